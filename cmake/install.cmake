@@ -1,11 +1,11 @@
-# What `cmake --install` puts where. The library is shared and its dependencies are private to it, so a program that
+# What `cmake --install` puts where, by component: library, development, program, documentation. The library is shared and its dependencies are private to it, so a program that
 # uses it looks for nothing else. CMake package and pkg-config file both find themselves: the prefix may be moved.
 include(CMakePackageConfigHelpers)
 
 install(TARGETS vdbshade EXPORT vdbshade-targets
-        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
+        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development
         INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-install(TARGETS vdbshade_oiio vdbshade_openvdb LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(TARGETS vdbshade_oiio vdbshade_openvdb LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/vdbshade COMPONENT library)
 
 # The program stands elsewhere, seen from the library, than in the build folder, and so is linked once more.
 cmake_path(IS_ABSOLUTE CMAKE_INSTALL_LIBDIR absolute)
@@ -14,26 +14,56 @@ if(absolute)
 else()
   set(VSH_LIBRARY_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
 endif()
-add_executable(vdbshade_cli_installed $<TARGET_OBJECTS:vdbshade_cli>)
+add_executable(vdbshade_cli_installed $<TARGET_OBJECTS:vdbshade_cli> $<TARGET_OBJECTS:vdbshade_help_pages>)
 target_link_libraries(vdbshade_cli_installed PRIVATE $<TARGET_PROPERTY:vdbshade_cli,LINK_LIBRARIES>)
 set_target_properties(vdbshade_cli_installed PROPERTIES
                       OUTPUT_NAME vdbshade RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/installed
                       INSTALL_RPATH "${VSH_LIBRARY_RPATH}" BUILD_WITH_INSTALL_RPATH ON LINKER_LANGUAGE C)
-install(TARGETS vdbshade_cli_installed RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(TARGETS vdbshade_reader RUNTIME DESTINATION ${VSH_READER_DIR})
-install(FILES LICENSE docs/licences.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
-install(DIRECTORY src/bindings/blender/vdbshade_bake DESTINATION ${CMAKE_INSTALL_DATADIR}/vdbshade/blender FILES_MATCHING PATTERN "*.py")
-install(DIRECTORY include/vdbshade DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
+install(TARGETS vdbshade_cli_installed RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
+install(TARGETS vdbshade_reader RUNTIME DESTINATION ${VSH_READER_DIR} COMPONENT library)
+install(FILES LICENSE docs/licences.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT library)
+install(DIRECTORY src/bindings/blender/vdbshade_bake DESTINATION ${CMAKE_INSTALL_DATADIR}/vdbshade/blender COMPONENT program
+        FILES_MATCHING PATTERN "*.py")
+install(DIRECTORY include/vdbshade DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development FILES_MATCHING PATTERN "*.h")
+install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation)
+install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation FILES_MATCHING PATTERN "*.md" PATTERN "*.png")
+install(DIRECTORY examples assets DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation)
+
+# The static library is the same objects, level sets among them; images other than EXR and PNG stay in their module. Who
+# links it links what it needs: names, which the linker looks for where it looks for everything.
+option(VSH_STATIC "Build the static library too" ON)
+if(VSH_STATIC AND NOT VSH_SANITIZE)
+  add_library(vdbshade_static STATIC $<TARGET_OBJECTS:vdbshade_objects> $<TARGET_OBJECTS:vdbshade_openvdb_objects>)
+  foreach(found openvdb half png assimp draco meshoptimizer jansson md sleef seccomp)
+    cmake_path(GET VSH_${found}_LIBRARY FILENAME file)
+    string(REGEX REPLACE "^lib(.*)\\.(so|a|dylib)$" "\\1" file ${file})
+    list(APPEND VSH_STATIC_NEEDS ${file})
+  endforeach()
+  list(APPEND VSH_STATIC_NEEDS tbb OpenEXRCore freetype z)
+  if(TARGET embree)
+    list(APPEND VSH_STATIC_NEEDS embree3)
+  endif()
+  list(APPEND VSH_STATIC_NEEDS stdc++ ${CMAKE_DL_LIBS} pthread m)
+  set_target_properties(vdbshade_static PROPERTIES OUTPUT_NAME vdbshade EXPORT_NAME static INTERFACE_LINK_LIBRARIES "${VSH_STATIC_NEEDS}")
+  target_include_directories(vdbshade_static INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  install(TARGETS vdbshade_static EXPORT vdbshade-static-targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development
+          INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+endif()
+list(TRANSFORM VSH_STATIC_NEEDS PREPEND "-l" OUTPUT_VARIABLE VSH_PC_PRIVATE)
+list(JOIN VSH_PC_PRIVATE " " VSH_PC_PRIVATE)
 
 set(VSH_PACKAGE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/vdbshade)
-install(EXPORT vdbshade-targets NAMESPACE vdbshade:: DESTINATION ${VSH_PACKAGE_DIR})
+install(EXPORT vdbshade-targets NAMESPACE vdbshade:: DESTINATION ${VSH_PACKAGE_DIR} COMPONENT development)
+if(TARGET vdbshade_static)
+  install(EXPORT vdbshade-static-targets NAMESPACE vdbshade:: DESTINATION ${VSH_PACKAGE_DIR} COMPONENT development)
+endif()
 configure_package_config_file(cmake/vdbshade-config.cmake.in vdbshade-config.cmake
-                              INSTALL_DESTINATION ${VSH_PACKAGE_DIR} NO_SET_AND_CHECK_MACRO)
+                              INSTALL_DESTINATION ${VSH_PACKAGE_DIR} PATH_VARS CMAKE_INSTALL_BINDIR NO_SET_AND_CHECK_MACRO)
 # Below 1.0 a minor version may change the interface.
 write_basic_package_version_file(vdbshade-config-version.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/vdbshade-config.cmake
               ${CMAKE_CURRENT_BINARY_DIR}/vdbshade-config-version.cmake
-        DESTINATION ${VSH_PACKAGE_DIR})
+        DESTINATION ${VSH_PACKAGE_DIR} COMPONENT development)
 
 # Folders that were given as absolute paths stay so; the others are found from where the .pc file lies.
 set(VSH_PC_DIR ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
@@ -54,4 +84,4 @@ else()
   set(VSH_PC_PREFIX "\${pcfiledir}/${VSH_PC_UP}")
 endif()
 configure_file(cmake/vdbshade.pc.in vdbshade.pc @ONLY)
-install(FILES ${CMAKE_CURRENT_BINARY_DIR}/vdbshade.pc DESTINATION ${VSH_PC_DIR})
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/vdbshade.pc DESTINATION ${VSH_PC_DIR} COMPONENT development)

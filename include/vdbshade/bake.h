@@ -13,6 +13,7 @@ enum { VSH_MAX_LIGHTMAP_SIZE = 65536 };
 
 enum { VSH_PADDING_AUTO = -1 };
 
+/* How a lightmap is made. */
 typedef struct vsh_lightmap_options {
     size_t struct_size;
     int32_t width;           /* texels, 1 … VSH_MAX_LIGHTMAP_SIZE */
@@ -92,8 +93,9 @@ static inline vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_c
 }
 VSH_API void vsh_texels_free(vsh_texels *texels); /* NULL does nothing */
 
+/* What texels come to. */
 typedef struct vsh_texels_info {
-    int32_t width;
+    int32_t width; /* texels */
     int32_t height;
     uint64_t covered;     /* texels with at least one sample */
     uint64_t samples;     /* evaluated positions, supersampling counted */
@@ -129,12 +131,13 @@ static inline vsh_result vsh_charts_create(const vsh_mesh *meshes, size_t mesh_c
 }
 VSH_API void vsh_charts_free(vsh_charts *charts); /* NULL does nothing */
 
+/* What charts come to. */
 typedef struct vsh_charts_info {
-    int32_t width;
+    int32_t width; /* texels */
     int32_t height;
     uint64_t covered; /* as of vsh_texels_info, of the whole lightmap */
-    uint64_t samples;
-    uint64_t bytes; /* in memory */
+    uint64_t samples; /* evaluated positions */
+    uint64_t bytes;   /* in memory */
 } vsh_charts_info;
 
 /* Cannot fail. */
@@ -164,7 +167,7 @@ VSH_API vsh_result vsh_texels_create_band(const vsh_charts *charts, int32_t firs
  * Rays against triangles begin on the sample's own where others are in the lift's way, or all of a light is
  * over it. */
 typedef struct vsh_texel_samples {
-    size_t count;
+    size_t count;            /* samples */
     const double *positions; /* [count][3], world units */
     const float *normals;    /* [count][3], unit, decide shadow: smooth where the mesh is, or geometric */
     const float *geometric_normals; /* [count][3], unit */
@@ -271,6 +274,7 @@ VSH_API double vsh_bake_error_rmse(const vsh_bake_error *error);
  * casters. NaN where nothing was held against them. */
 VSH_API double vsh_bake_error_field(const vsh_bake_error *error);
 
+/* What a bake did, and how far it is from the truth where that was asked for. */
 typedef struct vsh_bake_stats {
     size_t struct_size;
     uint64_t texels;           /* covered */
@@ -322,6 +326,7 @@ enum {
 VSH_API int32_t vsh_seams(const char *name);
 VSH_API const char *vsh_seams_name(int32_t seams);
 
+/* How seams are stitched. */
 typedef struct vsh_stitch_options {
     size_t struct_size;
     double max_change; /* how far a value may be moved, 0 … 1 (0.02): the standard error that it was baked to
@@ -371,6 +376,38 @@ static inline vsh_result vsh_lightmap_stitch(const vsh_charts *charts, const vsh
     return vsh_lightmap_stitch_sized(charts, lightmap, light_count, options, run, report, sizeof *report,
                                      error);
 }
+
+/* A lightmap among several that are stitched together. */
+typedef struct vsh_stitch_page {
+    const vsh_charts *charts;     /* of the lightmap */
+    const vsh_lightmap *lightmap; /* that is stitched, whole */
+} vsh_stitch_page;
+
+/* The same of several lightmaps of any sizes that have the same planes, such as pages of one atlas: borders
+ * between them, too. Nothing is done where there are none. Errors: as there. */
+VSH_API vsh_result vsh_lightmaps_stitch_sized(const vsh_stitch_page *pages, size_t page_count,
+                                              size_t light_count, const vsh_stitch_options *options,
+                                              const vsh_run *run, vsh_stitch_report *report,
+                                              size_t report_size, vsh_error *error);
+static inline vsh_result vsh_lightmaps_stitch(const vsh_stitch_page *pages, size_t page_count,
+                                              size_t light_count, const vsh_stitch_options *options,
+                                              const vsh_run *run, vsh_stitch_report *report,
+                                              vsh_error *error) {
+    return vsh_lightmaps_stitch_sized(pages, page_count, light_count, options, run, report, sizeof *report,
+                                      error);
+}
+
+/* Gives a whole lightmap's texels that are not valid and that no valid one of their chart filled, as those of
+ * faces that touch each other, the values of the texel that is nearest in the world, of the valid ones beside
+ * such that are not; and what is empty around them, up to 4 texels or the padding. Bent normals in tangent
+ * space are left. `texels` are those that the lightmap was baked of, all rows. *filled (may be NULL) is how
+ * many there are. Errors:
+ * - VSH_ERROR_ARGUMENT: texels, lightmap or its coverage NULL; texels of a band; run;
+ * - VSH_ERROR_LIMIT: run->memory_limit, beside texels and planes; 2^32 texels or samples;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED (nothing has changed then). */
+VSH_API vsh_result vsh_lightmap_fill_hidden(const vsh_texels *texels, const vsh_lightmap *lightmap,
+                                            size_t light_count, const vsh_run *run, uint64_t *filled,
+                                            vsh_error *error);
 
 #ifdef __cplusplus
 }

@@ -4,6 +4,7 @@
 
 #include "image.h"
 #include "lit.h"
+#include "parts.h"
 #include "scene.h"
 
 #ifdef __cplusplus
@@ -14,10 +15,10 @@ extern "C" {
 
 /* A lightmap of a job. The pointers belong to the job and hold until it is freed. */
 typedef struct vsh_job_lightmap {
-    size_t receiver;    /* its number in the scene */
-    const char *path;   /* of the receiver's file */
-    const char *output; /* file that it goes to; of an object its own */
-    const vsh_mesh *meshes;
+    size_t receiver;        /* its number in the scene */
+    const char *path;       /* of the receiver's file */
+    const char *output;     /* file that it goes to; of an object its own */
+    const vsh_mesh *meshes; /* [mesh_count]: that receive */
     size_t mesh_count;
     int32_t width; /* texels */
     int32_t height;
@@ -29,8 +30,8 @@ typedef struct vsh_job_lightmap {
     uint64_t resumed_rows;   /* that an earlier bake had kept */
     int32_t kept_rows; /* where its bake failed and `resume` was asked for: rows that the next one need not
                           bake */
-    size_t page;       /* of the receiver, where it is unwrapped onto several: an image's name then has its
-                          number before the ending, OUT.0.exr */
+    size_t page;       /* of the receiver, where it is unwrapped onto several, or has one for each object: an
+                          image's name then has its number before the ending, OUT.0.exr, or the object's name */
 } vsh_job_lightmap;
 
 /* Takes the rows of lightmaps, one lightmap after the other, from the top on, in the thread that called
@@ -45,7 +46,7 @@ typedef struct vsh_row_sink {
     /* It is whole, or `result` (not VSH_OK) says why it will not be, which what `end` returns then does not
      * change. Called once for each `begin` that returned VSH_OK. */
     vsh_result (*end)(void *user, vsh_result result, vsh_error *error);
-    void *user;
+    void *user; /* handed to its functions */
 } vsh_row_sink;
 
 static inline vsh_row_sink vsh_row_sink_default(void) {
@@ -57,8 +58,9 @@ static inline vsh_row_sink vsh_row_sink_default(void) {
 
 typedef struct vsh_bake_job_options {
     size_t struct_size;
-    int32_t per_object; /* nonzero: a lightmap for each object of every receiver, whose output holds "%s" in
-                           its file's name for the object's */
+    int32_t per_object;    /* nonzero: every receiver is of VSH_ATLAS_OBJECTS, a lightmap for each object. An
+                              image's name has the object's, in place of "%s", or else before the ending:
+                              OUT.NAME.exr */
     int32_t allow_overlap; /* nonzero: objects may share texels, whatever their receivers say */
     int32_t band_rows;     /* rows that are baked at a time, up to a multiple of VSH_BAND_STEP; 0: all, or as
                               many as run->memory_limit lets */
@@ -68,7 +70,7 @@ typedef struct vsh_bake_job_options {
     const char *invalid_picture; /* PNG of the texels that are not valid, for each lightmap: where there are
                                     several, FILE.OUTPUT.png. NULL: none. Not with `resume` */
     const vsh_row_sink *sink; /* NULL: image files at the receivers' outputs, which say where they come from
-                                 (vsh_provenance); where an output's name ends in .glb or .gltf, the
+                                 (vsh_provenance); where an output's name ends in .glb, .gltf or .obj, the
                                  receiver's file with its light (vsh_lit_write()): AO as occlusion, irradiance
                                  or else the mean of the lights' shadows as lightmap, whose intensity is π:
                                  what is lit fully shows its own colour */
@@ -85,12 +87,19 @@ typedef struct vsh_bake_job_options {
                             image shows is their unlit base colour */
     int32_t lit_image_place; /* VSH_LIT_IMAGES_… */
     const char *lit_exr;     /* EXR of all channels beside the one output; NULL: none */
+    int32_t shard; /* 1 … shard_count: vsh_bake_job_run() bakes only the rows that are its, as much work as
+                      any other's, and writes them into the file PARTS.SHARD-of-COUNT.part, whole or not at
+                      all; 0: all rows. Not with a sink or `invalid_picture` */
+    int32_t shard_count; /* 1 … 10000; for vsh_bake_job_merge() also 0: as many as there are beside PARTS */
+    const char *parts;   /* what the names of parts begin with; NULL: the first lightmap's output */
+    const char *const *words; /* [word_count]: kept in a part as they are, for vsh_part_words() */
+    size_t word_count;
 } vsh_bake_job_options;
 
 static inline vsh_bake_job_options vsh_bake_job_options_default(void) {
     vsh_bake_job_options options = {
-        sizeof(vsh_bake_job_options), 0,   0, 0, 0, NULL, NULL, NULL, NULL, 0, NULL, NULL, NULL, 0,
-        VSH_LIT_IMAGES_AUTO,          NULL};
+        sizeof(vsh_bake_job_options), 0,    0, 0, 0,    NULL, NULL, NULL, NULL, 0, NULL, NULL, NULL, 0,
+        VSH_LIT_IMAGES_AUTO,          NULL, 0, 0, NULL, NULL, 0};
     return options;
 }
 
@@ -105,7 +114,7 @@ VSH_API vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_
 
 /* Loads the scene's files and finds its lightmaps. Scene, options and what they point to must outlive the
  * job. Errors: as vsh_assets_load() and vsh_receiver_check(); VSH_ERROR_ARGUMENT (a pointer NULL, options,
- * run; an output without "%s" where per_object wants one; no receivers). */
+ * run; no receivers). */
 VSH_API vsh_result vsh_bake_job_create(const vsh_scene *scene, const vsh_bake_job_options *options,
                                        const vsh_run *run, vsh_bake_job **job, vsh_error *error);
 VSH_API void vsh_bake_job_free(vsh_bake_job *job); /* NULL does nothing */
@@ -126,6 +135,15 @@ VSH_API vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, v
  * are done by then stay. */
 VSH_API vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
 
+/* Puts the parts of all shards together, which vsh_bake_job_run() wrote for the same scene and options on
+ * whatever machines, in place of …_prepare() and …_run(): pads, fills, stitches, and writes the same files,
+ * bit by bit, as one bake that holds its lightmaps whole. What casts is not made. A lightmap that
+ * run->memory_limit does not let hold whole is written in bands of rows, as of a bake. Statistics are those
+ * of the parts, where what filled texels are off is not known. The parts stay. Errors: as …_measure() and the
+ * writing of …_run(); VSH_ERROR_READ (a part is missing), VSH_ERROR_INPUT (there are none; one is damaged, or
+ * of other inputs, options or another version than this job, all of which it names). */
+VSH_API vsh_result vsh_bake_job_merge(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
+
 /* How many lightmaps there are, and one of them. Cannot fail, but that `index` must be below the count. */
 VSH_API size_t vsh_bake_job_count(const vsh_bake_job *job);
 VSH_API void vsh_bake_job_lightmap_sized(const vsh_bake_job *job, size_t index, vsh_job_lightmap *lightmap,
@@ -139,15 +157,15 @@ VSH_API const vsh_assets *vsh_bake_job_assets(const vsh_bake_job *job);
 
 /* What a job has done so far. */
 typedef struct vsh_bake_report {
-    double load_s; /* seconds: files read and hashed */
-    double bake_s; /* texels made and shaded */
-    double write_s;
+    double load_s;   /* seconds: files read and hashed */
+    double bake_s;   /* texels made and shaded */
+    double write_s;  /* rows packed and written */
     uint64_t texels; /* these two of all lightmaps, as in vsh_bake_stats */
     uint64_t invalid_texels;
-    uint64_t resumed_rows;
-    uint64_t bands;
-    vsh_shade_stats shade;
-    vsh_occluders_info occluders;
+    uint64_t resumed_rows;        /* that earlier bakes had kept */
+    uint64_t bands;               /* baked, of all lightmaps */
+    vsh_shade_stats shade;        /* of all lightmaps */
+    vsh_occluders_info occluders; /* that all of them share */
     const vsh_bake_error *errors; /* [error_count]: of each light, of AO, of the sky; belong to the job */
     size_t error_count;           /* 2 + lights of the scene; 0 before vsh_bake_job_prepare() */
 } vsh_bake_report;
@@ -174,17 +192,17 @@ static inline vsh_result vsh_bake_scene(const vsh_scene *scene, const vsh_bake_j
 /* Found out by a small one: few voxels and a part of the texels are really made, by the same methods, and
  * what they took is scaled up. Texels, voxels and bands are close; times may be half or twice as much. */
 typedef struct vsh_bake_forecast {
-    uint64_t texels;
-    uint64_t samples;
-    double voxels; /* active, of all level sets; these three 0 where none are made */
+    uint64_t texels;  /* with at least one sample */
+    uint64_t samples; /* evaluated positions */
+    double voxels;    /* active, of all level sets; these three 0 where none are made */
     double voxel_size;
-    double resolution;  /* voxels along the longest side */
-    double peak_bytes;  /* at most */
-    double grid_bytes;  /* of the level sets */
-    double field_bytes; /* of the fields */
-    double voxelize_s;  /* seconds */
-    double field_s;
-    double bake_s;
+    double resolution;     /* voxels along the longest side */
+    double peak_bytes;     /* at most */
+    double grid_bytes;     /* of the level sets */
+    double field_bytes;    /* of the fields */
+    double voxelize_s;     /* seconds */
+    double field_s;        /* the same, fields and what rays are traced in */
+    double bake_s;         /* the same, texels */
     int32_t has_triangles; /* nonzero: they are traced, and auto is exact */
 } vsh_bake_forecast;
 

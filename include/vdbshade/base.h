@@ -38,6 +38,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* Before what the library shows. */
 #if defined(VSH_BUILD) && defined(__GNUC__)
 #define VSH_API __attribute__((visibility("default")))
 #else
@@ -48,6 +49,7 @@
 extern "C" {
 #endif
 
+/* The version of these headers; the library's is vsh_version(). */
 #define VSH_VERSION_MAJOR 0
 #define VSH_VERSION_MINOR 2
 #define VSH_VERSION_PATCH 0
@@ -76,8 +78,8 @@ VSH_API const char *vsh_result_name(vsh_result result);
 /* Filled by a call that fails; left alone by one that succeeds. The message is one line without control
  * characters, ends in NUL, and names file, place, value and limit where there are such. */
 typedef struct vsh_error {
-    vsh_result code;
-    char message[1020];
+    vsh_result code;    /* VSH_ERROR_… */
+    char message[1020]; /* what failed, in a line */
 } vsh_error;
 
 /* For bindings of other languages, which cannot call inline functions: what the …_default() or …_zero() of a
@@ -92,9 +94,9 @@ typedef struct vsh_attribute {
 } vsh_attribute;
 
 /* Told the stage ("load", "outline", "voxelize", "field", "charts", "texels", "validate", "shadow.NAME",
- * "ao", "padding", "volume", "flat", "hash", "compare", "page", "unwrap", "pack", "lit") and the fraction
- * done of it, 0 … 1, never falling within a stage. Called by one thread at a time, from any of the pool's
- * threads. Return 0 to go on; anything else cancels: the call frees what it took and returns
+ * "ao", "padding", "volume", "flat", "hash", "compare", "page", "unwrap", "pack", "lit", "parts", "merge")
+ * and the fraction done of it, 0 … 1, never falling within a stage. Called by one thread at a time, from any
+ * of the pool's threads. Return 0 to go on; anything else cancels: the call frees what it took and returns
  * VSH_ERROR_CANCELLED. At 1 a stage's work may be done, and what is returned be left alone: who wants to
  * cancel says so at every call from then on. */
 typedef int32_t vsh_progress_fn(void *user, const char *stage, double fraction);
@@ -102,6 +104,30 @@ typedef int32_t vsh_progress_fn(void *user, const char *stage, double fraction);
 /* Bad things that were worked around: one line each, without a newline ("mesh 'sail': 4 open edges: …"). Same
  * calling rules as vsh_progress_fn. */
 typedef void vsh_warning_fn(void *user, const char *message);
+
+/* A progress callback that hands on to another from time to time: for languages whose callbacks take long, or
+ * may be called by one thread alone. As vsh_run.progress goes vsh_progress_seldom(), as vsh_run.user the
+ * address of this, which is one call's. */
+typedef struct vsh_progress_filter {
+    size_t struct_size;
+    vsh_progress_fn *progress; /* handed on to with `user`: 0 and 1 of a stage, and in between at most every
+                                  `seconds`; else work goes on. What it answers other than 0 stays. May be
+                                  NULL */
+    void *user;                /* of `progress` */
+    double seconds;            /* by the clock, ≥ 0 */
+    uint64_t thread;  /* nonzero: that thread alone hands on, (uint64_t)pthread_self(); the one that makes a
+                         call takes part in its work */
+    double last;      /* these two are kept by vsh_progress_seldom(): when it handed on last, 0: not yet; */
+    int32_t answered; /* and what the callback answered */
+} vsh_progress_filter;
+
+static inline vsh_progress_filter vsh_progress_filter_default(void) {
+    vsh_progress_filter filter = {sizeof(vsh_progress_filter), NULL, NULL, 0.02, 0, 0.0, 0};
+    return filter;
+}
+
+/* A vsh_progress_fn: `filter` points to a vsh_progress_filter. */
+VSH_API int32_t vsh_progress_seldom(void *filter, const char *stage, double fraction);
 
 /* Instruction sets that the marching kernels are built for. Other parts of the library have one build; Embree
  * chooses its own. */

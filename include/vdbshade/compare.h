@@ -44,6 +44,7 @@ typedef struct vsh_compared {
     const uint8_t *mask; /* the same: compared where it is not 0. NULL: everywhere */
 } vsh_compared;
 
+/* How values are compared. */
 typedef struct vsh_compare_options {
     size_t struct_size;
     double threshold; /* of VSH_MEASURE_SHARE, in units of the range, 0 … 1 */
@@ -102,17 +103,17 @@ typedef struct vsh_measures {
     uint64_t count; /* values compared: masked in, finite in both */
     double range;   /* unit of all values here: 1, or the largest |golden| where that is more */
     double value[VSH_MEASURE_COUNT]; /* NaN where a measure does not apply: too few shadow edges, say */
-    uint64_t nonfinite[2];
-    uint64_t nonfinite_first[2]; /* index; meaningless where there is none */
-    double bias;                 /* with its sign, new - golden */
-    uint64_t worst;              /* index of the largest difference */
-    double worst_value[2];       /* there, as they are */
-    uint64_t edges[2];           /* shadow edges crossed */
-    uint64_t pairs;              /* of them found in both */
-    double width[2];             /* mean width of those from 10 % to 90 %, texels; NaN where there are none */
-    double shift[3];             /* x, y, z, texels: what stands at p in golden stands at p + shift in new */
-    double explained;            /* share of the squared difference that vanishes when that is undone */
-    vsh_region lost, gained;     /* the largest of each */
+    uint64_t nonfinite[2];           /* values that are no number */
+    uint64_t nonfinite_first[2];     /* index; meaningless where there is none */
+    double bias;                     /* with its sign, new - golden */
+    uint64_t worst;                  /* index of the largest difference */
+    double worst_value[2];           /* there, as they are */
+    uint64_t edges[2];               /* shadow edges crossed */
+    uint64_t pairs;                  /* of them found in both */
+    double width[2];         /* mean width of those from 10 % to 90 %, texels; NaN where there are none */
+    double shift[3];         /* x, y, z, texels: what stands at p in golden stands at p + shift in new */
+    double explained;        /* share of the squared difference that vanishes when that is undone */
+    vsh_region lost, gained; /* the largest of each */
 } vsh_measures;
 
 /* Measures how far values are from golden ones. Takes 22 bytes a value beside the caller's; runs under the
@@ -164,7 +165,7 @@ static inline vsh_result vsh_compare_accuracy(const vsh_compared *planes, size_t
 typedef struct vsh_limits {
     size_t struct_size;
     double value[VSH_MEASURE_COUNT]; /* of VSH_MEASURE_NONFINITE it is not looked at: it is 0 */
-    vsh_compare_options options;
+    vsh_compare_options options;     /* how its values are compared */
 } vsh_limits;
 
 /* Limits that bakes pass which differ by rounding: another compiler, files of 16 instead of 32 bits; and that
@@ -203,15 +204,15 @@ VSH_API void vsh_tolerances_apply(const vsh_tolerances *tolerances, const char *
 
 /* What came of a channel of two images, or of a grid of two .vdb files. */
 typedef struct vsh_channel_comparison {
-    char name[VSH_CHANNEL_NAME];
-    int32_t size[3];       /* depth 1: an image */
-    int32_t origin[3];     /* index of the first voxel; 0 in images */
-    int32_t is_coverage;   /* 1: it tells what is covered; the measures are not taken */
-    vsh_coverage coverage; /* of this channel, or this grid's active voxels */
-    double coverage_limit;
-    double max_error[2]; /* that golden and new say they were made to; NaN: they don't */
-    vsh_limits limits;
-    vsh_measures measures;
+    char name[VSH_CHANNEL_NAME];    /* the channel's or the grid's */
+    int32_t size[3];                /* depth 1: an image */
+    int32_t origin[3];              /* index of the first voxel; 0 in images */
+    int32_t is_coverage;            /* 1: it tells what is covered; the measures are not taken */
+    vsh_coverage coverage;          /* of this channel, or this grid's active voxels */
+    double coverage_limit;          /* that it was held to, as a share */
+    double max_error[2];            /* that golden and new say they were made to; NaN: they don't */
+    vsh_limits limits;              /* that it was held to */
+    vsh_measures measures;          /* what was measured */
     uint32_t failed;                /* as of vsh_compare_judge() */
     int32_t coverage_failed, alike; /* 1 or 0 */
 } vsh_channel_comparison;
@@ -232,7 +233,7 @@ typedef struct vsh_compare_files_options {
      * channel's. Other than 0 ends the comparison with VSH_ERROR_CANCELLED. May be NULL. */
     int32_t (*look)(void *user, size_t index, const vsh_channel_comparison *channel,
                     const vsh_compared *compared);
-    void *user;
+    void *user; /* handed to `look` */
 } vsh_compare_files_options;
 
 static inline vsh_compare_files_options vsh_compare_files_options_default(void) {
@@ -244,6 +245,7 @@ static inline vsh_compare_files_options vsh_compare_files_options_default(void) 
     return options;
 }
 
+/* What came of two files. */
 typedef struct vsh_comparison vsh_comparison;
 
 /* Compares two images channel by channel, or two .vdb files grid by grid, over what both cover. That they

@@ -12,6 +12,7 @@ extern "C" {
 /* Free it with vsh_field_free(). It does not need its grid any more. */
 typedef struct vsh_field vsh_field;
 
+/* How a field is made. */
 typedef struct vsh_field_options {
     size_t struct_size;
     double reach;    /* largest distance from a surface that must be told apart, world units, finite, > 0:
@@ -46,15 +47,16 @@ VSH_API void vsh_field_free(vsh_field *field); /* NULL does nothing */
 VSH_API void vsh_field_sample(const vsh_field *field, size_t count, const double *positions,
                               float *distances);
 
+/* What a field comes to. */
 typedef struct vsh_field_info {
     double voxel_size;    /* of the finest level, world units */
     double reach;         /* that the coarsest level resolves, world units */
     double bounds_min[3]; /* of the solid, world units */
     double bounds_max[3];
     double shell_thickness; /* of sheets in it, world units; 0: none */
-    int32_t levels;
-    uint64_t bricks; /* of 8³ cells, over all levels */
-    uint64_t bytes;  /* in memory */
+    int32_t levels;         /* of the pyramid, the finest one too */
+    uint64_t bricks;        /* of 8³ cells, over all levels */
+    uint64_t bytes;         /* in memory */
     uint64_t
         active_voxels; /* of the grid that it was made from: bytes / active_voxels are those of a voxel */
 } vsh_field_info;

@@ -30,6 +30,7 @@ VSH_API const char *vsh_flat_method_name(int32_t method);
  * A static string. */
 VSH_API const char *vsh_flat_light_name(int32_t type);
 
+/* How a light map of a plane is made. */
 typedef struct vsh_flat_options {
     size_t struct_size;
     int32_t width;        /* texels, 1 … 65536 */
@@ -88,30 +89,31 @@ enum {
     VSH_FLAT_POLYGON = 4 /* points */
 };
 
+/* A caster of a flat scene. Which members hold is told by its type. */
 typedef struct vsh_flat_caster {
-    int32_t type;     /* VSH_FLAT_… */
-    const char *path; /* file */
-    vsh_mask_options mask;
-    const char *text;
-    vsh_text_options letters;
-    double radius;        /* world units, > 0 */
-    double half_size[2];  /* the same */
-    const double *points; /* [point_count][2], closed, of either sense, may cross itself */
-    size_t point_count;   /* ≥ 3 */
-    double transform[6];  /* as in vsh_outline_instance */
+    int32_t type;             /* VSH_FLAT_… */
+    const char *path;         /* file */
+    vsh_mask_options mask;    /* how the image becomes an outline */
+    const char *text;         /* what is written, UTF-8 */
+    vsh_text_options letters; /* how it is written */
+    double radius;            /* world units, > 0 */
+    double half_size[2];      /* the same */
+    const double *points;     /* [point_count][2], closed, of either sense, may cross itself */
+    size_t point_count;       /* ≥ 3 */
+    double transform[6];      /* as in vsh_outline_instance */
 } vsh_flat_caster;
 
 /* A flat scene, read from a file or filled by the caller. Paths are as the system takes them. */
 typedef struct vsh_flat_scene {
-    const vsh_flat_caster *casters;
+    const vsh_flat_caster *casters; /* [caster_count] */
     size_t caster_count;
-    const vsh_light *lights; /* no two names alike, none empty: channels are named after them */
-    size_t light_count;
-    vsh_flat_options options;
-    const char *output;  /* image file; NULL: none is named */
-    int32_t bits;        /* as in vsh_image_options */
-    const char *pack;    /* as in vsh_image_options; may be NULL */
-    int32_t color_space; /* as in vsh_image_options */
+    const vsh_light *lights;  /* no two names alike, none empty: channels are named after them */
+    size_t light_count;       /* how many lights */
+    vsh_flat_options options; /* how its map is made */
+    const char *output;       /* image file; NULL: none is named */
+    int32_t bits;             /* as in vsh_image_options */
+    const char *pack;         /* as in vsh_image_options; may be NULL */
+    int32_t color_space;      /* as in vsh_image_options */
 } vsh_flat_scene;
 
 /* Reads a flat scene's file (docs/flat.md); what it names is not opened. The scene and all it points to

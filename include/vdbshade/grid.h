@@ -14,6 +14,7 @@ extern "C" {
 /* An OpenVDB level set of floats. Free it with vsh_grid_free(). */
 typedef struct vsh_grid vsh_grid;
 
+/* How a level set is made. */
 typedef struct vsh_grid_options {
     size_t struct_size;
     double voxel_size;  /* edge of a voxel, world units, 1e-12 … 1e12; 0: from `resolution` */
@@ -69,8 +70,8 @@ typedef double vsh_distance_fn(void *user, const double position[3]);
 
 /* A field given by a callback. A view; nothing is owned. */
 typedef struct vsh_distance {
-    vsh_distance_fn *distance;
-    void *user;
+    vsh_distance_fn *distance; /* the callback */
+    void *user;                /* handed to it */
     double lipschitz;     /* bound on |distance(a) - distance(b)| / |a - b|, > 0; 1 for a true distance. Less
                              than the truth loses parts of the surface */
     int32_t exact;        /* nonzero: a true distance near the surface, taken as it is; 0: re-distanced */
@@ -86,6 +87,17 @@ typedef struct vsh_distance {
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_grid_from_distance(const vsh_distance *field, const vsh_grid_options *options,
                                           const vsh_run *run, vsh_grid **grid, vsh_error *error);
+
+/* Signed distances at `count` world positions [count][3] into distances[count]: as vsh_distance_fn, 8 or 64
+ * positions at a time where there are so many. */
+typedef void vsh_distances_fn(void *user, size_t count, const double *positions, double *distances);
+
+/* The same level set as of vsh_grid_from_distance(), of a callback that is asked for many positions at once:
+ * `distances` in place of field->distance, which is not called. For callers to whom a call is dear. A field
+ * that is re-distanced is asked for single positions, too. Errors: as there. */
+VSH_API vsh_result vsh_grid_from_distances(const vsh_distance *field, vsh_distances_fn *distances,
+                                           const vsh_grid_options *options, const vsh_run *run,
+                                           vsh_grid **grid, vsh_error *error);
 
 /* Reads level set `name` of a .vdb file; NULL: the first grid of class level set. Translated, rotated,
  * mirrored and uniformly scaled transforms are kept, with voxels of 1e-5 … 1e12 world units. Where the
@@ -114,7 +126,7 @@ VSH_API vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const 
 
 /* A caster for vsh_grid_unite(): a grid and where it stands. A view; nothing is owned. */
 typedef struct vsh_grid_instance {
-    const vsh_grid *grid;
+    const vsh_grid *grid;    /* in a place of its own, or in several */
     const double *transform; /* [12], grid's world to world, three rows of four: any of rotation, translation,
                                 mirroring and one scale (to 1e-6); NULL: as it is */
 } vsh_grid_instance;
@@ -131,6 +143,7 @@ VSH_API vsh_result vsh_grid_unite(const vsh_grid_instance *instances, size_t ins
                                   const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
                                   vsh_error *error);
 
+/* What a level set comes to. */
 typedef struct vsh_grid_info {
     double voxel_size;    /* world units */
     double half_width;    /* voxels */
@@ -167,17 +180,17 @@ VSH_API vsh_result vsh_grid_to_openvdb(const vsh_grid *grid, uint32_t version, u
 
 /* One grid of a .vdb file, of any kind. Texts that do not fit are cut. */
 typedef struct vsh_vdb_entry {
-    char name[128];
+    char name[128];       /* may be empty, and of several grids the same */
     char type[64];        /* "Tree_float_5_4_3" */
     char grid_class[32];  /* "level set", "fog volume", … */
     double voxel_size[3]; /* world units along the grid's own axes */
     double background;    /* 0 where the values are not floats or doubles */
     int32_t index_min[3]; /* of the active voxels; 0 where there are none */
     int32_t index_max[3];
-    uint64_t active_voxels;
-    uint64_t bytes;        /* in memory */
-    char problem[256];     /* why it cannot cast shadows, or what is odd about it; empty: nothing */
-    char attributes[8192]; /* metadata that vdbshade wrote: lines "NAME: VALUE", each with a newline */
+    uint64_t active_voxels; /* with those of tiles */
+    uint64_t bytes;         /* in memory */
+    char problem[256];      /* why it cannot cast shadows, or what is odd about it; empty: nothing */
+    char attributes[8192];  /* metadata that vdbshade wrote: lines "NAME: VALUE", each with a newline */
 } vsh_vdb_entry;
 
 /* Lists up to `capacity` grids of a .vdb file into `entries` (may be NULL where that is 0), and their

@@ -59,11 +59,12 @@ VSH_API vsh_result vsh_heights_create(const vsh_heights_source *source, const vs
                                       vsh_heights **heights, vsh_error *error);
 VSH_API void vsh_heights_free(vsh_heights *heights); /* NULL does nothing */
 
+/* What a heightfield comes to. */
 typedef struct vsh_heights_info {
-    int32_t columns;
-    int32_t rows;
-    double lowest; /* samples, local units */
-    double highest;
+    int32_t columns;      /* samples along x */
+    int32_t rows;         /* samples along z */
+    double lowest;        /* samples, local units */
+    double highest;       /* the same */
     double bounds_min[3]; /* world box of the solid */
     double bounds_max[3];
     uint64_t bytes; /* in memory */

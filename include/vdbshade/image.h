@@ -48,6 +48,7 @@ VSH_API const char *vsh_color_space_name(int32_t color_space);
 /* Takes the sRGB curve off a value of 0 … 1. */
 VSH_API double vsh_srgb_to_linear(double encoded);
 
+/* How an image is written. */
 typedef struct vsh_image_options {
     size_t struct_size;
     int32_t bits; /* of a value: 8 and 16 are integers (16 in EXR: half float), 32 is float; 0: 32 for EXR,

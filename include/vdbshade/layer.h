@@ -37,10 +37,10 @@ typedef struct vsh_layer {
                             of no account for spheres */
     const vsh_triangles *triangles; /* its casters', for exact methods; auto is exact with them; else NULL */
     const char *const *lights;      /* [light_count]: names of the lights it casts for; NULL: of all */
-    size_t light_count;
-    int32_t ao;                 /* nonzero: part of ambient occlusion */
-    const vsh_heights *heights; /* a heightfield as it is */
-    const vsh_spheres *spheres; /* spheres as they are */
+    size_t light_count;             /* how many lights */
+    int32_t ao;                     /* nonzero: part of ambient occlusion */
+    const vsh_heights *heights;     /* a heightfield as it is */
+    const vsh_spheres *spheres;     /* spheres as they are */
     const char *name; /* that of a scene's layer; NULL: none. For the caller: nothing here reads it */
 } vsh_layer;
 

@@ -1,5 +1,5 @@
 /* Assets with their light: a glTF or GLB given back as it was, with one more set of UVs and with what was
- * baked in its materials; and a GLB made of a mesh file of another format (docs/lit.md). */
+ * baked in its materials; a GLB made of a mesh file of another format; an OBJ (docs/lit.md). */
 #ifndef VDBSHADE_LIT_H
 #define VDBSHADE_LIT_H
 
@@ -40,10 +40,10 @@ enum {
 
 /* An image of one page for one purpose, at most one each. Either `png`, or planes. */
 typedef struct vsh_lit_image {
-    int32_t purpose; /* VSH_LIT_… */
-    uint32_t page;
-    const void *png; /* [png_size] bytes of a PNG file, which are taken as they are */
-    size_t png_size;
+    int32_t purpose;       /* VSH_LIT_… */
+    uint32_t page;         /* from 0 */
+    const void *png;       /* [png_size] bytes of a PNG file, which are taken as they are */
+    size_t png_size;       /* bytes */
     int32_t width, height; /* of planes: texels, 1 … 65536 */
     const float *const
         *channels;         /* of planes: [channel_count][height × width], row 0 on top (v = 1), linear */
@@ -58,9 +58,11 @@ typedef struct vsh_lit_image {
 enum {
     VSH_LIT_IMAGES_AUTO = 0,   /* into a GLB, beside a glTF */
     VSH_LIT_IMAGES_EMBED = 1,  /* into the buffer */
-    VSH_LIT_IMAGES_BESIDE = 2, /* OUT.PURPOSE.png, or OUT.PURPOSE.PAGE.png where there are several pages */
+    VSH_LIT_IMAGES_BESIDE = 2, /* OUT.PURPOSE.png, or OUT.PURPOSE.PAGE.png where there are several pages, or
+                                  where a page has a name */
 };
 
+/* How a lit file is written. */
 typedef struct vsh_lit_options {
     size_t struct_size;
     const uint32_t *chart_pages; /* [chart_count]: the page that each chart lies on */
@@ -68,15 +70,24 @@ typedef struct vsh_lit_options {
     const vsh_lit_image *images; /* [image_count], in any order. A page without any leaves its materials as
                                     they are */
     size_t image_count;
-    int32_t image_place; /* VSH_LIT_IMAGES_… */
+    int32_t image_place;           /* VSH_LIT_IMAGES_… */
+    const char *const *page_names; /* [page_count]: of pages, UTF-8, as file names may be: images have them in
+                                      their names, and beside the file in place of the page's number. NULL,
+                                      and a name that is NULL: none */
+    size_t page_count;
+    const vsh_attribute *attributes; /* [attribute_count]: where it comes from (provenance.h): into the extras
+                                        of the document's asset, in place of earlier ones that begin with
+                                        "vdbshade_"; comments of an .obj. Extras that are no object stay */
+    size_t attribute_count;
 } vsh_lit_options;
 
 static inline vsh_lit_options vsh_lit_options_default(void) {
-    vsh_lit_options options = {sizeof(vsh_lit_options), NULL, 0, NULL, 0, VSH_LIT_IMAGES_AUTO};
+    vsh_lit_options options = {sizeof(vsh_lit_options), NULL, 0, NULL, 0,
+                               VSH_LIT_IMAGES_AUTO,     NULL, 0, NULL, 0};
     return options;
 }
 
-/* Writes `output`, a .glb or .gltf by its ending.
+/* Writes `output`, a .glb, .gltf or .obj by its ending.
  *
  * Where `path` is a .glb or .gltf, that document with all that it holds, known or not: each primitive that
  * has uvs gets them as its first free TEXCOORD_n; vertices are doubled only where the atlas splits them, and
@@ -90,14 +101,19 @@ static inline vsh_lit_options vsh_lit_options_default(void) {
  * Of other formats, and where path is NULL, a document is made of the model: a node for each object with its
  * transform, positions, normals, the first set of UVs and the new one, white materials.
  *
+ * An .obj holds the model's meshes in the world, by their names, with the UVs that they are lit by alone. Its
+ * images are PREVIEW, and stand beside it; a material page_N for each page (OUT.mtl, where there are images)
+ * shows its image. Without images it has the UVs, and materials where there are several pages.
+ *
  * `model` is what vsh_model_read() made of `path`, whose file has not changed since; `meshes` one for each of
  * its meshes, in the order of vsh_model_mesh(); NULL: all have their lightmap in the set that
  * vsh_model_mesh() takes for -1, on page 0. Draco's data is decoded by run->reader, where there is one.
  * Stage: "lit". Files are written beside their places and renamed when all are whole; a failure leaves old
  * ones as they were. Errors:
- * - VSH_ERROR_ARGUMENT: model, output or an array NULL; options, run; an ending other than .glb and .gltf; a
+ * - VSH_ERROR_ARGUMENT: model, output or an array NULL; options, run; another ending; a
  *   mesh that does not fit the model's, a chart, page, set or image out of range, two images of one page and
- *   purpose, UVs that are not finite; an output that would replace a file that the input is made of;
+ *   purpose, UVs that are not finite; an output that would replace a file that the input is made of, or an
+ * OUT.mtl that is not ours;
  * - VSH_ERROR_INPUT: a document that is not well formed, or not the model's;
  * - VSH_ERROR_READ: as vsh_model_read(); a buffer that is short or missing;
  * - VSH_ERROR_LIMIT: run->memory_limit; a GLB of 4 GiB or more;

@@ -28,6 +28,25 @@ enum {
     VSH_ALPHA_BLENDED = 2 /* glass, smoke */
 };
 
+/* What a texture is where UVs leave 0 … 1. */
+enum {
+    VSH_WRAP_REPEAT = 0,
+    VSH_WRAP_MIRROR = 1, /* repeated, every other time mirrored */
+    VSH_WRAP_CLAMP = 2   /* its edge goes on */
+};
+
+/* Where a mesh is cut out by a texture: light comes through where base_alpha × the texture's alpha, looked up
+ * bilinearly, is below alpha_cutoff (glTF 2.0, 3.9.4). A view; nothing is owned. */
+typedef struct vsh_alpha_mask {
+    const uint8_t *alpha;   /* [height][width], 255 is 1, row 0 on top (v = 1) */
+    int32_t width, height;  /* texels, ≥ 1 */
+    int32_t wrap[2];        /* VSH_WRAP_…, along u and v */
+    double uv_transform[6]; /* rows (a, b, c), (d, e, f): looked up at u' = a u + b v + c, v' = d u + e v + f,
+                               v up in all; all finite */
+    double alpha_cutoff;    /* ≥ 0 */
+    double base_alpha;      /* 0 … 1 */
+} vsh_alpha_mask;
+
 /* A view of a triangle mesh: nothing is copied or owned. */
 typedef struct vsh_mesh {
     const char *name;       /* for messages; may be NULL */
@@ -45,10 +64,18 @@ typedef struct vsh_mesh {
     int32_t solidity; /* VSH_SOLIDITY_…; where it casts */
     const struct vsh_checked_mesh *checked; /* what is known of views from a scene's assets, so that it is
                                                not looked for again. Else NULL */
-    int32_t alpha; /* VSH_ALPHA_…; what scenes make of it: vsh_caster.cast_blended */
+    int32_t alpha;     /* VSH_ALPHA_…; what scenes make of it: vsh_caster.cast_blended */
+    int32_t one_sided; /* nonzero: where it casts, light that falls on the backs of its faces comes through,
+                          as where an engine culls back faces; methods that march voxels take no notice */
+    const vsh_alpha_mask *mask; /* where it is cut out; it casts so, and is a sheet whatever its solidity
+                                   says. NULL: nowhere */
+    const float *mask_uvs;      /* [vertex_count][2], texture coordinates for the mask, v up; where there is a
+                                   mask. What is not finite is opaque */
+    const char *material_name;  /* may be NULL */
 } vsh_mesh;
 
-/* Whether a mesh is meant by `pattern`: its name, its object's name, or what its name has behind its object's
+/* Whether a mesh is meant by `pattern`: "material:PATTERN" means those whose material's name PATTERN is, or
+ * matches; any other its name, its object's name, or what its name has behind its object's
  * ("Wall", "Cube.003" and "Wall/Cube.003" for a node Wall with a mesh Cube.003) is `pattern`, or is matched
  * by it as a shell matches: * for anything, ? for one character, [a-c] for one byte of some, [!a-c] for one
  * of all others, \\ before what is meant as it is. Case counts. 1 or 0; 0 too where either is NULL. */
@@ -117,15 +144,9 @@ VSH_API double vsh_unit(const char *name);
 /* Number of UV sets of mesh `index` (< mesh count), 0 … VSH_MAX_UV_SETS. */
 VSH_API int32_t vsh_model_uv_sets(const vsh_model *model, size_t index);
 
-/* What a texture is where UVs leave 0 … 1. */
-enum {
-    VSH_WRAP_REPEAT = 0,
-    VSH_WRAP_MIRROR = 1, /* repeated, every other time mirrored */
-    VSH_WRAP_CLAMP = 2   /* its edge goes on */
-};
-
-/* A material of a file (glTF), as far as it decides where light comes through. What is of the texture is told
- * of masked ones only; light comes through these where base_alpha × the texture's alpha < alpha_cutoff. */
+/* A material of a file, as far as it decides where light comes through. What is of the texture is told
+ * of masked and blended ones; light comes through masked ones where base_alpha × the texture's alpha <
+ * alpha_cutoff. */
 typedef struct vsh_model_material {
     const char *name;       /* NULL where it has none */
     int32_t alpha;          /* VSH_ALPHA_… */
@@ -143,7 +164,8 @@ typedef struct vsh_model_material {
                                there. NULL: none */
 } vsh_model_material;
 
-/* Number of materials of the file: of glTF; of other formats 0. */
+/* Number of materials of the file: of PLY 0. Of formats other than glTF name and
+ * `alpha` are told. */
 VSH_API size_t vsh_model_material_count(const vsh_model *model);
 
 /* Material `index` (< material count). What it points to belongs to the model. */

@@ -15,6 +15,7 @@ extern "C" {
  * scene (vsh_scene_occluders()). Free it with vsh_occluders_free(). */
 typedef struct vsh_occluders vsh_occluders;
 
+/* How occluders are made of meshes. */
 typedef struct vsh_occluders_options {
     size_t struct_size;
     double reach;          /* as in vsh_field_options */
@@ -87,6 +88,7 @@ static inline void vsh_occluders_get_parts(const vsh_occluders *occluders, vsh_o
     vsh_occluders_get_parts_sized(occluders, parts, sizeof *parts);
 }
 
+/* What occluders come to. */
 typedef struct vsh_occluders_info {
     double voxel_size;        /* of the first field, world units: that of casters in no layer where there are
                                  such; 0: nothing is voxelised */
@@ -99,8 +101,8 @@ typedef struct vsh_occluders_info {
     uint64_t triangles_bytes; /* in memory, the true ones too */
     int32_t has_triangles;    /* 1: of casters in no layer; auto is exact for them */
     double voxelize_s;        /* seconds that these took to make; 0 of parts */
-    double field_s;
-    double triangles_s;
+    double field_s;           /* the same, of the field */
+    double triangles_s;       /* the same, of what rays are traced in */
 } vsh_occluders_info;
 
 /* Cannot fail. */

@@ -13,6 +13,7 @@ extern "C" {
  * with vsh_outline_free(). */
 typedef struct vsh_outline vsh_outline;
 
+/* How an image becomes an outline. */
 typedef struct vsh_mask_options {
     size_t struct_size;
     double width;        /* of the image, world units, > 0 … 1e15 */
@@ -50,6 +51,7 @@ enum { VSH_ALIGN_LEFT = 0, VSH_ALIGN_CENTER = 1, VSH_ALIGN_RIGHT = 2 };
 VSH_API int32_t vsh_align(const char *name);
 VSH_API const char *vsh_align_name(int32_t align);
 
+/* How letters become an outline. */
 typedef struct vsh_text_options {
     size_t struct_size;
     double height;       /* of the font's em, world units, > 0 … 1e15; capitals are about 0.7 of it */
@@ -88,7 +90,7 @@ VSH_API vsh_result vsh_outline_from_polygons(const double *points, const size_t 
 
 /* An outline and where it stands. A view; nothing is owned. */
 typedef struct vsh_outline_instance {
-    const vsh_outline *outline;
+    const vsh_outline *outline; /* in a place of its own, or in several */
     const double *transform; /* [6], local to world, two rows of three (column 2 translates), may mirror and
                                 scale unevenly, but not flatten; NULL: identity */
 } vsh_outline_instance;
@@ -99,9 +101,10 @@ typedef struct vsh_outline_instance {
 VSH_API vsh_result vsh_outline_unite(const vsh_outline_instance *instances, size_t instance_count,
                                      const vsh_run *run, vsh_outline **outline, vsh_error *error);
 
+/* What an outline comes to. */
 typedef struct vsh_outline_info {
-    size_t contours;
-    size_t points;
+    size_t contours;      /* closed polygons */
+    size_t points;        /* of all of them */
     double area;          /* world units² */
     double bounds_min[2]; /* world units */
     double bounds_max[2];

@@ -31,7 +31,7 @@ static inline size_t vsh_texel_place(uint32_t texel, int32_t width) {
  * Bungartz and Griebel, "Sparse grids", 2004). A value thus depends, within its error, on the points before
  * and after it; never on threads. */
 typedef struct vsh_points {
-    size_t count;
+    size_t count;            /* points */
     const double *positions; /* [count][3], world units */
     const float *normals;   /* [count][3], geometric, of any length, pointing away from the solid; may be NULL
                                for shadows: then there is no start offset, no horizon and no back side */

@@ -52,9 +52,9 @@ typedef struct vsh_point_layout {
     size_t struct_size;
     const float *float_positions; /* [count][3]: in place of points->positions, which is then NULL; the bits
                                      are those of the same numbers as doubles */
-    size_t position_stride;
-    size_t normal_stride;
-    size_t texel_stride;
+    size_t position_stride;       /* bytes from one position to the next */
+    size_t normal_stride;         /* the same of normals */
+    size_t texel_stride;          /* the same of texels */
 } vsh_point_layout;
 
 static inline vsh_point_layout vsh_point_layout_default(void) {

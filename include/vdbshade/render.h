@@ -58,8 +58,8 @@ enum { VSH_MAX_PICTURE_SIZE = 16384, VSH_MAX_SURFACES = 65536 };
 
 /* What camera rays meet: the zero surface of a field. A view; nothing is owned. */
 typedef struct vsh_surface {
-    const vsh_field *field;
-    double color[3]; /* linear RGB, share of light that comes back, 0 … 1 */
+    const vsh_field *field; /* whose zero surface is shown */
+    double color[3];        /* linear RGB, share of light that comes back, 0 … 1 */
 } vsh_surface;
 
 /* Meshes that are shown themselves, with a lightmap on them or in the light that the occluders leave. A
@@ -74,11 +74,12 @@ typedef struct vsh_lit_meshes {
     int32_t ambient; /* nonzero: its irradiance has the sky's light in it already (vsh_lightmap.ambient) */
 } vsh_lit_meshes;
 
+/* How a picture is drawn. */
 typedef struct vsh_render_options {
     size_t struct_size;
-    vsh_camera camera;
-    int32_t width;   /* pixels, 1 … VSH_MAX_PICTURE_SIZE */
-    int32_t height;  /* the same */
+    vsh_camera camera; /* where it is seen from */
+    int32_t width;     /* pixels, 1 … VSH_MAX_PICTURE_SIZE */
+    int32_t height;    /* the same */
     int32_t samples; /* N: N × N rays a pixel, jittered within their cells, under a Blackman-Harris filter 3
                         pixels wide (F. J. Harris, 1978); 1 … 16, and width × N at most 65000, so height */
     int32_t ao;      /* nonzero: the sky's light is multiplied by ambient occlusion */
@@ -91,8 +92,8 @@ typedef struct vsh_render_options {
     const vsh_lit_meshes *lit; /* [lit_count]: shown in front of surfaces up to 1.5 voxels nearer; may be
                                   NULL */
     size_t lit_count;
-    vsh_tint tint; /* of penumbrae */
-    vsh_shade_options shade;
+    vsh_tint tint;           /* of penumbrae */
+    vsh_shade_options shade; /* how shadow and AO are found */
 } vsh_render_options;
 
 static inline vsh_render_options vsh_render_options_default(void) {

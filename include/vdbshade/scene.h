@@ -3,6 +3,7 @@
 #define VDBSHADE_SCENE_H
 
 #include "bake.h"
+#include "field_file.h"
 #include "grid.h"
 #include "heights.h"
 #include "occluders.h"
@@ -25,7 +26,8 @@ enum {
     VSH_CASTER_TEXT = 6         /* text, likewise */
 };
 
-/* Which of a file's meshes are meant, by patterns as of vsh_mesh_matches(). All zero: all of them. */
+/* Which of a file's meshes are meant, by patterns as of vsh_mesh_matches(); one that matches none of them by
+ * these names means materials of that name. All zero: all of them. */
 typedef struct vsh_selection {
     const char *const *only; /* [only_count]: those that one of these matches, where there are any */
     size_t only_count;
@@ -35,10 +37,11 @@ typedef struct vsh_selection {
 
 /* What meshes are to be taken for, by a pattern as of vsh_mesh_matches(). */
 typedef struct vsh_solidity_rule {
-    const char *pattern;
-    int32_t solidity; /* VSH_SOLIDITY_… */
+    const char *pattern; /* of the names that are meant */
+    int32_t solidity;    /* VSH_SOLIDITY_… */
 } vsh_solidity_rule;
 
+/* A caster of a scene. Which members hold is told by its type. */
 typedef struct vsh_caster {
     int32_t type;         /* VSH_CASTER_… */
     const char *path;     /* mesh, vdb, heightfield, mask: file; text: font; spheres: NULL, or a file
@@ -53,15 +56,18 @@ typedef struct vsh_caster {
     int32_t direct;        /* heightfield: nonzero: cast as it is (vsh_heights), not voxelised */
     const double *spheres; /* [sphere_count][4], where there is no path: as in vsh_spheres_create() */
     size_t sphere_count;
-    int32_t voxelised; /* spheres: nonzero: part of the level set; 0: cast as they are (vsh_spheres) */
-    vsh_mask_options mask;
-    const char *text;
-    vsh_text_options letters;          /* text */
-    double thickness;                  /* mask, text: along z, local units, > 0 */
-    double color[3];                   /* in pictures, linear RGB, 0 … 1; all 0: 0.7, a light grey */
-    vsh_selection objects;             /* mesh: which of its meshes cast */
+    int32_t voxelised;        /* spheres: nonzero: part of the level set; 0: cast as they are (vsh_spheres) */
+    vsh_mask_options mask;    /* mask: how its image becomes an outline */
+    const char *text;         /* text: what is written, UTF-8 */
+    vsh_text_options letters; /* text */
+    double thickness;         /* mask, text: along z, local units, > 0 */
+    double color[3];          /* in pictures, linear RGB, 0 … 1; all 0: 0.7, a light grey */
+    vsh_selection objects;    /* mesh: which of its meshes cast */
     const vsh_solidity_rule *solidity; /* [solidity_count]; mesh: of those that cast; later ones overrule */
     size_t solidity_count;
+    const char *const *one_sided; /* [one_sided_count]; mesh: patterns of those that are (vsh_mesh.one_sided):
+                                     of materials, too, where no object is called so */
+    size_t one_sided_count;
 } vsh_caster;
 
 /* Casters that are shaded in a way of their own. */
@@ -83,17 +89,24 @@ enum {
     VSH_RECEIVER_UNWRAP_NEVER = 1,
     VSH_RECEIVER_UNWRAP_AUTO =
         2, /* where no lightmap can be baked by its own, because there are none, they
-              leave the unit square or lie over each other, and where texels_per_unit or
-              pages are given; what is laid out well in
-              each of its meshes stays so, and is packed anew */
+              leave the unit square or lie over each other (of VSH_ATLAS_OBJECTS within an object),
+              and where texels_per_unit, pages, max_size or density are given; what is laid out
+              well in each of its meshes stays so, and is packed anew */
     VSH_RECEIVER_UNWRAP_ALWAYS = 3
 };
+
+/* A factor of a receiver's texels_per_unit for the meshes that a pattern means, as in vsh_selection. */
+typedef struct vsh_density_rule {
+    const char *pattern; /* of names, as in vsh_mesh_matches() */
+    double factor;       /* finite, > 0 */
+} vsh_density_rule;
 
 /* "default", "never", "auto", "always" to VSH_RECEIVER_UNWRAP_… and back; -1 and NULL for what is none. Names
  * are static; NULL is none. */
 VSH_API int32_t vsh_receiver_unwrap(const char *name);
 VSH_API const char *vsh_receiver_unwrap_name(int32_t unwrap);
 
+/* What a lightmap of a scene is baked for. */
 typedef struct vsh_receiver {
     const char *path;     /* mesh file, or a heightfield's image */
     double transform[12]; /* local to world */
@@ -102,13 +115,13 @@ typedef struct vsh_receiver {
     int32_t height;
     int32_t supersample;
     int32_t padding;
-    int32_t ao_spacing;
+    int32_t ao_spacing; /* as in vsh_lightmap_options */
     const char *output; /* image file */
     int32_t bits;       /* as in vsh_image_options */
     const char *pack;   /* as in vsh_image_options; may be NULL */
     int32_t type;       /* VSH_RECEIVER_…; a heightfield is made as VSH_HEIGHTS_SURFACE, its UV set is 0 */
     double extent[2];   /* heightfield: size and height in vsh_heights_source */
-    double relief;
+    double relief;      /* heightfield: the height */
     vsh_selection objects; /* mesh: which of its meshes receive */
     int32_t partial; /* mesh: nonzero: those without UVs, or without the set, are left out with a warning,
                         as long as one has them */
@@ -123,28 +136,51 @@ typedef struct vsh_receiver {
     int32_t seams; /* mesh: VSH_SEAMS_…; FIX moves values by up to the scene's shade.max_error, and pads
                       by 2 texels at least. A lightmap that is baked in bands of rows keeps its seams, with
                       a warning */
+    int32_t
+        atlas; /* mesh: VSH_ATLAS_…; OBJECTS: each object has a lightmap of its own, whose UVs, where it is
+                  unwrapped, are packed alone. An image's name then has the object's (vsh_bake_job_create())
+                */
+    int32_t max_size;                /* where it is unwrapped, with texels_per_unit: a page has the fewest
+                                        texels that it needs (vsh_unwrap_options.fit_pages), at most so many on
+                                        a side, ≤ VSH_MAX_LIGHTMAP_SIZE; 0: it has `width` × `height` */
+    const vsh_density_rule *density; /* [density_count]: where it is unwrapped (vsh_model_densities()) */
+    size_t density_count;
 } vsh_receiver;
+
+/* A file whose lights a scene file takes, and which of the scene's they are. */
+typedef struct vsh_light_file {
+    const char *path; /* of a .glb or .gltf, as the system takes it */
+    double angle;     /* these two as in vsh_lights_read() */
+    double radius;
+    size_t first; /* lights[first …] of the scene, `count` > 0 of them, are the file's */
+    size_t count; /* of its lights */
+} vsh_light_file;
+
+/* "shared", "objects" to VSH_ATLAS_… and back; -1 and NULL for what is none. Names are static; NULL is none.
+ */
+VSH_API int32_t vsh_atlas_kind(const char *name);
+VSH_API const char *vsh_atlas_kind_name(int32_t atlas);
 
 /* A whole scene, read from a file or filled by the caller. Paths are as the system takes them (the reader has
  * put the scene file's folder in front of relative ones). */
 typedef struct vsh_scene {
-    const vsh_caster *casters;
+    const vsh_caster *casters; /* [caster_count] */
     size_t caster_count;
     const vsh_scene_layer *layers; /* that casters may be in */
-    size_t layer_count;
-    const vsh_light *lights; /* no two names alike, none empty: channels are named after them */
-    size_t light_count;
-    const vsh_receiver *receivers;
+    size_t layer_count;            /* how many layers */
+    const vsh_light *lights;       /* no two names alike, none empty: channels are named after them */
+    size_t light_count;            /* how many lights */
+    const vsh_receiver *receivers; /* [receiver_count] */
     size_t receiver_count;
-    vsh_grid_options grid;
-    vsh_shade_options shade;
-    int32_t ao;         /* nonzero: bake AO, within shade.ao_distance */
-    int32_t bent;       /* with ao: bake bent normals in the space VSH_BENT_… + 1; 0: none */
-    int32_t irradiance; /* nonzero: bake irradiance */
-    vsh_tint tint;      /* bake tinted shadows, and irradiance by them; VSH_TINT_NONE: none */
-    int32_t has_ambient;
-    double ambient[3]; /* of irradiance, as in vsh_lightmap; where has_ambient is not 0 */
-    vsh_planes planes; /* to be baked too */
+    vsh_grid_options grid;   /* of the casters' level set */
+    vsh_shade_options shade; /* how shadow and AO are found */
+    int32_t ao;              /* nonzero: bake AO, within shade.ao_distance */
+    int32_t bent;            /* with ao: bake bent normals in the space VSH_BENT_… + 1; 0: none */
+    int32_t irradiance;      /* nonzero: bake irradiance */
+    vsh_tint tint;           /* bake tinted shadows, and irradiance by them; VSH_TINT_NONE: none */
+    int32_t has_ambient;     /* nonzero: `ambient` holds; 0: there is no such light */
+    double ambient[3];       /* of irradiance, as in vsh_lightmap; where has_ambient is not 0 */
+    vsh_planes planes;       /* to be baked too */
     int32_t error; /* nonzero: bake the error left in each shadow and AO value too, where methods know it */
     const vsh_solidity_rule *solidity; /* [solidity_count]: of all mesh casters, over what they say
                                           themselves; each must match one's mesh */
@@ -153,18 +189,24 @@ typedef struct vsh_scene {
                              (vsh_model_unit());   0: as they say, and those that say nothing as they are */
     int32_t voxels_named; /* nonzero: `grid` holds a voxel size or a resolution that was asked for; 0: where
                              it is the default, what is baked chooses them (vsh_scene_resolution()) */
-    int32_t cast_blended; /* nonzero: meshes of blended materials (VSH_ALPHA_BLENDED) cast, whole; 0: they
-                             only receive */
+    int32_t cast_blended; /* nonzero: meshes of blended materials (VSH_ALPHA_BLENDED) cast, where the alpha of
+                             their texture is at least half, without one whole; 0: they only receive */
+    const vsh_light_file *light_files; /* [light_file_count], by `first`: where some of `lights` came from,
+                                          for those who look after inputs; a scene need not have any */
+    size_t light_file_count;
+    const vsh_field_file *field; /* the casters' fields, which are then not made (vsh_scene_use_field());
+                                    NULL: none are there */
 } vsh_scene;
 
-/* Reads a scene file; what it names is not opened. The scene and all it points to belong to *scene; free it
- * with vsh_scene_free(). Errors:
+/* Reads a scene file; of what it names, files of lights alone are opened. The scene and all it points to
+ * belong to *scene; free it with vsh_scene_free(). Errors:
  * - VSH_ERROR_ARGUMENT: path or scene NULL, run;
  * - VSH_ERROR_READ: no such file, no permission, no regular file;
  * - VSH_ERROR_INPUT, with line and column: no JSON, an unknown or missing key, a value of the wrong type or
  *   out of range;
  * - VSH_ERROR_LIMIT: a file of more than 64 MiB; one whose values may take more than run->memory_limit,
  * before they are read;
+ * - of files of lights: as vsh_lights_read();
  * - VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_scene_read(const char *path, const vsh_run *run, vsh_scene **scene, vsh_error *error);
 VSH_API void vsh_scene_free(vsh_scene *scene); /* of vsh_scene_read() only; NULL does nothing */
@@ -180,6 +222,10 @@ VSH_API void vsh_scene_free(vsh_scene *scene); /* of vsh_scene_read() only; NULL
 VSH_API vsh_result vsh_lights_from_model(const vsh_model *model, double angle, double radius, double unit,
                                          vsh_light **lights, size_t *count, vsh_error *error);
 VSH_API void vsh_lights_free(vsh_light *lights); /* NULL does nothing */
+
+/* The same of a file that vsh_model_read() reads. Errors: as there, and those of vsh_lights_from_model(). */
+VSH_API vsh_result vsh_lights_read(const char *path, double angle, double radius, double unit,
+                                   const vsh_run *run, vsh_light **lights, size_t *count, vsh_error *error);
 
 /* What a scene's files hold, each file read once, however many casters and receivers use it. */
 typedef struct vsh_assets vsh_assets;
@@ -209,6 +255,14 @@ VSH_API const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index
 VSH_API const vsh_model *vsh_assets_receiver_model(const vsh_assets *assets, size_t index,
                                                    const size_t **numbers);
 
+/* Fills density[mesh count]: for each of a model's meshes the factor of the last rule that means it, else 1.
+ * `path` is the model's, for messages. Errors: VSH_ERROR_ARGUMENT (a pointer NULL; a rule without a pattern,
+ * or whose factor is out of range), VSH_ERROR_INPUT (a rule that means no mesh, with names that it might have
+ * meant). */
+VSH_API vsh_result vsh_model_densities(const vsh_model *model, const char *path,
+                                       const vsh_density_rule *rules, size_t count, double *density,
+                                       vsh_error *error);
+
 /* *needs is 1 where a receiver's meshes are unwrapped, as receiver->unwrap says, and 0 where their own UVs
  * are baked. Of `receiver` what it says of its output, size and unwrapping is read. Errors: as
  * vsh_charts_create(). */
@@ -216,8 +270,24 @@ VSH_API vsh_result vsh_receiver_needs_unwrap(const vsh_receiver *receiver, const
                                              size_t count, const vsh_run *run, int32_t *needs,
                                              vsh_error *error);
 
-/* Pages of receiver `index`: 1 but where it is unwrapped and needs more; 0 beyond the scene's. */
+/* Pages of receiver `index`: 1 but where it is unwrapped and needs more, or has one for each object; 0 beyond
+ * the scene's. */
 VSH_API size_t vsh_assets_receiver_pages(const vsh_assets *assets, size_t index);
+
+/* A page of a receiver; `object` belongs to the assets. */
+typedef struct vsh_receiver_page {
+    int32_t width; /* texels */
+    int32_t height;
+    const char *object; /* the name of the object whose it is, "" where it has none; NULL: it is shared */
+} vsh_receiver_page;
+
+/* Fills *page; false, and nothing changes, beyond what there is. */
+VSH_API int32_t vsh_assets_receiver_page_info_sized(const vsh_assets *assets, size_t index, size_t page,
+                                                    vsh_receiver_page *info, size_t info_size);
+static inline int32_t vsh_assets_receiver_page_info(const vsh_assets *assets, size_t index, size_t page,
+                                                    vsh_receiver_page *info) {
+    return vsh_assets_receiver_page_info_sized(assets, index, page, info, sizeof *info);
+}
 
 /* The meshes of vsh_assets_receiver() that lie on page `page`, which are some in a row of them: *first is the
  * place of the first in that list. NULL and a count of 0 beyond what there is. */
@@ -273,11 +343,13 @@ VSH_API int32_t vsh_scene_traceable(const vsh_scene *scene, const vsh_scene_laye
  * by their voxels alone; 0 where rays against triangles decide, and voxels only save rays. */
 VSH_API int32_t vsh_scene_marches(const vsh_scene *scene, const vsh_scene_layer *layer);
 
+/* What vsh_scene_resolution() gives where it is named. */
+enum { VSH_RESOLUTION_NAMED = -1 };
+
 /* Voxels along the longest side of the casters in `layer`, or (NULL) in none, where `points` of receivers are
  * to be shaded by the scene's methods (docs/auto.md tells how they are chosen). VSH_RESOLUTION_NAMED: those
  * that the scene or the layer names; 0: none, rays against triangles are faster alone. It depends on what
  * the scene holds, and on nothing else. `assets` are those loaded for this scene. Cannot fail. */
-enum { VSH_RESOLUTION_NAMED = -1 };
 VSH_API int32_t vsh_scene_resolution(const vsh_scene *scene, const vsh_assets *assets,
                                      const vsh_scene_layer *layer, double points);
 
@@ -317,13 +389,80 @@ static inline vsh_scene_occluders_options vsh_scene_occluders_options_default(vo
  * assets must outlive the handle. Free it with vsh_occluders_free(). Errors, those of a layer's casters with
  * its name:
  * - VSH_ERROR_ARGUMENT: scene, assets or occluders NULL, a box of which a half is NULL, options, run;
- * - VSH_ERROR_INPUT: no casters, more layers and casters that are not voxelised than VSH_MAX_LAYERS; as
- *   vsh_scene_casters(), vsh_field_create() and vsh_triangles_create();
+ * - VSH_ERROR_INPUT: no casters, more layers and casters that are not voxelised than VSH_MAX_LAYERS; a
+ *   scene->field that is stale: of other casters or voxels, with what differs; as vsh_scene_casters(),
+ *   vsh_field_create(), vsh_field_file_field() and vsh_triangles_create();
  * - VSH_ERROR_LIMIT: as these;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_scene_occluders(const vsh_scene *scene, const vsh_assets *assets,
                                        const vsh_scene_occluders_options *options, const vsh_run *run,
                                        vsh_occluders **occluders, vsh_error *error);
+
+/* How a scene's fields are kept. */
+typedef struct vsh_scene_field_options {
+    size_t struct_size;
+    const vsh_attribute *attributes; /* [attribute_count]: for people, such as vsh_provenance_attributes();
+                                        may be NULL where that is 0 */
+    size_t attribute_count;
+} vsh_scene_field_options;
+
+static inline vsh_scene_field_options vsh_scene_field_options_default(void) {
+    vsh_scene_field_options options = {sizeof(vsh_scene_field_options), NULL, 0};
+    return options;
+}
+
+/* What fields took, or will take. */
+typedef struct vsh_scene_field_report {
+    size_t fields;          /* 1, and one for each layer that has casters with voxels */
+    uint64_t active_voxels; /* these three of all */
+    uint64_t grid_bytes;    /* of their level sets, in memory while they are made */
+    uint64_t field_bytes;   /* in memory; a file is as large */
+    double finest;          /* voxel of all, world units */
+    double voxelize_s;      /* seconds */
+    double field_s;         /* seconds that the fields took */
+    double write_s;         /* and the file */
+} vsh_scene_field_report;
+
+/* Makes the fields of a scene's casters, as vsh_scene_occluders() does, with levels for any reach, and writes
+ * them to a file (vsh_field_file_write()) with all that shaped them: vsh_scene.grid and the layers' voxels,
+ * and what the casters are. Lights, receivers and accuracy shape nothing, but where the scene names no
+ * voxels and those that vsh_scene_resolution() finds depend on them. Warns of what voxels make of casters.
+ * Written whole or not at all. Errors:
+ * - VSH_ERROR_ARGUMENT: scene, assets or path NULL, options, run;
+ * - VSH_ERROR_INPUT: no casters that are voxelised; casters whose triangles would be traced alone, so that
+ *   there is nothing to keep: name voxels, or a method that marches; as vsh_scene_casters() and
+ * vsh_field_create();
+ * - VSH_ERROR_LIMIT, VSH_ERROR_WRITE, VSH_ERROR_UNSUPPORTED: as these and vsh_field_file_write();
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_scene_save_field_sized(const vsh_scene *scene, const vsh_assets *assets,
+                                              const char *path, const vsh_scene_field_options *options,
+                                              const vsh_run *run, vsh_scene_field_report *report,
+                                              size_t report_size, vsh_error *error);
+static inline vsh_result vsh_scene_save_field(const vsh_scene *scene, const vsh_assets *assets,
+                                              const char *path, const vsh_scene_field_options *options,
+                                              const vsh_run *run, vsh_scene_field_report *report,
+                                              vsh_error *error) {
+    return vsh_scene_save_field_sized(scene, assets, path, options, run, report, sizeof *report, error);
+}
+
+/* What vsh_scene_save_field() will take, found out by fields of 96 voxels, or where the casters' own voxels
+ * are taken by those themselves; nothing is written. Times may be half or twice as much. Errors: as there. */
+VSH_API vsh_result vsh_scene_field_forecast_sized(const vsh_scene *scene, const vsh_assets *assets,
+                                                  const vsh_run *run, vsh_scene_field_report *report,
+                                                  size_t report_size, vsh_error *error);
+static inline vsh_result vsh_scene_field_forecast(const vsh_scene *scene, const vsh_assets *assets,
+                                                  const vsh_run *run, vsh_scene_field_report *report,
+                                                  vsh_error *error) {
+    return vsh_scene_field_forecast_sized(scene, assets, run, report, sizeof *report, error);
+}
+
+/* Has a scene take its fields from a file, which must outlive the scene and all that is made of it: call it
+ * before vsh_assets_load(), which then reads no .vdb that casts, and vsh_scene_occluders(), which makes no
+ * voxels. Where the scene names no voxels and that of the file did, it takes those. `file` NULL: they are
+ * made again. Values are those that are baked without, bit by bit: whether the fields are those of the
+ * scene's casters is looked at by vsh_scene_occluders(). Not safe against other threads that use the scene.
+ * Errors: VSH_ERROR_ARGUMENT (scene NULL), VSH_ERROR_READ (a file that names voxels out of range). */
+VSH_API vsh_result vsh_scene_use_field(vsh_scene *scene, const vsh_field_file *file, vsh_error *error);
 
 /* A scene's casters as rays meet them, whatever their layers: the triangles of meshes and heightfields, and
  * procedural ones as they are, for vsh_trace_shadow() and vsh_trace_ao(). Each is NULL where there are none,

@@ -52,8 +52,8 @@ static inline vsh_sdf_node vsh_sdf_node_default(void) {
 /* A tree: the last node is its root, every other node is the operand of exactly one operation, and no path
  * from the root is longer than 2048 nodes. A view; nothing is owned. */
 typedef struct vsh_sdf {
-    const vsh_sdf_node *nodes;
-    size_t node_count; /* 1 … 65536 */
+    const vsh_sdf_node *nodes; /* [node_count] */
+    size_t node_count;         /* 1 … 65536 */
 } vsh_sdf;
 
 /* Checks every node, and the tree. Errors: VSH_ERROR_INPUT, naming node, field, value and limit (sdf NULL is

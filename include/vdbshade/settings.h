@@ -32,6 +32,7 @@ enum {
     VSH_SETTING_OF_FLAT = 2      /* a flat scene, vsh_flat_scene_set() */
 };
 
+/* A setting: its names, and what its value may be. */
 typedef struct vsh_setting {
     char key[64];    /* in a scene's file: "rays", "ao.distance", "receivers.padding" */
     char option[64]; /* of the command line, "ao-method" */

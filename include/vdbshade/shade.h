@@ -11,6 +11,7 @@
 extern "C" {
 #endif
 
+/* How shadow and AO are found. */
 typedef struct vsh_shade_options {
     size_t struct_size;
     int32_t method;        /* VSH_SHADOW_… (auto) */
@@ -88,6 +89,7 @@ enum {
     VSH_TINT_POWER = 2      /* V to the power of each channel: (1, 1.2, 1.5), say */
 };
 
+/* How a penumbra is tinted. */
 typedef struct vsh_tint {
     int32_t type;    /* VSH_TINT_… */
     double power[3]; /* VSH_TINT_POWER: of R, G, B, 1/16 … 16 */

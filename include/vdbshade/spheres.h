@@ -24,8 +24,9 @@ VSH_API vsh_result vsh_spheres_create(const double *spheres, size_t count, const
                                       const vsh_run *run, vsh_spheres **made, vsh_error *error);
 VSH_API void vsh_spheres_free(vsh_spheres *spheres); /* NULL does nothing */
 
+/* What spheres come to. */
 typedef struct vsh_spheres_info {
-    size_t count;
+    size_t count;         /* spheres */
     double bounds_min[3]; /* world box */
     double bounds_max[3];
     uint64_t bytes; /* in memory */

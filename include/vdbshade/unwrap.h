@@ -17,11 +17,19 @@ enum {
                               together in them is a chart, and is packed as it is; else as VSH_UNWRAP_ALWAYS */
 };
 
+/* What lies on one page. */
+enum {
+    VSH_ATLAS_SHARED = 0, /* charts of any mesh */
+    VSH_ATLAS_OBJECTS = 1 /* those of one object, which are meshes in a row of one vsh_mesh.object above 0, or
+                             a single mesh */
+};
+
+/* How meshes are unwrapped. */
 typedef struct vsh_unwrap_options {
     size_t struct_size;
     int32_t width;     /* texels of each page, 1 … VSH_MAX_PAGE_SIZE */
     int32_t height;    /* the same */
-    int32_t max_pages; /* 1 … VSH_MAX_PAGES */
+    int32_t max_pages; /* 1 … VSH_MAX_PAGES; 1 with VSH_ATLAS_OBJECTS: each object has one */
     int32_t padding;   /* free texels between those that two charts touch, along rows and columns, 0 … 4096;
                           what is before a page's border is no chart, and needs none */
     double texels_per_unit; /* texels along a world unit, finite, ≥ 0; 0: the greatest at which everything
@@ -30,14 +38,20 @@ typedef struct vsh_unwrap_options {
     double max_stretch;     /* L2 stretch (vsh_atlas_chart) that no chart exceeds, ≥ 1.01; charts are split
                                until none does */
     int32_t keep_uvs;       /* VSH_UNWRAP_… */
+    int32_t atlas; /* VSH_ATLAS_…; of objects without texels_per_unit each has the greatest that fits its own
+                      page */
+    int32_t fit_pages; /* nonzero, with texels_per_unit: `width` × `height` is what a page may have at most.
+                          It has the fewest texels that what lies on it fits into, of sides that are powers of
+                          two (or the given ones), and at most twice as long as each other where those are */
 } vsh_unwrap_options;
 
 static inline vsh_unwrap_options vsh_unwrap_options_default(void) {
-    vsh_unwrap_options options = {sizeof(vsh_unwrap_options), 1024, 1024, 1, 4, 0.0, NULL, 1.3,
-                                  VSH_UNWRAP_ALWAYS};
+    vsh_unwrap_options options = {
+        sizeof(vsh_unwrap_options), 1024, 1024, 1, 4, 0.0, NULL, 1.3, VSH_UNWRAP_ALWAYS, VSH_ATLAS_SHARED, 0};
     return options;
 }
 
+/* The chart of a triangle that is in none. */
 #define VSH_NO_CHART UINT32_MAX
 
 /* One mesh as it lies in the atlas. The arrays belong to the atlas. Triangles are those of the mesh in its
@@ -52,9 +66,10 @@ typedef struct vsh_atlas_mesh {
     size_t triangle_count;
 } vsh_atlas_mesh;
 
+/* A chart of an atlas. */
 typedef struct vsh_atlas_chart {
-    uint32_t page;
-    uint32_t mesh;
+    uint32_t page;  /* that it lies on, from 0 */
+    uint32_t mesh;  /* that it was cut from */
     float stretch;  /* root of the mean of the squared stretch of all directions from texture to surface, over
                        the chart's area, for UVs of the surface's area: 1 is isometric (Sander and others,
                        "Texture mapping progressive meshes", 2001, L2) */
@@ -63,12 +78,22 @@ typedef struct vsh_atlas_chart {
     double area;    /* of its triangles, world units² */
 } vsh_atlas_chart;
 
-typedef struct vsh_atlas_info {
-    uint64_t charts;
-    uint32_t pages; /* that have charts */
-    int32_t width;  /* texels of each page */
+/* A page has charts; an object without any has none. */
+typedef struct vsh_atlas_page {
+    int32_t width; /* texels */
     int32_t height;
-    double texels_per_unit;  /* as given, or as found */
+    double texels_per_unit; /* of a mesh of density 1, as given or as found */
+    double covered;         /* share of the texels that a chart touches, 0 … 1 */
+    uint32_t first_mesh;    /* that has a chart on it */
+} vsh_atlas_page;
+
+/* What an atlas comes to. */
+typedef struct vsh_atlas_info {
+    uint64_t charts;         /* on all pages */
+    uint32_t pages;          /* that have charts */
+    int32_t width;           /* texels: the most that a page is wide */
+    int32_t height;          /* and high */
+    double texels_per_unit;  /* as given, or as found; the least of a page */
     double covered;          /* share of the texels of all pages that a chart touches, 0 … 1 */
     double stretch;          /* mean over charts, by area; 1 where there is none */
     double worst_stretch;    /* of a chart */
@@ -84,13 +109,15 @@ typedef struct vsh_atlas vsh_atlas;
  * Any triangles will do: edges of many triangles, several at one place, mirrored meshes. Triangles of a quad
  * stay together. Meshes of the same arrays whose transforms differ by a rotation, a mirroring, a translation
  * and a uniform scale share their charts' layout, and have places of their own. A mesh is spread over pages
- * only where it does not fit one. The values depend on no number of threads. The stages are "unwrap" and
+ * only where it does not fit one. Objects with pages of their own that differ by such transforms alone are
+ * packed alike. The values depend on no number of threads. The stages are "unwrap" and
  * "pack". Errors:
  * - VSH_ERROR_ARGUMENT: meshes or atlas NULL, no meshes or more than 2^32 - 1, options out of range, run, and
  *   as vsh_mesh_check();
  * - VSH_ERROR_INPUT: as vsh_mesh_check(); no triangle that has area;
  * - VSH_ERROR_LIMIT: run->memory_limit; charts that do not fit into max_pages at this density (the message
- *   names one that fits), or more charts than there are places in them; 2^32 / 3 triangles of a mesh;
+ *   names one that fits, and the object whose page it is), or more charts than there are places in them;
+ *   2^32 / 3 triangles of a mesh;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_unwrap(const vsh_mesh *meshes, size_t mesh_count, const vsh_unwrap_options *options,
                               const vsh_run *run, vsh_atlas **atlas, vsh_error *error);
@@ -122,7 +149,6 @@ static inline vsh_result vsh_uvs_measure(const vsh_mesh *mesh, int32_t width, in
 VSH_API size_t vsh_atlas_mesh_count(const vsh_atlas *atlas); /* as were given */
 VSH_API size_t vsh_atlas_chart_count(const vsh_atlas *atlas);
 VSH_API size_t vsh_atlas_page_count(const vsh_atlas *atlas);
-
 VSH_API void vsh_atlas_get_info_sized(const vsh_atlas *atlas, vsh_atlas_info *info, size_t info_size);
 static inline void vsh_atlas_get_info(const vsh_atlas *atlas, vsh_atlas_info *info) {
     vsh_atlas_get_info_sized(atlas, info, sizeof *info);
@@ -143,6 +169,15 @@ VSH_API void vsh_atlas_chart_view_sized(const vsh_atlas *atlas, size_t chart, vs
 static inline vsh_atlas_chart vsh_atlas_chart_view(const vsh_atlas *atlas, size_t chart) {
     vsh_atlas_chart view;
     vsh_atlas_chart_view_sized(atlas, chart, &view, sizeof view);
+    return view;
+}
+
+/* Page `page` (< page count). */
+VSH_API void vsh_atlas_page_view_sized(const vsh_atlas *atlas, size_t page, vsh_atlas_page *view,
+                                       size_t view_size);
+static inline vsh_atlas_page vsh_atlas_page_view(const vsh_atlas *atlas, size_t page) {
+    vsh_atlas_page view;
+    vsh_atlas_page_view_sized(atlas, page, &view, sizeof view);
     return view;
 }
 

@@ -2,6 +2,7 @@
 #ifndef VDBSHADE_VOLUME_H
 #define VDBSHADE_VOLUME_H
 
+#include "parts.h"
 #include "shade.h"
 #include "voxels.h"
 
@@ -16,6 +17,7 @@ enum {
     VSH_INSIDE_OFF = 1      /* are left off: inactive, background */
 };
 
+/* How voxels are shaded. */
 typedef struct vsh_volume_options {
     size_t struct_size;
     int32_t inside;          /* VSH_INSIDE_… */
@@ -55,6 +57,35 @@ VSH_API vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_vox
                                    const vsh_light *lights, size_t light_count,
                                    const vsh_volume_options *options, const vsh_run *run, vsh_volume **volume,
                                    vsh_shade_stats *stats, vsh_error *error);
+
+/* --- in parts */
+
+/* Bakes part shard of shard_count, as much work as any other, and writes it to PARTS.SHARD-of-COUNT.part,
+ * whole or not at all. Needs memory for the whole volume at most. Errors: as vsh_bake_volume();
+ * VSH_ERROR_ARGUMENT (part NULL or of another number), VSH_ERROR_WRITE. */
+VSH_API vsh_result vsh_bake_volume_part(const vsh_occluders *occluders, const vsh_voxels *voxels,
+                                        const vsh_light *lights, size_t light_count,
+                                        const vsh_volume_options *options, const vsh_part_options *part,
+                                        const vsh_run *run, vsh_shade_stats *stats, vsh_error *error);
+
+/* Puts the parts of all shards together, which were baked of these voxels, lights and options: the same
+ * volume as vsh_bake_volume() makes, bit by bit. Errors: as there, but of occluders; VSH_ERROR_READ (a part
+ * is missing), VSH_ERROR_INPUT (there are none; one is damaged, or of other voxels, attributes or another
+ * version, which it names). */
+VSH_API vsh_result vsh_volume_merge(const vsh_voxels *voxels, const vsh_light *lights, size_t light_count,
+                                    const vsh_volume_options *options, const vsh_part_options *parts,
+                                    const vsh_run *run, vsh_volume **volume, vsh_shade_stats *stats,
+                                    vsh_error *error);
+
+/* What cast in the first part that is there, of `shard_count` shards, or (0) of however many there are: voxel
+ * size, levels, voxels, bytes of fields, triangles. Errors: as vsh_part_words(). */
+VSH_API vsh_result vsh_volume_part_casters_sized(const char *parts, int32_t shard_count, const vsh_run *run,
+                                                 vsh_occluders_info *casters, size_t casters_size,
+                                                 vsh_error *error);
+static inline vsh_result vsh_volume_part_casters(const char *parts, int32_t shard_count, const vsh_run *run,
+                                                 vsh_occluders_info *casters, vsh_error *error) {
+    return vsh_volume_part_casters_sized(parts, shard_count, run, casters, sizeof *casters, error);
+}
 
 #ifdef __cplusplus
 }

@@ -47,8 +47,9 @@ VSH_API vsh_result vsh_voxels_from_vdb(const char *path, const char *name, const
                                        vsh_voxels **voxels, vsh_error *error);
 VSH_API void vsh_voxels_free(vsh_voxels *voxels); /* NULL does nothing */
 
+/* What voxels come to. */
 typedef struct vsh_voxels_info {
-    uint64_t count;
+    uint64_t count;       /* voxels */
     uint64_t blocks;      /* of 8³ voxels that hold them */
     int32_t index_min[3]; /* of the voxels, both inclusive */
     int32_t index_max[3];
@@ -76,8 +77,9 @@ typedef struct vsh_volume vsh_volume;
 
 VSH_API void vsh_volume_free(vsh_volume *volume); /* NULL does nothing */
 
+/* What a volume comes to. */
 typedef struct vsh_volume_info {
-    size_t grids;
+    size_t grids;    /* how many */
     uint64_t shaded; /* voxels whose values were found at their centres */
     uint64_t filled; /* inside ones that took the nearest */
     uint64_t off;    /* inside ones that were left off */
@@ -86,10 +88,10 @@ typedef struct vsh_volume_info {
 
 /* One grid of a volume. */
 typedef struct vsh_volume_grid {
-    char name[80]; /* "shadow.sun", "ao", … */
-    uint64_t active_voxels;
-    uint64_t leaves; /* of 8³ values */
-    uint64_t tiles;  /* active ones: regions of 8³ voxels and more that have one value */
+    char name[80];          /* "shadow.sun", "ao", … */
+    uint64_t active_voxels; /* with those of tiles */
+    uint64_t leaves;        /* of 8³ values */
+    uint64_t tiles;         /* active ones: regions of 8³ voxels and more that have one value */
 } vsh_volume_grid;
 
 /* Cannot fail; of a grid beyond the last, an empty name and zeros. */

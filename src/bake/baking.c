@@ -105,9 +105,10 @@ vsh_result vshi_bake_light(vshi_baking *bake, size_t index, vsh_error *error) {
     float *errors = lightmap->shadow_error != NULL ? lightmap->shadow_error[index] : NULL;
     float *tinted = lightmap->tint != NULL ? lightmap->tint[index] : NULL;
     VSHI_TRY(vshi_lift_for(bake->texels, light, &bake->quiet, &bake->origins, error));
-    VSHI_TRY(vshi_shade_shadow(occluders, &points, &bake->origins.rows, light, &shade, &bake->run,
-                               bake->values, errors != NULL ? bake->deviation : NULL, &bake->stats.shade,
-                               error));
+    vshi_point_rows rows = bake->origins.rows;
+    rows.only = bake->known != NULL; /* nothing is copied from the others */
+    VSHI_TRY(vshi_shade_shadow(occluders, &points, &rows, light, &shade, &bake->run, bake->values,
+                               errors != NULL ? bake->deviation : NULL, &bake->stats.shade, error));
     if (errors != NULL) {
         VSHI_TRY(vshi_baking_average(bake, bake->deviation, 1, errors, error));
     }

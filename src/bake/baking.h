@@ -22,6 +22,7 @@ typedef struct vshi_baking {
     vshi_origins origins;
     vshi_spread spread;
     uint8_t *state;       /* [rows held][width]: VSHI_TEXEL_… */
+    uint32_t *known;      /* [own rows][width]: VSHI_PART_…, of a part; NULL: it is padded, too */
     float *values;        /* [origins.count]: of one light, or AO */
     float *deviation;     /* [origins.count]: of the same; NULL where no plane is for it */
     float *irradiance;    /* [origins.count][3] */

@@ -345,8 +345,8 @@ void vsh_charts_get_info_sized(const vsh_charts *charts, vsh_charts_info *info, 
 
 /* --- bands */
 
-vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t rows, vshi_band *band,
-                         vsh_error *error) {
+vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t rows, bool part,
+                         vshi_band *band, vsh_error *error) {
     const int32_t height = charts->info.height;
     if (first_row < 0 || first_row >= height || first_row % VSH_BAND_STEP != 0) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "band from row %d: expected a multiple of %d below %d",
@@ -359,7 +359,7 @@ vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t ro
     }
     const size_t tile = VSHI_TILE, all = charts->sorted.rows;
     const size_t reach = (size_t)(charts->padding > LEAST_BESIDE ? charts->padding : LEAST_BESIDE);
-    const size_t beside = (reach + tile - 1) / tile;
+    const size_t beside = part ? 0 : (reach + tile - 1) / tile;
     band->own_first = first_row;
     band->own_rows = rows;
     band->own_begin = (size_t)first_row / tile;
@@ -400,10 +400,11 @@ static double floats_of(const vsh_lightmap *planes, size_t light_count) {
     return (double)floats;
 }
 
-uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows,
-                               const vsh_lightmap *lightmap, size_t light_count) {
+uint64_t vshi_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows, bool part,
+                                const vsh_lightmap *lightmap, size_t light_count) {
     vshi_band band;
-    if (charts == NULL || lightmap == NULL || vshi_band_set(charts, first_row, rows, &band, NULL) != VSH_OK) {
+    if (charts == NULL || lightmap == NULL ||
+        vshi_band_set(charts, first_row, rows, part, &band, NULL) != VSH_OK) {
         return 0;
     }
     const double width = charts->info.width;
@@ -421,7 +422,7 @@ uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int3
                            .tint = lightmap->tint != NULL,
                            .lattice = charts->ao_spacing > 1 && !vshi_ao_traces(&shade, NULL),
                            .windows = charts->ao_spacing > 1 && keeps_error,
-                           .fills = charts->fills && rows == charts->info.height};
+                           .fills = charts->fills && rows == charts->info.height && !part};
     for (size_t row = band.held_begin; row < band.held_end; ++row) {
         need.samples += (double)charts->rows[row].samples;
     }
@@ -430,4 +431,9 @@ uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int3
         width * (rows + (beside ? band.rows : 0)) * floats_of(lightmap, light_count) * sizeof(float);
     return (uint64_t)(need.samples * (double)vshi_sample_bytes(charts->tangents) + vshi_bake_bytes(&need) +
                       planes);
+}
+
+uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows,
+                               const vsh_lightmap *lightmap, size_t light_count) {
+    return vshi_charts_band_bytes(charts, first_row, rows, false, lightmap, light_count);
 }

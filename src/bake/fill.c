@@ -55,7 +55,7 @@ vsh_result vshi_fill_begin(vshi_fill *fill, const vshi_solid *solid, const vsh_v
         }
         fill->first_step[square] = s;
     }
-    fill->distance_error = DISTANCE_ERROR * solid->voxel_size;
+    fill->distance_error = solid != NULL ? DISTANCE_ERROR * solid->voxel_size : 0.0;
     VSHI_TRY(vshi_allocate((void **)&fill->shaded, fill->block_count, sizeof *fill->shaded, "volume", error));
     return vshi_allocate((void **)&fill->filled, fill->block_count, sizeof *fill->filled, "volume", error);
 }
@@ -80,12 +80,12 @@ static void find_around(const vshi_fill *fill, size_t block, size_t around[27]) 
     }
 }
 
-/* Voxels in reach of a block's voxel, from `least` voxels off: the block and number of the nearest that was
- * shaded. */
-static bool find_nearest(const vshi_fill *fill, const size_t around[27], int voxel, double least,
-                         size_t *block, int *nearest) {
+/* Voxels in reach of a block's voxel, whose distance's square is `least` at least: the block and number of
+ * the nearest that was shaded. */
+static bool find_nearest(const vshi_fill *fill, const size_t around[27], int voxel, int least, size_t *block,
+                         int *nearest) {
     const int at[3] = {8 + (voxel >> 6), 8 + (voxel >> 3 & 7), 8 + (voxel & 7)};
-    for (int s = fill->first_step[(int)ceil(least * least)]; s < VSHI_FILL_STEPS; ++s) {
+    for (int s = fill->first_step[least]; s < VSHI_FILL_STEPS; ++s) {
         const vshi_fill_step *step = &fill->steps[s];
         const int x = at[0] + step->by[0], y = at[1] + step->by[1], z = at[2] + step->by[2];
         *block = around[9 * (x >> 3) + 3 * (y >> 3) + (z >> 3)];
@@ -97,22 +97,32 @@ static bool find_nearest(const vshi_fill *fill, const size_t around[27], int vox
     return false;
 }
 
-/* The voxels of a block that were not shaded, and how far, at least, each is from any that was, voxels: 0
- * where nothing is known. */
-static size_t list_open(const vshi_fill *fill, size_t block, uint16_t *voxel, double *least) {
+/* The voxels of a block that were not shaded. */
+static size_t list_open(const vshi_fill *fill, size_t block, uint16_t voxel[VSHI_BLOCK_VOXELS + 1]) {
     const uint64_t *mask = fill->blocks[block].mask, *shaded = fill->shaded[block];
-    double centre[VSHI_BLOCK_VOXELS][3];
-    float distance[VSHI_BLOCK_VOXELS];
     size_t count = 0;
     for (int v = 0; v < VSHI_BLOCK_VOXELS; ++v) {
         voxel[count] = (uint16_t)v;
         count += is_set(mask, v) && !is_set(shaded, v);
     }
+    return count;
+}
+
+size_t vshi_fill_reaches(const vshi_fill *fill, size_t block, uint8_t *reaches) {
+    uint16_t voxel[VSHI_BLOCK_VOXELS + 1];
+    double centre[VSHI_BLOCK_VOXELS][3];
+    float distance[VSHI_BLOCK_VOXELS];
+    const size_t count = list_open(fill, block, voxel);
+    if (fill->solid == NULL) {
+        memcpy(reaches, fill->given[block], count);
+        return count;
+    }
     vshi_voxels_centres(fill->voxels, block, count, voxel, centre);
     vshi_solid_sample(fill->solid, count, &centre[0][0], distance);
     for (size_t i = 0; i < count; ++i) {
         const double inside = -(double)distance[i] - fill->distance_error;
-        least[i] = inside > 0.0 ? inside / fill->longest : 0.0;
+        const double least = inside > 0.0 ? inside / fill->longest : 0.0; /* 0 where nothing is known */
+        reaches[i] = least <= VSHI_FILL_REACH ? (uint8_t)ceil(least * least) : VSHI_FILL_NONE;
     }
     return count;
 }
@@ -147,13 +157,15 @@ bool vshi_fill_block(vshi_fill *fill, size_t block) {
     size_t around[27];
     find_around(fill, block, around);
     uint16_t open[VSHI_BLOCK_VOXELS + 1];
-    double least[VSHI_BLOCK_VOXELS];
-    const size_t count = list_open(fill, block, open, least);
+    uint8_t reaches[VSHI_BLOCK_VOXELS];
+    const size_t count = list_open(fill, block, open);
+    vshi_fill_reaches(fill, block, reaches);
     for (size_t i = 0; i < count; ++i) {
         const int voxel = open[i];
         size_t from;
         int nearest;
-        if (least[i] <= VSHI_FILL_REACH && find_nearest(fill, around, voxel, least[i], &from, &nearest)) {
+        if (reaches[i] <= VSHI_FILL_REACH * VSHI_FILL_REACH &&
+            find_nearest(fill, around, voxel, reaches[i], &from, &nearest)) {
             if (!copy_value(fill, block, voxel, from, nearest)) {
                 return false;
             }

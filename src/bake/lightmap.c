@@ -1,4 +1,5 @@
 #include "bake/baking.h"
+#include "bake/part.h"
 #include "bake/planes.h"
 #include "bake/pull_push.h"
 #include "base/floats.h"
@@ -34,6 +35,21 @@ static double fields_bytes(const vshi_baking *bake) {
     return bytes;
 }
 
+/* Of a part, what is known of its own texels before they are shaded. */
+static void note_texels(const vshi_baking *bake) {
+    const vsh_texels *texels = bake->texels;
+    const vshi_band *band = &texels->band;
+    const size_t own = (size_t)(band->own_first - band->first) * (size_t)texels->info.width;
+    const size_t first = texels->row_start[band->own_begin - band->held_begin];
+    const size_t last = texels->row_start[band->own_end - band->held_begin];
+    memset(bake->known, 0, (size_t)band->own_rows * (size_t)texels->info.width * sizeof *bake->known);
+    for (size_t i = last; i > first; --i) { /* the mesh is that of the first sample */
+        const size_t texel = vshi_sample_held(texels, i - 1);
+        bake->known[texel - own] = (vshi_sample_mesh(texels, i - 1) + 1) |
+                                   (bake->state[texel] == VSHI_TEXEL_VALID ? VSHI_PART_SHADEABLE : 0);
+    }
+}
+
 /* A vshi_origins_keep: which texels are valid, where the others take their values from, and which rows beside
  * the band's own are needed: all that are in reach of padding, and of others those that are taken from. */
 static vsh_result find_needed(void *user, const vshi_origins *origins, uint8_t *rows, vsh_error *error) {
@@ -43,11 +59,16 @@ static vsh_result find_needed(void *user, const vshi_origins *origins, uint8_t *
     const size_t count = band->held_end - band->held_begin;
     (void)origins;
     VSHI_TRY(vshi_baking_average(bake, NULL, 0, NULL, error));
-    VSHI_TRY(vshi_spread_find(texels, bake->state, &bake->spread, error));
+    if (bake->known != NULL) {
+        note_texels(bake);
+    } else {
+        VSHI_TRY(vshi_spread_find(texels, bake->state, &bake->spread, error));
+    }
     uint8_t *taken = NULL;
     VSHI_TRY(vshi_allocate((void **)&taken, count, 1, "lightmap rows", error));
     vshi_spread_mark(&bake->spread, texels, taken);
-    const size_t near = ((size_t)invalid_radius(texels) + VSHI_TILE - 1) / VSHI_TILE;
+    const size_t padded = ((size_t)invalid_radius(texels) + VSHI_TILE - 1) / VSHI_TILE;
+    const size_t near = bake->known != NULL ? 0 : padded;
     for (size_t row = 0; row < count; ++row) {
         const size_t at = row + band->held_begin;
         taken[row] = taken[row] || (at + near >= band->own_begin && at < band->own_end + near);
@@ -177,9 +198,10 @@ static bool is_seen(const vsh_texels *texels, const vshi_origins *origins, size_
 }
 
 /* Writes the planes `coverage` and `invalid` of a lightmap whose rows are those held, where it has them, and
- * counts the band's texels, those without a value by the mesh of their first sample. */
+ * counts the band's texels, those without a value by the mesh of their first sample. `known` is of a part. */
 static void write_coverage(const vsh_texels *texels, const vshi_origins *origins, const uint8_t *state,
-                           const vsh_lightmap *lightmap, vsh_bake_stats *stats) {
+                           const vsh_lightmap *lightmap, uint32_t *known, vsh_bake_stats *stats) {
+    const size_t own = (size_t)(texels->band.own_first - texels->band.first) * (size_t)texels->info.width;
     const vshi_band *band = &texels->band;
     const size_t first = texels->row_start[band->own_begin - band->held_begin];
     const size_t last = texels->row_start[band->own_end - band->held_begin];
@@ -195,6 +217,9 @@ static void write_coverage(const vsh_texels *texels, const vshi_origins *origins
             stats->seen_texels += seen;
             if (lightmap->invalid != NULL) {
                 lightmap->invalid[texel] = seen ? 2.0f : 1.0f;
+            }
+            if (known != NULL && seen) {
+                known[texel - own] |= VSHI_PART_SEEN;
             }
             if (stats->invalid_by_mesh != NULL) {
                 ++stats->invalid_by_mesh[vshi_sample_mesh(texels, i)];
@@ -230,9 +255,11 @@ static vsh_result run_bake(vshi_baking *bake, vsh_error *error) {
         VSHI_TRY_DONE(vshi_baking_choose_held(bake, error));
     }
     VSHI_TRY_DONE(bake_planes(bake, error));
-    write_coverage(texels, &bake->origins, bake->state, bake->lightmap, &bake->stats);
-    VSHI_TRY_DONE(pad(bake, bake->stats.invalid_texels, error));
-    VSHI_TRY_DONE(vshi_baking_add_filled(bake, error));
+    write_coverage(texels, &bake->origins, bake->state, bake->lightmap, bake->known, &bake->stats);
+    if (bake->known == NULL) {
+        VSHI_TRY_DONE(pad(bake, bake->stats.invalid_texels, error));
+        VSHI_TRY_DONE(vshi_baking_add_filled(bake, error));
+    }
     vshi_work_planes_copy_back(texels, &bake->work);
 done:
     free(bake->layers);
@@ -271,10 +298,10 @@ static vsh_result check(const vsh_lightmap *lightmap, const vsh_texels *texels, 
     return VSH_OK;
 }
 
-vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_texels *texels,
-                             const vsh_light *lights, size_t light_count, const vsh_shade_options *options,
-                             const vsh_run *run, const vsh_lightmap *lightmap, vsh_bake_stats *stats,
-                             vsh_error *error) {
+static vsh_result bake_texels(const vsh_occluders *occluders, const vsh_texels *texels,
+                              const vsh_light *lights, size_t light_count, const vsh_shade_options *options,
+                              const vsh_run *run, const vsh_lightmap *lightmap, uint32_t *known,
+                              vsh_bake_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(occluders);
     VSHI_NEEDS(texels);
@@ -285,6 +312,7 @@ vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_texels *t
                         .lights = lights,
                         .light_count = light_count,
                         .lightmap = lightmap,
+                        .known = known,
                         .needs = vshi_planes_need(lightmap, light_count),
                         .stats = vsh_bake_stats_zero()};
     VSHI_TRY(vshi_shade_options_resolve(options != NULL ? options : &texels->shade, &bake.shade, error));
@@ -304,4 +332,19 @@ vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_texels *t
         memcpy(stats, &bake.stats, stats->struct_size);
     }
     return VSH_OK;
+}
+
+vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_texels *texels,
+                             const vsh_light *lights, size_t light_count, const vsh_shade_options *options,
+                             const vsh_run *run, const vsh_lightmap *lightmap, vsh_bake_stats *stats,
+                             vsh_error *error) {
+    return bake_texels(occluders, texels, lights, light_count, options, run, lightmap, NULL, stats, error);
+}
+
+vsh_result vshi_bake_part(const vsh_occluders *occluders, const vsh_texels *texels, const vsh_light *lights,
+                          size_t light_count, const vsh_shade_options *options, const vsh_run *run,
+                          const vsh_lightmap *lightmap, uint32_t *known, vsh_bake_stats *stats,
+                          vsh_error *error) {
+    VSHI_NEEDS(known);
+    return bake_texels(occluders, texels, lights, light_count, options, run, lightmap, known, stats, error);
 }

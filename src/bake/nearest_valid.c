@@ -13,8 +13,8 @@ static const uint32_t NONE = UINT32_MAX, WAITING = UINT32_MAX - 1; /* for the en
 typedef struct spreading {
     size_t width, height;
     const uint8_t *state;
-    uint32_t *mesh;   /* [texels held] */
-    uint32_t *source; /* [texels held]: its own number where it is valid */
+    const uint32_t *mesh; /* [height][width] */
+    uint32_t *source;     /* [height][width]: its own number where it is valid */
     vshi_spread *spread;
 } spreading;
 
@@ -94,37 +94,46 @@ static void run_waves(spreading *s, size_t texels) {
     }
 }
 
-vsh_result vshi_spread_find(const vsh_texels *texels, const uint8_t *state, vshi_spread *spread,
-                            vsh_error *error) {
-    const size_t held = vshi_texels_held(texels);
+vsh_result vshi_spread_find_among(size_t width, size_t height, const uint32_t *mesh, const uint8_t *state,
+                                  vshi_spread *spread, vsh_error *error) {
+    const size_t texels = width * height;
     const char *what = "invalid texels";
     size_t invalid = 0;
     *spread = (vshi_spread){0};
-    for (size_t i = 0; i < held; ++i) {
+    for (size_t i = 0; i < texels; ++i) {
         invalid += state[i] == VSHI_TEXEL_INVALID;
     }
     if (invalid == 0) {
         return VSH_OK;
     }
-    spreading s = {.width = (size_t)texels->info.width,
-                   .height = (size_t)texels->band.rows,
-                   .state = state,
-                   .spread = spread};
+    spreading s = {.width = width, .height = height, .state = state, .mesh = mesh, .spread = spread};
     vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&s.mesh, held, sizeof *s.mesh, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&s.source, held, sizeof *s.source, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.source, texels, sizeof *s.source, what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&spread->texel, invalid, sizeof *spread->texel, what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&spread->source, invalid, sizeof *spread->source, what, error));
-    for (size_t i = texels->count; i > 0; --i) { /* that of its first sample */
-        s.mesh[vshi_sample_held(texels, i - 1)] = vshi_sample_mesh(texels, i - 1);
-    }
-    for (size_t i = 0; i < held; ++i) {
+    for (size_t i = 0; i < texels; ++i) {
         s.source[i] = state[i] == VSHI_TEXEL_VALID ? (uint32_t)i : NONE;
     }
-    run_waves(&s, held);
+    run_waves(&s, texels);
 done:
     free(s.source);
-    free(s.mesh);
+    return result;
+}
+
+vsh_result vshi_spread_find(const vsh_texels *texels, const uint8_t *state, vshi_spread *spread,
+                            vsh_error *error) {
+    uint32_t *mesh = NULL;
+    *spread = (vshi_spread){0};
+    if (memchr(state, VSHI_TEXEL_INVALID, vshi_texels_held(texels)) == NULL) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_allocate((void **)&mesh, vshi_texels_held(texels), sizeof *mesh, "invalid texels", error));
+    for (size_t i = texels->count; i > 0; --i) { /* that of its first sample */
+        mesh[vshi_sample_held(texels, i - 1)] = vshi_sample_mesh(texels, i - 1);
+    }
+    const vsh_result result = vshi_spread_find_among((size_t)texels->info.width, (size_t)texels->band.rows,
+                                                     mesh, state, spread, error);
+    free(mesh);
     return result;
 }
 

@@ -24,6 +24,11 @@ vsh_result vshi_spread_find(const vsh_texels *texels, const uint8_t *state, vshi
                             vsh_error *error);
 void vshi_spread_free(vshi_spread *spread);
 
+/* The same of any texels, [height][width], 2^32 - 3 of them at most: `mesh` is what texels of one chart have
+ * in common. */
+vsh_result vshi_spread_find_among(size_t width, size_t height, const uint32_t *mesh, const uint8_t *state,
+                                  vshi_spread *spread, vsh_error *error);
+
 /* Marks the tile rows held [rows] that the band's own texels take values from. */
 void vshi_spread_mark(const vshi_spread *spread, const vsh_texels *texels, uint8_t *rows);
 

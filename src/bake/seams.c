@@ -37,9 +37,9 @@ typedef struct island {
     double largest;       /* value */
 } island;
 
-/* A channel: one component of a plane. */
+/* A channel: one component of a plane of each page. */
 typedef struct channel {
-    float *values; /* of its first texel */
+    float **values; /* [page_count]: of its first texel */
     size_t stride;
     int range;
     double *vectors; /* [VECTORS × unknown_count] */
@@ -49,8 +49,10 @@ typedef struct channel {
 typedef struct stitching {
     vshi_seam_system system;
     const vsh_stitch_options *options;
-    const float *coverage; /* NULL: as charts cover */
-    channel *channels;     /* [channel_count] */
+    const vsh_stitch_page *pages; /* [page_count] */
+    size_t page_count;
+    channel *channels; /* [channel_count] */
+    float **values;    /* [channel_count × page_count]: theirs */
     size_t channel_count;
     size_t begin, batch; /* channels at work */
     double *vectors;     /* [batch × VECTORS × unknown_count] */
@@ -66,12 +68,13 @@ static double *vector(const stitching *s, const channel *c, int which, size_t fi
 }
 
 static float *value_of(const stitching *s, const channel *c, size_t unknown) {
-    return c->values + s->system.texel[unknown] * c->stride;
+    return c->values[s->system.page[unknown]] + s->system.texel[unknown] * c->stride;
 }
 
 static bool is_guess(const stitching *s, size_t unknown) {
-    return s->coverage != NULL ? s->coverage[s->system.texel[unknown]] == 0.0f
-                               : s->system.chart[unknown] == VSHI_NO_CHART;
+    const float *coverage = s->pages[s->system.page[unknown]].lightmap->coverage;
+    return coverage != NULL ? coverage[s->system.texel[unknown]] == 0.0f
+                            : s->system.chart[unknown] == VSHI_NO_CHART;
 }
 
 /* The largest value that is read together with each unknown. */
@@ -220,8 +223,8 @@ static vsh_result stitch_channels(stitching *s, const vsh_run *run, vsh_error *e
     return VSH_OK;
 }
 
-/* Counts the channels that are stitched, or (`list`) lists them. */
-static size_t list_channels(const vsh_lightmap *lightmap, size_t light_count, channel *list) {
+/* Counts the channels that are stitched, or (`list`) puts page `page`'s part of them in the list. */
+static size_t list_channels(const vsh_lightmap *lightmap, size_t light_count, channel *list, size_t page) {
     size_t kind_count, count = 0;
     const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
     for (const vshi_plane_kind *kind = kinds; kind < kinds + kind_count; ++kind) {
@@ -230,8 +233,9 @@ static size_t list_channels(const vsh_lightmap *lightmap, size_t light_count, ch
         for (size_t i = 0; i < planes * components; ++i) {
             float *plane = vshi_plane_of(lightmap, kind, i / components);
             if (plane != NULL && list != NULL) {
-                list[count] =
-                    (channel){.values = plane + i % components, .stride = components, .range = kind->range};
+                list[count].values[page] = plane + i % components;
+                list[count].stride = components;
+                list[count].range = kind->range;
             }
             count += plane != NULL;
         }
@@ -239,19 +243,47 @@ static size_t list_channels(const vsh_lightmap *lightmap, size_t light_count, ch
     return count;
 }
 
-static vsh_result stitch(stitching *s, const vsh_charts *charts, const vsh_lightmap *lightmap,
-                         size_t light_count, const vsh_run *run, vsh_stitch_report *report,
+static vsh_result make_channels(stitching *s, size_t light_count, vsh_error *error) {
+    VSHI_TRY(vshi_allocate((void **)&s->channels, s->channel_count, sizeof *s->channels, "seams", error));
+    VSHI_TRY(vshi_allocate((void **)&s->values, s->channel_count * s->page_count, sizeof *s->values, "seams",
+                           error));
+    for (size_t c = 0; c < s->channel_count; ++c) {
+        s->channels[c].values = s->values + c * s->page_count;
+    }
+    for (size_t page = 0; page < s->page_count; ++page) {
+        list_channels(s->pages[page].lightmap, light_count, s->channels, page);
+    }
+    return VSH_OK;
+}
+
+static vsh_result make_pages(const stitching *s, vshi_seam_pages *pages, vsh_error *error) {
+    const size_t count = s->page_count;
+    pages->count = count;
+    VSHI_TRY(vshi_allocate((void **)&pages->charts, count, sizeof *pages->charts, "seams", error));
+    VSHI_TRY(vshi_allocate((void **)&pages->first, count + 1, sizeof *pages->first, "seams", error));
+    VSHI_TRY(vshi_allocate((void **)&pages->texel, count + 1, sizeof *pages->texel, "seams", error));
+    for (size_t page = 0; page < count; ++page) {
+        const vshi_charts *charts = &s->pages[page].charts->sorted;
+        pages->charts[page] = charts;
+        pages->first[page + 1] = pages->first[page] + charts->first[charts->mesh_count];
+        pages->texel[page + 1] =
+            pages->texel[page] + (uint64_t)charts->raster.width * (uint64_t)charts->raster.height;
+    }
+    return VSH_OK;
+}
+
+static vsh_result stitch(stitching *s, size_t light_count, const vsh_run *run, vsh_stitch_report *report,
                          vsh_error *error) {
     static const double RADIANS = 3.14159265358979323846 / 180.0;
     vshi_seams seams = {NULL, NULL, 0, 0.0};
+    vshi_seam_pages pages = {NULL, 0, NULL, NULL};
     vshi_seam_system *system = &s->system;
     vsh_result result;
+    VSHI_TRY_DONE(make_channels(s, light_count, error));
+    VSHI_TRY_DONE(make_pages(s, &pages, error));
     VSHI_TRY_DONE(
-        vshi_allocate((void **)&s->channels, s->channel_count, sizeof *s->channels, "seams", error));
-    list_channels(lightmap, light_count, s->channels);
-    VSHI_TRY_DONE(vshi_seams_find(&charts->sorted, vshi_cos(s->options->max_angle * RADIANS), run, s->job,
-                                  &seams, error));
-    VSHI_TRY_DONE(vshi_seam_system_make(&charts->sorted, &seams, run, s->job, system, error));
+        vshi_seams_find(&pages, vshi_cos(s->options->max_angle * RADIANS), run, s->job, &seams, error));
+    VSHI_TRY_DONE(vshi_seam_system_make(&pages, &seams, run, s->job, system, error));
     report->seams = seams.count;
     report->places = system->row_count;
     report->crowded = system->crowded;
@@ -265,9 +297,13 @@ static vsh_result stitch(stitching *s, const vsh_charts *charts, const vsh_light
 done:
     free(s->islands);
     free(s->vectors);
+    free(s->values);
     free(s->channels);
     vshi_seam_system_free(system);
     vshi_seams_free(&seams);
+    free(pages.texel);
+    free(pages.first);
+    free(pages.charts);
     return result;
 }
 
@@ -279,13 +315,28 @@ static vsh_result check_option(double value, double least, double most, const ch
     return VSH_OK;
 }
 
-vsh_result vsh_lightmap_stitch_sized(const vsh_charts *charts, const vsh_lightmap *lightmap,
-                                     size_t light_count, const vsh_stitch_options *options,
-                                     const vsh_run *run, vsh_stitch_report *report, size_t report_size,
-                                     vsh_error *error) {
+static vsh_result check_pages(stitching *s, size_t light_count, vsh_run *run, vsh_error *error) {
+    for (size_t page = 0; page < s->page_count; ++page) {
+        const vsh_stitch_page *given = &s->pages[page];
+        VSHI_NEEDS(given->charts);
+        VSHI_NEEDS(given->lightmap);
+        const size_t count = list_channels(given->lightmap, light_count, NULL, page);
+        if (page > 0 && count != s->channel_count) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                             "vsh_stitch_page %zu: %zu channels, where the first page has %zu", page, count,
+                             s->channel_count);
+        }
+        s->channel_count = count;
+        run->memory_held += given->charts->info.bytes;
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_lightmaps_stitch_sized(const vsh_stitch_page *pages, size_t page_count, size_t light_count,
+                                      const vsh_stitch_options *options, const vsh_run *run,
+                                      vsh_stitch_report *report, size_t report_size, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(charts);
-    VSHI_NEEDS(lightmap);
+    VSHI_NEEDS_OF(page_count, pages);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     vsh_stitch_options own = vsh_stitch_options_default();
@@ -293,18 +344,27 @@ vsh_result vsh_lightmap_stitch_sized(const vsh_charts *charts, const vsh_lightma
     VSHI_TRY(check_option(own.max_change, 0.0, 1.0, "max_change", error));
     VSHI_TRY(check_option(own.max_angle, 0.0, 180.0, "max_angle", error));
     VSHI_TRY(check_option(own.keep, 1e-6, 1.0, "keep", error));
-    stitching s = {.options = &own, .coverage = lightmap->coverage};
-    s.channel_count = list_channels(lightmap, light_count, NULL);
+    stitching s = {.options = &own, .pages = pages, .page_count = page_count};
+    VSHI_TRY(check_pages(&s, light_count, &full, error));
     s.job = vshi_job_begin(&full, "seams", s.channel_count + 1);
     if (s.job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "seams: the system refused memory");
     }
     vsh_stitch_report found = {0};
-    full.memory_held += charts->info.bytes;
-    const vsh_result result = stitch(&s, charts, lightmap, light_count, &full, &found, error);
+    const vsh_result result = stitch(&s, light_count, &full, &found, error);
     vshi_job_end(s.job);
     if (result == VSH_OK && report != NULL) {
         vshi_give(report, report_size, &found, sizeof found);
     }
     return result;
+}
+
+vsh_result vsh_lightmap_stitch_sized(const vsh_charts *charts, const vsh_lightmap *lightmap,
+                                     size_t light_count, const vsh_stitch_options *options,
+                                     const vsh_run *run, vsh_stitch_report *report, size_t report_size,
+                                     vsh_error *error) {
+    VSHI_NEEDS(charts);
+    VSHI_NEEDS(lightmap);
+    const vsh_stitch_page page = {charts, lightmap};
+    return vsh_lightmaps_stitch_sized(&page, 1, light_count, options, run, report, report_size, error);
 }

@@ -4,14 +4,37 @@
 
 #include "bake/charts.h"
 
+/* The lightmaps that are stitched together; triangles, and texels, are numbered through all of them. */
+typedef struct vshi_seam_pages {
+    const vshi_charts **charts; /* [count] */
+    size_t count;
+    size_t *first;   /* [count + 1]: each page's first triangle */
+    uint64_t *texel; /* [count + 1]: and its first texel */
+} vshi_seam_pages;
+
+/* The page of a triangle. */
+static inline size_t vshi_seam_page(const vshi_seam_pages *pages, size_t triangle) {
+    size_t low = 0, high = pages->count;
+    while (high - low > 1) {
+        const size_t middle = low + (high - low) / 2;
+        if (pages->first[middle] <= triangle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return low;
+}
+
 /* An edge where two triangles go on into each other in the world, but not in the lightmap. */
 typedef struct vshi_seam {
     double x[2][2], y[2][2]; /* [side][end], texels; an end of both sides is one place in the world */
     uint32_t chart[2];       /* of each side */
+    uint32_t page[2];
 } vshi_seam;
 
 typedef struct vshi_seams {
-    uint32_t *chart; /* [triangles of all meshes]: the same number for all of a chart */
+    uint32_t *chart; /* [triangles of all pages]: the same number for all of a chart */
     vshi_seam *list; /* [count] */
     size_t count;
     double bytes;
@@ -22,7 +45,7 @@ typedef struct vshi_seams {
  * apart than an angle of this cosine. Of edges with more than a few triangles not all pairs are. Errors:
  * VSH_ERROR_LIMIT (run->memory_limit; 2^32 / 3 triangles), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free with
  * vshi_seams_free(), after a failure too. */
-vsh_result vshi_seams_find(const vshi_charts *charts, double cosine, const vsh_run *run, vshi_job *job,
+vsh_result vshi_seams_find(const vshi_seam_pages *pages, double cosine, const vsh_run *run, vshi_job *job,
                            vshi_seams *seams, vsh_error *error);
 void vshi_seams_free(vshi_seams *seams);
 
@@ -41,7 +64,8 @@ typedef struct vshi_seam_row {
 /* The texels that seams read are the unknowns. They are numbered island by island: no row reads of two. */
 typedef struct vshi_seam_system {
     size_t unknown_count;
-    uint64_t *texel; /* [unknown_count]: y × width + x */
+    uint64_t *texel; /* [unknown_count]: of its page, y × width + x */
+    uint32_t *page;  /* [unknown_count] */
     uint32_t *chart; /* [unknown_count]: that covers it; VSHI_NO_CHART: none */
     size_t row_count;
     vshi_seam_row *rows; /* [row_count], island by island */
@@ -57,7 +81,7 @@ typedef struct vshi_seam_system {
 
 /* Makes the system of all seams, in steps of half a texel. Errors: VSH_ERROR_LIMIT (run->memory_limit; 2^32
  * places), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free with vshi_seam_system_free(), after a failure too. */
-vsh_result vshi_seam_system_make(const vshi_charts *charts, const vshi_seams *seams, const vsh_run *run,
+vsh_result vshi_seam_system_make(const vshi_seam_pages *pages, const vshi_seams *seams, const vsh_run *run,
                                  vshi_job *job, vshi_seam_system *system, vsh_error *error);
 void vshi_seam_system_free(vshi_seam_system *system);
 

@@ -1,7 +1,7 @@
 /* Edges with equal ends in the world, found by a hash table of edges: where the lightmap's coordinates are
  * equal too, two triangles are of one chart; where they are not, and the surface is smooth, there is a seam.
  */
-#include "bake/seams.h"
+#include "bake/seams_parts.h"
 #include "base/hash.h"
 #include "base/memory.h"
 #include "base/try.h"
@@ -10,10 +10,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* How far apart the ends of an edge may be for two triangles to be of one chart, texels: what is rounded when
- * a file is written. A seam as narrow would be read at the same place on both sides. */
-static const double SAME_PLACE = 1.0 / 1024.0;
 
 enum {
     NO_EDGE = UINT32_MAX,
@@ -27,47 +23,17 @@ typedef struct slot {
     uint32_t hash;
 } slot;
 
-/* An end of a triangle's edge, as it is in the world and in the lightmap. */
-typedef struct edge_end {
-    const vsh_mesh *mesh;
-    size_t triangle; /* of the mesh */
-    uint32_t vertex;
-    vshi_vec at;
-    double x, y; /* texels */
-} edge_end;
-
 typedef struct edges {
-    const vshi_charts *charts;
+    const vshi_seam_pages *pages;
     double cosine;
     vshi_job *job;
     uint32_t *chart;    /* union-find, while charts are joined */
     slot *slots;        /* [slot_count], a power of two */
     uint32_t *previous; /* [3 triangles]: edge of the same ends before it; NO_EDGE: none */
+    uint8_t *goes_on;   /* [3 triangles]: its surface does beyond it, on another edge; or it has no area */
     size_t slot_count;
+    vshi_seam_parts parts;
 } edges;
-
-static uint32_t chart_of(uint32_t *chart, uint32_t triangle) {
-    while (chart[triangle] != triangle) {
-        chart[triangle] = chart[chart[triangle]];
-        triangle = chart[triangle];
-    }
-    return triangle;
-}
-
-/* The lower number stays, so that no order shows. */
-static void join(uint32_t *chart, uint32_t a, uint32_t b) {
-    a = chart_of(chart, a);
-    b = chart_of(chart, b);
-    chart[a > b ? a : b] = a < b ? a : b;
-}
-
-static vshi_vec place_of(const vsh_mesh *mesh, uint32_t vertex) {
-    return vshi_transform_point(mesh->transform, vshi_vec_off(mesh->positions + 3 * (size_t)vertex));
-}
-
-static bool same(vshi_vec a, vshi_vec b) {
-    return a.x == b.x && a.y == b.y && a.z == b.z;
-}
 
 static uint64_t hash_place(vshi_vec p) {
     const double at[3] = {p.x + 0.0, p.y + 0.0, p.z + 0.0}; /* -0 is 0 */
@@ -79,17 +45,14 @@ static uint64_t hash_place(vshi_vec p) {
     return key;
 }
 
-static const vsh_mesh *mesh_of(const edges *e, uint32_t edge, size_t *local) {
-    return &e->charts->meshes[vshi_charts_mesh(e->charts, edge / 3, local)];
-}
-
 static void places_of(const vsh_mesh *mesh, size_t local, size_t k, vshi_vec at[2]) {
-    at[0] = place_of(mesh, mesh->indices[3 * local + k]);
-    at[1] = place_of(mesh, mesh->indices[3 * local + (k + 1) % 3]);
+    at[0] = vshi_edge_place(mesh, mesh->indices[3 * local + k]);
+    at[1] = vshi_edge_place(mesh, mesh->indices[3 * local + (k + 1) % 3]);
 }
 
 static bool same_ends(const vshi_vec a[2], const vshi_vec b[2]) {
-    return (same(a[0], b[0]) && same(a[1], b[1])) || (same(a[0], b[1]) && same(a[1], b[0]));
+    return (vshi_same_place(a[0], b[0]) && vshi_same_place(a[1], b[1])) ||
+           (vshi_same_place(a[0], b[1]) && vshi_same_place(a[1], b[0]));
 }
 
 /* Edges that are put into the table together: their slots are fetched from memory meanwhile. */
@@ -119,7 +82,7 @@ static void put(edges *e, uint32_t edge, uint64_t key, const vshi_vec at[2]) {
         if (e->slots[i].hash != hash) {
             continue;
         }
-        const vsh_mesh *mesh = mesh_of(e, e->slots[i].edge, &local);
+        const vsh_mesh *mesh = vshi_edge_mesh(e->pages, e->slots[i].edge, &local);
         places_of(mesh, local, e->slots[i].edge % 3, other);
         if (same_ends(at, other)) {
             break;
@@ -138,71 +101,12 @@ static void put_all(edges *e, batch *b) {
 
 /* --- pairs of edges */
 
-static vshi_vec normal_at(const edge_end *end) {
-    const vsh_mesh *mesh = end->mesh;
-    vshi_vec normal = {0.0, 0.0, 0.0}, corner[3];
-    if (mesh->normals != NULL) {
-        const vshi_vec given = vshi_vec_off(mesh->normals + 3 * (size_t)end->vertex);
-        normal = vshi_unit(vshi_transform_normal(mesh->transform, given));
-    }
-    if (!(vshi_dot(normal, normal) > 0.0)) {
-        vshi_mesh_triangle(mesh, end->triangle, corner);
-        normal = vshi_unit(vshi_cross(vshi_sub(corner[1], corner[0]), vshi_sub(corner[2], corner[0])));
-    }
-    return normal;
-}
-
-static void look_at(const edges *e, uint32_t edge, edge_end ends[2]) {
-    size_t local;
-    const vsh_mesh *mesh = mesh_of(e, edge, &local);
-    for (uint32_t k = 0; k < 2; ++k) {
-        const uint32_t vertex = mesh->indices[3 * local + (edge % 3 + k) % 3];
-        const float *uv = mesh->uvs + 2 * (size_t)vertex;
-        ends[k] = (edge_end){mesh,
-                             local,
-                             vertex,
-                             place_of(mesh, vertex),
-                             (double)uv[0] * e->charts->raster.width,
-                             (1.0 - (double)uv[1]) * e->charts->raster.height};
-    }
-}
-
 /* Both edges, the second turned so that it begins where the first does. */
-static void look_at_pair(const edges *e, uint32_t a, uint32_t b, edge_end first[2], edge_end second[2]) {
-    look_at(e, a, first);
-    look_at(e, b, second);
-    if (!same(first[0].at, second[0].at)) {
-        const edge_end turned = second[0];
-        second[0] = second[1];
-        second[1] = turned;
-    }
-}
-
-static bool same_in_lightmap(const edge_end a[2], const edge_end b[2]) {
-    bool all = true;
-    for (int k = 0; k < 2; ++k) {
-        all = all && fabs(a[k].x - b[k].x) <= SAME_PLACE && fabs(a[k].y - b[k].y) <= SAME_PLACE;
-    }
-    return all;
-}
-
-static bool is_smooth(const edges *e, const edge_end a[2], const edge_end b[2]) {
-    bool all = true;
-    for (int k = 0; k < 2; ++k) {
-        all = all && vshi_dot(normal_at(&a[k]), normal_at(&b[k])) >= e->cosine;
-    }
-    return all;
-}
-
-/* What lies outside of the image is not baked. */
-static bool is_inside(const edges *e, const edge_end a[2]) {
-    const vshi_raster *raster = &e->charts->raster;
-    bool all = true;
-    for (int k = 0; k < 2; ++k) {
-        all = all && a[k].x >= -SAME_PLACE && a[k].x <= raster->width + SAME_PLACE && a[k].y >= -SAME_PLACE &&
-              a[k].y <= raster->height + SAME_PLACE;
-    }
-    return all;
+static void look_at_pair(const edges *e, uint32_t a, uint32_t b, vshi_edge_end first[2],
+                         vshi_edge_end second[2]) {
+    vshi_edge_look_at(e->pages, a, first);
+    vshi_edge_look_at(e->pages, b, second);
+    vshi_ends_turn(first, second);
 }
 
 /* --- all edges */
@@ -211,38 +115,45 @@ static bool cancelled(const edges *e, size_t triangle) {
     return triangle % POLL_TRIANGLES == 0 && vshi_job_advance(e->job, 0);
 }
 
-static vsh_result sort_edges(edges *e, vsh_error *error) {
-    const vshi_charts *charts = e->charts;
-    memset(e->slots, 0xff, e->slot_count * sizeof *e->slots);
-    uint32_t triangle = 0;
-    batch b;
-    b.count = 0;
+static vsh_result sort_page(edges *e, const vshi_charts *charts, batch *b, uint32_t *triangle,
+                            vsh_error *error) {
     for (size_t m = 0; m < charts->mesh_count; ++m) {
-        for (size_t i = 0; i < charts->meshes[m].triangle_count; ++i, ++triangle) {
-            if (cancelled(e, triangle)) {
+        for (size_t i = 0; i < charts->meshes[m].triangle_count; ++i, ++*triangle) {
+            if (cancelled(e, *triangle)) {
                 return vshi_job_fail_cancelled(e->job, error);
             }
             vshi_uv_triangle unused;
             const bool used = vshi_charts_triangle(charts, m, i, &unused);
-            e->chart[triangle] = triangle;
+            e->chart[*triangle] = *triangle;
             for (uint32_t k = 0; k < 3; ++k) {
-                e->previous[3 * triangle + k] = NO_EDGE;
+                e->previous[3 * *triangle + k] = NO_EDGE;
+                e->goes_on[3 * *triangle + k] = !used;
                 if (used) {
-                    add(e, &b, 3 * triangle + k, &charts->meshes[m], i);
+                    add(e, b, 3 * *triangle + k, &charts->meshes[m], i);
                 }
             }
-            if (b.count > BATCH - 3) {
-                put_all(e, &b);
+            if (b->count > BATCH - 3) {
+                put_all(e, b);
             }
         }
+    }
+    return VSH_OK;
+}
+
+static vsh_result sort_edges(edges *e, vsh_error *error) {
+    memset(e->slots, 0xff, e->slot_count * sizeof *e->slots);
+    uint32_t triangle = 0;
+    batch b;
+    b.count = 0;
+    for (size_t page = 0; page < e->pages->count; ++page) {
+        VSHI_TRY(sort_page(e, e->pages->charts[page], &b, &triangle, error));
     }
     put_all(e, &b);
     return VSH_OK;
 }
-
 /* Joins charts and counts seams, or (`list`) fills them in. */
 static vsh_result go_through_pairs(edges *e, vshi_seam *list, size_t *count, vsh_error *error) {
-    const size_t all = 3 * e->charts->first[e->charts->mesh_count];
+    const size_t all = 3 * e->pages->first[e->pages->count];
     *count = 0;
     for (size_t edge = 0; edge < all; ++edge) {
         if (edge % 3 == 0 && cancelled(e, edge / 3)) {
@@ -250,22 +161,21 @@ static vsh_result go_through_pairs(edges *e, vshi_seam *list, size_t *count, vsh
         }
         uint32_t other = e->previous[edge];
         for (int pair = 0; pair < MOST_PAIRS && other != NO_EDGE; ++pair, other = e->previous[other]) {
-            edge_end a[2], b[2];
+            vshi_edge_end a[2], b[2];
             look_at_pair(e, other, (uint32_t)edge, a, b);
-            if (same_in_lightmap(a, b)) {
-                join(e->chart, other / 3, (uint32_t)edge / 3);
+            const bool one_chart = vshi_ends_same_in_lightmap(a, b);
+            if (!one_chart && !vshi_ends_smooth(a, b, e->cosine)) {
                 continue;
             }
-            if (!is_smooth(e, a, b) || !is_inside(e, a) || !is_inside(e, b)) {
-                continue;
+            e->goes_on[edge] = e->goes_on[other] = 1;
+            if (one_chart) {
+                vshi_chart_join(e->chart, other / 3, (uint32_t)edge / 3);
+            } else if (vshi_ends_inside(a) && vshi_ends_inside(b)) {
+                if (list != NULL) {
+                    list[*count] = vshi_seam_between(a, b, e->chart, other / 3, (uint32_t)edge / 3);
+                }
+                ++*count;
             }
-            if (list != NULL) {
-                list[*count] =
-                    (vshi_seam){{{a[0].x, a[1].x}, {b[0].x, b[1].x}},
-                                {{a[0].y, a[1].y}, {b[0].y, b[1].y}},
-                                {chart_of(e->chart, other / 3), chart_of(e->chart, (uint32_t)edge / 3)}};
-            }
-            ++*count;
         }
     }
     return VSH_OK;
@@ -273,45 +183,56 @@ static vsh_result go_through_pairs(edges *e, vshi_seam *list, size_t *count, vsh
 
 static vsh_result find(edges *e, const vsh_run *run, vshi_seams *seams, vsh_error *error) {
     const char *what = "seams";
-    const size_t triangles = e->charts->first[e->charts->mesh_count];
+    const size_t triangles = e->pages->first[e->pages->count];
     e->slot_count = 16;
     while (e->slot_count < 4 * triangles) {
         e->slot_count *= 2;
     }
     const double held = (double)triangles * sizeof *e->chart;
     const double bytes =
-        held + 3.0 * (double)triangles * sizeof *e->previous + (double)e->slot_count * sizeof *e->slots;
+        held + 3.0 * (double)triangles * (sizeof *e->previous + 1) + (double)e->slot_count * sizeof *e->slots;
     VSHI_TRY(vshi_check_limit(run, bytes, what, error));
     VSHI_TRY(vshi_allocate((void **)&seams->chart, triangles, sizeof *seams->chart, what, error));
     VSHI_TRY(vshi_allocate((void **)&e->previous, 3 * triangles, sizeof *e->previous, what, error));
+    VSHI_TRY(vshi_allocate((void **)&e->goes_on, 3 * triangles, 1, what, error));
     VSHI_TRY(vshi_allocate((void **)&e->slots, e->slot_count, sizeof *e->slots, what, error));
     e->chart = seams->chart;
     VSHI_TRY(sort_edges(e, error));
     free(e->slots);
     e->slots = NULL;
     VSHI_TRY(go_through_pairs(e, NULL, &seams->count, error));
-    const double listed = (double)seams->count * sizeof *seams->list;
+    const double rest = bytes - (double)e->slot_count * sizeof *e->slots;
+    vsh_run beside = *run;
+    beside.memory_held += (uint64_t)rest;
+    VSHI_TRY(vshi_seam_parts_find(e->pages, e->goes_on, e->cosine, &beside, e->job, seams->chart, &e->parts,
+                                  error));
+    const size_t count = seams->count + e->parts.count;
+    const double listed = (double)count * sizeof *seams->list;
     seams->bytes = held + listed;
-    VSHI_TRY(vshi_check_limit(run, bytes - (double)e->slot_count * sizeof *e->slots + listed, what, error));
-    VSHI_TRY(vshi_allocate((void **)&seams->list, seams->count, sizeof *seams->list, what, error));
+    VSHI_TRY(vshi_check_limit(run, rest + listed + e->parts.bytes, what, error));
+    VSHI_TRY(vshi_allocate((void **)&seams->list, count, sizeof *seams->list, what, error));
     VSHI_TRY(go_through_pairs(e, seams->list, &seams->count, error));
+    vshi_seam_parts_list(&e->parts, seams->chart, seams->list + seams->count);
+    seams->count = count;
     for (size_t i = 0; i < triangles; ++i) {
-        seams->chart[i] = chart_of(seams->chart, (uint32_t)i);
+        seams->chart[i] = vshi_chart_of(seams->chart, (uint32_t)i);
     }
     return VSH_OK;
 }
 
-vsh_result vshi_seams_find(const vshi_charts *charts, double cosine, const vsh_run *run, vshi_job *job,
+vsh_result vshi_seams_find(const vshi_seam_pages *pages, double cosine, const vsh_run *run, vshi_job *job,
                            vshi_seams *seams, vsh_error *error) {
-    const size_t triangles = charts->first[charts->mesh_count];
+    const size_t triangles = pages->first[pages->count];
     *seams = (vshi_seams){NULL, NULL, 0, 0.0};
     if (triangles > UINT32_MAX / 3 - 1) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "seams: %zu triangles, at most %u", triangles,
                          UINT32_MAX / 3 - 1);
     }
-    edges e = {.charts = charts, .cosine = cosine, .job = job};
+    edges e = {.pages = pages, .cosine = cosine, .job = job};
     const vsh_result result = find(&e, run, seams, error);
+    vshi_seam_parts_free(&e.parts);
     free(e.slots);
+    free(e.goes_on);
     free(e.previous);
     return result;
 }

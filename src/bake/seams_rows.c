@@ -9,6 +9,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 static const double STEP = 0.5; /* texels, on the side where a seam is longer */
 
@@ -22,7 +23,7 @@ static const float UNREAD = 1.0f / 512.0f;
 enum { POLL_SEAMS = 4096 };
 
 typedef struct making {
-    const vshi_charts *charts;
+    const vshi_seam_pages *pages;
     const vshi_seams *seams;
     vshi_job *job;
     vshi_seam_system *system;
@@ -32,6 +33,7 @@ typedef struct making {
     uint32_t *parent;        /* [unknowns]: union-find, then the island */
     uint32_t *number;        /* [unknowns]: island by island */
     vshi_seam_row *unsorted; /* [places] */
+    size_t page;             /* whose owners are found */
     _Atomic vsh_result row_result;
 } making;
 
@@ -67,7 +69,8 @@ static uint32_t along(double at, int32_t size, int64_t texel[2]) {
 
 /* What is read at place `place` of `places`: from end to end, a lone one in the middle. */
 static lookup look_up(const making *m, const vshi_seam *seam, int side, size_t place, size_t places) {
-    const vshi_raster *raster = &m->charts->raster;
+    const vshi_raster *raster = &m->pages->charts[seam->page[side]]->raster;
+    const uint64_t texel = m->pages->texel[seam->page[side]];
     const double t = places > 1 ? (double)place / (double)(places - 1) : 0.5;
     int64_t column[2], row[2];
     const uint32_t x =
@@ -76,7 +79,7 @@ static lookup look_up(const making *m, const vshi_seam *seam, int side, size_t p
         along(seam->y[side][0] + t * (seam->y[side][1] - seam->y[side][0]), raster->height, row);
     lookup found;
     for (int k = 0; k < 4; ++k) {
-        found.texel[k] = (uint64_t)row[k / 2] * (uint64_t)raster->width + (uint64_t)column[k % 2];
+        found.texel[k] = texel + (uint64_t)row[k / 2] * (uint64_t)raster->width + (uint64_t)column[k % 2];
         found.weight[k] = (k % 2 ? x : STEPS_OF_TEXEL - x) * (k / 2 ? y : STEPS_OF_TEXEL - y);
     }
     return found;
@@ -127,7 +130,7 @@ static uint32_t unknown_of(const making *m, uint64_t texel) {
 /* Which chart a texel of a tile is of, as the bake shades it: that of its first sample. */
 static uint32_t owner_of(const making *m, const vshi_row *row, size_t bit) {
     const vshi_tile *tile = &row->tile;
-    const size_t n = (size_t)m->charts->raster.supersample, side = VSHI_TILE * n;
+    const size_t n = (size_t)m->pages->charts[m->page]->raster.supersample, side = VSHI_TILE * n;
     uint32_t owner = 0;
     if ((tile->covered >> bit & 1) != 0) {
         const uint32_t *sample = tile->owner + bit / VSHI_TILE * n * side + bit % VSHI_TILE * n;
@@ -140,34 +143,39 @@ static uint32_t owner_of(const making *m, const vshi_row *row, size_t bit) {
     if (owner == 0) {
         return VSHI_NO_CHART;
     }
-    return m->seams->chart[m->charts->first[row->mesh[owner - 1]] + row->local[owner - 1]];
+    const size_t first = m->pages->first[m->page] + m->pages->charts[m->page]->first[row->mesh[owner - 1]];
+    return m->seams->chart[first + row->local[owner - 1]];
 }
 
 static bool has_marks(const making *m, size_t row) {
-    const size_t width = (size_t)m->charts->raster.width, height = (size_t)m->charts->raster.height;
-    const size_t begin = row * VSHI_TILE * width;
-    const size_t last = (row + 1) * VSHI_TILE < height ? (row + 1) * VSHI_TILE : height;
+    const vshi_raster *raster = &m->pages->charts[m->page]->raster;
+    const size_t width = (size_t)raster->width, height = (size_t)raster->height;
+    const uint64_t texel = m->pages->texel[m->page], begin = texel + row * VSHI_TILE * width;
+    const uint64_t last = texel + ((row + 1) * VSHI_TILE < height ? (row + 1) * VSHI_TILE : height) * width;
     bool any = false;
-    for (size_t w = begin / 64; w <= (last * width - 1) / 64 && !any; ++w) {
+    for (uint64_t w = begin / 64; w <= (last - 1) / 64 && !any; ++w) {
         any = m->marks[w] != 0;
     }
     return any;
 }
 
 static void find_tile_owners(const making *m, vshi_row *row, size_t column) {
-    const size_t width = (size_t)m->charts->raster.width, height = (size_t)m->charts->raster.height;
+    const vshi_charts *charts = m->pages->charts[m->page];
+    const size_t width = (size_t)charts->raster.width, height = (size_t)charts->raster.height;
+    const uint64_t texel = m->pages->texel[m->page];
     bool rasterised = false;
     for (size_t bit = 0; bit < VSHI_TILE * VSHI_TILE; ++bit) {
         const size_t x = column * VSHI_TILE + bit % VSHI_TILE, y = row->row * VSHI_TILE + bit / VSHI_TILE;
-        if (x >= width || y >= height || !is_marked(m, y * width + x)) {
+        if (x >= width || y >= height || !is_marked(m, texel + y * width + x)) {
             continue;
         }
         if (!rasterised) {
-            vshi_row_tile(m->charts, row, column, NULL);
+            vshi_row_tile(charts, row, column, NULL);
             rasterised = true;
         }
-        const uint32_t unknown = unknown_of(m, y * width + x);
+        const uint32_t unknown = unknown_of(m, texel + y * width + x);
         m->system->texel[unknown] = y * width + x;
+        m->system->page[unknown] = (uint32_t)m->page;
         m->system->chart[unknown] = owner_of(m, row, bit);
     }
 }
@@ -179,7 +187,7 @@ static void find_owners(void *user, size_t begin, size_t end) {
         if (!has_marks(m, row)) {
             continue;
         }
-        const vsh_result result = vshi_row_open(m->charts, row, &work, NULL);
+        const vsh_result result = vshi_row_open(m->pages->charts[m->page], row, &work, NULL);
         if (result != VSH_OK) {
             atomic_store(&m->row_result, result);
         }
@@ -320,27 +328,40 @@ static vsh_result sort_islands(making *m, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Texels and charts into the order of the islands. */
+/* Texels, charts and pages into the order of the islands. */
 static vsh_result sort_unknowns(making *m, vsh_error *error) {
     vshi_seam_system *s = m->system;
     uint64_t *texel = NULL;
+    if (s->unknown_count == 0) {
+        return VSH_OK;
+    }
     VSHI_TRY(vshi_allocate((void **)&texel, s->unknown_count, sizeof *texel, "seams", error));
     for (size_t u = 0; u < s->unknown_count; ++u) {
         texel[m->number[u]] = s->texel[u];
         m->parent[m->number[u]] = s->chart[u];
     }
+    memcpy(s->chart, m->parent, s->unknown_count * sizeof *s->chart);
     for (size_t u = 0; u < s->unknown_count; ++u) {
-        s->chart[u] = m->parent[u];
+        m->parent[m->number[u]] = s->page[u];
     }
+    memcpy(s->page, m->parent, s->unknown_count * sizeof *s->page);
     free(s->texel);
     s->texel = texel;
     return VSH_OK;
 }
 
+static double most_row_bytes(const making *m, int32_t threads) {
+    double most = 0.0;
+    for (size_t page = 0; page < m->pages->count; ++page) {
+        most = fmax(most, vshi_row_bytes(m->pages->charts[page], threads));
+    }
+    return most;
+}
+
 static vsh_result make(making *m, const vsh_run *run, vsh_error *error) {
     const char *what = "seams";
     vshi_seam_system *s = m->system;
-    const uint64_t texels = (uint64_t)m->charts->raster.width * (uint64_t)m->charts->raster.height;
+    const uint64_t texels = m->pages->texel[m->pages->count];
     m->words = (size_t)((texels + 63) / 64);
     double bytes = m->seams->bytes + (double)m->words * (sizeof *m->marks + sizeof *m->rank);
     size_t places;
@@ -348,32 +369,35 @@ static vsh_result make(making *m, const vsh_run *run, vsh_error *error) {
     VSHI_TRY(vshi_allocate((void **)&m->marks, m->words, sizeof *m->marks, what, error));
     VSHI_TRY(vshi_allocate((void **)&m->rank, m->words, sizeof *m->rank, what, error));
     VSHI_TRY(mark(m, &places, error));
-    const double each = 2 * sizeof *s->texel + sizeof *s->chart + sizeof *m->parent + sizeof *m->number +
+    const double each = 2 * sizeof *s->texel + 2 * sizeof *s->chart + sizeof *m->parent + sizeof *m->number +
                         2 * sizeof *s->first_row;
     bytes += (double)s->unknown_count * each + 2.0 * (double)places * sizeof *s->rows +
-             vshi_row_bytes(m->charts, run->threads);
+             most_row_bytes(m, run->threads);
     VSHI_TRY(vshi_check_limit(run, bytes, what, error));
     VSHI_TRY(vshi_allocate((void **)&s->texel, s->unknown_count, sizeof *s->texel, what, error));
     VSHI_TRY(vshi_allocate((void **)&s->chart, s->unknown_count, sizeof *s->chart, what, error));
+    VSHI_TRY(vshi_allocate((void **)&s->page, s->unknown_count, sizeof *s->page, what, error));
     VSHI_TRY(vshi_allocate((void **)&m->parent, s->unknown_count, sizeof *m->parent, what, error));
     VSHI_TRY(vshi_allocate((void **)&m->number, s->unknown_count, sizeof *m->number, what, error));
     VSHI_TRY(vshi_allocate((void **)&m->unsorted, places, sizeof *m->unsorted, what, error));
-    VSHI_TRY(vshi_parallel_for(m->job, m->charts->rows, 1, 0, find_owners, m, error));
+    for (m->page = 0; m->page < m->pages->count; ++m->page) {
+        VSHI_TRY(vshi_parallel_for(m->job, m->pages->charts[m->page]->rows, 1, 0, find_owners, m, error));
+    }
     if (atomic_load(&m->row_result) != VSH_OK) {
         return vshi_fail(error, atomic_load(&m->row_result), "seams: the system refused memory for a row");
     }
     VSHI_TRY(make_rows(m, error));
     VSHI_TRY(sort_islands(m, error));
     VSHI_TRY(sort_unknowns(m, error));
-    s->bytes = m->seams->bytes + (double)s->unknown_count * (sizeof *s->texel + sizeof *s->chart) +
+    s->bytes = m->seams->bytes + (double)s->unknown_count * (sizeof *s->texel + 2 * sizeof *s->chart) +
                (double)s->row_count * sizeof *s->rows + 2.0 * (double)s->island_count * sizeof *s->first_row;
     return VSH_OK;
 }
 
-vsh_result vshi_seam_system_make(const vshi_charts *charts, const vshi_seams *seams, const vsh_run *run,
+vsh_result vshi_seam_system_make(const vshi_seam_pages *pages, const vshi_seams *seams, const vsh_run *run,
                                  vshi_job *job, vshi_seam_system *system, vsh_error *error) {
     *system = (vshi_seam_system){.unknown_count = 0};
-    making m = {.charts = charts, .seams = seams, .job = job, .system = system};
+    making m = {.pages = pages, .seams = seams, .job = job, .system = system};
     const vsh_result result = make(&m, run, error);
     free(m.unsorted);
     free(m.number);
@@ -388,6 +412,7 @@ void vshi_seam_system_free(vshi_seam_system *system) {
     free(system->first_unknown);
     free(system->rows);
     free(system->chart);
+    free(system->page);
     free(system->texel);
     *system = (vshi_seam_system){.unknown_count = 0};
 }

@@ -1,4 +1,5 @@
 #include "bake/texels.h"
+#include "bake/part.h"
 #include "bake/rows.h"
 #include "bake/smooth_surface.h"
 #include "base/floats.h"
@@ -234,17 +235,17 @@ done:
     return result;
 }
 
-static vsh_result create(const vsh_charts *charts, int32_t first_row, int32_t rows, const vsh_run *run,
-                         vsh_texels **texels, vsh_error *error) {
+static vsh_result create(const vsh_charts *charts, int32_t first_row, int32_t rows, bool part,
+                         const vsh_run *run, vsh_texels **texels, vsh_error *error) {
     vshi_band band;
     vsh_texels *made = NULL;
-    VSHI_TRY(vshi_band_set(charts, first_row, rows, &band, error));
+    VSHI_TRY(vshi_band_set(charts, first_row, rows, part, &band, error));
     VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "texels", error));
     made->band = band;
     made->info.width = charts->info.width;
     made->info.height = charts->info.height;
     made->padding = charts->padding;
-    made->fills = charts->fills && rows == charts->info.height;
+    made->fills = charts->fills && rows == charts->info.height && !part;
     made->ao_spacing = charts->ao_spacing;
     made->shade = charts->shade;
     made->whole = charts->info.samples;
@@ -266,7 +267,16 @@ vsh_result vsh_texels_create_band(const vsh_charts *charts, int32_t first_row, i
     VSHI_NEEDS(charts);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    return create(charts, first_row, rows, &full, texels, error);
+    return create(charts, first_row, rows, false, &full, texels, error);
+}
+
+vsh_result vshi_texels_create_part(const vsh_charts *charts, int32_t first_row, int32_t rows,
+                                   const vsh_run *run, vsh_texels **texels, vsh_error *error) {
+    VSHI_FLOATS;
+    *texels = NULL;
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    return create(charts, first_row, rows, true, &full, texels, error);
 }
 
 vsh_result vsh_texels_create_sized(const vsh_mesh *meshes, size_t mesh_count,
@@ -282,7 +292,7 @@ vsh_result vsh_texels_create_sized(const vsh_mesh *meshes, size_t mesh_count,
     vsh_charts *charts = NULL;
     VSHI_TRY(vshi_charts_make(meshes, mesh_count, options, &full, true, uv_reports, uv_reports_size, &charts,
                               error));
-    const vsh_result result = create(charts, 0, charts->info.height, &full, texels, error);
+    const vsh_result result = create(charts, 0, charts->info.height, false, &full, texels, error);
     vsh_charts_free(charts);
     return result;
 }

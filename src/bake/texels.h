@@ -46,9 +46,13 @@ typedef struct vshi_band {
     int32_t first, rows;         /* the same, held */
 } vshi_band;
 
-/* Errors: VSH_ERROR_ARGUMENT. */
-vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t rows, vshi_band *band,
-                         vsh_error *error);
+/* `part`: rows of a part (bake/part.h), which hold none to copy from. Errors: VSH_ERROR_ARGUMENT. */
+vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t rows, bool part,
+                         vshi_band *band, vsh_error *error);
+
+/* vsh_charts_band_bytes(), of rows of a part too. */
+uint64_t vshi_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows, bool part,
+                                const vsh_lightmap *lightmap, size_t light_count);
 
 /* Rows of tiles that the AO of rows begin … end - 1 depends on, where texels share it, of `all`: those of its
  * lattice's squares (8 × 8 spacings) and of the squares beside these, and whether these end there. */

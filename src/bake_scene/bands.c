@@ -1,5 +1,6 @@
 #include "bake_scene/bands.h"
 
+#include "bake/part.h"
 #include "base/bytes.h"
 #include "base/try.h"
 
@@ -13,14 +14,34 @@ typedef struct cost {
     size_t light_count;
     int32_t floats; /* beside those a texel: pictures, and what is baked interleaved and then split */
     uint64_t held, writer, limit;
+    int32_t first, end; /* rows that are baked */
+    int32_t channels;
+    bool part, merge;
 } cost;
+
+/* Bytes of rows that are taken from parts: theirs, and those around them that they are filled from. */
+static uint64_t merging(const cost *c, int32_t first, int32_t rows) {
+    const int32_t height = c->info.height, reach = vshi_part_reach(c->charts);
+    const int32_t above = first < reach ? first : reach;
+    const int32_t left = height - first - rows, below = left < reach ? left : reach;
+    const bool whole = rows == height;
+    const double texels = (double)c->info.width * (double)rows;
+    const double held = (double)c->info.width * (double)(above + rows + below);
+    bool fills;
+    vshi_part_padding(c->charts, &fills);
+    return (uint64_t)(texels * sizeof(float) * c->channels +
+                      held * (sizeof(uint32_t) + (whole ? 0.0 : sizeof(float) * (double)c->channels)) +
+                      vshi_rows_complete_bytes(c->info.width, above + rows + below, fills && whole));
+}
 
 /* Bytes that the largest of bands of so many rows takes. */
 static uint64_t largest(const cost *c, int32_t rows) {
     uint64_t most = 0;
-    for (int32_t first = 0; first < c->info.height; first += rows) {
-        const int32_t left = c->info.height - first, here = left < rows ? left : rows;
-        uint64_t bytes = vsh_charts_band_bytes(c->charts, first, here, &c->lightmap, c->light_count);
+    for (int32_t first = c->first; first < c->end; first += rows) {
+        const int32_t left = c->end - first, here = left < rows ? left : rows;
+        uint64_t bytes =
+            c->merge ? merging(c, first, here)
+                     : vshi_charts_band_bytes(c->charts, first, here, c->part, &c->lightmap, c->light_count);
         bytes += (uint64_t)c->floats * sizeof(float) * (uint64_t)c->info.width * (uint64_t)here;
         most = bytes > most ? bytes : most;
         if (left <= rows) {
@@ -51,7 +72,7 @@ static int32_t up_to_step(int32_t rows) {
 
 /* The most rows within the limit, where a step of them is within it and all are not. */
 static int32_t most_rows(const cost *c) {
-    const int32_t height = c->info.height;
+    const int32_t height = c->end - c->first;
     int32_t low = 1, high = (height + VSH_BAND_STEP - 1) / VSH_BAND_STEP; /* steps: fit, do not */
     while (high - low > 1) {
         const int32_t middle = low + (high - low) / 2;
@@ -69,7 +90,7 @@ static int32_t most_rows(const cost *c) {
 /* `wanted` rows, or (0) as many as go. */
 static vsh_result plan(const cost *c, int32_t wanted, const char *output, vshi_bands *bands,
                        vsh_error *error) {
-    const int32_t height = c->info.height;
+    const int32_t height = c->end - c->first;
     int32_t rows = wanted > 0 && up_to_step(wanted) < height ? up_to_step(wanted) : height;
     if (wanted == 0 && c->limit > 0 && largest(c, rows) > c->limit) {
         const uint64_t least = largest(c, VSH_BAND_STEP);
@@ -78,7 +99,7 @@ static vsh_result plan(const cost *c, int32_t wanted, const char *output, vshi_b
         }
         rows = most_rows(c);
     }
-    *bands = (vshi_bands){rows, (height + rows - 1) / rows, largest(c, rows)};
+    *bands = (vshi_bands){rows, (height + rows - 1) / rows, largest(c, rows), c->first, c->end};
     return VSH_OK;
 }
 
@@ -94,7 +115,12 @@ vsh_result vshi_bands_plan(const vsh_scene *scene, const vshi_target *target, co
               .lightmap = vshi_channels_shape(scene),
               .light_count = scene->light_count,
               .floats = 3 * (int32_t)channels.triple_count + (need->picture ? 4 : 0) +
-                        (scene->planes.invalid ? 1 : 0),
+                        (scene->planes.invalid ? 1 : 0) + (need->part ? 1 : 0),
+              .channels = channels.image.channel_count,
+              .first = need->first,
+              .end = need->end,
+              .part = need->part,
+              .merge = need->merge,
               .held = need->held,
               .limit = need->limit};
     c.writer = need->files ? vsh_image_writer_bytes(receiver->output, &channels.image, &image) : 0;

@@ -209,6 +209,34 @@ void vshi_channels_split(vshi_channels *channels, const vsh_scene *scene) {
     }
 }
 
+void vshi_channels_join(vshi_channels *channels, const vsh_scene *scene) {
+    const size_t texels = (size_t)channels->image.width * (size_t)channels->rows;
+    float *const *plane = channels->planes, *const *triple = channels->triples;
+    size_t kind_count;
+    const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
+    for (size_t k = 0; k < kind_count; ++k) {
+        for (size_t i = 0; i < count_of(&kinds[k], scene); ++i, plane += vshi_plane_components(&kinds[k])) {
+            for (size_t at = 0; kinds[k].axes != NULL && at < 3 * texels; ++at) {
+                (*triple)[at] = plane[at % 3][at / 3];
+            }
+            triple += kinds[k].axes != NULL;
+        }
+    }
+}
+
+size_t vshi_channels_padded(const vsh_scene *scene, float *const *planes, vshi_plane *padded) {
+    size_t kind_count, count = 0;
+    const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
+    for (size_t k = 0; k < kind_count; ++k) {
+        const size_t channels = count_of(&kinds[k], scene) * vshi_plane_components(&kinds[k]);
+        for (size_t i = 0; kinds[k].padded && i < channels; ++i) {
+            padded[count++] = (vshi_plane){planes[i], 1};
+        }
+        planes += channels;
+    }
+    return count;
+}
+
 void vshi_channels_free(vshi_channels *channels) {
     for (size_t t = 0; channels->triples != NULL && t < channels->triple_count; ++t) {
         free(channels->triples[t]);
@@ -217,6 +245,7 @@ void vshi_channels_free(vshi_channels *channels) {
         free(channels->planes[i]);
     }
     free(channels->invalid);
+    free(channels->known);
     free(channels->triples);
     free(channels->planes);
     free(channels->holds);

@@ -2,6 +2,7 @@
 #ifndef VSHI_CHANNELS_H
 #define VSHI_CHANNELS_H
 
+#include "bake/padding.h"
 #include "base/error.h"
 
 #include <stdbool.h>
@@ -17,6 +18,7 @@ typedef struct vshi_channels {
     float **planes;  /* [image.channel_count][rows][width] */
     float **triples; /* [triple_count][rows][width][3]: what is baked interleaved, and then split */
     float *invalid;  /* [rows][width] as the bake tells it (vsh_lightmap); NULL: not asked for */
+    uint32_t *known; /* [rows][width]: VSHI_PART_…, of a part; NULL: it is none */
     size_t triple_count;
     int32_t rows; /* that there is memory for */
 } vshi_channels;
@@ -36,6 +38,12 @@ vsh_lightmap vshi_channels_shape(const vsh_scene *scene);
 
 /* After the bake: what is interleaved, and what is invalid, into its planes. */
 void vshi_channels_split(vshi_channels *channels, const vsh_scene *scene);
+
+/* Before a bake goes on with what was split: back into what is interleaved. */
+void vshi_channels_join(vshi_channels *channels, const vsh_scene *scene);
+
+/* Those of `planes`, one a channel, that are padded, into padded[VSH_MAX_CHANNELS]; returns how many. */
+size_t vshi_channels_padded(const vsh_scene *scene, float *const *planes, vshi_plane *padded);
 
 void vshi_channels_free(vshi_channels *channels); /* zeroed ones too */
 

@@ -18,7 +18,8 @@ static const double MAKING = 4.3;
 
 /* What was measured on the trial. */
 typedef struct trial {
-    double finer;    /* the scene's resolution over the trial's */
+    double finer; /* the scene's resolution over the trial's */
+    double resolution;
     double sample_s; /* of one texel's sample, all lights and AO */
     vsh_occluders_info made;
 } trial;
@@ -67,11 +68,26 @@ static double finer(const vsh_scene *scene, int32_t resolution, double trial_vox
                                         : (double)scene->grid.resolution / TRIAL_RESOLUTION;
 }
 
+/* Voxels along the longest side of a field that is there; 0: there are none. */
+static double resolution_of(const vsh_scene *scene, const vsh_occluders *occluders, double voxel_size) {
+    vsh_occluder_parts parts;
+    vsh_field_info info;
+    vsh_occluders_get_parts(occluders, &parts);
+    vsh_field_get_info(parts.field, &info);
+    double longest = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        longest = fmax(longest, info.bounds_max[axis] - info.bounds_min[axis]);
+    }
+    const bool named = scene->grid.voxel_size == 0.0 && scene->grid.resolution > 0;
+    return voxel_size == 0.0 ? 0.0 : named ? scene->grid.resolution : longest / voxel_size;
+}
+
 static vsh_result try_small(const vsh_bake_job *job, const vsh_run *run, trial *t, vsh_error *error) {
     const double points = vshi_job_points(job);
     const int32_t resolution = vsh_scene_resolution(&job->scene, job->assets, NULL, points);
     vsh_scene small = job->scene;
-    if (resolution != 0) { /* where there are none, nor are there in the trial */
+    const bool smaller = resolution != 0 && job->scene.field == NULL;
+    if (smaller) { /* where there are none, nor are there in the trial, and those of a file are there */
         small.grid.voxel_size = 0.0;
         small.grid.resolution = TRIAL_RESOLUTION;
     }
@@ -83,7 +99,9 @@ static vsh_result try_small(const vsh_bake_job *job, const vsh_run *run, trial *
     vsh_occluders *occluders = NULL;
     VSHI_TRY(vsh_scene_occluders(&small, job->assets, &options, run, &occluders, error));
     vsh_occluders_get_info(occluders, &t->made);
-    t->finer = resolution != 0 ? finer(&job->scene, resolution, t->made.voxel_size) : 1.0;
+    t->finer = smaller ? finer(&job->scene, resolution, t->made.voxel_size) : 1.0;
+    t->resolution =
+        smaller ? TRIAL_RESOLUTION * t->finer : resolution_of(&job->scene, occluders, t->made.voxel_size);
     const vsh_result result = bake_part(job, occluders, run, t, error);
     vsh_occluders_free(occluders);
     return result;
@@ -130,7 +148,7 @@ vsh_result vsh_bake_job_forecast_sized(vsh_bake_job *job, const vsh_run *run, vs
     const double more = t.finer * t.finer; /* surfaces: voxels grow with the square */
     vsh_bake_forecast f = {.voxels = (double)t.made.active_voxels * more,
                            .voxel_size = t.made.voxel_size / t.finer,
-                           .resolution = t.made.voxel_size > 0.0 ? TRIAL_RESOLUTION * t.finer : 0.0,
+                           .resolution = t.resolution,
                            .grid_bytes = (double)t.made.grid_bytes * more,
                            .field_bytes = (double)t.made.field_bytes * more,
                            .voxelize_s = t.made.voxelize_s * more,

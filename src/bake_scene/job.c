@@ -1,7 +1,9 @@
 #include "bake_scene/job.h"
 
 #include "bake_scene/lit_sink.h"
-#include "bake_scene/resume.h"
+#include "bake_scene/part_job.h"
+#include "bake_scene/seams.h"
+#include "bake_scene/shares.h"
 #include "base/clock.h"
 #include "base/job.h"
 #include "base/memory.h"
@@ -43,7 +45,8 @@ vsh_result vsh_receiver_charts(const vsh_scene *scene, size_t index, const vsh_m
     }
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    const vshi_target target = {scene->receivers[index], index, meshes, mesh_count, NULL, {NULL}, 0};
+    const vshi_target target = {
+        .receiver = scene->receivers[index], .index = index, .meshes = meshes, .mesh_count = mesh_count};
     return vshi_target_charts(scene, &target, allow_overlap != 0, true, &full, charts, error);
 }
 
@@ -63,10 +66,6 @@ static vsh_result check_lit(const vsh_scene *scene, const vsh_bake_job_options *
     for (size_t i = 0; i < scene->receiver_count && options->sink == NULL; ++i) {
         assets += (size_t)vsh_lit_is_output(scene->receivers[i].output);
     }
-    if (assets > 0 && options->per_object) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "vsh_bake_job_options.per_object: an asset has one lightmap for all its objects");
-    }
     if (options->lit_exr != NULL && (assets != 1 || scene->receiver_count != 1)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "vsh_bake_job_options.lit_exr: is for one output that is a .glb or .gltf");
@@ -74,6 +73,24 @@ static vsh_result check_lit(const vsh_scene *scene, const vsh_bake_job_options *
     if (options->lit_image_place < VSH_LIT_IMAGES_AUTO || options->lit_image_place > VSH_LIT_IMAGES_BESIDE) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_job_options.lit_image_place is %d",
                          options->lit_image_place);
+    }
+    return VSH_OK;
+}
+
+static vsh_result check_shard(const vsh_bake_job_options *options, vsh_error *error) {
+    const int32_t count = options->shard_count;
+    if (count < 0 || count > VSHI_MOST_SHARDS || options->shard < 0 || options->shard > count) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "vsh_bake_job_options.shard %d of %d: expected 1 to %d, and no more than there are",
+                         options->shard, count, VSHI_MOST_SHARDS);
+    }
+    if (options->shard > 0 && (options->sink != NULL || options->invalid_picture != NULL)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_job_options.shard: not together with %s",
+                         options->sink != NULL ? "a sink" : "invalid_picture");
+    }
+    VSHI_NEEDS_OF(options->word_count, options->words);
+    for (size_t i = 0; i < options->word_count; ++i) {
+        VSHI_NEEDS(options->words[i]);
     }
     return VSH_OK;
 }
@@ -86,10 +103,29 @@ static vsh_result check(const vsh_scene *scene, const vsh_bake_job_options *opti
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_job_options.resume: not together with %s",
                          options->sink != NULL ? "a sink" : "invalid_picture");
     }
+    VSHI_TRY(check_shard(options, error));
     for (size_t i = 0; i < scene->receiver_count && options->sink == NULL; ++i) {
         VSHI_TRY(vsh_receiver_check(scene, i, error));
     }
     return check_lit(scene, options, error);
+}
+
+/* The job's own scene: with lightmaps of objects, where all are to have some, and light for assets. */
+static vsh_result take_scene(vsh_bake_job *job, const vsh_scene *scene, vsh_error *error) {
+    job->scene = *scene;
+    if (job->options.per_object != 0) {
+        VSHI_TRY(vshi_allocate((void **)&job->receivers_own, scene->receiver_count,
+                               sizeof *job->receivers_own, "receivers", error));
+        for (size_t i = 0; i < scene->receiver_count; ++i) {
+            job->receivers_own[i] = scene->receivers[i];
+            job->receivers_own[i].atlas = VSH_ATLAS_OBJECTS;
+        }
+        job->scene.receivers = job->receivers_own;
+    }
+    if (job->options.sink == NULL) {
+        vshi_lit_sink_scene(&job->scene);
+    }
+    return VSH_OK;
 }
 
 static vsh_result list_lightmaps(vsh_bake_job *job, vsh_error *error) {
@@ -129,16 +165,13 @@ vsh_result vsh_bake_job_create(const vsh_scene *scene, const vsh_bake_job_option
     if (made == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "bake job: the system refused memory");
     }
-    made->scene = *scene;
-    if (own.sink == NULL) {
-        vshi_lit_sink_scene(&made->scene);
-    }
     made->options = own;
     made->sink = sink;
     made->report.shade = vsh_shade_stats_zero();
     vsh_result result;
-    VSHI_TRY_DONE(vsh_assets_load(scene, &full, &made->assets, error));
-    VSHI_TRY_DONE(vshi_targets_make(scene, made->assets, own.per_object != 0, &full, &made->targets, error));
+    VSHI_TRY_DONE(take_scene(made, scene, error));
+    VSHI_TRY_DONE(vsh_assets_load(&made->scene, &full, &made->assets, error));
+    VSHI_TRY_DONE(vshi_targets_make(&made->scene, made->assets, &full, &made->targets, error));
     VSHI_TRY_DONE(list_lightmaps(made, error));
     made->report.load_s = vshi_seconds() - start;
     *job = made;
@@ -152,6 +185,8 @@ void vsh_bake_job_free(vsh_bake_job *job) {
     if (job == NULL) {
         return;
     }
+    free(job->part_path);
+    vshi_shares_free(job);
     free(job->errors);
     vshi_lit_pages_free(job);
     vsh_provenance_free(job->provenance);
@@ -161,6 +196,7 @@ void vsh_bake_job_free(vsh_bake_job *job) {
     free(job->lightmaps);
     vshi_targets_free(&job->targets);
     vsh_assets_free(job->assets);
+    free(job->receivers_own);
     free(job);
 }
 
@@ -183,6 +219,11 @@ void vsh_bake_job_get_report_sized(const vsh_bake_job *job, vsh_bake_report *rep
 
 /* --- measured */
 
+/* Whether some of its rows are baked, into a part. */
+static bool is_shard(const vsh_bake_job *job) {
+    return job->options.shard > 0;
+}
+
 /* Where its samples are: looked at in passing, or (whole) all of them are made. */
 static vsh_result find_bounds(const vsh_charts *charts, const vshi_bands *bands, bool whole,
                               const vsh_run *run, vsh_texels **texels, double low[3], double high[3],
@@ -202,20 +243,28 @@ static vsh_result measure(vsh_bake_job *job, size_t index, bool bakes, const vsh
     vsh_job_lightmap *lightmap = &job->lightmaps[index];
     vsh_charts *charts = NULL;
     vsh_texels *texels = NULL;
-    vshi_bands bands;
+    vshi_bands bands = {.count = 0};
     double low[3], high[3];
     vsh_result result;
+    /* the first part's bake tells of UVs */
+    const bool tells = bakes && !job->merges && job->options.shard <= 1;
     VSHI_TRY_DONE(vshi_target_charts(&job->scene, &job->targets.list[index], job->options.allow_overlap != 0,
-                                     bakes, run, &charts, error));
-    VSHI_TRY_DONE(vshi_job_plan(job, index, charts, 0, run, &bands, error));
-    VSHI_TRY_DONE(find_bounds(charts, &bands, bakes && bands.count == 1, run, &texels, low, high, error));
+                                     tells, run, &charts, error));
     vsh_charts_info counted;
     vsh_charts_get_info(charts, &counted);
+    VSHI_TRY_DONE(vshi_shares_note(job, index, charts, error));
+    if (!is_shard(job)) {
+        VSHI_TRY_DONE(vshi_job_plan(job, index, charts, 0, run, &bands, error));
+    }
+    if (!job->merges) { /* which asks nothing of what casts */
+        const bool all = bakes && bands.count == 1 && !is_shard(job);
+        VSHI_TRY_DONE(find_bounds(charts, &bands, all, run, &texels, low, high, error));
+    }
     lightmap->covered = counted.covered;
     lightmap->samples = counted.samples;
     lightmap->bands = bands.count;
     lightmap->band_rows = bands.rows;
-    for (int axis = 0; axis < 3 && counted.samples > 0; ++axis) {
+    for (int axis = 0; axis < 3 && counted.samples > 0 && !job->merges; ++axis) {
         job->receivers[0][axis] = fmin(job->receivers[0][axis], low[axis]);
         job->receivers[1][axis] = fmax(job->receivers[1][axis], high[axis]);
     }
@@ -261,7 +310,10 @@ double vshi_job_points(const vsh_bake_job *job) {
     return points;
 }
 
-static vsh_result find_provenance(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
+vsh_result vshi_job_find_provenance(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
+    if (job->provenance != NULL) {
+        return VSH_OK;
+    }
     const double start = vshi_seconds();
     vsh_provenance_source source = vsh_provenance_source_default();
     source.scene = &job->scene;
@@ -274,6 +326,18 @@ static vsh_result find_provenance(vsh_bake_job *job, const vsh_run *run, vsh_err
     const vsh_result result = vsh_provenance_create(&source, run, &job->provenance, error);
     job->report.load_s += vshi_seconds() - start;
     return result;
+}
+
+vsh_result vshi_job_make_errors(vsh_bake_job *job, vsh_error *error) {
+    const size_t count = job->scene.light_count + 2;
+    free(job->errors);
+    job->errors = calloc(count, sizeof *job->errors);
+    if (job->errors == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "bake job: the system refused memory");
+    }
+    job->report.errors = job->errors;
+    job->report.error_count = count;
+    return VSH_OK;
 }
 
 vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
@@ -291,19 +355,12 @@ vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, vsh_error
     options.points = vshi_job_points(job);
     VSHI_TRY(vsh_scene_occluders(&job->scene, job->assets, &options, run, &job->occluders, error));
     vsh_occluders_get_info(job->occluders, &job->report.occluders);
-    const size_t count = job->scene.light_count + 2;
-    job->errors = calloc(count, sizeof *job->errors);
-    if (job->errors == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "bake job: the system refused memory");
-    }
-    job->report.errors = job->errors;
-    job->report.error_count = count;
-    return VSH_OK;
+    return vshi_job_make_errors(job, error);
 }
 
 /* --- run */
 
-static vsh_result bake(vsh_bake_job *job, size_t index, const vsh_run *run, vsh_error *error) {
+vsh_result vshi_job_bake_one(vsh_bake_job *job, size_t index, const vsh_run *run, vsh_error *error) {
     vshi_lightmap_input input = {.charts = job->charts};
     vsh_charts *own = NULL;
     if (job->charts == NULL) {
@@ -314,9 +371,9 @@ static vsh_result bake(vsh_bake_job *job, size_t index, const vsh_run *run, vsh_
         input.charts = own;
     }
     const vsh_occluders_info *casters = &job->report.occluders;
+    const uint64_t held = job->parts != NULL ? 0 : casters->field_bytes + casters->triangles_bytes;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_job_plan(job, index, input.charts, casters->field_bytes + casters->triangles_bytes,
-                                run, &input.bands, error));
+    VSHI_TRY_DONE(vshi_job_plan(job, index, input.charts, held, run, &input.bands, error));
     if (input.bands.count > 1) {
         vsh_texels_free(job->texels);
         job->texels = NULL;
@@ -331,22 +388,33 @@ done:
     return result;
 }
 
+vsh_result vshi_job_bake_all(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
+    for (size_t i = 0, count; i < job->targets.count; i += count) {
+        VSHI_TRY(vshi_count_together(job, i, run, &count, error));
+        VSHI_TRY(count > 1 ? vshi_bake_together(job, i, count, run, error)
+                           : vshi_job_bake_one(job, i, run, error));
+    }
+    return VSH_OK;
+}
+
 vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
     VSHI_NEEDS(job);
-    if (job->errors == NULL) {
+    if (job->occluders == NULL || job->errors == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: vsh_bake_job_prepare() comes first", __func__);
     }
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    if (job->options.sink == NULL && job->provenance == NULL) {
-        VSHI_TRY(find_provenance(job, &full, error));
+    if (job->options.sink == NULL) {
+        VSHI_TRY(vshi_job_find_provenance(job, &full, error));
     }
-    for (size_t i = 0; i < job->targets.count; ++i) {
-        VSHI_TRY(bake(job, i, &full, error));
+    if (is_shard(job)) {
+        VSHI_TRY(vshi_job_bake_part(job, &full, error));
+    } else {
+        VSHI_TRY(vshi_job_bake_all(job, &full, error));
     }
     /* not before all are whole: a bake that goes on writes those that were again */
-    for (size_t i = 0; i < job->targets.count && job->options.resume; ++i) {
-        vshi_resume_remove(job->lightmaps[i].output);
+    for (size_t i = 0; i < job->targets.count && job->options.resume && !is_shard(job); ++i) {
+        VSHI_TRY(vshi_job_forget(job, i, error));
     }
     return VSH_OK;
 }

@@ -10,11 +10,14 @@
 
 /* A page of a receiver that goes into an asset, until all of them are there. */
 typedef struct vshi_lit_page {
-    float *planes[4]; /* AO; light: R, G and B, or one; NULL: none */
+    int32_t width, height;
+    const char *object; /* whose it is; NULL: of several */
+    float *planes[4];   /* AO; light: R, G and B, or one; NULL: none */
 } vshi_lit_page;
 
 struct vsh_bake_job {
     vsh_scene scene;
+    vsh_receiver *receivers_own; /* the scene's, where they are not those that were given; else NULL */
     vsh_bake_job_options options;
     vsh_row_sink sink; /* that of the options, where there is one */
     vsh_assets *assets;
@@ -30,15 +33,23 @@ struct vsh_bake_job {
     vsh_bake_error *errors;     /* [error_count], as in the report */
     vsh_bake_report report;
     bool measured;
+    size_t apart; /* lightmaps before it are not stitched together with others: there is no memory for it */
     vshi_lit_page *lit_pages; /* [lit_page_count]: of the receiver that is baked */
     size_t lit_page_count;
+    struct vshi_share_rows *shares; /* [targets.count], once measured: what shards are reckoned by */
+    struct vshi_part_writer *part;  /* under way; NULL: none */
+    char *part_path;
+    const struct vshi_part_piece *pieces; /* of it */
+    size_t piece;                         /* that is baked */
+    const struct vshi_parts *parts;       /* that lightmaps are put together from; NULL: they are baked */
+    bool merges;                          /* nothing is going to be baked */
 };
 
 /* The texels of some rows, or (`kept`, where they are all of them) those that are there already. */
 typedef struct vshi_lightmap_input {
     const vsh_charts *charts;
     const vsh_texels *kept; /* NULL: none */
-    vshi_bands bands;
+    vshi_bands bands;       /* of a shard's rows: of these alone */
 } vshi_lightmap_input;
 
 /* Points that the lightmaps of a measured job have. */
@@ -60,5 +71,21 @@ vsh_result vshi_job_measure(vsh_bake_job *job, bool bakes, const vsh_run *run, v
 /* Shades the texels of target `index` and hands its rows to the sink. */
 vsh_result vshi_job_bake(vsh_bake_job *job, size_t index, const vshi_lightmap_input *input,
                          const vsh_run *run, vsh_error *error);
+
+/* All of it of target `index`, from its charts on; a shard's rows alone, or rows out of parts. */
+vsh_result vshi_job_bake_one(vsh_bake_job *job, size_t index, const vsh_run *run, vsh_error *error);
+
+/* All lightmaps; those whose seams are fixed together. */
+vsh_result vshi_job_bake_all(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
+
+/* Where the outputs come from, once it is known what casts. */
+vsh_result vshi_job_find_provenance(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
+
+/* The report's errors, zeros. */
+vsh_result vshi_job_make_errors(vsh_bake_job *job, vsh_error *error);
+
+/* Statistics of bands and parts add up. */
+void vshi_add_shade(vsh_shade_stats *sum, const vsh_shade_stats *more);
+void vshi_add_bake_error(vsh_bake_error *sum, const vsh_bake_error *more);
 
 #endif

@@ -6,11 +6,19 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 enum { AO = 0, LIGHT = 1, PLANES = 4 };
 
 /* What viewers divide the light by that falls on a diffuse surface: light of 1 shows its own colour. */
 static const double full_light = 3.14159265358979323846;
+
+/* Whether light is shown alone, as colour: as was asked for, or because materials of an OBJ know nothing
+ * else. */
+static bool previews(const vshi_lit_sink *lit) {
+    return lit->job->options.lit_preview != 0 ||
+           strcasecmp(vshi_path_ending(lit->lightmap->output), "obj") == 0;
+}
 
 /* --- channels */
 
@@ -98,8 +106,10 @@ static vsh_result begin_exr(vshi_lit_sink *lit, const vsh_image *image, vsh_erro
         return VSH_OK;
     }
     const char *path = job->options.lit_exr;
-    if (page_count(lit) > 1) {
-        path = lit->exr_path = vshi_page_output(path, lit->lightmap->page);
+    const char *object = lit->target->object;
+    if (object != NULL || page_count(lit) > 1) {
+        path = lit->exr_path =
+            object != NULL ? vshi_object_output(path, object) : vshi_page_output(path, lit->lightmap->page);
         if (path == NULL) {
             return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", job->options.lit_exr);
         }
@@ -140,6 +150,8 @@ static vsh_result begin(void *user, const vsh_job_lightmap *lightmap, const vsh_
     vshi_lit_sink *lit = user;
     lit->lightmap = lightmap;
     lit->rows = 0;
+    lit->page =
+        (vshi_lit_page){.width = image->width, .height = image->height, .object = lit->target->object};
     lit->channel_count = image->channel_count;
     find_sources(lit, image);
     vsh_result result = begin_exr(lit, image, error);
@@ -182,7 +194,7 @@ static vsh_result add(void *user, int32_t rows, const float *const *planes, vsh_
             to[i] = sum / (float)lit->source_count[p];
         }
     }
-    if (lit->job->options.lit_preview == 0) {
+    if (!previews(lit)) {
         open_ambient(lit, (size_t)lit->rows * width, count);
     }
     lit->rows += rows;
@@ -192,8 +204,8 @@ static vsh_result add(void *user, int32_t rows, const float *const *planes, vsh_
 /* --- the asset */
 
 /* What the image of a lightmap shows: irradiance, or the mean of the shadows times AO. */
-static void multiply_by_ao(const vshi_lit_sink *lit, const vshi_lit_page *page) {
-    const size_t count = (size_t)lit->lightmap->height * (size_t)lit->lightmap->width;
+static void multiply_by_ao(const vshi_lit_page *page) {
+    const size_t count = (size_t)page->height * (size_t)page->width;
     for (size_t i = 0; i < count && page->planes[AO] != NULL && page->planes[LIGHT + 2] == NULL; ++i) {
         page->planes[LIGHT][i] *= page->planes[AO][i];
     }
@@ -204,10 +216,10 @@ static size_t list_images(const vshi_lit_sink *lit, size_t number, vsh_lit_image
     const vsh_bake_job *job = lit->job;
     const vshi_lit_page *page = &job->lit_pages[number];
     const vsh_receiver *receiver = &job->scene.receivers[lit->lightmap->receiver];
-    const bool light = page->planes[LIGHT] != NULL, preview = job->options.lit_preview != 0;
+    const bool light = page->planes[LIGHT] != NULL, preview = previews(lit);
     size_t count = 0;
     if (light && preview) {
-        multiply_by_ao(lit, page);
+        multiply_by_ao(page);
     }
     for (int kind = 0; kind < 2; ++kind) {
         const bool is_light = kind == 1;
@@ -219,8 +231,8 @@ static size_t list_images(const vshi_lit_sink *lit, size_t number, vsh_lit_image
                                        : is_light ? VSH_LIT_LIGHTMAP
                                                   : VSH_LIT_OCCLUSION,
                             .page = (uint32_t)number,
-                            .width = lit->lightmap->width,
-                            .height = lit->lightmap->height,
+                            .width = page->width,
+                            .height = page->height,
                             .channels = (const float *const *)page->planes + (is_light ? LIGHT : AO),
                             .channel_count = is_light && page->planes[LIGHT + 2] != NULL ? 3 : 1,
                             .bits = receiver->bits,
@@ -257,7 +269,6 @@ static vsh_result list_meshes(const vshi_lit_sink *lit, const vsh_model *model, 
     const vsh_assets *assets = lit->job->assets;
     const size_t *numbers, *of_atlas;
     size_t count;
-    vsh_assets_receiver(assets, index, &count);
     vsh_assets_receiver_model(assets, index, &numbers);
     const vsh_atlas *atlas = vsh_assets_receiver_atlas(assets, index, &of_atlas);
     const size_t all = vsh_model_mesh_count(model);
@@ -265,10 +276,15 @@ static vsh_result list_meshes(const vshi_lit_sink *lit, const vsh_model *model, 
     for (size_t i = 0; i < all; ++i) {
         (*meshes)[i].uv_set = -1;
     }
-    for (size_t i = 0; i < count; ++i) {
-        (*meshes)[numbers[i]] = atlas != NULL
-                                    ? mesh_of_atlas(atlas, of_atlas[i])
-                                    : mesh_of_file(&lit->job->scene.receivers[index], model, numbers[i]);
+    for (size_t page = 0; page < page_count(lit); ++page) {
+        size_t first;
+        vsh_assets_receiver_page(assets, index, page, &first, &count);
+        for (size_t i = first; i < first + count; ++i) {
+            vsh_lit_mesh *mesh = &(*meshes)[numbers[i]];
+            *mesh = atlas != NULL ? mesh_of_atlas(atlas, of_atlas[i])
+                                  : mesh_of_file(&lit->job->scene.receivers[index], model, numbers[i]);
+            mesh->page = (uint32_t)page; /* read where it has no charts */
+        }
     }
     return VSH_OK;
 }
@@ -300,6 +316,7 @@ static vsh_result write(const vshi_lit_sink *lit, vsh_error *error) {
     const vsh_model *model = vsh_assets_receiver_model(job->assets, lit->lightmap->receiver, &numbers);
     vsh_lit_mesh *meshes = NULL;
     vsh_lit_image *images = NULL;
+    const char **names = NULL;
     uint32_t *pages = NULL;
     vsh_lit_options options = vsh_lit_options_default();
     vsh_run run = *lit->run;
@@ -307,11 +324,17 @@ static vsh_result write(const vshi_lit_sink *lit, vsh_error *error) {
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&images, 2 * job->lit_page_count, sizeof *images,
                                 lit->lightmap->output, error));
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&names, job->lit_page_count, sizeof *names, lit->lightmap->output, error));
+    options.page_names = names;
+    options.page_count = job->lit_page_count;
     for (size_t page = 0; page < job->lit_page_count; ++page) {
+        names[page] = job->lit_pages[page].object;
         options.image_count += list_images(lit, page, images + options.image_count);
     }
     options.images = images;
     options.image_place = job->options.lit_image_place;
+    options.attributes = vsh_provenance_attributes(job->provenance, &options.attribute_count);
     VSHI_TRY_DONE(list_chart_pages(lit, &options, &pages, error));
     VSHI_TRY_DONE(list_meshes(lit, model, &meshes, error));
     tell_writing(job, lit->lightmap->output);
@@ -319,6 +342,7 @@ static vsh_result write(const vshi_lit_sink *lit, vsh_error *error) {
                            &options, lit->lightmap->output, &run, error);
 done:
     free(pages);
+    free(names);
     free(images);
     free(meshes);
     return result;
@@ -334,7 +358,7 @@ static vsh_result keep_page(vshi_lit_sink *lit, vsh_error *error) {
                                error));
     }
     job->lit_pages[job->lit_page_count++] = lit->page;
-    lit->page = (vshi_lit_page){{NULL}};
+    lit->page = (vshi_lit_page){.width = 0};
     if (job->lit_page_count < pages) {
         return VSH_OK;
     }

@@ -7,6 +7,7 @@
 typedef struct vshi_lit_sink {
     vsh_bake_job *job;
     const vsh_run *run;
+    const vshi_target *target;
     const vsh_job_lightmap *lightmap;
     vshi_lit_page page;    /* whose rows come; the job's once all are there */
     int32_t rows;          /* there so far */

@@ -37,6 +37,9 @@ static uint64_t checksum(const vshi_channels *channels, size_t texels, const uin
     for (int32_t c = 0; c < channels->image.channel_count; ++c) {
         sum = checksum_of(sum, channels->planes[c], texels * sizeof(float));
     }
+    if (channels->known != NULL) {
+        sum = checksum_of(sum, channels->known, texels * sizeof *channels->known);
+    }
     return checksum_of(sum, errors, error_count * sizeof *errors);
 }
 
@@ -49,6 +52,9 @@ static char *text_of(const vshi_resume_key *key) {
         return NULL;
     }
     fprintf(out, "%s3: %d x %d by %d\n", magic, key->image->width, key->image->height, key->band_rows);
+    if (key->part) {
+        fprintf(out, "rows %d to %d\n", key->first, key->end);
+    }
     for (int32_t c = 0; c < key->image->channel_count; ++c) {
         fprintf(out, "%s\n", key->image->names[c]);
     }
@@ -162,6 +168,8 @@ static bool read_band(vshi_resume *r, const band_head *want, vshi_channels *chan
     for (int32_t c = 0; good && c < channels->image.channel_count; ++c) {
         good = fread(channels->planes[c], sizeof(float), texels, r->file) == texels;
     }
+    good = good && (channels->known == NULL ||
+                    fread(channels->known, sizeof *channels->known, texels, r->file) == texels);
     good = good && fread(errors, sizeof *errors, r->error_count, r->file) == r->error_count;
     if (!good || checksum(channels, texels, invalid, mesh_count, errors, r->error_count) != head.checksum) {
         return false;
@@ -220,6 +228,8 @@ void vshi_resume_keep(vshi_resume *r, int32_t first, int32_t rows, const vshi_ch
     for (int32_t c = 0; good && c < channels->image.channel_count; ++c) {
         good = fwrite(channels->planes[c], sizeof(float), texels, r->file) == texels;
     }
+    good = good && (channels->known == NULL ||
+                    fwrite(channels->known, sizeof *channels->known, texels, r->file) == texels);
     good = good && fwrite(stats->errors, sizeof *stats->errors, r->error_count, r->file) == r->error_count;
     if (!good || fflush(r->file) != 0 || fdatasync(fileno(r->file)) != 0) {
         give_up(r);

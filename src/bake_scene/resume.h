@@ -1,6 +1,6 @@
 /* Bands of a lightmap that are kept until it is whole, so that a bake that was ended goes on from them. They
  * stand in OUTPUT.resume: what the bake is, as its output tells it, and for each band the statistics so far,
- * its channels and a checksum. */
+ * its channels (of a part also what is known of its texels) and a checksum. */
 #ifndef VSHI_RESUME_H
 #define VSHI_RESUME_H
 
@@ -23,6 +23,8 @@ typedef struct vshi_resume_key {
     size_t attribute_count;
     const vsh_image *image;
     int32_t band_rows;
+    bool part; /* of the rows first … end - 1 by themselves */
+    int32_t first, end;
 } vshi_resume_key;
 
 /* Opens, or begins, the file of an output, which no other run may have open. Bands of another bake, or of

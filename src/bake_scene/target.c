@@ -1,6 +1,7 @@
 #include "bake_scene/target.h"
 
 #include "base/try.h"
+#include "base/utf8.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,6 +10,7 @@
 #include <vdbshade/lit.h>
 
 enum {
+    MOST_LIT_PAGES = 65534, /* that materials are told apart by */
     NAME_BYTES = 120 /* of an object's name in a file's, which may have 255 with its number and ending */
 };
 
@@ -24,12 +26,15 @@ static const char *find_place(const char *output) {
     return strstr(slash != NULL ? slash : output, PLACE);
 }
 
-/* What no file system of Linux, Windows or macOS takes becomes "_". */
+/* What no file system of Linux, Windows or macOS takes becomes "_", and so do bytes that are no UTF-8. */
 static void make_safe(const char *name, char safe[NAME_BYTES + 1]) {
     size_t length = 0;
-    for (; name[length] != '\0' && length < NAME_BYTES; ++length) {
+    for (size_t whole = 0; name[length] != '\0' && length < NAME_BYTES; ++length) {
         const unsigned char c = (unsigned char)name[length];
-        safe[length] = c < 0x20 || c == 0x7f || strchr("/\\:*?\"<>|", c) != NULL ? '_' : name[length];
+        whole = whole > 0 ? whole : vshi_utf8_length(name + length);
+        safe[length] =
+            whole == 0 || c < 0x20 || c == 0x7f || strchr("/\\:*?\"<>|", c) != NULL ? '_' : name[length];
+        whole -= whole > 0;
     }
     while (name[length] != '\0' && length > 0 && ((unsigned char)name[length] & 0xc0) == 0x80) {
         --length; /* no half of a character */
@@ -41,50 +46,6 @@ static void make_safe(const char *name, char safe[NAME_BYTES + 1]) {
         safe[0] = '_';
     }
     safe[length] = '\0';
-}
-
-/* The output with a name in it, and a number behind the name from the second of its kind on. */
-static char *fill(const char *output, const char *name, size_t number) {
-    const char *at = find_place(output);
-    const size_t size = strlen(output) + strlen(name) + 24;
-    char *filled = malloc(size), count[24] = "";
-    if (number > 1) {
-        snprintf(count, sizeof count, "-%zu", number);
-    }
-    if (filled != NULL) {
-        snprintf(filled, size, "%.*s%s%s%s", (int)(at - output), output, name, count, at + strlen(PLACE));
-    }
-    return filled;
-}
-
-/* Names that differ in case only are one file to some systems. */
-static bool is_taken(const vshi_targets *t, const char *path) {
-    for (size_t i = 0; i < t->count; ++i) {
-        if (strcasecmp(t->list[i].output, path) == 0) {
-            return true;
-        }
-    }
-    return false;
-}
-
-static char *unique_output(const vshi_targets *t, const char *output, const char *name) {
-    char safe[NAME_BYTES + 1];
-    make_safe(name[0] != '\0' ? name : "object", safe);
-    char *path = fill(output, safe, 1);
-    for (size_t number = 2; path != NULL && is_taken(t, path); ++number) {
-        free(path);
-        path = fill(output, safe, number);
-    }
-    return path;
-}
-
-/* Meshes from `first` on that are one object. */
-static size_t object_size(const vsh_mesh *meshes, size_t first, size_t count) {
-    size_t end = first + 1;
-    while (end < count && meshes[first].object > 0 && meshes[end].object == meshes[first].object) {
-        ++end;
-    }
-    return end - first;
 }
 
 /* What casts is known already; what does not is looked at by itself, once for all passes. */
@@ -103,79 +64,135 @@ static vsh_result find_solid(vshi_target *target, const vsh_run *run, vsh_error 
     return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "%s: %s", target->receiver.path, why.message);
 }
 
-static vsh_result add(vshi_targets *t, const vsh_scene *scene, size_t index, const vsh_mesh *meshes,
-                      size_t count, char *output, const vsh_run *run, vsh_error *error) {
-    vshi_target *target = &t->list[t->count++];
-    *target = (vshi_target){scene->receivers[index], index, meshes, count, output, {NULL}, 0};
-    if (output != NULL) {
-        target->receiver.output = output;
-    }
+static vsh_result finish(vshi_target *target, const vsh_run *run, vsh_error *error) {
     if (target->receiver.seams == VSH_SEAMS_DEFAULT) {
         target->receiver.seams = vsh_lit_is_output(target->receiver.output) ? VSH_SEAMS_FIX : VSH_SEAMS_KEEP;
     }
     return find_solid(target, run, error);
 }
 
-static vsh_result add_objects(vshi_targets *t, const vsh_scene *scene, size_t index, const vsh_mesh *meshes,
-                              size_t count, const vsh_run *run, vsh_error *error) {
-    const char *output = scene->receivers[index].output;
-    if (find_place(output) == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "receivers[%zu]: output '%s': no '%s' for the names of objects", index, output,
-                         PLACE);
-    }
-    for (size_t i = 0, size; i < count; i += size) {
-        size = object_size(meshes, i, count);
-        const char *name = meshes[i].object_name != NULL ? meshes[i].object_name : meshes[i].name;
-        char *own = unique_output(t, output, name != NULL ? name : "");
-        if (own == NULL) {
-            return refuse_memory(error);
-        }
-        VSHI_TRY(add(t, scene, index, meshes + i, size, own, run, error));
-    }
-    return VSH_OK;
-}
-
-char *vshi_page_output(const char *output, size_t page) {
+/* FILE.MARK.exr for FILE.exr. */
+static char *mark_output(const char *output, const char *mark) {
     const char *slash = strrchr(output, '/'), *dot = strrchr(output, '.');
     const size_t length = strlen(output);
     const int stem = (int)(dot != NULL && (slash == NULL || dot > slash) ? (size_t)(dot - output) : length);
-    const size_t size = length + 24;
-    char *named = malloc(size);
-    if (named != NULL) {
-        snprintf(named, size, "%.*s.%zu%s", stem, output, page, output + stem);
+    const size_t size = length + strlen(mark) + 2;
+    char *marked = malloc(size);
+    if (marked != NULL) {
+        snprintf(marked, size, "%.*s.%s%s", stem, output, mark, output + stem);
     }
-    return named;
+    return marked;
 }
 
-/* All pages go into one asset, but images have one each. */
+char *vshi_object_output(const char *output, const char *object) {
+    const char *at = find_place(output);
+    if (at == NULL) {
+        return mark_output(output, object);
+    }
+    const size_t size = strlen(output) + strlen(object) + 1;
+    char *filled = malloc(size);
+    if (filled != NULL) {
+        snprintf(filled, size, "%.*s%s%s", (int)(at - output), output, object, at + strlen(PLACE));
+    }
+    return filled;
+}
+
+char *vshi_page_output(const char *output, size_t page) {
+    char number[24];
+    snprintf(number, sizeof number, "%zu", page);
+    return mark_output(output, number);
+}
+
+/* --- names of objects */
+
+/* Whether two lightmaps of one name would be one file: images of one output, pages of one asset. */
+static bool are_together(const vshi_target *a, const vshi_target *b, const vsh_scene *scene) {
+    const char *x = scene->receivers[a->index].output, *y = scene->receivers[b->index].output;
+    return a->index == b->index || (x != NULL && y != NULL && strcasecmp(x, y) == 0);
+}
+
+/* Whether `name` is `base`, or that with a number behind it. Names that differ in case only are one file to
+ * some systems. */
+static bool is_numbered(const char *name, const char *base) {
+    const size_t length = strlen(base);
+    return strncasecmp(name, base, length) == 0 &&
+           (name[length] == '\0' ||
+            (name[length] == '-' && name[length + 1 + strspn(name + length + 1, "0123456789")] == '\0'));
+}
+
+/* Which of the lightmaps before the last one are in its way. `base`: count those with a number, too. */
+static size_t count_taken(const vshi_targets *t, const vsh_scene *scene, const char *name, bool base) {
+    const vshi_target *own = &t->list[t->count - 1];
+    size_t count = 0;
+    for (size_t i = 0; i + 1 < t->count; ++i) {
+        const vshi_target *other = &t->list[i];
+        count += other->object != NULL && are_together(own, other, scene) &&
+                 (base ? is_numbered(other->object, name) : strcasecmp(other->object, name) == 0);
+    }
+    return count;
+}
+
+/* The object's name in files of the last lightmap, with a number behind it from the second of its kind on; to
+ * be freed. */
+static char *unique_name(const vshi_targets *t, const vsh_scene *scene, const char *name) {
+    char safe[NAME_BYTES + 1], unique[NAME_BYTES + 24];
+    make_safe(name[0] != '\0' ? name : "object", safe);
+    snprintf(unique, sizeof unique, "%s", safe);
+    if (count_taken(t, scene, unique, false) > 0) {
+        size_t number = count_taken(t, scene, safe, true);
+        do {
+            snprintf(unique, sizeof unique, "%s-%zu", safe, ++number);
+        } while (count_taken(t, scene, unique, false) > 0);
+    }
+    return strdup(unique);
+}
+
+/* --- lightmaps */
+
+/* All pages go into one asset, but images have one each: of an object with its name, else with a number. */
 static vsh_result add_pages(vshi_targets *t, const vsh_scene *scene, size_t index, const vsh_assets *assets,
                             const vsh_run *run, vsh_error *error) {
     const vsh_receiver *receiver = &scene->receivers[index];
     const size_t pages = vsh_assets_receiver_pages(assets, index);
-    const bool named = pages > 1 && receiver->output != NULL && !vsh_lit_is_output(receiver->output);
+    const bool image = receiver->output != NULL && !vsh_lit_is_output(receiver->output);
     for (size_t page = 0; page < pages; ++page) {
         size_t first, count;
+        vsh_receiver_page info;
+        vsh_assets_receiver_page_info(assets, index, page, &info);
         const vsh_mesh *meshes = vsh_assets_receiver_page(assets, index, page, &first, &count);
-        char *output = named ? vshi_page_output(receiver->output, page) : NULL;
-        if (named && output == NULL) {
+        vshi_target *target = &t->list[t->count];
+        const bool own = info.object != NULL, named = image && (own || pages > 1);
+        *target = (vshi_target){.receiver = *receiver, .index = index, .page = page};
+        ++t->count;
+        target->receiver.width = info.width;
+        target->receiver.height = info.height;
+        target->meshes = meshes;
+        target->mesh_count = count;
+        if (own) {
+            target->object = unique_name(t, scene, info.object);
+        }
+        if (named) {
+            target->output = own && target->object != NULL
+                                 ? vshi_object_output(receiver->output, target->object)
+                                 : vshi_page_output(receiver->output, page);
+            target->receiver.output = target->output;
+        }
+        if (vsh_lit_is_output(receiver->output) && page >= MOST_LIT_PAGES) {
+            return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu lightmaps, an asset has at most %d",
+                             receiver->output, pages, MOST_LIT_PAGES);
+        }
+        if ((own && target->object == NULL) || (named && target->output == NULL)) {
             return refuse_memory(error);
         }
-        VSHI_TRY(add(t, scene, index, meshes, count, output, run, error));
-        t->list[t->count - 1].page = page;
+        VSHI_TRY(finish(target, run, error));
     }
     return VSH_OK;
 }
 
-vsh_result vshi_targets_make(const vsh_scene *scene, const vsh_assets *assets, bool per_object,
-                             const vsh_run *run, vshi_targets *targets, vsh_error *error) {
+vsh_result vshi_targets_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
+                             vshi_targets *targets, vsh_error *error) {
     *targets = (vshi_targets){NULL, 0};
-    size_t most = scene->receiver_count;
-    for (size_t i = 0; i < scene->receiver_count && per_object; ++i) {
-        size_t count;
-        vsh_assets_receiver(assets, i, &count);
-        most += count;
-    }
+    size_t most = 0;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         most += vsh_assets_receiver_pages(assets, i);
     }
@@ -184,13 +201,7 @@ vsh_result vshi_targets_make(const vsh_scene *scene, const vsh_assets *assets, b
         return refuse_memory(error);
     }
     for (size_t i = 0; i < scene->receiver_count; ++i) {
-        if (per_object) {
-            size_t count;
-            const vsh_mesh *meshes = vsh_assets_receiver(assets, i, &count);
-            VSHI_TRY(add_objects(targets, scene, i, meshes, count, run, error));
-        } else {
-            VSHI_TRY(add_pages(targets, scene, i, assets, run, error));
-        }
+        VSHI_TRY(add_pages(targets, scene, i, assets, run, error));
     }
     return VSH_OK;
 }
@@ -199,6 +210,7 @@ void vshi_targets_free(vshi_targets *targets) {
     for (size_t i = 0; i < targets->count; ++i) {
         vshi_mesh_set_free(&targets->list[i].set);
         free(targets->list[i].output);
+        free(targets->list[i].object);
     }
     free(targets->list);
     *targets = (vshi_targets){NULL, 0};

@@ -128,7 +128,7 @@ static vsh_result put_in_place(const char *temporary, const char *target, vsh_er
     return result;
 }
 
-static vsh_result finish(const char *temporary, const char *target, vsh_error *error) {
+static vsh_result sync_file(const char *temporary, const char *target, vsh_error *error) {
     const int file = open(temporary, O_RDONLY | O_CLOEXEC);
     if (file < 0) {
         return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", target, strerror(errno));
@@ -136,20 +136,94 @@ static vsh_result finish(const char *temporary, const char *target, vsh_error *e
     const bool flushed = fsync(file) == 0 || errno == EINVAL; /* EINVAL: the file system cannot sync */
     const int flush_error = errno;
     const bool closed = close(file) == 0;
-    if (!flushed || !closed) {
-        return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", target,
-                         strerror(flushed ? errno : flush_error));
-    }
-    return put_in_place(temporary, target, error);
+    return flushed && closed ? VSH_OK
+                             : vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", target,
+                                         strerror(flushed ? errno : flush_error));
+}
+
+static void forget_temporary(vshi_output *output) {
+    free(output->temporary);
+    output->temporary = NULL;
 }
 
 vsh_result vshi_output_commit(vshi_output *output, vsh_error *error) {
-    const vsh_result result = finish(output->temporary, output->target, error);
+    vsh_result result = sync_file(output->temporary, output->target, error);
     if (result == VSH_OK) {
-        free(output->temporary);
-        output->temporary = NULL;
+        result = put_in_place(output->temporary, output->target, error);
+    }
+    if (result == VSH_OK) {
+        forget_temporary(output);
     }
     vshi_output_abandon(output);
+    return result;
+}
+
+/* Another name for what stands at a target, "" where nothing does or the file system has no such names. It
+ * looks like a temporary file that a killed process has left, which the next run takes away. */
+static vsh_result keep_old(const char *target, char **kept, vsh_error *error) {
+    const size_t capacity = strlen(target) + VSHI_TEMPORARY_ROOM;
+    *kept = malloc(capacity);
+    if (*kept == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", target);
+    }
+    (*kept)[0] = '\0';
+    if (access(target, F_OK) != 0) {
+        return VSH_OK;
+    }
+    const int file = vshi_temporary_create(target, *kept, capacity);
+    if (file < 0) {
+        (*kept)[0] = '\0';
+        return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", target, strerror(errno));
+    }
+    close(file);
+    unlink(*kept); /* the name was free; link() does not replace */
+    if (link(target, *kept) != 0) {
+        (*kept)[0] = '\0'; /* no hard links here, or none of folders */
+    }
+    return VSH_OK;
+}
+
+/* What was put in place goes again, and what stood there before comes back. */
+static void take_back(const char *target, const char *kept) {
+    if (kept[0] != '\0') {
+        (void)!rename(kept, target);
+    } else {
+        unlink(target);
+    }
+}
+
+vsh_result vshi_outputs_commit(vshi_output *const *outputs, size_t count, vsh_error *error) {
+    if (count == 1) {
+        return vshi_output_commit(outputs[0], error);
+    }
+    char **kept = calloc(count + 1, sizeof *kept);
+    vsh_result result =
+        kept != NULL ? VSH_OK : vshi_fail(error, VSH_ERROR_MEMORY, "outputs: the system refused memory");
+    size_t placed = 0;
+    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
+        result = sync_file(outputs[i]->temporary, outputs[i]->target, error);
+    }
+    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
+        result = keep_old(outputs[i]->target, &kept[i], error);
+    }
+    for (; placed < count && result == VSH_OK; placed += result == VSH_OK) {
+        result = put_in_place(outputs[placed]->temporary, outputs[placed]->target, error);
+    }
+    for (size_t i = 0; kept != NULL && i < count; ++i) {
+        if (i < placed && result != VSH_OK) {
+            take_back(outputs[i]->target, kept[i]);
+        } else if (kept[i] != NULL && kept[i][0] != '\0') {
+            unlink(kept[i]);
+        }
+        if (i < placed) {
+            forget_temporary(outputs[i]);
+        }
+        free(kept[i]);
+    }
+    for (size_t i = 0; i < count; ++i) {
+        vshi_output_abandon(outputs[i]);
+    }
+    free(kept);
     return result;
 }
 

@@ -35,6 +35,11 @@ VSHI_SHARED vsh_result vshi_output_begin(vshi_output *output, const char *path, 
  * VSH_ERROR_WRITE. */
 VSHI_SHARED vsh_result vshi_output_commit(vshi_output *output, vsh_error *error);
 
+/* The same of several, in their order: all of them, or after a failure none. (Where the file system has no
+ * hard links, those before the one that failed are gone then, and do not come back.) Errors: as one,
+ * VSH_ERROR_MEMORY. */
+vsh_result vshi_outputs_commit(vshi_output *const *outputs, size_t count, vsh_error *error);
+
 /* Removes the temporary; the target is as it was. Does nothing where nothing is under way. */
 VSHI_SHARED void vshi_output_abandon(vshi_output *output);
 

@@ -3,6 +3,7 @@
 #define VSHI_UTF8_H
 
 #include <stddef.h>
+#include <string.h>
 
 /* U+FFFD: what stands for a byte that is part of no character. */
 #define VSHI_NO_CHARACTER "\xef\xbf\xbd"
@@ -32,6 +33,18 @@ static inline size_t vshi_utf8_length(const char *text) {
         return c[0] == 0xef && c[1] == 0xbf && c[2] >= 0xbe ? 0 : sequences[i].length; /* U+FFFE, U+FFFF */
     }
     return 0;
+}
+
+/* `text` as UTF-8 whatever it holds, into clean[3 × its length + 1]: what is none becomes VSHI_NO_CHARACTER.
+ */
+static inline void vshi_utf8_clean(const char *text, char *clean) {
+    for (size_t length; *text != '\0'; text += length > 0 ? length : 1) {
+        length = vshi_utf8_length(text);
+        const size_t size = length > 0 ? length : sizeof VSHI_NO_CHARACTER - 1;
+        memcpy(clean, length > 0 ? text : VSHI_NO_CHARACTER, size);
+        clean += size;
+    }
+    *clean = '\0';
 }
 
 #endif

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_OPTIONS = 128, HELP_COLUMN = 30, HELP_WIDTH = 56 };
+enum { HELP_COLUMN = 30, HELP_WIDTH = 56 };
 
 /* --- settings of the library */
 
@@ -46,12 +46,12 @@ const vsh_setting *cli_setting(size_t index) {
 
 /* A command's options, with settings in the place of their groups. */
 typedef struct option_list {
-    cli_option options[MAX_OPTIONS];
+    cli_option options[CLI_MOST_OPTIONS];
     size_t count;
 } option_list;
 
 static void add_option(option_list *list, const cli_option *option) {
-    if (list->count < MAX_OPTIONS) {
+    if (list->count < CLI_MOST_OPTIONS) {
         list->options[list->count++] = *option;
     }
 }
@@ -75,6 +75,14 @@ static void list_options(const cli_command *command, option_list *list) {
             }
         }
     }
+}
+
+size_t cli_list_options(const cli_command *command, cli_option *options, size_t most) {
+    option_list list;
+    list_options(command, &list);
+    const size_t count = list.count < most ? list.count : most;
+    memcpy(options, list.options, count * sizeof *options);
+    return count;
 }
 
 bool cli_find_option(const cli_command *command, const char *name, size_t length, cli_option *option) {
@@ -134,7 +142,7 @@ const char *cli_nearest(const char *text, const char *const *candidates, size_t 
 }
 
 static int unknown_option(const cli_command *command, const option_list *list, const char *text) {
-    const char *names[MAX_OPTIONS];
+    const char *names[CLI_MOST_OPTIONS];
     size_t count = 0;
     for (size_t i = 0; i < list->count; ++i) {
         if (list->options[i].key != 0) {
@@ -163,7 +171,7 @@ static const cli_option *option_of_key(const option_list *list, int key) {
 static void make_getopt_tables(const option_list *list, struct option *longs, char *shorts) {
     size_t count = 0;
     *shorts++ = ':'; /* a missing value is told from an unknown option */
-    for (size_t i = 0; i < list->count && count + 1 < MAX_OPTIONS; ++i) {
+    for (size_t i = 0; i < list->count && count + 1 < CLI_MOST_OPTIONS; ++i) {
         const cli_option *option = &list->options[i];
         if (option->key == 0) {
             continue;
@@ -197,7 +205,8 @@ static bool abbreviated(const cli_option *option, char **argv, const char *value
 
 /* --- the command line as outputs tell it */
 
-static char *parsed_command; /* of the process's one command line at a time */
+static char *parsed_command;  /* of the process's one command line at a time */
+static size_t parsed_options; /* bytes of it before its operands */
 
 const char *cli_parsed_command(void) {
     return parsed_command != NULL ? parsed_command : "";
@@ -237,11 +246,26 @@ static const char *without_folder(const char *path) {
     return slash != NULL ? slash + 1 : path;
 }
 
+void cli_parsed_add(const char *option, const char *value) {
+    char *operands = parsed_command != NULL ? strdup(parsed_command + parsed_options) : NULL;
+    if (operands == NULL) {
+        return;
+    }
+    parsed_command[parsed_options] = '\0';
+    char name[64];
+    snprintf(name, sizeof name, "--%s", option);
+    append_word(name);
+    append_word(value);
+    parsed_options = strlen(cli_parsed_command());
+    append(operands, strlen(operands));
+    free(operands);
+}
+
 static void append_option(const cli_option *option, const char *value) {
     static const char *const changes_nothing[] = {
-        "output",  "output-folder", "stats",         "threads", "memory-limit", "isa",
-        "trusted", "confined",      "allow-outside", "quiet",   "verbose",      "progress",
-        "json",    "band-rows",     "dry-run",       "resume",  "help",         "view"};
+        "output",   "output-folder", "stats", "threads", "memory-limit", "isa",  "trusted",
+        "confined", "allow-outside", "quiet", "verbose", "progress",     "json", "band-rows",
+        "dry-run",  "resume",        "help",  "view",    "field",        "shard"};
     for (size_t i = 0; i < sizeof changes_nothing / sizeof changes_nothing[0]; ++i) {
         if (strcmp(option->name, changes_nothing[i]) == 0) {
             return;
@@ -267,8 +291,8 @@ int cli_parse_operands(const cli_command *command, int argc, char **argv, cli_op
 
 int cli_parse_some(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
                    const char *const *what, const char **operands, int least, int count, bool *help) {
-    struct option longs[MAX_OPTIONS];
-    char shorts[2 * MAX_OPTIONS + 2];
+    struct option longs[CLI_MOST_OPTIONS];
+    char shorts[2 * CLI_MOST_OPTIONS + 2];
     option_list list;
     list_options(command, &list);
     make_getopt_tables(&list, longs, shorts);
@@ -309,6 +333,7 @@ int cli_parse_some(const cli_command *command, int argc, char **argv, cli_option
             return code;
         }
     }
+    parsed_options = strlen(cli_parsed_command());
     for (int i = 0; i < count; ++i) {
         operands[i] = NULL;
         if (optind + i >= argc && i >= least) {

@@ -40,6 +40,12 @@ const vsh_setting *cli_setting(size_t index);
 /* The option of that name, of `length` bytes; false: it is none of the command's. */
 bool cli_find_option(const cli_command *command, const char *name, size_t length, cli_option *option);
 
+/* Its options and headings with the library's settings in the place of their rows, which last as long as the
+ * process; at most `most` of them. Returns how many. */
+size_t cli_list_options(const cli_command *command, cli_option *options, size_t most);
+
+enum { CLI_MOST_OPTIONS = 128 };
+
 /* Takes one option; returns CLI_OK or an exit code after saying why. `name` is "--sun". */
 typedef int cli_option_fn(void *settings, int key, const char *name, const char *value);
 
@@ -51,6 +57,9 @@ int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *
 /* The last command line that was parsed, as outputs tell it: without options that change no value (threads,
  * limits, output, …), and files by their names alone. Belongs to the parser; "" where memory was short. */
 const char *cli_parsed_command(void);
+
+/* Adds an option to it, as its last, that came from elsewhere. */
+void cli_parsed_add(const char *option, const char *value);
 
 /* The same with `least` to `count` operands, one or more; NULL stands for those that are not there. */
 int cli_parse_some(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
@@ -74,7 +83,8 @@ int cli_parse_point(const char *name, const char *text, double value[3]);       
 int cli_parse_color(const char *name, const char *text, double value[3]);            /* R,G,B, >= 0 */
 int cli_parse_box(const char *name, const char *text, double min[3], double max[3]); /* X0,Y0,Z0,X1,Y1,Z1 */
 int cli_parse_size(const char *name, const char *text, int32_t *w, int32_t *h);      /* W[xH] */
-int cli_parse_bytes(const char *name, const char *text, uint64_t *value);            /* 500M, 2GiB */
+int cli_parse_shard(const char *name, const char *text, int32_t *shard, int32_t *count); /* I/N */
+int cli_parse_bytes(const char *name, const char *text, uint64_t *value);                /* 500M, 2GiB */
 
 /* A name out of the library's list, or an error that shows the list. */
 int cli_parse_name(const char *name, const char *text, int32_t (*value_of)(const char *),
@@ -108,8 +118,13 @@ enum {
     CLI_KEY_ALLOW_OUTSIDE,
     CLI_KEY_SOLID,
     CLI_KEY_SHELL,
-    CLI_KEY_INWARD
+    CLI_KEY_INWARD,
+    CLI_KEY_SHARD
 };
+
+/* Work that is shared out: `what` it does of it. */
+#define CLI_SHARD_OPTION(what)                                                                               \
+    { CLI_KEY_SHARD, "shard", "I/N", what }
 
 #define CLI_READER_OPTIONS                                                                                   \
     {CLI_KEY_TRUSTED, "trusted", NULL,                                                                       \
@@ -144,9 +159,8 @@ enum {
 /* After the common ones, in commands that shade. */
 #define CLI_ISA_OPTION                                                                                       \
     {                                                                                                        \
-        CLI_KEY_ISA, "isa", "NAME",                                                                          \
-            "instruction set to shade with, for tests: best, base,\navx2 or avx512 (best); the result is "   \
-            "the same for any"                                                                               \
+        CLI_KEY_ISA, "isa", "best|base|avx2|avx512",                                                         \
+            "instruction set to shade with, for tests (best); the\nresult is the same for any"               \
     }
 
 /* Voxels, and what meshes are taken for. */

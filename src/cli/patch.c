@@ -76,11 +76,18 @@ int cli_patch_set(cli_patch *patch, const char *name, const char *value) {
     return give(patch, index_of(name), value);
 }
 
+const char *cli_patch_text(const cli_patch *patch, const char *name) {
+    return patch->text[index_of(name)];
+}
+
 bool cli_patch_has(const cli_patch *patch, const char *name) {
-    return patch->text[index_of(name)] != NULL;
+    return cli_patch_text(patch, name) != NULL;
 }
 
 int cli_patch_check(const cli_patch *patch) {
+    if (cli_patch_has(patch, "--size") && cli_patch_has(patch, "--max-size")) {
+        return cli_usage("--size and --max-size: give one of the two");
+    }
     if (cli_patch_has(patch, "--resolution") && cli_patch_has(patch, "--voxel-size")) {
         return cli_usage("--resolution and --voxel-size: give one of the two");
     }

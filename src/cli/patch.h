@@ -19,10 +19,13 @@ int cli_patch_take(cli_patch *patch, int key, const char *name, const char *valu
 /* The same by the option's name, "--size". */
 int cli_patch_set(cli_patch *patch, const char *name, const char *value);
 
+/* What an option was given; NULL: it was not. */
+const char *cli_patch_text(const cli_patch *patch, const char *name);
+
 /* Whether an option was given. */
 bool cli_patch_has(const cli_patch *patch, const char *name);
 
-/* --resolution and --voxel-size exclude each other. */
+/* --resolution and --voxel-size exclude each other, and so do --size and --max-size. */
 int cli_patch_check(const cli_patch *patch);
 
 /* Puts what was given over a scene, which then refers to the patch, over a receiver and over a flat scene. */

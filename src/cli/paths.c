@@ -16,6 +16,19 @@ bool cli_has_ending(const char *path, const char *ending) {
     return dot != NULL && strcasecmp(dot + 1, ending) == 0;
 }
 
+bool cli_has_ending_of(const char *path, const char *endings) {
+    for (const char *at = endings + strspn(endings, " "); *at != '\0'; at += strspn(at, " ")) {
+        char ending[16];
+        const size_t length = strcspn(at, " ");
+        snprintf(ending, sizeof ending, "%.*s", (int)length, at);
+        if (cli_has_ending(path, ending)) {
+            return true;
+        }
+        at += length;
+    }
+    return false;
+}
+
 /* Folder resolved, last part as it is. */
 static bool absolute(const char *path, char *result, size_t capacity) {
     char folder[PATH_MAX], real[PATH_MAX];

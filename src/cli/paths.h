@@ -8,6 +8,15 @@
 /* Whether `path` ends in ".ENDING", in any case. */
 bool cli_has_ending(const char *path, const char *ending);
 
+/* Whether it ends in one of these, which blanks part. */
+bool cli_has_ending_of(const char *path, const char *endings);
+
+/* Endings of the meshes and the images that are read. */
+#define CLI_MODEL_ENDINGS "obj gltf glb fbx dae ply stl"
+#define CLI_IMAGE_ENDINGS                                                                                    \
+    "exr png tif tiff jpg jpeg hdr tga bmp webp dpx psd pgm ppm pnm pfm gif jp2 j2k sgi rgb rla ico heic "   \
+    "heif avif"
+
 /* Whether the two name one file, whether by links or through folders; also where it does not exist yet. */
 bool cli_same_file(const char *a, const char *b);
 

@@ -63,6 +63,17 @@ int cli_parse_integer(const char *name, const char *text, int32_t least, int32_t
     return CLI_OK;
 }
 
+int cli_parse_shard(const char *name, const char *text, int32_t *shard, int32_t *count) {
+    enum { MOST = 10000 };
+    const char *rest;
+    if (!read_integer(text, shard, &rest) || *rest != '/' || !read_integer(rest + 1, count, &rest) ||
+        *rest != '\0' || *shard < 1 || *shard > *count || *count > MOST) {
+        return cli_usage("%s '%s': expected I/N, the part and how many there are, as 1/3; at most %d", name,
+                         text, MOST);
+    }
+    return CLI_OK;
+}
+
 static bool read_numbers(const char *text, int count, double *value) {
     const char *at = text;
     bool good = true;

@@ -11,20 +11,27 @@
 #include <string.h>
 #include <sys/mman.h>
 
-/* Beside this library, and then as every library is searched for: in a host with a sanitizer, whose dlopen()
- * is not libc's, the search does not begin at this one. */
-static void *open_module(const char *file) {
+/* The module in a folder, from that of this library; NULL: it is not there. */
+static void *open_beside(const char *folder, const char *file) {
     static const char of_this_library = 0;
     Dl_info here;
     char path[4096];
     const bool known = dladdr(&of_this_library, &here) != 0 && here.dli_fname != NULL;
     /* a path that is not absolute would be looked for where the host is by now */
     const char *end = known && here.dli_fname[0] == '/' ? strrchr(here.dli_fname, '/') : NULL;
-    void *module = NULL;
-    if (end != NULL && (size_t)snprintf(path, sizeof path, "%.*s/%s", (int)(end - here.dli_fname),
-                                        here.dli_fname, file) < sizeof path) {
-        module = dlopen(path, RTLD_LAZY | RTLD_LOCAL);
+    if (end == NULL || (size_t)snprintf(path, sizeof path, "%.*s/%s%s", (int)(end - here.dli_fname),
+                                        here.dli_fname, folder, file) >= sizeof path) {
+        return NULL;
     }
+    return dlopen(path, RTLD_LAZY | RTLD_LOCAL);
+}
+
+/* Beside this library as it is built, in a folder of its own there as it is installed, and then as every
+ * library is searched for: in a host with a sanitizer, whose dlopen() is not libc's, the search does not
+ * begin at this one. */
+static void *open_module(const char *file) {
+    void *module = open_beside("", file);
+    module = module != NULL ? module : open_beside("vdbshade/", file);
     return module != NULL ? module : dlopen(file, RTLD_LAZY | RTLD_LOCAL);
 }
 

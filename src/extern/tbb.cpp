@@ -1,6 +1,7 @@
 // Loops over TBB's pool.
 #include "base/parallel.h"
 #include "base/threads.h"
+#include "extern/arenas.h"
 #include "extern/guard.h"
 #include "extern/tsan.h"
 
@@ -44,13 +45,13 @@ class Arena {
         }
         const size_t allowed = control::active_value(control::max_allowed_parallelism);
         const int wanted = threads > 0 ? threads : tbb::info::default_concurrency();
-        arena.initialize(static_cast<int>(std::min(static_cast<size_t>(wanted), allowed)));
+        arena.emplace(static_cast<int>(std::min(static_cast<size_t>(wanted), allowed)));
     }
-    template <typename Fn> void run(const Fn &fn) { arena.execute(fn); }
+    template <typename Fn> void run(const Fn &fn) { arena->execute(fn); }
 
   private:
     std::optional<tbb::global_control> more;
-    tbb::task_arena arena;
+    std::optional<vshi::LentArena> arena;
 };
 
 // What throws here is TBB, to which the system refused a thread: loops throw nothing.

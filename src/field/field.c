@@ -20,9 +20,26 @@ void vsh_field_free(vsh_field *field) {
         return;
     }
     vsh_triangles_free(field->surface);
-    free(field->values);
-    free(field->index);
+    if (!field->borrowed) {
+        free(field->values);
+        free(field->index);
+    }
     free(field);
+}
+
+double vshi_field_reach(const vsh_field *field, double reach) {
+    double diagonal = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double edge = field->bounds_max[axis] - field->bounds_min[axis];
+        diagonal += edge * edge;
+    }
+    return reach > 0.0 ? reach / field->voxel_size : DEFAULT_REACH * sqrt(diagonal);
+}
+
+vsh_result vshi_field_reach_check(double reach, vsh_error *error) {
+    return reach >= 0.0 && !isinf(reach)
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_ARGUMENT, "reach %g: expected a length, 0 or more", reach);
 }
 
 /* World to index space of a similarity m: its transpose over the squared scale. */
@@ -100,9 +117,7 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     vsh_field *f = NULL;
     VSHI_TRY(vshi_options_resolve(options, &o, sizeof o, "vsh_field_options", error));
     VSHI_TRY(vshi_run_resolve(run, &r, error));
-    if (!(o.reach >= 0.0) || isinf(o.reach)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "reach %g: expected a length, 0 or more", o.reach);
-    }
+    VSHI_TRY(vshi_field_reach_check(o.reach, error));
 
     vsh_grid_info info;
     vsh_grid_get_info(grid, &info);
@@ -125,14 +140,8 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
         result = vshi_fail(error, VSH_ERROR_INPUT, "field: the level set has no surface");
         goto done;
     }
-    double diagonal = 0.0;
-    for (int axis = 0; axis < 3; ++axis) {
-        const double edge = f->bounds_max[axis] - f->bounds_min[axis];
-        diagonal += edge * edge;
-    }
-    const double reach = o.reach > 0.0 ? o.reach / f->voxel_size : DEFAULT_REACH * sqrt(diagonal);
     vshi_job_advance(job, 40);
-    VSHI_TRY_DONE(derive_levels(f, reach, (double)info.bytes, &r, job, &below, error));
+    VSHI_TRY_DONE(derive_levels(f, vshi_field_reach(f, o.reach), (double)info.bytes, &r, job, &below, error));
     if (o.surface != 0 && vsh_triangles_available()) {
         const vshi_budget budget = {&r, (double)info.bytes + vshi_field_bytes(f)};
         VSHI_TRY_DONE(vshi_field_add_surface(f, budget, job, error));

@@ -101,6 +101,9 @@ static int by_value(const void *a, const void *b) {
 /* Looks at `places` places of a mesh; `thickness` has room for as many. */
 static void look_at_mesh(const vsh_field *field, const vsh_mesh *mesh, double area, size_t places,
                          const vsh_triangles *triangles, double *thickness, vsh_lost *lost) {
+    if (mesh->mask != NULL) { /* a sheet, which is a shell of voxels where it is opaque */
+        return;
+    }
     double before = 0.0;
     size_t next = 0, gone = 0, measured = 0;
     for (size_t i = 0; i < mesh->triangle_count && next < places; ++i) {

@@ -8,9 +8,14 @@
 
 vsh_result vshi_serve_image(const char *path, vshi_decoder *request, const vsh_run *run,
                             vshi_encoder *payload, vsh_error *error) {
-    (void)request;
     vsh_image_file *file = NULL;
-    VSHI_TRY(vsh_image_read(path, run, &file, error));
+    const size_t size = (size_t)vshi_decode_count(request, SIZE_MAX / 2);
+    const void *bytes = vshi_decode_array(request, size, 1);
+    if (!vshi_decoder_ends(request)) {
+        return vshi_fail(error, VSH_ERROR_INTERNAL, "%s: the request to its reader does not hold", path);
+    }
+    VSHI_TRY(size > 0 ? vshi_image_read_bytes(path, bytes, size, run, &file, error)
+                      : vsh_image_read(path, run, &file, error));
     vshi_encode_count(payload, (uint64_t)file->width);
     vshi_encode_count(payload, (uint64_t)file->height);
     vshi_encode_count(payload, (uint64_t)file->channel_count);
@@ -80,8 +85,8 @@ vsh_result vshi_image_decode(vshi_decoder *decoder, const char *path, vsh_image_
     return result;
 }
 
-vsh_result vshi_image_from_reader(const char *path, const vsh_run *run, vsh_image_file **file,
-                                  vsh_error *error) {
+vsh_result vshi_image_from_reader(const char *path, const vshi_image_bytes *bytes, const vsh_run *run,
+                                  vsh_image_file **file, vsh_error *error) {
     enum { UNITS = 1000 };
     vshi_exchange exchange;
     vshi_answer answer;
@@ -89,6 +94,10 @@ vsh_result vshi_image_from_reader(const char *path, const vsh_run *run, vsh_imag
     vsh_result result = VSH_OK;
     VSHI_TRY_DONE(vshi_image_job(path, run, UNITS, &job, error));
     VSHI_TRY_DONE(vshi_exchange_begin(&exchange, VSHI_READ_IMAGE, path, run, error));
+    vshi_encode_count(&exchange.encoder, bytes != NULL ? bytes->size : 0);
+    if (bytes != NULL) {
+        vshi_encode_array(&exchange.encoder, bytes->at, bytes->size, 1);
+    }
     VSHI_TRY_DONE(vshi_exchange_send_job(&exchange, job, UNITS, &answer, error));
     result = vshi_image_decode(&answer.payload, path, file, error);
     vshi_answer_free(&answer);

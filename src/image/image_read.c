@@ -14,6 +14,11 @@
 
 typedef vsh_result read_fn(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error);
 
+static vsh_result read_by_oiio(const char *path, const vsh_run *run, vsh_image_file **file,
+                               vsh_error *error) {
+    return vshi_oiio_read(path, NULL, run, file, error);
+}
+
 /* Looks at the first bytes: an EXR file is one whatever its ending says. */
 static vsh_result find_reader(const char *path, read_fn **reader, vsh_error *error) {
     static const unsigned char exr[] = {0x76, 0x2f, 0x31, 0x01};
@@ -35,7 +40,7 @@ static vsh_result find_reader(const char *path, read_fn **reader, vsh_error *err
     } else if (strcasecmp(vshi_path_ending(path), "exr") == 0) {
         return vshi_fail(error, VSH_ERROR_READ, "%s: is no EXR file, or cut short", path);
     } else {
-        *reader = vshi_oiio_read;
+        *reader = read_by_oiio;
     }
     return VSH_OK;
 }
@@ -51,9 +56,35 @@ vsh_result vsh_image_read(const char *path, const vsh_run *run, vsh_image_file *
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     if (full.reader != NULL) {
-        return vshi_image_from_reader(path, &full, file, error);
+        return vshi_image_from_reader(path, NULL, &full, file, error);
     }
     read_fn *reader = NULL;
     VSHI_TRY(find_reader(path, &reader, error));
     return reader(path, &full, file, error);
+}
+
+static const char *format_of(const unsigned char *bytes, size_t size) {
+    static const struct {
+        const char *format, *magic;
+        size_t length, at;
+    } formats[] = {{"png", "\x89PNG", 4, 0}, {"jpeg", "\xff\xd8\xff", 3, 0}, {"webp", "WEBP", 4, 8}};
+    for (size_t i = 0; i < sizeof formats / sizeof formats[0]; ++i) {
+        if (size >= formats[i].at + formats[i].length &&
+            memcmp(bytes + formats[i].at, formats[i].magic, formats[i].length) == 0) {
+            return formats[i].format;
+        }
+    }
+    return NULL;
+}
+
+vsh_result vshi_image_read_bytes(const char *name, const void *at, size_t size, const vsh_run *run,
+                                 vsh_image_file **file, vsh_error *error) {
+    const vshi_image_bytes bytes = {at, size, format_of(at, size)};
+    *file = NULL;
+    if (bytes.format == NULL) {
+        return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: is neither PNG nor JPEG nor WebP", name);
+    }
+    return run->reader != NULL                ? vshi_image_from_reader(name, &bytes, run, file, error)
+           : strcmp(bytes.format, "png") == 0 ? vshi_png_read_bytes(name, &bytes, run, file, error)
+                                              : vshi_oiio_read(name, &bytes, run, file, error);
 }

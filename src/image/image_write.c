@@ -5,6 +5,7 @@
 #include "base/try.h"
 #include "image/exr.h"
 #include "image/pack.h"
+#include "image/png.h"
 #include "image/write_plan.h"
 
 #include <stdlib.h>
@@ -16,8 +17,9 @@ struct vsh_image_writer {
     char *path;
     char (*names)[VSH_CHANNEL_NAME]; /* of the image's channels */
     int32_t channel_count;
-    int32_t row; /* next */
-    vshi_exr_writer *exr;
+    int32_t row;          /* next */
+    vshi_exr_writer *exr; /* one of the three */
+    vshi_png_writer *png;
     vshi_oiio_writer *oiio;
     vsh_image_clipping clipping;
 };
@@ -34,9 +36,11 @@ static void free_writer(vsh_image_writer *writer) {
 
 /* Closes the file, and says what its closing came to. */
 static vsh_result close_file(vsh_image_writer *writer, vsh_error *error) {
-    const vsh_result result =
-        writer->plan.exr ? vshi_exr_end(writer->exr, error) : vshi_oiio_end(writer->oiio, error);
+    const vsh_result result = writer->plan.exr   ? vshi_exr_end(writer->exr, error)
+                              : writer->plan.png ? vshi_png_end(writer->png, error)
+                                                 : vshi_oiio_end(writer->oiio, error);
     writer->exr = NULL;
+    writer->png = NULL;
     writer->oiio = NULL;
     return result;
 }
@@ -81,6 +85,8 @@ vsh_result vsh_image_writer_create(const char *path, const vsh_image *image, con
     const char *temporary = made->output.temporary;
     if (plan->exr) {
         VSHI_TRY_DONE(vshi_exr_begin(temporary, made->path, &plan->planes, plan->bits, &made->exr, error));
+    } else if (plan->png) {
+        VSHI_TRY_DONE(vshi_png_begin(temporary, made->path, &plan->planes, plan->bits, &made->png, error));
     } else {
         VSHI_TRY_DONE(vshi_oiio_begin(temporary, made->path, &plan->format, &plan->planes, plan->bits,
                                       &made->oiio, error));
@@ -154,8 +160,9 @@ vsh_result vsh_image_writer_add(vsh_image_writer *writer, int32_t rows, const fl
     }
     list->grey.ao = picture->ao >= 0 ? planes[picture->ao] : NULL;
     count_clipped(writer, (size_t)rows * (size_t)list->width, planes);
-    const vsh_result result = writer->plan.exr ? vshi_exr_add(writer->exr, list, rows, error)
-                                               : vshi_oiio_add(writer->oiio, list, rows, error);
+    const vsh_result result = writer->plan.exr   ? vshi_exr_add(writer->exr, list, rows, error)
+                              : writer->plan.png ? vshi_png_add(writer->png, list, rows, error)
+                                                 : vshi_oiio_add(writer->oiio, list, rows, error);
     writer->row += rows;
     return result;
 }
@@ -220,6 +227,7 @@ uint64_t vsh_image_writer_bytes(const char *path, const vsh_image *image, const 
     if (vshi_write_plan_make(path, image, options, &plan, NULL) != VSH_OK) {
         return 0;
     }
-    return (uint64_t)(plan.exr ? vshi_exr_writer_bytes(&plan.planes, plan.bits)
-                               : vshi_oiio_writer_bytes(&plan.format, &plan.planes, plan.bits));
+    return (uint64_t)(plan.exr   ? vshi_exr_writer_bytes(&plan.planes, plan.bits)
+                      : plan.png ? vshi_png_writer_bytes(&plan.planes, plan.bits)
+                                 : vshi_oiio_writer_bytes(&plan.format, &plan.planes, plan.bits));
 }

@@ -1,5 +1,5 @@
 /* OpenImageIO is loaded when the first file needs it: with it come 240 libraries of formats, which take
- * longer to load (0.2 s) than a small bake takes, and most runs read and write EXR alone. */
+ * longer to load (0.2 s) than a small bake takes, and most runs read and write EXR and PNG alone. */
 #include "image/oiio.h"
 
 #include "base/try.h"
@@ -27,7 +27,7 @@ const char *vshi_oiio_refusal(const char *path) {
 }
 
 const char *vshi_oiio_endings(void) {
-    return "png, tif, jpg, tga, bmp, hdr, ppm, pgm, webp, jp2, dpx, gif, sgi, iff, rla, ico, heic, avif";
+    return "tif, jpg, tga, bmp, hdr, ppm, pgm, webp, jp2, dpx, gif, sgi, iff, rla, ico, heic, avif";
 }
 
 vsh_result vshi_oiio_begin(const char *temporary, const char *path, const vshi_format *format,
@@ -49,8 +49,9 @@ double vshi_oiio_writer_bytes(const vshi_format *format, const vshi_planes *plan
     return at()->writer_bytes(format, planes, bits);
 }
 
-vsh_result vshi_oiio_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
+vsh_result vshi_oiio_read(const char *path, const vshi_image_bytes *bytes, const vsh_run *run,
+                          vsh_image_file **file, vsh_error *error) {
     *file = NULL;
     VSHI_TRY(vshi_oiio_have(path, error));
-    return at()->read(path, run, file, error);
+    return at()->read(path, bytes, run, file, error);
 }

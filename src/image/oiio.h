@@ -1,31 +1,13 @@
-/* Every image format but OpenEXR, through OpenImageIO. */
+/* Every image format but OpenEXR and PNG, through OpenImageIO. */
 #ifndef VSHI_OIIO_H
 #define VSHI_OIIO_H
 
+#include "image/format.h"
 #include "image/planes.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-enum { VSHI_BITS_8 = 1, VSHI_BITS_16 = 2, VSHI_BITS_32 = 4 };
-
-enum {
-    VSHI_ALPHA_NONE = 0,
-    VSHI_ALPHA_KEPT = 1,  /* with R, G and B where A is 0 */
-    VSHI_ALPHA_ALWAYS = 2 /* the same, and there must be one: 1 where none is given */
-};
-
-/* What a format can hold. 8 and 16 are integers, 32 is float. */
-typedef struct vshi_format {
-    const char *name; /* OpenImageIO's: "png" */
-    int32_t bits;     /* VSHI_BITS_… that it can be written with */
-    int32_t alpha;    /* VSHI_ALPHA_… */
-    int32_t max_size; /* pixels along a side */
-    bool lossy;       /* values change by more than their rounding */
-    bool grey;        /* one channel, R */
-    double held;      /* bytes a value that the writer keeps until the end, over those of the value itself */
-} vshi_format;
 
 /* Loads what the others but vshi_oiio_read() need, once for the process. Errors: VSH_ERROR_UNSUPPORTED (it is
  * not installed, or of another version). Thread safe. */
@@ -61,9 +43,11 @@ vsh_result vshi_oiio_end(vshi_oiio_writer *writer, vsh_error *error);
 /* Bytes that writing takes at most. */
 double vshi_oiio_writer_bytes(const vshi_format *format, const vshi_planes *planes, int32_t bits);
 
-/* Within run->memory_limit; NULL is none. Errors: VSH_ERROR_INPUT, VSH_ERROR_UNSUPPORTED, VSH_ERROR_LIMIT,
- * VSH_ERROR_MEMORY. Thread safe. */
-vsh_result vshi_oiio_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error);
+/* The file at `path`, of the format that its ending says, or `bytes`, which a format is named of and messages
+ * call `path`. Within run->memory_limit; NULL is none. Errors: VSH_ERROR_READ, VSH_ERROR_INPUT,
+ * VSH_ERROR_UNSUPPORTED, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Thread safe. */
+vsh_result vshi_oiio_read(const char *path, const vshi_image_bytes *bytes, const vsh_run *run,
+                          vsh_image_file **file, vsh_error *error);
 
 #ifdef __cplusplus
 }

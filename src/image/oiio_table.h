@@ -17,7 +17,8 @@ typedef struct vshi_oiio_table {
     vsh_result (*add)(vshi_oiio_writer *, const vshi_planes *, int32_t, vsh_error *);
     vsh_result (*end)(vshi_oiio_writer *, vsh_error *);
     double (*writer_bytes)(const vshi_format *, const vshi_planes *, int32_t);
-    vsh_result (*read)(const char *, const vsh_run *, vsh_image_file **, vsh_error *);
+    vsh_result (*read)(const char *, const vshi_image_bytes *, const vsh_run *, vsh_image_file **,
+                       vsh_error *);
 } vshi_oiio_table;
 
 /* The module's one symbol. */

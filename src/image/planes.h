@@ -63,6 +63,20 @@ static inline float vshi_plane_at(const vshi_planes *planes, const vshi_image_pl
     return plane->encode != NULL ? plane->encode(value) : value;
 }
 
+/* The same as integers hold it: 0 … 1, where it is not cut. */
+static inline float vshi_plane_unit_at(const vshi_planes *planes, const vshi_image_plane *plane, size_t at) {
+    const float value = vshi_plane_at(planes, plane, at);
+    return plane->is_signed ? 0.5f + 0.5f * value : value;
+}
+
+/* 0 … 1 to 0 … most, to nearest; NaN becomes 0 because no comparison with it holds. */
+static inline uint32_t vshi_quantise(float value, uint32_t most) {
+    if (!(value > 0.0f)) {
+        return 0;
+    }
+    return value < 1.0f ? (uint32_t)((double)value * (double)most + 0.5) : most;
+}
+
 enum { VSHI_FILE_NAME = 256 }; /* EXR's longest channel name is 255 bytes */
 
 struct vsh_image_file {
@@ -93,9 +107,21 @@ VSHI_SHARED vsh_result vshi_image_job(const char *path, const vsh_run *run, int6
 /* Cut to VSHI_FILE_NAME, without control characters. */
 VSHI_SHARED void vshi_image_file_name(vsh_image_file *file, int32_t channel, const char *name);
 
-/* Has run->reader read the file. Errors: as vsh_image_read(). */
-vsh_result vshi_image_from_reader(const char *path, const vsh_run *run, vsh_image_file **file,
-                                  vsh_error *error);
+/* An image file that lies in memory. */
+typedef struct vshi_image_bytes {
+    const void *at;
+    size_t size;
+    const char *format; /* OpenImageIO's name of it */
+} vshi_image_bytes;
+
+/* Has run->reader read the file, or `bytes` that stand for it (NULL: none). Errors: as vsh_image_read(). */
+vsh_result vshi_image_from_reader(const char *path, const vshi_image_bytes *bytes, const vsh_run *run,
+                                  vsh_image_file **file, vsh_error *error);
+
+/* As vsh_image_read(), of an image file in memory, PNG, JPEG or WebP by its first bytes, which messages call
+ * `name`; `run` is a resolved one. Errors: VSH_ERROR_UNSUPPORTED too, of another kind. */
+vsh_result vshi_image_read_bytes(const char *name, const void *bytes, size_t size, const vsh_run *run,
+                                 vsh_image_file **file, vsh_error *error);
 
 struct vshi_decoder;
 struct vshi_encoder;

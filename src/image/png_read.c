@@ -6,6 +6,7 @@
 
 #include <png.h>
 
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -134,15 +135,11 @@ static vsh_result read_all(png_reader *reader) {
     return read_rows(reader);
 }
 
-vsh_result vshi_png_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
-    *file = NULL;
-    png_reader reader = {.path = path, .run = run, .error = error};
-    uint64_t size;
-    vsh_result result = vshi_input_open(path, path, UINT64_MAX, &reader.stream, &size, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    result = read_all(&reader);
+/* Closes the stream. */
+static vsh_result read_stream(const char *path, FILE *stream, const vsh_run *run, vsh_image_file **file,
+                              vsh_error *error) {
+    png_reader reader = {.path = path, .run = run, .error = error, .stream = stream};
+    const vsh_result result = read_all(&reader);
     vshi_job_end(reader.job);
     png_destroy_read_struct(&reader.png, &reader.info, NULL);
     free(reader.rows);
@@ -153,4 +150,20 @@ vsh_result vshi_png_read(const char *path, const vsh_run *run, vsh_image_file **
     }
     *file = reader.image;
     return VSH_OK;
+}
+
+vsh_result vshi_png_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
+    FILE *stream;
+    uint64_t size;
+    *file = NULL;
+    VSHI_TRY(vshi_input_open(path, path, UINT64_MAX, &stream, &size, error));
+    return read_stream(path, stream, run, file, error);
+}
+
+vsh_result vshi_png_read_bytes(const char *name, const vshi_image_bytes *bytes, const vsh_run *run,
+                               vsh_image_file **file, vsh_error *error) {
+    *file = NULL;
+    FILE *stream = fmemopen((void *)(uintptr_t)bytes->at, bytes->size, "rb"); /* which only reads */
+    return stream != NULL ? read_stream(name, stream, run, file, error)
+                          : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", name);
 }

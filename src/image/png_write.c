@@ -2,101 +2,69 @@
 
 #include "base/memory.h"
 #include "base/try.h"
+#include "image/png_stream.h"
 
-#include <png.h>
-
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* All that lives across libpng's longjmp: no local variable does. */
-typedef struct png_writer {
-    const vshi_png_source *source;
-    png_structp png;
-    png_infop info;
-    unsigned char *row;
-    unsigned char *bytes; /* written so far */
+typedef struct growing {
+    unsigned char *bytes;
     size_t size, capacity;
-    bool memory; /* was refused */
-    char message[200];
-} png_writer;
+} growing;
 
-static PNG_NORETURN void on_error(png_structp png, png_const_charp message) {
-    png_writer *writer = png_get_error_ptr(png);
-    snprintf(writer->message, sizeof writer->message, "%s", message);
-    png_longjmp(png, 1);
-}
-
-static void on_warning(png_structp png, png_const_charp message) {
-    (void)png;
-    (void)message;
-}
-
-static void on_write(png_structp png, png_bytep data, size_t length) {
-    png_writer *writer = png_get_io_ptr(png);
-    if (length > writer->capacity - writer->size) {
-        const size_t capacity = 2 * writer->capacity + length + 4096;
-        unsigned char *grown = realloc(writer->bytes, capacity);
+static bool put(void *user, const unsigned char *bytes, size_t size) {
+    growing *file = user;
+    if (size > file->capacity - file->size) {
+        const size_t capacity = 2 * file->capacity + size + 4096;
+        unsigned char *grown = realloc(file->bytes, capacity);
         if (grown == NULL) {
-            writer->memory = true;
-            png_error(png, "the system refused memory");
+            return false;
         }
-        writer->bytes = grown;
-        writer->capacity = capacity;
+        file->bytes = grown;
+        file->capacity = capacity;
     }
-    memcpy(writer->bytes + writer->size, data, length);
-    writer->size += length;
+    memcpy(file->bytes + file->size, bytes, size);
+    file->size += size;
+    return true;
 }
 
-static void on_flush(png_structp png) {
-    (void)png;
-}
-
-/* False where libpng jumped out of it. */
-static bool encode(png_writer *writer) {
-    const vshi_png_source *source = writer->source;
-    if (setjmp(png_jmpbuf(writer->png)) != 0) {
+static bool encode(vshi_png_stream *stream, const vshi_png_source *source, unsigned char *row,
+                   growing *file) {
+    const vshi_png_header header = {
+        .width = source->width, .height = source->height, .channels = source->channels, .bits = source->bits};
+    if (!vshi_png_stream_begin(stream, &header, put, file)) {
         return false;
     }
-    png_set_user_limits(writer->png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
-    png_set_write_fn(writer->png, writer, on_write, on_flush);
-    png_set_IHDR(writer->png, writer->info, (png_uint_32)source->width, (png_uint_32)source->height,
-                 source->bits, source->channels == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB,
-                 PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-    png_write_info(writer->png, writer->info);
     for (int32_t y = 0; y < source->height; ++y) {
-        source->row(source->user, y, writer->row);
-        png_write_row(writer->png, writer->row);
+        source->row(source->user, y, row);
+        if (!vshi_png_stream_row(stream, row)) {
+            return false;
+        }
     }
-    png_write_end(writer->png, writer->info);
-    return true;
+    return vshi_png_stream_end(stream);
 }
 
 vsh_result vshi_png_encode(const vshi_png_source *source, const char *what, unsigned char **bytes,
                            size_t *size, vsh_error *error) {
-    png_writer writer = {.source = source};
+    vshi_png_stream stream = {0};
+    growing file = {0};
+    unsigned char *row = NULL;
     vsh_result result;
     *bytes = NULL;
     *size = 0;
-    VSHI_TRY_DONE(vshi_allocate((void **)&writer.row, (size_t)source->width,
+    VSHI_TRY_DONE(vshi_allocate((void **)&row, (size_t)source->width,
                                 (size_t)(source->channels * source->bits / 8), what, error));
-    writer.png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &writer, on_error, on_warning);
-    writer.info = writer.png != NULL ? png_create_info_struct(writer.png) : NULL;
-    if (writer.info == NULL) {
-        result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
+    if (!encode(&stream, source, row, &file)) {
+        result = stream.memory ? vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what)
+                               : vshi_fail(error, VSH_ERROR_LIMIT, "%s: %s", what, stream.message);
         goto done;
     }
-    if (!encode(&writer)) {
-        result = vshi_fail(error, writer.memory ? VSH_ERROR_MEMORY : VSH_ERROR_LIMIT, "%s: %s", what,
-                           writer.message);
-        goto done;
-    }
-    *bytes = writer.bytes;
-    *size = writer.size;
-    writer.bytes = NULL;
+    *bytes = file.bytes;
+    *size = file.size;
+    file.bytes = NULL;
 done:
-    png_destroy_write_struct(&writer.png, &writer.info);
-    free(writer.bytes);
-    free(writer.row);
+    vshi_png_stream_free(&stream);
+    free(file.bytes);
+    free(row);
     return result;
 }

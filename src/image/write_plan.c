@@ -7,6 +7,7 @@
 #include "base/srgb.h"
 #include "base/try.h"
 #include "image/pack.h"
+#include "image/png.h"
 
 #include <string.h>
 #include <strings.h>
@@ -50,25 +51,32 @@ static vsh_result check_image(const char *path, const vsh_image *image, vsh_erro
     return VSH_OK;
 }
 
+/* A format of OpenImageIO's. */
+static vsh_result plan_other(const char *path, const char *ending, vshi_format *format, vsh_error *error) {
+    VSHI_TRY(vshi_oiio_have(path, error));
+    const char *refusal = vshi_oiio_refusal(path);
+    if (refusal != NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "%s: '%s' is not written: %s; expected one of exr, png, %s", path, ending, refusal,
+                         vshi_oiio_endings());
+    }
+    return vshi_oiio_format(path, format)
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: ending '%s': expected one of exr, png, %s", path,
+                           ending, vshi_oiio_endings());
+}
+
 static vsh_result plan_format(const char *path, const vsh_image *image, vshi_write_plan *plan,
                               vsh_error *error) {
     const char *ending = vshi_path_ending(path);
     plan->exr = strcasecmp(ending, "exr") == 0;
+    plan->png = strcasecmp(ending, vshi_png_format.name) == 0;
+    plan->format = vshi_png_format;
     if (plan->exr) {
         return VSH_OK;
     }
-    const vsh_result had = vshi_oiio_have(path, error);
-    if (had != VSH_OK) {
-        return had;
-    }
-    const char *refusal = vshi_oiio_refusal(path);
-    if (refusal != NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: '%s' is not written: %s; expected one of exr, %s",
-                         path, ending, refusal, vshi_oiio_endings());
-    }
-    if (!vshi_oiio_format(path, &plan->format)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: ending '%s': expected one of exr, %s", path, ending,
-                         vshi_oiio_endings());
+    if (!plan->png) {
+        VSHI_TRY(plan_other(path, ending, &plan->format, error));
     }
     if (image->width > plan->format.max_size || image->height > plan->format.max_size) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %d × %d pixels: %s has at most %d a side", path,

@@ -6,7 +6,7 @@
 #include "image/picture.h"
 
 typedef struct vshi_write_plan {
-    bool exr;
+    bool exr, png;                     /* the file's; or neither */
     vshi_format format;                /* where it is not EXR */
     int32_t bits;                      /* 8, 16 or 32 */
     vshi_planes planes;                /* without values; names are the image's, or static */

@@ -29,6 +29,10 @@ extern "C" {
          (const vsh_distance *field, const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,   \
           vsh_error *error),                                                                                 \
          (field, options, run, grid, error), grid)                                                           \
+    MAKE(vsh_grid_from_distances,                                                                            \
+         (const vsh_distance *field, vsh_distances_fn *distances, const vsh_grid_options *options,           \
+          const vsh_run *run, vsh_grid **grid, vsh_error *error),                                            \
+         (field, distances, options, run, grid, error), grid)                                                \
     MAKE(vsh_grid_unite,                                                                                     \
          (const vsh_grid_instance *instances, size_t count, const vsh_grid_options *options,                 \
           const vsh_run *run, vsh_grid **grid, vsh_error *error),                                            \

@@ -8,6 +8,7 @@
 #include "levelset/redistance.h"
 #include "sdf/sdf.h"
 
+#include <array>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -21,6 +22,32 @@ constexpr double SQRT3 = 1.7320508075688772;
 // edges and corners count for too much.
 constexpr size_t FORETELLING_BOXES = 4096;
 
+// A field's callback: for a position, or for several at once.
+struct Callback {
+    const vsh_distance &field;
+    vsh_distances_fn *batch;       // in place of field.distance; nullptr: none
+    const vsh_sdf *tree;           // whose distance the field is; nullptr: any
+    const uint8_t *keep = nullptr; // of a tree's nodes, those that decide where it is asked; nullptr: all
+
+    double operator()(const Vec3d &position) const {
+        double d = 0.0;
+        (*this)(1, &position, &d);
+        return d;
+    }
+    void operator()(size_t count, const Vec3d *positions, double *distances) const {
+        if (batch != nullptr) {
+            batch(field.user, count, positions->asPointer(), distances);
+            return;
+        }
+        for (size_t i = 0; i < count; ++i) {
+            const double *position = positions[i].asPointer();
+            distances[i] = keep != nullptr ? vshi_sdf_distance_within(tree, keep, position)
+                                           : field.distance(field.user, position);
+        }
+    }
+};
+static_assert(sizeof(Vec3d) == 3 * sizeof(double), "arrays of positions are arrays of doubles");
+
 // Boxes of one size; `size` voxels an edge, at multiples of it.
 struct Level {
     int32_t size;
@@ -29,17 +56,14 @@ struct Level {
 
 class Voxelizer {
   public:
-    Voxelizer(const vsh_distance &field_, const Lattice &lattice_, double band_, Stage &stage_,
-              vsh_error *error_)
-        : field(field_), lattice(lattice_), band(band_), stage(stage_), error(error_) {}
+    Voxelizer(const Callback &call_, const Lattice &lattice_, double band_, Stage &stage_, vsh_error *error_)
+        : call(call_), field(call_.field), lattice(lattice_), band(band_), stage(stage_), error(error_) {}
 
     FloatGrid::Ptr run(const Vec3d &low, const Vec3d &high);
 
   private:
-    double distance(const Vec3d &index) const {
-        const Vec3d position = index * lattice.voxel + lattice.translation;
-        return field.distance(field.user, position.asPointer());
-    }
+    Vec3d position(const Vec3d &index) const { return index * lattice.voxel + lattice.translation; }
+    double distance(const Vec3d &index) const { return call(position(index)); }
     // How far the field may lie from its value at the middle of a box of `size` voxels an edge, at its
     // voxels.
     double slack(int32_t size) const { return field.lipschitz * 0.5 * SQRT3 * (size - 1) * lattice.voxel; }
@@ -52,9 +76,12 @@ class Voxelizer {
     void foretell(const Level &level) const;
     void check_tiles(const Level &level, const std::vector<int8_t> &signs) const;
     Leaf *leaf(const Coord &origin, int8_t &sign, size_t index);
-    bool sample_block(Leaf &leaf, const Coord &corner, float &deepest, size_t index);
+    std::vector<uint8_t> narrow(const Coord &origin) const;
+    bool sample_block(Leaf &leaf, const Callback &here, const Coord &corner, double middle, float &witness,
+                      size_t index);
     void leaves(const Level &level);
 
+    const Callback &call;
     const vsh_distance &field;
     const Lattice &lattice;
     const double band; // world units of the field's value
@@ -75,7 +102,7 @@ void Voxelizer::note_bad(size_t index) {
 }
 
 void Voxelizer::fail_bad(const Vec3d &index) const {
-    const Vec3d p = index * lattice.voxel + lattice.translation;
+    const Vec3d p = position(index);
     throw Failure{vshi_fail(error, VSH_ERROR_INPUT,
                             "distance callback: %g at (%.9g, %.9g, %.9g): expected a finite value",
                             distance(index), p[0], p[1], p[2])};
@@ -180,9 +207,9 @@ Level Voxelizer::split(const Level &level) {
 }
 
 // Samples 4³ voxels of a leaf, or none but the middle where the band cannot reach them. Returns whether one
-// of them is in the band; `deepest` becomes the sign's witness where none is.
-bool Voxelizer::sample_block(Leaf &leaf, const Coord &corner, float &witness, size_t index) {
-    const double middle = distance(corner.asVec3d() + Vec3d(0.5 * (BLOCK - 1)));
+// of them is in the band; `witness` tells the sign where none is.
+bool Voxelizer::sample_block(Leaf &leaf, const Callback &here, const Coord &corner, double middle,
+                             float &witness, size_t index) {
     if (!std::isfinite(middle)) {
         note_bad(index);
         return false;
@@ -190,11 +217,20 @@ bool Voxelizer::sample_block(Leaf &leaf, const Coord &corner, float &witness, si
     const float background = grid->background();
     const bool far = std::fabs(middle) > slack(BLOCK) + band;
     bool in_band = false;
+    std::array<Vec3d, BLOCK * BLOCK * BLOCK> positions;
+    std::array<double, BLOCK * BLOCK * BLOCK> distances;
+    if (!far) {
+        for (int32_t i = 0; i < int32_t(positions.size()); ++i) {
+            positions[i] =
+                position(corner.offsetBy(i / (BLOCK * BLOCK), i / BLOCK % BLOCK, i % BLOCK).asVec3d());
+        }
+        here(positions.size(), positions.data(), distances.data());
+    }
     for (int32_t x = 0; x < BLOCK; ++x) {
         for (int32_t y = 0; y < BLOCK; ++y) {
             for (int32_t z = 0; z < BLOCK; ++z) {
                 const Coord voxel = corner.offsetBy(x, y, z);
-                const double d = far ? middle : distance(voxel.asVec3d());
+                const double d = far ? middle : distances[(x * BLOCK + y) * BLOCK + z];
                 if (!std::isfinite(d)) {
                     note_bad(index);
                     return false;
@@ -214,16 +250,37 @@ bool Voxelizer::sample_block(Leaf &leaf, const Coord &corner, float &witness, si
     return in_band;
 }
 
+// Of the shapes of a tree, those that decide in a leaf.
+std::vector<uint8_t> Voxelizer::narrow(const Coord &origin) const {
+    constexpr double MARGIN = 1.0 + 1e-6; // for the rounding of positions
+    std::vector<uint8_t> keep;
+    if (call.tree != nullptr) {
+        keep.resize(call.tree->node_count);
+        vshi_sdf_narrow(call.tree, position(origin.asVec3d() + Vec3d(3.5)).asPointer(),
+                        MARGIN * 3.5 * SQRT3 * lattice.voxel, keep.data());
+    }
+    return keep;
+}
+
 Leaf *Voxelizer::leaf(const Coord &origin, int8_t &sign, size_t index) {
+    const std::vector<uint8_t> keep = narrow(origin);
+    const Callback here{call.field, call.batch, call.tree, keep.empty() ? nullptr : keep.data()};
     auto leaf = std::make_unique<Leaf>(origin, grid->background(), false);
     bool in_band = false;
     bool inside = false;
     bool outside = false;
+    std::array<Coord, 8> corners;
+    std::array<Vec3d, 8> positions;
+    std::array<double, 8> middles;
+    for (int32_t block = 0; block < 8; ++block) {
+        corners[block] =
+            origin.offsetBy((block & 4) ? BLOCK : 0, (block & 2) ? BLOCK : 0, (block & 1) ? BLOCK : 0);
+        positions[block] = position(corners[block].asVec3d() + Vec3d(0.5 * (BLOCK - 1)));
+    }
+    here(positions.size(), positions.data(), middles.data());
     for (int32_t block = 0; block < 8; ++block) {
         float witness = 0.0f;
-        in_band |= sample_block(
-            *leaf, origin.offsetBy((block & 4) ? BLOCK : 0, (block & 2) ? BLOCK : 0, (block & 1) ? BLOCK : 0),
-            witness, index);
+        in_band |= sample_block(*leaf, here, corners[block], middles[block], witness, index);
         inside |= witness < 0.0f;
         outside |= witness >= 0.0f;
     }
@@ -282,8 +339,8 @@ FloatGrid::Ptr Voxelizer::run(const Vec3d &low, const Vec3d &high) {
     return grid;
 }
 
-void check_field(const vsh_distance *field, vsh_error *error) {
-    if (field == nullptr || field->distance == nullptr) {
+void check_field(const vsh_distance *field, vsh_distances_fn *batch, vsh_error *error) {
+    if (field == nullptr || (field->distance == nullptr && batch == nullptr)) {
         throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT, "distance field: no callback")};
     }
     if (!(field->lipschitz > 0.0 && std::isfinite(field->lipschitz))) {
@@ -301,14 +358,16 @@ void check_field(const vsh_distance *field, vsh_error *error) {
     }
 }
 
-vsh_result from_distance(const vsh_distance *field, const vsh_grid_options *options, const vsh_run *given,
-                         vsh_grid **grid, vsh_error *error) {
+vsh_result from_distance(const vsh_distance *field, vsh_distances_fn *batch, const vsh_sdf *tree,
+                         const vsh_grid_options *options, const vsh_run *given, vsh_grid **grid,
+                         vsh_error *error) {
     vsh_run run;
     const vsh_result result = vshi_run_resolve(given, &run, error);
     if (result != VSH_OK) {
         return result;
     }
-    check_field(field, error);
+    check_field(field, batch, error);
+    const Callback call{*field, batch, tree};
     const Vec3d low(field->bounds_min);
     const Vec3d high(field->bounds_max);
     const Lattice lattice = make_lattice(options, low, high, error);
@@ -316,12 +375,11 @@ vsh_result from_distance(const vsh_distance *field, const vsh_grid_options *opti
     // A field to be re-distanced is needed only where cells of 2³ voxels may hold its zero.
     const double band =
         field->exact ? lattice.half_width * lattice.voxel : 1.01 * SQRT3 * field->lipschitz * lattice.voxel;
-    FloatGrid::Ptr level_set = Voxelizer(*field, lattice, band, stage, error).run(low, high);
+    FloatGrid::Ptr level_set = Voxelizer(call, lattice, band, stage, error).run(low, high);
     if (!field->exact) {
         const double unit = 1.0 / (field->lipschitz * lattice.voxel);
         const IndexDistance exact = [&](const Vec3d &index) {
-            const Vec3d position = index * lattice.voxel + lattice.translation;
-            return unit * field->distance(field->user, position.asPointer());
+            return unit * call(index * lattice.voxel + lattice.translation);
         };
         level_set = redistance(*level_set, exact, lattice, 0.5, 1.0, stage, error);
     }
@@ -341,8 +399,20 @@ vsh_result vsh_grid_from_distance(const vsh_distance *field, const vsh_grid_opti
                                   const vsh_run *run, vsh_grid **grid, vsh_error *error) {
     VSHI_NEEDS(grid);
     *grid = nullptr;
-    return vshi::guard(error, VSH_ERROR_INTERNAL, "voxelize",
-                       [&] { return vshi::from_distance(field, options, run, grid, error); });
+    return vshi::guard(error, VSH_ERROR_INTERNAL, "voxelize", [&] {
+        return vshi::from_distance(field, nullptr, nullptr, options, run, grid, error);
+    });
+}
+
+vsh_result vsh_grid_from_distances(const vsh_distance *field, vsh_distances_fn *distances,
+                                   const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
+                                   vsh_error *error) {
+    VSHI_NEEDS(grid);
+    *grid = nullptr;
+    VSHI_NEEDS(distances);
+    return vshi::guard(error, VSH_ERROR_INTERNAL, "voxelize", [&] {
+        return vshi::from_distance(field, distances, nullptr, options, run, grid, error);
+    });
 }
 
 vsh_result vsh_grid_from_sdf(const vsh_sdf *sdf, const vsh_grid_options *options, const vsh_run *run,
@@ -357,5 +427,6 @@ vsh_result vsh_grid_from_sdf(const vsh_sdf *sdf, const vsh_grid_options *options
     vsh_sdf tree = *sdf;
     vsh_distance field = {vshi::tree_distance, &tree, 1.0, vshi_sdf_exact(sdf), {0, 0, 0}, {0, 0, 0}};
     vsh_sdf_bounds(sdf, field.bounds_min, field.bounds_max);
-    return vsh_grid_from_distance(&field, options, run, grid, error);
+    return vshi::guard(error, VSH_ERROR_INTERNAL, "voxelize",
+                       [&] { return vshi::from_distance(&field, nullptr, sdf, options, run, grid, error); });
 }

@@ -3,6 +3,7 @@
 
 #include "base/job.h"
 #include "base/memory.h"
+#include "extern/arenas.h"
 #include "extern/guard.h"
 #include "extern/tsan.h"
 #include "levelset/leaves.h"
@@ -13,7 +14,6 @@
 #include <openvdb/openvdb.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 struct vsh_grid {
     openvdb::FloatGrid::Ptr level_set; // never changed once the handle exists
@@ -109,7 +109,7 @@ class Stage {
     static constexpr size_t UNITS = 1000000;
     vshi_job *job;
     vsh_error *error;
-    tbb::task_arena arena;
+    LentArena arena;
     std::atomic<size_t> reached{0};
 };
 

@@ -1,6 +1,7 @@
 // Level sets from meshes: solids together, rooms cut out of them, walls behind the faces of others, sheets as
 // shells.
 #include "levelset/shells.h"
+#include "mesh/alpha_mask.h"
 #include "mesh/mesh_set.h"
 
 #include <cfloat>
@@ -57,6 +58,56 @@ void look_over(const vsh_mesh *mesh, size_t count, Meshes &meshes, vsh_error *er
         throw Failure{vshi_fail(error, VSH_ERROR_LIMIT, "voxelize: %zu triangles, %d at most",
                                 meshes.triangles, INT32_MAX)};
     }
+}
+
+// How long the pieces are that a mask leaves of triangles, voxels: the border is as near as half of one.
+constexpr double PIECE = 0.5;
+
+// Meshes, those that masks cut out as what is left of them.
+struct CutOut {
+    std::vector<vsh_mesh> meshes;
+    std::vector<vshi_mask_pieces> pieces;
+
+    CutOut() = default;
+    ~CutOut() {
+        for (vshi_mask_pieces &each : pieces) {
+            vshi_mask_pieces_free(&each);
+        }
+    }
+    CutOut(const CutOut &) = delete;
+    CutOut &operator=(const CutOut &) = delete;
+};
+
+// Cuts the meshes that have masks; what is made lives as long as `cut_out`. `run` comes to hold it.
+void cut_masks(const vsh_mesh *given, size_t count, double voxel, Meshes &meshes, CutOut &cut_out,
+               vsh_run &run, vsh_error *error) {
+    const auto masked = [](const vsh_mesh &mesh) { return mesh.mask != nullptr; };
+    if (std::none_of(given, given + count, masked)) {
+        return;
+    }
+    cut_out.meshes.assign(given, given + count);
+    cut_out.pieces.resize(count);
+    for (size_t i = 0; i < count; ++i) {
+        vsh_mesh &mesh = cut_out.meshes[i];
+        if (!masked(mesh)) {
+            continue;
+        }
+        vshi_mask_pieces &pieces = cut_out.pieces[i];
+        check(vshi_mask_pieces_cut(&mesh, PIECE * voxel, &run, &pieces, error));
+        mesh.positions = pieces.positions;
+        mesh.indices = pieces.indices;
+        mesh.vertex_count = 3 * pieces.count;
+        mesh.triangle_count = pieces.count;
+        mesh.normals = mesh.uvs = mesh.mask_uvs = nullptr;
+        mesh.mask = nullptr;
+        mesh.checked = nullptr;
+        mesh.solidity = VSH_SOLIDITY_SHELL;
+        mesh.alpha = VSH_ALPHA_MASKED;
+        run.memory_held += uint64_t(pieces.count) * (9 * sizeof(float) + 3 * sizeof(uint32_t));
+    }
+    vshi_mesh_set_free(&meshes.set);
+    meshes.triangles = 0;
+    look_over(cut_out.meshes.data(), count, meshes, error);
 }
 
 // Of a wide band to either side of a surface, voxels.
@@ -178,9 +229,11 @@ vsh_result from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_option
                        const vsh_run *given, vsh_grid **grid, vsh_error *error) {
     vsh_run run;
     check(vshi_run_resolve(given, &run, error));
+    CutOut cut_out; // which the meshes may be
     Meshes meshes;
     look_over(mesh, count, meshes, error);
     const Lattice lattice = make_lattice(options, meshes.low, meshes.high, error);
+    cut_masks(mesh, count, lattice.voxel, meshes, cut_out, run, error);
     check(vshi_mesh_set_solve(&meshes.set, &run, error));
     foretell(meshes, lattice, run, error);
     Stage stage(run, "voxelize", error);

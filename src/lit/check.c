@@ -1,6 +1,8 @@
 /* What callers give. */
 #include "lit/work.h"
 
+#include "base/utf8.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -101,6 +103,16 @@ static vsh_result check_image(const vsh_lit_image *image, size_t index, vsh_erro
     return VSH_OK;
 }
 
+static bool is_file_name(const char *name) {
+    const size_t size = strlen(name);
+    bool good = size > 0 && size <= VSHI_LIT_NAME_BYTES;
+    for (size_t i = 0, length; i < size && good; i += length) {
+        length = vshi_utf8_length(name + i);
+        good = length > 0 && (unsigned char)name[i] >= ' ' && strchr("/\\\x7f", name[i]) == NULL;
+    }
+    return good;
+}
+
 vsh_result vshi_lit_check_images(const vsh_lit_options *options, vsh_error *error) {
     VSHI_NEEDS_OF(options->image_count, options->images);
     VSHI_NEEDS_OF(options->chart_count, options->chart_pages);
@@ -117,6 +129,16 @@ vsh_result vshi_lit_check_images(const vsh_lit_options *options, vsh_error *erro
                                  "vsh_lit_image %zu: page %u has one of purpose %d already", i,
                                  options->images[i].page, options->images[i].purpose);
             }
+        }
+    }
+    VSHI_NEEDS_OF(options->page_count, options->page_names);
+    for (size_t i = 0; i < options->page_count; ++i) {
+        const char *name = options->page_names[i];
+        if (name != NULL && !is_file_name(name)) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                             "vsh_lit_options.page_names[%zu]: is no UTF-8, has a character that names of "
+                             "files have not, or is empty or longer than %d bytes",
+                             i, VSHI_LIT_NAME_BYTES);
         }
     }
     for (size_t c = 0; c < options->chart_count; ++c) {

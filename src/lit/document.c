@@ -84,6 +84,7 @@ vsh_result vshi_lit_open(vshi_lit_document *document, const char *path, const vs
     document->text_size = told_size(document->text, size);
     VSHI_TRY(check_lists(gltf, error));
     document->first_view = json_array_size(json_object_get(gltf->root, "bufferViews"));
+    document->image_count = json_array_size(json_object_get(gltf->root, "images"));
     const size_t buffers = json_array_size(json_object_get(gltf->root, "buffers"));
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&gltf->buffers, buffers, sizeof *gltf->buffers, error));
     gltf->buffer_count = buffers;

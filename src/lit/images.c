@@ -1,6 +1,5 @@
 #include "lit/images.h"
 
-#include "base/file.h"
 #include "base/memory.h"
 #include "base/srgb.h"
 #include "image/png.h"
@@ -9,6 +8,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+enum { MARK_BYTES = VSHI_LIT_NAME_BYTES + 64 }; /* of a purpose and a page's name */
 
 static const char *const purpose_names[VSH_LIT_PURPOSES] = {
     [VSH_LIT_OCCLUSION] = "occlusion", [VSH_LIT_LIGHTMAP] = "lightmap", [VSH_LIT_PREVIEW] = "preview"};
@@ -20,19 +21,6 @@ void vshi_lit_besides_free(vshi_lit_besides *besides) {
     }
     free(besides->list);
     *besides = (vshi_lit_besides){NULL, 0};
-}
-
-char *vshi_lit_beside_name(const char *output, const char *mark, const char *ending) {
-    const char *slash = strrchr(output, '/');
-    const char *name = slash != NULL ? slash + 1 : output;
-    const char *own = vshi_path_ending(output);
-    const size_t stem = own[0] != '\0' ? (size_t)(own - name) - 1 : strlen(name);
-    const size_t size = stem + strlen(mark) + strlen(ending) + 2;
-    char *made = malloc(size);
-    if (made != NULL) {
-        snprintf(made, size, "%.*s%s.%s", (int)stem, name, mark, ending);
-    }
-    return made;
 }
 
 /* --- encoding */
@@ -133,18 +121,24 @@ json_t *vshi_lit_uri(const char *name) {
     return uri;
 }
 
+/* The name of an image's page, or NULL. */
+static const char *name_of(const vshi_lit_work *work, const vsh_lit_image *image) {
+    return image->page < work->options->page_count ? work->options->page_names[image->page] : NULL;
+}
+
 static vsh_result put_beside(vshi_lit_work *work, const vsh_lit_image *image, vshi_lit_beside *beside,
                              json_t *made, vsh_error *error) {
-    char mark[64];
-    if (work->page_count > 1) {
+    char mark[MARK_BYTES];
+    const char *name = name_of(work, image);
+    if (name != NULL) {
+        snprintf(mark, sizeof mark, ".%s.%s", purpose_names[image->purpose], name);
+    } else if (work->page_count > 1) {
         snprintf(mark, sizeof mark, ".%s.%u", purpose_names[image->purpose], image->page);
     } else {
         snprintf(mark, sizeof mark, ".%s", purpose_names[image->purpose]);
     }
-    beside->name = vshi_lit_beside_name(work->output, mark, "png");
-    return beside->name != NULL
-               ? vshi_lit_set(&work->document, made, "uri", vshi_lit_uri(beside->name), error)
-               : vshi_lit_no_memory(&work->document, error);
+    VSHI_TRY(vshi_lit_beside_name(work, mark, "png", &beside->name, error));
+    return vshi_lit_set(&work->document, made, "uri", vshi_lit_uri(beside->name), error);
 }
 
 static vsh_result add_texture(vshi_lit_work *work, const vsh_lit_image *image, json_t *made, size_t *sampler,
@@ -170,7 +164,11 @@ static vsh_result add(vshi_lit_work *work, const vsh_lit_image *image, bool embe
         VSHI_TRY(encode(work, image, scale, &beside->owned, &beside->size, error));
         beside->bytes = beside->owned;
     }
-    json_t *made = json_pack("{s:s}", "name", purpose_names[image->purpose]);
+    char called[MARK_BYTES];
+    const char *name = name_of(work, image);
+    snprintf(called, sizeof called, "%s%s%s", purpose_names[image->purpose], name != NULL ? " of " : "",
+             name != NULL ? name : "");
+    json_t *made = json_pack("{s:s}", "name", called);
     vsh_result result = made != NULL ? VSH_OK : vshi_lit_no_memory(&work->document, error);
     if (result == VSH_OK) {
         result = embed ? embed_bytes(work, beside->bytes, beside->size, made, "image/png", error)

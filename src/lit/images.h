@@ -30,8 +30,18 @@ vsh_result vshi_lit_images_bring(vshi_lit_work *work, vsh_error *error);
 /* A file's name as a URI; NULL where memory is short. */
 json_t *vshi_lit_uri(const char *name);
 
-/* Name of a file beside the output: its own without its ending, `mark`, `ending`. NULL where memory is short.
+/* Name of a file beside the output: its own without its ending, `mark`, `ending`; where a file that the input
+ * is made of, and that others may use, has that name, with a number before the ending. Free it with free().
+ * (beside.c) Errors: VSH_ERROR_MEMORY, VSH_ERROR_ARGUMENT. */
+vsh_result vshi_lit_beside_name(const vshi_lit_work *work, const char *mark, const char *ending, char **name,
+                                vsh_error *error);
+
+/* The path of a file in the output's folder; NULL where memory is short. */
+char *vshi_lit_beside_path(const char *output, const char *name);
+
+/* Fails where a path is one of a file that the input is made of. Errors: VSH_ERROR_ARGUMENT,
+ * VSH_ERROR_MEMORY.
  */
-char *vshi_lit_beside_name(const char *output, const char *mark, const char *ending);
+vsh_result vshi_lit_check_replaced(const vshi_lit_document *document, const char *path, vsh_error *error);
 
 #endif

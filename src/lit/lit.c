@@ -1,8 +1,10 @@
 #include "lit/images.h"
+#include "lit/obj.h"
 #include "lit/prune.h"
 #include "lit/work.h"
 #include "lit/write.h"
 
+#include "base/attributes.h"
 #include "base/file.h"
 #include "base/floats.h"
 #include "base/memory.h"
@@ -18,7 +20,7 @@ static bool is_gltf(const char *path) {
 }
 
 int32_t vsh_lit_is_output(const char *path) {
-    return path != NULL && is_gltf(path) ? 1 : 0;
+    return path != NULL && (is_gltf(path) || vshi_lit_is_obj(path)) ? 1 : 0;
 }
 
 /* --- what is asked for */
@@ -58,12 +60,17 @@ static vsh_result count_pages(vshi_lit_work *work, vsh_error *error) {
 }
 
 static vsh_result check(vshi_lit_work *work, vsh_error *error) {
-    if (!is_gltf(work->output)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: expected a name that ends in .glb or .gltf",
+    if (!vsh_lit_is_output(work->output)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: expected a name that ends in .glb, .gltf or .obj",
                          work->output);
+    }
+    if (vshi_lit_is_obj(work->output)) {
+        VSHI_TRY(vshi_lit_obj_check(work, error));
     }
     VSHI_TRY(vshi_output_check(work->output, error));
     VSHI_TRY(vshi_lit_check_images(work->options, error));
+    VSHI_TRY(vshi_attributes_check(work->output, work->options->attributes, work->options->attribute_count,
+                                   error));
     VSHI_TRY(count_pages(work, error));
     for (size_t i = 0; i < vsh_model_mesh_count(work->model); ++i) {
         VSHI_TRY(vshi_lit_check_mesh(work, i, error));
@@ -122,13 +129,14 @@ static vsh_result bring_images(vshi_lit_work *work, const char *path, vsh_error 
 
 static vsh_result make_document(vshi_lit_work *work, const char *path, const vsh_run *run, vshi_job *job,
                                 vshi_lit_uses *uses, vsh_error *error) {
-    if (path == NULL || !is_gltf(path)) {
+    const bool obj = vshi_lit_is_obj(work->output);
+    if (path != NULL && is_same(path, work->output)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: the output is the input", work->output);
+    }
+    if (path == NULL || !is_gltf(path) || obj) {
         VSHI_TRY(vshi_lit_begin(&work->document, path != NULL ? path : work->output, run, job, error));
         VSHI_TRY(allocate_pages(work, error));
-        return vshi_lit_from_model(work, error);
-    }
-    if (is_same(path, work->output)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: the output is the input", work->output);
+        return obj ? VSH_OK : vshi_lit_from_model(work, error);
     }
     VSHI_TRY(vshi_lit_open(&work->document, path, run, job, error));
     VSHI_TRY(allocate_pages(work, error));
@@ -151,8 +159,11 @@ static vsh_result make(vshi_lit_work *work, const char *path, const vsh_run *run
     vsh_result result;
     VSHI_TRY_DONE(make_document(work, path, run, job, &uses, error));
     VSHI_TRY_DONE(vshi_lit_images_add(work, embed, &besides, error));
-    VSHI_TRY_DONE(vshi_lit_materials_apply(work, error));
-    VSHI_TRY_DONE(vshi_lit_prune(&work->document, &uses, error));
+    if (!vshi_lit_is_obj(work->output)) {
+        VSHI_TRY_DONE(vshi_lit_materials_apply(work, error));
+        VSHI_TRY_DONE(vshi_lit_prune(&work->document, &uses, error));
+        VSHI_TRY_DONE(vshi_lit_tell_origin(work, error));
+    }
     VSHI_TRY_DONE(vshi_lit_write_files(work, &besides, error));
 done:
     vshi_lit_uses_free(&uses);

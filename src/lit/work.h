@@ -62,6 +62,8 @@ static inline uint32_t vshi_lit_page(const vshi_lit_work *work, const vsh_lit_me
                                                  : work->options->chart_pages[mesh->charts[t]];
 }
 
+enum { VSHI_LIT_NAME_BYTES = 200 }; /* of a page, in names of files */
+
 /* Checks what the caller gives for the model's mesh `index`. Errors: VSH_ERROR_ARGUMENT. (check.c) */
 vsh_result vshi_lit_check_mesh(const vshi_lit_work *work, size_t index, vsh_error *error);
 vsh_result vshi_lit_check_images(const vsh_lit_options *options, vsh_error *error);
@@ -93,6 +95,9 @@ vsh_result vshi_lit_primitive_make(vshi_lit_work *work, size_t mesh, size_t prim
 vsh_result vshi_lit_pages_make(vshi_lit_work *work, const json_t *made, const vsh_lit_mesh *mesh,
                                const uint32_t *corners, size_t vertex_count, size_t set, size_t *whole,
                                json_t *list, vsh_error *error);
+
+/* The options' attributes into the extras of the asset. (origin.c) */
+vsh_result vshi_lit_tell_origin(vshi_lit_work *work, vsh_error *error);
 
 /* The only page of a mesh, or VSH_LIT_NO_CHART. */
 uint32_t vshi_lit_only_page(const vshi_lit_work *work, const vsh_lit_mesh *mesh);

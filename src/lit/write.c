@@ -1,15 +1,13 @@
 #include "lit/write.h"
 
 #include "base/file.h"
-#include "base/uri.h"
 #include "lit/buffers.h"
 #include "lit/json_text.h"
+#include "lit/obj.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
 
 /* --- writing */
 
@@ -22,6 +20,10 @@ typedef struct output_file {
 static void put(output_file *file, const void *bytes, size_t size) {
     vshi_sink_write(&file->sink, bytes, size, file->at);
     file->at += size;
+}
+
+static void put_into(void *file, const void *bytes, size_t size) {
+    put(file, bytes, size);
 }
 
 static void put_number(output_file *file, uint64_t number) {
@@ -126,57 +128,13 @@ static vsh_result end_file(output_file *file, const char *path, vsh_error *error
 
 /* --- files */
 
-/* The path of a file in the output's folder. */
-static char *path_beside(const char *output, const char *name) {
-    const char *slash = strrchr(output, '/');
-    const size_t folder = slash != NULL ? (size_t)(slash - output) + 1 : 0;
-    char *path = malloc(folder + strlen(name) + 1);
-    if (path != NULL) {
-        memcpy(path, output, folder);
-        strcpy(path + folder, name);
-    }
-    return path;
-}
-
-static bool is_same_file(const char *a, const char *b) {
-    struct stat one, other;
-    return stat(a, &one) == 0 && stat(b, &other) == 0 && one.st_dev == other.st_dev &&
-           one.st_ino == other.st_ino;
-}
-
-/* Files that the input is made of, and that others may use, are not replaced. */
-static vsh_result check_replaced(const vshi_lit_document *document, const char *path, vsh_error *error) {
-    static const char *const lists[] = {"buffers", "images"};
-    for (size_t k = 0; k < sizeof lists / sizeof lists[0] && document->text != NULL; ++k) {
-        size_t i;
-        const json_t *item;
-        json_array_foreach(json_object_get(document->gltf.root, lists[k]), i, item) {
-            const char *uri = json_string_value(json_object_get(item, "uri"));
-            if (uri == NULL || vshi_uri_is_data(uri) || vshi_uri_is_remote(uri)) {
-                continue;
-            }
-            char *given = vshi_uri_path(document->gltf.path, uri);
-            if (given == NULL) {
-                return vshi_lit_no_memory(document, error);
-            }
-            const bool same = is_same_file(given, path);
-            free(given);
-            if (same) {
-                return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: would replace %s[%zu] of %s", path, lists[k],
-                                 i, document->gltf.path);
-            }
-        }
-    }
-    return VSH_OK;
-}
-
 typedef struct files {
     output_file *list; /* [count]: the document's is the last */
     char **paths;      /* [named + 1] */
     size_t count, named;
 } files;
 
-/* The paths of all; `bin`: the name of the buffer's file; NULL: it is in the document. */
+/* The paths of all; `bin`: the name of the file of the buffer, or of an OBJ's materials; NULL: none. */
 static vsh_result name_files(const vshi_lit_work *work, const vshi_lit_besides *besides, const char *bin,
                              files *all, vsh_error *error) {
     all->named = besides->count + (bin != NULL);
@@ -187,11 +145,14 @@ static vsh_result name_files(const vshi_lit_work *work, const vshi_lit_besides *
     }
     for (size_t i = 0; i <= all->named; ++i) {
         const char *name = i < besides->count ? besides->list[i].name : bin;
-        all->paths[i] = i < all->named ? path_beside(work->output, name) : strdup(work->output);
+        all->paths[i] = i < all->named ? vshi_lit_beside_path(work->output, name) : strdup(work->output);
         if (all->paths[i] == NULL) {
             return vshi_lit_no_memory(&work->document, error);
         }
-        VSHI_TRY(check_replaced(&work->document, all->paths[i], error));
+        VSHI_TRY(vshi_lit_check_replaced(&work->document, all->paths[i], error));
+        if (i == besides->count && i < all->named && vshi_lit_is_obj(work->output)) {
+            VSHI_TRY(vshi_lit_mtl_check(all->paths[i], error));
+        }
     }
     return VSH_OK;
 }
@@ -222,8 +183,31 @@ static vsh_result write_document(const vshi_lit_work *work, output_file *file, c
     return result;
 }
 
+static vsh_result commit(files *all, vsh_error *error) {
+    vshi_output **outputs = calloc(all->named + 1, sizeof *outputs);
+    if (outputs == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", all->paths[all->named]);
+    }
+    for (size_t i = 0; i <= all->named; ++i) {
+        outputs[i] = &all->list[i].output;
+    }
+    const vsh_result result = vshi_outputs_commit(outputs, all->named + 1, error);
+    free(outputs);
+    return result;
+}
+
+/* The one that is named `bin`. */
+static void write_named(const vshi_lit_work *work, const vshi_lit_besides *besides, const vshi_lit_layout *l,
+                        output_file *file) {
+    if (vshi_lit_is_obj(work->output)) {
+        vshi_lit_put_mtl(work, besides, put_into, file);
+    } else {
+        put_buffers(file, &work->document, l);
+    }
+}
+
 static vsh_result write_all(const vshi_lit_work *work, const vshi_lit_besides *besides,
-                            const vshi_lit_layout *l, files *all, vsh_error *error) {
+                            const vshi_lit_layout *l, const char *bin, files *all, vsh_error *error) {
     for (size_t i = 0; i <= all->named; ++i) {
         output_file *file = &all->list[i];
         VSHI_TRY(begin_file(file, all->paths[i], error));
@@ -232,7 +216,9 @@ static vsh_result write_all(const vshi_lit_work *work, const vshi_lit_besides *b
         if (i < besides->count) {
             put(file, besides->list[i].bytes, besides->list[i].size);
         } else if (i < all->named) {
-            put_buffers(file, &work->document, l);
+            write_named(work, besides, l, file);
+        } else if (vshi_lit_is_obj(work->output)) {
+            result = vshi_lit_put_obj(work, bin, put_into, file, error);
         } else {
             result = write_document(work, file, l, all->named == besides->count, error);
         }
@@ -242,35 +228,44 @@ static vsh_result write_all(const vshi_lit_work *work, const vshi_lit_besides *b
     if (vshi_job_cancelled(work->document.gltf.job)) {
         return vshi_job_fail_cancelled(work->document.gltf.job, error);
     }
-    for (size_t i = 0; i <= all->named; ++i) {
-        VSHI_TRY(vshi_output_commit(&all->list[i].output, error));
+    return commit(all, error);
+}
+
+/* The document's buffers as one, in a file of the name *bin or (NULL) in the document. */
+static vsh_result join(vshi_lit_work *work, const vshi_lit_besides *besides, vshi_lit_layout *l, char **bin,
+                       files *all, vsh_error *error) {
+    vshi_lit_document *document = &work->document;
+    json_t *one = NULL;
+    VSHI_TRY(vshi_lit_lay_out(document, l, error));
+    if (strcasecmp(vshi_path_ending(work->output), "glb") != 0 && l->size > 0) {
+        VSHI_TRY(vshi_lit_beside_name(work, "", "bin", bin, error));
     }
-    return VSH_OK;
+    VSHI_TRY(name_files(work, besides, *bin, all, error)); /* by the names that the input has */
+    VSHI_TRY(vshi_lit_join_buffers(document, l, &one, error));
+    if (one != NULL) {
+        VSHI_TRY(vshi_lit_set(document, one, "byteLength", json_integer((json_int_t)l->size), error));
+        json_object_del(one, "uri");
+    }
+    return *bin != NULL ? vshi_lit_set(document, one, "uri", vshi_lit_uri(*bin), error) : VSH_OK;
+}
+
+/* The files of an OBJ: *mtl is the name of that of its materials; NULL: it has none. */
+static vsh_result name_obj(const vshi_lit_work *work, const vshi_lit_besides *besides, char **mtl, files *all,
+                           vsh_error *error) {
+    if (besides->count > 0) {
+        VSHI_TRY(vshi_lit_beside_name(work, "", "mtl", mtl, error));
+    }
+    return name_files(work, besides, *mtl, all, error);
 }
 
 vsh_result vshi_lit_write_files(vshi_lit_work *work, const vshi_lit_besides *besides, vsh_error *error) {
-    vshi_lit_document *document = &work->document;
-    const bool binary = strcasecmp(vshi_path_ending(work->output), "glb") == 0;
     vshi_lit_layout l = {.size = 0};
-    json_t *one = NULL;
     char *bin = NULL;
     files all = {.count = 0};
     vsh_result result;
-    VSHI_TRY_DONE(vshi_lit_lay_out(document, &l, error));
-    if (!binary && l.size > 0) {
-        bin = vshi_lit_beside_name(work->output, "", "bin");
-        VSHI_TRY_DONE(bin != NULL ? VSH_OK : vshi_lit_no_memory(document, error));
-    }
-    VSHI_TRY_DONE(name_files(work, besides, bin, &all, error)); /* by the names that the input has */
-    VSHI_TRY_DONE(vshi_lit_join_buffers(document, &l, &one, error));
-    if (one != NULL) {
-        VSHI_TRY_DONE(vshi_lit_set(document, one, "byteLength", json_integer((json_int_t)l.size), error));
-        json_object_del(one, "uri");
-    }
-    if (bin != NULL) {
-        VSHI_TRY_DONE(vshi_lit_set(document, one, "uri", vshi_lit_uri(bin), error));
-    }
-    VSHI_TRY_DONE(write_all(work, besides, &l, &all, error));
+    VSHI_TRY_DONE(vshi_lit_is_obj(work->output) ? name_obj(work, besides, &bin, &all, error)
+                                                : join(work, besides, &l, &bin, &all, error));
+    VSHI_TRY_DONE(write_all(work, besides, &l, bin, &all, error));
 done:
     end_files(&all);
     free(bin);

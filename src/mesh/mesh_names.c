@@ -85,6 +85,11 @@ int32_t vsh_mesh_matches(const vsh_mesh *mesh, const char *pattern) {
     if (mesh == NULL || pattern == NULL) {
         return 0;
     }
+    static const char of_material[] = "material:";
+    enum { OF_MATERIAL = sizeof of_material - 1 };
+    if (strncmp(pattern, of_material, OF_MATERIAL) == 0) {
+        return mesh->material_name != NULL && matches(mesh->material_name, pattern + OF_MATERIAL);
+    }
     const char *name = mesh->name, *object = mesh->object_name;
     if ((name != NULL && matches(name, pattern)) || (object != NULL && matches(object, pattern))) {
         return 1;

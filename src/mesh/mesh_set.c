@@ -2,6 +2,7 @@
 
 #include "base/memory.h"
 #include "base/try.h"
+#include "mesh/alpha_mask.h"
 
 #include <stdlib.h>
 
@@ -13,8 +14,8 @@ const struct vsh_checked_mesh *vshi_mesh_known(const vsh_mesh *mesh) {
     const vsh_mesh *of = &known->of;
     return mesh->positions == of->positions && mesh->indices == of->indices &&
                    mesh->vertex_count == of->vertex_count && mesh->triangle_count == of->triangle_count &&
-                   mesh->object == of->object && mesh->solidity == of->solidity &&
-                   vshi_mesh_same_transform(mesh->transform, of->transform)
+                   mesh->object == of->object && mesh->solidity == of->solidity && mesh->mask == of->mask &&
+                   mesh->mask_uvs == of->mask_uvs && vshi_mesh_same_transform(mesh->transform, of->transform)
                ? known
                : NULL;
 }
@@ -42,7 +43,13 @@ vsh_result vshi_mesh_set_create(const vsh_mesh *meshes, size_t count, vshi_mesh_
         } else {
             VSHI_TRY(vshi_mesh_look_over(&meshes[m], m, &own->report, error));
         }
-        own->of = set->meshes[m] = meshes[m];
+        set->meshes[m] = meshes[m];
+        if (meshes[m].mask != NULL) {
+            VSHI_TRY(vshi_alpha_mask_check(&meshes[m], m, error));
+            set->meshes[m].solidity = VSH_SOLIDITY_SHELL;
+            set->meshes[m].alpha = VSH_ALPHA_MASKED;
+        }
+        own->of = set->meshes[m];
         set->meshes[m].checked = own;
     }
     return VSH_OK;

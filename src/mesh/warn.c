@@ -47,6 +47,10 @@ void vshi_mesh_set_warn(const vshi_mesh_set *set, double shell, double voxel, co
     for (size_t w = 0; run->warning != NULL && w < wholes->count; ++w) {
         size_t count = 0;
         const vshi_component *components = vshi_solidity_of_whole(set->solidity, w, &count);
+        const vsh_mesh *whole = &wholes->meshes[w];
+        if (whole->alpha == VSH_ALPHA_MASKED && whole->solidity == VSH_SOLIDITY_SHELL) {
+            continue; /* what a mask cuts out is meant so */
+        }
         const tally t = tally_of(components, count);
         const size_t first = wholes->first[w];
         const vshi_mesh_name name = vshi_mesh_label(&set->meshes[first], first);

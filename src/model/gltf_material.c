@@ -171,7 +171,9 @@ static vsh_result read_mask(vshi_gltf *gltf, const json_t *given, const char *wh
                             vshi_model_material *material, vsh_error *error) {
     const json_t *surface = json_object_get(given, "pbrMetallicRoughness");
     vsh_error why;
-    material->told.alpha_cutoff = number_or(json_object_get(given, "alphaCutoff"), 0.0, FLT_MAX, 0.5);
+    if (material->told.alpha == VSH_ALPHA_MASKED) {
+        material->told.alpha_cutoff = number_or(json_object_get(given, "alphaCutoff"), 0.0, FLT_MAX, 0.5);
+    }
     material->told.base_alpha =
         number_or(json_array_get(json_object_get(surface, "baseColorFactor"), 3), 0.0, 1.0, 1.0);
     const vsh_result result =
@@ -207,7 +209,7 @@ vsh_result vshi_gltf_read_materials(vshi_gltf *gltf, vsh_error *error) {
             VSHI_TRY(vshi_gltf_hold(gltf, (double)strlen(name), error));
             VSHI_TRY(vshi_model_copy_line(name, &material->name, error));
         }
-        if (material->told.alpha == VSH_ALPHA_MASKED) {
+        if (material->told.alpha != VSH_ALPHA_OPAQUE) {
             VSHI_TRY(read_mask(gltf, given, where, material, error));
         }
     }

@@ -80,6 +80,8 @@ vsh_mesh vsh_model_mesh(const vsh_model *model, size_t index, int32_t uv_set) {
     const vshi_model_entry *entry = &model->entries[index];
     const vshi_model_shape *shape = &model->shapes[entry->shape];
     const int32_t set = uv_set == -1 ? shape->uv_sets > 1 : uv_set;
+    /* entries come before materials where a model is taken from a reader */
+    const size_t material = shape->material > 0 ? (size_t)shape->material - 1 : SIZE_MAX;
     return (vsh_mesh){
         .name = entry->name,
         .positions = shape->positions,
@@ -92,6 +94,7 @@ vsh_mesh vsh_model_mesh(const vsh_model *model, size_t index, int32_t uv_set) {
         .object_name = entry->object_name,
         .object = entry->object,
         .alpha = shape->alpha,
+        .material_name = material < model->material_count ? model->materials[material].name : NULL,
     };
 }
 

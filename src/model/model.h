@@ -172,6 +172,9 @@ void vshi_model_put_lights(struct vshi_encoder *encoder, const vsh_model *model)
 vsh_result vshi_model_take_lights(struct vshi_decoder *decoder, vsh_model *model, const char *path,
                                   vsh_error *error);
 
+/* Takes `count` materials, opaque and without names. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_model_take_plain_materials(vsh_model *model, size_t count, vsh_error *error);
+
 /* Its materials and images, which stay where they lie in the answer (model_material.c). */
 void vshi_model_put_materials(struct vshi_encoder *encoder, const vsh_model *model);
 vsh_result vshi_model_take_materials(struct vshi_decoder *decoder, vsh_model *model, const char *path,

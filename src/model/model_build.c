@@ -92,6 +92,8 @@ static vsh_result copy_shape(const vshi_model_source *source, const struct aiMes
         return VSH_OK; /* points or lines */
     }
     shape->alpha = alpha_of(source->scene, mesh);
+    shape->material =
+        mesh->mMaterialIndex < source->scene->mNumMaterials ? (int32_t)mesh->mMaterialIndex + 1 : 0;
     VSHI_TRY(vshi_allocate((void **)&shape->positions, count, sizeof(float[3]), what, error));
     VSHI_TRY(
         vshi_allocate((void **)&shape->indices, shape->triangle_count, sizeof(uint32_t[3]), what, error));
@@ -161,6 +163,26 @@ static vsh_result add_nodes(const vshi_model_source *source, vsh_model *model, v
     return VSH_OK;
 }
 
+/* Their names; what is blended is known of each mesh. */
+static vsh_result copy_materials(const vshi_model_source *source, vsh_model *model, vsh_error *error) {
+    const struct aiScene *scene = source->scene;
+    VSHI_TRY(vshi_model_take_plain_materials(model, scene->mNumMaterials, error));
+    for (size_t m = 0; m < model->shape_count; ++m) {
+        const int32_t material = model->shapes[m].material;
+        if (material > 0) {
+            model->materials[material - 1].told.alpha = model->shapes[m].alpha;
+        }
+    }
+    for (unsigned i = 0; i < scene->mNumMaterials; ++i) {
+        struct aiString name;
+        if (aiGetMaterialString(scene->mMaterials[i], AI_MATKEY_NAME, &name) == aiReturn_SUCCESS &&
+            name.length > 0) {
+            VSHI_TRY(vshi_model_copy_line(name.data, &model->materials[i].name, error));
+        }
+    }
+    return VSH_OK;
+}
+
 vsh_result vshi_model_build(const vshi_model_source *source, vsh_model **out, vsh_error *error) {
     vsh_model *model = NULL;
     vshi_skins skins = {.source = source};
@@ -177,6 +199,7 @@ vsh_result vshi_model_build(const vshi_model_source *source, vsh_model **out, vs
                           ? vshi_job_fail_cancelled(source->job, error)
                           : copy_shape(source, scene->mMeshes[m], &model->shapes[m], error));
     }
+    VSHI_TRY_DONE(copy_materials(source, model, error));
     if (scene->mRootNode != NULL) {
         const double metres = model->unit > 0.0 && !source->in_metres ? model->unit : 1.0;
         const double root[12] = {metres, 0, 0, 0, 0, metres, 0, 0, 0, 0, metres, 0};

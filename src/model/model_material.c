@@ -41,6 +41,17 @@ vsh_result vshi_model_copy_line(const char *text, char **copy, vsh_error *error)
     return VSH_OK;
 }
 
+vsh_result vshi_model_take_plain_materials(vsh_model *model, size_t count, vsh_error *error) {
+    static const double as_they_are[6] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0};
+    VSHI_TRY(vshi_allocate((void **)&model->materials, count, sizeof *model->materials, "materials", error));
+    model->material_count = count;
+    for (size_t i = 0; i < count; ++i) {
+        model->materials[i].told.base_alpha = 1.0;
+        memcpy(model->materials[i].told.uv_transform, as_they_are, sizeof as_they_are);
+    }
+    return VSH_OK;
+}
+
 void vshi_model_free_materials(vsh_model *model) {
     for (size_t i = 0; i < model->material_count; ++i) {
         free(model->materials[i].name);

@@ -94,6 +94,7 @@ static vsh_result make_shapes(vshi_obj *obj, vsh_model *model, vsh_error *error)
             .vertex_count = vertex_end(obj, m) - first,
             .alpha = mesh->material != SIZE_MAX && obj->blended[mesh->material] ? VSH_ALPHA_BLENDED
                                                                                 : VSH_ALPHA_OPAQUE,
+            .material = mesh->material < obj->materials.count ? (int32_t)mesh->material + 1 : 0,
         };
         model->shape_count = m + 1;
         if (triangles) {
@@ -103,6 +104,23 @@ static vsh_result make_shapes(vshi_obj *obj, vsh_model *model, vsh_error *error)
             VSHI_TRY(cut_mesh(obj, mesh, runs, shape, error));
         }
         made += shape->triangle_count;
+    }
+    return VSH_OK;
+}
+
+/* Their names, and which are blended. */
+static vsh_result make_materials(vshi_obj *obj, vsh_model *model, vsh_error *error) {
+    const size_t count = obj->materials.count;
+    if (count >= INT32_MAX) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu materials, at most %d", obj->path, count,
+                         INT32_MAX - 1);
+    }
+    const double bytes = (double)count * sizeof *model->materials + (double)obj->materials.used;
+    VSHI_TRY(vshi_check_limit(obj->run, obj->budget.bytes + bytes, obj->path, error));
+    VSHI_TRY(vshi_model_take_plain_materials(model, count, error));
+    for (size_t i = 0; i < count; ++i) {
+        model->materials[i].told.alpha = obj->blended[i] ? VSH_ALPHA_BLENDED : VSH_ALPHA_OPAQUE;
+        VSHI_TRY(vshi_model_copy_line(vshi_words_at(&obj->materials, i), &model->materials[i].name, error));
     }
     return VSH_OK;
 }
@@ -130,6 +148,7 @@ vsh_result vshi_obj_build(vshi_obj *obj, vsh_model *model, vsh_error *error) {
     free(obj->heads);
     obj->budget.bytes -= (double)(obj->head_capacity * sizeof *obj->heads);
     obj->heads = NULL;
+    VSHI_TRY(make_materials(obj, model, error));
     VSHI_TRY(make_shapes(obj, model, error));
     return add_entries(obj, model, error);
 }

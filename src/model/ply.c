@@ -139,7 +139,7 @@ static vsh_result keep_texcoords(vshi_ply_reader *r, const uint32_t *corners, vs
 
 static vsh_result keep_row(vshi_ply_reader *r, int role, vsh_error *error) {
     vshi_faces *faces = &r->faces;
-    const uint32_t *corners = faces->corners + faces->count;
+    const uint32_t *corners = faces->corners != NULL ? faces->corners + faces->count : NULL;
     if (role < VSHI_PLY_NUMBERS) {
         return vshi_ply_keep_vertex(r, error);
     }

@@ -106,6 +106,10 @@ static vsh_result gather(assembly *a, vsh_error *error) {
                              "caster %zu: %s: the transform of a level set must neither shear nor scale "
                              "unevenly",
                              i, caster->path);
+        } else if (caster->type == VSH_CASTER_VDB && vshi_assets_grid(a->assets, i) == NULL) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                             "caster %zu: %s: was not read, as the scene takes its field from a file", i,
+                             caster->path);
         }
         if (vshi_assets_outline(a->assets, i) != NULL && vshi_similarity_scale(caster->transform) <= 0.0) {
             return vshi_fail(error, VSH_ERROR_INPUT,

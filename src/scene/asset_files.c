@@ -24,8 +24,17 @@ vsh_result vshi_asset_model(vshi_asset_files *files, const char *path, const vsh
     vshi_asset_model_entry *entry = &files->models[files->model_count++];
     VSHI_TRY(copy_text(path, &entry->path, error));
     VSHI_TRY(vsh_model_read(path, run, &entry->model, error));
+    VSHI_TRY(vshi_masks_create(entry->model, entry->path, &entry->masks, error));
     *model = entry->model;
     return VSH_OK;
+}
+
+vshi_masks *vshi_asset_masks(const vshi_asset_files *files, const vsh_model *model) {
+    size_t i = 0;
+    while (files->models[i].model != model) {
+        ++i;
+    }
+    return files->models[i].masks;
 }
 
 static bool same_text(const char *a, const char *b) {
@@ -88,6 +97,7 @@ void vshi_asset_files_free(vshi_asset_files *files) {
     }
     free(files->grids);
     for (size_t i = 0; i < files->model_count; ++i) {
+        vshi_masks_free(files->models[i].masks);
         vsh_model_free(files->models[i].model);
         free(files->models[i].path);
     }

@@ -3,12 +3,14 @@
 #define VSHI_ASSET_FILES_H
 
 #include "heightfield/height_image.h"
+#include "scene/masks.h"
 
 #include <vdbshade/scene.h>
 
 typedef struct vshi_asset_model_entry {
     char *path;
     vsh_model *model;
+    vshi_masks *masks;
 } vshi_asset_model_entry;
 
 typedef struct vshi_asset_grid_entry {
@@ -39,6 +41,8 @@ void vshi_asset_files_free(vshi_asset_files *files);
 /* What a file holds, which belongs to `files`: read where it has not been. Errors: those of the readers. */
 vsh_result vshi_asset_model(vshi_asset_files *files, const char *path, const vsh_run *run,
                             const vsh_model **model, vsh_error *error);
+/* The masks of such a model. */
+vshi_masks *vshi_asset_masks(const vshi_asset_files *files, const vsh_model *model);
 vsh_result vshi_asset_grid(vshi_asset_files *files, const char *path, const char *name, const vsh_run *run,
                            const vsh_grid **grid, vsh_error *error);
 vsh_result vshi_asset_map(vshi_asset_files *files, const char *path, const vsh_run *run,

@@ -7,6 +7,8 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "scene/asset_files.h"
+#include "scene/asset_place.h"
+#include "scene/kept_field.h"
 #include "scene/select.h"
 #include "scene/solidity.h"
 #include "scene/unwrapped.h"
@@ -14,84 +16,23 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* One caster or receiver: the file's meshes with its transform in front of theirs. */
-typedef struct asset_place {
-    vsh_mesh *meshes;
-    double *transforms; /* [count][12] */
-    size_t *numbers;    /* [count]: of each in its model */
-    size_t count;
-    const vsh_model *model; /* of meshes; belongs to the assets' models */
-    const vsh_grid *grid;   /* vdb casters; belongs to the assets' grids */
-    vsh_outline *outline;   /* mask and text casters */
-    vsh_model *made;        /* of heightfields; its meshes are this place's */
-    vsh_heights *heights;   /* direct ones */
-    vsh_spheres *spheres;
-    bool direct;
-    vshi_mesh_set set; /* these two of a receiver */
-    vshi_unwrapped unwrapped;
-} asset_place;
-
 struct vsh_assets {
     vshi_asset_files files;
-    asset_place *casters;
+    vshi_asset_place *casters;
     size_t caster_count;
-    asset_place *receivers;
+    vshi_asset_place *receivers;
     size_t receiver_count;
     vshi_mesh_set set; /* of the casters' meshes */
+    vshi_caster_prints prints;
 };
 
-/* Adds mesh `number` of a model, as it is or as `mesh` has it. */
-static void add_mesh(asset_place *place, vsh_mesh mesh, size_t number, double scale,
-                     const double transform[12]) {
-    double *composed = place->transforms + 12 * place->count, scaled[12];
-    for (int k = 0; k < 12; ++k) {
-        scaled[k] = mesh.transform[k] * scale;
-    }
-    vshi_transform_compose(transform, scaled, composed);
-    mesh.transform = composed;
-    place->numbers[place->count] = number;
-    place->meshes[place->count++] = mesh;
-}
-
-/* The meshes of the model that are `chosen`; NULL: all. Those that `parts`, a receiver of the same model, has
- * unwrapped are taken from there: what casts and receives is one. NULL: none. */
-static vsh_result place_chosen(asset_place *place, const vsh_model *model, const unsigned char *chosen,
-                               const asset_place *parts, int32_t uv_set, double unit,
-                               const double transform[12], vsh_error *error) {
-    const size_t all = vsh_model_mesh_count(model), part_count = parts != NULL ? parts->count : 0;
-    const double own_unit = vsh_model_unit(model) > 0.0 ? vsh_model_unit(model) : 1.0;
-    const double scale = unit > 0.0 ? unit / own_unit : 1.0;
-    const size_t count = all + part_count;
-    VSHI_TRY(vshi_allocate((void **)&place->meshes, count, sizeof *place->meshes, "meshes", error));
-    VSHI_TRY(vshi_allocate((void **)&place->transforms, count, 12 * sizeof(double), "transforms", error));
-    VSHI_TRY(vshi_allocate((void **)&place->numbers, count, sizeof *place->numbers, "meshes", error));
-    unsigned char *taken = NULL;
-    VSHI_TRY(vshi_allocate((void **)&taken, all, 1, "meshes", error));
-    for (size_t i = 0; i < part_count; ++i) {
-        const size_t number = parts->numbers[i];
-        if (chosen == NULL || chosen[number] != 0) {
-            vsh_mesh part = parts->meshes[i];
-            part.transform = vsh_model_mesh(model, number, -1).transform;
-            add_mesh(place, part, number, scale, transform);
-            taken[number] = 1;
-        }
-    }
-    for (size_t i = 0; i < all; ++i) {
-        if ((chosen == NULL || chosen[i] != 0) && !taken[i]) {
-            add_mesh(place, vsh_model_mesh(model, i, uv_set), i, scale, transform);
-        }
-    }
-    free(taken);
-    return VSH_OK;
-}
-
-static vsh_result place_model(asset_place *place, const vsh_model *model, int32_t uv_set,
+static vsh_result place_model(vshi_asset_place *place, const vsh_model *model, int32_t uv_set,
                               const double transform[12], vsh_error *error) {
-    return place_chosen(place, model, NULL, NULL, uv_set, 0.0, transform, error);
+    return vshi_place_chosen(place, model, NULL, uv_set, 0.0, transform, error);
 }
 
 /* `source` is filled but for what the image holds, and whether it is direct but for its transform. */
-static vsh_result place_heights(vsh_assets *assets, asset_place *place, vsh_heights_source *source,
+static vsh_result place_heights(vsh_assets *assets, vshi_asset_place *place, vsh_heights_source *source,
                                 int32_t what, const double transform[12], const vsh_run *run,
                                 vsh_error *error) {
     const vshi_height_image *map = NULL;
@@ -107,7 +48,7 @@ static vsh_result place_heights(vsh_assets *assets, asset_place *place, vsh_heig
     return place_model(place, place->made, 0, transform, error);
 }
 
-static vsh_result place_spheres(asset_place *place, const vsh_caster *caster, size_t index,
+static vsh_result place_spheres(vshi_asset_place *place, const vsh_caster *caster, size_t index,
                                 const vsh_run *run, vsh_error *error) {
     const double *spheres = caster->spheres;
     size_t count = caster->sphere_count;
@@ -126,43 +67,8 @@ static vsh_result place_spheres(asset_place *place, const vsh_caster *caster, si
                                         caster->path != NULL ? ": " : "", why.message);
 }
 
-/* Takes glass and the like out of `chosen`, and tells what masks are taken for. */
-static vsh_result leave_out_blended(const vsh_scene *scene, const vsh_model *model, const char *path,
-                                    const vsh_run *run, unsigned char *chosen, vsh_error *error) {
-    const size_t count = vsh_model_mesh_count(model);
-    size_t left = 0, blended = 0, masked = 0;
-    for (size_t i = 0; i < count; ++i) {
-        const int32_t alpha = vsh_model_mesh(model, i, -1).alpha;
-        const bool out = chosen[i] != 0 && alpha == VSH_ALPHA_BLENDED && scene->cast_blended == 0;
-        blended += out;
-        masked += chosen[i] != 0 && alpha == VSH_ALPHA_MASKED;
-        chosen[i] = out ? 0 : chosen[i];
-        left += chosen[i] != 0;
-    }
-    if (left == 0) {
-        return vshi_fail(
-            error, VSH_ERROR_INPUT,
-            "%s: all its materials are blended (glass, smoke), and cast nothing; \"cast_blended\" "
-            "in a scene, or --cast-blended, has them cast",
-            path);
-    }
-    if (blended > 0) {
-        vshi_warn(run,
-                  "%s: %zu of %zu meshes have blended materials (glass, smoke) and cast no shadow; "
-                  "--cast-blended has them cast",
-                  path, blended, count);
-    }
-    if (masked > 0) {
-        vshi_warn(run,
-                  "%s: %zu of %zu meshes have masked materials (leaves, fences) and cast whole, without the "
-                  "holes of their textures",
-                  path, masked, count);
-    }
-    return VSH_OK;
-}
-
 /* The first receiver that unwraps meshes of a model; NULL: none. */
-static const asset_place *find_unwrapped(const vsh_assets *assets, const vsh_model *model) {
+static const vshi_asset_place *find_unwrapped(const vsh_assets *assets, const vsh_model *model) {
     for (size_t i = 0; i < assets->receiver_count; ++i) {
         if (assets->receivers[i].model == model && assets->receivers[i].unwrapped.atlas != NULL) {
             return &assets->receivers[i];
@@ -174,7 +80,7 @@ static const asset_place *find_unwrapped(const vsh_assets *assets, const vsh_mod
 static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_t index, const vsh_run *run,
                                vsh_error *error) {
     const vsh_caster *caster = &scene->casters[index];
-    asset_place *place = &assets->casters[index];
+    vshi_asset_place *place = &assets->casters[index];
     if (caster->type == VSH_CASTER_SDF) {
         return VSH_OK;
     }
@@ -188,6 +94,9 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
     }
     if (caster->path == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "caster %zu: no path", index);
+    }
+    if (caster->type == VSH_CASTER_VDB && scene->field != NULL) {
+        return VSH_OK; /* its field is there */
     }
     if (caster->type == VSH_CASTER_VDB) {
         return vshi_asset_grid(&assets->files, caster->path, caster->grid, run, &place->grid, error);
@@ -207,15 +116,8 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
         return place_heights(assets, place, &source, VSH_HEIGHTS_SOLID, caster->transform, run, error);
     }
     VSHI_TRY(vshi_asset_model(&assets->files, caster->path, run, &place->model, error));
-    unsigned char *chosen = NULL;
-    vsh_result result = VSH_OK;
-    VSHI_TRY_DONE(vshi_select(place->model, caster->path, &caster->objects, &chosen, error));
-    VSHI_TRY_DONE(leave_out_blended(scene, place->model, caster->path, run, chosen, error));
-    VSHI_TRY_DONE(place_chosen(place, place->model, chosen, find_unwrapped(assets, place->model), -1,
-                               scene->unit, caster->transform, error));
-done:
-    free(chosen);
-    return result;
+    return vshi_place_casting(place, scene, caster, vshi_asset_masks(&assets->files, place->model),
+                              find_unwrapped(assets, place->model), run, error);
 }
 
 static vsh_result settle_solidity(vsh_assets *assets, const vsh_scene *scene, const vsh_run *run,
@@ -227,7 +129,7 @@ static vsh_result settle_solidity(vsh_assets *assets, const vsh_scene *scene, co
         return result;
     }
     for (size_t i = 0; i < count; ++i) {
-        const asset_place *place = i < casters ? &assets->casters[i] : &assets->receivers[i - casters];
+        const vshi_asset_place *place = i < casters ? &assets->casters[i] : &assets->receivers[i - casters];
         lists[i] = (vshi_mesh_list){place->meshes, place->count, place->model,
                                     i < casters ? scene->casters[i].path : NULL};
     }
@@ -240,7 +142,7 @@ static vsh_result settle_solidity(vsh_assets *assets, const vsh_scene *scene, co
 static vsh_result check_receivers(vsh_assets *assets, const vsh_scene *scene, const vsh_run *run,
                                   vsh_error *error) {
     for (size_t i = 0; i < assets->receiver_count; ++i) {
-        asset_place *place = &assets->receivers[i];
+        vshi_asset_place *place = &assets->receivers[i];
         vsh_error why;
         const vsh_result result = vshi_mesh_set_create(place->meshes, place->count, &place->set, &why);
         if (result != VSH_OK) {
@@ -249,7 +151,8 @@ static vsh_result check_receivers(vsh_assets *assets, const vsh_scene *scene, co
         for (size_t m = 0; m < place->count; ++m) {
             place->meshes[m].checked = place->set.meshes[m].checked;
         }
-        if (place->unwrapped.page_count > 1) { /* what hangs together may be on several */
+        const bool shared = scene->receivers[i].atlas == VSH_ATLAS_SHARED;
+        if (shared && place->unwrapped.page_count > 1) { /* what hangs together may be on several */
             VSHI_TRY(vshi_mesh_set_solve(&place->set, run, error));
         }
     }
@@ -257,29 +160,17 @@ static vsh_result check_receivers(vsh_assets *assets, const vsh_scene *scene, co
 }
 
 /* Puts the parts of unwrapped meshes in their places. */
-static vsh_result unwrap(asset_place *place, const vsh_receiver *receiver, const vsh_run *run,
+static vsh_result unwrap(vshi_asset_place *place, const vsh_receiver *receiver, const vsh_run *run,
                          vsh_error *error) {
     int32_t needs = 0;
+    vshi_unwrapped *made = &place->unwrapped;
     VSHI_TRY(vsh_receiver_needs_unwrap(receiver, place->meshes, place->count, run, &needs, error));
     if (needs == 0) {
-        return VSH_OK;
+        return vshi_pages_as_they_are(receiver, place->meshes, place->count, made, error);
     }
-    vshi_unwrapped *made = &place->unwrapped;
-    VSHI_TRY(vshi_unwrap_receiver(receiver, place->meshes, place->count, run, made, error));
-    size_t *numbers = NULL;
-    VSHI_TRY(vshi_allocate((void **)&numbers, made->part_count, sizeof *numbers, "meshes", error));
-    for (size_t i = 0; i < made->part_count; ++i) {
-        numbers[i] = place->numbers[made->numbers[i]];
-    }
-    free(place->numbers);
-    place->numbers = numbers;
-    vsh_mesh *meshes = NULL;
-    VSHI_TRY(vshi_allocate((void **)&meshes, made->part_count, sizeof *meshes, "meshes", error));
-    memcpy(meshes, made->parts, made->part_count * sizeof *meshes);
-    free(place->meshes);
-    place->meshes = meshes;
-    place->count = made->part_count;
-    return VSH_OK;
+    VSHI_TRY(vshi_unwrap_receiver(receiver, place->model, place->meshes, place->numbers, place->count, run,
+                                  made, error));
+    return vshi_unwrapped_take(made, &place->meshes, &place->numbers, &place->count, error);
 }
 
 static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, size_t index, const vsh_run *run,
@@ -292,8 +183,9 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, siz
         vsh_heights_source source = {.name = receiver->path,
                                      .size = {receiver->extent[0], receiver->extent[1]},
                                      .height = receiver->relief};
-        return place_heights(assets, &assets->receivers[index], &source, VSH_HEIGHTS_SURFACE,
-                             receiver->transform, run, error);
+        vshi_asset_place *place = &assets->receivers[index];
+        VSHI_TRY(place_heights(assets, place, &source, VSH_HEIGHTS_SURFACE, receiver->transform, run, error));
+        return vshi_pages_as_they_are(receiver, place->meshes, place->count, &place->unwrapped, error);
     }
     const vsh_model *model = NULL;
     unsigned char *chosen = NULL;
@@ -302,8 +194,8 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, siz
     VSHI_TRY_DONE(vshi_select(model, receiver->path, &receiver->objects, &chosen, error));
     VSHI_TRY_DONE(vshi_select_uvs(model, receiver, run, chosen, error));
     assets->receivers[index].model = model;
-    VSHI_TRY_DONE(place_chosen(&assets->receivers[index], model, chosen, NULL, receiver->uv_set, scene->unit,
-                               receiver->transform, error));
+    VSHI_TRY_DONE(vshi_place_chosen(&assets->receivers[index], model, chosen, receiver->uv_set, scene->unit,
+                                    receiver->transform, error));
     result = unwrap(&assets->receivers[index], receiver, run, error);
 done:
     free(chosen);
@@ -344,6 +236,7 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
     VSHI_TRY_DONE(check_receivers(loaded, scene, &full, error));
     /* with the places in it, which the check asks for */
     VSHI_TRY_DONE(vshi_assets_check(loaded, scene, &full, error));
+    VSHI_TRY_DONE(vshi_kept_field_check(scene, loaded, &full, &loaded->prints, error));
     *assets = loaded;
     loaded = NULL;
 done:
@@ -351,7 +244,7 @@ done:
     return result;
 }
 
-static void free_places(asset_place *places, size_t count) {
+static void free_places(vshi_asset_place *places, size_t count) {
     for (size_t i = 0; i < count; ++i) {
         vsh_spheres_free(places[i].spheres);
         vsh_heights_free(places[i].heights);
@@ -370,6 +263,7 @@ void vsh_assets_free(vsh_assets *assets) {
     if (assets == NULL) {
         return;
     }
+    vshi_caster_prints_free(&assets->prints);
     vshi_mesh_set_free(&assets->set);
     free_places(assets->receivers, assets->receiver_count);
     free_places(assets->casters, assets->caster_count);
@@ -377,7 +271,7 @@ void vsh_assets_free(vsh_assets *assets) {
     free(assets);
 }
 
-static const vsh_mesh *placed_meshes(const asset_place *places, size_t count, size_t index,
+static const vsh_mesh *placed_meshes(const vshi_asset_place *places, size_t count, size_t index,
                                      size_t *mesh_count) {
     *mesh_count = index < count ? places[index].count : 0;
     return index < count ? places[index].meshes : NULL;
@@ -388,7 +282,7 @@ const vsh_mesh *vsh_assets_receiver(const vsh_assets *assets, size_t index, size
 }
 
 const vsh_model *vsh_assets_receiver_model(const vsh_assets *assets, size_t index, const size_t **numbers) {
-    const asset_place *place = index < assets->receiver_count ? &assets->receivers[index] : NULL;
+    const vshi_asset_place *place = index < assets->receiver_count ? &assets->receivers[index] : NULL;
     *numbers = place != NULL ? place->numbers : NULL;
     return place == NULL ? NULL : place->made != NULL ? place->made : place->model;
 }
@@ -398,7 +292,17 @@ size_t vsh_assets_receiver_pages(const vsh_assets *assets, size_t index) {
         return 0;
     }
     const vshi_unwrapped *made = &assets->receivers[index].unwrapped;
-    return made->atlas != NULL ? made->page_count : 1;
+    return made->page_begins != NULL ? made->page_count : 1;
+}
+
+int32_t vsh_assets_receiver_page_info_sized(const vsh_assets *assets, size_t index, size_t page,
+                                            vsh_receiver_page *info, size_t info_size) {
+    if (page >= vsh_assets_receiver_pages(assets, index)) {
+        return 0;
+    }
+    const vshi_unwrapped *made = &assets->receivers[index].unwrapped;
+    vshi_give(info, info_size, made->pages != NULL ? &made->pages[page] : &made->whole, sizeof *made->pages);
+    return 1;
 }
 
 const vsh_mesh *vsh_assets_receiver_page(const vsh_assets *assets, size_t index, size_t page, size_t *first,
@@ -407,7 +311,7 @@ const vsh_mesh *vsh_assets_receiver_page(const vsh_assets *assets, size_t index,
     if (page >= vsh_assets_receiver_pages(assets, index)) {
         return NULL;
     }
-    const asset_place *place = &assets->receivers[index];
+    const vshi_asset_place *place = &assets->receivers[index];
     const size_t *begins = place->unwrapped.page_begins;
     *first = begins != NULL ? begins[page] : 0;
     *mesh_count = (begins != NULL ? begins[page + 1] : place->count) - *first;
@@ -426,6 +330,10 @@ const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t
 
 const vsh_grid *vshi_assets_grid(const vsh_assets *assets, size_t index) {
     return index < assets->caster_count ? assets->casters[index].grid : NULL;
+}
+
+const vshi_caster_prints *vshi_assets_prints(const vsh_assets *assets) {
+    return &assets->prints;
 }
 
 const vsh_outline *vshi_assets_outline(const vsh_assets *assets, size_t index) {

@@ -77,6 +77,7 @@ static const vshi_key caster_keys[] = {
     {.name = "solid", .kind = VSHI_CUSTOM, .variants = MESH, .read = vshi_read_solid},
     {.name = "shell", .kind = VSHI_CUSTOM, .variants = MESH, .read = vshi_read_shell},
     {.name = "inward", .kind = VSHI_CUSTOM, .variants = MESH, .read = vshi_read_inward},
+    {.name = "one_sided", .kind = VSHI_CUSTOM, .variants = MESH, .read = vshi_read_one_sided},
     {.name = "sdf",
      .kind = VSHI_CUSTOM,
      .variants = SDF,

@@ -29,7 +29,7 @@ vsh_result vsh_scene_read(const char *path, const vsh_run *run, vsh_scene **scen
     vsh_result result = VSH_OK;
     VSHI_TRY_DONE(vshi_run_resolve(run, &full, error));
     VSHI_TRY_DONE(vshi_scene_text(path, &full, &text, &size, error));
-    VSHI_TRY_DONE(vshi_scene_parse(path, text, size, scene, error));
+    VSHI_TRY_DONE(vshi_scene_parse(path, text, size, &full, scene, error));
 done:
     free(text);
     return result;

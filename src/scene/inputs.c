@@ -91,6 +91,9 @@ vsh_result vshi_inputs_find(const vsh_scene *scene, const char *const *files, si
     for (size_t i = 0; scene != NULL && i < scene->receiver_count; ++i) {
         VSHI_TRY(add(inputs, scene->receivers[i].path, error));
     }
+    for (size_t i = 0; scene != NULL && i < scene->light_file_count; ++i) {
+        VSHI_TRY(add(inputs, scene->light_files[i].path, error));
+    }
     const size_t named = inputs->count;
     for (size_t i = 0; i < named; ++i) {
         if (strcasecmp(vshi_path_ending(inputs->paths[i]), "gltf") == 0) {

@@ -172,7 +172,7 @@ static vsh_result choose_all(vshi_json *reader, const vshi_value *root, vsh_scen
         memcpy(layers, scene->layers, scene->layer_count * sizeof *layers);
     }
     for (size_t l = 0; l < scene->light_count; ++l) {
-        const vshi_value light = vshi_item(&lights, l);
+        const vshi_value light = vshi_light_item(&lights, scene, l);
         if (vshi_member(&light, "layers", &names)) {
             VSHI_TRY(choose_layers(reader, &names, &scene->lights[l], scene, layers));
         }

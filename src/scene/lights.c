@@ -9,9 +9,11 @@
 #include <stdio.h>
 #include <string.h>
 
+/* Behind those of lights what stands in their place: a file of some (light_list.c). */
 static const char *type_name(int32_t i) {
     const vshi_light_type *type = vshi_light_type_of(i);
-    return type != NULL ? type->name : NULL;
+    const bool behind = type == NULL && i > 0 && vshi_light_type_of(i - 1) != NULL;
+    return type != NULL ? type->name : behind ? "file" : NULL;
 }
 
 /* Lights in a plane are discs. */

@@ -62,6 +62,20 @@ done:
     return result;
 }
 
+static void warn_one_sided(const vsh_caster *caster, const vsh_mesh *meshes, size_t count,
+                           const vsh_run *run) {
+    size_t one_sided = 0;
+    for (size_t m = 0; m < count; ++m) {
+        one_sided += meshes[m].one_sided != 0;
+    }
+    if (one_sided > 0) {
+        vshi_warn(run,
+                  "%s: %zu of %zu meshes are one-sided, and voxels cast to both sides: --method exact and "
+                  "--ao-method exact let light through their backs",
+                  caster->path, one_sided, count);
+    }
+}
+
 vsh_result vshi_scene_warn_lost(const vsh_scene *scene, const vsh_assets *assets,
                                 const vsh_scene_layer *layer, const vsh_field *field, const vsh_run *run,
                                 vsh_error *error) {
@@ -75,6 +89,7 @@ vsh_result vshi_scene_warn_lost(const vsh_scene *scene, const vsh_assets *assets
         if (count == 0 || caster->type != VSH_CASTER_MESH || !vshi_caster_in_layer(caster, layer)) {
             continue;
         }
+        warn_one_sided(caster, meshes, count, run);
         VSHI_TRY(look(caster, meshes, count, field, run, error));
     }
     return VSH_OK;

@@ -1,4 +1,4 @@
-/* The lights that a model's file has, as those of a scene. */
+/* The lights that a model, or its file, has, as those of a scene. */
 #include "base/error.h"
 #include "base/memory.h"
 #include "base/try.h"
@@ -93,6 +93,19 @@ vsh_result vsh_lights_from_model(const vsh_model *model, double angle, double ra
     *lights = made;
     *count = all;
     return VSH_OK;
+}
+
+vsh_result vsh_lights_read(const char *path, double angle, double radius, double unit, const vsh_run *run,
+                           vsh_light **lights, size_t *count, vsh_error *error) {
+    VSHI_NEEDS(lights);
+    *lights = NULL;
+    VSHI_NEEDS(count);
+    *count = 0;
+    vsh_model *model = NULL;
+    VSHI_TRY(vsh_model_read(path, run, &model, error));
+    const vsh_result result = vsh_lights_from_model(model, angle, radius, unit, lights, count, error);
+    vsh_model_free(model);
+    return result;
 }
 
 void vsh_lights_free(vsh_light *lights) {

@@ -6,6 +6,7 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
+#include "scene/kept_field.h"
 #include "shade/occluders.h"
 
 #include <math.h>
@@ -24,29 +25,28 @@ typedef struct making {
     vshi_occluders_own own;
     vsh_layer *layers; /* those that were made: copied in the end */
     vsh_occluder_parts parts;
+    vshi_caster_prints prints; /* where fields are a file's that the assets did not know of */
 } making;
 
 /* Reach for receivers in a box, or for points within a distance of the casters' box. */
-static double reach_of(const making *m, const vsh_grid *grid) {
+static double reach_of(const making *m, const vsh_grid_info *info) {
     const vsh_scene_occluders_options *o = &m->options;
     if (o->receivers_min != NULL) {
-        return vsh_scene_reach(m->scene, grid, o->receivers_min, o->receivers_max);
+        return vshi_scene_reach(m->scene, info, o->receivers_min, o->receivers_max);
     }
-    vsh_grid_info info;
-    vsh_grid_get_info(grid, &info);
     double diagonal = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
-        const double side = info.bounds_max[axis] - info.bounds_min[axis];
+        const double side = info->bounds_max[axis] - info->bounds_min[axis];
         diagonal += side * side;
     }
     diagonal = sqrt(diagonal);
     const double margin = o->within > 0.0 ? o->within : WITHIN * diagonal;
     double around_min[3], around_max[3];
     for (int axis = 0; axis < 3; ++axis) {
-        around_min[axis] = info.bounds_min[axis] - margin;
-        around_max[axis] = info.bounds_max[axis] + margin;
+        around_min[axis] = info->bounds_min[axis] - margin;
+        around_max[axis] = info->bounds_max[axis] + margin;
     }
-    const double reach = vsh_scene_reach(m->scene, grid, around_min, around_max);
+    const double reach = vshi_scene_reach(m->scene, info, around_min, around_max);
     /* the field's own default, where that is enough: a program that takes it gets the same bits */
     return reach > WITHIN * diagonal ? reach : vsh_field_options_default().reach;
 }
@@ -75,14 +75,63 @@ static vsh_result find_grid(making *m, const vsh_scene_layer *layer, int32_t res
     return result;
 }
 
-/* *field is NULL where there are no casters. */
-static vsh_result make_field(making *m, const vsh_scene_layer *layer, const vsh_triangles *triangles,
-                             vsh_field **field, vsh_error *error) {
+/* The field of a layer's casters, or (NULL) of those in none, whose level set is known; surfaces where rays
+ * pay for them. */
+static vsh_field_options options_of(const making *m, const vsh_scene_layer *layer,
+                                    const vsh_grid_info *voxels) {
+    vsh_field_options options = vsh_field_options_default();
+    options.reach = reach_of(m, voxels);
+    options.surface = pays(m, layer, voxels);
+    if (layer != NULL) {
+        options.reach *= fmax(1.0, layer->shade.softness); /* lights are as much wider */
+    }
+    return options;
+}
+
+/* Out of the scene's file. */
+static vsh_result take_field(making *m, const vsh_scene_layer *layer, int32_t resolution,
+                             vsh_grid_info *voxels, vsh_field **field, vsh_error *error) {
+    if (!vshi_layer_is_voxelised(m->scene, layer)) {
+        return VSH_OK;
+    }
+    const vshi_caster_prints *prints = vshi_assets_prints(m->assets);
+    if (prints->count != m->scene->caster_count) { /* they were loaded before the scene took a field */
+        if (m->prints.list == NULL) {
+            VSHI_TRY(vshi_caster_prints_make(m->scene, m->assets, &m->run, &m->prints, error));
+        }
+        prints = &m->prints;
+    }
+    size_t index;
+    VSHI_TRY(vshi_kept_field_find(m->scene, prints, layer, resolution, &index, voxels, error));
+    const vsh_field_options options = options_of(m, layer, voxels);
+    return vsh_field_file_field(m->scene->field, index, &options, &m->voxel, field, error);
+}
+
+/* Out of voxels that are made, or given. */
+static vsh_result create_field(making *m, const vsh_scene_layer *layer, int32_t resolution,
+                               vsh_grid_info *voxels, vsh_field **field, vsh_error *error) {
     const double start = vshi_seconds();
     const vsh_grid *grid;
     vsh_grid *made;
+    const vsh_result result = find_grid(m, layer, resolution, &grid, &made, error);
+    if (result != VSH_OK || grid == NULL) {
+        return result;
+    }
+    m->own.voxelize_s += vshi_seconds() - start;
+    vsh_grid_get_info(grid, voxels);
+    const vsh_field_options options = options_of(m, layer, voxels);
+    const vsh_result created = vsh_field_create(grid, &options, &m->voxel, field, error);
+    vsh_grid_free(made); /* the field does not need it */
+    return created;
+}
+
+/* *field is NULL where there are no casters. */
+static vsh_result make_field(making *m, const vsh_scene_layer *layer, const vsh_triangles *triangles,
+                             vsh_field **field, vsh_error *error) {
+    const double start = vshi_seconds(), voxelized = m->own.voxelize_s;
+    const bool given = layer == NULL && m->options.grid != NULL;
     int32_t resolution = VSH_RESOLUTION_NAMED;
-    if (m->options.voxels == 0 && (layer != NULL || m->options.grid == NULL)) {
+    if (m->options.voxels == 0 && !given) {
         resolution = vsh_scene_resolution(m->scene, m->assets, layer, m->options.points);
     }
     if (resolution == 0 && triangles != NULL) {
@@ -90,30 +139,20 @@ static vsh_result make_field(making *m, const vsh_scene_layer *layer, const vsh_
         return *field == NULL ? VSH_OK
                               : vshi_scene_warn_solidity(m->scene, m->assets, layer, &m->voxel, error);
     }
-    vsh_result result = find_grid(m, layer, resolution, &grid, &made, error);
-    if (result != VSH_OK || grid == NULL) {
-        return result;
-    }
-    const double voxelized = vshi_seconds();
     vsh_grid_info voxels;
-    vsh_grid_get_info(grid, &voxels);
-    m->own.grid_bytes += voxels.bytes;
-    vsh_field_options options = vsh_field_options_default();
-    options.reach = reach_of(m, grid);
-    options.surface = pays(m, layer, &voxels);
-    if (layer != NULL) {
-        options.reach *= fmax(1.0, layer->shade.softness); /* lights are as much wider */
+    if (m->scene->field != NULL && !given) {
+        VSHI_TRY(take_field(m, layer, resolution, &voxels, field, error));
+    } else {
+        VSHI_TRY(create_field(m, layer, resolution, &voxels, field, error));
     }
-    result = vsh_field_create(grid, &options, &m->voxel, field, error);
-    vsh_grid_free(made); /* the field does not need it */
-    if (result != VSH_OK) {
-        return result;
+    if (*field == NULL) {
+        return VSH_OK;
     }
     vsh_field_info info;
     vsh_field_get_info(*field, &info);
+    m->own.grid_bytes += voxels.bytes;
     m->voxel.memory_held += info.bytes;
-    m->own.voxelize_s += voxelized - start;
-    m->own.field_s += vshi_seconds() - voxelized;
+    m->own.field_s += vshi_seconds() - start - (m->own.voxelize_s - voxelized);
     vsh_run run = m->run;
     run.warning = m->voxel.warning;
     return vshi_scene_warn_lost(m->scene, m->assets, layer, *field, &run, error);
@@ -280,6 +319,7 @@ vsh_result vsh_scene_occluders(const vsh_scene *scene, const vsh_assets *assets,
     } else {
         vshi_occluders_own_free(&m.own);
     }
+    vshi_caster_prints_free(&m.prints);
     free(m.layers);
     return result;
 }

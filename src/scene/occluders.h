@@ -29,4 +29,8 @@ bool vshi_scene_method_is(const vsh_scene *scene, const vsh_scene_layer *layer, 
  * point that is shaded. */
 double vshi_scene_field_rays(const vsh_scene *scene, const vsh_scene_layer *layer);
 
+/* vsh_scene_reach() of a level set that is known by what it told of itself. */
+double vshi_scene_reach(const vsh_scene *scene, const vsh_grid_info *info, const double receivers_min[3],
+                        const double receivers_max[3]);
+
 #endif

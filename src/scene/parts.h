@@ -15,6 +15,12 @@ vsh_result vshi_read_layer(vshi_json *reader, const vshi_value *value, void *lay
 vsh_result vshi_read_light(vshi_json *reader, const vshi_value *value, void *light);
 vsh_result vshi_read_receiver(vshi_json *reader, const vshi_value *value, void *receiver);
 
+/* Reads the list of lights into a scene whose unit is known, and the files that it names, as `run` says; with
+ * NULL these are not read, and their lights missing. Fails where two lights have one name. */
+vsh_result vshi_read_lights(vshi_json *reader, const vshi_value *list, const vsh_run *run, vsh_scene *scene);
+/* The item of that list which light `light` of the scene is of. */
+vshi_value vshi_light_item(const vshi_value *list, const vsh_scene *scene, size_t light);
+
 /* Fails where casters and lights name layers, or layers lights, that the scene does not have; layers that a
  * light does not name where it names some cast for it no more. */
 vsh_result vshi_check_layers(vshi_json *reader, const vshi_value *root, vsh_scene *scene);
@@ -30,6 +36,8 @@ vsh_result vshi_read_except(vshi_json *reader, const vshi_value *value, void *se
 vsh_result vshi_read_solid(vshi_json *reader, const vshi_value *value, void *caster);
 vsh_result vshi_read_shell(vshi_json *reader, const vshi_value *value, void *caster);
 vsh_result vshi_read_inward(vshi_json *reader, const vshi_value *value, void *caster);
+/* Patterns of a caster's meshes that are one-sided. */
+vsh_result vshi_read_one_sided(vshi_json *reader, const vshi_value *value, void *caster);
 const char *vshi_color_space_key(int32_t i); /* names of color_space; NULL behind the last */
 vsh_result vshi_read_bits(vshi_json *reader, const vshi_value *value, void *bits); /* int32_t */
 

@@ -53,6 +53,36 @@ const char *vsh_receiver_unwrap_name(int32_t unwrap) {
     return vshi_name_at(unwrap_names, unwrap);
 }
 
+static const char *const atlas_table[] = {[VSH_ATLAS_SHARED] = "shared", [VSH_ATLAS_OBJECTS] = "objects"};
+static const vshi_names atlas_names = VSHI_NAMES(atlas_table);
+
+int32_t vsh_atlas_kind(const char *name) {
+    return vshi_name_find(atlas_names, name);
+}
+
+const char *vsh_atlas_kind_name(int32_t atlas) {
+    return vshi_name_at(atlas_names, atlas);
+}
+
+/* {"PATTERN": factor, …}, in the order of the file. */
+static vsh_result read_density(vshi_json *reader, const vshi_value *value, void *member) {
+    static const vshi_key key = {.kind = VSHI_NUMBER, .highest = VSHI_LARGEST, .flags = VSHI_ABOVE};
+    vsh_receiver *receiver = member;
+    VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
+    vsh_density_rule *rules;
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&rules, json_object_size(value->json), sizeof *rules,
+                                "patterns"));
+    receiver->density = rules;
+    for (void *at = json_object_iter(value->json); at != NULL; at = json_object_iter_next(value->json, at)) {
+        vshi_value factor;
+        vsh_density_rule *rule = &rules[receiver->density_count++];
+        VSHI_TRY(vshi_json_copy(reader, 0, json_object_iter_key(at), &rule->pattern));
+        vshi_member(value, json_object_iter_key(at), &factor);
+        VSHI_TRY(vshi_read_value(reader, &factor, &key, &rule->factor));
+    }
+    return VSH_OK;
+}
+
 /* Texels, or "auto". */
 static vsh_result read_padding(vshi_json *reader, const vshi_value *value, void *member) {
     const vshi_key key = {.kind = VSHI_INTEGER, .highest = 4096.0};
@@ -162,6 +192,30 @@ static const vshi_key receiver_keys[] = {
                 .group = VSH_SETTINGS_TEXELS,
                 .help = "images of --size that may be filled with UVs that are made: OUT.0.exr, OUT.1.exr, …",
                 .otherwise = "1; with --texels-per-unit as many as it takes"}},
+    {.name = "density", .kind = VSHI_CUSTOM, .variants = MESH, .offset = 0, .read = read_density},
+    {.name = "atlas",
+     .kind = VSHI_NAME,
+     .variants = MESH,
+     .offset = offsetof(vsh_receiver, atlas),
+     .name_of = vsh_atlas_kind_name,
+     .option = {.name = "atlas",
+                .value = "WHAT",
+                .group = VSH_SETTINGS_TEXELS,
+                .help =
+                    "objects: an image for each object, OUT.NAME.exr, whose UVs, where they are made, are "
+                    "packed alone; shared: all lie on the same"}},
+    {.name = "max_size",
+     .kind = VSHI_INTEGER,
+     .variants = MESH,
+     .offset = offsetof(vsh_receiver, max_size),
+     .lowest = 1.0,
+     .highest = VSH_MAX_LIGHTMAP_SIZE,
+     .option = {.name = "max-size",
+                .value = "N",
+                .group = VSH_SETTINGS_TEXELS,
+                .help = "with --texels-per-unit, instead of --size: images are as small as what lies on them "
+                        "allows, their sides powers of two up to N",
+                .otherwise = "--size is that of all"}},
     {.name = "size",
      .kind = VSHI_CUSTOM,
      .read = read_size,

@@ -4,14 +4,9 @@
 #include "mesh/mesh_set.h"
 #include "scene/assets.h"
 #include "scene/occluders.h"
+#include "scene/recipe.h"
 
 #include <math.h>
-
-static bool are_named(const vsh_scene *scene, const vsh_scene_layer *layer) {
-    return scene->voxels_named != 0 || scene->grid.voxel_size > 0.0 ||
-           scene->grid.resolution != vsh_grid_options_default().resolution ||
-           (layer != NULL && (layer->voxel_size > 0.0 || layer->resolution > 0));
-}
 
 /* Lights that a layer's casters cast for. */
 static size_t lights_of(const vsh_scene *scene, const vsh_scene_layer *layer) {
@@ -60,7 +55,7 @@ int32_t vsh_scene_resolution(const vsh_scene *scene, const vsh_assets *assets, c
                              double points) {
     VSHI_FLOATS;
     const int32_t otherwise = vsh_grid_options_default().resolution;
-    if (scene == NULL || assets == NULL || are_named(scene, layer)) {
+    if (scene == NULL || assets == NULL || vshi_scene_voxels_named(scene, layer)) {
         return VSH_RESOLUTION_NAMED;
     }
     if (vsh_scene_marches(scene, layer) != 0) {

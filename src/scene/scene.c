@@ -5,16 +5,12 @@
 #include "scene/parts.h"
 #include "json/keys.h"
 
-#include <vdbshade/image.h>
 #include <vdbshade/settings.h>
 
 #include <stdlib.h>
 #include <string.h>
 
-enum {
-    MAX_ITEMS = 65536,
-    MAX_LIGHTS = VSH_MAX_CHANNELS - 5, /* ao, A and three of irradiance must fit into the image too */
-};
+enum { MAX_ITEMS = 65536 };
 
 /* What vsh_scene_free() gets is the first member. */
 typedef struct owner {
@@ -38,15 +34,6 @@ static vsh_result read_layers(vshi_json *reader, const vshi_value *value, void *
                             &scene->layer_count));
     scene->layers = items;
     return VSH_OK;
-}
-
-static vsh_result read_lights(vshi_json *reader, const vshi_value *value, void *member) {
-    vsh_scene *scene = member;
-    void *items;
-    VSHI_TRY(vshi_read_list(reader, value, 0, MAX_LIGHTS, sizeof *scene->lights, vshi_read_light, &items,
-                            &scene->light_count));
-    scene->lights = items;
-    return vshi_check_light_names(reader, value, scene->lights, scene->light_count);
 }
 
 static int by_output(const void *a, const void *b) {
@@ -244,7 +231,7 @@ static const vshi_key scene_keys[] = {
                 .group = VSH_SETTINGS_CASTERS,
                 .help = "thickness of sheets and of walls behind rooms' faces"}},
     {.name = "layers", .kind = VSHI_CUSTOM, .read = read_layers},
-    {.name = "lights", .kind = VSHI_CUSTOM, .read = read_lights},
+    {.name = "lights", .kind = VSHI_LATER},
     {.name = "ao", .kind = VSHI_CUSTOM, .read = read_ao},
     {.name = "irradiance",
      .kind = VSHI_BOOL,
@@ -387,21 +374,25 @@ static const vshi_key scene_keys[] = {
      .offset = offsetof(vsh_scene, cast_blended),
      .option = {.name = "cast-blended",
                 .group = VSH_SETTINGS_CASTERS,
-                .help = "meshes of blended materials (glass) cast too, whole"}},
+                .help = "meshes of blended materials (glass) cast too"}},
     {.name = "receivers", .kind = VSHI_CUSTOM, .read = read_receivers},
 };
 const vshi_table vshi_scene_table = VSHI_TABLE(scene_keys);
 
-static vsh_result read_scene(vshi_json *reader, json_t *json, vsh_scene *scene) {
+static vsh_result read_scene(vshi_json *reader, json_t *json, const vsh_run *run, vsh_scene *scene) {
     const vshi_value root = {NULL, NULL, 0, 0, json};
+    vshi_value lights;
     *scene = vsh_scene_default();
     VSHI_TRY(vshi_read_object(reader, &root, &vshi_scene_table, 1, "a scene", scene));
     VSHI_TRY(vshi_reject_both(reader, &root, "voxel_size", "resolution"));
+    if (vshi_member(&root, "lights", &lights)) { /* after the unit of files' numbers */
+        VSHI_TRY(vshi_read_lights(reader, &lights, run, scene));
+    }
     return vshi_check_layers(reader, &root, scene);
 }
 
-vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, vsh_scene **scene,
-                            vsh_error *error) {
+vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, const vsh_run *run,
+                            vsh_scene **scene, vsh_error *error) {
     *scene = NULL;
     vshi_json reader = {path, text, size, NULL, error};
     json_t *json = NULL;
@@ -412,7 +403,7 @@ vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, vsh
         result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
         goto done;
     }
-    result = read_scene(&reader, json, &made->scene);
+    result = read_scene(&reader, json, run, &made->scene);
     made->blocks = reader.blocks;
     if (result != VSH_OK) {
         vsh_scene_free(&made->scene);

@@ -13,6 +13,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#define OF_MATERIAL "material:" /* begins a pattern of materials */
+
 /* --- in scene files */
 
 static vsh_result read_patterns(vshi_json *reader, const vshi_value *value, const char *const **patterns,
@@ -72,6 +74,11 @@ vsh_result vshi_read_inward(vshi_json *reader, const vshi_value *value, void *ca
     return read_rules(reader, value, caster, VSH_SOLIDITY_INWARD);
 }
 
+vsh_result vshi_read_one_sided(vshi_json *reader, const vshi_value *value, void *member) {
+    vsh_caster *caster = member;
+    return read_patterns(reader, value, &caster->one_sided, &caster->one_sided_count);
+}
+
 /* --- in a model */
 
 /* A name as messages tell it: that of the object. */
@@ -80,15 +87,28 @@ static const char *name_of(const vsh_mesh *mesh) {
     return name != NULL ? name : "";
 }
 
+/* That of the object of mesh `index`; of `materials`, that of material `index`. */
+static const char *name_at(const vsh_model *model, size_t index, bool materials) {
+    if (materials) {
+        const char *name = vsh_model_get_material(model, index).name;
+        return name != NULL ? name : "";
+    }
+    const vsh_mesh mesh = vsh_model_mesh(model, index, -1);
+    return name_of(&mesh);
+}
+
+static size_t count_of(const vsh_model *model, bool materials) {
+    return materials ? vsh_model_material_count(model) : vsh_model_mesh_count(model);
+}
+
 /* "'floor', 'wall' and 12 more", without those that follow one of the same name. */
-static void list_names(const vsh_model *model, char *text, size_t capacity) {
+static void list_names(const vsh_model *model, bool materials, char *text, size_t capacity) {
     enum { LISTED = 8, ROOM = 40 };
-    const size_t count = vsh_model_mesh_count(model);
+    const size_t count = count_of(model, materials);
     size_t used = 0, listed = 0, more = 0;
     const char *last = NULL;
     for (size_t i = 0; i < count; ++i) {
-        const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
-        const char *name = name_of(&mesh);
+        const char *name = name_at(model, i, materials);
         if (last != NULL && strcmp(last, name) == 0) {
             continue;
         }
@@ -119,22 +139,24 @@ static void fold(const char *from, bool pattern, char to[64]) {
     to[length] = '\0';
 }
 
-/* The name that a pattern which matches nothing comes nearest to, or NULL. */
-static const char *nearest_name(const vsh_model *model, const char *pattern) {
+/* The name that a pattern which matches nothing comes nearest to, or NULL: of an object (materials 0), then
+ * of a material. */
+static const char *nearest_name(const vsh_model *model, int materials, const char *pattern) {
     char wanted[64], have[64];
     fold(pattern, true, wanted);
     const char *nearest = NULL;
     size_t least = SIZE_MAX;
-    for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
-        const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
-        fold(name_of(&mesh), false, have);
-        size_t distance = vshi_edit_distance(wanted, have);
-        if (wanted[0] != '\0' && strstr(have, wanted) != NULL) {
-            distance = 0;
-        }
-        if (distance < least) {
-            least = distance;
-            nearest = name_of(&mesh);
+    for (; materials < 2; ++materials) {
+        for (size_t i = 0; i < count_of(model, materials != 0); ++i) {
+            fold(name_at(model, i, materials != 0), false, have);
+            size_t distance = vshi_edit_distance(wanted, have);
+            if (wanted[0] != '\0' && strstr(have, wanted) != NULL) {
+                distance = 0;
+            }
+            if (distance < least) {
+                least = distance;
+                nearest = name_at(model, i, materials != 0);
+            }
         }
     }
     return nearest != NULL && wanted[0] != '\0' && vshi_is_near(least, wanted) ? nearest : NULL;
@@ -142,30 +164,47 @@ static const char *nearest_name(const vsh_model *model, const char *pattern) {
 
 vsh_result vshi_fail_unmatched(const vsh_model *model, const char *path, const char *pattern,
                                vsh_error *error) {
-    char names[600] = "";
-    list_names(model, names, sizeof names);
-    const char *near = nearest_name(model, pattern);
-    return vshi_fail(error, VSH_ERROR_INPUT, "%s: no object is named '%.100s'%s%.100s%s there are %s", path,
-                     pattern, near != NULL ? "; did you mean '" : ";", near != NULL ? near : "",
-                     near != NULL ? "'?" : "", names);
+    char names[600] = "", materials[300] = "";
+    list_names(model, false, names, sizeof names);
+    list_names(model, true, materials, sizeof materials);
+    const size_t prefix =
+        strncmp(pattern, OF_MATERIAL, sizeof OF_MATERIAL - 1) == 0 ? sizeof OF_MATERIAL - 1 : 0;
+    const char *near = nearest_name(model, prefix > 0, pattern + prefix);
+    return vshi_fail(error, VSH_ERROR_INPUT, "%s: no %s is named '%.100s'%s%.100s%s there are %s%s%s", path,
+                     prefix > 0 ? "material" : "object", pattern + prefix,
+                     near != NULL ? "; did you mean '" : ";", near != NULL ? near : "",
+                     near != NULL ? "'?" : "", names, materials[0] != '\0' ? ", and materials " : "",
+                     materials);
 }
 
-/* Sets those that a pattern matches to `value`. */
+/* Sets those that a pattern matches by the name of their object, or of their `material`, to `value`; whether
+ * there are any. */
+static bool apply_one(const vsh_model *model, const char *pattern, bool material, unsigned char value,
+                      unsigned char *chosen) {
+    bool matched = false;
+    for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
+        vsh_mesh mesh = vsh_model_mesh(model, i, -1);
+        if (material) {
+            mesh.name = mesh.material_name;
+            mesh.object_name = NULL;
+        }
+        if (vsh_mesh_matches(&mesh, pattern)) {
+            chosen[i] = value;
+            matched = true;
+        }
+    }
+    return matched;
+}
+
+/* Sets those that a pattern matches to `value`: objects, or where none is called so, materials. */
 static vsh_result apply(const vsh_model *model, const char *path, const char *const *patterns, size_t count,
                         unsigned char value, unsigned char *chosen, vsh_error *error) {
     for (size_t p = 0; p < count; ++p) {
         if (patterns[p] == NULL) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: pattern %zu of objects is NULL", path, p);
         }
-        bool matched = false;
-        for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
-            const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
-            if (vsh_mesh_matches(&mesh, patterns[p])) {
-                chosen[i] = value;
-                matched = true;
-            }
-        }
-        if (!matched) {
+        if (!apply_one(model, patterns[p], false, value, chosen) &&
+            !apply_one(model, patterns[p], true, value, chosen)) {
             return vshi_fail_unmatched(model, path, patterns[p], error);
         }
     }
@@ -184,6 +223,12 @@ vsh_result vshi_select(const vsh_model *model, const char *path, const vsh_selec
                          "%s: no object is left: all that are chosen are excepted, too", path);
     }
     return VSH_OK;
+}
+
+vsh_result vshi_select_some(const vsh_model *model, const char *path, const char *const *patterns,
+                            size_t count, unsigned char **chosen, vsh_error *error) {
+    VSHI_TRY(vshi_allocate((void **)chosen, vsh_model_mesh_count(model), 1, "objects", error));
+    return apply(model, path, patterns, count, 1, *chosen, error);
 }
 
 static vsh_result fail_without_uvs(const vsh_receiver *receiver, const char *mesh, int32_t sets,

@@ -10,6 +10,11 @@
 vsh_result vshi_select(const vsh_model *model, const char *path, const vsh_selection *selection,
                        unsigned char **chosen, vsh_error *error);
 
+/* The same of a list of patterns: *chosen is 1 for each mesh that one of them matches, of none of them for
+ * no mesh. */
+vsh_result vshi_select_some(const vsh_model *model, const char *path, const char *const *patterns,
+                            size_t count, unsigned char **chosen, vsh_error *error);
+
 /* VSH_ERROR_INPUT, saying what a pattern may have meant that matches none of a model's meshes. */
 vsh_result vshi_fail_unmatched(const vsh_model *model, const char *path, const char *pattern,
                                vsh_error *error);

@@ -11,8 +11,9 @@
 static bool apply_rule(const vsh_solidity_rule *rule, const vshi_mesh_list *list) {
     bool matched = false;
     for (size_t i = 0; i < list->count; ++i) {
-        if (vsh_mesh_matches(&list->meshes[i], rule->pattern)) {
-            list->meshes[i].solidity = rule->solidity;
+        vsh_mesh *mesh = &list->meshes[i];
+        if (vsh_mesh_matches(mesh, rule->pattern)) {
+            mesh->solidity = mesh->mask != NULL ? VSH_SOLIDITY_SHELL : rule->solidity;
             matched = true;
         }
     }

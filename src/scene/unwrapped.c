@@ -3,9 +3,12 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
+#include "mesh/mesh.h"
+#include "scene/select.h"
 
 #include <vdbshade/lit.h>
 
+#include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
@@ -65,16 +68,20 @@ vsh_result vsh_receiver_needs_unwrap(const vsh_receiver *receiver, const vsh_mes
     if (mode != VSH_RECEIVER_UNWRAP_AUTO) {
         return VSH_OK;
     }
-    *needs = receiver->texels_per_unit > 0.0 || receiver->pages > 0;
+    *needs = receiver->texels_per_unit > 0.0 || receiver->pages > 0 || receiver->max_size > 0 ||
+             receiver->density_count > 0;
     for (size_t i = 0; i < count; ++i) {
         *needs = *needs || meshes[i].uvs == NULL;
     }
     if (*needs) {
         return VSH_OK;
     }
-    bool usable = false;
-    VSHI_TRY(are_usable(receiver, meshes, count, &full, &usable, error));
-    *needs = !usable;
+    for (size_t first = 0, size; first < count && *needs == 0; first += size) {
+        bool usable = false;
+        size = receiver->atlas == VSH_ATLAS_OBJECTS ? vshi_mesh_object_size(meshes, first, count) : count;
+        VSHI_TRY(are_usable(receiver, meshes + first, size, &full, &usable, error));
+        *needs = !usable;
+    }
     return VSH_OK;
 }
 
@@ -229,30 +236,155 @@ static vsh_result cut(cutting *c, const vsh_run *run, vsh_error *error) {
     return VSH_OK;
 }
 
-vsh_result vshi_unwrap_receiver(const vsh_receiver *receiver, const vsh_mesh *meshes, size_t count,
-                                const vsh_run *run, vshi_unwrapped *unwrapped, vsh_error *error) {
+static const char *object_of(const vsh_mesh *mesh) {
+    const char *name = mesh->object_name != NULL ? mesh->object_name : mesh->name;
+    return name != NULL ? name : "";
+}
+
+vsh_result vshi_pages_as_they_are(const vsh_receiver *receiver, const vsh_mesh *meshes, size_t count,
+                                  vshi_unwrapped *unwrapped, vsh_error *error) {
+    unwrapped->whole = (vsh_receiver_page){receiver->width, receiver->height, NULL};
+    if (receiver->atlas != VSH_ATLAS_OBJECTS) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_allocate((void **)&unwrapped->page_begins, count + 1, sizeof *unwrapped->page_begins,
+                           "pages", error));
+    VSHI_TRY(vshi_allocate((void **)&unwrapped->pages, count, sizeof *unwrapped->pages, "pages", error));
+    for (size_t first = 0; first < count; first += vshi_mesh_object_size(meshes, first, count)) {
+        unwrapped->pages[unwrapped->page_count] = unwrapped->whole;
+        unwrapped->pages[unwrapped->page_count].object = object_of(&meshes[first]);
+        unwrapped->page_begins[unwrapped->page_count++] = first;
+    }
+    unwrapped->page_begins[unwrapped->page_count] = count;
+    return VSH_OK;
+}
+
+static vsh_result list_pages(const vsh_receiver *receiver, const vsh_mesh *meshes, vshi_unwrapped *made,
+                             vsh_error *error) {
+    VSHI_TRY(vshi_allocate((void **)&made->pages, made->page_count, sizeof *made->pages, "pages", error));
+    for (size_t i = 0; i < made->page_count; ++i) {
+        const vsh_atlas_page page = vsh_atlas_page_view(made->atlas, i);
+        const bool own = receiver->atlas == VSH_ATLAS_OBJECTS;
+        made->pages[i] =
+            (vsh_receiver_page){page.width, page.height, own ? object_of(&meshes[page.first_mesh]) : NULL};
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_model_densities(const vsh_model *model, const char *path, const vsh_density_rule *rules,
+                               size_t count, double *density, vsh_error *error) {
+    VSHI_NEEDS(model);
+    VSHI_NEEDS(path);
+    VSHI_NEEDS(density);
+    VSHI_NEEDS_OF(count, rules);
+    const size_t meshes = vsh_model_mesh_count(model);
+    for (size_t m = 0; m < meshes; ++m) {
+        density[m] = 1.0;
+    }
+    for (size_t r = 0; r < count; ++r) {
+        const vsh_density_rule *rule = &rules[r];
+        if (rule->pattern == NULL || !(rule->factor > 0.0) || !isfinite(rule->factor)) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                             "%s: density '%.100s' is %g, expected a pattern and a finite number above 0",
+                             path, rule->pattern != NULL ? rule->pattern : "", rule->factor);
+        }
+        bool matched = false;
+        for (size_t m = 0; m < meshes; ++m) {
+            const vsh_mesh mesh = vsh_model_mesh(model, m, -1);
+            if (vsh_mesh_matches(&mesh, rule->pattern) != 0) {
+                density[m] = rule->factor;
+                matched = true;
+            }
+        }
+        if (!matched) {
+            return vshi_fail_unmatched(model, path, rule->pattern, error);
+        }
+    }
+    return VSH_OK;
+}
+
+/* Factors of the density of a receiver's meshes; NULL: all are 1. To be freed. */
+static vsh_result list_densities(const vsh_receiver *receiver, const vsh_model *model, const size_t *numbers,
+                                 size_t count, double **density, vsh_error *error) {
+    double *all = NULL;
+    vsh_result result;
+    *density = NULL;
+    if (receiver->density_count == 0) {
+        return VSH_OK;
+    }
+    VSHI_TRY_DONE(vshi_allocate((void **)&all, vsh_model_mesh_count(model), sizeof *all, "densities", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)density, count, sizeof **density, "densities", error));
+    VSHI_TRY_DONE(
+        vsh_model_densities(model, receiver->path, receiver->density, receiver->density_count, all, error));
+    for (size_t m = 0; m < count; ++m) {
+        (*density)[m] = all[numbers[m]];
+    }
+done:
+    free(all);
+    return result;
+}
+
+vsh_result vshi_unwrap_receiver(const vsh_receiver *receiver, const vsh_model *model, const vsh_mesh *meshes,
+                                const size_t *numbers, size_t count, const vsh_run *run,
+                                vshi_unwrapped *unwrapped, vsh_error *error) {
     *unwrapped = (vshi_unwrapped){NULL};
     vsh_unwrap_options options = vsh_unwrap_options_default();
-    options.width = receiver->width;
-    options.height = receiver->height;
+    options.width = receiver->max_size > 0 ? receiver->max_size : receiver->width;
+    options.height = receiver->max_size > 0 ? receiver->max_size : receiver->height;
+    options.fit_pages = receiver->max_size > 0;
+    options.atlas = receiver->atlas;
     options.padding =
         receiver->padding == VSH_PADDING_AUTO ? vsh_unwrap_options_default().padding : receiver->padding;
     options.texels_per_unit = receiver->texels_per_unit;
-    options.max_pages = receiver->pages > 0               ? receiver->pages
-                        : receiver->texels_per_unit > 0.0 ? VSH_MAX_PAGES
-                                                          : 1;
+    options.max_pages = receiver->pages > 0 ? receiver->pages
+                        : receiver->texels_per_unit > 0.0 && receiver->atlas == VSH_ATLAS_SHARED
+                            ? VSH_MAX_PAGES
+                            : 1;
     options.keep_uvs =
         vshi_receiver_unwrap(receiver) == VSH_RECEIVER_UNWRAP_ALWAYS ? VSH_UNWRAP_ALWAYS : VSH_UNWRAP_KEEP;
+    if (receiver->max_size > 0 && receiver->texels_per_unit == 0.0) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "%s: a largest size (max_size) is for a density (texels_per_unit): without one, any "
+                         "size is filled",
+                         receiver->path);
+    }
+    if (receiver->pages > 1 && receiver->atlas == VSH_ATLAS_OBJECTS) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %d pages: of an atlas of objects each has one",
+                         receiver->path, receiver->pages);
+    }
     cutting c = {.meshes = meshes, .count = count, .made = unwrapped};
     vsh_error why;
-    vsh_result result = vsh_unwrap(meshes, count, &options, run, &unwrapped->atlas, &why);
-    if (result != VSH_OK) {
-        return vshi_fail(error, result, "%s: %s", receiver->path, why.message);
+    double *density = NULL;
+    vsh_result result = list_densities(receiver, model, numbers, count, &density, error);
+    if (result == VSH_OK) {
+        options.density = density;
+        result = vsh_unwrap(meshes, count, &options, run, &unwrapped->atlas, &why);
+        result = result == VSH_OK ? VSH_OK : vshi_fail(error, result, "%s: %s", receiver->path, why.message);
     }
+    free(density);
+    VSHI_TRY(result);
     c.charts = vsh_atlas_charts(unwrapped->atlas);
     result = cut(&c, run, error);
     free(c.on_page);
-    return result;
+    return result == VSH_OK ? list_pages(receiver, meshes, unwrapped, error) : result;
+}
+
+vsh_result vshi_unwrapped_take(const vshi_unwrapped *made, vsh_mesh **meshes, size_t **numbers, size_t *count,
+                               vsh_error *error) {
+    size_t *of_parts = NULL;
+    vsh_mesh *parts = NULL;
+    VSHI_TRY(vshi_allocate((void **)&of_parts, made->part_count, sizeof *of_parts, "meshes", error));
+    for (size_t i = 0; i < made->part_count; ++i) {
+        of_parts[i] = (*numbers)[made->numbers[i]];
+    }
+    free(*numbers);
+    *numbers = of_parts;
+    VSHI_TRY(vshi_allocate((void **)&parts, made->part_count, sizeof *parts, "meshes", error));
+    memcpy(parts, made->parts, made->part_count * sizeof *parts);
+    free(*meshes);
+    *meshes = parts;
+    *count = made->part_count;
+    return VSH_OK;
 }
 
 void vshi_unwrapped_free(vshi_unwrapped *unwrapped) {
@@ -260,6 +392,7 @@ void vshi_unwrapped_free(vshi_unwrapped *unwrapped) {
         free(unwrapped->arrays[i]);
     }
     free(unwrapped->arrays);
+    free(unwrapped->pages);
     free(unwrapped->page_begins);
     free(unwrapped->numbers);
     free(unwrapped->parts);

@@ -143,9 +143,9 @@ static void run_piece(void *user, size_t piece, size_t next) {
 vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows *rows, size_t grain,
                              vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error) {
     const size_t all[2] = {0, count};
-    const vshi_point_rows one = {1, all, 0, 1};
+    const vshi_point_rows one = {1, all, 0, 1, false};
     rows = rows != NULL ? rows : &one;
-    size_t few[2] = {0, 0}, *before = few;
+    size_t few[2] = {0, 0}, *before = few, left_out = 0;
     void *memory = NULL;
     if (rows->count > 1) {
         const vsh_result result =
@@ -156,8 +156,12 @@ vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows 
         before = memory;
     }
     for (size_t row = 0; row < rows->count; ++row) {
-        before[row + 1] = before[row] + (rows->start[row + 1] - rows->start[row] + grain - 1) / grain;
+        const size_t points = rows->start[row + 1] - rows->start[row];
+        const bool skipped = rows->only && (row < rows->first || row >= rows->last);
+        before[row + 1] = before[row] + (skipped ? 0 : (points + grain - 1) / grain);
+        left_out += skipped ? points : 0;
     }
+    vshi_job_advance(job, left_out);
     shade_run pieces = {.fn = fn, .task = task, .job = job, .grain = grain, .rows = rows, .pieces = before};
     const vsh_result result = vshi_parallel_for(job, before[rows->count], 1, 0, run_piece, &pieces, error);
     free(memory);

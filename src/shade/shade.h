@@ -48,6 +48,7 @@ typedef struct vshi_point_rows {
     size_t count;        /* of the rows, at least 1 */
     const size_t *start; /* [count + 1]: first point of each row, from 0 to the number of points */
     size_t first, last;  /* rows first … last - 1 are counted in the statistics */
+    bool only;           /* and the others are not worked on at all */
 } vshi_point_rows;
 
 /* Runs fn over `count` points in pieces of `grain`, as a part of a job whose units are points. `rows` may be

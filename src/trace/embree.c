@@ -1,4 +1,4 @@
-#include "trace/embree_scene.h"
+#include "trace/embree_mask.h"
 
 #include "base/floats.h"
 #include "base/job.h"
@@ -201,6 +201,7 @@ static bool attach(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh
                                               3 * sizeof(float), meshes[mesh].vertex_count);
     uint32_t *indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                                 3 * sizeof(uint32_t), end - begin);
+    vshi_sieve_attach(triangles, mesh, geometry);
     if (vertices != NULL && indices != NULL) {
         memcpy(vertices, sheet->vertices + 3 * first_vertex, meshes[mesh].vertex_count * 3 * sizeof(float));
         for (size_t i = 0; i < 3 * (end - begin); ++i) {
@@ -355,6 +356,7 @@ vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const
     VSHI_TRY_DONE(vshi_check_limit(&full, bytes, "triangles", error));
     VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, "triangles", error));
     VSHI_TRY_DONE(vshi_mesh_set_solve(&set, &full, error));
+    VSHI_TRY_DONE(vshi_sieves_create(made, set.meshes, set.count, &full, bytes, error));
     made->limit = full.memory_limit;
     measure(made, set.meshes, set.count);
     job = vshi_job_begin(&full, "triangles", 1);
@@ -384,6 +386,7 @@ void vsh_triangles_free(vsh_triangles *triangles) {
     if (triangles->device != NULL) {
         rtcReleaseDevice(triangles->device);
     }
+    vshi_sieves_free(triangles);
     vshi_sheet_free(&triangles->sheet);
     free(triangles->solid);
     free(triangles->first);
@@ -393,7 +396,8 @@ void vsh_triangles_free(vsh_triangles *triangles) {
 uint64_t vsh_triangles_bytes(const vsh_triangles *triangles) {
     const long long bytes = atomic_load(&triangles->bytes);
     const vshi_sheet *sheet = &triangles->sheet;
-    return sizeof *triangles + (bytes > 0 ? (uint64_t)bytes : 0) + sheet->triangle_count +
+    return sizeof *triangles + triangles->sieve_bytes + (bytes > 0 ? (uint64_t)bytes : 0) +
+           sheet->triangle_count +
            (uint64_t)vshi_sheet_bytes((double)sheet->vertex_count, (double)sheet->triangle_count);
 }
 

@@ -1,5 +1,5 @@
 /* Rays against the triangles of a vsh_triangles: whether they meet any. */
-#include "trace/embree_scene.h"
+#include "trace/embree_mask.h"
 
 #ifndef VSH_EMBREE
 
@@ -164,7 +164,8 @@ void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *b
              ++layer) {
             const double distance = (double)hit.ray.tfar;
             const uint32_t triangle = triangles->first[hit.hit.geomID] + hit.hit.primID;
-            cut[b] = vshi_sheet_cuts(&triangles->sheet, &beam, triangle, distance, most);
+            cut[b] = !vshi_sieve_is(triangles, hit.hit.geomID) &&
+                     vshi_sheet_cuts(&triangles->sheet, &beam, triangle, distance, most);
             from = distance * (1.0 + 0x1p-16) + 0x1p-16;
         }
     }

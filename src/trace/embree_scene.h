@@ -16,6 +16,15 @@ enum { VSHI_AIR_AROUND, VSHI_SOLID_BEHIND, VSHI_SOLID_BEFORE, VSHI_SOLID_SIDE = 
 /* Added to it where the solid is closed over holes: rays from inside may leave by them. */
 enum { VSHI_SOLID_HOLED = 4 };
 
+struct vshi_sieve; /* embree_mask.h */
+
+/* The texels of a mask. */
+typedef struct vshi_texture {
+    uint8_t *alpha;
+    const uint8_t *of; /* what they are a copy of */
+    size_t texels;
+} vshi_texture;
+
 /* Embree counts in floats, drops what is beyond 1.8e18 and loses what is very small, so it gets the scene
  * around 0 and of a size near 1: `scale` is a power of two, which rounds nothing. */
 struct vsh_triangles {
@@ -32,7 +41,10 @@ struct vsh_triangles {
                   one these are a quarter faster */
     double centre[3];
     double scale;
-    double size;    /* of the longest side of the triangles' box, world units */
+    double size;               /* of the longest side of the triangles' box, world units */
+    struct vshi_sieve *sieves; /* [sieve_count], of the geometries; NULL: none lets rays through */
+    size_t sieve_count, texture_count, sieve_bytes;
+    vshi_texture *textures;
     uint64_t limit; /* bytes that Embree may hold; 0: no limit */
     atomic_llong bytes;
     atomic_bool refused;

@@ -100,8 +100,7 @@ done:
 
 /* UVs of a mesh's vertices, chart by chart. */
 static vsh_result place_vertices(struct vsh_atlas *a, size_t m, const vshi_shape *shape,
-                                 const vshi_atlas_shape *made, const vshi_packing *packing,
-                                 const vshi_item *items, vsh_error *error) {
+                                 const vshi_atlas_shape *made, const vshi_item *items, vsh_error *error) {
     float(*placed)[2] = NULL; /* of a patch */
     uint32_t most = 0;
     vsh_result result;
@@ -112,11 +111,12 @@ static vsh_result place_vertices(struct vsh_atlas *a, size_t m, const vshi_shape
     size_t vertex = 0;
     for (size_t c = 0; c < made->chart_count; ++c) {
         const vshi_patch *p = &shape->patches.list[c];
+        const vsh_atlas_page *page = &a->pages[items[c].page];
         for (uint32_t v = 0; v < p->vertex_count; ++v) {
             double at[2];
             vshi_fit_turn(&items[c].fit, items[c].quarters, p->uv[v], at);
-            placed[v][0] = (float)((items[c].x + at[0]) / packing->width);
-            placed[v][1] = (float)((items[c].y + at[1]) / packing->height);
+            placed[v][0] = (float)((items[c].x + at[0]) / page->width);
+            placed[v][1] = (float)((items[c].y + at[1]) / page->height);
         }
         VSHI_TRY_DONE(vshi_settle(p, placed, error));
         for (; vertex < made->chart_vertices && made->vertex_chart[vertex] == c; ++vertex) {
@@ -129,11 +129,11 @@ done:
 }
 
 static vsh_result mesh_make(struct vsh_atlas *a, size_t m, const vshi_shape *shape,
-                            const vshi_atlas_shape *made, const vshi_packing *packing, const vshi_item *items,
-                            uint32_t first_chart, vsh_error *error) {
+                            const vshi_atlas_shape *made, const vshi_item *items, uint32_t first_chart,
+                            vsh_error *error) {
     VSHI_TRY(vshi_allocate((void **)&a->uvs[m], made->vertex_count, 2 * sizeof(float), what, error));
     VSHI_TRY(vshi_allocate((void **)&a->mesh_charts[m], made->triangle_count, sizeof(uint32_t), what, error));
-    VSHI_TRY(place_vertices(a, m, shape, made, packing, items, error));
+    VSHI_TRY(place_vertices(a, m, shape, made, items, error));
     for (size_t i = 0; i < made->triangle_count; ++i) {
         a->mesh_charts[m][i] = made->charts[i] != VSH_NO_CHART ? first_chart + made->charts[i] : VSH_NO_CHART;
         a->info.flat_triangles += made->charts[i] == VSH_NO_CHART;
@@ -153,8 +153,7 @@ static double fitted_stretch(const vshi_item *item) {
     return item->patch->stretch * sqrt(0.5 * (uneven + 1.0 / uneven));
 }
 
-static void chart_make(struct vsh_atlas *a, const vshi_item *item, double scale, uint32_t chart,
-                       double *touched) {
+static void chart_make(struct vsh_atlas *a, const vshi_item *item, double scale, uint32_t chart) {
     const bool sideways = item->quarters % 2 != 0;
     const double stretch = fitted_stretch(item);
     a->charts[chart] = (vsh_atlas_chart){
@@ -166,23 +165,40 @@ static void chart_make(struct vsh_atlas *a, const vshi_item *item, double scale,
         .max = {item->x + (sideways ? item->fit.height : item->fit.width),
                 item->y + (sideways ? item->fit.width : item->fit.height)},
     };
-    *touched += (double)item->touched;
+    vsh_atlas_page *page = &a->pages[item->page];
+    page->first_mesh = item->mesh < page->first_mesh ? item->mesh : page->first_mesh;
+    page->covered += (double)item->touched;
 }
 
-vsh_result vshi_atlas_make(size_t mesh_count, const vshi_shapes *shapes, const vshi_packing *packing,
+/* What pages have in all, and shares of texels that were counted. */
+static void sum_pages(struct vsh_atlas *a) {
+    double texels = 0.0, touched = 0.0;
+    a->info.texels_per_unit = INFINITY;
+    for (uint32_t i = 0; i < a->info.pages; ++i) {
+        vsh_atlas_page *page = &a->pages[i];
+        const double own = (double)page->width * page->height;
+        touched += page->covered;
+        texels += own;
+        page->covered /= own;
+        a->info.width = page->width > a->info.width ? page->width : a->info.width;
+        a->info.height = page->height > a->info.height ? page->height : a->info.height;
+        a->info.texels_per_unit = fmin(a->info.texels_per_unit, page->texels_per_unit);
+    }
+    a->info.covered = touched / texels;
+}
+
+vsh_result vshi_atlas_make(size_t mesh_count, const vshi_shapes *shapes, vshi_pages *pages,
                            const vshi_item *items, size_t item_count, vsh_atlas **atlas, vsh_error *error) {
     struct vsh_atlas *a = NULL;
-    double touched = 0.0, area = 0.0, stretch = 0.0;
+    double area = 0.0, stretch = 0.0;
     vsh_result result;
     VSHI_TRY(vshi_allocate((void **)&a, 1, sizeof *a, what, error));
     a->shape_count = shapes->count;
     a->mesh_count = mesh_count;
-    a->info = (vsh_atlas_info){.charts = item_count,
-                               .pages = packing->pages,
-                               .width = packing->width,
-                               .height = packing->height,
-                               .texels_per_unit = packing->density,
-                               .shared = mesh_count - shapes->count};
+    a->info = (vsh_atlas_info){
+        .charts = item_count, .pages = (uint32_t)pages->count, .shared = mesh_count - shapes->count};
+    a->pages = pages->list;
+    *pages = (vshi_pages){NULL, 0};
     VSHI_TRY_DONE(vshi_allocate((void **)&a->shapes, shapes->count, sizeof *a->shapes, what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&a->meshes, mesh_count, sizeof *a->meshes, what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&a->uvs, mesh_count, sizeof *a->uvs, what, error));
@@ -196,16 +212,15 @@ vsh_result vshi_atlas_make(size_t mesh_count, const vshi_shapes *shapes, const v
         const vshi_instance *instance = &shapes->instances[m];
         const vshi_shape *shape = &shapes->list[instance->shape];
         a->info.kept += shape->kept;
-        VSHI_TRY_DONE(
-            mesh_make(a, m, shape, &a->shapes[instance->shape], packing, items + chart, chart, error));
+        VSHI_TRY_DONE(mesh_make(a, m, shape, &a->shapes[instance->shape], items + chart, chart, error));
         for (size_t c = 0; c < shape->patches.count; ++c, ++chart) {
-            chart_make(a, &items[chart], shape->surface.scale * instance->scale, chart, &touched);
+            chart_make(a, &items[chart], shape->surface.scale * instance->scale, chart);
             area += a->charts[chart].area;
             stretch += a->charts[chart].area * (double)a->charts[chart].stretch;
             a->info.worst_stretch = fmax(a->info.worst_stretch, (double)a->charts[chart].stretch);
         }
     }
-    a->info.covered = touched / ((double)packing->width * packing->height * packing->pages);
+    sum_pages(a);
     a->info.stretch = area > 0.0 ? stretch / area : 1.0;
 done:
     if (result != VSH_OK) {
@@ -235,6 +250,7 @@ void vsh_atlas_free(vsh_atlas *a) {
         free(a->shapes[i].indices);
         free(a->shapes[i].sources);
     }
+    free(a->pages);
     free(a->charts);
     free(a->mesh_charts);
     free(a->uvs);
@@ -266,6 +282,10 @@ void vsh_atlas_mesh_view_sized(const vsh_atlas *atlas, size_t mesh, vsh_atlas_me
 void vsh_atlas_chart_view_sized(const vsh_atlas *atlas, size_t chart, vsh_atlas_chart *view,
                                 size_t view_size) {
     vshi_give(view, view_size, &atlas->charts[chart], sizeof atlas->charts[chart]);
+}
+
+void vsh_atlas_page_view_sized(const vsh_atlas *atlas, size_t page, vsh_atlas_page *view, size_t view_size) {
+    vshi_give(view, view_size, &atlas->pages[page], sizeof atlas->pages[page]);
 }
 
 const vsh_atlas_chart *vsh_atlas_charts(const vsh_atlas *atlas) {

@@ -2,7 +2,7 @@
 #ifndef VSHI_UNWRAP_ATLAS_H
 #define VSHI_UNWRAP_ATLAS_H
 
-#include "unwrap/pack.h"
+#include "unwrap/pages.h"
 #include "unwrap/shapes.h"
 
 /* The arrays that instances share. Vertices of charts come first, chart by chart; then those of triangles
@@ -24,6 +24,7 @@ struct vsh_atlas {
     uint32_t **mesh_charts; /* [mesh_count] */
     size_t mesh_count;
     vsh_atlas_chart *charts; /* [info.charts] */
+    vsh_atlas_page *pages;   /* [info.pages] */
     vsh_atlas_info info;
 };
 
@@ -32,8 +33,9 @@ double vshi_atlas_shape_bytes(size_t triangle_count);
 double vshi_atlas_mesh_bytes(size_t triangle_count);
 
 /* Makes an atlas of charts that have their places: `items` [item_count] are those of the meshes in their
- * order, and of each mesh of its shape's patches in theirs. Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_atlas_make(size_t mesh_count, const vshi_shapes *shapes, const vshi_packing *packing,
+ * order, and of each mesh of its shape's patches in theirs. The atlas takes the pages' list. Errors:
+ * VSH_ERROR_MEMORY. */
+vsh_result vshi_atlas_make(size_t mesh_count, const vshi_shapes *shapes, vshi_pages *pages,
                            const vshi_item *items, size_t item_count, vsh_atlas **atlas, vsh_error *error);
 
 #endif

@@ -10,6 +10,8 @@
 /* Cosines of angles between normals. */
 static const double CREASE =
     0.64; /* 50°: a chart is cut there; sides of a round column of eight faces are 45° */
+static const double SMOOTH =
+    -0.6; /* 127°: where shading normals go on over the edge, as of a bar of three sides */
 static const double PLANE = 0.9999995; /* 0.06°: of one plane; stretch of a projection is then 1 + 5e-7 */
 static const double QUAD = 0.9;        /* 26°: halves of a quad that is not flat */
 static const double SEAM = 0.985;      /* 10° between shading normals of a vertex: modelled as an edge */
@@ -72,13 +74,15 @@ static void cut_sides(vshi_cut_mesh *s, int cut) {
         const uint32_t a = mesh->indices[side], b = mesh->indices[vshi_next_side(side)],
                        c = mesh->indices[vshi_next_side(other)], d = mesh->indices[other];
         const bool one_uv = same_uv(mesh->uvs, a, c) && same_uv(mesh->uvs, b, d);
+        const bool one_normal = same_normal(mesh->normals, a, c) && same_normal(mesh->normals, b, d);
+        const double crease = mesh->normals != NULL && one_normal ? SMOOTH : CREASE;
         const bool through =
-            cut == VSHI_CUT_UVS ? one_uv : vshi_dot(s->normal[side / 3], s->normal[other / 3]) >= CREASE;
+            cut == VSHI_CUT_UVS ? one_uv : vshi_dot(s->normal[side / 3], s->normal[other / 3]) >= crease;
         if (!through || s->area[side / 3] == 0.0 || s->area[other / 3] == 0.0) {
             s->partner[side] = VSHI_NONE;
             continue;
         }
-        s->soft[side] = one_uv && same_normal(mesh->normals, a, c) && same_normal(mesh->normals, b, d);
+        s->soft[side] = one_uv && one_normal;
     }
 }
 

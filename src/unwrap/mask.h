@@ -4,8 +4,8 @@
 
 #include "unwrap/patch.h"
 
-/* Turns that are tried beside quarter turns: 22.5° each. */
-enum { VSHI_ANGLES = 4 };
+/* Turns that are tried beside quarter turns: 11.25° each. */
+enum { VSHI_ANGLES = 8, VSHI_QUARTERS = 4 };
 
 /* A patch's box, by angle: its lowest corner and size. */
 typedef struct vshi_boxes {
@@ -49,6 +49,11 @@ vshi_fit vshi_mask_fit(const vshi_patch *patch, const vshi_boxes *boxes, int ang
  * with vshi_mask_free(), after a failure too. */
 vsh_result vshi_mask_make(const vshi_patch *patch, const vshi_fit *fit, vshi_mask *mask, vsh_error *error);
 void vshi_mask_free(vshi_mask *mask);
+
+/* Whether it has all texels of its box. */
+static inline bool vshi_mask_is_box(const vshi_mask *mask) {
+    return mask->touched == (uint64_t)mask->width * (uint64_t)mask->height;
+}
 
 /* The mask turned by quarter turns anticlockwise. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_mask_turn(const vshi_mask *mask, int quarters, vshi_mask *turned, vsh_error *error);

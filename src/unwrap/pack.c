@@ -33,7 +33,8 @@ enum {
 };
 
 double vshi_pack_bytes(const vshi_packing *packing, size_t count) {
-    return vshi_page_bytes(packing->width, packing->height) + (double)count * (sizeof(vshi_mask) + 200.0);
+    return vshi_page_bytes(packing->width, packing->height) +
+           (double)count * (VSHI_QUARTERS * sizeof(vshi_mask) + VSHI_ANGLES * sizeof(vshi_fit) + 400.0);
 }
 
 /* Places of the best attempt. */
@@ -324,6 +325,26 @@ static vsh_result find_density(search *s, int orders, int climbs, vsh_error *err
         failed = over > 1.0 ? density : failed;
     }
     return VSH_OK;
+}
+
+vsh_result vshi_pack_one(vshi_packing *packing, vshi_item *items, size_t count, vshi_job *job, bool *fits,
+                         vsh_error *error) {
+    search s = {.packing = packing, .items = items, .count = count, .job = job};
+    double over = INFINITY;
+    int by = 0;
+    vsh_result result;
+    *fits = false;
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.best, count, sizeof *s.best, "packing charts", error));
+    keep(&s, 0.0, 1);
+    VSHI_TRY_DONE(vshi_placing_begin(packing, packing->height, items, count, job, &s.placing, error));
+    VSHI_TRY_DONE(attempt_orders(&s, packing->density, VSHI_ORDERS, &over, &by, error));
+    *fits = over <= 1.0;
+    s.best_density = packing->density;
+    give(&s);
+done:
+    vshi_placing_free(&s.placing);
+    free(s.best);
+    return result;
 }
 
 vsh_result vshi_pack(vshi_packing *packing, vshi_item *items, size_t count, vshi_job *job, size_t units,

@@ -36,4 +36,9 @@ double vshi_pack_bytes(const vshi_packing *packing, size_t count);
 vsh_result vshi_pack(vshi_packing *packing, vshi_item *items, size_t count, vshi_job *job, size_t units,
                      vsh_error *error);
 
+/* The same at the density that is asked for, on one page: *fits tells whether there was room, and where there
+ * was none the items are as they were. Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_pack_one(vshi_packing *packing, vshi_item *items, size_t count, vshi_job *job, bool *fits,
+                         vsh_error *error);
+
 #endif

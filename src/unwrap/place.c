@@ -13,6 +13,7 @@ static const char what[] = "packing charts";
 
 enum { LEAST_TURNED = 40 };          /* texels: shorter charts are turned by quarters alone */
 enum { MANY = 3000, PATIENCE = 24 }; /* charts; rows */
+enum { FEW = 64 };                   /* charts that are tried at every angle, others at every second */
 enum { HINT_SIDE = 128 }; /* texels: larger charts are few, and look for a place from the first row on */
 
 /* Share of a page's texels that padded charts may have for it to be tried. */
@@ -23,19 +24,23 @@ vsh_result vshi_placing_begin(const vshi_packing *packing, int32_t height, vshi_
     *p = (vshi_placing){
         .packing = packing, .job = job, .items = items, .count = count, .least_turned = LEAST_TURNED};
     VSHI_TRY(vshi_allocate((void **)&p->masks, count, sizeof *p->masks, what, error));
+    VSHI_TRY(vshi_allocate((void **)&p->angles, count, sizeof *p->angles, what, error));
     VSHI_TRY(vshi_allocate((void **)&p->fits, count, sizeof *p->fits, what, error));
     VSHI_TRY(vshi_allocate((void **)&p->order, count, sizeof *p->order, what, error));
     VSHI_TRY(vshi_allocate((void **)&p->hints, HINT_SIDE * HINT_SIDE, sizeof *p->hints, what, error));
     VSHI_TRY(vshi_page_make(packing->width, height, packing->padding, &p->page, error));
     p->page.patience = count > MANY ? PATIENCE : 0;
+    p->angle_step = count > FEW ? 2 : 1;
     return VSH_OK;
 }
 
 static void drop_masks(vshi_placing *p) {
     for (size_t i = 0; p->masks != NULL && i < p->count; ++i) {
-        for (int a = 0; a < VSHI_ANGLES; ++a) {
-            vshi_mask_free(&p->masks[i][a]);
+        for (int m = 0; p->masks[i] != NULL && m < VSHI_QUARTERS * p->angles[i]; ++m) {
+            vshi_mask_free(&p->masks[i][m]);
         }
+        free(p->masks[i]);
+        p->masks[i] = NULL;
     }
 }
 
@@ -45,6 +50,7 @@ void vshi_placing_free(vshi_placing *p) {
     free(p->hints);
     free(p->order);
     free(p->fits);
+    free(p->angles);
     free(p->masks);
     *p = (vshi_placing){0};
 }
@@ -56,20 +62,27 @@ typedef struct masking {
     vsh_result *results; /* [count] */
 } masking;
 
+/* The item's masks, before quarter turns: which its number in the list of angles is told by. */
+static vsh_result make_item_masks(vshi_placing *p, size_t i) {
+    const vshi_item *item = &p->items[i];
+    const bool plain = vshi_patch_is_box(item->patch, item->boxes) || p->fits[i][0].width < p->least_turned;
+    vsh_error ignored;
+    p->angles[i] = plain ? 1 : VSHI_ANGLES / p->angle_step;
+    VSHI_TRY(vshi_allocate((void **)&p->masks[i], (size_t)p->angles[i], VSHI_QUARTERS * sizeof(vshi_mask),
+                           what, &ignored));
+    for (int n = 0; n < p->angles[i]; ++n) {
+        const int a = n * p->angle_step;
+        p->fits[i][a] =
+            vshi_mask_fit(item->patch, item->boxes, a, p->density * item->factor, p->packing->max_stretch);
+        VSHI_TRY(vshi_mask_make(item->patch, &p->fits[i][a], &p->masks[i][VSHI_QUARTERS * n], &ignored));
+    }
+    return VSH_OK;
+}
+
 static void make_masks(void *user, size_t begin, size_t end) {
     const masking *m = user;
-    vshi_placing *p = m->placing;
     for (size_t i = begin; i < end; ++i) {
-        const vshi_item *item = &p->items[i];
-        const bool plain =
-            vshi_patch_is_box(item->patch, item->boxes) || p->fits[i][0].width < p->least_turned;
-        vsh_error ignored;
-        m->results[i] = VSH_OK;
-        for (int a = 0; a < (plain ? 1 : VSHI_ANGLES) && m->results[i] == VSH_OK; ++a) {
-            p->fits[i][a] = vshi_mask_fit(item->patch, item->boxes, a, p->density * item->factor,
-                                          p->packing->max_stretch);
-            m->results[i] = vshi_mask_make(item->patch, &p->fits[i][a], &p->masks[i][a], &ignored);
-        }
+        m->results[i] = make_item_masks(m->placing, i);
     }
 }
 
@@ -144,8 +157,7 @@ done:
 
 /* Where a chart's box is all that it is, turning it over changes nothing. */
 static int turns_of(const vshi_mask *mask) {
-    const bool full = mask->touched == (uint64_t)mask->width * (uint64_t)mask->height;
-    return full ? (mask->width == mask->height ? 1 : 2) : 4;
+    return vshi_mask_is_box(mask) ? (mask->width == mask->height ? 1 : 2) : VSHI_QUARTERS;
 }
 
 static int32_t *hint_of(vshi_placing *p, const vshi_mask *mask) {
@@ -154,51 +166,45 @@ static int32_t *hint_of(vshi_placing *p, const vshi_mask *mask) {
                : NULL;
 }
 
-/* Finds the item's place in the page and takes it; *placed tells whether there was one. */
+/* Finds the item's place in the page and takes it; *placed tells whether there was one. Turned masks are kept
+ * for the next time. */
 static vsh_result place(vshi_placing *p, uint32_t index, bool *placed, vsh_error *error) {
     vshi_item *item = &p->items[index];
     int32_t best_end = p->page.height;
-    vshi_mask best = {0};
-    vsh_result result = VSH_OK;
+    const vshi_mask *best = NULL;
     *placed = false;
-    for (int a = 0; a < VSHI_ANGLES && p->masks[index][a].runs != NULL; ++a) {
-        const vshi_mask *mask = &p->masks[index][a];
-        for (int t = 0; t < turns_of(mask); ++t) {
-            vshi_mask turned = {0};
+    for (int n = 0; n < p->angles[index]; ++n) {
+        vshi_mask *masks = &p->masks[index][VSHI_QUARTERS * n];
+        for (int t = 0; t < turns_of(masks); ++t) {
+            vshi_mask *turned = &masks[t];
             int32_t x, y;
-            result = vshi_mask_turn(mask, t, &turned, error);
-            if (result != VSH_OK) {
-                vshi_mask_free(&turned);
-                goto done;
+            if (turned->runs == NULL) {
+                VSHI_TRY(vshi_mask_turn(masks, t, turned, error));
             }
-            int32_t *hint = hint_of(p, &turned);
-            bool found = vshi_page_find(&p->page, &turned, hint != NULL ? *hint : 0, best_end, &x, &y);
+            int32_t *hint = hint_of(p, turned);
+            const bool found = vshi_page_find(&p->page, turned, hint != NULL ? *hint : 0, best_end, &x, &y);
             if (found && hint != NULL) {
                 *hint = y;
             }
-            const int32_t end = found ? y + turned.height : 0;
+            const int32_t end = found ? y + turned->height : 0;
             if (!found || (*placed && end == best_end && y >= item->y)) {
-                vshi_mask_free(&turned);
                 continue;
             }
-            vshi_mask_free(&best);
             best = turned;
             best_end = end;
             item->x = x;
             item->y = y;
-            item->angle = a;
+            item->angle = n * p->angle_step;
             item->quarters = t;
             *placed = true;
         }
     }
     if (*placed) {
         item->fit = p->fits[index][item->angle];
-        item->touched = best.touched;
-        vshi_atlas_page_put(&p->page, &best, item->x, item->y);
+        item->touched = best->touched;
+        vshi_atlas_page_put(&p->page, best, item->x, item->y);
     }
-done:
-    vshi_mask_free(&best);
-    return result;
+    return VSH_OK;
 }
 
 /* Places the items of one page, those of the wanted meshes or, NULL, all that have none yet. Ends at the

@@ -14,10 +14,12 @@ typedef struct vshi_placing {
     vshi_item *items; /* [count] */
     size_t count;
     double density;
-    int32_t least_turned;            /* texels: shorter charts are turned by quarters alone */
-    vshi_mask (*masks)[VSHI_ANGLES]; /* [count]; runs are NULL at angles that are not tried */
-    vshi_fit (*fits)[VSHI_ANGLES];   /* [count] */
-    uint32_t *order;                 /* [count]: items, the first first */
+    int angle_step;                /* 1 or 2: which of the angles are tried */
+    int32_t least_turned;          /* texels: shorter charts are turned by quarters alone */
+    vshi_mask **masks;             /* [count][angles × VSHI_QUARTERS]; runs are NULL of turns not yet made */
+    int *angles;                   /* [count]: how many are tried of each */
+    vshi_fit (*fits)[VSHI_ANGLES]; /* [count] */
+    uint32_t *order;               /* [count]: items, the first first */
     vshi_page page;
     int32_t *hints; /* row where the last chart of a size was placed */
 } vshi_placing;

@@ -5,6 +5,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/try.h"
+#include "mesh/mesh.h"
 #include "unwrap/grow.h"
 #include "unwrap/keep.h"
 
@@ -40,6 +41,7 @@ void vshi_shapes_free(vshi_shapes *shapes) {
 
 typedef struct making {
     vshi_shapes *shapes;
+    const vsh_mesh *meshes; /* [mesh_count]; NULL: all are packed together, else each object alone */
     size_t mesh_count;
     double max_stretch;
     bool keep_uvs;
@@ -160,7 +162,7 @@ static vsh_result lay_out_all(const making *m, vsh_error *error) {
         count += m->shapes->list[i].chart_count;
     }
     VSHI_TRY_DONE(vshi_allocate((void **)&charts, count, sizeof *charts, what, error));
-    for (size_t i = 0, at = 0; i < m->shapes->count; at += m->shapes->list[i++].chart_count) {
+    for (size_t i = 0, at = 0; count > 0 && i < m->shapes->count; at += m->shapes->list[i++].chart_count) {
         VSHI_TRY_DONE(list_charts(&m->shapes->list[i], charts + at, error));
     }
     VSHI_TRY_DONE(vshi_parallel_for(m->job, count, 4, 0, lay_out_charts, &(laying){m, charts}, error));
@@ -246,10 +248,10 @@ done:
     return result;
 }
 
-/* World units², of all instances. */
-static double total_area(const making *m) {
+/* World units², of meshes begin … end - 1. */
+static double area_of(const making *m, size_t begin, size_t end) {
     double sum = 0.0;
-    for (size_t i = 0; i < m->mesh_count; ++i) {
+    for (size_t i = begin; i < end; ++i) {
         const vshi_shape *shape = &m->shapes->list[m->shapes->instances[i].shape];
         const double scale = shape->surface.scale * m->shapes->instances[i].scale;
         double area = 0.0;
@@ -261,16 +263,44 @@ static double total_area(const making *m) {
     return sum;
 }
 
-static vsh_result join_all(const making *m, size_t triangles, vsh_error *error) {
-    const double most = LARGEST * total_area(m);
+/* Fills largest [shapes]: what a chart of each may have at most, world units² of its first mesh; the least of
+ * what its instances may, where objects are packed alone. */
+static void find_largest(const making *m, double *largest) {
+    const double all = m->meshes == NULL ? area_of(m, 0, m->mesh_count) : INFINITY;
+    for (size_t i = 0; i < m->shapes->count; ++i) {
+        largest[i] = LARGEST * all;
+    }
+    for (size_t first = 0, size; m->meshes != NULL && first < m->mesh_count; first += size) {
+        size = vshi_mesh_object_size(m->meshes, first, m->mesh_count);
+        const double area = area_of(m, first, first + size);
+        for (size_t i = first; i < first + size; ++i) {
+            const vshi_instance *instance = &m->shapes->instances[i];
+            const double own = LARGEST * area / (instance->scale * instance->scale);
+            largest[instance->shape] = own < largest[instance->shape] ? own : largest[instance->shape];
+        }
+    }
+}
+
+static vsh_result begin_joining(const making *m, vsh_error *error) {
+    double *largest = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&largest, m->shapes->count, sizeof *largest, what, error));
+    find_largest(m, largest);
     for (size_t i = 0; i < m->shapes->count; ++i) {
         vshi_shape *shape = &m->shapes->list[i];
         if (!shape->kept && shape->patches.count > 1) {
             const double scale = shape->surface.scale;
-            VSHI_TRY(vshi_merging_begin(&shape->surface, &shape->patches, m->max_stretch,
-                                        most / (scale * scale), &shape->merging, error));
+            VSHI_TRY_DONE(vshi_merging_begin(&shape->surface, &shape->patches, m->max_stretch,
+                                             largest[i] / (scale * scale), &shape->merging, error));
         }
     }
+done:
+    free(largest);
+    return result;
+}
+
+static vsh_result join_all(const making *m, size_t triangles, vsh_error *error) {
+    VSHI_TRY(begin_joining(m, error));
     bool done_all = false;
     size_t told = 0;
     for (int round = 0; round < MOST_ROUNDS && !done_all; ++round) {
@@ -297,9 +327,14 @@ static void straighten_shapes(void *user, size_t begin, size_t end) {
     }
 }
 
-vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, size_t mesh_count, double max_stretch, bool keep_uvs,
-                               vshi_job *job, vsh_error *error) {
-    making m = {shapes, mesh_count, max_stretch, keep_uvs, job};
+vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, const vsh_mesh *meshes, size_t mesh_count,
+                               const vsh_unwrap_options *options, vshi_job *job, vsh_error *error) {
+    making m = {.shapes = shapes,
+                .meshes = options->atlas == VSH_ATLAS_OBJECTS ? meshes : NULL,
+                .mesh_count = mesh_count,
+                .max_stretch = options->max_stretch,
+                .keep_uvs = options->keep_uvs == VSH_UNWRAP_KEEP,
+                .job = job};
     size_t triangles = 0;
     for (size_t i = 0; i < shapes->count; ++i) {
         triangles += shapes->list[i].mesh->triangle_count;

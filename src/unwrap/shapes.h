@@ -42,10 +42,11 @@ typedef struct vshi_shapes {
 vsh_result vshi_shapes_find(const vsh_mesh *meshes, size_t mesh_count, vshi_shapes *shapes, vsh_error *error);
 void vshi_shapes_free(vshi_shapes *shapes);
 
-/* Makes their charts, straightened. Advances the job by VSHI_SHAPE_STEPS for each triangle of each shape,
- * about. Errors: VSH_ERROR_LIMIT (2^32 / 3 triangles), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+/* Makes their charts, straightened, of meshes [mesh_count], as the options have it. Advances the job by
+ * VSHI_SHAPE_STEPS for each triangle of each shape, about. Errors: VSH_ERROR_LIMIT (2^32 / 3 triangles),
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 enum { VSHI_SHAPE_STEPS = 6 };
-vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, size_t mesh_count, double max_stretch, bool keep_uvs,
-                               vshi_job *job, vsh_error *error);
+vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, const vsh_mesh *meshes, size_t mesh_count,
+                               const vsh_unwrap_options *options, vshi_job *job, vsh_error *error);
 
 #endif

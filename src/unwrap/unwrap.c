@@ -10,7 +10,7 @@ static const double LEAST_STRETCH = 1.01; /* of max_stretch: below, rounding and
 static const double STEPS_BYTES =
     420.0; /* a triangle, while charts are made: patches, trials and their equations */
 
-enum { MOST_PADDING = 4096, PACK_UNITS = 1024 };
+enum { MOST_PADDING = 4096 };
 
 static vsh_result check_whole(const char *name, int32_t value, int32_t least, int32_t most,
                               vsh_error *error) {
@@ -27,6 +27,15 @@ static vsh_result check_options(const vsh_unwrap_options *o, size_t mesh_count, 
     VSHI_TRY(check_whole("max_pages", o->max_pages, 1, VSH_MAX_PAGES, error));
     VSHI_TRY(check_whole("padding", o->padding, 0, MOST_PADDING, error));
     VSHI_TRY(check_whole("keep_uvs", o->keep_uvs, VSH_UNWRAP_ALWAYS, VSH_UNWRAP_KEEP, error));
+    VSHI_TRY(check_whole("atlas", o->atlas, VSH_ATLAS_SHARED, VSH_ATLAS_OBJECTS, error));
+    if (o->atlas == VSH_ATLAS_OBJECTS && o->max_pages > 1) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "unwrap: max_pages is %d: each object has one page",
+                         o->max_pages);
+    }
+    if (o->fit_pages != 0 && o->texels_per_unit == 0.0) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "unwrap: fit_pages: without texels_per_unit any page is filled");
+    }
     if (!(o->texels_per_unit >= 0.0) || !isfinite(o->texels_per_unit)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "unwrap: texels_per_unit is %g, expected a finite number from 0 on",
@@ -100,8 +109,8 @@ static vsh_result make_items(const vshi_shapes *shapes, size_t mesh_count, const
     return VSH_OK;
 }
 
-static vsh_result lay_out(vshi_shapes *shapes, size_t mesh_count, const vsh_unwrap_options *options,
-                          const vsh_run *run, vsh_error *error) {
+static vsh_result lay_out(vshi_shapes *shapes, const vsh_mesh *meshes, size_t mesh_count,
+                          const vsh_unwrap_options *options, const vsh_run *run, vsh_error *error) {
     size_t triangles = 0;
     for (size_t i = 0; i < shapes->count; ++i) {
         triangles += shapes->list[i].mesh->triangle_count;
@@ -110,20 +119,7 @@ static vsh_result lay_out(vshi_shapes *shapes, size_t mesh_count, const vsh_unwr
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "unwrap: the system refused memory");
     }
-    const vsh_result result = vshi_shapes_lay_out(shapes, mesh_count, options->max_stretch,
-                                                  options->keep_uvs == VSH_UNWRAP_KEEP, job, error);
-    vshi_job_end(job);
-    return result;
-}
-
-static vsh_result pack(vshi_packing *packing, vshi_item *items, size_t count, const vsh_run *run,
-                       vsh_error *error) {
-    VSHI_TRY(vshi_check_limit(run, vshi_pack_bytes(packing, count), "packing charts", error));
-    vshi_job *job = vshi_job_begin(run, "pack", PACK_UNITS);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "unwrap: the system refused memory");
-    }
-    const vsh_result result = vshi_pack(packing, items, count, job, PACK_UNITS, error);
+    const vsh_result result = vshi_shapes_lay_out(shapes, meshes, mesh_count, options, job, error);
     vshi_job_end(job);
     return result;
 }
@@ -143,20 +139,16 @@ vsh_result vsh_unwrap(const vsh_mesh *meshes, size_t mesh_count, const vsh_unwra
     vshi_shapes shapes = {0};
     vshi_item *items = NULL;
     size_t count = 0;
-    vshi_packing packing = {.width = o.width,
-                            .height = o.height,
-                            .padding = o.padding,
-                            .max_pages = (uint32_t)o.max_pages,
-                            .max_stretch = o.max_stretch,
-                            .density = o.texels_per_unit};
+    vshi_pages pages = {NULL, 0};
     vsh_result result;
     VSHI_TRY_DONE(vshi_shapes_find(meshes, mesh_count, &shapes, error));
     VSHI_TRY_DONE(check_memory(meshes, mesh_count, &shapes, &o, &full, error));
-    VSHI_TRY_DONE(lay_out(&shapes, mesh_count, &o, &full, error));
+    VSHI_TRY_DONE(lay_out(&shapes, meshes, mesh_count, &o, &full, error));
     VSHI_TRY_DONE(make_items(&shapes, mesh_count, o.density, &items, &count, error));
-    VSHI_TRY_DONE(pack(&packing, items, count, &full, error));
-    VSHI_TRY_DONE(vshi_atlas_make(mesh_count, &shapes, &packing, items, count, atlas, error));
+    VSHI_TRY_DONE(vshi_pages_pack(&o, meshes, mesh_count, &shapes, items, count, &full, &pages, error));
+    VSHI_TRY_DONE(vshi_atlas_make(mesh_count, &shapes, &pages, items, count, atlas, error));
 done:
+    free(pages.list);
     free(items);
     vshi_shapes_free(&shapes);
     return result;

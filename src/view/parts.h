@@ -31,8 +31,10 @@ vsh_result vshi_view_put_model(vshi_view *view, const char *path, json_t *about,
 /* The triangles, normals and UVs of a model as a GLB in a data block. */
 vsh_result vshi_view_put_arrays(vshi_view *view, const char *path, const vsh_model *model, vsh_error *error);
 
-/* Writes the planes of an image, and adds what they are to `pages`. */
+/* Writes the planes of an image, of a file or in memory, and adds what they are to `pages`. */
 vsh_result vshi_view_put_planes(vshi_view *view, const char *path, json_t *pages, vsh_error *error);
+vsh_result vshi_view_put_image(vshi_view *view, const char *name, const vsh_image *image, json_t *pages,
+                               vsh_error *error);
 
 /* Whatever a name holds, as JSON; NULL where memory is short. */
 json_t *vshi_view_text(const char *text);

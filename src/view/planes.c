@@ -64,12 +64,19 @@ static vsh_result put_deflated(vshi_view *view, const uint8_t *bytes, size_t cou
     return vshi_page_check(view->page, error);
 }
 
+/* An image, and what its file says of itself. */
+typedef struct source {
+    const char *name;
+    vsh_image image;
+    const vsh_attribute *attributes;
+    size_t attribute_count;
+} source;
+
 /* Whether an image has an attribute, of a value unless that is NULL. */
-static bool has_attribute(const vsh_image_file *file, const char *name, const char *value) {
-    size_t count;
-    const vsh_attribute *list = vsh_image_attributes(file, &count);
-    for (size_t i = 0; i < count; ++i) {
-        if (strcmp(list[i].name, name) == 0 && (value == NULL || strcmp(list[i].value, value) == 0)) {
+static bool has_attribute(const source *from, const char *name, const char *value) {
+    for (size_t i = 0; i < from->attribute_count; ++i) {
+        const vsh_attribute *one = &from->attributes[i];
+        if (strcmp(one->name, name) == 0 && (value == NULL || strcmp(one->value, value) == 0)) {
             return true;
         }
     }
@@ -92,18 +99,18 @@ static vsh_result put_channel(vshi_view *view, const vsh_image *image, int32_t c
         error);
 }
 
-static vsh_result put_channels(vshi_view *view, const vsh_image_file *file, uint8_t *bytes, json_t *channels,
+static vsh_result put_channels(vshi_view *view, const source *from, uint8_t *bytes, json_t *channels,
                                vsh_error *error) {
-    const vsh_image image = vsh_image_view(file);
-    const bool made_of_others = has_attribute(file, VSH_IMAGE_RGB, NULL);
-    const bool srgb = has_attribute(file, "vdbshade_color_space", "sRGB");
+    const vsh_image *image = &from->image;
+    const bool made_of_others = has_attribute(from, VSH_IMAGE_RGB, NULL);
+    const bool srgb = has_attribute(from, "vdbshade_color_space", "sRGB");
     vshi_job *job;
-    VSHI_TRY(vshi_view_begin(view, (size_t)image.channel_count, &job, error));
+    VSHI_TRY(vshi_view_begin(view, (size_t)image->channel_count, &job, error));
     vsh_result result = VSH_OK;
-    for (int32_t c = 0; c < image.channel_count; ++c) {
-        const bool picture = is_picture(image.names[c]);
+    for (int32_t c = 0; c < image->channel_count; ++c) {
+        const bool picture = is_picture(image->names[c]);
         if (!picture || !made_of_others) {
-            VSHI_TRY_DONE(put_channel(view, &image, c, picture && srgb, bytes, channels, error));
+            VSHI_TRY_DONE(put_channel(view, image, c, picture && srgb, bytes, channels, error));
         }
         VSHI_TRY_DONE(vshi_view_advance(view, job, 1, error));
     }
@@ -113,12 +120,11 @@ done:
 }
 
 /* What the file says of itself; NULL where memory is short. */
-static json_t *attributes_of(const vsh_image_file *file) {
-    size_t count;
-    const vsh_attribute *list = vsh_image_attributes(file, &count);
+static json_t *attributes_of(const source *from) {
     json_t *made = json_array();
-    for (size_t i = 0; i < count; ++i) {
-        json_t *pair = json_pack("[o, o]", vshi_view_text(list[i].name), vshi_view_text(list[i].value));
+    for (size_t i = 0; i < from->attribute_count; ++i) {
+        json_t *pair = json_pack("[o, o]", vshi_view_text(from->attributes[i].name),
+                                 vshi_view_text(from->attributes[i].value));
         if (json_array_append_new(made, pair) != 0) {
             json_decref(made);
             return NULL;
@@ -127,27 +133,41 @@ static json_t *attributes_of(const vsh_image_file *file) {
     return made;
 }
 
-vsh_result vshi_view_put_planes(vshi_view *view, const char *path, json_t *pages, vsh_error *error) {
-    vsh_image_file *file = NULL;
+/* `held` is what the planes take already. */
+static vsh_result put(vshi_view *view, const source *from, double held, json_t *pages, vsh_error *error) {
+    const vsh_image *image = &from->image;
+    const size_t texels = (size_t)image->width * (size_t)image->height;
     void *bytes = NULL;
     json_t *channels = json_array();
     vsh_result result;
-    VSHI_TRY_DONE(vsh_image_read(path, view->run, &file, error));
-    const vsh_image image = vsh_image_view(file);
-    const size_t texels = (size_t)image.width * (size_t)image.height;
-    const double held = (double)texels * (double)image.channel_count * sizeof(float);
-    VSHI_TRY_DONE(vshi_check_limit(view->run, held + 2.0 * (double)texels, path, error));
-    VSHI_TRY_DONE(vshi_allocate(&bytes, texels, 2, path, error));
-    VSHI_TRY_DONE(put_channels(view, file, bytes, channels, error));
-    VSHI_TRY_DONE(
-        vshi_view_tell(pages, NULL,
-                       json_pack("{s:o, s:i, s:i, s:O, s:o}", "name",
-                                 vshi_view_text(vshi_view_file_name(path)), "width", image.width, "height",
-                                 image.height, "channels", channels, "attributes", attributes_of(file)),
-                       error));
+    VSHI_TRY_DONE(vshi_check_limit(view->run, held + 2.0 * (double)texels, from->name, error));
+    VSHI_TRY_DONE(vshi_allocate(&bytes, texels, 2, from->name, error));
+    VSHI_TRY_DONE(put_channels(view, from, bytes, channels, error));
+    VSHI_TRY_DONE(vshi_view_tell(pages, NULL,
+                                 json_pack("{s:o, s:i, s:i, s:O, s:o}", "name", vshi_view_text(from->name),
+                                           "width", image->width, "height", image->height, "channels",
+                                           channels, "attributes", attributes_of(from)),
+                                 error));
 done:
     json_decref(channels);
     free(bytes);
+    return result;
+}
+
+vsh_result vshi_view_put_planes(vshi_view *view, const char *path, json_t *pages, vsh_error *error) {
+    vsh_image_file *file = NULL;
+    VSHI_TRY(vsh_image_read(path, view->run, &file, error));
+    source from = {.name = vshi_view_file_name(path), .image = vsh_image_view(file)};
+    from.attributes = vsh_image_attributes(file, &from.attribute_count);
+    const double texels = (double)from.image.width * (double)from.image.height;
+    const double held = texels * (double)from.image.channel_count * sizeof(float);
+    const vsh_result result = put(view, &from, held, pages, error);
     vsh_image_free(file);
     return result;
+}
+
+vsh_result vshi_view_put_image(vshi_view *view, const char *name, const vsh_image *image, json_t *pages,
+                               vsh_error *error) {
+    const source from = {.name = name, .image = *image};
+    return put(view, &from, 0.0, pages, error);
 }

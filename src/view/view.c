@@ -10,6 +10,7 @@
 #include "view/parts.h"
 
 #include <sha256.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -20,16 +21,11 @@ const char *vshi_view_file_name(const char *path) {
 
 json_t *vshi_view_text(const char *text) {
     char *clean = malloc(3 * strlen(text) + 1);
-    size_t used = 0;
     if (clean == NULL) {
         return NULL;
     }
-    for (size_t length; *text != '\0'; text += length > 0 ? length : 1) {
-        length = vshi_utf8_length(text);
-        memcpy(clean + used, length > 0 ? text : VSHI_NO_CHARACTER, length > 0 ? length : 3);
-        used += length > 0 ? length : 3;
-    }
-    json_t *made = json_stringn(clean, used);
+    vshi_utf8_clean(text, clean);
+    json_t *made = json_string(clean);
     free(clean);
     return made;
 }
@@ -139,12 +135,43 @@ static vsh_result put_bake(vshi_view *view, const vsh_view_bake *bake, vsh_error
     for (size_t i = 0; i < bake->plane_count; ++i) {
         VSHI_TRY_DONE(vshi_view_put_planes(view, bake->planes[i], pages, error));
     }
+    for (size_t i = 0; i < bake->image_count; ++i) {
+        VSHI_TRY_DONE(vshi_view_put_image(view, bake->name, &bake->images[i], pages, error));
+    }
     VSHI_TRY_DONE(vshi_view_tell(about, "pages", json_incref(pages), error));
     VSHI_TRY_DONE(vshi_view_tell(view->about, NULL, json_incref(about), error));
 done:
     json_decref(pages);
     json_decref(about);
     return result;
+}
+
+static vsh_result check_images(const vsh_view_bake *bake, const char *what, vsh_error *error) {
+    VSHI_NEEDS_OF(bake->image_count, bake->images);
+    if (bake->image_count > 0 && (bake->plane_count > 0 || bake->name == NULL)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: images %s", what,
+                         bake->name == NULL ? "without a name" : "and files of planes; expected one of them");
+    }
+    if (bake->image_count > VSH_MAX_VIEW_PLANES) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %zu images, at most %d", what, bake->image_count,
+                         VSH_MAX_VIEW_PLANES);
+    }
+    for (size_t i = 0; i < bake->image_count; ++i) {
+        const vsh_image *image = &bake->images[i];
+        const double texels = (double)image->width * (double)image->height;
+        if (image->width < 1 || image->height < 1 || image->channel_count < 1 ||
+            image->channel_count > VSH_MAX_CHANNELS || texels * image->channel_count > 0x1p31) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: image %zu has %d × %d texels, %d channels", what,
+                             i, image->width, image->height, image->channel_count);
+        }
+        VSHI_NEEDS(image->names);
+        VSHI_NEEDS(image->planes);
+        for (int32_t c = 0; c < image->channel_count; ++c) {
+            VSHI_NEEDS(image->names[c]);
+            VSHI_NEEDS(image->planes[c]);
+        }
+    }
+    return VSH_OK;
 }
 
 static vsh_result check(const vsh_view_bake *given, const char *what, vsh_view_bake *bake, vsh_error *error) {
@@ -162,26 +189,24 @@ static vsh_result check(const vsh_view_bake *given, const char *what, vsh_view_b
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: UV set %d: expected -1 … %d", what, bake->uv_set,
                          VSH_MAX_UV_SETS - 1);
     }
-    if (bake->model == NULL && bake->plane_count == 0) {
+    if (bake->model == NULL && bake->plane_count == 0 && bake->image_count == 0) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: neither a model nor planes", what);
     }
+    return check_images(bake, what, error);
+}
+
+static vsh_result put_page(vshi_view *view, const vsh_view_bake *bakes, size_t count, vsh_error *error) {
+    put_head(view->page);
+    for (size_t i = 0; i < count; ++i) {
+        VSHI_TRY(put_bake(view, &bakes[i], error));
+    }
+    VSHI_TRY(put_about(view, error));
+    put_scripts(view->page);
     return VSH_OK;
 }
 
-vsh_result vsh_view_write(const char *path, const vsh_view_bake *bake, const vsh_view_bake *other,
-                          const vsh_run *run, vsh_error *error) {
-    VSHI_FLOATS;
-    VSHI_NEEDS(path);
-    VSHI_NEEDS(bake);
-    vsh_view_bake bakes[2];
-    vsh_run full;
-    VSHI_TRY(check(bake, "bake", &bakes[0], error));
-    VSHI_NEEDS(bakes[0].model);
-    if (other != NULL) {
-        VSHI_TRY(check(other, "other", &bakes[1], error));
-    }
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    const size_t count = other != NULL ? 2 : 1;
+static vsh_result write_page(const char *path, const vsh_view_bake *bakes, size_t count, const vsh_run *run,
+                             vsh_error *error) {
     void *memory = NULL;
     VSHI_TRY(vshi_allocate(&memory, 1, sizeof(vshi_page), "page", error));
     vshi_page *page = memory;
@@ -190,17 +215,12 @@ vsh_result vsh_view_write(const char *path, const vsh_view_bake *bake, const vsh
         free(page);
         return result;
     }
-    vshi_view view = {page, &full, 0, json_array()};
+    vshi_view view = {page, run, 0, json_array()};
     if (view.about == NULL) {
         result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
         goto done;
     }
-    put_head(page);
-    for (size_t i = 0; i < count; ++i) {
-        VSHI_TRY_DONE(put_bake(&view, &bakes[i], error));
-    }
-    VSHI_TRY_DONE(put_about(&view, error));
-    put_scripts(page);
+    VSHI_TRY_DONE(put_page(&view, bakes, count, error));
     result = vshi_page_commit(page, error);
     page = NULL;
 done:
@@ -210,4 +230,41 @@ done:
     }
     free(memory);
     return result;
+}
+
+vsh_result vsh_view_write_bakes(const char *path, const vsh_view_bake *const *bakes, size_t count,
+                                const vsh_run *run, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(path);
+    VSHI_NEEDS(bakes);
+    if (count < 1 || count > VSH_MAX_VIEW_BAKES) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %zu bakes: expected 1 … %d", __func__, count,
+                         VSH_MAX_VIEW_BAKES);
+    }
+    vsh_view_bake *full = NULL;
+    vsh_run resolved;
+    vsh_result result = VSH_OK;
+    VSHI_TRY(vshi_allocate((void **)&full, count, sizeof *full, "bakes", error));
+    for (size_t i = 0; i < count; ++i) {
+        char what[32];
+        snprintf(what, sizeof what, "bake %zu", i);
+        VSHI_TRY_DONE(check(bakes[i], what, &full[i], error));
+    }
+    if (full[0].model == NULL) {
+        result = vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: the first bake's model is NULL", __func__);
+        goto done;
+    }
+    VSHI_TRY_DONE(vshi_run_resolve(run, &resolved, error));
+    result = write_page(path, full, count, &resolved, error);
+done:
+    free(full);
+    return result;
+}
+
+vsh_result vsh_view_write(const char *path, const vsh_view_bake *bake, const vsh_view_bake *other,
+                          const vsh_run *run, vsh_error *error) {
+    VSHI_NEEDS(path);
+    VSHI_NEEDS(bake);
+    const vsh_view_bake *const bakes[] = {bake, other};
+    return vsh_view_write_bakes(path, bakes, other != NULL ? 2 : 1, run, error);
 }

@@ -46,24 +46,49 @@ static void settle_blocks(void *user, size_t begin, size_t end) {
 
 /* --- the whole */
 
-static vsh_result run_passes(vshi_volume_bake *bake, const vsh_run *run, vsh_error *error) {
-    static vshi_range_fn *const passes[] = {vshi_volume_shade_blocks, fill_blocks, settle_blocks};
-    static const size_t units[] = {SHADE_UNITS, FILL_UNITS, 0};
-    vshi_job *job = vshi_job_begin(run, "volume", (SHADE_UNITS + FILL_UNITS) * bake->block_count);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "volume: the system refused memory");
+/* A range of blocks under way. */
+typedef struct range {
+    vshi_volume_bake *bake;
+    size_t first;
+} range;
+
+static void shade_range(void *user, size_t begin, size_t end) {
+    const range *r = user;
+    vshi_volume_shade_blocks(r->bake, r->first + begin, r->first + end);
+}
+
+static vsh_result check_memory(vshi_volume_bake *bake, vsh_result result, vsh_error *error) {
+    return result == VSH_OK && atomic_load(&bake->out_of_memory)
+               ? vshi_fail(error, VSH_ERROR_MEMORY, "volume: the system refused memory")
+               : result;
+}
+
+vsh_result vshi_volume_shade(vshi_volume_bake *bake, const vsh_light *lights, size_t begin, size_t end,
+                             vshi_job *job, size_t units, vsh_error *error) {
+    vsh_shade_options shade = bake->options.shade;
+    if (bake->options.ao == 0) {
+        shade.ao_method = VSH_AO_CONES; /* not asked for: it may want what is not there */
     }
-    vsh_result result;
-    for (size_t i = 0; i < sizeof units / sizeof units[0]; ++i) {
-        VSHI_TRY_DONE(
-            vshi_parallel_for(job, bake->block_count, VSHI_VOLUME_GRAIN, units[i], passes[i], bake, error));
+    const bool around = !bake->normals && bake->options.ao != 0; /* AO over all directions */
+    VSHI_TRY(
+        vshi_query_create(bake->occluders, lights, bake->light_count, &shade, around, &bake->query, error));
+    range r = {bake, begin};
+    const vsh_result result =
+        vshi_parallel_for(job, end - begin, VSHI_VOLUME_GRAIN, units, shade_range, &r, error);
+    vsh_query_free(bake->query);
+    bake->query = NULL;
+    return check_memory(bake, result, error);
+}
+
+vsh_result vshi_volume_finish(vshi_volume_bake *bake, vshi_job *job, size_t units, vsh_error *error) {
+    static vshi_range_fn *const passes[] = {fill_blocks, settle_blocks};
+    for (size_t i = 0; i < sizeof passes / sizeof passes[0]; ++i) {
+        VSHI_TRY(vshi_parallel_for(job, bake->block_count, VSHI_VOLUME_GRAIN, i == 0 ? units : 0, passes[i],
+                                   bake, error));
     }
-    if (atomic_load(&bake->out_of_memory)) {
-        result = vshi_fail(error, VSH_ERROR_MEMORY, "volume: the system refused memory");
-    }
-done:
-    vshi_job_end(job);
-    return result;
+    VSHI_TRY(check_memory(bake, VSH_OK, error));
+    const vsh_volume_info counts = vshi_fill_counts(&bake->fill);
+    return vshi_volume_close(bake->volume, &counts, error);
 }
 
 static void find_half_axes(vshi_volume_bake *bake) {
@@ -80,49 +105,39 @@ static void find_half_axes(vshi_volume_bake *bake) {
     }
 }
 
-static vsh_result begin_volume(vshi_volume_bake *bake, const vsh_light *lights, const vsh_run *run,
-                               vsh_error *error) {
+vsh_result vshi_volume_open(vshi_volume_bake *bake, const vsh_light *lights, const vsh_run *run,
+                            vsh_error *error) {
     vshi_channel *channels = NULL;
     VSHI_TRY(vshi_allocate((void **)&channels, bake->channel_count, sizeof *channels, "volume", error));
-    const vsh_occluders *casters = bake->occluders;
-    vsh_field_info info;
-    vsh_field_get_info(casters->field, &info);
     const vshi_channels what = {
-        lights,          bake->light_count,         &bake->options, bake->shadow_error, bake->ao_error,
-        info.voxel_size, casters->triangles != NULL};
+        lights,         bake->light_count,       &bake->options,      bake->shadow_error,
+        bake->ao_error, bake->caster_voxel_size, bake->has_triangles,
+    };
     vshi_channels_describe(&what, channels);
-    double layers = 0.0;
-    for (size_t i = 0; i < casters->layer_count; ++i) {
-        layers += vshi_layer_bytes(&casters->layers[i]);
-    }
-    const double held = (double)info.bytes + layers +
-                        2.0 * (double)bake->block_count * sizeof *bake->fill.shaded +
-                        (casters->triangles != NULL ? (double)vsh_triangles_bytes(casters->triangles) : 0.0);
+    const double held = bake->held + 2.0 * (double)bake->block_count * sizeof *bake->fill.shaded;
     const vsh_result result =
         vshi_volume_begin(bake->voxels, channels, bake->channel_count, run, held, &bake->volume, error);
     free(channels);
-    return result;
+    VSHI_TRY(result);
+    return vshi_fill_begin(&bake->fill, bake->occluders != NULL ? &bake->solid : NULL, bake->voxels,
+                           bake->volume, bake->channel_count, bake->options.inside == VSH_INSIDE_NEAREST,
+                           error);
 }
 
 static vsh_result bake_all(vshi_volume_bake *bake, const vsh_light *lights, const vsh_run *run,
                            vsh_error *error) {
-    vsh_shade_options shade = bake->options.shade;
-    if (bake->options.ao == 0) {
-        shade.ao_method = VSH_AO_CONES; /* not asked for: it may want what is not there */
+    const size_t blocks = bake->block_count;
+    vshi_job *job = vshi_job_begin(run, "volume", (SHADE_UNITS + FILL_UNITS) * blocks);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "volume: the system refused memory");
     }
-    const bool around = !bake->normals && bake->options.ao != 0; /* AO over all directions */
     vsh_result result;
-    VSHI_TRY_DONE(
-        vshi_query_create(bake->occluders, lights, bake->light_count, &shade, around, &bake->query, error));
-    VSHI_TRY_DONE(begin_volume(bake, lights, run, error));
-    VSHI_TRY_DONE(vshi_fill_begin(&bake->fill, &bake->solid, bake->voxels, bake->volume, bake->channel_count,
-                                  bake->options.inside == VSH_INSIDE_NEAREST, error));
-    VSHI_TRY_DONE(run_passes(bake, run, error));
-    const vsh_volume_info counts = vshi_fill_counts(&bake->fill);
-    result = vshi_volume_close(bake->volume, &counts, error);
+    VSHI_TRY_DONE(vshi_volume_open(bake, lights, run, error));
+    VSHI_TRY_DONE(vshi_volume_shade(bake, lights, 0, blocks, job, SHADE_UNITS, error));
+    result = vshi_volume_finish(bake, job, FILL_UNITS, error);
 done:
     vshi_fill_end(&bake->fill);
-    vsh_query_free(bake->query);
+    vshi_job_end(job);
     return result;
 }
 
@@ -155,6 +170,58 @@ static vsh_result check(const vsh_light *lights, const vshi_volume_bake *bake, v
     return VSH_OK;
 }
 
+static void take_casters(vshi_volume_bake *bake, const vsh_occluders *occluders) {
+    vsh_field_info info;
+    vsh_field_get_info(occluders->field, &info);
+    bake->solid = vshi_solid_of(occluders);
+    bake->caster_voxel_size = info.voxel_size;
+    bake->has_triangles = occluders->triangles != NULL;
+    bake->held =
+        (double)info.bytes + (bake->has_triangles ? (double)vsh_triangles_bytes(occluders->triangles) : 0.0);
+    for (size_t i = 0; i < occluders->layer_count; ++i) {
+        bake->held += vshi_layer_bytes(&occluders->layers[i]);
+    }
+}
+
+vsh_result vshi_volume_set_up(vshi_volume_bake *bake, const vsh_occluders *occluders,
+                              const vsh_voxels *voxels, const vsh_light *lights, size_t light_count,
+                              const vsh_volume_options *options, const vsh_run *run, vsh_run *full,
+                              vsh_error *error) {
+    *bake = (vshi_volume_bake){.occluders = occluders,
+                               .voxels = voxels,
+                               .light_count = light_count,
+                               .options = vsh_volume_options_default(),
+                               .one = vsh_run_default(),
+                               .lock = PTHREAD_MUTEX_INITIALIZER,
+                               .stats = vsh_shade_stats_zero()};
+    if (occluders != NULL) {
+        take_casters(bake, occluders);
+    }
+    vsh_shade_options shade;
+    VSHI_TRY(
+        vshi_options_resolve(options, &bake->options, sizeof bake->options, "vsh_volume_options", error));
+    VSHI_TRY(vshi_shade_options_resolve(&bake->options.shade, &shade, error));
+    bake->options.shade = shade;
+    VSHI_TRY(vshi_run_resolve(run, full, error));
+    VSHI_TRY(check(lights, bake, error));
+    if (occluders != NULL && occluders->field->unknown) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "volume: the occluders have no voxels, which tell what is inside");
+    }
+    vsh_voxels_info info;
+    vsh_voxels_get_info(voxels, &info);
+    bake->normals = info.has_normals != 0;
+    bake->blocks = vshi_voxels_blocks(voxels, &bake->block_count);
+    bake->shadow_error = bake->options.error != 0 && light_count > 0 && vshi_shadow_has_rays(&shade);
+    bake->ao_error = bake->options.error != 0 && bake->options.ao != 0 && vshi_ao_has_rays(&shade);
+    bake->channel_count =
+        light_count * (bake->shadow_error ? 2 : 1) + (bake->options.ao != 0) + bake->ao_error;
+    bake->one.threads = 1;
+    bake->one.isa = full->isa;
+    find_half_axes(bake);
+    return VSH_OK;
+}
+
 vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_voxels *voxels, const vsh_light *lights,
                            size_t light_count, const vsh_volume_options *options, const vsh_run *run,
                            vsh_volume **volume, vsh_shade_stats *stats, vsh_error *error) {
@@ -165,34 +232,8 @@ vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_voxels *vox
     VSHI_NEEDS(voxels);
     VSHI_NEEDS_OF(light_count, lights);
     vsh_run full;
-    vshi_volume_bake bake = {.occluders = occluders,
-                             .solid = vshi_solid_of(occluders),
-                             .voxels = voxels,
-                             .light_count = light_count,
-                             .options = vsh_volume_options_default(),
-                             .one = vsh_run_default(),
-                             .lock = PTHREAD_MUTEX_INITIALIZER,
-                             .stats = vsh_shade_stats_zero()};
-    vsh_shade_options shade;
-    VSHI_TRY(vshi_options_resolve(options, &bake.options, sizeof bake.options, "vsh_volume_options", error));
-    VSHI_TRY(vshi_shade_options_resolve(&bake.options.shade, &shade, error));
-    bake.options.shade = shade;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    VSHI_TRY(check(lights, &bake, error));
-    if (occluders->field->unknown) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "volume: the occluders have no voxels, which tell what is inside");
-    }
-    vsh_voxels_info info;
-    vsh_voxels_get_info(voxels, &info);
-    bake.normals = info.has_normals != 0;
-    bake.blocks = vshi_voxels_blocks(voxels, &bake.block_count);
-    bake.shadow_error = bake.options.error != 0 && light_count > 0 && vshi_shadow_has_rays(&shade);
-    bake.ao_error = bake.options.error != 0 && bake.options.ao != 0 && vshi_ao_has_rays(&shade);
-    bake.channel_count = light_count * (bake.shadow_error ? 2 : 1) + (bake.options.ao != 0) + bake.ao_error;
-    bake.one.threads = 1;
-    bake.one.isa = full.isa;
-    find_half_axes(&bake);
+    vshi_volume_bake bake;
+    VSHI_TRY(vshi_volume_set_up(&bake, occluders, voxels, lights, light_count, options, run, &full, error));
     const vsh_result result = bake_all(&bake, lights, &full, error);
     if (stats != NULL) {
         vshi_shade_stats_add(stats, &bake.stats);

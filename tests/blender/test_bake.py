@@ -203,6 +203,142 @@ def test_objects_without_lightmap_uvs_get_a_map_that_does_not_overlap():
     assert set(bpy.context.selected_objects) == {floor, roof}
 
 
+def at(obj, image, x, y):
+    """R of the image where a point of a quad of 2 × 2 around the origin has its UVs."""
+    uvs = [loop.uv for loop in obj.data.uv_layers["Lightmap"].data]
+    s, t = (x + 1.0) / 2.0, (y + 1.0) / 2.0
+    u, v = ((1 - t) * ((1 - s) * uvs[0][k] + s * uvs[1][k]) + t * (s * uvs[2][k] + (1 - s) * uvs[3][k]) for k in range(2))
+    return value(image, u, v)
+
+
+def test_the_image_fits_uvs_that_were_made():
+    floor, roof, _ = start(lightmap=False)
+    select(floor, roof)
+    image = bake()
+    assert at(floor, image, -0.5, 0.2) < 0.02 and at(floor, image, 0.5, 0.2) > 0.98
+    assert at(floor, image, 0.9, -0.9) > 0.98 and at(floor, image, -0.9, 0.9) < 0.02
+
+
+def test_objects_that_share_a_mesh_have_a_place_each():
+    floor, roof, _ = start(lightmap=False)
+    other = bpy.data.objects.new("other", floor.data)
+    other.location.x = 2.0  # beside it, under no roof: lit where x > 0
+    bpy.context.collection.objects.link(other)
+    bpy.context.view_layer.update()
+    select(floor, other)
+    image = bake()
+    assert floor.data != other.data
+    assert at(floor, image, -0.5, 0.0) < 0.02 and at(other, image, -0.5, 0.0) > 0.98
+    uvs = [sorted(tuple(loop.uv) for loop in obj.data.uv_layers["Lightmap"].data) for obj in (floor, other)]
+    assert uvs[0][3][0] < uvs[1][0][0] or uvs[1][3][0] < uvs[0][0][0] or \
+        max(uv[1] for uv in uvs[0]) < min(uv[1] for uv in uvs[1]) or max(uv[1] for uv in uvs[1]) < min(uv[1] for uv in uvs[0]), uvs
+
+
+def test_uvs_that_serve_are_kept_as_charts():
+    floor, roof, _ = start()
+    own = [(0, 0), (1, 0), (1, 0.25), (0, 0.25)]
+    for loop, uv in zip(floor.data.uv_layers["Baked"].data, own):
+        loop.uv = uv
+    roof.location.z = 3.0
+    select(floor, roof)
+    bake()
+    # the roof had none, so the floor's own are packed with it, four times as long as high
+    assert [tuple(loop.uv) for loop in floor.data.uv_layers["Baked"].data] == own
+    uvs = [loop.uv for loop in floor.data.uv_layers["Lightmap"].data]
+    assert 3.0 < (uvs[1] - uvs[0]).length / (uvs[2] - uvs[1]).length < 5.0, uvs
+
+
+def test_what_collections_show_of_others_casts():
+    floor, roof, _ = start()
+    hidden = bpy.data.collections.new("shown elsewhere")
+    bpy.context.collection.objects.unlink(roof)
+    hidden.objects.link(roof)
+    bpy.context.view_layer.update()
+    assert value(bake(), 0.25, 0.5) == 1.0
+    empty = bpy.data.objects.new("copy", None)
+    empty.instance_type, empty.instance_collection = "COLLECTION", hidden
+    empty.rotation_euler = (0.0, 0.0, math.pi)  # the roof over x < 0
+    empty.location.z = 1.0  # 2 above the floor: it hides -3 < x < -2
+    bpy.context.collection.objects.link(empty)
+    bpy.context.view_layer.update()
+    assert value(bake(), 0.25, 0.5) == 1.0
+    empty.rotation_euler, empty.location.z = (0.0, 0.0, 0.0), 0.0
+    bpy.context.view_layer.update()
+    image = bake()
+    assert value(image, 0.25, 0.5) < 0.02 and value(image, 0.75, 0.5) > 0.98
+    empty.hide_render = True
+    bpy.context.view_layer.update()
+    assert value(bake(), 0.25, 0.5) == 1.0
+
+
+def test_modifiers_carry_the_uvs_that_were_made():
+    floor, roof, _ = start(lightmap=False)
+    floor.modifiers.new("fine", "SUBSURF").subdivision_type = "SIMPLE"
+    bpy.context.view_layer.update()
+    select(floor)
+    image = bake()
+    assert len(floor.data.polygons) == 1 and len(floor.data.uv_layers["Lightmap"].data) == 4
+    assert at(floor, image, -0.5, 0.0) < 0.02 and at(floor, image, 0.5, 0.0) > 0.98
+
+
+def test_uvs_fit_the_form_that_modifiers_give():
+    floor, roof, settings = start(lightmap=False)
+    bpy.data.objects.remove(roof)
+    stretch = floor.modifiers.new("cast", "SIMPLE_DEFORM")
+    stretch.deform_method, stretch.factor, stretch.deform_axis = "STRETCH", 3.0, "X"
+    bpy.context.view_layer.update()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    size = floor.evaluated_get(depsgraph).dimensions
+    assert size.x > 2.0 * size.y, tuple(size)
+    bake()
+    uvs = [loop.uv for loop in floor.data.uv_layers["Lightmap"].data]
+    wide, high = (uvs[1] - uvs[0]).length, (uvs[2] - uvs[1]).length
+    assert abs(wide / high / (size.x / size.y) - 1.0) < 0.3, (wide, high, tuple(size))
+
+
+def test_each_of_several_materials_shows_the_image_by_the_same_uvs():
+    floor, roof, _ = start(lightmap=False)
+    mesh = bpy.data.meshes.new("two")
+    mesh.from_pydata(FLOOR + [(1, -1, 1), (1, 1, 1)], [], [(0, 1, 2, 3), (1, 4, 5, 2)])
+    two = bpy.data.objects.new("two", mesh)
+    bpy.context.collection.objects.link(two)
+    for name in ("stone", "wood"):
+        mesh.materials.append(bpy.data.materials.new(name))
+    mesh.polygons[1].material_index = 1
+    bpy.context.view_layer.update()
+    select(two)
+    image = bake()
+    for slot in two.material_slots:
+        nodes = slot.material.node_tree.nodes
+        assert nodes["vdbshade image"].image == image and nodes["vdbshade UV"].uv_map == "Lightmap", slot.name
+    assert [slot.material.name for slot in two.material_slots] == ["stone", "wood"]
+
+
+def test_uvs_are_made_only_where_that_is_allowed():
+    floor, roof, settings = start(lightmap=False)
+    settings.unwrap = "NEVER"
+    assert "'floor': has no UV map for a lightmap" in error_of(bpy.ops.vdbshade.bake)
+    floor, roof, settings = start()
+    bake()
+    assert "Lightmap" not in floor.data.uv_layers, "UVs where none were needed"
+    settings.unwrap = "ALWAYS"
+    bake()
+    assert "Lightmap" in floor.data.uv_layers
+
+
+def test_a_bake_that_fails_takes_its_uvs_back():
+    floor, roof, settings = start(lightmap=False)
+    other = bpy.data.objects.new("other", floor.data)
+    other.location.x = 2.0
+    bpy.context.collection.objects.link(other)
+    bpy.data.objects.remove(bpy.data.objects["sun"])  # what is asked for after the layout
+    bpy.context.view_layer.update()
+    select(floor, other)
+    assert "no sun" in error_of(bpy.ops.vdbshade.bake)
+    assert floor.data == other.data and len(bpy.data.meshes) == 2, list(bpy.data.meshes)
+    assert [layer.name for layer in floor.data.uv_layers] == ["UVMap"]
+
+
 def test_transforms_and_modifiers_count():
     floor, roof, settings = start(sun=(0.0, 0.0, 0.0))
     roof.scale = (-1.0, 1.0, 1.0)  # mirrored: over x < 0 now

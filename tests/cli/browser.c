@@ -159,8 +159,19 @@ static void mouse(const char *type, double x, double y, int buttons) {
                                "clickCount", 1)));
 }
 
+/* Sets what a field holds, as a user's choice of it does. */
+static void choose(const char *id, const char *value) {
+    char script[512];
+    snprintf(script, sizeof script,
+             "{ const field = document.getElementById('%s'); field.value = '%s';"
+             " field.dispatchEvent(new Event('input')); field.dispatchEvent(new Event('change')); } ''",
+             id, value);
+    free(evaluate(script));
+}
+
 static void act(const char *action) {
     double a[4];
+    char id[64], value[64];
     if (sscanf(action, "click:%lf,%lf", a, a + 1) == 2) {
         mouse("mousePressed", a[0], a[1], 1);
         mouse("mouseReleased", a[0], a[1], 0);
@@ -175,6 +186,8 @@ static void act(const char *action) {
         json_decref(call("Input.dispatchKeyEvent",
                          json_pack("{s:s,s:s,s:s}", "type", "keyDown", "key", key, "text", text)));
         json_decref(call("Input.dispatchKeyEvent", json_pack("{s:s,s:s}", "type", "keyUp", "key", key)));
+    } else if (sscanf(action, "value:%63[^=]=%63s", id, value) == 2) {
+        choose(id, value);
     } else {
         stop(action);
     }

@@ -1,5 +1,5 @@
-# Every scene in docs/scene.md and docs/flat.md bakes, and every command in docs/query.md, docs/volume.md,
-# docs/render.md, docs/lit.md, docs/regression.md and docs/view.md runs.
+# Every scene in docs/scene.md and docs/flat.md bakes, and every command in docs/query.md, docs/field.md,
+# docs/volume.md, docs/render.md, docs/lit.md, docs/regression.md and docs/view.md runs.
 load helper
 
 : "${DOCS:=$BATS_TEST_DIRNAME/../../docs}"
@@ -66,6 +66,10 @@ run_commands() {
     [ -s shaded.csv ] && [ -s props-lit.ply ] && [ "$(wc -l <sorted.csv)" -eq 2 ]
 }
 
+@test "every command of docs/field.md" {
+    run_commands field.md 4
+}
+
 @test "every command of docs/volume.md" {
     "$VDBSHADE" volume seeds.json --box -1,0,-1,1,1,1 --box-voxel-size 0.2 -o fog.vdb --quiet
     sed "s/fog.vdb:density/fog.vdb:ao/" "$DOCS/volume.md" >volume.md
@@ -100,13 +104,13 @@ run_commands() {
 # options_of FILE …: each option that is named there, once. Those of other programs are left out.
 options_of() {
     grep -ohE -- '(^|[^[:alnum:]-])--[a-z][a-z0-9-]*' "$@" | grep -oE -- '--.*' | sort -u |
-        grep -vxE -- '--(cflags|libs|install|stat|leak-check|preset|count|limit|runs|seconds)' # of CMake, pkg-config, git, tools/…
+        grep -vxE -- '--(cflags|libs|install|stat|leak-check|preset|count|limit|runs|seconds|array|partition|retries|wd|kill-on-invalid-dep|build|component|prefix|static|test)' # of CMake, pkg-config, git, tools/…
 }
 
 @test "the documents name every option of --help, and no other" {
     local command
     "$VDBSHADE" --help >help.txt
-    for command in bake voxelize info trade query volume flat render compare regress unwrap view; do
+    for command in bake voxelize info trade query volume flat render compare regress unwrap view merge field help; do
         "$VDBSHADE" "$command" --help >>help.txt
     done
     options_of help.txt >told.txt
@@ -119,7 +123,7 @@ options_of() {
     cat "$BATS_TEST_DIRNAME"/../../include/vdbshade/*.h | grep -oE '\b(vsh|VSH)_[A-Za-z0-9_]+' | sort -u >declared.txt
     # bench's programs, and what CMake and the tests are told
     grep -ohE '\b(vsh|VSH)_[A-Za-z0-9_]*[A-Za-z0-9]\b' "$DOCS"/*.md "$DOCS/../README.md" |
-        grep -vxE 'vsh_bench|vsh_cancel|VSH_(CLAIMS|BITS|TESTS|WERROR|EMBREE|OIIO|DRACO|WATCH.*|BENCH.*)' | sort -u >names.txt
+        grep -vxE 'vsh_bench|vsh_cancel|VSH_(CLAIMS|BITS|TESTS|WERROR|PYTHON|EMBREE|OIIO|DRACO|WATCH.*|BENCH.*)' | sort -u >names.txt
     [ "$(wc -l <names.txt)" -gt 20 ] || fail "too few: $(cat names.txt)"
     comm -13 declared.txt names.txt >unknown.txt
     [ ! -s unknown.txt ] || fail "not in a header: $(cat unknown.txt)"

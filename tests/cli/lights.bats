@@ -1,4 +1,4 @@
-# --lights: the lights that a glTF has, in place of those that the command line or a scene names, or with them.
+# --lights, and "file" among a scene's lights: those that a glTF has, with those that the command line or a scene names.
 load helper
 
 # A floor of 4 × 4 and a plate over it.
@@ -100,4 +100,107 @@ JSON
     write_lit lit.gltf "$(down 0 lamp 0,3,0)" "$LAMP"
     shade bake box.obj --lights lit.gltf -o lit.gltf
     refused 2 'the output is the file of --lights'
+}
+
+# write_scene FILE LIGHTS [MORE]: a scene of lit.gltf with its floor as receiver.
+write_scene() {
+    printf '{"casters": [{"mesh": "lit.gltf"}], "lights": [%s], %s
+        "receivers": [{"mesh": "lit.gltf", "objects": "floor", "size": 32, "output": "scene.exr"}]}\n' "$2" "${3:-}" >"$1"
+}
+
+@test "a scene takes the lights of a file among its own, as --lights takes them" {
+    write_lit lit.gltf "$(down 0 sun 0,7,0), $(down 1 lamp 1,3,0)" "$SUN,$LAMP"
+    write_scene scene.json '{"type": "file", "file": "lit.gltf", "angle_deg": 9, "radius": 0.25}'
+    shade bake scene.json
+    done_well
+    shade bake lit.gltf --lights file --sun-angle 9 --light-radius 0.25 --receive floor --size 32 -o line.exr
+    done_well
+    same_values scene.exr line.exr || fail 'not the same values'
+    mkdir -p elsewhere
+    write_lit elsewhere/lamps.gltf "$(down 0 spot 0,4,0)" "$SPOT"
+    write_scene scene.json '{"name": "first", "type": "directional", "direction": [0, 1, 0]},
+        {"type": "file", "file": "lit.gltf"}, {"type": "file", "file": "elsewhere/lamps.gltf"},
+        {"name": "last", "type": "directional", "direction": [0, 1, 0]}'
+    shade info scene.json
+    [ "$(grep -o "^light '[a-z]*'" <<<"$output" | tr -d '\n')" = "light 'first'light 'sun'light 'lamp'light 'spot'light 'last'" ] || fail "$output"
+    [[ $output == *"light 'sun': directional towards 0 1 0, 0.529985"* ]] || fail 'not the sun of the sky'
+    shade bake scene.json
+    done_well
+    shade info scene.exr
+    [[ $output == *lamps.gltf* ]] || fail 'the file is no input of the output'
+}
+
+@test "layers know the lights of a file by name, and a file's lights know layers" {
+    write_lit lit.gltf "$(down 0 sun 0,7,0), $(down 1 lamp 1,3,0)" "$SUN,$LAMP"
+    printf '0 0.1 0\n' >points.xyz # in the plate's shadow by every light
+    layered() { # LAYER FILE VALUES: more of the layer, of the file of lights; what sun, lamp and own leave
+        printf '{"casters": [{"mesh": "lit.gltf", "objects": "floor"}, {"mesh": "lit.gltf", "objects": "plate", "layer": "plates"}],
+            "layers": [{"name": "plates"%s}], "lights": [{"type": "file", "file": "lit.gltf"%s},
+            {"name": "own", "type": "directional", "direction": [0, 1, 0]}]}' "$1" "$2" >scene.json
+        shade query scene.json --points points.xyz -o answers.csv --answers-only
+        done_well
+        [ "$(cat answers.csv)" = "shadow.sun,shadow.lamp,shadow.own"$'\n'"$3" ] || fail "$(cat answers.csv)"
+    }
+    layered '' '' 0,0,0
+    layered ', "lights": ["lamp"]' '' 1,0,1
+    layered '' ', "layers": []' 1,1,0
+    write_scene scene.json '{"type": "file", "file": "lit.gltf"}' '"layers": [{"name": "a", "lights": ["moon"]}],'
+    shade bake scene.json
+    refused 2 'layers[0].lights[0]: "moon" is none of the scene'
+}
+
+@test "render, query, volume and trade take the lights of a file" {
+    write_lit lit.gltf "$(down 0 lamp 1,3,0)" "$LAMP"
+    printf '0 0.1 0\n-1.9 0.1 -1.9\n' >points.xyz
+    shade query lit.gltf --lights file --light-radius 0.1 --points points.xyz -o answers.csv --answers-only
+    done_well
+    [ "$(cat answers.csv)" = $'shadow.lamp\n0\n1' ] || fail "$(cat answers.csv)"
+    shade volume lit.gltf --lights lit.gltf --box -1,0.1,-1,1,0.3,1 --box-voxel-size 0.1 -o out.vdb
+    done_well
+    shade info out.vdb
+    [[ $output == *shadow.lamp* ]] || fail "$output"
+    shade render lit.gltf --lights lit.gltf --size 48x32 -o lamp.png
+    done_well
+    shade render lit.gltf --sun 0,1,0 --size 48x32 -o sun.png
+    ! cmp -s lamp.png sun.png || fail 'the picture of another light'
+    write_scene scene.json ''
+    shade trade scene.json --lights lit.gltf --size 16 --resolutions 16 --truth-rays 16 --budget 0.001 -o out.html --csv out.csv
+    done_well
+    grep -q '^shadow,' out.csv || fail 'no shadow'
+}
+
+@test "--unit moves the lights of a scene's files with its meshes" {
+    write_lit lit.gltf "$(down 0 lamp 1,3,0)" "$LAMP"
+    write_scene scene.json '{"name": "sky", "type": "directional", "direction": [0, 1, 0]}, {"type": "file", "file": "lit.gltf"}'
+    shade bake scene.json --unit cm
+    done_well
+    shade info scene.exr
+    [[ $output == *'vdbshade_light_lamp: sphere at 0.01 0.03 0,'* ]] || fail "$output"
+    write_scene scene.json '{"type": "file", "file": "lit.gltf"}' '"unit": "mm",'
+    shade info scene.json
+    [[ $output == *"light 'lamp': sphere at 0.001 0.003 0,"* ]] || fail "$output"
+}
+
+@test "what is wrong with a file of lights is told with its place" {
+    write_lit lit.gltf "$(down 0 lamp 1,3,0)" "$LAMP"
+    write_box box.obj
+    for one in '{"type": "file"}|lights[0]: key "file" is missing' \
+        '{"type": "file", "file": "box.obj"}|lights[0].file: box.obj has no lights' \
+        '{"type": "file", "file": "none.glb"}|none.glb' \
+        '{"type": "file", "file": "lit.gltf", "radius": -1}|lights[0].radius: -1 is out of range' \
+        '{"type": "file", "file": "lit.gltf", "angle_deg": 180}|lights[0].angle_deg: 180 is out of range' \
+        '{"type": "file", "file": "lit.gltf", "color": [1, 1, 1]}|lights[0].color: unknown key' \
+        '{"type": "file", "file": "lit.gltf"}, {"type": "file", "file": "lit.gltf"}|lights[1]: has a light "lamp", as lights[0] has' \
+        '{"type": "file", "file": "lit.gltf"}, {"name": "lamp", "type": "directional", "direction": [0, 1, 0]}|lights[1]: has a light "lamp", as lights[0]'; do
+        write_scene scene.json "${one%|*}"
+        shade bake scene.json
+        [[ $status -ge 2 && $stderr == *"${one#*|}"* ]] || fail "${one%|*}: $stderr"
+    done
+    write_scene scene.json '{"type": "file", "file": "lit.gltf"}'
+    shade bake scene.json --lights file
+    refused 2 "--lights 'file': scene.json is a scene"
+    cp lit.gltf lights.gltf
+    write_scene scene.json '{"type": "file", "file": "lights.gltf"}'
+    shade bake scene.json -o lights.gltf
+    refused 2 'lights.gltf: the output is also a file of lights'
 }

@@ -83,7 +83,7 @@ BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
     for words in "--preview -o a.png" "--embed -o a.exr" "--exr b.exr -o a.png" "--images-beside -o a.tif"; do
         # shellcheck disable=SC2086
         shade bake in.glb "${BAKE[@]}" $words
-        refused 2 "${words%% *}" ".glb or .gltf"
+        refused 2 "${words%% *}" ".glb, .gltf or .obj"
     done
     shade bake in.glb "${BAKE[@]}" --embed --images-beside -o a.glb
     refused 2 --embed --images-beside
@@ -91,8 +91,6 @@ BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
     refused 2 b.png .exr
     shade bake in.glb "${BAKE[@]}" --exr in.glb -o a.glb
     refused 2
-    shade bake in.glb "${BAKE[@]}" --per-object -o a.glb
-    refused 2 --per-object
     shade bake in.glb "${BAKE[@]}" --bits 32 -o a.glb
     refused 2 a.glb "32 bits"
     shade bake in.glb "${BAKE[@]}" --pack R=ao -o a.glb
@@ -193,4 +191,48 @@ JSON
     shade info dark.lightmap.png
     # 0.5 of 8 bits, in every texel
     [[ $output == *"min 0.50196"*"max 0.50196"* ]] || fail "$output"
+}
+
+@test "baked again over its own output, or beside files of its input, a glTF replaces only what is its own" {
+    shade bake "$ASSETS/thin.glb" --ao 0.5 --size 32 -o lit.gltf
+    done_well
+    cp lit.gltf in.gltf # which names lit.bin and lit.occlusion.png
+    cp lit.bin bin.before
+    cp lit.occlusion.png png.before
+    for again in 1 2; do
+        shade bake in.gltf --ao 0.2 --size 32 -o new.gltf
+        done_well
+        shade bake in.gltf --ao 0.2 --size 32 -o lit.gltf
+        done_well
+    done
+    [ "$(ls lit.* new.*)" = "$(printf '%s\n' lit.1.bin lit.bin lit.gltf lit.occlusion.1.png lit.occlusion.png new.bin new.gltf new.occlusion.png)" ] || fail "$(ls)"
+    cmp lit.bin bin.before && cmp lit.occlusion.png png.before || fail 'a file of the input was replaced'
+    grep -q '"uri": "lit.1.bin"' lit.gltf && grep -q '"uri": "lit.occlusion.1.png"' lit.gltf || fail "$(grep uri lit.gltf)"
+    cmp lit.occlusion.1.png new.occlusion.png || fail 'another image'
+}
+
+@test "an asset says where it comes from, in its extras, as images do" {
+    shade bake "$ASSETS/thin.glb" --ao 0.5 --size 32 -o lit.gltf --exr lit.exr
+    done_well
+    shade info lit.exr
+    told=$(grep '^vdbshade_' <<<"$output" | grep -v '^vdbshade_rgb') # which is of the EXR's own picture
+    [[ $told == *vdbshade_ao:* && $told == *vdbshade_input_0:\ sha256:*thin.glb* && $told == *"vdbshade_command: bake --ao 0.5"* ]] || fail "$told"
+    python3 -c 'import json, sys
+extras = json.load(open("lit.gltf"))["asset"]["extras"]
+print("\n".join("%s: %s" % one for one in extras.items()))' >extras
+    [ "$(cat extras)" = "$told" ] || fail "$(cat extras), not $told"
+    # others' stay, and what an earlier bake has told goes
+    sed -i 's/"extras": {/"extras": {"mine": [1], "vdbshade_old": "x",/' lit.gltf
+    grep -q '"mine"' lit.gltf
+    latin=$(printf 'n\xe9.gltf')
+    mv lit.gltf "$latin"
+    shade bake "$latin" --ao 0.2 --size 32 -o again.gltf
+    done_well
+    python3 -c 'import json, sys
+extras = json.load(open("again.gltf"))["asset"]["extras"]
+assert extras["mine"] == [1] and "vdbshade_old" not in extras and "--ao 0.2" in extras["vdbshade_command"], extras
+assert extras["vdbshade_input_0"].endswith("n\ufffd.gltf"), extras'
+    shade bake "$ASSETS/thin.glb" --ao 0.5 --size 32 -o lit.obj
+    done_well
+    grep -q '^# vdbshade_ao: ' lit.obj && grep -q '^# vdbshade_input_0: sha256' lit.obj || fail "$(head -9 lit.obj)"
 }

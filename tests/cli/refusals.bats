@@ -71,7 +71,7 @@ setup() {
     unless_sanitized "its shadow memory does not fit"
     write_box box.obj
     for most in 40 60 80 100 120 140 160 200; do
-        for what in "voxelize --resolution 16 -o out.vdb" "render --sun 1,2,1 --size 16 -o out.png"; do
+        for what in "voxelize --resolution 16 -o out.vdb" "render --sun 1,2,1 --size 16 -o out.tif"; do
             run --separate-stderr bash -c 'ulimit -d "$1"; shift; exec "$@"' bash $((most * 1000)) "$VDBSHADE" ${what%% *} \
                 box.obj ${what#* } --trusted --threads 1 --quiet
             [ "$status" -eq 0 ] || [ "$status" -eq 4 ] || fail "$most MB, $what"

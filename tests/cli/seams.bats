@@ -85,3 +85,90 @@ TUBE=(--sun 0.1,1,0.3 --sun-angle 60 --ao 1 --size 48 --quiet)
     [[ $output == *'scene.json:2:'*'padding: "all" is none of auto, a whole number from 0 to 4096'* ]]
     [ ! -e out.exr ]
 }
+
+@test "a face that is hidden where boxes touch takes what is nearest beside it" {
+    write_box box.obj
+    # another one on top of it
+    { cat box.obj; echo 'o upper'; sed -n 's/^v //p' box.obj | awk '{print "v", $1, $2 + 1, $3}'
+      sed -n 's/^f //p' box.obj | awk '{ out = "f"; for (i = 1; i <= NF; ++i) { split($i, p, "/"); out = out " " p[1] + 8 "/" p[2] } print out }'
+    } >two.obj
+    for seams in keep fix; do
+        shade bake two.obj --ao 1 --max-error 0.02 --size 128 --unwrap always --seams $seams -o $seams.exr --quiet
+        [ "$status" -eq 0 ] || fail "$stderr"
+        shade info $seams.exr
+        grep -o "'ao': min 0, mean [0-9.]*" <<<"$output" | grep -o '[0-9.]*$' >$seams.mean
+    done
+    # all that is seen is 1; two faces of twelve are hidden, some of whose texels padding reaches
+    paste keep.mean fix.mean | awk '{ exit !($1 > 0.3 && $2 > 1.03 * $1) }' || fail "$(cat keep.mean fix.mean)"
+    # nothing that is seen is another
+    run -0 "$VDBSHADE" compare keep.exr fix.exr --max-difference 0.020001 --max-coverage 0
+}
+
+# Two tiles of a floor side by side, two objects, and a box that stands over where they meet and only casts.
+write_tiles() {
+    cat >"$1" <<'EOF'
+o left
+v -2 0 -1
+v 0 0 -1
+v 0 0 1
+v -2 0 1
+f 4 3 2 1
+o right
+v 0 0 -1
+v 2 0 -1
+v 2 0 1
+v 0 0 1
+f 8 7 6 5
+EOF
+    write_box box.obj
+    awk '/^v / {print "v", $2 - 0.7, $3 + 0.6, $4 - 0.5}' box.obj >>"$1"
+    echo 'o box' >>"$1"
+    sed -n 's/^f //p' box.obj | awk '{ out = "f"; for (i = 1; i <= NF; ++i) { split($i, p, "/"); out = out " " p[1] + 8 } print out }' >>"$1"
+}
+
+@test "borders between two lightmaps are stitched, by no more than the error" {
+    write_tiles tiles.obj
+    for seams in keep fix; do
+        shade bake tiles.obj --no-receive box --ao 2 --max-error 0.02 --size 48 --unwrap always --atlas objects --seams $seams -o $seams.exr --quiet
+        [ "$status" -eq 0 ] || fail "$stderr"
+    done
+    for tile in left right; do # which is one chart, without a seam of its own
+        run -1 same_values keep.$tile.exr fix.$tile.exr
+        run -0 "$VDBSHADE" compare keep.$tile.exr fix.$tile.exr --max-difference 0.020001 --max-coverage 0
+    done
+    # the same in one receiver each
+    cat >two.json <<'EOF'
+{"casters": [{"mesh": "tiles.obj"}], "ao": {"distance": 2},
+ "receivers": [{"mesh": "tiles.obj", "objects": "left", "unwrap": "always", "size": 48, "seams": "fix", "output": "two.left.exr"},
+               {"mesh": "tiles.obj", "objects": "right", "unwrap": "always", "size": 48, "seams": "fix", "output": "two.right.exr"}]}
+EOF
+    shade bake two.json --max-error 0.02 --quiet
+    [ "$status" -eq 0 ] || fail "$stderr"
+    same_values fix.left.exr two.left.exr
+    same_values fix.right.exr two.right.exr
+    # threads change nothing
+    shade bake two.json --max-error 0.02 --quiet --threads 3 --output-folder three
+    [ "$status" -eq 0 ] || fail "$stderr"
+    same_values fix.left.exr three/two.left.exr
+}
+
+@test "lightmaps that memory does not hold together keep the seams between them, with a warning" {
+    write_tiles tiles.obj
+    tiles() {
+        shade bake tiles.obj --no-receive box --ao 2 --max-error 0.1 --ao-spacing 8 --size 256 --unwrap always --atlas objects --seams fix --threads 1 \
+            -o part.exr --memory-limit "$1"k
+        [ "$status" -eq 0 ] || [ "$status" -eq 4 ] || fail "$stderr"
+    }
+    tiles 1000000
+    [[ $stderr != *"seams"* ]] || fail "$stderr"
+    # the least by which each is whole
+    low=12000 high=60000
+    while [ $((high - low)) -gt 250 ]; do
+        middle=$(((low + high) / 2))
+        tiles $middle
+        if [ "$status" -eq 4 ] || [[ $stderr == *bands* ]]; then low=$middle; else high=$middle; fi
+    done
+    tiles $high
+    [[ $stderr == *"tiles.obj: seams between lightmaps are kept: no memory to hold 2 at once; raise --memory-limit"* ]] || fail "$high: $stderr"
+    [ "$(grep -c 'seams between' <<<"$stderr")" -eq 1 ] || fail "not once: $stderr"
+}

@@ -41,6 +41,29 @@ setup() {
     grep -q '^usemtl page_1' out.obj || fail "no second page"
 }
 
+@test "objects have pages of their own, with their names as materials, as small as a density needs" {
+    {
+        cat bare.obj
+        echo 'o second'
+        sed -n 's/^v //p' bare.obj | awk '{print "v", 3 * $1 + 5, 3 * $2, 3 * $3}'
+        sed -n 's/^f //p' bare.obj | awk '{ out = "f"; for (i = 1; i <= NF; ++i) out = out " " $i + 8; print out }'
+    } >two.obj
+    shade unwrap two.obj -o out.obj --atlas objects --max-size 256 --texels-per-unit 8 --picture charts.png
+    done_well
+    [[ $stderr == *"12 charts on 2 pages of up to 128 × 64"* ]] || fail "no summary"
+    [ "$(grep '^usemtl' out.obj | tr '\n' ' ')" = "usemtl box usemtl second " ] || fail "$(grep usemtl out.obj)"
+    shade info charts.png
+    [[ $output == *"128 × "* ]] || fail "no picture of the pages"
+    shade unwrap two.obj -o out.obj --atlas objects --pages 2
+    refused 2 --pages
+    shade unwrap two.obj -o out.obj --atlas each
+    refused 2 --atlas objects
+    shade unwrap two.obj -o out.obj --max-size 64
+    refused 2 --max-size --texels-per-unit
+    shade unwrap two.obj -o out.obj --max-size 64 --size 32 --texels-per-unit 1
+    refused 2 --max-size --size
+}
+
 @test "UVs that can serve are kept, and densities go by name" {
     shade unwrap box.obj -o out.obj --size 128 --keep
     done_well
@@ -48,7 +71,7 @@ setup() {
     shade unwrap box.obj -o out.obj --size 128 --density 'b*=0.5'
     done_well
     shade unwrap box.obj -o out.obj --density none=2
-    refused 2 none
+    refused 2 none "'box'"
     shade unwrap box.obj -o out.obj --density 3
     refused 2 --density
 }
@@ -65,8 +88,8 @@ setup() {
     old_output out.obj
     shade unwrap box.obj
     refused 2 -o
-    shade unwrap box.obj -o out.glb
-    refused 2 out.glb
+    shade unwrap box.obj -o out.ply
+    refused 2 out.ply
     shade unwrap box.obj -o none/out.obj
     refused 3 none/out.obj
     shade unwrap box.obj -o box.obj

@@ -122,3 +122,114 @@ write_two() {
     "$VDBSHADE" bake two.obj "${SMALL[@]}" --size 64 --ao 1 --unwrap always --threads 4 --band-rows 8 -o four.exr --quiet
     same_values one.exr four.exr
 }
+
+# As SMALL, without a size.
+FIT=(--sun 0.3,1,0.2 --resolution 24)
+
+# The two boxes, the second twice as large.
+write_uneven() {
+    write_two even.obj
+    awk '/^o second/ {s = 1} /^v / && s {print "v", $2 * 2 - 3, $3 * 2, $4 * 2; next} {print}' even.obj >"$1"
+    rm even.obj
+}
+
+@test "of an atlas of objects each has the image that it has alone" {
+    write_uneven two.obj
+    for objects in "--atlas objects" "--per-object"; do
+        rm -rf maps
+        # shellcheck disable=SC2086
+        shade bake two.obj "${SMALL[@]}" --size 32 --ao 1 --unwrap always $objects -o maps/
+        [ "$status" -eq 0 ] || fail "$stderr"
+        [ "$(echo maps/*)" = "maps/box.exr maps/second.exr" ] || fail "$(echo maps/*)"
+    done
+    shade bake two.obj "${SMALL[@]}" --size 32 --ao 1 --unwrap always --receive second -o alone.exr
+    [ "$status" -eq 0 ] || fail "$stderr"
+    same_values alone.exr maps/second.exr
+}
+
+@test "a scene names its images by objects, as small as their densities need" {
+    write_uneven two.obj
+    cat >scene.json <<EOF
+{"casters": [{"mesh": "two.obj"}], "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0]}],
+ "receivers": [{"mesh": "two.obj", "output": "map.png", "unwrap": "always", "atlas": "objects",
+                "texels_per_unit": 8, "max_size": 256, "density": {"*": 0.5, "second": 2}}]}
+EOF
+    shade bake scene.json
+    [ "$status" -eq 0 ] || fail "$stderr"
+    shade info map.box.png
+    [[ $output == *"32 × 16"* ]] || fail "$output"
+    shade info map.second.png
+    [[ $output == *"128 × 64"* || $output == *"128 × 128"* ]] || fail "$output"
+    [ ! -e map.png ] || fail "$(ls)"
+    sed 's/"second": 2/"secnd": 2/' scene.json >bad.json
+    shade bake bad.json
+    refused 2 "no object is named 'secnd'" "did you mean 'second'?" "'box'"
+    sed 's/"second": 2/"second": 0/' scene.json >bad.json
+    shade bake bad.json
+    refused 2 density
+    sed 's/"density": {[^}]*}/"density": 3/' scene.json >bad.json
+    shade bake bad.json
+    refused 2 density
+}
+
+@test "densities go by name, and a pattern that means none is refused with the names" {
+    write_two two.obj
+    shade bake two.obj "${SMALL[@]}" --size 128 --unwrap always --texels-per-unit 8 --receive second -o plain.exr --stats plain.json
+    shade bake two.obj "${SMALL[@]}" --size 128 --unwrap always --texels-per-unit 8 --density 'b*=3' --density 'sec*=2' \
+        --receive second -o dense.exr --stats dense.json
+    [ "$status" -eq 0 ] || fail "$stderr"
+    few=$(grep -o '"texels": [0-9]*' plain.json | grep -o '[0-9]*')
+    many=$(grep -o '"texels": [0-9]*' dense.json | grep -o '[0-9]*')
+    # four times as many, and a border
+    [ "$many" -ge $((3 * few)) ] && [ "$many" -le $((4 * few)) ] || fail "$few, then $many texels"
+    shade bake two.obj "${SMALL[@]}" --unwrap always --density 'x*=2' -o x.exr
+    refused 2 two.obj "'x*'" "'box', 'second'"
+    shade bake two.obj "${SMALL[@]}" --unwrap always --density 'box' -o x.exr
+    refused 2 --density PATTERN=X
+    shade bake two.obj "${SMALL[@]}" --unwrap always --density 'box=-1' -o x.exr
+    refused 2 --density
+}
+
+@test "an asset of objects has a lightmap for each, and materials of its own where they show one" {
+    write_uneven two.obj
+    shade bake two.obj "${FIT[@]}" --ao 1 --unwrap always --atlas objects --texels-per-unit 8 --max-size 128 --seams keep -o lit.gltf --exr all.exr
+    [ "$status" -eq 0 ] || fail "$stderr"
+    for file in lit.lightmap.box.png lit.lightmap.second.png lit.occlusion.second.png all.box.exr all.second.exr; do
+        [ -s "$file" ] || fail "no $file: $(ls)"
+    done
+    grep -q '"lightmap of box"' lit.gltf || fail "no name of an image"
+    [ "$(grep -o '"MOZ_lightmap": {' lit.gltf | wc -l)" -eq 2 ] || fail "not two materials: $(cat lit.gltf)"
+    shade info lit.lightmap.box.png
+    [[ $output == *"64 × 32"* ]] || fail "$output"
+    shade info lit.lightmap.second.png
+    [[ $output == *"64 × 64"* ]] || fail "$output"
+    # the values are those of the images
+    shade bake two.obj "${FIT[@]}" --ao 1 --irradiance --ambient 0.25,0.25,0.25 --atlas objects --texels-per-unit 8 --max-size 128 \
+        --unwrap always -o maps/
+    same_values maps/second.exr all.second.exr
+}
+
+@test "objects whose UVs each fill the square are lit as they are, with a lightmap for each" {
+    write_two two.obj
+    "$VDBSHADE" bake two.obj "${SMALL[@]}" --irradiance --ambient 0.25,0.25,0.25 --size 64 --per-object -o maps/ --quiet
+    shade bake two.obj "${SMALL[@]}" --size 64 --per-object --seams keep -o lit.glb --exr all.exr
+    [ "$status" -eq 0 ] || fail "$stderr"
+    same_values maps/box.exr all.box.exr
+    same_values maps/second.exr all.second.exr
+    [ "$(grep -ao '"MOZ_lightmap":{' lit.glb | wc -l)" -eq 2 ] || fail "not two materials"
+    ! grep -aq TEXCOORD_1 lit.glb || fail "new UVs"
+}
+
+@test "what does not go together with an atlas of objects or a largest size is refused" {
+    write_two two.obj
+    shade bake two.obj "${SMALL[@]}" --size 32 --max-size 64 --texels-per-unit 4 --unwrap always -o x.exr
+    refused 2 --size --max-size
+    shade bake two.obj "${FIT[@]}" --max-size 64 --unwrap always -o x.exr
+    refused 2 max_size texels_per_unit
+    shade bake two.obj "${SMALL[@]}" --atlas objects --pages 2 --unwrap always -o x.exr
+    refused 2 pages
+    shade bake two.obj "${SMALL[@]}" --atlas each -o x.exr
+    refused 2 --atlas
+    shade bake two.obj "${SMALL[@]}" --size 16 --texels-per-unit 40 --atlas objects --unwrap always -o x.exr
+    refused 4 two.obj "'box'" "would fit"
+}

@@ -24,7 +24,7 @@ fits() {
 }
 
 @test "every command has its own help, which fits 100 columns" {
-    for command in bake voxelize info trade query volume flat render compare regress unwrap view; do
+    for command in bake voxelize info trade query volume flat render compare regress unwrap view field merge help; do
         shade "$command" --help
         done_well
         [[ $output == "Usage: vdbshade $command "* ]] || fail "no usage line"

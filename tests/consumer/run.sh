@@ -48,6 +48,21 @@ cmake -S "$here" -B "$work/cmake" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_BUILD_TY
 cmake --build "$work/cmake" >"$work/cmake.log" || { cat "$work/cmake.log"; exit 1; }
 mkdir "$work/output"
 "$work/cmake/consumer" "$work/output"
+"$work/cmake/grids"
+sed 's/OPTIONAL_COMPONENTS moon/moon/' "$here/CMakeLists.txt" >"$work/CMakeLists.txt"
+cp "$here"/*.c "$here"/*.cpp "$work"
+if cmake -S "$work" -B "$work/moon" -DCMAKE_PREFIX_PATH="$prefix" >"$work/cmake.log" 2>&1; then
+    echo "a component that there is not was found" && exit 1
+fi
+grep -q 'component moon' "$work/cmake.log"
+
+say "the static library: the same, and no shared one beside it"
+mkdir "$work/alone"
+"$work/cmake/consumer_static" "$work/alone"
+"$prefix/bin/vdbshade" compare "$work/output/sphere.vdb" "$work/alone/sphere.vdb" --max-difference 0 --quiet
+if ldd "$work/cmake/consumer_static" | grep libvdbshade; then
+    echo "it is linked with the shared library" && exit 1
+fi
 
 say "pkg-config"
 export PKG_CONFIG_PATH="$library/pkgconfig"
@@ -57,12 +72,27 @@ eval "$cc -std=c11 -pedantic -Wall -Wextra -Werror '$here/consumer.c' -o '$work/
     $(pkg-config --cflags --libs vdbshade) -lm"
 LD_LIBRARY_PATH=$library "$work/plain" "$work/output" >"$work/plain.log" || { cat "$work/plain.log"; exit 1; }
 echo "the same values"
+# --static names what the archive needs
+eval "$cc -std=c11 -DOWN_READER=1 '$here/consumer.c' -o '$work/plain_static' $(pkg-config --cflags vdbshade) \
+    '$library/libvdbshade.a' $(pkg-config --libs --static vdbshade | sed 's/-lvdbshade//')"
+"$work/plain_static" "$work/alone" >"$work/plain.log" || { cat "$work/plain.log"; exit 1; }
 
 say "a host with a sanitizer, whose dlopen() is not libc's"
 eval "$cc -std=c11 -g -fsanitize=address '$here/consumer.c' -o '$work/watched' \
     $(pkg-config --cflags --libs vdbshade) -lm -Wl,-rpath,'$library'"
 ASAN_OPTIONS=detect_leaks=0 "$work/watched" "$work/output" >"$work/watched.log" 2>&1 || { cat "$work/watched.log"; exit 1; }
 echo "the same values"
+
+packages=$(dirname "$(find "$prefix" -path '*-packages/vdbshade' -type d)")
+if [ "$packages" != . ]; then
+    say "Python: the module finds the library beside it"
+    python=$(sed -n 's/^VSH_PYTHON_PROGRAM:FILEPATH=//p' "$build/CMakeCache.txt")
+    (cd "$work" && PYTHONPATH=$packages "$python" -B -c '
+import vdbshade
+print(vdbshade.__version__, len(vdbshade.Model("a.obj")), vdbshade.Triangles.available())
+loaded = {line.split(maxsplit=5)[5].strip() for line in open("/proc/self/maps") if "libvdbshade.so" in line}
+assert len(loaded) == 1 and "/moved here/" in loaded.pop(), loaded')
+fi
 
 say "the examples"
 cmake -S "$here/../../examples" -B "$work/examples" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_BUILD_TYPE=Release \
@@ -96,10 +126,10 @@ say "a host stays as it was, until it makes a level set"
 eval "$cc -std=c11 -pedantic -Wall -Wextra -Werror '$here/quiet.c' -o '$work/quiet' \
     $(pkg-config --cflags --libs vdbshade)"
 LD_LIBRARY_PATH=$library "$work/quiet"
-mv "$library"/libvdbshade_openvdb.so.* "$work"
+mv "$library"/vdbshade/libvdbshade_openvdb.so.* "$work"
 LD_LIBRARY_PATH=$library "$work/quiet" without
 "$prefix/bin/vdbshade" info "$work/a.obj" >/dev/null
-mv "$work"/libvdbshade_openvdb.so.* "$library"
+mv "$work"/libvdbshade_openvdb.so.* "$library"/vdbshade
 
 say "a host with OpenVDB grids of its own"
 eval "$cxx -std=c++17 -O1 '$here/grids.cpp' -o '$work/grids' $(pkg-config --cflags --libs vdbshade) -lopenvdb -ltbb \

@@ -303,6 +303,21 @@ static inline void write_lit(const char *path, const vsh_model *model, const vsh
     keep_file(output);
 }
 
+static inline vsh_lit_options options_of(const vsh_lit_image *images, size_t count) {
+    vsh_lit_options options = vsh_lit_options_default();
+    options.images = images;
+    options.image_count = count;
+    return options;
+}
+
+/* "in.glb" as "out.glb", lit by one white image. */
+static inline asset write_white(const vsh_model *model, const vsh_lit_mesh *meshes, int32_t purpose) {
+    const vsh_lit_image image = white_image(purpose, 0);
+    const vsh_lit_options options = options_of(&image, 1);
+    write_lit(path_of("in.glb").text, model, meshes, &options, path_of("out.glb").text);
+    return load_asset(path_of("out.glb").text);
+}
+
 /* --- atlases */
 
 /* A place in the atlas that tells mesh, triangle and corner apart. */

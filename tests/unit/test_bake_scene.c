@@ -315,25 +315,27 @@ static void what_cannot_be_is_refused_before_a_file_is_read(void **state) {
     assert_int_equal(vsh_receiver_check(&c.scene, 0, &error), VSH_ERROR_ARGUMENT);
 }
 
-static void objects_need_a_place_for_their_names(void **state) {
+static void lightmaps_of_objects_have_their_names(void **state) {
     (void)state;
     case_scene c;
     fill(&c);
     vsh_error error;
-    vsh_bake_job *job;
     vsh_bake_job_options options = vsh_bake_job_options_default();
     options.per_object = 1;
-    assert_int_equal(vsh_bake_job_create(&c.scene, &options, NULL, &job, &error), VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "%s"));
-    char output[300];
-    snprintf(output, sizeof output, "%s", at("of-%s.exr"));
-    c.receiver.output = output;
-    assert_ok(vsh_bake_job_create(&c.scene, &options, NULL, &job, &error), &error);
-    assert_int_equal(vsh_bake_job_count(job), 1);
-    vsh_job_lightmap lightmap;
-    vsh_bake_job_lightmap(job, 0, &lightmap);
-    assert_null(strchr(lightmap.output, '%'));
-    vsh_bake_job_free(job);
+    static const char *const outputs[2] = {"of.exr", "of-%s.exr"};
+    static const char *const named[2] = {"of.defaultobject.exr", "of-defaultobject.exr"};
+    for (int i = 0; i < 2; ++i) {
+        char output[300];
+        vsh_bake_job *job;
+        snprintf(output, sizeof output, "%s", at(outputs[i]));
+        c.receiver.output = output;
+        assert_ok(vsh_bake_job_create(&c.scene, &options, NULL, &job, &error), &error);
+        assert_int_equal(vsh_bake_job_count(job), 1);
+        vsh_job_lightmap lightmap;
+        vsh_bake_job_lightmap(job, 0, &lightmap);
+        assert_string_equal(lightmap.output, at(named[i]));
+        vsh_bake_job_free(job);
+    }
 }
 
 int main(void) {
@@ -344,7 +346,7 @@ int main(void) {
         cmocka_unit_test(what_was_kept_is_not_baked_again),
         cmocka_unit_test(steps_come_in_their_order),
         cmocka_unit_test(what_cannot_be_is_refused_before_a_file_is_read),
-        cmocka_unit_test(objects_need_a_place_for_their_names),
+        cmocka_unit_test(lightmaps_of_objects_have_their_names),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

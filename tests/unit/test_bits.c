@@ -357,8 +357,35 @@ static void atlas_of_a_mesh(const context *c, int32_t unused, bits *b) {
     vsh_model_free(model);
 }
 
+/* Holes of a repeated picture all over a mesh, seen from above; *uvs is to be freed. */
+static void cut_out(vsh_mesh *mesh, vsh_alpha_mask *mask, float **uvs) {
+    static uint8_t alpha[7 * 5];
+    for (size_t i = 0; i < sizeof alpha; ++i) {
+        alpha[i] = (uint8_t)(i * i * 37);
+    }
+    *uvs = malloc(2 * mesh->vertex_count * sizeof **uvs);
+    assert_non_null(*uvs);
+    for (size_t i = 0; i < mesh->vertex_count; ++i) {
+        (*uvs)[2 * i] = 3.0f * mesh->positions[3 * i];
+        (*uvs)[2 * i + 1] = 3.0f * mesh->positions[3 * i + 2];
+    }
+    *mask = (vsh_alpha_mask){.alpha = alpha,
+                             .width = 7,
+                             .height = 5,
+                             .wrap = {VSH_WRAP_REPEAT, VSH_WRAP_MIRROR},
+                             .uv_transform = {1, 0.25, 0, 0, 1, 0},
+                             .alpha_cutoff = 0.4,
+                             .base_alpha = 1.0};
+    mesh->mask = mask;
+    mesh->mask_uvs = *uvs;
+}
+
+enum { OF_AO = 1, CUT_OUT = 2 };
+
 /* Rays are Embree's. */
-static void exact(const context *c, int32_t is_ao, bits *b) {
+static void exact(const context *c, int32_t what, bits *b) {
+    vsh_alpha_mask mask;
+    float *uvs = NULL;
     const vsh_heights_source source = hills();
     vsh_model *model = NULL;
     vsh_grid *grid = NULL;
@@ -366,9 +393,12 @@ static void exact(const context *c, int32_t is_ao, bits *b) {
     context here = {.run = c->run};
     vsh_error error;
     check(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, &c->run, &model, &error), &error);
-    const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
+    vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
+    if ((what & CUT_OUT) != 0) {
+        cut_out(&mesh, &mask, &uvs);
+    }
     vsh_grid_options options = vsh_grid_options_default();
-    options.resolution = 64;
+    options.resolution = (what & CUT_OUT) != 0 ? 16 : 64;
     check(vsh_grid_from_meshes(&mesh, 1, &options, &c->run, &grid, &error), &error);
     check(vsh_field_create(grid, NULL, &c->run, &here.field, &error), &error);
     check(vsh_triangles_create(&mesh, 1, &c->run, &triangles, &error), &error);
@@ -377,7 +407,8 @@ static void exact(const context *c, int32_t is_ao, bits *b) {
     shading.ao_method = VSH_AO_EXACT;
     here.triangles = triangles;
     const vsh_light light = sun();
-    shade(&here, is_ao ? NULL : &light, &shading, b);
+    shade(&here, (what & OF_AO) != 0 ? NULL : &light, &shading, b);
+    free(uvs);
     vsh_triangles_free(triangles);
     vsh_field_free(here.field);
     vsh_grid_free(grid);

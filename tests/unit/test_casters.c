@@ -262,7 +262,7 @@ static void bake_floor(const char *casters, float *shadow, float *coverage, int3
     vsh_scene *scene = NULL;
     vsh_assets *assets = NULL;
     vsh_error error = {VSH_OK, ""};
-    if (vshi_scene_parse(VSH_ASSETS "/scene.json", text, strlen(text), &scene, &error) != VSH_OK ||
+    if (vshi_scene_parse(VSH_ASSETS "/scene.json", text, strlen(text), NULL, &scene, &error) != VSH_OK ||
         vsh_assets_load(scene, NULL, &assets, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }

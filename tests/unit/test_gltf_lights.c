@@ -2,13 +2,9 @@
  * process itself and by a reader, which is this test. */
 #define _GNU_SOURCE
 
-#include "models.h"
-
-#include "model/model.h"
+#include "served.h"
 
 #include <math.h>
-#include <sys/mman.h>
-#include <vdbshade/reader.h>
 #include <vdbshade/scene.h>
 
 #define TRIANGLE                                                                                             \
@@ -43,20 +39,6 @@ static const char lights[] =
     "{\"type\":\"point\",\"name\":\"lamp\",\"range\":7},"
     "{\"type\":\"spot\",\"spot\":{\"innerConeAngle\":0.125,\"outerConeAngle\":0.5},\"intensity\":2}";
 
-static vsh_model *read_lit(bool reader, const char *json) {
-    vsh_run run = vsh_run_default();
-    run.reader = reader ? "/proc/self/exe" : NULL;
-    run.reader_seconds = reader ? 120.0 : 0.0;
-    vsh_model *model = NULL;
-    vsh_error error = {0};
-    write_bytes("a.gltf", json, strlen(json));
-    if (vsh_model_read(path_of("a.gltf").text, &run, &model, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
-    assert_int_equal(unlink(path_of("a.gltf").text), 0);
-    return model;
-}
-
 static void assert_vector(const double *given, double x, double y, double z) {
     const double expected[3] = {x, y, z};
     for (int i = 0; i < 3; ++i) {
@@ -69,7 +51,7 @@ static void assert_vector(const double *given, double x, double y, double z) {
 static void lights_stand_where_their_nodes_do(void **state) {
     (void)state;
     for (int reader = 0; reader < 2; ++reader) {
-        vsh_model *model = read_lit(reader != 0, lit_json(nodes, lights));
+        vsh_model *model = read_gltf_by(reader != 0, lit_json(nodes, lights));
         assert_int_equal(vsh_model_light_count(model), 3);
         const vsh_model_light sun = vsh_model_get_light(model, 0), lamp = vsh_model_get_light(model, 1);
         const vsh_model_light spot = vsh_model_get_light(model, 2);
@@ -101,7 +83,7 @@ static void as_a_scenes_they_have_names_sizes_and_falloff(void **state) {
     vsh_error error = {0};
     vsh_light *made = NULL;
     size_t count = 0;
-    vsh_model *model = read_lit(
+    vsh_model *model = read_gltf_by(
         false, lit_json("{\"name\":\"Key light\",\"translation\":[1,2,3],\"children\":[2,3]," CARRIES(
                             "0") "},"
                                  "{\"name\":\"Key_light\"," CARRIES("1") "},{" CARRIES("2") "}",
@@ -171,11 +153,23 @@ static void what_points_nowhere_or_is_not_known_is_left_out_with_a_warning(void 
     vsh_model_free(model);
 }
 
-/* Each word that a reader tells in turn wrong, or perhaps. */
+static void look_at_lights(const vsh_model *model) {
+    vsh_light *made = NULL;
+    size_t count;
+    vsh_error error;
+    for (size_t i = 0; i < vsh_model_light_count(model); ++i) {
+        const vsh_model_light light = vsh_model_get_light(model, i);
+        assert_in_range(light.type, 0, VSH_MODEL_LIGHT_SPOT);
+        assert_true(light.inner_angle <= light.outer_angle && light.outer_angle <= 1.5708);
+        assert_true(light.intensity >= 0.0 && isfinite(light.intensity) && light.range >= 0.0);
+    }
+    if (vsh_lights_from_model(model, 0.1, 0.1, 0.0, &made, &count, &error) == VSH_OK) {
+        vsh_lights_free(made);
+    }
+}
+
 static void what_a_reader_tells_of_lights_is_refused_or_in_range(void **state) {
     (void)state;
-    static vshi_encoder encoder;
-    static _Alignas(8) unsigned char whole[4096], bytes[4096];
     static const uint64_t values[] = {0,
                                       1,
                                       2,
@@ -187,46 +181,9 @@ static void what_a_reader_tells_of_lights_is_refused_or_in_range(void **state) {
                                       0x3ff0000000000000,
                                       0x7ff8000000000000,
                                       0x7fe0000000000000};
-    const vsh_run run = vsh_run_default();
-    vsh_error error = {0};
     const char *json = lit_json(nodes, lights);
     write_bytes("a.gltf", json, strlen(json));
-    const int file = memfd_create("payload", 0);
-    vshi_encoder_begin(&encoder, file, 0);
-    assert_int_equal(vshi_serve_model(path_of("a.gltf").text, NULL, &run, &encoder, &error), VSH_OK);
-    assert_true(vshi_encoder_flush(&encoder));
-    const size_t size = (size_t)encoder.size;
-    assert_in_range(size, 8, sizeof whole);
-    assert_int_equal(pread(file, whole, size, 0), (ssize_t)size);
-    close(file);
-    int refused_count = 0, read = 0;
-    for (size_t word = 0; word < size / 8; ++word) {
-        for (size_t k = 0; k < sizeof values / sizeof values[0]; ++k) {
-            vsh_model *model = NULL;
-            memcpy(bytes, whole, size);
-            memcpy(bytes + 8 * word, &values[k], 8);
-            vshi_decoder decoder = {bytes, bytes + size, false};
-            if (vshi_model_decode(&decoder, path_of("a.gltf").text, &run, &model, &error) != VSH_OK) {
-                ++refused_count;
-                continue;
-            }
-            vsh_light *made = NULL;
-            size_t count;
-            for (size_t i = 0; i < vsh_model_light_count(model); ++i) {
-                const vsh_model_light light = vsh_model_get_light(model, i);
-                assert_in_range(light.type, 0, VSH_MODEL_LIGHT_SPOT);
-                assert_true(light.inner_angle <= light.outer_angle && light.outer_angle <= 1.5708);
-                assert_true(light.intensity >= 0.0 && isfinite(light.intensity) && light.range >= 0.0);
-            }
-            if (vsh_lights_from_model(model, 0.1, 0.1, 0.0, &made, &count, &error) == VSH_OK) {
-                vsh_lights_free(made);
-            }
-            vsh_model_free(model);
-            ++read;
-        }
-    }
-    assert_in_range(refused_count, 200, 100000);
-    assert_in_range(read, 20, 100000);
+    tell_wrong("a.gltf", values, sizeof values / sizeof values[0], look_at_lights, 200, 20);
     assert_int_equal(unlink(path_of("a.gltf").text), 0);
 }
 

@@ -2,13 +2,9 @@
  * reader, which is this test. */
 #define _GNU_SOURCE
 
-#include "models.h"
-
-#include "model/model.h"
+#include "served.h"
 
 #include <math.h>
-#include <sys/mman.h>
-#include <vdbshade/reader.h>
 
 /* Three corners and an "image" of 5 bytes. */
 static const unsigned char image[5] = {'I', 'M', 'A', 'G', 'E'};
@@ -34,22 +30,6 @@ static const char *material_json(const char *materials, const char *rest) {
     return json;
 }
 
-static vsh_model *read_by(bool reader, const char *json) {
-    vsh_run run = vsh_run_default();
-    run.warning = keep_warning;
-    run.reader = reader ? "/proc/self/exe" : NULL;
-    run.reader_seconds = reader ? 120.0 : 0.0;
-    warnings[0] = '\0';
-    vsh_model *model = NULL;
-    vsh_error error = {0};
-    write_bytes("a.gltf", json, strlen(json));
-    if (vsh_model_read(path_of("a.gltf").text, &run, &model, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
-    assert_int_equal(unlink(path_of("a.gltf").text), 0);
-    return model;
-}
-
 #define LEAF(more)                                                                                           \
     "{\"name\":\"plain\",\"alphaCutoff\":0.9},{\"name\":\"leaf\",\"alphaMode\":\"MASK\",\"alphaCutoff\":0."  \
     "25,"                                                                                                    \
@@ -62,7 +42,7 @@ static const char textures[] = "\"textures\":[{\"source\":0,\"sampler\":0}],\"sa
 static void masked_materials_come_with_their_image(void **state) {
     (void)state;
     for (int reader = 0; reader < 2; ++reader) {
-        vsh_model *model = read_by(reader != 0, material_json(LEAF(",\"texCoord\":3"), textures));
+        vsh_model *model = read_gltf_by(reader != 0, material_json(LEAF(",\"texCoord\":3"), textures));
         assert_int_equal(vsh_model_material_count(model), 2);
         assert_int_equal(vsh_model_mesh_material(model, 0), 1);
         assert_int_equal(vsh_model_mesh_material(model, 1), -1);
@@ -100,22 +80,24 @@ static void assert_maps(const vsh_model_material *m, double u, double v, double 
 /* By hand: in the file's UVs (v down) scaled, turned so that u goes the way of -v, moved. */
 static void transforms_map_uvs_with_v_up(void **state) {
     (void)state;
-    vsh_model *model = read_by(true, material_json(LEAF(""), textures));
+    vsh_model *model = read_gltf_by(true, material_json(LEAF(""), textures));
     vsh_model_material leaf = vsh_model_get_material(model, 1);
     assert_int_equal(leaf.uv_set, 0);
     assert_maps(&leaf, 0.25, 0.75, 0.25, 0.75);
     vsh_model_free(model);
-    model = read_by(true, material_json(LEAF(",\"texCoord\":1,\"extensions\":{\"KHR_texture_transform\":{"
-                                             "\"offset\":[0.5,0.25],\"scale\":[2,4],\"texCoord\":2}}"),
-                                        textures));
+    model =
+        read_gltf_by(true, material_json(LEAF(",\"texCoord\":1,\"extensions\":{\"KHR_texture_transform\":{"
+                                              "\"offset\":[0.5,0.25],\"scale\":[2,4],\"texCoord\":2}}"),
+                                         textures));
     leaf = vsh_model_get_material(model, 1);
     assert_int_equal(leaf.uv_set, 2);
     assert_maps(&leaf, 0.0, 1.0, 0.5, 1.0 - 0.25); /* the file's (0, 0) is at (0.5, 0.25) of it */
     assert_maps(&leaf, 0.5, 0.75, 1.5, 1.0 - 1.25);
     vsh_model_free(model);
-    model = read_by(true, material_json(LEAF(",\"extensions\":{\"KHR_texture_transform\":{\"offset\":[0,1],"
-                                             "\"rotation\":1.5707963267948966,\"scale\":[2,1]}}"),
-                                        textures));
+    model =
+        read_gltf_by(true, material_json(LEAF(",\"extensions\":{\"KHR_texture_transform\":{\"offset\":[0,1],"
+                                              "\"rotation\":1.5707963267948966,\"scale\":[2,1]}}"),
+                                         textures));
     leaf = vsh_model_get_material(model, 1);
     assert_maps(&leaf, 0.25, 1.0, 0.0, 1.0 - (1.0 - 0.5)); /* (0.25, 0) → (0.5, 0) → (0, -0.5) → (0, 0.5) */
     assert_maps(&leaf, 0.0, 0.75, 0.25, 1.0 - 1.0);        /* (0, 0.25) → (0.25, 0) → (0.25, 1) */
@@ -125,7 +107,7 @@ static void transforms_map_uvs_with_v_up(void **state) {
 static void images_may_lie_beside_or_in_the_json(void **state) {
     (void)state;
     for (int reader = 0; reader < 2; ++reader) {
-        vsh_model *model = read_by(
+        vsh_model *model = read_gltf_by(
             reader != 0,
             material_json(LEAF(""), "\"textures\":[{\"extensions\":{\"EXT_texture_webp\":{\"source\":0}}}],"
                                     "\"images\":[{\"uri\":\"my%20leaf.webp\"}]"));
@@ -134,9 +116,9 @@ static void images_may_lie_beside_or_in_the_json(void **state) {
         assert_string_equal(leaf.image_path, path_of("my leaf.webp").text);
         assert_true(leaf.wrap[0] == VSH_WRAP_REPEAT && leaf.wrap[1] == VSH_WRAP_REPEAT);
         vsh_model_free(model);
-        model =
-            read_by(reader != 0, material_json(LEAF(""), "\"textures\":[{\"source\":0}],\"images\":[{\"uri\":"
-                                                         "\"data:image/png;base64,SU1BR0U=\"}]"));
+        model = read_gltf_by(reader != 0,
+                             material_json(LEAF(""), "\"textures\":[{\"source\":0}],\"images\":[{\"uri\":"
+                                                     "\"data:image/png;base64,SU1BR0U=\"}]"));
         leaf = vsh_model_get_material(model, 1);
         assert_int_equal(leaf.image_size, sizeof image);
         assert_memory_equal(leaf.image, image, sizeof image);
@@ -160,7 +142,7 @@ static void a_mask_that_cannot_be_had_is_left_out_with_a_warning(void **state) {
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
         for (int reader = 0; reader < 2; ++reader) {
-            vsh_model *model = read_by(reader != 0, material_json(LEAF(""), bad[i].rest));
+            vsh_model *model = read_gltf_by(reader != 0, material_json(LEAF(""), bad[i].rest));
             const vsh_model_material leaf = vsh_model_get_material(model, 1);
             assert_null(leaf.image);
             assert_null(leaf.image_path);
@@ -172,11 +154,29 @@ static void a_mask_that_cannot_be_had_is_left_out_with_a_warning(void **state) {
     }
 }
 
-/* Each word that a reader tells in turn wrong, or perhaps; and a path that leads out of the folder. */
+static void look_at_materials(const vsh_model *model) {
+    for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
+        assert_true(vsh_model_mesh_material(model, i) < (int32_t)vsh_model_material_count(model));
+    }
+    for (size_t i = 0; i < vsh_model_material_count(model); ++i) {
+        const vsh_model_material m = vsh_model_get_material(model, i);
+        assert_in_range(m.uv_set, 0, VSH_MAX_UV_SETS - 1);
+        assert_in_range(m.wrap[0], 0, VSH_WRAP_CLAMP);
+        assert_in_range(m.alpha, 0, VSH_ALPHA_BLENDED);
+        assert_true(m.base_alpha >= 0.0 && m.base_alpha <= 1.0 && isfinite(m.uv_transform[5]));
+        assert_true(m.image == NULL || m.image_size == sizeof image || m.image_size <= 9);
+    }
+}
+
+static void write_two_images(void) {
+    const char *json =
+        material_json(LEAF(""), "\"textures\":[{\"source\":0},{\"source\":1}],\"images\":[{\"uri\":"
+                                "\"x.png\"},{\"bufferView\":1}]");
+    write_bytes("a.gltf", json, strlen(json));
+}
+
 static void what_a_reader_tells_of_materials_is_refused_or_in_range(void **state) {
     (void)state;
-    static vshi_encoder encoder;
-    static _Alignas(8) unsigned char whole[4096], bytes[4096];
     static const uint64_t values[] = {0,
                                       1,
                                       2,
@@ -188,50 +188,17 @@ static void what_a_reader_tells_of_materials_is_refused_or_in_range(void **state
                                       0x3ff0000000000000,
                                       0x7ff8000000000000,
                                       0x6374652f2e2e2f2e};
-    const vsh_run run = vsh_run_default();
-    vsh_error error = {0};
-    const char *json =
-        material_json(LEAF(""), "\"textures\":[{\"source\":0},{\"source\":1}],\"images\":[{\"uri\":"
-                                "\"x.png\"},{\"bufferView\":1}]");
-    write_bytes("a.gltf", json, strlen(json));
-    const int file = memfd_create("payload", 0);
-    vshi_encoder_begin(&encoder, file, 0);
-    assert_int_equal(vshi_serve_model(path_of("a.gltf").text, NULL, &run, &encoder, &error), VSH_OK);
-    assert_true(vshi_encoder_flush(&encoder));
-    const size_t size = (size_t)encoder.size;
-    assert_in_range(size, 8, sizeof whole);
-    assert_int_equal(pread(file, whole, size, 0), (ssize_t)size);
-    close(file);
-    int refused_count = 0, read = 0;
-    for (size_t word = 0; word < size / 8; ++word) {
-        for (size_t k = 0; k < sizeof values / sizeof values[0]; ++k) {
-            vsh_model *model = NULL;
-            memcpy(bytes, whole, size);
-            memcpy(bytes + 8 * word, &values[k], 8);
-            vshi_decoder decoder = {bytes, bytes + size, false};
-            if (vshi_model_decode(&decoder, path_of("a.gltf").text, &run, &model, &error) != VSH_OK) {
-                ++refused_count;
-                continue;
-            }
-            for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
-                assert_true(vsh_model_mesh_material(model, i) < (int32_t)vsh_model_material_count(model));
-            }
-            for (size_t i = 0; i < vsh_model_material_count(model); ++i) {
-                const vsh_model_material m = vsh_model_get_material(model, i);
-                assert_in_range(m.uv_set, 0, VSH_MAX_UV_SETS - 1);
-                assert_in_range(m.wrap[0], 0, VSH_WRAP_CLAMP);
-                assert_in_range(m.alpha, 0, VSH_ALPHA_BLENDED);
-                assert_true(m.base_alpha >= 0.0 && m.base_alpha <= 1.0 && isfinite(m.uv_transform[5]));
-                assert_true(m.image == NULL || m.image_size == sizeof image || m.image_size <= 9);
-            }
-            vsh_model_free(model);
-            ++read;
-        }
-    }
-    assert_in_range(refused_count, 100, 100000);
-    assert_in_range(read, 20, 100000);
+    write_two_images();
+    tell_wrong("a.gltf", values, sizeof values / sizeof values[0], look_at_materials, 100, 20);
+    assert_int_equal(unlink(path_of("a.gltf").text), 0);
+}
 
-    memcpy(bytes, whole, size);
+static void a_path_that_a_reader_leads_out_of_the_folder_is_refused(void **state) {
+    (void)state;
+    static _Alignas(8) unsigned char bytes[4096];
+    vsh_error error = {0};
+    write_two_images();
+    const size_t size = payload_of("a.gltf", bytes, sizeof bytes);
     const char name[] = "x.png";
     unsigned char *at = memmem(bytes, size, name, sizeof name);
     assert_non_null(at);
@@ -239,10 +206,8 @@ static void what_a_reader_tells_of_materials_is_refused_or_in_range(void **state
     unsigned char *begin = at - strlen(folder) - 1; /* where the path begins: its length stays */
     memset(begin, '/', (size_t)(at - begin) + sizeof name - 1);
     memcpy(at + sizeof name - sizeof out, out, sizeof out - 1);
-    vshi_decoder decoder = {bytes, bytes + size, false};
     vsh_model *model = NULL;
-    assert_int_equal(vshi_model_decode(&decoder, path_of("a.gltf").text, &run, &model, &error),
-                     VSH_ERROR_READ);
+    assert_int_equal(decode(bytes, size, "a.gltf", 0, &model, &error), VSH_ERROR_READ);
     assert_non_null(strstr(error.message, "its images"));
     assert_int_equal(unlink(path_of("a.gltf").text), 0);
 }
@@ -257,6 +222,7 @@ int main(int argc, char **argv) {
         cmocka_unit_test(images_may_lie_beside_or_in_the_json),
         cmocka_unit_test(a_mask_that_cannot_be_had_is_left_out_with_a_warning),
         cmocka_unit_test(what_a_reader_tells_of_materials_is_refused_or_in_range),
+        cmocka_unit_test(a_path_that_a_reader_leads_out_of_the_folder_is_refused),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

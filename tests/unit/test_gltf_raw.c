@@ -2,12 +2,7 @@
  * in the process itself, held against all that may be wrong with them. The test is its own reader. */
 #define _GNU_SOURCE
 
-#include "models.h"
-
-#include "model/model.h"
-
-#include <sys/mman.h>
-#include <vdbshade/reader.h>
+#include "served.h"
 
 enum {
     SIDE = 80,
@@ -182,29 +177,13 @@ static void wrong_arrays_are_refused_in_the_same_words(void **state) {
 
 /* --- what a reader tells of them */
 
-static size_t payload_of(const char *name, unsigned char *bytes, size_t room) {
-    static vshi_encoder encoder;
+static void look_at_mesh(const vsh_model *model) {
+    vsh_mesh_report report;
     vsh_error error = {0};
-    const vsh_run run = vsh_run_default();
-    const int file = memfd_create("payload", 0);
-    vshi_encoder_begin(&encoder, file, 0);
-    assert_int_equal(vshi_serve_model(path_of(name).text, NULL, &run, &encoder, &error), VSH_OK);
-    assert_true(vshi_encoder_flush(&encoder));
-    assert_in_range(encoder.size, 8, room);
-    assert_int_equal(pread(file, bytes, (size_t)encoder.size, 0), (ssize_t)encoder.size);
-    close(file);
-    return (size_t)encoder.size;
+    const vsh_mesh mesh = vsh_model_mesh(model, 0, 0);
+    assert_int_not_equal(vsh_mesh_check(&mesh, &report, &error), VSH_ERROR_ARGUMENT);
 }
 
-static vsh_result decode(const unsigned char *bytes, size_t size, const char *name, uint64_t limit,
-                         vsh_model **model, vsh_error *error) {
-    vshi_decoder decoder = {bytes, bytes + size, false};
-    vsh_run run = vsh_run_default();
-    run.memory_limit = limit;
-    return vshi_model_decode(&decoder, path_of(name).text, &run, model, error);
-}
-
-/* Every word of it in turn is one that is wrong, or may be. */
 static void what_a_reader_tells_is_refused_or_sound(void **state) {
     (void)state;
     static const uint64_t values[] = {0,
@@ -220,33 +199,9 @@ static void what_a_reader_tells_is_refused_or_sound(void **state) {
                                       BODY,
                                       UINT64_MAX / 12 + 2,
                                       64};
-    static _Alignas(8) unsigned char whole[4096], bytes[4096];
-    vsh_error error = {0};
     sheet *s = make_sheet();
     write_sheet("a.glb", s, "", "");
-    const size_t size = payload_of("a.glb", whole, sizeof whole);
-    int refused = 0, sound = 0;
-    for (size_t word = 0; word < size / 8; ++word) {
-        for (size_t k = 0; k < sizeof values / sizeof values[0]; ++k) {
-            vsh_model *model = NULL;
-            memcpy(bytes, whole, size);
-            memcpy(bytes + 8 * word, &values[k], 8);
-            if (decode(bytes, size, "a.glb", 0, &model, &error) != VSH_OK) {
-                if (strstr(error.message, "a.glb") == NULL) {
-                    fail_msg("word %zu: %s", word, error.message);
-                }
-                ++refused;
-                continue;
-            }
-            vsh_mesh_report report;
-            const vsh_mesh mesh = vsh_model_mesh(model, 0, 0);
-            assert_int_not_equal(vsh_mesh_check(&mesh, &report, &error), VSH_ERROR_ARGUMENT);
-            vsh_model_free(model);
-            ++sound;
-        }
-    }
-    assert_in_range(refused, 100, 100000);
-    assert_in_range(sound, 10, 100000);
+    tell_wrong("a.glb", values, sizeof values / sizeof values[0], look_at_mesh, 100, 10);
     free(s);
     assert_int_equal(unlink(path_of("a.glb").text), 0);
 }

@@ -27,13 +27,6 @@ static void remove_rich(asset *in, const char *name) {
     remove_file("tile one.png");
 }
 
-static vsh_lit_options options_of(const vsh_lit_image *images, size_t count) {
-    vsh_lit_options options = vsh_lit_options_default();
-    options.images = images;
-    options.image_count = count;
-    return options;
-}
-
 /* --- triangles */
 
 typedef struct triangle {
@@ -141,10 +134,7 @@ static void new_uvs_leave_all_other_accessors_alone(void **state) {
     asset in = write_rich("in.glb");
     vsh_model *model = read_model(path_of("in.glb").text);
     vsh_lit_mesh *lit = make_all_lit(model, false);
-    const vsh_lit_image image = white_image(VSH_LIT_OCCLUSION, 0);
-    const vsh_lit_options options = options_of(&image, 1);
-    write_lit(path_of("in.glb").text, model, lit, &options, path_of("out.glb").text);
-    asset out = load_asset(path_of("out.glb").text);
+    asset out = write_white(model, lit, VSH_LIT_OCCLUSION);
     forget_instances(&in);
     forget_instances(&out);
     assert_kept(&in, &out, mesh_only, occlusion_only);
@@ -202,10 +192,7 @@ static void split_vertices_take_all_their_attributes_along(void **state) {
     asset in = write_rich("in.glb");
     vsh_model *model = read_model(path_of("in.glb").text);
     vsh_lit_mesh *lit = make_all_lit(model, true);
-    const vsh_lit_image image = white_image(VSH_LIT_OCCLUSION, 0);
-    const vsh_lit_options options = options_of(&image, 1);
-    write_lit(path_of("in.glb").text, model, lit, &options, path_of("out.glb").text);
-    asset out = load_asset(path_of("out.glb").text);
+    asset out = write_white(model, lit, VSH_LIT_OCCLUSION);
     forget_instances(&in);
     forget_instances(&out);
     assert_kept(&in, &out, mesh_only, occlusion_only);

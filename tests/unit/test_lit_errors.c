@@ -321,20 +321,37 @@ static void outputs_that_are_inputs_are_refused(void **state) {
         vsh_lit_write(path_of("in.glb").text, s.model, s.lit, NULL, path_of("in.glb").text, NULL, &error),
         VSH_ERROR_ARGUMENT);
     assert_int_equal(
-        vsh_lit_write(path_of("in.glb").text, s.model, s.lit, NULL, path_of("out.obj").text, NULL, &error),
+        vsh_lit_write(path_of("in.glb").text, s.model, s.lit, NULL, path_of("out.ply").text, NULL, &error),
         VSH_ERROR_ARGUMENT);
     assert_int_equal(vsh_lit_write(path_of("in.glb").text, s.model, s.lit, NULL, path_of("none/out.glb").text,
                                    NULL, &error),
                      VSH_ERROR_WRITE);
-    /* what another document may use too */
+    free_sound(&s);
+}
+
+/* What another document may use too. */
+static void files_of_the_input_are_not_replaced_but_others_named(void **state) {
+    (void)state;
+    sound s = make_sound();
+    vsh_error error = {0};
     write_bytes("all.bin", s.in.bytes, s.in.size);
     json_object_set_new(json_array_get(json_object_get(s.in.root, "buffers"), 0), "uri",
                         json_string("all.bin"));
     write_glb(&s.in, "in.glb");
     assert_int_equal(
         vsh_lit_write(path_of("in.glb").text, s.model, s.lit, NULL, path_of("all.gltf").text, NULL, &error),
-        VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "all.bin: would replace buffers[0]"));
+        VSH_OK);
+    json_t *out = json_load_file(path_of("all.gltf").text, 0, NULL);
+    const json_t *buffer = json_array_get(json_object_get(out, "buffers"), 0);
+    assert_string_equal(json_string_value(json_object_get(buffer, "uri")), "all.1.bin");
+    json_decref(out);
+    size_t size;
+    unsigned char *bytes = load_bytes(path_of("all.bin").text, &size);
+    assert_int_equal(size, s.in.size);
+    assert_memory_equal(bytes, s.in.bytes, size);
+    free(bytes);
+    remove_file("all.gltf");
+    remove_file("all.1.bin");
     remove_file("all.bin");
     free_sound(&s);
 }
@@ -375,6 +392,7 @@ int main(void) {
         cmocka_unit_test(atlases_that_do_not_fit_are_refused),
         cmocka_unit_test(images_out_of_range_are_refused),
         cmocka_unit_test(outputs_that_are_inputs_are_refused),
+        cmocka_unit_test(files_of_the_input_are_not_replaced_but_others_named),
         cmocka_unit_test(limits_and_cancelling_leave_the_old_file),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

@@ -8,13 +8,6 @@
 
 enum { WIDTH = 7, HEIGHT = 3, TEXELS = WIDTH * HEIGHT };
 
-static vsh_lit_options options_of(const vsh_lit_image *images, size_t count) {
-    vsh_lit_options options = vsh_lit_options_default();
-    options.images = images;
-    options.image_count = count;
-    return options;
-}
-
 /* --- what they hold */
 
 /* The image of texture `texture`, which lies in the buffer, read again. */
@@ -144,10 +137,7 @@ static void materials_are_copied_only_where_they_must(void **state) {
     write_glb(&in, "in.glb");
     vsh_model *model = read_model(path_of("in.glb").text);
     vsh_lit_mesh *lit = make_all_lit(model, false);
-    const vsh_lit_image image = white_image(VSH_LIT_OCCLUSION, 0);
-    const vsh_lit_options options = options_of(&image, 1);
-    write_lit(path_of("in.glb").text, model, lit, &options, path_of("out.glb").text);
-    asset out = load_asset(path_of("out.glb").text);
+    asset out = write_white(model, lit, VSH_LIT_OCCLUSION);
     /* tiles: in set 1, and as it was for the mesh in the other scene. leaf: as variant there too, in set 1 as
      * a variant and by the instances, in set 0 by the skinned mesh. rail: set 0, and points. White: set 1 */
     assert_int_equal(count_of(&out, "materials"), 3 + 1 + 2 + 1 + 1);
@@ -175,8 +165,7 @@ static void materials_are_copied_only_where_they_must(void **state) {
     json_array_remove(json_object_get(json_array_get(json_object_get(in.root, "meshes"), 3), "primitives"),
                       1);
     write_glb(&in, "in.glb");
-    write_lit(path_of("in.glb").text, model, lit, &options, path_of("out.glb").text);
-    out = load_asset(path_of("out.glb").text);
+    out = write_white(model, lit, VSH_LIT_OCCLUSION);
     assert_int_equal(count_of(&out, "materials"), 3 + 1 + 1);
     for (size_t m = 0; m < 3; ++m) {
         assert_non_null(json_object_get(item_of(&out, "materials", m), "occlusionTexture"));
@@ -197,10 +186,7 @@ static void cut_out_materials_have_no_preview(void **state) {
     write_glb(&in, "in.glb");
     vsh_model *model = read_model(path_of("in.glb").text);
     vsh_lit_mesh *lit = make_all_lit(model, false);
-    const vsh_lit_image image = white_image(VSH_LIT_PREVIEW, 0);
-    const vsh_lit_options options = options_of(&image, 1);
-    write_lit(path_of("in.glb").text, model, lit, &options, path_of("out.glb").text);
-    asset out = load_asset(path_of("out.glb").text);
+    asset out = write_white(model, lit, VSH_LIT_PREVIEW);
     for (size_t m = 0; m < count_of(&out, "materials"); ++m) {
         const json_t *material = item_of(&out, "materials", m);
         const char *name = json_string_value(json_object_get(material, "name"));

@@ -128,6 +128,9 @@ static void files_have_paths_and_places(void **state) {
     REFUSED(vsh_volume_write(NULL, "a.vdb", 0, NULL, 0, &error));
     MAKES_NONE(vsh_scene_read(NULL, NULL, PLACE, &error));
     REFUSED(vsh_scene_read("a.json", NULL, NULL, &error));
+    MAKES_NONE(vsh_lights_read(NULL, 0.1, 0.0, 0.0, NULL, PLACE, &count, &error));
+    REFUSED(vsh_lights_read("a.glb", 0.1, 0.0, 0.0, NULL, NULL, &count, &error));
+    MAKES_NONE(vsh_lights_read("a.glb", 0.1, 0.0, 0.0, NULL, PLACE, NULL, &error));
     MAKES_NONE(vsh_flat_scene_read(NULL, NULL, PLACE, &error));
     REFUSED(vsh_flat_scene_read("a.json", NULL, NULL, &error));
     MAKES_NONE(vsh_tolerances_read(NULL, PLACE, &error));
@@ -154,6 +157,10 @@ static void scenes_are_not_made_of_nothing(void **state) {
     MAKES_NONE(vsh_scene_casters(&scene, NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_scene_layer_casters(&scene, NULL, NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_scene_occluders(NULL, NULL, NULL, NULL, PLACE, &error));
+    vsh_scene_field_report report;
+    REFUSED(vsh_scene_save_field(NULL, NULL, "a.field", NULL, NULL, &report, &error));
+    REFUSED(vsh_scene_field_forecast(NULL, NULL, NULL, &report, &error));
+    REFUSED(vsh_scene_use_field(NULL, NULL, &error));
     MAKES_NONE(vsh_scene_occluders(&scene, NULL, NULL, NULL, PLACE, &error));
     vsh_triangles *triangles = NULL;
     vsh_solids *solids = NULL;
@@ -198,6 +205,12 @@ static void nothing_is_shaded_without_what_it_takes(void **state) {
     MAKES_NONE(vsh_occluders_create(NULL, 1, NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_occluders_from_parts(NULL, PLACE, &error));
     MAKES_NONE(vsh_field_create(NULL, NULL, NULL, PLACE, &error));
+    MAKES_NONE(vsh_field_file_open(NULL, NULL, PLACE, &error));
+    REFUSED(vsh_field_file_open("a.field", NULL, NULL, &error));
+    MAKES_NONE(vsh_field_file_field(NULL, 0, NULL, NULL, PLACE, &error));
+    REFUSED(vsh_field_file_write(NULL, NULL, 1, NULL, 0, NULL, &error));
+    REFUSED(vsh_field_file_write("a.field", NULL, 1, NULL, 0, NULL, &error));
+    assert_int_equal(vsh_field_file_is(NULL), 0);
     REFUSED(vsh_shade_shadow(NULL, &points, &light, NULL, NULL, &value, NULL, NULL, &error));
     REFUSED(vsh_shade_shadow(casters, NULL, &light, NULL, NULL, &value, NULL, NULL, &error));
     REFUSED(vsh_shade_shadow(casters, &nowhere, &light, NULL, NULL, &value, NULL, NULL, &error));
@@ -332,10 +345,22 @@ static void nothing_is_drawn_or_compared_without_what_it_takes(void **state) {
     REFUSED(vsh_view_write("a.html", &seen, &no_bake, NULL, &error));
     seen.plane_count = 1;
     REFUSED(vsh_view_write("a.html", &seen, NULL, NULL, &error));
+    REFUSED(vsh_view_write_bakes("a.html", NULL, 1, NULL, &error));
+    REFUSED(vsh_view_write_bakes("a.html", (const vsh_view_bake *[]){&seen}, 0, NULL, &error));
+    seen.plane_count = 0;
+    seen.image_count = 1;
+    REFUSED(vsh_view_write("a.html", &seen, NULL, NULL, &error));
+    const char *const channel = "ao";
+    const float *no_plane = NULL;
+    const vsh_image image = {1, 1, 1, &channel, &no_plane, NULL};
+    seen.name = "seen";
+    seen.images = &image;
+    REFUSED(vsh_view_write("a.html", &seen, NULL, NULL, &error));
     assert_int_equal(vsh_comparison_alike(NULL), 0);
     assert_null(vsh_comparison_channel(NULL, 0));
     assert_null(vsh_comparison_problem(NULL, 0));
     vsh_comparison_free(NULL);
+    vsh_field_file_close(NULL);
     vsh_occluders_free(casters);
 }
 

@@ -162,6 +162,12 @@ static void materials_beside_the_file_say_what_is_blended(void **state) {
             read_text("own.obj", text); /* whose own materials are read where the others are not */
         assert_int_equal(vsh_model_mesh(model, 0, 0).alpha,
                          blended[i] ? VSH_ALPHA_BLENDED : VSH_ALPHA_OPAQUE);
+        const int32_t material = vsh_model_mesh_material(model, 0);
+        assert_in_range(material, 0, vsh_model_material_count(model) - 1);
+        const vsh_model_material told = vsh_model_get_material(model, (size_t)material);
+        assert_string_equal(told.name, names[i]);
+        assert_int_equal(told.alpha, blended[i] ? VSH_ALPHA_BLENDED : VSH_ALPHA_OPAQUE);
+        assert_string_equal(vsh_model_mesh(model, 0, 0).material_name, names[i]);
         vsh_model_free(model);
     }
     write_bytes("own.mtl", "newmtl a\nd x\n", 13);

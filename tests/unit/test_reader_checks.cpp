@@ -117,7 +117,9 @@ void damaged_decompressed_vertices_are_refused_or_sound(void **) {
 void damaged_images_and_contours_are_refused_or_sound(void **) {
     const char *font = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
     std::vector<unsigned char> whole =
-        payload_of(vshi_serve_image, std::string(VSH_ASSETS) + "/emblem.png", [](vshi_encoder *) {});
+        payload_of(vshi_serve_image, std::string(VSH_ASSETS) + "/emblem.png", [](vshi_encoder *request) {
+            vshi_encode_count(request, 0); /* bytes of its own */
+        });
     int refused = 0;
     damage(whole, DAMAGES / 8, [&](vshi_decoder *decoder) {
         vsh_image_file *file = nullptr;

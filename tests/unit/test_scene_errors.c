@@ -163,7 +163,7 @@ static const struct {
     {LIGHT("{\"name\":\"a\",@\"typ\":\"spot\"}"), "lights[0].typ: unknown key; did you mean \"type\"?"},
     {LIGHT("@{\"name\":\"a\",\"radius\":1}"), "lights[0]: key \"type\" is missing: a light needs it"},
     {LIGHT("{\"name\":\"a\",\"type\":@\"sun\"}"),
-     "lights[0].type: \"sun\" is none of directional, sphere, spot, rectangle"},
+     "lights[0].type: \"sun\" is none of directional, sphere, spot, rectangle, file"},
     {LIGHT("@{\"type\":\"sphere\",\"position\":[0,0,0]}"),
      "lights[0]: key \"name\" is missing: a sphere light needs it"},
     {LIGHT("@{\"name\":\"a\",\"type\":\"sphere\"}"),
@@ -275,13 +275,13 @@ static void what_is_wrong_is_told_with_line_column_and_key(void **state) {
         char text[512];
         char expected[sizeof error.message];
         expect_at(bad[i].text, bad[i].message, text, sizeof text, expected, sizeof expected);
-        const vsh_result result = vshi_scene_parse("s.json", text, strlen(text), &scene, &error);
+        const vsh_result result = vshi_scene_parse("s.json", text, strlen(text), NULL, &scene, &error);
         if (result != VSH_ERROR_INPUT || scene != NULL || strcmp(error.message, expected) != 0) {
             print_error("%s\n  expected %s\n  found    %s\n", bad[i].text, expected, error.message);
             ++wrong;
         }
         vsh_scene_free(scene);
-        assert_int_equal(vshi_scene_parse("s.json", text, strlen(text), &scene, NULL), result);
+        assert_int_equal(vshi_scene_parse("s.json", text, strlen(text), NULL, &scene, NULL), result);
     }
     assert_int_equal(wrong, 0);
 }
@@ -292,7 +292,8 @@ static void bytes_of_zero_are_told_with_their_place(void **state) {
     static const char text[] = "{\"casters\": [],\n \"resolution\": 6\0, \"ck\": 0}";
     vsh_scene *scene = NULL;
     vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vshi_scene_parse("s.json", text, sizeof text - 1, &scene, &error), VSH_ERROR_INPUT);
+    assert_int_equal(vshi_scene_parse("s.json", text, sizeof text - 1, NULL, &scene, &error),
+                     VSH_ERROR_INPUT);
     assert_string_equal(error.message, "s.json:2:17: a byte of 0, expected text");
     assert_null(scene);
 }
@@ -308,7 +309,7 @@ static void a_seeds_scene_cut_anywhere_is_an_error(void **state) {
         memcpy(piece, text, cut);
         vsh_scene *scene = NULL;
         vsh_error error = {VSH_OK, ""};
-        assert_int_equal(vshi_scene_parse("s", piece, cut, &scene, &error), VSH_ERROR_INPUT);
+        assert_int_equal(vshi_scene_parse("s", piece, cut, NULL, &scene, &error), VSH_ERROR_INPUT);
         assert_null(scene);
         assert_true(strncmp(error.message, "s:", 2) == 0);
         free(piece);
@@ -327,7 +328,7 @@ static void a_scene_with_any_byte_changed_is_read_or_refused(void **state) {
             text[i] = bytes[b];
             vsh_scene *scene = NULL;
             vsh_error error = {VSH_OK, ""};
-            const vsh_result result = vshi_scene_parse("s", text, sizeof text - 1, &scene, &error);
+            const vsh_result result = vshi_scene_parse("s", text, sizeof text - 1, NULL, &scene, &error);
             assert_true(result == VSH_OK || result == VSH_ERROR_INPUT);
             assert_true((result == VSH_OK) == (scene != NULL));
             assert_true((result == VSH_OK) == (error.message[0] == '\0'));
@@ -363,7 +364,7 @@ static void trees_nest_64_levels_and_no_more(void **state) {
     static const int levels[] = {64, 200, 1000, 5000};
     for (size_t i = 0; i < sizeof levels / sizeof levels[0]; ++i) {
         text = nested(levels[i]);
-        assert_int_equal(vshi_scene_parse("s", text, strlen(text), &scene, NULL), VSH_ERROR_INPUT);
+        assert_int_equal(vshi_scene_parse("s", text, strlen(text), NULL, &scene, NULL), VSH_ERROR_INPUT);
         free(text);
     }
 }
@@ -382,7 +383,7 @@ static void trees_have_65536_nodes_and_no_more(void **state) {
         strcpy(at, "]}}]}");
         vsh_scene *scene = NULL;
         vsh_error error = {VSH_OK, ""};
-        const vsh_result result = vshi_scene_parse("s", text, strlen(text), &scene, &error);
+        const vsh_result result = vshi_scene_parse("s", text, strlen(text), NULL, &scene, &error);
         if (leaves == 32768) {
             assert_int_equal(result, VSH_OK);
             assert_int_equal(scene->casters[0].sdf.node_count, 65535);
@@ -404,7 +405,7 @@ static void scales_of_nested_nodes_cannot_run_away(void **state) {
         SDF("{\"op\":\"union\",\"scale\":1e6,\"of\":[{\"op\":\"union\",\"scale\":1e6,\"of\":["
             "{\"shape\":\"sphere\",\"radius\":1,\"scale\":1e6},{\"shape\":\"sphere\",\"radius\":1}]},"
             "{\"shape\":\"sphere\",\"radius\":1}]}");
-    assert_int_equal(vshi_scene_parse("s", text, strlen(text), &scene, &error), VSH_ERROR_INPUT);
+    assert_int_equal(vshi_scene_parse("s", text, strlen(text), NULL, &scene, &error), VSH_ERROR_INPUT);
     assert_non_null(strstr(error.message, "casters[0].sdf.of[0].of[0]: the scales of all levels make 1e+18"));
 }
 
@@ -429,7 +430,7 @@ static void messages_stay_one_line_whatever_the_key(void **state) {
     snprintf(text, sizeof text, "{\"casters\":[{\"mesh\":\"a\"}],\"a\\nb%s\":1}", key);
     vsh_error error = {VSH_OK, ""};
     vsh_scene *scene = NULL;
-    assert_int_equal(vshi_scene_parse("s", text, strlen(text), &scene, &error), VSH_ERROR_INPUT);
+    assert_int_equal(vshi_scene_parse("s", text, strlen(text), NULL, &scene, &error), VSH_ERROR_INPUT);
     assert_null(strpbrk(error.message, "\r\n"));
     assert_non_null(strstr(error.message, "s:1:27: a?bkkk"));
     assert_non_null(strstr(error.message, "…: unknown key"));

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include <vdbshade/sdf.h>
+#include "sdf/sdf.h"
 
 static uint64_t random_state = 1;
 
@@ -316,6 +317,68 @@ static void a_tree_too_deep_to_recurse_is_refused_and_a_deep_one_works(void **st
     free(nodes);
 }
 
+/* A tree over `count` shapes of all kinds, turned, scaled, and joined by any operations. */
+static size_t random_tree(vsh_sdf_node *nodes, int count, bool unions) {
+    size_t used = 0;
+    int32_t last = -1;
+    for (int i = 0; i < count; ++i) {
+        vsh_sdf_node node = shape_of((int32_t)uniform(VSH_SDF_SPHERE, VSH_SDF_CONE + 0.999));
+        for (int axis = 0; axis < 3; ++axis) {
+            node.translation[axis] = uniform(-4.0, 4.0);
+            node.rotation[axis] = uniform(-1.0, 1.0);
+        }
+        node.scale = uniform(0.5, 2.0);
+        nodes[used] = node;
+        const int32_t here = (int32_t)used++;
+        if (last >= 0) {
+            vsh_sdf_node operation = vsh_sdf_node_default();
+            operation.shape =
+                unions ? VSH_SDF_UNION : (int32_t)uniform(VSH_SDF_UNION, VSH_SDF_SMOOTH_UNION + 0.999);
+            operation.left = i % 2 == 0 ? last : here;
+            operation.right = i % 2 == 0 ? here : last;
+            operation.smoothing = 0.3;
+            operation.translation[i % 3] = uniform(-0.2, 0.2);
+            operation.rotation[1] = uniform(-0.2, 0.2);
+            operation.scale = uniform(0.9, 1.1);
+            nodes[used++] = operation;
+        }
+        last = (int32_t)used - 1;
+    }
+    return used;
+}
+
+static void a_tree_narrowed_to_a_ball_has_the_same_bits_in_it(void **state) {
+    (void)state;
+    enum { SHAPES = 12, TREES = 200, PLACES = 20, POINTS = 50 };
+    vsh_sdf_node nodes[2 * SHAPES];
+    uint8_t keep[2 * SHAPES];
+    size_t left_out = 0, operations = 0;
+    for (int t = 0; t < TREES; ++t) {
+        const vsh_sdf sdf = {nodes, random_tree(nodes, SHAPES, t % 2 == 0)};
+        assert_int_equal(vsh_sdf_check(&sdf, NULL), VSH_OK);
+        for (int i = 0; i < PLACES; ++i) {
+            const double radius = pow(10.0, uniform(-3.0, 0.5));
+            const double middle[3] = {uniform(-6.0, 6.0), uniform(-6.0, 6.0), uniform(-6.0, 6.0)};
+            vshi_sdf_narrow(&sdf, middle, radius, keep);
+            for (size_t n = 0; n < sdf.node_count; ++n) {
+                operations += nodes[n].shape >= VSH_SDF_UNION;
+                left_out += keep[n] != 0;
+            }
+            for (int k = 0; k < POINTS; ++k) { /* on the ball's surface, where they change most, and in it */
+                const double way[3] = {uniform(-1.0, 1.0), uniform(-1.0, 1.0), uniform(-1.0, 1.0)};
+                const double length = norm(way[0], way[1], way[2]);
+                const double far = (k % 2 == 0 ? radius : uniform(0.0, radius)) / length;
+                const double p[3] = {middle[0] + far * way[0], middle[1] + far * way[1],
+                                     middle[2] + far * way[2]};
+                const double whole = vsh_sdf_distance(&sdf, p),
+                             less = vshi_sdf_distance_within(&sdf, keep, p);
+                assert_memory_equal(&whole, &less, sizeof whole);
+            }
+        }
+    }
+    assert_true(left_out > operations / 2); /* else it does not narrow */
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_shape_gives_the_distance_to_its_surface),
@@ -325,6 +388,7 @@ int main(void) {
         cmocka_unit_test(operations_are_the_sets_operations),
         cmocka_unit_test(a_turned_scaled_shape_is_the_shape_seen_from_elsewhere),
         cmocka_unit_test(bad_nodes_are_refused_by_name),
+        cmocka_unit_test(a_tree_narrowed_to_a_ball_has_the_same_bits_in_it),
         cmocka_unit_test(a_tree_too_deep_to_recurse_is_refused_and_a_deep_one_works),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

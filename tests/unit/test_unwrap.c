@@ -57,6 +57,66 @@ static void cylinders_and_cones_unroll_without_stretch(void **state) {
     }
 }
 
+/* Bars of few sides without ends: what shading rounds is one chart, what it does not is cut along its edges.
+ */
+static void bars_are_cut_along_edges_that_shading_shows(void **state) {
+    (void)state;
+    for (uint32_t sides = 3; sides <= 6; ++sides) {
+        for (int rounded = 0; rounded < 3; ++rounded) {
+            shape *s = shape_new();
+            float normals[4 * 6 + 4][3];
+            for (uint32_t i = 0; i < sides; ++i) { /* each side has vertices of its own */
+                for (uint32_t k = 0; k < 4; ++k) {
+                    const double turn = 6.283185307179586 / sides, at = turn * (i + (k == 1 || k == 2)),
+                                 facing = rounded == 1 ? at : turn * (i + 0.5);
+                    shape_vertex(s, 0.1 * cos(at), 0.1 * sin(at), k >= 2 ? 3 : 0);
+                    normals[4 * i + k][0] = (float)cos(facing);
+                    normals[4 * i + k][1] = (float)sin(facing);
+                    normals[4 * i + k][2] = 0;
+                }
+                shape_quad(s, 4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 3);
+            }
+            for (uint32_t k = 0; k < 4; ++k) { /* beside a floor, of which they are a small part */
+                shape_vertex(s, 10.0 * (k == 1 || k == 2), 10.0 * (k >= 2), -9);
+                normals[4 * sides + k][0] = normals[4 * sides + k][1] = 0;
+                normals[4 * sides + k][2] = 1;
+            }
+            shape_quad(s, 4 * sides, 4 * sides + 1, 4 * sides + 2, 4 * sides + 3);
+            vsh_mesh mesh = shape_mesh(s, "bar");
+            mesh.normals = rounded == 2 ? NULL : &normals[0][0];
+            const vsh_unwrap_options o = unwrap_into(128);
+            const vsh_atlas_info info = unwrap_well(&mesh, 1, &o, NULL);
+            if (info.charts != 1 + (rounded == 1 ? 1 : sides)) {
+                fail_msg("%u sides, %d: %d charts", sides, rounded, (int)info.charts);
+            }
+            assert_true(info.stretch < 1.01);
+            free(s);
+        }
+    }
+}
+
+/* Two leaves of a hinge that is nearly shut, whatever its shading says. */
+static void what_is_folded_onto_itself_is_cut(void **state) {
+    (void)state;
+    for (int shut = 0; shut < 2; ++shut) {
+        shape *s = shape_new();
+        const double angle = shut ? 2.6 : 2.0, c = -cos(angle), d = sin(angle); /* normals are so far apart */
+        shape_quad(s, shape_vertex(s, 0, 0, 0), shape_vertex(s, 0, 0, 1), shape_vertex(s, 1, 0, 1),
+                   shape_vertex(s, 1, 0, 0));
+        shape_quad(s, shape_vertex(s, 0, 0, 1), shape_vertex(s, 0, 0, 0), shape_vertex(s, c, d, 0),
+                   shape_vertex(s, c, d, 1));
+        float normals[8][3] = {{0}};
+        for (int v = 0; v < 8; ++v) {
+            normals[v][0] = 1;
+        }
+        vsh_mesh mesh = shape_mesh(s, "hinge");
+        mesh.normals = &normals[0][0];
+        const vsh_unwrap_options o = unwrap_into(64);
+        assert_int_equal(unwrap_well(&mesh, 1, &o, NULL).charts, 1 + shut);
+        free(s);
+    }
+}
+
 static void a_sphere_has_few_charts_of_little_stretch(void **state) {
     (void)state;
     shape *s = shape_new();
@@ -311,6 +371,8 @@ int main(void) {
         cmocka_unit_test(a_cube_has_six_charts_of_stretch_1),
         cmocka_unit_test(a_cube_of_eight_vertices_is_cut_along_its_edges),
         cmocka_unit_test(cylinders_and_cones_unroll_without_stretch),
+        cmocka_unit_test(bars_are_cut_along_edges_that_shading_shows),
+        cmocka_unit_test(what_is_folded_onto_itself_is_cut),
         cmocka_unit_test(a_sphere_has_few_charts_of_little_stretch),
         cmocka_unit_test(a_torus_is_cut_open),
         cmocka_unit_test(a_moebius_strip_is_cut_open),

@@ -371,6 +371,8 @@ static void bad_options_are_refused_by_name(void **state) {
     WITH(max_stretch, 1.0, "max_stretch");
     WITH(max_stretch, NAN, "max_stretch");
     WITH(keep_uvs, 2, "keep_uvs");
+    WITH(atlas, 2, "atlas");
+    WITH(fit_pages, 1, "fit_pages");
     WITH(struct_size, 0, "vsh_unwrap_options");
     for (int i = 0; i < 4; ++i) {
         WITH(density, bad + i, "density");

@@ -144,6 +144,18 @@ static inline int is_flat(const vsh_mesh *mesh, size_t triangle) {
     return n[0] == 0 && n[1] == 0 && n[2] == 0;
 }
 
+/* What is told of an atlas, with the size of one of its pages. */
+static inline vsh_atlas_info info_of_page(const vsh_atlas *atlas, const vsh_atlas_info *info,
+                                          uint32_t number) {
+    const vsh_atlas_page page = vsh_atlas_page_view(atlas, number);
+    vsh_atlas_info of = *info;
+    assert_in_range(page.width, 1, info->width);
+    assert_in_range(page.height, 1, info->height);
+    of.width = page.width;
+    of.height = page.height;
+    return of;
+}
+
 /* Sums over a chart. */
 typedef struct chart_sums {
     double squares, world, flat;
@@ -169,13 +181,14 @@ static inline void look_at_mesh(const vsh_mesh *mesh, size_t index, const vsh_at
         const vsh_atlas_chart view = vsh_atlas_chart_view(atlas, chart);
         assert_int_equal(view.mesh, index);
         assert_true(view.page < info->pages);
-        const corner_uvs c = uvs_of(&m, info, i);
+        const vsh_atlas_info page = info_of_page(atlas, info, view.page);
+        const corner_uvs c = uvs_of(&m, &page, i);
         for (size_t k = 0; k < 3; ++k) {
             uint32_t *seen = &chart_of[m.indices[3 * i + k]];
             assert_true(*seen == 0 || *seen == chart + 1);
             *seen = chart + 1;
-            assert_true(c.at[k][0] >= 0 && c.at[k][0] <= info->width && c.at[k][1] >= 0 &&
-                        c.at[k][1] <= info->height);
+            assert_true(c.at[k][0] >= 0 && c.at[k][0] <= page.width && c.at[k][1] >= 0 &&
+                        c.at[k][1] <= page.height);
         }
         if (!(doubled_area(&c) > 0.0)) {
             fail_msg("mesh %zu: triangle %zu is flipped, or has no area: %g texels", index, i,
@@ -186,7 +199,7 @@ static inline void look_at_mesh(const vsh_mesh *mesh, size_t index, const vsh_at
         sums[chart].squares += 0.5 * (larger * larger + smaller * smaller) * world;
         sums[chart].world += world;
         sums[chart].flat += doubled_area(&c);
-        const texel_box box = box_of(&c, info);
+        const texel_box box = box_of(&c, &page);
         for (int y = box.y0; y < box.y1; ++y) {
             for (int x = box.x0; x < box.x1; ++x) {
                 const size_t texel =
@@ -241,7 +254,15 @@ static inline void look_at_atlas(const vsh_mesh *meshes, size_t count, const vsh
     assert_int_equal(vsh_atlas_mesh_count(atlas), count);
     assert_int_equal(vsh_atlas_chart_count(atlas), info.charts);
     assert_int_equal(vsh_atlas_page_count(atlas), info.pages);
-    assert_true(info.width == o->width && info.height == o->height && info.pages <= (uint32_t)o->max_pages);
+    assert_true(o->fit_pages ? info.width <= o->width && info.height <= o->height
+                             : info.width == o->width && info.height == o->height);
+    assert_true(info.pages <= (o->atlas == VSH_ATLAS_OBJECTS ? count : (size_t)o->max_pages));
+    double of_pages = 0;
+    for (uint32_t page = 0; page < info.pages; ++page) {
+        const vsh_atlas_page view = vsh_atlas_page_view(atlas, page);
+        of_pages += (double)view.width * view.height;
+        assert_true(view.covered > 0 && view.covered <= 1 && view.texels_per_unit >= info.texels_per_unit);
+    }
     const size_t texels = (size_t)info.width * (size_t)info.height * info.pages;
     uint32_t *claims = calloc(texels, sizeof *claims);
     uint8_t *centres = calloc(texels, 1);
@@ -272,9 +293,8 @@ static inline void look_at_atlas(const vsh_mesh *meshes, size_t count, const vsh
     }
     assert_true(fabs(info.stretch - stretch / area) < 1e-3 && fabs(info.worst_stretch - worst) < 1e-6);
     /* what only just touches a texel may be told either way */
-    if (fabs((double)claimed / (double)texels - info.covered) > 0.01) {
-        fail_msg("%g of the texels are covered, said to be %g", (double)claimed / (double)texels,
-                 info.covered);
+    if (fabs((double)claimed / of_pages - info.covered) > 0.01) {
+        fail_msg("%g of the texels are covered, said to be %g", (double)claimed / of_pages, info.covered);
     }
     free(sums);
     free(centres);

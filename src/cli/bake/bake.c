@@ -57,10 +57,7 @@ static int check_lit(const cli_bake_settings *settings, const vsh_scene *scene) 
         assets += vsh_lit_is_output(scene->receivers[i].output) != 0;
     }
     if (given != NULL && assets == 0) {
-        return cli_usage("--%s: is for outputs that end in .glb or .gltf", given);
-    }
-    if (assets > 0 && settings->per_object) {
-        return cli_usage("--per-object: a .glb or .gltf has one lightmap for all its objects");
+        return cli_usage("--%s: is for outputs that end in .glb, .gltf or .obj", given);
     }
     if (settings->embed && settings->images_beside) {
         return cli_usage("--embed: not together with --images-beside");
@@ -75,11 +72,29 @@ static int check_lit(const cli_bake_settings *settings, const vsh_scene *scene) 
     return cli_bake_check_output(settings, scene, settings->exr);
 }
 
+/* What is not for a part, but for all of them together; and whether what parts say they are of is what is
+ * asked for. */
+static int check_shard(const cli_bake_settings *s, const vsh_scene *scene) {
+    const char *given = s->invalid_picture != NULL ? "invalid"
+                        : s->view != NULL          ? "view"
+                        : s->exr != NULL           ? "exr"
+                                                   : NULL;
+    if (s->shard > 0 && given != NULL) {
+        return cli_usage("--%s: not together with --shard; give it to 'vdbshade merge'", given);
+    }
+    if (s->merged != NULL && s->output == NULL && strcmp(s->merged, scene->receivers[0].output) != 0) {
+        return cli_usage("%s: its parts are of %s, whose first output is %s", s->merged, s->input,
+                         scene->receivers[0].output);
+    }
+    return CLI_OK;
+}
+
 /* What can be refused before anything is read. */
 static int check_files(const cli_bake_settings *settings, const vsh_scene *scene) {
     if (settings->stats != NULL) {
         CLI_TRY(cli_temporary_check(settings->stats));
     }
+    CLI_TRY(check_shard(settings, scene));
     CLI_TRY(check_picture(settings));
     CLI_TRY(check_lit(settings, scene));
     CLI_TRY(cli_bake_check_view(settings, scene));
@@ -111,6 +126,7 @@ enum { MOST_TOLD = 8 }; /* lightmaps that have a line each */
 
 typedef struct telling {
     const cli_common *common;
+    bool part;    /* lightmaps are not whole */
     size_t count; /* lightmaps */
 } telling;
 
@@ -124,7 +140,7 @@ static void say_lightmap(void *user, const vsh_job_lightmap *lightmap, vsh_resul
         cli_say("%s: %d of %d rows are kept in %s.resume; the same command goes on from there",
                 lightmap->output, lightmap->kept_rows, lightmap->height, lightmap->output);
     }
-    if (result != VSH_OK || t->common->quiet || !is_each_told(t)) {
+    if (result != VSH_OK || t->common->quiet || t->part || !is_each_told(t)) {
         return;
     }
     char banded[64] = "", taken[64] = "";
@@ -138,17 +154,34 @@ static void say_lightmap(void *user, const vsh_job_lightmap *lightmap, vsh_resul
             lightmap->width, lightmap->height, lightmap->covered, lightmap->invalid_texels, banded, taken);
 }
 
+/* A name to go before ".I-of-N.part", to be freed. */
+static char *name_parts(const cli_bake_settings *s, const vsh_scene *scene) {
+    const char *output = s->output != NULL ? s->output : scene->receivers[0].output;
+    size_t length = strlen(output);
+    while (length > 1 && output[length - 1] == '/') {
+        --length; /* a folder, of objects */
+    }
+    return strndup(output, length);
+}
+
+static void say_part(const cli_bake_settings *s, const char *parts, const vsh_bake_report *report) {
+    cli_say("%s.%d-of-%d.part: %" PRIu64 " texels, %" PRIu64
+            " of them invalid; 'vdbshade merge %s' once all parts are there",
+            parts, s->shard, s->shard_count, report->texels, report->invalid_texels, parts);
+}
+
 /* Where there are too many for a line each. */
 static void say_all(const telling *t, const vsh_bake_job *job, const vsh_bake_report *report) {
-    if (is_each_told(t)) {
+    if (t->part || is_each_told(t)) {
         return;
     }
     vsh_job_lightmap first, last;
     vsh_bake_job_lightmap(job, 0, &first);
     vsh_bake_job_lightmap(job, t->count - 1, &last);
-    cli_say("%zu lightmaps, %s to %s: %" PRIu64 " texels, %" PRIu64
-            " of them invalid; --verbose tells of each",
-            t->count, first.output, last.output, report->texels, report->invalid_texels);
+    const bool one = strcmp(first.output, last.output) == 0;
+    cli_say("%zu lightmaps, %s%s%s: %" PRIu64 " texels, %" PRIu64 " of them invalid; --verbose tells of each",
+            t->count, one ? "in " : first.output, one ? "" : " to ", last.output, report->texels,
+            report->invalid_texels);
 }
 
 static void say_writing(void *user, const char *path) {
@@ -190,10 +223,12 @@ static vsh_result run_job(vsh_bake_job *job, const vsh_scene *scene, const vsh_r
 }
 
 static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, vsh_bake_job *job,
-                    const vsh_run *run, telling *t) {
+                    const vsh_run *run, telling *t, const char *parts) {
     t->count = vsh_bake_job_count(job);
+    t->part = settings->shard > 0;
     vsh_error error;
-    if (run_job(job, scene, run, &error) != VSH_OK) {
+    if ((settings->merged != NULL ? vsh_bake_job_merge(job, run, &error)
+                                  : run_job(job, scene, run, &error)) != VSH_OK) {
         return cli_fail_of(NULL, &error);
     }
     vsh_bake_report report;
@@ -205,6 +240,9 @@ static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, v
     cli_warnings_tell();
     if (!settings->common.quiet) {
         say_all(t, job, &report);
+        if (t->part) {
+            say_part(settings, parts, &report);
+        }
         cli_stats_say(&stats);
     }
     return CLI_OK;
@@ -224,22 +262,48 @@ static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
                                                         : VSH_LIT_IMAGES_AUTO;
     options.lit_exr = settings->exr;
     options.command = cli_parsed_command();
-    const char *const files[] = {settings->input, settings->lights};
+    const char *const files[] = {settings->input, cli_bake_lights(settings)};
     options.files = files;
     options.file_count = settings->lights != NULL ? 2 : 1;
+    char *parts = name_parts(settings, scene);
+    options.shard = settings->dry_run ? 0 : settings->shard; /* what is told is of the whole */
+    options.shard_count = settings->shard_count;
+    options.parts = settings->merged != NULL ? settings->merged : parts;
+    options.words = settings->words;
+    options.word_count = settings->word_count;
     options.done = say_lightmap;
     options.writing = say_writing;
     options.user = &t;
     vsh_bake_job *job = NULL;
     vsh_error error;
-    if (vsh_bake_job_create(scene, &options, &run, &job, &error) != VSH_OK) {
-        return cli_fail_of(NULL, &error);
-    }
     int code;
+    if (parts == NULL) {
+        return cli_out_of_memory(settings->input);
+    }
+    if (vsh_bake_job_create(scene, &options, &run, &job, &error) != VSH_OK) {
+        code = cli_fail_of(NULL, &error);
+        goto done;
+    }
     CLI_TRY_DONE(check_outputs(settings, scene, job));
-    code = settings->dry_run ? cli_bake_forecast(scene, job, &run) : bake_job(settings, scene, job, &run, &t);
+    code = settings->dry_run ? cli_bake_forecast(scene, job, &run)
+                             : bake_job(settings, scene, job, &run, &t, parts);
 done:
     vsh_bake_job_free(job);
+    free(parts);
+    return code;
+}
+
+int cli_bake_by(const cli_bake_settings *settings) {
+    int code;
+    cli_progress_begin(settings->common.progress, settings->common.quiet);
+    cli_bake_scene made;
+    CLI_TRY_DONE(cli_bake_scene_make(settings, &made));
+    CLI_TRY_DONE(check_files(settings, &made.scene));
+    cli_signals_watch();
+    code = bake(settings, &made.scene);
+done:
+    cli_bake_scene_free(&made);
+    cli_progress_end();
     return code;
 }
 
@@ -247,17 +311,7 @@ int cli_bake_main(int argc, char **argv) {
     cli_bake_settings settings;
     bool help;
     int code = cli_bake_parse(argc, argv, &settings, &help);
-    if (code != CLI_OK || help) {
-        return code;
-    }
-    cli_progress_begin(settings.common.progress, settings.common.quiet);
-    cli_bake_scene made;
-    CLI_TRY_DONE(cli_bake_scene_make(&settings, &made));
-    CLI_TRY_DONE(check_files(&settings, &made.scene));
-    cli_signals_watch();
-    code = bake(&settings, &made.scene);
-done:
-    cli_bake_scene_free(&made);
-    cli_progress_end();
+    code = code != CLI_OK || help ? code : cli_bake_by(&settings);
+    cli_densities_free(&settings.densities);
     return code;
 }

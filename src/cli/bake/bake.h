@@ -8,6 +8,13 @@
  * them. CLI_OK or an exit code, having said why. */
 int cli_bake_check_shade(const cli_bake_settings *s, vsh_scene *scene);
 
+/* Puts the sun and the lights of a file that the options name behind those of the scene's file. CLI_OK or an
+ * exit code, having said why. */
+int cli_bake_add_lights(const cli_bake_settings *s, cli_bake_scene *made);
+
+/* Refuses an output that is a file whose lights are taken. */
+int cli_bake_check_lights(const cli_bake_settings *s, const vsh_scene *scene, const char *output);
+
 /* Expects all that comes behind a job's vsh_bake_job_measure(). */
 void cli_bake_expect(const vsh_scene *scene, const vsh_bake_job *job, int32_t threads);
 
@@ -15,6 +22,10 @@ void cli_bake_expect(const vsh_scene *scene, const vsh_bake_job *job, int32_t th
  * why.
  */
 int cli_bake_forecast(const vsh_scene *scene, vsh_bake_job *job, const vsh_run *run);
+
+/* Bakes, or puts parts together, by settings that were taken: frees nothing of them. CLI_OK or an exit code,
+ * having said why. */
+int cli_bake_by(const cli_bake_settings *settings);
 
 /* --view: whether the page can be written, and writing it when all is baked. CLI_OK or an exit code, having
  * said why. */

@@ -13,7 +13,7 @@ enum {
     KEY_OUTPUT_FOLDER,
     KEY_RECEIVE,
     KEY_NO_RECEIVE,
-    KEY_NO_CAST,
+    KEY_ONE_SIDED,
     KEY_PER_OBJECT,
     KEY_INVALID,
     KEY_PREVIEW,
@@ -21,8 +21,7 @@ enum {
     KEY_IMAGES_BESIDE,
     KEY_EXR,
     KEY_VIEW,
-    KEY_LIGHTS,
-    KEY_LIGHT_RADIUS
+    KEY_DENSITY
 };
 
 static const cli_option options[] = {
@@ -32,7 +31,7 @@ static const cli_option options[] = {
      ".png .tif .dpx .sgi .jp2 .tga .bmp .ico .iff .rla\n"
      ".hdr .ppm .pgm .jpg .webp .heic .avif .gif; what each\n"
      "can hold, and what is not written: docs/formats.md;\n"
-     ".glb .gltf: the input with its light in its materials\n(docs/lit.md)"},
+     ".glb .gltf .obj: the input with its light in its\nmaterials (docs/lit.md)"},
     {KEY_OUTPUT_FOLDER, "output-folder", "FOLDER",
      "write there what a scene's file says is written, under\nthe same names; it is made where it is not "
      "there"},
@@ -52,26 +51,31 @@ static const cli_option options[] = {
     {KEY_RESUME, "resume", NULL,
      "keep finished rows in OUT.resume until all are there,\nand go on from them where a bake with this "
      "option was\nended; the result is the same, bit by bit"},
+    CLI_SHARD_OPTION(
+        "bake part I of N, with as much work as the others, into\nOUT.I-of-N.part: on any machine, in any "
+        "order, again where\nit failed; 'vdbshade merge OUT' puts all parts together to\nthe bits of "
+        "one bake"),
     {0, NULL, NULL, "Objects"},
     {KEY_RECEIVE, "receive", "NAME",
      "only objects of this name receive, all cast; * and ?\nmatch as in a shell; may be repeated"},
-    {KEY_NO_RECEIVE, "no-receive", "NAME", "objects of this name only cast; may be repeated"},
-    {KEY_NO_CAST, "no-cast", "NAME", "objects of this name only receive; may be repeated"},
+    {KEY_NO_RECEIVE, "no-receive", "NAME",
+     "objects of this name only cast, or where there are\nnone, those of materials of this name; may be "
+     "repeated"},
+    CLI_NO_CAST_OPTION,
+    {KEY_ONE_SIDED, "one-sided", "NAME", "light passes the backs of their faces, likewise; may\nbe repeated"},
     {KEY_PER_OBJECT, "per-object", NULL,
      "an image for each object: FOLDER/NAME.exr with\n-o FOLDER/, else OUT.NAME.exr, or where OUT has %s"},
     {0, NULL, NULL, "Light and occlusion"},
     CLI_LIGHT_OPTIONS,
-    {KEY_LIGHTS, "lights", "FILE",
-     "also the lights in a glTF or GLB, which may be INPUT;\ntheir channels are shadow.NAME, suns are as "
-     "wide "
-     "as\n--sun-angle says"},
-    {KEY_LIGHT_RADIUS, "light-radius", "R", "radius of its points and spots, scene units (0: hard)"},
     CLI_SETTINGS(VSH_SETTINGS_CHANNELS),
     CLI_ACCURACY_OPTIONS,
     CLI_CASTER_OPTIONS,
     CLI_GRID_OPTIONS,
     {0, NULL, NULL, "Texels"},
     CLI_SETTINGS(VSH_SETTINGS_TEXELS),
+    {KEY_DENSITY, "density", "PATTERN=X",
+     "factor of --texels-per-unit, or of the density that\nfits, for objects of that name; repeatable, the "
+     "last\nthat means one holds (1)"},
     {KEY_BAND_ROWS, "band-rows", "N",
      "rows baked and written at a time, 1 to 65536,\nrounded up to eights; changes no value (all, or as\n"
      "many as --memory-limit allows)"},
@@ -100,7 +104,8 @@ static int take_caster(cli_bake_settings *s, const char *name, const char *value
 
 static int take_pattern(cli_patterns *patterns, const char *name, const char *value) {
     if (value[0] == '\0') {
-        return cli_usage("%s: expected an object's name, or a pattern such as 'floor*'", name);
+        return cli_usage("%s: expected the name of an object or a material, or a pattern such as 'floor*'",
+                         name);
     }
     if (patterns->count == CLI_MAX_PATTERNS) {
         return cli_usage("%s '%s': given more than %d times", name, value, CLI_MAX_PATTERNS);
@@ -119,8 +124,19 @@ int cli_shared_parse(cli_bake_settings *s, int key, const char *name, const char
     case CLI_KEY_SUN_ANGLE:
         s->has_sun_angle = true;
         return cli_parse_number(name, value, 0.0, 179.0, &s->sun_angle_deg);
+    case CLI_KEY_LIGHTS:
+        s->lights = value;
+        return CLI_OK;
+    case CLI_KEY_LIGHT_RADIUS:
+        s->has_light_radius = true;
+        return cli_parse_number(name, value, 0.0, 1e12, &s->light_radius);
     case CLI_KEY_CASTER:
         return take_caster(s, name, value);
+    case CLI_KEY_NO_CAST:
+        return take_pattern(&s->no_cast, name, value);
+    case CLI_KEY_FIELD:
+        s->field = value;
+        return CLI_OK;
     default:
         code = cli_patch_take(&s->patch, key, name, value, &taken);
         return taken ? code : cli_common_parse(&s->common, key, name, value, &taken);
@@ -140,8 +156,10 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return take_pattern(&s->receive, name, value);
     case KEY_NO_RECEIVE:
         return take_pattern(&s->no_receive, name, value);
-    case KEY_NO_CAST:
-        return take_pattern(&s->no_cast, name, value);
+    case KEY_ONE_SIDED:
+        return take_pattern(&s->one_sided, name, value);
+    case KEY_DENSITY:
+        return cli_density_take(&s->densities, name, value);
     case KEY_PER_OBJECT:
         s->per_object = true;
         return CLI_OK;
@@ -163,12 +181,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_VIEW:
         s->view = value;
         return CLI_OK;
-    case KEY_LIGHTS:
-        s->lights = value;
-        return CLI_OK;
-    case KEY_LIGHT_RADIUS:
-        s->has_light_radius = true;
-        return cli_parse_number(name, value, 0.0, 1e12, &s->light_radius);
     case KEY_STATS:
         s->stats = value;
         return CLI_OK;
@@ -178,6 +190,8 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_RESUME:
         s->resume = true;
         return CLI_OK;
+    case CLI_KEY_SHARD:
+        return cli_parse_shard(name, value, &s->shard, &s->shard_count);
     case KEY_BAND_ROWS:
         return cli_parse_integer(name, value, 1, VSH_MAX_LIGHTMAP_SIZE, &s->band_rows);
     default:
@@ -189,6 +203,10 @@ static int take(void *settings, int key, const char *name, const char *value) {
 int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings, bool *help) {
     memset(settings, 0, sizeof *settings);
     settings->common = cli_common_default();
+    settings->words = (const char *const *)argv;
+    settings->word_count = (size_t)argc;
     const int code = cli_parse(&cli_bake, argc, argv, take, settings, "INPUT", &settings->input, help);
+    const char *atlas = cli_patch_text(&settings->patch, "--atlas");
+    settings->per_object = settings->per_object || vsh_atlas_kind(atlas) == VSH_ATLAS_OBJECTS;
     return code != CLI_OK || *help ? code : cli_patch_check(&settings->patch);
 }

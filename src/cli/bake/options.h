@@ -3,6 +3,7 @@
 #define CLI_BAKE_OPTIONS_H
 
 #include "cli/commands.h"
+#include "cli/density.h"
 #include "cli/patch.h"
 
 enum { CLI_MAX_EXTRA_CASTERS = 256, CLI_MAX_PATTERNS = 256 };
@@ -14,25 +15,57 @@ typedef struct cli_patterns {
 } cli_patterns;
 
 /* What commands that shade share. */
-enum { CLI_KEY_SUN = 0x3000, CLI_KEY_SUN_ANGLE, CLI_KEY_CASTER };
+enum {
+    CLI_KEY_SUN = 0x3000,
+    CLI_KEY_SUN_ANGLE,
+    CLI_KEY_LIGHTS,
+    CLI_KEY_LIGHT_RADIUS,
+    CLI_KEY_CASTER,
+    CLI_KEY_FIELD,
+    CLI_KEY_NO_CAST
+};
 
-#define CLI_LIGHT_OPTIONS                                                                                    \
+/* Stands for INPUT itself, in --lights. */
+#define CLI_LIGHTS_OF_INPUT "file"
+
+#define CLI_LIGHTS                                                                                           \
     {CLI_KEY_SUN, "sun", "X,Y,Z", "direction towards the sun; its channel is shadow.sun"},                   \
         {CLI_KEY_SUN_ANGLE, "sun-angle", "DEG", "its angular diameter, degrees, 0 to 179 (0.53)"},           \
-        CLI_SETTINGS(VSH_SETTINGS_OCCLUSION)
+        {CLI_KEY_LIGHTS, "lights", "FILE",                                                                   \
+         "also the lights in a glTF or GLB, or by the word file\nthose in INPUT; their channels are "        \
+         "shadow.NAME, suns\nare as wide as --sun-angle says"},                                              \
+    {                                                                                                        \
+        CLI_KEY_LIGHT_RADIUS, "light-radius", "R", "radius of its points and spots, scene units (0: hard)"   \
+    }
+
+#define CLI_LIGHT_OPTIONS CLI_LIGHTS, CLI_SETTINGS(VSH_SETTINGS_OCCLUSION)
 
 #define CLI_ACCURACY_OPTIONS {0, NULL, NULL, "Accuracy"}, CLI_SETTINGS(VSH_SETTINGS_ACCURACY)
 
+#define CLI_NO_CAST_OPTION                                                                                   \
+    {                                                                                                        \
+        CLI_KEY_NO_CAST, "no-cast", "NAME",                                                                  \
+            "objects of this name only receive, or where there\nare none, those of materials; may be "       \
+            "repeated"                                                                                       \
+    }
+
+#define CLI_CASTER_OPTION                                                                                    \
+    { CLI_KEY_CASTER, "caster", "FILE", "another mesh or .vdb that casts shadows; may be\nrepeated" }
+
 #define CLI_CASTER_OPTIONS                                                                                   \
-    {0, NULL, NULL, "Casters and voxels"}, {                                                                 \
-        CLI_KEY_CASTER, "caster", "FILE", "another mesh or .vdb that casts shadows; may be\nrepeated"        \
+    {0, NULL, NULL, "Casters and voxels"}, CLI_CASTER_OPTION, {                                              \
+        CLI_KEY_FIELD, "field", "FILE",                                                                      \
+            "take the casters' voxels from there ('vdbshade field'),\nas it was told to make them; refused " \
+            "where "                                                                                         \
+            "it is stale;\nchanges no value"                                                                 \
     }
 
 typedef struct cli_bake_settings {
     const char *input;
     const char *output;
     const char *output_folder; /* for the outputs of a scene, by their names; NULL: where it says */
-    cli_patterns receive, no_receive, no_cast;
+    cli_patterns receive, no_receive, no_cast, one_sided;
+    cli_densities densities;
     const char *stats;
     const char *invalid_picture; /* NULL: none */
     const char *view;            /* page; NULL: none */
@@ -40,18 +73,26 @@ typedef struct cli_bake_settings {
     cli_patch patch; /* over the scene and its receivers */
     double sun[3];
     double sun_angle_deg;
-    const char *lights; /* a file whose lights are taken; NULL: none */
+    const char *lights; /* a file whose lights are taken, or CLI_LIGHTS_OF_INPUT; NULL: none */
     double light_radius;
     int32_t band_rows; /* 0: as many as go */
     const char *casters[CLI_MAX_EXTRA_CASTERS];
     size_t caster_count;
+    const char *field;                  /* a file of fields; NULL: they are made */
     const char *exr;                    /* beside an asset; NULL: none */
     bool preview, embed, images_beside; /* of an asset */
     bool has_sun, has_sun_angle, has_light_radius, per_object, dry_run, resume;
+    int32_t shard, shard_count; /* 0: all of it */
+    const char *const *words;   /* [word_count]: the command line that this is */
+    size_t word_count;
+    const char *merged; /* parts of this name are put together, and nothing is baked; NULL: it is baked */
 } cli_bake_settings;
 
 /* Takes an option of the tables above, a setting or one of the common ones. */
 int cli_shared_parse(cli_bake_settings *settings, int key, const char *name, const char *value);
+
+/* The file of --lights; NULL: none. */
+const char *cli_bake_lights(const cli_bake_settings *settings);
 
 /* Takes the command line. */
 int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings, bool *help);
@@ -62,8 +103,9 @@ typedef struct cli_bake_scene {
     vsh_scene *read; /* the scene file's; NULL for a mesh */
     vsh_caster *casters;
     vsh_receiver *receivers;
-    char **outputs;    /* [receiver_count], where they are not the scene's own; NULL: none is */
-    vsh_light *lights; /* [scene.light_count], where they are not all the scene file's */
+    char **outputs;        /* [receiver_count], where they are not the scene's own; NULL: none is */
+    vsh_light *lights;     /* [scene.light_count], where they are not all the scene file's */
+    vsh_field_file *field; /* that the scene takes; NULL: none */
 } cli_bake_scene;
 
 /* Makes the scene, checks that it can be baked and that its outputs replace no input. */

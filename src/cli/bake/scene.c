@@ -2,14 +2,12 @@
 #include "bake.h"
 #include "cli/message.h"
 #include "cli/paths.h"
+#include "cli/try.h"
 #include "options.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-static const double sun_angle_default_deg = 0.53; /* of the sun from the earth */
-static const double radians_per_degree = 0.017453292519943295;
 
 static void set_identity(double transform[12]) {
     for (int i = 0; i < 12; ++i) {
@@ -40,6 +38,8 @@ static int add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
             set_identity(made->casters[i].transform);
             if (i < own) {
                 made->casters[i].objects = selection(NULL, &s->no_cast);
+                made->casters[i].one_sided = s->one_sided.list;
+                made->casters[i].one_sided_count = s->one_sided.count;
             }
         }
     }
@@ -51,6 +51,10 @@ static int add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
 static int override_receiver(const cli_bake_settings *s, vsh_receiver *receiver) {
     if (s->receive.count > 0 || s->no_receive.count > 0) {
         receiver->objects = selection(&s->receive, &s->no_receive);
+    }
+    if (s->densities.count > 0) {
+        receiver->density = s->densities.list;
+        receiver->density_count = s->densities.count;
     }
     receiver->partial = s->per_object || receiver->partial;
     receiver->output = s->output != NULL ? s->output : receiver->output;
@@ -92,7 +96,8 @@ static int mark_outputs(cli_bake_scene *made) {
         return cli_out_of_memory("outputs");
     }
     for (size_t i = 0; i < made->scene.receiver_count; ++i) {
-        marked[i] = cli_object_output(made->receivers[i].output);
+        const char *output = made->receivers[i].output;
+        marked[i] = vsh_lit_is_output(output) ? strdup(output) : cli_object_output(output);
         made->receivers[i].output = marked[i];
     }
     free_outputs(made);
@@ -149,8 +154,10 @@ static int check_objects(const cli_bake_settings *s, const cli_bake_scene *made,
                          "file, by \"objects\" and \"except\"",
                          s->receive.count > 0 ? "receive" : "no-receive", s->input);
     }
-    if (s->no_cast.count > 0 && made->read != NULL) {
-        return cli_usage("--no-cast: the casters of a scene stand in its file, %s; see \"except\"", s->input);
+    if ((s->no_cast.count > 0 || s->one_sided.count > 0) && made->read != NULL) {
+        const bool except = s->no_cast.count > 0;
+        return cli_usage("--%s: the casters of a scene stand in its file, %s; see \"%s\"",
+                         except ? "no-cast" : "one-sided", s->input, except ? "except" : "one_sided");
     }
     return CLI_OK;
 }
@@ -189,79 +196,6 @@ static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
     return code == CLI_OK && s->per_object ? mark_outputs(made) : code;
 }
 
-static double sun_angle(const cli_bake_settings *s) {
-    return radians_per_degree * (s->has_sun_angle ? s->sun_angle_deg : sun_angle_default_deg);
-}
-
-/* Those of the scene's file, the sun, those of another file: what is given of them. */
-static int join_lights(const cli_bake_settings *s, const vsh_light *others, size_t count,
-                       cli_bake_scene *made) {
-    const size_t own = made->scene.light_count;
-    vsh_error error;
-    made->lights = calloc(own + 1 + count, sizeof *made->lights);
-    if (made->lights == NULL) {
-        return cli_out_of_memory("lights");
-    }
-    if (own > 0) {
-        memcpy(made->lights, made->scene.lights, own * sizeof *made->lights);
-    }
-    made->scene.lights = made->lights;
-    if (s->has_sun) {
-        vsh_light sun = vsh_light_default();
-        memcpy(sun.direction, s->sun, sizeof sun.direction);
-        sun.angle = sun_angle(s);
-        if (vsh_light_check(&sun, &error) != VSH_OK) {
-            return cli_fail(&error);
-        }
-        made->lights[made->scene.light_count++] = sun;
-    }
-    for (size_t i = 0; i < count; ++i) {
-        for (size_t k = 0; k < made->scene.light_count; ++k) {
-            if (strcmp(made->lights[k].name, others[i].name) == 0) {
-                return cli_usage("--lights '%s': its light '%s' has the name of %s", s->lights,
-                                 others[i].name, s->has_sun ? "--sun" : "one of the scene's file");
-            }
-        }
-        made->lights[made->scene.light_count++] = others[i];
-    }
-    return CLI_OK;
-}
-
-static int read_lights(const cli_bake_settings *s, double unit, vsh_light **lights, size_t *count) {
-    const vsh_run run = cli_common_run(&s->common);
-    vsh_model *model = NULL;
-    vsh_error error;
-    if (vsh_model_read(s->lights, &run, &model, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
-    const vsh_result result =
-        vsh_lights_from_model(model, sun_angle(s), s->light_radius, unit, lights, count, &error);
-    vsh_model_free(model);
-    if (result != VSH_OK) {
-        return cli_fail(&error);
-    }
-    return *count > 0 ? CLI_OK
-                      : cli_usage("--lights '%s': has no lights; those of a glTF or GLB are read", s->lights);
-}
-
-static int add_lights(const cli_bake_settings *s, cli_bake_scene *made) {
-    if (s->has_sun && made->read != NULL) {
-        return cli_usage("--sun: the lights of a scene stand in its file, %s", s->input);
-    }
-    if (s->has_sun_angle && !s->has_sun && s->lights == NULL) {
-        return cli_usage("--sun-angle: there is no --sun");
-    }
-    if (s->has_light_radius && s->lights == NULL) {
-        return cli_usage("--light-radius: there is no --lights");
-    }
-    vsh_light *others = NULL;
-    size_t count = 0;
-    int code = s->lights != NULL ? read_lights(s, made->scene.unit, &others, &count) : CLI_OK;
-    code = code == CLI_OK && (s->has_sun || count > 0) ? join_lights(s, others, count, made) : code;
-    vsh_lights_free(others);
-    return code;
-}
-
 int cli_bake_check_work(const cli_bake_settings *s, const cli_bake_scene *made) {
     const bool shades = made->scene.ao || vsh_planes_shaded(&made->scene.planes) > 0;
     if (made->read == NULL && made->scene.light_count == 0 && !shades) {
@@ -277,8 +211,9 @@ int cli_bake_check_output(const cli_bake_settings *s, const vsh_scene *scene, co
     if (cli_same_file(output, s->input)) {
         return cli_usage("%s: the output is the input", output);
     }
-    if (s->lights != NULL && cli_same_file(output, s->lights)) {
-        return cli_usage("%s: the output is the file of --lights", output);
+    CLI_TRY(cli_bake_check_lights(s, scene, output));
+    if (s->field != NULL && cli_same_file(output, s->field)) {
+        return cli_usage("%s: the output is the file of --field", output);
     }
     const bool named_by_scene = s->output == NULL && s->output_folder == NULL && output != s->stats;
     if (named_by_scene && cli_check_links(s->input, output) != CLI_OK) {
@@ -316,6 +251,28 @@ static int check_outputs(const cli_bake_settings *s, const vsh_scene *scene) {
     return s->stats != NULL ? cli_bake_check_output(s, scene, s->stats) : CLI_OK;
 }
 
+/* Opens the file of fields. What it says of voxels stands in outputs as if it had been given. */
+static int use_field(const cli_bake_settings *s, cli_bake_scene *made) {
+    if (s->field == NULL) {
+        return CLI_OK;
+    }
+    const vsh_run run = cli_common_run(&s->common);
+    const int32_t named = made->scene.voxels_named;
+    vsh_error error;
+    if (vsh_field_file_open(s->field, &run, &made->field, &error) != VSH_OK ||
+        vsh_scene_use_field(&made->scene, made->field, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    if (made->scene.voxels_named != named) {
+        char text[32];
+        const vsh_grid_options *grid = &made->scene.grid;
+        const bool size = grid->voxel_size > 0.0;
+        snprintf(text, sizeof text, "%.17g", size ? grid->voxel_size : grid->resolution);
+        cli_parsed_add(size ? "voxel-size" : "resolution", text);
+    }
+    return CLI_OK;
+}
+
 /* The input, or defaults for a mesh, with what the options put over it. */
 static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scene *made) {
     memset(made, 0, sizeof *made);
@@ -336,7 +293,8 @@ static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scen
         }
     }
     int code = cli_patch_scene(&settings->patch, &made->scene);
-    code = code == CLI_OK ? add_lights(settings, made) : code;
+    code = code == CLI_OK ? cli_bake_add_lights(settings, made) : code;
+    code = code == CLI_OK ? use_field(settings, made) : code;
     code = code == CLI_OK ? cli_bake_check_shade(settings, &made->scene) : code;
     code = code == CLI_OK && receivers ? cli_bake_check_work(settings, made) : code;
     return code == CLI_OK ? add_casters(settings, made) : code;
@@ -360,5 +318,6 @@ void cli_bake_scene_free(cli_bake_scene *made) {
     free(made->receivers);
     free(made->casters);
     free(made->lights);
+    vsh_field_file_close(made->field);
     vsh_scene_free(made->read);
 }

@@ -14,8 +14,17 @@ int cli_bake_check_view(const cli_bake_settings *settings, const vsh_scene *scen
     if (!cli_has_ending(page, "html")) {
         return cli_usage("--view '%s': expected a name that ends in .html", page);
     }
-    if (settings->per_object || scene->receiver_count != 1 || scene->receivers[0].type != VSH_RECEIVER_MESH) {
+    const bool images = settings->per_object && !vsh_lit_is_output(scene->receivers[0].output);
+    if (images || scene->receiver_count != 1 || scene->receivers[0].type != VSH_RECEIVER_MESH) {
         return cli_usage("--view '%s': shows one lightmap of one mesh; 'vdbshade view' shows others", page);
+    }
+    const int32_t unwrap = scene->receivers[0].unwrap;
+    if (!vsh_lit_is_output(scene->receivers[0].output) &&
+        (unwrap == VSH_RECEIVER_UNWRAP_AUTO || unwrap == VSH_RECEIVER_UNWRAP_ALWAYS)) {
+        return cli_usage("--view '%s': an image does not hold the UVs that are made; bake a .glb", page);
+    }
+    if (cli_has_ending(scene->receivers[0].output, "obj")) {
+        return cli_usage("--view '%s': shows what a .glb, a .gltf or an image holds, not an .obj", page);
     }
     if (cli_same_file(page, scene->receivers[0].output) || cli_same_file(page, settings->input)) {
         return cli_usage("--view '%s': is also the input or the output", page);

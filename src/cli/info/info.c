@@ -29,7 +29,7 @@ const cli_command cli_info = {
     "open, flipped and degenerate parts, what they are taken for, UVs that overlap within or between\n"
     "objects. OpenVDB files (.vdb): class, voxel size, band, bounds, memory of each grid, and why it\n"
     "cannot cast. Scenes (.json): casters, lights, receivers. Images: size, and the range of each\n"
-    "channel.",
+    "channel. Files of 'vdbshade field': voxels, levels, and what they were made of.",
     options,
     sizeof options / sizeof options[0],
     info_main};
@@ -51,19 +51,17 @@ static int take(void *settings, int key, const char *name, const char *value) {
 }
 
 static int print_info(const char *path, const cli_info_look *look, const vsh_run *run) {
-    static const char *const image_endings[] = {
-        "exr", "png", "tif", "tiff", "jpg", "jpeg", "hdr", "tga", "bmp", "webp", "dpx",  "psd",  "pgm",
-        "ppm", "pnm", "pfm", "gif",  "jp2", "j2k",  "sgi", "rgb", "rla", "ico",  "heic", "heif", "avif"};
+    if (vsh_field_file_is(path)) {
+        return cli_info_field(path, run);
+    }
     if (cli_has_ending(path, "vdb")) {
         return cli_info_vdb(path, run);
     }
     if (cli_has_ending(path, "json")) {
         return cli_info_scene(path, run);
     }
-    for (size_t i = 0; i < sizeof image_endings / sizeof image_endings[0]; ++i) {
-        if (cli_has_ending(path, image_endings[i])) {
-            return cli_info_image(path, run);
-        }
+    if (cli_has_ending_of(path, CLI_IMAGE_ENDINGS)) {
+        return cli_info_image(path, run);
     }
     return cli_info_mesh(path, look, run);
 }

@@ -116,9 +116,11 @@ static int print_mesh(const vsh_model *model, size_t index, const cli_info_look 
            report.bounds_min[2], report.bounds_max[0], report.bounds_max[1], report.bounds_max[2],
            report.area);
     if (mesh.alpha != VSH_ALPHA_OPAQUE) {
-        printf("  material: %s\n", mesh.alpha == VSH_ALPHA_BLENDED
-                                       ? "blended (glass, smoke): it casts no shadow, unless --cast-blended"
-                                       : "masked (leaves, fences): it casts whole, without the mask's holes");
+        printf("  material: %s\n",
+               mesh.alpha == VSH_ALPHA_BLENDED
+                   ? "blended (glass, smoke): it casts no shadow, unless its texture cuts "
+                     "it out, or --cast-blended"
+                   : "masked (leaves, fences): it casts by its texture's alpha");
     }
     print_count(report.open_edges, "open edges");
     print_count(report.flipped_edges, "edges whose triangles disagree about the outside");

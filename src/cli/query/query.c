@@ -31,9 +31,9 @@ static const cli_option options[] = {
     {KEY_POINTS, "points", "FILE",
      "points: .csv .tsv .txt .xyz, .ply, or .raw .f32 .bin of\nfloats (32 bits, little endian); - is "
      "standard input"},
-    {KEY_POINTS_FORMAT, "points-format", "NAME", "csv, ply or raw, whatever the ending"},
+    {KEY_POINTS_FORMAT, "points-format", "csv|ply|raw", "what they are, whatever the ending"},
     {'o', "output", "OUT", "file to write, by the same endings; - is standard output"},
-    {KEY_FORMAT, "format", "NAME", "csv, ply or raw, whatever the ending (for -, as the\npoints)"},
+    {KEY_FORMAT, "format", "csv|ply|raw", "what it is, whatever the ending (for -, as the points)"},
     {KEY_NORMALS, "normals", "yes|no",
      "whether rows have normals, and they are taken (csv and\nply: where there are any; raw: no, rows of 3 "
      "floats;\nyes: of 6)"},

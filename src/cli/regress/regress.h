@@ -35,6 +35,7 @@ typedef struct regress_settings {
     cli_compare_settings compare;
     const char *folder, *cache, *bakes, *only;
     bool update, all;
+    int32_t shard, shard_count; /* 0: all cases */
 } regress_settings;
 
 typedef struct regress_work {

@@ -37,8 +37,10 @@ typedef struct render_work {
 
 static int load(render_work *work) {
     const double start = vshi_seconds();
+    vsh_scene all = *work->scene;
+    all.field = NULL; /* level sets too: groups of one colour have fields of their own */
     vsh_error error;
-    if (vsh_assets_load(work->scene, &work->run, &work->assets, &error) != VSH_OK) {
+    if (vsh_assets_load(&all, &work->run, &work->assets, &error) != VSH_OK) {
         return cli_fail_of(NULL, &error);
     }
     CLI_TRY(render_lightmaps_read(work->settings, work->scene, work->assets, &work->run, &work->lightmaps));
@@ -164,12 +166,12 @@ static int render_frames(render_work *work) {
     return CLI_OK;
 }
 
-/* Lightmaps that are shown are inputs, too. */
+/* Lightmaps that are shown are inputs, too, and so is a file whose lights are taken. */
 static int find_origin(render_work *work) {
     const render_settings *s = work->settings;
-    const char *files[1 + RENDER_MOST_LIGHTMAPS] = {s->bake.input};
-    memcpy(files + 1, s->lightmaps, s->lightmap_count * sizeof *files);
-    return cli_provenance_make(work->scene, files, 1 + s->lightmap_count, &work->stats.casters, &work->run,
+    const char *files[2 + RENDER_MOST_LIGHTMAPS] = {s->bake.input, cli_bake_lights(&s->bake)};
+    memcpy(files + 2, s->lightmaps, s->lightmap_count * sizeof *files);
+    return cli_provenance_make(work->scene, files, 2 + s->lightmap_count, &work->stats.casters, &work->run,
                                &work->origin);
 }
 

@@ -17,13 +17,12 @@
 enum {
     KEY_CSV = 0x2000,
     KEY_PLOT,
+    KEY_VIEW,
     KEY_RECEIVER,
     KEY_SIZE,
     KEY_RESOLUTIONS,
     KEY_TRUTH_RAYS,
-    KEY_BUDGET,
-    KEY_SUN,
-    KEY_SUN_ANGLE
+    KEY_BUDGET
 };
 
 static const cli_option options[] = {
@@ -32,6 +31,8 @@ static const cli_option options[] = {
     {KEY_CSV, "csv", "FILE.csv", "write the table as CSV too"},
     {KEY_PLOT, "plot", "FILE.svg",
      "write the plot of the shadow (without lights, of AO)\nas a picture of its own too"},
+    {KEY_VIEW, "view", "PAGE.html",
+     "also a page to look at the runs in a browser, truth and\nbakes with a slider between: docs/view.md"},
     {0, NULL, NULL, "What is measured"},
     {KEY_RECEIVER, "receiver", "N", "one receiver of the scene only, from 0 (all)"},
     {KEY_SIZE, "size", "W[xH]", "texels of each lightmap, 1 to 4096 (256)"},
@@ -40,9 +41,8 @@ static const cli_option options[] = {
     {KEY_TRUTH_RAYS, "truth-rays", "N", "rays a texel of the truth, 16 to 65536 (1024)"},
     {KEY_BUDGET, "budget", "SECONDS",
      "time to spend on runs, once there is a truth: those that\ndo not fit are left out, and counted (120)"},
-    {0, NULL, NULL, "Light and occlusion, where INPUT is a mesh"},
-    {KEY_SUN, "sun", "X,Y,Z", "direction towards the sun"},
-    {KEY_SUN_ANGLE, "sun-angle", "DEG", "its angular diameter, degrees, 0 to 179 (0.53)"},
+    {0, NULL, NULL, "Light and occlusion, where INPUT is a mesh (--lights also of a scene)"},
+    CLI_LIGHTS,
     CLI_SETTING("ao"),
     CLI_SETTING("uv-set"),
     CLI_COMMON_OPTIONS,
@@ -103,6 +103,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_PLOT:
         s->plot = value;
         return CLI_OK;
+    case KEY_VIEW:
+        s->view = value;
+        return CLI_OK;
     case KEY_RECEIVER:
         return cli_parse_integer(name, value, 0, INT32_MAX, &s->receiver);
     case KEY_SIZE:
@@ -113,18 +116,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return cli_parse_integer(name, value, 16, 65536, &s->truth_rays);
     case KEY_BUDGET:
         return cli_parse_positive(name, value, &s->budget);
-    case KEY_SUN:
-        s->bake.has_sun = true;
-        return cli_parse_vector(name, value, s->bake.sun);
-    case KEY_SUN_ANGLE:
-        s->bake.has_sun_angle = true;
-        return cli_parse_number(name, value, 0.0, 179.0, &s->bake.sun_angle_deg);
     default:
-        break;
+        return cli_shared_parse(&s->bake, key, name, value);
     }
-    bool taken;
-    const int code = cli_patch_take(&s->bake.patch, key, name, value, &taken);
-    return taken ? code : cli_common_parse(&s->bake.common, key, name, value, &taken);
 }
 
 /* --- what the measurements share */
@@ -267,10 +261,12 @@ static int trade(const trade_settings *settings, vsh_scene *scene) {
     }
     int code;
     CLI_TRY_DONE(trade_load(&work));
+    CLI_TRY_DONE(trade_check_view_uvs(&work));
     CLI_TRY_DONE(measure(&work));
     CLI_TRY_DONE(trade_write_csv(&work));
     CLI_TRY_DONE(trade_write_plot(&work));
     CLI_TRY_DONE(trade_write_report(&work));
+    CLI_TRY_DONE(trade_write_view(&work));
     cli_signals_end();
     if (!settings->bake.common.quiet) {
         cli_say("%s: %zu runs in %.1f s, %zu left out", settings->report,
@@ -286,8 +282,8 @@ done:
 
 /* What can be refused before anything is read. */
 static int check_files(const trade_settings *s, const vsh_scene *scene) {
-    const char *const outputs[] = {s->report, s->csv, s->plot};
-    static const char *const names[] = {"output", "--csv file", "--plot file"};
+    const char *const outputs[] = {s->report, s->csv, s->plot, s->view};
+    static const char *const names[] = {"output", "--csv file", "--plot file", "--view page"};
     cli_bake_settings named = s->bake; /* by the command line, not by the scene */
     if (scene->layer_count > 0) {
         return cli_usage("%s: trade measures one field, not layers", s->bake.input);
@@ -355,6 +351,7 @@ static int trade_main(int argc, char **argv) {
     CLI_TRY_DONE(cli_bake_scene_make(&s.bake, &made));
     CLI_TRY_DONE(check_files(&s, &made.scene));
     CLI_TRY_DONE(choose_receiver(&s, &made.scene));
+    CLI_TRY_DONE(trade_check_view(&s, &made.scene));
     cli_signals_watch();
     code = trade(&s, &made.scene);
 done:

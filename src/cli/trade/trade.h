@@ -13,6 +13,7 @@ typedef struct trade_settings {
     const char *report;
     const char *csv;
     const char *plot;
+    const char *view;
     int32_t resolutions[TRADE_MAX_RESOLUTIONS];
     size_t resolution_count;
     int32_t truth_rays;
@@ -122,6 +123,12 @@ int trade_measure_embree(trade_work *work);
 int trade_write_report(const trade_work *work);
 int trade_write_csv(const trade_work *work);
 int trade_write_plot(const trade_work *work);
+
+/* --view: whether a page can show the scene, and then what was loaded; and the page, last of all: values are
+ * grown for it. */
+int trade_check_view(const trade_settings *settings, const vsh_scene *scene);
+int trade_check_view_uvs(const trade_work *work);
+int trade_write_view(const trade_work *work);
 
 /* Bakes all receivers into planes of shadow [lights][texels], of AO or of coverage (each may be NULL). */
 int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh_shade_options *shade,

@@ -1,6 +1,7 @@
 /* vdbshade unwrap: a mesh file's meshes get lightmap UVs. */
 #include "base/clock.h"
 #include "cli/commands.h"
+#include "cli/density.h"
 #include "cli/message.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
@@ -16,39 +17,42 @@
 
 enum {
     KEY_PICTURE = 0x2000,
+    KEY_ATLAS,
     KEY_SIZE,
+    KEY_MAX_SIZE,
     KEY_PAGES,
     KEY_TEXELS,
     KEY_DENSITY,
     KEY_PADDING,
     KEY_STRETCH,
-    KEY_KEEP,
-    MOST_DENSITIES = 256
+    KEY_KEEP
 };
-
-/* A factor of the density for what a pattern means. */
-typedef struct density_rule {
-    char *own; /* the pattern */
-    double factor;
-} density_rule;
 
 typedef struct unwrap_settings {
     const char *input;
     const char *output;
     const char *picture;
+    bool has_size;
+    int32_t max_size; /* 0: not given */
     vsh_unwrap_options options;
-    density_rule densities[MOST_DENSITIES];
-    size_t density_count;
+    cli_densities densities;
     cli_common common;
 } unwrap_settings;
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
-    {'o', "output", "OUT.obj",
-     "mesh file to write: the input's meshes, in the world, with\nthe UVs that were made"},
+    {'o', "output", "OUT",
+     "mesh file to write, with the UVs that were made: .glb or\n.gltf, the input with one more set; .obj, "
+     "its meshes "
+     "in\nthe world with that set alone"},
     {KEY_PICTURE, "picture", "FILE", "picture of the charts to write, PNG or another image"},
     {0, NULL, NULL, "Atlas"},
+    {KEY_ATLAS, "atlas", "WHAT",
+     "objects: each has a page of its own; shared: all lie on the\nsame (shared)"},
     {KEY_SIZE, "size", "N|WxH", "texels of each page (1024)"},
+    {KEY_MAX_SIZE, "max-size", "N",
+     "with --texels-per-unit, instead of --size: pages are as\nsmall as what lies on them allows, their "
+     "sides powers\nof two up to N"},
     {KEY_PAGES, "pages", "N", "pages at most, 1 to 1024 (1)"},
     {KEY_TEXELS, "texels-per-unit", "X", "density, texels along a unit of length (the greatest that\nfits)"},
     {KEY_DENSITY, "density", "PATTERN=X",
@@ -64,31 +68,13 @@ static int unwrap_main(int argc, char **argv);
 
 const cli_command cli_unwrap = {
     "unwrap",
-    "INPUT -o OUT.obj [options]",
+    "INPUT -o OUT [options]",
     "Cuts the meshes of a file into charts, lays them out flat, and packs them into an atlas:\n"
     "lightmap UVs for meshes that have none. Numbers in brackets are what holds without the\n"
     "option.",
     options,
     sizeof options / sizeof options[0],
     unwrap_main};
-
-static int take_density(unwrap_settings *s, const char *name, const char *value) {
-    const char *sign = strrchr(value, '=');
-    if (sign == NULL || sign == value) {
-        return cli_usage("%s '%s': expected PATTERN=FACTOR", name, value);
-    }
-    if (s->density_count == MOST_DENSITIES) {
-        return cli_usage("%s '%s': at most %d are taken", name, value, MOST_DENSITIES);
-    }
-    density_rule *rule = &s->densities[s->density_count];
-    CLI_TRY(cli_parse_positive(name, sign + 1, &rule->factor));
-    rule->own = strndup(value, (size_t)(sign - value));
-    if (rule->own == NULL) {
-        return cli_out_of_memory(name);
-    }
-    ++s->density_count;
-    return CLI_OK;
-}
 
 static int take(void *settings, int key, const char *name, const char *value) {
     unwrap_settings *s = settings;
@@ -100,14 +86,21 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_PICTURE:
         s->picture = value;
         return CLI_OK;
+    case KEY_ATLAS:
+        o->atlas = vsh_atlas_kind(value);
+        return o->atlas >= 0 ? CLI_OK : cli_usage("%s '%s': expected shared or objects", name, value);
     case KEY_SIZE:
+        s->has_size = true;
         return cli_parse_size(name, value, &o->width, &o->height);
+    case KEY_MAX_SIZE:
+        o->fit_pages = 1;
+        return cli_parse_integer(name, value, 1, VSH_MAX_PAGE_SIZE, &s->max_size);
     case KEY_PAGES:
         return cli_parse_integer(name, value, 1, VSH_MAX_PAGES, &o->max_pages);
     case KEY_TEXELS:
         return cli_parse_positive(name, value, &o->texels_per_unit);
     case KEY_DENSITY:
-        return take_density(s, name, value);
+        return cli_density_take(&s->densities, name, value);
     case KEY_PADDING:
         return cli_parse_integer(name, value, 0, 4096, &o->padding);
     case KEY_STRETCH:
@@ -122,10 +115,24 @@ static int take(void *settings, int key, const char *name, const char *value) {
     }
 }
 
+static int check_atlas(unwrap_settings *s) {
+    vsh_unwrap_options *o = &s->options;
+    if (s->max_size > 0 && (s->has_size || o->texels_per_unit == 0.0)) {
+        return s->has_size ? cli_usage("--max-size and --size: give one of the two")
+                           : cli_usage("--max-size: there is no --texels-per-unit, and any size is filled");
+    }
+    if (o->atlas == VSH_ATLAS_OBJECTS && o->max_pages > 1) {
+        return cli_usage("--pages: with --atlas objects each object has one");
+    }
+    o->width = s->max_size > 0 ? s->max_size : o->width;
+    o->height = s->max_size > 0 ? s->max_size : o->height;
+    return CLI_OK;
+}
+
 /* What can be refused before anything is read. */
 static int check_files(const unwrap_settings *s) {
-    if (s->output == NULL || !cli_has_ending(s->output, "obj")) {
-        return cli_usage("%s: give -o OUT.obj", s->output != NULL ? s->output : s->input);
+    if (!vsh_lit_is_output(s->output)) {
+        return cli_usage("%s: give -o OUT.obj, .glb or .gltf", s->output != NULL ? s->output : s->input);
     }
     if (cli_same_file(s->output, s->input)) {
         return cli_usage("%s: the output is the input", s->output);
@@ -148,33 +155,14 @@ static int check_files(const unwrap_settings *s) {
     return cli_temporary_check(s->output);
 }
 
-/* Factors by pattern: one of each mesh. */
-static int make_densities(const unwrap_settings *s, const vsh_mesh *meshes, size_t count, double *density) {
-    for (size_t m = 0; m < count; ++m) {
-        density[m] = 1.0;
-    }
-    for (size_t r = 0; r < s->density_count; ++r) {
-        size_t meant = 0;
-        for (size_t m = 0; m < count; ++m) {
-            if (vsh_mesh_matches(&meshes[m], s->densities[r].own) != 0) {
-                density[m] = s->densities[r].factor;
-                ++meant;
-            }
-        }
-        if (meant == 0) {
-            return cli_usage("--density '%s': no object of %s is meant", s->densities[r].own, s->input);
-        }
-    }
-    return CLI_OK;
-}
-
 static void say_summary(const unwrap_settings *s, const vsh_atlas *atlas, double seconds) {
     vsh_atlas_info info;
     vsh_atlas_get_info(atlas, &info);
     cli_say("%s: %" PRIu64
-            " charts on %u page%s of %d × %d, %.1f %% covered, %.4g texels a unit, stretch %.3f (worst "
+            " charts on %u page%s of %s%d × %d, %.1f %% covered, %.4g texels a unit, stretch %.3f (worst "
             "%.3f), %.2f s",
-            s->output, info.charts, info.pages, info.pages == 1 ? "" : "s", info.width, info.height,
+            s->output, info.charts, info.pages, info.pages == 1 ? "" : "s",
+            s->options.fit_pages && info.pages > 1 ? "up to " : "", info.width, info.height,
             100.0 * info.covered, info.texels_per_unit, info.stretch, info.worst_stretch, seconds);
     if (info.kept > 0 || info.shared > 0) {
         cli_say("%s: %" PRIu64 " mesh%s kept their UVs, %" PRIu64 " share the layout of another", s->output,
@@ -205,16 +193,18 @@ static int unwrap(unwrap_settings *s) {
     for (size_t m = 0; m < count; ++m) {
         meshes[m] = vsh_model_mesh(model, m, -1);
     }
-    CLI_TRY_DONE(make_densities(s, meshes, count, density));
     s->options.density = density;
-    if (vsh_unwrap(meshes, count, &s->options, &run, &atlas, &error) != VSH_OK) {
+    if (vsh_model_densities(model, s->input, s->densities.list, s->densities.count, density, &error) !=
+            VSH_OK ||
+        vsh_unwrap(meshes, count, &s->options, &run, &atlas, &error) != VSH_OK) {
         code = cli_fail_of(NULL, &error);
         goto done;
     }
     if (s->picture != NULL) {
         CLI_TRY_DONE(cli_unwrap_write_picture(s->picture, atlas));
     }
-    CLI_TRY_DONE(cli_unwrap_write_obj(s->output, meshes, atlas));
+    CLI_TRY_DONE(cli_unwrap_write_mesh(s->input, s->output, model, meshes, atlas,
+                                       s->options.atlas == VSH_ATLAS_OBJECTS, &run));
     cli_signals_end();
     if (!s->common.quiet) {
         say_summary(s, atlas, vshi_seconds() - start);
@@ -238,13 +228,12 @@ static int unwrap_main(int argc, char **argv) {
         goto done;
     }
     cli_progress_begin(s.common.progress, s.common.quiet);
+    CLI_TRY_DONE(check_atlas(&s));
     CLI_TRY_DONE(check_files(&s));
     cli_signals_watch();
     code = unwrap(&s);
 done:
-    for (size_t r = 0; r < s.density_count; ++r) {
-        free(s.densities[r].own);
-    }
+    cli_densities_free(&s.densities);
     cli_progress_end();
     return code;
 }

@@ -23,6 +23,8 @@ static const cli_option options[] = {
     {'o', "output", "OUT.vdb", "file to write: grids shadow.NAME of each light, and ao"},
     {KEY_HALF, "half", NULL, "write 16-bit floats"},
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
+    CLI_SHARD_OPTION(
+        "bake part I of N into OUT.vdb.I-of-N.part; 'vdbshade\nmerge OUT.vdb' puts all parts together"),
     {0, NULL, NULL, "Which voxels (without --box and --like the casters' own band)"},
     {KEY_BAND, "band", "VOXELS",
      "how far from the surface, in voxels, more than 0 to 100\n(all of the level set's band: --half-width)"},
@@ -31,7 +33,7 @@ static const cli_option options[] = {
     {KEY_LIKE, "like", "FILE[:GRID]",
      "the active voxels of a grid in a .vdb file, a fog say,\non its own lattice (the file's first grid of "
      "numbers)"},
-    {KEY_INSIDE, "inside", "NAME",
+    {KEY_INSIDE, "inside", "nearest|off",
      "voxels inside a solid: nearest (they take the nearest\noutside value) or off (inactive) (nearest)"},
     {0, NULL, NULL, "Light and occlusion"},
     CLI_LIGHT_OPTIONS,
@@ -93,6 +95,8 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_STATS:
         s->bake.stats = value;
         return CLI_OK;
+    case CLI_KEY_SHARD:
+        return cli_parse_shard(name, value, &s->bake.shard, &s->bake.shard_count);
     case KEY_HALF:
         s->half = true;
         return CLI_OK;
@@ -126,6 +130,12 @@ static int check_options(const volume_settings *s) {
     if (s->box_voxel_size > 0.0 && !s->has_box) {
         return cli_usage("--box-voxel-size: there is no --box");
     }
+    if (s->bake.field != NULL && s->like == NULL && s->box_voxel_size == 0.0) {
+        return cli_usage(
+            "--field '%s': the casters' band, and the size of its voxels, are a level set's, which such a "
+            "file does not keep: give --box and --box-voxel-size, or --like",
+            s->bake.field);
+    }
     return cli_patch_check(&s->bake.patch);
 }
 
@@ -158,6 +168,7 @@ typedef struct volume_work {
     vsh_grid *grid;
     vsh_voxels *voxels;
     vsh_volume *volume;
+    cli_provenance origin;
     cli_stats stats;
 } volume_work;
 
@@ -241,6 +252,56 @@ static int make_occluders(volume_work *work) {
     return CLI_OK;
 }
 
+/* Instead of what casts, what the parts say did. */
+static int find_casters(volume_work *work) {
+    const volume_settings *s = work->settings;
+    CLI_TRY(make_grid(work));
+    CLI_TRY(choose_voxels(work));
+    vsh_occluders_info casters;
+    vsh_error error;
+    if (vsh_volume_part_casters(s->bake.merged, s->bake.shard_count, &work->run, &casters, &error) !=
+        VSH_OK) {
+        return cli_fail(&error);
+    }
+    cli_stats_casters(&work->stats, work->scene, &casters);
+    return CLI_OK;
+}
+
+static int find_origin(volume_work *work) {
+    const cli_bake_settings *bake = &work->settings->bake;
+    const char *const files[] = {bake->input, work->settings->like, cli_bake_lights(bake)};
+    return cli_provenance_make(work->scene, files, 3, &work->stats.casters, &work->run, &work->origin);
+}
+
+static vsh_part_options part_options(const volume_work *work) {
+    const cli_bake_settings *s = &work->settings->bake;
+    vsh_part_options part = vsh_part_options_default();
+    part.parts = s->output;
+    part.shard = s->shard;
+    part.shard_count = s->shard_count;
+    part.attributes = work->origin.attributes;
+    part.attribute_count = work->origin.count;
+    part.words = s->words;
+    part.word_count = s->word_count;
+    return part;
+}
+
+static vsh_result run_bake(volume_work *work, const vsh_volume_options *bake, vsh_error *error) {
+    const cli_bake_settings *s = &work->settings->bake;
+    const vsh_scene *scene = work->scene;
+    const vsh_part_options part = part_options(work);
+    if (s->merged != NULL) {
+        return vsh_volume_merge(work->voxels, scene->lights, scene->light_count, bake, &part, &work->run,
+                                &work->volume, &work->stats.shade, error);
+    }
+    if (s->shard == 0) {
+        return vsh_bake_volume(work->occluders, work->voxels, scene->lights, scene->light_count, bake,
+                               &work->run, &work->volume, &work->stats.shade, error);
+    }
+    return vsh_bake_volume_part(work->occluders, work->voxels, scene->lights, scene->light_count, bake, &part,
+                                &work->run, &work->stats.shade, error);
+}
+
 static int bake_volume(volume_work *work) {
     const double start = vshi_seconds();
     vsh_volume_options bake = vsh_volume_options_default();
@@ -249,9 +310,7 @@ static int bake_volume(volume_work *work) {
     bake.error = work->scene->error;
     bake.shade = work->scene->shade;
     vsh_error error;
-    const vsh_result result =
-        vsh_bake_volume(work->occluders, work->voxels, work->scene->lights, work->scene->light_count, &bake,
-                        &work->run, &work->volume, &work->stats.shade, &error);
+    const vsh_result result = run_bake(work, &bake, &error);
     cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
@@ -263,18 +322,11 @@ static int write_volume(volume_work *work) {
         const vsh_error cancelled = {VSH_ERROR_CANCELLED, "write: cancelled"};
         return cli_fail(&cancelled);
     }
-    const char *const files[] = {work->settings->bake.input, work->settings->like};
-    cli_provenance origin;
-    const int code = cli_provenance_make(work->scene, files, 2, &work->stats.casters, &work->run, &origin);
-    if (code != CLI_OK) {
-        return code;
-    }
     vsh_error error;
     cli_signals_writing(output);
-    const vsh_result result =
-        vsh_volume_write(work->volume, output, work->settings->half, origin.attributes, origin.count, &error);
+    const vsh_result result = vsh_volume_write(work->volume, output, work->settings->half,
+                                               work->origin.attributes, work->origin.count, &error);
     cli_signals_writing(NULL);
-    cli_provenance_free(&origin);
     cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
     return result == VSH_OK ? CLI_OK : cli_fail(&error);
 }
@@ -301,19 +353,35 @@ static void say_results(const volume_work *work, const vsh_volume_info *info) {
     cli_stats_say(&work->stats);
 }
 
+static void say_part(const volume_work *work) {
+    const cli_bake_settings *s = &work->settings->bake;
+    if (!s->common.quiet) {
+        cli_say("%s.%d-of-%d.part: 'vdbshade merge %s' once all parts are there", s->output, s->shard,
+                s->shard_count, s->output);
+        cli_stats_say(&work->stats);
+    }
+}
+
 static int run_volume(const volume_settings *s, vsh_scene *scene) {
     volume_work work = {.settings = s, .scene = scene, .run = cli_common_run(&s->bake.common)};
     work.stats = cli_stats_begin(CLI_STATS_VOXELS, work.run.threads);
     vsh_volume_info info;
     int code;
     CLI_TRY_DONE(load(&work));
-    CLI_TRY_DONE(make_occluders(&work));
+    CLI_TRY_DONE(s->bake.merged != NULL ? find_casters(&work) : make_occluders(&work));
+    CLI_TRY_DONE(find_origin(&work));
     CLI_TRY_DONE(bake_volume(&work));
+    if (s->bake.shard > 0) {
+        CLI_TRY_DONE(cli_stats_finish(&work.stats, &work.run, s->bake.stats));
+        say_part(&work);
+        goto done;
+    }
     CLI_TRY_DONE(write_volume(&work));
     count_voxels(&work, &info);
     CLI_TRY_DONE(cli_stats_finish(&work.stats, &work.run, s->bake.stats));
     say_results(&work, &info);
 done:
+    cli_provenance_free(&work.origin);
     vsh_volume_free(work.volume);
     vsh_voxels_free(work.voxels);
     vsh_grid_free(work.grid);
@@ -322,31 +390,56 @@ done:
     return code;
 }
 
-static int volume_main(int argc, char **argv) {
-    volume_settings s;
-    memset(&s, 0, sizeof s);
-    s.bake.common = cli_common_default();
-    bool help;
-    int code = cli_parse(&cli_volume, argc, argv, take, &s, "INPUT", &s.bake.input, &help);
-    if (code != CLI_OK || help) {
-        return code;
-    }
-    code = check_options(&s);
+static int parse(int argc, char **argv, volume_settings *s, bool *help) {
+    memset(s, 0, sizeof *s);
+    s->bake.common = cli_common_default();
+    s->bake.words = (const char *const *)argv;
+    s->bake.word_count = (size_t)argc;
+    return cli_parse(&cli_volume, argc, argv, take, s, "INPUT", &s->bake.input, help);
+}
+
+static int volume_by(volume_settings *s) {
+    int code = check_options(s);
     if (code != CLI_OK) {
         return code;
     }
-    cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
+    cli_progress_begin(s->bake.common.progress, s->bake.common.quiet);
     cli_bake_scene made;
-    CLI_TRY_DONE(cli_bake_scene_for_points(&s.bake, &made));
-    if (s.band > made.scene.grid.half_width && !cli_patch_has(&s.bake.patch, "--half-width")) {
-        made.scene.grid.half_width = s.band;
+    CLI_TRY_DONE(cli_bake_scene_for_points(&s->bake, &made));
+    if (s->band > made.scene.grid.half_width && !cli_patch_has(&s->bake.patch, "--half-width")) {
+        made.scene.grid.half_width = s->band;
     }
-    CLI_TRY_DONE(cli_bake_check_work(&s.bake, &made));
-    CLI_TRY_DONE(check_files(&s, &made.scene));
+    CLI_TRY_DONE(cli_bake_check_work(&s->bake, &made));
+    CLI_TRY_DONE(check_files(s, &made.scene));
     cli_signals_watch();
-    code = run_volume(&s, &made.scene);
+    code = run_volume(s, &made.scene);
 done:
     cli_bake_scene_free(&made);
     cli_progress_end();
     return code;
+}
+
+static int volume_main(int argc, char **argv) {
+    volume_settings s;
+    bool help;
+    const int code = parse(argc, argv, &s, &help);
+    return code != CLI_OK || help ? code : volume_by(&s);
+}
+
+int cli_volume_merge(int argc, char **argv, const char *output, int32_t shards, const char *stats,
+                     const cli_common *common) {
+    volume_settings s;
+    bool help;
+    const int code = parse(argc, argv, &s, &help);
+    if (code != CLI_OK || help) {
+        return code != CLI_OK ? code : cli_usage("%s: its parts are of no bake", output);
+    }
+    s.bake.common = *common;
+    s.bake.output = s.bake.merged = output;
+    s.bake.shard = 0;
+    s.bake.shard_count = shards;
+    s.bake.stats = stats;
+    s.bake.words = NULL;
+    s.bake.word_count = 0;
+    return volume_by(&s);
 }

@@ -26,7 +26,6 @@ constexpr int32_t ANY_SIZE = INT_MAX;
 // (2048² for heif) pixels that came eight rows at a time.
 constexpr vshi_format writable[] = {
     // name, bits, alpha, size, lossy, grey, held
-    {"png", BITS_8_16, VSHI_ALPHA_KEPT, 1000000, false, false, 0.0},
     {"tiff", BITS_ALL, VSHI_ALPHA_KEPT, ANY_SIZE, false, false, 0.0},
     {"jpeg", VSHI_BITS_8, VSHI_ALPHA_NONE, 65500, true, false, 0.3},
     {"targa", VSHI_BITS_8, VSHI_ALPHA_KEPT, 65535, false, false, 0.0},

@@ -4,6 +4,7 @@
 #include "base/try.h"
 #include "extern/guard.h"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
@@ -77,9 +78,10 @@ vsh_result read_rows(OIIO::ImageInput &input, const char *path, vsh_image_file &
     return VSH_OK;
 }
 
-vsh_result read_file(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
-    const std::string ending = ending_of(path);
-    const std::string name = format_of_ending(ending);
+vsh_result read_file(const char *path, const vshi_image_bytes *bytes, const vsh_run *run,
+                     vsh_image_file **file, vsh_error *error) {
+    const std::string ending = bytes != nullptr ? bytes->format : ending_of(path);
+    const std::string name = bytes != nullptr ? bytes->format : format_of_ending(ending);
     if (!is_readable(name)) {
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: ending '%s': no image format that is read", path,
                          ending.c_str());
@@ -98,6 +100,16 @@ vsh_result read_file(const char *path, const vsh_run *run, vsh_image_file **file
     OIIO::ImageSpec config;
     config.attribute("oiio:UnassociatedAlpha", 1); // else colours are multiplied by alpha
     config.attribute("oiio:RawColor", 1);
+    std::unique_ptr<OIIO::Filesystem::IOMemReader> memory;
+    if (bytes != nullptr) {
+        if (input->supports("ioproxy") == 0) {
+            return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: this OpenImageIO reads %s from files alone",
+                             path, name.c_str());
+        }
+        memory = std::make_unique<OIIO::Filesystem::IOMemReader>(const_cast<void *>(bytes->at), bytes->size);
+        OIIO::Filesystem::IOProxy *proxy = memory.get();
+        config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
+    }
     OIIO::ImageSpec spec;
     if (!input->open(path, spec, config)) {
         return vshi_fail(error, VSH_ERROR_READ, "%s: could not be read as %s: %s", path, name.c_str(),
@@ -129,7 +141,9 @@ vsh_result read_file(const char *path, const vsh_run *run, vsh_image_file **file
 
 } // namespace vshi
 
-vsh_result vshi_oiio_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
+vsh_result vshi_oiio_read(const char *path, const vshi_image_bytes *bytes, const vsh_run *run,
+                          vsh_image_file **file, vsh_error *error) {
     *file = nullptr;
-    return vshi::guard(error, VSH_ERROR_READ, path, [&] { return vshi::read_file(path, run, file, error); });
+    return vshi::guard(error, VSH_ERROR_READ, path,
+                       [&] { return vshi::read_file(path, bytes, run, file, error); });
 }

@@ -1,6 +1,6 @@
-// Writing every image format but OpenEXR. Integers are made by us, and no value is multiplied by alpha or
-// sent through a transfer curve. Bytes go through a file of ours where the writer takes one; where it does
-// not, the file is read again, because those writers do not look whether their bytes arrived.
+// Writing every image format but OpenEXR and PNG. Integers are made by us, and no value is multiplied by
+// alpha or sent through a transfer curve. Bytes go through a file of ours where the writer takes one; where
+// it does not, the file is read again, because those writers do not look whether their bytes arrived.
 #include "image/oiio/oiio_verify.h"
 
 #include "base/file.h"
@@ -55,7 +55,7 @@ class CheckedFile final : public OIIO::Filesystem::IOProxy {
         return done;
     }
     size_t pwrite(const void *data, size_t count, int64_t offset) override {
-        // A failure is kept for finish() and not told: libpng would print it.
+        // A failure is kept for finish() and not told: libjpeg would end the process.
         vshi_sink_write(&sink_, data, count, static_cast<uint64_t>(offset));
         return count;
     }
@@ -67,20 +67,13 @@ class CheckedFile final : public OIIO::Filesystem::IOProxy {
     vshi_sink sink_;
 };
 
-// 0 … 1 to 0 … maximum, to nearest; NaN becomes 0 because no comparison with it holds.
-template <typename Integer> Integer quantise(float value) {
-    constexpr double maximum = std::numeric_limits<Integer>::max();
-    if (!(value > 0.0f)) {
-        return 0;
-    }
-    return value < 1.0f ? static_cast<Integer>(value * maximum + 0.5) : std::numeric_limits<Integer>::max();
-}
-
-template <typename Value> Value convert(float value) {
+template <typename Value>
+Value value_at(const vshi_planes &planes, const vshi_image_plane &plane, size_t at) {
     if constexpr (std::is_same_v<Value, float>) {
-        return value;
+        return vshi_plane_at(&planes, &plane, at);
     } else {
-        return quantise<Value>(value);
+        constexpr Value most = std::numeric_limits<Value>::max();
+        return static_cast<Value>(vshi_quantise(vshi_plane_unit_at(&planes, &plane, at), most));
     }
 }
 
@@ -93,10 +86,8 @@ void interleave(const vshi_planes &planes, int32_t first, int32_t last, Value *r
     const size_t texels = static_cast<size_t>(last - first) * width;
     for (size_t c = 0; c < count; ++c) {
         const vshi_image_plane &plane = planes.planes[c];
-        const bool halve = plane.is_signed && std::is_integral_v<Value>;
         for (size_t i = 0; i < texels; ++i) {
-            const float value = vshi_plane_at(&planes, &plane, begin + i);
-            rows[i * count + c] = convert<Value>(halve ? 0.5F + 0.5F * value : value);
+            rows[i * count + c] = value_at<Value>(planes, plane, begin + i);
         }
     }
 }
@@ -126,13 +117,8 @@ OIIO::ImageSpec make_spec(const vshi_planes &planes, const char *path, const std
         spec.attribute("ImageDescription", software); // else 80 bytes that nobody set
     } else if (format == "rla") {
         spec.attribute("oiio:ColorSpace", "Linear");
-    } else if (format == "png") {
-        for (size_t i = 0; i < planes.attribute_count; ++i) {
-            spec.attribute(planes.attributes[i].name, planes.attributes[i].value);
-        }
-        spec.attribute("vdbshade_color_space", planes.is_srgb ? "sRGB" : "linear");
     }
-    if (planes.is_srgb && (format == "png" || format == "tiff" || format == "jpeg")) {
+    if (planes.is_srgb && (format == "tiff" || format == "jpeg")) {
         spec.attribute("oiio:ColorSpace", "sRGB"); // data says nothing: what it was would be undone
     }
     return spec;
@@ -250,7 +236,7 @@ template <typename Value> class Writer final : public vshi_oiio_writer {
 
     vsh_result close(vsh_error *error) override {
         const bool whole = row_ == shape.height;
-        if (row_ == 0 && output_ != nullptr) { // libpng prints that a file without rows has none
+        if (row_ == 0 && output_ != nullptr) { // the writer of JPEG 2000 loses its image where no row came
             filled_ = step_;
             flush(nullptr);
         }

@@ -49,7 +49,7 @@
 
     /* Puts meshes into bake.scene. `loaded` is what VIEW.loadScene() gave; bakes of one file share it. */
     VIEW.build = function (bake, loaded) {
-        const pageOf = numberPages(loaded), known = new Map();
+        const pageOf = numberPages(loaded), known = loaded.geometries = loaded.geometries || new Map();
         bake.scene = new THREE.Scene();
         bake.loaded = loaded;
         bake.meshes = [];

@@ -23,31 +23,60 @@
         return made;
     };
 
-    /* Buttons of the modes; what no bake has is off. */
-    VIEW.makeModes = function (bakes, choose) {
-        const list = byId('modes');
-        VIEW.MODES.forEach(([mode, name, what], i) => {
+    /* Buttons of the modes. */
+    VIEW.makeModes = function (choose) {
+        VIEW.MODES.forEach(([mode, name], i) => {
             const button = VIEW.element('button', name), key = VIEW.element('kbd', String(i + 1));
-            const there = bakes.some(bake => VIEW.has(bake, mode));
             button.type = 'button';
             button.dataset.mode = mode;
             button.setAttribute('role', 'radio');
-            button.disabled = !there;
-            button.title = there ? what : 'nothing of it is in the files';
             button.prepend(key);
             button.onclick = () => choose(mode);
-            list.append(button);
+            byId('modes').append(button);
         });
     };
 
-    VIEW.makeLights = function (bakes, choose) {
-        const select = byId('channel');
-        for (const name of new Set(bakes.flatMap(bake => VIEW.lightsOf(bake)))) {
-            select.append(VIEW.element('option', name));
+    /* Of more than two bakes, one is chosen for each side of the slider. */
+    VIEW.makeSides = function (bakes, set) {
+        for (const side of ['left', 'right']) {
+            const select = byId(side + '-bake');
+            bakes.forEach((bake, i) => select.append(new Option(bake.name, i)));
+            select.onchange = () => set({[side]: +select.value});
+            select.hidden = bakes.length < 3;
+            byId(side).hidden = bakes.length > 2;
         }
-        select.onchange = () => choose(select.value);
-        return select.options.length > 0 ? select.options[0].value : null;
     };
+
+    /* What no bake that is seen has is off. */
+    function tellModes(state, bakes) {
+        VIEW.MODES.forEach(([mode, , what], i) => {
+            const button = byId('modes').children[i], there = bakes.some(bake => VIEW.has(bake, mode));
+            button.disabled = !there;
+            button.title = there ? what : 'nothing of it is in the files';
+            button.setAttribute('aria-checked', String(mode === state.mode));
+            button.tabIndex = mode === state.mode ? 0 : -1;
+        });
+    }
+
+    function tellLights(state, bakes) {
+        const names = [...new Set(bakes.flatMap(bake => VIEW.lightsOf(bake)))], select = byId('channel');
+        if ([...select.options].map(option => option.value).join('\n') !== names.join('\n')) {
+            select.replaceChildren(...names.map(name => VIEW.element('option', name)));
+        }
+        select.value = state.channel;
+    }
+
+    function tellSides(state, bakes) {
+        document.title = bakes.map(bake => bake.name).join(' | ');
+        byId('names').textContent = bakes.map(bake => bake.name).join('  |  ');
+        byId('compare').hidden = bakes.length < 2;
+        byId('split').value = state.split;
+        byId('bar').style.left = 100 * state.split + '%';
+        ['left', 'right'].forEach((side, i) => {
+            byId(side).textContent = bakes[i] ? bakes[i].name : '';
+            byId(side + '-bake').value = state[side];
+        });
+    }
 
     function legend(state, bake) {
         const box = byId('legend');
@@ -75,20 +104,15 @@
 
     /* The panels as the state has them. */
     VIEW.tell = function (state, bakes) {
-        for (const button of byId('modes').children) {
-            button.setAttribute('aria-checked', String(button.dataset.mode === state.mode));
-            button.tabIndex = button.dataset.mode === state.mode ? 0 : -1;
-        }
+        tellModes(state, bakes);
+        tellLights(state, bakes);
+        tellSides(state, bakes);
         byId('lights').hidden = state.mode !== 'light';
-        byId('channel').value = state.channel;
         byId('exposure').value = state.exposure;
         byId('exposure-value').textContent = (state.exposure > 0 ? '+' : '') + state.exposure.toFixed(1) + ' EV';
         byId('texels').checked = state.texels;
         byId('wireframe').checked = state.wireframe;
         byId('sides').checked = state.sides;
-        byId('compare').hidden = bakes.length < 2;
-        byId('split').value = state.split;
-        byId('bar').style.left = 100 * state.split + '%';
         document.documentElement.dataset.theme = state.theme;
         document.body.classList.toggle('bare', !state.ui);
         legend(state, bakes[0]);

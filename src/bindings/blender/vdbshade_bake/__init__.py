@@ -51,8 +51,10 @@ class VDBSHADE_OT_bake(bpy.types.Operator):
             self.start(context)
         except (BakeError, OSError, RuntimeError) as error:
             return self.fail(error)
-        code = self.bake.process.wait()
-        self.bake.poll()
+        try:
+            code = self.bake.wait()
+        except (BakeError, OSError, RuntimeError) as error:
+            return self.fail(error)
         return self.finish(context, code)
 
     def invoke(self, context, event):
@@ -74,7 +76,11 @@ class VDBSHADE_OT_bake(bpy.types.Operator):
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
-        code = self.bake.poll()
+        try:
+            code = self.bake.poll()
+        except (BakeError, OSError, RuntimeError) as error:
+            self.leave(context)
+            return self.fail(error)
         context.window_manager.progress_update(self.bake.progress[0])
         context.workspace.status_text_set("vdbshade: %s   Esc: cancel" % self.bake.progress[1])
         if code is None:
@@ -111,6 +117,10 @@ class VdbshadeSettings(bpy.types.PropertyGroup):
     padding: bpy.props.IntProperty(name="Padding", default=4, min=0, max=256, description="Texels around each chart")
     max_error: bpy.props.FloatProperty(name="Error", default=0.02, min=0.001, max=0.2, precision=3,
                                        description="Root mean square error that is allowed: less takes longer")
+    unwrap: bpy.props.EnumProperty(name="UVs", default="AUTO", items=(
+        ("AUTO", "Where needed", "Make lightmap UVs where an object has none, or shares its mesh with another"),
+        ("ALWAYS", "Make anew", "Make lightmap UVs for all objects"),
+        ("NEVER", "As they are", "Objects without lightmap UVs are refused")))
     link: bpy.props.EnumProperty(name="Materials", default="MULTIPLY", items=(
         ("NONE", "Image node", "Add the image, not linked"),
         ("MULTIPLY", "Multiply", "Multiply the base colour by it"),
@@ -133,7 +143,7 @@ class VDBSHADE_PT_panel(bpy.types.Panel):
             layout.prop(settings, "sun")
         if settings.what != "SHADOW":
             layout.prop(settings, "ao_distance")
-        for name in ("size", "padding", "max_error", "link", "image_name", "pack"):
+        for name in ("size", "padding", "max_error", "unwrap", "link", "image_name", "pack"):
             layout.prop(settings, name)
         layout.operator("vdbshade.bake", text="Bake %d objects" % sum(map(is_caster, context.selected_objects)))
 

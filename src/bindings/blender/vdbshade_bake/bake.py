@@ -9,6 +9,7 @@ import tempfile
 import bpy
 
 from . import materials, scene
+from .layout import Layout, needs_layout
 from .scene import BakeError
 
 
@@ -29,30 +30,49 @@ class Bake:
         self.receivers = [obj for obj in context.selected_objects if scene.is_caster(obj)]
         self.folder = None
         self.process = None
+        self.layout = None  # while UVs are made
+        self.undo = None
         self.progress = (0.0, "")
         self.warnings = []
 
     def begin(self, context):
         if not self.receivers:
             raise BakeError("select the mesh objects that are to be baked; they must not be hidden from renders")
-        program = program_of(context)
-        without = [obj for obj in self.receivers if materials.lightmap_uv(obj) is None]
-        unique = list({obj.data.name: obj for obj in without}.values())
-        if unique:
-            materials.make_lightmap_uvs(context, unique, 2.0 * self.settings.padding / self.settings.size)
-        self.uv_names = {obj.name: materials.lightmap_uv(obj) for obj in self.receivers}
+        self.program, how = program_of(context), self.settings.unwrap
         self.folder = tempfile.mkdtemp(prefix="vdbshade-")
+        if not needs_layout(self.receivers, how):
+            self.bake(context)
+            return
+        self.layout = self.undo = Layout(context, self.receivers, how)
+        parted = self.layout.part()
+        if parted:
+            self.warnings.append("%d objects have a mesh of their own now, as each has its place in the lightmap: %s" %
+                                 (len(parted), ", ".join(parted[:3]) + (" …" if len(parted) > 3 else "")))
+        context.view_layer.update()
+        self.start(self.layout.command(self.program, self.folder, self.settings, context.evaluated_depsgraph_get()))
+
+    def bake(self, context):
+        """The second step, once all receivers have UVs."""
+        self.uv_names = {obj.name: materials.lightmap_uv(obj) for obj in self.receivers}
+        without = [name for name, uv_name in self.uv_names.items() if uv_name is None]
+        if without:
+            raise BakeError("'%s': has no UV map for a lightmap: a second one, or one named '%s'" %
+                            (without[0], materials.UV_NAME))
         casters = [obj for obj in context.scene.objects if scene.is_caster(obj)]
         depsgraph = context.evaluated_depsgraph_get()
-        there = set(scene.write_glb(os.path.join(self.folder, "scene.glb"), casters, depsgraph, self.uv_names))
+        there = set(scene.write_glb(os.path.join(self.folder, "scene.glb"), casters, depsgraph, self.uv_names,
+                                    instances=True))
         receivers = [obj.name for obj in self.receivers if obj.name in there]
         if not receivers:
             raise BakeError("no selected object has a face")
         made = scene.scene_of(self.settings, context.scene, receivers, "baked.exr")
         with open(os.path.join(self.folder, "scene.json"), "w", encoding="utf-8") as out:
             json.dump(made, out)
-        self.log = open(os.path.join(self.folder, "log.txt"), "w+", encoding="utf-8", errors="replace")
-        command = [program, "bake", "scene.json", "--progress", "--max-error", "%g" % self.settings.max_error]
+        self.start([self.program, "bake", "scene.json", "--progress", "--max-error", "%g" % self.settings.max_error])
+
+    def start(self, command):
+        self.log_close()
+        self.log = open(os.path.join(self.folder, command[1] + ".txt"), "w+", encoding="utf-8", errors="replace")
         self.process = subprocess.Popen(command, cwd=self.folder, stdin=subprocess.DEVNULL, stdout=self.log,
                                         stderr=subprocess.STDOUT)
         self.read = 0
@@ -77,7 +97,21 @@ class Bake:
                 self.progress = (int(found.group(2)) / 100.0, line)
             else:
                 self.last = line
-        return code
+        if code != 0 or self.layout is None:
+            return code
+        self.layout.take(self.folder)
+        self.layout = None
+        bpy.context.view_layer.update()
+        self.bake(bpy.context)
+        return None
+
+    def wait(self):
+        """As poll(), once all has ended."""
+        while True:
+            self.process.wait()
+            code = self.poll()
+            if code is not None:
+                return code
 
     last = ""
 
@@ -91,6 +125,7 @@ class Bake:
         if not bpy.data.filepath or self.settings.pack:
             image.pack()
         materials.put_image(self.receivers, image, self.uv_names, self.settings.link)
+        self.undo = None
         return image
 
     def keep(self, path, name):
@@ -103,7 +138,7 @@ class Bake:
         return bpy.path.relpath(target)
 
     def stop(self):
-        """Ends the program where it runs, and takes its files away."""
+        """Ends the program where it runs, and takes its files away, and UVs whose bake did not come to its end."""
         if self.process is not None and self.process.poll() is None:
             self.process.terminate()
             try:
@@ -111,6 +146,9 @@ class Bake:
             except subprocess.TimeoutExpired:
                 self.process.kill()
                 self.process.wait()
+        if self.undo is not None:
+            self.undo.revert()
+            self.undo = None
         if self.folder is not None:
             self.log_close()
             shutil.rmtree(self.folder, ignore_errors=True)

@@ -1,9 +1,5 @@
-"""Lightmap UVs, and the image that comes back into the materials."""
-import math
-
+"""Which UVs an object's lightmap has, and the image that comes back into the materials."""
 import bpy
-
-from .scene import BakeError
 
 UV_NAME = "Lightmap"  # of the UV map that is made where an object has none for lightmaps
 IMAGE_NODE = "vdbshade image"
@@ -17,36 +13,6 @@ def lightmap_uv(obj):
     if UV_NAME in layers:
         return UV_NAME
     return layers[1].name if len(layers) > 1 else None
-
-
-def make_lightmap_uvs(context, objects, margin):
-    """One UV map more on each object that has none for lightmaps, all of them in one square: charts by angle."""
-    if context.mode != "OBJECT":
-        raise BakeError("leave edit mode first")
-    selected, active = list(context.selected_objects), context.view_layer.objects.active
-    bpy.ops.object.select_all(action="DESELECT")
-    before = {}
-    for obj in objects:
-        before[obj.name] = obj.data.uv_layers.active_index
-        if obj.data.uv_layers.new(name=UV_NAME, do_init=False) is None:
-            raise BakeError("'%s': has as many UV maps as there can be" % obj.name)
-        obj.data.uv_layers.active = obj.data.uv_layers[UV_NAME]
-        obj.select_set(True)
-    context.view_layer.objects.active = objects[0]
-    try:
-        bpy.ops.object.mode_set(mode="EDIT")
-        bpy.ops.mesh.reveal()
-        bpy.ops.mesh.select_all(action="SELECT")
-        bpy.ops.uv.smart_project(angle_limit=math.radians(66.0), island_margin=margin, scale_to_bounds=False)
-    finally:
-        bpy.ops.object.mode_set(mode="OBJECT")
-    for obj in objects:
-        if len(obj.data.uv_layers) > 1:
-            obj.data.uv_layers.active_index = before[obj.name]
-    bpy.ops.object.select_all(action="DESELECT")
-    for obj in selected:
-        obj.select_set(True)
-    context.view_layer.objects.active = active
 
 
 def load_image(path, name, settings):

@@ -23,31 +23,36 @@ def is_caster(obj):
     return obj.type == "MESH" and not obj.hide_render and len(obj.data.polygons) > 0
 
 
-def mesh_arrays(numpy, obj, depsgraph, uv_name):
-    """Positions, normals (world), UVs or None, and indices of an object as it is rendered, a vertex a corner."""
-    evaluated = obj.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh()
-    try:
-        mesh.calc_loop_triangles()
-        if hasattr(mesh, "calc_normals_split"):  # until Blender 4.1
-            mesh.calc_normals_split()
-        corners = len(mesh.loops)
-        points = numpy.empty(3 * len(mesh.vertices), numpy.float32)
-        mesh.vertices.foreach_get("co", points)
-        vertices = numpy.empty(corners, numpy.int32)
-        mesh.loops.foreach_get("vertex_index", vertices)
-        normals = numpy.empty(3 * corners, numpy.float32)
-        mesh.loops.foreach_get("normal", normals)
-        indices = numpy.empty(3 * len(mesh.loop_triangles), numpy.int32)
-        mesh.loop_triangles.foreach_get("loops", indices)
-        uvs = None
-        if uv_name is not None:
-            if uv_name not in mesh.uv_layers:
-                raise BakeError("'%s': its modifiers leave nothing of the UV map '%s'" % (obj.name, uv_name))
-            uvs = numpy.empty(2 * corners, numpy.float32)
-            mesh.uv_layers[uv_name].data.foreach_get("uv", uvs)
-    finally:
-        evaluated.to_mesh_clear()
+def keeps_corners(numpy, obj, mesh):
+    """Whether modifiers left an object's faces as they are, if not its vertices: each corner is what it was."""
+    def vertices_of(which):
+        vertices = numpy.empty(len(which.loops), numpy.int32)
+        which.loops.foreach_get("vertex_index", vertices)
+        return vertices
+
+    return len(obj.data.polygons) == len(mesh.polygons) and numpy.array_equal(vertices_of(obj.data), vertices_of(mesh))
+
+
+def arrays_of(numpy, obj, mesh, uv_name):
+    """Positions, normals (world), UVs or None, and indices of a mesh where its object stands, a vertex a corner."""
+    mesh.calc_loop_triangles()
+    if hasattr(mesh, "calc_normals_split"):  # until Blender 4.1
+        mesh.calc_normals_split()
+    corners = len(mesh.loops)
+    points = numpy.empty(3 * len(mesh.vertices), numpy.float32)
+    mesh.vertices.foreach_get("co", points)
+    vertices = numpy.empty(corners, numpy.int32)
+    mesh.loops.foreach_get("vertex_index", vertices)
+    normals = numpy.empty(3 * corners, numpy.float32)
+    mesh.loops.foreach_get("normal", normals)
+    indices = numpy.empty(3 * len(mesh.loop_triangles), numpy.int32)
+    mesh.loop_triangles.foreach_get("loops", indices)
+    uvs = None
+    if uv_name is not None:
+        if uv_name not in mesh.uv_layers:
+            raise BakeError("'%s': its modifiers leave nothing of the UV map '%s'" % (obj.name, uv_name))
+        uvs = numpy.empty(2 * corners, numpy.float32)
+        mesh.uv_layers[uv_name].data.foreach_get("uv", uvs)
     if len(indices) == 0:
         return None
     matrix = numpy.array(obj.matrix_world, numpy.float64)
@@ -64,44 +69,97 @@ def mesh_arrays(numpy, obj, depsgraph, uv_name):
             indices.astype("<u4").ravel())
 
 
-def write_glb(path, objects, depsgraph, uv_names):
-    """Writes objects as a GLB, axes as they are in Blender; returns the names of those that have triangles."""
-    numpy = numpy_of()
-    chunks, accessors, views, meshes, nodes = [], [], [], [], []
+def mesh_arrays(numpy, obj, depsgraph, uv_name, own_corners):
+    """The arrays of an object as it is rendered; with `own_corners` without modifiers that change its faces, so that a
+    vertex of the arrays is a corner of its mesh."""
+    evaluated = obj.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        if not own_corners or keeps_corners(numpy, obj, mesh):
+            return arrays_of(numpy, obj, mesh, uv_name)
+    finally:
+        evaluated.to_mesh_clear()
+    return arrays_of(numpy, obj, obj.data, uv_name)
 
-    def add(array, kind, component, count, **more):
-        views.append({"buffer": 0, "byteOffset": sum(map(len, chunks)), "byteLength": array.nbytes})
-        chunks.append(array.tobytes())
-        accessors.append(dict({"bufferView": len(views) - 1, "componentType": component, "count": count, "type": kind},
-                              **more))
-        return len(accessors) - 1
 
-    for obj in objects:
-        arrays = mesh_arrays(numpy, obj, depsgraph, uv_names.get(obj.name))
-        if arrays is None:
-            continue
+class Glb:
+    """A GLB that grows: axes as they are in Blender."""
+
+    def __init__(self):
+        self.numpy = numpy_of()
+        self.chunks, self.accessors, self.views, self.meshes, self.nodes = [], [], [], [], []
+        self.size = 0
+
+    def add(self, array, kind, component, count, **more):
+        self.views.append({"buffer": 0, "byteOffset": self.size, "byteLength": array.nbytes})
+        self.chunks.append(array.tobytes())
+        self.size += array.nbytes
+        self.accessors.append(dict({"bufferView": len(self.views) - 1, "componentType": component, "count": count,
+                                    "type": kind}, **more))
+        return len(self.accessors) - 1
+
+    def add_mesh(self, name, points, indices, **attributes):
+        if not self.numpy.isfinite(points).all():
+            raise BakeError("'%s': has vertices that are not finite" % name)
+        attributes["POSITION"] = self.add(points, "VEC3", 5126, len(points), min=points.min(axis=0).tolist(),
+                                          max=points.max(axis=0).tolist())
+        self.meshes.append({"name": name, "primitives": [
+            {"attributes": attributes, "indices": self.add(indices, "SCALAR", 5125, len(indices))}]})
+        return len(self.meshes) - 1
+
+    def add_object(self, obj, arrays):
         points, normals, uvs, indices = arrays
-        if not numpy.isfinite(points).all():
-            raise BakeError("'%s': has vertices that are not finite" % obj.name)
-        attributes = {"POSITION": add(points, "VEC3", 5126, len(points), min=points.min(axis=0).tolist(),
-                                      max=points.max(axis=0).tolist()),
-                      "NORMAL": add(normals, "VEC3", 5126, len(points))}
+        attributes = {"NORMAL": self.add(normals, "VEC3", 5126, len(points))}
         if uvs is not None:
-            flipped = numpy.stack((uvs[:, 0], 1.0 - uvs[:, 1]), axis=1).astype("<f4")  # v down
-            attributes["TEXCOORD_0"] = add(flipped, "VEC2", 5126, len(points))
-        meshes.append({"name": obj.data.name, "primitives": [{"attributes": attributes, "indices": add(indices, "SCALAR", 5125, len(indices))}]})
-        nodes.append({"name": obj.name, "mesh": len(meshes) - 1})
-    if not nodes:
-        raise BakeError("no object has a face")
-    body = b"".join(chunks)
-    text = json.dumps({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": list(range(len(nodes)))}],
-                       "nodes": nodes, "meshes": meshes, "accessors": accessors, "bufferViews": views,
-                       "buffers": [{"byteLength": len(body)}]}).encode()
-    text += b" " * (-len(text) % 4)
-    with open(path, "wb") as out:
-        out.write(struct.pack("<4sIIII", b"glTF", 2, 28 + len(text) + len(body), len(text), 0x4E4F534A))
-        out.write(text + struct.pack("<II", len(body), 0x004E4942) + body)
-    return [node["name"] for node in nodes]
+            flipped = self.numpy.stack((uvs[:, 0], 1.0 - uvs[:, 1]), axis=1).astype("<f4")  # v down
+            attributes["TEXCOORD_0"] = self.add(flipped, "VEC2", 5126, len(points))
+        self.nodes.append({"name": obj.name, "mesh": self.add_mesh(obj.name, points, indices, **attributes)})
+
+    def add_instance(self, mesh, matrix, known):
+        """A mesh that casts where an instance of it stands; `known` has the numbers of those that are there."""
+        numpy, key = self.numpy, mesh.as_pointer()
+        if key not in known:
+            mesh.calc_loop_triangles()
+            points = numpy.empty(3 * len(mesh.vertices), numpy.float32)
+            mesh.vertices.foreach_get("co", points)
+            indices = numpy.empty(3 * len(mesh.loop_triangles), numpy.int32)
+            mesh.loop_triangles.foreach_get("vertices", indices)
+            known[key] = None if len(indices) == 0 else self.add_mesh(
+                "instanced " + mesh.name, points.reshape(-1, 3).astype("<f4"), indices.astype("<u4"))
+        if known[key] is not None and matrix.determinant() != 0.0:
+            columns = [x for column in matrix.transposed() for x in column]
+            self.nodes.append({"name": "instance %d of %s" % (len(self.nodes), mesh.name), "mesh": known[key],
+                               "matrix": columns})
+
+    def write(self, path):
+        if not self.nodes:
+            raise BakeError("no object has a face")
+        body = b"".join(self.chunks)
+        text = json.dumps({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": list(range(len(self.nodes)))}],
+                           "nodes": self.nodes, "meshes": self.meshes, "accessors": self.accessors,
+                           "bufferViews": self.views, "buffers": [{"byteLength": len(body)}]}).encode()
+        text += b" " * (-len(text) % 4)
+        with open(path, "wb") as out:
+            out.write(struct.pack("<4sIIII", b"glTF", 2, 28 + len(text) + len(body), len(text), 0x4E4F534A))
+            out.write(text + struct.pack("<II", len(body), 0x004E4942) + body)
+
+
+def write_glb(path, objects, depsgraph, uv_names, own_corners=False, instances=False):
+    """Writes objects, and with `instances` what collections, particles and geometry nodes show of others, as a GLB;
+    returns the names of the objects that have triangles."""
+    glb, there = Glb(), []
+    for obj in objects:
+        arrays = mesh_arrays(glb.numpy, obj, depsgraph, uv_names.get(obj.name), own_corners)
+        if arrays is not None:
+            glb.add_object(obj, arrays)
+            there.append(obj.name)
+    known = {}
+    for shown in depsgraph.object_instances if instances else ():
+        if shown.is_instance and shown.object.type == "MESH" and not shown.object.hide_render and \
+                not (shown.parent is not None and shown.parent.hide_render):
+            glb.add_instance(shown.object.data, shown.matrix_world, known)
+    glb.write(path)
+    return there
 
 
 def pattern_of(name):

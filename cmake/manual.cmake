@@ -1,0 +1,27 @@
+# Pages of docs/ that the program prints (`vdbshade help TOPIC`), as arrays; and what it writes of its own tables when it is
+# built: man pages and completions, which packages install (`vdbshade help --write FOLDER`).
+set(VSH_HELP_PAGES ${PROJECT_BINARY_DIR}/help_pages.c)
+file(GLOB VSH_HELP_TEXTS CONFIGURE_DEPENDS docs/*.md)
+list(FILTER VSH_HELP_TEXTS EXCLUDE REGEX "/architecture.md$") # which is for who changes it
+string(REPLACE ";" "," pages "${VSH_HELP_TEXTS}")
+add_custom_command(OUTPUT ${VSH_HELP_PAGES}
+                   COMMAND ${CMAKE_COMMAND} -DOUT=${VSH_HELP_PAGES} "-DPAGES=${pages}" -P ${PROJECT_SOURCE_DIR}/cmake/embed_docs.cmake
+                   DEPENDS cmake/embed_docs.cmake ${VSH_HELP_TEXTS} VERBATIM)
+add_library(vdbshade_help_pages OBJECT ${VSH_HELP_PAGES}) # of whatever is made of the command line's sources
+vsh_set_source_flags(vdbshade_help_pages)
+target_include_directories(vdbshade_help_pages PRIVATE src include)
+list(APPEND VSH_CLI_SOURCES $<TARGET_OBJECTS:vdbshade_help_pages>)
+
+set(VSH_MANUAL ${PROJECT_BINARY_DIR}/manual)
+function(vsh_add_manual program)
+  add_custom_command(OUTPUT ${VSH_MANUAL}/done
+                     COMMAND ${CMAKE_COMMAND} -E rm -rf ${VSH_MANUAL}
+                     COMMAND ${program} help --write ${VSH_MANUAL}
+                     COMMAND ${CMAKE_COMMAND} -E touch ${VSH_MANUAL}/done
+                     DEPENDS ${program} VERBATIM)
+  add_custom_target(manual ALL DEPENDS ${VSH_MANUAL}/done)
+  install(DIRECTORY ${VSH_MANUAL}/share/man/man1 DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT program)
+  foreach(folder bash-completion zsh fish)
+    install(DIRECTORY ${VSH_MANUAL}/share/${folder} DESTINATION ${CMAKE_INSTALL_DATADIR} COMPONENT program)
+  endforeach()
+endfunction()

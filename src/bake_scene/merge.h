@@ -1,0 +1,43 @@
+/* Parts of a job's lightmaps, put together. */
+#ifndef VSHI_MERGE_H
+#define VSHI_MERGE_H
+
+#include "bake_scene/job.h"
+#include "bake_scene/part_rows.h"
+
+typedef struct vshi_part_place {
+    size_t part, piece;
+    uint64_t lightmap;
+    int32_t first, end; /* rows */
+} vshi_part_place;
+
+typedef struct vshi_parts {
+    vshi_part *list; /* [count] */
+    size_t count;
+    vshi_part_place *places; /* [place_count]: all pieces, by lightmap and row */
+    size_t place_count;
+} vshi_parts;
+
+/* What parts' files are named after: the options' name, or the first lightmap's output. */
+const char *vshi_parts_name(const vsh_bake_job *job);
+
+/* What its parts' files say of themselves, of `count` shards. */
+vsh_part_options vshi_job_part_options(const vsh_bake_job *job, int32_t count);
+
+/* Reads all parts of a job whose lightmaps are measured, and checks that they are its own and complete; sets
+ * what the report tells of casters, and where the output comes from. Errors: as vshi_part_open();
+ * VSH_ERROR_READ (one is missing), VSH_ERROR_INPUT (one is of other inputs, options, another version). Free
+ * them also after an error. */
+vsh_result vshi_parts_open(vsh_bake_job *job, int32_t count, const vsh_run *run, vshi_parts *parts,
+                           vsh_error *error);
+void vshi_parts_free(vshi_parts *parts);
+
+/* Takes rows of a lightmap into the channels, padded and filled. */
+vsh_result vshi_parts_take(const vshi_parts *parts, const vsh_scene *scene, size_t index,
+                           const vsh_charts *charts, int32_t first, int32_t rows, const vsh_run *run,
+                           vshi_channels *channels, vsh_error *error);
+
+/* Adds the statistics of a lightmap's pieces. */
+void vshi_parts_add_stats(const vshi_parts *parts, size_t index, vsh_bake_stats *stats);
+
+#endif

@@ -1,0 +1,134 @@
+#include "bake_scene/part_head.h"
+#include "base/memory.h"
+#include "base/try.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+void vshi_part_head_free(vshi_part_head *head) {
+    for (uint64_t i = 0; i < head->channel_count && head->channels != NULL; ++i) {
+        free(head->channels[i]);
+    }
+    free(head->pieces);
+    free(head->lightmaps);
+    free(head->channels);
+    vshi_part_about_free(&head->about);
+    *head = (vshi_part_head){.channel_count = 0};
+}
+
+void vshi_part_free(vshi_part *part) {
+    for (uint64_t i = 0; part->pieces != NULL && i < part->head.piece_count; ++i) {
+        free(part->pieces[i].invalid_by_mesh);
+        free(part->pieces[i].errors);
+    }
+    free(part->pieces);
+    free(part->offset);
+    vshi_part_head_free(&part->head);
+    free(part->path);
+    *part = (vshi_part){.path = NULL};
+}
+
+/* Whether pieces are rows of lightmaps, and as many as the file has room for; sets where each begins. */
+static vsh_result check_pieces(vshi_part *part, const vshi_part_front *front, vsh_error *error) {
+    const vshi_part_head *head = &part->head;
+    uint64_t at = 0;
+    double tail = 0.0;
+    if (head->channel_count > VSH_MAX_CHANNELS || head->channel_count == 0) {
+        return vshi_part_damaged(part->path, "its channels", error);
+    }
+    for (uint64_t i = 0; i < head->piece_count; ++i) {
+        const vshi_part_piece *piece = &head->pieces[i];
+        if (piece->lightmap >= head->lightmap_count) {
+            return vshi_part_damaged(part->path, "rows of no lightmap", error);
+        }
+        const vshi_part_lightmap *lightmap = &head->lightmaps[piece->lightmap];
+        if (lightmap->width < 1 || lightmap->width > VSH_MAX_LIGHTMAP_SIZE || lightmap->height < 1 ||
+            lightmap->height > VSH_MAX_LIGHTMAP_SIZE || piece->first < 0 || piece->rows < 1 ||
+            piece->first >= lightmap->height || piece->rows > lightmap->height - piece->first) {
+            return vshi_part_damaged(part->path, "rows outside of their lightmap", error);
+        }
+        part->offset[i] = sizeof *front + front->head_bytes + at;
+        /* at most 2^32 × 257 × 4 */
+        const uint64_t bytes =
+            (uint64_t)lightmap->width * (uint64_t)piece->rows * (head->channel_count + 1) * sizeof(float);
+        if (bytes > front->body_bytes - at) {
+            return vshi_part_damaged(part->path, "more rows than it holds", error);
+        }
+        at += bytes;
+        tail += vshi_part_stats_bytes(lightmap->mesh_count, head->error_count);
+    }
+    return at == front->body_bytes && tail == (double)front->tail_bytes
+               ? VSH_OK
+               : vshi_part_damaged(part->path, "it has not the size that it tells", error);
+}
+
+static vsh_result read_stats(vshi_part *part, vshi_part_code *code, vsh_error *error) {
+    const vshi_part_head *head = &part->head;
+    VSHI_TRY(vshi_allocate((void **)&part->pieces, (size_t)head->piece_count + 1, sizeof *part->pieces,
+                           part->path, error));
+    for (uint64_t i = 0; i < head->piece_count; ++i) {
+        vsh_bake_stats *stats = &part->pieces[i];
+        const uint64_t meshes = head->lightmaps[head->pieces[i].lightmap].mesh_count;
+        *stats = vsh_bake_stats_zero();
+        VSHI_TRY(vshi_allocate((void **)&stats->invalid_by_mesh, (size_t)meshes + 1, sizeof(uint64_t),
+                               part->path, error));
+        VSHI_TRY(vshi_allocate((void **)&stats->errors, (size_t)head->error_count + 1, sizeof *stats->errors,
+                               part->path, error));
+        vshi_part_code_stats(code, stats, meshes, head->error_count);
+    }
+    return code->failed ? vshi_part_damaged(part->path, "its statistics", error) : VSH_OK;
+}
+
+static vsh_result read_part(vshi_part_input *input, const vsh_run *run, vshi_part *part, vsh_error *error) {
+    vshi_part_head *head = &part->head;
+    if (strcmp(head->about.kind, VSHI_PART_BAKE) != 0) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: is a part of a %.32s, not of a bake", part->path,
+                         head->about.kind);
+    }
+    vshi_part_code_head(&input->head, head);
+    VSHI_TRY(vshi_part_input_end_head(input, error));
+    VSHI_TRY(vshi_allocate((void **)&part->offset, (size_t)head->piece_count + 1, sizeof *part->offset,
+                           part->path, error));
+    VSHI_TRY(check_pieces(part, &input->front, error));
+    VSHI_TRY(vshi_part_input_pass_body(input, true, run, error));
+    vshi_part_code tail;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_part_input_tail(input, run, &tail, error));
+    result = read_stats(part, &tail, error);
+done:
+    free(tail.bytes);
+    return result == VSH_OK ? vshi_part_input_check_sum(input, error) : result;
+}
+
+vsh_result vshi_part_open(const char *path, const vsh_run *run, vshi_part *part, vsh_error *error) {
+    *part = (vshi_part){.path = strdup(path)};
+    if (part->path == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+    }
+    vshi_part_input input;
+    vsh_result result = vshi_part_input_open(path, run, &input, &part->head.about, error);
+    result = result == VSH_OK ? read_part(&input, run, part, error) : result;
+    vshi_part_input_close(&input);
+    return result;
+}
+
+vsh_result vshi_part_read(const vshi_part *part, size_t piece, int32_t first, int32_t rows, size_t at,
+                          float *const *planes, uint32_t *known, vsh_error *error) {
+    const vshi_part_head *head = &part->head;
+    const size_t width = (size_t)head->lightmaps[head->pieces[piece].lightmap].width;
+    const uint64_t row_bytes = (uint64_t)width * (head->channel_count + 1) * sizeof(float);
+    const uint64_t begin = part->offset[piece] + (uint64_t)(first - head->pieces[piece].first) * row_bytes;
+    FILE *file;
+    VSHI_TRY(vshi_part_reopen(part->path, begin, &file, error));
+    vsh_result result = VSH_OK;
+    for (size_t row = 0; row < (size_t)rows && result == VSH_OK; ++row, at += width) {
+        for (uint64_t c = 0; c < head->channel_count && result == VSH_OK; ++c) {
+            result = vshi_part_read_bytes(file, part->path, planes[c] + at, width * sizeof(float), error);
+        }
+        if (result == VSH_OK) {
+            result = vshi_part_read_bytes(file, part->path, known + at, width * sizeof *known, error);
+        }
+    }
+    fclose(file);
+    return result;
+}

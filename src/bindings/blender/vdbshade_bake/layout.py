@@ -1,0 +1,120 @@
+"""Lightmap UVs by `vdbshade unwrap`: which objects need them, and how they come back into the meshes."""
+import os
+
+import bpy
+
+from . import materials, scene
+from .scene import BakeError
+
+
+def needs_layout(receivers, how):
+    """Whether UVs are to be made: where an object has none for a lightmap, or shares them with another."""
+    if how == "NEVER":
+        return False
+    data = [obj.data.name for obj in receivers]
+    return how == "ALWAYS" or len(set(data)) < len(data) or \
+        any(materials.lightmap_uv(obj) is None for obj in receivers)
+
+
+class Layout:
+    """All receivers in one square. UVs that serve are kept as charts, and packed with those that are made."""
+
+    def __init__(self, context, receivers, how):
+        if context.mode != "OBJECT":
+            raise BakeError("leave edit mode first")
+        self.receivers = receivers
+        self.keep = how != "ALWAYS"
+        self.undo = []
+        for obj in receivers:
+            if obj.data.library is not None or obj.library is not None:
+                raise BakeError("'%s': comes from another file, and so cannot have UVs made; make it local" % obj.name)
+
+    def part(self):
+        """Meshes that several objects have become one each: a lightmap has a place for each object."""
+        seen, parted = set(), []
+        for obj in self.receivers:
+            if obj.data.name in seen:
+                before = obj.data
+                obj.data = before.copy()
+                self.undo.append(lambda obj=obj, before=before, made=obj.data: unpart(obj, before, made))
+                parted.append(obj.name)
+            seen.add(obj.data.name)
+        return parted
+
+    def command(self, program, folder, settings, depsgraph):
+        """Writes what is laid out; the program's command line."""
+        names = {obj.name: materials.lightmap_uv(obj) if self.keep else None for obj in self.receivers}
+        there = scene.write_glb(os.path.join(folder, "layout.glb"), self.receivers, depsgraph, names, own_corners=True)
+        self.laid = [obj for obj in self.receivers if obj.name in there]
+        command = [program, "unwrap", "layout.glb", "-o", "layout.obj", "--progress", "--size", str(settings.size),
+                   "--padding", str(settings.padding)]
+        return command + ["--keep"] if self.keep else command
+
+    def take(self, folder):
+        """The UVs into the meshes."""
+        numpy = scene.numpy_of()
+        laid = read_obj(os.path.join(folder, "layout.obj"))
+        if len(laid) != len(self.laid):
+            raise BakeError("%d objects were laid out, of %d" % (len(laid), len(self.laid)))
+        for obj, (count, corners, uvs) in zip(self.laid, laid):
+            if count != len(obj.data.loops):
+                raise BakeError("'%s': was laid out with %d corners, and has %d" % (obj.name, count, len(obj.data.loops)))
+            of_corner = numpy.zeros((count, 2), numpy.float32)
+            corners, uvs = numpy.array(corners), numpy.array(uvs, numpy.float32)
+            of_corner[corners] = uvs
+            cut = numpy.unique(corners[(of_corner[corners] != uvs).any(axis=1)])
+            if len(cut) > 0:  # Blender's faces have one place for each corner
+                raise BakeError("'%s': %d corners of bent faces are parted by the layout; triangulate such faces" %
+                                (obj.name, len(cut)))
+            self.put(obj, of_corner)
+
+    def put(self, obj, uvs):
+        layers = obj.data.uv_layers
+        active, layer = layers.active_index, layers.get(materials.UV_NAME)
+        if layer is None:
+            layer = layers.new(name=materials.UV_NAME, do_init=False)
+            if layer is None:
+                raise BakeError("'%s': has as many UV maps as there can be" % obj.name)
+            if len(layers) > 1:
+                layers.active_index = active
+            self.undo.append(lambda obj=obj: obj.data.uv_layers.remove(obj.data.uv_layers[materials.UV_NAME]))
+        else:
+            numpy = scene.numpy_of()
+            before = numpy.empty(uvs.size, numpy.float32)
+            layer.data.foreach_get("uv", before)
+            self.undo.append(lambda obj=obj: obj.data.uv_layers[materials.UV_NAME].data.foreach_set("uv", before))
+        layer.data.foreach_set("uv", uvs.ravel())
+        obj.data.update()
+
+    def revert(self):
+        """Everything as it was."""
+        for step in reversed(self.undo):
+            step()
+        self.undo = []
+
+
+def unpart(obj, before, made):
+    obj.data = before
+    bpy.data.meshes.remove(made)
+
+
+def read_obj(path):
+    """Of each object of an OBJ its number of positions, and of the corners of its triangles the position and the UV."""
+    objects, uvs, positions, first = [], [], 0, 0
+    with open(path, encoding="utf-8", errors="replace") as lines:
+        for line in lines:
+            kind, _, rest = line.partition(" ")
+            if kind == "o":
+                objects.append([0, [], []])
+                first = positions
+            elif kind == "v":
+                positions += 1
+                objects[-1][0] += 1
+            elif kind == "vt":
+                uvs.append(tuple(map(float, rest.split())))
+            elif kind == "f":
+                for corner in rest.split():
+                    position, uv = corner.split("/")[:2]
+                    objects[-1][1].append(int(position) - 1 - first)
+                    objects[-1][2].append(uvs[int(uv) - 1])
+    return objects

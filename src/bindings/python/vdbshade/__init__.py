@@ -1,0 +1,38 @@
+"""Soft shadows and ambient occlusion, baked from signed distance fields and triangles.
+
+Casters become :class:`Occluders`, of which points (:class:`Query`, :func:`shade_shadow`, :func:`shade_ao`), lightmaps
+(:class:`Texels`, :func:`bake_lightmap`), volumes (:func:`bake_volume`) and pictures (:func:`render`) are asked. A
+:class:`Scene` bakes from files. Names are those of the C library without ``vsh_``; options are keywords, named and
+documented in :mod:`vdbshade.types`; constants are words; errors are :class:`Error`. World space is right-handed, in scene
+units; angles are radians. docs/python.md tells more.
+
+Every call lets other threads of Python run. What is passed in must not be changed meanwhile.
+"""
+from . import types
+from ._library import (ArgumentError, Cancelled, Error, InputError, InternalError, LimitError, OutOfMemoryError, ReadError, Run,
+                       UnsupportedError, VdbshadeWarning, WriteError)
+from ._bake_scene import BakeJob, SceneLightmap, bake_scene
+from ._compare import (Comparison, Limits, Measures, Tolerances, compare, compare_accuracy, compare_coverage, compare_files, compare_judge,
+                      measure_at_least)
+from ._field import Field, Heights, Spheres, Triangles, spheres_read, trace_ao, trace_shadow
+from ._field_file import FieldFile, KeptField, field_file_is, field_file_write
+from ._flat import FlatScene, flat_bake, flat_light_name, flat_visibility
+from ._grid import Grid, vdb_copy, vdb_list
+from ._image import Image, ImageWriter, image_check, image_default_pack, image_read, image_write, srgb_to_linear
+from ._inputs import file_digest, isa_available, provenance, provenance_max_error, reader_confinement, version
+from ._light import Light, lights_read
+from ._lightmap import Charts, Lightmap, Texels, bake_lightmap, charts_closeness, lightmap_fill_hidden, lightmap_stitch, lightmaps_stitch
+from ._mesh import AlphaMask, Mesh, Model, mesh_solidity, unit
+from ._occluders import Layer, Occluders
+from ._outline import Outline
+from ._parts import part_words
+from ._points import (Query, Stats, ao_method_resolve, ao_method_traits, shade_ao, shade_irradiance, shade_shadow, shade_tint,
+                      shadow_method_resolve, shadow_method_traits)
+from ._render import Camera, LitMeshes, Picture, render
+from ._scene import Assets, Scene, settings
+from ._sdf import Sdf, Solids
+from ._unwrap import Atlas, AtlasMesh, LitImage, lit_is_output, lit_write, unwrap, view_write, view_write_bakes
+from ._volume import Volume, Voxels, bake_volume, bake_volume_part, volume_merge, volume_part_casters
+
+__version__ = version()
+__all__ = [name for name in dir() if not name.startswith("_")]

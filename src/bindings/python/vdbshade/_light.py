@@ -1,0 +1,90 @@
+"""Lights: directional with an angular diameter, sphere, spot, rectangle."""
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any, List, Optional, Sequence, Tuple, Union
+
+from ._library import RUN, Run, call, ffi, lib
+from ._structs import Filled, members, path_of, told
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from . import types
+
+
+class Light:
+    """A light. What a type does not name is ignored; a size of 0 is a hard light.
+
+    Parameters
+    ----------
+    type : str
+        "directional" (direction, angle), "sphere" (position, radius), "spot" (position, radius, axis, inner_angle,
+        outer_angle) or "rectangle" (position, edge_u, edge_v, two_sided)
+    **options
+        members of ``vsh_light`` (vdbshade.types.Light): lengths in world units, angles in radians. `direction` points
+        towards the light, `angle` is its angular diameter; `color` is linear RGB times intensity.
+
+    Examples
+    --------
+    >>> Light("directional", direction=(0.4, 0.8, 0.3), angle=0.03, name="sun")
+    <vdbshade.Light sun: directional …>
+    """
+
+    def __init__(self, type: str = "directional", **options: "Unpack[types.Light]") -> None:
+        self._filled = Filled("vsh_light", dict(options, type=type))
+        self.struct = self._filled.pointer
+        call(lib.vsh_light_check, self.struct)
+
+    @classmethod
+    def _of(cls, struct: Any) -> "Light":
+        self = cls.__new__(cls)
+        self._filled = Filled("vsh_light")
+        self.struct = self._filled.pointer
+        self.struct[0] = struct
+        return self
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_") or name not in members("vsh_light"):
+            raise AttributeError(name)
+        return getattr(told(self.struct[0], "vsh_light"), name)
+
+    def __repr__(self) -> str:
+        text = ffi.new("char[]", 256)
+        lib.vsh_light_text(self.struct, text, 256)
+        return f"<vdbshade.Light {self.name}: {ffi.string(text).decode()}>"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Light) and told(self.struct[0], "vsh_light") == told(other.struct[0], "vsh_light")
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def lights_of(given: Union[Light, Sequence[Light]], name: str = "lights") -> Tuple[Any, int]:
+    """Lights as C takes them: ``vsh_light[]`` and how many."""
+    lights = [given] if isinstance(given, Light) else list(given)
+    if not all(isinstance(light, Light) for light in lights):
+        raise TypeError(f"{name}: expected a vdbshade.Light, or several in a list")
+    structs = ffi.new("vsh_light[]", max(len(lights), 1))
+    for i, light in enumerate(lights):
+        structs[i] = light.struct[0]
+    return structs, len(lights)
+
+
+def lights_read(path: "str | os.PathLike[str]", angle: float, radius: float, unit: float = 0.0, *,
+                run: Optional[Run] = None) -> List[Light]:
+    """The lights of a glTF's file as those of a scene, which have sizes.
+
+    Parameters
+    ----------
+    angle : float
+        of directional ones, angular diameter, radians
+    radius : float
+        of points, which become spheres, and spots, world units
+    unit : float
+        of the file's numbers, metres; 0: as it says itself
+    """
+    lights, count = ffi.new("vsh_light **"), ffi.new("size_t *")
+    call(lib.vsh_lights_read, path_of(path, "path"), angle, radius, unit, RUN, lights, count, run=run)
+    owned = ffi.gc(lights[0], lib.vsh_lights_free)
+    return [Light._of(owned[i]) for i in range(count[0])]

@@ -1,0 +1,174 @@
+/* Man pages in the man macros (man(7)), one of the program and one of each command. What is no ASCII is
+ * written as
+ * \[u2026], so that a page is the same whatever its reader takes its bytes for. There is no date: the same
+ * build gives the same page. */
+#include "help.h"
+
+#include "cli/text.h"
+
+#include <string.h>
+#include <vdbshade/vdbshade.h>
+
+enum { WIDTH = 56 }; /* and what escapes add to it: lines stay below 80 bytes */
+
+/* One character's code point, of valid UTF-8, which texts of ours are. */
+static unsigned code_point(const unsigned char *c, int *length) {
+    *length = c[0] < 0x80 ? 1 : c[0] < 0xe0 ? 2 : c[0] < 0xf0 ? 3 : 4;
+    unsigned point = *length == 1 ? c[0] : c[0] & (0x3fu >> (*length - 1));
+    for (int i = 1; i < *length; ++i) {
+        point = point << 6 | (c[i] & 0x3fu);
+    }
+    return point;
+}
+
+/* A word as roff takes it literally. Dashes of options are minus signs, which can be copied. */
+static void put_word(FILE *out, const char *word, int length, int first) {
+    if (first && (word[0] == '.' || word[0] == '\'')) {
+        fputs("\\&", out);
+    }
+    const bool copied = word[0] == '-' || memchr(word, '.', (size_t)length) != NULL ||
+                        (length > 2 && strncmp(word + 1, "--", 2) == 0); /* options and files */
+    if (copied) {
+        fputs("\\%", out); /* in one piece */
+    }
+    for (int i = 0, bytes; i < length; i += bytes) {
+        const unsigned point = code_point((const unsigned char *)word + i, &bytes);
+        if (point >= 0x80) {
+            fprintf(out, "\\[u%04X]", point);
+        } else if (point == '\\') {
+            fputs("\\e", out);
+        } else if (point == '-' && copied) {
+            fputs("\\-", out);
+        } else {
+            fputc((int)point, out);
+        }
+    }
+}
+
+static void paragraph(FILE *out, const char *words) {
+    cli_text text = {.out = out, .width = WIDTH, .put = put_word};
+    cli_text_add(&text, words);
+    cli_text_end(&text);
+}
+
+static void in_font(FILE *out, char font, const char *words) {
+    fprintf(out, "\\f%c", font);
+    put_word(out, words, (int)strlen(words), 0);
+    fputs("\\fR", out);
+}
+
+static void title(FILE *out, const char *name) {
+    fprintf(out, ".\\\" Made by 'vdbshade help --man'.\n.TH ");
+    for (const char *c = name; *c != '\0'; ++c) {
+        fputc(*c >= 'a' && *c <= 'z' ? *c - 'a' + 'A' : *c, out);
+    }
+    fprintf(out, " 1 \"\" \"vdbshade %s\" \"vdbshade\"\n", vsh_version());
+}
+
+static void write_option(FILE *out, const cli_option *option) {
+    fputs(".TP\n", out);
+    if (option->key < 256) {
+        fprintf(out, "\\fB\\-%c\\fR, ", option->key);
+    }
+    char name[72];
+    snprintf(name, sizeof name, "--%s", option->name);
+    in_font(out, 'B', name);
+    if (option->value != NULL) {
+        fputc(' ', out);
+        in_font(out, 'I', option->value);
+    }
+    fputc('\n', out);
+    paragraph(out, option->help);
+}
+
+/* "INPUT -o OUT [options]": placeholders in italics, options in bold. */
+static void write_usage(FILE *out, const char *usage) {
+    const char *at = usage, *word;
+    for (size_t length; (length = cli_next_word(&at, &word)) > 0;) {
+        char one[64];
+        snprintf(one, sizeof one, "%.*s", (int)length, word);
+        fputc(' ', out);
+        in_font(out, one[0] == '-' ? 'B' : 'I', one);
+    }
+    fputc('\n', out);
+}
+
+static void write_exit_codes(FILE *out) {
+    fputs(".SH EXIT STATUS\n", out);
+    const cli_exit_row *exit;
+    for (size_t i = 0; (exit = cli_exit_get(i)) != NULL; ++i) {
+        fprintf(out, ".TP\n\\fB%d\\fR\n", exit->code);
+        paragraph(out, exit->meaning);
+    }
+    fputs(".PP\n", out);
+    paragraph(out, cli_errors);
+}
+
+/* The other pages. */
+static void write_see_also(FILE *out, const cli_command *command) {
+    fputs(command != NULL ? ".SH SEE ALSO\n.BR vdbshade (1)" : ".SH SEE ALSO", out);
+    const cli_command_row *row;
+    for (size_t i = 0, listed = command != NULL; (row = cli_command_get(i)) != NULL; ++i) {
+        if (row->command != command) {
+            fprintf(out, "%s\n.BR vdbshade\\-%s (1)", listed++ > 0 ? "," : "", row->command->name);
+        }
+    }
+    fputc('\n', out);
+    fputs(".PP\n", out);
+    char pages[1024] = "'vdbshade help TOPIC' prints pages of the manual. Topics:";
+    for (const cli_page *page = cli_pages; page->name != NULL; ++page) {
+        const size_t used = strlen(pages);
+        snprintf(pages + used, sizeof pages - used, " docs/%s.md%s", page->name,
+                 page[1].name != NULL ? "," : ".");
+    }
+    paragraph(out, pages);
+}
+
+static void write_program(FILE *out) {
+    title(out, "vdbshade");
+    fputs(".SH NAME\nvdbshade \\- soft shadows and ambient occlusion from signed distance fields\n"
+          ".SH SYNOPSIS\n\\fBvdbshade\\fR \\fICOMMAND\\fR ...\n.br\n"
+          "\\fBvdbshade\\fR \\fICOMMAND\\fR \\fB\\-\\-help\\fR\n.br\n\\fBvdbshade \\-\\-version\\fR\n.SH "
+          "DESCRIPTION\n",
+          out);
+    paragraph(out, cli_summary);
+    fputs(".SH COMMANDS\n", out);
+    const cli_command_row *row;
+    for (size_t i = 0; (row = cli_command_get(i)) != NULL; ++i) {
+        fprintf(out, ".TP\n\\fB%s\\fR", row->command->name);
+        write_usage(out, row->operands);
+        paragraph(out, row->brief);
+    }
+    write_exit_codes(out);
+    write_see_also(out, NULL);
+}
+
+void cli_write_man(FILE *out, const cli_command_row *row) {
+    if (row == NULL) {
+        write_program(out);
+        return;
+    }
+    const cli_command *command = row->command;
+    char name[64];
+    snprintf(name, sizeof name, "vdbshade-%s", command->name);
+    title(out, name);
+    fprintf(out, ".SH NAME\nvdbshade\\-%s \\-\n", command->name);
+    paragraph(out, row->brief);
+    fprintf(out, ".SH SYNOPSIS\n\\fBvdbshade %s\\fR", command->name);
+    write_usage(out, command->usage);
+    fputs(".SH DESCRIPTION\n", out);
+    paragraph(out, command->summary);
+    fputs(".SH OPTIONS\n", out);
+    cli_option options[CLI_MOST_OPTIONS];
+    const size_t count = cli_list_options(command, options, CLI_MOST_OPTIONS);
+    for (size_t i = 0; i < count; ++i) {
+        if (options[i].key != 0) {
+            write_option(out, &options[i]);
+        } else {
+            fputs(".SS ", out);
+            paragraph(out, options[i].help);
+        }
+    }
+    write_exit_codes(out);
+    write_see_also(out, command);
+}

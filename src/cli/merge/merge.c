@@ -1,0 +1,121 @@
+/* vdbshade merge: the parts of a bake, put together. */
+#include "cli/bake/bake.h"
+#include "cli/message.h"
+
+#include <string.h>
+
+enum { MOST_WORDS = 100000 };
+enum { KEY_SHARDS = 0x2000, KEY_STATS, KEY_INVALID, KEY_EXR, KEY_VIEW };
+
+typedef struct merge_settings {
+    const char *output, *stats, *invalid_picture, *exr, *view;
+    int32_t shards; /* 0: as many as there are */
+    cli_common common;
+} merge_settings;
+
+static const cli_option options[] = {
+    {KEY_SHARDS, "shards", "N", "parts that there are of it, 1 to 10000 (found by their\nnames)"},
+    {KEY_INVALID, "invalid", "FILE.png", "these four as of bake, of the whole"},
+    {KEY_EXR, "exr", "FILE.exr", "also an EXR of all channels beside a .glb or .gltf"},
+    {KEY_VIEW, "view", "PAGE.html", "also a page to look at it in a browser: docs/view.md"},
+    {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
+    CLI_COMMON_OPTIONS,
+};
+
+static int merge_main(int argc, char **argv);
+
+const cli_command cli_merge = {
+    "merge",
+    "OUT [options]",
+    "Puts together what 'bake --shard I/N -o OUT' or 'volume --shard I/N -o OUT' left in\n"
+    "OUT.1-of-N.part to OUT.N-of-N.part: the same file, bit by bit, as without --shard. The parts say\n"
+    "by which options; their inputs are read again, from this folder where paths are relative, and must\n"
+    "not have changed. Parts stay. See docs/farm.md.",
+    options,
+    sizeof options / sizeof options[0],
+    merge_main};
+
+static int take(void *settings, int key, const char *name, const char *value) {
+    merge_settings *s = settings;
+    bool taken;
+    switch (key) {
+    case KEY_SHARDS:
+        return cli_parse_integer(name, value, 1, 10000, &s->shards);
+    case KEY_STATS:
+        s->stats = value;
+        return CLI_OK;
+    case KEY_INVALID:
+        s->invalid_picture = value;
+        return CLI_OK;
+    case KEY_EXR:
+        s->exr = value;
+        return CLI_OK;
+    case KEY_VIEW:
+        s->view = value;
+        return CLI_OK;
+    default:
+        return cli_common_parse(&s->common, key, name, value, &taken);
+    }
+}
+
+/* The command that its part was made by, but for what this one says. What a part names is read, never
+ * written: it may be anybody's. */
+static int merge_bake(const merge_settings *s, int argc, char **argv) {
+    cli_bake_settings bake;
+    bool help;
+    int code = cli_bake_parse(argc, argv, &bake, &help);
+    if (code != CLI_OK || help) {
+        cli_densities_free(&bake.densities);
+        return code != CLI_OK ? code : cli_usage("%s: its parts are of no bake", s->output);
+    }
+    bake.common = s->common;
+    bake.output = bake.output != NULL ? s->output : NULL;
+    bake.merged = s->output;
+    bake.shard = 0;
+    bake.shard_count = s->shards;
+    bake.stats = s->stats;
+    bake.invalid_picture = s->invalid_picture;
+    bake.exr = s->exr;
+    bake.view = s->view;
+    bake.dry_run = bake.resume = false;
+    bake.words = NULL;
+    bake.word_count = 0;
+    code = cli_bake_by(&bake);
+    cli_densities_free(&bake.densities);
+    return code;
+}
+
+static int merge_volume(const merge_settings *s, int argc, char **argv) {
+    const char *given = s->invalid_picture != NULL ? "invalid"
+                        : s->exr != NULL           ? "exr"
+                        : s->view != NULL          ? "view"
+                                                   : NULL;
+    return given != NULL ? cli_usage("--%s: is for lightmaps, and %s is a volume", given, s->output)
+                         : cli_volume_merge(argc, argv, s->output, s->shards, s->stats, &s->common);
+}
+
+static int merge_main(int argc, char **argv) {
+    merge_settings s = {.common = cli_common_default()};
+    bool help;
+    int code = cli_parse(&cli_merge, argc, argv, take, &s, "OUT", &s.output, &help);
+    if (code != CLI_OK || help) {
+        return code;
+    }
+    const vsh_run run = cli_common_run(&s.common);
+    char **words = NULL;
+    size_t count = 0;
+    vsh_error error;
+    if (vsh_part_words(s.output, s.shards, &run, &words, &count, &error) != VSH_OK) {
+        return cli_fail(&error);
+    }
+    const char *kind = count > 1 && count < MOST_WORDS ? words[0] : "";
+    if (strcmp(kind, cli_bake.name) == 0) {
+        code = merge_bake(&s, (int)count, words);
+    } else if (strcmp(kind, cli_volume.name) == 0) {
+        code = merge_volume(&s, (int)count, words);
+    } else {
+        code = cli_usage("%s: its parts are of no bake", s.output);
+    }
+    vsh_part_words_free(words);
+    return code;
+}

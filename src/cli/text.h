@@ -1,0 +1,20 @@
+/* Running text, broken into lines at blanks. */
+#ifndef CLI_TEXT_H
+#define CLI_TEXT_H
+
+#include <stdio.h>
+
+typedef struct cli_text {
+    FILE *out;
+    int width;                                                       /* characters a line, if words allow */
+    void (*put)(FILE *out, const char *word, int length, int first); /* NULL: as it is; first of a line */
+    int column;                                                      /* 0 to begin with */
+} cli_text;
+
+/* Adds words that blanks or newlines part. */
+void cli_text_add(cli_text *text, const char *words);
+
+/* Ends the line, where one was begun. */
+void cli_text_end(cli_text *text);
+
+#endif

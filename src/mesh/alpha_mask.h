@@ -1,0 +1,72 @@
+/* Meshes that a texture cuts out: where they are opaque, and triangles that are no more than that. */
+#ifndef VSHI_ALPHA_MASK_H
+#define VSHI_ALPHA_MASK_H
+
+#include "base/error.h"
+#include "base/shared.h"
+#include "base/vec.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <vdbshade/mesh.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Errors: VSH_ERROR_ARGUMENT where a mesh's mask is none (its size, its UVs), named as in vshi_mesh_label().
+ */
+vsh_result vshi_alpha_mask_check(const vsh_mesh *mesh, size_t index, vsh_error *error);
+
+/* Where the image is looked up for texture coordinates: columns and rows from the middle of the upper left
+ * texel. Not finite where they are not. */
+typedef struct vshi_mask_place {
+    double x, y;
+} vshi_mask_place;
+vshi_mask_place vshi_alpha_mask_place(const vsh_alpha_mask *mask, const float uv[2]);
+
+/* Whether a mask is opaque at a place. */
+bool vshi_alpha_mask_opaque(const vsh_alpha_mask *mask, vshi_mask_place at);
+
+/* How many texels are opaque, above and left of each corner of the image: any rectangle of it is told by four
+ * (Crow, "Summed-area tables for texture mapping", 1984). */
+typedef struct vshi_mask_table {
+    const vsh_alpha_mask *mask;
+    uint32_t *sums; /* [height + 1][width + 1] */
+} vshi_mask_table;
+
+double vshi_mask_table_bytes(const vsh_alpha_mask *mask);
+
+/* Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Free with vshi_mask_table_free(). */
+vsh_result vshi_mask_table_create(const vsh_alpha_mask *mask, const vsh_run *run, vshi_mask_table *table,
+                                  vsh_error *error);
+void vshi_mask_table_free(vshi_mask_table *table);
+
+/* What a mask is over a triangle of such corners: exact over all of the rectangle around it where that is of
+ * few texels, else MIXED unless it can be told. */
+typedef enum vshi_mask_cover {
+    VSHI_MASK_CLEAR,  /* nowhere opaque */
+    VSHI_MASK_OPAQUE, /* everywhere */
+    VSHI_MASK_MIXED
+} vshi_mask_cover;
+vshi_mask_cover vshi_mask_table_cover(const vshi_mask_table *table, const vshi_mask_place corners[3]);
+
+/* What a masked mesh is where it is opaque: each triangle cut into ever smaller ones, until they are opaque,
+ * or clear and left out, or no longer than `size` (world units) and not all clear. Corners are in the mesh's
+ * own space; neighbours may meet in the middle of an edge. */
+typedef struct vshi_mask_pieces {
+    float *positions;  /* [3 × count][3] */
+    uint32_t *indices; /* [count][3] */
+    size_t count;
+} vshi_mask_pieces;
+
+/* Errors: VSH_ERROR_LIMIT (run->memory_limit, more than 2^31 - 1 pieces), VSH_ERROR_MEMORY,
+ * VSH_ERROR_CANCELLED. Free with vshi_mask_pieces_free(), after an error too. */
+VSHI_SHARED vsh_result vshi_mask_pieces_cut(const vsh_mesh *mesh, double size, const vsh_run *run,
+                                            vshi_mask_pieces *pieces, vsh_error *error);
+VSHI_SHARED void vshi_mask_pieces_free(vshi_mask_pieces *pieces);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

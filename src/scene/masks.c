@@ -1,0 +1,331 @@
+#include "scene/masks.h"
+
+#include "base/job.h"
+#include "base/memory.h"
+#include "base/try.h"
+#include "image/planes.h"
+#include "mesh/alpha_mask.h"
+#include "mesh/mesh.h"
+#include "model/model.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Blended materials are opaque from here on. */
+static const double HALF = 0.5;
+
+enum { LARGEST = (1 << 16) - 1 }; /* texels along a side */
+
+typedef enum material_state {
+    NOT_READ,
+    WHOLE,   /* no mask, or none that leaves anything out */
+    NOTHING, /* all of it is clear */
+    BY_MASK
+} material_state;
+
+typedef struct material {
+    material_state state;
+    bool binary; /* its texture is, and its factor leaves it so */
+    vsh_alpha_mask mask;
+    vshi_mask_table table; /* NULL sums: not made yet */
+} material;
+
+/* Of a shape's triangles, those that are opaque and those that the mask cuts out; NULL where they are all, or
+ * none. */
+typedef struct shape {
+    bool known;
+    uint32_t *opaque, *mixed;
+    size_t opaque_count, mixed_count;
+} shape;
+
+typedef struct texture {
+    const void *of; /* vsh_model_material.image or .image_path */
+    uint8_t *alpha; /* NULL: it has none, or could not be read */
+    int32_t width, height;
+    bool binary; /* nearly all of it is clear or opaque, and there is some of both */
+} texture;
+
+struct vshi_masks {
+    const vsh_model *model;
+    const char *path;
+    material *materials; /* [material count of the model] */
+    texture *textures;   /* [texture_count], of as many */
+    size_t texture_count;
+    shape *shapes; /* [shape count of the model] */
+};
+
+vsh_result vshi_masks_create(const vsh_model *model, const char *path, vshi_masks **masks, vsh_error *error) {
+    const size_t materials = vsh_model_material_count(model);
+    VSHI_TRY(vshi_allocate((void **)masks, 1, sizeof **masks, "alpha masks", error));
+    vshi_masks *made = *masks;
+    made->model = model;
+    made->path = path;
+    VSHI_TRY(
+        vshi_allocate((void **)&made->materials, materials, sizeof *made->materials, "alpha masks", error));
+    VSHI_TRY(
+        vshi_allocate((void **)&made->textures, materials, sizeof *made->textures, "alpha masks", error));
+    return vshi_allocate((void **)&made->shapes, model->shape_count, sizeof *made->shapes, "alpha masks",
+                         error);
+}
+
+void vshi_masks_trim(vshi_masks *masks) {
+    for (size_t i = 0; masks->materials != NULL && i < vsh_model_material_count(masks->model); ++i) {
+        vshi_mask_table_free(&masks->materials[i].table);
+    }
+}
+
+void vshi_masks_free(vshi_masks *masks) {
+    if (masks == NULL) {
+        return;
+    }
+    vshi_masks_trim(masks);
+    for (size_t i = 0; masks->shapes != NULL && i < masks->model->shape_count; ++i) {
+        free(masks->shapes[i].opaque);
+        free(masks->shapes[i].mixed);
+    }
+    for (size_t i = 0; i < masks->texture_count; ++i) {
+        free(masks->textures[i].alpha);
+    }
+    free(masks->materials);
+    free(masks->textures);
+    free(masks->shapes);
+    free(masks);
+}
+
+/* --- textures */
+
+/* A cut-out's edges are few texels wide; smoke and glass are between all over. */
+static bool is_binary(const uint8_t *alpha, size_t texels) {
+    static const double BETWEEN = 0.25, SOME = 0.01;
+    enum { CLEAR = 25, OPAQUE = 230 };
+    size_t clear = 0, opaque = 0;
+    for (size_t i = 0; i < texels; ++i) {
+        clear += alpha[i] <= CLEAR;
+        opaque += alpha[i] >= OPAQUE;
+    }
+    const double all = (double)texels;
+    return (double)(texels - clear - opaque) <= BETWEEN * all && (double)clear >= SOME * all &&
+           (double)opaque >= SOME * all;
+}
+
+/* The alpha of an image, 8 bits a texel; none where it has none, or is opaque everywhere. */
+static vsh_result take_alpha(const vsh_image *image, const char *path, const vsh_run *run, texture *to,
+                             vsh_error *error) {
+    const size_t texels = (size_t)image->width * (size_t)image->height;
+    const float *from = NULL;
+    bool varies = false;
+    for (int32_t c = 0; c < image->channel_count; ++c) {
+        from = strcmp(image->names[c], "A") == 0 ? image->planes[c] : from;
+    }
+    for (size_t i = 0; from != NULL && i < texels && !varies; ++i) {
+        varies = from[i] < 1.0f;
+    }
+    if (!varies) {
+        return VSH_OK;
+    }
+    if (image->width > LARGEST || image->height > LARGEST) {
+        return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: %d × %d texels, at most %d along a side", path,
+                         image->width, image->height, LARGEST);
+    }
+    VSHI_TRY(
+        vshi_check_limit(run, (double)texels * (1.0 + sizeof(float) * image->channel_count), path, error));
+    VSHI_TRY(vshi_allocate((void **)&to->alpha, texels, 1, path, error));
+    for (size_t i = 0; i < texels; ++i) {
+        const float value = 255.0f * from[i] + 0.5f;
+        to->alpha[i] = (uint8_t)(value >= 255.0f ? 255.0f : value > 0.0f ? value : 0.0f);
+    }
+    to->width = image->width;
+    to->height = image->height;
+    to->binary = is_binary(to->alpha, texels);
+    return VSH_OK;
+}
+
+static bool is_fatal(vsh_result result) {
+    return result == VSH_ERROR_MEMORY || result == VSH_ERROR_CANCELLED || result == VSH_ERROR_LIMIT ||
+           result == VSH_ERROR_ARGUMENT;
+}
+
+/* Reads the texture of a material, once however many have it. What cannot be read is opaque: the mesh is
+ * there all the same. */
+static vsh_result read_texture(vshi_masks *masks, const vsh_model_material *told, const vsh_run *run,
+                               const texture **found, vsh_error *error) {
+    const void *of = told->image != NULL ? told->image : told->image_path;
+    for (size_t i = 0; i < masks->texture_count; ++i) {
+        if (masks->textures[i].of == of) {
+            *found = &masks->textures[i];
+            return VSH_OK;
+        }
+    }
+    texture *made = &masks->textures[masks->texture_count++];
+    *found = made;
+    made->of = of;
+    char name[600];
+    snprintf(name, sizeof name, "%.400s: the texture of material '%.100s'", masks->path,
+             told->name != NULL ? told->name : "");
+    vsh_image_file *file = NULL;
+    vsh_error why;
+    vsh_result result = told->image != NULL
+                            ? vshi_image_read_bytes(name, told->image, told->image_size, run, &file, &why)
+                            : vsh_image_read(told->image_path, run, &file, &why);
+    if (result == VSH_OK) {
+        const vsh_image image = vsh_image_view(file);
+        result = take_alpha(&image, name, run, made, &why);
+    }
+    vsh_image_free(file);
+    if (result == VSH_OK) {
+        return VSH_OK;
+    }
+    if (is_fatal(result)) {
+        return vshi_fail(error, result, "%s", why.message);
+    }
+    vshi_warn(run, "%s; material '%s' casts whole, without the holes of its texture", why.message,
+              told->name != NULL ? told->name : "");
+    return VSH_OK;
+}
+
+/* --- materials */
+
+static vsh_result read_material(vshi_masks *masks, size_t index, const vsh_run *run, vsh_error *error) {
+    material *m = &masks->materials[index];
+    const vsh_model_material told = vsh_model_get_material(masks->model, index);
+    const bool masked = told.alpha == VSH_ALPHA_MASKED;
+    if (m->state != NOT_READ) {
+        return VSH_OK;
+    }
+    m->state = WHOLE;
+    if (told.alpha == VSH_ALPHA_OPAQUE || (masked && !(told.alpha_cutoff > 0.0))) {
+        return VSH_OK;
+    }
+    const texture *found = NULL;
+    if (told.image != NULL || told.image_path != NULL) {
+        VSHI_TRY(read_texture(masks, &told, run, &found, error));
+    }
+    if (masked && told.base_alpha < told.alpha_cutoff) {
+        m->state = NOTHING;
+    } else if (found != NULL && found->alpha != NULL) {
+        m->state = BY_MASK;
+        m->binary = found->binary && told.base_alpha >= HALF;
+        m->mask = (vsh_alpha_mask){.alpha = found->alpha,
+                                   .width = found->width,
+                                   .height = found->height,
+                                   .wrap = {told.wrap[0], told.wrap[1]},
+                                   .alpha_cutoff = masked ? told.alpha_cutoff : HALF,
+                                   .base_alpha = masked ? told.base_alpha : 1.0};
+        memcpy(m->mask.uv_transform, told.uv_transform, sizeof told.uv_transform);
+    }
+    return VSH_OK;
+}
+
+/* --- shapes */
+
+static vshi_mask_cover cover_of(const vshi_mask_table *table, const vsh_mesh *mesh, size_t triangle) {
+    vshi_mask_place places[3];
+    for (size_t k = 0; k < 3; ++k) {
+        const size_t vertex = mesh->indices[3 * triangle + k];
+        places[k] = vshi_alpha_mask_place(table->mask, mesh->uvs + 2 * vertex);
+    }
+    return vshi_mask_table_cover(table, places);
+}
+
+vsh_result vshi_masks_is_cut_out(vshi_masks *masks, size_t mesh, const vsh_run *run, bool *is,
+                                 vsh_error *error) {
+    const int32_t number = vsh_model_mesh_material(masks->model, mesh);
+    *is = false;
+    if (number < 0 || vsh_model_get_material(masks->model, (size_t)number).alpha != VSH_ALPHA_BLENDED) {
+        return VSH_OK;
+    }
+    VSHI_TRY(read_material(masks, (size_t)number, run, error));
+    *is = masks->materials[number].state == BY_MASK && masks->materials[number].binary;
+    return VSH_OK;
+}
+
+static vsh_result take_list(size_t count, size_t all, const vsh_run *run, uint32_t **list, vsh_error *error) {
+    if (count == 0 || count == all) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_check_limit(run, 12.0 * (double)count, "triangles of masked materials", error));
+    return vshi_allocate((void **)list, 3 * count, sizeof **list, "triangles of masked materials", error);
+}
+
+/* Sorts the triangles of a view with the texture's UVs. */
+static vsh_result sort(const vshi_mask_table *table, const vsh_mesh *mesh, const vsh_run *run, shape *sorted,
+                       vsh_error *error) {
+    unsigned char *covers = NULL;
+    const size_t all = mesh->triangle_count;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&covers, all, 1, "triangles of masked materials", error));
+    for (size_t i = 0; i < all; ++i) {
+        covers[i] = (unsigned char)cover_of(table, mesh, i);
+        sorted->opaque_count += covers[i] == VSHI_MASK_OPAQUE;
+        sorted->mixed_count += covers[i] == VSHI_MASK_MIXED;
+    }
+    VSHI_TRY_DONE(take_list(sorted->opaque_count, all, run, &sorted->opaque, error));
+    VSHI_TRY_DONE(take_list(sorted->mixed_count, all, run, &sorted->mixed, error));
+    uint32_t *opaque = sorted->opaque, *mixed = sorted->mixed;
+    for (size_t i = 0; i < all; ++i) {
+        uint32_t **list = covers[i] == VSHI_MASK_OPAQUE ? &opaque : &mixed;
+        if (covers[i] != VSHI_MASK_CLEAR && *list != NULL) {
+            memcpy(*list, mesh->indices + 3 * i, 3 * sizeof **list);
+            *list += 3;
+        }
+    }
+    sorted->known = true;
+done:
+    free(covers);
+    return result;
+}
+
+vsh_result vshi_masks_cast(vshi_masks *masks, size_t index, const vsh_run *run, vshi_cast_views *views,
+                           vsh_error *error) {
+    const vsh_mesh mesh = vsh_model_mesh(masks->model, index, -1);
+    const int32_t number = vsh_model_mesh_material(masks->model, index);
+    *views = (vshi_cast_views){.meshes = {mesh}, .count = 1};
+    if (number < 0) {
+        return VSH_OK;
+    }
+    VSHI_TRY(read_material(masks, (size_t)number, run, error));
+    material *m = &masks->materials[number];
+    shape *sorted = &masks->shapes[masks->model->entries[index].shape];
+    if (m->state == NOTHING) {
+        *views = (vshi_cast_views){.count = 0, .cut = true};
+    }
+    if (m->state != BY_MASK) {
+        return VSH_OK;
+    }
+    const int32_t set = vsh_model_get_material(masks->model, (size_t)number).uv_set;
+    vsh_mesh textured = vsh_model_mesh(masks->model, index, set);
+    if (textured.uvs == NULL && !sorted->known) {
+        vshi_warn(run, "%s: %s: no UV set %d for the texture of its material: it casts whole", masks->path,
+                  vshi_mesh_label(&mesh, index).text, set);
+        sorted->known = true;
+        sorted->opaque_count = mesh.triangle_count;
+    }
+    if (!sorted->known) {
+        if (m->table.sums == NULL) {
+            VSHI_TRY(vshi_mask_table_create(&m->mask, run, &m->table, error));
+        }
+        VSHI_TRY(sort(&m->table, &textured, run, sorted, error));
+    }
+    if (sorted->opaque_count == mesh.triangle_count) {
+        return VSH_OK;
+    }
+    *views = (vshi_cast_views){.count = 0, .cut = true};
+    if (sorted->opaque_count > 0) {
+        vsh_mesh *opaque = &views->meshes[views->count++];
+        *opaque = mesh;
+        opaque->indices = sorted->opaque;
+        opaque->triangle_count = sorted->opaque_count;
+    }
+    if (sorted->mixed_count > 0) {
+        vsh_mesh *cut = &views->meshes[views->count++];
+        *cut = mesh;
+        cut->indices = sorted->mixed != NULL ? sorted->mixed : mesh.indices;
+        cut->triangle_count = sorted->mixed_count;
+        cut->mask = &m->mask;
+        cut->mask_uvs = textured.uvs;
+        cut->solidity = VSH_SOLIDITY_SHELL;
+        cut->alpha = VSH_ALPHA_MASKED;
+    }
+    return VSH_OK;
+}

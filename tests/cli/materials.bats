@@ -1,0 +1,230 @@
+# Materials: what they cut out, what of them is blended, and what is chosen by their names.
+load helper
+
+# write_level FILE MATERIAL IMAGE: a floor of 4 × 4 under material "earth" and a plate over it, of two primitives side by
+# side: one of MATERIAL, one of "wood". The texture is the image at the URI.
+write_level() {
+    cat >"$1" <<GLTF
+{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0, 1]}],
+ "nodes": [{"name": "floor", "mesh": 0}, {"name": "plate", "mesh": 1, "translation": [-0.5, 0, 0]},
+           {"name": "unused"}],
+ "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2, "material": 1}]},
+            {"primitives": [{"attributes": {"POSITION": 3, "TEXCOORD_0": 1}, "indices": 2, "material": 0},
+                            {"attributes": {"POSITION": 4, "TEXCOORD_0": 1}, "indices": 2, "material": 2}]}],
+ "materials": [$2, {"name": "earth"}, {"name": "wood"}],
+ "textures": [{"source": 0}], "images": [{"uri": "$3"}],
+ "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+               {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2"},
+               {"bufferView": 2, "componentType": 5123, "count": 6, "type": "SCALAR"},
+               {"bufferView": 3, "componentType": 5126, "count": 4, "type": "VEC3"},
+               {"bufferView": 4, "componentType": 5126, "count": 4, "type": "VEC3"}],
+ "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 32},
+                 {"buffer": 0, "byteOffset": 80, "byteLength": 12},
+                 {"buffer": 0, "byteOffset": 92, "byteLength": 48},
+                 {"buffer": 0, "byteOffset": 140, "byteLength": 48}],
+ "buffers": [{"byteLength": 188, "uri": "data:;base64,$BUFFER"}]}
+GLTF
+}
+
+# Corners of the floor, UVs, indices, corners of both plates: as numbers of awk's, little-endian.
+setup_file() {
+    BUFFER=$({
+        floats -2 0 2 2 0 2 2 0 -2 -2 0 -2
+        floats 0 1 1 1 1 0 0 0
+        printf '\0\0\1\0\2\0\0\0\2\0\3\0'
+        floats -0.5 1 0.5 0.5 1 0.5 0.5 1 -0.5 -0.5 1 -0.5
+        floats 0.75 1 0.5 1.75 1 0.5 1.75 1 -0.5 0.75 1 -0.5
+    } | base64 -w0)
+    export BUFFER
+}
+
+# Of -2, -0.5, 0, 0.5, 0.75, 1, 1.75, 2.
+floats() {
+    local number
+    for number; do
+        case $number in
+        -2) printf '\0\0\0\xc0' ;;
+        -0.5) printf '\0\0\0\xbf' ;;
+        0) printf '\0\0\0\0' ;;
+        0.5) printf '\0\0\0\x3f' ;;
+        0.75) printf '\0\0\x40\x3f' ;;
+        1) printf '\0\0\x80\x3f' ;;
+        1.75) printf '\0\0\xe0\x3f' ;;
+        2) printf '\0\0\0\x40' ;;
+        esac
+    done
+}
+
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+    cp "$ASSETS/emblem.png" .
+    write_level masked.gltf "$(leaf MASK)" emblem.png
+    write_level whole.gltf '{"name": "leaf"}' emblem.png
+}
+
+leaf() {
+    printf '{"name": "leaf", "alphaMode": "%s", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}' "$1"
+}
+
+BAKE=(--sun 0,1,0 --sun-angle 2 --ao 1 --size 96)
+
+# bake FILE OUT [options]: the light on the floor.
+bake() {
+    shade bake "$1" "${BAKE[@]}" --receive floor -o "$2" "${@:3}"
+    done_well
+}
+
+# mean_of FILE: of the sun's shadow.
+mean_of() {
+    "$VDBSHADE" info "$1" | awk '/shadow.sun/ { for (i = 1; i < NF; ++i) if ($i == "mean") print $(i + 1) + 0 }'
+}
+
+differ() {
+    ! same_values "$1" "$2" || fail "$1 and $2 are the same"
+}
+
+@test "a texture beside the file, in it, and without the confined reader are one" {
+    write_level within.gltf "$(leaf MASK)" "data:image/png;base64,$(base64 -w0 emblem.png)"
+    bake masked.gltf beside.exr
+    bake within.gltf within.exr
+    bake within.gltf trusted.exr --trusted
+    bake whole.gltf whole.exr
+    same_values beside.exr within.exr || fail "beside and within"
+    same_values beside.exr trusted.exr || fail "by the reader and here"
+    differ beside.exr whole.exr
+}
+
+@test "the same values for any threads, bands and instruction sets" {
+    bake masked.gltf one.exr --threads 1
+    bake masked.gltf two.exr --threads 2 --band-rows 8 --isa base
+    same_values one.exr two.exr || fail "not the same"
+}
+
+@test "exact with voxels is exact without" {
+    bake masked.gltf none.exr --max-error 0.005
+    bake masked.gltf fine.exr --max-error 0.005 --method exact --ao-method exact --resolution 96
+    # each keeps 0.005; single values and edges are those of other rays
+    shade compare fine.exr none.exr --max-rmse 0.004 --max-bias 0.001 --max-difference 0.1 --max-p99 1 --max-share 1 \
+        --max-edges 1 --max-widths 9 --max-penumbra 9 --max-shift 9
+    [ "$status" -eq 0 ] || fail "$output$stderr"
+}
+
+@test "a field keeps what is cut out, and is stale once the texture cuts otherwise" {
+    local -a voxels=(--method cone --resolution 64)
+    shade field masked.gltf --resolution 64 -o leaf.field
+    [ "$status" -eq 0 ] || fail "$stderr"
+    shade bake masked.gltf "${BAKE[@]}" --receive floor "${voxels[@]}" -o made.exr
+    [ "$status" -eq 0 ] || fail "$stderr"
+    shade bake masked.gltf "${BAKE[@]}" --receive floor "${voxels[@]}" -o kept.exr --field leaf.field
+    [ "$status" -eq 0 ] || fail "$stderr"
+    same_values made.exr kept.exr || fail "not the same"
+    sed -i 's/"alphaMode": "MASK"/"alphaMode": "MASK", "alphaCutoff": 0.9/' masked.gltf
+    shade bake masked.gltf "${BAKE[@]}" --receive floor "${voxels[@]}" -o kept.exr --field leaf.field
+    refused 2 leaf.field stale caster_0
+}
+
+@test "a texture that is not there leaves the material whole, with a warning" {
+    rm emblem.png
+    shade bake masked.gltf "${BAKE[@]}" --receive floor -o out.exr
+    [ "$status" -eq 0 ]
+    [[ $stderr == *"material 'leaf' casts whole, without the holes of its texture"* ]] || fail "$stderr"
+    cp "$ASSETS/emblem.png" .
+    bake whole.gltf whole.exr
+    same_values out.exr whole.exr || fail "not the same"
+}
+
+@test "a texture outside of the folder is not read" {
+    mkdir -p in
+    cp masked.gltf in/
+    sed -i 's,"emblem.png","../emblem.png",' in/masked.gltf
+    shade bake in/masked.gltf "${BAKE[@]}" --receive floor -o out.exr
+    [ "$status" -eq 0 ]
+    [[ $stderr == *"outside of its folder"* ]] || fail "$stderr"
+    bake in/masked.gltf allowed.exr --allow-outside
+    bake masked.gltf beside.exr
+    same_values allowed.exr beside.exr || fail "not the same"
+    differ out.exr beside.exr
+}
+
+@test "blended materials cast where they are cut out, by --cast-blended too, and glass only by that" {
+    write_level hashed.gltf "$(leaf BLEND)" emblem.png
+    bake masked.gltf masked.exr
+    shade bake hashed.gltf "${BAKE[@]}" --receive floor -o hashed.exr
+    [ "$status" -eq 0 ]
+    [[ $stderr == *"blended materials that their textures cut out"* ]] || fail "$stderr"
+    same_values masked.exr hashed.exr || fail "hashed leaves"
+    bake hashed.gltf asked.exr --cast-blended
+    same_values masked.exr asked.exr || fail "--cast-blended"
+    write_level glass.gltf '{"name": "leaf", "alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.2]}}' emblem.png
+    shade bake glass.gltf "${BAKE[@]}" --receive floor -o glass.exr
+    [[ $stderr == *"1 of 3 meshes have blended materials (glass, smoke) and cast no shadow"* ]] || fail "$stderr"
+    bake whole.gltf without.exr --no-cast leaf
+    same_values glass.exr without.exr || fail "glass casts"
+    bake glass.gltf asked.exr --cast-blended
+    bake whole.gltf whole.exr
+    same_values asked.exr whole.exr || fail "glass does not cast when asked to"
+}
+
+@test "materials are chosen by name where no object is called so" {
+    bake whole.gltf whole.exr
+    bake whole.gltf leafless.exr --no-cast leaf
+    bake whole.gltf woodless.exr --no-cast 'material:w*'
+    bake whole.gltf bare.exr --no-cast leaf --no-cast wood
+    bake whole.gltf plateless.exr --no-cast plate
+    differ whole.exr leafless.exr
+    differ leafless.exr woodless.exr
+    same_values bare.exr plateless.exr || fail "both materials are not the object"
+    shade bake whole.gltf "${BAKE[@]}" --no-receive leaf --no-receive wood -o others.exr
+    done_well
+    same_values others.exr whole.exr || fail "--no-receive"
+    shade bake whole.gltf "${BAKE[@]}" --receive earth -o named.exr
+    done_well
+    same_values named.exr whole.exr || fail "--receive"
+    old_output out.exr
+    shade bake whole.gltf "${BAKE[@]}" --no-cast woof -o out.exr
+    refused 2 "no object is named 'woof'" "did you mean 'wood'" "materials 'leaf', 'earth'"
+    shade bake whole.gltf "${BAKE[@]}" --one-sided material:floor -o out.exr
+    refused 2 "no material is named 'floor'"
+    shade bake whole.gltf "${BAKE[@]}" --one-sided '' -o out.exr
+    refused 2 "name of an object or a material"
+}
+
+@test "light on the backs of one-sided materials comes through" {
+    # the plates' fronts are up
+    bake whole.gltf whole.exr
+    bake whole.gltf above.exr --one-sided leaf --one-sided wood
+    same_values whole.exr above.exr || fail "their fronts do not cast"
+    sed 's/"translation": \[-0.5, 0, 0\]/"translation": [-0.5, 2, 0], "rotation": [1, 0, 0, 0]/' whole.gltf >turned.gltf
+    bake turned.gltf both.exr
+    bake turned.gltf below.exr --one-sided leaf --one-sided wood
+    bake turned.gltf none.exr --no-cast plate
+    differ both.exr none.exr
+    same_values below.exr none.exr || fail "their backs cast"
+    cat >scene.json <<'JSON'
+{"casters": [{"mesh": "turned.gltf", "one_sided": ["leaf", "material:wood"]}], "ao": {"distance": 1},
+ "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0], "angle_deg": 2}],
+ "receivers": [{"mesh": "turned.gltf", "objects": "floor", "size": 96, "output": "scene.exr"}]}
+JSON
+    shade bake scene.json
+    done_well
+    same_values scene.exr none.exr || fail "in a scene"
+    shade bake scene.json --one-sided leaf
+    refused 2 "one_sided"
+    shade bake turned.gltf "${BAKE[@]}" --receive floor --one-sided leaf --method cone --ao-method cones -o cone.exr
+    [ "$status" -eq 0 ]
+    [[ $stderr == *"1 of 3 meshes are one-sided, and voxels cast to both sides"* ]] || fail "$stderr"
+}
+
+@test "in a lit asset a material that does not receive stays as it was" {
+    shade bake masked.gltf --sun 0,1,0 --unwrap always --no-receive leaf --size 64 -o lit.gltf
+    [ "$status" -eq 0 ] || fail "$stderr"
+    grep -o '"name": *"leaf"[^]]*' lit.gltf | head -1 | grep -q MOZ_lightmap && fail "the leaf has a lightmap"
+    grep -q MOZ_lightmap lit.gltf || fail "nothing has a lightmap"
+    shade info lit.gltf
+    done_well
+}
+
+@test "info says how a material casts" {
+    shade info masked.gltf
+    [[ $output == *"masked (leaves, fences): it casts by its texture's alpha"* ]] || fail "$output"
+}

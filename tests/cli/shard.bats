@@ -1,0 +1,104 @@
+# `bake --shard I/N` and `merge`: parts that are baked by themselves come to the bits of one bake.
+load parts
+
+@test "2, 3, 7 and 64 parts of a lightmap are one bake, byte by byte" {
+    one out.exr "${CLOISTER[@]}"
+    for n in 2 3 7 64; do
+        merged out.exr "$n" "${CLOISTER[@]}"
+    done
+    no_leftovers
+}
+
+@test "what crosses parts is as in one bake: seams, padding, shared rays, what is filled, every channel" {
+    local options=(--irradiance --bent-normals world --sky y --invalid-channel --error --tint quadratic)
+    one out.exr "${CLOISTER[@]}" "${options[@]}" --padding auto
+    merged out.exr 3 "${CLOISTER[@]}" "${options[@]}" --padding auto
+    one out.png "${CLOISTER[@]}" --seams fix --padding auto
+    merged out.png 3 "${CLOISTER[@]}" --seams fix --padding auto
+    one out.exr "${CLOISTER[@]}" --padding 70 --supersample 2 --method adaptive --ao-method adaptive --resolution 48
+    merged out.exr 3 "${CLOISTER[@]}" --padding 70 --supersample 2 --method adaptive --ao-method adaptive --resolution 48
+    one out.exr "${CLOISTER[@]}" --method cone --ao-method cones --ao-spacing 8 --padding 0 --resolution 48
+    merged out.exr 3 "${CLOISTER[@]}" --method cone --ao-method cones --ao-spacing 8 --padding 0 --resolution 48
+}
+
+@test "so are an asset with its light in it, a terrain, objects of their own, and a scene of several lightmaps" {
+    one out.glb "${CLOISTER[@]}"
+    merged out.glb 3 "${CLOISTER[@]}"
+    printf '%s' '{"casters": [{"heightfield": "terrain.png", "size": [10, 10], "height": 2, "direct": true}],
+        "lights": [{"name": "sun", "type": "directional", "direction": [-1, 0.5, -0.3], "angle_deg": 5}], "ao": {"distance": 2},
+        "receivers": [{"heightfield": "terrain.png", "extent": [10, 10], "height": 2, "size": 64, "output": "out.exr"}]}' >terrain.json
+    one out.exr terrain.json
+    for n in 2 3 7 64; do
+        merged out.exr "$n" terrain.json
+    done
+    printf '%s' '{"casters": [{"mesh": "cloister.glb"}], "resolution": 48, "ao": {"distance": 2}, "receivers": [
+        {"mesh": "cloister.glb", "size": 64, "output": "a.exr"}, {"mesh": "cloister.glb", "size": 96, "output": "b.png"}]}' >two.json
+    "$VDBSHADE" bake two.json --quiet
+    mkdir one2 objects
+    mv a.exr b.png one2
+    for i in 1 2 3 4 5; do "$VDBSHADE" bake two.json --shard $i/5 --quiet; done
+    "$VDBSHADE" merge a.exr --quiet
+    cmp one2/a.exr a.exr
+    cmp one2/b.png b.png
+    "$VDBSHADE" bake "${CLOISTER[@]}" --size 64 --per-object -o one2/ --quiet
+    for i in 1 2 3; do "$VDBSHADE" bake "${CLOISTER[@]}" --size 64 --per-object -o objects/ --shard $i/3 --quiet; done
+    "$VDBSHADE" merge objects --quiet
+    rm one2/a.exr one2/b.png
+    diff -r one2 objects
+}
+
+@test "seams between pages and between objects are fixed where parts are put together, too" {
+    local unwrapped=("${CLOISTER[@]}" --unwrap always --texels-per-unit 9 --size 128)
+    one out.glb "${unwrapped[@]}" --pages 9
+    merged out.glb 3 "${unwrapped[@]}" --pages 9
+    one out.glb "${unwrapped[@]}" --atlas objects
+    merged out.glb 2 "${unwrapped[@]}" --atlas objects
+}
+
+@test "a part is the same whoever bakes it, with however many threads and bands, and goes on where it was ended" {
+    parts a.exr 3 2 "${CLOISTER[@]}"
+    parts b.exr 3 2 "${CLOISTER[@]}" --threads 1 --band-rows 16
+    parts c.exr 3 2 "${CLOISTER[@]}" --resume
+    [ -z "$(find . -name '*.resume')" ] || fail "rows are kept of a part that is whole"
+    for other in b c; do # but for their command lines, which the first pages of a part have
+        cmp <(values a.exr) <(values $other.exr) || fail "$other"
+    done
+    one out.exr "${CLOISTER[@]}"
+    parts out.exr 3 "" "${CLOISTER[@]}"
+    "$VDBSHADE" bake "${CLOISTER[@]}" -o out.exr --shard 2/3 --resume --threads 1 --quiet & pid=$!
+    while kill -0 $pid 2>/dev/null && [ "$(stat -c %s out.exr.2-of-3.part.0.resume 2>/dev/null || echo 0)" -lt 15000 ]; do
+        sleep 0.01
+    done
+    kill -KILL $pid
+    wait $pid || true
+    [ -s out.exr.2-of-3.part.0.resume ] || fail "nothing was kept"
+    run -0 "$VDBSHADE" bake "${CLOISTER[@]}" -o out.exr --shard 2/3 --resume --stats s.json
+    [ "$(grep -o '"resumed_rows": [0-9]*' s.json | cut -d' ' -f2)" -ge 8 ]
+    parts out.exr 3 "1 3" "${CLOISTER[@]}"
+    "$VDBSHADE" merge out.exr --quiet
+    cmp one/out.exr out.exr || fail "a part that went on is another"
+}
+
+@test "a lightmap larger than the memory limit is merged in bands of rows" {
+    options=(cloister.glb --sun -0.5,0.8,-0.6 --irradiance --method cone --resolution 48 --size 256x1536 --padding 40)
+    one out.exr "${options[@]}"
+    parts out.exr 3 "" "${options[@]}"
+    shade merge out.exr --memory-limit 16M
+    done_well
+    [[ $stderr == *"bands of"* ]] || fail "it was held whole"
+    cmp one/out.exr out.exr
+}
+
+@test "statistics, pictures of what is invalid, and pages are made of all parts" {
+    one out.exr "${CLOISTER[@]}" --stats one.json --invalid one.png
+    parts out.exr 3 "" "${CLOISTER[@]}"
+    "$VDBSHADE" merge out.exr --quiet --stats all.json --invalid all.png
+    for key in texels invalid_texels marches rays voxel_size; do
+        [ "$(grep -o "\"$key\": [0-9.]*" one.json | head -1)" = "$(grep -o "\"$key\": [0-9.]*" all.json | head -1)" ] || fail "$key"
+    done
+    cmp one.png all.png
+    for option in "--invalid x.png" "--view x.html"; do
+        shade bake "${CLOISTER[@]}" -o out.exr --shard 1/3 $option
+        refused 2 "${option% *}" "not together with --shard"
+    done
+}

@@ -1,0 +1,87 @@
+/* Pages of any mesh file, of any names: one is written whole, or a reason is given. What strangers name stays
+ * within the text that the page's script reads, and its scripts are the page's own. The first byte chooses
+ * the format, the second how many of the bytes are a name. */
+#include "fuzz.h"
+
+#include <vdbshade/view.h>
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { MOST_PAGE = 64 << 20, OWN_SCRIPTS = 64 };
+
+static size_t count_of(const char *text, const char *what) {
+    size_t count = 0;
+    for (const char *at = text; (at = strstr(at, what)) != NULL; at += strlen(what)) {
+        ++count;
+    }
+    return count;
+}
+
+/* The page as text; it holds no byte of 0. */
+static char *read_page(const char *path) {
+    FILE *file = fopen(path, "rb");
+    char *text = malloc(MOST_PAGE);
+    if (file == NULL || text == NULL) {
+        abort();
+    }
+    const size_t size = fread(text, 1, MOST_PAGE - 1, file);
+    text[size] = '\0';
+    fclose(file);
+    if (strlen(text) != size) {
+        abort();
+    }
+    return text;
+}
+
+static void check_page(const char *path) {
+    static const char about[] = "<script type=\"application/json\" id=\"about\">";
+    static size_t own; /* scripts of a page but for its data: the same for all */
+    char *text = read_page(path);
+    const char *begin = strstr(text, about);
+    if (begin == NULL || strncmp(strchr(begin + 1, '<'), "</script>\n<script>", 18) != 0) {
+        abort(); /* a name ends the text that it stands in: none has a line break that JSON leaves */
+    }
+    const size_t scripts = count_of(text, "<script>");
+    own = own == 0 ? scripts : own;
+    if (scripts != own || scripts > OWN_SCRIPTS ||
+        strcmp(text + strlen(text) - 15, "</body></html>\n") != 0) {
+        abort();
+    }
+    free(text);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    static const char *const names[] = {"a.gltf", "a.glb", "a.obj", "a.ply", "a.stl"};
+    if (size < 2 || size < 2 + (size_t)data[1]) {
+        return 0;
+    }
+    char name[256], output[1024];
+    memcpy(name, data + 2, data[1]);
+    name[data[1]] = '\0';
+    const char *path =
+        fuzz_file(names[data[0] % (sizeof names / sizeof names[0])], data + 2 + data[1], size - 2 - data[1]);
+    snprintf(output, sizeof output, "%s/page.html", fuzz_folder());
+    const float values[4] = {0.0f, 0.25f, 1.0f, 2.0f}, *const planes[] = {values, values};
+    const char *const channels[] = {name[0] != '\0' ? name : "shadow", "A"};
+    const vsh_image image = {2, 2, 2, channels, planes, NULL};
+    vsh_view_bake bake = vsh_view_bake_default(), other = vsh_view_bake_default();
+    bake.model = path;
+    bake.name = name;
+    other.images = &image;
+    other.image_count = 1;
+    other.name = name;
+    const vsh_run run = fuzz_run();
+    vsh_error error;
+    const vsh_result result = vsh_view_write(output, &bake, &other, &run, fuzz_error(&error));
+    fuzz_ended(result, &error, result == VSH_OK ? output : NULL);
+    if (result == VSH_OK) {
+        check_page(output);
+    }
+    if ((unlink(output) == 0) != (result == VSH_OK)) {
+        abort();
+    }
+    return 0;
+}

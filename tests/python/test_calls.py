@@ -1,0 +1,307 @@
+"""How calls run: errors, progress, Ctrl-C, other threads meanwhile, what is freed and when."""
+import gc
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+import unittest
+import warnings
+
+import numpy
+
+import vdbshade
+from common import ASSETS, Case, box, floor, points_on_floor, sun
+
+
+def resident():
+    """Bytes of this process in memory."""
+    return int(pathlib.Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE")
+
+
+class Errors(Case):
+    def assertFails(self, kind, message, function, *arguments, **options):
+        with self.assertRaisesRegex(kind, message) as caught:
+            function(*arguments, **options)
+        self.assertIsInstance(caught.exception, vdbshade.Error)
+        return caught.exception
+
+    def test_each_code_has_its_exception(self):
+        error = self.assertFails(vdbshade.ReadError, "none.vdb: cannot be read", vdbshade.Grid.read, "none.vdb")
+        self.assertEqual((error.code, error.name), (3, "VSH_ERROR_READ"))
+        self.assertIsInstance(error, OSError)
+        (self.folder / "bad.json").write_text("{")
+        self.assertFails(ValueError, "bad.json", vdbshade.Scene, self.folder / "bad.json")
+        self.assertFails(vdbshade.ArgumentError, "rays 5000 is out of range 0 … 4096", vdbshade.Query, vdbshade.Occluders(box()), sun(), rays=5000)
+        limit = vdbshade.Run(memory_limit=1000)
+        self.assertFails(vdbshade.LimitError, "memory", vdbshade.Grid.from_meshes, box(), resolution=256, run=limit)
+        self.assertFails(vdbshade.WriteError, "no/grid.vdb", vdbshade.Grid.from_meshes(box(), resolution=16).write, "no/grid.vdb")
+        self.assertFails(vdbshade.UnsupportedError, "extension", self.of_unknown_extension)
+
+    def of_unknown_extension(self):
+        path = self.folder / "strange.gltf"
+        path.write_text('{"asset": {"version": "2.0"}, "extensionsRequired": ["NO_such"], "extensionsUsed": ["NO_such"]}')
+        vdbshade.Model(path)
+
+    def test_damaged_files_are_read_apart(self):
+        """Files are read by the confined reader unless it is asked otherwise."""
+        vdbshade.Grid.from_meshes(box(), resolution=32).write(self.folder / "cut.vdb")
+        whole = (self.folder / "cut.vdb").read_bytes()
+        (self.folder / "cut.vdb").write_bytes(whole[: len(whole) // 2])
+        self.assertFails(vdbshade.ReadError, "cut.vdb", vdbshade.Grid.read, self.folder / "cut.vdb")
+        self.assertFails(vdbshade.Error, "no-such-reader", vdbshade.Model, ASSETS / "cloister.glb", run=vdbshade.Run(reader="no-such-reader"))
+        self.assertEqual(len(vdbshade.Model(ASSETS / "cloister.glb", run=vdbshade.Run(reader=False))), 12)
+
+    def test_options_are_named(self):
+        with self.assertRaisesRegex(TypeError, "no option 'ray'; there are method, ao_method"):
+            vdbshade.Query(vdbshade.Occluders(box()), sun(), ray=5)
+        with self.assertRaisesRegex(TypeError, "no setting 'sise'; there are .*size"):
+            vdbshade.Scene(ASSETS / "seeds.json", sise=5)
+        with self.assertRaisesRegex(ValueError, "method 'cones': expected one of hard, classic"):
+            vdbshade.Query(vdbshade.Occluders(box()), sun(), method="cones")
+        with self.assertRaisesRegex(TypeError, "rays 1.5: expected a whole number"):
+            vdbshade.Query(vdbshade.Occluders(box()), sun(), rays=1.5)
+        with self.assertRaisesRegex(ValueError, "rays .*: too large"):
+            vdbshade.Query(vdbshade.Occluders(box()), sun(), rays=2**40)
+        with self.assertRaisesRegex(ValueError, "direction: expected 3 numbers, got 2"):
+            sun(direction=(1, 2))
+        for bad in (1, [None] * 3):
+            with self.assertRaisesRegex(TypeError, "^direction: "):
+                sun(direction=bad)
+        with self.assertRaisesRegex(TypeError, "^angle: "):
+            sun(angle=[1])
+        self.assertEqual(sun(two_sided=numpy.bool_(True)).two_sided, 1)
+        with self.assertRaisesRegex(vdbshade.ArgumentError, "angle"):
+            sun(angle=4.0)
+        with self.assertRaisesRegex(ValueError, "name .*: expected at most 63 bytes"):
+            sun(name="x" * 64)
+        with self.assertRaisesRegex(TypeError, "occluders: expected a vdbshade.Occluders, got Model"):
+            vdbshade.Query(vdbshade.Model(ASSETS / "cloister.glb"))
+        with self.assertRaisesRegex(TypeError, "run: expected a vdbshade.Run, got int"):
+            vdbshade.Model(ASSETS / "cloister.glb", run=3)
+        with self.assertRaisesRegex(ValueError, "NUL"):
+            vdbshade.Model("a\0b")
+
+    def test_what_a_distance_function_raises_is_raised(self):
+        calls = []
+
+        def fails(positions):
+            calls.append(1)
+            raise KeyError("no distance here")
+
+        with self.assertRaisesRegex(KeyError, "no distance here"):
+            vdbshade.Grid.from_distance(fails, (-1, -1, -1), (1, 1, 1), voxel_size=0.1)
+        self.assertEqual(len(calls), 1)
+        with self.assertRaisesRegex(ValueError, "expected [0-9]+ distances for [0-9]+ positions, got shape"):
+            vdbshade.Grid.from_distance(lambda p: p, (-1, -1, -1), (1, 1, 1), voxel_size=0.1)
+        with self.assertRaisesRegex(vdbshade.InputError, "nan at"):
+            vdbshade.Grid.from_distance(lambda p: p[:, 0] * numpy.nan, (-1, -1, -1), (1, 1, 1), voxel_size=0.1)
+
+
+class Running(Case):
+    def test_progress_comes_to_its_end_in_the_thread_that_called(self):
+        seen = []
+        run = vdbshade.Run(progress=lambda stage, fraction: seen.append((stage, fraction, threading.get_ident())) and None, interval=0)
+        vdbshade.Occluders(box(), resolution=128, run=run)
+        stages = [stage for stage, _, _ in seen]
+        self.assertIn("voxelize", stages)
+        self.assertIn("field", stages)
+        self.assertEqual({thread for _, _, thread in seen}, {threading.get_ident()})
+        for stage in ("voxelize", "field"):
+            fractions = [f for s, f, _ in seen if s == stage]
+            self.assertEqual((min(fractions), max(fractions)), (0.0, 1.0))
+        every = len(seen)
+        seen.clear()
+        run.interval = 1000.0
+        vdbshade.Occluders(box(), resolution=128, run=run)
+        self.assertLess(len(seen), every)
+        self.assertIn(1.0, [f for _, f, _ in seen])
+
+    def test_progress_cancels_and_what_it_raises_is_raised(self):
+        with self.assertRaisesRegex(vdbshade.Cancelled, "cancelled"):
+            vdbshade.Occluders(box(), resolution=128, run=vdbshade.Run(progress=lambda stage, fraction: True))
+
+        def fails(stage, fraction):
+            raise LookupError(stage)
+
+        with self.assertRaises(LookupError):
+            vdbshade.Occluders(box(), resolution=128, run=vdbshade.Run(progress=fails))
+        vdbshade.Occluders(box(), resolution=32)  # and it all goes on
+
+    def test_warnings_are_pythons_or_go_to_the_function(self):
+        sheet = vdbshade.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], name="sail")
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            vdbshade.Grid.from_meshes(sheet, resolution=16)
+        self.assertEqual([w.category for w in caught], [vdbshade.VdbshadeWarning])
+        self.assertIn("'sail'", str(caught[0].message))
+        self.assertEqual(caught[0].filename, __file__)
+        told = []
+        with warnings.catch_warnings(record=True) as caught:
+            vdbshade.Grid.from_meshes(sheet, resolution=16, run=vdbshade.Run(warning=told.append))
+        self.assertEqual(([w for w in told if "'sail'" in w], caught), (told, []))
+        self.assertEqual(len(told), 1)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            with self.assertRaises(vdbshade.VdbshadeWarning):
+                vdbshade.Grid.from_meshes(sheet, resolution=16)
+
+    def test_other_threads_run_meanwhile(self):
+        """A call without progress, in a thread other than the main one, has no callbacks that would let others in."""
+        query = vdbshade.Query(vdbshade.Occluders(box()), max_error=1e-4, rays=4096)
+        positions, normals = points_on_floor(4000)
+        done = []
+        thread = threading.Thread(target=lambda: done.append(query.points(positions, normals, ao=True, run=vdbshade.Run(threads=1))))
+        begin, longest, last = time.perf_counter(), 0.0, time.perf_counter()
+        thread.start()
+        while not done and thread.is_alive():
+            time.sleep(0.001)
+            now = time.perf_counter()
+            longest, last = max(longest, now - last), now
+        thread.join()
+        taken = time.perf_counter() - begin
+        self.assertGreater(taken, 0.2, "too short to tell")
+        self.assertLess(longest, 0.5 * taken)
+
+    def interrupted(self, body):
+        """What a program says that gets SIGINT while it is in a long call."""
+        begin = """
+            import faulthandler, sys, threading, time, numpy, vdbshade
+            sys.path.insert(0, FOLDER)
+            from common import *
+            query = vdbshade.Query(vdbshade.Occluders(box()), max_error=1e-4, rays=4096)
+            positions, normals = points_on_floor(1000000)
+            def long(**options):
+                print("begins", flush=True)
+                query.points(positions, normals, ao=True, run=vdbshade.Run(**options))
+                print("ended", flush=True)
+        """
+        script = textwrap.dedent(begin).replace("FOLDER", repr(str(pathlib.Path(__file__).parent))) + textwrap.dedent(body)
+        process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        try:
+            self.assertEqual(process.stdout.readline(), "begins\n", msg="" if process.poll() is None else process.stderr.read())
+            time.sleep(0.3)
+            begin = time.perf_counter()
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=60)
+        finally:
+            process.kill()
+            process.wait()
+        self.assertLess(time.perf_counter() - begin, 10.0)
+        return process.returncode, out, err
+
+    def test_ctrl_c_ends_a_long_call(self):
+        code, out, err = self.interrupted("long()")
+        self.assertIn("KeyboardInterrupt", err)
+        self.assertEqual((code, out), (-signal.SIGINT, ""))
+
+    def test_ctrl_c_can_be_caught_and_calls_go_on(self):
+        code, out, err = self.interrupted("""
+            try:
+                long(progress=lambda stage, fraction: None, threads=2)
+            except KeyboardInterrupt:
+                print("caught", flush=True)
+            print(query.points(positions[:1], normals[:1], ao=True)["ao"].shape)
+        """)
+        self.assertEqual((code, out, err), (0, "caught\n(1,)\n", ""))
+
+    def test_ctrl_c_ends_a_distance_function(self):
+        code, out, err = self.interrupted("""
+            def slow(p):
+                time.sleep(0.01)
+                return numpy.linalg.norm(p, axis=1) - 1
+            print("begins", flush=True)
+            vdbshade.Grid.from_distance(slow, (-1, -1, -1), (1, 1, 1), voxel_size=0.01)
+        """)
+        self.assertIn("KeyboardInterrupt", err)
+        self.assertEqual((code, out), (-signal.SIGINT, ""))
+
+
+class Memory(Case):
+    def test_with_closes_and_closed_handles_are_refused(self):
+        with vdbshade.Grid.from_meshes(box(), resolution=16) as grid:
+            self.assertFalse(grid.closed)
+        self.assertTrue(grid.closed)
+        with self.assertRaisesRegex(ValueError, "Grid is closed"):
+            grid.info
+        with self.assertRaisesRegex(ValueError, "Grid is closed"):
+            vdbshade.Field(grid)
+        grid.close()
+        writer = vdbshade.ImageWriter(self.folder / "a.exr", ["ao"], (2, 2))
+        writer.abandon()
+        writer.abandon()
+        with self.assertRaisesRegex(ValueError, "closed"):
+            writer.finish()
+
+    def test_what_a_handle_needs_lives_as_long(self):
+        heights = vdbshade.Heights(numpy.random.default_rng(1).random((32, 32), numpy.float32) * 0.1)
+        occluders = vdbshade.Occluders.from_parts(layers=[vdbshade.Layer(heights)])
+        query = vdbshade.Query(occluders, sun())
+        positions, _ = points_on_floor(200)
+        want = query.points(positions)["shadow"]
+        field = vdbshade.Occluders(box(), resolution=32).field
+        model = vdbshade.Model(ASSETS / "cloister.glb")
+        mesh, positions_of_mesh = model[0], model[0].positions
+        copy = numpy.array(positions_of_mesh)
+        handle = query.handle
+        heights.close(), occluders.close(), model.close(), query.close()
+        del heights, occluders, model
+        gc.collect()
+        filler = [numpy.random.random(100000) for _ in range(20)]
+        query._cdata = handle
+        self.assertSame(query.points(positions)["shadow"], want)
+        self.assertSame(numpy.array(positions_of_mesh), copy)
+        self.assertEqual(mesh.name, "floor")
+        self.assertAlmostEqual(float(field.sample([[0, 0.75, 0]])[0]), -0.5, delta=0.05)
+        del filler
+
+    def grows(self, function, times):
+        """Bytes by which the process grows over calls, once it has warmed up."""
+        for _ in range(times // 4):
+            function()
+        gc.collect()
+        before = resident()
+        for _ in range(times):
+            function()
+        gc.collect()
+        return resident() - before
+
+    def test_many_calls_leave_nothing(self):
+        occluders = vdbshade.Occluders(box(), resolution=32)
+        query = vdbshade.Query(occluders, sun(), method="cone")
+        positions, normals = points_on_floor(100)
+        lamp = sun()
+
+        def fails():
+            try:
+                vdbshade.Query(occluders, lamp, rays=5000)
+            except vdbshade.ArgumentError:
+                pass
+
+        def cancels():
+            try:
+                vdbshade.shade_ao(occluders, positions, normals, run=vdbshade.Run(progress=lambda s, f: True))
+            except vdbshade.Cancelled:
+                pass
+
+        kib = 1024
+        self.assertLess(self.grows(lambda: query.points(positions, normals, gradient=True), 20000), 500 * kib)
+        self.assertLess(self.grows(fails, 5000), 500 * kib)
+        self.assertLess(self.grows(cancels, 3000), 500 * kib)
+        self.assertLess(self.grows(lambda: vdbshade.Query(occluders, [lamp, sun(name="b")]).points(positions), 3000), 500 * kib)
+        self.assertLess(self.grows(lambda: vdbshade.Grid.from_meshes(box(), resolution=16).info, 300), 2000 * kib)
+
+    def test_large_things_are_freed_when_nothing_refers_to_them(self):
+        texels = vdbshade.Texels(floor(), width=256, height=256)
+        occluders = vdbshade.Occluders(box())
+        megabyte = 1 << 20
+        self.assertLess(self.grows(lambda: vdbshade.bake_lightmap(occluders, texels, sun()), 20), 4 * megabyte)
+        self.assertLess(self.grows(lambda: vdbshade.Model(ASSETS / "cloister.glb")[0].positions.sum(), 20), 2 * megabyte)
+        self.assertLess(self.grows(lambda: vdbshade.image_read(ASSETS / "terrain.png"), 20), 4 * megabyte)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,407 @@
+"""All of the C library is within reach of Python, and it is what the headers say: functions, options, words, layouts."""
+import gc
+import inspect
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import unittest
+
+import numpy
+
+import vdbshade
+from common import ASSETS, FLOOR, FLOOR_TRIANGLES, FLOOR_UVS, ROOT, Case, box, floor, points_on_floor, sun
+from vdbshade import _structs, _tables, types
+from vdbshade._library import ffi, lib
+
+sys.path.insert(0, str(ROOT / "src/bindings/python"))
+import generate  # noqa: E402
+import headers  # noqa: E402
+
+TEXT = headers.read(ROOT / "include/vdbshade")
+
+# Functions of C that Python has no use for, and why.
+LEFT_OUT = {
+    "vsh_grid_from_distance": "a function of one position: vsh_grid_from_distances() takes arrays of them",
+    "vsh_grid_from_openvdb": "takes a pointer of OpenVDB's C++; .vdb files and arrays go between the two",
+    "vsh_grid_to_openvdb": "the same",
+    "vsh_volume_to_openvdb": "the same",
+    "vsh_reader_serve": "for the main of a program that is its own reader; Run(reader=…) takes such a program's path",
+    "vsh_planes_shaded": "what a plane costs, for progress of several bakes together",
+    "vsh_atlas_chart_view_sized": "one chart of those that Atlas.charts lists",
+}
+# Words are looked up in tables of the headers' constants; test_words_are_the_librarys holds them against these.
+WORDS = ["shadow_method", "ao_method", "sampler", "combine", "tint_type", "bent_space", "up", "seams", "receiver_unwrap", "align",
+         "measure", "inside", "flat_method", "isa", "atlas_kind"]
+LEFT_OUT.update({f"vsh_{name}{end}": "words" for name in WORDS for end in ("", "_name")}, vsh_color_space_name="words")
+
+
+class Reach(Case):
+    def test_every_function_is_called_or_left_out_for_a_reason(self):
+        """They are called, one and all, by what a program writes."""
+        declared = re.findall(r"VSH_API[^;{]*?\b(vsh_\w+)\s*\(", headers.COMMENT.sub(" ", TEXT))
+        self.assertGreater(len(set(declared)), 240)
+        self.assertEqual(set(declared), set(headers.functions(TEXT)))
+        called = {"vsh_progress_seldom"}  # handed to C when the module is imported
+
+        class Recorded:
+            def __getattr__(self, name):
+                called.add(name)
+                return getattr(lib, name)
+
+        modules = [m for n, m in sys.modules.items() if n.startswith("vdbshade._") and hasattr(m, "lib")]
+        for module in modules:
+            module.lib = Recorded()
+        try:
+            self.use_all_of_it()
+        finally:
+            for module in modules:
+                module.lib = lib
+        gc.collect()
+        freed = {name for name in declared if name.endswith("_free") or name == "vsh_image_writer_abandon"}
+        self.assertEqual(sorted(set(declared) - called - set(LEFT_OUT) - freed), [])
+        sources = "".join(path.read_text() for path in pathlib.Path(vdbshade.__file__).parent.glob("_*.py"))
+        self.assertEqual([name for name in freed if name not in sources], [])
+        self.assertEqual(sorted(set(LEFT_OUT) & called - {"vsh_isa_name"}), [])
+        self.assertEqual(sorted(set(LEFT_OUT) - set(declared)), [])
+
+    def use_all_of_it(self):
+        here, v = self.folder, vdbshade
+        glb, lamp = ASSETS / "cloister.glb", sun()
+        v.version(), v.isa_available("base"), v.unit("cm"), v.settings(), v.reader_confinement(), v.file_digest(glb), v.Error("", 1).name
+        v.Triangles.available(), v.measure_at_least("ssim"), v.srgb_to_linear(0.5), v.image_default_pack(["ao"]), v.lit_is_output("a.glb")
+        v.flat_light_name(0), v.shadow_method_traits("cone"), v.ao_method_traits("exact"), repr(lamp)
+        v.shadow_method_resolve("auto", True), v.ao_method_resolve("auto", False)
+        # meshes and models
+        model = v.Model(glb)
+        model.unit, model.uv_sets(0), model.materials, model.mesh_material(0), self.lights(), model.lights_from_model(0.1, 0.1)
+        self.assertTrue(model[0].matches("fl*"))
+        model[0].check(), model[0].uvs_usable(), model[0].measure_uvs(64, 64), v.mesh_solidity([box()])
+        terrain = numpy.random.default_rng(1).random((8, 8), numpy.float32) * 0.1
+        v.Model.from_heights(terrain, what="surface")
+        # level sets
+        ball = v.Sdf("sphere")
+        ball.distance([[0, 0, 0]]), ball.bounds()
+        grid = v.Grid.from_sdf(ball, voxel_size=0.2)
+        v.Grid.from_distance(lambda p: numpy.linalg.norm(p, axis=1) - 1, (-1, -1, -1), (1, 1, 1), voxel_size=0.2)
+        boxes = v.Grid.from_meshes(box(), voxel_size=0.2)
+        v.Grid.unite([grid, (boxes, numpy.eye(4))], voxel_size=0.2).write(here / "a.vdb", attributes={"a": "b"})
+        read = v.Grid.read(here / "a.vdb")
+        read.info, read.values(), v.vdb_list(here / "a.vdb"), v.vdb_copy(here / "a.vdb", (0, 0, 0), (2, 2, 2))
+        square = v.Outline.from_polygons([[[0, 0], [1, 0], [1, 1], [0, 1]]])
+        both = v.Outline.unite([square, (square, [[1, 0, 3], [0, 1, 0]])])
+        both.info, both.contours, both.distance([[0.5, 0.5]]), v.Grid.from_outline(square, 0.5, voxel_size=0.1)
+        v.Outline.from_image(ASSETS / "emblem.png")
+        fonts = sorted(pathlib.Path("/usr/share/fonts").rglob("*.ttf"))
+        v.Outline.from_text("A", fonts[0])
+        # what casts
+        field, triangles = v.Field(boxes), v.Triangles(box())
+        field.sample([[0, 0, 0]]), field.info, field.find_lost(box(), triangles), triangles.bytes
+        solids = v.Solids([ball], [numpy.eye(4)])
+        solids.distance([[0, 0, 0]])
+        heights, spheres = v.Heights(terrain), v.Spheres(v.spheres_read(ASSETS / "spheres.csv"))
+        heights.info, spheres.info
+        v.Occluders.from_parts(field, triangles=triangles, true_triangles=triangles)
+        v.Occluders.from_parts(layers=[v.Layer(heights), v.Layer(spheres, lights=["sun"], softness=0.5)]).info
+        occluders = v.Occluders(box(), resolution=32)
+        v.Occluders.from_grid(grid), occluders.field
+        # points
+        positions, normals = points_on_floor(8)
+        seen = v.shade_shadow(occluders, positions, normals, lamp)
+        v.shade_ao(occluders, positions, normals), v.shade_tint(seen, "quadratic"), v.shade_irradiance(positions, normals, lamp, seen)
+        v.Query(occluders, lamp).points(positions, normals)
+        v.trace_shadow(positions, normals, lamp, triangles=triangles), v.trace_ao(positions, normals, 1.0, solids=solids)
+        # lightmaps
+        texels = v.Texels(floor(), width=16, height=16)
+        texels.info, texels.samples, v.charts_closeness(floor(), 16, 16)
+        lightmap = v.bake_lightmap(occluders, texels, lamp, ao=True)
+        charts = v.Charts(floor(), width=16, height=16)
+        charts.info, charts.bounds(), charts.band_bytes(0, 16), charts.band(0, 8), v.lightmap_stitch(charts, lightmap)
+        lightmap.write(here / "a.exr")
+        image = v.image_read(here / "a.exr")
+        v.image_check(here / "b.exr", ["ao"], (2, 2)), v.provenance_max_error(image.attributes, "ao")
+        with v.ImageWriter(here / "b.exr", ["ao"], (2, 2)) as writer:
+            writer.add({"ao": numpy.zeros((2, 2))})
+            writer.clipping
+        # volumes
+        for voxels in (v.Voxels.from_grid(boxes), v.Voxels.from_box((0, 0, 0), (1, 1, 1), 0.5), v.Voxels.from_vdb(here / "a.vdb")):
+            voxels.info, voxels.centre(0, 0, 0)
+        volume = v.bake_volume(occluders, v.Voxels.from_grid(boxes), lamp)
+        volume.info, volume.grids, volume.sample(0, [[0, 0, 0]]), volume.values("shadow.sun", (0, 0, 0), (1, 1, 1))
+        volume.write(here / "v.vdb", half=True)
+        # scenes
+        scene = v.Scene(ASSETS / "seeds.json", size=16, resolution=32)
+        self.assertTrue(scene.has_truth())
+        scene.traceable(), scene.marches(), v.provenance(scene), scene.receiver_check(0)
+        job = v.BakeJob(scene)
+        job.forecast()
+        (baked,) = scene.bake()
+        job = v.BakeJob(scene, arrays=True)
+        job.bake(), job.report, job.lightmaps
+        assets = job.assets
+        meshes = assets.receiver(0)
+        assets.receiver(0, page=0), assets.caster(0), assets.receiver_pages(0), assets.receiver_model(0), assets.receiver_atlas(0)
+        self.assertIsNone(assets.heights(0))
+        assets.spheres(0), assets.casters(), assets.casters(only_layer=True), assets.truth(), assets.resolution(1e6)
+        scene.receiver_charts(0, meshes), scene.needs_unwrap(0, meshes), scene.reach(grid, (-1, -1, -1), (1, 1, 1))
+        v.Assets(scene).occluders(voxels=True)
+        v.Assets(v.Scene(casters=[glb], lights=[lamp])).triangles()
+        v.bake_scene(v.Scene(casters=[ball], lights=[lamp], size=16,
+                             receivers=[dict(path=ASSETS / "seeds_floor.obj", output=here / "s.exr")]))
+        # comparing, unwrapping, assets with their light, pages
+        v.compare_judge(v.compare(lightmap["ao"], lightmap["ao"])), v.compare_coverage(lightmap["A"], lightmap["A"])
+        v.compare_accuracy([lightmap["ao"]], [lightmap["ao"]]), v.Limits(noise=0.1)
+        (here / "t.json").write_text("{}")
+        v.Tolerances(here / "t.json").limits("ao")
+        self.assertTrue(v.compare_files(here / "a.exr", here / "a.exr").alike)
+        (here / "short.exr").write_bytes(b"")
+        self.assertFalse(v.compare_files(here / "a.exr", here / "b.exr").alike)
+        atlas = v.unwrap(model, width=256, height=256)
+        atlas.info, atlas.pages, atlas.charts, atlas[0].of(model[0])
+        v.lit_write(here / "lit.glb", model, [v.LitImage("occlusion", numpy.ones((64, 64)))], path=glb, atlas=atlas)
+        v.view_write(here / "lit.html", here / "lit.glb")
+        # planes and pictures
+        v.flat_bake(square, v.Light("sphere", position=(2, 2, 0), radius=0.1, name="lamp"), width=8, height=8)
+        v.flat_visibility(square, v.Light("sphere", position=(2, 2, 0), radius=0.1), [[0, 0]])
+        (here / "flat.json").write_text('{"region": [-1, -1, 1, 1], "casters": [{"shape": "circle", "radius": 0.2}], "lights": '
+                                        '[{"name": "l", "type": "disc", "position": [0.5, 0.5], "radius": 0.1}]}')
+        self.flat(here / "flat.json")
+        camera = v.Camera().frame((-1, -1, -1), (1, 1, 1)).frame_points(positions).orbit(0.1)
+        v.render([occluders.field], occluders, lamp, camera=camera, width=8, height=8,
+                 lit=[v.LitMeshes(floor(), {"shadow.sun": lightmap["shadow.sun"]})]).encode(alpha=True)
+        del baked, volume, job, assets, atlas, writer
+        self.hidden(), self.pages(), self.volume_parts(), self.job_parts(), self.kept_fields()
+
+    def lights(self):
+        path = self.folder / "lamp.gltf"
+        vdbshade.lit_write(path, vdbshade.Model(ASSETS / "seeds_floor.obj"), [])
+        document = json.loads(path.read_text())
+        document["extensionsUsed"] = ["KHR_lights_punctual"]
+        document["extensions"] = {"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 3.0}]}}
+        document["scenes"][0]["nodes"].append(len(document["nodes"]))
+        document["nodes"].append({"name": "lamp", "extensions": {"KHR_lights_punctual": {"light": 0}}})
+        path.write_text(json.dumps(document))
+        model = vdbshade.Model(path)
+        self.assertEqual([(light.name, light.type, light.intensity) for light in model.lights], [("lamp", "point", 3.0)])
+        (lamp,) = model.lights_from_model(0.1, 0.2)
+        self.assertEqual((lamp.type, lamp.radius, lamp.name), ("sphere", 0.2, "lamp"))
+        self.assertEqual(vdbshade.lights_read(path, 0.1, 0.2), [lamp])
+        self.assertEqual(vdbshade.lights_read(ASSETS / "cloister.glb", 0.1, 0.2), [])
+        scene = self.folder / "lamp.json"
+        scene.write_text(json.dumps({"casters": [{"mesh": "lamp.gltf"}], "lights": [{"type": "file", "file": "lamp.gltf", "radius": 0.2}]}))
+        read = vdbshade.Scene(scene)
+        self.assertEqual([repr(light) for light in read.lights], [repr(lamp)])
+        self.assertEqual([(f.radius, f.first, f.count) for f in read.light_files], [(0.2, 0, 1)])
+        self.assertEqual(vdbshade.Scene(scene, lights=[sun()]).light_files, [])
+
+    def hidden(self):
+        """A square that is all hidden takes the values of the border of one that lies in the same place."""
+        uvs = FLOOR_UVS * [0.4, 0.8] + [0.05, 0.1]
+        meshes = [vdbshade.Mesh(FLOOR, FLOOR_TRIANGLES, uvs=uvs + [shift, 0]) for shift in (0, 0.5)]
+        texels = vdbshade.Texels(meshes, width=32, height=32)
+        ao, coverage = numpy.zeros((32, 32), numpy.float32), vdbshade.bake_lightmap(vdbshade.Occluders(box()), texels)["A"]
+        left, right = coverage[:, :16] > 0, coverage[:, 16:] > 0
+        ao[:, :16][left] = numpy.linspace(0.1, 0.9, left.sum())
+        self.assertTrue(numpy.array_equal(left, right))
+        coverage[:, 16:] = 0
+        self.assertEqual(vdbshade.lightmap_fill_hidden(texels, {"ao": ao, "A": coverage}), right.sum())
+        border = left & ~(numpy.roll(left, 1, 0) & numpy.roll(left, -1, 0) & numpy.roll(left, 1, 1) & numpy.roll(left, -1, 1))
+        self.assertSame(ao[:, 16:][border], ao[:, :16][border])
+        self.assertTrue(set(ao[:, 16:][right]) <= set(ao[:, :16][border]))
+
+    def pages(self):
+        """Objects have pages of their own, as they ask; borders between pages are stitched."""
+        v, glb = vdbshade, ASSETS / "cloister.glb"
+        model = v.Model(glb)
+        rule = model[0].name
+        density = model.densities({"*": 0.5, rule: 2.0}, str(glb))
+        self.assertEqual([d for d, mesh in zip(density, model) if mesh.matches(rule)], [2.0] * sum(m.matches(rule) for m in model))
+        self.assertEqual(set(density), {0.5, 2.0})
+        with self.assertRaisesRegex(v.InputError, "cloister.*no-such"):
+            model.densities({"no-such": 1.0}, str(glb))
+        halves = [v.Mesh(FLOOR + numpy.float32([x, 0, 0]), FLOOR_TRIANGLES, name=f"half{x}") for x in (0, 4)]
+        atlas = v.unwrap(halves, density=[1, 2], texels_per_unit=4, width=64, height=64, atlas="objects", fit_pages=True)
+        pages = [atlas.page(i) for i in range(atlas.pages)]
+        self.assertEqual([(p.width, p.first_mesh, p.texels_per_unit) for p in pages], [(32, 0, 4.0), (64, 1, 4.0)])
+        self.assertRaises(IndexError, atlas.page, 2)
+        charts = [v.Charts([atlas[i].of(halves[i])], width=p.width, height=p.height) for i, p in enumerate(pages)]
+        maps = [{"ao": numpy.full(c.shape, value, numpy.float32), "A": numpy.ones(c.shape, numpy.float32)}
+                for c, value in zip(charts, (0.50, 0.51))]
+        report = v.lightmaps_stitch(list(zip(charts, maps)), max_change=0.1)
+        self.assertEqual(report.seams, 1)
+        self.assertLess(report.after, 0.1 * report.before)
+        self.assertGreater(maps[0]["ao"].max(), 0.5)
+        scene = v.Scene(casters=[glb], lights=[sun()], receivers=[dict(
+            path=glb, output=self.folder / "o.png", unwrap="always", atlas="objects", texels_per_unit=2.0, max_size=256,
+            density={rule: 2.0})])
+        assets = v.Assets(scene)
+        count = assets.receiver_pages(0)
+        infos = [assets.receiver_page_info(0, page) for page in range(count)]
+        self.assertGreater(count, 1)
+        self.assertEqual([(p.width, p.height) for p in infos],
+                         [(p.width, p.height) for p in map(assets.receiver_atlas(0)[0].page, range(count))])
+        self.assertTrue(all(assets.receiver(0, page=i)[0].object_name in (p.object, None) for i, p in enumerate(infos)))
+        self.assertIsNone(assets.receiver_page_info(0, count))
+        v.view_write_bakes(self.folder / "bakes.html", [dict(model=glb), dict(name="grey", images=[maps[0]]),
+                                                        dict(name="b", images=[maps[1]])])
+        self.assertIn("grey", (self.folder / "bakes.html").read_text())
+
+    def volume_parts(self):
+        """Two parts make the volume of one bake, bit by bit."""
+        v, parts, lamp = vdbshade, self.folder / "volume", sun(angle=1.0)
+        occluders, voxels = v.Occluders(box(), resolution=16), v.Voxels.from_box((-1, 0, -1), (1, 1.5, 1), 0.25)
+        whole = v.bake_volume(occluders, voxels, lamp, ao=True, ao_distance=1.0)
+        for shard in (1, 2):
+            v.bake_volume_part(occluders, voxels, lamp, parts=parts, shard=shard, shard_count=2, words=["a", "ü"], attributes={"a": "b"},
+                               ao=True, ao_distance=1.0)
+        merged = v.volume_merge(voxels, lamp, parts=parts, attributes={"a": "b"}, ao=True, ao_distance=1.0)
+        low, shape = [-4, 0, -4], [8, 6, 8]
+        for name in ("shadow.sun", "ao"):
+            self.assertSame(merged.values(name, low, shape), whole.values(name, low, shape))
+            self.assertGreater(len(set(whole.values(name, low, shape).flat)), 2)
+        self.assertEqual(v.part_words(parts), ["a", "ü"])
+        self.assertEqual(v.volume_part_casters(parts).voxel_size, occluders.info.voxel_size)
+        with self.assertRaisesRegex(v.InputError, "volume.1-of-2.part"):
+            v.volume_merge(voxels, lamp, parts=parts, attributes={"a": "c"}, ao=True, ao_distance=1.0)
+
+    def job_parts(self):
+        """Two parts make the lightmap of one bake, bit by bit."""
+        def scene():
+            return vdbshade.Scene(ASSETS / "seeds.json", size=32, resolution=32)
+        parts = self.folder / "job"
+        for shard in (1, 2):
+            job = vdbshade.BakeJob(scene(), shard=shard, shard_count=2, parts=parts, words=["w"])
+            self.assertEqual(job.bake(), [])
+        job = vdbshade.BakeJob(scene(), arrays=True, parts=parts)
+        job.measure()
+        (merged,), (whole,) = job.merge(), scene().bake()
+        self.assertEqual(list(merged), list(whole))
+        for name in whole:
+            self.assertSame(merged[name], whole[name])
+        self.assertEqual(vdbshade.part_words(parts, 2), ["w"])
+
+    def kept_fields(self):
+        """A field that was kept and is used gives the bits of one that is made."""
+        v, path = vdbshade, self.folder / "seeds.field"
+
+        def scene(**settings):
+            return v.Scene(ASSETS / "seeds.json", size=16, method="cone", ao_method="cones", **dict(dict(resolution=32), **settings))
+        made = scene()
+        forecast = made.field_forecast()
+        report = made.save_field(path, assets=v.Assets(made), attributes={"made_by": "test"})
+        self.assertEqual((report.fields, forecast.fields, report.write_s >= 0), (1, 1, True))
+        self.assertTrue(v.field_file_is(path))
+        self.assertFalse(v.field_file_is(ASSETS / "seeds.json"))
+        file = v.FieldFile(path)
+        self.assertEqual((file.path, file.bytes, file.attributes["made_by"]), (str(path), path.stat().st_size, "test"))
+        self.assertEqual((len(list(file)), file[-1].grid_bytes), (1, report.grid_bytes))
+        at = [[0, 0.8, 0], [0.4, 1.2, 0.1]]
+        kept = file[0]
+        self.assertSame(file.field(0).sample(at), kept.field.sample(at))
+        self.assertEqual(kept.field.info.active_voxels, report.active_voxels)
+        v.field_file_write(self.folder / "own.field", [kept, v.KeptField(v.Field(v.Grid.from_sdf(v.Sdf("sphere"), voxel_size=0.1)), "ball",
+                                                                         origin={"shape": "sphere"})], attributes={"a": "b"})
+        with v.FieldFile(self.folder / "own.field") as own:
+            self.assertEqual([(k.name, k.origin) for k in own], [(kept.name, kept.origin), ("ball", {"shape": "sphere"})])
+            self.assertSame(own.field(1).sample([[0, 0, 0.95]]), own[1].field.sample([[0, 0, 0.95]]))
+            self.assertRaises(IndexError, own.field, 2)
+        used = scene()
+        used.use_field(file)
+        file.close()
+        del file, kept
+        gc.collect()
+        (with_file,), (without,) = used.bake(), scene().bake()
+        for name in without:
+            self.assertSame(with_file[name], without[name])
+        self.assertLess(without["shadow.sun"].min(), 0.5)
+        stale = scene(resolution=33)
+        stale.use_field(v.FieldFile(path))
+        with self.assertRaisesRegex(v.InputError, "stale"):
+            stale.bake()
+        stale.use_field(None)
+        stale.bake()
+
+    def flat(self, path):
+        scene = vdbshade.FlatScene(path, size=8)
+        self.assertEqual(scene.bake()["A"].shape, scene.shape)
+
+    def test_words_are_the_librarys(self):
+        prefixes = dict(zip(WORDS, ["SHADOW", "AO", "SAMPLER", "COMBINE", "TINT", "BENT", "UP", "SEAMS", "RECEIVER_UNWRAP", "ALIGN",
+                                    "MEASURE", "INSIDE", "FLAT", "ISA", "ATLAS"]))
+        for name, prefix in prefixes.items():
+            for number in range(20):
+                word = getattr(lib, f"vsh_{name}_name")(number)
+                if word != ffi.NULL:
+                    word = ffi.string(word).decode()
+                    self.assertEqual(_structs.constant(f"VSH_{prefix}_", word, name), number, (name, word))
+                    self.assertEqual(getattr(lib, f"vsh_{name}")(word.encode()), number)
+
+    def test_a_word_of_another_enum_is_none(self):
+        self.assertEqual(list(_tables.WORDS["VSH_FLAT_"]), ["hard", "classic", "exact"])
+        self.assertEqual(list(_tables.WORDS["VSH_CHANNEL_"]), ["data", "light", "vector"])
+        with self.assertRaisesRegex(ValueError, "method 'mask': expected one of hard, classic, exact"):
+            vdbshade.flat_bake(None, method="mask", width=8, height=8)
+
+    def test_options_are_those_of_the_headers_with_their_defaults(self):
+        """Each option struct is begun by its defaults, and vdbshade.types tells its members."""
+        structs = headers.structs(TEXT)
+        options = [s for s, members in structs.items() if members[0].name == "struct_size"]
+        self.assertGreater(len(options), 25)
+        for struct in options:
+            if struct == "vsh_limits":  # vsh_limits_default_sized()
+                continue
+            self.assertEqual(_structs.Filled(struct).pointer.struct_size, ffi.sizeof(struct), struct)
+        for struct, members in structs.items():
+            self.assertEqual([m.name for m in members], _structs.members(struct), struct)
+            kind = getattr(types, "".join(part.capitalize() for part in struct[4:].split("_")))
+            shown = {m.name for m in members} - generate.HIDDEN - generate.ARGUMENTS.get(struct, set())
+            self.assertEqual({n.rstrip("_") for n in kind.__annotations__}, shown, struct)
+        self.assertIn("0 … 4096", types.ShadeOptions.__doc__)
+
+    def test_layouts_are_the_compilers(self):
+        """Sizes and places of all members, as the C compiler has them."""
+        lines, want = [], []
+        for struct in headers.structs(TEXT):
+            lines.append(f'printf("{struct} %zu\\n", sizeof({struct}));')
+            want.append(f"{struct} {ffi.sizeof(struct)}")
+            for member in _structs.members(struct):
+                lines.append(f'printf("{struct}.{member} %zu\\n", offsetof({struct}, {member}));')
+                want.append(f"{struct}.{member} {ffi.offsetof(struct, member)}")
+        for name, number in {n: v for block in headers.enumerations(TEXT) for n, v in block.items()}.items():
+            lines.append(f'printf("{name} %lld\\n", (long long){name});')
+            want.append(f"{name} {getattr(lib, name)}")
+            self.assertEqual(number, getattr(lib, name))
+        source = self.folder / "layout.c"
+        source.write_text("#include <vdbshade/vdbshade.h>\n#include <stdio.h>\nint main(void) {\n" + "\n".join(lines) + "\nreturn 0; }\n")
+        subprocess.run([os.environ.get("CC", "cc"), f"-I{ROOT / 'include'}", "-o", self.folder / "layout", source], check=True)
+        told = subprocess.run([self.folder / "layout"], check=True, capture_output=True, text=True).stdout.split("\n")
+        self.assertEqual(told[:-1], want)
+
+    def test_all_that_is_public_is_documented_and_annotated(self):
+        names = [n for n in vdbshade.__all__ if n != "types"]
+        self.assertGreater(len(names), 90)
+        for name in names:
+            thing = getattr(vdbshade, name)
+            self.assertTrue((thing.__doc__ or "").strip(), name)
+            functions = [(name, thing)] if inspect.isfunction(thing) else [
+                (f"{name}.{n}", getattr(m, "__func__", m)) for n, m in vars(thing).items()
+                if inspect.isfunction(getattr(m, "__func__", m)) and (not n.startswith("_") or n == "__init__")]
+            for where, function in functions:
+                signature = inspect.signature(function)
+                self.assertNotEqual(signature.return_annotation, signature.empty, where)
+                for parameter in signature.parameters.values():
+                    self.assertTrue(parameter.name in ("self", "cls") or parameter.annotation != parameter.empty, f"{where}: {parameter}")
+        self.assertTrue((pathlib.Path(vdbshade.__file__).parent / "py.typed").exists())
+
+    def test_another_version_of_the_library_is_refused(self):
+        script = ("import sys, vdbshade._tables as t; t.VERSION = '0.1'; del sys.modules['vdbshade'], sys.modules['vdbshade._library']\n"
+                  "import vdbshade")
+        result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+        self.assertIn("ImportError: vdbshade: this module is for version 0.1 of the library", result.stderr)
+        self.assertIn("'0.2", repr(_tables.VERSION))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,148 @@
+"""Values are those of the command line and of C, bit by bit, whatever the arrays' layouts."""
+import subprocess
+import threading
+import unittest
+
+import numpy
+
+import vdbshade
+from common import ASSETS, POINTS, VDBSHADE, Case, box, floor, points_on_floor, sun
+
+LIT = dict(direction=(0.6, 0.75, 0.5), angle=numpy.radians(3.0))
+
+
+class Values(Case):
+    def cli(self, *arguments):
+        subprocess.run([VDBSHADE, *map(str, arguments), "--quiet"], check=True, cwd=self.folder)
+
+    def test_a_lightmap_of_arrays_has_the_bits_of_the_command_lines(self):
+        model = ASSETS / "cloister.glb"
+        self.cli("bake", model, "--sun", "0.6,0.75,0.5", "--sun-angle", 3, "--ao", 0.6, "--size", 128, "--pack", "channels", "-o", "cli.exr")
+        baked = vdbshade.image_read(self.folder / "cli.exr")
+        meshes = vdbshade.Model(model)
+        lightmap = vdbshade.bake_lightmap(vdbshade.Occluders(meshes), vdbshade.Texels(meshes, width=128, height=128),
+                                          sun(**LIT), ao=True, ao_distance=0.6)
+        self.assertEqual(set(lightmap), set(baked))
+        for name in baked:
+            self.assertSame(lightmap[name], numpy.array(baked[name]))
+
+    def test_a_scene_has_the_bits_of_the_command_lines(self):
+        self.cli("bake", ASSETS / "seeds.json", "--size", 96, "--pack", "channels", "-o", "cli.exr")
+        baked = vdbshade.image_read(self.folder / "cli.exr")
+        (lightmap,) = vdbshade.Scene(ASSETS / "seeds.json", size=96).bake()
+        self.assertEqual(set(lightmap), set(baked))
+        for name in baked:
+            self.assertSame(lightmap[name], numpy.array(baked[name]))
+
+    def test_files_of_a_scene_are_those_of_the_command_line(self):
+        arguments = dict(casters=[ASSETS / "cloister.glb"], lights=[sun(**LIT)], size=64, ao=0.6)
+        report = vdbshade.bake_scene(vdbshade.Scene(receivers=[dict(path=ASSETS / "cloister.glb", output=self.folder / "py.exr")], **arguments))
+        self.cli("bake", ASSETS / "cloister.glb", "--sun", "0.6,0.75,0.5", "--sun-angle", 3, "--size", 64, "--ao", 0.6, "-o", "cli.exr")
+        self.assertEqual(report.texels, 4096)
+        self.assertTrue(vdbshade.compare_files(self.folder / "cli.exr", self.folder / "py.exr", limits=dict(max=0.0)))
+        lit = vdbshade.image_read(self.folder / "py.exr")
+        self.assertIn("shadow.sun", lit)
+        self.assertIn("vdbshade_input_0", lit.attributes)
+
+    def test_points_have_the_bits_of_c(self):
+        model = vdbshade.Model(ASSETS / "cloister.glb")
+        positions, normals = points_on_floor(5000)
+        (self.folder / "points").write_bytes(positions.tobytes() + normals.tobytes())
+        subprocess.run([POINTS, ASSETS / "cloister.glb", self.folder / "points", self.folder / "values"], check=True)
+        of_c = numpy.fromfile(self.folder / "values", numpy.float32).reshape(3, -1)
+        occluders = vdbshade.Occluders(model, resolution=128)
+        query = vdbshade.Query(occluders, sun(), method="cone", ao_method="cones")
+        found = query.points(positions, normals, ao=True, distance=True)
+        self.assertSame(found["shadow"], of_c[:1])
+        self.assertSame(found["ao"], of_c[1])
+        self.assertSame(found["distance"], of_c[2])
+        self.assertSame(vdbshade.shade_shadow(occluders, positions, normals, sun(), method="cone"), of_c[0])
+        self.assertSame(vdbshade.shade_ao(occluders, positions, normals, ao_method="cones"), of_c[1])
+        self.assertSame(occluders.field.sample(positions), of_c[2])
+
+    def test_layouts_change_no_bit(self):
+        query = vdbshade.Query(vdbshade.Occluders(box(), resolution=64), sun(), method="cone", ao_method="cones")
+        positions, normals = points_on_floor(1000)
+        positions = positions.astype(numpy.float32).astype(numpy.float64)
+        want = query.points(positions, normals, ao=True, gradient=True)
+        vertices = numpy.zeros(1000, [("color", "u1", 4), ("position", "f4", 3), ("normal", "f4", 3), ("texel", "u4")])
+        vertices["position"], vertices["normal"], vertices["texel"] = positions, normals, numpy.arange(1000)
+        wide = numpy.zeros((1000, 5))
+        wide[:, 1:4] = positions
+        for given in (positions.astype(numpy.float32), vertices["position"], wide[:, 1:4], positions.tolist(),
+                      numpy.asfortranarray(positions), positions.astype(">f8")):
+            for up in (normals, vertices["normal"]):
+                found = query.points(given, up, ao=True, gradient=True)
+                for name in want:
+                    self.assertSame(found[name], want[name])
+        found = query.points(vertices["position"], vertices["normal"], texels=vertices["texel"], ao=True)
+        self.assertSame(found["ao"], want["ao"])
+        backwards = query.points(positions[::-1], normals[::-1])["shadow"]
+        self.assertSame(numpy.ascontiguousarray(backwards[:, ::-1]), want["shadow"])
+
+    def test_bands_of_rows_are_those_of_the_whole(self):
+        occluders, options = vdbshade.Occluders(box()), dict(width=64, height=64)
+        whole = vdbshade.bake_lightmap(occluders, vdbshade.Texels(floor(), **options), sun())
+        charts = vdbshade.Charts(floor(), **options)
+        bands = [vdbshade.bake_lightmap(occluders, charts.band(row, 16), sun())["shadow.sun"] for row in range(0, 64, 16)]
+        self.assertSame(numpy.concatenate(bands), whole["shadow.sun"])
+        low, high = charts.bounds()
+        self.assertTrue(numpy.allclose([low[0], high[0]], [-2, 2], atol=0.1))
+        self.assertGreater(charts.band_bytes(0, 64, ao=True), charts.band_bytes(0, 16))
+
+    def test_threads_that_call_at_once_get_the_same(self):
+        query = vdbshade.Query(vdbshade.Occluders(box(), resolution=64), sun(), method="cone")
+        positions, normals = points_on_floor(20000)
+        want, found = query.points(positions, normals)["shadow"], [None] * 6
+
+        def ask(i):
+            found[i] = query.points(positions, normals)["shadow"]
+
+        threads = [threading.Thread(target=ask, args=(i,)) for i in range(6)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        for values in found:
+            self.assertSame(values, want)
+
+    def test_a_python_function_gives_the_level_set_of_the_shape(self):
+        """Of a sphere given as a tree, by a function of arrays and by one that has to be measured anew."""
+        options = dict(voxel_size=0.05)
+        tree = vdbshade.Grid.from_sdf(vdbshade.Sdf("sphere", radius=1.0), **options)
+        sizes = set()
+
+        def sphere(positions):
+            sizes.add(len(positions))
+            self.assertFalse(positions.flags.writeable)
+            return numpy.sqrt(positions[:, 0] ** 2 + positions[:, 1] ** 2 + positions[:, 2] ** 2) - 1.0
+
+        exact = vdbshade.Grid.from_distance(sphere, (-1, -1, -1), (1, 1, 1), **options)
+        # which rounds as the tree's distance does not, here and there
+        self.assertEqual(exact.info.active_voxels, tree.info.active_voxels)
+        self.assertTrue(numpy.allclose(exact.values(), tree.values(), atol=1e-6))
+        self.assertTrue({8, 64} <= sizes <= {1, 8, 64})
+        twice = vdbshade.Grid.from_distance(lambda p: 2 * sphere(p), (-1, -1, -1), (1, 1, 1), lipschitz=2, exact=False, **options)
+        at = numpy.random.default_rng(2).uniform(-1, 1, (1000, 3))
+        at *= (1.0 + numpy.random.default_rng(3).uniform(-0.05, 0.05, (1000, 1))) / numpy.linalg.norm(at, axis=1, keepdims=True)
+        distance = numpy.linalg.norm(at, axis=1) - 1
+        self.assertLess(numpy.abs(vdbshade.Field(twice).sample(at) - distance).max(), 0.005)
+
+    def test_moved_shapes_are_where_they_were_moved(self):
+        shape = vdbshade.Sdf("box", size=(1, 0.2, 0.3)) | vdbshade.Sdf("sphere", radius=0.5).translated(0, 1, 0)
+        moved = shape.scaled(2).rotated((0, 0, 1), 0.7).translated(1, 2, 3).rotated((1, 2, 0.5), -0.4).translated(0, 0, 1)
+        at = numpy.random.default_rng(1).uniform(-3, 3, (100, 3))
+        axis = numpy.array([1, 2, 0.5]) / numpy.linalg.norm([1, 2, 0.5])
+
+        def turn(v, axis, angle):
+            return v * numpy.cos(angle) + numpy.cross(axis, v) * numpy.sin(angle) + axis * (v @ axis)[:, None] * (1 - numpy.cos(angle))
+
+        there = turn(turn(2 * at, numpy.array([0, 0, 1.0]), 0.7) + [1, 2, 3], axis, -0.4) + [0, 0, 1]
+        self.assertTrue(numpy.allclose(moved.distance(there), 2 * shape.distance(at), atol=1e-9))
+        hollow = vdbshade.Sdf("sphere") - vdbshade.Sdf("sphere", radius=0.5)
+        self.assertAlmostEqual(hollow.distance([[0, 0, 0]])[0], 0.5)
+        self.assertAlmostEqual((vdbshade.Sdf("sphere") & vdbshade.Sdf("sphere").translated(1, 0, 0)).distance([[0.5, 0, 0]])[0], -0.5)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,307 @@
+/* Meshes that a texture cuts out: what rays meet of them. */
+#include "masked.h"
+
+#include "trace/embree.h"
+
+static const float UP[3] = {0.0f, 1.0f, 0.0f};
+
+static bool blocked(const vsh_triangles *triangles, const double from[3], const double direction[3]) {
+    vshi_segment_ray ray = {.far = INFINITY};
+    memcpy(ray.origin, from, sizeof ray.origin);
+    memcpy(ray.direction, direction, sizeof ray.direction);
+    bool met = false;
+    vshi_triangles_blocked(triangles, &ray, 1, &met);
+    return met;
+}
+
+/* --- shadows and AO */
+
+static void a_masked_card_casts_the_shadow_of_its_disc(void **state) {
+    (void)state;
+    card *c = malloc(sizeof *c);
+    make_card(c, 1.0f);
+    vsh_triangles *triangles = traced_of(&c->mesh, 1);
+    const double directions[3][3] = {{0.0, 1.0, 0.0}, {0.6, 0.8, 0.0}, {-0.48, 0.6, 0.64}};
+    int dark = 0, lit = 0;
+    for (int i = 0; i < 3 * 41 * 41; ++i) {
+        const double *d = directions[i % 3];
+        const double x = -1.2 + 0.06 * (i / 3 % 41), z = -1.2 + 0.06 * (i / 123);
+        const double from[3] = {x - d[0] / d[1], 0.0, z - d[2] / d[1]};
+        const double off = hypot(x, z) - DISC_RADIUS;
+        if (fabs(off) > 1e-3) {
+            assert_int_equal(blocked(triangles, from, d), off < 0.0);
+            dark += off < 0.0;
+            lit += fabs(x) < 1.0 && fabs(z) < 1.0 && off > 0.0;
+        }
+    }
+    assert_true(dark > 500 && lit > 300);
+    /* and from above */
+    assert_true(blocked(triangles, (const double[]){0, 2, 0}, (const double[]){0, -1, 0}));
+    assert_false(blocked(triangles, (const double[]){0.9, 2, 0.9}, (const double[]){0, -1, 0}));
+    vsh_triangles_free(triangles);
+    free(c);
+}
+
+static void soft_shadows_and_ao_are_those_of_the_disc_as_triangles(void **state) {
+    (void)state;
+    enum { POINTS = 200, RAYS = 1024 };
+    card *c = malloc(sizeof *c);
+    fan *f = malloc(sizeof *f);
+    make_card(c, 0.7f);
+    make_fan(f, 0.7f);
+    vsh_mesh whole = c->mesh;
+    whole.mask = NULL;
+    vsh_triangles *cut = traced_of(&c->mesh, 1), *disc = traced_of(&f->mesh, 1),
+                  *square = traced_of(&whole, 1);
+    double positions[3 * POINTS];
+    float normals[3 * POINTS], value[3][POINTS];
+    for (size_t i = 0; i < POINTS; ++i) {
+        const double at[3] = {0.01 * (double)i - 1.0, 0.0, 0.005 * (double)i};
+        memcpy(positions + 3 * i, at, sizeof at);
+        memcpy(normals + 3 * i, UP, sizeof UP);
+    }
+    const double towards[3] = {0.3, 1.0, 0.1};
+    const vsh_light light = sun(towards, 0.4);
+    const vsh_triangles *all[3] = {cut, disc, square};
+    for (int ao = 0; ao < 2; ++ao) {
+        for (int k = 0; k < 3; ++k) {
+            const vsh_result result = ao ? vsh_trace_ao(all[k], NULL, POINTS, positions, normals, 0.0, 3.0,
+                                                        RAYS, NULL, value[k], NULL)
+                                         : vsh_trace_shadow(all[k], NULL, POINTS, positions, normals, 0.0,
+                                                            &light, RAYS, NULL, value[k], NULL);
+            assert_int_equal(result, VSH_OK);
+        }
+        double worst = 0.0, other = 0.0;
+        for (size_t i = 0; i < POINTS; ++i) {
+            worst = fmax(worst, fabs((double)value[0][i] - (double)value[1][i]));
+            other = fmax(other, fabs((double)value[0][i] - (double)value[2][i]));
+        }
+        assert_true(worst <= 3.0 / RAYS); /* rays on the very edge */
+        assert_true(other > 0.05);
+    }
+    vsh_triangles_free(cut);
+    vsh_triangles_free(disc);
+    vsh_triangles_free(square);
+    free(c);
+    free(f);
+}
+
+/* --- lookups */
+
+static void rays_see_wraps_transforms_cutoff_and_base_factor(void **state) {
+    (void)state;
+    uint32_t seed = 1;
+    int through = 0, met = 0;
+    for (int i = 0; i < 18; ++i) {
+        card *c = malloc(sizeof *c);
+        uint8_t alpha[WIDE * HIGH];
+        make_card(c, 1.0f);
+        c->mask = random_mask(alpha, i, &seed);
+        for (size_t k = 0; k < 8; ++k) {
+            c->uvs[k] = 5.0f * c->uvs[k] - 2.25f; /* u: x from -1 to 1 is -2.25 to 2.75 */
+        }
+        vsh_triangles *triangles = traced_of(&c->mesh, 1);
+        for (int k = 0; k < 400; ++k) {
+            const double x = 1.9 * next_of(&seed) - 0.95, z = 1.9 * next_of(&seed) - 0.95;
+            const double u = 2.5 * (x + 1.0) - 2.25, v = 2.5 * (1.0 - z) - 2.25;
+            const double off = alpha_at(&c->mask, u, v) - c->mask.alpha_cutoff;
+            if (fabs(off) > 1e-5) {
+                const bool is = blocked(triangles, (const double[]){x, 0, z}, (const double[]){0, 1, 0});
+                assert_int_equal(is, off > 0.0);
+                through += !is;
+                met += is;
+            }
+        }
+        vsh_triangles_free(triangles);
+        free(c);
+    }
+    assert_true(through > 1000 && met > 1000);
+}
+
+/* --- packets */
+
+static void a_ray_sees_the_same_alone_and_in_any_packet(void **state) {
+    (void)state;
+    enum { RAYS = 4096 };
+    card *c = malloc(sizeof *c);
+    make_card(c, 1.0f);
+    for (size_t k = 0; k < 8; ++k) {
+        c->uvs[k] *= 37.0f; /* many small discs */
+    }
+    vsh_triangles *triangles = traced_of(&c->mesh, 1);
+    static vshi_segment_ray rays[RAYS];
+    static bool together[RAYS], turned[RAYS];
+    uint32_t seed = 3;
+    for (size_t i = 0; i < RAYS; ++i) {
+        vshi_vec d = vshi_unit((vshi_vec){0.5 * next_of(&seed), 1.0, 0.5 * next_of(&seed)});
+        rays[i] =
+            (vshi_segment_ray){{next_of(&seed) - 0.8, 0.0, next_of(&seed) - 0.8}, {d.x, d.y, d.z}, INFINITY};
+    }
+    vshi_triangles_blocked(triangles, rays, RAYS, together);
+    int met = 0;
+    for (size_t i = 0; i < RAYS; ++i) {
+        assert_int_equal(blocked(triangles, rays[i].origin, rays[i].direction), together[i]);
+        met += together[i];
+    }
+    assert_true(met > RAYS / 4 && met < 3 * RAYS / 4);
+    for (size_t i = 0; i < RAYS / 2; ++i) {
+        const vshi_segment_ray kept = rays[i];
+        rays[i] = rays[RAYS - 1 - i];
+        rays[RAYS - 1 - i] = kept;
+    }
+    vshi_triangles_blocked(triangles, rays, RAYS, turned);
+    for (size_t i = 0; i < RAYS; ++i) {
+        assert_int_equal(turned[RAYS - 1 - i], together[i]);
+    }
+    vsh_triangles_free(triangles);
+    free(c);
+}
+
+/* --- what else is made of triangles */
+
+static void no_beam_is_cut_by_what_is_masked_or_one_sided(void **state) {
+    (void)state;
+    /* over both triangles, and within one */
+    const vshi_sheet_beam beams[2] = {{{0.02, 0.0, 0.01}, {0.0, 1.0, 0.0}, 0.05, 0.05, INFINITY},
+                                      {{0.5, 0.0, 0.3}, {0.0, 1.0, 0.0}, 0.05, 0.05, INFINITY}};
+    card *c = malloc(sizeof *c);
+    make_card(c, 1.0f);
+    for (int kind = 0; kind < 3; ++kind) {
+        vsh_mesh mesh = c->mesh;
+        mesh.mask = kind == 1 ? mesh.mask : NULL;
+        mesh.one_sided = kind == 2;
+        vsh_triangles *triangles = traced_of(&mesh, 1);
+        bool cut[2] = {false, false};
+        vshi_triangles_cut(triangles, beams, 2, 32, cut);
+        assert_int_equal(cut[0], kind == 0);
+        assert_int_equal(cut[1], kind == 0);
+        vsh_triangles_free(triangles);
+    }
+    free(c);
+}
+
+/* A box from -1 to 1. */
+static vsh_mesh box_mesh(void) {
+    static const float corners[8][3] = {{-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}, {1, 1, -1},
+                                        {-1, -1, 1},  {1, -1, 1},  {-1, 1, 1},  {1, 1, 1}};
+    static const uint32_t sides[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                       2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+    return (vsh_mesh){.positions = corners[0], .indices = sides, .vertex_count = 8, .triangle_count = 12};
+}
+
+static void a_masked_box_holds_nothing(void **state) {
+    (void)state;
+    static const float uvs[16];
+    const uint8_t half[2] = {255, 0};
+    const vsh_alpha_mask mask = mask_of(half, 2, 1);
+    vsh_mesh box = box_mesh();
+    for (int masked = 0; masked < 2; ++masked) {
+        box.mask = masked ? &mask : NULL;
+        box.mask_uvs = uvs;
+        box.solidity = masked ? VSH_SOLIDITY_SOLID : VSH_SOLIDITY_AUTO;
+        vsh_triangles *triangles = traced_of(&box, 1);
+        assert_int_equal(vshi_triangles_have_solids(triangles), !masked);
+        vsh_triangles_free(triangles);
+    }
+}
+
+static void a_one_sided_box_is_as_solid_as_any(void **state) {
+    (void)state;
+    vsh_mesh box = box_mesh();
+    box.one_sided = 1;
+    vsh_triangles *triangles = traced_of(&box, 1);
+    assert_true(vshi_triangles_have_solids(triangles));
+    for (int i = 0; i < 3; ++i) {
+        const vshi_segment_ray ray = {{-3.0 + 3.0 * i, 0.1, 0.2}, {1.0, 0.0, 0.0}, INFINITY};
+        bool nothing = false;
+        uint8_t meets = VSHI_MEETS_NOTHING;
+        /* before it, in it, behind it */
+        assert_int_equal(vshi_triangles_depth(triangles, &ray, &nothing), i == 1);
+        assert_int_equal(nothing, i == 2);
+        vshi_triangles_meet(triangles, &ray, 1, &meets);
+        assert_int_equal(meets, i == 0 ? VSHI_MEETS_AIR : i == 1 ? VSHI_MEETS_SOLID : VSHI_MEETS_NOTHING);
+        /* and casts the same */
+        assert_int_equal(blocked(triangles, ray.origin, ray.direction), i < 2);
+    }
+    vsh_triangles_free(triangles);
+}
+
+static void light_on_the_back_of_a_one_sided_face_comes_through(void **state) {
+    (void)state;
+    card *c = malloc(sizeof *c);
+    make_card(c, 1.0f);
+    for (int i = 0; i < 8; ++i) {
+        const bool one_sided = (i & 1) != 0, mirrored = (i & 2) != 0, masked = (i & 4) != 0;
+        const double transform[12] = {mirrored ? -1.0 : 1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+        vsh_mesh mesh = c->mesh;
+        mesh.one_sided = one_sided;
+        mesh.transform = transform;
+        mesh.mask = masked ? mesh.mask : NULL;
+        vsh_triangles *triangles = traced_of(&mesh, 1);
+        const double under[3] = {0.1, 0.0, 0.2}, over[3] = {0.1, 2.0, 0.2};
+        /* its front is up: a light above shines on it */
+        assert_true(blocked(triangles, under, (const double[]){0, 1, 0}));
+        assert_int_equal(blocked(triangles, over, (const double[]){0, -1, 0}), !one_sided);
+        assert_int_equal(blocked(triangles, (const double[]){0.95, 0.0, 0.95}, (const double[]){0, 1, 0}),
+                         !masked);
+        vsh_triangles_free(triangles);
+    }
+    free(c);
+}
+
+/* --- what is refused */
+
+static void masks_that_are_none_are_refused(void **state) {
+    (void)state;
+    card *c = malloc(sizeof *c);
+    for (int i = 0; i < 8; ++i) {
+        make_card(c, 0.0f);
+        switch (i) {
+        case 0:
+            c->mask.alpha = NULL;
+            break;
+        case 1:
+            c->mask.width = 0;
+            break;
+        case 2:
+            c->mask.height = 1 << 16;
+            break;
+        case 3:
+            c->mask.wrap[1] = 3;
+            break;
+        case 4:
+            c->mask.uv_transform[5] = NAN;
+            break;
+        case 5:
+            c->mask.alpha_cutoff = -0.1;
+            break;
+        case 6:
+            c->mask.base_alpha = 1.5;
+            break;
+        default:
+            c->mesh.mask_uvs = NULL;
+            break;
+        }
+        vsh_triangles *triangles = NULL;
+        vsh_error error = {VSH_OK, ""};
+        assert_int_equal(vsh_triangles_create(&c->mesh, 1, NULL, &triangles, &error), VSH_ERROR_ARGUMENT);
+        assert_non_null(strstr(error.message, "'card'"));
+        assert_null(triangles);
+    }
+    free(c);
+}
+
+int main(void) {
+    const struct CMUnitTest traced[] = {
+        cmocka_unit_test(a_masked_card_casts_the_shadow_of_its_disc),
+        cmocka_unit_test(soft_shadows_and_ao_are_those_of_the_disc_as_triangles),
+        cmocka_unit_test(rays_see_wraps_transforms_cutoff_and_base_factor),
+        cmocka_unit_test(a_ray_sees_the_same_alone_and_in_any_packet),
+        cmocka_unit_test(no_beam_is_cut_by_what_is_masked_or_one_sided),
+        cmocka_unit_test(a_masked_box_holds_nothing),
+        cmocka_unit_test(a_one_sided_box_is_as_solid_as_any),
+        cmocka_unit_test(light_on_the_back_of_a_one_sided_face_comes_through),
+        cmocka_unit_test(masks_that_are_none_are_refused),
+    };
+    return vsh_triangles_available() ? cmocka_run_group_tests(traced, NULL, NULL) : 0;
+}

@@ -1,0 +1,135 @@
+/* What other languages call in place of callbacks that would be slow there. */
+#include "fields.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+
+typedef struct heard {
+    int calls, answer;
+    double last;
+    pthread_t thread;
+} heard;
+
+static int32_t listen(void *user, const char *stage, double fraction) {
+    heard *h = user;
+    assert_string_equal(stage, "stage");
+    ++h->calls;
+    h->last = fraction;
+    h->thread = pthread_self();
+    return h->answer;
+}
+
+static void progress_is_handed_on_at_both_ends_and_seldom_between(void **state) {
+    (void)state;
+    heard h = {0, 0, 0.0, pthread_self()};
+    vsh_progress_filter filter = vsh_progress_filter_default();
+    filter.progress = listen;
+    filter.user = &h;
+    filter.seconds = 1e6;
+    for (int i = 0; i <= 1000; ++i) {
+        assert_int_equal(vsh_progress_seldom(&filter, "stage", 0.001 * i), 0);
+    }
+    assert_int_equal(h.calls, 2);
+    assert_true(h.last == 1.0);
+    filter.seconds = 0.0;
+    assert_int_equal(vsh_progress_seldom(&filter, "stage", 0.5), 0);
+    assert_int_equal(h.calls, 3);
+    filter.progress = NULL;
+    assert_int_equal(vsh_progress_seldom(&filter, "stage", 0.5), 0);
+    assert_int_equal(vsh_progress_seldom(NULL, "stage", 0.5), 0);
+}
+
+static void an_answer_stays(void **state) {
+    (void)state;
+    heard h = {0, 7, 0.0, pthread_self()};
+    vsh_progress_filter filter = vsh_progress_filter_default();
+    filter.progress = listen;
+    filter.user = &h;
+    assert_int_equal(vsh_progress_seldom(&filter, "stage", 0.0), 7);
+    assert_int_equal(vsh_progress_seldom(&filter, "stage", 0.5), 7);
+    assert_int_equal(h.calls, 1);
+}
+
+static void *tell(void *filter) {
+    for (int i = 0; i <= 100; ++i) {
+        vsh_progress_seldom(filter, "stage", 0.01 * i);
+    }
+    return NULL;
+}
+
+static void one_thread_alone_hands_on(void **state) {
+    (void)state;
+    heard h = {0, 0, 0.0, pthread_self()};
+    vsh_progress_filter filter = vsh_progress_filter_default();
+    filter.progress = listen;
+    filter.user = &h;
+    filter.seconds = 0.0;
+    filter.thread = (uint64_t)pthread_self();
+    pthread_t other;
+    assert_int_equal(pthread_create(&other, NULL, tell, &filter), 0);
+    assert_int_equal(pthread_join(other, NULL), 0);
+    assert_int_equal(h.calls, 0);
+    tell(&filter);
+    assert_int_equal(h.calls, 101);
+    assert_true(pthread_equal(h.thread, pthread_self()));
+}
+
+static double ring(void *user, const double p[3]) {
+    (void)user;
+    return hypot(hypot(p[0], p[2]) - 0.7, p[1]) - 0.25;
+}
+
+static void rings(void *user, size_t count, const double *positions, double *distances) {
+    atomic_int *largest = user;
+    if ((int)count > atomic_load(largest)) {
+        atomic_store(largest, (int)count);
+    }
+    for (size_t i = 0; i < count; ++i) {
+        distances[i] = ring(NULL, positions + 3 * i);
+    }
+}
+
+/* Every distance of a box around it, bit by bit. */
+static void many_positions_at_once_give_the_same_level_set(void **state) {
+    (void)state;
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = 0.05;
+    for (int exact = 0; exact < 2; ++exact) {
+        atomic_int largest = 0;
+        vsh_distance field = {ring, &largest, 1.0, exact, {-1, -0.3, -1}, {1, 0.3, 1}};
+        vsh_grid *grids[2];
+        assert_int_equal(vsh_grid_from_distance(&field, &options, NULL, &grids[0], NULL), VSH_OK);
+        field.distance = NULL;
+        assert_int_equal(vsh_grid_from_distances(&field, rings, &options, NULL, &grids[1], NULL), VSH_OK);
+        assert_int_equal(atomic_load(&largest), 64);
+        const int32_t from[3] = {-24, -10, -24}, size[3] = {48, 20, 48};
+        static float values[2][48 * 20 * 48];
+        for (int i = 0; i < 2; ++i) {
+            assert_int_equal(vsh_grid_copy(grids[i], from, size, values[i], NULL), VSH_OK);
+            vsh_grid_free(grids[i]);
+        }
+        assert_memory_equal(values[0], values[1], sizeof values[0]);
+    }
+}
+
+static void without_a_callback_there_is_none(void **state) {
+    (void)state;
+    vsh_error error;
+    const vsh_distance field = {NULL, NULL, 1.0, 1, {-1, -1, -1}, {1, 1, 1}};
+    vsh_grid *grid = (vsh_grid *)&error;
+    assert_int_equal(vsh_grid_from_distances(&field, NULL, NULL, NULL, &grid, &error), VSH_ERROR_ARGUMENT);
+    assert_null(grid);
+    assert_int_equal(vsh_grid_from_distances(NULL, rings, NULL, NULL, &grid, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_grid_from_distances(&field, rings, NULL, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(progress_is_handed_on_at_both_ends_and_seldom_between),
+        cmocka_unit_test(an_answer_stays),
+        cmocka_unit_test(one_thread_alone_hands_on),
+        cmocka_unit_test(many_positions_at_once_give_the_same_level_set),
+        cmocka_unit_test(without_a_callback_there_is_none),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

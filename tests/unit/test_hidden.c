@@ -1,0 +1,319 @@
+/* What is hidden where surfaces touch: vsh_lightmap_fill_hidden(), and the tree that it asks. */
+#include "seams.h"
+
+#include "bake/places.h"
+
+/* --- the tree */
+
+static uint32_t nearest_of_all(const vshi_place *list, size_t count, const float at[3], float most) {
+    uint32_t best = UINT32_MAX;
+    for (size_t i = 0; i < count; ++i) {
+        float square = 0;
+        for (int k = 0; k < 3; ++k) {
+            square += (list[i].at[k] - at[k]) * (list[i].at[k] - at[k]);
+        }
+        if (square < most || (square == most && best != UINT32_MAX && list[i].number < best)) {
+            most = square;
+            best = list[i].number;
+        }
+    }
+    return best;
+}
+
+/* Places anywhere, on a plane, on a coarse lattice (many at one place), and all at one. */
+static void the_tree_finds_what_a_look_at_all_finds(void **state) {
+    (void)state;
+    enum { MOST = 1500 };
+    uint32_t seed = 5;
+    for (int kind = 0; kind < 4; ++kind) {
+        for (size_t count = 1; count <= MOST; count = count < 20 ? count + 1 : 5 * count) {
+            vshi_places places = {calloc(count, sizeof(vshi_place)), NULL, count};
+            vshi_place *list = calloc(count, sizeof *list);
+            for (size_t i = 0; i < count; ++i) {
+                for (int k = 0; k < 3; ++k) {
+                    const float x = random_value(&seed);
+                    list[i].at[k] = kind == 3             ? 1.0F
+                                    : kind == 2           ? floorf(5 * x)
+                                    : kind == 1 && k == 2 ? 0.0F
+                                                          : x;
+                }
+                list[i].number = (uint32_t)(count - i); /* not in the order of the list */
+            }
+            memcpy(places.list, list, count * sizeof *list);
+            assert_int_equal(vshi_places_sort(&places, NULL), VSH_OK);
+            for (int i = 0; i < 200; ++i) {
+                float at[3];
+                for (int k = 0; k < 3; ++k) {
+                    at[k] =
+                        kind == 2 ? floorf(11 * random_value(&seed)) / 2 : 1.4F * random_value(&seed) - 0.2F;
+                }
+                const float most = i % 2 ? INFINITY : 0.02F;
+                assert_int_equal(vshi_places_nearest(&places, at, most),
+                                 nearest_of_all(list, count, at, most));
+            }
+            vshi_places_free(&places);
+            free(list);
+        }
+    }
+}
+
+/* --- lightmaps */
+
+/* Three squares of the plane z = 0 in a row, each a chart of 12 texels: the middle one is hidden. Beside the
+ * first, in the lightmap, stands a fourth that is far away in the world. */
+enum { SEEN, HIDDEN_CHART, ACROSS, FAR, CHARTS, CHART_TEXELS = 12 };
+
+static const double corners[CHARTS][2] = {{4, 20}, {24, 20}, {44, 20}, {24, 37}};
+
+static charts_mesh *four_squares(void) {
+    charts_mesh *m = new_mesh();
+    for (int c = 0; c < CHARTS; ++c) {
+        add_square(m, c == FAR ? 40.0 : c, corners[c], CHART_TEXELS, 0.0, 1.0);
+    }
+    return m;
+}
+
+static vsh_texels *texels_of(const charts_mesh *m, int32_t padding) {
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = SIDE;
+    options.padding = padding;
+    vsh_texels *texels = NULL;
+    assert_int_equal(vsh_texels_create(&m->mesh, 1, &options, NULL, NULL, &texels, NULL), VSH_OK);
+    return texels;
+}
+
+/* Column and row of a texel in its chart (v downwards); -1: outside. */
+static int chart_at(size_t texel, int *column, int *row) {
+    const int x = (int)(texel % SIDE), y = (int)(texel / SIDE);
+    for (int c = 0; c < CHARTS; ++c) {
+        *column = x - (int)corners[c][0];
+        *row = y - ((int)corners[c][1] - CHART_TEXELS);
+        if (*column >= 0 && *column < CHART_TEXELS && *row >= 0 && *row < CHART_TEXELS) {
+            return c;
+        }
+    }
+    return -1;
+}
+
+/* 100 × chart + column + row / 100 where it is valid. */
+static float value_of(int chart, int column, int row) {
+    return (float)(100 * (chart + 1) + column) + (float)row / 100.0F;
+}
+
+typedef struct planes {
+    float *ao, *coverage, *light;
+} planes;
+
+static planes make_planes(int half) {
+    planes p = {new_plane(0.0F), new_plane(0.0F), calloc(3 * TEXELS, sizeof(float))};
+    for (size_t i = 0; i < TEXELS; ++i) {
+        int column, row;
+        const int chart = chart_at(i, &column, &row);
+        const int valid = chart >= 0 && (chart != HIDDEN_CHART || (half && column < 3));
+        p.coverage[i] = valid ? 1.0F : 0.0F;
+        p.ao[i] = valid ? value_of(chart, column, row) : -1.0F;
+        p.light[3 * i + 2] = p.ao[i];
+    }
+    return p;
+}
+
+static void free_planes(planes *p) {
+    free(p->ao);
+    free(p->coverage);
+    free(p->light);
+}
+
+static uint64_t fill(const vsh_texels *texels, const planes *p, int32_t threads) {
+    const vsh_lightmap map = {.ao = p->ao, .coverage = p->coverage, .irradiance = p->light};
+    vsh_run run = vsh_run_default();
+    uint64_t filled = UINT64_MAX;
+    vsh_error error = {0};
+    run.threads = threads;
+    if (vsh_lightmap_fill_hidden(texels, &map, 0, &run, &filled, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return filled;
+}
+
+static void a_hidden_chart_takes_the_nearest_values_of_the_world(void **state) {
+    (void)state;
+    charts_mesh *m = four_squares();
+    vsh_texels *texels = texels_of(m, 2);
+    planes p = make_planes(0);
+    assert_int_equal(fill(texels, &p, 1), CHART_TEXELS * CHART_TEXELS);
+    for (size_t i = 0; i < TEXELS; ++i) {
+        int column, row;
+        const int chart = chart_at(i, &column, &row);
+        assert_true(p.light[3 * i + 2] == p.ao[i] && p.light[3 * i] == 0);
+        if (chart < 0) {
+            continue;
+        }
+        /* the left half that of the last column before it, the right half that of the first after it */
+        const int left = column < CHART_TEXELS / 2;
+        const float wanted = chart != HIDDEN_CHART ? value_of(chart, column, row)
+                             : left                ? value_of(SEEN, CHART_TEXELS - 1, row)
+                                                   : value_of(ACROSS, 0, row);
+        if (p.ao[i] != wanted) {
+            fail_msg("chart %d, %d %d: %g, expected %g", chart, column, row, (double)p.ao[i], (double)wanted);
+        }
+        assert_true(p.coverage[i] == (chart != HIDDEN_CHART));
+    }
+    free_planes(&p);
+    vsh_texels_free(texels);
+    free(m);
+}
+
+static void what_is_empty_around_it_is_padded_as_far_as_it_is_the_nearest(void **state) {
+    (void)state;
+    charts_mesh *m = four_squares();
+    for (int32_t padding = 0; padding <= 6; padding += 2) {
+        vsh_texels *texels = texels_of(m, padding);
+        planes p = make_planes(0);
+        fill(texels, &p, 1);
+        const int reach = padding < 4 ? padding : 4, x = 24, y = 8; /* the chart's first texel */
+        for (int d = 1; d <= 6; ++d) {
+            const size_t left = (size_t)(y + 5) * SIDE + (size_t)(x - d);
+            const size_t above = (size_t)(y - d) * SIDE + (size_t)(x + 2);
+            assert_true(p.ao[above] == (d <= reach ? value_of(SEEN, CHART_TEXELS - 1, 0) : -1.0F));
+            assert_true(p.ao[left] == (d <= reach ? value_of(SEEN, CHART_TEXELS - 1, 5) : -1.0F));
+        }
+        /* five texels lie between it and the far one below: the middle one is of the one before */
+        for (int d = 0; d < 5; ++d) {
+            const size_t below = (size_t)(20 + d) * SIDE + (size_t)(x + 2);
+            const float wanted =
+                d < 2 && d < reach ? value_of(SEEN, CHART_TEXELS - 1, CHART_TEXELS - 1) : -1.0F;
+            if (d != 2) {
+                assert_true(p.ao[below] == wanted);
+            }
+        }
+        free_planes(&p);
+        vsh_texels_free(texels);
+    }
+    free(m);
+}
+
+static void a_chart_in_part_hidden_keeps_its_own_values_near_what_is_seen(void **state) {
+    (void)state;
+    charts_mesh *m = four_squares();
+    vsh_texels *texels = texels_of(m, 2);
+    planes p = make_planes(1);
+    for (size_t i = 0; i < TEXELS; ++i) { /* as the bake fills them */
+        int column, row;
+        if (chart_at(i, &column, &row) == HIDDEN_CHART && column >= 3) {
+            p.ao[i] = p.light[3 * i + 2] = value_of(HIDDEN_CHART, 2, row);
+        }
+    }
+    fill(texels, &p, 1);
+    for (size_t i = 0; i < TEXELS; ++i) {
+        int column, row;
+        if (chart_at(i, &column, &row) != HIDDEN_CHART || column < 3) {
+            continue;
+        }
+        /* the way to what is across (12 - column) is less than half of that to its own (column - 2) */
+        const int across = 2 * (12 - column) < column - 2;
+        const float wanted = across ? value_of(ACROSS, 0, row) : value_of(HIDDEN_CHART, 2, row);
+        if (p.ao[i] != wanted) {
+            fail_msg("%d %d: %g, expected %g", column, row, (double)p.ao[i], (double)wanted);
+        }
+    }
+    free_planes(&p);
+    vsh_texels_free(texels);
+    free(m);
+}
+
+/* The square that is across lies over the hidden one from its fifth column on. */
+static void what_lookups_beside_the_seen_read_is_its_own(void **state) {
+    (void)state;
+    charts_mesh *m = new_mesh();
+    static const double places[CHARTS] = {0.0, 1.0, 1.0 + 4.0 / CHART_TEXELS, 40.0};
+    for (int c = 0; c < CHARTS; ++c) {
+        add_square(m, places[c], corners[c], CHART_TEXELS, 0.0, 1.0);
+    }
+    vsh_texels *texels = texels_of(m, 2);
+    planes p = make_planes(1);
+    const int row = 5;
+    const size_t first = (size_t)(8 + row) * SIDE + 24;
+    for (size_t column = 3; column < CHART_TEXELS; ++column) {
+        p.ao[first + column] = value_of(HIDDEN_CHART, 2, row);
+    }
+    fill(texels, &p, 1);
+    for (int column = 3; column < 8; ++column) {
+        const float wanted = column == 5 ? value_of(ACROSS, 0, row) : value_of(HIDDEN_CHART, 2, row);
+        if (p.ao[first + (size_t)column] != wanted) {
+            fail_msg("%d: %g, expected %g", column, (double)p.ao[first + (size_t)column], (double)wanted);
+        }
+    }
+    free_planes(&p);
+    vsh_texels_free(texels);
+    free(m);
+}
+
+static void nothing_changes_where_all_is_seen_or_nothing(void **state) {
+    (void)state;
+    charts_mesh *m = four_squares();
+    vsh_texels *texels = texels_of(m, 2);
+    for (int seen = 0; seen < 2; ++seen) {
+        planes p = make_planes(0), q = make_planes(0);
+        for (size_t i = 0; i < TEXELS; ++i) {
+            p.coverage[i] = (float)seen;
+        }
+        assert_int_equal(fill(texels, &p, 1), 0);
+        assert_memory_equal(p.ao, q.ao, TEXELS * sizeof *p.ao);
+        free_planes(&p);
+        free_planes(&q);
+    }
+    vsh_texels_free(texels);
+    free(m);
+}
+
+static int32_t stop(void *user, const char *stage, double fraction) {
+    (void)user;
+    (void)stage;
+    (void)fraction;
+    return 1;
+}
+
+static void threads_limits_and_bad_calls(void **state) {
+    (void)state;
+    charts_mesh *m = four_squares();
+    vsh_texels *texels = texels_of(m, 2);
+    planes p = make_planes(0), q = make_planes(0);
+    fill(texels, &p, 1);
+    const vsh_lightmap map = {.ao = q.ao, .coverage = q.coverage}, none = {.ao = q.ao};
+    vsh_run run = vsh_run_default();
+    vsh_error error = {0};
+    run.memory_limit = 1000;
+    assert_int_equal(vsh_lightmap_fill_hidden(texels, &map, 0, &run, NULL, &error), VSH_ERROR_LIMIT);
+    assert_non_null(strstr(error.message, "hidden charts"));
+    run = vsh_run_default();
+    run.progress = stop;
+    assert_int_equal(vsh_lightmap_fill_hidden(texels, &map, 0, &run, NULL, &error), VSH_ERROR_CANCELLED);
+    assert_int_equal(vsh_lightmap_fill_hidden(texels, &none, 0, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_lightmap_fill_hidden(NULL, &map, 0, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_lightmap_fill_hidden(texels, NULL, 0, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
+    vsh_charts *charts = charts_of(&m->mesh, 1);
+    vsh_texels *band = NULL;
+    assert_int_equal(vsh_texels_create_band(charts, 0, 32, NULL, &band, NULL), VSH_OK);
+    assert_int_equal(vsh_lightmap_fill_hidden(band, &map, 0, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
+    vsh_texels_free(band);
+    vsh_charts_free(charts);
+    fill(texels, &q, 4); /* and none of these had changed it */
+    assert_memory_equal(p.ao, q.ao, TEXELS * sizeof *p.ao);
+    free_planes(&p);
+    free_planes(&q);
+    vsh_texels_free(texels);
+    free(m);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_tree_finds_what_a_look_at_all_finds),
+        cmocka_unit_test(a_hidden_chart_takes_the_nearest_values_of_the_world),
+        cmocka_unit_test(what_is_empty_around_it_is_padded_as_far_as_it_is_the_nearest),
+        cmocka_unit_test(a_chart_in_part_hidden_keeps_its_own_values_near_what_is_seen),
+        cmocka_unit_test(what_lookups_beside_the_seen_read_is_its_own),
+        cmocka_unit_test(nothing_changes_where_all_is_seen_or_nothing),
+        cmocka_unit_test(threads_limits_and_bad_calls),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

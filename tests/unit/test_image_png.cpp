@@ -1,0 +1,251 @@
+// PNG files as other programs see them: read by OpenImageIO, with no code of ours.
+#include <algorithm>
+#include <cmath>
+#include <csetjmp>
+#include <cstdarg>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
+#include <limits>
+#include <string>
+#include <unistd.h>
+#include <utility>
+#include <vector>
+
+#include <vdbshade/image.h>
+
+#include <OpenImageIO/imageio.h>
+
+extern "C" {
+#include <cmocka.h> // last: it has macros of common names
+}
+
+namespace {
+
+constexpr int WIDTH = 37, HEIGHT = 50;
+constexpr size_t TEXELS = WIDTH * HEIGHT;
+
+// From -0.25 to 1.5, what is none, and both infinities.
+float value_at(size_t channel, size_t texel) {
+    const size_t n = (texel * 7 + channel * 13) % 229;
+    return n == 226   ? std::numeric_limits<float>::quiet_NaN()
+           : n == 227 ? std::numeric_limits<float>::infinity()
+           : n == 228 ? -std::numeric_limits<float>::infinity()
+                      : static_cast<float>(n) / 129.0F - 0.25F;
+}
+
+struct Seen {
+    OIIO::ImageSpec spec;
+    std::string chunks;           // their types, in the order of the file: OpenImageIO takes some for granted
+    std::vector<uint16_t> values; // interleaved, as they stand in the file
+};
+
+std::string chunks_of(const std::string &path) {
+    std::ifstream file(path, std::ios::binary);
+    std::string types;
+    unsigned char head[8];
+    file.ignore(8); // the signature
+    while (file.read(reinterpret_cast<char *>(head), sizeof head)) {
+        types += std::string(reinterpret_cast<const char *>(head) + 4, 4) + " ";
+        file.ignore((head[0] << 24 | head[1] << 16 | head[2] << 8 | head[3]) + 4); // and its checksum
+    }
+    return types;
+}
+
+struct Asked {
+    explicit Asked(std::vector<const char *> channels) : names(std::move(channels)) {}
+    std::vector<const char *> names;
+    std::vector<int32_t> holds; // none: data
+    const char *pack = nullptr;
+    int32_t bits = 8;
+    int32_t color_space = VSH_COLOR_AUTO;
+    std::vector<vsh_attribute> attributes;
+};
+
+Asked packed(std::vector<const char *> names, const char *pack, int32_t bits) {
+    Asked asked(std::move(names));
+    asked.pack = pack;
+    asked.bits = bits;
+    return asked;
+}
+
+Asked irradiance(int32_t bits) {
+    Asked asked({"irradiance.R", "irradiance.G", "irradiance.B", "A"});
+    asked.holds = {VSH_CHANNEL_LIGHT, VSH_CHANNEL_LIGHT, VSH_CHANNEL_LIGHT, VSH_CHANNEL_DATA};
+    asked.bits = bits;
+    return asked;
+}
+
+Seen write_and_see(const Asked &asked) {
+    const std::string path = "png-" + std::to_string(getpid()) + ".png";
+    std::vector<std::vector<float>> planes(asked.names.size(), std::vector<float>(TEXELS));
+    std::vector<const float *> views;
+    for (size_t c = 0; c < planes.size(); ++c) {
+        for (size_t i = 0; i < TEXELS; ++i) {
+            planes[c][i] = value_at(c, i);
+        }
+        views.push_back(planes[c].data());
+    }
+    const vsh_image image = {WIDTH,
+                             HEIGHT,
+                             static_cast<int32_t>(asked.names.size()),
+                             asked.names.data(),
+                             views.data(),
+                             asked.holds.empty() ? nullptr : asked.holds.data()};
+    vsh_image_options options = vsh_image_options_default();
+    options.pack = asked.pack;
+    options.bits = asked.bits;
+    options.color_space = asked.color_space;
+    options.attributes = asked.attributes.data();
+    options.attribute_count = asked.attributes.size();
+    vsh_error error;
+    if (vsh_image_write(path.c_str(), &image, &options, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    const auto input = OIIO::ImageInput::create("png");
+    OIIO::ImageSpec config;
+    config.attribute("oiio:UnassociatedAlpha", 1); // else OpenImageIO multiplies colours by it
+    Seen seen;
+    assert_true(input != nullptr && input->open(path, seen.spec, config));
+    assert_int_equal(seen.spec.width, WIDTH);
+    assert_int_equal(seen.spec.height, HEIGHT);
+    assert_true(seen.spec.format == (asked.bits == 8 ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::UINT16));
+    const size_t count = TEXELS * static_cast<size_t>(seen.spec.nchannels);
+    seen.values.resize(count);
+    if (asked.bits == 16) {
+        assert_true(
+            input->read_image(0, 0, 0, seen.spec.nchannels, OIIO::TypeDesc::UINT16, seen.values.data()));
+    } else {
+        std::vector<uint8_t> bytes(count);
+        assert_true(input->read_image(0, 0, 0, seen.spec.nchannels, OIIO::TypeDesc::UINT8, bytes.data()));
+        std::copy(bytes.begin(), bytes.end(), seen.values.begin());
+    }
+    seen.chunks = chunks_of(path);
+    std::remove(path.c_str());
+    return seen;
+}
+
+double as_it_is(double value) {
+    return value;
+}
+
+double half_and_half(double value) {
+    return 0.5 + 0.5 * value;
+}
+
+double srgb(double value) { // IEC 61966-2-1
+    return value <= 0.0031308 ? 12.92 * value : 1.055 * std::pow(value, 1.0 / 2.4) - 0.055;
+}
+
+// A channel of the file is one of the image, -1 for zeros or -2 for ones.
+void assert_channel(const Seen &seen, size_t at, int channel, int32_t bits, double (*curve)(double)) {
+    const size_t count = static_cast<size_t>(seen.spec.nchannels);
+    const double most = bits == 8 ? 255.0 : 65535.0;
+    for (size_t i = 0; i < TEXELS; ++i) {
+        const auto value = static_cast<double>(channel >= 0 ? value_at(static_cast<size_t>(channel), i)
+                                                            : static_cast<float>(-1 - channel));
+        const double cut = value > 0.0 || curve == half_and_half ? std::min(value, 1.0) : 0.0;
+        const double expected = std::floor(std::clamp(curve(cut), 0.0, 1.0) * most + 0.5);
+        const double found = seen.values[i * count + at];
+        if (!(found == (std::isnan(value) ? 0.0 : expected))) {
+            fail_msg("channel %zu, texel %zu: %g is %g, expected %g", at, i, value, found, expected);
+        }
+    }
+}
+
+void values_are_those_that_were_given(void **) {
+    for (const int32_t bits : {8, 16}) {
+        const Seen three = write_and_see(packed({"shadow.sun", "ao"}, "R=ao,B=shadow.sun", bits));
+        assert_int_equal(three.spec.nchannels, 3);
+        assert_channel(three, 0, 1, bits, as_it_is);
+        assert_channel(three, 1, -1, bits, as_it_is);
+        assert_channel(three, 2, 0, bits, as_it_is);
+        const Seen four = write_and_see(packed({"shadow.sun", "ao", "A"}, "R=shadow.sun,G=ao,B=1,A=A", bits));
+        assert_int_equal(four.spec.nchannels, 4);
+        assert_int_equal(four.spec.alpha_channel, 3);
+        for (size_t c = 0; c < 4; ++c) { // colours are not multiplied by alpha, which is 0 at places
+            const int from[] = {0, 1, -2, 2};
+            assert_channel(four, c, from[c], bits, as_it_is);
+        }
+    }
+}
+
+void directions_are_half_and_one_half(void **) {
+    Asked asked = packed({"bent.x", "bent.y", "bent.z"}, "R=bent.x,G=bent.y,B=bent.z", 8);
+    asked.holds = {VSH_CHANNEL_VECTOR, VSH_CHANNEL_VECTOR, VSH_CHANNEL_VECTOR};
+    const Seen seen = write_and_see(asked);
+    for (size_t c = 0; c < 3; ++c) {
+        assert_channel(seen, c, static_cast<int>(c), 8, half_and_half);
+    }
+}
+
+void light_has_the_srgb_curve_and_says_so(void **) {
+    for (const int32_t bits : {8, 16}) {
+        const Seen seen = write_and_see(irradiance(bits));
+        for (size_t c = 0; c < 4; ++c) {
+            assert_channel(seen, c, static_cast<int>(c), bits, c < 3 ? srgb : as_it_is);
+        }
+        assert_true(seen.chunks.rfind("IHDR gAMA sRGB cHRM tEXt ", 0) == 0);
+        assert_string_equal(seen.spec.get_string_attribute("vdbshade_color_space").c_str(), "sRGB");
+    }
+}
+
+// A gamma chunk, or one of colours, would have them undone.
+void data_has_no_color_space(void **) {
+    Asked asked = irradiance(8);
+    asked.color_space = VSH_COLOR_LINEAR;
+    for (const Seen &seen : {write_and_see(asked), write_and_see(Asked({"shadow.sun", "A"}))}) {
+        assert_string_equal(seen.spec.get_string_attribute("vdbshade_color_space").c_str(), "linear");
+        assert_true(seen.chunks.rfind("IHDR tEXt tEXt IDAT ", 0) == 0);
+        assert_channel(seen, 0, 0, 8, as_it_is);
+    }
+}
+
+// Once each, in any script, and as long as they may be.
+void texts_are_those_that_were_given(void **) {
+    const std::string software = std::string("vdbshade ") + vsh_version(), longest(65535, 'x'), name(79, 'n');
+    Asked asked({"shadow.sun"});
+    asked.attributes = {{"vdbshade_command", "bake größe.obj"},
+                        {"vdbshade_color_space", "none of the caller's"},
+                        {"empty", ""},
+                        {name.c_str(), longest.c_str()}};
+    const Seen seen = write_and_see(asked);
+    assert_string_equal(seen.spec.get_string_attribute("Software").c_str(), software.c_str());
+    assert_string_equal(seen.spec.get_string_attribute("vdbshade_command").c_str(), "bake größe.obj");
+    assert_string_equal(seen.spec.get_string_attribute("vdbshade_color_space").c_str(), "linear");
+    assert_true(seen.spec.get_string_attribute(name) == longest);
+    assert_true(seen.chunks.rfind("IHDR tEXt tEXt tEXt tEXt tEXt IDAT ", 0) == 0);
+    asked.attributes = {{"Software", "a host of ours"}};
+    const Seen other = write_and_see(asked);
+    assert_string_equal(other.spec.get_string_attribute("Software").c_str(), "a host of ours");
+    assert_true(other.chunks.rfind("IHDR tEXt tEXt IDAT ", 0) == 0);
+}
+
+void the_longest_row_is_written(void **) {
+    std::vector<float> plane(1000000, 0.25F);
+    const char *name = "shadow.sun", *const path = "png-long.png";
+    const float *view = plane.data();
+    vsh_image image = {1000000, 1, 1, &name, &view, NULL};
+    vsh_error error;
+    assert_int_equal(vsh_image_write(path, &image, nullptr, &error), VSH_OK);
+    const auto input = OIIO::ImageInput::open(path);
+    assert_true(input != nullptr && input->spec().width == 1000000);
+    std::remove(path);
+    image.width = 1000001;
+    assert_int_equal(vsh_image_check(path, &image, nullptr, &error), VSH_ERROR_ARGUMENT);
+}
+
+} // namespace
+
+int main() {
+    const CMUnitTest tests[] = {
+        cmocka_unit_test(values_are_those_that_were_given),
+        cmocka_unit_test(directions_are_half_and_one_half),
+        cmocka_unit_test(light_has_the_srgb_curve_and_says_so),
+        cmocka_unit_test(data_has_no_color_space),
+        cmocka_unit_test(texts_are_those_that_were_given),
+        cmocka_unit_test(the_longest_row_is_written),
+    };
+    return cmocka_run_group_tests(tests, nullptr, nullptr);
+}

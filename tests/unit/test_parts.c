@@ -1,0 +1,337 @@
+/* Parts of lightmaps and volumes, by the library: what merging takes, and that no file makes it do worse than
+ * fail. */
+#include "images.h"
+
+#include "base/part_file.h"
+#include "base/part_sum.h"
+
+#include <vdbshade/vdbshade.h>
+
+enum { SIZE = 48, SHARDS = 2, CHANNELS = 6 };
+
+static const float corners[4][3] = {{-2, 0, -2}, {2, 0, -2}, {2, 0, 2}, {-2, 0, 2}};
+
+/* A floor under a ball, in files of this run's folder; some of the floor is within the ball. */
+typedef struct case_scene {
+    char mesh[300], output[300];
+    vsh_sdf_node ball;
+    vsh_caster caster;
+    vsh_light sun;
+    vsh_receiver receiver;
+    vsh_scene scene;
+} case_scene;
+
+static void fill(case_scene *c) {
+    memset(c, 0, sizeof *c);
+    snprintf(c->mesh, sizeof c->mesh, "%s", at("floor.obj"));
+    snprintf(c->output, sizeof c->output, "%s", at("floor.exr"));
+    FILE *file = fopen(c->mesh, "wb");
+    assert_non_null(file);
+    for (int i = 0; i < 4; ++i) {
+        fprintf(file, "v %g %g %g\nvt %d %d\n", (double)corners[i][0], (double)corners[i][1],
+                (double)corners[i][2], i == 1 || i == 2, i < 2);
+    }
+    fprintf(file, "f 1/1 3/3 2/2\nf 1/1 4/4 3/3\n");
+    assert_int_equal(fclose(file), 0);
+    c->scene = vsh_scene_default();
+    c->receiver = vsh_receiver_default();
+    c->ball = vsh_sdf_node_default();
+    c->ball.radius = 0.6;
+    c->caster.type = VSH_CASTER_SDF;
+    c->caster.sdf = (vsh_sdf){&c->ball, 1};
+    for (int i = 0; i < 12; ++i) {
+        c->caster.transform[i] = c->receiver.transform[i] = i % 5 == 0 ? 1.0 : 0.0;
+    }
+    c->caster.transform[7] = 0.4;
+    c->sun = vsh_light_default();
+    c->sun.angle = 0.1;
+    c->receiver.path = c->mesh;
+    c->receiver.output = c->output;
+    c->receiver.width = c->receiver.height = SIZE;
+    c->receiver.ao_spacing = 1;
+    c->scene.casters = &c->caster;
+    c->scene.caster_count = 1;
+    c->scene.lights = &c->sun;
+    c->scene.light_count = 1;
+    c->scene.receivers = &c->receiver;
+    c->scene.receiver_count = 1;
+    c->scene.ao = c->scene.irradiance = 1;
+    c->scene.grid.resolution = 24;
+    c->scene.shade.method = VSH_SHADOW_CONE;
+    c->scene.shade.ao_method = VSH_AO_CONES;
+    c->scene.shade.ao_distance = 1.0;
+}
+
+/* Rows as they come. */
+typedef struct taken {
+    float values[CHANNELS][SIZE * SIZE];
+    int32_t rows;
+} taken;
+
+static vsh_result begin(void *user, const vsh_job_lightmap *lightmap, const vsh_image *image,
+                        vsh_error *error) {
+    (void)lightmap;
+    (void)error;
+    taken *t = user;
+    t->rows = 0;
+    assert_int_equal(image->channel_count, CHANNELS);
+    return VSH_OK;
+}
+
+static vsh_result add(void *user, int32_t rows, const float *const *planes, vsh_error *error) {
+    (void)error;
+    taken *t = user;
+    assert_true(t->rows + rows <= SIZE);
+    for (int32_t c = 0; c < CHANNELS; ++c) {
+        memcpy(t->values[c] + t->rows * SIZE, planes[c], (size_t)rows * SIZE * sizeof(float));
+    }
+    t->rows += rows;
+    return VSH_OK;
+}
+
+static vsh_result end(void *user, vsh_result result, vsh_error *error) {
+    (void)user;
+    (void)error;
+    return result;
+}
+
+static vsh_row_sink sink_of(taken *t) {
+    return (vsh_row_sink){sizeof(vsh_row_sink), begin, add, end, t};
+}
+
+static void bake_parts(const case_scene *c) {
+    static const char *const words[] = {"one", "", "three words"};
+    for (int32_t i = 1; i <= SHARDS; ++i) {
+        vsh_bake_job_options options = vsh_bake_job_options_default();
+        options.shard = i;
+        options.shard_count = SHARDS;
+        options.words = words;
+        options.word_count = 3;
+        vsh_error error;
+        assert_ok(vsh_bake_scene(&c->scene, &options, NULL, NULL, &error), &error);
+    }
+}
+
+static vsh_result merge(const case_scene *c, taken *t, const vsh_run *run, vsh_error *error) {
+    const vsh_row_sink sink = sink_of(t);
+    vsh_bake_job_options options = vsh_bake_job_options_default();
+    options.sink = &sink;
+    vsh_bake_job *job = NULL;
+    vsh_result result = vsh_bake_job_create(&c->scene, &options, run, &job, error);
+    result = result == VSH_OK ? vsh_bake_job_merge(job, run, error) : result;
+    vsh_bake_job_free(job);
+    return result;
+}
+
+static void a_sink_takes_merged_rows_as_of_one_bake_and_words_come_back(void **state) {
+    (void)state;
+    case_scene c;
+    fill(&c);
+    taken *one = calloc(2, sizeof *one), *all = one + 1;
+    assert_non_null(one);
+    const vsh_row_sink sink = sink_of(one);
+    vsh_bake_job_options options = vsh_bake_job_options_default();
+    options.sink = &sink;
+    vsh_error error;
+    vsh_bake_report report;
+    assert_ok(vsh_bake_scene(&c.scene, &options, NULL, &report, &error), &error);
+    assert_true(report.invalid_texels > 20 && report.invalid_texels < SIZE * SIZE / 2);
+    bake_parts(&c);
+    assert_ok(merge(&c, all, NULL, &error), &error);
+    assert_int_equal(all->rows, SIZE);
+    assert_memory_equal(one->values, all->values, sizeof one->values);
+    char **words;
+    size_t count;
+    assert_ok(vsh_part_words(c.output, 0, NULL, &words, &count, &error), &error);
+    assert_int_equal(count, 3);
+    assert_string_equal(words[0], "one");
+    assert_string_equal(words[1], "");
+    assert_string_equal(words[2], "three words");
+    assert_null(words[3]);
+    vsh_part_words_free(words);
+    free(one);
+}
+
+static void a_job_of_a_part_is_refused_what_it_cannot_do(void **state) {
+    (void)state;
+    case_scene c;
+    fill(&c);
+    taken t;
+    const vsh_row_sink sink = sink_of(&t);
+    static const int32_t wrong[][2] = {{1, 0}, {2, 1}, {-1, 3}, {1, 10001}, {1, -1}};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0] + 2; ++i) {
+        vsh_bake_job_options options = vsh_bake_job_options_default();
+        options.shard = i < 5 ? wrong[i][0] : 1;
+        options.shard_count = i < 5 ? wrong[i][1] : 2;
+        options.sink = i == 5 ? &sink : NULL;
+        options.word_count = i == 6;
+        vsh_bake_job *job = NULL;
+        vsh_error error;
+        assert_int_equal(vsh_bake_job_create(&c.scene, &options, NULL, &job, &error), VSH_ERROR_ARGUMENT);
+        assert_null(job);
+    }
+}
+
+/* --- files of strangers */
+
+typedef struct bytes {
+    unsigned char *at;
+    size_t size;
+} bytes;
+
+static bytes read_file(const char *path) {
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    fseek(file, 0, SEEK_END);
+    bytes b = {.size = (size_t)ftell(file)};
+    rewind(file);
+    b.at = malloc(b.size);
+    assert_non_null(b.at);
+    assert_int_equal(fread(b.at, 1, b.size, file), b.size);
+    fclose(file);
+    return b;
+}
+
+/* With a checksum that is right. */
+static void write_file(const char *path, const bytes *b) {
+    const size_t body = b->size - sizeof(uint64_t);
+    const uint64_t sum = vshi_part_sum(VSHI_PART_SUM, b->at, body);
+    memcpy(b->at + body, &sum, sizeof sum);
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(b->at, 1, b->size, file), b->size);
+    assert_int_equal(fclose(file), 0);
+}
+
+typedef vsh_result merge_fn(void *user, vsh_error *error);
+
+/* Changes every byte of the head, of the tail, and some of what lies between, to what is worst for a number
+ * of it. What is refused is refused by the part's name. */
+static void try_all(const char *path, merge_fn *merge_it, void *user) {
+    static const unsigned char worst[] = {0x00, 0x01, 0x7f, 0x80, 0xff};
+    const bytes good = read_file(path);
+    bytes bad = {malloc(good.size), good.size};
+    assert_non_null(bad.at);
+    vshi_part_front front;
+    memcpy(&front, good.at, sizeof front);
+    const size_t head = sizeof front + (size_t)front.head_bytes;
+    const size_t tail = good.size - sizeof(uint64_t) - (size_t)front.tail_bytes;
+    size_t refused = 0, taken_all_the_same = 0;
+    for (size_t at = 0; at < good.size - sizeof(uint64_t); at += at < head
+                                                                     ? 1 + (at > sizeof front ? at % 3 : 0)
+                                                                 : at < tail ? (tail - head) / 30 + 1
+                                                                             : 5) {
+        memcpy(bad.at, good.at, good.size);
+        bad.at[at] = worst[at % sizeof worst] != good.at[at] ? worst[at % sizeof worst] : 0xaa;
+        write_file(path, &bad);
+        vsh_error error = {VSH_OK, ""};
+        const vsh_result result = merge_it(user, &error);
+        if (result == VSH_OK) {
+            ++taken_all_the_same; /* a value, a count, a text of nobody's */
+        } else if ((result != VSH_ERROR_INPUT && result != VSH_ERROR_READ && result != VSH_ERROR_LIMIT) ||
+                   strstr(error.message, strrchr(path, '/') + 1) == NULL) {
+            fail_msg("byte %zu: %s '%s'", at, vsh_result_name(result), error.message);
+        } else {
+            ++refused;
+        }
+    }
+    assert_true(refused > 100 && taken_all_the_same > 10);
+    memcpy(bad.at, good.at, good.size);
+    write_file(path, &bad);
+    vsh_error error;
+    assert_ok(merge_it(user, &error), &error);
+    free(bad.at);
+    free(good.at);
+}
+
+typedef struct bake_case {
+    case_scene *scene;
+    taken *rows;
+    vsh_run run;
+} bake_case;
+
+static vsh_result merge_bake(void *user, vsh_error *error) {
+    const bake_case *c = user;
+    return merge(c->scene, c->rows, &c->run, error);
+}
+
+static void no_part_of_a_lightmap_does_worse_than_fail(void **state) {
+    (void)state;
+    case_scene c;
+    fill(&c);
+    bake_parts(&c);
+    bake_case one = {&c, calloc(1, sizeof(taken)), vsh_run_default()};
+    assert_non_null(one.rows);
+    one.run.memory_limit = 64 << 20;
+    one.run.threads = 1;
+    try_all(at("floor.exr.2-of-2.part"), merge_bake, &one);
+    free(one.rows);
+}
+
+typedef struct volume_case {
+    vsh_voxels *voxels;
+    vsh_light sun;
+    vsh_volume_options options;
+    vsh_part_options parts;
+    vsh_run run;
+} volume_case;
+
+static vsh_result merge_volume(void *user, vsh_error *error) {
+    const volume_case *c = user;
+    vsh_volume *volume = NULL;
+    const vsh_result result =
+        vsh_volume_merge(c->voxels, &c->sun, 1, &c->options, &c->parts, &c->run, &volume, NULL, error);
+    vsh_volume_free(volume);
+    return result;
+}
+
+static void no_part_of_a_volume_does_worse_than_fail(void **state) {
+    (void)state;
+    vsh_sdf_node ball = vsh_sdf_node_default();
+    ball.radius = 0.5;
+    const vsh_sdf sdf = {&ball, 1};
+    static const double low[3] = {-1, -1, -1}, high[3] = {1, 1, 1};
+    static const vsh_attribute attribute = {"of", "a ball"};
+    char name[300];
+    snprintf(name, sizeof name, "%s", at("ball.vdb"));
+    vsh_grid_options resolution = vsh_grid_options_default();
+    resolution.resolution = 16;
+    vsh_error error;
+    vsh_grid *grid = NULL;
+    vsh_occluders *occluders = NULL;
+    volume_case c = {.sun = vsh_light_default(),
+                     .options = vsh_volume_options_default(),
+                     .parts = vsh_part_options_default(),
+                     .run = vsh_run_default()};
+    c.run.memory_limit = 64 << 20;
+    c.run.threads = 1;
+    assert_ok(vsh_grid_from_sdf(&sdf, &resolution, NULL, &grid, &error), &error);
+    assert_ok(vsh_occluders_from_grid(grid, NULL, NULL, &occluders, &error), &error);
+    assert_ok(vsh_voxels_from_box(low, high, 0.1, NULL, &c.voxels, &error), &error);
+    c.parts.parts = name;
+    c.parts.shard_count = SHARDS;
+    c.parts.attributes = &attribute;
+    c.parts.attribute_count = 1;
+    for (c.parts.shard = 1; c.parts.shard <= SHARDS; ++c.parts.shard) {
+        assert_ok(
+            vsh_bake_volume_part(occluders, c.voxels, &c.sun, 1, &c.options, &c.parts, NULL, NULL, &error),
+            &error);
+    }
+    try_all(at("ball.vdb.2-of-2.part"), merge_volume, &c);
+    vsh_occluders_info casters;
+    assert_ok(vsh_volume_part_casters(name, 0, NULL, &casters, &error), &error);
+    assert_true(casters.voxel_size > 0.0);
+    vsh_voxels_free(c.voxels);
+    vsh_occluders_free(occluders);
+    vsh_grid_free(grid);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_sink_takes_merged_rows_as_of_one_bake_and_words_come_back),
+        cmocka_unit_test(a_job_of_a_part_is_refused_what_it_cannot_do),
+        cmocka_unit_test(no_part_of_a_lightmap_does_worse_than_fail),
+        cmocka_unit_test(no_part_of_a_volume_does_worse_than_fail),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
