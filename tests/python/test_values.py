@@ -1,4 +1,5 @@
 """Values are those of the command line and of C, bit by bit, whatever the arrays' layouts."""
+import json
 import subprocess
 import threading
 import unittest
@@ -6,7 +7,7 @@ import unittest
 import numpy
 
 import vdbshade
-from common import ASSETS, POINTS, VDBSHADE, Case, box, floor, points_on_floor, sun
+from common import ASSETS, FLOOR, FLOOR_TRIANGLES, FLOOR_UVS, POINTS, VDBSHADE, Case, box, floor, points_on_floor, sun
 
 LIT = dict(direction=(0.6, 0.75, 0.5), angle=numpy.radians(3.0))
 
@@ -43,6 +44,58 @@ class Values(Case):
         lit = vdbshade.image_read(self.folder / "py.exr")
         self.assertIn("shadow.sun", lit)
         self.assertIn("vdbshade_input_0", lit.attributes)
+
+    def test_light_comes_through_what_is_cut_out_or_seen_from_its_back(self):
+        sheet, up = FLOOR + numpy.float32([0, 1, 0]), sun(direction=(0, 1, 0), angle=0.01)
+        positions, normals = points_on_floor(200)
+        positions *= [0.9, 1, 0.9]  # none under the sheet's rim, nor of its mask's
+        positions = positions[numpy.abs(positions[:, 0]) > 0.3]
+        normals = normals[: len(positions)]
+
+        def seen(triangles=FLOOR_TRIANGLES, **members):
+            mesh = vdbshade.Mesh(sheet, triangles, **members)
+            return vdbshade.trace_shadow(positions, normals, up, triangles=vdbshade.Triangles(mesh), rays=16)
+        backs = FLOOR_TRIANGLES[:, ::-1]
+        self.assertFalse(seen().any() or seen(backs).any() or seen(one_sided=True).any())
+        self.assertTrue((seen(backs, one_sided=True) == 1).all())
+        alpha = numpy.zeros((8, 8), numpy.uint8)
+        alpha[:, 4:] = 255
+        mask = vdbshade.AlphaMask(alpha, wrap=("clamp", "repeat"))
+        self.assertSame(seen(mask=mask, mask_uvs=FLOOR_UVS), (positions[:, 0] < 0).astype(numpy.float32))
+        mirrored = vdbshade.AlphaMask(alpha, wrap=("mirror", "clamp"), uv_transform=[[1, 0, 1], [0, 1, 0]])
+        self.assertSame(seen(mask=mirrored, mask_uvs=FLOOR_UVS), (positions[:, 0] > 0).astype(numpy.float32))
+        half = vdbshade.AlphaMask(alpha, base_alpha=0.25)
+        self.assertTrue((seen(mask=half, mask_uvs=FLOOR_UVS) == 1).all())
+        mesh = vdbshade.Mesh(sheet, FLOOR_TRIANGLES, mask=mask, mask_uvs=FLOOR_UVS, one_sided=True, material_name="leaf", uvs=FLOOR_UVS)
+        laid = vdbshade.unwrap(mesh, width=32, height=32)[0]
+        same = laid.of(mesh)
+        self.assertEqual((same.mask, same.one_sided, same.material_name), (mask, True, "leaf"))
+        self.assertSame(same.mask_uvs, FLOOR_UVS[laid.sources])
+        with self.assertRaisesRegex(ValueError, "expected both, or none"):
+            vdbshade.Mesh(sheet, FLOOR_TRIANGLES, mask=mask)
+        with self.assertRaisesRegex(TypeError, "vdbshade.AlphaMask, got ndarray"):
+            vdbshade.Mesh(sheet, FLOOR_TRIANGLES, mask=alpha, mask_uvs=FLOOR_UVS)
+
+    def test_what_a_file_says_of_masks_and_sides_is_read(self):
+        path = self.folder / "leaf.gltf"
+        vdbshade.lit_write(path, vdbshade.Model(ASSETS / "seeds_floor.obj"), [])
+        alpha = numpy.zeros((4, 4), numpy.float32)
+        alpha[0, 2:] = 1
+        vdbshade.image_write(self.folder / "leaf.png", dict(R=alpha, G=alpha, B=alpha, A=alpha), color_space="linear")
+        document = json.loads(path.read_text())
+        document.update(images=[dict(uri="leaf.png")], textures=[dict(source=0, sampler=0)], samplers=[dict(wrapS=33071)],
+                        materials=[dict(name="leaf", alphaMode="MASK", alphaCutoff=0.25,
+                                        pbrMetallicRoughness=dict(baseColorTexture=dict(index=0)))])
+        for primitive in document["meshes"][0]["primitives"]:
+            primitive["material"] = 0
+        path.write_text(json.dumps(document))
+        scene = vdbshade.Scene(casters=[dict(path=path, one_sided="leaf")], lights=[sun()])
+        (mesh,) = vdbshade.Assets(scene).caster(0)
+        self.assertEqual((mesh.one_sided, mesh.material_name, mesh.alpha), (True, "leaf", "masked"))
+        self.assertEqual((mesh.mask.wrap, mesh.mask.alpha_cutoff, mesh.mask.base_alpha), (("clamp", "repeat"), 0.25, 1.0))
+        self.assertTrue(numpy.array_equal(mesh.mask.alpha, alpha * 255))
+        self.assertEqual((mesh.mask_uvs.shape, mesh.mask.uv_transform.tolist()), ((len(mesh.positions), 2), [[1, 0, 0], [0, 1, 0]]))
+        self.assertFalse(vdbshade.Model(path)[0].one_sided)
 
     def test_points_have_the_bits_of_c(self):
         model = vdbshade.Model(ASSETS / "cloister.glb")
