@@ -185,12 +185,27 @@ def run_of(run: Optional[Run]) -> Run:
 class Running:
     """A call that is in C: what its callbacks raised, and the warnings that came."""
 
-    __slots__ = ("run", "raised", "messages", "outer", "__weakref__")
+    __slots__ = ("run", "raised", "messages", "outer", "open", "__weakref__")
 
     def __init__(self, run: Run, outer: "Optional[Running]") -> None:
         self.run, self.outer = run, outer
         self.raised: Optional[BaseException] = None
         self.messages: List[str] = []
+        self.open: Optional[str] = None  # the stage whose end was not told: another thread came to it
+
+    def tell(self, stage: str, fraction: float) -> bool:
+        """Tells how far a stage is; True: it is to stop."""
+        progress, before = self.run.progress, self.open
+        if progress is None:
+            return False
+        self.open = stage if fraction < 1.0 else None
+        stops = before is not None and before != stage and bool(progress(before, 1.0))
+        return bool(progress(stage, fraction)) or stops
+
+    def finish(self) -> None:
+        """Tells the end of the last stage of a call that is done; too late to stop."""
+        if self.open is not None:
+            self.tell(self.open, 1.0)
 
 
 _in_thread = threading.local()
@@ -213,8 +228,7 @@ def _progress(user: Any, stage: Any, fraction: float) -> int:
     running = ffi.from_handle(user)
     if running.raised is not None:
         return 1
-    progress = running.run.progress
-    return 1 if progress is not None and progress(ffi.string(stage).decode(), fraction) else 0
+    return 1 if running.tell(ffi.string(stage).decode(), fraction) else 0
 
 
 @ffi.callback("vsh_warning_fn *", onerror=note)
@@ -261,6 +275,7 @@ def call(function: Any, *arguments: Any, run: Optional[Run] = None, made: Any = 
         raise running.raised
     if result != 0:
         fail(result, error)
+    running.finish()
     return owned
 
 
