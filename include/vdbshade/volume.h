@@ -71,7 +71,8 @@ VSH_API vsh_result vsh_bake_volume_part(const vsh_occluders *occluders, const vs
 /* Puts the parts of all shards together, which were baked of these voxels, lights and options: the same
  * volume as vsh_bake_volume() makes, bit by bit. Errors: as there, but of occluders; VSH_ERROR_READ (a part
  * is missing), VSH_ERROR_INPUT (there are none; one is damaged, or of other voxels, attributes or another
- * version, which it names). */
+ * version, which it names). Other lights and options are noticed by attributes that tell of them, as those of
+ * vsh_provenance_create() do; without, they are the caller's to keep. */
 VSH_API vsh_result vsh_volume_merge(const vsh_voxels *voxels, const vsh_light *lights, size_t light_count,
                                     const vsh_volume_options *options, const vsh_part_options *parts,
                                     const vsh_run *run, vsh_volume **volume, vsh_shade_stats *stats,

@@ -18,21 +18,6 @@ typedef struct elements {
     unsigned char *owned; /* of a sparse one: made dense; may be NULL */
 } elements;
 
-static uint32_t index_at(const unsigned char *at, int type) {
-    uint16_t two;
-    uint32_t four;
-    switch (type) {
-    case VSHI_GLTF_UBYTE:
-        return *at;
-    case VSHI_GLTF_USHORT:
-        memcpy(&two, at, sizeof two);
-        return two;
-    default:
-        memcpy(&four, at, sizeof four);
-        return four;
-    }
-}
-
 static vsh_result make_dense(vshi_lit_document *document, const vshi_gltf_accessor *accessor, elements *made,
                              vsh_error *error) {
     VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)&made->owned, accessor->count, made->size, error));
@@ -41,7 +26,8 @@ static vsh_result make_dense(vshi_lit_document *document, const vshi_gltf_access
     }
     const size_t index_size = vshi_gltf_component_size(accessor->sparse_type);
     for (size_t i = 0; i < accessor->sparse_count; ++i) {
-        const size_t index = index_at(accessor->sparse_at + i * index_size, accessor->sparse_type);
+        const size_t index =
+            vshi_gltf_integer_at(accessor->sparse_at + i * index_size, accessor->sparse_type);
         memcpy(made->owned + index * made->size, accessor->sparse_values + i * made->size, made->size);
     }
     made->at = made->owned;
@@ -88,7 +74,7 @@ static double component_at(const unsigned char *at, int type) {
         memcpy(&number, at, sizeof number);
         return (double)number;
     default:
-        return (double)index_at(at, type);
+        return (double)vshi_gltf_integer_at(at, type);
     }
 }
 

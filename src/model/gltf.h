@@ -114,6 +114,9 @@ enum {
 /* Bytes of a component of a type VSHI_GLTF_…; 0 of every other. */
 size_t vshi_gltf_component_size(int type);
 
+/* The component at `at`, of an unsigned type. */
+size_t vshi_gltf_integer_at(const unsigned char *at, int type);
+
 typedef struct vshi_gltf_accessor {
     size_t count;
     int components; /* 1 … 16 */

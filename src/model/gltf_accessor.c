@@ -54,7 +54,7 @@ static vsh_result place(vshi_gltf *gltf, const char *where, size_t view, size_t 
     return VSH_OK;
 }
 
-static size_t integer_at(const unsigned char *at, int type) {
+size_t vshi_gltf_integer_at(const unsigned char *at, int type) {
     uint16_t two;
     uint32_t four;
     switch (type) {
@@ -98,7 +98,7 @@ static vsh_result open_sparse(vshi_gltf *gltf, const json_t *sparse, const char 
     VSHI_TRY(place(gltf, where, value_view, value_offset, count, value_size, &accessor->sparse_values,
                    &stride, error));
     for (size_t i = 0; i < count; ++i) {
-        const size_t index = integer_at(accessor->sparse_at + i * index_size, (int)type);
+        const size_t index = vshi_gltf_integer_at(accessor->sparse_at + i * index_size, (int)type);
         if (index >= accessor->count) {
             return vshi_gltf_fail(gltf, error, "%s: sparse index %zu of %zu is %zu, but it has %zu elements",
                                   where, i, count, index, accessor->count);
@@ -197,7 +197,7 @@ void vshi_gltf_accessor_floats(const vshi_gltf_accessor *a, float *values) {
     const size_t index_size = vshi_gltf_component_size(a->sparse_type);
     const size_t value_size = n * vshi_gltf_component_size(a->type);
     for (size_t i = 0; i < a->sparse_count; ++i) {
-        const size_t index = integer_at(a->sparse_at + i * index_size, a->sparse_type);
+        const size_t index = vshi_gltf_integer_at(a->sparse_at + i * index_size, a->sparse_type);
         element(a, a->sparse_values + i * value_size, values + n * index);
     }
 }
@@ -211,14 +211,15 @@ void vshi_gltf_accessor_integers(const vshi_gltf_accessor *a, uint32_t *values) 
     for (size_t i = 0; !plain && i < a->count; ++i) {
         for (size_t k = 0; k < n; ++k) {
             values[n * i + k] =
-                a->at != NULL ? (uint32_t)integer_at(a->at + i * a->stride + k * size, a->type) : 0;
+                a->at != NULL ? (uint32_t)vshi_gltf_integer_at(a->at + i * a->stride + k * size, a->type) : 0;
         }
     }
     const size_t index_size = vshi_gltf_component_size(a->sparse_type);
     for (size_t i = 0; i < a->sparse_count; ++i) {
-        const size_t index = integer_at(a->sparse_at + i * index_size, a->sparse_type);
+        const size_t index = vshi_gltf_integer_at(a->sparse_at + i * index_size, a->sparse_type);
         for (size_t k = 0; k < n; ++k) {
-            values[n * index + k] = (uint32_t)integer_at(a->sparse_values + (n * i + k) * size, a->type);
+            values[n * index + k] =
+                (uint32_t)vshi_gltf_integer_at(a->sparse_values + (n * i + k) * size, a->type);
         }
     }
 }

@@ -1,66 +1,7 @@
 /* A scene's lightmaps, from its files to its rows, by one call and by steps. */
-#include "images.h"
-
-#include <vdbshade/bake_scene.h>
+#include "floor_under_ball.h"
 
 enum { SIZE = 48 };
-
-static const float corners[4][3] = {{-2, 0, -2}, {2, 0, -2}, {2, 0, 2}, {-2, 0, 2}};
-
-/* A floor under a ball, in files of this run's folder. */
-typedef struct case_scene {
-    char mesh[300], output[300];
-    vsh_sdf_node ball;
-    vsh_caster caster;
-    vsh_light sun;
-    vsh_receiver receiver;
-    vsh_scene scene;
-} case_scene;
-
-static void fill(case_scene *c) {
-    memset(c, 0, sizeof *c);
-    snprintf(c->mesh, sizeof c->mesh, "%s", at("floor.obj"));
-    snprintf(c->output, sizeof c->output, "%s", at("floor.exr"));
-    FILE *file = fopen(c->mesh, "wb");
-    assert_non_null(file);
-    for (int i = 0; i < 4; ++i) {
-        fprintf(file, "v %g %g %g\nvt %d %d\n", (double)corners[i][0], (double)corners[i][1],
-                (double)corners[i][2], i == 1 || i == 2, i < 2);
-    }
-    fprintf(file, "f 1/1 3/3 2/2\nf 1/1 4/4 3/3\n");
-    assert_int_equal(fclose(file), 0);
-    c->ball = vsh_sdf_node_default();
-    c->ball.radius = 0.6;
-    c->caster.type = VSH_CASTER_SDF;
-    c->caster.sdf = (vsh_sdf){&c->ball, 1};
-    for (int i = 0; i < 12; ++i) {
-        c->caster.transform[i] = c->receiver.transform[i] = i % 5 == 0 ? 1.0 : 0.0;
-    }
-    c->caster.transform[7] = 1.0;
-    c->sun = vsh_light_default();
-    c->sun.angle = 0.1;
-    c->receiver.path = c->mesh;
-    c->receiver.output = c->output;
-    c->receiver.uv_set = -1;
-    c->receiver.width = c->receiver.height = SIZE;
-    c->receiver.supersample = 1;
-    c->receiver.ao_spacing = 1;
-    c->receiver.bits = 32;
-    c->scene = (vsh_scene){.casters = &c->caster,
-                           .caster_count = 1,
-                           .lights = &c->sun,
-                           .light_count = 1,
-                           .receivers = &c->receiver,
-                           .receiver_count = 1,
-                           .grid = vsh_grid_options_default(),
-                           .shade = vsh_shade_options_default(),
-                           .ao = 1,
-                           .irradiance = 1};
-    c->scene.grid.resolution = 32;
-    c->scene.shade.method = VSH_SHADOW_CONE;
-    c->scene.shade.ao_method = VSH_AO_CONES;
-    c->scene.shade.ao_distance = 1.0;
-}
 
 /* Rows as they come. */
 typedef struct taken {
@@ -135,7 +76,7 @@ static void one_call_writes_the_file_that_a_sink_is_handed(void **state) {
     static const char *const names[] = {"shadow.sun",   "ao",           "irradiance.R",
                                         "irradiance.G", "irradiance.B", "A"};
     case_scene c;
-    fill(&c);
+    fill(&c, SIZE, 1.0);
     vsh_error error;
     vsh_bake_report report;
     assert_ok(vsh_bake_scene(&c.scene, NULL, NULL, &report, &error), &error);
@@ -176,7 +117,7 @@ static void one_call_writes_the_file_that_a_sink_is_handed(void **state) {
 static void rows_of_bands_are_the_rows_of_the_whole(void **state) {
     (void)state;
     case_scene c;
-    fill(&c);
+    fill(&c, SIZE, 1.0);
     vsh_error error;
     taken whole = {.fail_at = 0}, banded = {.fail_at = 0};
     assert_ok(bake_into(&c, 0, &whole, &error), &error);
@@ -192,7 +133,7 @@ static void rows_of_bands_are_the_rows_of_the_whole(void **state) {
 static void what_a_sink_refuses_ends_the_bake_as_it_says(void **state) {
     (void)state;
     case_scene c;
-    fill(&c);
+    fill(&c, SIZE, 1.0);
     vsh_error error;
     taken t = {.fail_at = 2};
     assert_int_equal(bake_into(&c, 16, &t, &error), VSH_ERROR_WRITE);
@@ -225,7 +166,7 @@ static void take_done(void *user, const vsh_job_lightmap *lightmap, vsh_result r
 static void what_was_kept_is_not_baked_again(void **state) {
     (void)state;
     case_scene c;
-    fill(&c);
+    fill(&c, SIZE, 1.0);
     vsh_error error;
     told t = {0};
     vsh_run run = vsh_run_default();
@@ -265,7 +206,7 @@ static void what_was_kept_is_not_baked_again(void **state) {
 static void steps_come_in_their_order(void **state) {
     (void)state;
     case_scene c;
-    fill(&c);
+    fill(&c, SIZE, 1.0);
     vsh_error error;
     vsh_bake_job *job;
     assert_ok(vsh_bake_job_create(&c.scene, NULL, NULL, &job, &error), &error);
@@ -289,7 +230,7 @@ static void steps_come_in_their_order(void **state) {
 static void what_cannot_be_is_refused_before_a_file_is_read(void **state) {
     (void)state;
     case_scene c;
-    fill(&c);
+    fill(&c, SIZE, 1.0);
     unlink(c.mesh);
     vsh_error error;
     vsh_bake_job *job;
@@ -318,7 +259,7 @@ static void what_cannot_be_is_refused_before_a_file_is_read(void **state) {
 static void lightmaps_of_objects_have_their_names(void **state) {
     (void)state;
     case_scene c;
-    fill(&c);
+    fill(&c, SIZE, 1.0);
     vsh_error error;
     vsh_bake_job_options options = vsh_bake_job_options_default();
     options.per_object = 1;

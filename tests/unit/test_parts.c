@@ -1,66 +1,11 @@
 /* Parts of lightmaps and volumes, by the library: what merging takes, and that no file makes it do worse than
  * fail. */
-#include "images.h"
+#include "floor_under_ball.h"
 
 #include "base/part_file.h"
 #include "base/part_sum.h"
 
-#include <vdbshade/vdbshade.h>
-
 enum { SIZE = 48, SHARDS = 2, CHANNELS = 6 };
-
-static const float corners[4][3] = {{-2, 0, -2}, {2, 0, -2}, {2, 0, 2}, {-2, 0, 2}};
-
-/* A floor under a ball, in files of this run's folder; some of the floor is within the ball. */
-typedef struct case_scene {
-    char mesh[300], output[300];
-    vsh_sdf_node ball;
-    vsh_caster caster;
-    vsh_light sun;
-    vsh_receiver receiver;
-    vsh_scene scene;
-} case_scene;
-
-static void fill(case_scene *c) {
-    memset(c, 0, sizeof *c);
-    snprintf(c->mesh, sizeof c->mesh, "%s", at("floor.obj"));
-    snprintf(c->output, sizeof c->output, "%s", at("floor.exr"));
-    FILE *file = fopen(c->mesh, "wb");
-    assert_non_null(file);
-    for (int i = 0; i < 4; ++i) {
-        fprintf(file, "v %g %g %g\nvt %d %d\n", (double)corners[i][0], (double)corners[i][1],
-                (double)corners[i][2], i == 1 || i == 2, i < 2);
-    }
-    fprintf(file, "f 1/1 3/3 2/2\nf 1/1 4/4 3/3\n");
-    assert_int_equal(fclose(file), 0);
-    c->scene = vsh_scene_default();
-    c->receiver = vsh_receiver_default();
-    c->ball = vsh_sdf_node_default();
-    c->ball.radius = 0.6;
-    c->caster.type = VSH_CASTER_SDF;
-    c->caster.sdf = (vsh_sdf){&c->ball, 1};
-    for (int i = 0; i < 12; ++i) {
-        c->caster.transform[i] = c->receiver.transform[i] = i % 5 == 0 ? 1.0 : 0.0;
-    }
-    c->caster.transform[7] = 0.4;
-    c->sun = vsh_light_default();
-    c->sun.angle = 0.1;
-    c->receiver.path = c->mesh;
-    c->receiver.output = c->output;
-    c->receiver.width = c->receiver.height = SIZE;
-    c->receiver.ao_spacing = 1;
-    c->scene.casters = &c->caster;
-    c->scene.caster_count = 1;
-    c->scene.lights = &c->sun;
-    c->scene.light_count = 1;
-    c->scene.receivers = &c->receiver;
-    c->scene.receiver_count = 1;
-    c->scene.ao = c->scene.irradiance = 1;
-    c->scene.grid.resolution = 24;
-    c->scene.shade.method = VSH_SHADOW_CONE;
-    c->scene.shade.ao_method = VSH_AO_CONES;
-    c->scene.shade.ao_distance = 1.0;
-}
 
 /* Rows as they come. */
 typedef struct taken {
@@ -126,7 +71,7 @@ static vsh_result merge(const case_scene *c, taken *t, const vsh_run *run, vsh_e
 static void a_sink_takes_merged_rows_as_of_one_bake_and_words_come_back(void **state) {
     (void)state;
     case_scene c;
-    fill(&c);
+    fill(&c, SIZE, 0.4);
     taken *one = calloc(2, sizeof *one), *all = one + 1;
     assert_non_null(one);
     const vsh_row_sink sink = sink_of(one);
@@ -155,7 +100,7 @@ static void a_sink_takes_merged_rows_as_of_one_bake_and_words_come_back(void **s
 static void a_job_of_a_part_is_refused_what_it_cannot_do(void **state) {
     (void)state;
     case_scene c;
-    fill(&c);
+    fill(&c, SIZE, 0.4);
     taken t;
     const vsh_row_sink sink = sink_of(&t);
     static const int32_t wrong[][2] = {{1, 0}, {2, 1}, {-1, 3}, {1, 10001}, {1, -1}};
@@ -258,7 +203,7 @@ static vsh_result merge_bake(void *user, vsh_error *error) {
 static void no_part_of_a_lightmap_does_worse_than_fail(void **state) {
     (void)state;
     case_scene c;
-    fill(&c);
+    fill(&c, SIZE, 0.4);
     bake_parts(&c);
     bake_case one = {&c, calloc(1, sizeof(taken)), vsh_run_default()};
     assert_non_null(one.rows);
