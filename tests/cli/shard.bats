@@ -47,12 +47,12 @@ load parts
     diff -r one2 objects
 }
 
-@test "seams between pages and between objects are fixed where parts are put together, too" {
-    local unwrapped=("${CLOISTER[@]}" --unwrap always --texels-per-unit 9 --size 128)
-    one out.glb "${unwrapped[@]}" --pages 9
-    merged out.glb 3 "${unwrapped[@]}" --pages 9
-    one out.glb "${unwrapped[@]}" --atlas objects
-    merged out.glb 2 "${unwrapped[@]}" --atlas objects
+@test "seams between pages are fixed where parts are put together, too, and objects have their own" {
+    local ring=("$ASSETS/smooth.glb" --unwrap always --texels-per-unit 30 --size 128 --sun 0.5,0.5,0.1 --sun-angle 20 --ao 0.3) # a ring on two pages
+    one out.glb "${ring[@]}"
+    merged out.glb 3 "${ring[@]}"
+    one out.glb "${CLOISTER[@]}" --unwrap always --texels-per-unit 9 --size 128 --atlas objects
+    merged out.glb 2 "${CLOISTER[@]}" --unwrap always --texels-per-unit 9 --size 128 --atlas objects
 }
 
 @test "a part is the same whoever bakes it, with however many threads and bands, and goes on where it was ended" {

@@ -120,6 +120,14 @@ class Running(Case):
         self.assertLess(len(seen), every)
         self.assertIn(1.0, [f for _, f, _ in seen])
 
+    def test_the_end_of_every_stage_is_told_whichever_thread_came_to_it(self):
+        for _ in range(20):
+            seen = []
+            run = vdbshade.Run(threads=4, progress=lambda stage, fraction: seen.append((stage, fraction)), interval=1000.0)
+            vdbshade.Texels(floor(), width=256, height=256, run=run)
+            self.assertEqual({s for s, _ in seen}, {s for s, f in seen if f == 1.0})
+            self.assertEqual(seen[-1][1], 1.0)
+
     def test_progress_cancels_and_what_it_raises_is_raised(self):
         with self.assertRaisesRegex(vdbshade.Cancelled, "cancelled"):
             vdbshade.Occluders(box(), resolution=128, run=vdbshade.Run(progress=lambda stage, fraction: True))
