@@ -37,6 +37,19 @@ block() {
     done
 }
 
+@test "what scripts look for in the page is there once" {
+    local id
+    shade view box.obj --planes box.exr -o box.html --quiet
+    done_well
+    grep -oE '<[a-z0-9]+ ([^<>]* )?id="[a-z0-9-]+"' box.html | grep -oE 'id="[^"]+"' | sort >ids
+    [ -z "$(uniq -d ids)" ] || fail "twice: $(uniq -d ids)"
+    grep -ohE "byId\('[a-z-]+'\)" "$BATS_TEST_DIRNAME"/../../src/view/page/*.js | cut -d"'" -f2 | sort -u >sought
+    [ "$(wc -l <sought)" -gt 10 ] || fail "nothing is looked for"
+    while read -r id; do
+        grep -qxF "id=\"$id\"" ids || fail "no $id"
+    done <sought
+}
+
 @test "a GLB goes in byte by byte; compressed geometry and other formats as triangles" {
     shade view "$ASSETS/cloister.glb" -o page.html --quiet
     done_well
