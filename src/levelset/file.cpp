@@ -90,12 +90,15 @@ class Reader final : public openvdb::io::Archive {
     double bytes(size_t i);               // in memory, by what the file says of it
     GridBase::Ptr without_tree(size_t i); // metadata and transform
     GridBase::Ptr grid(size_t i, const char *path, vsh_error *error);
+    GridBase::Ptr grid_within(size_t i, const BBoxd &box, const char *path, vsh_error *error);
+    bool is_streamed() const { return streamed; }
 
     const uint64_t size;
 
   private:
     void list(std::istream &in, const char *path, vsh_error *error);
     GridBase::Ptr read_tree(size_t i);
+    GridBase::Ptr sound(const GridBase::Ptr &read, size_t i, const char *path, vsh_error *error);
 
     // The stream keeps this pointer's address.
     openvdb::io::StreamMetadata::Ptr state = std::make_shared<openvdb::io::StreamMetadata>();
@@ -184,14 +187,45 @@ GridBase::Ptr Reader::without_tree(size_t i) {
     return result;
 }
 
-GridBase::Ptr Reader::grid(size_t i, const char *path, vsh_error *error) {
-    const GridBase::Ptr result = streamed ? grids[i] : read_tree(i);
+GridBase::Ptr Reader::sound(const GridBase::Ptr &read, size_t i, const char *path, vsh_error *error) {
     if (!file.sound()) {
         throw Failure{vshi_fail(error, VSH_ERROR_READ,
                                 "%s: damaged: grid '%s': Zip data that do not fit their check sum", path,
                                 name(i).c_str())};
     }
-    return result;
+    return read;
+}
+
+GridBase::Ptr Reader::grid(size_t i, const char *path, vsh_error *error) {
+    return sound(streamed ? grids[i] : read_tree(i), i, path, error);
+}
+
+// Whole leaves, so that no voxel of one is cut.
+openvdb::CoordBBox leaves_around(const BBoxd &box, const openvdb::math::Transform &transform) {
+    const openvdb::math::Vec3d far(double(1 << 28));
+    const BBoxd index = transform.worldToIndex(box);
+    const Coord low =
+        Coord::floor(openvdb::math::maxComponent(openvdb::math::minComponent(index.min(), far), -far));
+    const Coord high =
+        Coord::floor(openvdb::math::maxComponent(openvdb::math::minComponent(index.max(), far), -far));
+    return {low & ~7, (high & ~7).offsetBy(7)};
+}
+
+bool has_leaves(const GridBase &grid) {
+    return grid.constBaseTree().leafCount() > 0;
+}
+
+GridBase::Ptr Reader::grid_within(size_t i, const BBoxd &box, const char *path, vsh_error *error) {
+    const openvdb::CoordBBox wanted = leaves_around(box, without_tree(i)->transform());
+    if (streamed || entries[i].isInstance()) {
+        const GridBase::Ptr result = grid(i, path, error);
+        result->clip(wanted);
+        return result;
+    }
+    const GridBase::Ptr result = grids[i]->copyGrid();
+    entries[i].seekToGrid(stream);
+    readGrid(result, entries[i], stream, wanted);
+    return sound(result, i, path, error);
 }
 
 GridBase::Ptr Reader::read_tree(size_t i) {
@@ -298,16 +332,19 @@ void describe_box(const openvdb::CoordBBox &box, vsh_vdb_entry &entry) {
     }
 }
 
+// The active voxels' box, by what the file says; empty where it does not.
+openvdb::CoordBBox told_box(const GridBase &grid) {
+    const auto low = grid.getMetadata<openvdb::Vec3IMetadata>(GridBase::META_FILE_BBOX_MIN);
+    const auto high = grid.getMetadata<openvdb::Vec3IMetadata>(GridBase::META_FILE_BBOX_MAX);
+    return low && high ? openvdb::CoordBBox(Coord(low->value()), Coord(high->value())) : openvdb::CoordBBox();
+}
+
 // What the file says of a grid that is too large to be read.
 void describe_unread(Reader &reader, size_t i, const char *why, vsh_vdb_entry &entry) {
     const GridBase::Ptr grid = reader.without_tree(i);
     describe_kind(*grid, entry);
-    const auto low = grid->getMetadata<openvdb::Vec3IMetadata>(GridBase::META_FILE_BBOX_MIN);
-    const auto high = grid->getMetadata<openvdb::Vec3IMetadata>(GridBase::META_FILE_BBOX_MAX);
     const auto voxels = grid->getMetadata<openvdb::Int64Metadata>(GridBase::META_FILE_VOXEL_COUNT);
-    if (low && high) {
-        describe_box(openvdb::CoordBBox(Coord(low->value()), Coord(high->value())), entry);
-    }
+    describe_box(told_box(*grid), entry);
     entry.active_voxels = voxels ? uint64_t(std::max<int64_t>(voxels->value(), 0)) : 0;
     entry.bytes = uint64_t(std::max(reader.bytes(i), 0.0));
     if (entry.problem[0] == '\0') {
@@ -356,16 +393,62 @@ double shell_of(const GridBase &grid) {
     return shell && std::isfinite(shell->value()) && shell->value() > 0.0 ? shell->value() : 0.0;
 }
 
-LevelSet load_level_set(const char *path, const char *name, Stage &stage, vsh_error *error) {
+namespace {
+
+size_t choose_level_set(Reader &reader, const char *path, const char *name, vsh_error *error) {
+    return choose(reader, path, name, error, [&](size_t i) {
+        return class_of(reader.metadata(i)) == GridBase::gridClassToString(openvdb::GRID_LEVEL_SET);
+    });
+}
+
+// A part of a grid. Where there is nothing in the box there is something in a larger one.
+GridBase::Ptr read_box(Reader &reader, size_t chosen, const BBoxd &box, const LevelSet &of, Stage &stage,
+                       vsh_error *error) {
+    const Named &named = of.named;
+    BBoxd around = box;
+    for (;;) {
+        stage.check();
+        const GridBase::Ptr found = reader.grid_within(chosen, around, named.path, error);
+        const bool all = around.volume() > 1e60 || !std::isfinite(around.volume());
+        if (has_leaves(*found) || all) {
+            refuse_large(named, stage.options, double(found->memUsage()), error);
+            return found;
+        }
+        around.expand(std::max(around.extents().x(), std::max(around.extents().y(), around.extents().z())));
+    }
+}
+
+} // namespace
+
+BBoxd told_level_set_box(const char *path, const char *name, const vsh_run &run, vsh_error *error) {
+    initialize();
+    try {
+        Reader reader(path, run, error);
+        const size_t chosen = choose_level_set(reader, path, name, error);
+        const GridBase::Ptr grid = reader.without_tree(chosen);
+        const openvdb::CoordBBox box = told_box(*grid);
+        const Vec3d half(0.5);
+        if (reader.is_streamed() || box.empty()) {
+            return BBoxd();
+        }
+        return grid->transform().indexToWorld(BBoxd(box.min().asVec3d() - half, box.max().asVec3d() + half));
+    } catch (const std::ios_base::failure &) {
+        throw Failure{fail_cut_short(path, error)};
+    }
+}
+
+LevelSet load_level_set(const char *path, const char *name, const BBoxd *box, Stage &stage,
+                        vsh_error *error) {
     initialize();
     try {
         Reader reader(path, stage.options, error);
-        const size_t chosen = choose(reader, path, name, error, [&](size_t i) {
-            return class_of(reader.metadata(i)) == GridBase::gridClassToString(openvdb::GRID_LEVEL_SET);
-        });
+        const size_t chosen = choose_level_set(reader, path, name, error);
         LevelSet loaded{{path, reader.name(chosen)}, nullptr, 0.0};
-        refuse_large(loaded.named, stage.options, reader.bytes(chosen), error);
-        const GridBase::Ptr found = reader.grid(chosen, path, error);
+        if (box == nullptr) {
+            refuse_large(loaded.named, stage.options, reader.bytes(chosen), error);
+        }
+        const GridBase::Ptr found = box != nullptr ? read_box(reader, chosen, *box, loaded, stage, error)
+                                                   : reader.grid(chosen, path, error);
         refuse_bad(loaded.named, examine_kind(*found), error);
         loaded.grid = to_floats(found);
         loaded.shell = shell_of(*found);

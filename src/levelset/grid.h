@@ -23,6 +23,7 @@ struct vsh_grid {
 
 namespace vshi {
 
+using openvdb::BBoxd;
 using openvdb::Coord;
 using openvdb::FloatGrid;
 using openvdb::FloatTree;

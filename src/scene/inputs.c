@@ -4,6 +4,7 @@
 #include "base/input.h"
 #include "base/try.h"
 #include "base/uri.h"
+#include "scene/tile.h"
 
 #include <jansson.h>
 #include <stdlib.h>
@@ -86,7 +87,7 @@ vsh_result vshi_inputs_find(const vsh_scene *scene, const char *const *files, si
         VSHI_TRY(add(inputs, files[i], error));
     }
     for (size_t i = 0; scene != NULL && i < scene->caster_count; ++i) {
-        VSHI_TRY(add(inputs, scene->casters[i].path, error));
+        VSHI_TRY(add(inputs, vshi_caster_is_left(scene, i) ? scene->casters[i].path : NULL, error));
     }
     for (size_t i = 0; scene != NULL && i < scene->receiver_count; ++i) {
         VSHI_TRY(add(inputs, scene->receivers[i].path, error));

@@ -20,9 +20,9 @@ static bool apply_rule(const vsh_solidity_rule *rule, const vshi_mesh_list *list
     return matched;
 }
 
-/* Rules of one caster, or of all. */
+/* Rules of one caster, or of all; each must match something, unless some of the casters are left out. */
 static vsh_result apply_rules(const vsh_solidity_rule *rules, size_t rule_count,
-                              const vshi_mesh_list *casters, size_t count, vsh_error *error) {
+                              const vshi_mesh_list *casters, size_t count, bool all, vsh_error *error) {
     for (size_t r = 0; r < rule_count; ++r) {
         const vsh_solidity_rule *rule = &rules[r];
         const vshi_mesh_list *first = NULL;
@@ -37,13 +37,14 @@ static vsh_result apply_rules(const vsh_solidity_rule *rules, size_t rule_count,
             first = first == NULL && casters[i].model != NULL ? &casters[i] : first;
             matched = (casters[i].model != NULL && apply_rule(rule, &casters[i])) || matched;
         }
-        if (!matched && first != NULL) {
+        if (matched || !all) {
+            continue;
+        }
+        if (first != NULL) {
             return vshi_fail_unmatched(first->model, first->path, rule->pattern, error);
         }
-        if (!matched) {
-            return vshi_fail(error, VSH_ERROR_INPUT, "no object is named '%.100s': no caster is a mesh",
-                             rule->pattern);
-        }
+        return vshi_fail(error, VSH_ERROR_INPUT, "no object is named '%.100s': no caster is a mesh",
+                         rule->pattern);
     }
     return VSH_OK;
 }
@@ -88,9 +89,11 @@ vsh_result vshi_solidity_settle(const vsh_scene *scene, const vshi_mesh_list *ca
                                 vsh_error *error) {
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
-        VSHI_TRY(apply_rules(caster->solidity, caster->solidity_count, &casters[i], 1, error));
+        VSHI_TRY(apply_rules(caster->solidity, caster->solidity_count, &casters[i], 1, scene->tile == NULL,
+                             error));
     }
-    VSHI_TRY(apply_rules(scene->solidity, scene->solidity_count, casters, scene->caster_count, error));
+    VSHI_TRY(apply_rules(scene->solidity, scene->solidity_count, casters, scene->caster_count,
+                         scene->tile == NULL, error));
     vsh_mesh *all = NULL;
     size_t count;
     vsh_result result;

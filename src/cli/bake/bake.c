@@ -79,6 +79,9 @@ static int check_shard(const cli_bake_settings *s, const vsh_scene *scene) {
                         : s->view != NULL          ? "view"
                         : s->exr != NULL           ? "exr"
                                                    : NULL;
+    if (s->tile_size > 0.0 && given != NULL) {
+        return cli_usage("--%s: not together with --tile-size", given);
+    }
     if (s->shard > 0 && given != NULL) {
         return cli_usage("--%s: not together with --shard; give it to 'vdbshade merge'", given);
     }
@@ -212,9 +215,15 @@ static cli_stats stats_of(const vsh_scene *scene, const vsh_bake_report *report,
 
 /* --- steps */
 
-/* Warnings are told as soon as they are known: what is wrong with the files, before the long work. */
-static vsh_result run_job(vsh_bake_job *job, const vsh_scene *scene, const vsh_run *run, vsh_error *error) {
+/* Warnings are told as soon as they are known: what is wrong with the files, before the long work; those of
+ * one of several bakes when all are done. */
+static vsh_result run_job(vsh_bake_job *job, const vsh_scene *scene, const vsh_run *run, bool one,
+                          vsh_error *error) {
     VSHI_TRY(vsh_bake_job_measure(job, run, error));
+    if (!one) {
+        VSHI_TRY(vsh_bake_job_prepare(job, run, error));
+        return vsh_bake_job_run(job, run, error);
+    }
     cli_bake_expect(scene, job, run->threads);
     cli_warnings_tell();
     VSHI_TRY(vsh_bake_job_prepare(job, run, error));
@@ -223,18 +232,20 @@ static vsh_result run_job(vsh_bake_job *job, const vsh_scene *scene, const vsh_r
 }
 
 static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, vsh_bake_job *job,
-                    const vsh_run *run, telling *t, const char *parts) {
+                    const vsh_run *run, telling *t, const char *parts, cli_stats *sum) {
     t->count = vsh_bake_job_count(job);
-    t->part = settings->shard > 0;
     vsh_error error;
     if ((settings->merged != NULL ? vsh_bake_job_merge(job, run, &error)
-                                  : run_job(job, scene, run, &error)) != VSH_OK) {
+                                  : run_job(job, scene, run, sum == NULL, &error)) != VSH_OK) {
         return cli_fail_of(NULL, &error);
     }
     vsh_bake_report report;
     vsh_bake_job_get_report(job, &report);
     const cli_stats stats = stats_of(scene, &report, run->threads);
     cli_stats_warn(&stats, scene, run);
+    if (sum != NULL) {
+        return cli_stats_add(sum, &stats);
+    }
     CLI_TRY(cli_bake_view(settings, scene, run));
     CLI_TRY(cli_stats_finish(&stats, run, settings->stats));
     cli_warnings_tell();
@@ -248,9 +259,11 @@ static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, v
     return CLI_OK;
 }
 
-static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
+int cli_bake_one(const cli_bake_settings *settings, const vsh_scene *scene, cli_stats *sum) {
     const vsh_run run = cli_common_run(&settings->common);
-    telling t = {.common = &settings->common};
+    const bool part = settings->shard > 0 && settings->tile_size == 0.0;
+    const bool told = sum == NULL || settings->common.verbose; /* each lightmap */
+    telling t = {.common = &settings->common, .part = part || !told};
     vsh_bake_job_options options = vsh_bake_job_options_default();
     options.per_object = settings->per_object;
     options.band_rows = settings->band_rows;
@@ -266,8 +279,8 @@ static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
     options.files = files;
     options.file_count = settings->lights != NULL ? 2 : 1;
     char *parts = name_parts(settings, scene);
-    options.shard = settings->dry_run ? 0 : settings->shard; /* what is told is of the whole */
-    options.shard_count = settings->shard_count;
+    options.shard = part && !settings->dry_run ? settings->shard : 0; /* what is told is of the whole */
+    options.shard_count = part ? settings->shard_count : 0;
     options.parts = settings->merged != NULL ? settings->merged : parts;
     options.words = settings->words;
     options.word_count = settings->word_count;
@@ -286,7 +299,7 @@ static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
     }
     CLI_TRY_DONE(check_outputs(settings, scene, job));
     code = settings->dry_run ? cli_bake_forecast(scene, job, &run)
-                             : bake_job(settings, scene, job, &run, &t, parts);
+                             : bake_job(settings, scene, job, &run, &t, parts, sum);
 done:
     vsh_bake_job_free(job);
     free(parts);
@@ -300,7 +313,8 @@ int cli_bake_by(const cli_bake_settings *settings) {
     CLI_TRY_DONE(cli_bake_scene_make(settings, &made));
     CLI_TRY_DONE(check_files(settings, &made.scene));
     cli_signals_watch();
-    code = bake(settings, &made.scene);
+    code = settings->tile_size > 0.0 ? cli_bake_tiles(settings, &made.scene)
+                                     : cli_bake_one(settings, &made.scene, NULL);
 done:
     cli_bake_scene_free(&made);
     cli_progress_end();

@@ -2,6 +2,7 @@
 #ifndef CLI_BAKE_H
 #define CLI_BAKE_H
 
+#include "cli/stats.h"
 #include "options.h"
 
 /* Whether a scene with its lights, that the options were put over, can be shaded so; sets what follows from
@@ -22,6 +23,13 @@ void cli_bake_expect(const vsh_scene *scene, const vsh_bake_job *job, int32_t th
  * why.
  */
 int cli_bake_forecast(const vsh_scene *scene, vsh_bake_job *job, const vsh_run *run);
+
+/* Bakes a scene whose files were checked, or puts its parts together. `sum` not NULL: it is one of several,
+ * and its statistics are added there; else they are told. CLI_OK or an exit code, having said why. */
+int cli_bake_one(const cli_bake_settings *settings, const vsh_scene *scene, cli_stats *sum);
+
+/* Bakes it in tiles: those of a shard, or all. The same. */
+int cli_bake_tiles(const cli_bake_settings *settings, const vsh_scene *scene);
 
 /* Bakes, or puts parts together, by settings that were taken: frees nothing of them. CLI_OK or an exit code,
  * having said why. */

@@ -21,7 +21,8 @@ enum {
     KEY_IMAGES_BESIDE,
     KEY_EXR,
     KEY_VIEW,
-    KEY_DENSITY
+    KEY_DENSITY,
+    KEY_TILE_SIZE
 };
 
 static const cli_option options[] = {
@@ -54,7 +55,7 @@ static const cli_option options[] = {
     CLI_SHARD_OPTION(
         "bake part I of N, with as much work as the others, into\nOUT.I-of-N.part: on any machine, in any "
         "order, again where\nit failed; 'vdbshade merge OUT' puts all parts together to\nthe bits of "
-        "one bake"),
+        "one bake; with --tile-size whole tiles, and\nnothing is to be merged"),
     {0, NULL, NULL, "Objects"},
     {KEY_RECEIVE, "receive", "NAME",
      "only objects of this name receive, all cast; * and ?\nmatch as in a shell; may be repeated"},
@@ -70,6 +71,11 @@ static const cli_option options[] = {
     CLI_SETTINGS(VSH_SETTINGS_CHANNELS),
     CLI_ACCURACY_OPTIONS,
     CLI_CASTER_OPTIONS,
+    {KEY_TILE_SIZE, "tile-size", "SIZE",
+     "for worlds that do not fit into memory: receivers are\nbaked cube by cube of SIZE scene units, each "
+     "cube with\n"
+     "the casters that its light and AO can meet; values are\nthe same to a tenth of --max-error "
+     "(docs/farm.md)"},
     CLI_GRID_OPTIONS,
     {0, NULL, NULL, "Texels"},
     CLI_SETTINGS(VSH_SETTINGS_TEXELS),
@@ -158,6 +164,8 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return take_pattern(&s->no_receive, name, value);
     case KEY_ONE_SIDED:
         return take_pattern(&s->one_sided, name, value);
+    case KEY_TILE_SIZE:
+        return cli_parse_number(name, value, 1e-9, 1e12, &s->tile_size);
     case KEY_DENSITY:
         return cli_density_take(&s->densities, name, value);
     case KEY_PER_OBJECT:

@@ -256,6 +256,9 @@ static int use_field(const cli_bake_settings *s, cli_bake_scene *made) {
     if (s->field == NULL) {
         return CLI_OK;
     }
+    if (s->tile_size > 0.0) {
+        return cli_usage("--field: not together with --tile-size");
+    }
     const vsh_run run = cli_common_run(&s->common);
     const int32_t named = made->scene.voxels_named;
     vsh_error error;

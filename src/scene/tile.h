@@ -1,0 +1,33 @@
+/* What of a scene's casters is left in one of its tiles. */
+#ifndef VSHI_SCENE_TILE_H
+#define VSHI_SCENE_TILE_H
+
+#include <vdbshade/tiles.h>
+
+#include <stdbool.h>
+
+typedef struct vshi_tile_caster {
+    unsigned char *kept; /* [meshes of its file], of a mesh: nonzero for those that are left; NULL: all */
+    bool none;           /* nothing of it is left */
+    bool boxed;          /* of a .vdb: what lies in `box` is, of its own space; else all of it */
+    double box[2][3];
+} vshi_tile_caster;
+
+struct vsh_tile {
+    vsh_scene scene;
+    vsh_receiver *receivers;   /* the scene's */
+    vshi_tile_caster *casters; /* [scene.caster_count] */
+    unsigned char *kept;       /* those of the casters, one after the other */
+    vsh_tile_info info;
+};
+
+static inline const vshi_tile_caster *vshi_tile_of(const vsh_scene *scene, size_t caster) {
+    return scene->tile != NULL ? &scene->tile->casters[caster] : NULL;
+}
+
+/* Whether a caster is left in the scene, or in the tile that it is. */
+static inline bool vshi_caster_is_left(const vsh_scene *scene, size_t caster) {
+    return scene->tile == NULL || !scene->tile->casters[caster].none;
+}
+
+#endif

@@ -1,0 +1,34 @@
+/* Where all of a scene's casters and receivers are, without holding what they are. */
+#ifndef VSHI_SCENE_TILE_SURVEY_H
+#define VSHI_SCENE_TILE_SURVEY_H
+
+#include "scene/tile_reach.h"
+
+/* Meshes of a file that are one object: those that are solid together. */
+typedef struct vshi_survey_object {
+    vshi_world_box box;
+    uint64_t triangles;
+    size_t first, last; /* meshes of the file, `last` among them */
+} vshi_survey_object;
+
+typedef struct vshi_survey_caster {
+    vshi_survey_object *objects; /* [count] of a mesh */
+    size_t count;
+    size_t meshes;      /* of its file */
+    vshi_world_box box; /* of a .vdb, in its own space; empty: not known */
+} vshi_survey_caster;
+
+typedef struct vshi_survey {
+    vshi_survey_caster *casters; /* [caster_count] */
+    size_t caster_count;
+    vshi_world_box *receivers; /* [receiver_count] */
+    size_t objects;            /* these two of all casters */
+    uint64_t triangles;
+} vshi_survey;
+
+/* Errors: those of vsh_tiles_create(). Free with vshi_survey_free(), after an error too. */
+vsh_result vshi_survey_make(const vsh_scene *scene, const vsh_run *run, vshi_survey *survey,
+                            vsh_error *error);
+void vshi_survey_free(vshi_survey *survey);
+
+#endif
