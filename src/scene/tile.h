@@ -2,6 +2,8 @@
 #ifndef VSHI_SCENE_TILE_H
 #define VSHI_SCENE_TILE_H
 
+#include "scene/tile_survey.h"
+
 #include <vdbshade/tiles.h>
 
 #include <stdbool.h>
@@ -12,6 +14,15 @@ typedef struct vshi_tile_caster {
     bool boxed;          /* of a .vdb: what lies in `box` is, of its own space; else all of it */
     double box[2][3];
 } vshi_tile_caster;
+
+struct vsh_tiles {
+    const vsh_scene *whole;
+    vshi_survey survey;
+    vshi_reach reach;
+    size_t *receivers; /* [receiver_count], tile by tile */
+    size_t *first;     /* [count + 1]: of each tile among them */
+    size_t count;
+};
 
 struct vsh_tile {
     vsh_scene scene;
