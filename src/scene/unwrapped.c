@@ -327,7 +327,7 @@ done:
 vsh_result vshi_unwrap_receiver(const vsh_receiver *receiver, const vsh_model *model, const vsh_mesh *meshes,
                                 const size_t *numbers, size_t count, const vsh_run *run,
                                 vshi_unwrapped *unwrapped, vsh_error *error) {
-    *unwrapped = (vshi_unwrapped){NULL};
+    *unwrapped = (vshi_unwrapped){0};
     vsh_unwrap_options options = vsh_unwrap_options_default();
     options.width = receiver->max_size > 0 ? receiver->max_size : receiver->width;
     options.height = receiver->max_size > 0 ? receiver->max_size : receiver->height;
@@ -397,5 +397,5 @@ void vshi_unwrapped_free(vshi_unwrapped *unwrapped) {
     free(unwrapped->numbers);
     free(unwrapped->parts);
     vsh_atlas_free(unwrapped->atlas);
-    *unwrapped = (vshi_unwrapped){NULL};
+    *unwrapped = (vshi_unwrapped){0};
 }

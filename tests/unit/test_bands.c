@@ -282,7 +282,7 @@ static void rows_that_are_no_band_are_refused(void **state) {
     const int32_t bad[][2] = {{-8, 8}, {4, 8},  {HEIGHT, 8}, {96, 8}, {0, 0},
                               {0, 4},  {0, -8}, {0, 96},     {88, 1}, {80, 8 + HEIGHT}};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
-        vsh_texels *texels = (vsh_texels *)&bad;
+        vsh_texels *texels = (vsh_texels *)charts; // not NULL, as refused it is to be
         vsh_error error = {0};
         assert_int_equal(vsh_texels_create_band(charts, bad[i][0], bad[i][1], NULL, &texels, &error),
                          VSH_ERROR_ARGUMENT);
