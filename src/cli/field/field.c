@@ -39,7 +39,7 @@ const cli_command cli_field = {
     "field",
     "INPUT -o OUT.field [options]",
     "Makes the voxels of a mesh's, a .vdb's or a scene's (.json) casters, and keeps them in a file that\n"
-    "bake, render, query and volume take with --field: a second sun then costs no voxel. The file is of\n"
+    "bake, render, query, volume and trade take with --field: a second sun then costs no voxel. It is of\n"
     "these casters and voxels and of this version, and is refused for any other: docs/field.md. Numbers\n"
     "in brackets are what holds without the option.",
     options,
