@@ -1,5 +1,5 @@
-/* Parts' files. They appear whole or not at all, hold nothing that tells of time or machine (but those of what
- * measures time), and whoever reads one checks all of it.
+/* Parts' files. They appear whole or not at all, hold nothing that tells of time or machine (but those of
+ * what measures time), and whoever reads one checks all of it.
  *
  * A file is: magic; numbers that tell the byte order and the sizes of what follows; the head, which begins
  * with a vshi_part_about; the body; the tail; a checksum. */
