@@ -80,6 +80,11 @@ vsh_result vshi_obj_set_group(vshi_obj *obj, const char *text, size_t size, vsh_
 vsh_result vshi_obj_set_material(vshi_obj *obj, const char *text, size_t size, vsh_error *error);
 vsh_result vshi_obj_read_materials(vshi_obj *obj, const char *text, size_t size, vsh_error *error);
 
+/* Where the material library is that an OBJ at `path` (".obj") names, in new memory: first the file of that
+ * name, and where it is not there the OBJ's own. NULL: memory is short. */
+enum { VSHI_OBJ_LIBRARIES = 2 };
+char *vshi_obj_library(const char *path, int choice, const char *name, size_t size);
+
 /* A material's number; one that is new is opaque. */
 vsh_result vshi_obj_material(vshi_obj *obj, const char *name, size_t size, size_t *number, bool *is_new,
                              vsh_error *error);

@@ -105,17 +105,24 @@ static vsh_result read_file(vshi_obj *obj, const char *path, bool *found, vsh_er
     return result;
 }
 
+char *vshi_obj_library(const char *path, int choice, const char *name, size_t size) {
+    if (choice == 0) {
+        return beside(path, name, size);
+    }
+    const char *slash = strrchr(path, '/'), *own = slash != NULL ? slash + 1 : path;
+    char *library = beside(path, own, strlen(own));
+    if (library != NULL) {
+        memcpy(strrchr(library, '.') + 1, "mtl", sizeof "mtl");
+    }
+    return library;
+}
+
 vsh_result vshi_obj_read_materials(vshi_obj *obj, const char *text, size_t size, vsh_error *error) {
     bool found = false;
-    const char *dot = strrchr(obj->path, '.'), *slash = strrchr(obj->path, '/');
-    const char *own = slash != NULL ? slash + 1 : obj->path;
-    for (int i = 0; i < 2 && size > 0 && !found; ++i) { /* that named, or else the OBJ's own */
-        char *path = i == 0 ? beside(obj->path, text, size) : beside(obj->path, own, (size_t)(dot - own) + 4);
+    for (int choice = 0; choice < VSHI_OBJ_LIBRARIES && size > 0 && !found; ++choice) {
+        char *path = vshi_obj_library(obj->path, choice, text, size);
         if (path == NULL) {
             return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", obj->path);
-        }
-        if (i > 0) {
-            memcpy(strrchr(path, '.') + 1, "mtl", sizeof "mtl");
         }
         const vsh_result result = read_file(obj, path, &found, error);
         free(path);

@@ -16,7 +16,8 @@
 #include <vdbshade/provenance.h>
 
 enum { NAME_SIZE = 96, LINE_SIZE = 512, HASH_PREFIX = sizeof "sha256:" - 1 };
-enum { RAYS = 64 }; /* of methods that keep no error, where none are given */
+enum { HASH_UNITS = 1 << 30 }; /* of the job, for all inputs */
+enum { RAYS = 64 };            /* of methods that keep no error, where none are given */
 
 struct vsh_provenance {
     vshi_attributes attributes;
@@ -142,7 +143,7 @@ static vsh_result add_inputs(vsh_provenance *p, const vshi_inputs *inputs, vshi_
         if (result != VSH_OK) {
             return result;
         }
-        if (vshi_job_advance(job, 1)) {
+        if (vshi_job_advance(job, HASH_UNITS / inputs->count)) {
             return vshi_job_fail_cancelled(job, error);
         }
     }
@@ -154,13 +155,14 @@ static vsh_result fill(vsh_provenance *p, const vsh_provenance_source *source, c
     VSHI_NUMBERS;
     VSHI_TRY(add_settings(p, source, error));
     vshi_inputs inputs = {NULL, 0, 0};
-    vsh_result result = VSH_OK;
-    VSHI_TRY_DONE(vshi_inputs_find(source->scene, source->files, source->file_count, run->allow_outside != 0,
-                                   &inputs, error));
-    vshi_job *job = vshi_job_begin(run, "hash", inputs.count);
-    result = job != NULL ? add_inputs(p, &inputs, job, error) : out_of_memory(error);
+    vshi_job *job = vshi_job_begin(run, "hash", HASH_UNITS);
+    if (job == NULL) {
+        return out_of_memory(error);
+    }
+    vsh_result result =
+        vshi_inputs_find(source->scene, source->files, source->file_count, run, job, &inputs, error);
+    result = result == VSH_OK ? add_inputs(p, &inputs, job, error) : result;
     vshi_job_end(job);
-done:
     vshi_inputs_free(&inputs);
     return result;
 }

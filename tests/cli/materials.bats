@@ -228,3 +228,46 @@ JSON
     shade info masked.gltf
     [[ $output == *"masked (leaves, fences): it casts by its texture's alpha"* ]] || fail "$output"
 }
+
+# The names of an image's inputs.
+inputs_of() {
+    "$VDBSHADE" info "$1" | sed -n 's/^vdbshade_input_[0-9]*: sha256:[0-9a-f]* //p' | tr '\n' ' '
+}
+
+@test "what decides where light comes through is an input" {
+    bake masked.gltf one.exr
+    [ "$(inputs_of one.exr)" = "masked.gltf emblem.png " ] || fail "$(inputs_of one.exr)"
+    bake whole.gltf whole.exr
+    [ "$(inputs_of whole.exr)" = "whole.gltf " ] || fail "$(inputs_of whole.exr)"
+    printf 'mtllib my box.mtl\n' >box.obj
+    write_box solid.obj
+    cat solid.obj >>box.obj
+    printf 'newmtl box\nd 1\n' >'my box.mtl'
+    shade bake box.obj "${SMALL[@]}" -o box.exr
+    [ "$(inputs_of box.exr)" = "box.obj my box.mtl " ] || fail "$(inputs_of box.exr)"
+    mv 'my box.mtl' box.mtl
+    shade bake box.obj "${SMALL[@]}" -o box.exr
+    [ "$(inputs_of box.exr)" = "box.obj box.mtl " ] || fail "$(inputs_of box.exr)"
+}
+
+# Another image in place of the leaf's, opaque all over.
+change_texture() {
+    "$VDBSHADE" bake "$ASSETS/seeds_floor.obj" --sun 0,1,0 --size 8 -o emblem.png --quiet
+}
+
+@test "parts of a bake and golden bakes are told from those of another texture" {
+    mkdir scenes
+    cat >scenes/leaf.json <<'JSON'
+{"casters": [{"mesh": "../masked.gltf"}],
+ "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0], "angle_deg": 2}],
+ "receivers": [{"mesh": "../masked.gltf", "objects": ["floor"], "size": 32, "output": "leaf.exr"}]}
+JSON
+    "$VDBSHADE" regress scenes --update --quiet
+    bake masked.gltf part.exr --shard 1/2
+    change_texture
+    bake masked.gltf part.exr --shard 2/2
+    shade merge part.exr
+    refused 2 part.exr.1-of-2.part 'is of other inputs or options' emblem.png
+    shade regress scenes
+    [[ $output == *"leaf: not alike"* ]] || fail "not baked again"
+}
