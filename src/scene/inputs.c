@@ -1,10 +1,12 @@
 #include "scene/inputs.h"
 
+#include "base/floats.h"
 #include "base/try.h"
 #include "model/beside.h"
 
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 static vsh_result out_of_memory(vsh_error *error) {
     return vshi_fail(error, VSH_ERROR_MEMORY, "inputs: the system refused memory");
@@ -70,4 +72,50 @@ void vshi_inputs_free(vshi_inputs *inputs) {
     }
     free(inputs->paths);
     *inputs = (vshi_inputs){NULL, 0, 0};
+}
+
+/* --- outputs */
+
+static vsh_result check_output(const char *output, const struct stat *status, const vshi_inputs *inputs,
+                               vsh_error *error) {
+    for (size_t i = 0; i < inputs->count; ++i) {
+        struct stat input;
+        if (stat(inputs->paths[i], &input) == 0 && input.st_ino == status->st_ino &&
+            input.st_dev == status->st_dev) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: the output is also an input: %s", output,
+                             inputs->paths[i]);
+        }
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_scene_check_outputs(const vsh_scene *scene, const char *const *outputs, size_t output_count,
+                                   const vsh_run *run, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(scene);
+    VSHI_NEEDS_OF(output_count, outputs);
+    for (size_t i = 0; i < output_count; ++i) {
+        VSHI_NEEDS(outputs[i]);
+    }
+    vsh_run settings;
+    VSHI_TRY(vshi_run_resolve(run, &settings, error));
+    vshi_inputs inputs = {NULL, 0, 0};
+    vshi_job *job = NULL;
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; i < output_count; ++i) {
+        struct stat status;
+        if (stat(outputs[i], &status) != 0) {
+            continue;
+        }
+        if (job == NULL) {
+            job = vshi_job_begin(&settings, "hash", 1);
+            VSHI_TRY_DONE(job != NULL ? VSH_OK : out_of_memory(error));
+            VSHI_TRY_DONE(vshi_inputs_find(scene, NULL, 0, &settings, job, &inputs, error));
+        }
+        VSHI_TRY_DONE(check_output(outputs[i], &status, &inputs, error));
+    }
+done:
+    vshi_job_end(job);
+    vshi_inputs_free(&inputs);
+    return result;
 }

@@ -250,6 +250,29 @@ inputs_of() {
     [ "$(inputs_of box.exr)" = "box.obj box.mtl " ] || fail "$(inputs_of box.exr)"
 }
 
+@test "no output replaces what is read with a model" {
+    cp masked.gltf level.gltf
+    base64 -d <<<"$BUFFER" >level.bin
+    sed -i 's,"uri": "data:[^"]*","uri": "level.bin",' level.gltf
+    ln -s emblem.png link.png
+    ln level.bin hard.field
+    sha256sum emblem.png level.bin >sums
+    local out
+    for out in emblem.png link.png; do
+        shade bake level.gltf "${BAKE[@]}" --receive floor -o "$out"
+        refused 2 "$out: the output is also an input" emblem.png
+        shade render level.gltf --sun 0,1,0 --size 16x16 -o "$out"
+        refused 2 "$out: the output is also an input" emblem.png
+    done
+    for out in level.bin hard.field; do
+        shade field level.gltf --resolution 32 -o "$out"
+        refused 2 "$out: the output is also an input" level.bin
+    done
+    sha256sum --check --quiet sums || fail "an input was replaced"
+    bake level.gltf out.exr
+    bake level.gltf out.exr
+}
+
 # Another image in place of the leaf's, opaque all over.
 change_texture() {
     "$VDBSHADE" bake "$ASSETS/seeds_floor.obj" --sun 0,1,0 --size 8 -o emblem.png --quiet

@@ -112,12 +112,18 @@ static int check_files(const cli_bake_settings *settings, const vsh_scene *scene
 
 /* Outputs of objects have their names only now. */
 static int check_outputs(const cli_bake_settings *settings, const vsh_scene *scene, const vsh_bake_job *job) {
-    for (size_t i = 0; i < vsh_bake_job_count(job); ++i) {
+    const size_t count = vsh_bake_job_count(job);
+    const char **outputs = calloc(count + 1, sizeof *outputs);
+    int code = outputs != NULL ? CLI_OK : cli_out_of_memory(settings->input);
+    for (size_t i = 0; i < count && code == CLI_OK; ++i) {
         vsh_job_lightmap lightmap;
         vsh_bake_job_lightmap(job, i, &lightmap);
-        CLI_TRY(cli_bake_check_output(settings, scene, lightmap.output));
+        outputs[i] = lightmap.output;
+        code = cli_bake_check_output(settings, scene, lightmap.output);
     }
-    return CLI_OK;
+    code = code == CLI_OK ? cli_bake_check_inputs(settings, scene, outputs, count) : code;
+    free(outputs);
+    return code;
 }
 
 /* --- what is told */

@@ -77,6 +77,7 @@ static int check_output(const field_settings *s, const vsh_scene *scene) {
         }
     }
     CLI_TRY(cli_bake_check_output(&s->bake, scene, output));
+    CLI_TRY(cli_bake_check_inputs(&s->bake, scene, &output, 1));
     return cli_temporary_check(output);
 }
 
