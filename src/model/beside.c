@@ -7,6 +7,7 @@
 #include "base/memory.h"
 #include "base/uri.h"
 #include "model/gltf.h"
+#include "model/mtl_map.h"
 #include "model/obj.h"
 #include "model/scan.h"
 
@@ -40,13 +41,16 @@ static bool is_there(const char *path) {
     return true;
 }
 
+static bool is_outside(const telling *t, const char *path) {
+    return t->run->allow_outside == 0 && !vshi_input_is_beside(t->path, path);
+}
+
 /* Takes `path` over, which is NULL where memory was short. */
 static vsh_result tell(const telling *t, char *path, bool anyhow, vsh_error *error) {
     if (path == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", t->path);
     }
-    if ((t->run->allow_outside == 0 && !vshi_input_is_beside(t->path, path)) ||
-        (!anyhow && !is_there(path))) {
+    if (is_outside(t, path) || (!anyhow && !is_there(path))) {
         free(path);
         return VSH_OK;
     }
@@ -122,51 +126,83 @@ done:
 
 /* --- OBJ */
 
+/* Tells of what the line at … end names, if it is one. */
+typedef vsh_result tell_line_fn(const telling *t, const char *path, const char *at, const char *end,
+                                vsh_error *error);
+
+/* All lines of a file that have a word. What cannot be read has none. */
+static vsh_result tell_lines(const telling *t, const char *path, const char *word, tell_line_fn *line,
+                             vsh_error *error);
+
+/* The texture that a line of an MTL names. */
+static vsh_result tell_map(const telling *t, const char *path, const char *at, const char *end,
+                           vsh_error *error) {
+    const vshi_token keyword = vshi_scan_token(&at, end);
+    vshi_mtl_map map;
+    return vshi_token_is(keyword, "map_d") && vshi_mtl_map_read(at, end, &map) && map.name.text != NULL
+               ? tell(t, vshi_mtl_map_path(path, map.name), false, error)
+               : VSH_OK;
+}
+
 /* The material library that a line of an OBJ names. */
-static vsh_result tell_library(const telling *t, const char *at, const char *end, vsh_error *error) {
+static vsh_result tell_library(const telling *t, const char *path, const char *at, const char *end,
+                               vsh_error *error) {
     const vshi_token keyword = vshi_scan_token(&at, end);
     const vshi_token name = vshi_scan_rest(at, end);
     if (!vshi_token_is(keyword, "mtllib") || name.size == 0) {
         return VSH_OK;
     }
     for (int choice = 0; choice < VSHI_OBJ_LIBRARIES; ++choice) {
-        char *path = vshi_obj_library(t->path, choice, name.text, name.size);
-        if (path == NULL || is_there(path)) {
-            return tell(t, path, false, error);
+        char *library = vshi_obj_library(path, choice, name.text, name.size);
+        if (library != NULL && !is_there(library)) {
+            free(library);
+            continue;
         }
-        free(path);
+        if (library == NULL || is_outside(t, library)) {
+            return tell(t, library, false, error);
+        }
+        vsh_result result = tell_lines(t, library, "map_d", tell_map, error);
+        if (result != VSH_OK) {
+            free(library);
+            return result;
+        }
+        return tell(t, library, false, error);
     }
     return VSH_OK;
 }
 
-static vsh_result tell_libraries(const telling *t, vshi_stream *stream, vsh_error *error) {
-    static const char keyword[] = "mtllib";
-    const char *stop;
-    for (;;) {
-        VSHI_TRY(vshi_stream_lines(stream, &stop, error));
-        const char *at = stream->at;
-        if (at == stop) {
-            return VSH_OK;
-        }
-        stream->at = stop;
-        while ((at = memmem(at, (size_t)(stop - at), keyword, sizeof keyword - 1)) != NULL) {
-            const char *begin = memrchr(stream->buffer, '\n', (size_t)(at - stream->buffer));
-            const char *end = at + strcspn(at, "\r\n");
-            VSHI_TRY(tell_library(t, begin != NULL ? begin + 1 : stream->buffer, end, error));
-            at = end;
-        }
+static vsh_result tell_window(const telling *t, const vshi_stream *stream, const char *stop, const char *word,
+                              tell_line_fn *line, vsh_error *error) {
+    const char *at = stream->at;
+    while ((at = memmem(at, (size_t)(stop - at), word, strlen(word))) != NULL) {
+        const char *begin = memrchr(stream->at, '\n', (size_t)(at - stream->at));
+        const char *end = memchr(at, '\n', (size_t)(stop - at));
+        end = end != NULL ? end : stop;
+        VSHI_TRY(line(t, stream->path, begin != NULL ? begin + 1 : stream->at, end, error));
+        at = end;
     }
+    return VSH_OK;
 }
 
-static vsh_result beside_obj(const telling *t, vsh_error *error) {
-    vshi_budget budget = {.path = t->path, .run = t->run};
+static vsh_result tell_lines(const telling *t, const char *path, const char *word, tell_line_fn *line,
+                             vsh_error *error) {
+    vshi_budget budget = {.path = path, .run = t->run};
     vshi_stream stream;
+    const char *stop;
     vsh_error why;
-    vsh_result result = vshi_stream_open(&stream, t->path, &budget, t->job, 0, &why);
-    result = result == VSH_OK ? tell_libraries(t, &stream, &why) : result;
+    vsh_result result = vshi_stream_open(&stream, path, &budget, t->job, 0, &why);
+    while (result == VSH_OK && (result = vshi_stream_lines(&stream, &stop, &why)) == VSH_OK &&
+           stream.at < stop) {
+        result = tell_window(t, &stream, stop, word, line, &why);
+        stream.at = stop;
+    }
     vshi_stream_close(&stream);
     return result == VSH_OK || result == VSH_ERROR_READ ? VSH_OK
                                                         : vshi_fail(error, result, "%s", why.message);
+}
+
+static vsh_result beside_obj(const telling *t, vsh_error *error) {
+    return tell_lines(t, t->path, "mtllib", tell_library, error);
 }
 
 vsh_result vshi_model_beside(const char *path, const vsh_run *run, vshi_job *job, vshi_beside_fn *take,

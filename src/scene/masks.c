@@ -40,8 +40,9 @@ typedef struct shape {
 } shape;
 
 typedef struct texture {
-    const void *of; /* vsh_model_material.image or .image_path */
-    uint8_t *alpha; /* NULL: it has none, or could not be read */
+    const void *of;  /* vsh_model_material.image or .image_path */
+    int32_t channel; /* VSH_MASK_CHANNEL_… */
+    uint8_t *alpha;  /* NULL: it has none, or could not be read */
     int32_t width, height;
     bool binary; /* nearly all of it is clear or opaque, and there is some of both */
 } texture;
@@ -109,19 +110,59 @@ static bool is_binary(const uint8_t *alpha, size_t texels) {
            (double)opaque >= SOME * all;
 }
 
+static const float *plane_of(const vsh_image *image, const char *name) {
+    const float *plane = NULL;
+    for (int32_t c = 0; c < image->channel_count; ++c) {
+        plane = strcmp(image->names[c], name) == 0 ? image->planes[c] : plane;
+    }
+    return plane;
+}
+
+/* What alpha is a weighted sum of; planes are NULL where there is none. */
+typedef struct alpha_source {
+    const float *planes[3];
+    float weights[3];
+} alpha_source;
+
+static float alpha_at(const alpha_source *source, size_t texel) {
+    float sum = 0.0f;
+    for (int i = 0; i < 3; ++i) {
+        sum += source->planes[i] != NULL ? source->weights[i] * source->planes[i][texel] : 0.0f;
+    }
+    return 255.0f * sum + 0.5f;
+}
+
+/* Whether it leaves anything out, in 8 bits. */
+static bool varies(const alpha_source *source, size_t texels) {
+    bool found = false;
+    for (size_t i = 0; source->planes[0] != NULL && i < texels && !found; ++i) {
+        found = !(alpha_at(source, i) >= 255.0f);
+    }
+    return found;
+}
+
+static alpha_source find_alpha(const vsh_image *image, int32_t channel, size_t texels) {
+    static const char *const names[] = {"A", "R", "G", "B"};
+    const float *grey = plane_of(image, "Y");
+    const alpha_source luminance = {{plane_of(image, "R"), plane_of(image, "G"), plane_of(image, "B")},
+                                    {0.2126f, 0.7152f, 0.0722f}};
+    alpha_source one = {{NULL}, {1.0f, 0.0f, 0.0f}};
+    if (channel <= VSH_MASK_CHANNEL_BLUE || channel == VSH_MASK_CHANNEL_AUTO) {
+        one.planes[0] = plane_of(image, names[channel <= VSH_MASK_CHANNEL_BLUE ? channel : 0]);
+    }
+    if (channel == VSH_MASK_CHANNEL_ALPHA || (channel == VSH_MASK_CHANNEL_AUTO && varies(&one, texels))) {
+        return one;
+    }
+    one.planes[0] = one.planes[0] != NULL && channel != VSH_MASK_CHANNEL_AUTO ? one.planes[0] : grey;
+    return one.planes[0] != NULL ? one : luminance;
+}
+
 /* The alpha of an image, 8 bits a texel; none where it has none, or is opaque everywhere. */
 static vsh_result take_alpha(const vsh_image *image, const char *path, const vsh_run *run, texture *to,
                              vsh_error *error) {
     const size_t texels = (size_t)image->width * (size_t)image->height;
-    const float *from = NULL;
-    bool varies = false;
-    for (int32_t c = 0; c < image->channel_count; ++c) {
-        from = strcmp(image->names[c], "A") == 0 ? image->planes[c] : from;
-    }
-    for (size_t i = 0; from != NULL && i < texels && !varies; ++i) {
-        varies = from[i] < 1.0f;
-    }
-    if (!varies) {
+    const alpha_source from = find_alpha(image, to->channel, texels);
+    if (!varies(&from, texels)) {
         return VSH_OK;
     }
     if (image->width > LARGEST || image->height > LARGEST) {
@@ -132,7 +173,7 @@ static vsh_result take_alpha(const vsh_image *image, const char *path, const vsh
         vshi_check_limit(run, (double)texels * (1.0 + sizeof(float) * image->channel_count), path, error));
     VSHI_TRY(vshi_allocate((void **)&to->alpha, texels, 1, path, error));
     for (size_t i = 0; i < texels; ++i) {
-        const float value = 255.0f * from[i] + 0.5f;
+        const float value = alpha_at(&from, i);
         to->alpha[i] = (uint8_t)(value >= 255.0f ? 255.0f : value > 0.0f ? value : 0.0f);
     }
     to->width = image->width;
@@ -152,7 +193,7 @@ static vsh_result read_texture(vshi_masks *masks, const vsh_model_material *told
                                const texture **found, vsh_error *error) {
     const void *of = told->image != NULL ? told->image : told->image_path;
     for (size_t i = 0; i < masks->texture_count; ++i) {
-        if (masks->textures[i].of == of) {
+        if (masks->textures[i].of == of && masks->textures[i].channel == told->image_channel) {
             *found = &masks->textures[i];
             return VSH_OK;
         }
@@ -160,6 +201,7 @@ static vsh_result read_texture(vshi_masks *masks, const vsh_model_material *told
     texture *made = &masks->textures[masks->texture_count++];
     *found = made;
     made->of = of;
+    made->channel = told->image_channel;
     char name[600];
     snprintf(name, sizeof name, "%.400s: the texture of material '%.100s'", masks->path,
              told->name != NULL ? told->name : "");
@@ -228,15 +270,24 @@ static vshi_mask_cover cover_of(const vshi_mask_table *table, const vsh_mesh *me
     return vshi_mask_table_cover(table, places);
 }
 
-vsh_result vshi_masks_is_cut_out(vshi_masks *masks, size_t mesh, const vsh_run *run, bool *is,
-                                 vsh_error *error) {
+vsh_result vshi_masks_blend(vshi_masks *masks, size_t mesh, const vsh_run *run, vshi_blend *blend,
+                            vsh_error *error) {
     const int32_t number = vsh_model_mesh_material(masks->model, mesh);
-    *is = false;
-    if (number < 0 || vsh_model_get_material(masks->model, (size_t)number).alpha != VSH_ALPHA_BLENDED) {
+    *blend = VSHI_BLEND_GLASS;
+    if (number < 0) {
+        return VSH_OK;
+    }
+    const vsh_model_material told = vsh_model_get_material(masks->model, (size_t)number);
+    if (told.alpha != VSH_ALPHA_BLENDED) {
         return VSH_OK;
     }
     VSHI_TRY(read_material(masks, (size_t)number, run, error));
-    *is = masks->materials[number].state == BY_MASK && masks->materials[number].binary;
+    const material *m = &masks->materials[number];
+    if (m->state == BY_MASK && m->binary) {
+        *blend = VSHI_BLEND_CUT_OUT;
+    } else if (m->state == WHOLE && told.by_texture != 0 && told.base_alpha >= 1.0) {
+        *blend = VSHI_BLEND_NOTHING;
+    }
     return VSH_OK;
 }
 
