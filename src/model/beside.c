@@ -50,6 +50,10 @@ static vsh_result tell(const telling *t, char *path, bool anyhow, vsh_error *err
     if (path == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", t->path);
     }
+    if (vshi_job_advance(t->job, 0)) {
+        free(path);
+        return vshi_job_fail_cancelled(t->job, error);
+    }
     if (is_outside(t, path) || (!anyhow && !is_there(path))) {
         free(path);
         return VSH_OK;
