@@ -263,6 +263,8 @@ inputs_of() {
         refused 2 "$out: the output is also an input" emblem.png
         shade render level.gltf --sun 0,1,0 --size 16x16 -o "$out"
         refused 2 "$out: the output is also an input" emblem.png
+        shade bake level.gltf "${BAKE[@]}" --receive floor -o out.exr --stats "$out"
+        refused 2 "$out: the output is also an input" emblem.png
     done
     for out in level.bin hard.field; do
         shade field level.gltf --resolution 32 -o "$out"

@@ -110,16 +110,24 @@ static int check_files(const cli_bake_settings *settings, const vsh_scene *scene
     return CLI_OK;
 }
 
-/* Outputs of objects have their names only now. */
+/* Outputs of objects have their names only now; the others are looked at once more, as inputs of models are
+ * found by reading those. */
 static int check_outputs(const cli_bake_settings *settings, const vsh_scene *scene, const vsh_bake_job *job) {
-    const size_t count = vsh_bake_job_count(job);
-    const char **outputs = calloc(count + 1, sizeof *outputs);
+    const char *const others[] = {settings->stats, settings->exr, settings->view, settings->invalid_picture};
+    enum { OTHERS = sizeof others / sizeof others[0] };
+    const size_t lightmaps = vsh_bake_job_count(job);
+    const char **outputs = calloc(lightmaps + OTHERS, sizeof *outputs);
     int code = outputs != NULL ? CLI_OK : cli_out_of_memory(settings->input);
-    for (size_t i = 0; i < count && code == CLI_OK; ++i) {
+    size_t count = 0;
+    for (size_t i = 0; i < lightmaps && code == CLI_OK; ++i) {
         vsh_job_lightmap lightmap;
         vsh_bake_job_lightmap(job, i, &lightmap);
-        outputs[i] = lightmap.output;
+        outputs[count++] = lightmap.output;
         code = cli_bake_check_output(settings, scene, lightmap.output);
+    }
+    for (size_t i = 0; i < OTHERS && code == CLI_OK; ++i) {
+        outputs[count] = others[i];
+        count += others[i] != NULL;
     }
     code = code == CLI_OK ? cli_bake_check_inputs(settings, scene, outputs, count) : code;
     free(outputs);

@@ -240,6 +240,7 @@ static int check_files(const render_settings *s, const vsh_scene *scene) {
     CLI_TRY(check_frames(s, scene));
     if (s->bake.stats != NULL) {
         CLI_TRY(cli_bake_check_output(&s->bake, scene, s->bake.stats));
+        CLI_TRY(cli_bake_check_inputs(&s->bake, scene, &s->bake.stats, 1));
     }
     if (scene->light_count == 0 && !scene->ao && s->lightmap_count == 0) {
         return cli_usage("%s: no lights and no ao; give --sun X,Y,Z or --ao DISTANCE, or both",
