@@ -45,7 +45,7 @@ static bool is_outside(const telling *t, const char *path) {
     return t->run->allow_outside == 0 && !vshi_input_is_beside(t->path, path);
 }
 
-/* Takes `path` over, which is NULL where memory was short. */
+/* Takes `path` over, which is NULL where memory was short; one that is not there only `anyhow`. */
 static vsh_result tell(const telling *t, char *path, bool anyhow, vsh_error *error) {
     if (path == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", t->path);
@@ -69,13 +69,14 @@ static vsh_result tell_uri(const telling *t, const char *uri, bool anyhow, vsh_e
                : tell(t, vshi_uri_path(t->path, uri), anyhow, error);
 }
 
-/* The JSON of a glTF or GLB; *root NULL: it has none that can be read. */
-static vsh_result load_json(const telling *t, FILE *file, uint64_t size, json_t **root, vsh_error *error) {
+/* The JSON of a glTF or GLB, and which of the two; root NULL: it has none that can be read. */
+static vsh_result load_json(const telling *t, FILE *file, uint64_t size, vshi_gltf *gltf, vsh_error *error) {
     enum { HEADER = 12, CHUNK = 8 };
     char head[HEADER + CHUNK];
     char *text = NULL;
     if (fread(head, 1, sizeof head, file) == sizeof head && memcmp(head, "glTF", 4) == 0) {
         const uint64_t chunk = vshi_bytes_number(head + HEADER, 4, false);
+        gltf->binary = true;
         size = chunk <= size - sizeof head ? chunk : 0;
     } else {
         rewind(file);
@@ -88,7 +89,7 @@ static vsh_result load_json(const telling *t, FILE *file, uint64_t size, json_t 
     if (fread(text, 1, (size_t)size, file) == size) {
         json_error_t where;
         bool early;
-        *root = vshi_gltf_parse_json(text, (size_t)size, &where, &early);
+        gltf->root = vshi_gltf_parse_json(text, (size_t)size, &where, &early);
     }
     free(text);
     return VSH_OK;
@@ -113,12 +114,12 @@ static vsh_result beside_gltf(const telling *t, vsh_error *error) {
     if (vshi_input_open(t->path, t->path, UINT64_MAX, &file, &size, &ignored) != VSH_OK) {
         return VSH_OK;
     }
-    vsh_result result = load_json(t, file, size, &gltf.root, error);
+    vsh_result result = load_json(t, file, size, &gltf, error);
     fclose(file);
     size_t i;
     json_t *given;
     json_array_foreach(json_object_get(gltf.root, "buffers"), i, given) {
-        VSHI_TRY_DONE(tell_uri(t, json_string_value(json_object_get(given, "uri")), true, error));
+        VSHI_TRY_DONE(tell_uri(t, json_string_value(json_object_get(given, "uri")), !gltf.binary, error));
     }
     json_array_foreach(json_object_get(gltf.root, "materials"), i, given) {
         VSHI_TRY_DONE(tell_texture(t, &gltf, given, error));
