@@ -279,8 +279,9 @@ done:
 /* Checks planes, tint, ambient light and lights. */
 static vsh_result check(const vsh_lightmap *lightmap, const vsh_texels *texels, const vsh_light *lights,
                         size_t light_count, vsh_error *error) {
+    const bool turns = texels->tangent != NULL || texels->count == 0; /* rows without a chart have none */
     if (lightmap->bent != NULL && lightmap->bent_space != VSH_BENT_WORLD &&
-        (lightmap->bent_space != VSH_BENT_TANGENT || texels->tangent == NULL)) {
+        (lightmap->bent_space != VSH_BENT_TANGENT || !turns)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "bent_space %d: expected %d, or %d with texels that have tangents",
                          lightmap->bent_space, VSH_BENT_WORLD, VSH_BENT_TANGENT);

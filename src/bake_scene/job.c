@@ -5,6 +5,7 @@
 #include "bake_scene/seams.h"
 #include "bake_scene/shares.h"
 #include "base/clock.h"
+#include "base/file.h"
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
@@ -12,6 +13,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_error *error) {
     VSHI_NEEDS(scene);
@@ -73,6 +75,14 @@ static vsh_result check_lit(const vsh_scene *scene, const vsh_bake_job_options *
     if (options->lit_image_place < VSH_LIT_IMAGES_AUTO || options->lit_image_place > VSH_LIT_IMAGES_BESIDE) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_job_options.lit_image_place is %d",
                          options->lit_image_place);
+    }
+    const bool embeds = options->lit_image_place == VSH_LIT_IMAGES_EMBED && options->sink == NULL;
+    for (size_t i = 0; embeds && i < scene->receiver_count; ++i) {
+        const char *output = scene->receivers[i].output;
+        if (strcasecmp(vshi_path_ending(output), "obj") == 0) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: an OBJ holds no images; they stand beside it",
+                             output);
+        }
     }
     return VSH_OK;
 }
