@@ -45,6 +45,10 @@ load parts
     "$VDBSHADE" merge objects --quiet
     rm one2/a.exr one2/b.png
     diff -r one2 objects
+    parts v1.2/ 2 "" "${CLOISTER[@]}" --size 64 --per-object
+    rmdir v1.2 # parts come from elsewhere, and the folder's name tells that it is one
+    "$VDBSHADE" merge v1.2/ --quiet
+    diff -r one2 v1.2
 }
 
 @test "seams between pages are fixed where parts are put together, too, and objects have their own" {

@@ -157,11 +157,7 @@ static void say_lightmap(void *user, const vsh_job_lightmap *lightmap, vsh_resul
 /* A name to go before ".I-of-N.part", to be freed. */
 static char *name_parts(const cli_bake_settings *s, const vsh_scene *scene) {
     const char *output = s->output != NULL ? s->output : scene->receivers[0].output;
-    size_t length = strlen(output);
-    while (length > 1 && output[length - 1] == '/') {
-        --length; /* a folder, of objects */
-    }
-    return strndup(output, length);
+    return cli_end_path(output, ""); /* a folder, of objects */
 }
 
 static void say_part(const cli_bake_settings *s, const char *parts, const vsh_bake_report *report) {

@@ -1,14 +1,18 @@
 /* vdbshade merge: the parts of a bake, put together. */
 #include "cli/bake/bake.h"
 #include "cli/message.h"
+#include "cli/paths.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 enum { MOST_WORDS = 100000 };
 enum { KEY_SHARDS = 0x2000, KEY_STATS, KEY_INVALID, KEY_EXR, KEY_VIEW };
 
 typedef struct merge_settings {
-    const char *output, *stats, *invalid_picture, *exr, *view;
+    const char *output; /* without slashes at its end: parts of a folder stand beside it */
+    const char *folder; /* the same with one */
+    const char *stats, *invalid_picture, *exr, *view;
     int32_t shards; /* 0: as many as there are */
     cli_common common;
 } merge_settings;
@@ -69,7 +73,10 @@ static int merge_bake(const merge_settings *s, int argc, char **argv) {
         return code != CLI_OK ? code : cli_usage("%s: its parts are of no bake", s->output);
     }
     bake.common = s->common;
-    bake.output = bake.output != NULL ? s->output : NULL;
+    if (bake.output != NULL) { /* a folder of objects stays one */
+        const char *slash = strrchr(bake.output, '/');
+        bake.output = slash != NULL && slash[1] == '\0' ? s->folder : s->output;
+    }
     bake.merged = s->output;
     bake.shard = 0;
     bake.shard_count = s->shards;
@@ -102,11 +109,18 @@ static int merge_main(int argc, char **argv) {
         return code;
     }
     const vsh_run run = cli_common_run(&s.common);
-    char **words = NULL;
+    char **words = NULL, *output = cli_end_path(s.output, ""), *folder = cli_end_path(s.output, "/");
     size_t count = 0;
     vsh_error error;
+    if (output == NULL || folder == NULL) {
+        code = cli_out_of_memory(s.output);
+        goto done;
+    }
+    s.output = output;
+    s.folder = folder;
     if (vsh_part_words(s.output, s.shards, &run, &words, &count, &error) != VSH_OK) {
-        return cli_fail(&error);
+        code = cli_fail(&error);
+        goto done;
     }
     const char *kind = count > 1 && count < MOST_WORDS ? words[0] : "";
     if (strcmp(kind, cli_bake.name) == 0) {
@@ -117,5 +131,8 @@ static int merge_main(int argc, char **argv) {
         code = cli_usage("%s: its parts are of no bake", s.output);
     }
     vsh_part_words_free(words);
+done:
+    free(folder);
+    free(output);
     return code;
 }
