@@ -78,7 +78,8 @@ typedef struct vsh_mesh {
  * matches; any other its name, its object's name, or what its name has behind its object's
  * ("Wall", "Cube.003" and "Wall/Cube.003" for a node Wall with a mesh Cube.003) is `pattern`, or is matched
  * by it as a shell matches: * for anything, ? for one character, [a-c] for one byte of some, [!a-c] for one
- * of all others, \\ before what is meant as it is. Case counts. 1 or 0; 0 too where either is NULL. */
+ * of all others, \\ before what is meant as it is. Case counts. A mesh without names is called "". 1 or 0; 0
+ * too where either is NULL. */
 VSH_API int32_t vsh_mesh_matches(const vsh_mesh *mesh, const char *pattern);
 
 /* What vsh_mesh_check() found. Vertices at equal positions count as one, so seams of UVs open nothing. */

@@ -35,7 +35,7 @@ typedef struct vsh_selection {
     size_t except_count;
 } vsh_selection;
 
-/* What meshes are to be taken for, by a pattern as of vsh_mesh_matches(). */
+/* What meshes are to be taken for, by a pattern as in vsh_selection. */
 typedef struct vsh_solidity_rule {
     const char *pattern; /* of the names that are meant */
     int32_t solidity;    /* VSH_SOLIDITY_… */

@@ -8,13 +8,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool apply_rule(const vsh_solidity_rule *rule, const vshi_mesh_list *list) {
+/* To what it means by objects' names in all of the lists, or by those of materials; whether there is any. */
+static bool apply_rule(const vsh_solidity_rule *rule, bool material, const vshi_mesh_list *lists,
+                       size_t count) {
     bool matched = false;
-    for (size_t i = 0; i < list->count; ++i) {
-        vsh_mesh *mesh = &list->meshes[i];
-        if (vsh_mesh_matches(mesh, rule->pattern)) {
-            mesh->solidity = mesh->mask != NULL ? VSH_SOLIDITY_SHELL : rule->solidity;
-            matched = true;
+    for (size_t k = 0; k < count; ++k) {
+        for (size_t i = 0; lists[k].model != NULL && i < lists[k].count; ++i) {
+            vsh_mesh *mesh = &lists[k].meshes[i];
+            if (vshi_mesh_is_meant(mesh, rule->pattern, material)) {
+                mesh->solidity = mesh->mask != NULL ? VSH_SOLIDITY_SHELL : rule->solidity;
+                matched = true;
+            }
         }
     }
     return matched;
@@ -26,7 +30,6 @@ static vsh_result apply_rules(const vsh_solidity_rule *rules, size_t rule_count,
     for (size_t r = 0; r < rule_count; ++r) {
         const vsh_solidity_rule *rule = &rules[r];
         const vshi_mesh_list *first = NULL;
-        bool matched = false;
         if (rule->pattern == NULL || rule->solidity < VSH_SOLIDITY_AUTO ||
             rule->solidity > VSH_SOLIDITY_INWARD) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "rule of solidity %zu: %s", r,
@@ -35,8 +38,9 @@ static vsh_result apply_rules(const vsh_solidity_rule *rules, size_t rule_count,
         }
         for (size_t i = 0; i < count; ++i) {
             first = first == NULL && casters[i].model != NULL ? &casters[i] : first;
-            matched = (casters[i].model != NULL && apply_rule(rule, &casters[i])) || matched;
         }
+        const bool matched =
+            apply_rule(rule, false, casters, count) || apply_rule(rule, true, casters, count);
         if (!matched && first != NULL) {
             return vshi_fail_unmatched(first->model, first->path, rule->pattern, error);
         }

@@ -180,6 +180,13 @@ differ() {
     shade bake whole.gltf "${BAKE[@]}" --receive earth -o named.exr
     done_well
     same_values named.exr whole.exr || fail "--receive"
+    local -a fit=(--sun 0,1,0 --size 96 --unwrap always)
+    shade bake whole.gltf "${fit[@]}" --density floor=0.5 -o whole.exr
+    shade bake whole.gltf "${fit[@]}" --density earth=0.5 -o named.exr
+    done_well
+    same_values named.exr whole.exr || fail "--density"
+    shade bake whole.gltf "${BAKE[@]}" --receive floor --shell leaf --solid 'material:w*' -o named.exr
+    done_well
     old_output out.exr
     shade bake whole.gltf "${BAKE[@]}" --no-cast woof -o out.exr
     refused 2 "no object is named 'woof'" "did you mean 'wood'" "materials 'leaf', 'earth'"
