@@ -115,7 +115,10 @@ static vsh_result check(const vsh_scene *scene, const vsh_bake_job_options *opti
     }
     VSHI_TRY(check_shard(options, error));
     for (size_t i = 0; i < scene->receiver_count && options->sink == NULL; ++i) {
-        VSHI_TRY(vsh_receiver_check(scene, i, error));
+        const vsh_result result = vsh_receiver_check(scene, i, error);
+        if (result != VSH_OK && (result != VSH_ERROR_WRITE || options->forecast == 0)) {
+            return result;
+        }
     }
     return check_lit(scene, options, error);
 }

@@ -149,13 +149,16 @@ done:
 /* --- what is kept for the next bake */
 
 char *vshi_job_kept_name(const vsh_bake_job *job, size_t index) {
-    if (job->options.shard == 0) {
-        return strdup(job->lightmaps[index].output);
+    const bool part = job->options.shard != 0;
+    const vsh_job_lightmap *lightmap = part ? NULL : &job->lightmaps[index];
+    if (!part && (lightmap->page == 0 || !vsh_lit_is_output(lightmap->output))) {
+        return strdup(lightmap->output);
     }
-    const size_t size = strlen(job->part_path) + 24;
+    const char *file = part ? job->part_path : lightmap->output; /* an asset has all of its pages */
+    const size_t size = strlen(file) + 24;
     char *name = malloc(size);
     if (name != NULL) {
-        snprintf(name, size, "%s.%zu", job->part_path, index);
+        snprintf(name, size, "%s.%zu", file, part ? index : lightmap->page);
     }
     return name;
 }

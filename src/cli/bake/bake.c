@@ -137,8 +137,12 @@ static bool is_each_told(const telling *t) {
 static void say_lightmap(void *user, const vsh_job_lightmap *lightmap, vsh_result result) {
     const telling *t = user;
     if (result != VSH_OK && lightmap->kept_rows > 0) {
-        cli_say("%s: %d of %d rows are kept in %s.resume; the same command goes on from there",
-                lightmap->output, lightmap->kept_rows, lightmap->height, lightmap->output);
+        char page[32] = "";
+        if (lightmap->page > 0 && vsh_lit_is_output(lightmap->output)) {
+            snprintf(page, sizeof page, ".%zu", lightmap->page);
+        }
+        cli_say("%s: %d of %d rows are kept in %s%s.resume; the same command goes on from there",
+                lightmap->output, lightmap->kept_rows, lightmap->height, lightmap->output, page);
     }
     if (result != VSH_OK || t->common->quiet || t->part || !is_each_told(t)) {
         return;
@@ -264,6 +268,7 @@ static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
     char *parts = name_parts(settings, scene);
     options.shard = settings->dry_run ? 0 : settings->shard; /* what is told is of the whole */
     options.shard_count = settings->shard_count;
+    options.forecast = settings->dry_run;
     options.parts = settings->merged != NULL ? settings->merged : parts;
     options.words = settings->words;
     options.word_count = settings->word_count;
