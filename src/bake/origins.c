@@ -239,7 +239,7 @@ static vsh_result keep_needed(const lifting *l, vshi_origins_keep *keep, void *u
     vsh_result result;
     VSHI_TRY_DONE(keep(user, origins, needed, error));
     for (size_t row = 0; row < rows; ++row) {
-        if (!needed[row]) {
+        if (!needed[row] && texels->row_start[row + 1] > texels->row_start[row]) {
             const size_t first = texels->row_start[row];
             memset(origins->valid + first, 0, texels->row_start[row + 1] - first);
         }
