@@ -74,7 +74,7 @@ static vsh_result find_needed(void *user, const vshi_origins *origins, uint8_t *
         taken[row] = taken[row] || (at + near >= band->own_begin && at < band->own_end + near);
     }
     const bool shared = vshi_baking_interpolates(bake) && needs(bake, NEEDS_ANY_AO);
-    memset(rows, 0, count);
+    memset(rows, VSHI_ROW_LEFT_OUT, count);
     for (size_t row = 0; row < count; ++row) {
         size_t begin = row + band->held_begin, end = begin + 1;
         if (shared) {
@@ -82,8 +82,11 @@ static vsh_result find_needed(void *user, const vshi_origins *origins, uint8_t *
         }
         begin = begin > band->held_begin ? begin - band->held_begin : 0;
         if (taken[row]) {
-            memset(rows + begin, 1, end - band->held_begin - begin);
+            memset(rows + begin, VSHI_ROW_BESIDE, end - band->held_begin - begin);
         }
+    }
+    for (size_t row = 0; row < count; ++row) {
+        rows[row] = taken[row] ? VSHI_ROW_WANTED : rows[row];
     }
     free(taken);
     return VSH_OK;
