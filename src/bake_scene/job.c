@@ -1,5 +1,6 @@
 #include "bake_scene/job.h"
 
+#include "bake_scene/bounds.h"
 #include "bake_scene/lit_sink.h"
 #include "bake_scene/part_job.h"
 #include "bake_scene/seams.h"
@@ -224,21 +225,6 @@ static bool is_shard(const vsh_bake_job *job) {
     return job->options.shard > 0;
 }
 
-/* Where its samples are: looked at in passing, or (whole) all of them are made. */
-static vsh_result find_bounds(const vsh_charts *charts, const vshi_bands *bands, bool whole,
-                              const vsh_run *run, vsh_texels **texels, double low[3], double high[3],
-                              vsh_error *error) {
-    if (!whole) {
-        return vsh_charts_bounds(charts, run, low, high, error);
-    }
-    VSHI_TRY(vsh_texels_create_band(charts, 0, bands->rows, run, texels, error));
-    vsh_texels_info info;
-    vsh_texels_get_info(*texels, &info);
-    memcpy(low, info.bounds_min, sizeof info.bounds_min);
-    memcpy(high, info.bounds_max, sizeof info.bounds_max);
-    return VSH_OK;
-}
-
 static vsh_result measure(vsh_bake_job *job, size_t index, bool bakes, const vsh_run *run, vsh_error *error) {
     vsh_job_lightmap *lightmap = &job->lightmaps[index];
     vsh_charts *charts = NULL;
@@ -252,13 +238,14 @@ static vsh_result measure(vsh_bake_job *job, size_t index, bool bakes, const vsh
                                      tells, run, &charts, error));
     vsh_charts_info counted;
     vsh_charts_get_info(charts, &counted);
-    VSHI_TRY_DONE(vshi_shares_note(job, index, charts, error));
-    if (!is_shard(job)) {
+    if (is_shard(job)) {
+        VSHI_TRY_DONE(vshi_shares_note(job, index, charts, run, error));
+    } else {
         VSHI_TRY_DONE(vshi_job_plan(job, index, charts, 0, run, &bands, error));
     }
     if (!job->merges) { /* which asks nothing of what casts */
         const bool all = bakes && bands.count == 1 && !is_shard(job);
-        VSHI_TRY_DONE(find_bounds(charts, &bands, all, run, &texels, low, high, error));
+        VSHI_TRY_DONE(vshi_job_bounds(job, index, charts, &bands, all, run, &texels, low, high, error));
     }
     lightmap->covered = counted.covered;
     lightmap->samples = counted.samples;
