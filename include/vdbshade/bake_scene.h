@@ -64,11 +64,12 @@ typedef struct vsh_bake_job_options {
     int32_t allow_overlap; /* nonzero: objects may share texels, whatever their receivers say */
     int32_t band_rows;     /* rows that are baked at a time, up to a multiple of VSH_BAND_STEP; 0: all, or as
                               many as run->memory_limit lets */
-    int32_t
-        resume; /* nonzero: bands are kept in OUTPUT.resume until all lightmaps are whole, and taken from
-                   there by the next bake of the same scene with the same settings. Needs files as outputs */
+    int32_t resume;        /* nonzero: bands are kept in OUTPUT.resume, of further pages of an asset
+                              OUTPUT.PAGE.resume, until all lightmaps are whole, and taken from there by the next
+                              bake of the same scene with the same settings. Needs files as outputs */
     const char *invalid_picture; /* PNG of the texels that are not valid, for each lightmap: where there are
-                                    several, FILE.OUTPUT.png. NULL: none. Not with `resume` */
+                                    several, FILE.OUTPUT.png, of pages of an asset with the number or the
+                                    object. NULL: none. Not with `resume` */
     const vsh_row_sink *sink; /* NULL: image files at the receivers' outputs, which say where they come from
                                  (vsh_provenance); where an output's name ends in .glb, .gltf or .obj, the
                                  receiver's file with its light (vsh_lit_write()): AO as occlusion, irradiance
@@ -94,12 +95,14 @@ typedef struct vsh_bake_job_options {
     const char *parts;   /* what the names of parts begin with; NULL: the first lightmap's output */
     const char *const *words; /* [word_count]: kept in a part as they are, for vsh_part_words() */
     size_t word_count;
+    int32_t forecast; /* nonzero: only what vsh_bake_job_forecast() tells is asked for, and the folders of
+                         outputs need not be there */
 } vsh_bake_job_options;
 
 static inline vsh_bake_job_options vsh_bake_job_options_default(void) {
     vsh_bake_job_options options = {
         sizeof(vsh_bake_job_options), 0,    0, 0, 0,    NULL, NULL, NULL, NULL, 0, NULL, NULL, NULL, 0,
-        VSH_LIT_IMAGES_AUTO,          NULL, 0, 0, NULL, NULL, 0};
+        VSH_LIT_IMAGES_AUTO,          NULL, 0, 0, NULL, NULL, 0,    0};
     return options;
 }
 

@@ -35,6 +35,16 @@ enum {
     VSH_WRAP_CLAMP = 2   /* its edge goes on */
 };
 
+/* Which channel of an image a material's alpha is. */
+enum {
+    VSH_MASK_CHANNEL_ALPHA = 0, /* A; 1 where there is none */
+    VSH_MASK_CHANNEL_RED = 1,
+    VSH_MASK_CHANNEL_GREEN = 2,
+    VSH_MASK_CHANNEL_BLUE = 3,
+    VSH_MASK_CHANNEL_LUMINANCE = 4, /* 0.2126 R + 0.7152 G + 0.0722 B as they are in the file, or Y */
+    VSH_MASK_CHANNEL_AUTO = 5       /* A where it is below 1 anywhere, else the luminance */
+};
+
 /* Where a mesh is cut out by a texture: light comes through where base_alpha × the texture's alpha, looked up
  * bilinearly, is below alpha_cutoff (glTF 2.0, 3.9.4). A view; nothing is owned. */
 typedef struct vsh_alpha_mask {
@@ -78,7 +88,8 @@ typedef struct vsh_mesh {
  * matches; any other its name, its object's name, or what its name has behind its object's
  * ("Wall", "Cube.003" and "Wall/Cube.003" for a node Wall with a mesh Cube.003) is `pattern`, or is matched
  * by it as a shell matches: * for anything, ? for one character, [a-c] for one byte of some, [!a-c] for one
- * of all others, \\ before what is meant as it is. Case counts. 1 or 0; 0 too where either is NULL. */
+ * of all others, \\ before what is meant as it is. Case counts. A mesh without names is called "". 1 or 0; 0
+ * too where either is NULL. */
 VSH_API int32_t vsh_mesh_matches(const vsh_mesh *mesh, const char *pattern);
 
 /* What vsh_mesh_check() found. Vertices at equal positions count as one, so seams of UVs open nothing. */
@@ -162,9 +173,12 @@ typedef struct vsh_model_material {
     size_t image_size; /* bytes of it */
     const char *image_path; /* the file, within the model's folder unless run->allow_outside; it need not be
                                there. NULL: none */
+    int32_t image_channel;  /* VSH_MASK_CHANNEL_… */
+    int32_t by_texture; /* 1: the format has no mode of alpha (OBJ): it is blended by base_alpha and the image
+                           alone, and as good as opaque where neither leaves anything out */
 } vsh_model_material;
 
-/* Number of materials of the file: of PLY 0. Of formats other than glTF name and
+/* Number of materials of the file: of PLY 0. Of formats other than glTF and OBJ name and
  * `alpha` are told. */
 VSH_API size_t vsh_model_material_count(const vsh_model *model);
 

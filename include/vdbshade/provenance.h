@@ -40,14 +40,14 @@ static inline vsh_provenance_source vsh_provenance_source_default(void) {
  * - vdbshade_voxel_size;
  * - those of the source;
  * - vdbshade_input_N: "sha256:… NAME" of each input, from N = 0: the source's files, then those of casters
- *   and receivers, then the .bin files of glTF among them, each file once; one outside of its model's folder
- *   only with run->allow_outside. */
+ *   and receivers, then what is read with models (.bin files, .mtl files, textures that cut out), each once;
+ *   what is outside of its model's folder only with run->allow_outside. */
 typedef struct vsh_provenance vsh_provenance;
 
 /* Reads every input once, to hash it. Free the result with vsh_provenance_free(). Errors:
  * - VSH_ERROR_ARGUMENT: source or provenance NULL, run;
  * - VSH_ERROR_READ: as vsh_file_digest();
- * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED (under the stage "hash"). */
+ * - VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED (under the stage "hash"). */
 VSH_API vsh_result vsh_provenance_create(const vsh_provenance_source *source, const vsh_run *run,
                                          vsh_provenance **provenance, vsh_error *error);
 

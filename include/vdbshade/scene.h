@@ -35,7 +35,7 @@ typedef struct vsh_selection {
     size_t except_count;
 } vsh_selection;
 
-/* What meshes are to be taken for, by a pattern as of vsh_mesh_matches(). */
+/* What meshes are to be taken for, by a pattern as in vsh_selection. */
 typedef struct vsh_solidity_rule {
     const char *pattern; /* of the names that are meant */
     int32_t solidity;    /* VSH_SOLIDITY_… */
@@ -211,6 +211,15 @@ typedef struct vsh_scene {
  * - VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_scene_read(const char *path, const vsh_run *run, vsh_scene **scene, vsh_error *error);
 VSH_API void vsh_scene_free(vsh_scene *scene); /* of vsh_scene_read() only; NULL does nothing */
+
+/* Refuses an output that is there already and is read with the scene: a file that it names, or what those
+ * name (the buffers and textures of a glTF, the materials of an OBJ), by whatever path or link. Of models it
+ * looks for names only, and only where there is such an output. `outputs` [output_count], none NULL. Thread
+ * safe. Errors:
+ * - VSH_ERROR_ARGUMENT: such an output; scene or outputs NULL, run;
+ * - VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED (under the stage "hash"). */
+VSH_API vsh_result vsh_scene_check_outputs(const vsh_scene *scene, const char *const *outputs,
+                                           size_t output_count, const vsh_run *run, vsh_error *error);
 
 /* The lights of a model's file (vsh_model_get_light()) as those of a scene. Lights of files have no size:
  * directional ones get `angle` (angular diameter, radians, 0 … π, excluded), points, which become spheres,

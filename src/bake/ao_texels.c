@@ -1,5 +1,6 @@
 #include "bake/ao_texels.h"
 
+#include "bake/ao_reach.h"
 #include "bake/raster.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -31,6 +32,7 @@ typedef struct sharing {
     float *open;   /* [origins.count][3]: bent normals by them; NULL: not asked for */
     plane *planes; /* [origins.count]: of texels that shot */
     float *values, *deviation, *bent;
+    vshi_ao_reach reach;
     int32_t spacing;        /* of the lattice at work */
     _Atomic size_t refused; /* blocks whose memory was */
     /* of the errors of rows of tiles, in VSHI_SQUARE_UNIT: their squares, and vshi_window_estimate's curved
@@ -73,8 +75,9 @@ static bool find_texels(const sharing *s, block *b) {
         const int32_t x = k % WIDTH, y = k / WIDTH;
         b->at[k] =
             vshi_texel_at(&s->share.map, b->lattice.left + x * s->spacing, b->lattice.top + y * s->spacing);
-        any = any || (x >= VSHI_TILE && x < VSHI_TILE + INNER && y >= VSHI_TILE && y < VSHI_TILE + INNER &&
-                      is_own(s, b->at[k]));
+        any =
+            any || (x >= VSHI_TILE && x < VSHI_TILE + INNER && y >= VSHI_TILE && y < VSHI_TILE + INNER &&
+                    is_own(s, b->at[k]) && vshi_ao_is_estimated(&s->reach, b->lattice.top + y * s->spacing));
     }
     return any;
 }
@@ -147,6 +150,9 @@ static vshi_window_estimate estimate(const sharing *s, const block *b, int32_t x
 static void estimate_own(const sharing *s, const block *b) {
     const float part = 1.0f / (float)s->spacing;
     for (int32_t y = VSHI_TILE; y < VSHI_TILE + INNER; ++y) {
+        if (!vshi_ao_is_estimated(&s->reach, b->lattice.top + y * s->spacing)) {
+            continue;
+        }
         for (int32_t x = VSHI_TILE; x < VSHI_TILE + INNER; ++x) {
             const uint32_t at = b->at[y * WIDTH + x];
             if (!is_own(s, at)) {
@@ -257,6 +263,9 @@ static void fill_cells(void *user, size_t begin, size_t end) {
     const sharing *s = user;
     const vshi_texel_map *map = &s->share.map;
     for (size_t row = begin; row < end; ++row) {
+        if (!s->reach.wanted[row * (size_t)s->spacing / VSHI_TILE]) {
+            continue;
+        }
         for (int32_t column = 0; column < map->width; column += s->spacing) {
             cell c = {.at = {column, (int32_t)row * s->spacing}};
             bool looked = false;
@@ -286,7 +295,7 @@ static void sum_rows(void *user, size_t begin, size_t end) {
         uint64_t square = 0, rays = 0, refined = 0, invalid = 0;
         int64_t curved = 0;
         double worst = 0.0;
-        for (size_t i = rows->start[row]; i < rows->start[row + 1]; ++i) {
+        for (size_t i = rows->start[row]; s->reach.wanted[row] && i < rows->start[row + 1]; ++i) {
             if (s->share.level[i] == VSHI_AO_KNOWN_LEVEL) {
                 s->values[i] = s->shot[i];
                 s->planes[i] = (plane){.deviation = isnan(s->shot[i]) ? NAN : 0.0f};
@@ -359,6 +368,21 @@ static vsh_result estimate_all(sharing *s, vshi_job *job, vsh_error *error) {
     return vshi_parallel_for(job, s->origins->rows.count, 1, 0, sum_rows, s, error);
 }
 
+/* Which rows' values are wanted, and what is to shoot for them. */
+static vsh_result open_reach(sharing *s, vsh_error *error) {
+    vshi_ao_reach *reach = &s->reach;
+    reach->rows = s->origins->rows.count;
+    reach->columns = ((size_t)s->texels->info.width + VSHI_TILE - 1) / VSHI_TILE;
+    VSHI_TRY(vshi_allocate((void **)&reach->wanted, reach->rows, 1, "AO texels", error));
+    VSHI_TRY(vshi_allocate((void **)&reach->lattices, reach->rows, reach->columns, "AO texels", error));
+    for (size_t row = 0; row < reach->rows; ++row) {
+        reach->wanted[row] = s->origins->needed[row] == VSHI_ROW_WANTED;
+    }
+    vshi_ao_reach_first(reach, s->texels->ao_spacing);
+    s->share.lattices = reach->lattices;
+    return VSH_OK;
+}
+
 vsh_result vshi_ao_texels(const vsh_occluders *occluders, const vsh_texels *texels,
                           const vshi_origins *origins, const vsh_points *points,
                           const vsh_shade_options *options, const vsh_run *run, float *values,
@@ -387,18 +411,25 @@ vsh_result vshi_ao_texels(const vsh_occluders *occluders, const vsh_texels *texe
     VSHI_TRY_DONE(vshi_allocate((void **)&s.planes, count, sizeof *s.planes, what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&s.square, origins->rows.count, sizeof *s.square, what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&s.curved, origins->rows.count, sizeof *s.curved, what, error));
+    VSHI_TRY_DONE(open_reach(&s, error));
     s.share.map = (vshi_texel_map){s.at, texels->info.width, texels->band.rows};
     s.share.spacing = texels->ao_spacing;
     if (count > 0) {
         VSHI_TRY_DONE(vshi_parallel_for(job, count, 4096, 0, map_origins, &s, error));
         VSHI_TRY_DONE(vshi_shade_ao(occluders, points, NULL, options, run, s.shot, NULL, s.open, &s.share,
                                     NULL, error));
+        if (vshi_ao_reach_further(&s.reach, &s.share)) {
+            VSHI_TRY_DONE(vshi_shade_ao(occluders, points, NULL, options, &quiet, s.shot, NULL, s.open,
+                                        &s.share, NULL, error));
+        }
         VSHI_TRY_DONE(estimate_all(&s, job, error));
     }
     if (stats != NULL) {
         add_stats(&s, stats);
     }
 done:
+    free(s.reach.lattices);
+    free(s.reach.wanted);
     free(s.curved);
     free(s.square);
     free(s.planes);

@@ -54,6 +54,13 @@ typedef struct counting {
     _Atomic vsh_result row_result; /* of the rows that failed */
 } counting;
 
+/* Texels of a tile beside those given. */
+static uint64_t beside(uint64_t texels) {
+    static const uint64_t FIRST_COLUMN = UINT64_C(0x0101010101010101);
+    return texels << VSHI_TILE | texels >> VSHI_TILE | (texels & ~(FIRST_COLUMN << 7)) << 1 |
+           (texels & ~FIRST_COLUMN) >> 1;
+}
+
 static void count_rows(void *user, size_t begin, size_t end) {
     counting *all = user;
     const vshi_charts *sorted = &all->charts->sorted;
@@ -81,7 +88,9 @@ static void count_rows(void *user, size_t begin, size_t end) {
                 samples += work.tile.owner[i] != 0;
             }
             total->samples += samples;
-            total->texels += (size_t)__builtin_popcountll(work.tile.border | work.tile.covered);
+            const uint64_t covered = work.tile.border | work.tile.covered;
+            total->texels += (size_t)__builtin_popcountll(covered);
+            total->edges += (size_t)__builtin_popcountll(covered & beside(~covered));
         }
         vshi_row_close(&work);
         atomic_fetch_add(&all->samples, total->samples);

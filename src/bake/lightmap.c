@@ -74,7 +74,7 @@ static vsh_result find_needed(void *user, const vshi_origins *origins, uint8_t *
         taken[row] = taken[row] || (at + near >= band->own_begin && at < band->own_end + near);
     }
     const bool shared = vshi_baking_interpolates(bake) && needs(bake, NEEDS_ANY_AO);
-    memset(rows, 0, count);
+    memset(rows, VSHI_ROW_LEFT_OUT, count);
     for (size_t row = 0; row < count; ++row) {
         size_t begin = row + band->held_begin, end = begin + 1;
         if (shared) {
@@ -82,8 +82,11 @@ static vsh_result find_needed(void *user, const vshi_origins *origins, uint8_t *
         }
         begin = begin > band->held_begin ? begin - band->held_begin : 0;
         if (taken[row]) {
-            memset(rows + begin, 1, end - band->held_begin - begin);
+            memset(rows + begin, VSHI_ROW_BESIDE, end - band->held_begin - begin);
         }
+    }
+    for (size_t row = 0; row < count; ++row) {
+        rows[row] = taken[row] ? VSHI_ROW_WANTED : rows[row];
     }
     free(taken);
     return VSH_OK;
@@ -279,8 +282,9 @@ done:
 /* Checks planes, tint, ambient light and lights. */
 static vsh_result check(const vsh_lightmap *lightmap, const vsh_texels *texels, const vsh_light *lights,
                         size_t light_count, vsh_error *error) {
+    const bool turns = texels->tangent != NULL || texels->count == 0; /* rows without a chart have none */
     if (lightmap->bent != NULL && lightmap->bent_space != VSH_BENT_WORLD &&
-        (lightmap->bent_space != VSH_BENT_TANGENT || texels->tangent == NULL)) {
+        (lightmap->bent_space != VSH_BENT_TANGENT || !turns)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "bent_space %d: expected %d, or %d with texels that have tangents",
                          lightmap->bent_space, VSH_BENT_WORLD, VSH_BENT_TANGENT);

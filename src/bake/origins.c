@@ -233,13 +233,12 @@ static vsh_result keep_needed(const lifting *l, vshi_origins_keep *keep, void *u
     vshi_origins *origins = l->origins;
     const vsh_texels *texels = l->texels;
     const size_t rows = texels->band.held_end - texels->band.held_begin;
-    uint8_t *needed = NULL;
-    VSHI_TRY(vshi_allocate((void **)&needed, rows, 1, "lightmap rows", error));
-    memset(needed, 1, rows);
-    vsh_result result;
-    VSHI_TRY_DONE(keep(user, origins, needed, error));
+    VSHI_TRY(vshi_allocate((void **)&origins->needed, rows, 1, "lightmap rows", error));
+    memset(origins->needed, VSHI_ROW_WANTED, rows);
+    VSHI_TRY(keep(user, origins, origins->needed, error));
     for (size_t row = 0; row < rows; ++row) {
-        if (!needed[row]) {
+        if (origins->needed[row] == VSHI_ROW_LEFT_OUT &&
+            texels->row_start[row + 1] > texels->row_start[row]) {
             const size_t first = texels->row_start[row];
             memset(origins->valid + first, 0, texels->row_start[row + 1] - first);
         }
@@ -247,9 +246,7 @@ static vsh_result keep_needed(const lifting *l, vshi_origins_keep *keep, void *u
     for (size_t i = 0; i < texels->count; ++i) {
         origins->before[i / VSHI_ORIGIN_BLOCK] += origins->valid[i];
     }
-done:
-    free(needed);
-    return result;
+    return VSH_OK;
 }
 
 /* Samplers tell points apart by it: the texel, and for the further samples of a texel a place some
@@ -380,6 +377,7 @@ void vshi_origins_free(vshi_origins *origins) {
     free(origins->texel);
     free(origins->surface);
     free(origins->position);
+    free(origins->needed);
     free(origins->row_start);
     free(origins->before);
     free(origins->dropped);

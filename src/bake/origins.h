@@ -22,6 +22,7 @@ typedef struct vshi_origins {
     size_t *before; /* [blocks + 1]: valid samples before each block */
     vshi_point_rows rows; /* of tiles, the band's own counted */
     size_t *row_start;    /* [rows.count + 1] */
+    uint8_t *needed;      /* [rows.count]: VSHI_ROW_… */
 } vshi_origins;
 
 /* What is baked of the samples. */
@@ -29,8 +30,12 @@ typedef struct vshi_origins_for {
     bool lights, ao;
 } vshi_origins_for;
 
-/* Called once it is known which samples are valid, with all of them: sets rows[] to 0 for the tile rows held
- * whose samples are not needed. Those count as invalid from then on. */
+/* What a tile row that is held is for: nothing, and its samples count as invalid; to tell those of other rows
+ * what is around them; for its values. */
+enum { VSHI_ROW_LEFT_OUT = 0, VSHI_ROW_BESIDE, VSHI_ROW_WANTED };
+
+/* Called once it is known which samples are valid, with all of them: sets rows[] to VSHI_ROW_… of each tile
+ * row held. */
 typedef vsh_result vshi_origins_keep(void *user, const vshi_origins *origins, uint8_t *rows,
                                      vsh_error *error);
 

@@ -34,6 +34,7 @@ static vsh_result make_texels(const vsh_bake_job *job, const vsh_run *run, vsh_t
     options.height = receiver->height < TRIAL_SIZE ? receiver->height : TRIAL_SIZE;
     options.supersample = smaller ? 1 : receiver->supersample;
     options.padding = smaller ? 0 : receiver->padding;
+    options.tangents = job->scene.bent == 1 + VSH_BENT_TANGENT;
     return vsh_texels_create(target->meshes, target->mesh_count, &options, run, NULL, texels, error);
 }
 

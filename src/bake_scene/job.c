@@ -1,10 +1,12 @@
 #include "bake_scene/job.h"
 
+#include "bake_scene/bounds.h"
 #include "bake_scene/lit_sink.h"
 #include "bake_scene/part_job.h"
 #include "bake_scene/seams.h"
 #include "bake_scene/shares.h"
 #include "base/clock.h"
+#include "base/file.h"
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
@@ -12,6 +14,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_error *error) {
     VSHI_NEEDS(scene);
@@ -74,6 +77,14 @@ static vsh_result check_lit(const vsh_scene *scene, const vsh_bake_job_options *
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_job_options.lit_image_place is %d",
                          options->lit_image_place);
     }
+    const bool embeds = options->lit_image_place == VSH_LIT_IMAGES_EMBED && options->sink == NULL;
+    for (size_t i = 0; embeds && i < scene->receiver_count; ++i) {
+        const char *output = scene->receivers[i].output;
+        if (strcasecmp(vshi_path_ending(output), "obj") == 0) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: an OBJ holds no images; they stand beside it",
+                             output);
+        }
+    }
     return VSH_OK;
 }
 
@@ -105,7 +116,10 @@ static vsh_result check(const vsh_scene *scene, const vsh_bake_job_options *opti
     }
     VSHI_TRY(check_shard(options, error));
     for (size_t i = 0; i < scene->receiver_count && options->sink == NULL; ++i) {
-        VSHI_TRY(vsh_receiver_check(scene, i, error));
+        const vsh_result result = vsh_receiver_check(scene, i, error);
+        if (result != VSH_OK && (result != VSH_ERROR_WRITE || options->forecast == 0)) {
+            return result;
+        }
     }
     return check_lit(scene, options, error);
 }
@@ -224,21 +238,6 @@ static bool is_shard(const vsh_bake_job *job) {
     return job->options.shard > 0;
 }
 
-/* Where its samples are: looked at in passing, or (whole) all of them are made. */
-static vsh_result find_bounds(const vsh_charts *charts, const vshi_bands *bands, bool whole,
-                              const vsh_run *run, vsh_texels **texels, double low[3], double high[3],
-                              vsh_error *error) {
-    if (!whole) {
-        return vsh_charts_bounds(charts, run, low, high, error);
-    }
-    VSHI_TRY(vsh_texels_create_band(charts, 0, bands->rows, run, texels, error));
-    vsh_texels_info info;
-    vsh_texels_get_info(*texels, &info);
-    memcpy(low, info.bounds_min, sizeof info.bounds_min);
-    memcpy(high, info.bounds_max, sizeof info.bounds_max);
-    return VSH_OK;
-}
-
 static vsh_result measure(vsh_bake_job *job, size_t index, bool bakes, const vsh_run *run, vsh_error *error) {
     vsh_job_lightmap *lightmap = &job->lightmaps[index];
     vsh_charts *charts = NULL;
@@ -252,13 +251,14 @@ static vsh_result measure(vsh_bake_job *job, size_t index, bool bakes, const vsh
                                      tells, run, &charts, error));
     vsh_charts_info counted;
     vsh_charts_get_info(charts, &counted);
-    VSHI_TRY_DONE(vshi_shares_note(job, index, charts, error));
-    if (!is_shard(job)) {
+    if (is_shard(job)) {
+        VSHI_TRY_DONE(vshi_shares_note(job, index, charts, run, error));
+    } else {
         VSHI_TRY_DONE(vshi_job_plan(job, index, charts, 0, run, &bands, error));
     }
     if (!job->merges) { /* which asks nothing of what casts */
         const bool all = bakes && bands.count == 1 && !is_shard(job);
-        VSHI_TRY_DONE(find_bounds(charts, &bands, all, run, &texels, low, high, error));
+        VSHI_TRY_DONE(vshi_job_bounds(job, index, charts, &bands, all, run, &texels, low, high, error));
     }
     lightmap->covered = counted.covered;
     lightmap->samples = counted.samples;

@@ -36,7 +36,7 @@ struct vsh_bake_job {
     size_t apart; /* lightmaps before it are not stitched together with others: there is no memory for it */
     vshi_lit_page *lit_pages; /* [lit_page_count]: of the receiver that is baked */
     size_t lit_page_count;
-    struct vshi_share_rows *shares; /* [targets.count], once measured: what shards are reckoned by */
+    struct vshi_share_rows *shares; /* [targets.count], of a shard once measured: what it is cut by */
     struct vshi_part_writer *part;  /* under way; NULL: none */
     char *part_path;
     const struct vshi_part_piece *pieces; /* of it */

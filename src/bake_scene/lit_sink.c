@@ -105,14 +105,9 @@ static vsh_result begin_exr(vshi_lit_sink *lit, const vsh_image *image, vsh_erro
     if (job->options.lit_exr == NULL) {
         return VSH_OK;
     }
-    const char *path = job->options.lit_exr;
-    const char *object = lit->target->object;
-    if (object != NULL || page_count(lit) > 1) {
-        path = lit->exr_path =
-            object != NULL ? vshi_object_output(path, object) : vshi_page_output(path, lit->lightmap->page);
-        if (path == NULL) {
-            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", job->options.lit_exr);
-        }
+    const char *path = lit->exr_path = vshi_target_file(lit->target, page_count(lit), job->options.lit_exr);
+    if (path == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", job->options.lit_exr);
     }
     vsh_image_options options = vsh_image_options_default();
     options.attributes = vsh_provenance_attributes(job->provenance, &options.attribute_count);

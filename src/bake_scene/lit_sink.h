@@ -12,7 +12,7 @@ typedef struct vshi_lit_sink {
     vshi_lit_page page;    /* whose rows come; the job's once all are there */
     int32_t rows;          /* there so far */
     vsh_image_writer *exr; /* of all channels; NULL: not asked for */
-    char *exr_path;        /* of a page among several; NULL: that which was asked for */
+    char *exr_path;        /* its name; NULL: not asked for */
     int32_t channel_count;
     int32_t sources[4][VSH_MAX_CHANNELS]; /* channels whose mean each plane is */
     int32_t source_count[4];

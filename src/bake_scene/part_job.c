@@ -13,7 +13,8 @@
 /* --- its head */
 
 /* Pieces and lightmaps of a shard; the lists are the head's. */
-static vsh_result list_pieces(const vsh_bake_job *job, vshi_part_head *head, vsh_error *error) {
+static vsh_result list_pieces(const vsh_bake_job *job, const vsh_run *run, vshi_part_head *head,
+                              vsh_error *error) {
     const size_t count = job->targets.count;
     VSHI_TRY(vshi_allocate((void **)&head->lightmaps, count + 1, sizeof *head->lightmaps, "part", error));
     head->lightmap_count = count;
@@ -22,7 +23,7 @@ static vsh_result list_pieces(const vsh_bake_job *job, vshi_part_head *head, vsh
         head->lightmaps[i] =
             (vshi_part_lightmap){own->width, own->height, own->mesh_count, own->covered, own->samples};
     }
-    return vshi_shares_list(job, job->options.shard, job->options.shard_count, &head->pieces,
+    return vshi_shares_list(job, job->options.shard, job->options.shard_count, run, &head->pieces,
                             &head->piece_count, error);
 }
 
@@ -44,8 +45,8 @@ static bool copy_channels(const vshi_channels *channels, vshi_part_head *head) {
 }
 
 /* Begins the part, whose pieces are the caller's to free also after an error. */
-static vsh_result begin_part(vsh_bake_job *job, vshi_part_piece **pieces, size_t *piece_count,
-                             vsh_error *error) {
+static vsh_result begin_part(vsh_bake_job *job, const vsh_run *run, vshi_part_piece **pieces,
+                             size_t *piece_count, vsh_error *error) {
     *pieces = NULL;
     const vsh_occluders_info *casters = &job->report.occluders;
     const vsh_part_options options = vshi_job_part_options(job, job->options.shard_count);
@@ -59,7 +60,7 @@ static vsh_result begin_part(vsh_bake_job *job, vshi_part_piece **pieces, size_t
     vsh_result result;
     char *path = vshi_part_path(options.parts, options.shard, options.shard_count);
     VSHI_TRY_DONE(vshi_channels_name(&job->scene, 1, 1, &channels, error));
-    VSHI_TRY_DONE(list_pieces(job, &head, error));
+    VSHI_TRY_DONE(list_pieces(job, run, &head, error));
     VSHI_TRY_DONE(vshi_part_about_make(VSHI_PART_BAKE, &options, &head.about, error));
     if (path == NULL || !copy_channels(&channels, &head)) {
         result = vshi_fail(error, VSH_ERROR_MEMORY, "part: the system refused memory");
@@ -127,7 +128,7 @@ vsh_result vshi_job_bake_part(vsh_bake_job *job, const vsh_run *run, vsh_error *
     vshi_part_piece *pieces;
     size_t count = 0;
     vsh_result result;
-    VSHI_TRY_DONE(begin_part(job, &pieces, &count, error));
+    VSHI_TRY_DONE(begin_part(job, run, &pieces, &count, error));
     tell_writing(job, job->part_path);
     result = bake_pieces(job, pieces, count, run, error);
     vshi_part_writer *part = job->part;
@@ -149,13 +150,16 @@ done:
 /* --- what is kept for the next bake */
 
 char *vshi_job_kept_name(const vsh_bake_job *job, size_t index) {
-    if (job->options.shard == 0) {
-        return strdup(job->lightmaps[index].output);
+    const bool part = job->options.shard != 0;
+    const vsh_job_lightmap *lightmap = part ? NULL : &job->lightmaps[index];
+    if (!part && (lightmap->page == 0 || !vsh_lit_is_output(lightmap->output))) {
+        return strdup(lightmap->output);
     }
-    const size_t size = strlen(job->part_path) + 24;
+    const char *file = part ? job->part_path : lightmap->output; /* an asset has all of its pages */
+    const size_t size = strlen(file) + 24;
     char *name = malloc(size);
     if (name != NULL) {
-        snprintf(name, size, "%s.%zu", job->part_path, index);
+        snprintf(name, size, "%s.%zu", file, part ? index : lightmap->page);
     }
     return name;
 }

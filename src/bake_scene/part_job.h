@@ -19,7 +19,8 @@ typedef struct vshi_part_sink {
 vsh_row_sink vshi_part_sink_of(vshi_part_sink *part);
 
 /* What bands of target (of a part: piece) `index` are kept beside (bake_scene/resume.h), to be freed: its
- * output, or the part with the piece's number. NULL where memory is short. */
+ * output, with the page's number for further pages of an asset, or the part with the piece's. NULL where
+ * memory is short. */
 char *vshi_job_kept_name(const vsh_bake_job *job, size_t index);
 
 /* Takes them away. */

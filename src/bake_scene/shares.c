@@ -1,39 +1,85 @@
 #include "bake_scene/shares.h"
 
-#include "bake/texels.h"
 #include "base/memory.h"
 #include "base/try.h"
 
 #include <stdlib.h>
 
-/* What shading is expected to take, of each row of tiles: samples. */
-struct vshi_share_rows {
-    size_t count; /* rows of tiles */
-    size_t step;  /* that stay together */
-    uint64_t samples;
-    uint32_t *row; /* [count]: samples of each */
-};
+/* Texels between those that are looked at: at most one in 256 of a lightmap's, and no more than so many,
+ * which take some tens of milliseconds. */
+enum { FEW_STEP = 16, FEW_MOST = 16384 };
 
-vsh_result vshi_shares_note(vsh_bake_job *job, size_t index, const vsh_charts *charts, vsh_error *error) {
+/* Times that shards go through a lightmap there and back: at most, and such that the borders they add take no
+ * more than this share of all work. Errors of what is expected of rows that lie apart even out. */
+enum { MOST_ROUNDS = 8 };
+static const double BORDERS = 0.01;
+
+/* Rows of tiles that a shard should have for pairs of them to stay together, where texels share AO: a border
+ * that parts a pair has more tiles beside it shoot. */
+enum { PAIRED = 32 };
+
+/* Rows that are rasterised and shaded beside a border, on both sides together, as whole ones: of windows that
+ * reach seven texels of each lattice. */
+static double border_rows(int32_t spacing) {
+    return spacing > 1 ? 5.0 * spacing : 1.0;
+}
+
+static int32_t few_step(const vsh_charts_info *info) {
+    int32_t step = FEW_STEP;
+    while ((double)info->width / step * ((double)info->height / step) > FEW_MOST) {
+        step *= 2;
+    }
+    return step;
+}
+
+vsh_result vshi_shares_note(vsh_bake_job *job, size_t index, const vsh_charts *charts, const vsh_run *run,
+                            vsh_error *error) {
     if (job->shares == NULL) {
         VSHI_TRY(
             vshi_allocate((void **)&job->shares, job->targets.count, sizeof *job->shares, "shares", error));
     }
-    struct vshi_share_rows *share = &job->shares[index];
-    free(share->row);
-    *share = (struct vshi_share_rows){.count = charts->sorted.rows, .step = (size_t)charts->ao_spacing};
+    vshi_share_rows *share = &job->shares[index];
+    share->count = charts->sorted.rows;
+    share->spacing = charts->ao_spacing;
+    share->few_step = few_step(&charts->info);
     VSHI_TRY(vshi_allocate((void **)&share->row, share->count, sizeof *share->row, "shares", error));
-    for (size_t row = 0; row < share->count; ++row) {
-        share->row[row] = (uint32_t)charts->rows[row].samples; /* 2^27 at most */
-        share->samples += charts->rows[row].samples;
+    VSHI_TRY(vshi_allocate((void **)&share->work, share->count, sizeof *share->work, "shares", error));
+    for (size_t row = 0; row < share->count; ++row) { /* 2^27 at most, and the triangles of the receiver */
+        const size_t *start = charts->sorted.row_start;
+        share->row[row] =
+            (vshi_share_row){(uint32_t)charts->rows[row].samples, (uint32_t)charts->rows[row].edges,
+                             (uint32_t)(start[row + 1] - start[row])};
     }
-    return VSH_OK;
+    return vshi_texels_create_sparse(charts, share->few_step, run, &share->few, error);
 }
 
-/* The shard that rows belong to which have so many samples, behind so many of all. */
-static int32_t shard_of(double before, double samples, double all, int32_t count) {
-    const double at = (before + 0.5 * samples) / all * (double)count;
-    return at >= (double)count ? count : 1 + (int32_t)at;
+/* --- cutting */
+
+/* All shares, and how they are cut. */
+typedef struct cutting {
+    uint64_t all;  /* work */
+    int32_t count; /* shards */
+    int32_t rounds;
+} cutting;
+
+/* The shard of work that lies so far behind the beginning. */
+static int32_t shard_of(const cutting *c, double at) {
+    const int32_t all = c->rounds * c->count;
+    const double place = at / (double)c->all * (double)all;
+    const int32_t number = place >= (double)all ? all - 1 : (int32_t)place;
+    const int32_t round = number / c->count, of = number % c->count;
+    return 1 + (round % 2 == 0 ? of : c->count - 1 - of);
+}
+
+/* Rounds there and back; one through several lightmaps, whose charts are counted again for each piece. */
+static int32_t count_rounds(const vsh_bake_job *job, int32_t count) {
+    if (job->targets.count != 1 || count < 2) {
+        return 1;
+    }
+    const vshi_share_rows *share = &job->shares[0];
+    const double border = border_rows(share->spacing) / (8.0 * (double)share->count);
+    const double more = BORDERS / (border * (count - 1));
+    return more >= MOST_ROUNDS - 1 ? MOST_ROUNDS : 1 + (int32_t)more;
 }
 
 /* Adds rows of tiles begin … end - 1 of a lightmap. */
@@ -49,26 +95,32 @@ static void add_rows(vshi_part_piece *pieces, uint64_t *count, size_t lightmap, 
     }
 }
 
-vsh_result vshi_shares_list(const vsh_bake_job *job, int32_t shard, int32_t count, vshi_part_piece **pieces,
-                            uint64_t *piece_count, vsh_error *error) {
-    double before = 0.0, all = 0.0;
+vsh_result vshi_shares_list(const vsh_bake_job *job, int32_t shard, int32_t count, const vsh_run *run,
+                            vshi_part_piece **pieces, uint64_t *piece_count, vsh_error *error) {
+    cutting cut = {.count = count, .rounds = count_rounds(job, count)};
+    *pieces = NULL;
     *piece_count = 0;
-    VSHI_TRY(vshi_allocate((void **)pieces, job->targets.count + 1, sizeof **pieces, "shares", error));
     for (size_t i = 0; i < job->targets.count; ++i) {
-        all += (double)job->shares[i].samples;
+        VSHI_TRY(vshi_shares_weigh(job, &job->shares[i], run, error));
+        cut.all += job->shares[i].all;
     }
+    cut.all = cut.all > 0 ? cut.all : 1;
+    const size_t most = job->targets.count + (size_t)cut.rounds + 1;
+    VSHI_TRY(vshi_allocate((void **)pieces, most, sizeof **pieces, "shares", error));
+    uint64_t before = 0;
     for (size_t i = 0; i < job->targets.count; ++i) {
-        const struct vshi_share_rows *share = &job->shares[i];
-        for (size_t row = 0; row < share->count; row += share->step) {
-            double samples = 0.0;
-            const size_t next = row + share->step < share->count ? row + share->step : share->count;
+        const vshi_share_rows *share = &job->shares[i];
+        const size_t step = share->spacing > 1 && share->count / PAIRED >= (size_t)count ? 2 : 1;
+        for (size_t row = 0; row < share->count; row += step) {
+            uint64_t work = 0;
+            const size_t next = row + step < share->count ? row + step : share->count;
             for (size_t k = row; k < next; ++k) {
-                samples += (double)share->row[k];
+                work += share->work[k];
             }
-            if (shard_of(before, samples, all > 0.0 ? all : 1.0, count) == shard) {
+            if (shard_of(&cut, (double)before + 0.5 * (double)work) == shard) {
                 add_rows(*pieces, piece_count, i, row, next, job->lightmaps[i].height);
             }
-            before += samples;
+            before += work;
         }
     }
     return VSH_OK;
@@ -76,6 +128,8 @@ vsh_result vshi_shares_list(const vsh_bake_job *job, int32_t shard, int32_t coun
 
 void vshi_shares_free(vsh_bake_job *job) {
     for (size_t i = 0; job->shares != NULL && i < job->targets.count; ++i) {
+        vsh_texels_free(job->shares[i].few);
+        free(job->shares[i].work);
         free(job->shares[i].row);
     }
     free(job->shares);

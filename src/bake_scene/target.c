@@ -103,6 +103,12 @@ char *vshi_page_output(const char *output, size_t page) {
     return mark_output(output, number);
 }
 
+char *vshi_target_file(const vshi_target *target, size_t pages, const char *file) {
+    return target->object != NULL ? vshi_object_output(file, target->object)
+           : pages > 1            ? vshi_page_output(file, target->page)
+                                  : strdup(file);
+}
+
 /* --- names of objects */
 
 /* Whether two lightmaps of one name would be one file: images of one output, pages of one asset. */

@@ -32,6 +32,10 @@ char *vshi_page_output(const char *output, size_t page);
 /* FILE.OBJECT.exr for FILE.exr, or with the object's name in place of "%s". To be freed as the last one. */
 char *vshi_object_output(const char *output, const char *object);
 
+/* Of a file that an asset has for each of its `pages`: FILE.OBJECT.exr of an object, FILE.PAGE.exr of one
+ * page of several, else FILE.exr. To be freed as the others. */
+char *vshi_target_file(const vshi_target *target, size_t pages, const char *file);
+
 /* Finds what is solid of receivers that do not cast. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY,
  * VSH_ERROR_CANCELLED. Free them also after a failure. */
 vsh_result vshi_targets_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,

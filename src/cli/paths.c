@@ -71,6 +71,19 @@ bool cli_is_folder(const char *path) {
     return (length > 0 && path[length - 1] == '/') || (stat(path, &status) == 0 && S_ISDIR(status.st_mode));
 }
 
+char *cli_end_path(const char *path, const char *end) {
+    size_t length = strlen(path);
+    while (length > 1 && path[length - 1] == '/') {
+        --length;
+    }
+    const size_t size = length + strlen(end) + 1;
+    char *ended = malloc(size);
+    if (ended != NULL) {
+        snprintf(ended, size, "%.*s%s", (int)length, path, end);
+    }
+    return ended;
+}
+
 /* The folder of a path into folder[PATH_MAX]; false where it is the current one. */
 static bool folder_of(const char *path, char *folder) {
     const char *slash = strrchr(path, '/');

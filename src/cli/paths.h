@@ -26,6 +26,9 @@ bool cli_is_model(const char *path);
 /* Whether a path is a folder, or ends as one. */
 bool cli_is_folder(const char *path);
 
+/* A path with `end` in place of the slashes at its end, to be freed; NULL where memory was short. */
+char *cli_end_path(const char *path, const char *end);
+
 /* Outputs that a file names, and not the user, must not leave for elsewhere by links: the file and its folder
  * may be a stranger's. `path` is as it was made of the folder of `namer` and of what stands there; its links
  * must end where its words say, or below the folder of `namer`. CLI_OK or, having said why, CLI_FILE. */

@@ -39,10 +39,13 @@ struct Callback {
             batch(field.user, count, positions->asPointer(), distances);
             return;
         }
+        if (keep != nullptr) {
+            const auto places = reinterpret_cast<const double(*)[3]>(positions);
+            vshi_sdf_distances_within(tree, keep, count, places, distances);
+            return;
+        }
         for (size_t i = 0; i < count; ++i) {
-            const double *position = positions[i].asPointer();
-            distances[i] = keep != nullptr ? vshi_sdf_distance_within(tree, keep, position)
-                                           : field.distance(field.user, position);
+            distances[i] = field.distance(field.user, positions[i].asPointer());
         }
     }
 };
@@ -226,26 +229,24 @@ bool Voxelizer::sample_block(Leaf &leaf, const Callback &here, const Coord &corn
         }
         here(positions.size(), positions.data(), distances.data());
     }
-    for (int32_t x = 0; x < BLOCK; ++x) {
-        for (int32_t y = 0; y < BLOCK; ++y) {
-            for (int32_t z = 0; z < BLOCK; ++z) {
-                const Coord voxel = corner.offsetBy(x, y, z);
-                const double d = far ? middle : distances[(x * BLOCK + y) * BLOCK + z];
-                if (!std::isfinite(d)) {
-                    note_bad(index);
-                    return false;
-                }
-                const float value = float(d);
-                const bool near = !far && std::fabs(value) < background;
-                witness = near ? value : std::copysign(background, value);
-                if (near) {
-                    leaf.setValueOn(voxel, witness); // meshing looks at active voxels only
-                } else {
-                    leaf.setValueOff(voxel, witness);
-                }
-                in_band |= near;
-            }
+    float *const values = leaf.buffer().data();
+    const openvdb::Index first = Leaf::coordToOffset(corner);
+    for (int32_t i = 0; i < int32_t(distances.size()); ++i) {
+        const double d = far ? middle : distances[i];
+        if (!std::isfinite(d)) {
+            note_bad(index);
+            return false;
         }
+        const openvdb::Index offset =
+            first + openvdb::Index((i / (BLOCK * BLOCK)) << 6 | (i / BLOCK % BLOCK) << 3 | i % BLOCK);
+        const float value = float(d);
+        const bool near = !far && std::fabs(value) < background;
+        witness = near ? value : std::copysign(background, value);
+        values[offset] = witness;
+        if (near) {
+            leaf.setActiveState(offset, true); // meshing looks at active voxels only
+        }
+        in_band |= near;
     }
     return in_band;
 }

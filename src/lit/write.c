@@ -68,10 +68,13 @@ static void put_buffers(output_file *file, const vshi_lit_document *document, co
 static void find_rest(const vshi_lit_document *document, const unsigned char **rest, uint64_t *size) {
     enum { CHUNK = 8 };
     const vshi_gltf_bytes *chunk = &document->gltf.chunk;
-    const unsigned char *end = (const unsigned char *)document->text + document->text_size;
     *rest = NULL;
     *size = 0;
-    if (!document->gltf.binary || end < chunk->at) {
+    if (!document->gltf.binary || document->text == NULL) { // of an OBJ there is none
+        return;
+    }
+    const unsigned char *end = (const unsigned char *)document->text + document->text_size;
+    if (end < chunk->at) {
         return;
     }
     const size_t padded = (chunk->size + 3) & ~(size_t)3;

@@ -190,13 +190,15 @@ static vsh_result find_of_whole(vshi_solidity *s, size_t whole, size_t *caps, vs
         *c = (vshi_component){.whole = (uint32_t)whole,
                               .triangles = found->begin[i + 1] - found->begin[i],
                               .list = found->list + found->begin[i],
-                              .cap = (const vshi_vec(*)[3])(s->caps + *caps)};
+                              .cap = s->caps != NULL ? (const vshi_vec(*)[3])(s->caps + *caps) : NULL};
         while (rim + c->open_edges < found->rim_count && found->rims[rim + c->open_edges].component == i) {
             ++c->open_edges;
         }
-        c->holes = close_holes(&k, found->rims + rim, c->open_edges, s->caps + *caps, s->hole_of + *caps);
-        rim += c->open_edges;
-        *caps += c->open_edges;
+        if (c->open_edges > 0) { // where no edge is open there is no memory of them
+            c->holes = close_holes(&k, found->rims + rim, c->open_edges, s->caps + *caps, s->hole_of + *caps);
+            rim += c->open_edges;
+            *caps += c->open_edges;
+        }
         const measure m = measure_component(s, c);
         decide(s, c, &m);
     }

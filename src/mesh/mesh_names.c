@@ -91,6 +91,9 @@ int32_t vsh_mesh_matches(const vsh_mesh *mesh, const char *pattern) {
         return mesh->material_name != NULL && matches(mesh->material_name, pattern + OF_MATERIAL);
     }
     const char *name = mesh->name, *object = mesh->object_name;
+    if (name == NULL && object == NULL) {
+        return matches("", pattern); /* as messages call it */
+    }
     if ((name != NULL && matches(name, pattern)) || (object != NULL && matches(object, pattern))) {
         return 1;
     }

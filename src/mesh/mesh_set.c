@@ -31,7 +31,7 @@ vsh_result vshi_mesh_check_data(const vsh_mesh *mesh, size_t index, vsh_error *e
 }
 
 vsh_result vshi_mesh_set_create(const vsh_mesh *meshes, size_t count, vshi_mesh_set *set, vsh_error *error) {
-    *set = (vshi_mesh_set){NULL};
+    *set = (vshi_mesh_set){0};
     VSHI_TRY(vshi_allocate((void **)&set->meshes, count, sizeof *set->meshes, "meshes", error));
     VSHI_TRY(vshi_allocate((void **)&set->checked, count, sizeof *set->checked, "meshes", error));
     set->count = count;
@@ -59,7 +59,7 @@ void vshi_mesh_set_free(vshi_mesh_set *set) {
     vshi_solidity_free(set->own);
     free(set->checked);
     free(set->meshes);
-    *set = (vshi_mesh_set){NULL};
+    *set = (vshi_mesh_set){0};
 }
 
 /* What is solid among just these meshes, in this order; NULL where nobody looked at them together. */

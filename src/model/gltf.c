@@ -10,9 +10,8 @@
 
 /* Memory that Jansson takes for a byte of JSON: 25 measured on a list of nodes, 1 on buffers in base64. It is
  * part of what a file's size is taken for beforehand (PEAK_BYTES_A_BYTE); this is what passes that. */
-static vsh_result parse(vshi_gltf *gltf, const char *text, size_t size, vsh_error *error) {
+json_t *vshi_gltf_parse_json(const char *text, size_t size, json_error_t *where, bool *early) {
     static const char mark[3] = {'\xef', '\xbb', '\xbf'};
-    json_error_t where;
     if (size >= sizeof mark && memcmp(text, mark, sizeof mark) == 0) {
         text += sizeof mark;
         size -= sizeof mark;
@@ -20,10 +19,17 @@ static vsh_result parse(vshi_gltf *gltf, const char *text, size_t size, vsh_erro
     while (size > 0 && text[size - 1] == '\0') {
         --size; /* padding of chunks by some exporters */
     }
-    gltf->root = json_loadb(text, size, JSON_ALLOW_NUL, &where);
+    json_t *root = json_loadb(text, size, JSON_ALLOW_NUL, where);
+    *early = root == NULL && (json_error_code(where) == json_error_premature_end_of_input ||
+                              where->position < 0 || (size_t)where->position >= size);
+    return root;
+}
+
+static vsh_result parse(vshi_gltf *gltf, const char *text, size_t size, vsh_error *error) {
+    json_error_t where;
+    bool early;
+    gltf->root = vshi_gltf_parse_json(text, size, &where, &early);
     if (gltf->root == NULL) {
-        const bool early = json_error_code(&where) == json_error_premature_end_of_input ||
-                           where.position < 0 || (size_t)where.position >= size;
         return vshi_fail(error, early ? VSH_ERROR_READ : VSH_ERROR_INPUT, "%s: %s: line %d column %d: %s",
                          gltf->path, early ? "cut short" : "its JSON is damaged", where.line, where.column,
                          where.text);

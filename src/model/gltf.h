@@ -177,10 +177,18 @@ vsh_result vshi_gltf_add_scene(vshi_gltf *gltf, vsh_error *error);
 /* Reads all materials, and the images of masked ones (gltf_material.c). */
 vsh_result vshi_gltf_read_materials(vshi_gltf *gltf, vsh_error *error);
 
+/* The image that a material which is not opaque has its alpha of; SIZE_MAX: none. Errors: VSH_ERROR_INPUT. */
+vsh_result vshi_gltf_mask_image(const vshi_gltf *gltf, const json_t *material, size_t *image,
+                                vsh_error *error);
+
 /* Adds the light that a node of the scene carries (gltf_lights.c). */
 vsh_result vshi_gltf_add_light(vshi_gltf *gltf, size_t node, vsh_error *error);
 
 /* --- the file (gltf.c) */
+
+/* Parses the JSON itself, perhaps with a mark before it and zeros behind. NULL: *where says why, and *early
+ * whether it is cut short. */
+json_t *vshi_gltf_parse_json(const char *text, size_t size, json_error_t *where, bool *early);
 
 /* Parses the JSON of a glTF or GLB of `size` bytes that lie at `text`, and finds its binary chunk; of `gltf`,
  * path, run and bytes_held are given. Free root with json_decref(), after a failure too. Errors: as

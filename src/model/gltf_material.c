@@ -185,6 +185,21 @@ static vsh_result read_mask(vshi_gltf *gltf, const json_t *given, const char *wh
     return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "%s", why.message);
 }
 
+vsh_result vshi_gltf_mask_image(const vshi_gltf *gltf, const json_t *material, size_t *image,
+                                vsh_error *error) {
+    const json_t *surface = json_object_get(material, "pbrMetallicRoughness");
+    size_t texture;
+    *image = SIZE_MAX;
+    if (alpha_of(material) == VSH_ALPHA_OPAQUE) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_gltf_index(gltf, json_object_get(surface, "baseColorTexture"), "index", "textures",
+                             "a material", &texture, error));
+    return texture != SIZE_MAX
+               ? find_image(gltf, vshi_gltf_element(gltf, "textures", texture), "a texture", image, error)
+               : VSH_OK;
+}
+
 vsh_result vshi_gltf_read_materials(vshi_gltf *gltf, vsh_error *error) {
     static const double as_they_are[6] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0};
     const json_t *materials = json_object_get(gltf->root, "materials");

@@ -35,6 +35,56 @@ vsh_result vshi_gltf_read_attribute(vshi_gltf *gltf, const json_t *attributes, c
     return VSH_OK;
 }
 
+/* Whether its material lets light through, where that is told. */
+static bool is_opaque(const vshi_gltf *gltf, const json_t *primitive) {
+    size_t material;
+    return !vshi_gltf_count(primitive, "material", SIZE_MAX, &material) ||
+           material >= gltf->model->material_count ||
+           gltf->model->materials[material].told.alpha == VSH_ALPHA_OPAQUE;
+}
+
+/* Whether its vertices have colours with alpha (3.7.2.1: COLOR_0 multiplies the base colour). */
+static vsh_result has_alpha(vshi_gltf *gltf, const json_t *primitive, const char *where, bool *has,
+                            vsh_error *error) {
+    vshi_gltf_accessor accessor;
+    size_t index;
+    *has = false;
+    if (is_opaque(gltf, primitive)) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_gltf_index(gltf, json_object_get(primitive, "attributes"), "COLOR_0", "accessors", where,
+                             &index, error));
+    if (index != SIZE_MAX) {
+        VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
+        *has = accessor.components == 4;
+    }
+    return VSH_OK;
+}
+
+static vsh_result read_alphas(vshi_gltf *gltf, const json_t *primitive, const char *where,
+                              vshi_model_shape *shape, vsh_error *error) {
+    const json_t *attributes = json_object_get(primitive, "attributes");
+    const size_t count = shape->vertex_count;
+    float *colors;
+    bool has, whole = true;
+    VSHI_TRY(has_alpha(gltf, primitive, where, &has, error));
+    if (!has) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_gltf_read_attribute(gltf, attributes, "COLOR_0", 4, count, where, &colors, error));
+    for (size_t v = 0; v < count; ++v) {
+        colors[v] = colors[4 * v + 3];
+        whole = whole && colors[v] >= 1.0F;
+    }
+    if (whole) {
+        free(colors);
+        return VSH_OK;
+    }
+    float *alphas = realloc(colors, count * sizeof *colors);
+    shape->alphas = alphas != NULL ? alphas : colors;
+    return VSH_OK;
+}
+
 static vsh_result read_vertices(vshi_gltf *gltf, const json_t *primitive, const char *where,
                                 vshi_model_shape *shape, vsh_error *error) {
     const json_t *attributes = json_object_get(primitive, "attributes");
@@ -48,7 +98,7 @@ static vsh_result read_vertices(vshi_gltf *gltf, const json_t *primitive, const 
         VSHI_TRY(vshi_gltf_read_attribute(gltf, attributes, name, 2, count, where, &shape->uvs[set], error));
         shape->uv_sets = shape->uvs[set] != NULL ? set + 1 : shape->uv_sets;
     }
-    return VSH_OK;
+    return read_alphas(gltf, primitive, where, shape, error);
 }
 
 /* The vertices in the order that a primitive draws them in: *order, *count of them. */
@@ -192,7 +242,11 @@ static vsh_result leave_raw(vshi_gltf *gltf, const json_t *primitive, const vshi
     vshi_model_shape found = {.raw = NULL};
     size_t corners = SIZE_MAX;
     const double held = gltf->bytes_held;
-    bool plain = gltf->mapped.at != NULL && !is_posed(primitive, pose);
+    bool plain = gltf->mapped.at != NULL && !is_posed(primitive, pose), colored = false;
+    if (plain) {
+        VSHI_TRY(has_alpha(gltf, primitive, where, &colored, error));
+        plain = !colored;
+    }
     if (plain) {
         VSHI_TRY(find_plain(gltf, primitive, "indices", 1, VSHI_GLTF_UINT, where, &corners, &found.indices,
                             &plain, error));

@@ -31,6 +31,7 @@ void vsh_model_free(vsh_model *model) {
         for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
             free(shape->uvs[set]);
         }
+        free(shape->alphas);
         free(shape->normals);
         free(shape->positions);
     }

@@ -20,6 +20,7 @@ typedef struct vshi_model_shape {
     float *positions;
     float *normals;
     float *uvs[VSH_MAX_UV_SETS];
+    float *alphas; /* [vertex_count], of vertex colours; NULL: all 1, or its material is opaque */
     uint32_t *indices;
     size_t vertex_count;
     size_t triangle_count;

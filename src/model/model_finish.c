@@ -82,6 +82,7 @@ static vsh_result renumber(const char *path, const unsigned char *used, vshi_mod
     free(place);
     compact(shape->positions, 3, used, shape->vertex_count);
     compact(shape->normals, 3, used, shape->vertex_count);
+    compact(shape->alphas, 1, used, shape->vertex_count);
     for (int set = 0; set < shape->uv_sets; ++set) {
         compact(shape->uvs[set], 2, used, shape->vertex_count);
     }

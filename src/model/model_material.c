@@ -86,6 +86,8 @@ void vshi_model_put_materials(vshi_encoder *encoder, const vsh_model *model) {
         vshi_encode_count(encoder, (uint64_t)m->uv_set);
         vshi_encode_count(encoder, (uint64_t)m->wrap[0]);
         vshi_encode_count(encoder, (uint64_t)m->wrap[1]);
+        vshi_encode_count(encoder, (uint64_t)m->image_channel);
+        vshi_encode_count(encoder, (uint64_t)m->by_texture);
         vshi_encode_count(encoder, model->materials[i].image);
         vshi_encode_array(encoder, values, VALUES, sizeof values[0]);
     }
@@ -122,6 +124,8 @@ static vsh_result take_material(vshi_decoder *decoder, const vsh_model *model, v
     m->uv_set = (int32_t)vshi_decode_count(decoder, VSH_MAX_UV_SETS - 1);
     m->wrap[0] = (int32_t)vshi_decode_count(decoder, VSH_WRAP_CLAMP);
     m->wrap[1] = (int32_t)vshi_decode_count(decoder, VSH_WRAP_CLAMP);
+    m->image_channel = (int32_t)vshi_decode_count(decoder, VSH_MASK_CHANNEL_AUTO);
+    m->by_texture = (int32_t)vshi_decode_count(decoder, 1);
     material->image = (size_t)vshi_decode_count(decoder, model->image_count);
     const void *told = vshi_decode_array(decoder, VALUES, sizeof(double));
     double values[VALUES];
@@ -144,7 +148,7 @@ static vsh_result take_material(vshi_decoder *decoder, const vsh_model *model, v
 
 vsh_result vshi_model_take_materials(vshi_decoder *decoder, vsh_model *model, const char *path,
                                      const vsh_run *run, vsh_error *error) {
-    enum { LEAST_IMAGE = 16, LEAST_MATERIAL = 56 + 8 * VALUES }; /* bytes of the message */
+    enum { LEAST_IMAGE = 16, LEAST_MATERIAL = 72 + 8 * VALUES }; /* bytes of the message */
     const size_t images = vshi_decode_count(decoder, (uint64_t)(decoder->end - decoder->at) / LEAST_IMAGE);
     VSHI_TRY(vshi_allocate((void **)&model->images, images, sizeof *model->images, path, error));
     model->image_count = images;

@@ -30,6 +30,10 @@ static void put_shape(vshi_encoder *encoder, const vshi_model_file *file, const 
     if (shape->normals != NULL) {
         vshi_encode_array(encoder, shape->normals, shape->vertex_count, sizeof(float[3]));
     }
+    vshi_encode_count(encoder, shape->alphas != NULL);
+    if (shape->alphas != NULL) {
+        vshi_encode_array(encoder, shape->alphas, shape->vertex_count, sizeof(float));
+    }
     for (int32_t set = 0; set < shape->uv_sets; ++set) {
         vshi_encode_count(encoder, shape->uvs[set] != NULL);
         if (shape->uvs[set] != NULL) {
@@ -119,6 +123,7 @@ static vsh_result take_shape(vshi_decoder *decoder, vshi_raw *raw, vshi_model_sh
     VSHI_TRY(take_array(decoder, count, sizeof(float[3]), &shape->positions, path, error));
     VSHI_TRY(take_array(decoder, shape->triangle_count, sizeof(uint32_t[3]), &shape->indices, path, error));
     VSHI_TRY(take_optional(decoder, count, sizeof(float[3]), &shape->normals, path, error));
+    VSHI_TRY(take_optional(decoder, count, sizeof(float), &shape->alphas, path, error));
     for (int32_t set = 0; set < shape->uv_sets; ++set) {
         VSHI_TRY(take_optional(decoder, count, sizeof(float[2]), &shape->uvs[set], path, error));
     }

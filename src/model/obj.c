@@ -381,7 +381,8 @@ done:
     vshi_faces_free(&obj.faces);
     free(obj.meshes);
     free(obj.objects);
-    free(obj.blended);
+    free(obj.alphas);
+    vshi_words_free(&obj.images);
     free(obj.object_of);
     free(obj.vertices);
     free(obj.heads);

@@ -39,6 +39,15 @@ typedef struct vshi_obj_values {
     size_t highest_line;
 } vshi_obj_values;
 
+/* How much of a material is there: its `d`, and where it is cut out. */
+typedef struct vshi_obj_alpha {
+    double opacity; /* 0 … 1 */
+    size_t image;   /* of images, + 1; 0: none */
+    int32_t channel;
+    bool clamp;
+    double offset[2], scale[2];
+} vshi_obj_alpha;
+
 typedef struct vshi_obj {
     const char *path;
     const vsh_run *run;
@@ -55,8 +64,9 @@ typedef struct vshi_obj {
     vshi_words names, materials;
     size_t *object_of; /* [names]: the first object of that name + 1; 0: none has it */
     size_t object_of_count, object_of_capacity;
-    bool *blended; /* [materials] */
-    size_t blended_count, blended_capacity;
+    vshi_obj_alpha *alphas; /* [materials] */
+    size_t alpha_capacity;
+    vshi_words images; /* paths */
     vshi_obj_object *objects;
     size_t object_count, object_capacity;
     vshi_obj_mesh *meshes;
@@ -79,6 +89,11 @@ vsh_result vshi_obj_set_object(vshi_obj *obj, const char *text, size_t size, vsh
 vsh_result vshi_obj_set_group(vshi_obj *obj, const char *text, size_t size, vsh_error *error);
 vsh_result vshi_obj_set_material(vshi_obj *obj, const char *text, size_t size, vsh_error *error);
 vsh_result vshi_obj_read_materials(vshi_obj *obj, const char *text, size_t size, vsh_error *error);
+
+/* Where the material library is that an OBJ at `path` (".obj") names, in new memory: first the file of that
+ * name, and where it is not there the OBJ's own. NULL: memory is short. */
+enum { VSHI_OBJ_LIBRARIES = 2 };
+char *vshi_obj_library(const char *path, int choice, const char *name, size_t size);
 
 /* A material's number; one that is new is opaque. */
 vsh_result vshi_obj_material(vshi_obj *obj, const char *name, size_t size, size_t *number, bool *is_new,

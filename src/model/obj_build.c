@@ -66,6 +66,10 @@ static vsh_result make_indices(vshi_obj *obj, vsh_model *model, bool *triangles,
     return VSH_OK;
 }
 
+static int32_t alpha_of(const vshi_obj_alpha *alpha) {
+    return alpha->opacity < 1.0 || alpha->image > 0 ? VSH_ALPHA_BLENDED : VSH_ALPHA_OPAQUE;
+}
+
 static vsh_result make_shapes(vshi_obj *obj, vsh_model *model, vsh_error *error) {
     bool triangles;
     size_t capacity = 0, made = 0;
@@ -92,8 +96,7 @@ static vsh_result make_shapes(vshi_obj *obj, vsh_model *model, vsh_error *error)
             .uvs = {mesh->has[VSHI_OBJ_TEXTURE] ? uvs + 2 * first : NULL},
             .uv_sets = mesh->has[VSHI_OBJ_TEXTURE],
             .vertex_count = vertex_end(obj, m) - first,
-            .alpha = mesh->material != SIZE_MAX && obj->blended[mesh->material] ? VSH_ALPHA_BLENDED
-                                                                                : VSH_ALPHA_OPAQUE,
+            .alpha = mesh->material != SIZE_MAX ? alpha_of(&obj->alphas[mesh->material]) : VSH_ALPHA_OPAQUE,
             .material = mesh->material < obj->materials.count ? (int32_t)mesh->material + 1 : 0,
         };
         model->shape_count = m + 1;
@@ -108,7 +111,38 @@ static vsh_result make_shapes(vshi_obj *obj, vsh_model *model, vsh_error *error)
     return VSH_OK;
 }
 
-/* Their names, and which are blended. */
+static void make_material(const vshi_obj_alpha *from, vshi_model_material *material) {
+    vsh_model_material *told = &material->told;
+    const double transform[6] = {from->scale[0], 0.0, from->offset[0], 0.0, from->scale[1], from->offset[1]};
+    told->alpha = alpha_of(from);
+    told->by_texture = 1;
+    told->base_alpha = from->opacity;
+    material->image = from->image;
+    if (from->image > 0) {
+        told->image_channel = from->channel;
+        told->wrap[0] = told->wrap[1] = from->clamp ? VSH_WRAP_CLAMP : VSH_WRAP_REPEAT;
+        memcpy(told->uv_transform, transform, sizeof transform);
+    }
+}
+
+/* What cuts them out. */
+static vsh_result make_images(vshi_obj *obj, vsh_model *model, vsh_error *error) {
+    const size_t count = obj->images.count;
+    const double bytes = (double)count * sizeof *model->images + (double)obj->images.used;
+    VSHI_TRY(vshi_check_limit(obj->run, obj->budget.bytes + bytes, obj->path, error));
+    VSHI_TRY(vshi_allocate((void **)&model->images, count, sizeof *model->images, obj->path, error));
+    model->image_count = count;
+    obj->budget.bytes += bytes;
+    for (size_t i = 0; i < count; ++i) {
+        model->images[i].path = strdup(vshi_words_at(&obj->images, i));
+        if (model->images[i].path == NULL) {
+            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", obj->path);
+        }
+    }
+    return VSH_OK;
+}
+
+/* Their names, and how much of them is there. */
 static vsh_result make_materials(vshi_obj *obj, vsh_model *model, vsh_error *error) {
     const size_t count = obj->materials.count;
     if (count >= INT32_MAX) {
@@ -119,7 +153,7 @@ static vsh_result make_materials(vshi_obj *obj, vsh_model *model, vsh_error *err
     VSHI_TRY(vshi_check_limit(obj->run, obj->budget.bytes + bytes, obj->path, error));
     VSHI_TRY(vshi_model_take_plain_materials(model, count, error));
     for (size_t i = 0; i < count; ++i) {
-        model->materials[i].told.alpha = obj->blended[i] ? VSH_ALPHA_BLENDED : VSH_ALPHA_OPAQUE;
+        make_material(&obj->alphas[i], &model->materials[i]);
         VSHI_TRY(vshi_model_copy_line(vshi_words_at(&obj->materials, i), &model->materials[i].name, error));
     }
     return VSH_OK;
@@ -148,6 +182,7 @@ vsh_result vshi_obj_build(vshi_obj *obj, vsh_model *model, vsh_error *error) {
     free(obj->heads);
     obj->budget.bytes -= (double)(obj->head_capacity * sizeof *obj->heads);
     obj->heads = NULL;
+    VSHI_TRY(make_images(obj, model, error));
     VSHI_TRY(make_materials(obj, model, error));
     VSHI_TRY(make_shapes(obj, model, error));
     return add_entries(obj, model, error);

@@ -1,19 +1,21 @@
-/* MTL, the materials of an OBJ: which of them are blended. */
+/* MTL, the materials of an OBJ: how much of them is there, and which textures cut them out. */
 #include "base/decimal.h"
 #include "base/input.h"
 #include "base/memory.h"
 #include "base/try.h"
+#include "model/mtl_map.h"
 #include "model/obj.h"
 #include "model/scan.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
 /* `d` is the opacity, Tr what is missing of it. "d -halo 0.5" is less where it is seen from the side. */
 static vsh_result take_opacity(const vshi_stream *stream, size_t line, vshi_token keyword, const char *at,
-                               const char *end, bool *blended, vsh_error *error) {
+                               const char *end, double *opacity, vsh_error *error) {
     vshi_token value = vshi_scan_token(&at, end);
     if (vshi_token_is(value, "-halo")) {
         value = vshi_scan_token(&at, end);
@@ -26,8 +28,62 @@ static vsh_result take_opacity(const vshi_stream *stream, size_t line, vshi_toke
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: line %zu: '%.*s' is '%.*s', expected a finite number",
                          stream->path, line, VSHI_TOKEN_ARGS(keyword), VSHI_TOKEN_ARGS(value));
     }
-    *blended = keyword.text[0] == 'd' ? number < 1.0F : 1.0F - number < 1.0F;
+    number = keyword.text[0] == 'd' ? number : 1.0F - number;
+    *opacity = number < 0.0F ? 0.0 : number < 1.0F ? (double)number : 1.0;
     return VSH_OK;
+}
+
+/* What cannot be had of a texture leaves the material as it is without: the mesh is there all the same. */
+static vsh_result take_map(vshi_obj *obj, const vshi_stream *stream, size_t line, const char *at,
+                           const char *end, vsh_error *error) {
+    enum { LONGEST = 1023 };
+    vshi_obj_alpha *alpha = &obj->alphas[obj->material];
+    vshi_mtl_map map;
+    bool is_new;
+    char option[64] = "";
+    const bool good = vshi_mtl_map_read(at, end, &map), taken = map.other.text == NULL;
+    if (!taken) {
+        snprintf(option, sizeof option, "%.*s", VSHI_TOKEN_ARGS(map.other));
+    }
+    if (!good) {
+        vshi_warn(
+            obj->run,
+            "%s: line %zu: 'map_d' has the option '%s', which is unknown or lacks its value; its mask is "
+            "not read",
+            stream->path, line, option);
+        return VSH_OK;
+    }
+    if (map.name.text == NULL) {
+        return VSH_OK;
+    }
+    if (!taken) {
+        vshi_warn(obj->run, "%s: line %zu: 'map_d' is read without its option '%s'", stream->path, line,
+                  option);
+    }
+    char *path = vshi_mtl_map_path(stream->path, map.name);
+    if (path == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stream->path);
+    }
+    vsh_result result = VSH_OK;
+    if (strlen(path) > LONGEST || memchr(map.name.text, '\0', map.name.size) != NULL) {
+        vshi_warn(obj->run, "%s: line %zu: 'map_d' names no file; its mask is not read", stream->path, line);
+    } else if (obj->run->allow_outside == 0 && !vshi_input_is_beside(obj->path, path)) {
+        vshi_warn(
+            obj->run,
+            "%s: line %zu: 'map_d' names '%.400s', outside of its folder; --allow-outside reads it; its "
+            "mask is not read",
+            stream->path, line, path);
+    } else {
+        result =
+            vshi_words_number(&obj->images, &obj->budget, path, strlen(path), &alpha->image, &is_new, error);
+        alpha->image += result == VSH_OK;
+        alpha->channel = map.channel;
+        alpha->clamp = map.clamp;
+        memcpy(alpha->offset, map.offset, sizeof alpha->offset);
+        memcpy(alpha->scale, map.scale, sizeof alpha->scale);
+    }
+    free(path);
+    return result;
 }
 
 static vsh_result take_line(vshi_obj *obj, const vshi_stream *stream, size_t line, const char *at,
@@ -45,8 +101,14 @@ static vsh_result take_line(vshi_obj *obj, const vshi_stream *stream, size_t lin
         }
         return VSH_OK;
     }
-    return obj->material != SIZE_MAX && (vshi_token_is(keyword, "d") || vshi_token_is(keyword, "Tr"))
-               ? take_opacity(stream, line, keyword, at, end, &obj->blended[obj->material], error)
+    if (obj->material == SIZE_MAX) {
+        return VSH_OK;
+    }
+    if (vshi_token_is(keyword, "map_d")) {
+        return take_map(obj, stream, line, at, end, error);
+    }
+    return vshi_token_is(keyword, "d") || vshi_token_is(keyword, "Tr")
+               ? take_opacity(stream, line, keyword, at, end, &obj->alphas[obj->material].opacity, error)
                : VSH_OK;
 }
 
@@ -105,17 +167,24 @@ static vsh_result read_file(vshi_obj *obj, const char *path, bool *found, vsh_er
     return result;
 }
 
+char *vshi_obj_library(const char *path, int choice, const char *name, size_t size) {
+    if (choice == 0) {
+        return beside(path, name, size);
+    }
+    const char *slash = strrchr(path, '/'), *own = slash != NULL ? slash + 1 : path;
+    char *library = beside(path, own, strlen(own));
+    if (library != NULL) {
+        memcpy(strrchr(library, '.') + 1, "mtl", sizeof "mtl");
+    }
+    return library;
+}
+
 vsh_result vshi_obj_read_materials(vshi_obj *obj, const char *text, size_t size, vsh_error *error) {
     bool found = false;
-    const char *dot = strrchr(obj->path, '.'), *slash = strrchr(obj->path, '/');
-    const char *own = slash != NULL ? slash + 1 : obj->path;
-    for (int i = 0; i < 2 && size > 0 && !found; ++i) { /* that named, or else the OBJ's own */
-        char *path = i == 0 ? beside(obj->path, text, size) : beside(obj->path, own, (size_t)(dot - own) + 4);
+    for (int choice = 0; choice < VSHI_OBJ_LIBRARIES && size > 0 && !found; ++choice) {
+        char *path = vshi_obj_library(obj->path, choice, text, size);
         if (path == NULL) {
             return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", obj->path);
-        }
-        if (i > 0) {
-            memcpy(strrchr(path, '.') + 1, "mtl", sizeof "mtl");
         }
         const vsh_result result = read_file(obj, path, &found, error);
         free(path);

@@ -93,10 +93,10 @@ vsh_result vshi_obj_set_group(vshi_obj *obj, const char *text, size_t size, vsh_
 vsh_result vshi_obj_material(vshi_obj *obj, const char *name, size_t size, size_t *number, bool *is_new,
                              vsh_error *error) {
     VSHI_TRY(vshi_words_number(&obj->materials, &obj->budget, name, size, number, is_new, error));
-    VSHI_TRY(vshi_grow(&obj->budget, &obj->blended, &obj->blended_capacity, obj->materials.count,
-                       sizeof *obj->blended, error));
+    VSHI_TRY(vshi_grow(&obj->budget, &obj->alphas, &obj->alpha_capacity, obj->materials.count,
+                       sizeof *obj->alphas, error));
     if (*is_new) {
-        obj->blended[*number] = false;
+        obj->alphas[*number] = (vshi_obj_alpha){.opacity = 1.0};
     }
     return VSH_OK;
 }

@@ -95,12 +95,13 @@ static vsh_result leave_out_blended(const vsh_scene *scene, vshi_masks *masks, c
     size_t left = 0, blended = 0, cut_out = 0;
     for (size_t i = 0; i < count; ++i) {
         const int32_t alpha = vsh_model_mesh(model, i, -1).alpha;
-        bool out = chosen[i] != 0 && alpha == VSH_ALPHA_BLENDED && scene->cast_blended == 0, stays = false;
+        bool out = chosen[i] != 0 && alpha == VSH_ALPHA_BLENDED && scene->cast_blended == 0;
+        vshi_blend blend = VSHI_BLEND_GLASS;
         if (out) {
-            VSHI_TRY(vshi_masks_is_cut_out(masks, i, run, &stays, error));
+            VSHI_TRY(vshi_masks_blend(masks, i, run, &blend, error));
         }
-        out = out && !stays;
-        cut_out += stays;
+        out = out && blend == VSHI_BLEND_GLASS;
+        cut_out += blend == VSHI_BLEND_CUT_OUT;
         blended += out;
         chosen[i] = out ? 0 : chosen[i];
         left += chosen[i] != 0;

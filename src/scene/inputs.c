@@ -1,18 +1,13 @@
 #include "scene/inputs.h"
 
-#include "base/file.h"
-#include "base/input.h"
+#include "base/floats.h"
 #include "base/try.h"
-#include "base/uri.h"
+#include "model/beside.h"
 #include "scene/tile.h"
 
-#include <jansson.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
-
-/* Bytes of a glTF that is looked through for its buffers. */
-static const uint64_t MOST_JSON = (uint64_t)1 << 30;
+#include <sys/stat.h>
 
 static vsh_result out_of_memory(vsh_error *error) {
     return vshi_fail(error, VSH_ERROR_MEMORY, "inputs: the system refused memory");
@@ -47,42 +42,12 @@ static vsh_result add(vshi_inputs *inputs, const char *path, vsh_error *error) {
     return path != NULL ? add_own(inputs, strdup(path), error) : VSH_OK;
 }
 
-/* Takes `path` over. A buffer outside of the model's folder is not read, so nothing is to be told of it. */
-static vsh_result add_buffer(vshi_inputs *inputs, const char *model, char *path, bool outside,
-                             vsh_error *error) {
-    if (path != NULL && !outside && !vshi_input_is_beside(model, path)) {
-        free(path);
-        return VSH_OK;
-    }
-    return add_own(inputs, path, error);
+static vsh_result add_beside(void *user, char *path, vsh_error *error) {
+    return add_own(user, path, error);
 }
 
-/* A glTF's buffers, which hold its vertices. What cannot be read as one has none. */
-static vsh_result add_buffers(vshi_inputs *inputs, const char *model, bool outside, vsh_error *error) {
-    FILE *file;
-    uint64_t size;
-    vsh_error ignored;
-    if (vshi_input_open(model, model, MOST_JSON, &file, &size, &ignored) != VSH_OK) {
-        return VSH_OK;
-    }
-    json_t *root = json_loadf(file, 0, NULL);
-    fclose(file);
-    vsh_result result = VSH_OK;
-    size_t i;
-    json_t *buffer;
-    json_array_foreach(json_object_get(root, "buffers"), i, buffer) {
-        const char *uri = json_string_value(json_object_get(buffer, "uri"));
-        if (uri != NULL && !vshi_uri_is_data(uri) && !vshi_uri_is_remote(uri)) {
-            VSHI_TRY_DONE(add_buffer(inputs, model, vshi_uri_path(model, uri), outside, error));
-        }
-    }
-done:
-    json_decref(root);
-    return result;
-}
-
-vsh_result vshi_inputs_find(const vsh_scene *scene, const char *const *files, size_t file_count, bool outside,
-                            vshi_inputs *inputs, vsh_error *error) {
+vsh_result vshi_inputs_find(const vsh_scene *scene, const char *const *files, size_t file_count,
+                            const vsh_run *run, vshi_job *job, vshi_inputs *inputs, vsh_error *error) {
     for (size_t i = 0; i < file_count; ++i) {
         VSHI_TRY(add(inputs, files[i], error));
     }
@@ -97,9 +62,7 @@ vsh_result vshi_inputs_find(const vsh_scene *scene, const char *const *files, si
     }
     const size_t named = inputs->count;
     for (size_t i = 0; i < named; ++i) {
-        if (strcasecmp(vshi_path_ending(inputs->paths[i]), "gltf") == 0) {
-            VSHI_TRY(add_buffers(inputs, inputs->paths[i], outside, error));
-        }
+        VSHI_TRY(vshi_model_beside(inputs->paths[i], run, job, add_beside, inputs, error));
     }
     return VSH_OK;
 }
@@ -110,4 +73,50 @@ void vshi_inputs_free(vshi_inputs *inputs) {
     }
     free(inputs->paths);
     *inputs = (vshi_inputs){NULL, 0, 0};
+}
+
+/* --- outputs */
+
+static vsh_result check_output(const char *output, const struct stat *status, const vshi_inputs *inputs,
+                               vsh_error *error) {
+    for (size_t i = 0; i < inputs->count; ++i) {
+        struct stat input;
+        if (stat(inputs->paths[i], &input) == 0 && input.st_ino == status->st_ino &&
+            input.st_dev == status->st_dev) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: the output is also an input: %s", output,
+                             inputs->paths[i]);
+        }
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_scene_check_outputs(const vsh_scene *scene, const char *const *outputs, size_t output_count,
+                                   const vsh_run *run, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(scene);
+    VSHI_NEEDS_OF(output_count, outputs);
+    for (size_t i = 0; i < output_count; ++i) {
+        VSHI_NEEDS(outputs[i]);
+    }
+    vsh_run settings;
+    VSHI_TRY(vshi_run_resolve(run, &settings, error));
+    vshi_inputs inputs = {NULL, 0, 0};
+    vshi_job *job = NULL;
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; i < output_count; ++i) {
+        struct stat status;
+        if (stat(outputs[i], &status) != 0) {
+            continue;
+        }
+        if (job == NULL) {
+            job = vshi_job_begin(&settings, "hash", 1);
+            VSHI_TRY_DONE(job != NULL ? VSH_OK : out_of_memory(error));
+            VSHI_TRY_DONE(vshi_inputs_find(scene, NULL, 0, &settings, job, &inputs, error));
+        }
+        VSHI_TRY_DONE(check_output(outputs[i], &status, &inputs, error));
+    }
+done:
+    vshi_job_end(job);
+    vshi_inputs_free(&inputs);
+    return result;
 }

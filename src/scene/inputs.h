@@ -2,9 +2,8 @@
 #ifndef VSHI_SCENE_INPUTS_H
 #define VSHI_SCENE_INPUTS_H
 
-#include "base/error.h"
+#include "base/job.h"
 
-#include <stdbool.h>
 #include <vdbshade/scene.h>
 
 typedef struct vshi_inputs {
@@ -12,12 +11,11 @@ typedef struct vshi_inputs {
     size_t count, capacity;
 } vshi_inputs;
 
-/* `files`, then what casters and receivers name, then the buffers of glTF among them, those outside of the
- * model's folder only if `outside`; each path once. `scene`
- * may be NULL. Files that cannot be read are listed all the same. To be freed also where it fails. Errors:
- * VSH_ERROR_MEMORY. */
-vsh_result vshi_inputs_find(const vsh_scene *scene, const char *const *files, size_t file_count, bool outside,
-                            vshi_inputs *inputs, vsh_error *error);
+/* `files`, then what casters, receivers and lights name, then what is read with the models among them
+ * (model/beside.h); each path once. `scene` may be NULL. Files that cannot be read are listed all the same.
+ * To be freed also where it fails. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_inputs_find(const vsh_scene *scene, const char *const *files, size_t file_count,
+                            const vsh_run *run, vshi_job *job, vshi_inputs *inputs, vsh_error *error);
 void vshi_inputs_free(vshi_inputs *inputs);
 
 #endif

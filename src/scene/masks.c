@@ -7,6 +7,7 @@
 #include "mesh/alpha_mask.h"
 #include "mesh/mesh.h"
 #include "model/model.h"
+#include "scene/vertex_alpha.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -37,11 +38,16 @@ typedef struct shape {
     bool known;
     uint32_t *opaque, *mixed;
     size_t opaque_count, mixed_count;
+    bool looked; /* at its vertices' alpha */
+    vshi_vertex_alpha vertices;
+    vsh_alpha_mask mask; /* where `masked`: its material's with that */
+    bool masked;
 } shape;
 
 typedef struct texture {
-    const void *of; /* vsh_model_material.image or .image_path */
-    uint8_t *alpha; /* NULL: it has none, or could not be read */
+    const void *of;  /* vsh_model_material.image or .image_path */
+    int32_t channel; /* VSH_MASK_CHANNEL_… */
+    uint8_t *alpha;  /* NULL: it has none, or could not be read */
     int32_t width, height;
     bool binary; /* nearly all of it is clear or opaque, and there is some of both */
 } texture;
@@ -83,6 +89,7 @@ void vshi_masks_free(vshi_masks *masks) {
     for (size_t i = 0; masks->shapes != NULL && i < masks->model->shape_count; ++i) {
         free(masks->shapes[i].opaque);
         free(masks->shapes[i].mixed);
+        vshi_vertex_alpha_free(&masks->shapes[i].vertices);
     }
     for (size_t i = 0; i < masks->texture_count; ++i) {
         free(masks->textures[i].alpha);
@@ -95,33 +102,59 @@ void vshi_masks_free(vshi_masks *masks) {
 
 /* --- textures */
 
-/* A cut-out's edges are few texels wide; smoke and glass are between all over. */
-static bool is_binary(const uint8_t *alpha, size_t texels) {
-    static const double BETWEEN = 0.25, SOME = 0.01;
-    enum { CLEAR = 25, OPAQUE = 230 };
-    size_t clear = 0, opaque = 0;
-    for (size_t i = 0; i < texels; ++i) {
-        clear += alpha[i] <= CLEAR;
-        opaque += alpha[i] >= OPAQUE;
+static const float *plane_of(const vsh_image *image, const char *name) {
+    const float *plane = NULL;
+    for (int32_t c = 0; c < image->channel_count; ++c) {
+        plane = strcmp(image->names[c], name) == 0 ? image->planes[c] : plane;
     }
-    const double all = (double)texels;
-    return (double)(texels - clear - opaque) <= BETWEEN * all && (double)clear >= SOME * all &&
-           (double)opaque >= SOME * all;
+    return plane;
+}
+
+/* What alpha is a weighted sum of; planes are NULL where there is none. */
+typedef struct alpha_source {
+    const float *planes[3];
+    float weights[3];
+} alpha_source;
+
+static float alpha_at(const alpha_source *source, size_t texel) {
+    float sum = 0.0f;
+    for (int i = 0; i < 3; ++i) {
+        sum += source->planes[i] != NULL ? source->weights[i] * source->planes[i][texel] : 0.0f;
+    }
+    return 255.0f * sum + 0.5f;
+}
+
+/* Whether it leaves anything out, in 8 bits. */
+static bool varies(const alpha_source *source, size_t texels) {
+    bool found = false;
+    for (size_t i = 0; source->planes[0] != NULL && i < texels && !found; ++i) {
+        found = !(alpha_at(source, i) >= 255.0f);
+    }
+    return found;
+}
+
+static alpha_source find_alpha(const vsh_image *image, int32_t channel, size_t texels) {
+    static const char *const names[] = {"A", "R", "G", "B"};
+    const float *grey = plane_of(image, "Y");
+    const alpha_source luminance = {{plane_of(image, "R"), plane_of(image, "G"), plane_of(image, "B")},
+                                    {0.2126f, 0.7152f, 0.0722f}};
+    alpha_source one = {{NULL}, {1.0f, 0.0f, 0.0f}};
+    if (channel <= VSH_MASK_CHANNEL_BLUE || channel == VSH_MASK_CHANNEL_AUTO) {
+        one.planes[0] = plane_of(image, names[channel <= VSH_MASK_CHANNEL_BLUE ? channel : 0]);
+    }
+    if (channel == VSH_MASK_CHANNEL_ALPHA || (channel == VSH_MASK_CHANNEL_AUTO && varies(&one, texels))) {
+        return one;
+    }
+    one.planes[0] = one.planes[0] != NULL && channel != VSH_MASK_CHANNEL_AUTO ? one.planes[0] : grey;
+    return one.planes[0] != NULL ? one : luminance;
 }
 
 /* The alpha of an image, 8 bits a texel; none where it has none, or is opaque everywhere. */
 static vsh_result take_alpha(const vsh_image *image, const char *path, const vsh_run *run, texture *to,
                              vsh_error *error) {
     const size_t texels = (size_t)image->width * (size_t)image->height;
-    const float *from = NULL;
-    bool varies = false;
-    for (int32_t c = 0; c < image->channel_count; ++c) {
-        from = strcmp(image->names[c], "A") == 0 ? image->planes[c] : from;
-    }
-    for (size_t i = 0; from != NULL && i < texels && !varies; ++i) {
-        varies = from[i] < 1.0f;
-    }
-    if (!varies) {
+    const alpha_source from = find_alpha(image, to->channel, texels);
+    if (!varies(&from, texels)) {
         return VSH_OK;
     }
     if (image->width > LARGEST || image->height > LARGEST) {
@@ -132,12 +165,12 @@ static vsh_result take_alpha(const vsh_image *image, const char *path, const vsh
         vshi_check_limit(run, (double)texels * (1.0 + sizeof(float) * image->channel_count), path, error));
     VSHI_TRY(vshi_allocate((void **)&to->alpha, texels, 1, path, error));
     for (size_t i = 0; i < texels; ++i) {
-        const float value = 255.0f * from[i] + 0.5f;
+        const float value = alpha_at(&from, i);
         to->alpha[i] = (uint8_t)(value >= 255.0f ? 255.0f : value > 0.0f ? value : 0.0f);
     }
     to->width = image->width;
     to->height = image->height;
-    to->binary = is_binary(to->alpha, texels);
+    to->binary = vshi_alpha_is_binary(to->alpha, texels);
     return VSH_OK;
 }
 
@@ -152,7 +185,7 @@ static vsh_result read_texture(vshi_masks *masks, const vsh_model_material *told
                                const texture **found, vsh_error *error) {
     const void *of = told->image != NULL ? told->image : told->image_path;
     for (size_t i = 0; i < masks->texture_count; ++i) {
-        if (masks->textures[i].of == of) {
+        if (masks->textures[i].of == of && masks->textures[i].channel == told->image_channel) {
             *found = &masks->textures[i];
             return VSH_OK;
         }
@@ -160,6 +193,7 @@ static vsh_result read_texture(vshi_masks *masks, const vsh_model_material *told
     texture *made = &masks->textures[masks->texture_count++];
     *found = made;
     made->of = of;
+    made->channel = told->image_channel;
     char name[600];
     snprintf(name, sizeof name, "%.400s: the texture of material '%.100s'", masks->path,
              told->name != NULL ? told->name : "");
@@ -228,15 +262,60 @@ static vshi_mask_cover cover_of(const vshi_mask_table *table, const vsh_mesh *me
     return vshi_mask_table_cover(table, places);
 }
 
-vsh_result vshi_masks_is_cut_out(vshi_masks *masks, size_t mesh, const vsh_run *run, bool *is,
-                                 vsh_error *error) {
+/* The alpha of a mesh's vertices, where it has any and its material is not opaque, as its shape's mask. */
+static vsh_result look_at_vertices(vshi_masks *masks, size_t mesh, const vsh_run *run, vsh_error *error) {
+    const size_t number = (size_t)vsh_model_mesh_material(masks->model, mesh);
+    const vsh_model_material told = vsh_model_get_material(masks->model, number);
+    const vshi_model_shape *of = &masks->model->shapes[masks->model->entries[mesh].shape];
+    const material *m = &masks->materials[number];
+    shape *s = &masks->shapes[masks->model->entries[mesh].shape];
+    if (s->looked) {
+        return VSH_OK;
+    }
+    s->looked = true;
+    s->vertices = (vshi_vertex_alpha){.uniform = true, .factor = 1.0};
+    if (of->alphas == NULL || told.alpha == VSH_ALPHA_OPAQUE) {
+        return VSH_OK;
+    }
+    const bool masked = told.alpha == VSH_ALPHA_MASKED;
+    VSHI_TRY(vshi_vertex_alpha_look(of->alphas, of->vertex_count, masks->path, run, &s->vertices, error));
+    if (m->state == WHOLE && !s->vertices.uniform && (!masked || told.alpha_cutoff > 0.0)) {
+        s->masked = true;
+        s->mask = masked ? vshi_vertex_alpha_mask(told.base_alpha, told.alpha_cutoff)
+                         : vshi_vertex_alpha_mask(1.0, HALF);
+    } else if (m->state == BY_MASK && s->vertices.uniform && masked) {
+        s->masked = true;
+        s->mask = m->mask;
+        s->mask.base_alpha *= s->vertices.factor;
+    } else if (m->state == BY_MASK && !s->vertices.uniform) {
+        const vsh_mesh view = vsh_model_mesh(masks->model, mesh, -1);
+        vshi_warn(run, "%s: %s: alpha of vertices that differ is not taken beside a texture's", masks->path,
+                  vshi_mesh_label(&view, mesh).text);
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_masks_blend(vshi_masks *masks, size_t mesh, const vsh_run *run, vshi_blend *blend,
+                            vsh_error *error) {
     const int32_t number = vsh_model_mesh_material(masks->model, mesh);
-    *is = false;
-    if (number < 0 || vsh_model_get_material(masks->model, (size_t)number).alpha != VSH_ALPHA_BLENDED) {
+    *blend = VSHI_BLEND_GLASS;
+    if (number < 0) {
+        return VSH_OK;
+    }
+    const vsh_model_material told = vsh_model_get_material(masks->model, (size_t)number);
+    if (told.alpha != VSH_ALPHA_BLENDED) {
         return VSH_OK;
     }
     VSHI_TRY(read_material(masks, (size_t)number, run, error));
-    *is = masks->materials[number].state == BY_MASK && masks->materials[number].binary;
+    const material *m = &masks->materials[number];
+    const shape *s = &masks->shapes[masks->model->entries[mesh].shape];
+    VSHI_TRY(look_at_vertices(masks, mesh, run, error));
+    const double factor = told.base_alpha * (s->vertices.uniform ? s->vertices.factor : 1.0);
+    if (m->state == BY_MASK ? m->binary && factor >= HALF : s->vertices.binary && factor >= HALF) {
+        *blend = VSHI_BLEND_CUT_OUT;
+    } else if (m->state == WHOLE && told.by_texture != 0 && told.base_alpha >= 1.0) {
+        *blend = VSHI_BLEND_NOTHING;
+    }
     return VSH_OK;
 }
 
@@ -276,6 +355,22 @@ done:
     return result;
 }
 
+/* Its material's table is kept for other shapes. */
+static vsh_result sort_by(material *m, const vsh_mesh *textured, const vsh_run *run, shape *sorted,
+                          vsh_error *error) {
+    vshi_mask_table own = {.sums = NULL};
+    if (!sorted->masked) {
+        if (m->table.sums == NULL) {
+            VSHI_TRY(vshi_mask_table_create(&m->mask, run, &m->table, error));
+        }
+        return sort(&m->table, textured, run, sorted, error);
+    }
+    VSHI_TRY(vshi_mask_table_create(&sorted->mask, run, &own, error));
+    const vsh_result result = sort(&own, textured, run, sorted, error);
+    vshi_mask_table_free(&own);
+    return result;
+}
+
 vsh_result vshi_masks_cast(vshi_masks *masks, size_t index, const vsh_run *run, vshi_cast_views *views,
                            vsh_error *error) {
     const vsh_mesh mesh = vsh_model_mesh(masks->model, index, -1);
@@ -285,27 +380,29 @@ vsh_result vshi_masks_cast(vshi_masks *masks, size_t index, const vsh_run *run, 
         return VSH_OK;
     }
     VSHI_TRY(read_material(masks, (size_t)number, run, error));
+    VSHI_TRY(look_at_vertices(masks, index, run, error));
     material *m = &masks->materials[number];
     shape *sorted = &masks->shapes[masks->model->entries[index].shape];
-    if (m->state == NOTHING) {
+    const vsh_model_material told = vsh_model_get_material(masks->model, (size_t)number);
+    const bool faint = told.alpha == VSH_ALPHA_MASKED && sorted->vertices.uniform &&
+                       told.base_alpha * sorted->vertices.factor < told.alpha_cutoff;
+    if (m->state == NOTHING || faint) {
         *views = (vshi_cast_views){.count = 0, .cut = true};
-    }
-    if (m->state != BY_MASK) {
         return VSH_OK;
     }
-    const int32_t set = vsh_model_get_material(masks->model, (size_t)number).uv_set;
-    vsh_mesh textured = vsh_model_mesh(masks->model, index, set);
+    if (m->state != BY_MASK && !sorted->masked) {
+        return VSH_OK;
+    }
+    vsh_mesh textured = vsh_model_mesh(masks->model, index, told.uv_set);
+    textured.uvs = m->state == BY_MASK ? textured.uvs : sorted->vertices.uvs;
     if (textured.uvs == NULL && !sorted->known) {
         vshi_warn(run, "%s: %s: no UV set %d for the texture of its material: it casts whole", masks->path,
-                  vshi_mesh_label(&mesh, index).text, set);
+                  vshi_mesh_label(&mesh, index).text, told.uv_set);
         sorted->known = true;
         sorted->opaque_count = mesh.triangle_count;
     }
     if (!sorted->known) {
-        if (m->table.sums == NULL) {
-            VSHI_TRY(vshi_mask_table_create(&m->mask, run, &m->table, error));
-        }
-        VSHI_TRY(sort(&m->table, &textured, run, sorted, error));
+        VSHI_TRY(sort_by(m, &textured, run, sorted, error));
     }
     if (sorted->opaque_count == mesh.triangle_count) {
         return VSH_OK;
@@ -322,7 +419,7 @@ vsh_result vshi_masks_cast(vshi_masks *masks, size_t index, const vsh_run *run, 
         *cut = mesh;
         cut->indices = sorted->mixed != NULL ? sorted->mixed : mesh.indices;
         cut->triangle_count = sorted->mixed_count;
-        cut->mask = &m->mask;
+        cut->mask = sorted->masked ? &sorted->mask : &m->mask;
         cut->mask_uvs = textured.uvs;
         cut->solidity = VSH_SOLIDITY_SHELL;
         cut->alpha = VSH_ALPHA_MASKED;

@@ -31,10 +31,16 @@ typedef struct vshi_cast_views {
 vsh_result vshi_masks_cast(vshi_masks *masks, size_t mesh, const vsh_run *run, vshi_cast_views *views,
                            vsh_error *error);
 
-/* *is: the mesh's material is blended, and yet a cut-out as masked ones are: nearly all of its texture is
- * clear or opaque, and there is some of both. So exporters make hashed leaves. Warnings and errors: as above.
- */
-vsh_result vshi_masks_is_cut_out(vshi_masks *masks, size_t mesh, const vsh_run *run, bool *is,
-                                 vsh_error *error);
+/* What a mesh whose material is blended is for those that cast. */
+typedef enum vshi_blend {
+    VSHI_BLEND_GLASS,
+    VSHI_BLEND_CUT_OUT, /* as masked ones are: nearly all of its texture is clear or opaque, and there is some
+                           of both. So exporters make hashed leaves */
+    VSHI_BLEND_NOTHING  /* opaque: vsh_model_material.by_texture, and nothing of it is left out */
+} vshi_blend;
+
+/* Warnings and errors: as above. */
+vsh_result vshi_masks_blend(vshi_masks *masks, size_t mesh, const vsh_run *run, vshi_blend *blend,
+                            vsh_error *error);
 
 #endif

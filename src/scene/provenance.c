@@ -8,6 +8,7 @@
 #include "base/try.h"
 #include "light/light.h"
 #include "scene/inputs.h"
+#include "scene/tile.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -16,7 +17,8 @@
 #include <vdbshade/provenance.h>
 
 enum { NAME_SIZE = 96, LINE_SIZE = 512, HASH_PREFIX = sizeof "sha256:" - 1 };
-enum { RAYS = 64 }; /* of methods that keep no error, where none are given */
+enum { HASH_UNITS = 1 << 30 }; /* of the job, for all inputs */
+enum { RAYS = 64 };            /* of methods that keep no error, where none are given */
 
 struct vsh_provenance {
     vshi_attributes attributes;
@@ -123,12 +125,29 @@ static vsh_result add_settings(vsh_provenance *p, const vsh_provenance_source *s
     return VSH_OK;
 }
 
-static vsh_result add_inputs(vsh_provenance *p, const vshi_inputs *inputs, vshi_job *job, vsh_error *error) {
+/* What a tile knows of a file already, or NULL. */
+static const char *known_digest(const vsh_scene *scene, const char *path) {
+    for (size_t i = 0; scene != NULL && scene->tile != NULL && i < scene->caster_count; ++i) {
+        const char *digest = vshi_tile_of(scene, i)->digest;
+        if (digest[0] != '\0' && strcmp(scene->casters[i].path, path) == 0) {
+            return digest;
+        }
+    }
+    return NULL;
+}
+
+static vsh_result add_inputs(vsh_provenance *p, const vsh_scene *scene, const vshi_inputs *inputs,
+                             vshi_job *job, vsh_error *error) {
     for (size_t i = 0; i < inputs->count; ++i) {
         const char *path = inputs->paths[i];
         const char *slash = strrchr(path, '/');
         char name[NAME_SIZE], digest[VSH_DIGEST_TEXT];
-        VSHI_TRY(vshi_file_digest(path, digest, job, error));
+        const char *known = known_digest(scene, path);
+        if (known != NULL) {
+            memcpy(digest, known, sizeof digest);
+        } else {
+            VSHI_TRY(vshi_file_digest(path, digest, job, error));
+        }
         const char *last = slash != NULL ? slash + 1 : path;
         const size_t size = HASH_PREFIX + VSH_DIGEST_TEXT + 1 + strlen(last);
         char *text = malloc(size);
@@ -142,7 +161,7 @@ static vsh_result add_inputs(vsh_provenance *p, const vshi_inputs *inputs, vshi_
         if (result != VSH_OK) {
             return result;
         }
-        if (vshi_job_advance(job, 1)) {
+        if (vshi_job_advance(job, HASH_UNITS / inputs->count)) {
             return vshi_job_fail_cancelled(job, error);
         }
     }
@@ -154,13 +173,14 @@ static vsh_result fill(vsh_provenance *p, const vsh_provenance_source *source, c
     VSHI_NUMBERS;
     VSHI_TRY(add_settings(p, source, error));
     vshi_inputs inputs = {NULL, 0, 0};
-    vsh_result result = VSH_OK;
-    VSHI_TRY_DONE(vshi_inputs_find(source->scene, source->files, source->file_count, run->allow_outside != 0,
-                                   &inputs, error));
-    vshi_job *job = vshi_job_begin(run, "hash", inputs.count);
-    result = job != NULL ? add_inputs(p, &inputs, job, error) : out_of_memory(error);
+    vshi_job *job = vshi_job_begin(run, "hash", HASH_UNITS);
+    if (job == NULL) {
+        return out_of_memory(error);
+    }
+    vsh_result result =
+        vshi_inputs_find(source->scene, source->files, source->file_count, run, job, &inputs, error);
+    result = result == VSH_OK ? add_inputs(p, source->scene, &inputs, job, error) : result;
     vshi_job_end(job);
-done:
     vshi_inputs_free(&inputs);
     return result;
 }

@@ -177,18 +177,23 @@ vsh_result vshi_fail_unmatched(const vsh_model *model, const char *path, const c
                      materials);
 }
 
+bool vshi_mesh_is_meant(const vsh_mesh *mesh, const char *pattern, bool material) {
+    vsh_mesh named = *mesh;
+    if (material) {
+        named.name = mesh->material_name;
+        named.object_name = NULL;
+    }
+    return (!material || named.name != NULL) && vsh_mesh_matches(&named, pattern) != 0;
+}
+
 /* Sets those that a pattern matches by the name of their object, or of their `material`, to `value`; whether
  * there are any. */
 static bool apply_one(const vsh_model *model, const char *pattern, bool material, unsigned char value,
                       unsigned char *chosen) {
     bool matched = false;
     for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
-        vsh_mesh mesh = vsh_model_mesh(model, i, -1);
-        if (material) {
-            mesh.name = mesh.material_name;
-            mesh.object_name = NULL;
-        }
-        if (vsh_mesh_matches(&mesh, pattern)) {
+        const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
+        if (vshi_mesh_is_meant(&mesh, pattern, material)) {
             chosen[i] = value;
             matched = true;
         }

@@ -4,6 +4,8 @@
 
 #include <vdbshade/scene.h>
 
+#include <stdbool.h>
+
 /* *chosen [mesh count]: 1 for each mesh that the selection means; to be freed, also after an error. `path` is
  * the model's, for messages. Errors: VSH_ERROR_INPUT where a pattern matches nothing (with names that it
  * might have meant) or nothing is left; VSH_ERROR_ARGUMENT where a pattern is NULL; VSH_ERROR_MEMORY. */
@@ -14,6 +16,10 @@ vsh_result vshi_select(const vsh_model *model, const char *path, const vsh_selec
  * no mesh. */
 vsh_result vshi_select_some(const vsh_model *model, const char *path, const char *const *patterns,
                             size_t count, unsigned char **chosen, vsh_error *error);
+
+/* Whether a pattern means a mesh by its object's name, as vsh_mesh_matches() does, or by its `material`'s:
+ * that is asked where it means no mesh by the other. */
+bool vshi_mesh_is_meant(const vsh_mesh *mesh, const char *pattern, bool material);
 
 /* VSH_ERROR_INPUT, saying what a pattern may have meant that matches none of a model's meshes. */
 vsh_result vshi_fail_unmatched(const vsh_model *model, const char *path, const char *pattern,

@@ -3,30 +3,36 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "scene/select.h"
+#include "scene/tile.h"
 
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
-static bool apply_rule(const vsh_solidity_rule *rule, const vshi_mesh_list *list) {
+/* To what it means by objects' names in all of the lists, or by those of materials; whether there is any. */
+static bool apply_rule(const vsh_solidity_rule *rule, bool material, const vshi_mesh_list *lists,
+                       size_t count) {
     bool matched = false;
-    for (size_t i = 0; i < list->count; ++i) {
-        vsh_mesh *mesh = &list->meshes[i];
-        if (vsh_mesh_matches(mesh, rule->pattern)) {
-            mesh->solidity = mesh->mask != NULL ? VSH_SOLIDITY_SHELL : rule->solidity;
-            matched = true;
+    for (size_t k = 0; k < count; ++k) {
+        for (size_t i = 0; lists[k].model != NULL && i < lists[k].count; ++i) {
+            vsh_mesh *mesh = &lists[k].meshes[i];
+            if (vshi_mesh_is_meant(mesh, rule->pattern, material)) {
+                mesh->solidity = mesh->mask != NULL ? VSH_SOLIDITY_SHELL : rule->solidity;
+                matched = true;
+            }
         }
     }
     return matched;
 }
 
-/* Rules of one caster, or of all; each must match something, unless some of the casters are left out. */
+/* Rules of one caster, or of all; each must match something. Of a tile, where some of the casters are left
+ * out, it is `told` what they mean. */
 static vsh_result apply_rules(const vsh_solidity_rule *rules, size_t rule_count,
-                              const vshi_mesh_list *casters, size_t count, bool all, vsh_error *error) {
+                              const vshi_mesh_list *casters, size_t count, const unsigned char *told,
+                              vsh_error *error) {
     for (size_t r = 0; r < rule_count; ++r) {
         const vsh_solidity_rule *rule = &rules[r];
         const vshi_mesh_list *first = NULL;
-        bool matched = false;
         if (rule->pattern == NULL || rule->solidity < VSH_SOLIDITY_AUTO ||
             rule->solidity > VSH_SOLIDITY_INWARD) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "rule of solidity %zu: %s", r,
@@ -35,9 +41,12 @@ static vsh_result apply_rules(const vsh_solidity_rule *rules, size_t rule_count,
         }
         for (size_t i = 0; i < count; ++i) {
             first = first == NULL && casters[i].model != NULL ? &casters[i] : first;
-            matched = (casters[i].model != NULL && apply_rule(rule, &casters[i])) || matched;
         }
-        if (matched || !all) {
+        if (told != NULL) {
+            apply_rule(rule, told[r] == VSHI_RULE_MATERIAL, casters, count);
+            continue;
+        }
+        if (apply_rule(rule, false, casters, count) || apply_rule(rule, true, casters, count)) {
             continue;
         }
         if (first != NULL) {
@@ -89,11 +98,11 @@ vsh_result vshi_solidity_settle(const vsh_scene *scene, const vshi_mesh_list *ca
                                 vsh_error *error) {
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
-        VSHI_TRY(apply_rules(caster->solidity, caster->solidity_count, &casters[i], 1, scene->tile == NULL,
-                             error));
+        VSHI_TRY(apply_rules(caster->solidity, caster->solidity_count, &casters[i], 1,
+                             vshi_tile_rules(scene, i), error));
     }
     VSHI_TRY(apply_rules(scene->solidity, scene->solidity_count, casters, scene->caster_count,
-                         scene->tile == NULL, error));
+                         vshi_tile_scene_rules(scene), error));
     vsh_mesh *all = NULL;
     size_t count;
     vsh_result result;

@@ -161,6 +161,8 @@ static vsh_result allocate_casters(const vsh_tiles *tiles, vsh_tile *tile, vsh_e
     VSHI_TRY(vshi_allocate((void **)&tile->kept, meshes, 1, "casters", error));
     for (size_t i = 0, at = 0; i < survey->caster_count; at += survey->casters[i++].meshes) {
         tile->casters[i].none = survey->casters[i].count > 0;
+        tile->casters[i].digest = survey->casters[i].digest;
+        tile->casters[i].rules = survey->casters[i].rules;
         tile->casters[i].kept = survey->casters[i].count > 0 ? tile->kept + at : NULL;
     }
     return VSH_OK;
@@ -197,6 +199,7 @@ vsh_result vsh_tile_create(const vsh_tiles *tiles, size_t index, vsh_tile **tile
     VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "tile", error));
     made->scene = *tiles->whole;
     made->scene.tile = made;
+    made->rules = tiles->survey.rules;
     made->info.all_objects = tiles->survey.objects;
     made->info.all_triangles = tiles->survey.triangles;
     vshi_world_box around;

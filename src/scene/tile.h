@@ -13,6 +13,8 @@ typedef struct vshi_tile_caster {
     bool none;           /* nothing of it is left */
     bool boxed;          /* of a .vdb: what lies in `box` is, of its own space; else all of it */
     double box[2][3];
+    const char *digest;         /* of a .vdb's file, that of the survey; "" */
+    const unsigned char *rules; /* VSHI_RULE_… of its own rules of solidity; those of the survey */
 } vshi_tile_caster;
 
 struct vsh_tiles {
@@ -26,14 +28,23 @@ struct vsh_tiles {
 
 struct vsh_tile {
     vsh_scene scene;
-    vsh_receiver *receivers;   /* the scene's */
-    vshi_tile_caster *casters; /* [scene.caster_count] */
-    unsigned char *kept;       /* those of the casters, one after the other */
+    vsh_receiver *receivers;    /* the scene's */
+    vshi_tile_caster *casters;  /* [scene.caster_count] */
+    unsigned char *kept;        /* those of the casters, one after the other */
+    const unsigned char *rules; /* the same of the scene's */
     vsh_tile_info info;
 };
 
 static inline const vshi_tile_caster *vshi_tile_of(const vsh_scene *scene, size_t caster) {
     return scene->tile != NULL ? &scene->tile->casters[caster] : NULL;
+}
+
+/* What the rules of a caster mean, and those of the scene; NULL: that is to be found. */
+static inline const unsigned char *vshi_tile_rules(const vsh_scene *scene, size_t caster) {
+    return scene->tile != NULL ? scene->tile->casters[caster].rules : NULL;
+}
+static inline const unsigned char *vshi_tile_scene_rules(const vsh_scene *scene) {
+    return scene->tile != NULL ? scene->tile->rules : NULL;
 }
 
 /* Whether a caster is left in the scene, or in the tile that it is. */

@@ -70,40 +70,46 @@ static vsh_result find_objects(const vshi_asset_place *placed, vshi_survey_caste
     return VSH_OK;
 }
 
-/* Whether a pattern of a rule means one of the meshes; a tile, which has some of them, does not ask. */
-static bool is_matched(const vshi_asset_place *placed, const char *pattern) {
-    for (size_t i = 0; i < placed->count; ++i) {
-        if (vsh_mesh_matches(&placed->meshes[i], pattern)) {
-            return true;
+/* What a pattern means among the meshes: of objects before materials. */
+static unsigned char meaning(const vshi_asset_place *placed, const char *pattern) {
+    for (unsigned char kind = VSHI_RULE_OBJECT; pattern != NULL && kind <= VSHI_RULE_MATERIAL; ++kind) {
+        for (size_t i = 0; i < placed->count; ++i) {
+            if (vshi_mesh_is_meant(&placed->meshes[i], pattern, kind == VSHI_RULE_MATERIAL)) {
+                return kind;
+            }
         }
     }
-    return false;
+    return VSHI_RULE_NONE;
 }
 
 typedef struct surveying {
     const vsh_scene *scene;
     const vsh_run *run;
     vshi_survey *survey;
-    bool *matched; /* [scene->solidity_count] */
 } surveying;
 
-static vsh_result check_rules(surveying *s, const vsh_caster *caster, const vsh_model *model,
-                              const vshi_asset_place *placed, vsh_error *error) {
+/* Of all rules, what they mean; a tile, which has some of the meshes, could not say. */
+static vsh_result find_rules(surveying *s, const vsh_caster *caster, const vsh_model *model,
+                             const vshi_asset_place *placed, vshi_survey_caster *found, vsh_error *error) {
     unsigned char *one_sided = NULL;
     const vsh_result result =
         vshi_select_some(model, caster->path, caster->one_sided, caster->one_sided_count, &one_sided, error);
     free(one_sided);
-    for (size_t i = 0; i < caster->solidity_count && result == VSH_OK; ++i) {
+    VSHI_TRY(result);
+    VSHI_TRY(vshi_allocate((void **)&found->rules, caster->solidity_count, 1, "solidity", error));
+    for (size_t i = 0; i < caster->solidity_count; ++i) {
         const char *pattern = caster->solidity[i].pattern;
-        if (pattern != NULL && !is_matched(placed, pattern)) {
+        found->rules[i] = meaning(placed, pattern);
+        if (pattern != NULL && found->rules[i] == VSHI_RULE_NONE) {
             return vshi_fail_unmatched(model, caster->path, pattern, error);
         }
     }
-    for (size_t i = 0; i < s->scene->solidity_count && result == VSH_OK; ++i) {
-        const char *pattern = s->scene->solidity[i].pattern;
-        s->matched[i] = s->matched[i] || (pattern != NULL && is_matched(placed, pattern));
+    for (size_t i = 0; i < s->scene->solidity_count; ++i) {
+        const unsigned char own = meaning(placed, s->scene->solidity[i].pattern);
+        unsigned char *all = &s->survey->rules[i];
+        *all = *all == VSHI_RULE_OBJECT || own == VSHI_RULE_NONE ? *all : own;
     }
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result look_at_caster(surveying *s, size_t index, const vsh_model *model, vsh_error *error) {
@@ -112,7 +118,7 @@ static vsh_result look_at_caster(surveying *s, size_t index, const vsh_model *mo
     vshi_asset_place placed = {.count = 0};
     vsh_result result;
     VSHI_TRY_DONE(place(s->scene, model, caster->path, &caster->objects, caster->transform, &placed, error));
-    VSHI_TRY_DONE(check_rules(s, caster, model, &placed, error));
+    VSHI_TRY_DONE(find_rules(s, caster, model, &placed, found, error));
     result = find_objects(&placed, found, error);
     found->meshes = vsh_model_mesh_count(model);
     for (size_t i = 0; i < found->count; ++i) {
@@ -153,10 +159,24 @@ static vsh_result look_at_heights(surveying *s, size_t index, vsh_error *error) 
     return VSH_OK;
 }
 
+/* Once for each file, however many casters are of it. */
+static vsh_result find_digest(surveying *s, size_t index, vsh_error *error) {
+    const vsh_caster *casters = s->scene->casters;
+    char *digest = s->survey->casters[index].digest;
+    for (size_t i = 0; i < index; ++i) {
+        if (casters[i].type == VSH_CASTER_VDB && strcmp(casters[i].path, casters[index].path) == 0) {
+            memcpy(digest, s->survey->casters[i].digest, VSH_DIGEST_TEXT);
+            return VSH_OK;
+        }
+    }
+    return vsh_file_digest(casters[index].path, s->run, digest, error);
+}
+
 static vsh_result look_at_vdb(surveying *s, size_t index, vsh_error *error) {
     const vsh_caster *caster = &s->scene->casters[index];
     vshi_world_box *box = &s->survey->casters[index].box;
     double told[6];
+    VSHI_TRY(find_digest(s, index, error));
     VSHI_TRY(vshi_vdb_box(caster->path, caster->grid, s->run, told, error));
     for (int axis = 0; axis < 3 && told[0] <= told[3]; ++axis) {
         box->low[axis] = told[axis];
@@ -227,7 +247,7 @@ static vsh_result look_at_receivers(surveying *s, vsh_error *error) {
 
 static vsh_result check_matched(const surveying *s, vsh_error *error) {
     for (size_t i = 0; i < s->scene->solidity_count; ++i) {
-        if (s->scene->solidity[i].pattern != NULL && !s->matched[i]) {
+        if (s->scene->solidity[i].pattern != NULL && s->survey->rules[i] == VSHI_RULE_NONE) {
             return vshi_fail(error, VSH_ERROR_INPUT, "no object is named '%.100s'",
                              s->scene->solidity[i].pattern);
         }
@@ -239,31 +259,28 @@ vsh_result vshi_survey_make(const vsh_scene *scene, const vsh_run *run, vshi_sur
                             vsh_error *error) {
     surveying s = {.scene = scene, .run = run, .survey = survey};
     *survey = (vshi_survey){.caster_count = scene->caster_count};
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&survey->casters, scene->caster_count, sizeof *survey->casters,
-                                "casters", error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&survey->receivers, scene->receiver_count, sizeof *survey->receivers,
-                                "receivers", error));
-    VSHI_TRY_DONE(
-        vshi_allocate((void **)&s.matched, scene->solidity_count, sizeof *s.matched, "solidity", error));
+    VSHI_TRY(vshi_allocate((void **)&survey->casters, scene->caster_count, sizeof *survey->casters, "casters",
+                           error));
+    VSHI_TRY(vshi_allocate((void **)&survey->receivers, scene->receiver_count, sizeof *survey->receivers,
+                           "receivers", error));
+    VSHI_TRY(vshi_allocate((void **)&survey->rules, scene->solidity_count, 1, "solidity", error));
     for (size_t i = 0; i < scene->caster_count; ++i) {
         survey->casters[i].box = vshi_empty_box;
     }
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         survey->receivers[i] = vshi_empty_box;
     }
-    VSHI_TRY_DONE(look_at_casters(&s, error));
-    VSHI_TRY_DONE(check_matched(&s, error));
-    result = look_at_receivers(&s, error);
-done:
-    free(s.matched);
-    return result;
+    VSHI_TRY(look_at_casters(&s, error));
+    VSHI_TRY(check_matched(&s, error));
+    return look_at_receivers(&s, error);
 }
 
 void vshi_survey_free(vshi_survey *survey) {
     for (size_t i = 0; survey->casters != NULL && i < survey->caster_count; ++i) {
         free(survey->casters[i].objects);
+        free(survey->casters[i].rules);
     }
+    free(survey->rules);
     free(survey->casters);
     free(survey->receivers);
     *survey = (vshi_survey){.caster_count = 0};

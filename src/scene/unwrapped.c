@@ -271,6 +271,20 @@ static vsh_result list_pages(const vsh_receiver *receiver, const vsh_mesh *meshe
     return VSH_OK;
 }
 
+/* Of the objects that a rule means by their names, or by those of their materials; whether there are any. */
+static bool apply_density(const vsh_model *model, const vsh_density_rule *rule, bool material,
+                          double *density) {
+    bool matched = false;
+    for (size_t m = 0; m < vsh_model_mesh_count(model); ++m) {
+        const vsh_mesh mesh = vsh_model_mesh(model, m, -1);
+        if (vshi_mesh_is_meant(&mesh, rule->pattern, material)) {
+            density[m] = rule->factor;
+            matched = true;
+        }
+    }
+    return matched;
+}
+
 vsh_result vsh_model_densities(const vsh_model *model, const char *path, const vsh_density_rule *rules,
                                size_t count, double *density, vsh_error *error) {
     VSHI_NEEDS(model);
@@ -288,15 +302,7 @@ vsh_result vsh_model_densities(const vsh_model *model, const char *path, const v
                              "%s: density '%.100s' is %g, expected a pattern and a finite number above 0",
                              path, rule->pattern != NULL ? rule->pattern : "", rule->factor);
         }
-        bool matched = false;
-        for (size_t m = 0; m < meshes; ++m) {
-            const vsh_mesh mesh = vsh_model_mesh(model, m, -1);
-            if (vsh_mesh_matches(&mesh, rule->pattern) != 0) {
-                density[m] = rule->factor;
-                matched = true;
-            }
-        }
-        if (!matched) {
+        if (!apply_density(model, rule, false, density) && !apply_density(model, rule, true, density)) {
             return vshi_fail_unmatched(model, path, rule->pattern, error);
         }
     }
@@ -327,7 +333,7 @@ done:
 vsh_result vshi_unwrap_receiver(const vsh_receiver *receiver, const vsh_model *model, const vsh_mesh *meshes,
                                 const size_t *numbers, size_t count, const vsh_run *run,
                                 vshi_unwrapped *unwrapped, vsh_error *error) {
-    *unwrapped = (vshi_unwrapped){NULL};
+    *unwrapped = (vshi_unwrapped){0};
     vsh_unwrap_options options = vsh_unwrap_options_default();
     options.width = receiver->max_size > 0 ? receiver->max_size : receiver->width;
     options.height = receiver->max_size > 0 ? receiver->max_size : receiver->height;
@@ -397,5 +403,5 @@ void vshi_unwrapped_free(vshi_unwrapped *unwrapped) {
     free(unwrapped->numbers);
     free(unwrapped->parts);
     vsh_atlas_free(unwrapped->atlas);
-    *unwrapped = (vshi_unwrapped){NULL};
+    *unwrapped = (vshi_unwrapped){0};
 }

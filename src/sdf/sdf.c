@@ -10,7 +10,7 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/try.h"
-#include "base/vec.h"
+#include "sdf/shapes.h"
 
 #include <stdlib.h>
 
@@ -47,10 +47,6 @@ static const struct {
 };
 
 enum { SHAPE_COUNT = sizeof shapes / sizeof shapes[0] };
-
-static bool is_operation(const vsh_sdf_node *node) {
-    return (shapes[node->shape].reads & OPERANDS) != 0;
-}
 
 static vsh_result check_lengths(const vsh_sdf_node *node, size_t index, vsh_error *error) {
     const struct {
@@ -102,7 +98,7 @@ static vsh_result check_placement(const vsh_sdf_node *node, size_t index, vsh_er
 /* Checks the operands of node `index`, and notes its depth; a depth of 0 marks a node that is used. */
 static vsh_result check_operands(const vsh_sdf *sdf, size_t index, int32_t *depth, vsh_error *error) {
     const vsh_sdf_node *node = &sdf->nodes[index];
-    if (!is_operation(node)) {
+    if (!vshi_sdf_is_operation(node)) {
         depth[index] = 1;
         return VSH_OK;
     }
@@ -172,131 +168,23 @@ vsh_result vsh_sdf_check(const vsh_sdf *sdf, vsh_error *error) {
     return result;
 }
 
-/* v turned by the quaternion, or back. Shapes are mostly not turned at all, and that is free. */
-static vshi_vec rotate(const double q[4], double direction, vshi_vec v) {
-    if (q[0] == 0.0 && q[1] == 0.0 && q[2] == 0.0) {
-        return v;
-    }
-    const double scale = 1.0 / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    const vshi_vec axis = {q[0] * scale * direction, q[1] * scale * direction, q[2] * scale * direction};
-    const vshi_vec twice = vshi_scale(vshi_cross(axis, v), 2.0);
-    return vshi_add(vshi_add(v, vshi_scale(twice, q[3] * scale)), vshi_cross(axis, twice));
-}
-
-/* max, min and clamp as comparisons: fmin and fmax are calls where NaN must be minded, and these run for
- * every voxel; a NaN position still gives NaN through the lengths. */
-static double larger(double a, double b) {
-    return a > b ? a : b;
-}
-static double smaller(double a, double b) {
-    return a < b ? a : b;
-}
-static double clamp(double value, double low, double high) {
-    return value < low ? low : value > high ? high : value;
-}
-
-static double box_distance(vshi_vec p, double x, double y, double z) {
-    const vshi_vec q = {fabs(p.x) - x, fabs(p.y) - y, fabs(p.z) - z};
-    const double deepest = larger(q.x, larger(q.y, q.z));
-    if (deepest <= 0.0) {
-        return deepest;
-    }
-    return vshi_length((vshi_vec){larger(q.x, 0.0), larger(q.y, 0.0), larger(q.z, 0.0)});
-}
-
-static double cone_distance(vshi_vec p, double half_height, double base, double top) {
-    const double r = sqrt(p.x * p.x + p.z * p.z);
-    const double cap_r = r - smaller(r, p.y < 0.0 ? base : top);
-    const double cap_y = fabs(p.y) - half_height;
-    const double slope_r = top - base;
-    const double slope_y = 2.0 * half_height;
-    const double along =
-        clamp(((top - r) * slope_r + (half_height - p.y) * slope_y) / (slope_r * slope_r + slope_y * slope_y),
-              0.0, 1.0);
-    const double side_r = r - top + slope_r * along;
-    const double side_y = p.y - half_height + slope_y * along;
-    const double squared = smaller(cap_r * cap_r + cap_y * cap_y, side_r * side_r + side_y * side_y);
-    return side_r < 0.0 && cap_y < 0.0 ? -sqrt(squared) : sqrt(squared);
-}
-
-static double shape_distance(const vsh_sdf_node *node, vshi_vec p) {
-    switch (node->shape) {
-    case VSH_SDF_SPHERE:
-        return vshi_length(p) - node->radius;
-    case VSH_SDF_BOX:
-        return box_distance(p, node->size[0], node->size[1], node->size[2]) - node->rounding;
-    case VSH_SDF_TORUS: {
-        const double ring = sqrt(p.x * p.x + p.z * p.z) - node->radius;
-        return sqrt(ring * ring + p.y * p.y) - node->minor_radius;
-    }
-    case VSH_SDF_PLANE: {
-        const double half = 0.5 * node->size[1];
-        p.y += half;
-        return box_distance(p, node->size[0], half, node->size[2]);
-    }
-    case VSH_SDF_CAPSULE:
-        p.y -= clamp(p.y, -node->size[1], node->size[1]);
-        return vshi_length(p) - node->radius;
-    case VSH_SDF_CYLINDER: {
-        const double r = sqrt(p.x * p.x + p.z * p.z) - node->radius;
-        const double y = fabs(p.y) - node->size[1];
-        if (r <= 0.0 || y <= 0.0) {
-            return larger(r, y);
-        }
-        return sqrt(r * r + y * y);
-    }
-    default: /* VSH_SDF_CONE */
-        return cone_distance(p, node->size[1], node->radius, node->minor_radius);
-    }
-}
-
-static double combine(const vsh_sdf_node *node, double a, double b) {
-    switch (node->shape) {
-    case VSH_SDF_INTERSECTION:
-        return larger(a, b);
-    case VSH_SDF_SUBTRACTION:
-        return larger(a, -b);
-    case VSH_SDF_SMOOTH_UNION: {
-        const double overlap = larger(node->smoothing - fabs(a - b), 0.0) / node->smoothing;
-        return smaller(a, b) - 0.25 * node->smoothing * overlap * overlap;
-    }
-    default: /* VSH_SDF_UNION */
-        return smaller(a, b);
-    }
-}
-
-/* The operands of an operation that decide. */
-enum { KEEP_BOTH, KEEP_LEFT, KEEP_RIGHT };
-
-static vshi_vec to_node(const vsh_sdf_node *node, vshi_vec p) {
-    p = rotate(node->rotation, -1.0, vshi_sub(p, vshi_vec_of(node->translation)));
-    return node->scale != 1.0 ? vshi_scale(p, 1.0 / node->scale) : p;
-}
-
-/* `keep` may be NULL. */
-static double node_distance(const vsh_sdf_node *nodes, const uint8_t *keep, int32_t index, vshi_vec p) {
+static double node_distance(const vsh_sdf_node *nodes, int32_t index, vshi_vec p) {
     const vsh_sdf_node *node = &nodes[index];
-    p = to_node(node, p);
-    double distance;
-    if (!is_operation(node)) {
-        distance = shape_distance(node, p);
-    } else if (keep == NULL || keep[index] == KEEP_BOTH) {
-        distance = combine(node, node_distance(nodes, keep, node->left, p),
-                           node_distance(nodes, keep, node->right, p));
-    } else {
-        distance = node_distance(nodes, keep, keep[index] == KEEP_LEFT ? node->left : node->right, p);
-        distance = node->shape == VSH_SDF_SUBTRACTION && keep[index] == KEEP_RIGHT ? -distance : distance;
-    }
+    p = vshi_sdf_to_node(node, p);
+    const double distance = !vshi_sdf_is_operation(node)
+                                ? vshi_sdf_shape_distance(node->shape, node, p)
+                                : vshi_sdf_combine(node->shape, node, node_distance(nodes, node->left, p),
+                                                   node_distance(nodes, node->right, p));
     return distance * node->scale;
+}
+
+double vshi_sdf_distance_at(const vsh_sdf *sdf, vshi_vec position) {
+    return vshi_finite(position) ? node_distance(sdf->nodes, (int32_t)sdf->node_count - 1, position) : NAN;
 }
 
 double vsh_sdf_distance(const vsh_sdf *sdf, const double position[3]) {
     VSHI_FLOATS;
-    const vshi_vec p = vshi_vec_of(position);
-    if (!vshi_finite(p)) {
-        return NAN;
-    }
-    return node_distance(sdf->nodes, NULL, (int32_t)sdf->node_count - 1, p);
+    return vshi_sdf_distance_at(sdf, vshi_vec_of(position));
 }
 
 /* A distance, and how far rounding may have moved it. */
@@ -312,25 +200,26 @@ static rounded narrow(const vsh_sdf_node *nodes, int32_t index, vshi_vec p, doub
     const double LARGEST = 1e100; /* whose squares are far from overflow */
     const vsh_sdf_node *node = &nodes[index];
     const double lengths = vshi_length(p) + vshi_length(vshi_vec_of(node->translation));
-    p = to_node(node, p);
+    p = vshi_sdf_to_node(node, p);
     radius /= node->scale;
     rounded here;
-    keep[index] = KEEP_BOTH;
-    if (!is_operation(node)) {
-        here.distance = shape_distance(node, p);
+    keep[index] = VSHI_SDF_KEEP_BOTH;
+    if (!vshi_sdf_is_operation(node)) {
+        here.distance = vshi_sdf_shape_distance(node->shape, node, p);
         here.error = ROUNDED * (fabs(node->size[0]) + fabs(node->size[1]) + fabs(node->size[2]) +
                                 fabs(node->radius) + fabs(node->minor_radius) + fabs(node->rounding));
     } else {
         const rounded left = narrow(nodes, node->left, p, radius, keep);
         const rounded right = narrow(nodes, node->right, p, radius, keep);
-        here = (rounded){combine(node, left.distance, right.distance), left.error + right.error};
+        here = (rounded){vshi_sdf_combine(node->shape, node, left.distance, right.distance),
+                         left.error + right.error};
         /* how much more the left one counts than the right one */
         const double more = node->shape == VSH_SDF_UNION          ? right.distance - left.distance
                             : node->shape == VSH_SDF_INTERSECTION ? left.distance - right.distance
                             : node->shape == VSH_SDF_SUBTRACTION  ? left.distance + right.distance
                                                                   : 0.0;
         if (fabs(more) > 2.0 * (radius * (1.0 + ROUNDED) + here.error) && fabs(more) < LARGEST) {
-            keep[index] = more > 0.0 ? KEEP_LEFT : KEEP_RIGHT;
+            keep[index] = more > 0.0 ? VSHI_SDF_KEEP_LEFT : VSHI_SDF_KEEP_RIGHT;
         }
     }
     here.error = node->scale * here.error + ROUNDED * (lengths + node->scale * fabs(here.distance));
@@ -343,15 +232,9 @@ void vshi_sdf_narrow(const vsh_sdf *sdf, const double position[3], double radius
     narrow(sdf->nodes, (int32_t)sdf->node_count - 1, vshi_vec_of(position), radius, keep);
 }
 
-double vshi_sdf_distance_within(const vsh_sdf *sdf, const uint8_t *keep, const double position[3]) {
-    VSHI_FLOATS;
-    const vshi_vec p = vshi_vec_of(position);
-    return vshi_finite(p) ? node_distance(sdf->nodes, keep, (int32_t)sdf->node_count - 1, p) : NAN;
-}
-
 bool vshi_sdf_exact(const vsh_sdf *sdf) {
     for (size_t i = 0; i < sdf->node_count; ++i) {
-        if (is_operation(&sdf->nodes[i]) && sdf->nodes[i].shape != VSH_SDF_UNION) {
+        if (vshi_sdf_is_operation(&sdf->nodes[i]) && sdf->nodes[i].shape != VSH_SDF_UNION) {
             return false;
         }
     }
@@ -377,7 +260,7 @@ static placement place_node(const placement *parent, const vsh_sdf_node *node) {
     at.origin = place(parent, vshi_vec_of(node->translation));
     at.scale = parent->scale * node->scale;
     for (int i = 0; i < 3; ++i) { /* row · R = Rᵀ applied to the row */
-        at.axis[i] = rotate(node->rotation, -1.0, parent->axis[i]);
+        at.axis[i] = vshi_sdf_rotate(node->rotation, -1.0, parent->axis[i]);
     }
     return at;
 }
@@ -394,15 +277,15 @@ static double shape_extent(const vsh_sdf_node *node, vshi_vec along) {
     case VSH_SDF_TORUS:
         return across * node->radius + node->minor_radius;
     case VSH_SDF_PLANE:
-        return fabs(along.x) * node->size[0] + larger(-along.y, 0.0) * node->size[1] +
+        return fabs(along.x) * node->size[0] + vshi_larger(-along.y, 0.0) * node->size[1] +
                fabs(along.z) * node->size[2];
     case VSH_SDF_CAPSULE:
         return fabs(along.y) * node->size[1] + node->radius;
     case VSH_SDF_CYLINDER:
         return fabs(along.y) * node->size[1] + across * node->radius;
     default: /* VSH_SDF_CONE */
-        return larger(across * node->radius - along.y * node->size[1],
-                      across * node->minor_radius + along.y * node->size[1]);
+        return vshi_larger(across * node->radius - along.y * node->size[1],
+                           across * node->minor_radius + along.y * node->size[1]);
     }
 }
 
@@ -411,7 +294,7 @@ static void node_bounds(const vsh_sdf_node *nodes, int32_t index, const placemen
     const vsh_sdf_node *node = &nodes[index];
     const placement at = place_node(parent, node);
     const double origin[3] = {at.origin.x, at.origin.y, at.origin.z};
-    if (!is_operation(node)) {
+    if (!vshi_sdf_is_operation(node)) {
         for (int i = 0; i < 3; ++i) {
             low[i] = origin[i] - at.scale * shape_extent(node, vshi_scale(at.axis[i], -1.0));
             high[i] = origin[i] + at.scale * shape_extent(node, at.axis[i]);
@@ -428,11 +311,12 @@ static void node_bounds(const vsh_sdf_node *nodes, int32_t index, const placemen
     const double grown = node->shape == VSH_SDF_SMOOTH_UNION ? 0.25 * node->smoothing * at.scale : 0.0;
     for (int i = 0; i < 3; ++i) {
         if (node->shape == VSH_SDF_INTERSECTION) {
-            low[i] = larger(low[i], low2[i]);
-            high[i] = larger(low[i], smaller(high[i], high2[i])); /* nothing in common: flat, not inverted */
+            low[i] = vshi_larger(low[i], low2[i]);
+            high[i] = vshi_larger(
+                low[i], vshi_smaller(high[i], high2[i])); /* nothing in common: flat, not inverted */
         } else {
-            low[i] = smaller(low[i], low2[i]) - grown;
-            high[i] = larger(high[i], high2[i]) + grown;
+            low[i] = vshi_smaller(low[i], low2[i]) - grown;
+            high[i] = vshi_larger(high[i], high2[i]) + grown;
         }
     }
 }

@@ -18,9 +18,9 @@ enum { VSHI_SDF_DEPTH = 2048 };
  * the position is finite. Thread safe. */
 VSHI_SHARED void vshi_sdf_narrow(const vsh_sdf *sdf, const double position[3], double radius, uint8_t *keep);
 
-/* vsh_sdf_distance(), to the bit, of a position within that radius, without the other operands. */
-VSHI_SHARED double vshi_sdf_distance_within(const vsh_sdf *sdf, const uint8_t *keep,
-                                            const double position[3]);
+/* vsh_sdf_distance(), to the bit, of positions [count] within that radius, without the other operands. */
+VSHI_SHARED void vshi_sdf_distances_within(const vsh_sdf *sdf, const uint8_t *keep, size_t count,
+                                           const double (*positions)[3], double *distances);
 
 /* True where the tree is a true distance outside: shapes and unions only. */
 VSHI_SHARED bool vshi_sdf_exact(const vsh_sdf *sdf);

@@ -27,6 +27,10 @@ typedef struct vshi_ao_share {
     /* [points]: spacing of the lattice that the texel's value is to come from, by a window over it where the
      * texel shot rays, else by those of its cell's corners */
     uint8_t *level;
+    /* [rows of tiles][columns of tiles], of 8 texels: which lattices shoot there, as the sum of their
+     * spacings, for a lattice's own tile the same all over it. What a tile shoots depends on those of wider
+     * lattices over it and, for its cells, over the texels behind it, where these are of its square */
+    const uint8_t *lattices;
 } vshi_ao_share;
 
 /* Levels of no lattice: not chosen yet; the value is known without rays. */

@@ -378,15 +378,39 @@ static void cover(const vshi_ao_task *task, const int32_t square[2], const int32
     }
 }
 
+/* Whether a tile is among those that are to shoot. */
+static bool shoots(const vshi_ao_share *share, const vshi_texel_lattice *of) {
+    const int32_t columns = (share->map.width + TILE - 1) / TILE;
+    return of->left < share->map.width && of->top < share->map.height &&
+           (share->lattices[of->top / TILE * columns + of->left / TILE] & of->spacing) != 0;
+}
+
+static bool any_shoots(const vshi_ao_share *share, const int32_t square[2]) {
+    bool any = false;
+    for (int32_t k = 0; k < share->spacing * share->spacing; ++k) {
+        const vshi_texel_lattice of = {.left = square[0] + k % share->spacing * TILE,
+                                       .top = square[1] + k / share->spacing * TILE,
+                                       .spacing = 2 * share->spacing - 1};
+        any = any || shoots(share, &of);
+    }
+    return any;
+}
+
 static void shade_square(const vshi_ao_task *task, const int32_t square[2], vsh_shade_stats *stats) {
     const int32_t side = vshi_ao_square(task->share);
     tile t;
+    if (!any_shoots(task->share, square)) {
+        return;
+    }
     const bool fine = task->options->max_error < FINE || task->options->sampler == VSH_SAMPLER_WHITE;
     for (int32_t spacing = fine ? 1 : task->share->spacing; spacing > 0; spacing /= 2) {
         const int32_t step = TILE * spacing;
         for (int32_t k = 0; k < side / step * (side / step); ++k) {
             const vshi_texel_lattice lattice = {square[0] + k % (side / step) * step,
                                                 square[1] + k / (side / step) * step, spacing, TILE, TILE};
+            if (!shoots(task->share, &lattice)) {
+                continue;
+            }
             open_tile(task, &lattice, &t);
             if (t.count > 0) {
                 shoot_tile(task, &t, stats);

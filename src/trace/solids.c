@@ -9,6 +9,7 @@
 #include "base/similarity.h"
 #include "base/try.h"
 #include "base/vec.h"
+#include "sdf/shapes.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -182,9 +183,7 @@ void vsh_solids_free(vsh_solids *solids) {
 }
 
 static double member_distance(const member *m, vshi_vec p) {
-    const vshi_vec local = vshi_transform_point(m->inverse, p);
-    const double at[3] = {local.x, local.y, local.z};
-    return m->scale * vsh_sdf_distance(&m->sdf, at);
+    return m->scale * vshi_sdf_distance_at(&m->sdf, vshi_transform_point(m->inverse, p));
 }
 
 static double distance_at(const vsh_solids *solids, vshi_vec p) {
@@ -216,9 +215,11 @@ static bool clip(const member *m, const vshi_segment_ray *ray, double *begin, do
             }
             continue;
         }
+        /* comparisons, as fmin and fmax are calls where NaN must be minded, and none is here */
         const double a = (low[axis] - o) / d, b = (high[axis] - o) / d;
-        *begin = fmax(*begin, fmin(a, b));
-        *end = fmin(*end, fmax(a, b));
+        const double first = a < b ? a : b, last = a < b ? b : a;
+        *begin = first > *begin ? first : *begin;
+        *end = last < *end ? last : *end;
     }
     return *begin <= *end;
 }

@@ -205,6 +205,19 @@ JSON
     untouched out.exr
 }
 
+@test "a dry run needs no folder that a bake would make" {
+    for out in new/ new/lit.glb; do
+        shade bake box.obj "${SMALL[@]}" --per-object -o "$out" --dry-run
+        done_well
+    done
+    printf '{"casters": [{"mesh": "box.obj"}], "ao": {"distance": 1}, "receivers": [{"mesh": "box.obj", "size": 32, "output": "lit.glb"}]}' >scene.json
+    shade bake scene.json --output-folder new --dry-run
+    done_well
+    [ ! -e new ] || fail "it was made"
+    shade bake box.obj "${SMALL[@]}" -o new/out.exr --dry-run
+    refused 3 "no folder 'new'"
+}
+
 @test "its texels are those of the bake" {
     shade bake box.obj "${SMALL[@]}" --size 200x90 -o out.exr --dry-run
     done_well

@@ -131,6 +131,12 @@ PROGRAM
     [[ $(head -1 asked) =~ --array=1-5\ --requeue\ .*--cpus-per-task=2\ --mem=([0-9]+)\ --time=2\ .*--partition=night\ .*part.sbatch\ bake\ box.obj ]]
     [ "${BASH_REMATCH[1]}" -ge 256 ] && [ "${BASH_REMATCH[1]}" -le 600 ]
     [[ $(tail -1 asked) == *"--dependency=afterok:7 "*"merge.sbatch out.exr 5" ]]
+    # of a trade memory and time are told, and what merge is to write
+    rm asked
+    run -2 env PATH="$PWD/bin:$PATH" "$tools/submit" 2 trade box.obj --sun 0,1,0 -o out.html
+    run -0 env PATH="$PWD/bin:$PATH" MEMORY=500 MINUTES=9 MERGE="--csv out.csv" "$tools/submit" 2 trade box.obj --sun 0,1,0 -o out.html
+    [[ $(head -1 asked) =~ --mem=500\ --time=9\ .*part.sbatch\ trade\ box.obj\ --sun ]]
+    [[ $(tail -1 asked) == *"merge.sbatch out.html 2 --csv out.csv" ]]
     for parts in 0 x 20000; do
         run -2 "$tools/submit" $parts bake box.obj -o out.exr
     done

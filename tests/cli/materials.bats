@@ -180,6 +180,13 @@ differ() {
     shade bake whole.gltf "${BAKE[@]}" --receive earth -o named.exr
     done_well
     same_values named.exr whole.exr || fail "--receive"
+    local -a fit=(--sun 0,1,0 --size 96 --unwrap always)
+    shade bake whole.gltf "${fit[@]}" --density floor=0.5 -o whole.exr
+    shade bake whole.gltf "${fit[@]}" --density earth=0.5 -o named.exr
+    done_well
+    same_values named.exr whole.exr || fail "--density"
+    shade bake whole.gltf "${BAKE[@]}" --receive floor --shell leaf --solid 'material:w*' -o named.exr
+    done_well
     old_output out.exr
     shade bake whole.gltf "${BAKE[@]}" --no-cast woof -o out.exr
     refused 2 "no object is named 'woof'" "did you mean 'wood'" "materials 'leaf', 'earth'"
@@ -227,4 +234,72 @@ JSON
 @test "info says how a material casts" {
     shade info masked.gltf
     [[ $output == *"masked (leaves, fences): it casts by its texture's alpha"* ]] || fail "$output"
+}
+
+# The names of an image's inputs.
+inputs_of() {
+    "$VDBSHADE" info "$1" | sed -n 's/^vdbshade_input_[0-9]*: sha256:[0-9a-f]* //p' | tr '\n' ' '
+}
+
+@test "what decides where light comes through is an input" {
+    bake masked.gltf one.exr
+    [ "$(inputs_of one.exr)" = "masked.gltf emblem.png " ] || fail "$(inputs_of one.exr)"
+    bake whole.gltf whole.exr
+    [ "$(inputs_of whole.exr)" = "whole.gltf " ] || fail "$(inputs_of whole.exr)"
+    printf 'mtllib my box.mtl\n' >box.obj
+    write_box solid.obj
+    cat solid.obj >>box.obj
+    printf 'newmtl box\nd 1\n' >'my box.mtl'
+    shade bake box.obj "${SMALL[@]}" -o box.exr
+    [ "$(inputs_of box.exr)" = "box.obj my box.mtl " ] || fail "$(inputs_of box.exr)"
+    mv 'my box.mtl' box.mtl
+    shade bake box.obj "${SMALL[@]}" -o box.exr
+    [ "$(inputs_of box.exr)" = "box.obj box.mtl " ] || fail "$(inputs_of box.exr)"
+}
+
+@test "no output replaces what is read with a model" {
+    cp masked.gltf level.gltf
+    base64 -d <<<"$BUFFER" >level.bin
+    sed -i 's,"uri": "data:[^"]*","uri": "level.bin",' level.gltf
+    ln -s emblem.png link.png
+    ln level.bin hard.field
+    sha256sum emblem.png level.bin >sums
+    local out
+    for out in emblem.png link.png; do
+        shade bake level.gltf "${BAKE[@]}" --receive floor -o "$out"
+        refused 2 "$out: the output is also an input" emblem.png
+        shade render level.gltf --sun 0,1,0 --size 16x16 -o "$out"
+        refused 2 "$out: the output is also an input" emblem.png
+        shade bake level.gltf "${BAKE[@]}" --receive floor -o out.exr --stats "$out"
+        refused 2 "$out: the output is also an input" emblem.png
+    done
+    for out in level.bin hard.field; do
+        shade field level.gltf --resolution 32 -o "$out"
+        refused 2 "$out: the output is also an input" level.bin
+    done
+    sha256sum --check --quiet sums || fail "an input was replaced"
+    bake level.gltf out.exr
+    bake level.gltf out.exr
+}
+
+# Another image in place of the leaf's, opaque all over.
+change_texture() {
+    "$VDBSHADE" bake "$ASSETS/seeds_floor.obj" --sun 0,1,0 --size 8 -o emblem.png --quiet
+}
+
+@test "parts of a bake and golden bakes are told from those of another texture" {
+    mkdir scenes
+    cat >scenes/leaf.json <<'JSON'
+{"casters": [{"mesh": "../masked.gltf"}],
+ "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0], "angle_deg": 2}],
+ "receivers": [{"mesh": "../masked.gltf", "objects": ["floor"], "size": 32, "output": "leaf.exr"}]}
+JSON
+    "$VDBSHADE" regress scenes --update --quiet
+    bake masked.gltf part.exr --shard 1/2
+    change_texture
+    bake masked.gltf part.exr --shard 2/2
+    shade merge part.exr
+    refused 2 part.exr.1-of-2.part 'is of other inputs or options' emblem.png
+    shade regress scenes
+    [[ $output == *"leaf: not alike"* ]] || fail "not baked again"
 }

@@ -69,6 +69,27 @@ end() { # SIGNAL
     cmp whole.exr out.exr
 }
 
+@test "pages of an asset keep their rows apart, and it goes on from those of each" {
+    local -a lit=(cloister.glb "${options[@]}" --unwrap always --pages 2 --seams keep -o lit.glb)
+    ln -s "$ASSETS/cloister.glb" .
+    "$VDBSHADE" bake "${lit[@]}" --quiet
+    mv lit.glb whole.glb
+    "$VDBSHADE" bake "${lit[@]}" --quiet --resume
+    cmp whole.glb lit.glb
+    rm lit.glb
+    "$VDBSHADE" bake "${lit[@]}" --resume --threads 1 2>err.txt &
+    pid=$!
+    while kill -0 "$pid" 2>/dev/null && [ "$(stat -c %s lit.glb.1.resume 2>/dev/null || echo 0)" -lt 100000 ]; do
+        sleep 0.01
+    done
+    end TERM
+    grep -Eq "lit.glb: [0-9]+ of 256 rows are kept in lit.glb.1.resume" err.txt || fail "$(cat err.txt)"
+    run -0 "$VDBSHADE" bake "${lit[@]}" --resume --stats s.json
+    cmp whole.glb lit.glb
+    [ "$(grep -o '"resumed_rows": [0-9]*' s.json | cut -d' ' -f2)" -gt 256 ] || fail "$(cat s.json)"
+    [ -z "$(ls | grep resume)" ] || fail "the rows are still there"
+}
+
 @test "an interrupt says what is kept" {
     begin out.exr 300000
     end TERM

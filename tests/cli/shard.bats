@@ -45,6 +45,10 @@ load parts
     "$VDBSHADE" merge objects --quiet
     rm one2/a.exr one2/b.png
     diff -r one2 objects
+    parts v1.2/ 2 "" "${CLOISTER[@]}" --size 64 --per-object
+    rmdir v1.2 # parts come from elsewhere, and the folder's name tells that it is one
+    "$VDBSHADE" merge v1.2/ --quiet
+    diff -r one2 v1.2
 }
 
 @test "seams between pages are fixed where parts are put together, too, and objects have their own" {
@@ -53,6 +57,32 @@ load parts
     merged out.glb 3 "${ring[@]}"
     one out.glb "${CLOISTER[@]}" --unwrap always --texels-per-unit 9 --size 128 --atlas objects
     merged out.glb 2 "${CLOISTER[@]}" --unwrap always --texels-per-unit 9 --size 128 --atlas objects
+}
+
+@test "parts have as much work as each other where one half of a lightmap takes many more rays than the other" {
+    { # the upper half is an open floor, the lower one a floor under slats
+        for z in 0 20; do
+            printf 'v %d 0 %d\n' 0 "$z" 8 "$z" 8 $((z + 4)) 0 $((z + 4))
+        done
+        printf 'vt %s\n' "0.01 0.51" "0.99 0.51" "0.99 0.99" "0.01 0.99" "0.01 0.01" "0.99 0.01" "0.99 0.49" "0.01 0.49"
+        printf 'f 4/4 3/3 2/2 1/1\nf 8/8 7/7 6/6 5/5\n'
+    } >floor.obj
+    for ((i = 0; i < 32; ++i)); do
+        awk -v i="$i" 'BEGIN { for (k = 0; k < 4; ++k) printf "v %g 0.3 %g\n", 0.25 * i + (k % 3 ? 0.1 : 0), k < 2 ? 20 : 24
+            printf "f %d %d %d %d\n", 4 * i + 4, 4 * i + 3, 4 * i + 2, 4 * i + 1 }'
+    done >slats.obj
+    printf '%s' '{"casters": [{"mesh": "floor.obj"}, {"mesh": "slats.obj"}], "ao": {"distance": 2},
+        "lights": [{"name": "sun", "type": "directional", "direction": [-0.3, 1, 0.2], "angle_deg": 5}],
+        "receivers": [{"mesh": "floor.obj", "size": 256, "output": "halves.exr"}]}' >halves.json
+    one halves.exr halves.json
+    for i in 1 2; do
+        "$VDBSHADE" bake halves.json -o halves.exr --shard $i/2 --stats $i.json --quiet
+        rays[i]=$(grep -o '"rays": [0-9]*' $i.json | head -1 | cut -d' ' -f2)
+    done
+    # by samples it is 5.5 times as many
+    [ $((rays[1] * 10)) -le $((rays[2] * 16)) ] && [ $((rays[2] * 10)) -le $((rays[1] * 16)) ] || fail "${rays[*]} rays"
+    "$VDBSHADE" merge halves.exr --quiet
+    cmp one/halves.exr halves.exr
 }
 
 @test "a part is the same whoever bakes it, with however many threads and bands, and goes on where it was ended" {

@@ -209,6 +209,16 @@ EOF
     same_values maps/second.exr all.second.exr
 }
 
+@test "pages of an asset have a picture each of what is invalid" {
+    write_uneven two.obj
+    shade bake two.obj "${FIT[@]}" --ao 1 --unwrap always --atlas objects --texels-per-unit 8 --max-size 128 -o lit.glb --invalid where.png
+    done_well
+    [ "$(ls where*)" = "$(printf 'where.lit.%s.png\n' box second)" ] || fail "$(ls)"
+    shade bake two.obj "${FIT[@]}" --ao 1 --unwrap always --size 64 --pages 2 -o lit.obj --invalid page.png
+    done_well
+    [ "$(ls page*)" = "$(printf 'page.lit.%s.png\n' 0 1)" ] || fail "$(ls)"
+}
+
 @test "objects whose UVs each fill the square are lit as they are, with a lightmap for each" {
     write_two two.obj
     "$VDBSHADE" bake two.obj "${SMALL[@]}" --irradiance --ambient 0.25,0.25,0.25 --size 64 --per-object -o maps/ --quiet

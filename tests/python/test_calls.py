@@ -101,6 +101,17 @@ class Errors(Case):
             vdbshade.Grid.from_distance(lambda p: p[:, 0] * numpy.nan, (-1, -1, -1), (1, 1, 1), voxel_size=0.1)
 
 
+    def test_what_a_distance_function_keeps_of_its_positions_stays(self):
+        kept = []
+
+        def ball(positions):
+            kept.append((positions, positions.copy()))
+            return numpy.linalg.norm(positions, axis=1) - 0.5
+
+        vdbshade.Grid.from_distance(ball, (-1, -1, -1), (1, 1, 1), voxel_size=0.1)
+        self.assertTrue(all(numpy.array_equal(at, copy) for at, copy in kept))
+
+
 class Running(Case):
     def test_progress_comes_to_its_end_in_the_thread_that_called(self):
         seen = []

@@ -135,6 +135,7 @@ class Reach(Case):
         scene = v.Scene(ASSETS / "seeds.json", size=16, resolution=32)
         self.assertTrue(scene.has_truth())
         scene.traceable(), scene.marches(), v.provenance(scene), scene.receiver_check(0)
+        scene.check_outputs([here / "none.exr"])
         job = v.BakeJob(scene)
         job.forecast()
         (baked,) = scene.bake()

@@ -1,5 +1,6 @@
 /* AO of a lightmap's texels by rays that they share, against rays that each shoots alone. Without Embree
  * there is nothing to test. */
+#include "bake/part.h"
 #include "texels_of.h"
 #include "traced.h"
 
@@ -83,10 +84,11 @@ typedef struct how {
     int32_t rows; /* of a band; 0: whole */
     int32_t threads;
     size_t receivers; /* of the first so many; 0: all */
+    bool parts;       /* of so many rows, instead of bands */
 } how;
 
 static void bake_rows(const stage *s, const vsh_texels *texels, const vsh_shade_options *shade, int32_t first,
-                      int32_t threads, baked *b) {
+                      int32_t threads, bool part, baked *b) {
     const size_t at = (size_t)first * WIDTH;
     const vsh_lightmap lightmap = {
         .ao = b->ao + at, .ao_error = b->error + at, .bent = b->bent + 3 * at, .coverage = b->coverage + at};
@@ -95,8 +97,11 @@ static void bake_rows(const stage *s, const vsh_texels *texels, const vsh_shade_
     vsh_bake_stats stats = vsh_bake_stats_zero();
     stats.shade = b->stats;
     vsh_error error = {0};
-    if (vsh_bake_lightmap(occluders_of_caster(&s->casters), texels, NULL, 0, shade, &run, &lightmap, &stats,
-                          &error) != VSH_OK) {
+    static uint32_t known[TEXELS];
+    const vsh_occluders *casters = occluders_of_caster(&s->casters);
+    if ((part ? vshi_bake_part(casters, texels, NULL, 0, shade, &run, &lightmap, known, &stats, &error)
+              : vsh_bake_lightmap(casters, texels, NULL, 0, shade, &run, &lightmap, &stats, &error)) !=
+        VSH_OK) {
         fail_msg("%s", error.message);
     }
     b->stats = stats.shade;
@@ -117,7 +122,7 @@ static baked *bake(const stage *s, how h) {
     b->stats = vsh_shade_stats_zero();
     if (h.rows == 0) {
         vsh_texels *texels = create(s->receivers, receivers, options, NULL);
-        bake_rows(s, texels, &options.shade, 0, h.threads, b);
+        bake_rows(s, texels, &options.shade, 0, h.threads, false, b);
         vsh_texels_free(texels);
         return b;
     }
@@ -126,8 +131,10 @@ static baked *bake(const stage *s, how h) {
     for (int32_t first = 0; first < HEIGHT; first += h.rows) {
         const int32_t rows = HEIGHT - first < h.rows ? HEIGHT - first : h.rows;
         vsh_texels *texels = NULL;
-        assert_int_equal(vsh_texels_create_band(charts, first, rows, NULL, &texels, NULL), VSH_OK);
-        bake_rows(s, texels, &options.shade, first, h.threads, b);
+        assert_int_equal((h.parts ? vshi_texels_create_part : vsh_texels_create_band)(charts, first, rows,
+                                                                                      NULL, &texels, NULL),
+                         VSH_OK);
+        bake_rows(s, texels, &options.shade, first, h.threads, h.parts, b);
         vsh_texels_free(texels);
     }
     vsh_charts_free(charts);
@@ -167,9 +174,26 @@ static void bands_change_no_bit(void **state) {
         baked *whole =
             bake(*state, (how){.spacing = 4, .max_error = 0.03, .padding = paddings[p], .threads = 1});
         for (size_t r = 0; r < 3; ++r) {
-            baked *banded = bake(*state, (how){4, 0.03, paddings[p], rows[r], 2, 0});
+            baked *banded = bake(*state, (how){4, 0.03, paddings[p], rows[r], 2, 0, false});
             assert_same(whole, banded);
             free(banded);
+        }
+        free(whole);
+    }
+}
+
+/* Those are padded by nothing, and so shoot the fewest rays for each other. */
+static void parts_change_no_bit(void **state) {
+    static const int32_t spacings[] = {2, 4, 8}, rows[] = {8, 16, 40};
+    static const double errors[] = {0.006, 0.03, 0.1};
+    for (size_t k = 0; k < 9; ++k) {
+        how h = {.spacing = spacings[k / 3], .max_error = errors[k % 3], .rows = HEIGHT, .parts = true};
+        baked *whole = bake(*state, h);
+        for (size_t r = 0; r < 3; ++r) {
+            h.rows = rows[r];
+            baked *parts = bake(*state, h);
+            assert_same(whole, parts);
+            free(parts);
         }
         free(whole);
     }
@@ -412,6 +436,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(threads_change_no_bit),
         cmocka_unit_test(bands_change_no_bit),
+        cmocka_unit_test(parts_change_no_bit),
         cmocka_unit_test(errors_are_below_those_asked_for_with_few_rays),
         cmocka_unit_test(charts_take_nothing_from_each_other),
         cmocka_unit_test(fine_texels_take_few_rays),

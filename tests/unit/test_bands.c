@@ -273,6 +273,40 @@ static void bands_have_the_samples_of_the_whole(void **state) {
     vsh_texels_free(whole);
 }
 
+/* No sample has tangents or an origin there. */
+static void a_band_without_a_chart_is_baked_and_is_empty(void **state) {
+    const stage *s = *state;
+    float uvs[8], shadow[8 * WIDTH], bent[3 * 8 * WIDTH], coverage[8 * WIDTH];
+    for (size_t v = 0; v < 4; ++v) {
+        uvs[2 * v] = s->floor.uvs[2 * v];
+        uvs[2 * v + 1] = 0.3f * s->floor.uvs[2 * v + 1]; /* in the lowest rows */
+    }
+    vsh_mesh low = s->receivers[0];
+    low.uvs = uvs;
+    vsh_lightmap_options options = size_of(WIDTH, HEIGHT, 1);
+    options.tangents = 1;
+    vsh_charts *charts = NULL;
+    vsh_error error = {0};
+    assert_int_equal(vsh_charts_create(&low, 1, &options, NULL, NULL, &charts, &error), VSH_OK);
+    vsh_texels *texels = NULL;
+    assert_int_equal(vsh_texels_create_band(charts, 0, 8, NULL, &texels, &error), VSH_OK);
+    vsh_light lights[2];
+    set_lights(lights);
+    memset(shadow, 0xff, sizeof shadow);
+    float *const shadows[1] = {shadow};
+    const vsh_lightmap lightmap = {
+        .shadow = shadows, .bent = bent, .bent_space = VSH_BENT_TANGENT, .coverage = coverage};
+    if (vsh_bake_lightmap(occluders_traced(s->field, s->triangles), texels, lights, 1, &options.shade, NULL,
+                          &lightmap, NULL, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    for (int i = 0; i < 8 * WIDTH; ++i) {
+        assert_true(shadow[i] == 0.0f && coverage[i] == 0.0f && bent[3 * i] == 0.0f);
+    }
+    vsh_texels_free(texels);
+    vsh_charts_free(charts);
+}
+
 static void rows_that_are_no_band_are_refused(void **state) {
     const stage *s = *state;
     const vsh_lightmap_options options = size_of(WIDTH, HEIGHT, 1);
@@ -282,7 +316,7 @@ static void rows_that_are_no_band_are_refused(void **state) {
     const int32_t bad[][2] = {{-8, 8}, {4, 8},  {HEIGHT, 8}, {96, 8}, {0, 0},
                               {0, 4},  {0, -8}, {0, 96},     {88, 1}, {80, 8 + HEIGHT}};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
-        vsh_texels *texels = (vsh_texels *)&bad;
+        vsh_texels *texels = (vsh_texels *)charts; // not NULL, as refused it is to be
         vsh_error error = {0};
         assert_int_equal(vsh_texels_create_band(charts, bad[i][0], bad[i][1], NULL, &texels, &error),
                          VSH_ERROR_ARGUMENT);
@@ -345,6 +379,7 @@ int main(void) {
         cmocka_unit_test(adaptive_rays_are_the_same_in_bands),
         cmocka_unit_test(exact_rays_are_the_same_in_bands),
         cmocka_unit_test(bands_have_the_samples_of_the_whole),
+        cmocka_unit_test(a_band_without_a_chart_is_baked_and_is_empty),
         cmocka_unit_test(rows_that_are_no_band_are_refused),
         cmocka_unit_test(a_band_bakes_within_the_bytes_it_is_said_to_take),
     };

@@ -408,7 +408,8 @@ static void names_match_patterns_as_in_a_shell(void **state) {
     assert_true(vsh_mesh_matches(&part, "Wall/Cube.003"));
     assert_false(vsh_mesh_matches(&part, "all") || vsh_mesh_matches(&part, "003"));
     const vsh_mesh nameless = {0};
-    assert_false(vsh_mesh_matches(&nameless, "*") || vsh_mesh_matches(&part, NULL) ||
+    assert_true(vsh_mesh_matches(&nameless, "*"));
+    assert_false(vsh_mesh_matches(&nameless, "?") || vsh_mesh_matches(&part, NULL) ||
                  vsh_mesh_matches(NULL, "*"));
 }
 

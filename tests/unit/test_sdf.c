@@ -349,7 +349,7 @@ static size_t random_tree(vsh_sdf_node *nodes, int count, bool unions) {
 
 static void a_tree_narrowed_to_a_ball_has_the_same_bits_in_it(void **state) {
     (void)state;
-    enum { SHAPES = 12, TREES = 200, PLACES = 20, POINTS = 50 };
+    enum { SHAPES = 12, TREES = 200, PLACES = 20, POINTS = 70 };
     vsh_sdf_node nodes[2 * SHAPES];
     uint8_t keep[2 * SHAPES];
     size_t left_out = 0, operations = 0;
@@ -364,19 +364,48 @@ static void a_tree_narrowed_to_a_ball_has_the_same_bits_in_it(void **state) {
                 operations += nodes[n].shape >= VSH_SDF_UNION;
                 left_out += keep[n] != 0;
             }
+            double p[POINTS][3], less[POINTS];
             for (int k = 0; k < POINTS; ++k) { /* on the ball's surface, where they change most, and in it */
                 const double way[3] = {uniform(-1.0, 1.0), uniform(-1.0, 1.0), uniform(-1.0, 1.0)};
                 const double length = norm(way[0], way[1], way[2]);
                 const double far = (k % 2 == 0 ? radius : uniform(0.0, radius)) / length;
-                const double p[3] = {middle[0] + far * way[0], middle[1] + far * way[1],
-                                     middle[2] + far * way[2]};
-                const double whole = vsh_sdf_distance(&sdf, p),
-                             less = vshi_sdf_distance_within(&sdf, keep, p);
-                assert_memory_equal(&whole, &less, sizeof whole);
+                for (int axis = 0; axis < 3; ++axis) {
+                    p[k][axis] = middle[axis] + far * way[axis];
+                }
+            }
+            vshi_sdf_distances_within(&sdf, keep, POINTS, (const double(*)[3])p, less);
+            for (int k = 0; k < POINTS; ++k) {
+                const double whole = vsh_sdf_distance(&sdf, p[k]);
+                assert_memory_equal(&whole, &less[k], sizeof whole);
             }
         }
     }
     assert_true(left_out > operations / 2); /* else it does not narrow */
+}
+
+static void many_places_at_once_are_as_one_by_one_in_deep_trees_too(void **state) {
+    (void)state;
+    enum { SHAPES = 100, POINTS = 70 };
+    vsh_sdf_node nodes[2 * SHAPES];
+    const uint8_t keep[2 * SHAPES] = {0};
+    double p[POINTS][3], at_once[POINTS];
+    for (int way = 0; way < 2; ++way) {
+        const vsh_sdf sdf = {nodes, random_tree(nodes, SHAPES, way == 0)};
+        for (int k = 0; k < POINTS; ++k) {
+            for (int axis = 0; axis < 3; ++axis) {
+                p[k][axis] = uniform(-6.0, 6.0);
+            }
+        }
+        p[3][1] = INFINITY;
+        p[POINTS - 1][2] = NAN;
+        for (size_t count = 1; count <= POINTS; count += 23) {
+            vshi_sdf_distances_within(&sdf, keep, count, (const double(*)[3])p, at_once);
+            for (size_t k = 0; k < count; ++k) {
+                const double one = vsh_sdf_distance(&sdf, p[k]);
+                assert_true(memcmp(&one, &at_once[k], sizeof one) == 0 || (isnan(one) && isnan(at_once[k])));
+            }
+        }
+    }
 }
 
 int main(void) {
@@ -389,6 +418,7 @@ int main(void) {
         cmocka_unit_test(a_turned_scaled_shape_is_the_shape_seen_from_elsewhere),
         cmocka_unit_test(bad_nodes_are_refused_by_name),
         cmocka_unit_test(a_tree_narrowed_to_a_ball_has_the_same_bits_in_it),
+        cmocka_unit_test(many_places_at_once_are_as_one_by_one_in_deep_trees_too),
         cmocka_unit_test(a_tree_too_deep_to_recurse_is_refused_and_a_deep_one_works),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

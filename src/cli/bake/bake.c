@@ -113,14 +113,28 @@ static int check_files(const cli_bake_settings *settings, const vsh_scene *scene
     return CLI_OK;
 }
 
-/* Outputs of objects have their names only now. */
+/* Outputs of objects have their names only now; the others are looked at once more, as inputs of models are
+ * found by reading those. */
 static int check_outputs(const cli_bake_settings *settings, const vsh_scene *scene, const vsh_bake_job *job) {
-    for (size_t i = 0; i < vsh_bake_job_count(job); ++i) {
+    const char *const others[] = {settings->stats, settings->exr, settings->view, settings->invalid_picture};
+    enum { OTHERS = sizeof others / sizeof others[0] };
+    const size_t lightmaps = vsh_bake_job_count(job);
+    const char **outputs = calloc(lightmaps + OTHERS, sizeof *outputs);
+    int code = outputs != NULL ? CLI_OK : cli_out_of_memory(settings->input);
+    size_t count = 0;
+    for (size_t i = 0; i < lightmaps && code == CLI_OK; ++i) {
         vsh_job_lightmap lightmap;
         vsh_bake_job_lightmap(job, i, &lightmap);
-        CLI_TRY(cli_bake_check_output(settings, scene, lightmap.output));
+        outputs[count++] = lightmap.output;
+        code = cli_bake_check_output(settings, scene, lightmap.output);
     }
-    return CLI_OK;
+    for (size_t i = 0; i < OTHERS && code == CLI_OK; ++i) {
+        outputs[count] = others[i];
+        count += others[i] != NULL;
+    }
+    code = code == CLI_OK ? cli_bake_check_inputs(settings, scene, outputs, count) : code;
+    free(outputs);
+    return code;
 }
 
 /* --- what is told */
@@ -140,8 +154,12 @@ static bool is_each_told(const telling *t) {
 static void say_lightmap(void *user, const vsh_job_lightmap *lightmap, vsh_result result) {
     const telling *t = user;
     if (result != VSH_OK && lightmap->kept_rows > 0) {
-        cli_say("%s: %d of %d rows are kept in %s.resume; the same command goes on from there",
-                lightmap->output, lightmap->kept_rows, lightmap->height, lightmap->output);
+        char page[32] = "";
+        if (lightmap->page > 0 && vsh_lit_is_output(lightmap->output)) {
+            snprintf(page, sizeof page, ".%zu", lightmap->page);
+        }
+        cli_say("%s: %d of %d rows are kept in %s%s.resume; the same command goes on from there",
+                lightmap->output, lightmap->kept_rows, lightmap->height, lightmap->output, page);
     }
     if (result != VSH_OK || t->common->quiet || t->part || !is_each_told(t)) {
         return;
@@ -160,11 +178,7 @@ static void say_lightmap(void *user, const vsh_job_lightmap *lightmap, vsh_resul
 /* A name to go before ".I-of-N.part", to be freed. */
 static char *name_parts(const cli_bake_settings *s, const vsh_scene *scene) {
     const char *output = s->output != NULL ? s->output : scene->receivers[0].output;
-    size_t length = strlen(output);
-    while (length > 1 && output[length - 1] == '/') {
-        --length; /* a folder, of objects */
-    }
-    return strndup(output, length);
+    return cli_end_path(output, ""); /* a folder, of objects */
 }
 
 static void say_part(const cli_bake_settings *s, const char *parts, const vsh_bake_report *report) {
@@ -281,6 +295,7 @@ int cli_bake_one(const cli_bake_settings *settings, const vsh_scene *scene, cli_
     char *parts = name_parts(settings, scene);
     options.shard = part && !settings->dry_run ? settings->shard : 0; /* what is told is of the whole */
     options.shard_count = part ? settings->shard_count : 0;
+    options.forecast = settings->dry_run;
     options.parts = settings->merged != NULL ? settings->merged : parts;
     options.words = settings->words;
     options.word_count = settings->word_count;

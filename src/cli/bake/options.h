@@ -123,6 +123,11 @@ int cli_bake_check_work(const cli_bake_settings *settings, const cli_bake_scene 
 
 /* Refuses an output that is one of the scene's inputs. CLI_OK or an exit code, having said why. */
 int cli_bake_check_output(const cli_bake_settings *settings, const vsh_scene *scene, const char *output);
+
+/* The same of outputs that are read with what the scene names, as textures are: looks into its models where
+ * such a file is there. */
+int cli_bake_check_inputs(const cli_bake_settings *settings, const vsh_scene *scene,
+                          const char *const *outputs, size_t count);
 void cli_bake_scene_free(cli_bake_scene *made);
 
 #endif

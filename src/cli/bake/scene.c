@@ -232,6 +232,13 @@ int cli_bake_check_output(const cli_bake_settings *s, const vsh_scene *scene, co
     return CLI_OK;
 }
 
+int cli_bake_check_inputs(const cli_bake_settings *s, const vsh_scene *scene, const char *const *outputs,
+                          size_t count) {
+    const vsh_run run = cli_common_run(&s->common);
+    vsh_error error;
+    return vsh_scene_check_outputs(scene, outputs, count, &run, &error) == VSH_OK ? CLI_OK : cli_fail(&error);
+}
+
 static int check_outputs(const cli_bake_settings *s, const vsh_scene *scene) {
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         const char *output = scene->receivers[i].output;

@@ -39,7 +39,7 @@ const cli_command cli_field = {
     "field",
     "INPUT -o OUT.field [options]",
     "Makes the voxels of a mesh's, a .vdb's or a scene's (.json) casters, and keeps them in a file that\n"
-    "bake, render, query and volume take with --field: a second sun then costs no voxel. The file is of\n"
+    "bake, render, query, volume and trade take with --field: a second sun then costs no voxel. It is of\n"
     "these casters and voxels and of this version, and is refused for any other: docs/field.md. Numbers\n"
     "in brackets are what holds without the option.",
     options,
@@ -77,6 +77,7 @@ static int check_output(const field_settings *s, const vsh_scene *scene) {
         }
     }
     CLI_TRY(cli_bake_check_output(&s->bake, scene, output));
+    CLI_TRY(cli_bake_check_inputs(&s->bake, scene, &output, 1));
     return cli_temporary_check(output);
 }
 

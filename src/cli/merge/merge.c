@@ -1,23 +1,29 @@
 /* vdbshade merge: the parts of a bake, put together. */
 #include "cli/bake/bake.h"
 #include "cli/message.h"
+#include "cli/paths.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 enum { MOST_WORDS = 100000 };
-enum { KEY_SHARDS = 0x2000, KEY_STATS, KEY_INVALID, KEY_EXR, KEY_VIEW };
+enum { KEY_SHARDS = 0x2000, KEY_STATS, KEY_INVALID, KEY_EXR, KEY_VIEW, KEY_CSV, KEY_PLOT };
 
 typedef struct merge_settings {
-    const char *output, *stats, *invalid_picture, *exr, *view;
+    const char *output; /* without slashes at its end: parts of a folder stand beside it */
+    const char *folder; /* the same with one */
+    const char *stats, *invalid_picture, *exr, *view, *csv, *plot;
     int32_t shards; /* 0: as many as there are */
     cli_common common;
 } merge_settings;
 
 static const cli_option options[] = {
     {KEY_SHARDS, "shards", "N", "parts that there are of it, 1 to 10000 (found by their\nnames)"},
-    {KEY_INVALID, "invalid", "FILE.png", "these four as of bake, of the whole"},
+    {KEY_INVALID, "invalid", "FILE.png", "these three as of bake, of the whole"},
     {KEY_EXR, "exr", "FILE.exr", "also an EXR of all channels beside a .glb or .gltf"},
     {KEY_VIEW, "view", "PAGE.html", "also a page to look at it in a browser: docs/view.md"},
+    {KEY_CSV, "csv", "FILE.csv", "of trade: the table of all runs as CSV"},
+    {KEY_PLOT, "plot", "FILE.svg", "of trade: its plot as a picture of its own"},
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
     CLI_COMMON_OPTIONS,
 };
@@ -27,8 +33,8 @@ static int merge_main(int argc, char **argv);
 const cli_command cli_merge = {
     "merge",
     "OUT [options]",
-    "Puts together what 'bake --shard I/N -o OUT' or 'volume --shard I/N -o OUT' left in\n"
-    "OUT.1-of-N.part to OUT.N-of-N.part: the same file, bit by bit, as without --shard. The parts say\n"
+    "Puts together what 'bake --shard I/N -o OUT', 'volume …' or 'trade …' left in OUT.1-of-N.part to\n"
+    "OUT.N-of-N.part: the same file, bit by bit but for times, as without --shard. The parts say\n"
     "by which options; their inputs are read again, from this folder where paths are relative, and must\n"
     "not have changed. Parts stay. See docs/farm.md.",
     options,
@@ -53,6 +59,12 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_VIEW:
         s->view = value;
         return CLI_OK;
+    case KEY_CSV:
+        s->csv = value;
+        return CLI_OK;
+    case KEY_PLOT:
+        s->plot = value;
+        return CLI_OK;
     default:
         return cli_common_parse(&s->common, key, name, value, &taken);
     }
@@ -69,7 +81,10 @@ static int merge_bake(const merge_settings *s, int argc, char **argv) {
         return code != CLI_OK ? code : cli_usage("%s: its parts are of no bake", s->output);
     }
     bake.common = s->common;
-    bake.output = bake.output != NULL ? s->output : NULL;
+    if (bake.output != NULL) { /* a folder of objects stays one */
+        const char *slash = strrchr(bake.output, '/');
+        bake.output = slash != NULL && slash[1] == '\0' ? s->folder : s->output;
+    }
     bake.merged = s->output;
     bake.shard = 0;
     bake.shard_count = s->shards;
@@ -86,12 +101,42 @@ static int merge_bake(const merge_settings *s, int argc, char **argv) {
 }
 
 static int merge_volume(const merge_settings *s, int argc, char **argv) {
-    const char *given = s->invalid_picture != NULL ? "invalid"
-                        : s->exr != NULL           ? "exr"
-                        : s->view != NULL          ? "view"
-                                                   : NULL;
-    return given != NULL ? cli_usage("--%s: is for lightmaps, and %s is a volume", given, s->output)
-                         : cli_volume_merge(argc, argv, s->output, s->shards, s->stats, &s->common);
+    return cli_volume_merge(argc, argv, s->output, s->shards, s->stats, &s->common);
+}
+
+static int merge_trade(const merge_settings *s, int argc, char **argv) {
+    const cli_merged merged = {s->output, s->csv, s->plot, s->view, s->shards, &s->common};
+    return cli_trade_merge(argc, argv, &merged);
+}
+
+/* What parts may be of, and which options are for their outputs. */
+static const struct {
+    const cli_command *command;
+    int (*merge)(const merge_settings *s, int argc, char **argv);
+    const char *what;
+    bool picture, view, table, stats;
+} kinds[] = {
+    {&cli_bake, merge_bake, "a lightmap", true, true, false, true},
+    {&cli_volume, merge_volume, "a volume", false, false, false, true},
+    {&cli_trade, merge_trade, "a trade", false, true, true, false},
+};
+
+static int merge(const merge_settings *s, int argc, char **argv) {
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; ++i) {
+        if (strcmp(kinds[i].command->name, argv[0]) != 0) {
+            continue;
+        }
+        const char *given = !kinds[i].picture && s->invalid_picture != NULL ? "invalid"
+                            : !kinds[i].picture && s->exr != NULL           ? "exr"
+                            : !kinds[i].view && s->view != NULL             ? "view"
+                            : !kinds[i].table && s->csv != NULL             ? "csv"
+                            : !kinds[i].table && s->plot != NULL            ? "plot"
+                            : !kinds[i].stats && s->stats != NULL           ? "stats"
+                                                                            : NULL;
+        return given != NULL ? cli_usage("--%s: %s is %s, which has none", given, s->output, kinds[i].what)
+                             : kinds[i].merge(s, argc, argv);
+    }
+    return cli_usage("%s: its parts are of no bake", s->output);
 }
 
 static int merge_main(int argc, char **argv) {
@@ -102,20 +147,24 @@ static int merge_main(int argc, char **argv) {
         return code;
     }
     const vsh_run run = cli_common_run(&s.common);
-    char **words = NULL;
+    char **words = NULL, *output = cli_end_path(s.output, ""), *folder = cli_end_path(s.output, "/");
     size_t count = 0;
     vsh_error error;
+    if (output == NULL || folder == NULL) {
+        code = cli_out_of_memory(s.output);
+        goto done;
+    }
+    s.output = output;
+    s.folder = folder;
     if (vsh_part_words(s.output, s.shards, &run, &words, &count, &error) != VSH_OK) {
-        return cli_fail(&error);
+        code = cli_fail(&error);
+        goto done;
     }
-    const char *kind = count > 1 && count < MOST_WORDS ? words[0] : "";
-    if (strcmp(kind, cli_bake.name) == 0) {
-        code = merge_bake(&s, (int)count, words);
-    } else if (strcmp(kind, cli_volume.name) == 0) {
-        code = merge_volume(&s, (int)count, words);
-    } else {
-        code = cli_usage("%s: its parts are of no bake", s.output);
-    }
+    code = count > 1 && count < MOST_WORDS ? merge(&s, (int)count, words)
+                                           : cli_usage("%s: its parts are of no bake", s.output);
     vsh_part_words_free(words);
+done:
+    free(folder);
+    free(output);
     return code;
 }

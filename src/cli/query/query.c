@@ -154,6 +154,7 @@ static int check_output(const query_settings *s, const vsh_scene *scene, const c
         return cli_usage("%s: the output is also the points' file", output);
     }
     CLI_TRY(cli_bake_check_output(&s->bake, scene, output));
+    CLI_TRY(cli_bake_check_inputs(&s->bake, scene, &output, 1));
     return cli_temporary_check(output);
 }
 

@@ -213,16 +213,34 @@ done:
     return code;
 }
 
-/* What can be refused before anything is read but the scene. */
-static int check_files(const render_settings *s, const vsh_scene *scene) {
+/* That no frame replaces an input. */
+static int check_frames(const render_settings *s, const vsh_scene *scene) {
     const int32_t count = s->frames > 0 && !s->page ? s->frames : 1;
-    for (int32_t i = 0; i < count; ++i) {
+    char **paths = calloc((size_t)count, sizeof *paths);
+    int code = paths != NULL ? CLI_OK : cli_out_of_memory(s->bake.output);
+    for (int32_t i = 0; i < count && code == CLI_OK; ++i) {
         char path[PATH_MAX];
         render_output_path(s, i, path, sizeof path);
-        CLI_TRY(cli_bake_check_output(&s->bake, scene, path));
+        paths[i] = strdup(path);
+        code = paths[i] != NULL ? cli_bake_check_output(&s->bake, scene, path)
+                                : cli_out_of_memory(s->bake.output);
     }
+    if (code == CLI_OK) {
+        code = cli_bake_check_inputs(&s->bake, scene, (const char *const *)paths, (size_t)count);
+    }
+    for (int32_t i = 0; i < count && paths != NULL; ++i) {
+        free(paths[i]);
+    }
+    free(paths);
+    return code;
+}
+
+/* What can be refused before anything is read but the scene. */
+static int check_files(const render_settings *s, const vsh_scene *scene) {
+    CLI_TRY(check_frames(s, scene));
     if (s->bake.stats != NULL) {
         CLI_TRY(cli_bake_check_output(&s->bake, scene, s->bake.stats));
+        CLI_TRY(cli_bake_check_inputs(&s->bake, scene, &s->bake.stats, 1));
     }
     if (scene->light_count == 0 && !scene->ao && s->lightmap_count == 0) {
         return cli_usage("%s: no lights and no ao; give --sun X,Y,Z or --ao DISTANCE, or both",

@@ -1,34 +1,12 @@
 /* Bakes the scene in every way that is worth a look, and takes the time. */
 #include "cli/message.h"
+#include "cli/progress.h"
 #include "cli/try.h"
 #include "trade.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-
-typedef struct plan {
-    int32_t method;
-    int32_t number;   /* rays or cones; 0: none */
-    double max_error; /* 0: none */
-} plan;
-
-static const plan shadow_plans[] = {
-    {VSH_SHADOW_HARD, 0, 0.0},      {VSH_SHADOW_CLASSIC, 0, 0.0},   {VSH_SHADOW_IMPROVED, 0, 0.0},
-    {VSH_SHADOW_SMOOTH, 0, 0.0},    {VSH_SHADOW_CONE, 0, 0.0},      {VSH_SHADOW_RAYS, 4, 0.0},
-    {VSH_SHADOW_ADAPTIVE, 0, 0.05}, {VSH_SHADOW_EXACT, 0, 0.05},    {VSH_SHADOW_ADAPTIVE, 0, 0.02},
-    {VSH_SHADOW_EXACT, 0, 0.02},    {VSH_SHADOW_ADAPTIVE, 0, 0.01}, {VSH_SHADOW_EXACT, 0, 0.01},
-    {VSH_SHADOW_RAYS, 16, 0.0},     {VSH_SHADOW_EXACT, 0, 0.005},   {VSH_SHADOW_ADAPTIVE, 0, 0.005},
-    {VSH_SHADOW_RAYS, 64, 0.0},
-};
-
-static const plan ao_plans[] = {
-    {VSH_AO_TAPS, 0, 0.0},      {VSH_AO_CONES, 4, 0.0},     {VSH_AO_CONES, 16, 0.0},
-    {VSH_AO_RAYS, 4, 0.0},      {VSH_AO_ADAPTIVE, 0, 0.05}, {VSH_AO_EXACT, 0, 0.05},
-    {VSH_AO_ADAPTIVE, 0, 0.02}, {VSH_AO_EXACT, 0, 0.02},    {VSH_AO_RAYS, 16, 0.0},
-    {VSH_AO_ADAPTIVE, 0, 0.01}, {VSH_AO_EXACT, 0, 0.01},    {VSH_AO_RAYS, 64, 0.0},
-    {VSH_AO_CONES, 64, 0.0},    {VSH_AO_EXACT, 0, 0.005},   {VSH_AO_ADAPTIVE, 0, 0.005},
-};
 
 /* The world box of the receivers' samples; empty, min > max, where there are none. */
 static void find_box(const trade_work *work, double min[3], double max[3]) {
@@ -65,10 +43,12 @@ static int make_occluders(const trade_work *work, const vsh_scene *scene, int32_
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
-int trade_make_occluders(trade_work *work, int32_t resolution, vsh_occluders **occluders, double *seconds) {
+int trade_make_occluders(trade_work *work, int32_t resolution, const vsh_field_file *kept,
+                         vsh_occluders **occluders, double *seconds) {
     vsh_scene scene = *work->scene;
     scene.grid.resolution = resolution;
     scene.grid.voxel_size = 0.0;
+    scene.field = kept;
     return make_occluders(work, &scene, 1, occluders, seconds);
 }
 
@@ -81,34 +61,51 @@ int trade_add_triangles(const trade_work *work, trade_field *field) {
                                                                               : cli_fail_of(NULL, &error);
 }
 
-/* The options of one plan, for the library and in `bake`'s words. */
-static vsh_shade_options shade_of(const trade_work *work, const trade_subject *subject, const plan *p,
-                                  trade_run *run) {
+void trade_name_run(const trade_work *work, trade_run *run) {
+    const trade_task *task = &work->tasks[run->task];
+    const bool ao = work->subjects[task->subject].ao;
+    const char *flag = ao ? "--ao-method" : "--method";
+    const bool rays = ao ? task->method == VSH_AO_RAYS : task->method == VSH_SHADOW_RAYS;
+    const size_t room = sizeof run->options;
+    char more[64] = "";
+    if (task->kind == TRADE_EMBREE) {
+        run->method = "embree";
+        run->embree = true;
+        snprintf(run->options, room, "%d ray%s a texel", task->number, task->number == 1 ? "" : "s");
+        return;
+    }
+    if (task->kind == TRADE_AUTO) {
+        run->method = "auto";
+        snprintf(run->options, room, "--max-error %g", task->max_error);
+        return;
+    }
+    run->method = ao ? vsh_ao_method_name(task->method) : vsh_shadow_method_name(task->method);
+    run->resolution = work->fields[task->field].resolution;
+    if (task->max_error > 0.0) {
+        snprintf(more, sizeof more, " --max-error %g", task->max_error);
+    } else if (task->number > 0) {
+        snprintf(more, sizeof more, " %s %d", rays ? "--rays" : "--ao-cones", task->number);
+    }
+    snprintf(run->options, room, "%s %s%s --resolution %d", flag, run->method, more, run->resolution);
+}
+
+/* A task's options, for the library. */
+static vsh_shade_options shade_of(const trade_work *work, const trade_task *task) {
     vsh_shade_options shade = work->scene->shade;
     shade.early_rays = 0;
-    const char *flag = subject->ao ? "--ao-method" : "--method";
-    const bool rays = subject->ao ? p->method == VSH_AO_RAYS : p->method == VSH_SHADOW_RAYS;
-    if (subject->ao) {
-        shade.ao_method = p->method;
-        shade.ao_cones = !rays && p->number > 0 ? p->number : shade.ao_cones;
-        run->method = vsh_ao_method_name(p->method);
+    if (work->subjects[task->subject].ao) {
+        const bool cones = task->method != VSH_AO_RAYS && task->number > 0;
+        shade.ao_method = task->method;
+        shade.ao_cones = cones ? task->number : shade.ao_cones;
+        shade.rays = task->method == VSH_AO_RAYS ? task->number : shade.rays;
     } else {
-        shade.method = p->method;
-        run->method = vsh_shadow_method_name(p->method);
+        shade.method = task->method;
+        shade.rays = task->method == VSH_SHADOW_RAYS ? task->number : shade.rays;
     }
-    char more[64] = "";
-    if (p->max_error > 0.0) {
-        shade.max_error = p->max_error;
+    if (task->max_error > 0.0) {
+        shade.max_error = task->max_error;
         shade.rays = 0; /* as many as that takes */
-        snprintf(more, sizeof more, " --max-error %g", p->max_error);
-    } else if (rays) {
-        shade.rays = p->number;
-        snprintf(more, sizeof more, " --rays %d", p->number);
-    } else if (p->number > 0) {
-        snprintf(more, sizeof more, " --ao-cones %d", p->number);
     }
-    snprintf(run->options, sizeof run->options, "%s %s%s --resolution %d", flag, run->method, more,
-             run->resolution);
     return shade;
 }
 
@@ -184,12 +181,46 @@ static int compare(const trade_work *work, const trade_subject *subject, const f
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
-int trade_compare(const trade_work *work, const trade_subject *subject, const uint8_t *mask, trade_run *run) {
+/* On the texels that all runs have, and on all of its own. */
+static int compare_both(const trade_work *work, trade_run *run) {
+    const trade_task *task = &work->tasks[run->task];
+    const trade_subject *subject = &work->subjects[task->subject];
+    const uint8_t *mask = task->kind == TRADE_METHOD   ? work->fields[task->field].mask
+                          : task->kind == TRADE_EMBREE ? work->any
+                                                       : run->mask;
     vsh_accuracy valid;
     CLI_TRY(compare(work, subject, run->values, mask, &valid));
     run->valid_rmse = valid.rmse;
-    run->rate = 1e6 * run->bake_s / (double)(subject->planes * run->valid);
     return compare(work, subject, run->values, work->common, &run->metrics);
+}
+
+static void say(const trade_work *work, const trade_run *run) {
+    char line[256], error[32] = "";
+    if (work->settings->bake.common.quiet || work->settings->bake.merged != NULL) {
+        return;
+    }
+    if (work->settings->bake.shard == 0) {
+        snprintf(error, sizeof error, "RMSE %.4f, ", run->metrics.rmse);
+    }
+    snprintf(line, sizeof line, "%s%s: %s%.3f s", run->embree ? "Embree, " : "", run->options, error,
+             run->bake_s);
+    cli_progress_line(line);
+}
+
+int trade_add(trade_work *work, trade_run *run) {
+    trade_subject *subject = &work->subjects[work->tasks[run->task].subject];
+    run->rate = 1e6 * run->bake_s / (double)(subject->planes * run->valid);
+    if (work->settings->bake.shard == 0) {
+        CLI_TRY(compare_both(work, run));
+    }
+    trade_run *more = realloc(subject->runs, (subject->run_count + 1) * sizeof *more);
+    if (more == NULL) {
+        return cli_out_of_memory("runs");
+    }
+    subject->runs = more;
+    more[subject->run_count++] = *run;
+    say(work, run);
+    return CLI_OK;
 }
 
 /* Bakes the run's values, several times where it is quick. */
@@ -218,14 +249,14 @@ static double expected(const trade_subject *subject, const trade_run *run, bool 
     return first ? 4.0 * seconds : seconds;
 }
 
-static int run_plan(trade_work *work, trade_subject *subject, const plan *p, const trade_field *on) {
-    trade_run run = {.resolution = on->resolution, .build_s = on->build_s, .valid = on->valid};
-    const vsh_shade_options shade = shade_of(work, subject, p, &run);
+static int run_method(trade_work *work, const trade_task *task) {
+    const trade_field *on = &work->fields[task->field];
+    const trade_subject *subject = &work->subjects[task->subject];
+    trade_run run = {.task = (size_t)(task - work->tasks), .build_s = on->build_s, .valid = on->valid};
+    const vsh_shade_options shade = shade_of(work, task);
     const bool exact =
-        subject->ao ? p->method == (int32_t)VSH_AO_EXACT : p->method == (int32_t)VSH_SHADOW_EXACT;
-    if (exact && !work->meshes) {
-        return CLI_OK;
-    }
+        subject->ao ? task->method == (int32_t)VSH_AO_EXACT : task->method == (int32_t)VSH_SHADOW_EXACT;
+    trade_name_run(work, &run);
     if (trade_left(work) < expected(subject, &run, on == work->fields)) {
         ++work->skipped;
         return CLI_OK;
@@ -239,41 +270,38 @@ static int run_plan(trade_work *work, trade_subject *subject, const plan *p, con
     run.bytes = info.field_bytes + (exact ? vsh_triangles_bytes(work->triangles) : 0);
     run.build_s += exact ? work->triangles_s : 0.0;
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    int code;
-    CLI_TRY_DONE(bake(work, subject, on->traced, &shade, &run, &stats));
+    int code = bake(work, subject, on->traced, &shade, &run, &stats);
     run.certified = certified_share(subject, run.valid, &shade, &stats);
-    CLI_TRY_DONE(trade_compare(work, subject, on->mask, &run));
-    if (trade_add(work, subject, &run) != NULL) {
-        return CLI_OK;
+    code = code == CLI_OK ? trade_add(work, &run) : code;
+    if (code != CLI_OK) {
+        free(run.values);
     }
-    code = cli_out_of_memory("runs");
-done:
-    free(run.values);
     return code;
 }
 
 /* What `bake` makes of an error with nothing else said: what casts is made for each, as it depends on it. */
-static int run_auto(trade_work *work, trade_subject *subject, double max_error) {
-    trade_run run = {.method = "auto"};
+static int run_auto(trade_work *work, const trade_task *task) {
+    const trade_subject *subject = &work->subjects[task->subject];
+    trade_run run = {.task = (size_t)(task - work->tasks), .certified = NAN};
     vsh_scene scene = *work->scene;
     scene.ao = subject->ao ? scene.ao : 0;
     scene.light_count = subject->ao ? 0 : scene.light_count;
     scene.shade.method = VSH_SHADOW_AUTO;
     scene.shade.ao_method = VSH_AO_AUTO;
-    scene.shade.max_error = max_error;
+    scene.shade.max_error = task->max_error;
     scene.shade.rays = 0;
+    trade_name_run(work, &run);
     if (trade_left(work) < expected(subject, &run, false)) {
         ++work->skipped;
         return CLI_OK;
     }
-    snprintf(run.options, sizeof run.options, "--max-error %g", max_error);
     vsh_occluders *occluders = NULL;
-    uint8_t *mask = calloc(work->texels, 1);
     float *coverage = calloc(work->texels, sizeof *coverage);
+    run.mask = calloc(work->texels, 1);
     run.values = calloc(subject->planes * work->texels, sizeof *run.values);
     vsh_shade_stats stats = vsh_shade_stats_zero();
     int code = CLI_OK;
-    if (mask == NULL || coverage == NULL || run.values == NULL) {
+    if (run.mask == NULL || coverage == NULL || run.values == NULL) {
         code = cli_out_of_memory("values");
         goto done;
     }
@@ -281,46 +309,23 @@ static int run_auto(trade_work *work, trade_subject *subject, double max_error) 
     CLI_TRY_DONE(trade_bake(work, occluders, &scene.shade, NULL, NULL, coverage, NULL));
     for (size_t i = 0; i < work->texels; ++i) {
         run.valid += coverage[i] > 0.0f;
-        mask[i] = coverage[i] > 0.0f && work->any[i]; /* where the truth was looked for */
+        run.mask[i] = coverage[i] > 0.0f && work->any[i]; /* where the truth was looked for */
     }
     vsh_occluders_info info;
     vsh_occluders_get_info(occluders, &info);
     run.bytes = info.field_bytes + info.triangles_bytes;
     CLI_TRY_DONE(bake(work, subject, occluders, &scene.shade, &run, &stats));
-    run.certified = NAN;
-    CLI_TRY_DONE(trade_compare(work, subject, mask, &run));
-    if (trade_add(work, subject, &run) == NULL) {
-        code = cli_out_of_memory("runs");
-        goto done;
-    }
+    CLI_TRY_DONE(trade_add(work, &run));
     run.values = NULL;
+    run.mask = NULL;
 done:
     vsh_occluders_free(occluders);
     free(run.values);
+    free(run.mask);
     free(coverage);
-    free(mask);
     return code;
 }
 
-/* auto first, then the first plans of all, on every field: where the budget ends, it is the dear ones that
- * are missing. */
-int trade_measure(trade_work *work) {
-    static const size_t shadow_count = sizeof shadow_plans / sizeof shadow_plans[0];
-    static const size_t ao_count = sizeof ao_plans / sizeof ao_plans[0];
-    static const double errors[] = {0.05, 0.02, 0.01, 0.005};
-    for (size_t i = 0; i < sizeof errors / sizeof errors[0]; ++i) {
-        for (size_t s = 0; s < work->subject_count; ++s) {
-            CLI_TRY(run_auto(work, &work->subjects[s], errors[i]));
-        }
-    }
-    for (size_t i = 0; i < shadow_count || i < ao_count; ++i) {
-        for (size_t s = 0; s < work->subject_count; ++s) {
-            trade_subject *subject = &work->subjects[s];
-            for (size_t f = 0; f < work->field_count && i < (subject->ao ? ao_count : shadow_count); ++f) {
-                const plan *p = subject->ao ? &ao_plans[i] : &shadow_plans[i];
-                CLI_TRY(run_plan(work, subject, p, &work->fields[f]));
-            }
-        }
-    }
-    return CLI_OK;
+int trade_measure(trade_work *work, const trade_task *task) {
+    return task->kind == TRADE_AUTO ? run_auto(work, task) : run_method(work, task);
 }

@@ -78,24 +78,16 @@ int trade_load(trade_work *work) {
     return load_casters(work);
 }
 
-int trade_take_masks(trade_work *work) {
-    float *coverage = calloc(work->texels, sizeof *coverage);
+int trade_join_masks(trade_work *work) {
     work->common = malloc(work->texels);
     work->any = calloc(work->texels, 1);
-    int code = CLI_OK;
-    if (coverage == NULL || work->common == NULL || work->any == NULL) {
-        code = cli_out_of_memory("coverage");
-        goto done;
+    if (work->common == NULL || work->any == NULL) {
+        return cli_out_of_memory("coverage");
     }
     memset(work->common, 1, work->texels);
     for (size_t f = 0; f < work->field_count; ++f) {
         trade_field *field = &work->fields[f];
-        field->mask = calloc(work->texels, 1);
-        CLI_TRY_DONE(field->mask == NULL ? cli_out_of_memory("coverage")
-                                         : trade_bake(work, field->occluders, &work->scene->shade, NULL, NULL,
-                                                      coverage, NULL));
         for (size_t i = 0; i < work->texels; ++i) {
-            field->mask[i] = coverage[i] > 0.0f;
             field->valid += field->mask[i];
             work->common[i] &= field->mask[i];
             work->any[i] |= field->mask[i];
@@ -105,10 +97,29 @@ int trade_take_masks(trade_work *work) {
         work->common_count += work->common[i];
         work->points += work->any[i];
     }
-    if (work->common_count == 0) {
-        code = cli_usage("%s: no texel is valid at all voxel sizes: nothing to measure",
-                         work->settings->bake.input);
+    return work->common_count > 0 ? CLI_OK
+                                  : cli_usage("%s: no texel is valid at all voxel sizes: nothing to measure",
+                                              work->settings->bake.input);
+}
+
+int trade_take_masks(trade_work *work) {
+    float *coverage = calloc(work->texels, sizeof *coverage);
+    int code = CLI_OK;
+    if (coverage == NULL) {
+        code = cli_out_of_memory("coverage");
+        goto done;
     }
+    for (size_t f = 0; f < work->field_count; ++f) {
+        trade_field *field = &work->fields[f];
+        field->mask = calloc(work->texels, 1);
+        CLI_TRY_DONE(field->mask == NULL ? cli_out_of_memory("coverage")
+                                         : trade_bake(work, field->occluders, &work->scene->shade, NULL, NULL,
+                                                      coverage, NULL));
+        for (size_t i = 0; i < work->texels; ++i) {
+            field->mask[i] = coverage[i] > 0.0f;
+        }
+    }
+    code = trade_join_masks(work);
 done:
     free(coverage);
     return code;

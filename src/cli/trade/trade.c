@@ -1,6 +1,7 @@
 /* vdbshade trade: speed against accuracy, measured on the user's own scene. */
 #include "trade.h"
 #include "base/clock.h"
+#include "base/part_file.h"
 #include "cli/casters.h"
 #include "cli/message.h"
 #include "cli/paths.h"
@@ -33,11 +34,17 @@ static const cli_option options[] = {
      "write the plot of the shadow (without lights, of AO)\nas a picture of its own too"},
     {KEY_VIEW, "view", "PAGE.html",
      "also a page to look at the runs in a browser, truth and\nbakes with a slider between: docs/view.md"},
+    CLI_SHARD_OPTION("take part I of N of the runs, chosen so that all parts take\nas long, into "
+                     "OUT.I-of-N.part; 'vdbshade merge OUT' makes\nthe page of all, --csv, --plot and --view "
+                     "are for it"),
     {0, NULL, NULL, "What is measured"},
     {KEY_RECEIVER, "receiver", "N", "one receiver of the scene only, from 0 (all)"},
     {KEY_SIZE, "size", "W[xH]", "texels of each lightmap, 1 to 4096 (256)"},
     {KEY_RESOLUTIONS, "resolutions", "N,N,...",
-     "voxels along the longest side, up to 16 of them\n(64,128,256)"},
+     "voxels along the longest side, up to 16 of them\n(64,128,256, or those of --field)"},
+    {CLI_KEY_FIELD, "field", "FILE",
+     "take the voxels of one of these from there ('vdbshade\nfield --resolution N'); refused where it is "
+     "stale; may be\nrepeated; changes no value but build_s"},
     {KEY_TRUTH_RAYS, "truth-rays", "N", "rays a texel of the truth, 16 to 65536 (1024)"},
     {KEY_BUDGET, "budget", "SECONDS",
      "time to spend on runs, once there is a truth: those that\ndo not fit are left out, and counted (120)"},
@@ -69,7 +76,8 @@ static int take_resolutions(trade_settings *s, const char *name, const char *val
     for (const char *at = value; s->resolution_count < TRADE_MAX_RESOLUTIONS; ++at) {
         char *end = NULL;
         const long number = *at >= '0' && *at <= '9' ? strtol(at, &end, 10) : 0;
-        if (number < 2 || number > 65536 || (*end != ',' && *end != '\0')) {
+        if (number < TRADE_LEAST_RESOLUTION || number > TRADE_MOST_RESOLUTION ||
+            (*end != ',' && *end != '\0')) {
             break;
         }
         s->resolutions[s->resolution_count++] = (int32_t)number;
@@ -78,8 +86,16 @@ static int take_resolutions(trade_settings *s, const char *name, const char *val
             return CLI_OK;
         }
     }
-    return cli_usage("%s '%s': expected up to %d whole numbers from 2 to 65536, with commas between them",
-                     name, value, TRADE_MAX_RESOLUTIONS);
+    return cli_usage("%s '%s': expected up to %d whole numbers from %d to %d, with commas between them", name,
+                     value, TRADE_MAX_RESOLUTIONS, TRADE_LEAST_RESOLUTION, TRADE_MOST_RESOLUTION);
+}
+
+static int take_field(trade_settings *s, const char *name, const char *value) {
+    if (s->kept_count == TRADE_MAX_RESOLUTIONS) {
+        return cli_usage("%s '%s': more than %d files", name, value, TRADE_MAX_RESOLUTIONS);
+    }
+    s->kept[s->kept_count++] = value;
+    return CLI_OK;
 }
 
 static int take_size(trade_settings *s, const char *name, const char *value) {
@@ -106,6 +122,10 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_VIEW:
         s->view = value;
         return CLI_OK;
+    case CLI_KEY_SHARD:
+        return cli_parse_shard(name, value, &s->bake.shard, &s->bake.shard_count);
+    case CLI_KEY_FIELD:
+        return take_field(s, name, value);
     case KEY_RECEIVER:
         return cli_parse_integer(name, value, 0, INT32_MAX, &s->receiver);
     case KEY_SIZE:
@@ -121,62 +141,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
     }
 }
 
-/* --- what the measurements share */
-
-/* With one thread it is the processor's time, so that other work on the machine does not show. */
-double trade_now(const trade_work *work) {
-    if (work->run.threads != 1) {
-        return vshi_seconds();
-    }
-    struct timespec now = {0, 0};
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
-double trade_left(const trade_work *work) {
-    return work->settings->budget - (vshi_seconds() - work->measuring);
-}
-
-/* A measurement that is as short as this is repeated. */
-static const double SHORT_SECONDS = 0.3;
-
-bool trade_again(const trade_clock *clock) {
-    return (size_t)clock->count < sizeof clock->times / sizeof clock->times[0] &&
-           clock->times[0] < SHORT_SECONDS;
-}
-
-static int by_value(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-double trade_median(trade_clock *clock) {
-    qsort(clock->times, (size_t)clock->count, sizeof clock->times[0], by_value);
-    return clock->times[clock->count / 2];
-}
-
-trade_run *trade_add(trade_work *work, trade_subject *subject, const trade_run *run) {
-    trade_run *more = realloc(subject->runs, (subject->run_count + 1) * sizeof *more);
-    if (more == NULL) {
-        return NULL;
-    }
-    subject->runs = more;
-    more[subject->run_count] = *run;
-    if (!work->settings->bake.common.quiet) {
-        char line[256];
-        snprintf(line, sizeof line, "%s%s: RMSE %.4f, %.3f s", run->embree ? "Embree, " : "", run->options,
-                 run->metrics.rmse, run->bake_s);
-        cli_progress_line(line);
-    }
-    return &more[subject->run_count++];
-}
-
 /* --- the work */
-
-static int by_size(const void *a, const void *b) {
-    const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
-    return (x > y) - (x < y);
-}
 
 /* Whether a run is neither slower nor farther from the truth than another, and better in one of the two. */
 static bool beats(const trade_run *a, const trade_run *b) {
@@ -197,25 +162,52 @@ static void mark_fronts(trade_work *work) {
     }
 }
 
-/* The finest field comes first. */
-static int measure(trade_work *work) {
-    const trade_settings *s = work->settings;
-    int32_t resolutions[TRADE_MAX_RESOLUTIONS];
-    memcpy(resolutions, s->resolutions, sizeof resolutions);
-    qsort(resolutions, s->resolution_count, sizeof resolutions[0], by_size);
-    for (size_t i = 0; i < s->resolution_count; ++i) {
-        trade_field *next = &work->fields[i];
-        next->resolution = resolutions[s->resolution_count - 1 - i];
-        CLI_TRY(trade_make_occluders(work, next->resolution, &next->occluders, &next->build_s));
-        ++work->field_count;
-        CLI_TRY(trade_add_triangles(work, next));
+static int make_field(trade_work *work, trade_field *field) {
+    CLI_TRY(trade_make_occluders(work, field->resolution, field->kept, &field->occluders, &field->build_s));
+    return trade_add_triangles(work, field);
+}
+
+/* Those out of files first: what is stale is refused before the long work. */
+static int make_fields(trade_work *work) {
+    for (int pass = 0; pass < 2; ++pass) {
+        for (size_t i = 0; i < work->field_count; ++i) {
+            trade_field *field = &work->fields[i];
+            if ((field->kept != NULL) == (pass == 0)) {
+                CLI_TRY(make_field(work, field));
+            }
+        }
     }
-    CLI_TRY(trade_take_masks(work));
-    CLI_TRY(trade_place_points(work));
-    CLI_TRY(trade_take_truth(work, work->fields[0].resolution));
+    return CLI_OK;
+}
+
+static int do_tasks(trade_work *work) {
+    size_t next = 0;
+    for (; next < work->task_count && work->tasks[next].kind == TRADE_TRUTH; ++next) {
+        const trade_task *task = &work->tasks[next];
+        CLI_TRY(trade_is_ours(work, task) ? trade_take_truth(work, task) : CLI_OK);
+    }
     work->measuring = vshi_seconds();
-    CLI_TRY(trade_measure_embree(work));
-    CLI_TRY(trade_measure(work));
+    for (; next < work->task_count; ++next) {
+        const trade_task *task = &work->tasks[next];
+        if (trade_is_ours(work, task)) {
+            CLI_TRY(task->kind == TRADE_EMBREE ? trade_measure_embree(work, task)
+                                               : trade_measure(work, task));
+        }
+    }
+    return CLI_OK;
+}
+
+static int measure(trade_work *work) {
+    trade_describe_truth(work);
+    if (work->settings->bake.merged != NULL) {
+        CLI_TRY(trade_take_parts(work));
+    } else {
+        CLI_TRY(make_fields(work));
+        CLI_TRY(trade_take_masks(work));
+        CLI_TRY(trade_place_points(work));
+        CLI_TRY(trade_list_tasks(work));
+        CLI_TRY(do_tasks(work));
+    }
     mark_fronts(work);
     return CLI_OK;
 }
@@ -225,6 +217,7 @@ static void free_work(trade_work *work) {
         trade_subject *subject = &work->subjects[s];
         for (size_t i = 0; i < subject->run_count; ++i) {
             free(subject->runs[i].values);
+            free(subject->runs[i].mask);
         }
         free(subject->runs);
         free(subject->truth);
@@ -238,6 +231,7 @@ static void free_work(trade_work *work) {
         vsh_texels_free(work->receivers[i].texels);
     }
     free(work->receivers);
+    free(work->tasks);
     free(work->any);
     free(work->common);
     free(work->positions);
@@ -248,31 +242,58 @@ static void free_work(trade_work *work) {
     vsh_assets_free(work->assets);
 }
 
-static int trade(const trade_settings *settings, vsh_scene *scene) {
+static int write_all(const trade_work *work) {
+    CLI_TRY(trade_write_csv(work));
+    CLI_TRY(trade_write_plot(work));
+    CLI_TRY(trade_write_report(work));
+    return trade_write_view(work);
+}
+
+static void say_summary(const trade_work *work) {
+    const cli_bake_settings *s = &work->settings->bake;
+    const size_t runs = work->subjects[0].run_count + work->subjects[1].run_count;
+    const double seconds = vshi_seconds() - work->began;
+    if (s->common.quiet) {
+        return;
+    }
+    if (s->shard > 0) {
+        cli_say("%s.%d-of-%d.part: %zu runs in %.1f s, %zu left out; 'vdbshade merge %s' once all parts are "
+                "there",
+                work->settings->report, s->shard, s->shard_count, runs, seconds, work->skipped,
+                work->settings->report);
+        return;
+    }
+    cli_say("%s: %zu runs %s %.1f s, %zu left out", work->settings->report, runs,
+            s->merged != NULL ? "put together in" : "in", seconds, work->skipped);
+}
+
+static int trade(const trade_settings *settings, const trade_kept *kept, vsh_scene *scene) {
     trade_work work = {.settings = settings,
                        .scene = scene,
                        .run = cli_common_run(&settings->bake.common),
+                       .field_count = settings->resolution_count,
                        .began = vshi_seconds()};
+    work.threads = work.run.threads;
     if (scene->light_count > 0) {
         work.subjects[work.subject_count++] = (trade_subject){.name = "shadow", .planes = scene->light_count};
     }
     if (scene->ao) {
         work.subjects[work.subject_count++] = (trade_subject){.name = "ao", .ao = true, .planes = 1};
     }
+    for (size_t i = 0; i < work.field_count; ++i) {
+        work.fields[i].resolution = settings->resolutions[i];
+        for (size_t k = 0; k < settings->kept_count; ++k) {
+            work.fields[i].kept =
+                kept[k].resolution == settings->resolutions[i] ? kept[k].file : work.fields[i].kept;
+        }
+    }
     int code;
     CLI_TRY_DONE(trade_load(&work));
     CLI_TRY_DONE(trade_check_view_uvs(&work));
     CLI_TRY_DONE(measure(&work));
-    CLI_TRY_DONE(trade_write_csv(&work));
-    CLI_TRY_DONE(trade_write_plot(&work));
-    CLI_TRY_DONE(trade_write_report(&work));
-    CLI_TRY_DONE(trade_write_view(&work));
+    CLI_TRY_DONE(settings->bake.shard > 0 ? trade_write_part(&work) : write_all(&work));
     cli_signals_end();
-    if (!settings->bake.common.quiet) {
-        cli_say("%s: %zu runs in %.1f s, %zu left out", settings->report,
-                work.subjects[0].run_count + work.subjects[1].run_count, vshi_seconds() - work.began,
-                work.skipped);
-    }
+    say_summary(&work);
 done:
     free_work(&work);
     return code;
@@ -282,9 +303,16 @@ done:
 
 /* What can be refused before anything is read. */
 static int check_files(const trade_settings *s, const vsh_scene *scene) {
+    const char *const given = s->csv != NULL    ? "csv"
+                              : s->plot != NULL ? "plot"
+                              : s->view != NULL ? "view"
+                                                : NULL;
     const char *const outputs[] = {s->report, s->csv, s->plot, s->view};
     static const char *const names[] = {"output", "--csv file", "--plot file", "--view page"};
     cli_bake_settings named = s->bake; /* by the command line, not by the scene */
+    if (s->bake.shard > 0 && given != NULL) {
+        return cli_usage("--%s: not together with --shard; give it to 'vdbshade merge'", given);
+    }
     if (scene->layer_count > 0) {
         return cli_usage("%s: trade measures one field, not layers", s->bake.input);
     }
@@ -303,11 +331,16 @@ static int check_files(const trade_settings *s, const vsh_scene *scene) {
                 return cli_usage("%s: both the %s and the %s", outputs[i], names[k], names[i]);
             }
         }
+        for (size_t k = 0; k < s->kept_count; ++k) {
+            if (cli_same_file(outputs[i], s->kept[k])) {
+                return cli_usage("%s: the %s is a file of --field", outputs[i], names[i]);
+            }
+        }
         named.output = outputs[i];
         CLI_TRY(cli_bake_check_output(&named, scene, outputs[i]));
         CLI_TRY(cli_temporary_check(outputs[i]));
     }
-    return CLI_OK;
+    return s->bake.shard > 0 ? trade_check_part(s) : CLI_OK;
 }
 
 /* Leaves the scene with the one receiver that was asked for. */
@@ -324,38 +357,71 @@ static int choose_receiver(const trade_settings *s, vsh_scene *scene) {
     return CLI_OK;
 }
 
-static int trade_main(int argc, char **argv) {
-    trade_settings s;
-    memset(&s, 0, sizeof s);
-    s.bake.common = cli_common_default();
-    cli_patch_set(&s.bake.patch, "--size", "256");
-    cli_patch_set(&s.bake.patch, "--supersample", "1"); /* the truth is one of the sample's too */
-    cli_patch_set(&s.bake.patch, "--padding", "0");
-    memcpy(s.resolutions, (const int32_t[]){64, 128, 256}, 3 * sizeof s.resolutions[0]);
-    s.resolution_count = 3;
-    s.truth_rays = 1024;
-    s.receiver = -1;
-    s.budget = 120.0;
-    bool help;
-    int code = cli_parse(&cli_trade, argc, argv, take, &s, "INPUT", &s.bake.input, &help);
-    if (code != CLI_OK || help) {
-        return code;
-    }
-    if (s.report == NULL || !cli_has_ending(s.report, "html")) {
-        return cli_usage("%s: give -o OUT.html", s.report != NULL ? s.report : s.bake.input);
+static int parse(int argc, char **argv, trade_settings *s, bool *help) {
+    memset(s, 0, sizeof *s);
+    s->bake.common = cli_common_default();
+    s->bake.words = (const char *const *)argv;
+    s->bake.word_count = (size_t)argc;
+    cli_patch_set(&s->bake.patch, "--size", "256");
+    cli_patch_set(&s->bake.patch, "--supersample", "1"); /* the truth is one of the sample's too */
+    cli_patch_set(&s->bake.patch, "--padding", "0");
+    s->truth_rays = 1024;
+    s->receiver = -1;
+    s->budget = 120.0;
+    return cli_parse(&cli_trade, argc, argv, take, s, "INPUT", &s->bake.input, help);
+}
+
+static int trade_by(trade_settings *s) {
+    if (s->report == NULL || !cli_has_ending(s->report, "html")) {
+        return cli_usage("%s: give -o OUT.html", s->report != NULL ? s->report : s->bake.input);
     }
     /* a mesh needs an output to be a scene; a scene's own are not written */
-    s.bake.output = cli_has_ending(s.bake.input, "json") ? NULL : s.report;
-    cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
+    s->bake.output = cli_has_ending(s->bake.input, "json") ? NULL : s->report;
+    cli_progress_begin(s->bake.common.progress, s->bake.common.quiet);
+    trade_kept kept[TRADE_MAX_RESOLUTIONS] = {{NULL, 0}};
     cli_bake_scene made;
-    CLI_TRY_DONE(cli_bake_scene_make(&s.bake, &made));
-    CLI_TRY_DONE(check_files(&s, &made.scene));
-    CLI_TRY_DONE(choose_receiver(&s, &made.scene));
-    CLI_TRY_DONE(trade_check_view(&s, &made.scene));
+    int code;
+    CLI_TRY_DONE(cli_bake_scene_make(&s->bake, &made));
+    CLI_TRY_DONE(trade_open_kept(s, kept));
+    CLI_TRY_DONE(check_files(s, &made.scene));
+    CLI_TRY_DONE(choose_receiver(s, &made.scene));
+    CLI_TRY_DONE(trade_check_view(s, &made.scene));
     cli_signals_watch();
-    code = trade(&s, &made.scene);
+    code = trade(s, kept, &made.scene);
 done:
     cli_bake_scene_free(&made);
+    trade_close_kept(s, kept);
     cli_progress_end();
     return code;
+}
+
+static int trade_main(int argc, char **argv) {
+    trade_settings s;
+    bool help;
+    const int code = parse(argc, argv, &s, &help);
+    return code != CLI_OK || help ? code : trade_by(&s);
+}
+
+int cli_trade_merge(int argc, char **argv, const cli_merged *merged) {
+    trade_settings s;
+    bool help;
+    const int code = parse(argc, argv, &s, &help);
+    if (code != CLI_OK || help) {
+        return code != CLI_OK ? code : cli_usage("%s: its parts are of no trade", merged->output);
+    }
+    s.bake.common = *merged->common;
+    s.report = s.bake.merged = merged->output;
+    s.csv = merged->csv;
+    s.plot = merged->plot;
+    s.view = merged->view;
+    s.bake.shard = 0;
+    s.bake.shard_count = merged->shards;
+    s.bake.words = NULL;
+    s.bake.word_count = 0;
+    vsh_error error;
+    if (merged->shards == 0 && vshi_parts_count(merged->output, &s.bake.shard_count, &error) != VSH_OK) {
+        return cli_fail(&error);
+    }
+    return vshi_parts_check_there(merged->output, s.bake.shard_count, &error) == VSH_OK ? trade_by(&s)
+                                                                                        : cli_fail(&error);
 }

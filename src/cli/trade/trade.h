@@ -6,20 +6,41 @@
 
 #include <stdio.h>
 
-enum { TRADE_MAX_RESOLUTIONS = 16 };
+enum { TRADE_MAX_RESOLUTIONS = 16, TRADE_LEAST_RESOLUTION = 2, TRADE_MOST_RESOLUTION = 65536 };
 
 typedef struct trade_settings {
-    cli_bake_settings bake; /* the scene, as `bake` takes it */
+    cli_bake_settings bake; /* the scene, as `bake` takes it; and which part, or the parts to merge */
     const char *report;
     const char *csv;
     const char *plot;
     const char *view;
+    const char *kept[TRADE_MAX_RESOLUTIONS]; /* [kept_count]: files of fields */
+    size_t kept_count;
     int32_t resolutions[TRADE_MAX_RESOLUTIONS];
-    size_t resolution_count;
+    size_t resolution_count; /* 0: those of the files, or 64, 128 and 256 */
     int32_t truth_rays;
     int32_t receiver; /* -1: all */
     double budget;    /* seconds */
 } trade_settings;
+
+/* What is done, in the order in which one process does it. */
+typedef enum trade_kind {
+    TRADE_TRUTH, /* of one subject, or (subject_count) of all */
+    TRADE_EMBREE,
+    TRADE_AUTO,
+    TRADE_METHOD
+} trade_kind;
+
+typedef struct trade_task {
+    trade_kind kind;
+    size_t subject;
+    size_t field;     /* TRADE_METHOD: on which */
+    int32_t method;   /* … */
+    int32_t number;   /* rays or cones; 0: none */
+    double max_error; /* 0: none */
+    double expected;  /* seconds, roughly: the same on all machines */
+    int32_t shard;    /* whose it is */
+} trade_task;
 
 /* Every plane of values holds the texels of all receivers, one receiver after the other. */
 typedef struct trade_receiver {
@@ -31,6 +52,7 @@ typedef struct trade_receiver {
 
 /* One way to bake, and what came of it. */
 typedef struct trade_run {
+    size_t task;
     const char *method;
     char options[128];  /* as `bake` takes them */
     int32_t resolution; /* 0: no voxels, or those that auto takes */
@@ -45,12 +67,15 @@ typedef struct trade_run {
     vsh_accuracy metrics; /* over the texels that all runs have */
     double valid_rmse;    /* over all texels that it gave a value */
     float *values;        /* as trade_subject.truth */
+    uint8_t *mask;        /* [texels]: 1 where it is to be compared; NULL: as its field says, or where there
+                             is any truth */
 } trade_run;
 
 typedef struct trade_field {
     int32_t resolution;
-    vsh_occluders *occluders; /* of voxels alone */
-    vsh_occluders *traced;    /* with triangles, where casters are all meshes */
+    const vsh_field_file *kept; /* where it is taken from; NULL: it is made */
+    vsh_occluders *occluders;   /* of voxels alone; these two NULL in merging */
+    vsh_occluders *traced;      /* with triangles, where casters are all meshes */
     double build_s;
     uint8_t *mask; /* [texels]: 1 where a bake on this field finds a texel valid */
     size_t valid;  /* how many those are */
@@ -61,7 +86,7 @@ typedef struct trade_subject {
     const char *name; /* "shadow", "ao" */
     bool ao;
     size_t planes; /* lights, or 1 */
-    float *truth;  /* [planes][texels] */
+    float *truth;  /* [planes][texels]; NULL in a part that another one's truth is for */
     trade_run *runs;
     size_t run_count;
 } trade_subject;
@@ -90,22 +115,28 @@ typedef struct trade_work {
     uint8_t *any;      /* [texels]: 1 where any field finds a texel valid */
     trade_subject subjects[2];
     size_t subject_count;
-    size_t skipped; /* runs that did not fit into the budget */
+    trade_task *tasks; /* [task_count] */
+    size_t task_count;
+    size_t skipped;  /* runs that did not fit into the budget */
+    int32_t threads; /* that times are of: the run's, or in merging the parts' */
     double began;
     double measuring; /* since when: what the budget is for */
     double truth_s;
     char truth_text[320]; /* what the truth is, for the report */
 } trade_work;
 
-/* Takes the values, which belong to the subject from then on; NULL where memory is short. */
-trade_run *trade_add(trade_work *work, trade_subject *subject, const trade_run *run);
+/* Takes the run with its values and mask, which belong to its subject from then on; in a part it is not held
+ * against the truth yet. CLI_OK or an exit code; the run is then still the caller's. */
+int trade_add(trade_work *work, trade_run *run);
 
 double trade_now(const trade_work *work);  /* seconds to take differences of */
 double trade_left(const trade_work *work); /* seconds of the budget */
 
 /* A measured time is the median of a few, where they are short. */
+enum { TRADE_REPEATS = 3 };
+#define TRADE_SHORT_SECONDS 0.3
 typedef struct trade_clock {
-    double times[3];
+    double times[TRADE_REPEATS];
     int count;
 } trade_clock;
 bool trade_again(const trade_clock *clock); /* whether to measure once more */
@@ -113,13 +144,16 @@ double trade_median(trade_clock *clock);
 
 /* All of these return CLI_OK or an exit code, having said why. */
 int trade_load(trade_work *work);
-int trade_make_occluders(trade_work *work, int32_t resolution, vsh_occluders **occluders, double *seconds);
+int trade_make_occluders(trade_work *work, int32_t resolution, const vsh_field_file *kept,
+                         vsh_occluders **occluders, double *seconds);
 int trade_add_triangles(const trade_work *work, trade_field *field);
 int trade_take_masks(trade_work *work);
+int trade_join_masks(trade_work *work); /* those of fields to common and any */
 int trade_place_points(trade_work *work);
-int trade_measure(trade_work *work);
-int trade_take_truth(trade_work *work, int32_t finest);
-int trade_measure_embree(trade_work *work);
+void trade_describe_truth(trade_work *work);
+int trade_take_truth(trade_work *work, const trade_task *task);
+int trade_measure_embree(trade_work *work, const trade_task *task);
+int trade_measure(trade_work *work, const trade_task *task); /* TRADE_AUTO, TRADE_METHOD */
 int trade_write_report(const trade_work *work);
 int trade_write_csv(const trade_work *work);
 int trade_write_plot(const trade_work *work);
@@ -134,8 +168,35 @@ int trade_write_view(const trade_work *work);
 int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh_shade_options *shade,
                float *shadow, float *ao, float *coverage, vsh_shade_stats *stats);
 
-/* Measures run->values and the rate, on the texels that all runs have and on all of `mask`. */
-int trade_compare(const trade_work *work, const trade_subject *subject, const uint8_t *mask, trade_run *run);
+/* The name of a run and what `bake` calls its options, by its task. */
+void trade_name_run(const trade_work *work, trade_run *run);
+
+/* --- tasks, and parts of them */
+
+/* Lists what is to be done, once there are masks and fields, and whose it is. */
+int trade_list_tasks(trade_work *work);
+static inline bool trade_is_ours(const trade_work *work, const trade_task *task) {
+    return work->settings->bake.shard == 0 || task->shard == work->settings->bake.shard;
+}
+
+/* Planes of its values. */
+size_t trade_task_planes(const trade_work *work, const trade_task *task);
+
+/* --shard: whether it can be kept, and then what was measured; and in its place what parts have measured. */
+int trade_check_part(const trade_settings *settings);
+int trade_write_part(const trade_work *work);
+int trade_take_parts(trade_work *work);
+
+/* --- fields in files */
+
+typedef struct trade_kept {
+    vsh_field_file *file;
+    int32_t resolution;
+} trade_kept;
+
+/* Opens them, and settles which resolutions are measured, largest first. */
+int trade_open_kept(trade_settings *settings, trade_kept kept[TRADE_MAX_RESOLUTIONS]);
+void trade_close_kept(const trade_settings *settings, trade_kept kept[TRADE_MAX_RESOLUTIONS]);
 
 /* --- parts of the report */
 

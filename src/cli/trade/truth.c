@@ -9,9 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* Embree's curve ends at so many rays, or at half of the truth's. */
-enum { CURVE_RAYS = 256 };
-
 /* Traces the subject's planes into `values`; `seconds` is of the library's call alone. */
 static int trace(const trade_work *work, const trade_subject *subject, int32_t rays, float *values,
                  double *seconds) {
@@ -46,14 +43,23 @@ done:
 }
 
 /* Of a scene whose casters rays cannot meet: rays against a field of twice the finest resolution. */
-static int march(trade_work *work, int32_t resolution) {
+static int32_t truth_resolution(const trade_work *work) {
+    const int32_t finest = work->fields[0].resolution;
+    return finest <= 32768 ? 2 * finest : finest;
+}
+
+static int32_t marched_rays(const trade_work *work) {
+    return work->settings->truth_rays < 4096 ? work->settings->truth_rays : 4096;
+}
+
+static int march(trade_work *work) {
     vsh_occluders *occluders = NULL;
     double seconds;
-    CLI_TRY(trade_make_occluders(work, resolution, &occluders, &seconds));
+    CLI_TRY(trade_make_occluders(work, truth_resolution(work), NULL, &occluders, &seconds));
     vsh_shade_options shade = work->scene->shade;
     shade.method = VSH_SHADOW_RAYS;
     shade.ao_method = VSH_AO_RAYS;
-    shade.rays = work->settings->truth_rays < 4096 ? work->settings->truth_rays : 4096;
+    shade.rays = marched_rays(work);
     shade.early_rays = 0;
     float *shadow = NULL, *ao = NULL;
     for (size_t s = 0; s < work->subject_count; ++s) {
@@ -62,51 +68,54 @@ static int march(trade_work *work, int32_t resolution) {
     }
     const int code = trade_bake(work, occluders, &shade, shadow, ao, NULL, NULL);
     vsh_occluders_free(occluders);
-    snprintf(work->truth_text, sizeof work->truth_text,
-             "%d rays a texel marched against a field of %d voxels along the longest side, as %s", shade.rays,
-             resolution,
-             vsh_triangles_available() ? "a caster is neither a mesh nor procedural"
-                                       : "this build has no Embree");
     return code;
 }
 
-static void describe(trade_work *work) {
+void trade_describe_truth(trade_work *work) {
     static const char *const whats[] = {
         "procedural casters themselves (sphere tracing in double precision)",
         "triangles (Embree)",
         "triangles (Embree) and procedural casters (sphere tracing in double precision), hidden by either",
     };
-    const char *what = whats[work->triangles == NULL ? 0 : work->solids == NULL ? 1 : 2];
-    snprintf(work->truth_text, sizeof work->truth_text, "%d rays a texel, from just above it, against the %s",
-             work->settings->truth_rays, what);
+    if (vsh_scene_has_truth(work->scene)) {
+        const char *what = whats[work->triangles == NULL ? 0 : work->solids == NULL ? 1 : 2];
+        snprintf(work->truth_text, sizeof work->truth_text,
+                 "%d rays a texel, from just above it, against the %s", work->settings->truth_rays, what);
+        return;
+    }
+    snprintf(work->truth_text, sizeof work->truth_text,
+             "%d rays a texel marched against a field of %d voxels along the longest side, as %s",
+             marched_rays(work), truth_resolution(work),
+             vsh_triangles_available() ? "a caster is neither a mesh nor procedural"
+                                       : "this build has no Embree");
 }
 
-int trade_take_truth(trade_work *work, int32_t finest) {
+int trade_take_truth(trade_work *work, const trade_task *task) {
+    const double start = trade_now(work);
+    double seconds;
     for (size_t s = 0; s < work->subject_count; ++s) {
         trade_subject *subject = &work->subjects[s];
+        if (task->subject != s && task->subject != work->subject_count) {
+            continue;
+        }
         subject->truth = calloc(subject->planes * work->texels, sizeof *subject->truth);
         if (subject->truth == NULL) {
             return cli_out_of_memory("truth");
         }
     }
-    const double start = trade_now(work);
-    if (!vsh_scene_has_truth(work->scene)) {
-        CLI_TRY(march(work, finest <= 32768 ? 2 * finest : finest));
+    if (task->subject == work->subject_count) {
+        CLI_TRY(march(work));
     } else {
-        describe(work);
-        for (size_t s = 0; s < work->subject_count; ++s) {
-            double seconds;
-            CLI_TRY(trace(work, &work->subjects[s], work->settings->truth_rays, work->subjects[s].truth,
-                          &seconds));
-        }
+        trade_subject *subject = &work->subjects[task->subject];
+        CLI_TRY(trace(work, subject, work->settings->truth_rays, subject->truth, &seconds));
     }
-    work->truth_s = trade_now(work) - start;
+    work->truth_s += trade_now(work) - start;
     return CLI_OK;
 }
 
-static int measure_rays(trade_work *work, trade_subject *subject, int32_t rays) {
-    trade_run run = {.method = "embree",
-                     .embree = true,
+int trade_measure_embree(trade_work *work, const trade_task *task) {
+    const trade_subject *subject = &work->subjects[task->subject];
+    trade_run run = {.task = (size_t)(task - work->tasks),
                      .build_s = work->triangles_s,
                      .bytes = vsh_triangles_bytes(work->triangles),
                      .certified = NAN,
@@ -115,28 +124,16 @@ static int measure_rays(trade_work *work, trade_subject *subject, int32_t rays) 
     if (run.values == NULL) {
         return cli_out_of_memory("values");
     }
-    snprintf(run.options, sizeof run.options, "%d ray%s a texel", rays, rays == 1 ? "" : "s");
+    trade_name_run(work, &run);
     trade_clock clock = {.count = 0};
     int code;
     do {
-        CLI_TRY_DONE(trace(work, subject, rays, run.values, &clock.times[clock.count++]));
+        CLI_TRY_DONE(trace(work, subject, task->number, run.values, &clock.times[clock.count++]));
     } while (trade_again(&clock));
     run.bake_s = trade_median(&clock);
-    CLI_TRY_DONE(trade_compare(work, subject, work->any, &run));
-    if (trade_add(work, subject, &run) != NULL) {
-        return CLI_OK;
-    }
-    code = cli_out_of_memory("runs");
+    CLI_TRY_DONE(trade_add(work, &run));
+    return CLI_OK;
 done:
     free(run.values);
     return code;
-}
-
-int trade_measure_embree(trade_work *work) {
-    for (size_t s = 0; s < work->subject_count && work->meshes; ++s) {
-        for (int32_t rays = 1; rays <= CURVE_RAYS && 2 * rays <= work->settings->truth_rays; rays *= 2) {
-            CLI_TRY(measure_rays(work, &work->subjects[s], rays));
-        }
-    }
-    return CLI_OK;
 }

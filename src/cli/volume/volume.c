@@ -143,8 +143,9 @@ static int check_output(const volume_settings *s, const vsh_scene *scene, const 
     if (s->like != NULL && cli_same_file(output, s->like)) {
         return cli_usage("%s: the output is also the file of --like", output);
     }
-    const int code = cli_bake_check_output(&s->bake, scene, output);
-    return code == CLI_OK ? cli_temporary_check(output) : code;
+    CLI_TRY(cli_bake_check_output(&s->bake, scene, output));
+    CLI_TRY(cli_bake_check_inputs(&s->bake, scene, &output, 1));
+    return cli_temporary_check(output);
 }
 
 /* What can be refused before anything is read. */

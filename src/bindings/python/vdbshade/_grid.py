@@ -54,7 +54,8 @@ def _distances(user: Any, count: int, positions: Any, distances: Any) -> None:
     result = numpy.frombuffer(ffi.buffer(distances, 8 * count), numpy.float64)
     result[:] = numpy.nan  # what ends the call, where the function raises
     if distance.raised is None:
-        at = numpy.frombuffer(ffi.buffer(positions, 24 * count), numpy.float64).reshape(count, 3)
+        # a copy: C's own are gone when the function returns, whoever keeps them
+        at = numpy.array(numpy.frombuffer(ffi.buffer(positions, 24 * count), numpy.float64)).reshape(count, 3)
         at.flags.writeable = False
         found = numpy.asarray(distance.function(at), numpy.float64)
         if found.shape != (count,):

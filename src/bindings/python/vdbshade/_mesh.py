@@ -316,7 +316,7 @@ class Model(Handle):
 
     @property
     def materials(self) -> List[types.ModelMaterial]:
-        """Materials of a glTF, as far as they decide where light comes through."""
+        """Materials of a glTF or an OBJ, as far as they decide where light comes through."""
         return [info(lib.vsh_model_get_material_sized, "vsh_model_material", self.handle, i)
                 for i in range(lib.vsh_model_material_count(self.handle))]
 

@@ -229,6 +229,11 @@ class Scene:
         """Whether truth() gives all of its casters."""
         return bool(lib.vsh_scene_has_truth(self.struct))
 
+    def check_outputs(self, outputs: "Sequence[str | os.PathLike[str]]", *, run: Optional[Run] = None) -> None:
+        """ArgumentError where one of these files is there already and is read with the scene: a texture, say."""
+        names = [ffi.new("char[]", path_of(o, "outputs")) for o in outputs]
+        call(lib.vsh_scene_check_outputs, self.struct, ffi.new("char *[]", names or 1), len(names), RUN, run=run)
+
     def receiver_check(self, index: int) -> None:
         """ArgumentError and the like where a receiver's image could not be written as it asks."""
         call(lib.vsh_receiver_check, self.struct, index)
