@@ -66,6 +66,14 @@ write_row() {
     [ "$(ls many | wc -l)" = 3 ]
 }
 
+@test "objects of several receivers in one folder are refused, as tiles would name them alike" {
+    write_row
+    run -2 "$VDBSHADE" bake row.json --tile-size 4 --per-object -o maps/
+    [[ "$output" == *"the output of two receivers"* ]]
+    "$VDBSHADE" bake row.json --tile-size 4 --per-object --quiet
+    [ -e floor0.floor.exr ] && [ -e floor8.floor.exr ]
+}
+
 @test "--dry-run lists tiles and forecasts the largest" {
     write_row
     run -0 "$VDBSHADE" bake row.json --tile-size 4 --dry-run

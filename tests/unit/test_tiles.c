@@ -243,6 +243,39 @@ static void what_is_left_out_hides_less_than_a_tenth_of_the_error(void **state) 
     vsh_scene_free(scene);
 }
 
+/* An object is meant before a material, also where a tile has the material alone. */
+static void a_rule_means_in_a_tile_what_it_means_in_the_world(void **state) {
+    (void)state;
+    write_world();
+    FILE *file = fopen(at("named.obj"), "wb");
+    assert_non_null(file);
+    int vertices = 1;
+    fputs("mtllib named.mtl\no near\nusemtl oak\n", file);
+    write_box(file, (const double[]){1.3, 0.01, -0.4}, (const double[]){1.7, 2.0, 0.6}, &vertices);
+    fputs("o oak\nusemtl stone\n", file);
+    write_box(file, (const double[]){301.3, 0.01, -0.4}, (const double[]){301.7, 2.0, 0.6}, &vertices);
+    assert_int_equal(fclose(file), 0);
+    file = fopen(at("named.mtl"), "wb");
+    assert_non_null(file);
+    fputs("newmtl oak\nKd 1 1 1\nnewmtl stone\nKd 1 1 1\n", file);
+    assert_int_equal(fclose(file), 0);
+    vsh_scene *scene = world("{\"mesh\": \"named.obj\", \"shell\": \"oak\"}", nothing_more);
+    vsh_tiles *tiles = tiles_of(scene, 4.0);
+    vsh_tile *tile = tile_of(tiles, 0);
+    vsh_assets *assets;
+    vsh_error error;
+    size_t count;
+    assert_int_equal(vsh_assets_load(vsh_tile_scene(tile), NULL, &assets, &error), VSH_OK);
+    const vsh_mesh *meshes = vsh_assets_caster(assets, 0, &count);
+    assert_int_equal(count, 1);
+    assert_string_equal(meshes[0].material_name, "oak");
+    assert_int_equal(meshes[0].solidity, VSH_SOLIDITY_AUTO);
+    vsh_assets_free(assets);
+    vsh_tile_free(tile);
+    vsh_tiles_free(tiles);
+    vsh_scene_free(scene);
+}
+
 static void layers_and_rules_of_what_is_far_away_do_no_harm(void **state) {
     (void)state;
     write_world();
@@ -326,6 +359,9 @@ static void what_cannot_be_cut_is_refused(void **state) {
     vsh_tile *tile = tile_of(tiles, 0), *none = (vsh_tile *)1;
     vsh_error error;
     refused(vsh_tile_scene(tile), 4.0, VSH_ERROR_ARGUMENT, "is a tile already");
+    vsh_scene own = *vsh_tile_scene(tile);
+    assert_int_equal(vsh_scene_use_field(&own, (const vsh_field_file *)1, &error), VSH_ERROR_ARGUMENT);
+    assert_null(own.field);
     assert_int_equal(vsh_tile_create(tiles, FLOORS, &none, &error), VSH_ERROR_ARGUMENT);
     assert_null(none);
     assert_non_null(strstr(error.message, "tile 5: there are 5"));
@@ -349,6 +385,7 @@ int main(void) {
         cmocka_unit_test(tiles_of_meshes_bake_the_whole_world_s_values_by_fewer_objects),
         cmocka_unit_test(one_tile_around_all_is_the_whole_bit_by_bit),
         cmocka_unit_test(what_is_left_out_hides_less_than_a_tenth_of_the_error),
+        cmocka_unit_test(a_rule_means_in_a_tile_what_it_means_in_the_world),
         cmocka_unit_test(layers_and_rules_of_what_is_far_away_do_no_harm),
         cmocka_unit_test(tiles_of_a_level_set_bake_it_within_the_error_by_fewer_voxels),
         cmocka_unit_test(what_cannot_be_cut_is_refused),

@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 static void set_identity(double transform[12]) {
     for (int i = 0; i < 12; ++i) {
@@ -219,6 +220,10 @@ int cli_bake_check_output(const cli_bake_settings *s, const vsh_scene *scene, co
     if (named_by_scene && cli_check_links(s->input, output) != CLI_OK) {
         return CLI_FILE;
     }
+    struct stat status;
+    if (stat(output, &status) != 0) {
+        return CLI_OK; /* it replaces nothing; worlds have many thousand casters */
+    }
     for (size_t i = 0; i < scene->caster_count; ++i) {
         if (scene->casters[i].path != NULL && cli_same_file(output, scene->casters[i].path)) {
             return cli_usage("%s: the output is also a caster's file", output);
@@ -250,7 +255,10 @@ static int check_outputs(const cli_bake_settings *s, const vsh_scene *scene) {
             return cli_usage("%s: both the output and the --stats file", output);
         }
         for (size_t k = 0; k < i; ++k) {
-            if (!s->per_object && cli_same_file(output, scene->receivers[k].output)) {
+            /* objects of one bake get names of their own, but tiles do not know of each other's */
+            const bool apart = s->per_object && s->tile_size == 0.0;
+            const char *other = scene->receivers[k].output;
+            if (!apart && (strcmp(output, other) == 0 || cli_same_file(output, other))) {
                 return cli_usage("%s: the output of two receivers", output);
             }
         }
