@@ -80,7 +80,8 @@ static void choose(vsh_tile *tile, const seen_object *seen, size_t count) {
 static vsh_result find_objects(const vsh_tiles *tiles, const vshi_world_box *around, vsh_tile *tile,
                                vsh_error *error) {
     seen_object *seen;
-    VSHI_TRY(vshi_allocate((void **)&seen, tiles->survey.objects, sizeof *seen, "objects", error));
+    /* one more: qsort wants a place, however few it sorts */
+    VSHI_TRY(vshi_allocate((void **)&seen, tiles->survey.objects + 1, sizeof *seen, "objects", error));
     size_t count = 0;
     for (size_t i = 0; i < tiles->survey.caster_count; ++i) {
         const vshi_survey_caster *caster = &tiles->survey.casters[i];

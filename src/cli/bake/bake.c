@@ -294,7 +294,7 @@ int cli_bake_one(const cli_bake_settings *settings, const vsh_scene *scene, cli_
     options.file_count = settings->lights != NULL ? 2 : 1;
     char *parts = name_parts(settings, scene);
     options.shard = part && !settings->dry_run ? settings->shard : 0; /* what is told is of the whole */
-    options.shard_count = part ? settings->shard_count : 0;
+    options.shard_count = settings->tile_size > 0.0 ? 0 : settings->shard_count;
     options.forecast = settings->dry_run;
     options.parts = settings->merged != NULL ? settings->merged : parts;
     options.words = settings->words;
