@@ -161,6 +161,35 @@ static void what_a_light_s_rays_meet_is_never_more_than_its_share(void **state) 
     assert_true(whole > SCENES / 40);
 }
 
+/* A cube that stands on its corner before a narrow sun covers 0.73 of the ball that is reckoned for it. */
+static void a_share_is_near_to_what_a_cube_hides(void **state) {
+    (void)state;
+    state_of_dice = 4;
+    const vshi_vec towards = vshi_unit((vshi_vec){1.0, 1.0, 1.0});
+    const vsh_light light = sun(towards, 0.2);
+    const vsh_scene scene = scene_of(&light, 0.0);
+    vshi_reach reach;
+    vsh_error error;
+    assert_int_equal(vshi_reach_make(&scene, &reach, &error), VSH_OK);
+    const vshi_world_box receiver = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    const vshi_vec middle = vshi_scale(towards, 100.0);
+    const vshi_world_box cube = {{middle.x - 4.0, middle.y - 4.0, middle.z - 4.0},
+                                 {middle.x + 4.0, middle.y + 4.0, middle.z + 4.0}};
+    const double share = vshi_reach_share(&reach, &receiver, &cube);
+    enum { MANY = 20000 };
+    int met = 0;
+    for (int i = 0; i < MANY; ++i) {
+        double end, near, far;
+        const vshi_vec from = {0.0, 0.0, 0.0}, way = ray_to(&reach.lights[0], from, &end);
+        met += meets(&cube, from, way, end, &near, &far);
+    }
+    const double seen = (double)met / MANY;
+    printf("%.3f of the sun is hidden, %.3f at most\n", seen, share);
+    assert_true(share > 0.3 && share < 0.8);
+    assert_true(seen > 0.65 * share && seen <= share);
+    vshi_reach_free(&reach);
+}
+
 static void what_ao_s_rays_meet_is_never_more_than_its_share(void **state) {
     (void)state;
     state_of_dice = 2;
@@ -250,6 +279,7 @@ static void a_region_holds_every_ray_as_far_as_the_world_goes(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_a_light_s_rays_meet_is_never_more_than_its_share),
+        cmocka_unit_test(a_share_is_near_to_what_a_cube_hides),
         cmocka_unit_test(what_ao_s_rays_meet_is_never_more_than_its_share),
         cmocka_unit_test(a_region_holds_every_ray_as_far_as_the_world_goes),
     };
