@@ -74,7 +74,7 @@ static const cli_option options[] = {
     {KEY_TILE_SIZE, "tile-size", "SIZE",
      "for worlds that do not fit into memory: receivers are\nbaked cube by cube of SIZE scene units, each "
      "cube with\n"
-     "the casters that its light and AO can meet; values are\nthe same to a tenth of --max-error "
+     "the casters that its light and AO can meet; values are\nthe same to within --max-error "
      "(docs/farm.md)"},
     CLI_GRID_OPTIONS,
     {0, NULL, NULL, "Texels"},
