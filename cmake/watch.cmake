@@ -19,6 +19,7 @@ set(VSH_WATCH_address_CLI accuracy casters channels flat hostile info input mask
 set(VSH_WATCH_thread_ONLY test_compare test_host test_layers test_lightmap test_texels)
 
 set(suppressions ${PROJECT_SOURCE_DIR}/tests/suppressions)
+set(watched ${PROJECT_SOURCE_DIR}/tests/watched.sh) # runs a test again where a sanitizer itself crashed
 set(VSH_WATCH_address_ENVIRONMENT
     "ASAN_OPTIONS=detect_leaks=1:strict_string_checks=1:detect_stack_use_after_return=1:allocator_may_return_null=1:exitcode=99"
     "LSAN_OPTIONS=suppressions=${suppressions}/lsan.txt:print_suppressions=0"
@@ -98,7 +99,7 @@ function(vsh_add_test name)
   foreach(watch ${VSH_WATCHES})
     if(name IN_LIST VSH_WATCH_${watch}_ONLY OR (NOT VSH_WATCH_${watch}_ONLY AND NOT name IN_LIST VSH_WATCH_${watch}_NOT))
       vsh_add_program(${watch}.${name} ${watch} ${parts})
-      add_test(NAME ${watch}.${name} COMMAND ${watch}.${name} ${given_ARGUMENTS})
+      add_test(NAME ${watch}.${name} COMMAND ${watched} $<TARGET_FILE:${watch}.${name}> ${given_ARGUMENTS})
       vsh_set_watched(${watch}.${name} ${watch})
     endif()
   endforeach()
@@ -123,7 +124,7 @@ function(vsh_add_cli_test name file)
         vsh_add_program(${watch}.vdbshade_cli ${watch} SOURCES ${VSH_CLI_SOURCES} LIBRARIES vsh::jansson)
         set_target_properties(${watch}.vdbshade_cli PROPERTIES OUTPUT_NAME vdbshade RUNTIME_OUTPUT_DIRECTORY ${watch})
       endif()
-      add_test(NAME ${watch}.cli_${name} COMMAND ${VSH_BATS} ${file})
+      add_test(NAME ${watch}.cli_${name} COMMAND ${watched} ${VSH_BATS} ${file})
       set_property(TEST ${watch}.cli_${name} PROPERTY ENVIRONMENT ${environment}
                    "VDBSHADE=$<TARGET_FILE:${watch}.vdbshade_cli>")
       vsh_set_watched(${watch}.cli_${name} ${watch})
