@@ -89,7 +89,7 @@ needs_slurm() {
     [ "$(id -u)" -eq 0 ] || skip "slurmd is started by root alone"
 }
 
-@test "a bake on Slurm comes to the bits of one bake, though a node's daemon is killed in the middle" {
+@test "a bake and a trade on Slurm come to what one of each does, though a node's daemon is killed in the middle" {
     needs_slurm
     write_box box.obj
     bake=(bake box.obj --sun 0.3,1,0.2 --sun-angle 5 --ao 1 --size 256)
@@ -119,6 +119,14 @@ PROGRAM
     grep -h "on n2, started again 0 times" out.exr.logs/*.log || fail "nothing was on the second node"
     grep -h "on n1, started again 1 times" out.exr.logs/*.log || fail "nothing was started again"
     [ -n "$array" ] && [ -n "$merge" ]
+
+    # a trade on the node that is left
+    local trade=(trade box.obj --sun 0.3,1,0.2 --sun-angle 20 --size 24 --resolutions 12 --truth-rays 64 --budget 3600 --threads 1)
+    "$VDBSHADE" "${trade[@]}" -o one.html --csv one.csv --quiet
+    MEMORY=500 MINUTES=2 MERGE="--csv out.csv" "$tools/submit" 2 "${trade[@]}" -o out.html
+    within 40 test -e out.csv || fail "no table: $(squeue; cat out.html.logs/*)"
+    [ "$(wc -l <one.csv)" -gt 9 ] && diff <(untimed one.csv) <(untimed out.csv) || fail "the rows are others"
+    [ -s out.html ]
 }
 
 @test "submit asks for what the estimate says, and refuses what it cannot share out" {

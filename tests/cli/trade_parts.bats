@@ -8,11 +8,6 @@ setup() {
 
 TINY=(--sun 0.3,1,0.2 --sun-angle 20 --size 24 --resolutions 12,24 --truth-rays 64 --budget 3600 --threads 1)
 
-# What of a table does not hang on time: all columns but those of seconds, and the front.
-untimed() {
-    cut -d, -f1-4,8-20,22 "$1"
-}
-
 # All parts of a trade in out.html, and what they come to in out.csv.
 parts() { # N INPUT [options]
     local n=$1 i
