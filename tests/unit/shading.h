@@ -27,19 +27,25 @@ static inline vsh_light lamp(const double position[3], double radius) {
     return light;
 }
 
-static inline vsh_shade_stats shadows(const vsh_field *field, const vsh_light *light, int32_t method,
-                                      size_t count, const double *positions, const float *normals,
-                                      float *visible) {
+static inline vsh_shade_stats shadows_by(const vsh_occluders *occluders, const vsh_light *light,
+                                         int32_t method, size_t count, const double *positions,
+                                         const float *normals, float *visible) {
     vsh_shade_options options = preview_options();
     options.method = method;
     const vsh_points points = {count, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
     vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_shadow(occluders_of(field), &points, light, &options, NULL, visible, NULL, &stats,
-                         &error) != VSH_OK) {
+    if (vsh_shade_shadow(occluders, &points, light, &options, NULL, visible, NULL, &stats, &error) !=
+        VSH_OK) {
         fail_msg("%s", error.message);
     }
     return stats;
+}
+
+static inline vsh_shade_stats shadows(const vsh_field *field, const vsh_light *light, int32_t method,
+                                      size_t count, const double *positions, const float *normals,
+                                      float *visible) {
+    return shadows_by(occluders_of(field), light, method, count, positions, normals, visible);
 }
 
 static inline float shadow_at(const vsh_field *field, const vsh_light *light, int32_t method,

@@ -149,16 +149,7 @@ static inline void caster_free(caster *c) {
 static inline vsh_shade_stats cast_shadows(const caster *c, const vsh_light *light, int32_t method,
                                            size_t count, const double *positions, const float *normals,
                                            float *visible) {
-    vsh_shade_options options = preview_options();
-    options.method = method;
-    const vsh_points points = {count, positions, normals, NULL};
-    vsh_shade_stats stats = vsh_shade_stats_zero();
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_shadow(occluders_of_caster(c), &points, light, &options, NULL, visible, NULL, &stats,
-                         &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
-    return stats;
+    return shadows_by(occluders_of_caster(c), light, method, count, positions, normals, visible);
 }
 
 static inline float cast_shadow_at(const caster *c, const vsh_light *light, int32_t method,
