@@ -4,7 +4,6 @@
  * the differentiable viewpoint", 1965). The sheet need be neither flat nor closed. */
 #include "mesh/sheet.h"
 
-#include "base/hash.h"
 #include "base/memory.h"
 #include "base/try.h"
 
@@ -42,59 +41,75 @@ double vshi_sheet_bytes(double vertex_count, double triangle_count) {
     return vertex_count * 3.0 * sizeof(float) + triangle_count * 6.0 * sizeof(uint32_t);
 }
 
-/* Edge k of triangle t is number 3 t + k. The table holds the first edge seen between two vertices, plus 1.
- */
-static void join_edge(vshi_sheet *sheet, uint64_t *slots, size_t capacity, size_t edge) {
-    const uint32_t *corners = sheet->corners + edge / 3 * 3;
+/* Edge k of triangle t is number 3 t + k: its vertices, the lower one first. */
+static void ends_of(const vshi_sheet *sheet, uint32_t edge, uint32_t ends[2]) {
+    const uint32_t *corners = sheet->corners + edge / 3 * (size_t)3;
     const uint32_t a = corners[edge % 3], b = corners[(edge + 1) % 3];
-    const uint32_t low = a < b ? a : b, high = a < b ? b : a;
-    if (a == b) {
-        return;
+    ends[0] = a < b ? a : b;
+    ends[1] = a < b ? b : a;
+}
+
+/* Sorts edges by one of their ends, and leaves those alike in order; `from` NULL: as they are numbered.
+ * Vertices near each other in a mesh mostly have numbers near each other, so that memory is gone through in
+ * order, which a hash table's is not. */
+static void sort_by_end(const vshi_sheet *sheet, int end, const uint32_t *from, uint32_t *first,
+                        uint32_t *sorted) {
+    const uint32_t count = (uint32_t)(3 * sheet->triangle_count);
+    uint32_t ends[2];
+    memset(first, 0, (sheet->vertex_count + 1) * sizeof *first);
+    for (uint32_t edge = 0; edge < count; ++edge) {
+        ends_of(sheet, edge, ends);
+        ++first[ends[end] + (size_t)1];
     }
-    size_t slot = (size_t)vshi_mix((uint64_t)low << 32 | high) & (capacity - 1);
-    for (; slots[slot] != 0; slot = (slot + 1) & (capacity - 1)) {
-        const size_t other = (size_t)((slots[slot] - 1) >> 2), met = (size_t)((slots[slot] - 1) & 3);
-        const uint32_t *held = sheet->corners + other / 3 * 3;
-        const uint32_t c = held[other % 3], d = held[(other + 1) % 3];
-        if ((c < d ? c : d) != low || (c < d ? d : c) != high) {
-            continue;
-        }
-        if (met == 1) {
-            sheet->neighbours[edge] = (uint32_t)(other / 3);
-            sheet->neighbours[other] = (uint32_t)(edge / 3);
-            ++slots[slot];
-        } else if (met == 2) { /* a third: none of them is joined */
-            const size_t second = 3 * (size_t)sheet->neighbours[other];
-            for (size_t k = 0; k < 3; ++k) {
-                if (sheet->neighbours[second + k] == other / 3) {
-                    sheet->neighbours[second + k] = VSHI_SHEET_BORDER;
-                }
+    for (size_t v = 0; v < sheet->vertex_count; ++v) {
+        first[v + 1] += first[v];
+    }
+    for (uint32_t i = 0; i < count; ++i) {
+        const uint32_t edge = from != NULL ? from[i] : i;
+        ends_of(sheet, edge, ends);
+        sorted[first[ends[end]]++] = edge;
+    }
+}
+
+/* Edges that are alone between their vertices are borders, and so are those where more than two meet. */
+static void join_edges(vshi_sheet *sheet, const uint32_t *sorted) {
+    const uint32_t count = (uint32_t)(3 * sheet->triangle_count);
+    for (uint32_t i = 0, next; i < count; i = next) {
+        uint32_t ends[2], other[2];
+        ends_of(sheet, sorted[i], ends);
+        for (next = i + 1; next < count; ++next) {
+            ends_of(sheet, sorted[next], other);
+            if (other[0] != ends[0] || other[1] != ends[1]) {
+                break;
             }
-            sheet->neighbours[other] = VSHI_SHEET_BORDER;
-            ++slots[slot];
         }
-        return;
+        if (next - i == 2 && ends[0] != ends[1]) {
+            sheet->neighbours[sorted[i]] = sorted[i + 1] / 3;
+            sheet->neighbours[sorted[i + 1]] = sorted[i] / 3;
+        }
     }
-    slots[slot] = ((uint64_t)edge << 2 | 1) + 1;
 }
 
 vsh_result vshi_sheet_join(vshi_sheet *sheet, vsh_error *error) {
+    const char *what = "triangles' neighbours";
     const size_t edges = 3 * sheet->triangle_count;
     if (edges == 0) {
         return VSH_OK;
     }
     memset(sheet->neighbours, 0xff, edges * sizeof *sheet->neighbours);
-    size_t capacity = 16;
-    while (capacity < edges + edges / 2) {
-        capacity *= 2;
-    }
-    uint64_t *slots;
-    VSHI_TRY(vshi_allocate((void **)&slots, capacity, sizeof *slots, "triangles' neighbours", error));
-    for (size_t edge = 0; edge < edges; ++edge) {
-        join_edge(sheet, slots, capacity, edge);
-    }
-    free(slots);
-    return VSH_OK;
+    uint32_t *first = NULL, *by_end = NULL, *sorted = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&first, sheet->vertex_count + 1, sizeof *first, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&by_end, edges, sizeof *by_end, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&sorted, edges, sizeof *sorted, what, error));
+    sort_by_end(sheet, 1, NULL, first, by_end);
+    sort_by_end(sheet, 0, by_end, first, sorted);
+    join_edges(sheet, sorted);
+done:
+    free(sorted);
+    free(by_end);
+    free(first);
+    return result;
 }
 
 /* --- cutting beams */

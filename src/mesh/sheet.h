@@ -29,8 +29,9 @@ typedef struct vshi_sheet_beam {
     double end;     /* may be infinite */
 } vshi_sheet_beam;
 
-/* Takes `vertex_count` vertices and `triangle_count` triangles, to be filled by the caller; vshi_sheet_join()
- * finds the neighbours afterwards. Errors: VSH_ERROR_MEMORY. */
+/* Takes `vertex_count` vertices and `triangle_count` triangles (at most VSHI_SHEET_TRIANGLES), to be filled
+ * by the caller; vshi_sheet_join() finds the neighbours afterwards. Errors: VSH_ERROR_MEMORY. */
+#define VSHI_SHEET_TRIANGLES (UINT32_MAX / 3) /* their edges are numbered */
 vsh_result vshi_sheet_allocate(vshi_sheet *sheet, size_t vertex_count, size_t triangle_count,
                                vsh_error *error);
 vsh_result vshi_sheet_join(vshi_sheet *sheet, vsh_error *error);

@@ -141,10 +141,10 @@ static vsh_result make_sheet(vsh_triangles *triangles, const vshi_mesh_set *set,
         most = meshes[m].vertex_count > most ? meshes[m].vertex_count : most;
         triangle_count += meshes[m].triangle_count - set->checked[m].report.degenerate_triangles;
     }
-    if (vertex_count > UINT32_MAX || triangle_count >= UINT32_MAX) {
+    if (vertex_count > UINT32_MAX || triangle_count > VSHI_SHEET_TRIANGLES) {
         return vshi_fail(error, VSH_ERROR_LIMIT,
-                         "triangles: %zu vertices and %zu triangles, at most 2^32 - 2", vertex_count,
-                         triangle_count);
+                         "triangles: %zu vertices and %zu triangles, at most %u and %u", vertex_count,
+                         triangle_count, UINT32_MAX, VSHI_SHEET_TRIANGLES);
     }
     vshi_sheet *sheet = &triangles->sheet;
     uint32_t *weld = NULL;

@@ -204,12 +204,52 @@ static void edges_of_three_triangles_are_borders(void **state) {
     vshi_sheet_free(&sheet);
 }
 
+/* What lies beyond an edge, by looking at all of them. */
+static uint32_t beyond(const vshi_sheet *sheet, size_t edge) {
+    const uint32_t *own = sheet->corners + edge / 3 * 3;
+    const uint32_t a = own[edge % 3], b = own[(edge + 1) % 3];
+    uint32_t found = VSHI_SHEET_BORDER;
+    size_t count = 0;
+    for (size_t other = 0; other < 3 * sheet->triangle_count; ++other) {
+        const uint32_t *corner = sheet->corners + other / 3 * 3;
+        const uint32_t c = corner[other % 3], d = corner[(other + 1) % 3];
+        if (other != edge && ((a == c && b == d) || (a == d && b == c))) {
+            found = (uint32_t)(other / 3);
+            ++count;
+        }
+    }
+    return count == 1 && a != b ? found : VSHI_SHEET_BORDER;
+}
+
+static void neighbours_are_those_of_exactly_two_triangles(void **state) {
+    (void)state;
+    enum { TRIANGLES = 60 };
+    uint64_t seed = 9;
+    size_t joined = 0;
+    /* from triangles that share most edges with many, folded and flat ones, too, to such that hardly meet */
+    for (uint32_t vertices = 4; vertices < 200; vertices += vertices / 4) {
+        vshi_sheet sheet;
+        assert_int_equal(vshi_sheet_allocate(&sheet, vertices, TRIANGLES, NULL), VSH_OK);
+        for (size_t i = 0; i < 3 * TRIANGLES; ++i) {
+            sheet.corners[i] = (uint32_t)(next_number(&seed) * vertices);
+        }
+        join(&sheet);
+        for (size_t edge = 0; edge < 3 * TRIANGLES; ++edge) {
+            assert_int_equal(sheet.neighbours[edge], beyond(&sheet, edge));
+            joined += sheet.neighbours[edge] != VSHI_SHEET_BORDER;
+        }
+        vshi_sheet_free(&sheet);
+    }
+    assert_true(joined > 100);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_cut_lets_no_ray_through),
         cmocka_unit_test(whole_sheets_cut_what_is_within_their_borders),
         cmocka_unit_test(solids_cut_beams_that_they_are_wider_than),
         cmocka_unit_test(edges_of_three_triangles_are_borders),
+        cmocka_unit_test(neighbours_are_those_of_exactly_two_triangles),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
