@@ -318,12 +318,16 @@ static vsh_result take(const vsh_mesh *mesh, vshi_edges *edges, finding *f, uint
     return VSH_OK;
 }
 
+vsh_result vshi_edges_check(const vsh_mesh *mesh, size_t index, vsh_error *error) {
+    return mesh->triangle_count <= UINT32_MAX / 3
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu triangles, %u at most",
+                           vshi_mesh_label(mesh, index).text, mesh->triangle_count, UINT32_MAX / 3);
+}
+
 vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, vshi_edges *edges, vsh_error *error) {
     *edges = (vshi_edges){0};
-    if (mesh->triangle_count > UINT32_MAX / 3) {
-        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu triangles, %u at most",
-                         vshi_mesh_label(mesh, index).text, mesh->triangle_count, UINT32_MAX / 3);
-    }
+    VSHI_TRY(vshi_edges_check(mesh, index, error));
     if (mesh->triangle_count == 0) {
         return VSH_OK;
     }

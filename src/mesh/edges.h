@@ -18,7 +18,10 @@ typedef struct vshi_edges {
     size_t open;       /* sides without a partner, but for those of triangles that are skipped */
 } vshi_edges;
 
-/* Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Free with vshi_edges_free(), after a failure too. */
+/* VSH_ERROR_LIMIT where a mesh has more triangles than edges can be numbered of. */
+vsh_result vshi_edges_check(const vsh_mesh *mesh, size_t index, vsh_error *error);
+
+/* Errors: of vshi_edges_check(), VSH_ERROR_MEMORY. Free with vshi_edges_free(), after a failure too. */
 vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, vshi_edges *edges, vsh_error *error);
 void vshi_edges_free(vshi_edges *edges);
 

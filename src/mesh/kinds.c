@@ -1,8 +1,10 @@
 /* What each component is for itself. */
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "base/try.h"
 #include "mesh/solidity_parts.h"
 
+#include <stdatomic.h>
 #include <stdlib.h>
 
 /* Of one that looks inwards: nothing is filled behind its faces but a thin wall, so that a room may lack a
@@ -177,7 +179,7 @@ static void decide(vshi_solidity *s, vshi_component *c, const measure *m) {
                 agreed && single;
 }
 
-static vsh_result find_of_whole(vshi_solidity *s, size_t whole, size_t *caps, vsh_error *error) {
+static vsh_result find_of_whole(vshi_solidity *s, size_t whole, size_t caps, vsh_error *error) {
     const vshi_components *found = &s->found[whole];
     closing k = {.mesh = &s->wholes.meshes[whole]};
     const size_t vertices = found->rim_count > 0 ? k.mesh->vertex_count : 0;
@@ -190,14 +192,14 @@ static vsh_result find_of_whole(vshi_solidity *s, size_t whole, size_t *caps, vs
         *c = (vshi_component){.whole = (uint32_t)whole,
                               .triangles = found->begin[i + 1] - found->begin[i],
                               .list = found->list + found->begin[i],
-                              .cap = s->caps != NULL ? (const vshi_vec(*)[3])(s->caps + *caps) : NULL};
+                              .cap = s->caps != NULL ? (const vshi_vec(*)[3])(s->caps + caps) : NULL};
         while (rim + c->open_edges < found->rim_count && found->rims[rim + c->open_edges].component == i) {
             ++c->open_edges;
         }
         if (c->open_edges > 0) { // where no edge is open there is no memory of them
-            c->holes = close_holes(&k, found->rims + rim, c->open_edges, s->caps + *caps, s->hole_of + *caps);
+            c->holes = close_holes(&k, found->rims + rim, c->open_edges, s->caps + caps, s->hole_of + caps);
             rim += c->open_edges;
-            *caps += c->open_edges;
+            caps += c->open_edges;
         }
         const measure m = measure_component(s, c);
         decide(s, c, &m);
@@ -209,10 +211,33 @@ done:
     return result;
 }
 
-vsh_result vshi_kinds_find(vshi_solidity *s, vsh_error *error) {
-    size_t caps = 0;
-    for (size_t m = 0; m < s->wholes.count; ++m) {
-        VSHI_TRY(find_of_whole(s, m, &caps, error));
+/* Wholes that are looked at, each for itself. */
+typedef struct telling {
+    vshi_solidity *s;
+    size_t *first_cap;      /* [wholes] */
+    _Atomic size_t refused; /* wholes whose memory was */
+} telling;
+
+/* A vshi_range_fn over wholes. */
+static void find_of_wholes(void *user, size_t begin, size_t end) {
+    telling *t = user;
+    for (size_t w = begin; w < end; ++w) {
+        if (find_of_whole(t->s, w, t->first_cap[w], NULL) != VSH_OK) {
+            atomic_fetch_add(&t->refused, 1);
+        }
     }
-    return VSH_OK;
+}
+
+vsh_result vshi_kinds_find(vshi_solidity *s, vshi_job *job, vsh_error *error) {
+    telling t = {.s = s};
+    VSHI_TRY(vshi_allocate((void **)&t.first_cap, s->wholes.count + 1, sizeof *t.first_cap, "holes", error));
+    for (size_t w = 0; w < s->wholes.count; ++w) {
+        t.first_cap[w + 1] = t.first_cap[w] + s->found[w].rim_count;
+    }
+    vsh_result result = vshi_parallel_for(job, s->wholes.count, 1, 0, find_of_wholes, &t, error);
+    if (result == VSH_OK && t.refused > 0) {
+        result = vshi_fail(error, VSH_ERROR_MEMORY, "holes: the system refused memory");
+    }
+    free(t.first_cap);
+    return result;
 }

@@ -3,10 +3,13 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "base/try.h"
+#include "mesh/edges.h"
 #include "mesh/mesh_set.h"
 #include "mesh/solidity_parts.h"
 
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -81,24 +84,45 @@ static const vshi_components *find_known(const vsh_mesh *meshes, const vshi_whol
                : NULL;
 }
 
-static vsh_result find_components(vshi_solidity *s, const vsh_mesh *meshes, vshi_job *job, vsh_error *error) {
-    for (size_t w = 0; w < s->wholes.count; ++w) {
-        const vshi_components *known = find_known(meshes, &s->wholes, w);
+/* Wholes that are looked at, each for itself. */
+typedef struct finding {
+    vshi_solidity *s;
+    const vsh_mesh *meshes;
+    _Atomic size_t refused; /* wholes whose memory was */
+} finding;
+
+/* A vshi_range_fn over wholes. */
+static void find_wholes(void *user, size_t begin, size_t end) {
+    finding *f = user;
+    vshi_solidity *s = f->s;
+    for (size_t w = begin; w < end; ++w) {
+        const vshi_components *known = find_known(f->meshes, &s->wholes, w);
         if (known != NULL) {
             s->found[w] = *known;
             s->lent[w] = true;
-        } else {
-            VSHI_TRY(vshi_components_find(&s->wholes.meshes[w], w, &s->found[w], error));
+        } else if (vshi_components_find(&s->wholes.meshes[w], w, &s->found[w], NULL) != VSH_OK) {
+            atomic_fetch_add(&f->refused, 1);
+            continue;
         }
         const size_t triangles = s->wholes.meshes[w].triangle_count;
         if (triangles > 0) {
             memcpy(s->turned + s->first_side[s->wholes.first[w]], s->found[w].turned, triangles);
         }
+    }
+}
+
+static vsh_result find_components(vshi_solidity *s, const vsh_mesh *meshes, vshi_job *job, vsh_error *error) {
+    finding f = {.s = s, .meshes = meshes};
+    for (size_t w = 0; w < s->wholes.count; ++w) {
+        VSHI_TRY(vshi_edges_check(&s->wholes.meshes[w], w, error));
+    }
+    VSHI_TRY(vshi_parallel_for(job, s->wholes.count, 1, 1, find_wholes, &f, error));
+    if (f.refused > 0) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "what is solid: the system refused memory");
+    }
+    for (size_t w = 0; w < s->wholes.count; ++w) {
         s->first[w + 1] = s->first[w] + s->found[w].count;
         s->cap_count += s->found[w].rim_count;
-        if (vshi_job_advance(job, 1)) {
-            return vshi_job_fail_cancelled(job, error);
-        }
     }
     s->count = s->first[s->wholes.count];
     return VSH_OK;
@@ -109,7 +133,7 @@ static vsh_result find(vshi_solidity *s, const vsh_mesh *meshes, vshi_job *job, 
     VSHI_TRY(vshi_allocate((void **)&s->components, s->count, sizeof *s->components, "components", error));
     VSHI_TRY(vshi_allocate((void **)&s->caps, s->cap_count, sizeof *s->caps, "holes", error));
     VSHI_TRY(vshi_allocate((void **)&s->hole_of, s->cap_count, sizeof *s->hole_of, "holes", error));
-    VSHI_TRY(vshi_kinds_find(s, error));
+    VSHI_TRY(vshi_kinds_find(s, job, error));
     VSHI_TRY(vshi_standing_find(s, job, error));
     VSHI_TRY(vshi_rooms_find(s, error));
     set_sides(s);

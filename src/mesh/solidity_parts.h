@@ -32,7 +32,7 @@ static inline uint8_t *vshi_solidity_turned(const vshi_solidity *s, const vshi_c
 }
 
 /* Measures all components, closes their holes, and tells sheets, solids and walls apart, each for itself. */
-vsh_result vshi_kinds_find(vshi_solidity *solidity, vsh_error *error);
+vsh_result vshi_kinds_find(vshi_solidity *solidity, vshi_job *job, vsh_error *error);
 
 /* Turns what encloses something to face the other way. */
 void vshi_component_turn(vshi_solidity *solidity, vshi_component *component);
