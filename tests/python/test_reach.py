@@ -335,10 +335,17 @@ class Reach(Case):
         tiles = v.Tiles(scene, 30.0)
         self.assertEqual([t.info.receivers for t in tiles], [1, 1])
         self.assertLess(tiles[1].info.objects, tiles[-1].info.all_objects)
+        done, texels = v.ReportSum(), 0
         for tile, whole in zip(tiles, scene.bake()):
-            (own,) = tile.bake()
+            job = v.BakeJob(tile, arrays=True)
+            (own,) = job.bake()
+            done.add(job)
+            texels += job.report.texels
             self.assertEqual(own.told.output, whole.told.output)
             self.assertLess(abs(own["shadow.sun"] - whole["shadow.sun"]).mean(), 0.002)
+        self.assertEqual(done.told.texels, texels)
+        self.assertGreater(texels, job.report.texels)
+        self.assertEqual(len(done.told.errors), 3)
         self.assertRaises(IndexError, tiles.__getitem__, 2)
         self.assertRaises(v.ArgumentError, v.Tiles, scene, 0.0)
         self.assertRaises(TypeError, v.Tiles, cloister, 1.0)
