@@ -116,8 +116,8 @@ typedef struct vsh_bake_job vsh_bake_job;
 VSH_API vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_error *error);
 
 /* Loads the scene's files and finds its lightmaps. Scene, options and what they point to must outlive the
- * job. Errors: as vsh_assets_load() and vsh_receiver_check(); VSH_ERROR_ARGUMENT (a pointer NULL, options,
- * run; no receivers). */
+ * job. Errors: as vsh_assets_load(), vsh_receiver_check() and, of assets, vsh_lit_check_uvs();
+ * VSH_ERROR_ARGUMENT (a pointer NULL, options, run; no receivers). */
 VSH_API vsh_result vsh_bake_job_create(const vsh_scene *scene, const vsh_bake_job_options *options,
                                        const vsh_run *run, vsh_bake_job **job, vsh_error *error);
 VSH_API void vsh_bake_job_free(vsh_bake_job *job); /* NULL does nothing */
