@@ -69,7 +69,8 @@ typedef struct vsh_bake_job_options {
                               bake of the same scene with the same settings. Needs files as outputs */
     const char *invalid_picture; /* PNG of the texels that are not valid, for each lightmap: where there are
                                     several, FILE.OUTPUT.png, of pages of an asset with the number or the
-                                    object. NULL: none. Not with `resume` */
+                                    object; of outputs of one name FILE.OUTPUT-2.png and so on from the
+                                    second. NULL: none. Not with `resume` */
     const vsh_row_sink *sink; /* NULL: image files at the receivers' outputs, which say where they come from
                                  (vsh_provenance); where an output's name ends in .glb, .gltf or .obj, the
                                  receiver's file with its light (vsh_lit_write()): AO as occlusion, irradiance

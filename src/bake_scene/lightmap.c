@@ -257,26 +257,6 @@ static vsh_result bake_bands(vshi_lightmap_work *w, vsh_error *error) {
     }
 }
 
-/* Images have names of their own, pages of an asset do not. */
-static vsh_result open_picture(vshi_lightmap_work *w, int32_t rows, vsh_error *error) {
-    const vsh_bake_job *job = w->job;
-    const vsh_receiver *receiver = &w->target->receiver;
-    const char *path = job->options.invalid_picture;
-    if (path == NULL) {
-        return VSH_OK;
-    }
-    char *name = vsh_lit_is_output(receiver->output)
-                     ? vshi_target_file(w->target, vsh_assets_receiver_pages(job->assets, w->target->index),
-                                        receiver->output)
-                     : strdup(receiver->output != NULL ? receiver->output : "");
-    const vsh_result result = name != NULL
-                                  ? vshi_invalid_picture_open(&w->picture, path, name, job->targets.count > 1,
-                                                              receiver->width, receiver->height, rows, error)
-                                  : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
-    free(name);
-    return result;
-}
-
 /* Memory, files, and what was kept. */
 static vsh_result open_all(vshi_lightmap_work *w, vsh_error *error) {
     const vsh_bake_job *job = w->job;
@@ -298,7 +278,8 @@ static vsh_result open_all(vshi_lightmap_work *w, vsh_error *error) {
         VSHI_TRY(vshi_allocate((void **)&w->channels.known, texels, sizeof *w->channels.known,
                                receiver->output, error));
     }
-    VSHI_TRY(open_picture(w, rows, error));
+    VSHI_TRY(
+        vshi_invalid_picture_open(&w->picture, job, (size_t)(w->target - job->targets.list), rows, error));
     if (job->options.resume) {
         const vshi_bands *bands = &w->input.bands;
         vshi_resume_key key = {.image = &w->channels.image,
