@@ -7,7 +7,7 @@
 
 static const char key[] = "vdbshade_uv_sets";
 
-/* Of the images of a page, as bits 1 << VSH_LIT_…; of no page: those that every page has. */
+/* Of the images of a page, as bits 1 << VSH_LIT_…. */
 static uint32_t purposes_of(const vshi_lit_work *work, uint32_t page) {
     uint32_t purposes = 0;
     for (size_t i = 0; i < work->options->image_count; ++i) {
@@ -17,7 +17,7 @@ static uint32_t purposes_of(const vshi_lit_work *work, uint32_t page) {
     return purposes;
 }
 
-/* The purposes that all pages of a mesh have. */
+/* Those that all pages of a mesh have. */
 static uint32_t purposes_of_mesh(const vshi_lit_work *work, const vsh_lit_mesh *mesh) {
     const uint32_t only = vshi_lit_only_page(work, mesh);
     if (only != VSH_LIT_NO_CHART) {
@@ -124,12 +124,15 @@ static bool is_replaceable(const vshi_lit_work *work, const json_t *primitive, s
 
 /* --- sets that were made */
 
+static const json_t *made_sets(const json_t *primitive) {
+    return json_object_get(json_object_get(primitive, "extras"), key);
+}
+
 /* Whether the file says that a set was made. */
 static bool is_made(const json_t *primitive, size_t set) {
-    const json_t *list = json_object_get(json_object_get(primitive, "extras"), key);
     size_t i;
     json_t *number;
-    json_array_foreach(list, i, number) {
+    json_array_foreach(made_sets(primitive), i, number) {
         if (json_is_integer(number) && json_integer_value(number) == (json_int_t)set) {
             return true;
         }
@@ -189,7 +192,7 @@ vsh_result vshi_lit_check_set(const vshi_lit_document *document, const char *whe
 
 vsh_result vshi_lit_choose_set(const vshi_lit_work *work, json_t *primitive, const vsh_lit_mesh *mesh,
                                const char *where, size_t *set, vsh_error *error) {
-    const uint32_t purposes = purposes_of_mesh(work, mesh);
+    const uint32_t purposes = made_sets(primitive) != NULL ? purposes_of_mesh(work, mesh) : 0;
     size_t count = count_sets(json_object_get(primitive, "attributes"));
     *set = 0;
     while (*set < count && !(is_made(primitive, *set) && is_replaceable(work, primitive, *set, purposes))) {
