@@ -303,16 +303,23 @@ class Reach(Case):
         kept = file[0]
         self.assertSame(file.field(0).sample(at), kept.field.sample(at))
         self.assertEqual(kept.field.info.active_voxels, report.active_voxels)
-        v.field_file_write(self.folder / "own.field", [kept, v.KeptField(v.Field(v.Grid.from_sdf(v.Sdf("sphere"), voxel_size=0.1)), "ball",
-                                                                         origin={"shape": "sphere"})], attributes={"a": "b"})
+        ball = v.Grid.from_sdf(v.Sdf("sphere"), voxel_size=0.1)
+        v.field_file_write(self.folder / "own.field", [kept, v.KeptField(v.Field(ball), "ball", origin={"shape": "sphere"},
+                                                                         band=v.Voxels.from_grid(ball))], attributes={"a": "b"})
         with v.FieldFile(self.folder / "own.field") as own:
             self.assertEqual([(k.name, k.origin) for k in own], [(kept.name, kept.origin), ("ball", {"shape": "sphere"})])
             self.assertSame(own.field(1).sample([[0, 0, 0.95]]), own[1].field.sample([[0, 0, 0.95]]))
             self.assertRaises(IndexError, own.field, 2)
+            own_band = own.band(1)
+        self.assertEqual((kept.band, kept.band_bytes > 0, own_band.info.count), (None, True, v.Voxels.from_grid(ball).info.count))
         used = scene()
         used.use_field(file)
+        assets = v.Assets(used)
+        bands = [file.band(0), assets.field_band(), assets.field_band(3.0), v.Voxels.from_grid(v.Assets(made).casters())]
+        self.assertEqual(len({(b.info.count, tuple(b.info.index_min), b.centre(3, 4, 5)) for b in bands}), 1)
+        self.assertRaises(v.InputError, file.band, 0, 2.0)
         file.close()
-        del file, kept
+        del file, kept, assets
         gc.collect()
         (with_file,), (without,) = used.bake(), scene().bake()
         for name in without:
