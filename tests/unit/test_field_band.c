@@ -60,10 +60,16 @@ static void the_band_of_a_file_is_that_of_the_level_set(void **state) {
 
 static void a_band_that_is_not_kept_is_told_and_one_of_other_casters_refused(void **state) {
     (void)state;
-    static const double low[3] = {-1, -1, -1}, high[3] = {1, 1, 1};
+    double low[3], high[3]; /* on the lattice of the level set, but no band */
     vsh_kept_field kept = vsh_kept_field_default();
-    vsh_grid *other = kept_grid(0.9 * VOXEL);
-    vsh_field *field = field_of_grid(kept_grid(VOXEL), 0.3);
+    vsh_grid *other = kept_grid(0.9 * VOXEL), *grid = kept_grid(VOXEL);
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    for (int axis = 0; axis < 3; ++axis) {
+        low[axis] = info.transform[4 * axis + 3] - 0.5 * VOXEL;
+        high[axis] = low[axis] + 4.0 * VOXEL;
+    }
+    vsh_field *field = field_of_grid(grid, 0.3);
     vsh_voxels *box, *finer = band_of(other), *band = NULL;
     assert_int_equal(vsh_voxels_from_box(low, high, VOXEL, NULL, &box, &why), VSH_OK);
     const vsh_voxels *const bands[] = {box, finer};
