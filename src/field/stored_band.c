@@ -125,8 +125,13 @@ vsh_result vsh_field_file_band(const vsh_field_file *file, size_t index, double 
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "band: the system refused memory");
     }
-    const vsh_result result = vshi_job_cancelled(job) ? vshi_job_fail_cancelled(job, error)
-                                                      : take_band(file, index, &full, voxels, error);
+    vsh_result result = vshi_job_cancelled(job) ? vshi_job_fail_cancelled(job, error)
+                                                : take_band(file, index, &full, voxels, error);
+    if (result == VSH_OK && vshi_job_advance(job, 1)) {
+        vsh_voxels_free(*voxels);
+        *voxels = NULL;
+        result = vshi_job_fail_cancelled(job, error);
+    }
     vshi_job_end(job);
     return result;
 }

@@ -55,9 +55,13 @@ same() {
     untouched v.vdb
 }
 
-@test "the band of a .vdb that turns, mirrors and scales is kept to the bit" {
+@test "the band of a .vdb is kept to the bit, in its own voxels, moved and scaled" {
     shade voxelize box.obj --resolution 24 -o box.vdb --quiet
     done_well
+    shade field box.vdb -o box.field --quiet # in its own voxels
+    done_well
+    same vdb box.field volume box.vdb --sun 1,2,3
+    same vdb box.field volume box.vdb --sun 1,2,3 --box 0,0,0,1,1,1
     cat >t.json <<'JSON'
 {"casters": [{"vdb": "box.vdb"}],
  "lights": [{"name": "sun", "type": "directional", "direction": [0.3, 1, 0.2], "angle_deg": 6}]}
