@@ -130,6 +130,11 @@ static void write_rows(void *user, size_t begin, size_t end) {
     creation *all = user;
     const vshi_charts *sorted = &all->charts->sorted;
     for (size_t row = begin; row < end; ++row) {
+        const size_t *start = all->texels != NULL ? all->texels->row_start + row : NULL;
+        all->boxes[row] = (box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+        if (start != NULL && start[0] == start[1]) {
+            continue;
+        }
         vshi_row work;
         const vsh_result result = vshi_row_open(sorted, all->first + row, &work, NULL);
         if (result != VSH_OK) {
@@ -137,11 +142,7 @@ static void write_rows(void *user, size_t begin, size_t end) {
             vshi_row_close(&work);
             continue;
         }
-        writer w = {.all = all,
-                    .work = &work,
-                    .box = &all->boxes[row],
-                    .next = all->texels != NULL ? all->texels->row_start[row] : 0};
-        *w.box = (box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+        writer w = {.all = all, .work = &work, .box = &all->boxes[row], .next = start != NULL ? *start : 0};
         for (size_t column = 0; column < work.tiles; ++column) {
             if (work.tile_start[column] != work.tile_start[column + 1]) {
                 vshi_row_tile(sorted, &work, column, NULL);
@@ -222,8 +223,10 @@ static vsh_result make_band(const vsh_charts *charts, const vsh_run *run, vsh_te
         vshi_allocate((void **)&texels->row_start, rows + 1, sizeof *texels->row_start, "texels", error));
     for (size_t row = 0; row < rows; ++row) {
         const vshi_tile_row *counted = &charts->rows[band->held_begin + row];
-        const bool own = band->held_begin + row >= band->own_begin && band->held_begin + row < band->own_end;
-        texels->row_start[row + 1] = texels->row_start[row] + counted->samples;
+        const size_t at = band->held_begin + row;
+        const bool own = at >= band->own_begin && at < band->own_end;
+        const bool laid = at >= band->laid_begin && at < band->laid_end;
+        texels->row_start[row + 1] = texels->row_start[row] + (laid ? counted->samples : 0);
         texels->info.covered += own ? counted->texels : 0;
         texels->info.samples += own ? counted->samples : 0;
     }
@@ -244,17 +247,18 @@ done:
     return result;
 }
 
-static vsh_result create(const vsh_charts *charts, int32_t first_row, int32_t rows, bool part,
+static vsh_result create(const vsh_charts *charts, int32_t first_row, int32_t rows, const vshi_ao_cut *cut,
                          const vsh_run *run, vsh_texels **texels, vsh_error *error) {
     vshi_band band;
     vsh_texels *made = NULL;
-    VSHI_TRY(vshi_band_set(charts, first_row, rows, part, &band, error));
+    VSHI_TRY(vshi_band_set(charts, first_row, rows, cut, &band, error));
     VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "texels", error));
     made->band = band;
+    made->cut = cut != NULL ? *cut : (vshi_ao_cut){.spacing = 1};
     made->info.width = charts->info.width;
     made->info.height = charts->info.height;
     made->padding = charts->padding;
-    made->fills = charts->fills && rows == charts->info.height && !part;
+    made->fills = charts->fills && rows == charts->info.height && cut == NULL;
     made->ao_spacing = charts->ao_spacing;
     made->shade = charts->shade;
     made->whole = charts->info.samples;
@@ -276,16 +280,17 @@ vsh_result vsh_texels_create_band(const vsh_charts *charts, int32_t first_row, i
     VSHI_NEEDS(charts);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    return create(charts, first_row, rows, false, &full, texels, error);
+    return create(charts, first_row, rows, NULL, &full, texels, error);
 }
 
 vsh_result vshi_texels_create_part(const vsh_charts *charts, int32_t first_row, int32_t rows,
-                                   const vsh_run *run, vsh_texels **texels, vsh_error *error) {
+                                   const vshi_ao_cut *cut, const vsh_run *run, vsh_texels **texels,
+                                   vsh_error *error) {
     VSHI_FLOATS;
     *texels = NULL;
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    return create(charts, first_row, rows, true, &full, texels, error);
+    return create(charts, first_row, rows, cut, &full, texels, error);
 }
 
 vsh_result vsh_texels_create_sized(const vsh_mesh *meshes, size_t mesh_count,
