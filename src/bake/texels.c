@@ -20,6 +20,7 @@ typedef struct creation {
     size_t first;                  /* tile row */
     vsh_texels *texels;            /* NULL: only the boxes are found */
     box *boxes;                    /* [tile rows]; NULL: they are not asked for */
+    const double (*within)[3];     /* low, high: tiles whose samples lie in it are left out; NULL: none are */
     _Atomic vsh_result row_result; /* of the rows that failed */
 } creation;
 
@@ -126,6 +127,17 @@ static void write_tile(writer *w) {
     }
 }
 
+/* Whether all samples of a tile lie in the box that is left out. */
+static bool is_within(const creation *all, const vshi_row *work, size_t column) {
+    bool within = all->within != NULL;
+    for (size_t i = work->tile_start[column]; within && i < work->tile_start[column + 1]; ++i) {
+        const uint32_t slot = work->tile_triangle[i];
+        within = vshi_surface_is_within(&all->charts->sorted.meshes[work->mesh[slot]], work->local[slot],
+                                        all->within[0], all->within[1]);
+    }
+    return within;
+}
+
 static void write_rows(void *user, size_t begin, size_t end) {
     creation *all = user;
     const vshi_charts *sorted = &all->charts->sorted;
@@ -144,7 +156,7 @@ static void write_rows(void *user, size_t begin, size_t end) {
         }
         writer w = {.all = all, .work = &work, .box = &all->boxes[row], .next = start != NULL ? *start : 0};
         for (size_t column = 0; column < work.tiles; ++column) {
-            if (work.tile_start[column] != work.tile_start[column + 1]) {
+            if (work.tile_start[column] != work.tile_start[column + 1] && !is_within(all, &work, column)) {
                 vshi_row_tile(sorted, &work, column, NULL);
                 write_tile(&w);
             }
@@ -171,17 +183,29 @@ done:
     return result;
 }
 
-/* Box of the boxes begin … end - 1; zeros where there are no samples. */
-static void join(const box *boxes, size_t begin, size_t end, double low[3], double high[3]) {
+/* Box of the boxes begin … end - 1, empty where there are no samples, or zeros. */
+static void join(const box *boxes, size_t begin, size_t end, bool zeros, double low[3], double high[3]) {
     for (int k = 0; k < 3; ++k) {
         double least = INFINITY, most = -INFINITY;
         for (size_t row = begin; row < end; ++row) {
             least = fmin(least, boxes[row].low[k]);
             most = fmax(most, boxes[row].high[k]);
         }
-        low[k] = least <= most ? least : 0.0;
-        high[k] = least <= most ? most : 0.0;
+        low[k] = zeros && least > most ? 0.0 : least;
+        high[k] = zeros && least > most ? 0.0 : most;
     }
+}
+
+vsh_result vshi_charts_bounds_beyond(const vsh_charts *charts, const double (*within)[3], const vsh_run *run,
+                                     double low[3], double high[3], vsh_error *error) {
+    creation all = {.charts = charts, .within = within};
+    const size_t rows = charts->sorted.rows;
+    vsh_result result;
+    VSHI_TRY_DONE(rasterise(&all, rows, run, error));
+    join(all.boxes, 0, rows, within == NULL, low, high);
+done:
+    free(all.boxes);
+    return result;
 }
 
 vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, double bounds_min[3],
@@ -192,14 +216,7 @@ vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, doubl
     VSHI_NEEDS(bounds_max);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    creation all = {.charts = charts};
-    const size_t rows = charts->sorted.rows;
-    vsh_result result;
-    VSHI_TRY_DONE(rasterise(&all, rows, &full, error));
-    join(all.boxes, 0, rows, bounds_min, bounds_max);
-done:
-    free(all.boxes);
-    return result;
+    return vshi_charts_bounds_beyond(charts, NULL, &full, bounds_min, bounds_max, error);
 }
 
 static vsh_result take_samples(vsh_texels *texels, bool tangents, vsh_error *error) {
@@ -240,7 +257,7 @@ static vsh_result make_band(const vsh_charts *charts, const vsh_run *run, vsh_te
     VSHI_TRY(take_samples(texels, charts->tangents, error));
     vsh_result result;
     VSHI_TRY_DONE(rasterise(&all, rows, run, error));
-    join(all.boxes, band->own_begin - band->held_begin, band->own_end - band->held_begin,
+    join(all.boxes, band->own_begin - band->held_begin, band->own_end - band->held_begin, true,
          texels->info.bounds_min, texels->info.bounds_max);
 done:
     free(all.boxes);
