@@ -69,7 +69,8 @@ typedef struct vsh_bake_job_options {
                               bake of the same scene with the same settings. Needs files as outputs */
     const char *invalid_picture; /* PNG of the texels that are not valid, for each lightmap: where there are
                                     several, FILE.OUTPUT.png, of pages of an asset with the number or the
-                                    object. NULL: none. Not with `resume` */
+                                    object; of outputs of one name FILE.OUTPUT-2.png and so on from the
+                                    second. NULL: none. Not with `resume` */
     const vsh_row_sink *sink; /* NULL: image files at the receivers' outputs, which say where they come from
                                  (vsh_provenance); where an output's name ends in .glb, .gltf or .obj, the
                                  receiver's file with its light (vsh_lit_write()): AO as occlusion, irradiance
@@ -116,8 +117,8 @@ typedef struct vsh_bake_job vsh_bake_job;
 VSH_API vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_error *error);
 
 /* Loads the scene's files and finds its lightmaps. Scene, options and what they point to must outlive the
- * job. Errors: as vsh_assets_load() and vsh_receiver_check(); VSH_ERROR_ARGUMENT (a pointer NULL, options,
- * run; no receivers). */
+ * job. Errors: as vsh_assets_load(), vsh_receiver_check() and, of assets, vsh_lit_check_uvs();
+ * VSH_ERROR_ARGUMENT (a pointer NULL, options, run; no receivers). */
 VSH_API vsh_result vsh_bake_job_create(const vsh_scene *scene, const vsh_bake_job_options *options,
                                        const vsh_run *run, vsh_bake_job **job, vsh_error *error);
 VSH_API void vsh_bake_job_free(vsh_bake_job *job); /* NULL does nothing */
@@ -178,6 +179,19 @@ VSH_API void vsh_bake_job_get_report_sized(const vsh_bake_job *job, vsh_bake_rep
                                            size_t report_size);
 static inline void vsh_bake_job_get_report(const vsh_bake_job *job, vsh_bake_report *report) {
     vsh_bake_job_get_report_sized(job, report, sizeof *report);
+}
+
+/* Adds to `sum`, which is all zeros at first, what another job of as many lights did, for those who bake a
+ * scene by several, one after the other: tiles. Counts, seconds and square errors add up and of worst errors
+ * there is the worst; of `occluders` bytes, voxels and bricks are those of the job that had most of each, as
+ * none outlives its job, its seconds add up, and all else is that of `more`. Errors are added to
+ * errors[more->error_count] of the caller's, zeros at first, which become those of `sum`; NULL: they are left
+ * out. Errors of the call: VSH_ERROR_ARGUMENT (sum or more NULL; both have errors, of different counts). */
+VSH_API vsh_result vsh_bake_report_add_sized(vsh_bake_report *sum, const vsh_bake_report *more,
+                                             size_t report_size, vsh_bake_error *errors, vsh_error *error);
+static inline vsh_result vsh_bake_report_add(vsh_bake_report *sum, const vsh_bake_report *more,
+                                             vsh_bake_error *errors, vsh_error *error) {
+    return vsh_bake_report_add_sized(sum, more, sizeof *sum, errors, error);
 }
 
 /* All of it: vsh_bake_job_create(), …_measure(), …_prepare() and …_run(). `report` (may be NULL) is filled on

@@ -3,6 +3,7 @@
 #define VDBSHADE_FIELD_FILE_H
 
 #include "field.h"
+#include "voxels.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -18,10 +19,14 @@ typedef struct vsh_kept_field {
     uint64_t grid_bytes;    /* 0: not known */
     const vsh_attribute *origin; /* [origin_count]: what shaped it, in words of whoever wrote the file */
     size_t origin_count;
+    const vsh_voxels *band; /* of that level set all of its band, as vsh_voxels_from_grid() makes it with a
+                               band of 0; NULL: it is not kept, and of a file: vsh_field_file_band() */
+    uint64_t band_bytes;    /* of a file: that its band takes there, 0: it keeps none. Not read where it is
+                               written */
 } vsh_kept_field;
 
 static inline vsh_kept_field vsh_kept_field_default(void) {
-    vsh_kept_field field = {sizeof(vsh_kept_field), "", NULL, 3.0, 0, NULL, 0};
+    vsh_kept_field field = {sizeof(vsh_kept_field), "", NULL, 3.0, 0, NULL, 0, NULL, 0};
     return field;
 }
 
@@ -29,7 +34,8 @@ static inline vsh_kept_field vsh_kept_field_default(void) {
  * be NULL where that is 0). It is of this version of the library and of no other. The same fields give the
  * same bytes. Atomic: written beside `path` and renamed. Errors:
  * - VSH_ERROR_ARGUMENT: path empty, no fields, more than 1024, a field NULL, one that holds nothing or knows
- *   no distances, names or attributes other than said here and in vsh_attribute, run;
+ *   no distances, a band that is no level set's or another's, names or attributes other than said here and
+ *   in vsh_attribute, run;
  * - VSH_ERROR_LIMIT: run->memory_limit, by what the fields take; texts of more than 64 MiB;
  * - VSH_ERROR_WRITE: no such folder, no permission, a folder or device in the way, disk full;
  * - VSH_ERROR_UNSUPPORTED: a machine that is not little-endian;
@@ -83,6 +89,20 @@ static inline void vsh_field_file_get(const vsh_field_file *file, size_t index, 
 VSH_API vsh_result vsh_field_file_field(const vsh_field_file *file, size_t index,
                                         const vsh_field_options *options, const vsh_run *run,
                                         vsh_field **field, vsh_error *error);
+
+/* The voxels of the band of the level set that field `index` was made from, as vsh_voxels_from_grid() makes
+ * them of it, bit by bit: all of it (`band` 0, or its half width). They need neither file nor field. Free
+ * with vsh_voxels_free(). Errors:
+ * - VSH_ERROR_ARGUMENT: a pointer NULL, an index beyond the file's, a band that is negative, not finite or
+ *   wider than the level set's, run;
+ * - VSH_ERROR_INPUT: the file keeps no band of this field, or is asked for a narrower one, which distances
+ *   of 16 bits cannot tell;
+ * - VSH_ERROR_READ: damaged;
+ * - VSH_ERROR_LIMIT: run->memory_limit, or the machine's memory;
+ * - VSH_ERROR_UNSUPPORTED: the module of level sets cannot be loaded;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_field_file_band(const vsh_field_file *file, size_t index, double band,
+                                       const vsh_run *run, vsh_voxels **voxels, vsh_error *error);
 
 #ifdef __cplusplus
 }

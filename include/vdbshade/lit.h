@@ -90,13 +90,14 @@ static inline vsh_lit_options vsh_lit_options_default(void) {
 /* Writes `output`, a .glb, .gltf or .obj by its ending.
  *
  * Where `path` is a .glb or .gltf, that document with all that it holds, known or not: each primitive that
- * has uvs gets them as its first free TEXCOORD_n; vertices are doubled only where the atlas splits them, and
- * then all attributes and morph targets of the primitive, byte by byte; primitives on several pages become
- * several; meshes that several nodes use, and instances of EXT_mesh_gpu_instancing, become meshes and nodes
- * of their own where their UVs differ, and share all accessors that do not. Primitives under Draco that
- * change are written as they are without it. Images and buffers that the file names beside it stay named
- * where output stands in its folder, else they come along in the buffer. A .gltf has its buffer beside it as
- * OUT.bin.
+ * has uvs gets them as its first free TEXCOORD_n, or in place of a set that an earlier call made, which its
+ * extras tell ("vdbshade_uv_sets") and which no texture that stays is in; vertices are doubled only where the
+ * atlas splits them, and then all attributes and morph targets of the primitive, byte by byte; primitives on
+ * several pages become several; meshes that several nodes use, and instances of EXT_mesh_gpu_instancing,
+ * become meshes and nodes of their own where their UVs differ, and share all accessors that do not.
+ * Primitives under Draco that change are written as they are without it. Images and buffers that the file
+ * names beside it stay named where output stands in its folder, else they come along in the buffer. A .gltf
+ * has its buffer beside it as OUT.bin.
  *
  * Of other formats, and where path is NULL, a document is made of the model: a node for each object with its
  * transform, positions, normals, the first set of UVs and the new one, white materials.
@@ -116,11 +117,19 @@ static inline vsh_lit_options vsh_lit_options_default(void) {
  * OUT.mtl that is not ours;
  * - VSH_ERROR_INPUT: a document that is not well formed, or not the model's;
  * - VSH_ERROR_READ: as vsh_model_read(); a buffer that is short or missing;
- * - VSH_ERROR_LIMIT: run->memory_limit; a GLB of 4 GiB or more;
+ * - VSH_ERROR_LIMIT: run->memory_limit; a GLB of 4 GiB or more; as vsh_lit_check_uvs();
  * - VSH_ERROR_WRITE, VSH_ERROR_UNSUPPORTED, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_lit_write(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
                                  const vsh_lit_options *options, const char *output, const vsh_run *run,
                                  vsh_error *error);
+
+/* Whether every mesh that has uvs has room for them in what vsh_lit_write() would make of `path`, a .glb or
+ * .gltf, for those who light by images that take long to bake: arguments as there, but that of images only
+ * purpose and page are read. Files none of whose meshes has VSH_MAX_UV_SETS sets are not opened. Errors:
+ * VSH_ERROR_LIMIT (a primitive with so many, none of which the new one replaces), VSH_ERROR_ARGUMENT (model
+ * or meshes NULL, options, a mesh, an image, run), VSH_ERROR_INPUT, VSH_ERROR_READ, VSH_ERROR_MEMORY. */
+VSH_API vsh_result vsh_lit_check_uvs(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
+                                     const vsh_lit_options *options, const vsh_run *run, vsh_error *error);
 
 /* Whether the ending of `path` is that of a file that vsh_lit_write() writes: 1 or 0, which NULL is too. */
 VSH_API int32_t vsh_lit_is_output(const char *path);

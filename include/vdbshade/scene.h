@@ -455,6 +455,17 @@ static inline vsh_result vsh_scene_save_field(const vsh_scene *scene, const vsh_
     return vsh_scene_save_field_sized(scene, assets, path, options, run, report, sizeof *report, error);
 }
 
+/* The voxels of the band of the scene's casters, bit by bit those of vsh_voxels_from_grid() with `band` and
+ * the level set that vsh_scene_casters() makes, out of scene->field: no voxel is made. `assets` are those
+ * loaded for this scene. Free with vsh_voxels_free(). Errors:
+ * - VSH_ERROR_ARGUMENT: scene, assets or voxels NULL, a scene that takes no field, a band that is none, run;
+ * - VSH_ERROR_INPUT: a scene with layers, each of which has a field of its own; a scene->field that is stale;
+ *   a band narrower than the level set's, and one that was not kept;
+ * - VSH_ERROR_READ, VSH_ERROR_LIMIT, VSH_ERROR_UNSUPPORTED, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED: as
+ *   vsh_field_file_band(). */
+VSH_API vsh_result vsh_scene_field_band(const vsh_scene *scene, const vsh_assets *assets, double band,
+                                        const vsh_run *run, vsh_voxels **voxels, vsh_error *error);
+
 /* What vsh_scene_save_field() will take, found out by fields of 96 voxels, or where the casters' own voxels
  * are taken by those themselves; nothing is written. Times may be half or twice as much. Errors: as there. */
 VSH_API vsh_result vsh_scene_field_forecast_sized(const vsh_scene *scene, const vsh_assets *assets,

@@ -38,9 +38,9 @@ typedef struct vsh_tile vsh_tile;
  * - of .vdb casters the leaves in a box around those rays and the cones around them;
  * - every other caster.
  * So a tile's values are the whole scene's to within the error asked for: but for that tenth, for voxels
- * where none are named by their size, and for rounding, as rays are traced relative to the middle of what
- * casts. The tiles must outlive it. Free it with vsh_tile_free(). Errors: VSH_ERROR_ARGUMENT (a pointer NULL,
- * no such tile), VSH_ERROR_MEMORY. */
+ * where none are named by their size, and for how far off their surfaces rays begin, which goes by the
+ * size of what casts, as a float's rounding does. The tiles must outlive it. Free it with vsh_tile_free().
+ * Errors: VSH_ERROR_ARGUMENT (a pointer NULL, no such tile), VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_tile_create(const vsh_tiles *tiles, size_t index, vsh_tile **tile, vsh_error *error);
 VSH_API void vsh_tile_free(vsh_tile *tile); /* NULL does nothing */
 

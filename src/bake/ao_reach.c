@@ -82,6 +82,17 @@ static void mark_wider(vshi_ao_reach *reach, int32_t spacing) {
     }
 }
 
+void vshi_ao_reach_own(vshi_ao_reach *reach, int32_t spacing, size_t begin, size_t end) {
+    for (size_t row = begin; row < end; ++row) {
+        for (size_t column = 0; column < reach->columns; ++column) {
+            for (int32_t s = 1; s <= spacing; s *= 2) {
+                mark(reach, s, TILE * column, TILE * row);
+            }
+        }
+    }
+    mark_wider(reach, spacing);
+}
+
 bool vshi_ao_reach_further(vshi_ao_reach *reach, const vshi_ao_share *share) {
     const int32_t most = REACH * share->spacing;
     bool any = false;

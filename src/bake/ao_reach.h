@@ -23,6 +23,10 @@ static inline bool vshi_ao_is_estimated(const vshi_ao_reach *reach, int32_t row)
  * which are the fewer rows beside those wanted the finer a lattice is. */
 void vshi_ao_reach_first(vshi_ao_reach *reach, int32_t spacing);
 
+/* Adds those whose tiles shoot for rows of tiles begin … end - 1 alone, whatever is beside them: rays and
+ * levels of their texels are then those of the whole lightmap. */
+void vshi_ao_reach_own(vshi_ao_reach *reach, int32_t spacing, size_t begin, size_t end);
+
 /* Once those have shot: windows over a wide lattice also take in its texels that were left to finer ones.
  * Sets the lattices that are to shoot for these, and no others; false where there are none. */
 bool vshi_ao_reach_further(vshi_ao_reach *reach, const vshi_ao_share *share);

@@ -3,13 +3,17 @@
 #ifndef VSHI_BAKE_AO_TEXELS_H
 #define VSHI_BAKE_AO_TEXELS_H
 
+#include "bake/ao_cut.h"
 #include "bake/origins.h"
 
-/* As vshi_lattice_ao(), of methods by rays that keep an error. */
+/* As vshi_lattice_ao(), of methods by rays that keep an error. With `shots` [rows that are kept of the band's
+ * own][width] the texels' cut leaves rows, whose values are 0 but for those that are known without rays: what
+ * is kept of them is set, but for what holds it against the casters. */
 vsh_result vshi_ao_texels(const vsh_occluders *occluders, const vsh_texels *texels,
                           const vshi_origins *origins, const vsh_points *points,
-                          const vsh_shade_options *options, const vsh_run *run, float *values,
-                          float *deviation, float *bent, vsh_shade_stats *stats, vsh_error *error);
+                          const vsh_shade_options *options, const vsh_run *run, vshi_ao_shot *shots,
+                          float *values, float *deviation, float *bent, vsh_shade_stats *stats,
+                          vsh_error *error);
 
 /* Bytes that it takes at most for so many samples in so many texels, beside the origins. */
 double vshi_ao_texels_bytes(double samples, int32_t width, int32_t rows, int32_t threads, bool bent);

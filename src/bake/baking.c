@@ -14,10 +14,14 @@
 
 /* Whether AO need not be shaded at every texel. `rays` are for those who want just them, taps cost no more;
  * what is near in a layer is not looked at. */
-bool vshi_baking_interpolates(const vshi_baking *bake) {
-    const int32_t method = bake->shade.ao_method;
-    return bake->texels->ao_spacing > 1 && !bake->layered_ao &&
+static bool interpolates(const vsh_shade_options *shade, int32_t spacing, bool layered_ao) {
+    const int32_t method = shade->ao_method;
+    return spacing > 1 && !layered_ao &&
            (method == VSH_AO_CONES || (vsh_ao_method_traits(method) & VSH_METHOD_KEEPS_ERROR) != 0);
+}
+
+bool vshi_baking_interpolates(const vshi_baking *bake) {
+    return interpolates(&bake->shade, bake->texels->ao_spacing, bake->layered_ao);
 }
 
 bool vshi_baking_traces_shadow(const vshi_baking *bake) {
@@ -28,11 +32,15 @@ bool vshi_baking_traces_ao(const vshi_baking *bake) {
     return vshi_ao_traces(&bake->shade, bake->occluders->triangles);
 }
 
-bool vshi_baking_shares(const vshi_baking *bake) {
-    const vsh_occluders *occluders = bake->occluders;
-    const int32_t method = vsh_ao_method_resolve(bake->shade.ao_method, occluders->triangles != NULL);
-    return vshi_baking_interpolates(bake) &&
+bool vshi_ao_is_shared(const vsh_occluders *occluders, const vsh_shade_options *shade, int32_t spacing,
+                       bool layered_ao) {
+    const int32_t method = vsh_ao_method_resolve(shade->ao_method, occluders->triangles != NULL);
+    return interpolates(shade, spacing, layered_ao) &&
            (method == VSH_AO_EXACT || (method == VSH_AO_ADAPTIVE && occluders->field->surface != NULL));
+}
+
+bool vshi_baking_shares(const vshi_baking *bake) {
+    return vshi_ao_is_shared(bake->occluders, &bake->shade, bake->texels->ao_spacing, bake->layered_ao);
 }
 
 /* Where rays begin: lifted already, but for methods that trace triangles. Those know the surface better than
@@ -137,9 +145,11 @@ vsh_result vshi_baking_open(vshi_baking *bake, const vsh_shade_options *options,
         return vshi_shade_ao(occluders, &points, &bake->origins.rows, &shade, &bake->run, bake->values,
                              deviation, bent, NULL, &bake->stats.shade, error);
     }
-    return (vshi_baking_shares(bake) ? vshi_ao_texels : vshi_lattice_ao)(
-        occluders, bake->texels, &bake->origins, &points, &shade, &bake->run, bake->values, deviation, bent,
-        &bake->stats.shade, error);
+    return vshi_baking_shares(bake)
+               ? vshi_ao_texels(occluders, bake->texels, &bake->origins, &points, &shade, &bake->run,
+                                bake->shots, bake->values, deviation, bent, &bake->stats.shade, error)
+               : vshi_lattice_ao(occluders, bake->texels, &bake->origins, &points, &shade, &bake->run,
+                                 bake->values, deviation, bent, &bake->stats.shade, error);
 }
 
 vsh_result vshi_bake_ao(vshi_baking *bake, vsh_error *error) {
@@ -203,8 +213,10 @@ static vsh_result hold_channel(vshi_baking *bake, size_t channel, const float *v
                                vsh_error *error) {
     const vsh_light *light = channel < bake->light_count ? &bake->lights[channel] : NULL;
     const vsh_shade_options options = channel > bake->light_count ? vshi_baking_sky(bake) : bake->shade;
-    return vshi_field_error_add(&bake->held, light, &options, values, filled, &bake->quiet,
-                                &bake->stats.errors[channel], error);
+    const vshi_field_error_left left = {&bake->texels->cut, bake->shots};
+    const bool leaves = channel == bake->light_count && bake->shots != NULL;
+    return vshi_field_error_add(&bake->held, light, &options, values, filled, leaves ? &left : NULL,
+                                &bake->quiet, &bake->stats.errors[channel], error);
 }
 
 vsh_result vshi_baking_add_error(vshi_baking *bake, size_t channel, double square, vsh_error *error) {

@@ -23,6 +23,7 @@ typedef struct vshi_baking {
     vshi_spread spread;
     uint8_t *state;       /* [rows held][width]: VSHI_TEXEL_… */
     uint32_t *known;      /* [own rows][width]: VSHI_PART_…, of a part; NULL: it is padded, too */
+    vshi_ao_shot *shots;  /* [own rows that are kept][width], of a part that leaves AO; else NULL */
     float *values;        /* [origins.count]: of one light, or AO */
     float *deviation;     /* [origins.count]: of the same; NULL where no plane is for it */
     float *irradiance;    /* [origins.count][3] */
@@ -78,5 +79,9 @@ bool vshi_baking_traces_ao(const vshi_baking *bake);
 /* Whether AO need not be shaded at every texel; whether texels share its rays then. */
 bool vshi_baking_interpolates(const vshi_baking *bake);
 bool vshi_baking_shares(const vshi_baking *bake);
+
+/* The same by what casts and resolved options, of texels this far apart. */
+bool vshi_ao_is_shared(const vsh_occluders *occluders, const vsh_shade_options *shade, int32_t spacing,
+                       bool layered_ao);
 
 #endif

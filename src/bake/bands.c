@@ -20,8 +20,7 @@
 
 enum {
     MAX_PADDING = 4096,
-    AUTO_PADDING = 16, /* texels: half of the gap between charts that four mip levels keep apart, and more */
-    LEAST_BESIDE = VSHI_SPREAD_REACH /* texels beside a band: invalid ones may be filled from as far */
+    AUTO_PADDING = 16 /* texels: half of the gap between charts that four mip levels keep apart, and more */
 };
 
 static vsh_result check_range(int32_t value, int32_t low, int32_t high, const char *name, vsh_error *error) {
@@ -354,35 +353,6 @@ void vsh_charts_get_info_sized(const vsh_charts *charts, vsh_charts_info *info, 
 
 /* --- bands */
 
-vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t rows, bool part,
-                         vshi_band *band, vsh_error *error) {
-    const int32_t height = charts->info.height;
-    if (first_row < 0 || first_row >= height || first_row % VSH_BAND_STEP != 0) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "band from row %d: expected a multiple of %d below %d",
-                         first_row, VSH_BAND_STEP, height);
-    }
-    if (rows < 1 || rows > height - first_row || (rows % VSH_BAND_STEP != 0 && rows != height - first_row)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "band of %d rows from row %d: expected a multiple of %d, or the %d that are left",
-                         rows, first_row, VSH_BAND_STEP, height - first_row);
-    }
-    const size_t tile = VSHI_TILE, all = charts->sorted.rows;
-    const size_t reach = (size_t)(charts->padding > LEAST_BESIDE ? charts->padding : LEAST_BESIDE);
-    const size_t beside = part ? 0 : (reach + tile - 1) / tile;
-    band->own_first = first_row;
-    band->own_rows = rows;
-    band->own_begin = (size_t)first_row / tile;
-    band->own_end = ((size_t)first_row + (size_t)rows + tile - 1) / tile;
-    band->held_begin = band->own_begin > beside ? band->own_begin - beside : 0;
-    band->held_end = all - band->own_end > beside ? band->own_end + beside : all;
-    if (charts->ao_spacing > 1) {
-        vshi_ao_rows(charts->ao_spacing, all, &band->held_begin, &band->held_end);
-    }
-    band->first = (int32_t)(band->held_begin * tile);
-    band->rows = (band->held_end == all ? height : (int32_t)(band->held_end * tile)) - band->first;
-    return VSH_OK;
-}
-
 double vshi_bake_bytes(const vshi_bake_need *need) {
     const double texels = (double)need->width * need->rows;
     double sample = vshi_origins_sample_bytes(need->traced);
@@ -409,11 +379,11 @@ static double floats_of(const vsh_lightmap *planes, size_t light_count) {
     return (double)floats;
 }
 
-uint64_t vshi_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows, bool part,
-                                const vsh_lightmap *lightmap, size_t light_count) {
+uint64_t vshi_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows,
+                                const vshi_ao_cut *cut, const vsh_lightmap *lightmap, size_t light_count) {
     vshi_band band;
     if (charts == NULL || lightmap == NULL ||
-        vshi_band_set(charts, first_row, rows, part, &band, NULL) != VSH_OK) {
+        vshi_band_set(charts, first_row, rows, cut, &band, NULL) != VSH_OK) {
         return 0;
     }
     const double width = charts->info.width;
@@ -431,8 +401,8 @@ uint64_t vshi_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int
                            .tint = lightmap->tint != NULL,
                            .lattice = charts->ao_spacing > 1 && !vshi_ao_traces(&shade, NULL),
                            .windows = charts->ao_spacing > 1 && keeps_error,
-                           .fills = charts->fills && rows == charts->info.height && !part};
-    for (size_t row = band.held_begin; row < band.held_end; ++row) {
+                           .fills = charts->fills && rows == charts->info.height && cut == NULL};
+    for (size_t row = band.laid_begin; row < band.laid_end; ++row) {
         need.samples += (double)charts->rows[row].samples;
     }
     const bool beside = band.rows > rows;
@@ -444,5 +414,5 @@ uint64_t vshi_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int
 
 uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows,
                                const vsh_lightmap *lightmap, size_t light_count) {
-    return vshi_charts_band_bytes(charts, first_row, rows, false, lightmap, light_count);
+    return vshi_charts_band_bytes(charts, first_row, rows, NULL, lightmap, light_count);
 }

@@ -88,6 +88,11 @@ static bool texel_at(const closeness *c, double x, double y, uint64_t *texel) {
     return true;
 }
 
+/* Where a texel's list begins: neighbours along a row are mostly near each other in memory. */
+static uint32_t *head_of(const closeness *c, uint64_t texel) {
+    return &c->heads[(vshi_mix(texel / 16) * 16 + texel % 16) & (c->head_count - 1)];
+}
+
 static void put_borders(closeness *c) {
     memset(c->heads, 0xff, c->head_count * sizeof *c->heads);
     for (uint32_t b = 0; b < c->border_count; ++b) {
@@ -98,7 +103,7 @@ static void put_borders(closeness *c) {
             uint64_t texel;
             step_to(&c->borders[b], s, steps, &x, &y);
             if (texel_at(c, x, y, &texel) && texel != last) {
-                uint32_t *head = &c->heads[vshi_mix(texel) & (c->head_count - 1)];
+                uint32_t *head = head_of(c, texel);
                 c->passings[c->passing_count] = (passing){texel, b, *head};
                 *head = (uint32_t)c->passing_count++;
                 last = texel;
@@ -115,20 +120,22 @@ static double distance_to(const border *b, double x, double y) {
     return sqrt(px * px + py * py);
 }
 
-/* How near another chart's border is to a place; 1 where none is within a texel. */
-static double nearest_other(const closeness *c, uint32_t chart, double x, double y) {
+/* How near another chart's border is to a place; 1 where none is within a texel. *alone: none passes the
+ * texels around it, wherever in its own the place is. */
+static double nearest_other(const closeness *c, uint32_t chart, double x, double y, bool *alone) {
     double nearest = 1.0;
+    *alone = true;
     for (int dy = -1; dy <= 1; ++dy) {
         for (int dx = -1; dx <= 1; ++dx) {
             uint64_t texel;
-            if (!texel_at(c, x + dx, y + dy, &texel)) {
+            if (!texel_at(c, floor(x) + dx, floor(y) + dy, &texel)) {
                 continue;
             }
-            uint32_t p = c->heads[vshi_mix(texel) & (c->head_count - 1)];
-            for (; p != NONE; p = c->passings[p].next) {
+            for (uint32_t p = *head_of(c, texel); p != NONE; p = c->passings[p].next) {
                 const border *b = &c->borders[c->passings[p].border];
                 if (c->passings[p].texel == texel && b->chart != chart) {
                     nearest = fmin(nearest, distance_to(b, x, y));
+                    *alone = false;
                 }
             }
         }
@@ -137,6 +144,8 @@ static double nearest_other(const closeness *c, uint32_t chart, double x, double
 }
 
 static void measure(const closeness *c, uint64_t *by_mesh, vsh_closeness *found) {
+    uint64_t free_texel = UINT64_MAX; /* around which no other chart than free_chart is */
+    uint32_t free_chart = 0;
     for (uint32_t b = 0; b < c->border_count; ++b) {
         const border *own = &c->borders[b];
         const size_t steps = steps_of(own);
@@ -145,10 +154,15 @@ static void measure(const closeness *c, uint64_t *by_mesh, vsh_closeness *found)
             double x, y;
             uint64_t texel;
             step_to(own, s, steps, &x, &y);
-            if (!texel_at(c, x, y, &texel)) {
+            if (!texel_at(c, x, y, &texel) || (texel == free_texel && own->chart == free_chart)) {
                 continue;
             }
-            const double gap = nearest_other(c, own->chart, x, y);
+            bool alone;
+            const double gap = nearest_other(c, own->chart, x, y, &alone);
+            if (alone) {
+                free_texel = texel;
+                free_chart = own->chart;
+            }
             if (gap < 1.0) {
                 found->gap = fmin(found->gap, gap);
                 found->texels += texel != last;

@@ -14,6 +14,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/try.h"
+#include "shade/ao.h"
 #include "shade/inside.h"
 #include "trace/embree.h"
 
@@ -216,7 +217,46 @@ typedef struct holding {
     vshi_lift_light light;
     vshi_vec up;
     const float *values, *filled; /* one of them is NULL */
+    const vshi_field_error_left *left;
 } holding;
+
+/* What is kept of a sample whose value is not known yet; NULL: it is. */
+static vshi_ao_shot *left_of(const holding *h, const vshi_field_error_sample *s) {
+    const vshi_field_error_left *left = h->left;
+    const vsh_texels *texels = h->share->texels;
+    const uint32_t texel = texels->texel[s->sample];
+    const int32_t row = (int32_t)vsh_texel_row(texel), first = texels->band.own_first;
+    if (left == NULL || !s->counts || s->packed == NONE || !vshi_ao_cut_leaves(left->cut, row / VSHI_TILE)) {
+        return NULL;
+    }
+    const int32_t at = vshi_ao_cut_kept(left->cut, row) - vshi_ao_cut_kept(left->cut, first);
+    vshi_ao_shot *shot =
+        left->shots + (size_t)at * (size_t)texels->info.width + (size_t)vsh_texel_column(texel);
+    return shot->level != VSHI_AO_KNOWN_LEVEL ? shot : NULL;
+}
+
+/* Rays to the casters, to be held against the value later. */
+static void keep(const holding *h, const vshi_field_error_sample *s, const double position[3],
+                 vshi_ao_shot *shot) {
+    const vsh_texels *texels = h->share->texels;
+    int32_t free[2], even;
+    if (vshi_truth_count(&h->truth, position, texels->normal + 3 * s->sample,
+                         (uint32_t)vshi_sample_place(texels, s->sample), free, &even)) {
+        shot->held[0] = s->weight | (even == VSHI_TRUTH_EVEN_HIDDEN ? VSHI_AO_EVEN_HIDDEN
+                                     : even == VSHI_TRUTH_EVEN_FREE ? VSHI_AO_EVEN_FREE
+                                                                    : 0);
+        shot->held[1] = (uint32_t)free[0] | (uint32_t)free[1] << 16;
+    }
+}
+
+static int32_t rays_of(double max_error) {
+    return max_error < FINE ? FINE_RAYS : RAYS;
+}
+
+/* A square by its weight. */
+static double weighed(double weight, double square) {
+    return rint(weight * square / UNIT) * UNIT;
+}
 
 static void hold(void *user, size_t begin, size_t end) {
     const holding *h = user;
@@ -226,13 +266,18 @@ static void hold(void *user, size_t begin, size_t end) {
         const vshi_vec p = vshi_lift_place(texels, &h->light, s->sample, s->dropped);
         const double position[3] = {p.x, p.y, p.z};
         double value = NAN, seen[2];
+        vshi_ao_shot *left = left_of(h, s);
+        h->share->square[k] = NAN;
+        if (left != NULL) {
+            keep(h, s, position, left);
+            continue;
+        }
         if (s->counts && s->packed != NONE && h->values != NULL) {
             value = (double)h->values[s->packed];
         }
         if (s->counts && s->packed == NONE && h->filled != NULL) {
             value = (double)h->filled[s->filled];
         }
-        h->share->square[k] = NAN;
         if (!isnan(value) && vshi_truth_twice(&h->truth, position, texels->normal + 3 * s->sample,
                                               (uint32_t)vshi_sample_place(texels, s->sample), value, seen)) {
             h->share->square[k] = (value - seen[0]) * (value - seen[1]);
@@ -242,19 +287,21 @@ static void hold(void *user, size_t begin, size_t end) {
 
 vsh_result vshi_field_error_add(vshi_field_error *share, const vsh_light *light,
                                 const vsh_shade_options *options, const float *values, const float *filled,
-                                const vsh_run *run, vsh_bake_error *sum, vsh_error *error) {
+                                const vshi_field_error_left *left, const vsh_run *run, vsh_bake_error *sum,
+                                vsh_error *error) {
     holding h = {.share = share,
                  .truth = share->truth,
                  .light = vshi_lift_light_of(light),
                  .up = vshi_vec_of(options->ao_up),
                  .values = values,
-                 .filled = filled};
+                 .filled = filled,
+                 .left = left};
     const bool one_ray = light != NULL && vshi_light_is_point(&h.light.place);
     h.truth.light = light;
     h.truth.place = h.light.place;
     h.truth.distance = options->ao_distance;
     h.truth.up = vshi_dot(h.up, h.up) > 0.0 ? &h.up : NULL;
-    h.truth.rays = one_ray ? 1 : options->max_error < FINE ? FINE_RAYS : RAYS;
+    h.truth.rays = one_ray ? 1 : rays_of(options->max_error);
     vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, h.truth.rays, 0);
     if (sampler == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "error of the field: the system refused memory");
@@ -268,12 +315,29 @@ vsh_result vshi_field_error_add(vshi_field_error *share, const vsh_light *light,
         if (!isnan(share->square[k])) {
             const double weight = share->samples[k].weight;
             held += weight;
-            square += rint(weight * share->square[k] / UNIT) * UNIT;
+            square += weighed(weight, share->square[k]);
         }
     }
     sum->held += held;
     sum->held_square_error += square;
     return VSH_OK;
+}
+
+bool vshi_field_error_settle(const vshi_ao_shot *shot, double max_error, double value, vsh_bake_error *sum) {
+    const int32_t rays = rays_of(max_error);
+    const double weight = shot->held[0] & VSHI_AO_HELD_WEIGHT;
+    const int32_t free[2] = {(int32_t)(shot->held[1] & 0xffff), (int32_t)(shot->held[1] >> 16)};
+    const int32_t even = (shot->held[0] & VSHI_AO_EVEN_HIDDEN) != 0 ? VSHI_TRUTH_EVEN_HIDDEN
+                         : (shot->held[0] & VSHI_AO_EVEN_FREE) != 0 ? VSHI_TRUTH_EVEN_FREE
+                                                                    : VSHI_TRUTH_UNEVEN;
+    double seen[2];
+    if (free[0] > rays || free[1] > rays) {
+        return false;
+    }
+    vshi_truth_settle(rays, free, even, value, seen);
+    sum->held += weight;
+    sum->held_square_error += weighed(weight, (value - seen[0]) * (value - seen[1]));
+    return true;
 }
 
 double vsh_bake_error_rmse(const vsh_bake_error *e) {

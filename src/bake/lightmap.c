@@ -74,7 +74,7 @@ static vsh_result find_needed(void *user, const vshi_origins *origins, uint8_t *
         taken[row] = taken[row] || (at + near >= band->own_begin && at < band->own_end + near);
     }
     const bool shared = vshi_baking_interpolates(bake) && needs(bake, NEEDS_ANY_AO);
-    memset(rows, VSHI_ROW_LEFT_OUT, count);
+    memset(rows, bake->shots != NULL ? VSHI_ROW_BESIDE : VSHI_ROW_LEFT_OUT, count);
     for (size_t row = 0; row < count; ++row) {
         size_t begin = row + band->held_begin, end = begin + 1;
         if (shared) {
@@ -305,7 +305,7 @@ static vsh_result check(const vsh_lightmap *lightmap, const vsh_texels *texels, 
 static vsh_result bake_texels(const vsh_occluders *occluders, const vsh_texels *texels,
                               const vsh_light *lights, size_t light_count, const vsh_shade_options *options,
                               const vsh_run *run, const vsh_lightmap *lightmap, uint32_t *known,
-                              vsh_bake_stats *stats, vsh_error *error) {
+                              vshi_ao_shot *shots, vsh_bake_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(occluders);
     VSHI_NEEDS(texels);
@@ -317,6 +317,7 @@ static vsh_result bake_texels(const vsh_occluders *occluders, const vsh_texels *
                         .light_count = light_count,
                         .lightmap = lightmap,
                         .known = known,
+                        .shots = shots,
                         .needs = vshi_planes_need(lightmap, light_count),
                         .stats = vsh_bake_stats_zero()};
     VSHI_TRY(vshi_shade_options_resolve(options != NULL ? options : &texels->shade, &bake.shade, error));
@@ -342,13 +343,15 @@ vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_texels *t
                              const vsh_light *lights, size_t light_count, const vsh_shade_options *options,
                              const vsh_run *run, const vsh_lightmap *lightmap, vsh_bake_stats *stats,
                              vsh_error *error) {
-    return bake_texels(occluders, texels, lights, light_count, options, run, lightmap, NULL, stats, error);
+    return bake_texels(occluders, texels, lights, light_count, options, run, lightmap, NULL, NULL, stats,
+                       error);
 }
 
 vsh_result vshi_bake_part(const vsh_occluders *occluders, const vsh_texels *texels, const vsh_light *lights,
                           size_t light_count, const vsh_shade_options *options, const vsh_run *run,
-                          const vsh_lightmap *lightmap, uint32_t *known, vsh_bake_stats *stats,
-                          vsh_error *error) {
+                          const vsh_lightmap *lightmap, uint32_t *known, vshi_ao_shot *shots,
+                          vsh_bake_stats *stats, vsh_error *error) {
     VSHI_NEEDS(known);
-    return bake_texels(occluders, texels, lights, light_count, options, run, lightmap, known, stats, error);
+    return bake_texels(occluders, texels, lights, light_count, options, run, lightmap, known, shots, stats,
+                       error);
 }

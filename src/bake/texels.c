@@ -20,6 +20,7 @@ typedef struct creation {
     size_t first;                  /* tile row */
     vsh_texels *texels;            /* NULL: only the boxes are found */
     box *boxes;                    /* [tile rows]; NULL: they are not asked for */
+    const double (*within)[3];     /* low, high: tiles whose samples lie in it are left out; NULL: none are */
     _Atomic vsh_result row_result; /* of the rows that failed */
 } creation;
 
@@ -126,10 +127,26 @@ static void write_tile(writer *w) {
     }
 }
 
+/* Whether all samples of a tile lie in the box that is left out. */
+static bool is_within(const creation *all, const vshi_row *work, size_t column) {
+    bool within = all->within != NULL;
+    for (size_t i = work->tile_start[column]; within && i < work->tile_start[column + 1]; ++i) {
+        const uint32_t slot = work->tile_triangle[i];
+        within = vshi_surface_is_within(&all->charts->sorted.meshes[work->mesh[slot]], work->local[slot],
+                                        all->within[0], all->within[1]);
+    }
+    return within;
+}
+
 static void write_rows(void *user, size_t begin, size_t end) {
     creation *all = user;
     const vshi_charts *sorted = &all->charts->sorted;
     for (size_t row = begin; row < end; ++row) {
+        const size_t *start = all->texels != NULL ? all->texels->row_start + row : NULL;
+        all->boxes[row] = (box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+        if (start != NULL && start[0] == start[1]) {
+            continue;
+        }
         vshi_row work;
         const vsh_result result = vshi_row_open(sorted, all->first + row, &work, NULL);
         if (result != VSH_OK) {
@@ -137,13 +154,9 @@ static void write_rows(void *user, size_t begin, size_t end) {
             vshi_row_close(&work);
             continue;
         }
-        writer w = {.all = all,
-                    .work = &work,
-                    .box = &all->boxes[row],
-                    .next = all->texels != NULL ? all->texels->row_start[row] : 0};
-        *w.box = (box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+        writer w = {.all = all, .work = &work, .box = &all->boxes[row], .next = start != NULL ? *start : 0};
         for (size_t column = 0; column < work.tiles; ++column) {
-            if (work.tile_start[column] != work.tile_start[column + 1]) {
+            if (work.tile_start[column] != work.tile_start[column + 1] && !is_within(all, &work, column)) {
                 vshi_row_tile(sorted, &work, column, NULL);
                 write_tile(&w);
             }
@@ -170,17 +183,29 @@ done:
     return result;
 }
 
-/* Box of the boxes begin … end - 1; zeros where there are no samples. */
-static void join(const box *boxes, size_t begin, size_t end, double low[3], double high[3]) {
+/* Box of the boxes begin … end - 1, empty where there are no samples, or zeros. */
+static void join(const box *boxes, size_t begin, size_t end, bool zeros, double low[3], double high[3]) {
     for (int k = 0; k < 3; ++k) {
         double least = INFINITY, most = -INFINITY;
         for (size_t row = begin; row < end; ++row) {
             least = fmin(least, boxes[row].low[k]);
             most = fmax(most, boxes[row].high[k]);
         }
-        low[k] = least <= most ? least : 0.0;
-        high[k] = least <= most ? most : 0.0;
+        low[k] = zeros && least > most ? 0.0 : least;
+        high[k] = zeros && least > most ? 0.0 : most;
     }
+}
+
+vsh_result vshi_charts_bounds_beyond(const vsh_charts *charts, const double (*within)[3], const vsh_run *run,
+                                     double low[3], double high[3], vsh_error *error) {
+    creation all = {.charts = charts, .within = within};
+    const size_t rows = charts->sorted.rows;
+    vsh_result result;
+    VSHI_TRY_DONE(rasterise(&all, rows, run, error));
+    join(all.boxes, 0, rows, within == NULL, low, high);
+done:
+    free(all.boxes);
+    return result;
 }
 
 vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, double bounds_min[3],
@@ -191,14 +216,7 @@ vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, doubl
     VSHI_NEEDS(bounds_max);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    creation all = {.charts = charts};
-    const size_t rows = charts->sorted.rows;
-    vsh_result result;
-    VSHI_TRY_DONE(rasterise(&all, rows, &full, error));
-    join(all.boxes, 0, rows, bounds_min, bounds_max);
-done:
-    free(all.boxes);
-    return result;
+    return vshi_charts_bounds_beyond(charts, NULL, &full, bounds_min, bounds_max, error);
 }
 
 static vsh_result take_samples(vsh_texels *texels, bool tangents, vsh_error *error) {
@@ -222,8 +240,10 @@ static vsh_result make_band(const vsh_charts *charts, const vsh_run *run, vsh_te
         vshi_allocate((void **)&texels->row_start, rows + 1, sizeof *texels->row_start, "texels", error));
     for (size_t row = 0; row < rows; ++row) {
         const vshi_tile_row *counted = &charts->rows[band->held_begin + row];
-        const bool own = band->held_begin + row >= band->own_begin && band->held_begin + row < band->own_end;
-        texels->row_start[row + 1] = texels->row_start[row] + counted->samples;
+        const size_t at = band->held_begin + row;
+        const bool own = at >= band->own_begin && at < band->own_end;
+        const bool laid = at >= band->laid_begin && at < band->laid_end;
+        texels->row_start[row + 1] = texels->row_start[row] + (laid ? counted->samples : 0);
         texels->info.covered += own ? counted->texels : 0;
         texels->info.samples += own ? counted->samples : 0;
     }
@@ -237,24 +257,25 @@ static vsh_result make_band(const vsh_charts *charts, const vsh_run *run, vsh_te
     VSHI_TRY(take_samples(texels, charts->tangents, error));
     vsh_result result;
     VSHI_TRY_DONE(rasterise(&all, rows, run, error));
-    join(all.boxes, band->own_begin - band->held_begin, band->own_end - band->held_begin,
+    join(all.boxes, band->own_begin - band->held_begin, band->own_end - band->held_begin, true,
          texels->info.bounds_min, texels->info.bounds_max);
 done:
     free(all.boxes);
     return result;
 }
 
-static vsh_result create(const vsh_charts *charts, int32_t first_row, int32_t rows, bool part,
+static vsh_result create(const vsh_charts *charts, int32_t first_row, int32_t rows, const vshi_ao_cut *cut,
                          const vsh_run *run, vsh_texels **texels, vsh_error *error) {
     vshi_band band;
     vsh_texels *made = NULL;
-    VSHI_TRY(vshi_band_set(charts, first_row, rows, part, &band, error));
+    VSHI_TRY(vshi_band_set(charts, first_row, rows, cut, &band, error));
     VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "texels", error));
     made->band = band;
+    made->cut = cut != NULL ? *cut : (vshi_ao_cut){.spacing = 1};
     made->info.width = charts->info.width;
     made->info.height = charts->info.height;
     made->padding = charts->padding;
-    made->fills = charts->fills && rows == charts->info.height && !part;
+    made->fills = charts->fills && rows == charts->info.height && cut == NULL;
     made->ao_spacing = charts->ao_spacing;
     made->shade = charts->shade;
     made->whole = charts->info.samples;
@@ -276,16 +297,17 @@ vsh_result vsh_texels_create_band(const vsh_charts *charts, int32_t first_row, i
     VSHI_NEEDS(charts);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    return create(charts, first_row, rows, false, &full, texels, error);
+    return create(charts, first_row, rows, NULL, &full, texels, error);
 }
 
 vsh_result vshi_texels_create_part(const vsh_charts *charts, int32_t first_row, int32_t rows,
-                                   const vsh_run *run, vsh_texels **texels, vsh_error *error) {
+                                   const vshi_ao_cut *cut, const vsh_run *run, vsh_texels **texels,
+                                   vsh_error *error) {
     VSHI_FLOATS;
     *texels = NULL;
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    return create(charts, first_row, rows, true, &full, texels, error);
+    return create(charts, first_row, rows, cut, &full, texels, error);
 }
 
 vsh_result vsh_texels_create_sized(const vsh_mesh *meshes, size_t mesh_count,

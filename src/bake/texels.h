@@ -2,6 +2,7 @@
 #ifndef VSHI_BAKE_TEXELS_H
 #define VSHI_BAKE_TEXELS_H
 
+#include "bake/ao_cut.h"
 #include "bake/charts.h"
 #include "shade/shade.h"
 
@@ -44,22 +45,29 @@ vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh
 vsh_result vshi_texels_create_sparse(const vsh_charts *charts, int32_t step, const vsh_run *run,
                                      vsh_texels **texels, vsh_error *error);
 
+/* vsh_charts_bounds() of the samples that may lie beyond a box, within[0] … within[1]: empty (low > high)
+ * where there are none. NULL: of all, and zeros. */
+vsh_result vshi_charts_bounds_beyond(const vsh_charts *charts, const double (*within)[3], const vsh_run *run,
+                                     double low[3], double high[3], vsh_error *error);
+
 /* Rows of texels that a band holds: its own, those beside it that its padding is copied from, and those below
  * them that their AO is interpolated from. */
 typedef struct vshi_band {
     size_t own_begin, own_end;   /* tile rows */
     size_t held_begin, held_end; /* the same */
+    size_t laid_begin, laid_end; /* of those, the ones that have samples */
     int32_t own_first, own_rows; /* rows of texels */
     int32_t first, rows;         /* the same, held */
 } vshi_band;
 
-/* `part`: rows of a part (bake/part.h), which hold none to copy from. Errors: VSH_ERROR_ARGUMENT. */
-vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t rows, bool part,
+/* `cut`: of a part that the rows are of (bake/part.h), which hold none to copy from; NULL: of none. Errors:
+ * VSH_ERROR_ARGUMENT. */
+vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t rows, const vshi_ao_cut *cut,
                          vshi_band *band, vsh_error *error);
 
 /* vsh_charts_band_bytes(), of rows of a part too. */
-uint64_t vshi_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows, bool part,
-                                const vsh_lightmap *lightmap, size_t light_count);
+uint64_t vshi_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows,
+                                const vshi_ao_cut *cut, const vsh_lightmap *lightmap, size_t light_count);
 
 /* Rows of tiles that the AO of rows begin … end - 1 depends on, where texels share it, of `all`: those of its
  * lattice's squares (8 × 8 spacings) and of the squares beside these, and whether these end there. */
@@ -86,6 +94,7 @@ double vshi_bake_bytes(const vshi_bake_need *need);
 struct vsh_texels {
     vsh_texels_info info; /* of the band's own rows */
     vshi_band band;
+    vshi_ao_cut cut; /* of a part */
     int32_t padding;
     bool fills;              /* what is beyond it too */
     int32_t ao_spacing;      /* as of the charts */

@@ -1,8 +1,12 @@
 #include "bake_scene/bands.h"
 
 #include "bake/part.h"
+#include "bake/texels.h"
+#include "bake_scene/merge.h"
 #include "base/bytes.h"
 #include "base/try.h"
+
+#include <math.h>
 
 enum { RESUME_BANDS = 16 }; /* a bake that is ended loses a sixteenth of a lightmap at most */
 
@@ -16,7 +20,9 @@ typedef struct cost {
     uint64_t held, writer, limit;
     int32_t first, end; /* rows that are baked */
     int32_t channels;
-    bool part, merge;
+    const vshi_ao_cut *cut; /* of a part; NULL: of none */
+    int32_t threads;
+    bool merge;
 } cost;
 
 /* Bytes of rows that are taken from parts: theirs, and those around them that they are filled from. */
@@ -31,7 +37,15 @@ static uint64_t merging(const cost *c, int32_t first, int32_t rows) {
     vshi_part_padding(c->charts, &fills);
     return (uint64_t)(texels * sizeof(float) * c->channels +
                       held * (sizeof(uint32_t) + (whole ? 0.0 : sizeof(float) * (double)c->channels)) +
-                      vshi_rows_complete_bytes(c->info.width, above + rows + below, fills && whole));
+                      fmax(vshi_rows_complete_bytes(c->info.width, above + rows + below, fills && whole),
+                           vshi_parts_finish_bytes(c->info.width, above + rows + below, c->charts->ao_spacing,
+                                                   c->threads)));
+}
+
+/* Bytes of what is kept of a part's rows. */
+static uint64_t keeping(const cost *c, int32_t first, int32_t rows) {
+    const int32_t kept = vshi_ao_cut_kept(c->cut, first + rows) - vshi_ao_cut_kept(c->cut, first);
+    return (uint64_t)kept * (uint64_t)c->info.width * sizeof(vshi_ao_shot);
 }
 
 /* Bytes that the largest of bands of so many rows takes. */
@@ -41,7 +55,8 @@ static uint64_t largest(const cost *c, int32_t rows) {
         const int32_t left = c->end - first, here = left < rows ? left : rows;
         uint64_t bytes =
             c->merge ? merging(c, first, here)
-                     : vshi_charts_band_bytes(c->charts, first, here, c->part, &c->lightmap, c->light_count);
+                     : vshi_charts_band_bytes(c->charts, first, here, c->cut, &c->lightmap, c->light_count);
+        bytes += c->cut != NULL ? keeping(c, first, here) : 0;
         bytes += (uint64_t)c->floats * sizeof(float) * (uint64_t)c->info.width * (uint64_t)here;
         most = bytes > most ? bytes : most;
         if (left <= rows) {
@@ -115,11 +130,12 @@ vsh_result vshi_bands_plan(const vsh_scene *scene, const vshi_target *target, co
               .lightmap = vshi_channels_shape(scene),
               .light_count = scene->light_count,
               .floats = 3 * (int32_t)channels.triple_count + (need->picture ? 4 : 0) +
-                        (scene->planes.invalid ? 1 : 0) + (need->part ? 1 : 0),
+                        (scene->planes.invalid ? 1 : 0) + (need->cut != NULL ? 1 : 0),
               .channels = channels.image.channel_count,
               .first = need->first,
               .end = need->end,
-              .part = need->part,
+              .cut = need->cut,
+              .threads = need->threads,
               .merge = need->merge,
               .held = need->held,
               .limit = need->limit};

@@ -14,10 +14,11 @@ typedef struct vshi_bands {
 
 /* What a lightmap's bands are planned by. */
 typedef struct vshi_bands_need {
-    bool picture;       /* one of texels that are not valid is made too */
-    bool resume;        /* bands are kept: there are to be some */
-    bool files;         /* image files are written */
-    bool part;          /* of rows that are baked by themselves */
+    bool picture;           /* one of texels that are not valid is made too */
+    bool resume;            /* bands are kept: there are to be some */
+    bool files;             /* image files are written */
+    const vshi_ao_cut *cut; /* of rows that are baked by themselves; NULL: all are */
+    int32_t threads;
     bool merge;         /* nothing is baked: rows come from parts */
     int32_t first, end; /* rows */
     int32_t rows;       /* wanted; 0: as many as go */

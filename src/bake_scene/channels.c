@@ -246,6 +246,7 @@ void vshi_channels_free(vshi_channels *channels) {
     }
     free(channels->invalid);
     free(channels->known);
+    free(channels->shots);
     free(channels->triples);
     free(channels->planes);
     free(channels->holds);

@@ -2,6 +2,7 @@
 #ifndef VSHI_CHANNELS_H
 #define VSHI_CHANNELS_H
 
+#include "bake/ao_cut.h"
 #include "bake/padding.h"
 #include "base/error.h"
 
@@ -15,10 +16,12 @@ typedef struct vshi_channels {
     char (*names)[VSH_CHANNEL_NAME];
     const char **name_list;
     int32_t *holds;
-    float **planes;  /* [image.channel_count][rows][width] */
-    float **triples; /* [triple_count][rows][width][3]: what is baked interleaved, and then split */
-    float *invalid;  /* [rows][width] as the bake tells it (vsh_lightmap); NULL: not asked for */
-    uint32_t *known; /* [rows][width]: VSHI_PART_…, of a part; NULL: it is none */
+    float **planes;      /* [image.channel_count][rows][width] */
+    float **triples;     /* [triple_count][rows][width][3]: what is baked interleaved, and then split */
+    float *invalid;      /* [rows][width] as the bake tells it (vsh_lightmap); NULL: not asked for */
+    uint32_t *known;     /* [rows][width]: VSHI_PART_…, of a part; NULL: it is none */
+    vshi_ao_shot *shots; /* [shot_rows][width]: of a part that leaves AO, what is kept; NULL: none does */
+    size_t shot_rows;    /* of the rows that are there */
     size_t triple_count;
     int32_t rows; /* that there is memory for */
 } vshi_channels;

@@ -153,7 +153,7 @@ static vsh_result shade(const vsh_bake_job *job, const vshi_share_rows *share, c
     }
     const vsh_lightmap lightmap = {.shadow = s->light_count > 0 ? planes : NULL, .ao = s->ao};
     result = vshi_bake_part(job->occluders, share->few, scene->lights, s->light_count, &options, &quiet,
-                            &lightmap, s->known, NULL, error);
+                            &lightmap, s->known, NULL, NULL, error);
 done:
     free(planes);
     return result;

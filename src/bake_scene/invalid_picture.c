@@ -3,36 +3,109 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 /* Of no chart, valid, invalid, and invalid in plain sight. */
 static const float COLOURS[4][3] = {
     {0.05f, 0.05f, 0.06f}, {0.5f, 0.5f, 0.5f}, {0.7f, 0.05f, 0.05f}, {1.0f, 0.85f, 0.1f}};
 static const char *const NAMES[3] = {"R", "G", "B"};
 
-/* "where.png" for "out/floor.exr", one of several: "where.floor.png". */
-static char *name_for(const char *path, const char *output, bool several) {
+/* --- names */
+
+/* "floor" of "out/floor.exr". */
+typedef struct stem {
+    const char *at;
+    size_t size;
+} stem;
+
+static stem stem_of(const char *output) {
     const char *slash = strrchr(output, '/');
     const char *name = slash != NULL ? slash + 1 : output, *dot = strrchr(name, '.');
-    const int length = dot != NULL ? (int)(dot - name) : (int)strlen(name);
-    const int stem = (int)(strlen(path) - strlen(".png"));
-    const size_t size = strlen(path) + (size_t)length + 2;
-    char *made = malloc(size);
-    if (made != NULL && several) {
-        snprintf(made, size, "%.*s.%.*s.png", stem, path, length, name);
-    } else if (made != NULL) {
-        snprintf(made, size, "%s", path);
+    return (stem){name, dot != NULL ? (size_t)(dot - name) : strlen(name)};
+}
+
+/* Names that differ in case only are one file to some systems. */
+static bool are_alike(stem a, stem b) {
+    return a.size == b.size && strncasecmp(a.at, b.at, a.size) == 0;
+}
+
+static bool is_taken(char *const *outputs, size_t count, const char *name) {
+    for (size_t i = 0; i < count; ++i) {
+        if (are_alike(stem_of(outputs[i]), (stem){name, strlen(name)})) {
+            return true;
+        }
     }
+    return false;
+}
+
+/* "where.floor.png" for the first "floor", "where.floor-2.png" for the second; numbers that another output
+ * has by itself are left out. */
+static char *name_for(const char *path, char *const *outputs, size_t count, size_t index) {
+    const stem own = stem_of(outputs[index]);
+    const int before = (int)(strlen(path) - strlen(".png"));
+    const size_t size = strlen(path) + own.size + 32;
+    char *made = malloc(size), *name = malloc(own.size + 32);
+    size_t alike = 0, number = 1;
+    for (size_t i = 0; i < index; ++i) {
+        alike += are_alike(stem_of(outputs[i]), own);
+    }
+    if (made != NULL && name != NULL) {
+        snprintf(name, own.size + 32, "%.*s", (int)own.size, own.at);
+        while (alike > 0) {
+            snprintf(name, own.size + 32, "%.*s-%zu", (int)own.size, own.at, ++number);
+            alike -= !is_taken(outputs, count, name);
+        }
+        snprintf(made, size, "%.*s.%s.png", before, path, name);
+    } else {
+        free(made);
+        made = NULL;
+    }
+    free(name);
     return made;
 }
 
-vsh_result vshi_invalid_picture_open(vshi_invalid_picture *picture, const char *path, const char *output,
-                                     bool several, int32_t width, int32_t height, int32_t rows,
-                                     vsh_error *error) {
+/* Images have names of their own, pages of an asset do not. */
+static char *output_of(const vsh_bake_job *job, const vshi_target *target) {
+    const char *output = target->receiver.output;
+    return vsh_lit_is_output(output)
+               ? vshi_target_file(target, vsh_assets_receiver_pages(job->assets, target->index), output)
+               : strdup(output != NULL ? output : "");
+}
+
+static char *picture_name(const vsh_bake_job *job, size_t index) {
+    const char *path = job->options.invalid_picture;
+    const size_t count = job->targets.count;
+    if (count == 1) {
+        return strdup(path);
+    }
+    char **outputs = calloc(count, sizeof *outputs), *made = NULL;
+    bool all = outputs != NULL;
+    for (size_t i = 0; i < count && all; ++i) {
+        outputs[i] = output_of(job, &job->targets.list[i]);
+        all = outputs[i] != NULL;
+    }
+    if (all) {
+        made = name_for(path, outputs, count, index);
+    }
+    for (size_t i = 0; i < count && outputs != NULL; ++i) {
+        free(outputs[i]);
+    }
+    free(outputs);
+    return made;
+}
+
+/* --- rows */
+
+vsh_result vshi_invalid_picture_open(vshi_invalid_picture *picture, const vsh_bake_job *job, size_t index,
+                                     int32_t rows, vsh_error *error) {
+    const char *path = job->options.invalid_picture;
+    const vsh_receiver *receiver = &job->targets.list[index].receiver;
+    const int32_t width = receiver->width, height = receiver->height;
     memset(picture, 0, sizeof *picture);
     if (path == NULL) {
         return VSH_OK;
     }
-    picture->path = name_for(path, output, several);
+    picture->path = picture_name(job, index);
     for (int c = 0; c < 3; ++c) {
         picture->planes[c] = calloc((size_t)width * (size_t)rows, sizeof(float));
         if (picture->planes[c] == NULL || picture->path == NULL) {

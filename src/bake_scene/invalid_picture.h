@@ -2,6 +2,7 @@
 #ifndef VSHI_INVALID_PICTURE_H
 #define VSHI_INVALID_PICTURE_H
 
+#include "bake_scene/job.h"
 #include "base/error.h"
 
 #include <stdbool.h>
@@ -14,12 +15,11 @@ typedef struct vshi_invalid_picture {
     vsh_image_writer *writer;
 } vshi_invalid_picture;
 
-/* Opens the picture for an image `output` of this size, of which `rows` come at a time: at `path`, or where
- * there are several images FILE.OUTPUT.png for it. NULL: does nothing. Errors: as vsh_image_writer_create().
- * Close it also after a failure. */
-vsh_result vshi_invalid_picture_open(vshi_invalid_picture *picture, const char *path, const char *output,
-                                     bool several, int32_t width, int32_t height, int32_t rows,
-                                     vsh_error *error);
+/* Opens the picture of lightmap `index`, of which `rows` come at a time: FILE.png, or where there are several
+ * FILE.OUTPUT.png, no two of which are alike. Does nothing where none is asked for. Errors: as
+ * vsh_image_writer_create(). Close it also after a failure. */
+vsh_result vshi_invalid_picture_open(vshi_invalid_picture *picture, const vsh_bake_job *job, size_t index,
+                                     int32_t rows, vsh_error *error);
 
 /* Adds rows, of planes as of vsh_lightmap. */
 vsh_result vshi_invalid_picture_add(vshi_invalid_picture *picture, int32_t rows, const float *invalid,

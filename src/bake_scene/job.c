@@ -187,6 +187,7 @@ vsh_result vsh_bake_job_create(const vsh_scene *scene, const vsh_bake_job_option
     VSHI_TRY_DONE(vsh_assets_load(&made->scene, &full, &made->assets, error));
     VSHI_TRY_DONE(vshi_targets_make(&made->scene, made->assets, &full, &made->targets, error));
     VSHI_TRY_DONE(list_lightmaps(made, error));
+    VSHI_TRY_DONE(vshi_lit_check_uvs(made, &full, error));
     made->report.load_s = vshi_seconds() - start;
     *job = made;
     return VSH_OK;

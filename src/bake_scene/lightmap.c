@@ -80,7 +80,9 @@ vsh_result vshi_job_plan(const vsh_bake_job *job, size_t index, const vsh_charts
         first = job->pieces[job->piece].first;
         end = first + job->pieces[job->piece].rows;
     }
-    const vshi_bands_need need = {.part = shard,
+    const vshi_ao_cut cut = vshi_job_cut(job, index, first, end);
+    const vshi_bands_need need = {.cut = shard ? &cut : NULL,
+                                  .threads = run->threads,
                                   .merge = job->merges,
                                   .first = first,
                                   .end = end,
@@ -98,25 +100,34 @@ static bool is_part(const vshi_lightmap_work *w) {
     return w->job->options.shard > 0;
 }
 
+static vsh_result make_texels(const vshi_lightmap_work *w, int32_t first, int32_t rows, const vsh_run *run,
+                              vsh_texels **texels, vsh_error *error) {
+    if (!is_part(w)) {
+        return vsh_texels_create_band(w->input.charts, first, rows, run, texels, error);
+    }
+    const vshi_ao_cut cut = vshi_job_cut(w->job, w->index, w->input.bands.first, w->input.bands.end);
+    return vshi_texels_create_part(w->input.charts, first, rows, &cut, run, texels, error);
+}
+
 static vsh_result bake_band(vshi_lightmap_work *w, int32_t first, int32_t rows, const vsh_run *run,
                             vsh_error *error) {
     const vsh_scene *scene = &w->job->scene;
     vsh_texels *own = NULL;
     uint32_t *known = w->channels.known;
     if (w->input.kept == NULL) {
-        VSHI_TRY((known != NULL ? vshi_texels_create_part : vsh_texels_create_band)(w->input.charts, first,
-                                                                                    rows, run, &own, error));
+        VSHI_TRY(make_texels(w, first, rows, run, &own, error));
     }
     const vsh_texels *texels = own != NULL ? own : w->input.kept;
     vsh_bake_stats band = vsh_bake_stats_zero();
     band.invalid_by_mesh = w->invalid;
     band.shade = w->baked.shade;
     band.errors = w->baked.errors;
-    vsh_result result = known != NULL
-                            ? vshi_bake_part(w->job->occluders, texels, scene->lights, scene->light_count,
-                                             &scene->shade, run, &w->channels.lightmap, known, &band, error)
-                            : vsh_bake_lightmap(w->job->occluders, texels, scene->lights, scene->light_count,
-                                                &scene->shade, run, &w->channels.lightmap, &band, error);
+    vsh_result result =
+        known != NULL
+            ? vshi_bake_part(w->job->occluders, texels, scene->lights, scene->light_count, &scene->shade, run,
+                             &w->channels.lightmap, known, w->channels.shots, &band, error)
+            : vsh_bake_lightmap(w->job->occluders, texels, scene->lights, scene->light_count, &scene->shade,
+                                run, &w->channels.lightmap, &band, error);
     if (result == VSH_OK && vshi_is_fixed_whole(w)) {
         result = vshi_fill_hidden(w, texels, error);
     }
@@ -138,7 +149,7 @@ static vsh_result bake_band(vshi_lightmap_work *w, int32_t first, int32_t rows, 
 static vsh_result take_band(vshi_lightmap_work *w, int32_t first, int32_t rows, const vsh_run *run,
                             vsh_error *error) {
     VSHI_TRY(vshi_parts_take(w->job->parts, &w->job->scene, w->index, w->input.charts, first, rows, run,
-                             &w->channels, error));
+                             &w->channels, &w->baked, error));
     if (!vshi_is_fixed_whole(w)) {
         return VSH_OK;
     }
@@ -153,6 +164,9 @@ static vsh_result take_band(vshi_lightmap_work *w, int32_t first, int32_t rows, 
 static vsh_result make_band(vshi_lightmap_work *w, int32_t first, int32_t rows, const vsh_run *run,
                             vsh_error *error) {
     const size_t meshes = w->target->mesh_count;
+    if (is_part(w)) {
+        vshi_part_set_shots(w->job, w->index, &w->input.bands, first, rows, &w->channels);
+    }
     if (vshi_resume_take(&w->resume, first, rows, &w->channels, &w->baked, meshes)) {
         w->lightmap->resumed_rows += (uint64_t)rows;
         return VSH_OK;
@@ -257,26 +271,6 @@ static vsh_result bake_bands(vshi_lightmap_work *w, vsh_error *error) {
     }
 }
 
-/* Images have names of their own, pages of an asset do not. */
-static vsh_result open_picture(vshi_lightmap_work *w, int32_t rows, vsh_error *error) {
-    const vsh_bake_job *job = w->job;
-    const vsh_receiver *receiver = &w->target->receiver;
-    const char *path = job->options.invalid_picture;
-    if (path == NULL) {
-        return VSH_OK;
-    }
-    char *name = vsh_lit_is_output(receiver->output)
-                     ? vshi_target_file(w->target, vsh_assets_receiver_pages(job->assets, w->target->index),
-                                        receiver->output)
-                     : strdup(receiver->output != NULL ? receiver->output : "");
-    const vsh_result result = name != NULL
-                                  ? vshi_invalid_picture_open(&w->picture, path, name, job->targets.count > 1,
-                                                              receiver->width, receiver->height, rows, error)
-                                  : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
-    free(name);
-    return result;
-}
-
 /* Memory, files, and what was kept. */
 static vsh_result open_all(vshi_lightmap_work *w, vsh_error *error) {
     const vsh_bake_job *job = w->job;
@@ -297,8 +291,10 @@ static vsh_result open_all(vshi_lightmap_work *w, vsh_error *error) {
         const size_t texels = (size_t)receiver->width * (size_t)rows;
         VSHI_TRY(vshi_allocate((void **)&w->channels.known, texels, sizeof *w->channels.known,
                                receiver->output, error));
+        VSHI_TRY(vshi_part_open_shots(job, w->index, &w->input.bands, &w->channels, error));
     }
-    VSHI_TRY(open_picture(w, rows, error));
+    VSHI_TRY(
+        vshi_invalid_picture_open(&w->picture, job, (size_t)(w->target - job->targets.list), rows, error));
     if (job->options.resume) {
         const vshi_bands *bands = &w->input.bands;
         vshi_resume_key key = {.image = &w->channels.image,

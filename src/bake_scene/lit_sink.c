@@ -8,14 +8,12 @@
 #include <string.h>
 #include <strings.h>
 
-enum { AO = 0, LIGHT = 1, PLANES = 4 };
+enum { AO = VSHI_LIT_AO, LIGHT = VSHI_LIT_LIGHT, PLANES = 4 };
 
 /* What viewers divide the light by that falls on a diffuse surface: light of 1 shows its own colour. */
 static const double full_light = 3.14159265358979323846;
 
-/* Whether light is shown alone, as colour: as was asked for, or because materials of an OBJ know nothing
- * else. */
-static bool previews(const vshi_lit_sink *lit) {
+bool vshi_lit_previews(const vshi_lit_sink *lit) {
     return lit->job->options.lit_preview != 0 ||
            strcasecmp(vshi_path_ending(lit->lightmap->output), "obj") == 0;
 }
@@ -30,8 +28,7 @@ static void take(vshi_lit_sink *lit, int plane, int32_t channel) {
     lit->sources[plane][lit->source_count[plane]++] = channel;
 }
 
-/* AO, and irradiance or (without it) all shadows. */
-static void find_sources(vshi_lit_sink *lit, const vsh_image *image) {
+void vshi_lit_find_sources(vshi_lit_sink *lit, const vsh_image *image) {
     static const char *const colors[3] = {"irradiance.R", "irradiance.G", "irradiance.B"};
     memset(lit->source_count, 0, sizeof lit->source_count);
     for (int32_t c = 0; c < image->channel_count; ++c) {
@@ -72,7 +69,7 @@ vsh_result vshi_lit_sink_check(const vsh_receiver *receiver, const vsh_image *im
     if (lit == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", receiver->output);
     }
-    find_sources(lit, image);
+    vshi_lit_find_sources(lit, image);
     const bool any = lit->source_count[AO] > 0 || lit->source_count[LIGHT] > 0;
     free(lit);
     if (!any) {
@@ -148,7 +145,7 @@ static vsh_result begin(void *user, const vsh_job_lightmap *lightmap, const vsh_
     lit->page =
         (vshi_lit_page){.width = image->width, .height = image->height, .object = lit->target->object};
     lit->channel_count = image->channel_count;
-    find_sources(lit, image);
+    vshi_lit_find_sources(lit, image);
     vsh_result result = begin_exr(lit, image, error);
     for (int p = 0; p < PLANES && result == VSH_OK; ++p) {
         if (lit->source_count[p] > 0) {
@@ -189,7 +186,7 @@ static vsh_result add(void *user, int32_t rows, const float *const *planes, vsh_
             to[i] = sum / (float)lit->source_count[p];
         }
     }
-    if (!previews(lit)) {
+    if (!vshi_lit_previews(lit)) {
         open_ambient(lit, (size_t)lit->rows * width, count);
     }
     lit->rows += rows;
@@ -211,7 +208,7 @@ static size_t list_images(const vshi_lit_sink *lit, size_t number, vsh_lit_image
     const vsh_bake_job *job = lit->job;
     const vshi_lit_page *page = &job->lit_pages[number];
     const vsh_receiver *receiver = &job->scene.receivers[lit->lightmap->receiver];
-    const bool light = page->planes[LIGHT] != NULL, preview = previews(lit);
+    const bool light = page->planes[LIGHT] != NULL, preview = vshi_lit_previews(lit);
     size_t count = 0;
     if (light && preview) {
         multiply_by_ao(page);
@@ -234,73 +231,6 @@ static size_t list_images(const vshi_lit_sink *lit, size_t number, vsh_lit_image
                             .intensity = is_light && !preview ? full_light : 1.0};
     }
     return count;
-}
-
-/* A mesh that is lit by the UVs of its file. */
-static vsh_lit_mesh mesh_of_file(const vsh_receiver *receiver, const vsh_model *model, size_t number) {
-    vsh_lit_mesh mesh = {.uv_set = receiver->uv_set};
-    if (receiver->type == VSH_RECEIVER_HEIGHTFIELD) {
-        mesh.uv_set = 0;
-    } else if (receiver->uv_set < 0) {
-        mesh.uv_set = vsh_model_uv_sets(model, number) > 1;
-    }
-    return mesh;
-}
-
-static vsh_lit_mesh mesh_of_atlas(const vsh_atlas *atlas, size_t number) {
-    const vsh_atlas_mesh mesh = vsh_atlas_mesh_view(atlas, number);
-    return (vsh_lit_mesh){.uvs = mesh.uvs,
-                          .sources = mesh.sources,
-                          .indices = mesh.indices,
-                          .charts = mesh.charts,
-                          .vertex_count = mesh.vertex_count,
-                          .triangle_count = mesh.triangle_count};
-}
-
-/* Which of the model's meshes are lit, and by which UVs. */
-static vsh_result list_meshes(const vshi_lit_sink *lit, const vsh_model *model, vsh_lit_mesh **meshes,
-                              vsh_error *error) {
-    const size_t index = lit->lightmap->receiver;
-    const vsh_assets *assets = lit->job->assets;
-    const size_t *numbers, *of_atlas;
-    size_t count;
-    vsh_assets_receiver_model(assets, index, &numbers);
-    const vsh_atlas *atlas = vsh_assets_receiver_atlas(assets, index, &of_atlas);
-    const size_t all = vsh_model_mesh_count(model);
-    VSHI_TRY(vshi_allocate((void **)meshes, all, sizeof **meshes, lit->lightmap->output, error));
-    for (size_t i = 0; i < all; ++i) {
-        (*meshes)[i].uv_set = -1;
-    }
-    for (size_t page = 0; page < page_count(lit); ++page) {
-        size_t first;
-        vsh_assets_receiver_page(assets, index, page, &first, &count);
-        for (size_t i = first; i < first + count; ++i) {
-            vsh_lit_mesh *mesh = &(*meshes)[numbers[i]];
-            *mesh = atlas != NULL ? mesh_of_atlas(atlas, of_atlas[i])
-                                  : mesh_of_file(&lit->job->scene.receivers[index], model, numbers[i]);
-            mesh->page = (uint32_t)page; /* read where it has no charts */
-        }
-    }
-    return VSH_OK;
-}
-
-/* The page that each chart lies on; NULL where there is no atlas. */
-static vsh_result list_chart_pages(const vshi_lit_sink *lit, vsh_lit_options *options, uint32_t **pages,
-                                   vsh_error *error) {
-    const size_t *of_atlas;
-    const vsh_atlas *atlas = vsh_assets_receiver_atlas(lit->job->assets, lit->lightmap->receiver, &of_atlas);
-    *pages = NULL;
-    if (atlas == NULL) {
-        return VSH_OK;
-    }
-    options->chart_count = vsh_atlas_chart_count(atlas);
-    VSHI_TRY(
-        vshi_allocate((void **)pages, options->chart_count, sizeof **pages, lit->lightmap->output, error));
-    for (size_t i = 0; i < options->chart_count; ++i) {
-        (*pages)[i] = vsh_atlas_charts(atlas)[i].page;
-    }
-    options->chart_pages = *pages;
-    return VSH_OK;
 }
 
 /* Writes the asset, once all pages are there. */
@@ -330,8 +260,8 @@ static vsh_result write(const vshi_lit_sink *lit, vsh_error *error) {
     options.images = images;
     options.image_place = job->options.lit_image_place;
     options.attributes = vsh_provenance_attributes(job->provenance, &options.attribute_count);
-    VSHI_TRY_DONE(list_chart_pages(lit, &options, &pages, error));
-    VSHI_TRY_DONE(list_meshes(lit, model, &meshes, error));
+    VSHI_TRY_DONE(vshi_lit_list_chart_pages(lit, &options, &pages, error));
+    VSHI_TRY_DONE(vshi_lit_list_meshes(lit, model, &meshes, error));
     tell_writing(job, lit->lightmap->output);
     result = vsh_lit_write(receiver->type == VSH_RECEIVER_HEIGHTFIELD ? NULL : receiver->path, model, meshes,
                            &options, lit->lightmap->output, &run, error);

@@ -4,6 +4,9 @@
 
 #include "bake_scene/job.h"
 
+/* Of the planes of a page: light has one or three. */
+enum { VSHI_LIT_AO = 0, VSHI_LIT_LIGHT = 1 };
+
 typedef struct vshi_lit_sink {
     vsh_bake_job *job;
     const vsh_run *run;
@@ -29,6 +32,24 @@ void vshi_lit_sink_scene(vsh_scene *scene);
 
 /* Whether an asset can be written with these channels. Errors: as vsh_receiver_check(). */
 vsh_result vshi_lit_sink_check(const vsh_receiver *receiver, const vsh_image *image, vsh_error *error);
+
+/* Whether light is shown alone, as colour: as was asked for, or because materials of an OBJ know nothing
+ * else. */
+bool vshi_lit_previews(const vshi_lit_sink *lit);
+
+/* Of an image's channels AO, and irradiance or (without it) all shadows, into `sources`. */
+void vshi_lit_find_sources(vshi_lit_sink *lit, const vsh_image *image);
+
+/* Which of the model's meshes are lit, and by which UVs; and the page that each chart lies on, NULL where
+ * there is no atlas. To be freed. Errors: VSH_ERROR_MEMORY. (lit_uvs.c) */
+vsh_result vshi_lit_list_meshes(const vshi_lit_sink *lit, const vsh_model *model, vsh_lit_mesh **meshes,
+                                vsh_error *error);
+vsh_result vshi_lit_list_chart_pages(const vshi_lit_sink *lit, vsh_lit_options *options, uint32_t **pages,
+                                     vsh_error *error);
+
+/* Whether the UVs that were made have room in a job's assets, once these are loaded: to be told before
+ * anything is baked. Errors: as vsh_lit_check_uvs(). (lit_uvs.c) */
+vsh_result vshi_lit_check_uvs(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
 
 /* Frees the pages that wait for others. */
 void vshi_lit_pages_free(vsh_bake_job *job);

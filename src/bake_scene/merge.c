@@ -89,6 +89,16 @@ static vsh_result check_casters(const vshi_part *part, const vshi_part *first, v
     return vshi_part_refuse(part->path, "voxel size", theirs, ours, error);
 }
 
+/* AO is left at the ends of all pieces of a lightmap, or at none. */
+static vsh_result check_left(const vshi_part *part, const vshi_part *first, vsh_error *error) {
+    for (uint64_t i = 0; i < part->head.lightmap_count; ++i) {
+        if (part->head.lightmaps[i].left != first->head.lightmaps[i].left) {
+            return vshi_part_damaged(part->path, "AO that other parts know nothing of", error);
+        }
+    }
+    return VSH_OK;
+}
+
 /* --- all of them together */
 
 static int compare_places(const void *left, const void *right) {
@@ -168,6 +178,7 @@ vsh_result vshi_parts_open(vsh_bake_job *job, int32_t count, const vsh_run *run,
         VSHI_TRY(vshi_part_about_check(&part->head.about, part->path, VSHI_PART_BAKE, i + 1, &own, error));
         VSHI_TRY(check_lightmaps(job, part, error));
         VSHI_TRY(check_casters(part, &parts->list[0], error));
+        VSHI_TRY(check_left(part, &parts->list[0], error));
     }
     return place_all(job, parts, error);
 }

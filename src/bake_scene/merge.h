@@ -32,10 +32,27 @@ vsh_result vshi_parts_open(vsh_bake_job *job, int32_t count, const vsh_run *run,
                            vsh_error *error);
 void vshi_parts_free(vshi_parts *parts);
 
-/* Takes rows of a lightmap into the channels, padded and filled. */
+/* Takes rows of a lightmap into the channels, with the AO that was left, padded and filled; what was left is
+ * added to the statistics. */
 vsh_result vshi_parts_take(const vshi_parts *parts, const vsh_scene *scene, size_t index,
                            const vsh_charts *charts, int32_t first, int32_t rows, const vsh_run *run,
-                           vshi_channels *channels, vsh_error *error);
+                           vshi_channels *channels, vsh_bake_stats *stats, vsh_error *error);
+
+/* Rows of a lightmap that are read from parts. */
+typedef struct vshi_held_rows {
+    int32_t width, first, end;
+    float **planes; /* [channel_count], of these rows */
+    float *memory;  /* NULL: they are the channels' own */
+    uint32_t *known;
+} vshi_held_rows;
+
+/* Finishes the AO of those of them that parts left; rows first … end - 1 are added to the statistics. */
+vsh_result vshi_parts_finish(const vshi_parts *parts, const vsh_scene *scene, size_t index,
+                             const vshi_channels *channels, const vshi_held_rows *held, int32_t first,
+                             int32_t end, const vsh_run *run, vsh_bake_stats *stats, vsh_error *error);
+
+/* Bytes that it takes at most, of texels that share AO by `spacing`. */
+double vshi_parts_finish_bytes(int32_t width, int32_t rows, int32_t spacing, int32_t threads);
 
 /* Adds the statistics of a lightmap's pieces. */
 void vshi_parts_add_stats(const vshi_parts *parts, size_t index, vsh_bake_stats *stats);

@@ -8,15 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Rows that are read to fill some of them. */
-typedef struct held_rows {
-    int32_t width, first, end;
-    float **planes; /* [channel_count], of these rows */
-    float *memory;  /* NULL: they are the channels' own */
-    uint32_t *known;
-} held_rows;
-
-static vsh_result hold(vshi_channels *channels, bool own, held_rows *held, vsh_error *error) {
+static vsh_result hold(vshi_channels *channels, bool own, vshi_held_rows *held, vsh_error *error) {
     const size_t texels = (size_t)held->width * (size_t)(held->end - held->first);
     const size_t count = (size_t)channels->image.channel_count;
     VSHI_TRY(vshi_allocate((void **)&held->known, texels, sizeof *held->known, "merge", error));
@@ -32,7 +24,8 @@ static vsh_result hold(vshi_channels *channels, bool own, held_rows *held, vsh_e
     return VSH_OK;
 }
 
-static vsh_result read_rows(const vshi_parts *parts, size_t index, const held_rows *held, vsh_error *error) {
+static vsh_result read_rows(const vshi_parts *parts, size_t index, const vshi_held_rows *held,
+                            vsh_error *error) {
     for (size_t i = 0; i < parts->place_count; ++i) {
         const vshi_part_place *place = &parts->places[i];
         const int32_t first = place->first > held->first ? place->first : held->first;
@@ -47,7 +40,7 @@ static vsh_result read_rows(const vshi_parts *parts, size_t index, const held_ro
 }
 
 static vsh_result complete(const vsh_scene *scene, const vsh_charts *charts, const vshi_channels *channels,
-                           bool whole, const held_rows *held, const vsh_run *run, vsh_error *error) {
+                           bool whole, const vshi_held_rows *held, const vsh_run *run, vsh_error *error) {
     vshi_plane padded[VSH_MAX_CHANNELS];
     bool fills;
     vshi_rows_given given = {.width = held->width,
@@ -62,7 +55,7 @@ static vsh_result complete(const vsh_scene *scene, const vsh_charts *charts, con
 }
 
 /* The rows that were asked for, of those held. */
-static void hand_over(const held_rows *held, int32_t first, int32_t rows, vshi_channels *channels) {
+static void hand_over(const vshi_held_rows *held, int32_t first, int32_t rows, vshi_channels *channels) {
     const size_t texels = (size_t)held->width * (size_t)rows;
     const size_t at = (size_t)(first - held->first) * (size_t)held->width;
     const float *coverage = held->planes[channels->image.channel_count - 1] + at;
@@ -78,15 +71,17 @@ static void hand_over(const held_rows *held, int32_t first, int32_t rows, vshi_c
 
 vsh_result vshi_parts_take(const vshi_parts *parts, const vsh_scene *scene, size_t index,
                            const vsh_charts *charts, int32_t first, int32_t rows, const vsh_run *run,
-                           vshi_channels *channels, vsh_error *error) {
+                           vshi_channels *channels, vsh_bake_stats *stats, vsh_error *error) {
     const int32_t height = channels->image.height, reach = vshi_part_reach(charts);
     const bool whole = rows == height;
-    held_rows held = {.width = channels->image.width,
-                      .first = first > reach ? first - reach : 0,
-                      .end = height - first - rows > reach ? first + rows + reach : height};
+    vshi_held_rows held = {.width = channels->image.width,
+                           .first = first > reach ? first - reach : 0,
+                           .end = height - first - rows > reach ? first + rows + reach : height};
     vsh_result result;
     VSHI_TRY_DONE(hold(channels, whole, &held, error));
     VSHI_TRY_DONE(read_rows(parts, index, &held, error));
+    VSHI_TRY_DONE(
+        vshi_parts_finish(parts, scene, index, channels, &held, first, first + rows, run, stats, error));
     VSHI_TRY_DONE(complete(scene, charts, channels, whole, &held, run, error));
     hand_over(&held, first, rows, channels);
     vshi_channels_join(channels, scene);

@@ -19,6 +19,7 @@ void vshi_part_code_head(vshi_part_code *code, vshi_part_head *head) {
         vshi_part_code_u64(code, &lightmap->mesh_count);
         vshi_part_code_u64(code, &lightmap->covered);
         vshi_part_code_u64(code, &lightmap->samples);
+        vshi_part_code_i32(code, &lightmap->left);
     }
     vshi_part_code_count(code, &head->piece_count, sizeof(uint64_t), (void **)&head->pieces,
                          sizeof *head->pieces);
@@ -27,6 +28,19 @@ void vshi_part_code_head(vshi_part_code *code, vshi_part_head *head) {
         vshi_part_code_i32(code, &head->pieces[i].first);
         vshi_part_code_i32(code, &head->pieces[i].rows);
     }
+}
+
+vshi_ao_cut vshi_part_cut(const vshi_part_head *head, const vshi_part_piece *piece) {
+    const vshi_part_lightmap *lightmap = &head->lightmaps[piece->lightmap];
+    return (vshi_ao_cut){lightmap->left, lightmap->height, piece->first, piece->first + piece->rows};
+}
+
+/* At most 2^32 × (257 × 4 + 56). */
+uint64_t vshi_part_rows_bytes(const vshi_part_head *head, const vshi_part_piece *piece, int32_t row) {
+    const vshi_ao_cut cut = vshi_part_cut(head, piece);
+    const uint64_t width = (uint64_t)head->lightmaps[piece->lightmap].width;
+    return width * ((uint64_t)(row - piece->first) * (head->channel_count + 1) * sizeof(float) +
+                    (uint64_t)vshi_ao_cut_kept(&cut, row) * sizeof(vshi_ao_shot));
 }
 
 double vshi_part_stats_bytes(uint64_t mesh_count, uint64_t error_count) {

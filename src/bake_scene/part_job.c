@@ -18,10 +18,11 @@ static vsh_result list_pieces(const vsh_bake_job *job, const vsh_run *run, vshi_
     const size_t count = job->targets.count;
     VSHI_TRY(vshi_allocate((void **)&head->lightmaps, count + 1, sizeof *head->lightmaps, "part", error));
     head->lightmap_count = count;
+    VSHI_TRY(vshi_shares_leave(job, error));
     for (size_t i = 0; i < count; ++i) {
         const vsh_job_lightmap *own = &job->lightmaps[i];
-        head->lightmaps[i] =
-            (vshi_part_lightmap){own->width, own->height, own->mesh_count, own->covered, own->samples};
+        head->lightmaps[i] = (vshi_part_lightmap){own->width,   own->height,  own->mesh_count,
+                                                  own->covered, own->samples, job->shares[i].left};
     }
     return vshi_shares_list(job, job->options.shard, job->options.shard_count, run, &head->pieces,
                             &head->piece_count, error);
@@ -80,6 +81,34 @@ done:
     return result;
 }
 
+/* --- what it leaves */
+
+vshi_ao_cut vshi_job_cut(const vsh_bake_job *job, size_t index, int32_t first, int32_t end) {
+    const bool shard = job->options.shard > 0;
+    return (vshi_ao_cut){shard ? job->shares[index].left : 1, job->lightmaps[index].height, first, end};
+}
+
+void vshi_part_set_shots(const vsh_bake_job *job, size_t index, const vshi_bands *bands, int32_t first,
+                         int32_t rows, vshi_channels *channels) {
+    const vshi_ao_cut cut = vshi_job_cut(job, index, bands->first, bands->end);
+    channels->shot_rows = (size_t)(vshi_ao_cut_kept(&cut, first + rows) - vshi_ao_cut_kept(&cut, first));
+}
+
+vsh_result vshi_part_open_shots(const vsh_bake_job *job, size_t index, const vshi_bands *bands,
+                                vshi_channels *channels, vsh_error *error) {
+    size_t most = 0;
+    if (job->shares[index].left <= 1) {
+        return VSH_OK;
+    }
+    for (int32_t first = bands->first, rows; first < bands->end; first += rows) {
+        rows = bands->end - first < bands->rows ? bands->end - first : bands->rows;
+        vshi_part_set_shots(job, index, bands, first, rows, channels);
+        most = channels->shot_rows > most ? channels->shot_rows : most;
+    }
+    return vshi_allocate((void **)&channels->shots, most * (size_t)job->lightmaps[index].width + 1,
+                         sizeof *channels->shots, job->lightmaps[index].output, error);
+}
+
 /* --- its rows */
 
 static vsh_result begin(void *user, const vsh_job_lightmap *lightmap, const vsh_image *image,
@@ -94,7 +123,8 @@ static vsh_result begin(void *user, const vsh_job_lightmap *lightmap, const vsh_
 static vsh_result add(void *user, int32_t rows, const float *const *planes, vsh_error *error) {
     const vshi_part_sink *part = user;
     (void)error; /* what could not be written is told at the end */
-    vshi_part_writer_add(part->job->part, part->lightmap->width, rows, planes, part->channels->known);
+    vshi_part_writer_add(part->job->part, part->lightmap->width, rows, planes, part->channels->known,
+                         part->channels->shots);
     return VSH_OK;
 }
 

@@ -1,3 +1,4 @@
+#include "bake/part.h"
 #include "bake_scene/part_head.h"
 #include "base/memory.h"
 #include "base/try.h"
@@ -47,10 +48,13 @@ static vsh_result check_pieces(vshi_part *part, const vshi_part_front *front, vs
             piece->first >= lightmap->height || piece->rows > lightmap->height - piece->first) {
             return vshi_part_damaged(part->path, "rows outside of their lightmap", error);
         }
+        const int32_t left = lightmap->left;
+        if ((left != 1 && left != 2 && left != 4 && left != 8) || piece->first % VSH_BAND_STEP != 0 ||
+            (piece->rows % VSH_BAND_STEP != 0 && piece->rows != lightmap->height - piece->first)) {
+            return vshi_part_damaged(part->path, "rows that no bake cuts", error);
+        }
         part->offset[i] = sizeof *front + front->head_bytes + at;
-        /* at most 2^32 × 257 × 4 */
-        const uint64_t bytes =
-            (uint64_t)lightmap->width * (uint64_t)piece->rows * (head->channel_count + 1) * sizeof(float);
+        const uint64_t bytes = vshi_part_rows_bytes(head, piece, piece->first + piece->rows);
         if (bytes > front->body_bytes - at) {
             return vshi_part_damaged(part->path, "more rows than it holds", error);
         }
@@ -115,19 +119,55 @@ vsh_result vshi_part_open(const char *path, const vsh_run *run, vshi_part *part,
 vsh_result vshi_part_read(const vshi_part *part, size_t piece, int32_t first, int32_t rows, size_t at,
                           float *const *planes, uint32_t *known, vsh_error *error) {
     const vshi_part_head *head = &part->head;
-    const size_t width = (size_t)head->lightmaps[head->pieces[piece].lightmap].width;
-    const uint64_t row_bytes = (uint64_t)width * (head->channel_count + 1) * sizeof(float);
-    const uint64_t begin = part->offset[piece] + (uint64_t)(first - head->pieces[piece].first) * row_bytes;
+    const vshi_part_piece *of = &head->pieces[piece];
+    const vshi_ao_cut cut = vshi_part_cut(head, of);
+    const size_t width = (size_t)head->lightmaps[of->lightmap].width;
     FILE *file;
-    VSHI_TRY(vshi_part_reopen(part->path, begin, &file, error));
+    VSHI_TRY(vshi_part_reopen(part->path, part->offset[piece] + vshi_part_rows_bytes(head, of, first), &file,
+                              error));
     vsh_result result = VSH_OK;
-    for (size_t row = 0; row < (size_t)rows && result == VSH_OK; ++row, at += width) {
+    for (int32_t row = first; row < first + rows && result == VSH_OK; ++row, at += width) {
         for (uint64_t c = 0; c < head->channel_count && result == VSH_OK; ++c) {
             result = vshi_part_read_bytes(file, part->path, planes[c] + at, width * sizeof(float), error);
         }
         if (result == VSH_OK) {
             result = vshi_part_read_bytes(file, part->path, known + at, width * sizeof *known, error);
         }
+        const bool kept = vshi_ao_cut_kept(&cut, row + 1) > vshi_ao_cut_kept(&cut, row);
+        if (result == VSH_OK && kept) {
+            result = vshi_part_skip(file, part->path, width * sizeof(vshi_ao_shot), error);
+        }
+    }
+    fclose(file);
+    return result;
+}
+
+static vsh_result read_shots(const vshi_part *part, size_t piece, int32_t row, FILE *file, size_t width,
+                             vshi_ao_shot *shots, vsh_error *error) {
+    const vshi_part_head *head = &part->head;
+    const size_t before = width * (head->channel_count + 1) * sizeof(float);
+    VSHI_TRY(vshi_part_skip(file, part->path, before, error));
+    const vshi_ao_cut cut = vshi_part_cut(head, &head->pieces[piece]);
+    if (vshi_ao_cut_kept(&cut, row + 1) == vshi_ao_cut_kept(&cut, row)) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_part_read_bytes(file, part->path, shots, width * sizeof *shots, error));
+    return vshi_ao_shots_are_sound(shots, width, cut.spacing)
+               ? VSH_OK
+               : vshi_part_damaged(part->path, "its rays of AO", error);
+}
+
+vsh_result vshi_part_read_shots(const vshi_part *part, size_t piece, int32_t first, int32_t rows,
+                                vshi_ao_shot *shots, vsh_error *error) {
+    const vshi_part_head *head = &part->head;
+    const vshi_part_piece *of = &head->pieces[piece];
+    const size_t width = (size_t)head->lightmaps[of->lightmap].width;
+    FILE *file;
+    VSHI_TRY(vshi_part_reopen(part->path, part->offset[piece] + vshi_part_rows_bytes(head, of, first), &file,
+                              error));
+    vsh_result result = VSH_OK;
+    for (int32_t row = 0; row < rows && result == VSH_OK; ++row) {
+        result = read_shots(part, piece, first + row, file, width, shots + (size_t)row * width, error);
     }
     fclose(file);
     return result;

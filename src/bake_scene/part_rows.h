@@ -1,10 +1,11 @@
 /* Parts of a job's lightmaps, as files (base/part_file.h). The body is rows, from the top on, each of them
- * its channels' values, then what is known of its texels (VSHI_PART_…); the tail is the statistics of each
- * piece.
+ * its channels' values, then what is known of its texels (VSHI_PART_…), then, where its cut keeps it, what
+ * they shot (vshi_ao_shot); the tail is the statistics of each piece.
  */
 #ifndef VSHI_PART_ROWS_H
 #define VSHI_PART_ROWS_H
 
+#include "bake/ao_cut.h"
 #include "base/part_file.h"
 
 #include <vdbshade/bake.h>
@@ -16,6 +17,7 @@
 typedef struct vshi_part_lightmap {
     int32_t width, height;
     uint64_t mesh_count, covered, samples; /* as in vsh_job_lightmap */
+    int32_t left; /* spacing of texels whose shared AO is left at the ends of pieces; 1: none is */
 } vshi_part_lightmap;
 
 /* Rows of one of them that a part holds. */
@@ -41,6 +43,12 @@ typedef struct vshi_part_head {
 
 void vshi_part_head_free(vshi_part_head *head);
 
+/* Where a piece ends, whose lightmap there is. */
+vshi_ao_cut vshi_part_cut(const vshi_part_head *head, const vshi_part_piece *piece);
+
+/* Bytes of the rows of a piece before `row` of its lightmap; they cannot overflow. */
+uint64_t vshi_part_rows_bytes(const vshi_part_head *head, const vshi_part_piece *piece, int32_t row);
+
 /* --- writing */
 
 typedef struct vshi_part_writer vshi_part_writer;
@@ -49,10 +57,10 @@ typedef struct vshi_part_writer vshi_part_writer;
 vsh_result vshi_part_writer_create(const char *path, const vshi_part_head *head, vshi_part_writer **writer,
                                    vsh_error *error);
 
-/* The next rows, of the piece that is under way: planes[channel_count][rows × width]. A write that failed is
- * told at the end. */
+/* The next rows, of the piece that is under way: planes[channel_count][rows × width], and `shots` of those of
+ * them that are kept, one after the other. A write that failed is told at the end. */
 void vshi_part_writer_add(vshi_part_writer *writer, int32_t width, int32_t rows, const float *const *planes,
-                          const uint32_t *known);
+                          const uint32_t *known, const vshi_ao_shot *shots);
 
 /* The piece is whole: its statistics, with errors [error_count] and invalid_by_mesh [mesh_count]. */
 vsh_result vshi_part_writer_piece(vshi_part_writer *writer, const vsh_bake_stats *stats, vsh_error *error);
@@ -80,5 +88,10 @@ void vshi_part_free(vshi_part *part);
  * `at` on. Errors: VSH_ERROR_READ. */
 vsh_result vshi_part_read(const vshi_part *part, size_t piece, int32_t first, int32_t rows, size_t at,
                           float *const *planes, uint32_t *known, vsh_error *error);
+
+/* What is kept of rows of a piece, into shots[rows][width], which are sound; others are left as they are.
+ * Errors: VSH_ERROR_READ, VSH_ERROR_INPUT. */
+vsh_result vshi_part_read_shots(const vshi_part *part, size_t piece, int32_t first, int32_t rows,
+                                vshi_ao_shot *shots, vsh_error *error);
 
 #endif

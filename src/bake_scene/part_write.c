@@ -8,8 +8,10 @@ struct vshi_part_writer {
     vshi_part_output file;
     int32_t channel_count;
     uint64_t error_count;
-    uint64_t *meshes; /* [piece_count]: of each piece's lightmap */
-    size_t done;      /* pieces */
+    uint64_t *meshes;  /* [piece_count]: of each piece's lightmap */
+    vshi_ao_cut *cuts; /* [piece_count] */
+    size_t done;       /* pieces */
+    int32_t row;       /* of the piece that is under way, that comes next; -1: its first */
     vshi_part_code tail;
 };
 
@@ -21,15 +23,18 @@ static vsh_result create(const char *path, const vshi_part_head *head, vshi_part
     writer->channel_count = (int32_t)head->channel_count;
     writer->error_count = head->error_count;
     writer->meshes = calloc((size_t)head->piece_count + 1, sizeof *writer->meshes);
-    if (writer->meshes == NULL) {
+    writer->cuts = calloc((size_t)head->piece_count + 1, sizeof *writer->cuts);
+    writer->row = -1;
+    if (writer->meshes == NULL || writer->cuts == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
     }
     for (uint64_t i = 0; i < head->piece_count; ++i) {
         const vshi_part_piece *piece = &head->pieces[i];
         const vshi_part_lightmap *lightmap = &head->lightmaps[piece->lightmap];
-        rows += (uint64_t)lightmap->width * (uint64_t)piece->rows * (head->channel_count + 1) * 4;
+        rows += vshi_part_rows_bytes(head, piece, piece->first + piece->rows);
         tail += (uint64_t)vshi_part_stats_bytes(lightmap->mesh_count, head->error_count);
         writer->meshes[i] = lightmap->mesh_count;
+        writer->cuts[i] = vshi_part_cut(head, piece);
     }
     vshi_part_about_code(&code, &same.about);
     vshi_part_code_head(&code, &same);
@@ -38,6 +43,7 @@ static vsh_result create(const char *path, const vshi_part_head *head, vshi_part
 
 static void release(vshi_part_writer *writer) {
     free(writer->tail.bytes);
+    free(writer->cuts);
     free(writer->meshes);
     free(writer);
 }
@@ -59,18 +65,27 @@ vsh_result vshi_part_writer_create(const char *path, const vshi_part_head *head,
 }
 
 void vshi_part_writer_add(vshi_part_writer *writer, int32_t width, int32_t rows, const float *const *planes,
-                          const uint32_t *known) {
+                          const uint32_t *known, const vshi_ao_shot *shots) {
     const size_t across = (size_t)width;
+    const vshi_ao_cut *cut = &writer->cuts[writer->done];
+    writer->row = writer->row < 0 ? cut->first : writer->row;
+    const int32_t before = vshi_ao_cut_kept(cut, writer->row);
     for (size_t row = 0; row < (size_t)rows; ++row) {
         for (int32_t c = 0; c < writer->channel_count; ++c) {
             vshi_part_output_put(&writer->file, planes[c] + row * across, across * sizeof(float));
         }
         vshi_part_output_put(&writer->file, known + row * across, across * sizeof *known);
+        const int32_t kept = vshi_ao_cut_kept(cut, writer->row);
+        if (vshi_ao_cut_kept(cut, ++writer->row) > kept) {
+            vshi_part_output_put(&writer->file, shots + (size_t)(kept - before) * across,
+                                 across * sizeof *shots);
+        }
     }
 }
 
 vsh_result vshi_part_writer_piece(vshi_part_writer *writer, const vsh_bake_stats *stats, vsh_error *error) {
     vsh_bake_stats same = *stats;
+    writer->row = -1;
     vshi_part_code_stats(&writer->tail, &same, writer->meshes[writer->done++], writer->error_count);
     return writer->tail.failed ? vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory",
                                            writer->file.output.target)

@@ -31,6 +31,11 @@ static uint64_t checksum_of(uint64_t sum, const void *bytes, size_t size) {
     return sum;
 }
 
+/* Texels that what they shot is kept of. */
+static size_t shots_of(const vshi_channels *channels) {
+    return channels->shots != NULL ? channels->shot_rows * (size_t)channels->image.width : 0;
+}
+
 static uint64_t checksum(const vshi_channels *channels, size_t texels, const uint64_t *invalid,
                          size_t mesh_count, const vsh_bake_error *errors, size_t error_count) {
     uint64_t sum = checksum_of(UINT64_C(0xcbf29ce484222325), invalid, mesh_count * sizeof *invalid);
@@ -39,6 +44,9 @@ static uint64_t checksum(const vshi_channels *channels, size_t texels, const uin
     }
     if (channels->known != NULL) {
         sum = checksum_of(sum, channels->known, texels * sizeof *channels->known);
+    }
+    if (channels->shots != NULL) {
+        sum = checksum_of(sum, channels->shots, shots_of(channels) * sizeof *channels->shots);
     }
     return checksum_of(sum, errors, error_count * sizeof *errors);
 }
@@ -51,7 +59,7 @@ static char *text_of(const vshi_resume_key *key) {
     if (out == NULL) {
         return NULL;
     }
-    fprintf(out, "%s3: %d x %d by %d\n", magic, key->image->width, key->image->height, key->band_rows);
+    fprintf(out, "%s4: %d x %d by %d\n", magic, key->image->width, key->image->height, key->band_rows);
     if (key->part) {
         fprintf(out, "rows %d to %d\n", key->first, key->end);
     }
@@ -170,6 +178,8 @@ static bool read_band(vshi_resume *r, const band_head *want, vshi_channels *chan
     }
     good = good && (channels->known == NULL ||
                     fread(channels->known, sizeof *channels->known, texels, r->file) == texels);
+    good = good && (channels->shots == NULL || fread(channels->shots, sizeof *channels->shots,
+                                                     shots_of(channels), r->file) == shots_of(channels));
     good = good && fread(errors, sizeof *errors, r->error_count, r->file) == r->error_count;
     if (!good || checksum(channels, texels, invalid, mesh_count, errors, r->error_count) != head.checksum) {
         return false;
@@ -230,6 +240,8 @@ void vshi_resume_keep(vshi_resume *r, int32_t first, int32_t rows, const vshi_ch
     }
     good = good && (channels->known == NULL ||
                     fwrite(channels->known, sizeof *channels->known, texels, r->file) == texels);
+    good = good && (channels->shots == NULL || fwrite(channels->shots, sizeof *channels->shots,
+                                                      shots_of(channels), r->file) == shots_of(channels));
     good = good && fwrite(stats->errors, sizeof *stats->errors, r->error_count, r->file) == r->error_count;
     if (!good || fflush(r->file) != 0 || fdatasync(fileno(r->file)) != 0) {
         give_up(r);

@@ -1,6 +1,6 @@
 /* Bands of a lightmap that are kept until it is whole, so that a bake that was ended goes on from them. They
  * stand in OUTPUT.resume: what the bake is, as its output tells it, and for each band the statistics so far,
- * its channels (of a part also what is known of its texels) and a checksum. */
+ * its channels (of a part also what is known of its texels, and kept of their AO) and a checksum. */
 #ifndef VSHI_RESUME_H
 #define VSHI_RESUME_H
 

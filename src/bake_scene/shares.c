@@ -1,5 +1,6 @@
 #include "bake_scene/shares.h"
 
+#include "bake/part.h"
 #include "base/memory.h"
 #include "base/try.h"
 
@@ -14,14 +15,24 @@ enum { FEW_STEP = 16, FEW_MOST = 16384 };
 enum { MOST_ROUNDS = 8 };
 static const double BORDERS = 0.01;
 
-/* Rows of tiles that a shard should have for pairs of them to stay together, where texels share AO: a border
- * that parts a pair has more tiles beside it shoot. */
-enum { PAIRED = 32 };
+/* Lattices' tiles that a shard should have one above the other for its ends to be at the ends of one, where
+ * texels share AO: what an end divides is shot by both. Of so many, half of one is little. */
+enum { TILES_APART = 16 };
 
-/* Rows that are rasterised and shaded beside a border, on both sides together, as whole ones: of windows that
- * reach seven texels of each lattice. */
-static double border_rows(int32_t spacing) {
-    return spacing > 1 ? 5.0 * spacing : 1.0;
+/* Rows of tiles that stay together. */
+static size_t step_of(const vshi_share_rows *share, int32_t shards) {
+    size_t step = 1;
+    while (step < (size_t)share->spacing && share->count / (2 * step * TILES_APART) >= (size_t)shards) {
+        step *= 2;
+    }
+    return step;
+}
+
+/* Rows that are laid out and shot beside a border, on both sides together, as whole ones: where AO is left,
+ * those that windows reach are kept, and what is shot twice are some tiles of lattices; else they are shot
+ * twice. */
+static double border_rows(const vshi_share_rows *share) {
+    return share->left > 1 ? 1.5 * share->spacing : share->spacing > 1 ? 5.0 * share->spacing : 1.0;
 }
 
 static int32_t few_step(const vsh_charts_info *info) {
@@ -53,6 +64,16 @@ vsh_result vshi_shares_note(vsh_bake_job *job, size_t index, const vsh_charts *c
     return vshi_texels_create_sparse(charts, share->few_step, run, &share->few, error);
 }
 
+vsh_result vshi_shares_leave(const vsh_bake_job *job, vsh_error *error) {
+    const vsh_lightmap planes = vshi_channels_shape(&job->scene);
+    for (size_t i = 0; i < job->targets.count; ++i) {
+        vshi_share_rows *share = &job->shares[i];
+        VSHI_TRY(vshi_part_spacing(job->occluders, &job->scene.shade, &planes, share->spacing, &share->left,
+                                   error));
+    }
+    return VSH_OK;
+}
+
 /* --- cutting */
 
 /* All shares, and how they are cut. */
@@ -77,7 +98,7 @@ static int32_t count_rounds(const vsh_bake_job *job, int32_t count) {
         return 1;
     }
     const vshi_share_rows *share = &job->shares[0];
-    const double border = border_rows(share->spacing) / (8.0 * (double)share->count);
+    const double border = border_rows(share) / (8.0 * (double)share->count);
     const double more = BORDERS / (border * (count - 1));
     return more >= MOST_ROUNDS - 1 ? MOST_ROUNDS : 1 + (int32_t)more;
 }
@@ -110,7 +131,7 @@ vsh_result vshi_shares_list(const vsh_bake_job *job, int32_t shard, int32_t coun
     uint64_t before = 0;
     for (size_t i = 0; i < job->targets.count; ++i) {
         const vshi_share_rows *share = &job->shares[i];
-        const size_t step = share->spacing > 1 && share->count / PAIRED >= (size_t)count ? 2 : 1;
+        const size_t step = step_of(share, count);
         for (size_t row = 0; row < share->count; row += step) {
             uint64_t work = 0;
             const size_t next = row + step < share->count ? row + step : share->count;

@@ -16,6 +16,7 @@ typedef struct vshi_share_row {
 typedef struct vshi_share_rows {
     size_t count;        /* rows of tiles */
     int32_t spacing;     /* of texels that share AO; 1: none do */
+    int32_t left;        /* the same, where AO is left at the ends of pieces (bake/ao_cut.h); else 1 */
     vshi_share_row *row; /* [count] */
     vsh_texels *few;     /* of it, of every `few_step`th row and column; NULL: none */
     int32_t few_step;
@@ -33,6 +34,9 @@ vsh_result vshi_shares_note(vsh_bake_job *job, size_t index, const vsh_charts *c
  * vsh_bake_lightmap(). */
 vsh_result vshi_shares_weigh(const vsh_bake_job *job, vshi_share_rows *share, const vsh_run *run,
                              vsh_error *error);
+
+/* Sets whether AO is left, of a prepared job. Errors: VSH_ERROR_ARGUMENT. */
+vsh_result vshi_shares_leave(const vsh_bake_job *job, vsh_error *error);
 
 /* The rows that shard `shard` of `count` bakes, of a prepared job, in the order of lightmaps and rows;
  * *pieces is to be freed, also after an error. Shards follow each other through all lightmaps, each with as

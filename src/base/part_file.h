@@ -90,6 +90,8 @@ VSHI_SHARED vsh_result vshi_part_reopen(const char *path, uint64_t at, FILE **fi
 VSHI_SHARED vsh_result vshi_part_read_bytes(FILE *file, const char *path, void *bytes, size_t size,
                                             vsh_error *error);
 
+VSHI_SHARED vsh_result vshi_part_skip(FILE *file, const char *path, size_t size, vsh_error *error);
+
 /* VSH_ERROR_INPUT: `what` of it cannot be. */
 VSHI_SHARED vsh_result vshi_part_damaged(const char *path, const char *what, vsh_error *error);
 

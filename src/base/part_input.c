@@ -102,9 +102,7 @@ vsh_result vshi_part_input_pass_body(vshi_part_input *part, bool whole, const vs
                                      vsh_error *error) {
     const uint64_t bytes = part->front.body_bytes;
     if (!whole) {
-        return fseeko(part->file, (off_t)bytes, SEEK_CUR) == 0
-                   ? VSH_OK
-                   : vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", part->path, strerror(errno));
+        return vshi_part_skip(part->file, part->path, (size_t)bytes, error);
     }
     unsigned char *chunk = NULL;
     vshi_job *job = vshi_job_begin(run, "parts", (size_t)(bytes / CHUNK) + 1);
@@ -144,6 +142,12 @@ void vshi_part_input_close(vshi_part_input *part) {
     }
     free(part->head.bytes);
     part->head.bytes = NULL;
+}
+
+vsh_result vshi_part_skip(FILE *file, const char *path, size_t size, vsh_error *error) {
+    return fseeko(file, (off_t)size, SEEK_CUR) == 0
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, strerror(errno));
 }
 
 vsh_result vshi_part_reopen(const char *path, uint64_t at, FILE **file, vsh_error *error) {

@@ -16,4 +16,11 @@ static inline bool cli_caster_is_direct(const vsh_caster *caster) {
            (caster->type == VSH_CASTER_SPHERES && !caster->voxelised);
 }
 
+/* How many casters are in level sets. */
+size_t cli_casters_voxelised(const vsh_scene *scene);
+
+/* Voxel size of the casters in no layer that the scene's file of fields keeps, world units; 0: it keeps none.
+ */
+double cli_casters_kept_voxel_size(const vsh_scene *scene);
+
 #endif

@@ -37,9 +37,8 @@ typedef struct cli_stats {
     uint64_t bands;        /* that lightmaps were baked in: one each where they were baked whole */
     vsh_shade_stats shade;
     const vsh_bake_error
-        *errors; /* [light_count + 2]: of each light, of AO, of the sky; NULL: none are known */
-    vsh_bake_error *own_errors; /* `errors` of a sum; NULL else */
-    const vsh_light *lights;    /* of `errors` */
+        *errors;             /* [light_count + 2]: of each light, of AO, of the sky; NULL: none are known */
+    const vsh_light *lights; /* of `errors` */
     size_t light_count;
     cli_method methods[CLI_STATS_KINDS]; /* NULL names where nothing is baked by one */
     double max_error;                    /* that was asked for */
@@ -58,11 +57,6 @@ void cli_stats_methods(cli_stats *stats, const vsh_scene *scene, int32_t has_tri
 
 /* Takes what casts and the seconds that it took to make, and what the scene's methods come to with it. */
 void cli_stats_casters(cli_stats *stats, const vsh_scene *scene, const vsh_occluders_info *casters);
-
-/* Adds what another bake of the same lights came to; `errors` become copies of its own, which
- * cli_stats_free_sum() frees. CLI_OK or an exit code, having said why. */
-int cli_stats_add(cli_stats *sum, const cli_stats *more);
-void cli_stats_free_sum(cli_stats *sum);
 
 /* What is known of the errors of a kind's values, all lights together. */
 vsh_bake_error cli_stats_error(const cli_stats *stats, int kind);

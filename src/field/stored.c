@@ -138,6 +138,38 @@ static uint64_t block_count(const vsh_field *field) {
     return top->first_index + (uint64_t)top->size[0] * (uint64_t)top->size[1] * (uint64_t)top->size[2];
 }
 
+/* Its place and its map, as far as there is one; blocks are looked at when they are copied. */
+static vsh_result check_band(const checking *c, const vshi_stored_band *band, const vsh_field *field,
+                             uint64_t head_bytes, uint64_t file_bytes) {
+    static const vshi_stored_band none;
+    if (band->block_count == 0) {
+        return memcmp(band, &none, sizeof none) == 0 ? VSH_OK : refuse(c, "a band without blocks");
+    }
+    const int32_t *size = field->levels[0].size;
+    if (band->block_count > (uint64_t)size[0] * (uint64_t)size[1] * (uint64_t)size[2]) {
+        return refuse(c, "its band has more blocks than it");
+    }
+    if (band->masks_at !=
+        vshi_stored_align(band->blocks_at + band->block_count * sizeof(uint32_t), VSHI_STORED_APART)) {
+        return refuse(c, "the blocks and masks of its band are not as many");
+    }
+    if (!lies_within(band->blocks_at, band->block_count * sizeof(uint32_t), head_bytes, file_bytes) ||
+        !lies_within(band->masks_at, band->block_count * VSHI_MASK_WORDS * sizeof(uint64_t), head_bytes,
+                     file_bytes)) {
+        return refuse(c, "its band lies beyond the file");
+    }
+    const vshi_map *map = &band->map;
+    const size_t length = strnlen(map->name, sizeof map->name);
+    bool sound = length < sizeof map->name && map->count <= VSHI_MAP_NUMBERS;
+    for (size_t i = 0; i < sizeof map->name; ++i) {
+        sound = sound && (i < length ? map->name[i] > ' ' && map->name[i] <= '~' : map->name[i] == '\0');
+    }
+    for (size_t i = 0; i < VSHI_MAP_NUMBERS; ++i) {
+        sound = sound && (i < map->count ? (bool)isfinite(map->numbers[i]) : map->numbers[i] == 0.0);
+    }
+    return sound ? VSH_OK : refuse(c, "the map of its band is none");
+}
+
 vsh_result vshi_stored_field_check(const char *path, size_t number, const vshi_stored_field *record,
                                    uint64_t head_bytes, uint64_t file_bytes, vsh_field *field,
                                    vsh_error *error) {
@@ -168,6 +200,10 @@ vsh_result vshi_stored_field_check(const char *path, size_t number, const vshi_s
     if (!lies_within(record->values_at, record->value_count * sizeof(int16_t), head_bytes, file_bytes) ||
         !lies_within(record->index_at, record->index_count * sizeof(int32_t), head_bytes, file_bytes)) {
         return refuse(&c, "its values or blocks lie beyond the file");
+    }
+    result = check_band(&c, &record->band, field, head_bytes, file_bytes);
+    if (result != VSH_OK) {
+        return result;
     }
     const vshi_level *finest = &field->levels[0];
     for (int axis = 0; axis < 3; ++axis) {

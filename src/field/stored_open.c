@@ -119,7 +119,7 @@ static const vshi_stored_head *head_of(const vsh_field_file *f) {
 }
 
 static const vshi_stored_field *record_of(const vsh_field_file *f, size_t i) {
-    return (const vshi_stored_field *)(f->head + sizeof(vshi_stored_head)) + i;
+    return vshi_stored_record(f->head, i);
 }
 
 /* --- texts */
@@ -185,6 +185,7 @@ static vsh_result read_texts(vsh_field_file *f, vsh_error *error) {
         kept->field = &f->fields[i];
         kept->half_width = record_of(f, i)->half_width;
         kept->grid_bytes = record_of(f, i)->grid_bytes;
+        kept->band_bytes = vshi_stored_band_bytes(record_of(f, i)->band.block_count);
         whole = kept->name != NULL && take_attributes(&t, kept->origin_count, next);
         next += kept->origin_count;
     }

@@ -31,7 +31,7 @@ static vshi_stored_head *head_of(const storing *s) {
 }
 
 static vshi_stored_field *record_of(const storing *s, size_t i) {
-    return (vshi_stored_field *)(s->head + sizeof(vshi_stored_head)) + i;
+    return vshi_stored_record(s->head, i);
 }
 
 static bool is_name(const char *name) {
@@ -65,6 +65,11 @@ static vsh_result check_field(const storing *s, size_t i, vsh_error *error) {
     if (kept->origin_count > 0 && kept->origin == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: fields[%zu]: origin is NULL", s->path, i);
     }
+    if (kept->band != NULL && !vshi_band_fits(kept->field, kept->band)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "%s: fields[%zu]: its band is none of the level set that it was made from", s->path,
+                         i);
+    }
     return vshi_attributes_check(s->path, kept->origin, kept->origin_count, error);
 }
 
@@ -78,12 +83,27 @@ static uint64_t text_bytes(const vsh_attribute *attributes, size_t count) {
     return bytes;
 }
 
+static size_t band_blocks(const vsh_kept_field *kept) {
+    size_t count = 0;
+    if (kept->band != NULL) {
+        vshi_voxels_blocks(kept->band, &count);
+    }
+    return count;
+}
+
 static uint64_t block_count(const vsh_field *field) {
     const vshi_level *top = &field->levels[field->level_count - 1];
     return top->first_index + (uint64_t)top->size[0] * (uint64_t)top->size[1] * (uint64_t)top->size[2];
 }
 
-static void fill_record(const vsh_kept_field *kept, vshi_stored_field *r, uint64_t *at) {
+static uint64_t place(uint64_t *at, uint64_t bytes) {
+    const uint64_t here = *at;
+    *at = vshi_stored_align(here + bytes, VSHI_STORED_APART);
+    return here;
+}
+
+static vsh_result fill_record(const vsh_kept_field *kept, vshi_stored_field *r, uint64_t *at,
+                              vsh_error *error) {
     const vsh_field *f = kept->field;
     memcpy(r->to_field, f->to_field, sizeof r->to_field);
     memcpy(r->world_min, f->world_min, sizeof r->world_min);
@@ -110,10 +130,16 @@ static void fill_record(const vsh_kept_field *kept, vshi_stored_field *r, uint64
         to->band = level->band;
         to->quantum = level->quantum;
     }
-    r->values_at = *at;
-    *at = vshi_stored_align(*at + r->value_count * sizeof(int16_t), VSHI_STORED_APART);
-    r->index_at = *at;
-    *at = vshi_stored_align(*at + r->index_count * sizeof(int32_t), VSHI_STORED_APART);
+    r->values_at = place(at, r->value_count * sizeof(int16_t));
+    r->index_at = place(at, r->index_count * sizeof(int32_t));
+    const size_t blocks = band_blocks(kept);
+    if (blocks == 0) {
+        return VSH_OK;
+    }
+    r->band.block_count = blocks;
+    r->band.blocks_at = place(at, blocks * sizeof(uint32_t));
+    r->band.masks_at = place(at, blocks * VSHI_MASK_WORDS * sizeof(uint64_t));
+    return vshi_voxels_map(kept->band, &r->band.map, error);
 }
 
 static char *put_text(char *at, const char *text) {
@@ -138,7 +164,8 @@ static vsh_result make_head(storing *s, const vsh_run *run, vsh_error *error) {
             strlen(s->fields[i].name) + 1 + text_bytes(s->fields[i].origin, s->fields[i].origin_count);
         const vsh_field *f = s->fields[i].field;
         body += vshi_stored_align(f->value_count * sizeof(int16_t), VSHI_STORED_APART) +
-                vshi_stored_align(block_count(f) * sizeof(int32_t), VSHI_STORED_APART);
+                vshi_stored_align(block_count(f) * sizeof(int32_t), VSHI_STORED_APART) +
+                vshi_stored_band_bytes(band_blocks(&s->fields[i]));
     }
     if (s->text_bytes > VSHI_STORED_TEXT) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "%s: names and attributes of more than %d bytes", s->path,
@@ -165,7 +192,7 @@ static vsh_result make_head(storing *s, const vsh_run *run, vsh_error *error) {
     char *text = s->head + sizeof *head + s->count * sizeof(vshi_stored_field);
     text = put_attributes(text, s->attributes, s->attribute_count);
     for (size_t i = 0; i < s->count; ++i) {
-        fill_record(&s->fields[i], record_of(s, i), &at);
+        VSHI_TRY(fill_record(&s->fields[i], record_of(s, i), &at, error));
         text =
             put_attributes(put_text(text, s->fields[i].name), s->fields[i].origin, s->fields[i].origin_count);
     }
@@ -214,7 +241,23 @@ static vsh_result put(storing *s, const void *bytes, uint64_t count, vsh_error *
 
 static vsh_result put_aligned(storing *s, const void *bytes, uint64_t count, vsh_error *error) {
     VSHI_TRY(put(s, bytes, count, error));
-    return put(s, NULL, vshi_stored_align(count, VSHI_STORED_APART) - count, error);
+    const uint64_t at = s->written + s->filled; /* chunks and the head end at multiples */
+    return put(s, NULL, vshi_stored_align(at, VSHI_STORED_APART) - at, error);
+}
+
+static vsh_result put_band(storing *s, const vsh_kept_field *kept, vsh_error *error) {
+    const vshi_level *level = &kept->field->levels[0];
+    size_t count;
+    const vshi_block *blocks = vshi_voxels_blocks(kept->band, &count);
+    for (size_t i = 0; i < count; ++i) {
+        const uint32_t number = vshi_block_number(level->origin, level->size, blocks[i].origin);
+        VSHI_TRY(put(s, &number, sizeof number, error));
+    }
+    VSHI_TRY(put_aligned(s, NULL, 0, error));
+    for (size_t i = 0; i < count; ++i) {
+        VSHI_TRY(put(s, blocks[i].mask, sizeof blocks[i].mask, error));
+    }
+    return VSH_OK;
 }
 
 static vsh_result put_fields(storing *s, vsh_error *error) {
@@ -222,6 +265,9 @@ static vsh_result put_fields(storing *s, vsh_error *error) {
         const vsh_field *f = s->fields[i].field;
         VSHI_TRY(put_aligned(s, f->values, f->value_count * sizeof *f->values, error));
         VSHI_TRY(put_aligned(s, f->index, block_count(f) * sizeof *f->index, error));
+        if (band_blocks(&s->fields[i]) > 0) {
+            VSHI_TRY(put_band(s, &s->fields[i], error));
+        }
     }
     return flush(s, error);
 }

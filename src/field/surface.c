@@ -97,7 +97,8 @@ static void find_quads(const int32_t value[8], cell_quads *quads) {
 
 typedef struct extraction {
     vshi_surface *surface;
-    cell_quads cells[256]; /* by the signs of the corners, 1 below the height */
+    cell_quads cells[256];              /* by the signs of the corners, 1 below the height */
+    uint8_t ones[1 << VSHI_BRICK_EDGE]; /* how many bits a row has */
     const double *centre;
     double scale;
     float *corners;
@@ -111,6 +112,9 @@ static void make_cells(extraction *e) {
             value[c] = (signs >> c & 1) != 0 ? -1 : 1;
         }
         find_quads(value, &e->cells[signs]);
+    }
+    for (int row = 1; row < 1 << VSHI_BRICK_EDGE; ++row) {
+        e->ones[row] = (uint8_t)(e->ones[row / 2] + row % 2);
     }
 }
 
@@ -145,47 +149,67 @@ static uint32_t corner_of(brick *b, int at, int edge, const int32_t value[8]) {
     uint16_t *number = &b->number[3 * low + axis];
     if (*number == 0) {
         *number = (uint16_t)++b->corner_count;
-        if (b->corners != NULL) {
-            write_corner(b, *number - 1u, low, axis, value[ends[0]], value[ends[1]]);
-        }
+        write_corner(b, *number - 1u, low, axis, value[ends[0]], value[ends[1]]);
     }
     return b->first_corner + *number - 1u;
 }
 
-static void add_cell(brick *b, int at) {
-    const int32_t height = b->extraction->surface->height;
-    int32_t value[8];
-    int signs = 0;
-    for (int c = 0; c < 8; ++c) {
-        value[c] = 2 * b->values[at + corner_at[c]] - height;
-        signs |= (value[c] < 0) << c;
-    }
-    cell_quads by_value;
+static void add_cell(brick *b, int at, int signs) {
     const cell_quads *cell = &b->extraction->cells[signs];
+    cell_quads by_value;
+    int32_t value[8];
+    if (b->quads != NULL || cell->ambiguous) {
+        for (int c = 0; c < 8; ++c) {
+            value[c] = 2 * b->values[at + corner_at[c]] - b->extraction->surface->height;
+        }
+    }
     if (cell->ambiguous) {
         find_quads(value, &by_value);
         cell = &by_value;
     }
-    for (int q = 0; q < cell->count; ++q, ++b->quad_count) {
+    for (int q = 0; q < cell->count && b->quads != NULL; ++q) {
         for (int k = 0; k < 4; ++k) {
-            const uint32_t corner = corner_of(b, at, cell->edges[q][k], value);
-            if (b->quads != NULL) {
-                b->quads[4 * (size_t)b->quad_count + (size_t)k] = corner;
-            }
+            b->quads[4 * (size_t)(b->quad_count + (uint32_t)q) + (size_t)k] =
+                corner_of(b, at, cell->edges[q][k], value);
         }
+    }
+    b->quad_count += cell->count;
+}
+
+/* Which values are below the height. */
+static void find_rows(brick *b) {
+    uint8_t below[VSHI_BRICK_VALUES];
+    const int16_t most = (int16_t)((b->extraction->surface->height - 1) / 2); /* it is odd */
+    for (int v = 0; v < VSHI_BRICK_VALUES; ++v) {
+        below[v] = b->values[v] <= most;
+    }
+    for (int row = 0; row < VSHI_STRIDE_X; ++row) {
+        const uint8_t *r = below + VSHI_BRICK_EDGE * row;
+        uint64_t bytes = 0;
+        memcpy(&bytes, r, sizeof bytes);
+        if (__BYTE_ORDER__ == __ORDER_BIG_ENDIAN__) {
+            bytes = __builtin_bswap64(bytes);
+        }
+        /* each byte is moved to a bit of the highest */
+        b->rows[row] = (uint16_t)(bytes * UINT64_C(0x0102040810204080) >> 56 | (uint64_t)r[8] << 8);
     }
 }
 
-static void extract_brick(brick *b) {
-    const int32_t height = b->extraction->surface->height;
+/* Each edge that is crossed has one. */
+static uint32_t count_corners(const brick *b) {
+    const uint8_t *ones = b->extraction->ones;
+    uint32_t count = 0;
     for (int row = 0; row < VSHI_STRIDE_X; ++row) {
-        const int16_t *v = b->values + VSHI_BRICK_EDGE * row;
-        int bits = 0;
-        for (int z = 0; z < VSHI_BRICK_EDGE; ++z) {
-            bits |= (2 * v[z] < height) << z;
-        }
-        b->rows[row] = (uint16_t)bits;
+        const uint16_t *r = b->rows + row;
+        count += ones[(r[0] ^ r[0] >> 1) & 0xff];
+        count += row % VSHI_BRICK_EDGE < VSHI_BRICK_CELLS ? ones[r[0] ^ r[1]] : 0u;
+        count += row < VSHI_BRICK_EDGE * VSHI_BRICK_CELLS ? ones[r[0] ^ r[VSHI_BRICK_EDGE]] : 0u;
     }
+    return count;
+}
+
+static void extract_brick(brick *b) {
+    find_rows(b);
     for (int x = 0; x < VSHI_BRICK_CELLS; ++x) {
         for (int y = 0; y < VSHI_BRICK_CELLS; ++y) {
             const uint16_t *r = b->rows + VSHI_BRICK_EDGE * x + y;
@@ -193,9 +217,15 @@ static void extract_brick(brick *b) {
             const int all = r[0] & r[1] & r[VSHI_BRICK_EDGE] & r[VSHI_BRICK_EDGE + 1];
             int mixed = (some | some >> 1) & ~(all & all >> 1) & 0xff;
             for (; mixed != 0; mixed &= mixed - 1) {
-                add_cell(b, VSHI_STRIDE_X * x + VSHI_STRIDE_Y * y + __builtin_ctz((unsigned)mixed));
+                const int z = __builtin_ctz((unsigned)mixed);
+                const int signs = (r[0] >> z & 3) | (r[1] >> z & 3) << 2 |
+                                  (r[VSHI_BRICK_EDGE] >> z & 3) << 4 | (r[VSHI_BRICK_EDGE + 1] >> z & 3) << 6;
+                add_cell(b, VSHI_STRIDE_X * x + VSHI_STRIDE_Y * y + z, signs);
             }
         }
+    }
+    if (b->quads == NULL) {
+        b->corner_count = count_corners(b);
     }
 }
 
@@ -209,8 +239,8 @@ static void extract(void *user, size_t begin, size_t end) {
         vshi_block_corner(level->origin, level->size, s->bricks[i], corner);
         b.values = s->field->values + s->field->index[level->first_index + s->bricks[i]];
         b.corner_count = b.quad_count = 0;
-        memset(b.number, 0, sizeof b.number);
         if (e->quads != NULL) {
+            memset(b.number, 0, sizeof b.number);
             b.first_corner = s->corners[i];
             b.corners = e->corners + 3 * (size_t)s->corners[i];
             b.quads = e->quads + 4 * (size_t)s->quads[i];

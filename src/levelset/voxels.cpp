@@ -18,10 +18,6 @@ constexpr double FARTHEST = 1e12; // of a voxel from the origin, voxels: doubles
 constexpr double ROUNDING = 1e-6; // voxels: a side so much longer takes no voxel more
 constexpr double BAND_ROUNDING = 1e-6; // of a band's width: the background is a float
 
-void check_blocks(const vsh_run &run, double count, const char *what, vsh_error *error) {
-    require(check_bytes(&run, count * double(sizeof(vshi_block)), what, error));
-}
-
 Vec3d centre_of(const VoxelSet &set, const int32_t index[3]) {
     return set.transform->indexToWorld(Vec3d(index[0], index[1], index[2]));
 }
@@ -82,7 +78,12 @@ bool set_bounds(const VoxelSet &set, vsh_voxels_info &info) {
     return finite;
 }
 
-// Takes the set; `what` names it in messages.
+} // namespace
+
+void check_blocks(const vsh_run &run, double count, const char *what, vsh_error *error) {
+    require(check_bytes(&run, count * double(sizeof(vshi_block)), what, error));
+}
+
 vsh_voxels *close_voxels(VoxelSet &&set, bool normals, const char *what, vsh_error *error) {
     vsh_voxels_info info{};
     for (int axis = 0; axis < 3; ++axis) {
@@ -115,6 +116,8 @@ vsh_voxels *close_voxels(VoxelSet &&set, bool normals, const char *what, vsh_err
     set.least_axis = std::min({info.voxel_size[0], info.voxel_size[1], info.voxel_size[2]});
     return new vsh_voxels{std::make_shared<const VoxelSet>(std::move(set)), info};
 }
+
+namespace {
 
 // --- the band of a level set
 

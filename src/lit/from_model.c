@@ -200,11 +200,13 @@ static vsh_result put_primitive(maker *m, size_t entry, arrays *a, json_t *made,
     size_t set = a->set_count;
     if (lit->uvs != NULL) {
         float *values = NULL;
+        VSHI_TRY(vshi_lit_check_set(document, "a mesh", set, error));
         VSHI_TRY(vshi_gltf_take(&document->gltf, (void **)&values, count, sizeof(float[2]), error));
         const vsh_result result =
             add_set(m, lit->uvs, NULL, count, values, set, json_object_get(made, "attributes"), error);
         free(values);
         VSHI_TRY(result);
+        VSHI_TRY(vshi_lit_tell_set(document, made, set, error));
     } else if (lit->uv_set >= 0) {
         set = a->sets[lit->uv_set];
     }

@@ -9,6 +9,7 @@
 #include "base/floats.h"
 #include "base/memory.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -188,6 +189,75 @@ static void free_work(vshi_lit_work *work) {
     }
     free(work->intensities);
     vshi_lit_close(&work->document);
+}
+
+/* --- room for new UVs */
+
+static vsh_result try_mesh(vshi_lit_work *work, size_t entry, vsh_error *error) {
+    const vshi_model_origin *origin = &work->model->entries[entry].origin;
+    const size_t mesh = (size_t)origin->mesh - 1, primitive = (size_t)origin->primitive - 1;
+    const json_t *of = vshi_gltf_element(&work->document.gltf, "meshes", mesh);
+    json_t *copy = json_deep_copy(json_array_get(json_object_get(of, "primitives"), primitive));
+    char where[96];
+    size_t set;
+    snprintf(where, sizeof where, "meshes[%zu].primitives[%zu]", mesh, primitive);
+    if (copy == NULL) {
+        return vshi_lit_no_memory(&work->document, error);
+    }
+    const vsh_result result = vshi_lit_choose_set(work, copy, &work->meshes[entry], where, &set, error);
+    json_decref(copy);
+    return result;
+}
+
+static vsh_result try_all(vshi_lit_work *work, const char *path, const vsh_run *run, vshi_job *job,
+                          vsh_error *error) {
+    bool opened = false;
+    for (size_t i = 0; i < vsh_model_mesh_count(work->model); ++i) {
+        if (work->meshes[i].uvs == NULL || vsh_model_uv_sets(work->model, i) < VSH_MAX_UV_SETS) {
+            continue;
+        }
+        if (path == NULL || !is_gltf(path)) {
+            VSHI_TRY(vshi_lit_begin(&work->document, path != NULL ? path : "a model", run, job, error));
+            return vshi_lit_check_set(&work->document, "a mesh", VSH_MAX_UV_SETS, error);
+        }
+        if (!opened) {
+            VSHI_TRY(vshi_lit_open(&work->document, path, run, job, error));
+            opened = true;
+        }
+        VSHI_TRY(try_mesh(work, i, error));
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_lit_check_uvs(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
+                             const vsh_lit_options *options, const vsh_run *run, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(model);
+    VSHI_NEEDS(meshes);
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    vsh_lit_options own = vsh_lit_options_default();
+    VSHI_TRY(vshi_options_resolve(options, &own, sizeof own, "vsh_lit_options", error));
+    for (size_t i = 0; i < own.image_count; ++i) {
+        if (own.images[i].purpose < 0 || own.images[i].purpose >= VSH_LIT_PURPOSES) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_lit_options.images[%zu].purpose is %d", i,
+                             own.images[i].purpose);
+        }
+    }
+    vshi_lit_work work = {.model = model, .meshes = meshes, .options = &own};
+    vshi_job *job = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(count_pages(&work, error));
+    for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
+        VSHI_TRY_DONE(vshi_lit_check_mesh(&work, i, error));
+    }
+    job = vshi_job_begin(&full, "lit", 1);
+    result = job != NULL ? try_all(&work, path, &full, job, error)
+                         : vshi_fail(error, VSH_ERROR_MEMORY, "a lit model: the system refused memory");
+done:
+    vshi_job_end(job);
+    free_work(&work);
+    return result;
 }
 
 vsh_result vsh_lit_write(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,

@@ -91,8 +91,7 @@ static vsh_result set_lightmap(vshi_lit_work *work, json_t *material, const vshi
     return vshi_lit_use_extension(document, "MOZ_lightmap", error);
 }
 
-/* Holes and glass are in the texture that this would replace. */
-static bool is_cut_by_texture(const json_t *material) {
+bool vshi_lit_is_cut_by_texture(const json_t *material) {
     const char *mode = json_string_value(json_object_get(material, "alphaMode"));
     return mode != NULL && strcmp(mode, "OPAQUE") != 0 &&
            json_object_get(json_object_get(material, "pbrMetallicRoughness"), "baseColorTexture") != NULL;
@@ -102,7 +101,7 @@ static vsh_result set_preview(vshi_lit_work *work, json_t *material, const vshi_
                               vsh_error *error) {
     vshi_lit_document *document = &work->document;
     json_t *base, *extensions;
-    if (is_cut_by_texture(material)) {
+    if (vshi_lit_is_cut_by_texture(material)) {
         return VSH_OK;
     }
     VSHI_TRY(vshi_lit_object(document, material, "pbrMetallicRoughness", &base, error));

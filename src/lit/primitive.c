@@ -188,20 +188,13 @@ static vsh_result make_split(vshi_lit_work *work, vshi_lit_shape *shape, const j
     return vshi_lit_add_floats(document, v->uvs[0], mesh->vertex_count, 2, false, uvs, NULL, error);
 }
 
-static size_t free_set(const json_t *attributes, char *name, size_t size) {
-    size_t set = 0;
-    do {
-        snprintf(name, size, "TEXCOORD_%zu", set);
-    } while (json_object_get(attributes, name) != NULL && ++set > 0);
-    return set;
-}
-
-static vsh_result set_uvs(const vshi_lit_work *work, json_t *primitive, size_t accessor, size_t *set,
+static vsh_result set_uvs(const vshi_lit_work *work, json_t *primitive, size_t accessor, size_t set,
                           vsh_error *error) {
     char name[40];
-    json_t *attributes = json_object_get(primitive, "attributes");
-    *set = free_set(attributes, name, sizeof name);
-    return vshi_lit_set(&work->document, attributes, name, json_integer((json_int_t)accessor), error);
+    snprintf(name, sizeof name, "TEXCOORD_%zu", set);
+    VSHI_TRY(vshi_lit_set(&work->document, json_object_get(primitive, "attributes"), name,
+                          json_integer((json_int_t)accessor), error));
+    return vshi_lit_tell_set(&work->document, primitive, set, error);
 }
 
 static vsh_result make(vshi_lit_work *work, vshi_lit_shape *shape, const json_t *given,
@@ -210,6 +203,7 @@ static vsh_result make(vshi_lit_work *work, vshi_lit_shape *shape, const json_t 
     vshi_lit_document *document = &work->document;
     vshi_lit_split *split = NULL;
     size_t uvs, set, positions, whole = SIZE_MAX;
+    VSHI_TRY(vshi_lit_choose_set(work, made, mesh, where, &set, error));
     if (v->split) {
         VSHI_TRY(make_split(work, shape, given, mesh, v, where, made, &uvs, &split, error));
     } else {
@@ -219,7 +213,7 @@ static vsh_result make(vshi_lit_work *work, vshi_lit_shape *shape, const json_t 
                                       v->elements, (const float(*)[2])v->uvs, mesh->vertex_count, &uvs,
                                       error));
     }
-    VSHI_TRY(set_uvs(work, made, uvs, &set, error));
+    VSHI_TRY(set_uvs(work, made, uvs, set, error));
     const uint32_t only = vshi_lit_only_page(work, mesh);
     if (!v->split && only != VSH_LIT_NO_CHART) { /* its indices stay, strips too */
         VSHI_TRY(vshi_lit_mark_primitive(work, made, only, set, error));

@@ -80,6 +80,10 @@ vsh_result vshi_lit_mark(vshi_lit_work *work, json_t *owner, uint32_t page, size
 vsh_result vshi_lit_mark_primitive(vshi_lit_work *work, json_t *primitive, uint32_t page, size_t set,
                                    vsh_error *error);
 
+/* Whether holes and glass of a material are in its base colour's texture, so that no preview replaces that.
+ */
+bool vshi_lit_is_cut_by_texture(const json_t *material);
+
 /* Makes the materials of all looks, and puts them into the primitives of the root's meshes. A material that
  * nothing else uses is changed where it is. Errors: VSH_ERROR_INPUT, VSH_ERROR_MEMORY. */
 vsh_result vshi_lit_materials_apply(vshi_lit_work *work, vsh_error *error);
@@ -88,6 +92,18 @@ vsh_result vshi_lit_materials_apply(vshi_lit_work *work, vsh_error *error);
  * itself, or one for each page. */
 vsh_result vshi_lit_primitive_make(vshi_lit_work *work, size_t mesh, size_t primitive, size_t entry,
                                    json_t *list, vsh_error *error);
+
+/* Takes out of a primitive what new UVs of `mesh` replace, and tells which set they become: the first that
+ * was made before and that nothing shows which stays, or one more. Errors: VSH_ERROR_LIMIT (VSH_MAX_UV_SETS).
+ * (own_sets.c) */
+vsh_result vshi_lit_choose_set(const vshi_lit_work *work, json_t *primitive, const vsh_lit_mesh *mesh,
+                               const char *where, size_t *set, vsh_error *error);
+vsh_result vshi_lit_check_set(const vshi_lit_document *document, const char *where, size_t set,
+                              vsh_error *error);
+
+/* Notes in a primitive's extras that a set was made, for the next time. */
+vsh_result vshi_lit_tell_set(const vshi_lit_document *document, json_t *primitive, size_t set,
+                             vsh_error *error);
 
 /* Appends to `list` a primitive for each page of `mesh`, copies of `made`, whose indices are set: those of
  * triangle t are corners[t]. `whole`: an accessor of all of them, used where there is one page; SIZE_MAX: a

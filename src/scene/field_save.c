@@ -24,8 +24,9 @@ typedef struct saving {
     vsh_run run;
     bool trial;
     vshi_caster_prints prints;
-    vsh_kept_field *kept; /* these three: [capacity] */
+    vsh_kept_field *kept; /* these four: [capacity] */
     vsh_field **fields;
+    vsh_voxels **bands;
     vshi_attributes *recipes;
     size_t count;
     vshi_attributes attributes;
@@ -96,7 +97,11 @@ static vsh_result make_field(saving *s, const vsh_scene_layer *layer, vsh_error 
     vsh_field_options options = vsh_field_options_default();
     options.reach = ANY_REACH;
     vsh_field **field = &s->fields[s->count];
-    const vsh_result result = vsh_field_create(grid, &options, &s->run, field, error);
+    vsh_voxels **band = &s->bands[s->count];
+    vsh_result result = vsh_field_create(grid, &options, &s->run, field, error);
+    if (result == VSH_OK && !s->trial) {
+        result = vsh_voxels_from_grid(grid, 0.0, &s->run, band, error);
+    }
     vsh_grid_free(grid);
     VSHI_TRY(result);
     vsh_field_info info;
@@ -121,6 +126,7 @@ static vsh_result make_field(saving *s, const vsh_scene_layer *layer, vsh_error 
     kept->grid_bytes = voxels.bytes;
     kept->origin = recipe->list;
     kept->origin_count = recipe->count;
+    kept->band = *band;
     return s->trial ? VSH_OK : vshi_scene_warn_lost(s->scene, s->assets, layer, *field, &s->run, error);
 }
 
@@ -128,6 +134,7 @@ static vsh_result make_fields(saving *s, vsh_error *error) {
     const size_t capacity = s->scene->layer_count + 1;
     VSHI_TRY(vshi_allocate((void **)&s->kept, capacity, sizeof *s->kept, "fields", error));
     VSHI_TRY(vshi_allocate((void **)&s->fields, capacity, sizeof *s->fields, "fields", error));
+    VSHI_TRY(vshi_allocate((void **)&s->bands, capacity, sizeof *s->bands, "bands", error));
     VSHI_TRY(vshi_allocate((void **)&s->recipes, capacity, sizeof *s->recipes, "fields", error));
     if (!s->trial) {
         VSHI_TRY(vshi_caster_prints_make(s->scene, s->assets, &s->run, &s->prints, error));
@@ -168,9 +175,13 @@ static void free_saving(saving *s) {
     for (size_t i = 0; s->fields != NULL && i <= s->scene->layer_count; ++i) {
         vsh_field_free(s->fields[i]);
     }
+    for (size_t i = 0; s->bands != NULL && i <= s->scene->layer_count; ++i) {
+        vsh_voxels_free(s->bands[i]);
+    }
     vshi_attributes_free(&s->attributes);
     vshi_caster_prints_free(&s->prints);
     free(s->recipes);
+    free(s->bands);
     free(s->fields);
     free(s->kept);
 }

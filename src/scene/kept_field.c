@@ -1,6 +1,7 @@
 #include "scene/kept_field.h"
 
 #include "base/floats.h"
+#include "base/job.h"
 #include "base/numbers.h"
 #include "base/try.h"
 #include "scene/assets.h"
@@ -80,6 +81,45 @@ vsh_result vshi_kept_field_find(const vsh_scene *scene, const vshi_caster_prints
     memcpy(info->bounds_min, of.bounds_min, sizeof info->bounds_min);
     memcpy(info->bounds_max, of.bounds_max, sizeof info->bounds_max);
     return VSH_OK;
+}
+
+static vsh_result find_band(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
+                            size_t *index, vsh_error *error) {
+    if (scene->field == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_scene_field_band: the scene takes no field");
+    }
+    if (scene->layer_count > 0) {
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "%s: keeps the casters of each layer on their own: a scene with layers has no band "
+                         "of all casters there",
+                         vsh_field_file_path(scene->field));
+    }
+    vshi_caster_prints made = {NULL, 0};
+    const vshi_caster_prints *prints = vshi_assets_prints(assets);
+    vsh_grid_info voxels;
+    vsh_result result;
+    if (prints->count != scene->caster_count) { /* they were loaded before the scene took a field */
+        VSHI_TRY_DONE(vshi_caster_prints_make(scene, assets, run, &made, error));
+        prints = &made;
+    }
+    result = vshi_kept_field_find(scene, prints, NULL, VSH_RESOLUTION_NAMED, index, &voxels, error);
+done:
+    vshi_caster_prints_free(&made);
+    return result;
+}
+
+vsh_result vsh_scene_field_band(const vsh_scene *scene, const vsh_assets *assets, double band,
+                                const vsh_run *run, vsh_voxels **voxels, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(voxels);
+    *voxels = NULL;
+    VSHI_NEEDS(scene);
+    VSHI_NEEDS(assets);
+    vsh_run full;
+    size_t index;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    VSHI_TRY(find_band(scene, assets, &full, &index, error));
+    return vsh_field_file_band(scene->field, index, band, &full, voxels, error);
 }
 
 /* What a file's scene named: "resolution 512", "voxel_size 0.01". */

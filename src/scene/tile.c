@@ -201,6 +201,7 @@ vsh_result vsh_tile_create(const vsh_tiles *tiles, size_t index, vsh_tile **tile
     made->scene = *tiles->whole;
     made->scene.tile = made;
     made->rules = tiles->survey.rules;
+    made->whole = tiles->survey.whole;
     made->info.all_objects = tiles->survey.objects;
     made->info.all_triangles = tiles->survey.triangles;
     vshi_world_box around;

@@ -32,6 +32,7 @@ struct vsh_tile {
     vshi_tile_caster *casters;  /* [scene.caster_count] */
     unsigned char *kept;        /* those of the casters, one after the other */
     const unsigned char *rules; /* the same of the scene's */
+    vshi_world_box whole;       /* that of the survey */
     vsh_tile_info info;
 };
 

@@ -6,6 +6,7 @@
 #include "levelset/told.h"
 #include "mesh/mesh.h"
 #include "scene/asset_place.h"
+#include "scene/assets.h"
 #include "scene/select.h"
 
 #include <stdlib.h>
@@ -255,6 +256,23 @@ static vsh_result check_matched(const surveying *s, vsh_error *error) {
     return VSH_OK;
 }
 
+static vshi_world_box find_whole(const surveying *s) {
+    vshi_world_box whole = vshi_empty_box;
+    for (size_t i = 0; i < s->scene->caster_count; ++i) {
+        const vsh_caster *caster = &s->scene->casters[i];
+        const vshi_survey_caster *found = &s->survey->casters[i];
+        if (!vshi_caster_in_layer(caster, NULL)) {
+            continue;
+        }
+        const vshi_world_box moved = vshi_box_moved(&found->box, caster->transform);
+        vshi_box_grow(&whole, &moved);
+        for (size_t k = 0; k < found->count; ++k) {
+            vshi_box_grow(&whole, &found->objects[k].box);
+        }
+    }
+    return whole;
+}
+
 vsh_result vshi_survey_make(const vsh_scene *scene, const vsh_run *run, vshi_survey *survey,
                             vsh_error *error) {
     surveying s = {.scene = scene, .run = run, .survey = survey};
@@ -272,6 +290,7 @@ vsh_result vshi_survey_make(const vsh_scene *scene, const vsh_run *run, vshi_sur
     }
     VSHI_TRY(look_at_casters(&s, error));
     VSHI_TRY(check_matched(&s, error));
+    survey->whole = find_whole(&s);
     return look_at_receivers(&s, error);
 }
 

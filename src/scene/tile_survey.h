@@ -30,6 +30,8 @@ typedef struct vshi_survey {
     size_t caster_count;
     unsigned char *rules;      /* [solidity_count]: of the scene's */
     vshi_world_box *receivers; /* [receiver_count] */
+    vshi_world_box whole;      /* of meshes and .vdb files that cast in no layer, world space; others are in
+                                  every tile */
     size_t objects;            /* these two of all casters */
     uint64_t triangles;
 } vshi_survey;

@@ -59,6 +59,7 @@ typedef struct vshi_ao_task {
     const vshi_sampler *sampler; /* of rays; else NULL */
     const vshi_ao_cones *cones;  /* of cones */
     double distance;             /* finest voxels */
+    double scale;                /* over what lengths AO bends, world units */
     bool sphere;                 /* in free space: all directions alike, no normals, no start offset */
     vshi_vec up;                 /* unit, world space: AO is of what is over its horizon; zero: of all */
     const vshi_kernel *kernel;   /* of a call, as what follows */

@@ -20,14 +20,10 @@ enum { TILE = 8, FIRST = 8, BEYOND = 16 };
 static const double SEEN_OVER = 0.4;
 static const int32_t MOST_SEEN = 128, CLOSE = 2;
 
-/* Steps between texels of a lattice, of scale_of(), at most: what a plane is off from what bends grows with
- * their square, so that they go with the square root of the error asked for, 0.05 of the scale for 0.02.
+/* Steps between texels of a lattice, of the task's scale, at most: what a plane is off from what bends grows
+ * with their square, so that they go with the square root of the error asked for, 0.05 of the scale for 0.02.
  * Where there are none along x or y, what is beside them is not known. */
 static const double WIDEST = 0.35, WIDEST_ALONE = 0.2;
-/* Of the casters' size, diagonally, what they are taken to be large: a well two wide and one deep is an
- * eighth, and what is seen of the sky from its floor came out darker by 0.01 with lattices as wide as the AO
- * distance allows. */
-static const double PART = 0.125;
 /* No lattice for errors below this: noise is then so small that what bends is most of the error, which
  * windows over fewer texels tell less of (test_claims: a disc that fills 32² texels). Nor for random rays, in
  * whose noise it hides. */
@@ -86,23 +82,6 @@ static bool decide(vshi_ao_piece *piece, tile *t, int32_t most) {
     return more;
 }
 
-/* Over what lengths AO bends, world units: the AO distance, beyond which nothing hides, or where that is
- * large or has no end, a part of the casters. */
-static double scale_of(const vshi_ao_task *task) {
-    double low[3], high[3], square = 0.0;
-    if (task->triangles != NULL) {
-        vshi_triangles_bounds(task->triangles, low, high);
-    }
-    for (int axis = 0; axis < 3; ++axis) {
-        const double side = task->triangles != NULL
-                                ? high[axis] - low[axis]
-                                : task->field->voxel_size * ((double)task->field->bounds_max[axis] -
-                                                             (double)task->field->bounds_min[axis]);
-        square += side * side;
-    }
-    return fmin(task->options->ao_distance, PART * sqrt(square));
-}
-
 /* Whether a lattice is fine enough at one of its texels, by the steps to those around it. */
 static bool is_fine(const vshi_ao_task *task, const tile *t, int32_t at) {
     const vshi_window_texel *e = &t->texels[at];
@@ -120,7 +99,7 @@ static bool is_fine(const vshi_ao_task *task, const tile *t, int32_t at) {
         }
         lone += alone;
     }
-    const double most = (lone > 0 ? WIDEST_ALONE : WIDEST) * sqrt(task->options->max_error) * scale_of(task);
+    const double most = (lone > 0 ? WIDEST_ALONE : WIDEST) * sqrt(task->options->max_error) * task->scale;
     return lone < 2 && (double)longest <= most;
 }
 

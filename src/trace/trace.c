@@ -219,11 +219,19 @@ static float trace_point(const tracing *task, size_t point) {
     return (float)((double)free / (double)task->rays);
 }
 
-bool vshi_truth_twice(const vshi_truth *truth, const double position[3], const float normal[3],
-                      uint32_t texel, double expected, double seen[2]) {
+/* Rays that all agree are no reason to end where they don't agree with the value: few rays miss what is
+ * small, always to one side. */
+static bool agrees(double free, double taken, double expected) {
+    static const double ENOUGH = 1e-3;
+    return fabs(free - expected * taken) < ENOUGH * taken;
+}
+
+/* Rays of two sets, all or until they agree with what is expected; how many are free. Returns how many each
+ * took, 0 where there is no point; *even: VSHI_TRUTH_… of the first. */
+static int32_t count_twice(const vshi_truth *truth, const double position[3], const float normal[3],
+                           uint32_t texel, double expected, int32_t free[2], int32_t *even, double *value) {
     /* the samplers' sequences: no others' */
     static const uint32_t PURPOSE[2] = {0x7e570001u, 0x7e570002u};
-    static const double ENOUGH = 1e-3;
     const tracing task = {.triangles = truth->triangles,
                           .solids = truth->solids,
                           .lift = truth->lift,
@@ -232,11 +240,12 @@ bool vshi_truth_twice(const vshi_truth *truth, const double position[3], const f
                           .up = truth->up,
                           .place = truth->place};
     viewpoint from;
-    if (!place_point(&task, position, normal, &from, &seen[0])) {
-        seen[1] = seen[0];
-        return !isnan(seen[0]);
+    free[0] = free[1] = 0;
+    *even = VSHI_TRUTH_UNEVEN;
+    if (!place_point(&task, position, normal, &from, value)) {
+        return 0;
     }
-    int32_t free[2] = {0, 0}, taken = 0;
+    int32_t taken = 0;
     while (taken < truth->rays) {
         double disc[VSHI_TRUTH_FIRST][2];
         const int32_t left = truth->rays - taken, count = left < VSHI_TRUTH_FIRST ? left : VSHI_TRUTH_FIRST;
@@ -245,17 +254,48 @@ bool vshi_truth_twice(const vshi_truth *truth, const double position[3], const f
             free[k] += count_free(&task, &from, (const double(*)[2])disc, count);
         }
         taken += count;
-        /* rays that all agree are no reason to end where they don't agree with the value: few rays miss what
-         * is small, always to one side */
-        if ((free[0] == 0 || free[0] == taken) && free[0] == free[1] &&
-            fabs(free[0] - expected * taken) < ENOUGH * taken) {
+        const bool alike = (free[0] == 0 || free[0] == taken) && free[0] == free[1];
+        if (alike && taken == count) {
+            *even = free[0] == 0 ? VSHI_TRUTH_EVEN_HIDDEN : VSHI_TRUTH_EVEN_FREE;
+        }
+        if (alike && agrees(free[0], taken, expected)) {
             break;
         }
+    }
+    return taken;
+}
+
+bool vshi_truth_twice(const vshi_truth *truth, const double position[3], const float normal[3],
+                      uint32_t texel, double expected, double seen[2]) {
+    int32_t free[2], even;
+    const int32_t taken = count_twice(truth, position, normal, texel, expected, free, &even, &seen[0]);
+    if (taken == 0) {
+        seen[1] = seen[0];
+        return !isnan(seen[0]);
     }
     for (int k = 0; k < 2; ++k) {
         seen[k] = (double)free[k] / (double)taken;
     }
     return true;
+}
+
+bool vshi_truth_count(const vshi_truth *truth, const double position[3], const float normal[3],
+                      uint32_t texel, int32_t free[2], int32_t *even) {
+    double value;
+    if (count_twice(truth, position, normal, texel, NAN, free, even, &value) == 0) {
+        free[0] = free[1] = value > 0.5 ? truth->rays : 0; /* known without rays */
+        return !isnan(value);
+    }
+    return true;
+}
+
+void vshi_truth_settle(int32_t rays, const int32_t free[2], int32_t even, double expected, double seen[2]) {
+    const int32_t first = rays < VSHI_TRUTH_FIRST ? rays : VSHI_TRUTH_FIRST;
+    const int32_t all = even == VSHI_TRUTH_EVEN_FREE ? first : 0;
+    const bool ends = even != VSHI_TRUTH_UNEVEN && agrees(all, first, expected);
+    for (int k = 0; k < 2; ++k) {
+        seen[k] = ends ? (double)all / (double)first : (double)free[k] / (double)rays;
+    }
 }
 
 static void trace_points(void *user, size_t begin, size_t end) {

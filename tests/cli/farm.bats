@@ -152,3 +152,38 @@ PROGRAM
     run -2 "$tools/submit" 2 render box.obj -o out.png
     run -2 env PATH="$PWD/bin:$PATH" "$tools/submit" 2 bake none.obj --ao 1 -o out.exr
 }
+
+@test "submit shares out tiles: no merge, and the parts bake what one bake of all tiles does" {
+    write_box box.obj
+    local x receivers=() casters=()
+    for x in 0 20 40; do
+        casters+=("{\"mesh\": \"box.obj\", \"transform\": {\"translate\": [$x, 0, 0]}}")
+        receivers+=("{\"mesh\": \"box.obj\", \"transform\": {\"translate\": [$x, 0, 0]}, \"size\": 32, \"output\": \"box$x.exr\"}")
+    done
+    (IFS=, && echo "{\"casters\": [${casters[*]}], \"ao\": {\"distance\": 1}, \"receivers\": [${receivers[*]}]}") >world.json
+    mkdir bin
+    printf '#!/bin/sh\nprintf "%%s\\n" "$*" >>asked\necho 7\n' >bin/sbatch
+    chmod +x bin/sbatch
+    run -0 env PATH="$PWD/bin:$PATH" "$tools/submit" 2 bake world.json --tile-size 10 --output-folder maps
+    [ "$output" = 7 ]
+    [ "$(wc -l <asked)" = 1 ] # an array, and nothing behind it
+    [[ $(cat asked) =~ --array=1-2\ .*--mem=([0-9]+)\ --time=2\ --output=maps.logs/%a.log\ .*part.sbatch\ (bake\ world.json\ .*)$ ]]
+    [ "${BASH_REMATCH[1]}" -ge 256 ] && [ "${BASH_REMATCH[1]}" -le 600 ]
+    read -ra bake <<<"${BASH_REMATCH[2]}"
+    for x in 1 2; do
+        SLURM_ARRAY_TASK_ID=$x SLURM_ARRAY_TASK_COUNT=2 SLURM_MEM_PER_NODE=${BASH_REMATCH[1]} "$tools/part.sbatch" "${bake[@]}" --quiet
+    done
+    "$VDBSHADE" bake world.json --tile-size 10 --output-folder all --quiet
+    for x in 0 20 40; do
+        same_values maps/box$x.exr all/box$x.exr
+    done
+    # time is of the tiles that a part has: 100 s each
+    printf '#!/bin/sh\nfor i in 1 2 3 4 5; do echo "tile $i of 5: 1 receiver"; done\necho "memory about 400 MiB"\necho "time about 100 s: bake 90 s"\n' >told
+    chmod +x told
+    rm asked
+    run -0 env PATH="$PWD/bin:$PATH" VDBSHADE="$PWD/told" "$tools/submit" 2 bake world.json --tile-size=10
+    [[ $(cat asked) =~ --mem=856\ --time=12\ --output=world.logs/%a.log ]]
+    run -2 env PATH="$PWD/bin:$PATH" MERGE=--quiet "$tools/submit" 2 bake world.json --tile-size 10
+    [[ "$output" == *"tiles are not merged"* ]]
+    run -2 env PATH="$PWD/bin:$PATH" "$tools/submit" 2 bake none.json --tile-size 10
+}

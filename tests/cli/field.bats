@@ -42,8 +42,37 @@ same() {
     same png c.field render "$ASSETS/cloister.glb" "${sun[@]}" --resolution 64 --method cone --size 64
     same csv c.field query "$ASSETS/cloister.glb" --points p.csv "${sun[@]}" --ao 0.4 --distance --resolution 64
     same vdb c.field volume "$ASSETS/cloister.glb" "${sun[@]}" --resolution 64 --box -1,0,-1,1,1,1 --box-voxel-size 0.25
-    shade volume "$ASSETS/cloister.glb" "${sun[@]}" -o v.vdb --field c.field
-    refused 2 --field
+    # the level set's band, with values of every kind, and the size of its voxels
+    same vdb c.field volume "$ASSETS/cloister.glb" "${sun[@]}" --resolution 64
+    same vdb c.field volume "$ASSETS/cloister.glb" "${sun[@]}" --ao 0.5 --resolution 64 --band 3 --inside off --half \
+        --method exact
+    same vdb c.field volume "$ASSETS/cloister.glb" "${sun[@]}" --resolution 64 --box -1,0,-1,1,1,1
+    old_output v.vdb
+    shade volume "$ASSETS/cloister.glb" "${sun[@]}" --resolution 64 --band 1.5 -o v.vdb --field c.field
+    refused 2 c.field "as a whole" "none of 1.5"
+    shade volume "$ASSETS/cloister.glb" "${sun[@]}" --resolution 65 -o v.vdb --field c.field
+    refused 2 c.field stale "resolution was 64"
+    untouched v.vdb
+}
+
+@test "the band of a .vdb is kept to the bit, in its own voxels, moved and scaled" {
+    shade voxelize box.obj --resolution 24 -o box.vdb --quiet
+    done_well
+    shade field box.vdb -o box.field --quiet # in its own voxels
+    done_well
+    same vdb box.field volume box.vdb --sun 1,2,3
+    same vdb box.field volume box.vdb --sun 1,2,3 --box 0,0,0,1,1,1
+    cat >t.json <<'JSON'
+{"casters": [{"vdb": "box.vdb"}],
+ "lights": [{"name": "sun", "type": "directional", "direction": [0.3, 1, 0.2], "angle_deg": 6}]}
+JSON
+    sed 's/"box.vdb"/"box.vdb", "transform": {"rotate_deg": [20, 30, 40], "scale": 0.5, "translate": [1, 2, 3]}/' t.json >u.json
+    for scene in t u; do
+        shade field $scene.json -o $scene.field --quiet
+        done_well
+        same vdb $scene.field volume $scene.json
+        same vdb $scene.field volume $scene.json --box 0,0,0,1,1,1
+    done
 }
 
 @test "a scene's layers and casters of every kind are kept" {
@@ -65,6 +94,8 @@ JSON
     done_well
     same exr s.field bake s.json
     same png s.field render s.json --size 48
+    shade volume s.json -o v.vdb --field s.field
+    refused 2 s.field layer
     shade info s.field
     [[ $output == "fields: 3, "*"sha256:"*" box.vdb"*"caster_2: vdb sha256:"*"field of layer 'a'"* ]] || fail "not what is there"
     [[ $output == *"field of layer 'b'"*"resolution: 40"*"caster_4: spheres, 48 of them"* ]] || fail "not what is there"

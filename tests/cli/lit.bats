@@ -102,6 +102,70 @@ BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
     [ "$(files)" = in.glb ] || fail "$(files)"
 }
 
+# sets FILE: "count of UV sets: those that materials of its document name".
+sets() {
+    local json
+    json=$(case $1 in *.glb) json_of "$1" ;; *) cat "$1" ;; esac)
+    echo "$(grep -o '"TEXCOORD_[0-9]*"' <<<"$json" | sort -u | wc -l): $(grep -o '"texCoord":[0-9]*' <<<"$json" | sort -u | grep -o '[0-9]*' | tr '\n' ' ')"
+}
+
+@test "new UVs take the place of those that were made before, and of no others" {
+    cp "$MODELS/scene.glb" lit0.glb
+    local n
+    for n in 1 2 3; do
+        shade bake lit$((n - 1)).glb "${BAKE[@]}" --unwrap always -o lit$n.glb
+        done_well
+        [ "$(sets lit$n.glb)" = "3: 2 " ] || fail "$n: $(sets lit$n.glb)"
+    done
+    # what is lit by it can be baked as it is, to the light that was baked into it
+    shade bake lit3.glb "${BAKE[@]}" --uv-set 2 --unwrap never --irradiance -o again.exr
+    done_well
+    # a lightmap that stays keeps its set
+    shade bake lit1.glb --ao 1 --size 32 --unwrap always -o ao.glb
+    done_well
+    [ "$(sets ao.glb)" = "4: 2 3 " ] || fail "$(sets ao.glb)"
+    shade bake ao.glb --ao 1 --size 32 --unwrap always -o ao2.glb
+    done_well
+    [ "$(sets ao2.glb)" = "4: 2 3 " ] || fail "$(sets ao2.glb)"
+    # and when both are replaced one is enough
+    shade bake ao2.glb "${BAKE[@]}" --unwrap always -o both.glb
+    done_well
+    [ "$(sets both.glb)" = "3: 2 " ] || fail "$(sets both.glb)"
+    # of previews, and of unwrap
+    shade bake lit1.glb "${BAKE[@]}" --unwrap always --preview -o preview.glb
+    done_well
+    [ "$(sets preview.glb)" = "4: 2 3 " ] || fail "$(sets preview.glb)"
+    "$VDBSHADE" unwrap "$MODELS/scene.glb" -o one.glb
+    "$VDBSHADE" unwrap one.glb -o two.glb
+    [ "$(sets two.glb)" = "3: " ] || fail "$(sets two.glb)"
+    # sets that nobody is known to have made
+    json_of lit1.glb | grep -q '"vdbshade_uv_sets":\[2\]' || fail "no mark"
+    LC_ALL=C sed 's/vdbshade_uv_sets/somebody_s_sets_/g' lit1.glb >other.glb
+    shade bake other.glb "${BAKE[@]}" --unwrap always -o more.glb
+    done_well
+    [ "$(sets more.glb)" = "4: 3 " ] || fail "$(sets more.glb)"
+}
+
+@test "a mesh that has no room for another set of UVs is refused before the bake" {
+    cp "$MODELS"/scene.* .
+    local eight='&'
+    for set in 2 3 4 5 6 7; do
+        eight+=", \"TEXCOORD_$set\" : \1"
+    done
+    sed "s/\"TEXCOORD_1\" : \([0-9]*\)/$eight/" scene.gltf >eight.gltf
+    [ "$(sets eight.gltf)" = "8: " ] || fail "$(sets eight.gltf)"
+    old_output out.gltf
+    shade bake eight.gltf --ao 1 --size 16384 --unwrap always --max-error 0.001 --quiet -o out.gltf # would take minutes
+    refused 4 eight.gltf 'meshes[1].primitives[0] has 8 sets of UVs' 'no more than 8'
+    [ "$(cat out.gltf)" = old ] || fail "the old output is gone"
+    shade bake eight.gltf --ao 1 --size 32 --unwrap always -o out.exr
+    done_well
+    sed 's/"material" : \([01]\)/"extras": {"vdbshade_uv_sets": [7]}, &/' eight.gltf >made.gltf
+    shade bake made.gltf --ao 1 --size 32 --unwrap always -o made.glb
+    done_well
+    [ "$(sets made.glb)" = "8: 7 " ] || fail "$(sets made.glb)"
+}
+
 # write_gltf NODES ACCESSOR BUFFER: a triangle, whose parts these are.
 write_gltf() {
     cat >in.gltf <<EOF
@@ -154,6 +218,10 @@ EOF
             done_well
         done
         shade bake "$MODELS/$model" "${BAKE[@]}" -o "kept/$model.gltf"
+        done_well
+        shade bake "kept/$model.gltf" "${BAKE[@]}" --unwrap always -o "kept/$model.twice.glb"
+        done_well
+        shade bake "kept/$model.twice.glb" "${BAKE[@]}" --unwrap always -o "kept/$model.thrice.glb"
         done_well
     done
     [ "$(ls kept/*.glb kept/*.gltf | wc -l)" -gt 40 ]

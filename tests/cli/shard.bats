@@ -21,6 +21,20 @@ load parts
     merged out.exr 3 "${CLOISTER[@]}" --method cone --ao-method cones --ao-spacing 8 --padding 0 --resolution 48
 }
 
+@test "AO that texels share is shot by one part and finished by merge, of any spacing and error, with its error and in bands" {
+    for options in "--ao-spacing 8 --error" "--ao-spacing 2 --max-error 0.05" "--max-error 0.008" "--method adaptive --ao-method adaptive --resolution 48 --error"; do
+        one out.exr "${CLOISTER[@]}" $options
+        for n in 2 5; do
+            merged out.exr "$n" "${CLOISTER[@]}" $options
+        done
+    done
+    one out.exr "${CLOISTER[@]}" --size 128x2048
+    parts out.exr 3 "" "${CLOISTER[@]}" --size 128x2048
+    "$VDBSHADE" merge out.exr --memory-limit 10M 2>merge.log
+    grep -q "bands of" merge.log || fail "it was held whole: $(cat merge.log)"
+    cmp one/out.exr out.exr
+}
+
 @test "so are an asset with its light in it, a terrain, objects of their own, and a scene of several lightmaps" {
     one out.glb "${CLOISTER[@]}"
     merged out.glb 3 "${CLOISTER[@]}"
@@ -123,7 +137,7 @@ load parts
     one out.exr "${CLOISTER[@]}" --stats one.json --invalid one.png
     parts out.exr 3 "" "${CLOISTER[@]}"
     "$VDBSHADE" merge out.exr --quiet --stats all.json --invalid all.png
-    for key in texels invalid_texels marches rays voxel_size; do
+    for key in texels invalid_texels marches rays voxel_size estimated_rmse; do
         [ "$(grep -o "\"$key\": [0-9.]*" one.json | head -1)" = "$(grep -o "\"$key\": [0-9.]*" all.json | head -1)" ] || fail "$key"
     done
     cmp one.png all.png

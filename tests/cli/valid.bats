@@ -62,6 +62,24 @@ load helper
     refused 2 --invalid --resume
 }
 
+@test "pictures of outputs of one name in several folders have names of their own" {
+    write_box box.obj
+    mkdir a b c d
+    local output outputs=()
+    for output in a/wall.exr b/wall.exr c/wall-2.exr d/Wall.exr; do
+        outputs+=("{\"mesh\": \"box.obj\", \"size\": $((32 + 8 * ${#outputs[@]})), \"output\": \"$output\"}")
+    done
+    (IFS=, && echo "{\"casters\": [{\"mesh\": \"box.obj\"}], \"ao\": {\"distance\": 1}, \"receivers\": [${outputs[*]}]}") >walls.json
+    shade bake walls.json --invalid where.png
+    done_well
+    [ "$(ls where* | wc -l)" -eq 4 ] || fail "$(ls)"
+    local name
+    for name in wall:32 wall-3:40 wall-2:48 Wall-4:56; do
+        shade info "where.${name%:*}.png"
+        [[ $output == *"${name#*:} × ${name#*:}"* ]] || fail "$name: $output"
+    done
+}
+
 @test "charts closer than a texel are told of, and from which size on they are apart" {
     write_box box.obj
     shade bake box.obj "${SMALL[@]}" --size 16 -o out.exr

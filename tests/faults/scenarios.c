@@ -247,12 +247,15 @@ static vsh_result take_field(const vsh_run *run, vsh_error *error) {
     vsh_field_file *file = NULL;
     vsh_assets *assets = NULL;
     vsh_occluders *occluders = NULL;
+    vsh_voxels *band = NULL;
     vsh_result result;
     MAKE(file, vsh_field_file_open(kept_field, run, &file, error));
     TRY(vsh_scene_use_field(&scene, file, error));
     MAKE(assets, vsh_assets_load(&scene, run, &assets, error));
     MAKE(occluders, vsh_scene_occluders(&scene, assets, NULL, run, &occluders, error));
+    MAKE(band, vsh_scene_field_band(&scene, assets, 0.0, run, &band, error));
 end:
+    vsh_voxels_free(band);
     vsh_occluders_free(occluders);
     vsh_assets_free(assets);
     vsh_field_file_close(file);

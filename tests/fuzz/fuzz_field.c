@@ -88,6 +88,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
             use(field, &run);
         }
         vsh_field_free(field);
+        vsh_voxels *band;
+        FUZZ_MAKE(band, vsh_field_file_band(file, i, 0.0, &run, &band, fuzz_error(&error)));
+        vsh_voxels_free(band);
     }
     vsh_field_file_close(file);
     free(bytes);

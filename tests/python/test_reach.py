@@ -29,6 +29,7 @@ LEFT_OUT = {
     "vsh_grid_to_openvdb": "the same",
     "vsh_volume_to_openvdb": "the same",
     "vsh_reader_serve": "for the main of a program that is its own reader; Run(reader=…) takes such a program's path",
+    "vsh_lit_check_uvs": "what lit_write() refuses, for bakes that begin long before it; BakeJob asks it",
     "vsh_planes_shaded": "what a plane costs, for progress of several bakes together",
     "vsh_atlas_chart_view_sized": "one chart of those that Atlas.charts lists",
 }
@@ -303,16 +304,23 @@ class Reach(Case):
         kept = file[0]
         self.assertSame(file.field(0).sample(at), kept.field.sample(at))
         self.assertEqual(kept.field.info.active_voxels, report.active_voxels)
-        v.field_file_write(self.folder / "own.field", [kept, v.KeptField(v.Field(v.Grid.from_sdf(v.Sdf("sphere"), voxel_size=0.1)), "ball",
-                                                                         origin={"shape": "sphere"})], attributes={"a": "b"})
+        ball = v.Grid.from_sdf(v.Sdf("sphere"), voxel_size=0.1)
+        v.field_file_write(self.folder / "own.field", [kept, v.KeptField(v.Field(ball), "ball", origin={"shape": "sphere"},
+                                                                         band=v.Voxels.from_grid(ball))], attributes={"a": "b"})
         with v.FieldFile(self.folder / "own.field") as own:
             self.assertEqual([(k.name, k.origin) for k in own], [(kept.name, kept.origin), ("ball", {"shape": "sphere"})])
             self.assertSame(own.field(1).sample([[0, 0, 0.95]]), own[1].field.sample([[0, 0, 0.95]]))
             self.assertRaises(IndexError, own.field, 2)
+            own_band = own.band(1)
+        self.assertEqual((kept.band, kept.band_bytes > 0, own_band.info.count), (None, True, v.Voxels.from_grid(ball).info.count))
         used = scene()
         used.use_field(file)
+        assets = v.Assets(used)
+        bands = [file.band(0), assets.field_band(), assets.field_band(3.0), v.Voxels.from_grid(v.Assets(made).casters())]
+        self.assertEqual(len({(b.info.count, tuple(b.info.index_min), b.centre(3, 4, 5)) for b in bands}), 1)
+        self.assertRaises(v.InputError, file.band, 0, 2.0)
         file.close()
-        del file, kept
+        del file, kept, assets
         gc.collect()
         (with_file,), (without,) = used.bake(), scene().bake()
         for name in without:
@@ -335,10 +343,17 @@ class Reach(Case):
         tiles = v.Tiles(scene, 30.0)
         self.assertEqual([t.info.receivers for t in tiles], [1, 1])
         self.assertLess(tiles[1].info.objects, tiles[-1].info.all_objects)
+        done, texels = v.ReportSum(), 0
         for tile, whole in zip(tiles, scene.bake()):
-            (own,) = tile.bake()
+            job = v.BakeJob(tile, arrays=True)
+            (own,) = job.bake()
+            done.add(job)
+            texels += job.report.texels
             self.assertEqual(own.told.output, whole.told.output)
             self.assertLess(abs(own["shadow.sun"] - whole["shadow.sun"]).mean(), 0.002)
+        self.assertEqual(done.told.texels, texels)
+        self.assertGreater(texels, job.report.texels)
+        self.assertEqual(len(done.told.errors), 3)
         self.assertRaises(IndexError, tiles.__getitem__, 2)
         self.assertRaises(v.ArgumentError, v.Tiles, scene, 0.0)
         self.assertRaises(TypeError, v.Tiles, cloister, 1.0)

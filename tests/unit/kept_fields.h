@@ -9,6 +9,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
+#include <vdbshade/vdbshade.h>
+
+static vsh_error why; /* of the last call that failed */
+
+static const double VOXEL = 0.05; /* of files that are written */
 
 static inline size_t field_head_bytes(const char *bytes) {
     return (size_t)((const vshi_stored_head *)(const void *)bytes)->head_bytes;
@@ -66,6 +71,46 @@ static inline vsh_grid *kept_grid(double voxel) {
         {.shape = TRUTH_SPHERE, .center = {-0.6, 0.3, 0.0}, .radius = 0.5},
         {.shape = TRUTH_BOX, .center = {0.7, 0.0, 0.2}, .half = {0.3, 0.4, 0.2}, .radius = 0.05}};
     return grid_of((truth_scene){solids, 2}, voxel);
+}
+
+static inline vsh_voxels *band_of(const vsh_grid *grid) {
+    vsh_voxels *band = NULL;
+    assert_int_equal(vsh_voxels_from_grid(grid, 0.0, NULL, &band, &why), VSH_OK);
+    return band;
+}
+
+/* Of all the levels that there can be. */
+static inline void write_kept_file(const char *path, double reach) {
+    vsh_kept_field kept = vsh_kept_field_default();
+    const vsh_attribute origin = {"voxels", "some"}, told = {"vdbshade_version", vsh_version()};
+    vsh_grid *grid = kept_grid(VOXEL);
+    vsh_voxels *band = band_of(grid);
+    vsh_field *field = field_of_grid(grid, reach);
+    kept.name = "casters";
+    kept.field = field;
+    kept.band = band;
+    kept.origin = &origin;
+    kept.origin_count = 1;
+    kept.grid_bytes = 12345;
+    if (vsh_field_file_write(path, &kept, 1, &told, 1, NULL, &why) != VSH_OK) {
+        fail_msg("%s", why.message);
+    }
+    vsh_voxels_free(band);
+    vsh_field_free(field);
+}
+
+static inline vsh_field_file *open_kept_file(const char *path) {
+    vsh_field_file *file = NULL;
+    if (vsh_field_file_open(path, NULL, &file, &why) != VSH_OK) {
+        fail_msg("%s", why.message);
+    }
+    return file;
+}
+
+static inline vsh_run one_thread(void) { /* thousands of small files are opened */
+    vsh_run run = vsh_run_default();
+    run.threads = 1;
+    return run;
 }
 
 #endif

@@ -4,34 +4,7 @@
 
 #include <vdbshade/vdbshade.h>
 
-static vsh_error why;
-
 static const char path[] = "test_field_file.field";
-static const double VOXEL = 0.05;
-
-/* Of all the levels that there can be. */
-static void write_file(double reach) {
-    vsh_kept_field kept = vsh_kept_field_default();
-    const vsh_attribute origin = {"voxels", "some"}, told = {"vdbshade_version", vsh_version()};
-    vsh_field *field = field_of_grid(kept_grid(VOXEL), reach);
-    kept.name = "casters";
-    kept.field = field;
-    kept.origin = &origin;
-    kept.origin_count = 1;
-    kept.grid_bytes = 12345;
-    if (vsh_field_file_write(path, &kept, 1, &told, 1, NULL, &why) != VSH_OK) {
-        fail_msg("%s", why.message);
-    }
-    vsh_field_free(field);
-}
-
-static vsh_field_file *open_file(void) {
-    vsh_field_file *file = NULL;
-    if (vsh_field_file_open(path, NULL, &file, &why) != VSH_OK) {
-        fail_msg("%s", why.message);
-    }
-    return file;
-}
 
 static int remove_file(void **state) {
     (void)state;
@@ -71,8 +44,8 @@ static void assert_same_bits(const vsh_field *a, const vsh_field *b) {
 
 static void a_field_of_a_file_has_the_bits_of_one_that_is_made(void **state) {
     (void)state;
-    write_file(1e30);
-    vsh_field_file *file = open_file();
+    write_kept_file(path, 1e30);
+    vsh_field_file *file = open_kept_file(path);
     static const double reaches[] = {0.0, 0.01, 0.3, 2.0, 100.0, 1e20};
     for (size_t i = 0; i < sizeof reaches / sizeof reaches[0]; ++i) {
         for (int32_t surface = 0; surface < 2; ++surface) {
@@ -102,10 +75,16 @@ static void a_field_of_a_file_has_the_bits_of_one_that_is_made(void **state) {
     vsh_field_file_close(file);
 }
 
+static size_t size_of(const char *of) {
+    size_t size;
+    free(read_field_bytes(of, &size));
+    return size;
+}
+
 static void a_file_tells_what_was_written(void **state) {
     (void)state;
-    write_file(1e30);
-    vsh_field_file *file = open_file();
+    write_kept_file(path, 1e30);
+    vsh_field_file *file = open_kept_file(path);
     assert_string_equal(vsh_field_file_path(file), path);
     assert_int_equal(vsh_field_file_count(file), 1);
     assert_int_equal(vsh_field_file_is(path), 1);
@@ -123,10 +102,12 @@ static void a_file_tells_what_was_written(void **state) {
     assert_string_equal(kept.origin[0].value, "some");
     assert_int_equal(kept.grid_bytes, 12345);
     assert_true(kept.half_width == 3.0);
+    assert_null(kept.band);
+    assert_true(kept.band_bytes > 0 && kept.band_bytes < size_of(path) / 10);
     char *bytes = read_field_bytes(path, &size), *again;
     assert_int_equal(size, vsh_field_file_bytes(file));
     vsh_field_file_close(file);
-    write_file(1e30);
+    write_kept_file(path, 1e30);
     again = read_field_bytes(path, &size);
     assert_memory_equal(bytes, again, size); /* the same fields, the same bytes */
     free(again);
@@ -135,8 +116,8 @@ static void a_file_tells_what_was_written(void **state) {
 
 static void a_reach_beyond_what_is_kept_is_refused(void **state) {
     (void)state;
-    write_file(0.5);
-    vsh_field_file *file = open_file();
+    write_kept_file(path, 0.5);
+    vsh_field_file *file = open_kept_file(path);
     vsh_field_options options = vsh_field_options_default();
     vsh_field *field = NULL;
     options.reach = 0.5;
@@ -154,12 +135,6 @@ static void a_reach_beyond_what_is_kept_is_refused(void **state) {
 
 /* --- what is no such file */
 
-static vsh_run one_thread(void) { /* thousands of small files are opened */
-    vsh_run run = vsh_run_default();
-    run.threads = 1;
-    return run;
-}
-
 static vsh_result open_bytes(const char *bytes, size_t size) {
     const vsh_run run = one_thread();
     write_field_bytes(path, bytes, size);
@@ -176,7 +151,7 @@ static vsh_result open_bytes(const char *bytes, size_t size) {
 
 static void a_file_with_any_byte_changed_is_refused(void **state) {
     (void)state;
-    write_file(0.3);
+    write_kept_file(path, 0.3);
     size_t size;
     char *bytes = read_field_bytes(path, &size);
     const size_t head = field_head_bytes(bytes);
@@ -198,7 +173,7 @@ static void a_file_with_any_byte_changed_is_refused(void **state) {
 
 static void a_file_that_is_cut_short_or_goes_on_is_refused(void **state) {
     (void)state;
-    write_file(0.3);
+    write_kept_file(path, 0.3);
     size_t size;
     char *bytes = read_field_bytes(path, &size);
     const size_t head = field_head_bytes(bytes);
@@ -218,7 +193,7 @@ static void a_file_that_is_cut_short_or_goes_on_is_refused(void **state) {
 
 static void another_version_or_format_is_refused_by_name(void **state) {
     (void)state;
-    write_file(0.3);
+    write_kept_file(path, 0.3);
     size_t size;
     char *bytes = read_field_bytes(path, &size);
     vshi_stored_head *head = (vshi_stored_head *)(void *)bytes;
@@ -228,7 +203,7 @@ static void another_version_or_format_is_refused_by_name(void **state) {
     assert_non_null(strstr(why.message, "is of vdbshade 9.8.7, this is "));
     head->format = VSHI_STORED_FORMAT + 1;
     assert_int_equal(open_bytes(bytes, size), VSH_ERROR_INPUT);
-    assert_non_null(strstr(why.message, "is of format 2"));
+    assert_non_null(strstr(why.message, "is of format 3"));
     memcpy(bytes, "nothing!", 8);
     assert_int_equal(open_bytes(bytes, size), VSH_ERROR_READ);
     assert_non_null(strstr(why.message, "is no file of fields"));
@@ -259,6 +234,8 @@ static void use_field(const vsh_field *field, const vsh_run *run) {
     }
 }
 
+static vsh_result band_result; /* of the last file that was used */
+
 /* What opened is used as a bake does: none of it may crash. */
 static bool use_forged(const char *bytes, size_t size) {
     const vsh_run run = one_thread();
@@ -276,6 +253,10 @@ static bool use_forged(const char *bytes, size_t size) {
             use_field(field, &run);
         }
         vsh_field_free(field);
+        vsh_voxels *band = NULL;
+        band_result = vsh_field_file_band(file, i, 0.0, &run, &band, &why);
+        assert_true((band_result == VSH_OK) == (band != NULL));
+        vsh_voxels_free(band);
     }
     vsh_field_file_close(file);
     return true;
@@ -285,15 +266,18 @@ static bool use_forged(const char *bytes, size_t size) {
 static bool counts_or_places(size_t at) {
     const size_t record = sizeof(vshi_stored_head);
     const size_t level = record + offsetof(vshi_stored_field, levels);
+    const size_t band = record + offsetof(vshi_stored_field, band);
     return at < offsetof(vshi_stored_head, sum) ||
-           (at >= record + offsetof(vshi_stored_field, attribute_count) && at < level) ||
+           (at >= record + offsetof(vshi_stored_field, attribute_count) && at < band) ||
+           (at >= band + offsetof(vshi_map, count) && at < band + offsetof(vshi_map, numbers)) ||
+           (at >= band + offsetof(vshi_stored_band, block_count) && at < level) ||
            (at >= level + offsetof(vshi_stored_level, value_count) && at < level + sizeof(vshi_stored_level));
 }
 
 /* Whoever forges a file makes its sums anew: then each member must be looked at. */
 static void a_forged_file_is_refused_or_safe(void **state) {
     (void)state;
-    write_file(0.3);
+    write_kept_file(path, 0.3);
     size_t size, refused = 0, tried = 0;
     char *bytes = read_field_bytes(path, &size), *forged = malloc(size);
     static const uint64_t hostile[] = {0,
@@ -305,7 +289,7 @@ static void a_forged_file_is_refused_or_safe(void **state) {
                                        UINT64_C(0x7fffffffffffffff),
                                        UINT64_MAX};
     const size_t records = sizeof(vshi_stored_head) + sizeof(vshi_stored_field);
-    for (size_t at = 8; at < records; at += at < 500 ? 4 : 92) {
+    for (size_t at = 8; at < records; at += at < 600 ? 4 : 92) {
         for (size_t i = 0; i < sizeof hostile / sizeof hostile[0]; ++i) {
             for (size_t width = 4; width <= 8; width += 4) {
                 memcpy(forged, bytes, size);
@@ -331,7 +315,7 @@ static void a_forged_file_is_refused_or_safe(void **state) {
 
 static void a_forged_index_is_refused_and_values_do_no_harm(void **state) {
     (void)state;
-    write_file(0.3);
+    write_kept_file(path, 0.3);
     size_t size;
     char *bytes = read_field_bytes(path, &size), *forged = malloc(size);
     const vshi_stored_field *record =
@@ -369,7 +353,7 @@ static void a_forged_index_is_refused_and_values_do_no_harm(void **state) {
 
 static void what_cannot_be_kept_is_refused_and_the_old_file_stays(void **state) {
     (void)state;
-    write_file(0.3);
+    write_kept_file(path, 0.3);
     size_t size, same;
     char *bytes = read_field_bytes(path, &size);
     vsh_field *field = field_of_grid(kept_grid(VOXEL), 0.3), *empty = NULL, *unknown = NULL;
@@ -402,7 +386,7 @@ static void what_cannot_be_kept_is_refused_and_the_old_file_stays(void **state) 
     assert_int_equal(vsh_field_file_open(path, &run, &file, &why), VSH_ERROR_LIMIT);
     kept[1].field = field;
     assert_int_equal(vsh_field_file_write(path, kept, 2, NULL, 0, NULL, &why), VSH_OK);
-    file = open_file();
+    file = open_kept_file(path);
     assert_int_equal(vsh_field_file_count(file), 2);
     vsh_field_file_close(file);
     free(now);

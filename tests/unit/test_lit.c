@@ -148,7 +148,14 @@ static void new_uvs_leave_all_other_accessors_alone(void **state) {
         json_t *attributes = json_copy(json_object_get(primitive, "attributes"));
         assert_int_equal(json_object_del(attributes, "TEXCOORD_1"), 0);
         assert_json_equal(json_object_get(primitive_of(&in, 0, 0), "attributes"), attributes, "attributes");
-        static const char *const kept[] = {"indices", "targets", "extras"};
+        json_t *extras = json_copy(json_object_get(primitive, "extras"));
+        json_t *made = json_pack("[i]", 1);
+        assert_json_equal(made, json_object_get(extras, "vdbshade_uv_sets"), "sets that were made");
+        assert_int_equal(json_object_del(extras, "vdbshade_uv_sets"), 0);
+        assert_json_equal(json_object_get(primitive_of(&in, 0, 0), "extras"), extras, "extras");
+        json_decref(extras);
+        json_decref(made);
+        static const char *const kept[] = {"indices", "targets"};
         for (size_t k = 0; k < sizeof kept / sizeof kept[0]; ++k) {
             assert_json_equal(json_object_get(primitive_of(&in, 0, 0), kept[k]),
                               json_object_get(primitive, kept[k]), kept[k]);

@@ -309,7 +309,15 @@ static void images_out_of_range_are_refused(void **state) {
                                      path_of("out.glb").text, NULL, &error),
                        &error);
         assert_int_equal(error.code, VSH_ERROR_ARGUMENT);
+        /* before there are images, their purposes count */
+        const bool purpose = options.images->purpose < 0 || options.images->purpose >= VSH_LIT_PURPOSES;
+        const vsh_result early =
+            vsh_lit_check_uvs(path_of("in.glb").text, s.model, s.lit, &options, NULL, &error);
+        assert_int_equal(early, purpose ? VSH_ERROR_ARGUMENT : VSH_OK);
     }
+    vsh_error error;
+    assert_int_equal(vsh_lit_check_uvs(NULL, s.model, NULL, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_lit_check_uvs(NULL, NULL, s.lit, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
     free_sound(&s);
 }
 

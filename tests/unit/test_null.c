@@ -161,6 +161,8 @@ static void scenes_are_not_made_of_nothing(void **state) {
     REFUSED(vsh_scene_save_field(NULL, NULL, "a.field", NULL, NULL, &report, &error));
     REFUSED(vsh_scene_field_forecast(NULL, NULL, NULL, &report, &error));
     REFUSED(vsh_scene_use_field(NULL, NULL, &error));
+    MAKES_NONE(vsh_scene_field_band(NULL, NULL, 0.0, NULL, PLACE, &error));
+    MAKES_NONE(vsh_scene_field_band(&scene, NULL, 0.0, NULL, PLACE, &error));
     MAKES_NONE(vsh_scene_occluders(&scene, NULL, NULL, NULL, PLACE, &error));
     vsh_triangles *triangles = NULL;
     vsh_solids *solids = NULL;
@@ -208,6 +210,7 @@ static void nothing_is_shaded_without_what_it_takes(void **state) {
     MAKES_NONE(vsh_field_file_open(NULL, NULL, PLACE, &error));
     REFUSED(vsh_field_file_open("a.field", NULL, NULL, &error));
     MAKES_NONE(vsh_field_file_field(NULL, 0, NULL, NULL, PLACE, &error));
+    MAKES_NONE(vsh_field_file_band(NULL, 0, 0.0, NULL, PLACE, &error));
     REFUSED(vsh_field_file_write(NULL, NULL, 1, NULL, 0, NULL, &error));
     REFUSED(vsh_field_file_write("a.field", NULL, 1, NULL, 0, NULL, &error));
     assert_int_equal(vsh_field_file_is(NULL), 0);

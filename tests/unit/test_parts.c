@@ -10,7 +10,7 @@ enum { SIZE = 48, SHARDS = 2, CHANNELS = 6 };
 /* Rows as they come. */
 typedef struct taken {
     float values[CHANNELS][SIZE * SIZE];
-    int32_t rows;
+    int32_t rows, channels;
 } taken;
 
 static vsh_result begin(void *user, const vsh_job_lightmap *lightmap, const vsh_image *image,
@@ -19,7 +19,8 @@ static vsh_result begin(void *user, const vsh_job_lightmap *lightmap, const vsh_
     (void)error;
     taken *t = user;
     t->rows = 0;
-    assert_int_equal(image->channel_count, CHANNELS);
+    t->channels = image->channel_count;
+    assert_in_range(image->channel_count, 1, CHANNELS);
     return VSH_OK;
 }
 
@@ -27,7 +28,7 @@ static vsh_result add(void *user, int32_t rows, const float *const *planes, vsh_
     (void)error;
     taken *t = user;
     assert_true(t->rows + rows <= SIZE);
-    for (int32_t c = 0; c < CHANNELS; ++c) {
+    for (int32_t c = 0; c < t->channels; ++c) {
         memcpy(t->values[c] + t->rows * SIZE, planes[c], (size_t)rows * SIZE * sizeof(float));
     }
     t->rows += rows;
@@ -84,6 +85,7 @@ static void a_sink_takes_merged_rows_as_of_one_bake_and_words_come_back(void **s
     bake_parts(&c);
     assert_ok(merge(&c, all, NULL, &error), &error);
     assert_int_equal(all->rows, SIZE);
+    assert_int_equal(all->channels, CHANNELS);
     assert_memory_equal(one->values, all->values, sizeof one->values);
     char **words;
     size_t count;
@@ -94,6 +96,45 @@ static void a_sink_takes_merged_rows_as_of_one_bake_and_words_come_back(void **s
     assert_string_equal(words[2], "three words");
     assert_null(words[3]);
     vsh_part_words_free(words);
+    free(one);
+}
+
+/* The ball becomes a wall that stands on the floor, to which rays of AO go that texels share. */
+static void fill_traced(case_scene *c, char wall[300]) {
+    fill(c, SIZE, 0.4);
+    snprintf(wall, 300, "%s", at("wall.obj"));
+    FILE *file = fopen(wall, "wb");
+    assert_non_null(file);
+    fprintf(file, "v -2 -1 0\nv 1 -1 0\nv 1 1 0.5\nv -2 1 0.5\nf 1 2 3\nf 1 3 4\n");
+    assert_int_equal(fclose(file), 0);
+    c->caster.type = VSH_CASTER_MESH;
+    c->caster.path = wall;
+    c->caster.transform[7] = 0.0;
+    c->receiver.ao_spacing = 2;
+    c->scene.irradiance = 0;
+    c->scene.error = 1;
+    c->scene.shade.method = VSH_SHADOW_EXACT;
+    c->scene.shade.ao_method = VSH_AO_EXACT;
+}
+
+static void what_parts_leave_of_ao_is_as_of_one_bake(void **state) {
+    (void)state;
+    case_scene c;
+    char wall[300];
+    if (!vsh_triangles_available()) {
+        return;
+    }
+    fill_traced(&c, wall);
+    taken *one = calloc(2, sizeof *one), *all = one + 1;
+    assert_non_null(one);
+    const vsh_row_sink sink = sink_of(one);
+    vsh_bake_job_options options = vsh_bake_job_options_default();
+    options.sink = &sink;
+    vsh_error error;
+    assert_ok(vsh_bake_scene(&c.scene, &options, NULL, NULL, &error), &error);
+    bake_parts(&c);
+    assert_ok(merge(&c, all, NULL, &error), &error);
+    assert_memory_equal(one, all, sizeof *one);
     free(one);
 }
 
@@ -213,6 +254,23 @@ static void no_part_of_a_lightmap_does_worse_than_fail(void **state) {
     free(one.rows);
 }
 
+static void no_part_that_leaves_ao_does_worse_than_fail(void **state) {
+    (void)state;
+    case_scene c;
+    char wall[300];
+    if (!vsh_triangles_available()) {
+        return;
+    }
+    fill_traced(&c, wall);
+    bake_parts(&c);
+    bake_case one = {&c, calloc(1, sizeof(taken)), vsh_run_default()};
+    assert_non_null(one.rows);
+    one.run.memory_limit = 64 << 20;
+    one.run.threads = 1;
+    try_all(at("floor.exr.2-of-2.part"), merge_bake, &one);
+    free(one.rows);
+}
+
 typedef struct volume_case {
     vsh_voxels *voxels;
     vsh_light sun;
@@ -274,8 +332,10 @@ static void no_part_of_a_volume_does_worse_than_fail(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_sink_takes_merged_rows_as_of_one_bake_and_words_come_back),
+        cmocka_unit_test(what_parts_leave_of_ao_is_as_of_one_bake),
         cmocka_unit_test(a_job_of_a_part_is_refused_what_it_cannot_do),
         cmocka_unit_test(no_part_of_a_lightmap_does_worse_than_fail),
+        cmocka_unit_test(no_part_that_leaves_ao_does_worse_than_fail),
         cmocka_unit_test(no_part_of_a_volume_does_worse_than_fail),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

@@ -64,23 +64,16 @@ static void disc(double *x, double *y) {
     } while (*x * *x + *y * *y > 1.0);
 }
 
-static vsh_light sun(vshi_vec towards, double angle) {
+/* A sun that stands towards `where`, of an angle, or a sphere there, of a radius. */
+static vsh_light light_of(int32_t type, vshi_vec where, double width) {
     vsh_light light = vsh_light_default();
-    light.type = VSH_LIGHT_DIRECTIONAL;
-    light.direction[0] = towards.x;
-    light.direction[1] = towards.y;
-    light.direction[2] = towards.z;
-    light.angle = angle;
-    return light;
-}
-
-static vsh_light lamp(vshi_vec at, double radius) {
-    vsh_light light = vsh_light_default();
-    light.type = VSH_LIGHT_SPHERE;
-    light.position[0] = at.x;
-    light.position[1] = at.y;
-    light.position[2] = at.z;
-    light.radius = radius;
+    const bool is_sun = type == VSH_LIGHT_DIRECTIONAL;
+    double *to = is_sun ? light.direction : light.position;
+    light.type = type;
+    to[0] = where.x;
+    to[1] = where.y;
+    to[2] = where.z;
+    *(is_sun ? &light.angle : &light.radius) = width;
     return light;
 }
 
@@ -108,8 +101,10 @@ static vsh_scene scene_of(const vsh_light *light, double ao) {
 }
 
 static vsh_light any_light(void) {
-    return dice(0.0, 1.0) < 0.5 ? sun(vshi_unit(somewhere(1.0)), dice(0.0, 1.0) < 0.2 ? 0.0 : dice(0.0, 2.8))
-                                : lamp(somewhere(60.0), dice(0.0, 1.0) < 0.2 ? 0.0 : dice(0.0, 8.0));
+    const bool is_sun = dice(0.0, 1.0) < 0.5;
+    const vshi_vec where = is_sun ? vshi_unit(somewhere(1.0)) : somewhere(60.0);
+    const double width = dice(0.0, 1.0) < 0.2 ? 0.0 : dice(0.0, is_sun ? 2.8 : 8.0);
+    return light_of(is_sun ? VSH_LIGHT_DIRECTIONAL : VSH_LIGHT_SPHERE, where, width);
 }
 
 enum { SCENES = 400, POINTS = 12, RAYS = 400 };
@@ -166,7 +161,7 @@ static void a_share_is_near_to_what_a_cube_hides(void **state) {
     (void)state;
     state_of_dice = 4;
     const vshi_vec towards = vshi_unit((vshi_vec){1.0, 1.0, 1.0});
-    const vsh_light light = sun(towards, 0.2);
+    const vsh_light light = light_of(VSH_LIGHT_DIRECTIONAL, towards, 0.2);
     const vsh_scene scene = scene_of(&light, 0.0);
     vshi_reach reach;
     vsh_error error;

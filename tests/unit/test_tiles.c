@@ -215,6 +215,28 @@ static void one_tile_around_all_is_the_whole_bit_by_bit(void **state) {
     vsh_scene_free(scene);
 }
 
+/* A post alone is so small that its lattices would be of single texels. */
+static void texels_of_a_tile_share_rays_as_in_the_whole_world(void **state) {
+    (void)state;
+    write_world();
+    vsh_scene *scene = world(posts, "\"max_error\": 0.3");
+    baked *whole = two(), *tiled = whole + 1;
+    bake(scene, whole);
+    bake_tiles(scene, 4.0, tiled);
+    int hidden = 0, differ = 0;
+    for (int f = 0; f < FLOORS; ++f) {
+        for (int i = 0; i < SIZE * SIZE; ++i) {
+            hidden += whole->values[f][AO][i] < 1.0F;
+            differ += whole->values[f][AO][i] != tiled->values[f][AO][i];
+        }
+    }
+    printf("%d of %d texels differ\n", differ, hidden);
+    assert_true(hidden > FLOORS * SIZE);
+    assert_true(50 * differ < hidden);
+    free(whole);
+    vsh_scene_free(scene);
+}
+
 static void what_is_left_out_hides_less_than_a_tenth_of_the_error(void **state) {
     (void)state;
     write_world();
@@ -384,6 +406,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(tiles_of_meshes_bake_the_whole_world_s_values_by_fewer_objects),
         cmocka_unit_test(one_tile_around_all_is_the_whole_bit_by_bit),
+        cmocka_unit_test(texels_of_a_tile_share_rays_as_in_the_whole_world),
         cmocka_unit_test(what_is_left_out_hides_less_than_a_tenth_of_the_error),
         cmocka_unit_test(a_rule_means_in_a_tile_what_it_means_in_the_world),
         cmocka_unit_test(layers_and_rules_of_what_is_far_away_do_no_harm),

@@ -206,7 +206,7 @@ static void say_writing(void *user, const char *path) {
     cli_signals_writing(path);
 }
 
-static cli_stats stats_of(const vsh_scene *scene, const vsh_bake_report *report, int32_t threads) {
+cli_stats cli_bake_stats(const vsh_scene *scene, const vsh_bake_report *report, int32_t threads) {
     cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS, threads);
     stats.texels = report->texels;
     stats.invalid_texels = report->invalid_texels;
@@ -246,7 +246,7 @@ static vsh_result run_job(vsh_bake_job *job, const vsh_scene *scene, const vsh_r
 }
 
 static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, vsh_bake_job *job,
-                    const vsh_run *run, telling *t, const char *parts, cli_stats *sum) {
+                    const vsh_run *run, telling *t, const char *parts, cli_bake_sum *sum) {
     t->count = vsh_bake_job_count(job);
     vsh_error error;
     if ((settings->merged != NULL ? vsh_bake_job_merge(job, run, &error)
@@ -255,10 +255,12 @@ static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, v
     }
     vsh_bake_report report;
     vsh_bake_job_get_report(job, &report);
-    const cli_stats stats = stats_of(scene, &report, run->threads);
+    const cli_stats stats = cli_bake_stats(scene, &report, run->threads);
     cli_stats_warn(&stats, scene, run);
     if (sum != NULL) {
-        return cli_stats_add(sum, &stats);
+        sum->bakes += 1;
+        return vsh_bake_report_add(&sum->report, &report, sum->errors, &error) == VSH_OK ? CLI_OK
+                                                                                         : cli_fail(&error);
     }
     CLI_TRY(cli_bake_view(settings, scene, run));
     CLI_TRY(cli_stats_finish(&stats, run, settings->stats));
@@ -273,7 +275,7 @@ static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, v
     return CLI_OK;
 }
 
-int cli_bake_one(const cli_bake_settings *settings, const vsh_scene *scene, cli_stats *sum) {
+int cli_bake_one(const cli_bake_settings *settings, const vsh_scene *scene, cli_bake_sum *sum) {
     const vsh_run run = cli_common_run(&settings->common);
     const bool part = settings->shard > 0 && settings->tile_size == 0.0;
     const bool told = sum == NULL || settings->common.verbose; /* each lightmap */

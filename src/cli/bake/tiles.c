@@ -63,7 +63,7 @@ static void describe(const vsh_tile *tile, size_t index, size_t count, char *tex
              info.triangles);
 }
 
-static int bake_tile(const cli_bake_settings *s, const vsh_tiles *tiles, size_t index, cli_stats *sum) {
+static int bake_tile(const cli_bake_settings *s, const vsh_tiles *tiles, size_t index, cli_bake_sum *sum) {
     vsh_tile *tile;
     vsh_error error;
     if (vsh_tile_create(tiles, index, &tile, &error) != VSH_OK) {
@@ -79,25 +79,30 @@ static int bake_tile(const cli_bake_settings *s, const vsh_tiles *tiles, size_t 
     return code;
 }
 
-static int bake_share(const cli_bake_settings *s, const vsh_tiles *tiles, share own) {
+static int bake_share(const cli_bake_settings *s, const vsh_scene *whole, const vsh_tiles *tiles, share own) {
     const vsh_run run = cli_common_run(&s->common);
-    cli_stats sum = cli_stats_begin(CLI_STATS_TEXELS, run.threads);
-    int code = CLI_OK;
-    for (size_t i = own.first; i < own.end; ++i) {
+    cli_bake_sum sum = {.errors = calloc(whole->light_count + 2, sizeof *sum.errors)};
+    int code = sum.errors != NULL ? CLI_OK : cli_out_of_memory("statistics");
+    for (size_t i = own.first; i < own.end && code == CLI_OK; ++i) {
         cli_progress_round("tile", i - own.first, own.end - own.first);
-        CLI_TRY_DONE(bake_tile(s, tiles, i, &sum));
+        code = bake_tile(s, tiles, i, &sum);
     }
-    CLI_TRY_DONE(cli_stats_finish(&sum, &run, s->stats));
+    if (code != CLI_OK) {
+        goto done;
+    }
+    cli_stats stats = cli_bake_stats(whole, &sum.report, run.threads);
+    stats.world_tiles = sum.bakes;
+    CLI_TRY_DONE(cli_stats_finish(&stats, &run, s->stats));
     cli_warnings_tell();
     if (!s->common.quiet) {
         cli_say("%zu of %zu tiles: %" PRIu64 " texels, %" PRIu64 " of them invalid; --verbose tells of each",
-                own.end - own.first, vsh_tiles_count(tiles), sum.texels, sum.invalid_texels);
+                own.end - own.first, vsh_tiles_count(tiles), stats.texels, stats.invalid_texels);
     }
     if (!s->common.quiet && own.first < own.end) {
-        cli_stats_say(&sum);
+        cli_stats_say(&stats);
     }
 done:
-    cli_stats_free_sum(&sum);
+    free(sum.errors);
     return code;
 }
 
@@ -142,7 +147,7 @@ int cli_bake_tiles(const cli_bake_settings *s, const vsh_scene *scene) {
     }
     int code = find_share(s, scene, tiles, &own);
     if (code == CLI_OK) {
-        code = s->dry_run ? forecast(s, tiles) : bake_share(s, tiles, own);
+        code = s->dry_run ? forecast(s, tiles) : bake_share(s, scene, tiles, own);
     }
     vsh_tiles_free(tiles);
     return code;

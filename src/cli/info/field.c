@@ -28,6 +28,10 @@ static void print_field(const vsh_kept_field *field) {
            vshi_bytes_text(field->grid_bytes, grid, sizeof grid));
     printf("  levels: %d, %" PRIu64 " bricks, %s\n", info.levels, info.bricks,
            vshi_bytes_text(info.bytes, bytes, sizeof bytes));
+    if (field->band_bytes > 0) {
+        printf("  band: its voxels, for 'volume', %s\n",
+               vshi_bytes_text(field->band_bytes, grid, sizeof grid));
+    }
     print_lines(field->origin, field->origin_count);
 }
 

@@ -130,12 +130,6 @@ static int check_options(const volume_settings *s) {
     if (s->box_voxel_size > 0.0 && !s->has_box) {
         return cli_usage("--box-voxel-size: there is no --box");
     }
-    if (s->bake.field != NULL && s->like == NULL && s->box_voxel_size == 0.0) {
-        return cli_usage(
-            "--field '%s': the casters' band, and the size of its voxels, are a level set's, which such a "
-            "file does not keep: give --box and --box-voxel-size, or --like",
-            s->bake.field);
-    }
     return cli_patch_check(&s->bake.patch);
 }
 
@@ -194,34 +188,44 @@ static int choose_voxels(volume_work *work) {
     vsh_error error;
     vsh_result result = VSH_OK;
     if (s->has_box) {
-        vsh_grid_info info = {.voxel_size = s->box_voxel_size};
-        if (s->box_voxel_size == 0.0) {
+        double size = s->box_voxel_size;
+        if (size == 0.0 && work->grid != NULL) {
+            vsh_grid_info info;
             vsh_grid_get_info(work->grid, &info);
+            size = info.voxel_size;
+        } else if (size == 0.0) {
+            size = cli_casters_kept_voxel_size(work->scene);
         }
-        const double size = info.voxel_size;
         result = vsh_voxels_from_box(s->box_min, s->box_max, size, &work->run, &work->voxels, &error);
-    } else if (s->like == NULL) {
+    } else if (s->like == NULL && work->grid != NULL) {
         result = vsh_voxels_from_grid(work->grid, s->band, &work->run, &work->voxels, &error);
+    } else if (s->like == NULL) {
+        result = vsh_scene_field_band(work->scene, work->assets, s->band, &work->run, &work->voxels, &error);
     }
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
 /* The union of all casters in voxels: what has the band, or tells the size of a box's voxels; and without
- * layers what casts. */
+ * layers what casts. None where a file keeps what is asked of it. */
 static int make_grid(volume_work *work) {
     const volume_settings *s = work->settings;
     if (s->like != NULL || s->box_voxel_size > 0.0) {
         return CLI_OK;
     }
-    size_t voxelised = 0;
-    for (size_t i = 0; i < work->scene->caster_count; ++i) {
-        voxelised += !cli_caster_is_direct(&work->scene->casters[i]);
-    }
-    if (voxelised == 0) {
+    if (cli_casters_voxelised(work->scene) == 0) {
         return cli_usage(
             "%s: no casters that are voxelised, whose band or voxel size is to be taken: give --box "
             "and --box-voxel-size, or --like",
             s->bake.input);
+    }
+    if (work->scene->field != NULL && work->scene->layer_count > 0) {
+        return cli_usage(
+            "--field '%s': keeps the casters of each layer on their own, and not the band of all, or the "
+            "size of its voxels: give --box and --box-voxel-size, or --like",
+            s->bake.field);
+    }
+    if (work->scene->field != NULL) {
+        return CLI_OK;
     }
     const double start = vshi_seconds();
     vsh_error error;

@@ -8,6 +8,7 @@ from ._library import RUN, Handle, Run, call, ffi, handle_of, lib, make, place, 
 from ._structs import Filled, path_of
 from ._field import Field
 from ._grid import Attributes, attributes_of
+from ._volume import Voxels
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -30,11 +31,19 @@ class KeptField:
         of that level set in memory; 0: not known
     origin : mapping, optional
         lines of text: what shaped it, in words of whoever writes the file
+    band : Voxels, optional
+        all of that level set's band, Voxels.from_grid(grid); of a file: FieldFile.band()
+
+    ``band_bytes``: what a file keeps of the band, 0: nothing.
     """
 
     def __init__(self, field: Field, name: str = "", *, half_width: float = 3.0, grid_bytes: int = 0,
-                 origin: Optional[Attributes] = None) -> None:
+                 origin: Optional[Attributes] = None, band: Optional[Voxels] = None) -> None:
         handle_of(field, Field, "field")
+        if band is not None:
+            handle_of(band, Voxels, "band")
+        self.band = band
+        self.band_bytes = 0
         self.field = field
         self.name = name
         self.half_width = half_width
@@ -72,8 +81,10 @@ class FieldFile(Handle):
         lib.vsh_field_file_get_sized(owner, self._index(index), view, ffi.sizeof("vsh_kept_field"))
         field = Field.__new__(Field)
         Handle.__init__(field, ffi.gc(ffi.cast("vsh_field *", view.field), lambda _, keeps=owner: None), owner)
-        return KeptField(field, text(view.name) or "", half_width=view.half_width, grid_bytes=view.grid_bytes,
+        kept = KeptField(field, text(view.name) or "", half_width=view.half_width, grid_bytes=view.grid_bytes,
                          origin=_lines(view.origin, view.origin_count))
+        kept.band_bytes = view.band_bytes
+        return kept
 
     def __iter__(self) -> Iterator[KeptField]:
         return (self[i] for i in range(len(self)))
@@ -109,6 +120,12 @@ class FieldFile(Handle):
         return field
 
 
+    def band(self, index: int, band: float = 0.0, *, run: Optional[Run] = None) -> Voxels:
+        """The band of the level set that a field was made from, as Voxels.from_grid() makes it of that, bit by bit: all of it.
+        InputError for a narrower one, and where it was not kept."""
+        return Voxels._made(lib.vsh_field_file_band, self.handle, self._index(index), band, run=run)
+
+
 def _lines(lines: Any, count: int) -> Dict[str, str]:
     return {text(lines[i].name) or "": text(lines[i].value) or "" for i in range(count)}
 
@@ -132,6 +149,8 @@ def field_file_write(path: "str | os.PathLike[str]", fields: Sequence[KeptField]
         origin, field = attributes_of(kept.origin), handle_of(kept.field, Field, "field")
         filled = Filled("vsh_kept_field", dict(name=kept.name, half_width=kept.half_width, grid_bytes=kept.grid_bytes))
         filled.pointer.field = field
+        if kept.band is not None:
+            filled.pointer.band = handle_of(kept.band, Voxels, "band")
         filled.pointer.origin, filled.pointer.origin_count = origin.array, origin.count
         structs[i] = filled.pointer[0]
         keeps += [filled, origin, field]

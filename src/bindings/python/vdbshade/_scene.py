@@ -20,6 +20,7 @@ from ._mesh import Mesh, Meshes, Model, density_rules, meshes_of
 from ._occluders import Occluders
 from ._sdf import Sdf, Solids
 from ._unwrap import Atlas
+from ._volume import Voxels
 
 
 def settings() -> List[types.Setting]:
@@ -390,6 +391,11 @@ class Assets(Handle):
             return None
         Handle.__init__(grid, cdata)
         return grid
+
+    def field_band(self, band: float = 0.0, *, run: Optional[Run] = None) -> Voxels:
+        """The band of all casters out of the scene's file of fields, as Voxels.from_grid(casters(), band) makes it, bit by
+        bit; InputError for a narrower band than all of it, and for scenes with layers."""
+        return Voxels._made(lib.vsh_scene_field_band, self.scene.struct, self.handle, band, run=run)
 
     def triangles(self, layer: Optional[str] = None, *, run: Optional[Run] = None) -> Optional[Triangles]:
         """The triangles of the casters in a layer, or in none."""
