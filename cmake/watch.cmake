@@ -12,7 +12,7 @@ set(VSH_WATCH_thread thread)
 # `address` leaves out what takes more than a minute with it, and what is compiled against OpenVDB's or OpenImageIO's
 # headers; `thread` is for what has threads of ours meet. tools/sanitize leaves out nothing.
 set(VSH_WATCH_address_NOT
-    test_alone test_band test_bits test_claims test_grid test_image_errors test_lattice test_magnitudes test_relations test_share # minutes
+    test_alone test_band test_bits test_claims test_grid test_grid_mesh test_image_errors test_lattice test_magnitudes test_relations test_share # minutes
     test_bitflips test_grid_file test_grid_values test_image_picture test_image_png test_reader test_reader_checks test_scene_grids
     test_volume_file)
 set(VSH_WATCH_address_CLI accuracy casters channels flat hostile info input masks output provenance regress usage view voxelize)
