@@ -75,6 +75,25 @@ JSON
     done
 }
 
+@test "parts of a scene of layers reach as far from each layer's field as one bake does" {
+    cp "$ASSETS/seeds_floor.obj" .
+    # the floor lies within the one field and far from the other
+    cat >layers.json <<JSON
+{"casters": [{"sdf": {"shape": "plane", "half_size": [3, 3], "thickness": 0.5}},
+  {"sdf": {"shape": "capsule", "half_height": 0.6, "radius": 0.15, "translate": [0, 0.75, 0]}, "layer": "posts"}],
+ "layers": [{"name": "posts", "resolution": 24}], "resolution": 48,
+ "lights": [{"name": "sun", "type": "directional", "direction": [1, 0.25, 0.3], "angle_deg": 30}],
+ "receivers": [{"mesh": "seeds_floor.obj", "size": 64, "output": "layers.exr"}]}
+JSON
+    "$VDBSHADE" field layers.json --method cone -o layers.field --quiet
+    "$VDBSHADE" bake layers.json --method cone -o one.exr --quiet
+    for i in 1 2; do
+        "$VDBSHADE" bake layers.json --method cone --field layers.field -o out.exr --shard "$i/2" --quiet
+    done
+    "$VDBSHADE" merge out.exr --quiet
+    cmp one.exr out.exr
+}
+
 @test "a scene's layers and casters of every kind are kept" {
     shade voxelize box.obj --resolution 32 -o box.vdb --quiet
     done_well

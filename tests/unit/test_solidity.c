@@ -121,6 +121,47 @@ static void small_holes_do_not_make_a_solid_hollow(void **state) {
     free(s);
 }
 
+/* Of many meshes, on any number of threads, each is found to be what it is alone, and is closed by its own
+ * caps. */
+static void meshes_with_holes_are_each_what_they_are_alone(void **state) {
+    (void)state;
+    enum { MESHES = 9 };
+    shape *shapes[MESHES];
+    vsh_mesh meshes[MESHES];
+    vshi_solidity *alone[MESHES], *together;
+    size_t all_caps = 0;
+    for (int m = 0; m < MESHES; ++m) { /* balls far apart, some closed, others open more or less */
+        shapes[m] = shape_new();
+        shape_ball(shapes[m], (double[]){10.0 * m, 0, 0}, 1.0 + 0.1 * m, m % 3 == 0 ? -1.0 : -0.9 + 0.05 * m,
+                   1.0, 12 + 4 * m);
+        meshes[m] = shape_mesh(shapes[m], "ball");
+        alone[m] = solidity_of(&meshes[m], 1);
+    }
+    for (int32_t threads = 1; threads <= 3; threads += 2) {
+        vsh_run run = vsh_run_default();
+        run.threads = threads;
+        vsh_error error;
+        assert_int_equal(vshi_solidity_create(meshes, MESHES, &run, &together, &error), VSH_OK);
+        for (size_t m = 0; m < MESHES; ++m) {
+            size_t own, other;
+            const vshi_component *a = vshi_solidity_of_whole(alone[m], 0, &own);
+            const vshi_component *b = vshi_solidity_of_whole(together, m, &other);
+            assert_true(own == 1 && other == 1 && a->kind == b->kind && a->open_edges == b->open_edges);
+            assert_true(a->enclosed == b->enclosed && a->volume == b->volume && a->holes == b->holes);
+            for (size_t k = 0; k < a->open_edges; ++k) {
+                assert_memory_equal(a->cap[k], b->cap[k], sizeof a->cap[k]);
+            }
+            all_caps += a->open_edges;
+        }
+        vshi_solidity_free(together);
+    }
+    assert_true(all_caps > 100);
+    for (int m = 0; m < MESHES; ++m) {
+        vshi_solidity_free(alone[m]);
+        free(shapes[m]);
+    }
+}
+
 static void vessels_cloth_and_cards_are_sheets(void **state) {
     (void)state;
     shape *s = shape_new();
@@ -348,6 +389,7 @@ int main(void) {
         cmocka_unit_test(a_mirrored_mesh_looks_the_same_way),
         cmocka_unit_test(faces_that_look_the_wrong_way_are_turned),
         cmocka_unit_test(small_holes_do_not_make_a_solid_hollow),
+        cmocka_unit_test(meshes_with_holes_are_each_what_they_are_alone),
         cmocka_unit_test(vessels_cloth_and_cards_are_sheets),
         cmocka_unit_test(boxes_that_share_an_edge_or_a_face_are_boxes),
         cmocka_unit_test(what_is_asked_overrules_what_is_found),
