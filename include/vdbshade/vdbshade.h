@@ -58,6 +58,7 @@
 #include "reader.h"
 #include "render.h"
 #include "scene.h"
+#include "scene_field.h"
 #include "sdf.h"
 #include "settings.h"
 #include "shade.h"

@@ -10,6 +10,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <vdbshade/scene_field.h>
 
 /* Farther than any light or receiver: all levels that a field can have. Those that are beyond its box take
  * some 40 kB each. */

@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <vdbshade/scene_field.h>
 
 bool vshi_layer_is_voxelised(const vsh_scene *scene, const vsh_scene_layer *layer) {
     for (size_t i = 0; i < scene->caster_count; ++i) {
