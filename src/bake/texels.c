@@ -9,12 +9,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { TRIANGLES = 1024 }; /* looked at together */
+
 typedef struct creation {
     const vsh_charts *charts;
     size_t first;                  /* tile row */
     vsh_texels *texels;            /* NULL: only the boxes are found */
     vshi_sample_box *boxes;        /* [tile rows]; NULL: they are not asked for */
-    const double (*within)[3];     /* low, high: tiles whose samples lie in it are left out; NULL: none are */
+    const double (*box)[3];        /* low, high: tiles whose samples lie in it are left out; NULL: none are */
+    bool *within;                  /* [triangles]: it holds all samples of the triangle; NULL: no box */
     _Atomic vsh_result row_result; /* of the rows that failed */
 } creation;
 
@@ -33,13 +36,34 @@ static void write_tile(vshi_sample_writer *w) {
     }
 }
 
-/* Whether all samples of a tile lie in the box that is left out. */
-static bool is_within(const creation *all, const vshi_row *work, size_t column) {
+/* --- what is left out */
+
+static void find_within(void *user, size_t begin, size_t end) {
+    const creation *all = user;
+    const vshi_charts *sorted = &all->charts->sorted;
+    for (size_t triangle = begin; triangle < end; ++triangle) {
+        size_t local;
+        const size_t mesh = vshi_charts_mesh(sorted, triangle, &local);
+        all->within[triangle] =
+            vshi_surface_is_within(&sorted->meshes[mesh], local, all->box[0], all->box[1]);
+    }
+}
+
+static bool is_row_within(const creation *all, size_t row) {
+    const vshi_charts *sorted = &all->charts->sorted;
+    bool within = all->within != NULL;
+    for (size_t i = sorted->row_start[row]; within && i < sorted->row_start[row + 1]; ++i) {
+        within = all->within[sorted->row_triangle[i]];
+    }
+    return within;
+}
+
+static bool is_tile_within(const creation *all, const vshi_row *work, size_t column) {
+    const size_t *first = all->charts->sorted.first;
     bool within = all->within != NULL;
     for (size_t i = work->tile_start[column]; within && i < work->tile_start[column + 1]; ++i) {
         const uint32_t slot = work->tile_triangle[i];
-        within = vshi_surface_is_within(&all->charts->sorted.meshes[work->mesh[slot]], work->local[slot],
-                                        all->within[0], all->within[1]);
+        within = all->within[first[work->mesh[slot]] + work->local[slot]];
     }
     return within;
 }
@@ -51,7 +75,7 @@ static void write_rows(void *user, size_t begin, size_t end) {
         const size_t *start = all->texels != NULL ? all->texels->row_start + row : NULL;
         all->boxes[row] =
             (vshi_sample_box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-        if (start != NULL && start[0] == start[1]) {
+        if ((start != NULL && start[0] == start[1]) || is_row_within(all, all->first + row)) {
             continue;
         }
         vshi_row work;
@@ -67,7 +91,8 @@ static void write_rows(void *user, size_t begin, size_t end) {
                                 .box = &all->boxes[row],
                                 .next = start != NULL ? *start : 0};
         for (size_t column = 0; column < work.tiles; ++column) {
-            if (work.tile_start[column] != work.tile_start[column + 1] && !is_within(all, &work, column)) {
+            if (work.tile_start[column] != work.tile_start[column + 1] &&
+                !is_tile_within(all, &work, column)) {
                 vshi_row_tile(sorted, &work, column, NULL);
                 write_tile(&w);
             }
@@ -84,6 +109,12 @@ static vsh_result rasterise(creation *all, size_t rows, const vsh_run *run, vsh_
         return vshi_fail(error, VSH_ERROR_MEMORY, "texels: the system refused memory");
     }
     VSHI_TRY_DONE(vshi_allocate((void **)&all->boxes, rows, sizeof *all->boxes, "texels", error));
+    if (all->box != NULL) {
+        const vshi_charts *sorted = &all->charts->sorted;
+        const size_t triangles = sorted->first[sorted->mesh_count];
+        VSHI_TRY_DONE(vshi_allocate((void **)&all->within, triangles, sizeof *all->within, "texels", error));
+        VSHI_TRY_DONE(vshi_parallel_for(job, triangles, TRIANGLES, 0, find_within, all, error));
+    }
     VSHI_TRY_DONE(vshi_parallel_for(job, rows, 1, 1, write_rows, all, error));
     if (atomic_load(&all->row_result) != VSH_OK) {
         result =
@@ -110,12 +141,13 @@ static void join(const vshi_sample_box *boxes, size_t begin, size_t end, bool ze
 
 vsh_result vshi_charts_bounds_beyond(const vsh_charts *charts, const double (*within)[3], const vsh_run *run,
                                      double low[3], double high[3], vsh_error *error) {
-    creation all = {.charts = charts, .within = within};
+    creation all = {.charts = charts, .box = within};
     const size_t rows = charts->sorted.rows;
     vsh_result result;
     VSHI_TRY_DONE(rasterise(&all, rows, run, error));
     join(all.boxes, 0, rows, within == NULL, low, high);
 done:
+    free(all.within);
     free(all.boxes);
     return result;
 }
