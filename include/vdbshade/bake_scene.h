@@ -96,14 +96,19 @@ typedef struct vsh_bake_job_options {
     const char *parts;   /* what the names of parts begin with; NULL: the first lightmap's output */
     const char *const *words; /* [word_count]: kept in a part as they are, for vsh_part_words() */
     size_t word_count;
-    int32_t forecast; /* nonzero: only what vsh_bake_job_forecast() tells is asked for, and the folders of
-                         outputs need not be there */
+    int32_t forecast;   /* nonzero: only what vsh_bake_job_forecast() tells is asked for, and the folders of
+                           outputs need not be there */
+    double shard_least; /* seconds of one thread, 0 … 1e9, that the rows of a shard are to take at least, as
+                           far as lightmaps' sizes, lights and errors tell: what every shard makes for itself
+                           should be little beside it. Where there is not so much for all shards, the last
+                           ones have no rows, and their jobs no lightmaps: they read no file, and their parts
+                           say so. 0: all have rows */
 } vsh_bake_job_options;
 
 static inline vsh_bake_job_options vsh_bake_job_options_default(void) {
     vsh_bake_job_options options = {
         sizeof(vsh_bake_job_options), 0,    0, 0, 0,    NULL, NULL, NULL, NULL, 0, NULL, NULL, NULL, 0,
-        VSH_LIT_IMAGES_AUTO,          NULL, 0, 0, NULL, NULL, 0,    0};
+        VSH_LIT_IMAGES_AUTO,          NULL, 0, 0, NULL, NULL, 0,    0,    0.5};
     return options;
 }
 
@@ -122,6 +127,10 @@ VSH_API vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_
 VSH_API vsh_result vsh_bake_job_create(const vsh_scene *scene, const vsh_bake_job_options *options,
                                        const vsh_run *run, vsh_bake_job **job, vsh_error *error);
 VSH_API void vsh_bake_job_free(vsh_bake_job *job); /* NULL does nothing */
+
+/* How many of options->shard_count shards have rows (shard_least): the first ones. 0 where an argument is
+ * NULL or its struct_size is none. Reads no file. */
+VSH_API int32_t vsh_bake_job_shards(const vsh_scene *scene, const vsh_bake_job_options *options);
 
 /* Rasterises the lightmaps to count their texels, and warns of what is wrong with their UVs. Errors:
  * VSH_ERROR_INPUT (as vsh_charts_create(); UVs that cover no texel; objects that share more than
@@ -148,7 +157,7 @@ VSH_API vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_e
  * of other inputs, options or another version than this job, all of which it names). */
 VSH_API vsh_result vsh_bake_job_merge(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
 
-/* How many lightmaps there are, and one of them. Cannot fail, but that `index` must be below the count. */
+/* How many lightmaps there are (0 of a shard without rows), and one of them, whose `index` is below it. */
 VSH_API size_t vsh_bake_job_count(const vsh_bake_job *job);
 VSH_API void vsh_bake_job_lightmap_sized(const vsh_bake_job *job, size_t index, vsh_job_lightmap *lightmap,
                                          size_t lightmap_size);

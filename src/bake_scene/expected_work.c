@@ -28,6 +28,10 @@ static const double CROWDED = 0.38, FEW_TRIANGLES = 0.01;
 static const double ALONE = 4000.0, ALONE_HALF_OPEN = 8000.0;
 /* The error that these are of, and the least that is asked of the few. */
 static const double COMMON = 0.02, COARSE = 0.1;
+/* Where nothing was looked at yet: texels in a penumbra, and AO of a texel that shares it or has its own. */
+static const double USUAL_PENUMBRA = 0.05, USUAL_SHARED = 1500.0, USUAL_ALONE = 5000.0;
+/* What rays take more where they are marched, rather too much than too little. */
+static const double MARCHED = 10.0;
 
 /* The few texels of a lightmap, shaded. */
 typedef struct shaded {
@@ -159,14 +163,61 @@ done:
     return result;
 }
 
+/* --- of what a scene asks for */
+
+/* What rays take more for a smaller error than COMMON. */
+static double finer_of(const vsh_scene *scene) {
+    const double finer = COMMON / fmax(scene->shade.max_error, 1e-4);
+    return finer > 1.0 ? finer * sqrt(finer) : finer;
+}
+
+/* Times that what is open is shaded. */
+static double openings_of(const vsh_scene *scene) {
+    return (scene->ao ? 1.0 : 0.0) + vsh_planes_shaded(&scene->planes);
+}
+
+/* Whether its size is what it says. */
+static bool is_sized(const vsh_receiver *receiver) {
+    return receiver->atlas != VSH_ATLAS_OBJECTS && receiver->texels_per_unit == 0.0 && receiver->pages <= 1 &&
+           receiver->max_size == 0 && receiver->width > 0 && receiver->height > 0;
+}
+
+/* Whether something is not traced against triangles of meshes. */
+static bool is_marched(const vsh_scene *scene) {
+    bool marched = vsh_scene_marches(scene, NULL) != 0;
+    for (size_t i = 0; i < scene->layer_count; ++i) {
+        marched = marched || vsh_scene_marches(scene, &scene->layers[i]) != 0;
+    }
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        marched = marched || scene->casters[i].type != VSH_CASTER_MESH;
+    }
+    return marched;
+}
+
+double vshi_shares_seconds(const vsh_scene *scene) {
+    const double finer = finer_of(scene) * (is_marched(scene) ? MARCHED : 1.0), openings = openings_of(scene);
+    const double lights = (double)scene->light_count * (LIT + USUAL_PENUMBRA * finer * PENUMBRA);
+    double ns = 0.0;
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        const vsh_receiver *receiver = &scene->receivers[i];
+        if (!is_sized(receiver)) {
+            return INFINITY;
+        }
+        const double across = receiver->supersample;
+        const double points = (double)receiver->width * receiver->height * across * across;
+        const bool shares = receiver->supersample == 1 && receiver->ao_spacing > 1;
+        ns += points * (LAID_OUT + VALID + lights + openings * finer * (shares ? USUAL_SHARED : USUAL_ALONE));
+    }
+    return 1e-9 * ns;
+}
+
 vsh_result vshi_shares_weigh(const vsh_bake_job *job, vshi_share_rows *share, const vsh_run *run,
                              vsh_error *error) {
     const vsh_scene *scene = &job->scene;
-    const double finer = COMMON / fmax(scene->shade.max_error, 1e-4);
     shaded s = {.light_count = scene->light_count,
                 .step = share->few_step,
-                .finer = finer > 1.0 ? finer * sqrt(finer) : finer,
-                .openings = (scene->ao ? 1.0 : 0.0) + vsh_planes_shaded(&scene->planes),
+                .finer = finer_of(scene),
+                .openings = openings_of(scene),
                 .shares = share->spacing > 1};
     share->all = 0;
     if (share->few != NULL) {

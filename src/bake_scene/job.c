@@ -95,6 +95,10 @@ static vsh_result check_shard(const vsh_bake_job_options *options, vsh_error *er
                          "vsh_bake_job_options.shard %d of %d: expected 1 to %d, and no more than there are",
                          options->shard, count, VSHI_MOST_SHARDS);
     }
+    if (!(options->shard_least >= 0.0 && options->shard_least <= 1e9)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "vsh_bake_job_options.shard_least is %g, expected 0 to 1e9", options->shard_least);
+    }
     if (options->shard > 0 && (options->sink != NULL || options->invalid_picture != NULL)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_job_options.shard: not together with %s",
                          options->sink != NULL ? "a sink" : "invalid_picture");
@@ -184,10 +188,13 @@ vsh_result vsh_bake_job_create(const vsh_scene *scene, const vsh_bake_job_option
     made->report.shade = vsh_shade_stats_zero();
     vsh_result result;
     VSHI_TRY_DONE(take_scene(made, scene, error));
-    VSHI_TRY_DONE(vsh_assets_load(&made->scene, &full, &made->assets, error));
-    VSHI_TRY_DONE(vshi_targets_make(&made->scene, made->assets, &full, &made->targets, error));
-    VSHI_TRY_DONE(list_lightmaps(made, error));
-    VSHI_TRY_DONE(vshi_lit_check_uvs(made, &full, error));
+    made->working = vsh_bake_job_shards(scene, &own);
+    if (!vshi_job_is_idle(made)) {
+        VSHI_TRY_DONE(vsh_assets_load(&made->scene, &full, &made->assets, error));
+        VSHI_TRY_DONE(vshi_targets_make(&made->scene, made->assets, &full, &made->targets, error));
+        VSHI_TRY_DONE(list_lightmaps(made, error));
+        VSHI_TRY_DONE(vshi_lit_check_uvs(made, &full, error));
+    }
     made->report.load_s = vshi_seconds() - start;
     *job = made;
     return VSH_OK;
@@ -349,6 +356,9 @@ vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, vsh_error
     if (job->occluders != NULL) {
         return VSH_OK;
     }
+    if (vshi_job_is_idle(job)) {
+        return vshi_job_make_errors(job, error);
+    }
     vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
     options.receivers_min = job->receivers[0];
     options.receivers_max = job->receivers[1];
@@ -400,12 +410,12 @@ vsh_result vshi_job_bake_all(vsh_bake_job *job, const vsh_run *run, vsh_error *e
 
 vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
     VSHI_NEEDS(job);
-    if (job->occluders == NULL || job->errors == NULL) {
+    if ((job->occluders == NULL && !vshi_job_is_idle(job)) || job->errors == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: vsh_bake_job_prepare() comes first", __func__);
     }
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    if (job->options.sink == NULL) {
+    if (job->options.sink == NULL && !vshi_job_is_idle(job)) {
         VSHI_TRY(vshi_job_find_provenance(job, &full, error));
     }
     if (is_shard(job)) {

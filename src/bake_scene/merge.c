@@ -11,7 +11,9 @@
 #include <string.h>
 
 const char *vshi_parts_name(const vsh_bake_job *job) {
-    return job->options.parts != NULL ? job->options.parts : job->lightmaps[0].output;
+    return job->options.parts != NULL ? job->options.parts
+           : job->targets.count > 0   ? job->lightmaps[0].output
+                                      : job->scene.receivers[0].output; /* of a shard without rows */
 }
 
 vsh_part_options vshi_job_part_options(const vsh_bake_job *job, int32_t count) {
@@ -99,6 +101,29 @@ static vsh_result check_left(const vshi_part *part, const vshi_part *first, vsh_
     return VSH_OK;
 }
 
+/* A part without rows tells of nothing; the others are of the job's inputs, and the first one's casters. */
+static vsh_result check_part(const vsh_bake_job *job, const vshi_part *part, const vshi_part *first,
+                             int32_t shard, int32_t count, vsh_error *error) {
+    const vshi_part_head *head = &part->head;
+    const bool idle = shard > first->head.working;
+    vsh_part_options own = vshi_job_part_options(job, count);
+    own.attribute_count = idle ? 0 : own.attribute_count;
+    VSHI_TRY(vshi_part_about_check(&head->about, part->path, VSHI_PART_BAKE, shard, &own, error));
+    if (head->working != first->head.working) {
+        char theirs[24], ours[24];
+        snprintf(theirs, sizeof theirs, "%d", head->working);
+        snprintf(ours, sizeof ours, "%d", first->head.working);
+        return vshi_part_refuse(part->path, "number of parts with rows", theirs, ours, error);
+    }
+    if (idle) {
+        return head->piece_count == 0 ? VSH_OK
+                                      : vshi_part_damaged(part->path, "rows that are not its", error);
+    }
+    VSHI_TRY(check_lightmaps(job, part, error));
+    VSHI_TRY(check_casters(part, first, error));
+    return check_left(part, first, error);
+}
+
 /* --- all of them together */
 
 static int compare_places(const void *left, const void *right) {
@@ -174,11 +199,7 @@ vsh_result vshi_parts_open(vsh_bake_job *job, int32_t count, const vsh_run *run,
             VSHI_TRY(take_casters(job, &part->head, error));
             VSHI_TRY(vshi_job_find_provenance(job, run, error));
         }
-        const vsh_part_options own = vshi_job_part_options(job, count);
-        VSHI_TRY(vshi_part_about_check(&part->head.about, part->path, VSHI_PART_BAKE, i + 1, &own, error));
-        VSHI_TRY(check_lightmaps(job, part, error));
-        VSHI_TRY(check_casters(part, &parts->list[0], error));
-        VSHI_TRY(check_left(part, &parts->list[0], error));
+        VSHI_TRY(check_part(job, part, &parts->list[0], i + 1, count, error));
     }
     return place_all(job, parts, error);
 }

@@ -10,6 +10,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+bool vshi_job_is_idle(const vsh_bake_job *job) {
+    return job->options.shard > job->working;
+}
+
 /* --- its head */
 
 /* Pieces and lightmaps of a shard; the lists are the head's. */
@@ -24,8 +28,8 @@ static vsh_result list_pieces(const vsh_bake_job *job, const vsh_run *run, vshi_
         head->lightmaps[i] = (vshi_part_lightmap){own->width,   own->height,  own->mesh_count,
                                                   own->covered, own->samples, job->shares[i].left};
     }
-    return vshi_shares_list(job, job->options.shard, job->options.shard_count, run, &head->pieces,
-                            &head->piece_count, error);
+    return vshi_shares_list(job, job->options.shard, job->working, run, &head->pieces, &head->piece_count,
+                            error);
 }
 
 /* Copies of texts; false where memory is short. */
@@ -56,7 +60,8 @@ static vsh_result begin_part(vsh_bake_job *job, const vsh_run *run, vshi_part_pi
                            .active_voxels = casters->active_voxels,
                            .field_bytes = casters->field_bytes,
                            .levels = casters->levels,
-                           .has_triangles = casters->has_triangles};
+                           .has_triangles = casters->has_triangles,
+                           .working = job->working};
     vshi_channels channels;
     vsh_result result;
     char *path = vshi_part_path(options.parts, options.shard, options.shard_count);

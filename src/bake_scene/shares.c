@@ -1,9 +1,12 @@
 #include "bake_scene/shares.h"
 
 #include "bake/part.h"
+#include "bake_scene/lit_sink.h"
+#include "base/floats.h"
 #include "base/memory.h"
 #include "base/try.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 /* Texels between those that are looked at: at most one in 256 of a lightmap's, and no more than so many,
@@ -72,6 +75,24 @@ vsh_result vshi_shares_leave(const vsh_bake_job *job, vsh_error *error) {
                                    error));
     }
     return VSH_OK;
+}
+
+/* --- how many have rows */
+
+int32_t vsh_bake_job_shards(const vsh_scene *scene, const vsh_bake_job_options *options) {
+    VSHI_FLOATS;
+    vsh_bake_job_options own = vsh_bake_job_options_default();
+    if (scene == NULL || options == NULL ||
+        vshi_options_resolve(options, &own, sizeof own, "vsh_bake_job_options", NULL) != VSH_OK) {
+        return 0;
+    }
+    vsh_scene baked = *scene;
+    if (own.sink == NULL) {
+        vshi_lit_sink_scene(&baked);
+    }
+    const double seconds = own.per_object != 0 ? INFINITY : vshi_shares_seconds(&baked);
+    const double most = own.shard_least > 0.0 ? floor(seconds / own.shard_least) : INFINITY;
+    return most >= own.shard_count ? own.shard_count : most > 1.0 ? (int32_t)most : 1;
 }
 
 /* --- cutting */

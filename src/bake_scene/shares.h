@@ -24,6 +24,10 @@ typedef struct vshi_share_rows {
     uint64_t all;   /* their sum */
 } vshi_share_rows;
 
+/* Seconds that a scene's lightmaps are expected to take, as far as it tells before a file is read; INFINITY
+ * where UVs that are made tell how large they are. */
+double vshi_shares_seconds(const vsh_scene *scene);
+
 /* Keeps what shares of a measured lightmap are reckoned by. Errors: VSH_ERROR_MEMORY, VSH_ERROR_LIMIT,
  * VSH_ERROR_CANCELLED. */
 vsh_result vshi_shares_note(vsh_bake_job *job, size_t index, const vsh_charts *charts, const vsh_run *run,
@@ -38,10 +42,10 @@ vsh_result vshi_shares_weigh(const vsh_bake_job *job, vshi_share_rows *share, co
 /* Sets whether AO is left, of a prepared job. Errors: VSH_ERROR_ARGUMENT. */
 vsh_result vshi_shares_leave(const vsh_bake_job *job, vsh_error *error);
 
-/* The rows that shard `shard` of `count` bakes, of a prepared job, in the order of lightmaps and rows;
- * *pieces is to be freed, also after an error. Shards follow each other through all lightmaps, each with as
- * much work as the others, several times there and back where borders cost little; rows begin at multiples of
- * VSH_BAND_STEP. Errors: as vshi_shares_weigh(). */
+/* The rows that shard `shard` of the `count` that have some bakes, of a prepared job, in the order of
+ * lightmaps and rows; *pieces is to be freed, also after an error. Shards follow each other through all
+ * lightmaps, each with as much work as the others, several times there and back where borders cost little;
+ * rows begin at multiples of VSH_BAND_STEP. Errors: as vshi_shares_weigh(). */
 vsh_result vshi_shares_list(const vsh_bake_job *job, int32_t shard, int32_t count, const vsh_run *run,
                             vshi_part_piece **pieces, uint64_t *piece_count, vsh_error *error);
 

@@ -92,7 +92,7 @@ needs_slurm() {
 @test "a bake and a trade on Slurm come to what one of each does, though a node's daemon is killed in the middle" {
     needs_slurm
     write_box box.obj
-    bake=(bake box.obj --sun 0.3,1,0.2 --sun-angle 5 --ao 1 --size 256)
+    bake=(bake box.obj --sun 0.3,1,0.2 --sun-angle 5 --ao 1 --size 256 --shard-least 0)
     "$VDBSHADE" "${bake[@]}" -o one.exr --quiet
     daemons=()
     start_slurm

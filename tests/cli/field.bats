@@ -88,7 +88,7 @@ JSON
     "$VDBSHADE" field layers.json --method cone -o layers.field --quiet
     "$VDBSHADE" bake layers.json --method cone -o one.exr --quiet
     for i in 1 2; do
-        "$VDBSHADE" bake layers.json --method cone --field layers.field -o out.exr --shard "$i/2" --quiet
+        "$VDBSHADE" bake layers.json --method cone --field layers.field -o out.exr --shard "$i/2" --shard-least 0 --quiet
     done
     "$VDBSHADE" merge out.exr --quiet
     cmp one.exr out.exr

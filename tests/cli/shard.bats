@@ -50,12 +50,12 @@ load parts
     "$VDBSHADE" bake two.json --quiet
     mkdir one2 objects
     mv a.exr b.png one2
-    for i in 1 2 3 4 5; do "$VDBSHADE" bake two.json --shard $i/5 --quiet; done
+    for i in 1 2 3 4 5; do "$VDBSHADE" bake two.json --shard $i/5 --shard-least 0 --quiet; done
     "$VDBSHADE" merge a.exr --quiet
     cmp one2/a.exr a.exr
     cmp one2/b.png b.png
     "$VDBSHADE" bake "${CLOISTER[@]}" --size 64 --per-object -o one2/ --quiet
-    for i in 1 2 3; do "$VDBSHADE" bake "${CLOISTER[@]}" --size 64 --per-object -o objects/ --shard $i/3 --quiet; done
+    for i in 1 2 3; do "$VDBSHADE" bake "${CLOISTER[@]}" --size 64 --per-object -o objects/ --shard $i/3 --shard-least 0 --quiet; done
     "$VDBSHADE" merge objects --quiet
     rm one2/a.exr one2/b.png
     diff -r one2 objects
@@ -90,7 +90,7 @@ load parts
         "receivers": [{"mesh": "floor.obj", "size": 256, "output": "halves.exr"}]}' >halves.json
     one halves.exr halves.json
     for i in 1 2; do
-        "$VDBSHADE" bake halves.json -o halves.exr --shard $i/2 --stats $i.json --quiet
+        "$VDBSHADE" bake halves.json -o halves.exr --shard $i/2 --shard-least 0 --stats $i.json --quiet
         rays[i]=$(grep -o '"rays": [0-9]*' $i.json | head -1 | cut -d' ' -f2)
     done
     # by samples it is 5.5 times as many
@@ -109,14 +109,14 @@ load parts
     done
     one out.exr "${CLOISTER[@]}"
     parts out.exr 3 "" "${CLOISTER[@]}"
-    "$VDBSHADE" bake "${CLOISTER[@]}" -o out.exr --shard 2/3 --resume --threads 1 --quiet & pid=$!
+    "$VDBSHADE" bake "${CLOISTER[@]}" -o out.exr --shard 2/3 --resume --shard-least 0 --threads 1 --quiet & pid=$!
     while kill -0 $pid 2>/dev/null && [ "$(stat -c %s out.exr.2-of-3.part.0.resume 2>/dev/null || echo 0)" -lt 15000 ]; do
         sleep 0.01
     done
     kill -KILL $pid
     wait $pid || true
     [ -s out.exr.2-of-3.part.0.resume ] || fail "nothing was kept"
-    run -0 "$VDBSHADE" bake "${CLOISTER[@]}" -o out.exr --shard 2/3 --resume --stats s.json
+    run -0 "$VDBSHADE" bake "${CLOISTER[@]}" -o out.exr --shard 2/3 --resume --shard-least 0 --stats s.json
     [ "$(grep -o '"resumed_rows": [0-9]*' s.json | cut -d' ' -f2)" -ge 8 ]
     parts out.exr 3 "1 3" "${CLOISTER[@]}"
     "$VDBSHADE" merge out.exr --quiet
@@ -145,4 +145,29 @@ load parts
         shade bake "${CLOISTER[@]}" -o out.exr --shard 1/3 $option
         refused 2 "${option% *}" "not together with --shard"
     done
+}
+
+@test "parts have rows where there is work for them, the others nothing to do, and all are merged as one bake" {
+    one out.exr "${CLOISTER[@]}" --size 1024
+    local i idle=0
+    for i in $(seq 64); do # it takes two to three seconds
+        run -0 "$VDBSHADE" bake "${CLOISTER[@]}" --size 1024 -o out.exr --shard "$i/64"
+        [[ $output == *"nothing to do"*"--shard-least"* ]] && idle=$((idle + 1))
+    done
+    [ "$idle" -ge 54 ] && [ "$idle" -le 62 ] || fail "$idle of 64 parts had nothing to do"
+    [ "$(stat -c %s out.exr.64-of-64.part)" -lt 2000 ]
+    run -0 "$VDBSHADE" bake "${CLOISTER[@]}" --size 1024 -o out.exr --shard 64/64 --field none.field # nor fields
+    shade bake "${CLOISTER[@]}" --size 1024 -o out.exr --shard 1/64 --field none.field
+    refused 3 none.field
+    "$VDBSHADE" merge out.exr --quiet
+    cmp one/out.exr out.exr
+    run -0 "$VDBSHADE" bake "${CLOISTER[@]}" -o out.exr --shard 64/64 --shard-least 1e-6 # the same for all parts
+    [[ $output != *"nothing to do"* ]]
+    shade merge out.exr
+    refused 2 "out.exr.64-of-64.part: is of other inputs or options"
+    # sizes that UVs tell are not known before these are made
+    run -0 "$VDBSHADE" bake "${CLOISTER[@]}" --unwrap always --texels-per-unit 4 -o unwrapped.exr --shard 2/2
+    [[ $output != *"nothing to do"* ]]
+    shade bake "${CLOISTER[@]}" -o out.exr --shard 1/2 --shard-least -1
+    refused 2 "--shard-least '-1'"
 }

@@ -181,7 +181,15 @@ static char *name_parts(const cli_bake_settings *s, const vsh_scene *scene) {
     return cli_end_path(output, ""); /* a folder, of objects */
 }
 
-static void say_part(const cli_bake_settings *s, const char *parts, const vsh_bake_report *report) {
+static void say_part(const cli_bake_settings *s, const char *parts, size_t lightmaps,
+                     const vsh_bake_report *report) {
+    if (lightmaps == 0) {
+        cli_say(
+            "%s.%d-of-%d.part: nothing to do, as parts would take less than %g s (--shard-least); 'vdbshade "
+            "merge %s' once all parts are there",
+            parts, s->shard, s->shard_count, s->shard_least, parts);
+        return;
+    }
     cli_say("%s.%d-of-%d.part: %" PRIu64 " texels, %" PRIu64
             " of them invalid; 'vdbshade merge %s' once all parts are there",
             parts, s->shard, s->shard_count, report->texels, report->invalid_texels, parts);
@@ -238,7 +246,9 @@ static vsh_result run_job(vsh_bake_job *job, const vsh_scene *scene, const vsh_r
         VSHI_TRY(vsh_bake_job_prepare(job, run, error));
         return vsh_bake_job_run(job, run, error);
     }
-    cli_bake_expect(scene, job, run->threads);
+    if (vsh_bake_job_count(job) > 0) {
+        cli_bake_expect(scene, job, run->threads);
+    }
     cli_warnings_tell();
     VSHI_TRY(vsh_bake_job_prepare(job, run, error));
     cli_warnings_tell();
@@ -268,9 +278,11 @@ static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, v
     if (!settings->common.quiet) {
         say_all(t, job, &report);
         if (t->part) {
-            say_part(settings, parts, &report);
+            say_part(settings, parts, t->count, &report);
         }
-        cli_stats_say(&stats);
+        if (t->count > 0) {
+            cli_stats_say(&stats);
+        }
     }
     return CLI_OK;
 }
@@ -297,6 +309,7 @@ int cli_bake_one(const cli_bake_settings *settings, const vsh_scene *scene, cli_
     char *parts = name_parts(settings, scene);
     options.shard = part && !settings->dry_run ? settings->shard : 0; /* what is told is of the whole */
     options.shard_count = settings->tile_size > 0.0 ? 0 : settings->shard_count;
+    options.shard_least = settings->shard_least;
     options.forecast = settings->dry_run;
     options.parts = settings->merged != NULL ? settings->merged : parts;
     options.words = settings->words;

@@ -22,7 +22,8 @@ enum {
     KEY_EXR,
     KEY_VIEW,
     KEY_DENSITY,
-    KEY_TILE_SIZE
+    KEY_TILE_SIZE,
+    KEY_SHARD_LEAST
 };
 
 static const cli_option options[] = {
@@ -56,6 +57,10 @@ static const cli_option options[] = {
         "bake part I of N, with as much work as the others, into\nOUT.I-of-N.part: on any machine, in any "
         "order, again where\nit failed; 'vdbshade merge OUT' puts all parts together to\nthe bits of "
         "one bake; with --tile-size whole tiles, and\nnothing is to be merged"),
+    {KEY_SHARD_LEAST, "shard-least", "SECONDS",
+     "work that a part has at least: where there is less for\neach, the last parts have nothing to do; 0: "
+     "all "
+     "have some;\nthe same for all parts (0.5)"},
     {0, NULL, NULL, "Objects"},
     {KEY_RECEIVE, "receive", "NAME",
      "only objects of this name receive, all cast; * and ?\nmatch as in a shell; may be repeated"},
@@ -200,6 +205,8 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case CLI_KEY_SHARD:
         return cli_parse_shard(name, value, &s->shard, &s->shard_count);
+    case KEY_SHARD_LEAST:
+        return cli_parse_number(name, value, 0.0, 1e9, &s->shard_least);
     case KEY_BAND_ROWS:
         return cli_parse_integer(name, value, 1, VSH_MAX_LIGHTMAP_SIZE, &s->band_rows);
     default:
@@ -211,6 +218,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
 int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings, bool *help) {
     memset(settings, 0, sizeof *settings);
     settings->common = cli_common_default();
+    settings->shard_least = vsh_bake_job_options_default().shard_least;
     settings->words = (const char *const *)argv;
     settings->word_count = (size_t)argc;
     const int code = cli_parse(&cli_bake, argc, argv, take, settings, "INPUT", &settings->input, help);

@@ -83,6 +83,7 @@ typedef struct cli_bake_settings {
     bool preview, embed, images_beside; /* of an asset */
     bool has_sun, has_sun_angle, has_light_radius, per_object, dry_run, resume;
     int32_t shard, shard_count; /* 0: all of it */
+    double shard_least;         /* seconds */
     double tile_size;           /* world units; 0: the scene is not cut into tiles */
     const char *const *words;   /* [word_count]: the command line that this is */
     size_t word_count;

@@ -266,6 +266,15 @@ static int check_outputs(const cli_bake_settings *s, const vsh_scene *scene) {
     return s->stats != NULL ? cli_bake_check_output(s, scene, s->stats) : CLI_OK;
 }
 
+/* Whether the shard of a bake is one that has some; else it has no use for fields. */
+static bool has_rows(const cli_bake_settings *s, const vsh_scene *scene) {
+    vsh_bake_job_options options = vsh_bake_job_options_default();
+    options.per_object = s->per_object;
+    options.shard_count = s->shard_count;
+    options.shard_least = s->shard_least;
+    return s->tile_size > 0.0 || s->shard <= vsh_bake_job_shards(scene, &options);
+}
+
 /* Opens the file of fields. What it says of voxels stands in outputs as if it had been given. */
 static int use_field(const cli_bake_settings *s, cli_bake_scene *made) {
     if (s->field == NULL) {
@@ -312,7 +321,6 @@ static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scen
     }
     int code = cli_patch_scene(&settings->patch, &made->scene);
     code = code == CLI_OK ? cli_bake_add_lights(settings, made) : code;
-    code = code == CLI_OK ? use_field(settings, made) : code;
     code = code == CLI_OK ? cli_bake_check_shade(settings, &made->scene) : code;
     code = code == CLI_OK && receivers ? cli_bake_check_work(settings, made) : code;
     return code == CLI_OK ? add_casters(settings, made) : code;
@@ -322,12 +330,13 @@ int cli_bake_scene_for_points(const cli_bake_settings *settings, cli_bake_scene 
     const int code = make(settings, false, made);
     made->scene.receivers = NULL;
     made->scene.receiver_count = 0;
-    return code;
+    return code == CLI_OK ? use_field(settings, made) : code;
 }
 
 int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made) {
     int code = make(settings, true, made);
     code = code == CLI_OK ? add_receivers(settings, made) : code;
+    code = code == CLI_OK && has_rows(settings, &made->scene) ? use_field(settings, made) : code;
     return code == CLI_OK ? check_outputs(settings, &made->scene) : code;
 }
 
