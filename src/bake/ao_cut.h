@@ -12,26 +12,8 @@ typedef struct vshi_ao_cut {
     int32_t spacing;    /* of texels that share AO; 1: nothing is left */
     int32_t height;     /* of the lightmap, texels */
     int32_t first, end; /* rows of texels */
+    uint32_t kinds;     /* what is kept of texels: VSHI_KEEPS_… (bake/ao_kept.h) */
 } vshi_ao_cut;
-
-/* What is kept of a texel. */
-typedef struct vshi_ao_shot {
-    double position[3]; /* where its rays begin */
-    float normal[3];
-    float shot;     /* share of its own rays that are free */
-    int32_t rays;   /* of them; 0: none */
-    uint32_t level; /* vshi_ao_share's; 0: the texel has no rays, and no normal either */
-    /* What holds it against the casters (bake/field_error.h): VSHI_AO_EVEN_… and how many samples it stands
-     * for; how many of each of two sets of rays to them are free, 16 bits each. 0: nothing does. */
-    uint32_t held[2];
-} vshi_ao_shot;
-
-_Static_assert(sizeof(vshi_ao_shot) == 56, "it is written as it is");
-
-/* The first rays of both sets are all hidden, all free. */
-#define VSHI_AO_EVEN_HIDDEN UINT32_C(0x80000000)
-#define VSHI_AO_EVEN_FREE UINT32_C(0x40000000)
-#define VSHI_AO_HELD_WEIGHT UINT32_C(0x3fffffff)
 
 enum { VSHI_AO_CUT_TILE = 8 };
 

@@ -13,8 +13,7 @@
 typedef struct sharing {
     const vsh_texels *texels;
     const vshi_origins *origins;
-    const vshi_ao_cut *cut; /* NULL: all is estimated */
-    vshi_ao_shot *shots;    /* of the band's own rows that are kept */
+    const vshi_ao_keep *keep; /* NULL: all is estimated */
     vshi_ao_estimates e;
 } sharing;
 
@@ -28,32 +27,45 @@ static void map_origins(void *user, size_t begin, size_t end) {
     }
 }
 
-/* A vshi_range_fn over the band's own rows of texels: what is kept of them. */
-static void keep_shots(void *user, size_t begin, size_t end) {
-    const sharing *s = user;
+/* What is kept of a texel; its value, where it is left, is none yet. */
+static void keep_texel(const sharing *s, const vshi_ao_kept *kept, size_t column, size_t i, bool left) {
     const vshi_ao_estimates *e = &s->e;
-    const size_t width = (size_t)s->texels->info.width;
-    const int32_t first = s->texels->band.own_first, before = vshi_ao_cut_kept(s->cut, first);
+    vshi_ao_shot *shot = &(s->keep->sky ? kept->sky : kept->ao)[column];
+    memcpy(kept->position + VSHI_KEPT_POSITION * column, e->points->positions + 3 * i, VSHI_KEPT_POSITION);
+    memcpy(kept->normal + 3 * column, e->points->normals + 3 * i, 3 * sizeof *kept->normal);
+    shot->level = e->share.level[i];
+    shot->rays = e->share.rays[i];
+    shot->shot = shot->rays > 0 ? e->shot[i] : 0.0f;
+    if (e->open != NULL && shot->rays > 0) {
+        memcpy(kept->open + 3 * column, e->open + 3 * i, 3 * sizeof *kept->open);
+    }
+    if (!left || !vshi_ao_is_left(shot)) {
+        return;
+    }
+    e->values[i] = 0.0f;
+    if (e->deviation != NULL) {
+        e->deviation[i] = 0.0f;
+    }
+    if (e->bent != NULL) {
+        memset(e->bent + 3 * i, 0, 3 * sizeof *e->bent);
+    }
+}
+
+/* A vshi_range_fn over the band's own rows of texels. */
+static void keep_rows(void *user, size_t begin, size_t end) {
+    const sharing *s = user;
     for (size_t k = begin; k < end; ++k) {
-        const int32_t row = first + (int32_t)k, at = vshi_ao_cut_kept(s->cut, row);
-        if (vshi_ao_cut_kept(s->cut, row + 1) == at) {
+        const int32_t row = s->keep->first + (int32_t)k;
+        const bool left = vshi_ao_cut_leaves(s->keep->cut, row / VSHI_TILE);
+        vshi_ao_kept kept;
+        if (!vshi_ao_keep_row(s->keep, row, &kept)) {
             continue;
         }
-        vshi_ao_shot *shots = s->shots + (size_t)(at - before) * width;
-        memset(shots, 0, width * sizeof *shots);
-        for (size_t column = 0; column < width; ++column) {
-            const uint32_t origin =
-                vshi_texel_at(&e->share.map, (int32_t)column, row - s->texels->band.first);
-            if (origin == 0) {
-                continue;
+        for (int32_t column = 0; column < s->keep->width; ++column) {
+            const uint32_t at = vshi_texel_at(&s->e.share.map, column, row - s->texels->band.first);
+            if (at > 0) {
+                keep_texel(s, &kept, (size_t)column, (size_t)at - 1, left);
             }
-            const size_t i = (size_t)origin - 1;
-            vshi_ao_shot *shot = &shots[column];
-            memcpy(shot->position, e->points->positions + 3 * i, sizeof shot->position);
-            memcpy(shot->normal, e->points->normals + 3 * i, sizeof shot->normal);
-            shot->level = e->share.level[i];
-            shot->rays = e->share.rays[i];
-            shot->shot = shot->rays > 0 ? e->shot[i] : 0.0f;
         }
     }
 }
@@ -69,11 +81,12 @@ static vsh_result open_reach(sharing *s, vsh_error *error) {
     const vshi_band *band = &s->texels->band;
     VSHI_TRY(vshi_allocate((void **)&reach->lattices, reach->rows, reach->columns, "AO texels", error));
     for (size_t row = 0; row < reach->rows; ++row) {
-        const bool left = s->cut != NULL && vshi_ao_cut_leaves(s->cut, (int32_t)(row + band->held_begin));
+        const bool left =
+            s->keep != NULL && vshi_ao_cut_leaves(s->keep->cut, (int32_t)(row + band->held_begin));
         reach->wanted[row] = s->origins->needed[row] == VSHI_ROW_WANTED && !left;
     }
     vshi_ao_reach_first(reach, s->texels->ao_spacing);
-    if (s->cut != NULL) {
+    if (s->keep != NULL) {
         vshi_ao_reach_own(reach, s->texels->ao_spacing, band->own_begin - band->held_begin,
                           band->own_end - band->held_begin);
     }
@@ -95,15 +108,14 @@ static vsh_result shoot(sharing *s, const vsh_occluders *occluders, const vsh_ru
 
 vsh_result vshi_ao_texels(const vsh_occluders *occluders, const vsh_texels *texels,
                           const vshi_origins *origins, const vsh_points *points,
-                          const vsh_shade_options *options, const vsh_run *run, vshi_ao_shot *shots,
+                          const vsh_shade_options *options, const vsh_run *run, const vshi_ao_keep *keep,
                           float *values, float *deviation, float *bent, vsh_shade_stats *stats,
                           vsh_error *error) {
     const size_t count = origins->count;
     sharing s = {
         .texels = texels,
         .origins = origins,
-        .cut = shots != NULL ? &texels->cut : NULL,
-        .shots = shots,
+        .keep = keep->memory != NULL ? keep : NULL,
         .e = {.points = points,
               .options = options,
               .rows = &origins->rows,
@@ -129,8 +141,8 @@ vsh_result vshi_ao_texels(const vsh_occluders *occluders, const vsh_texels *texe
         VSHI_TRY_DONE(shoot(&s, occluders, run, error));
         VSHI_TRY_DONE(vshi_ao_estimate(&s.e, job, error));
     }
-    if (s.cut != NULL) {
-        VSHI_TRY_DONE(vshi_parallel_for(job, (size_t)texels->band.own_rows, 16, 0, keep_shots, &s, error));
+    if (s.keep != NULL) {
+        VSHI_TRY_DONE(vshi_parallel_for(job, (size_t)(keep->end - keep->first), 16, 0, keep_rows, &s, error));
     }
     if (stats != NULL) {
         vshi_ao_estimate_add(&s.e, stats);

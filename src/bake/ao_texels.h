@@ -3,15 +3,14 @@
 #ifndef VSHI_BAKE_AO_TEXELS_H
 #define VSHI_BAKE_AO_TEXELS_H
 
-#include "bake/ao_cut.h"
+#include "bake/ao_kept.h"
 #include "bake/origins.h"
 
-/* As vshi_lattice_ao(), of methods by rays that keep an error. With `shots` [rows that are kept of the band's
- * own][width] the texels' cut leaves rows, whose values are 0 but for those that are known without rays: what
- * is kept of them is set, but for what holds it against the casters. */
+/* As vshi_lattice_ao(), of methods by rays that keep an error. What `keep` has memory for is set, but for
+ * what holds it against the casters and tangents, where texels have rays; values that are left are 0. */
 vsh_result vshi_ao_texels(const vsh_occluders *occluders, const vsh_texels *texels,
                           const vshi_origins *origins, const vsh_points *points,
-                          const vsh_shade_options *options, const vsh_run *run, vshi_ao_shot *shots,
+                          const vsh_shade_options *options, const vsh_run *run, const vshi_ao_keep *keep,
                           float *values, float *deviation, float *bent, vsh_shade_stats *stats,
                           vsh_error *error);
 

@@ -16,6 +16,11 @@ typedef struct vshi_average {
     uint8_t *state;      /* [texels held]: VSHI_TEXEL_…, INVALID where no sample has a value */
 } vshi_average;
 
+/* What the average of one sample is. */
+static inline float vshi_average_of_one(float value) {
+    return (float)(0.0 + (double)value); /* -0 becomes 0 */
+}
+
 /* Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 vsh_result vshi_average_run(const vshi_average *average, const vsh_run *run, vsh_error *error);
 

@@ -135,9 +135,8 @@ vsh_result vshi_bake_light(vshi_baking *bake, size_t index, vsh_error *error) {
 
 /* --- AO */
 
-vsh_result vshi_baking_open(vshi_baking *bake, const vsh_shade_options *options, float *deviation,
-                            float *bent, vsh_error *error) {
-    vsh_shade_options shade = *options;
+vsh_result vshi_baking_open(vshi_baking *bake, bool sky, float *deviation, float *bent, vsh_error *error) {
+    vsh_shade_options shade = vshi_baking_options(bake, sky);
     const vsh_occluders *occluders;
     const vsh_points points = points_of(bake, vshi_baking_traces_ao(bake), &shade, &occluders);
     VSHI_TRY(vshi_lift_for(bake->texels, NULL, &bake->quiet, &bake->origins, error));
@@ -145,9 +144,10 @@ vsh_result vshi_baking_open(vshi_baking *bake, const vsh_shade_options *options,
         return vshi_shade_ao(occluders, &points, &bake->origins.rows, &shade, &bake->run, bake->values,
                              deviation, bent, NULL, &bake->stats.shade, error);
     }
+    bake->keep.sky = sky;
     return vshi_baking_shares(bake)
                ? vshi_ao_texels(occluders, bake->texels, &bake->origins, &points, &shade, &bake->run,
-                                bake->shots, bake->values, deviation, bent, &bake->stats.shade, error)
+                                &bake->keep, bake->values, deviation, bent, &bake->stats.shade, error)
                : vshi_lattice_ao(occluders, bake->texels, &bake->origins, &points, &shade, &bake->run,
                                  bake->values, deviation, bent, &bake->stats.shade, error);
 }
@@ -155,8 +155,8 @@ vsh_result vshi_baking_open(vshi_baking *bake, const vsh_shade_options *options,
 vsh_result vshi_bake_ao(vshi_baking *bake, vsh_error *error) {
     const vsh_lightmap *lightmap = bake->lightmap;
     const double square = bake->stats.shade.square_error;
-    VSHI_TRY(vshi_baking_open(bake, &bake->shade, lightmap->ao_error != NULL ? bake->deviation : NULL,
-                              bake->bent, error));
+    VSHI_TRY(vshi_baking_open(bake, false, lightmap->ao_error != NULL ? bake->deviation : NULL, bake->bent,
+                              error));
     if (lightmap->ao_error != NULL) {
         VSHI_TRY(vshi_baking_average(bake, bake->deviation, 1, lightmap->ao_error, error));
     }
@@ -165,8 +165,8 @@ vsh_result vshi_bake_ao(vshi_baking *bake, vsh_error *error) {
     }
     VSHI_TRY(vshi_baking_add_error(bake, bake->light_count, square, error));
     if (lightmap->bent != NULL) {
-        VSHI_TRY(vshi_bent_normals(bake->texels, &bake->origins, lightmap->bent_space, &bake->quiet,
-                                   bake->bent, error));
+        VSHI_TRY(vshi_bent_normals(bake->texels, &bake->origins, lightmap->bent_space, &bake->keep,
+                                   &bake->quiet, bake->bent, error));
         VSHI_TRY(vshi_baking_average(bake, bake->bent, 3, lightmap->bent, error));
         vshi_bent_normals_again(vshi_texels_held(bake->texels), lightmap->bent);
     }
@@ -212,11 +212,10 @@ static const float *plane_of(const vshi_baking *bake, size_t channel) {
 static vsh_result hold_channel(vshi_baking *bake, size_t channel, const float *values, const float *filled,
                                vsh_error *error) {
     const vsh_light *light = channel < bake->light_count ? &bake->lights[channel] : NULL;
-    const vsh_shade_options options = channel > bake->light_count ? vshi_baking_sky(bake) : bake->shade;
-    const vshi_field_error_left left = {&bake->texels->cut, bake->shots};
-    const bool leaves = channel == bake->light_count && bake->shots != NULL;
-    return vshi_field_error_add(&bake->held, light, &options, values, filled, leaves ? &left : NULL,
-                                &bake->quiet, &bake->stats.errors[channel], error);
+    const vsh_shade_options options = vshi_baking_options(bake, channel > bake->light_count);
+    return vshi_field_error_add(&bake->held, light, &options, values, filled,
+                                light == NULL ? &bake->keep : NULL, &bake->quiet,
+                                &bake->stats.errors[channel], error);
 }
 
 vsh_result vshi_baking_add_error(vshi_baking *bake, size_t channel, double square, vsh_error *error) {

@@ -23,7 +23,7 @@ typedef struct vshi_baking {
     vshi_spread spread;
     uint8_t *state;       /* [rows held][width]: VSHI_TEXEL_… */
     uint32_t *known;      /* [own rows][width]: VSHI_PART_…, of a part; NULL: it is padded, too */
-    vshi_ao_shot *shots;  /* [own rows that are kept][width], of a part that leaves AO; else NULL */
+    vshi_ao_keep keep;    /* of a part that leaves AO: what is kept */
     float *values;        /* [origins.count]: of one light, or AO */
     float *deviation;     /* [origins.count]: of the same; NULL where no plane is for it */
     float *irradiance;    /* [origins.count][3] */
@@ -45,10 +45,9 @@ vsh_result vshi_baking_average(vshi_baking *bake, const float *values, size_t co
 vsh_result vshi_baking_step(vshi_baking *bake, const char *what, vshi_range_fn *step, void *user,
                             vsh_error *error);
 
-/* Shades what is open around each sample into `values`, by the methods and options of AO. `deviation` and
- * `bent` [origins.count], [..][3] may be NULL. */
-vsh_result vshi_baking_open(vshi_baking *bake, const vsh_shade_options *options, float *deviation,
-                            float *bent, vsh_error *error);
+/* Shades what is open around each sample, or of the sky over it, into `values`, by the methods of AO.
+ * `deviation` and `bent` [origins.count], [..][3] may be NULL. */
+vsh_result vshi_baking_open(vshi_baking *bake, bool sky, float *deviation, float *bent, vsh_error *error);
 
 /* Shades a light, or AO, and fills the planes of it. */
 vsh_result vshi_bake_light(vshi_baking *bake, size_t light, vsh_error *error);
@@ -65,8 +64,8 @@ vsh_result vshi_baking_choose_held(vshi_baking *bake, vsh_error *error);
  * vsh_bake_stats. */
 vsh_result vshi_baking_add_error(vshi_baking *bake, size_t channel, double square, vsh_error *error);
 
-/* Options that the sky is shaded by. */
-vsh_shade_options vshi_baking_sky(const vshi_baking *bake);
+/* Options that AO, or the sky, is shaded by. */
+vsh_shade_options vshi_baking_options(const vshi_baking *bake, bool sky);
 
 /* Adds what is filled, once it is: of the planes that there are. */
 vsh_result vshi_baking_add_filled(vshi_baking *bake, vsh_error *error);

@@ -217,27 +217,20 @@ typedef struct holding {
     vshi_lift_light light;
     vshi_vec up;
     const float *values, *filled; /* one of them is NULL */
-    const vshi_field_error_left *left;
+    const vshi_ao_keep *keep;
 } holding;
 
 /* What is kept of a sample whose value is not known yet; NULL: it is. */
 static vshi_ao_shot *left_of(const holding *h, const vshi_field_error_sample *s) {
-    const vshi_field_error_left *left = h->left;
-    const vsh_texels *texels = h->share->texels;
-    const uint32_t texel = texels->texel[s->sample];
-    const int32_t row = (int32_t)vsh_texel_row(texel), first = texels->band.own_first;
-    if (left == NULL || !s->counts || s->packed == NONE || !vshi_ao_cut_leaves(left->cut, row / VSHI_TILE)) {
-        return NULL;
-    }
-    const int32_t at = vshi_ao_cut_kept(left->cut, row) - vshi_ao_cut_kept(left->cut, first);
-    vshi_ao_shot *shot =
-        left->shots + (size_t)at * (size_t)texels->info.width + (size_t)vsh_texel_column(texel);
-    return shot->level != VSHI_AO_KNOWN_LEVEL ? shot : NULL;
+    const uint32_t texel = h->share->texels->texel[s->sample];
+    return h->keep != NULL && s->counts && s->packed != NONE
+               ? vshi_ao_keep_left(h->keep, (int32_t)vsh_texel_column(texel), (int32_t)vsh_texel_row(texel))
+               : NULL;
 }
 
 /* Rays to the casters, to be held against the value later. */
-static void keep(const holding *h, const vshi_field_error_sample *s, const double position[3],
-                 vshi_ao_shot *shot) {
+static void keep_count(const holding *h, const vshi_field_error_sample *s, const double position[3],
+                       vshi_ao_shot *shot) {
     const vsh_texels *texels = h->share->texels;
     int32_t free[2], even;
     if (vshi_truth_count(&h->truth, position, texels->normal + 3 * s->sample,
@@ -249,7 +242,7 @@ static void keep(const holding *h, const vshi_field_error_sample *s, const doubl
     }
 }
 
-static int32_t rays_of(double max_error) {
+int32_t vshi_field_error_rays(double max_error) {
     return max_error < FINE ? FINE_RAYS : RAYS;
 }
 
@@ -269,7 +262,7 @@ static void hold(void *user, size_t begin, size_t end) {
         vshi_ao_shot *left = left_of(h, s);
         h->share->square[k] = NAN;
         if (left != NULL) {
-            keep(h, s, position, left);
+            keep_count(h, s, position, left);
             continue;
         }
         if (s->counts && s->packed != NONE && h->values != NULL) {
@@ -287,7 +280,7 @@ static void hold(void *user, size_t begin, size_t end) {
 
 vsh_result vshi_field_error_add(vshi_field_error *share, const vsh_light *light,
                                 const vsh_shade_options *options, const float *values, const float *filled,
-                                const vshi_field_error_left *left, const vsh_run *run, vsh_bake_error *sum,
+                                const vshi_ao_keep *keep, const vsh_run *run, vsh_bake_error *sum,
                                 vsh_error *error) {
     holding h = {.share = share,
                  .truth = share->truth,
@@ -295,13 +288,13 @@ vsh_result vshi_field_error_add(vshi_field_error *share, const vsh_light *light,
                  .up = vshi_vec_of(options->ao_up),
                  .values = values,
                  .filled = filled,
-                 .left = left};
+                 .keep = keep};
     const bool one_ray = light != NULL && vshi_light_is_point(&h.light.place);
     h.truth.light = light;
     h.truth.place = h.light.place;
     h.truth.distance = options->ao_distance;
     h.truth.up = vshi_dot(h.up, h.up) > 0.0 ? &h.up : NULL;
-    h.truth.rays = one_ray ? 1 : rays_of(options->max_error);
+    h.truth.rays = one_ray ? 1 : vshi_field_error_rays(options->max_error);
     vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, h.truth.rays, 0);
     if (sampler == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "error of the field: the system refused memory");
@@ -323,21 +316,17 @@ vsh_result vshi_field_error_add(vshi_field_error *share, const vsh_light *light,
     return VSH_OK;
 }
 
-bool vshi_field_error_settle(const vshi_ao_shot *shot, double max_error, double value, vsh_bake_error *sum) {
-    const int32_t rays = rays_of(max_error);
+void vshi_field_error_settle(const vshi_ao_shot *shot, double max_error, double value, vsh_bake_error *sum) {
+    const int32_t rays = vshi_field_error_rays(max_error);
     const double weight = shot->held[0] & VSHI_AO_HELD_WEIGHT;
     const int32_t free[2] = {(int32_t)(shot->held[1] & 0xffff), (int32_t)(shot->held[1] >> 16)};
     const int32_t even = (shot->held[0] & VSHI_AO_EVEN_HIDDEN) != 0 ? VSHI_TRUTH_EVEN_HIDDEN
                          : (shot->held[0] & VSHI_AO_EVEN_FREE) != 0 ? VSHI_TRUTH_EVEN_FREE
                                                                     : VSHI_TRUTH_UNEVEN;
     double seen[2];
-    if (free[0] > rays || free[1] > rays) {
-        return false;
-    }
     vshi_truth_settle(rays, free, even, value, seen);
     sum->held += weight;
     sum->held_square_error += weighed(weight, (value - seen[0]) * (value - seen[1]));
-    return true;
 }
 
 double vsh_bake_error_rmse(const vsh_bake_error *e) {

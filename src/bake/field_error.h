@@ -2,7 +2,7 @@
 #ifndef VSHI_BAKE_FIELD_ERROR_H
 #define VSHI_BAKE_FIELD_ERROR_H
 
-#include "bake/ao_cut.h"
+#include "bake/ao_kept.h"
 #include "bake/lift.h"
 #include "trace/trace.h"
 
@@ -23,12 +23,6 @@ typedef struct vshi_field_error {
     double *square; /* [count]: of one channel */
 } vshi_field_error;
 
-/* Where samples' values of AO are not known yet. */
-typedef struct vshi_field_error_left {
-    const vshi_ao_cut *cut;
-    vshi_ao_shot *shots; /* [rows that are kept of the band's own][width]: `held` is set */
-} vshi_field_error_left;
-
 /* What stands for the truth, and the lift of rays to them. */
 vshi_truth vshi_field_error_truth(const vsh_occluders *occluders, const vsh_shade_options *shade);
 
@@ -44,15 +38,18 @@ void vshi_field_error_free(vshi_field_error *share);
 
 /* Adds what is found of a channel to *sum: of valid samples by their `values`, or (NULL) of those that are
  * filled by the plane of the texels held, once it is. Where `light` is NULL it is AO's, or with
- * options->ao_up the sky's: all that goes up, of the whole hemisphere. `left` may be NULL. Errors: the same.
- */
+ * options->ao_up the sky's: all that goes up, of the whole hemisphere. Of samples that `keep` (may be NULL)
+ * says are left, `held` of what is kept is set instead. Errors: the same. */
 vsh_result vshi_field_error_add(vshi_field_error *share, const vsh_light *light,
                                 const vsh_shade_options *options, const float *values, const float *filled,
-                                const vshi_field_error_left *left, const vsh_run *run, vsh_bake_error *sum,
+                                const vshi_ao_keep *keep, const vsh_run *run, vsh_bake_error *sum,
                                 vsh_error *error);
 
-/* Adds what vshi_field_error_add() would have of a texel that was left, once its value is known. False where
- * no bake left such a one. */
-bool vshi_field_error_settle(const vshi_ao_shot *shot, double max_error, double value, vsh_bake_error *sum);
+/* Rays that each of a sample's two values is of, at most. */
+int32_t vshi_field_error_rays(double max_error);
+
+/* Adds what vshi_field_error_add() would have of a texel that was left, once its value is known. No more of
+ * its rays are free than there are. */
+void vshi_field_error_settle(const vshi_ao_shot *shot, double max_error, double value, vsh_bake_error *sum);
 
 #endif

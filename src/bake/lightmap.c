@@ -74,7 +74,7 @@ static vsh_result find_needed(void *user, const vshi_origins *origins, uint8_t *
         taken[row] = taken[row] || (at + near >= band->own_begin && at < band->own_end + near);
     }
     const bool shared = vshi_baking_interpolates(bake) && needs(bake, NEEDS_ANY_AO);
-    memset(rows, bake->shots != NULL ? VSHI_ROW_BESIDE : VSHI_ROW_LEFT_OUT, count);
+    memset(rows, bake->keep.memory != NULL ? VSHI_ROW_BESIDE : VSHI_ROW_LEFT_OUT, count);
     for (size_t row = 0; row < count; ++row) {
         size_t begin = row + band->held_begin, end = begin + 1;
         if (shared) {
@@ -304,8 +304,8 @@ static vsh_result check(const vsh_lightmap *lightmap, const vsh_texels *texels, 
 
 static vsh_result bake_texels(const vsh_occluders *occluders, const vsh_texels *texels,
                               const vsh_light *lights, size_t light_count, const vsh_shade_options *options,
-                              const vsh_run *run, const vsh_lightmap *lightmap, uint32_t *known,
-                              vshi_ao_shot *shots, vsh_bake_stats *stats, vsh_error *error) {
+                              const vsh_run *run, const vsh_lightmap *lightmap, uint32_t *known, void *kept,
+                              vsh_bake_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(occluders);
     VSHI_NEEDS(texels);
@@ -317,7 +317,7 @@ static vsh_result bake_texels(const vsh_occluders *occluders, const vsh_texels *
                         .light_count = light_count,
                         .lightmap = lightmap,
                         .known = known,
-                        .shots = shots,
+                        .keep = {.cut = &texels->cut, .memory = kept},
                         .needs = vshi_planes_need(lightmap, light_count),
                         .stats = vsh_bake_stats_zero()};
     VSHI_TRY(vshi_shade_options_resolve(options != NULL ? options : &texels->shade, &bake.shade, error));
@@ -329,6 +329,10 @@ static vsh_result bake_texels(const vsh_occluders *occluders, const vsh_texels *
     for (size_t m = 0; bake.stats.invalid_by_mesh != NULL && m < texels->mesh_count; ++m) {
         bake.stats.invalid_by_mesh[m] = 0;
     }
+    bake.keep.width = texels->info.width;
+    bake.keep.first = texels->band.own_first;
+    bake.keep.end = texels->band.own_first + texels->band.own_rows;
+    vshi_ao_keep_clear(&bake.keep);
     bake.worst = bake.stats.shade.worst_error;
     bake.stats.shade.worst_error = 0.0;
     VSHI_TRY(run_bake(&bake, error));
@@ -349,9 +353,9 @@ vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_texels *t
 
 vsh_result vshi_bake_part(const vsh_occluders *occluders, const vsh_texels *texels, const vsh_light *lights,
                           size_t light_count, const vsh_shade_options *options, const vsh_run *run,
-                          const vsh_lightmap *lightmap, uint32_t *known, vshi_ao_shot *shots,
-                          vsh_bake_stats *stats, vsh_error *error) {
+                          const vsh_lightmap *lightmap, uint32_t *known, void *kept, vsh_bake_stats *stats,
+                          vsh_error *error) {
     VSHI_NEEDS(known);
-    return bake_texels(occluders, texels, lights, light_count, options, run, lightmap, known, shots, stats,
+    return bake_texels(occluders, texels, lights, light_count, options, run, lightmap, known, kept, stats,
                        error);
 }

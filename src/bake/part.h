@@ -1,11 +1,11 @@
 /* Rows of a lightmap that are baked by themselves, to be put together with the others later: values are those
  * of the samples alone. What is beyond them, padding and invalid texels, is filled once all rows are there,
  * so that no row is shaded for the sake of another. So is AO that is shared with rows of other parts
- * (bake/ao_cut.h), where AO and its error are all that depends on it; else those rows are shaded, too. */
+ * (bake/ao_cut.h), and what is made of it. */
 #ifndef VSHI_BAKE_PART_H
 #define VSHI_BAKE_PART_H
 
-#include "bake/ao_cut.h"
+#include "bake/ao_kept.h"
 #include "bake/padding.h"
 #include "bake/texels.h"
 
@@ -20,6 +20,9 @@
 vsh_result vshi_part_spacing(const vsh_occluders *occluders, const vsh_shade_options *options,
                              const vsh_lightmap *planes, int32_t spacing, int32_t *left, vsh_error *error);
 
+/* What is kept then, VSHI_KEEPS_…. */
+uint32_t vshi_part_kinds(const vsh_lightmap *planes);
+
 /* The texels of `rows` rows from `first_row` on, of those of the cut, as vsh_texels_create_band(), for
  * vshi_bake_part(). Errors: the same. */
 vsh_result vshi_texels_create_part(const vsh_charts *charts, int32_t first_row, int32_t rows,
@@ -27,12 +30,13 @@ vsh_result vshi_texels_create_part(const vsh_charts *charts, int32_t first_row, 
                                    vsh_error *error);
 
 /* vsh_bake_lightmap() of such texels: nothing is padded or filled. `known` [rows][width] takes VSHI_PART_… of
- * each, `shots` [rows that the cut keeps][width] what AO is finished by; NULL where it leaves none. Errors of
+ * each, `kept` [rows that the cut keeps][width] what AO is finished by, of the kinds of these planes; NULL
+ * where it leaves none. Values that are left are 0, or what is there of them: irradiance of lights. Errors of
  * what is filled, and of what is left, are not in the statistics. */
 vsh_result vshi_bake_part(const vsh_occluders *occluders, const vsh_texels *texels, const vsh_light *lights,
                           size_t light_count, const vsh_shade_options *options, const vsh_run *run,
-                          const vsh_lightmap *lightmap, uint32_t *known, vshi_ao_shot *shots,
-                          vsh_bake_stats *stats, vsh_error *error);
+                          const vsh_lightmap *lightmap, uint32_t *known, void *kept, vsh_bake_stats *stats,
+                          vsh_error *error);
 
 /* --- what parts left of AO */
 
@@ -40,26 +44,22 @@ vsh_result vshi_bake_part(const vsh_occluders *occluders, const vsh_texels *texe
 typedef struct vshi_ao_left {
     int32_t width, rows;
     int32_t spacing;
-    const vshi_ao_shot *shots; /* [rows][width]: what is kept; zeros where nothing is */
-    const uint8_t *wanted;     /* [rows of tiles]: 1 where values were left */
-    size_t first, last;        /* rows of tiles that are counted in the statistics */
+    uint32_t kinds;        /* VSHI_KEEPS_… */
+    void *kept;            /* what is, as vshi_ao_kept_row() takes it; zeros where nothing is */
+    const uint8_t *wanted; /* [rows of tiles]: 1 where values were left */
+    size_t first, last;    /* rows of tiles that are counted in the statistics */
 } vshi_ao_left;
 
-/* Whether its value was left: it was not known without rays. */
-bool vshi_ao_shot_is_left(const vshi_ao_shot *shot);
-
-/* Whether they can be what a bake of such a spacing left. */
-bool vshi_ao_shots_are_sound(const vshi_ao_shot *shots, size_t count, int32_t spacing);
-
-/* Sets the values that were left in `ao` and (may be NULL) `deviation` [rows][width] to those of one bake,
- * and adds what is known of them, with what holds them against the casters to their error's `sum`. The shots
- * are sound. Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED, VSH_ERROR_INPUT (no bake left such). */
+/* Sets the values that were left in the planes [rows][width] ao, ao_error, bent and sky, those that are not
+ * NULL, to those of one bake, and adds what is known of them, with what holds them against the casters to
+ * errors[0] of AO and errors[1] of the sky. What is kept is sound, and of the planes' kinds. Errors:
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 vsh_result vshi_ao_finish(const vshi_ao_left *left, const vsh_shade_options *options, const vsh_run *run,
-                          float *ao, float *deviation, vsh_shade_stats *shade, vsh_bake_error *sum,
+                          const vsh_lightmap *planes, vsh_shade_stats *shade, vsh_bake_error *errors,
                           vsh_error *error);
 
-/* Bytes that it takes at most, with the shots. */
-double vshi_ao_finish_bytes(int32_t width, int32_t rows, int32_t threads);
+/* Bytes that it takes at most, with what is kept and the planes. */
+double vshi_ao_finish_bytes(int32_t width, int32_t rows, int32_t threads, uint32_t kinds);
 
 /* --- what is beyond the samples */
 

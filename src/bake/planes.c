@@ -7,25 +7,30 @@
 #include <math.h>
 #include <string.h>
 
-/* Adds what AO lets through of it to the irradiance of lights, where texels are valid; without ambient light
- * AO dims the lights instead. Planes and state are of the texels that are held. */
-static void add_ambient(const vsh_texels *texels, const uint8_t *state, const vsh_lightmap *lightmap) {
+/* Adds what AO lets through to the irradiance of lights, where texels are valid; without ambient light AO
+ * dims the lights instead. Planes and state are of the texels that are held. Where AO is left so is this. */
+static void add_ambient(const vshi_baking *bake) {
+    const vsh_texels *texels = bake->texels;
+    const vsh_lightmap *lightmap = bake->lightmap;
+    const bool leaves = lightmap->ao != NULL && bake->keep.memory != NULL;
+    const int32_t width = texels->info.width;
     for (size_t i = 0; i < vshi_texels_held(texels); ++i) {
         const float open = lightmap->ao != NULL ? lightmap->ao[i] : 1.0f;
+        const int32_t column = (int32_t)(i % (size_t)width), row = (int32_t)(i / (size_t)width);
+        if ((lightmap->ambient != NULL && bake->state[i] != VSHI_TEXEL_VALID) ||
+            (leaves && vshi_ao_keep_left(&bake->keep, column, row + texels->band.first) != NULL)) {
+            continue;
+        }
         for (size_t c = 0; c < 3; ++c) {
             float *value = &lightmap->irradiance[3 * i + c];
-            if (lightmap->ambient == NULL) {
-                *value *= open;
-            } else if (state[i] == VSHI_TEXEL_VALID) {
-                *value += (float)lightmap->ambient[c] * open;
-            }
+            *value = vshi_irradiance_open(*value, lightmap->ambient, c, open);
         }
     }
 }
 
 static vsh_result fill_irradiance(vshi_baking *bake, float *plane, vsh_error *error) {
     VSHI_TRY(vshi_baking_average(bake, bake->irradiance, 3, plane, error));
-    add_ambient(bake->texels, bake->state, bake->lightmap);
+    add_ambient(bake);
     return VSH_OK;
 }
 
@@ -43,29 +48,38 @@ const char *vsh_up_name(int32_t up) {
     return vshi_name_at(ups, up);
 }
 
-typedef struct skylight {
-    vshi_baking *bake;
-    vshi_vec up;
-} skylight;
-
-/* From the share of what is over the horizon to that of the whole hemisphere. */
-static void weigh_sky(void *user, size_t begin, size_t end) {
-    const skylight *s = user;
-    for (size_t i = begin; i < end; ++i) {
-        const vshi_vec normal = vshi_unit(vshi_vec_off(s->bake->origins.normal + 3 * i));
-        const double over = fmin(fmax(0.5 * (1.0 + vshi_dot(normal, s->up)), 0.0), 1.0);
-        s->bake->values[i] = (float)(over * (double)s->bake->values[i]);
+void vshi_sky_up(int32_t axis, double up[3]) {
+    for (int k = 0; k < 3; ++k) {
+        up[k] = axis == VSH_UP_X + k ? 1.0 : axis == VSH_UP_MINUS_X + k ? -1.0 : 0.0;
     }
 }
 
-/* AO of what is over the horizon, within a distance that no caster is beyond. */
-vsh_shade_options vshi_baking_sky(const vshi_baking *bake) {
+float vshi_sky_weighed(const float normal[3], const double up[3], float open) {
+    const vshi_vec n = vshi_unit(vshi_vec_off(normal));
+    const double over = fmin(fmax(0.5 * (1.0 + vshi_dot(n, vshi_vec_of(up))), 0.0), 1.0);
+    return (float)(over * (double)open);
+}
+
+typedef struct skylight {
+    vshi_baking *bake;
+    double up[3];
+} skylight;
+
+static void weigh_sky(void *user, size_t begin, size_t end) {
+    const skylight *s = user;
+    for (size_t i = begin; i < end; ++i) {
+        float *value = &s->bake->values[i];
+        *value = vshi_sky_weighed(s->bake->origins.normal + 3 * i, s->up, *value);
+    }
+}
+
+/* The sky is AO of what is over the horizon, within a distance that no caster is beyond. */
+vsh_shade_options vshi_baking_options(const vshi_baking *bake, bool sky) {
     static const double FAR = 0x1p60;
-    const int32_t up = bake->lightmap->asked.sky;
     vsh_shade_options options = bake->shade;
-    options.ao_distance = FAR;
-    for (int axis = 0; axis < 3; ++axis) {
-        options.ao_up[axis] = up == VSH_UP_X + axis ? 1.0 : up == VSH_UP_MINUS_X + axis ? -1.0 : 0.0;
+    if (sky) {
+        options.ao_distance = FAR;
+        vshi_sky_up(bake->lightmap->asked.sky, options.ao_up);
     }
     return options;
 }
@@ -77,10 +91,10 @@ static vsh_result fill_sky(vshi_baking *bake, float *plane, vsh_error *error) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap asked.sky %d: expected %d … %d", up, VSH_UP_X,
                          VSH_UP_MINUS_Z);
     }
-    const vsh_shade_options options = vshi_baking_sky(bake);
     const double square = bake->stats.shade.square_error;
-    skylight s = {bake, vshi_vec_of(options.ao_up)};
-    VSHI_TRY(vshi_baking_open(bake, &options, NULL, NULL, error));
+    skylight s = {.bake = bake};
+    vshi_sky_up(up, s.up);
+    VSHI_TRY(vshi_baking_open(bake, true, NULL, NULL, error));
     VSHI_TRY(vshi_baking_step(bake, "sky", weigh_sky, &s, error));
     VSHI_TRY(vshi_baking_add_error(bake, bake->light_count + 1, square, error));
     return vshi_baking_average(bake, bake->values, 1, plane, error);

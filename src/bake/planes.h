@@ -71,6 +71,18 @@ void vshi_plane_put(vsh_lightmap *lightmap, const vshi_plane_kind *kind, float *
 uint32_t vshi_planes_need(const vsh_lightmap *lightmap, size_t light_count);
 uint32_t vshi_planes_need_of_light(const vsh_lightmap *lightmap, size_t light);
 
+/* A channel of irradiance of lights, with what AO lets through of light from all around, or (NULL) of theirs.
+ */
+static inline float vshi_irradiance_open(float lights, const double *ambient, size_t channel, float open) {
+    return ambient == NULL ? lights * open : lights + (float)ambient[channel] * open;
+}
+
+/* The axis that a sky is over, VSH_UP_…. */
+void vshi_sky_up(int32_t axis, double up[3]);
+
+/* From the share of what is over the horizon to that of the whole hemisphere. */
+float vshi_sky_weighed(const float normal[3], const double up[3], float open);
+
 /* What a scene asks for by a wish. */
 static inline bool vshi_plane_wished(const vshi_plane_kind *kind, const vsh_planes *planes) {
     return kind->wish != VSHI_NO_WISH && *(const int32_t *)((const char *)planes + kind->wish) != 0;

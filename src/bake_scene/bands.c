@@ -39,13 +39,13 @@ static uint64_t merging(const cost *c, int32_t first, int32_t rows) {
                       held * (sizeof(uint32_t) + (whole ? 0.0 : sizeof(float) * (double)c->channels)) +
                       fmax(vshi_rows_complete_bytes(c->info.width, above + rows + below, fills && whole),
                            vshi_parts_finish_bytes(c->info.width, above + rows + below, c->charts->ao_spacing,
-                                                   c->threads)));
+                                                   c->threads, vshi_part_kinds(&c->lightmap))));
 }
 
 /* Bytes of what is kept of a part's rows. */
 static uint64_t keeping(const cost *c, int32_t first, int32_t rows) {
     const int32_t kept = vshi_ao_cut_kept(c->cut, first + rows) - vshi_ao_cut_kept(c->cut, first);
-    return (uint64_t)kept * (uint64_t)c->info.width * sizeof(vshi_ao_shot);
+    return (uint64_t)kept * (uint64_t)c->info.width * vshi_ao_kept_bytes(c->cut->kinds);
 }
 
 /* Bytes that the largest of bands of so many rows takes. */

@@ -117,6 +117,10 @@ vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t hei
 
 /* --- values */
 
+static int32_t bent_space(const vsh_scene *scene) {
+    return scene->bent > 0 ? scene->bent - 1 : VSH_BENT_WORLD;
+}
+
 static void bind_all(vshi_channels *channels, const vsh_scene *scene) {
     float *const *plane = channels->planes, *const *triple = channels->triples;
     size_t kind_count;
@@ -132,7 +136,7 @@ static void bind_all(vshi_channels *channels, const vsh_scene *scene) {
     }
     channels->lightmap.tint_by = scene->tint; /* of irradiance too */
     channels->lightmap.ambient = scene->has_ambient ? scene->ambient : NULL;
-    channels->lightmap.bent_space = scene->bent > 0 ? scene->bent - 1 : VSH_BENT_WORLD;
+    channels->lightmap.bent_space = bent_space(scene);
     channels->lightmap.asked = scene->planes;
     channels->lightmap.invalid = channels->invalid;
 }
@@ -140,7 +144,7 @@ static void bind_all(vshi_channels *channels, const vsh_scene *scene) {
 vsh_lightmap vshi_channels_shape(const vsh_scene *scene) {
     static float plane;
     float *const any[] = {&plane};
-    vsh_lightmap lightmap = {.shadow = NULL};
+    vsh_lightmap lightmap = {.bent_space = bent_space(scene), .asked = scene->planes};
     size_t kind_count;
     const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
     for (size_t k = 0; k < kind_count; ++k) {
@@ -246,7 +250,7 @@ void vshi_channels_free(vshi_channels *channels) {
     }
     free(channels->invalid);
     free(channels->known);
-    free(channels->shots);
+    free(channels->kept);
     free(channels->triples);
     free(channels->planes);
     free(channels->holds);

@@ -2,7 +2,7 @@
 #ifndef VSHI_CHANNELS_H
 #define VSHI_CHANNELS_H
 
-#include "bake/ao_cut.h"
+#include "bake/ao_kept.h"
 #include "bake/padding.h"
 #include "base/error.h"
 
@@ -16,12 +16,12 @@ typedef struct vshi_channels {
     char (*names)[VSH_CHANNEL_NAME];
     const char **name_list;
     int32_t *holds;
-    float **planes;      /* [image.channel_count][rows][width] */
-    float **triples;     /* [triple_count][rows][width][3]: what is baked interleaved, and then split */
-    float *invalid;      /* [rows][width] as the bake tells it (vsh_lightmap); NULL: not asked for */
-    uint32_t *known;     /* [rows][width]: VSHI_PART_…, of a part; NULL: it is none */
-    vshi_ao_shot *shots; /* [shot_rows][width]: of a part that leaves AO, what is kept; NULL: none does */
-    size_t shot_rows;    /* of the rows that are there */
+    float **planes;    /* [image.channel_count][rows][width] */
+    float **triples;   /* [triple_count][rows][width][3]: what is baked interleaved, and then split */
+    float *invalid;    /* [rows][width] as the bake tells it (vsh_lightmap); NULL: not asked for */
+    uint32_t *known;   /* [rows][width]: VSHI_PART_…, of a part; NULL: it is none */
+    void *kept;        /* of a part that leaves AO, what is kept (bake/ao_kept.h); NULL: none is */
+    size_t kept_bytes; /* of the rows that are there */
     size_t triple_count;
     int32_t rows; /* that there is memory for */
 } vshi_channels;
@@ -36,7 +36,7 @@ vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t hei
 vsh_result vshi_channels_allocate(vshi_channels *channels, const vsh_scene *scene, int32_t rows, bool invalid,
                                   uint64_t limit, const char *output, vsh_error *error);
 
-/* Which planes a scene's bake fills: those that are not NULL, which are none to be written to. */
+/* Which planes a scene's bake fills, and how: those that are not NULL, which are none to be written to. */
 vsh_lightmap vshi_channels_shape(const vsh_scene *scene);
 
 /* After the bake: what is interleaved, and what is invalid, into its planes. */

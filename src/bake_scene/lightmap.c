@@ -125,7 +125,7 @@ static vsh_result bake_band(vshi_lightmap_work *w, int32_t first, int32_t rows, 
     vsh_result result =
         known != NULL
             ? vshi_bake_part(w->job->occluders, texels, scene->lights, scene->light_count, &scene->shade, run,
-                             &w->channels.lightmap, known, w->channels.shots, &band, error)
+                             &w->channels.lightmap, known, w->channels.kept, &band, error)
             : vsh_bake_lightmap(w->job->occluders, texels, scene->lights, scene->light_count, &scene->shade,
                                 run, &w->channels.lightmap, &band, error);
     if (result == VSH_OK && vshi_is_fixed_whole(w)) {
@@ -165,7 +165,7 @@ static vsh_result make_band(vshi_lightmap_work *w, int32_t first, int32_t rows, 
                             vsh_error *error) {
     const size_t meshes = w->target->mesh_count;
     if (is_part(w)) {
-        vshi_part_set_shots(w->job, w->index, &w->input.bands, first, rows, &w->channels);
+        vshi_part_set_kept(w->job, w->index, &w->input.bands, first, rows, &w->channels);
     }
     if (vshi_resume_take(&w->resume, first, rows, &w->channels, &w->baked, meshes)) {
         w->lightmap->resumed_rows += (uint64_t)rows;
@@ -291,7 +291,7 @@ static vsh_result open_all(vshi_lightmap_work *w, vsh_error *error) {
         const size_t texels = (size_t)receiver->width * (size_t)rows;
         VSHI_TRY(vshi_allocate((void **)&w->channels.known, texels, sizeof *w->channels.known,
                                receiver->output, error));
-        VSHI_TRY(vshi_part_open_shots(job, w->index, &w->input.bands, &w->channels, error));
+        VSHI_TRY(vshi_part_open_kept(job, w->index, &w->input.bands, &w->channels, error));
     }
     VSHI_TRY(
         vshi_invalid_picture_open(&w->picture, job, (size_t)(w->target - job->targets.list), rows, error));

@@ -91,8 +91,14 @@ static vsh_result check_casters(const vshi_part *part, const vshi_part *first, v
     return vshi_part_refuse(part->path, "voxel size", theirs, ours, error);
 }
 
-/* AO is left at the ends of all pieces of a lightmap, or at none. */
-static vsh_result check_left(const vshi_part *part, const vshi_part *first, vsh_error *error) {
+/* AO is left at the ends of all pieces of a lightmap, or at none; what is kept of it finishes these planes.
+ */
+static vsh_result check_left(const vsh_bake_job *job, const vshi_part *part, const vshi_part *first,
+                             vsh_error *error) {
+    const vsh_lightmap planes = vshi_channels_shape(&job->scene);
+    if (part->head.kinds != (int32_t)vshi_part_kinds(&planes)) {
+        return vshi_part_damaged(part->path, "rays of AO of other channels", error);
+    }
     for (uint64_t i = 0; i < part->head.lightmap_count; ++i) {
         if (part->head.lightmaps[i].left != first->head.lightmaps[i].left) {
             return vshi_part_damaged(part->path, "AO that other parts know nothing of", error);
@@ -121,7 +127,7 @@ static vsh_result check_part(const vsh_bake_job *job, const vshi_part *part, con
     }
     VSHI_TRY(check_lightmaps(job, part, error));
     VSHI_TRY(check_casters(part, first, error));
-    return check_left(part, first, error);
+    return check_left(job, part, first, error);
 }
 
 /* --- all of them together */

@@ -46,13 +46,14 @@ typedef struct vshi_held_rows {
     uint32_t *known;
 } vshi_held_rows;
 
-/* Finishes the AO of those of them that parts left; rows first … end - 1 are added to the statistics. */
+/* Finishes the AO of those of them that parts left, and what is made of it; rows first … end - 1 are added to
+ * the statistics. */
 vsh_result vshi_parts_finish(const vshi_parts *parts, const vsh_scene *scene, size_t index,
                              const vshi_channels *channels, const vshi_held_rows *held, int32_t first,
                              int32_t end, const vsh_run *run, vsh_bake_stats *stats, vsh_error *error);
 
-/* Bytes that it takes at most, of texels that share AO by `spacing`. */
-double vshi_parts_finish_bytes(int32_t width, int32_t rows, int32_t spacing, int32_t threads);
+/* Bytes that it takes at most, of texels that share AO by `spacing` and kinds of what is kept. */
+double vshi_parts_finish_bytes(int32_t width, int32_t rows, int32_t spacing, int32_t threads, uint32_t kinds);
 
 /* Adds the statistics of a lightmap's pieces. */
 void vshi_parts_add_stats(const vshi_parts *parts, size_t index, vsh_bake_stats *stats);

@@ -11,6 +11,7 @@ void vshi_part_code_head(vshi_part_code *code, vshi_part_head *head) {
     vshi_part_code_i32(code, &head->levels);
     vshi_part_code_i32(code, &head->has_triangles);
     vshi_part_code_i32(code, &head->working);
+    vshi_part_code_i32(code, &head->kinds);
     vshi_part_code_count(code, &head->lightmap_count, sizeof(uint64_t), (void **)&head->lightmaps,
                          sizeof *head->lightmaps);
     for (uint64_t i = 0; i < head->lightmap_count && !code->failed; ++i) {
@@ -33,15 +34,16 @@ void vshi_part_code_head(vshi_part_code *code, vshi_part_head *head) {
 
 vshi_ao_cut vshi_part_cut(const vshi_part_head *head, const vshi_part_piece *piece) {
     const vshi_part_lightmap *lightmap = &head->lightmaps[piece->lightmap];
-    return (vshi_ao_cut){lightmap->left, lightmap->height, piece->first, piece->first + piece->rows};
+    return (vshi_ao_cut){lightmap->left, lightmap->height, piece->first, piece->first + piece->rows,
+                         (uint32_t)head->kinds};
 }
 
-/* At most 2^32 × (257 × 4 + 56). */
+/* At most 2^32 × (257 × 4 + 104). */
 uint64_t vshi_part_rows_bytes(const vshi_part_head *head, const vshi_part_piece *piece, int32_t row) {
     const vshi_ao_cut cut = vshi_part_cut(head, piece);
     const uint64_t width = (uint64_t)head->lightmaps[piece->lightmap].width;
     return width * ((uint64_t)(row - piece->first) * (head->channel_count + 1) * sizeof(float) +
-                    (uint64_t)vshi_ao_cut_kept(&cut, row) * sizeof(vshi_ao_shot));
+                    (uint64_t)vshi_ao_cut_kept(&cut, row) * vshi_ao_kept_bytes(cut.kinds));
 }
 
 double vshi_part_stats_bytes(uint64_t mesh_count, uint64_t error_count) {

@@ -1,5 +1,6 @@
 #include "bake_scene/part_job.h"
 
+#include "bake/part.h"
 #include "bake_scene/merge.h"
 #include "bake_scene/resume.h"
 #include "bake_scene/shares.h"
@@ -62,6 +63,8 @@ static vsh_result begin_part(vsh_bake_job *job, const vsh_run *run, vshi_part_pi
                            .levels = casters->levels,
                            .has_triangles = casters->has_triangles,
                            .working = job->working};
+    const vsh_lightmap planes = vshi_channels_shape(&job->scene);
+    head.kinds = (int32_t)vshi_part_kinds(&planes);
     vshi_channels channels;
     vsh_result result;
     char *path = vshi_part_path(options.parts, options.shard, options.shard_count);
@@ -90,28 +93,30 @@ done:
 
 vshi_ao_cut vshi_job_cut(const vsh_bake_job *job, size_t index, int32_t first, int32_t end) {
     const bool shard = job->options.shard > 0;
-    return (vshi_ao_cut){shard ? job->shares[index].left : 1, job->lightmaps[index].height, first, end};
+    const vsh_lightmap planes = vshi_channels_shape(&job->scene);
+    return (vshi_ao_cut){shard ? job->shares[index].left : 1, job->lightmaps[index].height, first, end,
+                         vshi_part_kinds(&planes)};
 }
 
-void vshi_part_set_shots(const vsh_bake_job *job, size_t index, const vshi_bands *bands, int32_t first,
-                         int32_t rows, vshi_channels *channels) {
+void vshi_part_set_kept(const vsh_bake_job *job, size_t index, const vshi_bands *bands, int32_t first,
+                        int32_t rows, vshi_channels *channels) {
     const vshi_ao_cut cut = vshi_job_cut(job, index, bands->first, bands->end);
-    channels->shot_rows = (size_t)(vshi_ao_cut_kept(&cut, first + rows) - vshi_ao_cut_kept(&cut, first));
+    const int32_t kept = vshi_ao_cut_kept(&cut, first + rows) - vshi_ao_cut_kept(&cut, first);
+    channels->kept_bytes = (size_t)kept * (size_t)job->lightmaps[index].width * vshi_ao_kept_bytes(cut.kinds);
 }
 
-vsh_result vshi_part_open_shots(const vsh_bake_job *job, size_t index, const vshi_bands *bands,
-                                vshi_channels *channels, vsh_error *error) {
+vsh_result vshi_part_open_kept(const vsh_bake_job *job, size_t index, const vshi_bands *bands,
+                               vshi_channels *channels, vsh_error *error) {
     size_t most = 0;
     if (job->shares[index].left <= 1) {
         return VSH_OK;
     }
     for (int32_t first = bands->first, rows; first < bands->end; first += rows) {
         rows = bands->end - first < bands->rows ? bands->end - first : bands->rows;
-        vshi_part_set_shots(job, index, bands, first, rows, channels);
-        most = channels->shot_rows > most ? channels->shot_rows : most;
+        vshi_part_set_kept(job, index, bands, first, rows, channels);
+        most = channels->kept_bytes > most ? channels->kept_bytes : most;
     }
-    return vshi_allocate((void **)&channels->shots, most * (size_t)job->lightmaps[index].width + 1,
-                         sizeof *channels->shots, job->lightmaps[index].output, error);
+    return vshi_allocate(&channels->kept, most + 1, 1, job->lightmaps[index].output, error);
 }
 
 /* --- its rows */
@@ -129,7 +134,7 @@ static vsh_result add(void *user, int32_t rows, const float *const *planes, vsh_
     const vshi_part_sink *part = user;
     (void)error; /* what could not be written is told at the end */
     vshi_part_writer_add(part->job->part, part->lightmap->width, rows, planes, part->channels->known,
-                         part->channels->shots);
+                         part->channels->kept);
     return VSH_OK;
 }
 

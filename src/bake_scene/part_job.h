@@ -22,11 +22,11 @@ vsh_row_sink vshi_part_sink_of(vshi_part_sink *part);
 vshi_ao_cut vshi_job_cut(const vsh_bake_job *job, size_t index, int32_t first, int32_t end);
 
 /* Takes memory for what a part keeps of what it leaves, of each of a piece's bands, if it leaves any; sets
- * how many rows that are of one. Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_part_open_shots(const vsh_bake_job *job, size_t index, const vshi_bands *bands,
-                                vshi_channels *channels, vsh_error *error);
-void vshi_part_set_shots(const vsh_bake_job *job, size_t index, const vshi_bands *bands, int32_t first,
-                         int32_t rows, vshi_channels *channels);
+ * how many bytes that are of one. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_part_open_kept(const vsh_bake_job *job, size_t index, const vshi_bands *bands,
+                               vshi_channels *channels, vsh_error *error);
+void vshi_part_set_kept(const vsh_bake_job *job, size_t index, const vshi_bands *bands, int32_t first,
+                        int32_t rows, vshi_channels *channels);
 
 /* What bands of target (of a part: piece) `index` are kept beside (bake_scene/resume.h), to be freed: its
  * output, with the page's number for further pages of an asset, or the part with the piece's. NULL where

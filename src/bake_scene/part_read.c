@@ -41,6 +41,9 @@ static vsh_result check_pieces(vshi_part *part, const vshi_part_front *front, vs
         (head->about.shard > head->working && head->lightmap_count > 0)) {
         return vshi_part_damaged(part->path, "the number of parts with rows", error);
     }
+    if (head->kinds < 0 || head->kinds > VSHI_KEEPS_ALL) {
+        return vshi_part_damaged(part->path, "what no bake keeps", error);
+    }
     for (uint64_t i = 0; i < head->piece_count; ++i) {
         const vshi_part_piece *piece = &head->pieces[i];
         if (piece->lightmap >= head->lightmap_count) {
@@ -139,39 +142,40 @@ vsh_result vshi_part_read(const vshi_part *part, size_t piece, int32_t first, in
         }
         const bool kept = vshi_ao_cut_kept(&cut, row + 1) > vshi_ao_cut_kept(&cut, row);
         if (result == VSH_OK && kept) {
-            result = vshi_part_skip(file, part->path, width * sizeof(vshi_ao_shot), error);
+            result = vshi_part_skip(file, part->path, width * vshi_ao_kept_bytes(cut.kinds), error);
         }
     }
     fclose(file);
     return result;
 }
 
-static vsh_result read_shots(const vshi_part *part, size_t piece, int32_t row, FILE *file, size_t width,
-                             vshi_ao_shot *shots, vsh_error *error) {
-    const vshi_part_head *head = &part->head;
-    const size_t before = width * (head->channel_count + 1) * sizeof(float);
+/* The next row of a file, if it is kept. */
+static vsh_result read_kept(const vshi_part *part, const vshi_ao_cut *cut, int32_t row, size_t width,
+                            FILE *file, void *kept, vsh_error *error) {
+    const size_t before = width * (part->head.channel_count + 1) * sizeof(float);
     VSHI_TRY(vshi_part_skip(file, part->path, before, error));
-    const vshi_ao_cut cut = vshi_part_cut(head, &head->pieces[piece]);
-    if (vshi_ao_cut_kept(&cut, row + 1) == vshi_ao_cut_kept(&cut, row)) {
-        return VSH_OK;
-    }
-    VSHI_TRY(vshi_part_read_bytes(file, part->path, shots, width * sizeof *shots, error));
-    return vshi_ao_shots_are_sound(shots, width, cut.spacing)
-               ? VSH_OK
-               : vshi_part_damaged(part->path, "its rays of AO", error);
+    return vshi_ao_cut_kept(cut, row + 1) > vshi_ao_cut_kept(cut, row)
+               ? vshi_part_read_bytes(file, part->path, kept, width * vshi_ao_kept_bytes(cut->kinds), error)
+               : VSH_OK;
 }
 
-vsh_result vshi_part_read_shots(const vshi_part *part, size_t piece, int32_t first, int32_t rows,
-                                vshi_ao_shot *shots, vsh_error *error) {
+vsh_result vshi_part_read_kept(const vshi_part *part, size_t piece, int32_t first, int32_t rows,
+                               int32_t held_rays, void *kept, vsh_error *error) {
     const vshi_part_head *head = &part->head;
     const vshi_part_piece *of = &head->pieces[piece];
+    const vshi_ao_cut cut = vshi_part_cut(head, of);
     const size_t width = (size_t)head->lightmaps[of->lightmap].width;
     FILE *file;
     VSHI_TRY(vshi_part_reopen(part->path, part->offset[piece] + vshi_part_rows_bytes(head, of, first), &file,
                               error));
     vsh_result result = VSH_OK;
     for (int32_t row = 0; row < rows && result == VSH_OK; ++row) {
-        result = read_shots(part, piece, first + row, file, width, shots + (size_t)row * width, error);
+        unsigned char *at = (unsigned char *)kept + (size_t)row * width * vshi_ao_kept_bytes(cut.kinds);
+        const vshi_ao_kept texels = vshi_ao_kept_row(cut.kinds, width, at, 0);
+        result = read_kept(part, &cut, first + row, width, file, at, error);
+        if (result == VSH_OK && !vshi_ao_kept_is_sound(&texels, width, cut.spacing, held_rays)) {
+            result = vshi_part_damaged(part->path, "its rays of AO", error);
+        }
     }
     fclose(file);
     return result;

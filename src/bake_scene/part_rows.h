@@ -1,11 +1,11 @@
 /* Parts of a job's lightmaps, as files (base/part_file.h). The body is rows, from the top on, each of them
  * its channels' values, then what is known of its texels (VSHI_PART_…), then, where its cut keeps it, what
- * they shot (vshi_ao_shot); the tail is the statistics of each piece.
+ * their rays came to (bake/ao_kept.h); the tail is the statistics of each piece.
  */
 #ifndef VSHI_PART_ROWS_H
 #define VSHI_PART_ROWS_H
 
-#include "bake/ao_cut.h"
+#include "bake/ao_kept.h"
 #include "base/part_file.h"
 
 #include <vdbshade/bake.h>
@@ -36,6 +36,7 @@ typedef struct vshi_part_head {
     uint64_t active_voxels, field_bytes;
     int32_t levels, has_triangles;
     int32_t working; /* parts that have rows: the first ones. The others have nothing but their channels */
+    int32_t kinds;   /* of what is kept where AO is left: VSHI_KEEPS_… */
     vshi_part_lightmap *lightmaps; /* [lightmap_count] */
     uint64_t lightmap_count;
     vshi_part_piece *pieces; /* [piece_count], in the order of their rows in the file */
@@ -58,10 +59,10 @@ typedef struct vshi_part_writer vshi_part_writer;
 vsh_result vshi_part_writer_create(const char *path, const vshi_part_head *head, vshi_part_writer **writer,
                                    vsh_error *error);
 
-/* The next rows, of the piece that is under way: planes[channel_count][rows × width], and `shots` of those of
- * them that are kept, one after the other. A write that failed is told at the end. */
+/* The next rows, of the piece that is under way: planes[channel_count][rows × width], and `kept`, what is of
+ * those of them that the cut keeps. A write that failed is told at the end. */
 void vshi_part_writer_add(vshi_part_writer *writer, int32_t width, int32_t rows, const float *const *planes,
-                          const uint32_t *known, const vshi_ao_shot *shots);
+                          const uint32_t *known, const void *kept);
 
 /* The piece is whole: its statistics, with errors [error_count] and invalid_by_mesh [mesh_count]. */
 vsh_result vshi_part_writer_piece(vshi_part_writer *writer, const vsh_bake_stats *stats, vsh_error *error);
@@ -90,9 +91,9 @@ void vshi_part_free(vshi_part *part);
 vsh_result vshi_part_read(const vshi_part *part, size_t piece, int32_t first, int32_t rows, size_t at,
                           float *const *planes, uint32_t *known, vsh_error *error);
 
-/* What is kept of rows of a piece, into shots[rows][width], which are sound; others are left as they are.
- * Errors: VSH_ERROR_READ, VSH_ERROR_INPUT. */
-vsh_result vshi_part_read_shots(const vshi_part *part, size_t piece, int32_t first, int32_t rows,
-                                vshi_ao_shot *shots, vsh_error *error);
+/* What is kept of rows of a piece, which is sound for such held_rays, into the memory of `rows` rows; others
+ * are left as they are. Errors: VSH_ERROR_READ, VSH_ERROR_INPUT. */
+vsh_result vshi_part_read_kept(const vshi_part *part, size_t piece, int32_t first, int32_t rows,
+                               int32_t held_rays, void *kept, vsh_error *error);
 
 #endif

@@ -65,20 +65,21 @@ vsh_result vshi_part_writer_create(const char *path, const vshi_part_head *head,
 }
 
 void vshi_part_writer_add(vshi_part_writer *writer, int32_t width, int32_t rows, const float *const *planes,
-                          const uint32_t *known, const vshi_ao_shot *shots) {
+                          const uint32_t *known, const void *kept) {
     const size_t across = (size_t)width;
     const vshi_ao_cut *cut = &writer->cuts[writer->done];
     writer->row = writer->row < 0 ? cut->first : writer->row;
-    const int32_t before = vshi_ao_cut_kept(cut, writer->row);
+    const unsigned char *next = kept;
+    const size_t kept_bytes = across * vshi_ao_kept_bytes(cut->kinds);
     for (size_t row = 0; row < (size_t)rows; ++row) {
         for (int32_t c = 0; c < writer->channel_count; ++c) {
             vshi_part_output_put(&writer->file, planes[c] + row * across, across * sizeof(float));
         }
         vshi_part_output_put(&writer->file, known + row * across, across * sizeof *known);
-        const int32_t kept = vshi_ao_cut_kept(cut, writer->row);
-        if (vshi_ao_cut_kept(cut, ++writer->row) > kept) {
-            vshi_part_output_put(&writer->file, shots + (size_t)(kept - before) * across,
-                                 across * sizeof *shots);
+        const int32_t before = vshi_ao_cut_kept(cut, writer->row);
+        if (vshi_ao_cut_kept(cut, ++writer->row) > before) {
+            vshi_part_output_put(&writer->file, next, kept_bytes);
+            next += kept_bytes;
         }
     }
 }

@@ -31,11 +31,6 @@ static uint64_t checksum_of(uint64_t sum, const void *bytes, size_t size) {
     return sum;
 }
 
-/* Texels that what they shot is kept of. */
-static size_t shots_of(const vshi_channels *channels) {
-    return channels->shots != NULL ? channels->shot_rows * (size_t)channels->image.width : 0;
-}
-
 static uint64_t checksum(const vshi_channels *channels, size_t texels, const uint64_t *invalid,
                          size_t mesh_count, const vsh_bake_error *errors, size_t error_count) {
     uint64_t sum = checksum_of(UINT64_C(0xcbf29ce484222325), invalid, mesh_count * sizeof *invalid);
@@ -45,8 +40,8 @@ static uint64_t checksum(const vshi_channels *channels, size_t texels, const uin
     if (channels->known != NULL) {
         sum = checksum_of(sum, channels->known, texels * sizeof *channels->known);
     }
-    if (channels->shots != NULL) {
-        sum = checksum_of(sum, channels->shots, shots_of(channels) * sizeof *channels->shots);
+    if (channels->kept != NULL) {
+        sum = checksum_of(sum, channels->kept, channels->kept_bytes);
     }
     return checksum_of(sum, errors, error_count * sizeof *errors);
 }
@@ -178,8 +173,8 @@ static bool read_band(vshi_resume *r, const band_head *want, vshi_channels *chan
     }
     good = good && (channels->known == NULL ||
                     fread(channels->known, sizeof *channels->known, texels, r->file) == texels);
-    good = good && (channels->shots == NULL || fread(channels->shots, sizeof *channels->shots,
-                                                     shots_of(channels), r->file) == shots_of(channels));
+    good = good && (channels->kept == NULL ||
+                    fread(channels->kept, 1, channels->kept_bytes, r->file) == channels->kept_bytes);
     good = good && fread(errors, sizeof *errors, r->error_count, r->file) == r->error_count;
     if (!good || checksum(channels, texels, invalid, mesh_count, errors, r->error_count) != head.checksum) {
         return false;
@@ -240,8 +235,8 @@ void vshi_resume_keep(vshi_resume *r, int32_t first, int32_t rows, const vshi_ch
     }
     good = good && (channels->known == NULL ||
                     fwrite(channels->known, sizeof *channels->known, texels, r->file) == texels);
-    good = good && (channels->shots == NULL || fwrite(channels->shots, sizeof *channels->shots,
-                                                      shots_of(channels), r->file) == shots_of(channels));
+    good = good && (channels->kept == NULL ||
+                    fwrite(channels->kept, 1, channels->kept_bytes, r->file) == channels->kept_bytes);
     good = good && fwrite(stats->errors, sizeof *stats->errors, r->error_count, r->file) == r->error_count;
     if (!good || fflush(r->file) != 0 || fdatasync(fileno(r->file)) != 0) {
         give_up(r);

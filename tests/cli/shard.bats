@@ -35,6 +35,26 @@ load parts
     cmp one/out.exr out.exr
 }
 
+@test "what is made of AO is finished by merge, too: irradiance with and without light from all around, bent normals in both spaces, the sky" {
+    local all=(--irradiance --ambient 0.3,0.2,0.1 --bent-normals tangent --sky -z --error)
+    for options in "--irradiance --max-error 0.05" "--irradiance --ambient 0.3,0.2,0.1 --ao-spacing 2" "--bent-normals world --ao-spacing 8" "--sky y --seams fix" \
+        "${all[*]} --padding 20" "--irradiance --bent-normals tangent --sky y --method adaptive --ao-method adaptive --resolution 48"; do
+        one out.exr "${CLOISTER[@]}" $options
+        for n in 2 5; do
+            merged out.exr "$n" "${CLOISTER[@]}" $options
+        done
+    done
+    one out.exr "${CLOISTER[@]}" --size 128x2048 "${all[@]}"
+    parts out.exr 3 "" "${CLOISTER[@]}" --size 128x2048 "${all[@]}"
+    "$VDBSHADE" merge out.exr --memory-limit 16M 2>merge.log
+    grep -q "bands of" merge.log || fail "it was held whole: $(cat merge.log)"
+    cmp one/out.exr out.exr
+    one out.glb "${CLOISTER[@]}" "${all[@]}"
+    for n in 2 7 64; do
+        merged out.glb "$n" "${CLOISTER[@]}" "${all[@]}"
+    done
+}
+
 @test "so are an asset with its light in it, a terrain, objects of their own, and a scene of several lightmaps" {
     one out.glb "${CLOISTER[@]}"
     merged out.glb 3 "${CLOISTER[@]}"
@@ -100,25 +120,26 @@ load parts
 }
 
 @test "a part is the same whoever bakes it, with however many threads and bands, and goes on where it was ended" {
-    parts a.exr 3 2 "${CLOISTER[@]}"
-    parts b.exr 3 2 "${CLOISTER[@]}" --threads 1 --band-rows 16
-    parts c.exr 3 2 "${CLOISTER[@]}" --resume
+    local all=("${CLOISTER[@]}" --irradiance --bent-normals tangent --sky y)
+    parts a.exr 3 2 "${all[@]}"
+    parts b.exr 3 2 "${all[@]}" --threads 1 --band-rows 16
+    parts c.exr 3 2 "${all[@]}" --resume
     [ -z "$(find . -name '*.resume')" ] || fail "rows are kept of a part that is whole"
     for other in b c; do # but for their command lines, which the first pages of a part have
         cmp <(values a.exr) <(values $other.exr) || fail "$other"
     done
-    one out.exr "${CLOISTER[@]}"
-    parts out.exr 3 "" "${CLOISTER[@]}"
-    "$VDBSHADE" bake "${CLOISTER[@]}" -o out.exr --shard 2/3 --resume --shard-least 0 --threads 1 --quiet & pid=$!
+    one out.exr "${all[@]}"
+    parts out.exr 3 "" "${all[@]}"
+    "$VDBSHADE" bake "${all[@]}" -o out.exr --shard 2/3 --resume --shard-least 0 --threads 1 --quiet & pid=$!
     while kill -0 $pid 2>/dev/null && [ "$(stat -c %s out.exr.2-of-3.part.0.resume 2>/dev/null || echo 0)" -lt 15000 ]; do
         sleep 0.01
     done
     kill -KILL $pid
     wait $pid || true
     [ -s out.exr.2-of-3.part.0.resume ] || fail "nothing was kept"
-    run -0 "$VDBSHADE" bake "${CLOISTER[@]}" -o out.exr --shard 2/3 --resume --shard-least 0 --stats s.json
+    run -0 "$VDBSHADE" bake "${all[@]}" -o out.exr --shard 2/3 --resume --shard-least 0 --stats s.json
     [ "$(grep -o '"resumed_rows": [0-9]*' s.json | cut -d' ' -f2)" -ge 8 ]
-    parts out.exr 3 "1 3" "${CLOISTER[@]}"
+    parts out.exr 3 "1 3" "${all[@]}"
     "$VDBSHADE" merge out.exr --quiet
     cmp one/out.exr out.exr || fail "a part that went on is another"
 }

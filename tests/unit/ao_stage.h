@@ -74,11 +74,27 @@ static inline int tear_down(void **state) {
     return 0;
 }
 
+/* Planes beside AO, its error and bent normals, or not with them. */
+enum { WITH_SKY = 1, TANGENT_SPACE = 2, WITHOUT_AO = 4, WITHOUT_BENT = 8 };
+
 typedef struct baked {
-    float ao[TEXELS], error[TEXELS], bent[3 * TEXELS], coverage[TEXELS];
+    float ao[TEXELS], error[TEXELS], bent[3 * TEXELS], sky[TEXELS], coverage[TEXELS];
     vsh_shade_stats stats;
-    bool with_bent;
+    uint32_t planes;
 } baked;
+
+/* Rows from `first` on. */
+static inline vsh_lightmap planes_of(baked *b, int32_t first) {
+    const size_t at = (size_t)first * WIDTH;
+    const bool ao = (b->planes & WITHOUT_AO) == 0, tangent = (b->planes & TANGENT_SPACE) != 0;
+    return (vsh_lightmap){.ao = ao ? b->ao + at : NULL,
+                          .ao_error = ao ? b->error + at : NULL,
+                          .bent = (b->planes & WITHOUT_BENT) == 0 ? b->bent + 3 * at : NULL,
+                          .bent_space = tangent ? VSH_BENT_TANGENT : VSH_BENT_WORLD,
+                          .sky = (b->planes & WITH_SKY) != 0 ? b->sky + at : NULL,
+                          .asked = {.sky = VSH_UP_Y},
+                          .coverage = b->coverage + at};
+}
 
 typedef struct how {
     int32_t spacing;
@@ -88,15 +104,12 @@ typedef struct how {
     int32_t threads;
     size_t receivers; /* of the first so many; 0: all */
     bool parts;       /* of so many rows, instead of bands */
+    uint32_t planes;
 } how;
 
 static inline void bake_rows(const stage *s, const vsh_texels *texels, const vsh_shade_options *shade,
-                             int32_t first, int32_t threads, bool part, vshi_ao_shot *shots, baked *b) {
-    const size_t at = (size_t)first * WIDTH;
-    const vsh_lightmap lightmap = {.ao = b->ao + at,
-                                   .ao_error = b->error + at,
-                                   .bent = b->with_bent ? b->bent + 3 * at : NULL,
-                                   .coverage = b->coverage + at};
+                             int32_t first, int32_t threads, bool part, void *kept, baked *b) {
+    const vsh_lightmap lightmap = planes_of(b, first);
     vsh_run run = vsh_run_default();
     run.threads = threads;
     vsh_bake_stats stats = vsh_bake_stats_zero();
@@ -104,7 +117,7 @@ static inline void bake_rows(const stage *s, const vsh_texels *texels, const vsh
     vsh_error error = {0};
     static uint32_t known[TEXELS];
     const vsh_occluders *casters = occluders_of_caster(&s->casters);
-    if ((part ? vshi_bake_part(casters, texels, NULL, 0, shade, &run, &lightmap, known, shots, &stats, &error)
+    if ((part ? vshi_bake_part(casters, texels, NULL, 0, shade, &run, &lightmap, known, kept, &stats, &error)
               : vsh_bake_lightmap(casters, texels, NULL, 0, shade, &run, &lightmap, &stats, &error)) !=
         VSH_OK) {
         fail_msg("%s", error.message);
@@ -112,18 +125,19 @@ static inline void bake_rows(const stage *s, const vsh_texels *texels, const vsh
     b->stats = stats.shade;
 }
 
-static inline baked *begin_baked(bool with_bent) {
+static inline baked *begin_baked(uint32_t planes) {
     baked *b = malloc(sizeof *b);
     assert_non_null(b);
     memset(b, 0xff, sizeof *b); /* NaN: whatever is not written shows */
     b->stats = vsh_shade_stats_zero();
-    b->with_bent = with_bent;
+    b->planes = planes;
     return b;
 }
 
 static inline vsh_lightmap_options options_of(how h) {
     vsh_lightmap_options options = size_of(WIDTH, HEIGHT, 1);
     options.padding = h.padding;
+    options.tangents = 1;
     options.ao_spacing = h.spacing;
     options.shade.ao_method = VSH_AO_EXACT;
     options.shade.ao_distance = 0.8;
@@ -135,7 +149,7 @@ static inline vsh_lightmap_options options_of(how h) {
 static inline baked *bake(const stage *s, how h) {
     const vsh_lightmap_options options = options_of(h);
     const size_t receivers = h.receivers == 0 ? RECEIVERS : h.receivers;
-    baked *b = begin_baked(true);
+    baked *b = begin_baked(h.planes);
     if (h.rows == 0) {
         vsh_texels *texels = create(s->receivers, receivers, options, NULL);
         bake_rows(s, texels, &options.shade, 0, h.threads, false, NULL, b);
@@ -147,7 +161,7 @@ static inline baked *bake(const stage *s, how h) {
     for (int32_t first = 0; first < HEIGHT; first += h.rows) {
         const int32_t rows = HEIGHT - first < h.rows ? HEIGHT - first : h.rows;
         vsh_texels *texels = NULL;
-        const vshi_ao_cut cut = {1, HEIGHT, first, first + rows};
+        const vshi_ao_cut cut = {1, HEIGHT, first, first + rows, 0};
         assert_int_equal(h.parts ? vshi_texels_create_part(charts, first, rows, &cut, NULL, &texels, NULL)
                                  : vsh_texels_create_band(charts, first, rows, NULL, &texels, NULL),
                          VSH_OK);
@@ -168,11 +182,17 @@ static inline void assert_same_plane(const char *name, const float *a, const flo
 }
 
 static inline void assert_same(const baked *a, const baked *b) {
+    const uint32_t without = a->planes | b->planes, with = a->planes & b->planes;
     assert_same_plane("coverage", a->coverage, b->coverage, 1);
-    assert_same_plane("ao", a->ao, b->ao, 1);
-    assert_same_plane("ao_error", a->error, b->error, 1);
-    if (a->with_bent && b->with_bent) {
+    if ((without & WITHOUT_AO) == 0) {
+        assert_same_plane("ao", a->ao, b->ao, 1);
+        assert_same_plane("ao_error", a->error, b->error, 1);
+    }
+    if ((without & WITHOUT_BENT) == 0) {
         assert_same_plane("bent", a->bent, b->bent, 3);
+    }
+    if ((with & WITH_SKY) != 0) {
+        assert_same_plane("sky", a->sky, b->sky, 1);
     }
     assert_memory_equal(&a->stats, &b->stats, sizeof a->stats);
 }

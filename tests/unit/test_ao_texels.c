@@ -18,7 +18,7 @@ static void bands_change_no_bit(void **state) {
         baked *whole =
             bake(*state, (how){.spacing = 4, .max_error = 0.03, .padding = paddings[p], .threads = 1});
         for (size_t r = 0; r < 3; ++r) {
-            baked *banded = bake(*state, (how){4, 0.03, paddings[p], rows[r], 2, 0, false});
+            baked *banded = bake(*state, (how){4, 0.03, paddings[p], rows[r], 2, 0, false, 0});
             assert_same(whole, banded);
             free(banded);
         }

@@ -5,7 +5,7 @@
 #include "base/part_file.h"
 #include "base/part_sum.h"
 
-enum { SIZE = 48, SHARDS = 2, CHANNELS = 6 };
+enum { SIZE = 48, SHARDS = 2, CHANNELS = 12 };
 
 /* Rows as they come. */
 typedef struct taken {
@@ -90,7 +90,7 @@ static void a_sink_takes_merged_rows_as_of_one_bake_and_words_come_back(void **s
     bake_parts(&c);
     assert_ok(merge(&c, all, NULL, &error), &error);
     assert_int_equal(all->rows, SIZE);
-    assert_int_equal(all->channels, CHANNELS);
+    assert_int_equal(all->channels, 6);
     assert_memory_equal(one->values, all->values, sizeof one->values);
     char **words;
     size_t count;
@@ -104,8 +104,9 @@ static void a_sink_takes_merged_rows_as_of_one_bake_and_words_come_back(void **s
     free(one);
 }
 
-/* The ball becomes a wall that stands on the floor, to which rays of AO go that texels share. */
-static void fill_traced(case_scene *c, char wall[300]) {
+/* The ball becomes a wall that stands on the floor, to which rays of AO go that texels share. `made`: with
+ * all that is made of AO. */
+static void fill_traced(case_scene *c, char wall[300], bool made) {
     fill(c, SIZE, 0.4);
     snprintf(wall, 300, "%s", at("wall.obj"));
     FILE *file = fopen(wall, "wb");
@@ -116,7 +117,9 @@ static void fill_traced(case_scene *c, char wall[300]) {
     c->caster.path = wall;
     c->caster.transform[7] = 0.0;
     c->receiver.ao_spacing = 2;
-    c->scene.irradiance = 0;
+    c->scene.irradiance = made;
+    c->scene.bent = made ? 1 + VSH_BENT_TANGENT : 0;
+    c->scene.planes.sky = made ? VSH_UP_Y : VSH_UP_NONE;
     c->scene.error = 1;
     c->scene.shade.method = VSH_SHADOW_EXACT;
     c->scene.shade.ao_method = VSH_AO_EXACT;
@@ -129,18 +132,24 @@ static void what_parts_leave_of_ao_is_as_of_one_bake(void **state) {
     if (!vsh_triangles_available()) {
         return;
     }
-    fill_traced(&c, wall);
-    taken *one = calloc(2, sizeof *one), *all = one + 1;
-    assert_non_null(one);
-    const vsh_row_sink sink = sink_of(one);
-    vsh_bake_job_options options = vsh_bake_job_options_default();
-    options.sink = &sink;
-    vsh_error error;
-    assert_ok(vsh_bake_scene(&c.scene, &options, NULL, NULL, &error), &error);
-    bake_parts(&c);
-    assert_ok(merge(&c, all, NULL, &error), &error);
-    assert_memory_equal(one, all, sizeof *one);
-    free(one);
+    for (int32_t made = 0; made < 3; ++made) {
+        fill_traced(&c, wall, made > 0);
+        c.scene.has_ambient = made == 2;
+        c.scene.ambient[0] = 0.25;
+        c.scene.ambient[2] = 0.75;
+        taken *one = calloc(2, sizeof *one), *all = one + 1;
+        assert_non_null(one);
+        const vsh_row_sink sink = sink_of(one);
+        vsh_bake_job_options options = vsh_bake_job_options_default();
+        options.sink = &sink;
+        vsh_error error;
+        assert_ok(vsh_bake_scene(&c.scene, &options, NULL, NULL, &error), &error);
+        bake_parts(&c);
+        assert_ok(merge(&c, all, NULL, &error), &error);
+        assert_int_equal(all->channels, made > 0 ? CHANNELS : 5);
+        assert_memory_equal(one, all, sizeof *one);
+        free(one);
+    }
 }
 
 static void a_shard_without_rows_reads_nothing_and_its_part_is_merged(void **state) {
@@ -350,7 +359,7 @@ static void no_part_that_leaves_ao_does_worse_than_fail(void **state) {
     if (!vsh_triangles_available()) {
         return;
     }
-    fill_traced(&c, wall);
+    fill_traced(&c, wall, true);
     bake_parts(&c);
     bake_case one = {&c, calloc(1, sizeof(taken)), vsh_run_default()};
     assert_non_null(one.rows);
@@ -358,6 +367,39 @@ static void no_part_that_leaves_ao_does_worse_than_fail(void **state) {
     one.run.threads = 1;
     try_all(at("floor.exr.2-of-2.part"), merge_bake, &one);
     free(one.rows);
+}
+
+/* Sky for AO, of as many bytes: what is kept is not what these channels are finished by. */
+static void kinds_of_other_channels_are_refused(void **state) {
+    (void)state;
+    case_scene c;
+    char wall[300];
+    if (!vsh_triangles_available()) {
+        return;
+    }
+    fill_traced(&c, wall, false);
+    bake_parts(&c);
+    const char *path = at("floor.exr.2-of-2.part");
+    const bytes good = read_file(path);
+    vshi_part_front front;
+    memcpy(&front, good.at, sizeof front);
+    taken *rows = calloc(1, sizeof *rows);
+    assert_non_null(rows);
+    size_t refused = 0;
+    for (size_t i = sizeof front; i < sizeof front + (size_t)front.head_bytes; ++i) {
+        if (good.at[i] != 1) {
+            continue;
+        }
+        vsh_error error = {VSH_OK, ""};
+        good.at[i] = 2;
+        write_file(path, &good);
+        good.at[i] = 1;
+        merge(&c, rows, NULL, &error);
+        refused += strstr(error.message, "2-of-2.part: damaged: rays of AO of other channels") != NULL;
+    }
+    assert_int_equal(refused, 1);
+    free(rows);
+    free(good.at);
 }
 
 typedef struct volume_case {
@@ -428,6 +470,7 @@ int main(void) {
         cmocka_unit_test(a_job_of_a_part_is_refused_what_it_cannot_do),
         cmocka_unit_test(no_part_of_a_lightmap_does_worse_than_fail),
         cmocka_unit_test(no_part_that_leaves_ao_does_worse_than_fail),
+        cmocka_unit_test(kinds_of_other_channels_are_refused),
         cmocka_unit_test(no_part_of_a_volume_does_worse_than_fail),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
