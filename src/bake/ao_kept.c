@@ -94,7 +94,7 @@ bool vshi_ao_keep_row(const vshi_ao_keep *keep, int32_t row, vshi_ao_kept *kept)
 
 vshi_ao_shot *vshi_ao_keep_left(const vshi_ao_keep *keep, int32_t column, int32_t row) {
     vshi_ao_kept kept;
-    if (!vshi_ao_keep_row(keep, row, &kept) || !vshi_ao_cut_leaves(keep->cut, row / VSHI_AO_CUT_TILE)) {
+    if (!vshi_ao_cut_leaves(keep->cut, row / VSHI_AO_CUT_TILE) || !vshi_ao_keep_row(keep, row, &kept)) {
         return NULL;
     }
     vshi_ao_shot *shot = &(keep->sky ? kept.sky : kept.ao)[column];

@@ -155,11 +155,11 @@ load parts
 }
 
 @test "statistics, pictures of what is invalid, and pages are made of all parts" {
-    one out.exr "${CLOISTER[@]}" --stats one.json --invalid one.png
-    parts out.exr 3 "" "${CLOISTER[@]}"
+    one out.exr "${CLOISTER[@]}" --sky y --stats one.json --invalid one.png
+    parts out.exr 3 "" "${CLOISTER[@]}" --sky y
     "$VDBSHADE" merge out.exr --quiet --stats all.json --invalid all.png
-    for key in texels invalid_texels marches rays voxel_size estimated_rmse; do
-        [ "$(grep -o "\"$key\": [0-9.]*" one.json | head -1)" = "$(grep -o "\"$key\": [0-9.]*" all.json | head -1)" ] || fail "$key"
+    for key in texels invalid_texels marches rays voxel_size estimated_rmse worst_error; do # of all, of shadow, AO and the sky
+        [ "$(grep -o "\"$key\": [0-9.]*" one.json)" = "$(grep -o "\"$key\": [0-9.]*" all.json)" ] || fail "$key"
     done
     cmp one.png all.png
     for option in "--invalid x.png" "--view x.html"; do
