@@ -156,7 +156,7 @@ static void a_shard_without_rows_reads_nothing_and_its_part_is_merged(void **sta
     (void)state;
     case_scene c;
     char wall[300];
-    fill_traced(&c, wall);
+    fill_traced(&c, wall, false);
     taken *one = calloc(2, sizeof *one), *all = one + 1;
     assert_non_null(one);
     bake_parts(&c);
@@ -205,7 +205,7 @@ static void what_is_marched_is_more_work_and_objects_of_their_own_are_not_known(
     (void)state;
     case_scene c;
     char wall[300];
-    fill_traced(&c, wall);
+    fill_traced(&c, wall, false);
     assert_int_equal(lightmaps_of_second(&c, 0.02), 0);
     assert_int_equal(vsh_bake_job_shards(&c.scene, NULL), 0);
     c.scene.shade.max_error = 1e-3;
