@@ -95,9 +95,11 @@ static inline vsh_lit_options vsh_lit_options_default(void) {
  * atlas splits them, and then all attributes and morph targets of the primitive, byte by byte; primitives on
  * several pages become several; meshes that several nodes use, and instances of EXT_mesh_gpu_instancing,
  * become meshes and nodes of their own where their UVs differ, and share all accessors that do not.
- * Primitives under Draco that change are written as they are without it. Images and buffers that the file
- * names beside it stay named where output stands in its folder, else they come along in the buffer. A .gltf
- * has its buffer beside it as OUT.bin.
+ * Primitives under Draco that change are written as they are without it. Textures that an earlier call made,
+ * which their extras tell ("vdbshade_texture"), go with their images where nothing shows them any more,
+ * unless the file has extensions that are not known. Images and buffers that the file names beside it stay
+ * named where output stands in its folder, else they come along in the buffer. A .gltf has its buffer beside
+ * it as OUT.bin.
  *
  * Of other formats, and where path is NULL, a document is made of the model: a node for each object with its
  * transform, positions, normals, the first set of UVs and the new one, white materials.

@@ -201,10 +201,11 @@ static vsh_result stitch_channels(stitching *s, const vsh_run *run, vsh_error *e
     const double bytes = (double)room * ((double)system->unknown_count * VECTORS * sizeof(double) +
                                          (double)system->island_count * sizeof(island));
     VSHI_TRY(vshi_check_limit(run, system->bytes + bytes, "seams", error));
-    VSHI_TRY(vshi_allocate((void **)&s->vectors, room * VECTORS, system->unknown_count * sizeof(double),
+    /* one more of each, as there may be none */
+    VSHI_TRY(vshi_allocate((void **)&s->vectors, room * VECTORS, (system->unknown_count + 1) * sizeof(double),
                            "seams", error));
-    VSHI_TRY(
-        vshi_allocate((void **)&s->islands, room * system->island_count, sizeof(island), "seams", error));
+    VSHI_TRY(vshi_allocate((void **)&s->islands, room * (system->island_count + 1), sizeof(island), "seams",
+                           error));
     for (s->begin = 0; s->begin < s->channel_count; s->begin += s->batch) {
         const size_t left = s->channel_count - s->begin;
         s->batch = left < room ? left : room;

@@ -212,7 +212,9 @@ static vsh_result find(edges *e, const vsh_run *run, vshi_seams *seams, vsh_erro
     VSHI_TRY(vshi_check_limit(run, rest + listed + e->parts.bytes, what, error));
     VSHI_TRY(vshi_allocate((void **)&seams->list, count, sizeof *seams->list, what, error));
     VSHI_TRY(go_through_pairs(e, seams->list, &seams->count, error));
-    vshi_seam_parts_list(&e->parts, seams->chart, seams->list + seams->count);
+    if (e->parts.count > 0) {
+        vshi_seam_parts_list(&e->parts, seams->chart, seams->list + seams->count);
+    }
     seams->count = count;
     for (size_t i = 0; i < triangles; ++i) {
         seams->chart[i] = vshi_chart_of(seams->chart, (uint32_t)i);

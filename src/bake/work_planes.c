@@ -54,8 +54,8 @@ static vsh_result take_planes(const vsh_texels *texels, const vsh_lightmap *give
     for (size_t p = 0; p < work->count; ++p) {
         floats += work->planes[p].channels;
     }
-    VSHI_TRY(vshi_allocate((void **)&work->lights, kind_count * light_count, sizeof *work->lights,
-                           "lightmap band", error));
+    VSHI_TRY(vshi_allocate((void **)&work->lights, kind_count * (light_count + 1), sizeof *work->lights,
+                           "lightmap band", error)); /* there may be no lights */
     VSHI_TRY(
         vshi_allocate((void **)&work->memory, texel_count, floats * sizeof(float), "lightmap band", error));
     float *memory = work->memory;

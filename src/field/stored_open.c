@@ -168,8 +168,8 @@ static vsh_result read_texts(vsh_field_file *f, vsh_error *error) {
     if (count > head->text_bytes / 2) { /* each has two NULs */
         return damaged(f->path, "more attributes than texts", error);
     }
-    VSHI_TRY(
-        vshi_allocate((void **)&f->attributes, (size_t)count, sizeof *f->attributes, "attributes", error));
+    VSHI_TRY(vshi_allocate((void **)&f->attributes, (size_t)count + 1, sizeof *f->attributes, "attributes",
+                           error)); /* there may be none */
     texts t = {.at = f->head + sizeof *head + f->count * sizeof(vshi_stored_field)};
     t.end = t.at + head->text_bytes;
     vsh_attribute *next = f->attributes;

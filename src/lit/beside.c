@@ -28,13 +28,13 @@ static bool is_same_file(const char *a, const char *b) {
 
 vsh_result vshi_lit_check_replaced(const vshi_lit_document *document, const char *path, vsh_error *error) {
     static const char *const lists[] = {"buffers", "images"};
-    const size_t counts[] = {SIZE_MAX, document->image_count};
+    json_t *const own[] = {json_object_get(document->gltf.root, "buffers"), document->own_images};
     for (size_t k = 0; k < sizeof lists / sizeof lists[0] && document->text != NULL; ++k) {
         size_t i;
         const json_t *item;
-        json_array_foreach(json_object_get(document->gltf.root, lists[k]), i, item) {
+        json_array_foreach(own[k], i, item) {
             const char *uri = json_string_value(json_object_get(item, "uri"));
-            if (i >= counts[k] || uri == NULL || vshi_uri_is_data(uri) || vshi_uri_is_remote(uri)) {
+            if (uri == NULL || vshi_uri_is_data(uri) || vshi_uri_is_remote(uri)) {
                 continue;
             }
             char *given = vshi_uri_path(document->gltf.path, uri);

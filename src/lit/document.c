@@ -84,7 +84,10 @@ vsh_result vshi_lit_open(vshi_lit_document *document, const char *path, const vs
     document->text_size = told_size(document->text, size);
     VSHI_TRY(check_lists(gltf, error));
     document->first_view = json_array_size(json_object_get(gltf->root, "bufferViews"));
-    document->image_count = json_array_size(json_object_get(gltf->root, "images"));
+    document->own_images = json_copy(json_object_get(gltf->root, "images"));
+    if (document->own_images == NULL && json_object_get(gltf->root, "images") != NULL) {
+        return vshi_lit_no_memory(document, error);
+    }
     const size_t buffers = json_array_size(json_object_get(gltf->root, "buffers"));
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&gltf->buffers, buffers, sizeof *gltf->buffers, error));
     gltf->buffer_count = buffers;
@@ -103,6 +106,7 @@ vsh_result vshi_lit_begin(vshi_lit_document *document, const char *path, const v
 
 void vshi_lit_close(vshi_lit_document *document) {
     vshi_gltf_free_buffers(&document->gltf);
+    json_decref(document->own_images);
     json_decref(document->gltf.root);
     free(document->dropped);
     free(document->replaced);

@@ -29,7 +29,7 @@ typedef struct vshi_lit_document {
     bool *replaced;          /* [first_view]: views in front of it that do too; NULL: none */
     vshi_lit_range *dropped; /* [dropped_count], sorted: bytes of buffers that nothing needs any more */
     size_t dropped_count;
-    size_t image_count; /* of the file's own; those that are made come behind them */
+    json_t *own_images; /* the file's own, in their places; NULL: none */
 } vshi_lit_document;
 
 /* Reads a glTF or GLB without its buffers. Close after a failure too. Errors: as vsh_model_read(). */

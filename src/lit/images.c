@@ -3,6 +3,7 @@
 #include "base/memory.h"
 #include "base/srgb.h"
 #include "image/png.h"
+#include "lit/own_textures.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -147,7 +148,8 @@ static vsh_result add_texture(vshi_lit_work *work, const vsh_lit_image *image, j
     size_t index;
     VSHI_TRY(vshi_lit_append(document, "images", json_incref(made), &index, error));
     VSHI_TRY(add_sampler(work, sampler, error));
-    json_t *texture = json_pack("{s:I,s:I}", "sampler", (json_int_t)*sampler, "source", (json_int_t)index);
+    json_t *texture = json_pack("{s:I,s:I,s:o}", "sampler", (json_int_t)*sampler, "source", (json_int_t)index,
+                                "extras", vshi_lit_texture_mark(purpose_names[image->purpose]));
     return vshi_lit_append(document, "textures", texture, &work->textures[image->purpose][image->page],
                            error);
 }

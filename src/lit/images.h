@@ -23,8 +23,9 @@ void vshi_lit_besides_free(vshi_lit_besides *besides);
  * which is freed after a failure too. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 vsh_result vshi_lit_images_add(vshi_lit_work *work, bool embed, vshi_lit_besides *besides, vsh_error *error);
 
-/* Takes the images that the file names beside it into the buffer, where the document moves to another folder.
- * Those that cannot be read stay named, with a warning. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+/* Takes the file's own images that stay and that it names beside it into the buffer, where the document moves
+ * to another folder. Those that cannot be read stay named, with a warning. Errors: VSH_ERROR_LIMIT,
+ * VSH_ERROR_MEMORY. */
 vsh_result vshi_lit_images_bring(vshi_lit_work *work, vsh_error *error);
 
 /* A file's name as a URI; NULL where memory is short. */

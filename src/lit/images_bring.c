@@ -82,9 +82,11 @@ done:
 vsh_result vshi_lit_images_bring(vshi_lit_work *work, vsh_error *error) {
     size_t i;
     json_t *image;
-    json_array_foreach(json_object_get(work->document.gltf.root, "images"), i, image) {
+    const json_t *images = json_object_get(work->document.gltf.root, "images");
+    json_array_foreach(work->document.own_images, i, image) {
         const char *uri = json_string_value(json_object_get(image, "uri"));
-        if (uri != NULL && !vshi_uri_is_data(uri) && !vshi_uri_is_remote(uri)) {
+        const bool stays = json_array_get(images, i) == image;
+        if (stays && uri != NULL && !vshi_uri_is_data(uri) && !vshi_uri_is_remote(uri)) {
             VSHI_TRY(bring(work, image, uri, error));
         }
     }

@@ -119,6 +119,9 @@ static char *folder_of(const char *path) {
 
 /* Images that the input names stay named where the output stands beside it. */
 static vsh_result bring_images(vshi_lit_work *work, const char *path, vsh_error *error) {
+    if (work->document.own_images == NULL) {
+        return VSH_OK;
+    }
     char *one = folder_of(path), *other = folder_of(work->output);
     const bool known = one != NULL && other != NULL, beside = known && is_same(one, other);
     free(one);
@@ -146,8 +149,7 @@ static vsh_result make_document(vshi_lit_work *work, const char *path, const vsh
     }
     VSHI_TRY(vshi_lit_uses_find(&work->document, uses, error));
     VSHI_TRY(vshi_lit_materials_check(work, error));
-    VSHI_TRY(vshi_lit_nodes_make(work, error));
-    return bring_images(work, path, error);
+    return vshi_lit_nodes_make(work, error);
 }
 
 static vsh_result make(vshi_lit_work *work, const char *path, const vsh_run *run, vshi_job *job,
@@ -163,6 +165,7 @@ static vsh_result make(vshi_lit_work *work, const char *path, const vsh_run *run
     if (!vshi_lit_is_obj(work->output)) {
         VSHI_TRY_DONE(vshi_lit_materials_apply(work, error));
         VSHI_TRY_DONE(vshi_lit_prune(&work->document, &uses, error));
+        VSHI_TRY_DONE(bring_images(work, path, error)); /* which may be fewer now */
         VSHI_TRY_DONE(vshi_lit_tell_origin(work, error));
     }
     VSHI_TRY_DONE(vshi_lit_write_files(work, &besides, error));

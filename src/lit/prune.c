@@ -1,5 +1,8 @@
 #include "lit/prune.h"
 
+#include "lit/own_textures.h"
+#include "lit/places.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -87,10 +90,12 @@ vsh_result vshi_lit_uses_find(vshi_lit_document *document, vshi_lit_uses *uses, 
                             .view_count = json_array_size(json_object_get(gltf->root, "bufferViews"))};
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&uses->accessors, uses->accessor_count, sizeof(bool), error));
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&uses->views, uses->view_count, sizeof(bool), error));
+    VSHI_TRY(vshi_lit_textures_find(document, &uses->textures, error));
     return walk(document, note, uses, error);
 }
 
 void vshi_lit_uses_free(vshi_lit_uses *uses) {
+    vshi_lit_textures_free(&uses->textures);
     free(uses->accessors);
     free(uses->views);
     *uses = (vshi_lit_uses){.accessors = NULL};
@@ -98,7 +103,8 @@ void vshi_lit_uses_free(vshi_lit_uses *uses) {
 
 /* --- extensions */
 
-/* Those that refer to no accessor and no buffer view but by what is walked through above. */
+/* Those that refer to no accessor and no buffer view but by what is walked through above, and to textures,
+ * images and samplers as lit/own_textures.c says. */
 static bool is_known(const char *name) {
     static const char *const names[] = {"KHR_draco_mesh_compression",
                                         "EXT_mesh_gpu_instancing",
@@ -152,57 +158,21 @@ static bool knows_all(json_t *value) {
 
 /* --- new ones into old places */
 
-/* Where the new items of a list go; `first`: the first of them. */
-typedef struct places {
-    size_t *moved; /* [count - first] */
-    size_t first, count, end;
-} places;
-
-/* Old places that became free take the last of the new ones. */
-static vsh_result find_places(vshi_lit_document *document, size_t first, size_t count, const bool *before,
-                              const bool *after, places *p, vsh_error *error) {
-    *p = (places){.first = first, .count = count, .end = count};
-    VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)&p->moved, count - first, sizeof *p->moved, error));
-    for (size_t i = first; i < count; ++i) {
-        p->moved[i - first] = i;
-    }
-    for (size_t i = 0; i < first && p->end > first; ++i) {
-        if (before[i] && !after[i]) {
-            p->moved[--p->end - first] = i;
-        }
-    }
-    return VSH_OK;
-}
-
-static vsh_result move_items(vshi_lit_document *document, const char *name, const places *p,
-                             vsh_error *error) {
-    json_t *list = json_object_get(document->gltf.root, name);
-    while (json_array_size(list) > p->end) {
-        const size_t last = json_array_size(list) - 1;
-        if (json_array_set(list, p->moved[last - p->first], json_array_get(list, last)) != 0 ||
-            json_array_remove(list, last) != 0) {
-            return vshi_lit_no_memory(document, error);
-        }
-    }
-    return VSH_OK;
-}
-
 typedef struct moving {
-    places accessors, views;
+    vshi_lit_places accessors, views;
 } moving;
 
 static vsh_result rename_one(vshi_lit_document *document, json_t *object, const char *key, bool view,
                              void *user, vsh_error *error) {
     const moving *m = user;
-    const places *p = view ? &m->views : &m->accessors;
-    size_t index;
-    if (!vshi_gltf_count(object, key, SIZE_MAX, &index) || index < p->first || index >= p->count) {
-        return VSH_OK;
+    return vshi_lit_places_rename(document, view ? &m->views : &m->accessors, object, key, error);
+}
+
+/* before[count] becomes what was used then and is not any more. */
+static void keep_gone(bool *before, const bool *after, size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+        before[i] = before[i] && !after[i];
     }
-    const json_int_t moved = (json_int_t)p->moved[index - p->first];
-    return json_object_set_new_nocheck(object, key, json_integer(moved)) == 0
-               ? VSH_OK
-               : vshi_lit_no_memory(document, error);
 }
 
 /* --- bytes */
@@ -240,6 +210,9 @@ static void subtract(vshi_lit_document *document, vshi_lit_range range, const vs
                      size_t count) {
     enum { ALIGNMENT = 8 };
     size_t begin = range.begin;
+    if (range.end <= SIZE_MAX - ALIGNMENT) { /* with what pads it */
+        range.end = (range.end + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+    }
     for (size_t i = 0; i <= count; ++i) {
         const bool last = i == count;
         if (!last && (kept[i].buffer != range.buffer || kept[i].end <= begin || kept[i].begin >= range.end)) {
@@ -299,29 +272,30 @@ done:
     return result;
 }
 
-static vsh_result prune(vshi_lit_document *document, const vshi_lit_uses *before, vshi_lit_uses *after,
-                        moving *m, bool *replaced, vsh_error *error) {
+static vsh_result prune(vshi_lit_document *document, vshi_lit_uses *before, vshi_lit_uses *after, moving *m,
+                        bool *replaced, vsh_error *error) {
+    VSHI_TRY(vshi_lit_textures_prune(document, &before->textures, &after->textures, error));
     /* views of accessors that are no longer used are not either */
-    VSHI_TRY(find_places(document, before->accessor_count, after->accessor_count, before->accessors,
-                         after->accessors, &m->accessors, error));
+    keep_gone(before->accessors, after->accessors, before->accessor_count);
+    VSHI_TRY(vshi_lit_places_find(document, before->accessors, before->accessor_count, after->accessor_count,
+                                  &m->accessors, error));
     VSHI_TRY(walk(document, rename_one, m, error)); /* views are not moved yet */
-    VSHI_TRY(move_items(document, "accessors", &m->accessors, error));
+    VSHI_TRY(vshi_lit_places_move(document, "accessors", &m->accessors, error));
     vshi_lit_uses_free(after);
     VSHI_TRY(vshi_lit_uses_find(document, after, error));
-    VSHI_TRY(find_places(document, before->view_count, after->view_count, before->views, after->views,
-                         &m->views, error));
-    for (size_t i = m->views.end; i < m->views.count; ++i) {
-        replaced[m->views.moved[i - m->views.first]] = true;
-    }
+    keep_gone(before->views, after->views, before->view_count);
+    VSHI_TRY(vshi_lit_places_find(document, before->views, before->view_count, after->view_count, &m->views,
+                                  error));
+    vshi_lit_places_mark(&m->views, replaced);
     VSHI_TRY(drop_bytes(document, replaced, error)); /* while they still say which */
     m->accessors.first = m->accessors.count;         /* they have been moved */
     VSHI_TRY(walk(document, rename_one, m, error));
-    VSHI_TRY(move_items(document, "bufferViews", &m->views, error));
+    VSHI_TRY(vshi_lit_places_move(document, "bufferViews", &m->views, error));
     document->replaced = replaced;
     return VSH_OK;
 }
 
-vsh_result vshi_lit_prune(vshi_lit_document *document, const vshi_lit_uses *before, vsh_error *error) {
+vsh_result vshi_lit_prune(vshi_lit_document *document, vshi_lit_uses *before, vsh_error *error) {
     if (!knows_all(document->gltf.root)) {
         return VSH_OK;
     }

@@ -146,6 +146,29 @@ sets() {
     [ "$(sets more.glb)" = "4: 3 " ] || fail "$(sets more.glb)"
 }
 
+# sizes FILE: bytes, then how many textures, images, samplers, buffer views and accessors it has.
+sizes() {
+    python3 -c 'import json, struct, sys
+data = open(sys.argv[1], "rb").read()
+root = json.loads(data[20:20 + struct.unpack("<I", data[12:16])[0]])
+print(len(data), *(len(root[name]) for name in ("textures", "images", "samplers", "bufferViews", "accessors")))' "$1"
+}
+
+@test "an asset that is lit over and over keeps its size" {
+    local model n
+    for model in scene.glb scene_draco.glb figure.glb; do
+        cp "$MODELS/$model" lit0.glb
+        for n in 1 2 3 4; do
+            # light is the same, so that its images are; of which file it is does not show in the length
+            shade bake lit$((n - 1)).glb "${BAKE[@]}" --seams keep --unwrap always -o lit$n.glb
+            done_well
+        done
+        [ "$(sizes lit2.glb)" = "$(sizes lit3.glb)" ] && [ "$(sizes lit3.glb)" = "$(sizes lit4.glb)" ] ||
+            fail "$model: $(sizes lit1.glb), $(sizes lit2.glb), $(sizes lit3.glb), $(sizes lit4.glb)"
+        [[ $(sizes lit4.glb) == *" 2 2 1 "* ]] || fail "$model: $(sizes lit4.glb)"
+    done
+}
+
 @test "a mesh that has no room for another set of UVs is refused before the bake" {
     cp "$MODELS"/scene.* .
     local eight='&'
@@ -208,7 +231,7 @@ EOF
     node -e 'require("gltf-validator")' 2>/dev/null || skip "no gltf-validator"
     [ -n "${TEST_LIT:-}" ] || skip "no test_lit"
     mkdir kept
-    for test in "$TEST_LIT" "${TEST_LIT}_images"; do
+    for test in "$TEST_LIT" "${TEST_LIT}_images" "${TEST_LIT}_again"; do
         TMPDIR=$PWD VSH_LIT_KEEP=$PWD/kept "$test" >/dev/null 2>&1 || fail "$test"
     done
     for model in scene.glb scene.gltf figure.glb scene_draco.glb scene.fbx; do

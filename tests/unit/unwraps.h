@@ -92,10 +92,9 @@ static inline texel_box box_of(const corner_uvs *c, const vsh_atlas_info *info) 
 static inline void place_of(const vsh_mesh *mesh, uint32_t v, double at[3]) {
     const float *p = mesh->positions + 3 * (size_t)v;
     for (int r = 0; r < 3; ++r) {
-        const double *m = mesh->transform + 4 * r;
-        at[r] = mesh->transform == NULL
-                    ? (double)p[r]
-                    : m[0] * (double)p[0] + m[1] * (double)p[1] + m[2] * (double)p[2] + m[3];
+        static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+        const double *m = (mesh->transform != NULL ? mesh->transform : identity) + 4 * r;
+        at[r] = m[0] * (double)p[0] + m[1] * (double)p[1] + m[2] * (double)p[2] + m[3];
     }
 }
 

@@ -1,0 +1,314 @@
+/* Parts of bakes, merged: those that the library made when this began, changed in some places, or any bytes.
+ * Their sizes and sums are made those of what is there: else no input would come farther than them. The first
+ * byte chooses the bake and the part, the second how the others are taken. */
+#include "fuzz.h"
+
+#include "base/part_file.h"
+#include "base/part_sum.h"
+
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <vdbshade/vdbshade.h>
+
+enum { WIDTH = 16, HEIGHT = 40, SHARDS = 2, MOST = 1 << 20 };
+
+static const char floor_text[] = "v -2 0 -2\nv 2 0 -2\nv 2 0 2\nv -2 0 2\nvt 0 1\nvt 1 1\nvt 1 0\nvt 0 0\n"
+                                 "f 1/1 3/3 2/2\nf 1/1 4/4 3/3\n";
+static const char wall_text[] = "v -2 -1 0\nv 1 -1 0\nv 1 1 0.5\nv -2 1 0.5\nf 1 2 3\nf 1 3 4\n";
+
+/* Light that is made of AO; and AO that parts leave. */
+static const char *const scenes[] = {
+    "{\"casters\":[{\"sdf\":{\"shape\":\"sphere\",\"radius\":0.7}}],\"resolution\":16,\"irradiance\":true,"
+    "\"method\":\"cone\","
+    "\"lights\":[{\"name\":\"sun\",\"type\":\"directional\",\"direction\":[0,1,0],\"angle_deg\":5}],"
+    "\"ao\":{\"distance\":1,\"method\":\"cones\"},"
+    "\"receivers\":[{\"mesh\":\"floor.obj\",\"size\":[16,40],\"padding\":2,\"output\":\"0.exr\"}]}",
+    "{\"casters\":[{\"mesh\":\"wall.obj\"}],\"error\":true,"
+    "\"lights\":[{\"name\":\"sun\",\"type\":\"directional\",\"direction\":[0,1,0],\"angle_deg\":5}],"
+    "\"ao\":{\"distance\":1,\"method\":\"exact\"},"
+    "\"receivers\":[{\"mesh\":\"floor.obj\",\"size\":[16,40],\"ao_spacing\":2,\"output\":\"1.exr\"}]}"};
+
+enum { BAKES = sizeof scenes / sizeof scenes[0], VOLUME = BAKES, KINDS };
+
+/* What parts are of. */
+typedef struct source {
+    vsh_scene *scene; /* NULL: the volume */
+    char name[512];
+    unsigned char *bytes[SHARDS];
+    size_t size[SHARDS];
+} source;
+
+static source sources[KINDS];
+static vsh_voxels *voxels;
+
+static void must(vsh_result result, const vsh_error *error) {
+    if (result != VSH_OK) {
+        fprintf(stderr, "fuzz: %s\n", error->message);
+        abort();
+    }
+}
+
+/* --- what is there before the first input */
+
+static void bake_scene(source *s, int kind) {
+    char file[32];
+    vsh_error error;
+    snprintf(file, sizeof file, "%d.json", kind);
+    must(vsh_scene_read(fuzz_file(file, scenes[kind], strlen(scenes[kind])), NULL, &s->scene, &error),
+         &error);
+    for (int32_t shard = 1; shard <= SHARDS; ++shard) {
+        static const char *const words[] = {"bake", "a b"};
+        vsh_bake_job_options options = vsh_bake_job_options_default();
+        options.shard = shard;
+        options.shard_count = SHARDS;
+        options.parts = s->name;
+        options.words = words;
+        options.word_count = 2;
+        must(vsh_bake_scene(s->scene, &options, NULL, NULL, &error), &error);
+    }
+}
+
+static vsh_part_options volume_parts(const source *s, int32_t shard) {
+    static const vsh_attribute attribute = {"of", "a ball"};
+    vsh_part_options parts = vsh_part_options_default();
+    parts.parts = s->name;
+    parts.shard = shard;
+    parts.shard_count = SHARDS;
+    parts.attributes = &attribute;
+    parts.attribute_count = 1;
+    return parts;
+}
+
+static void bake_volume(const source *s) {
+    vsh_sdf_node ball = vsh_sdf_node_default();
+    ball.radius = 0.5;
+    const vsh_sdf sdf = {&ball, 1};
+    static const double low[3] = {-1, -1, -1}, high[3] = {1, 1, 1};
+    vsh_grid_options resolution = vsh_grid_options_default();
+    resolution.resolution = 12;
+    const vsh_light sun = vsh_light_default();
+    vsh_error error;
+    vsh_grid *grid;
+    vsh_occluders *occluders;
+    must(vsh_grid_from_sdf(&sdf, &resolution, NULL, &grid, &error), &error);
+    must(vsh_occluders_from_grid(grid, NULL, NULL, &occluders, &error), &error);
+    must(vsh_voxels_from_box(low, high, 0.15, NULL, &voxels, &error), &error);
+    for (int32_t shard = 1; shard <= SHARDS; ++shard) {
+        const vsh_part_options parts = volume_parts(s, shard);
+        const vsh_volume_options options = vsh_volume_options_default();
+        must(vsh_bake_volume_part(occluders, voxels, &sun, 1, &options, &parts, NULL, NULL, &error), &error);
+    }
+    vsh_occluders_free(occluders);
+    vsh_grid_free(grid);
+}
+
+static void load(source *s, int shard) {
+    char path[600];
+    snprintf(path, sizeof path, "%s.%d-of-%d.part", s->name, shard + 1, SHARDS);
+    FILE *file = fopen(path, "rb");
+    s->bytes[shard] = malloc(MOST);
+    if (file == NULL || s->bytes[shard] == NULL) {
+        abort();
+    }
+    s->size[shard] = fread(s->bytes[shard], 1, MOST, file);
+    fclose(file);
+}
+
+static void make_sources(void) {
+    fuzz_file("floor.obj", floor_text, sizeof floor_text - 1);
+    fuzz_file("wall.obj", wall_text, sizeof wall_text - 1);
+    for (int kind = 0; kind < KINDS; ++kind) {
+        source *s = &sources[kind];
+        snprintf(s->name, sizeof s->name, "%s/%d.%s", fuzz_folder(), kind, kind == VOLUME ? "vdb" : "exr");
+        if (kind == VOLUME) {
+            bake_volume(s);
+        } else {
+            bake_scene(s, kind);
+        }
+        for (int shard = 0; shard < SHARDS; ++shard) {
+            load(s, shard);
+        }
+    }
+}
+
+/* --- a part of the input's */
+
+typedef struct part {
+    unsigned char *at;
+    size_t size;
+} part;
+
+/* Changes, cuts out or puts in a few bytes, in the head, the tail or anywhere. */
+static void change(fuzz_input *input, part *p) {
+    vshi_part_front front;
+    uint32_t place;
+    memcpy(&front, p->at, sizeof front);
+    const uint8_t how = fuzz_byte(input);
+    fuzz_fill(input, &place, sizeof place);
+    const size_t width = (size_t)1 << how % 4, body = p->size - sizeof(uint64_t);
+    size_t begin = 0, end = body;
+    if ((how & 12) == 4 && front.head_bytes < body - sizeof front) {
+        end = sizeof front + (size_t)front.head_bytes;
+    } else if ((how & 12) == 8 && front.tail_bytes < body) {
+        begin = body - (size_t)front.tail_bytes;
+    }
+    if (end - begin < width) {
+        return;
+    }
+    const size_t at = begin + place % (end - begin - width + 1);
+    const size_t more = 4 * (1 + (size_t)place / 7 % 16);
+    if ((how & 0x70) == 0x10 && p->size > at + more + sizeof(uint64_t)) {
+        memmove(p->at + at, p->at + at + more, p->size - at - more);
+        p->size -= more;
+    } else if ((how & 0x70) == 0x20 && p->size + more <= MOST) {
+        memmove(p->at + at + more, p->at + at, p->size - at);
+        fuzz_fill(input, p->at + at, more);
+        p->size += more;
+    } else {
+        fuzz_fill(input, p->at + at, width);
+    }
+}
+
+/* Sizes, where those of head and tail are within the whole, and the sum. */
+static void forge(part *p) {
+    vshi_part_front front;
+    const size_t body = p->size - sizeof(uint64_t);
+    memcpy(&front, p->at, sizeof front);
+    const size_t rest = body - sizeof front;
+    if (front.head_bytes <= rest && front.tail_bytes <= rest - front.head_bytes) {
+        front.body_bytes = rest - front.head_bytes - front.tail_bytes;
+        memcpy(p->at, &front, sizeof front);
+    }
+    const uint64_t sum = vshi_part_sum(VSHI_PART_SUM, p->at, body);
+    memcpy(p->at + body, &sum, sizeof sum);
+}
+
+static part make_part(fuzz_input *input, const source *s, int shard) {
+    const uint8_t how = fuzz_byte(input);
+    part p = {malloc(MOST), 0};
+    if (p.at == NULL) {
+        abort();
+    }
+    if (how % 8 == 7 && input->left <= MOST) {
+        p.size = input->left;
+        fuzz_fill(input, p.at, p.size);
+    } else {
+        p.size = s->size[shard];
+        memcpy(p.at, s->bytes[shard], p.size);
+        while (input->left > 0) {
+            change(input, &p);
+        }
+    }
+    if (p.size >= sizeof(vshi_part_front) + sizeof(uint64_t) && how < 0xf0) {
+        forge(&p);
+    }
+    return p;
+}
+
+/* --- what takes it */
+
+static vsh_result begin(void *user, const vsh_job_lightmap *lightmap, const vsh_image *image,
+                        vsh_error *error) {
+    (void)error;
+    int32_t *rows = user;
+    if (lightmap->width != WIDTH || image->width != WIDTH || image->height != HEIGHT) {
+        abort();
+    }
+    *rows = 0;
+    return VSH_OK;
+}
+
+static vsh_result add(void *user, int32_t rows, const float *const *planes, vsh_error *error) {
+    (void)error;
+    int32_t *sum = user;
+    *sum += rows;
+    if (*sum > HEIGHT || planes[0] == NULL) {
+        abort();
+    }
+    return VSH_OK;
+}
+
+static vsh_result end(void *user, vsh_result result, vsh_error *error) {
+    (void)error;
+    const int32_t *rows = user;
+    if (result == VSH_OK && *rows != HEIGHT) {
+        abort();
+    }
+    return result;
+}
+
+static void merge_lightmaps(const source *s, bool bands) {
+    int32_t rows;
+    vsh_row_sink sink = vsh_row_sink_default();
+    sink.begin = begin;
+    sink.add = add;
+    sink.end = end;
+    sink.user = &rows;
+    const vsh_run run = fuzz_run();
+    vsh_bake_job_options options = vsh_bake_job_options_default();
+    options.sink = &sink;
+    options.parts = s->name;
+    options.band_rows = bands ? VSH_BAND_STEP : 0;
+    vsh_error error;
+    vsh_bake_job *job;
+    FUZZ_MAKE(job, vsh_bake_job_create(s->scene, &options, &run, &job, fuzz_error(&error)));
+    if (job != NULL) {
+        const vsh_result result = vsh_bake_job_merge(job, &run, fuzz_error(&error));
+        fuzz_ended(result, &error, result == VSH_OK ? job : NULL);
+    }
+    vsh_bake_job_free(job);
+}
+
+static void merge_volume(const source *s) {
+    const vsh_light sun = vsh_light_default();
+    const vsh_volume_options options = vsh_volume_options_default();
+    const vsh_part_options parts = volume_parts(s, 0);
+    const vsh_run run = fuzz_run();
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    vsh_error error;
+    vsh_volume *volume;
+    FUZZ_MAKE(volume,
+              vsh_volume_merge(voxels, &sun, 1, &options, &parts, &run, &volume, &stats, fuzz_error(&error)));
+    vsh_volume_free(volume);
+    vsh_occluders_info casters;
+    const vsh_result result = vsh_volume_part_casters(s->name, 0, &run, &casters, fuzz_error(&error));
+    fuzz_ended(result, &error, result == VSH_OK ? &casters : NULL);
+}
+
+static void read_words(const source *s) {
+    const vsh_run run = fuzz_run();
+    char **words = NULL;
+    size_t count = 0;
+    vsh_error error;
+    const vsh_result result = vsh_part_words(s->name, 0, &run, &words, &count, fuzz_error(&error));
+    fuzz_ended(result, &error, words);
+    if (words != NULL && words[count] != NULL) {
+        abort();
+    }
+    vsh_part_words_free(words);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    if (sources[0].scene == NULL) {
+        make_sources();
+    }
+    fuzz_input input = {data, size};
+    const uint8_t which = fuzz_byte(&input);
+    const source *s = &sources[which % KINDS];
+    const int shard = which / KINDS % SHARDS;
+    part p = make_part(&input, s, shard);
+    char name[64];
+    snprintf(name, sizeof name, "%s.%d-of-%d.part", strrchr(s->name, '/') + 1, shard + 1, SHARDS);
+    fuzz_file(name, p.at, p.size);
+    if (s->scene != NULL) {
+        merge_lightmaps(s, which >= 128);
+    } else {
+        merge_volume(s);
+    }
+    read_words(s);
+    fuzz_file(name, s->bytes[shard], s->size[shard]);
+    free(p.at);
+    return 0;
+}
