@@ -14,7 +14,7 @@ if(absolute)
 else()
   set(VSH_LIBRARY_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
 endif()
-add_executable(vdbshade_cli_installed $<TARGET_OBJECTS:vdbshade_cli> $<TARGET_OBJECTS:vdbshade_help_pages>)
+add_executable(vdbshade_cli_installed $<TARGET_OBJECTS:vdbshade_cli> ${VSH_CLI_OBJECTS})
 target_link_libraries(vdbshade_cli_installed PRIVATE $<TARGET_PROPERTY:vdbshade_cli,LINK_LIBRARIES>)
 set_target_properties(vdbshade_cli_installed PROPERTIES
                       OUTPUT_NAME vdbshade RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/installed

@@ -10,7 +10,6 @@ add_custom_command(OUTPUT ${VSH_HELP_PAGES}
 add_library(vdbshade_help_pages OBJECT ${VSH_HELP_PAGES}) # of whatever is made of the command line's sources
 vsh_set_source_flags(vdbshade_help_pages)
 target_include_directories(vdbshade_help_pages PRIVATE src include)
-list(APPEND VSH_CLI_SOURCES $<TARGET_OBJECTS:vdbshade_help_pages>)
 
 set(VSH_MANUAL ${PROJECT_BINARY_DIR}/manual)
 function(vsh_add_manual program)

@@ -91,7 +91,8 @@ class Voxelizer {
     Stage &stage;
     vsh_error *error;
     openvdb::CoordBBox region;
-    Vec3d sides; // of the bounds, voxels
+    Vec3d sides;              // of the bounds, voxels
+    std::vector<Level> solid; // boxes that are inside: filled once no level is refused any more
     FloatGrid::Ptr grid;
     std::atomic<size_t> bad{SIZE_MAX}; // first box with a value that is not finite
     static constexpr int32_t BLOCK = 4;
@@ -194,9 +195,10 @@ Level Voxelizer::split(const Level &level) {
     }
     check_tiles(level, signs);
     Level next{level.size / 2, {}};
+    Level inside{level.size, {}};
     for (size_t i = 0; i < count; ++i) {
         if (signs[i] < 0) {
-            fill_inside(level.origins[i], level.size);
+            inside.origins.push_back(level.origins[i]);
         }
         for (int32_t child = 0; signs[i] == 0 && child < 8; ++child) {
             const Coord origin = level.origins[i].offsetBy(
@@ -206,6 +208,7 @@ Level Voxelizer::split(const Level &level) {
             }
         }
     }
+    solid.push_back(std::move(inside));
     return next;
 }
 
@@ -329,6 +332,11 @@ FloatGrid::Ptr Voxelizer::run(const Vec3d &low, const Vec3d &high) {
     while (level.size > 8) {
         level = split(level);
         foretell(level);
+    }
+    for (const Level &boxes : solid) {
+        for (const Coord &origin : boxes.origins) {
+            fill_inside(origin, boxes.size);
+        }
     }
     leaves(level);
     if (grid->tree().leafCount() == 0) {

@@ -15,6 +15,10 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+// Compiled once, in float_grid.cpp: in each file that makes or reads a grid it would be most of its time.
+extern template class openvdb::tree::Tree<openvdb::FloatTree::RootNodeType>;
+extern template class openvdb::Grid<openvdb::FloatTree>;
+
 struct vsh_grid {
     openvdb::FloatGrid::Ptr level_set; // never changed once the handle exists
     double transform[12];

@@ -1,6 +1,8 @@
 /* Grids of distance callbacks and trees. test_grid_mesh.c has meshes, test_grid_union.c unions. */
 #include "grids.h"
 
+#include <sys/resource.h>
+
 static void a_sphere_is_exact_in_its_band(void **state) {
     (void)state;
     sphere s = {{0, 0, 0}, 1.0, 0};
@@ -216,6 +218,8 @@ static void too_small_a_voxel_is_refused_before_memory_is_taken(void **state) {
     sphere s = {{0, 0, 0}, 1.0, 0};
     const vsh_distance field = sphere_field(&s);
     vsh_grid *grid = NULL;
+    struct rusage before;
+    assert_int_equal(getrusage(RUSAGE_SELF, &before), 0);
     vsh_grid_options options = with_voxel(1e-9);
     assert_fails(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT,
                  "voxel size 1e-09");
@@ -226,6 +230,9 @@ static void too_small_a_voxel_is_refused_before_memory_is_taken(void **state) {
     assert_fails(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT,
                  "this machine's memory");
     assert_true(s.calls < 100000);
+    struct rusage after;
+    assert_int_equal(getrusage(RUSAGE_SELF, &after), 0);
+    assert_true(after.ru_maxrss - before.ru_maxrss < 50000); /* KB */
     options = with_voxel(0.005);
     vsh_run run = vsh_run_default();
     run.memory_limit = 10000000;
