@@ -52,7 +52,7 @@ if(NOT TARGET vsh::openexr)
   add_library(vsh::openexr INTERFACE IMPORTED)
   target_link_libraries(vsh::openexr INTERFACE OpenEXR::OpenEXRCore)
   add_library(vsh::dependencies INTERFACE IMPORTED)
-  target_link_libraries(vsh::dependencies INTERFACE TBB::tbb vsh::half vsh::openexr vsh::png vsh::assimp vsh::draco vsh::meshoptimizer vsh::jansson
+  target_link_libraries(vsh::dependencies INTERFACE TBB::tbb vsh::half vsh::openexr vsh::png vsh::meshoptimizer vsh::jansson
                                                     vsh::md vsh::sleef vsh::seccomp Freetype::Freetype ZLIB::ZLIB
                                                     ${CMAKE_DL_LIBS} m)
   if(TARGET embree)

@@ -5,7 +5,7 @@ include(CMakePackageConfigHelpers)
 install(TARGETS vdbshade EXPORT vdbshade-targets
         LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development
         INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-install(TARGETS vdbshade_oiio vdbshade_openvdb LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/vdbshade COMPONENT library)
+install(TARGETS ${VSH_MODULES} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/vdbshade COMPONENT library)
 
 # The program stands elsewhere, seen from the library, than in the build folder, and so is linked once more.
 cmake_path(IS_ABSOLUTE CMAKE_INSTALL_LIBDIR absolute)
@@ -29,11 +29,12 @@ install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONE
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation FILES_MATCHING PATTERN "*.md" PATTERN "*.png")
 install(DIRECTORY examples assets DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation)
 
-# The static library is the same objects, level sets among them; images other than EXR and PNG stay in their module. Who
+# The static library is the same objects, level sets and importers among them; images other than EXR and PNG stay in their module. Who
 # links it links what it needs: names, which the linker looks for where it looks for everything.
 option(VSH_STATIC "Build the static library too" ON)
 if(VSH_STATIC AND NOT VSH_SANITIZE)
-  add_library(vdbshade_static STATIC $<TARGET_OBJECTS:vdbshade_objects> $<TARGET_OBJECTS:vdbshade_openvdb_objects>)
+  add_library(vdbshade_static STATIC $<TARGET_OBJECTS:vdbshade_objects> $<TARGET_OBJECTS:vdbshade_openvdb_objects>
+              $<TARGET_OBJECTS:vdbshade_importers_objects>)
   foreach(found openvdb half png assimp draco meshoptimizer jansson md sleef seccomp)
     cmake_path(GET VSH_${found}_LIBRARY FILENAME file)
     string(REGEX REPLACE "^lib(.*)\\.(so|a|dylib)$" "\\1" file ${file})

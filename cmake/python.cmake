@@ -26,7 +26,7 @@ foreach(source ${sources})
   list(APPEND made ${VSH_PYTHON_FOLDER}/${source})
 endforeach()
 add_custom_target(vdbshade_python ALL DEPENDS ${made})
-add_dependencies(vdbshade_python vdbshade vdbshade_oiio vdbshade_openvdb vdbshade_reader)
+add_dependencies(vdbshade_python vdbshade ${VSH_MODULES} vdbshade_reader)
 
 # Where the library is, from the package's folder. Debian's Python looks for packages of its own in lib/python3, under
 # /usr/local in a folder of its version.

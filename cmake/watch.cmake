@@ -53,6 +53,7 @@ endfunction()
 
 vsh_add_watched(vdbshade_objects ${VSH_SOURCES})
 vsh_add_watched(vdbshade_cli_objects ${VSH_CLI_SOURCES})
+vsh_add_watched(vdbshade_importers_objects ${VSH_IMPORTERS_SOURCES})
 foreach(watch ${VSH_WATCHES})
   vsh_add_kernels(${watch}.vdbshade_objects)
 endforeach()
@@ -72,13 +73,13 @@ function(vsh_add_program name watch)
   target_compile_definitions(${name} PRIVATE VSH_ASSETS="${PROJECT_SOURCE_DIR}/assets"
                              VSH_MODELS="${PROJECT_SOURCE_DIR}/tests/models"
                              VSH_DOCS="${PROJECT_SOURCE_DIR}/docs")
-  foreach(library vdbshade_objects ${given_LIBRARIES})
+  foreach(library vdbshade_objects vdbshade_importers_objects ${given_LIBRARIES})
     if(watch AND TARGET ${watch}.${library})
       set(library ${watch}.${library})
     endif()
     target_link_libraries(${name} PRIVATE ${library})
   endforeach()
-  target_link_libraries(${name} PRIVATE vdbshade_openvdb_objects vsh::openvdb vsh::dependencies)
+  target_link_libraries(${name} PRIVATE vdbshade_openvdb_objects vsh::openvdb vsh::assimp vsh::draco vsh::dependencies)
   add_dependencies(${name} vdbshade_oiio) # which is loaded, not linked
   set_target_properties(${name} PROPERTIES LINKER_LANGUAGE CXX)
   foreach(call ${given_WRAP})

@@ -22,7 +22,7 @@ has() { # COMPONENT FILE …: it has them, and no other has
         [ -n "$(find "$work/$1" -path "$work/$1/$file" -print -quit)" ] || { echo "components: $1 has no $file" && exit 1; }
     done
 }
-has library '*/libvdbshade.so.*' '*/vdbshade/libvdbshade_openvdb.so.*' '*/vdbshade/libvdbshade_oiio.so.*' 'libexec/vdbshade/vdbshade-reader'
+has library '*/libvdbshade.so.*' '*/vdbshade/libvdbshade_openvdb.so.*' '*/vdbshade/libvdbshade_oiio.so.*' '*/vdbshade/libvdbshade_importers.so.*' 'libexec/vdbshade/vdbshade-reader'
 has development '*/libvdbshade.so' '*/libvdbshade.a' include/vdbshade/vdbshade.h '*/vdbshade.pc' '*/vdbshade-config.cmake'
 has program bin/vdbshade share/man/man1/vdbshade.1 share/man/man1/vdbshade-bake.1 share/bash-completion/completions/vdbshade \
     share/zsh/site-functions/_vdbshade share/fish/vendor_completions.d/vdbshade.fish

@@ -19,7 +19,7 @@ VSHI_SHARED vsh_result vshi_input_open(const char *path, const char *name, uint6
 
 /* Whether a file that `model` names lies in the model's folder or below, links followed; where the model is a
  * link, the folder of what it leads to is as good. A file that is not there lies nowhere else: true. */
-bool vshi_input_is_beside(const char *model, const char *path);
+VSHI_SHARED bool vshi_input_is_beside(const char *model, const char *path);
 
 #ifdef __cplusplus
 }

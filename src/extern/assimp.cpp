@@ -143,6 +143,16 @@ const aiScene *vshi_import_scene(const vshi_import *import) {
     return import->scene;
 }
 
+float vshi_import_opacity(const aiScene *scene, unsigned material) {
+    float opacity = 1.0F;
+    scene->mMaterials[material]->Get(AI_MATKEY_OPACITY, opacity);
+    return opacity;
+}
+
+bool vshi_import_material_name(const aiScene *scene, unsigned material, aiString *name) {
+    return scene->mMaterials[material]->Get(AI_MATKEY_NAME, *name) == aiReturn_SUCCESS && name->length > 0;
+}
+
 void vshi_import_free(vshi_import *import) {
     delete import;
 }

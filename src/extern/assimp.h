@@ -10,6 +10,7 @@ extern "C" {
 #endif
 
 struct aiScene;
+struct aiString;
 typedef struct vshi_import vshi_import;
 
 /* Reads the file as it is: polygons stay polygons, nothing is joined, generated or transformed. What the file
@@ -24,6 +25,10 @@ double vshi_import_unit(const vshi_import *import);
 
 /* Belongs to the import. */
 const struct aiScene *vshi_import_scene(const vshi_import *import);
+
+/* Of a material of it: 1 where it tells none; false where it tells no name. */
+float vshi_import_opacity(const struct aiScene *scene, unsigned material);
+bool vshi_import_material_name(const struct aiScene *scene, unsigned material, struct aiString *name);
 
 void vshi_import_free(vshi_import *import); /* NULL does nothing */
 

@@ -46,10 +46,10 @@ static bool has_room(size_t bytes) {
 /* What throws while libraries are loaded (their statics, refused memory or a thread) is caught by nobody and
  * ends the process: what they take is asked for before. */
 static vsh_result check_room(const vshi_module *module, vsh_error *error) {
-    if (!vshi_threads_left(VSHI_OPENVDB_THREADS)) {
+    if (module->threads > 0 && !vshi_threads_left(module->threads)) {
         return vshi_fail(error, VSH_ERROR_MEMORY,
                          "threads: the system refuses the %d that OpenVDB's libraries begin; %s need it",
-                         VSHI_OPENVDB_THREADS, module->what);
+                         module->threads, module->what);
     }
     return has_room(module->room)
                ? VSH_OK

@@ -11,13 +11,14 @@ typedef struct vshi_module {
     const char *file;   /* looked for beside this library, and then as every library is */
     const char *symbol; /* its table, whose first member is the version of the headers it was built with */
     size_t room;        /* bytes that loading it takes */
+    int32_t threads;    /* that its libraries begin */
     pthread_mutex_t lock;
     _Atomic(const void *) table;
 } vshi_module;
 
-#define VSHI_MODULE(what, name, room)                                                                        \
+#define VSHI_MODULE(what, name, room, threads)                                                               \
     {                                                                                                        \
-        what, "libvdbshade_" name ".so." VSHI_SOVERSION, "vshi_" name "_module", room,                       \
+        what, "libvdbshade_" name ".so." VSHI_SOVERSION, "vshi_" name "_module", room, threads,              \
             PTHREAD_MUTEX_INITIALIZER, NULL                                                                  \
     }
 

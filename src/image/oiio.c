@@ -2,11 +2,12 @@
  * longer to load (0.2 s) than a small bake takes, and most runs read and write EXR and PNG alone. */
 #include "image/oiio.h"
 
+#include "base/threads.h"
 #include "base/try.h"
 #include "extern/module.h"
 #include "image/oiio_table.h"
 
-static vshi_module module = VSHI_MODULE("images of this kind", "oiio", 128 << 20);
+static vshi_module module = VSHI_MODULE("images of this kind", "oiio", 128 << 20, VSHI_OPENVDB_THREADS);
 
 static const vshi_oiio_table *at(void) {
     return vshi_module_table(&module);

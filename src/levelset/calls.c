@@ -1,9 +1,10 @@
 /* OpenVDB is loaded when the first level set is made or read: loading it takes ten times as long as all other
  * libraries together (30 ms, 20 MB), and one of its own, liblog4cplus, begins threads in whoever loads it. */
 #include "levelset/calls.h"
+#include "base/threads.h"
 #include "extern/module.h"
 
-static vshi_module module = VSHI_MODULE("level sets", "openvdb", 48 << 20);
+static vshi_module module = VSHI_MODULE("level sets", "openvdb", 48 << 20, VSHI_OPENVDB_THREADS);
 
 static const vshi_openvdb_table *at(void) {
     return vshi_module_table(&module);

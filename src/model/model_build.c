@@ -1,6 +1,7 @@
 /* From Assimp's scene to a model: arrays, polygons cut into triangles, skins at rest, places. */
 #include "base/memory.h"
 #include "base/try.h"
+#include "extern/assimp.h"
 #include "mesh/mesh.h"
 #include "model/faces.h"
 #include "model/model.h"
@@ -73,11 +74,8 @@ static vsh_result copy_faces(const vshi_model_source *source, const struct aiMes
 }
 
 static int32_t alpha_of(const struct aiScene *scene, const struct aiMesh *mesh) {
-    float opacity = 1.0F;
     return mesh->mMaterialIndex < scene->mNumMaterials &&
-                   aiGetMaterialFloat(scene->mMaterials[mesh->mMaterialIndex], AI_MATKEY_OPACITY, &opacity) ==
-                       aiReturn_SUCCESS &&
-                   opacity < 1.0F
+                   vshi_import_opacity(scene, mesh->mMaterialIndex) < 1.0F
                ? VSH_ALPHA_BLENDED
                : VSH_ALPHA_OPAQUE;
 }
@@ -175,8 +173,7 @@ static vsh_result copy_materials(const vshi_model_source *source, vsh_model *mod
     }
     for (unsigned i = 0; i < scene->mNumMaterials; ++i) {
         struct aiString name;
-        if (aiGetMaterialString(scene->mMaterials[i], AI_MATKEY_NAME, &name) == aiReturn_SUCCESS &&
-            name.length > 0) {
+        if (vshi_import_material_name(scene, i, &name)) {
             VSHI_TRY(vshi_model_copy_line(name.data, &model->materials[i].name, error));
         }
     }

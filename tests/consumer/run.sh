@@ -130,6 +130,14 @@ mv "$library"/vdbshade/libvdbshade_openvdb.so.* "$work"
 LD_LIBRARY_PATH=$library "$work/quiet" without
 "$prefix/bin/vdbshade" info "$work/a.obj" >/dev/null
 mv "$work"/libvdbshade_openvdb.so.* "$library"/vdbshade
+mv "$library"/vdbshade/libvdbshade_importers.so.* "$work"
+"$prefix/bin/vdbshade" info "$work/a.obj" >/dev/null
+"$prefix/bin/vdbshade" info "$here/../models/scene.stl" >/dev/null 2>"$work/refused" && {
+    echo "an STL was read without the module of importers" >&2
+    exit 1
+}
+grep -q "models of this kind: need a module that cannot be had: .*libvdbshade_importers.so" "$work/refused"
+mv "$work"/libvdbshade_importers.so.* "$library"/vdbshade
 
 say "a host with OpenVDB grids of its own"
 eval "$cxx -std=c++17 -O1 '$here/grids.cpp' -o '$work/grids' $(pkg-config --cflags --libs vdbshade) -lopenvdb -ltbb \
