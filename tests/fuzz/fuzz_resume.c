@@ -14,13 +14,13 @@
 #include <vdbshade/vdbshade.h>
 
 enum { WIDTH = 6, BAND = 8, BANDS = 3, HEIGHT = BAND * BANDS - 2, MESHES = 2, ERRORS = 3, MOST = 1 << 16 };
-enum { TEXELS = WIDTH * BAND };
+enum { TEXELS = WIDTH * BAND, KEPT = 56 }; /* bytes of a texel of a part that leaves AO */
 
 /* A lightmap's bands as they are baked, and the file that keeps them all. */
 typedef struct source {
     vshi_channels channels;
     uint32_t known[TEXELS];
-    vshi_ao_shot shots[TEXELS];
+    unsigned char kept[TEXELS * KEPT];
     uint64_t invalid_by_mesh[MESHES];
     vsh_bake_error errors[ERRORS];
     unsigned char *bytes;
@@ -32,6 +32,11 @@ static char output[512];
 
 static int32_t rows_of(int band) {
     return band + 1 < BANDS ? BAND : HEIGHT - band * BAND;
+}
+
+/* Bytes that are kept of a band's AO. */
+static size_t kept_bytes(const source *s, int band) {
+    return s->channels.kept != NULL ? (size_t)WIDTH * (size_t)rows_of(band) * KEPT : 0;
 }
 
 static vshi_resume_key key_of(const source *s) {
@@ -61,8 +66,8 @@ static void bake(source *s, int band, vsh_bake_stats *stats) {
         }
     }
     memset(s->known, band + 1, sizeof s->known);
-    memset(s->shots, band + 2, sizeof s->shots);
-    s->channels.shot_rows = s->channels.shots != NULL ? (size_t)rows_of(band) : 0;
+    memset(s->kept, band + 2, sizeof s->kept);
+    s->channels.kept_bytes = kept_bytes(s, band);
     stats->texels = (uint64_t)band * 10 + 1;
     stats->shade.rays = 7;
     s->invalid_by_mesh[1] = (uint64_t)band;
@@ -70,7 +75,7 @@ static void bake(source *s, int band, vsh_bake_stats *stats) {
 
 /* Whether there is a band to take. */
 static bool take(source *s, vshi_resume *resume, int band, vsh_bake_stats *stats) {
-    s->channels.shot_rows = s->channels.shots != NULL ? (size_t)rows_of(band) : 0;
+    s->channels.kept_bytes = kept_bytes(s, band);
     return vshi_resume_take(resume, band * BAND, rows_of(band), &s->channels, stats, MESHES);
 }
 
@@ -97,9 +102,9 @@ static size_t load(unsigned char *bytes) {
 /* Bytes of what a band's sum is of. */
 static size_t payload(const source *s, int band) {
     const size_t each = (size_t)s->channels.image.channel_count * sizeof(float) +
-                        (s->channels.known != NULL ? sizeof s->known[0] : 0) +
-                        (s->channels.shots != NULL ? sizeof s->shots[0] : 0);
-    return sizeof s->invalid_by_mesh + (size_t)WIDTH * (size_t)rows_of(band) * each + sizeof s->errors;
+                        (s->channels.known != NULL ? sizeof s->known[0] : 0);
+    return sizeof s->invalid_by_mesh + (size_t)WIDTH * (size_t)rows_of(band) * each + kept_bytes(s, band) +
+           sizeof s->errors;
 }
 
 static void make_source(source *s, bool part) {
@@ -111,7 +116,7 @@ static void make_source(source *s, bool part) {
         abort();
     }
     s->channels.known = part ? s->known : NULL;
-    s->channels.shots = part ? s->shots : NULL;
+    s->channels.kept = part ? s->kept : NULL;
     const vsh_run run = fuzz_run();
     vshi_resume resume;
     vsh_bake_stats stats = stats_of(s);

@@ -1,0 +1,97 @@
+/* Lightmaps that are baked in two parts and merged into arrays. */
+#ifndef TEST_PARTS_H
+#define TEST_PARTS_H
+
+#include "floor_under_ball.h"
+
+enum { SIZE = 48, SHARDS = 2, CHANNELS = 12 };
+
+/* Rows as they come. */
+typedef struct taken {
+    float values[CHANNELS][SIZE * SIZE];
+    int32_t rows, channels;
+} taken;
+
+static inline vsh_result begin(void *user, const vsh_job_lightmap *lightmap, const vsh_image *image,
+                               vsh_error *error) {
+    (void)lightmap;
+    (void)error;
+    taken *t = user;
+    t->rows = 0;
+    t->channels = image->channel_count;
+    assert_in_range(image->channel_count, 1, CHANNELS);
+    return VSH_OK;
+}
+
+static inline vsh_result add(void *user, int32_t rows, const float *const *planes, vsh_error *error) {
+    (void)error;
+    taken *t = user;
+    assert_true(t->rows + rows <= SIZE);
+    for (int32_t c = 0; c < t->channels; ++c) {
+        memcpy(t->values[c] + t->rows * SIZE, planes[c], (size_t)rows * SIZE * sizeof(float));
+    }
+    t->rows += rows;
+    return VSH_OK;
+}
+
+static inline vsh_result end(void *user, vsh_result result, vsh_error *error) {
+    (void)user;
+    (void)error;
+    return result;
+}
+
+static inline vsh_row_sink sink_of(taken *t) {
+    return (vsh_row_sink){sizeof(vsh_row_sink), begin, add, end, t};
+}
+
+static inline void bake_parts_of(const case_scene *c, double least) {
+    static const char *const words[] = {"one", "", "three words"};
+    for (int32_t i = 1; i <= SHARDS; ++i) {
+        vsh_bake_job_options options = vsh_bake_job_options_default();
+        options.shard = i;
+        options.shard_count = SHARDS;
+        options.shard_least = least;
+        options.words = words;
+        options.word_count = 3;
+        vsh_error error;
+        assert_ok(vsh_bake_scene(&c->scene, &options, NULL, NULL, &error), &error);
+    }
+}
+
+static inline void bake_parts(const case_scene *c) {
+    bake_parts_of(c, 0.0);
+}
+
+static inline vsh_result merge(const case_scene *c, taken *t, const vsh_run *run, vsh_error *error) {
+    const vsh_row_sink sink = sink_of(t);
+    vsh_bake_job_options options = vsh_bake_job_options_default();
+    options.sink = &sink;
+    vsh_bake_job *job = NULL;
+    vsh_result result = vsh_bake_job_create(&c->scene, &options, run, &job, error);
+    result = result == VSH_OK ? vsh_bake_job_merge(job, run, error) : result;
+    vsh_bake_job_free(job);
+    return result;
+}
+
+/* The ball becomes a wall that stands on the floor, to which rays of AO go that texels share. `made`: with
+ * all that is made of AO. */
+static inline void fill_traced(case_scene *c, char wall[300], bool made) {
+    fill(c, SIZE, 0.4);
+    snprintf(wall, 300, "%s", at("wall.obj"));
+    FILE *file = fopen(wall, "wb");
+    assert_non_null(file);
+    fprintf(file, "v -2 -1 0\nv 1 -1 0\nv 1 1 0.5\nv -2 1 0.5\nf 1 2 3\nf 1 3 4\n");
+    assert_int_equal(fclose(file), 0);
+    c->caster.type = VSH_CASTER_MESH;
+    c->caster.path = wall;
+    c->caster.transform[7] = 0.0;
+    c->receiver.ao_spacing = 2;
+    c->scene.irradiance = made;
+    c->scene.bent = made ? 1 + VSH_BENT_TANGENT : 0;
+    c->scene.planes.sky = made ? VSH_UP_Y : VSH_UP_NONE;
+    c->scene.error = 1;
+    c->scene.shade.method = VSH_SHADOW_EXACT;
+    c->scene.shade.ao_method = VSH_AO_EXACT;
+}
+
+#endif

@@ -1,0 +1,216 @@
+/* Parts of strangers, of lightmaps and of volumes: no file makes merging do worse than fail. */
+#include "base/part_file.h"
+#include "base/part_sum.h"
+#include "parts.h"
+
+typedef struct bytes {
+    unsigned char *at;
+    size_t size;
+} bytes;
+
+static bytes read_file(const char *path) {
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    fseek(file, 0, SEEK_END);
+    bytes b = {.size = (size_t)ftell(file)};
+    rewind(file);
+    b.at = malloc(b.size);
+    assert_non_null(b.at);
+    assert_int_equal(fread(b.at, 1, b.size, file), b.size);
+    fclose(file);
+    return b;
+}
+
+/* With a checksum that is right. */
+static void write_file(const char *path, const bytes *b) {
+    const size_t body = b->size - sizeof(uint64_t);
+    const uint64_t sum = vshi_part_sum(VSHI_PART_SUM, b->at, body);
+    memcpy(b->at + body, &sum, sizeof sum);
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(b->at, 1, b->size, file), b->size);
+    assert_int_equal(fclose(file), 0);
+}
+
+typedef vsh_result merge_fn(void *user, vsh_error *error);
+
+/* Changes every byte of the head, of the tail, and some of what lies between, to what is worst for a number
+ * of it. What is refused is refused by the part's name. */
+static void try_all(const char *path, merge_fn *merge_it, void *user) {
+    static const unsigned char worst[] = {0x00, 0x01, 0x7f, 0x80, 0xff};
+    const bytes good = read_file(path);
+    bytes bad = {malloc(good.size), good.size};
+    assert_non_null(bad.at);
+    vshi_part_front front;
+    memcpy(&front, good.at, sizeof front);
+    const size_t head = sizeof front + (size_t)front.head_bytes;
+    const size_t tail = good.size - sizeof(uint64_t) - (size_t)front.tail_bytes;
+    size_t refused = 0, taken_all_the_same = 0;
+    for (size_t at = 0; at < good.size - sizeof(uint64_t); at += at < head
+                                                                     ? 1 + (at > sizeof front ? at % 3 : 0)
+                                                                 : at < tail ? (tail - head) / 30 + 1
+                                                                             : 5) {
+        memcpy(bad.at, good.at, good.size);
+        bad.at[at] = worst[at % sizeof worst] != good.at[at] ? worst[at % sizeof worst] : 0xaa;
+        write_file(path, &bad);
+        vsh_error error = {VSH_OK, ""};
+        const vsh_result result = merge_it(user, &error);
+        if (result == VSH_OK) {
+            ++taken_all_the_same; /* a value, a count, a text of nobody's */
+        } else if ((result != VSH_ERROR_INPUT && result != VSH_ERROR_READ && result != VSH_ERROR_LIMIT) ||
+                   strstr(error.message, strrchr(path, '/') + 1) == NULL) {
+            fail_msg("byte %zu: %s '%s'", at, vsh_result_name(result), error.message);
+        } else {
+            ++refused;
+        }
+    }
+    assert_true(refused > 100 && taken_all_the_same > 10);
+    memcpy(bad.at, good.at, good.size);
+    write_file(path, &bad);
+    vsh_error error;
+    assert_ok(merge_it(user, &error), &error);
+    free(bad.at);
+    free(good.at);
+}
+
+typedef struct bake_case {
+    case_scene *scene;
+    taken *rows;
+    vsh_run run;
+} bake_case;
+
+static vsh_result merge_bake(void *user, vsh_error *error) {
+    const bake_case *c = user;
+    return merge(c->scene, c->rows, &c->run, error);
+}
+
+static void no_part_of_a_lightmap_does_worse_than_fail(void **state) {
+    (void)state;
+    case_scene c;
+    fill(&c, SIZE, 0.4);
+    bake_parts(&c);
+    bake_case one = {&c, calloc(1, sizeof(taken)), vsh_run_default()};
+    assert_non_null(one.rows);
+    one.run.memory_limit = 64 << 20;
+    one.run.threads = 1;
+    try_all(at("floor.exr.2-of-2.part"), merge_bake, &one);
+    free(one.rows);
+}
+
+static void no_part_that_leaves_ao_does_worse_than_fail(void **state) {
+    (void)state;
+    case_scene c;
+    char wall[300];
+    if (!vsh_triangles_available()) {
+        return;
+    }
+    fill_traced(&c, wall, true);
+    bake_parts(&c);
+    bake_case one = {&c, calloc(1, sizeof(taken)), vsh_run_default()};
+    assert_non_null(one.rows);
+    one.run.memory_limit = 64 << 20;
+    one.run.threads = 1;
+    try_all(at("floor.exr.2-of-2.part"), merge_bake, &one);
+    free(one.rows);
+}
+
+/* Sky for AO, of as many bytes: what is kept is not what these channels are finished by. */
+static void kinds_of_other_channels_are_refused(void **state) {
+    (void)state;
+    case_scene c;
+    char wall[300];
+    if (!vsh_triangles_available()) {
+        return;
+    }
+    fill_traced(&c, wall, false);
+    bake_parts(&c);
+    const char *path = at("floor.exr.2-of-2.part");
+    const bytes good = read_file(path);
+    vshi_part_front front;
+    memcpy(&front, good.at, sizeof front);
+    taken *rows = calloc(1, sizeof *rows);
+    assert_non_null(rows);
+    size_t refused = 0;
+    for (size_t i = sizeof front; i < sizeof front + (size_t)front.head_bytes; ++i) {
+        if (good.at[i] != 1) {
+            continue;
+        }
+        vsh_error error = {VSH_OK, ""};
+        good.at[i] = 2;
+        write_file(path, &good);
+        good.at[i] = 1;
+        merge(&c, rows, NULL, &error);
+        refused += strstr(error.message, "2-of-2.part: damaged: rays of AO of other channels") != NULL;
+    }
+    assert_int_equal(refused, 1);
+    free(rows);
+    free(good.at);
+}
+
+typedef struct volume_case {
+    vsh_voxels *voxels;
+    vsh_light sun;
+    vsh_volume_options options;
+    vsh_part_options parts;
+    vsh_run run;
+} volume_case;
+
+static vsh_result merge_volume(void *user, vsh_error *error) {
+    const volume_case *c = user;
+    vsh_volume *volume = NULL;
+    const vsh_result result =
+        vsh_volume_merge(c->voxels, &c->sun, 1, &c->options, &c->parts, &c->run, &volume, NULL, error);
+    vsh_volume_free(volume);
+    return result;
+}
+
+static void no_part_of_a_volume_does_worse_than_fail(void **state) {
+    (void)state;
+    vsh_sdf_node ball = vsh_sdf_node_default();
+    ball.radius = 0.5;
+    const vsh_sdf sdf = {&ball, 1};
+    static const double low[3] = {-1, -1, -1}, high[3] = {1, 1, 1};
+    static const vsh_attribute attribute = {"of", "a ball"};
+    char name[300];
+    snprintf(name, sizeof name, "%s", at("ball.vdb"));
+    vsh_grid_options resolution = vsh_grid_options_default();
+    resolution.resolution = 16;
+    vsh_error error;
+    vsh_grid *grid = NULL;
+    vsh_occluders *occluders = NULL;
+    volume_case c = {.sun = vsh_light_default(),
+                     .options = vsh_volume_options_default(),
+                     .parts = vsh_part_options_default(),
+                     .run = vsh_run_default()};
+    c.run.memory_limit = 64 << 20;
+    c.run.threads = 1;
+    assert_ok(vsh_grid_from_sdf(&sdf, &resolution, NULL, &grid, &error), &error);
+    assert_ok(vsh_occluders_from_grid(grid, NULL, NULL, &occluders, &error), &error);
+    assert_ok(vsh_voxels_from_box(low, high, 0.1, NULL, &c.voxels, &error), &error);
+    c.parts.parts = name;
+    c.parts.shard_count = SHARDS;
+    c.parts.attributes = &attribute;
+    c.parts.attribute_count = 1;
+    for (c.parts.shard = 1; c.parts.shard <= SHARDS; ++c.parts.shard) {
+        assert_ok(
+            vsh_bake_volume_part(occluders, c.voxels, &c.sun, 1, &c.options, &c.parts, NULL, NULL, &error),
+            &error);
+    }
+    try_all(at("ball.vdb.2-of-2.part"), merge_volume, &c);
+    vsh_occluders_info casters;
+    assert_ok(vsh_volume_part_casters(name, 0, NULL, &casters, &error), &error);
+    assert_true(casters.voxel_size > 0.0);
+    vsh_voxels_free(c.voxels);
+    vsh_occluders_free(occluders);
+    vsh_grid_free(grid);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(no_part_of_a_lightmap_does_worse_than_fail),
+        cmocka_unit_test(no_part_that_leaves_ao_does_worse_than_fail),
+        cmocka_unit_test(kinds_of_other_channels_are_refused),
+        cmocka_unit_test(no_part_of_a_volume_does_worse_than_fail),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
