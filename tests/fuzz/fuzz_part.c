@@ -18,16 +18,16 @@ static const char floor_text[] = "v -2 0 -2\nv 2 0 -2\nv 2 0 2\nv -2 0 2\nvt 0 1
                                  "f 1/1 3/3 2/2\nf 1/1 4/4 3/3\n";
 static const char wall_text[] = "v -2 -1 0\nv 1 -1 0\nv 1 1 0.5\nv -2 1 0.5\nf 1 2 3\nf 1 3 4\n";
 
-/* Light that is made of AO; and AO that parts leave. */
+/* Light that is made of AO by cones; and AO that parts leave, with all that is made of it. */
 static const char *const scenes[] = {
     "{\"casters\":[{\"sdf\":{\"shape\":\"sphere\",\"radius\":0.7}}],\"resolution\":16,\"irradiance\":true,"
     "\"method\":\"cone\","
     "\"lights\":[{\"name\":\"sun\",\"type\":\"directional\",\"direction\":[0,1,0],\"angle_deg\":5}],"
     "\"ao\":{\"distance\":1,\"method\":\"cones\"},"
     "\"receivers\":[{\"mesh\":\"floor.obj\",\"size\":[16,40],\"padding\":2,\"output\":\"0.exr\"}]}",
-    "{\"casters\":[{\"mesh\":\"wall.obj\"}],\"error\":true,"
+    "{\"casters\":[{\"mesh\":\"wall.obj\"}],\"error\":true,\"irradiance\":true,\"sky\":\"y\","
     "\"lights\":[{\"name\":\"sun\",\"type\":\"directional\",\"direction\":[0,1,0],\"angle_deg\":5}],"
-    "\"ao\":{\"distance\":1,\"method\":\"exact\"},"
+    "\"ao\":{\"distance\":1,\"method\":\"exact\",\"bent_normals\":\"tangent\"},"
     "\"receivers\":[{\"mesh\":\"floor.obj\",\"size\":[16,40],\"ao_spacing\":2,\"output\":\"1.exr\"}]}"};
 
 enum { BAKES = sizeof scenes / sizeof scenes[0], VOLUME = BAKES, KINDS };
