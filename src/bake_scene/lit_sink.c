@@ -177,8 +177,11 @@ static vsh_result add(void *user, int32_t rows, const float *const *planes, vsh_
     vshi_lit_sink *lit = user;
     const size_t width = (size_t)lit->lightmap->width, count = (size_t)rows * width;
     for (int p = 0; p < PLANES; ++p) {
-        float *to = lit->page.planes[p] + (lit->page.planes[p] != NULL ? (size_t)lit->rows * width : 0);
-        for (size_t i = 0; i < count && lit->page.planes[p] != NULL; ++i) {
+        if (lit->page.planes[p] == NULL) {
+            continue;
+        }
+        float *to = lit->page.planes[p] + (size_t)lit->rows * width;
+        for (size_t i = 0; i < count; ++i) {
             float sum = 0.0F;
             for (int32_t s = 0; s < lit->source_count[p]; ++s) {
                 sum += planes[lit->sources[p][s]][i];
