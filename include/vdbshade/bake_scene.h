@@ -108,7 +108,7 @@ typedef struct vsh_bake_job_options {
 static inline vsh_bake_job_options vsh_bake_job_options_default(void) {
     vsh_bake_job_options options = {
         sizeof(vsh_bake_job_options), 0,    0, 0, 0,    NULL, NULL, NULL, NULL, 0, NULL, NULL, NULL, 0,
-        VSH_LIT_IMAGES_AUTO,          NULL, 0, 0, NULL, NULL, 0,    0,    0.5};
+        VSH_LIT_IMAGES_AUTO,          NULL, 0, 0, NULL, NULL, 0,    0,    0.4};
     return options;
 }
 

@@ -28,8 +28,9 @@ static const double CROWDED = 0.38, FEW_TRIANGLES = 0.01;
 static const double ALONE = 4000.0, ALONE_HALF_OPEN = 8000.0;
 /* The error that these are of, and the least that is asked of the few. */
 static const double COMMON = 0.02, COARSE = 0.1;
-/* Where nothing was looked at yet: texels in a penumbra, and AO of a texel that shares it or has its own. */
-static const double USUAL_PENUMBRA = 0.05, USUAL_SHARED = 1500.0, USUAL_ALONE = 5000.0;
+/* Where nothing was looked at yet: texels in a penumbra, and AO of a texel that shares it or has its own,
+ * rather too little. */
+static const double USUAL_PENUMBRA = 0.05, USUAL_SHARED = 1050.0, USUAL_ALONE = 5000.0;
 /* What rays take more where they are marched, rather too much than too little. */
 static const double MARCHED = 10.0;
 

@@ -60,7 +60,7 @@ static const cli_option options[] = {
     {KEY_SHARD_LEAST, "shard-least", "SECONDS",
      "work that a part has at least: where there is less for\neach, the last parts have nothing to do; 0: "
      "all "
-     "have some;\nthe same for all parts (0.5)"},
+     "have some;\nthe same for all parts (0.4)"},
     {0, NULL, NULL, "Objects"},
     {KEY_RECEIVE, "receive", "NAME",
      "only objects of this name receive, all cast; * and ?\nmatch as in a shell; may be repeated"},
