@@ -32,7 +32,7 @@ static const double COMMON = 0.02, COARSE = 0.1;
  * rather too little. */
 static const double USUAL_PENUMBRA = 0.05, USUAL_SHARED = 1050.0, USUAL_ALONE = 5000.0;
 /* What rays take more where they are marched, rather too much than too little. */
-static const double MARCHED = 10.0;
+static const double MARCHED = 25.0;
 
 /* The few texels of a lightmap, shaded. */
 typedef struct shaded {
