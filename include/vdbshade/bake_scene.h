@@ -99,9 +99,9 @@ typedef struct vsh_bake_job_options {
     int32_t forecast;   /* nonzero: only what vsh_bake_job_forecast() tells is asked for, and the folders of
                            outputs need not be there */
     double shard_least; /* seconds of one thread, 0 … 1e9, that the rows of a shard are to take at least, as
-                           far as lightmaps' sizes, lights and errors tell: what every shard makes for itself
-                           should be little beside it. Where there is not so much for all shards, the last
-                           ones have no rows, and their jobs no lightmaps: they read no file, and their parts
+                           far as lightmaps' sizes, lights and errors tell; the borders of AO between shards
+                           take a tenth at most. Where there is not so much for all shards, the last ones
+                           have no rows, and their jobs no lightmaps: they read no file, and their parts
                            say so. 0: all have rows */
 } vsh_bake_job_options;
 

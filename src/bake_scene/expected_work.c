@@ -33,6 +33,9 @@ static const double COMMON = 0.02, COARSE = 0.1;
 static const double USUAL_PENUMBRA = 0.05, USUAL_SHARED = 1050.0, USUAL_ALONE = 5000.0;
 /* What rays take more where they are marched, rather too much than too little. */
 static const double MARCHED = 25.0;
+/* What a border costs, in rows for each texel of spacing between those that share AO, and where it is
+ * interpolated instead; and what all borders may take. */
+static const double SHARED_ROWS = 1.5, MARCHED_ROWS = 2.5, MOST_BORDERS = 0.1;
 
 /* The few texels of a lightmap, shaded. */
 typedef struct shaded {
@@ -195,10 +198,11 @@ static bool is_marched(const vsh_scene *scene) {
     return marched;
 }
 
-double vshi_shares_seconds(const vsh_scene *scene) {
-    const double finer = finer_of(scene) * (is_marched(scene) ? MARCHED : 1.0), openings = openings_of(scene);
+double vshi_shares_most(const vsh_scene *scene, double least) {
+    const bool marched = is_marched(scene);
+    const double finer = finer_of(scene) * (marched ? MARCHED : 1.0), openings = openings_of(scene);
     const double lights = (double)scene->light_count * (LIT + USUAL_PENUMBRA * finer * PENUMBRA);
-    double ns = 0.0;
+    double ns = 0.0, borders = 0.0;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         const vsh_receiver *receiver = &scene->receivers[i];
         if (!is_sized(receiver)) {
@@ -206,10 +210,12 @@ double vshi_shares_seconds(const vsh_scene *scene) {
         }
         const double across = receiver->supersample;
         const double points = (double)receiver->width * receiver->height * across * across;
-        const bool shares = receiver->supersample == 1 && receiver->ao_spacing > 1;
+        const bool shares = openings > 0.0 && receiver->supersample == 1 && receiver->ao_spacing > 1;
+        const double border = shares ? (marched ? MARCHED_ROWS : SHARED_ROWS) * receiver->ao_spacing : 1.0;
         ns += points * (LAID_OUT + VALID + lights + openings * finer * (shares ? USUAL_SHARED : USUAL_ALONE));
+        borders += MOST_BORDERS * receiver->height / border;
     }
-    return 1e-9 * ns;
+    return fmin(1e-9 * ns / least, 1.0 + borders);
 }
 
 vsh_result vshi_shares_weigh(const vsh_bake_job *job, vshi_share_rows *share, const vsh_run *run,

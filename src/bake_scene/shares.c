@@ -90,8 +90,8 @@ int32_t vsh_bake_job_shards(const vsh_scene *scene, const vsh_bake_job_options *
     if (own.sink == NULL) {
         vshi_lit_sink_scene(&baked);
     }
-    const double seconds = own.per_object != 0 ? INFINITY : vshi_shares_seconds(&baked);
-    const double most = own.shard_least > 0.0 ? floor(seconds / own.shard_least) : INFINITY;
+    const bool known = own.per_object == 0 && own.shard_least > 0.0;
+    const double most = known ? floor(vshi_shares_most(&baked, own.shard_least)) : INFINITY;
     return most >= own.shard_count ? own.shard_count : most > 1.0 ? (int32_t)most : 1;
 }
 

@@ -24,9 +24,9 @@ typedef struct vshi_share_rows {
     uint64_t all;   /* their sum */
 } vshi_share_rows;
 
-/* Seconds that a scene's lightmaps are expected to take, as far as it tells before a file is read; INFINITY
- * where UVs that are made tell how large they are. */
-double vshi_shares_seconds(const vsh_scene *scene);
+/* Shards that have `least` seconds of work each, as far as the scene tells before a file is read, and whose
+ * borders take a tenth of it at most; INFINITY where UVs that are made tell how large lightmaps are. */
+double vshi_shares_most(const vsh_scene *scene, double least);
 
 /* Keeps what shares of a measured lightmap are reckoned by. Errors: VSH_ERROR_MEMORY, VSH_ERROR_LIMIT,
  * VSH_ERROR_CANCELLED. */
