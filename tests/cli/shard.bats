@@ -182,7 +182,7 @@ load parts
     refused 3 none.field
     "$VDBSHADE" merge out.exr --quiet
     cmp one/out.exr out.exr
-    run -0 "$VDBSHADE" bake "${CLOISTER[@]}" -o out.exr --shard 64/64 --shard-least 1e-6 # the same for all parts
+    run -0 "$VDBSHADE" bake "${CLOISTER[@]}" -o out.exr --shard 64/64 --shard-least 0 # the same for all parts
     [[ $output != *"nothing to do"* ]]
     shade merge out.exr
     refused 2 "out.exr.64-of-64.part: is of other inputs or options"
