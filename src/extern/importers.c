@@ -9,26 +9,6 @@ static const vshi_importers_table *at(void) {
     return vshi_module_table(&module);
 }
 
-#define MAKE(name, parameters, arguments, none)                                                              \
-    vsh_result name parameters {                                                                             \
-        const vsh_result result = vshi_module_load(&module, error);                                          \
-        if (result == VSH_OK) {                                                                              \
-            return at()->name arguments;                                                                     \
-        }                                                                                                    \
-        *(none) = NULL;                                                                                      \
-        return result;                                                                                       \
-    }
-#define GIVE(result, name, parameters, arguments)                                                            \
-    result name parameters {                                                                                 \
-        return at()->name arguments;                                                                         \
-    }
-#define DO(name, parameters, arguments)                                                                      \
-    void name parameters {                                                                                   \
-        if (at() != NULL) {                                                                                  \
-            at()->name arguments;                                                                            \
-        }                                                                                                    \
-    }
-
-VSHI_IMPORTERS_MAKES(MAKE)
-VSHI_IMPORTERS_GIVES(GIVE)
-VSHI_IMPORTERS_DOES(DO)
+VSHI_IMPORTERS_MAKES(VSHI_PASS_MAKE)
+VSHI_IMPORTERS_GIVES(VSHI_PASS_GIVE)
+VSHI_IMPORTERS_DOES(VSHI_PASS_DO)

@@ -4,13 +4,12 @@
 
 #include "extern/assimp.h"
 #include "extern/draco.h"
+#include "extern/module_calls.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* Calls that return a vsh_result, which load the module: MAKE(name, parameters, arguments, what is set to
- * none where it cannot be had). The last parameter is `vsh_error *error`. */
 #define VSHI_IMPORTERS_MAKES(MAKE)                                                                           \
     MAKE(vshi_import_read,                                                                                   \
          (const char *path, bool outside, vshi_job *job, size_t units, vshi_import **import,                 \
@@ -20,7 +19,6 @@ extern "C" {
          (const unsigned char *bytes, size_t size, const char *what, vshi_draco **mesh, vsh_error *error),   \
          (bytes, size, what, mesh, error), mesh)
 
-/* Calls about what those have made. */
 #define VSHI_IMPORTERS_GIVES(GIVE)                                                                           \
     GIVE(double, vshi_import_unit, (const vshi_import *import), (import))                                    \
     GIVE(const struct aiScene *, vshi_import_scene, (const vshi_import *import), (import))                   \
@@ -35,7 +33,6 @@ extern "C" {
          (const vshi_draco *mesh, uint32_t id, int type, int components, void *values),                      \
          (mesh, id, type, components, values))
 
-/* The same without a result, which do nothing where there is no module, and so nothing to free. */
 #define VSHI_IMPORTERS_DOES(DO)                                                                              \
     DO(vshi_draco_indices, (const vshi_draco *mesh, uint32_t *indices), (mesh, indices))                     \
     DO(vshi_import_free, (vshi_import * import), (import))                                                   \
@@ -43,15 +40,9 @@ extern "C" {
 
 typedef struct vshi_importers_table {
     const char *version; /* of the header that it was built with */
-#define MAKE(name, parameters, arguments, none) vsh_result(*name) parameters;
-#define GIVE(result, name, parameters, arguments) result(*name) parameters;
-#define DO(name, parameters, arguments) void(*name) parameters;
-    VSHI_IMPORTERS_MAKES(MAKE)
-    VSHI_IMPORTERS_GIVES(GIVE)
-    VSHI_IMPORTERS_DOES(DO)
-#undef MAKE
-#undef GIVE
-#undef DO
+    VSHI_IMPORTERS_MAKES(VSHI_MEMBER_MAKE)
+    VSHI_IMPORTERS_GIVES(VSHI_MEMBER_GIVE)
+    VSHI_IMPORTERS_DOES(VSHI_MEMBER_DO)
 } vshi_importers_table;
 
 /* The module's one symbol. */

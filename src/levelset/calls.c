@@ -12,28 +12,6 @@ static const vshi_openvdb_table *at(void) {
 
 static int *const nothing = NULL;
 
-#define MAKE(name, parameters, arguments, none)                                                              \
-    vsh_result name parameters {                                                                             \
-        const vsh_result result = vshi_module_load(&module, error);                                          \
-        if (result == VSH_OK) {                                                                              \
-            return at()->name arguments;                                                                     \
-        }                                                                                                    \
-        if ((none) != NULL) {                                                                                \
-            *(none) = 0;                                                                                     \
-        }                                                                                                    \
-        return result;                                                                                       \
-    }
-#define GIVE(result, name, parameters, arguments)                                                            \
-    result name parameters {                                                                                 \
-        return at()->name arguments;                                                                         \
-    }
-#define DO(name, parameters, arguments)                                                                      \
-    void name parameters {                                                                                   \
-        if (at() != NULL) {                                                                                  \
-            at()->name arguments;                                                                            \
-        }                                                                                                    \
-    }
-
-VSHI_OPENVDB_MAKES(MAKE)
-VSHI_OPENVDB_GIVES(GIVE)
-VSHI_OPENVDB_DOES(DO)
+VSHI_OPENVDB_MAKES(VSHI_PASS_MAKE)
+VSHI_OPENVDB_GIVES(VSHI_PASS_GIVE)
+VSHI_OPENVDB_DOES(VSHI_PASS_DO)

@@ -3,6 +3,7 @@
 #ifndef VSHI_OPENVDB_TABLE_H
 #define VSHI_OPENVDB_TABLE_H
 
+#include "extern/module_calls.h"
 #include "levelset/leaves.h"
 #include "levelset/serve.h"
 #include "levelset/told.h"
@@ -15,8 +16,6 @@
 extern "C" {
 #endif
 
-/* Calls that return a vsh_result, the first of which loads the module: MAKE(name, parameters, arguments, what
- * is set to none where it cannot be had). The last parameter is `vsh_error *error`. */
 #define VSHI_OPENVDB_MAKES(MAKE)                                                                             \
     MAKE(vsh_grid_from_meshes,                                                                               \
          (const vsh_mesh *meshes, size_t count, const vsh_grid_options *options, const vsh_run *run,         \
@@ -130,8 +129,6 @@ extern "C" {
     MAKE(vshi_volume_close, (vsh_volume * volume, const vsh_volume_info *counts, vsh_error *error),          \
          (volume, counts, error), nothing)
 
-/* Calls with what those have made: GIVE(result, name, parameters, arguments), and DO(name, parameters,
- * arguments), which does nothing where there is no module yet, and so nothing to free. */
 #define VSHI_OPENVDB_GIVES(GIVE)                                                                             \
     GIVE(size_t, vshi_grid_leaves, (const vsh_grid *grid, vshi_leaf *leaves, size_t capacity),               \
          (grid, leaves, capacity))                                                                           \
@@ -174,15 +171,9 @@ extern "C" {
 
 typedef struct vshi_openvdb_table {
     const char *version; /* of the header that it was built with */
-#define MAKE(name, parameters, arguments, none) vsh_result(*name) parameters;
-#define GIVE(result, name, parameters, arguments) result(*name) parameters;
-#define DO(name, parameters, arguments) void(*name) parameters;
-    VSHI_OPENVDB_MAKES(MAKE)
-    VSHI_OPENVDB_GIVES(GIVE)
-    VSHI_OPENVDB_DOES(DO)
-#undef MAKE
-#undef GIVE
-#undef DO
+    VSHI_OPENVDB_MAKES(VSHI_MEMBER_MAKE)
+    VSHI_OPENVDB_GIVES(VSHI_MEMBER_GIVE)
+    VSHI_OPENVDB_DOES(VSHI_MEMBER_DO)
 } vshi_openvdb_table;
 
 /* The module's one symbol. */

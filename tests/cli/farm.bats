@@ -139,6 +139,13 @@ PROGRAM
     [[ $(head -1 asked) =~ --array=1-5\ --requeue\ .*--cpus-per-task=2\ --mem=([0-9]+)\ --time=2\ .*--partition=night\ .*part.sbatch\ bake\ box.obj ]]
     [ "${BASH_REMATCH[1]}" -ge 256 ] && [ "${BASH_REMATCH[1]}" -le 600 ]
     [[ $(tail -1 asked) == *"--dependency=afterok:7 "*"merge.sbatch out.exr 5" ]]
+    # a few parts have all the work: 4000 s of four
+    printf '#!/bin/sh\necho "$*" >words\necho "memory about 400 MiB"\necho "time about 4000 s: bake 4000 s"\necho "parts 4 of 64 have rows"\n' >told
+    chmod +x told
+    rm asked
+    run -0 env PATH="$PWD/bin:$PATH" VDBSHADE="$PWD/told" "$tools/submit" 64 bake box.obj -o out.exr
+    [[ $(head -1 asked) == *"--mem=856 --time=35 "* ]]
+    [[ $(cat words) == *"--shard 1/64 --dry-run"* ]]
     # of a trade memory and time are told, and what merge is to write
     rm asked
     run -2 env PATH="$PWD/bin:$PATH" "$tools/submit" 2 trade box.obj --sun 0,1,0 -o out.html

@@ -85,7 +85,7 @@ write_row() {
 
 @test "what tiles do not go with is refused" {
     write_row
-    for option in "--view page.html" "--invalid i.png" "--field x.field"; do
+    for option in "--view page.html" "--invalid i.png" "--field x.field" "--shard-least 1"; do
         run -2 "$VDBSHADE" bake row.json --tile-size 4 $option
         [[ "$output" == *"${option%% *}: not together with --tile-size"* ]]
     done

@@ -1,18 +1,23 @@
 /* Parts of lightmaps, by the library: what merging takes, and which parts have rows. */
 #include "parts.h"
 
+static void bake_whole(const case_scene *c, taken *rows, vsh_bake_report *report) {
+    const vsh_row_sink sink = sink_of(rows);
+    vsh_bake_job_options options = vsh_bake_job_options_default();
+    options.sink = &sink;
+    vsh_error error;
+    assert_ok(vsh_bake_scene(&c->scene, &options, NULL, report, &error), &error);
+}
+
 static void a_sink_takes_merged_rows_as_of_one_bake_and_words_come_back(void **state) {
     (void)state;
     case_scene c;
     fill(&c, SIZE, 0.4);
     taken *one = calloc(2, sizeof *one), *all = one + 1;
     assert_non_null(one);
-    const vsh_row_sink sink = sink_of(one);
-    vsh_bake_job_options options = vsh_bake_job_options_default();
-    options.sink = &sink;
     vsh_error error;
     vsh_bake_report report;
-    assert_ok(vsh_bake_scene(&c.scene, &options, NULL, &report, &error), &error);
+    bake_whole(&c, one, &report);
     assert_true(report.invalid_texels > 20 && report.invalid_texels < SIZE * SIZE / 2);
     bake_parts(&c);
     assert_ok(merge(&c, all, NULL, &error), &error);
@@ -45,11 +50,8 @@ static void what_parts_leave_of_ao_is_as_of_one_bake(void **state) {
         c.scene.ambient[2] = 0.75;
         taken *one = calloc(2, sizeof *one), *all = one + 1;
         assert_non_null(one);
-        const vsh_row_sink sink = sink_of(one);
-        vsh_bake_job_options options = vsh_bake_job_options_default();
-        options.sink = &sink;
         vsh_error error;
-        assert_ok(vsh_bake_scene(&c.scene, &options, NULL, NULL, &error), &error);
+        bake_whole(&c, one, NULL);
         bake_parts(&c);
         assert_ok(merge(&c, all, NULL, &error), &error);
         assert_int_equal(all->channels, made > 0 ? CHANNELS : 5);
@@ -123,6 +125,27 @@ static void what_is_marched_is_more_work_and_objects_of_their_own_are_not_known(
     assert_int_equal(lightmaps_of_second(&c, 0.02), 1);
 }
 
+/* Of 48 rows a tenth is 4.8: less than a border of AO that every fourth texel has, more than one of every
+ * second; where AO is interpolated borders cost more. */
+static void borders_of_ao_take_a_tenth_at_most(void **state) {
+    (void)state;
+    case_scene c;
+    char wall[300];
+    fill_traced(&c, wall, false);
+    c.receiver.ao_spacing = 4;
+    assert_int_equal(lightmaps_of_second(&c, 1e-9), 0);
+    c.receiver.ao_spacing = 2;
+    assert_int_equal(lightmaps_of_second(&c, 1e-9), 1);
+    fill(&c, SIZE, 0.4);
+    c.receiver.ao_spacing = 2;
+    assert_int_equal(lightmaps_of_second(&c, 1e-9), 0);
+    c.receiver.ao_spacing = 1;
+    assert_int_equal(lightmaps_of_second(&c, 1e-9), 1);
+    c.receiver.ao_spacing = 4;
+    c.scene.ao = 0;
+    assert_int_equal(lightmaps_of_second(&c, 1e-9), 1);
+}
+
 static void shards_that_are_told_otherwise_how_many_have_rows_are_refused(void **state) {
     (void)state;
     case_scene c;
@@ -168,6 +191,7 @@ int main(void) {
         cmocka_unit_test(what_parts_leave_of_ao_is_as_of_one_bake),
         cmocka_unit_test(a_shard_without_rows_reads_nothing_and_its_part_is_merged),
         cmocka_unit_test(what_is_marched_is_more_work_and_objects_of_their_own_are_not_known),
+        cmocka_unit_test(borders_of_ao_take_a_tenth_at_most),
         cmocka_unit_test(shards_that_are_told_otherwise_how_many_have_rows_are_refused),
         cmocka_unit_test(a_job_of_a_part_is_refused_what_it_cannot_do),
     };

@@ -82,6 +82,9 @@ static int check_shard(const cli_bake_settings *s, const vsh_scene *scene) {
     if (s->tile_size > 0.0 && given != NULL) {
         return cli_usage("--%s: not together with --tile-size", given);
     }
+    if (s->tile_size > 0.0 && s->has_shard_least) {
+        return cli_usage("--shard-least: not together with --tile-size, of which parts have whole tiles");
+    }
     if (s->shard > 0 && given != NULL) {
         return cli_usage("--%s: not together with --shard; give it to 'vdbshade merge'", given);
     }
@@ -181,13 +184,13 @@ static char *name_parts(const cli_bake_settings *s, const vsh_scene *scene) {
     return cli_end_path(output, ""); /* a folder, of objects */
 }
 
-static void say_part(const cli_bake_settings *s, const char *parts, size_t lightmaps,
+static void say_part(const cli_bake_settings *s, const vsh_scene *scene, const char *parts, size_t lightmaps,
                      const vsh_bake_report *report) {
     if (lightmaps == 0) {
-        cli_say(
-            "%s.%d-of-%d.part: nothing to do, as parts would take less than %g s (--shard-least); 'vdbshade "
-            "merge %s' once all parts are there",
-            parts, s->shard, s->shard_count, s->shard_least, parts);
+        cli_say("%s.%d-of-%d.part: nothing to do, as there is work for %d (--shard-least); 'vdbshade merge "
+                "%s' once "
+                "all parts are there",
+                parts, s->shard, s->shard_count, cli_bake_shards(s, scene), parts);
         return;
     }
     cli_say("%s.%d-of-%d.part: %" PRIu64 " texels, %" PRIu64
@@ -278,7 +281,7 @@ static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, v
     if (!settings->common.quiet) {
         say_all(t, job, &report);
         if (t->part) {
-            say_part(settings, parts, t->count, &report);
+            say_part(settings, scene, parts, t->count, &report);
         }
         if (t->count > 0) {
             cli_stats_say(&stats);
@@ -330,6 +333,9 @@ int cli_bake_one(const cli_bake_settings *settings, const vsh_scene *scene, cli_
     CLI_TRY_DONE(check_outputs(settings, scene, job));
     code = settings->dry_run ? cli_bake_forecast(scene, job, &run)
                              : bake_job(settings, scene, job, &run, &t, parts, sum);
+    if (settings->dry_run && part && code == CLI_OK) {
+        printf("parts         %d of %d have rows\n", cli_bake_shards(settings, scene), settings->shard_count);
+    }
 done:
     vsh_bake_job_free(job);
     free(parts);

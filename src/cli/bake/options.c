@@ -59,8 +59,8 @@ static const cli_option options[] = {
         "one bake; with --tile-size whole tiles, and\nnothing is to be merged"),
     {KEY_SHARD_LEAST, "shard-least", "SECONDS",
      "work that a part has at least: where there is less for\neach, the last parts have nothing to do; 0: "
-     "all "
-     "have some;\nthe same for all parts (0.4)"},
+     "all have "
+     "some;\nthe same for all parts (0.4)"},
     {0, NULL, NULL, "Objects"},
     {KEY_RECEIVE, "receive", "NAME",
      "only objects of this name receive, all cast; * and ?\nmatch as in a shell; may be repeated"},
@@ -206,6 +206,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case CLI_KEY_SHARD:
         return cli_parse_shard(name, value, &s->shard, &s->shard_count);
     case KEY_SHARD_LEAST:
+        s->has_shard_least = true;
         return cli_parse_number(name, value, 0.0, 1e9, &s->shard_least);
     case KEY_BAND_ROWS:
         return cli_parse_integer(name, value, 1, VSH_MAX_LIGHTMAP_SIZE, &s->band_rows);

@@ -81,9 +81,9 @@ typedef struct cli_bake_settings {
     const char *field;                  /* a file of fields; NULL: they are made */
     const char *exr;                    /* beside an asset; NULL: none */
     bool preview, embed, images_beside; /* of an asset */
-    bool has_sun, has_sun_angle, has_light_radius, per_object, dry_run, resume;
+    bool has_sun, has_sun_angle, has_light_radius, has_shard_least, per_object, dry_run, resume;
     int32_t shard, shard_count; /* 0: all of it */
-    double shard_least;         /* seconds */
+    double shard_least;         /* seconds; 0: all shards have rows, as those of a trade do */
     double tile_size;           /* world units; 0: the scene is not cut into tiles */
     const char *const *words;   /* [word_count]: the command line that this is */
     size_t word_count;
@@ -121,6 +121,9 @@ int cli_bake_scene_receivers(const cli_bake_settings *settings, cli_bake_scene *
 
 /* Whether a scene for points has anything to bake: CLI_OK, or CLI_USAGE having said why. */
 int cli_bake_check_work(const cli_bake_settings *settings, const cli_bake_scene *made);
+
+/* How many of the shards have rows. */
+int32_t cli_bake_shards(const cli_bake_settings *settings, const vsh_scene *scene);
 
 /* Refuses an output that is one of the scene's inputs. CLI_OK or an exit code, having said why. */
 int cli_bake_check_output(const cli_bake_settings *settings, const vsh_scene *scene, const char *output);

@@ -266,13 +266,17 @@ static int check_outputs(const cli_bake_settings *s, const vsh_scene *scene) {
     return s->stats != NULL ? cli_bake_check_output(s, scene, s->stats) : CLI_OK;
 }
 
-/* Whether the shard of a bake is one that has some; else it has no use for fields. */
-static bool has_rows(const cli_bake_settings *s, const vsh_scene *scene) {
+int32_t cli_bake_shards(const cli_bake_settings *s, const vsh_scene *scene) {
     vsh_bake_job_options options = vsh_bake_job_options_default();
     options.per_object = s->per_object;
     options.shard_count = s->shard_count;
     options.shard_least = s->shard_least;
-    return s->tile_size > 0.0 || s->shard <= vsh_bake_job_shards(scene, &options);
+    return vsh_bake_job_shards(scene, &options);
+}
+
+/* Whether something is baked, or forecast: a shard without rows has no use for fields. */
+static bool has_rows(const cli_bake_settings *s, const vsh_scene *scene) {
+    return s->dry_run || s->tile_size > 0.0 || s->shard <= cli_bake_shards(s, scene);
 }
 
 /* Opens the file of fields. What it says of voxels stands in outputs as if it had been given. */
