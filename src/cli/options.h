@@ -109,8 +109,6 @@ vsh_run cli_common_run(const cli_common *common);
 enum {
     CLI_KEY_THREADS = 0x1000,
     CLI_KEY_MEMORY_LIMIT,
-    CLI_KEY_QUIET,
-    CLI_KEY_VERBOSE,
     CLI_KEY_PROGRESS,
     CLI_KEY_ISA,
     CLI_KEY_TRUSTED,
@@ -119,7 +117,9 @@ enum {
     CLI_KEY_SOLID,
     CLI_KEY_SHELL,
     CLI_KEY_INWARD,
-    CLI_KEY_SHARD
+    CLI_KEY_SHARD,
+    CLI_KEY_QUIET = 'q', /* as one letter, too */
+    CLI_KEY_VERBOSE = 'v'
 };
 
 /* Work that is shared out: `what` it does of it. */

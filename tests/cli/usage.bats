@@ -183,6 +183,17 @@ LIST
     refused 2 --resolution --voxel-size
 }
 
+@test "-q and -v are --quiet and --verbose, together with other letters too" {
+    write_box box.obj
+    shade bake box.obj "${SMALL[@]}" -qo out.exr
+    done_well
+    [ -z "$stderr" ]
+    shade bake box.obj "${SMALL[@]}" -v -o told.exr
+    done_well
+    [ -n "$stderr" ]
+    cmp out.exr told.exr
+}
+
 @test "a file whose name begins with a dash comes after --" {
     write_box ./-box.obj
     shade bake "${SMALL[@]}" --quiet -o out.exr -- -box.obj
