@@ -81,6 +81,17 @@ CONF
     within 15 eval '[ "$(sinfo -h -t idle -o %D)" = 2 ]' || fail "no two nodes: $(tail -5 slurmctld.log slurmd.n1.log)"
 }
 
+# Three boxes far from each other, in world.json.
+write_world() {
+    write_box box.obj
+    local x receivers=() casters=()
+    for x in 0 20 40; do
+        casters+=("{\"mesh\": \"box.obj\", \"transform\": {\"translate\": [$x, 0, 0]}}")
+        receivers+=("{\"mesh\": \"box.obj\", \"transform\": {\"translate\": [$x, 0, 0]}, \"size\": 32, \"output\": \"box$x.exr\"}")
+    done
+    (IFS=, && echo "{\"casters\": [${casters[*]}], \"ao\": {\"distance\": 1}, \"receivers\": [${receivers[*]}]}") >world.json
+}
+
 needs_slurm() {
     local program
     for program in munged slurmctld slurmd sbatch; do
@@ -89,7 +100,7 @@ needs_slurm() {
     [ "$(id -u)" -eq 0 ] || skip "slurmd is started by root alone"
 }
 
-@test "a bake and a trade on Slurm come to what one of each does, though a node's daemon is killed in the middle" {
+@test "a bake, a trade and a world in tiles on Slurm come to what one of each does, though a node's daemon is killed in the middle" {
     needs_slurm
     write_box box.obj
     bake=(bake box.obj --sun 0.3,1,0.2 --sun-angle 5 --ao 1 --size 256 --shard-least 0)
@@ -121,12 +132,21 @@ PROGRAM
     [ -n "$array" ] && [ -n "$merge" ]
 
     # a trade on the node that is left
-    local trade=(trade box.obj --sun 0.3,1,0.2 --sun-angle 20 --size 24 --resolutions 12 --truth-rays 64 --budget 3600 --threads 1)
+    local x trade=(trade box.obj --sun 0.3,1,0.2 --sun-angle 20 --size 24 --resolutions 12 --truth-rays 64 --budget 3600 --threads 1)
     "$VDBSHADE" "${trade[@]}" -o one.html --csv one.csv --quiet
     MEMORY=500 MINUTES=2 MERGE="--csv out.csv" "$tools/submit" 2 "${trade[@]}" -o out.html
     within 40 test -e out.csv || fail "no table: $(squeue; cat out.html.logs/*)"
     [ "$(wc -l <one.csv)" -gt 9 ] && diff <(untimed one.csv) <(untimed out.csv) || fail "the rows are others"
     [ -s out.html ]
+
+    # and a world in tiles, where nothing is merged
+    write_world
+    "$VDBSHADE" bake world.json --tile-size 10 --output-folder all --quiet
+    VDBSHADE=$PWD/program "$tools/submit" 2 bake world.json --tile-size 10 --output-folder maps
+    within 40 test -e maps/box0.exr -a -e maps/box20.exr -a -e maps/box40.exr || fail "a tile is missing: $(squeue; cat maps.logs/*)"
+    for x in 0 20 40; do
+        same_values maps/box$x.exr all/box$x.exr
+    done
 }
 
 @test "submit asks for what the estimate says, and refuses what it cannot share out" {
@@ -161,13 +181,8 @@ PROGRAM
 }
 
 @test "submit shares out tiles: no merge, and the parts bake what one bake of all tiles does" {
-    write_box box.obj
-    local x receivers=() casters=()
-    for x in 0 20 40; do
-        casters+=("{\"mesh\": \"box.obj\", \"transform\": {\"translate\": [$x, 0, 0]}}")
-        receivers+=("{\"mesh\": \"box.obj\", \"transform\": {\"translate\": [$x, 0, 0]}, \"size\": 32, \"output\": \"box$x.exr\"}")
-    done
-    (IFS=, && echo "{\"casters\": [${casters[*]}], \"ao\": {\"distance\": 1}, \"receivers\": [${receivers[*]}]}") >world.json
+    write_world
+    local x
     mkdir bin
     printf '#!/bin/sh\nprintf "%%s\\n" "$*" >>asked\necho 7\n' >bin/sbatch
     chmod +x bin/sbatch
