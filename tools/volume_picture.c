@@ -196,7 +196,7 @@ int main(int argc, char **argv) {
     vsh_volume_options options = vsh_volume_options_default();
     options.ao = 1;
     options.shade.ao_distance = 1.0;
-    options.shade.ao_cones = 64;
+    options.shade.max_error = 0.005f;
     vsh_scene scene = {.casters = &caster,
                        .caster_count = 1,
                        .lights = &sun,
