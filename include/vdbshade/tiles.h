@@ -14,8 +14,9 @@ typedef struct vsh_tiles vsh_tiles;
 
 /* Sorts a scene's receivers into cubes of `size` world units (finite, > 0), each by the middle of its box,
  * and looks where its casters are. Models are read one at a time and let go again; of .vdb files only what
- * they say of themselves is read. The scene must outlive the tiles, and neither it nor what it points to may
- * change meanwhile. Free them with vsh_tiles_free(). Errors:
+ * they say of themselves is read. Warns (run->warning) of receivers larger than two tiles, as none is cut.
+ * The scene must outlive the tiles, and neither it nor what it points to may change meanwhile. Free them
+ * with vsh_tiles_free(). Errors:
  * - VSH_ERROR_ARGUMENT: a pointer NULL, a size out of range, no receivers, a scene that takes its fields from
  *   a file or is a tile itself, run;
  * - VSH_ERROR_INPUT: a pattern that matches no mesh of its file, or leaves none;

@@ -71,6 +71,36 @@ done:
     return result;
 }
 
+static double longest_side(const vshi_world_box *box) {
+    double longest = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        longest = fmax(longest, box->high[axis] - box->low[axis]);
+    }
+    return longest;
+}
+
+/* Receivers are not cut: one that reaches far beyond its tile takes with it all that it can meet there. */
+static void warn_of_large(const vsh_tiles *tiles, double size, const vsh_run *run) {
+    size_t count = 0, largest = 0;
+    double longest = 2.0 * size;
+    for (size_t i = 0; i < tiles->whole->receiver_count; ++i) {
+        const double side = longest_side(&tiles->survey.receivers[i]);
+        count += side > 2.0 * size;
+        if (side > longest) {
+            longest = side;
+            largest = i;
+        }
+    }
+    if (count > 0) {
+        const char *output = tiles->whole->receivers[largest].output;
+        vshi_warn(
+            run,
+            "%zu of %zu receivers are larger than two tiles of %g ('%s' is the largest, with %g units): "
+            "what casts on such a one is loaded all at once; give its pieces lightmaps of their own",
+            count, tiles->whole->receiver_count, size, output != NULL ? output : "", longest);
+    }
+}
+
 vsh_result vsh_tiles_create(const vsh_scene *scene, double size, const vsh_run *run, vsh_tiles **tiles,
                             vsh_error *error) {
     VSHI_FLOATS;
@@ -95,6 +125,7 @@ vsh_result vsh_tiles_create(const vsh_scene *scene, double size, const vsh_run *
     VSHI_TRY_DONE(vshi_reach_make(scene, &made->reach, error));
     VSHI_TRY_DONE(vshi_survey_make(scene, &full, &made->survey, error));
     VSHI_TRY_DONE(sort_receivers(made, size, error));
+    warn_of_large(made, size, &full);
     *tiles = made;
     made = NULL;
 done:

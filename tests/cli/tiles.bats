@@ -66,6 +66,16 @@ write_row() {
     [ "$(ls many | wc -l)" = 3 ]
 }
 
+@test "receivers much larger than a tile are warned of, as they are not cut" {
+    write_row
+    shade bake row.json --tile-size 2 --dry-run
+    done_well
+    [ -z "$stderr" ] || fail "$stderr"
+    shade bake row.json --tile-size 1.5 --dry-run
+    done_well
+    [[ "$stderr" == *"warning: 3 of 3 receivers are larger than two tiles of 1.5 ('floor0.exr' is the largest, with 4 units)"* ]]
+}
+
 @test "objects of several receivers in one folder are refused, as tiles would name them alike" {
     write_row
     run -2 "$VDBSHADE" bake row.json --tile-size 4 --per-object -o maps/
