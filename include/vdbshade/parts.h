@@ -20,10 +20,12 @@ typedef struct vsh_part_options {
     size_t attribute_count;
     const char *const *words; /* [word_count]: kept as they are, for vsh_part_words() */
     size_t word_count;
+    int32_t working; /* of a volume: how many of the shards, the first ones, have voxels
+                        (vsh_volume_shards()); the same for all parts; of a merge not looked at. 0: all */
 } vsh_part_options;
 
 static inline vsh_part_options vsh_part_options_default(void) {
-    vsh_part_options options = {sizeof(vsh_part_options), NULL, 0, 0, NULL, 0, NULL, 0};
+    vsh_part_options options = {sizeof(vsh_part_options), NULL, 0, 0, NULL, 0, NULL, 0, 0};
     return options;
 }
 

@@ -60,9 +60,16 @@ VSH_API vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_vox
 
 /* --- in parts */
 
-/* Bakes part shard of shard_count, as much work as any other, and writes it to PARTS.SHARD-of-COUNT.part,
- * whole or not at all. Needs memory for the whole volume at most. Errors: as vsh_bake_volume();
- * VSH_ERROR_ARGUMENT (part NULL or of another number), VSH_ERROR_WRITE. */
+/* How many of `shard_count` shards should have voxels (vsh_part_options.working): as many, 1 at least, as
+ * have `least` seconds of one thread's work each, as far as the number of voxels, lights, AO and max_error
+ * tell, rather too few than too many; 0 or less, NaN: all. Cannot fail. */
+VSH_API int32_t vsh_volume_shards(double voxels, size_t light_count, const vsh_volume_options *options,
+                                  double least, int32_t shard_count);
+
+/* Bakes part shard of shard_count, as much work as any other that has voxels, and writes it to
+ * PARTS.SHARD-of-COUNT.part, whole or not at all. Needs memory for the whole volume at most. A shard behind
+ * part->working has no voxels: occluders and voxels may be NULL, and attributes are not looked at. Errors: as
+ * vsh_bake_volume(); VSH_ERROR_ARGUMENT (part NULL or of another number), VSH_ERROR_WRITE. */
 VSH_API vsh_result vsh_bake_volume_part(const vsh_occluders *occluders, const vsh_voxels *voxels,
                                         const vsh_light *lights, size_t light_count,
                                         const vsh_volume_options *options, const vsh_part_options *part,

@@ -111,7 +111,7 @@ static vsh_result check_left(const vsh_bake_job *job, const vshi_part *part, con
 static vsh_result check_part(const vsh_bake_job *job, const vshi_part *part, const vshi_part *first,
                              int32_t shard, int32_t count, vsh_error *error) {
     const vshi_part_head *head = &part->head;
-    const bool idle = shard > first->head.working;
+    const bool idle = shard > head->working;
     vsh_part_options own = vshi_job_part_options(job, count);
     own.attribute_count = idle ? 0 : own.attribute_count;
     VSHI_TRY(vshi_part_about_check(&head->about, part->path, VSHI_PART_BAKE, shard, &own, error));

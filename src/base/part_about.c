@@ -119,6 +119,10 @@ vsh_result vshi_part_check_options(const vsh_part_options *options, bool merges,
                          "shard %d of %d: expected 1 to the number of shards, at most %d", options->shard,
                          count, VSHI_MOST_SHARDS);
     }
+    if (!merges && (options->working < 0 || options->working > count)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%d of %d shards work: expected 0 (all) to the number",
+                         options->working, count);
+    }
     VSHI_NEEDS_OF(options->word_count, options->words);
     VSHI_NEEDS_OF(options->attribute_count, options->attributes);
     for (size_t i = 0; i < options->word_count; ++i) {

@@ -7,6 +7,7 @@
 #include "volume/volume_part.h"
 
 #include <inttypes.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -21,6 +22,26 @@ typedef struct merging {
     vshi_volume_head first; /* of the first part: the others say the same of casters */
     vshi_job *job;
 } merging;
+
+/* A part without blocks tells of nothing but that it has none. */
+static vsh_result check_idle(const vshi_volume_head *head, const char *path, vsh_error *error) {
+    return head->first == 0 && head->end == 0 ? VSH_OK
+                                              : vshi_part_damaged(path, "blocks that are not its", error);
+}
+
+static vsh_result check_working(const merging *m, const vshi_volume_head *head, const char *path,
+                                vsh_error *error) {
+    if (head->working < 1 || head->working > m->parts->shard_count) {
+        return vshi_part_damaged(path, "the number of parts with voxels", error);
+    }
+    if (head->working == m->first.working) {
+        return VSH_OK;
+    }
+    char theirs[24], ours[24];
+    snprintf(theirs, sizeof theirs, "%d", head->working);
+    snprintf(ours, sizeof ours, "%d", m->first.working);
+    return vshi_part_refuse(path, "number of parts with voxels", theirs, ours, error);
+}
 
 static vsh_result check_head(const merging *m, const vshi_volume_head *head, const char *path,
                              vsh_error *error) {
@@ -147,14 +168,24 @@ static vsh_result take_part(merging *m, const char *path, int32_t shard, vsh_err
     vshi_part_about about;
     vshi_volume_head head;
     vsh_shade_stats stats = vsh_shade_stats_zero();
+    vsh_part_options own = *m->parts;
+    bool idle = false;
     vsh_result result;
     VSHI_TRY_DONE(vshi_part_input_open(path, m->run, &input, &about, error));
-    VSHI_TRY_DONE(vshi_part_about_check(&about, path, VSHI_PART_VOLUME, shard, m->parts, error));
     vshi_volume_head_code(&input.head, &head);
+    idle = shard > head.working;
+    own.attribute_count = idle ? 0 : own.attribute_count;
+    VSHI_TRY_DONE(vshi_part_about_check(&about, path, VSHI_PART_VOLUME, shard, &own, error));
     VSHI_TRY_DONE(vshi_part_input_end_head(&input, error));
-    VSHI_TRY_DONE(check_head(m, &head, path, error));
+    VSHI_TRY_DONE(check_working(m, &head, path, error));
+    VSHI_TRY_DONE(idle ? check_idle(&head, path, error) : check_head(m, &head, path, error));
     VSHI_TRY_DONE(look_over(&input, m->run, &stats, error));
-    VSHI_TRY_DONE(read_blocks(m, &input, &head, error));
+    if (!idle) {
+        VSHI_TRY_DONE(read_blocks(m, &input, &head, error));
+    } else if (input.front.body_bytes > 0) {
+        result = vshi_part_damaged(path, "more than its blocks", error);
+        goto done;
+    }
     vshi_shade_stats_add(&m->bake->stats, &stats);
 done:
     vshi_part_about_free(&about);

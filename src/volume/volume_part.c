@@ -7,10 +7,12 @@
 #include "base/try.h"
 #include "shade/occluders.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 void vshi_volume_head_code(vshi_part_code *code, vshi_volume_head *head) {
+    vshi_part_code_i32(code, &head->working);
     vshi_part_code_u64(code, &head->first);
     vshi_part_code_u64(code, &head->end);
     vshi_part_code_u64(code, &head->blocks);
@@ -34,6 +36,28 @@ void vshi_volume_stats_code(vshi_part_code *code, vsh_shade_stats *s) {
     vshi_part_code_f64(code, &s->square_error);
     vshi_part_code_f64(code, &s->ao_square_error);
     vshi_part_code_f64(code, &s->worst_error);
+}
+
+/* --- how many have blocks */
+
+/* Nanoseconds or so of a voxel in a band, half of which are inside: what any takes, a light, and AO; of these
+ * what rays are for falls with the error, of which it is. Rather too little. */
+static const double ANY = 100.0, LIGHT = 150.0, LIGHT_RAYS = 200.0, AO_RAYS = 3000.0, COMMON_ERROR = 0.02;
+
+int32_t vsh_volume_shards(double voxels, size_t light_count, const vsh_volume_options *options, double least,
+                          int32_t shard_count) {
+    VSHI_FLOATS;
+    vsh_volume_options own = vsh_volume_options_default();
+    if (vshi_options_resolve(options, &own, sizeof own, "vsh_volume_options", NULL) != VSH_OK ||
+        !(least > 0.0) || !(voxels >= 0.0)) {
+        return shard_count;
+    }
+    const double finer = COMMON_ERROR / fmax((double)own.shade.max_error, 1e-4);
+    const double rays = finer > 1.0 ? finer * sqrt(finer) : finer;
+    const double ns =
+        ANY + (double)light_count * (LIGHT + rays * LIGHT_RAYS) + (own.ao != 0 ? rays * AO_RAYS : 0.0);
+    const double most = floor(1e-9 * ns * voxels / least);
+    return most >= shard_count ? shard_count : most > 1.0 ? (int32_t)most : 1;
 }
 
 /* --- which blocks */
@@ -60,9 +84,9 @@ static void find_range(const vshi_volume_bake *bake, const vsh_part_options *par
     vsh_voxels_info info;
     vsh_voxels_get_info(bake->voxels, &info);
     const double all = (double)info.count;
-    *first = part->shard == 1 ? 0 : find_begin(bake, all, part->shard, part->shard_count);
-    *end = part->shard == part->shard_count ? bake->block_count
-                                            : find_begin(bake, all, part->shard + 1, part->shard_count);
+    *first = part->shard == 1 ? 0 : find_begin(bake, all, part->shard, part->working);
+    *end = part->shard == part->working ? bake->block_count
+                                        : find_begin(bake, all, part->shard + 1, part->working);
 }
 
 /* --- its blocks */
@@ -119,13 +143,49 @@ static uint64_t put_block(const vshi_volume_bake *bake, size_t block, vshi_part_
     return bytes;
 }
 
-static vsh_result write_part(vshi_volume_bake *bake, const vsh_part_options *part, size_t first, size_t end,
-                             vsh_error *error) {
+/* The file of a part: its head, blocks first … end - 1 of the bake, and its statistics. */
+static vsh_result write_part(const vshi_volume_bake *bake, const vsh_part_options *part,
+                             vshi_volume_head *head, vsh_error *error) {
+    vshi_part_about about;
+    vshi_part_code code = {.reads = false}, tail = {.reads = false};
+    vshi_part_output file;
+    vsh_shade_stats stats = bake->stats;
+    uint64_t bytes = 0;
+    vsh_result result;
+    char *path = vshi_part_path(part->parts, part->shard, part->shard_count);
+    VSHI_TRY_DONE(vshi_part_about_make(VSHI_PART_VOLUME, part, &about, error));
+    vshi_part_about_code(&code, &about);
+    vshi_volume_head_code(&code, head);
+    vshi_volume_stats_code(&tail, &stats);
+    if (path == NULL || tail.failed) {
+        free(code.bytes);
+        result = vshi_fail(error, VSH_ERROR_MEMORY, "part: the system refused memory");
+        goto done;
+    }
+    for (size_t b = head->first; b < head->end; ++b) {
+        bytes += put_block(bake, b, NULL);
+    }
+    VSHI_TRY_DONE(vshi_part_output_begin(&file, path, &code, bytes, tail.size, error));
+    for (size_t b = head->first; b < head->end; ++b) {
+        put_block(bake, b, &file);
+    }
+    vshi_part_output_put(&file, tail.bytes, tail.size);
+    result = vshi_part_output_finish(&file, error);
+done:
+    free(tail.bytes);
+    free(path);
+    vshi_part_about_free(&about);
+    return result;
+}
+
+static vsh_result write_baked(const vshi_volume_bake *bake, const vsh_part_options *part, size_t first,
+                              size_t end, vsh_error *error) {
     vsh_voxels_info info;
     vsh_voxels_get_info(bake->voxels, &info);
     vsh_occluders_info casters;
     vsh_occluders_get_info(bake->occluders, &casters);
-    vshi_volume_head head = {.first = first,
+    vshi_volume_head head = {.working = part->working,
+                             .first = first,
                              .end = end,
                              .blocks = bake->block_count,
                              .count = info.count,
@@ -137,35 +197,15 @@ static vsh_result write_part(vshi_volume_bake *bake, const vsh_part_options *par
                              .has_triangles = casters.has_triangles,
                              .field_voxel_size = bake->caster_voxel_size,
                              .traced = bake->has_triangles};
-    vshi_part_about about;
-    vshi_part_code code = {.reads = false}, tail = {.reads = false};
-    vshi_part_output file;
-    uint64_t bytes = 0;
-    vsh_result result;
-    char *path = vshi_part_path(part->parts, part->shard, part->shard_count);
-    VSHI_TRY_DONE(vshi_part_about_make(VSHI_PART_VOLUME, part, &about, error));
-    vshi_part_about_code(&code, &about);
-    vshi_volume_head_code(&code, &head);
-    vshi_volume_stats_code(&tail, &bake->stats);
-    if (path == NULL || tail.failed) {
-        free(code.bytes);
-        result = vshi_fail(error, VSH_ERROR_MEMORY, "part: the system refused memory");
-        goto done;
-    }
-    for (size_t b = first; b < end; ++b) {
-        bytes += put_block(bake, b, NULL);
-    }
-    VSHI_TRY_DONE(vshi_part_output_begin(&file, path, &code, bytes, tail.size, error));
-    for (size_t b = first; b < end; ++b) {
-        put_block(bake, b, &file);
-    }
-    vshi_part_output_put(&file, tail.bytes, tail.size);
-    result = vshi_part_output_finish(&file, error);
-done:
-    free(tail.bytes);
-    free(path);
-    vshi_part_about_free(&about);
-    return result;
+    return write_part(bake, part, &head, error);
+}
+
+/* What a part without blocks tells is the same whatever is baked. */
+static vsh_result write_idle(vsh_part_options *part, vsh_error *error) {
+    const vshi_volume_bake none = {.stats = vsh_shade_stats_zero()};
+    vshi_volume_head head = {.working = part->working};
+    part->attribute_count = 0;
+    return write_part(&none, part, &head, error);
 }
 
 static vsh_result bake_part(vshi_volume_bake *bake, const vsh_light *lights, const vsh_part_options *part,
@@ -179,7 +219,7 @@ static vsh_result bake_part(vshi_volume_bake *bake, const vsh_light *lights, con
     vsh_result result;
     VSHI_TRY_DONE(vshi_volume_open(bake, lights, run, error));
     VSHI_TRY_DONE(vshi_volume_shade(bake, lights, first, end, job, 1, error));
-    result = write_part(bake, part, first, end, error);
+    result = write_baked(bake, part, first, end, error);
 done:
     vshi_fill_end(&bake->fill);
     vsh_volume_free(bake->volume);
@@ -192,14 +232,18 @@ vsh_result vsh_bake_volume_part(const vsh_occluders *occluders, const vsh_voxels
                                 const vsh_volume_options *options, const vsh_part_options *part,
                                 const vsh_run *run, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(occluders);
-    VSHI_NEEDS(voxels);
-    VSHI_NEEDS_OF(light_count, lights);
     VSHI_NEEDS(part);
     vsh_part_options own = vsh_part_options_default();
     VSHI_TRY(vshi_options_resolve(part, &own, sizeof own, "vsh_part_options", error));
     VSHI_NEEDS(own.parts);
     VSHI_TRY(vshi_part_check_options(&own, false, error));
+    own.working = own.working > 0 ? own.working : own.shard_count;
+    if (own.shard > own.working) {
+        return write_idle(&own, error);
+    }
+    VSHI_NEEDS(occluders);
+    VSHI_NEEDS(voxels);
+    VSHI_NEEDS_OF(light_count, lights);
     vsh_run full;
     vshi_volume_bake bake;
     VSHI_TRY(vshi_volume_set_up(&bake, occluders, voxels, lights, light_count, options, run, &full, error));

@@ -12,6 +12,7 @@
 
 /* What is behind the vshi_part_about of a head. */
 typedef struct vshi_volume_head {
+    int32_t working;        /* parts that have blocks: the first ones. Of the others nothing else is told */
     uint64_t first, end;    /* blocks */
     uint64_t blocks, count; /* of all parts: blocks, voxels */
     uint64_t channels;

@@ -16,26 +16,55 @@ load parts
         diff <(grep -E '"(voxels|inside_voxels|tiles|marches|rays)"' one.json) <(grep -E '"(voxels|inside_voxels|tiles|marches|rays)"' out.json)
         rm out.vdb out.vdb.*
     }
-    volume 2 --ao 1
-    volume 3 --box -2,-1,-2,3,2,3 --error --method adaptive
-    volume 7 --inside off
-    volume 64 --box -1,-1,-1,2,2,2 --ao 1
+    volume 2 --ao 1 --shard-least 0
+    volume 3 --box -2,-1,-2,3,2,3 --error --method adaptive --shard-least 0
+    volume 7 --inside off # one of them has all the voxels
+    volume 64 --box -1,-1,-1,2,2,2 --ao 1 --shard-least 0
     # parts of a lightmap and of a volume know each other
     parts out.png 1 "" box.obj "${SMALL[@]}"
-    "$VDBSHADE" volume box.obj --sun 1,1,1 --resolution 24 -o b.vdb --shard 1/2 --quiet
+    local b=(volume box.obj --sun 1,1,1 --resolution 24 --shard-least 0 -o b.vdb)
+    "$VDBSHADE" "${b[@]}" --shard 1/2 --quiet
     shade merge b.vdb
     refused 3 "b.vdb: a part is missing: 2 of 2"
     cp out.png.1-of-1.part b.vdb.2-of-2.part
     shade merge b.vdb
     refused 2 "b.vdb.2-of-2.part: is a part of a bake, not of a volume"
-    "$VDBSHADE" volume box.obj --sun 1,1,1 --resolution 24 --inside off -o b.vdb --shard 2/2 --quiet
+    "$VDBSHADE" "${b[@]}" --inside off --shard 2/2 --quiet
     shade merge b.vdb
     refused 2 "b.vdb.2-of-2.part: is of other inputs or options: its vdbshade_command is"
-    "$VDBSHADE" volume box.obj --sun 1,1,1 --resolution 24 -o b.vdb --shard 2/2 --quiet
+    "$VDBSHADE" "${b[@]}" --shard 2/2 --quiet --shard-least 1
+    shade merge b.vdb
+    refused 2 "b.vdb.2-of-2.part: is of other inputs or options: its number of parts with voxels is '1', of the others or here '2'"
+    "$VDBSHADE" "${b[@]}" --shard 2/2 --quiet
     printf x | dd of=b.vdb.2-of-2.part bs=1 seek=3000 conv=notrunc status=none
     shade merge b.vdb
     refused 2 "b.vdb.2-of-2.part: damaged"
     [ ! -e b.vdb ]
+}
+
+@test "parts of a volume have as much work as is worth a part, and those without read nothing" {
+    write_box box.obj
+    local volume=(volume box.obj --sun 1,1,1 --box -1,-1,-1,2,2,2 --box-voxel-size 0.1 --resolution 16 -o b.vdb)
+    # 27,000 voxels, each of 450 ns: three shares of 4 ms
+    shade "${volume[@]}" --shard 4/5 --shard-least 0.004 --field none.field
+    done_well
+    [[ "$stderr" == *"b.vdb.4-of-5.part: nothing to do, as there is work for 3 (--shard-least)"* ]]
+    shade "${volume[@]}" --shard 3/5 --shard-least 0.004 --field none.field
+    refused 3 none.field
+    local i
+    for i in 1 2 3 5; do
+        "$VDBSHADE" "${volume[@]}" --shard "$i/5" --shard-least 0.004 --quiet
+    done
+    "$VDBSHADE" merge b.vdb --quiet
+    mv b.vdb merged.vdb
+    "$VDBSHADE" "${volume[@]}" --quiet
+    cmp b.vdb merged.vdb
+    # of the band of a named size only files tell
+    shade volume box.obj --sun 1,1,1 --voxel-size 0.1 -o c.vdb --shard 5/5
+    done_well
+    [[ "$stderr" != *"nothing to do"* ]]
+    shade "${volume[@]}" --shard 1/2 --shard-least -1
+    refused 2 --shard-least
 }
 
 @test "parts that are missing are named, and nothing is written" {

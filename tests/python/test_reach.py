@@ -266,6 +266,13 @@ class Reach(Case):
             self.assertGreater(len(set(whole.values(name, low, shape).flat)), 2)
         self.assertEqual(v.part_words(parts), ["a", "ü"])
         self.assertEqual(v.volume_part_casters(parts).voxel_size, occluders.info.voxel_size)
+        self.assertEqual(v.volume_shards(voxels.info.count, 1, 0.4, 2, ao=True, ao_distance=1.0), 1)
+        self.assertEqual(v.volume_shards(1e9, 1, 0.4, 64, ao=True, ao_distance=1.0), 64)
+        for shard in (1, 2):
+            v.bake_volume_part(occluders if shard == 1 else None, voxels if shard == 1 else None, lamp, parts=parts, shard=shard,
+                               shard_count=2, working=1, attributes={"a": "b"}, ao=True, ao_distance=1.0)
+        merged = v.volume_merge(voxels, lamp, parts=parts, attributes={"a": "b"}, ao=True, ao_distance=1.0)
+        self.assertSame(merged.values("ao", low, shape), whole.values("ao", low, shape))
         with self.assertRaisesRegex(v.InputError, "volume.1-of-2.part"):
             v.volume_merge(voxels, lamp, parts=parts, attributes={"a": "c"}, ao=True, ao_distance=1.0)
 

@@ -187,10 +187,7 @@ static char *name_parts(const cli_bake_settings *s, const vsh_scene *scene) {
 static void say_part(const cli_bake_settings *s, const vsh_scene *scene, const char *parts, size_t lightmaps,
                      const vsh_bake_report *report) {
     if (lightmaps == 0) {
-        cli_say("%s.%d-of-%d.part: nothing to do, as there is work for %d (--shard-least); 'vdbshade merge "
-                "%s' once "
-                "all parts are there",
-                parts, s->shard, s->shard_count, cli_bake_shards(s, scene), parts);
+        cli_bake_say_idle(s, parts, cli_bake_shards(s, scene));
         return;
     }
     cli_say("%s.%d-of-%d.part: %" PRIu64 " texels, %" PRIu64

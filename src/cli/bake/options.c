@@ -22,8 +22,7 @@ enum {
     KEY_EXR,
     KEY_VIEW,
     KEY_DENSITY,
-    KEY_TILE_SIZE,
-    KEY_SHARD_LEAST
+    KEY_TILE_SIZE
 };
 
 static const cli_option options[] = {
@@ -57,10 +56,7 @@ static const cli_option options[] = {
         "bake part I of N, with as much work as the others, into\nOUT.I-of-N.part: on any machine, in any "
         "order, again where\nit failed; 'vdbshade merge OUT' puts all parts together to\nthe bits of "
         "one bake; with --tile-size whole tiles, and\nnothing is to be merged"),
-    {KEY_SHARD_LEAST, "shard-least", "SECONDS",
-     "work that a part has at least: where there is less for\neach, the last parts have nothing to do; 0: "
-     "all have "
-     "some;\nthe same for all parts (0.4)"},
+    CLI_SHARD_LEAST_OPTION,
     {0, NULL, NULL, "Objects"},
     {KEY_RECEIVE, "receive", "NAME",
      "only objects of this name receive, all cast; * and ?\nmatch as in a shell; may be repeated"},
@@ -145,6 +141,9 @@ int cli_shared_parse(cli_bake_settings *s, int key, const char *name, const char
         return take_caster(s, name, value);
     case CLI_KEY_NO_CAST:
         return take_pattern(&s->no_cast, name, value);
+    case CLI_KEY_SHARD_LEAST:
+        s->has_shard_least = true;
+        return cli_parse_number(name, value, 0.0, 1e9, &s->shard_least);
     case CLI_KEY_FIELD:
         s->field = value;
         return CLI_OK;
@@ -205,9 +204,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case CLI_KEY_SHARD:
         return cli_parse_shard(name, value, &s->shard, &s->shard_count);
-    case KEY_SHARD_LEAST:
-        s->has_shard_least = true;
-        return cli_parse_number(name, value, 0.0, 1e9, &s->shard_least);
     case KEY_BAND_ROWS:
         return cli_parse_integer(name, value, 1, VSH_MAX_LIGHTMAP_SIZE, &s->band_rows);
     default:

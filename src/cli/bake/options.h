@@ -22,11 +22,19 @@ enum {
     CLI_KEY_LIGHT_RADIUS,
     CLI_KEY_CASTER,
     CLI_KEY_FIELD,
-    CLI_KEY_NO_CAST
+    CLI_KEY_NO_CAST,
+    CLI_KEY_SHARD_LEAST
 };
 
 /* Stands for INPUT itself, in --lights. */
 #define CLI_LIGHTS_OF_INPUT "file"
+
+#define CLI_SHARD_LEAST_OPTION                                                                               \
+    {                                                                                                        \
+        CLI_KEY_SHARD_LEAST, "shard-least", "SECONDS",                                                       \
+            "work that a part has at least: where there is less for\neach, the last parts have nothing to "  \
+            "do; 0: all have some;\nthe same for all parts (0.4)"                                            \
+    }
 
 #define CLI_LIGHTS                                                                                           \
     {CLI_KEY_SUN, "sun", "X,Y,Z", "direction towards the sun; its channel is shadow.sun"},                   \
@@ -115,6 +123,13 @@ int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made)
 
 /* The same without its receivers: for points, which may ask for no light and no AO. */
 int cli_bake_scene_for_points(const cli_bake_settings *settings, cli_bake_scene *made);
+
+/* The two steps of that: all but the file of fields, and this. */
+int cli_bake_scene_without_field(const cli_bake_settings *settings, cli_bake_scene *made);
+int cli_bake_use_field(const cli_bake_settings *settings, cli_bake_scene *made);
+
+/* Says of a shard behind the `working` ones that it had nothing to do. */
+void cli_bake_say_idle(const cli_bake_settings *settings, const char *parts, int32_t working);
 
 /* Then adds the receivers, with the options put over them. CLI_OK or an exit code, having said why. */
 int cli_bake_scene_receivers(const cli_bake_settings *settings, cli_bake_scene *made);

@@ -274,13 +274,20 @@ int32_t cli_bake_shards(const cli_bake_settings *s, const vsh_scene *scene) {
     return vsh_bake_job_shards(scene, &options);
 }
 
+void cli_bake_say_idle(const cli_bake_settings *s, const char *parts, int32_t working) {
+    cli_say(
+        "%s.%d-of-%d.part: nothing to do, as there is work for %d (--shard-least); 'vdbshade merge %s' once "
+        "all parts are there",
+        parts, s->shard, s->shard_count, working, parts);
+}
+
 /* Whether something is baked, or forecast: a shard without rows has no use for fields. */
 static bool has_rows(const cli_bake_settings *s, const vsh_scene *scene) {
     return s->dry_run || s->tile_size > 0.0 || s->shard <= cli_bake_shards(s, scene);
 }
 
 /* Opens the file of fields. What it says of voxels stands in outputs as if it had been given. */
-static int use_field(const cli_bake_settings *s, cli_bake_scene *made) {
+int cli_bake_use_field(const cli_bake_settings *s, cli_bake_scene *made) {
     if (s->field == NULL) {
         return CLI_OK;
     }
@@ -330,17 +337,22 @@ static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scen
     return code == CLI_OK ? add_casters(settings, made) : code;
 }
 
-int cli_bake_scene_for_points(const cli_bake_settings *settings, cli_bake_scene *made) {
+int cli_bake_scene_without_field(const cli_bake_settings *settings, cli_bake_scene *made) {
     const int code = make(settings, false, made);
     made->scene.receivers = NULL;
     made->scene.receiver_count = 0;
-    return code == CLI_OK ? use_field(settings, made) : code;
+    return code;
+}
+
+int cli_bake_scene_for_points(const cli_bake_settings *settings, cli_bake_scene *made) {
+    const int code = cli_bake_scene_without_field(settings, made);
+    return code == CLI_OK ? cli_bake_use_field(settings, made) : code;
 }
 
 int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made) {
     int code = make(settings, true, made);
     code = code == CLI_OK ? add_receivers(settings, made) : code;
-    code = code == CLI_OK && has_rows(settings, &made->scene) ? use_field(settings, made) : code;
+    code = code == CLI_OK && has_rows(settings, &made->scene) ? cli_bake_use_field(settings, made) : code;
     return code == CLI_OK ? check_outputs(settings, &made->scene) : code;
 }
 

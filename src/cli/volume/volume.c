@@ -1,7 +1,7 @@
 /* vdbshade volume: shadow and AO on voxels, as .vdb grids. */
+#include "cli/volume/volume.h"
 #include "base/bytes.h"
 #include "base/clock.h"
-#include "cli/bake/options.h"
 #include "cli/casters.h"
 #include "cli/message.h"
 #include "cli/paths.h"
@@ -15,142 +15,6 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
-
-enum { KEY_BAND = 0x2000, KEY_BOX, KEY_BOX_VOXEL_SIZE, KEY_LIKE, KEY_INSIDE, KEY_HALF, KEY_STATS };
-
-static const cli_option options[] = {
-    {0, NULL, NULL, "Output"},
-    {'o', "output", "OUT.vdb", "file to write: grids shadow.NAME of each light, and ao"},
-    {KEY_HALF, "half", NULL, "write 16-bit floats"},
-    {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
-    CLI_SHARD_OPTION(
-        "bake part I of N into OUT.vdb.I-of-N.part; 'vdbshade\nmerge OUT.vdb' puts all parts together"),
-    {0, NULL, NULL, "Which voxels (without --box and --like the casters' own band)"},
-    {KEY_BAND, "band", "VOXELS",
-     "how far from the surface, in voxels, more than 0 to 100\n(all of the level set's band: --half-width)"},
-    {KEY_BOX, "box", "X0,Y0,Z0,X1,Y1,Z1", "a box, scene units: lower corner, upper corner"},
-    {KEY_BOX_VOXEL_SIZE, "box-voxel-size", "SIZE", "the edge of its voxels (that of the casters' voxels)"},
-    {KEY_LIKE, "like", "FILE[:GRID]",
-     "the active voxels of a grid in a .vdb file, a fog say,\non its own lattice (the file's first grid of "
-     "numbers)"},
-    {KEY_INSIDE, "inside", "nearest|off",
-     "voxels inside a solid: nearest (they take the nearest\noutside value) or off (inactive) (nearest)"},
-    {0, NULL, NULL, "Light and occlusion"},
-    CLI_LIGHT_OPTIONS,
-    CLI_ACCURACY_OPTIONS,
-    CLI_CASTER_OPTIONS,
-    CLI_GRID_OPTIONS,
-    CLI_COMMON_OPTIONS,
-    CLI_ISA_OPTION,
-};
-
-static int volume_main(int argc, char **argv);
-
-const cli_command cli_volume = {
-    "volume",
-    "INPUT -o OUT.vdb [options]",
-    "Bakes soft shadows and ambient occlusion into sparse grids. INPUT is a mesh file, a .vdb level set\n"
-    "or a scene file (.json; its casters, lights and ao, not its receivers). What is written, and how it\n"
-    "is to be read: docs/volume.md. Numbers in brackets are what holds without the option.",
-    options,
-    sizeof options / sizeof options[0],
-    volume_main};
-
-typedef struct volume_settings {
-    cli_bake_settings bake; /* the scene, as `bake` takes it; its output and stats are ours */
-    double band;            /* 0: not given */
-    bool has_box;
-    double box_min[3], box_max[3], box_voxel_size; /* 0: not given */
-    const char *like;                              /* file; NULL: not given */
-    const char *like_grid;                         /* NULL: the first */
-    char like_text[4096];
-    int32_t inside;
-    bool half;
-} volume_settings;
-
-/* FILE.vdb:GRID: cut behind the ending, as names of files and grids may both hold a colon. */
-static int take_like(volume_settings *s, const char *name, const char *value) {
-    if (value[0] == '\0' || strlen(value) >= sizeof s->like_text) {
-        return cli_usage("%s '%.60s': expected FILE.vdb or FILE.vdb:GRID", name, value);
-    }
-    strcpy(s->like_text, value);
-    s->like = s->like_text;
-    s->like_grid = NULL;
-    char *colon = strstr(s->like_text, ".vdb:");
-    if (colon != NULL) {
-        colon[4] = '\0';
-        s->like_grid = colon + 5;
-    }
-    return s->like_grid == NULL || s->like_grid[0] != '\0'
-               ? CLI_OK
-               : cli_usage("%s '%s': no grid is named behind the colon", name, value);
-}
-
-static int take(void *settings, int key, const char *name, const char *value) {
-    volume_settings *s = settings;
-    switch (key) {
-    case 'o':
-        s->bake.output = value;
-        return CLI_OK;
-    case KEY_STATS:
-        s->bake.stats = value;
-        return CLI_OK;
-    case CLI_KEY_SHARD:
-        return cli_parse_shard(name, value, &s->bake.shard, &s->bake.shard_count);
-    case KEY_HALF:
-        s->half = true;
-        return CLI_OK;
-    case KEY_BAND: {
-        const int code = cli_parse_positive(name, value, &s->band);
-        return code == CLI_OK && s->band > 100.0 ? cli_parse_number(name, value, 0.0, 100.0, &s->band) : code;
-    }
-    case KEY_BOX:
-        s->has_box = true;
-        return cli_parse_box(name, value, s->box_min, s->box_max);
-    case KEY_BOX_VOXEL_SIZE:
-        return cli_parse_positive(name, value, &s->box_voxel_size);
-    case KEY_LIKE:
-        return take_like(s, name, value);
-    case KEY_INSIDE:
-        return cli_parse_name(name, value, vsh_inside, vsh_inside_name, &s->inside);
-    default:
-        break;
-    }
-    return cli_shared_parse(&s->bake, key, name, value);
-}
-
-static int check_options(const volume_settings *s) {
-    if (s->bake.output == NULL || !cli_has_ending(s->bake.output, "vdb")) {
-        return cli_usage("%s: give -o OUT.vdb", s->bake.output != NULL ? s->bake.output : s->bake.input);
-    }
-    const char *where = s->band > 0.0 ? "--band" : s->has_box ? "--box" : "--like";
-    if ((s->band > 0.0) + s->has_box + (s->like != NULL) > 1) {
-        return cli_usage("%s: give one of --band, --box and --like", where);
-    }
-    if (s->box_voxel_size > 0.0 && !s->has_box) {
-        return cli_usage("--box-voxel-size: there is no --box");
-    }
-    return cli_patch_check(&s->bake.patch);
-}
-
-static int check_output(const volume_settings *s, const vsh_scene *scene, const char *output) {
-    if (s->like != NULL && cli_same_file(output, s->like)) {
-        return cli_usage("%s: the output is also the file of --like", output);
-    }
-    CLI_TRY(cli_bake_check_output(&s->bake, scene, output));
-    CLI_TRY(cli_bake_check_inputs(&s->bake, scene, &output, 1));
-    return cli_temporary_check(output);
-}
-
-/* What can be refused before anything is read. */
-static int check_files(const volume_settings *s, const vsh_scene *scene) {
-    const char *output = s->bake.output, *stats = s->bake.stats;
-    if (stats != NULL && cli_same_file(output, stats)) {
-        return cli_usage("%s: both the output and the --stats file", output);
-    }
-    const int code = check_output(s, scene, output);
-    return code == CLI_OK && stats != NULL ? check_output(s, scene, stats) : code;
-}
 
 /* --- the work */
 
@@ -288,6 +152,7 @@ static vsh_part_options part_options(const volume_work *work) {
     part.attribute_count = work->origin.count;
     part.words = s->words;
     part.word_count = s->word_count;
+    part.working = work->settings->working;
     return part;
 }
 
@@ -309,11 +174,7 @@ static vsh_result run_bake(volume_work *work, const vsh_volume_options *bake, vs
 
 static int bake_volume(volume_work *work) {
     const double start = vshi_seconds();
-    vsh_volume_options bake = vsh_volume_options_default();
-    bake.inside = work->settings->inside;
-    bake.ao = work->scene->ao;
-    bake.error = work->scene->error;
-    bake.shade = work->scene->shade;
+    const vsh_volume_options bake = volume_options(work->settings, work->scene);
     vsh_error error;
     const vsh_result result = run_bake(work, &bake, &error);
     cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
@@ -367,11 +228,31 @@ static void say_part(const volume_work *work) {
     }
 }
 
+/* A shard without voxels reads nothing, and its part says so. */
+static int leave_part(volume_work *work) {
+    const cli_bake_settings *s = &work->settings->bake;
+    const vsh_volume_options bake = volume_options(work->settings, work->scene);
+    const vsh_part_options part = part_options(work);
+    vsh_error error;
+    if (vsh_bake_volume_part(NULL, NULL, work->scene->lights, work->scene->light_count, &bake, &part,
+                             &work->run, &work->stats.shade, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    CLI_TRY(cli_stats_finish(&work->stats, &work->run, s->stats));
+    if (!s->common.quiet) {
+        cli_bake_say_idle(s, s->output, work->settings->working);
+    }
+    return CLI_OK;
+}
+
 static int run_volume(const volume_settings *s, vsh_scene *scene) {
     volume_work work = {.settings = s, .scene = scene, .run = cli_common_run(&s->bake.common)};
     work.stats = cli_stats_begin(CLI_STATS_VOXELS, work.run.threads);
     vsh_volume_info info;
     int code;
+    if (s->bake.shard > s->working) {
+        return leave_part(&work);
+    }
     CLI_TRY_DONE(load(&work));
     CLI_TRY_DONE(s->bake.merged != NULL ? find_casters(&work) : make_occluders(&work));
     CLI_TRY_DONE(find_origin(&work));
@@ -395,27 +276,23 @@ done:
     return code;
 }
 
-static int parse(int argc, char **argv, volume_settings *s, bool *help) {
-    memset(s, 0, sizeof *s);
-    s->bake.common = cli_common_default();
-    s->bake.words = (const char *const *)argv;
-    s->bake.word_count = (size_t)argc;
-    return cli_parse(&cli_volume, argc, argv, take, s, "INPUT", &s->bake.input, help);
-}
-
 static int volume_by(volume_settings *s) {
-    int code = check_options(s);
+    int code = volume_check_options(s);
     if (code != CLI_OK) {
         return code;
     }
     cli_progress_begin(s->bake.common.progress, s->bake.common.quiet);
     cli_bake_scene made;
-    CLI_TRY_DONE(cli_bake_scene_for_points(&s->bake, &made));
+    CLI_TRY_DONE(cli_bake_scene_without_field(&s->bake, &made));
     if (s->band > made.scene.grid.half_width && !cli_patch_has(&s->bake.patch, "--half-width")) {
         made.scene.grid.half_width = s->band;
     }
+    s->working = volume_shards(s, &made.scene);
+    if (s->bake.shard <= s->working) {
+        CLI_TRY_DONE(cli_bake_use_field(&s->bake, &made));
+    }
     CLI_TRY_DONE(cli_bake_check_work(&s->bake, &made));
-    CLI_TRY_DONE(check_files(s, &made.scene));
+    CLI_TRY_DONE(volume_check_files(s, &made.scene));
     cli_signals_watch();
     code = run_volume(s, &made.scene);
 done:
@@ -424,10 +301,10 @@ done:
     return code;
 }
 
-static int volume_main(int argc, char **argv) {
+int volume_main(int argc, char **argv) {
     volume_settings s;
     bool help;
-    const int code = parse(argc, argv, &s, &help);
+    const int code = volume_parse(argc, argv, &s, &help);
     return code != CLI_OK || help ? code : volume_by(&s);
 }
 
@@ -435,7 +312,7 @@ int cli_volume_merge(int argc, char **argv, const char *output, int32_t shards, 
                      const cli_common *common) {
     volume_settings s;
     bool help;
-    const int code = parse(argc, argv, &s, &help);
+    const int code = volume_parse(argc, argv, &s, &help);
     if (code != CLI_OK || help) {
         return code != CLI_OK ? code : cli_usage("%s: its parts are of no bake", output);
     }

@@ -19,9 +19,9 @@ def words_into(filled: Filled, words: Sequence[str]) -> None:
 
 
 def part_options(parts: "str | os.PathLike[str]", shard: int, shard_count: int, attributes: Optional[Attributes],
-                 words: Sequence[str] = ()) -> Filled:
+                 words: Sequence[str] = (), working: int = 0) -> Filled:
     """``vsh_part_options``."""
-    filled = Filled("vsh_part_options", dict(parts=os.fspath(parts), shard=shard, shard_count=shard_count))
+    filled = Filled("vsh_part_options", dict(parts=os.fspath(parts), shard=shard, shard_count=shard_count, working=working))
     lines = attributes_of(attributes)
     filled.keeps.append(lines)
     filled.pointer.attributes, filled.pointer.attribute_count = lines.array, lines.count

@@ -125,9 +125,22 @@ def _baked(occluders: Occluders, voxels: Voxels, structs: Any, count: int, fille
                 made=(lib.vsh_volume_free, volume))
 
 
-def bake_volume_part(occluders: Occluders, voxels: Voxels, lights: Union[Light, Sequence[Light]] = (), *,
-                     parts: "str | os.PathLike[str]", shard: int, shard_count: int, attributes: Optional[Attributes] = None,
-                     words: Sequence[str] = (), stats: Optional[Stats] = None, run: Optional[Run] = None, **options: Any) -> None:
+def volume_shards(voxels: float, light_count: int, least: float, shard_count: int, **options: Any) -> int:
+    """How many of `shard_count` shards should have voxels (`working` of bake_volume_part()): as many, 1 at least, as have `least`
+    seconds of one thread's work each, as far as the number of voxels, lights, AO and max_error tell. 0 or less: all.
+
+    Parameters
+    ----------
+    **options
+        as of bake_volume()
+    """
+    return int(lib.vsh_volume_shards(voxels, light_count, _options(options).pointer, least, shard_count))
+
+
+def bake_volume_part(occluders: Optional[Occluders], voxels: Optional[Voxels], lights: Union[Light, Sequence[Light]] = (), *,
+                     parts: "str | os.PathLike[str]", shard: int, shard_count: int, working: int = 0,
+                     attributes: Optional[Attributes] = None, words: Sequence[str] = (), stats: Optional[Stats] = None,
+                     run: Optional[Run] = None, **options: Any) -> None:
     """Shades a part of voxels, as much work as any other, and writes it to the file PARTS.SHARD-of-COUNT.part, whole or not
     at all: for volume_merge(), on whatever machine.
 
@@ -137,6 +150,9 @@ def bake_volume_part(occluders: Occluders, voxels: Voxels, lights: Union[Light, 
         what the names of the parts' files begin with
     shard, shard_count : int
         which part, 1 … shard_count, of how many, 1 … 10000
+    working : int
+        how many of them, the first ones, have voxels (volume_shards()), the same for all parts; 0: all. A shard behind these takes
+        None for occluders and voxels, too
     attributes : mapping, optional
         lines of text that the output will carry: the same for all parts, and for their merge
     words : sequence of str, optional
@@ -145,8 +161,10 @@ def bake_volume_part(occluders: Occluders, voxels: Voxels, lights: Union[Light, 
         as of bake_volume()
     """
     structs, count = lights_of(lights)
-    part = part_options(parts, shard, shard_count, attributes, words)
-    call(lib.vsh_bake_volume_part, handle_of(occluders, Occluders, "occluders"), handle_of(voxels, Voxels, "voxels"), structs, count,
+    part = part_options(parts, shard, shard_count, attributes, words, working)
+    casters = ffi.NULL if occluders is None else handle_of(occluders, Occluders, "occluders")
+    shaded = ffi.NULL if voxels is None else handle_of(voxels, Voxels, "voxels")
+    call(lib.vsh_bake_volume_part, casters, shaded, structs, count,
          _options(options).pointer, part.pointer, RUN, ffi.NULL if stats is None else stats.struct, run=run)
 
 
@@ -168,4 +186,4 @@ def volume_part_casters(parts: "str | os.PathLike[str]", shard_count: int = 0, *
     return told(found[0], "vsh_occluders_info")
 
 
-__all__ = ["Volume", "Voxels", "bake_volume", "bake_volume_part", "volume_merge", "volume_part_casters"]
+__all__ = ["Volume", "Voxels", "bake_volume", "bake_volume_part", "volume_merge", "volume_part_casters", "volume_shards"]
