@@ -1,7 +1,9 @@
 """How calls run: errors, progress, Ctrl-C, other threads meanwhile, what is freed and when."""
+import copy
 import gc
 import os
 import pathlib
+import pickle
 import signal
 import subprocess
 import sys
@@ -240,6 +242,12 @@ class Running(Case):
 
 
 class Memory(Case):
+    def test_handles_are_neither_pickled_nor_copied(self):
+        grid = vdbshade.Grid.from_meshes(box(), resolution=16)
+        for way in (pickle.dumps, copy.copy, copy.deepcopy):
+            with self.assertRaisesRegex(TypeError, "Grid can be neither pickled nor copied: it lives in this process"):
+                way(grid)
+
     def test_with_closes_and_closed_handles_are_refused(self):
         with vdbshade.Grid.from_meshes(box(), resolution=16) as grid:
             self.assertFalse(grid.closed)

@@ -326,6 +326,9 @@ class Handle:
     def closed(self) -> bool:
         return self._cdata is None
 
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        raise TypeError(f"{type(self).__name__} can be neither pickled nor copied: it lives in this process; make it in each")
+
     def __enter__(self) -> Any:
         self.handle
         return self
