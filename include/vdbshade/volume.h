@@ -58,6 +58,29 @@ VSH_API vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_vox
                                    const vsh_volume_options *options, const vsh_run *run, vsh_volume **volume,
                                    vsh_shade_stats *stats, vsh_error *error);
 
+/* --- what it will take */
+
+/* Found out by shading some of the blocks, from all over: times are good to some tenths. */
+typedef struct vsh_volume_forecast {
+    double bake_s;     /* seconds, by run's threads */
+    double peak_bytes; /* of the process at most, as it is now and with all grids without tiles */
+    int32_t grids;     /* that it will have */
+} vsh_volume_forecast;
+
+/* Errors: as vsh_bake_volume(). */
+VSH_API vsh_result vsh_bake_volume_forecast_sized(const vsh_occluders *occluders, const vsh_voxels *voxels,
+                                                  const vsh_light *lights, size_t light_count,
+                                                  const vsh_volume_options *options, const vsh_run *run,
+                                                  vsh_volume_forecast *forecast, size_t forecast_size,
+                                                  vsh_error *error);
+static inline vsh_result vsh_bake_volume_forecast(const vsh_occluders *occluders, const vsh_voxels *voxels,
+                                                  const vsh_light *lights, size_t light_count,
+                                                  const vsh_volume_options *options, const vsh_run *run,
+                                                  vsh_volume_forecast *forecast, vsh_error *error) {
+    return vsh_bake_volume_forecast_sized(occluders, voxels, lights, light_count, options, run, forecast,
+                                          sizeof *forecast, error);
+}
+
 /* --- in parts */
 
 /* How many of `shard_count` shards should have voxels (vsh_part_options.working): as many, 1 at least, as

@@ -63,8 +63,9 @@ static vsh_result check_memory(vshi_volume_bake *bake, vsh_result result, vsh_er
                : result;
 }
 
-vsh_result vshi_volume_shade(vshi_volume_bake *bake, const vsh_light *lights, size_t begin, size_t end,
-                             vshi_job *job, size_t units, vsh_error *error) {
+vsh_result vshi_volume_shade_by(vshi_volume_bake *bake, const vsh_light *lights, size_t count, size_t grain,
+                                vshi_range_fn *fn, void *user, vshi_job *job, size_t units,
+                                vsh_error *error) {
     vsh_shade_options shade = bake->options.shade;
     if (bake->options.ao == 0) {
         shade.ao_method = VSH_AO_CONES; /* not asked for: it may want what is not there */
@@ -72,12 +73,17 @@ vsh_result vshi_volume_shade(vshi_volume_bake *bake, const vsh_light *lights, si
     const bool around = !bake->normals && bake->options.ao != 0; /* AO over all directions */
     VSHI_TRY(
         vshi_query_create(bake->occluders, lights, bake->light_count, &shade, around, &bake->query, error));
-    range r = {bake, begin};
-    const vsh_result result =
-        vshi_parallel_for(job, end - begin, VSHI_VOLUME_GRAIN, units, shade_range, &r, error);
+    const vsh_result result = vshi_parallel_for(job, count, grain, units, fn, user, error);
     vsh_query_free(bake->query);
     bake->query = NULL;
     return check_memory(bake, result, error);
+}
+
+vsh_result vshi_volume_shade(vshi_volume_bake *bake, const vsh_light *lights, size_t begin, size_t end,
+                             vshi_job *job, size_t units, vsh_error *error) {
+    range r = {bake, begin};
+    return vshi_volume_shade_by(bake, lights, end - begin, VSHI_VOLUME_GRAIN, shade_range, &r, job, units,
+                                error);
 }
 
 vsh_result vshi_volume_finish(vshi_volume_bake *bake, vshi_job *job, size_t units, vsh_error *error) {

@@ -3,6 +3,7 @@
 #define VSHI_BAKE_VOLUME_BLOCKS_H
 
 #include "bake/fill.h"
+#include "base/parallel.h"
 #include "shade/query.h"
 #include "shade/shade.h"
 
@@ -50,6 +51,10 @@ vsh_result vshi_volume_open(vshi_volume_bake *bake, const vsh_light *lights, con
  * Errors: VSH_ERROR_ARGUMENT as vsh_query_create(), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 vsh_result vshi_volume_shade(vshi_volume_bake *bake, const vsh_light *lights, size_t begin, size_t end,
                              vshi_job *job, size_t units, vsh_error *error);
+
+/* The same by `fn` over 0 … count - 1, which calls vshi_volume_shade_blocks(). */
+vsh_result vshi_volume_shade_by(vshi_volume_bake *bake, const vsh_light *lights, size_t count, size_t grain,
+                                vshi_range_fn *fn, void *user, vshi_job *job, size_t units, vsh_error *error);
 
 /* Fills and settles all blocks, and closes the volume. */
 vsh_result vshi_volume_finish(vshi_volume_bake *bake, vshi_job *job, size_t units, vsh_error *error);

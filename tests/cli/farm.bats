@@ -166,6 +166,11 @@ PROGRAM
     run -0 env PATH="$PWD/bin:$PATH" VDBSHADE="$PWD/told" "$tools/submit" 64 bake box.obj -o out.exr
     [[ $(head -1 asked) == *"--mem=856 --time=35 "* ]]
     [[ $(cat words) == *"--shard 1/64 --dry-run"* ]]
+    # those of a volume, which --dry-run tells likewise
+    rm asked
+    run -0 env PATH="$PWD/bin:$PATH" "$tools/submit" 3 volume box.obj --sun 0,1,0 --resolution 24 -o out.vdb
+    [[ $(head -1 asked) =~ --mem=([0-9]+)\ --time=2\ .*part.sbatch\ volume\ box.obj ]]
+    [ "${BASH_REMATCH[1]}" -ge 256 ] && [ "${BASH_REMATCH[1]}" -le 600 ]
     # of a trade memory and time are told, and what merge is to write
     rm asked
     run -2 env PATH="$PWD/bin:$PATH" "$tools/submit" 2 trade box.obj --sun 0,1,0 -o out.html

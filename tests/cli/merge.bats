@@ -59,6 +59,10 @@ load parts
     mv b.vdb merged.vdb
     "$VDBSHADE" "${volume[@]}" --quiet
     cmp b.vdb merged.vdb
+    # nothing is baked by a forecast, which reads all, of whichever part
+    shade "${volume[@]}" --shard 5/5 --shard-least 0.004 --dry-run
+    done_well
+    [[ "$output" == *"voxels        27000, those inside too, in 1 grid"*"memory "*"time "*"parts         3 of 5 have voxels" ]] || fail "$output"
     # of the band of a named size only files tell
     shade volume box.obj --sun 1,1,1 --voxel-size 0.1 -o c.vdb --shard 5/5
     done_well

@@ -266,6 +266,9 @@ class Reach(Case):
             self.assertGreater(len(set(whole.values(name, low, shape).flat)), 2)
         self.assertEqual(v.part_words(parts), ["a", "ü"])
         self.assertEqual(v.volume_part_casters(parts).voxel_size, occluders.info.voxel_size)
+        forecast = v.bake_volume_forecast(occluders, voxels, lamp, ao=True, ao_distance=1.0)
+        self.assertEqual(forecast.grids, 2)
+        self.assertGreater(forecast.bake_s, 0.0)
         self.assertEqual(v.volume_shards(voxels.info.count, 1, 0.4, 2, ao=True, ao_distance=1.0), 1)
         self.assertEqual(v.volume_shards(1e9, 1, 0.4, 64, ao=True, ao_distance=1.0), 64)
         for shard in (1, 2):

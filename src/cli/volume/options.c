@@ -9,13 +9,24 @@
 #include <math.h>
 #include <string.h>
 
-enum { KEY_BAND = 0x2000, KEY_BOX, KEY_BOX_VOXEL_SIZE, KEY_LIKE, KEY_INSIDE, KEY_HALF, KEY_STATS };
+enum {
+    KEY_BAND = 0x2000,
+    KEY_BOX,
+    KEY_BOX_VOXEL_SIZE,
+    KEY_LIKE,
+    KEY_INSIDE,
+    KEY_HALF,
+    KEY_STATS,
+    KEY_DRY_RUN
+};
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
     {'o', "output", "OUT.vdb", "file to write: grids shadow.NAME of each light, and ao"},
     {KEY_HALF, "half", NULL, "write 16-bit floats"},
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
+    {KEY_DRY_RUN, "dry-run", NULL,
+     "bake nothing: print voxels, memory and expected time,\nfound by shading some voxels"},
     CLI_SHARD_OPTION(
         "bake part I of N into OUT.vdb.I-of-N.part; 'vdbshade\nmerge OUT.vdb' puts all parts together"),
     CLI_SHARD_LEAST_OPTION,
@@ -74,6 +85,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case KEY_STATS:
         s->bake.stats = value;
+        return CLI_OK;
+    case KEY_DRY_RUN:
+        s->bake.dry_run = true;
         return CLI_OK;
     case CLI_KEY_SHARD:
         return cli_parse_shard(name, value, &s->bake.shard, &s->bake.shard_count);

@@ -228,6 +228,32 @@ static void say_part(const volume_work *work) {
     }
 }
 
+/* What it will take, for people and for tools/slurm/submit. */
+static int print_forecast(const volume_work *work) {
+    const volume_settings *s = work->settings;
+    const vsh_volume_options bake = volume_options(s, work->scene);
+    const double *took = work->stats.seconds;
+    vsh_volume_forecast f;
+    vsh_voxels_info info;
+    vsh_error error;
+    if (vsh_bake_volume_forecast(work->occluders, work->voxels, work->scene->lights, work->scene->light_count,
+                                 &bake, &work->run, &f, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    vsh_voxels_get_info(work->voxels, &info);
+    const double made = took[CLI_STAGE_LOAD] + took[CLI_STAGE_VOXELIZE] + took[CLI_STAGE_FIELD];
+    char bytes[32];
+    printf("voxels        %" PRIu64 ", those inside too, in %d grid%s\n", info.count, f.grids,
+           f.grids == 1 ? "" : "s");
+    printf("memory        about %s at most\n", vshi_bytes_text((uint64_t)f.peak_bytes, bytes, sizeof bytes));
+    printf("time          about %.2g s: voxelize %.2g s, field %.2g s, bake %.2g s (by some of the voxels)\n",
+           made + f.bake_s, took[CLI_STAGE_VOXELIZE], took[CLI_STAGE_FIELD], f.bake_s);
+    if (s->bake.shard_count > 0) {
+        printf("parts         %d of %d have voxels\n", s->working, s->bake.shard_count);
+    }
+    return CLI_OK;
+}
+
 /* A shard without voxels reads nothing, and its part says so. */
 static int leave_part(volume_work *work) {
     const cli_bake_settings *s = &work->settings->bake;
@@ -250,11 +276,15 @@ static int run_volume(const volume_settings *s, vsh_scene *scene) {
     work.stats = cli_stats_begin(CLI_STATS_VOXELS, work.run.threads);
     vsh_volume_info info;
     int code;
-    if (s->bake.shard > s->working) {
+    if (s->bake.shard > s->working && !s->bake.dry_run) {
         return leave_part(&work);
     }
     CLI_TRY_DONE(load(&work));
     CLI_TRY_DONE(s->bake.merged != NULL ? find_casters(&work) : make_occluders(&work));
+    if (s->bake.dry_run) {
+        code = print_forecast(&work);
+        goto done;
+    }
     CLI_TRY_DONE(find_origin(&work));
     CLI_TRY_DONE(bake_volume(&work));
     if (s->bake.shard > 0) {
@@ -288,7 +318,7 @@ static int volume_by(volume_settings *s) {
         made.scene.grid.half_width = s->band;
     }
     s->working = volume_shards(s, &made.scene);
-    if (s->bake.shard <= s->working) {
+    if (s->bake.shard <= s->working || s->bake.dry_run) {
         CLI_TRY_DONE(cli_bake_use_field(&s->bake, &made));
     }
     CLI_TRY_DONE(cli_bake_check_work(&s->bake, &made));

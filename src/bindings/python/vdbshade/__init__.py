@@ -33,7 +33,7 @@ from ._scene import Assets, Scene, settings
 from ._sdf import Sdf, Solids
 from ._tiles import Tile, Tiles
 from ._unwrap import Atlas, AtlasMesh, LitImage, lit_is_output, lit_write, unwrap, view_write, view_write_bakes
-from ._volume import Volume, Voxels, bake_volume, bake_volume_part, volume_merge, volume_part_casters, volume_shards
+from ._volume import Volume, Voxels, bake_volume, bake_volume_forecast, bake_volume_part, volume_merge, volume_part_casters, volume_shards
 
 __version__ = version()
 __all__ = [name for name in dir() if not name.startswith("_")]

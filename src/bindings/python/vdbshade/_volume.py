@@ -125,6 +125,16 @@ def _baked(occluders: Occluders, voxels: Voxels, structs: Any, count: int, fille
                 made=(lib.vsh_volume_free, volume))
 
 
+def bake_volume_forecast(occluders: Occluders, voxels: Voxels, lights: Union[Light, Sequence[Light]] = (), *, run: Optional[Run] = None,
+                         **options: Any) -> types.VolumeForecast:
+    """What bake_volume() would take, of the same arguments: some of the blocks are shaded, from all over."""
+    structs, count = lights_of(lights)
+    found = ffi.new("vsh_volume_forecast *")
+    call(lib.vsh_bake_volume_forecast_sized, handle_of(occluders, Occluders, "occluders"), handle_of(voxels, Voxels, "voxels"), structs,
+         count, _options(options).pointer, RUN, found, ffi.sizeof("vsh_volume_forecast"), run=run)
+    return told(found[0], "vsh_volume_forecast")
+
+
 def volume_shards(voxels: float, light_count: int, least: float, shard_count: int, **options: Any) -> int:
     """How many of `shard_count` shards should have voxels (`working` of bake_volume_part()): as many, 1 at least, as have `least`
     seconds of one thread's work each, as far as the number of voxels, lights, AO and max_error tell. 0 or less: all.
@@ -186,4 +196,4 @@ def volume_part_casters(parts: "str | os.PathLike[str]", shard_count: int = 0, *
     return told(found[0], "vsh_occluders_info")
 
 
-__all__ = ["Volume", "Voxels", "bake_volume", "bake_volume_part", "volume_merge", "volume_part_casters", "volume_shards"]
+__all__ = ["Volume", "Voxels", "bake_volume", "bake_volume_forecast", "bake_volume_part", "volume_merge", "volume_part_casters", "volume_shards"]
