@@ -14,14 +14,14 @@
 
 /* Whether AO need not be shaded at every texel. `rays` are for those who want just them, taps cost no more;
  * what is near in a layer is not looked at. */
-static bool interpolates(const vsh_shade_options *shade, int32_t spacing, bool layered_ao) {
+bool vshi_ao_is_interpolated(const vsh_shade_options *shade, int32_t spacing, bool layered_ao) {
     const int32_t method = shade->ao_method;
     return spacing > 1 && !layered_ao &&
            (method == VSH_AO_CONES || (vsh_ao_method_traits(method) & VSH_METHOD_KEEPS_ERROR) != 0);
 }
 
 bool vshi_baking_interpolates(const vshi_baking *bake) {
-    return interpolates(&bake->shade, bake->texels->ao_spacing, bake->layered_ao);
+    return vshi_ao_is_interpolated(&bake->shade, bake->texels->ao_spacing, bake->layered_ao);
 }
 
 bool vshi_baking_traces_shadow(const vshi_baking *bake) {
@@ -35,7 +35,7 @@ bool vshi_baking_traces_ao(const vshi_baking *bake) {
 bool vshi_ao_is_shared(const vsh_occluders *occluders, const vsh_shade_options *shade, int32_t spacing,
                        bool layered_ao) {
     const int32_t method = vsh_ao_method_resolve(shade->ao_method, occluders->triangles != NULL);
-    return interpolates(shade, spacing, layered_ao) &&
+    return vshi_ao_is_interpolated(shade, spacing, layered_ao) &&
            (method == VSH_AO_EXACT || (method == VSH_AO_ADAPTIVE && occluders->field->surface != NULL));
 }
 
@@ -140,6 +140,9 @@ vsh_result vshi_baking_open(vshi_baking *bake, bool sky, float *deviation, float
     const vsh_occluders *occluders;
     const vsh_points points = points_of(bake, vshi_baking_traces_ao(bake), &shade, &occluders);
     VSHI_TRY(vshi_lift_for(bake->texels, NULL, &bake->quiet, &bake->origins, error));
+    if (bake->row_work != NULL) {
+        bake->origins.rows.work = bake->row_work + bake->origins.rows.count;
+    }
     if (!vshi_baking_interpolates(bake)) {
         return vshi_shade_ao(occluders, &points, &bake->origins.rows, &shade, &bake->run, bake->values,
                              deviation, bent, NULL, &bake->stats.shade, error);

@@ -38,12 +38,31 @@ static void find_texels(void *user, size_t begin, size_t end) {
 
 /* --- the texels of a pass */
 
+/* Cells of rows that are wanted end in the row of tiles behind, whose own cells matter as far as they tell
+ * which of its texels are shaded: at each but the finest lattice. So do, at each but the two finest, those of
+ * the row behind that. */
+static void find_behind(vshi_lattice *l) {
+    const vshi_origins *origins = l->origins;
+    for (size_t row = 0; row < origins->rows.count; ++row) {
+        const int before = row > 0 ? l->behind[row - 1] : LATTICE_FAR;
+        const int behind = before < LATTICE_FAR ? before + 1 : LATTICE_FAR;
+        l->behind[row] = origins->needed[row] == VSHI_ROW_WANTED ? 0 : (uint8_t)behind;
+    }
+}
+
+/* Whether a pass shades anything in the texel's row. */
+static bool is_reached(const vshi_lattice *l, size_t i) {
+    const size_t row = (row_of(l, i) - (uint32_t)l->texels->band.first) / VSHI_TILE;
+    return (l->spacing >> l->behind[row]) > 0;
+}
+
 static void choose(void *user, size_t begin, size_t end) {
     const vshi_lattice *l = user;
     for (size_t block = begin; block < end; ++block) {
         size_t count = 0;
         for (size_t i = block * BLOCK; i < block_end(l, block); ++i) {
-            if (l->state[i] == LATTICE_UNKNOWN && vshi_lattice_is_corner(l, column_of(l, i), row_of(l, i))) {
+            if (l->state[i] == LATTICE_UNKNOWN && is_reached(l, i) &&
+                vshi_lattice_is_corner(l, column_of(l, i), row_of(l, i))) {
                 l->state[i] = LATTICE_CHOSEN;
                 ++count;
             }
@@ -105,7 +124,7 @@ static void interpolate(void *user, size_t begin, size_t end) {
     for (size_t block = begin; block < end; ++block) {
         vshi_cell c = {.column = UINT32_MAX};
         for (size_t i = block * BLOCK; i < block_end(l, block); ++i) {
-            if (l->state[i] != LATTICE_UNKNOWN) {
+            if (l->state[i] != LATTICE_UNKNOWN || !is_reached(l, i)) {
                 continue;
             }
             const uint32_t column = column_of(l, i), row = row_of(l, i);
@@ -273,6 +292,8 @@ vsh_result vshi_lattice_ao(const vsh_occluders *occluders, const vsh_texels *tex
     VSHI_TRY_DONE(vshi_allocate((void **)&l.before, l.blocks + 1, sizeof *l.before, what, error));
     VSHI_TRY_DONE(
         vshi_allocate((void **)&l.row_start, origins->rows.count + 1, sizeof *l.row_start, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&l.behind, origins->rows.count, 1, what, error));
+    find_behind(&l);
     const bool estimates = (vsh_ao_method_traits(options->ao_method) & VSH_METHOD_KEEPS_ERROR) != 0;
     VSHI_TRY_DONE(vshi_allocate((void **)&own, estimates && deviation == NULL ? origins->count : 0,
                                 sizeof *own, what, error));
@@ -283,6 +304,7 @@ vsh_result vshi_lattice_ao(const vsh_occluders *occluders, const vsh_texels *tex
     }
 done:
     free(own);
+    free(l.behind);
     free(l.row_start);
     free(l.before);
     free(l.state);

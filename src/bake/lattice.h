@@ -7,8 +7,8 @@
 /* As vsh_shade_ao() at the origins' points, `points`, of a lightmap of one sample a texel. Texels of a
  * lattice of the texels' ao_spacing (1, 2, 4 or 8) are shaded; those between are interpolated where nothing
  * is near enough to change within a cell, else the lattice is halved there (irradiance caching: Ward,
- * Rubinstein and Clear, 1988). Of a band, so many held at either end may have other values than in the
- * whole. `deviation` and `bent`, as of vshi_ao_task, may be NULL. */
+ * Rubinstein and Clear, 1988). Values of rows that are wanted alone are those of the whole. `deviation` and
+ * `bent`, as of vshi_ao_task, may be NULL. */
 vsh_result vshi_lattice_ao(const vsh_occluders *occluders, const vsh_texels *texels,
                            const vshi_origins *origins, const vsh_points *points,
                            const vsh_shade_options *options, const vsh_run *run, float *values,

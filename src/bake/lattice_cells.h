@@ -5,6 +5,8 @@
 
 #include "bake/origins.h"
 
+enum { LATTICE_FAR = 31 };
+
 /* Known: shaded; between: interpolated. */
 enum { LATTICE_UNKNOWN, LATTICE_CHOSEN, LATTICE_KNOWN, LATTICE_BETWEEN };
 
@@ -29,6 +31,8 @@ typedef struct vshi_lattice {
     uint32_t *texel;
     float *chosen_values, *chosen_deviation, *chosen_bent;
     size_t *row_start; /* [rows of the origins + 1] */
+    uint8_t *behind;   /* [rows of the origins]: rows of tiles that each lies behind the last that is wanted
+                          before it; LATTICE_FAR: as many or more, or none is */
 } vshi_lattice;
 
 /* Between lattice lines, both included; at the edge of a chart clipped to the texels that are there. */

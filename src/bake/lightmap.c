@@ -73,12 +73,13 @@ static vsh_result find_needed(void *user, const vshi_origins *origins, uint8_t *
         const size_t at = row + band->held_begin;
         taken[row] = taken[row] || (at + near >= band->own_begin && at < band->own_end + near);
     }
-    const bool shared = vshi_baking_interpolates(bake) && needs(bake, NEEDS_ANY_AO);
+    const bool interpolated = vshi_baking_interpolates(bake) && needs(bake, NEEDS_ANY_AO);
     memset(rows, bake->keep.memory != NULL ? VSHI_ROW_BESIDE : VSHI_ROW_LEFT_OUT, count);
     for (size_t row = 0; row < count; ++row) {
         size_t begin = row + band->held_begin, end = begin + 1;
-        if (shared) {
-            vshi_ao_rows(texels->ao_spacing, band->held_end, &begin, &end);
+        if (interpolated) {
+            (vshi_baking_shares(bake) ? vshi_ao_rows : vshi_ao_rows_between)(texels->ao_spacing,
+                                                                             band->held_end, &begin, &end);
         }
         begin = begin > band->held_begin ? begin - band->held_begin : 0;
         if (taken[row]) {
@@ -249,6 +250,7 @@ static vsh_result run_bake(vshi_baking *bake, vsh_error *error) {
     const vshi_origins_for what = {needs(bake, VSHI_NEEDS_LIGHTS), needs(bake, NEEDS_ANY_AO)};
     VSHI_TRY_DONE(vshi_origins_create(bake->occluders, texels, &bake->shade, what, find_needed, bake,
                                       &bake->run, &bake->origins, error));
+    bake->origins.rows.work = bake->row_work;
     VSHI_TRY_DONE(hold(bake, VSHI_NEEDS_LIGHTS | NEEDS_ANY_AO, 1, &bake->values, error));
     VSHI_TRY_DONE(hold(bake, VSHI_NEEDS_DEVIATION, 1, &bake->deviation, error));
     VSHI_TRY_DONE(hold(bake, VSHI_NEEDS_IRRADIANCE, 3, &bake->irradiance, error));
@@ -305,7 +307,7 @@ static vsh_result check(const vsh_lightmap *lightmap, const vsh_texels *texels, 
 static vsh_result bake_texels(const vsh_occluders *occluders, const vsh_texels *texels,
                               const vsh_light *lights, size_t light_count, const vsh_shade_options *options,
                               const vsh_run *run, const vsh_lightmap *lightmap, uint32_t *known, void *kept,
-                              vsh_bake_stats *stats, vsh_error *error) {
+                              vshi_row_work *work, vsh_bake_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(occluders);
     VSHI_NEEDS(texels);
@@ -317,6 +319,7 @@ static vsh_result bake_texels(const vsh_occluders *occluders, const vsh_texels *
                         .light_count = light_count,
                         .lightmap = lightmap,
                         .known = known,
+                        .row_work = work,
                         .keep = {.cut = &texels->cut, .memory = kept},
                         .needs = vshi_planes_need(lightmap, light_count),
                         .stats = vsh_bake_stats_zero()};
@@ -347,15 +350,15 @@ vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_texels *t
                              const vsh_light *lights, size_t light_count, const vsh_shade_options *options,
                              const vsh_run *run, const vsh_lightmap *lightmap, vsh_bake_stats *stats,
                              vsh_error *error) {
-    return bake_texels(occluders, texels, lights, light_count, options, run, lightmap, NULL, NULL, stats,
-                       error);
+    return bake_texels(occluders, texels, lights, light_count, options, run, lightmap, NULL, NULL, NULL,
+                       stats, error);
 }
 
 vsh_result vshi_bake_part(const vsh_occluders *occluders, const vsh_texels *texels, const vsh_light *lights,
                           size_t light_count, const vsh_shade_options *options, const vsh_run *run,
-                          const vsh_lightmap *lightmap, uint32_t *known, void *kept, vsh_bake_stats *stats,
-                          vsh_error *error) {
+                          const vsh_lightmap *lightmap, uint32_t *known, void *kept, vshi_row_work *work,
+                          vsh_bake_stats *stats, vsh_error *error) {
     VSHI_NEEDS(known);
-    return bake_texels(occluders, texels, lights, light_count, options, run, lightmap, known, kept, stats,
-                       error);
+    return bake_texels(occluders, texels, lights, light_count, options, run, lightmap, known, kept, work,
+                       stats, error);
 }

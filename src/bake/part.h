@@ -8,6 +8,7 @@
 #include "bake/ao_kept.h"
 #include "bake/padding.h"
 #include "bake/texels.h"
+#include "shade/shade.h"
 
 /* What is known of a texel, in 32 bits; 0 where no chart covers it. */
 #define VSHI_PART_MESH UINT32_C(0x3fffffff) /* 1 + index of the mesh of its first sample */
@@ -16,9 +17,11 @@
 #define VSHI_PART_SEEN UINT32_C(0x80000000) /* none is, but it is in plain sight */
 
 /* The spacing of texels that share AO where it can be left, of texels of `spacing` at most and a lightmap of
- * these planes; else 1. Options may be those that are not settled. Errors: VSH_ERROR_ARGUMENT. */
+ * these planes, else 1; and of those that it is interpolated between, else 1. Options may be those that are
+ * not settled. Errors: VSH_ERROR_ARGUMENT. */
 vsh_result vshi_part_spacing(const vsh_occluders *occluders, const vsh_shade_options *options,
-                             const vsh_lightmap *planes, int32_t spacing, int32_t *left, vsh_error *error);
+                             const vsh_lightmap *planes, int32_t spacing, int32_t *left, int32_t *between,
+                             vsh_error *error);
 
 /* What is kept then, VSHI_KEEPS_…. */
 uint32_t vshi_part_kinds(const vsh_lightmap *planes);
@@ -32,11 +35,13 @@ vsh_result vshi_texels_create_part(const vsh_charts *charts, int32_t first_row, 
 /* vsh_bake_lightmap() of such texels: nothing is padded or filled. `known` [rows][width] takes VSHI_PART_… of
  * each, `kept` [rows that the cut keeps][width] what AO is finished by, of the kinds of these planes; NULL
  * where it leaves none. Values that are left are 0, or what is there of them: irradiance of lights. Errors of
- * what is filled, and of what is left, are not in the statistics. */
+ * what is filled, and of what is left, are not in the statistics. `work` [2][rows of tiles held] takes
+ * what is done for each of them, for lights and for what is open, but for AO that texels share; NULL: nothing
+ * does. */
 vsh_result vshi_bake_part(const vsh_occluders *occluders, const vsh_texels *texels, const vsh_light *lights,
                           size_t light_count, const vsh_shade_options *options, const vsh_run *run,
-                          const vsh_lightmap *lightmap, uint32_t *known, void *kept, vsh_bake_stats *stats,
-                          vsh_error *error);
+                          const vsh_lightmap *lightmap, uint32_t *known, void *kept, vshi_row_work *work,
+                          vsh_bake_stats *stats, vsh_error *error);
 
 /* --- what parts left of AO */
 

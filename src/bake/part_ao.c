@@ -14,17 +14,18 @@
 #include <string.h>
 
 vsh_result vshi_part_spacing(const vsh_occluders *occluders, const vsh_shade_options *options,
-                             const vsh_lightmap *planes, int32_t spacing, int32_t *left, vsh_error *error) {
+                             const vsh_lightmap *planes, int32_t spacing, int32_t *left, int32_t *between,
+                             vsh_error *error) {
     vsh_shade_options shade;
     bool layered_ao = false;
-    *left = 1;
+    *left = *between = 1;
     VSHI_TRY(vshi_shade_options_resolve(options, &shade, error));
     for (size_t i = 0; i < occluders->layer_count; ++i) {
         layered_ao = layered_ao || occluders->layers[i].ao != 0;
     }
-    *left = vshi_part_kinds(planes) != 0 && vshi_ao_is_shared(occluders, &shade, spacing, layered_ao)
-                ? spacing
-                : 1;
+    if (vshi_part_kinds(planes) != 0 && vshi_ao_is_interpolated(&shade, spacing, layered_ao)) {
+        *(vshi_ao_is_shared(occluders, &shade, spacing, layered_ao) ? left : between) = spacing;
+    }
     return VSH_OK;
 }
 

@@ -39,9 +39,10 @@ vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh
                             const vsh_run *run, bool limited, vsh_uv_report *uv_reports,
                             size_t uv_reports_size, vsh_charts **charts, vsh_error *error);
 
-/* Texels of a lightmap that is `step` times as small, a multiple of 16: texel (i, j) has the first sample of
- * texel (step i + step / 2, step j + step / 2) of the charts', where that has any. *texels is NULL where no
- * texel is. Errors: VSH_ERROR_MEMORY, VSH_ERROR_LIMIT, VSH_ERROR_CANCELLED. */
+/* Texels of a lightmap that is `step` times as small, a multiple of 16: texel (i, 8 j) has the first sample
+ * of texel (step i + step / 2, step j + step / 2) of the charts', where that has any. So each row of samples
+ * is a row of tiles by itself. *texels is NULL where no texel is. Errors: VSH_ERROR_MEMORY, VSH_ERROR_LIMIT,
+ * VSH_ERROR_CANCELLED. */
 vsh_result vshi_texels_create_sparse(const vsh_charts *charts, int32_t step, const vsh_run *run,
                                      vsh_texels **texels, vsh_error *error);
 
@@ -75,6 +76,18 @@ static inline void vshi_ao_rows(int32_t spacing, size_t all, size_t *begin, size
     const size_t square = (size_t)spacing, first = *begin / square, last = (*end + square - 1) / square + 1;
     *begin = first > 0 ? (first - 1) * square : 0;
     *end = last * square < all ? last * square + 1 : all;
+}
+
+/* The same where AO is interpolated between texels instead: cells reach into the row of tiles behind, and at
+ * each lattice that is wider than the finest, those of that row into the next. The rows above and behind all
+ * these tell where charts end. */
+static inline void vshi_ao_rows_between(int32_t spacing, size_t all, size_t *begin, size_t *end) {
+    size_t behind = 1;
+    for (int32_t s = spacing; s > 1; s /= 2) {
+        ++behind;
+    }
+    *begin -= *begin > 0 ? 1 : 0;
+    *end = all - *end > behind ? *end + behind : all;
 }
 
 /* What vsh_bake_lightmap() takes beside field, texels and planes, bytes: the most it holds at a time. */

@@ -15,13 +15,7 @@ typedef struct sparse {
     _Atomic vsh_result row_result; /* of the rows that failed */
 } sparse;
 
-/* Texels of whole tiles before one of a sparse lightmap: its place among all, were all of them there. */
-static size_t sparse_place(size_t columns, size_t column, size_t row) {
-    const size_t tiles = (columns + VSHI_TILE - 1) / VSHI_TILE, side = VSHI_TILE;
-    return ((row / side * tiles + column / side) * side + row % side) * side + column % side;
-}
-
-/* Rows of the sparse lightmap, each by itself. */
+/* Rows of samples, each by itself. */
 static void write_sparse(void *user, size_t begin, size_t end) {
     sparse *some = user;
     const vshi_charts *sorted = &some->charts->sorted;
@@ -36,10 +30,10 @@ static void write_sparse(void *user, size_t begin, size_t end) {
         for (size_t column = 0; column < columns && result == VSH_OK; ++column) {
             const size_t of = column * some->step + some->step / 2;
             if (of < work.tiles && work.tile_start[of] != work.tile_start[of + 1]) {
-                const size_t place = sparse_place(columns, column, row);
+                const size_t place = row * columns + column;
                 w.next = place;
                 vshi_row_tile(sorted, &work, of, NULL);
-                const uint32_t texel = vsh_texel((uint32_t)column, (uint32_t)row);
+                const uint32_t texel = vsh_texel((uint32_t)column, (uint32_t)(VSHI_TILE * row));
                 some->taken[place] = vshi_samples_write(&w, 0, 0, texel, 1) > 0;
             }
         }
@@ -49,8 +43,7 @@ static void write_sparse(void *user, size_t begin, size_t end) {
 
 /* Moves the samples that there are together, and counts those of each row of tiles. */
 static void pack_sparse(const uint8_t *taken, size_t places, vsh_texels *texels) {
-    const size_t tiles = ((size_t)texels->info.width + VSHI_TILE - 1) / VSHI_TILE;
-    const size_t of_row = tiles * VSHI_TILE * VSHI_TILE;
+    const size_t of_row = (size_t)texels->info.width;
     size_t next = 0;
     for (size_t i = 0; i < places; ++i) {
         if (taken[i]) {
@@ -75,8 +68,6 @@ vsh_result vshi_texels_create_sparse(const vsh_charts *charts, int32_t step, con
                                      vsh_texels **texels, vsh_error *error) {
     const size_t columns = ((size_t)charts->info.width + (size_t)step / 2 - 1) / (size_t)step;
     const size_t rows = ((size_t)charts->info.height + (size_t)step / 2 - 1) / (size_t)step;
-    const size_t tiles = (columns + VSHI_TILE - 1) / VSHI_TILE,
-                 tile_rows = (rows + VSHI_TILE - 1) / VSHI_TILE;
     sparse some = {.charts = charts, .step = (size_t)step / VSHI_TILE};
     vsh_texels *made = NULL;
     *texels = NULL;
@@ -89,11 +80,11 @@ vsh_result vshi_texels_create_sparse(const vsh_charts *charts, int32_t step, con
         return vshi_fail(error, VSH_ERROR_MEMORY, "texels: the system refused memory");
     }
     VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, "texels", error));
-    made->count = tiles * tile_rows * VSHI_TILE * VSHI_TILE;
+    made->count = rows * columns;
     made->info.width = (int32_t)columns;
-    made->info.height = (int32_t)rows;
+    made->info.height = (int32_t)(VSHI_TILE * rows);
     made->band = (vshi_band){
-        .own_end = tile_rows, .held_end = tile_rows, .own_rows = (int32_t)rows, .rows = (int32_t)rows};
+        .own_end = rows, .held_end = rows, .own_rows = made->info.height, .rows = made->info.height};
     made->ao_spacing = 1;
     made->shade = charts->shade;
     made->mesh_count = charts->sorted.mesh_count;
@@ -103,7 +94,7 @@ vsh_result vshi_texels_create_sparse(const vsh_charts *charts, int32_t step, con
                                        (double)made->count * (double)vshi_sample_bytes(false),
                                    "texels", error));
     VSHI_TRY_DONE(
-        vshi_allocate((void **)&made->row_start, tile_rows + 1, sizeof *made->row_start, "texels", error));
+        vshi_allocate((void **)&made->row_start, rows + 1, sizeof *made->row_start, "texels", error));
     VSHI_TRY_DONE(vshi_samples_take(made, false, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&some.taken, made->count, 1, "texels", error));
     some.texels = made;

@@ -1,5 +1,7 @@
 /* What rows of a lightmap are expected to take: samples are counted, and a few of them shaded coarsely tell
- * how many of them are invalid, half lit or half open, which is what rays are spent on.
+ * how many of them are invalid, half lit or half open, which is what rays are spent on. What is marched is
+ * counted instead, in the few: cones, and walks over heights and through spheres, take as much whatever the
+ * error, and differ by where they are.
  *
  * Weights are nanoseconds or so, fitted to the cloister, a terrain, a room and a level of many objects at a
  * max_error of 0.02; only what they are of each other matters. A ray takes up to three times as long in one
@@ -8,11 +10,13 @@
 #include "bake_scene/shares.h"
 
 #include "bake/part.h"
+#include "bake_scene/bounds.h"
 #include "base/memory.h"
 #include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* A sample's position and whether it is valid; what a valid one takes beside rays. */
 static const double LAID_OUT = 250.0, VALID = 200.0;
@@ -26,16 +30,26 @@ static const double HALF_OPEN = 3500.0, CHANGING = 11000.0, LONE = 2800.0, SHAPE
 static const double CROWDED = 0.38, FEW_TRIANGLES = 0.01;
 /* AO of each texel's own rays, and of p (1 - p). */
 static const double ALONE = 4000.0, ALONE_HALF_OPEN = 8000.0;
+/* What is marched: a cone or a walk, a sample of it; of a heightfield's AO, what its azimuths take beside. */
+static const double MARCH = 250.0, SAMPLE = 10.0, AZIMUTHS = 12000.0;
+/* What AO on a field takes of a texel that shares it, though nothing hides anything. */
+static const double FREE = 400.0;
+/* Where AO is interpolated, texels that are shaded: so many of each cell, and at each end of a chart. */
+static const double OF_CELL = 2.0, OF_EDGE = 3.0;
 /* The error that these are of, and the least that is asked of the few. */
 static const double COMMON = 0.02, COARSE = 0.1;
 /* Where nothing was looked at yet: texels in a penumbra, and AO of a texel that shares it or has its own,
  * rather too little. */
 static const double USUAL_PENUMBRA = 0.05, USUAL_SHARED = 1050.0, USUAL_ALONE = 5000.0;
-/* What rays take more where they are marched, rather too much than too little. */
-static const double MARCHED = 25.0;
-/* What a border costs, in rows for each texel of spacing between those that share AO, and where it is
- * interpolated instead; and what all borders may take. */
-static const double SHARED_ROWS = 1.5, MARCHED_ROWS = 2.5, MOST_BORDERS = 0.1;
+/* What these take more where fields are marched by rays that cones leave over, and by rays alone, rather too
+ * much than too little. Heights and spheres take so much for what is open, whatever the error. */
+static const double MARCHED = 2.5, MARCHED_RAYS = 25.0, OVER_HEIGHTS = 30000.0, AMONG_SPHERES = 1000.0;
+/* What a border costs, in rows for each texel of spacing between those that share AO, and at least where it
+ * may be interpolated instead; and what all borders may take. */
+static const double SHARED_ROWS = 1.5, BETWEEN_ROWS = 6.0, MOST_BORDERS = 0.1;
+/* What each part takes by itself beside what it does for any: a heightfield's triangles, of 256 samples on a
+ * side; and the few, where they take as long as others. What of all that may be. */
+static const double TRIANGLES_OF_HEIGHTS = 8e7, MOST_OWN = 0.12;
 
 /* The few texels of a lightmap, shaded. */
 typedef struct shaded {
@@ -46,7 +60,11 @@ typedef struct shaded {
     float *shadow;   /* [light_count][height][width] */
     double finer;    /* what rays take more for a smaller error than COMMON */
     double openings; /* times that what is open is shaded */
+    double free;     /* FREE, where it is a field that is shot at */
+    double azimuths; /* AZIMUTHS of all heightfields that hide what is open */
     bool shares;
+    bool lights_by_rays, open_by_rays; /* rays that max_error tells the number of */
+    vshi_row_work *work;               /* [2][height / VSHI_TILE]: of each row of the few */
 } shaded;
 
 static bool is_valid(uint32_t known) {
@@ -92,25 +110,36 @@ static void add_work(const shaded *s, size_t i, double *other, double *open) {
     for (size_t k = 0; k < s->light_count; ++k) {
         const double v = (double)s->shadow[k * s->width * s->height + i];
         const bool in_penumbra = v > 1.0 - FULL && v < FULL;
-        *other += LIT + (in_penumbra ? s->finer * PENUMBRA : 0.0);
+        *other += LIT + (in_penumbra && s->lights_by_rays ? s->finer * PENUMBRA : 0.0);
         shaped = shaped || in_penumbra;
     }
-    if (s->ao != NULL) {
+    *other += s->azimuths;
+    if (s->ao != NULL && s->open_by_rays) {
         const double p = (double)s->ao[i], half = p * (1.0 - p);
+        *open += s->openings * s->free;
         *open += s->openings * s->finer *
                  (s->shares ? HALF_OPEN * half + changing(s, i) + (shaped ? SHAPED : 0.0)
                             : ALONE + ALONE_HALF_OPEN * half);
     }
 }
 
-/* Sums of a row of the few, or of all. */
+/* Sums of a row of the few, or of all; `marched` is of what is open. */
 typedef struct sums {
-    double count, valid, other, open;
+    double count, valid, other, open, marched;
 } sums;
 
+static double marched(const vshi_row_work *work) {
+    return MARCH * (double)work->marches + SAMPLE * (double)work->samples;
+}
+
 static sums sum_rows(const shaded *s, size_t begin, size_t end) {
-    sums of = {0.0, 0.0, 0.0, 0.0};
-    for (size_t i = begin * s->width; i < end * s->width; ++i) {
+    sums of = {0.0, 0.0, 0.0, 0.0, 0.0};
+    for (size_t row = begin; row < end; ++row) {
+        of.other += marched(&s->work[row]);
+        of.marched += marched(&s->work[s->height / VSHI_TILE + row]);
+    }
+    const size_t tile = VSHI_TILE * s->width;
+    for (size_t i = begin * tile; i < end * tile; ++i) {
         if ((s->known[i] & VSHI_PART_MESH) != 0) {
             of.count += 1.0;
             of.valid += is_valid(s->known[i]);
@@ -120,21 +149,30 @@ static sums sum_rows(const shaded *s, size_t begin, size_t end) {
     return of;
 }
 
+/* Of what is open, the part of a row's texels that is shaded. */
+static double part_shaded(const vshi_share_rows *share, const vshi_share_row *row) {
+    const double cell = (double)share->between * share->between;
+    const double edges = row->samples > 0 ? (double)row->edges / row->samples : 0.0;
+    return share->between > 1 ? fmin(1.0, OF_CELL / cell + OF_EDGE * edges) : 1.0;
+}
+
 /* By the few in each row, or where there are none by all. */
 static void weigh(const shaded *s, vshi_share_rows *share) {
-    const sums all = sum_rows(s, 0, s->height);
-    const double edge = s->ao != NULL && s->shares ? s->openings * s->finer * EDGE : 0.0;
+    const size_t rows = s->height / VSHI_TILE;
+    const sums all = sum_rows(s, 0, rows);
+    const double edge = s->ao != NULL && s->open_by_rays && s->shares ? s->openings * s->finer * EDGE : 0.0;
     for (size_t row = 0; row < share->count; ++row) {
         const vshi_share_row *of = &share->row[row];
         const size_t at = VSHI_TILE * row / (size_t)s->step;
-        sums few = at < s->height ? sum_rows(s, at, at + 1) : all;
+        sums few = at < rows ? sum_rows(s, at, at + 1) : all;
         few = few.count > 0.0 ? few : all;
         if (few.count == 0.0) {
-            few = (sums){1.0, 1.0, LAID_OUT + VALID, 0.0};
+            few = (sums){1.0, 1.0, LAID_OUT + VALID, 0.0, 0.0};
         }
         const double part = of->samples / few.count;
         const double open = part * few.open + of->edges * edge * few.valid / few.count;
-        share->work[row] = (uint64_t)(part * few.other + crowding(of) * open);
+        share->work[row] =
+            (uint64_t)(part * (few.other + part_shaded(share, of) * few.marched) + crowding(of) * open);
         share->all += share->work[row];
     }
 }
@@ -150,6 +188,8 @@ static vsh_result shade(const vsh_bake_job *job, const vshi_share_rows *share, c
     quiet.progress = NULL;
     quiet.warning = NULL;
     vsh_result result;
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&s->work, s->height / VSHI_TILE, 2 * sizeof *s->work, "shares", error));
     VSHI_TRY_DONE(vshi_allocate((void **)&s->known, texels, sizeof *s->known, "shares", error));
     VSHI_TRY_DONE(
         vshi_allocate((void **)&s->ao, s->openings > 0.0 ? texels : 0, sizeof *s->ao, "shares", error));
@@ -161,7 +201,7 @@ static vsh_result shade(const vsh_bake_job *job, const vshi_share_rows *share, c
     }
     const vsh_lightmap lightmap = {.shadow = s->light_count > 0 ? planes : NULL, .ao = s->ao};
     result = vshi_bake_part(job->occluders, share->few, scene->lights, s->light_count, &options, &quiet,
-                            &lightmap, s->known, NULL, NULL, error);
+                            &lightmap, s->known, NULL, s->work, NULL, error);
 done:
     free(planes);
     return result;
@@ -186,23 +226,66 @@ static bool is_sized(const vsh_receiver *receiver) {
            receiver->max_size == 0 && receiver->width > 0 && receiver->height > 0;
 }
 
-/* Whether something is not traced against triangles of meshes. */
-static bool is_marched(const vsh_scene *scene) {
-    bool marched = vsh_scene_marches(scene, NULL) != 0;
+/* What a texel takes, and whether what is open at some is not shaded. */
+typedef struct usual {
+    double light, shared, alone; /* all lights; all that is open, if texels share it or not */
+    double direct;               /* of that, what takes as much whatever the error */
+    bool shares;
+} usual;
+
+/* Whether a caster without voxels hides what is open. */
+static bool hides_open(const vsh_scene *scene, const vsh_caster *caster) {
+    bool hides = vshi_casts_itself(caster);
+    for (size_t i = 0; hides && caster->layer != NULL && i < scene->layer_count; ++i) {
+        hides = strcmp(scene->layers[i].name, caster->layer) != 0 || scene->layers[i].shade.ao != 0;
+    }
+    return hides;
+}
+
+/* Whether something is not traced against triangles of meshes, but for heights and spheres. */
+static bool marches_field(const vsh_scene *scene) {
+    bool marches = vsh_scene_marches(scene, NULL) != 0, voxels = false;
     for (size_t i = 0; i < scene->layer_count; ++i) {
-        marched = marched || vsh_scene_marches(scene, &scene->layers[i]) != 0;
+        marches = marches || vsh_scene_marches(scene, &scene->layers[i]) != 0;
     }
     for (size_t i = 0; i < scene->caster_count; ++i) {
-        marched = marched || scene->casters[i].type != VSH_CASTER_MESH;
+        const vsh_caster *caster = &scene->casters[i];
+        marches = marches || (caster->type != VSH_CASTER_MESH && !vshi_casts_itself(caster));
+        voxels = voxels || !vshi_casts_itself(caster);
     }
-    return marched;
+    return marches && voxels;
+}
+
+/* What rays of a scene take more than those to triangles. */
+static double marching(const vsh_scene *scene) {
+    const bool rays = scene->shade.method == VSH_SHADOW_RAYS || scene->shade.ao_method == VSH_AO_RAYS;
+    const uint32_t traits = vsh_shadow_method_traits(vsh_shadow_method_resolve(scene->shade.method, 0)) |
+                            vsh_ao_method_traits(vsh_ao_method_resolve(scene->shade.ao_method, 0));
+    const bool adaptive = (traits & VSH_METHOD_KEEPS_ERROR) != 0;
+    return !marches_field(scene) ? 1.0 : rays ? MARCHED_RAYS : adaptive ? MARCHED : 1.0;
+}
+
+static usual usual_of(const vsh_scene *scene) {
+    const double finer = finer_of(scene) * marching(scene), openings = openings_of(scene);
+    usual u = {.light = (double)scene->light_count * (LIT + USUAL_PENUMBRA * finer * PENUMBRA),
+               .shared = openings * finer * USUAL_SHARED,
+               .alone = openings * finer * USUAL_ALONE,
+               .shares = openings > 0.0};
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        if (hides_open(scene, &scene->casters[i])) {
+            u.direct +=
+                openings * (scene->casters[i].type == VSH_CASTER_SPHERES ? AMONG_SPHERES : OVER_HEIGHTS);
+            u.shares = false;
+        }
+    }
+    u.alone = u.direct > 0.0 ? u.direct : u.alone;
+    return u;
 }
 
 double vshi_shares_most(const vsh_scene *scene, double least) {
-    const bool marched = is_marched(scene);
-    const double finer = finer_of(scene) * (marched ? MARCHED : 1.0), openings = openings_of(scene);
-    const double lights = (double)scene->light_count * (LIT + USUAL_PENUMBRA * finer * PENUMBRA);
-    double ns = 0.0, borders = 0.0;
+    const usual u = usual_of(scene);
+    const double least_rows = marches_field(scene) ? BETWEEN_ROWS : 1.0;
+    double ns = 0.0, own = 0.0, borders = 0.0;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         const vsh_receiver *receiver = &scene->receivers[i];
         if (!is_sized(receiver)) {
@@ -210,12 +293,32 @@ double vshi_shares_most(const vsh_scene *scene, double least) {
         }
         const double across = receiver->supersample;
         const double points = (double)receiver->width * receiver->height * across * across;
-        const bool shares = openings > 0.0 && receiver->supersample == 1 && receiver->ao_spacing > 1;
-        const double border = shares ? (marched ? MARCHED_ROWS : SHARED_ROWS) * receiver->ao_spacing : 1.0;
-        ns += points * (LAID_OUT + VALID + lights + openings * finer * (shares ? USUAL_SHARED : USUAL_ALONE));
-        borders += MOST_BORDERS * receiver->height / border;
+        const bool shares = u.shares && receiver->supersample == 1 && receiver->ao_spacing > 1;
+        const double each = LAID_OUT + VALID + u.light + (shares ? u.shared : u.alone);
+        const double few = vshi_shares_few(receiver->width, receiver->height);
+        ns += points * each;
+        own += few * u.direct + (receiver->type == VSH_RECEIVER_HEIGHTFIELD ? TRIANGLES_OF_HEIGHTS : 0.0);
+        borders += MOST_BORDERS * receiver->height /
+                   (shares ? fmax(least_rows, SHARED_ROWS * receiver->ao_spacing) : 1.0);
     }
-    return fmin(1e-9 * ns / least, 1.0 + borders);
+    return fmin(fmin(1e-9 * ns / least, 1.0 + borders), own > 0.0 ? MOST_OWN * ns / own : INFINITY);
+}
+
+/* What is done by rays to triangles or a field, and what by heights. */
+static void set_methods(const vsh_bake_job *job, shaded *s) {
+    const vsh_occluders *occluders = job->occluders;
+    const vsh_scene *scene = &job->scene;
+    const int32_t traced = occluders->triangles != NULL;
+    const bool shot = traced || job->report.occluders.voxel_size > 0.0;
+    const uint32_t lights = vsh_shadow_method_traits(vsh_shadow_method_resolve(scene->shade.method, traced));
+    const uint32_t open = vsh_ao_method_traits(vsh_ao_method_resolve(scene->shade.ao_method, traced));
+    s->lights_by_rays = shot && (lights & VSH_METHOD_KEEPS_ERROR) != 0;
+    s->open_by_rays = shot && (open & VSH_METHOD_KEEPS_ERROR) != 0;
+    s->free = s->shares && !traced ? FREE : 0.0;
+    for (size_t i = 0; i < occluders->layer_count; ++i) {
+        const vsh_layer *layer = &occluders->layers[i];
+        s->azimuths += layer->heights != NULL && layer->ao != 0 ? s->openings * AZIMUTHS : 0.0;
+    }
 }
 
 vsh_result vshi_shares_weigh(const vsh_bake_job *job, vshi_share_rows *share, const vsh_run *run,
@@ -226,6 +329,7 @@ vsh_result vshi_shares_weigh(const vsh_bake_job *job, vshi_share_rows *share, co
                 .finer = finer_of(scene),
                 .openings = openings_of(scene),
                 .shares = share->spacing > 1};
+    set_methods(job, &s);
     share->all = 0;
     if (share->few != NULL) {
         s.width = (size_t)share->few->info.width;
@@ -235,6 +339,7 @@ vsh_result vshi_shares_weigh(const vsh_bake_job *job, vshi_share_rows *share, co
     if (result == VSH_OK) {
         weigh(&s, share);
     }
+    free(s.work);
     free(s.shadow);
     free(s.ao);
     free(s.known);

@@ -34,8 +34,11 @@ void vshi_part_code_head(vshi_part_code *code, vshi_part_head *head) {
 
 vshi_ao_cut vshi_part_cut(const vshi_part_head *head, const vshi_part_piece *piece) {
     const vshi_part_lightmap *lightmap = &head->lightmaps[piece->lightmap];
-    return (vshi_ao_cut){lightmap->left, lightmap->height, piece->first, piece->first + piece->rows,
-                         (uint32_t)head->kinds};
+    return (vshi_ao_cut){.spacing = lightmap->left,
+                         .height = lightmap->height,
+                         .first = piece->first,
+                         .end = piece->first + piece->rows,
+                         .kinds = (uint32_t)head->kinds};
 }
 
 /* At most 2^32 × (257 × 4 + 104). */

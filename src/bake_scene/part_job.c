@@ -94,8 +94,12 @@ done:
 vshi_ao_cut vshi_job_cut(const vsh_bake_job *job, size_t index, int32_t first, int32_t end) {
     const bool shard = job->options.shard > 0;
     const vsh_lightmap planes = vshi_channels_shape(&job->scene);
-    return (vshi_ao_cut){shard ? job->shares[index].left : 1, job->lightmaps[index].height, first, end,
-                         vshi_part_kinds(&planes)};
+    return (vshi_ao_cut){.spacing = shard ? job->shares[index].left : 1,
+                         .height = job->lightmaps[index].height,
+                         .first = first,
+                         .end = end,
+                         .kinds = vshi_part_kinds(&planes),
+                         .between = shard ? job->shares[index].between : 1};
 }
 
 void vshi_part_set_kept(const vsh_bake_job *job, size_t index, const vshi_bands *bands, int32_t first,

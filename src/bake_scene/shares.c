@@ -25,25 +25,34 @@ enum { TILES_APART = 16 };
 /* Rows of tiles that stay together. */
 static size_t step_of(const vshi_share_rows *share, int32_t shards) {
     size_t step = 1;
-    while (step < (size_t)share->spacing && share->count / (2 * step * TILES_APART) >= (size_t)shards) {
+    while (step < (size_t)share->left && share->count / (2 * step * TILES_APART) >= (size_t)shards) {
         step *= 2;
     }
     return step;
 }
 
 /* Rows that are laid out and shot beside a border, on both sides together, as whole ones: where AO is left,
- * those that windows reach are kept, and what is shot twice are some tiles of lattices; else they are shot
- * twice. */
+ * those that windows reach are kept, and what is shot twice are some tiles of lattices; where it is
+ * interpolated, the wider lattices of some rows of tiles. */
 static double border_rows(const vshi_share_rows *share) {
-    return share->left > 1 ? 1.5 * share->spacing : share->spacing > 1 ? 5.0 * share->spacing : 1.0;
+    static const double LEFT_ROWS = 1.5, BETWEEN_ROWS = 6.0;
+    return share->left > 1 ? LEFT_ROWS * share->left : share->between > 1 ? BETWEEN_ROWS : 1.0;
 }
 
-static int32_t few_step(const vsh_charts_info *info) {
+static double few_of(int32_t width, int32_t height, int32_t step) {
+    return (double)width / step * ((double)height / step);
+}
+
+static int32_t few_step(int32_t width, int32_t height) {
     int32_t step = FEW_STEP;
-    while ((double)info->width / step * ((double)info->height / step) > FEW_MOST) {
+    while (few_of(width, height, step) > FEW_MOST) {
         step *= 2;
     }
     return step;
+}
+
+double vshi_shares_few(int32_t width, int32_t height) {
+    return few_of(width, height, few_step(width, height));
 }
 
 vsh_result vshi_shares_note(vsh_bake_job *job, size_t index, const vsh_charts *charts, const vsh_run *run,
@@ -55,7 +64,7 @@ vsh_result vshi_shares_note(vsh_bake_job *job, size_t index, const vsh_charts *c
     vshi_share_rows *share = &job->shares[index];
     share->count = charts->sorted.rows;
     share->spacing = charts->ao_spacing;
-    share->few_step = few_step(&charts->info);
+    share->few_step = few_step(charts->info.width, charts->info.height);
     VSHI_TRY(vshi_allocate((void **)&share->row, share->count, sizeof *share->row, "shares", error));
     VSHI_TRY(vshi_allocate((void **)&share->work, share->count, sizeof *share->work, "shares", error));
     for (size_t row = 0; row < share->count; ++row) { /* 2^27 at most, and the triangles of the receiver */
@@ -72,7 +81,8 @@ vsh_result vshi_shares_leave(const vsh_bake_job *job, vsh_error *error) {
     for (size_t i = 0; i < job->targets.count; ++i) {
         vshi_share_rows *share = &job->shares[i];
         VSHI_TRY(vshi_part_spacing(job->occluders, &job->scene.shade, &planes, share->spacing, &share->left,
-                                   error));
+                                   &share->between, error));
+        share->spacing = share->left > share->between ? share->left : share->between;
     }
     return VSH_OK;
 }

@@ -15,8 +15,9 @@ typedef struct vshi_share_row {
 /* What shares of a lightmap are reckoned by. */
 typedef struct vshi_share_rows {
     size_t count;        /* rows of tiles */
-    int32_t spacing;     /* of texels that share AO; 1: none do */
+    int32_t spacing;     /* of texels whose AO is not all shaded; 1: all is */
     int32_t left;        /* the same, where AO is left at the ends of pieces (bake/ao_cut.h); else 1 */
+    int32_t between;     /* the same, where it is interpolated between texels; else 1 */
     vshi_share_row *row; /* [count] */
     vsh_texels *few;     /* of it, of every `few_step`th row and column; NULL: none */
     int32_t few_step;
@@ -25,8 +26,12 @@ typedef struct vshi_share_rows {
 } vshi_share_rows;
 
 /* Shards that have `least` seconds of work each, as far as the scene tells before a file is read, and whose
- * borders take a tenth of it at most; INFINITY where UVs that are made tell how large lightmaps are. */
+ * borders take a tenth of it at most, and what parts do by themselves little more; INFINITY where UVs that
+ * are made tell how large lightmaps are. */
 double vshi_shares_most(const vsh_scene *scene, double least);
+
+/* Texels of a lightmap that are looked at. */
+double vshi_shares_few(int32_t width, int32_t height);
 
 /* Keeps what shares of a measured lightmap are reckoned by. Errors: VSH_ERROR_MEMORY, VSH_ERROR_LIMIT,
  * VSH_ERROR_CANCELLED. */
@@ -39,7 +44,7 @@ vsh_result vshi_shares_note(vsh_bake_job *job, size_t index, const vsh_charts *c
 vsh_result vshi_shares_weigh(const vsh_bake_job *job, vshi_share_rows *share, const vsh_run *run,
                              vsh_error *error);
 
-/* Sets whether AO is left, of a prepared job. Errors: VSH_ERROR_ARGUMENT. */
+/* Settles how AO is shaded, of a prepared job: spacing, left and between. Errors: VSH_ERROR_ARGUMENT. */
 vsh_result vshi_shares_leave(const vsh_bake_job *job, vsh_error *error);
 
 /* The rows that shard `shard` of the `count` that have some bakes, of a prepared job, in the order of

@@ -179,6 +179,11 @@ load parts
     run -0 "$VDBSHADE" bake "${CLOISTER[@]}" --size 1024 -o out.exr --shard 64/64 --dry-run # of the whole
     [[ $output == *"lightmap"*"parts "*" 4 of 64 have rows"* ]]
     [ "$(stat -c %s out.exr.64-of-64.part)" -lt 2000 ]
+    # over a terrain, whose triangles each part counts, more work is taken than that
+    printf '{"casters": [{"heightfield": "terrain.png", "size": [10, 10], "height": 2, "direct": true}], "ao": {"distance": 2},
+        "receivers": [{"heightfield": "terrain.png", "extent": [10, 10], "height": 2, "size": 512, "output": "t.exr"}]}' >t.json
+    run -0 "$VDBSHADE" bake t.json --shard 64/64 --dry-run
+    [[ $output == *"parts "*" 8 of 64 have rows"* ]]
     run -0 "$VDBSHADE" bake "${CLOISTER[@]}" --size 1024 -o out.exr --shard 64/64 --field none.field # nor fields
     shade bake "${CLOISTER[@]}" --size 1024 -o out.exr --shard 1/64 --field none.field
     refused 3 none.field
@@ -193,4 +198,48 @@ load parts
     [[ $output != *"nothing to do"* ]]
     shade bake "${CLOISTER[@]}" -o out.exr --shard 1/2 --shard-least -1
     refused 2 "--shard-least '-1'"
+}
+
+# Of N parts the most that one has to do, in hundredths of their mean, as $most: its samples, and its marches, each with
+# its share of what else its texel takes, as so many samples; all are merged as one bake.
+even_work() { # NAME.exr N SAMPLES arguments
+    local name=$1 count=$2 each=$3 i sum=0 own
+    shift 3
+    most=0
+    one "$name" "$@"
+    for ((i = 1; i <= count; ++i)); do
+        "$VDBSHADE" bake "$@" -o "$name" --shard "$i/$count" --shard-least 0 --stats "$i.json" --quiet
+        own=$(awk -F '[:,]' -v each="$each" '/"samples"/ { work += $2 } /"marches"/ { work += each * $2 } END { print work }' "$i.json")
+        sum=$((sum + own))
+        most=$((own > most ? own : most))
+    done
+    most=$((100 * most * count / sum))
+    "$VDBSHADE" merge "$name" --quiet
+    cmp "one/$name" "$name"
+}
+
+@test "parts have as much work as each other where it is marched: over heights, among spheres, by cones" {
+    local ground="$ASSETS/terrain.png" scene
+    scene='"lights": [{"name": "sun", "type": "directional", "direction": [-5, 8, -6], "angle_deg": 5}], "ao": {"distance": 2}'
+    printf '{"casters": [{"heightfield": "%s", "size": [10, 10], "height": 2, "direct": true}], %s, "receivers": [
+        {"heightfield": "%s", "extent": [10, 10], "height": 2, "size": 256, "output": "ground.exr"}]}' "$ground" "$scene" "$ground" >ground.json
+    even_work ground.exr 6 650 ground.json
+    [ "$most" -le 125 ] || fail "one part has $most hundredths of the mean over heights"
+
+    # spheres stand close over one half of a floor
+    awk 'BEGIN { print "x,y,z,radius"; for (i = 0; i < 40; ++i) for (k = 0; k < 20; ++k) printf "%g,0.1,%g,0.03\n", i / 10, k / 10 }' >near.csv
+    printf 'v 0 0 0\nv 4 0 0\nv 4 0 4\nv 0 0 4\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 4/4 3/3 2/2 1/1\n' >half.obj
+    printf '{"casters": [{"spheres": "near.csv"}], %s, "receivers": [{"mesh": "half.obj", "size": 512, "output": "half.exr"}]}' \
+        "${scene/\"distance\": 2/\"distance\": 0.5}" >half.json
+    even_work half.exr 7 52 half.json
+    [ "$most" -le 125 ] || fail "one part has $most hundredths of the mean among spheres"
+
+    # and posts instead, by cones: their samples alone
+    awk 'BEGIN { for (i = 0; i < 20; ++i) for (k = 0; k < 10; ++k) { x = i / 5; z = k / 5
+        printf "v %g 0 %g\nv %g 0 %g\nv %g 0.3 %g\nv %g 0.3 %g\n", x, z, x + 0.1, z, x + 0.1, z + 0.05, x, z + 0.05
+        n = 4 * (i * 10 + k); printf "f %d %d %d %d\n", n + 1, n + 2, n + 3, n + 4 } }' >posts.obj
+    printf '{"casters": [{"mesh": "half.obj"}, {"mesh": "posts.obj"}], "resolution": 128, "method": "cone", %s,
+        "receivers": [{"mesh": "half.obj", "size": 1024, "output": "posts.exr"}]}' "${scene%%, \"ao\"*}" >posts.json
+    even_work posts.exr 7 0 posts.json
+    [ "$most" -le 125 ] || fail "one part has $most hundredths of the mean by cones"
 }

@@ -117,7 +117,8 @@ static inline void bake_rows(const stage *s, const vsh_texels *texels, const vsh
     vsh_error error = {0};
     static uint32_t known[TEXELS];
     const vsh_occluders *casters = occluders_of_caster(&s->casters);
-    if ((part ? vshi_bake_part(casters, texels, NULL, 0, shade, &run, &lightmap, known, kept, &stats, &error)
+    if ((part ? vshi_bake_part(casters, texels, NULL, 0, shade, &run, &lightmap, known, kept, NULL, &stats,
+                               &error)
               : vsh_bake_lightmap(casters, texels, NULL, 0, shade, &run, &lightmap, &stats, &error)) !=
         VSH_OK) {
         fail_msg("%s", error.message);
@@ -161,7 +162,7 @@ static inline baked *bake(const stage *s, how h) {
     for (int32_t first = 0; first < HEIGHT; first += h.rows) {
         const int32_t rows = HEIGHT - first < h.rows ? HEIGHT - first : h.rows;
         vsh_texels *texels = NULL;
-        const vshi_ao_cut cut = {1, HEIGHT, first, first + rows, 0};
+        const vshi_ao_cut cut = {1, HEIGHT, first, first + rows, 0, 0};
         assert_int_equal(h.parts ? vshi_texels_create_part(charts, first, rows, &cut, NULL, &texels, NULL)
                                  : vsh_texels_create_band(charts, first, rows, NULL, &texels, NULL),
                          VSH_OK);

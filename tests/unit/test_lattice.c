@@ -1,4 +1,5 @@
 /* AO that is interpolated between texels, against the same AO at every texel. */
+#include "bake/part.h"
 #include "casts.h"
 #include "fields.h"
 #include "previews.h"
@@ -163,6 +164,64 @@ static void bands_are_interpolated_as_the_whole(void **state) {
     free(banded);
 }
 
+/* Parts have the values of the whole, and shade little for them beyond their own rows: of the wider lattices
+ * in the rows of tiles behind, and nothing above. */
+static void parts_shade_little_beside_them(void **state) {
+    enum { ROWS = 32 };
+    static uint32_t known[TEXELS];
+    static vshi_row_work work[2 * SIZE / VSHI_TILE];
+    const vsh_mesh mesh = {
+        .positions = POSITIONS, .uvs = UVS, .indices = INDICES, .vertex_count = 4, .triangle_count = 2};
+    const vsh_shade_options shade = options_of(VSH_AO_CONES);
+    vsh_lightmap_options options = preview_lightmap_options();
+    options.width = options.height = SIZE;
+    options.padding = 0;
+    for (int32_t spacing = 2; spacing <= 8; spacing *= 2) {
+        options.ao_spacing = spacing;
+        baked *whole = bake(*state, spacing, &shade, 0), *parts = calloc(1, sizeof *parts);
+        assert_non_null(parts);
+        uint64_t own = 0, above = 0, behind = 0;
+        vsh_charts *charts;
+        assert_int_equal(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &charts, NULL), VSH_OK);
+        for (int32_t row = 0; row < SIZE; row += ROWS) {
+            const vshi_ao_cut cut = {
+                .spacing = 1, .height = SIZE, .first = row, .end = row + ROWS, .between = spacing};
+            const vsh_lightmap lightmap = {.ao = parts->ao + (size_t)row * SIZE};
+            vsh_texels *texels;
+            memset(work, 0, sizeof work);
+            assert_int_equal(vshi_texels_create_part(charts, row, ROWS, &cut, NULL, &texels, NULL), VSH_OK);
+            assert_int_equal(vshi_bake_part(occluders_of(*state), texels, NULL, 0, &shade, NULL, &lightmap,
+                                            known + (size_t)row * SIZE, NULL, work, NULL, NULL),
+                             VSH_OK);
+            const vshi_band *band = &texels->band;
+            const size_t held = band->held_end - band->held_begin;
+            for (size_t k = 0; k < held; ++k) {
+                const size_t at = band->held_begin + k;
+                *(at < band->own_begin ? &above
+                  : at < band->own_end ? &own
+                                       : &behind) += work[held + k].marches;
+                assert_int_equal(work[k].marches, 0); /* there are no lights */
+            }
+            vsh_texels_free(texels);
+        }
+        vsh_charts_free(charts);
+        for (size_t i = 0; i < TEXELS; ++i) { /* others are filled once all parts are there */
+            if ((known[i] & VSHI_PART_SHADEABLE) != 0 && whole->ao[i] != parts->ao[i]) {
+                fail_msg("spacing %d, row %zu, column %zu: %.9g whole, %.9g in parts", spacing, i / SIZE,
+                         i % SIZE, (double)whole->ao[i], (double)parts->ao[i]);
+            }
+        }
+        print_message("spacing %d: %.3f of the marches behind\n", spacing, (double)behind / (double)own);
+        assert_int_equal(own, whole->stats.shade.marches);
+        assert_int_equal(above, 0);
+        /* a row of tiles for each lattice wider than the finest, of which that is left out */
+        const uint64_t lattices = spacing == 8 ? 3 : spacing == 4 ? 2 : 1;
+        assert_true(behind > 0 && behind * (ROWS / VSHI_TILE) < own * lattices);
+        free(parts);
+        free(whole);
+    }
+}
+
 static void other_spacings_are_refused(void **state) {
     (void)state;
     static const int32_t bad[] = {0, -4, 3, 5, 6, 16, INT32_MAX};
@@ -193,7 +252,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(little_is_lost_and_much_is_saved),    cmocka_unit_test(threads_change_no_bit),
         cmocka_unit_test(bands_are_interpolated_as_the_whole), cmocka_unit_test(errors_are_as_said),
-        cmocka_unit_test(other_spacings_are_refused),
+        cmocka_unit_test(parts_shade_little_beside_them),      cmocka_unit_test(other_spacings_are_refused),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -114,19 +114,19 @@ static void what_is_marched_is_more_work_and_objects_of_their_own_are_not_known(
     case_scene c;
     char wall[300];
     fill_traced(&c, wall, false);
-    assert_int_equal(lightmaps_of_second(&c, 0.02), 0);
+    assert_int_equal(lightmaps_of_second(&c, 0.003), 0);
     assert_int_equal(vsh_bake_job_shards(&c.scene, NULL), 0);
     c.scene.shade.max_error = 1e-3;
-    assert_int_equal(lightmaps_of_second(&c, 0.02), 1);
+    assert_int_equal(lightmaps_of_second(&c, 0.003), 1);
     c.scene.shade.max_error = 0.02;
     c.receiver.atlas = VSH_ATLAS_OBJECTS;
-    assert_int_equal(lightmaps_of_second(&c, 0.02), 1);
+    assert_int_equal(lightmaps_of_second(&c, 0.003), 1);
     fill(&c, SIZE, 0.4);
-    assert_int_equal(lightmaps_of_second(&c, 0.02), 1);
+    assert_int_equal(lightmaps_of_second(&c, 0.003), 1);
 }
 
 /* Of 48 rows a tenth is 4.8: less than a border of AO that every fourth texel has, more than one of every
- * second; where AO is interpolated borders cost more. */
+ * second; where it may be interpolated a border costs 6 at least. */
 static void borders_of_ao_take_a_tenth_at_most(void **state) {
     (void)state;
     case_scene c;
