@@ -147,7 +147,8 @@ static inline void vsh_charts_get_info(const vsh_charts *charts, vsh_charts_info
 }
 
 /* World box of all samples, as of vsh_texels_info: of which vsh_scene_reach() makes a field's reach. Takes as
- * long as making all texels. Errors: VSH_ERROR_ARGUMENT (run), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+ * long as making the texels of those triangles that reach as far as it. Errors: VSH_ERROR_ARGUMENT (run),
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, double bounds_min[3],
                                      double bounds_max[3], vsh_error *error);
 

@@ -6,6 +6,7 @@
 #include "base/parallel.h"
 #include "base/try.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -13,7 +14,7 @@ enum { TRIANGLES = 1024 }; /* looked at together */
 
 typedef struct creation {
     const vsh_charts *charts;
-    size_t first;                  /* tile row */
+    size_t first, step;            /* tile rows: where they begin, and how far they are apart */
     vsh_texels *texels;            /* NULL: only the boxes are found */
     vshi_sample_box *boxes;        /* [tile rows]; NULL: they are not asked for */
     const double (*box)[3];        /* low, high: tiles whose samples lie in it are left out; NULL: none are */
@@ -75,11 +76,12 @@ static void write_rows(void *user, size_t begin, size_t end) {
         const size_t *start = all->texels != NULL ? all->texels->row_start + row : NULL;
         all->boxes[row] =
             (vshi_sample_box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-        if ((start != NULL && start[0] == start[1]) || is_row_within(all, all->first + row)) {
+        const size_t of = all->first + row * all->step;
+        if ((start != NULL && start[0] == start[1]) || is_row_within(all, of)) {
             continue;
         }
         vshi_row work;
-        const vsh_result result = vshi_row_open(sorted, all->first + row, &work, NULL);
+        const vsh_result result = vshi_row_open(sorted, of, &work, NULL);
         if (result != VSH_OK) {
             atomic_store(&all->row_result, result);
             vshi_row_close(&work);
@@ -101,9 +103,10 @@ static void write_rows(void *user, size_t begin, size_t end) {
     }
 }
 
-/* Rasterises `rows` rows of tiles. */
+/* Rasterises `rows` rows of tiles, or those of them that are `step` apart. */
 static vsh_result rasterise(creation *all, size_t rows, const vsh_run *run, vsh_error *error) {
     vsh_result result;
+    rows = (rows + all->step - 1) / all->step;
     vshi_job *job = vshi_job_begin(run, "texels", rows);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "texels: the system refused memory");
@@ -139,28 +142,47 @@ static void join(const vshi_sample_box *boxes, size_t begin, size_t end, bool ze
     }
 }
 
-vsh_result vshi_charts_bounds_beyond(const vsh_charts *charts, const double (*within)[3], const vsh_run *run,
-                                     double low[3], double high[3], vsh_error *error) {
-    creation all = {.charts = charts, .box = within};
+static vsh_result find_bounds(const vsh_charts *charts, const double (*within)[3], size_t step,
+                              const vsh_run *run, double low[3], double high[3], vsh_error *error) {
+    creation all = {.charts = charts, .step = step, .box = within};
     const size_t rows = charts->sorted.rows;
     vsh_result result;
     VSHI_TRY_DONE(rasterise(&all, rows, run, error));
-    join(all.boxes, 0, rows, within == NULL, low, high);
+    join(all.boxes, 0, (rows + step - 1) / step, false, low, high);
 done:
     free(all.within);
     free(all.boxes);
     return result;
 }
 
+vsh_result vshi_charts_bounds_beyond(const vsh_charts *charts, const double within[2][3], const vsh_run *run,
+                                     double low[3], double high[3], vsh_error *error) {
+    return find_bounds(charts, within, 1, run, low, high, error);
+}
+
+/* A few rows tell of most triangles that all their samples lie within the box of what is found. */
 vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, double bounds_min[3],
                              double bounds_max[3], vsh_error *error) {
+    enum { FEW = 16 };
     VSHI_FLOATS;
     VSHI_NEEDS(charts);
     VSHI_NEEDS(bounds_min);
     VSHI_NEEDS(bounds_max);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    return vshi_charts_bounds_beyond(charts, NULL, &full, bounds_min, bounds_max, error);
+    vsh_run quiet = full;
+    quiet.progress = NULL;
+    double few[2][3], low[3], high[3];
+    VSHI_TRY(find_bounds(charts, NULL, FEW, &quiet, few[0], few[1], error));
+    VSHI_TRY(find_bounds(charts, (const double(*)[3])few, 1, &full, low, high, error));
+    for (int k = 0; k < 3; ++k) {
+        bounds_min[k] = fmin(few[0][k], low[k]);
+        bounds_max[k] = fmax(few[1][k], high[k]);
+        if (bounds_min[k] > bounds_max[k]) { /* there are no samples */
+            bounds_min[k] = bounds_max[k] = 0.0;
+        }
+    }
+    return VSH_OK;
 }
 
 static vsh_result make_band(const vsh_charts *charts, const vsh_run *run, vsh_texels *texels,
@@ -184,7 +206,7 @@ static vsh_result make_band(const vsh_charts *charts, const vsh_run *run, vsh_te
     const double held = (double)charts->info.bytes + vshi_row_bytes(&charts->sorted, run->threads);
     VSHI_TRY(vshi_check_limit(run, held + samples, "texels", error));
     texels->info.bytes = sizeof *texels + texels->count * sample + (rows + 1) * sizeof *texels->row_start;
-    creation all = {.charts = charts, .first = band->held_begin, .texels = texels};
+    creation all = {.charts = charts, .first = band->held_begin, .step = 1, .texels = texels};
     VSHI_TRY(vshi_samples_take(texels, charts->tangents, error));
     vsh_result result;
     VSHI_TRY_DONE(rasterise(&all, rows, run, error));

@@ -47,8 +47,8 @@ vsh_result vshi_texels_create_sparse(const vsh_charts *charts, int32_t step, con
                                      vsh_texels **texels, vsh_error *error);
 
 /* vsh_charts_bounds() of the samples that may lie beyond a box, within[0] … within[1]: empty (low > high)
- * where there are none. NULL: of all, and zeros. */
-vsh_result vshi_charts_bounds_beyond(const vsh_charts *charts, const double (*within)[3], const vsh_run *run,
+ * where there are none. */
+vsh_result vshi_charts_bounds_beyond(const vsh_charts *charts, const double within[2][3], const vsh_run *run,
                                      double low[3], double high[3], vsh_error *error);
 
 /* Rows of texels that a band holds: its own, those beside it that its padding is copied from, and those below

@@ -165,6 +165,32 @@ static void a_mirrored_transform_keeps_uvs_on_their_corners(void **state) {
     vsh_texels_free(texels);
 }
 
+/* Whatever rows are looked at first: they have no samples, some, or all. */
+static void bounds_of_charts_are_those_of_their_texels(void **state) {
+    (void)state;
+    sphere s;
+    make_sphere(&s, 12, 1.0);
+    static const int32_t sizes[][2] = {{8, 8}, {256, 128}, {64, 1024}, {1024, 1016}};
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; ++i) {
+        for (int32_t samples = 1; samples <= 2; ++samples) {
+            const vsh_lightmap_options options = size_of(sizes[i][0], sizes[i][1], samples);
+            vsh_charts *charts = NULL;
+            vsh_texels *texels = NULL;
+            vsh_texels_info info;
+            double low[3], high[3];
+            assert_int_equal(vsh_charts_create(&s.mesh, 1, &options, NULL, NULL, &charts, NULL), VSH_OK);
+            assert_int_equal(vsh_texels_create(&s.mesh, 1, &options, NULL, NULL, &texels, NULL), VSH_OK);
+            vsh_texels_get_info(texels, &info);
+            assert_int_equal(vsh_charts_bounds(charts, NULL, low, high, NULL), VSH_OK);
+            assert_memory_equal(low, info.bounds_min, sizeof low);
+            assert_memory_equal(high, info.bounds_max, sizeof high);
+            vsh_texels_free(texels);
+            vsh_charts_free(charts);
+        }
+    }
+    free_sphere(&s);
+}
+
 /* Tiles whose samples all lie in a box are left out, those that are lifted out of it are not: of it and of
  * what is left the box is that of all. */
 static void bounds_beyond_a_box_reach_as_far_as_those_of_all(void **state) {
@@ -206,6 +232,7 @@ int main(void) {
         cmocka_unit_test(a_cube_with_averaged_normals_is_shaded_smooth_but_stays_in_its_place),
         cmocka_unit_test(a_mirrored_transform_keeps_normals_outward),
         cmocka_unit_test(a_mirrored_transform_keeps_uvs_on_their_corners),
+        cmocka_unit_test(bounds_of_charts_are_those_of_their_texels),
         cmocka_unit_test(bounds_beyond_a_box_reach_as_far_as_those_of_all),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
