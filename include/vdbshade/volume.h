@@ -67,7 +67,7 @@ typedef struct vsh_volume_forecast {
     int32_t grids;     /* that it will have */
 } vsh_volume_forecast;
 
-/* Errors: as vsh_bake_volume(). */
+/* What vsh_bake_volume() would take of the same arguments; under its stage. Errors: as there. */
 VSH_API vsh_result vsh_bake_volume_forecast_sized(const vsh_occluders *occluders, const vsh_voxels *voxels,
                                                   const vsh_light *lights, size_t light_count,
                                                   const vsh_volume_options *options, const vsh_run *run,

@@ -10,18 +10,14 @@
 #include "bake_scene/shares.h"
 
 #include "bake/part.h"
-#include "bake_scene/bounds.h"
+#include "bake_scene/work.h"
 #include "base/memory.h"
 #include "base/try.h"
+#include "shade/rays_expected.h"
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
-/* A sample's position and whether it is valid; what a valid one takes beside rays. */
-static const double LAID_OUT = 250.0, VALID = 200.0;
-/* A light that is proved, or dark; one in its penumbra. */
-static const double LIT = 100.0, PENUMBRA = 6000.0;
 /* AO whose rays texels share: of p (1 - p), of what it changes by from texel to texel, where nothing tells of
  * that, in a light's penumbra, which lies where shapes are; and of a texel at the end of a chart, which
  * shoots rays of its own. */
@@ -36,20 +32,8 @@ static const double MARCH = 250.0, SAMPLE = 10.0, AZIMUTHS = 12000.0;
 static const double FREE = 400.0;
 /* Where AO is interpolated, texels that are shaded: so many of each cell, and at each end of a chart. */
 static const double OF_CELL = 2.0, OF_EDGE = 3.0;
-/* The error that these are of, and the least that is asked of the few. */
-static const double COMMON = 0.02, COARSE = 0.1;
-/* Where nothing was looked at yet: texels in a penumbra, and AO of a texel that shares it or has its own,
- * rather too little. */
-static const double USUAL_PENUMBRA = 0.05, USUAL_SHARED = 1050.0, USUAL_ALONE = 5000.0;
-/* What these take more where fields are marched by rays that cones leave over, and by rays alone, rather too
- * much than too little. Heights and spheres take so much for what is open, whatever the error. */
-static const double MARCHED = 2.5, MARCHED_RAYS = 25.0, OVER_HEIGHTS = 30000.0, AMONG_SPHERES = 1000.0;
-/* What a border costs, in rows for each texel of spacing between those that share AO, and at least where it
- * may be interpolated instead; and what all borders may take. */
-static const double SHARED_ROWS = 1.5, BETWEEN_ROWS = 6.0, MOST_BORDERS = 0.1;
-/* What each part takes by itself beside what it does for any: a heightfield's triangles, of 256 samples on a
- * side; and the few, where they take as long as others. What of all that may be. */
-static const double TRIANGLES_OF_HEIGHTS = 8e7, MOST_OWN = 0.12;
+/* The least error that is asked of the few. */
+static const double COARSE = 0.1;
 
 /* The few texels of a lightmap, shaded. */
 typedef struct shaded {
@@ -58,7 +42,7 @@ typedef struct shaded {
     uint32_t *known;
     float *ao;       /* NULL: none */
     float *shadow;   /* [light_count][height][width] */
-    double finer;    /* what rays take more for a smaller error than COMMON */
+    double finer;    /* how many times as much rays take to the error asked for */
     double openings; /* times that what is open is shaded */
     double free;     /* FREE, where it is a field that is shot at */
     double azimuths; /* AZIMUTHS of all heightfields that hide what is open */
@@ -101,16 +85,16 @@ static double crowding(const vshi_share_row *row) {
 /* What a texel takes: but for AO, and of that. */
 static void add_work(const shaded *s, size_t i, double *other, double *open) {
     static const double FULL = 0.99;
-    *other += LAID_OUT;
+    *other += VSHI_LAID_OUT;
     if (!is_valid(s->known[i])) {
         return;
     }
-    *other += VALID;
+    *other += VSHI_VALID;
     bool shaped = false;
     for (size_t k = 0; k < s->light_count; ++k) {
         const double v = (double)s->shadow[k * s->width * s->height + i];
         const bool in_penumbra = v > 1.0 - FULL && v < FULL;
-        *other += LIT + (in_penumbra && s->lights_by_rays ? s->finer * PENUMBRA : 0.0);
+        *other += VSHI_LIT + (in_penumbra && s->lights_by_rays ? s->finer * VSHI_PENUMBRA : 0.0);
         shaped = shaped || in_penumbra;
     }
     *other += s->azimuths;
@@ -167,7 +151,7 @@ static void weigh(const shaded *s, vshi_share_rows *share) {
         sums few = at < rows ? sum_rows(s, at, at + 1) : all;
         few = few.count > 0.0 ? few : all;
         if (few.count == 0.0) {
-            few = (sums){1.0, 1.0, LAID_OUT + VALID, 0.0, 0.0};
+            few = (sums){1.0, 1.0, VSHI_LAID_OUT + VSHI_VALID, 0.0, 0.0};
         }
         const double part = of->samples / few.count;
         const double open = part * few.open + of->edges * edge * few.valid / few.count;
@@ -207,103 +191,6 @@ done:
     return result;
 }
 
-/* --- of what a scene asks for */
-
-/* What rays take more for a smaller error than COMMON. */
-static double finer_of(const vsh_scene *scene) {
-    const double finer = COMMON / fmax(scene->shade.max_error, 1e-4);
-    return finer > 1.0 ? finer * sqrt(finer) : finer;
-}
-
-/* Times that what is open is shaded. */
-static double openings_of(const vsh_scene *scene) {
-    return (scene->ao ? 1.0 : 0.0) + vsh_planes_shaded(&scene->planes);
-}
-
-/* Whether its size is what it says. */
-static bool is_sized(const vsh_receiver *receiver) {
-    return receiver->atlas != VSH_ATLAS_OBJECTS && receiver->texels_per_unit == 0.0 && receiver->pages <= 1 &&
-           receiver->max_size == 0 && receiver->width > 0 && receiver->height > 0;
-}
-
-/* What a texel takes, and whether what is open at some is not shaded. */
-typedef struct usual {
-    double light, shared, alone; /* all lights; all that is open, if texels share it or not */
-    double direct;               /* of that, what takes as much whatever the error */
-    bool shares;
-} usual;
-
-/* Whether a caster without voxels hides what is open. */
-static bool hides_open(const vsh_scene *scene, const vsh_caster *caster) {
-    bool hides = vshi_casts_itself(caster);
-    for (size_t i = 0; hides && caster->layer != NULL && i < scene->layer_count; ++i) {
-        hides = strcmp(scene->layers[i].name, caster->layer) != 0 || scene->layers[i].shade.ao != 0;
-    }
-    return hides;
-}
-
-/* Whether something is not traced against triangles of meshes, but for heights and spheres. */
-static bool marches_field(const vsh_scene *scene) {
-    bool marches = vsh_scene_marches(scene, NULL) != 0, voxels = false;
-    for (size_t i = 0; i < scene->layer_count; ++i) {
-        marches = marches || vsh_scene_marches(scene, &scene->layers[i]) != 0;
-    }
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        const vsh_caster *caster = &scene->casters[i];
-        marches = marches || (caster->type != VSH_CASTER_MESH && !vshi_casts_itself(caster));
-        voxels = voxels || !vshi_casts_itself(caster);
-    }
-    return marches && voxels;
-}
-
-/* What rays of a scene take more than those to triangles. */
-static double marching(const vsh_scene *scene) {
-    const bool rays = scene->shade.method == VSH_SHADOW_RAYS || scene->shade.ao_method == VSH_AO_RAYS;
-    const uint32_t traits = vsh_shadow_method_traits(vsh_shadow_method_resolve(scene->shade.method, 0)) |
-                            vsh_ao_method_traits(vsh_ao_method_resolve(scene->shade.ao_method, 0));
-    const bool adaptive = (traits & VSH_METHOD_KEEPS_ERROR) != 0;
-    return !marches_field(scene) ? 1.0 : rays ? MARCHED_RAYS : adaptive ? MARCHED : 1.0;
-}
-
-static usual usual_of(const vsh_scene *scene) {
-    const double finer = finer_of(scene) * marching(scene), openings = openings_of(scene);
-    usual u = {.light = (double)scene->light_count * (LIT + USUAL_PENUMBRA * finer * PENUMBRA),
-               .shared = openings * finer * USUAL_SHARED,
-               .alone = openings * finer * USUAL_ALONE,
-               .shares = openings > 0.0};
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        if (hides_open(scene, &scene->casters[i])) {
-            u.direct +=
-                openings * (scene->casters[i].type == VSH_CASTER_SPHERES ? AMONG_SPHERES : OVER_HEIGHTS);
-            u.shares = false;
-        }
-    }
-    u.alone = u.direct > 0.0 ? u.direct : u.alone;
-    return u;
-}
-
-double vshi_shares_most(const vsh_scene *scene, double least) {
-    const usual u = usual_of(scene);
-    const double least_rows = marches_field(scene) ? BETWEEN_ROWS : 1.0;
-    double ns = 0.0, own = 0.0, borders = 0.0;
-    for (size_t i = 0; i < scene->receiver_count; ++i) {
-        const vsh_receiver *receiver = &scene->receivers[i];
-        if (!is_sized(receiver)) {
-            return INFINITY;
-        }
-        const double across = receiver->supersample;
-        const double points = (double)receiver->width * receiver->height * across * across;
-        const bool shares = u.shares && receiver->supersample == 1 && receiver->ao_spacing > 1;
-        const double each = LAID_OUT + VALID + u.light + (shares ? u.shared : u.alone);
-        const double few = vshi_shares_few(receiver->width, receiver->height);
-        ns += points * each;
-        own += few * u.direct + (receiver->type == VSH_RECEIVER_HEIGHTFIELD ? TRIANGLES_OF_HEIGHTS : 0.0);
-        borders += MOST_BORDERS * receiver->height /
-                   (shares ? fmax(least_rows, SHARED_ROWS * receiver->ao_spacing) : 1.0);
-    }
-    return fmin(fmin(1e-9 * ns / least, 1.0 + borders), own > 0.0 ? MOST_OWN * ns / own : INFINITY);
-}
-
 /* What is done by rays to triangles or a field, and what by heights. */
 static void set_methods(const vsh_bake_job *job, shaded *s) {
     const vsh_occluders *occluders = job->occluders;
@@ -326,8 +213,8 @@ vsh_result vshi_shares_weigh(const vsh_bake_job *job, vshi_share_rows *share, co
     const vsh_scene *scene = &job->scene;
     shaded s = {.light_count = scene->light_count,
                 .step = share->few_step,
-                .finer = finer_of(scene),
-                .openings = openings_of(scene),
+                .finer = vshi_rays_expected(scene->shade.max_error),
+                .openings = vshi_work_openings(scene),
                 .shares = share->spacing > 1};
     set_methods(job, &s);
     share->all = 0;

@@ -6,7 +6,6 @@
 #include "base/try.h"
 
 #include <math.h>
-#include <sys/resource.h>
 
 /* The trial: voxels along the longest side, and texels on a side. */
 enum { TRIAL_RESOLUTION = 96, TRIAL_SIZE = 128 };
@@ -108,11 +107,6 @@ static vsh_result try_small(const vsh_bake_job *job, const vsh_run *run, trial *
     return result;
 }
 
-static double resident_bytes(void) {
-    struct rusage usage;
-    return getrusage(RUSAGE_SELF, &usage) == 0 ? 1024.0 * (double)usage.ru_maxrss : 0.0;
-}
-
 /* Bytes that the largest lightmap takes, the fields with it; plans all of them. */
 static vsh_result plan_bands(vsh_bake_job *job, double field_bytes, const vsh_run *run, uint64_t *largest,
                              vsh_error *error) {
@@ -164,7 +158,7 @@ vsh_result vsh_bake_job_forecast_sized(vsh_bake_job *job, const vsh_run *run, vs
     uint64_t largest;
     VSHI_TRY(plan_bands(job, f.field_bytes, &full, &largest, error));
     const double base =
-        fmax(0.0, resident_bytes() - MAKING * (double)t.made.grid_bytes); /* program and assets */
+        fmax(0.0, (double)vshi_peak_bytes() - MAKING * (double)t.made.grid_bytes); /* program and assets */
     f.peak_bytes = base + fmax(fmax(MAKING * f.grid_bytes, f.grid_bytes + f.field_bytes), (double)largest);
     vshi_give(forecast, forecast_size, &f, sizeof f);
     return VSH_OK;

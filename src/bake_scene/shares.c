@@ -2,6 +2,7 @@
 
 #include "bake/part.h"
 #include "bake_scene/lit_sink.h"
+#include "bake_scene/work.h"
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/try.h"
@@ -35,8 +36,7 @@ static size_t step_of(const vshi_share_rows *share, int32_t shards) {
  * those that windows reach are kept, and what is shot twice are some tiles of lattices; where it is
  * interpolated, the wider lattices of some rows of tiles. */
 static double border_rows(const vshi_share_rows *share) {
-    static const double LEFT_ROWS = 1.5, BETWEEN_ROWS = 6.0;
-    return share->left > 1 ? LEFT_ROWS * share->left : share->between > 1 ? BETWEEN_ROWS : 1.0;
+    return share->left > 1 ? VSHI_SHARED_ROWS * share->left : share->between > 1 ? VSHI_BETWEEN_ROWS : 1.0;
 }
 
 static double few_of(int32_t width, int32_t height, int32_t step) {

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 
 enum { ALIGNMENT = 64, LARGE_PAGE = 2 << 20 /* x86-64 */ };
 
@@ -55,4 +56,9 @@ vsh_result vshi_check_limit(const vsh_run *run, double bytes, const char *what, 
     const int decimals = run->memory_limit < 1000000 ? 3 : 0;
     return vshi_fail(error, VSH_ERROR_LIMIT, "%s: about %.*f MB are needed, over the memory limit of %.*f MB",
                      what, decimals, bytes / 1e6, decimals, (double)run->memory_limit / 1e6);
+}
+
+uint64_t vshi_peak_bytes(void) {
+    struct rusage usage;
+    return getrusage(RUSAGE_SELF, &usage) == 0 ? (uint64_t)usage.ru_maxrss * 1024 : 0;
 }

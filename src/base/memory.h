@@ -39,6 +39,9 @@ static inline void vshi_give_all(void *to, size_t size, const void *from, size_t
  * run->memory_limit together with run->memory_held. `run` may be NULL. */
 VSHI_SHARED vsh_result vshi_check_limit(const vsh_run *run, double bytes, const char *what, vsh_error *error);
 
+/* The most bytes that this process has had in memory so far; 0 where the system does not tell. */
+VSHI_SHARED uint64_t vshi_peak_bytes(void);
+
 /* What run->memory_held leaves of its limit, at least a byte; 0: there is no limit. */
 uint64_t vshi_memory_left(const vsh_run *run);
 

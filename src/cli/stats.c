@@ -2,6 +2,7 @@
 
 #include "base/bytes.h"
 #include "base/clock.h"
+#include "base/memory.h"
 #include "message.h"
 #include "signals.h"
 #include "temporary.h"
@@ -11,7 +12,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <sys/resource.h>
 #include <unistd.h>
 #include <vdbshade/reader.h>
 
@@ -21,11 +21,6 @@ double cli_stats_stage(cli_stats *stats, int stage, double since) {
     const double now = vshi_seconds();
     stats->seconds[stage] += now - since;
     return now;
-}
-
-static uint64_t peak_bytes(void) {
-    struct rusage usage;
-    return getrusage(RUSAGE_SELF, &usage) == 0 ? (uint64_t)usage.ru_maxrss * 1024 : 0;
 }
 
 /* Of the field, for each active voxel of the level set. */
@@ -258,7 +253,7 @@ static int write_file(const cli_stats *stats, const vsh_run *run, const char *pa
         {"skipped", stats->shade.skipped},
         {"rays", stats->shade.rays},
         {"refined", stats->shade.refined},
-        {"peak_bytes", peak_bytes()},
+        {"peak_bytes", vshi_peak_bytes()},
         own[stats->of][2],
         {"threads", (uint64_t)stats->threads},
         {"levels", (uint64_t)stats->casters.levels},
@@ -363,7 +358,7 @@ void cli_stats_say(const cli_stats *stats) {
     char field[32], peak[32];
     if (stats->casters.field_bytes == 0) {
         cli_say("no voxels, %d thread%s, peak %s", stats->threads, stats->threads == 1 ? "" : "s",
-                vshi_bytes_text(peak_bytes(), peak, sizeof peak));
+                vshi_bytes_text(vshi_peak_bytes(), peak, sizeof peak));
     } else {
         cli_say("voxel %.4g, %" PRIu64
                 " active voxels, field of %d level%s in %s (%.1f bytes a voxel), %d thread%s, "
@@ -372,7 +367,7 @@ void cli_stats_say(const cli_stats *stats) {
                 stats->casters.levels == 1 ? "" : "s",
                 vshi_bytes_text(stats->casters.field_bytes, field, sizeof field), bytes_per_voxel(stats),
                 stats->threads, stats->threads == 1 ? "" : "s",
-                vshi_bytes_text(peak_bytes(), peak, sizeof peak));
+                vshi_bytes_text(vshi_peak_bytes(), peak, sizeof peak));
     }
     say_choice(stats);
     say_errors(stats);

@@ -7,7 +7,6 @@
 #include "volume/volume_blocks.h"
 
 #include <math.h>
-#include <sys/resource.h>
 
 /* Pieces of work that are tried, from all over the volume. */
 enum { PIECES = 64 };
@@ -30,17 +29,12 @@ static void shade_some(void *user, size_t begin, size_t end) {
     }
 }
 
-static double resident_bytes(void) {
-    struct rusage usage;
-    return getrusage(RUSAGE_SELF, &usage) == 0 ? 1024.0 * (double)usage.ru_maxrss : 0.0;
-}
-
 static vsh_result measure(vshi_volume_bake *bake, const vsh_light *lights, const vsh_run *run,
                           vsh_volume_forecast *f, vsh_error *error) {
     const size_t pieces = (bake->block_count + VSHI_VOLUME_GRAIN - 1) / VSHI_VOLUME_GRAIN;
     trial t = {bake, (pieces + PIECES - 1) / PIECES};
     const size_t tried = (pieces + t.step - 1) / t.step;
-    const double held = resident_bytes();
+    const double held = (double)vshi_peak_bytes();
     vshi_job *job = vshi_job_begin(run, "volume", tried);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "volume: the system refused memory");

@@ -180,12 +180,7 @@ static vsh_result take_part(merging *m, const char *path, int32_t shard, vsh_err
     VSHI_TRY_DONE(check_working(m, &head, path, error));
     VSHI_TRY_DONE(idle ? check_idle(&head, path, error) : check_head(m, &head, path, error));
     VSHI_TRY_DONE(look_over(&input, m->run, &stats, error));
-    if (!idle) {
-        VSHI_TRY_DONE(read_blocks(m, &input, &head, error));
-    } else if (input.front.body_bytes > 0) {
-        result = vshi_part_damaged(path, "more than its blocks", error);
-        goto done;
-    }
+    VSHI_TRY_DONE(read_blocks(m, &input, &head, error));
     vshi_shade_stats_add(&m->bake->stats, &stats);
 done:
     vshi_part_about_free(&about);

@@ -6,6 +6,7 @@
 #include "base/parallel.h"
 #include "base/try.h"
 #include "shade/occluders.h"
+#include "shade/rays_expected.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -40,9 +41,10 @@ void vshi_volume_stats_code(vshi_part_code *code, vsh_shade_stats *s) {
 
 /* --- how many have blocks */
 
-/* Nanoseconds or so of a voxel in a band, half of which are inside: what any takes, a light, and AO; of these
- * what rays are for falls with the error, of which it is. Rather too little. */
-static const double ANY = 100.0, LIGHT = 150.0, LIGHT_RAYS = 200.0, AO_RAYS = 3000.0, COMMON_ERROR = 0.02;
+/* Nanoseconds or so of a voxel in a band, half of which are inside: what any takes, a light, and AO; what of
+ * these is rays goes by the error. Rather too little: AO is 1600 to 11 000 within 0.3 to all of the cloister.
+ */
+static const double ANY = 100.0, LIGHT = 150.0, LIGHT_RAYS = 200.0, AO_RAYS = 3000.0;
 
 int32_t vsh_volume_shards(double voxels, size_t light_count, const vsh_volume_options *options, double least,
                           int32_t shard_count) {
@@ -52,8 +54,7 @@ int32_t vsh_volume_shards(double voxels, size_t light_count, const vsh_volume_op
         !(least > 0.0) || !(voxels >= 0.0)) {
         return shard_count;
     }
-    const double finer = COMMON_ERROR / fmax((double)own.shade.max_error, 1e-4);
-    const double rays = finer > 1.0 ? finer * sqrt(finer) : finer;
+    const double rays = vshi_rays_expected((double)own.shade.max_error);
     const double ns =
         ANY + (double)light_count * (LIGHT + rays * LIGHT_RAYS) + (own.ao != 0 ? rays * AO_RAYS : 0.0);
     const double most = floor(1e-9 * ns * voxels / least);
