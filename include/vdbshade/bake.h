@@ -165,8 +165,8 @@ VSH_API vsh_result vsh_texels_create_band(const vsh_charts *charts, int32_t firs
 
 /* The samples behind a lightmap, in the order in which they are shaded. A view into the texels. Positions are
  * lifted off coarse triangles towards the smooth surface (Hanika, "Hacking the shadow terminator", 2021).
- * Rays against triangles begin on the sample's own where others are in the lift's way, or all of a light is
- * over it. */
+ * Shadow rays begin there where the light grazes the triangle. They begin on the triangle where the light
+ * stands well above it, and in between near other triangles. Rays of AO begin on the triangle. */
 typedef struct vsh_texel_samples {
     size_t count;            /* samples */
     const double *positions; /* [count][3], world units */

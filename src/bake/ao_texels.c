@@ -98,11 +98,11 @@ static vsh_result shoot(sharing *s, const vsh_occluders *occluders, const vsh_ru
     vshi_ao_estimates *e = &s->e;
     vsh_run quiet = *run;
     quiet.progress = NULL;
-    VSHI_TRY(vshi_shade_ao(occluders, e->points, NULL, e->options, run, e->shot, NULL, e->open, &e->share,
-                           NULL, error));
+    VSHI_TRY(vshi_shade_ao(occluders, e->points, s->origins->face, NULL, e->options, run, e->shot, NULL,
+                           e->open, &e->share, NULL, error));
     return vshi_ao_reach_further(&e->reach, &e->share)
-               ? vshi_shade_ao(occluders, e->points, NULL, e->options, &quiet, e->shot, NULL, e->open,
-                               &e->share, NULL, error)
+               ? vshi_shade_ao(occluders, e->points, s->origins->face, NULL, e->options, &quiet, e->shot,
+                               NULL, e->open, &e->share, NULL, error)
                : VSH_OK;
 }
 

@@ -43,18 +43,21 @@ bool vshi_baking_shares(const vshi_baking *bake) {
     return vshi_ao_is_shared(bake->occluders, &bake->shade, bake->texels->ao_spacing, bake->layered_ao);
 }
 
-/* Where rays begin: lifted already, but for methods that trace triangles. Those know the surface better than
- * any voxel does, and lift their cones themselves. */
-static vsh_points points_of(const vshi_baking *bake, bool traced, vsh_shade_options *shade,
-                            const vsh_occluders **occluders) {
-    const vshi_origins *origins = &bake->origins;
+/* Finds where the rays to a light, or of AO (NULL), begin. Marched ones have their start offset already;
+ * traced ones begin on the triangles, and shading adds the offset. */
+static vsh_result place_points(vshi_baking *bake, const vsh_light *light, bool traced,
+                               vsh_shade_options *shade, const vsh_occluders **occluders, vsh_points *points,
+                               vsh_error *error) {
+    vshi_origins *origins = &bake->origins;
     *occluders = traced ? bake->occluders : &bake->lifted;
     if (!traced) {
         shade->start_offset = 0.0;
         shade->surface_offset = 0.0;
     }
-    return (vsh_points){origins->count, traced ? origins->surface : origins->position, origins->normal,
-                        origins->texel};
+    const vshi_lifter lifter = vshi_lifter_open(bake->texels, bake->occluders, light);
+    VSHI_TRY(vshi_lift_origins(&lifter, traced, &bake->quiet, origins, error));
+    *points = (vsh_points){origins->count, origins->start, origins->normal, origins->texel};
+    return VSH_OK;
 }
 
 vsh_result vshi_baking_average(vshi_baking *bake, const float *values, size_t components, float *plane,
@@ -107,12 +110,12 @@ vsh_result vshi_bake_light(vshi_baking *bake, size_t index, vsh_error *error) {
     const vsh_light *light = &bake->lights[index];
     vsh_shade_options shade = bake->shade;
     const vsh_occluders *occluders;
-    const vsh_points points = points_of(bake, vshi_baking_traces_shadow(bake), &shade, &occluders);
+    vsh_points points;
     const double square = bake->stats.shade.square_error;
     float *shadow = lightmap->shadow != NULL ? lightmap->shadow[index] : NULL;
     float *errors = lightmap->shadow_error != NULL ? lightmap->shadow_error[index] : NULL;
     float *tinted = lightmap->tint != NULL ? lightmap->tint[index] : NULL;
-    VSHI_TRY(vshi_lift_for(bake->texels, light, &bake->quiet, &bake->origins, error));
+    VSHI_TRY(place_points(bake, light, vshi_baking_traces_shadow(bake), &shade, &occluders, &points, error));
     vshi_point_rows rows = bake->origins.rows;
     rows.only = bake->known != NULL; /* nothing is copied from the others */
     VSHI_TRY(vshi_shade_shadow(occluders, &points, &rows, light, &shade, &bake->run, bake->values,
@@ -138,14 +141,14 @@ vsh_result vshi_bake_light(vshi_baking *bake, size_t index, vsh_error *error) {
 vsh_result vshi_baking_open(vshi_baking *bake, bool sky, float *deviation, float *bent, vsh_error *error) {
     vsh_shade_options shade = vshi_baking_options(bake, sky);
     const vsh_occluders *occluders;
-    const vsh_points points = points_of(bake, vshi_baking_traces_ao(bake), &shade, &occluders);
-    VSHI_TRY(vshi_lift_for(bake->texels, NULL, &bake->quiet, &bake->origins, error));
+    vsh_points points;
+    VSHI_TRY(place_points(bake, NULL, vshi_baking_traces_ao(bake), &shade, &occluders, &points, error));
     if (bake->row_work != NULL) {
         bake->origins.rows.work = bake->row_work + bake->origins.rows.count;
     }
     if (!vshi_baking_interpolates(bake)) {
-        return vshi_shade_ao(occluders, &points, &bake->origins.rows, &shade, &bake->run, bake->values,
-                             deviation, bent, NULL, &bake->stats.shade, error);
+        return vshi_shade_ao(occluders, &points, bake->origins.face, &bake->origins.rows, &shade, &bake->run,
+                             bake->values, deviation, bent, NULL, &bake->stats.shade, error);
     }
     bake->keep.sky = sky;
     return vshi_baking_shares(bake)
@@ -198,8 +201,8 @@ vsh_result vshi_baking_choose_held(vshi_baking *bake, vsh_error *error) {
     const bool traced =
         ((bake->needs & VSHI_NEEDS_LIGHTS) == 0 || vshi_baking_traces_shadow(bake)) &&
         ((bake->needs & (VSHI_NEEDS_AO | VSHI_NEEDS_OPEN)) == 0 || vshi_baking_traces_ao(bake));
-    return vshi_field_error_choose(bake->texels, &bake->origins, bake->state, &truth, traced, &bake->quiet,
-                                   &bake->held, error);
+    return vshi_field_error_choose(bake->texels, &bake->origins, bake->state, bake->occluders, &truth, traced,
+                                   &bake->quiet, &bake->held, error);
 }
 
 /* Channels in the order of their errors: lights, AO, the sky. */

@@ -355,7 +355,7 @@ void vsh_charts_get_info_sized(const vsh_charts *charts, vsh_charts_info *info, 
 
 double vshi_bake_bytes(const vshi_bake_need *need) {
     const double texels = (double)need->width * need->rows;
-    double sample = vshi_origins_sample_bytes(need->traced);
+    double sample = vshi_origins_sample_bytes();
     const int floats = (need->values ? 1 : 0) + (need->errors ? 1 : 0) + (need->irradiance ? 3 : 0) +
                        (need->bent ? 3 : 0) + (need->tint ? 3 : 0);
     sample += (double)floats * sizeof(float);

@@ -38,7 +38,6 @@ struct vshi_field_error_sample {
     size_t sample;   /* of the texels' */
     size_t packed;   /* of the valid ones; NONE: it is not */
     size_t filled;   /* its texel among those held, if that is filled from others; NONE: it is not */
-    bool dropped;    /* its rays begin on its triangle, as of vshi_lift_drop() */
     uint32_t weight; /* samples that it stands for */
     bool counts;     /* the casters leave it valid, and it has a value */
 };
@@ -144,14 +143,9 @@ static bool is_outside(const vshi_field_error *share, const double position[3], 
 
 static void look(void *user, size_t begin, size_t end) {
     const vshi_field_error *share = user;
-    const vshi_lift_light no_light = vshi_lift_light_of(NULL);
     for (size_t k = begin; k < end; ++k) {
         vshi_field_error_sample *s = &share->samples[k];
-        if (share->truth.triangles != NULL) {
-            vshi_lift_drop(share->texels, share->truth.triangles, s->sample, s->sample + 1, share->dropped);
-        }
-        s->dropped = share->dropped[s->sample] != 0;
-        const vshi_vec p = vshi_lift_place(share->texels, &no_light, s->sample, s->dropped);
+        const vshi_vec p = vshi_sample_foot(share->texels, s->sample);
         const double position[3] = {p.x, p.y, p.z};
         const float *normal = share->texels->geometric + 3 * s->sample;
         if (share->traced) { /* what is valid was looked at in the same way */
@@ -188,11 +182,11 @@ vshi_truth vshi_field_error_truth(const vsh_occluders *occluders, const vsh_shad
     return truth;
 }
 
-vsh_result vshi_field_error_choose(const vsh_texels *texels, vshi_origins *origins, const uint8_t *state,
+vsh_result vshi_field_error_choose(const vsh_texels *texels, const vshi_origins *origins,
+                                   const uint8_t *state, const vsh_occluders *occluders,
                                    const vshi_truth *truth, bool traced, const vsh_run *run,
                                    vshi_field_error *share, vsh_error *error) {
-    *share =
-        (vshi_field_error){.texels = texels, .truth = *truth, .traced = traced, .dropped = origins->dropped};
+    *share = (vshi_field_error){.texels = texels, .truth = *truth, .traced = traced, .occluders = occluders};
     const size_t step = step_of(texels, traced), count = count_groups(texels, step > 0 ? step : 1);
     VSHI_TRY(
         vshi_allocate((void **)&share->samples, count, sizeof *share->samples, "error of the field", error));
@@ -214,7 +208,7 @@ void vshi_field_error_free(vshi_field_error *share) {
 typedef struct holding {
     const vshi_field_error *share;
     vshi_truth truth;
-    vshi_lift_light light;
+    vshi_lifter lifter;
     vshi_vec up;
     const float *values, *filled; /* one of them is NULL */
     const vshi_ao_keep *keep;
@@ -234,7 +228,8 @@ static void keep_count(const holding *h, const vshi_field_error_sample *s, const
     const vsh_texels *texels = h->share->texels;
     int32_t free[2], even;
     if (vshi_truth_count(&h->truth, position, texels->normal + 3 * s->sample,
-                         (uint32_t)vshi_sample_place(texels, s->sample), free, &even)) {
+                         texels->geometric + 3 * s->sample, (uint32_t)vshi_sample_place(texels, s->sample),
+                         free, &even)) {
         shot->held[0] = s->weight | (even == VSHI_TRUTH_EVEN_HIDDEN ? VSHI_AO_EVEN_HIDDEN
                                      : even == VSHI_TRUTH_EVEN_FREE ? VSHI_AO_EVEN_FREE
                                                                     : 0);
@@ -256,8 +251,14 @@ static void hold(void *user, size_t begin, size_t end) {
     const vsh_texels *texels = h->share->texels;
     for (size_t k = begin; k < end; ++k) {
         const vshi_field_error_sample *s = &h->share->samples[k];
-        const vshi_vec p = vshi_lift_place(texels, &h->light, s->sample, s->dropped);
+        /* Where a light is cut by the plane of the triangle, the lift undoes what the facet hides. Elsewhere
+         * it only moves shadows, which is an error. */
+        vshi_vec p = vshi_sample_foot(texels, s->sample);
+        if (vshi_light_is_cut(&h->lifter, s->sample)) {
+            p = vshi_add(p, vshi_lift_find(&h->lifter, s->sample));
+        }
         const double position[3] = {p.x, p.y, p.z};
+        const float *face = h->truth.light == NULL ? texels->geometric + 3 * s->sample : NULL;
         double value = NAN, seen[2];
         vshi_ao_shot *left = left_of(h, s);
         h->share->square[k] = NAN;
@@ -271,7 +272,7 @@ static void hold(void *user, size_t begin, size_t end) {
         if (s->counts && s->packed == NONE && h->filled != NULL) {
             value = (double)h->filled[s->filled];
         }
-        if (!isnan(value) && vshi_truth_twice(&h->truth, position, texels->normal + 3 * s->sample,
+        if (!isnan(value) && vshi_truth_twice(&h->truth, position, texels->normal + 3 * s->sample, face,
                                               (uint32_t)vshi_sample_place(texels, s->sample), value, seen)) {
             h->share->square[k] = (value - seen[0]) * (value - seen[1]);
         }
@@ -284,14 +285,14 @@ vsh_result vshi_field_error_add(vshi_field_error *share, const vsh_light *light,
                                 vsh_error *error) {
     holding h = {.share = share,
                  .truth = share->truth,
-                 .light = vshi_lift_light_of(light),
+                 .lifter = vshi_lifter_open(share->texels, share->occluders, light),
                  .up = vshi_vec_of(options->ao_up),
                  .values = values,
                  .filled = filled,
                  .keep = keep};
-    const bool one_ray = light != NULL && vshi_light_is_point(&h.light.place);
+    const bool one_ray = light != NULL && vshi_light_is_point(&h.lifter.place);
     h.truth.light = light;
-    h.truth.place = h.light.place;
+    h.truth.place = h.lifter.place;
     h.truth.distance = options->ao_distance;
     h.truth.up = vshi_dot(h.up, h.up) > 0.0 ? &h.up : NULL;
     h.truth.rays = one_ray ? 1 : vshi_field_error_rays(options->max_error);

@@ -17,7 +17,7 @@ typedef struct vshi_field_error {
     const vsh_texels *texels;
     vshi_truth truth; /* but for what differs from channel to channel */
     bool traced;
-    uint8_t *dropped; /* the origins' */
+    const vsh_occluders *occluders;
     size_t count;
     vshi_field_error_sample *samples;
     double *square; /* [count]: of one channel */
@@ -28,10 +28,10 @@ vshi_truth vshi_field_error_truth(const vsh_occluders *occluders, const vsh_shad
 
 /* Chooses them of the band's own rows, and looks at which the casters leave valid. `state` [texels held]
  * holds VSHI_TEXEL_…; `truth` has the casters and the lift; `traced`: all values came by rays to them, so
- * that they decided what is valid too. `origins`, whose `dropped` is set for
- * them, outlive them. Free with vshi_field_error_free() also after an error. Errors:
+ * that they decided what is valid too. Free with vshi_field_error_free() also after an error. Errors:
  * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-vsh_result vshi_field_error_choose(const vsh_texels *texels, vshi_origins *origins, const uint8_t *state,
+vsh_result vshi_field_error_choose(const vsh_texels *texels, const vshi_origins *origins,
+                                   const uint8_t *state, const vsh_occluders *occluders,
                                    const vshi_truth *truth, bool traced, const vsh_run *run,
                                    vshi_field_error *share, vsh_error *error);
 void vshi_field_error_free(vshi_field_error *share);

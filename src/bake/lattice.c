@@ -79,6 +79,7 @@ static void pack(void *user, size_t begin, size_t end) {
             if (l->state[i] == LATTICE_CHOSEN) {
                 memcpy(l->position + 3 * next, l->points->positions + 3 * i, 3 * sizeof(double));
                 memcpy(l->normal + 3 * next, l->points->normals + 3 * i, 3 * sizeof(float));
+                memcpy(l->face + 3 * next, l->origins->face + 3 * i, 3 * sizeof(float));
                 l->texel[next] = l->points->texels[i];
                 l->number[next++] = (uint32_t)i;
             }
@@ -184,10 +185,11 @@ static vsh_result shade_pass(vshi_lattice *l, const vsh_shade_options *options, 
     const char *what = "AO texels";
     l->number = l->texel = NULL;
     l->position = NULL;
-    l->normal = l->chosen_values = l->chosen_deviation = l->chosen_bent = NULL;
+    l->normal = l->face = l->chosen_values = l->chosen_deviation = l->chosen_bent = NULL;
     VSHI_TRY_DONE(vshi_allocate((void **)&l->number, count, sizeof *l->number, what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&l->position, count, 3 * sizeof(double), what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&l->normal, count, 3 * sizeof(float), what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&l->face, count, 3 * sizeof(float), what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&l->texel, count, sizeof *l->texel, what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&l->chosen_values, count, sizeof(float), what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&l->chosen_deviation, l->deviation != NULL ? count : 0,
@@ -201,7 +203,7 @@ static vsh_result shade_pass(vshi_lattice *l, const vsh_shade_options *options, 
     }
     const vsh_points points = {count, l->position, l->normal, l->texel};
     const vshi_point_rows rows = chosen_rows(l, count);
-    VSHI_TRY_DONE(vshi_shade_ao(l->occluders, &points, &rows, &shade, run, l->chosen_values,
+    VSHI_TRY_DONE(vshi_shade_ao(l->occluders, &points, l->face, &rows, &shade, run, l->chosen_values,
                                 l->chosen_deviation, l->chosen_bent, NULL, stats, error));
     VSHI_TRY_DONE(vshi_parallel_for(job, count, 4096, 0, unpack, l, error));
 done:
@@ -209,6 +211,7 @@ done:
     free(l->chosen_deviation);
     free(l->chosen_values);
     free(l->texel);
+    free(l->face);
     free(l->normal);
     free(l->position);
     free(l->number);
@@ -262,7 +265,7 @@ static void add_errors(const vshi_lattice *l, vsh_shade_stats *stats) {
 
 double vshi_lattice_bytes(double samples, double texels, bool bent) {
     return texels * sizeof(uint32_t) +
-           samples * (1.0 + 3.0 * sizeof(double) + (bent ? 11.0 : 8.0) * sizeof(float));
+           samples * (1.0 + 3.0 * sizeof(double) + (bent ? 14.0 : 11.0) * sizeof(float));
 }
 
 vsh_result vshi_lattice_ao(const vsh_occluders *occluders, const vsh_texels *texels,

@@ -27,7 +27,7 @@ typedef struct vshi_lattice {
     /* of the chosen */
     uint32_t *number;
     double *position;
-    float *normal;
+    float *normal, *face;
     uint32_t *texel;
     float *chosen_values, *chosen_deviation, *chosen_bent;
     size_t *row_start; /* [rows of the origins + 1] */

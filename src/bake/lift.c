@@ -1,82 +1,95 @@
 #include "bake/lift.h"
 #include "base/elementary.h"
 #include "base/parallel.h"
+#include "shade/layers.h"
 #include "trace/embree.h"
 
 #include <math.h>
 
-/* Where the ray begins that looks for triangles in a lift's way, in the height that rays on triangles begin
- * at: some roundings of a float over the sample's own triangle. */
-static const double FIRST_PART = 0.125;
+/* Rays that look for neighbours begin this far above the triangle, in units of vshi_triangles_lift(): more
+ * than the rounding of floats. */
+static const double START = 0.125;
 
-/* How far it goes, lifts: a sample may come half way to what is over it, or it would stand in its shadow. */
-static const double ROOM = 2.0;
+/* A neighbour at this distance or farther leaves the lift as it is; a closer one reduces it in proportion. In
+ * units of the lift: with less than 2 a sample may end up inside its neighbour or above a low one. */
+static const double ROOM = 4.0;
 
-/* The sine of how high the lowest part of a light stands over a triangle whose samples need no lift for it:
- * 3°. A shadow's edge then moves by 20 lifts at most where one triangle's samples are lifted and those of the
- * next are not. */
+/* Sine of the elevation of the light's lowest point over the triangle (3 degrees) from which on a sample is
+ * not lifted: a lift also moves the shadows of everything else. Below it the lift fades in. */
 static const double WELL_ABOVE = 0.05;
 
-void vshi_lift_drop(const vsh_texels *texels, const vsh_triangles *triangles, size_t first, size_t last,
-                    uint8_t *dropped) {
-    const double hair = vshi_triangles_lift(triangles), start = FIRST_PART * hair;
-    vshi_segment_ray rays[VSHI_ORIGIN_BLOCK];
-    uint16_t of[VSHI_ORIGIN_BLOCK];
-    bool blocked[VSHI_ORIGIN_BLOCK];
-    size_t count = 0;
-    for (size_t i = first; i < last; ++i) {
-        const vshi_vec lift = vshi_vec_off(texels->lift + 3 * i);
-        const double length = vshi_length(lift);
-        if (!(length > start)) {
-            continue;
-        }
-        const vshi_vec low =
-            vshi_add(vshi_lift_foot(texels, i), vshi_scale(vshi_vec_off(texels->geometric + 3 * i), start));
-        const vshi_vec up = vshi_scale(lift, 1.0 / length);
-        rays[count] = (vshi_segment_ray){{low.x, low.y, low.z}, {up.x, up.y, up.z}, ROOM * length + hair};
-        of[count++] = (uint16_t)(i - first);
+vshi_lifter vshi_lifter_open(const vsh_texels *texels, const vsh_occluders *occluders,
+                             const vsh_light *light) {
+    vshi_lifter lifter = {.texels = texels, .occluders = occluders, .light = light};
+    if (light != NULL) {
+        lifter.place = vshi_light_in_world(light);
     }
-    vshi_triangles_blocked(triangles, rays, count, blocked);
-    for (size_t k = 0; k < count; ++k) {
-        dropped[first + of[k]] = dropped[first + of[k]] || blocked[k];
-    }
+    return lifter;
 }
 
-typedef struct aiming {
-    const vsh_texels *texels;
-    vshi_lift_light light;
-    vshi_origins *origins;
-} aiming;
-
-/* Whether all of the light is well above the triangle of a sample at `foot`. */
-static bool is_above(const vsh_texels *texels, const vshi_lift_light *l, size_t sample, vshi_vec foot) {
-    const vshi_vec normal = vshi_vec_off(texels->geometric + 3 * sample);
+/* Sine of the elevation of the light's lowest point over the triangle. */
+static double find_elevation(const vshi_lifter *l, size_t sample) {
+    const vshi_vec normal = vshi_vec_off(l->texels->geometric + 3 * sample);
     const vshi_light_place *place = &l->place;
     if (place->parallel) {
-        return vshi_dot(normal, place->towards) > place->sine + WELL_ABOVE;
+        return vshi_dot(normal, place->towards) - place->sine;
     }
-    const vshi_vec to = vshi_sub(place->centre, foot);
-    return vshi_dot(normal, to) > place->radius + WELL_ABOVE * vshi_length(to);
+    const vshi_vec to = vshi_sub(place->centre, vshi_sample_foot(l->texels, sample));
+    const double distance = vshi_length(to);
+    return distance > 0.0 ? (vshi_dot(normal, to) - place->radius) / distance : -1.0;
 }
 
-vshi_lift_light vshi_lift_light_of(const vsh_light *light) {
-    vshi_lift_light l = {.light = light};
-    if (light != NULL) {
-        l.place = vshi_light_in_world(light);
+bool vshi_light_is_cut(const vshi_lifter *lifter, size_t sample) {
+    return lifter->light != NULL && find_elevation(lifter, sample) < 0.0;
+}
+
+/* Distance to the nearest triangle straight up and at 45 degrees to four sides, at most `far`. */
+static double find_room(const vsh_triangles *triangles, vshi_vec foot, vshi_vec normal, vshi_vec up,
+                        double far) {
+    const vshi_vec from = vshi_add(foot, vshi_scale(normal, START * vshi_triangles_lift(triangles)));
+    vshi_vec u, v;
+    vshi_frame(up, &u, &v);
+    const vshi_vec ways[5] = {up, vshi_unit(vshi_add(up, u)), vshi_unit(vshi_sub(up, u)),
+                              vshi_unit(vshi_add(up, v)), vshi_unit(vshi_sub(up, v))};
+    double room = far;
+    for (int k = 0; k < 5; ++k) {
+        const vshi_vec d = ways[k];
+        const vshi_segment_ray ray = {{from.x, from.y, from.z}, {d.x, d.y, d.z}, room};
+        room = fmin(room, vshi_triangles_distance(triangles, &ray));
     }
-    return l;
+    return room;
 }
 
-vshi_vec vshi_lift_place(const vsh_texels *texels, const vshi_lift_light *light, size_t sample,
-                         bool dropped) {
-    const vshi_vec foot = vshi_lift_foot(texels, sample);
-    const bool low = dropped || (light->light != NULL && is_above(texels, light, sample, foot));
-    return low ? foot : vshi_vec_of(texels->position + 3 * sample);
+vshi_vec vshi_lift_find(const vshi_lifter *l, size_t sample) {
+    static const vshi_vec NONE = {0.0, 0.0, 0.0};
+    const vshi_vec lift = vshi_vec_off(l->texels->lift + 3 * sample);
+    const double length = vshi_length(lift);
+    if (l->light == NULL || !(length > 0.0)) {
+        return NONE;
+    }
+    const double elevation = find_elevation(l, sample);
+    double share = elevation <= 0.0 ? 1.0 : fmax(1.0 - elevation / WELL_ABOVE, 0.0);
+    const vshi_vec foot = vshi_sample_foot(l->texels, sample), up = vshi_scale(lift, 1.0 / length);
+    const vshi_vec normal = vshi_vec_off(l->texels->geometric + 3 * sample);
+    for (size_t k = 0; share > 0.0 && k <= l->occluders->layer_count; ++k) {
+        const vsh_triangles *triangles =
+            k == 0 ? l->occluders->triangles : l->occluders->layers[k - 1].triangles;
+        if (triangles != NULL) {
+            share *= find_room(triangles, foot, normal, up, ROOM * length) / (ROOM * length);
+        }
+    }
+    return vshi_scale(lift, share);
 }
 
-static void aim_blocks(void *user, size_t begin, size_t end) {
-    const aiming *a = user;
-    const vsh_texels *texels = a->texels;
+typedef struct lifting {
+    const vshi_lifter *lifter;
+    vshi_origins *origins;
+    bool traced;
+} lifting;
+
+static void lift_blocks(void *user, size_t begin, size_t end) {
+    const lifting *a = user;
+    const vsh_texels *texels = a->lifter->texels;
     const vshi_origins *origins = a->origins;
     for (size_t block = begin; block < end; ++block) {
         size_t next = origins->before[block];
@@ -85,8 +98,10 @@ static void aim_blocks(void *user, size_t begin, size_t end) {
             if (!origins->valid[i]) {
                 continue;
             }
-            double *at = origins->surface + 3 * next++;
-            const vshi_vec p = vshi_lift_place(texels, &a->light, i, origins->dropped[i]);
+            const vshi_vec base =
+                a->traced ? vshi_sample_foot(texels, i) : vshi_vec_of(origins->position + 3 * next);
+            const vshi_vec p = vshi_add(base, vshi_lift_find(a->lifter, i));
+            double *at = origins->start + 3 * next++;
             at[0] = p.x;
             at[1] = p.y;
             at[2] = p.z;
@@ -94,17 +109,14 @@ static void aim_blocks(void *user, size_t begin, size_t end) {
     }
 }
 
-vsh_result vshi_lift_for(const vsh_texels *texels, const vsh_light *light, const vsh_run *run,
-                         vshi_origins *origins, vsh_error *error) {
-    if (origins->surface == NULL) {
-        return VSH_OK;
-    }
-    aiming a = {.texels = texels, .light = vshi_lift_light_of(light), .origins = origins};
+vsh_result vshi_lift_origins(const vshi_lifter *lifter, bool traced, const vsh_run *run,
+                             vshi_origins *origins, vsh_error *error) {
+    lifting task = {lifter, origins, traced};
     vshi_job *job = vshi_job_begin(run, "lift", origins->blocks);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "lift: the system refused memory");
     }
-    const vsh_result result = vshi_parallel_for(job, origins->blocks, 1, 1, aim_blocks, &a, error);
+    const vsh_result result = vshi_parallel_for(job, origins->blocks, 1, 1, lift_blocks, &task, error);
     vshi_job_end(job);
     return result;
 }

@@ -1,37 +1,37 @@
-/* Samples that are lifted off their triangles, for their own facets not to hide light from them (surface.h),
- * and where they are not. */
+/* Where the shadow rays of a sample begin: on its triangle, or lifted off it towards the smooth surface that
+ * the vertex normals describe (smooth_surface.h), so that the facets of a smooth mesh do not hide a light
+ * that is above the smooth surface. AO needs no lift: it leaves out the directions below the face. */
 #ifndef VSHI_BAKE_LIFT_H
 #define VSHI_BAKE_LIFT_H
 
 #include "bake/origins.h"
 #include "light/view.h"
 
-/* Where a sample stands: on its triangle. */
-static inline vshi_vec vshi_lift_foot(const vsh_texels *texels, size_t sample) {
+/* The sample's position on its triangle. */
+static inline vshi_vec vshi_sample_foot(const vsh_texels *texels, size_t sample) {
     return vshi_sub(vshi_vec_of(texels->position + 3 * sample), vshi_vec_off(texels->lift + 3 * sample));
 }
 
-/* Marks in dropped[all samples] those of first … last - 1, at most VSHI_ORIGIN_BLOCK, whose lift brings them
- * through one of `triangles`, or close to it. */
-void vshi_lift_drop(const vsh_texels *texels, const vsh_triangles *triangles, size_t first, size_t last,
-                    uint8_t *dropped);
+/* What the lift of a sample depends on. */
+typedef struct vshi_lifter {
+    const vsh_texels *texels;
+    const vsh_occluders *occluders; /* their triangles limit the lift */
+    const vsh_light *light;         /* NULL: AO, which lifts nothing */
+    vshi_light_place place;         /* of the light, in world space */
+} vshi_lifter;
 
-/* A light, or (NULL) AO, that samples are lifted for. */
-typedef struct vshi_lift_light {
-    const vsh_light *light;
-    vshi_light_place place; /* of the light, in world space */
-} vshi_lift_light;
+vshi_lifter vshi_lifter_open(const vsh_texels *texels, const vsh_occluders *occluders,
+                             const vsh_light *light);
 
-vshi_lift_light vshi_lift_light_of(const vsh_light *light);
+/* Whether a part of the light lies below the plane of the sample's triangle. */
+bool vshi_light_is_cut(const vshi_lifter *lifter, size_t sample);
 
-/* Where a sample's rays to it begin. */
-vshi_vec vshi_lift_place(const vsh_texels *texels, const vshi_lift_light *light, size_t sample, bool dropped);
+/* How far the sample is lifted for the light: texels->lift times a share from 0 to 1. */
+vshi_vec vshi_lift_find(const vshi_lifter *lifter, size_t sample);
 
-/* Sets where rays to a light begin, origins->surface, or rays of AO where it is NULL. Facets hide light from
- * their neighbours where it comes in over the smooth surface but not over the facet: where all of a light is
- * well above a sample's triangle its rays begin on that, because a lift also moves the shadows of all else.
- * Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-vsh_result vshi_lift_for(const vsh_texels *texels, const vsh_light *light, const vsh_run *run,
-                         vshi_origins *origins, vsh_error *error);
+/* Sets origins->start, where the rays to a light begin: on the triangles if `traced`, else at
+ * origins->position; plus the lift. Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_lift_origins(const vshi_lifter *lifter, bool traced, const vsh_run *run,
+                             vshi_origins *origins, vsh_error *error);
 
 #endif

@@ -54,11 +54,6 @@ static size_t block_end(const lifting *l, size_t block) {
     return end < l->texels->count ? end : l->texels->count;
 }
 
-/* The sample itself, without any offset. */
-static vshi_vec place(const lifting *l, size_t i) {
-    return l->origins->dropped[i] ? vshi_lift_foot(l->texels, i) : vshi_vec_of(l->texels->position + 3 * i);
-}
-
 static void put(vshi_vec p, double at[3]) {
     at[0] = p.x;
     at[1] = p.y;
@@ -68,7 +63,7 @@ static void put(vshi_vec p, double at[3]) {
 static void lift(const lifting *l, size_t i, double offset, double shell, double origin[3]) {
     const vsh_texels *texels = l->texels;
     const double height = offset + (vshi_sample_is_sheet(texels, i) ? shell : 0.0);
-    const vshi_vec p = place(l, i);
+    const vshi_vec p = vshi_sample_foot(texels, i);
     const double at[3] = {p.x, p.y, p.z};
     for (size_t k = 0; k < 3; ++k) {
         origin[k] = at[k] + height * (double)texels->geometric[3 * i + k];
@@ -158,6 +153,32 @@ static size_t together_begin(const vsh_texels *texels, size_t i) {
     return begin == i ? i : together_end(texels, begin);
 }
 
+/* Leaves out valid samples first … last - 1 that lie on another face: every ray from there meets it at once.
+ * A short ray in the sample's own plane, across the sample, finds such faces. */
+static void leave_out_touching(const lifting *l, const vsh_triangles *triangles, size_t first, size_t last) {
+    static const double ACROSS[2] = {0.7648, 0.6442}; /* along no axis, and no edge that people build */
+    const double lift = vshi_triangles_lift(triangles);
+    vshi_segment_ray rays[TOGETHER];
+    size_t of[TOGETHER], count = 0;
+    bool blocked[TOGETHER];
+    for (size_t i = first; i < last; ++i) {
+        if (l->origins->valid[i]) {
+            const vshi_vec normal = vshi_vec_off(l->texels->geometric + 3 * i);
+            vshi_vec u, v;
+            vshi_frame(normal, &u, &v);
+            const vshi_vec d = vshi_unit(vshi_add(vshi_scale(u, ACROSS[0]), vshi_scale(v, ACROSS[1])));
+            const vshi_vec p = vshi_add(vshi_sample_foot(l->texels, i),
+                                        vshi_sub(vshi_scale(normal, lift), vshi_scale(d, 0.5 * lift)));
+            rays[count] = (vshi_segment_ray){{p.x, p.y, p.z}, {d.x, d.y, d.z}, lift};
+            of[count++] = i;
+        }
+    }
+    vshi_triangles_blocked(triangles, rays, count, blocked);
+    for (size_t k = 0; k < count; ++k) {
+        l->origins->valid[of[k]] = !blocked[k];
+    }
+}
+
 /* Looks at samples first … last - 1, which belong together, by rays against a field's triangles. */
 static void trace(const lifting *l, const looked_at *in, size_t first, size_t last) {
     double at[3 * TOGETHER];
@@ -165,7 +186,7 @@ static void trace(const lifting *l, const looked_at *in, size_t first, size_t la
     bool follows[TOGETHER];
     size_t i = first;
     do { /* there is one */
-        put(place(l, i), at + 3 * (i - first));
+        put(vshi_sample_foot(l->texels, i), at + 3 * (i - first));
         follows[i - first] =
             i > first && !vshi_sample_is_border(l->texels, i) && !vshi_sample_is_border(l->texels, i - 1);
     } while (++i < last);
@@ -178,27 +199,17 @@ static void trace(const lifting *l, const looked_at *in, size_t first, size_t la
             l->origins->seen[i] = where[i - first] == VSHI_INSIDE_SEEN;
         }
     }
+    leave_out_touching(l, in->triangles, first, last);
 }
 
 /* Samples within a heightfield or a sphere that are none of their surfaces. */
 static void look_at_solid(const lifting *l, size_t solid, size_t first, size_t last) {
     for (size_t i = first; i < last; ++i) {
-        const double *at = l->texels->position + 3 * i;
+        double at[3];
+        put(vshi_sample_foot(l->texels, i), at);
         const bool held = l->heights[solid] != NULL ? vshi_heights_hold(l->heights[solid], at)
                                                     : vshi_spheres_hold(l->spheres[solid], at);
         l->origins->valid[i] = l->origins->valid[i] && !held;
-    }
-}
-
-static void drop(void *user, size_t begin, size_t end) {
-    const lifting *l = user;
-    for (size_t block = begin; block < end; ++block) {
-        for (size_t field = 0; field < l->field_count; ++field) {
-            if (l->fields[field].triangles != NULL) {
-                vshi_lift_drop(l->texels, l->fields[field].triangles, block * VSHI_ORIGIN_BLOCK,
-                               block_end(l, block), l->origins->dropped);
-            }
-        }
     }
 }
 
@@ -273,6 +284,7 @@ static void pack(void *user, size_t begin, size_t end) {
                 lift(l, i, crease > 0 ? l->fields[crease - 1].probe : l->offset, l->fields[0].shell,
                      origins->position + 3 * next);
                 memcpy(origins->normal + 3 * next, l->texels->normal + 3 * i, 3 * sizeof(float));
+                memcpy(origins->face + 3 * next, l->texels->geometric + 3 * i, 3 * sizeof(float));
                 origins->texel[next] = sampler_texel(l->texels, i);
                 ++next;
             }
@@ -309,8 +321,8 @@ static void look_in(lifting *l, const vsh_field *field, const vsh_triangles *tri
                                               .marched = marched || triangles == NULL};
 }
 
-double vshi_origins_sample_bytes(bool traced) {
-    return 4.0 + (traced ? 6.0 : 3.0) * sizeof(double) + 4.0 * sizeof(float);
+double vshi_origins_sample_bytes(void) {
+    return 3.0 + 6.0 * sizeof(double) + 7.0 * sizeof(float);
 }
 
 vsh_result vshi_origins_create(const vsh_occluders *occluders, const vsh_texels *texels,
@@ -336,16 +348,14 @@ vsh_result vshi_origins_create(const vsh_occluders *occluders, const vsh_texels 
         }
     }
     vsh_result result;
-    vshi_job *job = vshi_job_begin(run, "validate", 3 * origins->blocks);
+    vshi_job *job = vshi_job_begin(run, "validate", 2 * origins->blocks);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", name);
     }
     VSHI_TRY_DONE(vshi_allocate((void **)&origins->valid, texels->count, 1, name, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&origins->seen, texels->count, 1, name, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&l.crease, texels->count, 1, name, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&origins->dropped, texels->count, 1, name, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&origins->before, origins->blocks + 1, sizeof(size_t), name, error));
-    VSHI_TRY_DONE(vshi_parallel_for(job, origins->blocks, 1, 1, drop, &l, error));
     VSHI_TRY_DONE(vshi_parallel_for(job, origins->blocks, 1, 1, validate, &l, error));
     VSHI_TRY_DONE(keep_needed(&l, keep, user, error));
     for (size_t block = 0; block <= origins->blocks; ++block) {
@@ -359,12 +369,10 @@ vsh_result vshi_origins_create(const vsh_occluders *occluders, const vsh_texels 
     find_rows(texels, origins);
     VSHI_TRY_DONE(
         vshi_allocate((void **)&origins->position, origins->count, 3 * sizeof(double), name, error));
-    const bool traced =
-        vshi_shadow_traces(options, occluders->triangles) || vshi_ao_traces(options, occluders->triangles);
-    VSHI_TRY_DONE(vshi_allocate((void **)&origins->surface, traced ? origins->count : 0, 3 * sizeof(double),
-                                name, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&origins->start, origins->count, 3 * sizeof(double), name, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&origins->texel, origins->count, sizeof(uint32_t), name, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&origins->normal, origins->count, 3 * sizeof(float), name, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&origins->face, origins->count, 3 * sizeof(float), name, error));
     VSHI_TRY_DONE(vshi_parallel_for(job, origins->blocks, 1, 1, pack, &l, error));
 done:
     free(l.crease);
@@ -373,14 +381,14 @@ done:
 }
 
 void vshi_origins_free(vshi_origins *origins) {
+    free(origins->face);
     free(origins->normal);
     free(origins->texel);
-    free(origins->surface);
+    free(origins->start);
     free(origins->position);
     free(origins->needed);
     free(origins->row_start);
     free(origins->before);
-    free(origins->dropped);
     free(origins->seen);
     free(origins->valid);
     *origins = (vshi_origins){0};

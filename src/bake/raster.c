@@ -259,6 +259,57 @@ double vshi_uv_nearest(const vshi_uv_triangle *triangle, double x, double y, dou
     return best;
 }
 
+/* Clips a convex polygon to sign × (axis coordinate - limit) <= 0 (Sutherland and Hodgman, "Reentrant polygon
+ * clipping", 1974). */
+static int clip(const double (*from)[2], int count, int axis, double sign, double limit, double (*to)[2]) {
+    int kept = 0;
+    for (int i = 0; i < count; ++i) {
+        const double *a = from[i], *b = from[(i + 1) % count];
+        const double over_a = sign * (a[axis] - limit), over_b = sign * (b[axis] - limit);
+        if (over_a <= 0.0) {
+            to[kept][0] = a[0];
+            to[kept++][1] = a[1];
+        }
+        if ((over_a <= 0.0) != (over_b <= 0.0)) {
+            const double t = over_a / (over_a - over_b);
+            to[kept][0] = a[0] + t * (b[0] - a[0]);
+            to[kept++][1] = a[1] + t * (b[1] - a[1]);
+        }
+    }
+    return kept;
+}
+
+void vshi_uv_centroid_near(const vshi_uv_triangle *triangle, double x, double y, double weight[3]) {
+    enum { MOST = 3 + 4 }; /* corners: each clip adds one at most */
+    double polygon[2][MOST][2], at[2] = {0.0, 0.0};
+    vshi_uv_nearest(triangle, x, y, weight);
+    for (int k = 0; k < 3; ++k) {
+        at[0] += weight[k] * triangle->x[k];
+        at[1] += weight[k] * triangle->y[k];
+        polygon[0][k][0] = triangle->x[k];
+        polygon[0][k][1] = triangle->y[k];
+    }
+    int count = 3;
+    for (int side = 0; side < 4; ++side) {
+        const int axis = side / 2;
+        const double sign = side % 2 == 0 ? 1.0 : -1.0;
+        count = clip((const double(*)[2])polygon[side % 2], count, axis, sign, at[axis] + sign * 0.5,
+                     polygon[1 - side % 2]);
+    }
+    double area = 0.0, sum[2] = {0.0, 0.0};
+    for (int i = 1; i + 1 < count; ++i) { /* a fan around the first corner */
+        const double *o = polygon[0][0], *a = polygon[0][i], *b = polygon[0][i + 1];
+        const double twice = fabs((a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]));
+        area += twice;
+        for (int axis = 0; axis < 2; ++axis) {
+            sum[axis] += twice * (o[axis] + a[axis] + b[axis]) / 3.0;
+        }
+    }
+    if (area > 0.0) {
+        vshi_uv_barycentric(triangle, sum[0] / area, sum[1] / area, weight);
+    }
+}
+
 void vshi_uv_barycentric(const vshi_uv_triangle *triangle, double x, double y, double weight[3]) {
     const double ax = triangle->x[1] - triangle->x[0], ay = triangle->y[1] - triangle->y[0];
     const double bx = triangle->x[2] - triangle->x[0], by = triangle->y[2] - triangle->y[0];

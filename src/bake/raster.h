@@ -67,6 +67,10 @@ void vshi_tile_touch(const vshi_raster *raster, const vshi_uv_triangle *triangle
 /* Barycentric coordinates of a point of the image, clamped into the triangle. */
 void vshi_uv_barycentric(const vshi_uv_triangle *triangle, double x, double y, double weight[3]);
 
+/* Centroid of the part of the triangle that lies within half a texel, along both axes, of its point nearest
+ * to (x, y), which is outside it. */
+void vshi_uv_centroid_near(const vshi_uv_triangle *triangle, double x, double y, double weight[3]);
+
 /* Point of the triangle's outline that is nearest to a point outside it; returns the squared distance. */
 double vshi_uv_nearest(const vshi_uv_triangle *triangle, double x, double y, double weight[3]);
 

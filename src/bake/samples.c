@@ -76,7 +76,8 @@ size_t vshi_samples_write(vshi_sample_writer *w, size_t x, size_t y, uint32_t te
     double weight[3];
     if ((tile->border >> bit) & 1) {
         const uint32_t number = tile->nearest[bit];
-        vshi_uv_nearest(&w->work->triangle[number - 1], (double)column + 0.5, (double)row + 0.5, weight);
+        vshi_uv_centroid_near(&w->work->triangle[number - 1], (double)column + 0.5, (double)row + 0.5,
+                              weight);
         write_sample(w, number, texel, weight, true);
         return 1;
     }

@@ -8,6 +8,14 @@
 #include <math.h>
 #include <string.h>
 
+vshi_vec vshi_ao_face(const vshi_ao_task *task, size_t i, vshi_vec normal) {
+    if (task->faces == NULL) {
+        return normal;
+    }
+    const vshi_vec face = vshi_vec_off(task->faces + 3 * i);
+    return vshi_dot(face, normal) < VSHI_ONE_NORMAL ? face : normal;
+}
+
 void vshi_ao_axes(vshi_vec normal, vshi_vec axes[3]) {
     vshi_frame(normal, &axes[0], &axes[1]);
     axes[2] = normal;
@@ -163,14 +171,15 @@ vsh_result vsh_shade_ao(const vsh_occluders *occluders, const vsh_points *points
     VSHI_NEEDS(points);
     VSHI_NEEDS_OF(points->count, points->positions);
     VSHI_NEEDS_OF(points->count, ao);
-    VSHI_TRY(vshi_shade_ao(occluders, points, NULL, options, run, ao, deviation, bent, NULL, stats, error));
+    VSHI_TRY(
+        vshi_shade_ao(occluders, points, NULL, NULL, options, run, ao, deviation, bent, NULL, stats, error));
     for (size_t i = 0; bent != NULL && i < points->count; ++i) {
         vshi_ao_bent(bent + 3 * i, points->normals + 3 * i);
     }
     return VSH_OK;
 }
 
-vsh_result vshi_shade_ao(const vsh_occluders *occluders, const vsh_points *points,
+vsh_result vshi_shade_ao(const vsh_occluders *occluders, const vsh_points *points, const float *faces,
                          const vshi_point_rows *rows, const vsh_shade_options *options, const vsh_run *run,
                          float *ao, float *deviation, float *bent, const vshi_ao_share *share,
                          vsh_shade_stats *stats, vsh_error *error) {
@@ -206,6 +215,7 @@ vsh_result vshi_shade_ao(const vsh_occluders *occluders, const vsh_points *point
     task.kernel = vshi_kernel_of(full_run.isa);
     task.outside = rows != NULL || share != NULL;
     task.points = points;
+    task.faces = faces;
     task.ao = ao;
     task.deviation = deviation;
     task.bent = bent;

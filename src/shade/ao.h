@@ -65,6 +65,8 @@ typedef struct vshi_ao_task {
     const vshi_kernel *kernel;   /* of a call, as what follows */
     bool outside;                /* the points are known to lie in no solid: samples of a lightmap */
     const vsh_points *points;
+    const float *faces; /* [count][3], unit: normals of the faces under the points, whose own normals are
+                         * smooth. Directions below the face do not count. NULL: the points' normals */
     float *ao;
     float *deviation;           /* may be NULL */
     const vshi_ao_share *share; /* of texels that share their rays; NULL: each point has its own */
@@ -150,6 +152,9 @@ void vshi_ao_bent(float *bent, const float *normal);
 
 /* vshi_frame() of a unit vector, and the vector. */
 void vshi_ao_axes(vshi_vec normal, vshi_vec axes[3]);
+
+/* The face normal of point i, or `normal` where the two are the same but for rounding. */
+vshi_vec vshi_ao_face(const vshi_ao_task *task, size_t i, vshi_vec normal);
 
 /* A direction of the frame's axes in their space. */
 static inline vshi_vec vshi_ao_direction(const vshi_vec axes[3], vshi_vec d) {

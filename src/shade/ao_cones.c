@@ -112,18 +112,24 @@ static double cone_share(const vshi_ao_cones *cones, const float *close, int32_t
     return near + (far - near) * part[0];
 }
 
-/* What all cones of a point see together, and in the mean where (along the frame's axes). */
-static double open_share(const vshi_ao_cones *cones, const float *close, vshi_vec *where) {
+/* What the cones of a point above its face see together, and in the mean where; both along the frame's axes.
+ */
+static double open_share(const vshi_ao_cones *cones, const float *close, vshi_vec face, vshi_vec *where) {
+    int32_t count = 0;
     double open = 0.0;
     vshi_vec sum = {0.0, 0.0, 0.0}, all = {0.0, 0.0, 0.0};
     for (int32_t c = 0; c < cones->count; ++c) {
+        if (vshi_dot(cones->directions[c], face) < 0.0) {
+            continue;
+        }
         const double share = cone_share(cones, close, c);
+        ++count;
         open += share;
         sum = vshi_add(sum, vshi_scale(cones->directions[c], share));
         all = vshi_add(all, cones->directions[c]);
     }
-    *where = vshi_ao_mean(sum, all, open, cones->count, (vshi_vec){0.0, 0.0, 1.0});
-    return open / cones->count;
+    *where = vshi_ao_mean(sum, all, open, count, (vshi_vec){0.0, 0.0, 1.0});
+    return open / count;
 }
 
 static void flush(const vshi_ao_task *task, vshi_chunk *chunk, float *close, vsh_shade_stats *stats) {
@@ -182,11 +188,17 @@ void vshi_ao_by_cones(const void *user, size_t begin, size_t end, vsh_shade_stat
         if (!valid[i - begin]) {
             continue;
         }
-        vshi_vec where;
-        task->ao[i] = (float)open_share(cones, close + (i - begin) * count, &where);
+        const vshi_vec *axis = axes[i - begin];
+        vshi_vec where, face = {0.0, 0.0, 0.0}; /* every cone counts */
+        if (task->faces != NULL) {
+            const vshi_vec normal = vshi_unit(vshi_vec_off(task->points->normals + 3 * i));
+            const vshi_vec f = vshi_direction_to_field(task->field, vshi_ao_face(task, i, normal));
+            face = (vshi_vec){vshi_dot(f, axis[0]), vshi_dot(f, axis[1]), vshi_dot(f, axis[2])};
+        }
+        task->ao[i] = (float)open_share(cones, close + (i - begin) * count, face, &where);
         if (task->bent != NULL) {
             const double length = vshi_length(where);
-            const vshi_vec d = vshi_ao_direction(axes[i - begin], where);
+            const vshi_vec d = vshi_ao_direction(axis, where);
             vshi_ao_set_bent(task, i, vshi_scale(vshi_direction_to_world(task->field, d), length));
         }
     }

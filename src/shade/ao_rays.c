@@ -179,28 +179,10 @@ static void field_ray(vshi_ao_piece *b, uint32_t owner, vshi_vec local, vsh_shad
     *start = (float)begin > *start ? (float)begin : *start;
 }
 
-/* Turns axes about the normal so that `up` lies over the first; the cosine of up and the normal. */
-static double turn_to(vshi_vec up, vshi_vec axes[3]) {
-    static const double STRAIGHT = 1e-12; /* square of a sine: the axes may then be any */
-    const double rise = vshi_dot(up, axes[2]);
-    const vshi_vec along = vshi_sub(up, vshi_scale(axes[2], rise));
-    if (vshi_dot(along, along) > STRAIGHT) {
-        axes[0] = vshi_unit(along);
-        axes[1] = vshi_cross(axes[2], axes[0]);
-    }
-    return fmin(fmax(rise, -1.0), 1.0);
-}
-
 /* From a place on the disc: by its cosine over the hemisphere (Malley), or evenly over the sphere (Lambert's
- * azimuthal projection, 1772). What is over a horizon is the disc from half an ellipse on, x > -rise √(1 -
- * y²): rows of the disc are shortened to it, all by the same, so that areas stay in proportion. */
+ * azimuthal projection, 1772). */
 static vshi_vec direction_of(const vshi_ao_task *task, double rise, const double disc[2]) {
-    double x = disc[0];
-    const double y = disc[1];
-    if (rise < 1.0) {
-        const double edge = 1.0 - y * y;
-        x = 0.5 * ((1.0 + rise) * x + (1.0 - rise) * sqrt(edge > 0.0 ? edge : 0.0));
-    }
+    const double x = vshi_dome_place(rise, disc[0], disc[1]), y = disc[1];
     const double square = 1.0 - x * x - y * y;
     const double height = sqrt(square > 0.0 ? square : 0.0);
     return task->sphere ? (vshi_vec){2.0 * height * x, 2.0 * height * y, 2.0 * square - 1.0}
@@ -215,7 +197,8 @@ static void shoot(vshi_ao_piece *b, uint32_t owner, vsh_shade_stats *stats) {
         const int32_t count = left < AT_ONCE ? left : AT_ONCE;
         vshi_sampler_disc(b->task->sampler, point->texel, PURPOSE, point->taken, count, disc);
         for (int32_t i = 0; i < count; ++i) {
-            const vshi_vec local = direction_of(b->task, point->rise, disc[i]);
+            const vshi_vec local =
+                vshi_dome_mirror(direction_of(b->task, point->rise, disc[i]), point->mirror);
             if (b->task->bent != NULL) {
                 point->all = vshi_add(point->all, local);
             }
@@ -229,13 +212,29 @@ static void shoot(vshi_ao_piece *b, uint32_t owner, vsh_shade_stats *stats) {
     }
 }
 
+/* Turns the axes and limits the point's directions: above the horizon where there is one, else above its
+ * face. With both, directions below the face are mirrored at it: few, and the horizon leaves out what it
+ * must. */
+static void limit_dome(const vshi_ao_task *task, vshi_ao_point *point, vshi_vec up, vshi_vec face,
+                       vshi_vec axes[3]) {
+    const bool smooth = vshi_dot(face, axes[2]) < VSHI_ONE_NORMAL;
+    if (vshi_ao_has_horizon(task)) {
+        point->rise = vshi_dome_turn(up, axes);
+        if (smooth) {
+            point->mirror =
+                (vshi_vec){vshi_dot(face, axes[0]), vshi_dot(face, axes[1]), vshi_dot(face, axes[2])};
+        }
+    } else if (smooth) {
+        point->rise = vshi_dome_turn(face, axes);
+    }
+}
+
 /* False where there is nothing to shoot: the value is then known. */
 static bool prepare(const vshi_ao_piece *b, size_t i, vshi_ao_point *point, vsh_shade_stats *stats) {
     const vshi_ao_task *task = b->task;
     const vsh_points *points = task->points;
     *point = (vshi_ao_point){
         .rise = 1.0, .index = i, .texel = points->texels != NULL ? points->texels[i] : (uint32_t)i};
-    const bool horizon = vshi_ao_has_horizon(task);
     if (!vshi_ao_frame_at(task, i, &point->frame, stats)) {
         return false;
     }
@@ -243,17 +242,21 @@ static bool prepare(const vshi_ao_piece *b, size_t i, vshi_ao_point *point, vsh_
         const vshi_vec normal =
             task->sphere ? point->frame.axes[2] : vshi_unit(vshi_vec_off(points->normals + 3 * i));
         const double offset = vshi_triangles_lift(task->triangles) + task->options->surface_offset;
+        const vshi_vec face = vshi_ao_face(task, i, normal);
         vshi_ao_axes(normal, point->world_axes);
-        point->rise = horizon ? turn_to(task->up, point->world_axes) : 1.0;
+        limit_dome(task, point, task->up, face, point->world_axes);
         point->world_origin =
-            vshi_add(vshi_vec_of(points->positions + 3 * i), vshi_scale(normal, task->sphere ? 0.0 : offset));
+            vshi_add(vshi_vec_of(points->positions + 3 * i), vshi_scale(face, task->sphere ? 0.0 : offset));
     } else {
         point->frame.grown = vshi_shade_grown(task->field, point->frame.origin);
         point->traced = task->options->ao_method == VSH_AO_ADAPTIVE &&
                         vshi_shade_traces(task->field, point->frame.origin);
         ++stats->samples;
-        if (horizon) {
-            point->rise = turn_to(vshi_direction_to_field(task->field, task->up), point->frame.axes);
+        if (!task->sphere) {
+            const vshi_vec normal = vshi_unit(vshi_vec_off(points->normals + 3 * i));
+            limit_dome(task, point, vshi_direction_to_field(task->field, task->up),
+                       vshi_direction_to_field(task->field, vshi_ao_face(task, i, normal)),
+                       point->frame.axes);
         }
         find_balls(task, point, stats);
     }
@@ -370,12 +373,13 @@ void vshi_ao_piece_open(vshi_ao_piece *piece, const vshi_ao_task *task, const si
 }
 
 /* Whether the rays of a point are traced in packets of several points: whole blocks of a sequence of its own,
- * over all of its hemisphere, of which nothing is to be known but how many are free. */
+ * of which only the number of free ones is asked for. */
 static bool in_packets(const vshi_ao_piece *b, const vshi_ao_point *point) {
     const vshi_ao_task *task = b->task;
     const vshi_vec o = point->world_origin;
     return b->exact && !task->sphere && task->bent == NULL && task->options->sampler == VSH_SAMPLER_SOBOL &&
-           point->rise >= 1.0 && vshi_sampler_is_blocks(point->taken, point->next) &&
+           vshi_dot(point->mirror, point->mirror) == 0.0 &&
+           vshi_sampler_is_blocks(point->taken, point->next) &&
            vshi_triangles_sees(task->triangles, (double[]){o.x, o.y, o.z});
 }
 
@@ -396,6 +400,7 @@ static void shoot_packets(vshi_ao_piece *b, size_t first, vsh_shade_stats *stats
                             .axis = p->world_axes[2],
                             .u = p->world_axes[0],
                             .v = p->world_axes[1],
+                            .rise = p->rise,
                             .far = task->options->ao_distance};
         vshi_sampler_shift(task->sampler, p->texel, PURPOSE, disc->shift);
         of[count++] = i;

@@ -14,9 +14,11 @@ typedef struct vshi_ao_ball {
 
 typedef struct vshi_ao_point {
     vshi_ao_frame frame;
-    bool traced;  /* not exact: its rays meet the field's surface; else they are marched */
-    double rise;  /* cosine of `up` and the normal; 1: AO is of the whole hemisphere */
-    size_t index; /* of the task's points */
+    bool traced; /* not exact: its rays meet the field's surface; else they are marched */
+    double
+        rise; /* cosine between the normal and that of the plane that limits its directions; 1: none does */
+    vshi_vec mirror; /* face at which directions below it are mirrored, along the axes; zero: none are */
+    size_t index;    /* of the task's points */
     uint32_t texel;
     int32_t taken, free; /* rays */
     int32_t next;        /* rays after this round; 0: done */

@@ -298,7 +298,7 @@ void vshi_layers_shadow(const vshi_layers *layers, const vshi_shadow_task *task,
 }
 
 /* What a layer leaves of the sky; values of heights and spheres are exact. */
-static void occlude(const prepared *item, const vshi_ao_task *task, layer_piece *piece,
+static void occlude(const prepared *item, const vshi_ao_task *task, size_t begin, layer_piece *piece,
                     vsh_shade_stats *stats) {
     const vsh_layer *layer = &item->layer;
     const size_t count = piece->points.count;
@@ -316,6 +316,7 @@ static void occlude(const prepared *item, const vshi_ao_task *task, layer_piece 
         own.kernel = task->kernel;
         own.outside = task->outside;
         own.points = &piece->points;
+        own.faces = task->faces != NULL ? task->faces + 3 * begin : NULL;
         own.ao = piece->value;
         own.deviation = task->deviation != NULL ? piece->deviation : NULL;
         own.bent = bent;
@@ -336,7 +337,7 @@ void vshi_layers_ao(const vshi_layers *layers, const vshi_ao_task *task, size_t 
     layer_piece piece;
     cut(&piece, task->points, begin, end);
     for (size_t k = 0; k < layers->count; ++k) {
-        occlude(&layers->items[k], task, &piece, stats);
+        occlude(&layers->items[k], task, begin, &piece, stats);
         for (size_t i = begin, n = 0; i < end; ++i, ++n) {
             combine(layers->items[k].layer.combine, (double)piece.value[n], (double)piece.deviation[n], 1.0,
                     &task->ao[i], task->deviation != NULL ? &task->deviation[i] : NULL);

@@ -82,14 +82,14 @@ vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, c
 
 struct vshi_ao_share;
 
-/* vsh_shade_shadow() and vsh_shade_ao() for points in rows; `rows` may be NULL, and so may `bent` and
- * `share`, as of vshi_ao_task. With `share` no rows are taken, and points are values of their own rays only.
- */
+/* vsh_shade_shadow() and vsh_shade_ao() for points in rows; `rows` may be NULL, and so may `faces`,
+ * `bent` and `share`, as of vshi_ao_task. With `share` no rows are taken, and points are values of their own
+ * rays only. */
 vsh_result vshi_shade_shadow(const vsh_occluders *occluders, const vsh_points *points,
                              const vshi_point_rows *rows, const vsh_light *light,
                              const vsh_shade_options *options, const vsh_run *run, float *visibility,
                              float *deviation, vsh_shade_stats *stats, vsh_error *error);
-vsh_result vshi_shade_ao(const vsh_occluders *occluders, const vsh_points *points,
+vsh_result vshi_shade_ao(const vsh_occluders *occluders, const vsh_points *points, const float *faces,
                          const vshi_point_rows *rows, const vsh_shade_options *options, const vsh_run *run,
                          float *ao, float *deviation, float *bent, const struct vshi_ao_share *share,
                          vsh_shade_stats *stats, vsh_error *error);

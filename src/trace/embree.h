@@ -8,6 +8,7 @@
 #include "mesh/sheet.h"
 #include "trace/sampler.h"
 
+#include <math.h>
 #include <stdbool.h>
 #include <vdbshade/trace.h>
 
@@ -31,15 +32,49 @@ vsh_result vshi_triangles_of_quads(const vshi_quads *quads, const vsh_run *run, 
 void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
                             bool *blocked);
 
+/* Distance to the first triangle that a ray meets; ray->far where it meets none. Thread safe. */
+double vshi_triangles_distance(const vsh_triangles *triangles, const vshi_segment_ray *ray);
+
 /* A disc that a point sees, or a dome over one. World space. */
 typedef struct vshi_disc {
     double origin[3];
     vshi_vec axis, u, v; /* a ray goes along axis + x u + y v, (x, y) on the unit disc; of a dome, where all
                             three are unit, along √(1 - x² - y²) axis + x u + y v */
+    double rise;         /* of a dome: vshi_dome_place(); 1 for all of it */
     vshi_vec normal;     /* rays below it meet something, whatever there is; zero: none do */
     double far;          /* how long the rays are; may be infinite */
     uint32_t shift[2];   /* of the texel: vshi_sampler_shift() */
 } vshi_disc;
+
+/* A face and a smooth normal that lean apart by less (0.08 degrees) are one: rounding of floats. */
+#define VSHI_ONE_NORMAL (1.0 - 1e-6)
+
+/* Turns the axes of a dome about the third so that `up` leans towards the first. Returns the cosine between
+ * up and the third, the `rise` of the plane that is orthogonal to up. */
+static inline double vshi_dome_turn(vshi_vec up, vshi_vec axes[3]) {
+    static const double STRAIGHT = 1e-12; /* square of a sine: the axes may then be any */
+    const double rise = vshi_dot(up, axes[2]);
+    const vshi_vec along = vshi_sub(up, vshi_scale(axes[2], rise));
+    if (vshi_dot(along, along) > STRAIGHT) {
+        axes[0] = vshi_unit(along);
+        axes[1] = vshi_cross(axes[2], axes[0]);
+    }
+    return rise < -1.0 ? -1.0 : rise > 1.0 ? 1.0 : rise;
+}
+
+/* Moves places on the disc to the part of it whose directions on the dome (Malley) lie above that plane, the
+ * disc from half an ellipse on, x > -rise √(1 - y²): rows of the disc are shortened, all by the same factor,
+ * so that areas stay in proportion. */
+static inline double vshi_dome_place(double rise, double x, double y) {
+    const double edge = 1.0 - y * y;
+    return rise < 1.0 ? 0.5 * ((1.0 + rise) * x + (1.0 - rise) * sqrt(edge > 0.0 ? edge : 0.0)) : x;
+}
+
+/* A direction below a face, mirrored at it; others, and of a zero normal all, stay. */
+static inline vshi_vec vshi_dome_mirror(vshi_vec d, vshi_vec face) {
+    const double below = vshi_dot(d, face);
+    return below < 0.0 ? vshi_sub(d, vshi_scale(face, 2.0 * below)) : d;
+}
 
 /* Whether a point is near enough to the triangles for vshi_triangles_discs(). */
 bool vshi_triangles_sees(const vsh_triangles *triangles, const double origin[3]);

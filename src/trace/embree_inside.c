@@ -15,6 +15,11 @@ int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray 
     return 0;
 }
 
+double vshi_triangles_distance(const vsh_triangles *triangles, const vshi_segment_ray *ray) {
+    (void)triangles;
+    return ray->far;
+}
+
 bool vshi_triangles_have_solids(const vsh_triangles *triangles) {
     (void)triangles;
     return false;
@@ -186,6 +191,17 @@ int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray 
         most = left > most ? left : most;
     }
     return most;
+}
+
+double vshi_triangles_distance(const vsh_triangles *triangles, const vshi_segment_ray *ray) {
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    struct RTCRayHit lone;
+    if (!aim_lone(triangles, ray, &lone)) {
+        return ray->far;
+    }
+    rtcIntersect1(triangles->scene, &context, &lone);
+    return lone.hit.geomID != RTC_INVALID_GEOMETRY_ID ? (double)lone.ray.tfar / triangles->scale : ray->far;
 }
 
 bool vshi_triangles_have_solids(const vsh_triangles *triangles) {

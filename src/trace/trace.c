@@ -35,6 +35,8 @@ typedef struct tracing {
 typedef struct target {
     vshi_vec axis, u, v;
     double radius;
+    double rise;     /* of AO: vshi_dome_place() */
+    vshi_vec mirror; /* of AO over a horizon: vshi_dome_mirror() */
     double distance; /* of the light's centre; infinite for a directional light */
     double size;     /* of the sphere */
     vshi_light_view view;
@@ -57,6 +59,7 @@ static vshi_light_side aim(const vshi_light_place *place, vshi_vec from, target 
     const vshi_light_side side = vshi_light_look(place, from, false, &view);
     if (side == VSHI_LIGHT_SEEN) {
         *t = (target){.axis = view.axis,
+                      .rise = 1.0,
                       .radius = vshi_light_tangent(place, &view),
                       .distance = view.distance,
                       .size = place->radius,
@@ -93,19 +96,21 @@ static bool direct(const tracing *task, const target *t, const double disc[2], c
     if (task->place.shape != NULL) {
         return direct_to_shape(&task->place, t, disc, normal, ray);
     }
-    const double x = disc[0] * t->radius, y = disc[1] * t->radius;
-    double up, scale = 1.0;
+    double x = disc[0] * t->radius, up, scale = 1.0;
+    const double y = disc[1] * t->radius;
     if (task->light != NULL) {
         scale = 1.0 / sqrt(1.0 + x * x + y * y);
         up = scale;
         ray->far = far_of(t, up);
     } else {
+        x = vshi_dome_place(t->rise, x, y);
         const double square = 1.0 - x * x - y * y;
         up = square > 0.0 ? sqrt(square) : 0.0;
         ray->far = task->distance;
     }
-    const vshi_vec d =
+    const vshi_vec towards =
         vshi_add(vshi_add(vshi_scale(t->u, scale * x), vshi_scale(t->v, scale * y)), vshi_scale(t->axis, up));
+    const vshi_vec d = vshi_dome_mirror(towards, t->mirror);
     ray->direction[0] = d.x;
     ray->direction[1] = d.y;
     ray->direction[2] = d.z;
@@ -149,9 +154,26 @@ typedef struct viewpoint {
     const vsh_solids *solids; /* that rays may meet */
 } viewpoint;
 
-/* False where the point's value needs no rays: it is then in *value. */
-static bool place_point(const tracing *task, const double position[3], const float *normal, viewpoint *from,
-                        double *value) {
+/* Limits AO to the directions above the point's face; over a horizon those below it are mirrored at it. */
+static void aim_dome(const tracing *task, vshi_vec face, target *t) {
+    vshi_vec axes[3];
+    vshi_frame(t->axis, &t->u, &t->v);
+    if (!(vshi_dot(face, t->axis) < VSHI_ONE_NORMAL)) {
+        return;
+    }
+    if (task->up != NULL) {
+        t->mirror = face;
+        return;
+    }
+    memcpy(axes, (vshi_vec[]){t->u, t->v, t->axis}, sizeof axes);
+    t->rise = vshi_dome_turn(face, axes);
+    t->u = axes[0];
+    t->v = axes[1];
+}
+
+/* False where the point's value needs no rays: it is then in *value. `face`: of AO; NULL: the normal. */
+static bool place_point(const tracing *task, const double position[3], const float *normal, const float *face,
+                        viewpoint *from, double *value) {
     *from = (viewpoint){.origin = vshi_vec_of(position)};
     if (normal != NULL) {
         from->normal = vshi_unit(vshi_vec_off(normal));
@@ -159,15 +181,16 @@ static bool place_point(const tracing *task, const double position[3], const flo
             *value = NAN;
             return false;
         }
-        from->origin = vshi_add(from->origin, vshi_scale(from->normal, task->lift));
+        const vshi_vec up = face != NULL ? vshi_vec_off(face) : from->normal;
+        from->origin = vshi_add(from->origin, vshi_scale(up, task->lift));
     }
     if (!vshi_finite(from->origin)) {
         *value = NAN;
         return false;
     }
-    from->target = (target){.axis = from->normal, .radius = 1.0};
+    from->target = (target){.axis = from->normal, .radius = 1.0, .rise = 1.0};
     if (task->light == NULL) {
-        vshi_frame(from->target.axis, &from->target.u, &from->target.v);
+        aim_dome(task, face != NULL ? vshi_vec_off(face) : from->normal, &from->target);
     } else {
         const vshi_light_side side = aim(&task->place, from->origin, &from->target);
         if (side != VSHI_LIGHT_SEEN) {
@@ -212,7 +235,7 @@ static float trace_point(const tracing *task, size_t point) {
     viewpoint from;
     double value;
     const float *normal = task->normals != NULL ? task->normals + 3 * point : NULL;
-    if (!place_point(task, task->positions + 3 * point, normal, &from, &value)) {
+    if (!place_point(task, task->positions + 3 * point, normal, NULL, &from, &value)) {
         return (float)value;
     }
     const int32_t free = count_free(task, &from, (const double(*)[2])task->disc, task->rays);
@@ -229,7 +252,8 @@ static bool agrees(double free, double taken, double expected) {
 /* Rays of two sets, all or until they agree with what is expected; how many are free. Returns how many each
  * took, 0 where there is no point; *even: VSHI_TRUTH_… of the first. */
 static int32_t count_twice(const vshi_truth *truth, const double position[3], const float normal[3],
-                           uint32_t texel, double expected, int32_t free[2], int32_t *even, double *value) {
+                           const float *face, uint32_t texel, double expected, int32_t free[2], int32_t *even,
+                           double *value) {
     /* the samplers' sequences: no others' */
     static const uint32_t PURPOSE[2] = {0x7e570001u, 0x7e570002u};
     const tracing task = {.triangles = truth->triangles,
@@ -242,7 +266,7 @@ static int32_t count_twice(const vshi_truth *truth, const double position[3], co
     viewpoint from;
     free[0] = free[1] = 0;
     *even = VSHI_TRUTH_UNEVEN;
-    if (!place_point(&task, position, normal, &from, value)) {
+    if (!place_point(&task, position, normal, face, &from, value)) {
         return 0;
     }
     int32_t taken = 0;
@@ -266,9 +290,9 @@ static int32_t count_twice(const vshi_truth *truth, const double position[3], co
 }
 
 bool vshi_truth_twice(const vshi_truth *truth, const double position[3], const float normal[3],
-                      uint32_t texel, double expected, double seen[2]) {
+                      const float *face, uint32_t texel, double expected, double seen[2]) {
     int32_t free[2], even;
-    const int32_t taken = count_twice(truth, position, normal, texel, expected, free, &even, &seen[0]);
+    const int32_t taken = count_twice(truth, position, normal, face, texel, expected, free, &even, &seen[0]);
     if (taken == 0) {
         seen[1] = seen[0];
         return !isnan(seen[0]);
@@ -280,9 +304,9 @@ bool vshi_truth_twice(const vshi_truth *truth, const double position[3], const f
 }
 
 bool vshi_truth_count(const vshi_truth *truth, const double position[3], const float normal[3],
-                      uint32_t texel, int32_t free[2], int32_t *even) {
+                      const float *face, uint32_t texel, int32_t free[2], int32_t *even) {
     double value;
-    if (count_twice(truth, position, normal, texel, NAN, free, even, &value) == 0) {
+    if (count_twice(truth, position, normal, face, texel, NAN, free, even, &value) == 0) {
         free[0] = free[1] = value > 0.5 ? truth->rays : 0; /* known without rays */
         return !isnan(value);
     }

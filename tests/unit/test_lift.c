@@ -1,5 +1,6 @@
-/* Samples that are lifted off the facets of a smooth sphere: where rays to a light begin, and what is in a
- * lift's way. The truth is that of the facets. */
+/* Meshes with smooth normals: where shadow rays begin, and which directions count for AO. The truth is that
+ * of the facets. */
+#include "bake/lift.h"
 #include "casts.h"
 #include "texels_of.h"
 
@@ -209,8 +210,8 @@ static void samples_are_valid_by_where_their_facets_are(void **state) {
     close_scene(&s);
 }
 
-/* A box just beyond where samples are lifted to. */
-static void samples_are_not_lifted_close_to_what_is_over_them(void **state) {
+/* A box just beyond the smooth sphere. */
+static void ao_close_to_a_wall_is_that_of_the_facets(void **state) {
     (void)state;
     static const double FACE = 1.018;
     box over;
@@ -236,6 +237,107 @@ static void samples_are_not_lifted_close_to_what_is_over_them(void **state) {
     free(truth);
     free(ao);
     close_scene(&s);
+}
+
+static void ao_of_a_smooth_convex_body_in_the_open_is_1(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s, NULL);
+    float *ao = calloc(TEXELS, sizeof *ao);
+    bake(&s, NULL, 0, &(vsh_lightmap){.ao = ao});
+    for (size_t i = 0; i < s.flat.count; ++i) {
+        assert_true(ao[vsh_texel_place(s.lifted.texels[i], WIDTH)] == 1.0f);
+    }
+    free(ao);
+    close_scene(&s);
+}
+
+/* A strip of 0.2 × 3 between walls half as high as it is wide. */
+static double mean_ao_between_walls(const float *normals) {
+    vsh_error error = {VSH_OK, ""};
+    quad strip;
+    make_quad(&strip, 0.0f, 0.0f, 0.1f, 1.0f);
+    strip.mesh.normals = normals;
+    box walls[2];
+    make_box(&walls[0], (double[]){-0.1, 0.0, -0.1}, (double[]){0.0, 3.0, 0.1});
+    make_box(&walls[1], (double[]){0.2, 0.0, -0.1}, (double[]){0.3, 3.0, 0.1});
+    const vsh_mesh casters[3] = {strip.mesh, walls[0].mesh, walls[1].mesh};
+    vsh_triangles *triangles = NULL;
+    check(vsh_triangles_create(casters, 3, NULL, &triangles, &error), &error);
+    vsh_occluder_parts parts = vsh_occluder_parts_default();
+    parts.triangles = triangles;
+    vsh_occluders *occluders = NULL;
+    check(vsh_occluders_from_parts(&parts, &occluders, &error), &error);
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = 128;
+    options.padding = 0;
+    options.shade.ao_method = VSH_AO_EXACT;
+    options.shade.ao_distance = 50.0;
+    options.shade.max_error = 0.01;
+    vsh_texels *texels = create(&strip.mesh, 1, options, NULL);
+    static float ao[128 * 128], coverage[128 * 128];
+    const vsh_lightmap planes = {.ao = ao, .coverage = coverage};
+    check(vsh_bake_lightmap(occluders, texels, NULL, 0, NULL, NULL, &planes, NULL, &error), &error);
+    double sum = 0.0, count = 0.0;
+    for (size_t i = 0; i < 128 * 128; ++i) {
+        sum += coverage[i] > 0.0f ? (double)ao[i] : 0.0;
+        count += coverage[i] > 0.0f;
+    }
+    assert_true(count > 1000.0);
+    vsh_texels_free(texels);
+    vsh_occluders_free(occluders);
+    vsh_triangles_free(triangles);
+    return sum / count;
+}
+
+/* Normals that lean by 10 degrees at both ends turn the hemisphere by as much; they open no view over the
+ * walls.
+ */
+static void leaning_normals_do_not_lift_ao_over_low_walls(void **state) {
+    (void)state;
+    static const float SIN = 0.17364818f, COS = 0.98480775f;
+    const float leaning[12] = {0.0f, -SIN, COS, 0.0f, -SIN, COS, 0.0f, SIN, COS, 0.0f, SIN, COS};
+    const double flat = mean_ao_between_walls(NULL), bent = mean_ao_between_walls(leaning);
+    print_message("mean AO: %.4f, with leaning normals %.4f\n", flat, bent);
+    assert_true(flat > 0.4 && flat < 0.8);
+    assert_true(fabs(bent - flat) < 0.02);
+}
+
+/* A wall at growing distances from the sphere, under a light that grazes the facets. */
+static void a_lift_fades_as_neighbours_come_near(void **state) {
+    (void)state;
+    enum { WALLS = 40 };
+    static const double FIRST = 1.0, STEP = 0.002;
+    const vsh_light light = sun_towards(0.0, 1.0, 0.0);
+    size_t lifted = 0, faded = 0;
+    double *before = NULL;
+    for (int w = 0; w < WALLS; ++w) {
+        const double face = FIRST + STEP * w;
+        box wall;
+        make_box(&wall, (double[]){face, -2.0, -2.0}, (double[]){3.0, 2.0, 2.0});
+        scene s;
+        open_scene(&s, &wall);
+        before = before != NULL ? before : calloc(s.flat.count, sizeof *before);
+        const vshi_lifter lifter = vshi_lifter_open(s.texels, occluders_traced(s.field, s.triangles), &light);
+        for (size_t i = 0; i < s.flat.count; ++i) {
+            const double length = vshi_length(vshi_lift_find(&lifter, i));
+            const double room = face - s.flat.positions[3 * i];
+            const double x = (double)s.texels->lift[3 * i],
+                         whole = vshi_length(vshi_vec_off(s.texels->lift + 3 * i));
+            assert_true(length <= whole * (1.0 + 1e-6));
+            if (x > 0.9 * whole && whole > 0.0) {
+                /* up to a quarter of the distance along the lift, which leans by 26 degrees at most */
+                assert_true(length <= 0.25 * room / 0.9 + 1e-6);
+                assert_true(w == 0 || fabs(length - before[i]) < 0.3 * STEP);
+                lifted += length > 0.99 * whole;
+                faded += length > 0.01 * whole && length < 0.9 * whole;
+            }
+            before[i] = length;
+        }
+        close_scene(&s);
+    }
+    free(before);
+    assert_true(lifted > 100 && faded > 100);
 }
 
 static void a_light_changes_nothing_for_other_lights_and_ao(void **state) {
@@ -266,7 +368,10 @@ int main(void) {
         cmocka_unit_test(rays_to_a_light_well_above_a_facet_begin_on_it),
         cmocka_unit_test(facets_do_not_hide_a_light_that_is_over_the_smooth_sphere),
         cmocka_unit_test(samples_are_valid_by_where_their_facets_are),
-        cmocka_unit_test(samples_are_not_lifted_close_to_what_is_over_them),
+        cmocka_unit_test(ao_close_to_a_wall_is_that_of_the_facets),
+        cmocka_unit_test(ao_of_a_smooth_convex_body_in_the_open_is_1),
+        cmocka_unit_test(leaning_normals_do_not_lift_ao_over_low_walls),
+        cmocka_unit_test(a_lift_fades_as_neighbours_come_near),
         cmocka_unit_test(a_light_changes_nothing_for_other_lights_and_ao),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

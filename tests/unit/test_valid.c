@@ -345,6 +345,55 @@ static void a_floor_beside_the_mouth_of_an_inward_pipe_is_valid(void **state) {
     free(s);
 }
 
+/* A floor and a box that stands on it. */
+static void put_box_on_floor(shape *s, double low, double high) {
+    memset(s, 0, sizeof *s);
+    quad_at(s, 0.0, -4.0, 4.0);
+    add_box(s, (box){{low, 0.0, low}, {high, 1.0, high}});
+}
+
+static bool is_on_floor(const baked *b, size_t i) {
+    return b->samples.positions[3 * i + 1] == 0.0 && b->samples.geometric_normals[3 * i + 1] > 0.5f;
+}
+
+/* The coordinate of texel centres of the floor that is nearest to x. */
+static double find_centre(const baked *b, double x) {
+    double nearest = INFINITY;
+    for (size_t i = 0; i < b->samples.count; ++i) {
+        const double *p = b->samples.positions + 3 * i;
+        if (is_on_floor(b, i) && fabs(p[0]) < 3.9 && fabs(p[0] - x) < fabs(nearest - x)) {
+            nearest = p[0];
+        }
+    }
+    return nearest;
+}
+
+static void texels_on_the_side_of_a_box_are_filled_from_the_open(void **state) {
+    (void)state;
+    shape *s = malloc(sizeof *s);
+    put_box_on_floor(s, -1.0, 1.0);
+    vsh_mesh mesh = mesh_of(s);
+    baked b = bake(&mesh, 64, 0, 1.0);
+    const double low = find_centre(&b, -0.8), high = find_centre(&b, 1.2);
+    free_baked(&b);
+    put_box_on_floor(s, low, high);
+    mesh = mesh_of(s);
+    b = bake(&mesh, 64, 0, 1.0);
+    size_t touching = 0;
+    for (size_t i = 0; i < b.samples.count; ++i) {
+        const double *p = b.samples.positions + 3 * i;
+        if (is_on_floor(&b, i) && fabs(p[0] - low) < 1e-6 && p[2] > low + 0.2 && p[2] < high - 0.2) {
+            ++touching;
+            const float ao = b.ao[vsh_texel_place(b.samples.texels[i], SIZE)];
+            assert_false(is_valid(&b, i));
+            assert_true(ao > 0.5f && ao < 0.65f); /* 0.5 at the foot of a high wall */
+        }
+    }
+    assert_true(touching > 5);
+    free_baked(&b);
+    free(s);
+}
+
 int main(void) {
     if (!vsh_triangles_available()) {
         return 0;
@@ -359,6 +408,7 @@ int main(void) {
         cmocka_unit_test(points_deep_in_a_box_see_no_sky_though_its_triangles_are_far),
         cmocka_unit_test(invalid_texels_take_the_nearest_value_of_their_chart),
         cmocka_unit_test(a_gap_that_is_narrower_than_the_lift_of_rays_is_no_solid),
+        cmocka_unit_test(texels_on_the_side_of_a_box_are_filled_from_the_open),
         cmocka_unit_test(a_floor_beside_the_mouth_of_an_inward_pipe_is_valid),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
