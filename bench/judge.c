@@ -18,36 +18,29 @@
 #define NAMES                                                                                                \
     "covered,valid,unclear,wrongly_invalid,wrongly_valid,shadow_rmse,shadow_bias,shadow_p99,shadow_max,ao_"  \
     "rmse,ao_bias,ao_p99,ao_max,black_texels,black_triangles,filled_shadow_rmse,filled_ao_rmse,apart,apart_" \
-    "shadow_rmse,apart_ao_rmse,leaks"
+    "shadow_rmse,leaks"
 
 static const float BLACK = 0.02f, BRIGHT = 0.5f; /* a mistake: a value below where truth is above */
 static const float WRONG = 0.25f;                /* an error that is seen at a glance */
 enum { BLACK_TRIANGLE = 4, LISTED = 40 };        /* texels of a triangle, at least, to call it black */
 
-typedef struct opened {
-    vsh_image_file *file;
-    vsh_image image;
-    const char *path;
-} opened;
-
-static opened open_image(const char *path) {
+judge_bake judge_read_bake(const char *path) {
     vsh_error error;
-    opened o = {.path = path};
-    if (vsh_image_read(path, NULL, &o.file, &error) != VSH_OK) {
-        fprintf(stderr, "judge: %s\n", error.message);
-        exit(2);
+    judge_bake b = {.path = path};
+    if (vsh_image_read(path, NULL, &b.file, &error) != VSH_OK) {
+        judge_give_up(path, error.message);
     }
-    o.image = vsh_image_view(o.file);
-    return o;
+    b.image = vsh_image_view(b.file);
+    return b;
 }
 
-static const float *plane(const opened *o, const char *name) {
-    for (int32_t i = 0; i < o->image.channel_count; ++i) {
-        if (strcmp(o->image.names[i], name) == 0) {
-            return o->image.planes[i];
+const float *judge_plane(const judge_bake *b, const char *name) {
+    for (int32_t i = 0; i < b->image.channel_count; ++i) {
+        if (strcmp(b->image.names[i], name) == 0) {
+            return b->image.planes[i];
         }
     }
-    fprintf(stderr, "judge: %s: no channel %s\n", o->path, name);
+    fprintf(stderr, "judge: %s: no channel %s\n", b->path, name);
     exit(2);
 }
 
@@ -117,7 +110,7 @@ typedef struct per_triangle {
 } per_triangle;
 
 typedef struct judged {
-    sums all[2], filled[2], apart[2];
+    sums all[2], filled[2], apart;
     size_t covered, valid, unclear, wrongly_invalid, wrongly_valid, black, black_triangles, leaks;
 } judged;
 
@@ -146,8 +139,8 @@ static judged judge(size_t count, const float *verdict, const float *apart, cons
         bool black = false, leak = false;
         for (int c = 0; c < 2; ++c) {
             const float error = values[c][i] - truths[c][i];
-            if (apart[i] > 0.0f) {
-                add(&j.apart[c], (double)error);
+            if (c == 0 && apart[i] > 0.0f) {
+                add(&j.apart, (double)error);
                 continue;
             }
             add(&j.all[c], (double)error);
@@ -209,24 +202,25 @@ static int paint(const char *path, int32_t width, int32_t height, const float *v
 }
 
 static int compare(int count, char **arguments) {
-    opened t = open_image(arguments[0]), b = open_image(arguments[1]);
+    judge_bake t = judge_read_bake(arguments[0]), b = judge_read_bake(arguments[1]);
     if (t.image.width != b.image.width || t.image.height != b.image.height) {
         fprintf(stderr, "judge: %s and %s have not one size\n", t.path, b.path);
         return 2;
     }
     const size_t texels = (size_t)t.image.width * (size_t)t.image.height;
-    const float *verdict = plane(&t, "verdict"), *a = plane(&b, "A");
-    const float *const truths[2] = {plane(&t, "shadow"), plane(&t, "ao")};
-    const float *const values[2] = {plane(&b, "shadow.sun"), plane(&b, "ao")};
-    const judged j = judge(texels, verdict, plane(&t, "apart"), plane(&t, "triangle"), truths, values, a);
+    const float *verdict = judge_plane(&t, "verdict"), *a = judge_plane(&b, "A");
+    const float *const truths[2] = {judge_plane(&t, "shadow"), judge_plane(&t, "ao")};
+    const float *const values[2] = {judge_plane(&b, "shadow.sun"), judge_plane(&b, "ao")};
+    const judged j =
+        judge(texels, verdict, judge_plane(&t, "apart"), judge_plane(&t, "triangle"), truths, values, a);
     printf("%zu,%zu,%zu,%zu,%zu", j.covered, j.valid, j.unclear, j.wrongly_invalid, j.wrongly_valid);
     for (int c = 0; c < 2; ++c) {
         printf(",%.5f,%.5f,%.4f,%.4f", rmse(&j.all[c]),
                j.all[c].count > 0 ? j.all[c].sum / (double)j.all[c].count : 0.0, p99(&j.all[c]),
                j.all[c].max);
     }
-    printf(",%zu,%zu,%.5f,%.5f,%zu,%.5f,%.5f,%zu\n", j.black, j.black_triangles, rmse(&j.filled[0]),
-           rmse(&j.filled[1]), j.apart[0].count, rmse(&j.apart[0]), rmse(&j.apart[1]), j.leaks);
+    printf(",%zu,%zu,%.5f,%.5f,%zu,%.5f,%zu\n", j.black, j.black_triangles, rmse(&j.filled[0]),
+           rmse(&j.filled[1]), j.apart.count, rmse(&j.apart), j.leaks);
     const int result =
         count > 2 ? paint(arguments[2], t.image.width, t.image.height, verdict, truths, values, a) : 0;
     vsh_image_free(b.file);
@@ -235,7 +229,7 @@ static int compare(int count, char **arguments) {
 }
 
 static int alike(char **arguments) {
-    opened o[2] = {open_image(arguments[0]), open_image(arguments[1])};
+    judge_bake o[2] = {judge_read_bake(arguments[0]), judge_read_bake(arguments[1])};
     const size_t texels = (size_t)o[0].image.width * (size_t)o[0].image.height;
     sums all[2] = {0};
     size_t lone = 0;
@@ -244,11 +238,11 @@ static int alike(char **arguments) {
         return 2;
     }
     for (size_t i = 0; i < texels; ++i) {
-        const bool first = plane(&o[0], "A")[i] > 0.0f, second = plane(&o[1], "A")[i] > 0.0f;
+        const bool first = judge_plane(&o[0], "A")[i] > 0.0f, second = judge_plane(&o[1], "A")[i] > 0.0f;
         lone += first != second;
         for (int c = 0; first && second && c < 2; ++c) {
             const char *name = c == 0 ? "shadow.sun" : "ao";
-            add(&all[c], (double)(plane(&o[0], name)[i] - plane(&o[1], name)[i]));
+            add(&all[c], (double)(judge_plane(&o[0], name)[i] - judge_plane(&o[1], name)[i]));
         }
     }
     printf("%.5f,%.5f,%zu\n", rmse(&all[0]), rmse(&all[1]), lone);
@@ -260,7 +254,7 @@ static int alike(char **arguments) {
 static int list(char **arguments) {
     vsh_error error;
     vsh_model *model = NULL;
-    opened t = open_image(arguments[0]), b = open_image(arguments[1]);
+    judge_bake t = judge_read_bake(arguments[0]), b = judge_read_bake(arguments[1]);
     if (vsh_model_read(arguments[2], NULL, &model, &error) != VSH_OK) {
         fprintf(stderr, "judge: %s\n", error.message);
         return 2;
@@ -275,16 +269,16 @@ static int list(char **arguments) {
     size_t count, wrong = 0;
     judge_triangle *triangles = judge_take_triangles(meshes, mesh_count, &count, low, high);
     size_t *found = judge_take(texels * sizeof *found);
-    const float *verdict = plane(&t, "verdict"), *triangle = plane(&t, "triangle"),
-                *apart = plane(&t, "apart");
-    const float *const truths[2] = {plane(&t, "shadow"), plane(&t, "ao")};
-    const float *const values[2] = {plane(&b, "shadow.sun"), plane(&b, "ao")}, *a = plane(&b, "A");
+    const float *verdict = judge_plane(&t, "verdict"), *triangle = judge_plane(&t, "triangle"),
+                *apart = judge_plane(&t, "apart");
+    const float *const truths[2] = {judge_plane(&t, "shadow"), judge_plane(&t, "ao")};
+    const float *const values[2] = {judge_plane(&b, "shadow.sun"), judge_plane(&b, "ao")},
+                       *a = judge_plane(&b, "A");
     for (size_t i = 0; i < texels; ++i) {
         const int v = (int)verdict[i];
-        const bool off =
-            fabsf(values[0][i] - truths[0][i]) > WRONG || fabsf(values[1][i] - truths[1][i]) > WRONG;
-        if ((v == JUDGE_INVALID && a[i] > 0.0f) ||
-            (v == JUDGE_VALID && (a[i] < 1.0f || (off && apart[i] == 0.0f)))) {
+        const bool off = (apart[i] == 0.0f && fabsf(values[0][i] - truths[0][i]) > WRONG) ||
+                         fabsf(values[1][i] - truths[1][i]) > WRONG;
+        if ((v == JUDGE_INVALID && a[i] > 0.0f) || (v == JUDGE_VALID && (a[i] < 1.0f || off))) {
             found[wrong++] = i;
         }
     }
@@ -319,7 +313,7 @@ static int blame(char **arguments) {
     } share;
     vsh_error error;
     vsh_model *model = NULL;
-    opened t = open_image(arguments[0]), b = open_image(arguments[1]);
+    judge_bake t = judge_read_bake(arguments[0]), b = judge_read_bake(arguments[1]);
     if (vsh_model_read(arguments[2], NULL, &model, &error) != VSH_OK) {
         fprintf(stderr, "judge: %s\n", error.message);
         return 2;
@@ -335,10 +329,11 @@ static int blame(char **arguments) {
         free(judge_take_triangles(&mesh, 1, &count, low, high));
         end[m + 1] = end[m] + count;
     }
-    const float *verdict = plane(&t, "verdict"), *triangle = plane(&t, "triangle"),
-                *apart = plane(&t, "apart");
-    const float *const truths[2] = {plane(&t, "shadow"), plane(&t, "ao")};
-    const float *const values[2] = {plane(&b, "shadow.sun"), plane(&b, "ao")}, *a = plane(&b, "A");
+    const float *verdict = judge_plane(&t, "verdict"), *triangle = judge_plane(&t, "triangle"),
+                *apart = judge_plane(&t, "apart");
+    const float *const truths[2] = {judge_plane(&t, "shadow"), judge_plane(&t, "ao")};
+    const float *const values[2] = {judge_plane(&b, "shadow.sun"), judge_plane(&b, "ao")},
+                       *a = judge_plane(&b, "A");
     for (size_t i = 0; i < texels; ++i) {
         const int v = (int)verdict[i];
         size_t m = 0;
@@ -351,7 +346,10 @@ static int blame(char **arguments) {
         ++shares[m].texels;
         shares[m].valid += v == JUDGE_INVALID && a[i] > 0.0f;
         shares[m].invalid += v == JUDGE_VALID && a[i] < 1.0f;
-        for (int c = 0; c < 2 && v == JUDGE_VALID && apart[i] == 0.0f; ++c) {
+        for (int c = 0; c < 2 && v == JUDGE_VALID; ++c) {
+            if (c == 0 && apart[i] > 0.0f) {
+                continue;
+            }
             const double e = (double)(values[c][i] - truths[c][i]);
             shares[m].square[c] += e * e;
             shares[m].black += values[c][i] < BLACK && truths[c][i] > BRIGHT;
@@ -386,6 +384,9 @@ int main(int argc, char **argv) {
     }
     if (argc == 4 && strcmp(argv[1], "alike") == 0) {
         return alike(argv + 2);
+    }
+    if (argc >= 2 && strcmp(argv[1], "seen") == 0) {
+        return judge_seen(argc - 2, argv + 2);
     }
     if (argc == 2 && strcmp(argv[1], "names") == 0) {
         puts(NAMES);

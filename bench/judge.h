@@ -6,7 +6,10 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <vdbshade/image.h>
 #include <vdbshade/mesh.h>
+
+#include "embree.h"
 
 /* What truth says of a texel. */
 enum {
@@ -17,6 +20,8 @@ enum {
     JUDGE_UNCLEAR = 3, /* between them, or where two solids touch: not judged */
     JUDGE_VERDICTS = 4
 };
+
+enum { JUDGE_KINDS = 3 }; /* of objects in the file of solids: solids, rooms, hollows */
 
 typedef struct judge_question {
     int32_t size; /* texels, of both sides */
@@ -33,7 +38,7 @@ typedef struct judge_truth {
     float *verdict;
     float *shadow;
     float *ao;
-    float *apart; /* 1 where a smooth normal's horizon is not the triangle's: an error there is told apart */
+    float *apart; /* 1 where the light is near the horizon of a bent face: shadows are judged apart there */
     float *triangle; /* 1 + number among all triangles; 0 for none */
     double units;    /* the model's size over that of the solids' file: 1 where it was read as it was meant */
 } judge_truth;
@@ -43,9 +48,10 @@ judge_truth judge_make(const char *model, const judge_question *question);
 void judge_free(judge_truth *truth);
 
 typedef struct judge_triangle {
-    double p[3][3], n[3][3], uv[3][2]; /* n: smooth, unit */
+    double p[3][3], n[3][3], uv[3][2]; /* n: smooth, unit; uv: NAN without UVs */
     double g[3];                       /* geometric, unit */
     double bend;                       /* radians, the largest between g and n */
+    uint32_t mesh;
 } judge_triangle;
 
 /* All triangles with an area, and the box around them. */
@@ -57,6 +63,27 @@ judge_triangle *judge_take_triangles(const vsh_mesh *meshes, size_t mesh_count, 
 void judge_position(const judge_triangle *t, double column, double row, double size, double at[3],
                     double n[3]);
 
+/* A model with its lightmap's UVs (-1: the set that a bake takes), and what of it is solid. */
+typedef struct judge_scene {
+    vsh_model *model;
+    vsh_mesh *meshes;
+    size_t mesh_count;
+    judge_triangle *triangles;
+    size_t count;
+    truth_mesh *traced, *solids, *rooms, *hollows; /* the last two may be NULL */
+    bool unknown; /* no file says what is solid: the first face that a ray meets decides */
+    double lift;  /* of rays' origins along the face's normal */
+    double solid_scale;
+} judge_scene;
+
+/* Ends the program where anything fails. `lift` is a share of the model's size. */
+judge_scene judge_open(const char *model, const char *solids, int32_t uv_set, double lift);
+void judge_close(judge_scene *scene);
+
+/* JUDGE_VALID … JUDGE_UNCLEAR for a point of a face with the normal g. */
+int judge_verdict(const judge_scene *scene, const double p[3], const double g[3]);
+bool judge_hidden(const judge_scene *scene, const double from[3], const double towards[3], double reach);
+
 typedef struct judge_shape {
     float *positions;
     uint32_t *indices;
@@ -66,6 +93,19 @@ typedef struct judge_shape {
 
 /* "v" and "f" of an OBJ with convex faces, which are cut into fans: the faces of objects "KIND:…" only. */
 judge_shape judge_read_solids(const char *path, const char *kind);
+
+typedef struct judge_bake {
+    vsh_image_file *file;
+    vsh_image image;
+    const char *path;
+} judge_bake;
+
+/* A bake and one of its channels, or the end of the program. */
+judge_bake judge_read_bake(const char *path);
+const float *judge_plane(const judge_bake *bake, const char *name);
+
+/* `vsh_judge seen`, of its arguments (judge_seen.c); returns the exit code. */
+int judge_seen(int count, char **arguments);
 
 _Noreturn void judge_give_up(const char *what, const char *why);
 

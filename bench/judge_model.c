@@ -71,8 +71,9 @@ static bool take_triangle(const vsh_mesh *mesh, const uint32_t *corner, bool fli
         for (int k = 0; k < 3; ++k) {
             t->p[c][k] = transformed(mesh, mesh->positions + 3 * (size_t)v, k);
         }
-        t->uv[c][0] = (double)mesh->uvs[2 * (size_t)v];
-        t->uv[c][1] = (double)mesh->uvs[2 * (size_t)v + 1];
+        for (int k = 0; k < 2; ++k) {
+            t->uv[c][k] = mesh->uvs != NULL ? (double)mesh->uvs[2 * (size_t)v + (size_t)k] : (double)NAN;
+        }
     }
     double e[2][3];
     for (int k = 0; k < 3; ++k) {
@@ -113,12 +114,10 @@ judge_triangle *judge_take_triangles(const vsh_mesh *meshes, size_t mesh_count, 
     judge_triangle *triangles = judge_take(all * sizeof *triangles);
     *count = 0;
     for (size_t m = 0; m < mesh_count; ++m) {
-        if (meshes[m].uvs == NULL) {
-            judge_give_up(meshes[m].name != NULL ? meshes[m].name : "a mesh", "no UVs");
-        }
         const bool flip = mirrors(&meshes[m]);
         for (size_t i = 0; i < meshes[m].triangle_count; ++i) {
             judge_triangle *t = &triangles[*count];
+            t->mesh = (uint32_t)m;
             *count += take_triangle(&meshes[m], meshes[m].indices + 3 * i, flip, t) ? 1 : 0;
             for (int c = 0; c < 9; ++c) {
                 low[c % 3] = fmin(low[c % 3], t->p[c / 3][c % 3]);

@@ -1,6 +1,6 @@
-/* Truth of a model's lightmap, texel by texel at their centres: on the triangles as they are, geometric
- * normals for the horizon, by rays of Embree. What is solid comes from a file of its own, where faces look to
- * the air. */
+/* Truth of a model's lightmap, texel by texel at their centres: on the triangles as they are, by rays of
+ * Embree. AO is over the hemisphere of the smooth normal; directions below the face count neither as open nor
+ * as hidden. What is solid comes from a file of its own, where faces look to the air. */
 #include "directions.h"
 #include "embree_scene.h"
 #include "judge.h"
@@ -11,24 +11,20 @@
 #include <string.h>
 #include <vdbshade/vdbshade.h>
 
-static const double FEW = 0.2, MOST = 0.8;
+/* Shares of rays that meet backs. Where no file says what is solid, open meshes are judged more strictly. */
+static const double FEW = 0.2, MOST = 0.8, FEW_OF_MODEL = 0.05;
 static const double BORDER = 1e-3; /* texels */
-static const double LIFT = 2e-6;   /* of the model's half size: some of Embree's roundings */
+static const double LIFT = 1e-6;   /* of the model's size: some of Embree's roundings */
 static const double TOUCH = 6.0;   /* lifts: solids so near to each other touch */
-static const double TILT =
-    10.0; /* degrees of a smooth normal off its triangle: what lies beyond is told apart */
-enum { VERDICT_RAYS = 96, FIRST_RAYS = 64, KINDS = 3 };
+enum { VERDICT_RAYS = 96, FIRST_RAYS = 64 };
 static const double PI = 3.14159265358979323846;
 
 typedef struct work {
     const judge_question *question;
+    const judge_scene *scene;
     judge_truth *truth;
-    judge_triangle *triangles;
-    size_t count;
-    const truth_mesh *model, *solids, *rooms, *hollows; /* of the last two NULL where there are none */
-    double lift, solid_scale;
     truth_frame sun;
-    double (*few)[3], (*sun_rays)[3], (*ao_rays)[3], (*verdict_rays)[3]; /* in a frame's axes */
+    double (*few)[3], (*sun_rays)[3], (*ao_rays)[3]; /* in a frame's axes */
 } work;
 
 static double dot(const double a[3], const double b[3]) {
@@ -50,11 +46,11 @@ static struct RTCRayHit ray_of(const truth_mesh *mesh, const double from[3], con
                               .hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
 }
 
-static bool hidden(const truth_mesh *mesh, const double from[3], const double towards[3], double reach) {
+bool judge_hidden(const judge_scene *scene, const double from[3], const double towards[3], double reach) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    struct RTCRayHit r = ray_of(mesh, from, towards, reach);
-    rtcOccluded1(mesh->scene, &context, &r.ray);
+    struct RTCRayHit r = ray_of(scene->traced, from, towards, reach);
+    rtcOccluded1(scene->traced->scene, &context, &r.ray);
     return r.ray.tfar < 0.0f;
 }
 
@@ -102,62 +98,66 @@ static double first_on(const truth_mesh *mesh, const double from[3], const doubl
 /* Whether a ray says that it begins within a solid, which it leaves more often than it enters (solids may lie
  * within and across each other), or behind the wall of a room. Where two walls lie in one place, back to
  * back, the one that looks at us is seen. */
-static bool is_behind(const work *w, const double from[3], const double towards[3], bool hollows) {
-    if (all_on(w->solids, from, towards, INFINITY).backs +
-            (hollows ? all_on(w->hollows, from, towards, INFINITY).backs : 0) >
+static bool is_behind(const judge_scene *s, const double from[3], const double towards[3], bool hollows) {
+    bool back, unused;
+    if (s->unknown) {
+        first_on(s->solids, from, towards, &back);
+        return back;
+    }
+    if (all_on(s->solids, from, towards, INFINITY).backs +
+            (hollows ? all_on(s->hollows, from, towards, INFINITY).backs : 0) >
         0) {
         return true;
     }
-    bool back, unused;
-    if (w->rooms == NULL) {
+    if (s->rooms == NULL) {
         return false;
     }
-    const double wall = first_on(w->rooms, from, towards, &back);
-    if (!back || wall > first_on(w->solids, from, towards, &unused)) {
+    const double wall = first_on(s->rooms, from, towards, &back);
+    if (!back || wall > first_on(s->solids, from, towards, &unused)) {
         return false;
     }
-    const double near = TOUCH * w->lift / w->solid_scale;
+    const double near = TOUCH * s->lift / s->solid_scale;
     double before[3];
     for (int k = 0; k < 3; ++k) {
         before[k] = from[k] + fmax(0.0, wall - near) * towards[k];
     }
-    return all_on(w->rooms, before, towards, 2.0 * near).backs > 0;
+    return all_on(s->rooms, before, towards, 2.0 * near).backs > 0;
 }
 
 /* Whether a solid or room ends where another begins: a face that looks against this one lies within TOUCH. */
-static bool touches(const work *w, const double at[3], const double g[3]) {
-    const double near = TOUCH * w->lift / w->solid_scale;
+static bool touches(const judge_scene *s, const double at[3], const double g[3]) {
+    const double near = TOUCH * s->lift / s->solid_scale;
     double under[3];
     for (int k = 0; k < 3; ++k) {
         under[k] = at[k] - near * g[k];
     }
-    return all_on(w->solids, under, g, 2.0 * near).against ||
-           (w->rooms != NULL && all_on(w->rooms, under, g, 2.0 * near).against);
+    return all_on(s->solids, under, g, 2.0 * near).against ||
+           (s->rooms != NULL && all_on(s->rooms, under, g, 2.0 * near).against);
 }
 
-static int count_behind(const work *w, const double start[3], const double g[3], bool hollows) {
+static int count_behind(const judge_scene *s, const double start[3], const double g[3], bool hollows) {
     const truth_frame frame = truth_frame_around(g);
     int backs = 0;
     for (int i = 0; i < VERDICT_RAYS; ++i) {
         double towards[3];
-        truth_to_world(&frame, w->verdict_rays[i], towards);
-        backs += is_behind(w, start, towards, hollows) ? 1 : 0;
+        truth_cosine_direction(&frame, (size_t)i, VERDICT_RAYS, towards);
+        backs += is_behind(s, start, towards, hollows) ? 1 : 0;
     }
     return backs;
 }
 
-static int verdict_of(const work *w, const double p[3], const double g[3]) {
+int judge_verdict(const judge_scene *s, const double p[3], const double g[3]) {
     double at[3], start[3];
     for (int k = 0; k < 3; ++k) {
-        at[k] = p[k] / w->solid_scale;
-        start[k] = at[k] + w->lift / w->solid_scale * g[k];
+        at[k] = p[k] / s->solid_scale;
+        start[k] = at[k] + s->lift / s->solid_scale * g[k];
     }
-    const int backs = count_behind(w, start, g, false);
-    if (backs <= FEW * VERDICT_RAYS) {
-        const bool either = w->hollows != NULL && count_behind(w, start, g, true) > FEW * VERDICT_RAYS;
+    const int backs = count_behind(s, start, g, false);
+    if (backs <= (s->unknown ? FEW_OF_MODEL : FEW) * VERDICT_RAYS) {
+        const bool either = s->hollows != NULL && count_behind(s, start, g, true) > FEW * VERDICT_RAYS;
         return either ? JUDGE_UNCLEAR : JUDGE_VALID;
     }
-    return backs < MOST * VERDICT_RAYS || touches(w, at, g) ? JUDGE_UNCLEAR : JUDGE_INVALID;
+    return backs < MOST * VERDICT_RAYS || touches(s, at, g) ? JUDGE_UNCLEAR : JUDGE_INVALID;
 }
 
 static float shadow_of(const work *w, const double start[3], const double g[3]) {
@@ -168,7 +168,7 @@ static float shadow_of(const work *w, const double start[3], const double g[3]) 
         for (size_t i = 0; i < counts[pass]; ++i) {
             double towards[3];
             truth_to_world(&w->sun, pass == 0 ? w->few[i] : w->sun_rays[i], towards);
-            lit += dot(towards, g) > 0.0 && !hidden(w->model, start, towards, INFINITY) ? 1 : 0;
+            lit += dot(towards, g) > 0.0 && !judge_hidden(w->scene, start, towards, INFINITY) ? 1 : 0;
         }
         if (lit == 0 || lit == counts[pass]) {
             return lit > 0 ? 1.0f : 0.0f;
@@ -180,13 +180,16 @@ static float shadow_of(const work *w, const double start[3], const double g[3]) 
 static float ao_of(const work *w, const double start[3], const double g[3], const double n[3]) {
     const truth_frame frame = truth_frame_around(n);
     const size_t rays = (size_t)w->question->rays;
-    size_t open = 0;
+    size_t above = 0, open = 0;
     for (size_t i = 0; i < rays; ++i) {
         double towards[3];
         truth_to_world(&frame, w->ao_rays[i], towards);
-        open += dot(towards, g) > 0.0 && !hidden(w->model, start, towards, w->question->distance) ? 1 : 0;
+        if (dot(towards, g) > 0.0) {
+            ++above;
+            open += judge_hidden(w->scene, start, towards, w->question->distance) ? 0 : 1;
+        }
     }
-    return (float)((double)open / (double)rays);
+    return above > 0 ? (float)((double)open / (double)above) : 1.0f;
 }
 
 /* The directions of all points, once. */
@@ -197,16 +200,12 @@ static void aim(work *w) {
     w->few = judge_take(FIRST_RAYS * sizeof *w->few);
     w->sun_rays = judge_take(rays * sizeof *w->sun_rays);
     w->ao_rays = judge_take(rays * sizeof *w->ao_rays);
-    w->verdict_rays = judge_take(VERDICT_RAYS * sizeof *w->verdict_rays);
     for (size_t i = 0; i < FIRST_RAYS; ++i) {
         truth_light_direction(&axes, radius, i, FIRST_RAYS, w->few[i]);
     }
     for (size_t i = 0; i < rays; ++i) {
         truth_light_direction(&axes, radius, i, rays, w->sun_rays[i]);
         truth_cosine_direction(&axes, i, rays, w->ao_rays[i]);
-    }
-    for (size_t i = 0; i < VERDICT_RAYS; ++i) {
-        truth_cosine_direction(&axes, i, VERDICT_RAYS, w->verdict_rays[i]);
     }
 }
 
@@ -219,20 +218,20 @@ static void texel(void *user, size_t begin, size_t end) {
         if (w->truth->triangle[i] <= 0.0f) {
             continue;
         }
-        const judge_triangle *t = &w->triangles[(size_t)w->truth->triangle[i] - 1];
+        const judge_triangle *t = &w->scene->triangles[(size_t)w->truth->triangle[i] - 1];
         double at[3], n[3], start[3];
         judge_position(t, (double)(i % (size_t)size) + 0.5, (double)(i / (size_t)size) + 0.5, size, at, n);
         for (int k = 0; k < 3; ++k) {
-            start[k] = at[k] + w->lift * t->g[k];
+            start[k] = at[k] + w->scene->lift * t->g[k];
         }
-        w->truth->verdict[i] = (float)verdict_of(w, at, t->g);
+        w->truth->verdict[i] = (float)judge_verdict(w->scene, at, t->g);
         if (w->truth->verdict[i] == JUDGE_INVALID) {
             continue;
         }
         const double height = asin(dot(w->sun.n, t->g)), bend = t->bend;
         const bool horizon =
             bend > 1e-3 && fabs(height) < bend + (0.5 * w->question->angle + 0.5) * PI / 180.0;
-        w->truth->apart[i] = horizon || dot(n, t->g) < cos(TILT * PI / 180.0) ? 1.0f : 0.0f;
+        w->truth->apart[i] = horizon ? 1.0f : 0.0f;
         w->truth->shadow[i] = shadow_of(w, start, t->g);
         w->truth->ao[i] = ao_of(w, start, t->g, n);
     }
@@ -241,8 +240,8 @@ static void texel(void *user, size_t begin, size_t end) {
 /* The first triangle keeps a texel; one whose centre is nearer than BORDER to a border is left out. */
 static void cover(const work *w) {
     const int32_t size = w->question->size;
-    for (size_t k = 0; k < w->count; ++k) {
-        const judge_triangle *t = &w->triangles[k];
+    for (size_t k = 0; k < w->scene->count; ++k) {
+        const judge_triangle *t = &w->scene->triangles[k];
         double q[3][2], low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
         for (int c = 0; c < 3; ++c) {
             q[c][0] = t->uv[c][0] * size - 0.5;
@@ -275,84 +274,86 @@ static void cover(const work *w) {
     }
 }
 
-judge_truth judge_make(const char *path, const judge_question *question) {
+judge_scene judge_open(const char *path, const char *solids, int32_t uv_set, double lift) {
     vsh_error error;
-    vsh_model *model = NULL;
-    if (vsh_model_read(path, NULL, &model, &error) != VSH_OK) {
+    judge_scene s = {.solid_scale = 1.0, .unknown = solids == NULL};
+    if (vsh_model_read(path, NULL, &s.model, &error) != VSH_OK) {
         judge_give_up(path, error.message);
     }
-    const size_t mesh_count = vsh_model_mesh_count(model);
-    vsh_mesh *meshes = judge_take(mesh_count * sizeof *meshes);
-    for (size_t i = 0; i < mesh_count; ++i) {
-        meshes[i] = vsh_model_mesh(model, i, -1);
+    s.mesh_count = vsh_model_mesh_count(s.model);
+    s.meshes = judge_take(s.mesh_count * sizeof *s.meshes);
+    for (size_t i = 0; i < s.mesh_count; ++i) {
+        s.meshes[i] = vsh_model_mesh(s.model, i, uv_set);
     }
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    s.triangles = judge_take_triangles(s.meshes, s.mesh_count, &s.count, low, high);
+    const double extent = fmax(high[0] - low[0], fmax(high[1] - low[1], high[2] - low[2]));
+    s.lift = lift * extent;
+    s.traced = truth_mesh_create(s.meshes, s.mesh_count);
+    static const char *const kinds[JUDGE_KINDS] = {"solid:", "room:", "hollow:"};
+    truth_mesh **const looked_into[JUDGE_KINDS] = {&s.solids, &s.rooms, &s.hollows};
+    if (solids == NULL) {
+        s.solids = truth_mesh_create(s.meshes, s.mesh_count);
+    }
+    for (int kind = 0; solids != NULL && kind < JUDGE_KINDS; ++kind) {
+        judge_shape shape = judge_read_solids(solids, kinds[kind]);
+        const vsh_mesh mesh = {.positions = shape.positions,
+                               .indices = shape.indices,
+                               .vertex_count = shape.vertices,
+                               .triangle_count = shape.triangles};
+        if (shape.triangles > 0 || kind == 0) {
+            *looked_into[kind] = truth_mesh_create(&mesh, 1);
+        }
+        s.solid_scale = extent / fmax(shape.high[0] - shape.low[0],
+                                      fmax(shape.high[1] - shape.low[1], shape.high[2] - shape.low[2]));
+        for (int k = 0; k < 3 && kind == 0; ++k) {
+            if (fabs(low[k] - shape.low[k] * s.solid_scale) > 1e-4 * extent ||
+                fabs(high[k] - shape.high[k] * s.solid_scale) > 1e-4 * extent) {
+                fprintf(stderr, "judge: %s: axis %d is %g … %g, the solids say %g … %g\n", path, k, low[k],
+                        high[k], shape.low[k], shape.high[k]);
+            }
+        }
+        free(shape.positions);
+        free(shape.indices);
+    }
+    if (s.traced == NULL || s.solids == NULL) {
+        judge_give_up(path, "no Embree, no truth");
+    }
+    for (int k = 0; k < JUDGE_KINDS; ++k) {
+        if (*looked_into[k] != NULL) {
+            rtcSetSceneFlags((*looked_into[k])->scene,
+                             RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+            rtcCommitScene((*looked_into[k])->scene);
+        }
+    }
+    return s;
+}
+
+void judge_close(judge_scene *s) {
+    truth_mesh_free(s->hollows);
+    truth_mesh_free(s->rooms);
+    truth_mesh_free(s->solids);
+    truth_mesh_free(s->traced);
+    free(s->triangles);
+    free(s->meshes);
+    vsh_model_free(s->model);
+}
+
+judge_truth judge_make(const char *path, const judge_question *question) {
+    judge_scene scene = judge_open(path, question->solids, -1, LIFT);
     const size_t texels = (size_t)question->size * (size_t)question->size;
     judge_truth truth = {judge_take(texels * sizeof(float)), judge_take(texels * sizeof(float)),
                          judge_take(texels * sizeof(float)), judge_take(texels * sizeof(float)),
-                         judge_take(texels * sizeof(float)), 1.0};
-    work w = {.question = question, .truth = &truth, .solid_scale = 1.0};
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    w.triangles = judge_take_triangles(meshes, mesh_count, &w.count, low, high);
-    const double extent = fmax(high[0] - low[0], fmax(high[1] - low[1], high[2] - low[2]));
-    w.lift = 0.5 * LIFT * extent;
-    w.sun = truth_frame_around(question->towards);
-    truth_mesh *mesh = truth_mesh_create(meshes, mesh_count);
-    truth_mesh *looked_into[KINDS] = {NULL};
-    static const char *const kinds[KINDS] = {"solid:", "room:", "hollow:"};
-    if (question->solids == NULL) {
-        looked_into[0] = truth_mesh_create(meshes, mesh_count);
-    }
-    for (int kind = 0; question->solids != NULL && kind < KINDS; ++kind) {
-        judge_shape s = judge_read_solids(question->solids, kinds[kind]);
-        const vsh_mesh shape = {.positions = s.positions,
-                                .indices = s.indices,
-                                .vertex_count = s.vertices,
-                                .triangle_count = s.triangles};
-        if (s.triangles > 0 || kind == 0) {
-            looked_into[kind] = truth_mesh_create(&shape, 1);
-        }
-        truth.units = extent / fmax(s.high[0] - s.low[0], fmax(s.high[1] - s.low[1], s.high[2] - s.low[2]));
-        w.solid_scale = truth.units;
-        for (int k = 0; k < 3 && kind == 0; ++k) {
-            if (fabs(low[k] - s.low[k] * truth.units) > 1e-4 * extent ||
-                fabs(high[k] - s.high[k] * truth.units) > 1e-4 * extent) {
-                fprintf(stderr, "judge: %s: axis %d is %g … %g, the solids say %g … %g\n", path, k, low[k],
-                        high[k], s.low[k], s.high[k]);
-            }
-        }
-        free(s.positions);
-        free(s.indices);
-    }
-    if (mesh == NULL || looked_into[0] == NULL) {
-        judge_give_up(path, "no Embree, no truth");
-    }
-    for (int k = 0; k < KINDS; ++k) {
-        if (looked_into[k] != NULL) {
-            rtcSetSceneFlags(looked_into[k]->scene,
-                             RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
-            rtcCommitScene(looked_into[k]->scene);
-        }
-    }
-    w.solids = looked_into[0];
-    w.rooms = looked_into[1];
-    w.hollows = looked_into[2];
-    w.model = mesh;
+                         judge_take(texels * sizeof(float)), scene.solid_scale};
+    work w = {
+        .question = question, .scene = &scene, .truth = &truth, .sun = truth_frame_around(question->towards)};
     aim(&w);
     cover(&w);
     truth_in_pieces(texels, 0, texel, &w);
-    for (int k = 0; k < KINDS; ++k) {
-        if (looked_into[k] != NULL) {
-            truth_mesh_free(looked_into[k]);
-        }
-    }
-    truth_mesh_free(mesh);
-    free(w.verdict_rays);
     free(w.ao_rays);
     free(w.sun_rays);
     free(w.few);
-    free(w.triangles);
-    free(meshes);
-    vsh_model_free(model);
+    judge_close(&scene);
     return truth;
 }
 
