@@ -1,6 +1,6 @@
 /* Judges a bake as a viewer sees it: bilinear lookups at random points of the surface, compared with rays.
  *
- *   vsh_judge seen MODEL BAKE.exr [--sun X,Y,Z] [--sun-angle DEGREES] [--ao DISTANCE] [--solids FILE.obj]
+ *   vsh_judge seen MODEL BAKE.exr [--sun X,Y,Z] [--sun-angle DEGREES] [--ao DISTANCE] [--solids FILE.obj|-]
  *                  [--receive MESH] [--uv-set N] [--list]
  *
  * BAKE.exr has the channels `shadow.sun` and `ao`, as far as --sun and --ao ask for them. Every pixel counts
@@ -350,7 +350,7 @@ int judge_seen(int count, char **arguments) {
         } else if (strcmp(word, "--uv-set") == 0) {
             understood = sscanf(value, "%d", &uv_set) == 1;
         } else if (strcmp(word, "--solids") == 0) {
-            solids = value;
+            solids = strcmp(value, "-") != 0 ? value : NULL;
         } else if (strcmp(word, "--receive") == 0) {
             receive = value;
         } else {

@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 """Makes the sixteen game assets that tools/judge-assets bakes, each as GLB, OBJ and FBX with lightmap UVs in its
-second set, and beside them what a person takes for solid in each, NAME.solids.obj.
+second set. NAME.solids.obj says what a person takes for solid. NAME_smooth.glb is NAME.glb, smooth-shaded up to
+60° between faces; it is missing where that changes nothing.
 
   blender -b --python tools/make_game_assets.py -- FOLDER [NAME…]
 
 Needs Blender 3.4. The same files each time. Metres; z is up in here, y in the files.
 """
+import filecmp
 import os
 import sys
 
@@ -16,6 +18,7 @@ from game_assets import ASSETS  # noqa: E402
 
 MARGIN = 0.004  # of the unit square: 4 texels of 1024
 SMOOTH_BELOW = 0.7  # radians between faces of a smooth object
+SMOOTHER_BELOW = 1.05  # of all objects of NAME_smooth.glb
 
 
 def clear():
@@ -28,10 +31,14 @@ def mesh_of(name, part):
     if mesh.validate():
         raise SystemExit("%s: Blender mended the mesh" % name)
     if part.smooth:
-        mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
-        mesh.use_auto_smooth = True
-        mesh.auto_smooth_angle = SMOOTH_BELOW
+        shade_smooth(mesh, SMOOTH_BELOW)
     return mesh
+
+
+def shade_smooth(mesh, below):
+    mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
+    mesh.use_auto_smooth = True
+    mesh.auto_smooth_angle = below
 
 
 def tiling_uvs(mesh):
@@ -79,9 +86,12 @@ def write_solids(path, parts):
             base += len(part.vertices)
 
 
-def export(folder, name):
-    stem = os.path.join(folder, name)
+def export_glb(stem):
     bpy.ops.export_scene.gltf(filepath=stem + ".glb", export_format="GLB", export_materials="NONE")
+
+
+def export(stem):
+    export_glb(stem)
     bpy.ops.wm.obj_export(filepath=stem + ".obj", export_materials=False)
     bpy.ops.export_scene.fbx(filepath=stem + ".fbx")
 
@@ -99,7 +109,13 @@ def make(folder, name, build):
         objects.append(o)
     lightmap_uvs(objects)
     write_solids(os.path.join(folder, name + ".solids.obj"), parts)
-    export(folder, name)
+    stem = os.path.join(folder, name)
+    export(stem)
+    for o in objects:
+        shade_smooth(o.data, SMOOTHER_BELOW)
+    export_glb(stem + "_smooth")
+    if filecmp.cmp(stem + ".glb", stem + "_smooth.glb", shallow=False):
+        os.remove(stem + "_smooth.glb")
     triangles = sum(len(p.vertices) - 2 for o in objects for p in o.data.polygons)
     print("asset %s: %d objects, %d triangles" % (name, len(objects), triangles))
 
