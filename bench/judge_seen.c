@@ -1,16 +1,16 @@
-/* Judges a bake as a viewer sees it: bilinear lookups at random points of the surface, compared with rays.
+/* Judges a bake as a viewer sees it: compares bilinear lookups at random points of the surface with rays.
  *
- *   vsh_judge seen MODEL BAKE.exr [--sun X,Y,Z] [--sun-angle DEGREES] [--ao DISTANCE] [--solids FILE.obj|-]
- *                  [--receive MESH] [--uv-set N] [--list]
+ *   vsh_judge seen MODEL BAKE.exr [--sun X,Y,Z] [--sun-angle DEGREES] [--ao DISTANCE]
+ *                  [--solids FILE.obj|-] [--receive MESH] [--uv-set N] [--list]
  *
- * BAKE.exr has the channels `shadow.sun` and `ao`, as far as --sun and --ao ask for them. Every pixel counts
- * as a viewer's graphics card would blend it, padding and borders too; `A` is not looked at. Prints lines
- * "NAME VALUE"; shares are in percent. "wide" is the part on charts that are at least four texels wide.
- * --list adds a line for each point that is off by more than a quarter.
+ * --sun needs the channel `shadow.sun` in BAKE.exr, --ao needs `ao`. Lookups blend all pixels as a graphics
+ * card does, padding and borders too. They ignore `A`. The output is lines of "NAME VALUE". Shares are in
+ * percent. "wide" means the points on charts that are at least four texels wide. --list prints each point
+ * that is off by more than a quarter.
  *
- * Left out: points that see the backs of solids; of shadows also points of bent faces where a part of the
- * sun's disc is below the face or below the smooth normal's horizon, as a baker may smooth such terminators.
- */
+ * Points that see the backs of solids are left out. A baker may smooth shadow terminators. So shadows leave
+ * out points of bent faces where the horizon of the face or of the smooth normal cuts the sun's disc, or
+ * where they disagree. */
 #include "directions.h"
 #include "embree_scene.h"
 #include "judge.h"
@@ -280,7 +280,7 @@ static void judge_points(void *user, size_t begin, size_t end) {
 /* --- what is reported */
 
 static void report(const task *t, int channel, const char *name, bool list) {
-    size_t count[2] = {0}, dark[2] = {0}, bright[2] = {0}; /* of all points, of those on wide charts */
+    size_t count[2] = {0}, dark[2] = {0}, bright[2] = {0}; /* [wide]: all points, points on wide charts */
     double square = 0.0;
     for (size_t i = 0; i < POINTS; ++i) {
         const point *p = &t->points[i];
@@ -309,7 +309,7 @@ static void report(const task *t, int channel, const char *name, bool list) {
     }
 }
 
-/* Sums of the triangles' areas; those of other meshes and without UVs have none. */
+/* Sums up the triangles' areas. Triangles of other meshes or without UVs count as 0. */
 static void add_areas(task *t, const char *receive) {
     double sum = 0.0;
     for (size_t i = 0; i < t->scene.count; ++i) {

@@ -1,6 +1,6 @@
-/* Truth of a model's lightmap, texel by texel at their centres: on the triangles as they are, by rays of
- * Embree. AO is over the hemisphere of the smooth normal; directions below the face count neither as open nor
- * as hidden. What is solid comes from a file of its own, where faces look to the air. */
+/* Truth of a model's lightmap at the texels' centres, by Embree's rays against the triangles as they are. AO
+ * is over the hemisphere of the smooth normal. Directions below the face count neither as open nor as hidden.
+ * A file of its own says what is solid: its faces look to the air. */
 #include "directions.h"
 #include "embree_scene.h"
 #include "judge.h"
