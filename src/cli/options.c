@@ -2,6 +2,7 @@
 #include "options.h"
 
 #include "message.h"
+#include "text.h"
 
 #include <getopt.h>
 #include <stdio.h>
@@ -353,22 +354,6 @@ int cli_parse_some(const cli_command *command, int argc, char **argv, cli_option
     return CLI_OK;
 }
 
-/* As many bytes of `text` as go on a line: to where it is broken, or to the last blank that fits. */
-static size_t line_length(const char *text) {
-    size_t fits = 0;
-    int columns = 0;
-    for (size_t i = 0;; ++i) {
-        const bool ends = text[i] == '\0' || text[i] == '\n';
-        if (ends || text[i] == ' ') {
-            fits = columns <= HELP_WIDTH || fits == 0 ? i : fits;
-        }
-        if (ends || columns > HELP_WIDTH) {
-            return fits > 0 ? fits : i;
-        }
-        columns += ((unsigned char)text[i] & 0xc0) != 0x80; /* characters, not bytes */
-    }
-}
-
 static void print_option(const cli_option *option) {
     char left[128];
     int used = option->key < 256 ? snprintf(left, sizeof left, "  -%c, --%s", option->key, option->name)
@@ -376,19 +361,16 @@ static void print_option(const cli_option *option) {
     if (option->value != NULL) {
         used += snprintf(left + used, sizeof left - (size_t)used, " %s", option->value);
     }
-    printf("%-*s", HELP_COLUMN, left);
-    if (used >= HELP_COLUMN) {
-        printf("\n%*s", HELP_COLUMN, "");
+    fputs(left, stdout);
+    int columns = cli_text_characters(left, strlen(left));
+    if (columns >= HELP_COLUMN) {
+        putchar('\n');
+        columns = 0;
     }
-    for (const char *line = option->help;;) {
-        const size_t length = line_length(line);
-        printf("%.*s\n", (int)length, line);
-        if (line[length] == '\0') {
-            return;
-        }
-        line += length + 1;
-        printf("%*s", HELP_COLUMN, "");
-    }
+    cli_text text = {
+        .out = stdout, .width = HELP_WIDTH, .lead = HELP_COLUMN - columns, .indent = HELP_COLUMN};
+    cli_text_add(&text, option->help);
+    cli_text_end(&text);
 }
 
 void cli_print_help(const cli_command *command) {

@@ -11,7 +11,7 @@ typedef struct cli_option {
     int key;
     const char *name;
     const char *value; /* placeholder; NULL: the option takes none */
-    const char *help;  /* lines separated by \n; for a heading, its text */
+    const char *help;  /* line breaks count as blanks; for a heading, its text */
 } cli_option;
 
 typedef struct cli_command {

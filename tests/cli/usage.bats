@@ -33,6 +33,30 @@ fits() {
     done
 }
 
+@test "the help of options fills its column, counted in characters" {
+    local LC_ALL=C.UTF-8 line text before
+    for command in bake voxelize info trade query volume flat render compare regress unwrap view field merge help; do
+        shade "$command" --help
+        done_well
+        before=
+        for line in "${lines[@]}"; do
+            text=${line:30}
+            [[ $line == *: && $line != ' '* ]] && text= && before=
+            if [[ $line == "$(printf '%30s' '')"* ]]; then # the option's help goes on
+                word=${text%% *}
+                [ -z "$before" ] || [ $((${#before} + 1 + ${#word})) -gt 56 ] ||
+                    fail "$command: '$word' fits the line before: $before"
+            elif [[ ${line:29:1} == ' ' ]]; then
+                [[ $text != ' '* ]] || fail "$command: the help begins late: $line"
+            elif [[ $line =~ ^\ +- ]]; then # a long name, whose help begins below
+                [[ $line =~ [^\ ]\ \  ]] && fail "$command: the help begins early: $line"
+                text=
+            fi
+            before=$text
+        done
+    done
+}
+
 @test "the help of bake names every option that holds for good" {
     shade bake --help
     for option in sun sun-angle ao size resolution voxel-size uv-set method padding threads memory-limit \
