@@ -10,11 +10,23 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
+#include "image/write_plan.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+
+static vsh_result check_image(const char *path, const vsh_image *image, const vsh_image_options *options,
+                              vsh_error *error) {
+    vsh_error why;
+    const vsh_result result = vsh_image_check(path, image, options, &why);
+    if (result == VSH_OK) {
+        return VSH_OK;
+    }
+    const char *assets = vshi_image_is_written(path) ? "" : "; or glb, gltf, obj for the mesh with its light";
+    return vshi_fail(error, result, "%s%s", why.message, assets);
+}
 
 vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_error *error) {
     VSHI_NEEDS(scene);
@@ -29,7 +41,7 @@ vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_error *e
     VSHI_TRY_DONE(vshi_channels_name(scene, receiver->width, receiver->height, &channels, error));
     result = vsh_lit_is_output(receiver->output)
                  ? vshi_lit_sink_check(receiver, &channels.image, error)
-                 : vsh_image_check(receiver->output, &channels.image, &options, error);
+                 : check_image(receiver->output, &channels.image, &options, error);
 done:
     vshi_channels_free(&channels);
     return result;

@@ -9,6 +9,7 @@
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 bool cli_has_ending(const char *path, const char *ending) {
     const char *slash = strrchr(path, '/');
@@ -92,6 +93,14 @@ static bool folder_of(const char *path, char *folder) {
     }
     snprintf(folder, PATH_MAX, "%.*s", (int)(slash - path), path);
     return true;
+}
+
+int cli_check_input(const char *path) {
+    if (access(path, R_OK) == 0) {
+        return CLI_OK;
+    }
+    cli_say("%s: cannot be opened: %s", path, strerror(errno));
+    return CLI_FILE;
 }
 
 int cli_check_folder(const char *path) {

@@ -66,6 +66,13 @@ static vsh_result plan_other(const char *path, const char *ending, vshi_format *
                            ending, vshi_oiio_endings());
 }
 
+bool vshi_image_is_written(const char *path) {
+    const char *ending = vshi_path_ending(path);
+    vshi_format format;
+    return strcasecmp(ending, "exr") == 0 || strcasecmp(ending, vshi_png_format.name) == 0 ||
+           (vshi_oiio_have(path, NULL) == VSH_OK && vshi_oiio_format(path, &format));
+}
+
 static vsh_result plan_format(const char *path, const vsh_image *image, vshi_write_plan *plan,
                               vsh_error *error) {
     const char *ending = vshi_path_ending(path);

@@ -14,6 +14,9 @@ typedef struct vshi_write_plan {
     vshi_picture picture;              /* where a plane is grey: what of */
 } vshi_write_plan;
 
+/* Whether images of this ending are written. */
+bool vshi_image_is_written(const char *path);
+
 /* Errors: as of vsh_image_check(), but for the disk's. */
 vsh_result vshi_write_plan_make(const char *path, const vsh_image *image, const vsh_image_options *options,
                                 vshi_write_plan *plan, vsh_error *error);

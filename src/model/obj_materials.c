@@ -180,6 +180,7 @@ char *vshi_obj_library(const char *path, int choice, const char *name, size_t si
 }
 
 vsh_result vshi_obj_read_materials(vshi_obj *obj, const char *text, size_t size, vsh_error *error) {
+    enum { LONGEST_SHOWN = 400 };
     bool found = false;
     for (int choice = 0; choice < VSHI_OBJ_LIBRARIES && size > 0 && !found; ++choice) {
         char *path = vshi_obj_library(obj->path, choice, text, size);
@@ -189,6 +190,10 @@ vsh_result vshi_obj_read_materials(vshi_obj *obj, const char *text, size_t size,
         const vsh_result result = read_file(obj, path, &found, error);
         free(path);
         VSHI_TRY(result);
+    }
+    if (!found && size > 0) {
+        vshi_warn(obj->run, "%s: the material library '%.*s' cannot be read: its materials are opaque",
+                  obj->path, size < LONGEST_SHOWN ? (int)size : LONGEST_SHOWN, text);
     }
     return VSH_OK;
 }

@@ -18,6 +18,14 @@ bake_bad() {
     refused 3 none.json
     bake_bad box.obj --caster none.obj
     refused 3 none.obj
+    shade bake none.glb
+    refused 3 none.glb 'cannot be opened'
+    shade bake none.glb -o out.exr
+    refused 3 none.glb 'cannot be opened'
+    shade render none.glb -o out.png
+    refused 3 none.glb 'cannot be opened'
+    shade volume none.glb -o out.vdb
+    refused 3 none.glb 'cannot be opened'
     untouched out.exr
 }
 

@@ -162,6 +162,14 @@ GLTF
     same outside.exr whole.exr
 }
 
+@test "a material library that is missing is named" {
+    bake 'd 0.3' there.exr
+    [[ $stderr != *library* ]] || fail "it is there: $stderr"
+    rm level.mtl
+    shade bake level.obj --sun 0,1,0 --sun-angle 1 --size 96 --receive floor -o gone.exr
+    [[ $stderr == *"level.obj: the material library 'level.mtl' cannot be read"* ]] || fail "$stderr"
+}
+
 @test "what is neither clear nor opaque is glass" {
     bake '' without.exr --no-cast material:leaf
     bake 'map_d smoke.pgm' smoke.exr

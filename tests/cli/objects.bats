@@ -220,7 +220,7 @@ JSON
             }
             if (/;[ ]*$/) {
                 on = 0
-                n = split(text, part, /%[-+ 0-9.]*(zu|s|d|u|g|f|lu)/)
+                n = split(text, part, /%[-+ 0-9.*]*(zu|s|d|u|g|f|lu)/)
                 best = ""
                 for (i = 1; i <= n; ++i) if (length(part[i]) > length(best)) best = part[i]
                 gsub(/^[ :;,.()'"'"']+|[ :;,.()'"'"']+$/, "", best)

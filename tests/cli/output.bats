@@ -40,6 +40,16 @@ bake_to() {
     refused 2 out
 }
 
+@test "what bake writes is listed with the assets, images alone without them" {
+    for out in out.fbx out.psd; do
+        bake_to "$out"
+        refused 2 "expected one of exr, png," "glb, gltf, obj"
+    done
+    shade render box.obj "${SMALL[@]}" -o out.fbx
+    refused 2 out.fbx
+    [[ $stderr != *glb* ]] || fail "render writes no asset"
+}
+
 @test "bits and packings that a format does not have" {
     bake_to out.png --bits 32
     refused 2 32

@@ -322,6 +322,7 @@ static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scen
         }
         made->scene = *made->read;
     } else {
+        CLI_TRY(cli_check_input(settings->input));
         if (receivers && settings->output == NULL) {
             return cli_usage("%s: no output; give -o OUT", settings->input);
         }
