@@ -34,3 +34,30 @@ block() {
     [ "$(sed -nE '/^ \*     static vsh_result bake/,/^ \*     }/s/^ \*     ?//p' "$header" | sed 's|// \(.*\)|/* \1 */|')" = "$bake" ] ||
         fail "vdbshade.h"
 }
+
+# missing [TAG…]: what tools/setup asks for on a system where nothing is installed.
+missing() {
+    mkdir -p stubs
+    printf '#!/bin/sh\nexit 1\n' | tee stubs/dpkg-query >stubs/sudo
+    printf '#!/bin/sh\necho 1000\n' >stubs/id
+    chmod +x stubs/*
+    run env PATH="$PWD/stubs:$PATH" "$BATS_TEST_DIRNAME/../../tools/setup" "$@"
+}
+
+@test "the demo installs what building and baking take, and nothing of Python or tests" {
+    local tools=$BATS_TEST_DIRNAME/../../tools package
+    grep -qx 'tools/setup' "$tools/demo" || fail "tools/demo has another set-up"
+    grep -qx 'tools/setup python test' "$tools/test" || fail "tools/test has another set-up"
+    missing
+    [ "$status" -eq 2 ] || fail "expected exit code 2"
+    [[ $output == *" cmake "*" libopenvdb-dev "* ]] || fail "what building takes is missing"
+    for package in slurmd chromium doxygen clang-tidy lintian bats libcmocka-dev python3-numpy gcovr; do
+        [[ " $output " != *" $package "* ]] || fail "$package is installed"
+    done
+    missing python test
+    for package in cmake slurmd chromium bats libcmocka-dev python3-numpy; do
+        [[ " $output " == *" $package "* ]] || fail "$package is not installed"
+    done
+    missing pyton
+    [[ $status -eq 2 && $output == *"no tag 'pyton'"* ]] || fail "a wrong tag is taken"
+}
