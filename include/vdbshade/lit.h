@@ -1,4 +1,4 @@
-/* Assets with their light: a glTF or GLB given back as it was, with one more set of UVs and with what was
+/* Assets with their light: a glTF or GLB given back as it was, with lightmap UVs and with what was
  * baked in its materials; a GLB made of a mesh file of another format; an OBJ (docs/lit.md). */
 #ifndef VDBSHADE_LIT_H
 #define VDBSHADE_LIT_H
@@ -90,8 +90,9 @@ static inline vsh_lit_options vsh_lit_options_default(void) {
 /* Writes `output`, a .glb, .gltf or .obj by its ending.
  *
  * Where `path` is a .glb or .gltf, that document with all that it holds, known or not: each primitive that
- * has uvs gets them as its first free TEXCOORD_n, or in place of a set that an earlier call made, which its
- * extras tell ("vdbshade_uv_sets") and which no texture that stays is in; vertices are doubled only where the
+ * has uvs gets them as TEXCOORD_1, or in place of a set that an earlier call made, which its extras list
+ * ("vdbshade_uv_sets"). Where textures that stay use that set, it gets them as its first free TEXCOORD_n, with
+ * a warning. Vertices are doubled only where the
  * atlas splits them, and then all attributes and morph targets of the primitive, byte by byte; primitives on
  * several pages become several; meshes that several nodes use, and instances of EXT_mesh_gpu_instancing,
  * become meshes and nodes of their own where their UVs differ, and share all accessors that do not.
@@ -102,7 +103,7 @@ static inline vsh_lit_options vsh_lit_options_default(void) {
  * it as OUT.bin.
  *
  * Of other formats, and where path is NULL, a document is made of the model: a node for each object with its
- * transform, positions, normals, the first set of UVs and the new one, white materials.
+ * transform, positions, normals, the sets of UVs with the new one as the second, white materials.
  *
  * An .obj holds the model's meshes in the world, by their names, with the UVs that they are lit by alone. Its
  * images are PREVIEW, and stand beside it; a material page_N for each page (OUT.mtl, where there are images)

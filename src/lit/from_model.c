@@ -150,9 +150,13 @@ static vsh_result fill(maker *m, size_t entry, const double *world, arrays *a, v
     for (int32_t set = 0; set < VSH_MAX_UV_SETS; ++set) {
         const float *uvs = vsh_model_mesh(m->work->model, entry, set).uvs;
         a->sets[set] = uvs != NULL ? a->set_count : SIZE_MAX;
-        if (uvs != NULL) {
-            VSHI_TRY_DONE(add_set(m, uvs, a->lit, count, values, a->set_count++, a->attributes, error));
+        if (uvs == NULL) {
+            continue;
         }
+        if (a->lit == NULL || a->set_count != VSHI_LIT_SET) { /* which the new UVs replace */
+            VSHI_TRY_DONE(add_set(m, uvs, a->lit, count, values, a->set_count, a->attributes, error));
+        }
+        ++a->set_count;
     }
 done:
     free(values);
@@ -197,10 +201,9 @@ static vsh_result put_primitive(maker *m, size_t entry, arrays *a, json_t *made,
     const vsh_lit_mesh *lit = &work->meshes[entry];
     const uint32_t *corners = lit->uvs != NULL ? lit->indices : mesh->indices;
     const size_t count = lit->uvs != NULL ? lit->vertex_count : mesh->vertex_count;
-    size_t set = a->set_count;
+    size_t set = a->set_count < VSHI_LIT_SET ? a->set_count : VSHI_LIT_SET;
     if (lit->uvs != NULL) {
         float *values = NULL;
-        VSHI_TRY(vshi_lit_check_set(document, "a mesh", set, error));
         VSHI_TRY(vshi_gltf_take(&document->gltf, (void **)&values, count, sizeof(float[2]), error));
         const vsh_result result =
             add_set(m, lit->uvs, NULL, count, values, set, json_object_get(made, "attributes"), error);

@@ -215,13 +215,9 @@ static vsh_result try_mesh(vshi_lit_work *work, size_t entry, vsh_error *error) 
 static vsh_result try_all(vshi_lit_work *work, const char *path, const vsh_run *run, vshi_job *job,
                           vsh_error *error) {
     bool opened = false;
-    for (size_t i = 0; i < vsh_model_mesh_count(work->model); ++i) {
+    for (size_t i = 0; path != NULL && is_gltf(path) && i < vsh_model_mesh_count(work->model); ++i) {
         if (work->meshes[i].uvs == NULL || vsh_model_uv_sets(work->model, i) < VSH_MAX_UV_SETS) {
             continue;
-        }
-        if (path == NULL || !is_gltf(path)) {
-            VSHI_TRY(vshi_lit_begin(&work->document, path != NULL ? path : "a model", run, job, error));
-            return vshi_lit_check_set(&work->document, "a mesh", VSH_MAX_UV_SETS, error);
         }
         if (!opened) {
             VSHI_TRY(vshi_lit_open(&work->document, path, run, job, error));

@@ -1,6 +1,5 @@
-/* Which set of a primitive new UVs become: one that was made before is replaced by them. The extras of a
- * primitive tell which those are ("vdbshade_uv_sets": [1]); whatever else a file holds is not taken for one.
- */
+/* Which set of a primitive new UVs become. They replace the file's lightmap set, or a set that an earlier
+ * bake made: the extras of a primitive list those ("vdbshade_uv_sets": [1]). */
 #include "lit/work.h"
 
 #include <stdio.h>
@@ -98,7 +97,7 @@ static void name_of(size_t set, char *name, size_t size) {
     snprintf(name, size, "TEXCOORD_%zu", set);
 }
 
-/* Whether a set that was made is there, and all that shows it, or moves it, is going to be replaced. */
+/* Whether a set is there, and all that shows it, or moves it, is going to be replaced. */
 static bool is_replaceable(const vshi_lit_work *work, const json_t *primitive, size_t set,
                            uint32_t purposes) {
     char name[40];
@@ -178,24 +177,13 @@ vsh_result vshi_lit_tell_set(const vshi_lit_document *document, json_t *primitiv
     return vshi_lit_set(document, extras, key, list, error);
 }
 
-vsh_result vshi_lit_check_set(const vshi_lit_document *document, const char *where, size_t set,
-                              vsh_error *error) {
-    if (set < VSH_MAX_UV_SETS) {
-        return VSH_OK;
-    }
-    return vshi_fail(
-        error, VSH_ERROR_LIMIT,
-        "%s: %s has %zu sets of UVs, none of them one that was made for light and that nothing else "
-        "shows: no more than %d can be read",
-        document->gltf.path, where, set, VSH_MAX_UV_SETS);
-}
-
 vsh_result vshi_lit_choose_set(const vshi_lit_work *work, json_t *primitive, const vsh_lit_mesh *mesh,
                                const char *where, size_t *set, vsh_error *error) {
-    const uint32_t purposes = made_sets(primitive) != NULL ? purposes_of_mesh(work, mesh) : 0;
+    const uint32_t purposes = purposes_of_mesh(work, mesh);
     size_t count = count_sets(json_object_get(primitive, "attributes"));
     *set = 0;
-    while (*set < count && !(is_made(primitive, *set) && is_replaceable(work, primitive, *set, purposes))) {
+    while (*set < count && !((*set == VSHI_LIT_SET || is_made(primitive, *set)) &&
+                             is_replaceable(work, primitive, *set, purposes))) {
         ++*set;
     }
     /* sets are numbered without gaps: of others that were made the last can go */
@@ -206,5 +194,11 @@ vsh_result vshi_lit_choose_set(const vshi_lit_work *work, json_t *primitive, con
     if (*set < count) {
         drop(primitive, *set);
     }
-    return vshi_lit_check_set(&work->document, where, *set, error);
+    if (*set < VSH_MAX_UV_SETS) {
+        return VSH_OK;
+    }
+    return vshi_fail(error, VSH_ERROR_LIMIT,
+                     "%s: %s has %zu sets of UVs, and textures that stay use those that the lightmap could "
+                     "take: no more than %d can be read",
+                     work->document.gltf.path, where, *set, VSH_MAX_UV_SETS);
 }

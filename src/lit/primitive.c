@@ -204,6 +204,12 @@ static vsh_result make(vshi_lit_work *work, vshi_lit_shape *shape, const json_t 
     vshi_lit_split *split = NULL;
     size_t uvs, set, positions, whole = SIZE_MAX;
     VSHI_TRY(vshi_lit_choose_set(work, made, mesh, where, &set, error));
+    if (set > VSHI_LIT_SET) {
+        vshi_warn(document->gltf.run,
+                  "%s: %s: textures that stay use TEXCOORD_%d, so the lightmap's UVs are TEXCOORD_%zu, which "
+                  "Godot, Unity and Hubs do not read",
+                  document->gltf.path, where, VSHI_LIT_SET, set);
+    }
     if (v->split) {
         VSHI_TRY(make_split(work, shape, given, mesh, v, where, made, &uvs, &split, error));
     } else {

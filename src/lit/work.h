@@ -93,13 +93,14 @@ vsh_result vshi_lit_materials_apply(vshi_lit_work *work, vsh_error *error);
 vsh_result vshi_lit_primitive_make(vshi_lit_work *work, size_t mesh, size_t primitive, size_t entry,
                                    json_t *list, vsh_error *error);
 
-/* Takes out of a primitive what new UVs of `mesh` replace, and tells which set they become: the first that
- * was made before and that nothing shows which stays, or one more. Errors: VSH_ERROR_LIMIT (VSH_MAX_UV_SETS).
- * (own_sets.c) */
+/* The set of UVs that engines take for lightmaps. */
+enum { VSHI_LIT_SET = 1 };
+
+/* Takes out of a primitive what new UVs of `mesh` replace, and tells which set they become: the first that is
+ * VSHI_LIT_SET or was made before, and that no texture uses which stays; else one more. Errors:
+ * VSH_ERROR_LIMIT (VSH_MAX_UV_SETS). (own_sets.c) */
 vsh_result vshi_lit_choose_set(const vshi_lit_work *work, json_t *primitive, const vsh_lit_mesh *mesh,
                                const char *where, size_t *set, vsh_error *error);
-vsh_result vshi_lit_check_set(const vshi_lit_document *document, const char *where, size_t set,
-                              vsh_error *error);
 
 /* Notes in a primitive's extras that a set was made, for the next time. */
 vsh_result vshi_lit_tell_set(const vshi_lit_document *document, json_t *primitive, size_t set,
