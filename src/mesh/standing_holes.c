@@ -1,8 +1,9 @@
 /* How far the holes of a vessel are closed by others.
  *
- * A hole is closed where just beyond it is behind something: a segment from there into the component comes
- * out of the front of another one before it goes in by one. So a cup that stands upside down is closed, and
- * neither one that holds fruit or coffee, whose fronts look out of it, nor one that stands below a shelf. */
+ * A segment from just beyond the hole into the component tells: the hole is closed if the segment leaves
+ * another component that it begins in, or enters within the gap around the hole. So a cup that stands upside
+ * down is closed, on a thick table and on a thin board. A cup that holds fruit or coffee is open, because the
+ * segment enters those deeper inside; so is a cup below a shelf, which is farther off than the gap. */
 #include "mesh/standing.h"
 
 /* Of the points of a hole that are looked at, and of those of its rim: fewer that are closed do not close any
@@ -27,8 +28,9 @@ static vshi_vec cross_of(const vshi_vec cap[3]) {
     return vshi_scale(vshi_cross(vshi_sub(cap[1], cap[0]), vshi_sub(cap[2], cap[0])), 0.5);
 }
 
-/* Whether `point` is seen to be behind something on the way to `target` in the vessel. */
-static bool is_behind(const vshi_vessel *v, vshi_vec point, vshi_vec target, bool by_solids) {
+/* Whether the segment from `point` to `target` in the vessel leaves a component that it begins in, or enters
+ * in its first part, `gap` of its length: a thin slab may lie all within the gap. */
+static bool is_behind(const vshi_vessel *v, vshi_vec point, vshi_vec target, double gap, bool by_solids) {
     vshi_face_crossing crossings[CROSSINGS];
     const size_t count = vshi_face_tree_cross(v->tree, point, target, crossings, CROSSINGS);
     double end = 1.0;
@@ -41,6 +43,9 @@ static bool is_behind(const vshi_vessel *v, vshi_vec point, vshi_vec target, boo
         if (!by_solids || c->kind != VSHI_KIND_SHEET) {
             left += crossings[i].out;
         }
+        if (left < 0 && crossings[i].at <= gap) {
+            left = 0;
+        }
         if (left > 0) {
             return true;
         }
@@ -48,8 +53,8 @@ static bool is_behind(const vshi_vessel *v, vshi_vec point, vshi_vec target, boo
     return false;
 }
 
-/* Whether what is `gap` beyond a point of a cap is behind something. The first segment tells; but it may lie
- * within a solid as a whole, whose faces others then meet. */
+/* Whether another component closes a cap at a point. The first segment tells; but it may lie within a solid
+ * as a whole, whose faces the other segments then meet. */
 static bool is_closed(const vshi_vessel *v, vshi_vec at, vshi_vec normal, size_t number, double gap) {
     for (size_t aim = 0; aim < AIMS; ++aim) {
         double best = 0.0;
@@ -63,8 +68,10 @@ static bool is_closed(const vshi_vessel *v, vshi_vec at, vshi_vec normal, size_t
                 along = out;
             }
         }
-        const vshi_vec beyond = vshi_add(at, vshi_scale(along, gap / fmax(best, LEAST_COSINE)));
-        if (best > 0.0 && is_behind(v, beyond, target, aim > 0)) {
+        const double off = gap / fmax(best, LEAST_COSINE);
+        const vshi_vec beyond = vshi_add(at, vshi_scale(along, off));
+        const double length = vshi_length(vshi_sub(target, beyond));
+        if (best > 0.0 && is_behind(v, beyond, target, 2.0 * off / length, aim > 0)) {
             return true;
         }
     }

@@ -75,6 +75,31 @@ static void boxes_that_lack_the_side_they_stand_on_are_solid(void **state) {
     free(s);
 }
 
+/* The probe reaches 0.08 below a hole of 2 × 2. */
+static void houses_are_solid_on_slabs_of_any_thickness(void **state) {
+    (void)state;
+    static const double THICKNESS[] = {0.004, 0.01, 0.02, 0.05, 0.07, 0.08, 0.09, 0.1, 0.3, 1.0};
+    static const double SUNK[] = {0.0, 0.01, 0.06};
+    shape *s = shape_new();
+    for (size_t i = 0; i < sizeof THICKNESS / sizeof *THICKNESS; ++i) {
+        for (size_t k = 0; k < sizeof SUNK / sizeof *SUNK; ++k) {
+            const double low[3] = {-4, -4, -THICKNESS[i]}, high[3] = {4, 4, 0}, at[3] = {0.2, 0.1, -SUNK[k]};
+            char what[64];
+            snprintf(what, sizeof what, "sunk by %g into a slab of %g", SUNK[k], THICKNESS[i]);
+            shape_box(s, low, high, ALL_SIDES);
+            build_box(s, -SUNK[k], 2.0, ALL_SIDES & ~BOTTOM);
+            assert_kinds_of(s, what, "SS");
+            shape_box(s, low, high, ALL_SIDES);
+            shape_ball(s, at, 1.0, 0.0, 1.0, 24);
+            assert_kinds_of(s, what, "SS");
+            shape_box(s, low, high, ALL_SIDES);
+            shape_turned(s, ORIGIN, CUP, 3, 32);
+            assert_kinds_of(s, what, "S-");
+        }
+    }
+    free(s);
+}
+
 static void vessels_that_stand_upright_are_sheets(void **state) {
     (void)state;
     shape *s = shape_new();
@@ -298,6 +323,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(half_balls_on_a_plate_are_solid),
         cmocka_unit_test(boxes_that_lack_the_side_they_stand_on_are_solid),
+        cmocka_unit_test(houses_are_solid_on_slabs_of_any_thickness),
         cmocka_unit_test(vessels_that_stand_upright_are_sheets),
         cmocka_unit_test(what_holds_something_is_a_sheet),
         cmocka_unit_test(walls_without_floor_and_ceiling_are_solid_below_a_roof),
