@@ -237,9 +237,8 @@ typedef struct vsh_lightmap {
     const double *ambient; /* [3]: of irradiance: light from all around, linear RGB ≥ 0; NULL: none, and AO
                               darkens all light */
     int32_t bent_space;    /* VSH_BENT_…; in tangent space the texels need vsh_lightmap_options.tangents */
-    float *invalid; /* 1: a chart covers it, but no sample of it is valid; 2: and it is in plain sight, as of
-                       vsh_bake_stats; 0 elsewhere. Not padded */
-    vsh_planes asked; /* how planes are asked for, where there is more to it than whether */
+    float *invalid;        /* 1: a chart covers it, but no sample of it is valid; 0 elsewhere. Not padded */
+    vsh_planes asked;      /* how planes are asked for, where there is more to it than whether */
     float *sky; /* what of the light of an even sky, over the horizon of `asked.sky`, comes straight to the
                    texel: 1/π ∫ V(ω) max(0, n · ω) [ω · up > 0] dω. V is 0 where a caster is in the way,
                    however far, else 1. 1: all that a surface may see, an open floor; an open wall has 1/2, an
@@ -285,8 +284,6 @@ typedef struct vsh_bake_stats {
                                   padding, or 8 texels where that is more */
     uint64_t *invalid_by_mesh; /* [mesh_count] of the texels, filled where not NULL */
     vsh_shade_stats shade;     /* added to */
-    uint64_t seen_texels;      /* of the invalid ones: in plain sight, rays from them escape. Of exact methods
-                                  only: a field does not tell, and leaves it 0 */
     vsh_bake_error *errors;    /* [light_count + 1], and with a plane of the sky [light_count + 2]: of each
                                   light, of AO, of the sky; added to; NULL: not wanted.
                                   Where a method keeps an error and the occluders have what stands for the
@@ -297,7 +294,7 @@ typedef struct vsh_bake_stats {
 } vsh_bake_stats;
 
 static inline vsh_bake_stats vsh_bake_stats_zero(void) {
-    vsh_bake_stats stats = {sizeof(vsh_bake_stats), 0, 0, NULL, vsh_shade_stats_zero(), 0, NULL};
+    vsh_bake_stats stats = {sizeof(vsh_bake_stats), 0, 0, NULL, vsh_shade_stats_zero(), NULL};
     return stats;
 }
 

@@ -121,8 +121,7 @@ static bool is_clear(const vshi_field_error *share, const double position[3], co
             vshi_add(vshi_scale(u, radius * vshi_cos(angle)), vshi_scale(v, radius * vshi_sin(angle))),
             vshi_scale(n, sqrt(1.0 - square)));
         const vshi_segment_ray ray = {{at.x, at.y, at.z}, {d.x, d.y, d.z}, INFINITY};
-        bool escapes;
-        behind += vshi_triangles_depth(triangles, &ray, &escapes) > 0;
+        behind += vshi_triangles_depth(triangles, &ray) > 0;
     }
     return behind <= CLEAR * CLEAR_RAYS;
 }

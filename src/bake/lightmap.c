@@ -192,20 +192,10 @@ static vsh_result lift_layers(const vsh_occluders *occluders, const vsh_shade_op
 
 /* --- which texels have values */
 
-/* Whether the texel that sample i is the first of is in plain sight, none of whose samples is valid. */
-static bool is_seen(const vsh_texels *texels, const vshi_origins *origins, size_t i) {
-    bool seen = false;
-    for (size_t k = i; k < texels->count && texels->texel[k] == texels->texel[i]; ++k) {
-        seen = seen || origins->seen[k] != 0;
-    }
-    return seen;
-}
-
 /* Writes the planes `coverage` and `invalid` of a lightmap whose rows are those held, where it has them, and
- * counts the band's texels, those without a value by the mesh of their first sample. `known` is of a part. */
-static void write_coverage(const vsh_texels *texels, const vshi_origins *origins, const uint8_t *state,
-                           const vsh_lightmap *lightmap, uint32_t *known, vsh_bake_stats *stats) {
-    const size_t own = (size_t)(texels->band.own_first - texels->band.first) * (size_t)texels->info.width;
+ * counts the band's texels, those without a value by the mesh of their first sample. */
+static void write_coverage(const vsh_texels *texels, const uint8_t *state, const vsh_lightmap *lightmap,
+                           vsh_bake_stats *stats) {
     const vshi_band *band = &texels->band;
     const size_t first = texels->row_start[band->own_begin - band->held_begin];
     const size_t last = texels->row_start[band->own_end - band->held_begin];
@@ -216,14 +206,9 @@ static void write_coverage(const vsh_texels *texels, const vshi_origins *origins
         }
         const size_t texel = vshi_sample_held(texels, i);
         if (state[texel] == VSHI_TEXEL_INVALID) {
-            const bool seen = is_seen(texels, origins, i);
             ++invalid;
-            stats->seen_texels += seen;
             if (lightmap->invalid != NULL) {
-                lightmap->invalid[texel] = seen ? 2.0f : 1.0f;
-            }
-            if (known != NULL && seen) {
-                known[texel - own] |= VSHI_PART_SEEN;
+                lightmap->invalid[texel] = 1.0f;
             }
             if (stats->invalid_by_mesh != NULL) {
                 ++stats->invalid_by_mesh[vshi_sample_mesh(texels, i)];
@@ -260,7 +245,7 @@ static vsh_result run_bake(vshi_baking *bake, vsh_error *error) {
         VSHI_TRY_DONE(vshi_baking_choose_held(bake, error));
     }
     VSHI_TRY_DONE(bake_planes(bake, error));
-    write_coverage(texels, &bake->origins, bake->state, bake->lightmap, bake->known, &bake->stats);
+    write_coverage(texels, bake->state, bake->lightmap, &bake->stats);
     if (bake->known == NULL) {
         VSHI_TRY_DONE(pad(bake, bake->stats.invalid_texels, error));
         VSHI_TRY_DONE(vshi_baking_add_filled(bake, error));

@@ -196,7 +196,6 @@ static void trace(const lifting *l, const looked_at *in, size_t first, size_t la
     for (i = first; i < last; ++i) {
         if (where[i - first] != VSHI_OUTSIDE) {
             l->origins->valid[i] = 0;
-            l->origins->seen[i] = where[i - first] == VSHI_INSIDE_SEEN;
         }
     }
     leave_out_touching(l, in->triangles, first, last);
@@ -353,7 +352,6 @@ vsh_result vshi_origins_create(const vsh_occluders *occluders, const vsh_texels 
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", name);
     }
     VSHI_TRY_DONE(vshi_allocate((void **)&origins->valid, texels->count, 1, name, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&origins->seen, texels->count, 1, name, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&l.crease, texels->count, 1, name, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&origins->before, origins->blocks + 1, sizeof(size_t), name, error));
     VSHI_TRY_DONE(vshi_parallel_for(job, origins->blocks, 1, 1, validate, &l, error));
@@ -389,7 +387,6 @@ void vshi_origins_free(vshi_origins *origins) {
     free(origins->needed);
     free(origins->row_start);
     free(origins->before);
-    free(origins->seen);
     free(origins->valid);
     *origins = (vshi_origins){0};
 }

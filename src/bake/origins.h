@@ -15,7 +15,6 @@ typedef struct vshi_origins {
     float *face;     /* [count][3]: of the triangle */
     uint32_t *texel; /* [count]: as vsh_points.texels; a texel's further samples get numbers of their own */
     uint8_t *valid;  /* [all samples]: 1 where the sample is among them */
-    uint8_t *seen;   /* [all samples]: 1 where one that is not is seen from outside all the same */
     size_t blocks;   /* of all samples */
     size_t *before;  /* [blocks + 1]: valid samples before each block */
     vshi_point_rows rows; /* of tiles, the band's own counted */

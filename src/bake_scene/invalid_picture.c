@@ -5,9 +5,8 @@
 #include <string.h>
 #include <strings.h>
 
-/* Of no chart, valid, invalid, and invalid in plain sight. */
-static const float COLOURS[4][3] = {
-    {0.05f, 0.05f, 0.06f}, {0.5f, 0.5f, 0.5f}, {0.7f, 0.05f, 0.05f}, {1.0f, 0.85f, 0.1f}};
+/* Of no chart, valid, invalid. */
+static const float COLOURS[3][3] = {{0.05f, 0.05f, 0.06f}, {0.5f, 0.5f, 0.5f}, {0.7f, 0.05f, 0.05f}};
 static const char *const NAMES[3] = {"R", "G", "B"};
 
 /* --- names */
@@ -126,7 +125,7 @@ vsh_result vshi_invalid_picture_add(vshi_invalid_picture *picture, int32_t rows,
     }
     const size_t texels = (size_t)picture->image.width * (size_t)rows;
     for (size_t i = 0; i < texels; ++i) {
-        const int kind = invalid[i] > 1.0f ? 3 : invalid[i] > 0.0f ? 2 : coverage[i] > 0.0f ? 1 : 0;
+        const int kind = invalid[i] > 0.0f ? 2 : coverage[i] > 0.0f ? 1 : 0;
         for (int c = 0; c < 3; ++c) {
             picture->planes[c][i] = COLOURS[kind][c];
         }

@@ -137,7 +137,6 @@ static vsh_result bake_band(vshi_lightmap_work *w, int32_t first, int32_t rows, 
     }
     w->baked.texels += band.texels;
     w->baked.invalid_texels += band.invalid_texels;
-    w->baked.seen_texels += band.seen_texels;
     w->baked.shade = band.shade;
     for (size_t m = 0; m < w->target->mesh_count; ++m) {
         w->baked.invalid_by_mesh[m] += band.invalid_by_mesh[m];

@@ -65,7 +65,7 @@ static void hand_over(const vshi_held_rows *held, int32_t first, int32_t rows, v
     for (size_t i = 0; channels->invalid != NULL && i < texels; ++i) {
         const uint32_t known = held->known[at + i];
         const bool invalid = (known & VSHI_PART_MESH) != 0 && coverage[i] != 1.0f;
-        channels->invalid[i] = !invalid ? 0.0f : (known & VSHI_PART_SEEN) != 0 ? 2.0f : 1.0f;
+        channels->invalid[i] = invalid ? 1.0f : 0.0f;
     }
 }
 
@@ -102,7 +102,6 @@ void vshi_parts_add_stats(const vshi_parts *parts, size_t index, vsh_bake_stats 
         const vsh_bake_stats *piece = &part->pieces[place->piece];
         stats->texels += piece->texels;
         stats->invalid_texels += piece->invalid_texels;
-        stats->seen_texels += piece->seen_texels;
         vshi_add_shade(&stats->shade, &piece->shade);
         for (uint64_t m = 0; m < part->head.lightmaps[index].mesh_count; ++m) {
             stats->invalid_by_mesh[m] += piece->invalid_by_mesh[m];

@@ -1,6 +1,6 @@
 #include "bake_scene/part_head.h"
 
-enum { STATS_WORDS = 15, ERROR_WORDS = 5 }; /* of 8 bytes */
+enum { STATS_WORDS = 14, ERROR_WORDS = 5 }; /* of 8 bytes */
 
 void vshi_part_code_head(vshi_part_code *code, vshi_part_head *head) {
     vshi_part_code_texts(code, &head->channels, &head->channel_count);
@@ -58,7 +58,6 @@ void vshi_part_code_stats(vshi_part_code *code, vsh_bake_stats *stats, uint64_t 
     vsh_shade_stats *shade = &stats->shade;
     vshi_part_code_u64(code, &stats->texels);
     vshi_part_code_u64(code, &stats->invalid_texels);
-    vshi_part_code_u64(code, &stats->seen_texels);
     uint64_t *const counts[] = {&shade->marches,      &shade->samples,    &shade->skipped,
                                 &shade->certified,    &shade->unfinished, &shade->invalid,
                                 &shade->beyond_reach, &shade->rays,       &shade->refined};

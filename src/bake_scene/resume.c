@@ -15,7 +15,7 @@ static const char magic[] = "vdbshade resume "; /* the file begins with it; the 
 /* Before every band. All of the file is of the machine's own byte order: it is of one bake on one machine. */
 typedef struct band_head {
     int32_t first, rows;
-    uint64_t texels, invalid_texels, seen_texels;
+    uint64_t texels, invalid_texels;
     vsh_shade_stats shade;
     uint64_t checksum; /* of what follows: invalid_by_mesh, the planes, then the errors of channels */
 } band_head;
@@ -54,7 +54,7 @@ static char *text_of(const vshi_resume_key *key) {
     if (out == NULL) {
         return NULL;
     }
-    fprintf(out, "%s4: %d x %d by %d\n", magic, key->image->width, key->image->height, key->band_rows);
+    fprintf(out, "%s5: %d x %d by %d\n", magic, key->image->width, key->image->height, key->band_rows);
     if (key->part) {
         fprintf(out, "rows %d to %d\n", key->first, key->end);
     }
@@ -181,7 +181,6 @@ static bool read_band(vshi_resume *r, const band_head *want, vshi_channels *chan
     }
     stats->texels = head.texels;
     stats->invalid_texels = head.invalid_texels;
-    stats->seen_texels = head.seen_texels;
     stats->shade = head.shade;
     memcpy(stats->invalid_by_mesh, invalid, mesh_count * sizeof *invalid);
     memcpy(stats->errors, errors, r->error_count * sizeof *errors);
@@ -224,7 +223,6 @@ void vshi_resume_keep(vshi_resume *r, int32_t first, int32_t rows, const vshi_ch
     head.rows = rows;
     head.texels = stats->texels;
     head.invalid_texels = stats->invalid_texels;
-    head.seen_texels = stats->seen_texels;
     head.shade = stats->shade;
     head.checksum =
         checksum(channels, texels, stats->invalid_by_mesh, mesh_count, stats->errors, r->error_count);

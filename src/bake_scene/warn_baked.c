@@ -36,24 +36,13 @@ static void name_worst(const vshi_target *target, const uint64_t *invalid, char 
 
 static void warn_invalid(const vshi_target *target, const vsh_bake_stats *baked, bool traced,
                          const vsh_run *run) {
-    char names[512], seen[384];
+    char names[512];
     name_worst(target, baked->invalid_by_mesh, names, sizeof names);
-    if (!traced) {
-        snprintf(
-            seen, sizeof seen,
-            "as far as voxels tell; smaller ones, or --method exact and --ao-method exact, leave only those "
-            "that are; --invalid FILE.png shows them");
-    } else if (baked->seen_texels > 0) {
-        snprintf(seen, sizeof seen,
-                 "%" PRIu64 " of them in plain sight, through holes; --invalid FILE.png shows where; what is "
-                 "taken for solid, 'vdbshade info' tells",
-                 baked->seen_texels);
-    } else {
-        snprintf(seen, sizeof seen, "none in plain sight; --invalid FILE.png shows where");
-    }
     vshi_warn(run,
-              "%s: %" PRIu64 " of %" PRIu64 " texels are invalid (inside a solid or behind a wall): %s; %s",
-              target->receiver.path, baked->invalid_texels, baked->texels, names, seen);
+              "%s: %" PRIu64 " of %" PRIu64 " texels are invalid (inside a solid or behind a wall%s): %s; "
+              "--invalid FILE.png shows where",
+              target->receiver.path, baked->invalid_texels, baked->texels,
+              traced ? "" : ", as far as voxels tell", names);
 }
 
 /* Whether values are what cones read, and no rays refine them. */

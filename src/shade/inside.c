@@ -85,45 +85,45 @@ static void aim(const looking *l, size_t point, size_t direction, vshi_segment_r
 }
 
 /* Whether a ray begins in a solid, followed all the way. */
-static bool begins_inside(const looking *l, size_t point, int direction, bool *seen) {
+static bool begins_inside(const looking *l, size_t point, int direction) {
     vshi_segment_ray ray;
-    bool escaped;
     aim(l, point, (size_t)direction, &ray);
-    const bool inside = vshi_triangles_depth(l->triangles, &ray, &escaped) > 0;
-    *seen = *seen || escaped;
-    return inside;
+    return vshi_triangles_depth(l->triangles, &ray) > 0;
 }
 
 /* Follows rays all the way: more of them where they disagree, with each other or with the first. */
-static uint8_t count_through(const looking *l, size_t point, bool seen) {
+static uint8_t count_through(const looking *l, size_t point) {
     int inside = 0, all = MORE;
     double share = MAJORITY;
     for (int k = 0; k < COUNTED; ++k) {
-        inside += begins_inside(l, point, FIRST + k, &seen);
+        inside += begins_inside(l, point, FIRST + k);
     }
     if (inside == 0) {
         return VSHI_OUTSIDE;
     }
     if (inside == COUNTED) {
         for (int k = 0; k < FIRST; ++k) {
-            inside += begins_inside(l, point, k, &seen);
+            inside += begins_inside(l, point, k);
         }
         if (inside == COUNTED + FIRST) {
-            return seen ? VSHI_INSIDE_SEEN : VSHI_INSIDE;
+            return VSHI_INSIDE;
         }
         all += FIRST;
         share = AGREED;
     }
     for (int k = COUNTED; k < MORE; ++k) {
-        inside += begins_inside(l, point, FIRST + k, &seen);
+        inside += begins_inside(l, point, FIRST + k);
     }
     if (inside > UNCLEAR[0] * all && inside < UNCLEAR[1] * all) {
         for (int k = MORE; k < TURNS * MORE; ++k) {
-            inside += begins_inside(l, point, FIRST + k, &seen);
+            inside += begins_inside(l, point, FIRST + k);
         }
         all += (TURNS - 1) * MORE;
     }
-    return inside < share * all ? VSHI_OUTSIDE : seen ? VSHI_INSIDE_SEEN : VSHI_INSIDE;
+    if (inside < share * all) {
+        return VSHI_OUTSIDE;
+    }
+    return VSHI_INSIDE;
 }
 
 /* For a point whose first rays all begin in solids with holes: whether others do as well. */
@@ -136,7 +136,7 @@ static uint8_t confirm(const looking *l, size_t point) {
     vshi_triangles_meet(l->triangles, rays, SECOND, meets);
     for (size_t k = 0; k < SECOND; ++k) {
         if (meets[k] < VSHI_MEETS_SOLID) {
-            return count_through(l, point, meets[k] == VSHI_MEETS_NOTHING);
+            return count_through(l, point);
         }
     }
     return VSHI_INSIDE;
@@ -168,7 +168,7 @@ static void look(const looking *l, const size_t *points, size_t count, uint8_t *
         } else if (inside == 0 && ((escapes && !l->holes) || (l->open != NULL && l->open(l->user, point)))) {
             where[point] = VSHI_OUTSIDE;
         } else {
-            where[point] = count_through(l, point, escapes);
+            where[point] = count_through(l, point);
         }
     }
 }

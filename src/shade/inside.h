@@ -7,11 +7,7 @@
 #include <stdint.h>
 #include <vdbshade/trace.h>
 
-enum {
-    VSHI_OUTSIDE = 0,
-    VSHI_INSIDE = 1,
-    VSHI_INSIDE_SEEN = 2 /* but not all around: through an opening it is seen from outside */
-};
+enum { VSHI_OUTSIDE = 0, VSHI_INSIDE = 1 };
 
 /* Whether something else knows that point `i` is in the open; asked only where a few rays do not tell. */
 typedef bool vshi_open_fn(const void *user, size_t i);

@@ -103,7 +103,7 @@ void vshi_triangles_meet(const vsh_triangles *triangles, const vshi_segment_ray 
 
 /* How many solids hold the origin of a ray, by what it crosses on its way: the most that it leaves before it
  * enters as many. Also right where solids lie in each other. Walls count as solids behind them. */
-int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray *ray, bool *meets_nothing);
+int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray *ray);
 
 /* Whether any triangle is a solid's or a wall's. */
 bool vshi_triangles_have_solids(const vsh_triangles *triangles);

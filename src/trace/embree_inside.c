@@ -10,8 +10,8 @@ void vshi_triangles_meet(const vsh_triangles *triangles, const vshi_segment_ray 
     (void)triangles, (void)rays, (void)count, (void)meets;
 }
 
-int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray *ray, bool *meets_nothing) {
-    (void)triangles, (void)ray, (void)meets_nothing;
+int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray *ray) {
+    (void)triangles, (void)ray;
     return 0;
 }
 
@@ -173,17 +173,15 @@ static void sort(crossing *crossings, size_t count) {
     }
 }
 
-int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray *ray, bool *meets_nothing) {
+int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray *ray) {
     crossing crossings[MOST_CROSSINGS];
     looking look;
     begin_look(&look, triangles, crossings);
     struct RTCRayHit lone;
-    *meets_nothing = true;
     if (!aim_lone(triangles, ray, &lone)) {
         return 0;
     }
     rtcIntersect1(triangles->scene, &look.context, &lone);
-    *meets_nothing = look.count == 0;
     sort(crossings, look.count);
     int left = 0, most = 0;
     for (size_t i = 0; i < look.count; ++i) {

@@ -38,8 +38,8 @@ static const cli_option options[] = {
      "there"},
     CLI_SETTINGS(VSH_SETTINGS_IMAGE),
     {KEY_INVALID, "invalid", "FILE.png",
-     "also a picture of the lightmap: charts grey, texels\ninside solids or behind walls red, those of them "
-     "in\nplain sight yellow; FILE.OUT.png where there are\nseveral outputs"},
+     "also a picture of the lightmap: charts grey, texels\ninside solids or behind walls red; FILE.OUT.png "
+     "where\nthere are several outputs"},
     {KEY_PREVIEW, "preview", NULL,
      "into a .glb or .gltf: the light as unlit base colour,\nwhich every viewer shows, in place of textures"},
     {KEY_EMBED, "embed", NULL, "put its images into it (.glb)"},
