@@ -47,7 +47,8 @@ struct vshi_exr_writer {
     unsigned char *chunk; /* [count][lines][width] values */
     exr_encode_pipeline_t pipeline;
     bool pipeline_ready;
-    exr_result_t status; /* the first failure */
+    exr_result_t (*compress)(exr_encode_pipeline_t *pipeline); /* OpenEXR's own */
+    exr_result_t status;                                       /* the first failure */
 };
 
 static void sort_by_name(const vshi_planes *planes, int32_t *order) {
@@ -112,6 +113,17 @@ static void fill_values(const vshi_exr_writer *writer, const vshi_planes *planes
     }
 }
 
+/* Readers take a chunk for raw if its size is the raw size. OpenEXR up to 3.4.7 writes compressed data of
+ * exactly that size, so such chunks are stored raw here (OpenEXR's issue 2306). */
+static exr_result_t compress_chunk(exr_encode_pipeline_t *pipeline) {
+    const vshi_exr_writer *writer = pipeline->encoding_user_data;
+    const exr_result_t status = writer->compress(pipeline);
+    if (status == EXR_ERR_SUCCESS && pipeline->compressed_bytes == pipeline->packed_bytes) {
+        memcpy(pipeline->compressed_buffer, pipeline->packed_buffer, pipeline->packed_bytes);
+    }
+    return status;
+}
+
 /* Writes the rows that the chunk holds. */
 static exr_result_t write_chunk(vshi_exr_writer *writer) {
     exr_encode_pipeline_t *pipeline = &writer->pipeline;
@@ -136,6 +148,9 @@ static exr_result_t write_chunk(vshi_exr_writer *writer) {
     }
     if (first) {
         status = exr_encoding_choose_default_routines(writer->context, writer->part, pipeline);
+        writer->compress = pipeline->compress_fn;
+        pipeline->compress_fn = compress_chunk;
+        pipeline->encoding_user_data = writer;
     }
     writer->row += writer->filled;
     writer->filled = 0;

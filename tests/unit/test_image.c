@@ -54,6 +54,41 @@ static void exr_32_is_bit_exact(void **state) {
     }
 }
 
+/* Chunks whose compressed data are as long as the raw data are stored raw: small images of few different
+ * values hit that. */
+static void exr_keeps_every_small_size(void **state) {
+    (void)state;
+    static const char *const names[] = {"a", "b", "c", "d", "e", "f", "g"};
+    static const float levels[] = {0.0f, 1.0f, 0.5f, 0.25f, 1.0f / 3.0f, 0.7f, 0.9f};
+    enum { LARGEST = 12, KINDS = 4 };
+    for (int32_t at_size = 0; at_size < LARGEST * LARGEST * KINDS * 7; ++at_size) {
+        const int32_t kind = at_size % KINDS, channels = at_size / KINDS % 7 + 1,
+                      width = at_size / KINDS / 7 % LARGEST + 1, height = at_size / KINDS / 7 / LARGEST + 1;
+        const int32_t bits = kind < 2 ? 32 : 16, variety = kind % 2 == 0 ? 2 : 7;
+        sample s;
+        make(&s, width, height, channels, names);
+        const size_t texels = (size_t)width * (size_t)height;
+        uint32_t seed = 7;
+        for (size_t i = 0; i < texels * (size_t)channels; ++i) {
+            seed = seed * 1664525u + 1013904223u;
+            s.values[i] = levels[(seed >> 24) % (uint32_t)variety];
+        }
+        vsh_image_file *file = write_and_read(at("small.exr"), &s.image, bits, "channels");
+        const vsh_image view = vsh_image_view(file);
+        assert_int_equal(view.width, width);
+        assert_int_equal(view.height, height);
+        for (int32_t c = 0; c < channels; ++c) {
+            const double difference = worst(view.planes[channel_of(&view, names[c])], s.planes[c], texels);
+            if (!(difference <= (bits == 16 ? 0x1p-12 : 0.0))) {
+                fail_msg("%d × %d, %d channels of %d bits: off by %g", width, height, channels, bits,
+                         difference);
+            }
+        }
+        vsh_image_free(file);
+        unmake(&s);
+    }
+}
+
 static void exr_channels_come_back_sorted_by_name(void **state) {
     (void)state;
     sample s;
@@ -424,6 +459,7 @@ static void channel_names_may_have_commas_and_equals(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(exr_32_is_bit_exact),
+        cmocka_unit_test(exr_keeps_every_small_size),
         cmocka_unit_test(exr_channels_come_back_sorted_by_name),
         cmocka_unit_test(exr_keeps_names_of_127_bytes),
         cmocka_unit_test(exr_16_is_right_to_half_precision),
