@@ -22,8 +22,8 @@ enum {
 };
 
 /* A light. Only its shape and place enter shadow values; falloff, colour, a spot's edge and cosines enter
- * irradiance only. A size (angle, radius) of 0 is a hard light. All numbers are finite; what a type does not
- * name is ignored.
+ * irradiance only. A size (angle, radius) of 0 is a hard light, and so is one whose half angle has a sine
+ * below 1e-6. All numbers are finite; what a type does not name is ignored.
  *
  * Of a rectangle the visible fraction is that of its solid angle. VSH_SHADOW_RAYS, ADAPTIVE and EXACT cast
  * rays over it as it is; VSH_SHADOW_HARD takes its centre; the other methods, and heights and spheres without
@@ -35,9 +35,9 @@ typedef struct vsh_light {
     int32_t type;        /* VSH_LIGHT_… */
     int32_t falloff;     /* VSH_FALLOFF_…; not directional */
     double direction[3]; /* directional: towards the light. Any length but 0 */
-    double position[3];  /* of the centre, world units */
+    double position[3];  /* of the centre, world units, -1e100 … 1e100 */
     double angle;        /* directional: angular diameter, radians, 0 … π (excluded) */
-    double radius;       /* sphere, spot: world units, ≥ 0 */
+    double radius;       /* sphere, spot: world units, 0 … 1e100 */
     double axis[3];      /* spot: the way it shines, away from it. Any length but 0 */
     double inner_angle;  /* spot: half angle of full light, radians, 0 … outer_angle */
     double outer_angle;  /* spot: half angle where light ends, radians, > 0 … π */

@@ -10,6 +10,7 @@
 #include "flat/visible.h"
 
 #include "base/elementary.h"
+#include "light/view.h"
 
 #include <math.h>
 #include <string.h>
@@ -45,6 +46,11 @@ static vshi_point unit_normal(const vshi_flat_view *v, double slope, double sign
     return (vshi_point){x * v->towards.x - y * v->towards.y, x * v->towards.y + y * v->towards.x};
 }
 
+/* The same limits as in space. */
+static double slope_of(double tangent) {
+    return tangent < VSHI_LEAST_SINE ? 0.0 : fmin(tangent, VSHI_LARGEST_TANGENT);
+}
+
 bool vshi_flat_look(const vsh_light *light, vshi_point point, vshi_flat_view *view) {
     view->point = point;
     if (light->type == VSH_LIGHT_DIRECTIONAL) {
@@ -52,7 +58,7 @@ bool vshi_flat_look(const vsh_light *light, vshi_point point, vshi_flat_view *vi
         view->towards = (vshi_point){light->direction[0] / length, light->direction[1] / length};
         view->distance = INFINITY;
         view->radius = 0.0;
-        view->slope = vshi_tan(0.5 * light->angle);
+        view->slope = slope_of(vshi_tan(0.5 * light->angle));
         return true;
     }
     const double x = light->position[0] - point.x, y = light->position[1] - point.y;
@@ -65,7 +71,8 @@ bool vshi_flat_look(const vsh_light *light, vshi_point point, vshi_flat_view *vi
     }
     view->towards = (vshi_point){x / view->distance, y / view->distance};
     /* (d - r)(d + r) keeps what d² - r² loses next to the light */
-    view->slope = light->radius / sqrt((view->distance - light->radius) * (view->distance + light->radius));
+    view->slope =
+        slope_of(light->radius / sqrt((view->distance - light->radius) * (view->distance + light->radius)));
     return true;
 }
 

@@ -28,9 +28,6 @@ static const double WIDEST = 0.09;
 /* What cones for proofs are wider than the light, against rounding. */
 static const double ROOM = 1e-6;
 
-/* A disc of a half space has no cone. */
-static const double LARGEST_SINE = 1.0 - 1e-9;
-
 /* Steradians below which rays go over the area alike: distances and cosines to its parts are then the same to
  * 3e-4, and angles of the projected sides lose what a double holds of them. */
 static const double SMALL = 1e-7;
@@ -163,7 +160,7 @@ static vshi_light_side look(const vshi_light_place *place, vshi_vec from, bool h
     bound(place, &s, corners, view);
     /* the disc of the same solid angle, and where its cone comes to the rectangle's plane */
     const double solid = polygon_angle(s.height, corners, 4), part = solid / (2.0 * PI);
-    view->sine = fmin(sqrt(part * (2.0 - part)), LARGEST_SINE);
+    view->sine = vshi_light_sine(sqrt(part * (2.0 - part)));
     const double towards = vshi_dot(view->axis, s.down);
     const double end = s.height > 0.0 ? s.height / (towards + view->sine) : view->near;
     view->distance = end / (1.0 - view->sine * view->sine);

@@ -10,15 +10,18 @@
 
 static const double DEGREES = 180.0 / PI;
 
+/* Squares of lengths in voxels stay finite up to here, and far lights are suns long before. */
+#define FARTHEST 1e100
+
 /* --- suns */
 
 static void place_sun(const vsh_light *light, vshi_light_place *place) {
-    const double half = 0.5 * light->angle;
+    const double half = fmin(0.5 * light->angle, VSHI_LARGEST_HALF), sine = vshi_light_sine(vshi_sin(half));
     *place = (vshi_light_place){.parallel = true,
                                 .towards = vshi_unit(vshi_vec_of(light->direction)),
-                                .half = half,
-                                .sine = vshi_sin(half),
-                                .tangent = vshi_tan(half)};
+                                .half = sine > 0.0 ? half : 0.0,
+                                .sine = sine,
+                                .tangent = sine > 0.0 ? vshi_tan(half) : 0.0};
 }
 
 static double sun_gain(const vsh_light *light, vshi_vec to_light, double distance) {
@@ -27,7 +30,8 @@ static double sun_gain(const vsh_light *light, vshi_vec to_light, double distanc
 }
 
 static void resize_sun(vsh_light *light, double factor) {
-    light->angle = 2.0 * vshi_atan(factor * vshi_tan(0.5 * light->angle));
+    const double half = vshi_atan(factor * vshi_tan(0.5 * light->angle));
+    light->angle = 2.0 * fmin(half, VSHI_LARGEST_HALF);
 }
 
 static int describe_sun(const vsh_light *light, char *text, size_t size) {
@@ -169,12 +173,10 @@ const vshi_light_member vshi_light_members[] = {
     {MEMBER(direction), TOWARDS_OR_AXIS(DIRECTIONAL)},
     {MEMBER(axis), TOWARDS_OR_AXIS(SPOT)},
     {MEMBER(position), .key = "position", .kind = VSHI_LIGHT_VECTOR, .types = SPHERE | SPOT | RECTANGLE,
-     .required = SPHERE | SPOT | RECTANGLE, .lowest = -INFINITY, .highest = INFINITY, .above = true,
-     .below = true},
+     .required = SPHERE | SPOT | RECTANGLE, .lowest = -FARTHEST, .highest = FARTHEST},
     {MEMBER(angle), .key = "angle_deg", .kind = VSHI_LIGHT_ANGLE, .types = DIRECTIONAL, .highest = PI,
      .below = true},
-    {MEMBER(radius), .key = "radius", .kind = VSHI_LIGHT_NUMBER, .types = SPHERE | SPOT, .highest = INFINITY,
-     .below = true},
+    {MEMBER(radius), .key = "radius", .kind = VSHI_LIGHT_NUMBER, .types = SPHERE | SPOT, .highest = FARTHEST},
     {MEMBER(inner_angle), .key = "inner_deg", .kind = VSHI_LIGHT_ANGLE, .types = SPOT, .required = SPOT,
      .highest = PI, .apart = true},
     {MEMBER(outer_angle), .key = "outer_deg", .kind = VSHI_LIGHT_ANGLE, .types = SPOT, .required = SPOT,

@@ -12,6 +12,19 @@
 
 struct vshi_light_shape;
 
+/* Sine of a half angle below which a light counts as a point: floats hold its edge to a sixteenth of that,
+ * and its square is far from underflow. */
+#define VSHI_LEAST_SINE 0x1p-20
+
+/* The largest sine of a half angle, its tangent and the angle: at 1 the cone would be a half space. */
+#define VSHI_LARGEST_SINE (1.0 - 1e-9)
+#define VSHI_LARGEST_TANGENT 22360.68
+#define VSHI_LARGEST_HALF (0.5 * 3.14159265358979323846 - 4.4721359e-5)
+
+static inline double vshi_light_sine(double sine) {
+    return sine < VSHI_LEAST_SINE ? 0.0 : fmin(sine, VSHI_LARGEST_SINE);
+}
+
 /* Where a light is and how large. */
 typedef struct vshi_light_place {
     bool parallel;    /* directional: seen alike from everywhere */
@@ -107,7 +120,7 @@ static inline vshi_light_side vshi_light_look(const vshi_light_place *place, vsh
     if (!(view->distance > place->radius)) {
         return VSHI_LIGHT_WITHIN;
     }
-    view->sine = view->bound = place->radius / view->distance;
+    view->sine = view->bound = vshi_light_sine(place->radius / view->distance);
     view->near = view->distance - place->radius;
     view->end = vshi_light_end(view);
     return VSHI_LIGHT_SEEN;

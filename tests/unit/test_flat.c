@@ -420,6 +420,30 @@ static void limits_and_cancelling(void **state) {
     vsh_outline_free(wall);
 }
 
+static void tiny_lights_are_seen_or_not_and_wide_ones_as_their_neighbours(void **state) {
+    (void)state;
+    static const double SIZES[] = {5e-324, 1e-300, 1e-160, 1e-50, 1e-20, 1e-10, 1e-7};
+    vsh_outline *letters = text("vdb", 1.0);
+    for (uint64_t i = 0; i < 300; ++i) {
+        const double p[2] = {4.0 * any(2 * i) - 2.0, 4.0 * any(2 * i + 1) - 2.0};
+        vsh_light lights[] = {lamp(1.9, 1.7, 0.0), flat_sun(0.3, 1.0, 0.0)};
+        for (int l = 0; l < 2; ++l) {
+            const double hard = vsh_flat_visibility(letters, &lights[l], p);
+            for (size_t k = 0; k < sizeof SIZES / sizeof SIZES[0]; ++k) {
+                lights[l].radius = lights[l].angle = SIZES[k];
+                assert_true(fabs(vsh_flat_visibility(letters, &lights[l], p) - hard) < 1e-3);
+            }
+        }
+        lights[0].radius = 1e99;
+        assert_true(vsh_flat_visibility(letters, &lights[0], p) == 1.0);
+        lights[1].angle = 179.99 / 180.0 * PI;
+        const double wide = vsh_flat_visibility(letters, &lights[1], p);
+        lights[1].angle = nextafter(PI, 0.0);
+        assert_true(fabs(vsh_flat_visibility(letters, &lights[1], p) - wide) < 1e-3);
+    }
+    vsh_outline_free(letters);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_edge_hides_its_share_of_the_angle),
@@ -428,6 +452,7 @@ int main(void) {
         cmocka_unit_test(a_disc_around_a_whole_star_is_seen_by_all),
         cmocka_unit_test(a_comb_of_a_thousand_teeth),
         cmocka_unit_test(a_light_of_no_size_is_seen_or_not),
+        cmocka_unit_test(tiny_lights_are_seen_or_not_and_wide_ones_as_their_neighbours),
         cmocka_unit_test(points_in_the_light_and_without_casters_are_lit),
         cmocka_unit_test(a_map_holds_what_its_texels_see),
         cmocka_unit_test(no_number_of_threads_shows),

@@ -1,7 +1,11 @@
 /* The ends of what a light can be: angles of suns, radii and distances of lamps, lamps in casters, on their
  * surfaces and at receivers, light that grazes. Of every method; docs/numerics.md has the bounds,
  * test_light.c what is refused. */
+#include "field/field.h"
+#include "terrain.h"
 #include "traced.h"
+
+#include <vdbshade/spheres.h>
 
 static const float UP[3] = {0.0f, 1.0f, 0.0f};
 
@@ -277,6 +281,164 @@ static void grazing_light_reaches_an_open_plate(void **state) {
     }
 }
 
+/* A light of a type over the seeds' floor: `size` is an angle, a radius or the sides of a square. */
+static vsh_light light_of_size(int32_t type, double size) {
+    static const double ABOVE[3] = {1.0, 3.0, 1.0};
+    vsh_light light = type == VSH_LIGHT_DIRECTIONAL ? sun(truth_seeds_sun, size) : lamp(ABOVE, size);
+    light.type = type;
+    light.axis[1] = -1.0;
+    light.inner_angle = 1.0;
+    light.outer_angle = 1.2;
+    light.edge_u[0] = light.edge_v[2] = size;
+    return light;
+}
+
+/* What casts: the seeds as voxels and triangles, and as layers that need no voxels a ball and a ridge. */
+typedef struct ranges_stage {
+    enum { FIELD, BALL, RIDGE, STAGES } kind;
+    caster seeds;
+    vsh_field *empty;
+    vsh_spheres *ball;
+    vsh_heights *ridge;
+} ranges_stage;
+
+static ranges_stage set_up(void) {
+    static const double BALL_AT[4] = {0.2, 0.8, 0.1, 0.4};
+    static float ground[33 * 33];
+    for (int i = 0; i < 33; ++i) {
+        ground[33 * i + 16] = 1.0f;
+    }
+    const vsh_heights_source source = source_of(ground, 33, 33, 5.0, 0.6);
+    ranges_stage s = {.seeds = caster_of(truth_seeds(), 0.04, 0.0), .ridge = heights_of(&source)};
+    assert_int_equal(vshi_field_create_empty(0.04, &s.empty, NULL), VSH_OK);
+    assert_int_equal(vsh_spheres_create(BALL_AT, 1, NULL, NULL, &s.ball, NULL), VSH_OK);
+    return s;
+}
+
+static void tear_down(ranges_stage *s) {
+    caster_free(&s->seeds);
+    vsh_field_free(s->empty);
+    vsh_spheres_free(s->ball);
+    vsh_heights_free(s->ridge);
+}
+
+static void cast_on_stage(const ranges_stage *s, const vsh_light *light, int32_t method, double softness,
+                          size_t count, const double *positions, const float *normals, float *values) {
+    vsh_layer layer = vsh_layer_default();
+    layer.softness = softness;
+    layer.spheres = s->kind == BALL ? s->ball : NULL;
+    layer.heights = s->kind == RIDGE ? s->ridge : NULL;
+    if (s->kind == FIELD) {
+        cast_shadows(&s->seeds, light, method, count, positions, normals, values);
+    } else {
+        shadows_by(occluders_with(s->empty, &layer, 1), light, method, count, positions, normals, values);
+    }
+    for (size_t i = 0; i < count; ++i) {
+        if (!(values[i] >= 0.0f && values[i] <= 1.0f)) {
+            fail_msg("%s: %g", vsh_shadow_method_name(method), (double)values[i]);
+        }
+    }
+}
+
+enum { FLOOR_SIDE = 32, FLOOR = FLOOR_SIDE * FLOOR_SIDE };
+
+static double mean_difference(const float *a, const float *b) {
+    double sum = 0.0;
+    for (int i = 0; i < FLOOR; ++i) {
+        sum += fabs((double)a[i] - (double)b[i]) / FLOOR;
+    }
+    return sum;
+}
+
+/* Of every type, size, method and kind of caster. Large sizes only have to stay in range. */
+static void tiny_lights_are_hard_lights(void **state) {
+    (void)state;
+    static const double SIZES[] = {5e-324, 1e-300, 1e-200, 1e-100, 1e-50, 1e-45, 1e-38, 1e-30,
+                                   1e-20,  1e-15,  1e-10,  1e-8,   1e-7,  1e-6,  1e-5,  1e-4,
+                                   1.0,    3.14,   1e3,    1e10,   1e15,  1e30,  1e99};
+    static double positions[3 * FLOOR];
+    static float normals[3 * FLOOR], hard[FLOOR], values[FLOOR];
+    floor_texels(FLOOR_SIDE, positions, normals);
+    ranges_stage s = set_up();
+    size_t accepted = 0;
+    for (int32_t type = 0; type <= VSH_LIGHT_RECTANGLE; ++type) {
+        for (s.kind = FIELD; s.kind < STAGES; ++s.kind) {
+            /* layers have two ways at most: one of a ray, one of a disc, and `classic` */
+            const int32_t methods = s.kind == FIELD ? shadow_methods() : VSH_SHADOW_CONE + 1;
+            for (int32_t method = 0; method < methods; ++method) {
+                const int32_t point_type = type == VSH_LIGHT_RECTANGLE ? VSH_LIGHT_SPHERE : type;
+                const vsh_light point = light_of_size(point_type, 0.0);
+                cast_on_stage(&s, &point, method, 1.0, FLOOR, positions, normals, hard);
+                assert_true(mean_difference(hard, (const float[FLOOR]){0.0f}) < 0.99);
+                for (size_t i = 0; i < sizeof SIZES / sizeof SIZES[0]; ++i) {
+                    const vsh_light light = light_of_size(type, SIZES[i]);
+                    if (vsh_light_check(&light, NULL) != VSH_OK) {
+                        continue;
+                    }
+                    ++accepted;
+                    cast_on_stage(&s, &light, method, 1.0, FLOOR, positions, normals, values);
+                    const double off = mean_difference(values, hard);
+                    if (SIZES[i] < 1e-3 && !(off < 0.002)) {
+                        fail_msg("type %d, caster %d, %s, size %g: off by %g", type, (int)s.kind,
+                                 vsh_shadow_method_name(method), SIZES[i], off);
+                    }
+                }
+            }
+        }
+    }
+    assert_true(accepted > 4 * 12 * (size_t)(VSH_SHADOW_CONE + 1) * STAGES);
+    tear_down(&s);
+}
+
+static void layers_of_no_softness_are_hard(void **state) {
+    (void)state;
+    static const double SOFTNESS[] = {0.0, 5e-324, 1e-300, 1e-50, 1e-9};
+    static double positions[3 * FLOOR];
+    static float normals[3 * FLOOR], hard[FLOOR], values[FLOOR];
+    floor_texels(FLOOR_SIDE, positions, normals);
+    ranges_stage s = set_up();
+    for (int32_t type = 0; type <= VSH_LIGHT_RECTANGLE; ++type) {
+        for (s.kind = BALL; s.kind < STAGES; ++s.kind) {
+            const vsh_light light = light_of_size(type, 0.2);
+            cast_on_stage(&s, &light, VSH_SHADOW_HARD, 1.0, FLOOR, positions, normals, hard);
+            for (size_t i = 0; i < sizeof SOFTNESS / sizeof SOFTNESS[0]; ++i) {
+                cast_on_stage(&s, &light, VSH_SHADOW_CONE, SOFTNESS[i], FLOOR, positions, normals, values);
+                assert_true(mean_difference(values, hard) < 0.002);
+            }
+            cast_on_stage(&s, &light, VSH_SHADOW_CONE, 1000.0, FLOOR, positions, normals, values);
+        }
+    }
+    tear_down(&s);
+}
+
+/* Of every method and kind of caster: the last double below 180 degrees, too. */
+static void suns_just_below_180_degrees_are_as_those_of_179_99(void **state) {
+    (void)state;
+    const double angles[] = {RADIANS(179.9999), RADIANS(179.999999), RADIANS(179.99999999),
+                             RADIANS(179.9999999999), nextafter(PI, 0.0)};
+    static double positions[3 * FLOOR];
+    static float normals[3 * FLOOR], neighbour[FLOOR], values[FLOOR];
+    floor_texels(FLOOR_SIDE, positions, normals);
+    ranges_stage s = set_up();
+    for (s.kind = FIELD; s.kind < STAGES; ++s.kind) {
+        const int32_t methods = s.kind == FIELD ? shadow_methods() : VSH_SHADOW_CONE + 1;
+        for (int32_t method = 0; method < methods; ++method) {
+            vsh_light light = sun(truth_seeds_sun, RADIANS(179.99));
+            cast_on_stage(&s, &light, method, 1.0, FLOOR, positions, normals, neighbour);
+            for (size_t a = 0; a < sizeof angles / sizeof angles[0]; ++a) {
+                light.angle = angles[a];
+                cast_on_stage(&s, &light, method, 1.0, FLOOR, positions, normals, values);
+                const double off = mean_difference(values, neighbour);
+                if (!(off < 0.02)) {
+                    fail_msg("caster %d, %s, %.17g: off by %g", (int)s.kind, vsh_shadow_method_name(method),
+                             angles[a], off);
+                }
+            }
+        }
+    }
+    tear_down(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(lights_of_0_to_179_degrees_stay_in_range_and_near_the_truth),
@@ -286,6 +448,9 @@ int main(void) {
         cmocka_unit_test(lamps_at_the_receiver_are_cut_by_its_horizon_only),
         cmocka_unit_test(exact_of_a_light_without_size_is_one_traced_ray),
         cmocka_unit_test(grazing_light_reaches_an_open_plate),
+        cmocka_unit_test(tiny_lights_are_hard_lights),
+        cmocka_unit_test(layers_of_no_softness_are_hard),
+        cmocka_unit_test(suns_just_below_180_degrees_are_as_those_of_179_99),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
