@@ -19,6 +19,12 @@ namespace {
 constexpr double MESH_BYTES_PER_LEAF = 3.0 * BYTES_PER_LEAF;
 constexpr double BYTES_PER_TRIANGLE = 160.0;
 
+// A band's work is one visit of each triangle to each region of 32³ voxels (band.h) that the triangle
+// reaches. So many visits take ten seconds or so. Bands up to NARROW cost at most three times what the
+// narrowest does.
+constexpr double MOST_VISITS = 3e6;
+constexpr double NARROW = 12.0;
+
 struct Meshes {
     vshi_mesh_set set{};
     Vec3d low{DBL_MAX};
@@ -116,6 +122,19 @@ double band_of(const vshi_component &component, const Lattice &lattice) {
                          : component.kind == VSHI_KIND_SHEET ? 0.5 * lattice.shell
                                                              : 0.0;
     return lattice.half_width + shell;
+}
+
+// Refuses wide bands of many triangles. A triangle smaller than a region reaches (half width / 16 + 1)³ of
+// them.
+void check_work(size_t triangles, double half_width, vsh_error *error) {
+    const double widest = std::max(NARROW, 16.0 * (std::cbrt(MOST_VISITS / double(triangles)) - 1.0));
+    if (half_width > widest) {
+        throw Failure{
+            vshi_fail(error, VSH_ERROR_LIMIT,
+                      "half_width %g: a band this wide takes minutes for %zu triangles; use at most "
+                      "%.0f (the field's coarser levels reach farther anyway)",
+                      half_width, triangles, std::floor(widest))};
+    }
 }
 
 void foretell(const Meshes &meshes, const Lattice &lattice, const vsh_run &run, vsh_error *error) {
@@ -235,6 +254,7 @@ vsh_result from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_option
     const Lattice lattice = make_lattice(options, meshes.low, meshes.high, error);
     cut_masks(mesh, count, lattice.voxel, meshes, cut_out, run, error);
     check(vshi_mesh_set_solve(&meshes.set, &run, error));
+    check_work(meshes.triangles, lattice.half_width, error);
     foretell(meshes, lattice, run, error);
     Stage stage(run, "voxelize", error);
     vshi_mesh_set_warn(&meshes.set, lattice.shell, lattice.voxel, &run);

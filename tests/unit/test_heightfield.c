@@ -72,6 +72,41 @@ static void a_surface_lies_under_its_lightmap_as_the_image_does(void **state) {
     vsh_model_free(model);
 }
 
+static int stop_at_once(void *user, const char *stage, double fraction) {
+    (void)user, (void)stage, (void)fraction;
+    return 1;
+}
+
+/* A band of 100 voxels took ten minutes. */
+static void a_band_that_would_take_minutes_is_refused_and_the_one_it_names_is_not(void **state) {
+    (void)state;
+    enum { FINE = 257 };
+    float *values = hills(FINE, FINE);
+    const vsh_heights_source source = source_of(values, FINE, FINE, 10.0, 2.0);
+    vsh_model *model = model_of(&source, VSH_HEIGHTS_SOLID);
+    const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
+    vsh_grid_options options = vsh_grid_options_default();
+    options.resolution = 24;
+    options.half_width = 100.0;
+    vsh_grid *grid = NULL;
+    vsh_error error = {VSH_OK, ""};
+    assert_int_equal(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &error), VSH_ERROR_LIMIT);
+    const char *most = strstr(error.message, "use at most ");
+    assert_non_null(strstr(error.message, "half_width 100"));
+    assert_non_null(most);
+    /* cancelled as soon as it begins */
+    options.half_width = atof(most + strlen("use at most "));
+    vsh_run run = vsh_run_default();
+    run.progress = stop_at_once;
+    assert_int_equal(vsh_grid_from_meshes(&mesh, 1, &options, &run, &grid, &error), VSH_ERROR_CANCELLED);
+    options.half_width = 12.0;
+    run.progress = NULL;
+    assert_int_equal(vsh_grid_from_meshes(&mesh, 1, &options, &run, &grid, &error), VSH_OK);
+    vsh_grid_free(grid);
+    vsh_model_free(model);
+    free(values);
+}
+
 static void the_field_of_a_heightfield_holds_distances_not_gaps(void **state) {
     (void)state;
     /* a ramp of slope 2 along x: a gap g over it is a distance g / √5 */
@@ -266,6 +301,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_solid_is_closed_wound_outwards_and_of_its_volume),
         cmocka_unit_test(a_surface_lies_under_its_lightmap_as_the_image_does),
+        cmocka_unit_test(a_band_that_would_take_minutes_is_refused_and_the_one_it_names_is_not),
         cmocka_unit_test(the_field_of_a_heightfield_holds_distances_not_gaps),
         cmocka_unit_test_setup_teardown(images_of_8_16_and_32_bits_are_read, make_folder, remove_folder),
         cmocka_unit_test_setup_teardown(bad_images_are_refused_with_their_place, make_folder, remove_folder),
