@@ -129,8 +129,11 @@ typedef struct vsh_picture {
  * voxel to each side. There a pixel's colour is the surface's × (sum over lights of colour × falloff × cosine
  * × tinted visibility + sky × AO), with the values of vsh_shade_shadow() and vsh_shade_ao() among the
  * occluders. Surfaces are usually their fields; others of the same casters tell more colours
- * apart. Rays that begin within a solid begin where they leave it. For VSH_SHADOW_EXACT, VSH_AO_EXACT and
- * layers without a field points are lifted by half a voxel.
+ * apart. Rays that begin within a solid begin where they leave it.
+ *
+ * On lit meshes without a lightmap, VSH_SHADOW_EXACT and VSH_AO_EXACT shade the point on the triangle. Other
+ * methods shade a point half a voxel over it. On surfaces, points are lifted by half a voxel for
+ * VSH_SHADOW_EXACT, VSH_AO_EXACT and layers without a field.
  *
  * Light shafts: at `shaft_steps` points of each ray through the fog, the first jittered by blue noise, what
  * the lights' visibility there lets through comes to the eye with exponential decay (K. Mitchell, "Volumetric

@@ -231,10 +231,8 @@ static vsh_result check_memory(const rendering *r, const vsh_surface *surfaces, 
 }
 
 /* Whether light is asked of something else than the fields that are seen. */
-static bool needs_lift(const vsh_occluders *occluders, const vsh_render_options *o, size_t light_count) {
-    const vsh_shade_options *shade = &o->shade;
-    bool lift = (light_count > 0 && vshi_shadow_traces(shade, occluders->triangles)) ||
-                (o->ao && vshi_ao_traces(shade, occluders->triangles));
+static bool needs_lift(const vshi_scenery *s, const vsh_occluders *occluders) {
+    bool lift = (s->light_count > 0 && s->traces_shadow) || (s->options->ao && s->traces_ao);
     for (size_t i = 0; i < occluders->layer_count && !lift; ++i) {
         lift = occluders->layers[i].field == NULL;
     }
@@ -272,7 +270,9 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
     VSHI_TRY_DONE(vshi_lit_create(&o, lights, light_count, &r.grid, &lit, error));
     r.scenery.query = query;
     r.scenery.field = occluders->field;
-    r.scenery.lift = needs_lift(occluders, &o, light_count) ? LIFT : 0.0;
+    r.scenery.traces_shadow = vshi_shadow_traces(&o.shade, occluders->triangles);
+    r.scenery.traces_ao = vshi_ao_traces(&o.shade, occluders->triangles);
+    r.scenery.lift = needs_lift(&r.scenery, occluders) ? LIFT : 0.0;
     r.scenery.lit = lit;
     if (o.shafts > 0.0 && light_count > 0 && place_fog(&r)) {
         sampler = vshi_sampler_create(VSH_SAMPLER_BLUE, 1, o.shade.frame);

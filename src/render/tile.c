@@ -6,8 +6,8 @@
 
 /* How much nearer than a lit mesh a surface of the same shape may be, its voxels. */
 static const double SAME = 1.5;
-/* Where light is asked for at a triangle: so far over it, and as much more as the field's surface stands over
- * it, up to a limit; voxels. */
+/* Marches begin so far over a triangle, and as much more as the field's surface stands over it, up to a
+ * limit; voxels. */
 static const double CLEAR = 0.5, LEAST_CLEAR = 0.3, MOST_LIFT = 3.0;
 
 /* The hits on surfaces in a tile, to be shaded together. */
@@ -15,7 +15,8 @@ typedef struct hits {
     size_t count;
     vshi_seen *seen[VSHI_TILE_SAMPLES];
     const double *color[VSHI_TILE_SAMPLES];
-    double positions[VSHI_TILE_SAMPLES][3];
+    double traced[VSHI_TILE_SAMPLES][3];  /* where rays against triangles begin */
+    double marched[VSHI_TILE_SAMPLES][3]; /* where marches through the field begin */
     float normals[VSHI_TILE_SAMPLES][3];
     uint32_t texels[VSHI_TILE_SAMPLES];
     float visibility[VSHI_TILE_SAMPLES];
@@ -44,12 +45,13 @@ static const vsh_surface *find_surface(const vshi_scenery *scenery, const vshi_e
     return nearest;
 }
 
-static void add_point(hits *h, vshi_vec point, vshi_vec n, const double *color, uint32_t texel,
-                      vshi_seen *seen) {
+static void add_point(hits *h, vshi_vec traced, vshi_vec marched, vshi_vec n, const double *color,
+                      uint32_t texel, vshi_seen *seen) {
     const size_t i = h->count++;
     h->seen[i] = seen;
     h->color[i] = color;
-    h->positions[i][0] = point.x, h->positions[i][1] = point.y, h->positions[i][2] = point.z;
+    h->traced[i][0] = traced.x, h->traced[i][1] = traced.y, h->traced[i][2] = traced.z;
+    h->marched[i][0] = marched.x, h->marched[i][1] = marched.y, h->marched[i][2] = marched.z;
     h->normals[i][0] = (float)n.x, h->normals[i][1] = (float)n.y, h->normals[i][2] = (float)n.z;
     h->texels[i] = texel;
     for (int c = 0; c < 3; ++c) {
@@ -62,15 +64,15 @@ static void add_hit(const vshi_scenery *scenery, hits *h, const vsh_surface *sur
     const vshi_vec at = vshi_add(ray->origin, vshi_scale(ray->direction, distance));
     const vshi_vec n = vshi_field_normal(surface->field, at, vshi_scale(ray->direction, -1.0));
     const vshi_vec point = vshi_add(at, vshi_scale(n, scenery->lift * surface->field->voxel_size));
-    add_point(h, point, n, surface->color, texel, seen);
+    add_point(h, point, point, n, surface->color, texel, seen);
 }
 
-/* How far a point of a triangle is to be lifted along its normal to be out of what the field has for it,
- * which for an open mesh is a shell around it; voxels. */
-static double clear_of(const vsh_field *field, vshi_vec at, vshi_vec normal) {
+/* Returns how far over a triangle marches begin, voxels: outside of the field's surface, which is a shell
+ * around an open mesh. */
+static double find_lift(const vsh_field *field, vshi_vec at, vshi_vec normal) {
     double lift = CLEAR;
     if (field->unknown) {
-        return 0.0; /* rays begin off the triangles by themselves */
+        return 0.0; /* nothing is marched */
     }
     while (lift < MOST_LIFT) {
         const vshi_vec point = vshi_add(at, vshi_scale(normal, lift * field->voxel_size));
@@ -88,19 +90,21 @@ static double clear_of(const vsh_field *field, vshi_vec at, vshi_vec normal) {
 static void add_bare(const vshi_scenery *scenery, hits *h, uint32_t triangle, vshi_vec through,
                      uint32_t texel, vshi_seen *seen) {
     const vshi_lit_point p = vshi_lit_meet(scenery->lit, triangle, through);
-    const double lift = clear_of(scenery->field, p.at, p.flat) * scenery->field->voxel_size;
-    add_point(h, vshi_add(p.at, vshi_scale(p.flat, lift)), p.normal, p.color, texel, seen);
+    const double lift = find_lift(scenery->field, p.at, p.flat) * scenery->field->voxel_size;
+    add_point(h, p.at, vshi_add(p.at, vshi_scale(p.flat, lift)), p.normal, p.color, texel, seen);
 }
 
 /* Light at the hits, one after the other of the lights, so that room for one is enough. */
 static vsh_result light_hits(const vshi_scenery *scenery, hits *h, vsh_shade_stats *stats, vsh_error *error) {
-    const vsh_points points = {h->count, &h->positions[0][0], &h->normals[0][0], h->texels};
+    vsh_points points = {h->count, NULL, &h->normals[0][0], h->texels};
     vsh_query_output output = vsh_query_output_default();
     if (scenery->options->ao) {
+        points.positions = scenery->traces_ao ? &h->traced[0][0] : &h->marched[0][0];
         output.ao = h->ao;
         VSHI_TRY(vsh_query_points(scenery->query, &points, NULL, &scenery->run, &output, stats, error));
         output.ao = NULL;
     }
+    points.positions = scenery->traces_shadow ? &h->traced[0][0] : &h->marched[0][0];
     for (size_t l = 0; l < scenery->light_count; ++l) {
         float *visibility[VSHI_MOST_LIGHTS] = {NULL};
         visibility[l] = h->visibility;

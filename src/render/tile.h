@@ -16,8 +16,9 @@ typedef struct vshi_scenery {
     const vsh_query *query;
     const vsh_field *field; /* that the query asks */
     vsh_run run;
-    double lift;         /* of shaded points, voxels */
-    const vshi_lit *lit; /* NULL: none */
+    bool traces_shadow, traces_ao; /* rays against triangles, not marches through the field */
+    double lift;                   /* of points on surfaces, voxels */
+    const vshi_lit *lit;           /* NULL: none */
     vshi_shafts shafts;
 } vshi_scenery;
 

@@ -191,6 +191,78 @@ write_quad() {
     "$VDBSHADE" info box.exr | grep -q "channel 'Z': min 3, mean 3, max 3" || fail "box: $("$VDBSHADE" info box.exr)"
 }
 
+# write_post FILE: a post of 0.25 × 3 × 0.5 on a wide floor, whose default voxels are larger than the post.
+write_post() {
+    cat >"$1" <<'OBJ'
+o floor
+v -50 0 -50
+v 50 0 -50
+v 50 0 50
+v -50 0 50
+f 4 3 2
+f 4 2 1
+o post
+v -0.125 0 -0.25
+v 0.125 0 -0.25
+v 0.125 3 -0.25
+v -0.125 3 -0.25
+v -0.125 0 0.25
+v 0.125 0 0.25
+v 0.125 3 0.25
+v -0.125 3 0.25
+f 5 8 7 6
+f 9 10 11 12
+f 5 6 10 9
+f 8 12 11 7
+f 5 9 12 8
+f 6 7 11 10
+OBJ
+}
+
+# From above; column c of 200 sees the floor at x = -3.5 + 0.02 (c + 0.5), row 25 of 50 at z = 0.01.
+ABOVE=(--camera -1.5,20,0 --look-at -1.5,0,0 --up 0,0,-1 --fov 2.86419 --size 200x50 --samples 1)
+
+# The row of pixels that crosses the post's shadow: red of each, 0 … 255.
+middle_row() {
+    od -An -v -tu1 -w3 -j$((14 + 3 * 200 * 25)) -N600 "$1" | awk '{ print $1 }'
+}
+
+@test "a post's shadow begins at its foot and is as long as the sun says" {
+    write_post post.obj
+    # The floor is dark from x = -3.125 to the foot at -0.125; behind it the post's dark side is seen up to 0.118.
+    for options in "" "--resolution 64" "--voxel-size 0.5 --ao 1 --ao-method cones"; do
+        # shellcheck disable=SC2086
+        shade render post.obj --sun 1,1,0 --sun-angle 0 "${ABOVE[@]}" --sky 0,0,0 $options -o view.ppm --quiet
+        done_well
+        middle_row view.ppm | awk '{ c = NR - 1; bad += c >= 20 && c <= 179 && $1 > 60 || c <= 17 && $1 < 150 } END { exit bad > 0 }' ||
+            fail "'$options': $(middle_row view.ppm | tr '\n' ' ')"
+    done
+}
+
+@test "a picture of triangles has the light that query gives at the same points" {
+    write_post post.obj
+    for c in $(seq 4 6 164); do
+        echo "$c" | awk '{ print -3.5 + 0.02 * ($1 + 0.5), 0, 0.01, 0, 1, 0 }'
+    done >points.csv
+    # Light that falls on the floor where all is open: a sun's cosine, the whole sky.
+    while read -r open sky light; do
+        # shellcheck disable=SC2086
+        shade query post.obj --points points.csv $light --max-error 0.003 -o answers.csv --answers-only --quiet
+        done_well
+        # shellcheck disable=SC2086
+        shade render post.obj $light --max-error 0.003 "${ABOVE[@]}" --sky "$sky,$sky,$sky" -o view.ppm --quiet
+        done_well
+        paste <(grep -v '[a-z]' answers.csv) <(middle_row view.ppm | awk 'NR % 6 == 5 && NR <= 165') |
+            awk -v open="$open" '{ v = $2 / 255; seen = v < 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ^ 2.4
+                    n++; bad += (seen - 0.6 * open * $1) ^ 2 > 0.012 ^ 2 }
+                END { exit n != 27 || bad > 0 }' ||
+            fail "$light: $(paste answers.csv <(middle_row view.ppm | awk 'NR % 6 == 5 && NR <= 165') | tr '\n' ' ')"
+    done <<'LIGHTS'
+0.70711 0 --sun 1,1,0 --sun-angle 20
+1 1 --ao 1
+LIGHTS
+}
+
 @test "a dark lightmap leaves nothing light of an open mesh" {
     write_quad quad.obj
     printf 'P5 2 2 255\n\0\0\0\0' >black.pgm

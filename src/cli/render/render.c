@@ -50,7 +50,7 @@ static int load(render_work *work) {
 
 static int make_occluders(render_work *work) {
     vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
-    what.voxels = 1; /* which are seen */
+    what.voxels = render_shows_fields(work->scene, work->assets);
     vsh_error error;
     if (vsh_scene_occluders(work->scene, work->assets, &what, &work->run, &work->occluders, &error) !=
         VSH_OK) {
@@ -102,7 +102,7 @@ static int set_options(render_work *work) {
     o->shaft_steps = s->shaft_steps;
     o->shade = work->scene->shade;
     if (!work->scene->ao) {
-        o->shade.ao_method = VSH_AO_CONES; /* not asked for: it may want triangles that are not there */
+        o->shade.ao_method = VSH_AO_AUTO; /* no rays are cast: exact may lack its triangles */
     }
     CLI_TRY(join_lit(work));
     return render_camera_place(s, &work->surfaces, o);

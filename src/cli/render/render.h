@@ -35,6 +35,9 @@ typedef struct render_surfaces {
     size_t mesh_count;
 } render_surfaces;
 
+/* Whether any caster has no triangles, so that its field is what is seen. */
+bool render_shows_fields(const vsh_scene *scene, const vsh_assets *assets);
+
 /* The triangles of every caster that has them, and for what has none a surface for every layer's colour.
  * CLI_OK or an exit code, having said why; free also after a failure. */
 int render_surfaces_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_occluders *occluders,

@@ -19,6 +19,14 @@ static bool is_shown_as_mesh(const vsh_assets *assets, size_t index) {
     return count > 0;
 }
 
+bool render_shows_fields(const vsh_scene *scene, const vsh_assets *assets) {
+    bool shows = false;
+    for (size_t i = 0; i < scene->caster_count && !shows; ++i) {
+        shows = !is_shown_as_mesh(assets, i);
+    }
+    return shows;
+}
+
 void render_color_of(const vsh_caster *caster, double color[3]) {
     const bool given =
         caster != NULL && (caster->color[0] > 0.0 || caster->color[1] > 0.0 || caster->color[2] > 0.0);
