@@ -13,7 +13,7 @@ static const double CREASE =
 static const double SMOOTH =
     -0.6; /* 127°: where shading normals go on over the edge, as of a bar of three sides */
 static const double PLANE = 0.9999995; /* 0.06°: of one plane; stretch of a projection is then 1 + 5e-7 */
-static const double QUAD = 0.9;        /* 26°: halves of a quad that is not flat */
+static const double QUAD = 0.9;        /* 26°: halves of a quad that is not flat, by their shape alone */
 static const double SEAM = 0.985;      /* 10° between shading normals of a vertex: modelled as an edge */
 
 double vshi_cut_mesh_bytes(const vsh_mesh *mesh) {
@@ -86,7 +86,36 @@ static void cut_sides(vshi_cut_mesh *s, int cut) {
     }
 }
 
-/* Triangles that lie in the plane of the first; `queue` holds `count`. */
+/* The one side of a triangle where the triangle beyond has the same vertices, or VSHI_NONE. */
+static uint32_t find_shared_side(const vshi_cut_mesh *s, uint32_t triangle) {
+    const uint32_t *indices = s->mesh->indices;
+    uint32_t shared = VSHI_NONE;
+    for (uint32_t side = 3 * triangle; side < 3 * triangle + 3; ++side) {
+        const uint32_t other = s->partner[side];
+        if (other != VSHI_NONE && indices[side] == indices[vshi_next_side(other)] &&
+            indices[vshi_next_side(side)] == indices[other]) {
+            if (shared != VSHI_NONE) {
+                return VSHI_NONE;
+            }
+            shared = side;
+        }
+    }
+    return shared;
+}
+
+/* The other half of a quad that shares no vertex with its neighbours, as where every face has vertices of its
+ * own; else VSHI_NONE. */
+static uint32_t find_quad_half(const vshi_cut_mesh *s, uint32_t triangle) {
+    const uint32_t side = find_shared_side(s, triangle);
+    const uint32_t half = side != VSHI_NONE ? s->partner[side] / 3 : VSHI_NONE;
+    return half != VSHI_NONE && find_shared_side(s, half) == s->partner[side] ? half : VSHI_NONE;
+}
+
+static bool is_flat(const vshi_cut_mesh *s, uint32_t a, uint32_t b) {
+    return vshi_dot(s->normal[a], s->normal[b]) > PLANE;
+}
+
+/* Triangles that lie in the plane of the first, and the halves of their quads; `queue` holds `count`. */
 static uint32_t gather_plane(vshi_cut_mesh *s, uint32_t first, uint32_t unit, uint32_t *queue) {
     uint32_t waiting = 1;
     queue[0] = first;
@@ -95,7 +124,7 @@ static uint32_t gather_plane(vshi_cut_mesh *s, uint32_t first, uint32_t unit, ui
         for (uint32_t k = 0; k < 3; ++k) {
             const uint32_t side = s->partner[3 * queue[at] + k];
             if (side != VSHI_NONE && s->unit[side / 3] == VSHI_NONE &&
-                vshi_dot(s->normal[first], s->normal[side / 3]) > PLANE) {
+                (is_flat(s, first, side / 3) || find_quad_half(s, queue[at]) == side / 3)) {
                 s->unit[side / 3] = unit;
                 queue[waiting++] = side / 3;
             }
@@ -141,6 +170,14 @@ static vsh_result gather_units(vshi_cut_mesh *s, vsh_error *error) {
     VSHI_TRY_DONE(vshi_allocate((void **)&size, s->count, sizeof *size, "parts of planes", error));
     memset(s->unit, 0xff, s->count * sizeof *s->unit);
     uint32_t units = 0;
+    /* bent quads come first, so that no half of one joins the plane of a neighbour */
+    for (uint32_t i = 0; i < s->count; ++i) {
+        const uint32_t half = s->unit[i] == VSHI_NONE ? find_quad_half(s, i) : VSHI_NONE;
+        if (half != VSHI_NONE && !is_flat(s, i, half)) {
+            s->unit[i] = s->unit[half] = units;
+            size[units++] = 2;
+        }
+    }
     for (uint32_t i = 0; i < s->count; ++i) {
         if (s->unit[i] == VSHI_NONE && s->area[i] > 0.0) {
             size[units] = gather_plane(s, i, units, queue);
