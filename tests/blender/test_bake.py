@@ -128,14 +128,18 @@ def test_ao_and_its_distance():
     assert far < 0.8 and near == 1.0, (far, near)
 
 
-def test_irradiance_is_the_shadow_times_the_cosine():
+def test_light_is_the_sun_by_its_angle_and_ambient_by_ao():
     _, _, settings = start()
-    settings.what = "LIGHT"
+    settings.property_unset("what")  # what a user gets
     settings.ao_distance = 0.1
     image = bake()
-    lit = value(image, 0.9, 0.5)
-    assert abs(lit - math.cos(math.radians(45.0))) < 0.02, lit
+    lit, dark = value(image, 0.9, 0.5), value(image, 0.25, 0.5)
+    assert abs(lit - math.cos(math.radians(45.0)) - settings.ambient) < 0.02, lit
+    assert settings.ambient > 0.1 and abs(dark - settings.ambient) < 0.02, dark
     assert image.colorspace_settings.name.startswith("Linear")
+    settings.ao_distance = 10.0
+    under = value(bake(), 0.75, 0.5)  # the roof hides some of the sky, and none of the sun
+    assert lit - settings.ambient < under < lit - 0.02, under
 
 
 def test_image_and_uv_map_stand_in_the_material():
@@ -269,6 +273,63 @@ def test_what_collections_show_of_others_casts():
     empty.hide_render = True
     bpy.context.view_layer.update()
     assert value(bake(), 0.25, 0.5) == 1.0
+
+
+def uv_scales(obj):
+    """Returns the area of each triangle in the lightmap by its area in the world, relative to the median."""
+    mesh, scales = obj.data, []
+    mesh.calc_loop_triangles()
+    for triangle in mesh.loop_triangles:
+        a, b, c = (mesh.uv_layers["Lightmap"].data[loop].uv for loop in triangle.loops)
+        scales.append(0.5 * (b - a).cross(c - a) / triangle.area)
+    median = sorted(scales)[len(scales) // 2]
+    return [scale / median for scale in scales]
+
+
+def test_suzanne_is_laid_out_without_stretch_and_keeps_her_faces():
+    for levels in (0, 1, 2):
+        _, _, settings = start()
+        bpy.ops.mesh.primitive_monkey_add()
+        suzanne = bpy.context.object
+        if levels > 0:
+            suzanne.modifiers.new("fine", "SUBSURF").levels = levels
+            bpy.ops.object.modifier_apply(modifier="fine")
+        select(suzanne)
+        faces = len(suzanne.data.polygons)
+        bake()
+        scales = uv_scales(suzanne)
+        assert len(suzanne.data.polygons) == faces
+        assert 0.25 < min(scales) and max(scales) < 4.0, (levels, min(scales), max(scales))
+
+
+def crown():
+    """A cylinder whose caps are bent so much that no chart holds all of a cap."""
+    start(lightmap=False)
+    bpy.ops.mesh.primitive_cylinder_add(vertices=9, calc_uvs=False)
+    obj = bpy.context.object
+    for i, vertex in enumerate(obj.data.vertices):
+        vertex.co.z += 0.8 * math.sin(5.0 * i)
+    select(obj)
+    return obj
+
+
+def test_bent_faces_that_the_lightmap_parts_become_triangles():
+    obj = crown()
+    before = len(obj.data.polygons), sum(len(face.vertices) - 2 for face in obj.data.polygons)
+    bake()
+    after = len(obj.data.polygons), sum(len(face.vertices) - 2 for face in obj.data.polygons)
+    assert after[0] > before[0] and after[1] == before[1], (before, after)
+    scales = uv_scales(obj)
+    assert 0.25 < min(scales) and max(scales) < 4.0, (min(scales), max(scales))
+
+
+def test_a_bake_that_fails_gives_bent_faces_back():
+    obj = crown()
+    before = [tuple(face.vertices) for face in obj.data.polygons]
+    bpy.data.objects.remove(bpy.data.objects["sun"])  # what is asked for after the layout
+    assert "no sun" in error_of(bpy.ops.vdbshade.bake)
+    assert [tuple(face.vertices) for face in obj.data.polygons] == before
+    assert not obj.data.uv_layers
 
 
 def test_modifiers_carry_the_uvs_that_were_made():

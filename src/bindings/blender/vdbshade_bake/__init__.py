@@ -103,14 +103,16 @@ class VDBSHADE_OT_bake(bpy.types.Operator):
 
 
 class VdbshadeSettings(bpy.types.PropertyGroup):
-    what: bpy.props.EnumProperty(name="Bake", default="BOTH", items=(
-        ("BOTH", "Shadow × AO", "The sun's shadow times ambient occlusion"),
+    what: bpy.props.EnumProperty(name="Bake", default="LIGHT", items=(
+        ("LIGHT", "Light", "The sun's light by shadow and angle, plus ambient light times ambient occlusion"),
+        ("BOTH", "Shadow × AO", "The sun's shadow times ambient occlusion: shadows are black"),
         ("SHADOW", "Shadow", "The share of the sun that is seen: 1 lit, 0 dark"),
-        ("AO", "Ambient occlusion", "The share of the hemisphere that is open"),
-        ("LIGHT", "Irradiance", "The sun's light by the angle at which it falls, times ambient occlusion")))
+        ("AO", "Ambient occlusion", "The share of the hemisphere that is open")))
     sun: bpy.props.PointerProperty(
         name="Sun", type=bpy.types.Object, description="Its direction and angle; none: the scene's first sun",
         poll=lambda self, obj: obj.type == "LIGHT" and obj.data.type == "SUN")
+    ambient: bpy.props.FloatProperty(name="Ambient", default=0.25, min=0.0, soft_max=1.0,
+                                     description="Light from all around, of which a sun's full light is 1")
     ao_distance: bpy.props.FloatProperty(name="AO distance", default=1.0, min=1e-4, soft_max=100.0, subtype="DISTANCE",
                                          description="How far ambient occlusion looks")
     size: bpy.props.IntProperty(name="Size", default=1024, min=16, max=16384, description="Texels along each side")
@@ -143,6 +145,8 @@ class VDBSHADE_PT_panel(bpy.types.Panel):
             layout.prop(settings, "sun")
         if settings.what != "SHADOW":
             layout.prop(settings, "ao_distance")
+        if settings.what == "LIGHT":
+            layout.prop(settings, "ambient")
         for name in ("size", "padding", "max_error", "unwrap", "link", "image_name", "pack"):
             layout.prop(settings, name)
         layout.operator("vdbshade.bake", text="Bake %d objects" % sum(map(is_caster, context.selected_objects)))

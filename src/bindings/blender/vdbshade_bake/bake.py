@@ -100,6 +100,7 @@ class Bake:
         if code != 0 or self.layout is None:
             return code
         self.layout.take(self.folder)
+        self.warnings += self.layout.warnings
         self.layout = None
         bpy.context.view_layer.update()
         self.bake(bpy.context)

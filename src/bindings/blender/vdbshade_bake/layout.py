@@ -1,6 +1,7 @@
 """Lightmap UVs by `vdbshade unwrap`: which objects need them, and how they come back into the meshes."""
 import os
 
+import bmesh
 import bpy
 
 from . import materials, scene
@@ -25,6 +26,7 @@ class Layout:
         self.receivers = receivers
         self.keep = how != "ALWAYS"
         self.undo = []
+        self.warnings = []
         for obj in receivers:
             if obj.data.library is not None or obj.library is not None:
                 raise BakeError("'%s': comes from another file, and so cannot have UVs made; make it local" % obj.name)
@@ -63,10 +65,34 @@ class Layout:
             corners, uvs = numpy.array(corners), numpy.array(uvs, numpy.float32)
             of_corner[corners] = uvs
             cut = numpy.unique(corners[(of_corner[corners] != uvs).any(axis=1)])
-            if len(cut) > 0:  # Blender's faces have one place for each corner
-                raise BakeError("'%s': %d corners of bent faces are parted by the layout; triangulate such faces" %
-                                (obj.name, len(cut)))
             self.put(obj, of_corner)
+            if len(cut) > 0:  # Blender's faces have one place for each corner
+                self.split(obj, cut, corners.reshape(-1, 3), uvs.reshape(-1, 3, 2))
+
+    def split(self, obj, cut, triangles, uvs):
+        """Splits the faces of the corners `cut` into the triangles that were laid out, each with UVs of its own."""
+        backup, made = bmesh.new(), bmesh.new()
+        backup.from_mesh(obj.data)
+        made.from_mesh(obj.data)
+        made.faces.ensure_lookup_table()
+        made.verts.ensure_lookup_table()
+        layer = made.loops.layers.uv[materials.UV_NAME]
+        face_of = {loop: face.index for face in obj.data.polygons for loop in face.loop_indices}
+        pieces = {face: [made.faces[face]] for face in {face_of[corner] for corner in cut}}
+        for corners, places in zip(triangles, uvs):
+            own = pieces.get(face_of[corners[0]])
+            if own is None:
+                continue
+            place = {obj.data.loops[corner].vertex_index: uv for corner, uv in zip(corners, places)}
+            own.extend(split_off(own, [made.verts[vertex] for vertex in place]))
+            for face in own:
+                if {loop.vert.index for loop in face.loops} == set(place):
+                    for loop in face.loops:
+                        loop[layer].uv = place[loop.vert.index]
+        made.to_mesh(obj.data)
+        made.free()
+        self.undo.append(lambda: backup.to_mesh(obj.data))
+        self.warnings.append("'%s': %d bent faces are triangles now, as the lightmap parts them" % (obj.name, len(pieces)))
 
     def put(self, obj, uvs):
         layers = obj.data.uv_layers
@@ -96,6 +122,17 @@ class Layout:
 def unpart(obj, before, made):
     obj.data = before
     bpy.data.meshes.remove(made)
+
+
+def split_off(faces, corners):
+    """Cuts the triangle of three vertices out of the face that has them all; returns the faces that this makes."""
+    made = []
+    for i in range(3):
+        a, b = corners[i], corners[i - 1]
+        face = next(face for face in faces + made if {*corners} <= {*face.verts})
+        if not any({a, b} == {*edge.verts} for edge in face.edges):
+            made.append(bmesh.utils.face_split(face, a, b)[0])
+    return made
 
 
 def read_obj(path):

@@ -196,4 +196,5 @@ def scene_of(settings, scene, receivers, output):
         made["ao"] = {"distance": settings.ao_distance}
     if settings.what == "LIGHT":
         made["irradiance"] = True
+        made["ambient"] = [settings.ambient] * 3
     return made
