@@ -246,6 +246,38 @@ BAKE=(--sun 1,0.2,1 --sun-angle 20 --ao 1 --size 64 --max-error 0.05 --bent-norm
     pixel_is 300 100 $(lit 255 255 255 0.8 0.8 0.8 1)
 }
 
+# Whether an element is what a finger meets in its middle.
+ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
+    return r.width > 0 && e.contains(document.elementFromPoint(r.x + r.width / 2, r.y + r.height / 2)); }'
+
+@test "on a phone targets are 44 pixels large, the panel takes a third, and Hide can be taken back" {
+    write_squares
+    write_corner
+    shade view squares.gltf corner.obj -o models.html --quiet
+    done_well
+    WIDE=390x844m look models.html "mode=light" \
+        "tell:[...document.querySelectorAll('button, select, input[type=range], label:has([type=checkbox])')].map(e => [e.id, e.getBoundingClientRect()])
+            .filter(([id, r]) => r.width > 0 && (r.width < 44 || r.height < 44)).map(([id, r]) => id + ' ' + r.width + ' ' + r.height).join()" \
+        "tell:{ const r = document.getElementById('tools').getBoundingClientRect(); String(r.width * r.height / innerWidth / innerHeight) }" \
+        "tell:$ON_TOP; document.getElementById('hide').click(); String([...document.querySelectorAll('button')].filter(onTop).map(e => e.textContent))" \
+        "tell:document.getElementById('show').click(); String(onTop(document.getElementById('hide')))" >told
+    [ "$(sed -n 1p told)" = "" ] || fail "small: $(sed -n 1p told)"
+    awk 'NR == 2 { exit !($1 > 0.1 && $1 <= 1 / 3) }' told || fail "a share of $(sed -n 2p told)"
+    [ "$(sed -n 3p told)" = "Show" ] || fail "after Hide: $(sed -n 3p told)"
+    [ "$(sed -n 4p told)" = "true" ] || fail "after Show: $(sed -n 4p told)"
+}
+
+@test "labels are whole where there is room" {
+    write_corner
+    cp corner.obj "a corner with a rather long name.obj"
+    shade view corner.obj "a corner with a rather long name.obj" -o models.html --quiet
+    done_well
+    WIDE=1440x900 look models.html "" \
+        "tell:[...document.querySelectorAll('span, label, button, h1')].filter(e => e.scrollWidth > e.clientWidth && e.clientWidth > 0).map(e => e.textContent).join()" \
+        "tell:String(document.getElementById('right').clientWidth > 100)" >told
+    [ "$(cat told)" = $'\ntrue' ] || fail "cut: $(cat told)"
+}
+
 @test "texel density, checker and charts of a mesh without a bake" {
     write_corner
     shade view corner.obj -o corner.html --quiet

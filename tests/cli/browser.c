@@ -1,8 +1,11 @@
 /* A page in Chromium without a window, by its debugging pipe: waits until the page says that it is ready or
  * has failed (data-state of its root), does what is asked, and keeps its picture and document. Usage:
  *
- *   browser URL SIZE OUT.png OUT.html [key:NAME | click:X,Y | drag:X,Y,X,Y | value:ID=TEXT]… [--
- * CHROMIUM_OPTION …] */
+ *   browser URL SIZE OUT.png OUT.html [key:NAME | click:X,Y | drag:X,Y,X,Y | value:ID=TEXT |
+ *   tell:EXPRESSION]… [-- CHROMIUM_OPTION …]
+ *
+ * SIZE is a number, or WIDTHxHEIGHT; with an m behind it the page is on a phone with a touch screen. `tell`
+ * prints what an expression comes to, a line each. */
 #define _GNU_SOURCE
 #include <fcntl.h>
 #include <jansson.h>
@@ -188,9 +191,24 @@ static void act(const char *action) {
         json_decref(call("Input.dispatchKeyEvent", json_pack("{s:s,s:s}", "type", "keyUp", "key", key)));
     } else if (sscanf(action, "value:%63[^=]=%63s", id, value) == 2) {
         choose(id, value);
+    } else if (strncmp(action, "tell:", 5) == 0) {
+        char *told = evaluate(action + 5);
+        puts(told);
+        free(told);
     } else {
         stop(action);
     }
+}
+
+static void set_size(const char *size) {
+    int width = 0, height = 0;
+    char end = '\0';
+    const int read = sscanf(size, "%dx%d%c", &width, &height, &end);
+    const bool phone = read == 3 && end == 'm';
+    json_decref(call("Emulation.setDeviceMetricsOverride",
+                     json_pack("{s:i,s:i,s:i,s:b}", "width", width, "height", read > 1 ? height : width,
+                               "deviceScaleFactor", 1, "mobile", phone)));
+    json_decref(call("Emulation.setTouchEmulationEnabled", json_pack("{s:b}", "enabled", phone)));
 }
 
 static void save(const char *path, const char *text, bool base64) {
@@ -236,10 +254,7 @@ int main(int argc, char **argv) {
     state.session = strdup(json_string_value(json_object_get(attached, "sessionId")));
     json_decref(target);
     json_decref(attached);
-    const int size = atoi(argv[2]);
-    json_decref(
-        call("Emulation.setDeviceMetricsOverride", json_pack("{s:i,s:i,s:i,s:b}", "width", size, "height",
-                                                             size, "deviceScaleFactor", 1, "mobile", 0)));
+    set_size(argv[2]);
     json_decref(call("Page.navigate", json_pack("{s:s}", "url", argv[1])));
     wait_until_ready();
     static const char drawn[] = "new Promise(r => requestAnimationFrame(() => requestAnimationFrame(() => "

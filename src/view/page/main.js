@@ -221,7 +221,7 @@
         for (const name of ['texels', 'wireframe', 'sides']) {
             byId(name).onchange = event => set({[name]: event.target.checked});
         }
-        for (const [id, key] of [['frame', 'f'], ['link', 'l'], ['theme', 'd'], ['hide', 'h']]) {
+        for (const [id, key] of [['frame', 'f'], ['link', 'l'], ['theme', 'd'], ['hide', 'h'], ['show', 'h']]) {
             byId(id).onclick = keys[key];
         }
         const bar = byId('bar');

@@ -73,7 +73,7 @@
         byId('split').value = state.split;
         byId('bar').style.left = 100 * state.split + '%';
         ['left', 'right'].forEach((side, i) => {
-            byId(side).textContent = bakes[i] ? bakes[i].name : '';
+            byId(side).textContent = byId(side).title = bakes[i] ? bakes[i].name : '';
             byId(side + '-bake').value = state[side];
         });
     }
