@@ -55,7 +55,10 @@ enum { VSH_CONFINED_LIMITS = 1, VSH_CONFINED_CALLS = 2, VSH_CONFINED_FILES = 4, 
 /* For the main of a reader, before anything else, and in a process with no thread that does anything: where
  * argv[1] is VSH_READER_ARGUMENT, confines the process for good, parses the file that the parent asks for and
  * returns the exit code that main is to return; -1 where the argument is not there, which is a common start.
- * A program can so be its own reader ("/proc/self/exe"). Any vdbshade of the same version is one, too. */
+ * A program can so be its own reader ("/proc/self/exe"). Any vdbshade of the same version is one, too.
+ * The environment of a reader has VSH_IN_READER. A process with that variable starts no reader: calls with
+ * vsh_run.reader fail with VSH_ERROR_ARGUMENT there, so a main that forgets this call cannot start itself
+ * again and again. */
 VSH_API int32_t vsh_reader_serve(int argc, char **argv);
 
 /* Starts run->reader to see how it is confined here: *confined becomes a sum of VSH_CONFINED_…. Errors:

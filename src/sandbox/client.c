@@ -80,6 +80,13 @@ static int lift(int file) {
 
 vsh_result vshi_exchange_begin(vshi_exchange *exchange, int32_t kind, const char *path, const vsh_run *run,
                                vsh_error *error) {
+    if (vshi_in_reader()) {
+        /* else a program that names itself as reader would start itself without end */
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "%s: not read: this process is a reader itself; main has to call vsh_reader_serve() "
+                         "before anything else",
+                         path);
+    }
     exchange->path = path;
     exchange->run = run;
     const int file = lift(memfd_create("vdbshade request", MFD_CLOEXEC | MFD_ALLOW_SEALING));
@@ -228,8 +235,9 @@ static vsh_result fail_end(const vshi_exchange *exchange, int status, bool begun
                          exchange->run->reader, vsh_version());
     }
     if (!begun) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: '%s' is no reader of vdbshade %s", exchange->path,
-                         exchange->run->reader, vsh_version());
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "%s: '%s' is no reader of vdbshade %s: its main does not call vsh_reader_serve()",
+                         exchange->path, exchange->run->reader, vsh_version());
     }
     return vshi_fail(error, VSH_ERROR_READ, "%s: damaged: the reader ended without an answer (%d)",
                      exchange->path, WIFEXITED(status) ? WEXITSTATUS(status) : -1);

@@ -95,6 +95,9 @@ static bool find_own(char path[PATH_MAX]) {
 
 /* --- its environment */
 
+/* Set in the environment of every reader. */
+#define VSHI_IN_READER "VSH_IN_READER"
+
 /* Variables that a reader's libraries act on; what else a host has there (tokens, passwords) is none of a
  * hostile file's business. */
 static bool is_passed(const char *variable) {
@@ -119,21 +122,27 @@ static bool is_passed(const char *variable) {
     return false;
 }
 
-static char **make_environment(void) {
+/* What is passed, and `mark`. */
+static char **make_environment(char *mark) {
     size_t count = 0, passed = 0;
     while (environ != NULL && environ[count] != NULL) {
         ++count;
     }
-    char **made = malloc((count + 1) * sizeof *made);
+    char **made = malloc((count + 2) * sizeof *made);
     for (size_t i = 0; made != NULL && i < count; ++i) {
         if (is_passed(environ[i])) {
             made[passed++] = environ[i];
         }
     }
     if (made != NULL) {
+        made[passed++] = mark;
         made[passed] = NULL;
     }
     return made;
+}
+
+bool vshi_in_reader(void) {
+    return getenv(VSHI_IN_READER) != NULL;
 }
 
 /* --- starting */
@@ -172,7 +181,7 @@ static void set_attributes(posix_spawnattr_t *attributes) {
 /* Nothing but posix_spawn(): between fork and exec none of our code runs, as it must not in a process that
  * may have threads. */
 int vshi_spawn_reader(const vshi_exchange *exchange, int answer, int progress, pid_t *pid) {
-    char own[PATH_MAX], name[] = VSH_READER, argument[] = VSH_READER_ARGUMENT;
+    char own[PATH_MAX], name[] = VSH_READER, argument[] = VSH_READER_ARGUMENT, mark[] = VSHI_IN_READER "=1";
     char *const arguments[] = {name, argument, NULL};
     const char *program = exchange->run->reader;
     if (strcmp(program, VSH_READER) == 0) {
@@ -184,7 +193,7 @@ int vshi_spawn_reader(const vshi_exchange *exchange, int answer, int progress, p
     }
     posix_spawn_file_actions_t files;
     posix_spawnattr_t attributes;
-    char **environment = make_environment();
+    char **environment = make_environment(mark);
     int reason = environment != NULL ? posix_spawn_file_actions_init(&files) : ENOMEM;
     if (reason != 0) {
         free(environment);

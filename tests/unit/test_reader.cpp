@@ -278,6 +278,25 @@ void a_reader_that_fails_is_an_error_with_its_reason(void **) {
     misbehave(nullptr);
 }
 
+void a_program_that_names_itself_and_does_not_serve_starts_once(void **) {
+    const std::string path = ball_file(), starts = in_folder("starts.txt");
+    put(starts, "");
+    setenv(STARTS, starts.c_str(), 1);
+    setenv(READS, path.c_str(), 1);
+    misbehave("host");
+    const vsh_run run = with_reader();
+    vsh_grid *grid = nullptr;
+    assert_said(vsh_grid_read(path.c_str(), nullptr, &run, &grid, &failure), VSH_ERROR_ARGUMENT,
+                {"ball.vdb: '/proc/self/exe' is no reader of vdbshade", "does not call vsh_reader_serve()"});
+    misbehave(nullptr);
+    assert_string_equal(content(starts).c_str(),
+                        ("started\n" + path +
+                         ": not read: this process is a reader itself; main has to call vsh_reader_serve() "
+                         "before anything else\n")
+                            .c_str());
+    assert_no_child();
+}
+
 void a_program_that_is_missing_or_no_reader_is_an_argument(void **) {
     const std::string path = ball_file();
     for (const char *program : {"/nowhere/reader", "/bin/true", "/tmp"}) {
@@ -420,6 +439,7 @@ int main(int argc, char **argv) {
         cmocka_unit_test(images_lists_voxels_and_texts_are_the_same),
         cmocka_unit_test(errors_are_the_same),
         cmocka_unit_test(a_reader_that_fails_is_an_error_with_its_reason),
+        cmocka_unit_test(a_program_that_names_itself_and_does_not_serve_starts_once),
         cmocka_unit_test(a_program_that_is_missing_or_no_reader_is_an_argument),
         cmocka_unit_test(cancelling_kills_the_reader),
         cmocka_unit_test(a_host_may_ignore_its_children_and_have_threads),
