@@ -41,7 +41,7 @@ typedef struct vsh_solidity_rule {
     int32_t solidity;    /* VSH_SOLIDITY_… */
 } vsh_solidity_rule;
 
-/* A caster of a scene. Which members hold is told by its type. */
+/* A caster of a scene. The type says which members apply. Begin with vsh_caster_default() (settings.h). */
 typedef struct vsh_caster {
     int32_t type;         /* VSH_CASTER_… */
     const char *path;     /* mesh, vdb, heightfield, mask: file; text: font; spheres: NULL, or a file
@@ -106,7 +106,7 @@ typedef struct vsh_density_rule {
 VSH_API int32_t vsh_receiver_unwrap(const char *name);
 VSH_API const char *vsh_receiver_unwrap_name(int32_t unwrap);
 
-/* What a lightmap of a scene is baked for. */
+/* A mesh or heightfield that a lightmap is baked for. Begin with vsh_receiver_default() (settings.h). */
 typedef struct vsh_receiver {
     const char *path;     /* mesh file, or a heightfield's image */
     double transform[12]; /* local to world */
@@ -242,8 +242,8 @@ typedef struct vsh_assets vsh_assets;
 
 /* Reads the models and level sets that `scene` names, receivers' first, and puts them in their places. The
  * scene need not outlive the call. Free the result with vsh_assets_free(). Errors:
- * - VSH_ERROR_ARGUMENT: scene or assets NULL, a caster of no type, a caster or receiver without a path, a
- *   UV set outside -1 … VSH_MAX_UV_SETS - 1, run;
+ * - VSH_ERROR_ARGUMENT: scene or assets NULL, a caster of no type, a caster or receiver without a path or
+ *   with a transform that is not finite or flattens, a UV set outside -1 … VSH_MAX_UV_SETS - 1, run;
  * - VSH_ERROR_INPUT: a receiver's mesh without UVs or without the set asked for; a pattern that matches no
  *   mesh of its file, patterns that leave none; a caster whose meshes are all blended, without
  *   scene->cast_blended; as vsh_model_read(),

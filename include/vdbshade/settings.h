@@ -63,7 +63,8 @@ VSH_API vsh_result vsh_receiver_set(vsh_receiver *receiver, const char *name, co
 VSH_API vsh_result vsh_flat_scene_set(vsh_flat_scene *scene, const char *name, const char *text,
                                       vsh_error *error);
 
-/* Empty scenes, and a receiver that is no file yet, as keys that are not given leave them. */
+/* Empty scenes, and a caster and a receiver without a file, as a scene file leaves keys that are not given. A
+ * transform is the identity. */
 static inline vsh_scene vsh_scene_default(void) {
     vsh_scene scene;
     memset(&scene, 0, sizeof scene);
@@ -76,6 +77,14 @@ static inline vsh_flat_scene vsh_flat_scene_default(void) {
     memset(&scene, 0, sizeof scene);
     scene.options = vsh_flat_options_default();
     return scene;
+}
+static inline vsh_caster vsh_caster_default(void) {
+    vsh_caster caster;
+    memset(&caster, 0, sizeof caster);
+    caster.transform[0] = caster.transform[5] = caster.transform[10] = 1.0;
+    caster.mask = vsh_mask_options_default();
+    caster.letters = vsh_text_options_default();
+    return caster;
 }
 static inline vsh_receiver vsh_receiver_default(void) {
     const vsh_lightmap_options lightmap = vsh_lightmap_options_default();

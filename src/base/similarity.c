@@ -9,6 +9,10 @@
  * similarity: what is left after composing a few rotations that were written with six digits. */
 static const double similarity_tolerance = 1e-4;
 
+/* A linear part whose unit columns span less volume than this makes shapes flat: what is left of their third
+ * direction is rounding. */
+static const double FLATTENING_VOLUME = 1e-12;
+
 double vshi_similarity_scale(const double m[12]) {
     const vshi_vec x = {m[0], m[4], m[8]};
     const vshi_vec y = {m[1], m[5], m[9]};
@@ -26,6 +30,16 @@ double vshi_similarity_scale(const double m[12]) {
         }
     }
     return scale;
+}
+
+bool vshi_transform_flattens(const double m[12]) {
+    const vshi_vec x = vshi_unit((vshi_vec){m[0], m[4], m[8]});
+    const vshi_vec y = vshi_unit((vshi_vec){m[1], m[5], m[9]});
+    const vshi_vec z = vshi_unit((vshi_vec){m[2], m[6], m[10]});
+    /* The determinant itself decides about mirroring, so it must not underflow or overflow either. */
+    const double determinant = vshi_transform_determinant(m);
+    return !(fabs(vshi_dot(x, vshi_cross(y, z))) > FLATTENING_VOLUME) || determinant == 0.0 ||
+           !isfinite(determinant);
 }
 
 /* The largest component is found first, so that nothing cancels (S. W. Shepperd, "Quaternion from rotation

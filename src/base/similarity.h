@@ -2,10 +2,14 @@
 #ifndef VSHI_SIMILARITY_H
 #define VSHI_SIMILARITY_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 /* Uniform scale of a transform [12]; 0 for one that shears, scales unevenly or flattens. */
 double vshi_similarity_scale(const double m[12]);
+
+/* Whether a finite transform makes everything flat. */
+bool vshi_transform_flattens(const double m[12]);
 
 /* Quaternion x, y, z, w of the rotation in a similarity of that scale that does not mirror. */
 void vshi_similarity_rotation(const double m[12], double scale, double q[4]);

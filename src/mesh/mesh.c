@@ -1,13 +1,10 @@
 #include "mesh/mesh.h"
 
+#include "base/similarity.h"
 #include "base/try.h"
 
 #include <stdio.h>
 #include <string.h>
-
-/* A linear part whose unit columns span less volume than this squeezes the mesh flat: what is left of its
- * third direction is rounding. */
-static const double FLATTENING_VOLUME = 1e-12;
 
 vshi_mesh_name vshi_mesh_label(const vsh_mesh *mesh, size_t index) {
     vshi_mesh_name name;
@@ -45,15 +42,9 @@ vsh_result vshi_mesh_check_transform(const vsh_mesh *mesh, size_t index, vsh_err
                              vshi_mesh_label(mesh, index).text, i / 4, i % 4, m[i]);
         }
     }
-    const vshi_vec x = vshi_unit((vshi_vec){m[0], m[4], m[8]});
-    const vshi_vec y = vshi_unit((vshi_vec){m[1], m[5], m[9]});
-    const vshi_vec z = vshi_unit((vshi_vec){m[2], m[6], m[10]});
-    /* The determinant itself decides about mirroring, so it must not underflow or overflow either. */
-    const double determinant = vshi_transform_determinant(m);
-    if (!(fabs(vshi_dot(x, vshi_cross(y, z))) > FLATTENING_VOLUME) || determinant == 0.0 ||
-        !isfinite(determinant)) {
+    if (vshi_transform_flattens(m)) {
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: the transform flattens it (determinant %g)",
-                         vshi_mesh_label(mesh, index).text, determinant);
+                         vshi_mesh_label(mesh, index).text, vshi_transform_determinant(m));
     }
     return VSH_OK;
 }

@@ -122,7 +122,7 @@ static bool is_passed(const char *variable) {
     return false;
 }
 
-/* What is passed, and `mark`. */
+/* Copies the variables that is_passed() keeps, and adds `mark`. */
 static char **make_environment(char *mark) {
     size_t count = 0, passed = 0;
     while (environ != NULL && environ[count] != NULL) {

@@ -5,7 +5,9 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/similarity.h"
 #include "base/try.h"
+#include "base/vec.h"
 #include "scene/asset_files.h"
 #include "scene/asset_place.h"
 #include "scene/kept_field.h"
@@ -14,6 +16,7 @@
 #include "scene/tile.h"
 #include "scene/unwrapped.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -214,6 +217,36 @@ static vsh_result allocate_places(vsh_assets *assets, const vsh_scene *scene, vs
     return VSH_OK;
 }
 
+/* `index` of the scene's "casters" or "receivers". A struct that was only zeroed has a transform of zeros. */
+static vsh_result check_transform(const double transform[12], const char *list, size_t index,
+                                  vsh_error *error) {
+    for (int i = 0; i < 12; ++i) {
+        if (!isfinite(transform[i])) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                             "%s[%zu].transform[%d] is %g: expected a finite number", list, index, i,
+                             transform[i]);
+        }
+    }
+    if (vshi_transform_flattens(transform)) {
+        return vshi_fail(
+            error, VSH_ERROR_ARGUMENT,
+            "%s[%zu].transform flattens everything (determinant %g); vsh_%.*s_default() gives the "
+            "identity",
+            list, index, vshi_transform_determinant(transform), (int)strlen(list) - 1, list);
+    }
+    return VSH_OK;
+}
+
+static vsh_result check_transforms(const vsh_scene *scene, vsh_error *error) {
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        VSHI_TRY(check_transform(scene->receivers[i].transform, "receivers", i, error));
+    }
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        VSHI_TRY(check_transform(scene->casters[i].transform, "casters", i, error));
+    }
+    return VSH_OK;
+}
+
 vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets,
                            vsh_error *error) {
     VSHI_FLOATS;
@@ -222,6 +255,7 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
     VSHI_NEEDS(scene);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
+    VSHI_TRY(check_transforms(scene, error));
     vsh_assets *loaded = NULL;
     VSHI_TRY(vshi_allocate((void **)&loaded, 1, sizeof *loaded, "assets", error));
     vsh_result result = VSH_OK;

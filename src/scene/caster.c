@@ -4,7 +4,7 @@
 #include "scene/transform.h"
 #include "scene/tree.h"
 
-#include <vdbshade/scene.h>
+#include <vdbshade/settings.h>
 
 enum {
     MESH = 1 << VSH_CASTER_MESH,
@@ -134,10 +134,8 @@ static const vshi_table caster_table = VSHI_TABLE(caster_keys);
 
 vsh_result vshi_read_caster(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_caster *caster = member;
+    *caster = vsh_caster_default();
     caster->type = -1;
-    vshi_transform_identity(caster->transform);
-    caster->mask = vsh_mask_options_default();
-    caster->letters = vsh_text_options_default();
     vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
     if (result != VSH_OK) {
         return result;

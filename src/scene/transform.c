@@ -3,6 +3,7 @@
 #include "scene/assets.h"
 
 #include "base/elementary.h"
+#include "base/similarity.h"
 #include "base/try.h"
 #include "base/vec.h"
 
@@ -11,9 +12,6 @@
 
 /* Shear that numbers written with seven digits leave in a rotation. */
 static const double SIMILARITY_TOLERANCE = 1e-5;
-/* Volume of the unit cube's image against that of a cube with its edges: under this it is a sheet, and
- * normals through it are noise. */
-static const double FLAT_TOLERANCE = 1e-12;
 static const double SMALLEST_SCALE = 1e-6;
 static const double LARGEST_SCALE = 1e6;
 
@@ -85,12 +83,6 @@ static const vshi_key transform_keys[] = {
 };
 static const vshi_table transform_table = VSHI_TABLE(transform_keys);
 
-void vshi_transform_identity(double matrix[12]) {
-    for (int i = 0; i < 12; ++i) {
-        matrix[i] = i % 5 == 0 ? 1.0 : 0.0;
-    }
-}
-
 /* Scale, then rotation, then translation. */
 static void compose(const parts *p, double m[12]) {
     double q[4];
@@ -136,8 +128,7 @@ vsh_result vshi_read_transform(vshi_json *reader, const vshi_value *value, void 
         return VSH_OK;
     }
     memcpy(m, p.matrix, sizeof p.matrix);
-    const double cube = vshi_length(axis(m, 0)) * vshi_length(axis(m, 1)) * vshi_length(axis(m, 2));
-    if (!(fabs(vshi_transform_determinant(m)) > FLAT_TOLERANCE * cube)) {
+    if (vshi_transform_flattens(m)) {
         return vshi_json_fail(reader, &given, "flattens: the determinant of its first three columns is 0");
     }
     return VSH_OK;

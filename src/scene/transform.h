@@ -11,8 +11,6 @@ vsh_result vshi_read_rotation(vshi_json *reader, const vshi_value *value, void *
 /* A "transform" object into double[12]. Errors: also a transform that flattens. */
 vsh_result vshi_read_transform(vshi_json *reader, const vshi_value *value, void *matrix);
 
-void vshi_transform_identity(double matrix[12]);
-
 /* Whether lengths all change by the same factor: rotation, translation, mirroring, uniform scale. */
 bool vshi_transform_is_similarity(const double matrix[12]);
 

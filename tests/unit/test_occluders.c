@@ -288,6 +288,43 @@ static void more_layers_than_can_be_are_refused(void **state) {
     assert_string_equal(why.message, "0 layers and 129 casters that are not voxelised: at most 128 together");
 }
 
+static void a_default_caster_stands_where_its_file_says_and_a_zeroed_transform_is_named(void **state) {
+    (void)state;
+    enum { COUNT = 2 };
+    vsh_caster casters[COUNT] = {vsh_caster_default(), vsh_caster_default()};
+    vsh_receiver receiver = vsh_receiver_default();
+    const vsh_scene scene = {.casters = casters,
+                             .caster_count = COUNT,
+                             .receivers = &receiver,
+                             .receiver_count = 1,
+                             .grid = vsh_grid_options_default()};
+    receiver.path = casters[0].path = casters[1].path = VSH_ASSETS "/thin.glb";
+    vsh_assets *assets = NULL;
+    assert_int_equal(vsh_assets_load(&scene, NULL, &assets, &why), VSH_OK);
+    vsh_assets_free(assets);
+    const struct {
+        double *at, value;
+        const char *message;
+    } cases[] = {
+        {&casters[1].transform[5], 0.0,
+         "casters[1].transform flattens everything (determinant 0); vsh_caster_default() gives the identity"},
+        {&receiver.transform[0], 0.0,
+         "receivers[0].transform flattens everything (determinant 0); vsh_receiver_default() gives the "
+         "identity"},
+        {&casters[0].transform[3], NAN, "casters[0].transform[3] is nan: expected a finite number"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+        const double before = *cases[i].at;
+        *cases[i].at = cases[i].value;
+        assert_int_equal(vsh_assets_load(&scene, NULL, &assets, &why), VSH_ERROR_ARGUMENT);
+        assert_string_equal(why.message, cases[i].message);
+        *cases[i].at = before;
+    }
+    casters[0] = (vsh_caster){.type = VSH_CASTER_MESH, .path = casters[1].path};
+    assert_int_equal(vsh_assets_load(&scene, NULL, &assets, &why), VSH_ERROR_ARGUMENT);
+    assert_memory_equal(why.message, "casters[0].transform flattens", 29);
+}
+
 static void count_lost(void *user, const char *message) {
     *(int *)user += strstr(message, "of its area is lost") != NULL;
 }
@@ -298,8 +335,8 @@ static void what_voxels_lose_is_told_where_they_decide_unless_they_are_a_trial(v
         int32_t method, silent;
         bool told;
     } cases[] = {{VSH_SHADOW_CONE, 0, true}, {VSH_SHADOW_CONE, 1, false}, {VSH_SHADOW_EXACT, 0, false}};
-    vsh_caster caster = {.type = VSH_CASTER_MESH, .path = VSH_ASSETS "/thin.glb"};
-    caster.transform[0] = caster.transform[5] = caster.transform[10] = 1.0;
+    vsh_caster caster = vsh_caster_default();
+    caster.path = VSH_ASSETS "/thin.glb";
     const vsh_light light = vsh_light_default();
     vsh_scene scene = {.casters = &caster,
                        .caster_count = 1,
@@ -340,6 +377,7 @@ int main(void) {
         cmocka_unit_test(a_scene_keeps_the_truth_only_where_an_error_is_kept),
         cmocka_unit_test(a_box_without_a_half_is_refused),
         cmocka_unit_test(more_layers_than_can_be_are_refused),
+        cmocka_unit_test(a_default_caster_stands_where_its_file_says_and_a_zeroed_transform_is_named),
         cmocka_unit_test(what_voxels_lose_is_told_where_they_decide_unless_they_are_a_trial),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

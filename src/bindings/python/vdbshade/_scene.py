@@ -94,8 +94,6 @@ def _caster(given: Any) -> Filled:
     kind = given.pop("type", "sdf" if sdf is not None else "spheres" if spheres is not None else "vdb" if vdb else "mesh")
     filled = Filled("vsh_caster", dict(type=kind))
     struct = filled.pointer
-    lib.vsh_struct_init(b"vsh_mask_options", ffi.addressof(struct, "mask"), ffi.sizeof("vsh_mask_options"))
-    lib.vsh_struct_init(b"vsh_text_options", ffi.addressof(struct, "letters"), ffi.sizeof("vsh_text_options"))
     for name, value in given.items():
         filled.set(struct, "vsh_caster", name, value)
     _moved(struct, moved)
