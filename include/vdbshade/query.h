@@ -55,10 +55,12 @@ typedef struct vsh_point_layout {
     size_t position_stride;       /* bytes from one position to the next */
     size_t normal_stride;         /* the same of normals */
     size_t texel_stride;          /* the same of texels */
+    const float *face_normals;    /* [count][3], unit, packed: of the faces, where points->normals are smooth.
+                                     Directions below the face do not count for AO. NULL: points->normals */
 } vsh_point_layout;
 
 static inline vsh_point_layout vsh_point_layout_default(void) {
-    vsh_point_layout layout = {sizeof(vsh_point_layout), NULL, 0, 0, 0};
+    vsh_point_layout layout = {sizeof(vsh_point_layout), NULL, 0, 0, 0, NULL};
     return layout;
 }
 

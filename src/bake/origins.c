@@ -321,7 +321,7 @@ static void look_in(lifting *l, const vsh_field *field, const vsh_triangles *tri
 }
 
 double vshi_origins_sample_bytes(void) {
-    return 3.0 + 6.0 * sizeof(double) + 7.0 * sizeof(float);
+    return 2.0 + 6.0 * sizeof(double) + 7.0 * sizeof(float);
 }
 
 vsh_result vshi_origins_create(const vsh_occluders *occluders, const vsh_texels *texels,

@@ -18,6 +18,7 @@ typedef struct hits {
     double traced[VSHI_TILE_SAMPLES][3];  /* where rays against triangles begin */
     double marched[VSHI_TILE_SAMPLES][3]; /* where marches through the field begin */
     float normals[VSHI_TILE_SAMPLES][3];
+    float faces[VSHI_TILE_SAMPLES][3]; /* normals of the triangles; the same where a field is hit */
     uint32_t texels[VSHI_TILE_SAMPLES];
     float visibility[VSHI_TILE_SAMPLES];
     float ao[VSHI_TILE_SAMPLES];
@@ -45,14 +46,15 @@ static const vsh_surface *find_surface(const vshi_scenery *scenery, const vshi_e
     return nearest;
 }
 
-static void add_point(hits *h, vshi_vec traced, vshi_vec marched, vshi_vec n, const double *color,
-                      uint32_t texel, vshi_seen *seen) {
+static void add_point(hits *h, vshi_vec traced, vshi_vec marched, vshi_vec n, vshi_vec face,
+                      const double *color, uint32_t texel, vshi_seen *seen) {
     const size_t i = h->count++;
     h->seen[i] = seen;
     h->color[i] = color;
     h->traced[i][0] = traced.x, h->traced[i][1] = traced.y, h->traced[i][2] = traced.z;
     h->marched[i][0] = marched.x, h->marched[i][1] = marched.y, h->marched[i][2] = marched.z;
     h->normals[i][0] = (float)n.x, h->normals[i][1] = (float)n.y, h->normals[i][2] = (float)n.z;
+    h->faces[i][0] = (float)face.x, h->faces[i][1] = (float)face.y, h->faces[i][2] = (float)face.z;
     h->texels[i] = texel;
     for (int c = 0; c < 3; ++c) {
         seen->normal[c] = h->normals[i][c];
@@ -64,7 +66,7 @@ static void add_hit(const vshi_scenery *scenery, hits *h, const vsh_surface *sur
     const vshi_vec at = vshi_add(ray->origin, vshi_scale(ray->direction, distance));
     const vshi_vec n = vshi_field_normal(surface->field, at, vshi_scale(ray->direction, -1.0));
     const vshi_vec point = vshi_add(at, vshi_scale(n, scenery->lift * surface->field->voxel_size));
-    add_point(h, point, point, n, surface->color, texel, seen);
+    add_point(h, point, point, n, n, surface->color, texel, seen);
 }
 
 /* Returns how far over a triangle marches begin, voxels: outside of the field's surface, which is a shell
@@ -91,7 +93,7 @@ static void add_bare(const vshi_scenery *scenery, hits *h, uint32_t triangle, vs
                      uint32_t texel, vshi_seen *seen) {
     const vshi_lit_point p = vshi_lit_meet(scenery->lit, triangle, through);
     const double lift = find_lift(scenery->field, p.at, p.flat) * scenery->field->voxel_size;
-    add_point(h, p.at, vshi_add(p.at, vshi_scale(p.flat, lift)), p.normal, p.color, texel, seen);
+    add_point(h, p.at, vshi_add(p.at, vshi_scale(p.flat, lift)), p.normal, p.flat, p.color, texel, seen);
 }
 
 /* Light at the hits, one after the other of the lights, so that room for one is enough. */
@@ -101,7 +103,9 @@ static vsh_result light_hits(const vshi_scenery *scenery, hits *h, vsh_shade_sta
     if (scenery->options->ao) {
         points.positions = scenery->traces_ao ? &h->traced[0][0] : &h->marched[0][0];
         output.ao = h->ao;
-        VSHI_TRY(vsh_query_points(scenery->query, &points, NULL, &scenery->run, &output, stats, error));
+        vsh_point_layout layout = vsh_point_layout_default();
+        layout.face_normals = &h->faces[0][0];
+        VSHI_TRY(vsh_query_points(scenery->query, &points, &layout, &scenery->run, &output, stats, error));
         output.ao = NULL;
     }
     points.positions = scenery->traces_shadow ? &h->traced[0][0] : &h->marched[0][0];

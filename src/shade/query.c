@@ -20,6 +20,7 @@ typedef struct query_call {
     const vsh_query *query;
     const vsh_points *points; /* where they, and the output, are packed; else NULL */
     vshi_view view;
+    const float *faces; /* [points][3] or NULL, as of vshi_ao_task */
     const vsh_query_output *output;
     const vshi_kernel *kernel;
     size_t first;          /* of the points that are under way */
@@ -40,9 +41,10 @@ static void shade_light(const query_call *call, size_t light, const vsh_points *
     vshi_shadow_shade(&task, begin, end, stats);
 }
 
-static void shade_sky(const query_call *call, const vsh_points *points, size_t begin, size_t end, float *ao,
-                      float *deviation, vsh_shade_stats *stats) {
+static void shade_sky(const query_call *call, const vsh_points *points, const float *faces, size_t begin,
+                      size_t end, float *ao, float *deviation, vsh_shade_stats *stats) {
     vshi_ao_task task = call->query->ao;
+    task.faces = faces;
     task.kernel = call->kernel;
     task.points = points;
     task.ao = ao;
@@ -86,7 +88,7 @@ static void shade_in_place(const void *user, size_t begin, size_t end, vsh_shade
         }
     }
     if (output->ao != NULL) {
-        shade_sky(call, call->points, begin, end, output->ao, output->ao_deviation, stats);
+        shade_sky(call, call->points, call->faces, begin, end, output->ao, output->ao_deviation, stats);
     }
     if (output->distance != NULL || output->gradient != NULL) {
         measure(call, end - begin, call->points->positions + 3 * begin,
@@ -98,7 +100,7 @@ static void shade_in_place(const void *user, size_t begin, size_t end, vsh_shade
 /* Points from anywhere, brought together. */
 typedef struct gathered {
     double positions[VSHI_PIECE][3];
-    float normals[VSHI_PIECE][3];
+    float normals[VSHI_PIECE][3], faces[VSHI_PIECE][3];
     uint32_t texels[VSHI_PIECE];
     float values[VSHI_PIECE], deviations[VSHI_PIECE];
     float gradients[VSHI_PIECE][3];
@@ -135,6 +137,9 @@ static void gather(const piece *p, gathered *g) {
             __builtin_prefetch(all->normals + next * all->normal_stride);
             memcpy(g->normals[i], all->normals + point * all->normal_stride, sizeof g->normals[i]);
         }
+        if (p->call->faces != NULL) {
+            memcpy(g->faces[i], p->call->faces + 3 * point, sizeof g->faces[i]);
+        }
         g->texels[i] = (uint32_t)point;
         if (all->texels != NULL) {
             memcpy(&g->texels[i], all->texels + point * all->texel_stride, sizeof g->texels[i]);
@@ -161,8 +166,8 @@ static void shade_gathered(const void *user, size_t begin, size_t end, vsh_shade
         }
     }
     if (output->ao != NULL) {
-        shade_sky(call, &points, 0, p.count, g.values, output->ao_deviation != NULL ? g.deviations : NULL,
-                  stats);
+        shade_sky(call, &points, call->faces != NULL ? &g.faces[0][0] : NULL, 0, p.count, g.values,
+                  output->ao_deviation != NULL ? g.deviations : NULL, stats);
         scatter(&p, 1, g.values, output->ao);
         scatter(&p, 1, g.deviations, output->ao_deviation);
     }
@@ -248,7 +253,7 @@ static vsh_result resolve_stride(const char *name, size_t unit, size_t packed, s
 /* Points as they stand in memory; *packed tells whether that is as vsh_points says. Errors:
  * VSH_ERROR_ARGUMENT. */
 static vsh_result view_points(const vsh_points *points, const vsh_point_layout *layout, vshi_view *view,
-                              bool *packed, vsh_error *error) {
+                              const float **faces, bool *packed, vsh_error *error) {
     vsh_point_layout l = vsh_point_layout_default();
     VSHI_TRY(vshi_options_resolve(layout, &l, sizeof l, "vsh_point_layout", error));
     const bool floats = l.float_positions != NULL;
@@ -267,6 +272,7 @@ static vsh_result view_points(const vsh_points *points, const vsh_point_layout *
                         l.normal_stride,
                         l.texel_stride,
                         floats};
+    *faces = l.face_normals;
     *packed = !floats && l.position_stride == 3 * sizeof(double) &&
               (points->normals == NULL || l.normal_stride == 3 * sizeof(float)) &&
               (points->texels == NULL || l.texel_stride == sizeof(uint32_t));
@@ -283,8 +289,9 @@ vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, co
     vsh_run full_run;
     vsh_query_output full = vsh_query_output_default();
     vshi_view view;
+    const float *faces = NULL;
     bool packed = false, any = false;
-    VSHI_TRY(view_points(points, layout, &view, &packed, error));
+    VSHI_TRY(view_points(points, layout, &view, &faces, &packed, error));
     VSHI_TRY(vshi_run_resolve(run, &full_run, error));
     VSHI_TRY(vshi_options_resolve(output, &full, sizeof full, "vsh_query_output", error));
     VSHI_TRY(check_output(query, &view, &full, &any, error));
@@ -294,6 +301,7 @@ vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, co
     query_call call = {.query = query,
                        .points = packed && full.stride == 0 ? points : NULL,
                        .view = view,
+                       .faces = faces,
                        .output = &full,
                        .kernel = vshi_kernel_of(full_run.isa)};
     if (view.count <= FEW) {

@@ -252,6 +252,40 @@ static void ao_of_a_smooth_convex_body_in_the_open_is_1(void **state) {
     close_scene(&s);
 }
 
+static void queries_take_the_normals_of_faces_for_ao(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s, NULL);
+    vsh_error error = {VSH_OK, ""};
+    vsh_shade_options options = vsh_shade_options_default();
+    options.ao_method = VSH_AO_EXACT;
+    options.ao_distance = 0.1;
+    vsh_query *query = NULL;
+    check(vsh_query_create(occluders_traced(s.field, s.triangles), NULL, 0, &options, &query, &error),
+          &error);
+    float *ao = calloc(s.flat.count, sizeof *ao);
+    vsh_query_output output = vsh_query_output_default();
+    output.ao = ao;
+    vsh_point_layout layout = vsh_point_layout_default();
+    const size_t counts[] = {1, 64, s.flat.count};
+    for (size_t k = 0; k < 3; ++k) {
+        size_t dark[2] = {0, 0};
+        for (int faces = 0; faces < 2; ++faces) {
+            const vsh_points points = {counts[k], s.flat.positions, s.lifted.normals, NULL};
+            layout.face_normals = faces ? s.flat.geometric_normals : NULL;
+            check(vsh_query_points(query, &points, &layout, NULL, &output, NULL, &error), &error);
+            for (size_t i = 0; i < counts[k]; ++i) {
+                dark[faces] += ao[i] < 1.0f;
+            }
+        }
+        assert_int_equal(dark[1], 0);
+        assert_true(k < 2 || dark[0] > 100);
+    }
+    free(ao);
+    vsh_query_free(query);
+    close_scene(&s);
+}
+
 /* A strip of 0.2 × 3 between walls half as high as it is wide. */
 static double mean_ao_between_walls(const float *normals) {
     vsh_error error = {VSH_OK, ""};
@@ -370,6 +404,7 @@ int main(void) {
         cmocka_unit_test(samples_are_valid_by_where_their_facets_are),
         cmocka_unit_test(ao_close_to_a_wall_is_that_of_the_facets),
         cmocka_unit_test(ao_of_a_smooth_convex_body_in_the_open_is_1),
+        cmocka_unit_test(queries_take_the_normals_of_faces_for_ao),
         cmocka_unit_test(leaning_normals_do_not_lift_ao_over_low_walls),
         cmocka_unit_test(a_lift_fades_as_neighbours_come_near),
         cmocka_unit_test(a_light_changes_nothing_for_other_lights_and_ao),
