@@ -1,5 +1,5 @@
-/* Assets with their light: a glTF or GLB given back as it was, with lightmap UVs and with what was
- * baked in its materials; a GLB made of a mesh file of another format; an OBJ (docs/lit.md). */
+/* Assets with their light: a glTF or GLB given back as it was, with lightmap UVs and the baked
+ * images in its materials; a GLB made of a mesh file of another format; an OBJ (docs/lit.md). */
 #ifndef VDBSHADE_LIT_H
 #define VDBSHADE_LIT_H
 

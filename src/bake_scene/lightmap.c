@@ -58,7 +58,7 @@ vsh_result vshi_target_charts(const vsh_scene *scene, const vshi_target *target,
         goto done;
     }
     if (warn) {
-        vshi_warn_uvs(target, reports, run);
+        vshi_warn_uvs(target, reports, info.covered, run);
     }
 done:
     free(reports);

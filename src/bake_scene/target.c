@@ -159,7 +159,8 @@ static char *unique_name(const vshi_targets *t, const vsh_scene *scene, const ch
 static vsh_result add_pages(vshi_targets *t, const vsh_scene *scene, size_t index, const vsh_assets *assets,
                             const vsh_run *run, vsh_error *error) {
     const vsh_receiver *receiver = &scene->receivers[index];
-    const size_t pages = vsh_assets_receiver_pages(assets, index);
+    const size_t pages = vsh_assets_receiver_pages(assets, index), *numbers;
+    const bool unwrapped = vsh_assets_receiver_atlas(assets, index, &numbers) != NULL;
     const bool image = receiver->output != NULL && !vsh_lit_is_output(receiver->output);
     for (size_t page = 0; page < pages; ++page) {
         size_t first, count;
@@ -168,7 +169,7 @@ static vsh_result add_pages(vshi_targets *t, const vsh_scene *scene, size_t inde
         const vsh_mesh *meshes = vsh_assets_receiver_page(assets, index, page, &first, &count);
         vshi_target *target = &t->list[t->count];
         const bool own = info.object != NULL, named = image && (own || pages > 1);
-        *target = (vshi_target){.receiver = *receiver, .index = index, .page = page};
+        *target = (vshi_target){.receiver = *receiver, .index = index, .page = page, .unwrapped = unwrapped};
         ++t->count;
         target->receiver.width = info.width;
         target->receiver.height = info.height;

@@ -4,9 +4,10 @@
 
 #include "bake_scene/target.h"
 
-/* Warns of what is wrong with its UVs, a line a mesh and kind, and of charts that are too close for the size.
- */
-void vshi_warn_uvs(const vshi_target *target, const vsh_uv_report *reports, const vsh_run *run);
+/* Warns of faults in its UVs, a line a mesh and kind. Warns of charts that lie too close for the size, and of
+ * charts that cover few texels. */
+void vshi_warn_uvs(const vshi_target *target, const vsh_uv_report *reports, uint64_t covered,
+                   const vsh_run *run);
 
 /* Charts that cover no texel's centre, or objects that lie over each other on more than VSH_LARGEST_OVERLAP
  * of the texels: VSH_ERROR_INPUT, with why. */

@@ -63,12 +63,52 @@ static void warn_close(const vshi_target *target, const vsh_uv_report *reports, 
               receiver->path, close.texels, close.mesh_texels, name_of(&target->meshes[close.mesh]), help);
 }
 
-void vshi_warn_uvs(const vshi_target *target, const vsh_uv_report *reports, const vsh_run *run) {
+/* The target's size, doubled until it has grown by `least_factor`. */
+static void name_size(const vshi_target *target, double least_factor, char *text, size_t size) {
+    int32_t width = target->receiver.width, height = target->receiver.height;
+    for (double factor = 1.0;
+         factor < least_factor && width <= VSH_MAX_LIGHTMAP_SIZE / 2 && height <= VSH_MAX_LIGHTMAP_SIZE / 2;
+         factor *= 2.0) {
+        width *= 2;
+        height *= 2;
+    }
+    snprintf(text, size, width == height ? "--size %d" : "--size %dx%d", width, height);
+}
+
+static void warn_covered(const vshi_target *target, uint64_t covered, const vsh_run *run) {
+    static const double least = 0.2;
+    static const double full = 0.6; /* the share that charts cover of a page without padding, about */
+    const vsh_receiver *receiver = &target->receiver;
+    const double share = (double)covered / ((double)receiver->width * (double)receiver->height);
+    const bool chosen = receiver->objects.only_count > 0 || receiver->objects.except_count > 0;
+    if (share >= least || (chosen && !target->unwrapped) || (target->page > 0 && target->object == NULL)) {
+        return; /* other objects fill the rest of the layout; the last page need not be full */
+    }
+    char help[128], size[40];
+    if (!target->unwrapped) {
+        name_size(target, sqrt(least / share), size, sizeof size);
+        snprintf(help, sizeof help, "--unwrap always packs them anew, or %s gives them more texels", size);
+    } else if (receiver->texels_per_unit > 0.0) {
+        snprintf(help, sizeof help, "use a smaller --size, or --texels-per-unit %.3g",
+                 receiver->texels_per_unit * sqrt(least / share));
+    } else { /* share = full (1 - padding / size)² */
+        const double padding = 1.0 - sqrt(share / full);
+        name_size(target, padding / (1.0 - sqrt(least / full)), size, sizeof size);
+        snprintf(help, sizeof help, "padding takes most of the image, so use %s", size);
+    }
+    vshi_warn(run, "%s: %s%s%scharts cover %.2g %% of %d × %d texels: %s", receiver->path,
+              target->object != NULL ? "object '" : "", target->object != NULL ? target->object : "",
+              target->object != NULL ? "': " : "", 100.0 * share, receiver->width, receiver->height, help);
+}
+
+void vshi_warn_uvs(const vshi_target *target, const vsh_uv_report *reports, uint64_t covered,
+                   const vsh_run *run) {
     for (size_t m = 0; m < target->mesh_count; ++m) {
         warn_mesh(target->receiver.path, &target->meshes[m], &reports[m], run);
     }
     if (run->warning != NULL) {
         warn_close(target, reports, run);
+        warn_covered(target, covered, run);
     }
 }
 

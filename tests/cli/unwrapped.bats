@@ -243,3 +243,41 @@ EOF
     shade bake two.obj "${SMALL[@]}" --size 16 --texels-per-unit 40 --atlas objects --unwrap always -o x.exr
     refused 4 two.obj "'box'" "would fit"
 }
+
+
+# scattered COUNT: triangles that hang nowhere together, so that each is a chart.
+scattered() {
+    awk -v count="$1" 'BEGIN {
+        for (i = 0; i < count; ++i) printf "v %d 0 0\nv %d 0 1\nv %d 0 0\n", 2 * i, 2 * i, 2 * i + 1
+        for (i = 0; i < count; ++i) printf "f %d %d %d\n", 3 * i + 1, 3 * i + 2, 3 * i + 3
+    }'
+}
+
+@test "charts that cover less than a fifth are warned of, with the size or density that helps" {
+    local bake=(--ao 1 --ao-method taps --resolution 16 -o out.exr) few="charts cover * % of *texels: " size
+    # charts of the file's own: a tenth of the square
+    printf 'v 0 0 0\nv 1 0 0\nv 1 0 -1\nv 0 0 -1\nvt 0 0\nvt 0.4 0\nvt 0.4 0.25\nvt 0 0.25\nf 1/1 2/2 3/3 4/4\n' >tenth.obj
+    shade bake tenth.obj "${bake[@]}" --size 64
+    done_well
+    [[ $stderr == *$few"--unwrap always packs them anew, or --size 128 gives them more texels"* ]] || fail "$stderr"
+    shade bake tenth.obj "${bake[@]}" --size 64 --unwrap always
+    [[ $stderr != *"charts cover"* ]] || fail "packed anew: $stderr"
+    # charts that padding keeps apart
+    scattered 100 >many.obj
+    shade bake many.obj "${bake[@]}" --size 64 --unwrap auto
+    [[ $stderr == *$few"padding takes most of the image, so use --size "* ]] || fail "$stderr"
+    size=$(sed -n 's/.*so use --size //p' <<<"$stderr")
+    shade bake many.obj "${bake[@]}" --size "$size" --unwrap auto
+    done_well
+    [[ $stderr != *"charts cover"* ]] || fail "--size $size: $stderr"
+    # a density that is too low for the size
+    shade bake tenth.obj "${bake[@]}" --size 64 --unwrap always --texels-per-unit 8
+    [[ $stderr == *$few"use a smaller --size, or --texels-per-unit "* ]] || fail "$stderr"
+    size=$(sed -n 's/.*--texels-per-unit //p' <<<"$stderr")
+    shade bake tenth.obj "${bake[@]}" --size 64 --unwrap always --texels-per-unit "$size"
+    done_well
+    # objects that are chosen share the layout with others
+    { sed 's/^f/o tenth\nf/' tenth.obj; echo 'o other'; echo 'f 1/1 2/2 3/3'; } >two.obj
+    shade bake two.obj "${bake[@]}" --size 64 --receive tenth
+    [[ $stderr != *"charts cover"* ]] || fail "chosen: $stderr"
+}
