@@ -184,6 +184,9 @@ static void free_work(vshi_lit_work *work) {
         vshi_lit_topology_free(&work->shapes[i].topology);
     }
     free(work->shapes);
+    for (size_t i = 0; i < work->looks.count; ++i) {
+        json_decref(work->looks.list[i].transform);
+    }
     free(work->looks.list);
     vshi_lit_uv_pool_free(&work->pool);
     vshi_lit_dracos_free(&work->dracos);

@@ -5,16 +5,22 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char variants_name[] = "KHR_materials_variants";
+static const char variants_name[] = "KHR_materials_variants", transform_name[] = "KHR_texture_transform";
 
 /* --- looks */
+
+static bool has_transform(const vshi_lit_look *look, json_t *transform) {
+    return look->transform == NULL || transform == NULL ? look->transform == transform
+                                                        : json_equal(look->transform, transform) != 0;
+}
 
 static vsh_result find_look(vshi_lit_work *work, const vshi_lit_look *wanted, size_t *index,
                             vsh_error *error) {
     vshi_lit_looks *looks = &work->looks;
     for (*index = 0; *index < looks->count; ++*index) {
         const vshi_lit_look *look = &looks->list[*index];
-        if (look->material == wanted->material && look->page == wanted->page && look->set == wanted->set) {
+        if (look->material == wanted->material && look->page == wanted->page && look->set == wanted->set &&
+            has_transform(look, wanted->transform)) {
             return VSH_OK;
         }
     }
@@ -28,11 +34,13 @@ static vsh_result find_look(vshi_lit_work *work, const vshi_lit_look *wanted, si
         looks->capacity = capacity;
     }
     looks->list[looks->count++] = *wanted;
+    json_incref(wanted->transform);
     return VSH_OK;
 }
 
-vsh_result vshi_lit_mark(vshi_lit_work *work, json_t *owner, uint32_t page, size_t set, vsh_error *error) {
-    vshi_lit_look look = {.page = page, .set = set, .made = SIZE_MAX};
+static vsh_result mark(vshi_lit_work *work, json_t *owner, uint32_t page, size_t set, json_t *transform,
+                       vsh_error *error) {
+    vshi_lit_look look = {.page = page, .set = set, .transform = transform, .made = SIZE_MAX};
     size_t index;
     VSHI_TRY(vshi_gltf_index(&work->document.gltf, owner, "material", "materials", "a primitive",
                              &look.material, error));
@@ -41,16 +49,16 @@ vsh_result vshi_lit_mark(vshi_lit_work *work, json_t *owner, uint32_t page, size
 }
 
 vsh_result vshi_lit_mark_primitive(vshi_lit_work *work, json_t *primitive, uint32_t page, size_t set,
-                                   vsh_error *error) {
+                                   json_t *transform, vsh_error *error) {
     const json_t *mappings = json_object_get(vshi_gltf_extension(primitive, variants_name), "mappings");
     size_t i;
     json_t *mapping;
     json_array_foreach(mappings, i, mapping) {
         if (json_object_get(mapping, "material") != NULL) {
-            VSHI_TRY(vshi_lit_mark(work, mapping, page, set, error));
+            VSHI_TRY(mark(work, mapping, page, set, transform, error));
         }
     }
-    return vshi_lit_mark(work, primitive, page, set, error);
+    return mark(work, primitive, page, set, transform, error);
 }
 
 /* --- what they look like */
@@ -63,22 +71,24 @@ static bool has_images(const vshi_lit_work *work, uint32_t page) {
     return any;
 }
 
-static json_t *texture_info(size_t texture, size_t set) {
-    return json_pack("{s:I,s:I}", "index", (json_int_t)texture, "texCoord", (json_int_t)set);
+static json_t *texture_info(const vshi_lit_work *work, int purpose, const vshi_lit_look *look) {
+    const json_int_t texture = (json_int_t)work->textures[purpose][look->page], set = (json_int_t)look->set;
+    return look->transform == NULL ? json_pack("{s:I,s:I}", "index", texture, "texCoord", set)
+                                   : json_pack("{s:I,s:I,s:{s:O}}", "index", texture, "texCoord", set,
+                                               "extensions", transform_name, look->transform);
 }
 
 static vsh_result set_occlusion(vshi_lit_work *work, json_t *material, const vshi_lit_look *look,
                                 vsh_error *error) {
-    const size_t texture = work->textures[VSH_LIT_OCCLUSION][look->page];
-    return vshi_lit_set(&work->document, material, "occlusionTexture", texture_info(texture, look->set),
-                        error);
+    return vshi_lit_set(&work->document, material, "occlusionTexture",
+                        texture_info(work, VSH_LIT_OCCLUSION, look), error);
 }
 
 static vsh_result set_lightmap(vshi_lit_work *work, json_t *material, const vshi_lit_look *look,
                                vsh_error *error) {
     vshi_lit_document *document = &work->document;
     json_t *extensions;
-    json_t *info = texture_info(work->textures[VSH_LIT_LIGHTMAP][look->page], look->set);
+    json_t *info = texture_info(work, VSH_LIT_LIGHTMAP, look);
     vsh_result result = vshi_lit_object(document, material, "extensions", &extensions, error);
     if (result == VSH_OK) {
         result = vshi_lit_set(document, info, "intensity", json_real(work->intensities[look->page]), error);
@@ -106,8 +116,8 @@ static vsh_result set_preview(vshi_lit_work *work, json_t *material, const vshi_
     }
     VSHI_TRY(vshi_lit_object(document, material, "pbrMetallicRoughness", &base, error));
     VSHI_TRY(vshi_lit_object(document, material, "extensions", &extensions, error));
-    VSHI_TRY(vshi_lit_set(document, base, "baseColorTexture",
-                          texture_info(work->textures[VSH_LIT_PREVIEW][look->page], look->set), error));
+    VSHI_TRY(
+        vshi_lit_set(document, base, "baseColorTexture", texture_info(work, VSH_LIT_PREVIEW, look), error));
     VSHI_TRY(vshi_lit_set(document, extensions, "KHR_materials_unlit", json_object(), error));
     return vshi_lit_use_extension(document, "KHR_materials_unlit", error);
 }
@@ -124,7 +134,7 @@ static vsh_result dress(vshi_lit_work *work, json_t *material, const vshi_lit_lo
             VSHI_TRY(purposes[purpose](work, material, look, error));
         }
     }
-    return VSH_OK;
+    return look->transform != NULL ? vshi_lit_use_extension(&work->document, transform_name, error) : VSH_OK;
 }
 
 /* --- who shows them */

@@ -24,7 +24,7 @@ static vsh_result add(vshi_lit_work *work, const json_t *made, size_t indices, u
         return vshi_lit_no_memory(document, error);
     }
     VSHI_TRY(vshi_lit_set(document, primitive, "indices", json_integer((json_int_t)indices), error));
-    return vshi_lit_mark_primitive(work, primitive, page, set, error);
+    return vshi_lit_mark_primitive(work, primitive, page, set, NULL, error);
 }
 
 /* Triangles of a page, and (on the first) those that have none: corners of them into chosen[]. */

@@ -222,7 +222,7 @@ static vsh_result make(vshi_lit_work *work, vshi_lit_shape *shape, const json_t 
     VSHI_TRY(set_uvs(work, made, uvs, set, error));
     const uint32_t only = vshi_lit_only_page(work, mesh);
     if (!v->split && only != VSH_LIT_NO_CHART) { /* its indices stay, strips too */
-        VSHI_TRY(vshi_lit_mark_primitive(work, made, only, set, error));
+        VSHI_TRY(vshi_lit_mark_primitive(work, made, only, set, NULL, error));
         return json_array_append(list, made) == 0 ? VSH_OK : vshi_lit_no_memory(document, error);
     }
     if (shape->topology.mode != VSHI_LIT_TRIANGLES || shape->topology.draco != NULL) {
@@ -234,16 +234,34 @@ static vsh_result make(vshi_lit_work *work, vshi_lit_shape *shape, const json_t 
                                           &whole, list, error);
 }
 
+/* The transform that led from the file's set to the model's UVs, in new memory; NULL: none, or no memory. */
+static json_t *copy_transform(const vshi_lit_work *work, size_t entry, const json_t *primitive, size_t set) {
+    const vshi_model_shape *shape = &work->model->shapes[work->model->entries[entry].shape];
+    size_t material;
+    if ((shape->packed >> set & 1) == 0 || !vshi_gltf_count(primitive, "material", SIZE_MAX, &material)) {
+        return NULL;
+    }
+    const vshi_gltf_unpacking u = vshi_gltf_find_unpacking(&work->document.gltf, material, set);
+    json_t *transform = u.uvs == VSHI_GLTF_UVS_PACKED ? json_deep_copy(u.told) : NULL;
+    json_object_del(transform, "texCoord"); /* the material that refers to it names the set */
+    return transform;
+}
+
 /* The set is the file's own. */
-static vsh_result make_kept(vshi_lit_work *work, const vsh_lit_mesh *mesh, const char *where, json_t *made,
-                            json_t *list, vsh_error *error) {
+static vsh_result make_kept(vshi_lit_work *work, size_t entry, const char *where, json_t *made, json_t *list,
+                            vsh_error *error) {
+    const vsh_lit_mesh *mesh = &work->meshes[entry];
     char name[40];
     snprintf(name, sizeof name, "TEXCOORD_%d", mesh->uv_set);
     if (mesh->uv_set >= 0 && json_object_get(json_object_get(made, "attributes"), name) == NULL) {
         return vshi_gltf_fail(&work->document.gltf, error, "%s: has no %s to be lit by", where, name);
     }
     if (mesh->uv_set >= 0) {
-        VSHI_TRY(vshi_lit_mark_primitive(work, made, mesh->page, (size_t)mesh->uv_set, error));
+        const size_t set = (size_t)mesh->uv_set;
+        json_t *transform = copy_transform(work, entry, made, set);
+        const vsh_result result = vshi_lit_mark_primitive(work, made, mesh->page, set, transform, error);
+        json_decref(transform);
+        VSHI_TRY(result);
     }
     return json_array_append(list, made) == 0 ? VSH_OK : vshi_lit_no_memory(&work->document, error);
 }
@@ -260,7 +278,7 @@ vsh_result vshi_lit_primitive_make(vshi_lit_work *work, size_t mesh, size_t prim
     json_t *made = json_deep_copy(given);
     vsh_result result = made != NULL ? VSH_OK : vshi_lit_no_memory(&work->document, error);
     if (result == VSH_OK && lit->uvs == NULL) {
-        result = make_kept(work, lit, where, made, list, error);
+        result = make_kept(work, entry, where, made, list, error);
         goto done;
     }
     VSHI_TRY_DONE(result);

@@ -12,7 +12,8 @@ typedef struct vshi_lit_look {
     size_t material; /* SIZE_MAX: none, which is a white one */
     uint32_t page;
     size_t set;
-    size_t made; /* the material that shows it; SIZE_MAX: not yet, or none */
+    json_t *transform; /* of the set's UVs, KHR_texture_transform; NULL: none */
+    size_t made;       /* the material that shows it; SIZE_MAX: not yet, or none */
 } vshi_lit_look;
 
 typedef struct vshi_lit_looks {
@@ -72,13 +73,11 @@ vsh_result vshi_lit_check_images(const vsh_lit_options *options, vsh_error *erro
  * VSH_ERROR_INPUT. */
 vsh_result vshi_lit_materials_check(vshi_lit_work *work, vsh_error *error);
 
-/* Marks a primitive (or a variant of KHR_materials_variants) for a page and a set: its "material" becomes the
- * look's number, negative until vshi_lit_materials_apply(). */
-vsh_result vshi_lit_mark(vshi_lit_work *work, json_t *owner, uint32_t page, size_t set, vsh_error *error);
-
-/* The same of a primitive and all its variants. */
+/* Marks a primitive and its variants for a page and a set: "material" becomes the look's number, negative
+ * until vshi_lit_materials_apply(). `transform` (KHR_texture_transform) leads from the set to the page; NULL:
+ * none. */
 vsh_result vshi_lit_mark_primitive(vshi_lit_work *work, json_t *primitive, uint32_t page, size_t set,
-                                   vsh_error *error);
+                                   json_t *transform, vsh_error *error);
 
 /* Whether holes and glass of a material are in its base colour's texture, so that no preview replaces that.
  */

@@ -142,6 +142,7 @@ done:
     vsh_model_free(gltf.model);
     free(gltf.node_world);
     free(gltf.node_seen);
+    free(gltf.unpackings);
     free(gltf.mesh_shapes);
     vshi_gltf_free_buffers(&gltf);
     json_decref(gltf.root);

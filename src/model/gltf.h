@@ -39,6 +39,7 @@ typedef struct vshi_gltf {
     vsh_model *model;
     size_t shape_capacity;
     size_t *mesh_shapes; /* first shape + 1 of each mesh that has been read as it is; 0: not yet */
+    struct vshi_gltf_unpacking *unpackings; /* [materials][VSH_MAX_UV_SETS]; NULL: no UVs are packed */
     bool *node_seen;
     double (*node_world)[12]; /* of every node of the scene that has been visited */
     size_t node_count;
@@ -176,6 +177,23 @@ vsh_result vshi_gltf_add_scene(vshi_gltf *gltf, vsh_error *error);
 
 /* Reads all materials, and the images of masked ones (gltf_material.c). */
 vsh_result vshi_gltf_read_materials(vshi_gltf *gltf, vsh_error *error);
+
+/* Whether the textures of a material transform the UVs of a set. */
+typedef enum vshi_gltf_uvs {
+    VSHI_GLTF_UVS_PLAIN,  /* no texture is in the set, or none transforms it */
+    VSHI_GLTF_UVS_PACKED, /* all have one transform */
+    VSHI_GLTF_UVS_MIXED   /* their transforms differ */
+} vshi_gltf_uvs;
+
+/* Packers store UVs as integers, and undo that by KHR_texture_transform. */
+typedef struct vshi_gltf_unpacking {
+    vshi_gltf_uvs uvs;
+    bool looked;         /* is to be found */
+    double transform[6]; /* of PACKED: rows (a, b, c), (d, e, f), v down */
+    const json_t *told;  /* the extension that it is from */
+} vshi_gltf_unpacking;
+
+vshi_gltf_unpacking vshi_gltf_find_unpacking(const vshi_gltf *gltf, size_t material, size_t set);
 
 /* The image that a material which is not opaque has its alpha of; SIZE_MAX: none. Errors: VSH_ERROR_INPUT. */
 vsh_result vshi_gltf_mask_image(const vshi_gltf *gltf, const json_t *material, size_t *image,

@@ -21,10 +21,9 @@ static int32_t wrap_of(const json_t *sampler, const char *key) {
     return code == CLAMP ? VSH_WRAP_CLAMP : code == MIRROR ? VSH_WRAP_MIRROR : VSH_WRAP_REPEAT;
 }
 
-/* From UVs with v up to those of the image with v up: offset × rotation × scale, where the rotation goes the
- * way that Blender, Babylon and three.js have it and not that of the extension's own listing (glTF issue
- * 1563). */
-static bool read_transform(const json_t *transform, double to[6]) {
+/* Offset × rotation × scale, of UVs with v down. The rotation goes the way that Blender, Babylon and three.js
+ * have it and not that of the extension's own listing (glTF issue 1563). */
+static bool read_transform(const json_t *transform, double down[6]) {
     double offset[2] = {0.0, 0.0}, scale[2] = {1.0, 1.0}, angle = 0.0;
     const json_t *rotation = json_object_get(transform, "rotation");
     bool good = vshi_gltf_numbers(transform, "offset", 2, offset) &&
@@ -32,13 +31,117 @@ static bool read_transform(const json_t *transform, double to[6]) {
                 (rotation == NULL || json_is_number(rotation));
     angle = rotation != NULL ? json_number_value(rotation) : angle;
     const double c = vshi_cos(angle), s = vshi_sin(angle);
-    const double down[6] = {c * scale[0], s * scale[1], offset[0], -s * scale[0], c * scale[1], offset[1]};
-    const double up[6] = {down[0], -down[1], down[1] + down[2], -down[3], down[4], 1.0 - down[4] - down[5]};
+    const double rows[6] = {c * scale[0], s * scale[1], offset[0], -s * scale[0], c * scale[1], offset[1]};
     for (int i = 0; i < 6; ++i) {
-        good = good && fabs(up[i]) <= FLT_MAX;
-        to[i] = up[i] + 0.0;
+        good = good && fabs(rows[i]) <= FLT_MAX;
+        down[i] = rows[i] + 0.0;
     }
     return good;
+}
+
+/* The same from UVs with v up to those of the image with v up. */
+static bool read_transform_up(const json_t *transform, double up[6]) {
+    double down[6];
+    bool good = read_transform(transform, down);
+    const double rows[6] = {down[0], -down[1], down[1] + down[2], -down[3], down[4], 1.0 - down[4] - down[5]};
+    for (int i = 0; i < 6; ++i) {
+        good = good && fabs(rows[i]) <= FLT_MAX;
+        up[i] = rows[i] + 0.0;
+    }
+    return good;
+}
+
+/* --- UVs that a packer has made integers */
+
+static const double as_they_are[6] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0};
+
+static void add_texture(const json_t *info, size_t wanted, vshi_gltf_unpacking *u, bool *any) {
+    const json_t *told = vshi_gltf_extension(info, "KHR_texture_transform");
+    size_t own, set;
+    double transform[6];
+    if (json_object_get(info, "index") == NULL || !vshi_gltf_count(info, "texCoord", 0, &own) ||
+        !vshi_gltf_count(told, "texCoord", own, &set) || set != wanted) {
+        return;
+    }
+    if (!read_transform(told, transform) ||
+        (*any && memcmp(u->transform, transform, sizeof transform) != 0)) {
+        u->uvs = VSHI_GLTF_UVS_MIXED;
+        return;
+    }
+    if (!*any && memcmp(transform, as_they_are, sizeof transform) != 0) {
+        u->uvs = VSHI_GLTF_UVS_PACKED;
+    }
+    *any = true;
+    u->told = told;
+    memcpy(u->transform, transform, sizeof transform);
+}
+
+/* All textures at or below `value`. */
+static void add_textures(json_t *value, size_t set, vshi_gltf_unpacking *u, bool *any) {
+    size_t i;
+    const char *name;
+    json_t *member;
+    add_texture(value, set, u, any);
+    json_array_foreach(value, i, member) {
+        add_textures(member, set, u, any);
+    }
+    json_object_foreach(value, name, member) {
+        add_textures(member, set, u, any);
+    }
+}
+
+vshi_gltf_unpacking vshi_gltf_find_unpacking(const vshi_gltf *gltf, size_t material, size_t set) {
+    vshi_gltf_unpacking u = {.uvs = VSHI_GLTF_UVS_PLAIN};
+    bool any = false;
+    add_textures(json_array_get(json_object_get(gltf->root, "materials"), material), set, &u, &any);
+    return u;
+}
+
+static bool is_integer(const vshi_gltf *gltf, const json_t *attributes, int set) {
+    char name[32];
+    size_t accessor, type;
+    snprintf(name, sizeof name, "TEXCOORD_%d", set);
+    return vshi_gltf_count(attributes, name, SIZE_MAX, &accessor) && accessor != SIZE_MAX &&
+           vshi_gltf_count(vshi_gltf_element(gltf, "accessors", accessor), "componentType", VSHI_GLTF_FLOAT,
+                           &type) &&
+           type != VSHI_GLTF_FLOAT;
+}
+
+/* Finds what undoes the packing of each set that a primitive has as integers. It holds for all primitives of
+ * that material, so that the material's own mask is looked up by their UVs. */
+static vsh_result note_packed(vshi_gltf *gltf, const json_t *primitive, vsh_error *error) {
+    const size_t count = gltf->model->material_count;
+    size_t material;
+    if (!vshi_gltf_count(primitive, "material", SIZE_MAX, &material) || material >= count) {
+        return VSH_OK;
+    }
+    for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
+        if (!is_integer(gltf, json_object_get(primitive, "attributes"), set)) {
+            continue;
+        }
+        if (gltf->unpackings == NULL) {
+            VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&gltf->unpackings, count,
+                                        sizeof(vshi_gltf_unpacking[VSH_MAX_UV_SETS]), error));
+        }
+        gltf->unpackings[material * VSH_MAX_UV_SETS + (size_t)set].looked = true;
+    }
+    return VSH_OK;
+}
+
+static vsh_result find_packed(vshi_gltf *gltf, vsh_error *error) {
+    size_t m, p;
+    json_t *mesh, *primitive;
+    json_array_foreach(json_object_get(gltf->root, "meshes"), m, mesh) {
+        json_array_foreach(json_object_get(mesh, "primitives"), p, primitive) {
+            VSHI_TRY(note_packed(gltf, primitive, error));
+        }
+    }
+    for (size_t i = 0; gltf->unpackings != NULL && i < gltf->model->material_count * VSH_MAX_UV_SETS; ++i) {
+        if (gltf->unpackings[i].looked) {
+            gltf->unpackings[i] = vshi_gltf_find_unpacking(gltf, i / VSH_MAX_UV_SETS, i % VSH_MAX_UV_SETS);
+        }
+    }
+    return VSH_OK;
 }
 
 /* --- its image */
@@ -135,7 +238,7 @@ static vsh_result read_texture(vshi_gltf *gltf, const json_t *info, const char *
     VSHI_TRY(vshi_gltf_index(gltf, given, "sampler", "samplers", where, &sampler, error));
     if (!vshi_gltf_count(info, "texCoord", 0, &set) ||
         !vshi_gltf_count(transform, "texCoord", set, &own_set) || own_set >= VSH_MAX_UV_SETS ||
-        !read_transform(transform, told->uv_transform)) {
+        !read_transform_up(transform, told->uv_transform)) {
         return vshi_gltf_fail(gltf, error, "%s: the texCoord or transform of its texture is wrong", where);
     }
     told->uv_set = (int32_t)own_set;
@@ -201,7 +304,6 @@ vsh_result vshi_gltf_mask_image(const vshi_gltf *gltf, const json_t *material, s
 }
 
 vsh_result vshi_gltf_read_materials(vshi_gltf *gltf, vsh_error *error) {
-    static const double as_they_are[6] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0};
     const json_t *materials = json_object_get(gltf->root, "materials");
     vsh_model *model = gltf->model;
     const size_t count = json_array_size(materials);
@@ -210,6 +312,7 @@ vsh_result vshi_gltf_read_materials(vshi_gltf *gltf, vsh_error *error) {
     model->material_count = count;
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&model->images, images, sizeof *model->images, error));
     model->image_count = images;
+    VSHI_TRY(find_packed(gltf, error));
     for (size_t i = 0; i < count; ++i) {
         const json_t *given = json_array_get(materials, i);
         vshi_model_material *material = &model->materials[i];
@@ -226,6 +329,11 @@ vsh_result vshi_gltf_read_materials(vshi_gltf *gltf, vsh_error *error) {
         }
         if (material->told.alpha != VSH_ALPHA_OPAQUE) {
             VSHI_TRY(read_mask(gltf, given, where, material, error));
+        }
+        const size_t set = (size_t)material->told.uv_set;
+        if (gltf->unpackings != NULL &&
+            gltf->unpackings[i * VSH_MAX_UV_SETS + set].uvs == VSHI_GLTF_UVS_PACKED) {
+            memcpy(material->told.uv_transform, as_they_are, sizeof as_they_are); /* the UVs have it */
         }
     }
     return VSH_OK;

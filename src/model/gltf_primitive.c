@@ -181,6 +181,17 @@ static vsh_result read_plain(vshi_gltf *gltf, const json_t *primitive, size_t mo
     return shape->triangle_count > 0 ? read_vertices(gltf, primitive, where, shape, error) : VSH_OK;
 }
 
+/* Finds the transform that undoes the packing of a set; NULL: it is not packed. */
+static const vshi_gltf_unpacking *find_unpacking(const vshi_gltf *gltf, const json_t *primitive, int set) {
+    size_t material;
+    if (gltf->unpackings == NULL || !vshi_gltf_count(primitive, "material", SIZE_MAX, &material) ||
+        material >= gltf->model->material_count) {
+        return NULL;
+    }
+    const vshi_gltf_unpacking *u = &gltf->unpackings[material * VSH_MAX_UV_SETS + (size_t)set];
+    return u->uvs != VSHI_GLTF_UVS_PLAIN ? u : NULL;
+}
+
 /* --- shapes that are left in the file */
 
 /* Whether a pose moves anything of a primitive. */
@@ -229,6 +240,7 @@ static vsh_result find_vertices(vshi_gltf *gltf, const json_t *primitive, const 
         VSHI_TRY(find_plain(gltf, attributes, name, 2, VSHI_GLTF_FLOAT, where, &count, &shape->uvs[set],
                             plain, error));
         shape->uv_sets = shape->uvs[set] != NULL ? set + 1 : shape->uv_sets;
+        *plain = *plain && (shape->uvs[set] == NULL || find_unpacking(gltf, primitive, set) == NULL);
     }
     shape->vertex_count = count;
     return VSH_OK;
@@ -268,6 +280,24 @@ static vsh_result leave_raw(vshi_gltf *gltf, const json_t *primitive, const vshi
     return VSH_OK;
 }
 
+/* UVs as a packer found them. */
+static void unpack_uvs(const vshi_gltf *gltf, const json_t *primitive, vshi_model_shape *shape) {
+    for (int set = 0; set < shape->uv_sets; ++set) {
+        const vshi_gltf_unpacking *u = find_unpacking(gltf, primitive, set);
+        float *uvs = shape->uvs[set];
+        if (u == NULL || uvs == NULL) {
+            continue;
+        }
+        shape->packed |= 1U << set;
+        const double *t = u->transform;
+        for (size_t v = 0; v < shape->vertex_count && u->uvs == VSHI_GLTF_UVS_PACKED; ++v) {
+            const double x = (double)uvs[2 * v], y = (double)uvs[2 * v + 1];
+            uvs[2 * v] = (float)(t[0] * x + t[1] * y + t[2]);
+            uvs[2 * v + 1] = (float)(t[3] * x + t[4] * y + t[5]);
+        }
+    }
+}
+
 /* One that is not there is none. */
 static void set_material(const vshi_gltf *gltf, const json_t *primitive, vshi_model_shape *shape) {
     size_t material;
@@ -302,6 +332,7 @@ vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *primitive, co
     if (shape->raw != NULL) {
         return VSH_OK;
     }
+    unpack_uvs(gltf, primitive, shape);
     VSHI_TRY(vshi_gltf_apply_pose(gltf, primitive, pose, where, shape, error));
     return vshi_model_finish(gltf->path, gltf->run, where, shape, error);
 }

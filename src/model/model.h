@@ -25,6 +25,8 @@ typedef struct vshi_model_shape {
     size_t vertex_count;
     size_t triangle_count;
     int32_t uv_sets;  /* highest set + 1 */
+    uint32_t packed;  /* sets, as bits, that textures of the file look up through a transform: a packer's
+                         integers */
     int32_t alpha;    /* VSH_ALPHA_… */
     int32_t material; /* number of it + 1; 0: none */
     char *raw;        /* its arrays lie in the model's file, as they are there: what to call it where

@@ -14,6 +14,7 @@ static void put_shape(vshi_encoder *encoder, const vshi_model_file *file, const 
     vshi_encode_count(encoder, shape->triangle_count);
     vshi_encode_count(encoder, shape->vertex_count);
     vshi_encode_count(encoder, (uint64_t)shape->uv_sets);
+    vshi_encode_count(encoder, shape->packed);
     vshi_encode_count(encoder, (uint64_t)shape->alpha);
     vshi_encode_count(encoder, (uint64_t)shape->material);
     if (shape->triangle_count == 0) {
@@ -111,6 +112,7 @@ static vsh_result take_shape(vshi_decoder *decoder, vshi_raw *raw, vshi_model_sh
     shape->triangle_count = vshi_decode_count(decoder, SIZE_MAX / 64);
     shape->vertex_count = vshi_decode_count(decoder, UINT32_MAX);
     shape->uv_sets = (int32_t)vshi_decode_count(decoder, VSH_MAX_UV_SETS);
+    shape->packed = (uint32_t)vshi_decode_count(decoder, (1U << VSH_MAX_UV_SETS) - 1);
     shape->alpha = (int32_t)vshi_decode_count(decoder, VSH_ALPHA_BLENDED);
     shape->material = (int32_t)vshi_decode_count(decoder, INT32_MAX);
     if (decoder->bad || shape->triangle_count == 0) {
@@ -167,7 +169,7 @@ static vsh_result take_entry(vshi_decoder *decoder, vsh_model *model, size_t ind
 
 static vsh_result take_meshes(vshi_decoder *decoder, vshi_raw *raw, vsh_model *model, const char *path,
                               const vsh_run *run, vsh_error *error) {
-    enum { LEAST_SHAPE = 40, LEAST_ENTRY = 144 }; /* bytes of the message */
+    enum { LEAST_SHAPE = 48, LEAST_ENTRY = 144 }; /* bytes of the message */
     const size_t shapes = vshi_decode_count(decoder, (uint64_t)(decoder->end - decoder->at) / LEAST_SHAPE);
     if (shapes == 0) {
         return vshi_answer_fail(path, "its meshes", error);

@@ -8,6 +8,7 @@
 #include "base/similarity.h"
 #include "base/try.h"
 #include "base/vec.h"
+#include "model/model.h"
 #include "scene/asset_files.h"
 #include "scene/asset_place.h"
 #include "scene/kept_field.h"
@@ -19,6 +20,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <vdbshade/lit.h>
 
 struct vsh_assets {
     vshi_asset_files files;
@@ -163,13 +165,25 @@ static vsh_result check_receivers(vsh_assets *assets, const vsh_scene *scene, co
     return VSH_OK;
 }
 
+/* Whether a lit asset's own UVs are a packer's, which few engines look a lightmap up by. */
+static bool is_packed(const vshi_asset_place *place, const vsh_receiver *receiver) {
+    bool packed = false;
+    for (size_t i = 0; i < place->count; ++i) {
+        const vshi_model_shape *shape = &place->model->shapes[place->model->entries[place->numbers[i]].shape];
+        const int32_t set = receiver->uv_set < 0 ? shape->uv_sets > 1 : receiver->uv_set;
+        packed = packed || (shape->packed >> set & 1) != 0;
+    }
+    return packed && vshi_receiver_unwrap(receiver) == VSH_RECEIVER_UNWRAP_AUTO &&
+           vsh_lit_is_output(receiver->output) != 0;
+}
+
 /* Puts the parts of unwrapped meshes in their places. */
 static vsh_result unwrap(vshi_asset_place *place, const vsh_receiver *receiver, const vsh_run *run,
                          vsh_error *error) {
     int32_t needs = 0;
     vshi_unwrapped *made = &place->unwrapped;
     VSHI_TRY(vsh_receiver_needs_unwrap(receiver, place->meshes, place->count, run, &needs, error));
-    if (needs == 0) {
+    if (needs == 0 && !is_packed(place, receiver)) {
         return vshi_pages_as_they_are(receiver, place->meshes, place->count, made, error);
     }
     VSHI_TRY(vshi_unwrap_receiver(receiver, place->model, place->meshes, place->numbers, place->count, run,

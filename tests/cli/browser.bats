@@ -177,6 +177,22 @@ BAKE=(--sun 1,0.2,1 --sun-angle 20 --ao 1 --size 64 --max-error 0.05 --bent-norm
     [ "$(picture get corner.png 4 10 | cut -d' ' -f2)" -gt 200 ] || fail "nothing is lit"
 }
 
+@test "UVs that a packer made integers are shown as they are baked" {
+    write_packed plain.gltf float ''
+    write_packed packed.gltf short '{"scale":[0.000244140625,0.000244140625]}'
+    local kind x shown=()
+    for kind in plain packed; do
+        "$VDBSHADE" bake $kind.gltf --sun 0.2,1,1 --size 64 --unwrap never --quiet -o $kind.exr
+        shade view $kind.gltf --planes $kind.exr -o $kind.html --quiet
+        done_well
+        look $kind.html "fov=90&camera=0,3,1,0,0,0&ui=0&mode=light&channel=shadow.sun"
+        state_is ready
+        shown+=("$(for x in 70 110 150 190 230 330; do picture get page.png $x 155; done)")
+    done
+    [ "${shown[0]}" = "${shown[1]}" ] || fail "plain: ${shown[0]}; packed: ${shown[1]}"
+    [ "$(sort -u <<<"${shown[0]}" | wc -l)" -ge 2 ] || fail "one colour: ${shown[0]}"
+}
+
 @test "bilinear lookups between texels, and bent normals as (1 + n) / 2" {
     write_corner
     "$VDBSHADE" bake corner.obj "${BAKE[@]}" -o corner.exr

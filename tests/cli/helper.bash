@@ -123,3 +123,35 @@ unless_sanitized() {
 untimed() {
     cut -d, -f1-4,8-20,22 "$1"
 }
+
+# write_packed FILE TYPE TRANSFORM: a floor under a smaller one, whose UVs are integers (or floats) of one layout; TRANSFORM is
+# that of its texture.
+write_packed() {
+    python3 - "$@" <<'PY'
+import base64, json, struct, sys
+path, kind, transform = sys.argv[1], sys.argv[2], sys.argv[3]
+floor = [((-2, 0, 2), (.0, 1.)), ((2, 0, 2), (.75, 1.)), ((2, 0, -2), (.75, .25)), ((-2, 0, -2), (.0, .25))]
+above = [((-1, 1, 1), (.75, .25)), ((0, 1, 1), (1., .25)), ((0, 1, 0), (1., .0)), ((-1, 1, 0), (.75, .0))]
+places = b"".join(struct.pack("<3f", *p) for p, _ in floor + above)
+uvs = b"".join(struct.pack("<2f", *uv) if kind == "float" else struct.pack("<2H", *(int(4096 * c) for c in uv)) for _, uv in floor + above)
+order = struct.pack("<6H", 0, 1, 2, 0, 2, 3)
+body = places + uvs + order
+step = 8 if kind == "float" else 4
+def uv(first):
+    return {"bufferView": 1, "byteOffset": first * step, "componentType": 5126 if kind == "float" else 5123, "count": 4, "type": "VEC2"}
+def place(first):
+    return {"bufferView": 0, "byteOffset": first * 12, "componentType": 5126, "count": 4, "type": "VEC3"}
+info = {"index": 0}
+if transform:
+    info["extensions"] = {"KHR_texture_transform": json.loads(transform)}
+root = {"asset": {"version": "2.0"}, "scenes": [{"nodes": [0, 1]}], "nodes": [{"name": "floor", "mesh": 0}, {"name": "above", "mesh": 1}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 2 * i, "TEXCOORD_0": 2 * i + 1}, "indices": 4, "material": 0}]} for i in (0, 1)],
+        "accessors": [place(0), uv(0), place(4), uv(4), {"bufferView": 2, "componentType": 5123, "count": 6, "type": "SCALAR"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 96}, {"buffer": 0, "byteOffset": 96, "byteLength": len(uvs), "byteStride": step},
+                        {"buffer": 0, "byteOffset": 96 + len(uvs), "byteLength": 12}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": info}}], "textures": [{"source": 0}], "images": [{"uri": "none.png"}],
+        "extensionsUsed": ["KHR_mesh_quantization", "KHR_texture_transform"],
+        "buffers": [{"byteLength": len(body), "uri": "data:;base64," + base64.b64encode(body).decode()}]}
+json.dump(root, open(path, "w"))
+PY
+}

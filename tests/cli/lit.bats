@@ -197,6 +197,49 @@ print(len(data), *(len(root[name]) for name in ("textures", "images", "samplers"
     [ "$(sets made.glb)" = "8: 1 7 " ] || fail "$(sets made.glb)"
 }
 
+# material FILE: what its first material refers to: set and transform of the base colour, AO and light, and its primitives' sets.
+material() {
+    json_of "$1" | python3 -c 'import json, sys
+root = json.load(sys.stdin)
+m = root["materials"][0]
+for info in (m["pbrMetallicRoughness"]["baseColorTexture"], m["occlusionTexture"], m["extensions"]["MOZ_lightmap"]):
+    transform = info.get("extensions", {}).get("KHR_texture_transform", {})
+    print(info.get("texCoord", 0), *transform.get("scale", ()), end="; ")
+print(*sorted(name for name in root["meshes"][0]["primitives"][0]["attributes"] if name[0] == "T"))'
+}
+
+@test "UVs that a packer made integers are baked as its textures see them" {
+    local unpack='{"scale":[0.000244140625,0.000244140625]}' # 1 / 4096
+    write_packed plain.gltf float ''
+    write_packed packed.gltf short "$unpack"
+    for file in plain packed; do
+        shade bake $file.gltf "${BAKE[@]}" --unwrap never -o $file.exr
+        done_well
+    done
+    same_values plain.exr packed.exr || fail "another image: $("$VDBSHADE" compare plain.exr packed.exr)"
+    # an asset has them packed anew, into a set of its own
+    shade bake packed.gltf "${BAKE[@]}" --size 64 -o anew.glb
+    done_well
+    [ "$(material anew.glb)" = "0 0.000244140625 0.000244140625; 1; 1; TEXCOORD_0 TEXCOORD_1" ] || fail "$(material anew.glb)"
+    # or refers to the file's own through the same transform
+    shade bake packed.gltf "${BAKE[@]}" --unwrap never -o own.glb
+    done_well
+    local moved="0 0.000244140625 0.000244140625; "
+    [ "$(material own.glb)" = "$moved$moved${moved}TEXCOORD_0" ] || fail "$(material own.glb)"
+    shade bake own.glb "${BAKE[@]}" --unwrap never -o own.exr
+    done_well
+    same_values plain.exr own.exr || fail "the asset lit by its own UVs: another image"
+    # an OBJ has no transform: the UVs have it
+    shade bake packed.gltf "${BAKE[@]}" --unwrap never -o own.obj
+    done_well
+    grep -q '^vt 0.75 0.75$' own.obj || fail "$(grep '^vt' own.obj)"
+    # a texture that is laid out in another way does not tell what undoes the packing: all is packed anew
+    sed 's/"baseColorTexture"/"metallicRoughnessTexture": {"index": 0}, &/' packed.gltf >mixed.gltf
+    shade bake mixed.gltf "${BAKE[@]}" --size 64 -o mixed.glb
+    done_well
+    [ "$(material mixed.glb)" = "0 0.000244140625 0.000244140625; 1; 1; TEXCOORD_0 TEXCOORD_1" ] || fail "$(material mixed.glb)"
+}
+
 # write_gltf NODES ACCESSOR BUFFER: a triangle, whose parts these are.
 write_gltf() {
     cat >in.gltf <<EOF

@@ -104,6 +104,88 @@ static void transforms_map_uvs_with_v_up(void **state) {
     vsh_model_free(model);
 }
 
+#define MOVED(numbers, more) "\"extensions\":{\"KHR_texture_transform\":{" numbers more "}}"
+#define UNPACK "\"scale\":[0.0001220703125,0.000244140625],\"offset\":[0.25,0.125]" /* 1 / 8192, 1 / 4096 */
+#define BASE(more) "\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0," more "}}"
+#define OCCLUSION(more) ",\"occlusionTexture\":{\"index\":0," more "}"
+
+/* Two triangles of one material, whose UVs are those of accessors. */
+static const char *packed_json(const char *material, int one, int other) {
+    static const float corners[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}},
+                       plain[3][2] = {{0, 0}, {0.5F, 0}, {0, 0.25F}};
+    static const uint16_t integers[3][2] = {{0, 0}, {4096, 0}, {0, 2048}};
+    static char json[4096], text[128];
+    unsigned char body[72];
+    memcpy(body, corners, 36);
+    memcpy(body + 36, integers, 12);
+    memcpy(body + 48, plain, 24);
+    base64(body, sizeof body, text);
+    const int size = snprintf(
+        json, sizeof json,
+        "{\"asset\":{\"version\":\"2.0\"},\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],\"meshes\":[{"
+        "\"primitives\":[{\"attributes\":{\"POSITION\":0,\"TEXCOORD_0\":%d},\"material\":0},"
+        "{\"attributes\":{\"POSITION\":0,\"TEXCOORD_0\":%d},\"material\":0}]}],\"accessors\":["
+        "{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},"
+        "{\"bufferView\":1,\"componentType\":5123,\"count\":3,\"type\":\"VEC2\"},"
+        "{\"bufferView\":1,\"componentType\":5123,\"normalized\":true,\"count\":3,\"type\":\"VEC2\"},"
+        "{\"bufferView\":2,\"componentType\":5126,\"count\":3,\"type\":\"VEC2\"}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36},{\"buffer\":0,\"byteOffset\":36,\"byteLength\":12}"
+        ","
+        "{\"buffer\":0,\"byteOffset\":48,\"byteLength\":24}],"
+        "\"materials\":[{\"alphaMode\":\"MASK\",%s}],\"textures\":[{}],"
+        "\"buffers\":[{\"byteLength\":72,\"uri\":\"data:;base64,%s\"}]}",
+        one, other, material, text);
+    assert_in_range(size, 1, sizeof json - 1);
+    return json;
+}
+
+static void uvs_that_a_packer_made_integers_are_what_textures_see(void **state) {
+    (void)state;
+    enum { INTEGER = 1, NORMALIZED = 2, PLAIN = 3 };
+    static const struct {
+        const char *material;
+        int one, other; /* accessors */
+        double u, v;    /* of corner 1 of the first, v up */
+        double other_u, other_v;
+        bool left; /* the material's transform is still to be applied */
+    } cases[] = {
+        {BASE(MOVED(UNPACK, "")), INTEGER, INTEGER, 0.75, 0.875, 0.75, 0.875, false},
+        {BASE(MOVED(UNPACK, "")) OCCLUSION(MOVED(UNPACK, "")), INTEGER, INTEGER, 0.75, 0.875, 0.75, 0.875,
+         false},
+        {BASE(MOVED("\"scale\":[7.9998779296875,15.999755859375],\"offset\":[0.25,0.125]", "")), NORMALIZED,
+         NORMALIZED, 0.75, 0.875, 0.75, 0.875, false},
+        /* one primitive is packed: the transform counts for all of the material */
+        {BASE(MOVED("\"scale\":[0.5,0.5]", "")), INTEGER, PLAIN, 2048.0, 1.0, 0.25, 1.0, false},
+        /* no packer's: floats */
+        {BASE(MOVED("\"scale\":[0.5,0.5]", "")), PLAIN, PLAIN, 0.5, 1.0, 0.5, 1.0, true},
+        /* textures that differ; one of another set; one that the transform moves to another */
+        {BASE(MOVED(UNPACK, "")) OCCLUSION("\"texCoord\":0"), INTEGER, INTEGER, 4096.0, 1.0, 4096.0, 1.0,
+         true},
+        {BASE(MOVED(UNPACK, "")) OCCLUSION("\"texCoord\":1"), INTEGER, INTEGER, 0.75, 0.875, 0.75, 0.875,
+         false},
+        {BASE("\"texCoord\":1," MOVED(UNPACK, ",\"texCoord\":0")), INTEGER, INTEGER, 0.75, 0.875, 0.75, 0.875,
+         false},
+        {BASE(MOVED(UNPACK, ",\"texCoord\":1")), INTEGER, INTEGER, 4096.0, 1.0, 4096.0, 1.0, true},
+        /* nothing to tell it */
+        {"\"name\":\"plain\"", INTEGER, INTEGER, 4096.0, 1.0, 4096.0, 1.0, false},
+    };
+    for (size_t i = 0; i < 2 * sizeof cases / sizeof cases[0]; ++i) {
+        const size_t c = i / 2;
+        vsh_model *model =
+            read_gltf_by(i % 2 != 0, packed_json(cases[c].material, cases[c].one, cases[c].other));
+        const double expected[2][2] = {{cases[c].u, cases[c].v}, {cases[c].other_u, cases[c].other_v}};
+        for (size_t m = 0; m < 2; ++m) {
+            const float *uv = vsh_model_mesh(model, m, 0).uvs + 2;
+            if (fabs((double)uv[0] - expected[m][0]) > 1e-6 || fabs((double)uv[1] - expected[m][1]) > 1e-6) {
+                fail_msg("case %zu, mesh %zu: (%.9g, %.9g)", c, m, (double)uv[0], (double)uv[1]);
+            }
+        }
+        const vsh_model_material told = vsh_model_get_material(model, 0);
+        assert_int_equal(told.uv_transform[0] != 1.0, cases[c].left);
+        vsh_model_free(model);
+    }
+}
+
 static void images_may_lie_beside_or_in_the_json(void **state) {
     (void)state;
     for (int reader = 0; reader < 2; ++reader) {
@@ -219,6 +301,7 @@ int main(int argc, char **argv) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(masked_materials_come_with_their_image),
         cmocka_unit_test(transforms_map_uvs_with_v_up),
+        cmocka_unit_test(uvs_that_a_packer_made_integers_are_what_textures_see),
         cmocka_unit_test(images_may_lie_beside_or_in_the_json),
         cmocka_unit_test(a_mask_that_cannot_be_had_is_left_out_with_a_warning),
         cmocka_unit_test(what_a_reader_tells_of_materials_is_refused_or_in_range),

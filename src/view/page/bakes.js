@@ -20,20 +20,23 @@
         return page ? [page.width, page.height] : image ? [image.width, image.height] : [ASSUMED, ASSUMED];
     }
 
-    function geometryOf(arrays, uv, material, known) {
-        const key = [uv, material.base && material.base.set, material.ao && material.ao.set,
+    function geometryOf(drawn, known) {
+        const {arrays, material} = drawn;
+        const uvAo = material.ao ? VIEW.movedUvs(arrays, material.ao.set, material.ao.matrix) : null;
+        const key = [drawn.set, material.base && material.base.set, material.ao && material.ao.set,
             material.glow && material.glow.set].join();
         const of = known.get(arrays) || new Map();
         known.set(arrays, of);
-        if (!of.has(key)) {
+        const same = of.get(key);
+        if (!same || same.uvs !== drawn.uvs || same.uvAo !== uvAo) {
             const geometry = new THREE.BufferGeometry();
             const put = (name, array, size) => array && geometry.setAttribute(name, new THREE.BufferAttribute(array, size));
             const uvOf = map => map ? arrays.uvs[map.set] || null : null;
             put('position', arrays.position, 3);
             put('normal', arrays.normal, 3);
-            put('uvLight', uv >= 0 ? arrays.uvs[uv] : null, 2);
+            put('uvLight', drawn.uvs, 2);
             put('uvBase', uvOf(material.base), 2);
-            put('uvAo', uvOf(material.ao), 2);
+            put('uvAo', uvAo, 2);
             put('uvGlow', uvOf(material.glow), 2);
             if (arrays.color) {
                 const {array, size, count} = arrays.color, three = new Float32Array(3 * count);
@@ -42,9 +45,9 @@
             }
             geometry.setIndex(new THREE.BufferAttribute(arrays.indices, 1));
             geometry.computeBoundingSphere();
-            of.set(key, geometry);
+            of.set(key, {geometry, uvs: drawn.uvs, uvAo});
         }
-        return of.get(key);
+        return of.get(key).geometry;
     }
 
     /* Puts meshes into bake.scene. `loaded` is what VIEW.loadScene() gave; bakes of one file share it. */
@@ -55,7 +58,7 @@
         bake.meshes = [];
         for (const drawn of loaded.drawn) {
             const page = bake.pages[Math.min(pageOf(drawn), bake.pages.length - 1)] || null;
-            const size = sizeOf(drawn, page), geometry = geometryOf(drawn.arrays, drawn.set, drawn.material, known);
+            const size = sizeOf(drawn, page), geometry = geometryOf(drawn, known);
             const mesh = new THREE.Mesh(geometry,
                 VIEW.shaderOf(drawn.material, drawn.arrays.color !== null, drawn.set >= 0, size));
             mesh.matrixAutoUpdate = false;

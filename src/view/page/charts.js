@@ -41,7 +41,7 @@
 
     /* {count, colors, chart}: the charts of a drawn thing, numbered from `first`; `chart` is of each vertex. */
     VIEW.chartsOf = function (drawn, first) {
-        const {arrays, set} = drawn, uv = arrays.uvs[set], count = arrays.count, indices = arrays.indices;
+        const {arrays, uvs: uv} = drawn, count = arrays.count, indices = arrays.indices;
         const parent = weld(arrays.position, uv, count);
         const find = i => {
             while (parent[i] !== i) {
@@ -80,7 +80,7 @@
 
     /* Areas in the world and in texels of all that is drawn. */
     VIEW.areasOf = function (drawn, size) {
-        const {arrays, set, matrix} = drawn, uv = arrays.uvs[set], p = [0, 1, 2].map(() => new THREE.Vector3());
+        const {arrays, matrix, uvs: uv} = drawn, p = [0, 1, 2].map(() => new THREE.Vector3());
         let world = 0, texels = 0;
         for (let i = 0; i < arrays.indices.length; i += 3) {
             const [a, b, c] = arrays.indices.subarray(i, i + 3);

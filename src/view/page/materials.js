@@ -5,6 +5,16 @@
     const WRAP = {33071: THREE.ClampToEdgeWrapping, 33648: THREE.MirroredRepeatWrapping, 10497: THREE.RepeatWrapping};
     const FILTER = {9728: THREE.NearestFilter};
 
+    /* {set, matrix} of a texture info: which UVs it is looked up by, and how. */
+    function layoutOf(info) {
+        const transform = (info.extensions || {}).KHR_texture_transform || {};
+        const matrix = new THREE.Matrix3();
+        const [sx, sy] = transform.scale || [1, 1], [x, y] = transform.offset || [0, 0];
+        const c = Math.cos(transform.rotation || 0), s = Math.sin(transform.rotation || 0);
+        matrix.set(sx * c, sy * s, x, -sx * s, sy * c, y, 0, 0, 1);
+        return {set: transform.texCoord !== undefined ? transform.texCoord : info.texCoord || 0, matrix};
+    }
+
     /* {texture, image, index, set, matrix} of a texture info; null where there is none to be had. */
     async function texture(file, info, mipmaps) {
         if (!info || info.index === undefined) {
@@ -26,13 +36,7 @@
         made.wrapS = WRAP[sampler.wrapS] || THREE.RepeatWrapping;
         made.wrapT = WRAP[sampler.wrapT] || THREE.RepeatWrapping;
         made.needsUpdate = true;
-        const transform = (info.extensions || {}).KHR_texture_transform || {};
-        const matrix = new THREE.Matrix3();
-        const [sx, sy] = transform.scale || [1, 1], [x, y] = transform.offset || [0, 0];
-        const c = Math.cos(transform.rotation || 0), s = Math.sin(transform.rotation || 0);
-        matrix.set(sx * c, sy * s, x, -sx * s, sy * c, y, 0, 0, 1);
-        const set = transform.texCoord !== undefined ? transform.texCoord : info.texCoord || 0;
-        return {texture: made, image: bitmap, source: definition.source, set, matrix};
+        return {texture: made, image: bitmap, source: definition.source, ...layoutOf(info)};
     }
 
     VIEW.material = async function (file, index) {
@@ -41,7 +45,10 @@
         const lightmap = extensions.MOZ_lightmap;
         const strength = (extensions.KHR_materials_emissive_strength || {}).emissiveStrength;
         const glossy = extensions.KHR_materials_pbrSpecularGlossiness || {};
+        const infos = [m.occlusionTexture, pbr.baseColorTexture, glossy.diffuseTexture, pbr.metallicRoughnessTexture,
+            m.normalTexture, m.emissiveTexture];
         return {
+            layouts: infos.filter(info => info).map(layoutOf),
             name: m.name || '',
             color: pbr.baseColorFactor || glossy.diffuseFactor || (index !== undefined ? [1, 1, 1, 1] : [0.8, 0.8, 0.8, 1]),
             base: await texture(file, pbr.baseColorTexture || glossy.diffuseTexture, true),

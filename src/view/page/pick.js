@@ -22,7 +22,7 @@
             const corner = k => new THREE.Vector3().fromArray(drawn.arrays.position, 3 * vertices[k]).applyMatrix4(drawn.matrix);
             const weights = new THREE.Vector3();
             new THREE.Triangle(corner(0), corner(1), corner(2)).getBarycoord(hit.point, weights);
-            const uv = drawn.arrays.uvs[drawn.set], w = weights.toArray();
+            const uv = drawn.uvs, w = weights.toArray();
             found.uv = [0, 1].map(axis => vertices.reduce((sum, vertex, k) => sum + w[k] * uv[2 * vertex + axis], 0));
             found.texel = found.uv.map((value, axis) => wrap(value * size[axis], size[axis]));
         }

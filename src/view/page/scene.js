@@ -3,7 +3,7 @@
 'use strict';
 
 (function () {
-    const MOST_DEPTH = 1024, UV_SETS = 8, TRIANGLES = 4, STRIP = 5, FAN = 6;
+    const MOST_DEPTH = 1024, UV_SETS = 8, TRIANGLES = 4, STRIP = 5, FAN = 6, FLOAT = 5126;
 
     function indicesOf(file, primitive, count) {
         const given = primitive.indices !== undefined
@@ -51,15 +51,17 @@
             });
             return {array, size: given.size, count: given.count};
         };
-        const position = moved('POSITION'), uvs = [];
+        const position = moved('POSITION'), uvs = [], integers = [];
         for (let set = 0; set < UV_SETS; ++set) {
             const uv = get('TEXCOORD_' + set);
             uvs.push(uv && uv.count === position.count ? uv.array : null);
+            integers.push(uv !== null && file.json.accessors[attributes['TEXCOORD_' + set]].componentType !== FLOAT);
         }
         const color = get('COLOR_0'), normal = moved('NORMAL');
         return {
             position: position.array, count: position.count,
             normal: normal && normal.count === position.count ? normal.array : null, uvs,
+            integers, moved: new Map(),
             color: color && color.count === position.count ? color : null,
             indices: indicesOf(file, primitive, position.count), joints: get('JOINTS_0'), weights: get('WEIGHTS_0')
         };
@@ -154,6 +156,29 @@
         return has(1) ? 1 : has(0) ? 0 : -1;
     }
 
+    /* UVs as a texture looks them up, of a set that may have a transform. */
+    VIEW.movedUvs = function (arrays, set, matrix) {
+        const key = [set, ...matrix.elements].join(), uvs = arrays.uvs[set];
+        if (!uvs || matrix.equals(new THREE.Matrix3())) {
+            return uvs || null;
+        }
+        if (!arrays.moved.has(key)) {
+            const point = new THREE.Vector2(), moved = new Float32Array(uvs.length);
+            for (let i = 0; i < uvs.length; i += 2) {
+                point.fromArray(uvs, i).applyMatrix3(matrix).toArray(moved, i);
+            }
+            arrays.moved.set(key, moved);
+        }
+        return arrays.moved.get(key);
+    };
+
+    /* UVs of the lightmap: moved by its own transform, or by the one that undoes a packer's integers. */
+    function lightUvs(material, arrays, set) {
+        const maps = arrays.integers[set] ? [material.light, ...material.layouts] : [material.light];
+        const map = maps.find(one => one && one.set === set);
+        return VIEW.movedUvs(arrays, set, map ? map.matrix : new THREE.Matrix3());
+    }
+
     /* A primitive that cannot be had is left out, with a word about it. */
     function tryArrays(file, primitive, weights, name) {
         try {
@@ -193,8 +218,9 @@
                 }
                 const material = materials.get(primitive.material);
                 for (const matrix of placesOf(file, node, world)) {
-                    drawn.push({name, mesh: mesh.name || '', material, arrays, matrix,
-                        set: lightSet(material, arrays, uvSet)});
+                    const set = lightSet(material, arrays, uvSet);
+                    drawn.push({name, mesh: mesh.name || '', material, arrays, matrix, set,
+                        uvs: lightUvs(material, arrays, set)});
                 }
             }
         }
