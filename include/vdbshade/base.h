@@ -101,8 +101,9 @@ typedef struct vsh_attribute {
  * cancel says so at every call from then on. */
 typedef int32_t vsh_progress_fn(void *user, const char *stage, double fraction);
 
-/* Bad things that were worked around: one line each, without a newline ("mesh 'sail': 4 open edges: …"). Same
- * calling rules as vsh_progress_fn. */
+/* A warning: what changes the result, and what the user can do about it. One line without a newline. Where
+ * vsh_run.notes asks for notes, they come here too and begin with "note: ": they say what was decided, and
+ * need no action ("note: mesh 'sail' (1 of 1): 4 open edges: …"). Same calling rules as vsh_progress_fn. */
 typedef void vsh_warning_fn(void *user, const char *message);
 
 /* A progress callback that hands on to another from time to time: for languages whose callbacks take long, or
@@ -169,10 +170,11 @@ typedef struct vsh_run {
                               file is not opened: VSH_ERROR_INPUT */
     uint64_t memory_held;  /* bytes of memory_limit that the caller holds beside what it gives to the call:
                               images read before, say */
+    int32_t notes;         /* 1: `warning` gets notes too */
 } vsh_run;
 
 static inline vsh_run vsh_run_default(void) {
-    vsh_run run = {sizeof(vsh_run), 0, 0, NULL, NULL, NULL, VSH_ISA_BEST, NULL, 0.0, 0, 0, 0};
+    vsh_run run = {sizeof(vsh_run), 0, 0, NULL, NULL, NULL, VSH_ISA_BEST, NULL, 0.0, 0, 0, 0, 0};
     return run;
 }
 

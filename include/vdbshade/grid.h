@@ -29,9 +29,9 @@ static inline vsh_grid_options vsh_grid_options_default(void) {
 }
 
 /* The union of what the meshes are taken for (vsh_mesh.solidity): solids (closed over their holes, with a
- * warning) less the rooms in them; walls of shell_thickness behind faces that look inwards; shells of
- * shell_thickness around sheets, with a warning. Faces that look the other way than those around are warned
- * of. Errors:
+ * note) less the rooms in them; walls of shell_thickness behind faces that look inwards; shells of
+ * shell_thickness around sheets, with a note. Faces that look the other way than those around are noted
+ * too. Errors:
  * - VSH_ERROR_ARGUMENT: no meshes, options out of range, run, and as vsh_mesh_check();
  * - VSH_ERROR_INPUT: as vsh_mesh_check(); no triangle of any area;
  * - VSH_ERROR_LIMIT: the estimated memory passes run->memory_limit or the machine's, a voxel size outside

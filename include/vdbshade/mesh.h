@@ -126,8 +126,8 @@ static inline vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *r
  * - Polygons are cut into triangles that cover them exactly, concave ones too. */
 typedef struct vsh_model vsh_model;
 
-/* Reads a model; the ending of `path` tells its format. Warns of meshes that a transform flattens (left
- * out), normals that are not finite (flat there) and polygons whose edges cross. Free the
+/* Reads a model; the ending of `path` tells its format. Notes meshes that a transform flattens (left
+ * out), and warns of normals that are not finite (flat there) and of polygons whose edges cross. Free the
  * result with vsh_model_free(). Errors:
  * - VSH_ERROR_ARGUMENT: path or model NULL, run;
  * - VSH_ERROR_READ: no such file, no permission, no regular file, empty, cut short, damaged, or a glTF's

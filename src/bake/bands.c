@@ -213,14 +213,13 @@ static void warn(const counting *all, const vsh_run *run, const vsh_uv_report *r
         if (report->overlap_texels > 0) {
             vshi_warn(
                 run,
-                "%s: lightmap UVs overlap: %zu texels of %zu triangles are covered already, %zu of them "
-                "by other objects; the first triangle keeps them",
+                "%s: %zu texels of %zu triangles overlap other charts, %zu of them those of other objects; "
+                "the first triangle keeps its texels",
                 name, report->overlap_texels, report->overlap_triangles, report->other_texels);
         }
         if (report->outside_triangles > 0) {
-            vshi_warn(run,
-                      "%s: lightmap UVs of %zu triangles leave the unit square; what is outside is not baked",
-                      name, report->outside_triangles);
+            vshi_warn(run, "%s: %zu triangles leave the UV square; the parts outside are not baked", name,
+                      report->outside_triangles);
         }
         if (report->degenerate_triangles > 0) {
             vshi_warn(run, "%s: %zu triangles have no area in the lightmap UVs and are not baked", name,

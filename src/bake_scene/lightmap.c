@@ -212,16 +212,15 @@ static void warn_bands(const vshi_lightmap_work *w) {
     if (bands > 1 && vshi_fixes_seams(&w->target->receiver)) {
         vshi_warn(
             w->run,
-            "%s: seams are kept: it is baked in %d bands of rows, and a border's sides may lie in two; raise "
-            "--memory-limit, or bake without --resume",
+            "%s: seams are not fixed, because it is baked in %d bands of rows; raise --memory-limit, or bake "
+            "without --resume",
             receiver->path, bands);
     }
     if (bands > 1 && receiver->padding == VSH_PADDING_AUTO) {
-        vshi_warn(
-            w->run,
-            "%s: padding is of 16 texels, not of all that is empty: it is baked in %d bands of rows; raise "
-            "--memory-limit, or bake without --resume",
-            receiver->path, bands);
+        vshi_warn(w->run,
+                  "%s: padding is limited to 16 texels, because it is baked in %d bands of rows; raise "
+                  "--memory-limit, or bake without --resume",
+                  receiver->path, bands);
     }
 }
 

@@ -85,7 +85,8 @@ static bool has_key(FILE *file, const char *key) {
 }
 
 static void give_up(vshi_resume *r) {
-    vshi_warn(r->run, "%s: could not be written: %s; nothing is kept any more", r->path, strerror(errno));
+    vshi_warn(r->run, "%s: could not be written: %s; the bake goes on, but cannot be resumed", r->path,
+              strerror(errno));
     fclose(r->file);
     r->file = NULL;
     unlink(r->path);
@@ -129,7 +130,8 @@ static vsh_result open_file(vshi_resume *r, vsh_error *error) {
 /* Begins the file anew. */
 static void begin_file(vshi_resume *r, const char *key) {
     if (fseek(r->file, 0, SEEK_END) == 0 && ftell(r->file) > 0) {
-        vshi_warn(r->run, "%s: is of another bake, of other inputs or options; begun anew", r->path);
+        vshi_warn(r->run, "%s: belongs to another bake (other inputs or options); this one begins anew",
+                  r->path);
     }
     rewind(r->file);
     if (ftruncate(fileno(r->file), 0) != 0 || fwrite(key, strlen(key) + 1, 1, r->file) != 1 ||

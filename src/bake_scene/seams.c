@@ -52,7 +52,7 @@ static vsh_result keep_without_memory(const vshi_lightmap_work *w, vsh_result re
     if (result != VSH_ERROR_LIMIT) {
         return vshi_name_file(w->target->receiver.path, result, error);
     }
-    vshi_warn(w->run, "%s: %s: no memory to fix them beside a whole lightmap; raise --memory-limit",
+    vshi_warn(w->run, "%s: %s are not fixed for lack of memory; raise --memory-limit",
               w->target->receiver.path, kept);
     return VSH_OK;
 }
@@ -62,7 +62,7 @@ vsh_result vshi_fill_hidden(const vshi_lightmap_work *w, const vsh_texels *texel
     run.memory_held += casters_bytes(w->job) + own_planes_bytes(w) + w->held;
     const vsh_result result =
         vsh_lightmap_fill_hidden(texels, &w->channels.lightmap, w->job->scene.light_count, &run, NULL, error);
-    return keep_without_memory(w, result, "hidden charts are kept", error);
+    return keep_without_memory(w, result, "hidden charts", error);
 }
 
 /* Of `count` lightmaps in a row. */
@@ -81,7 +81,7 @@ static vsh_result stitch(const vshi_lightmap_work *w, size_t count, vsh_error *e
     const vsh_result result =
         vsh_lightmaps_stitch(pages, count, job->scene.light_count, &options, &run, NULL, error);
     free(pages);
-    return keep_without_memory(w, result, "seams are kept", error);
+    return keep_without_memory(w, result, "seams", error);
 }
 
 vsh_result vshi_stitch_alone(const vshi_lightmap_work *w, vsh_error *error) {
@@ -187,9 +187,10 @@ vsh_result vshi_count_together(vsh_bake_job *job, size_t first, const vsh_run *r
     }
     if (!fit) {
         job->apart = first + (own > 1 ? own : most);
-        vshi_warn(run,
-                  "%s: seams between lightmaps are kept: no memory to hold %zu at once; raise --memory-limit",
-                  job->lightmaps[first].path, own > 1 ? own : most);
+        vshi_warn(
+            run,
+            "%s: seams between lightmaps are not fixed: no memory holds %zu at once; raise --memory-limit",
+            job->lightmaps[first].path, own > 1 ? own : most);
     }
 done:
     free(held);

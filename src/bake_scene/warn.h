@@ -17,7 +17,7 @@ vsh_result vshi_refuse_uvs(const vshi_target *target, const vsh_uv_report *repor
 /* A lightmap without one valid texel is no lightmap: VSH_ERROR_INPUT. */
 vsh_result vshi_refuse_invalid(const vshi_target *target, const vsh_bake_stats *baked, vsh_error *error);
 
-/* Warns of texels that are not valid, and of marches that did not end or widened too far. */
+/* Notes texels that are not valid, and warns of marches that did not end or widened too far. */
 void vshi_warn_baked(const vsh_scene *scene, const vshi_target *target, const vsh_bake_stats *baked,
                      const vsh_run *run);
 

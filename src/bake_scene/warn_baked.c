@@ -34,15 +34,15 @@ static void name_worst(const vshi_target *target, const uint64_t *invalid, char 
     }
 }
 
-static void warn_invalid(const vshi_target *target, const vsh_bake_stats *baked, bool traced,
+static void note_invalid(const vshi_target *target, const vsh_bake_stats *baked, bool traced,
                          const vsh_run *run) {
     char names[512];
+    const char *by = traced ? "" : "voxels decide, and --method exact is sharper; ";
     name_worst(target, baked->invalid_by_mesh, names, sizeof names);
-    vshi_warn(run,
-              "%s: %" PRIu64 " of %" PRIu64 " texels are invalid (inside a solid or behind a wall%s): %s; "
+    vshi_note(run,
+              "%s: %" PRIu64 " of %" PRIu64 " texels are invalid (inside a solid or behind a wall): %s; %s"
               "--invalid FILE.png shows where",
-              target->receiver.path, baked->invalid_texels, baked->texels,
-              traced ? "" : ", as far as voxels tell", names);
+              target->receiver.path, baked->invalid_texels, baked->texels, names, by);
 }
 
 /* Whether values are what cones read, and no rays refine them. */
@@ -57,17 +57,17 @@ void vshi_warn_baked(const vsh_scene *scene, const vshi_target *target, const vs
     const char *path = target->receiver.path;
     const vsh_shade_stats *shade = &baked->shade;
     if (baked->invalid_texels > 0) {
-        warn_invalid(target, baked, vsh_scene_marches(scene, NULL) == 0, run);
+        note_invalid(target, baked, vsh_scene_marches(scene, NULL) == 0, run);
     }
     if (shade->unfinished > 0) {
-        vshi_warn(run, "%s: %" PRIu64 " of %" PRIu64 " marches ran out of %d steps", path, shade->unfinished,
-                  shade->marches, scene->shade.max_steps);
+        vshi_warn(run, "%s: %" PRIu64 " of %" PRIu64 " marches ran out of %d steps; use larger voxels", path,
+                  shade->unfinished, shade->marches, scene->shade.max_steps);
     }
     if (shade->beyond_reach > 0 && cones_decide(scene)) {
         vshi_warn(run,
                   "%s: %" PRIu64 " of %" PRIu64
-                  " cones grew wider than the field reaches: far shadows may be too "
-                  "dark there; rays decide with --method exact (or adaptive) and --ao-method exact",
+                  " cones grew wider than the field reaches, so far shadows may be too "
+                  "dark; --method exact and --ao-method exact use rays",
                   path, shade->beyond_reach, shade->marches);
     }
 }
@@ -87,7 +87,7 @@ void vshi_warn_clipping(const char *output, const vsh_image_clipping *cut, const
     if (cut->clipped > 0) {
         vshi_warn(
             run,
-            "%s: %.3g %% of the texels are brighter than 1, up to %.3g, and cut to 1: write .exr, or floats "
+            "%s: %.3g %% of the texels are brighter than 1, up to %.3g, and cut to 1; write .exr, or floats "
             "(--bits 32) where the format has them, or dim the lights",
             output, 100.0 * (double)cut->clipped / (double)cut->texels, (double)cut->largest);
     }

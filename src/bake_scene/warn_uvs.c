@@ -18,20 +18,26 @@ static const char *object_of(const vsh_mesh *mesh) {
 static void warn_mesh(const char *path, const vsh_mesh *mesh, const vsh_uv_report *uv, const vsh_run *run) {
     const char *name = name_of(mesh);
     if (uv->overlap_texels > uv->other_texels) {
-        vshi_warn(run, "%s: mesh '%s': %zu texels of %zu triangles lie over other charts of the same object",
+        vshi_warn(run,
+                  "%s: mesh '%s': %zu texels of %zu triangles lie over other charts of the same object; "
+                  "unwrap it anew",
                   path, name, uv->overlap_texels - uv->other_texels, uv->overlap_triangles);
     }
     if (uv->other_texels > 0) {
-        vshi_warn(run, "%s: mesh '%s': %zu texels lie over charts of other objects", path, name,
-                  uv->other_texels);
+        vshi_warn(run,
+                  "%s: mesh '%s': %zu texels lie over charts of other objects; use --per-object or one atlas",
+                  path, name, uv->other_texels);
     }
     if (uv->outside_triangles > 0) {
-        vshi_warn(run, "%s: mesh '%s': %zu triangles leave the UV square; what lies outside is not baked",
+        vshi_warn(run,
+                  "%s: mesh '%s': %zu triangles leave the UV square; the parts outside are not baked; "
+                  "--uv-set N chooses another set",
                   path, name, uv->outside_triangles);
     }
     if (uv->degenerate_triangles > 0) {
-        vshi_warn(run, "%s: mesh '%s': %zu triangles have no area in the UV set", path, name,
-                  uv->degenerate_triangles);
+        vshi_warn(run,
+                  "%s: mesh '%s': %zu triangles have no area in the UV set and are not baked; unwrap them",
+                  path, name, uv->degenerate_triangles);
     }
 }
 

@@ -70,9 +70,9 @@ int32_t vshi_job_threads(const vshi_job *job) {
     const int32_t wanted = job->run.threads;
     const int32_t given = vshi_parallel_threads(wanted);
     static atomic_flag told = ATOMIC_FLAG_INIT; /* once a process, whose threads they are */
-    if (given != wanted && job->run.warning != NULL && !atomic_flag_test_and_set(&told)) {
+    if (given != wanted && vshi_wants_notes(&job->run) && !atomic_flag_test_and_set(&told)) {
         const char *than = wanted > 0 ? "asked for" : "there are cores";
-        vshi_warn(&job->run,
+        vshi_note(&job->run,
                   "the system gives this process fewer threads than %s (%d at a time): slower, with the same "
                   "result",
                   than, given);
@@ -121,15 +121,32 @@ vsh_result vshi_run_resolve(const vsh_run *run, vsh_run *full, vsh_error *error)
     return vshi_isa_check(full->isa, error);
 }
 
-void vshi_warn(const vsh_run *run, const char *format, ...) {
-    if (run == NULL || run->warning == NULL) {
-        return;
-    }
+static void send_line(const vsh_run *run, const char *prefix, const char *format, va_list arguments) {
     vsh_error line;
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(line.message, sizeof line.message, format, arguments);
-    va_end(arguments);
+    const int used = snprintf(line.message, sizeof line.message, "%s", prefix);
+    vsnprintf(line.message + used, sizeof line.message - (size_t)used, format, arguments);
     vshi_one_line(line.message);
     run->warning(run->user, line.message);
+}
+
+void vshi_warn(const vsh_run *run, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    if (run != NULL && run->warning != NULL) {
+        send_line(run, "", format, arguments);
+    }
+    va_end(arguments);
+}
+
+bool vshi_wants_notes(const vsh_run *run) {
+    return run != NULL && run->warning != NULL && run->notes != 0;
+}
+
+void vshi_note(const vsh_run *run, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    if (vshi_wants_notes(run)) {
+        send_line(run, VSHI_NOTE, format, arguments);
+    }
+    va_end(arguments);
 }

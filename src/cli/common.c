@@ -49,6 +49,7 @@ vsh_run cli_common_run(const cli_common *common) {
     run.allow_outside = common->allow_outside;
     run.progress = cli_progress_report;
     run.warning = cli_warnings_parse;
+    run.notes = common->verbose;
     cli_warnings_begin(common->verbose, common->quiet);
     return run;
 }

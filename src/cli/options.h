@@ -95,7 +95,7 @@ typedef struct cli_common {
     int32_t threads;
     uint64_t memory_limit;
     bool quiet;
-    bool verbose; /* every warning by itself */
+    bool verbose; /* every warning by itself, and notes */
     bool progress;
     int32_t isa;        /* of commands that shade */
     bool trusted;       /* files are parsed in this process */
@@ -151,7 +151,7 @@ enum {
          "threads, 1 to 1024 (all cores); the result is\nthe same for any number"},                          \
         CLI_MEMORY_OPTION, CLI_READER_OPTIONS,                                                               \
         {CLI_KEY_PROGRESS, "progress", NULL, "show progress even where it is no terminal"},                  \
-        {CLI_KEY_VERBOSE, "verbose", NULL, "every warning, and not one line for all of a kind"},             \
+        {CLI_KEY_VERBOSE, "verbose", NULL, "every warning by itself, and notes"},                            \
         {CLI_KEY_QUIET, "quiet", NULL, "say nothing but errors"}, {                                          \
         'h', "help", NULL, "show this help"                                                                  \
     }

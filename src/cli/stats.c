@@ -115,16 +115,16 @@ static void say_help(const cli_stats *stats, const vsh_scene *scene, int kind, c
     const vsh_bake_error known = cli_stats_error(stats, kind);
     const bool by_rays = sqrt(known.square_error / known.values) > stats->max_error;
     if (by_rays && scene->shade.rays > 0) {
-        snprintf(text, size, "%d rays are too few; leave the limit off", scene->shade.rays);
+        snprintf(text, size, "%d rays are too few; raise --rays, or leave it off", scene->shade.rays);
     } else if (by_rays) {
-        snprintf(text, size, "no more rays are taken by the sampler '%s'",
+        snprintf(text, size, "the sampler '%s' has no more rays; use --sampler sobol",
                  vsh_sampler_name(scene->shade.sampler));
     } else if (stats->methods[kind].traces) {
-        snprintf(text, size, "what is interpolated between rays is off by it; --max-error %.1g keeps it",
+        snprintf(text, size, "values between rays are interpolated; --max-error %.1g keeps it",
                  0.5 * stats->max_error);
     } else {
         const bool can = vsh_scene_traceable(scene, NULL) && vsh_triangles_available();
-        snprintf(text, size, "%.3g of it is that of voxels of %.3g: %s%ssmaller ones leave less",
+        snprintf(text, size, "%.3g of it comes from voxels of %.3g; %s%ssmaller ones leave less",
                  vsh_bake_error_field(&known), stats->casters.voxel_size, can ? kinds[kind].option : "",
                  can ? " exact has none, " : "");
     }
@@ -139,7 +139,7 @@ void cli_stats_warn(const cli_stats *stats, const vsh_scene *scene, const vsh_ru
         }
         char line[512], help[256];
         say_help(stats, scene, kind, help, sizeof help);
-        snprintf(line, sizeof line, "%s: an error of %.3g is left, where %g was asked for: %s",
+        snprintf(line, sizeof line, "%s: the estimated error is %.3g, above the limit of %g: %s",
                  kinds[kind].said, error, stats->max_error, help);
         run->warning(run->user, line);
     }

@@ -171,8 +171,8 @@ void cli_warnings_parse(void *user, const char *message) {
         }
     }
     pthread_mutex_unlock(&state.lock);
-    if (of == NULL) {
-        cli_say("warning: %s", message);
+    if (of == NULL) { /* notes name themselves */
+        cli_say("%s%s", strncmp(message, "note: ", 6) == 0 ? "" : "warning: ", message);
     }
 }
 

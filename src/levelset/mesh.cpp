@@ -257,7 +257,7 @@ vsh_result from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_option
     check_work(meshes.triangles, lattice.half_width, error);
     foretell(meshes, lattice, run, error);
     Stage stage(run, "voxelize", error);
-    vshi_mesh_set_warn(&meshes.set, lattice.shell, lattice.voxel, &run);
+    vshi_mesh_set_note(&meshes.set, lattice.shell, lattice.voxel, &run);
 
     const double reach = 2.0 * (lattice.half_width + lattice.shell) + 2.0;
     const Parts parts = sort_parts(meshes.set.solidity, lattice, reach);

@@ -63,7 +63,7 @@ static vsh_result bring(vshi_lit_work *work, json_t *image, const char *uri, vsh
     if (result == VSH_ERROR_LIMIT || result == VSH_ERROR_MEMORY) {
         result = vshi_fail(error, result, "%s", why.message);
     } else if (type == NULL) {
-        vshi_warn(document->gltf.run, "%s: image '%s' stays named as it is, which '%s' will not find: %s",
+        vshi_warn(document->gltf.run, "%s: image '%s' keeps its path, where '%s' will not find it: %s",
                   document->gltf.path, uri, work->output,
                   result == VSH_OK ? "it is of no type that is known" : why.message);
         result = VSH_OK;

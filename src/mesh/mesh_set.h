@@ -44,9 +44,9 @@ VSHI_SHARED void vshi_mesh_set_free(vshi_mesh_set *set);
  * is a small part of a second for a million triangles. Errors: as vshi_solidity_create(). */
 VSHI_SHARED vsh_result vshi_mesh_set_solve(vshi_mesh_set *set, const vsh_run *run, vsh_error *error);
 
-/* Warns, once it is solved, of objects that are taken for something else than they look: sheets, which become
- * shells of so many voxels of this size (shell 0: there are no voxels), solids with holes, flipped faces. */
-VSHI_SHARED void vshi_mesh_set_warn(const vshi_mesh_set *set, double shell, double voxel, const vsh_run *run);
+/* Sends notes on the sheets, the solids with holes and the flipped faces of a solved set. Sheets become shells
+ * of `shell` voxels of size `voxel`. Where there are no voxels, `shell` is 0. */
+VSHI_SHARED void vshi_mesh_set_note(const vshi_mesh_set *set, double shell, double voxel, const vsh_run *run);
 
 #ifdef __cplusplus
 }

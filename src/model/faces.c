@@ -84,8 +84,8 @@ void vshi_face_cutter_end(vshi_face_cutter *cutter, const vsh_run *run, const ch
     free(cutter->own_corners);
     if (cutter->crossing > 0) {
         vshi_warn(run,
-                  "%s: mesh '%s': edges of %zu polygons cross each other: which triangles they mean cannot "
-                  "be told",
+                  "%s: mesh '%s': edges of %zu polygons cross, so their triangles are guessed; triangulate "
+                  "before the export",
                   path, name, cutter->crossing);
     }
 }

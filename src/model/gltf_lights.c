@@ -96,14 +96,15 @@ static vsh_result add_light(vshi_gltf *gltf, size_t node, size_t index, const js
     snprintf(where, sizeof where, "lights[%zu] of %s", index, extension);
     vsh_model_light light = {.type = type_of(json_string_value(json_object_get(given, "type")))};
     if (light.type < 0) {
-        vshi_warn(gltf->run, "%s: %s is neither directional nor a point nor a spot: left out", gltf->path,
+        vshi_warn(gltf->run, "%s: %s is left out: its type is not directional, point or spot", gltf->path,
                   where);
         return VSH_OK;
     }
     VSHI_TRY(read_values(gltf, given, where, &light, error));
     if (!place(gltf->node_world[node], &light)) {
-        vshi_warn(gltf->run, "%s: nodes[%zu], which carries a light, points nowhere: left out", gltf->path,
-                  node);
+        vshi_warn(gltf->run,
+                  "%s: the light of nodes[%zu] is left out: its transform gives it no direction or place",
+                  gltf->path, node);
         return VSH_OK;
     }
     const char *name = json_string_value(json_object_get(vshi_gltf_element(gltf, "nodes", node), "name"));

@@ -282,7 +282,7 @@ static vsh_result read_mask(vshi_gltf *gltf, const json_t *given, const char *wh
     const vsh_result result =
         read_texture(gltf, json_object_get(surface, "baseColorTexture"), where, material, &why);
     if (result == VSH_ERROR_INPUT || result == VSH_ERROR_READ || result == VSH_ERROR_UNSUPPORTED) {
-        vshi_warn(gltf->run, "%s; its mask is not read", why.message);
+        vshi_warn(gltf->run, "%s; its mask is ignored", why.message);
         return VSH_OK;
     }
     return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "%s", why.message);

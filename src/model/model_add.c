@@ -94,7 +94,7 @@ vsh_result vshi_model_add(vsh_model *model, const char *path, const vsh_run *run
         return VSH_OK;
     }
     /* A scale of zero is how scenes hide things. */
-    vshi_warn(run, "%s: %s; left out", path, why.message);
+    vshi_note(run, "%s: %s; left out", path, why.message);
     free(model->entries[last].object_name);
     free(model->entries[last].name);
     --model->entry_count;

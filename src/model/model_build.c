@@ -117,7 +117,7 @@ static vsh_result copy_shape(const vshi_model_source *source, const struct aiMes
     if (shape->normals != NULL) {
         const size_t bad = copy_normals(shape->normals, mesh->mNormals, count);
         if (bad > 0) {
-            vshi_warn(source->run, "%s: mesh '%s': %zu normals are not finite: flat there", what,
+            vshi_warn(source->run, "%s: mesh '%s': %zu normals are not finite; those faces are flat", what,
                       mesh->mName.data, bad);
         }
     }

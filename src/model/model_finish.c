@@ -150,7 +150,7 @@ static void check_normals(const char *path, const vsh_run *run, const char *wher
             ++bad;
         }
     }
-    vshi_warn(run, "%s: %s: %zu normals are not finite: flat there", path, where, bad);
+    vshi_warn(run, "%s: %s: %zu normals are not finite; those faces are flat", path, where, bad);
 }
 
 vsh_result vshi_model_finish(const char *path, const vsh_run *run, const char *where, vshi_model_shape *shape,

@@ -49,7 +49,7 @@ static vsh_result take_map(vshi_obj *obj, const vshi_stream *stream, size_t line
         vshi_warn(
             obj->run,
             "%s: line %zu: 'map_d' has the option '%s', which is unknown or lacks its value; its mask is "
-            "not read",
+            "ignored",
             stream->path, line, option);
         return VSH_OK;
     }
@@ -57,8 +57,8 @@ static vsh_result take_map(vshi_obj *obj, const vshi_stream *stream, size_t line
         return VSH_OK;
     }
     if (!taken) {
-        vshi_warn(obj->run, "%s: line %zu: 'map_d' is read without its option '%s'", stream->path, line,
-                  option);
+        vshi_warn(obj->run, "%s: line %zu: 'map_d' is read without its option '%s'; apply it to the image",
+                  stream->path, line, option);
     }
     char *path = vshi_mtl_map_path(stream->path, map.name);
     if (path == NULL) {
@@ -66,13 +66,12 @@ static vsh_result take_map(vshi_obj *obj, const vshi_stream *stream, size_t line
     }
     vsh_result result = VSH_OK;
     if (strlen(path) > LONGEST || memchr(map.name.text, '\0', map.name.size) != NULL) {
-        vshi_warn(obj->run, "%s: line %zu: 'map_d' names no file; its mask is not read", stream->path, line);
+        vshi_warn(obj->run, "%s: line %zu: 'map_d' names no file; its mask is ignored", stream->path, line);
     } else if (obj->run->allow_outside == 0 && !vshi_input_is_beside(obj->path, path)) {
-        vshi_warn(
-            obj->run,
-            "%s: line %zu: 'map_d' names '%.400s', outside of its folder; --allow-outside reads it; its "
-            "mask is not read",
-            stream->path, line, path);
+        vshi_warn(obj->run,
+                  "%s: line %zu: 'map_d' names '%.400s' outside of the model's folder; its mask is ignored; "
+                  "--allow-outside reads it",
+                  stream->path, line, path);
     } else {
         result =
             vshi_words_number(&obj->images, &obj->budget, path, strlen(path), &alpha->image, &is_new, error);

@@ -212,7 +212,7 @@ static vsh_result check_vertices(const vshi_ply_reader *r, vsh_error *error) {
         }
     }
     if (bad > 0) {
-        vshi_warn(r->run, "%s: mesh '': %zu normals are not finite: flat there", r->path, bad);
+        vshi_warn(r->run, "%s: mesh '': %zu normals are not finite; those faces are flat", r->path, bad);
     }
     return VSH_OK;
 }

@@ -270,7 +270,8 @@ static vsh_result map_answer(const vshi_exchange *exchange, int file, vshi_answe
 static void pass_warnings(const vshi_exchange *exchange, vshi_decoder warnings, uint64_t count) {
     for (uint64_t i = 0; i < count && i < MAX_WARNINGS; ++i) {
         const char *text = vshi_decode_text(&warnings, false);
-        if (text != NULL) {
+        const bool note = text != NULL && strncmp(text, VSHI_NOTE, strlen(VSHI_NOTE)) == 0;
+        if (text != NULL && (!note || vshi_wants_notes(exchange->run))) {
             vshi_warn(exchange->run, "%s", text);
         }
     }
@@ -283,7 +284,7 @@ static void warn_of_missing(const vshi_exchange *exchange, uint64_t confined) {
     const uint64_t expected = VSH_CONFINED_LIMITS | VSH_CONFINED_CALLS;
     if ((confined & expected) != expected && !VSHI_SANITIZED) {
         vshi_warn(exchange->run,
-                  "the process that files are read in is confined in part only: this system refuses it %s",
+                  "the process that reads files is confined in part only: this system refuses it %s",
                   vshi_missing_text(confined, missing));
     }
 }

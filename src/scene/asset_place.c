@@ -116,11 +116,11 @@ static vsh_result leave_out_blended(const vsh_scene *scene, vshi_masks *masks, c
     if (blended > 0) {
         vshi_warn(run,
                   "%s: %zu of %zu meshes have blended materials (glass, smoke) and cast no shadow; "
-                  "--cast-blended has them cast",
+                  "--cast-blended makes them cast",
                   path, blended, count);
     }
     if (cut_out > 0) {
-        vshi_warn(
+        vshi_note(
             run,
             "%s: %zu of %zu meshes have blended materials that their textures cut out (leaves, fences): "
             "they cast where alpha is at least half; --no-cast NAME leaves them out",

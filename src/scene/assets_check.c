@@ -20,7 +20,7 @@ static vsh_result check_file(const char *path, const vsh_mesh *meshes, size_t co
     for (size_t i = 0; i < count; ++i) {
         const size_t skipped = meshes[i].checked->report.degenerate_triangles;
         if (skipped > 0) {
-            vshi_warn(run, "%s: mesh '%s': %zu triangles of zero area are skipped", path,
+            vshi_note(run, "%s: mesh '%s': %zu triangles of zero area are skipped", path,
                       meshes[i].name != NULL ? meshes[i].name : "", skipped);
         }
     }

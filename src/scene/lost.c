@@ -20,8 +20,8 @@ static void warn(const vsh_caster *caster, const vsh_mesh *mesh, const vsh_lost 
         snprintf(help, sizeof help, "voxels of %.2g hold most of it", HELD * lost->thickness);
     }
     vshi_warn(run,
-              "%s: mesh '%s': %s of its area is lost, thinner than 1.25 voxels of %.3g: nothing is cast "
-              "there; %s, and --method exact needs none",
+              "%s: mesh '%s': %s of its area is thinner than 1.25 voxels of %.3g and casts nothing; "
+              "%s, and --method exact needs none",
               caster->path, mesh->name != NULL ? mesh->name : "", share, voxel_size, help);
 }
 
@@ -70,7 +70,7 @@ static void warn_one_sided(const vsh_caster *caster, const vsh_mesh *meshes, siz
     }
     if (one_sided > 0) {
         vshi_warn(run,
-                  "%s: %zu of %zu meshes are one-sided, and voxels cast to both sides: --method exact and "
+                  "%s: %zu of %zu meshes are one-sided, but voxels cast to both sides; --method exact and "
                   "--ao-method exact let light through their backs",
                   caster->path, one_sided, count);
     }

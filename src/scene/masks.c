@@ -289,8 +289,9 @@ static vsh_result look_at_vertices(vshi_masks *masks, size_t mesh, const vsh_run
         s->mask.base_alpha *= s->vertices.factor;
     } else if (m->state == BY_MASK && !s->vertices.uniform) {
         const vsh_mesh view = vsh_model_mesh(masks->model, mesh, -1);
-        vshi_warn(run, "%s: %s: alpha of vertices that differ is not taken beside a texture's", masks->path,
-                  vshi_mesh_label(&view, mesh).text);
+        vshi_warn(run,
+                  "%s: %s: the alpha of its vertices is ignored beside a texture's; put it into the texture",
+                  masks->path, vshi_mesh_label(&view, mesh).text);
     }
     return VSH_OK;
 }
@@ -396,8 +397,9 @@ vsh_result vshi_masks_cast(vshi_masks *masks, size_t index, const vsh_run *run, 
     vsh_mesh textured = vsh_model_mesh(masks->model, index, told.uv_set);
     textured.uvs = m->state == BY_MASK ? textured.uvs : sorted->vertices.uvs;
     if (textured.uvs == NULL && !sorted->known) {
-        vshi_warn(run, "%s: %s: no UV set %d for the texture of its material: it casts whole", masks->path,
-                  vshi_mesh_label(&mesh, index).text, told.uv_set);
+        vshi_warn(run,
+                  "%s: %s: no UV set %d for the texture of its material, so it casts whole; export its UVs",
+                  masks->path, vshi_mesh_label(&mesh, index).text, told.uv_set);
         sorted->known = true;
         sorted->opaque_count = mesh.triangle_count;
     }

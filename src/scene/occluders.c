@@ -138,7 +138,7 @@ static vsh_result make_field(making *m, const vsh_scene_layer *layer, const vsh_
     if (resolution == 0 && triangles != NULL) {
         VSHI_TRY(vshi_occluders_unknown(triangles, 0.0, field, error));
         return *field == NULL ? VSH_OK
-                              : vshi_scene_warn_solidity(m->scene, m->assets, layer, &m->voxel, error);
+                              : vshi_scene_note_solidity(m->scene, m->assets, layer, &m->voxel, error);
     }
     vsh_grid_info voxels;
     if (m->scene->field != NULL && !given) {
@@ -278,8 +278,9 @@ static vsh_result make(making *m, vsh_error *error) {
     const double start = vshi_seconds();
     VSHI_TRY(make_triangles(m, NULL, &m->own.triangles, error));
     if (m->options.triangles != 0 && misses_embree(m->scene)) {
-        vshi_warn(&m->run, "this build has no Embree to trace triangles with: adaptive takes the place of "
-                           "exact, and its error is that of the voxels");
+        vshi_warn(&m->run,
+                  "this build has no Embree, so adaptive replaces exact, with the error of its voxels; "
+                  "use finer voxels, or a build with Embree");
     }
     VSHI_TRY(make_truth(m, error));
     m->own.triangles_s = vshi_seconds() - start;

@@ -12,9 +12,9 @@ vsh_result vshi_scene_warn_lost(const vsh_scene *scene, const vsh_assets *assets
                                 const vsh_scene_layer *layer, const vsh_field *field, const vsh_run *run,
                                 vsh_error *error);
 
-/* Warns of what the meshes of a layer's casters, or (NULL) of those in none, are taken for without voxels.
- * Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_scene_warn_solidity(const vsh_scene *scene, const vsh_assets *assets,
+/* Sends notes on the solids and sheets of a layer's casters that have no voxels. NULL: of the casters in no
+ * layer. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_scene_note_solidity(const vsh_scene *scene, const vsh_assets *assets,
                                     const vsh_scene_layer *layer, const vsh_run *run, vsh_error *error);
 
 /* Whether a bake's values are to be held against the casters themselves: not where no method keeps an error,

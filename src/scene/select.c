@@ -276,7 +276,8 @@ vsh_result vshi_select_uvs(const vsh_model *model, const vsh_receiver *receiver,
             return fail_without_uvs(receiver, label.text, sets, error);
         }
         chosen[i] = 0;
-        vshi_warn(run, "%s: %s: no UVs to bake into: it casts only", receiver->path, label.text);
+        vshi_warn(run, "%s: %s: no UVs to bake into, so it casts only; unwrap it, or use --unwrap auto",
+                  receiver->path, label.text);
     }
     return VSH_OK;
 }

@@ -93,7 +93,7 @@ static void warn_of_large(const vsh_tiles *tiles, double size, const vsh_run *ru
     }
     if (count > 0) {
         const char *output = tiles->whole->receivers[largest].output;
-        vshi_warn(
+        vshi_note(
             run,
             "%zu of %zu receivers are larger than two tiles of %g ('%s' is the largest, with %g units): "
             "what casts on such a one is loaded all at once; give its pieces lightmaps of their own",

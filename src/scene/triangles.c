@@ -1,4 +1,5 @@
 /* The triangles of a scene's casters. */
+#include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
 #include "mesh/mesh_set.h"
@@ -106,9 +107,9 @@ vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets,
     return result;
 }
 
-vsh_result vshi_scene_warn_solidity(const vsh_scene *scene, const vsh_assets *assets,
+vsh_result vshi_scene_note_solidity(const vsh_scene *scene, const vsh_assets *assets,
                                     const vsh_scene_layer *layer, const vsh_run *run, vsh_error *error) {
-    if (run->warning == NULL) {
+    if (!vshi_wants_notes(run)) {
         return VSH_OK;
     }
     vshi_mesh_set set = {.count = 0};
@@ -118,7 +119,7 @@ vsh_result vshi_scene_warn_solidity(const vsh_scene *scene, const vsh_assets *as
     VSHI_TRY_DONE(list_meshes(scene, assets, layer, &meshes, &count, error));
     VSHI_TRY_DONE(vshi_mesh_set_create(meshes, count, &set, error));
     VSHI_TRY_DONE(vshi_mesh_set_solve(&set, run, error));
-    vshi_mesh_set_warn(&set, 0.0, 0.0, run);
+    vshi_mesh_set_note(&set, 0.0, 0.0, run);
 done:
     vshi_mesh_set_free(&set);
     free(meshes);

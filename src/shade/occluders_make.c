@@ -94,7 +94,7 @@ vsh_result vsh_occluders_create(const vsh_mesh *meshes, size_t mesh_count,
     }
     if (own.field == NULL) {
         VSHI_TRY_DONE(vshi_occluders_unknown(own.triangles, 0.0, &own.field, error));
-        vshi_mesh_set_warn(&set, 0.0, 0.0, &resolved);
+        vshi_mesh_set_note(&set, 0.0, 0.0, &resolved);
     }
     vsh_occluder_parts parts = vsh_occluder_parts_default();
     parts.field = own.field;

@@ -73,7 +73,9 @@ static vsh_result put_named(vshi_view *view, vshi_job *job, const char *model, c
     vsh_error why;
     vsh_result result = VSH_OK;
     if (!view->run->allow_outside && !vshi_input_is_beside(model, path)) {
-        vshi_warn(view->run, "%s: '%s' is outside of its folder, and not in the page", model, uri);
+        vshi_warn(view->run,
+                  "%s: '%s' is outside of its folder and not in the page; --allow-outside reads it", model,
+                  uri);
     } else if (vshi_input_open(path, path, VSH_MAX_VIEW_MODEL, &file, &size, &why) != VSH_OK) {
         vshi_warn(view->run, "%s: is not in the page: %s", model, why.message);
     } else {

@@ -47,7 +47,7 @@ solid() {
 
 @test "a million triangles without area are counted and change nothing" {
     { cat box.obj && yes 'f 1/1 1/1 2/2' | head -n 1000000; } >many.obj
-    bake many.obj
+    bake many.obj --verbose
     done_well
     [[ $stderr == *"1000000 triangles of zero area"* ]] || fail "they are not counted"
     shade bake box.obj -o whole.exr "${SMALL[@]}"
@@ -59,7 +59,7 @@ solid() {
 
 @test "faces that are missing, turned inward or given twice" {
     sed '$d' box.obj | sed '$d' >open.obj
-    bake open.obj
+    bake open.obj --verbose
     done_well
     [[ $stderr == *"4 open edges"* ]] || fail "says nothing of the missing face"
     solid box.obj >sound.txt

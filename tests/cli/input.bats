@@ -87,7 +87,7 @@ bake_bad() {
 
 @test "zero-area triangles are skipped and counted" {
     { cat box.obj && printf 'f 1/1 1/1 2/2\nf 3/3 3/3 3/3\n'; } >sliver.obj
-    bake_bad sliver.obj
+    bake_bad sliver.obj --verbose
     done_well
     [[ $stderr == *"2 triangles of zero area"* ]] || fail "they are not counted"
     shade bake box.obj -o whole.exr "${SMALL[@]}"

@@ -156,6 +156,19 @@ JSON
     [ -z "$stderr" ] || fail "--quiet said something"
 }
 
+@test "what users need not act on is a note, which --verbose alone prints" {
+    write_level level.obj floor crate
+    printf 'o card\nv 0 0 -3\nv 1 0 -3\nv 0 1 -3\nf -3 -2 -1\nf -1 -1 -2\n' >>level.obj
+    shade bake level.obj "${LEVEL[@]}" --receive floor -o out.exr
+    done_well
+    [[ $stderr != *warning:* && $stderr != *note:* ]] || fail "told: $stderr"
+    shade bake level.obj "${LEVEL[@]}" --receive floor -o out.exr --verbose
+    done_well
+    [[ $stderr == *"vdbshade: note: level.obj: mesh 'card': 1 triangles of zero area are skipped"* ]] || fail "no area"
+    [[ $stderr == *"vdbshade: note: mesh 'card' ("*"3 open edges: baked as a "* ]] || fail "no sheet"
+    [[ $stderr != *warning:* ]] || fail "a warning"
+}
+
 @test "warnings that were kept come before the error that ends the run" {
     write_level level.obj floor bare naked
     awk '/^o /{n++} n > 1 && /^vt/{next} n > 1 && /^f/{gsub(/\/[0-9]+/, "")} {print}' level.obj >bare.obj
@@ -203,13 +216,13 @@ JSON
     done
 }
 
-@test "every warning that is printed is documented" {
+@test "every warning and note that is printed is documented" {
     local sources=("$BATS_TEST_DIRNAME"/../../src) docs=$BATS_TEST_DIRNAME/../../docs/warnings.md missing=
     # the strings of each call joined, what is filled in cut out, and the longest piece of the rest
     while IFS= read -r piece; do
         grep -qF -- "$piece" "$docs" || missing+="$piece"$'\n'
     done < <(find "${sources[@]}" -name '*.c' -o -name '*.cpp' | xargs awk '
-        /(vshi_warn|cli_warn)\(/ || (/snprintf\(line, sizeof line/ && FILENAME ~ /cli/) { on = 1; text = "" }
+        /(vshi_warn|vshi_note|cli_warn)\(/ || (/snprintf\(line, sizeof line/ && FILENAME ~ /cli/) { on = 1; text = "" }
         on {
             rest = $0
             while (match(rest, /"([^"\\]|\\.)*"/)) {

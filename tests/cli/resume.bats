@@ -59,7 +59,7 @@ end() { # SIGNAL
     cp kept other.exr.resume
     cp other.exr expected.exr
     run --separate-stderr -0 bake other.exr --max-error 0.1 --resume
-    [[ $stderr == *"other.exr.resume: is of another bake, of other inputs or options; begun anew"* ]]
+    [[ $stderr == *"other.exr.resume: belongs to another bake (other inputs or options); this one begins anew"* ]]
     cmp expected.exr other.exr
     # a flipped bit within the first band, and a file that was cut within the last
     size=$(stat -c %s kept)
@@ -113,7 +113,7 @@ end() { # SIGNAL
         ulimit -f $(($(stat -c %s whole.exr) / 1024 + 50)) # KiB: the lightmap is smaller than its rows
         bake out.exr --resume --trusted 2>err.txt
     )
-    grep -q "warning: out.exr.resume: could not be written: File too large; nothing is kept any more" err.txt
+    grep -q "warning: out.exr.resume: could not be written: File too large; the bake goes on, but cannot be resumed" err.txt
     cmp whole.exr out.exr
     [ ! -e out.exr.resume ]
 }

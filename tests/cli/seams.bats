@@ -54,8 +54,8 @@ TUBE=(--sun 0.1,1,0.3 --sun-angle 60 --ao 1 --size 48 --quiet)
     write_tube tube.obj
     run -0 "$VDBSHADE" bake tube.obj "${TUBE[@]}" --padding 16 -o plain.exr
     run --separate-stderr -0 "$VDBSHADE" bake tube.obj "${TUBE[@]:0:8}" --seams fix --padding auto --band-rows 16 -o bands.exr
-    [[ $stderr == *"tube.obj: seams are kept: it is baked in 3 bands of rows"* ]]
-    [[ $stderr == *"tube.obj: padding is of 16 texels, not of all that is empty: it is baked in 3 bands"* ]]
+    [[ $stderr == *"tube.obj: seams are not fixed, because it is baked in 3 bands of rows"* ]]
+    [[ $stderr == *"tube.obj: padding is limited to 16 texels, because it is baked in 3 bands"* ]]
     run -0 "$VDBSHADE" compare plain.exr bands.exr --max-difference 0 --max-coverage 0 --padding
 }
 
@@ -169,6 +169,6 @@ EOF
         if [ "$status" -eq 4 ] || [[ $stderr == *bands* ]]; then low=$middle; else high=$middle; fi
     done
     tiles $high
-    [[ $stderr == *"tiles.obj: seams between lightmaps are kept: no memory to hold 2 at once; raise --memory-limit"* ]] || fail "$high: $stderr"
+    [[ $stderr == *"tiles.obj: seams between lightmaps are not fixed: no memory holds 2 at once; raise --memory-limit"* ]] || fail "$high: $stderr"
     [ "$(grep -c 'seams between' <<<"$stderr")" -eq 1 ] || fail "not once: $stderr"
 }

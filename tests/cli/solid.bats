@@ -56,9 +56,9 @@ OBJ
     shade info stands.obj
     done_well
     [[ $output == *"closed by what it stands on or runs into: 1 of these"* ]] || fail "not closed: $output"
-    shade bake stands.obj --receive floor -o floor.exr --ao 1 --size 60 --stats stats.json
+    shade bake stands.obj --receive floor -o floor.exr --ao 1 --size 60 --stats stats.json --verbose
     done_well
-    [[ $stderr == *"taken for solid, closed by those"* ]] || fail "no warning: $stderr"
+    [[ $stderr == *"note: mesh 'hut'"*"taken for solid, closed by those"* ]] || fail "no note: $stderr"
     shade info stands.obj
     [ "$(grep -oE '"invalid_texels": [0-9]+' stats.json)" = '"invalid_texels": 400' ] || fail "$(cat stats.json)"
     shade bake stands.obj --receive floor --shell hut -o floor.exr --ao 1 --size 60 --stats stats.json
@@ -99,22 +99,22 @@ write_studs() {
 }
 
 @test "a room whose faces look inwards is baked" {
-    shade bake room.obj -o room.exr --ao 0.5 --size 64 --resolution 64 --ao-method exact
+    shade bake room.obj -o room.exr --verbose --ao 0.5 --size 64 --resolution 64 --ao-method exact
     done_well
     [[ $stderr != *"are invalid"* ]] || fail "$stderr"
 }
 
 @test "solid, shell and inward overrule what is found" {
-    shade voxelize crate.obj -o crate.vdb --resolution 32
+    shade voxelize crate.obj --verbose -o crate.vdb --resolution 32
     done_well
     [[ $stderr == *"baked as a shell"* ]] || fail "no shell: $stderr"
-    shade voxelize crate.obj -o crate.vdb --resolution 32 --solid '*'
+    shade voxelize crate.obj --verbose -o crate.vdb --resolution 32 --solid '*'
     done_well
     [[ $stderr == *"closed over the holes"* ]] || fail "not closed: $stderr"
-    shade voxelize box.obj -o shell.vdb --resolution 32 --shell 'b*' --shell 'box'
+    shade voxelize box.obj --verbose -o shell.vdb --resolution 32 --shell 'b*' --shell 'box'
     done_well
     [[ $stderr == *"baked as a shell"* ]] || fail "no shell: $stderr"
-    shade voxelize box.obj -o wall.vdb --resolution 32 --inward box
+    shade voxelize box.obj --verbose -o wall.vdb --resolution 32 --inward box
     done_well
     [[ $stderr == *"triangles that face the other way"* ]] || fail "not turned: $stderr"
 }
@@ -134,7 +134,7 @@ write_studs() {
   "transform": {"translate": [3, 0, 0]}}],
  "resolution": 32}
 JSON
-    shade voxelize scene.json -o out.vdb
+    shade voxelize scene.json --verbose -o out.vdb
     done_well
     [[ $stderr == *"closed over the holes"* ]] || fail "not closed: $stderr"
     [[ $stderr == *"face the other way"* ]] || fail "not inward: $stderr"

@@ -66,14 +66,14 @@ write_row() {
     [ "$(ls many | wc -l)" = 3 ]
 }
 
-@test "receivers much larger than a tile are warned of, as they are not cut" {
+@test "receivers much larger than a tile are noted, as they are not cut" {
     write_row
     shade bake row.json --tile-size 2 --dry-run
     done_well
     [ -z "$stderr" ] || fail "$stderr"
-    shade bake row.json --tile-size 1.5 --dry-run
+    shade bake row.json --tile-size 1.5 --dry-run --verbose
     done_well
-    [[ "$stderr" == *"warning: 3 of 3 receivers are larger than two tiles of 1.5 ('floor0.exr' is the largest, with 4 units)"* ]]
+    [[ "$stderr" == *"note: 3 of 3 receivers are larger than two tiles of 1.5 ('floor0.exr' is the largest, with 4 units)"* ]]
 }
 
 @test "objects of several receivers in one folder are refused, as tiles would name them alike" {

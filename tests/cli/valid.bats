@@ -5,7 +5,7 @@ load helper
     write_box box.obj
     awk '$1 == "v" { print "v", $2, $3 + 0.25, $4; next } { print }' box.obj >above.obj
     shade bake box.obj --caster above.obj --ao 0.5 --method exact --ao-method exact --size 64 --resolution 24 \
-        -o box.exr --invalid where.png --invalid-channel
+        -o box.exr --invalid where.png --invalid-channel --verbose
     done_well
     [[ $stderr == *"texels are invalid (inside a solid or behind a wall)"*"--invalid"* ]] ||
         fail "not told"

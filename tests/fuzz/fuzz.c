@@ -117,6 +117,7 @@ vsh_run fuzz_run(void) {
     run.memory_limit = FUZZ_MEMORY;
     run.progress = stop_late;
     run.warning = look_at_warning;
+    run.notes = 1;
     begun = seconds();
     return run;
 }

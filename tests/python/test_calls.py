@@ -156,19 +156,21 @@ class Running(Case):
         sheet = vdbshade.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], name="sail")
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            vdbshade.Grid.from_meshes(sheet, resolution=16)
+            vdbshade.Grid.from_meshes(sheet, resolution=16, run=vdbshade.Run(notes=True))
         self.assertEqual([w.category for w in caught], [vdbshade.VdbshadeWarning])
         self.assertIn("'sail'", str(caught[0].message))
         self.assertEqual(caught[0].filename, __file__)
         told = []
         with warnings.catch_warnings(record=True) as caught:
-            vdbshade.Grid.from_meshes(sheet, resolution=16, run=vdbshade.Run(warning=told.append))
+            vdbshade.Grid.from_meshes(sheet, resolution=16, run=vdbshade.Run(warning=told.append, notes=True))
         self.assertEqual(([w for w in told if "'sail'" in w], caught), (told, []))
+        self.assertEqual(len(told), 1)
+        vdbshade.Grid.from_meshes(sheet, resolution=16, run=vdbshade.Run(warning=told.append))
         self.assertEqual(len(told), 1)
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             with self.assertRaises(vdbshade.VdbshadeWarning):
-                vdbshade.Grid.from_meshes(sheet, resolution=16)
+                vdbshade.Grid.from_meshes(sheet, resolution=16, run=vdbshade.Run(notes=True))
 
     def test_other_threads_run_meanwhile(self):
         """A call without progress, in a thread other than the main one, has no callbacks that would let others in."""

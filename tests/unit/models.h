@@ -66,6 +66,7 @@ static inline vsh_result read_bytes(const char *name, const void *bytes, size_t 
                                     vsh_error *error) {
     vsh_run run = vsh_run_default();
     run.warning = keep_warning;
+    run.notes = 1;
     warnings[0] = '\0';
     write_bytes(name, bytes, size);
     const vsh_result result = vsh_model_read(path_of(name).text, &run, model, error);

@@ -14,6 +14,7 @@
 static inline vsh_model *read_gltf_by(bool reader, const char *json) {
     vsh_run run = vsh_run_default();
     run.warning = keep_warning;
+    run.notes = 1;
     run.reader = reader ? "/proc/self/exe" : NULL;
     run.reader_seconds = reader ? 120.0 : 0.0;
     warnings[0] = '\0';

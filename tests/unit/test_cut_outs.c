@@ -12,6 +12,7 @@
 static vsh_result load(bool reader, const vsh_scene *scene, vsh_assets **assets, vsh_error *error) {
     vsh_run run = vsh_run_default();
     run.warning = keep_warning;
+    run.notes = 1;
     run.reader = reader ? "/proc/self/exe" : NULL;
     run.reader_seconds = reader ? 120.0 : 0.0;
     warnings[0] = '\0';

@@ -143,13 +143,15 @@ static void an_open_quad_becomes_a_shell_with_a_warning(void **state) {
     int warnings = 0;
     vsh_run run = vsh_run_default();
     run.warning = keep_warning;
+    run.notes = 1;
     run.user = &warnings;
     vsh_grid *grid = NULL;
     vsh_grid_options options = with_voxel(0.02);
     options.shell_thickness = 4.0;
     assert_int_equal(vsh_grid_from_meshes(&quad, 1, &options, &run, &grid, &failure), VSH_OK);
     assert_int_equal(warnings, 1);
-    assert_non_null(strstr(last_warning, "mesh 'sail' (1 of 1): 4 open edges: baked as a shell 4 voxels"));
+    assert_non_null(
+        strstr(last_warning, "note: mesh 'sail' (1 of 1): 4 open edges: baked as a shell 4 voxels"));
     leaves all = leaves_of(grid);
     assert_float_equal(all.info.shell_thickness, 0.08, 1e-12);
     for (size_t i = 0; i < all.count; ++i) {
@@ -173,13 +175,14 @@ static void a_crack_is_closed_and_told(void **state) {
     int warnings = 0;
     vsh_run run = vsh_run_default();
     run.warning = keep_warning;
+    run.notes = 1;
     run.user = &warnings;
     vsh_grid *grid = grid_of(&ball.mesh, 1, 0.03, &run);
     assert_true(worst_error(grid, unit_sphere, 2.95, 2.95) < 0.1);
     assert_int_equal(wrong_blocks(grid, unit_sphere, 8), 0);
     assert_int_equal(warnings, 1);
     assert_non_null(
-        strstr(last_warning, "mesh 'ball' (1 of 1): 3 open edges around 1 hole in 1 of 1 component"));
+        strstr(last_warning, "note: mesh 'ball' (1 of 1): 3 open edges around 1 hole in 1 of 1 component"));
     assert_non_null(strstr(last_warning, "closed over the holes"));
     vsh_grid_info info;
     vsh_grid_get_info(grid, &info);

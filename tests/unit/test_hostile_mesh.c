@@ -25,6 +25,7 @@ static vsh_grid *grid_of(const vsh_mesh *mesh) {
     const vsh_grid_options options = with_voxel(0.1);
     vsh_run run = vsh_run_default();
     run.warning = keep_warning;
+    run.notes = 1;
     warned[0] = '\0';
     vsh_grid *grid = NULL;
     if (vsh_grid_from_meshes(mesh, 1, &options, &run, &grid, &failure) != VSH_OK) {

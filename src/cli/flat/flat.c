@@ -209,7 +209,7 @@ static int finish_image(vsh_image_writer *writer, const char *output) {
     }
     if (cut.clipped > 0) {
         cli_warn(
-            "%s: %.3g %% of the texels are brighter than 1, up to %.3g, and cut to 1: write .exr, or floats "
+            "%s: %.3g %% of the texels are brighter than 1, up to %.3g, and cut to 1; write .exr, or floats "
             "(--bits 32) where the format has them, or dim the lights",
             output, 100.0 * (double)cut.clipped / (double)cut.texels, (double)cut.largest);
     }

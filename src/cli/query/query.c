@@ -191,7 +191,7 @@ static int choose_answers(query_work *work) {
         if (cli_patch_has(&s->bake.patch, "--ao")) {
             return cli_usage("%s: no normals, which --ao needs", work->reader.table.source.name);
         }
-        cli_warn("%s: no normals: no ao", work->reader.table.source.name);
+        cli_warn("%s: the points have no normals, so AO is left out", work->reader.table.source.name);
         scene->ao = 0;
     }
     *a = (query_answers){.lights = scene->light_count,
@@ -250,8 +250,8 @@ static void say_results(const query_work *work) {
         return;
     }
     if (stats->shade.beyond_reach > 0) {
-        cli_warn("%" PRIu64 " cones are wider than the field reaches: points are far from the casters; "
-                 "see --within",
+        cli_warn("%" PRIu64 " cones are wider than the field reaches, so far shadows may be too dark; "
+                 "raise --within",
                  stats->shade.beyond_reach);
     }
     cli_say("%s: %" PRIu64 " points", work->settings->bake.output, stats->points);

@@ -181,7 +181,7 @@ static void say_results(const render_work *work) {
         return;
     }
     if (work->stats.shade.unfinished > 0) {
-        cli_warn("%" PRIu64 " rays ran out of steps", work->stats.shade.unfinished);
+        cli_warn("%" PRIu64 " rays ran out of steps; use larger voxels", work->stats.shade.unfinished);
     }
     const double *at = work->options.camera.position, *to = work->options.camera.target;
     cli_say("%s: %d × %d, camera %.5g,%.5g,%.5g looking at %.5g,%.5g,%.5g", s->bake.output, s->width,

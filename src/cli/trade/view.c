@@ -200,8 +200,8 @@ static int make_page(page *p, float *coverage) {
     }
     memcpy(p->mask, work->common, work->texels);
     if (bytes > MOST_BYTES) {
-        cli_warn("%s: only the runs on the front are in it, not all %zu: their planes would take %.0f MiB; "
-                 "see --size",
+        cli_warn("%s: only the runs on the front are in it; the planes of all %zu would take %.0f MiB; "
+                 "lower --size",
                  work->settings->view, runs - work->subject_count, bytes / 1048576.0);
     }
     CLI_TRY(add_all(p, bytes > MOST_BYTES));

@@ -127,6 +127,8 @@ class Run:
         seconds, at least so many apart
     warning : callable, optional
         called as ``warning(message)``, by whatever thread; None: ``warnings.warn(message, VdbshadeWarning)``
+    notes : bool
+        notes come as warnings do, and begin with "note: ": they say what was decided, and need no action
     isa : str
         instruction set of the marching kernels: "best", "base", "avx2", "avx512"
     reader : bool or str
@@ -146,7 +148,7 @@ class Run:
                  progress: Optional[Callable[[str, float], Any]] = None, interval: float = 0.02,
                  warning: Optional[Callable[[str], Any]] = None, isa: str = "best",
                  reader: "bool | str | os.PathLike[str]" = True, reader_seconds: float = 0.0,
-                 confined: bool = False, allow_outside: bool = False, memory_held: int = 0) -> None:
+                 confined: bool = False, allow_outside: bool = False, memory_held: int = 0, notes: bool = False) -> None:
         from ._structs import Filled
         if not interval >= 0.0:
             raise ValueError(f"interval {interval}: expected seconds, at least 0")
@@ -157,7 +159,7 @@ class Run:
             reader = "vdbshade-reader"
         self._filled = Filled("vsh_run", dict(
             threads=threads, memory_limit=memory_limit, isa=isa, reader=reader or None, reader_seconds=reader_seconds,
-            confined=confined, allow_outside=allow_outside, memory_held=memory_held))
+            confined=confined, allow_outside=allow_outside, memory_held=memory_held, notes=notes))
         self.progress = progress
         self.warning = warning
         self.interval = float(interval)
