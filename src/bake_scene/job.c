@@ -5,6 +5,7 @@
 #include "bake_scene/part_job.h"
 #include "bake_scene/seams.h"
 #include "bake_scene/shares.h"
+#include "bake_scene/warn.h"
 #include "base/clock.h"
 #include "base/file.h"
 #include "base/job.h"
@@ -378,6 +379,11 @@ vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, vsh_error
     options.points = vshi_job_points(job);
     VSHI_TRY(vsh_scene_occluders(&job->scene, job->assets, &options, run, &job->occluders, error));
     vsh_occluders_get_info(job->occluders, &job->report.occluders);
+    if (job->options.shard <= 1 && run != NULL) { /* the first part's bake warns for all */
+        vsh_run full;
+        VSHI_TRY(vshi_run_resolve(run, &full, error));
+        vshi_warn_hidden_lights(job, &full);
+    }
     return vshi_job_make_errors(job, error);
 }
 

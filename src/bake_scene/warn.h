@@ -2,7 +2,7 @@
 #ifndef VSHI_WARN_H
 #define VSHI_WARN_H
 
-#include "bake_scene/target.h"
+#include "bake_scene/job.h"
 
 /* Warns of faults in its UVs, a line a mesh and kind. Warns of charts that lie too close for the size, and of
  * charts that cover few texels. */
@@ -20,6 +20,9 @@ vsh_result vshi_refuse_invalid(const vshi_target *target, const vsh_bake_stats *
 /* Notes texels that are not valid, and warns of marches that did not end or widened too far. */
 void vshi_warn_baked(const vsh_scene *scene, const vshi_target *target, const vsh_bake_stats *baked,
                      const vsh_run *run);
+
+/* Warns of lights, and of the sky, that one caster hides from every receiver of a prepared job. */
+void vshi_warn_hidden_lights(const vsh_bake_job *job, const vsh_run *run);
 
 /* Warns of light that the file's integers cut. */
 void vshi_warn_clipping(const char *output, const vsh_image_clipping *cut, const vsh_run *run);

@@ -243,6 +243,78 @@ JSON
     [ -z "$missing" ] || fail "not in docs/warnings.md: $missing"
 }
 
+# add_box FILE NAME LOW HIGH [FACE]: a closed box that looks outwards, without the face (1 is that at the lowest y).
+add_box() {
+    awk -v name="$2" -v low="$3" -v high="$4" -v left_out="${5:-0}" -v before="$(cat "$1" 2>/dev/null | grep -c '^v ')" 'BEGIN {
+        split(low, l, ","); split(high, h, ","); print "o " name
+        for (i = 0; i < 8; ++i) print "v", (i % 2 ? h[1] : l[1]), (int(i / 2) % 2 ? h[2] : l[2]), (i > 3 ? h[3] : l[3])
+        n = split("1 2 6 5,3 7 8 4,1 5 7 3,2 4 8 6,1 3 4 2,5 6 8 7", face, ",")
+        for (i = 1; i <= n; ++i) if (i != left_out) {
+            split(face[i], v, " "); print "f", before + v[1], before + v[2], before + v[3], before + v[4]
+        }
+    }' >>"$1"
+}
+
+@test "a light that one caster hides from all receivers is told of with what helps, and no other is" {
+    local sun=(--sun 0.4,0.8,0.3) options=(--unwrap always --size 64 -o out.exr)
+    add_box dome.obj ground -20,-1,-20 20,0,20
+    add_box dome.obj crate -1,0,-1 1,2,1
+    cp dome.obj open.obj
+    add_box dome.obj sky -30,-2,-30 30,30,30 1
+    shade bake dome.obj "${sun[@]}" --sky y "${options[@]}"
+    done_well
+    local help="reaches no texel of 'ground', 'crate': 'sky' encloses them; --no-cast sky lets it through"
+    [[ $stderr == *"warning: light 'sun' $help"* && $stderr == *"warning: the sky $help"* ]] || fail "no warning"
+    shade bake dome.obj "${sun[@]}" --no-receive sky --method cone --resolution 32 "${options[@]}"
+    done_well
+    [[ $stderr == *"light 'sun' $help"* ]] || fail "no warning where voxels cast"
+    shade bake dome.obj "${sun[@]}" --sky y --no-cast sky "${options[@]}"
+    done_well
+    [[ $stderr != *reaches* ]] || fail "the dome does not cast"
+
+    # a lamp in its bulb; and in the open
+    add_box open.obj 'bulb+1' -0.1,4,-0.1 0.1,4.2,0.1
+    for height in 4.1 5; do
+        cat >lamp.json <<JSON
+{"casters": [{"mesh": "open.obj"}], "lights": [{"name": "lamp", "type": "sphere", "position": [0, $height, 0], "radius": 0.05}],
+ "receivers": [{"mesh": "open.obj", "size": 64, "unwrap": "always", "output": "out.exr"}]}
+JSON
+        shade bake lamp.json
+        done_well
+        [[ $height != 4.1 || $stderr == *"light 'lamp' reaches no texel of 'ground', 'crate': 'bulb+1' encloses the light; --no-cast 'bulb+1' lets it through"* ]] || fail "no bulb"
+        [[ $height != 5 || $stderr != *reaches* ]] || fail "the lamp is in the open"
+    done
+
+    # a lamp in a room of its own, which looks inwards, beside the others
+    cp open.obj apart.obj
+    add_box apart.obj cell 22,0,-2 26,4,2
+    awk '/^o cell/ { inward = 1 } inward && /^f/ { print "f", $5, $4, $3, $2; next } { print }' apart.obj >cell.obj
+    sed 's/open.obj/cell.obj/g; s/"position": [^]]*/"position": [24, 2, 0/' lamp.json >cell.json
+    shade bake cell.json
+    done_well
+    [[ $stderr != *reaches* ]] || fail "the lamp lights its room"
+
+    # the shade of a wall, faces that look away from the sun, a room of several walls
+    cp open.obj wall.obj
+    add_box wall.obj wall 2,0,-20 3,40,20
+    shade bake wall.obj --sun 1,0.3,0 --receive crate "${options[@]}"
+    done_well
+    [[ $stderr != *reaches* ]] || fail "a crate may lie in the shade of a wall"
+    shade bake dome.obj --sun 0,-1,0 --receive ground "${options[@]}"
+    done_well
+    [[ $stderr != *"no texel"* ]] || fail "the ground is seen from below"
+    add_box room.obj crate -1,0,-1 1,2,1
+    add_box room.obj floor -5,-1,-5 5,0,5
+    add_box room.obj roof -5,4,-5 5,5,5
+    add_box room.obj left -6,-1,-5 -5,5,5
+    add_box room.obj right 5,-1,-5 6,5,5
+    add_box room.obj back -6,-1,-6 6,5,-5
+    add_box room.obj front -6,-1,5 6,5,6
+    shade bake room.obj "${sun[@]}" --receive crate --receive floor "${options[@]}"
+    done_well
+    [[ $stderr != *reaches* ]] || fail "no wall alone encloses the crate"
+}
+
 @test "compare tells no measure that too few edges do not give" {
     write_level level.obj floor wall
     shade bake level.obj --receive floor --sun 1,0.3,0 --sun-angle 2 --method cone --size 8 --resolution 48 --quiet -o out.exr
