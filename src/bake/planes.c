@@ -4,6 +4,7 @@
 #include "base/names.h"
 #include "base/try.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -124,6 +125,25 @@ enum { KINDS = sizeof kinds / sizeof kinds[0] };
 const vshi_plane_kind *vshi_plane_kinds(size_t *count) {
     *count = KINDS;
     return kinds;
+}
+
+static bool is_channel_of(const vshi_plane_kind *kind, const char *name) {
+    const size_t length = strlen(kind->name);
+    return strncmp(name, kind->name, length) == 0 && (name[length] == '\0' || name[length] == '.');
+}
+
+bool vshi_channel_can_hold(const char *name, float value, float *low, float *high) {
+    static const float ROUNDING = 1e-4f; /* of means of unit directions and of shares */
+    const vshi_plane_kind *kind = kinds;
+    while (kind < kinds + KINDS && !is_channel_of(kind, name)) {
+        ++kind;
+    }
+    const uint32_t needs = kind < kinds + KINDS ? kind->needs : VSHI_NEEDS_DEVIATION;
+    const bool is_error = (needs & VSHI_NEEDS_DEVIATION) != 0, is_vector = (needs & VSHI_NEEDS_BENT) != 0;
+    *low = is_vector ? -1.0f : 0.0f;
+    *high = is_error || (needs & VSHI_NEEDS_IRRADIANCE) != 0 ? FLT_MAX : 1.0f;
+    /* methods that know no error say NaN */
+    return (is_error && isnan(value)) || (value >= *low - ROUNDING && value <= *high + ROUNDING);
 }
 
 float *vshi_plane_of(const vsh_lightmap *lightmap, const vshi_plane_kind *kind, size_t light) {

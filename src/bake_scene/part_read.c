@@ -1,8 +1,10 @@
 #include "bake/part.h"
+#include "bake/planes.h"
 #include "bake_scene/part_head.h"
 #include "base/memory.h"
 #include "base/try.h"
 
+#include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -123,6 +125,22 @@ vsh_result vshi_part_open(const char *path, const vsh_run *run, vshi_part *part,
     return result;
 }
 
+/* Whether a bake can have made values of a row. */
+static vsh_result check_values(const vshi_part *part, uint64_t lightmap, uint64_t channel, int32_t row,
+                               size_t width, const float *values, vsh_error *error) {
+    for (size_t i = 0; i < width; ++i) {
+        float low, high;
+        if (!vshi_channel_can_hold(part->head.channels[channel], values[i], &low, &high)) {
+            return vshi_fail(error, VSH_ERROR_INPUT,
+                             "%s: damaged: '%s' of texel (%zu, %d) of lightmap %" PRIu64
+                             " is %g, out of range %g … %g; bake this part again",
+                             part->path, part->head.channels[channel], i, row, lightmap, (double)values[i],
+                             (double)low, (double)high);
+        }
+    }
+    return VSH_OK;
+}
+
 vsh_result vshi_part_read(const vshi_part *part, size_t piece, int32_t first, int32_t rows, size_t at,
                           float *const *planes, uint32_t *known, vsh_error *error) {
     const vshi_part_head *head = &part->head;
@@ -136,6 +154,8 @@ vsh_result vshi_part_read(const vshi_part *part, size_t piece, int32_t first, in
     for (int32_t row = first; row < first + rows && result == VSH_OK; ++row, at += width) {
         for (uint64_t c = 0; c < head->channel_count && result == VSH_OK; ++c) {
             result = vshi_part_read_bytes(file, part->path, planes[c] + at, width * sizeof(float), error);
+            result = result == VSH_OK ? check_values(part, of->lightmap, c, row, width, planes[c] + at, error)
+                                      : result;
         }
         if (result == VSH_OK) {
             result = vshi_part_read_bytes(file, part->path, known + at, width * sizeof *known, error);

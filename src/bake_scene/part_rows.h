@@ -87,7 +87,7 @@ vsh_result vshi_part_open(const char *path, const vsh_run *run, vshi_part *part,
 void vshi_part_free(vshi_part *part);
 
 /* Reads rows of a piece, from `first` of the lightmap on, into planes[channel_count] and `known` from texel
- * `at` on. Errors: VSH_ERROR_READ. */
+ * `at` on. Errors: VSH_ERROR_READ, VSH_ERROR_INPUT (a value out of its channel's range). */
 vsh_result vshi_part_read(const vshi_part *part, size_t piece, int32_t first, int32_t rows, size_t at,
                           float *const *planes, uint32_t *known, vsh_error *error);
 

@@ -111,15 +111,19 @@ static void find_half_axes(vshi_volume_bake *bake) {
     }
 }
 
-vsh_result vshi_volume_open(vshi_volume_bake *bake, const vsh_light *lights, const vsh_run *run,
-                            vsh_error *error) {
-    vshi_channel *channels = NULL;
-    VSHI_TRY(vshi_allocate((void **)&channels, bake->channel_count, sizeof *channels, "volume", error));
+void vshi_volume_describe(const vshi_volume_bake *bake, const vsh_light *lights, vshi_channel *channels) {
     const vshi_channels what = {
         lights,         bake->light_count,       &bake->options,      bake->shadow_error,
         bake->ao_error, bake->caster_voxel_size, bake->has_triangles,
     };
     vshi_channels_describe(&what, channels);
+}
+
+vsh_result vshi_volume_open(vshi_volume_bake *bake, const vsh_light *lights, const vsh_run *run,
+                            vsh_error *error) {
+    vshi_channel *channels = NULL;
+    VSHI_TRY(vshi_allocate((void **)&channels, bake->channel_count, sizeof *channels, "volume", error));
+    vshi_volume_describe(bake, lights, channels);
     const double held = bake->held + 2.0 * (double)bake->block_count * sizeof *bake->fill.shaded;
     const vsh_result result =
         vshi_volume_begin(bake->voxels, channels, bake->channel_count, run, held, &bake->volume, error);

@@ -42,6 +42,9 @@ vsh_result vshi_volume_set_up(vshi_volume_bake *bake, const vsh_occluders *occlu
                               const vsh_volume_options *options, const vsh_run *run, vsh_run *full,
                               vsh_error *error);
 
+/* Describes the volume's grids: channels[channel_count]. */
+void vshi_volume_describe(const vshi_volume_bake *bake, const vsh_light *lights, vshi_channel *channels);
+
 /* Begins the volume and its filling. Errors: as vshi_volume_begin(). End it with vshi_fill_end(), and free
  * the volume, also then. */
 vsh_result vshi_volume_open(vshi_volume_bake *bake, const vsh_light *lights, const vsh_run *run,

@@ -1,4 +1,5 @@
 /* Parts of a volume, put together. */
+#include "bake/planes.h"
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
@@ -17,6 +18,7 @@ typedef struct merging {
     vshi_volume_bake *bake;
     const vsh_part_options *parts;
     const vsh_run *run;
+    vshi_channel *channels; /* [channel_count] */
     uint8_t **reaches;      /* [block_count]: of the fill */
     uint64_t next;          /* block that is to be read */
     vshi_volume_head first; /* of the first part: the others say the same of casters */
@@ -84,6 +86,22 @@ static vsh_result read(body *from, void *bytes, size_t size, vsh_error *error) {
     return vshi_part_read_bytes(from->file, from->path, bytes, size, error);
 }
 
+/* Whether a bake can have made a value. */
+static vsh_result check_value(const merging *m, const char *path, size_t channel, size_t block, int voxel,
+                              float value, vsh_error *error) {
+    float low, high;
+    const char *name = m->channels[channel].name;
+    if (vshi_channel_can_hold(name, value, &low, &high)) {
+        return VSH_OK;
+    }
+    const int32_t *origin = m->bake->blocks[block].origin;
+    return vshi_fail(
+        error, VSH_ERROR_INPUT,
+        "%s: damaged: '%s' of voxel (%d, %d, %d) is %g, out of range %g … %g; bake this part again", path,
+        name, origin[0] + (voxel >> 6), origin[1] + (voxel >> 3 & 7), origin[2] + (voxel & 7), (double)value,
+        (double)low, (double)high);
+}
+
 static vsh_result read_channel(merging *m, body *from, size_t channel, size_t block, size_t shaded,
                                vsh_error *error) {
     const uint64_t *mask = m->bake->fill.shaded[block];
@@ -102,6 +120,7 @@ static vsh_result read_channel(merging *m, body *from, size_t channel, size_t bl
     for (int v = 0; v < VSHI_BLOCK_VOXELS && shaded > 0; ++v) {
         if (mask[v >> 6] >> (v & 63) & 1) {
             leaf[v] = values[count == 1 ? 0 : at];
+            VSHI_TRY(check_value(m, from->path, channel, block, v, leaf[v], error));
             ++at;
         }
     }
@@ -214,6 +233,9 @@ static vsh_result merge(merging *m, const vsh_light *lights, vsh_error *error) {
     vsh_result result;
     VSHI_TRY_DONE(vshi_volume_open(bake, lights, m->run, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&m->reaches, blocks, sizeof *m->reaches, "volume", error));
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&m->channels, bake->channel_count, sizeof *m->channels, "volume", error));
+    vshi_volume_describe(bake, lights, m->channels);
     bake->fill.given = m->reaches;
     VSHI_TRY_DONE(take_parts(m, error));
     result = vshi_volume_finish(bake, m->job, FILL_UNITS, error);
@@ -222,6 +244,7 @@ done:
         free(m->reaches[b]);
     }
     free(m->reaches);
+    free(m->channels);
     vshi_fill_end(&bake->fill);
     vshi_job_end(m->job);
     return result;

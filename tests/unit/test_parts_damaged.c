@@ -145,6 +145,50 @@ static void kinds_of_other_channels_are_refused(void **state) {
     free(good.at);
 }
 
+/* What no bake makes, all over the body, with a right checksum. */
+static void try_values(const char *path, const char *place, merge_fn *merge_it, void *user) {
+    static const float values[] = {NAN, INFINITY, -INFINITY, -1.0f, 2.0f};
+    const bytes good = read_file(path);
+    vshi_part_front front;
+    memcpy(&front, good.at, sizeof front);
+    const size_t body = sizeof front + (size_t)front.head_bytes;
+    const size_t words = (size_t)front.body_bytes / sizeof(float), step = words / 500 + 1;
+    size_t refused = 0;
+    for (size_t i = 0; i < words; i += step) {
+        const float value = values[i / step % 5];
+        bytes bad = {malloc(good.size), good.size};
+        assert_non_null(bad.at);
+        memcpy(bad.at, good.at, good.size);
+        memcpy(bad.at + body + i * sizeof value, &value, sizeof value);
+        write_file(path, &bad);
+        vsh_error error = {VSH_OK, ""};
+        const vsh_result result = merge_it(user, &error);
+        char expected[64];
+        snprintf(expected, sizeof expected, "is %g, out of range 0 … 1", (double)value);
+        if (result == VSH_ERROR_INPUT && strstr(error.message, expected) != NULL) {
+            assert_non_null(strstr(error.message, strrchr(path, '/') + 1));
+            assert_non_null(strstr(error.message, place));
+            ++refused;
+        }
+        free(bad.at);
+    }
+    print_message("%zu of %zu tries were refused by range\n", refused, words / step);
+    assert_true(refused >= words / step / 20);
+    write_file(path, &good);
+    free(good.at);
+}
+
+static void values_out_of_range_are_refused_by_part_plane_and_texel(void **state) {
+    (void)state;
+    case_scene c;
+    fill(&c, SIZE, 0.4);
+    bake_parts(&c);
+    bake_case one = {&c, calloc(1, sizeof(taken)), vsh_run_default()};
+    assert_non_null(one.rows);
+    try_values(at("floor.exr.2-of-2.part"), "of texel (", merge_bake, &one);
+    free(one.rows);
+}
+
 typedef struct volume_case {
     vsh_voxels *voxels;
     vsh_light sun;
@@ -195,6 +239,7 @@ static void no_part_of_a_volume_does_worse_than_fail(void **state) {
             &error);
     }
     try_all(at("ball.vdb.2-of-2.part"), merge_volume, &c, 100);
+    try_values(at("ball.vdb.2-of-2.part"), "of voxel (", merge_volume, &c);
     c.parts.working = 1; /* the second has no voxels, and nothing is to be given for it */
     c.parts.shard = 1;
     assert_ok(vsh_bake_volume_part(occluders, c.voxels, &c.sun, 1, &c.options, &c.parts, NULL, NULL, &error),
@@ -220,6 +265,7 @@ int main(void) {
         cmocka_unit_test(no_part_of_a_lightmap_does_worse_than_fail),
         cmocka_unit_test(no_part_that_leaves_ao_does_worse_than_fail),
         cmocka_unit_test(kinds_of_other_channels_are_refused),
+        cmocka_unit_test(values_out_of_range_are_refused_by_part_plane_and_texel),
         cmocka_unit_test(no_part_of_a_volume_does_worse_than_fail),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
