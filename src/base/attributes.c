@@ -52,8 +52,8 @@ vsh_result vshi_attributes_check(const char *path, const vsh_attribute *attribut
 
 static char *copy_line(const char *text) {
     char *copy = strdup(text);
-    for (char *c = copy; c != NULL && *c != '\0'; ++c) {
-        *c = (unsigned char)*c < 0x20 || *c == 0x7f ? '?' : *c;
+    if (copy != NULL) {
+        vshi_one_line(copy);
     }
     return copy;
 }

@@ -1,5 +1,7 @@
 #include "base/error.h"
 
+#include "base/utf8.h"
+
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -79,8 +81,9 @@ vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *format, ...)
 }
 
 void vshi_one_line(char *text) {
-    for (; *text != '\0'; ++text) {
-        if ((unsigned char)*text < 0x20 || *text == 0x7f) {
+    for (size_t length; *text != '\0'; text += length > 0 ? length : 1) {
+        length = vshi_utf8_length(text);
+        if (length == 0 || (unsigned char)*text < 0x20 || *text == 0x7f) {
             *text = '?';
         }
     }

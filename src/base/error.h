@@ -39,7 +39,7 @@ VSHI_SHARED vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *
         }                                                                                                    \
     } while (0)
 
-/* Control characters become '?'. */
+/* Control characters, and bytes that are not UTF-8, become '?'. */
 VSHI_SHARED void vshi_one_line(char *text);
 
 #ifdef __cplusplus

@@ -1,6 +1,7 @@
 #define _GNU_SOURCE /* fopencookie */
 #include "message.h"
 
+#include "base/error.h"
 #include "paths.h"
 #include "progress.h"
 #include "signals.h"
@@ -34,9 +35,7 @@ static const struct {
 static void __attribute__((format(printf, 1, 0))) say(const char *format, va_list arguments) {
     char line[3 * 4096]; /* two paths and what is said of them */
     vsnprintf(line, sizeof line, format, arguments);
-    for (char *c = line; (c = strchr(c, '\n')) != NULL;) {
-        *c = '?';
-    }
+    vshi_one_line(line);
     cli_plain(line, strlen(line));
     cli_progress_line(line);
 }

@@ -1,6 +1,12 @@
 /* Scenes that are wrong, damaged, too large or not there. */
 #include "scenes.h"
 
+#include "base/error.h"
+#include "scene/parts.h"
+#include "shade/shade.h"
+
+#include <vdbshade/settings.h>
+
 #include <unistd.h>
 
 /* A scene around one part, so that the table below can be short. */
@@ -39,8 +45,12 @@ static const struct {
     {CASTERS "\"method\":\"cone\",@\"xyzzy\":1}", "xyzzy: unknown key"},
     {"{\"receivers\":[],\"\\u0061o\":{\"distance\":1,@\"cone\":1}}",
      "ao.cone: unknown key; did you mean \"cones\"?"},
-    {CASTERS "\"voxel_size\":@0}", "voxel_size: 0 is out of range 0 (excluded) … 1e+15"},
-    {CASTERS "\"voxel_size\":@-1}", "voxel_size: -1 is out of range 0 (excluded) … 1e+15"},
+    {CASTERS "\"voxel_size\":@0}", "voxel_size: 0 is out of range 1e-12 … 1e+12"},
+    {CASTERS "\"voxel_size\":@-1}", "voxel_size: -1 is out of range 1e-12 … 1e+12"},
+    {CASTERS "\"voxel_size\":@1e13}", "voxel_size: 1e+13 is out of range 1e-12 … 1e+12"},
+    {LAYER("{\"name\":\"a\",\"voxel_size\":@1e-13}"),
+     "layers[0].voxel_size: 1e-13 is out of range 1e-12 … 1e+12"},
+    {CASTERS "\"ao\":{\"distance\":@5e-324}}", "ao.distance: 4.94065646e-324 is out of range 1e-12 … 1e+15"},
     {CASTERS "\"voxel_size\":@\"1\"}", "voxel_size: expected a number, found a string"},
     {CASTERS "\"voxel_size\":1,@\"resolution\":9}", "resolution: cannot stand beside \"voxel_size\""},
     {CASTERS "\"resolution\":@1}", "resolution: 1 is out of range 2 … 65536"},
@@ -70,7 +80,7 @@ static const struct {
     {CASTERS "\"irradiance\":@1}", "irradiance: expected true or false, found a number"},
     {CASTERS "\"irradiance\":@null}", "irradiance: expected true or false, found null"},
     {CASTERS "\"ao\":@{}}", "ao: key \"distance\" is missing: ao needs it"},
-    {CASTERS "\"ao\":{\"distance\":@0}}", "ao.distance: 0 is out of range 0 (excluded) … 1e+15"},
+    {CASTERS "\"ao\":{\"distance\":@0}}", "ao.distance: 0 is out of range 1e-12 … 1e+15"},
     {CASTERS "\"ao\":{\"distance\":1,\"cones\":@257}}", "ao.cones: 257 is out of range 1 … 256"},
     {CASTERS "\"ao\":{@\"cones\":8,\"method\":\"taps\",\"distance\":1}}",
      "ao.cones: is no key of ao by taps"},
@@ -436,6 +446,45 @@ static void messages_stay_one_line_whatever_the_key(void **state) {
     assert_non_null(strstr(error.message, "…: unknown key"));
 }
 
+/* Else a number of a scene file would be refused later, without its line and key. */
+static void what_a_table_of_keys_takes_the_library_takes(void **state) {
+    (void)state;
+    const vshi_table tables[] = {vshi_scene_table, vshi_ao_table};
+    size_t tried = 0;
+    for (size_t t = 0; t < 2; ++t) {
+        for (size_t k = 0; k < tables[t].key_count; ++k) {
+            const vshi_key *key = &tables[t].keys[k];
+            if (key->kind != VSHI_NUMBER && key->kind != VSHI_INTEGER) {
+                continue;
+            }
+            for (int end = 0; end < 2; ++end) {
+                const double value = end ? key->highest : key->lowest;
+                vsh_scene scene = vsh_scene_default();
+                vsh_shade_options full;
+                vsh_error error = {VSH_OK, ""};
+                if (key->kind == VSHI_NUMBER) {
+                    *(double *)((char *)&scene + key->offset) = value;
+                } else {
+                    *(int32_t *)((char *)&scene + key->offset) = (int32_t)value;
+                }
+                assert_int_equal(key->flags & (VSHI_ABOVE | VSHI_BELOW), 0);
+                if (vshi_shade_options_resolve(&scene.shade, &full, &error) != VSH_OK) {
+                    fail_msg("%s %g: %s", key->name, value, error.message);
+                }
+                ++tried;
+            }
+        }
+    }
+    assert_true(tried >= 20);
+}
+
+static void bytes_that_are_no_text_do_not_reach_messages(void **state) {
+    (void)state;
+    vsh_error error = {VSH_OK, ""};
+    vshi_fail(&error, VSH_ERROR_INPUT, "%s: type '%s' × %.4s", "caf\xe9.json", "\xff\xc0\x80 é", "abc…");
+    assert_string_equal(error.message, "caf?.json: type '??? é' × abc?");
+}
+
 static void a_file_that_is_not_there_or_is_a_folder_cannot_be_read(void **state) {
     (void)state;
     vsh_scene *scene = NULL;
@@ -477,6 +526,8 @@ int main(void) {
         cmocka_unit_test(a_byte_order_mark_is_passed_over),
         cmocka_unit_test(keys_with_escapes_are_the_keys_they_spell),
         cmocka_unit_test(messages_stay_one_line_whatever_the_key),
+        cmocka_unit_test(what_a_table_of_keys_takes_the_library_takes),
+        cmocka_unit_test(bytes_that_are_no_text_do_not_reach_messages),
         cmocka_unit_test(a_file_that_is_not_there_or_is_a_folder_cannot_be_read),
         cmocka_unit_test(a_device_is_no_scene_and_a_large_file_over_the_limit),
     };

@@ -79,7 +79,7 @@ static void what_is_refused_is_told_and_changes_nothing(void **state) {
         {"max_error", "nan", "expected a number from 0.0001 to 1", VSH_ERROR_INPUT},
         {"jitter", "0x1", "expected a number from 0 to 1", VSH_ERROR_INPUT},
         {"jitter", "0.5,", "expected a number from 0 to 1", VSH_ERROR_INPUT},
-        {"voxel_size", "0", "expected a number greater than 0", VSH_ERROR_INPUT},
+        {"voxel_size", "0", "expected a number from 1e-12 to 1e+12", VSH_ERROR_INPUT},
         {"method", "cones", "expected one of hard, classic", VSH_ERROR_INPUT},
         {"ambient", "1,-1,1", "expected three numbers of at least 0", VSH_ERROR_INPUT},
         {"ambient", "1,1", "expected three numbers", VSH_ERROR_INPUT},
