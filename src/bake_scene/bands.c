@@ -18,6 +18,7 @@ typedef struct cost {
     size_t light_count;
     int32_t floats; /* beside those a texel: pictures, and what is baked interleaved and then split */
     uint64_t held, writer, limit;
+    bool in_memory;     /* the format is put together in memory before it is written */
     int32_t first, end; /* rows that are baked */
     int32_t channels;
     const vshi_ao_cut *cut; /* of a part; NULL: of none */
@@ -66,19 +67,29 @@ static uint64_t largest(const cost *c, int32_t rows) {
     return c->held + c->info.bytes + c->writer + most;
 }
 
+/* What helps most: what takes most of the bytes is made smaller. */
+static const char *advice(const cost *c, uint64_t rows, uint64_t held) {
+    if (c->writer > rows && c->writer > held) {
+        return c->in_memory ? "this format is put together in memory: write .exr, .png or .tif, or raise "
+                              "--memory-limit"
+                            : "raise --memory-limit, or take a smaller --size or fewer channels";
+    }
+    return rows > held ? "raise --memory-limit, or take a smaller --size or fewer channels"
+                       : "raise --memory-limit, or take larger voxels";
+}
+
 static vsh_result refuse(const cost *c, const char *output, uint64_t bytes, vsh_error *error) {
-    char all[VSHI_BYTES_ROOM], held[VSHI_BYTES_ROOM], writer[VSHI_BYTES_ROOM], limit[VSHI_BYTES_ROOM];
-    return vshi_fail(
-        error, VSH_ERROR_LIMIT,
-        "%s: %d × %d texels need %s even %d rows at a time (field and charts %s, writing %s), over "
-        "the memory limit of %s; %s",
-        output, c->info.width, c->info.height, vshi_bytes_text(bytes, all, sizeof all), VSH_BAND_STEP,
-        vshi_bytes_text(c->held + c->info.bytes, held, sizeof held),
-        vshi_bytes_text(c->writer, writer, sizeof writer), vshi_bytes_text(c->limit, limit, sizeof limit),
-        c->writer > c->limit / 4
-            ? "this format is put together in memory: write .exr, .png or .tif, or raise "
-              "--memory-limit"
-            : "raise --memory-limit, or take larger voxels");
+    char all[VSHI_BYTES_ROOM], band[VSHI_BYTES_ROOM], held[VSHI_BYTES_ROOM], writer[VSHI_BYTES_ROOM],
+        limit[VSHI_BYTES_ROOM];
+    const uint64_t held_bytes = c->held + c->info.bytes, row_bytes = bytes - held_bytes - c->writer;
+    return vshi_fail(error, VSH_ERROR_LIMIT,
+                     "%s: %d × %d texels need %s even %d rows at a time (rows %s, field and charts %s, "
+                     "writing %s), over the memory limit of %s; %s",
+                     output, c->info.width, c->info.height, vshi_bytes_text(bytes, all, sizeof all),
+                     VSH_BAND_STEP, vshi_bytes_text(row_bytes, band, sizeof band),
+                     vshi_bytes_text(held_bytes, held, sizeof held),
+                     vshi_bytes_text(c->writer, writer, sizeof writer),
+                     vshi_bytes_text(c->limit, limit, sizeof limit), advice(c, row_bytes, held_bytes));
 }
 
 static int32_t up_to_step(int32_t rows) {
@@ -140,6 +151,9 @@ vsh_result vshi_bands_plan(const vsh_scene *scene, const vshi_target *target, co
               .held = need->held,
               .limit = need->limit};
     c.writer = need->files ? vsh_image_writer_bytes(receiver->output, &channels.image, &image) : 0;
+    vsh_image half = channels.image;
+    half.height = (half.height + 1) / 2;
+    c.in_memory = need->files && vsh_image_writer_bytes(receiver->output, &half, &image) < c.writer;
     vsh_charts_get_info(charts, &c.info);
     VSHI_TRY_DONE(plan(&c, need->rows, receiver->output, bands, error));
     if (need->resume && need->rows == 0 && bands->rows > kept) {
