@@ -362,6 +362,21 @@ ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
     grep -q 'squares.gltf: image 7 is not shown' page.dom || fail "$(grep -o 'id="problems".*' page.dom)"
 }
 
+@test "textures whose image is in EXT_texture_webp are shown, and others are named with their format" {
+    write_squares
+    # decoders go by what the bytes are, so that a PNG stands in for a WebP here
+    sed 's/"textures": \[{"source": 0}, {"source": 1}\]/"textures": [{"extensions": {"EXT_texture_webp": {"source": 0}}}, {"extensions": {"KHR_texture_basisu": {"source": 1}}}]/
+         s/"extensionsUsed": \[/"extensionsUsed": ["EXT_texture_webp", "KHR_texture_basisu", /' squares.gltf >webp.gltf
+    grep -q EXT_texture_webp.*source webp.gltf
+    shade view webp.gltf -o webp.html --quiet
+    done_well
+    look webp.html ""
+    state_is ready
+    grep -q 'texture 1 is not shown: browsers do not read the images of KHR_texture_basisu' page.dom ||
+        fail "$(grep -o 'id="problems".*' page.dom)"
+    ! grep -q 'undefined\|texture 0\|image 0' <(grep -o 'id="problems".*' page.dom | head -c 400)
+}
+
 @test "docs/engines.md: the lines for three.js show a lit glTF as it is meant" {
     three=/usr/share/javascript/three
     write_squares

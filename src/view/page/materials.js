@@ -15,13 +15,30 @@
         return {set: transform.texCoord !== undefined ? transform.texCoord : info.texCoord || 0, matrix};
     }
 
+    /* Formats that browsers decode, and those that they do not. */
+    const SHOWN = ['EXT_texture_webp', 'EXT_texture_avif'], OTHERS = ['KHR_texture_basisu', 'MSFT_texture_dds'];
+
+    /* The number of a texture's image; undefined, with a word about it, where no browser can show one. */
+    function imageOf(file, index, definition) {
+        const extensions = definition.extensions || {};
+        const sources = [definition, ...SHOWN.map(name => extensions[name])].filter(at => at && at.source !== undefined);
+        if (sources.length === 0) {
+            const other = OTHERS.find(name => extensions[name]);
+            file.problems.add('texture ' + index + ' is not shown: ' +
+                (other ? 'browsers do not read the images of ' + other : 'it names no image'));
+            return undefined;
+        }
+        return sources[0].source;
+    }
+
     /* {texture, image, index, set, matrix} of a texture info; null where there is none to be had. */
     async function texture(file, info, mipmaps) {
         if (!info || info.index === undefined) {
             return null;
         }
         const definition = VIEW.gltf.at(file.json.textures, info.index, 'texture');
-        const bitmap = await VIEW.gltf.image(file, definition.source);
+        const source = imageOf(file, info.index, definition);
+        const bitmap = source !== undefined ? await VIEW.gltf.image(file, source) : null;
         if (bitmap === null) {
             return null;
         }
@@ -36,7 +53,7 @@
         made.wrapS = WRAP[sampler.wrapS] || THREE.RepeatWrapping;
         made.wrapT = WRAP[sampler.wrapT] || THREE.RepeatWrapping;
         made.needsUpdate = true;
-        return {texture: made, image: bitmap, source: definition.source, ...layoutOf(info)};
+        return {texture: made, image: bitmap, source, ...layoutOf(info)};
     }
 
     VIEW.material = async function (file, index) {
