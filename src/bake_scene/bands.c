@@ -67,7 +67,7 @@ static uint64_t largest(const cost *c, int32_t rows) {
     return c->held + c->info.bytes + c->writer + most;
 }
 
-/* What helps most: what takes most of the bytes is made smaller. */
+/* Names the remedy for the largest share of the bytes. */
 static const char *advice(const cost *c, uint64_t rows, uint64_t held) {
     if (c->writer > rows && c->writer > held) {
         return c->in_memory ? "this format is put together in memory: write .exr, .png or .tif, or raise "

@@ -29,8 +29,11 @@ by_each() {
 
 @test "a voxel size out of range names the scene, and the layer" {
     local ball='{"sdf": {"shape": "sphere", "radius": 1}}'
-    write_scene small.json "$ball" ', "voxel_size": 1e-13'
-    by_each small.json 4 "voxel size 1e-13: " "5.36871e+08 at most"
+    write_scene below.json "$ball" ', "voxel_size": 1e-13'
+    shade bake below.json --quiet -o out.exr
+    refused 2 "below.json:2:" "voxel_size: 1e-13 is out of range 1e-12 … 1e+12"
+    write_scene small.json "$ball" ', "voxel_size": 1e-12'
+    by_each small.json 4 "voxel size 1e-12: " "5.36871e+08 at most"
     write_scene large.json '{"sdf": {"shape": "sphere", "radius": 1e14}}' ', "resolution": 8'
     by_each large.json 4 "voxel size 2.5e+13: " "1e-12 … 1e+12"
     write_scene far.json '{"sdf": {"shape": "sphere", "radius": 1, "translate": [1e14, 0, 0]}}' ', "resolution": 8'
@@ -38,8 +41,8 @@ by_each() {
     shade voxelize far.json --quiet -o out.vdb
     refused 4 "far.json: voxel size "
     write_scene layer.json "$ball, {\"sdf\": {\"shape\": \"sphere\", \"radius\": 1}, \"layer\": \"clouds\"}" \
-        ', "resolution": 8, "layers": [{"name": "clouds", "voxel_size": 1e-13}]'
-    by_each layer.json 4 "layer 'clouds': voxel size 1e-13: "
+        ', "resolution": 8, "layers": [{"name": "clouds", "voxel_size": 1e-12}]'
+    by_each layer.json 4 "layer 'clouds': voxel size 1e-12: "
 }
 
 @test "a mesh too large, too small or too far for distances is named, whether it gets voxels or not" {

@@ -293,7 +293,7 @@ static vsh_light light_of_size(int32_t type, double size) {
     return light;
 }
 
-/* What casts: the seeds as voxels and triangles, and as layers that need no voxels a ball and a ridge. */
+/* The casters: the seeds as voxels and triangles; a ball and a ridge as layers without voxels. */
 typedef struct ranges_stage {
     enum { FIELD, BALL, RIDGE, STAGES } kind;
     caster seeds;
