@@ -112,8 +112,8 @@ static double cone_share(const vshi_ao_cones *cones, const float *close, int32_t
     return near + (far - near) * part[0];
 }
 
-/* What the cones of a point above its face see together, and in the mean where; both along the frame's axes.
- */
+/* The open share of the cones above a point's face. Sets *where to the mean open direction, along the frame's
+ * axes as `face` is. */
 static double open_share(const vshi_ao_cones *cones, const float *close, vshi_vec face, vshi_vec *where) {
     int32_t count = 0;
     double open = 0.0;

@@ -40,7 +40,7 @@ typedef struct vshi_disc {
     double origin[3];
     vshi_vec axis, u, v; /* a ray goes along axis + x u + y v, (x, y) on the unit disc; of a dome, where all
                             three are unit, along √(1 - x² - y²) axis + x u + y v */
-    double rise;         /* of a dome: vshi_dome_place(); 1 for all of it */
+    double rise;         /* of a dome: the argument of vshi_dome_place(); 1 is the whole dome */
     vshi_vec normal;     /* rays below it meet something, whatever there is; zero: none do */
     double far;          /* how long the rays are; may be infinite */
     uint32_t shift[2];   /* of the texel: vshi_sampler_shift() */
@@ -62,9 +62,9 @@ static inline double vshi_dome_turn(vshi_vec up, vshi_vec axes[3]) {
     return rise < -1.0 ? -1.0 : rise > 1.0 ? 1.0 : rise;
 }
 
-/* Moves places on the disc to the part of it whose directions on the dome (Malley) lie above that plane, the
- * disc from half an ellipse on, x > -rise √(1 - y²): rows of the disc are shortened, all by the same factor,
- * so that areas stay in proportion. */
+/* Moves a place on the disc to where its direction on the dome (Malley) lies above that plane. The disc then
+ * begins at half an ellipse, x > -rise √(1 - y²). All rows shrink by the same factor, which keeps areas in
+ * proportion. */
 static inline double vshi_dome_place(double rise, double x, double y) {
     const double edge = 1.0 - y * y;
     return rise < 1.0 ? 0.5 * ((1.0 + rise) * x + (1.0 - rise) * sqrt(edge > 0.0 ? edge : 0.0)) : x;

@@ -100,7 +100,7 @@ static void errors_are_below_those_asked_for_with_few_rays(void **state) {
         assert_true(fabs(j.bias) < 0.003 && j.most < 0.3);
         assert_true(shared->stats.rays * 2 < alone->stats.rays);
         assert_true(j.angle < angles[e] && j.angle < 1.25 * a.angle);
-        /* what bends in windows is known of all texels together, and so is what it adds; it is no guess */
+        /* the statistics also count how windows bend, and stay near the measured error */
         const double noise = j.said * j.said * (double)j.count, all = shared->stats.ao_square_error;
         print_message("    with what bends: said %.5f\n", sqrt(all / (double)j.count));
         assert_true(all > 0.999 * noise && all < 2.0 * j.is * j.is * (double)j.count);
