@@ -35,9 +35,9 @@ typedef struct vsh_light {
     int32_t type;        /* VSH_LIGHT_… */
     int32_t falloff;     /* VSH_FALLOFF_…; not directional */
     double direction[3]; /* directional: towards the light. Any length but 0 */
-    double position[3];  /* of the centre, world units, -1e100 … 1e100 */
+    double position[3];  /* of the centre, world units */
     double angle;        /* directional: angular diameter, radians, 0 … π (excluded) */
-    double radius;       /* sphere, spot: world units, 0 … 1e100 */
+    double radius;       /* sphere, spot: world units, ≥ 0 */
     double axis[3];      /* spot: the way it shines, away from it. Any length but 0 */
     double inner_angle;  /* spot: half angle of full light, radians, 0 … outer_angle */
     double outer_angle;  /* spot: half angle where light ends, radians, > 0 … π */

@@ -10,9 +10,6 @@
 
 static const double DEGREES = 180.0 / PI;
 
-/* Squares of lengths in voxels stay finite up to here, and far lights are suns long before. */
-#define FARTHEST 1e100
-
 /* --- suns */
 
 static void place_sun(const vsh_light *light, vshi_light_place *place) {
@@ -173,10 +170,12 @@ const vshi_light_member vshi_light_members[] = {
     {MEMBER(direction), TOWARDS_OR_AXIS(DIRECTIONAL)},
     {MEMBER(axis), TOWARDS_OR_AXIS(SPOT)},
     {MEMBER(position), .key = "position", .kind = VSHI_LIGHT_VECTOR, .types = SPHERE | SPOT | RECTANGLE,
-     .required = SPHERE | SPOT | RECTANGLE, .lowest = -FARTHEST, .highest = FARTHEST},
+     .required = SPHERE | SPOT | RECTANGLE, .lowest = -INFINITY, .highest = INFINITY, .above = true,
+     .below = true},
     {MEMBER(angle), .key = "angle_deg", .kind = VSHI_LIGHT_ANGLE, .types = DIRECTIONAL, .highest = PI,
      .below = true},
-    {MEMBER(radius), .key = "radius", .kind = VSHI_LIGHT_NUMBER, .types = SPHERE | SPOT, .highest = FARTHEST},
+    {MEMBER(radius), .key = "radius", .kind = VSHI_LIGHT_NUMBER, .types = SPHERE | SPOT, .highest = INFINITY,
+     .below = true},
     {MEMBER(inner_angle), .key = "inner_deg", .kind = VSHI_LIGHT_ANGLE, .types = SPOT, .required = SPOT,
      .highest = PI, .apart = true},
     {MEMBER(outer_angle), .key = "outer_deg", .kind = VSHI_LIGHT_ANGLE, .types = SPOT, .required = SPOT,

@@ -367,11 +367,11 @@ JSON
     [ "$status" -eq 1 ] || fail "expected 1"
     [[ $output == *'"golden": "bad'$'\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd''.exr"'* && $output == *'"new": "über'$'\xef\xbf\xbd''.exr"'* ]] ||
         fail "files"
-    [[ $output == *'"name": "shadow.s'$'\xef\xbf\xbd''n"'* ]] || fail "channels"
+    [[ $output == *'"name": "shadow.s?n"'* ]] || fail "channels"
     local one
     printf '%s' "$output" >bad.json
     for one in bad.json bad.xml bad.html; do
         iconv -f UTF-8 -t UTF-8 "$one" >/dev/null || fail "$one is no UTF-8"
     done
-    grep -q $'name="shadow.s\xef\xbf\xbdn"' bad.xml || fail "channels in XML"
+    grep -q 'name="shadow.s?n"' bad.xml || fail "channels in XML"
 }
