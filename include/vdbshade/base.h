@@ -3,9 +3,9 @@
  * What holds for every call, and is not said again at each:
  *
  * - The library prints nothing, ends nothing and keeps no state of its own. It begins threads only within
- *   calls that take a vsh_run. With the first level set it loads OpenVDB, and with the first image other than
- *   EXR and PNG OpenImageIO; both stay, and four threads of liblog4cplus with them, which wait.
- *   VSH_ERROR_UNSUPPORTED where such a module cannot be had.
+ *   calls that take a vsh_run. With the first level set it loads OpenVDB, with the first image other than
+ *   EXR and PNG OpenImageIO, and with the first rays against triangles Embree; they stay, and four threads
+ *   of liblog4cplus with them, which wait. VSH_ERROR_UNSUPPORTED where such a module cannot be had.
  * - A call that can fail returns a vsh_result and fills the caller's vsh_error.
  * - Every function may be called by several threads at once. Handles are immutable once made and may be
  *   shared by threads; each is freed once, when no call uses it any more.

@@ -14,7 +14,8 @@ extern "C" {
 /* The triangles of some meshes in world space, in a tree for rays. Immutable; may be shared by threads. */
 typedef struct vsh_triangles vsh_triangles;
 
-/* 1 where the library was built with Embree, 0 where vsh_triangles_create() returns VSH_ERROR_UNSUPPORTED. */
+/* 1 where the library was built with Embree and can load it, else 0: vsh_triangles_create() then returns
+ * VSH_ERROR_UNSUPPORTED. Embree is loaded by the first call that needs it and stays loaded. */
 VSH_API int vsh_triangles_available(void);
 
 /* Copies the meshes' triangles, transforms applied; both sides of a triangle block. Errors:

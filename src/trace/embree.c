@@ -57,7 +57,8 @@ static const double TRIANGLE_BYTES = 300.0;
 static const double QUAD_BYTES = 160.0;
 
 int vsh_triangles_available(void) {
-    return 1;
+    const vshi_embree *embree;
+    return vshi_embree_load(&embree, NULL) == VSH_OK;
 }
 
 static bool watch_memory(void *user, ssize_t bytes, bool post) {
@@ -193,29 +194,30 @@ static bool attach(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh
     if (begin == end) {
         return true;
     }
-    const RTCGeometry geometry = rtcNewGeometry(triangles->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    const RTCGeometry geometry =
+        triangles->embree->rtcNewGeometry(triangles->device, RTC_GEOMETRY_TYPE_TRIANGLE);
     if (geometry == NULL) {
         return false;
     }
-    float *vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                              3 * sizeof(float), meshes[mesh].vertex_count);
-    uint32_t *indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                3 * sizeof(uint32_t), end - begin);
+    float *vertices = triangles->embree->rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), meshes[mesh].vertex_count);
+    uint32_t *indices = triangles->embree->rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), end - begin);
     vshi_sieve_attach(triangles, mesh, geometry);
     if (vertices != NULL && indices != NULL) {
         memcpy(vertices, sheet->vertices + 3 * first_vertex, meshes[mesh].vertex_count * 3 * sizeof(float));
         for (size_t i = 0; i < 3 * (end - begin); ++i) {
             indices[i] = sheet->corners[3 * begin + i] - (uint32_t)first_vertex;
         }
-        rtcCommitGeometry(geometry);
-        rtcAttachGeometryByID(triangles->scene, geometry, (unsigned)mesh);
+        triangles->embree->rtcCommitGeometry(geometry);
+        triangles->embree->rtcAttachGeometryByID(triangles->scene, geometry, (unsigned)mesh);
     }
-    rtcReleaseGeometry(geometry);
+    triangles->embree->rtcReleaseGeometry(geometry);
     return vertices != NULL && indices != NULL;
 }
 
 static vsh_result refuse(const vsh_triangles *triangles, vshi_job *job, vsh_error *error) {
-    const enum RTCError code = rtcGetDeviceError(triangles->device);
+    const enum RTCError code = triangles->embree->rtcGetDeviceError(triangles->device);
     if (atomic_load(&triangles->refused)) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "triangles: the memory limit of %.0f MB is passed",
                          (double)triangles->limit / 1e6);
@@ -231,42 +233,45 @@ static vsh_result refuse(const vsh_triangles *triangles, vshi_job *job, vsh_erro
 
 /* The tree is made on the pool's threads, as many as the arena around the call has. */
 static void commit(void *user) {
-    rtcCommitScene(user);
+    const vsh_triangles *triangles = user;
+    triangles->embree->rtcCommitScene(triangles->scene);
 }
 
 /* An empty scene. */
 static vsh_result begin(vsh_triangles *triangles, vshi_job *job, vsh_error *error) {
-    triangles->device = rtcNewDevice(NULL);
+    VSHI_TRY(vshi_embree_load(&triangles->embree, error));
+    triangles->device = triangles->embree->rtcNewDevice(NULL);
     if (triangles->device == NULL) {
-        const enum RTCError code = rtcGetDeviceError(NULL);
+        const enum RTCError code = triangles->embree->rtcGetDeviceError(NULL);
         return code == RTC_ERROR_OUT_OF_MEMORY
                    ? vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory")
                    : vshi_fail(error, VSH_ERROR_UNSUPPORTED,
                                "triangles: Embree refuses this machine, error %d", (int)code);
     }
-    triangles->wide =
-        rtcGetDeviceProperty(triangles->device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0;
-    rtcSetDeviceMemoryMonitorFunction(triangles->device, watch_memory, triangles);
-    triangles->scene = rtcNewScene(triangles->device);
+    triangles->wide = triangles->embree->rtcGetDeviceProperty(
+                          triangles->device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0;
+    triangles->embree->rtcSetDeviceMemoryMonitorFunction(triangles->device, watch_memory, triangles);
+    triangles->scene = triangles->embree->rtcNewScene(triangles->device);
     if (triangles->scene == NULL) {
         return refuse(triangles, job, error);
     }
-    rtcSetSceneFlags(triangles->scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
-    rtcSetSceneProgressMonitorFunction(triangles->scene, watch_progress, job);
+    triangles->embree->rtcSetSceneFlags(triangles->scene,
+                                        RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+    triangles->embree->rtcSetSceneProgressMonitorFunction(triangles->scene, watch_progress, job);
     return VSH_OK;
 }
 
 /* Makes the tree. */
 static vsh_result finish(vsh_triangles *triangles, vshi_job *job, vsh_error *error) {
-    const vsh_result result = vshi_parallel_call(job, commit, triangles->scene, error);
-    rtcSetSceneProgressMonitorFunction(triangles->scene, NULL, NULL);
+    const vsh_result result = vshi_parallel_call(job, commit, triangles, error);
+    triangles->embree->rtcSetSceneProgressMonitorFunction(triangles->scene, NULL, NULL);
     if (result != VSH_OK) {
         return result;
     }
     if (vshi_job_cancelled(job)) {
         return vshi_job_fail_cancelled(job, error);
     }
-    const enum RTCError code = rtcGetDeviceError(triangles->device);
+    const enum RTCError code = triangles->embree->rtcGetDeviceError(triangles->device);
     if (code != RTC_ERROR_NONE || atomic_load(&triangles->refused)) {
         return refuse(triangles, job, error);
     }
@@ -293,26 +298,26 @@ static vsh_result build(vsh_triangles *triangles, const vshi_mesh_set *set, vshi
 static vsh_result build_quads(vsh_triangles *triangles, const vshi_quads *quads, vshi_job *job,
                               vsh_error *error) {
     VSHI_TRY(begin(triangles, job, error));
-    const RTCGeometry geometry = rtcNewGeometry(triangles->device, RTC_GEOMETRY_TYPE_QUAD);
+    const RTCGeometry geometry = triangles->embree->rtcNewGeometry(triangles->device, RTC_GEOMETRY_TYPE_QUAD);
     if (geometry == NULL) {
         return refuse(triangles, job, error);
     }
-    float *corners = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                             3 * sizeof(float), quads->corner_count);
-    uint32_t *indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4,
-                                                4 * sizeof(uint32_t), quads->quad_count);
+    float *corners = triangles->embree->rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), quads->corner_count);
+    uint32_t *indices = triangles->embree->rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, 4 * sizeof(uint32_t), quads->quad_count);
     vsh_result result =
         corners != NULL && indices != NULL
             ? quads->write(quads->user, triangles->centre, triangles->scale, corners, indices, error)
             : refuse(triangles, job, error);
     if (result == VSH_OK) {
-        rtcCommitGeometry(geometry);
+        triangles->embree->rtcCommitGeometry(geometry);
         /* quads of one size: rays are as fast as through a tree that takes twice the time to make */
-        rtcSetSceneBuildQuality(triangles->scene, RTC_BUILD_QUALITY_LOW);
-        rtcAttachGeometry(triangles->scene, geometry);
+        triangles->embree->rtcSetSceneBuildQuality(triangles->scene, RTC_BUILD_QUALITY_LOW);
+        triangles->embree->rtcAttachGeometry(triangles->scene, geometry);
         result = finish(triangles, job, error);
     }
-    rtcReleaseGeometry(geometry);
+    triangles->embree->rtcReleaseGeometry(geometry);
     return result;
 }
 
@@ -381,10 +386,10 @@ void vsh_triangles_free(vsh_triangles *triangles) {
         return;
     }
     if (triangles->scene != NULL) {
-        rtcReleaseScene(triangles->scene);
+        triangles->embree->rtcReleaseScene(triangles->scene);
     }
     if (triangles->device != NULL) {
-        rtcReleaseDevice(triangles->device);
+        triangles->embree->rtcReleaseDevice(triangles->device);
     }
     vshi_sieves_free(triangles);
     vshi_sheet_free(&triangles->sheet);

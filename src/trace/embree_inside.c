@@ -149,7 +149,7 @@ void vshi_triangles_meet(const vsh_triangles *triangles, const vshi_segment_ray 
         struct RTCRayHit lone;
         meets[i] = VSHI_MEETS_NOTHING;
         if (aim_lone(triangles, &rays[i], &lone)) {
-            rtcIntersect1(triangles->scene, &look.context, &lone);
+            triangles->embree->rtcIntersect1(triangles->scene, &look.context, &lone);
             meets[i] = met(triangles, lone.hit.geomID, lone.hit.primID, &rays[i]);
         }
     }
@@ -181,7 +181,7 @@ int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray 
     if (!aim_lone(triangles, ray, &lone)) {
         return 0;
     }
-    rtcIntersect1(triangles->scene, &look.context, &lone);
+    triangles->embree->rtcIntersect1(triangles->scene, &look.context, &lone);
     sort(crossings, look.count);
     int left = 0, most = 0;
     for (size_t i = 0; i < look.count; ++i) {
@@ -198,7 +198,7 @@ double vshi_triangles_distance(const vsh_triangles *triangles, const vshi_segmen
     if (!aim_lone(triangles, ray, &lone)) {
         return ray->far;
     }
-    rtcIntersect1(triangles->scene, &context, &lone);
+    triangles->embree->rtcIntersect1(triangles->scene, &context, &lone);
     return lone.hit.geomID != RTC_INVALID_GEOMETRY_ID ? (double)lone.ray.tfar / triangles->scale : ray->far;
 }
 

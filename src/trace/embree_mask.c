@@ -157,9 +157,9 @@ void vshi_sieves_free(vsh_triangles *triangles) {
 
 void vshi_sieve_attach(const vsh_triangles *triangles, size_t mesh, RTCGeometry geometry) {
     if (vshi_sieve_is(triangles, mesh)) {
-        rtcSetGeometryUserData(geometry, (void *)(uintptr_t)triangles);
-        rtcSetGeometryIntersectFilterFunction(geometry, filter);
-        rtcSetGeometryOccludedFilterFunction(geometry, filter);
+        triangles->embree->rtcSetGeometryUserData(geometry, (void *)(uintptr_t)triangles);
+        triangles->embree->rtcSetGeometryIntersectFilterFunction(geometry, filter);
+        triangles->embree->rtcSetGeometryOccludedFilterFunction(geometry, filter);
     }
 }
 

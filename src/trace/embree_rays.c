@@ -96,13 +96,13 @@ static void copy_half(int half, const struct RTCRay16 *whole, struct RTCRay8 *pa
 void vshi_triangles_occlude(const vsh_triangles *triangles, const int *valid,
                             struct RTCIntersectContext *context, struct RTCRay16 *packet) {
     if (triangles->wide) {
-        rtcOccluded16(valid, triangles->scene, context, packet);
+        triangles->embree->rtcOccluded16(valid, triangles->scene, context, packet);
         return;
     }
     for (int half = 0; half < 2; ++half) {
         struct RTCRay8 part;
         copy_half(half, packet, &part);
-        rtcOccluded8(valid + 8 * half, triangles->scene, context, &part);
+        triangles->embree->rtcOccluded8(valid + 8 * half, triangles->scene, context, &part);
         memcpy(packet->tfar + 8 * half, part.tfar, sizeof part.tfar);
     }
 }
@@ -143,7 +143,7 @@ static bool next_hit(const vsh_triangles *triangles, const vshi_sheet_beam *beam
                                       .tfar = beam->end < (double)FLT_MAX ? (float)beam->end : INFINITY,
                                       .mask = 0xffffffffu},
                               .hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
-    rtcIntersect1(triangles->scene, &context, hit);
+    triangles->embree->rtcIntersect1(triangles->scene, &context, hit);
     return hit->hit.geomID != RTC_INVALID_GEOMETRY_ID;
 }
 

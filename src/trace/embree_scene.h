@@ -11,6 +11,41 @@
 #include <embree3/rtcore.h>
 #include <stdatomic.h>
 
+/* Embree's functions that are called. */
+#define VSHI_EMBREE_CALLS(CALL)                                                                              \
+    CALL(rtcAttachGeometry)                                                                                  \
+    CALL(rtcAttachGeometryByID)                                                                              \
+    CALL(rtcCommitGeometry)                                                                                  \
+    CALL(rtcCommitScene)                                                                                     \
+    CALL(rtcGetDeviceError)                                                                                  \
+    CALL(rtcGetDeviceProperty)                                                                               \
+    CALL(rtcIntersect1)                                                                                      \
+    CALL(rtcNewDevice)                                                                                       \
+    CALL(rtcNewGeometry)                                                                                     \
+    CALL(rtcNewScene)                                                                                        \
+    CALL(rtcOccluded16)                                                                                      \
+    CALL(rtcOccluded8)                                                                                       \
+    CALL(rtcReleaseDevice)                                                                                   \
+    CALL(rtcReleaseGeometry)                                                                                 \
+    CALL(rtcReleaseScene)                                                                                    \
+    CALL(rtcSetDeviceMemoryMonitorFunction)                                                                  \
+    CALL(rtcSetGeometryIntersectFilterFunction)                                                              \
+    CALL(rtcSetGeometryOccludedFilterFunction)                                                               \
+    CALL(rtcSetGeometryUserData)                                                                             \
+    CALL(rtcSetNewGeometryBuffer)                                                                            \
+    CALL(rtcSetSceneBuildQuality)                                                                            \
+    CALL(rtcSetSceneFlags)                                                                                   \
+    CALL(rtcSetSceneProgressMonitorFunction)
+
+/* A pointer to each, and nothing else: embree_load.c fills it as an array. */
+typedef struct vshi_embree {
+#define VSHI_EMBREE_CALL(name) __typeof__(name) *name;
+    VSHI_EMBREE_CALLS(VSHI_EMBREE_CALL)
+} vshi_embree;
+
+/* Loads Embree once, for as long as the process lives. Errors: VSH_ERROR_UNSUPPORTED (it is not there). */
+vsh_result vshi_embree_load(const vshi_embree **embree, vsh_error *error);
+
 /* Where a triangle's solid lies, as its corners in the sheet turn. */
 enum { VSHI_AIR_AROUND, VSHI_SOLID_BEHIND, VSHI_SOLID_BEFORE, VSHI_SOLID_SIDE = 3 };
 /* Added to it where the solid is closed over holes: rays from inside may leave by them. */
@@ -28,6 +63,7 @@ typedef struct vshi_texture {
 /* Embree counts in floats, drops what is beyond 1.8e18 and loses what is very small, so it gets the scene
  * around 0 and of a size near 1: `scale` is a power of two, which rounds nothing. */
 struct vsh_triangles {
+    const vshi_embree *embree;
     RTCDevice device;
     RTCScene scene;
     vshi_sheet sheet;       /* of all geometries one after the other, in the scene's units */

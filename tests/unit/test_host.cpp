@@ -28,6 +28,16 @@ extern "C" {
 #include <unistd.h>
 #include <vdbshade/vdbshade.h>
 
+// A host with an Embree of its own, which exports it (tests/CMakeLists.txt).
+extern "C" {
+__attribute__((visibility("default"))) void *rtcNewDevice(const char *config);
+}
+static bool host_called;
+void *rtcNewDevice(const char *) {
+    host_called = true;
+    return nullptr;
+}
+
 namespace {
 
 std::string folder;
@@ -278,6 +288,26 @@ void many_threads_share_one_field(void **) {
     vsh_grid_free(grid);
 }
 
+void embree_of_the_host_is_not_called(void **) {
+    if (vsh_triangles_available() == 0) {
+        skip();
+    }
+    const float positions[9] = {0, 0, 0, 1, 0, 0, 0, 0, 1};
+    const uint32_t indices[3] = {0, 1, 2};
+    vsh_mesh mesh{};
+    mesh.positions = positions;
+    mesh.indices = indices;
+    mesh.vertex_count = 3;
+    mesh.triangle_count = 1;
+    vsh_triangles *triangles = nullptr;
+    vsh_error error{};
+    const vsh_result result = vsh_triangles_create(&mesh, 1, nullptr, &triangles, &error);
+    assert_string_equal(error.message, "");
+    assert_int_equal(result, VSH_OK);
+    assert_false(host_called);
+    vsh_triangles_free(triangles);
+}
+
 int make_folder(void **) {
     char name[512], here[400];
     const char *place = std::getenv("TMPDIR");
@@ -317,6 +347,7 @@ int main() {
         cmocka_unit_test(arenas_of_the_host_change_nothing),
         cmocka_unit_test(many_threads_with_fields_of_their_own_get_the_same_bits),
         cmocka_unit_test(many_threads_share_one_field),
+        cmocka_unit_test(embree_of_the_host_is_not_called),
     };
     return cmocka_run_group_tests_name("host", tests, make_folder, remove_folder);
 }
