@@ -35,6 +35,19 @@ function(vsh_set_source_flags target)
   target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:C>:-Wconversion -Wno-sign-conversion>)
 endfunction()
 
+# Callers have stacks of 128 KiB: frames are small, but for those of kernels,
+# which run in vshi_on_stack() (src/base/threads.h).
+set(VSH_LARGEST_FRAME 24576)
+file(GLOB VSH_LARGE_FRAMES ${PROJECT_SOURCE_DIR}/src/shade/*.c)
+list(APPEND VSH_LARGE_FRAMES ${PROJECT_SOURCE_DIR}/src/volume/volume_blocks.c ${PROJECT_SOURCE_DIR}/src/field/reach_out.c
+     ${PROJECT_SOURCE_DIR}/src/bake/lift.c)
+set_source_files_properties(${VSH_LARGE_FRAMES} PROPERTIES COMPILE_OPTIONS -Wno-frame-larger-than)
+function(vsh_limit_frames target)
+  if(NOT VSH_SANITIZE)
+    target_compile_options(${target} PRIVATE $<$<AND:$<COMPILE_LANGUAGE:C>,$<CONFIG:Release>>:-Wframe-larger-than=${VSH_LARGEST_FRAME}>)
+  endif()
+endfunction()
+
 # The kernels are one source each, built once for each instruction set and chosen at run time: lanes at once and in a vector.
 set(VSH_KERNEL_base 16 4)
 set(VSH_KERNEL_few 4 4)
@@ -68,6 +81,6 @@ function(vsh_add_kernel target name source flags definitions)
   set(file ${PROJECT_BINARY_DIR}/kernels/${name}.c)
   file(CONFIGURE OUTPUT ${file} CONTENT "${definitions}#include \"${source}\"\n")
   target_sources(${target} PRIVATE ${file})
-  set_source_files_properties(${file} PROPERTIES COMPILE_OPTIONS "-O3;${flags}"
+  set_source_files_properties(${file} PROPERTIES COMPILE_OPTIONS "-O3;-Wno-frame-larger-than;${flags}"
                               OBJECT_DEPENDS ${PROJECT_SOURCE_DIR}/src/${source})
 endfunction()

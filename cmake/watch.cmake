@@ -38,7 +38,8 @@ include(CheckLinkerFlag)
 check_linker_flag(CXX -fuse-ld=lld VSH_LLD)
 
 function(vsh_watch target watch)
-  target_compile_options(${target} PRIVATE -O1 -g1 -fsanitize=${VSH_WATCH_${watch}} ${VSH_SANITIZE_FLAGS})
+  target_compile_options(${target} PRIVATE -O1 -g1 -fsanitize=${VSH_WATCH_${watch}} ${VSH_SANITIZE_FLAGS}
+                         $<$<COMPILE_LANGUAGE:C>:-Wno-frame-larger-than>)
   target_link_options(${target} PRIVATE -fsanitize=${VSH_WATCH_${watch}})
 endfunction()
 

@@ -25,6 +25,9 @@
  *   vsh_lightmap, vsh_image …), and vsh_error, vsh_attribute and vsh_bake_error, which get no more members.
  * - Calls compute in the default floating-point environment (round to nearest, denormals kept, no traps),
  *   whatever the caller has set, which is given back. Callbacks are called in the default one.
+ * - Every call works on a stack of 128 KiB, of a thread or of a fibre. A call that finds less than 2 MiB left
+ *   does its work on threads of its own with 4 MiB and waits for them, which takes up to a millisecond more.
+ *   VSH_ERROR_MEMORY where the system refuses such a thread. Callbacks then come from these threads.
  * - Files that somebody else made: the libraries that parse .vdb files, meshes, images and fonts can crash on
  *   damaged ones. With vsh_run.reader they run in a child process, confined, that hands over plain arrays;
  *   everything in these is checked, and a crash, a hang or hunger there is an error here (reader.h). The
@@ -117,7 +120,7 @@ typedef struct vsh_progress_filter {
     void *user;                /* of `progress` */
     double seconds;            /* by the clock, ≥ 0 */
     uint64_t thread;  /* nonzero: that thread alone hands on, (uint64_t)pthread_self(); the one that makes a
-                         call takes part in its work */
+                         call takes part in its work, if it has a stack of 4 MiB */
     double last;      /* these two are kept by vsh_progress_seldom(): when it handed on last, 0: not yet; */
     int32_t answered; /* and what the callback answered */
 } vsh_progress_filter;

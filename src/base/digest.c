@@ -25,7 +25,7 @@ static vsh_result digest_stream(FILE *file, const char *path, char *digest, vshi
     SHA2_CTX context;
     SHA256Init(&context);
     const bool fast = vshi_sha256_fast();
-    unsigned char bytes[1 << 16];
+    unsigned char bytes[1 << 14];
     size_t count;
     while ((count = fread(bytes, 1, sizeof bytes, file)) > 0) {
         update(&context, fast, bytes, count);

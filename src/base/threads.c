@@ -4,6 +4,8 @@
 #define _GNU_SOURCE /* gettid */
 #include "base/threads.h"
 
+#include "base/error.h"
+
 #include <pthread.h>
 #include <sched.h>
 #include <signal.h>
@@ -130,4 +132,67 @@ bool vshi_threads_left(int32_t wanted) {
     const bool left = try(wanted, 0) == wanted;
     pthread_mutex_unlock(&looking);
     return left;
+}
+
+/* The range of addresses of a thread's stack. A fibre has its stack elsewhere. */
+typedef struct stack_range {
+    uintptr_t low, high; /* both 0: not looked up yet */
+} stack_range;
+
+static bool has_stack(void) {
+    static _Thread_local stack_range range;
+    if (range.high == 0) {
+        pthread_attr_t attributes;
+        void *low = NULL;
+        size_t size = 0;
+        range = (stack_range){0, UINTPTR_MAX}; /* where the system does not tell */
+        if (pthread_getattr_np(pthread_self(), &attributes) == 0) {
+            if (pthread_attr_getstack(&attributes, &low, &size) == 0) {
+                range = (stack_range){(uintptr_t)low, (uintptr_t)low + size};
+            }
+            pthread_attr_destroy(&attributes);
+        }
+    }
+    const uintptr_t here = (uintptr_t)__builtin_frame_address(0);
+    return here >= range.low && here < range.high && here - range.low >= VSHI_STACK_ENOUGH;
+}
+
+typedef struct stack_call {
+    void (*fn)(void *user);
+    void *user;
+} stack_call;
+
+static void *run_call(void *user) {
+    const stack_call *call = user;
+    call->fn(call->user);
+    return NULL;
+}
+
+vsh_result vshi_on_stack(void (*fn)(void *user), void *user, vsh_error *error) {
+    if (has_stack()) {
+        fn(user);
+        return VSH_OK;
+    }
+    stack_call call = {fn, user};
+    sigset_t all, before;
+    pthread_attr_t attributes;
+    pthread_t thread;
+    bool begun = false;
+    if (pthread_attr_init(&attributes) == 0) {
+        sigfillset(&all);
+        pthread_sigmask(SIG_SETMASK, &all, &before);
+        begun = pthread_attr_setstacksize(&attributes, VSHI_STACK) == 0 &&
+                pthread_create(&thread, &attributes, run_call, &call) == 0;
+        pthread_sigmask(SIG_SETMASK, &before, NULL);
+        pthread_attr_destroy(&attributes);
+    }
+    if (!begun) {
+        return vshi_fail(
+            error, VSH_ERROR_MEMORY,
+            "threads: the system refuses a thread with a stack of %d MB; call from a thread with "
+            "%d MB",
+            VSHI_STACK >> 20, 2 * VSHI_STACK_ENOUGH >> 20);
+    }
+    pthread_join(thread, NULL);
+    return VSH_OK;
 }

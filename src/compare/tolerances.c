@@ -1,6 +1,7 @@
 /* Limits from a file of JSON, read as scenes are. */
 #include "base/floats.h"
 #include "base/job.h"
+#include "base/threads.h"
 #include "base/try.h"
 #include "json/keys.h"
 
@@ -99,6 +100,25 @@ static vsh_result parse(vshi_json *reader, vsh_tolerances *made) {
     return result;
 }
 
+typedef struct parsing {
+    vshi_json *reader;
+    vsh_tolerances *made;
+    vsh_result result;
+} parsing;
+
+static void parse_all(void *user) {
+    VSHI_FLOATS;
+    parsing *p = user;
+    p->result = parse(p->reader, p->made);
+}
+
+/* How deep JSON nests is up to its file. */
+static vsh_result parse_on_stack(vshi_json *reader, vsh_tolerances *made) {
+    parsing p = {reader, made, VSH_OK};
+    VSHI_TRY(vshi_on_stack(parse_all, &p, reader->error));
+    return p.result;
+}
+
 vsh_result vsh_tolerances_read(const char *path, vsh_tolerances **tolerances, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(tolerances);
@@ -113,7 +133,7 @@ vsh_result vsh_tolerances_read(const char *path, vsh_tolerances **tolerances, vs
     vsh_tolerances *made = calloc(1, sizeof *made);
     const vsh_result result =
         made != NULL
-            ? parse(&reader, made)
+            ? parse_on_stack(&reader, made)
             : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
     free(text);
     if (result != VSH_OK) {

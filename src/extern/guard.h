@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 #include "base/floats.h"
+#include "base/threads.h"
 
 #include <exception>
 #include <new>
@@ -23,9 +24,9 @@ inline void require(vsh_result result) {
     }
 }
 
-// Runs body() and returns its vsh_result; exceptions become VSH_ERROR_MEMORY or `code`, prefixed by `what`.
+// What body() returns; exceptions become VSH_ERROR_MEMORY or `code`, prefixed by `what`.
 template <typename Body>
-vsh_result guard(vsh_error *error, vsh_result code, const char *what, Body &&body) noexcept {
+vsh_result catch_all(vsh_error *error, vsh_result code, const char *what, Body &body) noexcept {
     VSHI_FLOATS;
     try {
         return body();
@@ -38,6 +39,16 @@ vsh_result guard(vsh_error *error, vsh_result code, const char *what, Body &&bod
     } catch (...) {
         return vshi_fail(error, VSH_ERROR_INTERNAL, "%s: unknown exception", what);
     }
+}
+
+// The same, where there is stack enough for what body() calls: maybe on another thread.
+template <typename Body>
+vsh_result guard(vsh_error *error, vsh_result code, const char *what, Body &&body) noexcept {
+    vsh_result result = VSH_OK;
+    auto run = [&] { result = catch_all(error, code, what, body); };
+    const vsh_result begun =
+        vshi_on_stack([](void *user) { (*static_cast<decltype(run) *>(user))(); }, &run, error);
+    return begun == VSH_OK ? result : begun;
 }
 
 } // namespace vshi

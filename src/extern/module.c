@@ -6,6 +6,7 @@
 #include "base/threads.h"
 
 #include <dlfcn.h>
+#include <errno.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
@@ -62,7 +63,12 @@ static vsh_result load(vshi_module *module, vsh_error *error) {
     if (result != VSH_OK) {
         return result;
     }
+    errno = 0;
     void *opened = open_module(module->file);
+    if (opened == NULL && errno == ENOMEM) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused the memory that %s takes",
+                         module->what, module->file);
+    }
     const void *table = opened != NULL ? dlsym(opened, module->symbol) : NULL;
     if (table == NULL) {
         const char *why = dlerror();
@@ -78,12 +84,24 @@ static vsh_result load(vshi_module *module, vsh_error *error) {
     return VSH_OK;
 }
 
+typedef struct loading {
+    vshi_module *module;
+    vsh_result result;
+    vsh_error *error;
+} loading;
+
+static void load_once(void *user) {
+    loading *l = user;
+    pthread_mutex_lock(&l->module->lock);
+    l->result = vshi_module_table(l->module) == NULL ? load(l->module, l->error) : VSH_OK;
+    pthread_mutex_unlock(&l->module->lock);
+}
+
 vsh_result vshi_module_load(vshi_module *module, vsh_error *error) {
     if (vshi_module_table(module) != NULL) {
         return VSH_OK;
     }
-    pthread_mutex_lock(&module->lock);
-    const vsh_result result = vshi_module_table(module) == NULL ? load(module, error) : VSH_OK;
-    pthread_mutex_unlock(&module->lock);
-    return result;
+    loading l = {module, VSH_OK, error};
+    const vsh_result begun = vshi_on_stack(load_once, &l, error);
+    return begun == VSH_OK ? l.result : begun;
 }

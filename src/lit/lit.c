@@ -8,6 +8,7 @@
 #include "base/file.h"
 #include "base/floats.h"
 #include "base/memory.h"
+#include "base/threads.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -231,6 +232,36 @@ static vsh_result try_all(vshi_lit_work *work, const char *path, const vsh_run *
     return VSH_OK;
 }
 
+typedef vsh_result work_fn(vshi_lit_work *work, const char *path, const vsh_run *run, vshi_job *job,
+                           vsh_error *error);
+
+typedef struct work_call {
+    work_fn *fn;
+    vshi_lit_work *work;
+    const char *path;
+    const vsh_run *run;
+    vshi_job *job;
+    vsh_error *error;
+    vsh_result result;
+} work_call;
+
+static void do_work(void *user) {
+    VSHI_FLOATS;
+    work_call *c = user;
+    c->result = c->fn(c->work, c->path, c->run, c->job, c->error);
+}
+
+/* How deep JSON nests is up to its file. */
+static vsh_result work_on_stack(work_fn *fn, vshi_lit_work *work, const char *path, const vsh_run *run,
+                                vshi_job *job, vsh_error *error) {
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "a lit model: the system refused memory");
+    }
+    work_call call = {fn, work, path, run, job, error, VSH_OK};
+    const vsh_result begun = vshi_on_stack(do_work, &call, error);
+    return begun == VSH_OK ? call.result : begun;
+}
+
 vsh_result vsh_lit_check_uvs(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
                              const vsh_lit_options *options, const vsh_run *run, vsh_error *error) {
     VSHI_FLOATS;
@@ -254,8 +285,7 @@ vsh_result vsh_lit_check_uvs(const char *path, const vsh_model *model, const vsh
         VSHI_TRY_DONE(vshi_lit_check_mesh(&work, i, error));
     }
     job = vshi_job_begin(&full, "lit", 1);
-    result = job != NULL ? try_all(&work, path, &full, job, error)
-                         : vshi_fail(error, VSH_ERROR_MEMORY, "a lit model: the system refused memory");
+    result = work_on_stack(try_all, &work, path, &full, job, error);
 done:
     vshi_job_end(job);
     free_work(&work);
@@ -282,8 +312,7 @@ vsh_result vsh_lit_write(const char *path, const vsh_model *model, const vsh_lit
     vsh_result result;
     VSHI_TRY_DONE(check(&work, error));
     job = vshi_job_begin(&full, "lit", vsh_model_mesh_count(model) + 1);
-    result = job != NULL ? make(&work, path, &full, job, error)
-                         : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", output);
+    result = work_on_stack(make, &work, path, &full, job, error);
     if (result == VSH_OK) {
         vshi_job_advance(job, 1); /* all is written: too late to stop */
     }

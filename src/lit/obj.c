@@ -38,7 +38,7 @@ typedef struct text {
     vshi_lit_put *put;
     void *file;
     size_t used;
-    char buffer[1 << 16];
+    char buffer[1 << 14];
 } text;
 
 enum { LONGEST = 512 /* bytes that one call of say() comes to at most */ };

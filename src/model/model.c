@@ -5,6 +5,7 @@
 
 #include "base/floats.h"
 #include "base/memory.h"
+#include "base/threads.h"
 #include "base/try.h"
 #include "model/model_file.h"
 
@@ -105,7 +106,7 @@ static bool wants_normals(const char *path) {
     return dot == NULL || (strcmp(dot, ".stl") != 0 && strcmp(dot, ".STL") != 0);
 }
 
-static vsh_result read_here(const char *path, const vsh_run *run, vshi_job *job, bool alone,
+static vsh_result read_file(const char *path, const vsh_run *run, vshi_job *job, bool alone,
                             vsh_model **model, vsh_error *error) {
     vshi_import *import = NULL;
     double unit = 0.0;
@@ -123,6 +124,30 @@ static vsh_result read_here(const char *path, const vsh_run *run, vshi_job *job,
     const vsh_result result = vshi_model_build(&source, model, error);
     vshi_import_free(import);
     return result;
+}
+
+typedef struct reading {
+    const char *path;
+    const vsh_run *run;
+    vshi_job *job;
+    bool alone;
+    vsh_model **model;
+    vsh_error *error;
+    vsh_result result;
+} reading;
+
+static void read_on_stack(void *user) {
+    VSHI_FLOATS;
+    reading *r = user;
+    r->result = read_file(r->path, r->run, r->job, r->alone, r->model, r->error);
+}
+
+/* How deep JSON nests is up to its file. */
+static vsh_result read_here(const char *path, const vsh_run *run, vshi_job *job, bool alone,
+                            vsh_model **model, vsh_error *error) {
+    reading r = {path, run, job, alone, model, error, VSH_OK};
+    const vsh_result begun = vshi_on_stack(read_on_stack, &r, error);
+    return begun == VSH_OK ? r.result : begun;
 }
 
 vsh_result vshi_model_read(const char *path, const vsh_run *run, bool alone, vsh_model **model,

@@ -12,7 +12,7 @@
 extern "C" {
 #endif
 
-enum { VSHI_ENCODER_BUFFER = 1 << 16 };
+enum { VSHI_ENCODER_BUFFER = 1 << 14 };
 
 /* A message that is written from offset `size` on; the first failure is kept, what follows it is left out. */
 typedef struct vshi_encoder {

@@ -4,6 +4,7 @@
 #include "base/error.h"
 #include "base/floats.h"
 #include "base/job.h"
+#include "base/threads.h"
 #include "base/try.h"
 #include "model/unsupported.h"
 #include "json/json.h"
@@ -18,19 +19,34 @@ vsh_result vshi_scene_text(const char *path, const vsh_run *run, char **text, si
     return vshi_json_text(path, run, text, size, error);
 }
 
+typedef struct reading {
+    const char *path;
+    const vsh_run *run;
+    vsh_scene **scene;
+    vsh_error *error;
+    vsh_result result;
+} reading;
+
+static void read_file(void *user) {
+    VSHI_FLOATS;
+    reading *r = user;
+    char *text = NULL;
+    size_t size;
+    r->result = vshi_scene_text(r->path, r->run, &text, &size, r->error);
+    if (r->result == VSH_OK) {
+        r->result = vshi_scene_parse(r->path, text, size, r->run, r->scene, r->error);
+    }
+    free(text);
+}
+
 vsh_result vsh_scene_read(const char *path, const vsh_run *run, vsh_scene **scene, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(scene);
     *scene = NULL;
     VSHI_NEEDS(path);
-    char *text = NULL;
-    size_t size;
     vsh_run full;
-    vsh_result result = VSH_OK;
-    VSHI_TRY_DONE(vshi_run_resolve(run, &full, error));
-    VSHI_TRY_DONE(vshi_scene_text(path, &full, &text, &size, error));
-    VSHI_TRY_DONE(vshi_scene_parse(path, text, size, &full, scene, error));
-done:
-    free(text);
-    return result;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    reading r = {path, &full, scene, error, VSH_OK};
+    VSHI_TRY(vshi_on_stack(read_file, &r, error)); /* how deep JSON nests is up to its file */
+    return r.result;
 }

@@ -3,6 +3,7 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/threads.h"
 #include "base/try.h"
 #include "scene/parts.h"
 #include "scene/scene.h"
@@ -157,6 +158,25 @@ done:
     return result;
 }
 
+typedef struct parsing {
+    vshi_json *reader;
+    owner *made;
+    vsh_result result;
+} parsing;
+
+static void parse_all(void *user) {
+    VSHI_FLOATS;
+    parsing *p = user;
+    p->result = parse(p->reader, p->made);
+}
+
+/* How deep JSON nests is up to its file. */
+static vsh_result parse_on_stack(vshi_json *reader, owner *made) {
+    parsing p = {reader, made, VSH_OK};
+    VSHI_TRY(vshi_on_stack(parse_all, &p, reader->error));
+    return p.result;
+}
+
 vsh_result vsh_flat_scene_read(const char *path, const vsh_run *run, vsh_flat_scene **scene,
                                vsh_error *error) {
     VSHI_FLOATS;
@@ -172,7 +192,7 @@ vsh_result vsh_flat_scene_read(const char *path, const vsh_run *run, vsh_flat_sc
     owner *made = calloc(1, sizeof *made);
     const vsh_result result =
         made != NULL
-            ? parse(&reader, made)
+            ? parse_on_stack(&reader, made)
             : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
     free(text);
     if (result == VSH_OK) {

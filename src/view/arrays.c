@@ -113,7 +113,7 @@ static char *describe(const vsh_model *model, uint64_t *bytes) {
                              "2.0", "scene", 0, "scenes", "nodes", numbers_to(&g, model->entry_count),
                              "nodes", g.nodes, "meshes", g.meshes, "accessors", g.accessors, "bufferViews",
                              g.views, "buffers", "byteLength", (json_int_t)g.bytes);
-    char *text = root != NULL && !g.short_of_memory ? json_dumps(root, JSON_COMPACT) : NULL;
+    char *text = root != NULL && !g.short_of_memory ? vshi_view_dump(root) : NULL;
     json_decref(root);
     return text;
 }

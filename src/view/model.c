@@ -45,7 +45,7 @@ static vsh_result fail_to_read(const char *path, FILE *file, vsh_error *error) {
 /* The bytes of a file, in a data block. */
 static vsh_result put_file(vshi_view *view, vshi_job *job, FILE *file, uint64_t size, const char *path,
                            vsh_error *error) {
-    enum { PIECE = 3 << 14 };
+    enum { PIECE = 3 << 12 };
     char piece[PIECE];
     vshi_page_data_begin(view->page, VSHI_VIEW_BLOCK, view->blocks++);
     for (uint64_t left = size; left > 0;) {
@@ -135,10 +135,13 @@ static vsh_result read_json(const vshi_view *view, const char *path, FILE *file,
     VSHI_TRY(vshi_allocate(&text, (size_t)length + 1, 1, path, error));
     vsh_result result = VSH_OK;
     json_error_t why;
+    errno = 0;
     if (fread(text, 1, (size_t)length, file) != length) {
         result = fail_to_read(path, file, error);
     } else if ((*root = json_loadb(text, (size_t)length, 0, &why)) == NULL) {
-        result = vshi_fail(error, VSH_ERROR_READ, "%s: its JSON, line %d: %s", path, why.line, why.text);
+        result = errno == ENOMEM ? vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path)
+                                 : vshi_fail(error, VSH_ERROR_READ, "%s: its JSON, line %d: %s", path,
+                                             why.line, why.text);
     }
     free(text);
     rewind(file);

@@ -39,6 +39,9 @@ vsh_result vshi_view_put_image(vshi_view *view, const char *name, const vsh_imag
 /* Whatever a name holds, as JSON; NULL where memory is short. */
 json_t *vshi_view_text(const char *text);
 
+/* JSON as text, to be freed; NULL where memory is short. json_dumps() leaves out keys then. */
+char *vshi_view_dump(const json_t *json);
+
 /* A path's last part. */
 const char *vshi_view_file_name(const char *path);
 

@@ -37,7 +37,7 @@ static void split(const float *values, int32_t width, int32_t height, bool srgb,
 }
 
 static vsh_result put_deflated(vshi_view *view, const uint8_t *bytes, size_t count, vsh_error *error) {
-    enum { PIECE = 1 << 16, MOST = 1 << 28 };
+    enum { PIECE = 1 << 14, MOST = 1 << 28 };
     uint8_t piece[PIECE];
     z_stream stream;
     memset(&stream, 0, sizeof stream);

@@ -4,6 +4,7 @@
 
 #include "base/floats.h"
 #include "base/memory.h"
+#include "base/threads.h"
 #include "base/try.h"
 #include "base/utf8.h"
 #include "view/embedded.h"
@@ -85,9 +86,18 @@ static void put_head(vshi_page *page) {
     vshi_page_put(page, vshi_view_body.bytes, vshi_view_body.size);
 }
 
+char *vshi_view_dump(const json_t *json) {
+    const size_t size = json_dumpb(json, NULL, 0, JSON_COMPACT);
+    char *text = size > 0 ? malloc(size + 1) : NULL;
+    if (text != NULL) {
+        text[json_dumpb(json, text, size, JSON_COMPACT)] = '\0';
+    }
+    return text;
+}
+
 /* JSON that HTML takes for text: within strings, the only place where they can be, < > & are escaped. */
 static vsh_result put_about(vshi_view *view, vsh_error *error) {
-    char *text = json_dumps(view->about, JSON_COMPACT);
+    char *text = vshi_view_dump(view->about);
     if (text == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "page: the system refused memory");
     }
@@ -232,6 +242,21 @@ done:
     return result;
 }
 
+typedef struct writing {
+    const char *path;
+    const vsh_view_bake *bakes;
+    size_t count;
+    const vsh_run *run;
+    vsh_error *error;
+    vsh_result result;
+} writing;
+
+static void write_all(void *user) {
+    VSHI_FLOATS;
+    writing *w = user;
+    w->result = write_page(w->path, w->bakes, w->count, w->run, w->error);
+}
+
 vsh_result vsh_view_write_bakes(const char *path, const vsh_view_bake *const *bakes, size_t count,
                                 const vsh_run *run, vsh_error *error) {
     VSHI_FLOATS;
@@ -255,7 +280,9 @@ vsh_result vsh_view_write_bakes(const char *path, const vsh_view_bake *const *ba
         goto done;
     }
     VSHI_TRY_DONE(vshi_run_resolve(run, &resolved, error));
-    result = write_page(path, full, count, &resolved, error);
+    writing w = {path, full, count, &resolved, error, VSH_OK};
+    VSHI_TRY_DONE(vshi_on_stack(write_all, &w, error)); /* how deep JSON nests is up to its file */
+    result = w.result;
 done:
     free(full);
     return result;

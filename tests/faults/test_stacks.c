@@ -1,0 +1,235 @@
+/* Every kind of call works on a stack of 128 KiB: of a thread, and of a fibre, which no thread knows of.
+ * Below each stack lies a page that nobody may touch. */
+#define _GNU_SOURCE
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "sandbox/reader.h"
+#include "scenarios.h"
+
+#include <limits.h>
+#include <pthread.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <ucontext.h>
+#include <unistd.h>
+
+enum { STACK = 128 << 10, GUARD = 4096, PAINT = 0xa5 };
+
+typedef struct call {
+    scenario_fn *scenario;
+    vsh_run run;
+    vsh_result result;
+    vsh_error error;
+} call;
+
+static void do_call(call *c) {
+    c->error = (vsh_error){VSH_OK, ""};
+    c->result = c->scenario(&c->run, &c->error);
+}
+
+static void *on_thread(void *user) {
+    do_call(user);
+    return NULL;
+}
+
+/* makecontext() passes integers only. */
+static call *fibre_call;
+static void on_fibre(void) {
+    do_call(fibre_call);
+}
+
+static unsigned char *make_stack(void) {
+    unsigned char *pages =
+        mmap(NULL, GUARD + STACK, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    assert_ptr_not_equal(pages, MAP_FAILED);
+    assert_int_equal(mprotect(pages, GUARD, PROT_NONE), 0);
+    memset(pages + GUARD, PAINT, STACK);
+    return pages;
+}
+
+/* Returns the bytes of it that were touched. */
+static size_t free_stack(unsigned char *pages) {
+    size_t untouched = 0;
+    while (untouched < STACK && pages[GUARD + untouched] == PAINT) {
+        ++untouched;
+    }
+    munmap(pages, GUARD + STACK);
+    return STACK - untouched;
+}
+
+static size_t run_on_thread(call *c) {
+    unsigned char *pages = make_stack();
+    pthread_attr_t attributes;
+    pthread_t thread;
+    assert_int_equal(pthread_attr_init(&attributes), 0);
+    assert_int_equal(pthread_attr_setstack(&attributes, pages + GUARD, STACK), 0);
+    assert_int_equal(pthread_create(&thread, &attributes, on_thread, c), 0);
+    assert_int_equal(pthread_join(thread, NULL), 0);
+    pthread_attr_destroy(&attributes);
+    return free_stack(pages);
+}
+
+static size_t run_on_fibre(call *c) {
+    static ucontext_t host, fibre;
+    unsigned char *pages = make_stack();
+    assert_int_equal(getcontext(&fibre), 0);
+    fibre.uc_stack.ss_sp = pages + GUARD;
+    fibre.uc_stack.ss_size = STACK;
+    fibre.uc_link = &host;
+    fibre_call = c;
+    makecontext(&fibre, on_fibre, 0);
+    assert_int_equal(swapcontext(&host, &fibre), 0);
+    return free_stack(pages);
+}
+
+static void run_everywhere(const char *name, call *c) {
+    static size_t (*const places[])(call *) = {run_on_thread, run_on_fibre};
+    size_t used[2];
+    for (size_t i = 0; i < 2; ++i) {
+        c->run.threads = (int32_t)i + 1;
+        used[i] = places[i](c);
+        if (c->result != VSH_OK) {
+            fail_msg("%s: %s", name, c->error.message);
+        }
+        scenarios_untouched(); /* no: it has written */
+    }
+    print_message("%-28s %3zu KiB of a thread, %3zu of a fibre\n", name, used[0] >> 10, used[1] >> 10);
+}
+
+static void every_scenario_runs(void **state) {
+    (void)state;
+    if (VSHI_SANITIZED) { /* whose frames are larger */
+        skip();
+    }
+    for (size_t i = 0; i < scenario_count; ++i) {
+        call c = {.scenario = scenarios[i].run, .run = vsh_run_default()};
+        run_everywhere(scenarios[i].name, &c);
+    }
+}
+
+static void files_are_read_by_a_reader(void **state) {
+    (void)state;
+    char reader[PATH_MAX];
+    const ssize_t length = readlink("/proc/self/exe", reader, sizeof reader - 32);
+    assert_true(length > 0);
+    reader[length] = '\0';
+    strcpy(strrchr(reader, '/'), "/../" VSH_READER);
+    if (VSHI_SANITIZED || access(reader, X_OK) != 0) {
+        skip();
+    }
+    for (size_t i = 0; i < scenario_count; ++i) {
+        if (strstr(scenarios[i].name, "models") != NULL || strstr(scenarios[i].name, "assets") != NULL ||
+            strstr(scenarios[i].name, "images read") != NULL) {
+            call c = {.scenario = scenarios[i].run, .run = vsh_run_default()};
+            c.run.reader = reader;
+            run_everywhere(scenarios[i].name, &c);
+        }
+    }
+}
+
+/* Jansson reads 2048 levels, one inside the other. */
+static vsh_result read_deep(const vsh_run *run, vsh_error *error) {
+    static const struct {
+        const char *name, *begin, *end;
+    } files[] = {{"deep.json", "{\"casters\": ", "}"},
+                 {"deep.gltf", "{\"asset\": {\"version\": \"2.0\"}, \"extras\": ", "}"}};
+    enum { LEVELS = 2000 };
+    for (size_t i = 0; i < 2; ++i) {
+        FILE *file = fopen(files[i].name, "w");
+        assert_non_null(file);
+        fputs(files[i].begin, file);
+        for (int level = 0; level < LEVELS; ++level) {
+            fputc('[', file);
+        }
+        for (int level = 0; level < LEVELS; ++level) {
+            fputc(']', file);
+        }
+        fputs(files[i].end, file);
+        fclose(file);
+    }
+    vsh_scene *scene = NULL;
+    vsh_model *model = NULL;
+    vsh_tolerances *tolerances = NULL;
+    vsh_flat_scene *flat = NULL;
+    vsh_view_bake bake = vsh_view_bake_default();
+    bake.model = files[1].name;
+    const bool refused = vsh_scene_read(files[0].name, run, &scene, error) == VSH_ERROR_INPUT &&
+                         vsh_flat_scene_read(files[0].name, run, &flat, error) == VSH_ERROR_INPUT &&
+                         vsh_tolerances_read(files[0].name, &tolerances, error) == VSH_ERROR_INPUT &&
+                         vsh_model_read(files[1].name, run, &model, error) == VSH_ERROR_INPUT &&
+                         vsh_view_write("deep.html", &bake, NULL, run, error) == VSH_ERROR_INPUT;
+    unlink(files[0].name);
+    unlink(files[1].name);
+    return refused ? VSH_OK : VSH_ERROR_INTERNAL;
+}
+
+static void deeply_nested_files_are_refused(void **state) {
+    (void)state;
+    if (VSHI_SANITIZED) {
+        skip();
+    }
+    call c = {.scenario = read_deep, .run = vsh_run_default()};
+    run_everywhere("deeply nested files", &c);
+}
+
+static int32_t shadow_method, ao_method;
+
+static vsh_result bake_by_methods(const vsh_run *run, vsh_error *error) {
+    vsh_model *model = NULL;
+    vsh_occluders *occluders = NULL;
+    vsh_texels *texels = NULL;
+    float shadow[SIDE * SIDE], ao[SIDE * SIDE];
+    vsh_result result;
+    MAKE(model, vsh_model_read("box.obj", run, &model, error));
+    const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
+    vsh_occluders_options casting = vsh_occluders_options_default();
+    casting.triangles = 1;
+    casting.grid.resolution = 16;
+    MAKE(occluders, vsh_occluders_create(&mesh, 1, &casting, run, &occluders, error));
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = SIDE;
+    MAKE(texels, vsh_texels_create(&mesh, 1, &options, run, NULL, &texels, error));
+    vsh_light light = vsh_light_default();
+    light.angle = 0.3;
+    vsh_shade_options shade = vsh_shade_options_default();
+    shade.method = shadow_method;
+    shade.ao_method = ao_method;
+    float *const shadows[] = {shadow};
+    const vsh_lightmap planes = {.shadow = shadows, .ao = ao};
+    TRY(vsh_bake_lightmap(occluders, texels, &light, 1, &shade, run, &planes, NULL, error));
+end:
+    vsh_texels_free(texels);
+    vsh_occluders_free(occluders);
+    vsh_model_free(model);
+    return result;
+}
+
+static void lightmaps_are_baked_by_every_method(void **state) {
+    (void)state;
+    if (VSHI_SANITIZED || vsh_triangles_available() == 0) {
+        skip();
+    }
+    for (shadow_method = VSH_SHADOW_HARD; shadow_method <= VSH_SHADOW_AUTO; ++shadow_method) {
+        char name[64];
+        ao_method = shadow_method % (VSH_AO_AUTO + 1);
+        snprintf(name, sizeof name, "%s, AO %s", vsh_shadow_method_name(shadow_method),
+                 vsh_ao_method_name(ao_method));
+        call c = {.scenario = bake_by_methods, .run = vsh_run_default()};
+        run_everywhere(name, &c);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_scenario_runs),
+        cmocka_unit_test(deeply_nested_files_are_refused),
+        cmocka_unit_test(lightmaps_are_baked_by_every_method),
+        cmocka_unit_test(files_are_read_by_a_reader),
+    };
+    return cmocka_run_group_tests(tests, scenarios_begin, scenarios_end);
+}
