@@ -4,6 +4,7 @@
 #include "base/try.h"
 #include "json/locate.h"
 
+#include <errno.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -162,12 +163,13 @@ vsh_result vshi_json_load(vshi_json *reader, json_t **json) {
                          reader->path, place.line, place.column);
     }
     json_error_t failure;
+    errno = 0;
     *json =
         json_loadb(reader->text, reader->size, JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL, &failure);
     if (*json != NULL) {
         return VSH_OK;
     }
-    if (json_error_code(&failure) == json_error_out_of_memory) {
+    if (errno == ENOMEM) { /* Jansson calls it a syntax error in some places */
         return vshi_fail(reader->error, VSH_ERROR_MEMORY, "%s: the system refused memory", reader->path);
     }
     return vshi_fail(reader->error, VSH_ERROR_INPUT, "%s:%d:%d: %s", reader->path,

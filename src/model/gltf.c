@@ -5,6 +5,7 @@
 #include "base/memory.h"
 #include "model/scan.h"
 
+#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -19,6 +20,7 @@ json_t *vshi_gltf_parse_json(const char *text, size_t size, json_error_t *where,
     while (size > 0 && text[size - 1] == '\0') {
         --size; /* padding of chunks by some exporters */
     }
+    errno = 0;
     json_t *root = json_loadb(text, size, JSON_ALLOW_NUL, where);
     *early = root == NULL && (json_error_code(where) == json_error_premature_end_of_input ||
                               where->position < 0 || (size_t)where->position >= size);
@@ -29,6 +31,9 @@ static vsh_result parse(vshi_gltf *gltf, const char *text, size_t size, vsh_erro
     json_error_t where;
     bool early;
     gltf->root = vshi_gltf_parse_json(text, size, &where, &early);
+    if (gltf->root == NULL && errno == ENOMEM) { /* Jansson calls it a syntax error in some places */
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", gltf->path);
+    }
     if (gltf->root == NULL) {
         return vshi_fail(error, early ? VSH_ERROR_READ : VSH_ERROR_INPUT, "%s: %s: line %d column %d: %s",
                          gltf->path, early ? "cut short" : "its JSON is damaged", where.line, where.column,

@@ -212,8 +212,8 @@ static vsh_result fail_end(const vshi_exchange *exchange, int status, bool begun
             return fail_time(exchange, seconds_for(exchange->path, exchange->run), error);
         }
         const char *name = sigabbrev_np(number);
-        return vshi_fail(error, VSH_ERROR_READ, "%s: damaged: the reader crashed (SIG%s)", exchange->path,
-                         name != NULL ? name : "?");
+        return vshi_fail(error, VSH_ERROR_READ, "%s: damaged: the reader crashed (SIG%s), or memory ran out",
+                         exchange->path, name != NULL ? name : "?");
     }
     if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_OUT_OF_MEMORY) {
         return fail_memory(exchange, error);

@@ -225,7 +225,8 @@ static vsh_result refuse(const vsh_triangles *triangles, vshi_job *job, vsh_erro
     if (vshi_job_cancelled(job)) {
         return vshi_job_fail_cancelled(job, error);
     }
-    if (code == RTC_ERROR_OUT_OF_MEMORY) {
+    if (code == RTC_ERROR_OUT_OF_MEMORY ||
+        code == RTC_ERROR_NONE) { /* it forgets the reason in some places */
         return vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory");
     }
     return vshi_fail(error, VSH_ERROR_INTERNAL, "triangles: Embree's error %d", (int)code);
@@ -243,7 +244,7 @@ static vsh_result begin(vsh_triangles *triangles, vshi_job *job, vsh_error *erro
     triangles->device = triangles->embree->rtcNewDevice(NULL);
     if (triangles->device == NULL) {
         const enum RTCError code = triangles->embree->rtcGetDeviceError(NULL);
-        return code == RTC_ERROR_OUT_OF_MEMORY
+        return code == RTC_ERROR_OUT_OF_MEMORY || code == RTC_ERROR_NONE
                    ? vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory")
                    : vshi_fail(error, VSH_ERROR_UNSUPPORTED,
                                "triangles: Embree refuses this machine, error %d", (int)code);

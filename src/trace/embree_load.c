@@ -7,6 +7,7 @@
 #include "base/error.h"
 
 #include <dlfcn.h>
+#include <errno.h>
 #include <pthread.h>
 #include <string.h>
 
@@ -19,7 +20,12 @@ static _Atomic(const vshi_embree *) loaded;
 
 static vsh_result load(vsh_error *error) {
     /* stays for as long as the process lives, as other handles may trace with it */
+    errno = 0;
     void *library = dlopen(VSH_EMBREE, RTLD_NOW | RTLD_LOCAL);
+    if (library == NULL && errno == ENOMEM) {
+        return vshi_fail(error, VSH_ERROR_MEMORY,
+                         "triangles: the system refused the memory that Embree takes");
+    }
     unsigned char *call = (unsigned char *)&calls;
     for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
         void *found = library != NULL ? dlsym(library, names[i]) : NULL;

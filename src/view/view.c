@@ -89,8 +89,12 @@ static void put_head(vshi_page *page) {
 char *vshi_view_dump(const json_t *json) {
     const size_t size = json_dumpb(json, NULL, 0, JSON_COMPACT);
     char *text = size > 0 ? malloc(size + 1) : NULL;
+    if (text != NULL && json_dumpb(json, text, size, JSON_COMPACT) != size) {
+        free(text);
+        return NULL;
+    }
     if (text != NULL) {
-        text[json_dumpb(json, text, size, JSON_COMPACT)] = '\0';
+        text[size] = '\0';
     }
     return text;
 }

@@ -81,6 +81,26 @@ setup() {
     [ "$refused" -gt 4 ] || fail "$refused refused"
 }
 
+@test "whichever allocation of view is refused, it says so or the page is whole" {
+    unless_sanitized "its allocations cannot be refused"
+    local input n refused=0
+    for input in box.obj "$ASSETS/thin.glb"; do
+        view=("$VDBSHADE" view "$input" -o out.html --trusted --threads 1 --quiet)
+        "${view[@]}"
+        mv out.html whole.html
+        for ((n = 3; n < 1000; n += 7)); do
+            LD_PRELOAD=$calls REFUSE_MALLOC=$n run --separate-stderr "${view[@]}"
+            if [ "$status" -eq 0 ]; then
+                cmp out.html whole.html || fail "$n of $input"
+            else
+                [[ $status = [34] && $stderr =~ memory|"the system refused" ]] || fail "$n of $input: $status $stderr"
+                refused=$((refused + 1))
+            fi
+        done
+    done
+    [ "$refused" -gt 100 ] || fail "$refused refused"
+}
+
 @test "statistics that cannot be written are told before an image is replaced" {
     old_output out.exr
     local name

@@ -1,6 +1,6 @@
 /* Preloaded by tests/cli/refusals.bats: system calls that are refused, or told of.
  * REFUSE_THREADS=N: no more than N threads at a time, LINGER=MS: one that was joined counts for so long yet;
- * REFUSE_MEMFD: none; TELL_SYNCS=FILE: a line for each
+ * REFUSE_MEMFD: none; REFUSE_MALLOC=N: the N-th allocation; TELL_SYNCS=FILE: a line for each
  * fsync(), fdatasync() and rename(), with the names. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -101,6 +101,40 @@ int memfd_create(const char *name, unsigned flags) {
         return -1;
     }
     return real(name, flags);
+}
+
+/* glibc's own, as dlsym() allocates. */
+void *__libc_malloc(size_t size);
+void *__libc_calloc(size_t count, size_t size);
+void *__libc_realloc(void *old, size_t size);
+
+static atomic_long allocations;
+static long refused_allocation; /* 0: none */
+
+static __attribute__((constructor)) void begin(void) {
+    const char *text = getenv("REFUSE_MALLOC");
+    refused_allocation = text != NULL ? atol(text) : 0;
+    atomic_store(&allocations, 0);
+}
+
+static int refuses(void) {
+    if (refused_allocation == 0 || atomic_fetch_add(&allocations, 1) + 1 != refused_allocation) {
+        return 0;
+    }
+    errno = ENOMEM;
+    return 1;
+}
+
+void *malloc(size_t size) {
+    return refuses() ? NULL : __libc_malloc(size);
+}
+
+void *calloc(size_t count, size_t size) {
+    return refuses() ? NULL : __libc_calloc(count, size);
+}
+
+void *realloc(void *old, size_t size) {
+    return refuses() ? NULL : __libc_realloc(old, size);
 }
 
 static void tell(const char *call, const char *name) {

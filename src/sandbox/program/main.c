@@ -6,6 +6,7 @@
 #include <vdbshade/reader.h>
 
 #include <dlfcn.h>
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -13,7 +14,11 @@
 typedef int32_t serve_fn(int argc, char **argv);
 
 static int serve(char *name, char *argument, const vshi_reader_state *state) {
+    errno = 0;
     void *library = dlopen(VSHI_LIBRARY, RTLD_LAZY | RTLD_GLOBAL);
+    if (library == NULL && errno == ENOMEM) {
+        return VSHI_READER_OUT_OF_MEMORY;
+    }
     void *symbol = library != NULL ? dlsym(library, "vsh_reader_serve") : NULL;
     if (symbol == NULL) {
         return VSHI_READER_EMPTY;
