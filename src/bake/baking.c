@@ -54,10 +54,13 @@ static vsh_result place_points(vshi_baking *bake, const vsh_light *light, bool t
         shade->start_offset = 0.0;
         shade->surface_offset = 0.0;
     }
-    const vshi_lifter lifter = vshi_lifter_open(bake->texels, bake->occluders, light);
-    VSHI_TRY(vshi_lift_origins(&lifter, traced, &bake->quiet, origins, error));
     *points = (vsh_points){origins->count, origins->start, origins->normal, origins->texel};
-    return VSH_OK;
+    if (!traced && !bake->texels->smooth) { /* nothing is lifted */
+        points->positions = origins->position;
+        return VSH_OK;
+    }
+    const vshi_lifter lifter = vshi_lifter_open(bake->texels, bake->occluders, light);
+    return vshi_lift_origins(&lifter, traced, &bake->quiet, origins, error);
 }
 
 vsh_result vshi_baking_average(vshi_baking *bake, const float *values, size_t components, float *plane,

@@ -308,6 +308,9 @@ vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh
     made->padding = made->fills ? AUTO_PADDING : full.padding;
     made->ao_spacing = full.supersample == 1 ? full.ao_spacing : 1;
     made->tangents = full.tangents != 0;
+    for (size_t m = 0; m < mesh_count; ++m) {
+        made->smooth = made->smooth || meshes[m].normals != NULL;
+    }
     made->shade = full.shade;
     VSHI_TRY_DONE(make(meshes, mesh_count, &full, run, limited, job, reports, made, error));
     if (uv_reports != NULL) {
@@ -354,13 +357,13 @@ void vsh_charts_get_info_sized(const vsh_charts *charts, vsh_charts_info *info, 
 
 double vshi_bake_bytes(const vshi_bake_need *need) {
     const double texels = (double)need->width * need->rows;
-    double sample = vshi_origins_sample_bytes();
+    double sample = vshi_origins_sample_bytes(need->traced, need->smooth);
     const int floats = (need->values ? 1 : 0) + (need->errors ? 1 : 0) + (need->irradiance ? 3 : 0) +
                        (need->bent ? 3 : 0) + (need->tint ? 3 : 0);
     sample += (double)floats * sizeof(float);
     return need->samples * sample + texels * (1.0 + VSHI_PADDING_TEXEL_BYTES + VSHI_SPREAD_TEXEL_BYTES) +
            (need->fills ? vshi_pull_push_bytes(need->width, need->rows) : 0.0) +
-           fmax(need->lattice ? vshi_lattice_bytes(need->samples, texels, need->bent) : 0.0,
+           fmax(need->lattice ? vshi_lattice_bytes(need->samples, texels, need->bent, need->smooth) : 0.0,
                 need->windows
                     ? vshi_ao_texels_bytes(need->samples, need->width, need->rows, need->threads, need->bent)
                     : 0.0);
@@ -393,6 +396,7 @@ uint64_t vshi_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int
     vshi_bake_need need = {.width = charts->info.width,
                            .rows = band.rows,
                            .traced = vshi_shadow_traces(&shade, NULL) || vshi_ao_traces(&shade, NULL),
+                           .smooth = charts->smooth,
                            .values = true,
                            .errors = lightmap->shadow_error != NULL || lightmap->ao_error != NULL,
                            .irradiance = lightmap->irradiance != NULL,

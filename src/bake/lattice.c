@@ -79,7 +79,9 @@ static void pack(void *user, size_t begin, size_t end) {
             if (l->state[i] == LATTICE_CHOSEN) {
                 memcpy(l->position + 3 * next, l->points->positions + 3 * i, 3 * sizeof(double));
                 memcpy(l->normal + 3 * next, l->points->normals + 3 * i, 3 * sizeof(float));
-                memcpy(l->face + 3 * next, l->origins->face + 3 * i, 3 * sizeof(float));
+                if (l->face != NULL) {
+                    memcpy(l->face + 3 * next, l->origins->face + 3 * i, 3 * sizeof(float));
+                }
                 l->texel[next] = l->points->texels[i];
                 l->number[next++] = (uint32_t)i;
             }
@@ -189,7 +191,8 @@ static vsh_result shade_pass(vshi_lattice *l, const vsh_shade_options *options, 
     VSHI_TRY_DONE(vshi_allocate((void **)&l->number, count, sizeof *l->number, what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&l->position, count, 3 * sizeof(double), what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&l->normal, count, 3 * sizeof(float), what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&l->face, count, 3 * sizeof(float), what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&l->face, l->origins->face != NULL ? count : 0, 3 * sizeof(float),
+                                what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&l->texel, count, sizeof *l->texel, what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&l->chosen_values, count, sizeof(float), what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&l->chosen_deviation, l->deviation != NULL ? count : 0,
@@ -263,9 +266,10 @@ static void add_errors(const vshi_lattice *l, vsh_shade_stats *stats) {
     stats->ao_square_error += (double)sum * VSHI_SQUARE_UNIT;
 }
 
-double vshi_lattice_bytes(double samples, double texels, bool bent) {
+double vshi_lattice_bytes(double samples, double texels, bool bent, bool smooth) {
     return texels * sizeof(uint32_t) +
-           samples * (1.0 + 3.0 * sizeof(double) + (bent ? 14.0 : 11.0) * sizeof(float));
+           samples *
+               (1.0 + 3.0 * sizeof(double) + ((bent ? 11.0 : 8.0) + (smooth ? 3.0 : 0.0)) * sizeof(float));
 }
 
 vsh_result vshi_lattice_ao(const vsh_occluders *occluders, const vsh_texels *texels,

@@ -15,6 +15,6 @@ vsh_result vshi_lattice_ao(const vsh_occluders *occluders, const vsh_texels *tex
                            float *deviation, float *bent, vsh_shade_stats *stats, vsh_error *error);
 
 /* Bytes that it takes at most for so many samples and texels, beside the origins. */
-double vshi_lattice_bytes(double samples, double texels, bool bent);
+double vshi_lattice_bytes(double samples, double texels, bool bent, bool smooth);
 
 #endif

@@ -144,6 +144,7 @@ static vsh_result check_limit(const vshi_baking *bake, vsh_error *error) {
                                  .width = texels->info.width,
                                  .rows = texels->band.rows,
                                  .traced = vshi_baking_traces_shadow(bake) || vshi_baking_traces_ao(bake),
+                                 .smooth = texels->smooth,
                                  .values = needs(bake, VSHI_NEEDS_LIGHTS | NEEDS_ANY_AO),
                                  .errors = needs(bake, VSHI_NEEDS_DEVIATION),
                                  .irradiance = needs(bake, VSHI_NEEDS_IRRADIANCE),

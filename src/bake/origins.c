@@ -283,7 +283,9 @@ static void pack(void *user, size_t begin, size_t end) {
                 lift(l, i, crease > 0 ? l->fields[crease - 1].probe : l->offset, l->fields[0].shell,
                      origins->position + 3 * next);
                 memcpy(origins->normal + 3 * next, l->texels->normal + 3 * i, 3 * sizeof(float));
-                memcpy(origins->face + 3 * next, l->texels->geometric + 3 * i, 3 * sizeof(float));
+                if (origins->face != NULL) {
+                    memcpy(origins->face + 3 * next, l->texels->geometric + 3 * i, 3 * sizeof(float));
+                }
                 origins->texel[next] = sampler_texel(l->texels, i);
                 ++next;
             }
@@ -320,8 +322,8 @@ static void look_in(lifting *l, const vsh_field *field, const vsh_triangles *tri
                                               .marched = marched || triangles == NULL};
 }
 
-double vshi_origins_sample_bytes(void) {
-    return 2.0 + 6.0 * sizeof(double) + 7.0 * sizeof(float);
+double vshi_origins_sample_bytes(bool traced, bool smooth) {
+    return 2.0 + (traced || smooth ? 6.0 : 3.0) * sizeof(double) + (smooth ? 7.0 : 4.0) * sizeof(float);
 }
 
 vsh_result vshi_origins_create(const vsh_occluders *occluders, const vsh_texels *texels,
@@ -367,10 +369,14 @@ vsh_result vshi_origins_create(const vsh_occluders *occluders, const vsh_texels 
     find_rows(texels, origins);
     VSHI_TRY_DONE(
         vshi_allocate((void **)&origins->position, origins->count, 3 * sizeof(double), name, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&origins->start, origins->count, 3 * sizeof(double), name, error));
+    const bool starts = texels->smooth || vshi_shadow_traces(options, occluders->triangles) ||
+                        vshi_ao_traces(options, occluders->triangles);
+    VSHI_TRY_DONE(vshi_allocate((void **)&origins->start, starts ? origins->count : 0, 3 * sizeof(double),
+                                name, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&origins->texel, origins->count, sizeof(uint32_t), name, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&origins->normal, origins->count, 3 * sizeof(float), name, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&origins->face, origins->count, 3 * sizeof(float), name, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&origins->face, texels->smooth ? origins->count : 0,
+                                3 * sizeof(float), name, error));
     VSHI_TRY_DONE(vshi_parallel_for(job, origins->blocks, 1, 1, pack, &l, error));
 done:
     free(l.crease);

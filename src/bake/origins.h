@@ -10,13 +10,14 @@ enum { VSHI_ORIGIN_BLOCK = 1024 }; /* samples that are worked on together */
 typedef struct vshi_origins {
     size_t count;
     double *position; /* [count][3]: start offset above the triangle, where marches begin; world units */
-    double *start;   /* [count][3]: where the rays of the channel at hand begin, set by vshi_lift_origins() */
-    float *normal;   /* [count][3]: smooth; decides shadow */
-    float *face;     /* [count][3]: of the triangle */
-    uint32_t *texel; /* [count]: as vsh_points.texels; a texel's further samples get numbers of their own */
-    uint8_t *valid;  /* [all samples]: 1 where the sample is among them */
-    size_t blocks;   /* of all samples */
-    size_t *before;  /* [blocks + 1]: valid samples before each block */
+    double *start;    /* [count][3]: where the rays of the channel at hand begin, set by vshi_lift_origins();
+                         NULL where that is `position` */
+    float *normal;    /* [count][3]: smooth; decides shadow */
+    float *face;      /* [count][3]: of the triangle; NULL where all normals are those of the triangles */
+    uint32_t *texel;  /* [count]: as vsh_points.texels; a texel's further samples get numbers of their own */
+    uint8_t *valid;   /* [all samples]: 1 where the sample is among them */
+    size_t blocks;    /* of all samples */
+    size_t *before;   /* [blocks + 1]: valid samples before each block */
     vshi_point_rows rows; /* of tiles, the band's own counted */
     size_t *row_start;    /* [rows.count + 1] */
     uint8_t *needed;      /* [rows.count]: VSHI_ROW_… */
@@ -37,7 +38,7 @@ typedef vsh_result vshi_origins_keep(void *user, const vshi_origins *origins, ui
                                      vsh_error *error);
 
 /* Bytes that the origin of a sample takes at most. */
-double vshi_origins_sample_bytes(void);
+double vshi_origins_sample_bytes(bool traced, bool smooth);
 
 /* Lifts each sample along its geometric normal by the start offset, and by half a shell's thickness where its
  * mesh is open. A sample is invalid inside a solid or behind a wall of

@@ -231,6 +231,7 @@ static vsh_result create(const vsh_charts *charts, int32_t first_row, int32_t ro
     made->fills = charts->fills && rows == charts->info.height && cut == NULL;
     made->ao_spacing = charts->ao_spacing;
     made->shade = charts->shade;
+    made->smooth = charts->smooth;
     made->whole = charts->info.samples;
     made->mesh_count = charts->sorted.mesh_count;
     const vsh_result result = make_band(charts, run, made, error);

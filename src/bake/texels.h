@@ -22,6 +22,7 @@ struct vsh_charts {
     bool fills;         /* what is beyond the padding too, where a lightmap is whole */
     int32_t ao_spacing; /* 1 where texels have several samples */
     bool tangents;
+    bool smooth; /* a mesh has normals, which may not be those of its triangles */
     vsh_shade_options shade;
     vshi_tile_row *rows;  /* [sorted.rows] */
     unsigned char *sheet; /* [triangles of all meshes]: it has air on both sides, so that the field holds its
@@ -95,6 +96,7 @@ typedef struct vshi_bake_need {
     double samples;      /* held */
     int32_t width, rows; /* the same, texels */
     bool traced;         /* rays against triangles */
+    bool smooth;         /* as of the charts */
     bool values, errors, irradiance, bent, tint;
     bool lattice, windows; /* AO between texels, or by those around */
     bool fills;            /* what is beyond the padding */
@@ -112,6 +114,7 @@ struct vsh_texels {
     bool fills;              /* what is beyond it too */
     int32_t ao_spacing;      /* as of the charts */
     vsh_shade_options shade; /* those given with the lightmap's size */
+    bool smooth;             /* as of the charts */
     size_t count;            /* samples */
     uint64_t whole;          /* samples of the whole lightmap, all its bands */
     size_t *row_start;       /* [held tile rows + 1]: first sample of each */

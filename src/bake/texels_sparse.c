@@ -87,6 +87,7 @@ vsh_result vshi_texels_create_sparse(const vsh_charts *charts, int32_t step, con
         .own_end = rows, .held_end = rows, .own_rows = made->info.height, .rows = made->info.height};
     made->ao_spacing = 1;
     made->shade = charts->shade;
+    made->smooth = charts->smooth;
     made->mesh_count = charts->sorted.mesh_count;
     VSHI_TRY_DONE(vshi_check_limit(run,
                                    (double)charts->info.bytes +

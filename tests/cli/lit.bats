@@ -373,7 +373,7 @@ print("\n".join("%s: %s" % one for one in extras.items()))' >extras
     python3 -c 'import json, sys
 extras = json.load(open("again.gltf"))["asset"]["extras"]
 assert extras["mine"] == [1] and "vdbshade_old" not in extras and "--ao 0.2" in extras["vdbshade_command"], extras
-assert extras["vdbshade_input_0"].endswith("n\ufffd.gltf"), extras'
+assert extras["vdbshade_input_0"].endswith("n?.gltf"), extras'
     shade bake "$ASSETS/thin.glb" --ao 0.5 --size 32 -o lit.obj
     done_well
     grep -q '^# vdbshade_ao: ' lit.obj && grep -q '^# vdbshade_input_0: sha256' lit.obj || fail "$(head -9 lit.obj)"
