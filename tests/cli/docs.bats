@@ -104,7 +104,7 @@ run_commands() {
 # options_of FILE …: each option that is named there, once. Those of other programs are left out.
 options_of() {
     grep -ohE -- '(^|[^[:alnum:]-])--[a-z][a-z0-9-]*' "$@" | grep -oE -- '--.*' | sort -u |
-        grep -vxE -- '--(cflags|libs|install|stat|leak-check|preset|count|limit|runs|seconds|array|partition|retries|wd|wrap|kill-on-invalid-dep|build|component|prefix|static|test)' # of CMake, pkg-config, git, tools/…
+        grep -vxE -- '--(cflags|libs|install|stat|leak-check|preset|count|limit|runs|seconds|array|partition|retries|wd|wrap|kill-on-invalid-dep|build|component|prefix|static|test|exclude-libs)' # of CMake, pkg-config, git, tools/…
 }
 
 @test "the documents name every option of --help, and no other" {
