@@ -24,7 +24,7 @@ enum {
     RAYS = 16,     /* from a point to a light */
     NAMED = 2      /* receivers that the warning names */
 };
-/* Of the caster's diagonal: the rounding of what ends at its box. */
+/* Tolerance for receivers that end at the caster's box, in its diagonals: rounding. */
 static const double ROUNDING = 1e-6;
 /* Cosine with the sky's axis: such points see no more than the sky. */
 static const double LEVEL = 0.999;
@@ -60,7 +60,7 @@ typedef struct search {
     size_t count;
     const vsh_mesh *left_out; /* of the object that gets no points; NULL: all get some */
     points all;
-    points facing; /* those that may see the light */
+    points facing; /* the points that face the light */
     float seen[POINTS];
 } search;
 

@@ -24,7 +24,7 @@ inline void require(vsh_result result) {
     }
 }
 
-// What body() returns; exceptions become VSH_ERROR_MEMORY or `code`, prefixed by `what`.
+// Returns the result of body(). Exceptions become VSH_ERROR_MEMORY or `code`, prefixed by `what`.
 template <typename Body>
 vsh_result catch_all(vsh_error *error, vsh_result code, const char *what, Body &body) noexcept {
     VSHI_FLOATS;

@@ -103,7 +103,7 @@ static void run_everywhere(const char *name, call *c) {
 
 static void every_scenario_runs(void **state) {
     (void)state;
-    if (VSHI_SANITIZED) { /* whose frames are larger */
+    if (VSHI_SANITIZED) { /* sanitizers make frames larger */
         skip();
     }
     for (size_t i = 0; i < scenario_count; ++i) {
