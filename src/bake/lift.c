@@ -27,20 +27,31 @@ vshi_lifter vshi_lifter_open(const vsh_texels *texels, const vsh_occluders *occl
     return lifter;
 }
 
-/* Sine of the elevation of the light's lowest point over the triangle. */
-static double find_elevation(const vshi_lifter *l, size_t sample) {
-    const vshi_vec normal = vshi_vec_off(l->texels->geometric + 3 * sample);
+/* Sines of the elevation of the light's lowest and highest point. */
+typedef struct elevation {
+    double lowest, highest;
+} elevation;
+
+static elevation find_elevation(const vshi_lifter *l, size_t sample, const float *normals) {
+    const vshi_vec normal = vshi_vec_off(normals + 3 * sample);
     const vshi_light_place *place = &l->place;
+    double centre = 0.0, half = 1.0; /* in the middle of the light */
     if (place->parallel) {
-        return vshi_dot(normal, place->towards) - place->sine;
+        centre = vshi_dot(normal, place->towards);
+        half = place->sine;
+    } else {
+        const vshi_vec to = vshi_sub(place->centre, vshi_sample_foot(l->texels, sample));
+        const double distance = vshi_length(to);
+        if (distance > 0.0) {
+            centre = vshi_dot(normal, to) / distance;
+            half = place->radius / distance;
+        }
     }
-    const vshi_vec to = vshi_sub(place->centre, vshi_sample_foot(l->texels, sample));
-    const double distance = vshi_length(to);
-    return distance > 0.0 ? (vshi_dot(normal, to) - place->radius) / distance : -1.0;
+    return (elevation){centre - half, centre + half};
 }
 
 bool vshi_light_is_cut(const vshi_lifter *lifter, size_t sample) {
-    return lifter->light != NULL && find_elevation(lifter, sample) < 0.0;
+    return lifter->light != NULL && find_elevation(lifter, sample, lifter->texels->geometric).lowest < 0.0;
 }
 
 /* Distance to the nearest triangle straight up and at 45 degrees to four sides, at most `far`. */
@@ -67,8 +78,11 @@ vshi_vec vshi_lift_find(const vshi_lifter *l, size_t sample) {
     if (l->light == NULL || !(length > 0.0)) {
         return NONE;
     }
-    const double elevation = find_elevation(l, sample);
-    double share = elevation <= 0.0 ? 1.0 : fmax(1.0 - elevation / WELL_ABOVE, 0.0);
+    if (find_elevation(l, sample, l->texels->normal).highest < 0.0) {
+        return NONE; /* the smooth surface faces away from all of the light */
+    }
+    const double lowest = find_elevation(l, sample, l->texels->geometric).lowest;
+    double share = lowest <= 0.0 ? 1.0 : fmax(1.0 - lowest / WELL_ABOVE, 0.0);
     const vshi_vec foot = vshi_sample_foot(l->texels, sample), up = vshi_scale(lift, 1.0 / length);
     const vshi_vec normal = vshi_vec_off(l->texels->geometric + 3 * sample);
     for (size_t k = 0; share > 0.0 && k <= l->occluders->layer_count; ++k) {
