@@ -181,8 +181,9 @@ static void field_ray(vshi_ao_piece *b, uint32_t owner, vshi_vec local, vsh_shad
 
 /* From a place on the disc: by its cosine over the hemisphere (Malley), or evenly over the sphere (Lambert's
  * azimuthal projection, 1772). */
-static vshi_vec direction_of(const vshi_ao_task *task, double rise, const double disc[2]) {
-    const double x = vshi_dome_place(rise, disc[0], disc[1]), y = disc[1];
+static vshi_vec direction_of(const vshi_ao_task *task, const vshi_lean *lean, double disc[2]) {
+    vshi_dome_place(lean, disc);
+    const double x = disc[0], y = disc[1];
     const double square = 1.0 - x * x - y * y;
     const double height = sqrt(square > 0.0 ? square : 0.0);
     return task->sphere ? (vshi_vec){2.0 * height * x, 2.0 * height * y, 2.0 * square - 1.0}
@@ -198,7 +199,7 @@ static void shoot(vshi_ao_piece *b, uint32_t owner, vsh_shade_stats *stats) {
         vshi_sampler_disc(b->task->sampler, point->texel, PURPOSE, point->taken, count, disc);
         for (int32_t i = 0; i < count; ++i) {
             const vshi_vec local =
-                vshi_dome_mirror(direction_of(b->task, point->rise, disc[i]), point->mirror);
+                vshi_dome_mirror(direction_of(b->task, &point->lean, disc[i]), point->mirror);
             if (b->task->bent != NULL) {
                 point->all = vshi_add(point->all, local);
             }
@@ -212,20 +213,20 @@ static void shoot(vshi_ao_piece *b, uint32_t owner, vsh_shade_stats *stats) {
     }
 }
 
-/* Turns the axes and limits the point's directions: above the horizon where there is one, else above its
+/* Limits the point's directions: above the horizon where there is one, else above its
  * face. With both, directions below the face are mirrored at it: few, and the horizon leaves out what it
  * must. */
 static void limit_dome(const vshi_ao_task *task, vshi_ao_point *point, vshi_vec up, vshi_vec face,
-                       vshi_vec axes[3]) {
+                       const vshi_vec axes[3]) {
     const bool smooth = vshi_dot(face, axes[2]) < VSHI_ONE_NORMAL;
     if (vshi_ao_has_horizon(task)) {
-        point->rise = vshi_dome_turn(up, axes);
+        point->lean = vshi_dome_lean(up, axes);
         if (smooth) {
             point->mirror =
                 (vshi_vec){vshi_dot(face, axes[0]), vshi_dot(face, axes[1]), vshi_dot(face, axes[2])};
         }
     } else if (smooth) {
-        point->rise = vshi_dome_turn(face, axes);
+        point->lean = vshi_dome_lean(face, axes);
     }
 }
 
@@ -233,8 +234,9 @@ static void limit_dome(const vshi_ao_task *task, vshi_ao_point *point, vshi_vec 
 static bool prepare(const vshi_ao_piece *b, size_t i, vshi_ao_point *point, vsh_shade_stats *stats) {
     const vshi_ao_task *task = b->task;
     const vsh_points *points = task->points;
-    *point = (vshi_ao_point){
-        .rise = 1.0, .index = i, .texel = points->texels != NULL ? points->texels[i] : (uint32_t)i};
+    *point = (vshi_ao_point){.lean = VSHI_WHOLE_DOME,
+                             .index = i,
+                             .texel = points->texels != NULL ? points->texels[i] : (uint32_t)i};
     if (!vshi_ao_frame_at(task, i, &point->frame, stats)) {
         return false;
     }
@@ -400,7 +402,7 @@ static void shoot_packets(vshi_ao_piece *b, size_t first, vsh_shade_stats *stats
                             .axis = p->world_axes[2],
                             .u = p->world_axes[0],
                             .v = p->world_axes[1],
-                            .rise = p->rise,
+                            .lean = p->lean,
                             .far = task->options->ao_distance};
         vshi_sampler_shift(task->sampler, p->texel, PURPOSE, disc->shift);
         of[count++] = i;

@@ -14,9 +14,8 @@ typedef struct vshi_ao_ball {
 
 typedef struct vshi_ao_point {
     vshi_ao_frame frame;
-    bool traced; /* not exact: its rays meet the field's surface; else they are marched */
-    double
-        rise; /* cosine between the normal and that of the plane that limits its directions; 1: none does */
+    bool traced;     /* not exact: its rays meet the field's surface; else they are marched */
+    vshi_lean lean;  /* of the plane that limits its directions */
     vshi_vec mirror; /* face at which directions below it are mirrored, along the axes; zero: none are */
     size_t index;    /* of the task's points */
     uint32_t texel;

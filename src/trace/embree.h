@@ -35,40 +35,49 @@ void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_r
 /* Distance to the first triangle that a ray meets; ray->far where it meets none. Thread safe. */
 double vshi_triangles_distance(const vsh_triangles *triangles, const vshi_segment_ray *ray);
 
+/* A face and a smooth normal that lean apart by less (0.08 degrees) are one: rounding of floats. */
+#define VSHI_ONE_NORMAL (1.0 - 1e-6)
+
+/* A plane through the centre of a dome, which limits its directions. `rise` is the cosine between the plane's
+ * normal and the dome's axis, (x, y) the unit direction on the disc that the normal leans to. */
+typedef struct vshi_lean {
+    double rise, x, y;
+} vshi_lean;
+
+static const vshi_lean VSHI_WHOLE_DOME = {1.0, 1.0, 0.0};
+
+/* How the plane with the normal `up` limits the dome over axes[2]. All vectors are unit. */
+static inline vshi_lean vshi_dome_lean(vshi_vec up, const vshi_vec axes[3]) {
+    static const double STRAIGHT = 1e-12; /* square of a sine: the direction may then be any */
+    const double x = vshi_dot(up, axes[0]), y = vshi_dot(up, axes[1]), rise = vshi_dot(up, axes[2]);
+    const double square = x * x + y * y, unit = square > STRAIGHT ? 1.0 / sqrt(square) : 0.0;
+    return (vshi_lean){rise < -1.0 ? -1.0 : rise > 1.0 ? 1.0 : rise, unit > 0.0 ? unit * x : 1.0, unit * y};
+}
+
+/* Moves a place on the disc to where its direction on the dome (Malley) lies above the plane. The disc then
+ * begins at half an ellipse. All rows along the lean shrink by the same factor, which keeps areas in
+ * proportion. */
+static inline void vshi_dome_place(const vshi_lean *lean, double place[2]) {
+    if (lean->rise < 1.0) {
+        const double along = place[0] * lean->x + place[1] * lean->y;
+        const double edge = 1.0 - (place[0] * place[0] + place[1] * place[1]) + along * along;
+        const double to = (1.0 + lean->rise) * along + (1.0 - lean->rise) * sqrt(edge > 0.0 ? edge : 0.0);
+        const double by = 0.5 * to - along;
+        place[0] += by * lean->x;
+        place[1] += by * lean->y;
+    }
+}
+
 /* A disc that a point sees, or a dome over one. World space. */
 typedef struct vshi_disc {
     double origin[3];
     vshi_vec axis, u, v; /* a ray goes along axis + x u + y v, (x, y) on the unit disc; of a dome, where all
                             three are unit, along √(1 - x² - y²) axis + x u + y v */
-    double rise;         /* of a dome: the argument of vshi_dome_place(); 1 is the whole dome */
+    vshi_lean lean;      /* of a dome */
     vshi_vec normal;     /* rays below it meet something, whatever there is; zero: none do */
     double far;          /* how long the rays are; may be infinite */
     uint32_t shift[2];   /* of the texel: vshi_sampler_shift() */
 } vshi_disc;
-
-/* A face and a smooth normal that lean apart by less (0.08 degrees) are one: rounding of floats. */
-#define VSHI_ONE_NORMAL (1.0 - 1e-6)
-
-/* Turns the axes of a dome about the third so that `up` leans towards the first. Returns the cosine between
- * up and the third, the `rise` of the plane that is orthogonal to up. */
-static inline double vshi_dome_turn(vshi_vec up, vshi_vec axes[3]) {
-    static const double STRAIGHT = 1e-12; /* square of a sine: the axes may then be any */
-    const double rise = vshi_dot(up, axes[2]);
-    const vshi_vec along = vshi_sub(up, vshi_scale(axes[2], rise));
-    if (vshi_dot(along, along) > STRAIGHT) {
-        axes[0] = vshi_unit(along);
-        axes[1] = vshi_cross(axes[2], axes[0]);
-    }
-    return rise < -1.0 ? -1.0 : rise > 1.0 ? 1.0 : rise;
-}
-
-/* Moves a place on the disc to where its direction on the dome (Malley) lies above that plane. The disc then
- * begins at half an ellipse, x > -rise √(1 - y²). All rows shrink by the same factor, which keeps areas in
- * proportion. */
-static inline double vshi_dome_place(double rise, double x, double y) {
-    const double edge = 1.0 - y * y;
-    return rise < 1.0 ? 0.5 * ((1.0 + rise) * x + (1.0 - rise) * sqrt(edge > 0.0 ? edge : 0.0)) : x;
-}
 
 /* A direction below a face, mirrored at it; others, and of a zero normal all, stay. */
 static inline vshi_vec vshi_dome_mirror(vshi_vec d, vshi_vec face) {

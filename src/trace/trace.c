@@ -35,7 +35,7 @@ typedef struct tracing {
 typedef struct target {
     vshi_vec axis, u, v;
     double radius;
-    double rise;     /* of AO: vshi_dome_place() */
+    vshi_lean lean;  /* of AO */
     vshi_vec mirror; /* of AO over a horizon: vshi_dome_mirror() */
     double distance; /* of the light's centre; infinite for a directional light */
     double size;     /* of the sphere */
@@ -59,7 +59,7 @@ static vshi_light_side aim(const vshi_light_place *place, vshi_vec from, target 
     const vshi_light_side side = vshi_light_look(place, from, false, &view);
     if (side == VSHI_LIGHT_SEEN) {
         *t = (target){.axis = view.axis,
-                      .rise = 1.0,
+                      .lean = VSHI_WHOLE_DOME,
                       .radius = vshi_light_tangent(place, &view),
                       .distance = view.distance,
                       .size = place->radius,
@@ -96,20 +96,20 @@ static bool direct(const tracing *task, const target *t, const double disc[2], c
     if (task->place.shape != NULL) {
         return direct_to_shape(&task->place, t, disc, normal, ray);
     }
-    double x = disc[0] * t->radius, up, scale = 1.0;
-    const double y = disc[1] * t->radius;
+    double place[2] = {disc[0] * t->radius, disc[1] * t->radius}, up, scale = 1.0;
     if (task->light != NULL) {
-        scale = 1.0 / sqrt(1.0 + x * x + y * y);
+        scale = 1.0 / sqrt(1.0 + place[0] * place[0] + place[1] * place[1]);
         up = scale;
         ray->far = far_of(t, up);
     } else {
-        x = vshi_dome_place(t->rise, x, y);
-        const double square = 1.0 - x * x - y * y;
+        vshi_dome_place(&t->lean, place);
+        const double square = 1.0 - place[0] * place[0] - place[1] * place[1];
         up = square > 0.0 ? sqrt(square) : 0.0;
         ray->far = task->distance;
     }
     const vshi_vec towards =
-        vshi_add(vshi_add(vshi_scale(t->u, scale * x), vshi_scale(t->v, scale * y)), vshi_scale(t->axis, up));
+        vshi_add(vshi_add(vshi_scale(t->u, scale * place[0]), vshi_scale(t->v, scale * place[1])),
+                 vshi_scale(t->axis, up));
     const vshi_vec d = vshi_dome_mirror(towards, t->mirror);
     ray->direction[0] = d.x;
     ray->direction[1] = d.y;
@@ -156,19 +156,15 @@ typedef struct viewpoint {
 
 /* Limits AO to the directions above the point's face; over a horizon those below it are mirrored at it. */
 static void aim_dome(const tracing *task, vshi_vec face, target *t) {
-    vshi_vec axes[3];
     vshi_frame(t->axis, &t->u, &t->v);
     if (!(vshi_dot(face, t->axis) < VSHI_ONE_NORMAL)) {
         return;
     }
     if (task->up != NULL) {
         t->mirror = face;
-        return;
+    } else {
+        t->lean = vshi_dome_lean(face, (vshi_vec[]){t->u, t->v, t->axis});
     }
-    memcpy(axes, (vshi_vec[]){t->u, t->v, t->axis}, sizeof axes);
-    t->rise = vshi_dome_turn(face, axes);
-    t->u = axes[0];
-    t->v = axes[1];
 }
 
 /* False where the point's value needs no rays: it is then in *value. `face`: of AO; NULL: the normal. */
@@ -188,7 +184,7 @@ static bool place_point(const tracing *task, const double position[3], const flo
         *value = NAN;
         return false;
     }
-    from->target = (target){.axis = from->normal, .radius = 1.0, .rise = 1.0};
+    from->target = (target){.axis = from->normal, .radius = 1.0, .lean = VSHI_WHOLE_DOME};
     if (task->light == NULL) {
         aim_dome(task, face != NULL ? vshi_vec_off(face) : from->normal, &from->target);
     } else {

@@ -40,7 +40,11 @@ static void place(bool domes, double far) {
         d->v = vshi_scale(d->v, domes ? 1.0 : tangent);
         d->normal = domes || i % 3 == 0 ? (vshi_vec){0.0, 0.0, 0.0} : normal;
         d->far = far;
-        d->rise = i % 4 == 0 ? 1.0 : 2.0 * at(i, 7) - 1.0;
+        d->lean = VSHI_WHOLE_DOME;
+        if (i % 4 != 0) {
+            const vshi_vec up = vshi_unit((vshi_vec){at(i, 7) - 0.5, at(i, 8) - 0.5, at(i, 9) - 0.5});
+            d->lean = vshi_dome_lean(up, (vshi_vec[]){d->u, d->v, d->axis});
+        }
         vshi_sampler_shift(sampler, 77 * i, 5, d->shift);
     }
 }
@@ -53,11 +57,13 @@ static int32_t count_lit(uint32_t i, bool domes, int32_t first, int32_t last) {
     for (int32_t k = first; k < last; ++k) {
         double disc[1][2];
         vshi_sampler_disc(sampler, 77 * i, 5, k, 1, disc);
-        const double x = domes ? vshi_dome_place(d->rise, disc[0][0], disc[0][1]) : disc[0][0];
-        const double square = 1.0 - x * x - disc[0][1] * disc[0][1];
+        if (domes) {
+            vshi_dome_place(&d->lean, disc[0]);
+        }
+        const double square = 1.0 - disc[0][0] * disc[0][0] - disc[0][1] * disc[0][1];
         const double up = domes ? sqrt(fmax(square, 0.0)) : 1.0;
-        const vshi_vec way = vshi_unit(
-            vshi_add(vshi_scale(d->axis, up), vshi_add(vshi_scale(d->u, x), vshi_scale(d->v, disc[0][1]))));
+        const vshi_vec way = vshi_unit(vshi_add(
+            vshi_scale(d->axis, up), vshi_add(vshi_scale(d->u, disc[0][0]), vshi_scale(d->v, disc[0][1]))));
         const bool horizon = vshi_dot(d->normal, d->normal) > 0.0;
         const vshi_segment_ray ray = {
             {d->origin[0], d->origin[1], d->origin[2]}, {way.x, way.y, way.z}, d->far};
