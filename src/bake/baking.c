@@ -4,7 +4,6 @@
 #include "bake/average.h"
 #include "bake/bent_normals.h"
 #include "bake/lattice.h"
-#include "bake/lift.h"
 #include "bake/planes.h"
 #include "base/try.h"
 #include "shade/ao.h"
@@ -59,8 +58,8 @@ static vsh_result place_points(vshi_baking *bake, const vsh_light *light, bool t
         points->positions = origins->position;
         return VSH_OK;
     }
-    const vshi_lifter lifter = vshi_lifter_open(bake->texels, bake->occluders, light);
-    return vshi_lift_origins(&lifter, traced, &bake->quiet, origins, error);
+    const vshi_lifter lifter = vshi_lifter_open(bake->occluders, light);
+    return vshi_origins_lift(&lifter, bake->texels, traced, &bake->quiet, origins, error);
 }
 
 vsh_result vshi_baking_average(vshi_baking *bake, const float *values, size_t components, float *plane,

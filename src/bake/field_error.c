@@ -252,9 +252,10 @@ static void hold(void *user, size_t begin, size_t end) {
         const vshi_field_error_sample *s = &h->share->samples[k];
         /* Where a light is cut by the plane of the triangle, the lift undoes what the facet hides. Elsewhere
          * it only moves shadows, which is an error. */
-        vshi_vec p = vshi_sample_foot(texels, s->sample);
-        if (vshi_light_is_cut(&h->lifter, s->sample)) {
-            p = vshi_add(p, vshi_lift_find(&h->lifter, s->sample));
+        const vshi_lift_point point = vshi_sample_lift_point(texels, s->sample);
+        vshi_vec p = point.foot;
+        if (vshi_light_is_cut(&h->lifter, &point)) {
+            p = vshi_add(p, vshi_lift_find(&h->lifter, &point));
         }
         const double position[3] = {p.x, p.y, p.z};
         const float *face = h->truth.light == NULL ? texels->geometric + 3 * s->sample : NULL;
@@ -284,7 +285,7 @@ vsh_result vshi_field_error_add(vshi_field_error *share, const vsh_light *light,
                                 vsh_error *error) {
     holding h = {.share = share,
                  .truth = share->truth,
-                 .lifter = vshi_lifter_open(share->texels, share->occluders, light),
+                 .lifter = vshi_lifter_open(share->occluders, light),
                  .up = vshi_vec_of(options->ao_up),
                  .values = values,
                  .filled = filled,

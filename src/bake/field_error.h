@@ -3,7 +3,7 @@
 #define VSHI_BAKE_FIELD_ERROR_H
 
 #include "bake/ao_kept.h"
-#include "bake/lift.h"
+#include "bake/origins.h"
 #include "trace/trace.h"
 
 /* The most samples of a lightmap, and what each takes, bytes. */

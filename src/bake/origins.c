@@ -1,5 +1,4 @@
 #include "bake/origins.h"
-#include "bake/lift.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/try.h"
@@ -380,6 +379,45 @@ vsh_result vshi_origins_create(const vsh_occluders *occluders, const vsh_texels 
     VSHI_TRY_DONE(vshi_parallel_for(job, origins->blocks, 1, 1, pack, &l, error));
 done:
     free(l.crease);
+    vshi_job_end(job);
+    return result;
+}
+
+/* --- where shadow rays begin */
+
+typedef struct starting {
+    const vshi_lifter *lifter;
+    const vsh_texels *texels;
+    vshi_origins *origins;
+    bool traced;
+} starting;
+
+static void place_starts(void *user, size_t begin, size_t end) {
+    const starting *a = user;
+    const vsh_texels *texels = a->texels;
+    const vshi_origins *origins = a->origins;
+    for (size_t block = begin; block < end; ++block) {
+        size_t next = origins->before[block];
+        const size_t last = (block + 1) * VSHI_ORIGIN_BLOCK;
+        for (size_t i = block * VSHI_ORIGIN_BLOCK; i < last && i < texels->count; ++i) {
+            if (!origins->valid[i]) {
+                continue;
+            }
+            const vshi_lift_point point = vshi_sample_lift_point(texels, i);
+            const vshi_vec base = a->traced ? point.foot : vshi_vec_of(origins->position + 3 * next);
+            put(vshi_add(base, vshi_lift_find(a->lifter, &point)), origins->start + 3 * next++);
+        }
+    }
+}
+
+vsh_result vshi_origins_lift(const vshi_lifter *lifter, const vsh_texels *texels, bool traced,
+                             const vsh_run *run, vshi_origins *origins, vsh_error *error) {
+    starting task = {lifter, texels, origins, traced};
+    vshi_job *job = vshi_job_begin(run, "lift", origins->blocks);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "lift: the system refused memory");
+    }
+    const vsh_result result = vshi_parallel_for(job, origins->blocks, 1, 1, place_starts, &task, error);
     vshi_job_end(job);
     return result;
 }

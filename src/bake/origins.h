@@ -3,6 +3,7 @@
 #define VSHI_BAKE_ORIGINS_H
 
 #include "bake/texels.h"
+#include "shade/lift.h"
 
 enum { VSHI_ORIGIN_BLOCK = 1024 }; /* samples that are worked on together */
 
@@ -10,7 +11,7 @@ enum { VSHI_ORIGIN_BLOCK = 1024 }; /* samples that are worked on together */
 typedef struct vshi_origins {
     size_t count;
     double *position; /* [count][3]: start offset above the triangle, where marches begin; world units */
-    double *start;    /* [count][3]: where the rays of the channel at hand begin, set by vshi_lift_origins();
+    double *start;    /* [count][3]: where the rays of the channel at hand begin, set by vshi_origins_lift();
                          NULL where that is `position` */
     float *normal;    /* [count][3]: smooth; decides shadow */
     float *face;      /* [count][3]: of the triangle; NULL where all normals are those of the triangles */
@@ -49,6 +50,21 @@ vsh_result vshi_origins_create(const vsh_occluders *occluders, const vsh_texels 
                                const vsh_shade_options *options, vshi_origins_for what,
                                vshi_origins_keep *keep, void *user, const vsh_run *run, vshi_origins *origins,
                                vsh_error *error);
+/* The sample's position on its triangle. */
+static inline vshi_vec vshi_sample_foot(const vsh_texels *texels, size_t sample) {
+    return vshi_sub(vshi_vec_of(texels->position + 3 * sample), vshi_vec_off(texels->lift + 3 * sample));
+}
+
+static inline vshi_lift_point vshi_sample_lift_point(const vsh_texels *texels, size_t sample) {
+    return (vshi_lift_point){vshi_sample_foot(texels, sample), vshi_vec_off(texels->lift + 3 * sample),
+                             vshi_vec_off(texels->geometric + 3 * sample),
+                             vshi_vec_off(texels->normal + 3 * sample)};
+}
+
+/* Sets origins->start, where the rays to a light begin: on the triangles if `traced`, else at
+ * origins->position; plus the lift. Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_origins_lift(const vshi_lifter *lifter, const vsh_texels *texels, bool traced,
+                             const vsh_run *run, vshi_origins *origins, vsh_error *error);
 void vshi_origins_free(vshi_origins *origins);
 
 #endif

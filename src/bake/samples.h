@@ -3,7 +3,7 @@
 #define VSHI_BAKE_SAMPLES_H
 
 #include "bake/rows.h"
-#include "bake/smooth_surface.h"
+#include "mesh/smooth_surface.h"
 #include "bake/texels.h"
 
 /* Box of positions. */

@@ -3,6 +3,7 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "mesh/mesh.h"
+#include "mesh/smooth_surface.h"
 #include "shade/shade.h"
 
 #include <stdio.h>
@@ -305,33 +306,32 @@ static float blend(const footprint *f, const float *plane) {
 
 /* Where a ray meets a triangle. */
 typedef struct spot {
-    vshi_vec at, flat, normal; /* flat and normal on one side, whichever */
-    double facing;             /* -1: that side is seen from behind */
+    vshi_vec at, lift, flat, normal; /* flat and normal on one side, whichever */
+    double facing;                   /* -1: that side is seen from behind */
     double uv[2];
 } spot;
 
 static spot find_spot(const triangle *t, const vsh_mesh *mesh, vshi_vec ray) {
     spot s = {.uv = {0.0, 0.0}};
     double weight[3];
-    vshi_vec corner[3], smooth = {0.0, 0.0, 0.0};
+    vshi_vec corner[3];
     uint32_t vertex[3];
     cross_triangle(t, ray, weight);
     const double sum = weight[0] + weight[1] + weight[2];
     vshi_mesh_triangle_of(mesh, t->number, corner, vertex);
     for (int k = 0; k < 3; ++k) {
-        const double share = weight[k] / sum;
+        weight[k] /= sum;
         for (int axis = 0; axis < 2 && mesh->uvs != NULL; ++axis) {
-            s.uv[axis] += share * (double)mesh->uvs[2 * (size_t)vertex[k] + (size_t)axis];
-        }
-        s.at = vshi_add(s.at, vshi_scale(corner[k], share));
-        if (mesh->normals != NULL) {
-            smooth = vshi_add(
-                smooth, vshi_scale(vshi_unit(vshi_vec_off(mesh->normals + 3 * (size_t)vertex[k])), share));
+            s.uv[axis] += weight[k] * (double)mesh->uvs[2 * (size_t)vertex[k] + (size_t)axis];
         }
     }
-    s.flat = vshi_unit(normal_of(t));
-    const vshi_vec n = vshi_unit(vshi_transform_normal(mesh->transform, smooth));
-    s.normal = vshi_dot(n, n) > 0.5 && vshi_dot(n, s.flat) > 0.0 ? n : s.flat;
+    vshi_surface surface;
+    vshi_surface_set(mesh, t->number, &surface);
+    const int second = surface.mirrored ? 2 : 1; /* of the mesh's indices */
+    vshi_surface_at(&surface, (double[]){weight[0], weight[second], weight[3 - second]}, &s.at, &s.normal,
+                    &s.lift);
+    s.at = vshi_sub(s.at, s.lift);
+    s.flat = surface.geometric;
     s.facing = vshi_dot(s.flat, ray) > 0.0 ? -1.0 : 1.0;
     return s;
 }
@@ -344,7 +344,9 @@ vshi_lit_point vshi_lit_meet(const vshi_lit *lit, uint32_t number, vshi_vec ray)
     const triangle *t = &lit->triangles[number];
     const vsh_lit_meshes *of = lit->maps[t->map].of;
     const spot s = find_spot(t, &of->meshes[t->mesh], ray);
-    return (vshi_lit_point){s.at, vshi_scale(s.flat, s.facing), vshi_scale(s.normal, s.facing), of->color};
+    return (vshi_lit_point){{s.at, s.facing > 0.0 ? s.lift : (vshi_vec){0.0, 0.0, 0.0},
+                             vshi_scale(s.flat, s.facing), vshi_scale(s.normal, s.facing)},
+                            of->color};
 }
 
 void vshi_lit_bounds(const vshi_lit *lit, vshi_vec *low, vshi_vec *high) {

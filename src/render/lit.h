@@ -4,6 +4,7 @@
 
 #include "base/job.h"
 #include "render/grid.h"
+#include "shade/lift.h"
 
 typedef struct vshi_lit vshi_lit;
 
@@ -35,10 +36,10 @@ void vshi_lit_raster(const vshi_lit *lit, const vshi_lit_band *band, size_t stri
 /* Whether a triangle has no lightmap, so that what falls on it is to be asked for at its points. */
 bool vshi_lit_is_bare(const vshi_lit *lit, uint32_t triangle);
 
-/* Where a ray meets a triangle, with unit normals towards the eye: its own, and the one to light it by. */
+/* Where a ray meets a triangle. The normals point towards the eye. */
 typedef struct vshi_lit_point {
-    vshi_vec at, flat, normal; /* world space */
-    const double *color;       /* [3] */
+    vshi_lift_point point;
+    const double *color; /* [3] */
 } vshi_lit_point;
 
 vshi_lit_point vshi_lit_meet(const vshi_lit *lit, uint32_t triangle, vshi_vec ray);

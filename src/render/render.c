@@ -269,7 +269,7 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
     VSHI_TRY_DONE(vsh_query_create(occluders, lights, light_count, &o.shade, &query, error));
     VSHI_TRY_DONE(vshi_lit_create(&o, lights, light_count, &r.grid, &lit, error));
     r.scenery.query = query;
-    r.scenery.field = occluders->field;
+    r.scenery.occluders = occluders;
     r.scenery.traces_shadow = vshi_shadow_traces(&o.shade, occluders->triangles);
     r.scenery.traces_ao = vshi_ao_traces(&o.shade, occluders->triangles);
     r.scenery.lift = needs_lift(&r.scenery, occluders) ? LIFT : 0.0;

@@ -15,7 +15,9 @@ typedef struct hits {
     size_t count;
     vshi_seen *seen[VSHI_TILE_SAMPLES];
     const double *color[VSHI_TILE_SAMPLES];
-    double traced[VSHI_TILE_SAMPLES][3];  /* where rays against triangles begin */
+    vshi_lift_point points[VSHI_TILE_SAMPLES];
+    double traced[VSHI_TILE_SAMPLES][3];  /* where rays against triangles begin, of AO, */
+    double lifted[VSHI_TILE_SAMPLES][3];  /* and of the light at hand */
     double marched[VSHI_TILE_SAMPLES][3]; /* where marches through the field begin */
     float normals[VSHI_TILE_SAMPLES][3];
     float faces[VSHI_TILE_SAMPLES][3]; /* normals of the triangles; the same where a field is hit */
@@ -24,6 +26,12 @@ typedef struct hits {
     float ao[VSHI_TILE_SAMPLES];
     float light[VSHI_TILE_SAMPLES][3];
 } hits;
+
+static void put(vshi_vec p, double at[3]) {
+    at[0] = p.x;
+    at[1] = p.y;
+    at[2] = p.z;
+}
 
 /* The nearest surface, NULL where there is none or a lit mesh at `lit` stands for it. */
 static const vsh_surface *find_surface(const vshi_scenery *scenery, const vshi_eye_ray *ray, double lit,
@@ -46,13 +54,15 @@ static const vsh_surface *find_surface(const vshi_scenery *scenery, const vshi_e
     return nearest;
 }
 
-static void add_point(hits *h, vshi_vec traced, vshi_vec marched, vshi_vec n, vshi_vec face,
-                      const double *color, uint32_t texel, vshi_seen *seen) {
+static void add_point(hits *h, const vshi_lift_point *point, vshi_vec marched, const double *color,
+                      uint32_t texel, vshi_seen *seen) {
     const size_t i = h->count++;
+    const vshi_vec n = point->normal, face = point->face;
     h->seen[i] = seen;
     h->color[i] = color;
-    h->traced[i][0] = traced.x, h->traced[i][1] = traced.y, h->traced[i][2] = traced.z;
-    h->marched[i][0] = marched.x, h->marched[i][1] = marched.y, h->marched[i][2] = marched.z;
+    h->points[i] = *point;
+    put(point->foot, h->traced[i]);
+    put(marched, h->marched[i]);
     h->normals[i][0] = (float)n.x, h->normals[i][1] = (float)n.y, h->normals[i][2] = (float)n.z;
     h->faces[i][0] = (float)face.x, h->faces[i][1] = (float)face.y, h->faces[i][2] = (float)face.z;
     h->texels[i] = texel;
@@ -66,12 +76,12 @@ static void add_hit(const vshi_scenery *scenery, hits *h, const vsh_surface *sur
     const vshi_vec at = vshi_add(ray->origin, vshi_scale(ray->direction, distance));
     const vshi_vec n = vshi_field_normal(surface->field, at, vshi_scale(ray->direction, -1.0));
     const vshi_vec point = vshi_add(at, vshi_scale(n, scenery->lift * surface->field->voxel_size));
-    add_point(h, point, point, n, n, surface->color, texel, seen);
+    add_point(h, &(vshi_lift_point){point, {0.0, 0.0, 0.0}, n, n}, point, surface->color, texel, seen);
 }
 
 /* Returns how far over a triangle marches begin, voxels: outside of the field's surface, which is a shell
  * around an open mesh. */
-static double find_lift(const vsh_field *field, vshi_vec at, vshi_vec normal) {
+static double find_clearance(const vsh_field *field, vshi_vec at, vshi_vec normal) {
     double lift = CLEAR;
     if (field->unknown) {
         return 0.0; /* nothing is marched */
@@ -92,8 +102,9 @@ static double find_lift(const vsh_field *field, vshi_vec at, vshi_vec normal) {
 static void add_bare(const vshi_scenery *scenery, hits *h, uint32_t triangle, vshi_vec through,
                      uint32_t texel, vshi_seen *seen) {
     const vshi_lit_point p = vshi_lit_meet(scenery->lit, triangle, through);
-    const double lift = find_lift(scenery->field, p.at, p.flat) * scenery->field->voxel_size;
-    add_point(h, p.at, vshi_add(p.at, vshi_scale(p.flat, lift)), p.normal, p.flat, p.color, texel, seen);
+    const vsh_field *field = scenery->occluders->field;
+    const double clear = find_clearance(field, p.point.foot, p.point.face) * field->voxel_size;
+    add_point(h, &p.point, vshi_add(p.point.foot, vshi_scale(p.point.face, clear)), p.color, texel, seen);
 }
 
 /* Light at the hits, one after the other of the lights, so that room for one is enough. */
@@ -108,10 +119,15 @@ static vsh_result light_hits(const vshi_scenery *scenery, hits *h, vsh_shade_sta
         VSHI_TRY(vsh_query_points(scenery->query, &points, &layout, &scenery->run, &output, stats, error));
         output.ao = NULL;
     }
-    points.positions = scenery->traces_shadow ? &h->traced[0][0] : &h->marched[0][0];
+    points.positions = &h->lifted[0][0];
     for (size_t l = 0; l < scenery->light_count; ++l) {
         float *visibility[VSHI_MOST_LIGHTS] = {NULL};
         visibility[l] = h->visibility;
+        const vshi_lifter lifter = vshi_lifter_open(scenery->occluders, &scenery->lights[l]);
+        for (size_t i = 0; i < h->count; ++i) {
+            const vshi_vec from = vshi_vec_of(scenery->traces_shadow ? h->traced[i] : h->marched[i]);
+            put(vshi_add(from, vshi_lift_find(&lifter, &h->points[i])), h->lifted[i]);
+        }
         output.visibility = visibility;
         VSHI_TRY(vsh_query_points(scenery->query, &points, NULL, &scenery->run, &output, stats, error));
         vshi_shade_irradiance(&points, NULL, &scenery->lights[l], h->visibility, &scenery->options->tint,

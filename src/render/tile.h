@@ -14,7 +14,7 @@ typedef struct vshi_scenery {
     const vsh_light *lights;
     size_t light_count;
     const vsh_query *query;
-    const vsh_field *field; /* that the query asks */
+    const vsh_occluders *occluders; /* that the query asks */
     vsh_run run;
     bool traces_shadow, traces_ao; /* rays against triangles, not marches through the field */
     double lift;                   /* of points on surfaces, voxels */

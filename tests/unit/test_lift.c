@@ -1,6 +1,6 @@
 /* Meshes with smooth normals: where shadow rays begin, and which directions count for AO. The truth is that
  * of the facets. */
-#include "bake/lift.h"
+#include "bake/origins.h"
 #include "casts.h"
 #include "texels_of.h"
 
@@ -187,6 +187,41 @@ static void facets_do_not_hide_a_light_that_is_over_the_smooth_sphere(void **sta
 }
 
 /* A box whose face cuts the sphere: between the facets and the smooth sphere, near the cut. */
+/* Its light is the cosine of the smooth normal, from where the light stands over the horizon. */
+static void pictures_show_no_facets_where_light_grazes_a_smooth_sphere(void **state) {
+    (void)state;
+    enum { SIZE = 64 };
+    static float color[3 * SIZE * SIZE], alpha[SIZE * SIZE], depth[SIZE * SIZE], normal[3 * SIZE * SIZE];
+    scene s;
+    open_scene(&s, NULL);
+    vsh_error error = {VSH_OK, ""};
+    const vsh_light light = sun_towards(1.0, 0.4, 0.2);
+    const vsh_lit_meshes lit = {&s.ball.mesh, 1, NULL, {1.0, 1.0, 1.0}, 0};
+    vsh_render_options options = vsh_render_options_default();
+    options.width = options.height = SIZE;
+    memcpy(options.camera.position, (double[]){0.0, 0.0, 4.0}, sizeof options.camera.position);
+    memset(options.camera.target, 0, sizeof options.camera.target);
+    memset(options.sky, 0, sizeof options.sky);
+    options.samples = 1;
+    options.shade.method = VSH_SHADOW_EXACT;
+    options.lit = &lit;
+    options.lit_count = 1;
+    check(vsh_render(NULL, 0, occluders_traced(s.field, s.triangles), &light, 1, &options, NULL,
+                     &(vsh_picture){color, alpha, depth, normal}, NULL, &error),
+          &error);
+    size_t near = 0, dark = 0;
+    for (size_t i = 0; i < SIZE * SIZE; ++i) {
+        const float cosine = (float)dot(normal + 3 * i, light.direction);
+        if (alpha[i] == 1.0f && cosine > 0.02f && cosine < 0.3f) {
+            ++near;
+            dark += color[3 * i] < 0.9f * cosine;
+        }
+    }
+    assert_true(near > 100);
+    assert_int_equal(dark, 0);
+    close_scene(&s);
+}
+
 static void samples_are_valid_by_where_their_facets_are(void **state) {
     (void)state;
     static const double FACE = 0.953, CLEAR = 1e-4;
@@ -353,9 +388,10 @@ static void a_lift_fades_as_neighbours_come_near(void **state) {
         scene s;
         open_scene(&s, &wall);
         before = before != NULL ? before : calloc(s.flat.count, sizeof *before);
-        const vshi_lifter lifter = vshi_lifter_open(s.texels, occluders_traced(s.field, s.triangles), &light);
+        const vshi_lifter lifter = vshi_lifter_open(occluders_traced(s.field, s.triangles), &light);
         for (size_t i = 0; i < s.flat.count; ++i) {
-            const double length = vshi_length(vshi_lift_find(&lifter, i));
+            const vshi_lift_point point = vshi_sample_lift_point(s.texels, i);
+            const double length = vshi_length(vshi_lift_find(&lifter, &point));
             const double room = face - s.flat.positions[3 * i];
             const double x = (double)s.texels->lift[3 * i],
                          whole = vshi_length(vshi_vec_off(s.texels->lift + 3 * i));
@@ -402,6 +438,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rays_to_a_light_well_above_a_facet_begin_on_it),
         cmocka_unit_test(facets_do_not_hide_a_light_that_is_over_the_smooth_sphere),
+        cmocka_unit_test(pictures_show_no_facets_where_light_grazes_a_smooth_sphere),
         cmocka_unit_test(samples_are_valid_by_where_their_facets_are),
         cmocka_unit_test(ao_close_to_a_wall_is_that_of_the_facets),
         cmocka_unit_test(ao_of_a_smooth_convex_body_in_the_open_is_1),

@@ -1,6 +1,5 @@
-#include "bake/lift.h"
+#include "shade/lift.h"
 #include "base/elementary.h"
-#include "base/parallel.h"
 #include "shade/layers.h"
 #include "trace/embree.h"
 
@@ -18,9 +17,8 @@ static const double ROOM = 4.0;
  * not lifted: a lift also moves the shadows of everything else. Below it the lift fades in. */
 static const double WELL_ABOVE = 0.05;
 
-vshi_lifter vshi_lifter_open(const vsh_texels *texels, const vsh_occluders *occluders,
-                             const vsh_light *light) {
-    vshi_lifter lifter = {.texels = texels, .occluders = occluders, .light = light};
+vshi_lifter vshi_lifter_open(const vsh_occluders *occluders, const vsh_light *light) {
+    vshi_lifter lifter = {.occluders = occluders, .light = light};
     if (light != NULL) {
         lifter.place = vshi_light_in_world(light);
     }
@@ -32,15 +30,14 @@ typedef struct elevation {
     double lowest, highest;
 } elevation;
 
-static elevation find_elevation(const vshi_lifter *l, size_t sample, const float *normals) {
-    const vshi_vec normal = vshi_vec_off(normals + 3 * sample);
+static elevation find_elevation(const vshi_lifter *l, vshi_vec from, vshi_vec normal) {
     const vshi_light_place *place = &l->place;
     double centre = 0.0, half = 1.0; /* in the middle of the light */
     if (place->parallel) {
         centre = vshi_dot(normal, place->towards);
         half = place->sine;
     } else {
-        const vshi_vec to = vshi_sub(place->centre, vshi_sample_foot(l->texels, sample));
+        const vshi_vec to = vshi_sub(place->centre, from);
         const double distance = vshi_length(to);
         if (distance > 0.0) {
             centre = vshi_dot(normal, to) / distance;
@@ -50,8 +47,8 @@ static elevation find_elevation(const vshi_lifter *l, size_t sample, const float
     return (elevation){centre - half, centre + half};
 }
 
-bool vshi_light_is_cut(const vshi_lifter *lifter, size_t sample) {
-    return lifter->light != NULL && find_elevation(lifter, sample, lifter->texels->geometric).lowest < 0.0;
+bool vshi_light_is_cut(const vshi_lifter *lifter, const vshi_lift_point *point) {
+    return lifter->light != NULL && find_elevation(lifter, point->foot, point->face).lowest < 0.0;
 }
 
 /* Distance to the nearest triangle straight up and at 45 degrees to four sides, at most `far`. */
@@ -71,66 +68,24 @@ static double find_room(const vsh_triangles *triangles, vshi_vec foot, vshi_vec 
     return room;
 }
 
-vshi_vec vshi_lift_find(const vshi_lifter *l, size_t sample) {
+vshi_vec vshi_lift_find(const vshi_lifter *l, const vshi_lift_point *point) {
     static const vshi_vec NONE = {0.0, 0.0, 0.0};
-    const vshi_vec lift = vshi_vec_off(l->texels->lift + 3 * sample);
-    const double length = vshi_length(lift);
+    const double length = vshi_length(point->lift);
     if (l->light == NULL || !(length > 0.0)) {
         return NONE;
     }
-    if (find_elevation(l, sample, l->texels->normal).highest < 0.0) {
+    if (find_elevation(l, point->foot, point->normal).highest < 0.0) {
         return NONE; /* the smooth surface faces away from all of the light */
     }
-    const double lowest = find_elevation(l, sample, l->texels->geometric).lowest;
+    const double lowest = find_elevation(l, point->foot, point->face).lowest;
     double share = lowest <= 0.0 ? 1.0 : fmax(1.0 - lowest / WELL_ABOVE, 0.0);
-    const vshi_vec foot = vshi_sample_foot(l->texels, sample), up = vshi_scale(lift, 1.0 / length);
-    const vshi_vec normal = vshi_vec_off(l->texels->geometric + 3 * sample);
+    const vshi_vec up = vshi_scale(point->lift, 1.0 / length);
     for (size_t k = 0; share > 0.0 && k <= l->occluders->layer_count; ++k) {
         const vsh_triangles *triangles =
             k == 0 ? l->occluders->triangles : l->occluders->layers[k - 1].triangles;
         if (triangles != NULL) {
-            share *= find_room(triangles, foot, normal, up, ROOM * length) / (ROOM * length);
+            share *= find_room(triangles, point->foot, point->face, up, ROOM * length) / (ROOM * length);
         }
     }
-    return vshi_scale(lift, share);
-}
-
-typedef struct lifting {
-    const vshi_lifter *lifter;
-    vshi_origins *origins;
-    bool traced;
-} lifting;
-
-static void lift_blocks(void *user, size_t begin, size_t end) {
-    const lifting *a = user;
-    const vsh_texels *texels = a->lifter->texels;
-    const vshi_origins *origins = a->origins;
-    for (size_t block = begin; block < end; ++block) {
-        size_t next = origins->before[block];
-        const size_t last = (block + 1) * VSHI_ORIGIN_BLOCK;
-        for (size_t i = block * VSHI_ORIGIN_BLOCK; i < last && i < texels->count; ++i) {
-            if (!origins->valid[i]) {
-                continue;
-            }
-            const vshi_vec base =
-                a->traced ? vshi_sample_foot(texels, i) : vshi_vec_of(origins->position + 3 * next);
-            const vshi_vec p = vshi_add(base, vshi_lift_find(a->lifter, i));
-            double *at = origins->start + 3 * next++;
-            at[0] = p.x;
-            at[1] = p.y;
-            at[2] = p.z;
-        }
-    }
-}
-
-vsh_result vshi_lift_origins(const vshi_lifter *lifter, bool traced, const vsh_run *run,
-                             vshi_origins *origins, vsh_error *error) {
-    lifting task = {lifter, origins, traced};
-    vshi_job *job = vshi_job_begin(run, "lift", origins->blocks);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "lift: the system refused memory");
-    }
-    const vsh_result result = vshi_parallel_for(job, origins->blocks, 1, 1, lift_blocks, &task, error);
-    vshi_job_end(job);
-    return result;
+    return vshi_scale(point->lift, share);
 }

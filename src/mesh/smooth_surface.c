@@ -1,7 +1,7 @@
 /* Samples of coarse smooth meshes are lifted towards the surface that their normals describe, after Hanika,
  * "Hacking the Shadow Terminator" (Ray Tracing Gems II, 2021): p' = p + Σ b_i (-min(0, (p - v_i)·n_i)) n_i.
  * Only convex parts are lifted, by about the sagitta of the arc over the triangle. */
-#include "bake/smooth_surface.h"
+#include "mesh/smooth_surface.h"
 #include "mesh/mesh.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
-/* Where a sample of a triangle stands in the world and which way it faces. */
-#ifndef VSHI_BAKE_SMOOTH_SURFACE_H
-#define VSHI_BAKE_SMOOTH_SURFACE_H
+/* Where a point of a triangle lies in the world and which way it faces. */
+#ifndef VSHI_MESH_SMOOTH_SURFACE_H
+#define VSHI_MESH_SMOOTH_SURFACE_H
 
 #include "base/vec.h"
 
