@@ -223,6 +223,7 @@ void vsh_bake_job_free(vsh_bake_job *job) {
     free(job->part_path);
     vshi_shares_free(job);
     free(job->errors);
+    free(job->lit);
     vshi_lit_pages_free(job);
     vsh_provenance_free(job->provenance);
     vsh_occluders_free(job->occluders);
@@ -352,8 +353,10 @@ vsh_result vshi_job_find_provenance(vsh_bake_job *job, const vsh_run *run, vsh_e
 vsh_result vshi_job_make_errors(vsh_bake_job *job, vsh_error *error) {
     const size_t count = job->scene.light_count + 2;
     free(job->errors);
+    free(job->lit);
     job->errors = calloc(count, sizeof *job->errors);
-    if (job->errors == NULL) {
+    job->lit = calloc(count, sizeof *job->lit);
+    if (job->errors == NULL || job->lit == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "bake job: the system refused memory");
     }
     job->report.errors = job->errors;
@@ -379,11 +382,6 @@ vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, vsh_error
     options.points = vshi_job_points(job);
     VSHI_TRY(vsh_scene_occluders(&job->scene, job->assets, &options, run, &job->occluders, error));
     vsh_occluders_get_info(job->occluders, &job->report.occluders);
-    if (job->options.shard <= 1 && run != NULL) { /* the first part's bake warns for all */
-        vsh_run full;
-        VSHI_TRY(vshi_run_resolve(run, &full, error));
-        vshi_warn_hidden_lights(job, &full);
-    }
     return vshi_job_make_errors(job, error);
 }
 
@@ -423,6 +421,7 @@ vsh_result vshi_job_bake_all(vsh_bake_job *job, const vsh_run *run, vsh_error *e
         VSHI_TRY(count > 1 ? vshi_bake_together(job, i, count, run, error)
                            : vshi_job_bake_one(job, i, run, error));
     }
+    vshi_warn_hidden_lights(job, run);
     return VSH_OK;
 }
 

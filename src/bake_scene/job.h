@@ -15,6 +15,12 @@ typedef struct vshi_lit_page {
     float *planes[4];   /* AO; light: R, G and B, or one; NULL: none */
 } vshi_lit_page;
 
+/* The objects that a light or the sky reaches. */
+typedef struct vshi_lit {
+    const vsh_mesh *mesh; /* NULL: nothing yet */
+    bool several;         /* more than one object */
+} vshi_lit;
+
 struct vsh_bake_job {
     vsh_scene scene;
     vsh_receiver *receivers_own; /* the scene's, where they are not those that were given; else NULL */
@@ -31,6 +37,7 @@ struct vsh_bake_job {
     vsh_occluders *occluders;   /* NULL: not prepared */
     vsh_provenance *provenance; /* NULL where a caller's sink takes the rows, and nothing is kept */
     vsh_bake_error *errors;     /* [error_count], as in the report */
+    vshi_lit *lit;              /* [light_count + 1]: of each light, of the sky */
     vsh_bake_report report;
     bool measured;
     size_t apart; /* lightmaps before it are not stitched together with others: there is no memory for it */
@@ -85,7 +92,7 @@ vsh_result vshi_job_bake_all(vsh_bake_job *job, const vsh_run *run, vsh_error *e
 /* Where the outputs come from, once it is known what casts. */
 vsh_result vshi_job_find_provenance(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
 
-/* The report's errors, zeros. */
+/* The report's errors and what lights reach, zeros. */
 vsh_result vshi_job_make_errors(vsh_bake_job *job, vsh_error *error);
 
 /* Statistics of bands and parts add up. */

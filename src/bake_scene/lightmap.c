@@ -109,6 +109,17 @@ static vsh_result make_texels(const vshi_lightmap_work *w, int32_t first, int32_
     return vshi_texels_create_part(w->input.charts, first, rows, &cut, run, texels, error);
 }
 
+/* Notes what lights reach in `rows` rows from `first` on. */
+static void note_lit(const vshi_lightmap_work *w, const vsh_texels *texels, int32_t first, int32_t rows) {
+    const size_t width = (size_t)w->lightmap->width, begin = (size_t)first * width;
+    for (size_t i = 0; i < texels->count; ++i) {
+        const size_t texel = vshi_sample_place(texels, i);
+        if (texel >= begin && texel - begin < (size_t)rows * width) {
+            vshi_note_lit(w, texel - begin, vshi_sample_mesh(texels, i));
+        }
+    }
+}
+
 static vsh_result bake_band(vshi_lightmap_work *w, int32_t first, int32_t rows, const vsh_run *run,
                             vsh_error *error) {
     const vsh_scene *scene = &w->job->scene;
@@ -128,6 +139,9 @@ static vsh_result bake_band(vshi_lightmap_work *w, int32_t first, int32_t rows, 
                              &w->channels.lightmap, known, w->channels.kept, NULL, &band, error)
             : vsh_bake_lightmap(w->job->occluders, texels, scene->lights, scene->light_count, &scene->shade,
                                 run, &w->channels.lightmap, &band, error);
+    if (result == VSH_OK) {
+        note_lit(w, texels, first, rows);
+    }
     if (result == VSH_OK && vshi_is_fixed_whole(w)) {
         result = vshi_fill_hidden(w, texels, error);
     }
@@ -147,8 +161,7 @@ static vsh_result bake_band(vshi_lightmap_work *w, int32_t first, int32_t rows, 
 /* Takes a band from parts, as bake_band() makes it. */
 static vsh_result take_band(vshi_lightmap_work *w, int32_t first, int32_t rows, const vsh_run *run,
                             vsh_error *error) {
-    VSHI_TRY(vshi_parts_take(w->job->parts, &w->job->scene, w->index, w->input.charts, first, rows, run,
-                             &w->channels, &w->baked, error));
+    VSHI_TRY(vshi_parts_take(w, first, rows, run, error));
     if (!vshi_is_fixed_whole(w)) {
         return VSH_OK;
     }

@@ -32,11 +32,11 @@ vsh_result vshi_parts_open(vsh_bake_job *job, int32_t count, const vsh_run *run,
                            vsh_error *error);
 void vshi_parts_free(vshi_parts *parts);
 
-/* Takes rows of a lightmap into the channels, with the AO that was left, padded and filled; what was left is
- * added to the statistics. */
-vsh_result vshi_parts_take(const vshi_parts *parts, const vsh_scene *scene, size_t index,
-                           const vsh_charts *charts, int32_t first, int32_t rows, const vsh_run *run,
-                           vshi_channels *channels, vsh_bake_stats *stats, vsh_error *error);
+/* Reads rows of a lightmap from the job's parts into the channels. Finishes the AO that the parts left, pads
+ * and fills. Adds the finished AO to the statistics. */
+struct vshi_lightmap_work;
+vsh_result vshi_parts_take(struct vshi_lightmap_work *work, int32_t first, int32_t rows, const vsh_run *run,
+                           vsh_error *error);
 
 /* Rows of a lightmap that are read from parts. */
 typedef struct vshi_held_rows {

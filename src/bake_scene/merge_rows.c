@@ -1,6 +1,7 @@
 /* Rows out of parts: read with those around them, filled, and handed on. */
 #include "bake/part.h"
-#include "bake_scene/merge.h"
+#include "bake_scene/lightmap.h"
+#include "bake_scene/warn.h"
 #include "base/memory.h"
 #include "base/try.h"
 
@@ -54,24 +55,30 @@ static vsh_result complete(const vsh_scene *scene, const vsh_charts *charts, con
     return vshi_rows_complete(&given, run, error);
 }
 
-/* The rows that were asked for, of those held. */
-static void hand_over(const vshi_held_rows *held, int32_t first, int32_t rows, vshi_channels *channels) {
+/* Copies rows to the channels and notes what lights reach in them. */
+static void hand_over(const vshi_held_rows *held, int32_t first, int32_t rows, vshi_lightmap_work *w) {
+    vshi_channels *channels = &w->channels;
     const size_t texels = (size_t)held->width * (size_t)rows;
     const size_t at = (size_t)(first - held->first) * (size_t)held->width;
     const float *coverage = held->planes[channels->image.channel_count - 1] + at;
     for (int32_t c = 0; held->memory != NULL && c < channels->image.channel_count; ++c) {
         memcpy(channels->planes[c], held->planes[c] + at, texels * sizeof(float));
     }
-    for (size_t i = 0; channels->invalid != NULL && i < texels; ++i) {
-        const uint32_t known = held->known[at + i];
-        const bool invalid = (known & VSHI_PART_MESH) != 0 && coverage[i] != 1.0f;
-        channels->invalid[i] = invalid ? 1.0f : 0.0f;
+    for (size_t i = 0; i < texels; ++i) {
+        const uint32_t mesh = held->known[at + i] & VSHI_PART_MESH;
+        if (channels->invalid != NULL) {
+            channels->invalid[i] = mesh != 0 && coverage[i] != 1.0f ? 1.0f : 0.0f;
+        }
+        vshi_note_lit(w, i, (size_t)mesh - 1); /* SIZE_MAX: no mesh */
     }
 }
 
-vsh_result vshi_parts_take(const vshi_parts *parts, const vsh_scene *scene, size_t index,
-                           const vsh_charts *charts, int32_t first, int32_t rows, const vsh_run *run,
-                           vshi_channels *channels, vsh_bake_stats *stats, vsh_error *error) {
+vsh_result vshi_parts_take(vshi_lightmap_work *w, int32_t first, int32_t rows, const vsh_run *run,
+                           vsh_error *error) {
+    const vshi_parts *parts = w->job->parts;
+    const vsh_scene *scene = &w->job->scene;
+    const vsh_charts *charts = w->input.charts;
+    vshi_channels *channels = &w->channels;
     const int32_t height = channels->image.height, reach = vshi_part_reach(charts);
     const bool whole = rows == height;
     vshi_held_rows held = {.width = channels->image.width,
@@ -79,11 +86,11 @@ vsh_result vshi_parts_take(const vshi_parts *parts, const vsh_scene *scene, size
                            .end = height - first - rows > reach ? first + rows + reach : height};
     vsh_result result;
     VSHI_TRY_DONE(hold(channels, whole, &held, error));
-    VSHI_TRY_DONE(read_rows(parts, index, &held, error));
-    VSHI_TRY_DONE(
-        vshi_parts_finish(parts, scene, index, channels, &held, first, first + rows, run, stats, error));
+    VSHI_TRY_DONE(read_rows(parts, w->index, &held, error));
+    VSHI_TRY_DONE(vshi_parts_finish(parts, scene, w->index, channels, &held, first, first + rows, run,
+                                    &w->baked, error));
     VSHI_TRY_DONE(complete(scene, charts, channels, whole, &held, run, error));
-    hand_over(&held, first, rows, channels);
+    hand_over(&held, first, rows, w);
     vshi_channels_join(channels, scene);
 done:
     free(held.memory);
