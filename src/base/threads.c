@@ -5,6 +5,7 @@
 #include "base/threads.h"
 
 #include "base/error.h"
+#include "base/floats.h"
 
 #include <pthread.h>
 #include <sched.h>
@@ -158,22 +159,24 @@ static bool has_stack(void) {
 }
 
 typedef struct stack_call {
-    void (*fn)(void *user);
+    vshi_stack_fn *fn;
     void *user;
+    vsh_error *error;
+    vsh_result result;
 } stack_call;
 
 static void *run_call(void *user) {
-    const stack_call *call = user;
-    call->fn(call->user);
+    VSHI_FLOATS;
+    stack_call *call = user;
+    call->result = call->fn(call->user, call->error);
     return NULL;
 }
 
-vsh_result vshi_on_stack(void (*fn)(void *user), void *user, vsh_error *error) {
+vsh_result vshi_on_stack(vshi_stack_fn *fn, void *user, vsh_error *error) {
     if (has_stack()) {
-        fn(user);
-        return VSH_OK;
+        return fn(user, error);
     }
-    stack_call call = {fn, user};
+    stack_call call = {fn, user, error, VSH_OK};
     sigset_t all, before;
     pthread_attr_t attributes;
     pthread_t thread;
@@ -194,5 +197,5 @@ vsh_result vshi_on_stack(void (*fn)(void *user), void *user, vsh_error *error) {
             VSHI_STACK >> 20, 2 * VSHI_STACK_ENOUGH >> 20);
     }
     pthread_join(thread, NULL);
-    return VSH_OK;
+    return call.result;
 }

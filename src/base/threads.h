@@ -24,12 +24,13 @@ int32_t vshi_threads_given(int32_t wanted, size_t stack);
 /* Whether so many can be begun now, beside those that there are. */
 bool vshi_threads_left(int32_t wanted);
 
-/* Calls fn(user) on this thread where it has VSHI_STACK_ENOUGH left, else on a new thread with VSHI_STACK,
- * and waits for it. Hosts call from threads and fibres with small stacks, and TBB, Embree, OpenVDB, parsers
- * and our kernels need more. Signals go to other threads. Errors: VSH_ERROR_MEMORY (the system refuses a
- * thread). */
+/* Calls fn(user, error) and returns its result. If this thread has less than VSHI_STACK_ENOUGH left, a new
+ * thread with VSHI_STACK makes the call. Hosts call from threads and fibres with small stacks, but TBB,
+ * Embree, OpenVDB, our kernels and parsers of nested files need more. Signals go to other threads. Errors:
+ * those of fn, VSH_ERROR_MEMORY (the system refuses a thread). */
 enum { VSHI_STACK = 4 << 20 /* bytes, as TBB's threads have */, VSHI_STACK_ENOUGH = 2 << 20 };
-VSHI_SHARED vsh_result vshi_on_stack(void (*fn)(void *user), void *user, vsh_error *error);
+typedef vsh_result vshi_stack_fn(void *user, vsh_error *error);
+VSHI_SHARED vsh_result vshi_on_stack(vshi_stack_fn *fn, void *user, vsh_error *error);
 
 #ifdef __cplusplus
 }

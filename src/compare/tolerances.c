@@ -89,7 +89,15 @@ static const vshi_key file_keys[] = {
 static const vshi_table file_table = VSHI_TABLE(file_keys);
 _Static_assert(offsetof(vsh_tolerances, all) == 0, "the keys' offsets are those of an entry");
 
-static vsh_result parse(vshi_json *reader, vsh_tolerances *made) {
+typedef struct parsing {
+    vshi_json reader;
+    vsh_tolerances *made;
+} parsing;
+
+static vsh_result parse(void *user, vsh_error *error) {
+    (void)error; /* the reader has it */
+    vshi_json *reader = &((parsing *)user)->reader;
+    vsh_tolerances *made = ((parsing *)user)->made;
     json_t *json;
     VSHI_TRY(vshi_json_load(reader, &json));
     const vshi_value root = {NULL, NULL, 0, 0, json};
@@ -98,25 +106,6 @@ static vsh_result parse(vshi_json *reader, vsh_tolerances *made) {
     made->blocks = reader->blocks;
     json_decref(json);
     return result;
-}
-
-typedef struct parsing {
-    vshi_json *reader;
-    vsh_tolerances *made;
-    vsh_result result;
-} parsing;
-
-static void parse_all(void *user) {
-    VSHI_FLOATS;
-    parsing *p = user;
-    p->result = parse(p->reader, p->made);
-}
-
-/* How deep JSON nests is up to its file. */
-static vsh_result parse_on_stack(vshi_json *reader, vsh_tolerances *made) {
-    parsing p = {reader, made, VSH_OK};
-    VSHI_TRY(vshi_on_stack(parse_all, &p, reader->error));
-    return p.result;
 }
 
 vsh_result vsh_tolerances_read(const char *path, vsh_tolerances **tolerances, vsh_error *error) {
@@ -129,11 +118,11 @@ vsh_result vsh_tolerances_read(const char *path, vsh_tolerances **tolerances, vs
     vsh_run run = vsh_run_default();
     run.memory_limit = MOST_BYTES;
     VSHI_TRY(vshi_json_text(path, &run, &text, &size, error));
-    vshi_json reader = {path, text, size, NULL, error};
     vsh_tolerances *made = calloc(1, sizeof *made);
+    parsing p = {{path, text, size, NULL, error}, made};
     const vsh_result result =
         made != NULL
-            ? parse_on_stack(&reader, made)
+            ? vshi_on_stack(parse, &p, error)
             : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
     free(text);
     if (result != VSH_OK) {

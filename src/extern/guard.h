@@ -44,11 +44,9 @@ vsh_result catch_all(vsh_error *error, vsh_result code, const char *what, Body &
 // The same, where there is stack enough for what body() calls: maybe on another thread.
 template <typename Body>
 vsh_result guard(vsh_error *error, vsh_result code, const char *what, Body &&body) noexcept {
-    vsh_result result = VSH_OK;
-    auto run = [&] { result = catch_all(error, code, what, body); };
-    const vsh_result begun =
-        vshi_on_stack([](void *user) { (*static_cast<decltype(run) *>(user))(); }, &run, error);
-    return begun == VSH_OK ? result : begun;
+    auto run = [&] { return catch_all(error, code, what, body); };
+    const auto call = [](void *user, vsh_error *) { return (*static_cast<decltype(run) *>(user))(); };
+    return vshi_on_stack(call, &run, error);
 }
 
 } // namespace vshi

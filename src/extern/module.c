@@ -84,24 +84,14 @@ static vsh_result load(vshi_module *module, vsh_error *error) {
     return VSH_OK;
 }
 
-typedef struct loading {
-    vshi_module *module;
-    vsh_result result;
-    vsh_error *error;
-} loading;
-
-static void load_once(void *user) {
-    loading *l = user;
-    pthread_mutex_lock(&l->module->lock);
-    l->result = vshi_module_table(l->module) == NULL ? load(l->module, l->error) : VSH_OK;
-    pthread_mutex_unlock(&l->module->lock);
+static vsh_result load_once(void *user, vsh_error *error) {
+    vshi_module *module = user;
+    pthread_mutex_lock(&module->lock);
+    const vsh_result result = vshi_module_table(module) == NULL ? load(module, error) : VSH_OK;
+    pthread_mutex_unlock(&module->lock);
+    return result;
 }
 
 vsh_result vshi_module_load(vshi_module *module, vsh_error *error) {
-    if (vshi_module_table(module) != NULL) {
-        return VSH_OK;
-    }
-    loading l = {module, VSH_OK, error};
-    const vsh_result begun = vshi_on_stack(load_once, &l, error);
-    return begun == VSH_OK ? l.result : begun;
+    return vshi_module_table(module) != NULL ? VSH_OK : vshi_on_stack(load_once, module, error);
 }

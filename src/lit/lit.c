@@ -119,11 +119,11 @@ static char *folder_of(const char *path) {
 }
 
 /* Images that the input names stay named where the output stands beside it. */
-static vsh_result bring_images(vshi_lit_work *work, const char *path, vsh_error *error) {
+static vsh_result bring_images(vshi_lit_work *work, vsh_error *error) {
     if (work->document.own_images == NULL) {
         return VSH_OK;
     }
-    char *one = folder_of(path), *other = folder_of(work->output);
+    char *one = folder_of(work->path), *other = folder_of(work->output);
     const bool known = one != NULL && other != NULL, beside = known && is_same(one, other);
     free(one);
     free(other);
@@ -132,18 +132,19 @@ static vsh_result bring_images(vshi_lit_work *work, const char *path, vsh_error 
                     : vshi_lit_images_bring(work, error);
 }
 
-static vsh_result make_document(vshi_lit_work *work, const char *path, const vsh_run *run, vshi_job *job,
-                                vshi_lit_uses *uses, vsh_error *error) {
+static vsh_result make_document(vshi_lit_work *work, vshi_lit_uses *uses, vsh_error *error) {
+    const char *path = work->path;
     const bool obj = vshi_lit_is_obj(work->output);
     if (path != NULL && is_same(path, work->output)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: the output is the input", work->output);
     }
     if (path == NULL || !is_gltf(path) || obj) {
-        VSHI_TRY(vshi_lit_begin(&work->document, path != NULL ? path : work->output, run, job, error));
+        VSHI_TRY(
+            vshi_lit_begin(&work->document, path != NULL ? path : work->output, work->run, work->job, error));
         VSHI_TRY(allocate_pages(work, error));
         return obj ? VSH_OK : vshi_lit_from_model(work, error);
     }
-    VSHI_TRY(vshi_lit_open(&work->document, path, run, job, error));
+    VSHI_TRY(vshi_lit_open(&work->document, path, work->run, work->job, error));
     VSHI_TRY(allocate_pages(work, error));
     if (has_new_uvs(work)) {
         VSHI_TRY(vshi_lit_dracos_read(&work->document, &work->dracos, error));
@@ -153,20 +154,20 @@ static vsh_result make_document(vshi_lit_work *work, const char *path, const vsh
     return vshi_lit_nodes_make(work, error);
 }
 
-static vsh_result make(vshi_lit_work *work, const char *path, const vsh_run *run, vshi_job *job,
-                       vsh_error *error) {
+static vsh_result make(void *user, vsh_error *error) {
+    vshi_lit_work *work = user;
     vshi_lit_besides besides = {NULL, 0};
     vshi_lit_uses uses = {.accessors = NULL};
     const int32_t place = work->options->image_place;
     const bool glb = strcasecmp(vshi_path_ending(work->output), "glb") == 0;
     const bool embed = place == VSH_LIT_IMAGES_EMBED || (place == VSH_LIT_IMAGES_AUTO && glb);
     vsh_result result;
-    VSHI_TRY_DONE(make_document(work, path, run, job, &uses, error));
+    VSHI_TRY_DONE(make_document(work, &uses, error));
     VSHI_TRY_DONE(vshi_lit_images_add(work, embed, &besides, error));
     if (!vshi_lit_is_obj(work->output)) {
         VSHI_TRY_DONE(vshi_lit_materials_apply(work, error));
         VSHI_TRY_DONE(vshi_lit_prune(&work->document, &uses, error));
-        VSHI_TRY_DONE(bring_images(work, path, error)); /* which may be fewer now */
+        VSHI_TRY_DONE(bring_images(work, error)); /* which may be fewer now */
         VSHI_TRY_DONE(vshi_lit_tell_origin(work, error));
     }
     VSHI_TRY_DONE(vshi_lit_write_files(work, &besides, error));
@@ -216,15 +217,16 @@ static vsh_result try_mesh(vshi_lit_work *work, size_t entry, vsh_error *error) 
     return result;
 }
 
-static vsh_result try_all(vshi_lit_work *work, const char *path, const vsh_run *run, vshi_job *job,
-                          vsh_error *error) {
+static vsh_result try_all(void *user, vsh_error *error) {
+    vshi_lit_work *work = user;
+    const char *path = work->path;
     bool opened = false;
     for (size_t i = 0; path != NULL && is_gltf(path) && i < vsh_model_mesh_count(work->model); ++i) {
         if (work->meshes[i].uvs == NULL || vsh_model_uv_sets(work->model, i) < VSH_MAX_UV_SETS) {
             continue;
         }
         if (!opened) {
-            VSHI_TRY(vshi_lit_open(&work->document, path, run, job, error));
+            VSHI_TRY(vshi_lit_open(&work->document, path, work->run, work->job, error));
             opened = true;
         }
         VSHI_TRY(try_mesh(work, i, error));
@@ -232,34 +234,10 @@ static vsh_result try_all(vshi_lit_work *work, const char *path, const vsh_run *
     return VSH_OK;
 }
 
-typedef vsh_result work_fn(vshi_lit_work *work, const char *path, const vsh_run *run, vshi_job *job,
-                           vsh_error *error);
-
-typedef struct work_call {
-    work_fn *fn;
-    vshi_lit_work *work;
-    const char *path;
-    const vsh_run *run;
-    vshi_job *job;
-    vsh_error *error;
-    vsh_result result;
-} work_call;
-
-static void do_work(void *user) {
-    VSHI_FLOATS;
-    work_call *c = user;
-    c->result = c->fn(c->work, c->path, c->run, c->job, c->error);
-}
-
-/* How deep JSON nests is up to its file. */
-static vsh_result work_on_stack(work_fn *fn, vshi_lit_work *work, const char *path, const vsh_run *run,
-                                vshi_job *job, vsh_error *error) {
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "a lit model: the system refused memory");
-    }
-    work_call call = {fn, work, path, run, job, error, VSH_OK};
-    const vsh_result begun = vshi_on_stack(do_work, &call, error);
-    return begun == VSH_OK ? call.result : begun;
+static vsh_result do_work(vshi_stack_fn *fn, vshi_lit_work *work, size_t steps, vsh_error *error) {
+    work->job = vshi_job_begin(work->run, "lit", steps);
+    return work->job != NULL ? vshi_on_stack(fn, work, error)
+                             : vshi_fail(error, VSH_ERROR_MEMORY, "a lit model: the system refused memory");
 }
 
 vsh_result vsh_lit_check_uvs(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
@@ -277,17 +255,15 @@ vsh_result vsh_lit_check_uvs(const char *path, const vsh_model *model, const vsh
                              own.images[i].purpose);
         }
     }
-    vshi_lit_work work = {.model = model, .meshes = meshes, .options = &own};
-    vshi_job *job = NULL;
+    vshi_lit_work work = {.model = model, .meshes = meshes, .options = &own, .path = path, .run = &full};
     vsh_result result;
     VSHI_TRY_DONE(count_pages(&work, error));
     for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
         VSHI_TRY_DONE(vshi_lit_check_mesh(&work, i, error));
     }
-    job = vshi_job_begin(&full, "lit", 1);
-    result = work_on_stack(try_all, &work, path, &full, job, error);
+    result = do_work(try_all, &work, 1, error);
 done:
-    vshi_job_end(job);
+    vshi_job_end(work.job);
     free_work(&work);
     return result;
 }
@@ -306,18 +282,20 @@ vsh_result vsh_lit_write(const char *path, const vsh_model *model, const vsh_lit
     if (meshes == NULL) {
         VSHI_TRY(default_meshes(model, &made, error));
     }
-    vshi_lit_work work = {
-        .model = model, .meshes = meshes != NULL ? meshes : made, .options = &own, .output = output};
-    vshi_job *job = NULL;
+    vshi_lit_work work = {.model = model,
+                          .meshes = meshes != NULL ? meshes : made,
+                          .options = &own,
+                          .output = output,
+                          .path = path,
+                          .run = &full};
     vsh_result result;
     VSHI_TRY_DONE(check(&work, error));
-    job = vshi_job_begin(&full, "lit", vsh_model_mesh_count(model) + 1);
-    result = work_on_stack(make, &work, path, &full, job, error);
+    result = do_work(make, &work, vsh_model_mesh_count(model) + 1, error);
     if (result == VSH_OK) {
-        vshi_job_advance(job, 1); /* all is written: too late to stop */
+        vshi_job_advance(work.job, 1); /* all is written: too late to stop */
     }
 done:
-    vshi_job_end(job);
+    vshi_job_end(work.job);
     free_work(&work);
     free(made);
     return result;

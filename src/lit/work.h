@@ -46,6 +46,9 @@ typedef struct vshi_lit_work {
     const vsh_lit_mesh *meshes; /* [entries of the model] */
     const vsh_lit_options *options;
     const char *output;
+    const char *path; /* of the model's file; NULL: none */
+    const vsh_run *run;
+    vshi_job *job;
     size_t page_count;                  /* 1 + the highest page */
     size_t *textures[VSH_LIT_PURPOSES]; /* [page_count]; SIZE_MAX: none */
     double *intensities;                /* [page_count]: of lightmaps */

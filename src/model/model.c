@@ -106,48 +106,32 @@ static bool wants_normals(const char *path) {
     return dot == NULL || (strcmp(dot, ".stl") != 0 && strcmp(dot, ".STL") != 0);
 }
 
-static vsh_result read_file(const char *path, const vsh_run *run, vshi_job *job, bool alone,
-                            vsh_model **model, vsh_error *error) {
-    vshi_import *import = NULL;
-    double unit = 0.0;
-    VSHI_TRY(vshi_model_file_read(path, run, job, alone, &import, model, &unit, error));
-    if (import == NULL) {
-        return VSH_OK;
-    }
-    const vshi_model_source source = {.path = path,
-                                      .run = run,
-                                      .job = job,
-                                      .scene = vshi_import_scene(import),
-                                      .keep_normals = wants_normals(path),
-                                      .unit = unit > 0.0 ? unit : vshi_import_unit(import),
-                                      .in_metres = unit > 0.0};
-    const vsh_result result = vshi_model_build(&source, model, error);
-    vshi_import_free(import);
-    return result;
-}
-
 typedef struct reading {
     const char *path;
     const vsh_run *run;
     vshi_job *job;
     bool alone;
     vsh_model **model;
-    vsh_error *error;
-    vsh_result result;
 } reading;
 
-static void read_on_stack(void *user) {
-    VSHI_FLOATS;
-    reading *r = user;
-    r->result = read_file(r->path, r->run, r->job, r->alone, r->model, r->error);
-}
-
-/* How deep JSON nests is up to its file. */
-static vsh_result read_here(const char *path, const vsh_run *run, vshi_job *job, bool alone,
-                            vsh_model **model, vsh_error *error) {
-    reading r = {path, run, job, alone, model, error, VSH_OK};
-    const vsh_result begun = vshi_on_stack(read_on_stack, &r, error);
-    return begun == VSH_OK ? r.result : begun;
+static vsh_result read_file(void *user, vsh_error *error) {
+    const reading *r = user;
+    vshi_import *import = NULL;
+    double unit = 0.0;
+    VSHI_TRY(vshi_model_file_read(r->path, r->run, r->job, r->alone, &import, r->model, &unit, error));
+    if (import == NULL) {
+        return VSH_OK;
+    }
+    const vshi_model_source source = {.path = r->path,
+                                      .run = r->run,
+                                      .job = r->job,
+                                      .scene = vshi_import_scene(import),
+                                      .keep_normals = wants_normals(r->path),
+                                      .unit = unit > 0.0 ? unit : vshi_import_unit(import),
+                                      .in_metres = unit > 0.0};
+    const vsh_result result = vshi_model_build(&source, r->model, error);
+    vshi_import_free(import);
+    return result;
 }
 
 vsh_result vshi_model_read(const char *path, const vsh_run *run, bool alone, vsh_model **model,
@@ -163,10 +147,11 @@ vsh_result vshi_model_read(const char *path, const vsh_run *run, bool alone, vsh
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
     }
+    reading r = {path, &full, job, alone, model};
     vsh_result result;
     VSHI_TRY_DONE(full.reader != NULL
                       ? vshi_model_from_reader(path, &full, job, VSHI_MODEL_FILE_UNITS, model, error)
-                      : read_here(path, &full, job, alone, model, error));
+                      : vshi_on_stack(read_file, &r, error));
     if (vshi_job_advance(job, BUILD_UNITS)) {
         vsh_model_free(*model);
         *model = NULL;

@@ -23,20 +23,18 @@ typedef struct reading {
     const char *path;
     const vsh_run *run;
     vsh_scene **scene;
-    vsh_error *error;
-    vsh_result result;
 } reading;
 
-static void read_file(void *user) {
-    VSHI_FLOATS;
-    reading *r = user;
+static vsh_result read_file(void *user, vsh_error *error) {
+    const reading *r = user;
     char *text = NULL;
     size_t size;
-    r->result = vshi_scene_text(r->path, r->run, &text, &size, r->error);
-    if (r->result == VSH_OK) {
-        r->result = vshi_scene_parse(r->path, text, size, r->run, r->scene, r->error);
+    vsh_result result = vshi_scene_text(r->path, r->run, &text, &size, error);
+    if (result == VSH_OK) {
+        result = vshi_scene_parse(r->path, text, size, r->run, r->scene, error);
     }
     free(text);
+    return result;
 }
 
 vsh_result vsh_scene_read(const char *path, const vsh_run *run, vsh_scene **scene, vsh_error *error) {
@@ -46,7 +44,6 @@ vsh_result vsh_scene_read(const char *path, const vsh_run *run, vsh_scene **scen
     VSHI_NEEDS(path);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    reading r = {path, &full, scene, error, VSH_OK};
-    VSHI_TRY(vshi_on_stack(read_file, &r, error)); /* how deep JSON nests is up to its file */
-    return r.result;
+    reading r = {path, &full, scene};
+    return vshi_on_stack(read_file, &r, error);
 }

@@ -145,7 +145,15 @@ static const vshi_key scene_keys[] = {
 };
 const vshi_table vshi_flat_table = VSHI_TABLE(scene_keys);
 
-static vsh_result parse(vshi_json *reader, owner *made) {
+typedef struct parsing {
+    vshi_json reader;
+    owner *made;
+} parsing;
+
+static vsh_result parse(void *user, vsh_error *error) {
+    (void)error; /* the reader has it */
+    vshi_json *reader = &((parsing *)user)->reader;
+    owner *made = ((parsing *)user)->made;
     json_t *json = NULL;
     vsh_result result = VSH_OK;
     VSHI_TRY_DONE(vshi_json_load(reader, &json));
@@ -156,25 +164,6 @@ done:
     made->blocks = reader->blocks;
     json_decref(json);
     return result;
-}
-
-typedef struct parsing {
-    vshi_json *reader;
-    owner *made;
-    vsh_result result;
-} parsing;
-
-static void parse_all(void *user) {
-    VSHI_FLOATS;
-    parsing *p = user;
-    p->result = parse(p->reader, p->made);
-}
-
-/* How deep JSON nests is up to its file. */
-static vsh_result parse_on_stack(vshi_json *reader, owner *made) {
-    parsing p = {reader, made, VSH_OK};
-    VSHI_TRY(vshi_on_stack(parse_all, &p, reader->error));
-    return p.result;
 }
 
 vsh_result vsh_flat_scene_read(const char *path, const vsh_run *run, vsh_flat_scene **scene,
@@ -188,11 +177,11 @@ vsh_result vsh_flat_scene_read(const char *path, const vsh_run *run, vsh_flat_sc
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     VSHI_TRY(vshi_scene_text(path, &full, &text, &size, error));
-    vshi_json reader = {path, text, size, NULL, error};
     owner *made = calloc(1, sizeof *made);
+    parsing p = {{path, text, size, NULL, error}, made};
     const vsh_result result =
         made != NULL
-            ? parse_on_stack(&reader, made)
+            ? vshi_on_stack(parse, &p, error)
             : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
     free(text);
     if (result == VSH_OK) {

@@ -219,22 +219,29 @@ static vsh_result put_page(vshi_view *view, const vsh_view_bake *bakes, size_t c
     return VSH_OK;
 }
 
-static vsh_result write_page(const char *path, const vsh_view_bake *bakes, size_t count, const vsh_run *run,
-                             vsh_error *error) {
+typedef struct writing {
+    const char *path;
+    const vsh_view_bake *bakes;
+    size_t count;
+    const vsh_run *run;
+} writing;
+
+static vsh_result write_page(void *user, vsh_error *error) {
+    const writing *w = user;
     void *memory = NULL;
     VSHI_TRY(vshi_allocate(&memory, 1, sizeof(vshi_page), "page", error));
     vshi_page *page = memory;
-    vsh_result result = vshi_page_begin(page, path, error);
+    vsh_result result = vshi_page_begin(page, w->path, error);
     if (result != VSH_OK) {
         free(page);
         return result;
     }
-    vshi_view view = {page, run, 0, json_array()};
+    vshi_view view = {page, w->run, 0, json_array()};
     if (view.about == NULL) {
-        result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+        result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", w->path);
         goto done;
     }
-    VSHI_TRY_DONE(put_page(&view, bakes, count, error));
+    VSHI_TRY_DONE(put_page(&view, w->bakes, w->count, error));
     result = vshi_page_commit(page, error);
     page = NULL;
 done:
@@ -244,21 +251,6 @@ done:
     }
     free(memory);
     return result;
-}
-
-typedef struct writing {
-    const char *path;
-    const vsh_view_bake *bakes;
-    size_t count;
-    const vsh_run *run;
-    vsh_error *error;
-    vsh_result result;
-} writing;
-
-static void write_all(void *user) {
-    VSHI_FLOATS;
-    writing *w = user;
-    w->result = write_page(w->path, w->bakes, w->count, w->run, w->error);
 }
 
 vsh_result vsh_view_write_bakes(const char *path, const vsh_view_bake *const *bakes, size_t count,
@@ -284,9 +276,8 @@ vsh_result vsh_view_write_bakes(const char *path, const vsh_view_bake *const *ba
         goto done;
     }
     VSHI_TRY_DONE(vshi_run_resolve(run, &resolved, error));
-    writing w = {path, full, count, &resolved, error, VSH_OK};
-    VSHI_TRY_DONE(vshi_on_stack(write_all, &w, error)); /* how deep JSON nests is up to its file */
-    result = w.result;
+    writing w = {path, full, count, &resolved};
+    result = vshi_on_stack(write_page, &w, error);
 done:
     free(full);
     return result;
