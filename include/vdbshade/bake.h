@@ -237,8 +237,8 @@ typedef struct vsh_lightmap {
     const double *ambient; /* [3]: of irradiance: light from all around, linear RGB ≥ 0; NULL: none, and AO
                               darkens all light */
     int32_t bent_space;    /* VSH_BENT_…; in tangent space the texels need vsh_lightmap_options.tangents */
-    float *invalid;        /* 1: a chart covers it, but no sample of it is valid; 0 elsewhere. Not padded */
-    vsh_planes asked;      /* how planes are asked for, where there is more to it than whether */
+    float *invalid;        /* 1: a chart covers the texel, but no sample is valid; 0 elsewhere. Not padded */
+    vsh_planes asked;      /* options of planes, such as the axis of the sky */
     float *sky; /* what of the light of an even sky, over the horizon of `asked.sky`, comes straight to the
                    texel: 1/π ∫ V(ω) max(0, n · ω) [ω · up > 0] dω. V is 0 where a caster is in the way,
                    however far, else 1. 1: all that a surface may see, an open floor; an open wall has 1/2, an

@@ -104,8 +104,8 @@ typedef struct vsh_attribute {
  * cancel says so at every call from then on. */
 typedef int32_t vsh_progress_fn(void *user, const char *stage, double fraction);
 
-/* A warning: what changes the result, and what the user can do about it. One line without a newline. Where
- * vsh_run.notes asks for notes, they come here too and begin with "note: ": they say what was decided, and
+/* Gets a warning: what changes the result, and what the user can do about it. One line without a newline. If
+ * vsh_run.notes is set it gets notes too, which begin with "note: ". They say what the library decided, and
  * need no action ("note: mesh 'sail' (1 of 1): 4 open edges: …"). Same calling rules as vsh_progress_fn. */
 typedef void vsh_warning_fn(void *user, const char *message);
 

@@ -19,7 +19,8 @@ typedef struct vsh_grid_options {
     size_t struct_size;
     double voxel_size;  /* edge of a voxel, world units, 1e-12 … 1e12; 0: from `resolution` */
     int32_t resolution; /* voxels along the longest side of the bounds, 2 … 65536, where voxel_size is 0 */
-    double half_width;  /* of the narrow band, voxels, 3 … 100; of many triangles less, from 12 on */
+    double
+        half_width; /* of the narrow band, voxels, 3 … 100. Many triangles lower the limit, to 12 at least */
     double shell_thickness; /* of sheets and walls, voxels, 1 … 50 */
 } vsh_grid_options;
 

@@ -13,7 +13,7 @@
 /* What is known of a texel, in 32 bits; 0 where no chart covers it. */
 #define VSHI_PART_MESH UINT32_C(0x3fffffff) /* 1 + index of the mesh of its first sample */
 #define VSHI_PART_SHADEABLE                                                                                  \
-    UINT32_C(0x40000000) /* one of its samples is valid: others may be filled from it */
+    UINT32_C(0x40000000) /* a sample is valid, so other texels may be filled from this one */
 
 /* The spacing of texels that share AO where it can be left, of texels of `spacing` at most and a lightmap of
  * these planes, else 1; and of those that it is interpolated between, else 1. Options may be those that are

@@ -142,7 +142,7 @@ bool vshi_channel_can_hold(const char *name, float value, float *low, float *hig
     const bool is_error = (needs & VSHI_NEEDS_DEVIATION) != 0, is_vector = (needs & VSHI_NEEDS_BENT) != 0;
     *low = is_vector ? -1.0f : 0.0f;
     *high = is_error || (needs & VSHI_NEEDS_IRRADIANCE) != 0 ? FLT_MAX : 1.0f;
-    /* methods that know no error say NaN */
+    /* methods without an estimate give NaN */
     return (is_error && isnan(value)) || (value >= *low - ROUNDING && value <= *high + ROUNDING);
 }
 

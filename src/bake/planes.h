@@ -52,8 +52,8 @@ typedef struct vshi_plane_kind {
 /* In the order of their channels in files. */
 const vshi_plane_kind *vshi_plane_kinds(size_t *count);
 
-/* Whether a bake can have made a value of the channel `name`, "shadow.sun" or "ao". Else *low and *high are
- * what values may be. */
+/* Whether a bake can produce this value of the channel `name`, "shadow.sun" or "ao". If not, sets *low and
+ * *high to the channel's range. */
 bool vshi_channel_can_hold(const char *name, float value, float *low, float *high);
 
 static inline size_t vshi_plane_components(const vshi_plane_kind *kind) {

@@ -18,7 +18,7 @@ typedef struct cost {
     size_t light_count;
     int32_t floats; /* beside those a texel: pictures, and what is baked interleaved and then split */
     uint64_t held, writer, limit;
-    bool in_memory;     /* the format is put together in memory before it is written */
+    bool in_memory;     /* the writer needs the whole file in memory */
     int32_t first, end; /* rows that are baked */
     int32_t channels;
     const vshi_ao_cut *cut; /* of a part; NULL: of none */

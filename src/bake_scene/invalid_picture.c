@@ -5,7 +5,7 @@
 #include <string.h>
 #include <strings.h>
 
-/* Of no chart, valid, invalid. */
+/* Colours of texels outside charts, of valid and of invalid texels. */
 static const float COLOURS[3][3] = {{0.05f, 0.05f, 0.06f}, {0.5f, 0.5f, 0.5f}, {0.7f, 0.05f, 0.05f}};
 static const char *const NAMES[3] = {"R", "G", "B"};
 

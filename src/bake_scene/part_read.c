@@ -125,7 +125,7 @@ vsh_result vshi_part_open(const char *path, const vsh_run *run, vshi_part *part,
     return result;
 }
 
-/* Whether a bake can have made values of a row. */
+/* Checks that a bake can produce the values of a row. */
 static vsh_result check_values(const vshi_part *part, uint64_t lightmap, uint64_t channel, int32_t row,
                                size_t width, const float *values, vsh_error *error) {
     for (size_t i = 0; i < width; ++i) {

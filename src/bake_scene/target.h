@@ -18,7 +18,7 @@ typedef struct vshi_target {
     char *output;      /* of an object or a page; NULL: it is the receiver's own */
     vshi_mesh_set set; /* whose the meshes are */
     size_t page;       /* of the receiver */
-    bool unwrapped;    /* its UVs are made, or packed anew */
+    bool unwrapped;    /* its UVs are new, or packed again */
     char *object;      /* whose it is, as files are named by it, each in its own way; NULL: of several */
 } vshi_target;
 

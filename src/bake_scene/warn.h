@@ -4,8 +4,8 @@
 
 #include "bake_scene/lightmap.h"
 
-/* Warns of faults in its UVs, a line a mesh and kind. Warns of charts that lie too close for the size, and of
- * charts that cover few texels. */
+/* Warns of faults in the target's UVs, one line for each mesh and kind. Warns of charts that lie too close
+ * for the size, and of charts that cover few texels. */
 void vshi_warn_uvs(const vshi_target *target, const vsh_uv_report *reports, uint64_t covered,
                    const vsh_run *run);
 

@@ -33,10 +33,10 @@ VSHI_SHARED vsh_result vshi_job_fail_cancelled(const vshi_job *job, vsh_error *e
 /* Checks run (may be NULL) and copies it over defaults into *full. Errors: VSH_ERROR_ARGUMENT. */
 VSHI_SHARED vsh_result vshi_run_resolve(const vsh_run *run, vsh_run *full, vsh_error *error);
 
-/* Sends one line to run->warning, where there is one: what changes the result, and what helps. */
+/* Sends one line to run->warning, if it is set: what changes the result, and what helps. */
 VSHI_SHARED void vshi_warn(const vsh_run *run, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-/* Sends a line that needs no action, after VSHI_NOTE, where run->notes asks for it. */
+/* Sends VSHI_NOTE and a line that needs no action, if run->notes is set. */
 #define VSHI_NOTE "note: "
 VSHI_SHARED void vshi_note(const vsh_run *run, const char *format, ...) __attribute__((format(printf, 2, 3)));
 VSHI_SHARED bool vshi_wants_notes(const vsh_run *run);

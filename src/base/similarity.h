@@ -8,7 +8,7 @@
 /* Uniform scale of a transform [12]; 0 for one that shears, scales unevenly or flattens. */
 double vshi_similarity_scale(const double m[12]);
 
-/* Whether a finite transform makes everything flat. */
+/* Whether a finite transform flattens all shapes. */
 bool vshi_transform_flattens(const double m[12]);
 
 /* Quaternion x, y, z, w of the rotation in a similarity of that scale that does not mirror. */

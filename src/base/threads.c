@@ -146,7 +146,7 @@ static bool has_stack(void) {
         pthread_attr_t attributes;
         void *low = NULL;
         size_t size = 0;
-        range = (stack_range){0, UINTPTR_MAX}; /* where the system does not tell */
+        range = (stack_range){0, UINTPTR_MAX}; /* if the system does not say */
         if (pthread_getattr_np(pthread_self(), &attributes) == 0) {
             if (pthread_attr_getstack(&attributes, &low, &size) == 0) {
                 range = (stack_range){(uintptr_t)low, (uintptr_t)low + size};

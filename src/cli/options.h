@@ -95,7 +95,7 @@ typedef struct cli_common {
     int32_t threads;
     uint64_t memory_limit;
     bool quiet;
-    bool verbose; /* every warning by itself, and notes */
+    bool verbose; /* print each warning and notes */
     bool progress;
     int32_t isa;        /* of commands that shade */
     bool trusted;       /* files are parsed in this process */

@@ -34,7 +34,7 @@ char *cli_end_path(const char *path, const char *end);
  * must end where its words say, or below the folder of `namer`. CLI_OK or, having said why, CLI_FILE. */
 int cli_check_links(const char *namer, const char *path);
 
-/* Checks that an input can be opened. CLI_OK or, having said why, CLI_FILE. */
+/* Checks that an input can be opened. If not, prints why and returns CLI_FILE. */
 int cli_check_input(const char *path);
 
 /* Says which folder is missing where an output's is. CLI_OK or CLI_FILE. */

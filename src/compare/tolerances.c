@@ -95,7 +95,7 @@ typedef struct parsing {
 } parsing;
 
 static vsh_result parse(void *user, vsh_error *error) {
-    (void)error; /* the reader has it */
+    (void)error; /* the reader holds it */
     vshi_json *reader = &((parsing *)user)->reader;
     vsh_tolerances *made = ((parsing *)user)->made;
     json_t *json;

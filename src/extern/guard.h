@@ -41,7 +41,7 @@ vsh_result catch_all(vsh_error *error, vsh_result code, const char *what, Body &
     }
 }
 
-// The same, where there is stack enough for what body() calls: maybe on another thread.
+// The same, with enough stack for what body() calls. That may take another thread.
 template <typename Body>
 vsh_result guard(vsh_error *error, vsh_result code, const char *what, Body &&body) noexcept {
     auto run = [&] { return catch_all(error, code, what, body); };

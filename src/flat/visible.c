@@ -46,7 +46,7 @@ static vshi_point unit_normal(const vshi_flat_view *v, double slope, double sign
     return (vshi_point){x * v->towards.x - y * v->towards.y, x * v->towards.y + y * v->towards.x};
 }
 
-/* The same limits as in space. */
+/* The same limits as in 3D (light/view.h). */
 static double slope_of(double tangent) {
     return tangent < VSHI_LEAST_SINE ? 0.0 : fmin(tangent, VSHI_LARGEST_TANGENT);
 }

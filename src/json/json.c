@@ -169,7 +169,7 @@ vsh_result vshi_json_load(vshi_json *reader, json_t **json) {
     if (*json != NULL) {
         return VSH_OK;
     }
-    if (errno == ENOMEM) { /* Jansson calls it a syntax error in some places */
+    if (errno == ENOMEM) { /* Jansson sometimes reports a syntax error instead */
         return vshi_fail(reader->error, VSH_ERROR_MEMORY, "%s: the system refused memory", reader->path);
     }
     return vshi_fail(reader->error, VSH_ERROR_INPUT, "%s:%d:%d: %s", reader->path,

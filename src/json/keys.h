@@ -7,7 +7,7 @@
 /* Magnitudes over this are no scene: a double then no longer tells points a unit apart, and products of a few
  * such numbers are not finite. */
 #define VSHI_LARGEST 1e15
-/* Lengths that the library takes, of voxels and of AO, where a scene can be smaller or larger than both. */
+/* Limits of the library for lengths of voxels and of AO. A scene can be smaller or larger. */
 #define VSHI_SMALLEST_LENGTH 1e-12
 #define VSHI_LARGEST_VOXEL 1e12
 #define VSHI_PI 3.14159265358979323846

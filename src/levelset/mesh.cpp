@@ -19,9 +19,8 @@ namespace {
 constexpr double MESH_BYTES_PER_LEAF = 3.0 * BYTES_PER_LEAF;
 constexpr double BYTES_PER_TRIANGLE = 160.0;
 
-// A band's work is one visit of each triangle to each region of 32³ voxels (band.h) that the triangle
-// reaches. So many visits take ten seconds or so. Bands up to NARROW cost at most three times what the
-// narrowest does.
+// Each triangle visits each region of 32³ voxels (band.h) that it reaches. This many visits take about ten
+// seconds. Bands up to NARROW cost at most three times as much as the narrowest.
 constexpr double MOST_VISITS = 3e6;
 constexpr double NARROW = 12.0;
 

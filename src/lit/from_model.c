@@ -153,7 +153,7 @@ static vsh_result fill(maker *m, size_t entry, const double *world, arrays *a, v
         if (uvs == NULL) {
             continue;
         }
-        if (a->lit == NULL || a->set_count != VSHI_LIT_SET) { /* which the new UVs replace */
+        if (a->lit == NULL || a->set_count != VSHI_LIT_SET) { /* the new UVs replace that set */
             VSHI_TRY_DONE(add_set(m, uvs, a->lit, count, values, a->set_count, a->attributes, error));
         }
         ++a->set_count;

@@ -167,7 +167,7 @@ static vsh_result make(void *user, vsh_error *error) {
     if (!vshi_lit_is_obj(work->output)) {
         VSHI_TRY_DONE(vshi_lit_materials_apply(work, error));
         VSHI_TRY_DONE(vshi_lit_prune(&work->document, &uses, error));
-        VSHI_TRY_DONE(bring_images(work, error)); /* which may be fewer now */
+        VSHI_TRY_DONE(bring_images(work, error)); /* there may be fewer now */
         VSHI_TRY_DONE(vshi_lit_tell_origin(work, error));
     }
     VSHI_TRY_DONE(vshi_lit_write_files(work, &besides, error));

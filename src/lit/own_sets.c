@@ -1,5 +1,5 @@
-/* Which set of a primitive new UVs become. They replace the file's lightmap set, or a set that an earlier
- * bake made: the extras of a primitive list those ("vdbshade_uv_sets": [1]). */
+/* Chooses the set of a primitive that new UVs become. They replace the file's lightmap set, or a set of an
+ * earlier bake, which the extras of a primitive list ("vdbshade_uv_sets": [1]). */
 #include "lit/work.h"
 
 #include <stdio.h>
@@ -97,7 +97,7 @@ static void name_of(size_t set, char *name, size_t size) {
     snprintf(name, size, "TEXCOORD_%zu", set);
 }
 
-/* Whether a set is there, and all that shows it, or moves it, is going to be replaced. */
+/* Whether a set exists, no morph target moves it, and new textures replace all that use it. */
 static bool is_replaceable(const vshi_lit_work *work, const json_t *primitive, size_t set,
                            uint32_t purposes) {
     char name[40];

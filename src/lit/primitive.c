@@ -234,7 +234,7 @@ static vsh_result make(vshi_lit_work *work, vshi_lit_shape *shape, const json_t 
                                           &whole, list, error);
 }
 
-/* The transform that led from the file's set to the model's UVs, in new memory; NULL: none, or no memory. */
+/* The transform from the file's set to the model's UVs, in new memory. NULL: none, or no memory. */
 static json_t *copy_transform(const vshi_lit_work *work, size_t entry, const json_t *primitive, size_t set) {
     const vshi_model_shape *shape = &work->model->shapes[work->model->entries[entry].shape];
     size_t material;
@@ -243,7 +243,7 @@ static json_t *copy_transform(const vshi_lit_work *work, size_t entry, const jso
     }
     const vshi_gltf_unpacking u = vshi_gltf_find_unpacking(&work->document.gltf, material, set);
     json_t *transform = u.uvs == VSHI_GLTF_UVS_PACKED ? json_deep_copy(u.told) : NULL;
-    json_object_del(transform, "texCoord"); /* the material that refers to it names the set */
+    json_object_del(transform, "texCoord"); /* the material names the set */
     return transform;
 }
 

@@ -12,7 +12,7 @@ typedef struct vshi_lit_look {
     size_t material; /* SIZE_MAX: none, which is a white one */
     uint32_t page;
     size_t set;
-    json_t *transform; /* of the set's UVs, KHR_texture_transform; NULL: none */
+    json_t *transform; /* KHR_texture_transform of the set's UVs; NULL: none */
     size_t made;       /* the material that shows it; SIZE_MAX: not yet, or none */
 } vshi_lit_look;
 
@@ -77,8 +77,8 @@ vsh_result vshi_lit_check_images(const vsh_lit_options *options, vsh_error *erro
 vsh_result vshi_lit_materials_check(vshi_lit_work *work, vsh_error *error);
 
 /* Marks a primitive and its variants for a page and a set: "material" becomes the look's number, negative
- * until vshi_lit_materials_apply(). `transform` (KHR_texture_transform) leads from the set to the page; NULL:
- * none. */
+ * until vshi_lit_materials_apply(). `transform` (KHR_texture_transform) maps the set to the page; NULL: none.
+ */
 vsh_result vshi_lit_mark_primitive(vshi_lit_work *work, json_t *primitive, uint32_t page, size_t set,
                                    json_t *transform, vsh_error *error);
 
@@ -95,12 +95,12 @@ vsh_result vshi_lit_materials_apply(vshi_lit_work *work, vsh_error *error);
 vsh_result vshi_lit_primitive_make(vshi_lit_work *work, size_t mesh, size_t primitive, size_t entry,
                                    json_t *list, vsh_error *error);
 
-/* The set of UVs that engines take for lightmaps. */
+/* The set of UVs that engines use for lightmaps. */
 enum { VSHI_LIT_SET = 1 };
 
-/* Takes out of a primitive what new UVs of `mesh` replace, and tells which set they become: the first that is
- * VSHI_LIT_SET or was made before, and that no texture uses which stays; else one more. Errors:
- * VSH_ERROR_LIMIT (VSH_MAX_UV_SETS). (own_sets.c) */
+/* Removes the sets of a primitive that new UVs of `mesh` replace, and finds the set that they become. That is
+ * the first that is VSHI_LIT_SET or of an earlier bake, if no remaining texture uses it; else one more set.
+ * Errors: VSH_ERROR_LIMIT (VSH_MAX_UV_SETS). (own_sets.c) */
 vsh_result vshi_lit_choose_set(const vshi_lit_work *work, json_t *primitive, const vsh_lit_mesh *mesh,
                                const char *where, size_t *set, vsh_error *error);
 

@@ -28,8 +28,8 @@ static vshi_vec cross_of(const vshi_vec cap[3]) {
     return vshi_scale(vshi_cross(vshi_sub(cap[1], cap[0]), vshi_sub(cap[2], cap[0])), 0.5);
 }
 
-/* Whether the segment from `point` to `target` in the vessel leaves a component that it begins in, or enters
- * in its first part, `gap` of its length: a thin slab may lie all within the gap. */
+/* Whether the segment from `point` to `target` in the vessel leaves a component that it begins in, or that it
+ * enters in its first part, `gap` of its length. A thin slab may lie entirely in the gap. */
 static bool is_behind(const vshi_vessel *v, vshi_vec point, vshi_vec target, double gap, bool by_solids) {
     vshi_face_crossing crossings[CROSSINGS];
     const size_t count = vshi_face_tree_cross(v->tree, point, target, crossings, CROSSINGS);
@@ -53,8 +53,8 @@ static bool is_behind(const vshi_vessel *v, vshi_vec point, vshi_vec target, dou
     return false;
 }
 
-/* Whether another component closes a cap at a point. The first segment tells; but it may lie within a solid
- * as a whole, whose faces the other segments then meet. */
+/* Whether another component closes a cap at a point. The first segment decides, unless it lies entirely in a
+ * solid. The other segments then meet the faces of that solid. */
 static bool is_closed(const vshi_vessel *v, vshi_vec at, vshi_vec normal, size_t number, double gap) {
     for (size_t aim = 0; aim < AIMS; ++aim) {
         double best = 0.0;

@@ -31,7 +31,7 @@ static vsh_result parse(vshi_gltf *gltf, const char *text, size_t size, vsh_erro
     json_error_t where;
     bool early;
     gltf->root = vshi_gltf_parse_json(text, size, &where, &early);
-    if (gltf->root == NULL && errno == ENOMEM) { /* Jansson calls it a syntax error in some places */
+    if (gltf->root == NULL && errno == ENOMEM) { /* Jansson sometimes reports a syntax error instead */
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", gltf->path);
     }
     if (gltf->root == NULL) {

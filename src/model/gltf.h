@@ -185,12 +185,12 @@ typedef enum vshi_gltf_uvs {
     VSHI_GLTF_UVS_MIXED   /* their transforms differ */
 } vshi_gltf_uvs;
 
-/* Packers store UVs as integers, and undo that by KHR_texture_transform. */
+/* The transform that turns a packer's integers back into UVs (KHR_texture_transform). */
 typedef struct vshi_gltf_unpacking {
     vshi_gltf_uvs uvs;
     bool looked;         /* is to be found */
     double transform[6]; /* of PACKED: rows (a, b, c), (d, e, f), v down */
-    const json_t *told;  /* the extension that it is from */
+    const json_t *told;  /* the extension that holds it */
 } vshi_gltf_unpacking;
 
 vshi_gltf_unpacking vshi_gltf_find_unpacking(const vshi_gltf *gltf, size_t material, size_t set);

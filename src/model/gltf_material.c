@@ -21,8 +21,8 @@ static int32_t wrap_of(const json_t *sampler, const char *key) {
     return code == CLAMP ? VSH_WRAP_CLAMP : code == MIRROR ? VSH_WRAP_MIRROR : VSH_WRAP_REPEAT;
 }
 
-/* Offset × rotation × scale, of UVs with v down. The rotation goes the way that Blender, Babylon and three.js
- * have it and not that of the extension's own listing (glTF issue 1563). */
+/* Offset × rotation × scale, of UVs with v down. The rotation turns as in Blender, Babylon and three.js, not
+ * as in the extension's own code (glTF issue 1563). */
 static bool read_transform(const json_t *transform, double down[6]) {
     double offset[2] = {0.0, 0.0}, scale[2] = {1.0, 1.0}, angle = 0.0;
     const json_t *rotation = json_object_get(transform, "rotation");
@@ -39,7 +39,7 @@ static bool read_transform(const json_t *transform, double down[6]) {
     return good;
 }
 
-/* The same from UVs with v up to those of the image with v up. */
+/* The same, from UVs with v up to an image with v up. */
 static bool read_transform_up(const json_t *transform, double up[6]) {
     double down[6];
     bool good = read_transform(transform, down);
@@ -51,7 +51,7 @@ static bool read_transform_up(const json_t *transform, double up[6]) {
     return good;
 }
 
-/* --- UVs that a packer has made integers */
+/* --- UVs that a packer turned into integers */
 
 static const double as_they_are[6] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0};
 
@@ -76,7 +76,7 @@ static void add_texture(const json_t *info, size_t wanted, vshi_gltf_unpacking *
     memcpy(u->transform, transform, sizeof transform);
 }
 
-/* All textures at or below `value`. */
+/* Looks at all textures at or below `value`. */
 static void add_textures(json_t *value, size_t set, vshi_gltf_unpacking *u, bool *any) {
     size_t i;
     const char *name;
@@ -107,8 +107,8 @@ static bool is_integer(const vshi_gltf *gltf, const json_t *attributes, int set)
            type != VSHI_GLTF_FLOAT;
 }
 
-/* Finds what undoes the packing of each set that a primitive has as integers. It holds for all primitives of
- * that material, so that the material's own mask is looked up by their UVs. */
+/* Finds the transform of each set that a primitive stores as integers. It applies to all primitives of the
+ * material, so that their UVs fit the material's mask. */
 static vsh_result note_packed(vshi_gltf *gltf, const json_t *primitive, vsh_error *error) {
     const size_t count = gltf->model->material_count;
     size_t material;
@@ -333,7 +333,8 @@ vsh_result vshi_gltf_read_materials(vshi_gltf *gltf, vsh_error *error) {
         const size_t set = (size_t)material->told.uv_set;
         if (gltf->unpackings != NULL &&
             gltf->unpackings[i * VSH_MAX_UV_SETS + set].uvs == VSHI_GLTF_UVS_PACKED) {
-            memcpy(material->told.uv_transform, as_they_are, sizeof as_they_are); /* the UVs have it */
+            memcpy(material->told.uv_transform, as_they_are,
+                   sizeof as_they_are); /* the UVs have it already */
         }
     }
     return VSH_OK;

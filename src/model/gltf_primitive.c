@@ -181,7 +181,7 @@ static vsh_result read_plain(vshi_gltf *gltf, const json_t *primitive, size_t mo
     return shape->triangle_count > 0 ? read_vertices(gltf, primitive, where, shape, error) : VSH_OK;
 }
 
-/* Finds the transform that undoes the packing of a set; NULL: it is not packed. */
+/* Finds the transform of a packed set. NULL: the set is not packed. */
 static const vshi_gltf_unpacking *find_unpacking(const vshi_gltf *gltf, const json_t *primitive, int set) {
     size_t material;
     if (gltf->unpackings == NULL || !vshi_gltf_count(primitive, "material", SIZE_MAX, &material) ||
@@ -280,7 +280,7 @@ static vsh_result leave_raw(vshi_gltf *gltf, const json_t *primitive, const vshi
     return VSH_OK;
 }
 
-/* UVs as a packer found them. */
+/* Turns a packer's integers into UVs. */
 static void unpack_uvs(const vshi_gltf *gltf, const json_t *primitive, vshi_model_shape *shape) {
     for (int set = 0; set < shape->uv_sets; ++set) {
         const vshi_gltf_unpacking *u = find_unpacking(gltf, primitive, set);

@@ -6,8 +6,8 @@
 
 /* How much nearer than a lit mesh a surface of the same shape may be, its voxels. */
 static const double SAME = 1.5;
-/* Marches begin so far over a triangle, and as much more as the field's surface stands over it, up to a
- * limit; voxels. */
+/* Marches begin this far above a triangle, plus the height of the field's surface above it, up to a limit.
+ * In voxels. */
 static const double CLEAR = 0.5, LEAST_CLEAR = 0.3, MOST_LIFT = 3.0;
 
 /* The hits on surfaces in a tile, to be shaded together. */
@@ -79,8 +79,8 @@ static void add_hit(const vshi_scenery *scenery, hits *h, const vsh_surface *sur
     add_point(h, &(vshi_lift_point){point, {0.0, 0.0, 0.0}, n, n}, point, surface->color, texel, seen);
 }
 
-/* Returns how far over a triangle marches begin, voxels: outside of the field's surface, which is a shell
- * around an open mesh. */
+/* Returns how far above a triangle marches begin, in voxels. They must begin outside the field's surface,
+ * which is a shell around an open mesh. */
 static double find_clearance(const vsh_field *field, vshi_vec at, vshi_vec normal) {
     double lift = CLEAR;
     if (field->unknown) {

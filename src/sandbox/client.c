@@ -81,7 +81,7 @@ static int lift(int file) {
 vsh_result vshi_exchange_begin(vshi_exchange *exchange, int32_t kind, const char *path, const vsh_run *run,
                                vsh_error *error) {
     if (vshi_in_reader()) {
-        /* else a program that names itself as reader would start itself without end */
+        /* otherwise a program that names itself as its reader would start itself forever */
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "%s: not read: this process is a reader itself; main has to call vsh_reader_serve() "
                          "before anything else",

@@ -114,7 +114,7 @@ static int32_t serve_request(serving *s, vshi_serve_fn *const *servers, int argc
     run.allow_outside = request.outside;
     run.progress = report;
     run.warning = keep_warning;
-    run.notes = 1; /* the client leaves them out where nobody wants them */
+    run.notes = 1; /* the client drops them if nobody wants them */
     run.user = s;
     vshi_confine_memory();
     return answer(s, servers[request.kind], request.path, &request.rest, &run);

@@ -165,7 +165,7 @@ static vsh_result check_receivers(vsh_assets *assets, const vsh_scene *scene, co
     return VSH_OK;
 }
 
-/* Whether a lit asset's own UVs are a packer's, which few engines look a lightmap up by. */
+/* Whether a lit asset's own UVs are a packer's integers. Few engines read a lightmap with those. */
 static bool is_packed(const vshi_asset_place *place, const vsh_receiver *receiver) {
     bool packed = false;
     for (size_t i = 0; i < place->count; ++i) {

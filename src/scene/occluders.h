@@ -12,7 +12,7 @@ vsh_result vshi_scene_warn_lost(const vsh_scene *scene, const vsh_assets *assets
                                 const vsh_scene_layer *layer, const vsh_field *field, const vsh_run *run,
                                 vsh_error *error);
 
-/* Sends notes on the solids and sheets of a layer's casters that have no voxels. NULL: of the casters in no
+/* Sends notes on the solids and sheets of a layer's casters that have no voxels. NULL: the casters in no
  * layer. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_scene_note_solidity(const vsh_scene *scene, const vsh_assets *assets,
                                     const vsh_scene_layer *layer, const vsh_run *run, vsh_error *error);

@@ -13,7 +13,7 @@ static const double CREASE =
 static const double SMOOTH =
     -0.6; /* 127°: where shading normals go on over the edge, as of a bar of three sides */
 static const double PLANE = 0.9999995; /* 0.06°: of one plane; stretch of a projection is then 1 + 5e-7 */
-static const double QUAD = 0.9;        /* 26°: halves of a quad that is not flat, by their shape alone */
+static const double QUAD = 0.9;        /* 26°: halves of a quad that is not flat, found by shape */
 static const double SEAM = 0.985;      /* 10° between shading normals of a vertex: modelled as an edge */
 
 double vshi_cut_mesh_bytes(const vsh_mesh *mesh) {
@@ -86,7 +86,7 @@ static void cut_sides(vshi_cut_mesh *s, int cut) {
     }
 }
 
-/* The one side of a triangle where the triangle beyond has the same vertices, or VSHI_NONE. */
+/* The only side of a triangle whose neighbour shares the two vertices, or VSHI_NONE. */
 static uint32_t find_shared_side(const vshi_cut_mesh *s, uint32_t triangle) {
     const uint32_t *indices = s->mesh->indices;
     uint32_t shared = VSHI_NONE;
@@ -103,8 +103,7 @@ static uint32_t find_shared_side(const vshi_cut_mesh *s, uint32_t triangle) {
     return shared;
 }
 
-/* The other half of a quad that shares no vertex with its neighbours, as where every face has vertices of its
- * own; else VSHI_NONE. */
+/* The other half of a quad in a mesh whose faces share no vertices; else VSHI_NONE. */
 static uint32_t find_quad_half(const vshi_cut_mesh *s, uint32_t triangle) {
     const uint32_t side = find_shared_side(s, triangle);
     const uint32_t half = side != VSHI_NONE ? s->partner[side] / 3 : VSHI_NONE;
@@ -170,7 +169,7 @@ static vsh_result gather_units(vshi_cut_mesh *s, vsh_error *error) {
     VSHI_TRY_DONE(vshi_allocate((void **)&size, s->count, sizeof *size, "parts of planes", error));
     memset(s->unit, 0xff, s->count * sizeof *s->unit);
     uint32_t units = 0;
-    /* bent quads come first, so that no half of one joins the plane of a neighbour */
+    /* bent quads come first, so that none of their halves joins the plane of a neighbour */
     for (uint32_t i = 0; i < s->count; ++i) {
         const uint32_t half = s->unit[i] == VSHI_NONE ? find_quad_half(s, i) : VSHI_NONE;
         if (half != VSHI_NONE && !is_flat(s, i, half)) {

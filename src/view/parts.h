@@ -39,7 +39,7 @@ vsh_result vshi_view_put_image(vshi_view *view, const char *name, const vsh_imag
 /* Whatever a name holds, as JSON; NULL where memory is short. */
 json_t *vshi_view_text(const char *text);
 
-/* JSON as text, to be freed; NULL where memory is short. json_dumps() leaves out keys then. */
+/* JSON as text; the caller frees it. NULL if memory is short: json_dumps() would leave out keys. */
 char *vshi_view_dump(const json_t *json);
 
 /* A path's last part. */

@@ -86,7 +86,7 @@ static vsh_result read(body *from, void *bytes, size_t size, vsh_error *error) {
     return vshi_part_read_bytes(from->file, from->path, bytes, size, error);
 }
 
-/* Whether a bake can have made a value. */
+/* Checks that a bake can produce a value. */
 static vsh_result check_value(const merging *m, const char *path, size_t channel, size_t block, int voxel,
                               float value, vsh_error *error) {
     float low, high;

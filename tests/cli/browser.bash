@@ -15,7 +15,7 @@ picture() {
     "$BATS_FILE_TMPDIR/picture" "$@"
 }
 
-# The size of the window, as browser.c takes it: a number that halves well.
+# The size of the window for browser.c, an even number.
 WIDE=400
 
 # look PAGE STATE [ACTION …] [-- OPTION …]: opens PAGE#STATE and does what browser.c can do; its picture is in page.png, its

@@ -262,7 +262,7 @@ BAKE=(--sun 1,0.2,1 --sun-angle 20 --ao 1 --size 64 --max-error 0.05 --bent-norm
     pixel_is 300 100 $(lit 255 255 255 0.8 0.8 0.8 1)
 }
 
-# Whether an element is what a finger meets in its middle.
+# Whether a tap on the middle of an element hits it.
 ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
     return r.width > 0 && e.contains(document.elementFromPoint(r.x + r.width / 2, r.y + r.height / 2)); }'
 
@@ -364,7 +364,7 @@ ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
 
 @test "textures whose image is in EXT_texture_webp are shown, and others are named with their format" {
     write_squares
-    # decoders go by what the bytes are, so that a PNG stands in for a WebP here
+    # decoders look at the bytes, so a PNG can stand in for a WebP here
     sed 's/"textures": \[{"source": 0}, {"source": 1}\]/"textures": [{"extensions": {"EXT_texture_webp": {"source": 0}}}, {"extensions": {"KHR_texture_basisu": {"source": 1}}}]/
          s/"extensionsUsed": \[/"extensionsUsed": ["EXT_texture_webp", "KHR_texture_basisu", /' squares.gltf >webp.gltf
     grep -q EXT_texture_webp.*source webp.gltf

@@ -124,8 +124,8 @@ untimed() {
     cut -d, -f1-4,8-20,22 "$1"
 }
 
-# write_packed FILE TYPE TRANSFORM: a floor under a smaller one, whose UVs are integers (or floats) of one layout; TRANSFORM is
-# that of its texture.
+# write_packed FILE TYPE TRANSFORM: a floor under a smaller floor. Their UVs have one layout, as integers or floats. The texture has
+# the TRANSFORM.
 write_packed() {
     python3 - "$@" <<'PY'
 import base64, json, struct, sys

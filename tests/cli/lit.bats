@@ -132,7 +132,7 @@ sets() {
     shade bake ao2.glb "${BAKE[@]}" --unwrap always -o both.glb
     done_well
     [ "$(sets both.glb)" = "2: 1 " ] || fail "$(sets both.glb)"
-    # of previews, of unwrap, and of another format
+    # sets made by a preview, by unwrap, and from another format
     shade bake lit1.glb "${BAKE[@]}" --unwrap always --preview -o preview.glb
     done_well
     [ "$(sets preview.glb)" = "3: 1 2 " ] || fail "$(sets preview.glb)"
@@ -142,7 +142,7 @@ sets() {
     shade bake "$MODELS/scene.fbx" "${BAKE[@]}" --unwrap always -o fbx.glb
     done_well
     [ "$(sets fbx.glb)" = "2: 1 " ] || fail "$(sets fbx.glb)"
-    # a later set that nobody is known to have made
+    # a later set without a mark of vdbshade
     json_of ao.glb | grep -q '"vdbshade_uv_sets":\[1,2\]' || fail "no mark"
     LC_ALL=C sed 's/vdbshade_uv_sets/somebody_s_sets_/g' ao.glb >other.glb
     shade bake other.glb --ao 1 --size 32 --unwrap always -o more.glb
@@ -197,7 +197,7 @@ print(len(data), *(len(root[name]) for name in ("textures", "images", "samplers"
     [ "$(sets made.glb)" = "8: 1 7 " ] || fail "$(sets made.glb)"
 }
 
-# material FILE: what its first material refers to: set and transform of the base colour, AO and light, and its primitives' sets.
+# material FILE: prints the set and transform of the first material's base colour, AO and light, and the sets of its primitives.
 material() {
     json_of "$1" | python3 -c 'import json, sys
 root = json.load(sys.stdin)
@@ -217,11 +217,11 @@ print(*sorted(name for name in root["meshes"][0]["primitives"][0]["attributes"] 
         done_well
     done
     same_values plain.exr packed.exr || fail "another image: $("$VDBSHADE" compare plain.exr packed.exr)"
-    # an asset has them packed anew, into a set of its own
+    # an asset gets new UVs in a set of their own
     shade bake packed.gltf "${BAKE[@]}" --size 64 -o anew.glb
     done_well
     [ "$(material anew.glb)" = "0 0.000244140625 0.000244140625; 1; 1; TEXCOORD_0 TEXCOORD_1" ] || fail "$(material anew.glb)"
-    # or refers to the file's own through the same transform
+    # or uses the file's own UVs through the same transform
     shade bake packed.gltf "${BAKE[@]}" --unwrap never -o own.glb
     done_well
     local moved="0 0.000244140625 0.000244140625; "
@@ -229,11 +229,11 @@ print(*sorted(name for name in root["meshes"][0]["primitives"][0]["attributes"] 
     shade bake own.glb "${BAKE[@]}" --unwrap never -o own.exr
     done_well
     same_values plain.exr own.exr || fail "the asset lit by its own UVs: another image"
-    # an OBJ has no transform: the UVs have it
+    # an OBJ has no transform, so its UVs include it
     shade bake packed.gltf "${BAKE[@]}" --unwrap never -o own.obj
     done_well
     grep -q '^vt 0.75 0.75$' own.obj || fail "$(grep '^vt' own.obj)"
-    # a texture that is laid out in another way does not tell what undoes the packing: all is packed anew
+    # textures with different transforms leave the packing unknown: all UVs are new
     sed 's/"baseColorTexture"/"metallicRoughnessTexture": {"index": 0}, &/' packed.gltf >mixed.gltf
     shade bake mixed.gltf "${BAKE[@]}" --size 64 -o mixed.glb
     done_well

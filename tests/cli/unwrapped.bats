@@ -245,7 +245,7 @@ EOF
 }
 
 
-# scattered COUNT: triangles that hang nowhere together, so that each is a chart.
+# scattered COUNT: triangles that share no edges, so each is a chart.
 scattered() {
     awk -v count="$1" 'BEGIN {
         for (i = 0; i < count; ++i) printf "v %d 0 0\nv %d 0 1\nv %d 0 0\n", 2 * i, 2 * i, 2 * i + 1
@@ -276,7 +276,7 @@ scattered() {
     size=$(sed -n 's/.*--texels-per-unit //p' <<<"$stderr")
     shade bake tenth.obj "${bake[@]}" --size 64 --unwrap always --texels-per-unit "$size"
     done_well
-    # objects that are chosen share the layout with others
+    # the chosen objects share the layout with others
     { sed 's/^f/o tenth\nf/' tenth.obj; echo 'o other'; echo 'f 1/1 2/2 3/3'; } >two.obj
     shade bake two.obj "${bake[@]}" --size 64 --receive tenth
     [[ $stderr != *"charts cover"* ]] || fail "chosen: $stderr"

@@ -19,7 +19,7 @@ load helper
 
 @test "texels in a solid that lacks a side are 1 in the channel, and no line says that they are seen" {
     write_box box.obj
-    # a bar that leaves the larger box through its wall; that box has no side opposite, and a sheet stands before the gap
+    # A bar sticks out of the larger box through its wall. The box lacks the opposite side; a sheet stands before the gap.
     awk '$1 == "v" { print "v", $2, $3, 5 * $4; next } { print }' box.obj >bar.obj
     awk '/^o/ { print "o around"; next } /^f/ && left++ < 2 { next }
         $1 == "v" { print "v", 3 * $2 - 1, 3 * $3 - 1, 3 * $4 - 1; next } { print }' box.obj >around.obj

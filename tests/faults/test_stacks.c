@@ -1,5 +1,5 @@
-/* Every kind of call works on a stack of 128 KiB: of a thread, and of a fibre, which no thread knows of.
- * Below each stack lies a page that nobody may touch. */
+/* Every kind of call works on a stack of 128 KiB, of a thread and of a fibre. The system does not know a
+ * fibre's stack. Nobody may touch the page below each stack. */
 #define _GNU_SOURCE
 #include <setjmp.h>
 #include <stdarg.h>
@@ -52,7 +52,7 @@ static unsigned char *make_stack(void) {
     return pages;
 }
 
-/* Returns the bytes of it that were touched. */
+/* Returns how many bytes of the stack were touched. */
 static size_t free_stack(unsigned char *pages) {
     size_t untouched = 0;
     while (untouched < STACK && pages[GUARD + untouched] == PAINT) {
@@ -96,7 +96,7 @@ static void run_everywhere(const char *name, call *c) {
         if (c->result != VSH_OK) {
             fail_msg("%s: %s", name, c->error.message);
         }
-        scenarios_untouched(); /* no: it has written */
+        scenarios_untouched(); /* restores the outputs */
     }
     print_message("%-28s %3zu KiB of a thread, %3zu of a fibre\n", name, used[0] >> 10, used[1] >> 10);
 }
@@ -132,7 +132,7 @@ static void files_are_read_by_a_reader(void **state) {
     }
 }
 
-/* Jansson reads 2048 levels, one inside the other. */
+/* Jansson reads 2048 nested levels. */
 static vsh_result read_deep(const vsh_run *run, vsh_error *error) {
     static const struct {
         const char *name, *begin, *end;

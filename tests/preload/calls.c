@@ -103,7 +103,7 @@ int memfd_create(const char *name, unsigned flags) {
     return real(name, flags);
 }
 
-/* glibc's own, as dlsym() allocates. */
+/* glibc's own: dlsym() would allocate. */
 void *__libc_malloc(size_t size);
 void *__libc_calloc(size_t count, size_t size);
 void *__libc_realloc(void *old, size_t size);

@@ -34,7 +34,7 @@ inline void misbehave(const char *how) {
     }
 }
 
-// Each start of a program that names itself as reader adds a line here: the error that it got.
+// A program that names itself as its reader adds a line here at each start: the error that it got.
 constexpr const char *STARTS = "VSH_TEST_STARTS";
 constexpr const char *READS = "VSH_TEST_READS"; // the file that it reads
 

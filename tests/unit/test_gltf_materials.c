@@ -154,11 +154,11 @@ static void uvs_that_a_packer_made_integers_are_what_textures_see(void **state) 
          false},
         {BASE(MOVED("\"scale\":[7.9998779296875,15.999755859375],\"offset\":[0.25,0.125]", "")), NORMALIZED,
          NORMALIZED, 0.75, 0.875, 0.75, 0.875, false},
-        /* one primitive is packed: the transform counts for all of the material */
+        /* one primitive is packed: the transform applies to all of the material */
         {BASE(MOVED("\"scale\":[0.5,0.5]", "")), INTEGER, PLAIN, 2048.0, 1.0, 0.25, 1.0, false},
-        /* no packer's: floats */
+        /* floats come from no packer */
         {BASE(MOVED("\"scale\":[0.5,0.5]", "")), PLAIN, PLAIN, 0.5, 1.0, 0.5, 1.0, true},
-        /* textures that differ; one of another set; one that the transform moves to another */
+        /* transforms that differ; a texture in another set; a transform that names another set */
         {BASE(MOVED(UNPACK, "")) OCCLUSION("\"texCoord\":0"), INTEGER, INTEGER, 4096.0, 1.0, 4096.0, 1.0,
          true},
         {BASE(MOVED(UNPACK, "")) OCCLUSION("\"texCoord\":1"), INTEGER, INTEGER, 0.75, 0.875, 0.75, 0.875,
@@ -166,7 +166,7 @@ static void uvs_that_a_packer_made_integers_are_what_textures_see(void **state) 
         {BASE("\"texCoord\":1," MOVED(UNPACK, ",\"texCoord\":0")), INTEGER, INTEGER, 0.75, 0.875, 0.75, 0.875,
          false},
         {BASE(MOVED(UNPACK, ",\"texCoord\":1")), INTEGER, INTEGER, 4096.0, 1.0, 4096.0, 1.0, true},
-        /* nothing to tell it */
+        /* no texture, so no transform */
         {"\"name\":\"plain\"", INTEGER, INTEGER, 4096.0, 1.0, 4096.0, 1.0, false},
     };
     for (size_t i = 0; i < 2 * sizeof cases / sizeof cases[0]; ++i) {

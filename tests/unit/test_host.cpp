@@ -28,7 +28,7 @@ extern "C" {
 #include <unistd.h>
 #include <vdbshade/vdbshade.h>
 
-// A host with an Embree of its own, which exports it (tests/CMakeLists.txt).
+// A host that exports its own Embree (tests/CMakeLists.txt).
 extern "C" {
 __attribute__((visibility("default"))) void *rtcNewDevice(const char *config);
 }

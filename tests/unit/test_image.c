@@ -54,8 +54,8 @@ static void exr_32_is_bit_exact(void **state) {
     }
 }
 
-/* Chunks whose compressed data are as long as the raw data are stored raw: small images of few different
- * values hit that. */
+/* The writer stores a chunk raw if its compressed data are as long as the raw data. Small images with few
+ * values have such chunks. */
 static void exr_keeps_every_small_size(void **state) {
     (void)state;
     static const char *const names[] = {"a", "b", "c", "d", "e", "f", "g"};

@@ -350,7 +350,7 @@ static double mean_difference(const float *a, const float *b) {
     return sum;
 }
 
-/* Of every type, size, method and kind of caster. Large sizes only have to stay in range. */
+/* Tries every type, size, method and kind of caster. Values of large lights only have to stay in range. */
 static void tiny_lights_are_hard_lights(void **state) {
     (void)state;
     static const double SIZES[] = {5e-324, 1e-300, 1e-200, 1e-100, 1e-50, 1e-45, 1e-38, 1e-30,
@@ -363,7 +363,7 @@ static void tiny_lights_are_hard_lights(void **state) {
     size_t accepted = 0;
     for (int32_t type = 0; type <= VSH_LIGHT_RECTANGLE; ++type) {
         for (s.kind = FIELD; s.kind < STAGES; ++s.kind) {
-            /* layers have two ways at most: one of a ray, one of a disc, and `classic` */
+            /* layers tell only rays, discs and `classic` apart */
             const int32_t methods = s.kind == FIELD ? shadow_methods() : VSH_SHADOW_CONE + 1;
             for (int32_t method = 0; method < methods; ++method) {
                 const int32_t point_type = type == VSH_LIGHT_RECTANGLE ? VSH_LIGHT_SPHERE : type;
@@ -411,7 +411,7 @@ static void layers_of_no_softness_are_hard(void **state) {
     tear_down(&s);
 }
 
-/* Of every method and kind of caster: the last double below 180 degrees, too. */
+/* Tries every method and kind of caster, and the last double below 180 degrees. */
 static void suns_just_below_180_degrees_are_as_those_of_179_99(void **state) {
     (void)state;
     const double angles[] = {RADIANS(179.9999), RADIANS(179.999999), RADIANS(179.99999999),

@@ -411,7 +411,7 @@ static void primitives_on_two_pages_become_two(void **state) {
     }
 }
 
-/* Other formats: all their triangles, where they stood, with the first set and the new one as the second. */
+/* Documents of other formats keep all triangles, their places and the first set. The second set is new. */
 static void other_formats_become_documents(void **state) {
     (void)state;
     static const char *const names[] = {"scene.obj", "scene.ply", "scene.stl",

@@ -145,7 +145,7 @@ static void kinds_of_other_channels_are_refused(void **state) {
     free(good.at);
 }
 
-/* Puts values that no bake makes all over the body, with a right checksum. */
+/* Writes values that no bake produces all over the body, with the right checksum. */
 static void try_values(const char *path, const char *place, merge_fn *merge_it, void *user) {
     static const float values[] = {NAN, INFINITY, -INFINITY, -1.0f, 2.0f};
     const bytes good = read_file(path);

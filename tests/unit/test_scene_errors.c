@@ -446,7 +446,7 @@ static void messages_stay_one_line_whatever_the_key(void **state) {
     assert_non_null(strstr(error.message, "…: unknown key"));
 }
 
-/* Else a number of a scene file would be refused later, without its line and key. */
+/* Otherwise the library would refuse a number of a scene file later, without line and key. */
 static void what_a_table_of_keys_takes_the_library_takes(void **state) {
     (void)state;
     const vshi_table tables[] = {vshi_scene_table, vshi_ao_table};

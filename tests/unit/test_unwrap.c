@@ -317,7 +317,8 @@ static void triangles_of_a_quad_stay_together(void **state) {
     free(s);
 }
 
-/* Modellers write faces so. No bend below a crease parts a quad, and its diagonal may be the shorter one. */
+/* Modellers often write faces with vertices of their own. A bend below a crease never splits a quad,
+ * whichever diagonal it has. */
 static void quads_with_vertices_of_their_own_stay_together(void **state) {
     (void)state;
     shape *s = shape_new(), *faces = shape_new();

@@ -356,7 +356,7 @@ static bool is_on_floor(const baked *b, size_t i) {
     return b->samples.positions[3 * i + 1] == 0.0 && b->samples.geometric_normals[3 * i + 1] > 0.5f;
 }
 
-/* The coordinate of texel centres of the floor that is nearest to x. */
+/* Returns the coordinate nearest to x at which the floor has texel centres. */
 static double find_centre(const baked *b, double x) {
     double nearest = INFINITY;
     for (size_t i = 0; i < b->samples.count; ++i) {

@@ -35,7 +35,7 @@ typedef struct render_surfaces {
     size_t mesh_count;
 } render_surfaces;
 
-/* Whether any caster has no triangles, so that its field is what is seen. */
+/* Whether any caster has no triangles, so that the picture shows its field. */
 bool render_shows_fields(const vsh_scene *scene, const vsh_assets *assets);
 
 /* The triangles of every caster that has them, and for what has none a surface for every layer's colour.

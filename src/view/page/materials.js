@@ -5,7 +5,7 @@
     const WRAP = {33071: THREE.ClampToEdgeWrapping, 33648: THREE.MirroredRepeatWrapping, 10497: THREE.RepeatWrapping};
     const FILTER = {9728: THREE.NearestFilter};
 
-    /* {set, matrix} of a texture info: which UVs it is looked up by, and how. */
+    /* {set, matrix} of a texture info: the set of UVs and their transform. */
     function layoutOf(info) {
         const transform = (info.extensions || {}).KHR_texture_transform || {};
         const matrix = new THREE.Matrix3();
@@ -15,10 +15,10 @@
         return {set: transform.texCoord !== undefined ? transform.texCoord : info.texCoord || 0, matrix};
     }
 
-    /* Formats that browsers decode, and those that they do not. */
+    /* Formats that browsers can decode, and formats that they cannot. */
     const SHOWN = ['EXT_texture_webp', 'EXT_texture_avif'], OTHERS = ['KHR_texture_basisu', 'MSFT_texture_dds'];
 
-    /* The number of a texture's image; undefined, with a word about it, where no browser can show one. */
+    /* The number of a texture's image. If no browser can show it, says so and returns undefined. */
     function imageOf(file, index, definition) {
         const extensions = definition.extensions || {};
         const sources = [definition, ...SHOWN.map(name => extensions[name])].filter(at => at && at.source !== undefined);

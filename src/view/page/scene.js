@@ -156,7 +156,7 @@
         return has(1) ? 1 : has(0) ? 0 : -1;
     }
 
-    /* UVs as a texture looks them up, of a set that may have a transform. */
+    /* UVs of a set with the texture's transform, if it has one. */
     VIEW.movedUvs = function (arrays, set, matrix) {
         const key = [set, ...matrix.elements].join(), uvs = arrays.uvs[set];
         if (!uvs || matrix.equals(new THREE.Matrix3())) {
@@ -172,7 +172,7 @@
         return arrays.moved.get(key);
     };
 
-    /* UVs of the lightmap: moved by its own transform, or by the one that undoes a packer's integers. */
+    /* UVs of the lightmap, with its own transform or the one for a packer's integers. */
     function lightUvs(material, arrays, set) {
         const maps = arrays.integers[set] ? [material.light, ...material.layouts] : [material.light];
         const map = maps.find(one => one && one.set === set);
