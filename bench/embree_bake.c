@@ -7,8 +7,8 @@
  * that it traces N rays a texel (16) of the same sampler in Embree's packets. No level set, no field, no
  * proofs, nothing that texels share. Truth is that of many rays of another frame. */
 #include "bake/average.h"
-#include "bake/lift.h"
 #include "bake/nearest_valid.h"
+#include "bake/origins.h"
 #include "bake_scene/channels.h"
 #include "bake_scene/job.h"
 #include "base/clock.h"

@@ -3,8 +3,8 @@
 #define VSHI_BAKE_SAMPLES_H
 
 #include "bake/rows.h"
-#include "mesh/smooth_surface.h"
 #include "bake/texels.h"
+#include "mesh/smooth_surface.h"
 
 /* Box of positions. */
 typedef struct vshi_sample_box {
