@@ -34,6 +34,7 @@ typedef struct options {
 /* A lightmap under way. */
 typedef struct baking {
     const vsh_texels *texels;
+    const vsh_occluders *occluders;
     vshi_origins origins;
     vshi_channels channels;
     bench_rays_task task;
@@ -123,10 +124,12 @@ static void shade(void *user, size_t begin, size_t end) {
     const double lift = vshi_triangles_lift(b->task.triangles);
     double from[3 * VSHI_ORIGIN_BLOCK];
     float values[VSHI_ORIGIN_BLOCK];
+    const float *faces = o->face != NULL ? o->face + 3 * begin : NULL;
+    const float *up = faces != NULL ? faces : o->normal + 3 * begin;
     for (size_t k = 0; k < 3 * (end - begin); ++k) {
-        from[k] = o->surface[3 * begin + k] + lift * (double)o->normal[3 * begin + k];
+        from[k] = o->start[3 * begin + k] + lift * (double)up[k];
     }
-    bench_rays_trace(&b->task, (const uint32_t(*)[2])b->net, end - begin, from, o->normal + 3 * begin,
+    bench_rays_trace(&b->task, (const uint32_t(*)[2])b->net, end - begin, from, o->normal + 3 * begin, faces,
                      o->texel + begin, values);
     for (size_t i = begin; i < end; ++i) {
         b->plane[vsh_texel_place(o->texel[i], b->texels->info.width)] = values[i - begin];
@@ -136,10 +139,10 @@ static void shade(void *user, size_t begin, size_t end) {
 /* A light's visibility, or (NULL) AO, of all valid texels. */
 static void bake_plane(baking *b, const vsh_light *light, const vsh_run *run, float *plane) {
     vsh_error error;
-    const vshi_lift_light place = vshi_lift_light_of(light);
-    b->task.light = light != NULL ? &place.place : NULL;
+    const vshi_lifter lifter = vshi_lifter_open(b->occluders, light);
+    b->task.light = light != NULL ? &lifter.place : NULL;
     b->plane = plane;
-    bench_check(vshi_lift_for(b->texels, light, run, &b->origins, &error), &error);
+    bench_check(vshi_origins_lift(&lifter, b->texels, true, run, &b->origins, &error), &error);
     vshi_job *job = vshi_job_begin(run, "bake", b->origins.count);
     bench_check(vshi_parallel_for(job, b->origins.count, VSHI_ORIGIN_BLOCK, 1, shade, b, &error), &error);
     vshi_job_end(job);
@@ -245,6 +248,7 @@ int main(int argc, char **argv) {
     parts.triangles = triangles;
     parts.field = field_of_nothing_known(triangles);
     bench_check(vsh_occluders_from_parts(&parts, &occluders, &error), &error);
+    b.occluders = occluders;
     vsh_shade_options exact = vsh_shade_options_default();
     exact.method = VSH_SHADOW_EXACT;
     exact.ao_method = VSH_AO_EXACT;

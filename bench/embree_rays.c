@@ -46,7 +46,8 @@ typedef struct group {
     struct RTCRay16 ray;
     uint32_t shift[2][LANES], cell[LANES]; /* cell of the shift */
     float normal[3][LANES], u[3][LANES], v[3][LANES];
-    int used[LANES]; /* -1 */
+    float rise[LANES], lean[2][LANES]; /* of AO: vshi_lean */
+    int used[LANES];                   /* -1 */
     int free[LANES];
 } group;
 
@@ -97,6 +98,12 @@ static void trace_group(const bench_rays_task *task, const uint32_t (*net)[2], g
             }
         } else {
             for (int l = 0; l < LANES; ++l) {
+                const float along = x[l] * g->lean[0][l] + y[l] * g->lean[1][l];
+                const float edge = 1.0f - (x[l] * x[l] + y[l] * y[l]) + along * along;
+                const float by = 0.5f * (g->rise[l] - 1.0f) * along +
+                                 0.5f * (1.0f - g->rise[l]) * sqrtf(edge > 0.0f ? edge : 0.0f);
+                x[l] += by * g->lean[0][l];
+                y[l] += by * g->lean[1][l];
                 const float square = 1.0f - x[l] * x[l] - y[l] * y[l];
                 const float z = sqrtf(square > 0.0f ? square : 0.0f);
                 r->dir_x[l] = g->normal[0][l] * z + g->u[0][l] * x[l] + g->v[0][l] * y[l];
@@ -126,7 +133,8 @@ static bool is_away(const vshi_light_place *light, size_t count, const float *no
 }
 
 void bench_rays_trace(const bench_rays_task *task, const uint32_t (*net)[2], size_t count,
-                      const double *origins, const float *normals, const uint32_t *texels, float *values) {
+                      const double *origins, const float *normals, const float *faces, const uint32_t *texels,
+                      float *values) {
     const vsh_triangles *t = task->triangles;
     const int bits = bits_of(task->rays);
     for (size_t first = 0; first < count; first += LANES) {
@@ -148,6 +156,13 @@ void bench_rays_trace(const bench_rays_task *task, const uint32_t (*net)[2], siz
             const double tangent = task->light != NULL ? task->light->tangent : 1.0;
             vshi_vec u, v;
             vshi_frame(task->light != NULL ? task->light->towards : vshi_vec_off(normals + 3 * i), &u, &v);
+            const vshi_lean lean = faces != NULL
+                                       ? vshi_dome_lean(vshi_vec_off(faces + 3 * i),
+                                                        (vshi_vec[]){u, v, vshi_vec_off(normals + 3 * i)})
+                                       : VSHI_WHOLE_DOME;
+            g.rise[l] = (float)lean.rise;
+            g.lean[0][l] = (float)lean.x;
+            g.lean[1][l] = (float)lean.y;
             u = vshi_scale(u, tangent);
             v = vshi_scale(v, tangent);
             g.u[0][l] = (float)u.x, g.u[1][l] = (float)u.y, g.u[2][l] = (float)u.z;

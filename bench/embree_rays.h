@@ -20,9 +20,11 @@ typedef struct bench_rays_task {
  * where memory is short. */
 uint32_t (*bench_rays_net(const vshi_sampler *sampler, int32_t rays))[2];
 
-/* Values of `count` texels whose rays begin at origins [count][3], world units, over their normals
- * [count][3], unit. `net` is that of bench_rays_net(). Thread safe. */
+/* Values of `count` texels whose rays begin at origins [count][3], world units. Normals [count][3] are unit.
+ * AO leaves out directions below the faces [count][3], unit; NULL: below the normals. `net` is that of
+ * bench_rays_net(). Thread safe. */
 void bench_rays_trace(const bench_rays_task *task, const uint32_t (*net)[2], size_t count,
-                      const double *origins, const float *normals, const uint32_t *texels, float *values);
+                      const double *origins, const float *normals, const float *faces, const uint32_t *texels,
+                      float *values);
 
 #endif

@@ -60,7 +60,8 @@ static void trace(bench_rays_task task, double first, double last, points *p) {
         p->texels[i] = vsh_texel((uint32_t)i % 64, (uint32_t)i / 64);
     }
     uint32_t(*net)[2] = bench_rays_net(sampler, task.rays);
-    bench_rays_trace(&task, (const uint32_t(*)[2])net, POINTS, p->origins, p->normals, p->texels, p->values);
+    bench_rays_trace(&task, (const uint32_t(*)[2])net, POINTS, p->origins, p->normals, NULL, p->texels,
+                     p->values);
     free(net);
     vshi_sampler_free(sampler);
 }
