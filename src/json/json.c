@@ -166,11 +166,13 @@ vsh_result vshi_json_load(vshi_json *reader, json_t **json) {
     errno = 0;
     *json =
         json_loadb(reader->text, reader->size, JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL, &failure);
+    if (errno == ENOMEM) { /* Jansson calls it a syntax error, or cuts numbers and words short */
+        json_decref(*json);
+        *json = NULL;
+        return vshi_fail(reader->error, VSH_ERROR_MEMORY, "%s: the system refused memory", reader->path);
+    }
     if (*json != NULL) {
         return VSH_OK;
-    }
-    if (errno == ENOMEM) { /* Jansson sometimes reports a syntax error instead */
-        return vshi_fail(reader->error, VSH_ERROR_MEMORY, "%s: the system refused memory", reader->path);
     }
     return vshi_fail(reader->error, VSH_ERROR_INPUT, "%s:%d:%d: %s", reader->path,
                      failure.line > 1 ? failure.line : 1, failure.column > 1 ? failure.column : 1,

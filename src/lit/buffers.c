@@ -66,7 +66,7 @@ static vsh_result list_buffers(vshi_lit_document *document, vshi_lit_layout *l, 
     }
     *one = *one == NULL && l->size > 0 ? json_object() : *one;
     bool good = list != NULL && (l->size == 0 || *one != NULL);
-    good = good && (*one == NULL || json_array_append_new(list, *one) == 0);
+    good = (*one == NULL || json_array_append_new(list, *one) == 0) && good;
     for (size_t i = 0; i < gltf->buffer_count; ++i) {
         l->numbers[i] = l->offsets[i] != SIZE_MAX ? 0 : json_array_size(list);
         if (l->offsets[i] == SIZE_MAX && is_needed(document, i)) {

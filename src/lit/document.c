@@ -84,7 +84,8 @@ vsh_result vshi_lit_open(vshi_lit_document *document, const char *path, const vs
     document->text_size = told_size(document->text, size);
     VSHI_TRY(check_lists(gltf, error));
     document->first_view = json_array_size(json_object_get(gltf->root, "bufferViews"));
-    document->own_images = json_copy(json_object_get(gltf->root, "images"));
+    json_t *images = json_object_get(gltf->root, "images");
+    document->own_images = vshi_gltf_check_copy(json_copy(images), images);
     if (document->own_images == NULL && json_object_get(gltf->root, "images") != NULL) {
         return vshi_lit_no_memory(document, error);
     }

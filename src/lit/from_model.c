@@ -3,6 +3,7 @@
 
 #include "base/vec.h"
 
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -229,7 +230,8 @@ static vsh_result put_primitive(maker *m, size_t entry, arrays *a, json_t *made,
 static vsh_result add_primitive(maker *m, size_t entry, const double *world, json_t *list, vsh_error *error) {
     arrays *a;
     VSHI_TRY(take_arrays(m, entry, world, &a, error));
-    json_t *made = json_pack("{s:o}", "attributes", json_copy(a->attributes));
+    json_t *made =
+        json_pack("{s:o}", "attributes", vshi_gltf_check_copy(json_copy(a->attributes), a->attributes));
     if (made == NULL) {
         return vshi_lit_no_memory(&m->work->document, error);
     }
@@ -257,8 +259,10 @@ static vsh_result add_node(maker *m, size_t first, size_t end, json_t *nodes, vs
     size_t mesh, node;
     VSHI_TRY(vshi_lit_append(document, "meshes", json_pack("{s:o}", "primitives", list), &mesh, error));
     json_t *made = json_pack("{s:I}", "mesh", (json_int_t)mesh);
+    errno = 0;
     json_t *label = name != NULL ? json_string(name) : NULL; /* one that is no UTF-8 has no place there */
-    if (label != NULL && json_object_set_new(made, "name", label) != 0) {
+    if ((label == NULL && errno == ENOMEM) ||
+        (label != NULL && json_object_set_new(made, "name", label) != 0)) {
         json_decref(made);
         return vshi_lit_no_memory(document, error);
     }

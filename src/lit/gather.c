@@ -107,7 +107,7 @@ static vsh_result set_bounds(const vshi_lit_document *document, json_t *accessor
 
 static vsh_result describe(vshi_lit_document *document, size_t index, size_t view, size_t count,
                            json_t **made, vsh_error *error) {
-    *made = json_deep_copy(vshi_gltf_element(&document->gltf, "accessors", index));
+    *made = vshi_gltf_copy(vshi_gltf_element(&document->gltf, "accessors", index));
     if (*made == NULL) {
         return vshi_lit_no_memory(document, error);
     }

@@ -205,7 +205,7 @@ static vsh_result try_mesh(vshi_lit_work *work, size_t entry, vsh_error *error) 
     const vshi_model_origin *origin = &work->model->entries[entry].origin;
     const size_t mesh = (size_t)origin->mesh - 1, primitive = (size_t)origin->primitive - 1;
     const json_t *of = vshi_gltf_element(&work->document.gltf, "meshes", mesh);
-    json_t *copy = json_deep_copy(json_array_get(json_object_get(of, "primitives"), primitive));
+    json_t *copy = vshi_gltf_copy(json_array_get(json_object_get(of, "primitives"), primitive));
     char where[96];
     size_t set;
     snprintf(where, sizeof where, "meshes[%zu].primitives[%zu]", mesh, primitive);

@@ -211,7 +211,7 @@ static vsh_result make(vshi_lit_work *work, vshi_lit_look *look, bool *taken, js
                        vsh_error *error) {
     vshi_lit_document *document = &work->document;
     json_t *material = look->material != SIZE_MAX
-                           ? json_deep_copy(vshi_gltf_element(&document->gltf, "materials", look->material))
+                           ? vshi_gltf_copy(vshi_gltf_element(&document->gltf, "materials", look->material))
                            : json_object();
     if (material == NULL) {
         return vshi_lit_no_memory(document, error);

@@ -162,7 +162,7 @@ static vsh_result make_primitives(vshi_lit_work *work, const use *u, json_t *lis
         if (next < u->first + u->count && work->model->entries[next].origin.primitive == p + 1) {
             VSHI_TRY(vshi_lit_primitive_make(work, u->mesh, p, next, list, error));
             ++next;
-        } else if (json_array_append_new(list, json_deep_copy(json_array_get(primitives, p))) != 0) {
+        } else if (json_array_append_new(list, vshi_gltf_copy(json_array_get(primitives, p))) != 0) {
             return vshi_lit_no_memory(&work->document, error);
         }
     }
@@ -176,7 +176,8 @@ static vsh_result make_mesh(vshi_lit_work *work, uses *all, use *u, vsh_error *e
         u->made = alike->made;
         return VSH_OK;
     }
-    json_t *mesh = json_copy(json_array_get(json_object_get(document->gltf.root, "meshes"), u->mesh));
+    json_t *old = json_array_get(json_object_get(document->gltf.root, "meshes"), u->mesh);
+    json_t *mesh = vshi_gltf_check_copy(json_copy(old), old);
     json_t *list = json_array();
     vsh_result result = mesh != NULL && list != NULL ? VSH_OK : vshi_lit_no_memory(document, error);
     if (result == VSH_OK) {
@@ -259,7 +260,7 @@ static vsh_result add_instance(vshi_lit_work *work, const json_t *node, size_t n
     }
     const json_t *weights = json_object_get(node, "weights");
     if (result == VSH_OK && weights != NULL) {
-        result = vshi_lit_set(document, made, "weights", json_deep_copy(weights), error);
+        result = vshi_lit_set(document, made, "weights", vshi_gltf_copy(weights), error);
     }
     if (result != VSH_OK) {
         json_decref(made);

@@ -19,7 +19,7 @@ uint32_t vshi_lit_only_page(const vshi_lit_work *work, const vsh_lit_mesh *mesh)
 static vsh_result add(vshi_lit_work *work, const json_t *made, size_t indices, uint32_t page, size_t set,
                       json_t *list, vsh_error *error) {
     vshi_lit_document *document = &work->document;
-    json_t *primitive = json_deep_copy(made);
+    json_t *primitive = vshi_gltf_copy(made);
     if (primitive == NULL || json_array_append_new(list, primitive) != 0) {
         return vshi_lit_no_memory(document, error);
     }

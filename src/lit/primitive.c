@@ -234,17 +234,22 @@ static vsh_result make(vshi_lit_work *work, vshi_lit_shape *shape, const json_t 
                                           &whole, list, error);
 }
 
-/* The transform from the file's set to the model's UVs, in new memory. NULL: none, or no memory. */
-static json_t *copy_transform(const vshi_lit_work *work, size_t entry, const json_t *primitive, size_t set) {
+/* Copies the transform from the file's set to the model's UVs. *transform is in new memory; NULL: there is
+ * none. */
+static vsh_result copy_transform(vshi_lit_work *work, size_t entry, const json_t *primitive, size_t set,
+                                 json_t **transform, vsh_error *error) {
     const vshi_model_shape *shape = &work->model->shapes[work->model->entries[entry].shape];
     size_t material;
     if ((shape->packed >> set & 1) == 0 || !vshi_gltf_count(primitive, "material", SIZE_MAX, &material)) {
-        return NULL;
+        return VSH_OK;
     }
     const vshi_gltf_unpacking u = vshi_gltf_find_unpacking(&work->document.gltf, material, set);
-    json_t *transform = u.uvs == VSHI_GLTF_UVS_PACKED ? json_deep_copy(u.told) : NULL;
-    json_object_del(transform, "texCoord"); /* the material names the set */
-    return transform;
+    if (u.uvs != VSHI_GLTF_UVS_PACKED || u.told == NULL) {
+        return VSH_OK;
+    }
+    *transform = vshi_gltf_copy(u.told);
+    json_object_del(*transform, "texCoord"); /* the material names the set */
+    return *transform != NULL ? VSH_OK : vshi_lit_no_memory(&work->document, error);
 }
 
 /* The set is the file's own. */
@@ -258,7 +263,8 @@ static vsh_result make_kept(vshi_lit_work *work, size_t entry, const char *where
     }
     if (mesh->uv_set >= 0) {
         const size_t set = (size_t)mesh->uv_set;
-        json_t *transform = copy_transform(work, entry, made, set);
+        json_t *transform = NULL;
+        VSHI_TRY(copy_transform(work, entry, made, set, &transform, error));
         const vsh_result result = vshi_lit_mark_primitive(work, made, mesh->page, set, transform, error);
         json_decref(transform);
         VSHI_TRY(result);
@@ -275,7 +281,7 @@ vsh_result vshi_lit_primitive_make(vshi_lit_work *work, size_t mesh, size_t prim
     const vsh_lit_mesh *lit = &work->meshes[entry];
     vertices v = {.elements = NULL};
     vshi_lit_shape *shape = NULL;
-    json_t *made = json_deep_copy(given);
+    json_t *made = vshi_gltf_copy(given);
     vsh_result result = made != NULL ? VSH_OK : vshi_lit_no_memory(&work->document, error);
     if (result == VSH_OK && lit->uvs == NULL) {
         result = make_kept(work, entry, where, made, list, error);

@@ -22,6 +22,10 @@ json_t *vshi_gltf_parse_json(const char *text, size_t size, json_error_t *where,
     }
     errno = 0;
     json_t *root = json_loadb(text, size, JSON_ALLOW_NUL, where);
+    if (errno == ENOMEM) { /* Jansson calls it a syntax error, or cuts numbers and words short */
+        json_decref(root);
+        root = NULL;
+    }
     *early = root == NULL && (json_error_code(where) == json_error_premature_end_of_input ||
                               where->position < 0 || (size_t)where->position >= size);
     return root;
@@ -31,7 +35,7 @@ static vsh_result parse(vshi_gltf *gltf, const char *text, size_t size, vsh_erro
     json_error_t where;
     bool early;
     gltf->root = vshi_gltf_parse_json(text, size, &where, &early);
-    if (gltf->root == NULL && errno == ENOMEM) { /* Jansson sometimes reports a syntax error instead */
+    if (gltf->root == NULL && errno == ENOMEM) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", gltf->path);
     }
     if (gltf->root == NULL) {

@@ -50,6 +50,13 @@ typedef struct vshi_gltf {
 /* An element of an array of the root, NULL where there is none. */
 const json_t *vshi_gltf_element(const vshi_gltf *gltf, const char *array, size_t index);
 
+/* A deep copy; NULL if memory is refused or `json` is NULL. */
+json_t *vshi_gltf_copy(const json_t *json);
+
+/* Returns `copy`, by json_copy() or json_deep_copy(), or frees it and returns NULL if it lacks something:
+ * they leave out what they have no memory for. */
+json_t *vshi_gltf_check_copy(json_t *copy, const json_t *json);
+
 /* A whole number of at least 0; `fallback` where the key is absent; false where the value is anything else.
  */
 bool vshi_gltf_count(const json_t *object, const char *key, size_t fallback, size_t *value);

@@ -11,6 +11,7 @@
 #include "scenarios.h"
 
 #include <inttypes.h>
+#include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -90,6 +91,7 @@ static void every_allocation_may_fail(void **state) {
 }
 
 int main(void) {
+    json_set_alloc_funcs(malloc, free); /* wrapped as in our objects */
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_allocation_may_fail),
     };
