@@ -23,12 +23,13 @@ const char *vshi_path_ending(const char *path) {
 
 /* The folder of the path, in new memory: "." where the path names none. */
 static char *folder_of(const char *path) {
-    const char *name = last_part(path);
-    if (name == path) {
-        return strdup(".");
+    const size_t length = (size_t)(last_part(path) - path);
+    char *folder = malloc(length + 2);
+    if (folder != NULL) {
+        memcpy(folder, length > 0 ? path : ".", length > 0 ? length : 1);
+        folder[length > 1 ? length - 1 : 1] = '\0';
     }
-    const size_t length = (size_t)(name - path);
-    return strndup(path, length > 1 ? length - 1 : 1);
+    return folder;
 }
 
 static vsh_result check_target(const char *path, vsh_error *error) {

@@ -45,6 +45,10 @@ VSHI_SHARED uint64_t vshi_peak_bytes(void);
 /* What run->memory_held leaves of its limit, at least a byte; 0: there is no limit. */
 uint64_t vshi_memory_left(const vsh_run *run);
 
+/* Ends a program that base/guarded_malloc.c is linked into, after a block of `bytes` was refused. Each of
+ * those programs defines it. It takes no memory and no lock. */
+void vshi_memory_refused(size_t bytes) __attribute__((noreturn));
+
 #ifdef __cplusplus
 }
 #endif

@@ -1,3 +1,4 @@
+#define _GNU_SOURCE /* getdents64 */
 #include "base/temporary.h"
 
 #include "base/file.h"
@@ -107,8 +108,7 @@ static bool is_left(int file, long process) {
     return errno != EWOULDBLOCK && errno != EINTR && kill((pid_t)process, 0) != 0 && errno == ESRCH;
 }
 
-/* Those of `own`, a process, or (0) those that nobody holds. */
-static void take_away(const char *target, long own) {
+void vshi_temporary_clean(const char *target) {
     const naming n = naming_of(target);
     char folder[PATH_MAX];
     if (n.folder_length >= PATH_MAX) {
@@ -125,12 +125,6 @@ static void take_away(const char *target, long own) {
         if (process == 0) {
             continue;
         }
-        if (own != 0) {
-            if (process == own) {
-                unlinkat(dirfd(listing), entry->d_name, 0);
-            }
-            continue;
-        }
         const int file =
             openat(dirfd(listing), entry->d_name, O_WRONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
         struct stat status;
@@ -145,11 +139,31 @@ static void take_away(const char *target, long own) {
     closedir(listing);
 }
 
-void vshi_temporary_clean(const char *target) {
-    take_away(target, 0);
+static void remove_open(int folder, const char *descriptor) {
+    char path[PATH_MAX], only[VSHI_TEMPORARY_ROOM], numbered[VSHI_TEMPORARY_ROOM];
+    const ssize_t size = readlinkat(folder, descriptor, path, sizeof path - 1);
+    if (size <= 0) {
+        return;
+    }
+    path[size] = '\0';
+    snprintf(only, sizeof only, ".%ld.tmp", (long)getpid());
+    snprintf(numbered, sizeof numbered, ".%ld-", (long)getpid());
+    const char *slash = strrchr(path, '/');
+    if (slash != NULL && slash[1] == '.' &&
+        (strstr(slash, only) != NULL || (strstr(slash, numbered) != NULL && strstr(slash, ".tmp") != NULL))) {
+        unlink(path);
+    }
 }
 
-void vshi_temporary_remove(const char *path) {
-    char real[PATH_MAX];
-    take_away(realpath(path, real) != NULL ? real : path, (long)getpid());
+void vshi_temporary_remove_own(void) {
+    const int folder = open("/proc/self/fd", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    _Alignas(struct dirent64) char entries[2048];
+    for (ssize_t size; (size = getdents64(folder, entries, sizeof entries)) > 0;) {
+        const struct dirent64 *entry;
+        for (ssize_t at = 0; at < size; at += entry->d_reclen) {
+            entry = (const void *)(entries + at);
+            remove_open(folder, entry->d_name);
+        }
+    }
+    close(folder);
 }

@@ -25,8 +25,8 @@ int vshi_temporary_create(const char *target, char *path, size_t capacity);
  * that cannot be looked at, stay. */
 void vshi_temporary_clean(const char *target);
 
-/* Removes this process's temporaries of the path, or of what it leads to. */
-VSHI_SHARED void vshi_temporary_remove(const char *path);
+/* Removes the temporary files that this process holds open. Takes no memory and no lock. */
+VSHI_SHARED void vshi_temporary_remove_own(void);
 
 #ifdef __cplusplus
 }

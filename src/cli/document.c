@@ -3,7 +3,6 @@
 #include "base/base64.h"
 #include "base/utf8.h"
 #include "message.h"
-#include "signals.h"
 #include "temporary.h"
 
 #include <png.h>
@@ -41,9 +40,7 @@ int cli_document_write(const char *path, void (*compose)(FILE *out, const void *
         free(text);
         return cli_out_of_memory(path);
     }
-    cli_signals_writing(path);
     const int code = cli_temporary_write(path, text);
-    cli_signals_writing(NULL);
     free(text);
     return code;
 }

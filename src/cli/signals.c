@@ -1,5 +1,6 @@
 #include "signals.h"
 
+#include "base/memory.h"
 #include "base/temporary.h"
 #include "message.h"
 
@@ -8,6 +9,7 @@
 #include <semaphore.h>
 #include <signal.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
@@ -17,10 +19,10 @@ static const long grace_nanoseconds = 250 * 1000 * 1000;
 
 static sem_t signalled; /* posted by each signal; waited for by the watcher */
 static atomic_bool interrupted;
+static atomic_int written; /* 0: the output is not; else 1 + the exit code */
 static pthread_mutex_t telling = PTHREAD_MUTEX_INITIALIZER;
 static bool told;                                          /* the user knows; guarded by `telling` */
 static pthread_mutex_t ending = PTHREAD_MUTEX_INITIALIZER; /* held while the process is ended */
-static const char *writing;                                /* guarded by `ending` */
 
 static void on_signal(int number) {
     (void)number;
@@ -78,9 +80,7 @@ static void *watch(void *unused) {
     while (sem_timedwait(&signalled, &until) != 0 && errno == EINTR) {
     }
     pthread_mutex_lock(&ending);
-    if (writing != NULL) {
-        vshi_temporary_remove(writing);
-    }
+    vshi_temporary_remove_own();
     cli_signals_tell();
     _exit(CLI_INTERRUPTED);
 }
@@ -92,13 +92,29 @@ void cli_signals_watch(void) {
     }
 }
 
-void cli_signals_writing(const char *path) {
+/* The lock is kept: a watcher that wakes now waits for it until the process has ended of itself. */
+void cli_signals_end(int code) {
     pthread_mutex_lock(&ending);
-    writing = path;
-    pthread_mutex_unlock(&ending);
+    atomic_store(&written, code + 1);
 }
 
-/* The lock is kept: a watcher that wakes now waits for it until the process has ended of itself. */
-void cli_signals_end(void) {
-    pthread_mutex_lock(&ending);
+/* --- memory */
+
+void vshi_memory_refused(size_t bytes) {
+    static atomic_flag begun = ATOMIC_FLAG_INIT;
+    while (atomic_flag_test_and_set(&begun)) {
+        pause(); /* another thread ends the process */
+    }
+    if (atomic_load(&written) != 0) {
+        fflush(stdout);
+        _exit(atomic_load(&written) - 1);
+    }
+    vshi_temporary_remove_own();
+    char line[128];
+    const int size = snprintf(line, sizeof line, "%svdbshade: the system refused memory, %zu bytes\n",
+                              isatty(STDERR_FILENO) ? "\r\033[K" : "", bytes);
+    if (write(STDERR_FILENO, line, (size_t)size) < 0) {
+        /* There is nobody left to tell. */
+    }
+    _exit(CLI_LIMIT);
 }

@@ -1,4 +1,5 @@
-/* SIGINT, SIGTERM and SIGHUP: the work is asked to stop, and ended where it does not. */
+/* SIGINT, SIGTERM and SIGHUP: the work is asked to stop, and ended where it does not. Refused memory ends it
+ * at once. Either takes temporary files away. */
 #ifndef CLI_SIGNALS_H
 #define CLI_SIGNALS_H
 
@@ -18,12 +19,8 @@ void cli_signals_tell(void);
  * stopped a little after the first. To be called when nothing will be forked any more. */
 void cli_signals_watch(void);
 
-/* The file that is being written, so that an end in the middle of it takes the temporary file beside it away;
- * NULL: none. The string must live until the next call. */
-void cli_signals_writing(const char *path);
-
-/* The output is written: signals end nothing any more. Not for a cancelled run, which may yet take long to
- * give its memory back. */
-void cli_signals_end(void);
+/* The output is written: signals end nothing any more, and refused memory ends the process with `code`. Not
+ * for a cancelled run, which may yet take long to give its memory back. */
+void cli_signals_end(int code);
 
 #endif

@@ -296,12 +296,10 @@ cli_stats cli_stats_begin(int32_t of, int32_t threads) {
 int cli_stats_finish(const cli_stats *stats, const vsh_run *run, const char *path) {
     int code = CLI_OK;
     if (path != NULL) {
-        cli_signals_writing(path);
         code = write_file(stats, run, path);
-        cli_signals_writing(NULL);
     }
     if (code == CLI_OK) {
-        cli_signals_end();
+        cli_signals_end(CLI_OK);
     }
     return code;
 }

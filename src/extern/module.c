@@ -47,7 +47,11 @@ static bool has_room(size_t bytes) {
 /* What throws while libraries are loaded (their statics, refused memory or a thread) is caught by nobody and
  * ends the process: what they take is asked for before. */
 static vsh_result check_room(const vshi_module *module, vsh_error *error) {
+    errno = 0;
     if (module->threads > 0 && !vshi_threads_left(module->threads)) {
+        if (errno == ENOMEM) {
+            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", module->what);
+        }
         return vshi_fail(error, VSH_ERROR_MEMORY,
                          "threads: the system refuses the %d that OpenVDB's libraries begin; %s need it",
                          module->threads, module->what);

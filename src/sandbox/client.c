@@ -200,7 +200,8 @@ static vsh_result fail_memory(const vshi_exchange *exchange, vsh_error *error) {
                          exchange->path);
     }
     return vshi_fail(error, VSH_ERROR_LIMIT,
-                     "%s: reading it takes more than the memory limit of %.0f MB: damaged, or very large",
+                     "%s: reading it takes more than the memory limit of %.0f MB, or than the system gives: "
+                     "damaged, or very large",
                      exchange->path, (double)exchange->run->memory_limit / 1e6);
 }
 

@@ -96,8 +96,11 @@ static int answer(serving *s, vshi_serve_fn *serve, const char *path, vshi_decod
 
 static int32_t serve_request(serving *s, vshi_serve_fn *const *servers, int argc, char **argv) {
     vshi_request request;
-    if (!vshi_request_read(&request) || s->warnings == NULL) {
+    if (!vshi_request_read(&request)) {
         return VSHI_READER_CANNOT;
+    }
+    if (s->warnings == NULL) {
+        return VSHI_READER_OUT_OF_MEMORY;
     }
     const vshi_reader_state state = vshi_reader_begin(argc, argv, &request);
     if (state.code >= 0) {

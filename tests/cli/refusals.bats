@@ -81,21 +81,31 @@ setup() {
     [ "$refused" -gt 4 ] || fail "$refused refused"
 }
 
-@test "whichever allocation of view is refused, it says so or the page is whole" {
+@test "whichever allocation is refused, the program says so and leaves the old output, or the output is whole" {
     unless_sanitized "its allocations cannot be refused"
-    local input n refused=0
-    for input in box.obj "$ASSETS/thin.glb"; do
-        view=("$VDBSHADE" view "$input" -o out.html --trusted --threads 1 --quiet)
-        "${view[@]}"
-        mv out.html whole.html
-        for ((n = 3; n < 1000; n += 7)); do
-            LD_PRELOAD=$calls REFUSE_MALLOC=$n run --separate-stderr "${view[@]}"
-            if [ "$status" -eq 0 ]; then
-                cmp out.html whole.html || fail "$n of $input"
-            else
-                [[ $status = [34] && $stderr =~ memory|"the system refused" ]] || fail "$n of $input: $status $stderr"
+    local what out n program words refused=0
+    echo "0.5,1.2,0.5" >points.csv
+    "$VDBSHADE" voxelize box.obj --resolution 6 --quiet -o made.vdb
+    for what in "view box.obj -o out.html" "bake box.obj ${SMALL[*]} --ao 1 -o out.exr" "bake box.obj ${SMALL[*]} -o out.tif" \
+        "bake $ASSETS/thin.glb --sun 0,1,0 --size 8 --resolution 12 -o out.glb" "voxelize box.obj --resolution 6 -o out.vdb" \
+        "query made.vdb --sun 0,1,0 --points points.csv -o out.csv" "unwrap box.obj --size 64 -o out.obj"; do
+        out=out.${what##*.}
+        for program in vdbshade vdbshade-reader; do
+            read -ra words <<<"$what --threads 1 --quiet"
+            [ $program = vdbshade-reader ] || words+=(--trusted)
+            "$VDBSHADE" "${words[@]}"
+            mv "$out" "whole.${out##*.}"
+            for ((n = 1; n < 3000; n += 1 + n)); do
+                old_output "$out"
+                LD_PRELOAD=$calls VSH_TEST_PROGRAM=$program VSH_TEST_MALLOC=$n run --separate-stderr "$VDBSHADE" "${words[@]}"
+                if [ "$status" -eq 0 ]; then
+                    cmp -s "$out" "whole.${out##*.}" || same_values "$out" "whole.${out##*.}" || fail "$n of $program $what"
+                    continue
+                fi
+                [[ $stderr == *"the system "@(refused|gives)* || $stderr == *memory* ]] || fail "$n of $program $what"
+                refused 4 && untouched "$out" || fail "$n of $program $what"
                 refused=$((refused + 1))
-            fi
+            done
         done
     done
     [ "$refused" -gt 100 ] || fail "$refused refused"

@@ -1,7 +1,7 @@
 /* Preloaded by tests/cli/refusals.bats: system calls that are refused, or told of.
  * REFUSE_THREADS=N: no more than N threads at a time, LINGER=MS: one that was joined counts for so long yet;
- * REFUSE_MEMFD: none; REFUSE_MALLOC=N: the N-th allocation; TELL_SYNCS=FILE: a line for each
- * fsync(), fdatasync() and rename(), with the names. */
+ * REFUSE_MEMFD: none; VSH_TEST_MALLOC=N: the N-th allocation of the program VSH_TEST_PROGRAM;
+ * TELL_SYNCS=FILE: a line for each fsync(), fdatasync() and rename(), with the names. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -107,13 +107,15 @@ int memfd_create(const char *name, unsigned flags) {
 void *__libc_malloc(size_t size);
 void *__libc_calloc(size_t count, size_t size);
 void *__libc_realloc(void *old, size_t size);
+void *__libc_memalign(size_t alignment, size_t size);
 
 static atomic_long allocations;
 static long refused_allocation; /* 0: none */
 
 static __attribute__((constructor)) void begin(void) {
-    const char *text = getenv("REFUSE_MALLOC");
-    refused_allocation = text != NULL ? atol(text) : 0;
+    const char *text = getenv("VSH_TEST_MALLOC"), *program = getenv("VSH_TEST_PROGRAM");
+    const int meant = text != NULL && program != NULL && strcmp(program, program_invocation_short_name) == 0;
+    refused_allocation = meant ? atol(text) : 0;
     atomic_store(&allocations, 0);
 }
 
@@ -135,6 +137,16 @@ void *calloc(size_t count, size_t size) {
 
 void *realloc(void *old, size_t size) {
     return refuses() ? NULL : __libc_realloc(old, size);
+}
+
+void *aligned_alloc(size_t alignment, size_t size) {
+    return refuses() ? NULL : __libc_memalign(alignment, size);
+}
+
+int posix_memalign(void **block, size_t alignment, size_t size) {
+    void *made = aligned_alloc(alignment, size);
+    *block = made != NULL ? made : *block;
+    return made != NULL ? 0 : ENOMEM;
 }
 
 static void tell(const char *call, const char *name) {

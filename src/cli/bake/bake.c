@@ -209,11 +209,6 @@ static void say_all(const telling *t, const vsh_bake_job *job, const vsh_bake_re
             report->invalid_texels);
 }
 
-static void say_writing(void *user, const char *path) {
-    (void)user;
-    cli_signals_writing(path);
-}
-
 cli_stats cli_bake_stats(const vsh_scene *scene, const vsh_bake_report *report, int32_t threads) {
     cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS, threads);
     stats.texels = report->texels;
@@ -315,7 +310,6 @@ int cli_bake_one(const cli_bake_settings *settings, const vsh_scene *scene, cli_
     options.words = settings->words;
     options.word_count = settings->word_count;
     options.done = say_lightmap;
-    options.writing = say_writing;
     options.user = &t;
     vsh_bake_job *job = NULL;
     vsh_error error;

@@ -2,7 +2,6 @@
 #include "bake.h"
 #include "cli/message.h"
 #include "cli/paths.h"
-#include "cli/signals.h"
 #include "cli/temporary.h"
 #include "cli/try.h"
 
@@ -47,8 +46,6 @@ int cli_bake_view(const cli_bake_settings *settings, const vsh_scene *scene, con
         bake.uv_set = receiver->uv_set;
     }
     vsh_error error;
-    cli_signals_writing(settings->view);
     const vsh_result result = vsh_view_write(settings->view, &bake, NULL, run, &error);
-    cli_signals_writing(NULL);
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }

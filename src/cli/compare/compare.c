@@ -70,8 +70,8 @@ static int compare_main(int argc, char **argv) {
     code = code == CLI_OK ? cli_comparison_report(&s, &comparison, 1) : code;
     code = code == CLI_OK ? print(&s, &comparison) : code;
     if (code == CLI_OK) {
-        cli_signals_end();
         code = comparison.alike ? CLI_OK : CLI_UNLIKE;
+        cli_signals_end(code);
     }
     cli_comparison_free(&comparison);
     cli_progress_end();

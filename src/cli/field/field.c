@@ -100,15 +100,13 @@ static int save(const field_settings *s, const vsh_scene *scene, const vsh_asset
     told.attribute_count = origin.count;
     vsh_scene_field_report report;
     vsh_error error;
-    cli_signals_writing(s->bake.output);
     const vsh_result result =
         vsh_scene_save_field(scene, assets, s->bake.output, &told, run, &report, &error);
-    cli_signals_writing(NULL);
     cli_provenance_free(&origin);
     if (result != VSH_OK) {
         return cli_fail_of(s->bake.input, &error);
     }
-    cli_signals_end();
+    cli_signals_end(CLI_OK);
     cli_warnings_tell();
     if (!s->bake.common.quiet) {
         say_summary(s->bake.output, &report);

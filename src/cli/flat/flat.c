@@ -225,7 +225,6 @@ static int write_map(const flat_settings *s, const vsh_flat_scene *scene, const 
     told.attributes = origin.attributes;
     told.attribute_count = origin.count;
     vsh_error error;
-    cli_signals_writing(scene->output);
     vsh_image_writer *writer = NULL;
     if (vsh_image_writer_create(scene->output, &planes->image, &told, &writer, &error) != VSH_OK ||
         vsh_image_writer_add(writer, planes->image.height, planes->image.planes, &error) != VSH_OK) {
@@ -235,7 +234,6 @@ static int write_map(const flat_settings *s, const vsh_flat_scene *scene, const 
     }
     code = finish_image(writer, scene->output);
 done:
-    cli_signals_writing(NULL);
     cli_provenance_free(&origin);
     return code;
 }

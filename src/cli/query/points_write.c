@@ -2,7 +2,6 @@
  * and normal else. */
 #include "base/decimal.h"
 #include "cli/message.h"
-#include "cli/signals.h"
 #include "cli/try.h"
 #include "points.h"
 
@@ -127,7 +126,6 @@ int cli_points_writer_open(const char *path, int32_t format, bool answers_only,
     CLI_TRY(check_names(w, reader));
     const bool counted = format == VSHI_TABLE_PLY && reader->table.format != VSHI_TABLE_PLY;
     if (!standard) {
-        cli_signals_writing(path);
         CLI_TRY(cli_temporary_begin(&w->temporary, path));
         w->file = w->temporary.file;
     } else if (counted) {

@@ -4,7 +4,6 @@
 #include "base/clock.h"
 #include "cli/message.h"
 #include "cli/progress.h"
-#include "cli/signals.h"
 #include "cli/try.h"
 #include "query.h"
 
@@ -168,7 +167,6 @@ int query_stream(const query_settings *s, const vsh_query *query, query_answers 
     stats->bad_rows = reader->bad;
 done:
     cli_points_writer_free(&writer);
-    cli_signals_writing(NULL);
     cli_points_free(&points);
     return code;
 }

@@ -1,7 +1,6 @@
 /* Pictures as files. */
 #include "cli/message.h"
 #include "cli/paths.h"
-#include "cli/signals.h"
 #include "cli/temporary.h"
 #include "render.h"
 
@@ -115,9 +114,7 @@ static int write_image(const char *path, const vsh_image *image, int32_t bits, c
     options.color_space = bits == 8 ? VSH_COLOR_ENCODED : VSH_COLOR_AUTO;
     options.attributes = origin->attributes;
     options.attribute_count = origin->count;
-    cli_signals_writing(path);
     const vsh_result result = vsh_image_write(path, image, &options, &error);
-    cli_signals_writing(NULL);
     return result == VSH_OK ? CLI_OK : cli_fail(&error);
 }
 

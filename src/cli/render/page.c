@@ -1,7 +1,6 @@
 /* A turntable in one page that needs nothing beside it. */
 #include "cli/document.h"
 #include "cli/message.h"
-#include "cli/signals.h"
 #include "cli/temporary.h"
 #include "cli/try.h"
 #include "render.h"
@@ -95,10 +94,8 @@ int render_page_end(render_page *page) {
     fputs(tail, page->out);
     const bool whole = !ferror(page->out) && fclose(page->out) == 0;
     page->out = NULL;
-    cli_signals_writing(page->settings->bake.output);
     const int code =
         whole ? cli_temporary_write(page->settings->bake.output, page->text) : cli_out_of_memory("page");
-    cli_signals_writing(NULL);
     render_page_abandon(page);
     return code;
 }

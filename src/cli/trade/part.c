@@ -1,7 +1,6 @@
 /* --shard: what was measured, kept for merging. */
 #include "part.h"
 #include "cli/message.h"
-#include "cli/signals.h"
 #include "cli/temporary.h"
 #include "cli/try.h"
 
@@ -181,9 +180,7 @@ int trade_write_part(const trade_work *work) {
     CLI_TRY_DONE(list_records(work, &head));
     CLI_TRY_DONE(vshi_part_about_make(TRADE_PART, &options, &about, &error) == VSH_OK ? CLI_OK
                                                                                       : cli_fail(&error));
-    cli_signals_writing(path);
     code = write(work, path, &head, &about);
-    cli_signals_writing(NULL);
 done:
     vshi_part_about_free(&about);
     cli_provenance_free(&origin);

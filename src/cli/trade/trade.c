@@ -292,7 +292,7 @@ static int trade(const trade_settings *settings, const trade_kept *kept, vsh_sce
     CLI_TRY_DONE(trade_check_view_uvs(&work));
     CLI_TRY_DONE(measure(&work));
     CLI_TRY_DONE(settings->bake.shard > 0 ? trade_write_part(&work) : write_all(&work));
-    cli_signals_end();
+    cli_signals_end(CLI_OK);
     say_summary(&work);
 done:
     free_work(&work);

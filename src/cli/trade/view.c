@@ -1,7 +1,6 @@
 /* --view: every run on the mesh in one page, with the truth beside it. */
 #include "cli/message.h"
 #include "cli/paths.h"
-#include "cli/signals.h"
 #include "cli/temporary.h"
 #include "cli/try.h"
 #include "cli/warnings.h"
@@ -169,9 +168,7 @@ static int write_page(page *p) {
     p->list[0].bake.model = receiver->path;
     p->list[0].bake.uv_set = receiver->uv_set;
     vsh_error error;
-    cli_signals_writing(s->view);
     const vsh_result result = vsh_view_write_bakes(s->view, bakes, p->count, &p->work->run, &error);
-    cli_signals_writing(NULL);
     free(bakes);
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }

@@ -205,7 +205,7 @@ static int unwrap(unwrap_settings *s) {
     }
     CLI_TRY_DONE(cli_unwrap_write_mesh(s->input, s->output, model, meshes, atlas,
                                        s->options.atlas == VSH_ATLAS_OBJECTS, &run));
-    cli_signals_end();
+    cli_signals_end(CLI_OK);
     if (!s->common.quiet) {
         say_summary(s, atlas, vshi_seconds() - start);
     }

@@ -1,6 +1,5 @@
 /* The mesh file that is written. */
 #include "base/utf8.h"
-#include "cli/signals.h"
 #include "cli/try.h"
 #include "unwrap.h"
 
@@ -77,11 +76,9 @@ int cli_unwrap_write_mesh(const char *input, const char *path, const vsh_model *
         pages[i] = vsh_atlas_charts(atlas)[i].page;
     }
     vsh_error error;
-    cli_signals_writing(path);
     if (vsh_lit_write(input, model, places, &options, path, run, &error) != VSH_OK) {
         code = cli_fail_of(NULL, &error);
     }
-    cli_signals_writing(NULL);
 done:
     free(pages);
     free((void *)names);

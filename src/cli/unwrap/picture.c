@@ -1,5 +1,4 @@
 #include "cli/message.h"
-#include "cli/signals.h"
 #include "unwrap.h"
 
 #include "base/hash.h"
@@ -120,9 +119,7 @@ int cli_unwrap_write_picture(const char *path, const vsh_atlas *atlas) {
         vsh_image_options options = vsh_image_options_default();
         options.bits = 8;
         vsh_error error;
-        cli_signals_writing(path);
         code = vsh_image_write(path, &image, &options, &error) == VSH_OK ? CLI_OK : cli_fail(&error);
-        cli_signals_writing(NULL);
     }
     for (int k = 0; k < 3; ++k) {
         free(p.planes[k]);

@@ -108,9 +108,7 @@ static int write_page(const view_settings *s) {
     const bool two = s->inputs[1] != NULL || s->planes[1].count > 0;
     const vsh_run run = cli_common_run(&s->common);
     vsh_error error;
-    cli_signals_writing(s->output);
     const vsh_result result = vsh_view_write(s->output, &bakes[0], two ? &bakes[1] : NULL, &run, &error);
-    cli_signals_writing(NULL);
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
@@ -132,7 +130,7 @@ static int view_main(int argc, char **argv) {
     const int code = write_page(&s);
     cli_progress_end();
     if (code == CLI_OK) {
-        cli_signals_end();
+        cli_signals_end(CLI_OK);
         if (!s.common.quiet) {
             cli_say("%s: written in %.2f s; open it in a browser", s.output, vshi_seconds() - start);
         }

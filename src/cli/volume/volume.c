@@ -189,10 +189,8 @@ static int write_volume(volume_work *work) {
         return cli_fail(&cancelled);
     }
     vsh_error error;
-    cli_signals_writing(output);
     const vsh_result result = vsh_volume_write(work->volume, output, work->settings->half,
                                                work->origin.attributes, work->origin.count, &error);
-    cli_signals_writing(NULL);
     cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
     return result == VSH_OK ? CLI_OK : cli_fail(&error);
 }

@@ -91,10 +91,8 @@ static int write_grid(const voxelize_settings *s, const vsh_scene *scene, const 
         return cli_fail(&cancelled);
     }
     vsh_error error;
-    cli_signals_writing(s->output);
     const vsh_result result =
         vsh_grid_write(grid, s->output, s->name, origin.attributes, origin.count, &error);
-    cli_signals_writing(NULL);
     cli_provenance_free(&origin);
     return result == VSH_OK ? CLI_OK : cli_fail(&error);
 }
@@ -120,7 +118,7 @@ static int voxelize(const voxelize_settings *s, const vsh_scene *scene) {
         goto done;
     }
     CLI_TRY_DONE(write_grid(s, scene, &run, grid));
-    cli_signals_end();
+    cli_signals_end(CLI_OK);
     if (!s->common.quiet) {
         say_summary(s, grid, vshi_seconds() - start);
     }

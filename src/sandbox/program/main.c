@@ -1,5 +1,6 @@
 /* vdbshade-reader: confines itself, and only then loads the library, whose own libraries begin threads before
  * any main (liblog4cplus, which OpenVDB brings, begins four), and parse. */
+#include "base/memory.h"
 #include "sandbox/reader.h"
 #include "sandbox/request.h"
 
@@ -12,6 +13,11 @@
 #include <unistd.h>
 
 typedef int32_t serve_fn(int argc, char **argv);
+
+void vshi_memory_refused(size_t bytes) {
+    (void)bytes;
+    _exit(VSHI_READER_OUT_OF_MEMORY);
+}
 
 static int serve(char *name, char *argument, const vshi_reader_state *state) {
     errno = 0;
