@@ -33,6 +33,7 @@ typedef struct group {
     struct RTCRay16 ray;
     float axis[3][LANES], u[3][LANES], v[3][LANES], normal[3][LANES], far[LANES];
     float rise[LANES], lean[2][LANES]; /* of domes: vshi_lean */
+    bool leans;                        /* any of them */
     uint32_t shift[2][LANES];
     float lowest[LANES]; /* of a ray along its normal, below it */
     int valid[LANES];    /* -1: the lane has a disc */
@@ -54,6 +55,7 @@ static void set_lane(const vsh_triangles *t, const vshi_disc *disc, int lane, gr
     const double far = disc->far * t->scale;
     g->far[lane] = far < (double)FLT_MAX ? (float)far : INFINITY;
     g->lowest[lane] = normal[0] != 0.0 || normal[1] != 0.0 || normal[2] != 0.0 ? 0.0f : -INFINITY;
+    g->leans = g->leans || disc->lean.rise < 1.0;
     g->rise[lane] = (float)disc->lean.rise;
     g->lean[0][lane] = (float)disc->lean.x;
     g->lean[1][lane] = (float)disc->lean.y;
@@ -95,9 +97,8 @@ static inline void aim_at_discs(group *g, const float x[LANES], const float y[LA
     }
 }
 
-/* The same on domes, above a plane: vshi_dome_place(). */
-static inline void aim_at_domes(group *g, float x[LANES], float y[LANES], int valid[LANES]) {
-    struct RTCRay16 *r = &g->ray;
+/* vshi_dome_place() */
+static inline void place_on_domes(const group *g, float x[LANES], float y[LANES]) {
     for (int l = 0; l < LANES; ++l) {
         const float along = x[l] * g->lean[0][l] + y[l] * g->lean[1][l];
         const float edge = 1.0f - (x[l] * x[l] + y[l] * y[l]) + along * along;
@@ -105,6 +106,16 @@ static inline void aim_at_domes(group *g, float x[LANES], float y[LANES], int va
         const float by = 0.5f * to - along;
         x[l] += by * g->lean[0][l];
         y[l] += by * g->lean[1][l];
+    }
+}
+
+/* The same on domes. */
+static inline void aim_at_domes(group *g, float x[LANES], float y[LANES], int valid[LANES]) {
+    struct RTCRay16 *r = &g->ray;
+    if (g->leans) {
+        place_on_domes(g, x, y);
+    }
+    for (int l = 0; l < LANES; ++l) {
         const float square = 1.0f - (x[l] * x[l] + y[l] * y[l]);
         const float z = sqrtf(square > 0.0f ? square : 0.0f);
         r->dir_x[l] = g->axis[0][l] * z + (g->u[0][l] * x[l] + g->v[0][l] * y[l]);
