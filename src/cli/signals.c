@@ -110,10 +110,10 @@ void vshi_memory_refused(size_t bytes) {
         _exit(atomic_load(&written) - 1);
     }
     vshi_temporary_remove_own();
-    char line[128];
-    const int size = snprintf(line, sizeof line, "%svdbshade: the system refused memory, %zu bytes\n",
+    char message[128];
+    const int size = snprintf(message, sizeof message, "%svdbshade: the system refused memory, %zu bytes\n",
                               isatty(STDERR_FILENO) ? "\r\033[K" : "", bytes);
-    if (write(STDERR_FILENO, line, (size_t)size) < 0) {
+    if (write(STDERR_FILENO, message, (size_t)size) < 0) {
         /* There is nobody left to tell. */
     }
     _exit(CLI_LIMIT);
