@@ -124,7 +124,10 @@ int main(int argc, char **argv) {
             }
         }
         fclose(in);
+        free(packed);
+        free(bytes);
     }
+    vsh_image_free(file);
     return at == argc ? 0 : 5;
 }
 C
