@@ -6,6 +6,7 @@ setup_file() {
 }
 
 setup() {
+    unless_sanitized "a sanitizer must be loaded before the library that refuses"
     cd "$BATS_TEST_TMPDIR" || return 1
     write_box box.obj
     calls=$BATS_FILE_TMPDIR/calls.so
@@ -68,7 +69,6 @@ setup() {
 
 @test "where it refuses the memory that OpenVDB or OpenImageIO take, that is said" {
     local most refused=0
-    unless_sanitized "its shadow memory does not fit"
     write_box box.obj
     for most in 40 60 80 100 120 140 160 200; do
         for what in "voxelize --resolution 16 -o out.vdb" "render --sun 1,2,1 --size 16 -o out.tif"; do
@@ -82,7 +82,6 @@ setup() {
 }
 
 @test "whichever allocation is refused, the program says so and leaves the old output, or the output is whole" {
-    unless_sanitized "its allocations cannot be refused"
     local what out n program words refused=0
     echo "0.5,1.2,0.5" >points.csv
     "$VDBSHADE" voxelize box.obj --resolution 6 --quiet -o made.vdb
