@@ -29,7 +29,7 @@ void vshi_note_lit(const vshi_lightmap_work *w, size_t texel, size_t mesh) {
     for (size_t i = 0; i <= lights && lit != NULL && planes->coverage[texel] == 1.0f; ++i) {
         const float *plane = i < lights ? planes->shadow[i] : planes->sky;
         vshi_lit *so_far = &w->job->lit[i];
-        if (plane != NULL && plane[texel] > 0.0f && !so_far->several && so_far->mesh != lit) {
+        if (plane != NULL && !so_far->several && so_far->mesh != lit && plane[texel] > 0.0f) {
             so_far->several = so_far->mesh != NULL && !is_same(so_far->mesh, lit);
             so_far->mesh = lit;
         }

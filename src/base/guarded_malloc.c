@@ -9,6 +9,7 @@
 #include <malloc.h>
 #include <stdatomic.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* The next definition: that of libc, a sanitizer, or an allocator that was preloaded. */
 static void *find_next(_Atomic(void *) *found, const char *name) {

@@ -8,7 +8,7 @@
 static const double SAME = 1.5;
 /* Marches begin this far above a triangle, plus the height of the field's surface above it, up to a limit.
  * In voxels. */
-static const double CLEAR = 0.5, LEAST_CLEAR = 0.3, MOST_LIFT = 3.0;
+static const double CLEAR = 0.5, LEAST_CLEAR = 0.3, MOST_CLEAR = 3.0;
 
 /* The hits on surfaces in a tile, to be shaded together. */
 typedef struct hits {
@@ -82,19 +82,19 @@ static void add_hit(const vshi_scenery *scenery, hits *h, const vsh_surface *sur
 /* Returns how far above a triangle marches begin, in voxels. They must begin outside the field's surface,
  * which is a shell around an open mesh. */
 static double find_clearance(const vsh_field *field, vshi_vec at, vshi_vec normal) {
-    double lift = CLEAR;
+    double clearance = CLEAR;
     if (field->unknown) {
         return 0.0; /* nothing is marched */
     }
-    while (lift < MOST_LIFT) {
-        const vshi_vec point = vshi_add(at, vshi_scale(normal, lift * field->voxel_size));
+    while (clearance < MOST_CLEAR) {
+        const vshi_vec point = vshi_add(at, vshi_scale(normal, clearance * field->voxel_size));
         const double world[3] = {point.x, point.y, point.z};
         const vshi_vec p = vshi_to_field(field, world);
         const double h = (double)vshi_field_distance(field, (float[3]){(float)p.x, (float)p.y, (float)p.z});
         if (h >= LEAST_CLEAR) {
-            return lift;
+            return clearance;
         }
-        lift += fmax(CLEAR - h, LEAST_CLEAR);
+        clearance += fmax(CLEAR - h, LEAST_CLEAR);
     }
     return CLEAR; /* in something else */
 }

@@ -213,9 +213,8 @@ static void shoot(vshi_ao_piece *b, uint32_t owner, vsh_shade_stats *stats) {
     }
 }
 
-/* Limits the point's directions: above the horizon where there is one, else above its
- * face. With both, directions below the face are mirrored at it: few, and the horizon leaves out what it
- * must. */
+/* Limits the point's directions to those above the horizon, or above its face if there is no horizon. With
+ * both, the few directions below the face are mirrored at it. */
 static void limit_dome(const vshi_ao_task *task, vshi_ao_point *point, vshi_vec up, vshi_vec face,
                        const vshi_vec axes[3]) {
     const bool smooth = vshi_dot(face, axes[2]) < VSHI_ONE_NORMAL;

@@ -115,6 +115,37 @@ static void what_is_no_blocks_is_told(void **state) {
     }
 }
 
+/* What is left of the disc is bounded by half a circle and half an ellipse. It has closed forms for the means
+ * of the distance along the lean, of its square, and of the square across it. */
+static void places_fill_the_dome_above_a_plane_evenly(void **state) {
+    (void)state;
+    enum { SIDE = 400 };
+    static const double PI = 3.14159265358979323846;
+    const vshi_vec axes[3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
+    for (int k = 1; k <= 8; ++k) {
+        const double rise = 0.25 * k - 1.0, slope = sqrt(1.0 - rise * rise);
+        const vshi_vec up = {0.6 * slope, -0.8 * slope, rise};
+        const vshi_lean lean = vshi_dome_lean(up, axes);
+        double count = 0.0, along = 0.0, square = 0.0, across = 0.0;
+        for (int i = 0; i < SIDE * SIDE; ++i) {
+            double p[2] = {2.0 * (i % SIDE + 0.5) / SIDE - 1.0, 2.0 * (i / SIDE + 0.5) / SIDE - 1.0};
+            if (p[0] * p[0] + p[1] * p[1] < 1.0) {
+                vshi_dome_place(&lean, p);
+                const double z = sqrt(fmax(1.0 - p[0] * p[0] - p[1] * p[1], 0.0));
+                assert_true(up.x * p[0] + up.y * p[1] + up.z * z > -1e-7);
+                const double a = 0.6 * p[0] - 0.8 * p[1], b = 0.8 * p[0] + 0.6 * p[1];
+                count += 1.0;
+                along += a;
+                square += a * a;
+                across += b * b;
+            }
+        }
+        assert_true(fabs(along / count - 4.0 / (3.0 * PI) * (1.0 - rise)) < 1e-3);
+        assert_true(fabs(square / count - 0.25 * (1.0 - rise + rise * rise)) < 1e-3);
+        assert_true(fabs(across / count - 0.25) < 1e-3);
+    }
+}
+
 int main(void) {
     if (!vsh_triangles_available()) {
         return 0;
@@ -134,6 +165,7 @@ int main(void) {
         return 1;
     }
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(places_fill_the_dome_above_a_plane_evenly),
         cmocka_unit_test(packets_count_what_lone_rays_do),
         cmocka_unit_test(what_is_no_blocks_is_told),
     };
