@@ -152,29 +152,45 @@ static size_t together_begin(const vsh_texels *texels, size_t i) {
     return begin == i ? i : together_end(texels, begin);
 }
 
-/* Leaves out valid samples first … last - 1 that lie on another face: every ray from there meets it at once.
- * A short ray in the sample's own plane, across the sample, finds such faces. */
+/* Whether the point is inside a solid, by a ray along `way` from a little behind it. */
+static bool is_solid_behind(const vsh_triangles *triangles, const vshi_segment_ray *ray) {
+    vshi_segment_ray behind = *ray;
+    for (size_t axis = 0; axis < 3; ++axis) {
+        behind.origin[axis] += ray->far * ray->direction[axis];
+    }
+    behind.far = INFINITY;
+    return vshi_triangles_depth(triangles, &behind) > 0;
+}
+
+/* Leaves out valid samples first … last - 1 that lie on another face. If that crosses the sample's plane,
+ * every ray meets it at once: a short ray in the plane, across the sample, finds it. If it lies in the plane,
+ * as that of a floor under a box, every ray begins behind it: a short ray back through the sample finds it.
+ * Both sides of a card also lie in one plane, but have no solid between them. */
 static void leave_out_touching(const lifting *l, const vsh_triangles *triangles, size_t first, size_t last) {
     static const double ACROSS[2] = {0.7648, 0.6442}; /* along no axis, and no edge that people build */
-    const double lift = vshi_triangles_lift(triangles);
-    vshi_segment_ray rays[TOGETHER];
+    static const double NEAR = 0.25; /* of the lift: 16 roundings of a float; a wider gap is a gap */
+    const double lift = vshi_triangles_lift(triangles), near = NEAR * lift;
+    vshi_segment_ray across[TOGETHER], back[TOGETHER];
     size_t of[TOGETHER], count = 0;
-    bool blocked[TOGETHER];
+    bool crossed[TOGETHER], covered[TOGETHER];
     for (size_t i = first; i < last; ++i) {
         if (l->origins->valid[i]) {
             const vshi_vec normal = vshi_vec_off(l->texels->geometric + 3 * i);
+            const vshi_vec foot = vshi_sample_foot(l->texels, i), down = vshi_scale(normal, -1.0);
             vshi_vec u, v;
             vshi_frame(normal, &u, &v);
             const vshi_vec d = vshi_unit(vshi_add(vshi_scale(u, ACROSS[0]), vshi_scale(v, ACROSS[1])));
-            const vshi_vec p = vshi_add(vshi_sample_foot(l->texels, i),
-                                        vshi_sub(vshi_scale(normal, lift), vshi_scale(d, 0.5 * lift)));
-            rays[count] = (vshi_segment_ray){{p.x, p.y, p.z}, {d.x, d.y, d.z}, lift};
+            const vshi_vec p = vshi_add(foot, vshi_sub(vshi_scale(normal, lift), vshi_scale(d, 0.5 * lift)));
+            const vshi_vec q = vshi_add(foot, vshi_scale(normal, near));
+            across[count] = (vshi_segment_ray){{p.x, p.y, p.z}, {d.x, d.y, d.z}, lift};
+            back[count] = (vshi_segment_ray){{q.x, q.y, q.z}, {down.x, down.y, down.z}, 2.0 * near};
             of[count++] = i;
         }
     }
-    vshi_triangles_blocked(triangles, rays, count, blocked);
+    vshi_triangles_blocked(triangles, across, count, crossed);
+    vshi_triangles_meet_backs(triangles, back, count, covered);
     for (size_t k = 0; k < count; ++k) {
-        l->origins->valid[of[k]] = !blocked[k];
+        l->origins->valid[of[k]] = !crossed[k] && !(covered[k] && is_solid_behind(triangles, &back[k]));
     }
 }
 

@@ -32,6 +32,10 @@ vsh_result vshi_triangles_of_quads(const vshi_quads *quads, const vsh_run *run, 
 void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
                             bool *blocked);
 
+/* The same for the backs of triangles only: rays pass fronts by. */
+void vshi_triangles_meet_backs(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
+                               bool *met);
+
 /* Distance to the first triangle that a ray meets; ray->far where it meets none. Thread safe. */
 double vshi_triangles_distance(const vsh_triangles *triangles, const vshi_segment_ray *ray);
 

@@ -13,6 +13,11 @@ void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *b
     (void)triangles, (void)beams, (void)count, (void)most, (void)cut;
 }
 
+void vshi_triangles_meet_backs(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
+                               bool *met) {
+    vshi_triangles_blocked(triangles, rays, count, met);
+}
+
 #else
 
 #include <float.h>
@@ -107,10 +112,11 @@ void vshi_triangles_occlude(const vsh_triangles *triangles, const int *valid,
     }
 }
 
-void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
-                            bool *blocked) {
+static void find_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
+                         RTCFilterFunctionN filter, bool *blocked) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
+    context.filter = filter;
     for (size_t begin = 0; begin < count; begin += VSHI_PACKET) {
         struct RTCRay16 packet = {0};
         _Alignas(64) int valid[VSHI_PACKET] = {0};
@@ -126,6 +132,32 @@ void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_r
             blocked[begin + (size_t)lane] = valid[lane] != 0 && packet.tfar[lane] < 0.0f;
         }
     }
+}
+
+void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
+                            bool *blocked) {
+    find_blocked(triangles, rays, count, NULL, blocked);
+}
+
+/* An Embree filter: lets rays pass the fronts of triangles. */
+static void pass_fronts(const struct RTCFilterFunctionNArguments *args) {
+    enum { RAY_DIRECTION = 4, HIT_NORMAL = 0 }; /* rows of N values; Embree has names for them in C++ only */
+    const size_t n = args->N;
+    const float *ray = (const float *)args->ray, *hit = (const float *)args->hit;
+    for (size_t i = 0; i < n; ++i) {
+        float along = 0.0f;
+        for (size_t axis = 0; axis < 3; ++axis) {
+            along += ray[(RAY_DIRECTION + axis) * n + i] * hit[(HIT_NORMAL + axis) * n + i];
+        }
+        if (!(along > 0.0f)) {
+            args->valid[i] = 0;
+        }
+    }
+}
+
+void vshi_triangles_meet_backs(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
+                               bool *met) {
+    find_blocked(triangles, rays, count, pass_fronts, met);
 }
 
 /* Where the axis of a beam meets what is past `from`; false where nothing. */

@@ -394,6 +394,38 @@ static void texels_on_the_side_of_a_box_are_filled_from_the_open(void **state) {
     free(s);
 }
 
+/* The room's floor is a wall with air behind it, so nothing is met from beneath it. */
+static void what_stands_on_a_floor_with_air_beneath_it_is_invalid_there(void **state) {
+    (void)state;
+    for (int room = 0; room < 2; ++room) {
+        shape *s = calloc(1, sizeof *s);
+        if (room) {
+            add_faces(s, (box){{-4.0, 0.0, -4.0}, {4.0, 2.5, 4.0}}, true);
+        } else {
+            quad_at(s, 0.0, -4.0, 4.0);
+        }
+        add_box(s, (box){{-1.0, 0.0, -1.0}, {1.0, 0.8, 1.0}});
+        quad_at(s, 0.8, -0.5, 0.5); /* a cloth on the box, both of which are seen */
+        const vsh_mesh mesh = mesh_of(s);
+        baked b = bake(&mesh, 48, 0, 1.0);
+        size_t under = 0, over = 0;
+        for (size_t i = 0; i < b.samples.count; ++i) {
+            const double y = b.samples.positions[3 * i + 1];
+            const float up = b.samples.geometric_normals[3 * i + 1];
+            if (y == 0.0 && up < -0.5f) {
+                ++under;
+                assert_false(is_valid(&b, i));
+            } else if (y > 0.7 && y < 0.9 && up > 0.5f) {
+                ++over;
+                assert_true(is_valid(&b, i));
+            }
+        }
+        assert_true(under > 100 && over > 200);
+        free_baked(&b);
+        free(s);
+    }
+}
+
 int main(void) {
     if (!vsh_triangles_available()) {
         return 0;
@@ -409,6 +441,7 @@ int main(void) {
         cmocka_unit_test(invalid_texels_take_the_nearest_value_of_their_chart),
         cmocka_unit_test(a_gap_that_is_narrower_than_the_lift_of_rays_is_no_solid),
         cmocka_unit_test(texels_on_the_side_of_a_box_are_filled_from_the_open),
+        cmocka_unit_test(what_stands_on_a_floor_with_air_beneath_it_is_invalid_there),
         cmocka_unit_test(a_floor_beside_the_mouth_of_an_inward_pipe_is_valid),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
