@@ -154,7 +154,8 @@ int judge_verdict(const judge_scene *s, const double p[3], const double g[3]) {
     }
     const int backs = count_behind(s, start, g, false);
     if (backs <= (s->unknown ? FEW_OF_MODEL : FEW) * VERDICT_RAYS) {
-        const bool either = s->hollows != NULL && count_behind(s, start, g, true) > FEW * VERDICT_RAYS;
+        const bool either =
+            touches(s, at, g) || (s->hollows != NULL && count_behind(s, start, g, true) > FEW * VERDICT_RAYS);
         return either ? JUDGE_UNCLEAR : JUDGE_VALID;
     }
     return backs < MOST * VERDICT_RAYS || touches(s, at, g) ? JUDGE_UNCLEAR : JUDGE_INVALID;
