@@ -123,19 +123,26 @@ struct Census {
     }
 };
 
-// The norm by differences towards the surface alone (Godunov's scheme for the Eikonal equation, Rouy and
-// Tourin 1992): central ones vanish in the middle of thin sheets, where distances are right.
-double norm(const float *value, double voxel) {
+// Two norms of a gradient. `towards` takes differences towards the surface (Godunov's scheme for the Eikonal
+// equation, Rouy and Tourin 1992): central ones vanish in the middle of thin sheets. `steepest` takes the
+// larger of both differences: across a sheet thinner than two voxels those towards the surface are small too.
+struct Norms {
+    double towards, steepest;
+};
+
+Norms find_norms(const float *value, double voxel) {
     constexpr int strides[3] = {64, 8, 1};
     const double sign = *value < 0.0f ? -1.0 : 1.0;
-    double sum = 0.0;
+    double towards = 0.0, steepest = 0.0;
     for (const int stride : strides) {
-        const double back = sign * (double(*value) - double(value[-stride]));
-        const double ahead = sign * (double(*value) - double(value[stride]));
-        const double slope = std::max(0.0, std::max(back, ahead)) / voxel;
-        sum += slope * slope;
+        const double back = sign * (double(*value) - double(value[-stride])) / voxel;
+        const double ahead = sign * (double(*value) - double(value[stride])) / voxel;
+        const double slope = std::max(0.0, std::max(back, ahead));
+        const double most = std::max(std::fabs(back), std::fabs(ahead));
+        towards += slope * slope;
+        steepest += most * most;
     }
-    return std::sqrt(sum);
+    return {std::sqrt(towards), std::sqrt(steepest)};
 }
 
 // Whether no distance changes so from a voxel to the next: too far, or from deep inside to the outside.
@@ -208,10 +215,10 @@ Census visit(const Leaf &leaf, float background, float voxel) {
         const Coord at = Leaf::offsetToLocalCoord(i);
         const bool surrounded = std::min({at[0], at[1], at[2]}) > 0 && std::max({at[0], at[1], at[2]}) < 7;
         if (surrounded && std::fabs(value) < voxel) {
-            const double length = norm(values + i, double(voxel));
+            const Norms norms = find_norms(values + i, double(voxel));
             ++census.norms;
-            census.flat += length < LEAST_NORM;
-            census.steep += length > GREATEST_NORM;
+            census.flat += norms.steepest < LEAST_NORM;
+            census.steep += norms.towards > GREATEST_NORM;
         }
     }
     return census;

@@ -62,6 +62,33 @@ void values_that_are_no_distances_are_made_so(void **) {
     }
 }
 
+// Walls of 0.6 to 1.5 voxels, wherever they stand between the voxels: their distances are right, and stay.
+void thin_walls_hold_distances(void **) {
+    for (const double half : {0.3, 0.45, 0.6, 0.75}) {
+        for (const double offset : {0.0, 0.14, 0.27}) {
+            const FloatGrid::Ptr grid = FloatGrid::create(float(3.0 * VOXEL));
+            grid->setTransform(openvdb::math::Transform::createLinearTransform(VOXEL));
+            grid->setGridClass(openvdb::GRID_LEVEL_SET);
+            for (const openvdb::Coord at : openvdb::CoordBBox(openvdb::Coord(-14), openvdb::Coord(14))) {
+                const openvdb::Vec3d q(std::fabs(at.x()) - 10.0, std::fabs(at.y()) - 10.0,
+                                       std::fabs(at.z() - offset) - half);
+                const openvdb::Vec3d outside(std::max(q.x(), 0.0), std::max(q.y(), 0.0),
+                                             std::max(q.z(), 0.0));
+                const double distance = outside.length() + std::min(std::max({q.x(), q.y(), q.z()}), 0.0);
+                if (std::fabs(distance) < 3.0) {
+                    grid->tree().setValue(at, float(VOXEL * distance));
+                }
+            }
+            Warnings warnings;
+            vsh_grid *read = nullptr;
+            const std::string path = save("wall.vdb", {grid});
+            assert_said(vsh_grid_read(path.c_str(), nullptr, &warnings.run, &read, &failure), VSH_OK, {});
+            assert_true(warnings.lines.empty());
+            vsh_grid_free(read);
+        }
+    }
+}
+
 // Shadows under the sphere, seen as the reader left it.
 std::vector<float> shadows_of(const vsh_grid *grid) {
     vsh_occluders *occluders = nullptr;
@@ -163,6 +190,7 @@ int main() {
         cmocka_unit_test(turned_and_mirrored_grids_stay_where_they_are),
         cmocka_unit_test(doubles_are_read),
         cmocka_unit_test(values_that_are_no_distances_are_made_so),
+        cmocka_unit_test(thin_walls_hold_distances),
         cmocka_unit_test(scaled_values_and_narrow_bands_cast_the_same_shadows),
         cmocka_unit_test(what_is_all_inside_is_refused),
         cmocka_unit_test(making_distances_anew_names_the_file_and_the_grid),
