@@ -1,4 +1,5 @@
 #include "bake/baking.h"
+#include "bake/shadow_smooth.h"
 
 #include "bake/ao_texels.h"
 #include "bake/average.h"
@@ -121,7 +122,10 @@ vsh_result vshi_bake_light(vshi_baking *bake, size_t index, vsh_error *error) {
     vshi_point_rows rows = bake->origins.rows;
     rows.only = bake->known != NULL; /* nothing is copied from the others */
     VSHI_TRY(vshi_shade_shadow(occluders, &points, &rows, light, &shade, &bake->run, bake->values,
-                               errors != NULL ? bake->deviation : NULL, &bake->stats.shade, error));
+                               bake->deviation, &bake->stats.shade, error));
+    if (shade.max_error >= VSHI_COARSE) { /* finer values are smooth by themselves */
+        VSHI_TRY(vshi_shadow_smooth(&bake->origins, &bake->quiet, bake->values, bake->deviation, error));
+    }
     if (errors != NULL) {
         VSHI_TRY(vshi_baking_average(bake, bake->deviation, 1, errors, error));
     }

@@ -146,7 +146,7 @@ static vsh_result check_limit(const vshi_baking *bake, vsh_error *error) {
                                  .traced = vshi_baking_traces_shadow(bake) || vshi_baking_traces_ao(bake),
                                  .smooth = texels->smooth,
                                  .values = needs(bake, VSHI_NEEDS_LIGHTS | NEEDS_ANY_AO),
-                                 .errors = needs(bake, VSHI_NEEDS_DEVIATION),
+                                 .errors = needs(bake, VSHI_NEEDS_DEVIATION | VSHI_NEEDS_LIGHTS),
                                  .irradiance = needs(bake, VSHI_NEEDS_IRRADIANCE),
                                  .bent = needs(bake, VSHI_NEEDS_BENT),
                                  .tint = needs(bake, VSHI_NEEDS_TINT),
@@ -238,7 +238,7 @@ static vsh_result run_bake(vshi_baking *bake, vsh_error *error) {
                                       &bake->run, &bake->origins, error));
     bake->origins.rows.work = bake->row_work;
     VSHI_TRY_DONE(hold(bake, VSHI_NEEDS_LIGHTS | NEEDS_ANY_AO, 1, &bake->values, error));
-    VSHI_TRY_DONE(hold(bake, VSHI_NEEDS_DEVIATION, 1, &bake->deviation, error));
+    VSHI_TRY_DONE(hold(bake, VSHI_NEEDS_DEVIATION | VSHI_NEEDS_LIGHTS, 1, &bake->deviation, error));
     VSHI_TRY_DONE(hold(bake, VSHI_NEEDS_IRRADIANCE, 3, &bake->irradiance, error));
     VSHI_TRY_DONE(hold(bake, VSHI_NEEDS_BENT, 3, &bake->bent, error));
     VSHI_TRY_DONE(hold(bake, VSHI_NEEDS_TINT, 3, &bake->tinted, error));
