@@ -22,10 +22,14 @@ typedef struct vsh_field_options {
                       * of adaptive are traced against it instead of being marched. Values are as near to the
                       * casters, not the same. Pays from about two rays an active voxel on; some 30 bytes an
                       * active voxel */
+    double grown; /* voxels that casters are grown by for rays, 0 … 1. A trilinear sample over a convex edge is
+                   * too large, by up to 0.44 voxels, so what is voxelised seems smaller than it is. 0: voxels
+                   * are the definition, as those of a file */
 } vsh_field_options;
 
 static inline vsh_field_options vsh_field_options_default(void) {
-    vsh_field_options options = {sizeof(vsh_field_options), 0.0, 0};
+    /* Through a roof of slats of 3.3 voxels AO's rays see 0.047 too much with 0, 0.0004 with this. */
+    vsh_field_options options = {sizeof(vsh_field_options), 0.0, 0, 0.15};
     return options;
 }
 

@@ -11,23 +11,6 @@
 extern "C" {
 #endif
 
-/* The triangles of some meshes in world space, in a tree for rays. Immutable; may be shared by threads. */
-typedef struct vsh_triangles vsh_triangles;
-
-/* 1 where the library was built with Embree and can load it, else 0: vsh_triangles_create() then returns
- * VSH_ERROR_UNSUPPORTED. Embree is loaded by the first call that needs it and stays loaded. */
-VSH_API int vsh_triangles_available(void);
-
-/* Copies the meshes' triangles, transforms applied; both sides of a triangle block. Errors:
- * VSH_ERROR_UNSUPPORTED (no Embree), VSH_ERROR_INPUT (as vsh_mesh_check()), VSH_ERROR_LIMIT,
- * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free the result with vsh_triangles_free(). */
-VSH_API vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
-                                        vsh_triangles **triangles, vsh_error *error);
-VSH_API void vsh_triangles_free(vsh_triangles *triangles); /* NULL does nothing */
-
-/* Bytes in memory. Cannot fail. */
-VSH_API uint64_t vsh_triangles_bytes(const vsh_triangles *triangles);
-
 /* Procedural casters as they are: no voxels, no triangles. Immutable; may be shared by threads. */
 typedef struct vsh_solids vsh_solids;
 
@@ -41,6 +24,29 @@ VSH_API void vsh_solids_free(vsh_solids *solids); /* NULL does nothing */
 
 /* Signed distance to the nearest solid, as vsh_sdf_distance(), world units; infinite where there is none. */
 VSH_API double vsh_solids_distance(const vsh_solids *solids, const double position[3]);
+
+/* The triangles of some meshes in world space, in a tree for rays. Immutable; may be shared by threads. */
+typedef struct vsh_triangles vsh_triangles;
+
+/* 1 where the library was built with Embree and can load it, else 0: vsh_triangles_create() then returns
+ * VSH_ERROR_UNSUPPORTED. Embree is loaded by the first call that needs it and stays loaded. */
+VSH_API int vsh_triangles_available(void);
+
+/* Copies the meshes' triangles, transforms applied; both sides of a triangle block. Errors:
+ * VSH_ERROR_UNSUPPORTED (no Embree), VSH_ERROR_INPUT (as vsh_mesh_check()), VSH_ERROR_LIMIT,
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free the result with vsh_triangles_free(). */
+VSH_API vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
+                                        vsh_triangles **triangles, vsh_error *error);
+
+/* The same, with procedural solids beside the meshes, which rays meet as they are. `solids` may be NULL; they
+ * must outlive the result. */
+VSH_API vsh_result vsh_triangles_create_beside(const vsh_mesh *meshes, size_t mesh_count,
+                                               const vsh_solids *solids, const vsh_run *run,
+                                               vsh_triangles **triangles, vsh_error *error);
+VSH_API void vsh_triangles_free(vsh_triangles *triangles); /* NULL does nothing */
+
+/* Bytes in memory. Cannot fail. */
+VSH_API uint64_t vsh_triangles_bytes(const vsh_triangles *triangles);
 
 /* Fraction of a light that each of `count` points [count][3] sees, into visibility[count]: `rays` rays (1 …
  * 65536) over the light's disc (Vogel's spiral, 1979), that begin `lift` world units above the point along

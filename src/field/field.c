@@ -118,6 +118,9 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     VSHI_TRY(vshi_options_resolve(options, &o, sizeof o, "vsh_field_options", error));
     VSHI_TRY(vshi_run_resolve(run, &r, error));
     VSHI_TRY(vshi_field_reach_check(o.reach, error));
+    if (!(o.grown >= 0.0 && o.grown <= 1.0)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "field: grown %g: expected 0 … 1 voxels", o.grown);
+    }
 
     vsh_grid_info info;
     vsh_grid_get_info(grid, &info);
@@ -129,6 +132,7 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&f, 1, sizeof *f, "field", error));
     f->voxel_size = info.voxel_size;
+    f->grown = o.grown;
     f->shell_thickness = info.shell_thickness;
     f->active_voxels = info.active_voxels;
     memcpy(f->world_min, info.bounds_min, sizeof f->world_min);

@@ -57,7 +57,8 @@ struct vsh_field {
     bool unknown;           /* see vshi_field_create_unknown() */
     int32_t level_count;
     vshi_level levels[VSHI_MAX_LEVELS];
-    vsh_triangles *surface; /* of the finest level, grown by VSHI_GROWN, field space (surface.h): only for
+    double grown; /* by how much casters are grown for rays, voxels */
+    vsh_triangles *surface; /* of the finest level, as much grown, field space (surface.h): only for
                              * vshi_triangles_blocked(). NULL: rays are marched */
 };
 
@@ -125,13 +126,6 @@ static inline float vshi_field_sample(const vsh_field *field, const float p[3], 
 static inline float vshi_field_distance(const vsh_field *field, const float p[3]) {
     return vshi_field_sample(field, p, NULL);
 }
-
-/* A trilinear sample over a convex edge is too large, by up to 0.44 voxels: what stands out in the field is
- * smaller than its caster, and edges are what hides the sky. By so many voxels casters are grown for rays.
- * Through a roof of slats of 3.3 voxels AO's rays see 0.047 too much without it, 0.0004 with it
- * (test_ao_rays); on the cloister 256 rays see 0.0068 and 0.0021 too much. Round casters lose less: with it
- * sixteen cones are 0.0046 too dark on the seeds' floor. */
-#define VSHI_GROWN 0.15
 
 /* World position to field space, in double precision. */
 static inline vshi_vec vshi_to_field(const vsh_field *field, const double position[3]) {

@@ -74,6 +74,7 @@ vsh_result vsh_field_file_field(const vsh_field_file *file, size_t index, const 
     f->borrowed = true;
     VSHI_TRY_DONE(cut_levels(file, f, vshi_field_reach(f, o.reach), error));
     VSHI_TRY_DONE(vshi_check_limit(&full, vshi_field_bytes(f), "field", error));
+    f->grown = o.grown;
     if (o.surface != 0 && vsh_triangles_available()) {
         VSHI_TRY_DONE(add_surface(f, &full, error));
     }

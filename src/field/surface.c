@@ -326,7 +326,7 @@ static vsh_result write(void *user, const double centre[3], double scale, float 
 vsh_result vshi_field_add_surface(vsh_field *field, vshi_budget budget, vshi_job *job, vsh_error *error) {
     vshi_surface surface;
     vsh_result result;
-    result = vshi_surface_find(field, VSHI_GROWN, budget, job, &surface, error);
+    result = vshi_surface_find(field, field->grown, budget, job, &surface, error);
     if (result != VSH_OK || surface.quads[surface.brick_count] == 0) { /* of parts too thin for it: none */
         goto done;
     }
@@ -344,6 +344,190 @@ vsh_result vshi_field_add_surface(vsh_field *field, vshi_budget budget, vshi_job
 done:
     vshi_surface_free(&surface);
     return result;
+}
+
+/* A mesh on its way, a triangle's corners after the other's. */
+typedef struct refinement {
+    const vsh_field *field;
+    float *positions; /* NULL: triangles are only counted */
+    size_t triangle_count;
+} refinement;
+
+static double sample_finest(const vsh_field *field, vshi_vec p) {
+    return (double)vshi_level_sample(field, 0, (float[]){(float)p.x, (float)p.y, (float)p.z}, NULL);
+}
+
+/* The middle of an edge, moved to the surface; false where it is there already. It depends on the two ends
+ * alone, so the triangles on both sides agree. */
+static bool find_middle(const vsh_field *field, vshi_vec a, vshi_vec b, vshi_vec *middle) {
+    enum { STEPS = 3 };
+    static const double NEAR = 1.0 / 64.0, ASIDE = 0.5; /* voxels */
+    *middle = vshi_scale(vshi_add(a, b), 0.5);
+    double height = sample_finest(field, *middle);
+    if (fabs(height) < NEAR) {
+        return false;
+    }
+    for (int step = 0; step < STEPS; ++step) {
+        vshi_vec slope;
+        double *const of_axis[3] = {&slope.x, &slope.y, &slope.z};
+        for (int axis = 0; axis < 3; ++axis) {
+            const vshi_vec by = {axis == 0 ? ASIDE : 0.0, axis == 1 ? ASIDE : 0.0, axis == 2 ? ASIDE : 0.0};
+            *of_axis[axis] =
+                sample_finest(field, vshi_add(*middle, by)) - sample_finest(field, vshi_sub(*middle, by));
+        }
+        const double square = vshi_dot(slope, slope),
+                     most = fabs(height) < ASIDE ? 1.0 : ASIDE / fabs(height);
+        if (!(square > 0.25)) { /* a ridge: there is no way down */
+            return step > 0;
+        }
+        *middle = vshi_sub(*middle, vshi_scale(slope, most * height / square));
+        *middle = (vshi_vec){(double)(float)middle->x, (double)(float)middle->y, (double)(float)middle->z};
+        height = sample_finest(field, *middle);
+    }
+    return true;
+}
+
+/* Adds a triangle, turned to look to where the field grows. */
+static void add_triangle(refinement *r, const vshi_vec corner[3]) {
+    static const double ASIDE = 0.25; /* voxels */
+    float *to = r->positions != NULL ? r->positions + 9 * r->triangle_count : NULL;
+    ++r->triangle_count;
+    if (to == NULL) {
+        return;
+    }
+    const vshi_vec middle = vshi_scale(vshi_add(corner[0], vshi_add(corner[1], corner[2])), 1.0 / 3.0);
+    const vshi_vec normal =
+        vshi_unit(vshi_cross(vshi_sub(corner[1], corner[0]), vshi_sub(corner[2], corner[0])));
+    const vshi_vec aside = vshi_scale(normal, ASIDE);
+    const bool outwards =
+        sample_finest(r->field, vshi_add(middle, aside)) > sample_finest(r->field, vshi_sub(middle, aside));
+    for (int k = 0; k < 3; ++k) {
+        const vshi_vec p = corner[outwards || k == 0 ? k : 3 - k];
+        to[3 * k] = (float)p.x;
+        to[3 * k + 1] = (float)p.y;
+        to[3 * k + 2] = (float)p.z;
+    }
+}
+
+/* Adds a triangle, cut where the middles of its edges are off the surface. */
+static void refine(refinement *r, const vshi_vec corner[3], int depth) { /* NOLINT(misc-no-recursion) */
+    enum { DEEPEST = 2 };
+    vshi_vec middle[3];
+    int cut = 0, first = 0;
+    for (int k = 0; k < 3 && depth < DEEPEST; ++k) {
+        if (find_middle(r->field, corner[k], corner[(k + 1) % 3], &middle[k])) {
+            cut |= 1 << k;
+        }
+    }
+    if (cut == 0) {
+        add_triangle(r, corner);
+        return;
+    }
+    if (cut == 7) {
+        for (int k = 0; k < 3; ++k) {
+            refine(r, (vshi_vec[]){corner[k], middle[k], middle[(k + 2) % 3]}, depth + 1);
+        }
+        refine(r, middle, depth + 1);
+        return;
+    }
+    while ((cut >> first & 1) == 0) { /* the last edge of those that are cut comes first */
+        ++first;
+    }
+    if ((cut >> (first + 1) % 3 & 1) == 0 && (cut >> (first + 2) % 3 & 1) != 0) {
+        first = (first + 2) % 3;
+    }
+    const int second = (first + 1) % 3, third = (first + 2) % 3;
+    const vshi_vec m = middle[first];
+    if ((cut >> second & 1) == 0) {
+        refine(r, (vshi_vec[]){corner[first], m, corner[third]}, depth + 1);
+        refine(r, (vshi_vec[]){m, corner[second], corner[third]}, depth + 1);
+        return;
+    }
+    refine(r, (vshi_vec[]){m, corner[second], middle[second]}, depth + 1);
+    refine(r, (vshi_vec[]){m, middle[second], corner[third]}, depth + 1);
+    refine(r, (vshi_vec[]){m, corner[third], corner[first]}, depth + 1);
+}
+
+static void refine_quads(refinement *r, const float *corners, const uint32_t *quads, size_t count) {
+    r->triangle_count = 0;
+    for (size_t q = 0; q < count; ++q) {
+        vshi_vec p[4];
+        for (int k = 0; k < 4; ++k) {
+            p[k] = vshi_vec_off(corners + 3 * (size_t)quads[4 * q + (size_t)k]);
+        }
+        refine(r, p, 0);
+        if (quads[4 * q + 2] != quads[4 * q + 3]) {
+            refine(r, (vshi_vec[]){p[0], p[2], p[3]}, 0);
+        }
+    }
+}
+
+static void find_transform(const vsh_field *field, double transform[12]) {
+    const vshi_vec zero = vshi_to_world(field, (vshi_vec){0.0, 0.0, 0.0});
+    for (int column = 0; column < 4; ++column) {
+        const vshi_vec axis = {column == 0 ? 1.0 : 0.0, column == 1 ? 1.0 : 0.0, column == 2 ? 1.0 : 0.0};
+        const vshi_vec to = column < 3 ? vshi_sub(vshi_to_world(field, axis), zero) : zero;
+        transform[column] = to.x;
+        transform[4 + column] = to.y;
+        transform[8 + column] = to.z;
+    }
+}
+
+static vsh_result make_mesh(const vsh_field *field, const vsh_run *run, vshi_job *job, vshi_surface *surface,
+                            float **corners, uint32_t **quads, vshi_surface_mesh *mesh, vsh_error *error) {
+    static const double centre[3] = {0.0, 0.0, 0.0};
+    VSHI_TRY(vshi_surface_find(field, 0.0, (vshi_budget){run, 0.0}, job, surface, error));
+    const size_t count = surface->quads[surface->brick_count];
+    const size_t corner_count = surface->corners[surface->brick_count];
+    double bytes = 12.0 * (double)corner_count + 16.0 * (double)count;
+    VSHI_TRY(vshi_check_limit(run, bytes, "surface", error));
+    VSHI_TRY(vshi_allocate((void **)corners, corner_count, 3 * sizeof **corners, "surface", error));
+    VSHI_TRY(vshi_allocate((void **)quads, count, 4 * sizeof **quads, "surface", error));
+    VSHI_TRY(vshi_surface_write(surface, centre, 1.0, job, *corners, *quads, error));
+    refinement r = {field, NULL, 0};
+    refine_quads(&r, *corners, *quads, count);
+    bytes += 48.0 * (double)r.triangle_count;
+    VSHI_TRY(vshi_check_limit(run, bytes, "surface", error));
+    if (r.triangle_count > UINT32_MAX / 3) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "surface: %zu triangles, at most %u", r.triangle_count,
+                         UINT32_MAX / 3);
+    }
+    mesh->triangle_count = r.triangle_count;
+    mesh->vertex_count = 3 * r.triangle_count;
+    VSHI_TRY(
+        vshi_allocate((void **)&mesh->positions, mesh->vertex_count, 3 * sizeof(float), "surface", error));
+    VSHI_TRY(vshi_allocate((void **)&mesh->indices, mesh->vertex_count, sizeof(uint32_t), "surface", error));
+    r.positions = mesh->positions;
+    refine_quads(&r, *corners, *quads, count);
+    for (size_t i = 0; i < mesh->vertex_count; ++i) {
+        mesh->indices[i] = (uint32_t)i;
+    }
+    find_transform(field, mesh->transform);
+    return VSH_OK;
+}
+
+vsh_result vshi_surface_mesh_make(const vsh_field *field, const vsh_run *run, vshi_surface_mesh *mesh,
+                                  vsh_error *error) {
+    *mesh = (vshi_surface_mesh){.positions = NULL};
+    vshi_job *job = vshi_job_begin(run, "surface", 2 * list_bricks(field, NULL));
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "surface: the system refused memory");
+    }
+    vshi_surface surface = {.bricks = NULL};
+    uint32_t *quads = NULL;
+    float *corners = NULL;
+    const vsh_result result = make_mesh(field, run, job, &surface, &corners, &quads, mesh, error);
+    free(corners);
+    free(quads);
+    vshi_surface_free(&surface);
+    vshi_job_end(job);
+    return result;
+}
+
+void vshi_surface_mesh_free(vshi_surface_mesh *mesh) {
+    free(mesh->indices);
+    free(mesh->positions);
+    *mesh = (vshi_surface_mesh){.positions = NULL};
 }
 
 /* A quad over a cell whose values have a mixed difference of m is off by up to m / 4, that of xy at its
@@ -373,5 +557,5 @@ bool vshi_surface_clears(const vsh_field *field, vshi_vec place) {
     const int16_t *v = field->values + field->index[level->first_index + block] +
                        (cell[0] & 7) * VSHI_STRIDE_X + (cell[1] & 7) * VSHI_STRIDE_Y + (cell[2] & 7);
     const double height = (double)vshi_level_sample(field, 0, p, NULL);
-    return height - VSHI_GROWN > bend(v) * (double)level->quantum;
+    return height - field->grown > bend(v) * (double)level->quantum;
 }

@@ -33,6 +33,19 @@ vsh_result vshi_surface_write(vshi_surface *surface, const double centre[3], dou
  * `budget` counts all that is held but it. Errors: also VSH_ERROR_UNSUPPORTED without Embree. */
 vsh_result vshi_field_add_surface(vsh_field *field, vshi_budget budget, vshi_job *job, vsh_error *error);
 
+/* The surface where the finest level reads 0, as a mesh that looks outwards. */
+typedef struct vshi_surface_mesh {
+    float *positions;  /* [vertex_count][3], field space */
+    uint32_t *indices; /* [triangle_count][3] */
+    size_t vertex_count, triangle_count;
+    double transform[12]; /* field space to world */
+} vshi_surface_mesh;
+
+/* Free it with vshi_surface_mesh_free(), after an error too. Errors: as vshi_surface_find(). */
+vsh_result vshi_surface_mesh_make(const vsh_field *field, const vsh_run *run, vshi_surface_mesh *mesh,
+                                  vsh_error *error);
+void vshi_surface_mesh_free(vshi_surface_mesh *mesh);
+
 /* Whether a place of field space is outside of field->surface for certain: farther from it than a quad may be
  * off what the cell reads. */
 bool vshi_surface_clears(const vsh_field *field, vshi_vec place);

@@ -3,6 +3,7 @@
 #include "base/similarity.h"
 #include "mesh/mesh_set.h"
 #include "scene/assets.h"
+#include "scene/occluders.h"
 #include "spheres/sphere_tree.h"
 
 #include "base/job.h"
@@ -154,7 +155,11 @@ static vsh_result take_own_voxels(assembly *a, double finest, vsh_error *error) 
                          "resolution 0: no caster is a level set, whose voxel size it stands for");
     }
     a->options.resolution = vsh_grid_options_default().resolution; /* not looked at */
-    a->options.voxel_size = a->scene->caster_count > 1 ? finest : 0.0;
+    size_t taken = 0;
+    for (size_t i = 0; i < a->scene->caster_count; ++i) {
+        taken += a->taken[i];
+    }
+    a->options.voxel_size = taken > 1 ? finest : 0.0;
     return VSH_OK;
 }
 
@@ -206,6 +211,24 @@ static vsh_result choose_voxel_size(assembly *a, vsh_error *error) {
     }
     a->options.voxel_size = longest / a->options.resolution;
     return VSH_OK;
+}
+
+/* Warns of level sets whose voxels become others, where values are marched through these. */
+static void warn_resampled(const assembly *a, const vsh_scene_layer *layer, const vsh_run *run) {
+    static const double SAME = 1e-4;
+    for (size_t i = 0; i < a->scene->caster_count && vsh_scene_marches(a->scene, layer); ++i) {
+        const vsh_caster *caster = &a->scene->casters[i];
+        if (!a->taken[i] || caster->type != VSH_CASTER_VDB || a->options.voxel_size == 0.0) {
+            continue;
+        }
+        vsh_grid_info info;
+        vsh_grid_get_info(vshi_assets_grid(a->assets, i), &info);
+        const double own = info.voxel_size * vshi_similarity_scale(caster->transform);
+        if (fabs(own - a->options.voxel_size) > SAME * own) {
+            vshi_warn(run, "%s: its voxels of %g are resampled to %g; --resolution 0 keeps them",
+                      caster->path, own, a->options.voxel_size);
+        }
+    }
 }
 
 static void add_instance(assembly *a, const vsh_grid *grid, const double *transform) {
@@ -301,9 +324,9 @@ static void free_assembly(assembly *a) {
 }
 
 /* The union of the casters that are taken, with these options over the defaults. */
-static vsh_result assemble(const vsh_scene *scene, const vsh_assets *assets, const bool *taken,
-                           const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
-                           vsh_error *error) {
+static vsh_result assemble(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
+                           const bool *taken, const vsh_grid_options *options, const vsh_run *run,
+                           vsh_grid **grid, vsh_error *error) {
     assembly a = {.scene = scene, .assets = assets, .taken = taken, .options = vsh_grid_options_default()};
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
@@ -315,6 +338,7 @@ static vsh_result assemble(const vsh_scene *scene, const vsh_assets *assets, con
     if (a.options.voxel_size == 0.0) {
         VSHI_TRY_DONE(choose_voxel_size(&a, error));
     }
+    warn_resampled(&a, layer, &full);
     VSHI_TRY_DONE(make_grids(&a, &full, error));
     VSHI_TRY_DONE(unite(&a, run, grid, error)); /* which counts the instances itself */
 done:
@@ -349,10 +373,19 @@ vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, c
     if (take(scene, true, NULL, taken) == 0) {
         VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_INPUT, "scene: no casters that are voxelised"));
     }
-    VSHI_TRY_DONE(assemble(scene, assets, taken, &scene->grid, run, grid, error));
+    VSHI_TRY_DONE(assemble(scene, assets, NULL, taken, &scene->grid, run, grid, error));
 done:
     free(taken);
     return result;
+}
+
+vsh_grid_options vshi_scene_grid_options(const vsh_scene *scene, const vsh_scene_layer *layer) {
+    vsh_grid_options options = scene->grid;
+    if (layer != NULL && (layer->voxel_size != 0.0 || layer->resolution != 0)) {
+        options.voxel_size = layer->voxel_size;
+        options.resolution = layer->resolution;
+    }
+    return options;
 }
 
 vsh_result vsh_scene_layer_casters(const vsh_scene *scene, const vsh_assets *assets,
@@ -363,17 +396,27 @@ vsh_result vsh_scene_layer_casters(const vsh_scene *scene, const vsh_assets *ass
     *grid = NULL;
     VSHI_NEEDS(scene);
     VSHI_NEEDS(assets);
-    vsh_grid_options options = scene->grid;
-    if (layer != NULL && (layer->voxel_size != 0.0 || layer->resolution != 0)) {
-        options.voxel_size = layer->voxel_size;
-        options.resolution = layer->resolution;
-    }
+    const vsh_grid_options options = vshi_scene_grid_options(scene, layer);
     bool *taken;
     vsh_result result = VSH_OK;
     VSHI_TRY_DONE(vshi_allocate((void **)&taken, scene->caster_count, sizeof *taken, "casters", error));
     if (take(scene, false, layer, taken) > 0) {
-        VSHI_TRY_DONE(assemble(scene, assets, taken, &options, run, grid, error));
+        VSHI_TRY_DONE(assemble(scene, assets, layer, taken, &options, run, grid, error));
     }
+done:
+    free(taken);
+    return result;
+}
+
+vsh_result vshi_scene_caster_grid(const vsh_scene *scene, const vsh_assets *assets, size_t caster,
+                                  const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
+                                  vsh_error *error) {
+    bool *taken;
+    vsh_result result;
+    *grid = NULL;
+    VSHI_TRY_DONE(vshi_allocate((void **)&taken, scene->caster_count, sizeof *taken, "casters", error));
+    taken[caster] = true;
+    result = assemble(scene, assets, NULL, taken, options, run, grid, error);
 done:
     free(taken);
     return result;

@@ -83,6 +83,9 @@ static vsh_field_options options_of(const making *m, const vsh_scene_layer *laye
     vsh_field_options options = vsh_field_options_default();
     options.reach = reach_of(m, voxels);
     options.surface = pays(m, layer, voxels);
+    if (vshi_scene_is_level_set(m->scene, layer)) {
+        options.grown = 0.0; /* its voxels are the definition */
+    }
     if (layer != NULL) {
         options.reach *= fmax(1.0, layer->shade.softness); /* lights are as much wider */
     }

@@ -17,9 +17,22 @@ vsh_result vshi_scene_warn_lost(const vsh_scene *scene, const vsh_assets *assets
 vsh_result vshi_scene_note_solidity(const vsh_scene *scene, const vsh_assets *assets,
                                     const vsh_scene_layer *layer, const vsh_run *run, vsh_error *error);
 
+/* How a layer's casters, or (NULL) those in none, are voxelised. */
+vsh_grid_options vshi_scene_grid_options(const vsh_scene *scene, const vsh_scene_layer *layer);
+
+/* The level set of one caster alone, with these options over the defaults. Errors: as
+ * vsh_scene_layer_casters(). */
+vsh_result vshi_scene_caster_grid(const vsh_scene *scene, const vsh_assets *assets, size_t caster,
+                                  const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
+                                  vsh_error *error);
+
 /* Whether a bake's values are to be held against the casters themselves: not where no method keeps an error,
  * where layers cast, or where rays cannot meet all casters. */
 bool vshi_scene_wants_truth(const vsh_scene *scene);
+
+/* Whether a layer's only caster, or (NULL) that in none, is a level set, which keeps its voxels when it is
+ * marched. */
+bool vshi_scene_is_level_set(const vsh_scene *scene, const vsh_scene_layer *layer);
 
 /* Whether a method that a layer's casters, or (NULL) those in none, are shaded with has all of `traits`,
  * VSH_METHOD_…, or (`has` false) lacks one: of shadows where there are lights, of AO where it is baked. */

@@ -51,12 +51,27 @@ static bool are_followed(const vsh_scene *scene, const vsh_scene_layer *layer) {
     return !vshi_scene_method_is(scene, layer, VSH_METHOD_KEEPS_ERROR, false);
 }
 
+bool vshi_scene_is_level_set(const vsh_scene *scene, const vsh_scene_layer *layer) {
+    size_t level_sets = 0, count = 0;
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        const vsh_caster *caster = &scene->casters[i];
+        if (vshi_caster_in_layer(caster, layer) && !vshi_caster_is_direct(caster)) {
+            ++count;
+            level_sets += caster->type == VSH_CASTER_VDB;
+        }
+    }
+    return count == 1 && level_sets == 1;
+}
+
 int32_t vsh_scene_resolution(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
                              double points) {
     VSHI_FLOATS;
     const int32_t otherwise = vsh_grid_options_default().resolution;
     if (scene == NULL || assets == NULL || vshi_scene_voxels_named(scene, layer)) {
         return VSH_RESOLUTION_NAMED;
+    }
+    if (vsh_scene_marches(scene, layer) != 0 && vshi_scene_is_level_set(scene, layer)) {
+        return 0;
     }
     if (vsh_scene_marches(scene, layer) != 0) {
         return are_followed(scene, layer)

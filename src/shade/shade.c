@@ -221,10 +221,10 @@ static const double GROWN_SHARE = 0.75;
 double vshi_shade_grown(const vsh_field *field, vshi_vec origin) {
     const float at[3] = {(float)origin.x, (float)origin.y, (float)origin.z};
     const double most = GROWN_SHARE * (double)vshi_field_distance(field, at);
-    return most > VSHI_GROWN ? VSHI_GROWN : most > 0.0 ? most : 0.0;
+    return most > field->grown ? field->grown : most > 0.0 ? most : 0.0;
 }
 
 bool vshi_shade_traces(const vsh_field *field, vshi_vec origin) {
-    return field->surface != NULL && vshi_shade_grown(field, origin) >= VSHI_GROWN &&
+    return field->surface != NULL && vshi_shade_grown(field, origin) >= field->grown &&
            vshi_surface_clears(field, origin);
 }

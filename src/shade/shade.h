@@ -108,7 +108,7 @@ static inline double vshi_shade_lift(const vsh_field *field, const vsh_shade_opt
 bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t i, double lift,
                        vshi_vec *origin, vshi_vec *normal);
 
-/* What casters are grown by for rays that begin at a point of field space, voxels: up to VSHI_GROWN. */
+/* What casters are grown by for rays that begin at a point of field space, voxels: up to field->grown. */
 double vshi_shade_grown(const vsh_field *field, vshi_vec origin);
 
 /* Whether rays on the field from there are traced against its surface: where that is there, is grown by no

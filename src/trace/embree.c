@@ -7,6 +7,7 @@
 #include "base/try.h"
 #include "mesh/mesh.h"
 #include "mesh/mesh_set.h"
+#include "trace/solids.h"
 
 #include <float.h>
 #include <stdlib.h>
@@ -24,7 +25,12 @@ int vsh_triangles_available(void) {
 
 vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
                                 vsh_triangles **triangles, vsh_error *error) {
-    (void)meshes, (void)mesh_count, (void)run;
+    return vsh_triangles_create_beside(meshes, mesh_count, NULL, run, triangles, error);
+}
+
+vsh_result vsh_triangles_create_beside(const vsh_mesh *meshes, size_t mesh_count, const vsh_solids *solids,
+                                       const vsh_run *run, vsh_triangles **triangles, vsh_error *error) {
+    (void)meshes, (void)mesh_count, (void)solids, (void)run;
     if (triangles != NULL) {
         *triangles = NULL;
     }
@@ -38,6 +44,10 @@ vsh_result vshi_triangles_of_quads(const vshi_quads *quads, const vsh_run *run, 
     (void)quads, (void)run, (void)held, (void)job;
     *triangles = NULL;
     return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "surface: this library was built without Embree");
+}
+
+void vshi_triangles_own_solids(vsh_triangles *triangles) {
+    (void)triangles;
 }
 
 void vsh_triangles_free(vsh_triangles *triangles) {
@@ -96,6 +106,13 @@ static void place(vsh_triangles *triangles, const double low[3], const double hi
     triangles->size = 2.0 * half;
 }
 
+static void grow(double low[3], double high[3], const double at[3]) {
+    for (int axis = 0; axis < 3; ++axis) {
+        low[axis] = at[axis] < low[axis] ? at[axis] : low[axis];
+        high[axis] = at[axis] > high[axis] ? at[axis] : high[axis];
+    }
+}
+
 static void measure(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count) {
     double low[3] = {DBL_MAX, DBL_MAX, DBL_MAX}, high[3] = {-DBL_MAX, -DBL_MAX, -DBL_MAX};
     for (size_t m = 0; m < mesh_count; ++m) {
@@ -103,12 +120,17 @@ static void measure(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mes
             vshi_vec corner[3];
             vshi_mesh_triangle(&meshes[m], i, corner);
             for (int k = 0; k < 3; ++k) {
-                const double at[3] = {corner[k].x, corner[k].y, corner[k].z};
-                for (int axis = 0; axis < 3; ++axis) {
-                    low[axis] = at[axis] < low[axis] ? at[axis] : low[axis];
-                    high[axis] = at[axis] > high[axis] ? at[axis] : high[axis];
-                }
+                grow(low, high, (double[]){corner[k].x, corner[k].y, corner[k].z});
             }
+        }
+    }
+    const size_t parts = triangles->solids != NULL ? vshi_solids_part_count(triangles->solids) : 0;
+    for (size_t k = 0; k < parts; ++k) {
+        double least[3], most[3];
+        vshi_solids_part_box(triangles->solids, k, least, most);
+        if (least[0] <= most[0]) {
+            grow(low, high, least);
+            grow(low, high, most);
         }
     }
     memcpy(triangles->low, low, sizeof low);
@@ -292,6 +314,9 @@ static vsh_result build(vsh_triangles *triangles, const vshi_mesh_set *set, vshi
             return vshi_job_fail_cancelled(job, error);
         }
     }
+    if (triangles->solids != NULL && !vshi_triangles_attach_solids(triangles)) {
+        return refuse(triangles, job, error);
+    }
     VSHI_TRY(finish(triangles, job, error));
     return vshi_job_advance(job, 1) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
 }
@@ -343,6 +368,11 @@ vsh_result vshi_triangles_of_quads(const vshi_quads *quads, const vsh_run *run, 
 
 vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
                                 vsh_triangles **triangles, vsh_error *error) {
+    return vsh_triangles_create_beside(meshes, mesh_count, NULL, run, triangles, error);
+}
+
+vsh_result vsh_triangles_create_beside(const vsh_mesh *meshes, size_t mesh_count, const vsh_solids *solids,
+                                       const vsh_run *run, vsh_triangles **triangles, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(triangles);
     *triangles = NULL;
@@ -364,6 +394,8 @@ vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const
     VSHI_TRY_DONE(vshi_mesh_set_solve(&set, &full, error));
     VSHI_TRY_DONE(vshi_sieves_create(made, set.meshes, set.count, &full, bytes, error));
     made->limit = full.memory_limit;
+    made->solids = solids;
+    made->mesh_count = mesh_count;
     measure(made, set.meshes, set.count);
     job = vshi_job_begin(&full, "triangles", 1);
     if (job == NULL) {
@@ -382,9 +414,16 @@ done:
     return result;
 }
 
+void vshi_triangles_own_solids(vsh_triangles *triangles) {
+    triangles->owns_solids = true;
+}
+
 void vsh_triangles_free(vsh_triangles *triangles) {
     if (triangles == NULL) {
         return;
+    }
+    if (triangles->owns_solids) {
+        vsh_solids_free((vsh_solids *)(uintptr_t)triangles->solids);
     }
     if (triangles->scene != NULL) {
         triangles->embree->rtcReleaseScene(triangles->scene);

@@ -28,6 +28,9 @@ typedef struct vshi_quads {
 vsh_result vshi_triangles_of_quads(const vshi_quads *quads, const vsh_run *run, double held, vshi_job *job,
                                    vsh_triangles **triangles, vsh_error *error);
 
+/* Frees the solids that the triangles were created beside together with them. */
+void vshi_triangles_own_solids(vsh_triangles *triangles);
+
 /* Whether each of `count` rays meets a triangle. Thread safe. */
 void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
                             bool *blocked);

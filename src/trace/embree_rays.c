@@ -195,6 +195,9 @@ void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *b
         for (int layer = 0; near && layer < LAYERS && !cut[b] && next_hit(triangles, &beam, from, &hit);
              ++layer) {
             const double distance = (double)hit.ray.tfar;
+            if (hit.hit.geomID >= triangles->mesh_count) {
+                break;
+            }
             const uint32_t triangle = triangles->first[hit.hit.geomID] + hit.hit.primID;
             cut[b] = !vshi_sieve_is(triangles, hit.hit.geomID) &&
                      vshi_sheet_cuts(&triangles->sheet, &beam, triangle, distance, most);

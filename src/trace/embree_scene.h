@@ -28,6 +28,10 @@
     CALL(rtcReleaseDevice)                                                                                   \
     CALL(rtcReleaseGeometry)                                                                                 \
     CALL(rtcReleaseScene)                                                                                    \
+    CALL(rtcSetGeometryBoundsFunction)                                                                       \
+    CALL(rtcSetGeometryIntersectFunction)                                                                    \
+    CALL(rtcSetGeometryOccludedFunction)                                                                     \
+    CALL(rtcSetGeometryUserPrimitiveCount)                                                                   \
     CALL(rtcSetDeviceMemoryMonitorFunction)                                                                  \
     CALL(rtcSetGeometryIntersectFilterFunction)                                                              \
     CALL(rtcSetGeometryOccludedFilterFunction)                                                               \
@@ -81,10 +85,17 @@ struct vsh_triangles {
     struct vshi_sieve *sieves; /* [sieve_count], of the geometries; NULL: none lets rays through */
     size_t sieve_count, texture_count, sieve_bytes;
     vshi_texture *textures;
+    const vsh_solids *solids; /* beside the triangles; may be NULL. Geometries after those of the meshes have
+                               * no triangles in the sheet */
+    bool owns_solids;
+    size_t mesh_count;
     uint64_t limit; /* bytes that Embree may hold; 0: no limit */
     atomic_llong bytes;
     atomic_bool refused;
 };
+
+/* Adds triangles->solids to the scene as one geometry; false where Embree refuses: its error says why. */
+bool vshi_triangles_attach_solids(vsh_triangles *triangles);
 
 /* Rays that are traced at a time, where the machine has vectors so wide; else half as many, twice. On the
  * cloister, towards a sun of 5°, a ray takes 36 ns alone, 15 of eight and 9.5 of sixteen that are told to go

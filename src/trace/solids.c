@@ -11,6 +11,7 @@
 #include "base/vec.h"
 #include "sdf/shapes.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -28,6 +29,8 @@ typedef struct member {
     double inverse[12]; /* world to local */
     double scale;       /* local to world */
     vshi_vec low, high; /* box, world; inside out where it is empty */
+    vshi_vec centre;    /* these two of a sphere, world; else the radius is 0 */
+    double radius;
 } member;
 
 struct vsh_solids {
@@ -114,6 +117,10 @@ static void add_members(vsh_solids *solids, const vsh_sdf_node *nodes, int32_t r
     }
     grow(&solids->low, &solids->high, m->low);
     grow(&solids->low, &solids->high, m->high);
+    if (node->shape == VSH_SDF_SPHERE) {
+        m->centre = vshi_transform_point(transform, vshi_vec_of(node->translation));
+        m->radius = m->scale * node->scale * node->radius;
+    }
 }
 
 /* Copies a tree that has been checked; there is room for all of its nodes as members. */
@@ -224,30 +231,60 @@ static bool clip(const member *m, const vshi_segment_ray *ray, double *begin, do
     return *begin <= *end;
 }
 
-static bool meets(const member *m, const vshi_segment_ray *ray, double hit) {
+static double meet_sphere(const member *m, const vshi_segment_ray *ray, double hit) {
+    const vshi_vec to = vshi_sub(m->centre, vshi_vec_of(ray->origin)), d = vshi_vec_of(ray->direction);
+    const double along = vshi_dot(to, d), radius = m->radius + hit;
+    const vshi_vec miss = vshi_sub(to, vshi_scale(d, along));
+    const double half = radius * radius - vshi_dot(miss, miss);
+    if (vshi_dot(to, to) <= radius * radius) {
+        return 0.0;
+    }
+    const double t = half >= 0.0 ? along - sqrt(half) : INFINITY;
+    return t >= 0.0 && t <= ray->far ? t : INFINITY;
+}
+
+/* How far the ray goes until it meets the member; infinite where it does not. */
+static double meet(const member *m, const vshi_segment_ray *ray, double hit) {
     double t, end;
+    if (m->radius > 0.0) {
+        return meet_sphere(m, ray, hit);
+    }
     if (!clip(m, ray, &t, &end)) {
-        return false;
+        return INFINITY;
     }
     const vshi_vec origin = vshi_vec_of(ray->origin), direction = vshi_vec_of(ray->direction);
     for (int step = 0; step < MOST_STEPS; ++step) {
         if (t > end) {
-            return false;
+            return INFINITY;
         }
         const double distance = member_distance(m, vshi_add(origin, vshi_scale(direction, t)));
         if (distance <= hit) {
-            return true;
+            break;
         }
         t += distance;
     }
-    return true; /* it has not got away from the surface */
+    return t; /* after the last step it has not got away from the surface */
+}
+
+size_t vshi_solids_part_count(const vsh_solids *solids) {
+    return solids->count;
+}
+
+void vshi_solids_part_box(const vsh_solids *solids, size_t part, double low[3], double high[3]) {
+    const member *m = &solids->members[part];
+    memcpy(low, (double[]){m->low.x, m->low.y, m->low.z}, 3 * sizeof *low);
+    memcpy(high, (double[]){m->high.x, m->high.y, m->high.z}, 3 * sizeof *high);
+}
+
+double vshi_solids_part_meet(const vsh_solids *solids, size_t part, const vshi_segment_ray *ray) {
+    return meet(&solids->members[part], ray, HIT * solids->size);
 }
 
 void vshi_solids_blocked(const vsh_solids *solids, const vshi_segment_ray *rays, size_t count,
                          bool *blocked) {
     for (size_t i = 0; i < count; ++i) {
         for (size_t k = 0; k < solids->count && !blocked[i]; ++k) {
-            blocked[i] = meets(&solids->members[k], &rays[i], HIT * solids->size);
+            blocked[i] = isfinite(vshi_solids_part_meet(solids, k, &rays[i]));
         }
     }
 }

@@ -7,6 +7,13 @@
 #include <stdbool.h>
 #include <vdbshade/trace.h>
 
+/* The parts that all solids are the union of, and the world box of one, inside out where it is empty. */
+size_t vshi_solids_part_count(const vsh_solids *solids);
+void vshi_solids_part_box(const vsh_solids *solids, size_t part, double low[3], double high[3]);
+
+/* How far a ray (unit direction to within 1e-6) goes until it meets a part; infinite where it does not. */
+double vshi_solids_part_meet(const vsh_solids *solids, size_t part, const vshi_segment_ray *ray);
+
 /* Sets blocked[i] where ray i meets a solid; leaves it as it is elsewhere, and does not look where it is set.
  */
 void vshi_solids_blocked(const vsh_solids *solids, const vshi_segment_ray *rays, size_t count, bool *blocked);

@@ -35,6 +35,7 @@ static void quads_free(quads *q) {
     free(q->quads);
 }
 
+static const double GROWN = 0.15; /* voxels */
 static const float *compared;
 
 static int compare_corners(const void *a, const void *b) {
@@ -108,7 +109,7 @@ static vsh_field *rubble(void) {
 
 static void surface_is_closed(void **state) {
     (void)state;
-    const double heights[] = {0.0, VSHI_GROWN, -1.0};
+    const double heights[] = {0.0, GROWN, -1.0};
     vsh_field *seeds = field_of(truth_seeds(), VOXEL, 1.0);
     vsh_field *hollow = hollow_box(VOXEL, 1.1 * VOXEL), *stones = rubble();
     for (size_t i = 0; i < sizeof heights / sizeof heights[0]; ++i) {
@@ -133,12 +134,12 @@ static void corners_lie_on_the_sphere(void **state) {
     (void)state;
     const truth_solid ball = {.shape = TRUTH_SPHERE, .center = {0.1, 0.2, 0.3}, .radius = 0.5};
     vsh_field *field = field_of((truth_scene){&ball, 1}, VOXEL, 1.0);
-    quads q = quads_of(field, VSHI_GROWN);
+    quads q = quads_of(field, GROWN);
     double worst = 0.0;
     for (size_t i = 0; i < q.corner_count; ++i) {
         const float *c = q.corners + 3 * i;
         const vshi_vec p = vshi_to_world(field, (vshi_vec){(double)c[0], (double)c[1], (double)c[2]});
-        const double off = truth_solid_distance(&ball, (double[]){p.x, p.y, p.z}) / VOXEL - VSHI_GROWN;
+        const double off = truth_solid_distance(&ball, (double[]){p.x, p.y, p.z}) / VOXEL - GROWN;
         worst = fmax(worst, fabs(off));
     }
     print_message("corners are within %.4f voxels of the sphere\n", worst);
@@ -172,14 +173,14 @@ static void hold_rays(const vsh_field *field, size_t tries, double reach, double
         random_direction(&counter, d);
         const float at[3] = {(float)p[0], (float)p[1], (float)p[2]};
         const double h = (double)vshi_level_sample(field, 0, at, NULL);
-        if (h < VSHI_GROWN || h > 2.0 || !vshi_surface_clears(field, vshi_vec_of(p))) {
+        if (h < GROWN || h > 2.0 || !vshi_surface_clears(field, vshi_vec_of(p))) {
             continue;
         }
         const vshi_segment_ray ray = {
             .origin = {p[0], p[1], p[2]}, .direction = {d[0], d[1], d[2]}, .far = reach};
         bool blocked;
         vshi_triangles_blocked(field->surface, &ray, 1, &blocked);
-        const double least = least_along(field, vshi_vec_of(p), vshi_vec_of(d), reach) - VSHI_GROWN;
+        const double least = least_along(field, vshi_vec_of(p), vshi_vec_of(d), reach) - GROWN;
         worst = fmax(worst, blocked ? least : -least);
         ++looked;
         blocked_count += blocked;

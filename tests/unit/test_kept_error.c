@@ -1,0 +1,256 @@
+/* Scenes of procedural shapes and level sets keep the error that is asked for, against rays in closed form.
+ */
+#include "analytic.h"
+#include "images.h"
+#include "metrics.h"
+#include "scenes.h"
+
+#include <vdbshade/vdbshade.h>
+
+enum { SIZE = 96, RAYS = 1024, MOST_SOLIDS = 16, FINE = 512 };
+static const double SUN[3] = {-0.5, 0.6, -0.3}, ANGLE = 0.08726646259971647, AO_DISTANCE = 0.8;
+
+/* Shapes as a scene's text and as the truth has them. */
+typedef struct shapes {
+    char text[4096];
+    truth_solid solids[MOST_SOLIDS];
+    size_t count;
+} shapes;
+
+static void add_shape(shapes *s, const truth_solid *solid) {
+    char *end = s->text + strlen(s->text);
+    const size_t left = sizeof s->text - strlen(s->text);
+    const char *comma = s->count > 0 ? "," : "";
+    const double *c = solid->center, *h = solid->half;
+    int written = 0;
+    if (solid->shape == TRUTH_BOX) {
+        written =
+            snprintf(end, left,
+                     "%s{\"sdf\": {\"shape\": \"box\", \"half_size\": [%g, %g, %g], \"translate\": [%g, "
+                     "%g, %g]}}",
+                     comma, h[0], h[1], h[2], c[0], c[1], c[2]);
+    } else if (solid->shape == TRUTH_SPHERE) {
+        written = snprintf(end, left, "%s{\"spheres\": [[%g, %g, %g, %g]], \"voxelised\": true}", comma, c[0],
+                           c[1], c[2], solid->radius);
+    } else {
+        written = snprintf(end, left,
+                           "%s{\"sdf\": {\"shape\": \"torus\", \"radius\": %g, \"tube_radius\": %g, "
+                           "\"translate\": [%g, %g, %g]}}",
+                           comma, solid->radius, solid->minor_radius, c[0], c[1], c[2]);
+    }
+    assert_true(written > 0 && (size_t)written < left && s->count < MOST_SOLIDS);
+    s->solids[s->count++] = *solid;
+}
+
+static void add_box(shapes *s, double x, double y, double z, double half_x, double half_y, double half_z) {
+    add_shape(s, &(truth_solid){TRUTH_BOX, {x, y, z}, {half_x, half_y, half_z}, 0.0, 0.0});
+}
+
+static void add_plate(shapes *s, double half) {
+    add_box(s, 0.0, -0.25, 0.0, half, 0.25, half);
+}
+
+static void make_touching(shapes *s) {
+    add_plate(s, 3.0);
+    add_shape(s, &(truth_solid){TRUTH_SPHERE, {0.0, 0.5, 0.0}, {0.0, 0.0, 0.0}, 0.5, 0.0});
+    add_box(s, 1.2, 0.4, 0.3, 0.4, 0.4, 0.4);
+}
+
+static void make_posts(shapes *s) {
+    add_plate(s, 3.0);
+    for (int i = 0; i < 9; ++i) {
+        add_box(s, 1.2 * (i % 3 - 1), 0.5, i / 3 - 1.0, 0.02, 0.5, 0.02);
+    }
+}
+
+static void make_frames(shapes *s) {
+    add_plate(s, 3.0);
+    add_box(s, -1.0, 1.0, 0.0, 0.04, 1.0, 0.04);
+    add_box(s, 1.0, 1.0, 0.0, 0.04, 1.0, 0.04);
+    add_box(s, 0.0, 2.0, 0.0, 1.04, 0.04, 0.04);
+    add_shape(s, &(truth_solid){TRUTH_TORUS, {1.2, 0.6, 1.2}, {0.0, 0.0, 0.0}, 0.5, 0.05});
+}
+
+static void make_far_plane(shapes *s) {
+    add_plate(s, 8.0);
+    add_box(s, 0.0, 1.05, 0.0, 0.6, 0.6, 0.6);
+    add_shape(s, &(truth_solid){TRUTH_SPHERE, {0.2, 2.3, 0.1}, {0.0, 0.0, 0.0}, 0.35, 0.0});
+}
+
+typedef struct baked {
+    float shadow[FINE * FINE], ao[FINE * FINE], valid[FINE * FINE];
+    double shadow_error, ao_error; /* estimates */
+} baked;
+
+static void take_plane(const vsh_image *image, const char *name, int size, float *plane) {
+    for (int32_t c = 0; c < image->channel_count; ++c) {
+        if (strcmp(image->names[c], name) == 0) {
+            memcpy(plane, image->planes[c], (size_t)size * (size_t)size * sizeof *plane);
+            return;
+        }
+    }
+    fail_msg("no channel %s", name);
+}
+
+/* Bakes casters onto the floor of the seeds' scene. */
+static void bake(const char *casters, double max_error, int size, baked *b) {
+    char text[8192];
+    snprintf(
+        text, sizeof text,
+        "{\"casters\": [%s], \"lights\": [{\"name\": \"sun\", \"type\": \"directional\", \"direction\": "
+        "[%g, %g, %g], \"angle_deg\": 5}], \"ao\": {\"distance\": %g}, \"max_error\": %g, \"receivers\": "
+        "[{\"mesh\": \"%s/seeds_floor.obj\", \"size\": %d, \"output\": \"%s\"}]}",
+        casters, SUN[0], SUN[1], SUN[2], AO_DISTANCE, max_error, VSH_ASSETS, size, at("out.exr"));
+    vsh_scene *scene = parse(at("scene.json"), text);
+    vsh_bake_job *job;
+    vsh_error error;
+    assert_ok(vsh_bake_job_create(scene, NULL, NULL, &job, &error), &error);
+    assert_ok(vsh_bake_job_measure(job, NULL, &error), &error);
+    assert_ok(vsh_bake_job_prepare(job, NULL, &error), &error);
+    assert_ok(vsh_bake_job_run(job, NULL, &error), &error);
+    vsh_bake_report report;
+    vsh_bake_job_get_report(job, &report);
+    b->shadow_error = vsh_bake_error_rmse(&report.errors[0]);
+    b->ao_error = vsh_bake_error_rmse(&report.errors[1]);
+    vsh_bake_job_free(job);
+    vsh_scene_free(scene);
+    vsh_image_file *file;
+    assert_ok(vsh_image_read(at("out.exr"), NULL, &file, &error), &error);
+    const vsh_image image = vsh_image_view(file);
+    take_plane(&image, "shadow.sun", size, b->shadow);
+    take_plane(&image, "ao", size, b->ao);
+    take_plane(&image, "A", size, b->valid);
+    vsh_image_free(file);
+}
+
+static void check(const char *what, double max_error, const float *values, const float *truth,
+                  const float *valid, double estimate) {
+    const truth_metrics m = truth_compare(SIZE * SIZE, values, truth, valid);
+    if (!(m.rmse <= max_error) || !(estimate >= 0.8 * m.rmse)) {
+        fail_msg("%s: %g is asked, %g is the error, %g the estimate", what, max_error, m.rmse, estimate);
+    }
+}
+
+static void procedural_scenes_keep_the_error_that_is_asked_for(void **state) {
+    (void)state;
+    static const struct {
+        const char *name;
+        void (*make)(shapes *s);
+    } scenes[] = {{"touching", make_touching},
+                  {"posts", make_posts},
+                  {"frames", make_frames},
+                  {"far plane", make_far_plane}};
+    static const double up[3] = {0.0, 1.0, 0.0}, errors[] = {0.02, 0.005};
+    static float shadow[SIZE * SIZE], ao[SIZE * SIZE];
+    static double points[SIZE * SIZE][3];
+    static baked b;
+    for (size_t i = 0; i < SIZE * SIZE; ++i) {
+        points[i][0] = -2.5 + 5.0 * ((double)(i % SIZE) + 0.5) / SIZE;
+        points[i][1] = 1e-5;
+        points[i][2] = -2.5 + 5.0 * ((double)(i / SIZE) + 0.5) / SIZE;
+    }
+    for (size_t k = 0; k < sizeof scenes / sizeof scenes[0]; ++k) {
+        shapes s = {.count = 0};
+        scenes[k].make(&s);
+        const truth_scene truth = {s.solids, s.count};
+        truth_lights(truth, SIZE * SIZE, points[0], up, SUN, tan(0.5 * ANGLE), INFINITY, RAYS, shadow);
+        for (size_t i = 0; i < SIZE * SIZE; ++i) {
+            ao[i] = (float)truth_ao(truth, points[i], up, AO_DISTANCE, RAYS);
+        }
+        for (size_t e = 0; e < sizeof errors / sizeof errors[0]; ++e) {
+            char what[64];
+            bake(s.text, errors[e], SIZE, &b);
+            snprintf(what, sizeof what, "%s, shadow", scenes[k].name);
+            check(what, errors[e], b.shadow, shadow, b.valid, b.shadow_error);
+            snprintf(what, sizeof what, "%s, AO", scenes[k].name);
+            check(what, errors[e], b.ao, ao, b.valid, b.ao_error);
+        }
+    }
+}
+
+/* A box and a sphere in a level set of 0.0117; beside it a plane of 16 units, whose voxels would be larger.
+ */
+static void a_level_set_keeps_its_voxels_beside_a_large_plane(void **state) {
+    (void)state;
+    static baked alone, beside;
+    char text[1024];
+    vsh_sdf_node nodes[3] = {vsh_sdf_node_default(), vsh_sdf_node_default(), vsh_sdf_node_default()};
+    nodes[0].shape = VSH_SDF_BOX;
+    nodes[0].size[0] = nodes[0].size[1] = nodes[0].size[2] = 0.6;
+    nodes[0].translation[1] = 1.05;
+    nodes[1].radius = 0.35;
+    nodes[1].translation[1] = 2.3;
+    nodes[2].shape = VSH_SDF_UNION;
+    nodes[2].left = 0;
+    nodes[2].right = 1;
+    const vsh_sdf sdf = {nodes, 3};
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = 0.0117;
+    vsh_grid *grid;
+    vsh_error error;
+    assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &error), &error);
+    assert_ok(vsh_grid_write(grid, at("shape.vdb"), NULL, NULL, 0, &error), &error);
+    vsh_grid_free(grid);
+    snprintf(text, sizeof text, "{\"vdb\": \"%s\"}", at("shape.vdb"));
+    bake(text, 0.005, SIZE, &alone);
+    snprintf(
+        text, sizeof text,
+        "{\"vdb\": \"%s\"}, {\"sdf\": {\"shape\": \"plane\", \"half_size\": [8, 8], \"thickness\": 0.5}}",
+        at("shape.vdb"));
+    bake(text, 0.005, SIZE, &beside);
+    assert_true(truth_compare(SIZE * SIZE, alone.shadow, beside.shadow, NULL).rmse < 0.005);
+}
+
+/* Mean square of second differences along rows first … last - 1, where the truth is within a penumbra. */
+static double bend(const float *values, const float *truth, int first, int last) {
+    double sum = 0.0;
+    size_t count = 0;
+    for (int row = first; row < last; ++row) {
+        const float *v = values + (size_t)row * FINE, *t = truth + (size_t)row * FINE;
+        for (int i = 1; i + 1 < FINE; ++i) {
+            if (t[i] > 0.0005f && t[i] < 0.9995f) {
+                const double second = (double)v[i - 1] - 2.0 * (double)v[i] + (double)v[i + 1];
+                sum += second * second;
+                ++count;
+            }
+        }
+    }
+    assert_true(count > 1000);
+    return sum / (double)count;
+}
+
+static void penumbrae_rise_smoothly_at_their_ends(void **state) {
+    (void)state;
+    enum { FIRST = 200, LAST = 240 };
+    static const double up[3] = {0.0, 1.0, 0.0};
+    static baked b;
+    static float truth[FINE * FINE];
+    static double points[FINE * FINE][3];
+    shapes s = {.count = 0};
+    make_far_plane(&s);
+    bake(s.text, 0.02, FINE, &b);
+    for (int i = FIRST * FINE; i < LAST * FINE; ++i) {
+        points[i][0] = -2.5 + 5.0 * ((double)(i % FINE) + 0.5) / FINE;
+        points[i][1] = 1e-5;
+        points[i][2] = -2.5 + 5.0 * ((double)(i / FINE) + 0.5) / FINE;
+    }
+    const size_t from = FIRST * FINE;
+    truth_lights((truth_scene){s.solids, s.count}, (LAST - FIRST) * FINE, points[from], up, SUN,
+                 tan(0.5 * ANGLE), INFINITY, 4 * RAYS, truth + from);
+    const double ratio = sqrt(bend(b.shadow, truth, FIRST, LAST) / bend(truth, truth, FIRST, LAST));
+    if (!(ratio < 1.3)) {
+        fail_msg("second differences are %g times those of the truth", ratio);
+    }
+}
+
+int main(void) {
+    if (!vsh_triangles_available()) {
+        return 0;
+    }
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(procedural_scenes_keep_the_error_that_is_asked_for),
+        cmocka_unit_test(penumbrae_rise_smoothly_at_their_ends),
+        cmocka_unit_test(a_level_set_keeps_its_voxels_beside_a_large_plane),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
