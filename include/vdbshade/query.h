@@ -34,8 +34,9 @@ typedef struct vsh_query_output {
     float *distance;          /* [count], of the point itself (no start offset), signed, world units: negative
                                  inside; NaN where the position is not finite */
     float *gradient; /* [count][3], unit: the direction in which the distance grows, next to a surface
-                        its normal. 0, 0, 0 where the field has none: beyond its reach, at the middle
-                        of a sphere. NaN where the position is not finite */
+                        its normal, beyond the finest band within some degrees. 0, 0, 0 where the field
+                        has none: beyond its reach, at the middle of a sphere. NaN where the position is
+                        not finite */
     size_t stride;   /* bytes from one point's value to the next in every array, a multiple of 4, at
                         least 4, with `gradient` 12; 0: as above, without gaps */
 } vsh_query_output;

@@ -1,5 +1,6 @@
 #include "bake/solid.h"
 
+#include "field/field.h"
 #include "heightfield/heights.h"
 #include "shade/occluders.h"
 #include "spheres/sphere_tree.h"
@@ -30,11 +31,21 @@ static void lower(float *distance, float other) {
     *distance = other < *distance ? other : *distance; /* NaN stays */
 }
 
+/* The nearest estimate, not the lower bound of vsh_field_sample(): its differences give normals. */
+static void sample_field(const vsh_field *field, size_t count, const double *positions, float *distances) {
+    for (size_t i = 0; i < count; ++i) {
+        const vshi_vec p = vshi_to_field(field, positions + 3 * i);
+        const float at[3] = {(float)p.x, (float)p.y, (float)p.z};
+        const bool known = vshi_finite(p) && !field->unknown;
+        distances[i] = known ? (float)((double)vshi_field_distance(field, at) * field->voxel_size) : NAN;
+    }
+}
+
 void vshi_solid_sample(const vshi_solid *solid, size_t count, const double *positions, float *distances) {
-    vsh_field_sample(solid->fields[0], count, positions, distances);
+    sample_field(solid->fields[0], count, positions, distances);
     for (size_t f = 1; f < solid->field_count; ++f) {
         float other[VSHI_SOLID_MOST];
-        vsh_field_sample(solid->fields[f], count, positions, other);
+        sample_field(solid->fields[f], count, positions, other);
         for (size_t i = 0; i < count; ++i) {
             lower(&distances[i], other[i]);
         }

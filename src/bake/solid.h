@@ -17,7 +17,7 @@ enum { VSHI_SOLID_MOST = 512 }; /* positions at a time */
 
 vshi_solid vshi_solid_of(const vsh_occluders *occluders);
 
-/* Signed distance, world units, to whichever field or sphere is nearest, as vsh_field_sample(); at most
+/* Signed distance, world units, to whichever field or sphere is nearest; at most
  * VSHI_SOLID_MOST positions [count][3]. Heights have none. */
 void vshi_solid_sample(const vshi_solid *solid, size_t count, const double *positions, float *distances);
 

@@ -109,23 +109,43 @@ static inline float vshi_level_sample(const vsh_field *field, int32_t l, const f
  * of the band: this much of a band is left to the next level, voxels. */
 #define VSHI_BAND_EDGE 0.5f
 
-/* Signed distance at a field-space position from the finest level that resolves it, finest voxels. Where
- * `gradient` is not NULL, it is that level's cell's own; zero beyond the reach. */
-static inline float vshi_field_sample(const vsh_field *field, const float p[3], float gradient[3]) {
+/* Error of a trilinear sample, voxels: the distance is 1-Lipschitz and a cell's centre is √3/2 from its
+ * corners. */
+#define VSHI_SLACK 0.87f
+/* A distance is semiconcave away from the surface: its second derivatives are at most 1/d (Cannarsa and
+ * Sinestrari, "Semiconcave functions", 2004). So Jensen's inequality bounds a trilinear sample's excess by
+ * half the mean square distance to the corners, 3/8 voxel², over the least d in the cell. */
+#define VSHI_CURVATURE 0.375f
+/* How far a value of a coarse level may be above the distance at its own place, voxels of the level. Coarse
+ * values are distances to surface points that were found, which are not always the nearest. The finest
+ * level's are exact but for vshi_level.rounding. Values within solids may be off by twice as much: where
+ * solids overlap, a finest value may be the distance to a triangle inside the union, which a coarse level
+ * does not know. Checked on all voxels of the cloister at 512 voxels: 19 of 5.4 million free balls were too
+ * large within solids, by up to 0.25 voxels, and none of 12.7 million outside. */
+#define VSHI_NODE 0.3f
+
+/* Whether a sample of a level is beyond what that level resolves. */
+static inline bool vshi_level_saturated(const vshi_level *level, float h) {
+    const float resolved = level->band - VSHI_BAND_EDGE * level->scale;
+    return h >= resolved || h <= -resolved;
+}
+
+/* Signed distance at a field-space position from the finest level that resolves it, finest voxels. Coarser
+ * levels' samples can be too large: see vshi_field_lower_bound(). */
+static inline float vshi_field_distance(const vsh_field *field, const float p[3]) {
     float h = 0.0f;
     for (int32_t l = 0; l < field->level_count; ++l) {
-        const float resolved = field->levels[l].band - VSHI_BAND_EDGE * field->levels[l].scale;
-        h = vshi_level_sample(field, l, p, gradient);
-        if (h < resolved && h > -resolved) {
+        h = vshi_level_sample(field, l, p, NULL);
+        if (!vshi_level_saturated(&field->levels[l], h)) {
             break;
         }
     }
     return h;
 }
 
-static inline float vshi_field_distance(const vsh_field *field, const float p[3]) {
-    return vshi_field_sample(field, p, NULL);
-}
+/* The same for callers who march by it: beyond the finest band |distance| is a lower bound. Where `gradient`
+ * is not NULL, it points the way in which the distance grows; zero beyond the reach. */
+float vshi_field_lower_bound(const vsh_field *field, const float p[3], float gradient[3]);
 
 /* World position to field space, in double precision. */
 static inline vshi_vec vshi_to_field(const vsh_field *field, const double position[3]) {

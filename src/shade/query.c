@@ -61,7 +61,7 @@ static void measure(const query_call *call, size_t count, const double *position
         const bool finite = vshi_finite(p);
         const float at[3] = {(float)p.x, (float)p.y, (float)p.z};
         float slope[3];
-        const float h = vshi_field_sample(field, at, gradients != NULL ? slope : NULL);
+        const float h = vshi_field_lower_bound(field, at, gradients != NULL ? slope : NULL);
         if (distances != NULL) {
             distances[i] = finite ? (float)((double)h * field->voxel_size) : NAN;
         }

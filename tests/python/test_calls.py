@@ -284,7 +284,8 @@ class Memory(Case):
         self.assertSame(query.points(positions)["shadow"], want)
         self.assertSame(numpy.array(positions_of_mesh), copy)
         self.assertEqual(mesh.name, "floor")
-        self.assertAlmostEqual(float(field.sample([[0, 0.75, 0]])[0]), -0.5, delta=0.05)
+        depth = -float(field.sample([[0, 0.75, 0]])[0])  # a lower bound, so deep inside
+        self.assertTrue(0.4 < depth <= 0.5, depth)
         del filler
 
     def grows(self, function, times):

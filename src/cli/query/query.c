@@ -45,7 +45,7 @@ static const cli_option options[] = {
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
     {0, NULL, NULL, "What is answered"},
     CLI_LIGHT_OPTIONS,
-    {KEY_DISTANCE, "distance", NULL, "also distance: to the nearest surface, scene units,\nnegative inside"},
+    {KEY_DISTANCE, "distance", NULL, "also distance: to the nearest surface, scene units,\nnegative inside; far away a lower bound"},
     {KEY_GRADIENT, "gradient", NULL,
      "also gradient.x, .y, .z: unit, the way that distance\ngrows; next to a surface its normal"},
     CLI_ACCURACY_OPTIONS,
