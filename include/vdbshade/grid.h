@@ -100,7 +100,8 @@ VSH_API vsh_result vsh_grid_from_distances(const vsh_distance *field, vsh_distan
                                            const vsh_grid_options *options, const vsh_run *run,
                                            vsh_grid **grid, vsh_error *error);
 
-/* Reads level set `name` of a .vdb file; NULL: the first grid of class level set. Translated, rotated,
+/* Reads level set `name` of a .vdb file; NULL: the first grid of class level set that has a surface and can
+ * cast, with a warning that names the others. Translated, rotated,
  * mirrored and uniformly scaled transforms are kept, with voxels of 1e-5 … 1e12 world units. Where the
  * values are no distances, or the band is narrower than 3 voxels, distances are made anew from the zero
  * surface, with a warning; one is given, too, where values show damage. OpenVDB's reader can crash on damaged

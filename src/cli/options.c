@@ -2,6 +2,7 @@
 #include "options.h"
 
 #include "message.h"
+#include "paths.h"
 #include "text.h"
 
 #include <getopt.h>
@@ -208,6 +209,12 @@ static bool abbreviated(const cli_option *option, char **argv, const char *value
 
 static char *parsed_command;  /* of the process's one command line at a time */
 static size_t parsed_options; /* bytes of it before its operands */
+static char *parsed_file;     /* FILE.vdb of an operand FILE.vdb:NAME */
+static const char *parsed_grid;
+
+const char *cli_parsed_grid(void) {
+    return parsed_grid;
+}
 
 const char *cli_parsed_command(void) {
     return parsed_command != NULL ? parsed_command : "";
@@ -282,7 +289,18 @@ static void append_option(const cli_option *option, const char *value) {
 
 int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
               const char *what, const char **operand, bool *help) {
-    return cli_parse_operands(command, argc, argv, take, settings, &what, operand, 1, help);
+    const int code = cli_parse_operands(command, argc, argv, take, settings, &what, operand, 1, help);
+    parsed_grid = code == CLI_OK && !*help ? cli_grid_name(*operand) : NULL;
+    if (parsed_grid != NULL) {
+        free(parsed_file);
+        parsed_file = strndup(*operand, (size_t)(parsed_grid - 1 - *operand));
+        if (parsed_file == NULL) {
+            return cli_out_of_memory("file name");
+        }
+        *operand = parsed_file;
+        cli_message_input(parsed_file);
+    }
+    return code;
 }
 
 int cli_parse_operands(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,

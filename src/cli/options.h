@@ -54,6 +54,9 @@ typedef int cli_option_fn(void *settings, int key, const char *name, const char 
 int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
               const char *what, const char **operand, bool *help);
 
+/* Of an operand FILE.vdb:NAME, which cli_parse() gives as FILE.vdb, the NAME; else NULL. */
+const char *cli_parsed_grid(void);
+
 /* The last command line that was parsed, as outputs tell it: without options that change no value (threads,
  * limits, output, …), and files by their names alone. Belongs to the parser; "" where memory was short. */
 const char *cli_parsed_command(void);

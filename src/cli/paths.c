@@ -30,6 +30,14 @@ bool cli_has_ending_of(const char *path, const char *endings) {
     return false;
 }
 
+const char *cli_grid_name(const char *path) {
+    const char *colon = NULL;
+    for (const char *at = strchr(path, ':'); at != NULL; at = strchr(at + 1, ':')) {
+        colon = at - path > 4 && strncasecmp(at - 4, ".vdb", 4) == 0 ? at : colon;
+    }
+    return colon != NULL && access(path, F_OK) != 0 ? colon + 1 : NULL;
+}
+
 /* Folder resolved, last part as it is. */
 static bool absolute(const char *path, char *result, size_t capacity) {
     char folder[PATH_MAX], real[PATH_MAX];

@@ -11,6 +11,9 @@ bool cli_has_ending(const char *path, const char *ending);
 /* Whether it ends in one of these, which blanks part. */
 bool cli_has_ending_of(const char *path, const char *endings);
 
+/* The NAME of FILE.vdb:NAME, the file's grid; NULL for any other path, and if a file has the whole name. */
+const char *cli_grid_name(const char *path);
+
 /* Endings of the meshes and the images that are read. */
 #define CLI_MODEL_ENDINGS "obj gltf glb fbx dae ply stl"
 #define CLI_IMAGE_ENDINGS                                                                                    \

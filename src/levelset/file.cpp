@@ -170,10 +170,47 @@ double shell_of(const GridBase &grid) {
 
 namespace {
 
-size_t choose_level_set(GridReader &reader, const char *path, const char *name, vsh_error *error) {
-    return choose(reader, path, name, error, [&](size_t i) {
+// Whether a grid has no leaf. A tree is read only if the file says that no voxel is active.
+bool is_empty(GridReader &reader, size_t i, const char *path, vsh_error *error) {
+    const auto voxels =
+        reader.metadata(i).getMetadata<openvdb::Int64Metadata>(GridBase::META_FILE_VOXEL_COUNT);
+    const bool suspect = voxels ? voxels->value() == 0 : reader.is_streamed();
+    return suspect && !has_leaves(*reader.grid(i, path, error));
+}
+
+struct Choice {
+    size_t grid;
+    std::string others; // level sets that were passed over, with what is wrong with them
+};
+
+// Without a name the first level set that can cast; else the first, to be refused with its reason.
+Choice choose_level_set(GridReader &reader, const char *path, const char *name, vsh_error *error) {
+    const size_t first = choose(reader, path, name, error, [&](size_t i) {
         return class_of(reader.metadata(i)) == GridBase::gridClassToString(openvdb::GRID_LEVEL_SET);
     });
+    Choice choice{first, ""};
+    bool found = name != nullptr;
+    for (size_t i = first; name == nullptr && i < reader.count(); ++i) {
+        const GridBase::Ptr bare = reader.without_tree(i);
+        if (bare->getGridClass() != openvdb::GRID_LEVEL_SET) {
+            continue;
+        }
+        const Finding kind = examine_kind(*bare);
+        const std::string wrong = kind.kind == Finding::BAD          ? kind.text
+                                  : is_empty(reader, i, path, error) ? "it is empty"
+                                                                     : "";
+        if (!found && wrong.empty()) {
+            choice.grid = i;
+            found = true;
+            continue;
+        }
+        choice.others += (choice.others.empty() ? "'" : ", '") + reader.name(i) + "'" +
+                         (wrong.empty() ? "" : " (" + wrong + ")");
+    }
+    if (!found) {
+        choice.others.clear();
+    }
+    return choice;
 }
 
 // A part of a grid. Where there is nothing in the box there is something in a larger one.
@@ -199,7 +236,7 @@ BBoxd told_level_set_box(const char *path, const char *name, const vsh_run &run,
     initialize();
     try {
         GridReader reader(path, run, error);
-        const size_t chosen = choose_level_set(reader, path, name, error);
+        const size_t chosen = choose_level_set(reader, path, name, error).grid;
         const GridBase::Ptr grid = reader.without_tree(chosen);
         const openvdb::CoordBBox box = told_box(*grid);
         const Vec3d half(0.5);
@@ -217,7 +254,8 @@ LevelSet load_level_set(const char *path, const char *name, const BBoxd *box, St
     initialize();
     try {
         GridReader reader(path, stage.options, error);
-        const size_t chosen = choose_level_set(reader, path, name, error);
+        const Choice choice = choose_level_set(reader, path, name, error);
+        const size_t chosen = choice.grid;
         LevelSet loaded{{path, reader.name(chosen)}, nullptr, 0.0};
         if (box == nullptr) {
             refuse_large(loaded.named, stage.options, reader.bytes(chosen), error);
@@ -227,6 +265,11 @@ LevelSet load_level_set(const char *path, const char *name, const BBoxd *box, St
         refuse_bad(loaded.named, examine_kind(*found), error);
         loaded.grid = to_floats(found);
         loaded.shell = shell_of(*found);
+        if (!choice.others.empty()) {
+            vshi_warn(&stage.options,
+                      "%s casts; the file's other level sets do not: %.700s; pick one as %s:NAME",
+                      loaded.named.text().c_str(), choice.others.c_str(), path);
+        }
         return loaded;
     } catch (const std::ios_base::failure &) {
         throw Failure{fail_cut_short(path, error)};

@@ -4,6 +4,9 @@
 #include "scene/transform.h"
 #include "scene/tree.h"
 
+#include <string.h>
+#include <strings.h>
+#include <unistd.h>
 #include <vdbshade/settings.h>
 
 enum {
@@ -62,6 +65,27 @@ static vsh_result read_spheres(vshi_json *reader, const vshi_value *value, void 
     return VSH_OK;
 }
 
+/* FILE.vdb, or FILE.vdb:NAME: the file's grid NAME. A file whose own name holds a colon is that file. */
+static vsh_result read_vdb(vshi_json *reader, const vshi_value *value, void *member) {
+    static const vshi_key path = {.kind = VSHI_PATH};
+    vsh_caster *caster = member;
+    VSHI_TRY(vshi_read_value(reader, value, &path, &caster->path));
+    const char *colon = NULL;
+    for (const char *at = strchr(caster->path, ':'); at != NULL; at = strchr(at + 1, ':')) {
+        colon = at - caster->path > 4 && strncasecmp(at - 4, ".vdb", 4) == 0 ? at : colon;
+    }
+    if (colon != NULL && access(caster->path, F_OK) != 0) {
+        const size_t length = (size_t)(colon - caster->path);
+        char *file;
+        VSHI_TRY(vshi_json_allocate(reader, (void **)&file, length + 1, 1, "file name"));
+        memcpy(file, caster->path, length);
+        file[length] = '\0';
+        caster->grid = colon + 1;
+        caster->path = file;
+    }
+    return VSH_OK;
+}
+
 static const vshi_key caster_keys[] = {
     {.name = "mesh", .kind = VSHI_PATH, .variants = MESH, .offset = offsetof(vsh_caster, path)},
     {.name = "objects",
@@ -83,7 +107,7 @@ static const vshi_key caster_keys[] = {
      .variants = SDF,
      .offset = offsetof(vsh_caster, sdf),
      .read = vshi_read_sdf},
-    {.name = "vdb", .kind = VSHI_PATH, .variants = VDB, .offset = offsetof(vsh_caster, path)},
+    {.name = "vdb", .kind = VSHI_CUSTOM, .variants = VDB, .read = read_vdb},
     {.name = "grid", .kind = VSHI_STRING, .variants = VDB, .offset = offsetof(vsh_caster, grid)},
     {.name = "heightfield", .kind = VSHI_PATH, .variants = HEIGHTFIELD, .offset = offsetof(vsh_caster, path)},
     {.name = "size",

@@ -56,3 +56,34 @@ setup() {
     refused 2 out.vdb
     untouched out.vdb
 }
+
+@test "FILE.vdb:GRID names a grid wherever a .vdb is read; a file of that whole name is the file" {
+    "$VDBSHADE" voxelize box.obj -o box.vdb --name hull --voxel-size 0.1 --quiet
+    printf '0.1,0.2,2\n0,3,0\n' >points.csv
+    printf 'v -3 -1 -3\nv 3 -1 -3\nv 3 -1 3\nv -3 -1 3\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 1 0\n%s\n' \
+        'f 1/1/1 4/4/1 3/3/1 2/2/1' >floor.obj
+    for grid in box.vdb box.vdb:hull box.vdb:other; do
+        printf '{"casters": [{"vdb": "%s"}], "lights": [{"name": "sun", "type": "directional", "angle_deg": 1, "direction": [0, 1, 0]}],
+            "receivers": [{"mesh": "floor.obj", "size": 8, "output": "scene.exr"}]}' $grid >scene.json
+        for command in "query $grid --points points.csv --distance -o out.csv" "voxelize $grid -o out.vdb" \
+            "volume $grid --sun 0,1,0 -o out.vdb" "render $grid --sun 0,1,0 --size 32x32 -o out.png" "info $grid" \
+            "query scene.json --points points.csv -o out.csv" "bake scene.json" \
+            "bake floor.obj --caster $grid --sun 0,1,0 --size 8 -o out.exr" "field $grid -o out.field"; do
+            rm -f out.*
+            # shellcheck disable=SC2086
+            shade $command
+            if [ $grid = box.vdb:other ]; then
+                refused 2 box.vdb "no grid 'other'; it holds 'hull'"
+            else
+                [ "$status" -eq 0 ] || fail "$command: $stderr"
+            fi
+        done
+    done
+    shade query no.vdb:hull --points points.csv --distance -o out.csv
+    refused 3 no.vdb
+    mv box.vdb 'a.vdb:hull.vdb'
+    shade query a.vdb:hull.vdb --points points.csv --distance -o out.csv
+    done_well
+    shade query a.vdb:hull.vdb:hull --points points.csv --distance -o out.csv
+    done_well
+}

@@ -65,6 +65,59 @@ void grids_are_listed_and_found_by_name(void **) {
                 {path.c_str(), "'Sphere'", "'density', 'velocity', 'sphere'"});
 }
 
+// Two balls, an empty level set in front of them and one that is scaled unevenly.
+std::string several(const char *file, bool streamed) {
+    const FloatGrid::Ptr nothing = FloatGrid::create(0.15f), skewed = ball<FloatGrid>(0.5, 3.0f),
+                         first = ball<FloatGrid>(0.5, 3.0f), second = ball<FloatGrid>(1.0, 3.0f);
+    nothing->setGridClass(openvdb::GRID_LEVEL_SET);
+    nothing->setTransform(first->transform().copy());
+    nothing->setName("nothing");
+    skewed->setTransform(openvdb::math::Transform::createLinearTransform(
+        openvdb::math::Mat4d(1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1)));
+    skewed->setName("skewed");
+    first->setName("first");
+    second->setName("second");
+    if (!streamed) {
+        return save(file, {nothing, skewed, first, second});
+    }
+    std::ofstream out(in_folder(file), std::ios::binary);
+    openvdb::io::Stream(out).write(openvdb::GridCPtrVec{nothing, skewed, first, second});
+    return in_folder(file);
+}
+
+void the_first_level_set_that_can_cast_is_taken_and_the_others_are_named(void **) {
+    for (const bool streamed : {false, true}) {
+        const std::string path = several("several.vdb", streamed);
+        Warnings warnings;
+        vsh_grid *grid = nullptr, *named = nullptr;
+        assert_said(vsh_grid_read(path.c_str(), nullptr, &warnings.run, &grid, &failure), VSH_OK, {});
+        assert_int_equal(warnings.lines.size(), 1);
+        for (const char *part : {"'first' casts", "'nothing' (it is empty)", "'skewed' (voxel size 1 x 2 x 1",
+                                 "'second'", "several.vdb:NAME"}) {
+            if (warnings.lines[0].find(part) == std::string::npos) {
+                fail_msg("'%s' is not in '%s'", part, warnings.lines[0].c_str());
+            }
+        }
+        Warnings none;
+        assert_said(vsh_grid_read(path.c_str(), "first", &none.run, &named, &failure), VSH_OK, {});
+        assert_true(none.lines.empty());
+        assert_same(grid, named);
+        vsh_grid_free(grid);
+        vsh_grid_free(named);
+    }
+}
+
+void where_no_level_set_can_cast_the_first_ones_reason_is_given(void **) {
+    const FloatGrid::Ptr one = FloatGrid::create(0.15f), other = FloatGrid::create(0.15f);
+    one->setGridClass(openvdb::GRID_LEVEL_SET);
+    one->setName("one");
+    other->setGridClass(openvdb::GRID_LEVEL_SET);
+    vsh_grid *grid = nullptr;
+    const std::string path = save("empty.vdb", {one, other});
+    assert_said(vsh_grid_read(path.c_str(), nullptr, nullptr, &grid, &failure), VSH_ERROR_INPUT,
+                {"grid 'one'", "it is empty"});
+}
+
 void what_is_no_vdb_file_is_not_read(void **) {
     vsh_grid *grid = nullptr;
     const std::string path = in_folder("not.vdb");
@@ -244,6 +297,8 @@ int main() {
         cmocka_unit_test(a_written_grid_comes_back_bit_for_bit),
         cmocka_unit_test(openvdb_reads_what_is_written),
         cmocka_unit_test(grids_are_listed_and_found_by_name),
+        cmocka_unit_test(the_first_level_set_that_can_cast_is_taken_and_the_others_are_named),
+        cmocka_unit_test(where_no_level_set_can_cast_the_first_ones_reason_is_given),
         cmocka_unit_test(what_is_no_vdb_file_is_not_read),
         cmocka_unit_test(what_casts_no_shadows_is_refused),
         cmocka_unit_test(voxels_too_small_for_openvdb_are_refused_and_the_least_come_back),

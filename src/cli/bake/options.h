@@ -58,7 +58,10 @@ enum {
     }
 
 #define CLI_CASTER_OPTION                                                                                    \
-    { CLI_KEY_CASTER, "caster", "FILE", "another mesh or .vdb that casts shadows; may be\nrepeated" }
+    {                                                                                                        \
+        CLI_KEY_CASTER, "caster", "FILE",                                                                    \
+            "another mesh or .vdb (FILE.vdb:GRID) that casts\nshadows; may be repeated"                      \
+    }
 
 #define CLI_CASTER_OPTIONS                                                                                   \
     {0, NULL, NULL, "Casters and voxels"}, CLI_CASTER_OPTION, {                                              \
@@ -112,6 +115,7 @@ typedef struct cli_bake_scene {
     vsh_scene scene;
     vsh_scene *read; /* the scene file's; NULL for a mesh */
     vsh_caster *casters;
+    char *caster_files[CLI_MAX_EXTRA_CASTERS]; /* FILE.vdb of each --caster FILE.vdb:NAME */
     vsh_receiver *receivers;
     char **outputs;        /* [receiver_count], where they are not the scene's own; NULL: none is */
     vsh_light *lights;     /* [scene.light_count], where they are not all the scene file's */

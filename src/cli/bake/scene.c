@@ -21,6 +21,23 @@ static vsh_selection selection(const cli_patterns *only, const cli_patterns *exc
                            except->count};
 }
 
+/* Caster i's file and grid: of the input, or of the (i - own)th --caster. */
+static int name_caster(const cli_bake_settings *s, cli_bake_scene *made, size_t i, size_t own) {
+    vsh_caster *caster = &made->casters[i];
+    if (i < own) {
+        caster->path = s->input;
+        caster->grid = cli_parsed_grid();
+        return CLI_OK;
+    }
+    const char *given = s->casters[i - own];
+    caster->path = given;
+    caster->grid = cli_grid_name(given);
+    if (caster->grid != NULL) {
+        caster->path = made->caster_files[i - own] = strndup(given, (size_t)(caster->grid - 1 - given));
+    }
+    return caster->path != NULL ? CLI_OK : cli_out_of_memory("casters");
+}
+
 /* The input's casters, then those of --caster. */
 static int add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
     const size_t own = made->read != NULL ? made->read->caster_count : 1;
@@ -33,7 +50,7 @@ static int add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
         if (i < own && made->read != NULL) {
             made->casters[i] = made->read->casters[i];
         } else {
-            made->casters[i].path = i < own ? s->input : s->casters[i - own];
+            CLI_TRY(name_caster(s, made, i, own));
             made->casters[i].type =
                 cli_has_ending(made->casters[i].path, "vdb") ? VSH_CASTER_VDB : VSH_CASTER_MESH;
             set_identity(made->casters[i].transform);
@@ -361,6 +378,9 @@ void cli_bake_scene_free(cli_bake_scene *made) {
     free_outputs(made);
     free(made->receivers);
     free(made->casters);
+    for (size_t i = 0; i < CLI_MAX_EXTRA_CASTERS; ++i) {
+        free(made->caster_files[i]);
+    }
     free(made->lights);
     vsh_field_file_close(made->field);
     vsh_scene_free(made->read);

@@ -16,6 +16,8 @@ static const struct {
 } files[] = {
     {"query", "INPUT", CLI_MODEL_ENDINGS " json vdb"},
     {"volume", "INPUT", CLI_MODEL_ENDINGS " json vdb"},
+    {"voxelize", "INPUT", CLI_MODEL_ENDINGS " json vdb"},
+    {"render", "INPUT", CLI_MODEL_ENDINGS " json vdb"},
     {"unwrap", "INPUT", CLI_MODEL_ENDINGS},
     {"view", "INPUT", CLI_MODEL_ENDINGS},
     {"view", "OTHER", CLI_MODEL_ENDINGS},

@@ -27,9 +27,9 @@ const cli_command cli_info = {
     "FILE",
     "Prints what a file holds and what is wrong with it. Meshes: objects, triangles, UV sets, bounds,\n"
     "open, flipped and degenerate parts, what they are taken for, UVs that overlap within or between\n"
-    "objects. OpenVDB files (.vdb): class, voxel size, band, bounds, memory of each grid, and why it\n"
-    "cannot cast. Scenes (.json): casters, lights, receivers. Images: size, and the range of each\n"
-    "channel. Files of 'vdbshade field': voxels, levels, and what they were made of.",
+    "objects. OpenVDB files (FILE.vdb, or FILE.vdb:GRID): class, voxel size, band, bounds, memory of\n"
+    "each grid, and why it cannot cast. Scenes (.json): casters, lights, receivers. Images: size, and\n"
+    "the range of each channel. Files of 'vdbshade field': voxels, levels, and what they were made of.",
     options,
     sizeof options / sizeof options[0],
     info_main};
@@ -55,7 +55,7 @@ static int print_info(const char *path, const cli_info_look *look, const vsh_run
         return cli_info_field(path, run);
     }
     if (cli_has_ending(path, "vdb")) {
-        return cli_info_vdb(path, run);
+        return cli_info_vdb(path, cli_parsed_grid(), run);
     }
     if (cli_has_ending(path, "json")) {
         return cli_info_scene(path, run);

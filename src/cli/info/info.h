@@ -25,7 +25,7 @@ void cli_info_summary(const vsh_model *model);
 /* How those of its meshes that have UVs share an image. */
 int cli_info_uvs(const vsh_model *model, const vsh_mesh *meshes, size_t count, const cli_info_look *look,
                  const vsh_run *run);
-int cli_info_vdb(const char *path, const vsh_run *run);
+int cli_info_vdb(const char *path, const char *name, const vsh_run *run); /* name NULL: all grids */
 int cli_info_scene(const char *path, const vsh_run *run);
 int cli_info_field(const char *path, const vsh_run *run);
 int cli_info_image(const char *path, const vsh_run *run);

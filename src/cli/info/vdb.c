@@ -46,7 +46,17 @@ static void print_grid(const vsh_vdb_entry *grid) {
     }
 }
 
-int cli_info_vdb(const char *path, const vsh_run *run) {
+static void say_names(const char *path, const char *name, const vsh_vdb_entry *entries, size_t count) {
+    char names[700] = "";
+    size_t used = 0;
+    for (size_t i = 0; i < count && used < sizeof names; ++i) {
+        used +=
+            (size_t)snprintf(names + used, sizeof names - used, "%s'%s'", i > 0 ? ", " : "", entries[i].name);
+    }
+    cli_say("%s: no grid '%s'; it holds %s", path, name, names);
+}
+
+int cli_info_vdb(const char *path, const char *name, const vsh_run *run) {
     vsh_vdb_entry *entries = calloc(MAX_LISTED, sizeof *entries);
     if (entries == NULL) {
         cli_say("%s: the system refused memory", path);
@@ -58,13 +68,23 @@ int cli_info_vdb(const char *path, const vsh_run *run) {
         free(entries);
         return cli_fail(&error);
     }
-    for (size_t i = 0; i < count && i < MAX_LISTED; ++i) {
-        print_grid(&entries[i]);
+    const size_t listed = count < MAX_LISTED ? count : MAX_LISTED;
+    size_t shown = 0;
+    for (size_t i = 0; i < listed; ++i) {
+        if (name == NULL || strcmp(entries[i].name, name) == 0) {
+            print_grid(&entries[i]);
+            ++shown;
+        }
+    }
+    if (name != NULL && shown == 0) {
+        say_names(path, name, entries, listed);
+        free(entries);
+        return CLI_USAGE;
     }
     if (count == 0) {
         printf("problem: no grids\n");
     }
-    if (count > MAX_LISTED) {
+    if (count > MAX_LISTED && name == NULL) {
         printf("… and %zu more grids\n", count - MAX_LISTED);
     }
     free(entries);

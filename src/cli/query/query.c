@@ -45,7 +45,8 @@ static const cli_option options[] = {
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
     {0, NULL, NULL, "What is answered"},
     CLI_LIGHT_OPTIONS,
-    {KEY_DISTANCE, "distance", NULL, "also distance: to the nearest surface, scene units,\nnegative inside; far away a lower bound"},
+    {KEY_DISTANCE, "distance", NULL,
+     "also distance: to the nearest surface, scene units,\nnegative inside; far away a lower bound"},
     {KEY_GRADIENT, "gradient", NULL,
      "also gradient.x, .y, .z: unit, the way that distance\ngrows; next to a surface its normal"},
     CLI_ACCURACY_OPTIONS,
@@ -64,9 +65,9 @@ const cli_command cli_query = {
     "query",
     "INPUT --points FILE -o OUT [options]",
     "Answers at points what a light's shadow, ambient occlusion and the distance are there. INPUT is a\n"
-    "mesh file, a .vdb level set or a scene file (.json; its lights and ao, not its receivers). Bad rows\n"
-    "are told by number and answered nan. Formats and columns: docs/query.md. Numbers in brackets are\n"
-    "what holds without the option.",
+    "mesh file, a level set (FILE.vdb, FILE.vdb:GRID) or a scene file (.json; its lights and ao, not its\n"
+    "receivers). Bad rows are reported by number and answered nan. Formats and columns: docs/query.md.\n"
+    "Numbers in brackets are the defaults.",
     options,
     sizeof options / sizeof options[0],
     query_main};

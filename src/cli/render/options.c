@@ -64,9 +64,9 @@ static const cli_option options[] = {
 const cli_command cli_render = {
     "render",
     "INPUT -o OUT [options]",
-    "Draws a picture of INPUT, a mesh file or a scene file (.json), with the shadows and AO that bake\n"
-    "would give: for looking at a scene or a lightmap. No materials but a caster's color; docs/render.md\n"
-    "says more. Numbers in brackets are what holds without the option.",
+    "Draws a picture of INPUT, a mesh file, a level set (FILE.vdb, FILE.vdb:GRID) or a scene (.json),\n"
+    "with the shadows and AO that bake would give: for looking at a scene or a lightmap. No materials but\n"
+    "a caster's color; docs/render.md says more. Numbers in brackets are the defaults.",
     options,
     sizeof options / sizeof options[0],
     cli_render_main};

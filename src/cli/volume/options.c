@@ -52,25 +52,22 @@ static const cli_option options[] = {
 const cli_command cli_volume = {
     "volume",
     "INPUT -o OUT.vdb [options]",
-    "Bakes soft shadows and ambient occlusion into sparse grids. INPUT is a mesh file, a .vdb level set\n"
-    "or a scene file (.json; its casters, lights and ao, not its receivers). What is written, and how it\n"
-    "is to be read: docs/volume.md. Numbers in brackets are what holds without the option.",
+    "Bakes soft shadows and ambient occlusion into sparse grids. INPUT is a mesh file, a level set\n"
+    "(FILE.vdb, FILE.vdb:GRID) or a scene file (.json; its casters, lights and ao, not its receivers).\n"
+    "What is written, and how to read it: docs/volume.md. Numbers in brackets are the defaults.",
     options,
     sizeof options / sizeof options[0],
     volume_main};
 
-/* FILE.vdb:GRID: cut behind the ending, as names of files and grids may both hold a colon. */
 static int take_like(volume_settings *s, const char *name, const char *value) {
     if (value[0] == '\0' || strlen(value) >= sizeof s->like_text) {
         return cli_usage("%s '%.60s': expected FILE.vdb or FILE.vdb:GRID", name, value);
     }
     strcpy(s->like_text, value);
     s->like = s->like_text;
-    s->like_grid = NULL;
-    char *colon = strstr(s->like_text, ".vdb:");
-    if (colon != NULL) {
-        colon[4] = '\0';
-        s->like_grid = colon + 5;
+    s->like_grid = cli_grid_name(value);
+    if (s->like_grid != NULL) {
+        s->like_text[s->like_grid - 1 - value] = '\0';
     }
     return s->like_grid == NULL || s->like_grid[0] != '\0'
                ? CLI_OK

@@ -39,8 +39,8 @@ static int voxelize_main(int argc, char **argv);
 const cli_command cli_voxelize = {
     "voxelize",
     "INPUT -o OUT.vdb [options]",
-    "Turns a mesh file, or all casters of a scene file (.json), into one narrow-band level set.\n"
-    "Numbers in brackets are what holds without the option.",
+    "Turns a mesh file, a level set (FILE.vdb or FILE.vdb:GRID), or all casters of a scene file (.json)\n"
+    "into one narrow-band level set. Numbers in brackets are what holds without the option.",
     options,
     sizeof options / sizeof options[0],
     voxelize_main};
@@ -145,11 +145,15 @@ static int voxelize_main(int argc, char **argv) {
         return cli_usage("%s: give -o OUT.vdb", s.output != NULL ? s.output : s.input);
     }
     cli_progress_begin(s.common.progress, s.common.quiet);
-    const vsh_caster mesh = {
-        .type = VSH_CASTER_MESH, .path = s.input, .transform = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
+    const bool vdb = cli_has_ending(s.input, "vdb");
+    vsh_caster caster = vsh_caster_default();
+    caster.type = vdb ? VSH_CASTER_VDB : VSH_CASTER_MESH;
+    caster.path = s.input;
+    caster.grid = cli_parsed_grid();
     vsh_scene scene = vsh_scene_default();
-    scene.casters = &mesh;
+    scene.casters = &caster;
     scene.caster_count = 1;
+    scene.grid.resolution = vdb ? 0 : scene.grid.resolution; /* its own voxels */
     vsh_scene *read = NULL;
     if (cli_has_ending(s.input, "json")) {
         const vsh_run run = cli_common_run(&s.common);
