@@ -114,9 +114,15 @@ typedef struct vsh_measures {
     double shift[3];         /* x, y, z, texels: what stands at p in golden stands at p + shift in new */
     double explained;        /* share of the squared difference that vanishes when that is undone */
     vsh_region lost, gained; /* the largest of each */
+    double noise;            /* standard error of the differences that neighbours along edges do not share */
+    double noise_share;      /* its share of the squared difference. Noise excuses lost and gained regions as
+                              * vsh_compare_options.noise does, and from a quarter on penumbrae and widths */
+    double curve[3][2];      /* golden and new value at 1/4, 1/2 and 3/4 of golden's range, if a curve (gamma,
+                              * exposure) explains 98 % of the squared difference that is no noise; else 0.
+                              * Penumbrae, edges, shift and regions are then what differs besides the curve */
 } vsh_measures;
 
-/* Measures how far values are from golden ones. Takes 22 bytes a value beside the caller's; runs under the
+/* Measures how far values are from golden ones. Takes 26 bytes a value beside the caller's; runs under the
  * stage "compare". The same bits for any number of threads. Errors:
  * - VSH_ERROR_ARGUMENT: compared, its planes or measures NULL, sizes, options out of range, run;
  * - VSH_ERROR_LIMIT: run->memory_limit;
@@ -226,7 +232,8 @@ typedef struct vsh_compare_files_options {
     double limits[VSH_MEASURE_COUNT]; /* of all channels */
     double coverage_limit;            /* covered texels that may be in one file alone, as a share */
     double threshold, step;           /* as of vsh_compare_options */
-    double noise; /* as of vsh_limits_allow_noise(); NaN: by the max errors of the files where these differ */
+    double noise;    /* as of vsh_limits_allow_noise(); NaN: by the max errors of the files, where
+                      * these or their methods, samplers or frames differ */
     int32_t reach;   /* as of vsh_compare_options */
     int32_t padding; /* 1: what is not covered is compared too */
     /* Sees the values of each channel that was measured, which hold until it returns; `index` is the

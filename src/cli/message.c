@@ -15,6 +15,15 @@
 #include <unistd.h>
 
 static const char *input;
+static char last_line[1024];
+
+const char *cli_last_message(void) {
+    return last_line;
+}
+
+void cli_keep_message(const char *line) {
+    snprintf(last_line, sizeof last_line, "%s", line);
+}
 
 static const struct {
     vsh_result result;
@@ -37,6 +46,7 @@ static void __attribute__((format(printf, 1, 0))) say(const char *format, va_lis
     vsnprintf(line, sizeof line, format, arguments);
     vshi_one_line(line);
     cli_plain(line, strlen(line));
+    cli_keep_message(line);
     cli_progress_line(line);
 }
 

@@ -18,6 +18,10 @@ enum {
 /* "vdbshade: …" as one line: control characters become '?'. */
 void cli_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
+/* The last line that was printed so, or by a child, without "vdbshade: "; "" at first. */
+const char *cli_last_message(void);
+void cli_keep_message(const char *line);
+
 /* As cli_say(), and returns CLI_USAGE. This and the next tell the warnings that were kept before. */
 int cli_usage(const char *format, ...) __attribute__((format(printf, 1, 2)));
 

@@ -72,7 +72,7 @@ static vsh_result check(const vsh_compared *compared, const vsh_compare_options 
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "noise of %g: expected 0 … 1", options->noise);
     }
     /* the caller's values and mask, then ours */
-    const double bytes = count * (9.0 + 1.0 + VSHI_SHIFT_SCRATCH + VSHI_REGIONS_SCRATCH);
+    const double bytes = count * (9.0 + 1.0 + VSHI_CURVE_SCRATCH + VSHI_SHIFT_SCRATCH + VSHI_REGIONS_SCRATCH);
     return vshi_check_limit(run, bytes, "comparison", error);
 }
 
@@ -112,7 +112,7 @@ void vshi_pair_make(const vsh_compared *compared, uint8_t *mask, vshi_pair *pair
 /* --- the measures, each a piece of the work */
 
 typedef struct work {
-    const vshi_pair *pair;
+    const vshi_pair *pair, *shapes; /* the latter with golden on the curve of causes.c */
     const vsh_compare_options *options;
     vsh_measures *measures;
     uint8_t *scratch;
@@ -122,11 +122,12 @@ typedef struct work {
 static const struct {
     vshi_measure_fn *take;
     size_t scratch;
-} parts[] = {{vshi_measure_regions, VSHI_REGIONS_SCRATCH},
-             {vshi_measure_shift, VSHI_SHIFT_SCRATCH},
-             {vshi_measure_ssim, 0},
-             {vshi_measure_edges, 0},
-             {vshi_measure_values, 0}};
+    bool shapes; /* it compares shapes, whatever the curve over the values */
+} parts[] = {{vshi_measure_regions, VSHI_REGIONS_SCRATCH, true},
+             {vshi_measure_shift, VSHI_SHIFT_SCRATCH, true},
+             {vshi_measure_ssim, 0, false},
+             {vshi_measure_edges, 0, true},
+             {vshi_measure_values, 0, false}};
 enum { PARTS = sizeof parts / sizeof parts[0] };
 
 static void take_parts(void *user, size_t begin, size_t end) {
@@ -136,8 +137,9 @@ static void take_parts(void *user, size_t begin, size_t end) {
         for (size_t k = 0; k < i; ++k) {
             before += parts[k].scratch * w->pair->count;
         }
+        const vshi_pair *pair = parts[i].shapes ? w->shapes : w->pair;
         w->results[i] =
-            parts[i].take(w->pair, w->options, w->scratch + before, w->measures) ? VSH_OK : VSH_ERROR_MEMORY;
+            parts[i].take(pair, w->options, w->scratch + before, w->measures) ? VSH_OK : VSH_ERROR_MEMORY;
     }
 }
 
@@ -168,20 +170,25 @@ vsh_result vsh_compare_sized(const vsh_compared *compared, const vsh_compare_opt
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     VSHI_TRY(check(compared, options, &full, &chosen, error));
     const size_t count = (size_t)compared->size[0] * (size_t)compared->size[1] * (size_t)compared->size[2];
-    void *mask = NULL, *scratch = NULL;
+    void *mask = NULL, *scratch = NULL, *mapped = NULL;
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate(&mask, count, 1, "comparison", error));
     VSHI_TRY_DONE(
         vshi_allocate(&scratch, count, VSHI_SHIFT_SCRATCH + VSHI_REGIONS_SCRATCH, "comparison", error));
+    VSHI_TRY_DONE(vshi_allocate(&mapped, count, VSHI_CURVE_SCRATCH, "comparison", error));
     vshi_pair pair;
     vsh_measures m;
     vshi_pair_make(compared, mask, &pair, &m);
-    work w = {&pair, &chosen, &m, scratch, {VSH_OK}};
+    vshi_pair shapes = pair;
+    work w = {&pair, &shapes, &chosen, &m, scratch, {VSH_OK}};
     if (m.count > 0) {
+        vshi_find_noise(&pair, &m);
+        vshi_follow_curve(&shapes, mapped, scratch, &m);
         VSHI_TRY_DONE(take_all(&w, &full, error));
     }
     vshi_give(measures, measures_size, &m, sizeof m);
 done:
+    free(mapped);
     free(scratch);
     free(mask);
     return result;

@@ -28,6 +28,7 @@ enum { OUTLIERS = 8 };      /* so many values at each end of the range are not l
 enum { FEWEST_EDGES = 16 }; /* below it they say nothing of a bake */
 
 static const double LOW = 0.1, HIGH = 0.9;
+static const double LEAST_NOISE = 0.25; /* of the squared difference: what penumbrae alone come to is less */
 static const double MOST_ROOM = 0.3;    /* of the range, that each mark gives way */
 static const double LEAST_RANGE = 0.05; /* between the darkest and the lightest: less is no shadow */
 static const double REACH = 2.0;        /* texels that a pair's edges may stand apart, however narrow */
@@ -222,7 +223,7 @@ static void keep_smallest(double kept[OUTLIERS], double v) {
 }
 
 /* What counts as dark and as light. */
-static bool find_sides(const vshi_pair *pair, const vsh_compare_options *options, line *l) {
+static bool find_sides(const vshi_pair *pair, double threshold, double noise, line *l) {
     double dark[OUTLIERS], light[OUTLIERS]; /* the latter with the other sign */
     for (int i = 0; i < OUTLIERS; ++i) {
         dark[i] = light[i] = INFINITY;
@@ -234,7 +235,7 @@ static bool find_sides(const vshi_pair *pair, const vsh_compare_options *options
         }
     }
     const double range = -light[0] - dark[0];
-    const double room = fmin(vshi_no_difference(options->threshold, options), MOST_ROOM * range);
+    const double room = fmin(vshi_no_difference(threshold, noise), MOST_ROOM * range);
     l->sides = (marks){dark[0] + LOW * range, dark[0] + HIGH * range};
     l->closer = (marks){l->sides.low + room, l->sides.high - room};
     return range >= LEAST_RANGE; /* not where there are fewer values: -inf */
@@ -244,7 +245,10 @@ static double share(uint64_t part, uint64_t of) {
     return of > 0 ? (double)part / (double)of : 0.0;
 }
 
-static void conclude(const tally *t, vsh_measures *m) {
+/* `noise` is what there is beside the limits' own, in units of the range between dark and light. Many texels
+ * of a wide penumbra have many chances to pass a mark, so that the mean width moves as far as a single one.
+ */
+static void conclude(const tally *t, double noise, vsh_measures *m) {
     const uint64_t most = t->edges[0] > t->edges[1] ? t->edges[0] : t->edges[1];
     for (int which = 0; which < 2; ++which) {
         m->edges[which] = t->edges[which];
@@ -257,8 +261,8 @@ static void conclude(const tally *t, vsh_measures *m) {
     }
     if (t->pairs >= FEWEST_EDGES) {
         const double ratio = t->width[VSHI_NEW] / t->width[VSHI_GOLDEN];
-        m->value[VSH_MEASURE_PENUMBRA] = fmax(ratio, 1.0 / ratio) - 1.0;
-        m->value[VSH_MEASURE_WIDTHS] = t->off / t->width[VSHI_GOLDEN];
+        m->value[VSH_MEASURE_PENUMBRA] = fmax(0.0, fmax(ratio, 1.0 / ratio) - 1.0 - VSHI_NOISY_EDGE * noise);
+        m->value[VSH_MEASURE_WIDTHS] = fmax(0.0, t->off / t->width[VSHI_GOLDEN] - VSHI_NOISY_EDGE * noise);
     }
 }
 
@@ -288,7 +292,8 @@ bool vshi_measure_edges(const vshi_pair *pair, const vsh_compare_options *option
     edge *const lists[3] = {edges, edges + longest, edges + 2 * longest};
     tally t = {.pairs = 0};
     line l = {.pair = pair};
-    const bool shadow = find_sides(pair, options, &l);
+    const double noise = m->noise_share >= LEAST_NOISE ? m->noise : 0.0;
+    const bool shadow = find_sides(pair, options->threshold, fmax(noise, options->noise), &l);
     for (int axis = 0; shadow && axis < 3; ++axis) {
         set_axis(&l, axis);
         for (size_t i = 0; i < pair->count; ++i) {
@@ -297,7 +302,7 @@ bool vshi_measure_edges(const vshi_pair *pair, const vsh_compare_options *option
             }
         }
     }
-    conclude(&t, m);
+    conclude(&t, fmax(0.0, noise - options->noise) / ((l.sides.high - l.sides.low) / (HIGH - LOW)), m);
     free(edges);
     return true;
 }

@@ -37,10 +37,22 @@ vsh_result vshi_compare_problem(const vshi_compare_work *work, vsh_error *error,
 
 /* --- one channel */
 
-/* Bakes made to one error cast the same rays and have no noise between them. */
-static double noise_between(const double max_error[2]) {
-    const bool differ = max_error[0] < max_error[1] || max_error[0] > max_error[1]; /* false of NaN */
-    return differ ? sqrt(max_error[0] * max_error[0] + max_error[1] * max_error[1]) : 0.0;
+/* A channel's method, error, sampler and frame, in the file's words. */
+static const char *method_of(const vshi_texts *texts, const char *channel) {
+    char name[VSH_CHANNEL_NAME + 16];
+    snprintf(name, sizeof name, "vdbshade_%.*s", (int)strcspn(channel, "."), channel);
+    size_t i = 0;
+    while (i < texts->count && strcmp(texts->list[i].name, name) != 0) {
+        ++i;
+    }
+    return i < texts->count ? texts->list[i].value : "";
+}
+
+/* Bakes made in one way cast the same rays and have no noise between them. */
+static double noise_between(const vshi_texts texts[2], const char *channel, const double max_error[2]) {
+    const bool known = !isnan(max_error[0]) && !isnan(max_error[1]);
+    const bool differ = strcmp(method_of(&texts[0], channel), method_of(&texts[1], channel)) != 0;
+    return known && differ ? sqrt(max_error[0] * max_error[0] + max_error[1] * max_error[1]) : 0.0;
 }
 
 static void set_limits(const vshi_compare_work *work, const vshi_texts texts[2],
@@ -51,7 +63,9 @@ static void set_limits(const vshi_compare_work *work, const vshi_texts texts[2],
         channel->max_error[which] =
             vsh_provenance_max_error(texts[which].list, texts[which].count, channel->name);
     }
-    vsh_limits_allow_noise(&channel->limits, isnan(o->noise) ? noise_between(channel->max_error) : o->noise);
+    vsh_limits_allow_noise(&channel->limits, isnan(o->noise)
+                                                 ? noise_between(texts, channel->name, channel->max_error)
+                                                 : o->noise);
     channel->coverage_limit = COVERAGE_LIMIT;
     vsh_tolerances_apply(work->tolerances, channel->name, &channel->limits, &channel->coverage_limit);
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {

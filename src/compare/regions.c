@@ -119,7 +119,7 @@ bool vshi_measure_regions(const vshi_pair *pair, const vsh_compare_options *opti
     memset(off, 0, pair->count * sizeof *off);
     look_around(pair, VSHI_NEW, 1.0, (size_t)options->reach, &e, off);
     look_around(pair, VSHI_GOLDEN, -1.0, (size_t)options->reach, &e, off);
-    const double step = vshi_no_difference(options->step, options);
+    const double step = vshi_no_difference(options->step, fmax(options->noise, m->noise));
     uint32_t *stack = (uint32_t *)(planes + 3 * pair->count); /* no texel is on it twice */
     for (size_t i = 0; i < pair->count; ++i) {
         if (fabs((double)off[i]) >= step) {

@@ -82,7 +82,7 @@ static double percentile(const vshi_pair *pairs, size_t pair_count, const tally 
 bool vshi_measure_values(const vshi_pair *pair, const vsh_compare_options *options, void *scratch,
                          vsh_measures *m) {
     (void)scratch;
-    tally t = {.worst = -1.0, .threshold = vshi_no_difference(options->threshold, options)};
+    tally t = {.worst = -1.0, .threshold = vshi_no_difference(options->threshold, options->noise)};
     t.bins = calloc((size_t)2 * BINS, sizeof *t.bins);
     if (t.bins == NULL) {
         return false;

@@ -140,9 +140,15 @@ JSON
     sed -i 's/gone.obj/box.obj/; s/"resolution": 32/"voxel_size": 1e-9/' scenes/broken.json
     regress --update --junit out.xml
     [ "$status" -eq 4 ] || fail "expected 4"
-    [[ $output == "box: "*"broken: failed"*"exit code 4"* ]] || fail "not told"
+    [[ $output == "box: "*"broken: failed"*"exit code 4: "*broken.json*"voxels along"* ]] || fail "not told"
     [ -s scenes/golden/box.exr ] || fail "the other was not baked"
     grep -q 'name="broken/broken.exr" tests="1" failures="1"' out.xml || fail "JUnit"
+    grep -q 'exit code 4: .*voxels along' out.xml || fail "no reason in JUnit"
+    regress --json
+    [[ $output == *'"status": "failed"'*'"exit_code": 4'*'"reason": "'*"voxels along"* ]] || fail "no reason in JSON"
+    echo '{"casters": [' >scenes/unread.json
+    regress --json
+    [[ $output == *'"reason": "'*unread.json:* ]] || fail "no reason in JSON"
     clean
 }
 

@@ -69,6 +69,13 @@ static void set_measures(json_t *root, const vsh_channel_comparison *channel) {
                         json_pack("{s:o,s:o}", "golden", number(m->width[0]), "new", number(m->width[1])));
     json_object_set_new(root, "shift", json_pack("[f,f,f]", m->shift[0], m->shift[1], m->shift[2]));
     json_object_set_new(root, "shift_explains", number(m->explained));
+    json_object_set_new(root, "measured_noise", number(m->noise));
+    json_object_set_new(root, "noise_explains", number(m->noise_share));
+    json_object_set_new(root, "curve",
+                        m->curve[2][0] > 0.0
+                            ? json_pack("[[f,f],[f,f],[f,f]]", m->curve[0][0], m->curve[0][1], m->curve[1][0],
+                                        m->curve[1][1], m->curve[2][0], m->curve[2][1])
+                            : json_null());
     json_object_set_new(root, "lost", region(channel, &m->lost));
     json_object_set_new(root, "gained", region(channel, &m->gained));
 }

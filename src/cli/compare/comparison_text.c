@@ -107,6 +107,17 @@ static void add_failure(text *t, const vsh_channel_comparison *channel, int meas
     }
 }
 
+/* Names noise or a curve that explains most of the difference. */
+static void add_causes(text *t, const vsh_channel_comparison *channel) {
+    const vsh_measures *m = &channel->measures;
+    if (m->curve[2][0] > 0.0) {
+        add(t, "values follow a curve that takes %.2f, %.2f, %.2f to %.2f, %.2f, %.2f: gamma or exposure?",
+            m->curve[0][0], m->curve[1][0], m->curve[2][0], m->curve[0][1], m->curve[1][1], m->curve[2][1]);
+    } else if (m->noise_share >= 0.5 && m->noise > channel->limits.options.noise) {
+        add(t, "noise of %.3g, which is %.0f %% of the squared difference", m->noise, 100.0 * m->noise_share);
+    }
+}
+
 void cli_channel_explain(const vsh_channel_comparison *channel, char *out, size_t capacity) {
     text t = {out, capacity};
     out[0] = '\0';
@@ -127,6 +138,9 @@ void cli_channel_explain(const vsh_channel_comparison *channel, char *out, size_
             add_nonfinite(&t, channel);
         }
         return;
+    }
+    if (channel->failed != 0) {
+        add_causes(&t, channel);
     }
     for (size_t i = 0; i < sizeof by_meaning / sizeof by_meaning[0]; ++i) {
         if ((channel->failed >> by_meaning[i] & 1) != 0) {

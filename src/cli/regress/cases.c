@@ -55,6 +55,7 @@ void regress_free_case(regress_case *one) {
     regress_lines_free(&one->outputs);
     regress_lines_free(&one->inputs);
     free(one->changed);
+    free(one->reason);
     free(one->output);
     free(one->scene);
     free(one->name);
@@ -364,12 +365,18 @@ static int check_unique(const regress_work *work) {
     return CLI_OK;
 }
 
+void regress_mark_failed(regress_case *one, int code) {
+    one->status = REGRESS_FAILED;
+    one->code = code;
+    free(one->reason);
+    one->reason = cli_last_message()[0] != '\0' ? strdup(cli_last_message()) : NULL;
+}
+
 int regress_failed(regress_case *one, int code) {
     if (code != CLI_USAGE && code != CLI_FILE) {
         return code;
     }
-    one->status = REGRESS_FAILED;
-    one->code = code;
+    regress_mark_failed(one, code);
     return CLI_OK;
 }
 

@@ -149,11 +149,14 @@ static int bake_all(regress_work *work) {
             const vsh_error cancelled = {VSH_ERROR_CANCELLED, ""};
             return cli_fail(&cancelled);
         }
-        one->code = regress_bake(work, one);
-        if (one->code == CLI_INTERRUPTED) {
-            return one->code;
+        cli_keep_message("");
+        const int code = regress_bake(work, one);
+        if (code == CLI_INTERRUPTED) {
+            return code;
         }
-        one->status = one->code == CLI_OK ? one->status : REGRESS_FAILED;
+        if (code != CLI_OK) {
+            regress_mark_failed(one, code);
+        }
     }
     return CLI_OK;
 }

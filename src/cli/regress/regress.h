@@ -28,6 +28,7 @@ typedef struct regress_case {
     char *changed;         /* which of them did; NULL: none that is known */
     int status;            /* REGRESS_… */
     int code;              /* of a bake that failed */
+    char *reason;          /* its last error; NULL: none is known */
     cli_comparison *comparisons; /* [outputs.count]; zeroed where there is none */
 } regress_case;
 
@@ -63,6 +64,9 @@ void regress_free_case(regress_case *one);
 /* That a case's options, from the file `list`, only change values. CLI_OK or an exit code, having said why.
  */
 int regress_check_options(const regress_case *one, const char *list);
+
+/* With the last error as the reason. */
+void regress_mark_failed(regress_case *one, int code);
 
 /* A case that cannot be read or written fails by itself, and the others go on: marks it and gives CLI_OK;
  * other codes, which end all, as they are. */

@@ -32,6 +32,12 @@ static void print_updated(const cli_comparison *c, const char *output) {
     }
 }
 
+static const char *failure_of(const regress_case *one, char *text, size_t size) {
+    snprintf(text, size, "the bake ended with exit code %d%s%s", one->code, one->reason != NULL ? ": " : "",
+             one->reason != NULL ? one->reason : "");
+    return text;
+}
+
 static void print_lines(const regress_work *work) {
     for (size_t i = 0; i < work->case_count; ++i) {
         const regress_case *one = &work->cases[i];
@@ -42,7 +48,8 @@ static void print_lines(const regress_work *work) {
         putchar('\n');
         for (size_t k = 0; k < one->outputs.count; ++k) {
             if (one->status == REGRESS_FAILED) {
-                printf("  %s: the bake ended with exit code %d\n", one->outputs.line[k], one->code);
+                char why[1200];
+                printf("  %s: %s\n", one->outputs.line[k], failure_of(one, why, sizeof why));
             } else if (one->status == REGRESS_UPDATED) {
                 print_updated(&one->comparisons[k], one->outputs.line[k]);
             } else if (one->status != REGRESS_UNCHANGED && !one->comparisons[k].alike) {
@@ -62,11 +69,14 @@ static int print_json(const regress_work *work) {
         for (size_t k = 0; k < one->outputs.count && one->comparisons[k].name != NULL; ++k) {
             json_array_append_new(outputs, cli_comparison_json(&one->comparisons[k]));
         }
-        json_array_append_new(cases,
-                              json_pack("{s:o,s:s,s:o,s:o}", "name", cli_utf8_json(one->name), "status",
-                                        status_names[one->status], "changed",
-                                        one->changed != NULL ? cli_utf8_json(one->changed) : json_null(),
-                                        "outputs", outputs));
+        const bool failed = one->status == REGRESS_FAILED;
+        json_array_append_new(
+            cases, json_pack("{s:o,s:s,s:o,s:o,s:o,s:o}", "name", cli_utf8_json(one->name), "status",
+                             status_names[one->status], "changed",
+                             one->changed != NULL ? cli_utf8_json(one->changed) : json_null(), "exit_code",
+                             failed ? json_integer(one->code) : json_null(), "reason",
+                             failed && one->reason != NULL ? cli_utf8_json(one->reason) : json_null(),
+                             "outputs", outputs));
     }
     json_t *root = json_pack("{s:o}", "cases", cases);
     const bool whole = root != NULL && json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) == 0;
@@ -93,7 +103,7 @@ static int write_files(const regress_work *work) {
                 c->alike = one->status == REGRESS_UNCHANGED;
             }
             if (one->status == REGRESS_FAILED && cli_comparison_problem(c, 0) == NULL) {
-                snprintf(c->problem, sizeof c->problem, "the bake ended with exit code %d", one->code);
+                failure_of(one, c->problem, sizeof c->problem);
             }
             all[at++] = *c;
         }
