@@ -37,11 +37,19 @@ typedef struct cli_points_reader {
     bool has_normals, floats; /* floats: positions came as such */
     bool strict;              /* a bad row ends it */
     uint64_t bad;             /* rows so far */
+    /* the vertices of a PLY's faces in the order of its rows, without those that no face has; NULL: normals,
+     * if any, are in the rows */
+    float *face_positions, *face_normals; /* [face_vertices][3] */
+    size_t face_vertices, next;           /* next: to be met */
 } cli_points_reader;
 
 /* Opens a file, or standard input for "-", and reads its header. `normals`: 1 they are there and are taken, 0
  * they are not, -1 where they are there. These return CLI_OK or an exit code, having said why. */
 int cli_points_open(const char *path, int32_t format, int normals, bool strict, cli_points_reader *reader);
+
+/* Gives a PLY's points the normals of its faces, if they have none. Why it did not into error->message: ""
+ * where there are no faces. */
+void cli_points_take_faces(const char *path, const vsh_run *run, cli_points_reader *reader, vsh_error *error);
 
 /* Up to points->room rows; fewer only at the end, or where the room of kept bytes is used up. */
 int cli_points_read(cli_points_reader *reader, size_t most_kept, cli_points *points);

@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <vdbshade/scene.h>
 
 enum { NX = 3 }; /* columns before the normal */
 
@@ -107,7 +108,7 @@ static int keep_fillers(cli_points *points, char delimiter, int missing) {
 static void check_row(const cli_points_reader *reader, vshi_table_row *row) {
     const char *const *names = reader->table.wanted.names;
     bool zero = reader->has_normals;
-    for (int i = 0; i < reader->table.columns; ++i) {
+    for (int i = 0; i < (reader->has_normals ? NX + 3 : NX); ++i) {
         const double value = row->value[i];
         if (!isfinite(value)) {
             snprintf(row->bad, sizeof row->bad, "%s is not finite", names[i]);
@@ -120,7 +121,8 @@ static void check_row(const cli_points_reader *reader, vshi_table_row *row) {
         zero = zero && (i < NX || (float)value == 0.0f);
     }
     if (zero) {
-        snprintf(row->bad, sizeof row->bad, "the normal is zero");
+        snprintf(row->bad, sizeof row->bad, "%s",
+                 reader->face_normals != NULL ? "its faces give it no normal" : "the normal is zero");
     }
 }
 
@@ -139,6 +141,88 @@ static int take_row(const cli_points_reader *reader, const vshi_table_row *row, 
     }
     ++points->count;
     return CLI_OK;
+}
+
+/* --- normals of faces */
+
+/* Sums of the triangles' normals by area at each vertex, and its position. */
+static bool sum_normals(const vsh_mesh *mesh, cli_points_reader *reader) {
+    const size_t count = mesh->vertex_count;
+    float *positions = malloc(count * 3 * sizeof *positions), *normals = malloc(count * 3 * sizeof *normals);
+    double *sums = calloc(count, 3 * sizeof *sums);
+    const bool good = positions != NULL && normals != NULL && sums != NULL;
+    for (size_t t = 0; good && t < mesh->triangle_count; ++t) {
+        const uint32_t *corner = mesh->indices + 3 * t;
+        double a[3], b[3];
+        for (int k = 0; k < 3; ++k) {
+            const double at = (double)mesh->positions[3 * (size_t)corner[0] + (size_t)k];
+            a[k] = (double)mesh->positions[3 * (size_t)corner[1] + (size_t)k] - at;
+            b[k] = (double)mesh->positions[3 * (size_t)corner[2] + (size_t)k] - at;
+        }
+        for (int i = 0; i < 3; ++i) {
+            for (int k = 0; k < 3; ++k) {
+                sums[3 * (size_t)corner[i] + (size_t)k] +=
+                    a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+            }
+        }
+    }
+    for (size_t v = 0; good && v < count; ++v) {
+        const double *s = sums + 3 * v, length = sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
+        for (size_t k = 0; k < 3; ++k) {
+            normals[3 * v + k] = length > 0.0 ? (float)(s[k] / length) : 0.0f;
+            positions[3 * v + k] = mesh->positions[3 * v + k];
+        }
+    }
+    free(sums);
+    reader->face_positions = positions;
+    reader->face_normals = normals;
+    reader->face_vertices = count;
+    return good;
+}
+
+static bool has_faces(const vshi_ply_header *ply) {
+    for (int e = 0; e < ply->elements; ++e) {
+        if (ply->element[e].count > 0 &&
+            (strcmp(ply->element[e].name, "face") == 0 || strcmp(ply->element[e].name, "tristrips") == 0)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+void cli_points_take_faces(const char *path, const vsh_run *run, cli_points_reader *reader,
+                           vsh_error *error) {
+    *error = (vsh_error){VSH_OK, ""};
+    if (reader->has_normals || !has_faces(&reader->table.ply)) {
+        return;
+    }
+    if (strcmp(path, "-") == 0) {
+        snprintf(error->message, sizeof error->message, "those of its faces need a file, not a pipe");
+        return;
+    }
+    vsh_model *model = NULL;
+    if (vsh_model_read(path, run, &model, error) != VSH_OK) {
+        return;
+    }
+    const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
+    reader->has_normals = sum_normals(&mesh, reader);
+    vsh_model_free(model);
+    if (!reader->has_normals) {
+        snprintf(error->message, sizeof error->message, "the system refused memory");
+    }
+}
+
+/* The faces' normal of a row: of the next of their vertices, if that lies there. */
+static void find_normal(cli_points_reader *reader, vshi_table_row *row) {
+    const size_t v = reader->next;
+    bool met = v < reader->face_vertices;
+    for (size_t k = 0; k < 3; ++k) {
+        met = met && (float)row->value[k] == reader->face_positions[3 * v + k];
+    }
+    for (size_t k = 0; k < 3; ++k) {
+        row->value[NX + k] = met ? (double)reader->face_normals[3 * v + k] : 0.0;
+    }
+    reader->next += met;
 }
 
 static int32_t look_for_interrupt(void *user, const char *stage, double fraction) {
@@ -187,6 +271,9 @@ int cli_points_read(cli_points_reader *reader, size_t most_kept, cli_points *poi
         if (row.bytes == NULL) {
             break;
         }
+        if (row.bad[0] == '\0' && reader->face_normals != NULL) {
+            find_normal(reader, &row);
+        }
         if (row.bad[0] == '\0') {
             check_row(reader, &row);
         }
@@ -207,6 +294,9 @@ bool cli_points_can_keep(const cli_points_reader *reader) {
 
 void cli_points_close(cli_points_reader *reader) {
     vshi_table_close(&reader->table);
+    free(reader->face_positions);
+    free(reader->face_normals);
+    reader->face_positions = reader->face_normals = NULL;
     vshi_job_end(reader->job);
     reader->job = NULL;
 }

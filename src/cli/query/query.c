@@ -35,8 +35,9 @@ static const cli_option options[] = {
     {'o', "output", "OUT", "file to write, by the same endings; - is standard output"},
     {KEY_FORMAT, "format", "csv|ply|raw", "what it is, whatever the ending (for -, as the points)"},
     {KEY_NORMALS, "normals", "yes|no",
-     "whether rows have normals, and they are taken (csv and\nply: where there are any; raw: no, rows of 3 "
-     "floats;\nyes: of 6)"},
+     "whether normals are read (csv and ply: if there are any,\na PLY mesh has those of its faces; raw: no, "
+     "rows "
+     "of 3\nfloats; yes: of 6)"},
     {KEY_ANSWERS_ONLY, "answers-only", NULL,
      "write answers alone; else behind each row as it came,\nor (formats differ) behind x y z nx ny nz"},
     {KEY_STRICT, "strict", NULL, "end at the first bad row, with code 2"},
@@ -184,13 +185,14 @@ typedef struct query_work {
 } query_work;
 
 /* What the scene, the options and the points' normals let be asked. */
-static int choose_answers(query_work *work) {
+static int choose_answers(query_work *work, const char *why) {
     const query_settings *s = work->settings;
     query_answers *a = &work->answers;
     vsh_scene *scene = work->scene;
     if (scene->ao && !work->reader.has_normals) {
         if (cli_patch_has(&s->bake.patch, "--ao")) {
-            return cli_usage("%s: no normals, which --ao needs", work->reader.table.source.name);
+            return cli_usage("%s: no normals, which --ao needs%s%s", work->reader.table.source.name,
+                             why[0] != '\0' ? ": " : "", why);
         }
         cli_warn("%s: the points have no normals, so AO is left out", work->reader.table.source.name);
         scene->ao = 0;
@@ -264,10 +266,15 @@ static int run_query(const query_settings *s, vsh_scene *scene) {
     work.stats = cli_stats_begin(CLI_STATS_POINTS, work.run.threads);
     int code = CLI_OK;
     CLI_TRY_DONE(cli_points_open(s->points, s->points_format, s->normals, s->strict, &work.reader));
-    CLI_TRY_DONE(choose_answers(&work));
+    vsh_error why = {VSH_OK, ""};
+    if (s->normals != 0) {
+        cli_points_take_faces(s->points, &work.run, &work.reader, &why);
+    }
+    CLI_TRY_DONE(choose_answers(&work, why.message));
     CLI_TRY_DONE(load(&work));
     CLI_TRY_DONE(make_query(&work));
-    const uint64_t held = work.stats.casters.field_bytes + work.stats.casters.triangles_bytes;
+    const uint64_t held = work.stats.casters.field_bytes + work.stats.casters.triangles_bytes +
+                          work.reader.face_vertices * (uint64_t)sizeof(float[6]);
     CLI_TRY_DONE(query_stream(s, work.query, &work.answers, held, &work.run, &work.reader, &work.stats));
     CLI_TRY_DONE(cli_stats_finish(&work.stats, &work.run, s->bake.stats));
     say_results(&work);
