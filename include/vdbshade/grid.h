@@ -201,6 +201,7 @@ typedef struct vsh_vdb_entry {
     uint64_t bytes;         /* in memory */
     char problem[256];      /* why it cannot cast shadows, or what is odd about it; empty: nothing */
     char attributes[8192];  /* metadata that vdbshade wrote: lines "NAME: VALUE", each with a newline */
+    int32_t mended; /* nonzero: it can cast, as vsh_grid_read() makes its distances anew for `problem` */
 } vsh_vdb_entry;
 
 /* Lists up to `capacity` grids of a .vdb file into `entries` (may be NULL where that is 0), and their

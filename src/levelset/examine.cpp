@@ -106,7 +106,7 @@ struct Census {
     size_t rim = 0, cliffs = 0;            // steps from the band to the background; those far too high
     size_t plateaus = 0;                   // inactive values inside the band
     size_t jumps = 0;                      // between neighbours that no distances can have
-    size_t outer = 0;                      // values beyond the background
+    size_t outer = 0;                      // inactive values beyond the background
     openvdb::Index bad = Leaf::SIZE;       // first value that is not finite
 
     void add(const Census &other) {
@@ -156,7 +156,8 @@ bool is_jump(float a, float b, float background, float voxel) {
            ((!in_a && !in_b) || std::fabs(in_a ? a : b) > (JUMP - 1.0f) * voxel);
 }
 
-void visit_pairs(Census &census, const float *values, openvdb::Index i, float background, float voxel) {
+void visit_pairs(Census &census, const Leaf &leaf, openvdb::Index i, float background, float voxel) {
+    const float *values = leaf.buffer().data();
     constexpr openvdb::Index strides[3] = {64, 8, 1};
     for (const openvdb::Index stride : strides) {
         if ((i / stride) % 8 == 7) {
@@ -164,7 +165,9 @@ void visit_pairs(Census &census, const float *values, openvdb::Index i, float ba
         }
         const float a = values[i], b = values[i + stride];
         const bool in_a = std::fabs(a) < background, in_b = std::fabs(b) < background;
-        census.jumps += is_jump(a, b, background, voxel);
+        // dense grids have distances beyond the background, as active values
+        const bool active = leaf.isValueOn(i) && leaf.isValueOn(i + stride);
+        census.jumps += active ? std::fabs(a - b) > JUMP * voxel : is_jump(a, b, background, voxel);
         if (in_a != in_b) {
             const float outer = std::copysign(background, in_a ? b : a);
             ++census.rim;
@@ -209,9 +212,9 @@ Census visit(const Leaf &leaf, float background, float voxel) {
         }
         census.negative += value < 0.0f;
         census.positive += value > 0.0f;
-        census.outer += std::fabs(value) > BEYOND * background;
+        census.outer += !leaf.isValueOn(i) && std::fabs(value) > BEYOND * background;
         census.plateaus += !leaf.isValueOn(i) && std::fabs(value) < PLATEAU * background;
-        visit_pairs(census, values, i, background, voxel);
+        visit_pairs(census, leaf, i, background, voxel);
         const Coord at = Leaf::offsetToLocalCoord(i);
         const bool surrounded = std::min({at[0], at[1], at[2]}) > 0 && std::max({at[0], at[1], at[2]}) < 7;
         if (surrounded && std::fabs(value) < voxel) {
@@ -342,7 +345,7 @@ Finding examine_values(const FloatGrid &grid, Stage &stage) {
                        all.jumps, double(JUMP));
     }
     if (all.outer > 0) {
-        return finding(Finding::NOTED, "damaged? %zu values are beyond the background %g", all.outer,
+        return finding(Finding::NOTED, "damaged? %zu inactive values are beyond the background %g", all.outer,
                        double(background));
     }
     return {};

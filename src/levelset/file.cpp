@@ -146,7 +146,9 @@ void describe(GridReader &reader, size_t i, const char *path, const vsh_run &run
         entry.background = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid)->background();
     }
     if (entry.problem[0] == '\0') {
-        copy_text(entry.problem, examine_values(*to_floats(grid), stage).text);
+        const Finding finding = examine_values(*to_floats(grid), stage);
+        copy_text(entry.problem, finding.text);
+        entry.mended = finding.kind == Finding::ODD;
     }
 }
 

@@ -58,6 +58,11 @@ void values_that_are_no_distances_are_made_so(void **) {
         assert_int_equal(warnings.lines.size(), 1);
         assert_non_null(std::strstr(warnings.lines[0].c_str(), one.reason));
         assert_true(worst_error(read, RADIUS, one.centre) < 0.1);
+        vsh_vdb_entry entry = {};
+        size_t count = 0;
+        assert_int_equal(vsh_vdb_list(path.c_str(), nullptr, &entry, 1, &count, &failure), VSH_OK);
+        assert_non_null(std::strstr(entry.problem, one.reason));
+        assert_int_equal(entry.mended, 1);
         vsh_grid_free(read);
     }
 }
@@ -109,6 +114,34 @@ std::vector<float> shadows_of(const vsh_grid *grid) {
 }
 
 // Bands of other widths too: narrower ones than 3 voxels are made anew.
+// Distances in all voxels of a box, as arrays become grids: beyond the background, too.
+void dense_distances_are_no_damage(void **) {
+    const FloatGrid::Ptr grid = FloatGrid::create(float(3.0 * VOXEL));
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(VOXEL));
+    auto values = grid->getAccessor();
+    for (int i = 0; i < 64 * 64 * 64; ++i) {
+        const openvdb::Coord at(i / 4096 - 32, i / 64 % 64 - 32, i % 64 - 32);
+        values.setValue(at, float(VOXEL * at.asVec3d().length() - RADIUS));
+    }
+    const std::string path = save("dense.vdb", {grid});
+    Warnings warnings;
+    vsh_grid *read = nullptr;
+    assert_said(vsh_grid_read(path.c_str(), nullptr, &warnings.run, &read, &failure), VSH_OK, {});
+    assert_true(warnings.lines.empty());
+    assert_true(worst_error(read, RADIUS, openvdb::Vec3d(0.0)) < 0.01);
+    vsh_grid_free(read);
+    vsh_vdb_entry entry = {};
+    size_t count = 0;
+    assert_int_equal(vsh_vdb_list(path.c_str(), nullptr, &entry, 1, &count, &failure), VSH_OK);
+    assert_string_equal(entry.problem, "");
+    values.setValue(openvdb::Coord(28, 3, 4), 1e9f);
+    save("dense.vdb", {grid});
+    assert_said(vsh_grid_read(path.c_str(), nullptr, &warnings.run, &read, &failure), VSH_OK, {});
+    assert_true(warnings.lines.size() == 1 && std::strstr(warnings.lines[0].c_str(), "damaged?") != nullptr);
+    vsh_grid_free(read);
+}
+
 void scaled_values_and_narrow_bands_cast_the_same_shadows(void **) {
     vsh_grid *own = own_sphere();
     const std::vector<float> expected = shadows_of(own);
@@ -191,6 +224,7 @@ int main() {
         cmocka_unit_test(doubles_are_read),
         cmocka_unit_test(values_that_are_no_distances_are_made_so),
         cmocka_unit_test(thin_walls_hold_distances),
+        cmocka_unit_test(dense_distances_are_no_damage),
         cmocka_unit_test(scaled_values_and_narrow_bands_cast_the_same_shadows),
         cmocka_unit_test(what_is_all_inside_is_refused),
         cmocka_unit_test(making_distances_anew_names_the_file_and_the_grid),

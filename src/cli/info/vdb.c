@@ -42,7 +42,9 @@ static void print_grid(const vsh_vdb_entry *grid) {
         printf(
             "  holds: values that vdbshade baked, to be looked up: it is no caster and needs to be none\n");
     } else if (grid->problem[0] != '\0') {
-        printf("  problem: %s\n", grid->problem);
+        printf(grid->mended != 0 ? "  note: %s: its distances are made anew where it is used\n"
+                                 : "  problem: %s\n",
+               grid->problem);
     }
 }
 
