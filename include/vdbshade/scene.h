@@ -81,7 +81,7 @@ typedef struct vsh_scene_layer {
 /* The share of a lightmap's covered texels that objects may take from each other: charts that touch. */
 #define VSH_LARGEST_OVERLAP 0.01
 
-enum { VSH_RECEIVER_MESH = 0, VSH_RECEIVER_HEIGHTFIELD = 1 };
+enum { VSH_RECEIVER_MESH = 0, VSH_RECEIVER_HEIGHTFIELD = 1, VSH_RECEIVER_PLANE = 2 };
 
 /* Whether a receiver's lightmap UVs are made for it (vsh_unwrap()), in place of those of its file. */
 enum {
@@ -106,9 +106,10 @@ typedef struct vsh_density_rule {
 VSH_API int32_t vsh_receiver_unwrap(const char *name);
 VSH_API const char *vsh_receiver_unwrap_name(int32_t unwrap);
 
-/* A mesh or heightfield that a lightmap is baked for. Begin with vsh_receiver_default() (settings.h). */
+/* A mesh, heightfield or plane that a lightmap is baked for. Begin with vsh_receiver_default() (settings.h).
+ */
 typedef struct vsh_receiver {
-    const char *path;     /* mesh file, or a heightfield's image */
+    const char *path;     /* mesh file, a heightfield's image, or a plane's name in messages */
     double transform[12]; /* local to world */
     int32_t uv_set; /* from 0 to VSH_MAX_UV_SETS - 1; -1: the second where there is one, else the first */
     int32_t width;  /* these four as in vsh_lightmap_options */
@@ -119,9 +120,11 @@ typedef struct vsh_receiver {
     const char *output; /* image file */
     int32_t bits;       /* as in vsh_image_options */
     const char *pack;   /* as in vsh_image_options; may be NULL */
-    int32_t type;       /* VSH_RECEIVER_…; a heightfield is made as VSH_HEIGHTS_SURFACE, its UV set is 0 */
-    double extent[2];   /* heightfield: size and height in vsh_heights_source */
-    double relief;      /* heightfield: the height */
+    int32_t type; /* VSH_RECEIVER_…; heightfields and planes are made as VSH_HEIGHTS_SURFACE, their UV set
+                   * is 0 */
+    double extent[2]; /* heightfield: size and height in vsh_heights_source; plane: the same, and flat, about
+                       * the origin, facing +y */
+    double relief;    /* heightfield: the height */
     vsh_selection objects; /* mesh: which of its meshes receive */
     int32_t partial; /* mesh: nonzero: those without UVs, or without the set, are left out with a warning,
                         as long as one has them */

@@ -266,7 +266,7 @@ static vsh_result write(const vshi_lit_sink *lit, vsh_error *error) {
     VSHI_TRY_DONE(vshi_lit_list_chart_pages(lit, &options, &pages, error));
     VSHI_TRY_DONE(vshi_lit_list_meshes(lit, model, &meshes, error));
     tell_writing(job, lit->lightmap->output);
-    result = vsh_lit_write(receiver->type == VSH_RECEIVER_HEIGHTFIELD ? NULL : receiver->path, model, meshes,
+    result = vsh_lit_write(receiver->type != VSH_RECEIVER_MESH ? NULL : receiver->path, model, meshes,
                            &options, lit->lightmap->output, &run, error);
 done:
     free(pages);

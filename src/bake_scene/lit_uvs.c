@@ -12,7 +12,7 @@
 /* A mesh that is lit by the UVs of its file. */
 static vsh_lit_mesh mesh_of_file(const vsh_receiver *receiver, const vsh_model *model, size_t number) {
     vsh_lit_mesh mesh = {.uv_set = receiver->uv_set};
-    if (receiver->type == VSH_RECEIVER_HEIGHTFIELD) {
+    if (receiver->type != VSH_RECEIVER_MESH) {
         mesh.uv_set = 0;
     } else if (receiver->uv_set < 0) {
         mesh.uv_set = vsh_model_uv_sets(model, number) > 1;
@@ -101,7 +101,7 @@ static vsh_result check_uvs(const vshi_lit_sink *lit, const vsh_run *run, vsh_er
     const size_t *numbers;
     const vsh_model *model = vsh_assets_receiver_model(lit->job->assets, lightmap->receiver, &numbers);
     const vsh_receiver *receiver = &lit->job->scene.receivers[lightmap->receiver];
-    const char *path = receiver->type == VSH_RECEIVER_HEIGHTFIELD ? NULL : receiver->path;
+    const char *path = receiver->type != VSH_RECEIVER_MESH ? NULL : receiver->path;
     vsh_lit_mesh *meshes = NULL;
     vsh_lit_image *images = NULL;
     uint32_t *chart_pages = NULL;

@@ -85,9 +85,10 @@ int cli_parse_vector(const char *name, const char *text, double value[3]);      
 int cli_parse_point(const char *name, const char *text, double value[3]);            /* X,Y,Z */
 int cli_parse_color(const char *name, const char *text, double value[3]);            /* R,G,B, >= 0 */
 int cli_parse_box(const char *name, const char *text, double min[3], double max[3]); /* X0,Y0,Z0,X1,Y1,Z1 */
-int cli_parse_size(const char *name, const char *text, int32_t *w, int32_t *h);      /* W[xH] */
-int cli_parse_shard(const char *name, const char *text, int32_t *shard, int32_t *count); /* I/N */
-int cli_parse_bytes(const char *name, const char *text, uint64_t *value);                /* 500M, 2GiB */
+int cli_parse_floor(const char *name, const char *text, double size[2], double center[3]); /* W,D[,X,Y,Z] */
+int cli_parse_size(const char *name, const char *text, int32_t *w, int32_t *h);            /* W[xH] */
+int cli_parse_shard(const char *name, const char *text, int32_t *shard, int32_t *count);   /* I/N */
+int cli_parse_bytes(const char *name, const char *text, uint64_t *value);                  /* 500M, 2GiB */
 
 /* A name out of the library's list, or an error that shows the list. */
 int cli_parse_name(const char *name, const char *text, int32_t (*value_of)(const char *),

@@ -116,6 +116,19 @@ int cli_parse_box(const char *name, const char *text, double min[3], double max[
     return CLI_OK;
 }
 
+int cli_parse_floor(const char *name, const char *text, double size[2], double center[3]) {
+    double value[5] = {0.0};
+    const bool good = read_numbers(text, 5, value) || read_numbers(text, 2, memset(value, 0, sizeof value));
+    memcpy(size, value, 2 * sizeof *size);
+    memcpy(center, value + 2, 3 * sizeof *center);
+    if (!good || !(size[0] > 0.0 && size[0] <= 1e12 && size[1] > 0.0 && size[1] <= 1e12)) {
+        return cli_usage(
+            "%s '%s': expected W,D or W,D,X,Y,Z: its sizes along x and z, above 0, and its middle", name,
+            text);
+    }
+    return CLI_OK;
+}
+
 int cli_parse_size(const char *name, const char *text, int32_t *w, int32_t *h) {
     const char *at;
     bool good = read_integer(text, w, &at);

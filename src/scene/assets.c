@@ -191,6 +191,20 @@ static vsh_result unwrap(vshi_asset_place *place, const vsh_receiver *receiver, 
     return vshi_unwrapped_take(made, &place->meshes, &place->numbers, &place->count, error);
 }
 
+/* A heightfield of four heights, all 0. */
+static vsh_result place_plane(vshi_asset_place *place, const vsh_receiver *receiver, const vsh_run *run,
+                              vsh_error *error) {
+    static const float flat[4] = {0.0f, 0.0f, 0.0f, 0.0f};
+    const vsh_heights_source source = {.name = receiver->path,
+                                       .columns = 2,
+                                       .rows = 2,
+                                       .values = flat,
+                                       .size = {receiver->extent[0], receiver->extent[1]}};
+    VSHI_TRY(vsh_model_from_heights(&source, VSH_HEIGHTS_SURFACE, run, &place->made, error));
+    VSHI_TRY(place_model(place, place->made, 0, receiver->transform, error));
+    return vshi_pages_as_they_are(receiver, place->meshes, place->count, &place->unwrapped, error);
+}
+
 static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, size_t index, const vsh_run *run,
                                  vsh_error *error) {
     const vsh_receiver *receiver = &scene->receivers[index];
@@ -204,6 +218,9 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, siz
         vshi_asset_place *place = &assets->receivers[index];
         VSHI_TRY(place_heights(assets, place, &source, VSH_HEIGHTS_SURFACE, receiver->transform, run, error));
         return vshi_pages_as_they_are(receiver, place->meshes, place->count, &place->unwrapped, error);
+    }
+    if (receiver->type == VSH_RECEIVER_PLANE) {
+        return place_plane(&assets->receivers[index], receiver, run, error);
     }
     const vsh_model *model = NULL;
     unsigned char *chosen = NULL;

@@ -158,6 +158,15 @@ static vsh_result parse(void *user, vsh_error *error) {
     vsh_result result = VSH_OK;
     VSHI_TRY_DONE(vshi_json_load(reader, &json));
     const vshi_value root = {NULL, NULL, 0, 0, json};
+    vshi_value region;
+    VSHI_TRY_DONE(vshi_expect(reader, &root, JSON_OBJECT));
+    if (!vshi_member(&root, "region", &region)) {
+        result =
+            vshi_json_fail(reader, &root,
+                           "key \"region\" is missing: a flat scene needs it; 'vdbshade bake' bakes scenes "
+                           "with receivers");
+        goto done;
+    }
     made->scene = vsh_flat_scene_default();
     VSHI_TRY_DONE(vshi_read_object(reader, &root, &vshi_flat_table, 1, "a flat scene", &made->scene));
 done:

@@ -55,7 +55,8 @@ vsh_result vshi_inputs_find(const vsh_scene *scene, const char *const *files, si
         VSHI_TRY(add(inputs, vshi_caster_is_left(scene, i) ? scene->casters[i].path : NULL, error));
     }
     for (size_t i = 0; scene != NULL && i < scene->receiver_count; ++i) {
-        VSHI_TRY(add(inputs, scene->receivers[i].path, error));
+        const vsh_receiver *receiver = &scene->receivers[i];
+        VSHI_TRY(add(inputs, receiver->type != VSH_RECEIVER_PLANE ? receiver->path : NULL, error));
     }
     for (size_t i = 0; scene != NULL && i < scene->light_file_count; ++i) {
         VSHI_TRY(add(inputs, scene->light_files[i].path, error));

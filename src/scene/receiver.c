@@ -6,6 +6,7 @@
 #include <vdbshade/image.h>
 #include <vdbshade/settings.h>
 
+#include <math.h>
 #include <string.h>
 
 vsh_result vshi_read_size(vshi_json *reader, const vshi_value *value, int32_t *width, int32_t *height) {
@@ -97,7 +98,76 @@ static vsh_result read_padding(vshi_json *reader, const vshi_value *value, void 
                                 json_string_value(value->json));
 }
 
-enum { MESH = 1 << VSH_RECEIVER_MESH, HEIGHTFIELD = 1 << VSH_RECEIVER_HEIGHTFIELD };
+enum {
+    MESH = 1 << VSH_RECEIVER_MESH,
+    HEIGHTFIELD = 1 << VSH_RECEIVER_HEIGHTFIELD,
+    PLANE = 1 << VSH_RECEIVER_PLANE
+};
+
+typedef struct plane {
+    double size[2], center[3], normal[3];
+} plane;
+
+static const vshi_key plane_keys[] = {
+    {.name = "size",
+     .kind = VSHI_VECTOR,
+     .required = VSHI_ALL,
+     .offset = offsetof(plane, size),
+     .count = 2,
+     .lowest = 1e-12,
+     .highest = 1e12},
+    {.name = "center",
+     .kind = VSHI_VECTOR,
+     .offset = offsetof(plane, center),
+     .count = 3,
+     .lowest = -VSHI_LARGEST,
+     .highest = VSHI_LARGEST},
+    {.name = "normal",
+     .kind = VSHI_VECTOR,
+     .offset = offsetof(plane, normal),
+     .count = 3,
+     .lowest = -VSHI_LARGEST,
+     .highest = VSHI_LARGEST,
+     .flags = VSHI_NONZERO},
+};
+static const vshi_table plane_table = VSHI_TABLE(plane_keys);
+
+/* Turns +y into the normal the shortest way, and moves the origin to the center, before the transform. */
+static void stand(const plane *p, double transform[12]) {
+    const double length =
+        sqrt(p->normal[0] * p->normal[0] + p->normal[1] * p->normal[1] + p->normal[2] * p->normal[2]);
+    const double a = p->normal[0] / length, b = p->normal[1] / length, c = p->normal[2] / length;
+    const double s = b > -1.0 ? 1.0 / (1.0 + b) : 0.0; /* upside down: half a turn about x */
+    const double turned[3][4] = {{1.0 - a * a * s, a, -a * c * s, p->center[0]},
+                                 {-a, b, -c, p->center[1]},
+                                 {-a * c * s, c, b > -1.0 ? 1.0 - c * c * s : -1.0, p->center[2]}};
+    double before[12];
+    memcpy(before, transform, sizeof before);
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 4; ++column) {
+            double sum = column == 3 ? before[4 * row + 3] : 0.0;
+            for (int k = 0; k < 3; ++k) {
+                sum += before[4 * row + k] * turned[k][column];
+            }
+            transform[4 * row + column] = sum;
+        }
+    }
+}
+
+/* Comes after the other keys, as it is put before the transform. */
+static vsh_result take_plane(vshi_json *reader, const vshi_value *value, vsh_receiver *receiver) {
+    plane p = {.normal = {0.0, 1.0, 0.0}};
+    VSHI_TRY(vshi_read_object(reader, value, &plane_table, 1, "a plane", &p));
+    memcpy(receiver->extent, p.size, sizeof p.size);
+    stand(&p, receiver->transform);
+    receiver->path = "plane";
+    return VSH_OK;
+}
+
+static vsh_result read_plane(vshi_json *reader, const vshi_value *value, void *member) {
+    (void)member;
+    return vshi_expect(reader, value, JSON_OBJECT);
+}
 
 const char *vshi_color_space_key(int32_t i) {
     return i < VSH_COLOR_ENCODED ? vsh_color_space_name(i) : NULL; /* bakes are never encoded yet */
@@ -113,6 +183,7 @@ static const vshi_key receiver_keys[] = {
      .kind = VSHI_PATH,
      .variants = HEIGHTFIELD,
      .offset = offsetof(vsh_receiver, path)},
+    {.name = "plane", .kind = VSHI_CUSTOM, .variants = PLANE, .read = read_plane},
     {.name = "extent",
      .kind = VSHI_VECTOR,
      .variants = HEIGHTFIELD,
@@ -307,9 +378,14 @@ vsh_result vshi_read_receiver(vshi_json *reader, const vshi_value *value, void *
     *receiver = vsh_receiver_default();
     VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
     VSHI_TRY(vshi_reject_both(reader, value, "mesh", "heightfield"));
+    VSHI_TRY(vshi_reject_both(reader, value, "mesh", "plane"));
+    VSHI_TRY(vshi_reject_both(reader, value, "heightfield", "plane"));
+    static const char *const whats[] = {"a receiver", "a heightfield receiver", "a plane receiver"};
     vshi_value given;
-    const bool heightfield = vshi_member(value, "heightfield", &given);
-    receiver->type = heightfield ? VSH_RECEIVER_HEIGHTFIELD : VSH_RECEIVER_MESH;
-    return vshi_read_object(reader, value, &vshi_receiver_table, 1U << receiver->type,
-                            heightfield ? "a heightfield receiver" : "a receiver", receiver);
+    receiver->type = vshi_member(value, "heightfield", &given) ? VSH_RECEIVER_HEIGHTFIELD
+                     : vshi_member(value, "plane", &given)     ? VSH_RECEIVER_PLANE
+                                                               : VSH_RECEIVER_MESH;
+    VSHI_TRY(vshi_read_object(reader, value, &vshi_receiver_table, 1U << receiver->type,
+                              whats[receiver->type], receiver));
+    return receiver->type == VSH_RECEIVER_PLANE ? take_plane(reader, &given, receiver) : VSH_OK;
 }

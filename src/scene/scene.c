@@ -381,8 +381,12 @@ const vshi_table vshi_scene_table = VSHI_TABLE(scene_keys);
 
 static vsh_result read_scene(vshi_json *reader, json_t *json, const vsh_run *run, vsh_scene *scene) {
     const vshi_value root = {NULL, NULL, 0, 0, json};
-    vshi_value lights;
+    vshi_value lights, region;
     *scene = vsh_scene_default();
+    VSHI_TRY(vshi_expect(reader, &root, JSON_OBJECT));
+    if (vshi_member(&root, "region", &region)) {
+        return vshi_json_fail(reader, &region, "belongs to flat scenes, which 'vdbshade flat' bakes");
+    }
     VSHI_TRY(vshi_read_object(reader, &root, &vshi_scene_table, 1, "a scene", scene));
     VSHI_TRY(vshi_reject_both(reader, &root, "voxel_size", "resolution"));
     if (vshi_member(&root, "lights", &lights)) { /* after the unit of files' numbers */

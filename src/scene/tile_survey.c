@@ -237,7 +237,7 @@ static vsh_result look_at_receivers(surveying *s, vsh_error *error) {
         if (receiver->path == NULL) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "receiver %zu: no path", i);
         }
-        if (receiver->type == VSH_RECEIVER_HEIGHTFIELD) {
+        if (receiver->type != VSH_RECEIVER_MESH) {
             VSHI_TRY(look_at_heights(s, i, error));
         } else if (vshi_box_is_empty(&s->survey->receivers[i])) {
             VSHI_TRY(look_at_model(s, receiver->path, s->scene->caster_count, i, error));

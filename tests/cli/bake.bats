@@ -192,6 +192,62 @@ JSON
     same_values mes.exr vdb.exr || fail "they differ"
 }
 
+# receiver NAME KEYS: the seeds' scene, coarse, on that receiver.
+receiver() {
+    sed "s/0\.02,/0.06,/; s|\"mesh\": \"seeds_floor.obj\", \"size\": 512, \"output\": \"seeds.exr\"|$2, \"size\": 48, \"output\": \"$1.exr\"|" \
+        "$ASSETS/seeds.json" >"$1.json"
+    shade bake "$1.json" --quiet
+    done_well
+}
+
+@test "a plane receives as the mesh of it does, however it is stood" {
+    receiver mesh "\"mesh\": \"$ASSETS/seeds_floor.obj\""
+    receiver plane '"plane": {"size": [5, 5]}'
+    same_values mesh.exr plane.exr || fail "another floor"
+    # a wall that faces +x, turned up by its transform
+    receiver wall '"transform": {"rotate_deg": [0, 0, 90]}, "plane": {"size": [5, 5], "normal": [2, 0, 0], "center": [0, 0, 0]}'
+    "$VDBSHADE" compare mesh.exr wall.exr || fail "another wall"
+    printf 'v -2 0 1\nv 2 0 1\nv 2 4 1\nv -2 4 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/2/1 3/3/1 4/4/1\n' >quad.obj
+    receiver quad '"mesh": "quad.obj"'
+    receiver facing '"plane": {"size": [4, 4], "normal": [0, 0, 1], "center": [0, 2, 1]}'
+    "$VDBSHADE" compare quad.exr facing.exr || fail "another facing"
+}
+
+@test "--floor receives for casters without receivers, also in trade" {
+    shade voxelize box.obj -o box.vdb --voxel-size 0.1 --quiet
+    shade bake box.vdb --sun 1,2,1 -o floor.exr
+    refused 2 box.vdb --floor volume
+    shade bake box.vdb --sun 1,2,1 --sun-angle 5 --floor 6,6,0,-1,0 --size 32 --quiet -o floor.exr
+    done_well
+    local scene='"casters": [{"vdb": "box.vdb"}], "voxel_size": 0.1, "lights": [{"name": "sun", "type": "directional", "direction": [1, 2, 1], "angle_deg": 5}]'
+    echo "{$scene}" >bare.json
+    echo "{$scene, \"receivers\": [{\"plane\": {\"size\": [6, 6], \"center\": [0, -1, 0]}, \"size\": 32, \"output\": \"scene.exr\"}]}" >scene.json
+    shade bake bare.json -o bare.exr
+    refused 2 bare.json --floor
+    shade bake bare.json --floor 6,6,0,-1,0 --size 32 --quiet -o bare.exr
+    done_well
+    shade bake scene.json --quiet
+    done_well
+    same_values bare.exr scene.exr || fail "the option and the key differ"
+    shade bake scene.json --floor 6,6 -o other.exr
+    refused 2 --floor plane
+    shade trade box.vdb --sun 1,2,1 -o trade.html
+    refused 2 box.vdb --floor
+    shade trade box.vdb --sun 1,2,1 --floor 6,6,0,-1,0 --size 16 --resolutions 16 --truth-rays 16 --budget 1 --quiet -o trade.html
+    done_well
+    [ -s trade.html ] || fail "no page"
+}
+
+@test "a flat scene is sent to flat, and a scene with receivers to bake" {
+    echo '{"region": [-1, -1, 1, 1], "casters": [], "lights": [], "output": "flat.exr"}' >flat.json
+    shade bake flat.json
+    refused 2 flat.json:1 "vdbshade flat"
+    shade query flat.json --points points.csv --distance -o out.csv
+    refused 2 flat.json:1 "vdbshade flat"
+    shade flat "$ASSETS/seeds.json"
+    refused 2 seeds.json "vdbshade bake"
+}
+
 # --- --dry-run: what a bake will take
 
 @test "a dry run says what a bake will take, and writes nothing" {

@@ -87,8 +87,9 @@ static void every_key_lands_in_its_field(void **state) {
 static const struct {
     const char *text, *message;
 } bad[] = {
-    {"@{}", "key \"lights\" is missing: a flat scene needs it"},
-    {"@{" LIGHTS "}", "key \"region\" is missing: a flat scene needs it"},
+    {"@{}", "key \"region\" is missing: a flat scene needs it; 'vdbshade bake' bakes scenes with receivers"},
+    {"@{" LIGHTS "}",
+     "key \"region\" is missing: a flat scene needs it; 'vdbshade bake' bakes scenes with receivers"},
     {"{" LIGHTS ",\"region\":@[0,0,0,1]}", "region: is empty: expected [left, bottom, right, top]"},
     {"{" LIGHTS ",\"region\":@[0,0,1]}", "region: expected 4 numbers, found 3"},
     {"{" LIGHTS ",\"region\":[0,@1e16,1,1]}", "region[1]: 1e+16 is out of range -1e+15 … 1e+15"},

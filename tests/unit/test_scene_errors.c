@@ -242,6 +242,13 @@ static const struct {
      "receivers[1].uv_set: is no key of a heightfield receiver"},
     {RECEIVER("@{\"heightfield\":\"h\",\"height\":1,\"output\":\"p\"}"),
      "receivers[1]: key \"extent\" is missing: a heightfield receiver needs it"},
+    {RECEIVER("{\"mesh\":\"m\",@\"plane\":{}}"), "receivers[1].plane: cannot stand beside \"mesh\""},
+    {RECEIVER("{\"plane\":@{},\"output\":\"p\"}"),
+     "receivers[1].plane: key \"size\" is missing: a plane needs it"},
+    {RECEIVER("{\"plane\":{\"size\":[1,1],\"normal\":@[0,0,0]},\"output\":\"p\"}"),
+     "receivers[1].plane.normal: is zero, and so points nowhere"},
+    {RECEIVER("{\"plane\":{},@\"uv_set\":1}"), "receivers[1].uv_set: is no key of a plane receiver"},
+    {"{\"region\":@[0,0,1,1]}", "region: belongs to flat scenes, which 'vdbshade flat' bakes"},
     /* receivers */
     {RECEIVER("@{}"), "receivers[1]: key \"mesh\" is missing: a receiver needs it"},
     {RECEIVER("@{\"mesh\":\"m\"}"), "receivers[1]: key \"output\" is missing: a receiver needs it"},

@@ -63,6 +63,7 @@ static const cli_option options[] = {
     {KEY_NO_RECEIVE, "no-receive", "NAME",
      "objects of this name only cast, or where there are\nnone, those of materials of this name; may be "
      "repeated"},
+    CLI_FLOOR_OPTION,
     CLI_NO_CAST_OPTION,
     {KEY_ONE_SIDED, "one-sided", "NAME", "light passes the backs of their faces, likewise; may\nbe repeated"},
     {KEY_PER_OBJECT, "per-object", NULL,
@@ -139,6 +140,8 @@ int cli_shared_parse(cli_bake_settings *s, int key, const char *name, const char
         return cli_parse_number(name, value, 0.0, 1e12, &s->light_radius);
     case CLI_KEY_CASTER:
         return take_caster(s, name, value);
+    case CLI_KEY_FLOOR:
+        return cli_parse_floor(name, value, s->floor_size, s->floor_center);
     case CLI_KEY_NO_CAST:
         return take_pattern(&s->no_cast, name, value);
     case CLI_KEY_SHARD_LEAST:

@@ -23,6 +23,7 @@ enum {
     CLI_KEY_CASTER,
     CLI_KEY_FIELD,
     CLI_KEY_NO_CAST,
+    CLI_KEY_FLOOR,
     CLI_KEY_SHARD_LEAST
 };
 
@@ -49,6 +50,13 @@ enum {
 #define CLI_LIGHT_OPTIONS CLI_LIGHTS, CLI_SETTINGS(VSH_SETTINGS_OCCLUSION)
 
 #define CLI_ACCURACY_OPTIONS {0, NULL, NULL, "Accuracy"}, CLI_SETTINGS(VSH_SETTINGS_ACCURACY)
+
+#define CLI_FLOOR_OPTION                                                                                     \
+    {                                                                                                        \
+        CLI_KEY_FLOOR, "floor", "W,D[,X,Y,Z]",                                                               \
+            "a plane of W x D about X,Y,Z (0,0,0) that faces +y\nreceives, and casts nothing: for casters "  \
+            "without receivers"                                                                              \
+    }
 
 #define CLI_NO_CAST_OPTION                                                                                   \
     {                                                                                                        \
@@ -89,9 +97,10 @@ typedef struct cli_bake_settings {
     int32_t band_rows; /* 0: as many as go */
     const char *casters[CLI_MAX_EXTRA_CASTERS];
     size_t caster_count;
-    const char *field;                  /* a file of fields; NULL: they are made */
-    const char *exr;                    /* beside an asset; NULL: none */
-    bool preview, embed, images_beside; /* of an asset */
+    const char *field;                     /* a file of fields; NULL: they are made */
+    const char *exr;                       /* beside an asset; NULL: none */
+    bool preview, embed, images_beside;    /* of an asset */
+    double floor_size[2], floor_center[3]; /* size 0: none */
     bool has_sun, has_sun_angle, has_light_radius, has_shard_least, per_object, dry_run, resume;
     int32_t shard, shard_count; /* 0: all of it */
     double shard_least;         /* seconds; 0: all shards have rows, as those of a trade do */

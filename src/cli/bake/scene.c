@@ -128,8 +128,24 @@ static int mark_outputs(cli_bake_scene *made) {
     return CLI_OK;
 }
 
+/* The plane of --floor. */
+static vsh_receiver floor_of(const cli_bake_settings *s) {
+    vsh_receiver receiver = vsh_receiver_default();
+    receiver.type = VSH_RECEIVER_PLANE;
+    receiver.path = "floor";
+    memcpy(receiver.extent, s->floor_size, sizeof receiver.extent);
+    for (int axis = 0; axis < 3; ++axis) {
+        receiver.transform[4 * axis + 3] = s->floor_center[axis];
+    }
+    return receiver;
+}
+
 int cli_bake_scene_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
-    const size_t count = made->read != NULL ? made->read->receiver_count : 1;
+    const bool floor = s->floor_size[0] > 0.0;
+    if (floor && made->read != NULL && made->read->receiver_count > 0) {
+        return cli_usage("--floor: %s has receivers of its own; put a \"plane\" beside them", s->input);
+    }
+    const size_t count = made->read != NULL && !floor ? made->read->receiver_count : 1;
     if (count == 0) {
         return CLI_OK;
     }
@@ -140,8 +156,10 @@ int cli_bake_scene_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
     int code = CLI_OK;
     for (size_t i = 0; i < count && code == CLI_OK; ++i) {
         vsh_receiver *receiver = &made->receivers[i];
-        *receiver = made->read != NULL ? made->read->receivers[i] : vsh_receiver_default();
-        receiver->path = made->read != NULL ? receiver->path : s->input;
+        *receiver = floor                ? floor_of(s)
+                    : made->read != NULL ? made->read->receivers[i]
+                                         : vsh_receiver_default();
+        receiver->path = floor || made->read != NULL ? receiver->path : s->input;
         code = override_receiver(s, receiver);
     }
     made->scene.receivers = made->receivers;
@@ -191,13 +209,17 @@ static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
         return cli_usage("-o '%s': %s has %zu receivers, each with its own output", s->output, s->input,
                          given);
     }
-    if (made->read == NULL && cli_has_ending(s->input, "vdb")) {
-        return cli_usage("%s: a level set has no UVs to bake a lightmap by; see 'vdbshade volume'", s->input);
+    if (made->read == NULL && cli_has_ending(s->input, "vdb") && s->floor_size[0] == 0.0) {
+        return cli_usage(
+            "%s: a level set has no UVs to bake a lightmap by; give --floor W,D,X,Y,Z for a floor that "
+            "receives, or bake voxels with 'vdbshade volume'",
+            s->input);
     }
     int code = check_objects(s, made, given);
     code = code == CLI_OK ? cli_bake_scene_receivers(s, made) : code;
     if (code == CLI_OK && made->scene.receiver_count == 0) {
-        return cli_usage("%s: no receivers to bake", s->input);
+        return cli_usage("%s: no receivers to bake; name some in \"receivers\", or give --floor W,D,X,Y,Z",
+                         s->input);
     }
     for (size_t i = 0; code == CLI_OK && i < made->scene.receiver_count; ++i) {
         if (made->scene.receivers[i].output == NULL) {
@@ -247,7 +269,8 @@ int cli_bake_check_output(const cli_bake_settings *s, const vsh_scene *scene, co
         }
     }
     for (size_t i = 0; i < scene->receiver_count; ++i) {
-        if (cli_same_file(output, scene->receivers[i].path)) {
+        if (scene->receivers[i].type != VSH_RECEIVER_PLANE &&
+            cli_same_file(output, scene->receivers[i].path)) {
             return cli_usage("%s: the output is also a receiver's file", output);
         }
     }

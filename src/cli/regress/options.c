@@ -11,7 +11,7 @@
 static const char *const changes_values[] = {
     "receive", "no-receive", "no-cast",        "one-sided", "sun",  "sun-angle", "lights", "light-radius",
     "caster",  "solid",      "shell",          "inward",    "half", "band",      "box",    "like",
-    "inside",  "name",       "box-voxel-size", "density"};
+    "inside",  "name",       "box-voxel-size", "density",   "floor"};
 
 static bool is_setting(const char *name) {
     const vsh_setting *setting;

@@ -52,6 +52,7 @@ static const cli_option options[] = {
     CLI_LIGHTS,
     CLI_SETTING("ao"),
     CLI_SETTING("uv-set"),
+    CLI_FLOOR_OPTION,
     CLI_COMMON_OPTIONS,
     CLI_ISA_OPTION,
 };
@@ -376,7 +377,8 @@ static int trade_by(trade_settings *s) {
         return cli_usage("%s: give -o OUT.html", s->report != NULL ? s->report : s->bake.input);
     }
     /* a mesh needs an output to be a scene; a scene's own are not written */
-    s->bake.output = cli_has_ending(s->bake.input, "json") ? NULL : s->report;
+    const bool scene = cli_has_ending(s->bake.input, "json") && s->bake.floor_size[0] == 0.0;
+    s->bake.output = scene ? NULL : s->report;
     cli_progress_begin(s->bake.common.progress, s->bake.common.quiet);
     trade_kept kept[TRADE_MAX_RESOLUTIONS] = {{NULL, 0}};
     cli_bake_scene made;
