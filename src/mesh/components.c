@@ -124,9 +124,63 @@ static vsh_result list_rims(walking *w, vsh_error *error) {
     return VSH_OK;
 }
 
+/* The edge of an open terrain, by its triangles. */
+static vsh_result list_terrain_rims(const vsh_mesh *mesh, vshi_terrain t, vshi_components *c,
+                                    vsh_error *error) {
+    const bool mirrored = vshi_transform_determinant(mesh->transform) < 0.0;
+    const size_t across = t.columns - 1, down = t.rows - 1;
+    VSHI_TRY(
+        vshi_allocate((void **)&c->rims, vshi_terrain_edge_length(t), sizeof *c->rims, "open edges", error));
+    for (size_t i = 0; i < mesh->triangle_count; ++i) {
+        const size_t column = i / 2 % across, row = i / 2 / across;
+        if (column > 0 && column + 1 < across && row > 0 && row + 1 < down) {
+            continue;
+        }
+        uint32_t given[3], v[3];
+        vshi_terrain_triangle(t, i, given);
+        v[0] = given[0];
+        v[1] = given[mirrored ? 2 : 1];
+        v[2] = given[mirrored ? 1 : 2];
+        for (int k = 0; k < 3; ++k) {
+            const uint32_t a = v[k], b = v[(k + 1) % 3];
+            const size_t ax = a % t.columns, bx = b % t.columns, az = a / t.columns, bz = b / t.columns;
+            if ((ax == bx && (ax == 0 || ax == across)) || (az == bz && (az == 0 || az == down))) {
+                c->rims[c->rim_count++] = (vshi_rim){0, a, b};
+            }
+        }
+    }
+    return VSH_OK;
+}
+
+/* The one component of a terrain: the order of its triangles says how they hang together. */
+static vsh_result list_terrain(const vsh_mesh *mesh, vshi_terrain t, vshi_components *c, vsh_error *error) {
+    static const char *const name = "components";
+    const size_t count = mesh->triangle_count, vertices = mesh->vertex_count;
+    VSHI_TRY(vshi_allocate((void **)&c->weld, vertices, sizeof *c->weld, name, error));
+    VSHI_TRY(vshi_allocate((void **)&c->turned, count, 1, name, error));
+    VSHI_TRY(vshi_allocate((void **)&c->doubled, count, 1, name, error));
+    VSHI_TRY(vshi_allocate((void **)&c->twisted, 1, 1, name, error));
+    VSHI_TRY(vshi_allocate((void **)&c->begin, 2, sizeof *c->begin, name, error));
+    VSHI_TRY(vshi_allocate((void **)&c->list, count, sizeof *c->list, name, error));
+    for (size_t v = 0; v < vertices; ++v) {
+        c->weld[v] = (uint32_t)v;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        if (!vshi_mesh_degenerate(mesh, i)) {
+            c->list[c->begin[1]++] = (uint32_t)i;
+        }
+    }
+    c->count = 1;
+    return t.solid ? VSH_OK : list_terrain_rims(mesh, t, c, error);
+}
+
 vsh_result vshi_components_find(const vsh_mesh *mesh, size_t index, vshi_components *found,
                                 vsh_error *error) {
     *found = (vshi_components){0};
+    vshi_terrain terrain;
+    if (vshi_mesh_is_terrain(mesh, &terrain)) {
+        return list_terrain(mesh, terrain, found, error);
+    }
     walking w = {.mesh = mesh, .mirrored = vshi_transform_determinant(mesh->transform) < 0.0, .found = found};
     const size_t count = mesh->triangle_count;
     vsh_result result;

@@ -118,3 +118,103 @@ bool vshi_mesh_degenerate(const vsh_mesh *mesh, size_t i) {
     const vshi_vec normal = vshi_cross(vshi_sub(b, a), vshi_sub(c, a));
     return normal.x == 0.0 && normal.y == 0.0 && normal.z == 0.0;
 }
+
+/* Sample `i` of the way around the edge: row 0, then the last column, the last row, the first column. */
+static size_t edge_sample(vshi_terrain t, size_t i) {
+    const size_t across = t.columns - 1, down = t.rows - 1;
+    if (i < across) {
+        return i;
+    }
+    i -= across;
+    if (i < down) {
+        return i * t.columns + across;
+    }
+    i -= down;
+    if (i < across) {
+        return down * t.columns + across - i;
+    }
+    return (down - (i - across)) * t.columns;
+}
+
+void vshi_terrain_triangle(vshi_terrain t, size_t i, uint32_t vertex[3]) {
+    const size_t across = t.columns - 1, cells = across * (t.rows - 1), samples = t.columns * t.rows;
+    if (i < 2 * cells) {
+        const size_t cell = i / 2, first = cell / across * t.columns + cell % across;
+        const size_t below = first + t.columns;
+        vertex[0] = (uint32_t)first;
+        vertex[1] = (uint32_t)(i % 2 == 0 ? below + 1 : below);
+        vertex[2] = (uint32_t)(i % 2 == 0 ? first + 1 : below + 1);
+        return;
+    }
+    const size_t edge = vshi_terrain_edge_length(t), at = (i - 2 * cells) / 3, next = (at + 1) % edge;
+    const size_t corners[3][3] = {{edge_sample(t, at), edge_sample(t, next), samples + next},
+                                  {edge_sample(t, at), samples + next, samples + at},
+                                  {samples + edge, samples + at, samples + next}};
+    for (size_t k = 0; k < 3; ++k) {
+        vertex[k] = (uint32_t)corners[(i - 2 * cells) % 3][k];
+    }
+}
+
+bool vshi_terrain_is_even(const vsh_mesh *mesh, vshi_terrain t) {
+    static const double ROUNDING = 1e-6;
+    const float *first = mesh->positions, *last = first + 3 * (t.columns * t.rows - 1);
+    const double width = (double)last[0] - (double)first[0], depth = (double)last[2] - (double)first[2];
+    bool even = true;
+    for (size_t row = 0; even && row < t.rows; ++row) {
+        const double z = (double)first[2] + depth * ((double)row / (double)(t.rows - 1));
+        for (size_t column = 0; column < t.columns; ++column) {
+            const float *p = first + 3 * (row * t.columns + column);
+            const double x = (double)first[0] + width * ((double)column / (double)(t.columns - 1));
+            even = even && fabs((double)p[0] - x) <= ROUNDING * width &&
+                   fabs((double)p[2] - z) <= ROUNDING * depth;
+        }
+    }
+    return even;
+}
+
+static bool lie_apart(const float *positions, vshi_terrain t) {
+    bool apart = true;
+    for (size_t row = 0; apart && row < t.rows; ++row) {
+        for (size_t column = 0; column < t.columns; ++column) {
+            const float *p = positions + 3 * (row * t.columns + column);
+            apart = apart && (column == 0 || p[0] > p[-3]) &&
+                    (row == 0 || p[2] > p[2 - 3 * (ptrdiff_t)t.columns]);
+        }
+    }
+    return apart;
+}
+
+/* The terrain that so many vertices and triangles would be; no rows where they are none. */
+static vshi_terrain guess_terrain(const vsh_mesh *mesh) {
+    if (mesh->triangle_count < 2 || mesh->indices[1] < 3) { /* the first triangle is 0, columns + 1, 1 */
+        return (vshi_terrain){0};
+    }
+    const size_t columns = (size_t)mesh->indices[1] - 1, vertices = mesh->vertex_count;
+    vshi_terrain t = {columns, vertices / columns, false};
+    if (t.rows >= 2 && vshi_terrain_vertex_count(t) == vertices &&
+        vshi_terrain_triangle_count(t) == mesh->triangle_count) {
+        return t;
+    }
+    t = (vshi_terrain){columns, vertices + 3 > 2 * columns ? (vertices + 3 - 2 * columns) / (columns + 2) : 0,
+                       true};
+    if (t.rows >= 2 && vshi_terrain_vertex_count(t) == vertices &&
+        vshi_terrain_triangle_count(t) == mesh->triangle_count) {
+        return t;
+    }
+    return (vshi_terrain){0};
+}
+
+bool vshi_mesh_is_terrain(const vsh_mesh *mesh, vshi_terrain *terrain) {
+    *terrain = guess_terrain(mesh);
+    if (terrain->rows == 0) {
+        return false;
+    }
+    for (size_t i = 0; i < mesh->triangle_count; ++i) {
+        uint32_t vertex[3];
+        vshi_terrain_triangle(*terrain, i, vertex);
+        if (memcmp(vertex, mesh->indices + 3 * i, sizeof vertex) != 0) {
+            return false;
+        }
+    }
+    return lie_apart(mesh->positions, *terrain);
+}

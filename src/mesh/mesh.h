@@ -75,6 +75,37 @@ static inline void vshi_mesh_triangle(const vsh_mesh *mesh, size_t i, vshi_vec c
  * rounding's worth of area, as they would after a rotation. */
 VSHI_SHARED bool vshi_mesh_degenerate(const vsh_mesh *mesh, size_t i);
 
+/* A grid of heights: a surface, or a closed solid. Its vertices are the samples, row by row, and of a solid
+ * the bottom below each sample of the edge, from the first row's on around, then the bottom's middle. */
+typedef struct vshi_terrain {
+    size_t columns, rows; /* samples, at least 2 */
+    bool solid;
+} vshi_terrain;
+
+/* Samples along the edge. */
+static inline size_t vshi_terrain_edge_length(vshi_terrain t) {
+    return 2 * (t.columns - 1) + 2 * (t.rows - 1);
+}
+
+static inline size_t vshi_terrain_triangle_count(vshi_terrain t) {
+    return 2 * (t.columns - 1) * (t.rows - 1) + (t.solid ? 3 * vshi_terrain_edge_length(t) : 0);
+}
+
+static inline size_t vshi_terrain_vertex_count(vshi_terrain t) {
+    return t.columns * t.rows + (t.solid ? vshi_terrain_edge_length(t) + 1 : 0);
+}
+
+/* The vertices of triangle i: two for each cell, then of a solid two of the sides and one of the bottom for
+ * each sample of the edge. */
+void vshi_terrain_triangle(vshi_terrain terrain, size_t i, uint32_t vertex[3]);
+
+/* Whether a mesh has the triangles of a terrain, all of them in order, and its samples lie apart: x grows
+ * with columns, z with rows. */
+bool vshi_mesh_is_terrain(const vsh_mesh *mesh, vshi_terrain *terrain);
+
+/* Whether its samples stand on a grid of even steps, but for the rounding of floats. */
+bool vshi_terrain_is_even(const vsh_mesh *mesh, vshi_terrain terrain);
+
 /* weld[v] = the lowest vertex at the very position of v (-0 is 0), for the mesh's vertex_count vertices.
  * Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_mesh_weld(const vsh_mesh *mesh, uint32_t *weld, vsh_error *error);

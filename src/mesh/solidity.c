@@ -15,6 +15,8 @@
 
 /* What a triangle and a vertex take while edges are found, and afterwards at most. */
 static const double BYTES_PER_TRIANGLE = 120.0, BYTES_PER_VERTEX = 24.0;
+/* The same of terrains, whose edges are known. */
+static const double TERRAIN_BYTES_PER_TRIANGLE = 9.0, TERRAIN_BYTES_PER_VERTEX = 4.0;
 
 static vsh_result allocate(vshi_solidity *s, const vsh_mesh *meshes, vsh_error *error) {
     VSHI_TRY(vshi_allocate((void **)&s->first_side, s->mesh_count + 1, sizeof *s->first_side, "what is solid",
@@ -145,8 +147,11 @@ vsh_result vshi_solidity_create(const vsh_mesh *meshes, size_t mesh_count, const
     *made = NULL;
     double bytes = 0.0;
     for (size_t m = 0; m < mesh_count; ++m) {
-        bytes += BYTES_PER_TRIANGLE * (double)meshes[m].triangle_count +
-                 BYTES_PER_VERTEX * (double)meshes[m].vertex_count;
+        vshi_terrain terrain;
+        const bool known = vshi_mesh_is_terrain(&meshes[m], &terrain);
+        bytes +=
+            (known ? TERRAIN_BYTES_PER_TRIANGLE : BYTES_PER_TRIANGLE) * (double)meshes[m].triangle_count +
+            (known ? TERRAIN_BYTES_PER_VERTEX : BYTES_PER_VERTEX) * (double)meshes[m].vertex_count;
     }
     VSHI_TRY(vshi_check_limit(run, bytes, "what is solid", error));
     vshi_solidity *s = NULL;

@@ -87,11 +87,16 @@ vsh_result vshi_asset_files_create(const vsh_scene *scene, vshi_asset_files *fil
     return vshi_allocate((void **)&files->maps, count, sizeof *files->maps, "heightfields", error);
 }
 
-void vshi_asset_files_free(vshi_asset_files *files) {
+void vshi_asset_maps_free(vshi_asset_files *files) {
     for (size_t i = 0; i < files->map_count; ++i) {
         free(files->maps[i].map.values);
         free(files->maps[i].path);
     }
+    files->map_count = 0;
+}
+
+void vshi_asset_files_free(vshi_asset_files *files) {
+    vshi_asset_maps_free(files);
     free(files->maps);
     for (size_t i = 0; i < files->grid_count; ++i) {
         vsh_grid_free(files->grids[i].grid);

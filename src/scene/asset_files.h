@@ -39,6 +39,9 @@ typedef struct vshi_asset_files {
 vsh_result vshi_asset_files_create(const vsh_scene *scene, vshi_asset_files *files, vsh_error *error);
 void vshi_asset_files_free(vshi_asset_files *files);
 
+/* Frees the images of heights, once all models are made of them. */
+void vshi_asset_maps_free(vshi_asset_files *files);
+
 /* What a file holds, which belongs to `files`: read where it has not been. Errors: those of the readers. */
 vsh_result vshi_asset_model(vshi_asset_files *files, const char *path, const vsh_run *run,
                             const vsh_model **model, vsh_error *error);

@@ -8,6 +8,7 @@
 #include "base/similarity.h"
 #include "base/try.h"
 #include "base/vec.h"
+#include "heightfield/heights_check.h"
 #include "model/model.h"
 #include "scene/asset_files.h"
 #include "scene/asset_place.h"
@@ -39,8 +40,8 @@ static vsh_result place_model(vshi_asset_place *place, const vsh_model *model, i
 
 /* `source` is filled but for what the image holds, and whether it is direct but for its transform. */
 static vsh_result place_heights(vsh_assets *assets, vshi_asset_place *place, vsh_heights_source *source,
-                                int32_t what, const double transform[12], const vsh_run *run,
-                                vsh_error *error) {
+                                int32_t what, const size_t *texels, const double transform[12],
+                                const vsh_run *run, vsh_error *error) {
     const vshi_height_image *map = NULL;
     VSHI_TRY(vshi_asset_map(&assets->files, source->name, run, &map, error));
     source->columns = map->columns;
@@ -50,7 +51,7 @@ static vsh_result place_heights(vsh_assets *assets, vshi_asset_place *place, vsh
         source->transform = transform;
         return vsh_heights_create(source, run, &place->heights, error);
     }
-    VSHI_TRY(vsh_model_from_heights(source, what, run, &place->made, error));
+    VSHI_TRY(vshi_model_of_heights(source, what, texels, run, &place->made, error));
     return place_model(place, place->made, 0, transform, error);
 }
 
@@ -119,7 +120,7 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
                                      .size = {caster->size[0], caster->size[1]},
                                      .height = caster->height,
                                      .base = caster->base};
-        return place_heights(assets, place, &source, VSH_HEIGHTS_SOLID, caster->transform, run, error);
+        return place_heights(assets, place, &source, VSH_HEIGHTS_SOLID, NULL, caster->transform, run, error);
     }
     VSHI_TRY(vshi_asset_model(&assets->files, caster->path, run, &place->model, error));
     return vshi_place_casting(place, scene, index, vshi_asset_masks(&assets->files, place->model),
@@ -216,7 +217,12 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, siz
                                      .size = {receiver->extent[0], receiver->extent[1]},
                                      .height = receiver->relief};
         vshi_asset_place *place = &assets->receivers[index];
-        VSHI_TRY(place_heights(assets, place, &source, VSH_HEIGHTS_SURFACE, receiver->transform, run, error));
+        const size_t samples = receiver->supersample > 1 ? (size_t)receiver->supersample : 1;
+        const size_t texels[2] = {samples * (size_t)receiver->width, samples * (size_t)receiver->height};
+        const bool sized =
+            receiver->width > 0 && receiver->height > 0 && !vsh_lit_is_output(receiver->output);
+        VSHI_TRY(place_heights(assets, place, &source, VSH_HEIGHTS_SURFACE, sized ? texels : NULL,
+                               receiver->transform, run, error));
         return vshi_pages_as_they_are(receiver, place->meshes, place->count, &place->unwrapped, error);
     }
     if (receiver->type == VSH_RECEIVER_PLANE) {
@@ -298,6 +304,7 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
     for (size_t i = 0; i < scene->caster_count; ++i) {
         VSHI_TRY_DONE(place_caster(loaded, scene, i, &full, error));
     }
+    vshi_asset_maps_free(&loaded->files);
     VSHI_TRY_DONE(settle_solidity(loaded, scene, &full, error));
     VSHI_TRY_DONE(check_receivers(loaded, scene, &full, error));
     /* with the places in it, which the check asks for */

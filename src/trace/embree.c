@@ -63,6 +63,8 @@ uint64_t vsh_triangles_bytes(const vsh_triangles *triangles) {
 
 /* A triangle's share of buffers and tree, bytes: 180 to 230 measured, more while the tree is made. */
 static const double TRIANGLE_BYTES = 300.0;
+/* A terrain's sample's: it and the greatest of blocks. */
+static const double SAMPLE_BYTES = 5.4;
 /* A quad's, likewise: 97 measured. */
 static const double QUAD_BYTES = 160.0;
 
@@ -88,6 +90,16 @@ static bool watch_progress(void *user, double fraction) {
     VSHI_FLOATS;
     (void)fraction;
     return !vshi_job_advance(user, 0);
+}
+
+/* The terrain that a mesh is; NULL: none. */
+static const vshi_terrain_part *terrain_of(const vsh_triangles *triangles, size_t mesh) {
+    for (size_t k = 0; k < triangles->terrain_count; ++k) {
+        if (triangles->terrains[k].mesh == mesh) {
+            return &triangles->terrains[k];
+        }
+    }
+    return NULL;
 }
 
 /* Centre and scale, from the box of all corners. */
@@ -116,12 +128,13 @@ static void grow(double low[3], double high[3], const double at[3]) {
 static void measure(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count) {
     double low[3] = {DBL_MAX, DBL_MAX, DBL_MAX}, high[3] = {-DBL_MAX, -DBL_MAX, -DBL_MAX};
     for (size_t m = 0; m < mesh_count; ++m) {
-        for (size_t i = 0; i < meshes[m].triangle_count; ++i) {
-            vshi_vec corner[3];
-            vshi_mesh_triangle(&meshes[m], i, corner);
-            for (int k = 0; k < 3; ++k) {
-                grow(low, high, (double[]){corner[k].x, corner[k].y, corner[k].z});
-            }
+        const bool terrain = terrain_of(triangles, m) != NULL; /* which uses each of its vertices */
+        const size_t corners = terrain ? meshes[m].vertex_count : 3 * meshes[m].triangle_count;
+        for (size_t i = 0; i < corners; ++i) {
+            const size_t vertex = terrain ? i : meshes[m].indices[i];
+            const vshi_vec p =
+                vshi_transform_point(meshes[m].transform, vshi_vec_off(meshes[m].positions + 3 * vertex));
+            grow(low, high, (double[]){p.x, p.y, p.z});
         }
     }
     const size_t parts = triangles->solids != NULL ? vshi_solids_part_count(triangles->solids) : 0;
@@ -154,15 +167,87 @@ static uint8_t find_solid(const vsh_mesh *mesh, const uint8_t *sides, const uint
     return (uint8_t)((behind ? VSHI_SOLID_BEHIND : VSHI_SOLID_BEFORE) | (holed[i] ? VSHI_SOLID_HOLED : 0));
 }
 
+/* Finds the terrains that are solid beneath, as they are but for what a caller says of them. */
+static vsh_result find_terrains(vsh_triangles *triangles, const vshi_mesh_set *set, vsh_error *error) {
+    VSHI_TRY(vshi_allocate((void **)&triangles->terrains, set->count, sizeof *triangles->terrains,
+                           "triangles", error));
+    for (size_t m = 0; m < set->count; ++m) {
+        const vsh_mesh *mesh = &set->meshes[m];
+        const uint8_t *sides = vshi_solidity_sides(set->solidity, m);
+        vshi_terrain grid;
+        if (mesh->mask == NULL && mesh->one_sided == 0 && vshi_mesh_is_terrain(mesh, &grid) && grid.solid &&
+            vshi_terrain_is_even(mesh, grid) && sides[0] == VSHI_SIDE_BEHIND) {
+            triangles->terrains[triangles->terrain_count++] = (vshi_terrain_part){.mesh = m, .grid = grid};
+        }
+    }
+    triangles->first_terrain = (unsigned)set->count;
+    return VSH_OK;
+}
+
+static vsh_result make_reliefs(vsh_triangles *triangles, const vshi_mesh_set *set, vsh_error *error) {
+    for (size_t k = 0; k < triangles->terrain_count; ++k) {
+        vshi_terrain_part *part = &triangles->terrains[k];
+        const vsh_mesh *mesh = &set->meshes[part->mesh];
+        vshi_relief *relief = &part->relief;
+        VSHI_TRY(vshi_relief_create(mesh, part->grid, triangles->centre, triangles->scale, relief, error));
+        const float *first = mesh->positions, *last = first + 3 * (part->grid.columns * part->grid.rows - 1);
+        for (int i = 0; i < 8; ++i) {
+            const vshi_vec local = {(double)(i & 1 ? last[0] : first[0]),
+                                    (double)(i & 2 ? relief->highest : relief->lowest),
+                                    (double)(i & 4 ? last[2] : first[2])};
+            put(triangles, vshi_transform_point(mesh->transform, local), part->corners[i]);
+        }
+    }
+    return VSH_OK;
+}
+
+/* Vertices and triangles of a mesh in the sheet: of a terrain those of its sides and bottom. */
+static size_t sheet_vertices(const vsh_triangles *triangles, const vsh_mesh *mesh, size_t m) {
+    const vshi_terrain_part *part = terrain_of(triangles, m);
+    return part == NULL ? mesh->vertex_count : 2 * vshi_terrain_edge_length(part->grid) + 1;
+}
+
+static size_t sheet_triangles(const vsh_triangles *triangles, const vshi_mesh_set *set, size_t m) {
+    const vshi_terrain_part *part = terrain_of(triangles, m);
+    return part != NULL ? 3 * vshi_terrain_edge_length(part->grid)
+                        : set->meshes[m].triangle_count - set->checked[m].report.degenerate_triangles;
+}
+
+/* The sides and the bottom of a terrain, from these vertices and triangles of the sheet on. */
+static void put_sides(vsh_triangles *triangles, const vsh_mesh *mesh, vshi_terrain grid, size_t vertex,
+                      size_t triangle) {
+    vshi_sheet *sheet = &triangles->sheet;
+    const size_t edge = vshi_terrain_edge_length(grid), samples = grid.columns * grid.rows;
+    const size_t first = 2 * (grid.columns - 1) * (grid.rows - 1);
+    const bool mirrored = vshi_transform_determinant(mesh->transform) < 0.0;
+    for (size_t i = 0; i < 3 * edge; ++i) {
+        uint32_t of[3];
+        vshi_terrain_triangle(grid, first + i, of);
+        const size_t next = (i / 3 + 1) % edge;
+        for (size_t k = 0; k < 3; ++k) { /* a sample of the edge, in the order of the sides, or the bottom */
+            const size_t place = of[k] >= samples       ? edge + of[k] - samples
+                                 : i % 3 == 0 && k == 1 ? next
+                                                        : i / 3;
+            const vshi_vec local = vshi_vec_off(mesh->positions + 3 * (size_t)of[k]);
+            put(triangles, vshi_transform_point(mesh->transform, local),
+                sheet->vertices + 3 * (vertex + place));
+            sheet->corners[3 * (triangle + i) + k] = (uint32_t)(vertex + place);
+        }
+        triangles->solid[triangle + i] = mirrored ? VSHI_SOLID_BEFORE : VSHI_SOLID_BEHIND;
+    }
+    triangles->has_solids = true;
+}
+
 /* The sheet of all meshes: their vertices, welded, and the triangles that are not degenerate. */
 static vsh_result make_sheet(vsh_triangles *triangles, const vshi_mesh_set *set, vsh_error *error) {
     const vsh_mesh *meshes = set->meshes;
     const size_t mesh_count = set->count;
     size_t vertex_count = 0, triangle_count = 0, most = 0;
     for (size_t m = 0; m < mesh_count; ++m) {
-        vertex_count += meshes[m].vertex_count;
-        most = meshes[m].vertex_count > most ? meshes[m].vertex_count : most;
-        triangle_count += meshes[m].triangle_count - set->checked[m].report.degenerate_triangles;
+        const size_t vertices = sheet_vertices(triangles, &meshes[m], m);
+        vertex_count += vertices;
+        most = vertices > most ? vertices : most;
+        triangle_count += sheet_triangles(triangles, set, m);
     }
     if (vertex_count > UINT32_MAX || triangle_count > VSHI_SHEET_TRIANGLES) {
         return vshi_fail(error, VSH_ERROR_LIMIT,
@@ -182,8 +267,15 @@ static vsh_result make_sheet(vsh_triangles *triangles, const vshi_mesh_set *set,
         const vsh_mesh *mesh = &meshes[m];
         const uint8_t *sides = vshi_solidity_sides(set->solidity, m);
         const uint8_t *holed = vshi_solidity_holed(set->solidity, m);
-        VSHI_TRY_DONE(vshi_solidity_weld(set->solidity, meshes, m, weld, error));
         triangles->first[m] = (uint32_t)triangle;
+        const vshi_terrain_part *part = terrain_of(triangles, m);
+        if (part != NULL) {
+            put_sides(triangles, mesh, part->grid, vertex, triangle);
+            vertex += sheet_vertices(triangles, mesh, m);
+            triangle += sheet_triangles(triangles, set, m);
+            continue;
+        }
+        VSHI_TRY_DONE(vshi_solidity_weld(set->solidity, meshes, m, weld, error));
         for (size_t i = 0; i < mesh->triangle_count; ++i) {
             if (vshi_mesh_degenerate(mesh, i)) {
                 continue;
@@ -213,6 +305,7 @@ static bool attach(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh
     const vshi_sheet *sheet = &triangles->sheet;
     const size_t begin = triangles->first[mesh];
     const size_t end = mesh + 1 < mesh_count ? triangles->first[mesh + 1] : sheet->triangle_count;
+    const size_t vertex_count = sheet_vertices(triangles, &meshes[mesh], mesh);
     if (begin == end) {
         return true;
     }
@@ -222,12 +315,12 @@ static bool attach(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh
         return false;
     }
     float *vertices = triangles->embree->rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), meshes[mesh].vertex_count);
+        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertex_count);
     uint32_t *indices = triangles->embree->rtcSetNewGeometryBuffer(
         geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), end - begin);
     vshi_sieve_attach(triangles, mesh, geometry);
     if (vertices != NULL && indices != NULL) {
-        memcpy(vertices, sheet->vertices + 3 * first_vertex, meshes[mesh].vertex_count * 3 * sizeof(float));
+        memcpy(vertices, sheet->vertices + 3 * first_vertex, vertex_count * 3 * sizeof(float));
         for (size_t i = 0; i < 3 * (end - begin); ++i) {
             indices[i] = sheet->corners[3 * begin + i] - (uint32_t)first_vertex;
         }
@@ -309,9 +402,14 @@ static vsh_result build(vsh_triangles *triangles, const vshi_mesh_set *set, vshi
         if (!attach(triangles, set->meshes, set->count, m, vertex)) {
             return refuse(triangles, job, error);
         }
-        vertex += set->meshes[m].vertex_count;
+        vertex += sheet_vertices(triangles, &set->meshes[m], m);
         if (vshi_job_advance(job, 0)) {
             return vshi_job_fail_cancelled(job, error);
+        }
+    }
+    for (size_t k = 0; k < triangles->terrain_count; ++k) {
+        if (!vshi_terrain_attach(triangles, k)) {
+            return refuse(triangles, job, error);
         }
     }
     if (triangles->solids != NULL && !vshi_triangles_attach_solids(triangles)) {
@@ -384,19 +482,23 @@ vsh_result vsh_triangles_create_beside(const vsh_mesh *meshes, size_t mesh_count
     vshi_job *job = NULL;
     vsh_result result;
     VSHI_TRY_DONE(vshi_mesh_set_create(meshes, mesh_count, &set, error));
-    double bytes = 0.0;
-    for (size_t m = 0; m < mesh_count; ++m) {
-        const double vertices = (double)meshes[m].vertex_count, faces = (double)meshes[m].triangle_count;
-        bytes += 12.0 * vertices + TRIANGLE_BYTES * faces + vshi_sheet_bytes(vertices, faces);
-    }
-    VSHI_TRY_DONE(vshi_check_limit(&full, bytes, "triangles", error));
     VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, "triangles", error));
     VSHI_TRY_DONE(vshi_mesh_set_solve(&set, &full, error));
+    VSHI_TRY_DONE(find_terrains(made, &set, error));
+    double bytes = 0.0;
+    for (size_t m = 0; m < mesh_count; ++m) {
+        const double vertices = (double)sheet_vertices(made, &set.meshes[m], m);
+        const double faces = (double)sheet_triangles(made, &set, m);
+        const vshi_terrain_part *part = terrain_of(made, m);
+        bytes += 12.0 * vertices + TRIANGLE_BYTES * faces + vshi_sheet_bytes(vertices, faces) +
+                 (part != NULL ? SAMPLE_BYTES * (double)meshes[m].vertex_count : 0.0);
+    }
+    VSHI_TRY_DONE(vshi_check_limit(&full, bytes, "triangles", error));
     VSHI_TRY_DONE(vshi_sieves_create(made, set.meshes, set.count, &full, bytes, error));
     made->limit = full.memory_limit;
     made->solids = solids;
-    made->mesh_count = mesh_count;
     measure(made, set.meshes, set.count);
+    VSHI_TRY_DONE(make_reliefs(made, &set, error));
     job = vshi_job_begin(&full, "triangles", 1);
     if (job == NULL) {
         result = vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory");
@@ -433,6 +535,10 @@ void vsh_triangles_free(vsh_triangles *triangles) {
     }
     vshi_sieves_free(triangles);
     vshi_sheet_free(&triangles->sheet);
+    for (size_t k = 0; k < triangles->terrain_count; ++k) {
+        vshi_relief_free(&triangles->terrains[k].relief);
+    }
+    free(triangles->terrains);
     free(triangles->solid);
     free(triangles->first);
     free(triangles);
@@ -441,7 +547,11 @@ void vsh_triangles_free(vsh_triangles *triangles) {
 uint64_t vsh_triangles_bytes(const vsh_triangles *triangles) {
     const long long bytes = atomic_load(&triangles->bytes);
     const vshi_sheet *sheet = &triangles->sheet;
-    return sizeof *triangles + triangles->sieve_bytes + (bytes > 0 ? (uint64_t)bytes : 0) +
+    size_t reliefs = 0;
+    for (size_t k = 0; k < triangles->terrain_count; ++k) {
+        reliefs += triangles->terrains[k].relief.bytes;
+    }
+    return sizeof *triangles + triangles->sieve_bytes + reliefs + (bytes > 0 ? (uint64_t)bytes : 0) +
            sheet->triangle_count +
            (uint64_t)vshi_sheet_bytes((double)sheet->vertex_count, (double)sheet->triangle_count);
 }

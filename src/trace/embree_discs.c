@@ -131,7 +131,7 @@ static void trace(const vsh_triangles *t, const uint32_t (*points)[2], bool dome
                   uint32_t size, int32_t *lit) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    context.flags = t->fine ? RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT : RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    context.flags = vshi_triangles_flags(t, true);
     uint32_t cell[LANES];
     int32_t seen[LANES] = {0};
     for (int l = 0; l < LANES; ++l) {

@@ -62,23 +62,23 @@ typedef struct looking {
     crossing *crossings; /* NULL: the first is looked for */
 } looking;
 
-/* 1 where a ray of this direction leaves the triangle's solid, -1 where it enters it, 0 for a sheet. */
-static int8_t crosses(const vsh_triangles *triangles, unsigned mesh, unsigned local, vshi_vec direction) {
-    const uint32_t triangle = triangles->first[mesh] + local;
-    const uint8_t solid = triangles->solid[triangle] & VSHI_SOLID_SIDE;
-    if (solid == VSHI_AIR_AROUND) {
+/* 1 where a ray of this direction leaves the solid of a triangle with this normal, -1 where it enters it, 0
+ * for a sheet. */
+static int8_t crosses(uint8_t solid, vshi_vec normal, vshi_vec direction) {
+    if ((solid & VSHI_SOLID_SIDE) == VSHI_AIR_AROUND) {
         return 0;
     }
-    const uint32_t *corners = triangles->sheet.corners + 3 * (size_t)triangle;
-    const vshi_vec a = vshi_vec_off(triangles->sheet.vertices + 3 * (size_t)corners[0]);
-    const vshi_vec b = vshi_vec_off(triangles->sheet.vertices + 3 * (size_t)corners[1]);
-    const vshi_vec c = vshi_vec_off(triangles->sheet.vertices + 3 * (size_t)corners[2]);
-    const bool forwards = vshi_dot(vshi_cross(vshi_sub(b, a), vshi_sub(c, a)), direction) > 0.0;
-    return forwards == (solid == VSHI_SOLID_BEHIND) ? 1 : -1;
+    const bool forwards = vshi_dot(normal, direction) > 0.0;
+    return forwards == ((solid & VSHI_SOLID_SIDE) == VSHI_SOLID_BEHIND) ? 1 : -1;
 }
 
 /* Rows of N values that rays and hits are made of; Embree has names for them in C++ only. */
-enum { RAY_DIRECTION = 4, RAY_FAR = 8, HIT_TRIANGLE = 5, HIT_MESH = 6 };
+enum { RAY_DIRECTION = 4, RAY_FAR = 8, HIT_NORMAL = 0, HIT_TRIANGLE = 5, HIT_MESH = 6 };
+
+static vshi_vec vector_of(const float *rows, size_t first, size_t n, size_t i) {
+    return (vshi_vec){(double)rows[first * n + i], (double)rows[(first + 1) * n + i],
+                      (double)rows[(first + 2) * n + i]};
+}
 
 /* Sheets are passed by; where all crossings are asked for, each is noted and passed by. */
 static void filter(const struct RTCFilterFunctionNArguments *args) {
@@ -90,17 +90,15 @@ static void filter(const struct RTCFilterFunctionNArguments *args) {
         if (args->valid[i] != -1) {
             continue;
         }
-        const unsigned mesh = hit[HIT_MESH * n + i], local = hit[HIT_TRIANGLE * n + i];
-        const uint8_t solid = look->triangles->solid[look->triangles->first[mesh] + local];
+        const uint8_t solid =
+            vshi_triangles_solid(look->triangles, hit[HIT_MESH * n + i], hit[HIT_TRIANGLE * n + i]);
         if (solid == VSHI_AIR_AROUND || look->crossings != NULL) {
             args->valid[i] = 0;
         }
         if (solid != VSHI_AIR_AROUND && look->crossings != NULL && look->count < MOST_CROSSINGS) {
-            const vshi_vec direction = {(double)ray[RAY_DIRECTION * n + i],
-                                        (double)ray[(RAY_DIRECTION + 1) * n + i],
-                                        (double)ray[(RAY_DIRECTION + 2) * n + i]};
+            const vshi_vec normal = vector_of((const float *)args->hit, HIT_NORMAL, n, i);
             look->crossings[look->count++] =
-                (crossing){ray[RAY_FAR * n + i], crosses(look->triangles, mesh, local, direction)};
+                (crossing){ray[RAY_FAR * n + i], crosses(solid, normal, vector_of(ray, RAY_DIRECTION, n, i))};
         }
     }
 }
@@ -111,14 +109,16 @@ static void begin_look(looking *look, const vsh_triangles *triangles, crossing *
     look->context.filter = filter;
 }
 
-static uint8_t met(const vsh_triangles *triangles, unsigned mesh, unsigned local,
-                   const vshi_segment_ray *ray) {
-    if (mesh == RTC_INVALID_GEOMETRY_ID) {
+static uint8_t met(const vsh_triangles *triangles, const struct RTCRayHit *ray) {
+    const struct RTCHit *hit = &ray->hit;
+    if (hit->geomID == RTC_INVALID_GEOMETRY_ID) {
         return VSHI_MEETS_NOTHING;
     }
-    const bool holed = (triangles->solid[triangles->first[mesh] + local] & VSHI_SOLID_HOLED) != 0;
-    const bool out = crosses(triangles, mesh, local, vshi_vec_of(ray->direction)) > 0;
-    return !out ? VSHI_MEETS_AIR : holed ? VSHI_MEETS_HOLED : VSHI_MEETS_SOLID;
+    const uint8_t solid = vshi_triangles_solid(triangles, hit->geomID, hit->primID);
+    const vshi_vec normal = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
+    const vshi_vec direction = {(double)ray->ray.dir_x, (double)ray->ray.dir_y, (double)ray->ray.dir_z};
+    const bool out = crosses(solid, normal, direction) > 0;
+    return !out ? VSHI_MEETS_AIR : (solid & VSHI_SOLID_HOLED) != 0 ? VSHI_MEETS_HOLED : VSHI_MEETS_SOLID;
 }
 
 /* Aims a lone ray; false where it has no direction. */
@@ -150,7 +150,7 @@ void vshi_triangles_meet(const vsh_triangles *triangles, const vshi_segment_ray 
         meets[i] = VSHI_MEETS_NOTHING;
         if (aim_lone(triangles, &rays[i], &lone)) {
             triangles->embree->rtcIntersect1(triangles->scene, &look.context, &lone);
-            meets[i] = met(triangles, lone.hit.geomID, lone.hit.primID, &rays[i]);
+            meets[i] = met(triangles, &lone);
         }
     }
 }

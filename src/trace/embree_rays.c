@@ -112,11 +112,17 @@ void vshi_triangles_occlude(const vsh_triangles *triangles, const int *valid,
     }
 }
 
+/* A context of Embree's, and what a filter is to know. */
+typedef struct blocking {
+    struct RTCIntersectContext context; /* first: the filter is given this */
+    const vsh_triangles *triangles;
+} blocking;
+
 static void find_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
                          RTCFilterFunctionN filter, bool *blocked) {
-    struct RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    context.filter = filter;
+    blocking look = {.triangles = triangles};
+    rtcInitIntersectContext(&look.context);
+    look.context.filter = filter;
     for (size_t begin = 0; begin < count; begin += VSHI_PACKET) {
         struct RTCRay16 packet = {0};
         _Alignas(64) int valid[VSHI_PACKET] = {0};
@@ -124,10 +130,8 @@ static void find_blocked(const vsh_triangles *triangles, const vshi_segment_ray 
         for (int lane = 0; lane < lanes; ++lane) {
             valid[lane] = vshi_triangles_aim(triangles, &rays[begin + (size_t)lane], &packet, lane) ? -1 : 0;
         }
-        context.flags = !triangles->fine && vshi_rays_together(rays + begin, lanes)
-                            ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
-                            : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
-        vshi_triangles_occlude(triangles, valid, &context, &packet);
+        look.context.flags = vshi_triangles_flags(triangles, vshi_rays_together(rays + begin, lanes));
+        vshi_triangles_occlude(triangles, valid, &look.context, &packet);
         for (int lane = 0; lane < lanes; ++lane) {
             blocked[begin + (size_t)lane] = valid[lane] != 0 && packet.tfar[lane] < 0.0f;
         }
@@ -139,17 +143,26 @@ void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_r
     find_blocked(triangles, rays, count, NULL, blocked);
 }
 
-/* An Embree filter: lets rays pass the fronts of triangles. */
+/* An Embree filter: lets rays pass the fronts of triangles. A solid's faces look away from it, also where a
+ * transform mirrors them; those of sheets look as their corners turn. */
 static void pass_fronts(const struct RTCFilterFunctionNArguments *args) {
-    enum { RAY_DIRECTION = 4, HIT_NORMAL = 0 }; /* rows of N values; Embree has names for them in C++ only */
+    /* rows of N values; Embree has names for them in C++ only */
+    enum { RAY_DIRECTION = 4, HIT_NORMAL = 0, HIT_TRIANGLE = 5, HIT_MESH = 6 };
+    const vsh_triangles *triangles = ((const blocking *)args->context)->triangles;
     const size_t n = args->N;
     const float *ray = (const float *)args->ray, *hit = (const float *)args->hit;
+    const unsigned *of = (const unsigned *)args->hit;
     for (size_t i = 0; i < n; ++i) {
+        if (args->valid[i] != -1) {
+            continue;
+        }
         float along = 0.0f;
         for (size_t axis = 0; axis < 3; ++axis) {
             along += ray[(RAY_DIRECTION + axis) * n + i] * hit[(HIT_NORMAL + axis) * n + i];
         }
-        if (!(along > 0.0f)) {
+        const uint8_t solid =
+            vshi_triangles_solid(triangles, of[HIT_MESH * n + i], of[HIT_TRIANGLE * n + i]) & VSHI_SOLID_SIDE;
+        if (!(solid == VSHI_SOLID_BEFORE ? along < 0.0f : along > 0.0f)) {
             args->valid[i] = 0;
         }
     }
@@ -195,12 +208,10 @@ void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *b
         for (int layer = 0; near && layer < LAYERS && !cut[b] && next_hit(triangles, &beam, from, &hit);
              ++layer) {
             const double distance = (double)hit.ray.tfar;
-            if (hit.hit.geomID >= triangles->mesh_count) {
-                break;
-            }
-            const uint32_t triangle = triangles->first[hit.hit.geomID] + hit.hit.primID;
-            cut[b] = !vshi_sieve_is(triangles, hit.hit.geomID) &&
-                     vshi_sheet_cuts(&triangles->sheet, &beam, triangle, distance, most);
+            const unsigned mesh = hit.hit.geomID;
+            cut[b] = mesh < triangles->first_terrain && !vshi_sieve_is(triangles, mesh) &&
+                     vshi_sheet_cuts(&triangles->sheet, &beam, triangles->first[mesh] + hit.hit.primID,
+                                     distance, most);
             from = distance * (1.0 + 0x1p-16) + 0x1p-16;
         }
     }

@@ -3,6 +3,7 @@
 #define VSHI_EMBREE_SCENE_H
 
 #include "trace/embree.h"
+#include "trace/terrain.h"
 
 #include <stdint.h>
 
@@ -28,11 +29,11 @@
     CALL(rtcReleaseDevice)                                                                                   \
     CALL(rtcReleaseGeometry)                                                                                 \
     CALL(rtcReleaseScene)                                                                                    \
+    CALL(rtcSetDeviceMemoryMonitorFunction)                                                                  \
     CALL(rtcSetGeometryBoundsFunction)                                                                       \
     CALL(rtcSetGeometryIntersectFunction)                                                                    \
     CALL(rtcSetGeometryOccludedFunction)                                                                     \
     CALL(rtcSetGeometryUserPrimitiveCount)                                                                   \
-    CALL(rtcSetDeviceMemoryMonitorFunction)                                                                  \
     CALL(rtcSetGeometryIntersectFilterFunction)                                                              \
     CALL(rtcSetGeometryOccludedFilterFunction)                                                               \
     CALL(rtcSetGeometryUserData)                                                                             \
@@ -57,6 +58,15 @@ enum { VSHI_SOLID_HOLED = 4 };
 
 struct vshi_sieve; /* embree_mask.h */
 
+/* A mesh that is a terrain. Its sides and bottom are triangles like others, its top is a geometry of its own.
+ */
+typedef struct vshi_terrain_part {
+    size_t mesh;
+    vshi_terrain grid;
+    vshi_relief relief;
+    float corners[8][3]; /* of the box around its top, in the scene's units */
+} vshi_terrain_part;
+
 /* The texels of a mask. */
 typedef struct vshi_texture {
     uint8_t *alpha;
@@ -70,9 +80,12 @@ struct vsh_triangles {
     const vshi_embree *embree;
     RTCDevice device;
     RTCScene scene;
-    vshi_sheet sheet;       /* of all geometries one after the other, in the scene's units */
-    uint32_t *first;        /* triangle of the sheet that each geometry begins with */
-    uint8_t *solid;         /* [of the sheet]: where each one's solid lies */
+    vshi_sheet sheet;            /* of all geometries one after the other, in the scene's units */
+    uint32_t *first;             /* triangle of the sheet that each geometry begins with */
+    uint8_t *solid;              /* [of the sheet]: where each one's solid lies */
+    vshi_terrain_part *terrains; /* [terrain_count] */
+    size_t terrain_count;
+    unsigned first_terrain; /* geometries from here on are the tops of terrains */
     bool has_solids;        /* any */
     bool has_holes;         /* in any of them */
     bool wide;              /* VSHI_PACKET rays are traced at once, not in two halves */
@@ -88,7 +101,6 @@ struct vsh_triangles {
     const vsh_solids *solids; /* beside the triangles; may be NULL. Geometries after those of the meshes have
                                * no triangles in the sheet */
     bool owns_solids;
-    size_t mesh_count;
     uint64_t limit; /* bytes that Embree may hold; 0: no limit */
     atomic_llong bytes;
     atomic_bool refused;
@@ -96,6 +108,24 @@ struct vsh_triangles {
 
 /* Adds triangles->solids to the scene as one geometry; false where Embree refuses: its error says why. */
 bool vshi_triangles_attach_solids(vsh_triangles *triangles);
+
+/* VSHI_SOLID_… of a primitive of a geometry. */
+static inline uint8_t vshi_triangles_solid(const vsh_triangles *triangles, unsigned mesh, unsigned local) {
+    return mesh >= triangles->first_terrain ? VSHI_SOLID_BEHIND
+                                            : triangles->solid[triangles->first[mesh] + local];
+}
+
+/* How packets go on: all rays together, or (where they go apart) each by itself. Terrains follow a packet's
+ * rays all at once in any case. */
+static inline enum RTCIntersectContextFlags vshi_triangles_flags(const vsh_triangles *triangles,
+                                                                 bool together) {
+    return !triangles->fine && (together || triangles->terrain_count > 0)
+               ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
+               : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+}
+
+/* Adds the geometry of terrain `number`; false where Embree refuses. */
+bool vshi_terrain_attach(const vsh_triangles *triangles, size_t number);
 
 /* Rays that are traced at a time, where the machine has vectors so wide; else half as many, twice. On the
  * cloister, towards a sun of 5°, a ray takes 36 ns alone, 15 of eight and 9.5 of sixteen that are told to go

@@ -81,7 +81,8 @@ bool vshi_triangles_attach_solids(vsh_triangles *triangles) {
     embree->rtcSetGeometryIntersectFunction(geometry, intersect);
     embree->rtcSetGeometryOccludedFunction(geometry, occlude);
     embree->rtcCommitGeometry(geometry);
-    embree->rtcAttachGeometryByID(triangles->scene, geometry, (unsigned)triangles->mesh_count);
+    embree->rtcAttachGeometryByID(triangles->scene, geometry,
+                                  (unsigned)(triangles->first_terrain + triangles->terrain_count));
     embree->rtcReleaseGeometry(geometry);
     return true;
 }

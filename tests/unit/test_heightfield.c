@@ -2,8 +2,13 @@
 #include "images.h"
 #include "terrain.h"
 
+#include "base/isa.h"
 #include "base/vec.h"
+#include "heightfield/heights_check.h"
+#include "mesh/solidity.h"
 #include "previews.h"
+#include "trace/embree.h"
+#include "trace/terrain.h"
 
 #include <vdbshade/scene.h>
 
@@ -72,6 +77,38 @@ static void a_surface_lies_under_its_lightmap_as_the_image_does(void **state) {
     vsh_model_free(model);
 }
 
+static void a_surface_keeps_the_heights_beside_each_texel_s_middle(void **state) {
+    (void)state;
+    static const struct {
+        size_t texels, most; /* columns of texels, and of heights that are kept */
+    } cases[] = {{1, 5}, {15, 33}, {16, 50}, {32, SIDE}, {100, SIDE}};
+    float *values = hills(SIDE, SIDE);
+    const vsh_heights_source source = source_of(values, SIDE, SIDE, 10.0, 2.0);
+    const vsh_run run = vsh_run_default();
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        const size_t texels[2] = {cases[i].texels, 8};
+        vsh_model *model = NULL;
+        assert_int_equal(vshi_model_of_heights(&source, VSH_HEIGHTS_SURFACE, texels, &run, &model, NULL),
+                         VSH_OK);
+        const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
+        vshi_terrain grid;
+        assert_true(vshi_mesh_is_terrain(&mesh, &grid));
+        assert_true(grid.columns <= cases[i].most && grid.rows <= 26);
+        assert_true(mesh.uvs[0] == 0.0f && mesh.uvs[2 * (grid.columns - 1)] == 1.0f);
+        for (size_t texel = 0; texel < texels[0]; ++texel) {
+            const double middle = ((double)texel + 0.5) / (double)texels[0];
+            size_t next = 1;
+            while ((double)mesh.uvs[2 * next] < middle) {
+                ++next;
+            }
+            /* one cell of the heights is all that lies between */
+            assert_true((double)(mesh.uvs[2 * next] - mesh.uvs[2 * next - 2]) * (SIDE - 1) < 1.001);
+        }
+        vsh_model_free(model);
+    }
+    free(values);
+}
+
 static int stop_at_once(void *user, const char *stage, double fraction) {
     (void)user, (void)stage, (void)fraction;
     return 1;
@@ -134,6 +171,197 @@ static void the_field_of_a_heightfield_holds_distances_not_gaps(void **state) {
     }
     vsh_field_free(field);
     vsh_model_free(model);
+}
+
+/* A triangle's corners that begin elsewhere show the same, but the mesh is no terrain any more. */
+static vsh_mesh reindexed(const vsh_mesh *mesh, uint32_t *indices) {
+    vsh_mesh other = *mesh;
+    memcpy(indices, mesh->indices, 3 * mesh->triangle_count * sizeof *indices);
+    for (int k = 0; k < 3; ++k) {
+        indices[k] = mesh->indices[(k + 1) % 3];
+    }
+    other.indices = indices;
+    return other;
+}
+
+static void a_terrain_is_solid_or_open_as_its_triangles_are(void **state) {
+    (void)state;
+    static const double mirrors[12] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    float *values = hills(SIDE, 40);
+    const vsh_heights_source source = source_of(values, SIDE, 40, 10.0, 2.0);
+    uint32_t *indices = malloc(16 * SIDE * 40 * sizeof *indices);
+    assert_non_null(indices);
+    for (int i = 0; i < 4; ++i) {
+        vsh_model *model = model_of(&source, i % 2 == 0 ? VSH_HEIGHTS_SOLID : VSH_HEIGHTS_SURFACE);
+        vsh_mesh meshes[2] = {vsh_model_mesh(model, 0, -1)};
+        meshes[0].transform = i < 2 ? NULL : mirrors;
+        meshes[1] = reindexed(&meshes[0], indices);
+        vshi_terrain terrain;
+        assert_true(vshi_mesh_is_terrain(&meshes[0], &terrain) &&
+                    !vshi_mesh_is_terrain(&meshes[1], &terrain));
+        const vsh_run run = vsh_run_default();
+        vshi_solidity *found[2];
+        const vshi_component *c[2];
+        for (int k = 0; k < 2; ++k) {
+            size_t count;
+            assert_int_equal(vshi_solidity_create(&meshes[k], 1, &run, &found[k], NULL), VSH_OK);
+            c[k] = vshi_solidity_components(found[k], &count);
+            assert_int_equal(count, 1);
+        }
+        assert_int_equal(c[0]->kind, c[1]->kind);
+        assert_int_equal(c[0]->kind, i % 2 == 0 ? VSHI_KIND_SOLID : VSHI_KIND_SHEET);
+        assert_int_equal(c[0]->vessel, c[1]->vessel);
+        assert_int_equal(c[0]->triangles, c[1]->triangles);
+        assert_int_equal(c[0]->turned, c[1]->turned);
+        assert_int_equal(c[0]->open_edges, c[1]->open_edges);
+        assert_int_equal(c[0]->holes, c[1]->holes);
+        assert_true(c[0]->area == c[1]->area);
+        assert_true(fabs(c[0]->volume - c[1]->volume) <= 1e-9 * c[0]->area);
+        assert_memory_equal(vshi_solidity_sides(found[0], 0), vshi_solidity_sides(found[1], 0),
+                            meshes[0].triangle_count);
+        vshi_solidity_free(found[0]);
+        vshi_solidity_free(found[1]);
+        vsh_model_free(model);
+    }
+    free(indices);
+    free(values);
+}
+
+static double random_part(uint32_t *state) {
+    *state = *state * 1664525u + 1013904223u;
+    return (double)(*state >> 8) / 16777216.0;
+}
+
+static vsh_triangles *make_triangles(const vsh_mesh *mesh) {
+    vsh_triangles *triangles = NULL;
+    assert_int_equal(vsh_triangles_create(mesh, 1, NULL, &triangles, NULL), VSH_OK);
+    return triangles;
+}
+
+/* From anywhere to anywhere, some upright, some along the grid. */
+static vshi_segment_ray random_ray(const vsh_triangles *of, int number, uint32_t *seed) {
+    double low[3], high[3], square = 0.0;
+    vshi_triangles_bounds(of, low, high);
+    vshi_segment_ray ray = {.far = number % 3 == 0 ? INFINITY : 0.0};
+    for (int k = 0; k < 3; ++k) {
+        const double side = high[k] - low[k];
+        ray.origin[k] = low[k] + (1.4 * random_part(seed) - 0.2) * side;
+        ray.direction[k] = number % 8 == 0 && k != number / 8 % 3 ? 0.0 : random_part(seed) - 0.5;
+        square += ray.direction[k] * ray.direction[k];
+    }
+    for (int k = 0; k < 3; ++k) {
+        ray.direction[k] /= sqrt(square);
+    }
+    ray.far = ray.far > 0.0 ? ray.far : 4.0 * random_part(seed);
+    return ray;
+}
+
+static void rays_meet_a_terrain_as_they_meet_its_triangles(void **state) {
+    (void)state;
+    enum { RAYS = 20000, COLUMNS = 40 };
+    static const double transforms[][12] = {
+        {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
+        {0, 0, 3, 100, 3, 0, 0, -7, 0, 3, 0, 2},               /* turned, z up */
+        {-0.6, 0.8, 0, 5, 0.8, 0.6, 0, 1e3, 0, 0, 1, 0},       /* mirrored, and tilted */
+        {1e-3, 2e-4, 0, 0, 0, 4e-3, 0, 0, 1e-4, 0, 1e-3, 0.1}, /* sheared */
+    };
+    float *values = hills(COLUMNS, SIDE);
+    const vsh_heights_source source = source_of(values, COLUMNS, SIDE, 10.0, 2.0);
+    vsh_model *model = model_of(&source, VSH_HEIGHTS_SOLID);
+    uint32_t *indices = malloc(16 * SIDE * COLUMNS * sizeof *indices);
+    assert_non_null(indices);
+    for (size_t i = 0; i < sizeof transforms / sizeof transforms[0]; ++i) {
+        vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
+        mesh.transform = transforms[i];
+        const vsh_mesh other = reindexed(&mesh, indices);
+        vsh_triangles *terrain = make_triangles(&mesh), *triangles = make_triangles(&other);
+        assert_true(vsh_triangles_bytes(terrain) < vsh_triangles_bytes(triangles) / 4);
+        uint32_t seed = (uint32_t)i;
+        int apart[4] = {0};
+        for (int k = 0; k < RAYS; ++k) {
+            const vshi_segment_ray ray = random_ray(triangles, k, &seed);
+            bool blocked[2], backs[2];
+            uint8_t meets[2];
+            vsh_triangles *const both[2] = {terrain, triangles};
+            for (int b = 0; b < 2; ++b) {
+                vshi_triangles_blocked(both[b], &ray, 1, &blocked[b]);
+                vshi_triangles_meet_backs(both[b], &ray, 1, &backs[b]);
+                vshi_triangles_meet(both[b], &ray, 1, &meets[b]);
+            }
+            apart[0] += blocked[0] != blocked[1];
+            apart[1] += backs[0] != backs[1];
+            apart[2] += meets[0] != meets[1];
+            apart[3] += vshi_triangles_depth(terrain, &ray) != vshi_triangles_depth(triangles, &ray);
+            const double near = vshi_triangles_distance(terrain, &ray);
+            if (blocked[0] && blocked[1] && meets[0] == meets[1]) {
+                assert_true(fabs(near / vshi_triangles_distance(triangles, &ray) - 1.0) < 1e-2);
+            }
+        }
+        print_message("transform %zu: of %d rays %d, %d, %d and %d differ\n", i, RAYS, apart[0], apart[1],
+                      apart[2], apart[3]);
+        const bool mirrored = vshi_transform_determinant(transforms[i]) < 0.0;
+        for (int k = 0; k < 4; ++k) { /* rays that graze an edge */
+            /* vshi_triangles_meet_backs() confuses the sides of mirrored triangles */
+            assert_true(apart[k] < RAYS / 2000 || (k == 1 && mirrored));
+        }
+        vsh_triangles_free(triangles);
+        vsh_triangles_free(terrain);
+    }
+    free(indices);
+    vsh_model_free(model);
+    free(values);
+}
+
+static void every_instruction_set_finds_the_same_crossings(void **state) {
+    (void)state;
+    static const struct {
+        int32_t isa;
+        vshi_terrain_kernel *kernel;
+    } sets[] = {
+        {VSH_ISA_BASE, vshi_terrain_base},
+#if defined(__x86_64__)
+        {VSH_ISA_AVX2, vshi_terrain_avx2},
+        {VSH_ISA_AVX512, vshi_terrain_avx512}
+#endif
+    };
+    float *values = hills(SIDE, SIDE);
+    const vsh_heights_source source = source_of(values, SIDE, SIDE, 10.0, 2.0);
+    vsh_model *model = model_of(&source, VSH_HEIGHTS_SOLID);
+    const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
+    vshi_terrain grid;
+    vshi_relief relief;
+    assert_true(vshi_mesh_is_terrain(&mesh, &grid));
+    const double centre[3] = {0.0, 0.0, 0.0};
+    assert_int_equal(vshi_relief_create(&mesh, grid, centre, 1.0, &relief, NULL), VSH_OK);
+    uint32_t seed = 7;
+    int crossed = 0;
+    for (int i = 0; i < 2000; ++i) {
+        vshi_terrain_rays rays;
+        for (int lane = 0; lane < VSHI_TERRAIN_LANES; ++lane) {
+            float origin[3], direction[3];
+            for (int k = 0; k < 3; ++k) {
+                origin[k] = (float)(k == 1 ? 3.0 * random_part(&seed) : 12.0 * random_part(&seed) - 6.0);
+                direction[k] = (float)(random_part(&seed) - 0.5);
+            }
+            vshi_terrain_aim(&relief, origin, direction, 0.0, lane % 3 == 0 ? 5.0 : INFINITY, lane, &rays);
+        }
+        float first[VSHI_TERRAIN_LANES];
+        for (size_t k = 0; k < sizeof sets / sizeof sets[0]; ++k) {
+            if (vshi_isa_check(sets[k].isa, NULL) != VSH_OK) {
+                continue;
+            }
+            sets[k].kernel(&relief, &rays);
+            if (k == 0) {
+                memcpy(first, rays.hit, sizeof first);
+                crossed += first[0] < INFINITY || first[1] < INFINITY;
+            }
+            assert_memory_equal(first, rays.hit, sizeof first);
+        }
+    }
+    assert_true(crossed > 500);
+    vshi_relief_free(&relief);
+    vsh_model_free(model);
+    free(values);
 }
 
 /* A scene of one heightfield caster over an image in the tests' folder. */
@@ -301,8 +529,12 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_solid_is_closed_wound_outwards_and_of_its_volume),
         cmocka_unit_test(a_surface_lies_under_its_lightmap_as_the_image_does),
+        cmocka_unit_test(a_surface_keeps_the_heights_beside_each_texel_s_middle),
         cmocka_unit_test(a_band_that_would_take_minutes_is_refused_and_the_one_it_names_is_not),
         cmocka_unit_test(the_field_of_a_heightfield_holds_distances_not_gaps),
+        cmocka_unit_test(a_terrain_is_solid_or_open_as_its_triangles_are),
+        cmocka_unit_test(rays_meet_a_terrain_as_they_meet_its_triangles),
+        cmocka_unit_test(every_instruction_set_finds_the_same_crossings),
         cmocka_unit_test_setup_teardown(images_of_8_16_and_32_bits_are_read, make_folder, remove_folder),
         cmocka_unit_test_setup_teardown(bad_images_are_refused_with_their_place, make_folder, remove_folder),
         cmocka_unit_test(bad_sources_are_refused),
