@@ -1,5 +1,5 @@
-/* Casters without voxels: a heightfield of 4096² marched as it is, and 10^4 spheres in closed form, each
- * against the same solids voxelised and against rays. */
+/* Compares a heightfield of 4096² that is marched as it is, and 10^4 spheres in closed form, with the same
+ * solids voxelised and with rays. */
 #include "bench.h"
 #include "casts.h"
 #include "field/field.h"
@@ -162,9 +162,9 @@ static vsh_field *voxelise(const terrain *t, double voxel) {
     return field;
 }
 
-/* Methods against voxels; `direct` is what the terrain said as it is. */
+/* Methods against voxels. */
 static void bench_voxels(FILE *csv, const terrain *t, const vsh_points *points, const vsh_light *light,
-                         double ray, const float *truth, const float *direct, float *values) {
+                         double ray, const float *truth, float *values) {
     static const double voxels[] = {1.0, 0.5};
     for (size_t v = 0; v < 2; ++v) {
         vsh_field *field = voxelise(t, voxels[v]);
@@ -182,8 +182,6 @@ static void bench_voxels(FILE *csv, const terrain *t, const vsh_points *points, 
             snprintf(what, sizeof what, "%s %g",
                      light != NULL ? vsh_shadow_method_name(methods[m]) : "ao cones", voxels[v]);
             row(csv, "terrain", what, seconds, COUNT, ray, &stats, values, truth);
-            const truth_metrics apart = truth_compare(COUNT, direct, values, NULL);
-            truth_metrics_print("  direct from it", &apart);
         }
         vsh_field_free(field);
     }
@@ -192,8 +190,7 @@ static void bench_voxels(FILE *csv, const terrain *t, const vsh_points *points, 
 static void bench_heights(FILE *csv) {
     terrain t = make();
     const vsh_points points = {COUNT, t.positions, t.normals, NULL};
-    float *truth = bench_take(COUNT * sizeof *truth), *values = bench_take(COUNT * sizeof *values),
-          *direct = bench_take(COUNT * sizeof *direct);
+    float *truth = bench_take(COUNT * sizeof *truth), *values = bench_take(COUNT * sizeof *values);
     vsh_light sun = vsh_light_default();
     memcpy(sun.direction, SUN, sizeof SUN);
     sun.angle = SUN_ANGLE;
@@ -217,26 +214,22 @@ static void bench_heights(FILE *csv) {
             }
             ray = bench_embree(csv, "terrain", t.truth, &question, truth, NULL, values).ray;
         }
-        vsh_shade_stats stats;
-        double seconds;
-        if (!ao) {
-            layer.method = VSH_SHADOW_HARD;
-            seconds = bench_shadow(BENCH_RUNS, bench_layered(empty, &layer), &points, &sun, &shade, direct,
-                                   NULL, &stats);
-            row(csv, "terrain", "direct hard", seconds, COUNT, ray, &stats, direct, truth);
-            layer.method = -1;
+        static const int32_t marches[] = {VSH_SHADOW_HARD, VSH_SHADOW_CLASSIC};
+        for (size_t m = 0; m < 2 && !ao; ++m) {
+            vsh_shade_stats stats;
+            char what[40];
+            layer.method = marches[m];
+            const double seconds = bench_shadow(BENCH_RUNS, bench_layered(empty, &layer), &points, &sun,
+                                                &shade, values, NULL, &stats);
+            snprintf(what, sizeof what, "direct %s", vsh_shadow_method_name(marches[m]));
+            row(csv, "terrain", what, seconds, COUNT, ray, &stats, values, truth);
         }
-        seconds = ao ? bench_ao(BENCH_RUNS, bench_layered(empty, &layer), &points, &shade, direct, &stats)
-                     : bench_shadow(BENCH_RUNS, bench_layered(empty, &layer), &points, &sun, &shade, direct,
-                                    NULL, &stats);
-        row(csv, "terrain", ao ? "direct ao" : "direct", seconds, COUNT, ray, &stats, direct, truth);
-        bench_voxels(csv, &t, &points, ao ? NULL : &sun, ray, truth, direct, values);
+        bench_voxels(csv, &t, &points, ao ? NULL : &sun, ray, truth, values);
     }
     vsh_field_free(empty);
     truth_mesh_free(t.truth);
     vsh_model_free(t.model);
     vsh_heights_free(t.heights);
-    free(direct);
     free(values);
     free(truth);
     free(t.normals);

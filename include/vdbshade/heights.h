@@ -1,4 +1,4 @@
-/* Heightfields: terrains as meshes to be voxelised, or as they are, for shadows without voxels. */
+/* Heightfields: terrains as meshes to be traced or voxelised, or as they are, to be marched. */
 #ifndef VDBSHADE_HEIGHTS_H
 #define VDBSHADE_HEIGHTS_H
 
@@ -44,16 +44,15 @@ enum {
 VSH_API vsh_result vsh_model_from_heights(const vsh_heights_source *source, int32_t what, const vsh_run *run,
                                           vsh_model **model, vsh_error *error);
 
-/* A heightfield that casts by itself, however large: heights under a pyramid of their maxima (A. Tevs, I.
- * Ihrke, H.-P. Seidel, "Maximum mipmaps for fast, accurate, and scalable dynamic height field rendering",
- * 2008). Immutable; may be shared by threads. */
+/* A heightfield that is marched as it is, for the shadow methods hard and classic (vsh_layer.heights).
+ * Immutable; may be shared by threads. */
 typedef struct vsh_heights vsh_heights;
 
-/* Copies the heights and makes the pyramid over them. Free the result with vsh_heights_free(). Errors:
+/* Copies the heights. Free the result with vsh_heights_free(). Errors:
  * - VSH_ERROR_ARGUMENT: source, values or heights NULL, sizes out of range, a transform that is not finite,
  *   shears, scales unevenly or flattens, run;
  * - VSH_ERROR_INPUT: a value that is not finite, or not once scaled, by its row and column;
- * - VSH_ERROR_LIMIT: run->memory_limit (5.4 bytes a sample);
+ * - VSH_ERROR_LIMIT: run->memory_limit (4 bytes a sample);
  * - VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_heights_create(const vsh_heights_source *source, const vsh_run *run,
                                       vsh_heights **heights, vsh_error *error);

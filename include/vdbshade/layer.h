@@ -25,8 +25,8 @@ typedef struct vsh_layer {
     size_t struct_size;
     const vsh_field *field; /* its casters; or NULL, and one of heights and spheres in its place */
     int32_t method;         /* VSH_SHADOW_… of its shadows; -1: that of the options. heights know
-                               VSH_SHADOW_HARD, spheres VSH_SHADOW_CLASSIC too; every other is their one soft
-                               method, and VSH_AO_… theirs */
+                               VSH_SHADOW_HARD and VSH_SHADOW_CLASSIC and refuse others. spheres know these
+                               too; every other is their one soft method, and VSH_AO_… theirs */
     int32_t combine;        /* VSH_COMBINE_… */
     double softness; /* factor on the sizes of lights, 0 hard … 1000: some casters hard, some soft in one
                         scene */
@@ -39,7 +39,8 @@ typedef struct vsh_layer {
     const char *const *lights;      /* [light_count]: names of the lights it casts for; NULL: of all */
     size_t light_count;             /* how many lights */
     int32_t ao;                     /* nonzero: part of ambient occlusion */
-    const vsh_heights *heights;     /* a heightfield as it is */
+    const vsh_heights *heights;     /* a heightfield that is marched as it is, for shadows. AO is that of
+                                       `field`, which may stand beside it; NULL: they have none */
     const vsh_spheres *spheres;     /* spheres as they are */
     const char *name; /* that of a scene's layer; NULL: none. For the caller: nothing here reads it */
 } vsh_layer;

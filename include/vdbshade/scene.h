@@ -53,7 +53,8 @@ typedef struct vsh_caster {
     double size[2];       /* heightfield, as in vsh_heights_source: these three */
     double height;
     double base;
-    int32_t direct;        /* heightfield: nonzero: cast as it is (vsh_heights), not voxelised */
+    int32_t direct;        /* heightfield: nonzero: marched as it is (vsh_heights) by VSH_SHADOW_HARD and
+                              VSH_SHADOW_CLASSIC; no other method takes notice */
     const double *spheres; /* [sphere_count][4], where there is no path: as in vsh_spheres_create() */
     size_t sphere_count;
     int32_t voxelised;        /* spheres: nonzero: part of the level set; 0: cast as they are (vsh_spheres) */
@@ -312,8 +313,9 @@ VSH_API const vsh_mesh *vsh_assets_receiver_page(const vsh_assets *assets, size_
 VSH_API const vsh_atlas *vsh_assets_receiver_atlas(const vsh_assets *assets, size_t index,
                                                    const size_t **numbers);
 
-/* What caster `index` casts by where it is not part of a level set: a heightfield that is direct, spheres
- * that are not voxelised. They belong to the assets; NULL for every other caster, and beyond the scene's. */
+/* What caster `index` casts by where it is not part of a level set: a direct heightfield that is
+ * marched, spheres that are not voxelised. They belong to the assets; NULL for every other caster, and beyond
+ * the scene's. */
 VSH_API const vsh_heights *vsh_assets_heights(const vsh_assets *assets, size_t index);
 VSH_API const vsh_spheres *vsh_assets_spheres(const vsh_assets *assets, size_t index);
 
@@ -350,8 +352,8 @@ VSH_API vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets 
                                        vsh_triangles **triangles, vsh_error *error);
 
 /* 1 where auto traces the casters in `layer`, or (NULL) in none. 0 where it marches them: one level set
- * alone, which keeps its voxels so, and masks and texts alone. Those that cast as they are (spheres and
- * heightfields in closed form) do not count. Also 1 where there are no others. */
+ * alone, which keeps its voxels so, and masks and texts alone. Those that cast as they are (spheres, and
+ * heightfields that are marched) do not count. Also 1 where there are no others. */
 VSH_API int32_t vsh_scene_traceable(const vsh_scene *scene, const vsh_scene_layer *layer);
 
 /* 1 where shadows of the casters in `layer`, or (NULL) in none, or AO are baked by a method that knows them

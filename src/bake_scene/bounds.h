@@ -15,8 +15,7 @@ vsh_result vshi_job_bounds(const vsh_bake_job *job, size_t index, const vsh_char
 
 /* Whether a caster is no part of a field, and has no triangles to be traced. */
 static inline bool vshi_casts_itself(const vsh_caster *caster) {
-    return (caster->type == VSH_CASTER_HEIGHTFIELD && caster->direct != 0) ||
-           (caster->type == VSH_CASTER_SPHERES && caster->voxelised == 0);
+    return caster->type == VSH_CASTER_SPHERES && caster->voxelised == 0;
 }
 
 #endif

@@ -26,8 +26,8 @@ static const double HALF_OPEN = 3500.0, CHANGING = 11000.0, LONE = 2800.0, SHAPE
 static const double CROWDED = 0.38, FEW_TRIANGLES = 0.01;
 /* AO of each texel's own rays, and of p (1 - p). */
 static const double ALONE = 4000.0, ALONE_HALF_OPEN = 8000.0;
-/* What is marched: a cone or a walk, a sample of it; of a heightfield's AO, what its azimuths take beside. */
-static const double MARCH = 250.0, SAMPLE = 10.0, AZIMUTHS = 12000.0;
+/* What is marched: a cone or a walk, a sample of it. */
+static const double MARCH = 250.0, SAMPLE = 10.0;
 /* What AO on a field takes of a texel that shares it, though nothing hides anything. */
 static const double FREE = 400.0;
 /* Where AO is interpolated, texels that are shaded: so many of each cell, and at each end of a chart. */
@@ -45,7 +45,6 @@ typedef struct shaded {
     double finer;    /* how many times as much rays take to the error asked for */
     double openings; /* times that what is open is shaded */
     double free;     /* FREE, where it is a field that is shot at */
-    double azimuths; /* AZIMUTHS of all heightfields that hide what is open */
     bool shares;
     bool lights_by_rays, open_by_rays; /* rays that max_error tells the number of */
     vshi_row_work *work;               /* [2][height / VSHI_TILE]: of each row of the few */
@@ -97,7 +96,6 @@ static void add_work(const shaded *s, size_t i, double *other, double *open) {
         *other += VSHI_LIT + (in_penumbra && s->lights_by_rays ? s->finer * VSHI_PENUMBRA : 0.0);
         shaped = shaped || in_penumbra;
     }
-    *other += s->azimuths;
     if (s->ao != NULL && s->open_by_rays) {
         const double p = (double)s->ao[i], half = p * (1.0 - p);
         *open += s->openings * s->free;
@@ -191,7 +189,7 @@ done:
     return result;
 }
 
-/* What is done by rays to triangles or a field, and what by heights. */
+/* What is done by rays to triangles or a field. */
 static void set_methods(const vsh_bake_job *job, shaded *s) {
     const vsh_occluders *occluders = job->occluders;
     const vsh_scene *scene = &job->scene;
@@ -202,10 +200,6 @@ static void set_methods(const vsh_bake_job *job, shaded *s) {
     s->lights_by_rays = shot && (lights & VSH_METHOD_KEEPS_ERROR) != 0;
     s->open_by_rays = shot && (open & VSH_METHOD_KEEPS_ERROR) != 0;
     s->free = s->shares && !traced ? FREE : 0.0;
-    for (size_t i = 0; i < occluders->layer_count; ++i) {
-        const vsh_layer *layer = &occluders->layers[i];
-        s->azimuths += layer->heights != NULL && layer->ao != 0 ? s->openings * AZIMUTHS : 0.0;
-    }
 }
 
 vsh_result vshi_shares_weigh(const vsh_bake_job *job, vshi_share_rows *share, const vsh_run *run,

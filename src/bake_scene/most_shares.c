@@ -11,8 +11,8 @@
  * rather too little. */
 static const double USUAL_PENUMBRA = 0.05, USUAL_SHARED = 1050.0, USUAL_ALONE = 5000.0;
 /* What these take more where fields are marched by rays that cones leave over, and by rays alone, rather too
- * much than too little. Heights and spheres take so much for what is open, whatever the error. */
-static const double MARCHED = 2.5, MARCHED_RAYS = 25.0, OVER_HEIGHTS = 30000.0, AMONG_SPHERES = 1000.0;
+ * much than too little. Spheres take so much for what is open, whatever the error. */
+static const double MARCHED = 2.5, MARCHED_RAYS = 25.0, AMONG_SPHERES = 1000.0;
 /* What all borders may take. */
 static const double MOST_BORDERS = 0.1;
 /* What each part takes by itself beside what it does for any: a heightfield's triangles, of 256 samples on a
@@ -73,8 +73,7 @@ static usual usual_of(const vsh_scene *scene) {
                .shares = openings > 0.0};
     for (size_t i = 0; i < scene->caster_count; ++i) {
         if (hides_open(scene, &scene->casters[i])) {
-            u.direct +=
-                openings * (scene->casters[i].type == VSH_CASTER_SPHERES ? AMONG_SPHERES : OVER_HEIGHTS);
+            u.direct += openings * AMONG_SPHERES;
             u.shares = false;
         }
     }

@@ -12,8 +12,7 @@ static inline bool cli_caster_has_triangles(const vsh_caster *caster) {
 
 /* Whether a caster stays out of level sets. */
 static inline bool cli_caster_is_direct(const vsh_caster *caster) {
-    return (caster->type == VSH_CASTER_HEIGHTFIELD && caster->direct) ||
-           (caster->type == VSH_CASTER_SPHERES && !caster->voxelised);
+    return caster->type == VSH_CASTER_SPHERES && !caster->voxelised;
 }
 
 /* How many casters are in level sets. */

@@ -351,7 +351,7 @@ static size_t take(const vsh_scene *scene, bool all, const vsh_scene_layer *laye
     size_t count = 0;
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
-        taken[i] = (all || vshi_caster_in_layer(caster, layer)) && !vshi_caster_is_direct(caster);
+        taken[i] = (all || vshi_caster_in_layer(caster, layer)) && !vshi_caster_is_direct(scene, caster);
         count += taken[i];
     }
     return count;

@@ -18,7 +18,7 @@ typedef struct vshi_asset_place {
     const vsh_grid *grid;   /* vdb casters; belongs to the assets' grids */
     vsh_outline *outline;   /* mask and text casters */
     vsh_model *made;        /* of heightfields; its meshes are this place's */
-    vsh_heights *heights;   /* direct ones */
+    vsh_heights *heights;   /* of direct heightfields, beside `made` */
     vsh_spheres *spheres;
     bool direct;
     vshi_mesh_set set; /* these two of a receiver */

@@ -48,8 +48,9 @@ static vsh_result place_heights(vsh_assets *assets, vshi_asset_place *place, vsh
     source->rows = map->rows;
     source->values = map->values;
     if (place->direct) {
-        source->transform = transform;
-        return vsh_heights_create(source, run, &place->heights, error);
+        vsh_heights_source placed = *source;
+        placed.transform = transform;
+        VSHI_TRY(vsh_heights_create(&placed, run, &place->heights, error));
     }
     VSHI_TRY(vshi_model_of_heights(source, what, texels, run, &place->made, error));
     return place_model(place, place->made, 0, transform, error);
@@ -95,7 +96,7 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "caster %zu: type %d: expected 0 … %d", index,
                          caster->type, VSH_CASTER_TEXT);
     }
-    place->direct = vshi_caster_is_direct(caster);
+    place->direct = vshi_caster_is_direct(scene, caster);
     if (caster->type == VSH_CASTER_SPHERES) {
         return place_spheres(place, caster, index, run, error);
     }

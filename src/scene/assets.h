@@ -12,11 +12,9 @@ static inline bool vshi_caster_in_layer(const vsh_caster *caster, const vsh_scen
     return caster->layer == NULL ? layer == NULL : layer != NULL && strcmp(caster->layer, layer->name) == 0;
 }
 
-/* Whether a caster stays out of level sets. */
-static inline bool vshi_caster_is_direct(const vsh_caster *caster) {
-    return (caster->type == VSH_CASTER_HEIGHTFIELD && caster->direct != 0) ||
-           (caster->type == VSH_CASTER_SPHERES && caster->voxelised == 0);
-}
+/* Whether a caster stays out of level sets: spheres, and a direct heightfield whose shadows are marched over
+ * its heights. Its AO is traced. */
+bool vshi_caster_is_direct(const vsh_scene *scene, const vsh_caster *caster);
 
 /* outer × inner, three rows of four each; inner NULL: identity. */
 void vshi_transform_compose(const double outer[12], const double *inner, double result[12]);

@@ -14,7 +14,7 @@
 bool vshi_layer_is_voxelised(const vsh_scene *scene, const vsh_scene_layer *layer) {
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
-        if (vshi_caster_in_layer(caster, layer) && !vshi_caster_is_direct(caster)) {
+        if (vshi_caster_in_layer(caster, layer) && !vshi_caster_is_direct(scene, caster)) {
             return true;
         }
     }

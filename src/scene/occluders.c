@@ -216,24 +216,43 @@ static vsh_result make_truth(making *m, vsh_error *error) {
     return result == VSH_ERROR_CANCELLED ? vshi_fail(error, result, "%s", why.message) : VSH_OK;
 }
 
-/* Casters without voxels, each shaded as its layer is. */
-static void add_direct(making *m) {
-    for (size_t i = 0; i < m->scene->caster_count; ++i) {
-        const vsh_caster *caster = &m->scene->casters[i];
-        if (!vshi_caster_is_direct(caster)) {
+/* What traces the AO of a direct heightfield. */
+static vsh_result trace_ao(making *m, size_t caster, size_t place, vsh_layer *layer, vsh_error *error) {
+    size_t count;
+    const vsh_mesh *meshes = vsh_assets_caster(m->assets, caster, &count);
+    vsh_triangles **triangles = &m->own.layer_triangles[place];
+    VSHI_TRY(vsh_triangles_create(meshes, count, &m->run, triangles, error));
+    VSHI_TRY(vshi_occluders_unknown(*triangles, 0.0, &m->own.layer_fields[place], error));
+    layer->field = m->own.layer_fields[place];
+    layer->triangles = *triangles;
+    return VSH_OK;
+}
+
+/* Casters without voxels, each shaded as its layer is. `place` is the first that no layer's field takes. */
+static vsh_result add_direct(making *m, size_t place, vsh_error *error) {
+    const vsh_scene *scene = m->scene;
+    const bool ao = scene->ao != 0 || vsh_planes_shaded(&scene->planes) > 0;
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        const vsh_caster *caster = &scene->casters[i];
+        if (!vshi_caster_is_direct(scene, caster)) {
             continue;
         }
         vsh_layer *layer = &m->layers[m->parts.layer_count++];
         *layer = vsh_layer_default();
-        for (size_t k = 0; caster->layer != NULL && k < m->scene->layer_count; ++k) {
-            if (strcmp(m->scene->layers[k].name, caster->layer) == 0) {
-                *layer = m->scene->layers[k].shade;
+        for (size_t k = 0; caster->layer != NULL && k < scene->layer_count; ++k) {
+            if (strcmp(scene->layers[k].name, caster->layer) == 0) {
+                *layer = scene->layers[k].shade;
             }
         }
         layer->name = caster->layer;
         layer->heights = vsh_assets_heights(m->assets, i);
         layer->spheres = vsh_assets_spheres(m->assets, i);
+        if (layer->heights != NULL && layer->ao != 0 && ao) {
+            VSHI_TRY(trace_ao(m, i, place, layer, error));
+        }
+        ++place;
     }
+    return VSH_OK;
 }
 
 static vsh_result allocate_layers(making *m, size_t count, vsh_error *error) {
@@ -250,7 +269,7 @@ static vsh_result make_layers(making *m, vsh_error *error) {
     const vsh_scene *scene = m->scene;
     size_t direct = 0;
     for (size_t i = 0; i < scene->caster_count; ++i) {
-        direct += vshi_caster_is_direct(&scene->casters[i]);
+        direct += vshi_caster_is_direct(scene, &scene->casters[i]);
     }
     const size_t most = scene->layer_count + direct;
     if (most > VSH_MAX_LAYERS) {
@@ -273,8 +292,7 @@ static vsh_result make_layers(making *m, vsh_error *error) {
             layer->triangles = *triangles;
         }
     }
-    add_direct(m);
-    return VSH_OK;
+    return add_direct(m, scene->layer_count, error);
 }
 
 static vsh_result make(making *m, vsh_error *error) {

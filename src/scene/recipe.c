@@ -181,7 +181,7 @@ static vsh_result print_caster(const vsh_scene *scene, const vsh_assets *assets,
     const vsh_caster *caster = &scene->casters[i];
     size_t count = 0;
     const vsh_mesh *meshes = vsh_assets_caster(assets, i, &count);
-    if (vshi_caster_is_direct(caster)) {
+    if (vshi_caster_is_direct(scene, caster)) {
         return VSH_OK;
     }
     if (caster->type == VSH_CASTER_VDB) {
@@ -286,7 +286,7 @@ vsh_result vshi_recipe_make(const vsh_scene *scene, const vshi_caster_prints *pr
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
         const bool meshes = caster->type == VSH_CASTER_MESH;
-        if (!vshi_caster_is_direct(caster) && (meshes || vshi_caster_in_layer(caster, layer))) {
+        if (!vshi_caster_is_direct(scene, caster) && (meshes || vshi_caster_in_layer(caster, layer))) {
             VSHI_TRY(add_caster(lines, caster, layer, &prints->list[i], i, error));
         }
     }

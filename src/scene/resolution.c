@@ -13,6 +13,10 @@ static size_t lights_of(const vsh_scene *scene, const vsh_scene_layer *layer) {
     return layer == NULL || layer->shade.lights == NULL ? scene->light_count : layer->shade.light_count;
 }
 
+static bool is_voxelised_in(const vsh_scene *scene, const vsh_caster *caster, const vsh_scene_layer *layer) {
+    return vshi_caster_in_layer(caster, layer) && !vshi_caster_is_direct(scene, caster);
+}
+
 /* What a mesh is: area and box from where it was checked. */
 static vshi_resolution_need measure(const vsh_scene *scene, const vsh_assets *assets,
                                     const vsh_scene_layer *layer) {
@@ -21,7 +25,7 @@ static vshi_resolution_need measure(const vsh_scene *scene, const vsh_assets *as
     for (size_t i = 0; i < scene->caster_count; ++i) {
         size_t count = 0;
         const vsh_mesh *meshes = vsh_assets_caster(assets, i, &count);
-        for (size_t m = 0; m < count && vshi_caster_in_layer(&scene->casters[i], layer); ++m) {
+        for (size_t m = 0; m < count && is_voxelised_in(scene, &scene->casters[i], layer); ++m) {
             const vsh_mesh_report *report = &vshi_mesh_known(&meshes[m])->report;
             need.triangles += (double)meshes[m].triangle_count;
             need.area += report->area;
@@ -44,7 +48,7 @@ static bool are_followed(const vsh_scene *scene, const vsh_scene_layer *layer) {
         const vsh_caster *caster = &scene->casters[i];
         const bool shaped = caster->type == VSH_CASTER_SDF || caster->type == VSH_CASTER_MASK ||
                             caster->type == VSH_CASTER_TEXT || caster->type == VSH_CASTER_SPHERES;
-        if (vshi_caster_in_layer(caster, layer) && !vshi_caster_is_direct(caster) && !shaped) {
+        if (is_voxelised_in(scene, caster, layer) && !shaped) {
             return false;
         }
     }

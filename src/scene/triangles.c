@@ -13,8 +13,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-static bool is_voxelised_in(const vsh_caster *caster, const vsh_scene_layer *layer) {
-    return vshi_caster_in_layer(caster, layer) && !vshi_caster_is_direct(caster);
+static bool is_voxelised_in(const vsh_scene *scene, const vsh_caster *caster, const vsh_scene_layer *layer) {
+    return vshi_caster_in_layer(caster, layer) && !vshi_caster_is_direct(scene, caster);
 }
 
 static bool has_triangles(const vsh_caster *caster) {
@@ -31,7 +31,7 @@ int32_t vsh_scene_traceable(const vsh_scene *scene, const vsh_scene_layer *layer
     size_t exact = 0, level_sets = 0, outlines = 0;
     for (size_t i = 0; scene != NULL && i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
-        if (is_voxelised_in(caster, layer)) {
+        if (is_voxelised_in(scene, caster, layer)) {
             exact += has_triangles(caster) || has_solids(caster);
             level_sets += caster->type == VSH_CASTER_VDB;
             outlines += caster->type == VSH_CASTER_MASK || caster->type == VSH_CASTER_TEXT;
@@ -47,6 +47,21 @@ static int32_t method_of(const vsh_scene *scene, const vsh_scene_layer *layer) {
 
 static bool casts_ao(const vsh_scene *scene, const vsh_scene_layer *layer) {
     return (scene->ao || vsh_planes_shaded(&scene->planes) > 0) && (layer == NULL || layer->shade.ao);
+}
+
+bool vshi_caster_is_direct(const vsh_scene *scene, const vsh_caster *caster) {
+    if (caster->type != VSH_CASTER_HEIGHTFIELD || caster->direct == 0) {
+        return caster->type == VSH_CASTER_SPHERES && caster->voxelised == 0;
+    }
+    const vsh_scene_layer *layer = NULL;
+    for (size_t i = 0; caster->layer != NULL && i < scene->layer_count; ++i) {
+        layer = strcmp(scene->layers[i].name, caster->layer) == 0 ? &scene->layers[i] : layer;
+    }
+    const int32_t method = method_of(scene, layer);
+    const bool traced =
+        vsh_triangles_available() != 0 && vsh_ao_method_resolve(scene->shade.ao_method, 1) == VSH_AO_EXACT;
+    return scene->light_count > 0 && (method == VSH_SHADOW_HARD || method == VSH_SHADOW_CLASSIC) &&
+           (traced || !casts_ao(scene, layer));
 }
 
 bool vshi_scene_method_is(const vsh_scene *scene, const vsh_scene_layer *layer, uint32_t traits, bool has) {
@@ -171,7 +186,7 @@ static vsh_result gather_traced(const vsh_scene *scene, const vsh_assets *assets
     VSHI_TRY(allocate_traced(scene, assets, t, error));
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
-        if (!all && !is_voxelised_in(caster, layer)) {
+        if (!all && !is_voxelised_in(scene, caster, layer)) {
             continue;
         }
         size_t own;
@@ -260,8 +275,8 @@ bool vshi_scene_wants_truth(const vsh_scene *scene) {
                     vshi_scene_method_is(scene, NULL, VSH_METHOD_KEEPS_ERROR, true);
     for (size_t i = 0; i < scene->caster_count; ++i) { /* of these voxels are the definition, or as good */
         const vsh_caster *caster = &scene->casters[i];
-        measured =
-            measured && (has_triangles(caster) || has_solids(caster)) && !vshi_caster_is_direct(caster);
+        measured = measured && (has_triangles(caster) || has_solids(caster)) &&
+                   !vshi_caster_is_direct(scene, caster);
     }
     return measured;
 }
@@ -280,7 +295,7 @@ static vsh_result list_meshes(const vsh_scene *scene, const vsh_assets *assets, 
     for (size_t i = 0; i < scene->caster_count; ++i) {
         size_t own;
         const vsh_mesh *of_caster = vsh_assets_caster(assets, i, &own);
-        for (size_t m = 0; is_voxelised_in(&scene->casters[i], layer) && m < own; ++m) {
+        for (size_t m = 0; is_voxelised_in(scene, &scene->casters[i], layer) && m < own; ++m) {
             (*meshes)[(*count)++] = of_caster[m];
         }
     }

@@ -3,7 +3,6 @@
 
 #include "base/memory.h"
 #include "base/try.h"
-#include "heightfield/height_pyramid.h"
 #include "heightfield/heights.h"
 #include "light/light.h"
 #include "spheres/spheres.h"
@@ -64,7 +63,7 @@ static vsh_result resolve(const void *given, vsh_layer *layer, vsh_error *error)
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "remap from %g to %g: expected a rise", layer->remap[0],
                          layer->remap[1]);
     }
-    const int casters = (layer->field != NULL) + (layer->heights != NULL) + (layer->spheres != NULL);
+    const int casters = (layer->field != NULL || layer->heights != NULL) + (layer->spheres != NULL);
     if (casters != 1) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s of field, heights and spheres: expected one",
                          casters == 0 ? "none" : "several");
@@ -91,7 +90,9 @@ vsh_result vshi_layer_resolve(const vsh_layer *layers, size_t index, vsh_layer *
 
 double vshi_layer_bytes(const vsh_layer *layer) {
     if (layer->heights != NULL) {
-        return (double)layer->heights->info.bytes;
+        vsh_heights_info info;
+        vsh_heights_get_info(layer->heights, &info);
+        return (double)info.bytes;
     }
     if (layer->spheres != NULL) {
         vsh_spheres_info info;
@@ -111,6 +112,16 @@ static bool casts_for(const vsh_layer *layer, const vsh_light *light) {
     return casts;
 }
 
+/* Whether a method marches heights as they are. */
+static bool is_marched(int32_t method) {
+    return method == VSH_SHADOW_HARD || method == VSH_SHADOW_CLASSIC;
+}
+
+/* Heights by themselves cast no ambient occlusion: their field, or triangles, do. */
+static bool casts_ao(const vsh_layer *layer) {
+    return layer->ao != 0 && (layer->field != NULL || layer->spheres != NULL);
+}
+
 static vsh_result prepare(prepared *item, size_t index, double lifted, const vsh_light *light,
                           vshi_ao_cones *cones, vsh_error *error) {
     const vsh_layer *layer = &item->layer;
@@ -122,7 +133,13 @@ static vsh_result prepare(prepared *item, size_t index, double lifted, const vsh
     if (light != NULL) {
         item->light = vshi_light_resized(light, layer->softness);
     }
-    if (layer->field == NULL) { /* needs no preparing */
+    if (light != NULL && layer->heights != NULL && !is_marched(options->method)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "heights are marched by the methods hard and classic; for method %s trace their "
+                         "triangles",
+                         vsh_shadow_method_name(options->method));
+    }
+    if (layer->field == NULL || (light != NULL && layer->heights != NULL)) { /* needs no preparing */
         return light != NULL ? vsh_light_check(&item->light, error) : VSH_OK;
     }
     if (light != NULL) {
@@ -152,7 +169,7 @@ vsh_result vshi_layers_prepare(const vsh_occluders *occluders, const vsh_shade_o
     for (size_t i = 0; i < occluders->layer_count; ++i) {
         prepared *item = &made->items[made->count];
         item->layer = occluders->layers[i];
-        if ((light != NULL ? casts_for(&item->layer, light) : item->layer.ao != 0)) {
+        if ((light != NULL ? casts_for(&item->layer, light) : casts_ao(&item->layer))) {
             item->options = *options;
             ++made->count;
             vsh_error why;
@@ -173,7 +190,7 @@ vsh_result vshi_layers_prepare_sphere(vshi_layers *layers, vsh_error *error) {
     for (size_t i = 0; layers != NULL && i < layers->count; ++i) {
         if (layers->items[i].layer.field == NULL) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                             "AO in free space: heightfields and spheres know of none without voxels");
+                             "AO in free space: spheres know of none without voxels");
         }
         VSHI_TRY(vshi_ao_prepare_sphere(&layers->cones, &layers->items[i].ao, error));
     }
@@ -251,7 +268,7 @@ static void shade_field(const prepared *item, const vshi_shadow_task *task, laye
     }
 }
 
-/* What heights or spheres leave of it: shares already, and exact. */
+/* What heights or spheres leave of it: shares already. */
 static void shade_analytic(const prepared *item, const vshi_shadow_task *task, size_t begin,
                            layer_piece *piece, vsh_shade_stats *stats) {
     const vsh_layer *layer = &item->layer;
@@ -277,7 +294,7 @@ void vshi_layers_shadow(const vshi_layers *layers, const vshi_shadow_task *task,
     for (size_t k = 0; k < layers->count; ++k) {
         const prepared *item = &layers->items[k];
         const double *remap = item->layer.remap;
-        if (item->layer.field != NULL) {
+        if (item->layer.field != NULL && item->layer.heights == NULL) {
             shade_field(item, task, &piece, stats);
         } else {
             shade_analytic(item, task, begin, &piece, stats);
@@ -297,7 +314,7 @@ void vshi_layers_shadow(const vshi_layers *layers, const vshi_shadow_task *task,
     }
 }
 
-/* What a layer leaves of the sky; values of heights and spheres are exact. */
+/* What a layer leaves of the sky; values of spheres are exact. */
 static void occlude(const prepared *item, const vshi_ao_task *task, size_t begin, layer_piece *piece,
                     vsh_shade_stats *stats) {
     const vsh_layer *layer = &item->layer;
@@ -305,10 +322,7 @@ static void occlude(const prepared *item, const vshi_ao_task *task, size_t begin
     float *bent = task->bent != NULL ? piece->bent : NULL;
     const vshi_vec *up = vshi_ao_has_horizon(task) ? &task->up : NULL;
     memset(piece->deviation, 0, count * sizeof *piece->deviation);
-    if (layer->heights != NULL) {
-        vshi_heights_ao(layer->heights, item->options.ao_distance, up, &piece->points, 0, count,
-                        vshi_heights_lift(layer->heights, layer->start_offset), piece->value, bent, stats);
-    } else if (layer->spheres != NULL) {
+    if (layer->spheres != NULL) {
         vshi_spheres_ao(layer->spheres, item->options.ao_distance, up, &piece->points, 0, count, 0.0,
                         piece->value, bent, stats);
     } else {

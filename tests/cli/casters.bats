@@ -16,19 +16,47 @@ scene() { # casters, receivers, more keys
 }
 
 
-@test "a direct terrain makes no voxel, and the same bits for any number of threads" {
-    scene "{$LAND, \"direct\": true}" "$OVER" '"ao": {"distance": 1}'
-    shade bake scene.json --threads 1 --stats stats.json
+# A hill of 16 bits, 257 × 257.
+write_hill() {
+    awk 'BEGIN {
+        print "P2 257 257 65535"
+        for (i = 0; i < 257; ++i)
+            for (j = 0; j < 257; ++j)
+                printf "%d\n", 60000 * exp(-((j - 110) ^ 2 + (i - 150) ^ 2) / 1800)
+    }' >"$1"
+}
+
+@test "a direct terrain is marched by hard and classic, and makes no voxel and the same bits for any number of threads" {
+    for method in hard classic; do
+        scene "{$LAND, \"direct\": true}" "$OVER" "\"ao\": {\"distance\": 1}, \"method\": \"$method\""
+        shade bake scene.json --threads 1 --stats stats.json
+        done_well
+        grep -q '"active_voxels": 0' stats.json
+        one=$(sha256sum <out.exr)
+        shade bake scene.json --threads 4
+        done_well
+        [ "$(sha256sum <out.exr)" = "$one" ]
+        grep -A1 '"shadow": {' stats.json | grep -q "\"method\": \"$method\""
+        grep -A1 '"ao": {' stats.json | grep -q '"method": "exact"'
+    done
+}
+
+@test "a direct terrain is traced by every other method" {
+    write_hill hill.pgm
+    hill='"heightfield": "hill.pgm", "size": [10, 10], "height": 2'
+    over='"receivers": [{"heightfield": "hill.pgm", "extent": [10, 10], "height": 2, "size": 256, "output": "out.exr"}]'
+    scene "{$hill, \"direct\": true}" "$over" '"ao": {"distance": 1}'
+    shade bake scene.json
     done_well
-    grep -q '"active_voxels": 0' stats.json
-    one=$(sha256sum <out.exr)
-    shade bake scene.json --threads 4
+    scene "{$hill}" "$over" '"ao": {"distance": 1}'
+    shade bake scene.json -o traced.exr
     done_well
-    [ "$(sha256sum <out.exr)" = "$one" ]
+    shade compare out.exr traced.exr --max-difference 0.001
+    done_well
 }
 
 @test "a direct terrain and spheres are shaded by query as by bake" {
-    scene "{$LAND, \"direct\": true}, {\"spheres\": [[0, 2, 0, 0.5]]}" "$OVER"
+    scene "{$LAND, \"direct\": true}, {\"spheres\": [[0, 2, 0, 0.5]]}" "$OVER" '"method": "hard"'
     # above all, beneath the terrain, in the sphere's shadow, and as far away on its other side
     printf 'x,y,z\n0,5,0\n2,-1,0\n1.05,1.4,-0.45\n-1.05,2.6,0.45\n' >points.csv
     shade query scene.json --points points.csv -o answers.csv --quiet
@@ -40,7 +68,7 @@ scene() { # casters, receivers, more keys
     scene "{$LAND}, {\"spheres\": [[0, 3, 0, 0.5]], \"voxelised\": true}" "$OVER" '"resolution": 48'
     shade voxelize scene.json -o out.vdb --quiet
     done_well
-    scene "{$LAND, \"direct\": true}" "$OVER"
+    scene '{"spheres": [[0, 3, 0, 0.5]]}' "$OVER"
     shade voxelize scene.json -o out.vdb
     refused 2 "no casters that are voxelised"
 }

@@ -38,10 +38,10 @@ static void points_on(const vsh_mesh *mesh, double *positions, float *normals) {
     }
 }
 
-static void a_layer_of_heights_is_shaded_as_its_triangles_with_the_receivers_horizon(void **state) {
+static void a_layer_of_heights_is_marched_by_hard_and_classic_and_by_no_other_method(void **state) {
     (void)state;
     static double positions[3 * POINTS];
-    static float normals[3 * POINTS], values[POINTS], truth[POINTS];
+    static float normals[3 * POINTS], values[POINTS], other[POINTS];
     float *heights = hills(SIDE, SIDE);
     const vsh_heights_source source = source_of(heights, SIDE, SIDE, 10.0, 1.5);
     vsh_model *model = model_of(&source, VSH_HEIGHTS_SOLID);
@@ -51,54 +51,49 @@ static void a_layer_of_heights_is_shaded_as_its_triangles_with_the_receivers_hor
     layer.heights = heights_of(&source);
     vsh_field *empty = empty_field();
     vsh_shade_options options = preview_options();
-    options.ao_distance = 1.0;
     const vsh_points points = {POINTS, positions, normals, NULL};
     static const double towards[3] = {-0.8, 0.3, 0.4};
-    const double angle = RADIANS(30.0);
-    const vsh_light light = sun(towards, angle);
-    vsh_error error = {VSH_OK, ""};
-    truth_mesh *rays = truth_mesh_create(&mesh, 1);
-    assert_int_equal(vsh_shade_shadow(occluders_with(empty, &layer, 1), &points, &light, &options, NULL,
-                                      values, NULL, NULL, &error),
-                     VSH_OK);
-    if (rays != NULL) {
-        truth_mesh_light(rays, POINTS, positions, normals, towards, tan(0.5 * angle), 1024, 0, truth);
-        const truth_metrics m = truth_compare(POINTS, values, truth, NULL);
-        truth_metrics_print("shadow", &m);
-        assert_true(m.rmse < 0.006);
-        assert_true(m.penumbra > POINTS / 4);
+    const vsh_light light = sun(towards, RADIANS(30.0));
+    for (int32_t method = 0; method <= VSH_SHADOW_AUTO; ++method) {
+        const bool marched = method == VSH_SHADOW_HARD || method == VSH_SHADOW_CLASSIC;
+        vsh_error error = {VSH_OK, ""};
+        layer.method = method;
+        assert_int_equal(vsh_shade_shadow(occluders_with(empty, &layer, 1), &points, &light, &options, NULL,
+                                          values, NULL, NULL, &error),
+                         marched ? VSH_OK : VSH_ERROR_ARGUMENT);
+        assert_true(marched ||
+                    strstr(error.message, "layer 0: heights are marched by the methods hard and classic") !=
+                        NULL);
     }
-    assert_int_equal(vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &options, NULL, values, NULL,
-                                  NULL, NULL, &error),
-                     VSH_OK);
-    if (rays != NULL) {
-        truth_mesh_ao(rays, POINTS, positions, normals, 1.0, 1024, 0, truth);
-        const truth_metrics m = truth_compare(POINTS, values, truth, NULL);
-        truth_metrics_print("ao", &m);
-        assert_true(m.rmse < 0.006);
-    }
-    /* a layer that is hard, or that casts for another light */
+    /* a light of no size is hard */
     layer.softness = 0.0;
+    layer.method = VSH_SHADOW_CLASSIC;
     assert_int_equal(vsh_shade_shadow(occluders_with(empty, &layer, 1), &points, &light, &options, NULL,
-                                      values, NULL, NULL, &error),
+                                      values, NULL, NULL, NULL),
                      VSH_OK);
     layer.softness = 1.0;
     layer.method = VSH_SHADOW_HARD;
     assert_int_equal(vsh_shade_shadow(occluders_with(empty, &layer, 1), &points, &light, &options, NULL,
-                                      truth, NULL, NULL, &error),
+                                      other, NULL, NULL, NULL),
                      VSH_OK);
-    assert_memory_equal(values, truth, sizeof values);
+    assert_memory_equal(values, other, sizeof values);
+    /* another light's layer casts nothing, and heights have no AO by themselves */
     static const char *const lamp_name[] = {"lamp"};
     layer.lights = lamp_name;
     layer.light_count = 1;
     assert_int_equal(vsh_shade_shadow(occluders_with(empty, &layer, 1), &points, &light, &options, NULL,
-                                      values, NULL, NULL, &error),
+                                      values, NULL, NULL, NULL),
                      VSH_OK);
     assert_int_equal(
-        vsh_shade_shadow(occluders_of(empty), &points, &light, &options, NULL, truth, NULL, NULL, &error),
+        vsh_shade_shadow(occluders_of(empty), &points, &light, &options, NULL, other, NULL, NULL, NULL),
         VSH_OK);
-    assert_memory_equal(values, truth, sizeof values);
-    truth_mesh_free(rays);
+    assert_memory_equal(values, other, sizeof values);
+    assert_int_equal(vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &options, NULL, values, NULL,
+                                  NULL, NULL, NULL),
+                     VSH_OK);
+    for (size_t i = 0; i < POINTS; ++i) {
+        assert_true(values[i] == 1.0f);
+    }
     vsh_field_free(empty);
     vsh_heights_free((vsh_heights *)(uintptr_t)layer.heights);
     vsh_model_free(model);
@@ -188,7 +183,7 @@ static void bent_by_rays(truth_scene scene, const double point[3], double distan
     }
 }
 
-static void bent_normals_lean_away_from_spheres_and_terrain(void **state) {
+static void bent_normals_lean_away_from_spheres(void **state) {
     (void)state;
     enum { COUNT = 60 };
     static double positions[3 * COUNT];
@@ -222,43 +217,17 @@ static void bent_normals_lean_away_from_spheres_and_terrain(void **state) {
         }
     }
     vsh_spheres_free(made);
-    /* a wall along z, whose face a quarter of the terrain's cells make, seen from the ground before it */
-    float values[33 * 33];
-    for (int i = 0; i < 33 * 33; ++i) {
-        values[i] = i % 33 > 16 ? 1.0f : 0.0f;
-    }
-    const vsh_heights_source source = {
-        .columns = 33, .rows = 33, .values = values, .size = {32, 32}, .height = 4, .base = 1};
-    truth_solid wall = {.shape = TRUTH_BOX, .center = {9.0, 0.0, 0.0}, .half = {8.0, 4.0, 16.0}};
-    layer.spheres = NULL;
-    layer.heights = heights_of(&source);
-    options.ao_distance = 10.0;
-    const truth_scene beside = {&wall, 1};
-    for (size_t i = 0; i < COUNT; ++i) {
-        positions[3 * i] = between(&counter, -8.0, -2.0);
-        positions[3 * i + 1] = 1e-3;
-        positions[3 * i + 2] = between(&counter, -3.0, 3.0);
-    }
-    assert_int_equal(
-        vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &options, NULL, ao, NULL, bent, NULL, NULL),
-        VSH_OK);
-    for (size_t i = 0; i < COUNT; ++i) {
-        double mean[3];
-        bent_by_rays(beside, positions + 3 * i, 10.0, mean);
-        for (size_t axis = 0; axis < 3; ++axis) {
-            assert_float_equal(bent[3 * i + axis], mean[axis], 0.03);
-        }
-    }
-    vsh_heights_free((vsh_heights *)(uintptr_t)layer.heights);
     vsh_field_free(empty);
 }
 
 /* Bakes the floor under casters given as JSON; coverage of its texels. */
 static void bake_floor(const char *casters, float *shadow, float *coverage, int32_t side) {
     char text[1024];
-    snprintf(text, sizeof text,
-             "{\"casters\":[%s],\"receivers\":[{\"mesh\":\"seeds_floor.obj\",\"output\":\"none.exr\"}]}",
-             casters);
+    snprintf(
+        text, sizeof text,
+        "{\"casters\":[%s],\"method\":\"hard\",\"lights\":[{\"name\":\"sun\",\"type\":\"directional\",\"direction\":[0,1,0]}],"
+        "\"receivers\":[{\"mesh\":\"seeds_floor.obj\",\"output\":\"none.exr\"}]}",
+        casters);
     vsh_scene *scene = NULL;
     vsh_assets *assets = NULL;
     vsh_error error = {VSH_OK, ""};
@@ -269,6 +238,7 @@ static void bake_floor(const char *casters, float *shadow, float *coverage, int3
     vsh_layer layer = vsh_layer_default();
     layer.heights = vsh_assets_heights(assets, 0);
     layer.spheres = vsh_assets_spheres(assets, 0);
+    layer.method = layer.heights != NULL ? VSH_SHADOW_HARD : -1;
     vsh_shade_options shade = preview_options();
     vsh_lightmap_options options = preview_lightmap_options();
     options.width = options.height = side;
@@ -322,9 +292,9 @@ static void texels_within_a_sphere_or_a_terrain_are_not_valid(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_layer_of_heights_is_shaded_as_its_triangles_with_the_receivers_horizon),
+        cmocka_unit_test(a_layer_of_heights_is_marched_by_hard_and_classic_and_by_no_other_method),
         cmocka_unit_test(spheres_in_a_layer_cast_as_rays_say_and_in_voxels_within_the_error_asked_for),
-        cmocka_unit_test(bent_normals_lean_away_from_spheres_and_terrain),
+        cmocka_unit_test(bent_normals_lean_away_from_spheres),
         cmocka_unit_test(texels_within_a_sphere_or_a_terrain_are_not_valid),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -2,7 +2,6 @@
 #include "previews.h"
 #include "shading.h"
 
-#include "heightfield/heights.h"
 #include "spheres/spheres.h"
 #include "truth/directions.h"
 
@@ -147,21 +146,10 @@ static void check_halves(const float *normals, const double up[3], const float *
     }
 }
 
-static void heights_and_spheres_have_two_halves(void **state) {
+static void spheres_have_two_halves(void **state) {
     (void)state;
-    enum { SIDE = 24 };
-    static float samples[SIDE * SIDE], all[POINTS], over[POINTS], under[POINTS];
-    uint64_t counter = 11;
-    for (size_t i = 0; i < SIDE * SIDE; ++i) {
-        samples[i] = (float)between(&counter, 0.0, 1.0);
-    }
-    const vsh_heights_source source = {
-        .columns = SIDE, .rows = SIDE, .values = samples, .size = {6.0, 6.0}, .height = 1.0};
-    vsh_heights *heights = NULL;
+    static float all[POINTS], over[POINTS], under[POINTS];
     vsh_error error = {VSH_OK, ""};
-    if (vsh_heights_create(&source, NULL, &heights, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
     static const double balls[3][4] = {{0.4, 2.0, 0.1, 0.5}, {-0.6, 2.6, 0.4, 0.7}, {0.1, 1.8, -0.9, 0.3}};
     vsh_spheres *spheres = NULL;
     assert_int_equal(vsh_spheres_create(&balls[0][0], 3, NULL, NULL, &spheres, &error), VSH_OK);
@@ -169,16 +157,11 @@ static void heights_and_spheres_have_two_halves(void **state) {
     const vsh_points points = {POINTS, s->positions, s->normals, NULL};
     const vshi_vec up = {0.48, 0.64, -0.6}, down = {-0.48, -0.64, 0.6};
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    vshi_heights_ao(heights, FAR, NULL, &points, 0, POINTS, 0.0, all, NULL, &stats);
-    vshi_heights_ao(heights, FAR, &up, &points, 0, POINTS, 0.0, over, NULL, &stats);
-    vshi_heights_ao(heights, FAR, &down, &points, 0, POINTS, 0.0, under, NULL, &stats);
-    check_halves(s->normals, (double[]){up.x, up.y, up.z}, all, over, under, 0.02);
     vshi_spheres_ao(spheres, FAR, NULL, &points, 0, POINTS, 0.0, all, NULL, &stats);
     vshi_spheres_ao(spheres, FAR, &up, &points, 0, POINTS, 0.0, over, NULL, &stats);
     vshi_spheres_ao(spheres, FAR, &down, &points, 0, POINTS, 0.0, under, NULL, &stats);
     check_halves(s->normals, (double[]){up.x, up.y, up.z}, all, over, under, 0.02);
     vsh_spheres_free(spheres);
-    vsh_heights_free(heights);
     tear_down(s);
 }
 
@@ -210,7 +193,7 @@ static void what_knows_no_horizon_says_so(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shares_of_what_is_over_a_horizon_are_the_rays),
-        cmocka_unit_test(heights_and_spheres_have_two_halves),
+        cmocka_unit_test(spheres_have_two_halves),
         cmocka_unit_test(what_knows_no_horizon_says_so),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

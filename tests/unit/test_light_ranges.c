@@ -293,23 +293,17 @@ static vsh_light light_of_size(int32_t type, double size) {
     return light;
 }
 
-/* The casters: the seeds as voxels and triangles; a ball and a ridge as layers without voxels. */
+/* The casters: the seeds as voxels and triangles; a ball as a layer without voxels. */
 typedef struct ranges_stage {
-    enum { FIELD, BALL, RIDGE, STAGES } kind;
+    enum { FIELD, BALL, STAGES } kind;
     caster seeds;
     vsh_field *empty;
     vsh_spheres *ball;
-    vsh_heights *ridge;
 } ranges_stage;
 
 static ranges_stage set_up(void) {
     static const double BALL_AT[4] = {0.2, 0.8, 0.1, 0.4};
-    static float ground[33 * 33];
-    for (int i = 0; i < 33; ++i) {
-        ground[33 * i + 16] = 1.0f;
-    }
-    const vsh_heights_source source = source_of(ground, 33, 33, 5.0, 0.6);
-    ranges_stage s = {.seeds = caster_of(truth_seeds(), 0.04, 0.0), .ridge = heights_of(&source)};
+    ranges_stage s = {.seeds = caster_of(truth_seeds(), 0.04, 0.0)};
     assert_int_equal(vshi_field_create_empty(0.04, &s.empty, NULL), VSH_OK);
     assert_int_equal(vsh_spheres_create(BALL_AT, 1, NULL, NULL, &s.ball, NULL), VSH_OK);
     return s;
@@ -319,7 +313,6 @@ static void tear_down(ranges_stage *s) {
     caster_free(&s->seeds);
     vsh_field_free(s->empty);
     vsh_spheres_free(s->ball);
-    vsh_heights_free(s->ridge);
 }
 
 static void cast_on_stage(const ranges_stage *s, const vsh_light *light, int32_t method, double softness,
@@ -327,7 +320,6 @@ static void cast_on_stage(const ranges_stage *s, const vsh_light *light, int32_t
     vsh_layer layer = vsh_layer_default();
     layer.softness = softness;
     layer.spheres = s->kind == BALL ? s->ball : NULL;
-    layer.heights = s->kind == RIDGE ? s->ridge : NULL;
     if (s->kind == FIELD) {
         cast_shadows(&s->seeds, light, method, count, positions, normals, values);
     } else {
