@@ -39,8 +39,8 @@ typedef struct vsh_layer {
     const char *const *lights;      /* [light_count]: names of the lights it casts for; NULL: of all */
     size_t light_count;             /* how many lights */
     int32_t ao;                     /* nonzero: part of ambient occlusion */
-    const vsh_heights *heights;     /* a heightfield that is marched as it is, for shadows. AO is that of
-                                       `field`, which may stand beside it; NULL: they have none */
+    const vsh_heights *heights;     /* a heightfield that is marched, for shadows. `field` may be given
+                                       too, for AO; without it the layer has no AO. NULL: none */
     const vsh_spheres *spheres;     /* spheres as they are */
     const char *name; /* that of a scene's layer; NULL: none. For the caller: nothing here reads it */
 } vsh_layer;

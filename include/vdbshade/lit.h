@@ -91,16 +91,15 @@ static inline vsh_lit_options vsh_lit_options_default(void) {
  *
  * Where `path` is a .glb or .gltf, that document with all that it holds, known or not: each primitive that
  * has uvs gets them as TEXCOORD_1, or in place of a set that an earlier call made, which its extras list
- * ("vdbshade_uv_sets"). Where textures that stay use that set, it gets them as its first free TEXCOORD_n, with
- * a warning. Vertices are doubled only where the
- * atlas splits them, and then all attributes and morph targets of the primitive, byte by byte; primitives on
- * several pages become several; meshes that several nodes use, and instances of EXT_mesh_gpu_instancing,
- * become meshes and nodes of their own where their UVs differ, and share all accessors that do not.
- * Primitives under Draco that change are written as they are without it. Textures that an earlier call made,
- * which their extras tell ("vdbshade_texture"), go with their images where nothing shows them any more,
- * unless the file has extensions that are not known. Images and buffers that the file names beside it stay
- * named where output stands in its folder, else they come along in the buffer. A .gltf has its buffer beside
- * it as OUT.bin.
+ * ("vdbshade_uv_sets"). Where textures that stay use that set, it gets them as its first free TEXCOORD_n,
+ * with a warning. Vertices are doubled only where the atlas splits them, and then all attributes and morph
+ * targets of the primitive, byte by byte; primitives on several pages become several; meshes that several
+ * nodes use, and instances of EXT_mesh_gpu_instancing, become meshes and nodes of their own where their UVs
+ * differ, and share all accessors that do not. Primitives under Draco that change are written as they are
+ * without it. Textures that an earlier call made, which their extras tell ("vdbshade_texture"), go with their
+ * images where nothing shows them any more, unless the file has extensions that are not known. Images and
+ * buffers that the file names beside it stay named where output stands in its folder, else they come along in
+ * the buffer. A .gltf has its buffer beside it as OUT.bin.
  *
  * Of other formats, and where path is NULL, a document is made of the model: a node for each object with its
  * transform, positions, normals, the sets of UVs with the new one as the second, white materials.

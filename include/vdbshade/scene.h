@@ -50,7 +50,8 @@ typedef struct vsh_caster {
     vsh_sdf sdf;          /* sdf: tree */
     double transform[12]; /* local to world, three rows of four; but for meshes no shear, no uneven scale */
     const char *layer;    /* name of the layer it is in; NULL: none */
-    double size[2];       /* heightfield, as in vsh_heights_source: these three */
+    double size[2]; /* heightfield, as in vsh_heights_source: these three. A size[1] of 0 follows from the
+                       image's pixels, and size[0] is the longer side */
     double height;
     double base;
     int32_t direct;        /* heightfield: nonzero: marched as it is (vsh_heights) by VSH_SHADOW_HARD and
@@ -125,7 +126,8 @@ typedef struct vsh_receiver {
                    * is 0 */
     double extent[2]; /* heightfield: size and height in vsh_heights_source; plane: the same, and flat, about
                        * the origin, facing +y */
-    double relief;    /* heightfield: the height */
+    double relief;    /* heightfield: the caster's height. Scene files have a heightfield that receives
+                            cast too, where no heightfield caster is of its image */
     vsh_selection objects; /* mesh: which of its meshes receive */
     int32_t partial; /* mesh: nonzero: those without UVs, or without the set, are left out with a warning,
                         as long as one has them */
@@ -313,9 +315,8 @@ VSH_API const vsh_mesh *vsh_assets_receiver_page(const vsh_assets *assets, size_
 VSH_API const vsh_atlas *vsh_assets_receiver_atlas(const vsh_assets *assets, size_t index,
                                                    const size_t **numbers);
 
-/* What caster `index` casts by where it is not part of a level set: a direct heightfield that is
- * marched, spheres that are not voxelised. They belong to the assets; NULL for every other caster, and beyond
- * the scene's. */
+/* The heightfield that caster `index` marches, and the spheres that it casts without voxels. They belong to
+ * the assets. NULL for every other caster, and beyond the scene's. */
 VSH_API const vsh_heights *vsh_assets_heights(const vsh_assets *assets, size_t index);
 VSH_API const vsh_spheres *vsh_assets_spheres(const vsh_assets *assets, size_t index);
 

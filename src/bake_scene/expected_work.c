@@ -26,7 +26,7 @@ static const double HALF_OPEN = 3500.0, CHANGING = 11000.0, LONE = 2800.0, SHAPE
 static const double CROWDED = 0.38, FEW_TRIANGLES = 0.01;
 /* AO of each texel's own rays, and of p (1 - p). */
 static const double ALONE = 4000.0, ALONE_HALF_OPEN = 8000.0;
-/* What is marched: a cone or a walk, a sample of it. */
+/* Time of a march, and of one of its samples. */
 static const double MARCH = 250.0, SAMPLE = 10.0;
 /* What AO on a field takes of a texel that shares it, though nothing hides anything. */
 static const double FREE = 400.0;
@@ -189,7 +189,7 @@ done:
     return result;
 }
 
-/* What is done by rays to triangles or a field. */
+/* Finds the methods that cast rays. */
 static void set_methods(const vsh_bake_job *job, shaded *s) {
     const vsh_occluders *occluders = job->occluders;
     const vsh_scene *scene = &job->scene;

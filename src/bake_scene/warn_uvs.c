@@ -112,7 +112,7 @@ void vshi_warn_uvs(const vshi_target *target, const vsh_uv_report *reports, uint
     for (size_t m = 0; m < target->mesh_count; ++m) {
         warn_mesh(target->receiver.path, &target->meshes[m], &reports[m], run);
     }
-    if (run->warning != NULL) {
+    if (run->warning != NULL && target->receiver.type != VSH_RECEIVER_HEIGHTFIELD) { /* that is one chart */
         warn_close(target, reports, run);
         warn_covered(target, covered, run);
     }

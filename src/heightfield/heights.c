@@ -23,7 +23,7 @@ static const double DARK = 0.004;
 
 struct vsh_heights {
     int32_t columns, rows;
-    double depth;           /* of a cell along z, in cells' widths, as all that follows */
+    double depth;           /* a cell's length along z, in cells' widths, as are the members below */
     double lowest, highest; /* bottom, and the highest sample */
     vsh_heights_info info;
     double to_cells[12]; /* world to cells: x and z from sample (0, 0), y up */

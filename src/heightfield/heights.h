@@ -12,9 +12,9 @@
 #include <stdbool.h>
 
 /* Marches from points begin … end - 1 to a light that was checked before. Writes its visible share into
- * visibility[end - begin]: for VSH_SHADOW_HARD 0 or 1, for any other method that of VSH_SHADOW_CLASSIC. Points
- * are first moved `lift` world units along their normals. Those within the solid are dark, invalid ones NaN.
- * Thread safe. */
+ * visibility[end - begin]: for VSH_SHADOW_HARD 0 or 1, for any other method that of VSH_SHADOW_CLASSIC.
+ * Points are first moved `lift` world units along their normals. Points within the solid are dark, invalid
+ * points NaN. Thread safe. */
 void vshi_heights_shadow(const vsh_heights *heights, const vsh_light *light, int32_t method,
                          const vsh_points *points, size_t begin, size_t end, double lift, float *visibility,
                          vsh_shade_stats *stats);

@@ -38,6 +38,15 @@ static vsh_result place_model(vshi_asset_place *place, const vsh_model *model, i
     return vshi_place_chosen(place, model, NULL, uv_set, 0.0, transform, error);
 }
 
+/* A second side of 0 follows from the first, which is the longer one, by the cells. */
+static void settle_size(vsh_heights_source *source) {
+    const double across = source->columns - 1, down = source->rows - 1, longer = source->size[0];
+    if (source->size[1] == 0.0) {
+        source->size[0] = longer * fmin(1.0, across / down);
+        source->size[1] = longer * fmin(1.0, down / across);
+    }
+}
+
 /* `source` is filled but for what the image holds, and whether it is direct but for its transform. */
 static vsh_result place_heights(vsh_assets *assets, vshi_asset_place *place, vsh_heights_source *source,
                                 int32_t what, const size_t *texels, const double transform[12],
@@ -47,6 +56,7 @@ static vsh_result place_heights(vsh_assets *assets, vshi_asset_place *place, vsh
     source->columns = map->columns;
     source->rows = map->rows;
     source->values = map->values;
+    settle_size(source);
     if (place->direct) {
         vsh_heights_source placed = *source;
         placed.transform = transform;

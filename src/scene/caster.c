@@ -110,10 +110,16 @@ static const vshi_key caster_keys[] = {
     {.name = "vdb", .kind = VSHI_CUSTOM, .variants = VDB, .read = read_vdb},
     {.name = "grid", .kind = VSHI_STRING, .variants = VDB, .offset = offsetof(vsh_caster, grid)},
     {.name = "heightfield", .kind = VSHI_PATH, .variants = HEIGHTFIELD, .offset = offsetof(vsh_caster, path)},
-    {.name = "size",
+    {.name = "extent",
      .kind = VSHI_VECTOR,
      .variants = HEIGHTFIELD,
-     .required = HEIGHTFIELD,
+     .offset = offsetof(vsh_caster, size),
+     .count = 2,
+     .lowest = 1e-12,
+     .highest = 1e12},
+    {.name = "size", /* the old name of "extent" */
+     .kind = VSHI_VECTOR,
+     .variants = HEIGHTFIELD,
      .offset = offsetof(vsh_caster, size),
      .count = 2,
      .lowest = 1e-12,
@@ -185,6 +191,13 @@ vsh_result vshi_read_caster(vshi_json *reader, const vshi_value *value, void *me
         return vshi_json_fail(reader, value,
                               "key \"mesh\", \"sdf\", \"vdb\", \"heightfield\", \"spheres\", \"mask\" "
                               "or \"text\" is missing");
+    }
+    if (caster->type == VSH_CASTER_HEIGHTFIELD) {
+        VSHI_TRY(vshi_reject_both(reader, value, "extent", "size"));
+        if (!(caster->size[0] > 0.0)) {
+            return vshi_json_fail(reader, value, "key \"extent\" is missing: %s needs it",
+                                  whats[caster->type]);
+        }
     }
     if (caster->type != VSH_CASTER_MESH && !vshi_transform_is_similarity(caster->transform) &&
         vshi_member(value, "transform", &transform)) {

@@ -216,7 +216,7 @@ static vsh_result make_truth(making *m, vsh_error *error) {
     return result == VSH_ERROR_CANCELLED ? vshi_fail(error, result, "%s", why.message) : VSH_OK;
 }
 
-/* What traces the AO of a direct heightfield. */
+/* Makes the triangles that trace the AO of a direct heightfield. */
 static vsh_result trace_ao(making *m, size_t caster, size_t place, vsh_layer *layer, vsh_error *error) {
     size_t count;
     const vsh_mesh *meshes = vsh_assets_caster(m->assets, caster, &count);

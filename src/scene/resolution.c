@@ -59,7 +59,7 @@ bool vshi_scene_is_level_set(const vsh_scene *scene, const vsh_scene_layer *laye
     size_t level_sets = 0, count = 0;
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
-        if (vshi_caster_in_layer(caster, layer) && !vshi_caster_is_direct(caster)) {
+        if (vshi_caster_in_layer(caster, layer) && !vshi_caster_is_direct(scene, caster)) {
             ++count;
             level_sets += caster->type == VSH_CASTER_VDB;
         }

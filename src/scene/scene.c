@@ -189,7 +189,7 @@ static vsh_result read_unit(vshi_json *reader, const vshi_value *value, void *me
 }
 
 static const vshi_key scene_keys[] = {
-    {.name = "casters", .kind = VSHI_CUSTOM, .required = VSHI_ALL, .read = read_casters},
+    {.name = "casters", .kind = VSHI_CUSTOM, .read = read_casters},
     {.name = "voxel_size",
      .kind = VSHI_NUMBER,
      .offset = offsetof(vsh_scene, grid.voxel_size),
@@ -379,6 +379,46 @@ static const vshi_key scene_keys[] = {
 };
 const vshi_table vshi_scene_table = VSHI_TABLE(scene_keys);
 
+static bool is_named(const vsh_scene *scene, const char *path) {
+    bool named = false;
+    for (size_t i = 0; i < scene->caster_count && !named; ++i) {
+        const vsh_caster *caster = &scene->casters[i];
+        named = caster->type == VSH_CASTER_HEIGHTFIELD && strcmp(caster->path, path) == 0;
+    }
+    return named;
+}
+
+/* Terrains that receive also cast, where the scene does not name them as casters. */
+static vsh_result add_terrains(vshi_json *reader, const vshi_value *root, vsh_scene *scene) {
+    size_t count = 0;
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        count += scene->receivers[i].type == VSH_RECEIVER_HEIGHTFIELD;
+    }
+    if (scene->caster_count + count == 0) {
+        return vshi_json_fail(reader, root, "key \"casters\" is missing: a scene needs it");
+    }
+    vsh_caster *casters;
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&casters, scene->caster_count + count, sizeof *casters,
+                                "casters"));
+    if (scene->caster_count > 0) {
+        memcpy(casters, scene->casters, scene->caster_count * sizeof *casters);
+    }
+    scene->casters = casters;
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        const vsh_receiver *receiver = &scene->receivers[i];
+        if (receiver->type == VSH_RECEIVER_HEIGHTFIELD && !is_named(scene, receiver->path)) {
+            vsh_caster *caster = &casters[scene->caster_count++];
+            *caster = vsh_caster_default();
+            caster->type = VSH_CASTER_HEIGHTFIELD;
+            caster->path = receiver->path;
+            caster->height = receiver->relief;
+            memcpy(caster->size, receiver->extent, sizeof caster->size);
+            memcpy(caster->transform, receiver->transform, sizeof caster->transform);
+        }
+    }
+    return VSH_OK;
+}
+
 static vsh_result read_scene(vshi_json *reader, json_t *json, const vsh_run *run, vsh_scene *scene) {
     const vshi_value root = {NULL, NULL, 0, 0, json};
     vshi_value lights, region;
@@ -389,6 +429,7 @@ static vsh_result read_scene(vshi_json *reader, json_t *json, const vsh_run *run
     }
     VSHI_TRY(vshi_read_object(reader, &root, &vshi_scene_table, 1, "a scene", scene));
     VSHI_TRY(vshi_reject_both(reader, &root, "voxel_size", "resolution"));
+    VSHI_TRY(add_terrains(reader, &root, scene));
     if (vshi_member(&root, "lights", &lights)) { /* after the unit of files' numbers */
         VSHI_TRY(vshi_read_lights(reader, &lights, run, scene));
     }

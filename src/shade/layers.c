@@ -268,7 +268,7 @@ static void shade_field(const prepared *item, const vshi_shadow_task *task, laye
     }
 }
 
-/* What heights or spheres leave of it: shares already. */
+/* Shades by heights or spheres, which give shares. */
 static void shade_analytic(const prepared *item, const vshi_shadow_task *task, size_t begin,
                            layer_piece *piece, vsh_shade_stats *stats) {
     const vsh_layer *layer = &item->layer;
@@ -314,7 +314,7 @@ void vshi_layers_shadow(const vshi_layers *layers, const vshi_shadow_task *task,
     }
 }
 
-/* What a layer leaves of the sky; values of spheres are exact. */
+/* Finds the AO of a layer; that of spheres is exact. */
 static void occlude(const prepared *item, const vshi_ao_task *task, size_t begin, layer_piece *piece,
                     vsh_shade_stats *stats) {
     const vsh_layer *layer = &item->layer;

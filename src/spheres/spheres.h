@@ -20,7 +20,10 @@ void vshi_spheres_shadow(const vsh_spheres *spheres, const vsh_light *light, int
                          vsh_shade_stats *stats);
 
 /* Cosine-weighted fraction of the hemisphere that the spheres leave free within a distance, likewise;
- * points->normals must be given. `bent` and `up` as of vshi_heights_ao(). */
+ * points->normals must be given. `bent` [end - begin][3], where not NULL, receives the integral of the free
+ * directions so weighted, in world space: two thirds of the normal under an open sky, NaN for invalid points.
+ * `up` (unit, world space), where not NULL, limits AO to directions above its horizon; `bent` is NULL then.
+ */
 void vshi_spheres_ao(const vsh_spheres *spheres, double ao_distance, const vshi_vec *up,
                      const vsh_points *points, size_t begin, size_t end, double lift, float *ao, float *bent,
                      vsh_shade_stats *stats);

@@ -13,7 +13,7 @@ enum { LANES = VSHI_TERRAIN_LANES };
 enum { RAY_ORIGIN = 0, RAY_NEAR = 3, RAY_DIRECTION = 4, RAY_FAR = 8, RAY_ROWS = 12 };
 enum { HIT_NORMAL = 0, HIT_U = 3, HIT_V = 4, HIT_TRIANGLE = 5, HIT_MESH = 6 };
 
-/* How far beyond a crossing the next one is looked for, cells. */
+/* The search for the next crossing begins so many cells beyond one. */
 static const double PAST = 1e-4;
 
 /* Room around the box for the rounding of floats, of its size. */

@@ -37,7 +37,7 @@ static void fill_level(const vshi_relief *r, int32_t level) {
     }
 }
 
-/* From the rays' space to cells: through the world, and the inverse of what takes cells there. */
+/* Finds the transform from the rays' space to cells. It inverts the transform from cells to the world. */
 static void place(const vsh_mesh *mesh, vshi_terrain t, const double centre[3], double scale,
                   vshi_relief *r) {
     const float *first = mesh->positions, *last = mesh->positions + 3 * (t.columns * t.rows - 1);
@@ -175,7 +175,7 @@ vshi_vec vshi_terrain_normal(const vshi_relief *r, const vshi_terrain_rays *rays
                  h11 = (double)h[r->columns + 1];
     const bool right = x - (i - rays->column[lane]) >= z - (j - rays->row[lane]);
     const double g[3] = {right ? h00 - h01 : h10 - h11, 1.0, right ? h01 - h11 : h00 - h10};
-    const double *m = r->to_cells; /* the gradient of what is over the surface, by the transposed matrix */
+    const double *m = r->to_cells; /* the transposed matrix moves a gradient */
     return (vshi_vec){g[0] * m[0] + g[1] * m[4] + g[2] * m[8], g[0] * m[1] + g[1] * m[5] + g[2] * m[9],
                       g[0] * m[2] + g[1] * m[6] + g[2] * m[10]};
 }

@@ -23,9 +23,9 @@ typedef struct vshi_relief {
 /* Rays in cells. `t` is the distance along the ground, in steps of one cell along x or z, whichever is
  * longer. */
 typedef struct vshi_terrain_rays {
-    int32_t column[VSHI_TERRAIN_LANES], row[VSHI_TERRAIN_LANES]; /* of the origin, and */
-    float x[VSHI_TERRAIN_LANES], z[VSHI_TERRAIN_LANES];          /* what of it lies beyond them */
-    float y[VSHI_TERRAIN_LANES];                                 /* height of the origin */
+    int32_t column[VSHI_TERRAIN_LANES], row[VSHI_TERRAIN_LANES];                  /* cell of the origin */
+    float x[VSHI_TERRAIN_LANES], z[VSHI_TERRAIN_LANES];                           /* the origin in its cell */
+    float y[VSHI_TERRAIN_LANES];                                                  /* height of the origin */
     float dx[VSHI_TERRAIN_LANES], dy[VSHI_TERRAIN_LANES], dz[VSHI_TERRAIN_LANES]; /* along a unit of t */
     float to[VSHI_TERRAIN_LANES];  /* of t, which begins at 0; below 0: no ray */
     float hit[VSHI_TERRAIN_LANES]; /* of t: where the ray first crosses the surface; INFINITY: nowhere */

@@ -64,11 +64,60 @@ write_hill() {
     [ "$(cut -d, -f4 answers.csv | tr '\n' ' ')" = "shadow.sun 1 0 0 1 " ] || fail "$(cat answers.csv)"
 }
 
+@test "an image of heights, a receiver alone and a caster of either name bake one terrain" {
+    scene "{$LAND}" "$OVER" '"ao": {"distance": 1}'
+    shade bake scene.json -o one.exr
+    done_well
+    printf '{%s, %s, "ao": {"distance": 1}}' "$SUN" "$OVER" >scene.json
+    shade bake scene.json
+    done_well
+    same_values one.exr out.exr || fail "a receiver alone"
+    scene "{${LAND/size/extent}}" "$OVER" '"ao": {"distance": 1}'
+    shade bake scene.json
+    done_well
+    same_values one.exr out.exr || fail "extent"
+    for world in 10 10,10; do
+        shade bake terrain.png --height 2 --size-world $world --sun=-0.7,0.4,0.3 --sun-angle 4 --ao 1 --size 96 -o out.exr
+        done_well
+        same_values one.exr out.exr || fail "--size-world $world"
+    done
+}
+
+@test "the shorter side of a terrain follows from its pixels" {
+    printf 'P2 5 3 9 0 1 2 3 4 5 6 7 8 9 8 7 6 5 4\n' >long.pgm
+    shade bake long.pgm --height 2 --size-world 8 --ao 1 --size 32 -o one.exr
+    done_well
+    shade bake long.pgm --height 2 --size-world 8,4 --ao 1 --size 32 -o out.exr
+    done_well
+    same_values one.exr out.exr
+}
+
+@test "what a terrain's image lacks is said, and what to do" {
+    shade bake terrain.png --ao 1 -o out.exr
+    refused 2 'terrain.png' '--height H, the height of white, and --size-world W'
+    shade bake terrain.png --height 2 --ao 1 -o out.exr
+    refused 2 'terrain.png' 'give --size-world W, the length of its longer side'
+    shade bake terrain.png --size-world 10 --ao 1 -o out.exr
+    refused 2 'terrain.png' 'give --height H, the height of white'
+    shade bake terrain.png --height 0 --size-world 10 --ao 1 -o out.exr
+    refused 2 "--height '0'"
+    shade bake terrain.png --height 2 --size-world 10,0 --ao 1 -o out.exr
+    refused 2 "--size-world '0'"
+    shade bake seeds_floor.obj --height 2 --ao 1 -o out.exr
+    refused 2 '--height' 'seeds_floor.obj is no image of heights'
+    printf '{%s, "receivers": []}' "$SUN" >scene.json
+    shade bake scene.json
+    refused 2 'key "casters" is missing'
+    scene "{$LAND, \"extent\": [10, 10]}" "$OVER"
+    shade bake scene.json
+    refused 2 'casters[0].extent: cannot stand beside "size"'
+}
+
 @test "voxelize takes a terrain and spheres that are voxelised, and no others" {
     scene "{$LAND}, {\"spheres\": [[0, 3, 0, 0.5]], \"voxelised\": true}" "$OVER" '"resolution": 48'
     shade voxelize scene.json -o out.vdb --quiet
     done_well
-    scene '{"spheres": [[0, 3, 0, 0.5]]}' "$OVER"
+    scene '{"spheres": [[0, 3, 0, 0.5]]}' "$FLOOR"
     shade voxelize scene.json -o out.vdb
     refused 2 "no casters that are voxelised"
 }

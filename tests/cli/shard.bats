@@ -58,8 +58,7 @@ load parts
 @test "so are an asset with its light in it, a terrain, objects of their own, and a scene of several lightmaps" {
     one out.glb "${CLOISTER[@]}"
     merged out.glb 3 "${CLOISTER[@]}"
-    printf '%s' '{"casters": [{"heightfield": "terrain.png", "size": [10, 10], "height": 2, "direct": true}],
-        "lights": [{"name": "sun", "type": "directional", "direction": [-1, 0.5, -0.3], "angle_deg": 5}], "ao": {"distance": 2},
+    printf '%s' '{"lights": [{"name": "sun", "type": "directional", "direction": [-1, 0.5, -0.3], "angle_deg": 5}], "ao": {"distance": 2},
         "receivers": [{"heightfield": "terrain.png", "extent": [10, 10], "height": 2, "size": 64, "output": "out.exr"}]}' >terrain.json
     one out.exr terrain.json
     for n in 2 3 7 64; do
@@ -179,11 +178,10 @@ load parts
     run -0 "$VDBSHADE" bake "${CLOISTER[@]}" --size 1024 -o out.exr --shard 64/64 --dry-run # of the whole
     [[ $output == *"lightmap"*"parts "*" 4 of 64 have rows"* ]]
     [ "$(stat -c %s out.exr.64-of-64.part)" -lt 2000 ]
-    # over a terrain, whose triangles each part counts, more work is taken than that
-    printf '{"casters": [{"heightfield": "terrain.png", "size": [10, 10], "height": 2, "direct": true}], "ao": {"distance": 2},
-        "receivers": [{"heightfield": "terrain.png", "extent": [10, 10], "height": 2, "size": 512, "output": "t.exr"}]}' >t.json
+    # a terrain is traced in a second
+    printf '{"ao": {"distance": 2}, "receivers": [{"heightfield": "terrain.png", "extent": [10, 10], "height": 2, "size": 512, "output": "t.exr"}]}' >t.json
     run -0 "$VDBSHADE" bake t.json --shard 64/64 --dry-run
-    [[ $output == *"parts "*" 8 of 64 have rows"* ]]
+    [[ $output == *"parts "*" 1 of 64 have rows"* ]]
     run -0 "$VDBSHADE" bake "${CLOISTER[@]}" --size 1024 -o out.exr --shard 64/64 --field none.field # nor fields
     shade bake "${CLOISTER[@]}" --size 1024 -o out.exr --shard 1/64 --field none.field
     refused 3 none.field
@@ -218,14 +216,9 @@ even_work() { # NAME.exr N SAMPLES arguments
     cmp "one/$name" "$name"
 }
 
-@test "parts have as much work as each other where it is marched: over heights, among spheres, by cones" {
-    local ground="$ASSETS/terrain.png" scene
+@test "parts have as much work as each other where it is marched: among spheres, by cones" {
+    local scene
     scene='"lights": [{"name": "sun", "type": "directional", "direction": [-5, 8, -6], "angle_deg": 5}], "ao": {"distance": 2}'
-    printf '{"casters": [{"heightfield": "%s", "size": [10, 10], "height": 2, "direct": true}], %s, "receivers": [
-        {"heightfield": "%s", "extent": [10, 10], "height": 2, "size": 256, "output": "ground.exr"}]}' "$ground" "$scene" "$ground" >ground.json
-    even_work ground.exr 6 650 ground.json
-    [ "$most" -le 125 ] || fail "one part has $most hundredths of the mean over heights"
-
     # spheres stand close over one half of a floor
     awk 'BEGIN { print "x,y,z,radius"; for (i = 0; i < 40; ++i) for (k = 0; k < 20; ++k) printf "%g,0.1,%g,0.03\n", i / 10, k / 10 }' >near.csv
     printf 'v 0 0 0\nv 4 0 0\nv 4 0 4\nv 0 0 4\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 4/4 3/3 2/2 1/1\n' >half.obj

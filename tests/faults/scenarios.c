@@ -200,6 +200,7 @@ static vsh_result ask(const vsh_run *run, vsh_error *error) {
     static const char *const names[] = {"sun"};
     vsh_layer layers[] = {vsh_layer_default(), vsh_layer_default(), vsh_layer_default()};
     layers[0].heights = heights;
+    layers[0].method = VSH_SHADOW_CLASSIC;
     layers[1].spheres = spheres;
     layers[1].lights = names;
     layers[1].light_count = 1;

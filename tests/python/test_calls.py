@@ -267,7 +267,7 @@ class Memory(Case):
 
     def test_what_a_handle_needs_lives_as_long(self):
         heights = vdbshade.Heights(numpy.random.default_rng(1).random((32, 32), numpy.float32) * 0.1)
-        occluders = vdbshade.Occluders.from_parts(layers=[vdbshade.Layer(heights)])
+        occluders = vdbshade.Occluders.from_parts(layers=[vdbshade.Layer(heights, method="classic")])
         query = vdbshade.Query(occluders, sun())
         positions, _ = points_on_floor(200)
         want = query.points(positions)["shadow"]

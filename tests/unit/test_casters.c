@@ -223,11 +223,11 @@ static void bent_normals_lean_away_from_spheres(void **state) {
 /* Bakes the floor under casters given as JSON; coverage of its texels. */
 static void bake_floor(const char *casters, float *shadow, float *coverage, int32_t side) {
     char text[1024];
-    snprintf(
-        text, sizeof text,
-        "{\"casters\":[%s],\"method\":\"hard\",\"lights\":[{\"name\":\"sun\",\"type\":\"directional\",\"direction\":[0,1,0]}],"
-        "\"receivers\":[{\"mesh\":\"seeds_floor.obj\",\"output\":\"none.exr\"}]}",
-        casters);
+    snprintf(text, sizeof text,
+             "{\"casters\":[%s],\"method\":\"hard\",\"lights\":[{\"name\":\"sun\",\"type\":\"directional\","
+             "\"direction\":[0,1,0]}],"
+             "\"receivers\":[{\"mesh\":\"seeds_floor.obj\",\"output\":\"none.exr\"}]}",
+             casters);
     vsh_scene *scene = NULL;
     vsh_assets *assets = NULL;
     vsh_error error = {VSH_OK, ""};

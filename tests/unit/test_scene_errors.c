@@ -209,7 +209,7 @@ static const struct {
      "lights[0].edge_u: is no key of a sphere light"},
     /* heightfields */
     {"{\"casters\":[@{\"heightfield\":\"a\",\"height\":1}]}",
-     "casters[0]: key \"size\" is missing: a heightfield caster needs it"},
+     "casters[0]: key \"extent\" is missing: a heightfield caster needs it"},
     {"{\"casters\":[@{\"heightfield\":\"a\",\"size\":[1,1]}]}",
      "casters[0]: key \"height\" is missing: a heightfield caster needs it"},
     {"{\"casters\":[{\"heightfield\":\"a\",\"height\":1,\"size\":[1,@0]}]}",

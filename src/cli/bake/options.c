@@ -1,6 +1,7 @@
 #include "options.h"
 
 #include "cli/message.h"
+#include "cli/try.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -22,7 +23,9 @@ enum {
     KEY_EXR,
     KEY_VIEW,
     KEY_DENSITY,
-    KEY_TILE_SIZE
+    KEY_TILE_SIZE,
+    KEY_HEIGHT,
+    KEY_SIZE_WORLD
 };
 
 static const cli_option options[] = {
@@ -68,6 +71,10 @@ static const cli_option options[] = {
     {KEY_ONE_SIDED, "one-sided", "NAME", "light passes the backs of their faces, likewise; may\nbe repeated"},
     {KEY_PER_OBJECT, "per-object", NULL,
      "an image for each object: FOLDER/NAME.exr with\n-o FOLDER/, else OUT.NAME.exr, or where OUT has %s"},
+    {0, NULL, NULL, "Terrain"},
+    {KEY_HEIGHT, "height", "H", "height of white in INPUT, an image of heights; scene\nunits"},
+    {KEY_SIZE_WORLD, "size-world", "W[,D]",
+     "length of its longer side, or of both: along x, then\nalong z; scene units"},
     {0, NULL, NULL, "Light and occlusion"},
     CLI_LIGHT_OPTIONS,
     CLI_SETTINGS(VSH_SETTINGS_CHANNELS),
@@ -95,11 +102,27 @@ const cli_command cli_bake = {
     "bake",
     "INPUT -o OUT [options]",
     "Bakes soft shadows and ambient occlusion into a lightmap. INPUT is a mesh file with lightmap UVs\n"
-    "(OBJ, glTF, GLB, PLY, FBX …), which casts and receives, or a scene file (.json), whose values the\n"
-    "options override. Numbers in brackets are what holds without the option.",
+    "(OBJ, glTF, GLB, PLY, FBX …), which casts and receives, an image of heights (with --height), or a\n"
+    "scene file (.json), whose values the options override. Numbers in brackets are what holds without\n"
+    "the option.",
     options,
     sizeof options / sizeof options[0],
     cli_bake_main};
+
+/* W or W,D */
+static int parse_world(const char *name, const char *value, double world[2]) {
+    const char *comma = strchr(value, ',');
+    char first[64];
+    const size_t length = comma != NULL ? (size_t)(comma - value) : strlen(value);
+    if (length >= sizeof first) {
+        return cli_usage("%s '%s': expected W or W,D", name, value);
+    }
+    memcpy(first, value, length);
+    first[length] = '\0';
+    world[1] = 0.0;
+    CLI_TRY(cli_parse_number(name, first, 1e-12, 1e12, &world[0]));
+    return comma != NULL ? cli_parse_number(name, comma + 1, 1e-12, 1e12, &world[1]) : CLI_OK;
+}
 
 static int take_caster(cli_bake_settings *s, const char *name, const char *value) {
     if (s->caster_count == CLI_MAX_EXTRA_CASTERS) {
@@ -173,6 +196,12 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return take_pattern(&s->one_sided, name, value);
     case KEY_TILE_SIZE:
         return cli_parse_number(name, value, 1e-9, 1e12, &s->tile_size);
+    case KEY_HEIGHT:
+        CLI_TRY(cli_parse_number(name, value, -1e12, 1e12, &s->height));
+        return s->height != 0.0 ? CLI_OK
+                                : cli_usage("%s '%s': a terrain without height casts nothing", name, value);
+    case KEY_SIZE_WORLD:
+        return parse_world(name, value, s->world);
     case KEY_DENSITY:
         return cli_density_take(&s->densities, name, value);
     case KEY_PER_OBJECT:

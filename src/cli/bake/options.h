@@ -104,6 +104,7 @@ typedef struct cli_bake_settings {
     bool has_sun, has_sun_angle, has_light_radius, has_shard_least, per_object, dry_run, resume;
     int32_t shard, shard_count; /* 0: all of it */
     double shard_least;         /* seconds; 0: all shards have rows, as those of a trade do */
+    double height, world[2];    /* --height and --size-world; 0: not given. world[1] 0: the image says */
     double tile_size;           /* world units; 0: the scene is not cut into tiles */
     const char *const *words;   /* [word_count]: the command line that this is */
     size_t word_count;

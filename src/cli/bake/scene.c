@@ -38,6 +38,34 @@ static int name_caster(const cli_bake_settings *s, cli_bake_scene *made, size_t 
     return caster->path != NULL ? CLI_OK : cli_out_of_memory("casters");
 }
 
+/* Whether the input is an image, which is baked as a terrain. */
+static bool is_heights(const char *input) {
+    static const char *const endings[] = {"png", "exr",  "tif", "tiff", "pgm", "ppm",  "pfm", "hdr",
+                                          "jpg", "jpeg", "bmp", "tga",  "jp2", "webp", "dpx"};
+    bool is = false;
+    for (size_t i = 0; i < sizeof endings / sizeof endings[0] && !is; ++i) {
+        is = cli_has_ending(input, endings[i]);
+    }
+    return is;
+}
+
+static int check_heights(const cli_bake_settings *s) {
+    const bool wanted = is_heights(s->input), given[2] = {s->height != 0.0, s->world[0] > 0.0};
+    if (!wanted && (given[0] || given[1])) {
+        return cli_usage("--%s: %s is no image of heights, to which it belongs",
+                         given[0] ? "height" : "size-world", s->input);
+    }
+    if (wanted && !(given[0] && given[1])) {
+        return cli_usage("%s: an image is baked as a terrain; give %s", s->input,
+                         given[0] ? "--size-world W, the length of its longer side"
+                         : given[1]
+                             ? "--height H, the height of white"
+                             : "--height H, the height of white, and --size-world W, the length of its "
+                               "longer side");
+    }
+    return CLI_OK;
+}
+
 /* The input's casters, then those of --caster. */
 static int add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
     const size_t own = made->read != NULL ? made->read->caster_count : 1;
@@ -54,7 +82,11 @@ static int add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
             made->casters[i].type =
                 cli_has_ending(made->casters[i].path, "vdb") ? VSH_CASTER_VDB : VSH_CASTER_MESH;
             set_identity(made->casters[i].transform);
-            if (i < own) {
+            if (i < own && s->height != 0.0) {
+                made->casters[i].type = VSH_CASTER_HEIGHTFIELD;
+                made->casters[i].height = s->height;
+                memcpy(made->casters[i].size, s->world, sizeof s->world);
+            } else if (i < own) {
                 made->casters[i].objects = selection(NULL, &s->no_cast);
                 made->casters[i].one_sided = s->one_sided.list;
                 made->casters[i].one_sided_count = s->one_sided.count;
@@ -160,6 +192,11 @@ int cli_bake_scene_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
                     : made->read != NULL ? made->read->receivers[i]
                                          : vsh_receiver_default();
         receiver->path = floor || made->read != NULL ? receiver->path : s->input;
+        if (!floor && made->read == NULL && s->height != 0.0) {
+            receiver->type = VSH_RECEIVER_HEIGHTFIELD;
+            receiver->relief = s->height;
+            memcpy(receiver->extent, s->world, sizeof s->world);
+        }
         code = override_receiver(s, receiver);
     }
     made->scene.receivers = made->receivers;
@@ -354,6 +391,7 @@ int cli_bake_use_field(const cli_bake_settings *s, cli_bake_scene *made) {
 /* The input, or defaults for a mesh, with what the options put over it. */
 static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scene *made) {
     memset(made, 0, sizeof *made);
+    CLI_TRY(receivers ? check_heights(settings) : CLI_OK);
     if (cli_has_ending(settings->input, "json")) {
         const vsh_run run = cli_common_run(&settings->common);
         vsh_error error;

@@ -9,9 +9,9 @@
 /* Of all commands of cases, what changes values beside settings, which all do. One that is not here is
  * refused: a new option is to be added when it is known to write nothing. */
 static const char *const changes_values[] = {
-    "receive", "no-receive", "no-cast",        "one-sided", "sun",  "sun-angle", "lights", "light-radius",
-    "caster",  "solid",      "shell",          "inward",    "half", "band",      "box",    "like",
-    "inside",  "name",       "box-voxel-size", "density",   "floor"};
+    "receive", "no-receive", "no-cast",        "one-sided", "sun",    "sun-angle",  "lights", "light-radius",
+    "caster",  "solid",      "shell",          "inward",    "half",   "band",       "box",    "like",
+    "inside",  "name",       "box-voxel-size", "density",   "height", "size-world", "floor"};
 
 static bool is_setting(const char *name) {
     const vsh_setting *setting;
