@@ -63,6 +63,8 @@ uint64_t vsh_triangles_bytes(const vsh_triangles *triangles) {
 
 /* A triangle's share of buffers and tree, bytes: 180 to 230 measured, more while the tree is made. */
 static const double TRIANGLE_BYTES = 300.0;
+/* A tree over a terrain of fewer triangles takes at most 200 MB, and up to a third less time a ray. */
+enum { LEAST_TERRAIN = 1 << 19 };
 /* A terrain's sample's: it and the greatest of blocks. */
 static const double SAMPLE_BYTES = 5.4;
 /* A quad's, likewise: 97 measured. */
@@ -167,7 +169,7 @@ static uint8_t find_solid(const vsh_mesh *mesh, const uint8_t *sides, const uint
     return (uint8_t)((behind ? VSHI_SOLID_BEHIND : VSHI_SOLID_BEFORE) | (holed[i] ? VSHI_SOLID_HOLED : 0));
 }
 
-/* Finds the terrains that are solid beneath, as they are but for what a caller says of them. */
+/* Finds the large terrains that are solid beneath, as they are unless a caller says otherwise. */
 static vsh_result find_terrains(vsh_triangles *triangles, const vshi_mesh_set *set, vsh_error *error) {
     VSHI_TRY(vshi_allocate((void **)&triangles->terrains, set->count, sizeof *triangles->terrains,
                            "triangles", error));
@@ -175,8 +177,9 @@ static vsh_result find_terrains(vsh_triangles *triangles, const vshi_mesh_set *s
         const vsh_mesh *mesh = &set->meshes[m];
         const uint8_t *sides = vshi_solidity_sides(set->solidity, m);
         vshi_terrain grid;
-        if (mesh->mask == NULL && mesh->one_sided == 0 && vshi_mesh_is_terrain(mesh, &grid) && grid.solid &&
-            vshi_terrain_is_even(mesh, grid) && sides[0] == VSHI_SIDE_BEHIND) {
+        if (mesh->triangle_count >= LEAST_TERRAIN && mesh->mask == NULL && mesh->one_sided == 0 &&
+            vshi_mesh_is_terrain(mesh, &grid) && grid.solid && vshi_terrain_is_even(mesh, grid) &&
+            sides[0] == VSHI_SIDE_BEHIND) {
             triangles->terrains[triangles->terrain_count++] = (vshi_terrain_part){.mesh = m, .grid = grid};
         }
     }

@@ -95,6 +95,15 @@ void vshi_relief_free(vshi_relief *relief) {
     *relief = (vshi_relief){0};
 }
 
+/* fmin() and fmax() are calls, as they know NaN. */
+static inline double lesser(double a, double b) {
+    return a < b ? a : b;
+}
+
+static inline double greater(double a, double b) {
+    return a > b ? a : b;
+}
+
 /* Where a ray is over the ground, of t, along one axis of `cells` cells. */
 static void clip(double origin, double along, double cells, double *from, double *to) {
     if (along == 0.0) {
@@ -102,8 +111,8 @@ static void clip(double origin, double along, double cells, double *from, double
         return;
     }
     const double a = -origin / along, b = (cells - origin) / along;
-    *from = fmax(*from, fmin(a, b));
-    *to = fmin(*to, fmax(a, b));
+    *from = greater(*from, lesser(a, b));
+    *to = lesser(*to, greater(a, b));
 }
 
 void vshi_terrain_aim(const vshi_relief *r, const float origin[3], const float direction[3], double from,
@@ -114,8 +123,8 @@ void vshi_terrain_aim(const vshi_relief *r, const float origin[3], const float d
         along[k] = m[0] * (double)direction[0] + m[1] * (double)direction[1] + m[2] * (double)direction[2];
         at[k] = m[0] * (double)origin[0] + m[1] * (double)origin[1] + m[2] * (double)origin[2] + m[3];
     }
-    const double speed = fmax(fmax(fabs(along[0]), fabs(along[2])), LEAST_SPEED);
-    double first = from * speed, last = fmin(to * speed, 1e30);
+    const double speed = greater(greater(fabs(along[0]), fabs(along[2])), LEAST_SPEED);
+    double first = from * speed, last = lesser(to * speed, 1e30);
     const double dx = along[0] / speed, dz = along[2] / speed;
     clip(at[0], dx, r->columns - 1, &first, &last);
     clip(at[2], dz, r->rows - 1, &first, &last);
