@@ -397,16 +397,18 @@ static void texels_on_the_side_of_a_box_are_filled_from_the_open(void **state) {
 /* The room's floor is a wall with air behind it, so nothing is met from beneath it. */
 static void what_stands_on_a_floor_with_air_beneath_it_is_invalid_there(void **state) {
     (void)state;
-    for (int room = 0; room < 2; ++room) {
+    for (int kind = 0; kind < 3; ++kind) { /* on a plane, in a room, in a mirrored room */
         shape *s = calloc(1, sizeof *s);
-        if (room) {
+        if (kind > 0) {
             add_faces(s, (box){{-4.0, 0.0, -4.0}, {4.0, 2.5, 4.0}}, true);
         } else {
             quad_at(s, 0.0, -4.0, 4.0);
         }
         add_box(s, (box){{-1.0, 0.0, -1.0}, {1.0, 0.8, 1.0}});
         quad_at(s, 0.8, -0.5, 0.5); /* a cloth on the box, both of which are seen */
-        const vsh_mesh mesh = mesh_of(s);
+        vsh_mesh mesh = mesh_of(s);
+        static const double mirror[12] = {-1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0};
+        mesh.transform = kind == 2 ? mirror : NULL;
         baked b = bake(&mesh, 48, 0, 1.0);
         size_t under = 0, over = 0;
         for (size_t i = 0; i < b.samples.count; ++i) {
