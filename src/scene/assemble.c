@@ -373,7 +373,9 @@ vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, c
     if (take(scene, true, NULL, taken) == 0) {
         VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_INPUT, "scene: no casters that are voxelised"));
     }
-    VSHI_TRY_DONE(assemble(scene, assets, NULL, taken, &scene->grid, run, grid, error));
+    const vsh_grid_options options =
+        scene->layer_count == 0 ? vshi_scene_grid_options(scene, NULL) : scene->grid;
+    VSHI_TRY_DONE(assemble(scene, assets, NULL, taken, &options, run, grid, error));
 done:
     free(taken);
     return result;
@@ -381,6 +383,9 @@ done:
 
 vsh_grid_options vshi_scene_grid_options(const vsh_scene *scene, const vsh_scene_layer *layer) {
     vsh_grid_options options = scene->grid;
+    if (vshi_scene_keeps_voxels(scene, layer)) {
+        options.resolution = 0;
+    }
     if (layer != NULL && (layer->voxel_size != 0.0 || layer->resolution != 0)) {
         options.voxel_size = layer->voxel_size;
         options.resolution = layer->resolution;

@@ -138,7 +138,10 @@ static vsh_result make_field(making *m, const vsh_scene_layer *layer, const vsh_
     if (m->options.voxels == 0 && !given) {
         resolution = vsh_scene_resolution(m->scene, m->assets, layer, m->options.points);
     }
-    if (resolution == 0 && triangles != NULL) {
+    if (resolution == VSH_RESOLUTION_NAMED && !given && vshi_scene_keeps_voxels(m->scene, layer)) {
+        resolution = 0; /* its own voxels */
+    }
+    if (resolution == 0 && triangles != NULL && m->options.voxels == 0) {
         VSHI_TRY(vshi_occluders_unknown(triangles, 0.0, field, error));
         return *field == NULL ? VSH_OK
                               : vshi_scene_note_solidity(m->scene, m->assets, layer, &m->voxel, error);

@@ -30,9 +30,10 @@ vsh_result vshi_scene_caster_grid(const vsh_scene *scene, const vsh_assets *asse
  * where layers cast, or where rays cannot meet all casters. */
 bool vshi_scene_wants_truth(const vsh_scene *scene);
 
-/* Whether a layer's only caster, or (NULL) that in none, is a level set, which keeps its voxels when it is
- * marched. */
+/* Whether a layer's only caster, or (NULL) that in none, is a level set; and whether it keeps its voxels, as
+ * nobody named others. */
 bool vshi_scene_is_level_set(const vsh_scene *scene, const vsh_scene_layer *layer);
+bool vshi_scene_keeps_voxels(const vsh_scene *scene, const vsh_scene_layer *layer);
 
 /* Whether a method that a layer's casters, or (NULL) those in none, are shaded with has all of `traits`,
  * VSH_METHOD_…, or (`has` false) lacks one: of shadows where there are lights, of AO where it is baked. */

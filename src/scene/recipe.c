@@ -2,6 +2,7 @@
  * stale unless its alpha cuts out what casts, and another unit or selection does. A .vdb, which a field makes
  * unneeded, is hashed as it lies. */
 #include "scene/recipe.h"
+#include "scene/occluders.h"
 
 #include "base/digest.h"
 #include "base/hash.h"
@@ -273,9 +274,10 @@ vsh_result vshi_recipe_make(const vsh_scene *scene, const vshi_caster_prints *pr
     VSHI_NUMBERS;
     const bool own = layer != NULL && (layer->voxel_size != 0.0 || layer->resolution != 0);
     const double voxel_size = own ? layer->voxel_size : scene->grid.voxel_size;
-    const int32_t voxels = resolution != VSH_RESOLUTION_NAMED ? resolution
-                           : own                              ? layer->resolution
-                                                              : scene->grid.resolution;
+    const int32_t voxels = resolution != VSH_RESOLUTION_NAMED      ? resolution
+                           : own                                   ? layer->resolution
+                           : vshi_scene_keeps_voxels(scene, layer) ? 0
+                                                                   : scene->grid.resolution;
     if (voxel_size > 0.0) {
         VSHI_TRY(add_size(lines, "voxel_size", voxel_size, error));
     } else {

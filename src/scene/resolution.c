@@ -67,6 +67,10 @@ bool vshi_scene_is_level_set(const vsh_scene *scene, const vsh_scene_layer *laye
     return count == 1 && level_sets == 1;
 }
 
+bool vshi_scene_keeps_voxels(const vsh_scene *scene, const vsh_scene_layer *layer) {
+    return vshi_scene_is_level_set(scene, layer) && !vshi_scene_voxels_named(scene, layer);
+}
+
 int32_t vsh_scene_resolution(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
                              double points) {
     VSHI_FLOATS;

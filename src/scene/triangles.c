@@ -37,8 +37,10 @@ int32_t vsh_scene_traceable(const vsh_scene *scene, const vsh_scene_layer *layer
             outlines += caster->type == VSH_CASTER_MASK || caster->type == VSH_CASTER_TEXT;
         }
     }
-    const bool marched = exact == 0 && (level_sets == 0) != (outlines == 0) && level_sets <= 1;
-    return scene != NULL && !marched;
+    const bool alone = exact == 0 && (level_sets == 0) != (outlines == 0) && level_sets <= 1;
+    const bool unread =
+        scene != NULL && scene->field != NULL && level_sets + outlines > 0; /* their fields are */
+    return scene != NULL && !alone && !unread;
 }
 
 static int32_t method_of(const vsh_scene *scene, const vsh_scene_layer *layer) {

@@ -106,7 +106,7 @@ JSON
   {"sdf": {"shape": "sphere", "radius": 0.4, "translate": [0, 2, 0]}, "layer": "a"}],
  "layers": [{"name": "a", "softness": 2}, {"name": "b", "resolution": 40}], "resolution": 48,
  "lights": [{"name": "sun", "type": "directional", "direction": [0.3, 1, 0.2], "angle_deg": 6}],
- "ao": {"distance": 0.5}, "method": "cone",
+ "ao": {"distance": 0.5, "method": "adaptive"}, "method": "cone",
  "receivers": [{"mesh": "seeds_floor.obj", "size": 64, "output": "s.exr"}]}
 JSON
     shade field s.json -o s.field --quiet

@@ -58,9 +58,11 @@ needs_embree() {
     [[ $output == *"shadow exact, AO exact"* ]] || fail "$output"
 }
 
-@test "casters that are no triangles are baked by adaptive" {
+@test "a level set alone is baked by adaptive" {
+    printf '{"casters": [{"sdf": {"shape": "sphere", "radius": 0.5, "translate": [0, 2, 0]}}]}' >ball.json
+    "$VDBSHADE" voxelize ball.json --resolution 24 --quiet -o ball.vdb
     cat >sphere.json <<'JSON'
-{"casters": [{"sdf": {"shape": "sphere", "radius": 0.5, "translate": [0, 2, 0]}}], "resolution": 24,
+{"casters": [{"vdb": "ball.vdb"}],
  "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0], "angle_deg": 5}],
  "receivers": [{"mesh": "box.obj", "size": 16, "output": "a.exr"}]}
 JSON

@@ -52,7 +52,7 @@ alike() {
     no_leftovers
 }
 
-@test "a marched truth, several receivers and lights: parts of whatever is measured are alike, to the page of runs" {
+@test "a level set, several receivers and lights: parts of whatever is measured are alike, to the page of runs" {
     "$VDBSHADE" voxelize box.obj -o box.vdb --resolution 24 --quiet
     cat >scene.json <<'JSON'
 {"casters": [{"vdb": "box.vdb"}],
@@ -64,7 +64,6 @@ JSON
     "$VDBSHADE" trade "${options[@]}" -o one.html --csv one.csv --quiet
     parts 2 "${options[@]}"
     alike
-    grep -q 'a field of 24 voxels' out.html || fail "no word of the truth"
     rm ./*.part
     # what does not fit into a part's budget is left out of all of them
     options=(box.obj --sun 0,1,0 --size 16 --resolutions 8 --truth-rays 16 --budget 0.000001 --threads 1)

@@ -123,7 +123,7 @@ static size_t compare(const vsh_field *field, const vsh_voxels *voxels, const vs
     for (size_t i = 0; i < d[0].count; ++i) {
         double slope[3], at[2][3];
         float beside[2];
-        if (!(distance[i] >= 0.0f) || (normals && fabs((double)distance[i]) > 2.4 * info.voxel_size[0])) {
+        if (!(distance[i] >= 0.0f) || (normals && fabs((double)distance[i]) > 2.0 * info.voxel_size[0])) {
             continue;
         }
         for (int axis = 0; axis < 3; ++axis) {
