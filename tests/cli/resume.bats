@@ -140,7 +140,7 @@ end() { # SIGNAL
     "receivers": [{"mesh": "floor.obj", "output": "out.exr", "transform": {$at}}]
 }
 JSON
-            for how in "" --resume "--memory-limit 21.7M --stats stats.json"; do
+            for how in "" --resume "--band-rows 64 --stats stats.json"; do
                 rm -f out.exr out.exr.resume
                 run --separate-stderr "$VDBSHADE" bake scene.json --size 400x256 --max-error 0.2 $how --quiet
                 if [ "$at" = '"scale": 1' ]; then

@@ -30,6 +30,7 @@ LEFT_OUT = {
     "vsh_volume_to_openvdb": "the same",
     "vsh_reader_serve": "for the main of a program that is its own reader; Run(reader=…) takes such a program's path",
     "vsh_lit_check_uvs": "what lit_write() refuses, for bakes that begin long before it; BakeJob asks it",
+    "vsh_triangles_create_beside": "procedural solids beside meshes: scenes trace them so",
     "vsh_planes_shaded": "what a plane costs, for progress of several bakes together",
     "vsh_atlas_chart_view_sized": "one chart of those that Atlas.charts lists",
 }
