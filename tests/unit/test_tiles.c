@@ -142,9 +142,6 @@ static void bake_tiles(const vsh_scene *scene, double size, baked *into) {
     vsh_tiles_free(tiles);
 }
 
-/* Fewer casters prove more texels lit. Those beside them are smoothed to other values. */
-static const double SUN_OFF = 0.15;
-
 static double rmse(const baked *a, const baked *b, int plane) {
     double sum = 0.0;
     for (int f = 0; f < FLOORS; ++f) {
@@ -173,7 +170,7 @@ static void tiles_of_meshes_bake_the_whole_world_s_values_by_fewer_objects(void 
     bake_tiles(scene, 4.0, tiled);
     const double sun = rmse(whole, tiled, SUN), ao = rmse(whole, tiled, AO);
     printf("off by %.3g of the sun, %.3g of AO\n", sun, ao);
-    assert_true(sun <= SUN_OFF * scene->shade.max_error);
+    assert_true(sun <= 0.1 * scene->shade.max_error);
     assert_true(ao <= 0.1 * scene->shade.max_error);
     vsh_tiles *tiles = tiles_of(scene, 4.0);
     assert_int_equal(vsh_tiles_count(tiles), FLOORS);
@@ -310,7 +307,7 @@ static void layers_and_rules_of_what_is_far_away_do_no_harm(void **state) {
     baked *whole = two(), *tiled = whole + 1;
     bake(scene, whole);
     bake_tiles(scene, 4.0, tiled);
-    assert_true(rmse(whole, tiled, SUN) <= SUN_OFF * scene->shade.max_error);
+    assert_true(rmse(whole, tiled, SUN) <= 0.1 * scene->shade.max_error);
     assert_true(rmse(whole, tiled, AO) <= 0.1 * scene->shade.max_error);
     free(whole);
     vsh_scene_free(scene);
