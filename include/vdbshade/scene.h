@@ -340,10 +340,10 @@ VSH_API vsh_result vsh_scene_layer_casters(const vsh_scene *scene, const vsh_ass
                                            const vsh_scene_layer *layer, const vsh_run *run, vsh_grid **grid,
                                            vsh_error *error);
 
-/* What rays meet of a scene's casters in `layer`, or (NULL) in none, for VSH_SHADOW_EXACT and VSH_AO_EXACT:
- * meshes and heightfields as triangles, procedural shapes and spheres as they are, level sets, masks and
- * texts as the surface of their own voxels. *triangles is NULL where there are none. Free them with
- * vsh_triangles_free(). Errors:
+/* Makes a scene's casters in `layer`, or (NULL) in none, ready for rays of VSH_SHADOW_EXACT and VSH_AO_EXACT.
+ * Meshes and heightfields become triangles. Procedural shapes and spheres keep their exact form. Level sets,
+ * masks and texts become the surface of their own voxels. *triangles is NULL if there are no casters. Free
+ * the result with vsh_triangles_free(). Errors:
  * - VSH_ERROR_ARGUMENT: scene, assets or triangles NULL, run;
  * - VSH_ERROR_INPUT: a transform that shears or scales a shape or a level set unevenly;
  * - VSH_ERROR_UNSUPPORTED, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED: as
@@ -353,8 +353,8 @@ VSH_API vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets 
                                        vsh_triangles **triangles, vsh_error *error);
 
 /* 1 where auto traces the casters in `layer`, or (NULL) in none. 0 where it marches them: one level set
- * alone, which keeps its voxels so, and masks and texts alone. Those that cast as they are (spheres, and
- * heightfields that are marched) do not count. Also 1 where there are no others. */
+ * alone, which keeps its voxels so, and masks and texts alone. Spheres in closed form and heightfields
+ * that are marched do not count. Also 1 if there are no other casters. */
 VSH_API int32_t vsh_scene_traceable(const vsh_scene *scene, const vsh_scene_layer *layer);
 
 /* 1 where shadows of the casters in `layer`, or (NULL) in none, or AO are baked by a method that knows them

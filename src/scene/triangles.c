@@ -233,7 +233,7 @@ done:
     return result;
 }
 
-/* What values are held against. Procedural solids alone need no Embree. */
+/* The casters as estimates measure errors against them. Procedural solids alone need no Embree. */
 vsh_result vsh_scene_truth(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                            vsh_triangles **triangles, vsh_solids **solids, vsh_error *error) {
     VSHI_NEEDS(triangles);

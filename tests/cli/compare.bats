@@ -362,12 +362,12 @@ JSON
 @test "another frame at one error is alike; a sun a tenth wider is not, between bakes of two errors either" {
     local frame
     for frame in 0 1; do
-        "$VDBSHADE" bake golden.json --method adaptive --max-error 0.02 --size 256 --frame $frame --quiet -o frame$frame.exr
+        "$VDBSHADE" bake golden.json --method adaptive --max-error 0.02 --frame $frame --quiet -o frame$frame.exr
     done
     compare frame0.exr frame1.exr
     done_well
     [[ $(line shadow.sun) == *"noise of 0.0283 is allowed for (made to max errors 0.02 and 0.02)"* ]] || fail "$output"
-    "$VDBSHADE" bake wider.json --method adaptive --max-error 0.005 --size 256 --quiet -o wider_fine.exr
+    "$VDBSHADE" bake wider.json --method adaptive --max-error 0.005 --quiet -o wider_fine.exr
     compare frame0.exr wider_fine.exr
     [ "$status" -eq 1 ] || fail "alike"
     [[ $(line shadow.sun) == "shadow.sun: not alike: penumbrae 1."* ]] || fail "$output"
