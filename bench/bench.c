@@ -97,7 +97,6 @@ static table tables[] = {{"", bench_header, NULL},
                          {"-ratios", ratio_header, NULL},
                          {"-scaling", bench_scaling_header, NULL},
                          {"-features", bench_features_header, NULL},
-                         {"-terrain", bench_header, NULL},
                          {"-read", bench_read_header, NULL},
                          {"-levelset", bench_levelset_header, NULL},
                          {"-penumbra", bench_penumbra_header, NULL}};
@@ -106,8 +105,8 @@ static table *table_of(const char *part) {
     static const struct {
         const char *part, *suffix;
     } others[] = {{"intersector", "-ratios"}, {"nanovdb", "-ratios"},    {"cores", "-ratios"},
-                  {"scaling", "-scaling"},    {"features", "-features"}, {"terrain", "-terrain"},
-                  {"read", "-read"},          {"levelset", "-levelset"}, {"penumbra", "-penumbra"}};
+                  {"scaling", "-scaling"},    {"features", "-features"}, {"read", "-read"},
+                  {"levelset", "-levelset"},  {"penumbra", "-penumbra"}};
     const char *suffix = "";
     for (size_t i = 0; i < sizeof others / sizeof others[0]; ++i) {
         suffix = strcmp(part, others[i].part) == 0 ? others[i].suffix : suffix;
@@ -165,7 +164,6 @@ int main(int argc, char **argv) {
                  {"cores", bench_all_cores},
                  {"scaling", bench_scaling},
                  {"features", bench_features},
-                 {"terrain", bench_terrain},
                  {"read", bench_read},
                  {"levelset", bench_levelset},
                  {"penumbra", bench_penumbra}};

@@ -58,7 +58,6 @@ void bench_ao_lightmaps(FILE *csv);
 void bench_refine(FILE *csv);
 void bench_proofs(FILE *csv);
 void bench_points(FILE *csv);
-void bench_terrain(FILE *csv);
 void bench_intersector(FILE *csv);
 void bench_nanovdb(FILE *csv);
 void bench_all_cores(FILE *csv);

@@ -39,9 +39,8 @@ typedef struct vsh_layer {
     const char *const *lights;      /* [light_count]: names of the lights it casts for; NULL: of all */
     size_t light_count;             /* how many lights */
     int32_t ao;                     /* nonzero: part of ambient occlusion */
-    const vsh_heights *heights;     /* a heightfield that is marched, for shadows. `field` may be given
-                                       too, for AO; without it the layer has no AO. NULL: none */
-    const vsh_spheres *spheres;     /* spheres as they are */
+    const vsh_heights *heights; /* these two shade by the methods hard and classic, at most one of them. */
+    const vsh_spheres *spheres; /* AO takes `field` and `triangles`; without these there is no AO */
     const char *name; /* that of a scene's layer; NULL: none. For the caller: nothing here reads it */
 } vsh_layer;
 

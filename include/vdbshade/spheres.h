@@ -1,4 +1,4 @@
-/* Spheres that cast by themselves: no voxels, shadows and ambient occlusion in closed form. */
+/* Lists of spheres. Their hard and classic shadows have closed forms. */
 #ifndef VDBSHADE_SPHERES_H
 #define VDBSHADE_SPHERES_H
 

@@ -34,7 +34,7 @@ static bool may_make_field(const vsh_bake_job *job, size_t index, const vsh_char
     for (size_t i = 0; i < scene->caster_count; ++i) { /* what has no triangles is no mesh to be traced */
         size_t count = 0;
         vsh_assets_caster(job->assets, i, &count);
-        may = may || (count == 0 && !vshi_casts_itself(&scene->casters[i]));
+        may = may || count == 0;
     }
     return may;
 }

@@ -13,9 +13,4 @@ vsh_result vshi_job_bounds(const vsh_bake_job *job, size_t index, const vsh_char
                            const vshi_bands *bands, bool whole, const vsh_run *run, vsh_texels **texels,
                            double low[3], double high[3], vsh_error *error);
 
-/* Whether a caster is no part of a field, and has no triangles to be traced. */
-static inline bool vshi_casts_itself(const vsh_caster *caster) {
-    return caster->type == VSH_CASTER_SPHERES && caster->voxelised == 0;
-}
-
 #endif

@@ -11,8 +11,8 @@
  * rather too little. */
 static const double USUAL_PENUMBRA = 0.05, USUAL_SHARED = 1050.0, USUAL_ALONE = 5000.0;
 /* What these take more where fields are marched by rays that cones leave over, and by rays alone, rather too
- * much than too little. Spheres take so much for what is open, whatever the error. */
-static const double MARCHED = 2.5, MARCHED_RAYS = 25.0, AMONG_SPHERES = 1000.0;
+ * much than too little. */
+static const double MARCHED = 2.5, MARCHED_RAYS = 25.0;
 /* What all borders may take. */
 static const double MOST_BORDERS = 0.1;
 /* What each part takes by itself beside what it does for any: a heightfield's triangles, of 256 samples on a
@@ -28,31 +28,19 @@ static bool is_sized(const vsh_receiver *receiver) {
 /* What a texel takes, and whether what is open at some is not shaded. */
 typedef struct usual {
     double light, shared, alone; /* all lights; all that is open, if texels share it or not */
-    double direct;               /* of that, what takes as much whatever the error */
     bool shares;
 } usual;
 
-/* Whether a caster without voxels hides what is open. */
-static bool hides_open(const vsh_scene *scene, const vsh_caster *caster) {
-    bool hides = vshi_casts_itself(caster);
-    for (size_t i = 0; hides && caster->layer != NULL && i < scene->layer_count; ++i) {
-        hides = strcmp(scene->layers[i].name, caster->layer) != 0 || scene->layers[i].shade.ao != 0;
-    }
-    return hides;
-}
-
-/* Whether something is not traced against triangles of meshes, but for heights and spheres. */
+/* Whether something is not traced against triangles of meshes. */
 static bool marches_field(const vsh_scene *scene) {
-    bool marches = vsh_scene_marches(scene, NULL) != 0, voxels = false;
+    bool marches = vsh_scene_marches(scene, NULL) != 0;
     for (size_t i = 0; i < scene->layer_count; ++i) {
         marches = marches || vsh_scene_marches(scene, &scene->layers[i]) != 0;
     }
     for (size_t i = 0; i < scene->caster_count; ++i) {
-        const vsh_caster *caster = &scene->casters[i];
-        marches = marches || (caster->type != VSH_CASTER_MESH && !vshi_casts_itself(caster));
-        voxels = voxels || !vshi_casts_itself(caster);
+        marches = marches || scene->casters[i].type != VSH_CASTER_MESH;
     }
-    return marches && voxels;
+    return marches;
 }
 
 /* What rays of a scene take more than those to triangles. */
@@ -67,17 +55,11 @@ static double marching(const vsh_scene *scene) {
 static usual usual_of(const vsh_scene *scene) {
     const double finer = vshi_rays_expected(scene->shade.max_error) * marching(scene),
                  openings = vshi_work_openings(scene);
-    usual u = {.light = (double)scene->light_count * (VSHI_LIT + USUAL_PENUMBRA * finer * VSHI_PENUMBRA),
-               .shared = openings * finer * USUAL_SHARED,
-               .alone = openings * finer * USUAL_ALONE,
-               .shares = openings > 0.0};
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        if (hides_open(scene, &scene->casters[i])) {
-            u.direct += openings * AMONG_SPHERES;
-            u.shares = false;
-        }
-    }
-    u.alone = u.direct > 0.0 ? u.direct : u.alone;
+    const usual u = {.light =
+                         (double)scene->light_count * (VSHI_LIT + USUAL_PENUMBRA * finer * VSHI_PENUMBRA),
+                     .shared = openings * finer * USUAL_SHARED,
+                     .alone = openings * finer * USUAL_ALONE,
+                     .shares = openings > 0.0};
     return u;
 }
 
@@ -94,9 +76,8 @@ double vshi_shares_most(const vsh_scene *scene, double least) {
         const double points = (double)receiver->width * receiver->height * across * across;
         const bool shares = u.shares && receiver->supersample == 1 && receiver->ao_spacing > 1;
         const double each = VSHI_LAID_OUT + VSHI_VALID + u.light + (shares ? u.shared : u.alone);
-        const double few = vshi_shares_few(receiver->width, receiver->height);
         ns += points * each;
-        own += few * u.direct + (receiver->type == VSH_RECEIVER_HEIGHTFIELD ? TRIANGLES_OF_HEIGHTS : 0.0);
+        own += receiver->type == VSH_RECEIVER_HEIGHTFIELD ? TRIANGLES_OF_HEIGHTS : 0.0;
         borders += MOST_BORDERS * receiver->height /
                    (shares ? fmax(least_rows, VSHI_SHARED_ROWS * receiver->ao_spacing) : 1.0);
     }

@@ -51,10 +51,6 @@ static int32_t few_step(int32_t width, int32_t height) {
     return step;
 }
 
-double vshi_shares_few(int32_t width, int32_t height) {
-    return few_of(width, height, few_step(width, height));
-}
-
 vsh_result vshi_shares_note(vsh_bake_job *job, size_t index, const vsh_charts *charts, const vsh_run *run,
                             vsh_error *error) {
     if (job->shares == NULL) {

@@ -30,9 +30,6 @@ typedef struct vshi_share_rows {
  * are made tell how large lightmaps are. */
 double vshi_shares_most(const vsh_scene *scene, double least);
 
-/* Texels of a lightmap that are looked at. */
-double vshi_shares_few(int32_t width, int32_t height);
-
 /* Keeps what shares of a measured lightmap are reckoned by. Errors: VSH_ERROR_MEMORY, VSH_ERROR_LIMIT,
  * VSH_ERROR_CANCELLED. */
 vsh_result vshi_shares_note(vsh_bake_job *job, size_t index, const vsh_charts *charts, const vsh_run *run,

@@ -1,13 +1,5 @@
 #include "cli/casters.h"
 
-size_t cli_casters_voxelised(const vsh_scene *scene) {
-    size_t count = 0;
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        count += !cli_caster_is_direct(&scene->casters[i]);
-    }
-    return count;
-}
-
 double cli_casters_kept_voxel_size(const vsh_scene *scene) {
     const vsh_field_file *file = scene->field;
     for (size_t i = 0; i < vsh_field_file_count(file); ++i) {

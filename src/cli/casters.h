@@ -10,13 +10,10 @@ static inline bool cli_caster_has_triangles(const vsh_caster *caster) {
     return caster->type == VSH_CASTER_MESH || caster->type == VSH_CASTER_HEIGHTFIELD;
 }
 
-/* Whether a caster stays out of level sets. */
+/* Whether a caster stays out of level sets if a scene's shadows are `hard` or `classic`. */
 static inline bool cli_caster_is_direct(const vsh_caster *caster) {
     return caster->type == VSH_CASTER_SPHERES && !caster->voxelised;
 }
-
-/* How many casters are in level sets. */
-size_t cli_casters_voxelised(const vsh_scene *scene);
 
 /* Voxel size of the casters in no layer that the scene's file of fields keeps, world units; 0: it keeps none.
  */

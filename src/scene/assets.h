@@ -12,8 +12,8 @@ static inline bool vshi_caster_in_layer(const vsh_caster *caster, const vsh_scen
     return caster->layer == NULL ? layer == NULL : layer != NULL && strcmp(caster->layer, layer->name) == 0;
 }
 
-/* Whether a caster stays out of level sets: spheres, and a direct heightfield whose shadows are marched over
- * its heights. Its AO is traced. */
+/* Whether a caster stays out of level sets: spheres and direct heightfields, if shadows are `hard` or
+ * `classic` and AO, if there is any, is traced. */
 bool vshi_caster_is_direct(const vsh_scene *scene, const vsh_caster *caster);
 
 /* outer × inner, three rows of four each; inner NULL: identity. */

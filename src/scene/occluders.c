@@ -219,12 +219,10 @@ static vsh_result make_truth(making *m, vsh_error *error) {
     return result == VSH_ERROR_CANCELLED ? vshi_fail(error, result, "%s", why.message) : VSH_OK;
 }
 
-/* Makes the triangles that trace the AO of a direct heightfield. */
+/* Makes what rays of AO meet of a direct heightfield or spheres. */
 static vsh_result trace_ao(making *m, size_t caster, size_t place, vsh_layer *layer, vsh_error *error) {
-    size_t count;
-    const vsh_mesh *meshes = vsh_assets_caster(m->assets, caster, &count);
     vsh_triangles **triangles = &m->own.layer_triangles[place];
-    VSHI_TRY(vsh_triangles_create(meshes, count, &m->run, triangles, error));
+    VSHI_TRY(vshi_scene_caster_triangles(m->scene, m->assets, caster, &m->run, triangles, error));
     VSHI_TRY(vshi_occluders_unknown(*triangles, 0.0, &m->own.layer_fields[place], error));
     layer->field = m->own.layer_fields[place];
     layer->triangles = *triangles;
@@ -250,7 +248,7 @@ static vsh_result add_direct(making *m, size_t place, vsh_error *error) {
         layer->name = caster->layer;
         layer->heights = vsh_assets_heights(m->assets, i);
         layer->spheres = vsh_assets_spheres(m->assets, i);
-        if (layer->heights != NULL && layer->ao != 0 && ao) {
+        if (layer->ao != 0 && ao) {
             VSHI_TRY(trace_ao(m, i, place, layer, error));
         }
         ++place;

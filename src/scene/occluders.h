@@ -26,6 +26,10 @@ vsh_result vshi_scene_caster_grid(const vsh_scene *scene, const vsh_assets *asse
                                   const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
                                   vsh_error *error);
 
+/* What rays of AO meet of one caster that is shaded without voxels: as vsh_scene_triangles(). */
+vsh_result vshi_scene_caster_triangles(const vsh_scene *scene, const vsh_assets *assets, size_t caster,
+                                       const vsh_run *run, vsh_triangles **triangles, vsh_error *error);
+
 /* Whether a bake's values are to be held against the casters themselves: not where no method keeps an error,
  * where layers cast, or where rays cannot meet all casters. */
 bool vshi_scene_wants_truth(const vsh_scene *scene);

@@ -52,8 +52,10 @@ static bool casts_ao(const vsh_scene *scene, const vsh_scene_layer *layer) {
 }
 
 bool vshi_caster_is_direct(const vsh_scene *scene, const vsh_caster *caster) {
-    if (caster->type != VSH_CASTER_HEIGHTFIELD || caster->direct == 0) {
-        return caster->type == VSH_CASTER_SPHERES && caster->voxelised == 0;
+    const bool may = (caster->type == VSH_CASTER_HEIGHTFIELD && caster->direct != 0) ||
+                     (caster->type == VSH_CASTER_SPHERES && caster->voxelised == 0);
+    if (!may) {
+        return false;
     }
     const vsh_scene_layer *layer = NULL;
     for (size_t i = 0; caster->layer != NULL && i < scene->layer_count; ++i) {
@@ -181,30 +183,41 @@ done:
     return result;
 }
 
-/* `all`: of every layer, and those that cast as they are. */
-static vsh_result gather_traced(const vsh_scene *scene, const vsh_assets *assets, bool all,
-                                const vsh_scene_layer *layer, const vsh_run *run, traced *t,
-                                vsh_error *error) {
-    VSHI_TRY(allocate_traced(scene, assets, t, error));
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        const vsh_caster *caster = &scene->casters[i];
-        if (!all && !is_voxelised_in(scene, caster, layer)) {
-            continue;
-        }
-        size_t own;
-        const vsh_mesh *of_caster = vsh_assets_caster(assets, i, &own);
-        for (size_t m = 0; m < own; ++m) {
-            t->meshes[t->mesh_count++] = of_caster[m];
-        }
-        if (caster->type == VSH_CASTER_SDF) {
-            add_sdf(t, caster->sdf, caster->transform);
-        } else if (caster->type == VSH_CASTER_SPHERES) {
-            add_balls(t, vshi_assets_spheres(assets, i));
-        } else if (!has_triangles(caster)) {
-            VSHI_TRY(add_surface(scene, assets, layer, i, run, t, error));
-        }
+static vsh_result add_caster(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
+                             size_t i, const vsh_run *run, traced *t, vsh_error *error) {
+    const vsh_caster *caster = &scene->casters[i];
+    size_t own;
+    const vsh_mesh *of_caster = vsh_assets_caster(assets, i, &own);
+    for (size_t m = 0; m < own; ++m) {
+        t->meshes[t->mesh_count++] = of_caster[m];
+    }
+    if (caster->type == VSH_CASTER_SDF) {
+        add_sdf(t, caster->sdf, caster->transform);
+    } else if (caster->type == VSH_CASTER_SPHERES) {
+        add_balls(t, vshi_assets_spheres(assets, i));
+    } else if (!has_triangles(caster)) {
+        return add_surface(scene, assets, layer, i, run, t, error);
     }
     return VSH_OK;
+}
+
+static vsh_result make_triangles(const traced *t, const vsh_run *run, vsh_triangles **triangles,
+                                 vsh_error *error) {
+    vsh_solids *solids = NULL;
+    if (t->mesh_count + t->sdf_count == 0) {
+        return VSH_OK;
+    }
+    if (t->sdf_count > 0) {
+        VSHI_TRY(vsh_solids_create(t->sdfs, t->places[0], t->sdf_count, &solids, error));
+    }
+    const vsh_result result =
+        vsh_triangles_create_beside(t->meshes, t->mesh_count, solids, run, triangles, error);
+    if (result == VSH_OK) {
+        vshi_triangles_own_solids(*triangles);
+    } else {
+        vsh_solids_free(solids);
+    }
+    return result;
 }
 
 vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
@@ -214,21 +227,29 @@ vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets,
     VSHI_NEEDS(scene);
     VSHI_NEEDS(assets);
     traced t = {.mesh_count = 0};
-    vsh_solids *solids = NULL;
     vsh_run full;
     vsh_result result;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    VSHI_TRY_DONE(gather_traced(scene, assets, false, layer, &full, &t, error));
-    if (t.sdf_count > 0) {
-        VSHI_TRY_DONE(vsh_solids_create(t.sdfs, t.places[0], t.sdf_count, &solids, error));
+    VSHI_TRY_DONE(allocate_traced(scene, assets, &t, error));
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        if (is_voxelised_in(scene, &scene->casters[i], layer)) {
+            VSHI_TRY_DONE(add_caster(scene, assets, layer, i, &full, &t, error));
+        }
     }
-    if (t.mesh_count + t.sdf_count > 0) {
-        VSHI_TRY_DONE(vsh_triangles_create_beside(t.meshes, t.mesh_count, solids, run, triangles, error));
-        vshi_triangles_own_solids(*triangles);
-        solids = NULL;
-    }
+    result = make_triangles(&t, run, triangles, error);
 done:
-    vsh_solids_free(solids);
+    free_traced(&t);
+    return result;
+}
+
+vsh_result vshi_scene_caster_triangles(const vsh_scene *scene, const vsh_assets *assets, size_t caster,
+                                       const vsh_run *run, vsh_triangles **triangles, vsh_error *error) {
+    traced t = {.mesh_count = 0};
+    vsh_result result;
+    VSHI_TRY_DONE(allocate_traced(scene, assets, &t, error));
+    VSHI_TRY_DONE(add_caster(scene, assets, NULL, caster, run, &t, error));
+    result = make_triangles(&t, run, triangles, error);
+done:
     free_traced(&t);
     return result;
 }
@@ -246,7 +267,10 @@ vsh_result vsh_scene_truth(const vsh_scene *scene, const vsh_assets *assets, con
     vsh_run full;
     vsh_result result;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    VSHI_TRY_DONE(gather_traced(scene, assets, true, NULL, &full, &t, error));
+    VSHI_TRY_DONE(allocate_traced(scene, assets, &t, error));
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        VSHI_TRY_DONE(add_caster(scene, assets, NULL, i, &full, &t, error));
+    }
     if (t.mesh_count > 0 && vsh_triangles_available()) {
         VSHI_TRY_DONE(vsh_triangles_create(t.meshes, t.mesh_count, run, triangles, error));
     }

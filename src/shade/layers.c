@@ -38,6 +38,11 @@ struct vshi_layers {
     prepared items[];
 };
 
+/* Whether shadows of a layer's casters need no field: heights are marched, spheres have closed forms. */
+static bool is_closed(const vsh_layer *layer) {
+    return layer->heights != NULL || layer->spheres != NULL;
+}
+
 static vsh_result resolve(const void *given, vsh_layer *layer, vsh_error *error) {
     *layer = vsh_layer_default();
     VSHI_TRY(vshi_options_resolve(given, layer, sizeof *layer, "vsh_layer", error));
@@ -63,10 +68,11 @@ static vsh_result resolve(const void *given, vsh_layer *layer, vsh_error *error)
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "remap from %g to %g: expected a rise", layer->remap[0],
                          layer->remap[1]);
     }
-    const int casters = (layer->field != NULL || layer->heights != NULL) + (layer->spheres != NULL);
-    if (casters != 1) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s of field, heights and spheres: expected one",
-                         casters == 0 ? "none" : "several");
+    if (layer->heights != NULL && layer->spheres != NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "both heights and spheres: expected one of them");
+    }
+    if (layer->field == NULL && !is_closed(layer)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "none of field, heights and spheres: expected one");
     }
     for (size_t i = 0; layer->lights != NULL && i < layer->light_count; ++i) {
         if (layer->lights[i] == NULL) {
@@ -112,14 +118,9 @@ static bool casts_for(const vsh_layer *layer, const vsh_light *light) {
     return casts;
 }
 
-/* Whether a method marches heights as they are. */
-static bool is_marched(int32_t method) {
-    return method == VSH_SHADOW_HARD || method == VSH_SHADOW_CLASSIC;
-}
-
-/* Heights by themselves cast no ambient occlusion: their field, or triangles, do. */
+/* Heights and spheres by themselves cast no ambient occlusion: their field, or triangles, do. */
 static bool casts_ao(const vsh_layer *layer) {
-    return layer->ao != 0 && (layer->field != NULL || layer->spheres != NULL);
+    return layer->ao != 0 && layer->field != NULL;
 }
 
 static vsh_result prepare(prepared *item, size_t index, double lifted, const vsh_light *light,
@@ -133,14 +134,14 @@ static vsh_result prepare(prepared *item, size_t index, double lifted, const vsh
     if (light != NULL) {
         item->light = vshi_light_resized(light, layer->softness);
     }
-    if (light != NULL && layer->heights != NULL && !is_marched(options->method)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "heights are marched by the methods hard and classic; for method %s trace their "
-                         "triangles",
-                         vsh_shadow_method_name(options->method));
-    }
-    if (layer->field == NULL || (light != NULL && layer->heights != NULL)) { /* needs no preparing */
-        return light != NULL ? vsh_light_check(&item->light, error) : VSH_OK;
+    if (light != NULL && is_closed(layer)) {
+        if (options->method != VSH_SHADOW_HARD && options->method != VSH_SHADOW_CLASSIC) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                             "heights and spheres are shaded by the methods hard and classic; for method %s "
+                             "trace or voxelize them",
+                             vsh_shadow_method_name(options->method));
+        }
+        return vsh_light_check(&item->light, error);
     }
     if (light != NULL) {
         VSHI_TRY(vshi_shadow_prepare(&own, &item->light, options, &item->shadow, error));
@@ -188,10 +189,6 @@ done:
 
 vsh_result vshi_layers_prepare_sphere(vshi_layers *layers, vsh_error *error) {
     for (size_t i = 0; layers != NULL && i < layers->count; ++i) {
-        if (layers->items[i].layer.field == NULL) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                             "AO in free space: spheres know of none without voxels");
-        }
         VSHI_TRY(vshi_ao_prepare_sphere(&layers->cones, &layers->items[i].ao, error));
     }
     return VSH_OK;
@@ -269,15 +266,15 @@ static void shade_field(const prepared *item, const vshi_shadow_task *task, laye
 }
 
 /* Shades by heights or spheres, which give shares. */
-static void shade_analytic(const prepared *item, const vshi_shadow_task *task, size_t begin,
-                           layer_piece *piece, vsh_shade_stats *stats) {
+static void shade_closed(const prepared *item, const vshi_shadow_task *task, size_t begin, layer_piece *piece,
+                         vsh_shade_stats *stats) {
     const vsh_layer *layer = &item->layer;
     const size_t count = piece->points.count;
     if (layer->heights != NULL) {
         vshi_heights_shadow(layer->heights, &item->light, item->options.method, &piece->points, 0, count,
                             vshi_heights_lift(layer->heights, layer->start_offset), piece->value, stats);
     } else {
-        vshi_spheres_shadow(layer->spheres, &item->light, item->options.method, &piece->points, 0, count, 0.0,
+        vshi_spheres_shadow(layer->spheres, &item->light, item->options.method, &piece->points, 0, count,
                             piece->value, stats);
     }
     for (size_t i = 0; i < count; ++i) {
@@ -294,10 +291,10 @@ void vshi_layers_shadow(const vshi_layers *layers, const vshi_shadow_task *task,
     for (size_t k = 0; k < layers->count; ++k) {
         const prepared *item = &layers->items[k];
         const double *remap = item->layer.remap;
-        if (item->layer.field != NULL && item->layer.heights == NULL) {
-            shade_field(item, task, &piece, stats);
+        if (is_closed(&item->layer)) {
+            shade_closed(item, task, begin, &piece, stats);
         } else {
-            shade_analytic(item, task, begin, &piece, stats);
+            shade_field(item, task, &piece, stats);
         }
         for (size_t i = begin, n = 0; i < end; ++i, ++n) {
             if (!(task->visibility[i] > 0.0f)) {
@@ -314,28 +311,19 @@ void vshi_layers_shadow(const vshi_layers *layers, const vshi_shadow_task *task,
     }
 }
 
-/* Finds the AO of a layer; that of spheres is exact. */
 static void occlude(const prepared *item, const vshi_ao_task *task, size_t begin, layer_piece *piece,
                     vsh_shade_stats *stats) {
-    const vsh_layer *layer = &item->layer;
     const size_t count = piece->points.count;
-    float *bent = task->bent != NULL ? piece->bent : NULL;
-    const vshi_vec *up = vshi_ao_has_horizon(task) ? &task->up : NULL;
+    vshi_ao_task own = item->ao;
     memset(piece->deviation, 0, count * sizeof *piece->deviation);
-    if (layer->spheres != NULL) {
-        vshi_spheres_ao(layer->spheres, item->options.ao_distance, up, &piece->points, 0, count, 0.0,
-                        piece->value, bent, stats);
-    } else {
-        vshi_ao_task own = item->ao;
-        own.kernel = task->kernel;
-        own.outside = task->outside;
-        own.points = &piece->points;
-        own.faces = task->faces != NULL ? task->faces + 3 * begin : NULL;
-        own.ao = piece->value;
-        own.deviation = task->deviation != NULL ? piece->deviation : NULL;
-        own.bent = bent;
-        vshi_ao_shade(&own, 0, count, stats);
-    }
+    own.kernel = task->kernel;
+    own.outside = task->outside;
+    own.points = &piece->points;
+    own.faces = task->faces != NULL ? task->faces + 3 * begin : NULL;
+    own.ao = piece->value;
+    own.deviation = task->deviation != NULL ? piece->deviation : NULL;
+    own.bent = task->bent != NULL ? piece->bent : NULL;
+    vshi_ao_shade(&own, 0, count, stats);
 }
 
 /* What a layer takes from the open sky is taken from what is left of it. */

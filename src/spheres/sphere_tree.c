@@ -366,20 +366,3 @@ double vshi_sphere_tree_distance(const vsh_spheres *spheres, const double positi
     }
     return nearest;
 }
-
-bool vshi_spheres_origin(const vsh_points *points, size_t i, double lift, double origin[3],
-                         vshi_vec *normal) {
-    vshi_vec p = vshi_vec_of(points->positions + 3 * i);
-    *normal = (vshi_vec){0.0, 0.0, 0.0};
-    if (points->normals != NULL) {
-        *normal = vshi_unit(vshi_vec_off(points->normals + 3 * i));
-        if (!(vshi_dot(*normal, *normal) > 0.5)) {
-            return false;
-        }
-        p = vshi_add(p, vshi_scale(*normal, lift));
-    }
-    origin[0] = p.x;
-    origin[1] = p.y;
-    origin[2] = p.z;
-    return vshi_finite(p);
-}

@@ -212,7 +212,7 @@ static void shade_layer(const context *c, const vsh_heights *heights, const vsh_
     vsh_layer layer = vsh_layer_default();
     layer.heights = heights;
     layer.spheres = spheres;
-    layer.method = heights != NULL ? VSH_SHADOW_CLASSIC : -1;
+    layer.method = VSH_SHADOW_CLASSIC;
     vsh_shade_options options = preview_options();
     const context here = {c->run, NULL, empty, NULL, &layer};
     const vsh_light lights[] = {sun(), spot()};

@@ -2,7 +2,6 @@
 #include "previews.h"
 #include "shading.h"
 
-#include "spheres/spheres.h"
 #include "truth/directions.h"
 
 #include <stdlib.h>
@@ -134,37 +133,6 @@ static void shares_of_what_is_over_a_horizon_are_the_rays(void **state) {
     tear_down(s);
 }
 
-/* What is over a horizon and what is under it are together the whole. */
-static void check_halves(const float *normals, const double up[3], const float *all, const float *over,
-                         const float *under, double most) {
-    for (size_t i = 0; i < POINTS; ++i) {
-        const double share = whole(normals + 3 * i, up);
-        const double sum = share * (double)over[i] + (1.0 - share) * (double)under[i];
-        if (!(fabs(sum - (double)all[i]) <= most)) {
-            fail_msg("point %zu: %g, of halves %g", i, (double)all[i], sum);
-        }
-    }
-}
-
-static void spheres_have_two_halves(void **state) {
-    (void)state;
-    static float all[POINTS], over[POINTS], under[POINTS];
-    vsh_error error = {VSH_OK, ""};
-    static const double balls[3][4] = {{0.4, 2.0, 0.1, 0.5}, {-0.6, 2.6, 0.4, 0.7}, {0.1, 1.8, -0.9, 0.3}};
-    vsh_spheres *spheres = NULL;
-    assert_int_equal(vsh_spheres_create(&balls[0][0], 3, NULL, NULL, &spheres, &error), VSH_OK);
-    stage *s = set_up();
-    const vsh_points points = {POINTS, s->positions, s->normals, NULL};
-    const vshi_vec up = {0.48, 0.64, -0.6}, down = {-0.48, -0.64, 0.6};
-    vsh_shade_stats stats = vsh_shade_stats_zero();
-    vshi_spheres_ao(spheres, FAR, NULL, &points, 0, POINTS, 0.0, all, NULL, &stats);
-    vshi_spheres_ao(spheres, FAR, &up, &points, 0, POINTS, 0.0, over, NULL, &stats);
-    vshi_spheres_ao(spheres, FAR, &down, &points, 0, POINTS, 0.0, under, NULL, &stats);
-    check_halves(s->normals, (double[]){up.x, up.y, up.z}, all, over, under, 0.02);
-    vsh_spheres_free(spheres);
-    tear_down(s);
-}
-
 static void what_knows_no_horizon_says_so(void **state) {
     (void)state;
     static const double up[3] = {0.0, 1.0, 0.0};
@@ -193,7 +161,6 @@ static void what_knows_no_horizon_says_so(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shares_of_what_is_over_a_horizon_are_the_rays),
-        cmocka_unit_test(spheres_have_two_halves),
         cmocka_unit_test(what_knows_no_horizon_says_so),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -30,8 +30,8 @@ static void add_shape(shapes *s, const truth_solid *solid) {
                      "%g, %g]}}",
                      comma, h[0], h[1], h[2], c[0], c[1], c[2]);
     } else if (solid->shape == TRUTH_SPHERE) {
-        written = snprintf(end, left, "%s{\"spheres\": [[%g, %g, %g, %g]], \"voxelised\": true}", comma, c[0],
-                           c[1], c[2], solid->radius);
+        written = snprintf(end, left, "%s{\"spheres\": [[%g, %g, %g, %g]]}", comma, c[0], c[1], c[2],
+                           solid->radius);
     } else {
         written = snprintf(end, left,
                            "%s{\"sdf\": {\"shape\": \"torus\", \"radius\": %g, \"tube_radius\": %g, "

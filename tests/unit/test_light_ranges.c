@@ -355,8 +355,8 @@ static void tiny_lights_are_hard_lights(void **state) {
     size_t accepted = 0;
     for (int32_t type = 0; type <= VSH_LIGHT_RECTANGLE; ++type) {
         for (s.kind = FIELD; s.kind < STAGES; ++s.kind) {
-            /* layers tell only rays, discs and `classic` apart */
-            const int32_t methods = s.kind == FIELD ? shadow_methods() : VSH_SHADOW_CONE + 1;
+            /* spheres are shaded by `hard` and `classic` alone */
+            const int32_t methods = s.kind == FIELD ? shadow_methods() : VSH_SHADOW_CLASSIC + 1;
             for (int32_t method = 0; method < methods; ++method) {
                 const int32_t point_type = type == VSH_LIGHT_RECTANGLE ? VSH_LIGHT_SPHERE : type;
                 const vsh_light point = light_of_size(point_type, 0.0);
@@ -378,7 +378,7 @@ static void tiny_lights_are_hard_lights(void **state) {
             }
         }
     }
-    assert_true(accepted > 4 * 12 * (size_t)(VSH_SHADOW_CONE + 1) * STAGES);
+    assert_true(accepted > 4 * 12 * (size_t)(VSH_SHADOW_CLASSIC + 1) * STAGES);
     tear_down(&s);
 }
 
@@ -394,10 +394,10 @@ static void layers_of_no_softness_are_hard(void **state) {
             const vsh_light light = light_of_size(type, 0.2);
             cast_on_stage(&s, &light, VSH_SHADOW_HARD, 1.0, FLOOR, positions, normals, hard);
             for (size_t i = 0; i < sizeof SOFTNESS / sizeof SOFTNESS[0]; ++i) {
-                cast_on_stage(&s, &light, VSH_SHADOW_CONE, SOFTNESS[i], FLOOR, positions, normals, values);
+                cast_on_stage(&s, &light, VSH_SHADOW_CLASSIC, SOFTNESS[i], FLOOR, positions, normals, values);
                 assert_true(mean_difference(values, hard) < 0.002);
             }
-            cast_on_stage(&s, &light, VSH_SHADOW_CONE, 1000.0, FLOOR, positions, normals, values);
+            cast_on_stage(&s, &light, VSH_SHADOW_CLASSIC, 1000.0, FLOOR, positions, normals, values);
         }
     }
     tear_down(&s);
@@ -413,7 +413,7 @@ static void suns_just_below_180_degrees_are_as_those_of_179_99(void **state) {
     floor_texels(FLOOR_SIDE, positions, normals);
     ranges_stage s = set_up();
     for (s.kind = FIELD; s.kind < STAGES; ++s.kind) {
-        const int32_t methods = s.kind == FIELD ? shadow_methods() : VSH_SHADOW_CONE + 1;
+        const int32_t methods = s.kind == FIELD ? shadow_methods() : VSH_SHADOW_CLASSIC + 1;
         for (int32_t method = 0; method < methods; ++method) {
             vsh_light light = sun(truth_seeds_sun, RADIANS(179.99));
             cast_on_stage(&s, &light, method, 1.0, FLOOR, positions, normals, neighbour);

@@ -1,6 +1,7 @@
 /* What casts as one handle: from meshes, from parts and from a scene. */
 #include "fields.h"
 #include "scenes.h"
+#include "shading.h"
 
 #include <vdbshade/vdbshade.h>
 
@@ -274,7 +275,14 @@ static void more_layers_than_can_be_are_refused(void **state) {
         casters[i] = (vsh_caster){.type = VSH_CASTER_SPHERES, .spheres = ball, .sphere_count = 1};
         casters[i].transform[0] = casters[i].transform[5] = casters[i].transform[10] = 1.0;
     }
-    vsh_scene scene = {.casters = casters, .grid = vsh_grid_options_default()};
+    const double up[3] = {0, 1, 0};
+    const vsh_light light = sun(up, 0.1);
+    vsh_scene scene = {.casters = casters,
+                       .grid = vsh_grid_options_default(),
+                       .shade = vsh_shade_options_default(),
+                       .lights = &light,
+                       .light_count = 1};
+    scene.shade.method = VSH_SHADOW_HARD;
     for (size_t more = 0; more < 2; ++more) {
         scene.caster_count = VSH_MAX_LAYERS + more;
         vsh_assets *assets = NULL;

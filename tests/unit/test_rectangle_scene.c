@@ -34,13 +34,10 @@ static void the_horizon_cuts_it_by_solid_angle(void **state) {
     vsh_field_free(nothing);
 }
 
-static void layers_and_casters_without_voxels_know_it(void **state) {
+static void layers_know_it(void **state) {
     const caster *c = *state;
-    static const double BALLS[2][4] = {{0.2, 0.8, 0.0, 0.3}, {-0.8, 0.5, 0.6, 0.25}};
-    vsh_spheres *spheres = NULL;
     vsh_field *nothing = NULL;
     assert_int_equal(vshi_field_create_empty(0.1, &nothing, NULL), VSH_OK);
-    assert_int_equal(vsh_spheres_create(&BALLS[0][0], 2, NULL, NULL, &spheres, NULL), VSH_OK);
     const vsh_light light = light_of(0);
     vsh_layer layer = vsh_layer_default();
     layer.field = c->field;
@@ -62,22 +59,6 @@ static void layers_and_casters_without_voxels_know_it(void **state) {
         others += layered[i] != whole[i];
     }
     assert_true(others <= 2);
-    /* spheres: the disc, against rays to the rectangle */
-    const truth_solid solids[2] = {{.shape = TRUTH_SPHERE, .center = {0.2, 0.8, 0.0}, .radius = 0.3},
-                                   {.shape = TRUTH_SPHERE, .center = {-0.8, 0.5, 0.6}, .radius = 0.25}};
-    caster balls = caster_of((truth_scene){solids, 2}, 0.03, 2.0);
-    options = options_of(VSH_SHADOW_RAYS);
-    shade(&balls, &light, &options, whole, NULL);
-    vsh_layer analytic = vsh_layer_default();
-    analytic.spheres = spheres;
-    shade_by(occluders_with(nothing, &analytic, 1), &light, &options, layered, NULL);
-    double square = 0.0;
-    for (size_t i = 0; i < COUNT; ++i) {
-        square += pow((double)layered[i] - (double)whole[i], 2.0) / COUNT;
-    }
-    assert_true(sqrt(square) < 0.04);
-    caster_free(&balls);
-    vsh_spheres_free(spheres);
     vsh_field_free(nothing);
 }
 
@@ -180,7 +161,7 @@ static void what_is_no_rectangle_is_refused(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_horizon_cuts_it_by_solid_angle),
-        cmocka_unit_test(layers_and_casters_without_voxels_know_it),
+        cmocka_unit_test(layers_know_it),
         cmocka_unit_test(threads_and_instruction_sets_give_the_same_bits),
         cmocka_unit_test(irradiance_has_the_cosine_at_which_it_shines),
         cmocka_unit_test(what_is_no_rectangle_is_refused),

@@ -4,7 +4,6 @@
 #include "truth/directions.h"
 #include "truth/metrics.h"
 
-#include "spheres/caps.h"
 #include "spheres/spheres.h"
 
 #include <stdio.h>
@@ -65,82 +64,11 @@ static void tear_down(stage *s) {
 static void shadow(const stage *s, const vsh_light *light, int32_t method, bool normals, float *values) {
     const vsh_points points = {POINTS, s->positions, normals ? s->normals : NULL, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    vshi_spheres_shadow(s->made, light, method, &points, 0, POINTS, 0.0, values, &stats);
+    vshi_spheres_shadow(s->made, light, method, &points, 0, POINTS, values, &stats);
     assert_true(stats.samples > 0);
 }
 
-static truth_metrics check_sun_by(const stage *s, const double towards[3], double angle, size_t rays,
-                                  const char *what) {
-    static float values[POINTS], truth[POINTS];
-    const vsh_light light = sun(towards, angle);
-    shadow(s, &light, VSH_SHADOW_CONE, false, values);
-    const truth_scene scene = {s->solids, s->count};
-    assert_int_equal(
-        truth_lights(scene, POINTS, s->positions, NULL, towards, tan(0.5 * angle), INFINITY, rays, truth), 0);
-    const truth_metrics m = truth_compare(POINTS, values, truth, NULL);
-    truth_metrics_print(what, &m);
-    assert_true(m.penumbra > 0 && m.penumbra_rmse > 0.0); /* or nothing was tested */
-    return m;
-}
-
-static truth_metrics check_sun(const stage *s, const double towards[3], double angle, const char *what) {
-    return check_sun_by(s, towards, angle, RAYS, what);
-}
-
 static const double TOWARDS[3] = {-0.5, 0.6, -0.6};
-
-/* Of one sphere there may be so many rays that what is left is the formula's own error. */
-static void a_sphere_hides_of_a_disc_what_rays_say(void **state) {
-    (void)state;
-    enum { FINE = 16 * RAYS };
-    stage *small = set_up(1, 0.3, 0.3, 1.0), *large = set_up(1, 3.0, 3.0, 1.0);
-    assert_true(check_sun_by(large, TOWARDS, RADIANS(0.5), FINE, "large, the sun's size").max < 0.001);
-    assert_true(check_sun_by(small, TOWARDS, RADIANS(11.0), FINE, "small, 11°").max < 0.001);
-    assert_true(check_sun_by(small, TOWARDS, RADIANS(38.0), FINE, "small, 38°").max < 0.01);
-    assert_true(check_sun_by(small, TOWARDS, RADIANS(100.0), FINE, "small, 100°").max < 0.01);
-    assert_true(check_sun_by(large, TOWARDS, RADIANS(11.0), FINE, "large, 11°").max < 0.001);
-    assert_true(check_sun_by(large, TOWARDS, RADIANS(38.0), FINE, "large, 38°").max < 0.01);
-    assert_true(check_sun_by(large, TOWARDS, RADIANS(150.0), FINE, "large, 150°").max < 0.015);
-    tear_down(large);
-    tear_down(small);
-}
-
-static void many_spheres_hide_what_rays_say(void **state) {
-    (void)state;
-    stage *some = set_up(40, 0.05, 0.3, 2.0), *many = set_up(MOST, 0.05, 0.15, 2.0),
-          *dust = set_up(MOST, 0.005, 0.02, 2.0);
-    assert_true(check_sun(some, TOWARDS, RADIANS(5.0), "40, 5°").rmse < 0.003);
-    assert_true(check_sun(some, TOWARDS, RADIANS(25.0), "40, 25°").rmse < 0.004);
-    assert_true(check_sun(many, TOWARDS, RADIANS(5.0), "400, 5°").rmse < 0.006);
-    assert_true(check_sun(many, TOWARDS, RADIANS(25.0), "400, 25°").rmse < 0.006);
-    assert_true(check_sun(many, TOWARDS, RADIANS(70.0), "400, 70°").rmse < 0.006);
-    assert_true(check_sun(dust, TOWARDS, RADIANS(11.0), "400 small, 11°").rmse < 0.003);
-    tear_down(dust);
-    tear_down(many);
-    tear_down(some);
-}
-
-static void of_a_disc_that_the_horizon_cuts_the_rest_counts(void **state) {
-    (void)state;
-    stage *s = set_up(100, 0.05, 0.4, 2.0);
-    static float values[POINTS], truth[POINTS];
-    static const double low[3] = {-0.9, 0.1, 0.3};
-    static const double up[3] = {0.0, 1.0, 0.0};
-    const double angle = RADIANS(30.0);
-    const vsh_light light = sun(low, angle);
-    shadow(s, &light, VSH_SHADOW_CONE, true, values);
-    const truth_scene scene = {s->solids, s->count}, none = {s->solids, 0};
-    truth_lights(scene, POINTS, s->positions, up, low, tan(0.5 * angle), INFINITY, RAYS, truth);
-    const double above = truth_light(none, s->positions, up, low, tan(0.5 * angle), INFINITY, RAYS);
-    assert_true(above > 0.5 && above < 0.95);
-    for (size_t i = 0; i < POINTS; ++i) {
-        values[i] *= (float)above;
-    }
-    const truth_metrics m = truth_compare(POINTS, values, truth, NULL);
-    truth_metrics_print("cut", &m);
-    assert_true(m.rmse < 0.006);
-    tear_down(s);
-}
 
 static void hard_shadows_are_the_rays(void **state) {
     (void)state;
@@ -185,57 +113,6 @@ static void the_classic_method_is_the_nearest_miss(void **state) {
     tear_down(s);
 }
 
-static void lamps_are_the_rays_up_to_the_lamp(void **state) {
-    (void)state;
-    stage *s = set_up(60, 0.05, 0.3, 2.0);
-    static const double place[3] = {0.4, 1.2, 0.1};
-    const vsh_light light = lamp(place, 0.2);
-    static float values[POINTS], truth[POINTS], mask[POINTS];
-    shadow(s, &light, VSH_SHADOW_CONE, false, values);
-    const truth_scene scene = {s->solids, s->count};
-    for (size_t i = 0; i < POINTS; ++i) {
-        double to[3], square = 0.0;
-        for (size_t axis = 0; axis < 3; ++axis) {
-            to[axis] = place[axis] - s->positions[3 * i + axis];
-            square += to[axis] * to[axis];
-        }
-        const double sine = 0.2 / sqrt(square);
-        truth[i] = (float)truth_light(scene, s->positions + 3 * i, NULL, to, sine / sqrt(1.0 - sine * sine),
-                                      sqrt(square) * (1.0 - sine * sine), RAYS);
-        mask[i] = truth_distance(scene, s->positions + 3 * i) > 0.0 ? 1.0f : 0.0f;
-    }
-    const truth_metrics m = truth_compare(POINTS, values, truth, mask);
-    truth_metrics_print("lamp", &m);
-    assert_true(m.rmse < 0.006);
-    tear_down(s);
-}
-
-static void ambient_occlusion_is_the_rays(void **state) {
-    (void)state;
-    static float values[POINTS], truth[POINTS];
-    static const size_t counts[] = {1, 40, MOST};
-    static const double distances[] = {0.3, 1.0, 30.0};
-    static const double up[3] = {0.0, 1.0, 0.0};
-    for (size_t c = 0; c < 3; ++c) {
-        stage *s = set_up(counts[c], 0.05, 0.3, c == 0 ? 0.5 : 2.0);
-        const truth_scene scene = {s->solids, s->count};
-        for (size_t d = 0; d < 3; ++d) {
-            const vsh_points points = {POINTS, s->positions, s->normals, NULL};
-            vsh_shade_stats stats = vsh_shade_stats_zero();
-            vshi_spheres_ao(s->made, distances[d], NULL, &points, 0, POINTS, 0.0, values, NULL, &stats);
-            for (size_t i = 0; i < POINTS; ++i) {
-                truth[i] = (float)truth_ao(scene, s->positions + 3 * i, up, distances[d], RAYS);
-            }
-            const truth_metrics m = truth_compare(POINTS, values, truth, NULL);
-            char what[40];
-            snprintf(what, sizeof what, "ao, %zu within %g", counts[c], distances[d]);
-            truth_metrics_print(what, &m);
-            assert_true(m.rmse < (c == 0 ? 0.002 : 0.01));
-        }
-        tear_down(s);
-    }
-}
-
 /* Half of a sphere is below its own tangent plane, and does not shade it. */
 static void a_sphere_leaves_its_own_surface_open(void **state) {
     (void)state;
@@ -254,9 +131,7 @@ static void a_sphere_leaves_its_own_surface_open(void **state) {
         const vsh_points points = {1, position, normal, NULL};
         const vsh_light light = sun(towards, 0.3);
         vsh_shade_stats stats = vsh_shade_stats_zero();
-        vshi_spheres_shadow(made, &light, VSH_SHADOW_CONE, &points, 0, 1, 0.0, &value, &stats);
-        assert_true(value == 1.0f);
-        vshi_spheres_ao(made, 1.0, NULL, &points, 0, 1, 0.0, &value, NULL, &stats);
+        vshi_spheres_shadow(made, &light, VSH_SHADOW_CLASSIC, &points, 0, 1, &value, &stats);
         assert_true(value == 1.0f);
     }
     vsh_spheres_free(made);
@@ -301,7 +176,7 @@ static void bounds_lose_no_sphere_of_many(void **state) {
         const vsh_light light = sun(towards, 0.1);
         vsh_shade_stats stats = vsh_shade_stats_zero();
         float value = -1.0f;
-        vshi_spheres_shadow(made, &light, VSH_SHADOW_HARD, &points, 0, 1, 0.0, &value, &stats);
+        vshi_spheres_shadow(made, &light, VSH_SHADOW_HARD, &points, 0, 1, &value, &stats);
         assert_true(value == (hidden ? 0.0f : 1.0f));
     }
     vsh_spheres_free(made);
@@ -318,13 +193,12 @@ static void points_that_are_no_points_are_nan_and_inner_ones_dark(void **state) 
     const vsh_light light = sun(up, 0.1);
     const vsh_points points = {4, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    float values[3], ao[3];
+    float values[3];
     for (size_t begin = 0; begin < 2; ++begin) {
-        vshi_spheres_shadow(made, &light, VSH_SHADOW_CONE, &points, begin, begin + 3, 0.0, values, &stats);
-        vshi_spheres_ao(made, 1.0, NULL, &points, begin, begin + 3, 0.0, ao, NULL, &stats);
-        assert_true(isnan(values[1 - begin]) && isnan(ao[1 - begin]));
-        assert_true(values[2 - begin] == 0.0f && ao[2 - begin] == 0.0f);
-        assert_true(begin == 0 ? isnan(values[0]) && isnan(ao[0]) : values[2] == 1.0f && ao[2] == 1.0f);
+        vshi_spheres_shadow(made, &light, VSH_SHADOW_CLASSIC, &points, begin, begin + 3, values, &stats);
+        assert_true(isnan(values[1 - begin]));
+        assert_true(values[2 - begin] == 0.0f);
+        assert_true(begin == 0 ? isnan(values[0]) : values[2] == 1.0f);
     }
     vsh_spheres_free(made);
 }
@@ -408,13 +282,8 @@ static void rows_of_a_file_are_read_or_refused_by_number(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_sphere_hides_of_a_disc_what_rays_say),
-        cmocka_unit_test(many_spheres_hide_what_rays_say),
-        cmocka_unit_test(of_a_disc_that_the_horizon_cuts_the_rest_counts),
         cmocka_unit_test(hard_shadows_are_the_rays),
         cmocka_unit_test(the_classic_method_is_the_nearest_miss),
-        cmocka_unit_test(lamps_are_the_rays_up_to_the_lamp),
-        cmocka_unit_test(ambient_occlusion_is_the_rays),
         cmocka_unit_test(a_sphere_leaves_its_own_surface_open),
         cmocka_unit_test(bounds_lose_no_sphere_of_many),
         cmocka_unit_test(points_that_are_no_points_are_nan_and_inner_ones_dark),

@@ -76,12 +76,6 @@ static int make_grid(volume_work *work) {
     if (s->like != NULL || s->box_voxel_size > 0.0) {
         return CLI_OK;
     }
-    if (cli_casters_voxelised(work->scene) == 0) {
-        return cli_usage(
-            "%s: no casters that are voxelised, whose band or voxel size is to be taken: give --box "
-            "and --box-voxel-size, or --like",
-            s->bake.input);
-    }
     if (work->scene->field != NULL && work->scene->layer_count > 0) {
         return cli_usage(
             "--field '%s': keeps the casters of each layer on their own, and not the band of all, or the "
