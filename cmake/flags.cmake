@@ -64,10 +64,8 @@ function(vsh_add_kernels target)
   foreach(kind ${kinds})
     set(flags ${VSH_KERNEL_${kind}})
     list(POP_FRONT flags lanes width)
-    foreach(source lanes silhouette)
-      vsh_add_kernel(${target} ${source}_${kind} shade/kernel/${source}.inc "${flags}"
-                     "#define KERNEL_NAME vshi_kernel_${kind}\n#define SILHOUETTES_NAME vshi_silhouettes_${kind}\n#define MARCH_LANES ${lanes}\n#define MARCH_WIDTH ${width}\n")
-    endforeach()
+    vsh_add_kernel(${target} lanes_${kind} shade/kernel/lanes.inc "${flags}"
+                   "#define KERNEL_NAME vshi_kernel_${kind}\n#define MARCH_LANES ${lanes}\n#define MARCH_WIDTH ${width}\n")
     if(NOT kind STREQUAL few)
       vsh_add_kernel(${target} terrain_${kind} trace/kernel/terrain.inc "${flags}" "#define TERRAIN_NAME vshi_terrain_${kind}\n")
       vsh_add_kernel(${target} leaf_${kind} levelset/kernel/leaf.inc "${flags}" "#define LEAF_NAME vshi_leaf_${kind}\n")

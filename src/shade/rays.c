@@ -32,8 +32,7 @@ void vshi_chunk_clear(vshi_chunk *chunk) {
                               .wide = lane[12],
                               .clear = lane[13],
                               .deeper = lane[14],
-                              .pace = lane[11], /* no march takes horizons and a pace, */
-                              .at = lane[12],   /* nor tells a place and takes a width */
+                              .pace = lane[11], /* no march takes both horizons and a pace */
                               .proof = chunk->proof};
 }
 

@@ -13,9 +13,6 @@
 /* Of a march by practical: what is less is dark. */
 static const double PRACTICAL_END = 0.004;
 
-/* The start offset is half undone so many voxels from a point, and all of it far away. */
-static const double OWN_SURFACE = 8.0;
-
 /* Turns a closeness into a visible fraction, by method. */
 static float remap(int32_t method, double closeness, double sine) {
     if (method == VSH_SHADOW_HARD || sine <= 0.0) {
@@ -112,51 +109,6 @@ static float pace_of(const vshi_shadow_task *task, size_t point) {
     return (float)(1.0 - task->options->jitter * (double)(bits >> 11) * 0x1p-53);
 }
 
-/* Moves ray r, of which a march has left more than lit or dark, to place i of what is looked at more closely.
- */
-static void keep_part(const vshi_shadow_task *task, const vshi_facing *facing, vshi_chunk *chunk, size_t r,
-                      size_t i) {
-    const vshi_rays *rays = &chunk->rays;
-    const uint32_t owner = chunk->owner[r];
-    const vshi_cone *cone = &facing->cone[owner];
-    /* seen from the point itself, but near it, where its own surface is */
-    const double at = (double)rays->at[r], drop = task->offset * at / (at + OWN_SURFACE);
-    const vshi_vec origin = vshi_sub(cone->origin, vshi_scale(facing->normal[owner], drop));
-    rays->origin[0][i] = (float)origin.x;
-    rays->origin[1][i] = (float)origin.y;
-    rays->origin[2][i] = (float)origin.z;
-    for (int axis = 0; axis < 3; ++axis) {
-        rays->direction[axis][i] = rays->direction[axis][r];
-    }
-    rays->end[i] = (float)cone->whole; /* not what was proved of it: that depends on the neighbours */
-    rays->sine[i] = rays->sine[r];
-    rays->close[i] = rays->close[r];
-    rays->at[i] = rays->at[r];
-    chunk->owner[i] = owner;
-}
-
-/* Values of the chunk's first `count` rays, by the edges that hide a part of the light. */
-static void shade_parts(const vshi_shadow_task *task, const vshi_facing *facing, const vshi_chunk *chunk,
-                        size_t count) {
-    const vshi_rays *rays = &chunk->rays;
-    const vshi_silhouettes parts = {.count = count,
-                                    .origin = {rays->origin[0], rays->origin[1], rays->origin[2]},
-                                    .direction = {rays->direction[0], rays->direction[1], rays->direction[2]},
-                                    .sine = rays->sine,
-                                    .end = rays->end,
-                                    .close = rays->close,
-                                    .at = rays->at,
-                                    .x = rays->begin,
-                                    .more = rays->stop};
-    task->kernel->silhouettes(task->field, &parts);
-    for (size_t i = 0; i < count; ++i) {
-        const vshi_cone *cone = &facing->cone[chunk->owner[i]];
-        const double value = vshi_segment((double)parts.x[i]) + (double)parts.more[i];
-        const double most = cone->close < cone->sine ? vshi_cone_visibility(cone->close, cone->sine) : 1.0;
-        task->visibility[facing->point[chunk->owner[i]]] = (float)fmax(0.0, fmin(most, value));
-    }
-}
-
 static void shade_points(const vshi_shadow_task *task, size_t begin, size_t end, vsh_shade_stats *stats) {
     const int32_t method = task->options->method;
     vshi_facing facing;
@@ -187,18 +139,12 @@ static void shade_points(const vshi_shadow_task *task, size_t begin, size_t end,
                         task->options->max_steps, &work);
     stats->samples += work.samples;
     stats->unfinished += work.unfinished;
-    size_t parts = 0;
     for (size_t r = 0; r < chunk.rays.count; ++r) {
         const double closeness = chunk.rays.close[r];
         const double sine = chunk.rays.sine[r];
         stats->certified += sine > 0.0 && (closeness >= sine || closeness <= -sine);
-        if (method == VSH_SHADOW_CONE && fabs(closeness) < sine && chunk.rays.at[r] > 0.0f) {
-            keep_part(task, &facing, &chunk, r, parts++);
-        } else {
-            task->visibility[facing.point[chunk.owner[r]]] = remap(method, closeness, sine);
-        }
+        task->visibility[facing.point[chunk.owner[r]]] = remap(method, closeness, sine);
     }
-    shade_parts(task, &facing, &chunk, parts);
 }
 
 void vshi_shadow_shade(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
@@ -235,8 +181,7 @@ vsh_result vshi_shadow_prepare(const vsh_occluders *occluders, const vsh_light *
                                .triangles = triangles,
                                .light = light,
                                .options = options,
-                               .lowest = inner ? 1.0 : 0.0,
-                               .offset = options->start_offset + occluders->lifted / field->voxel_size};
+                               .lowest = inner ? 1.0 : 0.0};
     task->leaky = vshi_shadow_traces(options, triangles) &&
                   (field->shell_thickness > 0.0 || vshi_triangles_have_holes(triangles));
     task->world = vshi_light_in_world(light);

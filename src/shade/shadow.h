@@ -17,7 +17,6 @@ typedef struct vshi_shadow_task {
     vshi_light_place world;      /* in world space */
     double lowest;    /* sine of how far below the receiver's plane an axis may be, of its cone's: 1 where the
                        * inner penumbra counts, else 0 */
-    double offset;    /* what marches begin above a point's surface by the start offset, voxels */
     bool leaky;       /* exact: what the field has for solid need not be shut off by triangles, so that a cone
                        * which goes into it is not hidden for certain */
     uint32_t purpose; /* of the sampler: lights of other names have other sequences */

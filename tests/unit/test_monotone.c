@@ -171,11 +171,8 @@ static void more_rays_are_never_farther_from_the_truth(void **state) {
  * the field's error; adaptive and exact stop anywhere within an error of 0.02, so that two of their values
  * may be three of its root-2-folds apart; triangulation takes two samples for one surface; and
  * taps add up five samples, of levels that are good to a part of their own voxels. */
-/* Of `cone` where the slab is as small as the light and the receiver under its very middle, so that the
- * nearest edge is now one and now another of the four: what it reads at each of them is off by as much. */
 static double rise_of_shadow(int32_t method) {
     return method == VSH_SHADOW_IMPROVED    ? 0.05
-           : method == VSH_SHADOW_CONE      ? 0.03
            : method == VSH_SHADOW_PRACTICAL ? 1.5e-3
            : method == VSH_SHADOW_RAYS      ? 1.1 / 64.0
            : method >= VSH_SHADOW_ADAPTIVE  ? 3.0 * 1.4143 * 0.02

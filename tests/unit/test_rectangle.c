@@ -101,8 +101,7 @@ static void one_march_takes_the_disc_of_equal_solid_angle(void **state) {
         shade(c, &square, &options, values, NULL);
         shade(c, &ball, &options, of_ball, NULL);
         for (size_t i = 0; i < COUNT; ++i) {
-            /* a search goes on from what rounding has left of the direction */
-            if (!(fabsf(values[i] - of_ball[i]) < (method == VSH_SHADOW_CONE ? 1e-5f : 1e-6f))) {
+            if (!(fabsf(values[i] - of_ball[i]) < 1e-6f)) {
                 fail_msg("%s, point %zu: %g, the ball %g", vsh_shadow_method_name(method), i,
                          (double)values[i], (double)of_ball[i]);
             }

@@ -327,10 +327,6 @@ static void turned_by_right_angles_and_mirrored_values_stay_within_a_bound(void 
         if (kind < 2 * SHADOWS ? method >= VSH_SHADOW_RAYS : kind > 2 * SHADOWS) {
             /* where rays and cones lie in the disc or hemisphere does not turn with the scene */
             assert_true(worst[kind].rms < 0.03);
-        } else if (kind < 2 * SHADOWS && method == VSH_SHADOW_CONE) {
-            /* where two edges are as near, what rounding leaves chooses between them: one value in 1000 */
-            assert_true(worst[kind].rms < 1e-3 && worst[kind].worst < 0.05 &&
-                        worst[kind].beyond <= COUNT / 1000);
         } else {
             assert_true(worst[kind].rms < 1e-4 && worst[kind].worst < 2e-3 && worst[kind].beyond == 0);
         }

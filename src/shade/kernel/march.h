@@ -2,7 +2,7 @@
 #ifndef VSHI_MARCH_H
 #define VSHI_MARCH_H
 
-#include "shade/kernel/silhouette.h"
+#include "field/field.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -18,8 +18,6 @@ typedef struct vshi_rays {
     float *stop;  /* a ray ends when its closeness falls to this: -sine, or 0 for what ends at a hit */
     float *close; /* in: upper bound of the closeness, at least `stop`. out: min of it and of h / t along the
                    * ray, h the distance to the surface at t; `stop` or less where the ray ended by it */
-    float *at; /* out, of VSHI_MARCH_PLAIN and VSHI_MARCH_JITTERED: the t where `close` was read, 0: it is as
-                  it came in; may be NULL */
     /* for VSHI_MARCH_PROOF and VSHI_MARCH_BEAM, which leave `close` alone; else NULL */
     float *horizon; /* of proofs: sine of the direction's height over the receiver's plane; INFINITY without
                      * one */
@@ -58,11 +56,10 @@ typedef void vshi_march_fn(const vsh_field *field, const vshi_rays *rays, int32_
 typedef void vshi_balls_fn(const vsh_field *field, size_t count, float *const centre[3], float radius,
                            bool *is_free);
 
-/* One source (lanes.inc and silhouette.inc), built for each instruction set; all give the same bits. */
+/* One source (lanes.inc), built for each instruction set; all give the same bits. */
 typedef struct vshi_kernel {
     vshi_march_fn *march;
     vshi_balls_fn *balls;
-    vshi_silhouettes_fn *silhouettes;
 } vshi_kernel;
 
 extern const vshi_kernel vshi_kernel_base;
