@@ -13,7 +13,6 @@ typedef struct vshi_ao_cut {
     int32_t height;     /* of the lightmap, texels */
     int32_t first, end; /* rows of texels */
     uint32_t kinds;     /* what is kept of texels: VSHI_KEEPS_… (bake/ao_kept.h) */
-    int32_t between;    /* spacing of texels that AO is interpolated between; 1: it is not; 0: not told */
 } vshi_ao_cut;
 
 enum { VSHI_AO_CUT_TILE = 8 };

@@ -4,25 +4,12 @@
 #include "bake/ao_texels.h"
 #include "bake/average.h"
 #include "bake/bent_normals.h"
-#include "bake/lattice.h"
 #include "bake/planes.h"
 #include "base/try.h"
 #include "shade/ao.h"
 #include "shade/shadow.h"
 
 #include <math.h>
-
-/* Whether AO need not be shaded at every texel. `rays` are for those who want just them, taps cost no more;
- * what is near in a layer is not looked at. */
-bool vshi_ao_is_interpolated(const vsh_shade_options *shade, int32_t spacing, bool layered_ao) {
-    const int32_t method = shade->ao_method;
-    return spacing > 1 && !layered_ao &&
-           (method == VSH_AO_CONES || (vsh_ao_method_traits(method) & VSH_METHOD_KEEPS_ERROR) != 0);
-}
-
-bool vshi_baking_interpolates(const vshi_baking *bake) {
-    return vshi_ao_is_interpolated(&bake->shade, bake->texels->ao_spacing, bake->layered_ao);
-}
 
 bool vshi_baking_traces_shadow(const vshi_baking *bake) {
     return vshi_shadow_traces(&bake->shade, bake->occluders->triangles);
@@ -32,15 +19,13 @@ bool vshi_baking_traces_ao(const vshi_baking *bake) {
     return vshi_ao_traces(&bake->shade, bake->occluders->triangles);
 }
 
-bool vshi_ao_is_shared(const vsh_occluders *occluders, const vsh_shade_options *shade, int32_t spacing,
-                       bool layered_ao) {
-    const int32_t method = vsh_ao_method_resolve(shade->ao_method, occluders->triangles != NULL);
-    return vshi_ao_is_interpolated(shade, spacing, layered_ao) &&
-           (method == VSH_AO_EXACT || (method == VSH_AO_ADAPTIVE && occluders->field->surface != NULL));
+bool vshi_ao_is_shared(const vsh_shade_options *shade, int32_t spacing, bool layered_ao) {
+    return spacing > 1 && !layered_ao &&
+           (vsh_ao_method_traits(shade->ao_method) & VSH_METHOD_KEEPS_ERROR) != 0;
 }
 
 bool vshi_baking_shares(const vshi_baking *bake) {
-    return vshi_ao_is_shared(bake->occluders, &bake->shade, bake->texels->ao_spacing, bake->layered_ao);
+    return vshi_ao_is_shared(&bake->shade, bake->texels->ao_spacing, bake->layered_ao);
 }
 
 /* Finds where the rays to a light, or of AO (NULL), begin. Marched ones have their start offset already;
@@ -152,16 +137,13 @@ vsh_result vshi_baking_open(vshi_baking *bake, bool sky, float *deviation, float
     if (bake->row_work != NULL) {
         bake->origins.rows.work = bake->row_work + bake->origins.rows.count;
     }
-    if (!vshi_baking_interpolates(bake)) {
+    if (!vshi_baking_shares(bake)) {
         return vshi_shade_ao(occluders, &points, bake->origins.face, &bake->origins.rows, &shade, &bake->run,
                              bake->values, deviation, bent, NULL, &bake->stats.shade, error);
     }
     bake->keep.sky = sky;
-    return vshi_baking_shares(bake)
-               ? vshi_ao_texels(occluders, bake->texels, &bake->origins, &points, &shade, &bake->run,
-                                &bake->keep, bake->values, deviation, bent, &bake->stats.shade, error)
-               : vshi_lattice_ao(occluders, bake->texels, &bake->origins, &points, &shade, &bake->run,
-                                 bake->values, deviation, bent, &bake->stats.shade, error);
+    return vshi_ao_texels(occluders, bake->texels, &bake->origins, &points, &shade, &bake->run, &bake->keep,
+                          bake->values, deviation, bent, &bake->stats.shade, error);
 }
 
 vsh_result vshi_bake_ao(vshi_baking *bake, vsh_error *error) {

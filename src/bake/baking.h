@@ -76,13 +76,8 @@ vsh_result vshi_baking_add_filled(vshi_baking *bake, vsh_error *error);
 bool vshi_baking_traces_shadow(const vshi_baking *bake);
 bool vshi_baking_traces_ao(const vshi_baking *bake);
 
-/* Whether AO need not be shaded at every texel; whether texels share its rays then. */
-bool vshi_baking_interpolates(const vshi_baking *bake);
+/* Whether texels share rays of AO. Methods with an error to keep share them, unless layers cast. */
 bool vshi_baking_shares(const vshi_baking *bake);
-
-/* The same by what casts and resolved options, of texels this far apart. */
-bool vshi_ao_is_interpolated(const vsh_shade_options *shade, int32_t spacing, bool layered_ao);
-bool vshi_ao_is_shared(const vsh_occluders *occluders, const vsh_shade_options *shade, int32_t spacing,
-                       bool layered_ao);
+bool vshi_ao_is_shared(const vsh_shade_options *shade, int32_t spacing, bool layered_ao);
 
 #endif

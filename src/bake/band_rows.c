@@ -39,11 +39,7 @@ vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t ro
     band->own_end = ((size_t)first_row + (size_t)rows + tile - 1) / tile;
     band->held_begin = band->own_begin > beside ? band->own_begin - beside : 0;
     band->held_end = all - band->own_end > beside ? band->own_end + beside : all;
-    if (cut != NULL && cut->spacing <= 1 && cut->between != 0) {
-        if (cut->between > 1) {
-            vshi_ao_rows_between(cut->between, all, &band->held_begin, &band->held_end);
-        }
-    } else if (charts->ao_spacing > 1) {
+    if (charts->ao_spacing > 1) {
         vshi_ao_rows(charts->ao_spacing, all, &band->held_begin, &band->held_end);
     }
     band->laid_begin = band->held_begin;

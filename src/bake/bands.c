@@ -1,6 +1,5 @@
 /* Charts that are counted once, and cut into bands of rows. */
 #include "bake/ao_texels.h"
-#include "bake/lattice.h"
 #include "bake/nearest_valid.h"
 #include "bake/origins.h"
 #include "bake/padding.h"
@@ -363,10 +362,9 @@ double vshi_bake_bytes(const vshi_bake_need *need) {
     sample += (double)floats * sizeof(float);
     return need->samples * sample + texels * (1.0 + VSHI_PADDING_TEXEL_BYTES + VSHI_SPREAD_TEXEL_BYTES) +
            (need->fills ? vshi_pull_push_bytes(need->width, need->rows) : 0.0) +
-           fmax(need->lattice ? vshi_lattice_bytes(need->samples, texels, need->bent, need->smooth) : 0.0,
-                need->windows
-                    ? vshi_ao_texels_bytes(need->samples, need->width, need->rows, need->threads, need->bent)
-                    : 0.0);
+           (need->windows
+                ? vshi_ao_texels_bytes(need->samples, need->width, need->rows, need->threads, need->bent)
+                : 0.0);
 }
 
 /* Floats a texel of all planes that are there. */
@@ -402,7 +400,6 @@ uint64_t vshi_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int
                            .irradiance = lightmap->irradiance != NULL,
                            .bent = lightmap->bent != NULL,
                            .tint = lightmap->tint != NULL,
-                           .lattice = charts->ao_spacing > 1 && !vshi_ao_traces(&shade, NULL),
                            .windows = charts->ao_spacing > 1 && keeps_error,
                            .fills = charts->fills && rows == charts->info.height && cut == NULL};
     for (size_t row = band.laid_begin; row < band.laid_end; ++row) {

@@ -73,13 +73,12 @@ static vsh_result find_needed(void *user, const vshi_origins *origins, uint8_t *
         const size_t at = row + band->held_begin;
         taken[row] = taken[row] || (at + near >= band->own_begin && at < band->own_end + near);
     }
-    const bool interpolated = vshi_baking_interpolates(bake) && needs(bake, NEEDS_ANY_AO);
+    const bool shared = vshi_baking_shares(bake) && needs(bake, NEEDS_ANY_AO);
     memset(rows, bake->keep.memory != NULL ? VSHI_ROW_BESIDE : VSHI_ROW_LEFT_OUT, count);
     for (size_t row = 0; row < count; ++row) {
         size_t begin = row + band->held_begin, end = begin + 1;
-        if (interpolated) {
-            (vshi_baking_shares(bake) ? vshi_ao_rows : vshi_ao_rows_between)(texels->ao_spacing,
-                                                                             band->held_end, &begin, &end);
+        if (shared) {
+            vshi_ao_rows(texels->ao_spacing, band->held_end, &begin, &end);
         }
         begin = begin > band->held_begin ? begin - band->held_begin : 0;
         if (taken[row]) {
@@ -138,8 +137,6 @@ done:
 
 static vsh_result check_limit(const vshi_baking *bake, vsh_error *error) {
     const vsh_texels *texels = bake->texels;
-    const bool open = needs(bake, NEEDS_ANY_AO) && vshi_baking_interpolates(bake);
-    const bool shares = vshi_baking_shares(bake);
     const vshi_bake_need need = {.samples = (double)texels->count,
                                  .width = texels->info.width,
                                  .rows = texels->band.rows,
@@ -150,8 +147,7 @@ static vsh_result check_limit(const vshi_baking *bake, vsh_error *error) {
                                  .irradiance = needs(bake, VSHI_NEEDS_IRRADIANCE),
                                  .bent = needs(bake, VSHI_NEEDS_BENT),
                                  .tint = needs(bake, VSHI_NEEDS_TINT),
-                                 .lattice = open && !shares,
-                                 .windows = open && shares,
+                                 .windows = needs(bake, NEEDS_ANY_AO) && vshi_baking_shares(bake),
                                  .fills = texels->fills,
                                  .threads = bake->run.threads};
     const double bytes =

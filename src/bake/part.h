@@ -15,12 +15,10 @@
 #define VSHI_PART_SHADEABLE                                                                                  \
     UINT32_C(0x40000000) /* a sample is valid, so other texels may be filled from this one */
 
-/* The spacing of texels that share AO where it can be left, of texels of `spacing` at most and a lightmap of
- * these planes, else 1; and of those that it is interpolated between, else 1. Options may be those that are
- * not settled. Errors: VSH_ERROR_ARGUMENT. */
+/* The spacing of texels that share AO, of `spacing` at most and a lightmap of these planes; 1 where none do.
+ * Errors: VSH_ERROR_ARGUMENT. */
 vsh_result vshi_part_spacing(const vsh_occluders *occluders, const vsh_shade_options *options,
-                             const vsh_lightmap *planes, int32_t spacing, int32_t *left, int32_t *between,
-                             vsh_error *error);
+                             const vsh_lightmap *planes, int32_t spacing, int32_t *left, vsh_error *error);
 
 /* What is kept then, VSHI_KEEPS_…. */
 uint32_t vshi_part_kinds(const vsh_lightmap *planes);

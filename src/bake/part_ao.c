@@ -14,17 +14,16 @@
 #include <string.h>
 
 vsh_result vshi_part_spacing(const vsh_occluders *occluders, const vsh_shade_options *options,
-                             const vsh_lightmap *planes, int32_t spacing, int32_t *left, int32_t *between,
-                             vsh_error *error) {
+                             const vsh_lightmap *planes, int32_t spacing, int32_t *left, vsh_error *error) {
     vsh_shade_options shade;
     bool layered_ao = false;
-    *left = *between = 1;
+    *left = 1;
     VSHI_TRY(vshi_shade_options_resolve(options, &shade, error));
     for (size_t i = 0; i < occluders->layer_count; ++i) {
         layered_ao = layered_ao || occluders->layers[i].ao != 0;
     }
-    if (vshi_part_kinds(planes) != 0 && vshi_ao_is_interpolated(&shade, spacing, layered_ao)) {
-        *(vshi_ao_is_shared(occluders, &shade, spacing, layered_ao) ? left : between) = spacing;
+    if (vshi_part_kinds(planes) != 0 && vshi_ao_is_shared(&shade, spacing, layered_ao)) {
+        *left = spacing;
     }
     return VSH_OK;
 }

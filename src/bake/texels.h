@@ -53,7 +53,7 @@ vsh_result vshi_charts_bounds_beyond(const vsh_charts *charts, const double with
                                      double low[3], double high[3], vsh_error *error);
 
 /* Rows of texels that a band holds: its own, those beside it that its padding is copied from, and those below
- * them that their AO is interpolated from. */
+ * them whose rays their AO shares. */
 typedef struct vshi_band {
     size_t own_begin, own_end;   /* tile rows */
     size_t held_begin, held_end; /* the same */
@@ -79,18 +79,6 @@ static inline void vshi_ao_rows(int32_t spacing, size_t all, size_t *begin, size
     *end = last * square < all ? last * square + 1 : all;
 }
 
-/* The same where AO is interpolated between texels instead: cells reach into the row of tiles behind, and at
- * each lattice that is wider than the finest, those of that row into the next. The rows above and behind all
- * these tell where charts end. */
-static inline void vshi_ao_rows_between(int32_t spacing, size_t all, size_t *begin, size_t *end) {
-    size_t behind = 1;
-    for (int32_t s = spacing; s > 1; s /= 2) {
-        ++behind;
-    }
-    *begin -= *begin > 0 ? 1 : 0;
-    *end = all - *end > behind ? *end + behind : all;
-}
-
 /* What vsh_bake_lightmap() takes beside field, texels and planes, bytes: the most it holds at a time. */
 typedef struct vshi_bake_need {
     double samples;      /* held */
@@ -98,8 +86,8 @@ typedef struct vshi_bake_need {
     bool traced;         /* rays against triangles */
     bool smooth;         /* as of the charts */
     bool values, errors, irradiance, bent, tint;
-    bool lattice, windows; /* AO between texels, or by those around */
-    bool fills;            /* what is beyond the padding */
+    bool windows; /* AO by the texels around */
+    bool fills;   /* what is beyond the padding */
     int32_t threads;
 } vshi_bake_need;
 

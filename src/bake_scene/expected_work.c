@@ -30,8 +30,6 @@ static const double ALONE = 4000.0, ALONE_HALF_OPEN = 8000.0;
 static const double MARCH = 250.0, SAMPLE = 10.0;
 /* What AO on a field takes of a texel that shares it, though nothing hides anything. */
 static const double FREE = 400.0;
-/* Where AO is interpolated, texels that are shaded: so many of each cell, and at each end of a chart. */
-static const double OF_CELL = 2.0, OF_EDGE = 3.0;
 /* The least error that is asked of the few. */
 static const double COARSE = 0.1;
 
@@ -131,13 +129,6 @@ static sums sum_rows(const shaded *s, size_t begin, size_t end) {
     return of;
 }
 
-/* Of what is open, the part of a row's texels that is shaded. */
-static double part_shaded(const vshi_share_rows *share, const vshi_share_row *row) {
-    const double cell = (double)share->between * share->between;
-    const double edges = row->samples > 0 ? (double)row->edges / row->samples : 0.0;
-    return share->between > 1 ? fmin(1.0, OF_CELL / cell + OF_EDGE * edges) : 1.0;
-}
-
 /* By the few in each row, or where there are none by all. */
 static void weigh(const shaded *s, vshi_share_rows *share) {
     const size_t rows = s->height / VSHI_TILE;
@@ -153,8 +144,7 @@ static void weigh(const shaded *s, vshi_share_rows *share) {
         }
         const double part = of->samples / few.count;
         const double open = part * few.open + of->edges * edge * few.valid / few.count;
-        share->work[row] =
-            (uint64_t)(part * (few.other + part_shaded(share, of) * few.marched) + crowding(of) * open);
+        share->work[row] = (uint64_t)(part * (few.other + few.marched) + crowding(of) * open);
         share->all += share->work[row];
     }
 }

@@ -65,7 +65,6 @@ static usual usual_of(const vsh_scene *scene) {
 
 double vshi_shares_most(const vsh_scene *scene, double least) {
     const usual u = usual_of(scene);
-    const double least_rows = marches_field(scene) ? VSHI_BETWEEN_ROWS : 1.0;
     double ns = 0.0, own = 0.0, borders = 0.0;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         const vsh_receiver *receiver = &scene->receivers[i];
@@ -78,8 +77,7 @@ double vshi_shares_most(const vsh_scene *scene, double least) {
         const double each = VSHI_LAID_OUT + VSHI_VALID + u.light + (shares ? u.shared : u.alone);
         ns += points * each;
         own += receiver->type == VSH_RECEIVER_HEIGHTFIELD ? TRIANGLES_OF_HEIGHTS : 0.0;
-        borders += MOST_BORDERS * receiver->height /
-                   (shares ? fmax(least_rows, VSHI_SHARED_ROWS * receiver->ao_spacing) : 1.0);
+        borders += MOST_BORDERS * receiver->height / (shares ? VSHI_SHARED_ROWS * receiver->ao_spacing : 1.0);
     }
     return fmin(fmin(1e-9 * ns / least, 1.0 + borders), own > 0.0 ? MOST_OWN * ns / own : INFINITY);
 }

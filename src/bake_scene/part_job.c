@@ -98,8 +98,7 @@ vshi_ao_cut vshi_job_cut(const vsh_bake_job *job, size_t index, int32_t first, i
                          .height = job->lightmaps[index].height,
                          .first = first,
                          .end = end,
-                         .kinds = vshi_part_kinds(&planes),
-                         .between = shard ? job->shares[index].between : 1};
+                         .kinds = vshi_part_kinds(&planes)};
 }
 
 void vshi_part_set_kept(const vsh_bake_job *job, size_t index, const vshi_bands *bands, int32_t first,

@@ -33,10 +33,9 @@ static size_t step_of(const vshi_share_rows *share, int32_t shards) {
 }
 
 /* Rows that are laid out and shot beside a border, on both sides together, as whole ones: where AO is left,
- * those that windows reach are kept, and what is shot twice are some tiles of lattices; where it is
- * interpolated, the wider lattices of some rows of tiles. */
+ * those that windows reach are kept, and what is shot twice are some tiles of lattices. */
 static double border_rows(const vshi_share_rows *share) {
-    return share->left > 1 ? VSHI_SHARED_ROWS * share->left : share->between > 1 ? VSHI_BETWEEN_ROWS : 1.0;
+    return share->left > 1 ? VSHI_SHARED_ROWS * share->left : 1.0;
 }
 
 static double few_of(int32_t width, int32_t height, int32_t step) {
@@ -77,8 +76,8 @@ vsh_result vshi_shares_leave(const vsh_bake_job *job, vsh_error *error) {
     for (size_t i = 0; i < job->targets.count; ++i) {
         vshi_share_rows *share = &job->shares[i];
         VSHI_TRY(vshi_part_spacing(job->occluders, &job->scene.shade, &planes, share->spacing, &share->left,
-                                   &share->between, error));
-        share->spacing = share->left > share->between ? share->left : share->between;
+                                   error));
+        share->spacing = share->left;
     }
     return VSH_OK;
 }

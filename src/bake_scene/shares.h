@@ -17,7 +17,6 @@ typedef struct vshi_share_rows {
     size_t count;        /* rows of tiles */
     int32_t spacing;     /* of texels whose AO is not all shaded; 1: all is */
     int32_t left;        /* the same, where AO is left at the ends of pieces (bake/ao_cut.h); else 1 */
-    int32_t between;     /* the same, where it is interpolated between texels; else 1 */
     vshi_share_row *row; /* [count] */
     vsh_texels *few;     /* of it, of every `few_step`th row and column; NULL: none */
     int32_t few_step;
@@ -41,7 +40,7 @@ vsh_result vshi_shares_note(vsh_bake_job *job, size_t index, const vsh_charts *c
 vsh_result vshi_shares_weigh(const vsh_bake_job *job, vshi_share_rows *share, const vsh_run *run,
                              vsh_error *error);
 
-/* Settles how AO is shaded, of a prepared job: spacing, left and between. Errors: VSH_ERROR_ARGUMENT. */
+/* Settles how AO is shaded, of a prepared job: spacing and left. Errors: VSH_ERROR_ARGUMENT. */
 vsh_result vshi_shares_leave(const vsh_bake_job *job, vsh_error *error);
 
 /* The rows that shard `shard` of the `count` that have some bakes, of a prepared job, in the order of

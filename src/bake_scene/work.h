@@ -8,9 +8,8 @@
 static const double VSHI_LAID_OUT = 250.0, VSHI_VALID = 200.0;
 /* A light that is proved, or dark; one in its penumbra. */
 static const double VSHI_LIT = 100.0, VSHI_PENUMBRA = 6000.0;
-/* What a border costs, in rows: for each texel of spacing between those that share AO, and where it is
- * interpolated instead. */
-static const double VSHI_SHARED_ROWS = 1.5, VSHI_BETWEEN_ROWS = 6.0;
+/* What a border costs, in rows, for each texel of spacing between those that share AO. */
+static const double VSHI_SHARED_ROWS = 1.5;
 
 /* Times that what is open is shaded. */
 static inline double vshi_work_openings(const vsh_scene *scene) {

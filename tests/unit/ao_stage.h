@@ -105,6 +105,7 @@ typedef struct how {
     size_t receivers; /* of the first so many; 0: all */
     bool parts;       /* of so many rows, instead of bands */
     uint32_t planes;
+    bool marched; /* by VSH_AO_ADAPTIVE */
 } how;
 
 static inline void bake_rows(const stage *s, const vsh_texels *texels, const vsh_shade_options *shade,
@@ -140,7 +141,7 @@ static inline vsh_lightmap_options options_of(how h) {
     options.padding = h.padding;
     options.tangents = 1;
     options.ao_spacing = h.spacing;
-    options.shade.ao_method = VSH_AO_EXACT;
+    options.shade.ao_method = h.marched ? VSH_AO_ADAPTIVE : VSH_AO_EXACT;
     options.shade.ao_distance = 0.8;
     options.shade.rays = 0; /* as many as the error takes */
     options.shade.max_error = h.max_error;
@@ -162,7 +163,7 @@ static inline baked *bake(const stage *s, how h) {
     for (int32_t first = 0; first < HEIGHT; first += h.rows) {
         const int32_t rows = HEIGHT - first < h.rows ? HEIGHT - first : h.rows;
         vsh_texels *texels = NULL;
-        const vshi_ao_cut cut = {1, HEIGHT, first, first + rows, 0, 0};
+        const vshi_ao_cut cut = {1, HEIGHT, first, first + rows, 0};
         assert_int_equal(h.parts ? vshi_texels_create_part(charts, first, rows, &cut, NULL, &texels, NULL)
                                  : vsh_texels_create_band(charts, first, rows, NULL, &texels, NULL),
                          VSH_OK);

@@ -44,7 +44,7 @@ static baked *bake_alone(const stage *s, how h, int32_t pieces, uint32_t *kinds)
     memset(rows_kept, 0, sizeof rows_kept);
     for (int32_t first = 0; first < HEIGHT; first += pieces) {
         const int32_t end = HEIGHT - first < pieces ? HEIGHT : first + pieces;
-        bake_piece(s, charts, &options.shade, h, (vshi_ao_cut){h.spacing, HEIGHT, first, end, *kinds, 1}, b);
+        bake_piece(s, charts, &options.shade, h, (vshi_ao_cut){h.spacing, HEIGHT, first, end, *kinds}, b);
     }
     vsh_charts_free(charts);
     return b;
@@ -140,9 +140,9 @@ static void rows_are_kept_that_windows_over_those_left_take_in(void **state) {
     size_t left = 0, alone = 0;
     for (int32_t n = 0; n < 3 * 400; ++n) {
         const int32_t spacing = 2 << n / 400, first = n % 20, size = 1 + n % 400 / 20;
-        const vshi_ao_cut pieces[3] = {{spacing, 8 * ROWS, 0, 8 * first, 0, 1},
-                                       {spacing, 8 * ROWS, 8 * first, 8 * (first + size), 0, 1},
-                                       {spacing, 8 * ROWS, 8 * (first + size), 8 * ROWS, 0, 1}};
+        const vshi_ao_cut pieces[3] = {{spacing, 8 * ROWS, 0, 8 * first, 0},
+                                       {spacing, 8 * ROWS, 8 * first, 8 * (first + size), 0},
+                                       {spacing, 8 * ROWS, 8 * (first + size), 8 * ROWS, 0}};
         bool kept[ROWS + 1] = {false}, leaves[ROWS] = {false};
         for (size_t p = first > 0 ? 0 : 1; p < 3; ++p) {
             const vshi_ao_cut *cut = &pieces[p];
@@ -193,14 +193,12 @@ static void what_is_made_of_ao_is_left_too(void **state) {
         planes.irradiance = b->bent;
         assert_int_equal(vshi_part_kinds(&planes), cases[i].kinds);
         for (size_t m = 0; m < 3; ++m) {
-            int32_t left, between;
+            int32_t left;
             vsh_shade_options shade = options.shade;
             shade.ao_method = methods[m];
-            assert_int_equal(vshi_part_spacing(occluders_of_caster(&s->casters), &shade, &planes, 4, &left,
-                                               &between, NULL),
-                             VSH_OK);
+            assert_int_equal(
+                vshi_part_spacing(occluders_of_caster(&s->casters), &shade, &planes, 4, &left, NULL), VSH_OK);
             assert_int_equal(left, cases[i].kinds != 0 && methods[m] == VSH_AO_EXACT ? 4 : 1);
-            assert_int_equal(between, cases[i].kinds != 0 && methods[m] == VSH_AO_CONES ? 4 : 1);
         }
         free(b);
     }

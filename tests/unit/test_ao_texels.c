@@ -18,7 +18,10 @@ static void bands_change_no_bit(void **state) {
         baked *whole =
             bake(*state, (how){.spacing = 4, .max_error = 0.03, .padding = paddings[p], .threads = 1});
         for (size_t r = 0; r < 3; ++r) {
-            baked *banded = bake(*state, (how){4, 0.03, paddings[p], rows[r], 2, 0, false, 0});
+            baked *banded = bake(
+                *state,
+                (how){
+                    .spacing = 4, .max_error = 0.03, .padding = paddings[p], .rows = rows[r], .threads = 2});
             assert_same(whole, banded);
             free(banded);
         }
@@ -109,6 +112,22 @@ static void errors_are_below_those_asked_for_with_few_rays(void **state) {
         free(alone);
         free(shared);
     }
+    free(truth);
+}
+
+/* Held against rays on the same field that no texel shares. */
+static void marched_rays_are_shared_too(void **state) {
+    baked *truth = bake(*state, (how){.spacing = 1, .max_error = 0.004, .marched = true}),
+          *shared = bake(*state, (how){.spacing = 4, .max_error = 0.02, .marched = true}),
+          *alone = bake(*state, (how){.spacing = 1, .max_error = 0.02, .marched = true});
+    const judged j = judge(shared, truth), a = judge(alone, truth);
+    print_message("RMSE %.5f, said %.5f, most %.3f, %.0f rays; alone %.5f, %.0f rays\n", j.is, j.said, j.most,
+                  (double)shared->stats.rays, a.is, (double)alone->stats.rays);
+    assert_true(j.is < a.is && j.most < 0.3);
+    assert_true(j.is < 1.1 * sqrt(shared->stats.ao_square_error / (double)j.count));
+    assert_true(shared->stats.rays * 2 < alone->stats.rays);
+    free(alone);
+    free(shared);
     free(truth);
 }
 
@@ -282,6 +301,7 @@ int main(void) {
         cmocka_unit_test(bands_change_no_bit),
         cmocka_unit_test(parts_change_no_bit),
         cmocka_unit_test(errors_are_below_those_asked_for_with_few_rays),
+        cmocka_unit_test(marched_rays_are_shared_too),
         cmocka_unit_test(charts_take_nothing_from_each_other),
         cmocka_unit_test(fine_texels_take_few_rays),
         cmocka_unit_test(what_ends_beside_a_square_darkens_no_texel_of_the_next_row),
