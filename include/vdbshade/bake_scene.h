@@ -26,12 +26,9 @@ typedef struct vsh_job_lightmap {
     uint64_t samples;        /* evaluated positions, supersampling counted */
     int32_t bands;           /* that it is baked in; 1: whole */
     int32_t band_rows;       /* of each band but the last */
-    uint64_t invalid_texels; /* these three once it is baked: as in vsh_bake_stats */
-    uint64_t resumed_rows;   /* that an earlier bake had kept */
-    int32_t kept_rows; /* where its bake failed and `resume` was asked for: rows that the next one need not
-                          bake */
-    size_t page;       /* of the receiver, where it is unwrapped onto several, or has one for each object: an
-                          image's name then has its number before the ending, OUT.0.exr, or the object's name */
+    uint64_t invalid_texels; /* once it is baked: as in vsh_bake_stats */
+    size_t page; /* of the receiver, where it is unwrapped onto several, or has one for each object: an
+                    image's name then has its number before the ending, OUT.0.exr, or the object's name */
 } vsh_job_lightmap;
 
 /* Takes the rows of lightmaps, one lightmap after the other, from the top on, in the thread that called
@@ -64,13 +61,10 @@ typedef struct vsh_bake_job_options {
     int32_t allow_overlap; /* nonzero: objects may share texels, whatever their receivers say */
     int32_t band_rows;     /* rows that are baked at a time, up to a multiple of VSH_BAND_STEP; 0: all, or as
                               many as run->memory_limit lets */
-    int32_t resume;        /* nonzero: bands are kept in OUTPUT.resume, of further pages of an asset
-                              OUTPUT.PAGE.resume, until all lightmaps are whole, and taken from there by the next
-                              bake of the same scene with the same settings. Needs files as outputs */
     const char *invalid_picture; /* PNG of the texels that are not valid, for each lightmap: where there are
                                     several, FILE.OUTPUT.png, of pages of an asset with the number or the
                                     object; of outputs of one name FILE.OUTPUT-2.png and so on from the
-                                    second. NULL: none. Not with `resume` */
+                                    second. NULL: none */
     const vsh_row_sink *sink; /* NULL: image files at the receivers' outputs, which say where they come from
                                  (vsh_provenance); where an output's name ends in .glb, .gltf or .obj, the
                                  receiver's file with its light (vsh_lit_write()): AO as occlusion, irradiance
@@ -107,7 +101,7 @@ typedef struct vsh_bake_job_options {
 
 static inline vsh_bake_job_options vsh_bake_job_options_default(void) {
     vsh_bake_job_options options = {
-        sizeof(vsh_bake_job_options), 0,    0, 0, 0,    NULL, NULL, NULL, NULL, 0, NULL, NULL, NULL, 0,
+        sizeof(vsh_bake_job_options), 0,    0, 0, NULL, NULL, NULL, NULL, 0,  NULL, NULL, NULL, 0,
         VSH_LIT_IMAGES_AUTO,          NULL, 0, 0, NULL, NULL, 0,    0,    0.4};
     return options;
 }
@@ -144,8 +138,7 @@ VSH_API vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, v
 /* Bakes every lightmap and hands over its rows, once vsh_bake_job_prepare() went well. Errors: as
  * vsh_bake_lightmap() and the sink, and for files as vsh_image_writer_create() to …_finish();
  * VSH_ERROR_INPUT (a lightmap whose texels are all invalid); VSH_ERROR_LIMIT (not even VSH_BAND_STEP rows fit
- * the limit); VSH_ERROR_WRITE (`resume`: the file of bands is not ours, or open elsewhere). Lightmaps that
- * are done by then stay. */
+ * the limit). Lightmaps that are done by then stay. */
 VSH_API vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
 
 /* Puts the parts of all shards together, which vsh_bake_job_run() wrote for the same scene and options on
@@ -175,7 +168,6 @@ typedef struct vsh_bake_report {
     double write_s;  /* rows packed and written */
     uint64_t texels; /* these two of all lightmaps, as in vsh_bake_stats */
     uint64_t invalid_texels;
-    uint64_t resumed_rows;        /* that earlier bakes had kept */
     uint64_t bands;               /* baked, of all lightmaps */
     vsh_shade_stats shade;        /* of all lightmaps */
     vsh_occluders_info occluders; /* that all of them share */

@@ -8,8 +8,6 @@
 
 #include <math.h>
 
-enum { RESUME_BANDS = 16 }; /* a bake that is ended loses a sixteenth of a lightmap at most */
-
 /* What a lightmap takes, whatever is baked at a time. */
 typedef struct cost {
     const vsh_charts *charts;
@@ -134,7 +132,6 @@ vsh_result vshi_bands_plan(const vsh_scene *scene, const vshi_target *target, co
     const vsh_receiver *receiver = &target->receiver;
     const vsh_image_options image = vshi_receiver_image(receiver);
     vshi_channels channels;
-    const int32_t kept = (receiver->height + RESUME_BANDS - 1) / RESUME_BANDS;
     vsh_result result;
     VSHI_TRY_DONE(vshi_channels_name(scene, receiver->width, receiver->height, &channels, error));
     cost c = {.charts = charts,
@@ -156,9 +153,6 @@ vsh_result vshi_bands_plan(const vsh_scene *scene, const vshi_target *target, co
     c.in_memory = need->files && vsh_image_writer_bytes(receiver->output, &half, &image) < c.writer;
     vsh_charts_get_info(charts, &c.info);
     VSHI_TRY_DONE(plan(&c, need->rows, receiver->output, bands, error));
-    if (need->resume && need->rows == 0 && bands->rows > kept) {
-        result = plan(&c, kept, receiver->output, bands, error);
-    }
 done:
     vshi_channels_free(&channels);
     return result;

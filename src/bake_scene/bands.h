@@ -15,7 +15,6 @@ typedef struct vshi_bands {
 /* What a lightmap's bands are planned by. */
 typedef struct vshi_bands_need {
     bool picture;           /* one of texels that are not valid is made too */
-    bool resume;            /* bands are kept: there are to be some */
     bool files;             /* image files are written */
     const vshi_ao_cut *cut; /* of rows that are baked by themselves; NULL: all are */
     int32_t threads;

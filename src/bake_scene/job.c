@@ -127,10 +127,6 @@ static vsh_result check(const vsh_scene *scene, const vsh_bake_job_options *opti
     if (scene->receiver_count == 0) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "scene: no receivers");
     }
-    if (options->resume && (options->sink != NULL || options->invalid_picture != NULL)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_job_options.resume: not together with %s",
-                         options->sink != NULL ? "a sink" : "invalid_picture");
-    }
     VSHI_TRY(check_shard(options, error));
     for (size_t i = 0; i < scene->receiver_count && options->sink == NULL; ++i) {
         const vsh_result result = vsh_receiver_check(scene, i, error);
@@ -439,10 +435,6 @@ vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_error *er
         VSHI_TRY(vshi_job_bake_part(job, &full, error));
     } else {
         VSHI_TRY(vshi_job_bake_all(job, &full, error));
-    }
-    /* not before all are whole: a bake that goes on writes those that were again */
-    for (size_t i = 0; i < job->targets.count && job->options.resume && !is_shard(job); ++i) {
-        VSHI_TRY(vshi_job_forget(job, i, error));
     }
     return VSH_OK;
 }

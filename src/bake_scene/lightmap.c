@@ -87,7 +87,6 @@ vsh_result vshi_job_plan(const vsh_bake_job *job, size_t index, const vsh_charts
                                   .first = first,
                                   .end = end,
                                   .picture = job->options.invalid_picture != NULL,
-                                  .resume = job->options.resume != 0,
                                   .files = job->options.sink == NULL && !lit && !shard,
                                   .rows = job->merges ? 0 : job->options.band_rows,
                                   .held = held + kept,
@@ -172,23 +171,17 @@ static vsh_result take_band(vshi_lightmap_work *w, int32_t first, int32_t rows, 
     return result;
 }
 
-/* Bakes a band, or takes it from parts, or from before. */
+/* Bakes a band, or takes it from parts. */
 static vsh_result make_band(vshi_lightmap_work *w, int32_t first, int32_t rows, const vsh_run *run,
                             vsh_error *error) {
-    const size_t meshes = w->target->mesh_count;
     if (is_part(w)) {
         vshi_part_set_kept(w->job, w->index, &w->input.bands, first, rows, &w->channels);
-    }
-    if (vshi_resume_take(&w->resume, first, rows, &w->channels, &w->baked, meshes)) {
-        w->lightmap->resumed_rows += (uint64_t)rows;
-        return VSH_OK;
     }
     VSHI_TRY((w->job->parts != NULL ? take_band : bake_band)(w, first, rows, run, error));
     if (vshi_is_fixed_whole(w)) {
         VSHI_TRY(vshi_stitch_alone(w, error));
     }
     vshi_channels_split(&w->channels, &w->job->scene);
-    vshi_resume_keep(&w->resume, first, rows, &w->channels, &w->baked, meshes);
     return VSH_OK;
 }
 
@@ -223,16 +216,14 @@ static void warn_bands(const vshi_lightmap_work *w) {
     const vsh_receiver *receiver = &w->target->receiver;
     const int32_t bands = w->input.bands.count;
     if (bands > 1 && vshi_fixes_seams(&w->target->receiver)) {
-        vshi_warn(
-            w->run,
-            "%s: seams are not fixed, because it is baked in %d bands of rows; raise --memory-limit, or bake "
-            "without --resume",
-            receiver->path, bands);
+        vshi_warn(w->run,
+                  "%s: seams are not fixed, because it is baked in %d bands of rows; raise --memory-limit",
+                  receiver->path, bands);
     }
     if (bands > 1 && receiver->padding == VSH_PADDING_AUTO) {
         vshi_warn(w->run,
                   "%s: padding is limited to 16 texels, because it is baked in %d bands of rows; raise "
-                  "--memory-limit, or bake without --resume",
+                  "--memory-limit",
                   receiver->path, bands);
     }
 }
@@ -282,7 +273,7 @@ static vsh_result bake_bands(vshi_lightmap_work *w, vsh_error *error) {
     }
 }
 
-/* Memory, files, and what was kept. */
+/* Memory and files. */
 static vsh_result open_all(vshi_lightmap_work *w, vsh_error *error) {
     const vsh_bake_job *job = w->job;
     const vsh_scene *scene = &job->scene;
@@ -304,25 +295,7 @@ static vsh_result open_all(vshi_lightmap_work *w, vsh_error *error) {
                                receiver->output, error));
         VSHI_TRY(vshi_part_open_kept(job, w->index, &w->input.bands, &w->channels, error));
     }
-    VSHI_TRY(
-        vshi_invalid_picture_open(&w->picture, job, (size_t)(w->target - job->targets.list), rows, error));
-    if (job->options.resume) {
-        const vshi_bands *bands = &w->input.bands;
-        vshi_resume_key key = {.image = &w->channels.image,
-                               .band_rows = rows,
-                               .part = is_part(w),
-                               .first = bands->first,
-                               .end = bands->end};
-        key.attributes = vsh_provenance_attributes(job->provenance, &key.attribute_count);
-        char *kept = vshi_job_kept_name(job, is_part(w) ? job->piece : w->index);
-        const vsh_result result =
-            kept != NULL
-                ? vshi_resume_open(kept, &key, job->report.error_count, w->run, &w->resume, error)
-                : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", receiver->path);
-        free(kept);
-        VSHI_TRY(result);
-    }
-    return VSH_OK;
+    return vshi_invalid_picture_open(&w->picture, job, (size_t)(w->target - job->targets.list), rows, error);
 }
 
 static vsh_result end_sink(vshi_lightmap_work *w, vsh_result result, vsh_error *error) {
@@ -343,7 +316,6 @@ static void add_to_report(const vshi_lightmap_work *w) {
     vsh_bake_report *report = &w->job->report;
     report->texels += w->baked.texels;
     report->invalid_texels += w->baked.invalid_texels;
-    report->resumed_rows += w->lightmap->resumed_rows;
     report->bands += (uint64_t)w->input.bands.count;
     vshi_add_shade(&report->shade, &w->baked.shade);
     for (size_t i = 0; i < report->error_count; ++i) {
@@ -396,7 +368,6 @@ vsh_result vshi_lightmap_write_whole(vshi_lightmap_work *w, vsh_error *error) {
 vsh_result vshi_lightmap_end(vshi_lightmap_work *w, vsh_result result, vsh_error *error) {
     result = end_sink(w, result, error);
     result = vshi_invalid_picture_close(&w->picture, result, error);
-    w->lightmap->kept_rows = vshi_resume_close(&w->resume);
     w->lightmap->invalid_texels = w->baked.invalid_texels;
     if (result == VSH_OK) {
         add_to_report(w);

@@ -9,7 +9,6 @@
 #include "bake_scene/lit_sink.h"
 #include "bake_scene/merge.h"
 #include "bake_scene/part_job.h"
-#include "bake_scene/resume.h"
 #include "base/rounds.h"
 
 typedef struct vshi_lightmap_work {
@@ -30,7 +29,6 @@ typedef struct vshi_lightmap_work {
     uint64_t held; /* bytes of others that are kept meanwhile */
     bool begun;    /* the sink has taken rows */
     vshi_invalid_picture picture;
-    vshi_resume resume;
 } vshi_lightmap_work;
 
 /* What the library made of arrays names no file: adds it. */

@@ -2,7 +2,6 @@
 
 #include "bake/part.h"
 #include "bake_scene/merge.h"
-#include "bake_scene/resume.h"
 #include "bake_scene/shares.h"
 #include "base/memory.h"
 #include "base/try.h"
@@ -182,37 +181,7 @@ vsh_result vshi_job_bake_part(vsh_bake_job *job, const vsh_run *run, vsh_error *
         vshi_part_writer_abandon(part);
     }
     tell_writing(job, NULL);
-    for (size_t i = 0; i < count && result == VSH_OK && job->options.resume; ++i) {
-        result = vshi_job_forget(job, i, error);
-    }
 done:
     free(pieces);
     return result;
-}
-
-/* --- what is kept for the next bake */
-
-char *vshi_job_kept_name(const vsh_bake_job *job, size_t index) {
-    const bool part = job->options.shard != 0;
-    const vsh_job_lightmap *lightmap = part ? NULL : &job->lightmaps[index];
-    if (!part && (lightmap->page == 0 || !vsh_lit_is_output(lightmap->output))) {
-        return strdup(lightmap->output);
-    }
-    const char *file = part ? job->part_path : lightmap->output; /* an asset has all of its pages */
-    const size_t size = strlen(file) + 24;
-    char *name = malloc(size);
-    if (name != NULL) {
-        snprintf(name, size, "%s.%zu", file, part ? index : lightmap->page);
-    }
-    return name;
-}
-
-vsh_result vshi_job_forget(const vsh_bake_job *job, size_t index, vsh_error *error) {
-    char *name = vshi_job_kept_name(job, index);
-    if (name == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "lightmaps: the system refused memory");
-    }
-    vshi_resume_remove(name);
-    free(name);
-    return VSH_OK;
 }

@@ -28,12 +28,4 @@ vsh_result vshi_part_open_kept(const vsh_bake_job *job, size_t index, const vshi
 void vshi_part_set_kept(const vsh_bake_job *job, size_t index, const vshi_bands *bands, int32_t first,
                         int32_t rows, vshi_channels *channels);
 
-/* What bands of target (of a part: piece) `index` are kept beside (bake_scene/resume.h), to be freed: its
- * output, with the page's number for further pages of an asset, or the part with the piece's. NULL where
- * memory is short. */
-char *vshi_job_kept_name(const vsh_bake_job *job, size_t index);
-
-/* Takes them away. */
-vsh_result vshi_job_forget(const vsh_bake_job *job, size_t index, vsh_error *error);
-
 #endif

@@ -172,7 +172,7 @@ vsh_result vshi_count_together(vsh_bake_job *job, size_t first, const vsh_run *r
     bool fit = false;
     vsh_result result;
     *count = 1;
-    if (most == 1 || job->options.resume || first < job->apart) {
+    if (most == 1 || first < job->apart) {
         return VSH_OK;
     }
     VSHI_TRY_DONE(vshi_allocate((void **)&held, most, sizeof *held, "seams", error));

@@ -53,7 +53,6 @@ static void add_report(vsh_bake_report *sum, const vsh_bake_report *more, vsh_ba
     sum->write_s += more->write_s;
     sum->texels += more->texels;
     sum->invalid_texels += more->invalid_texels;
-    sum->resumed_rows += more->resumed_rows;
     sum->bands += more->bands;
     vshi_add_shade(&sum->shade, &more->shade);
     add_occluders(&sum->occluders, &more->occluders);

@@ -271,9 +271,9 @@ void cli_parsed_add(const char *option, const char *value) {
 
 static void append_option(const cli_option *option, const char *value) {
     static const char *const changes_nothing[] = {
-        "output",   "output-folder", "stats", "threads", "memory-limit", "isa",   "trusted",
-        "confined", "allow-outside", "quiet", "verbose", "progress",     "json",  "band-rows",
-        "dry-run",  "resume",        "help",  "view",    "field",        "shard", "shard-least"};
+        "output",   "output-folder", "stats", "threads", "memory-limit", "isa",        "trusted",
+        "confined", "allow-outside", "quiet", "verbose", "progress",     "json",       "band-rows",
+        "dry-run",  "help",          "view",  "field",   "shard",        "shard-least"};
     for (size_t i = 0; i < sizeof changes_nothing / sizeof changes_nothing[0]; ++i) {
         if (strcmp(option->name, changes_nothing[i]) == 0) {
             return;

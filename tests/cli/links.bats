@@ -109,30 +109,3 @@ JSON
     [ "$status" -eq 3 ] && [[ $stderr == *"theirs/golden/box.exr: cannot be written: a link leads"* ]] || fail "file"
     cmp mine.exr elsewhere/mine.exr
 }
-
-@test "--resume follows no link, waits for no pipe and takes nobody's file" {
-    local bake=(bake theirs/scene.json -o out.exr --resume)
-    old_output out.exr
-    ln -s elsewhere/mine.exr out.exr.resume
-    shade "${bake[@]}"
-    told 3 "out.exr.resume: cannot be written: it is a link"
-    kept
-    ln -sf elsewhere/new out.exr.resume
-    shade "${bake[@]}"
-    told 3 "out.exr.resume: cannot be written: it is a link"
-    kept
-    rm out.exr.resume
-    mkfifo out.exr.resume
-    run --separate-stderr timeout 20 "$VDBSHADE" "${bake[@]}"
-    told 3 "out.exr.resume: cannot be written: it is no regular file"
-    rm out.exr.resume
-    printf 'my notes on how to go on' >out.exr.resume
-    shade "${bake[@]}"
-    told 3 "out.exr.resume: is no file of --resume, and stays as it is"
-    [ "$(cat out.exr.resume)" = 'my notes on how to go on' ] || fail "overwritten"
-    untouched out.exr
-    printf 'vdbshade res' >out.exr.resume # cut off by a kill
-    shade "${bake[@]}" --quiet
-    done_well
-    [ ! -e out.exr.resume ] || fail "left"
-}

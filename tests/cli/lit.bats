@@ -66,16 +66,12 @@ BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
     [ "$(json_of lit.glb | grep -o '"occlusionTexture"' | wc -l)" -eq 1 ] || fail "$(json_of lit.glb)"
 }
 
-@test "in bands, resumed and by any number of threads it is the same file" {
+@test "in bands and by any number of threads it is the same file" {
     shade bake "$MODELS/scene.glb" "${BAKE[@]}" -o whole.glb
     done_well
     shade bake "$MODELS/scene.glb" "${BAKE[@]}" -o bands.glb --band-rows 8 --threads 1
     done_well
     cmp whole.glb bands.glb
-    shade bake "$MODELS/scene.glb" "${BAKE[@]}" -o resumed.glb --band-rows 8 --resume
-    done_well
-    cmp whole.glb resumed.glb
-    [ ! -e resumed.glb.resume ] || fail "rows are left"
 }
 
 @test "options that are for assets alone, and that assets do not have, are refused" {

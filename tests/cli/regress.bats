@@ -205,7 +205,7 @@ asking() {
     local one
     mkdir elsewhere
     for one in --trusted "--stats $PWD/elsewhere/a" "--stats=$PWD/elsewhere/a" "-o $PWD/elsewhere/a.exr" "-o$PWD/elsewhere/a.exr" \
-        "--output $PWD/elsewhere/a.exr" "--output-folder $PWD/elsewhere" "--invalid $PWD/elsewhere/a.png" --resume --dry-run \
+        "--output $PWD/elsewhere/a.exr" "--output-folder $PWD/elsewhere" "--invalid $PWD/elsewhere/a.png" --dry-run \
         "--threads 1" "--memory-limit 0" "--trust" "--per-object" "-- x" "box.json" "--size 8 --trusted" "--size=8 --stats elsewhere/a"; do
         # shellcheck disable=SC2086 # words
         asking $one

@@ -69,12 +69,10 @@ load helper
     untouched out.exr
 }
 
-@test "the picture is a PNG, and does not go on where another bake ended" {
+@test "the picture is a PNG" {
     write_box box.obj
     shade bake box.obj "${SMALL[@]}" -o out.exr --invalid where.jpg
     refused 2 --invalid where.jpg .png
-    shade bake box.obj "${SMALL[@]}" -o out.exr --invalid where.png --resume
-    refused 2 --invalid --resume
 }
 
 @test "pictures of outputs of one name in several folders have names of their own" {

@@ -144,65 +144,6 @@ static void what_a_sink_refuses_ends_the_bake_as_it_says(void **state) {
     free(t.values);
 }
 
-/* Cancels in the stage "bake" of bands, once that is so far. */
-static int32_t stop_late(void *user, const char *stage, double fraction) {
-    (void)user;
-    return strcmp(stage, "bake") == 0 && fraction > 0.5;
-}
-
-typedef struct told {
-    int done, kept, resumed;
-    vsh_result result;
-} told;
-
-static void take_done(void *user, const vsh_job_lightmap *lightmap, vsh_result result) {
-    told *t = user;
-    ++t->done;
-    t->kept = lightmap->kept_rows;
-    t->resumed = (int)lightmap->resumed_rows;
-    t->result = result;
-}
-
-static void what_was_kept_is_not_baked_again(void **state) {
-    (void)state;
-    case_scene c;
-    fill(&c, SIZE, 1.0);
-    vsh_error error;
-    told t = {0};
-    vsh_run run = vsh_run_default();
-    run.progress = stop_late;
-    vsh_bake_job_options options = vsh_bake_job_options_default();
-    options.band_rows = 8;
-    options.resume = 1;
-    options.done = take_done;
-    options.user = &t;
-    unlink(c.output);
-    assert_int_equal(vsh_bake_scene(&c.scene, &options, &run, NULL, &error), VSH_ERROR_CANCELLED);
-    assert_int_equal(t.done, 1);
-    assert_int_equal(t.result, VSH_ERROR_CANCELLED);
-    assert_true(t.kept >= 8 && t.kept < SIZE);
-    assert_int_not_equal(access(c.output, F_OK), 0);
-    const int kept = t.kept;
-    assert_ok(vsh_bake_scene(&c.scene, &options, NULL, NULL, &error), &error);
-    assert_int_equal(t.resumed, kept);
-    assert_int_equal(access(c.output, F_OK), 0);
-    char path[400];
-    snprintf(path, sizeof path, "%s.resume", c.output);
-    assert_int_not_equal(access(path, F_OK), 0);
-    vsh_image_file *file;
-    assert_ok(vsh_image_read(c.output, NULL, &file, &error), &error);
-    taken whole = {.fail_at = 0};
-    assert_ok(bake_into(&c, 0, &whole, &error), &error);
-    const vsh_image image = vsh_image_view(file);
-    for (int32_t k = 0; k < image.channel_count; ++k) {
-        if (strcmp(image.names[k], "ao") == 0) {
-            assert_memory_equal(image.planes[k], whole.values + SIZE * SIZE, SIZE * SIZE * sizeof(float));
-        }
-    }
-    vsh_image_free(file);
-    free(whole.values);
-}
-
 static void steps_come_in_their_order(void **state) {
     (void)state;
     case_scene c;
@@ -308,10 +249,6 @@ static void what_cannot_be_is_refused_before_a_file_is_read(void **state) {
     vsh_row_sink sink = sink_of(&t);
     vsh_bake_job_options options = vsh_bake_job_options_default();
     options.sink = &sink;
-    options.resume = 1;
-    assert_int_equal(vsh_bake_job_create(&c.scene, &options, NULL, &job, &error), VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "resume"));
-    options.resume = 0;
     sink.end = NULL;
     assert_int_equal(vsh_bake_job_create(&c.scene, &options, NULL, &job, &error), VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "vsh_row_sink"));
@@ -354,7 +291,6 @@ int main(void) {
         cmocka_unit_test(one_call_writes_the_file_that_a_sink_is_handed),
         cmocka_unit_test(rows_of_bands_are_the_rows_of_the_whole),
         cmocka_unit_test(what_a_sink_refuses_ends_the_bake_as_it_says),
-        cmocka_unit_test(what_was_kept_is_not_baked_again),
         cmocka_unit_test(steps_come_in_their_order),
         cmocka_unit_test(reports_of_jobs_add_up),
         cmocka_unit_test(what_cannot_be_is_refused_before_a_file_is_read),

@@ -36,9 +36,6 @@ static int check_image(const cli_bake_settings *settings, const vsh_scene *scene
 
 static int check_picture(const cli_bake_settings *settings) {
     const char *path = settings->invalid_picture;
-    if (path != NULL && settings->resume) {
-        return cli_usage("--invalid '%s': not together with --resume", path);
-    }
     if (path != NULL && !cli_has_ending(path, "png")) {
         return cli_usage("--invalid '%s': expected a name that ends in .png", path);
     }
@@ -156,26 +153,15 @@ static bool is_each_told(const telling *t) {
 
 static void say_lightmap(void *user, const vsh_job_lightmap *lightmap, vsh_result result) {
     const telling *t = user;
-    if (result != VSH_OK && lightmap->kept_rows > 0) {
-        char page[32] = "";
-        if (lightmap->page > 0 && vsh_lit_is_output(lightmap->output)) {
-            snprintf(page, sizeof page, ".%zu", lightmap->page);
-        }
-        cli_say("%s: %d of %d rows are kept in %s%s.resume; the same command goes on from there",
-                lightmap->output, lightmap->kept_rows, lightmap->height, lightmap->output, page);
-    }
     if (result != VSH_OK || t->common->quiet || t->part || !is_each_told(t)) {
         return;
     }
-    char banded[64] = "", taken[64] = "";
+    char banded[64] = "";
     if (lightmap->bands > 1) {
         snprintf(banded, sizeof banded, ", in %d bands of %d rows", lightmap->bands, lightmap->band_rows);
     }
-    if (lightmap->resumed_rows > 0) {
-        snprintf(taken, sizeof taken, ", %" PRIu64 " rows of them from before", lightmap->resumed_rows);
-    }
-    cli_say("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid%s%s", lightmap->output,
-            lightmap->width, lightmap->height, lightmap->covered, lightmap->invalid_texels, banded, taken);
+    cli_say("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid%s", lightmap->output,
+            lightmap->width, lightmap->height, lightmap->covered, lightmap->invalid_texels, banded);
 }
 
 /* A name to go before ".I-of-N.part", to be freed. */
@@ -213,7 +199,6 @@ cli_stats cli_bake_stats(const vsh_scene *scene, const vsh_bake_report *report, 
     cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS, threads);
     stats.texels = report->texels;
     stats.invalid_texels = report->invalid_texels;
-    stats.resumed_rows = report->resumed_rows;
     stats.bands = report->bands;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         const int32_t spacing = scene->receivers[i].supersample == 1 ? scene->receivers[i].ao_spacing : 1;
@@ -290,7 +275,6 @@ int cli_bake_one(const cli_bake_settings *settings, const vsh_scene *scene, cli_
     vsh_bake_job_options options = vsh_bake_job_options_default();
     options.per_object = settings->per_object;
     options.band_rows = settings->band_rows;
-    options.resume = settings->resume;
     options.invalid_picture = settings->invalid_picture;
     options.lit_preview = settings->preview;
     options.lit_image_place = settings->embed           ? VSH_LIT_IMAGES_EMBED

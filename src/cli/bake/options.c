@@ -10,7 +10,6 @@ enum {
     KEY_BAND_ROWS = 0x2000,
     KEY_STATS,
     KEY_DRY_RUN,
-    KEY_RESUME,
     KEY_OUTPUT_FOLDER,
     KEY_RECEIVE,
     KEY_NO_RECEIVE,
@@ -52,9 +51,6 @@ static const cli_option options[] = {
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
     {KEY_DRY_RUN, "dry-run", NULL,
      "bake nothing: print texels, voxels, memory and\nexpected time, found by a small bake"},
-    {KEY_RESUME, "resume", NULL,
-     "keep finished rows in OUT.resume until all are there,\nand go on from them where a bake with this "
-     "option was\nended; the result is the same, bit by bit"},
     CLI_SHARD_OPTION(
         "bake part I of N, with as much work as the others, into\nOUT.I-of-N.part: on any machine, in any "
         "order, again where\nit failed; 'vdbshade merge OUT' puts all parts together to\nthe bits of "
@@ -230,9 +226,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case KEY_DRY_RUN:
         s->dry_run = true;
-        return CLI_OK;
-    case KEY_RESUME:
-        s->resume = true;
         return CLI_OK;
     case CLI_KEY_SHARD:
         return cli_parse_shard(name, value, &s->shard, &s->shard_count);

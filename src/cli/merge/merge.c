@@ -92,7 +92,7 @@ static int merge_bake(const merge_settings *s, int argc, char **argv) {
     bake.invalid_picture = s->invalid_picture;
     bake.exr = s->exr;
     bake.view = s->view;
-    bake.dry_run = bake.resume = false;
+    bake.dry_run = false;
     bake.words = NULL;
     bake.word_count = 0;
     code = cli_bake_by(&bake);
