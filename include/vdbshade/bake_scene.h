@@ -182,19 +182,6 @@ static inline void vsh_bake_job_get_report(const vsh_bake_job *job, vsh_bake_rep
     vsh_bake_job_get_report_sized(job, report, sizeof *report);
 }
 
-/* Adds to `sum`, which is all zeros at first, what another job of as many lights did, for those who bake a
- * scene by several, one after the other: tiles. Counts, seconds and square errors add up and of worst errors
- * there is the worst; of `occluders` bytes, voxels and bricks are those of the job that had most of each, as
- * none outlives its job, its seconds add up, and all else is that of `more`. Errors are added to
- * errors[more->error_count] of the caller's, zeros at first, which become those of `sum`; NULL: they are left
- * out. Errors of the call: VSH_ERROR_ARGUMENT (sum or more NULL; both have errors, of different counts). */
-VSH_API vsh_result vsh_bake_report_add_sized(vsh_bake_report *sum, const vsh_bake_report *more,
-                                             size_t report_size, vsh_bake_error *errors, vsh_error *error);
-static inline vsh_result vsh_bake_report_add(vsh_bake_report *sum, const vsh_bake_report *more,
-                                             vsh_bake_error *errors, vsh_error *error) {
-    return vsh_bake_report_add_sized(sum, more, sizeof *sum, errors, error);
-}
-
 /* All of it: vsh_bake_job_create(), …_measure(), …_prepare() and …_run(). `report` (may be NULL) is filled on
  * success, without `errors`. Errors: as these. */
 VSH_API vsh_result vsh_bake_scene_sized(const vsh_scene *scene, const vsh_bake_job_options *options,

@@ -117,14 +117,6 @@ VSH_API vsh_result vsh_grid_from_distances(const vsh_distance *field, vsh_distan
 VSH_API vsh_result vsh_grid_read(const char *path, const char *name, const vsh_run *run, vsh_grid **grid,
                                  vsh_error *error);
 
-/* The same of what lies within a box of the grid's world space (box_min < box_max, finite), of a file that
- * need not fit into memory: leaves of 8³ voxels that reach into it, and the nearest where none does. Solids
- * are cut open where the box ends, which nothing near it may look at. A streamed file is read whole before.
- * Errors: as there; VSH_ERROR_ARGUMENT (a pointer NULL, a box that is none). */
-VSH_API vsh_result vsh_grid_read_box(const char *path, const char *name, const double box_min[3],
-                                     const double box_max[3], const vsh_run *run, vsh_grid **grid,
-                                     vsh_error *error);
-
 /* Writes one .vdb file with the grid as `name` (NULL: "surface") and attributes [attribute_count] as its
  * metadata (may be NULL where that is 0); the same grid gives the same bytes. Atomic: written beside `path`
  * and renamed, so a failure leaves an old file alone. Errors: VSH_ERROR_ARGUMENT (path NULL or empty,

@@ -202,7 +202,6 @@ typedef struct vsh_scene {
     size_t light_file_count;
     const vsh_field_file *field; /* the casters' fields, which are then not made (vsh_scene_use_field());
                                     NULL: none are there */
-    const struct vsh_tile *tile; /* what of the casters is left (vsh_tile_scene()); NULL: all */
 } vsh_scene;
 
 /* Reads a scene file; of what it names, files of lights alone are opened. The scene and all it points to

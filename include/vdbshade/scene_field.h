@@ -83,7 +83,7 @@ static inline vsh_result vsh_scene_field_forecast(const vsh_scene *scene, const 
  * voxels. Where the scene names no voxels and that of the file did, it takes those. `file` NULL: they are
  * made again. Values are those that are baked without, bit by bit: whether the fields are those of the
  * scene's casters is looked at by vsh_scene_occluders(). Not safe against other threads that use the scene.
- * Errors: VSH_ERROR_ARGUMENT (scene NULL, or a tile), VSH_ERROR_READ (a file that names voxels out of range).
+ * Errors: VSH_ERROR_ARGUMENT (scene NULL), VSH_ERROR_READ (a file that names voxels out of range).
  */
 VSH_API vsh_result vsh_scene_use_field(vsh_scene *scene, const vsh_field_file *file, vsh_error *error);
 

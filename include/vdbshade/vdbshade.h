@@ -64,7 +64,6 @@
 #include "shade.h"
 #include "solidity.h"
 #include "spheres.h"
-#include "tiles.h"
 #include "trace.h"
 #include "unwrap.h"
 #include "view.h"

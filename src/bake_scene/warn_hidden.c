@@ -113,8 +113,8 @@ static void look_at(const vsh_bake_job *job, const vsh_mesh *own, size_t parts, 
 }
 
 void vshi_warn_hidden_lights(const vsh_bake_job *job, const vsh_run *run) {
-    if (run->warning == NULL || job->scene.tile != NULL) {
-        return; /* lights may reach other tiles */
+    if (run->warning == NULL) {
+        return;
     }
     for (size_t i = 0; i < job->scene.caster_count; ++i) {
         const vsh_caster *caster = &job->scene.casters[i];

@@ -13,7 +13,6 @@ int32_t vsh_reader_serve(int argc, char **argv) {
         [VSHI_READ_VOXELS] = vshi_serve_voxels, [VSHI_READ_MODEL] = vshi_serve_model,
         [VSHI_READ_IMAGE] = vshi_serve_image,   [VSHI_READ_TEXT] = vshi_serve_text,
         [VSHI_READ_COPY] = vshi_serve_copy,     [VSHI_READ_DRACO] = vshi_serve_draco,
-        [VSHI_READ_BOX] = vshi_serve_box,
     };
     return vshi_serve(servers, argc, argv);
 }

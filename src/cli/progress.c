@@ -24,10 +24,7 @@ static struct {
     bool terminal;
     bool standing; /* a line without its newline is on the terminal */
     cli_estimate estimate;
-    const char *what; /* of rounds; NULL: there is one */
-    size_t done, count;
-    double first_round; /* when it began */
-    double last;        /* when something was written */
+    double last; /* when something was written */
 } state = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
 void cli_progress_begin(bool wanted, bool quiet) {
@@ -42,15 +39,6 @@ void cli_progress_expect(const char *stage, int kind, double seconds) {
     pthread_mutex_unlock(&state.lock);
 }
 
-void cli_progress_round(const char *what, size_t done, size_t count) {
-    pthread_mutex_lock(&state.lock);
-    state.first_round = state.what == NULL ? vshi_seconds() : state.first_round;
-    state.what = what;
-    state.done = done;
-    state.count = count;
-    pthread_mutex_unlock(&state.lock);
-}
-
 static void clear_line(void) {
     if (state.standing) {
         fputs("\r\033[K", stderr);
@@ -62,10 +50,6 @@ static void clear_line(void) {
  * known yet. */
 static double left_at(double now) {
     const cli_estimate *e = &state.estimate;
-    if (state.what != NULL) {
-        const double left = (double)(state.count - state.done);
-        return state.done > 0 ? (now - state.first_round) * left / (double)state.done : -1.0;
-    }
     const double left = cli_estimate_left(e, now), elapsed = now - (left >= 0.0 ? e->first : e->began);
     if (elapsed < estimate_seconds ||
         (left < 0.0 && !(e->fraction >= estimate_fraction && e->fraction < 1.0))) {
@@ -84,10 +68,7 @@ static void show(double now) {
         snprintf(rest, sizeof rest, ", about %.0f s left", left);
     }
     clear_line();
-    if (state.what != NULL) {
-        fprintf(stderr, "vdbshade: %s %zu of %zu: %s%s", state.what, state.done + 1, state.count, e->name,
-                rest);
-    } else if (e->count > 0) {
+    if (e->count > 0) {
         fprintf(stderr, "vdbshade: %s (%.0f %% of all)%s", e->name, percent, rest);
     } else {
         fprintf(stderr, "vdbshade: %s %.0f %%%s", e->name, percent, rest);
@@ -109,7 +90,7 @@ int32_t cli_progress_report(void *user, const char *stage, double fraction) {
         const bool fresh = strncmp(state.estimate.name, stage, sizeof state.estimate.name - 1) != 0;
         cli_estimate_report(&state.estimate, stage, fraction, now);
         if (now - state.last >= (state.terminal ? terminal_interval : log_interval) ||
-            (fresh && !state.terminal && state.what == NULL)) {
+            (fresh && !state.terminal)) {
             show(now);
         }
         pthread_mutex_unlock(&state.lock);

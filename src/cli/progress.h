@@ -3,7 +3,6 @@
 #define CLI_PROGRESS_H
 
 #include <stdbool.h>
-#include <stddef.h>
 #include <vdbshade/base.h>
 
 /* Decides whether progress is shown: `wanted` shows it anywhere, else it is shown on a terminal only. `quiet`
@@ -13,10 +12,6 @@ void cli_progress_begin(bool wanted, bool quiet);
 /* A stage that the command is to come to, and what it takes, about: CLI_ESTIMATE_… (estimate.h), seconds.
  * What is told is then of the whole command. */
 void cli_progress_expect(const char *stage, int kind, double seconds);
-
-/* From here on what is told is of one of `count` bakes alike, `done` of which are over; `what` is static:
- * "tile". Their stages are not expected. */
-void cli_progress_round(const char *what, size_t done, size_t count);
 
 /* For vsh_run: show, and stop where the user interrupted. */
 int32_t cli_progress_report(void *user, const char *stage, double fraction);

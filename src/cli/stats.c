@@ -267,7 +267,6 @@ static int write_file(const cli_stats *stats, const vsh_run *run, const char *pa
         json_object_set_new(root, counts[i].name, json_integer((json_int_t)counts[i].value));
     }
     if (stats->of == CLI_STATS_TEXELS) {
-        json_object_set_new(root, "world_tiles", json_integer((json_int_t)stats->world_tiles));
         json_object_set_new(root, "ao_spacing",
                             stats->ao_spacing > 0 ? json_integer(stats->ao_spacing) : json_null());
     }

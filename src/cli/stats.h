@@ -32,7 +32,6 @@ typedef struct cli_stats {
     uint64_t points, bad_rows;
     uint64_t voxels, inside_voxels, tiles;
     int32_t ao_spacing;    /* of lightmaps, the least that was asked for; 0: there is none */
-    uint64_t world_tiles;  /* that the scene was cut into; 0: none */
     uint64_t bands;        /* that lightmaps were baked in: one each where they were baked whole */
     vsh_shade_stats shade;
     const vsh_bake_error

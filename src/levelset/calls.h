@@ -6,7 +6,6 @@
 #include "extern/module_calls.h"
 #include "levelset/leaves.h"
 #include "levelset/serve.h"
-#include "levelset/told.h"
 #include "levelset/volume.h"
 
 #include <vdbshade/grid.h>
@@ -40,13 +39,6 @@ extern "C" {
     MAKE(vsh_grid_read,                                                                                      \
          (const char *path, const char *name, const vsh_run *run, vsh_grid **grid, vsh_error *error),        \
          (path, name, run, grid, error), grid)                                                               \
-    MAKE(vsh_grid_read_box,                                                                                  \
-         (const char *path, const char *name, const double box_min[3], const double box_max[3],              \
-          const vsh_run *run, vsh_grid **grid, vsh_error *error),                                            \
-         (path, name, box_min, box_max, run, grid, error), grid)                                             \
-    MAKE(vshi_vdb_box,                                                                                       \
-         (const char *path, const char *name, const vsh_run *run, double box[6], vsh_error *error),          \
-         (path, name, run, box, error), nothing)                                                             \
     MAKE(vsh_vdb_list_sized,                                                                                 \
          (const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t size, size_t capacity,        \
           size_t *count, vsh_error *error),                                                                  \
@@ -72,10 +64,6 @@ extern "C" {
           vsh_voxels **voxels, vsh_error *error),                                                            \
          (map, blocks, count, what, run, voxels, error), voxels)                                             \
     MAKE(vshi_serve_grid,                                                                                    \
-         (const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,                \
-          vsh_error *error),                                                                                 \
-         (path, request, run, payload, error), nothing)                                                      \
-    MAKE(vshi_serve_box,                                                                                     \
          (const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,                \
           vsh_error *error),                                                                                 \
          (path, request, run, payload, error), nothing)                                                      \

@@ -215,55 +215,17 @@ Choice choose_level_set(GridReader &reader, const char *path, const char *name, 
     return choice;
 }
 
-// A part of a grid. Where there is nothing in the box there is something in a larger one.
-GridBase::Ptr read_box(GridReader &reader, size_t chosen, const BBoxd &box, const LevelSet &of, Stage &stage,
-                       vsh_error *error) {
-    const Named &named = of.named;
-    BBoxd around = box;
-    for (;;) {
-        stage.check();
-        const GridBase::Ptr found = reader.grid_within(chosen, around, named.path, error);
-        const bool all = around.volume() > 1e60 || !std::isfinite(around.volume());
-        if (has_leaves(*found) || all) {
-            refuse_large(named, stage.options, double(found->memUsage()), error);
-            return found;
-        }
-        around.expand(std::max(around.extents().x(), std::max(around.extents().y(), around.extents().z())));
-    }
-}
-
 } // namespace
 
-BBoxd told_level_set_box(const char *path, const char *name, const vsh_run &run, vsh_error *error) {
-    initialize();
-    try {
-        GridReader reader(path, run, error);
-        const size_t chosen = choose_level_set(reader, path, name, error).grid;
-        const GridBase::Ptr grid = reader.without_tree(chosen);
-        const openvdb::CoordBBox box = told_box(*grid);
-        const Vec3d half(0.5);
-        if (reader.is_streamed() || box.empty()) {
-            return BBoxd();
-        }
-        return grid->transform().indexToWorld(BBoxd(box.min().asVec3d() - half, box.max().asVec3d() + half));
-    } catch (const std::ios_base::failure &) {
-        throw Failure{fail_cut_short(path, error)};
-    }
-}
-
-LevelSet load_level_set(const char *path, const char *name, const BBoxd *box, Stage &stage,
-                        vsh_error *error) {
+LevelSet load_level_set(const char *path, const char *name, Stage &stage, vsh_error *error) {
     initialize();
     try {
         GridReader reader(path, stage.options, error);
         const Choice choice = choose_level_set(reader, path, name, error);
         const size_t chosen = choice.grid;
         LevelSet loaded{{path, reader.name(chosen)}, nullptr, 0.0};
-        if (box == nullptr) {
-            refuse_large(loaded.named, stage.options, reader.bytes(chosen), error);
-        }
-        const GridBase::Ptr found = box != nullptr ? read_box(reader, chosen, *box, loaded, stage, error)
-                                                   : reader.grid(chosen, path, error);
+        refuse_large(loaded.named, stage.options, reader.bytes(chosen), error);
+        const GridBase::Ptr found = reader.grid(chosen, path, error);
         refuse_bad(loaded.named, examine_kind(*found), error);
         loaded.grid = to_floats(found);
         loaded.shell = shell_of(*found);

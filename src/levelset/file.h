@@ -31,16 +31,12 @@ using NumberGrids = openvdb::NumericGridTypes::Append<openvdb::BoolGrid, openvdb
 openvdb::GridBase::Ptr read_numbers(const char *path, const char *name, const vsh_run &run, vsh_error *error);
 
 // Level set `name` (nullptr: the first of that class) of a .vdb file, of a sound kind, within the run's
-// memory limit; of `box` (nullptr: all of it) the leaves that reach into it. Throws Failure.
-LevelSet load_level_set(const char *path, const char *name, const BBoxd *box, Stage &stage, vsh_error *error);
+// memory limit. Throws Failure.
+LevelSet load_level_set(const char *path, const char *name, Stage &stage, vsh_error *error);
 
-// The world box of that level set, as the file tells of it, whose values are not read; empty where it does
-// not. Throws Failure.
-BBoxd told_level_set_box(const char *path, const char *name, const vsh_run &run, vsh_error *error);
-
-// A handle of a level set from outside (`cut`: of a part of one): its values are looked at, and its distances
-// made anew where they are none. Throws Failure.
-vsh_grid *close_level_set(LevelSet &set, bool cut, Stage &stage, vsh_error *error);
+// Makes a handle of a level set from outside: checks its values, and measures its distances anew where they
+// are none. Throws Failure.
+vsh_grid *close_level_set(LevelSet &set, Stage &stage, vsh_error *error);
 
 // What our metadata say of it, world units; 0: nothing.
 double shell_of(const openvdb::GridBase &grid);

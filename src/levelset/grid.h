@@ -27,7 +27,6 @@ struct vsh_grid {
 
 namespace vshi {
 
-using openvdb::BBoxd;
 using openvdb::Coord;
 using openvdb::FloatGrid;
 using openvdb::FloatTree;

@@ -61,17 +61,6 @@ std::string shown_name(const GridDescriptor &entry) {
     return GridDescriptor::nameAsString(entry.uniqueName());
 }
 
-// Whole leaves, so that no voxel of one is cut.
-openvdb::CoordBBox leaves_around(const BBoxd &box, const openvdb::math::Transform &transform) {
-    const openvdb::math::Vec3d far(double(1 << 28));
-    const BBoxd index = transform.worldToIndex(box);
-    const Coord low =
-        Coord::floor(openvdb::math::maxComponent(openvdb::math::minComponent(index.min(), far), -far));
-    const Coord high =
-        Coord::floor(openvdb::math::maxComponent(openvdb::math::minComponent(index.max(), far), -far));
-    return {low & ~7, (high & ~7).offsetBy(7)};
-}
-
 } // namespace
 
 GridReader::GridReader(const char *path, const vsh_run &run, vsh_error *error)
@@ -164,19 +153,6 @@ GridBase::Ptr GridReader::sound(const GridBase::Ptr &read, size_t i, const char 
 
 GridBase::Ptr GridReader::grid(size_t i, const char *path, vsh_error *error) {
     return sound(streamed ? grids[i] : read_tree(i), i, path, error);
-}
-
-GridBase::Ptr GridReader::grid_within(size_t i, const BBoxd &box, const char *path, vsh_error *error) {
-    const openvdb::CoordBBox wanted = leaves_around(box, without_tree(i)->transform());
-    if (streamed || entries[i].isInstance()) {
-        const GridBase::Ptr result = grid(i, path, error);
-        result->clip(wanted);
-        return result;
-    }
-    const GridBase::Ptr result = grids[i]->copyGrid();
-    entries[i].seekToGrid(stream);
-    readGrid(result, entries[i], stream, wanted);
-    return sound(result, i, path, error);
 }
 
 GridBase::Ptr GridReader::read_tree(size_t i) {

@@ -31,7 +31,6 @@ class GridReader final : public openvdb::io::Archive {
     double bytes(size_t i);                        // in memory, by what the file says of it
     openvdb::GridBase::Ptr without_tree(size_t i); // metadata and transform
     openvdb::GridBase::Ptr grid(size_t i, const char *path, vsh_error *error);
-    openvdb::GridBase::Ptr grid_within(size_t i, const BBoxd &box, const char *path, vsh_error *error);
     bool is_streamed() const { return streamed; }
 
     const uint64_t size;

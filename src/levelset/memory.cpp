@@ -17,7 +17,7 @@ vsh_result adopt(const FloatGrid::ConstPtr &given, const vsh_run &run, vsh_grid 
     refuse_bad(named, examine_kind(*given), error);
     refuse_large(named, run, double(given->memUsage()), error);
     LevelSet set{named, given->deepCopy(), shell_of(*given)};
-    *grid = close_level_set(set, false, stage, error);
+    *grid = close_level_set(set, stage, error);
     return VSH_OK;
 }
 

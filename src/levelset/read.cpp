@@ -3,7 +3,6 @@
 #include "levelset/examine.h"
 #include "levelset/file.h"
 #include "levelset/message.h"
-#include "levelset/told.h"
 
 #include <cmath>
 #include <cstring>
@@ -27,12 +26,12 @@ FloatGrid::Ptr mend_named(const Named &named, const FloatGrid &grid, Stage &stag
 
 } // namespace
 
-vsh_grid *close_level_set(LevelSet &set, bool cut, Stage &stage, vsh_error *error) {
+vsh_grid *close_level_set(LevelSet &set, Stage &stage, vsh_error *error) {
     stage.check();
     refuse_large(set.named, stage.options, double(set.grid->memUsage()), error);
     const Finding finding = examine_values(*set.grid, stage);
     refuse_bad(set.named, finding, error);
-    if (finding.kind == Finding::NOTED && !cut) { // where it is cut values jump
+    if (finding.kind == Finding::NOTED) {
         vshi_warn(&stage.options, "%s: %s", set.named.text().c_str(), finding.text.c_str());
     }
     if (finding.kind == Finding::ODD) {
@@ -51,12 +50,6 @@ bool poll_stage(void *user, double fraction) {
     return stage.cancelled();
 }
 
-void put_box(vshi_encoder *payload, const BBoxd &box) {
-    const double corners[6] = {box.min().x(), box.min().y(), box.min().z(),
-                               box.max().x(), box.max().y(), box.max().z()};
-    vshi_encode_array(payload, corners, 6, sizeof(double));
-}
-
 // An answer that goes when it goes out of scope.
 class Answer {
   public:
@@ -65,15 +58,12 @@ class Answer {
     Answer(const Answer &) = delete;
     Answer &operator=(const Answer &) = delete;
 
-    vshi_decoder *ask(int32_t kind, const char *path, const char *name, uint64_t number, const BBoxd *box,
-                      Stage &stage, vsh_error *error) {
+    vshi_decoder *ask(int32_t kind, const char *path, const char *name, uint64_t number, Stage &stage,
+                      vsh_error *error) {
         const auto request = std::make_unique<vshi_exchange>();
         require(vshi_exchange_begin(request.get(), kind, path, &stage.options, error));
         vshi_encode_text(&request->encoder, name);
         vshi_encode_count(&request->encoder, number);
-        if (box != nullptr) {
-            put_box(&request->encoder, *box);
-        }
         require(vshi_exchange_send(request.get(), poll_stage, &stage, &answer, error));
         return &answer.payload;
     }
@@ -82,23 +72,21 @@ class Answer {
     vshi_answer answer{nullptr, 0, 0, {nullptr, nullptr, true}};
 };
 
-vsh_result read(const char *path, const char *name, const BBoxd *box, const vsh_run &run, vsh_grid **grid,
-                vsh_error *error) {
+vsh_result read(const char *path, const char *name, const vsh_run &run, vsh_grid **grid, vsh_error *error) {
     Stage stage(run, "load", error);
     stage.check();
     LevelSet set{{path, ""}, nullptr, 0.0};
     if (run.reader != nullptr) {
         Answer answer;
-        set = take_level_set(answer.ask(VSHI_READ_GRID, path, name, box != nullptr, box, stage, error), path,
-                             error);
+        set = take_level_set(answer.ask(VSHI_READ_GRID, path, name, 0, stage, error), path, error);
         set.grid->setGridClass(openvdb::GRID_LEVEL_SET); // which the reader saw
         refuse_bad(set.named, examine_kind(*set.grid), error);
         set.grid->clearGridClass(); // as one that was read here: its mesh is turned by it
     } else {
-        set = load_level_set(path, name, box, stage, error);
+        set = load_level_set(path, name, stage, error);
     }
     stage.reach(0.3);
-    *grid = close_level_set(set, box != nullptr, stage, error);
+    *grid = close_level_set(set, stage, error);
     return VSH_OK;
 }
 
@@ -136,33 +124,14 @@ void take_list(vshi_decoder *decoder, const char *path, std::vector<vsh_vdb_entr
     count = size_t(all);
 }
 
-vsh_result tell_box(const char *path, const char *name, const vsh_run &run, double corners[6],
-                    vsh_error *error) {
-    if (run.reader != nullptr) {
-        Stage stage(run, "load", error);
-        Answer answer;
-        vshi_decoder *decoder = answer.ask(VSHI_READ_BOX, path, name, 0, nullptr, stage, error);
-        const void *told = vshi_decode_array(decoder, 6, sizeof(double));
-        if (told == nullptr || !vshi_decoder_ends(decoder)) {
-            throw Failure{vshi_answer_fail(path, "a box", error)};
-        }
-        std::memcpy(corners, told, 6 * sizeof(double));
-    } else {
-        const BBoxd box = told_level_set_box(path, name, run, error);
-        std::memcpy(corners, box.min().asPointer(), 3 * sizeof(double));
-        std::memcpy(corners + 3, box.max().asPointer(), 3 * sizeof(double));
-    }
-    return VSH_OK;
-}
-
 vsh_result list(const char *path, const vsh_run &run, vsh_vdb_entry *entries, size_t entry_size,
                 size_t capacity, size_t *count, vsh_error *error) {
     std::vector<vsh_vdb_entry> found;
     if (run.reader != nullptr) {
         Stage stage(run, "load", error);
         Answer answer;
-        take_list(answer.ask(VSHI_READ_LIST, path, nullptr, capacity, nullptr, stage, error), path, found,
-                  capacity, *count, error);
+        take_list(answer.ask(VSHI_READ_LIST, path, nullptr, capacity, stage, error), path, found, capacity,
+                  *count, error);
     } else {
         list_grids(path, run, found, capacity, *count, error);
     }
@@ -177,26 +146,14 @@ vsh_result call(const vsh_run *run, const char *path, vsh_error *error, Body &&b
     return guard(error, VSH_ERROR_READ, path, [&] { return body(full); });
 }
 
-bool is_box(const BBoxd &box) {
-    return box.min().isFinite() && box.max().isFinite() && box.min().x() < box.max().x() &&
-           box.min().y() < box.max().y() && box.min().z() < box.max().z();
-}
-
 // What follows the path in every request of this file.
 struct Wanted {
     const char *name;
-    uint64_t number; // of lists: entries; else how many boxes follow, 0 or 1
-    BBoxd box;
+    uint64_t number; // of entries, for a list
 
-    Wanted(vshi_decoder *request, const char *path, bool boxed, vsh_error *error)
-        : name(vshi_decode_text(request, false)), number(vshi_decode_count(request, boxed ? 1 : UINT64_MAX)) {
-        const void *corners = boxed ? vshi_decode_array(request, 6 * number, sizeof(double)) : nullptr;
-        double value[6] = {0.0, 0.0, 0.0, 1.0, 1.0, 1.0};
-        if (corners != nullptr) {
-            std::memcpy(value, corners, sizeof value);
-        }
-        box = BBoxd(Vec3d(value[0], value[1], value[2]), Vec3d(value[3], value[4], value[5]));
-        if (!vshi_decoder_ends(request) || !is_box(box)) {
+    Wanted(vshi_decoder *request, const char *path, vsh_error *error)
+        : name(vshi_decode_text(request, false)), number(vshi_decode_count(request, UINT64_MAX)) {
+        if (!vshi_decoder_ends(request)) {
             throw Failure{
                 vshi_fail(error, VSH_ERROR_INTERNAL, "%s: the request to its reader does not hold", path)};
         }
@@ -210,19 +167,9 @@ struct Wanted {
 vsh_result vshi_serve_grid(const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,
                            vsh_error *error) {
     return vshi::guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
-        const vshi::Wanted wanted(request, path, true, error);
+        const vshi::Wanted wanted(request, path, error);
         vshi::Stage stage(*run, "load", error);
-        const vshi::BBoxd *box = wanted.number > 0 ? &wanted.box : nullptr;
-        vshi::put_level_set(payload, vshi::load_level_set(path, wanted.name, box, stage, error));
-        return VSH_OK;
-    });
-}
-
-vsh_result vshi_serve_box(const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,
-                          vsh_error *error) {
-    return vshi::guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
-        const vshi::Wanted wanted(request, path, false, error);
-        vshi::put_box(payload, vshi::told_level_set_box(path, wanted.name, *run, error));
+        vshi::put_level_set(payload, vshi::load_level_set(path, wanted.name, stage, error));
         return VSH_OK;
     });
 }
@@ -230,7 +177,7 @@ vsh_result vshi_serve_box(const char *path, vshi_decoder *request, const vsh_run
 vsh_result vshi_serve_list(const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,
                            vsh_error *error) {
     return vshi::guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
-        const vshi::Wanted wanted(request, path, false, error);
+        const vshi::Wanted wanted(request, path, error);
         std::vector<vsh_vdb_entry> found;
         size_t count = 0;
         vshi::list_grids(path, *run, found, wanted.number, count, error);
@@ -246,32 +193,8 @@ vsh_result vsh_grid_read(const char *path, const char *name, const vsh_run *run,
     VSHI_NEEDS(grid);
     *grid = nullptr;
     VSHI_NEEDS(path);
-    return vshi::call(run, path, error, [&](const vsh_run &full) {
-        return vshi::read(path, name, nullptr, full, grid, error);
-    });
-}
-
-vsh_result vsh_grid_read_box(const char *path, const char *name, const double box_min[3],
-                             const double box_max[3], const vsh_run *run, vsh_grid **grid, vsh_error *error) {
-    VSHI_NEEDS(grid);
-    *grid = nullptr;
-    VSHI_NEEDS(path);
-    VSHI_NEEDS(box_min);
-    VSHI_NEEDS(box_max);
-    const vshi::BBoxd box(vshi::Vec3d(box_min[0], box_min[1], box_min[2]),
-                          vshi::Vec3d(box_max[0], box_max[1], box_max[2]));
-    if (!vshi::is_box(box)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: the box from %g, %g, %g to %g, %g, %g is none", path,
-                         box_min[0], box_min[1], box_min[2], box_max[0], box_max[1], box_max[2]);
-    }
     return vshi::call(run, path, error,
-                      [&](const vsh_run &full) { return vshi::read(path, name, &box, full, grid, error); });
-}
-
-vsh_result vshi_vdb_box(const char *path, const char *name, const vsh_run *run, double box[6],
-                        vsh_error *error) {
-    return vshi::call(run, path, error,
-                      [&](const vsh_run &full) { return vshi::tell_box(path, name, full, box, error); });
+                      [&](const vsh_run &full) { return vshi::read(path, name, full, grid, error); });
 }
 
 vsh_result vsh_vdb_list_sized(const char *path, const vsh_run *run, vsh_vdb_entry *entries,

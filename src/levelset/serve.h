@@ -8,7 +8,7 @@
 extern "C" {
 #endif
 
-vshi_serve_fn vshi_serve_grid, vshi_serve_box, vshi_serve_list, vshi_serve_voxels, vshi_serve_copy;
+vshi_serve_fn vshi_serve_grid, vshi_serve_list, vshi_serve_voxels, vshi_serve_copy;
 
 #ifdef __cplusplus
 }

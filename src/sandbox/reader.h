@@ -21,8 +21,7 @@ enum {
     VSHI_READ_COPY = 6,
     VSHI_READ_CONFINEMENT = 7, /* how its reader is confined; the path is of no matter */
     VSHI_READ_DRACO = 8,       /* a glTF's vertices under Draco, all attributes of them */
-    VSHI_READ_BOX = 9,         /* where a level set is, by what its file says */
-    VSHI_READ_KINDS = 10
+    VSHI_READ_KINDS = 9
 };
 
 /* --- the caller */
@@ -97,7 +96,7 @@ enum {
 #define VSHI_ANSWER_MAGIC UINT64_C(0x726577736e61)
 
 /* Of the messages' form; goes up with every change of one. */
-enum { VSHI_READER_PROTOCOL = 6 };
+enum { VSHI_READER_PROTOCOL = 7 };
 
 /* An answer begins with this. It is written twice: with code VSHI_ANSWER_BEGUN before anything is parsed,
  * and at the end. */

@@ -41,9 +41,8 @@ static bool same_text(const char *a, const char *b) {
     return a == NULL || b == NULL ? a == b : strcmp(a, b) == 0;
 }
 
-vsh_result vshi_asset_grid(vshi_asset_files *files, const vsh_caster *caster, const vshi_tile_caster *tile,
-                           const vsh_run *run, const vsh_grid **grid, vsh_error *error) {
-    const char *path = caster->path, *name = caster->grid;
+vsh_result vshi_asset_grid(vshi_asset_files *files, const char *path, const char *name, const vsh_run *run,
+                           const vsh_grid **grid, vsh_error *error) {
     for (size_t i = 0; i < files->grid_count; ++i) {
         const vshi_asset_grid_entry *entry = &files->grids[i];
         if (same_text(entry->path, path) && same_text(entry->name, name)) {
@@ -56,9 +55,7 @@ vsh_result vshi_asset_grid(vshi_asset_files *files, const vsh_caster *caster, co
     if (name != NULL) {
         VSHI_TRY(copy_text(name, &entry->name, error));
     }
-    const bool boxed = tile != NULL && tile->boxed;
-    VSHI_TRY(boxed ? vsh_grid_read_box(path, name, tile->box[0], tile->box[1], run, &entry->grid, error)
-                   : vsh_grid_read(path, name, run, &entry->grid, error));
+    VSHI_TRY(vsh_grid_read(path, name, run, &entry->grid, error));
     *grid = entry->grid;
     return VSH_OK;
 }

@@ -4,7 +4,6 @@
 
 #include "heightfield/height_image.h"
 #include "scene/masks.h"
-#include "scene/tile.h"
 
 #include <vdbshade/scene.h>
 
@@ -47,9 +46,9 @@ vsh_result vshi_asset_model(vshi_asset_files *files, const char *path, const vsh
                             const vsh_model **model, vsh_error *error);
 /* The masks of such a model. */
 vshi_masks *vshi_asset_masks(const vshi_asset_files *files, const vsh_model *model);
-/* That of a .vdb caster; `tile`, where there is one, says which part of it. */
-vsh_result vshi_asset_grid(vshi_asset_files *files, const vsh_caster *caster, const vshi_tile_caster *tile,
-                           const vsh_run *run, const vsh_grid **grid, vsh_error *error);
+/* `name` NULL: the file's first. */
+vsh_result vshi_asset_grid(vshi_asset_files *files, const char *path, const char *name, const vsh_run *run,
+                           const vsh_grid **grid, vsh_error *error);
 vsh_result vshi_asset_map(vshi_asset_files *files, const char *path, const vsh_run *run,
                           const vshi_height_image **map, vsh_error *error);
 

@@ -5,7 +5,6 @@
 #include "base/try.h"
 #include "scene/assets.h"
 #include "scene/select.h"
-#include "scene/tile.h"
 
 #include <stdlib.h>
 
@@ -129,25 +128,20 @@ static vsh_result leave_out_blended(const vsh_scene *scene, vshi_masks *masks, c
     return VSH_OK;
 }
 
-vsh_result vshi_place_casting(vshi_asset_place *place, const vsh_scene *scene, size_t index,
+vsh_result vshi_place_casting(vshi_asset_place *place, const vsh_scene *scene, const vsh_caster *caster,
                               vshi_masks *masks, const vshi_asset_place *parts, const vsh_run *run,
                               vsh_error *error) {
-    const vsh_caster *caster = &scene->casters[index];
-    const vshi_tile_caster *tile = vshi_tile_of(scene, index);
     unsigned char *chosen = NULL, *one_sided = NULL;
     vsh_result result;
     VSHI_TRY_DONE(vshi_select(place->model, caster->path, &caster->objects, &chosen, error));
     VSHI_TRY_DONE(leave_out_blended(scene, masks, place->model, caster->path, run, chosen, error));
-    for (size_t i = 0; tile != NULL && tile->kept != NULL && i < vsh_model_mesh_count(place->model); ++i) {
-        chosen[i] = chosen[i] != 0 && tile->kept[i] != 0;
-    }
     VSHI_TRY_DONE(vshi_select_some(place->model, caster->path, caster->one_sided, caster->one_sided_count,
                                    &one_sided, error));
     VSHI_TRY_DONE(place_casting(place, masks, chosen, parts, scene->unit, caster->transform, run, error));
     for (size_t i = 0; i < place->count; ++i) {
         place->meshes[i].one_sided = one_sided[place->numbers[i]];
     }
-    if (place->count == 0 && tile == NULL) {
+    if (place->count == 0) {
         result = vshi_fail(error, VSH_ERROR_INPUT,
                            "%s: the masks of its materials leave nothing of what is to cast", caster->path);
     }

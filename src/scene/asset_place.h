@@ -29,11 +29,10 @@ typedef struct vshi_asset_place {
 vsh_result vshi_place_chosen(vshi_asset_place *place, const vsh_model *model, const unsigned char *chosen,
                              int32_t uv_set, double unit, const double transform[12], vsh_error *error);
 
-/* Puts those of place->model there that mesh caster `index` takes, as they cast: `masks` are the model's,
- * `parts` is a receiver that has unwrapped meshes of it, or NULL. Warns of blended ones that do not cast.
- * Errors: VSH_ERROR_INPUT (a pattern matches nothing, nothing is left, but in a tile), those of
- * vshi_masks_cast(). */
-vsh_result vshi_place_casting(vshi_asset_place *place, const vsh_scene *scene, size_t index,
+/* Adds the meshes of place->model that a mesh caster takes, as they cast. `masks` are the model's. `parts` is
+ * a receiver that has unwrapped meshes of the model, or NULL. Warns of blended meshes that do not cast.
+ * Errors: VSH_ERROR_INPUT (a pattern matches nothing, nothing is left), those of vshi_masks_cast(). */
+vsh_result vshi_place_casting(vshi_asset_place *place, const vsh_scene *scene, const vsh_caster *caster,
                               vshi_masks *masks, const vshi_asset_place *parts, const vsh_run *run,
                               vsh_error *error);
 

@@ -15,7 +15,6 @@
 #include "scene/kept_field.h"
 #include "scene/select.h"
 #include "scene/solidity.h"
-#include "scene/tile.h"
 #include "scene/unwrapped.h"
 
 #include <math.h>
@@ -99,7 +98,7 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
                                vsh_error *error) {
     const vsh_caster *caster = &scene->casters[index];
     vshi_asset_place *place = &assets->casters[index];
-    if (caster->type == VSH_CASTER_SDF || !vshi_caster_is_left(scene, index)) {
+    if (caster->type == VSH_CASTER_SDF) {
         return VSH_OK;
     }
     if (caster->type < VSH_CASTER_MESH || caster->type > VSH_CASTER_TEXT) {
@@ -117,7 +116,7 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
         return VSH_OK; /* its field is there */
     }
     if (caster->type == VSH_CASTER_VDB) {
-        return vshi_asset_grid(&assets->files, caster, vshi_tile_of(scene, index), run, &place->grid, error);
+        return vshi_asset_grid(&assets->files, caster->path, caster->grid, run, &place->grid, error);
     }
     if (caster->type == VSH_CASTER_MASK) {
         return vsh_outline_from_image(caster->path, &caster->mask, run, &place->outline, error);
@@ -134,7 +133,7 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
         return place_heights(assets, place, &source, VSH_HEIGHTS_SOLID, NULL, caster->transform, run, error);
     }
     VSHI_TRY(vshi_asset_model(&assets->files, caster->path, run, &place->model, error));
-    return vshi_place_casting(place, scene, index, vshi_asset_masks(&assets->files, place->model),
+    return vshi_place_casting(place, scene, caster, vshi_asset_masks(&assets->files, place->model),
                               find_unwrapped(assets, place->model), run, error);
 }
 

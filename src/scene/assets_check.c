@@ -3,7 +3,6 @@
 #include "base/try.h"
 #include "mesh/mesh_set.h"
 #include "scene/assets.h"
-#include "scene/tile.h"
 
 #include <string.h>
 
@@ -30,8 +29,7 @@ static vsh_result check_file(const char *path, const vsh_mesh *meshes, size_t co
 /* Whether one of the first casters and receivers is of that file, too. */
 static bool is_seen(const vsh_scene *scene, size_t casters, size_t receivers, const char *path) {
     for (size_t i = 0; i < casters; ++i) {
-        if (scene->casters[i].type == VSH_CASTER_MESH && vshi_caster_is_left(scene, i) &&
-            strcmp(scene->casters[i].path, path) == 0) {
+        if (scene->casters[i].type == VSH_CASTER_MESH && strcmp(scene->casters[i].path, path) == 0) {
             return true;
         }
     }
@@ -48,8 +46,7 @@ vsh_result vshi_assets_check(const vsh_assets *assets, const vsh_scene *scene, c
     size_t count;
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
-        if (caster->type == VSH_CASTER_MESH && vshi_caster_is_left(scene, i) &&
-            !is_seen(scene, i, 0, caster->path)) {
+        if (caster->type == VSH_CASTER_MESH && !is_seen(scene, i, 0, caster->path)) {
             const vsh_mesh *meshes = vsh_assets_caster(assets, i, &count);
             VSHI_TRY(check_file(caster->path, meshes, count, run, error));
         }

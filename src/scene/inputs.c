@@ -3,7 +3,6 @@
 #include "base/floats.h"
 #include "base/try.h"
 #include "model/beside.h"
-#include "scene/tile.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -52,7 +51,7 @@ vsh_result vshi_inputs_find(const vsh_scene *scene, const char *const *files, si
         VSHI_TRY(add(inputs, files[i], error));
     }
     for (size_t i = 0; scene != NULL && i < scene->caster_count; ++i) {
-        VSHI_TRY(add(inputs, vshi_caster_is_left(scene, i) ? scene->casters[i].path : NULL, error));
+        VSHI_TRY(add(inputs, scene->casters[i].path, error));
     }
     for (size_t i = 0; scene != NULL && i < scene->receiver_count; ++i) {
         const vsh_receiver *receiver = &scene->receivers[i];

@@ -157,10 +157,6 @@ vsh_result vsh_scene_use_field(vsh_scene *scene, const vsh_field_file *file, vsh
     VSHI_FLOATS;
     VSHI_NUMBERS;
     VSHI_NEEDS(scene);
-    if (scene->tile != NULL && file != NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "vsh_scene_use_field: the scene is a tile, whose casters are not all");
-    }
     scene->field = file;
     if (file == NULL || vshi_scene_voxels_named(scene, NULL)) {
         return VSH_OK;

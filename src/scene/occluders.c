@@ -7,7 +7,6 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "scene/kept_field.h"
-#include "scene/tile.h"
 #include "shade/occluders.h"
 
 #include <math.h>
@@ -314,15 +313,6 @@ static vsh_result make(making *m, vsh_error *error) {
     return VSH_OK;
 }
 
-/* A tile's casters are some of a world's. */
-static void tell_whole(const vsh_scene *scene, vsh_occluders *occluders) {
-    if (scene->tile != NULL) {
-        occluders->is_part = true;
-        memcpy(occluders->whole_min, scene->tile->whole.low, sizeof occluders->whole_min);
-        memcpy(occluders->whole_max, scene->tile->whole.high, sizeof occluders->whole_max);
-    }
-}
-
 vsh_result vsh_scene_occluders(const vsh_scene *scene, const vsh_assets *assets,
                                const vsh_scene_occluders_options *options, const vsh_run *run,
                                vsh_occluders **occluders, vsh_error *error) {
@@ -349,9 +339,6 @@ vsh_result vsh_scene_occluders(const vsh_scene *scene, const vsh_assets *assets,
     m.parts.layers = m.layers;
     if (result == VSH_OK) {
         result = vshi_occluders_make(&m.parts, &m.own, occluders, error);
-        if (result == VSH_OK) {
-            tell_whole(scene, *occluders);
-        }
     } else {
         vshi_occluders_own_free(&m.own);
     }

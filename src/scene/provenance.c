@@ -8,7 +8,6 @@
 #include "base/try.h"
 #include "light/light.h"
 #include "scene/inputs.h"
-#include "scene/tile.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -125,29 +124,12 @@ static vsh_result add_settings(vsh_provenance *p, const vsh_provenance_source *s
     return VSH_OK;
 }
 
-/* What a tile knows of a file already, or NULL. */
-static const char *known_digest(const vsh_scene *scene, const char *path) {
-    for (size_t i = 0; scene != NULL && scene->tile != NULL && i < scene->caster_count; ++i) {
-        const char *digest = vshi_tile_of(scene, i)->digest;
-        if (digest[0] != '\0' && strcmp(scene->casters[i].path, path) == 0) {
-            return digest;
-        }
-    }
-    return NULL;
-}
-
-static vsh_result add_inputs(vsh_provenance *p, const vsh_scene *scene, const vshi_inputs *inputs,
-                             vshi_job *job, vsh_error *error) {
+static vsh_result add_inputs(vsh_provenance *p, const vshi_inputs *inputs, vshi_job *job, vsh_error *error) {
     for (size_t i = 0; i < inputs->count; ++i) {
         const char *path = inputs->paths[i];
         const char *slash = strrchr(path, '/');
         char name[NAME_SIZE], digest[VSH_DIGEST_TEXT];
-        const char *known = known_digest(scene, path);
-        if (known != NULL) {
-            memcpy(digest, known, sizeof digest);
-        } else {
-            VSHI_TRY(vshi_file_digest(path, digest, job, error));
-        }
+        VSHI_TRY(vshi_file_digest(path, digest, job, error));
         const char *last = slash != NULL ? slash + 1 : path;
         const size_t size = HASH_PREFIX + VSH_DIGEST_TEXT + 1 + strlen(last);
         char *text = malloc(size);
@@ -179,7 +161,7 @@ static vsh_result fill(vsh_provenance *p, const vsh_provenance_source *source, c
     }
     vsh_result result =
         vshi_inputs_find(source->scene, source->files, source->file_count, run, job, &inputs, error);
-    result = result == VSH_OK ? add_inputs(p, source->scene, &inputs, job, error) : result;
+    result = result == VSH_OK ? add_inputs(p, &inputs, job, error) : result;
     vshi_job_end(job);
     vshi_inputs_free(&inputs);
     return result;

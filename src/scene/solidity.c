@@ -3,7 +3,6 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "scene/select.h"
-#include "scene/tile.h"
 
 #include <stdbool.h>
 #include <stdlib.h>
@@ -25,11 +24,9 @@ static bool apply_rule(const vsh_solidity_rule *rule, bool material, const vshi_
     return matched;
 }
 
-/* Rules of one caster, or of all; each must match something. Of a tile, where some of the casters are left
- * out, it is `told` what they mean. */
+/* Applies the rules of one caster, or of all. Each must match something. */
 static vsh_result apply_rules(const vsh_solidity_rule *rules, size_t rule_count,
-                              const vshi_mesh_list *casters, size_t count, const unsigned char *told,
-                              vsh_error *error) {
+                              const vshi_mesh_list *casters, size_t count, vsh_error *error) {
     for (size_t r = 0; r < rule_count; ++r) {
         const vsh_solidity_rule *rule = &rules[r];
         const vshi_mesh_list *first = NULL;
@@ -41,10 +38,6 @@ static vsh_result apply_rules(const vsh_solidity_rule *rules, size_t rule_count,
         }
         for (size_t i = 0; i < count; ++i) {
             first = first == NULL && casters[i].model != NULL ? &casters[i] : first;
-        }
-        if (told != NULL) {
-            apply_rule(rule, told[r] == VSHI_RULE_MATERIAL, casters, count);
-            continue;
         }
         if (apply_rule(rule, false, casters, count) || apply_rule(rule, true, casters, count)) {
             continue;
@@ -98,11 +91,9 @@ vsh_result vshi_solidity_settle(const vsh_scene *scene, const vshi_mesh_list *ca
                                 vsh_error *error) {
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
-        VSHI_TRY(apply_rules(caster->solidity, caster->solidity_count, &casters[i], 1,
-                             vshi_tile_rules(scene, i), error));
+        VSHI_TRY(apply_rules(caster->solidity, caster->solidity_count, &casters[i], 1, error));
     }
-    VSHI_TRY(apply_rules(scene->solidity, scene->solidity_count, casters, scene->caster_count,
-                         vshi_tile_scene_rules(scene), error));
+    VSHI_TRY(apply_rules(scene->solidity, scene->solidity_count, casters, scene->caster_count, error));
     vsh_mesh *all = NULL;
     size_t count;
     vsh_result result;

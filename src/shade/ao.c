@@ -6,7 +6,6 @@
 #include "trace/embree.h"
 
 #include <math.h>
-#include <string.h>
 
 vshi_vec vshi_ao_face(const vshi_ao_task *task, size_t i, vshi_vec normal) {
     if (task->faces == NULL) {
@@ -75,19 +74,11 @@ static vshi_vec sides_of(const vsh_occluders *occluders) {
     double low[3], high[3], side[3];
     if (occluders->triangles != NULL) {
         vshi_triangles_bounds(occluders->triangles, low, high);
-    } else {
-        memcpy(low, f->world_min, sizeof low);
-        memcpy(high, f->world_max, sizeof high);
     }
     for (int axis = 0; axis < 3; ++axis) {
-        if (occluders->is_part) {
-            side[axis] =
-                fmax(high[axis], occluders->whole_max[axis]) - fmin(low[axis], occluders->whole_min[axis]);
-        } else if (occluders->triangles != NULL) {
-            side[axis] = high[axis] - low[axis];
-        } else {
-            side[axis] = f->voxel_size * ((double)f->bounds_max[axis] - (double)f->bounds_min[axis]);
-        }
+        side[axis] = occluders->triangles != NULL
+                         ? high[axis] - low[axis]
+                         : f->voxel_size * ((double)f->bounds_max[axis] - (double)f->bounds_min[axis]);
     }
     return vshi_vec_of(side);
 }

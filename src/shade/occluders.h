@@ -4,8 +4,6 @@
 
 #include <vdbshade/occluders.h>
 
-#include <stdbool.h>
-
 /* Handles that are made for a caller own what they are made of; one that stands for a part of another within
  * a call (a layer's casters) is a plain struct. */
 struct vsh_occluders {
@@ -17,9 +15,6 @@ struct vsh_occluders {
     const vsh_solids *true_solids;
     double lifted; /* what the points to be shaded are off their surfaces already, of a start offset; world
                     * units */
-    bool is_part;  /* of a larger scene: these casters and others that lie in the box of the whole, whose size
-                    * is that which AO is shaded by, so that any part's lattices are those of the whole */
-    double whole_min[3], whole_max[3];
     struct vshi_occluders_own *own;
 };
 

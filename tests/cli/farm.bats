@@ -81,17 +81,6 @@ CONF
     within 15 eval '[ "$(sinfo -h -t idle -o %D)" = 2 ]' || fail "no two nodes: $(tail -5 slurmctld.log slurmd.n1.log)"
 }
 
-# Three boxes far from each other, in world.json.
-write_world() {
-    write_box box.obj
-    local x receivers=() casters=()
-    for x in 0 20 40; do
-        casters+=("{\"mesh\": \"box.obj\", \"transform\": {\"translate\": [$x, 0, 0]}}")
-        receivers+=("{\"mesh\": \"box.obj\", \"transform\": {\"translate\": [$x, 0, 0]}, \"size\": 32, \"output\": \"box$x.exr\"}")
-    done
-    (IFS=, && echo "{\"casters\": [${casters[*]}], \"ao\": {\"distance\": 1}, \"receivers\": [${receivers[*]}]}") >world.json
-}
-
 needs_slurm() {
     local program
     for program in munged slurmctld slurmd sbatch; do
@@ -100,7 +89,7 @@ needs_slurm() {
     [ "$(id -u)" -eq 0 ] || skip "slurmd is started by root alone"
 }
 
-@test "a bake, a trade and a world in tiles on Slurm come to what one of each does, though a node's daemon is killed in the middle" {
+@test "a bake and a trade on Slurm come to what one of each does, though a node's daemon is killed in the middle" {
     needs_slurm
     write_box box.obj
     bake=(bake box.obj --sun 0.3,1,0.2 --sun-angle 5 --ao 1 --size 256 --shard-least 0)
@@ -138,15 +127,6 @@ PROGRAM
     within 40 test -e out.csv || fail "no table: $(squeue; cat out.html.logs/*)"
     [ "$(wc -l <one.csv)" -gt 9 ] && diff <(untimed one.csv) <(untimed out.csv) || fail "the rows are others"
     [ -s out.html ]
-
-    # and a world in tiles, where nothing is merged
-    write_world
-    "$VDBSHADE" bake world.json --tile-size 10 --output-folder all --quiet
-    VDBSHADE=$PWD/program "$tools/submit" 2 bake world.json --tile-size 10 --output-folder maps
-    within 40 test -e maps/box0.exr -a -e maps/box20.exr -a -e maps/box40.exr || fail "a tile is missing: $(squeue; cat maps.logs/*)"
-    for x in 0 20 40; do
-        same_values maps/box$x.exr all/box$x.exr
-    done
 }
 
 @test "submit asks for what the estimate says, and refuses what it cannot share out" {
@@ -183,34 +163,4 @@ PROGRAM
     run -2 "$tools/submit" 2 bake box.obj --ao 1
     run -2 "$tools/submit" 2 render box.obj -o out.png
     run -2 env PATH="$PWD/bin:$PATH" "$tools/submit" 2 bake none.obj --ao 1 -o out.exr
-}
-
-@test "submit shares out tiles: no merge, and the parts bake what one bake of all tiles does" {
-    write_world
-    local x
-    mkdir bin
-    printf '#!/bin/sh\nprintf "%%s\\n" "$*" >>asked\necho 7\n' >bin/sbatch
-    chmod +x bin/sbatch
-    run -0 env PATH="$PWD/bin:$PATH" "$tools/submit" 2 bake world.json --tile-size 10 --output-folder maps
-    [ "$output" = 7 ]
-    [ "$(wc -l <asked)" = 1 ] # an array, and nothing behind it
-    [[ $(cat asked) =~ --array=1-2\ .*--mem=([0-9]+)\ --time=2\ --output=maps.logs/%a.log\ .*part.sbatch\ (bake\ world.json\ .*)$ ]]
-    [ "${BASH_REMATCH[1]}" -ge 256 ] && [ "${BASH_REMATCH[1]}" -le 600 ]
-    read -ra bake <<<"${BASH_REMATCH[2]}"
-    for x in 1 2; do
-        SLURM_ARRAY_TASK_ID=$x SLURM_ARRAY_TASK_COUNT=2 SLURM_MEM_PER_NODE=${BASH_REMATCH[1]} "$tools/part.sbatch" "${bake[@]}" --quiet
-    done
-    "$VDBSHADE" bake world.json --tile-size 10 --output-folder all --quiet
-    for x in 0 20 40; do
-        same_values maps/box$x.exr all/box$x.exr
-    done
-    # time is of the tiles that a part has: 100 s each
-    printf '#!/bin/sh\nfor i in 1 2 3 4 5; do echo "tile $i of 5: 1 receiver"; done\necho "memory about 400 MiB"\necho "time about 100 s: bake 90 s"\n' >told
-    chmod +x told
-    rm asked
-    run -0 env PATH="$PWD/bin:$PATH" VDBSHADE="$PWD/told" "$tools/submit" 2 bake world.json --tile-size=10
-    [[ $(cat asked) =~ --mem=856\ --time=12\ --output=world.logs/%a.log ]]
-    run -2 env PATH="$PWD/bin:$PATH" MERGE=--quiet "$tools/submit" 2 bake world.json --tile-size 10
-    [[ "$output" == *"tiles are not merged"* ]]
-    run -2 env PATH="$PWD/bin:$PATH" "$tools/submit" 2 bake none.json --tile-size 10
 }

@@ -175,8 +175,7 @@ class Reach(Case):
         v.render([occluders.field], occluders, lamp, camera=camera, width=8, height=8,
                  lit=[v.LitMeshes(floor(), {"shadow.sun": lightmap["shadow.sun"]})]).encode(alpha=True)
         del baked, volume, job, assets, atlas, writer
-        self.hidden(), self.pages(), self.volume_parts(), self.job_parts(), self.kept_fields(), self.tiles()
-        self.tiles()
+        self.hidden(), self.pages(), self.volume_parts(), self.job_parts(), self.kept_fields()
 
     def lights(self):
         path = self.folder / "lamp.gltf"
@@ -343,41 +342,6 @@ class Reach(Case):
             stale.bake()
         stale.use_field(None)
         stale.bake()
-
-    def tiles(self):
-        """A tile is a scene with fewer receivers; what it bakes is what the whole does."""
-        v = vdbshade
-        far = [[1, 0, 0, 40], [0, 1, 0, 0], [0, 0, 1, 0]]
-        cloister = ASSETS / "cloister.glb"
-        scene = v.Scene(casters=[cloister, dict(path=cloister, transform=far)], lights=[v.Light(direction=(0.5, 0.8, 0.3))], size=16,
-                        receivers=[dict(path=cloister, output="near.exr"), dict(path=cloister, transform=far, output="far.exr")])
-        tiles = v.Tiles(scene, 30.0)
-        self.assertEqual([t.info.receivers for t in tiles], [1, 1])
-        self.assertLess(tiles[1].info.objects, tiles[-1].info.all_objects)
-        done, texels = v.ReportSum(), 0
-        for tile, whole in zip(tiles, scene.bake()):
-            job = v.BakeJob(tile, arrays=True)
-            (own,) = job.bake()
-            done.add(job)
-            texels += job.report.texels
-            self.assertEqual(own.told.output, whole.told.output)
-            self.assertLess(abs(own["shadow.sun"] - whole["shadow.sun"]).mean(), 0.002)
-        self.assertEqual(done.told.texels, texels)
-        self.assertGreater(texels, job.report.texels)
-        self.assertEqual(len(done.told.errors), 3)
-        self.assertRaises(IndexError, tiles.__getitem__, 2)
-        self.assertRaises(v.ArgumentError, v.Tiles, scene, 0.0)
-        self.assertRaises(TypeError, v.Tiles, cloister, 1.0)
-        tile = tiles[0]
-        tiles.close()
-        del tiles, scene
-        gc.collect()
-        tile.set("size", 8)
-        self.assertEqual(tile.bake()[0]["A"].shape, (8, 8))
-        row = v.Grid.from_sdf(v.Sdf("sphere"), voxel_size=0.1)
-        row.write(self.folder / "ball.vdb")
-        part = v.Grid.read(self.folder / "ball.vdb", box=[[0.5, -2, -2], [2, 2, 2]])
-        self.assertLess(part.info.active_voxels, 0.7 * row.info.active_voxels)
 
     def flat(self, path):
         scene = vdbshade.FlatScene(path, size=8)

@@ -168,76 +168,6 @@ static void steps_come_in_their_order(void **state) {
     vsh_bake_job_free(job);
 }
 
-static void reports_of_jobs_add_up(void **state) {
-    (void)state;
-    case_scene c;
-    vsh_error error;
-    vsh_bake_report one[2], sum = {.load_s = 0.0};
-    vsh_bake_error errors[2][3], all[3] = {{.values = 0.0}};
-    for (int k = 0; k < 2; ++k) {
-        fill(&c, SIZE, 1.0 + k);
-        c.scene.grid.resolution = k == 0 ? 64 : 48;
-        c.scene.shade.method = VSH_SHADOW_ADAPTIVE;
-        c.scene.shade.ao_method = VSH_AO_ADAPTIVE;
-        vsh_bake_job *job;
-        assert_ok(vsh_bake_job_create(&c.scene, NULL, NULL, &job, &error), &error);
-        assert_ok(vsh_bake_job_measure(job, NULL, &error), &error);
-        assert_ok(vsh_bake_job_prepare(job, NULL, &error), &error);
-        assert_ok(vsh_bake_job_run(job, NULL, &error), &error);
-        vsh_bake_job_get_report(job, &one[k]);
-        assert_int_equal(one[k].error_count, 3);
-        memcpy(errors[k], one[k].errors, sizeof errors[k]);
-        assert_ok(vsh_bake_report_add(&sum, &one[k], all, &error), &error);
-        vsh_bake_job_free(job);
-    }
-    assert_int_equal(sum.texels, 2 * SIZE * SIZE);
-    assert_int_equal(sum.bands, 2);
-    assert_int_equal(sum.invalid_texels, one[0].invalid_texels + one[1].invalid_texels);
-    assert_true(sum.load_s == one[0].load_s + one[1].load_s && sum.load_s > 0.0);
-    assert_true(sum.bake_s == one[0].bake_s + one[1].bake_s && sum.bake_s > 0.0);
-    assert_true(sum.write_s == one[0].write_s + one[1].write_s);
-    assert_int_equal(sum.shade.samples, one[0].shade.samples + one[1].shade.samples);
-    assert_int_equal(sum.shade.marches, one[0].shade.marches + one[1].shade.marches);
-    assert_int_equal(sum.shade.rays, one[0].shade.rays + one[1].shade.rays);
-    assert_true(sum.shade.worst_error == fmax(one[0].shade.worst_error, one[1].shade.worst_error));
-    /* of what casts there is the most of each, its seconds aside */
-    const vsh_occluders_info *casts[2] = {&one[0].occluders, &one[1].occluders};
-    assert_true(casts[0]->active_voxels > casts[1]->active_voxels);
-    assert_int_equal(sum.occluders.active_voxels, casts[0]->active_voxels);
-    assert_int_equal(sum.occluders.field_bytes, casts[0]->field_bytes);
-    assert_true(sum.occluders.voxel_size == casts[1]->voxel_size);
-    assert_true(sum.occluders.voxelize_s == casts[0]->voxelize_s + casts[1]->voxelize_s);
-    assert_ptr_equal(sum.errors, all);
-    assert_int_equal(sum.error_count, 3);
-    for (int i = 0; i < 3; ++i) {
-        assert_true(all[i].values == errors[0][i].values + errors[1][i].values);
-        assert_true(all[i].square_error == errors[0][i].square_error + errors[1][i].square_error);
-        assert_true(all[i].worst == fmax(errors[0][i].worst, errors[1][i].worst));
-    }
-    assert_true(all[0].values > 0.0 && all[1].values > 0.0);
-    /* without errors, of a program of an older header, and what cannot be */
-    struct {
-        vsh_bake_report report;
-        char behind;
-    } older = {.behind = 7};
-    const size_t size = offsetof(vsh_bake_report, shade);
-    one[0].errors = errors[0];
-    assert_ok(vsh_bake_report_add_sized(&older.report, &one[0], size, NULL, &error), &error);
-    assert_int_equal(older.report.texels, SIZE * SIZE);
-    assert_int_equal(older.report.shade.samples, 0);
-    assert_int_equal(older.behind, 7);
-    vsh_bake_report none = {.load_s = 0.0};
-    assert_ok(vsh_bake_report_add(&none, &one[0], NULL, &error), &error);
-    assert_null(none.errors);
-    assert_int_equal(none.error_count, 0);
-    one[0].error_count = 2;
-    assert_int_equal(vsh_bake_report_add(&sum, &one[0], all, &error), VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "3 and 2 errors"));
-    assert_int_equal(sum.texels, 2 * SIZE * SIZE);
-    assert_int_equal(vsh_bake_report_add(NULL, &one[0], all, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_bake_report_add(&sum, NULL, all, &error), VSH_ERROR_ARGUMENT);
-}
-
 static void what_cannot_be_is_refused_before_a_file_is_read(void **state) {
     (void)state;
     case_scene c;
@@ -292,7 +222,6 @@ int main(void) {
         cmocka_unit_test(rows_of_bands_are_the_rows_of_the_whole),
         cmocka_unit_test(what_a_sink_refuses_ends_the_bake_as_it_says),
         cmocka_unit_test(steps_come_in_their_order),
-        cmocka_unit_test(reports_of_jobs_add_up),
         cmocka_unit_test(what_cannot_be_is_refused_before_a_file_is_read),
         cmocka_unit_test(lightmaps_of_objects_have_their_names),
     };

@@ -76,12 +76,6 @@ static int check_shard(const cli_bake_settings *s, const vsh_scene *scene) {
                         : s->view != NULL          ? "view"
                         : s->exr != NULL           ? "exr"
                                                    : NULL;
-    if (s->tile_size > 0.0 && given != NULL) {
-        return cli_usage("--%s: not together with --tile-size", given);
-    }
-    if (s->tile_size > 0.0 && s->has_shard_least) {
-        return cli_usage("--shard-least: not together with --tile-size, of which parts have whole tiles");
-    }
     if (s->shard > 0 && given != NULL) {
         return cli_usage("--%s: not together with --shard; give it to 'vdbshade merge'", given);
     }
@@ -195,7 +189,7 @@ static void say_all(const telling *t, const vsh_bake_job *job, const vsh_bake_re
             report->invalid_texels);
 }
 
-cli_stats cli_bake_stats(const vsh_scene *scene, const vsh_bake_report *report, int32_t threads) {
+static cli_stats make_stats(const vsh_scene *scene, const vsh_bake_report *report, int32_t threads) {
     cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS, threads);
     stats.texels = report->texels;
     stats.invalid_texels = report->invalid_texels;
@@ -217,15 +211,9 @@ cli_stats cli_bake_stats(const vsh_scene *scene, const vsh_bake_report *report, 
 
 /* --- steps */
 
-/* Warnings are told as soon as they are known: what is wrong with the files, before the long work; those of
- * one of several bakes when all are done. */
-static vsh_result run_job(vsh_bake_job *job, const vsh_scene *scene, const vsh_run *run, bool one,
-                          vsh_error *error) {
+/* Prints warnings as soon as they are known: what is wrong with the files, before the long work. */
+static vsh_result run_job(vsh_bake_job *job, const vsh_scene *scene, const vsh_run *run, vsh_error *error) {
     VSHI_TRY(vsh_bake_job_measure(job, run, error));
-    if (!one) {
-        VSHI_TRY(vsh_bake_job_prepare(job, run, error));
-        return vsh_bake_job_run(job, run, error);
-    }
     if (vsh_bake_job_count(job) > 0) {
         cli_bake_expect(scene, job, run->threads);
     }
@@ -236,22 +224,17 @@ static vsh_result run_job(vsh_bake_job *job, const vsh_scene *scene, const vsh_r
 }
 
 static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, vsh_bake_job *job,
-                    const vsh_run *run, telling *t, const char *parts, cli_bake_sum *sum) {
+                    const vsh_run *run, telling *t, const char *parts) {
     t->count = vsh_bake_job_count(job);
     vsh_error error;
     if ((settings->merged != NULL ? vsh_bake_job_merge(job, run, &error)
-                                  : run_job(job, scene, run, sum == NULL, &error)) != VSH_OK) {
+                                  : run_job(job, scene, run, &error)) != VSH_OK) {
         return cli_fail_of(NULL, &error);
     }
     vsh_bake_report report;
     vsh_bake_job_get_report(job, &report);
-    const cli_stats stats = cli_bake_stats(scene, &report, run->threads);
+    const cli_stats stats = make_stats(scene, &report, run->threads);
     cli_stats_warn(&stats, scene, run);
-    if (sum != NULL) {
-        sum->bakes += 1;
-        return vsh_bake_report_add(&sum->report, &report, sum->errors, &error) == VSH_OK ? CLI_OK
-                                                                                         : cli_fail(&error);
-    }
     CLI_TRY(cli_bake_view(settings, scene, run));
     CLI_TRY(cli_stats_finish(&stats, run, settings->stats));
     cli_warnings_tell();
@@ -267,11 +250,11 @@ static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, v
     return CLI_OK;
 }
 
-int cli_bake_one(const cli_bake_settings *settings, const vsh_scene *scene, cli_bake_sum *sum) {
+/* Bakes a scene whose files were checked, or puts its parts together. */
+static int bake_scene(const cli_bake_settings *settings, const vsh_scene *scene) {
     const vsh_run run = cli_common_run(&settings->common);
-    const bool part = settings->shard > 0 && settings->tile_size == 0.0;
-    const bool told = sum == NULL || settings->common.verbose; /* each lightmap */
-    telling t = {.common = &settings->common, .part = part || !told};
+    const bool part = settings->shard > 0;
+    telling t = {.common = &settings->common, .part = part};
     vsh_bake_job_options options = vsh_bake_job_options_default();
     options.per_object = settings->per_object;
     options.band_rows = settings->band_rows;
@@ -286,8 +269,8 @@ int cli_bake_one(const cli_bake_settings *settings, const vsh_scene *scene, cli_
     options.files = files;
     options.file_count = settings->lights != NULL ? 2 : 1;
     char *parts = name_parts(settings, scene);
-    options.shard = part && !settings->dry_run ? settings->shard : 0; /* what is told is of the whole */
-    options.shard_count = settings->tile_size > 0.0 ? 0 : settings->shard_count;
+    options.shard = settings->dry_run ? 0 : settings->shard; /* what is told is of the whole */
+    options.shard_count = settings->shard_count;
     options.shard_least = settings->shard_least;
     options.forecast = settings->dry_run;
     options.parts = settings->merged != NULL ? settings->merged : parts;
@@ -307,7 +290,7 @@ int cli_bake_one(const cli_bake_settings *settings, const vsh_scene *scene, cli_
     }
     CLI_TRY_DONE(check_outputs(settings, scene, job));
     code = settings->dry_run ? cli_bake_forecast(scene, job, &run)
-                             : bake_job(settings, scene, job, &run, &t, parts, sum);
+                             : bake_job(settings, scene, job, &run, &t, parts);
     if (settings->dry_run && part && code == CLI_OK) {
         printf("parts         %d of %d have rows\n", cli_bake_shards(settings, scene), settings->shard_count);
     }
@@ -324,8 +307,7 @@ int cli_bake_by(const cli_bake_settings *settings) {
     CLI_TRY_DONE(cli_bake_scene_make(settings, &made));
     CLI_TRY_DONE(check_files(settings, &made.scene));
     cli_signals_watch();
-    code = settings->tile_size > 0.0 ? cli_bake_tiles(settings, &made.scene)
-                                     : cli_bake_one(settings, &made.scene, NULL);
+    code = bake_scene(settings, &made.scene);
 done:
     cli_bake_scene_free(&made);
     cli_progress_end();

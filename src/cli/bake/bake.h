@@ -2,7 +2,6 @@
 #ifndef CLI_BAKE_H
 #define CLI_BAKE_H
 
-#include "cli/stats.h"
 #include "options.h"
 
 /* Whether a scene with its lights, that the options were put over, can be shaded so; sets what follows from
@@ -23,23 +22,6 @@ void cli_bake_expect(const vsh_scene *scene, const vsh_bake_job *job, int32_t th
  * why.
  */
 int cli_bake_forecast(const vsh_scene *scene, vsh_bake_job *job, const vsh_run *run);
-
-/* What several bakes of the same lights came to. */
-typedef struct cli_bake_sum {
-    vsh_bake_report report;
-    vsh_bake_error *errors; /* [lights + 2], of the report */
-    uint64_t bakes;
-} cli_bake_sum;
-
-/* Bakes a scene whose files were checked, or puts its parts together. `sum` not NULL: it is one of several,
- * and what it reports is added there; else it is told. CLI_OK or an exit code, having said why. */
-int cli_bake_one(const cli_bake_settings *settings, const vsh_scene *scene, cli_bake_sum *sum);
-
-/* What there is to tell of a bake of the scene, or of all of them. */
-cli_stats cli_bake_stats(const vsh_scene *scene, const vsh_bake_report *report, int32_t threads);
-
-/* Bakes it in tiles: those of a shard, or all. The same. */
-int cli_bake_tiles(const cli_bake_settings *settings, const vsh_scene *scene);
 
 /* Bakes, or puts parts together, by settings that were taken: frees nothing of them. CLI_OK or an exit code,
  * having said why. */

@@ -22,7 +22,6 @@ enum {
     KEY_EXR,
     KEY_VIEW,
     KEY_DENSITY,
-    KEY_TILE_SIZE,
     KEY_HEIGHT,
     KEY_SIZE_WORLD
 };
@@ -54,7 +53,7 @@ static const cli_option options[] = {
     CLI_SHARD_OPTION(
         "bake part I of N, with as much work as the others, into\nOUT.I-of-N.part: on any machine, in any "
         "order, again where\nit failed; 'vdbshade merge OUT' puts all parts together to\nthe bits of "
-        "one bake; with --tile-size whole tiles, and\nnothing is to be merged"),
+        "one bake"),
     CLI_SHARD_LEAST_OPTION,
     {0, NULL, NULL, "Objects"},
     {KEY_RECEIVE, "receive", "NAME",
@@ -76,11 +75,6 @@ static const cli_option options[] = {
     CLI_SETTINGS(VSH_SETTINGS_CHANNELS),
     CLI_ACCURACY_OPTIONS,
     CLI_CASTER_OPTIONS,
-    {KEY_TILE_SIZE, "tile-size", "SIZE",
-     "for worlds that do not fit into memory: receivers are\nbaked cube by cube of SIZE scene units, each "
-     "cube with\n"
-     "the casters that its light and AO can meet; values are\nthe same to within --max-error "
-     "(docs/farm.md)"},
     CLI_GRID_OPTIONS,
     {0, NULL, NULL, "Texels"},
     CLI_SETTINGS(VSH_SETTINGS_TEXELS),
@@ -164,7 +158,6 @@ int cli_shared_parse(cli_bake_settings *s, int key, const char *name, const char
     case CLI_KEY_NO_CAST:
         return take_pattern(&s->no_cast, name, value);
     case CLI_KEY_SHARD_LEAST:
-        s->has_shard_least = true;
         return cli_parse_number(name, value, 0.0, 1e9, &s->shard_least);
     case CLI_KEY_FIELD:
         s->field = value;
@@ -190,8 +183,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return take_pattern(&s->no_receive, name, value);
     case KEY_ONE_SIDED:
         return take_pattern(&s->one_sided, name, value);
-    case KEY_TILE_SIZE:
-        return cli_parse_number(name, value, 1e-9, 1e12, &s->tile_size);
     case KEY_HEIGHT:
         CLI_TRY(cli_parse_number(name, value, -1e12, 1e12, &s->height));
         return s->height != 0.0 ? CLI_OK

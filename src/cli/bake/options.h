@@ -101,11 +101,10 @@ typedef struct cli_bake_settings {
     const char *exr;                       /* beside an asset; NULL: none */
     bool preview, embed, images_beside;    /* of an asset */
     double floor_size[2], floor_center[3]; /* size 0: none */
-    bool has_sun, has_sun_angle, has_light_radius, has_shard_least, per_object, dry_run;
+    bool has_sun, has_sun_angle, has_light_radius, per_object, dry_run;
     int32_t shard, shard_count; /* 0: all of it */
     double shard_least;         /* seconds; 0: all shards have rows, as those of a trade do */
     double height, world[2];    /* --height and --size-world; 0: not given. world[1] 0: the image says */
-    double tile_size;           /* world units; 0: the scene is not cut into tiles */
     const char *const *words;   /* [word_count]: the command line that this is */
     size_t word_count;
     const char *merged; /* parts of this name are put together, and nothing is baked; NULL: it is baked */

@@ -298,7 +298,7 @@ int cli_bake_check_output(const cli_bake_settings *s, const vsh_scene *scene, co
     }
     struct stat status;
     if (stat(output, &status) != 0) {
-        return CLI_OK; /* it replaces nothing; worlds have many thousand casters */
+        return CLI_OK; /* it replaces nothing */
     }
     for (size_t i = 0; i < scene->caster_count; ++i) {
         if (scene->casters[i].path != NULL && cli_same_file(output, scene->casters[i].path)) {
@@ -332,10 +332,8 @@ static int check_outputs(const cli_bake_settings *s, const vsh_scene *scene) {
             return cli_usage("%s: both the output and the --stats file", output);
         }
         for (size_t k = 0; k < i; ++k) {
-            /* objects of one bake get names of their own, but tiles do not know of each other's */
-            const bool apart = s->per_object && s->tile_size == 0.0;
             const char *other = scene->receivers[k].output;
-            if (!apart && (strcmp(output, other) == 0 || cli_same_file(output, other))) {
+            if (!s->per_object && (strcmp(output, other) == 0 || cli_same_file(output, other))) {
                 return cli_usage("%s: the output of two receivers", output);
             }
         }
@@ -360,16 +358,13 @@ void cli_bake_say_idle(const cli_bake_settings *s, const char *parts, int32_t wo
 
 /* Whether something is baked, or forecast: a shard without rows has no use for fields. */
 static bool has_rows(const cli_bake_settings *s, const vsh_scene *scene) {
-    return s->dry_run || s->tile_size > 0.0 || s->shard <= cli_bake_shards(s, scene);
+    return s->dry_run || s->shard <= cli_bake_shards(s, scene);
 }
 
 /* Opens the file of fields. What it says of voxels stands in outputs as if it had been given. */
 int cli_bake_use_field(const cli_bake_settings *s, cli_bake_scene *made) {
     if (s->field == NULL) {
         return CLI_OK;
-    }
-    if (s->tile_size > 0.0) {
-        return cli_usage("--field: not together with --tile-size");
     }
     const vsh_run run = cli_common_run(&s->common);
     const int32_t named = made->scene.voxels_named;

@@ -11,7 +11,7 @@ Every call lets other threads of Python run. What is passed in must not be chang
 from . import types
 from ._library import (ArgumentError, Cancelled, Error, InputError, InternalError, LimitError, OutOfMemoryError, ReadError, Run,
                        UnsupportedError, VdbshadeWarning, WriteError)
-from ._bake_scene import BakeJob, ReportSum, SceneLightmap, bake_scene
+from ._bake_scene import BakeJob, SceneLightmap, bake_scene
 from ._compare import (Comparison, Limits, Measures, Tolerances, compare, compare_accuracy, compare_coverage, compare_files, compare_judge,
                       measure_at_least)
 from ._field import Field, Heights, Spheres, Triangles, spheres_read, trace_ao, trace_shadow
@@ -31,7 +31,6 @@ from ._points import (Query, Stats, ao_method_resolve, ao_method_traits, shade_a
 from ._render import Camera, LitMeshes, Picture, render
 from ._scene import Assets, Scene, settings
 from ._sdf import Sdf, Solids
-from ._tiles import Tile, Tiles
 from ._unwrap import Atlas, AtlasMesh, LitImage, lit_is_output, lit_write, unwrap, view_write, view_write_bakes
 from ._volume import Volume, Voxels, bake_volume, bake_volume_forecast, bake_volume_part, volume_merge, volume_part_casters, volume_shards
 

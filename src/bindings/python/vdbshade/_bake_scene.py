@@ -90,12 +90,6 @@ def _told(lightmap: Any) -> types.JobLightmap:
     return found
 
 
-def _report(found: Any) -> types.BakeReport:
-    report = told(found[0], "vsh_bake_report")
-    report.errors = [told(found.errors[i], "vsh_bake_error") for i in range(found.error_count)]
-    return report
-
-
 class BakeJob(Handle):
     """The lightmaps of a scene under way. Not for several threads at once.
 
@@ -199,46 +193,17 @@ class BakeJob(Handle):
     @property
     def report(self) -> types.BakeReport:
         """What it has done so far; `errors` is a list of vdbshade.types.BakeError: of each light, of AO, of the sky."""
-        return _report(self._found())
-
-    def _found(self) -> Any:
         found = ffi.new("vsh_bake_report *")
         lib.vsh_bake_job_get_report_sized(self.handle, found, ffi.sizeof("vsh_bake_report"))
-        return found
+        report = told(found[0], "vsh_bake_report")
+        report.errors = [told(found.errors[i], "vsh_bake_error") for i in range(found.error_count)]
+        return report
 
     def forecast(self, *, run: Optional[Run] = None) -> types.BakeForecast:
         """What it will take, of a job that was not measured."""
         forecast = ffi.new("vsh_bake_forecast *")
         call(lib.vsh_bake_job_forecast_sized, self.handle, RUN, forecast, ffi.sizeof("vsh_bake_forecast"), run=run)
         return told(forecast[0], "vsh_bake_forecast")
-
-
-class ReportSum:
-    """What several jobs of as many lights did, one after the other: those of tiles.
-
-    >>> done = ReportSum()
-    >>> for tile in Tiles(Scene("world.json"), 100.0):
-    ...     job = BakeJob(tile)
-    ...     job.bake()
-    ...     done.add(job)
-    >>> done.told.texels
-    """
-
-    def __init__(self) -> None:
-        self._sum = ffi.new("vsh_bake_report *")
-        self._errors: Any = ffi.NULL
-
-    def add(self, job: BakeJob) -> None:
-        """Adds what a job has done so far: counts, seconds and square errors add up; of memory and voxels there is the most."""
-        found = job._found()
-        if self._errors == ffi.NULL and found.error_count > 0:
-            self._errors = ffi.new("vsh_bake_error[]", found.error_count)
-        call(lib.vsh_bake_report_add_sized, self._sum, found, ffi.sizeof("vsh_bake_report"), self._errors)
-
-    @property
-    def told(self) -> types.BakeReport:
-        """As BakeJob.report."""
-        return _report(self._sum)
 
 
 def bake_scene(scene: Scene, *, files: Sequence[Any] = (), words: Sequence[str] = (), run: Optional[Run] = None,
@@ -252,4 +217,4 @@ def bake_scene(scene: Scene, *, files: Sequence[Any] = (), words: Sequence[str] 
     return told(report[0], "vsh_bake_report")
 
 
-__all__ = ["BakeJob", "ReportSum", "SceneLightmap", "bake_scene"]
+__all__ = ["BakeJob", "SceneLightmap", "bake_scene"]

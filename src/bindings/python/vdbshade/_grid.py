@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Callable, List, Mapping, Optional, Sequen
 import numpy
 from numpy.typing import ArrayLike
 
-from ._arrays import array, output, pointer, transform as matrix
+from ._arrays import output, pointer, transform as matrix
 from ._library import RUN, Handle, Run, call, ffi, handle_of, lib, make, note, place
 from ._structs import Filled, info, path_of, told
 from ._mesh import Meshes, meshes_of
@@ -135,15 +135,9 @@ class Grid(Handle):
                          Filled("vsh_grid_options", options).pointer, run=run)
 
     @classmethod
-    def read(cls, path: "str | os.PathLike[str]", name: Optional[str] = None, *, box: Optional[ArrayLike] = None,
-             run: Optional[Run] = None) -> "Grid":
-        """A level set of a .vdb file; `name` None: its first. `box`, shape (2, 3): only the leaves that reach into it, of the
-        grid's world space from the least corner to the largest, of a file that need not fit into memory."""
-        given = path_of(path, "path"), ffi.NULL if name is None else name.encode()
-        if box is None:
-            return cls._made(lib.vsh_grid_read, *given, run=run)
-        corners = array(box, numpy.float64, (2, 3), "box")
-        return cls._made(lib.vsh_grid_read_box, *given, pointer(corners), pointer(corners[1]), run=run)
+    def read(cls, path: "str | os.PathLike[str]", name: Optional[str] = None, *, run: Optional[Run] = None) -> "Grid":
+        """A level set of a .vdb file; `name` None: its first."""
+        return cls._made(lib.vsh_grid_read, path_of(path, "path"), ffi.NULL if name is None else name.encode(), run=run)
 
     @classmethod
     def unite(cls, grids: "Sequence[Union[Grid, Tuple[Grid, ArrayLike]]]", *, run: Optional[Run] = None,
