@@ -202,6 +202,7 @@ static vsh_result ask(const vsh_run *run, vsh_error *error) {
     layers[0].heights = heights;
     layers[0].method = VSH_SHADOW_CLASSIC;
     layers[1].spheres = spheres;
+    layers[1].method = VSH_SHADOW_CLASSIC;
     layers[1].lights = names;
     layers[1].light_count = 1;
     vsh_occluder_parts parts;
