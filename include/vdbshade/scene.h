@@ -3,7 +3,7 @@
 #define VDBSHADE_SCENE_H
 
 #include "bake.h"
-#include "field_file.h"
+#include "field.h"
 #include "grid.h"
 #include "heights.h"
 #include "occluders.h"
@@ -200,8 +200,6 @@ typedef struct vsh_scene {
     const vsh_light_file *light_files; /* [light_file_count], by `first`: where some of `lights` came from,
                                           for those who look after inputs; a scene need not have any */
     size_t light_file_count;
-    const vsh_field_file *field; /* the casters' fields, which are then not made (vsh_scene_use_field());
-                                    NULL: none are there */
 } vsh_scene;
 
 /* Reads a scene file; of what it names, files of lights alone are opened. The scene and all it points to
@@ -406,9 +404,8 @@ static inline vsh_scene_occluders_options vsh_scene_occluders_options_default(vo
  * assets must outlive the handle. Free it with vsh_occluders_free(). Errors, those of a layer's casters with
  * its name:
  * - VSH_ERROR_ARGUMENT: scene, assets or occluders NULL, a box of which a half is NULL, options, run;
- * - VSH_ERROR_INPUT: no casters, more layers and casters that are not voxelised than VSH_MAX_LAYERS; a
- *   scene->field that is stale: of other casters or voxels, with what differs; as vsh_scene_casters(),
- *   vsh_field_create(), vsh_field_file_field() and vsh_triangles_create();
+ * - VSH_ERROR_INPUT: no casters, more layers and casters that are not voxelised than VSH_MAX_LAYERS; as
+ *   vsh_scene_casters(), vsh_field_create() and vsh_triangles_create();
  * - VSH_ERROR_LIMIT: as these;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_scene_occluders(const vsh_scene *scene, const vsh_assets *assets,

@@ -155,11 +155,6 @@ done:
     return result;
 }
 
-vsh_result vshi_charts_bounds_beyond(const vsh_charts *charts, const double within[2][3], const vsh_run *run,
-                                     double low[3], double high[3], vsh_error *error) {
-    return find_bounds(charts, within, 1, run, low, high, error);
-}
-
 /* A few rows tell of most triangles that all their samples lie within the box of what is found. */
 vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, double bounds_min[3],
                              double bounds_max[3], vsh_error *error) {

@@ -47,11 +47,6 @@ vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh
 vsh_result vshi_texels_create_sparse(const vsh_charts *charts, int32_t step, const vsh_run *run,
                                      vsh_texels **texels, vsh_error *error);
 
-/* vsh_charts_bounds() of the samples that may lie beyond a box, within[0] … within[1]: empty (low > high)
- * where there are none. */
-vsh_result vshi_charts_bounds_beyond(const vsh_charts *charts, const double within[2][3], const vsh_run *run,
-                                     double low[3], double high[3], vsh_error *error);
-
 /* Rows of texels that a band holds: its own, those beside it that its padding is copied from, and those below
  * them whose rays their AO shares. */
 typedef struct vshi_band {

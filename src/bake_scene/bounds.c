@@ -27,7 +27,7 @@ static double most_points(const vsh_bake_job *job, size_t index, const vsh_chart
 static bool may_make_field(const vsh_bake_job *job, size_t index, const vsh_charts *charts) {
     const vsh_scene *scene = &job->scene;
     const double points = most_points(job, index, charts);
-    bool may = scene->field != NULL || vsh_scene_resolution(scene, job->assets, NULL, points) != 0;
+    bool may = vsh_scene_resolution(scene, job->assets, NULL, points) != 0;
     for (size_t i = 0; i < scene->layer_count; ++i) {
         may = may || vsh_scene_resolution(scene, job->assets, &scene->layers[i], points) != 0;
     }
@@ -37,23 +37,6 @@ static bool may_make_field(const vsh_bake_job *job, size_t index, const vsh_char
         may = may || count == 0;
     }
     return may;
-}
-
-/* What all fields of the scene's file hold: one reaches across that and the samples, so that those within ask
- * for nothing. False where fields are made. */
-static bool find_held(const vsh_scene *scene, double held[2][3]) {
-    const size_t count = scene->field != NULL ? vsh_field_file_count(scene->field) : 0;
-    for (size_t i = 0; i < count; ++i) {
-        vsh_kept_field kept = vsh_kept_field_default();
-        vsh_field_info info;
-        vsh_field_file_get(scene->field, i, &kept);
-        vsh_field_get_info(kept.field, &info);
-        for (int axis = 0; axis < 3; ++axis) {
-            held[0][axis] = i == 0 ? info.bounds_min[axis] : fmax(held[0][axis], info.bounds_min[axis]);
-            held[1][axis] = i == 0 ? info.bounds_max[axis] : fmin(held[1][axis], info.bounds_max[axis]);
-        }
-    }
-    return count > 0;
 }
 
 vsh_result vshi_job_bounds(const vsh_bake_job *job, size_t index, const vsh_charts *charts,
@@ -66,10 +49,6 @@ vsh_result vshi_job_bounds(const vsh_bake_job *job, size_t index, const vsh_char
         memcpy(low, info.bounds_min, sizeof info.bounds_min);
         memcpy(high, info.bounds_max, sizeof info.bounds_max);
         return VSH_OK;
-    }
-    double held[2][3];
-    if (find_held(&job->scene, held)) {
-        return vshi_charts_bounds_beyond(charts, (const double(*)[3])held, run, low, high, error);
     }
     if (may_make_field(job, index, charts)) {
         return vsh_charts_bounds(charts, run, low, high, error);

@@ -86,8 +86,8 @@ static vsh_result try_small(const vsh_bake_job *job, const vsh_run *run, trial *
     const double points = vshi_job_points(job);
     const int32_t resolution = vsh_scene_resolution(&job->scene, job->assets, NULL, points);
     vsh_scene small = job->scene;
-    const bool smaller = resolution != 0 && job->scene.field == NULL;
-    if (smaller) { /* where there are none, nor are there in the trial, and those of a file are there */
+    const bool smaller = resolution != 0;
+    if (smaller) { /* where there are none, nor are there in the trial */
         small.grid.voxel_size = 0.0;
         small.grid.resolution = TRIAL_RESOLUTION;
     }

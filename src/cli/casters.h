@@ -15,8 +15,4 @@ static inline bool cli_caster_is_direct(const vsh_caster *caster) {
     return caster->type == VSH_CASTER_SPHERES && !caster->voxelised;
 }
 
-/* Voxel size of the casters in no layer that the scene's file of fields keeps, world units; 0: it keeps none.
- */
-double cli_casters_kept_voxel_size(const vsh_scene *scene);
-
 #endif

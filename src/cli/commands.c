@@ -12,7 +12,6 @@ static const cli_command_row rows[] = {
     {&cli_merge, "OUT", "parts of a bake on several machines, put together"},
     {&cli_unwrap, "INPUT -o OUT.obj", "lightmap UVs for meshes that have none"},
     {&cli_voxelize, "INPUT -o OUT.vdb", "level set of a mesh's or a scene's casters"},
-    {&cli_field, "INPUT -o OUT.field", "a scene's fields, made once for many bakes"},
     {&cli_info, "FILE", "what a mesh, .vdb, scene or image holds, and what is wrong with it"},
     {&cli_volume, "INPUT -o OUT.vdb", "grids of shadow and AO: a surface's band, a box, a fog's voxels"},
     {&cli_query, "INPUT -o OUT", "shadow, AO, distance at points of a CSV, a PLY or raw floats"},

@@ -6,7 +6,6 @@
 
 extern const cli_command cli_bake;
 extern const cli_command cli_voxelize;
-extern const cli_command cli_field;
 extern const cli_command cli_info;
 extern const cli_command cli_trade;
 extern const cli_command cli_query;

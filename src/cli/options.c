@@ -207,9 +207,8 @@ static bool abbreviated(const cli_option *option, char **argv, const char *value
 
 /* --- the command line as outputs tell it */
 
-static char *parsed_command;  /* of the process's one command line at a time */
-static size_t parsed_options; /* bytes of it before its operands */
-static char *parsed_file;     /* FILE.vdb of an operand FILE.vdb:NAME */
+static char *parsed_command; /* of the process's one command line at a time */
+static char *parsed_file;    /* FILE.vdb of an operand FILE.vdb:NAME */
 static const char *parsed_grid;
 
 const char *cli_parsed_grid(void) {
@@ -254,26 +253,11 @@ static const char *without_folder(const char *path) {
     return slash != NULL ? slash + 1 : path;
 }
 
-void cli_parsed_add(const char *option, const char *value) {
-    char *operands = parsed_command != NULL ? strdup(parsed_command + parsed_options) : NULL;
-    if (operands == NULL) {
-        return;
-    }
-    parsed_command[parsed_options] = '\0';
-    char name[64];
-    snprintf(name, sizeof name, "--%s", option);
-    append_word(name);
-    append_word(value);
-    parsed_options = strlen(cli_parsed_command());
-    append(operands, strlen(operands));
-    free(operands);
-}
-
 static void append_option(const cli_option *option, const char *value) {
     static const char *const changes_nothing[] = {
-        "output",   "output-folder", "stats", "threads", "memory-limit", "isa",        "trusted",
-        "confined", "allow-outside", "quiet", "verbose", "progress",     "json",       "band-rows",
-        "dry-run",  "help",          "view",  "field",   "shard",        "shard-least"};
+        "output",   "output-folder", "stats", "threads", "memory-limit", "isa",  "trusted",
+        "confined", "allow-outside", "quiet", "verbose", "progress",     "json", "band-rows",
+        "dry-run",  "help",          "view",  "shard",   "shard-least"};
     for (size_t i = 0; i < sizeof changes_nothing / sizeof changes_nothing[0]; ++i) {
         if (strcmp(option->name, changes_nothing[i]) == 0) {
             return;
@@ -352,7 +336,6 @@ int cli_parse_some(const cli_command *command, int argc, char **argv, cli_option
             return code;
         }
     }
-    parsed_options = strlen(cli_parsed_command());
     for (int i = 0; i < count; ++i) {
         operands[i] = NULL;
         if (optind + i >= argc && i >= least) {

@@ -61,9 +61,6 @@ const char *cli_parsed_grid(void);
  * limits, output, …), and files by their names alone. Belongs to the parser; "" where memory was short. */
 const char *cli_parsed_command(void);
 
-/* Adds an option to it, as its last, that came from elsewhere. */
-void cli_parsed_add(const char *option, const char *value);
-
 /* The same with `least` to `count` operands, one or more; NULL stands for those that are not there. */
 int cli_parse_some(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
                    const char *const *what, const char **operands, int least, int count, bool *help);

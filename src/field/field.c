@@ -20,26 +20,19 @@ void vsh_field_free(vsh_field *field) {
         return;
     }
     vsh_triangles_free(field->surface);
-    if (!field->borrowed) {
-        free(field->values);
-        free(field->index);
-    }
+    free(field->values);
+    free(field->index);
     free(field);
 }
 
-double vshi_field_reach(const vsh_field *field, double reach) {
+/* Returns the reach in finest voxels. `reach` is in world units; 0 asks for the default. */
+static double find_reach(const vsh_field *field, double reach) {
     double diagonal = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
         const double edge = field->bounds_max[axis] - field->bounds_min[axis];
         diagonal += edge * edge;
     }
     return reach > 0.0 ? reach / field->voxel_size : DEFAULT_REACH * sqrt(diagonal);
-}
-
-vsh_result vshi_field_reach_check(double reach, vsh_error *error) {
-    return reach >= 0.0 && !isinf(reach)
-               ? VSH_OK
-               : vshi_fail(error, VSH_ERROR_ARGUMENT, "reach %g: expected a length, 0 or more", reach);
 }
 
 /* World to index space of a similarity m: its transpose over the squared scale. */
@@ -117,7 +110,9 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     vsh_field *f = NULL;
     VSHI_TRY(vshi_options_resolve(options, &o, sizeof o, "vsh_field_options", error));
     VSHI_TRY(vshi_run_resolve(run, &r, error));
-    VSHI_TRY(vshi_field_reach_check(o.reach, error));
+    if (!(o.reach >= 0.0 && !isinf(o.reach))) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "reach %g: expected a length, 0 or more", o.reach);
+    }
     if (!(o.grown >= 0.0 && o.grown <= 1.0)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "field: grown %g: expected 0 … 1 voxels", o.grown);
     }
@@ -145,7 +140,7 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
         goto done;
     }
     vshi_job_advance(job, 40);
-    VSHI_TRY_DONE(derive_levels(f, vshi_field_reach(f, o.reach), (double)info.bytes, &r, job, &below, error));
+    VSHI_TRY_DONE(derive_levels(f, find_reach(f, o.reach), (double)info.bytes, &r, job, &below, error));
     if (o.surface != 0 && vsh_triangles_available()) {
         const vshi_budget budget = {&r, (double)info.bytes + vshi_field_bytes(f)};
         VSHI_TRY_DONE(vshi_field_add_surface(f, budget, job, error));

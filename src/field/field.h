@@ -49,7 +49,6 @@ struct vsh_field {
     float bounds_max[3];
     double world_min[3];
     double world_max[3];
-    bool borrowed;   /* `index` and `values` are a file's */
     int32_t *index;  /* offset in `values` of each block's brick; all levels */
     int16_t *values; /* bricks; all levels; multiples of the level's quantum, negative inside */
     uint64_t value_count;
@@ -57,7 +56,7 @@ struct vsh_field {
     bool unknown;           /* see vshi_field_create_unknown() */
     int32_t level_count;
     vshi_level levels[VSHI_MAX_LEVELS];
-    double grown; /* by how much casters are grown for rays, voxels */
+    double grown;           /* by how much casters are grown for rays, voxels */
     vsh_triangles *surface; /* of the finest level, as much grown, field space (surface.h): only for
                              * vshi_triangles_blocked(). NULL: rays are marched */
 };
@@ -175,12 +174,6 @@ vsh_result vshi_field_create_empty(double voxel_size, vsh_field **field, vsh_err
 static inline bool vshi_field_is_empty(const vsh_field *field) {
     return field->bounds_min[0] > field->bounds_max[0];
 }
-
-/* How far a field must reach that is asked for `reach` world units, 0: that of its box; finest voxels. */
-double vshi_field_reach(const vsh_field *field, double reach);
-
-/* Errors: VSH_ERROR_ARGUMENT: it is negative or not finite. */
-vsh_result vshi_field_reach_check(double reach, vsh_error *error);
 
 /* What stands for casters that are traced only: their box, and distances of 0 everywhere, which prove neither
  * that anything is free nor that it is solid. Lengths are told in voxels of this size, world units, 1e-12 …

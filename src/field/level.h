@@ -102,16 +102,6 @@ static inline void vshi_block_corner(const int32_t origin[3], const int32_t size
     corner[2] = origin[2] + 8 * (int32_t)(block % (size_t)size[2]);
 }
 
-/* The block whose first value is there, of those that there are. */
-static inline uint32_t vshi_block_number(const int32_t origin[3], const int32_t size[3],
-                                         const int32_t corner[3]) {
-    uint32_t number = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-        number = number * (uint32_t)size[axis] + (uint32_t)((corner[axis] - origin[axis]) / 8);
-    }
-    return number;
-}
-
 /* Appends the level above the field's coarsest one; *below is of that one, and then of the new. */
 vsh_result vshi_level_derive(vsh_field *field, vshi_below *below, vshi_budget budget, vshi_job *job,
                              vsh_error *error);

@@ -57,12 +57,6 @@ extern "C" {
     MAKE(vsh_voxels_from_vdb,                                                                                \
          (const char *path, const char *name, const vsh_run *run, vsh_voxels **voxels, vsh_error *error),    \
          (path, name, run, voxels, error), voxels)                                                           \
-    MAKE(vshi_voxels_map, (const vsh_voxels *voxels, vshi_map *map, vsh_error *error), (voxels, map, error), \
-         nothing)                                                                                            \
-    MAKE(vshi_voxels_of_blocks,                                                                              \
-         (const vshi_map *map, const vshi_block *blocks, size_t count, const char *what, const vsh_run *run, \
-          vsh_voxels **voxels, vsh_error *error),                                                            \
-         (map, blocks, count, what, run, voxels, error), voxels)                                             \
     MAKE(vshi_serve_grid,                                                                                    \
          (const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,                \
           vsh_error *error),                                                                                 \

@@ -25,23 +25,6 @@ const vshi_block *vshi_voxels_blocks(const vsh_voxels *voxels, size_t *count);
 /* Number of the block with this origin; SIZE_MAX where there is none. Thread safe, as what follows. */
 size_t vshi_voxels_find(const vsh_voxels *voxels, const int32_t origin[3]);
 
-/* A linear transform: OpenVDB's name of its map, ended by NUL, and the numbers that define it. */
-enum { VSHI_MAP_NAME = 32, VSHI_MAP_NUMBERS = 16 };
-typedef struct vshi_map {
-    char name[VSHI_MAP_NAME];
-    uint64_t count;
-    double numbers[VSHI_MAP_NUMBERS];
-} vshi_map;
-
-/* Where voxels lie. Errors: VSH_ERROR_INPUT (a frustum). */
-vsh_result vshi_voxels_map(const vsh_voxels *voxels, vshi_map *map, vsh_error *error);
-
-/* A surface's voxels of blocks that are sorted and not empty, within ±2^30: what vshi_voxels_map() and
- * vshi_voxels_blocks() told of such. `what` names them in messages. Errors: VSH_ERROR_INPUT (a map of no
- * known kind or with other numbers, no voxel, voxels beyond ±2^28), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
-vsh_result vshi_voxels_of_blocks(const vshi_map *map, const vshi_block *blocks, size_t count,
-                                 const char *what, const vsh_run *run, vsh_voxels **voxels, vsh_error *error);
-
 /* Longest axis of a voxel, world units; infinite where it is not the same everywhere. */
 double vshi_voxels_longest_axis(const vsh_voxels *voxels);
 

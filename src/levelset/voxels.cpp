@@ -78,12 +78,12 @@ bool set_bounds(const VoxelSet &set, vsh_voxels_info &info) {
     return finite;
 }
 
-} // namespace
-
+// Whether memory allows for so many blocks.
 void check_blocks(const vsh_run &run, double count, const char *what, vsh_error *error) {
     require(check_bytes(&run, count * double(sizeof(vshi_block)), what, error));
 }
 
+// Takes the set; `what` names it in messages.
 vsh_voxels *close_voxels(VoxelSet &&set, bool normals, const char *what, vsh_error *error) {
     vsh_voxels_info info{};
     for (int axis = 0; axis < 3; ++axis) {
@@ -116,8 +116,6 @@ vsh_voxels *close_voxels(VoxelSet &&set, bool normals, const char *what, vsh_err
     set.least_axis = std::min({info.voxel_size[0], info.voxel_size[1], info.voxel_size[2]});
     return new vsh_voxels{std::make_shared<const VoxelSet>(std::move(set)), info};
 }
-
-namespace {
 
 // --- the band of a level set
 

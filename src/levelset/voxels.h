@@ -16,12 +16,6 @@ struct VoxelSet {
     double least_axis = 0.0; // of a voxel, world units
 };
 
-// Takes the set; `what` names it in messages.
-vsh_voxels *close_voxels(VoxelSet &&set, bool normals, const char *what, vsh_error *error);
-
-// Whether memory allows for so many blocks.
-void check_blocks(const vsh_run &run, double count, const char *what, vsh_error *error);
-
 } // namespace vshi
 
 struct vsh_voxels {

@@ -12,7 +12,6 @@
 #include "model/model.h"
 #include "scene/asset_files.h"
 #include "scene/asset_place.h"
-#include "scene/kept_field.h"
 #include "scene/select.h"
 #include "scene/solidity.h"
 #include "scene/unwrapped.h"
@@ -29,7 +28,6 @@ struct vsh_assets {
     vshi_asset_place *receivers;
     size_t receiver_count;
     vshi_mesh_set set; /* of the casters' meshes */
-    vshi_caster_prints prints;
 };
 
 static vsh_result place_model(vshi_asset_place *place, const vsh_model *model, int32_t uv_set,
@@ -111,9 +109,6 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
     }
     if (caster->path == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "caster %zu: no path", index);
-    }
-    if (caster->type == VSH_CASTER_VDB && scene->field != NULL) {
-        return VSH_OK; /* its field is there */
     }
     if (caster->type == VSH_CASTER_VDB) {
         return vshi_asset_grid(&assets->files, caster->path, caster->grid, run, &place->grid, error);
@@ -319,7 +314,6 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
     VSHI_TRY_DONE(check_receivers(loaded, scene, &full, error));
     /* with the places in it, which the check asks for */
     VSHI_TRY_DONE(vshi_assets_check(loaded, scene, &full, error));
-    VSHI_TRY_DONE(vshi_kept_field_check(scene, loaded, &full, &loaded->prints, error));
     *assets = loaded;
     loaded = NULL;
 done:
@@ -346,7 +340,6 @@ void vsh_assets_free(vsh_assets *assets) {
     if (assets == NULL) {
         return;
     }
-    vshi_caster_prints_free(&assets->prints);
     vshi_mesh_set_free(&assets->set);
     free_places(assets->receivers, assets->receiver_count);
     free_places(assets->casters, assets->caster_count);
@@ -413,10 +406,6 @@ const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t
 
 const vsh_grid *vshi_assets_grid(const vsh_assets *assets, size_t index) {
     return index < assets->caster_count ? assets->casters[index].grid : NULL;
-}
-
-const vshi_caster_prints *vshi_assets_prints(const vsh_assets *assets) {
-    return &assets->prints;
 }
 
 const vsh_outline *vshi_assets_outline(const vsh_assets *assets, size_t index) {

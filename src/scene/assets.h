@@ -2,10 +2,9 @@
 #ifndef VSHI_ASSETS_H
 #define VSHI_ASSETS_H
 
-#include "scene/recipe.h"
-
 #include <stdbool.h>
 #include <string.h>
+#include <vdbshade/scene.h>
 
 /* Whether a caster is in a layer, or (NULL) in none. */
 static inline bool vshi_caster_in_layer(const vsh_caster *caster, const vsh_scene_layer *layer) {
@@ -27,10 +26,6 @@ const vsh_outline *vshi_assets_outline(const vsh_assets *assets, size_t index);
 
 /* The spheres of a caster, voxelised or not; NULL for every other. */
 const vsh_spheres *vshi_assets_spheres(const vsh_assets *assets, size_t index);
-
-/* What the casters are, where the scene takes its fields from a file; their list is NULL where it does not.
- * Belongs to the assets. */
-const vshi_caster_prints *vshi_assets_prints(const vsh_assets *assets);
 
 /* Warns of triangles of zero area, and refuses a file of nothing else, each file once. Errors:
  * VSH_ERROR_INPUT. */

@@ -6,7 +6,6 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
-#include "scene/kept_field.h"
 #include "shade/occluders.h"
 
 #include <math.h>
@@ -25,7 +24,6 @@ typedef struct making {
     vshi_occluders_own own;
     vsh_layer *layers; /* those that were made: copied in the end */
     vsh_occluder_parts parts;
-    vshi_caster_prints prints; /* where fields are a file's that the assets did not know of */
 } making;
 
 /* Reach for receivers in a box, or for points within a distance of the casters' box. */
@@ -91,25 +89,6 @@ static vsh_field_options options_of(const making *m, const vsh_scene_layer *laye
     return options;
 }
 
-/* Out of the scene's file. */
-static vsh_result take_field(making *m, const vsh_scene_layer *layer, int32_t resolution,
-                             vsh_grid_info *voxels, vsh_field **field, vsh_error *error) {
-    if (!vshi_layer_is_voxelised(m->scene, layer)) {
-        return VSH_OK;
-    }
-    const vshi_caster_prints *prints = vshi_assets_prints(m->assets);
-    if (prints->count != m->scene->caster_count) { /* they were loaded before the scene took a field */
-        if (m->prints.list == NULL) {
-            VSHI_TRY(vshi_caster_prints_make(m->scene, m->assets, &m->run, &m->prints, error));
-        }
-        prints = &m->prints;
-    }
-    size_t index;
-    VSHI_TRY(vshi_kept_field_find(m->scene, prints, layer, resolution, &index, voxels, error));
-    const vsh_field_options options = options_of(m, layer, voxels);
-    return vsh_field_file_field(m->scene->field, index, &options, &m->voxel, field, error);
-}
-
 /* Out of voxels that are made, or given. */
 static vsh_result create_field(making *m, const vsh_scene_layer *layer, int32_t resolution,
                                vsh_grid_info *voxels, vsh_field **field, vsh_error *error) {
@@ -146,11 +125,7 @@ static vsh_result make_field(making *m, const vsh_scene_layer *layer, const vsh_
                               : vshi_scene_note_solidity(m->scene, m->assets, layer, &m->voxel, error);
     }
     vsh_grid_info voxels;
-    if (m->scene->field != NULL && !given) {
-        VSHI_TRY(take_field(m, layer, resolution, &voxels, field, error));
-    } else {
-        VSHI_TRY(create_field(m, layer, resolution, &voxels, field, error));
-    }
+    VSHI_TRY(create_field(m, layer, resolution, &voxels, field, error));
     if (*field == NULL) {
         return VSH_OK;
     }
@@ -342,7 +317,6 @@ vsh_result vsh_scene_occluders(const vsh_scene *scene, const vsh_assets *assets,
     } else {
         vshi_occluders_own_free(&m.own);
     }
-    vshi_caster_prints_free(&m.prints);
     free(m.layers);
     return result;
 }

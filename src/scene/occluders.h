@@ -34,6 +34,9 @@ vsh_result vshi_scene_caster_triangles(const vsh_scene *scene, const vsh_assets 
  * where layers cast, or where rays cannot meet all casters. */
 bool vshi_scene_wants_truth(const vsh_scene *scene);
 
+/* Whether the scene or the layer names its voxels. */
+bool vshi_scene_voxels_named(const vsh_scene *scene, const vsh_scene_layer *layer);
+
 /* Whether a layer's only caster, or (NULL) that in none, is a level set; and whether it keeps its voxels, as
  * nobody named others. */
 bool vshi_scene_is_level_set(const vsh_scene *scene, const vsh_scene_layer *layer);

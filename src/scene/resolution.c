@@ -4,7 +4,6 @@
 #include "mesh/mesh_set.h"
 #include "scene/assets.h"
 #include "scene/occluders.h"
-#include "scene/recipe.h"
 
 #include <math.h>
 
@@ -53,6 +52,12 @@ static bool are_followed(const vsh_scene *scene, const vsh_scene_layer *layer) {
         }
     }
     return !vshi_scene_method_is(scene, layer, VSH_METHOD_KEEPS_ERROR, false);
+}
+
+bool vshi_scene_voxels_named(const vsh_scene *scene, const vsh_scene_layer *layer) {
+    return scene->voxels_named != 0 || scene->grid.voxel_size > 0.0 ||
+           scene->grid.resolution != vsh_grid_options_default().resolution ||
+           (layer != NULL && (layer->voxel_size > 0.0 || layer->resolution > 0));
 }
 
 bool vshi_scene_is_level_set(const vsh_scene *scene, const vsh_scene_layer *layer) {

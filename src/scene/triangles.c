@@ -38,9 +38,7 @@ int32_t vsh_scene_traceable(const vsh_scene *scene, const vsh_scene_layer *layer
         }
     }
     const bool alone = exact == 0 && (level_sets == 0) != (outlines == 0) && level_sets <= 1;
-    const bool unread =
-        scene != NULL && scene->field != NULL && level_sets + outlines > 0; /* their fields are */
-    return scene != NULL && !alone && !unread;
+    return scene != NULL && !alone;
 }
 
 static int32_t method_of(const vsh_scene *scene, const vsh_scene_layer *layer) {

@@ -1,5 +1,5 @@
-# Every scene in docs/scene.md and docs/flat.md bakes, and every command in docs/query.md, docs/field.md,
-# docs/volume.md, docs/render.md, docs/lit.md, docs/regression.md and docs/view.md runs.
+# Every scene in docs/scene.md and docs/flat.md bakes, and every command in docs/query.md, docs/volume.md,
+# docs/render.md, docs/lit.md, docs/regression.md and docs/view.md runs.
 load helper
 
 : "${DOCS:=$BATS_TEST_DIRNAME/../../docs}"
@@ -66,10 +66,6 @@ run_commands() {
     [ -s shaded.csv ] && [ -s props-lit.ply ] && [ "$(wc -l <sorted.csv)" -eq 2 ]
 }
 
-@test "every command of docs/field.md" {
-    run_commands field.md 4
-}
-
 @test "every command of docs/volume.md" {
     "$VDBSHADE" volume seeds.json --box -1,0,-1,1,1,1 --box-voxel-size 0.2 -o fog.vdb --quiet
     sed "s/fog.vdb:density/fog.vdb:ao/" "$DOCS/volume.md" >volume.md
@@ -110,7 +106,7 @@ options_of() {
 @test "the documents name every option of --help, and no other" {
     local command
     "$VDBSHADE" --help >help.txt
-    for command in bake voxelize info trade query volume flat render compare regress unwrap view merge field help; do
+    for command in bake voxelize info trade query volume flat render compare regress unwrap view merge help; do
         "$VDBSHADE" "$command" --help >>help.txt
     done
     options_of help.txt >told.txt

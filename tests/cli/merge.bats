@@ -51,11 +51,9 @@ load parts
     [ -z "$(ls b.vdb* 2>/dev/null)" ] || fail "something was written"
     [[ "$output" == *"voxels        27000, those inside too, in 1 grid"*"memory "*"time "*"parts         3 of 5 have voxels" ]] || fail "$output"
     # 27,000 voxels, each of 450 ns: three shares of 4 ms
-    shade "${volume[@]}" --shard 4/5 --shard-least 0.004 --field none.field
+    shade "${volume[@]}" --shard 4/5 --shard-least 0.004
     done_well
     [[ "$stderr" == *"b.vdb.4-of-5.part: nothing to do, as there is work for 3 (--shard-least)"* ]]
-    shade "${volume[@]}" --shard 3/5 --shard-least 0.004 --field none.field
-    refused 3 none.field
     local i
     for i in 1 2 3 5; do
         "$VDBSHADE" "${volume[@]}" --shard "$i/5" --shard-least 0.004 --quiet

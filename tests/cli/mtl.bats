@@ -189,6 +189,6 @@ GLTF
     [ "$names" = "left half.pgm level.mtl level.obj " ] || fail "$names"
     shade bake level.obj --sun 0,1,0 --size 16 --receive floor --no-cast material:leaf -o 'left half.pgm'
     refused 2 'left half.pgm: the output is also an input'
-    shade field level.obj --resolution 16 -o level.mtl
+    shade bake level.obj --sun 0,1,0 --size 16 --receive floor -o out.exr --stats level.mtl
     refused 2 'level.mtl: the output is also an input'
 }

@@ -165,9 +165,6 @@ load parts
     printf '{"ao": {"distance": 2}, "receivers": [{"heightfield": "terrain.png", "extent": [10, 10], "height": 2, "size": 512, "output": "t.exr"}]}' >t.json
     run -0 "$VDBSHADE" bake t.json --shard 64/64 --dry-run
     [[ $output == *"parts "*" 1 of 64 have rows"* ]]
-    run -0 "$VDBSHADE" bake "${CLOISTER[@]}" --size 1024 -o out.exr --shard 64/64 --field none.field # nor fields
-    shade bake "${CLOISTER[@]}" --size 1024 -o out.exr --shard 1/64 --field none.field
-    refused 3 none.field
     "$VDBSHADE" merge out.exr --quiet
     cmp one/out.exr out.exr
     run -0 "$VDBSHADE" bake "${CLOISTER[@]}" -o out.exr --shard 64/64 --shard-least 0 # the same for all parts

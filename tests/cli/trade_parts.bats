@@ -1,4 +1,4 @@
-# Error against time in parts, and on fields out of files.
+# Error against time in parts.
 load helper
 
 setup() {
@@ -154,33 +154,4 @@ PY
     echo "# again" >>box.obj
     shade merge out.html
     refused 2 "out.html.1-of-2.part: is of other inputs or options: its vdbshade_input_0 is"
-}
-
-@test "fields out of files: the same values, and stale ones are refused" {
-    local n
-    "$VDBSHADE" trade box.obj "${TINY[@]}" -o one.html --csv one.csv --quiet
-    for n in 12 24; do
-        "$VDBSHADE" field box.obj --resolution $n -o $n.field --quiet
-    done
-    # in place of --resolutions, in whatever order; or of some of them; and of parts
-    "$VDBSHADE" trade box.obj "${TINY[@]:0:6}" --truth-rays 64 --budget 3600 --threads 1 --field 12.field --field 24.field \
-        -o out.html --csv out.csv --quiet
-    alike
-    "$VDBSHADE" trade box.obj "${TINY[@]}" --field 24.field -o out.html --csv out.csv --quiet
-    alike
-    parts 2 box.obj "${TINY[@]}" --field 12.field
-    alike
-    shade trade box.obj "${TINY[@]}" --resolutions 8,12 --field 24.field -o out.html
-    refused 2 "--field '24.field': is of 24 voxels, which --resolutions has not"
-    shade trade box.obj "${TINY[@]}" --field 24.field --field 24.field -o out.html
-    refused 2 "of 24 voxels there is 24.field already"
-    "$VDBSHADE" field box.obj --voxel-size 0.1 -o size.field --quiet
-    shade trade box.obj "${TINY[@]}" --field size.field -o out.html
-    refused 2 "--field 'size.field': is of no --resolution"
-    cp 24.field field.html
-    shade trade box.obj "${TINY[@]}" --field field.html -o field.html
-    refused 2 "field.html: the output is a file of --field"
-    sed -i 's/^v 1 1 1$/v 1 1 1.5/' box.obj
-    shade trade box.obj "${TINY[@]}" --size 32 --field 24.field -o out.html
-    refused 2 "24.field: is stale: caster_0 (box.obj) was mesh, 12 triangles"
 }

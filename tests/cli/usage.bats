@@ -24,7 +24,7 @@ fits() {
 }
 
 @test "every command has its own help, which fits 100 columns" {
-    for command in bake voxelize info trade query volume flat render compare regress unwrap view field merge help; do
+    for command in bake voxelize info trade query volume flat render compare regress unwrap view merge help; do
         shade "$command" --help
         done_well
         [[ $output == "Usage: vdbshade $command "* ]] || fail "no usage line"
@@ -35,7 +35,7 @@ fits() {
 
 @test "the help of options fills its column, counted in characters" {
     local LC_ALL=C.UTF-8 line text before
-    for command in bake voxelize info trade query volume flat render compare regress unwrap view field merge help; do
+    for command in bake voxelize info trade query volume flat render compare regress unwrap view merge help; do
         shade "$command" --help
         done_well
         before=

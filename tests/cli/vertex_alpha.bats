@@ -87,19 +87,12 @@ same() {
     same three.exr whole.exr
 }
 
-@test "voxels have the same edge, and a field of another is stale" {
+@test "voxels have the same edge" {
     write_leaf half.gltf "$(mask 0.5)" "$FADE"
-    write_leaf other.gltf "$(mask 0.5)" "$(sed 's/\\0/\\100/' <<<"$FADE")"
-    shade field half.gltf --resolution 96 -o half.field
-    [ "$status" -eq 0 ] || fail "$stderr"
     bake half.gltf made.exr --method cone --resolution 96
-    bake half.gltf kept.exr --method cone --field half.field
-    same made.exr kept.exr
     write_leaf whole.gltf "$(mask 0.5)" "$WHOLE"
     bake whole.gltf whole.exr --method cone --resolution 96
     ! same_values made.exr whole.exr || fail "voxels are whole"
-    shade bake other.gltf --sun 0,1,0 --receive floor --size 16 -o o.exr --method cone --field half.field
-    refused 2 half.field stale caster_0
 }
 
 @test "where all vertices have one alpha it is a factor" {

@@ -68,7 +68,7 @@ setup() {
         for command in "query $grid --points points.csv --distance -o out.csv" "voxelize $grid -o out.vdb" \
             "volume $grid --sun 0,1,0 -o out.vdb" "render $grid --sun 0,1,0 --size 32x32 -o out.png" "info $grid" \
             "query scene.json --points points.csv -o out.csv" "bake scene.json" \
-            "bake floor.obj --caster $grid --sun 0,1,0 --size 8 -o out.exr" "field $grid -o out.field"; do
+            "bake floor.obj --caster $grid --sun 0,1,0 --size 8 -o out.exr"; do
             rm -f out.*
             # shellcheck disable=SC2086
             shade $command

@@ -233,37 +233,6 @@ end:
     return result;
 }
 
-static vsh_result keep_field(const vsh_run *run, vsh_error *error) {
-    const vsh_scene scene = ball_scene();
-    vsh_assets *assets = NULL;
-    vsh_result result;
-    MAKE(assets, vsh_assets_load(&scene, run, &assets, error));
-    TRY(vsh_scene_save_field(&scene, assets, "out.field", NULL, run, NULL, error));
-end:
-    vsh_assets_free(assets);
-    return result;
-}
-
-static vsh_result take_field(const vsh_run *run, vsh_error *error) {
-    vsh_scene scene = ball_scene();
-    vsh_field_file *file = NULL;
-    vsh_assets *assets = NULL;
-    vsh_occluders *occluders = NULL;
-    vsh_voxels *band = NULL;
-    vsh_result result;
-    MAKE(file, vsh_field_file_open(kept_field, run, &file, error));
-    TRY(vsh_scene_use_field(&scene, file, error));
-    MAKE(assets, vsh_assets_load(&scene, run, &assets, error));
-    MAKE(occluders, vsh_scene_occluders(&scene, assets, NULL, run, &occluders, error));
-    MAKE(band, vsh_scene_field_band(&scene, assets, 0.0, run, &band, error));
-end:
-    vsh_voxels_free(band);
-    vsh_occluders_free(occluders);
-    vsh_assets_free(assets);
-    vsh_field_file_close(file);
-    return result;
-}
-
 static vsh_result trace(const vsh_run *run, vsh_error *error) {
     vsh_model *model = NULL;
     vsh_triangles *triangles = NULL;
@@ -436,8 +405,6 @@ const scenario scenarios[] = {
     {"a grid written", write_grid},
     {"points shaded", shade_points},
     {"a query with layers", ask},
-    {"a scene's field kept", keep_field},
-    {"a kept field taken", take_field},
     {"rays traced", trace},
     {"a lightmap", bake_lightmap},
     {"a volume written", bake_volume},

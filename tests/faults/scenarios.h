@@ -27,10 +27,6 @@ int scenarios_end(void **state);
  * made so anew. */
 int scenarios_untouched(void);
 
-/* A scene of a ball that casts, in few voxels, and the file of its field. */
-vsh_scene ball_scene(void);
-extern const char kept_field[];
-
 /* --- What scenarios are made of. */
 
 /* Runs a call; ends the scenario where it fails, and the test where it then left a handle. */

@@ -175,7 +175,7 @@ class Reach(Case):
         v.render([occluders.field], occluders, lamp, camera=camera, width=8, height=8,
                  lit=[v.LitMeshes(floor(), {"shadow.sun": lightmap["shadow.sun"]})]).encode(alpha=True)
         del baked, volume, job, assets, atlas, writer
-        self.hidden(), self.pages(), self.volume_parts(), self.job_parts(), self.kept_fields()
+        self.hidden(), self.pages(), self.volume_parts(), self.job_parts()
 
     def lights(self):
         path = self.folder / "lamp.gltf"
@@ -295,53 +295,6 @@ class Reach(Case):
             self.assertSame(merged[name], whole[name])
         self.assertEqual(vdbshade.part_words(parts, 2), ["w"])
 
-    def kept_fields(self):
-        """A field that was kept and is used gives the bits of one that is made."""
-        v, path = vdbshade, self.folder / "seeds.field"
-
-        def scene(**settings):
-            return v.Scene(ASSETS / "seeds.json", size=16, method="cone", ao_method="cones", **dict(dict(resolution=32), **settings))
-        made = scene()
-        forecast = made.field_forecast()
-        report = made.save_field(path, assets=v.Assets(made), attributes={"made_by": "test"})
-        self.assertEqual((report.fields, forecast.fields, report.write_s >= 0), (1, 1, True))
-        self.assertTrue(v.field_file_is(path))
-        self.assertFalse(v.field_file_is(ASSETS / "seeds.json"))
-        file = v.FieldFile(path)
-        self.assertEqual((file.path, file.bytes, file.attributes["made_by"]), (str(path), path.stat().st_size, "test"))
-        self.assertEqual((len(list(file)), file[-1].grid_bytes), (1, report.grid_bytes))
-        at = [[0, 0.8, 0], [0.4, 1.2, 0.1]]
-        kept = file[0]
-        self.assertSame(file.field(0).sample(at), kept.field.sample(at))
-        self.assertEqual(kept.field.info.active_voxels, report.active_voxels)
-        ball = v.Grid.from_sdf(v.Sdf("sphere"), voxel_size=0.1)
-        v.field_file_write(self.folder / "own.field", [kept, v.KeptField(v.Field(ball), "ball", origin={"shape": "sphere"},
-                                                                         band=v.Voxels.from_grid(ball))], attributes={"a": "b"})
-        with v.FieldFile(self.folder / "own.field") as own:
-            self.assertEqual([(k.name, k.origin) for k in own], [(kept.name, kept.origin), ("ball", {"shape": "sphere"})])
-            self.assertSame(own.field(1).sample([[0, 0, 0.95]]), own[1].field.sample([[0, 0, 0.95]]))
-            self.assertRaises(IndexError, own.field, 2)
-            own_band = own.band(1)
-        self.assertEqual((kept.band, kept.band_bytes > 0, own_band.info.count), (None, True, v.Voxels.from_grid(ball).info.count))
-        used = scene()
-        used.use_field(file)
-        assets = v.Assets(used)
-        bands = [file.band(0), assets.field_band(), assets.field_band(3.0), v.Voxels.from_grid(v.Assets(made).casters())]
-        self.assertEqual(len({(b.info.count, tuple(b.info.index_min), b.centre(3, 4, 5)) for b in bands}), 1)
-        self.assertRaises(v.InputError, file.band, 0, 2.0)
-        file.close()
-        del file, kept, assets
-        gc.collect()
-        (with_file,), (without,) = used.bake(), scene().bake()
-        for name in without:
-            self.assertSame(with_file[name], without[name])
-        self.assertLess(without["shadow.sun"].min(), 0.5)
-        stale = scene(resolution=33)
-        stale.use_field(v.FieldFile(path))
-        with self.assertRaisesRegex(v.InputError, "stale"):
-            stale.bake()
-        stale.use_field(None)
-        stale.bake()
 
     def flat(self, path):
         scene = vdbshade.FlatScene(path, size=8)

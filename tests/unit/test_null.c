@@ -157,12 +157,6 @@ static void scenes_are_not_made_of_nothing(void **state) {
     MAKES_NONE(vsh_scene_casters(&scene, NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_scene_layer_casters(&scene, NULL, NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_scene_occluders(NULL, NULL, NULL, NULL, PLACE, &error));
-    vsh_scene_field_report report;
-    REFUSED(vsh_scene_save_field(NULL, NULL, "a.field", NULL, NULL, &report, &error));
-    REFUSED(vsh_scene_field_forecast(NULL, NULL, NULL, &report, &error));
-    REFUSED(vsh_scene_use_field(NULL, NULL, &error));
-    MAKES_NONE(vsh_scene_field_band(NULL, NULL, 0.0, NULL, PLACE, &error));
-    MAKES_NONE(vsh_scene_field_band(&scene, NULL, 0.0, NULL, PLACE, &error));
     MAKES_NONE(vsh_scene_occluders(&scene, NULL, NULL, NULL, PLACE, &error));
     vsh_triangles *triangles = NULL;
     vsh_solids *solids = NULL;
@@ -207,13 +201,6 @@ static void nothing_is_shaded_without_what_it_takes(void **state) {
     MAKES_NONE(vsh_occluders_create(NULL, 1, NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_occluders_from_parts(NULL, PLACE, &error));
     MAKES_NONE(vsh_field_create(NULL, NULL, NULL, PLACE, &error));
-    MAKES_NONE(vsh_field_file_open(NULL, NULL, PLACE, &error));
-    REFUSED(vsh_field_file_open("a.field", NULL, NULL, &error));
-    MAKES_NONE(vsh_field_file_field(NULL, 0, NULL, NULL, PLACE, &error));
-    MAKES_NONE(vsh_field_file_band(NULL, 0, 0.0, NULL, PLACE, &error));
-    REFUSED(vsh_field_file_write(NULL, NULL, 1, NULL, 0, NULL, &error));
-    REFUSED(vsh_field_file_write("a.field", NULL, 1, NULL, 0, NULL, &error));
-    assert_int_equal(vsh_field_file_is(NULL), 0);
     REFUSED(vsh_shade_shadow(NULL, &points, &light, NULL, NULL, &value, NULL, NULL, &error));
     REFUSED(vsh_shade_shadow(casters, NULL, &light, NULL, NULL, &value, NULL, NULL, &error));
     REFUSED(vsh_shade_shadow(casters, &nowhere, &light, NULL, NULL, &value, NULL, NULL, &error));
@@ -363,7 +350,6 @@ static void nothing_is_drawn_or_compared_without_what_it_takes(void **state) {
     assert_null(vsh_comparison_channel(NULL, 0));
     assert_null(vsh_comparison_problem(NULL, 0));
     vsh_comparison_free(NULL);
-    vsh_field_file_close(NULL);
     vsh_occluders_free(casters);
 }
 

@@ -75,15 +75,6 @@ static void a_call_fills_the_struct_that_the_caller_has(void **state) {
     vsh_atlas_free(atlas);
     HOLDS(vsh_grid_info, 1, vsh_grid_get_info_sized(grid, (void *)room, size));
     HOLDS(vsh_field_info, 1, vsh_field_get_info_sized(field, (void *)room, size));
-    static const char file_name[] = "test_sized.field";
-    vsh_kept_field kept = vsh_kept_field_default();
-    kept.field = field;
-    vsh_field_file *file = NULL;
-    assert_int_equal(vsh_field_file_write(file_name, &kept, 1, NULL, 0, NULL, &why), VSH_OK);
-    assert_int_equal(vsh_field_file_open(file_name, NULL, &file, &why), VSH_OK);
-    HOLDS(vsh_kept_field, 1, vsh_field_file_get_sized(file, 0, (void *)room, size));
-    vsh_field_file_close(file);
-    assert_int_equal(remove(file_name), 0);
     vsh_occluders *casters = NULL;
     assert_int_equal(vsh_occluders_from_grid(grid, NULL, NULL, &casters, &why), VSH_OK);
     vsh_occluder_parts parts;

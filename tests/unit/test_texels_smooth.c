@@ -191,39 +191,6 @@ static void bounds_of_charts_are_those_of_their_texels(void **state) {
     free_sphere(&s);
 }
 
-/* Tiles whose samples all lie in a box are left out, those that are lifted out of it are not: of it and of
- * what is left the box is that of all. */
-static void bounds_beyond_a_box_reach_as_far_as_those_of_all(void **state) {
-    (void)state;
-    sphere s;
-    make_sphere(&s, 12, 1.0);
-    const vsh_lightmap_options options = size_of(256, 128, 1);
-    vsh_charts *charts = NULL;
-    assert_int_equal(vsh_charts_create(&s.mesh, 1, &options, NULL, NULL, &charts, NULL), VSH_OK);
-    vsh_run run = vsh_run_default();
-    double all[2][3];
-    assert_int_equal(vsh_charts_bounds(charts, NULL, all[0], all[1], NULL), VSH_OK);
-    size_t less = 0;
-    for (int n = 0; n < 200; ++n) { /* through the corners of the facets, which are at 0.87 … 1 */
-        const double low = -0.6 - 0.003 * n, high = 0.8 + 0.0011 * n;
-        const double within[2][3] = {{low, low, -2.0}, {high, 2.0, high}};
-        double beyond[2][3];
-        assert_int_equal(vshi_charts_bounds_beyond(charts, within, &run, beyond[0], beyond[1], NULL), VSH_OK);
-        for (int axis = 0; axis < 3; ++axis) {
-            assert_true(fmin(within[0][axis], beyond[0][axis]) == fmin(within[0][axis], all[0][axis]));
-            assert_true(fmax(within[1][axis], beyond[1][axis]) == fmax(within[1][axis], all[1][axis]));
-            less += beyond[1][axis] < all[1][axis];
-        }
-    }
-    assert_true(less > 50);
-    const double large[2][3] = {{-2.0, -2.0, -2.0}, {2.0, 2.0, 2.0}};
-    double none[2][3];
-    assert_int_equal(vshi_charts_bounds_beyond(charts, large, &run, none[0], none[1], NULL), VSH_OK);
-    assert_true(none[0][0] > none[1][0] && none[0][1] > none[1][1] && none[0][2] > none[1][2]);
-    vsh_charts_free(charts);
-    free_sphere(&s);
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(samples_of_a_coarse_smooth_sphere_are_lifted_to_within_its_sag),
@@ -233,7 +200,6 @@ int main(void) {
         cmocka_unit_test(a_mirrored_transform_keeps_normals_outward),
         cmocka_unit_test(a_mirrored_transform_keeps_uvs_on_their_corners),
         cmocka_unit_test(bounds_of_charts_are_those_of_their_texels),
-        cmocka_unit_test(bounds_beyond_a_box_reach_as_far_as_those_of_all),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -18,7 +18,6 @@ HIDDEN = {"struct_size", "user", "checked", "sink", "done", "writing", "look"}
 # Members that arguments of their own stand for.
 ARGUMENTS = {"vsh_light": {"type"}, "vsh_sdf_node": {"shape", "left", "right"}, "vsh_compare_files_options": {"limits"},
              "vsh_unwrap_options": {"density"}, "vsh_image_options": {"attributes", "attribute_count"},
-             "vsh_kept_field": {"field", "origin", "origin_count", "band", "band_bytes"},
              "vsh_layer": {"field", "heights", "spheres", "triangles", "lights", "light_count"}}
 NUMBERS = {"int32_t": "int", "uint32_t": "int", "uint64_t": "int", "size_t": "int", "double": "float", "float": "float"}
 

@@ -83,7 +83,7 @@ static void expect_shape(const vsh_scene *scene, const vsh_assets *assets, doubl
     if (is_traced(scene)) {
         cli_progress_expect("triangles", CLI_ESTIMATE_SHAPE, s.triangles * traced_s);
     }
-    if (chosen == 0 || scene->field != NULL) {
+    if (chosen == 0) {
         return;
     }
     cli_progress_expect("voxelize", CLI_ESTIMATE_SHAPE, voxels * voxel_s + s.triangles * triangle_s);

@@ -159,9 +159,6 @@ int cli_shared_parse(cli_bake_settings *s, int key, const char *name, const char
         return take_pattern(&s->no_cast, name, value);
     case CLI_KEY_SHARD_LEAST:
         return cli_parse_number(name, value, 0.0, 1e9, &s->shard_least);
-    case CLI_KEY_FIELD:
-        s->field = value;
-        return CLI_OK;
     default:
         code = cli_patch_take(&s->patch, key, name, value, &taken);
         return taken ? code : cli_common_parse(&s->common, key, name, value, &taken);

@@ -21,7 +21,6 @@ enum {
     CLI_KEY_LIGHTS,
     CLI_KEY_LIGHT_RADIUS,
     CLI_KEY_CASTER,
-    CLI_KEY_FIELD,
     CLI_KEY_NO_CAST,
     CLI_KEY_FLOOR,
     CLI_KEY_SHARD_LEAST
@@ -65,18 +64,10 @@ enum {
             "repeated"                                                                                       \
     }
 
-#define CLI_CASTER_OPTION                                                                                    \
-    {                                                                                                        \
+#define CLI_CASTER_OPTIONS                                                                                   \
+    {0, NULL, NULL, "Casters and voxels"}, {                                                                 \
         CLI_KEY_CASTER, "caster", "FILE",                                                                    \
             "another mesh or .vdb (FILE.vdb:GRID) that casts\nshadows; may be repeated"                      \
-    }
-
-#define CLI_CASTER_OPTIONS                                                                                   \
-    {0, NULL, NULL, "Casters and voxels"}, CLI_CASTER_OPTION, {                                              \
-        CLI_KEY_FIELD, "field", "FILE",                                                                      \
-            "take the casters' voxels from there ('vdbshade field'),\nas it was told to make them; refused " \
-            "where "                                                                                         \
-            "it is stale;\nchanges no value"                                                                 \
     }
 
 typedef struct cli_bake_settings {
@@ -97,7 +88,6 @@ typedef struct cli_bake_settings {
     int32_t band_rows; /* 0: as many as go */
     const char *casters[CLI_MAX_EXTRA_CASTERS];
     size_t caster_count;
-    const char *field;                     /* a file of fields; NULL: they are made */
     const char *exr;                       /* beside an asset; NULL: none */
     bool preview, embed, images_beside;    /* of an asset */
     double floor_size[2], floor_center[3]; /* size 0: none */
@@ -126,9 +116,8 @@ typedef struct cli_bake_scene {
     vsh_caster *casters;
     char *caster_files[CLI_MAX_EXTRA_CASTERS]; /* FILE.vdb of each --caster FILE.vdb:NAME */
     vsh_receiver *receivers;
-    char **outputs;        /* [receiver_count], where they are not the scene's own; NULL: none is */
-    vsh_light *lights;     /* [scene.light_count], where they are not all the scene file's */
-    vsh_field_file *field; /* that the scene takes; NULL: none */
+    char **outputs;    /* [receiver_count], where they are not the scene's own; NULL: none is */
+    vsh_light *lights; /* [scene.light_count], where they are not all the scene file's */
 } cli_bake_scene;
 
 /* Makes the scene, checks that it can be baked and that its outputs replace no input. */
@@ -136,10 +125,6 @@ int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made)
 
 /* The same without its receivers: for points, which may ask for no light and no AO. */
 int cli_bake_scene_for_points(const cli_bake_settings *settings, cli_bake_scene *made);
-
-/* The two steps of that: all but the file of fields, and this. */
-int cli_bake_scene_without_field(const cli_bake_settings *settings, cli_bake_scene *made);
-int cli_bake_use_field(const cli_bake_settings *settings, cli_bake_scene *made);
 
 /* Says of a shard behind the `working` ones that it had nothing to do. */
 void cli_bake_say_idle(const cli_bake_settings *settings, const char *parts, int32_t working);

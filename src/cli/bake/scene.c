@@ -289,9 +289,6 @@ int cli_bake_check_output(const cli_bake_settings *s, const vsh_scene *scene, co
         return cli_usage("%s: the output is the input", output);
     }
     CLI_TRY(cli_bake_check_lights(s, scene, output));
-    if (s->field != NULL && cli_same_file(output, s->field)) {
-        return cli_usage("%s: the output is the file of --field", output);
-    }
     const bool named_by_scene = s->output == NULL && s->output_folder == NULL && output != s->stats;
     if (named_by_scene && cli_check_links(s->input, output) != CLI_OK) {
         return CLI_FILE;
@@ -356,33 +353,6 @@ void cli_bake_say_idle(const cli_bake_settings *s, const char *parts, int32_t wo
         parts, s->shard, s->shard_count, working, parts);
 }
 
-/* Whether something is baked, or forecast: a shard without rows has no use for fields. */
-static bool has_rows(const cli_bake_settings *s, const vsh_scene *scene) {
-    return s->dry_run || s->shard <= cli_bake_shards(s, scene);
-}
-
-/* Opens the file of fields. What it says of voxels stands in outputs as if it had been given. */
-int cli_bake_use_field(const cli_bake_settings *s, cli_bake_scene *made) {
-    if (s->field == NULL) {
-        return CLI_OK;
-    }
-    const vsh_run run = cli_common_run(&s->common);
-    const int32_t named = made->scene.voxels_named;
-    vsh_error error;
-    if (vsh_field_file_open(s->field, &run, &made->field, &error) != VSH_OK ||
-        vsh_scene_use_field(&made->scene, made->field, &error) != VSH_OK) {
-        return cli_fail_of(NULL, &error);
-    }
-    if (made->scene.voxels_named != named) {
-        char text[32];
-        const vsh_grid_options *grid = &made->scene.grid;
-        const bool size = grid->voxel_size > 0.0;
-        snprintf(text, sizeof text, "%.17g", size ? grid->voxel_size : grid->resolution);
-        cli_parsed_add(size ? "voxel-size" : "resolution", text);
-    }
-    return CLI_OK;
-}
-
 /* The input, or defaults for a mesh, with what the options put over it. */
 static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scene *made) {
     memset(made, 0, sizeof *made);
@@ -411,22 +381,16 @@ static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scen
     return code == CLI_OK ? add_casters(settings, made) : code;
 }
 
-int cli_bake_scene_without_field(const cli_bake_settings *settings, cli_bake_scene *made) {
+int cli_bake_scene_for_points(const cli_bake_settings *settings, cli_bake_scene *made) {
     const int code = make(settings, false, made);
     made->scene.receivers = NULL;
     made->scene.receiver_count = 0;
     return code;
 }
 
-int cli_bake_scene_for_points(const cli_bake_settings *settings, cli_bake_scene *made) {
-    const int code = cli_bake_scene_without_field(settings, made);
-    return code == CLI_OK ? cli_bake_use_field(settings, made) : code;
-}
-
 int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made) {
     int code = make(settings, true, made);
     code = code == CLI_OK ? add_receivers(settings, made) : code;
-    code = code == CLI_OK && has_rows(settings, &made->scene) ? cli_bake_use_field(settings, made) : code;
     return code == CLI_OK ? check_outputs(settings, &made->scene) : code;
 }
 
@@ -438,6 +402,5 @@ void cli_bake_scene_free(cli_bake_scene *made) {
         free(made->caster_files[i]);
     }
     free(made->lights);
-    vsh_field_file_close(made->field);
     vsh_scene_free(made->read);
 }

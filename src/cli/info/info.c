@@ -29,7 +29,7 @@ const cli_command cli_info = {
     "open, flipped and degenerate parts, what they are taken for, UVs that overlap within or between\n"
     "objects. OpenVDB files (FILE.vdb, or FILE.vdb:GRID): class, voxel size, band, bounds, memory of\n"
     "each grid, and why it cannot cast. Scenes (.json): casters, lights, receivers. Images: size, and\n"
-    "the range of each channel. Files of 'vdbshade field': voxels, levels, and what they were made of.",
+    "the range of each channel.",
     options,
     sizeof options / sizeof options[0],
     info_main};
@@ -51,9 +51,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
 }
 
 static int print_info(const char *path, const cli_info_look *look, const vsh_run *run) {
-    if (vsh_field_file_is(path)) {
-        return cli_info_field(path, run);
-    }
     if (cli_has_ending(path, "vdb")) {
         return cli_info_vdb(path, cli_parsed_grid(), run);
     }

@@ -27,7 +27,6 @@ int cli_info_uvs(const vsh_model *model, const vsh_mesh *meshes, size_t count, c
                  const vsh_run *run);
 int cli_info_vdb(const char *path, const char *name, const vsh_run *run); /* name NULL: all grids */
 int cli_info_scene(const char *path, const vsh_run *run);
-int cli_info_field(const char *path, const vsh_run *run);
 int cli_info_image(const char *path, const vsh_run *run);
 
 #endif

@@ -37,10 +37,8 @@ typedef struct render_work {
 
 static int load(render_work *work) {
     const double start = vshi_seconds();
-    vsh_scene all = *work->scene;
-    all.field = NULL; /* level sets too: groups of one colour have fields of their own */
     vsh_error error;
-    if (vsh_assets_load(&all, &work->run, &work->assets, &error) != VSH_OK) {
+    if (vsh_assets_load(work->scene, &work->run, &work->assets, &error) != VSH_OK) {
         return cli_fail_of(NULL, &error);
     }
     CLI_TRY(render_lightmaps_read(work->settings, work->scene, work->assets, &work->run, &work->lightmaps));

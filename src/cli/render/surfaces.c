@@ -159,7 +159,6 @@ static int make_split(const vsh_scene *scene, const vsh_assets *assets, const vs
         return CLI_OK;
     }
     vsh_scene colored = *scene;
-    colored.field = NULL; /* none is of these groups */
     colored.casters = p->casters;
     colored.layers = p->layers;
     colored.layer_count = p->count;

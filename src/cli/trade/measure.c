@@ -43,12 +43,10 @@ static int make_occluders(const trade_work *work, const vsh_scene *scene, int32_
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
-int trade_make_occluders(trade_work *work, int32_t resolution, const vsh_field_file *kept,
-                         vsh_occluders **occluders, double *seconds) {
+int trade_make_occluders(trade_work *work, int32_t resolution, vsh_occluders **occluders, double *seconds) {
     vsh_scene scene = *work->scene;
     scene.grid.resolution = resolution;
     scene.grid.voxel_size = 0.0;
-    scene.field = kept;
     return make_occluders(work, &scene, 1, occluders, seconds);
 }
 

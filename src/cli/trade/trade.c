@@ -41,10 +41,7 @@ static const cli_option options[] = {
     {KEY_RECEIVER, "receiver", "N", "one receiver of the scene only, from 0 (all)"},
     {KEY_SIZE, "size", "W[xH]", "texels of each lightmap, 1 to 4096 (256)"},
     {KEY_RESOLUTIONS, "resolutions", "N,N,...",
-     "voxels along the longest side, up to 16 of them\n(64,128,256, or those of --field)"},
-    {CLI_KEY_FIELD, "field", "FILE",
-     "take the voxels of one of these from there ('vdbshade\nfield --resolution N'); refused where it is "
-     "stale; may be\nrepeated; changes no value but build_s"},
+     "voxels along the longest side, up to 16 of them\n(64,128,256)"},
     {KEY_TRUTH_RAYS, "truth-rays", "N", "rays a texel of the truth, 16 to 65536 (1024)"},
     {KEY_BUDGET, "budget", "SECONDS",
      "time to spend on runs, once there is a truth: those that\ndo not fit are left out, and counted (120)"},
@@ -91,14 +88,6 @@ static int take_resolutions(trade_settings *s, const char *name, const char *val
                      value, TRADE_MAX_RESOLUTIONS, TRADE_LEAST_RESOLUTION, TRADE_MOST_RESOLUTION);
 }
 
-static int take_field(trade_settings *s, const char *name, const char *value) {
-    if (s->kept_count == TRADE_MAX_RESOLUTIONS) {
-        return cli_usage("%s '%s': more than %d files", name, value, TRADE_MAX_RESOLUTIONS);
-    }
-    s->kept[s->kept_count++] = value;
-    return CLI_OK;
-}
-
 static int take_size(trade_settings *s, const char *name, const char *value) {
     int32_t width, height;
     CLI_TRY(cli_parse_size(name, value, &width, &height));
@@ -125,8 +114,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case CLI_KEY_SHARD:
         return cli_parse_shard(name, value, &s->bake.shard, &s->bake.shard_count);
-    case CLI_KEY_FIELD:
-        return take_field(s, name, value);
     case KEY_RECEIVER:
         return cli_parse_integer(name, value, 0, INT32_MAX, &s->receiver);
     case KEY_SIZE:
@@ -163,20 +150,11 @@ static void mark_fronts(trade_work *work) {
     }
 }
 
-static int make_field(trade_work *work, trade_field *field) {
-    CLI_TRY(trade_make_occluders(work, field->resolution, field->kept, &field->occluders, &field->build_s));
-    return trade_add_triangles(work, field);
-}
-
-/* Those out of files first: what is stale is refused before the long work. */
 static int make_fields(trade_work *work) {
-    for (int pass = 0; pass < 2; ++pass) {
-        for (size_t i = 0; i < work->field_count; ++i) {
-            trade_field *field = &work->fields[i];
-            if ((field->kept != NULL) == (pass == 0)) {
-                CLI_TRY(make_field(work, field));
-            }
-        }
+    for (size_t i = 0; i < work->field_count; ++i) {
+        trade_field *field = &work->fields[i];
+        CLI_TRY(trade_make_occluders(work, field->resolution, &field->occluders, &field->build_s));
+        CLI_TRY(trade_add_triangles(work, field));
     }
     return CLI_OK;
 }
@@ -268,7 +246,7 @@ static void say_summary(const trade_work *work) {
             s->merged != NULL ? "put together in" : "in", seconds, work->skipped);
 }
 
-static int trade(const trade_settings *settings, const trade_kept *kept, vsh_scene *scene) {
+static int trade(const trade_settings *settings, vsh_scene *scene) {
     trade_work work = {.settings = settings,
                        .scene = scene,
                        .run = cli_common_run(&settings->bake.common),
@@ -283,10 +261,6 @@ static int trade(const trade_settings *settings, const trade_kept *kept, vsh_sce
     }
     for (size_t i = 0; i < work.field_count; ++i) {
         work.fields[i].resolution = settings->resolutions[i];
-        for (size_t k = 0; k < settings->kept_count; ++k) {
-            work.fields[i].kept =
-                kept[k].resolution == settings->resolutions[i] ? kept[k].file : work.fields[i].kept;
-        }
     }
     int code;
     CLI_TRY_DONE(trade_load(&work));
@@ -332,11 +306,6 @@ static int check_files(const trade_settings *s, const vsh_scene *scene) {
                 return cli_usage("%s: both the %s and the %s", outputs[i], names[k], names[i]);
             }
         }
-        for (size_t k = 0; k < s->kept_count; ++k) {
-            if (cli_same_file(outputs[i], s->kept[k])) {
-                return cli_usage("%s: the %s is a file of --field", outputs[i], names[i]);
-            }
-        }
         named.output = outputs[i];
         CLI_TRY(cli_bake_check_output(&named, scene, outputs[i]));
         CLI_TRY(cli_temporary_check(outputs[i]));
@@ -358,8 +327,16 @@ static int choose_receiver(const trade_settings *s, vsh_scene *scene) {
     return CLI_OK;
 }
 
+static int compare_descending(const void *a, const void *b) {
+    const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
+    return (x < y) - (x > y);
+}
+
 static int parse(int argc, char **argv, trade_settings *s, bool *help) {
+    static const int32_t resolutions[] = {256, 128, 64};
     memset(s, 0, sizeof *s);
+    memcpy(s->resolutions, resolutions, sizeof resolutions);
+    s->resolution_count = sizeof resolutions / sizeof resolutions[0];
     s->bake.common = cli_common_default();
     s->bake.words = (const char *const *)argv;
     s->bake.word_count = (size_t)argc;
@@ -369,7 +346,9 @@ static int parse(int argc, char **argv, trade_settings *s, bool *help) {
     s->truth_rays = 1024;
     s->receiver = -1;
     s->budget = 120.0;
-    return cli_parse(&cli_trade, argc, argv, take, s, "INPUT", &s->bake.input, help);
+    const int code = cli_parse(&cli_trade, argc, argv, take, s, "INPUT", &s->bake.input, help);
+    qsort(s->resolutions, s->resolution_count, sizeof s->resolutions[0], compare_descending);
+    return code;
 }
 
 static int trade_by(trade_settings *s) {
@@ -380,19 +359,16 @@ static int trade_by(trade_settings *s) {
     const bool scene = cli_has_ending(s->bake.input, "json") && s->bake.floor_size[0] == 0.0;
     s->bake.output = scene ? NULL : s->report;
     cli_progress_begin(s->bake.common.progress, s->bake.common.quiet);
-    trade_kept kept[TRADE_MAX_RESOLUTIONS] = {{NULL, 0}};
     cli_bake_scene made;
     int code;
     CLI_TRY_DONE(cli_bake_scene_make(&s->bake, &made));
-    CLI_TRY_DONE(trade_open_kept(s, kept));
     CLI_TRY_DONE(check_files(s, &made.scene));
     CLI_TRY_DONE(choose_receiver(s, &made.scene));
     CLI_TRY_DONE(trade_check_view(s, &made.scene));
     cli_signals_watch();
-    code = trade(s, kept, &made.scene);
+    code = trade(s, &made.scene);
 done:
     cli_bake_scene_free(&made);
-    trade_close_kept(s, kept);
     cli_progress_end();
     return code;
 }

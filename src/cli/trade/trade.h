@@ -14,10 +14,8 @@ typedef struct trade_settings {
     const char *csv;
     const char *plot;
     const char *view;
-    const char *kept[TRADE_MAX_RESOLUTIONS]; /* [kept_count]: files of fields */
-    size_t kept_count;
-    int32_t resolutions[TRADE_MAX_RESOLUTIONS];
-    size_t resolution_count; /* 0: those of the files, or 64, 128 and 256 */
+    int32_t resolutions[TRADE_MAX_RESOLUTIONS]; /* descending */
+    size_t resolution_count;
     int32_t truth_rays;
     int32_t receiver; /* -1: all */
     double budget;    /* seconds */
@@ -73,9 +71,8 @@ typedef struct trade_run {
 
 typedef struct trade_field {
     int32_t resolution;
-    const vsh_field_file *kept; /* where it is taken from; NULL: it is made */
-    vsh_occluders *occluders;   /* of voxels alone; these two NULL in merging */
-    vsh_occluders *traced;      /* with triangles, where casters are all meshes */
+    vsh_occluders *occluders; /* of voxels alone; these two NULL in merging */
+    vsh_occluders *traced;    /* with triangles, where casters are all meshes */
     double build_s;
     uint8_t *mask; /* [texels]: 1 where a bake on this field finds a texel valid */
     size_t valid;  /* how many those are */
@@ -144,8 +141,7 @@ double trade_median(trade_clock *clock);
 
 /* All of these return CLI_OK or an exit code, having said why. */
 int trade_load(trade_work *work);
-int trade_make_occluders(trade_work *work, int32_t resolution, const vsh_field_file *kept,
-                         vsh_occluders **occluders, double *seconds);
+int trade_make_occluders(trade_work *work, int32_t resolution, vsh_occluders **occluders, double *seconds);
 int trade_add_triangles(const trade_work *work, trade_field *field);
 int trade_take_masks(trade_work *work);
 int trade_join_masks(trade_work *work); /* those of fields to common and any */
@@ -186,17 +182,6 @@ size_t trade_task_planes(const trade_work *work, const trade_task *task);
 int trade_check_part(const trade_settings *settings);
 int trade_write_part(const trade_work *work);
 int trade_take_parts(trade_work *work);
-
-/* --- fields in files */
-
-typedef struct trade_kept {
-    vsh_field_file *file;
-    int32_t resolution;
-} trade_kept;
-
-/* Opens them, and settles which resolutions are measured, largest first. */
-int trade_open_kept(trade_settings *settings, trade_kept kept[TRADE_MAX_RESOLUTIONS]);
-void trade_close_kept(const trade_settings *settings, trade_kept kept[TRADE_MAX_RESOLUTIONS]);
 
 /* --- parts of the report */
 

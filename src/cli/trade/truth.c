@@ -55,7 +55,7 @@ static int32_t marched_rays(const trade_work *work) {
 static int march(trade_work *work) {
     vsh_occluders *occluders = NULL;
     double seconds;
-    CLI_TRY(trade_make_occluders(work, truth_resolution(work), NULL, &occluders, &seconds));
+    CLI_TRY(trade_make_occluders(work, truth_resolution(work), &occluders, &seconds));
     vsh_shade_options shade = work->scene->shade;
     shade.method = VSH_SHADOW_RAYS;
     shade.ao_method = VSH_AO_RAYS;

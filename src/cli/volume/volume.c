@@ -57,32 +57,19 @@ static int choose_voxels(volume_work *work) {
             vsh_grid_info info;
             vsh_grid_get_info(work->grid, &info);
             size = info.voxel_size;
-        } else if (size == 0.0) {
-            size = cli_casters_kept_voxel_size(work->scene);
         }
         result = vsh_voxels_from_box(s->box_min, s->box_max, size, &work->run, &work->voxels, &error);
-    } else if (s->like == NULL && work->grid != NULL) {
-        result = vsh_voxels_from_grid(work->grid, s->band, &work->run, &work->voxels, &error);
     } else if (s->like == NULL) {
-        result = vsh_scene_field_band(work->scene, work->assets, s->band, &work->run, &work->voxels, &error);
+        result = vsh_voxels_from_grid(work->grid, s->band, &work->run, &work->voxels, &error);
     }
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
 /* The union of all casters in voxels: what has the band, or tells the size of a box's voxels; and without
- * layers what casts. None where a file keeps what is asked of it. */
+ * layers what casts. */
 static int make_grid(volume_work *work) {
     const volume_settings *s = work->settings;
     if (s->like != NULL || s->box_voxel_size > 0.0) {
-        return CLI_OK;
-    }
-    if (work->scene->field != NULL && work->scene->layer_count > 0) {
-        return cli_usage(
-            "--field '%s': keeps the casters of each layer on their own, and not the band of all, or the "
-            "size of its voxels: give --box and --box-voxel-size, or --like",
-            s->bake.field);
-    }
-    if (work->scene->field != NULL) {
         return CLI_OK;
     }
     const double start = vshi_seconds();
@@ -305,14 +292,11 @@ static int volume_by(volume_settings *s) {
     }
     cli_progress_begin(s->bake.common.progress, s->bake.common.quiet);
     cli_bake_scene made;
-    CLI_TRY_DONE(cli_bake_scene_without_field(&s->bake, &made));
+    CLI_TRY_DONE(cli_bake_scene_for_points(&s->bake, &made));
     if (s->band > made.scene.grid.half_width && !cli_patch_has(&s->bake.patch, "--half-width")) {
         made.scene.grid.half_width = s->band;
     }
     s->working = volume_shards(s, &made.scene);
-    if (s->bake.shard <= s->working || s->bake.dry_run) {
-        CLI_TRY_DONE(cli_bake_use_field(&s->bake, &made));
-    }
     CLI_TRY_DONE(cli_bake_check_work(&s->bake, &made));
     CLI_TRY_DONE(volume_check_files(s, &made.scene));
     cli_signals_watch();

@@ -15,7 +15,6 @@ from ._bake_scene import BakeJob, SceneLightmap, bake_scene
 from ._compare import (Comparison, Limits, Measures, Tolerances, compare, compare_accuracy, compare_coverage, compare_files, compare_judge,
                       measure_at_least)
 from ._field import Field, Heights, Spheres, Triangles, spheres_read, trace_ao, trace_shadow
-from ._field_file import FieldFile, KeptField, field_file_is, field_file_write
 from ._flat import FlatScene, flat_bake, flat_light_name, flat_visibility
 from ._grid import Grid, vdb_copy, vdb_list
 from ._image import Image, ImageWriter, image_check, image_default_pack, image_read, image_write, srgb_to_linear

@@ -12,15 +12,13 @@ from ._arrays import array, pointer, transform as matrix, vector
 from ._library import RUN, Handle, Run, call, ffi, handle_of, lib, make, place
 from ._structs import Filled, constant, path_of, told
 from ._field import Heights, Spheres, Triangles
-from ._field_file import FieldFile
-from ._grid import Attributes, Grid, attributes_of
+from ._grid import Grid
 from ._light import Light, lights_of
 from ._lightmap import Charts, _freeing
 from ._mesh import Mesh, Meshes, Model, density_rules, meshes_of
 from ._occluders import Occluders
 from ._sdf import Sdf, Solids
 from ._unwrap import Atlas
-from ._volume import Voxels
 
 
 def settings() -> List[types.Setting]:
@@ -260,47 +258,6 @@ class Scene:
         return lib.vsh_scene_reach(self.struct, handle_of(grid, Grid, "grid"), vector(receivers_min, 3, "receivers_min"),
                                    vector(receivers_max, 3, "receivers_max"))
 
-    # --- its fields, kept
-
-    def save_field(self, path: "str | os.PathLike[str]", *, assets: "Optional[Assets]" = None, attributes: Optional[Attributes] = None,
-                   run: Optional[Run] = None) -> types.SceneFieldReport:
-        """Makes the fields of its casters and writes them to a file, whole or not at all, for use_field() of this scene and of
-        others with the same casters and voxels.
-
-        Parameters
-        ----------
-        assets : Assets, optional
-            its files; None: they are loaded
-        attributes : mapping, optional
-            lines of text for people, such as provenance()
-        """
-        loaded, lines = self._assets(assets, run), attributes_of(attributes)
-        options, report = Filled("vsh_scene_field_options"), ffi.new("vsh_scene_field_report *")
-        options.pointer.attributes, options.pointer.attribute_count = lines.array, lines.count
-        call(lib.vsh_scene_save_field_sized, self.struct, loaded.handle, path_of(path, "path"), options.pointer, RUN, report,
-             ffi.sizeof("vsh_scene_field_report"), run=run)
-        return told(report[0], "vsh_scene_field_report")
-
-    def field_forecast(self, *, assets: "Optional[Assets]" = None, run: Optional[Run] = None) -> types.SceneFieldReport:
-        """What save_field() will take: voxels, bytes, seconds; times may be half or twice as much. Nothing is written."""
-        report = ffi.new("vsh_scene_field_report *")
-        call(lib.vsh_scene_field_forecast_sized, self.struct, self._assets(assets, run).handle, RUN, report,
-             ffi.sizeof("vsh_scene_field_report"), run=run)
-        return told(report[0], "vsh_scene_field_report")
-
-    def _assets(self, given: "Optional[Assets]", run: Optional[Run]) -> "Assets":
-        if given is not None:
-            handle_of(given, Assets, "assets")
-        return given or Assets(self, run=run)
-
-    def use_field(self, file: Optional[FieldFile]) -> None:
-        """Takes its fields from a file, before Assets or a BakeJob are made of it; None: they are made again. Values are those
-        that are baked without, bit by bit; InputError, then, for a file of other casters or voxels. The file stays open as
-        long as the scene. Not while other threads use the scene."""
-        handle = ffi.NULL if file is None else handle_of(file, FieldFile, "file")
-        self._filled.keeps.append(handle)
-        call(lib.vsh_scene_use_field, self.struct, handle)
-
     def bake(self, *, run: Optional[Run] = None, **options: Any) -> Any:
         """Bakes its lightmaps into arrays: a list of SceneLightmap; options of BakeJob. bake_scene() writes files."""
         from ._bake_scene import BakeJob
@@ -389,11 +346,6 @@ class Assets(Handle):
             return None
         Handle.__init__(grid, cdata)
         return grid
-
-    def field_band(self, band: float = 0.0, *, run: Optional[Run] = None) -> Voxels:
-        """The band of all casters out of the scene's file of fields, as Voxels.from_grid(casters(), band) makes it, bit by
-        bit; InputError for a narrower band than all of it, and for scenes with layers."""
-        return Voxels._made(lib.vsh_scene_field_band, self.scene.struct, self.handle, band, run=run)
 
     def triangles(self, layer: Optional[str] = None, *, run: Optional[Run] = None) -> Optional[Triangles]:
         """The triangles of the casters in a layer, or in none."""
