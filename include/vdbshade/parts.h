@@ -1,5 +1,5 @@
-/* Parts of a bake that several machines share: files PARTS.I-of-N.part, of which vsh_bake_job_merge() and
- * vsh_volume_merge() make one output. */
+/* Parts of a bake that several machines share: files PARTS.I-of-N.part, of which vsh_bake_job_merge()
+ * makes one output. */
 #ifndef VDBSHADE_PARTS_H
 #define VDBSHADE_PARTS_H
 
@@ -8,26 +8,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-/* Which part of how many, and what its file keeps. A view. */
-typedef struct vsh_part_options {
-    size_t struct_size;
-    const char *parts;               /* what the names of the parts' files begin with */
-    int32_t shard;                   /* 1 … shard_count; of a merge not looked at */
-    int32_t shard_count;             /* 1 … 10000; of a merge also 0: as many as there are beside `parts` */
-    const vsh_attribute *attributes; /* [attribute_count]: what the output will tell of where it comes from
-                                        (vsh_provenance): the same for all parts, and for their merge */
-    size_t attribute_count;
-    const char *const *words; /* [word_count]: kept as they are, for vsh_part_words() */
-    size_t word_count;
-    int32_t working; /* of a volume: how many of the shards, the first ones, have voxels
-                        (vsh_volume_shards()); the same for all parts; of a merge not looked at. 0: all */
-} vsh_part_options;
-
-static inline vsh_part_options vsh_part_options_default(void) {
-    vsh_part_options options = {sizeof(vsh_part_options), NULL, 0, 0, NULL, 0, NULL, 0, 0};
-    return options;
-}
 
 /* The words that were kept in the first part that is there of those whose names begin with `parts`, of
  * `shard_count` shards, or (0) of however many there are beside it: (*words)[*count], and NULL behind them,

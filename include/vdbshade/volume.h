@@ -2,7 +2,6 @@
 #ifndef VDBSHADE_VOLUME_H
 #define VDBSHADE_VOLUME_H
 
-#include "parts.h"
 #include "shade.h"
 #include "voxels.h"
 
@@ -57,66 +56,6 @@ VSH_API vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_vox
                                    const vsh_light *lights, size_t light_count,
                                    const vsh_volume_options *options, const vsh_run *run, vsh_volume **volume,
                                    vsh_shade_stats *stats, vsh_error *error);
-
-/* --- what it will take */
-
-/* Found out by shading some of the blocks, from all over: times are good to some tenths. */
-typedef struct vsh_volume_forecast {
-    double bake_s;     /* seconds, by run's threads */
-    double peak_bytes; /* of the process at most, as it is now and with all grids without tiles */
-    int32_t grids;     /* that it will have */
-} vsh_volume_forecast;
-
-/* What vsh_bake_volume() would take of the same arguments; under its stage. Errors: as there. */
-VSH_API vsh_result vsh_bake_volume_forecast_sized(const vsh_occluders *occluders, const vsh_voxels *voxels,
-                                                  const vsh_light *lights, size_t light_count,
-                                                  const vsh_volume_options *options, const vsh_run *run,
-                                                  vsh_volume_forecast *forecast, size_t forecast_size,
-                                                  vsh_error *error);
-static inline vsh_result vsh_bake_volume_forecast(const vsh_occluders *occluders, const vsh_voxels *voxels,
-                                                  const vsh_light *lights, size_t light_count,
-                                                  const vsh_volume_options *options, const vsh_run *run,
-                                                  vsh_volume_forecast *forecast, vsh_error *error) {
-    return vsh_bake_volume_forecast_sized(occluders, voxels, lights, light_count, options, run, forecast,
-                                          sizeof *forecast, error);
-}
-
-/* --- in parts */
-
-/* How many of `shard_count` shards should have voxels (vsh_part_options.working): as many, 1 at least, as
- * have `least` seconds of one thread's work each, as far as the number of voxels, lights, AO and max_error
- * tell, rather too few than too many; 0 or less, NaN: all. Cannot fail. */
-VSH_API int32_t vsh_volume_shards(double voxels, size_t light_count, const vsh_volume_options *options,
-                                  double least, int32_t shard_count);
-
-/* Bakes part shard of shard_count, as much work as any other that has voxels, and writes it to
- * PARTS.SHARD-of-COUNT.part, whole or not at all. Needs memory for the whole volume at most. A shard behind
- * part->working has no voxels: occluders and voxels may be NULL, and attributes are not looked at. Errors: as
- * vsh_bake_volume(); VSH_ERROR_ARGUMENT (part NULL or of another number), VSH_ERROR_WRITE. */
-VSH_API vsh_result vsh_bake_volume_part(const vsh_occluders *occluders, const vsh_voxels *voxels,
-                                        const vsh_light *lights, size_t light_count,
-                                        const vsh_volume_options *options, const vsh_part_options *part,
-                                        const vsh_run *run, vsh_shade_stats *stats, vsh_error *error);
-
-/* Puts the parts of all shards together, which were baked of these voxels, lights and options: the same
- * volume as vsh_bake_volume() makes, bit by bit. Errors: as there, but of occluders; VSH_ERROR_READ (a part
- * is missing), VSH_ERROR_INPUT (there are none; one is damaged, or of other voxels, attributes or another
- * version, which it names). Other lights and options are noticed by attributes that tell of them, as those of
- * vsh_provenance_create() do; without, they are the caller's to keep. */
-VSH_API vsh_result vsh_volume_merge(const vsh_voxels *voxels, const vsh_light *lights, size_t light_count,
-                                    const vsh_volume_options *options, const vsh_part_options *parts,
-                                    const vsh_run *run, vsh_volume **volume, vsh_shade_stats *stats,
-                                    vsh_error *error);
-
-/* What cast in the first part that is there, of `shard_count` shards, or (0) of however many there are: voxel
- * size, levels, voxels, bytes of fields, triangles. Errors: as vsh_part_words(). */
-VSH_API vsh_result vsh_volume_part_casters_sized(const char *parts, int32_t shard_count, const vsh_run *run,
-                                                 vsh_occluders_info *casters, size_t casters_size,
-                                                 vsh_error *error);
-static inline vsh_result vsh_volume_part_casters(const char *parts, int32_t shard_count, const vsh_run *run,
-                                                 vsh_occluders_info *casters, vsh_error *error) {
-    return vsh_volume_part_casters_sized(parts, shard_count, run, casters, sizeof *casters, error);
-}
 
 #ifdef __cplusplus
 }

@@ -55,7 +55,7 @@ vsh_result vshi_fill_begin(vshi_fill *fill, const vshi_solid *solid, const vsh_v
         }
         fill->first_step[square] = s;
     }
-    fill->distance_error = solid != NULL ? DISTANCE_ERROR * solid->voxel_size : 0.0;
+    fill->distance_error = DISTANCE_ERROR * solid->voxel_size;
     VSHI_TRY(vshi_allocate((void **)&fill->shaded, fill->block_count, sizeof *fill->shaded, "volume", error));
     return vshi_allocate((void **)&fill->filled, fill->block_count, sizeof *fill->filled, "volume", error);
 }
@@ -108,23 +108,21 @@ static size_t list_open(const vshi_fill *fill, size_t block, uint16_t voxel[VSHI
     return count;
 }
 
-size_t vshi_fill_reaches(const vshi_fill *fill, size_t block, uint8_t *reaches) {
-    uint16_t voxel[VSHI_BLOCK_VOXELS + 1];
+enum { NO_REACH = 255 };
+
+/* Finds for each of these voxels the least square of its distance to a shaded voxel, in voxels. The solid's
+ * distance bounds it; NO_REACH means that no shaded voxel is close enough. */
+static void find_reaches(const vshi_fill *fill, size_t block, const uint16_t *voxel, size_t count,
+                         uint8_t *reaches) {
     double centre[VSHI_BLOCK_VOXELS][3];
     float distance[VSHI_BLOCK_VOXELS];
-    const size_t count = list_open(fill, block, voxel);
-    if (fill->solid == NULL) {
-        memcpy(reaches, fill->given[block], count);
-        return count;
-    }
     vshi_voxels_centres(fill->voxels, block, count, voxel, centre);
     vshi_solid_sample(fill->solid, count, &centre[0][0], distance);
     for (size_t i = 0; i < count; ++i) {
         const double inside = -(double)distance[i] - fill->distance_error;
         const double least = inside > 0.0 ? inside / fill->longest : 0.0; /* 0 where nothing is known */
-        reaches[i] = least <= VSHI_FILL_REACH ? (uint8_t)ceil(least * least) : VSHI_FILL_NONE;
+        reaches[i] = least <= VSHI_FILL_REACH ? (uint8_t)ceil(least * least) : NO_REACH;
     }
-    return count;
 }
 
 static bool copy_value(const vshi_fill *fill, size_t block, int voxel, size_t from, int nearest) {
@@ -159,7 +157,7 @@ bool vshi_fill_block(vshi_fill *fill, size_t block) {
     uint16_t open[VSHI_BLOCK_VOXELS + 1];
     uint8_t reaches[VSHI_BLOCK_VOXELS];
     const size_t count = list_open(fill, block, open);
-    vshi_fill_reaches(fill, block, reaches);
+    find_reaches(fill, block, open, count, reaches);
     for (size_t i = 0; i < count; ++i) {
         const int voxel = open[i];
         size_t from;

@@ -17,8 +17,7 @@ typedef struct vshi_fill_step {
 enum { VSHI_FILL_REACH = 4, VSHI_FILL_STEPS = 256 }; /* voxels; places within them */
 
 typedef struct vshi_fill {
-    const vshi_solid *solid; /* NULL: `given` tells what it would */
-    uint8_t *const *given;   /* [block_count]: vshi_fill_reaches() of each that has open voxels */
+    const vshi_solid *solid;
     const vsh_voxels *voxels;
     const vshi_block *blocks;
     vsh_volume *volume;
@@ -33,16 +32,10 @@ typedef struct vshi_fill {
     _Atomic uint64_t shaded_count, filled_count, off_count;
 } vshi_fill;
 
-/* `solid` may be NULL where `given` is set before anything is filled. Errors: VSH_ERROR_MEMORY. */
+/* Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_fill_begin(vshi_fill *fill, const vshi_solid *solid, const vsh_voxels *voxels,
                            vsh_volume *volume, size_t channel_count, bool fills, vsh_error *error);
 void vshi_fill_end(vshi_fill *fill);
-
-/* Of each voxel of a block that was not shaded, in their order: the least square of its distance to one that
- * was, voxels, as far as the solid tells; VSHI_FILL_NONE where none is in reach. reaches[VSHI_BLOCK_VOXELS];
- * returns how many there are. */
-enum { VSHI_FILL_NONE = 255 };
-size_t vshi_fill_reaches(const vshi_fill *fill, size_t block, uint8_t *reaches);
 
 /* Fills a block's voxels that were not shaded, where one within reach was; all blocks are shaded by then.
  * Different blocks on different threads. False where memory is short. */

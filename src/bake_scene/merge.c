@@ -16,14 +16,13 @@ const char *vshi_parts_name(const vsh_bake_job *job) {
                                       : job->scene.receivers[0].output; /* of a shard without rows */
 }
 
-vsh_part_options vshi_job_part_options(const vsh_bake_job *job, int32_t count) {
-    vsh_part_options options = vsh_part_options_default();
-    options.parts = vshi_parts_name(job);
-    options.shard = job->options.shard;
-    options.shard_count = count;
+vshi_part_options vshi_job_part_options(const vsh_bake_job *job, int32_t count) {
+    vshi_part_options options = {.parts = vshi_parts_name(job),
+                                 .shard = job->options.shard,
+                                 .shard_count = count,
+                                 .words = job->options.words,
+                                 .word_count = job->options.word_count};
     options.attributes = vsh_provenance_attributes(job->provenance, &options.attribute_count);
-    options.words = job->options.words;
-    options.word_count = job->options.word_count;
     return options;
 }
 
@@ -112,9 +111,9 @@ static vsh_result check_part(const vsh_bake_job *job, const vshi_part *part, con
                              int32_t shard, int32_t count, vsh_error *error) {
     const vshi_part_head *head = &part->head;
     const bool idle = shard > head->working;
-    vsh_part_options own = vshi_job_part_options(job, count);
+    vshi_part_options own = vshi_job_part_options(job, count);
     own.attribute_count = idle ? 0 : own.attribute_count;
-    VSHI_TRY(vshi_part_about_check(&head->about, part->path, VSHI_PART_BAKE, shard, &own, error));
+    VSHI_TRY(vshi_part_about_check(&head->about, part->path, shard, &own, error));
     if (head->working != first->head.working) {
         char theirs[24], ours[24];
         snprintf(theirs, sizeof theirs, "%d", head->working);

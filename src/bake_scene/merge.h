@@ -22,7 +22,7 @@ typedef struct vshi_parts {
 const char *vshi_parts_name(const vsh_bake_job *job);
 
 /* What its parts' files say of themselves, of `count` shards. */
-vsh_part_options vshi_job_part_options(const vsh_bake_job *job, int32_t count);
+vshi_part_options vshi_job_part_options(const vsh_bake_job *job, int32_t count);
 
 /* Reads all parts of a job whose lightmaps are measured, and checks that they are its own and complete; sets
  * what the report tells of casters, and where the output comes from. Errors: as vshi_part_open();

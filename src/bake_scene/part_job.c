@@ -54,7 +54,7 @@ static vsh_result begin_part(vsh_bake_job *job, const vsh_run *run, vshi_part_pi
                              size_t *piece_count, vsh_error *error) {
     *pieces = NULL;
     const vsh_occluders_info *casters = &job->report.occluders;
-    const vsh_part_options options = vshi_job_part_options(job, job->options.shard_count);
+    const vshi_part_options options = vshi_job_part_options(job, job->options.shard_count);
     vshi_part_head head = {.error_count = job->report.error_count,
                            .voxel_size = casters->voxel_size,
                            .active_voxels = casters->active_voxels,
@@ -69,7 +69,7 @@ static vsh_result begin_part(vsh_bake_job *job, const vsh_run *run, vshi_part_pi
     char *path = vshi_part_path(options.parts, options.shard, options.shard_count);
     VSHI_TRY_DONE(vshi_channels_name(&job->scene, 1, 1, &channels, error));
     VSHI_TRY_DONE(list_pieces(job, run, &head, error));
-    VSHI_TRY_DONE(vshi_part_about_make(VSHI_PART_BAKE, &options, &head.about, error));
+    VSHI_TRY_DONE(vshi_part_about_make(&options, &head.about, error));
     if (path == NULL || !copy_channels(&channels, &head)) {
         result = vshi_fail(error, VSH_ERROR_MEMORY, "part: the system refused memory");
         goto done;

@@ -94,10 +94,6 @@ static vsh_result read_stats(vshi_part *part, vshi_part_code *code, vsh_error *e
 
 static vsh_result read_part(vshi_part_input *input, const vsh_run *run, vshi_part *part, vsh_error *error) {
     vshi_part_head *head = &part->head;
-    if (strcmp(head->about.kind, VSHI_PART_BAKE) != 0) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "%s: is a part of a %.32s, not of a bake", part->path,
-                         head->about.kind);
-    }
     vshi_part_code_head(&input->head, head);
     VSHI_TRY(vshi_part_input_end_head(input, error));
     VSHI_TRY(vshi_allocate((void **)&part->offset, (size_t)head->piece_count + 1, sizeof *part->offset,

@@ -11,8 +11,6 @@
 #include <vdbshade/bake.h>
 #include <vdbshade/image.h>
 
-#define VSHI_PART_BAKE "bake" /* the kind of part */
-
 /* A lightmap of the job that a part is of. */
 typedef struct vshi_part_lightmap {
     int32_t width, height;

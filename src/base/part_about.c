@@ -16,11 +16,10 @@ void vshi_part_about_free(vshi_part_about *about) {
     free(about->attributes);
     free(about->words);
     free(about->version);
-    free(about->kind);
-    *about = (vshi_part_about){.kind = NULL};
+    *about = (vshi_part_about){.version = NULL};
 }
 
-static bool copy_words(const vsh_part_options *options, vshi_part_about *about) {
+static bool copy_words(const vshi_part_options *options, vshi_part_about *about) {
     about->words = calloc(options->word_count + 1, sizeof *about->words);
     for (size_t i = 0; about->words != NULL && i < options->word_count; ++i) {
         about->words[about->word_count++] = strdup(options->words[i]);
@@ -31,7 +30,7 @@ static bool copy_words(const vsh_part_options *options, vshi_part_about *about) 
     return about->words != NULL;
 }
 
-static bool copy_attributes(const vsh_part_options *options, vshi_part_about *about) {
+static bool copy_attributes(const vshi_part_options *options, vshi_part_about *about) {
     about->attributes = calloc(options->attribute_count + 1, sizeof *about->attributes);
     for (size_t i = 0; about->attributes != NULL && i < options->attribute_count; ++i) {
         vshi_part_attribute *attribute = &about->attributes[about->attribute_count++];
@@ -44,20 +43,15 @@ static bool copy_attributes(const vsh_part_options *options, vshi_part_about *ab
     return about->attributes != NULL;
 }
 
-vsh_result vshi_part_about_make(const char *kind, const vsh_part_options *options, vshi_part_about *about,
-                                vsh_error *error) {
-    *about = (vshi_part_about){.kind = strdup(kind),
-                               .version = strdup(VSHI_VERSION),
-                               .shard = options->shard,
-                               .shard_count = options->shard_count};
-    return about->kind != NULL && about->version != NULL && copy_words(options, about) &&
-                   copy_attributes(options, about)
+vsh_result vshi_part_about_make(const vshi_part_options *options, vshi_part_about *about, vsh_error *error) {
+    *about = (vshi_part_about){
+        .version = strdup(VSHI_VERSION), .shard = options->shard, .shard_count = options->shard_count};
+    return about->version != NULL && copy_words(options, about) && copy_attributes(options, about)
                ? VSH_OK
                : vshi_fail(error, VSH_ERROR_MEMORY, "part: the system refused memory");
 }
 
 void vshi_part_about_code(vshi_part_code *code, vshi_part_about *about) {
-    vshi_part_code_text(code, &about->kind);
     vshi_part_code_text(code, &about->version);
     vshi_part_code_i32(code, &about->shard);
     vshi_part_code_i32(code, &about->shard_count);
@@ -79,7 +73,7 @@ vsh_result vshi_part_refuse(const char *path, const char *what, const char *thei
 }
 
 static vsh_result check_attributes(const vshi_part_about *about, const char *path,
-                                   const vsh_part_options *options, vsh_error *error) {
+                                   const vshi_part_options *options, vsh_error *error) {
     const vsh_attribute *own = options->attributes;
     const size_t count = options->attribute_count;
     for (size_t i = 0; i < count || i < about->attribute_count; ++i) {
@@ -94,39 +88,15 @@ static vsh_result check_attributes(const vshi_part_about *about, const char *pat
     return VSH_OK;
 }
 
-vsh_result vshi_part_about_check(const vshi_part_about *about, const char *path, const char *kind,
-                                 int32_t shard, const vsh_part_options *options, vsh_error *error) {
+vsh_result vshi_part_about_check(const vshi_part_about *about, const char *path, int32_t shard,
+                                 const vshi_part_options *options, vsh_error *error) {
     if (strcmp(about->version, VSHI_VERSION) != 0) {
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: is of vdbshade %.32s, this is %s; bake this part again",
                          path, about->version, VSHI_VERSION);
-    }
-    if (strcmp(about->kind, kind) != 0) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "%s: is a part of a %.32s, not of a %s", path, about->kind,
-                         kind);
     }
     if (about->shard != shard || about->shard_count != options->shard_count) {
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: holds part %d of %d; was it renamed?", path,
                          about->shard, about->shard_count);
     }
     return check_attributes(about, path, options, error);
-}
-
-vsh_result vshi_part_check_options(const vsh_part_options *options, bool merges, vsh_error *error) {
-    const int32_t count = options->shard_count;
-    if (count < (merges ? 0 : 1) || count > VSHI_MOST_SHARDS ||
-        (!merges && (options->shard < 1 || options->shard > count))) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "shard %d of %d: expected 1 to the number of shards, at most %d", options->shard,
-                         count, VSHI_MOST_SHARDS);
-    }
-    if (!merges && (options->working < 0 || options->working > count)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%d of %d shards work: expected 0 (all) to the number",
-                         options->working, count);
-    }
-    VSHI_NEEDS_OF(options->word_count, options->words);
-    VSHI_NEEDS_OF(options->attribute_count, options->attributes);
-    for (size_t i = 0; i < options->word_count; ++i) {
-        VSHI_NEEDS(options->words[i]);
-    }
-    return VSH_OK;
 }

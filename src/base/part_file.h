@@ -12,14 +12,14 @@
 #include <stdio.h>
 
 /* "PARTS.I-of-N.part", to be freed; NULL where memory is short. */
-VSHI_SHARED char *vshi_part_path(const char *parts, int32_t shard, int32_t count);
+char *vshi_part_path(const char *parts, int32_t shard, int32_t count);
 
 /* The number of shards of the parts beside a name, of which there may be some missing. Errors:
  * VSH_ERROR_INPUT (there are none, or of several numbers), VSH_ERROR_READ, VSH_ERROR_MEMORY. */
-VSHI_SHARED vsh_result vshi_parts_count(const char *parts, int32_t *count, vsh_error *error);
+vsh_result vshi_parts_count(const char *parts, int32_t *count, vsh_error *error);
 
 /* Whether all parts are there. Errors: VSH_ERROR_READ, with those that are missing; VSH_ERROR_MEMORY. */
-VSHI_SHARED vsh_result vshi_parts_check_there(const char *parts, int32_t count, vsh_error *error);
+vsh_result vshi_parts_check_there(const char *parts, int32_t count, vsh_error *error);
 
 /* The path of the part with the lowest number that is there, to be freed; shard_count 0: of however many. */
 vsh_result vshi_parts_first(const char *parts, int32_t shard_count, char **path, vsh_error *error);
@@ -42,14 +42,14 @@ typedef struct vshi_part_output {
 
 /* Begins a part with its head, whose memory is freed. Errors, and then nothing is under way: VSH_ERROR_WRITE,
  * VSH_ERROR_MEMORY. */
-VSHI_SHARED vsh_result vshi_part_output_begin(vshi_part_output *part, const char *path, vshi_part_code *head,
-                                              uint64_t body_bytes, uint64_t tail_bytes, vsh_error *error);
+vsh_result vshi_part_output_begin(vshi_part_output *part, const char *path, vshi_part_code *head,
+                                  uint64_t body_bytes, uint64_t tail_bytes, vsh_error *error);
 
 /* The next bytes of body and tail, a multiple of 4. What could not be written is told at the end. */
-VSHI_SHARED void vshi_part_output_put(vshi_part_output *part, const void *bytes, size_t size);
+void vshi_part_output_put(vshi_part_output *part, const void *bytes, size_t size);
 
 /* Puts the file in its place. Errors: VSH_ERROR_WRITE. */
-VSHI_SHARED vsh_result vshi_part_output_finish(vshi_part_output *part, vsh_error *error);
+vsh_result vshi_part_output_finish(vshi_part_output *part, vsh_error *error);
 void vshi_part_output_abandon(vshi_part_output *part); /* what is not under way, too */
 
 /* --- reading, in this order */
@@ -64,35 +64,33 @@ typedef struct vshi_part_input {
 
 /* Opens a part and reads its head. Errors: VSH_ERROR_READ, VSH_ERROR_INPUT (no part, damaged, another
  * version's), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Close it, and free `about`, also after an error. */
-VSHI_SHARED vsh_result vshi_part_input_open(const char *path, const vsh_run *run, vshi_part_input *part,
-                                            vshi_part_about *about, vsh_error *error);
+vsh_result vshi_part_input_open(const char *path, const vsh_run *run, vshi_part_input *part,
+                                vshi_part_about *about, vsh_error *error);
 
 /* Whether all of the head was read. */
-VSHI_SHARED vsh_result vshi_part_input_end_head(const vshi_part_input *part, vsh_error *error);
+vsh_result vshi_part_input_end_head(const vshi_part_input *part, vsh_error *error);
 
 /* Goes over the body, and (`whole`) sums it up. Errors: VSH_ERROR_READ, VSH_ERROR_MEMORY,
  * VSH_ERROR_CANCELLED. */
-VSHI_SHARED vsh_result vshi_part_input_pass_body(vshi_part_input *part, bool whole, const vsh_run *run,
-                                                 vsh_error *error);
+vsh_result vshi_part_input_pass_body(vshi_part_input *part, bool whole, const vsh_run *run, vsh_error *error);
 
 /* Reads the tail, whose memory is the caller's to free also after an error. */
 vsh_result vshi_part_input_tail(vshi_part_input *part, const vsh_run *run, vshi_part_code *tail,
                                 vsh_error *error);
 
 /* Whether, with its body, it is what was written. */
-VSHI_SHARED vsh_result vshi_part_input_check_sum(vshi_part_input *part, vsh_error *error);
-VSHI_SHARED void vshi_part_input_close(vshi_part_input *part);
+vsh_result vshi_part_input_check_sum(vshi_part_input *part, vsh_error *error);
+void vshi_part_input_close(vshi_part_input *part);
 
 /* --- reading again */
 
 /* Opens a part at a place in its body. Errors: VSH_ERROR_READ, VSH_ERROR_MEMORY. */
-VSHI_SHARED vsh_result vshi_part_reopen(const char *path, uint64_t at, FILE **file, vsh_error *error);
-VSHI_SHARED vsh_result vshi_part_read_bytes(FILE *file, const char *path, void *bytes, size_t size,
-                                            vsh_error *error);
+vsh_result vshi_part_reopen(const char *path, uint64_t at, FILE **file, vsh_error *error);
+vsh_result vshi_part_read_bytes(FILE *file, const char *path, void *bytes, size_t size, vsh_error *error);
 
-VSHI_SHARED vsh_result vshi_part_skip(FILE *file, const char *path, size_t size, vsh_error *error);
+vsh_result vshi_part_skip(FILE *file, const char *path, size_t size, vsh_error *error);
 
 /* VSH_ERROR_INPUT: `what` of it cannot be. */
-VSHI_SHARED vsh_result vshi_part_damaged(const char *path, const char *what, vsh_error *error);
+vsh_result vshi_part_damaged(const char *path, const char *what, vsh_error *error);
 
 #endif

@@ -73,7 +73,7 @@ static vsh_result refuse_short(vshi_part_input *part, vsh_error *error) {
 vsh_result vshi_part_input_open(const char *path, const vsh_run *run, vshi_part_input *part,
                                 vshi_part_about *about, vsh_error *error) {
     *part = (vshi_part_input){.path = path, .sum = VSHI_PART_SUM};
-    *about = (vshi_part_about){.kind = NULL};
+    *about = (vshi_part_about){.version = NULL};
     uint64_t size;
     VSHI_TRY(vshi_input_open(path, path, UINT64_MAX / 2, &part->file, &size, error));
     if (size < sizeof part->front + sizeof(uint64_t)) {

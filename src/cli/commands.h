@@ -19,21 +19,6 @@ extern const cli_command cli_view;
 extern const cli_command cli_help;
 extern const cli_command cli_merge;
 
-/* The parts of a volume, by the command line that one of them kept. */
-int cli_volume_merge(int argc, char **argv, const char *output, int32_t shards, const char *stats,
-                     const cli_common *common);
-
-/* What `merge` was told of a trade. */
-typedef struct cli_merged {
-    const char *output;
-    const char *csv, *plot, *view; /* NULL: none */
-    int32_t shards;                /* 0: as many as there are */
-    const cli_common *common;
-} cli_merged;
-
-/* The parts of a trade, likewise. */
-int cli_trade_merge(int argc, char **argv, const cli_merged *merged);
-
 int cli_bake_main(int argc, char **argv);
 int cli_render_main(int argc, char **argv);
 

@@ -2,12 +2,14 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/names.h"
+#include "base/numbers.h"
 #include "base/parallel.h"
 #include "base/try.h"
+#include "light/light.h"
 #include "shade/layers.h"
-#include "volume/channels.h"
 #include "volume/volume_blocks.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -46,51 +48,33 @@ static void settle_blocks(void *user, size_t begin, size_t end) {
 
 /* --- the whole */
 
-/* A range of blocks under way. */
-typedef struct range {
-    vshi_volume_bake *bake;
-    size_t first;
-} range;
-
-static void shade_range(void *user, size_t begin, size_t end) {
-    const range *r = user;
-    vshi_volume_shade_blocks(r->bake, r->first + begin, r->first + end);
-}
-
 static vsh_result check_memory(vshi_volume_bake *bake, vsh_result result, vsh_error *error) {
     return result == VSH_OK && atomic_load(&bake->out_of_memory)
                ? vshi_fail(error, VSH_ERROR_MEMORY, "volume: the system refused memory")
                : result;
 }
 
-vsh_result vshi_volume_shade_by(vshi_volume_bake *bake, const vsh_light *lights, size_t count, size_t grain,
-                                vshi_range_fn *fn, void *user, vshi_job *job, size_t units,
-                                vsh_error *error) {
-    vsh_shade_options shade = bake->options.shade;
+static vsh_result shade(vshi_volume_bake *bake, const vsh_light *lights, vshi_job *job, vsh_error *error) {
+    vsh_shade_options options = bake->options.shade;
     if (bake->options.ao == 0) {
-        shade.ao_method = VSH_AO_CONES; /* not asked for: it may want what is not there */
+        options.ao_method = VSH_AO_CONES; /* not asked for: it may want what is not there */
     }
     const bool around = !bake->normals && bake->options.ao != 0; /* AO over all directions */
     VSHI_TRY(
-        vshi_query_create(bake->occluders, lights, bake->light_count, &shade, around, &bake->query, error));
-    const vsh_result result = vshi_parallel_for(job, count, grain, units, fn, user, error);
+        vshi_query_create(bake->occluders, lights, bake->light_count, &options, around, &bake->query, error));
+    const vsh_result result = vshi_parallel_for(job, bake->block_count, VSHI_VOLUME_GRAIN, SHADE_UNITS,
+                                                vshi_volume_shade_blocks, bake, error);
     vsh_query_free(bake->query);
     bake->query = NULL;
     return check_memory(bake, result, error);
 }
 
-vsh_result vshi_volume_shade(vshi_volume_bake *bake, const vsh_light *lights, size_t begin, size_t end,
-                             vshi_job *job, size_t units, vsh_error *error) {
-    range r = {bake, begin};
-    return vshi_volume_shade_by(bake, lights, end - begin, VSHI_VOLUME_GRAIN, shade_range, &r, job, units,
-                                error);
-}
-
-vsh_result vshi_volume_finish(vshi_volume_bake *bake, vshi_job *job, size_t units, vsh_error *error) {
+/* Fills and settles all blocks, and closes the volume. */
+static vsh_result finish(vshi_volume_bake *bake, vshi_job *job, vsh_error *error) {
     static vshi_range_fn *const passes[] = {fill_blocks, settle_blocks};
     for (size_t i = 0; i < sizeof passes / sizeof passes[0]; ++i) {
-        VSHI_TRY(vshi_parallel_for(job, bake->block_count, VSHI_VOLUME_GRAIN, i == 0 ? units : 0, passes[i],
-                                   bake, error));
+        VSHI_TRY(vshi_parallel_for(job, bake->block_count, VSHI_VOLUME_GRAIN, i == 0 ? FILL_UNITS : 0,
+                                   passes[i], bake, error));
     }
     VSHI_TRY(check_memory(bake, VSH_OK, error));
     const vsh_volume_info counts = vshi_fill_counts(&bake->fill);
@@ -111,27 +95,66 @@ static void find_half_axes(vshi_volume_bake *bake) {
     }
 }
 
-void vshi_volume_describe(const vshi_volume_bake *bake, const vsh_light *lights, vshi_channel *channels) {
-    const vshi_channels what = {
-        lights,         bake->light_count,       &bake->options,      bake->shadow_error,
-        bake->ao_error, bake->caster_voxel_size, bake->has_triangles,
-    };
-    vshi_channels_describe(&what, channels);
+static vshi_channel *next_of(vshi_channel **next, const vshi_volume_bake *bake, const char *method) {
+    vshi_channel *channel = (*next)++;
+    *channel = (vshi_channel){.method = method, .caster_voxel_size = bake->caster_voxel_size};
+    return channel;
 }
 
-vsh_result vshi_volume_open(vshi_volume_bake *bake, const vsh_light *lights, const vsh_run *run,
-                            vsh_error *error) {
+static void describe_shadow(const vshi_volume_bake *bake, const vsh_light *lights, bool error,
+                            vshi_channel **next) {
+    const vsh_shade_options *shade = &bake->options.shade;
+    const char *method =
+        vsh_shadow_method_name(vsh_shadow_method_resolve(shade->method, bake->occluders->triangles != NULL));
+    for (size_t l = 0; l < bake->light_count; ++l) {
+        const vsh_light *light = &lights[l];
+        vshi_channel *c = next_of(next, bake, method);
+        snprintf(c->name, sizeof c->name, "%s.%s", error ? "error" : "shadow", light->name);
+        snprintf(c->description, sizeof c->description, "%s light '%s', 1 lit, 0 dark",
+                 error ? "standard error of the visible fraction of" : "visible fraction of", light->name);
+        vsh_light_text(light, c->light, sizeof c->light);
+    }
+}
+
+static void describe_ao(const vshi_volume_bake *bake, bool error, vshi_channel **next) {
+    const vsh_shade_options *shade = &bake->options.shade;
+    const int32_t method = vsh_ao_method_resolve(shade->ao_method, bake->occluders->triangles != NULL);
+    vshi_channel *c = next_of(next, bake, vsh_ao_method_name(method));
+    snprintf(c->name, sizeof c->name, "%s", error ? "error.ao" : "ao");
+    snprintf(c->description, sizeof c->description, "%s within %g, 1 open, 0 closed",
+             error ? "standard error of ambient occlusion" : "ambient occlusion", shade->ao_distance);
+}
+
+/* Fills a channel for each grid, in the order of vsh_volume. */
+static void describe(const vshi_volume_bake *bake, const vsh_light *lights, vshi_channel *channels) {
+    VSHI_NUMBERS;
+    vshi_channel *next = channels;
+    describe_shadow(bake, lights, false, &next);
+    if (bake->options.ao != 0) {
+        describe_ao(bake, false, &next);
+    }
+    if (bake->shadow_error) {
+        describe_shadow(bake, lights, true, &next);
+    }
+    if (bake->ao_error) {
+        describe_ao(bake, true, &next);
+    }
+}
+
+/* Begins the volume and its filling. Errors: as vshi_volume_begin(). End it with vshi_fill_end(), and free
+ * the volume, also then. */
+static vsh_result begin(vshi_volume_bake *bake, const vsh_light *lights, const vsh_run *run,
+                        vsh_error *error) {
     vshi_channel *channels = NULL;
     VSHI_TRY(vshi_allocate((void **)&channels, bake->channel_count, sizeof *channels, "volume", error));
-    vshi_volume_describe(bake, lights, channels);
+    describe(bake, lights, channels);
     const double held = bake->held + 2.0 * (double)bake->block_count * sizeof *bake->fill.shaded;
     const vsh_result result =
         vshi_volume_begin(bake->voxels, channels, bake->channel_count, run, held, &bake->volume, error);
     free(channels);
     VSHI_TRY(result);
-    return vshi_fill_begin(&bake->fill, bake->occluders != NULL ? &bake->solid : NULL, bake->voxels,
-                           bake->volume, bake->channel_count, bake->options.inside == VSH_INSIDE_NEAREST,
-                           error);
+    return vshi_fill_begin(&bake->fill, &bake->solid, bake->voxels, bake->volume, bake->channel_count,
+                           bake->options.inside == VSH_INSIDE_NEAREST, error);
 }
 
 static vsh_result bake_all(vshi_volume_bake *bake, const vsh_light *lights, const vsh_run *run,
@@ -142,9 +165,9 @@ static vsh_result bake_all(vshi_volume_bake *bake, const vsh_light *lights, cons
         return vshi_fail(error, VSH_ERROR_MEMORY, "volume: the system refused memory");
     }
     vsh_result result;
-    VSHI_TRY_DONE(vshi_volume_open(bake, lights, run, error));
-    VSHI_TRY_DONE(vshi_volume_shade(bake, lights, 0, blocks, job, SHADE_UNITS, error));
-    result = vshi_volume_finish(bake, job, FILL_UNITS, error);
+    VSHI_TRY_DONE(begin(bake, lights, run, error));
+    VSHI_TRY_DONE(shade(bake, lights, job, error));
+    result = finish(bake, job, error);
 done:
     vshi_fill_end(&bake->fill);
     vshi_job_end(job);
@@ -185,18 +208,17 @@ static void take_casters(vshi_volume_bake *bake, const vsh_occluders *occluders)
     vsh_field_get_info(occluders->field, &info);
     bake->solid = vshi_solid_of(occluders);
     bake->caster_voxel_size = info.voxel_size;
-    bake->has_triangles = occluders->triangles != NULL;
-    bake->held =
-        (double)info.bytes + (bake->has_triangles ? (double)vsh_triangles_bytes(occluders->triangles) : 0.0);
+    bake->held = (double)info.bytes +
+                 (occluders->triangles != NULL ? (double)vsh_triangles_bytes(occluders->triangles) : 0.0);
     for (size_t i = 0; i < occluders->layer_count; ++i) {
         bake->held += vshi_layer_bytes(&occluders->layers[i]);
     }
 }
 
-vsh_result vshi_volume_set_up(vshi_volume_bake *bake, const vsh_occluders *occluders,
-                              const vsh_voxels *voxels, const vsh_light *lights, size_t light_count,
-                              const vsh_volume_options *options, const vsh_run *run, vsh_run *full,
-                              vsh_error *error) {
+/* Checks what there is to bake, and takes it; `options` and `run` may be NULL. Errors: VSH_ERROR_ARGUMENT. */
+static vsh_result set_up(vshi_volume_bake *bake, const vsh_occluders *occluders, const vsh_voxels *voxels,
+                         const vsh_light *lights, size_t light_count, const vsh_volume_options *options,
+                         const vsh_run *run, vsh_run *full, vsh_error *error) {
     *bake = (vshi_volume_bake){.occluders = occluders,
                                .voxels = voxels,
                                .light_count = light_count,
@@ -204,9 +226,7 @@ vsh_result vshi_volume_set_up(vshi_volume_bake *bake, const vsh_occluders *occlu
                                .one = vsh_run_default(),
                                .lock = PTHREAD_MUTEX_INITIALIZER,
                                .stats = vsh_shade_stats_zero()};
-    if (occluders != NULL) {
-        take_casters(bake, occluders);
-    }
+    take_casters(bake, occluders);
     vsh_shade_options shade;
     VSHI_TRY(
         vshi_options_resolve(options, &bake->options, sizeof bake->options, "vsh_volume_options", error));
@@ -214,7 +234,7 @@ vsh_result vshi_volume_set_up(vshi_volume_bake *bake, const vsh_occluders *occlu
     bake->options.shade = shade;
     VSHI_TRY(vshi_run_resolve(run, full, error));
     VSHI_TRY(check(lights, bake, error));
-    if (occluders != NULL && occluders->field->unknown) {
+    if (occluders->field->unknown) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "volume: the occluders have no voxels, which tell what is inside");
     }
@@ -243,7 +263,7 @@ vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_voxels *vox
     VSHI_NEEDS_OF(light_count, lights);
     vsh_run full;
     vshi_volume_bake bake;
-    VSHI_TRY(vshi_volume_set_up(&bake, occluders, voxels, lights, light_count, options, run, &full, error));
+    VSHI_TRY(set_up(&bake, occluders, voxels, lights, light_count, options, run, &full, error));
     const vsh_result result = bake_all(&bake, lights, &full, error);
     if (stats != NULL) {
         vshi_shade_stats_add(stats, &bake.stats);

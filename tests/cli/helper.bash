@@ -119,11 +119,6 @@ unless_sanitized() {
     case ${CFLAGS:-} in *-fsanitize*) skip "$1" ;; esac
 }
 
-# What of a table of `trade` does not hang on time: all columns but those of seconds, and the front.
-untimed() {
-    cut -d, -f1-4,8-20,22 "$1"
-}
-
 # write_packed FILE TYPE TRANSFORM: a floor under a smaller floor. Their UVs have one layout, as integers or floats. The texture has
 # the TRANSFORM.
 write_packed() {

@@ -270,22 +270,3 @@ begin() {
     [ "$status" -eq 130 ] || fail "expected 130"
     [ ! -e "$folder" ] || fail "SIGHUP left bakes"
 }
-
-@test "shards share the cases out: each is in one, and one may have none" {
-    for name in a b c d; do sed "s/box.exr/$name.exr/" scenes/box.json >scenes/$name.json; done
-    rm scenes/box.json
-    regress --update --quiet
-    for shard in 1/3 2/3 3/3; do
-        regress --all --shard $shard
-        done_well
-        echo "$output" >>told.txt
-    done
-    [ "$(grep -Eo '^[a-d]: alike' told.txt | tr '\n' ' ')" = "a: alike d: alike b: alike c: alike " ] || fail "$(cat told.txt)"
-    regress --all --shard 7/9
-    done_well
-    shade regress scenes --shard 0/2
-    refused 2 "--shard '0/2': expected I/N"
-    # what others were alike to is kept
-    regress
-    [[ $output != *": alike"* ]] || fail "baked again"
-}

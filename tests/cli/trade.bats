@@ -34,6 +34,15 @@ column() {
     column resolution | grep -qx 24
     ! grep -qE 'nan|inf' trade.csv || fail "a number is none"
     column front | grep -qx 1 || fail "nothing on the front"
+    # none on the front is beaten in both time and error; each other one is by some, or is as good
+    awk -F, 'NR > 1 && $2 != "embree" { n = ++count[$1]; rate[$1, n] = $7; rmse[$1, n] = $13; front[$1, n] = $21 }
+             END { for (s in count) for (i = 1; i <= count[s]; ++i) {
+                       beaten = matched = 0
+                       for (k = 1; k <= count[s]; ++k) if (k != i) {
+                           beaten += rate[s, k] < rate[s, i] && rmse[s, k] < rmse[s, i]
+                           matched += rate[s, k] <= rate[s, i] && rmse[s, k] <= rmse[s, i]
+                       }
+                       if (front[s, i] ? beaten : !matched) exit 1 } }' trade.csv || fail "$(cat trade.csv)"
 }
 
 # scene CASTERS RECEIVERS: scene.json with a wide sun.

@@ -98,6 +98,13 @@ info() {
     [[ $output == *"shadow.sun"*"'ao'"*"error.sun"*"error.ao"* ]] || fail "no errors"
 }
 
+@test "a dry run tells voxels and memory, and bakes nothing" {
+    shade volume "$ASSETS/cloister.glb" --sun 1,1,1 --ao 1 --box 0,0,0,1,2,3 --box-voxel-size 0.1 --resolution 16 -o out.vdb --dry-run
+    done_well
+    [[ "$output" =~ ^"voxels        6000, those inside too"$'\n'"memory        about "[0-9.]+" MiB at most"$ ]] || fail "$output"
+    [ ! -e out.vdb ]
+}
+
 @test "bad options are refused, and the old file stays" {
     old_output out.vdb
     shade volume scene.json

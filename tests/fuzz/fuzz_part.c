@@ -30,18 +30,17 @@ static const char *const scenes[] = {
     "\"ao\":{\"distance\":1,\"method\":\"exact\",\"bent_normals\":\"tangent\"},"
     "\"receivers\":[{\"mesh\":\"floor.obj\",\"size\":[16,40],\"ao_spacing\":2,\"output\":\"1.exr\"}]}"};
 
-enum { BAKES = sizeof scenes / sizeof scenes[0], VOLUME = BAKES, KINDS };
+enum { KINDS = sizeof scenes / sizeof scenes[0] };
 
 /* What parts are of. */
 typedef struct source {
-    vsh_scene *scene; /* NULL: the volume */
+    vsh_scene *scene;
     char name[512];
     unsigned char *bytes[SHARDS];
     size_t size[SHARDS];
 } source;
 
 static source sources[KINDS];
-static vsh_voxels *voxels;
 
 static void must(vsh_result result, const vsh_error *error) {
     if (result != VSH_OK) {
@@ -71,40 +70,6 @@ static void bake_scene(source *s, int kind) {
     }
 }
 
-static vsh_part_options volume_parts(const source *s, int32_t shard) {
-    static const vsh_attribute attribute = {"of", "a ball"};
-    vsh_part_options parts = vsh_part_options_default();
-    parts.parts = s->name;
-    parts.shard = shard;
-    parts.shard_count = SHARDS;
-    parts.attributes = &attribute;
-    parts.attribute_count = 1;
-    return parts;
-}
-
-static void bake_volume(const source *s) {
-    vsh_sdf_node ball = vsh_sdf_node_default();
-    ball.radius = 0.5;
-    const vsh_sdf sdf = {&ball, 1};
-    static const double low[3] = {-1, -1, -1}, high[3] = {1, 1, 1};
-    vsh_grid_options resolution = vsh_grid_options_default();
-    resolution.resolution = 12;
-    const vsh_light sun = vsh_light_default();
-    vsh_error error;
-    vsh_grid *grid;
-    vsh_occluders *occluders;
-    must(vsh_grid_from_sdf(&sdf, &resolution, NULL, &grid, &error), &error);
-    must(vsh_occluders_from_grid(grid, NULL, NULL, &occluders, &error), &error);
-    must(vsh_voxels_from_box(low, high, 0.15, NULL, &voxels, &error), &error);
-    for (int32_t shard = 1; shard <= SHARDS; ++shard) {
-        const vsh_part_options parts = volume_parts(s, shard);
-        const vsh_volume_options options = vsh_volume_options_default();
-        must(vsh_bake_volume_part(occluders, voxels, &sun, 1, &options, &parts, NULL, NULL, &error), &error);
-    }
-    vsh_occluders_free(occluders);
-    vsh_grid_free(grid);
-}
-
 static void load(source *s, int shard) {
     char path[600];
     snprintf(path, sizeof path, "%s.%d-of-%d.part", s->name, shard + 1, SHARDS);
@@ -122,12 +87,8 @@ static void make_sources(void) {
     fuzz_file("wall.obj", wall_text, sizeof wall_text - 1);
     for (int kind = 0; kind < KINDS; ++kind) {
         source *s = &sources[kind];
-        snprintf(s->name, sizeof s->name, "%s/%d.%s", fuzz_folder(), kind, kind == VOLUME ? "vdb" : "exr");
-        if (kind == VOLUME) {
-            bake_volume(s);
-        } else {
-            bake_scene(s, kind);
-        }
+        snprintf(s->name, sizeof s->name, "%s/%d.exr", fuzz_folder(), kind);
+        bake_scene(s, kind);
         for (int shard = 0; shard < SHARDS; ++shard) {
             load(s, shard);
         }
@@ -262,22 +223,6 @@ static void merge_lightmaps(const source *s, bool bands) {
     vsh_bake_job_free(job);
 }
 
-static void merge_volume(const source *s) {
-    const vsh_light sun = vsh_light_default();
-    const vsh_volume_options options = vsh_volume_options_default();
-    const vsh_part_options parts = volume_parts(s, 0);
-    const vsh_run run = fuzz_run();
-    vsh_shade_stats stats = vsh_shade_stats_zero();
-    vsh_error error;
-    vsh_volume *volume;
-    FUZZ_MAKE(volume,
-              vsh_volume_merge(voxels, &sun, 1, &options, &parts, &run, &volume, &stats, fuzz_error(&error)));
-    vsh_volume_free(volume);
-    vsh_occluders_info casters;
-    const vsh_result result = vsh_volume_part_casters(s->name, 0, &run, &casters, fuzz_error(&error));
-    fuzz_ended(result, &error, result == VSH_OK ? &casters : NULL);
-}
-
 static void read_words(const source *s) {
     const vsh_run run = fuzz_run();
     char **words = NULL;
@@ -303,11 +248,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     char name[64];
     snprintf(name, sizeof name, "%s.%d-of-%d.part", strrchr(s->name, '/') + 1, shard + 1, SHARDS);
     fuzz_file(name, p.at, p.size);
-    if (s->scene != NULL) {
-        merge_lightmaps(s, which >= 128);
-    } else {
-        merge_volume(s);
-    }
+    merge_lightmaps(s, which >= 128);
     read_words(s);
     fuzz_file(name, s->bytes[shard], s->size[shard]);
     free(p.at);

@@ -175,7 +175,7 @@ class Reach(Case):
         v.render([occluders.field], occluders, lamp, camera=camera, width=8, height=8,
                  lit=[v.LitMeshes(floor(), {"shadow.sun": lightmap["shadow.sun"]})]).encode(alpha=True)
         del baked, volume, job, assets, atlas, writer
-        self.hidden(), self.pages(), self.volume_parts(), self.job_parts()
+        self.hidden(), self.pages(), self.job_parts()
 
     def lights(self):
         path = self.folder / "lamp.gltf"
@@ -250,34 +250,6 @@ class Reach(Case):
         v.view_write_bakes(self.folder / "bakes.html", [dict(model=glb), dict(name="grey", images=[maps[0]]),
                                                         dict(name="b", images=[maps[1]])])
         self.assertIn("grey", (self.folder / "bakes.html").read_text())
-
-    def volume_parts(self):
-        """Two parts make the volume of one bake, bit by bit."""
-        v, parts, lamp = vdbshade, self.folder / "volume", sun(angle=1.0)
-        occluders, voxels = v.Occluders(box(), resolution=16), v.Voxels.from_box((-1, 0, -1), (1, 1.5, 1), 0.25)
-        whole = v.bake_volume(occluders, voxels, lamp, ao=True, ao_distance=1.0)
-        for shard in (1, 2):
-            v.bake_volume_part(occluders, voxels, lamp, parts=parts, shard=shard, shard_count=2, words=["a", "ü"], attributes={"a": "b"},
-                               ao=True, ao_distance=1.0)
-        merged = v.volume_merge(voxels, lamp, parts=parts, attributes={"a": "b"}, ao=True, ao_distance=1.0)
-        low, shape = [-4, 0, -4], [8, 6, 8]
-        for name in ("shadow.sun", "ao"):
-            self.assertSame(merged.values(name, low, shape), whole.values(name, low, shape))
-            self.assertGreater(len(set(whole.values(name, low, shape).flat)), 2)
-        self.assertEqual(v.part_words(parts), ["a", "ü"])
-        self.assertEqual(v.volume_part_casters(parts).voxel_size, occluders.info.voxel_size)
-        forecast = v.bake_volume_forecast(occluders, voxels, lamp, ao=True, ao_distance=1.0)
-        self.assertEqual(forecast.grids, 2)
-        self.assertGreater(forecast.bake_s, 0.0)
-        self.assertEqual(v.volume_shards(voxels.info.count, 1, 0.4, 2, ao=True, ao_distance=1.0), 1)
-        self.assertEqual(v.volume_shards(1e9, 1, 0.4, 64, ao=True, ao_distance=1.0), 64)
-        for shard in (1, 2):
-            v.bake_volume_part(occluders if shard == 1 else None, voxels if shard == 1 else None, lamp, parts=parts, shard=shard,
-                               shard_count=2, working=1, attributes={"a": "b"}, ao=True, ao_distance=1.0)
-        merged = v.volume_merge(voxels, lamp, parts=parts, attributes={"a": "b"}, ao=True, ao_distance=1.0)
-        self.assertSame(merged.values("ao", low, shape), whole.values("ao", low, shape))
-        with self.assertRaisesRegex(v.InputError, "volume.1-of-2.part"):
-            v.volume_merge(voxels, lamp, parts=parts, attributes={"a": "c"}, ao=True, ao_distance=1.0)
 
     def job_parts(self):
         """Two parts make the lightmap of one bake, bit by bit."""

@@ -1,4 +1,4 @@
-/* Parts of strangers, of lightmaps and of volumes: no file makes merging do worse than fail. */
+/* Parts of strangers: no file makes merging do worse than fail. */
 #include "base/part_file.h"
 #include "base/part_sum.h"
 #include "parts.h"
@@ -32,11 +32,19 @@ static void write_file(const char *path, const bytes *b) {
     assert_int_equal(fclose(file), 0);
 }
 
-typedef vsh_result merge_fn(void *user, vsh_error *error);
+typedef struct bake_case {
+    case_scene *scene;
+    taken *rows;
+    vsh_run run;
+} bake_case;
+
+static vsh_result merge_bake(const bake_case *c, vsh_error *error) {
+    return merge(c->scene, c->rows, &c->run, error);
+}
 
 /* Changes every byte of the head, of the tail, and some of what lies between, to what is worst for a number
  * of it. What is refused is refused by the part's name; so many are at least. */
-static void try_all(const char *path, merge_fn *merge_it, void *user, size_t least_refused) {
+static void try_all(const char *path, bake_case *one, size_t least_refused) {
     static const unsigned char worst[] = {0x00, 0x01, 0x7f, 0x80, 0xff};
     const bytes good = read_file(path);
     bytes bad = {malloc(good.size), good.size};
@@ -54,7 +62,7 @@ static void try_all(const char *path, merge_fn *merge_it, void *user, size_t lea
         bad.at[at] = worst[at % sizeof worst] != good.at[at] ? worst[at % sizeof worst] : 0xaa;
         write_file(path, &bad);
         vsh_error error = {VSH_OK, ""};
-        const vsh_result result = merge_it(user, &error);
+        const vsh_result result = merge_bake(one, &error);
         if (result == VSH_OK) {
             ++taken_all_the_same; /* a value, a count, a text of nobody's */
         } else if ((result != VSH_ERROR_INPUT && result != VSH_ERROR_READ && result != VSH_ERROR_LIMIT) ||
@@ -68,20 +76,9 @@ static void try_all(const char *path, merge_fn *merge_it, void *user, size_t lea
     memcpy(bad.at, good.at, good.size);
     write_file(path, &bad);
     vsh_error error;
-    assert_ok(merge_it(user, &error), &error);
+    assert_ok(merge_bake(one, &error), &error);
     free(bad.at);
     free(good.at);
-}
-
-typedef struct bake_case {
-    case_scene *scene;
-    taken *rows;
-    vsh_run run;
-} bake_case;
-
-static vsh_result merge_bake(void *user, vsh_error *error) {
-    const bake_case *c = user;
-    return merge(c->scene, c->rows, &c->run, error);
 }
 
 static void try_all_of(case_scene *c) {
@@ -90,7 +87,7 @@ static void try_all_of(case_scene *c) {
     assert_non_null(one.rows);
     one.run.memory_limit = 64 << 20;
     one.run.threads = 1;
-    try_all(at("floor.exr.2-of-2.part"), merge_bake, &one, 100);
+    try_all(at("floor.exr.2-of-2.part"), &one, 100);
     free(one.rows);
 }
 
@@ -146,7 +143,7 @@ static void kinds_of_other_channels_are_refused(void **state) {
 }
 
 /* Writes values that no bake produces all over the body, with the right checksum. */
-static void try_values(const char *path, const char *place, merge_fn *merge_it, void *user) {
+static void try_values(const char *path, const char *place, bake_case *one) {
     static const float values[] = {NAN, INFINITY, -INFINITY, -1.0f, 2.0f};
     const bytes good = read_file(path);
     vshi_part_front front;
@@ -162,7 +159,7 @@ static void try_values(const char *path, const char *place, merge_fn *merge_it, 
         memcpy(bad.at + body + i * sizeof value, &value, sizeof value);
         write_file(path, &bad);
         vsh_error error = {VSH_OK, ""};
-        const vsh_result result = merge_it(user, &error);
+        const vsh_result result = merge_bake(one, &error);
         char expected[64];
         snprintf(expected, sizeof expected, "is %g, out of range 0 … 1", (double)value);
         if (result == VSH_ERROR_INPUT && strstr(error.message, expected) != NULL) {
@@ -185,79 +182,8 @@ static void values_out_of_range_are_refused_by_part_plane_and_texel(void **state
     bake_parts(&c);
     bake_case one = {&c, calloc(1, sizeof(taken)), vsh_run_default()};
     assert_non_null(one.rows);
-    try_values(at("floor.exr.2-of-2.part"), "of texel (", merge_bake, &one);
+    try_values(at("floor.exr.2-of-2.part"), "of texel (", &one);
     free(one.rows);
-}
-
-typedef struct volume_case {
-    vsh_voxels *voxels;
-    vsh_light sun;
-    vsh_volume_options options;
-    vsh_part_options parts;
-    vsh_run run;
-} volume_case;
-
-static vsh_result merge_volume(void *user, vsh_error *error) {
-    const volume_case *c = user;
-    vsh_volume *volume = NULL;
-    const vsh_result result =
-        vsh_volume_merge(c->voxels, &c->sun, 1, &c->options, &c->parts, &c->run, &volume, NULL, error);
-    vsh_volume_free(volume);
-    return result;
-}
-
-static void no_part_of_a_volume_does_worse_than_fail(void **state) {
-    (void)state;
-    vsh_sdf_node ball = vsh_sdf_node_default();
-    ball.radius = 0.5;
-    const vsh_sdf sdf = {&ball, 1};
-    static const double low[3] = {-1, -1, -1}, high[3] = {1, 1, 1};
-    static const vsh_attribute attribute = {"of", "a ball"};
-    char name[300];
-    snprintf(name, sizeof name, "%s", at("ball.vdb"));
-    vsh_grid_options resolution = vsh_grid_options_default();
-    resolution.resolution = 16;
-    vsh_error error;
-    vsh_grid *grid = NULL;
-    vsh_occluders *occluders = NULL;
-    volume_case c = {.sun = vsh_light_default(),
-                     .options = vsh_volume_options_default(),
-                     .parts = vsh_part_options_default(),
-                     .run = vsh_run_default()};
-    c.run.memory_limit = 64 << 20;
-    c.run.threads = 1;
-    assert_ok(vsh_grid_from_sdf(&sdf, &resolution, NULL, &grid, &error), &error);
-    assert_ok(vsh_occluders_from_grid(grid, NULL, NULL, &occluders, &error), &error);
-    assert_ok(vsh_voxels_from_box(low, high, 0.1, NULL, &c.voxels, &error), &error);
-    c.parts.parts = name;
-    c.parts.shard_count = SHARDS;
-    c.parts.attributes = &attribute;
-    c.parts.attribute_count = 1;
-    for (c.parts.shard = 1; c.parts.shard <= SHARDS; ++c.parts.shard) {
-        assert_ok(
-            vsh_bake_volume_part(occluders, c.voxels, &c.sun, 1, &c.options, &c.parts, NULL, NULL, &error),
-            &error);
-    }
-    try_all(at("ball.vdb.2-of-2.part"), merge_volume, &c, 100);
-    try_values(at("ball.vdb.2-of-2.part"), "of voxel (", merge_volume, &c);
-    c.parts.working = 1; /* the second has no voxels, and nothing is to be given for it */
-    c.parts.shard = 1;
-    assert_ok(vsh_bake_volume_part(occluders, c.voxels, &c.sun, 1, &c.options, &c.parts, NULL, NULL, &error),
-              &error);
-    c.parts.shard = 2;
-    assert_ok(vsh_bake_volume_part(NULL, NULL, NULL, 0, NULL, &c.parts, NULL, NULL, &error), &error);
-    assert_ok(merge_volume(&c, &error), &error);
-    try_all(at("ball.vdb.2-of-2.part"), merge_volume, &c, 20);
-    c.parts.working = 3;
-    assert_int_equal(
-        vsh_bake_volume_part(occluders, c.voxels, &c.sun, 1, &c.options, &c.parts, NULL, NULL, &error),
-        VSH_ERROR_ARGUMENT);
-    vsh_occluders_info casters;
-    assert_ok(vsh_volume_part_casters(name, 0, NULL, &casters, &error), &error);
-    assert_true(casters.voxel_size > 0.0);
-    vsh_voxels_free(c.voxels);
-    vsh_occluders_free(occluders);
-    vsh_grid_free(grid);
 }
 
 int main(void) {
@@ -266,7 +192,6 @@ int main(void) {
         cmocka_unit_test(no_part_that_leaves_ao_does_worse_than_fail),
         cmocka_unit_test(kinds_of_other_channels_are_refused),
         cmocka_unit_test(values_out_of_range_are_refused_by_part_plane_and_texel),
-        cmocka_unit_test(no_part_of_a_volume_does_worse_than_fail),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -93,7 +93,7 @@ typedef struct cli_bake_settings {
     double floor_size[2], floor_center[3]; /* size 0: none */
     bool has_sun, has_sun_angle, has_light_radius, per_object, dry_run;
     int32_t shard, shard_count; /* 0: all of it */
-    double shard_least;         /* seconds; 0: all shards have rows, as those of a trade do */
+    double shard_least;         /* seconds; 0: all shards have rows */
     double height, world[2];    /* --height and --size-world; 0: not given. world[1] 0: the image says */
     const char *const *words;   /* [word_count]: the command line that this is */
     size_t word_count;

@@ -380,22 +380,14 @@ int regress_failed(regress_case *one, int code) {
     return CLI_OK;
 }
 
-/* Whether a case is one of those asked for, `at` of those that --only leaves. */
-static bool is_asked(const regress_settings *s, const regress_case *one, size_t *at) {
-    if (s->only != NULL && strstr(one->name, s->only) == NULL) {
-        return false;
-    }
-    const size_t place = (*at)++;
-    return s->shard == 0 || place % (size_t)s->shard_count == (size_t)s->shard - 1;
-}
-
 int regress_find_cases(regress_work *work) {
     int code = read_list(work);
     code = code == CLI_OK ? add_scenes(work) : code;
-    size_t kept = 0, asked = 0;
+    const char *only = work->settings->only;
+    size_t kept = 0;
     for (size_t i = 0; i < work->case_count; ++i) {
         regress_case *one = &work->cases[i];
-        if (code == CLI_OK && !is_asked(work->settings, one, &asked)) {
+        if (code == CLI_OK && only != NULL && strstr(one->name, only) == NULL) {
             regress_free_case(one);
             continue;
         }
@@ -413,10 +405,9 @@ int regress_find_cases(regress_work *work) {
         }
     }
     work->case_count = kept;
-    if (code == CLI_OK && kept == 0 && asked == 0) { /* a shard may have none */
-        return work->settings->only != NULL
-                   ? cli_usage("%s: no case's name holds '%s'", work->folder, work->settings->only)
-                   : cli_usage("%s: no scenes (.json) in it", work->folder);
+    if (code == CLI_OK && kept == 0) {
+        return only != NULL ? cli_usage("%s: no case's name holds '%s'", work->folder, only)
+                            : cli_usage("%s: no scenes (.json) in it", work->folder);
     }
     return code == CLI_OK ? check_unique(work) : code;
 }

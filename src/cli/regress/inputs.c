@@ -219,10 +219,10 @@ static bool was_alike(const regress_case *one) {
     return one->status == REGRESS_UNCHANGED || one->status == REGRESS_ALIKE || one->status == REGRESS_UPDATED;
 }
 
-/* Cases that --only and --shard left out stay as they were. */
+/* Cases that --only left out stay as they were. */
 int regress_write_cache(const regress_work *work) {
     json_t *old = regress_load(work->cache), *alike = json_object(), *root = json_object();
-    if (work->settings->only != NULL || work->settings->shard > 0) {
+    if (work->settings->only != NULL) {
         json_object_update(alike, json_object_get(old, "alike"));
     }
     for (size_t i = 0; i < work->case_count; ++i) {

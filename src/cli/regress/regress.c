@@ -25,7 +25,6 @@ static const cli_option options[] = {
      "put new bakes in the place of golden ones that they are\nnot like, and of missing ones"},
     {KEY_ALL, "all", NULL, "bake what did not change, too"},
     {KEY_ONLY, "only", "TEXT", "only cases whose names hold it"},
-    CLI_SHARD_OPTION("only every Nth case, from the Ith on: for N machines,\neach with a --cache of its own"),
     {KEY_CACHE, "cache", "FILE", "what was alike, and of what inputs\n(DIR/.regress-cache.json)"},
     {KEY_BAKES, "bakes", "FOLDER", "keep the new bakes there"},
     {0, NULL, NULL, "Reports"},
@@ -61,8 +60,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_ONLY:
         s->only = value;
         return CLI_OK;
-    case CLI_KEY_SHARD:
-        return cli_parse_shard(name, value, &s->shard, &s->shard_count);
     case KEY_CACHE:
         s->cache = value;
         return CLI_OK;

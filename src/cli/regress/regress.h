@@ -36,7 +36,6 @@ typedef struct regress_settings {
     cli_compare_settings compare;
     const char *folder, *cache, *bakes, *only;
     bool update, all;
-    int32_t shard, shard_count; /* 0: all cases */
 } regress_settings;
 
 typedef struct regress_work {

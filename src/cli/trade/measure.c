@@ -193,24 +193,19 @@ static int compare_both(const trade_work *work, trade_run *run) {
 }
 
 static void say(const trade_work *work, const trade_run *run) {
-    char line[256], error[32] = "";
-    if (work->settings->bake.common.quiet || work->settings->bake.merged != NULL) {
+    char line[256];
+    if (work->settings->bake.common.quiet) {
         return;
     }
-    if (work->settings->bake.shard == 0) {
-        snprintf(error, sizeof error, "RMSE %.4f, ", run->metrics.rmse);
-    }
-    snprintf(line, sizeof line, "%s%s: %s%.3f s", run->embree ? "Embree, " : "", run->options, error,
-             run->bake_s);
+    snprintf(line, sizeof line, "%s%s: RMSE %.4f, %.3f s", run->embree ? "Embree, " : "", run->options,
+             run->metrics.rmse, run->bake_s);
     cli_progress_line(line);
 }
 
 int trade_add(trade_work *work, trade_run *run) {
     trade_subject *subject = &work->subjects[work->tasks[run->task].subject];
     run->rate = 1e6 * run->bake_s / (double)(subject->planes * run->valid);
-    if (work->settings->bake.shard == 0) {
-        CLI_TRY(compare_both(work, run));
-    }
+    CLI_TRY(compare_both(work, run));
     trade_run *more = realloc(subject->runs, (subject->run_count + 1) * sizeof *more);
     if (more == NULL) {
         return cli_out_of_memory("runs");

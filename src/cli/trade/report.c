@@ -153,14 +153,11 @@ static void write_texels(FILE *out, const trade_work *work) {
         "a run’s own voxel size.</dd>\n<dt>Truth</dt><dd>%s; it took %.1f s.</dd>\n",
         work->covered - work->points, work->truth_text, work->truth_s);
     fprintf(out,
-            "<dt>Time</dt><dd>%s%s; median of three runs where they are short. A bake’s time is that of the "
+            "<dt>Time</dt><dd>%s; median of three runs where they are short. A bake’s time is that of the "
             "whole "
             "bake stage: which texels are valid, where rays begin, cones and rays. Building is voxels and "
             "field%s. A value is one light’s at one texel, or one texel’s AO.</dd>\n",
-            work->threads == 1 ? "one thread, processor time" : "all threads asked for, wall time",
-            work->settings->bake.merged != NULL
-                ? ", each of the machine that took it: several may have shared the runs"
-                : "",
+            work->run.threads == 1 ? "one thread, processor time" : "all threads asked for, wall time",
             work->meshes
                 ? ", and the tree of triangles where rays meet those. Embree’s time is that of making "
                   "and tracing the rays, from texels known to be valid"
@@ -168,10 +165,9 @@ static void write_texels(FILE *out, const trade_work *work) {
     if (work->skipped > 0) {
         fprintf(
             out,
-            "<dt>Budget</dt><dd>%zu runs did not fit into the budget of %g s%s; <code>--budget</code> gives "
+            "<dt>Budget</dt><dd>%zu runs did not fit into the budget of %g s; <code>--budget</code> gives "
             "more.</dd>\n",
-            work->skipped, work->settings->budget,
-            work->settings->bake.merged != NULL ? " of their part" : "");
+            work->skipped, work->settings->budget);
     }
     fprintf(out, "<dt>Made by</dt><dd>vdbshade %s</dd></dl>\n", vsh_version());
 }

@@ -78,7 +78,8 @@ int trade_load(trade_work *work) {
     return load_casters(work);
 }
 
-int trade_join_masks(trade_work *work) {
+/* Joins the masks of fields to common and any. */
+static int join_masks(trade_work *work) {
     work->common = malloc(work->texels);
     work->any = calloc(work->texels, 1);
     if (work->common == NULL || work->any == NULL) {
@@ -119,7 +120,7 @@ int trade_take_masks(trade_work *work) {
             field->mask[i] = coverage[i] > 0.0f;
         }
     }
-    code = trade_join_masks(work);
+    code = join_masks(work);
 done:
     free(coverage);
     return code;

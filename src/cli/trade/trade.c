@@ -1,7 +1,6 @@
 /* vdbshade trade: speed against accuracy, measured on the user's own scene. */
 #include "trade.h"
 #include "base/clock.h"
-#include "base/part_file.h"
 #include "cli/casters.h"
 #include "cli/message.h"
 #include "cli/paths.h"
@@ -34,9 +33,6 @@ static const cli_option options[] = {
      "write the plot of the shadow (without lights, of AO)\nas a picture of its own too"},
     {KEY_VIEW, "view", "PAGE.html",
      "also a page to look at the runs in a browser, truth and\nbakes with a slider between: docs/view.md"},
-    CLI_SHARD_OPTION("take part I of N of the runs, chosen so that all parts take\nas long, into "
-                     "OUT.I-of-N.part; 'vdbshade merge OUT' makes\nthe page of all, --csv, --plot and --view "
-                     "are for it"),
     {0, NULL, NULL, "What is measured"},
     {KEY_RECEIVER, "receiver", "N", "one receiver of the scene only, from 0 (all)"},
     {KEY_SIZE, "size", "W[xH]", "texels of each lightmap, 1 to 4096 (256)"},
@@ -112,8 +108,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_VIEW:
         s->view = value;
         return CLI_OK;
-    case CLI_KEY_SHARD:
-        return cli_parse_shard(name, value, &s->bake.shard, &s->bake.shard_count);
     case KEY_RECEIVER:
         return cli_parse_integer(name, value, 0, INT32_MAX, &s->receiver);
     case KEY_SIZE:
@@ -162,31 +156,23 @@ static int make_fields(trade_work *work) {
 static int do_tasks(trade_work *work) {
     size_t next = 0;
     for (; next < work->task_count && work->tasks[next].kind == TRADE_TRUTH; ++next) {
-        const trade_task *task = &work->tasks[next];
-        CLI_TRY(trade_is_ours(work, task) ? trade_take_truth(work, task) : CLI_OK);
+        CLI_TRY(trade_take_truth(work, &work->tasks[next]));
     }
     work->measuring = vshi_seconds();
     for (; next < work->task_count; ++next) {
         const trade_task *task = &work->tasks[next];
-        if (trade_is_ours(work, task)) {
-            CLI_TRY(task->kind == TRADE_EMBREE ? trade_measure_embree(work, task)
-                                               : trade_measure(work, task));
-        }
+        CLI_TRY(task->kind == TRADE_EMBREE ? trade_measure_embree(work, task) : trade_measure(work, task));
     }
     return CLI_OK;
 }
 
 static int measure(trade_work *work) {
     trade_describe_truth(work);
-    if (work->settings->bake.merged != NULL) {
-        CLI_TRY(trade_take_parts(work));
-    } else {
-        CLI_TRY(make_fields(work));
-        CLI_TRY(trade_take_masks(work));
-        CLI_TRY(trade_place_points(work));
-        CLI_TRY(trade_list_tasks(work));
-        CLI_TRY(do_tasks(work));
-    }
+    CLI_TRY(make_fields(work));
+    CLI_TRY(trade_take_masks(work));
+    CLI_TRY(trade_place_points(work));
+    CLI_TRY(trade_list_tasks(work));
+    CLI_TRY(do_tasks(work));
     mark_fronts(work);
     return CLI_OK;
 }
@@ -229,21 +215,11 @@ static int write_all(const trade_work *work) {
 }
 
 static void say_summary(const trade_work *work) {
-    const cli_bake_settings *s = &work->settings->bake;
     const size_t runs = work->subjects[0].run_count + work->subjects[1].run_count;
     const double seconds = vshi_seconds() - work->began;
-    if (s->common.quiet) {
-        return;
+    if (!work->settings->bake.common.quiet) {
+        cli_say("%s: %zu runs in %.1f s, %zu left out", work->settings->report, runs, seconds, work->skipped);
     }
-    if (s->shard > 0) {
-        cli_say("%s.%d-of-%d.part: %zu runs in %.1f s, %zu left out; 'vdbshade merge %s' once all parts are "
-                "there",
-                work->settings->report, s->shard, s->shard_count, runs, seconds, work->skipped,
-                work->settings->report);
-        return;
-    }
-    cli_say("%s: %zu runs %s %.1f s, %zu left out", work->settings->report, runs,
-            s->merged != NULL ? "put together in" : "in", seconds, work->skipped);
 }
 
 static int trade(const trade_settings *settings, vsh_scene *scene) {
@@ -252,7 +228,6 @@ static int trade(const trade_settings *settings, vsh_scene *scene) {
                        .run = cli_common_run(&settings->bake.common),
                        .field_count = settings->resolution_count,
                        .began = vshi_seconds()};
-    work.threads = work.run.threads;
     if (scene->light_count > 0) {
         work.subjects[work.subject_count++] = (trade_subject){.name = "shadow", .planes = scene->light_count};
     }
@@ -266,7 +241,7 @@ static int trade(const trade_settings *settings, vsh_scene *scene) {
     CLI_TRY_DONE(trade_load(&work));
     CLI_TRY_DONE(trade_check_view_uvs(&work));
     CLI_TRY_DONE(measure(&work));
-    CLI_TRY_DONE(settings->bake.shard > 0 ? trade_write_part(&work) : write_all(&work));
+    CLI_TRY_DONE(write_all(&work));
     cli_signals_end(CLI_OK);
     say_summary(&work);
 done:
@@ -278,16 +253,9 @@ done:
 
 /* What can be refused before anything is read. */
 static int check_files(const trade_settings *s, const vsh_scene *scene) {
-    const char *const given = s->csv != NULL    ? "csv"
-                              : s->plot != NULL ? "plot"
-                              : s->view != NULL ? "view"
-                                                : NULL;
     const char *const outputs[] = {s->report, s->csv, s->plot, s->view};
     static const char *const names[] = {"output", "--csv file", "--plot file", "--view page"};
     cli_bake_settings named = s->bake; /* by the command line, not by the scene */
-    if (s->bake.shard > 0 && given != NULL) {
-        return cli_usage("--%s: not together with --shard; give it to 'vdbshade merge'", given);
-    }
     if (scene->layer_count > 0) {
         return cli_usage("%s: trade measures one field, not layers", s->bake.input);
     }
@@ -310,7 +278,7 @@ static int check_files(const trade_settings *s, const vsh_scene *scene) {
         CLI_TRY(cli_bake_check_output(&named, scene, outputs[i]));
         CLI_TRY(cli_temporary_check(outputs[i]));
     }
-    return s->bake.shard > 0 ? trade_check_part(s) : CLI_OK;
+    return CLI_OK;
 }
 
 /* Leaves the scene with the one receiver that was asked for. */
@@ -338,8 +306,6 @@ static int parse(int argc, char **argv, trade_settings *s, bool *help) {
     memcpy(s->resolutions, resolutions, sizeof resolutions);
     s->resolution_count = sizeof resolutions / sizeof resolutions[0];
     s->bake.common = cli_common_default();
-    s->bake.words = (const char *const *)argv;
-    s->bake.word_count = (size_t)argc;
     cli_patch_set(&s->bake.patch, "--size", "256");
     cli_patch_set(&s->bake.patch, "--supersample", "1"); /* the truth is one of the sample's too */
     cli_patch_set(&s->bake.patch, "--padding", "0");
@@ -351,55 +317,29 @@ static int parse(int argc, char **argv, trade_settings *s, bool *help) {
     return code;
 }
 
-static int trade_by(trade_settings *s) {
-    if (s->report == NULL || !cli_has_ending(s->report, "html")) {
-        return cli_usage("%s: give -o OUT.html", s->report != NULL ? s->report : s->bake.input);
+static int trade_main(int argc, char **argv) {
+    trade_settings s;
+    bool help;
+    int code = parse(argc, argv, &s, &help);
+    if (code != CLI_OK || help) {
+        return code;
+    }
+    if (s.report == NULL || !cli_has_ending(s.report, "html")) {
+        return cli_usage("%s: give -o OUT.html", s.report != NULL ? s.report : s.bake.input);
     }
     /* a mesh needs an output to be a scene; a scene's own are not written */
-    const bool scene = cli_has_ending(s->bake.input, "json") && s->bake.floor_size[0] == 0.0;
-    s->bake.output = scene ? NULL : s->report;
-    cli_progress_begin(s->bake.common.progress, s->bake.common.quiet);
+    const bool scene = cli_has_ending(s.bake.input, "json") && s.bake.floor_size[0] == 0.0;
+    s.bake.output = scene ? NULL : s.report;
+    cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
     cli_bake_scene made;
-    int code;
-    CLI_TRY_DONE(cli_bake_scene_make(&s->bake, &made));
-    CLI_TRY_DONE(check_files(s, &made.scene));
-    CLI_TRY_DONE(choose_receiver(s, &made.scene));
-    CLI_TRY_DONE(trade_check_view(s, &made.scene));
+    CLI_TRY_DONE(cli_bake_scene_make(&s.bake, &made));
+    CLI_TRY_DONE(check_files(&s, &made.scene));
+    CLI_TRY_DONE(choose_receiver(&s, &made.scene));
+    CLI_TRY_DONE(trade_check_view(&s, &made.scene));
     cli_signals_watch();
-    code = trade(s, &made.scene);
+    code = trade(&s, &made.scene);
 done:
     cli_bake_scene_free(&made);
     cli_progress_end();
     return code;
-}
-
-static int trade_main(int argc, char **argv) {
-    trade_settings s;
-    bool help;
-    const int code = parse(argc, argv, &s, &help);
-    return code != CLI_OK || help ? code : trade_by(&s);
-}
-
-int cli_trade_merge(int argc, char **argv, const cli_merged *merged) {
-    trade_settings s;
-    bool help;
-    const int code = parse(argc, argv, &s, &help);
-    if (code != CLI_OK || help) {
-        return code != CLI_OK ? code : cli_usage("%s: its parts are of no trade", merged->output);
-    }
-    s.bake.common = *merged->common;
-    s.report = s.bake.merged = merged->output;
-    s.csv = merged->csv;
-    s.plot = merged->plot;
-    s.view = merged->view;
-    s.bake.shard = 0;
-    s.bake.shard_count = merged->shards;
-    s.bake.words = NULL;
-    s.bake.word_count = 0;
-    vsh_error error;
-    if (merged->shards == 0 && vshi_parts_count(merged->output, &s.bake.shard_count, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
-    return vshi_parts_check_there(merged->output, s.bake.shard_count, &error) == VSH_OK ? trade_by(&s)
-                                                                                        : cli_fail(&error);
 }

@@ -9,7 +9,7 @@
 enum { TRADE_MAX_RESOLUTIONS = 16, TRADE_LEAST_RESOLUTION = 2, TRADE_MOST_RESOLUTION = 65536 };
 
 typedef struct trade_settings {
-    cli_bake_settings bake; /* the scene, as `bake` takes it; and which part, or the parts to merge */
+    cli_bake_settings bake; /* the scene, as `bake` takes it */
     const char *report;
     const char *csv;
     const char *plot;
@@ -36,8 +36,6 @@ typedef struct trade_task {
     int32_t method;   /* … */
     int32_t number;   /* rays or cones; 0: none */
     double max_error; /* 0: none */
-    double expected;  /* seconds, roughly: the same on all machines */
-    int32_t shard;    /* whose it is */
 } trade_task;
 
 /* Every plane of values holds the texels of all receivers, one receiver after the other. */
@@ -71,7 +69,7 @@ typedef struct trade_run {
 
 typedef struct trade_field {
     int32_t resolution;
-    vsh_occluders *occluders; /* of voxels alone; these two NULL in merging */
+    vsh_occluders *occluders; /* of voxels alone */
     vsh_occluders *traced;    /* with triangles, where casters are all meshes */
     double build_s;
     uint8_t *mask; /* [texels]: 1 where a bake on this field finds a texel valid */
@@ -83,7 +81,7 @@ typedef struct trade_subject {
     const char *name; /* "shadow", "ao" */
     bool ao;
     size_t planes; /* lights, or 1 */
-    float *truth;  /* [planes][texels]; NULL in a part that another one's truth is for */
+    float *truth;  /* [planes][texels] */
     trade_run *runs;
     size_t run_count;
 } trade_subject;
@@ -114,16 +112,15 @@ typedef struct trade_work {
     size_t subject_count;
     trade_task *tasks; /* [task_count] */
     size_t task_count;
-    size_t skipped;  /* runs that did not fit into the budget */
-    int32_t threads; /* that times are of: the run's, or in merging the parts' */
+    size_t skipped; /* runs that did not fit into the budget */
     double began;
     double measuring; /* since when: what the budget is for */
     double truth_s;
     char truth_text[320]; /* what the truth is, for the report */
 } trade_work;
 
-/* Takes the run with its values and mask, which belong to its subject from then on; in a part it is not held
- * against the truth yet. CLI_OK or an exit code; the run is then still the caller's. */
+/* Takes the run with its values and mask, which belong to its subject from then on. CLI_OK or an exit code;
+ * the run is then still the caller's. */
 int trade_add(trade_work *work, trade_run *run);
 
 double trade_now(const trade_work *work);  /* seconds to take differences of */
@@ -144,7 +141,6 @@ int trade_load(trade_work *work);
 int trade_make_occluders(trade_work *work, int32_t resolution, vsh_occluders **occluders, double *seconds);
 int trade_add_triangles(const trade_work *work, trade_field *field);
 int trade_take_masks(trade_work *work);
-int trade_join_masks(trade_work *work); /* those of fields to common and any */
 int trade_place_points(trade_work *work);
 void trade_describe_truth(trade_work *work);
 int trade_take_truth(trade_work *work, const trade_task *task);
@@ -167,21 +163,8 @@ int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh
 /* The name of a run and what `bake` calls its options, by its task. */
 void trade_name_run(const trade_work *work, trade_run *run);
 
-/* --- tasks, and parts of them */
-
-/* Lists what is to be done, once there are masks and fields, and whose it is. */
+/* Lists what is to be done, once there are masks and fields. */
 int trade_list_tasks(trade_work *work);
-static inline bool trade_is_ours(const trade_work *work, const trade_task *task) {
-    return work->settings->bake.shard == 0 || task->shard == work->settings->bake.shard;
-}
-
-/* Planes of its values. */
-size_t trade_task_planes(const trade_work *work, const trade_task *task);
-
-/* --shard: whether it can be kept, and then what was measured; and in its place what parts have measured. */
-int trade_check_part(const trade_settings *settings);
-int trade_write_part(const trade_work *work);
-int trade_take_parts(trade_work *work);
 
 /* --- parts of the report */
 

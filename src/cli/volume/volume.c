@@ -1,8 +1,8 @@
 /* vdbshade volume: shadow and AO on voxels, as .vdb grids. */
-#include "cli/volume/volume.h"
 #include "base/bytes.h"
 #include "base/clock.h"
-#include "cli/casters.h"
+#include "base/memory.h"
+#include "cli/bake/options.h"
 #include "cli/message.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
@@ -15,6 +15,159 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
+
+/* --- options */
+
+typedef struct volume_settings {
+    cli_bake_settings bake; /* the scene, as `bake` takes it; its output and stats are ours */
+    double band;            /* 0: not given */
+    bool has_box;
+    double box_min[3], box_max[3], box_voxel_size; /* 0: not given */
+    const char *like;                              /* file; NULL: not given */
+    const char *like_grid;                         /* NULL: the first */
+    char like_text[4096];
+    int32_t inside;
+    bool half;
+} volume_settings;
+
+enum {
+    KEY_BAND = 0x2000,
+    KEY_BOX,
+    KEY_BOX_VOXEL_SIZE,
+    KEY_LIKE,
+    KEY_INSIDE,
+    KEY_HALF,
+    KEY_STATS,
+    KEY_DRY_RUN
+};
+
+static const cli_option options[] = {
+    {0, NULL, NULL, "Output"},
+    {'o', "output", "OUT.vdb", "file to write: grids shadow.NAME of each light, and ao"},
+    {KEY_HALF, "half", NULL, "write 16-bit floats"},
+    {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
+    {KEY_DRY_RUN, "dry-run", NULL, "bake nothing: print voxels and memory"},
+    {0, NULL, NULL, "Which voxels (without --box and --like the casters' own band)"},
+    {KEY_BAND, "band", "VOXELS",
+     "how far from the surface, in voxels, more than 0 to 100\n(all of the level set's band: --half-width)"},
+    {KEY_BOX, "box", "X0,Y0,Z0,X1,Y1,Z1", "a box, scene units: lower corner, upper corner"},
+    {KEY_BOX_VOXEL_SIZE, "box-voxel-size", "SIZE", "the edge of its voxels (that of the casters' voxels)"},
+    {KEY_LIKE, "like", "FILE[:GRID]",
+     "the active voxels of a grid in a .vdb file, a fog say,\non its own lattice (the file's first grid of "
+     "numbers)"},
+    {KEY_INSIDE, "inside", "nearest|off",
+     "voxels inside a solid: nearest (they take the nearest\noutside value) or off (inactive) (nearest)"},
+    {0, NULL, NULL, "Light and occlusion"},
+    CLI_LIGHT_OPTIONS,
+    CLI_ACCURACY_OPTIONS,
+    CLI_CASTER_OPTIONS,
+    CLI_GRID_OPTIONS,
+    CLI_COMMON_OPTIONS,
+    CLI_ISA_OPTION,
+};
+
+static int volume_main(int argc, char **argv);
+
+const cli_command cli_volume = {
+    "volume",
+    "INPUT -o OUT.vdb [options]",
+    "Bakes soft shadows and ambient occlusion into sparse grids. INPUT is a mesh file, a level set\n"
+    "(FILE.vdb, FILE.vdb:GRID) or a scene file (.json; its casters, lights and ao, not its receivers).\n"
+    "What is written, and how to read it: docs/volume.md. Numbers in brackets are the defaults.",
+    options,
+    sizeof options / sizeof options[0],
+    volume_main};
+
+static int take_like(volume_settings *s, const char *name, const char *value) {
+    if (value[0] == '\0' || strlen(value) >= sizeof s->like_text) {
+        return cli_usage("%s '%.60s': expected FILE.vdb or FILE.vdb:GRID", name, value);
+    }
+    strcpy(s->like_text, value);
+    s->like = s->like_text;
+    s->like_grid = cli_grid_name(value);
+    if (s->like_grid != NULL) {
+        s->like_text[s->like_grid - 1 - value] = '\0';
+    }
+    return s->like_grid == NULL || s->like_grid[0] != '\0'
+               ? CLI_OK
+               : cli_usage("%s '%s': no grid is named behind the colon", name, value);
+}
+
+static int take(void *settings, int key, const char *name, const char *value) {
+    volume_settings *s = settings;
+    switch (key) {
+    case 'o':
+        s->bake.output = value;
+        return CLI_OK;
+    case KEY_STATS:
+        s->bake.stats = value;
+        return CLI_OK;
+    case KEY_DRY_RUN:
+        s->bake.dry_run = true;
+        return CLI_OK;
+    case KEY_HALF:
+        s->half = true;
+        return CLI_OK;
+    case KEY_BAND: {
+        const int code = cli_parse_positive(name, value, &s->band);
+        return code == CLI_OK && s->band > 100.0 ? cli_parse_number(name, value, 0.0, 100.0, &s->band) : code;
+    }
+    case KEY_BOX:
+        s->has_box = true;
+        return cli_parse_box(name, value, s->box_min, s->box_max);
+    case KEY_BOX_VOXEL_SIZE:
+        return cli_parse_positive(name, value, &s->box_voxel_size);
+    case KEY_LIKE:
+        return take_like(s, name, value);
+    case KEY_INSIDE:
+        return cli_parse_name(name, value, vsh_inside, vsh_inside_name, &s->inside);
+    default:
+        break;
+    }
+    return cli_shared_parse(&s->bake, key, name, value);
+}
+
+static int check_options(const volume_settings *s) {
+    if (s->bake.output == NULL || !cli_has_ending(s->bake.output, "vdb")) {
+        return cli_usage("%s: give -o OUT.vdb", s->bake.output != NULL ? s->bake.output : s->bake.input);
+    }
+    const char *where = s->band > 0.0 ? "--band" : s->has_box ? "--box" : "--like";
+    if ((s->band > 0.0) + s->has_box + (s->like != NULL) > 1) {
+        return cli_usage("%s: give one of --band, --box and --like", where);
+    }
+    if (s->box_voxel_size > 0.0 && !s->has_box) {
+        return cli_usage("--box-voxel-size: there is no --box");
+    }
+    return cli_patch_check(&s->bake.patch);
+}
+
+static int check_output(const volume_settings *s, const vsh_scene *scene, const char *output) {
+    if (s->like != NULL && cli_same_file(output, s->like)) {
+        return cli_usage("%s: the output is also the file of --like", output);
+    }
+    CLI_TRY(cli_bake_check_output(&s->bake, scene, output));
+    CLI_TRY(cli_bake_check_inputs(&s->bake, scene, &output, 1));
+    return cli_temporary_check(output);
+}
+
+/* What can be refused before anything is read. */
+static int check_files(const volume_settings *s, const vsh_scene *scene) {
+    const char *output = s->bake.output, *stats = s->bake.stats;
+    if (stats != NULL && cli_same_file(output, stats)) {
+        return cli_usage("%s: both the output and the --stats file", output);
+    }
+    const int code = check_output(s, scene, output);
+    return code == CLI_OK && stats != NULL ? check_output(s, scene, stats) : code;
+}
+
+static vsh_volume_options volume_options(const volume_settings *s, const vsh_scene *scene) {
+    vsh_volume_options bake = vsh_volume_options_default();
+    bake.inside = s->inside;
+    bake.ao = scene->ao;
+    bake.error = scene->error;
+    bake.shade = scene->shade;
+    return bake;
+}
 
 /* --- the work */
 
@@ -102,62 +255,19 @@ static int make_occluders(volume_work *work) {
     return CLI_OK;
 }
 
-/* Instead of what casts, what the parts say did. */
-static int find_casters(volume_work *work) {
-    const volume_settings *s = work->settings;
-    CLI_TRY(make_grid(work));
-    CLI_TRY(choose_voxels(work));
-    vsh_occluders_info casters;
-    vsh_error error;
-    if (vsh_volume_part_casters(s->bake.merged, s->bake.shard_count, &work->run, &casters, &error) !=
-        VSH_OK) {
-        return cli_fail(&error);
-    }
-    cli_stats_casters(&work->stats, work->scene, &casters);
-    return CLI_OK;
-}
-
 static int find_origin(volume_work *work) {
     const cli_bake_settings *bake = &work->settings->bake;
     const char *const files[] = {bake->input, work->settings->like, cli_bake_lights(bake)};
     return cli_provenance_make(work->scene, files, 3, &work->stats.casters, &work->run, &work->origin);
 }
 
-static vsh_part_options part_options(const volume_work *work) {
-    const cli_bake_settings *s = &work->settings->bake;
-    vsh_part_options part = vsh_part_options_default();
-    part.parts = s->output;
-    part.shard = s->shard;
-    part.shard_count = s->shard_count;
-    part.attributes = work->origin.attributes;
-    part.attribute_count = work->origin.count;
-    part.words = s->words;
-    part.word_count = s->word_count;
-    part.working = work->settings->working;
-    return part;
-}
-
-static vsh_result run_bake(volume_work *work, const vsh_volume_options *bake, vsh_error *error) {
-    const cli_bake_settings *s = &work->settings->bake;
-    const vsh_scene *scene = work->scene;
-    const vsh_part_options part = part_options(work);
-    if (s->merged != NULL) {
-        return vsh_volume_merge(work->voxels, scene->lights, scene->light_count, bake, &part, &work->run,
-                                &work->volume, &work->stats.shade, error);
-    }
-    if (s->shard == 0) {
-        return vsh_bake_volume(work->occluders, work->voxels, scene->lights, scene->light_count, bake,
-                               &work->run, &work->volume, &work->stats.shade, error);
-    }
-    return vsh_bake_volume_part(work->occluders, work->voxels, scene->lights, scene->light_count, bake, &part,
-                                &work->run, &work->stats.shade, error);
-}
-
 static int bake_volume(volume_work *work) {
     const double start = vshi_seconds();
     const vsh_volume_options bake = volume_options(work->settings, work->scene);
     vsh_error error;
-    const vsh_result result = run_bake(work, &bake, &error);
+    const vsh_result result =
+        vsh_bake_volume(work->occluders, work->voxels, work->scene->lights, work->scene->light_count, &bake,
+                        &work->run, &work->volume, &work->stats.shade, &error);
     cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
@@ -198,56 +308,19 @@ static void say_results(const volume_work *work, const vsh_volume_info *info) {
     cli_stats_say(&work->stats);
 }
 
-static void say_part(const volume_work *work) {
-    const cli_bake_settings *s = &work->settings->bake;
-    if (!s->common.quiet) {
-        cli_say("%s.%d-of-%d.part: 'vdbshade merge %s' once all parts are there", s->output, s->shard,
-                s->shard_count, s->output);
-        cli_stats_say(&work->stats);
-    }
-}
+/* Bytes of a block of 8³ voxels: its values in one grid with its share of the tree, and its masks. */
+static const double GRID_BYTES = 2200.0, BLOCK_BYTES = 640.0;
 
-/* What it will take, for people and for tools/slurm/submit. */
-static int print_forecast(const volume_work *work) {
-    const volume_settings *s = work->settings;
-    const vsh_volume_options bake = volume_options(s, work->scene);
-    const double *took = work->stats.seconds;
-    vsh_volume_forecast f;
+static void print_forecast(const volume_work *work) {
+    const vsh_scene *scene = work->scene;
     vsh_voxels_info info;
-    vsh_error error;
-    if (vsh_bake_volume_forecast(work->occluders, work->voxels, work->scene->lights, work->scene->light_count,
-                                 &bake, &work->run, &f, &error) != VSH_OK) {
-        return cli_fail_of(NULL, &error);
-    }
     vsh_voxels_get_info(work->voxels, &info);
-    const double made = took[CLI_STAGE_LOAD] + took[CLI_STAGE_VOXELIZE] + took[CLI_STAGE_FIELD];
-    char bytes[32];
-    printf("voxels        %" PRIu64 ", those inside too, in %d grid%s\n", info.count, f.grids,
-           f.grids == 1 ? "" : "s");
-    printf("memory        about %s at most\n", vshi_bytes_text((uint64_t)f.peak_bytes, bytes, sizeof bytes));
-    printf("time          about %.2g s: voxelize %.2g s, field %.2g s, bake %.2g s (by some of the voxels)\n",
-           made + f.bake_s, took[CLI_STAGE_VOXELIZE], took[CLI_STAGE_FIELD], f.bake_s);
-    if (s->bake.shard_count > 0) {
-        printf("parts         %d of %d have voxels\n", s->working, s->bake.shard_count);
-    }
-    return CLI_OK;
-}
-
-/* A shard without voxels reads nothing, and its part says so. */
-static int leave_part(volume_work *work) {
-    const cli_bake_settings *s = &work->settings->bake;
-    const vsh_volume_options bake = volume_options(work->settings, work->scene);
-    const vsh_part_options part = part_options(work);
-    vsh_error error;
-    if (vsh_bake_volume_part(NULL, NULL, work->scene->lights, work->scene->light_count, &bake, &part,
-                             &work->run, &work->stats.shade, &error) != VSH_OK) {
-        return cli_fail_of(NULL, &error);
-    }
-    CLI_TRY(cli_stats_finish(&work->stats, &work->run, s->stats));
-    if (!s->common.quiet) {
-        cli_bake_say_idle(s, s->output, work->settings->working);
-    }
-    return CLI_OK;
+    const double grids =
+        ((double)scene->light_count + (scene->ao != 0 ? 1.0 : 0.0)) * (scene->error != 0 ? 2.0 : 1.0);
+    const double bytes = (double)vshi_peak_bytes() + (double)info.blocks * (BLOCK_BYTES + GRID_BYTES * grids);
+    char text[32];
+    printf("voxels        %" PRIu64 ", those inside too\n", info.count);
+    printf("memory        about %s at most\n", vshi_bytes_text((uint64_t)bytes, text, sizeof text));
 }
 
 static int run_volume(const volume_settings *s, vsh_scene *scene) {
@@ -255,22 +328,14 @@ static int run_volume(const volume_settings *s, vsh_scene *scene) {
     work.stats = cli_stats_begin(CLI_STATS_VOXELS, work.run.threads);
     vsh_volume_info info;
     int code;
-    if (s->bake.shard > s->working && !s->bake.dry_run) {
-        return leave_part(&work);
-    }
     CLI_TRY_DONE(load(&work));
-    CLI_TRY_DONE(s->bake.merged != NULL ? find_casters(&work) : make_occluders(&work));
+    CLI_TRY_DONE(make_occluders(&work));
     if (s->bake.dry_run) {
-        code = print_forecast(&work);
+        print_forecast(&work);
         goto done;
     }
     CLI_TRY_DONE(find_origin(&work));
     CLI_TRY_DONE(bake_volume(&work));
-    if (s->bake.shard > 0) {
-        CLI_TRY_DONE(cli_stats_finish(&work.stats, &work.run, s->bake.stats));
-        say_part(&work);
-        goto done;
-    }
     CLI_TRY_DONE(write_volume(&work));
     count_voxels(&work, &info);
     CLI_TRY_DONE(cli_stats_finish(&work.stats, &work.run, s->bake.stats));
@@ -285,49 +350,26 @@ done:
     return code;
 }
 
-static int volume_by(volume_settings *s) {
-    int code = volume_check_options(s);
-    if (code != CLI_OK) {
+static int volume_main(int argc, char **argv) {
+    volume_settings s = {.bake = {.common = cli_common_default()}};
+    bool help;
+    int code = cli_parse(&cli_volume, argc, argv, take, &s, "INPUT", &s.bake.input, &help);
+    if (code != CLI_OK || help) {
         return code;
     }
-    cli_progress_begin(s->bake.common.progress, s->bake.common.quiet);
+    CLI_TRY(check_options(&s));
+    cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
     cli_bake_scene made;
-    CLI_TRY_DONE(cli_bake_scene_for_points(&s->bake, &made));
-    if (s->band > made.scene.grid.half_width && !cli_patch_has(&s->bake.patch, "--half-width")) {
-        made.scene.grid.half_width = s->band;
+    CLI_TRY_DONE(cli_bake_scene_for_points(&s.bake, &made));
+    if (s.band > made.scene.grid.half_width && !cli_patch_has(&s.bake.patch, "--half-width")) {
+        made.scene.grid.half_width = s.band;
     }
-    s->working = volume_shards(s, &made.scene);
-    CLI_TRY_DONE(cli_bake_check_work(&s->bake, &made));
-    CLI_TRY_DONE(volume_check_files(s, &made.scene));
+    CLI_TRY_DONE(cli_bake_check_work(&s.bake, &made));
+    CLI_TRY_DONE(check_files(&s, &made.scene));
     cli_signals_watch();
-    code = run_volume(s, &made.scene);
+    code = run_volume(&s, &made.scene);
 done:
     cli_bake_scene_free(&made);
     cli_progress_end();
     return code;
-}
-
-int volume_main(int argc, char **argv) {
-    volume_settings s;
-    bool help;
-    const int code = volume_parse(argc, argv, &s, &help);
-    return code != CLI_OK || help ? code : volume_by(&s);
-}
-
-int cli_volume_merge(int argc, char **argv, const char *output, int32_t shards, const char *stats,
-                     const cli_common *common) {
-    volume_settings s;
-    bool help;
-    const int code = volume_parse(argc, argv, &s, &help);
-    if (code != CLI_OK || help) {
-        return code != CLI_OK ? code : cli_usage("%s: its parts are of no bake", output);
-    }
-    s.bake.common = *common;
-    s.bake.output = s.bake.merged = output;
-    s.bake.shard = 0;
-    s.bake.shard_count = shards;
-    s.bake.stats = stats;
-    s.bake.words = NULL;
-    s.bake.word_count = 0;
-    return volume_by(&s);
 }

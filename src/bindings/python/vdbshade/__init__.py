@@ -31,7 +31,7 @@ from ._render import Camera, LitMeshes, Picture, render
 from ._scene import Assets, Scene, settings
 from ._sdf import Sdf, Solids
 from ._unwrap import Atlas, AtlasMesh, LitImage, lit_is_output, lit_write, unwrap, view_write, view_write_bakes
-from ._volume import Volume, Voxels, bake_volume, bake_volume_forecast, bake_volume_part, volume_merge, volume_part_casters, volume_shards
+from ._volume import Volume, Voxels, bake_volume
 
 __version__ = version()
 __all__ = [name for name in dir() if not name.startswith("_")]

@@ -6,7 +6,6 @@ from typing import List, Optional, Sequence
 
 from ._library import RUN, Run, call, ffi, lib, text
 from ._structs import Filled, path_of
-from ._grid import Attributes, attributes_of
 
 
 def words_into(filled: Filled, words: Sequence[str]) -> None:
@@ -16,17 +15,6 @@ def words_into(filled: Filled, words: Sequence[str]) -> None:
     array = ffi.new("char *[]", [filled.text(w, "words") for w in words] or 1)
     filled.keeps.append(array)
     filled.pointer.words, filled.pointer.word_count = array, len(words)
-
-
-def part_options(parts: "str | os.PathLike[str]", shard: int, shard_count: int, attributes: Optional[Attributes],
-                 words: Sequence[str] = (), working: int = 0) -> Filled:
-    """``vsh_part_options``."""
-    filled = Filled("vsh_part_options", dict(parts=os.fspath(parts), shard=shard, shard_count=shard_count, working=working))
-    lines = attributes_of(attributes)
-    filled.keeps.append(lines)
-    filled.pointer.attributes, filled.pointer.attribute_count = lines.array, lines.count
-    words_into(filled, words)
-    return filled
 
 
 def part_words(parts: "str | os.PathLike[str]", shard_count: int = 0, *, run: Optional[Run] = None) -> List[str]:
