@@ -12,10 +12,10 @@ ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 FONTS = "/usr/share/fonts/truetype/dejavu/"
 LIGHT = ["--sun", "0.3,1,0.2", "--sun-angle", "5"]
 SMALL = ["--resolution", "12", "--threads", "1"]
-BAKE = ["bake", "IN", *LIGHT, "--ao", "0.5", "--size", "8", *SMALL, "--allow-overlap", "-o", "out.exr"]
+BAKE = ["bake", "IN", *LIGHT, "--ao", "0.5", "--size", "8", *SMALL, "-o", "out.exr"]
 # of what every mesh is put to, more often what is cheap
 MESH = [["info", "IN"]] * 4 + [BAKE] * 3 + [
-    ["bake", "IN", *LIGHT, "--method", "cone", "--ao", "0.5", "--ao-method", "cones", "--size", "8", *SMALL, "--allow-overlap", "-o", "out.png"],
+    ["bake", "IN", *LIGHT, "--method", "cone", "--ao", "0.5", "--ao-method", "cones", "--size", "8", *SMALL, "-o", "out.png"],
     ["bake", "IN", *LIGHT, "--uv-set", "0", "--per-object", "--size", "6", *SMALL, "-o", "made/"],
     ["query", "sound.obj", "--caster", "IN", *LIGHT, "--points", "points.csv", "--distance", *SMALL, "-o", "out.csv"],
     ["voxelize", "IN", *SMALL, "-o", "out.vdb"],

@@ -22,7 +22,9 @@ enum {
     VSH_SETTINGS_IMAGE = 4,   /* these two of a receiver: its image, and the image's texels */
     VSH_SETTINGS_TEXELS = 5,
     VSH_SETTINGS_FLAT_IMAGE = 6, /* the same of a flat scene */
-    VSH_SETTINGS_FLAT_TEXELS = 7
+    VSH_SETTINGS_FLAT_TEXELS = 7,
+    VSH_SETTINGS_LEVEL_SET = 8, /* of the narrow band, for files of it */
+    VSH_SETTINGS_FILE_ONLY = 9  /* keys of the scene file that no command has an option for */
 };
 
 /* What has a setting. */

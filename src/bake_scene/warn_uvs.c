@@ -159,7 +159,7 @@ vsh_result vshi_refuse_uvs(const vshi_target *target, const vsh_uv_report *repor
         " texels (%" PRIu64 " are covered at all); '%.100s' on %zu, %zu of them over '%.100s': "
         "give each object an image of its own (--per-object), choose some (--receive NAME), or "
         "unwrap them together into one atlas (in Blender: select all, edit mode, UV > Smart UV "
-        "Project); --allow-overlap bakes it as it is",
+        "Project); \"allow_overlap\": true of a scene's receiver bakes it as it is",
         receiver->path, count, target->mesh_count, texels, covered,
         object_of(&target->meshes[worst - reports]), worst->other_texels, worst->other_mesh_texels,
         object_of(&target->meshes[worst->other_mesh]));

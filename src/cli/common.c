@@ -36,14 +36,13 @@ static uint64_t machine_memory(void) {
 }
 
 cli_common cli_common_default(void) {
-    return (cli_common){0, machine_memory() / 4 * 3, false, false, false, VSH_ISA_BEST, false, false, false};
+    return (cli_common){0, machine_memory() / 4 * 3, false, false, false, false, false, false};
 }
 
 vsh_run cli_common_run(const cli_common *common) {
     vsh_run run = vsh_run_default();
     run.threads = common->threads;
     run.memory_limit = common->memory_limit;
-    run.isa = common->isa;
     run.reader = common->trusted ? NULL : VSH_READER;
     run.confined = common->confined;
     run.allow_outside = common->allow_outside;
@@ -68,8 +67,6 @@ int cli_common_parse(cli_common *common, int key, const char *name, const char *
         return cli_parse_integer(name, value, 1, 1024, &common->threads);
     case CLI_KEY_MEMORY_LIMIT:
         return cli_parse_bytes(name, value, &common->memory_limit);
-    case CLI_KEY_ISA:
-        return cli_parse_name(name, value, vsh_isa, vsh_isa_name, &common->isa);
     case CLI_KEY_TRUSTED:
         common->trusted = true;
         return check_reader(common);

@@ -98,7 +98,6 @@ typedef struct cli_common {
     bool quiet;
     bool verbose; /* print each warning and notes */
     bool progress;
-    int32_t isa;        /* of commands that shade */
     bool trusted;       /* files are parsed in this process */
     bool confined;      /* … or in one that is confined wholly, or not at all */
     bool allow_outside; /* what models name may lie outside their folder */
@@ -111,7 +110,6 @@ enum {
     CLI_KEY_THREADS = 0x1000,
     CLI_KEY_MEMORY_LIMIT,
     CLI_KEY_PROGRESS,
-    CLI_KEY_ISA,
     CLI_KEY_TRUSTED,
     CLI_KEY_CONFINED,
     CLI_KEY_ALLOW_OUTSIDE,
@@ -157,13 +155,6 @@ enum {
         'h', "help", NULL, "show this help"                                                                  \
     }
 
-/* After the common ones, in commands that shade. */
-#define CLI_ISA_OPTION                                                                                       \
-    {                                                                                                        \
-        CLI_KEY_ISA, "isa", "best|base|avx2|avx512",                                                         \
-            "instruction set to shade with, for tests (best); the\nresult is the same for any"               \
-    }
-
 /* Voxels, and what meshes are taken for. */
 #define CLI_GRID_OPTIONS                                                                                     \
     CLI_SETTINGS(VSH_SETTINGS_CASTERS),                                                                      \
@@ -174,7 +165,7 @@ enum {
         CLI_KEY_INWARD, "inward", "PATTERN", "objects that are rooms: air in what they enclose"              \
     }
 
-/* Takes an option of the tables above but the last; *taken tells whether it was one of them. */
+/* Takes an option of the tables above; *taken tells whether it was one of them. */
 int cli_common_parse(cli_common *common, int key, const char *name, const char *value, bool *taken);
 
 #endif

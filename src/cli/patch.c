@@ -85,9 +85,6 @@ bool cli_patch_has(const cli_patch *patch, const char *name) {
 }
 
 int cli_patch_check(const cli_patch *patch) {
-    if (cli_patch_has(patch, "--size") && cli_patch_has(patch, "--max-size")) {
-        return cli_usage("--size and --max-size: give one of the two");
-    }
     if (cli_patch_has(patch, "--resolution") && cli_patch_has(patch, "--voxel-size")) {
         return cli_usage("--resolution and --voxel-size: give one of the two");
     }

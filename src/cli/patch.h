@@ -25,7 +25,7 @@ const char *cli_patch_text(const cli_patch *patch, const char *name);
 /* Whether an option was given. */
 bool cli_patch_has(const cli_patch *patch, const char *name);
 
-/* --resolution and --voxel-size exclude each other, and so do --size and --max-size. */
+/* --resolution and --voxel-size exclude each other. */
 int cli_patch_check(const cli_patch *patch);
 
 /* Puts what was given over a scene, which then refers to the patch, over a receiver and over a flat scene. */

@@ -117,7 +117,7 @@ static void say_help(const cli_stats *stats, const vsh_scene *scene, int kind, c
     if (by_rays && scene->shade.rays > 0) {
         snprintf(text, size, "%d rays are too few; raise --rays, or leave it off", scene->shade.rays);
     } else if (by_rays) {
-        snprintf(text, size, "the sampler '%s' has no more rays; use --sampler sobol",
+        snprintf(text, size, "the sampler '%s' has no more rays; set \"sampler\": \"sobol\" in the scene",
                  vsh_sampler_name(scene->shade.sampler));
     } else if (stats->methods[kind].traces) {
         snprintf(text, size, "values between rays are interpolated; --max-error %.1g keeps it",

@@ -31,8 +31,8 @@ typedef struct cli_stats {
     int of; /* CLI_STATS_…: what is counted */
     uint64_t points, bad_rows;
     uint64_t voxels, inside_voxels, tiles;
-    int32_t ao_spacing;    /* of lightmaps, the least that was asked for; 0: there is none */
-    uint64_t bands;        /* that lightmaps were baked in: one each where they were baked whole */
+    int32_t ao_spacing; /* of lightmaps, the least that was asked for; 0: there is none */
+    uint64_t bands;     /* that lightmaps were baked in: one each where they were baked whole */
     vsh_shade_stats shade;
     const vsh_bake_error
         *errors;             /* [light_count + 2]: of each light, of AO, of the sky; NULL: none are known */

@@ -229,7 +229,7 @@ static const vshi_key receiver_keys[] = {
      .offset = offsetof(vsh_receiver, allow_overlap),
      .option =
          {.name = "allow-overlap",
-          .group = VSH_SETTINGS_TEXELS,
+          .group = VSH_SETTINGS_FILE_ONLY,
           .help = "bake objects that lie over each other in the lightmap, too: the first keeps the texels"}},
     {.name = "unwrap",
      .kind = VSHI_NAME,
@@ -271,7 +271,7 @@ static const vshi_key receiver_keys[] = {
      .name_of = vsh_atlas_kind_name,
      .option = {.name = "atlas",
                 .value = "WHAT",
-                .group = VSH_SETTINGS_TEXELS,
+                .group = VSH_SETTINGS_FILE_ONLY,
                 .help =
                     "objects: an image for each object, OUT.NAME.exr, whose UVs, where they are made, are "
                     "packed alone; shared: all lie on the same"}},
@@ -283,7 +283,7 @@ static const vshi_key receiver_keys[] = {
      .highest = VSH_MAX_LIGHTMAP_SIZE,
      .option = {.name = "max-size",
                 .value = "N",
-                .group = VSH_SETTINGS_TEXELS,
+                .group = VSH_SETTINGS_FILE_ONLY,
                 .help = "with --texels-per-unit, instead of --size: images are as small as what lies on them "
                         "allows, their sides powers of two up to N",
                 .otherwise = "--size is that of all"}},
@@ -336,7 +336,7 @@ static const vshi_key receiver_keys[] = {
      .highest = 8.0,
      .option = {.name = "ao-spacing",
                 .value = "N",
-                .group = VSH_SETTINGS_TEXELS,
+                .group = VSH_SETTINGS_FILE_ONLY,
                 .help = "texels: AO by cones or adaptive is interpolated between texels so far "
                         "apart where casters are far; texels share the rays of exact AO; 1: neither",
                 .range = "1, 2, 4 or 8"}},
@@ -367,7 +367,7 @@ static const vshi_key receiver_keys[] = {
      .name_of = vshi_color_space_key,
      .option = {.name = "color-space",
                 .value = "SPACE",
-                .group = VSH_SETTINGS_IMAGE,
+                .group = VSH_SETTINGS_FILE_ONLY,
                 .help = "of R, G, B in 8 and 16 bits",
                 .otherwise = "auto: srgb for irradiance and tints, linear for the rest"}},
 };

@@ -14,8 +14,10 @@ needs_embree() {
 
 # by_rays METHOD: a lone box by the method is lit, dark and open, and the file names the method's rays.
 by_rays() {
-    shade bake box.obj "${SMALL[@]}" --ao 0.5 --method "$1" --ao-method "$1" --rays 8 --sampler blue --frame 1 \
-        --quiet --stats stats.json -o "$1.exr"
+    write_scene box.json box.obj '"sampler": "blue", "frame": 1'
+    no_sun "${SMALL[@]}"
+    shade bake box.json "${rest[@]}" --ao 0.5 --method "$1" --ao-method "$1" --rays 8 --quiet \
+        --stats stats.json -o "$1.exr"
     done_well
     grep -q '"rays": [1-9]' stats.json || fail "no rays: $(cat stats.json)"
     shade info "$1.exr"

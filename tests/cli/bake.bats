@@ -16,21 +16,6 @@ setup() {
     cmp 1.exr 5.exr
 }
 
-@test "the same bits for every instruction set; one that is missing is refused by name" {
-    shade bake box.obj "${SMALL[@]}" --ao 0.5 --quiet -o best.exr
-    done_well
-    for isa in best base avx2 avx512; do
-        shade bake box.obj "${SMALL[@]}" --ao 0.5 --isa "$isa" --quiet -o "$isa.out.exr"
-        if [ "$status" -eq 0 ]; then
-            cmp best.exr "$isa.out.exr"
-        else
-            case $isa in best | base) fail "$isa is everywhere" ;; esac
-            refused 2 "isa $isa" "this machine has no"
-            [ ! -e "$isa.out.exr" ] || fail "an output beside the error"
-        fi
-    done
-}
-
 @test "the channels are named by light, ao, irradiance and coverage" {
     shade bake box.obj "${SMALL[@]}" --ao 1 --irradiance --quiet -o out.exr
     done_well

@@ -3,7 +3,8 @@ load helper
 
 @test "bent normals, tints and irradiance have channels of their own" {
     write_box box.obj
-    run -0 "$VDBSHADE" bake box.obj --sun 1,1,1 --ao 0.5 --size 32 --resolution 32 --bent-normals world --tint quadratic \
+    write_scene box.json box.obj '"tint": "quadratic"' '' '1, 1, 1'
+    run -0 "$VDBSHADE" bake box.json --ao 0.5 --size 32 --resolution 32 --bent-normals world \
         --ambient 0.1,0.2,0.3 -o box.exr --quiet
     run -0 "$VDBSHADE" info box.exr
     for channel in shadow.sun ao irradiance.R irradiance.B bent.X bent.Y bent.Z tint.sun.R tint.sun.G tint.sun.B A; do
@@ -27,16 +28,18 @@ load helper
 
 @test "bands of bent normals and tints are those of the whole" {
     write_box box.obj
-    options=(--sun 1,1,1 --ao 0.5 --size 64 --resolution 32 --bent-normals tangent --tint 1,1.2,1.5 --quiet)
-    run -0 "$VDBSHADE" bake box.obj "${options[@]}" -o whole.exr
-    run -0 "$VDBSHADE" bake box.obj "${options[@]}" --band-rows 16 -o bands.exr
+    options=(--ao 0.5 --size 64 --resolution 32 --bent-normals tangent --quiet)
+    write_scene box.json box.obj '"tint": [1, 1.2, 1.5]'
+    write_scene low.json low.obj '"tint": [1, 1.2, 1.5]'
+    run -0 "$VDBSHADE" bake box.json "${options[@]}" -o whole.exr
+    run -0 "$VDBSHADE" bake box.json "${options[@]}" --band-rows 16 -o bands.exr
     cmp whole.exr bands.exr
     # without a chart in the last bands, and by a small bake beforehand
     awk '/^vt/ { $3 /= 4 } { print }' box.obj >low.obj
-    run -0 "$VDBSHADE" bake low.obj "${options[@]}" -o whole.exr
-    run -0 "$VDBSHADE" bake low.obj "${options[@]}" --band-rows 16 -o bands.exr
+    run -0 "$VDBSHADE" bake low.json "${options[@]}" -o whole.exr
+    run -0 "$VDBSHADE" bake low.json "${options[@]}" --band-rows 16 -o bands.exr
     cmp whole.exr bands.exr
-    run -0 "$VDBSHADE" bake box.obj "${options[@]}" --dry-run -o whole.exr
+    run -0 "$VDBSHADE" bake box.json "${options[@]}" --dry-run -o whole.exr
 }
 
 @test "the sky over a box is 1, 1/2 and 0, by option and scene, in bands as whole" {
@@ -73,8 +76,9 @@ load helper
     [[ $output == *"AO by taps knows no directions"* ]]
     run -2 "$VDBSHADE" bake box.obj --ao 1 --bent-normals up -o box.exr
     [[ $output == *"'up'"*"world, tangent"* ]]
-    run -2 "$VDBSHADE" bake box.obj --sun 1,1,1 --tint 0,1,1 -o box.exr
-    [[ $output == *"powers from 0.0625 to 16"* ]]
+    write_scene box.json box.obj '"tint": [0, 1, 1]'
+    run -2 "$VDBSHADE" bake box.json -o box.exr
+    [[ $output == *"box.json"*"tint"* ]]
     run -2 "$VDBSHADE" bake box.obj --sun 1,1,1 --ambient -1,1,1 -o box.exr
     [[ $output == *"expected three numbers of at least 0"* ]]
 }

@@ -35,7 +35,7 @@ setup_file() {
         "$VDBSHADE" volume $one.json --box -2.5,0,-2.5,2.5,1.5,2.5 --box-voxel-size 0.125 --quiet -o $one.vdb || return 1
     done
     "$VDBSHADE" bake golden.json --bits 16 --quiet -o half_float.exr
-    "$VDBSHADE" bake golden.json --threads 1 --isa base --quiet -o again.exr
+    "$VDBSHADE" bake golden.json --threads 1 --quiet -o again.exr
     "$VDBSHADE" bake golden.json --bits 16 --quiet -o golden.png
     "$VDBSHADE" bake golden.json --bits 8 --quiet -o eight.png
     "$VDBSHADE" volume golden.json --box -2.5,0,-2.5,2.5,1.5,2.5 --box-voxel-size 0.125 --half --quiet -o half_float.vdb
@@ -362,7 +362,8 @@ JSON
 @test "another frame at one error is alike; a sun a tenth wider is not, between bakes of two errors either" {
     local frame
     for frame in 0 1; do
-        "$VDBSHADE" bake golden.json --method adaptive --max-error 0.02 --frame $frame --quiet -o frame$frame.exr
+        sed "0,/{/s//{\"frame\": $frame, /" golden.json >frame.json
+        "$VDBSHADE" bake frame.json --method adaptive --max-error 0.02 --quiet -o frame$frame.exr
     done
     compare frame0.exr frame1.exr
     done_well

@@ -59,11 +59,12 @@ endings_after() {
     "$VDBSHADE" info light.png | grep -qx 'vdbshade_color_space: sRGB' || fail "it does not say sRGB"
     shade "${bake[@]}" --pack R=shadow.sun,A=A -o data.png --quiet
     "$VDBSHADE" info data.png | grep -qx 'vdbshade_color_space: linear' || fail "it does not say linear"
-    shade "${bake[@]}" --color-space linear -o linear.png --quiet
-    ! same_values light.png linear.png || fail "--color-space changes nothing"
-    shade "${bake[@]}" --color-space gamma -o x.png
-    refused 2 --color-space gamma
-    shade "${bake[@]}" --color-space srgb -o x.tif --bits 32
+    write_scene linear.json box.obj '' '"color_space": "linear"' '0, 3, 4'
+    no_sun "${bake[@]:2}"
+    shade bake linear.json "${rest[@]}" -o linear.png --quiet
+    ! same_values light.png linear.png || fail "color_space changes nothing"
+    write_scene srgb.json box.obj '' '"color_space": "srgb"'
+    shade bake srgb.json "${rest[@]}" -o x.tif --bits 32
     refused 2 srgb
     shade "${bake[@]}" -o light.png
     [[ $stderr != *"brighter than 1"* ]] || fail "nothing is"

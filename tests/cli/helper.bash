@@ -8,6 +8,24 @@ setup() {
     cd "$BATS_TEST_TMPDIR" || return 1
 }
 
+# write_scene FILE.json MESH [KEYS [KEYS OF THE RECEIVER [DIRECTION]]]: a scene in which a mesh casts and receives, with a sun.
+write_scene() {
+    local sun='{"name": "sun", "type": "directional", "angle_deg": 5, "direction": ['${5:-0.3, 1, 0.2}']}'
+    printf '{"casters": [{"mesh": "%s"}]%s, "lights": [%s], "receivers": [{"mesh": "%s", "output": "out.exr"%s}]}\n' \
+        "$2" "${3:+, $3}" "$sun" "$2" "${4:+, $4}" >"$1"
+}
+
+# Sets rest to options without those of a sun.
+no_sun() {
+    rest=()
+    while [ $# -gt 0 ]; do
+        case $1 in
+        --sun | --sun-angle) shift 2 ;;
+        *) rest+=("$1") && shift ;;
+        esac
+    done
+}
+
 # A unit cube, closed, each face with its own sixth of the UV square.
 write_box() {
     cat >"$1" <<'OBJ'

@@ -111,8 +111,8 @@ answers() {
     answers adaptive auto
     bash_completes bake --method = a
     answers adaptive auto
-    bash_completes bake --ao-spacing =
-    answers 1 2 4 8
+    bash_completes bake --bits =
+    answers 8 16 32
     bash_completes flat --method ''
     answers hard classic exact
     bash_completes query --normals ''

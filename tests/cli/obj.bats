@@ -68,9 +68,6 @@ LIGHT=(--sun 0.3,1,0.2 --sun-angle 5 --ao 0.5 --size 64)
     refused 2 'lit.mtl: would be replaced, which vdbshade has not written'
     [ "$(cat lit.mtl)" = 'newmtl red' ] && [ ! -e lit.obj ] && [ ! -e lit.preview.png ] || fail "$(ls)"
     rm lit.mtl
-    shade bake bare.obj "${LIGHT[@]}" -o lit.obj --embed --invalid invalid.png
-    refused 2 'an OBJ holds no images'
-    [ ! -e invalid.png ] || fail 'baked before it was refused'
     shade bake bare.obj "${LIGHT[@]}" -o lit.obj --view lit.html
     refused 2 "--view 'lit.html': shows what a .glb"
     shade bake bare.obj "${LIGHT[@]}" -o lit.obj

@@ -30,9 +30,11 @@ LEVEL=(--sun 0.3,1,0.2 --sun-angle 5 --size 32 --resolution 24)
     write_level level.obj floor wall roof
     shade bake level.obj "${LEVEL[@]}" -o out.exr
     refused 2 level.obj '2 of 3 meshes' "'wall' on" "over 'floor'" --per-object --receive 'one atlas' \
-        --allow-overlap
+        allow_overlap
     [ ! -e out.exr ] || fail "an image beside the error"
-    shade bake level.obj "${LEVEL[@]}" --allow-overlap -o out.exr
+    write_scene level.json level.obj '' '"allow_overlap": true'
+    no_sun "${LEVEL[@]}"
+    shade bake level.json "${rest[@]}" -o out.exr
     done_well
     [[ $stderr == *"2 objects"*"lie over charts of other objects"* ]] || fail "no warning"
 }
@@ -144,14 +146,16 @@ JSON
 
 @test "warnings of a kind are one line with the worst, all of them with --verbose, none with --quiet" {
     write_level level.obj $(seq -f 'crate_%03g' 40)
-    shade bake level.obj "${LEVEL[@]}" --allow-overlap -o out.exr
+    write_scene level.json level.obj '' '"allow_overlap": true'
+    no_sun "${LEVEL[@]}"
+    shade bake level.json "${rest[@]}" -o out.exr
     done_well
     [ "$(grep -c warning: <<<"$stderr")" -lt 4 ] || fail "too many lines"
     [[ $stderr == *"warning: 39 objects: level.obj: mesh 'crate_"*"then 'crate_"*"--verbose lists all"* ]] || fail "no summary"
-    shade bake level.obj "${LEVEL[@]}" --allow-overlap -o out.exr --verbose
+    shade bake level.json "${rest[@]}" -o out.exr --verbose
     done_well
     [ "$(grep -c 'lie over charts of other objects' <<<"$stderr")" -eq 39 ] || fail "not all"
-    shade bake level.obj "${LEVEL[@]}" --allow-overlap -o out.exr --quiet
+    shade bake level.json "${rest[@]}" -o out.exr --quiet
     done_well
     [ -z "$stderr" ] || fail "--quiet said something"
 }

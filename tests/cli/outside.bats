@@ -104,14 +104,14 @@ JSON
         "$models/scene.gltf" >inside/a.gltf
     at_once info inside/a.gltf
     done_well
-    at_once bake inside/a.gltf -o out.exr "${SMALL[@]}" --allow-overlap
+    at_once bake inside/a.gltf -o out.exr "${SMALL[@]}" --unwrap always
     done_well
     local hash
     hash=$(sha256sum <secret)
     grep -aq "scene.bin" out.exr || fail "the file that is used is not told"
     ! grep -aq "${hash%% *}" out.exr || fail "its hash is told"
     ! grep -aq "secret" out.exr || fail "its name is told"
-    at_once bake inside/a.gltf -o out.exr "${SMALL[@]}" --allow-overlap --allow-outside
+    at_once bake inside/a.gltf -o out.exr "${SMALL[@]}" --unwrap always --allow-outside
     done_well
     grep -aq "${hash%% *}" out.exr || fail "it is not told where it is allowed"
 }

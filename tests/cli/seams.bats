@@ -129,7 +129,7 @@ EOF
 @test "borders between two lightmaps are stitched, by no more than the error" {
     write_tiles tiles.obj
     for seams in keep fix; do
-        shade bake tiles.obj --no-receive box --ao 2 --max-error 0.02 --size 48 --unwrap always --atlas objects --seams $seams -o $seams.exr --quiet
+        shade bake tiles.obj --no-receive box --ao 2 --max-error 0.02 --size 48 --unwrap always --per-object --seams $seams -o $seams.exr --quiet
         [ "$status" -eq 0 ] || fail "$stderr"
     done
     for tile in left right; do # which is one chart, without a seam of its own
@@ -155,7 +155,7 @@ EOF
 @test "lightmaps that memory does not hold together keep the seams between them, with a warning" {
     write_tiles tiles.obj
     tiles() {
-        shade bake tiles.obj --no-receive box --ao 2 --max-error 0.1 --ao-spacing 8 --size 256 --unwrap always --atlas objects --seams fix --threads 1 \
+        shade bake tiles.obj --no-receive box --ao 2 --max-error 0.1 --size 256 --unwrap always --per-object --seams fix --threads 1 \
             -o part.exr --memory-limit "$1"k
         [ "$status" -eq 0 ] || [ "$status" -eq 4 ] || fail "$stderr"
     }

@@ -32,7 +32,7 @@ tables() {
 
 @test "--help of bake and flat has the ranges and the defaults that the documents have" {
     "$VDBSHADE" bake --help >help.txt
-    expect_ranges 10 < <(tables scene.md)
+    expect_ranges 3 < <(tables scene.md)
     "$VDBSHADE" flat --help >help.txt
     expect_ranges 3 < <(tables flat.md)
     # what the document has as a list, or for each of two numbers

@@ -10,22 +10,30 @@ load parts
 }
 
 @test "what crosses parts is as in one bake: seams, padding, shared rays, what is filled, every channel" {
-    local options=(--irradiance --bent-normals world --sky y --invalid-channel --error --tint quadratic)
-    one out.exr "${CLOISTER[@]}" "${options[@]}" --padding auto
-    merged out.exr 3 "${CLOISTER[@]}" "${options[@]}" --padding auto
+    local options=(--irradiance --bent-normals world --sky y --error)
+    write_scene all.json "${CLOISTER[0]}" '"invalid": true, "tint": "quadratic"'
+    no_sun "${CLOISTER[@]:1}"
+    one out.exr all.json "${rest[@]}" "${options[@]}" --padding auto
+    merged out.exr 3 all.json "${rest[@]}" "${options[@]}" --padding auto
     one out.png "${CLOISTER[@]}" --seams fix --padding auto
     merged out.png 3 "${CLOISTER[@]}" --seams fix --padding auto
     one out.exr "${CLOISTER[@]}" --padding 70 --supersample 2 --method adaptive --ao-method adaptive --resolution 48
     merged out.exr 3 "${CLOISTER[@]}" --padding 70 --supersample 2 --method adaptive --ao-method adaptive --resolution 48
-    one out.exr "${CLOISTER[@]}" --method cone --ao-method cones --ao-spacing 8 --padding 0 --resolution 48
-    merged out.exr 3 "${CLOISTER[@]}" --method cone --ao-method cones --ao-spacing 8 --padding 0 --resolution 48
+    one out.exr "${CLOISTER[@]}" --method cone --ao-method cones --padding 0 --resolution 48
+    merged out.exr 3 "${CLOISTER[@]}" --method cone --ao-method cones --padding 0 --resolution 48
 }
 
 @test "AO that texels share is shot by one part and finished by merge, of any spacing and error, with its error and in bands" {
-    for options in "--ao-spacing 8 --error" "--ao-spacing 2 --max-error 0.05" "--max-error 0.008" "--method adaptive --ao-method adaptive --resolution 48 --error"; do
-        one out.exr "${CLOISTER[@]}" $options
+    for spacing in 2 8; do
+        write_scene $spacing.json "${CLOISTER[0]}" '' "\"ao_spacing\": $spacing"
+    done
+    write_scene 4.json "${CLOISTER[0]}"
+    no_sun "${CLOISTER[@]:1}"
+    for options in "8.json --error" "2.json --max-error 0.05" "4.json --max-error 0.008" \
+        "4.json --method adaptive --ao-method adaptive --resolution 48 --error"; do
+        one out.exr $options "${rest[@]}"
         for n in 2 5; do
-            merged out.exr "$n" "${CLOISTER[@]}" $options
+            merged out.exr "$n" $options "${rest[@]}"
         done
     done
     one out.exr "${CLOISTER[@]}" --size 128x2048
@@ -37,7 +45,7 @@ load parts
 
 @test "what is made of AO is finished by merge, too: irradiance with and without light from all around, bent normals in both spaces, the sky" {
     local all=(--irradiance --ambient 0.3,0.2,0.1 --bent-normals tangent --sky -z --error)
-    for options in "--irradiance --max-error 0.05" "--irradiance --ambient 0.3,0.2,0.1 --ao-spacing 2" "--bent-normals world --ao-spacing 8" "--sky y --seams fix" \
+    for options in "--irradiance --max-error 0.05" "--irradiance --ambient 0.3,0.2,0.1" "--bent-normals world" "--sky y --seams fix" \
         "${all[*]} --padding 20" "--irradiance --bent-normals tangent --sky y --method adaptive --ao-method adaptive --resolution 48"; do
         one out.exr "${CLOISTER[@]}" $options
         for n in 2 5; do
@@ -88,8 +96,8 @@ load parts
     local ring=("$ASSETS/smooth.glb" --unwrap always --texels-per-unit 30 --size 128 --sun 0.5,0.5,0.1 --sun-angle 20 --ao 0.3) # a ring on two pages
     one out.glb "${ring[@]}"
     merged out.glb 3 "${ring[@]}"
-    one out.glb "${CLOISTER[@]}" --unwrap always --texels-per-unit 9 --size 128 --atlas objects
-    merged out.glb 2 "${CLOISTER[@]}" --unwrap always --texels-per-unit 9 --size 128 --atlas objects
+    one out.glb "${CLOISTER[@]}" --unwrap always --texels-per-unit 9 --size 128 --per-object
+    merged out.glb 2 "${CLOISTER[@]}" --unwrap always --texels-per-unit 9 --size 128 --per-object
 }
 
 @test "parts have as much work as each other where one half of a lightmap takes many more rays than the other" {

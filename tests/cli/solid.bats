@@ -89,7 +89,8 @@ write_studs() {
 @test "AO between texels keeps the foot of what the voxels lose" {
     write_studs studs.obj
     for spacing in 1 8; do
-        shade bake studs.obj --receive floor --resolution 16 --ao 0.3 --size 384 --ao-spacing $spacing -o $spacing.exr
+        write_scene studs.json studs.obj '' "\"objects\": \"floor\", \"ao_spacing\": $spacing"
+        shade bake studs.json --resolution 16 --ao 0.3 --size 384 -o $spacing.exr
         done_well
     done
     shade compare 1.exr 8.exr

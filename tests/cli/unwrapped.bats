@@ -135,13 +135,9 @@ write_uneven() {
 
 @test "of an atlas of objects each has the image that it has alone" {
     write_uneven two.obj
-    for objects in "--atlas objects" "--per-object"; do
-        rm -rf maps
-        # shellcheck disable=SC2086
-        shade bake two.obj "${SMALL[@]}" --size 32 --ao 1 --unwrap always $objects -o maps/
-        [ "$status" -eq 0 ] || fail "$stderr"
-        [ "$(echo maps/*)" = "maps/box.exr maps/second.exr" ] || fail "$(echo maps/*)"
-    done
+    shade bake two.obj "${SMALL[@]}" --size 32 --ao 1 --unwrap always --per-object -o maps/
+    [ "$status" -eq 0 ] || fail "$stderr"
+    [ "$(echo maps/*)" = "maps/box.exr maps/second.exr" ] || fail "$(echo maps/*)"
     shade bake two.obj "${SMALL[@]}" --size 32 --ao 1 --unwrap always --receive second -o alone.exr
     [ "$status" -eq 0 ] || fail "$stderr"
     same_values alone.exr maps/second.exr
@@ -192,7 +188,9 @@ EOF
 
 @test "an asset of objects has a lightmap for each, and materials of its own where they show one" {
     write_uneven two.obj
-    shade bake two.obj "${FIT[@]}" --ao 1 --unwrap always --atlas objects --texels-per-unit 8 --max-size 128 --seams keep -o lit.gltf --exr all.exr
+    write_scene fit.json two.obj '' '"atlas": "objects", "max_size": 128, "texels_per_unit": 8, "unwrap": "always"'
+    no_sun "${FIT[@]}"
+    shade bake fit.json "${rest[@]}" --ao 1 --seams keep -o lit.gltf --exr all.exr
     [ "$status" -eq 0 ] || fail "$stderr"
     for file in lit.lightmap.box.png lit.lightmap.second.png lit.occlusion.second.png all.box.exr all.second.exr; do
         [ -s "$file" ] || fail "no $file: $(ls)"
@@ -204,14 +202,15 @@ EOF
     shade info lit.lightmap.second.png
     [[ $output == *"64 × 64"* ]] || fail "$output"
     # the values are those of the images
-    shade bake two.obj "${FIT[@]}" --ao 1 --irradiance --ambient 0.25,0.25,0.25 --atlas objects --texels-per-unit 8 --max-size 128 \
-        --unwrap always -o maps/
-    same_values maps/second.exr all.second.exr
+    shade bake fit.json "${rest[@]}" --ao 1 --irradiance --ambient 0.25,0.25,0.25 -o images.exr
+    same_values images.second.exr all.second.exr
 }
 
 @test "pages of an asset have a picture each of what is invalid" {
     write_uneven two.obj
-    shade bake two.obj "${FIT[@]}" --ao 1 --unwrap always --atlas objects --texels-per-unit 8 --max-size 128 -o lit.glb --invalid where.png
+    write_scene fit.json two.obj '' '"atlas": "objects", "max_size": 128, "texels_per_unit": 8, "unwrap": "always"'
+    no_sun "${FIT[@]}"
+    shade bake fit.json "${rest[@]}" --ao 1 -o lit.glb --invalid where.png
     done_well
     [ "$(ls where*)" = "$(printf 'where.lit.%s.png\n' box second)" ] || fail "$(ls)"
     shade bake two.obj "${FIT[@]}" --ao 1 --unwrap always --size 64 --pages 2 -o lit.obj --invalid page.png
@@ -232,15 +231,13 @@ EOF
 
 @test "what does not go together with an atlas of objects or a largest size is refused" {
     write_two two.obj
-    shade bake two.obj "${SMALL[@]}" --size 32 --max-size 64 --texels-per-unit 4 --unwrap always -o x.exr
-    refused 2 --size --max-size
-    shade bake two.obj "${FIT[@]}" --max-size 64 --unwrap always -o x.exr
+    write_scene fit.json two.obj '' '"max_size": 64, "unwrap": "always"'
+    no_sun "${FIT[@]}"
+    shade bake fit.json "${rest[@]}" -o x.exr
     refused 2 max_size texels_per_unit
-    shade bake two.obj "${SMALL[@]}" --atlas objects --pages 2 --unwrap always -o x.exr
+    shade bake two.obj "${SMALL[@]}" --per-object --pages 2 --unwrap always -o x.exr
     refused 2 pages
-    shade bake two.obj "${SMALL[@]}" --atlas each -o x.exr
-    refused 2 --atlas
-    shade bake two.obj "${SMALL[@]}" --size 16 --texels-per-unit 40 --atlas objects --unwrap always -o x.exr
+    shade bake two.obj "${SMALL[@]}" --size 16 --texels-per-unit 40 --per-object --unwrap always -o x.exr
     refused 4 two.obj "'box'" "would fit"
 }
 

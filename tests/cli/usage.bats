@@ -121,9 +121,6 @@ fits() {
 --ao-method ray
 --rays 0
 --rays 4097
---sampler green
---frame -1
---early-rays 4097
 --max-error 0
 --max-error 2
 --sun 1,2
@@ -141,8 +138,6 @@ fits() {
 --resolution 65537
 --resolution 24.5
 --resolution 99999999999999999999
---half-width 2
---shell-thickness 0
 --size 0
 --size 1000000
 --size 64x
@@ -155,7 +150,6 @@ fits() {
 --padding -1
 --padding 4097
 --bits 12
---isa sse2
 --threads 0
 --threads 1025
 --memory-limit -5

@@ -4,8 +4,9 @@ load helper
 @test "a picture and a channel show the texels that are in another solid, and one line tells of them" {
     write_box box.obj
     awk '$1 == "v" { print "v", $2, $3 + 0.25, $4; next } { print }' box.obj >above.obj
-    shade bake box.obj --caster above.obj --ao 0.5 --method exact --ao-method exact --size 64 --resolution 24 \
-        -o box.exr --invalid where.png --invalid-channel --verbose
+    write_scene box.json box.obj '"invalid": true'
+    shade bake box.json --caster above.obj --ao 0.5 --method exact --ao-method exact --size 64 --resolution 24 \
+        -o box.exr --invalid where.png --verbose
     done_well
     [[ $stderr == *"texels are invalid (inside a solid or behind a wall)"*"--invalid"* ]] ||
         fail "not told"
@@ -24,8 +25,8 @@ load helper
     awk '/^o/ { print "o around"; next } /^f/ && left++ < 2 { next }
         $1 == "v" { print "v", 3 * $2 - 1, 3 * $3 - 1, 3 * $4 - 1; next } { print }' box.obj >around.obj
     printf 'o sheet\nv -9 -9 -3\nv 9 -9 -3\nv 9 9 -3\nv -9 9 -3\nf 1 2 3 4\n' >sheet.obj
-    shade bake bar.obj --caster around.obj --caster sheet.obj --solid around --ao 0.5 --size 64 --invalid-channel \
-        --verbose -o bar.exr
+    write_scene bar.json bar.obj '"invalid": true'
+    shade bake bar.json --caster around.obj --caster sheet.obj --solid around --ao 0.5 --size 64 --verbose -o bar.exr
     done_well
     [[ $stderr == *"texels are invalid"* && $stderr != *"plain sight"* ]] || fail "claimed"
     run -0 "$VDBSHADE" info bar.exr
@@ -35,13 +36,13 @@ load helper
 @test "bands give the same channel of invalid texels" {
     write_box box.obj
     awk '$1 == "v" { print "v", $2, $3 + 0.25, $4; next } { print }' box.obj >above.obj
-    options=(--caster above.obj --ao 0.5 --method exact --ao-method exact --size 64 --resolution 24
-        --invalid-channel --quiet)
-    shade bake box.obj "${options[@]}" -o whole.exr
+    options=(--caster above.obj --ao 0.5 --method exact --ao-method exact --size 64 --resolution 24 --quiet)
+    write_scene box.json box.obj '"invalid": true'
+    shade bake box.json "${options[@]}" -o whole.exr
     done_well
-    shade bake box.obj "${options[@]}" --band-rows 8 -o bands.exr --invalid bands.png
+    shade bake box.json "${options[@]}" --band-rows 8 -o bands.exr --invalid bands.png
     done_well
-    shade bake box.obj "${options[@]}" -o whole.exr --invalid whole.png
+    shade bake box.json "${options[@]}" -o whole.exr --invalid whole.png
     same_values whole.exr bands.exr
     cmp whole.png bands.png
 }
@@ -110,7 +111,7 @@ load helper
 @test "with nothing said rays decide what is valid, as with exact, and voxels do not" {
     write_box box.obj
     awk '$1 == "v" { print "v", $2, $3 + 0.25, $4; next } { print }' box.obj >above.obj
-    options=(--caster above.obj --sun 0.3,1,0.2 --ao 0.5 --size 64 --invalid-channel --quiet)
+    options=(--caster above.obj --sun 0.3,1,0.2 --ao 0.5 --size 64 --quiet)
     shade bake box.obj "${options[@]}" --resolution 8 -o auto.exr
     done_well
     shade bake box.obj "${options[@]}" --resolution 8 --method exact --ao-method exact -o exact.exr

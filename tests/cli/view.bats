@@ -142,7 +142,9 @@ C
 @test "light of a PNG that says sRGB is made linear" {
     "$VDBSHADE" bake box.obj "${SMALL[@]}" --irradiance --bits 16 --quiet -o light.png
     "$VDBSHADE" info light.png | grep -q 'vdbshade_color_space: sRGB'
-    "$VDBSHADE" bake box.obj "${SMALL[@]}" --irradiance --bits 16 --color-space linear --quiet -o plain.png
+    write_scene box.json box.obj '' '"color_space": "linear"'
+    no_sun "${SMALL[@]}"
+    "$VDBSHADE" bake box.json "${rest[@]}" --irradiance --bits 16 --quiet -o plain.png
     for name in light plain; do
         shade view box.obj --planes $name.png -o $name.html --quiet
         done_well

@@ -82,7 +82,7 @@ info() {
 
 @test "half floats take less room, and values are the same for any number of threads" {
     shade volume scene.json --method cone --ao-method cones -o 1.vdb --threads 1 --quiet
-    shade volume scene.json --method cone --ao-method cones -o 5.vdb --threads 5 --isa base --quiet
+    shade volume scene.json --method cone --ao-method cones -o 5.vdb --threads 5 --quiet
     cmp 1.vdb 5.vdb
     shade volume scene.json --method cone --ao-method cones -o half.vdb --half --quiet
     done_well

@@ -44,20 +44,13 @@ static int check_picture(const cli_bake_settings *settings) {
 
 /* What is only for outputs that are assets. */
 static int check_lit(const cli_bake_settings *settings, const vsh_scene *scene) {
-    const char *given = settings->preview         ? "preview"
-                        : settings->embed         ? "embed"
-                        : settings->images_beside ? "images-beside"
-                        : settings->exr != NULL   ? "exr"
-                                                  : NULL;
+    const char *given = settings->preview ? "preview" : settings->exr != NULL ? "exr" : NULL;
     size_t assets = 0;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         assets += vsh_lit_is_output(scene->receivers[i].output) != 0;
     }
     if (given != NULL && assets == 0) {
         return cli_usage("--%s: is for outputs that end in .glb, .gltf or .obj", given);
-    }
-    if (settings->embed && settings->images_beside) {
-        return cli_usage("--embed: not together with --images-beside");
     }
     if (settings->exr == NULL) {
         return CLI_OK;
@@ -260,9 +253,6 @@ static int bake_scene(const cli_bake_settings *settings, const vsh_scene *scene)
     options.band_rows = settings->band_rows;
     options.invalid_picture = settings->invalid_picture;
     options.lit_preview = settings->preview;
-    options.lit_image_place = settings->embed           ? VSH_LIT_IMAGES_EMBED
-                              : settings->images_beside ? VSH_LIT_IMAGES_BESIDE
-                                                        : VSH_LIT_IMAGES_AUTO;
     options.lit_exr = settings->exr;
     options.command = cli_parsed_command();
     const char *const files[] = {settings->input, cli_bake_lights(settings)};

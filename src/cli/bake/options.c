@@ -13,12 +13,9 @@ enum {
     KEY_OUTPUT_FOLDER,
     KEY_RECEIVE,
     KEY_NO_RECEIVE,
-    KEY_ONE_SIDED,
     KEY_PER_OBJECT,
     KEY_INVALID,
     KEY_PREVIEW,
-    KEY_EMBED,
-    KEY_IMAGES_BESIDE,
     KEY_EXR,
     KEY_VIEW,
     KEY_DENSITY,
@@ -43,8 +40,6 @@ static const cli_option options[] = {
      "where\nthere are several outputs"},
     {KEY_PREVIEW, "preview", NULL,
      "into a .glb or .gltf: the light as unlit base colour,\nwhich every viewer shows, in place of textures"},
-    {KEY_EMBED, "embed", NULL, "put its images into it (.glb)"},
-    {KEY_IMAGES_BESIDE, "images-beside", NULL, "put its images beside it, as OUT.lightmap.png (.gltf)"},
     {KEY_EXR, "exr", "FILE.exr", "also an EXR of all channels beside a .glb or .gltf"},
     {KEY_VIEW, "view", "PAGE.html", "also a page to look at it in a browser: docs/view.md"},
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
@@ -63,7 +58,6 @@ static const cli_option options[] = {
      "repeated"},
     CLI_FLOOR_OPTION,
     CLI_NO_CAST_OPTION,
-    {KEY_ONE_SIDED, "one-sided", "NAME", "light passes the backs of their faces, likewise; may\nbe repeated"},
     {KEY_PER_OBJECT, "per-object", NULL,
      "an image for each object: FOLDER/NAME.exr with\n-o FOLDER/, else OUT.NAME.exr, or where OUT has %s"},
     {0, NULL, NULL, "Terrain"},
@@ -85,7 +79,6 @@ static const cli_option options[] = {
      "rows baked and written at a time, 1 to 65536,\nrounded up to eights; changes no value (all, or as\n"
      "many as --memory-limit allows)"},
     CLI_COMMON_OPTIONS,
-    CLI_ISA_OPTION,
 };
 
 const cli_command cli_bake = {
@@ -178,8 +171,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return take_pattern(&s->receive, name, value);
     case KEY_NO_RECEIVE:
         return take_pattern(&s->no_receive, name, value);
-    case KEY_ONE_SIDED:
-        return take_pattern(&s->one_sided, name, value);
     case KEY_HEIGHT:
         CLI_TRY(cli_parse_number(name, value, -1e12, 1e12, &s->height));
         return s->height != 0.0 ? CLI_OK
@@ -196,12 +187,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case KEY_PREVIEW:
         s->preview = true;
-        return CLI_OK;
-    case KEY_EMBED:
-        s->embed = true;
-        return CLI_OK;
-    case KEY_IMAGES_BESIDE:
-        s->images_beside = true;
         return CLI_OK;
     case KEY_EXR:
         s->exr = value;
@@ -232,7 +217,5 @@ int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings, bool *hel
     settings->words = (const char *const *)argv;
     settings->word_count = (size_t)argc;
     const int code = cli_parse(&cli_bake, argc, argv, take, settings, "INPUT", &settings->input, help);
-    const char *atlas = cli_patch_text(&settings->patch, "--atlas");
-    settings->per_object = settings->per_object || vsh_atlas_kind(atlas) == VSH_ATLAS_OBJECTS;
     return code != CLI_OK || *help ? code : cli_patch_check(&settings->patch);
 }

@@ -74,7 +74,7 @@ typedef struct cli_bake_settings {
     const char *input;
     const char *output;
     const char *output_folder; /* for the outputs of a scene, by their names; NULL: where it says */
-    cli_patterns receive, no_receive, no_cast, one_sided;
+    cli_patterns receive, no_receive, no_cast;
     cli_densities densities;
     const char *stats;
     const char *invalid_picture; /* NULL: none */
@@ -89,7 +89,7 @@ typedef struct cli_bake_settings {
     const char *casters[CLI_MAX_EXTRA_CASTERS];
     size_t caster_count;
     const char *exr;                       /* beside an asset; NULL: none */
-    bool preview, embed, images_beside;    /* of an asset */
+    bool preview;                          /* of an asset */
     double floor_size[2], floor_center[3]; /* size 0: none */
     bool has_sun, has_sun_angle, has_light_radius, per_object, dry_run;
     int32_t shard, shard_count; /* 0: all of it */

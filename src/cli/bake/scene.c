@@ -88,8 +88,6 @@ static int add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
                 memcpy(made->casters[i].size, s->world, sizeof s->world);
             } else if (i < own) {
                 made->casters[i].objects = selection(NULL, &s->no_cast);
-                made->casters[i].one_sided = s->one_sided.list;
-                made->casters[i].one_sided_count = s->one_sided.count;
             }
         }
     }
@@ -227,10 +225,8 @@ static int check_objects(const cli_bake_settings *s, const cli_bake_scene *made,
                          "file, by \"objects\" and \"except\"",
                          s->receive.count > 0 ? "receive" : "no-receive", s->input);
     }
-    if ((s->no_cast.count > 0 || s->one_sided.count > 0) && made->read != NULL) {
-        const bool except = s->no_cast.count > 0;
-        return cli_usage("--%s: the casters of a scene stand in its file, %s; see \"%s\"",
-                         except ? "no-cast" : "one-sided", s->input, except ? "except" : "one_sided");
+    if (s->no_cast.count > 0 && made->read != NULL) {
+        return cli_usage("--no-cast: the casters of a scene stand in its file, %s; see \"except\"", s->input);
     }
     return CLI_OK;
 }

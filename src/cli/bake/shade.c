@@ -51,7 +51,7 @@ static const char *first_given(const cli_patch *given, const char *const *option
 
 int cli_bake_check_shade(const cli_bake_settings *s, vsh_scene *scene) {
     static const char *const of_ao[] = {"--ao-method", "--ao-cones"};
-    static const char *const of_rays[] = {"--rays", "--sampler", "--frame", "--early-rays", "--error"};
+    static const char *const of_rays[] = {"--rays", "--error"};
     const cli_patch *given = &s->patch;
     const char *option = first_given(given, of_ao, sizeof of_ao / sizeof of_ao[0]);
     if (option != NULL && !scene->ao && vsh_planes_shaded(&scene->planes) == 0) {

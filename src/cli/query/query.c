@@ -57,7 +57,6 @@ static const cli_option options[] = {
      "how far from the casters' box points may be for wide\nlights to be right there (four times its "
      "diagonal)"},
     CLI_COMMON_OPTIONS,
-    CLI_ISA_OPTION,
 };
 
 static int query_main(int argc, char **argv);

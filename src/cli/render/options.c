@@ -58,7 +58,6 @@ static const cli_option options[] = {
     CLI_CASTER_OPTIONS,
     CLI_GRID_OPTIONS,
     CLI_COMMON_OPTIONS,
-    CLI_ISA_OPTION,
 };
 
 const cli_command cli_render = {

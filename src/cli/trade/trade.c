@@ -47,7 +47,6 @@ static const cli_option options[] = {
     CLI_SETTING("uv-set"),
     CLI_FLOOR_OPTION,
     CLI_COMMON_OPTIONS,
-    CLI_ISA_OPTION,
 };
 
 static int trade_main(int argc, char **argv);

@@ -49,7 +49,7 @@ static const cli_option options[] = {
     {KEY_DRY_RUN, "dry-run", NULL, "bake nothing: print voxels and memory"},
     {0, NULL, NULL, "Which voxels (without --box and --like the casters' own band)"},
     {KEY_BAND, "band", "VOXELS",
-     "how far from the surface, in voxels, more than 0 to 100\n(all of the level set's band: --half-width)"},
+     "how far from the surface, in voxels, more than 0 to 100\n(all of the level set's band)"},
     {KEY_BOX, "box", "X0,Y0,Z0,X1,Y1,Z1", "a box, scene units: lower corner, upper corner"},
     {KEY_BOX_VOXEL_SIZE, "box-voxel-size", "SIZE", "the edge of its voxels (that of the casters' voxels)"},
     {KEY_LIKE, "like", "FILE[:GRID]",
@@ -63,7 +63,6 @@ static const cli_option options[] = {
     CLI_CASTER_OPTIONS,
     CLI_GRID_OPTIONS,
     CLI_COMMON_OPTIONS,
-    CLI_ISA_OPTION,
 };
 
 static int volume_main(int argc, char **argv);
@@ -361,7 +360,7 @@ static int volume_main(int argc, char **argv) {
     cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
     cli_bake_scene made;
     CLI_TRY_DONE(cli_bake_scene_for_points(&s.bake, &made));
-    if (s.band > made.scene.grid.half_width && !cli_patch_has(&s.bake.patch, "--half-width")) {
+    if (s.band > made.scene.grid.half_width) {
         made.scene.grid.half_width = s.band;
     }
     CLI_TRY_DONE(cli_bake_check_work(&s.bake, &made));

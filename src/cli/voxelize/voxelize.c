@@ -31,6 +31,7 @@ static const cli_option options[] = {
     {KEY_NAME, "name", "NAME", "name of the grid in it (surface)"},
     {0, NULL, NULL, "Voxels"},
     CLI_GRID_OPTIONS,
+    CLI_SETTINGS(VSH_SETTINGS_LEVEL_SET),
     CLI_COMMON_OPTIONS,
 };
 
