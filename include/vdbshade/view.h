@@ -3,6 +3,7 @@
 #define VDBSHADE_VIEW_H
 
 #include "image.h"
+#include "scene.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -52,6 +53,17 @@ VSH_API vsh_result vsh_view_write_bakes(const char *path, const vsh_view_bake *c
                                         const vsh_run *run, vsh_error *error);
 
 enum { VSH_MAX_VIEW_BAKES = 4096 };
+
+/* The same of a scene that is not baked: the surface of its casters' voxels, with its shadows, AO and light
+ * at every vertex. All casters are voxelised; receivers, tint, bent normals and the sky are left out. `name`
+ * is shown. Light is the lights' irradiance, and the scene's ambient light times AO; without ambient light
+ * 0.3 of each colour, or 1 where there are no lights. Errors:
+ * - VSH_ERROR_ARGUMENT: path, name or scene NULL; more lights than VSH_MAX_CHANNELS - 4; run;
+ * - those of vsh_assets_load(), vsh_scene_occluders() and vsh_query_points();
+ * - VSH_ERROR_LIMIT: a surface of more than VSH_MAX_VIEW_MODEL bytes; run->memory_limit;
+ * - VSH_ERROR_WRITE, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_view_write_scene(const char *path, const char *name, const vsh_scene *scene,
+                                        const vsh_run *run, vsh_error *error);
 
 /* Browsers hold no text of 512 MiB, which base64 makes of this. */
 enum { VSH_MAX_VIEW_MODEL = 384 * 1024 * 1024 - 1024 };

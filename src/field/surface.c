@@ -473,20 +473,49 @@ static void find_transform(const vsh_field *field, double transform[12]) {
     }
 }
 
-static vsh_result make_mesh(const vsh_field *field, const vsh_run *run, vshi_job *job, vshi_surface *surface,
-                            float **corners, uint32_t **quads, vshi_surface_mesh *mesh, vsh_error *error) {
+static double bytes_of(const vshi_surface_quads *quads) {
+    return 12.0 * (double)quads->corner_count + 16.0 * (double)quads->quad_count;
+}
+
+static vsh_result make_quads(const vsh_field *field, const vsh_run *run, vshi_job *job, vshi_surface *surface,
+                             vshi_surface_quads *made, vsh_error *error) {
     static const double centre[3] = {0.0, 0.0, 0.0};
     VSHI_TRY(vshi_surface_find(field, 0.0, (vshi_budget){run, 0.0}, job, surface, error));
-    const size_t count = surface->quads[surface->brick_count];
-    const size_t corner_count = surface->corners[surface->brick_count];
-    double bytes = 12.0 * (double)corner_count + 16.0 * (double)count;
-    VSHI_TRY(vshi_check_limit(run, bytes, "surface", error));
-    VSHI_TRY(vshi_allocate((void **)corners, corner_count, 3 * sizeof **corners, "surface", error));
-    VSHI_TRY(vshi_allocate((void **)quads, count, 4 * sizeof **quads, "surface", error));
-    VSHI_TRY(vshi_surface_write(surface, centre, 1.0, job, *corners, *quads, error));
+    made->corner_count = surface->corners[surface->brick_count];
+    made->quad_count = surface->quads[surface->brick_count];
+    VSHI_TRY(vshi_check_limit(run, bytes_of(made), "surface", error));
+    VSHI_TRY(vshi_allocate((void **)&made->corners, made->corner_count, 3 * sizeof *made->corners, "surface",
+                           error));
+    VSHI_TRY(
+        vshi_allocate((void **)&made->quads, made->quad_count, 4 * sizeof *made->quads, "surface", error));
+    return vshi_surface_write(surface, centre, 1.0, job, made->corners, made->quads, error);
+}
+
+vsh_result vshi_surface_quads_make(const vsh_field *field, const vsh_run *run, vshi_surface_quads *quads,
+                                   vsh_error *error) {
+    *quads = (vshi_surface_quads){.corners = NULL};
+    vshi_job *job = vshi_job_begin(run, "surface", 2 * list_bricks(field, NULL));
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "surface: the system refused memory");
+    }
+    vshi_surface surface = {.bricks = NULL};
+    const vsh_result result = make_quads(field, run, job, &surface, quads, error);
+    vshi_surface_free(&surface);
+    vshi_job_end(job);
+    return result;
+}
+
+void vshi_surface_quads_free(vshi_surface_quads *quads) {
+    free(quads->quads);
+    free(quads->corners);
+    *quads = (vshi_surface_quads){.corners = NULL};
+}
+
+static vsh_result make_mesh(const vsh_field *field, const vsh_run *run, const vshi_surface_quads *quads,
+                            vshi_surface_mesh *mesh, vsh_error *error) {
     refinement r = {field, NULL, 0};
-    refine_quads(&r, *corners, *quads, count);
-    bytes += 48.0 * (double)r.triangle_count;
+    refine_quads(&r, quads->corners, quads->quads, quads->quad_count);
+    const double bytes = bytes_of(quads) + 48.0 * (double)r.triangle_count;
     VSHI_TRY(vshi_check_limit(run, bytes, "surface", error));
     if (r.triangle_count > UINT32_MAX / 3) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "surface: %zu triangles, at most %u", r.triangle_count,
@@ -498,7 +527,7 @@ static vsh_result make_mesh(const vsh_field *field, const vsh_run *run, vshi_job
         vshi_allocate((void **)&mesh->positions, mesh->vertex_count, 3 * sizeof(float), "surface", error));
     VSHI_TRY(vshi_allocate((void **)&mesh->indices, mesh->vertex_count, sizeof(uint32_t), "surface", error));
     r.positions = mesh->positions;
-    refine_quads(&r, *corners, *quads, count);
+    refine_quads(&r, quads->corners, quads->quads, quads->quad_count);
     for (size_t i = 0; i < mesh->vertex_count; ++i) {
         mesh->indices[i] = (uint32_t)i;
     }
@@ -509,18 +538,10 @@ static vsh_result make_mesh(const vsh_field *field, const vsh_run *run, vshi_job
 vsh_result vshi_surface_mesh_make(const vsh_field *field, const vsh_run *run, vshi_surface_mesh *mesh,
                                   vsh_error *error) {
     *mesh = (vshi_surface_mesh){.positions = NULL};
-    vshi_job *job = vshi_job_begin(run, "surface", 2 * list_bricks(field, NULL));
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "surface: the system refused memory");
-    }
-    vshi_surface surface = {.bricks = NULL};
-    uint32_t *quads = NULL;
-    float *corners = NULL;
-    const vsh_result result = make_mesh(field, run, job, &surface, &corners, &quads, mesh, error);
-    free(corners);
-    free(quads);
-    vshi_surface_free(&surface);
-    vshi_job_end(job);
+    vshi_surface_quads quads;
+    vsh_result result = vshi_surface_quads_make(field, run, &quads, error);
+    result = result == VSH_OK ? make_mesh(field, run, &quads, mesh, error) : result;
+    vshi_surface_quads_free(&quads);
     return result;
 }
 

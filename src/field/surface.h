@@ -33,7 +33,19 @@ vsh_result vshi_surface_write(vshi_surface *surface, const double centre[3], dou
  * `budget` counts all that is held but it. Errors: also VSH_ERROR_UNSUPPORTED without Embree. */
 vsh_result vshi_field_add_surface(vsh_field *field, vshi_budget budget, vshi_job *job, vsh_error *error);
 
-/* The surface where the finest level reads 0, as a mesh that looks outwards. */
+/* The quads of the surface where the finest level reads 0. Their corners may go around either way. */
+typedef struct vshi_surface_quads {
+    float *corners;  /* [corner_count][3], field space */
+    uint32_t *quads; /* [quad_count][4] */
+    size_t corner_count, quad_count;
+} vshi_surface_quads;
+
+/* Free it with vshi_surface_quads_free(), after an error too. Errors: as vshi_surface_find(). */
+vsh_result vshi_surface_quads_make(const vsh_field *field, const vsh_run *run, vshi_surface_quads *quads,
+                                   vsh_error *error);
+void vshi_surface_quads_free(vshi_surface_quads *quads);
+
+/* The same surface as a mesh that looks outwards, refined where the quads are off it. */
 typedef struct vshi_surface_mesh {
     float *positions;  /* [vertex_count][3], field space */
     uint32_t *indices; /* [triangle_count][3] */

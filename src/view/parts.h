@@ -42,6 +42,17 @@ json_t *vshi_view_text(const char *text);
 /* JSON as text; the caller frees it. NULL if memory is short: json_dumps() would leave out keys. */
 char *vshi_view_dump(const json_t *json);
 
+/* A surface, and an image whose texel i, row by row, has the values of vertex i. */
+typedef struct vshi_view_surface {
+    const char *name;
+    const vsh_model *model; /* of one shape */
+    const vsh_image *image; /* NULL: no values */
+} vshi_view_surface;
+
+/* Writes a page of the bakes, or of the surface where that is not NULL. Errors: as vsh_view_write(). */
+vsh_result vshi_view_write_page(const char *path, const vsh_view_bake *bakes, size_t count,
+                                const vshi_view_surface *surface, const vsh_run *run, vsh_error *error);
+
 /* A path's last part. */
 const char *vshi_view_file_name(const char *path);
 

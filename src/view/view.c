@@ -160,6 +160,27 @@ done:
     return result;
 }
 
+static vsh_result put_surface(vshi_view *view, const vshi_view_surface *surface, vsh_error *error) {
+    json_t *about = json_object(), *pages = json_array();
+    char block[32];
+    vsh_result result;
+    snprintf(block, sizeof block, VSHI_VIEW_BLOCK "%zu", view->blocks);
+    VSHI_TRY_DONE(vshi_view_put_arrays(view, surface->name, surface->model, error));
+    VSHI_TRY_DONE(vshi_view_tell(about, "name", vshi_view_text(surface->name), error));
+    VSHI_TRY_DONE(vshi_view_tell(about, "uvSet", json_integer(-1), error));
+    VSHI_TRY_DONE(vshi_view_tell(about, "model", json_string(block), error));
+    VSHI_TRY_DONE(vshi_view_tell(about, "perVertex", json_true(), error));
+    if (surface->image != NULL) {
+        VSHI_TRY_DONE(vshi_view_put_image(view, surface->name, surface->image, pages, error));
+    }
+    VSHI_TRY_DONE(vshi_view_tell(about, "pages", json_incref(pages), error));
+    VSHI_TRY_DONE(vshi_view_tell(view->about, NULL, json_incref(about), error));
+done:
+    json_decref(pages);
+    json_decref(about);
+    return result;
+}
+
 static vsh_result check_images(const vsh_view_bake *bake, const char *what, vsh_error *error) {
     VSHI_NEEDS_OF(bake->image_count, bake->images);
     if (bake->image_count > 0 && (bake->plane_count > 0 || bake->name == NULL)) {
@@ -209,22 +230,26 @@ static vsh_result check(const vsh_view_bake *given, const char *what, vsh_view_b
     return check_images(bake, what, error);
 }
 
-static vsh_result put_page(vshi_view *view, const vsh_view_bake *bakes, size_t count, vsh_error *error) {
+typedef struct writing {
+    const char *path;
+    const vsh_view_bake *bakes;
+    size_t count;
+    const vshi_view_surface *surface;
+    const vsh_run *run;
+} writing;
+
+static vsh_result put_page(vshi_view *view, const writing *w, vsh_error *error) {
     put_head(view->page);
-    for (size_t i = 0; i < count; ++i) {
-        VSHI_TRY(put_bake(view, &bakes[i], error));
+    for (size_t i = 0; i < w->count; ++i) {
+        VSHI_TRY(put_bake(view, &w->bakes[i], error));
+    }
+    if (w->surface != NULL) {
+        VSHI_TRY(put_surface(view, w->surface, error));
     }
     VSHI_TRY(put_about(view, error));
     put_scripts(view->page);
     return VSH_OK;
 }
-
-typedef struct writing {
-    const char *path;
-    const vsh_view_bake *bakes;
-    size_t count;
-    const vsh_run *run;
-} writing;
 
 static vsh_result write_page(void *user, vsh_error *error) {
     const writing *w = user;
@@ -241,7 +266,7 @@ static vsh_result write_page(void *user, vsh_error *error) {
         result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", w->path);
         goto done;
     }
-    VSHI_TRY_DONE(put_page(&view, w->bakes, w->count, error));
+    VSHI_TRY_DONE(put_page(&view, w, error));
     result = vshi_page_commit(page, error);
     page = NULL;
 done:
@@ -251,6 +276,12 @@ done:
     }
     free(memory);
     return result;
+}
+
+vsh_result vshi_view_write_page(const char *path, const vsh_view_bake *bakes, size_t count,
+                                const vshi_view_surface *surface, const vsh_run *run, vsh_error *error) {
+    writing w = {path, bakes, count, surface, run};
+    return vshi_on_stack(write_page, &w, error);
 }
 
 vsh_result vsh_view_write_bakes(const char *path, const vsh_view_bake *const *bakes, size_t count,
@@ -276,8 +307,7 @@ vsh_result vsh_view_write_bakes(const char *path, const vsh_view_bake *const *ba
         goto done;
     }
     VSHI_TRY_DONE(vshi_run_resolve(run, &resolved, error));
-    writing w = {path, full, count, &resolved};
-    result = vshi_on_stack(write_page, &w, error);
+    result = vshi_view_write_page(path, full, count, NULL, &resolved, error);
 done:
     free(full);
     return result;

@@ -193,6 +193,26 @@ BAKE=(--sun 1,0.2,1 --sun-angle 20 --ao 1 --size 64 --max-error 0.05 --bent-norm
     [ "$(sort -u <<<"${shown[0]}" | wc -l)" -ge 2 ] || fail "one colour: ${shown[0]}"
 }
 
+@test "a scene: light, shadow and AO at the vertices of its surface, which can be picked" {
+    sed 's/"voxel_size": 0.02/"voxel_size": 0.05/' "$ASSETS/seeds.json" >seeds.json
+    shade view seeds.json -o seeds.html --quiet
+    done_well
+    # 4 × 4 of the floor from above: x and z from -2 to 2, a pixel is 0.01 at y = 0. What is higher is nearer the border.
+    local above="fov=90&camera=0,2,0.0001,0,0,0&ui=0"
+    look seeds.html "$above&mode=light&channel=shadow.sun"
+    state_is ready
+    pixel_is 20 20 255 255 255
+    pixel_is 267 280 0 0 0 # the middle of the sphere's shadow
+    look seeds.html "$above&mode=lit"
+    pixel_is 20 20 $(lit 255 255 255 0.8 0.8 0.8 0.909)
+    look seeds.html "$above&mode=ao"
+    pixel_is 20 20 255 255 255
+    look seeds.html "ui=1&$above&pick=0.05,0.05"
+    for told in '<h2>surface</h2>' '<th>UV set</th><td>none</td>' '<th>shadow.sun</th><td>1</td>' '<th>ao</th><td>1</td>'; do
+        grep -qF "$told" page.dom || fail "no $told: $(grep -o '<section.*section>' page.dom)"
+    done
+}
+
 @test "bilinear lookups between texels, and bent normals as (1 + n) / 2" {
     write_corner
     "$VDBSHADE" bake corner.obj "${BAKE[@]}" -o corner.exr

@@ -94,7 +94,7 @@ run_commands() {
 }
 
 @test "every command of docs/view.md" {
-    run_commands view.md 5
+    run_commands view.md 6
 }
 
 # options_of FILE …: each option that is named there, once. Those of other programs are left out.

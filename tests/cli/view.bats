@@ -168,6 +168,121 @@ C
         "$VDBSHADE" view box.obj --planes box.exr -o $threads.html --threads $threads --quiet
     done
     cmp 1.html 3.html
+    sed 's/"voxel_size": 0.02/"voxel_size": 0.1/' "$ASSETS/seeds.json" >seeds.json
+    for threads in 1 3; do
+        "$VDBSHADE" view seeds.json -o $threads.html --threads $threads --quiet
+    done
+    cmp 1.html 3.html
+}
+
+@test "a scene is the surface of its voxels, with the shadow, AO and light of its sun and sky at each vertex" {
+    sed 's/"voxel_size": 0.02/"voxel_size": 0.05/' "$ASSETS/seeds.json" >seeds.json
+    shade view seeds.json -o page.html --quiet
+    done_well
+    no_leftovers
+    grep -oE '"name":"[a-zA-Z.]*","data":"data[0-9]"' page.html | cut -d'"' -f4,8 --output-delimiter=' ' >channels
+    printf '%s\n' 'shadow.sun data1' 'ao data2' 'irradiance.R data3' 'irradiance.G data4' 'irradiance.B data5' | diff - channels
+    cat >vertices.c <<'C'
+#include <Imath/half.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <zlib.h>
+static unsigned char *read_all(const char *path, size_t *size) {
+    FILE *in = fopen(path, "rb");
+    unsigned char *bytes = calloc(1, 1 << 24);
+    if (in == NULL || bytes == NULL) exit(2);
+    *size = fread(bytes, 1, 1 << 24, in);
+    fclose(in);
+    return bytes;
+}
+/* GLB PLANE …: the world position of each vertex, and its values. A row of a plane has 2048. */
+int main(int argc, char **argv) {
+    size_t size;
+    unsigned char *glb = read_all(argv[1], &size), *planes[8];
+    char *json = (char *)glb + 20;
+    unsigned length, count;
+    double matrix[16];
+    memcpy(&length, glb + 12, sizeof length);
+    if (sscanf(strstr(json, "\"count\":"), "\"count\":%u", &count) != 1) return 3;
+    char *at = strstr(json, "\"matrix\":[") + 10;
+    for (int i = 0; i < 16; ++i, ++at) matrix[i] = strtod(at, &at);
+    const unsigned char *positions = glb + 20 + length + 8;
+    const size_t texels = (count + 2047) / 2048 * (size_t)2048;
+    for (int k = 2; k < argc; ++k) {
+        unsigned char *packed = read_all(argv[k], &size), *bytes = planes[k - 2] = malloc(2 * texels);
+        uLongf unpacked = 2 * texels;
+        if (uncompress(bytes, &unpacked, packed, size) != Z_OK || unpacked != 2 * texels) return 4;
+        for (size_t i = 0; i < 2 * texels; ++i)
+            if (i % 2048) bytes[i] += bytes[i - 1];
+        free(packed);
+    }
+    for (size_t i = 0; i < count; ++i) {
+        float p[3];
+        memcpy(p, positions + 12 * i, sizeof p);
+        for (int c = 0; c < 3; ++c) printf("%g ", p[c] + matrix[12 + c]);
+        for (int k = 0; k < argc - 2; ++k)
+            printf("%g ", imath_half_to_float((imath_half_bits_t)(planes[k][i] << 8 | planes[k][texels + i])));
+        printf("\n");
+    }
+    return 0;
+}
+C
+    "${CC:-cc}" -std=gnu11 ${CFLAGS-} vertices.c -lz -lImath-3_1 -lm -o vertices
+    for block in 0 1 2 3; do
+        block data$block page.html >$block
+    done
+    ./vertices 0 1 2 3 >vertices.txt
+    # x y z shadow ao light. The floor is 6 × 6 at y = 0, the sphere's radius 0.5 around y = 0.8; the sun casts its shadow to
+    # x = 0.67, z = 0.8. Under it AO is 1 - (0.5 / 0.8)². Light is 0.3 of the sky and the sun's cosine, 0.609.
+    awk 'function near(x, y, z, r) { return ($1 - x) ^ 2 + ($2 - y) ^ 2 + ($3 - z) ^ 2 < r * r }
+         function off(value, wanted, most) { return value - wanted > most || wanted - value > most }
+         $2 > -0.03 && $2 < 0.03 { floor++ }
+         near(0, 1.3, 0, 0.1) { top++; bad += off($4, 1, 0.01) }
+         near(-2, 0, -2, 0.5) { open++; bad += off($4, 1, 0.01) || off($5, 1, 0.01) || off($6, 0.909, 0.01) }
+         near(0.667, 0, 0.8, 0.2) { dark++; bad += off($4, 0, 0.01) || off($6, 0.3 * $5, 0.01) }
+         near(0, 0, 0, 0.1) { under++; sum += $5 }
+         END { print floor, top, open, dark, under, sum / under, bad
+               exit !(floor > 13000 && top > 3 && open > 200 && dark > 30 && under > 5 && bad == 0 && !off(sum / under, 0.609, 0.03)) }' vertices.txt
+}
+
+@test "what a scene does not take, and scenes that cannot be shown" {
+    old_output page.html
+    cp "$ASSETS/seeds.json" .
+    for option in "--planes box.exr" "--other-planes box.exr" "--uv-set 1" box.obj; do
+        # shellcheck disable=SC2086
+        shade view seeds.json $option -o page.html
+        refused 2 seeds.json 'takes no OTHER'
+    done
+    shade view gone.json -o page.html
+    refused 3 gone.json
+    echo '{"casters": [{"mesh": "gone.obj"}], "ao": {"distance": 1}}' >other.json
+    shade view other.json -o page.html
+    refused 3 gone.obj
+    echo '{"casters": [], "ao": {"distance": 1}}' >other.json
+    shade view other.json -o page.html
+    refused 2 other.json 'casters'
+    untouched page.html
+    cp box.obj page.html
+    echo '{"casters": [{"mesh": "page.html"}], "ao": {"distance": 1}}' >other.json
+    shade view other.json -o page.html
+    refused 2 page.html 'is also an input'
+    cmp box.obj page.html
+}
+
+@test "layers, terrains and spheres of a scene are in its surface; without light only its shape is shown" {
+    ln -s "$(cd "$ASSETS" && pwd)/terrain.png" .
+    cat >scene.json <<'JSON'
+{"casters": [{"heightfield": "terrain.png", "size": [10, 10], "height": 2, "base": 1, "direct": true},
+             {"spheres": [[0, 4, 0, 1]], "layer": "above"}],
+ "layers": [{"name": "above", "voxel_size": 0.2}], "voxel_size": 0.2}
+JSON
+    shade view scene.json -o page.html --quiet
+    done_well
+    block data0 page.html >surface.glb
+    # the terrain's base is at y = -1, the sphere's top at y = 5
+    "$VDBSHADE" info surface.glb | awk '$1 == "bounds:" { printf "%.2f %.2f %.2f\n", $3, $7, $6 }' >bounds
+    [ "$(cat bounds)" = "-1.00 5.00 5.00" ] || fail "$(cat bounds)"
 }
 
 @test "bad usage" {

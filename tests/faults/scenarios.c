@@ -396,6 +396,23 @@ static vsh_result write_page(const vsh_run *run, vsh_error *error) {
     return vsh_view_write("out.html", &bake, &other, run, error);
 }
 
+static vsh_result write_scene_page(const vsh_run *run, vsh_error *error) {
+    vsh_sdf_node node = vsh_sdf_node_default();
+    vsh_caster ball = vsh_caster_default();
+    ball.type = VSH_CASTER_SDF;
+    ball.sdf = (vsh_sdf){&node, 1};
+    vsh_light light = vsh_light_default();
+    vsh_scene scene = vsh_scene_default();
+    scene.casters = &ball;
+    scene.caster_count = 1;
+    scene.lights = &light;
+    scene.light_count = 1;
+    scene.grid.resolution = 8;
+    scene.shade = preview_options();
+    scene.ao = 1;
+    return vsh_view_write_scene("out.html", "a scene", &scene, run, error);
+}
+
 const scenario scenarios[] = {
     {"scene files", read_scenes},
     {"models", read_models},
@@ -419,6 +436,7 @@ const scenario scenarios[] = {
     {"a lit model written", light_model},
     {"a comparison", compare},
     {"a page", write_page},
+    {"a scene's page", write_scene_page},
     {"an atlas", unwrap},
 };
 const size_t scenario_count = sizeof scenarios / sizeof scenarios[0];

@@ -250,6 +250,8 @@ class Reach(Case):
         v.view_write_bakes(self.folder / "bakes.html", [dict(model=glb), dict(name="grey", images=[maps[0]]),
                                                         dict(name="b", images=[maps[1]])])
         self.assertIn("grey", (self.folder / "bakes.html").read_text())
+        v.Scene(ASSETS / "seeds.json", resolution=24).view(self.folder / "scene.html", "the seeds")
+        self.assertIn("the seeds", (self.folder / "scene.html").read_text())
 
     def job_parts(self):
         """Two parts make the lightmap of one bake, bit by bit."""

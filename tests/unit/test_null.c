@@ -337,6 +337,10 @@ static void nothing_is_drawn_or_compared_without_what_it_takes(void **state) {
     REFUSED(vsh_view_write("a.html", &seen, NULL, NULL, &error));
     REFUSED(vsh_view_write_bakes("a.html", NULL, 1, NULL, &error));
     REFUSED(vsh_view_write_bakes("a.html", (const vsh_view_bake *[]){&seen}, 0, NULL, &error));
+    const vsh_scene scene = {.caster_count = 0};
+    REFUSED(vsh_view_write_scene(NULL, "a", &scene, NULL, &error));
+    REFUSED(vsh_view_write_scene("a.html", NULL, &scene, NULL, &error));
+    REFUSED(vsh_view_write_scene("a.html", "a", NULL, NULL, &error));
     seen.plane_count = 0;
     seen.image_count = 1;
     REFUSED(vsh_view_write("a.html", &seen, NULL, NULL, &error));

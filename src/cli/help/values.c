@@ -19,7 +19,6 @@ static const struct {
     {"voxelize", "INPUT", CLI_MODEL_ENDINGS " json vdb"},
     {"render", "INPUT", CLI_MODEL_ENDINGS " json vdb"},
     {"unwrap", "INPUT", CLI_MODEL_ENDINGS},
-    {"view", "INPUT", CLI_MODEL_ENDINGS},
     {"view", "OTHER", CLI_MODEL_ENDINGS},
     {"info", "FILE", CLI_MODEL_ENDINGS " json vdb " CLI_IMAGE_ENDINGS},
     {"query", "points", ROWS},

@@ -45,7 +45,8 @@ const cli_command cli_view = {
     "view",
     "INPUT [OTHER] -o OUT.html [options]",
     "Writes a page that shows a lit mesh in a browser, in three dimensions: its light, AO, every channel\n"
-    "of its bake, texel density, charts; and a second bake beside it. It needs nothing beside it;\n"
+    "of its bake, texel density, charts; and a second bake beside it. A page of a scene (.json) shows the\n"
+    "surface of the casters' voxels, with shadows and AO at its vertices. The page needs no other file;\n"
     "docs/view.md",
     options,
     sizeof options / sizeof options[0],
@@ -78,10 +79,19 @@ static int take(void *settings, int key, const char *name, const char *value) {
     return cli_common_parse(&s->common, key, name, value, &taken);
 }
 
+static bool is_scene(const view_settings *s) {
+    return cli_has_ending(s->inputs[0], "json");
+}
+
 /* What can be refused before anything is read. */
 static int check(const view_settings *s) {
     if (s->output == NULL || !cli_has_ending(s->output, "html")) {
         return cli_usage("%s: give -o OUT.html", s->output != NULL ? s->output : s->inputs[0]);
+    }
+    if (is_scene(s) &&
+        (s->inputs[1] != NULL || s->planes[0].count + s->planes[1].count > 0 || s->uv_set >= 0)) {
+        return cli_usage("%s: is a scene, which takes no OTHER, --planes, --other-planes or --uv-set",
+                         s->inputs[0]);
     }
     for (size_t i = 0; i < 2; ++i) {
         if (s->inputs[i] != NULL && cli_same_file(s->output, s->inputs[i])) {
@@ -94,6 +104,19 @@ static int check(const view_settings *s) {
         }
     }
     return cli_temporary_check(s->output);
+}
+
+static int write_scene(const view_settings *s) {
+    const vsh_run run = cli_common_run(&s->common);
+    const char *slash = strrchr(s->inputs[0], '/');
+    vsh_scene *scene = NULL;
+    vsh_error error;
+    const bool done = vsh_scene_read(s->inputs[0], &run, &scene, &error) == VSH_OK &&
+                      vsh_scene_check_outputs(scene, &s->output, 1, &run, &error) == VSH_OK &&
+                      vsh_view_write_scene(s->output, slash != NULL ? slash + 1 : s->inputs[0], scene, &run,
+                                           &error) == VSH_OK;
+    vsh_scene_free(scene);
+    return done ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
 static int write_page(const view_settings *s) {
@@ -127,7 +150,7 @@ static int view_main(int argc, char **argv) {
     const double start = vshi_seconds();
     cli_progress_begin(s.common.progress, s.common.quiet);
     cli_signals_watch();
-    const int code = write_page(&s);
+    const int code = is_scene(&s) ? write_scene(&s) : write_page(&s);
     cli_progress_end();
     if (code == CLI_OK) {
         cli_signals_end(CLI_OK);

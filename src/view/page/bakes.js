@@ -60,7 +60,7 @@
             const page = bake.pages[Math.min(pageOf(drawn), bake.pages.length - 1)] || null;
             const size = sizeOf(drawn, page), geometry = geometryOf(drawn, known);
             const mesh = new THREE.Mesh(geometry,
-                VIEW.shaderOf(drawn.material, drawn.arrays.color !== null, drawn.set >= 0, size));
+                VIEW.shaderOf(drawn.material, drawn.arrays.color !== null, drawn.set >= 0, size, bake.perVertex === true));
             mesh.matrixAutoUpdate = false;
             mesh.matrix.copy(drawn.matrix);
             mesh.userData = {drawn, page, size};
@@ -143,18 +143,18 @@
     /* Whether a bake has something to show in a mode. */
     VIEW.has = function (bake, mode) {
         const uv = bake.meshes.some(mesh => mesh.userData.drawn.set >= 0);
-        const page = bake.pages[0];
+        const page = bake.pages[0], known = uv || bake.perVertex;
         switch (mode) {
         case 'lit':
         case 'base':
             return true;
         case 'ao':
-            return Boolean(page && uv && groupFor(page, 'ao')) || bake.meshes.some(m => m.userData.drawn.material.ao);
+            return Boolean(page && known && groupFor(page, 'ao')) || bake.meshes.some(m => m.userData.drawn.material.ao);
         case 'light':
-            return uv && VIEW.lightsOf(bake).length > 0;
+            return known && VIEW.lightsOf(bake).length > 0;
         case 'bent':
         case 'invalid':
-            return Boolean(page && uv && groupFor(page, mode));
+            return Boolean(page && known && groupFor(page, mode));
         default:
             return uv;
         }

@@ -17,12 +17,15 @@
         }
         const {drawn, page, size, chart} = hit.object.userData, vertices = [hit.face.a, hit.face.b, hit.face.c];
         const found = {bake, object: hit.object, drawn, page, size, point: hit.point, triangle: hit.faceIndex,
-            distance: hit.distance, chart: chart ? chart[vertices[0]] : null, uv: null, texel: null};
-        if (drawn.set >= 0) {
+            distance: hit.distance, chart: chart ? chart[vertices[0]] : null, uv: null, texel: null, weights: null, vertices};
+        if (drawn.set >= 0 || bake.perVertex) {
             const corner = k => new THREE.Vector3().fromArray(drawn.arrays.position, 3 * vertices[k]).applyMatrix4(drawn.matrix);
             const weights = new THREE.Vector3();
             new THREE.Triangle(corner(0), corner(1), corner(2)).getBarycoord(hit.point, weights);
-            const uv = drawn.uvs, w = weights.toArray();
+            found.weights = weights.toArray();
+        }
+        if (drawn.set >= 0) {
+            const uv = drawn.uvs, w = found.weights;
             found.uv = [0, 1].map(axis => vertices.reduce((sum, vertex, k) => sum + w[k] * uv[2 * vertex + axis], 0));
             found.texel = found.uv.map((value, axis) => wrap(value * size[axis], size[axis]));
         }
@@ -52,10 +55,12 @@
     VIEW.values = function (found) {
         const list = [], number = VIEW.halves(), {material} = found.drawn;
         const text = value => Number.isFinite(value) ? String(+value.toPrecision(4)) : String(value);
-        if (found.page && found.texel) {
-            const at = found.texel[1] * found.page.width + found.texel[0];
+        if (found.page && (found.texel || found.bake.perVertex)) {
+            const at = found.texel ? [found.texel[1] * found.page.width + found.texel[0]] : found.vertices;
+            const weights = found.texel ? [1] : found.weights;
+            const mean = channel => at.reduce((sum, place, k) => sum + weights[k] * number[channel.values[place]], 0);
             for (const group of VIEW.groups(found.page)) {
-                const values = [...new Set(group.channels)].map(channel => text(number[channel.values[at]]));
+                const values = [...new Set(group.channels)].map(channel => text(mean(channel)));
                 list.push([group.name, values.join('  ')]);
             }
         }

@@ -13,14 +13,19 @@
     const VARYINGS = `
 centroid varying vec2 vLight, vBase, vAo, vGlow;
 varying vec2 vPlace;
-varying vec3 vTint, vChart, vNormalView, vView, vWorld;`;
+varying vec3 vTint, vChart, vNormalView, vView, vWorld;
+varying vec4 vValue;`;
 
     const vertex = `
 attribute vec2 uvLight, uvBase, uvAo, uvGlow;
 attribute vec3 tint, chart;
 ${VARYINGS}
 uniform mat3 baseMatrix, glowMatrix;
+uniform bool perVertex;
+uniform sampler2D plane;
 void main() {
+    int row = textureSize(plane, 0).x; /* a vertex has the texel of its number */
+    vValue = perVertex ? texelFetch(plane, ivec2(gl_VertexID % row, gl_VertexID / row), 0) : vec4(0.0);
     vec4 view = modelViewMatrix * vec4(position, 1.0);
     vLight = uvLight;
     vPlace = uvLight;
@@ -37,7 +42,7 @@ void main() {
 
     const fragment = `
 uniform int mode;
-uniform bool hasPlane, hasLight, hasAo, hasBase, hasGlow, hasTint, hasUv, unlit, encode;
+uniform bool hasPlane, hasLight, hasAo, hasBase, hasGlow, hasTint, hasUv, unlit, encode, perVertex;
 uniform sampler2D plane, lightMap, aoMap, baseMap, glowMap;
 uniform vec4 color;
 uniform vec3 glow;
@@ -77,26 +82,27 @@ void main() {
     vec3 plain = base.rgb * (unlit ? 1.0 : shape());
     vec3 emitted = glow * (hasGlow ? toLinear(texture2D(glowMap, vGlow).rgb) : vec3(1.0));
     float ao = hasAo ? mix(1.0, texture2D(aoMap, vAo).r, strength) : 1.0;
-    vec4 value = hasPlane && hasUv ? texture2D(plane, vLight) : vec4(0.0);
+    bool known = hasPlane && (hasUv || perVertex);
+    vec4 value = perVertex ? vValue : known ? texture2D(plane, vLight) : vec4(0.0);
     vec3 none = vec3(0.18, 0.18, 0.2) * shape();
     vec3 shown = none;
     if (mode == ${VIEW.MODE.lit}) {
-        if (hasPlane && hasUv) { shown = base.rgb * value.rgb * gain + emitted; }
+        if (known) { shown = base.rgb * value.rgb * gain + emitted; }
         else if (hasLight) { shown = base.rgb * baked() * ao * gain + emitted; }
         else { shown = plain * ao * gain + emitted; }
         shown = toSrgb(shown);
     } else if (mode == ${VIEW.MODE.base}) {
         shown = toSrgb(base.rgb + emitted);
     } else if (mode == ${VIEW.MODE.ao}) {
-        if (hasPlane && hasUv) { shown = value.rgb; }
+        if (known) { shown = value.rgb; }
         else if (hasAo) { shown = grey(texture2D(aoMap, vAo).r); }
     } else if (mode == ${VIEW.MODE.light}) {
-        if (hasPlane && hasUv) { shown = encode ? toSrgb(value.rgb * gain) : value.rgb * gain; }
+        if (known) { shown = encode ? toSrgb(value.rgb * gain) : value.rgb * gain; }
         else if (hasLight) { shown = toSrgb(baked() * gain); }
     } else if (mode == ${VIEW.MODE.bent}) {
-        if (hasPlane && hasUv) { shown = 0.5 + 0.5 * value.rgb; }
+        if (known) { shown = 0.5 + 0.5 * value.rgb; }
     } else if (mode == ${VIEW.MODE.invalid}) {
-        if (hasPlane && hasUv) {
+        if (known) {
             shown = value.r > 0.5 ? vec3(0.93, 0.1, 0.6) : value.g < 0.5 ? vec3(0.95, 0.65, 0.15) : vec3(0.62) * shape();
         }
     } else if (mode == ${VIEW.MODE.charts}) {
@@ -124,8 +130,8 @@ void main() {
 
     const empty = new THREE.DataTexture(new Uint8Array(4), 1, 1);
 
-    /* A material of three.js for one of glTF's, with lightmaps of `size` texels. */
-    VIEW.shaderOf = function (material, hasTint, hasUv, size) {
+    /* A material of three.js for one of glTF's, with lightmaps of `size` texels, or a value each vertex. */
+    VIEW.shaderOf = function (material, hasTint, hasUv, size, perVertex) {
         const textureOf = map => map ? map.texture : empty;
         const uniforms = {
             mode: {value: 0}, hasPlane: {value: false}, plane: {value: empty}, encode: {value: false},
@@ -135,7 +141,7 @@ void main() {
             hasGlow: {value: material.glow !== null}, glowMap: {value: textureOf(material.glow)},
             baseMatrix: {value: material.base ? material.base.matrix : new THREE.Matrix3()},
             glowMatrix: {value: material.glow ? material.glow.matrix : new THREE.Matrix3()},
-            hasTint: {value: hasTint}, hasUv: {value: hasUv}, unlit: {value: material.unlit},
+            hasTint: {value: hasTint}, hasUv: {value: hasUv}, perVertex: {value: perVertex}, unlit: {value: material.unlit},
             color: {value: new THREE.Vector4().fromArray(material.color)},
             glow: {value: new THREE.Vector3().fromArray(material.emissive)},
             intensity: {value: material.intensity}, strength: {value: material.strength},
@@ -143,7 +149,7 @@ void main() {
             size: {value: new THREE.Vector2(size[0], size[1])}, picked: {value: new THREE.Vector2(-1, -1)}
         };
         const made = new THREE.ShaderMaterial({uniforms, vertexShader: vertex, fragmentShader: fragment,
-            side: material.doubleSided ? THREE.DoubleSide : THREE.FrontSide});
+            side: material.doubleSided || perVertex ? THREE.DoubleSide : THREE.FrontSide});
         made.userData.blended = material.alphaMode === 'BLEND';
         made.userData.side = made.side;
         made.extensions.derivatives = true;

@@ -258,6 +258,11 @@ class Scene:
         return lib.vsh_scene_reach(self.struct, handle_of(grid, Grid, "grid"), vector(receivers_min, 3, "receivers_min"),
                                    vector(receivers_max, 3, "receivers_max"))
 
+    def view(self, path: "str | os.PathLike[str]", name: str = "scene", *, run: Optional[Run] = None) -> None:
+        """Writes a page that shows the surface of its casters' voxels, with shadow, AO and light at the vertices
+        (docs/view.md). `name` is shown."""
+        call(lib.vsh_view_write_scene, path_of(path, "path"), name.encode(), self.struct, RUN, run=run)
+
     def bake(self, *, run: Optional[Run] = None, **options: Any) -> Any:
         """Bakes its lightmaps into arrays: a list of SceneLightmap; options of BakeJob. bake_scene() writes files."""
         from ._bake_scene import BakeJob
