@@ -188,7 +188,6 @@ def scenes():
     yield "box.json", lit([BALL], resolution=16), ["volume", "IN", "--box=-4,-4,-4,4,4,4", "--box-voxel-size", "0.01", "-o", "out.vdb"]
     yield "band.json", lit([BALL], resolution=600), ["volume", "IN", "--band", "50", "-o", "out.vdb"]
     yield "picture.json", lit([BALL], resolution=16), ["render", "IN", "--size", "16384x16384", "-o", "out.png"]
-    yield "turntable.json", lit([BALL], resolution=16), ["render", "IN", "--turntable", "4", "--size", "512x512", "-o", "out.html"]
     plane = {"region": [-2, -2, 2, 2], "lights": [{"name": "l", "type": "disc", "position": [1, 1.5], "radius": 0.1}]}
     flat = ["flat", "IN", "-o", "out.exr"]
     yield "plane.json", json.dumps(dict(plane, size=65536)).encode(), flat

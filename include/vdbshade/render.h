@@ -48,7 +48,7 @@ VSH_API vsh_result vsh_camera_frame(vsh_camera *camera, const double bounds_min[
 VSH_API vsh_result vsh_camera_frame_points(vsh_camera *camera, size_t count, const double *points,
                                            double azimuth, double elevation, double aspect, vsh_error *error);
 
-/* Turns a camera by `angle` radians around the axis along `up` through its target, as a turntable does;
+/* Turns a camera by `angle` radians around the axis along `up` through its target,
  * anticlockwise seen from above. The camera must have passed vsh_camera_check(). */
 VSH_API void vsh_camera_orbit(vsh_camera *camera, double angle);
 

@@ -15,7 +15,7 @@ static const cli_command_row rows[] = {
     {&cli_info, "FILE", "what a mesh, .vdb, scene or image holds, and what is wrong with it"},
     {&cli_volume, "INPUT -o OUT.vdb", "grids of shadow and AO: a surface's band, a box, a fog's voxels"},
     {&cli_query, "INPUT -o OUT", "shadow, AO, distance at points of a CSV, a PLY or raw floats"},
-    {&cli_render, "INPUT -o OUT", "picture of a scene, or a turntable, to look at a bake"},
+    {&cli_render, "INPUT -o OUT", "picture of a scene, to look at a bake"},
     {&cli_view, "INPUT -o OUT.html",
      "page to look at a lit mesh in a browser, with every channel of its bake"},
     {&cli_flat, "SCENE -o OUT", "light map of a plane, for 2D games"},

@@ -1,4 +1,4 @@
-# vdbshade render: pictures and turntables.
+# vdbshade render: pictures.
 load helper
 
 SUN=(--sun 0.3,1,0.2 --sun-angle 5)
@@ -52,33 +52,13 @@ png_size() {
     refused 2 --background --shafts
 }
 
-@test "a turntable's frames are numbered from 0, and all differ" {
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --turntable 3 -o view_%03d.png --quiet
+@test "--orbit turns the camera around what it looks at, anticlockwise from above" {
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --camera 0.5,1.5,4 --look-at 0.5,0,0 --orbit 90 -o turned.png --quiet
     done_well
-    [ "$(ls view_*.png | tr '\n' ' ')" = "view_000.png view_001.png view_002.png " ] || fail "$(ls)"
-    ! cmp -s view_000.png view_001.png || fail "it does not turn"
-    ! cmp -s view_001.png view_002.png || fail "it does not turn"
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --orbit 120 -o turned.png --quiet
-    same_values turned.png view_001.png || fail "--orbit is not a turntable's turn"
-}
-
-@test "a turntable without a place for the number, or with two, is refused" {
-    for output in view.png view_%d_%d.png view_%s.png view_%; do
-        shade render box.obj "${SUN[@]}" "${QUICK[@]}" --turntable 3 -o "$output"
-        refused 2 %d
-    done
-}
-
-@test "a page holds its frames, and needs nothing beside it" {
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --turntable 4 -o turn.html --quiet
-    done_well
-    [ "$(grep -c '^"iVBOR' turn.html)" -eq 4 ] || fail "frames: $(grep -c '^"iVBOR' turn.html)"
-    ! grep -qE '(src|href)="?(https?:|/|\.)' turn.html || fail "the page needs something beside it"
-    no_leftovers
-    # A frame is the PNG that a turntable of files has.
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --turntable 4 -o view_%d.png --quiet
-    grep '^"iVBOR' turn.html | sed -n 2p | tr -d '",' | base64 -d >frame.png
-    same_values frame.png view_1.png || fail "another frame"
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --camera 4.5,1.5,0 --look-at 0.5,0,0 -o placed.png --quiet
+    same_values turned.png placed.png || fail "another place"
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --camera 0.5,1.5,4 --look-at 0.5,0,0 -o front.png --quiet
+    ! same_values front.png placed.png || fail "both places look alike"
 }
 
 @test "cameras that see nothing are refused" {

@@ -24,7 +24,6 @@ static const struct {
     {"query", "points", ROWS},
     {"query", "output", ROWS},
     {"bake", "output", CLI_IMAGE_ENDINGS " glb gltf"},
-    {"render", "output", CLI_IMAGE_ENDINGS " html"},
     {NULL, "INPUT", CLI_MODEL_ENDINGS " json"},
     {NULL, "SCENE", "json"},
     {NULL, "GOLDEN", CLI_IMAGE_ENDINGS " vdb"},

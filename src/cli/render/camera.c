@@ -76,7 +76,7 @@ static double *find_points(const render_surfaces *seen, const vsh_render_options
     return points;
 }
 
-/* The box around points: a turntable's camera sees it from all sides. */
+/* Frames the box around points, so that all of it is seen from any angle of --orbit. */
 static vsh_result frame_box(const render_settings *s, size_t count, const double *points, vsh_camera *camera,
                             vsh_error *error) {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
@@ -98,7 +98,7 @@ int render_camera_place(const render_settings *s, const render_surfaces *seen, v
     }
     memcpy(camera->up, s->up, sizeof camera->up);
     camera->fov = s->fov_deg * degree;
-    const bool near = s->frames == 0 && s->orbit_deg == 0.0 && !s->has_camera; /* else as a turntable */
+    const bool near = s->orbit_deg == 0.0 && !s->has_camera;
     const vsh_result result =
         near ? vsh_camera_frame_points(camera, count, points, azimuth_deg * degree, elevation_deg * degree,
                                        (double)s->width / (double)s->height, &error)

@@ -11,7 +11,6 @@ enum {
     KEY_UP,
     KEY_FOV,
     KEY_ORBIT,
-    KEY_TURNTABLE,
     KEY_SIZE,
     KEY_SAMPLES,
     KEY_SKY,
@@ -27,8 +26,7 @@ enum {
 static const cli_option options[] = {
     {0, NULL, NULL, "Picture"},
     {'o', "output", "OUT",
-     "image to write: .exr has linear R G B, A, Z and N.X N.Y\nN.Z; others are sRGB of 8 bits. A turntable's "
-     "name has a\n%d or %04d for the frame, or ends in .html: a page that\nturns"},
+     "image to write: .exr has linear R G B, A, Z and N.X N.Y\nN.Z; others are sRGB of 8 bits"},
     {KEY_SIZE, "size", "W[xH]", "pixels, 1 to 16384 (1280x720)"},
     {KEY_SAMPLES, "samples", "N", "N x N rays a pixel, 1 to 16 (3)"},
     {KEY_EXPOSURE, "exposure", "STOPS", "colours of 8-bit pictures times 2^STOPS, -20 to 20 (0)"},
@@ -39,7 +37,6 @@ static const cli_option options[] = {
     {KEY_UP, "up", "X,Y,Z", "the way up (0,1,0)"},
     {KEY_FOV, "fov", "DEG", "angle over the picture's height, 0.1 to 170 (35)"},
     {KEY_ORBIT, "orbit", "DEG", "turn it so far around what it looks at (0)"},
-    {KEY_TURNTABLE, "turntable", "N", "N pictures of a whole turn, 2 to 1000 (a page: 36)"},
     {0, NULL, NULL, "Light"},
     CLI_LIGHT_OPTIONS,
     {KEY_SKY, "sky", "R,G,B",
@@ -108,8 +105,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return cli_parse_number(name, value, 0.1, 170.0, &s->fov_deg);
     case KEY_ORBIT:
         return cli_parse_number(name, value, -1e6, 1e6, &s->orbit_deg);
-    case KEY_TURNTABLE:
-        return cli_parse_integer(name, value, 2, RENDER_MOST_FRAMES, &s->frames);
     case KEY_SIZE:
         return cli_parse_size(name, value, &s->width, &s->height);
     case KEY_SAMPLES:
@@ -154,8 +149,6 @@ static int check(render_settings *s) {
         return cli_usage("--size %dx%d: expected at most %d pixels a side", s->width, s->height,
                          VSH_MAX_PICTURE_SIZE);
     }
-    s->page = cli_has_ending(s->bake.output, "html") || cli_has_ending(s->bake.output, "htm");
-    s->frames = s->page && s->frames == 0 ? RENDER_PAGE_FRAMES : s->frames;
     if (s->has_camera && s->has_look_at) {
         vsh_camera camera = vsh_camera_default();
         memcpy(camera.position, s->camera, sizeof camera.position);

@@ -4,14 +4,11 @@
 #include "cli/temporary.h"
 #include "render.h"
 
-#include <limits.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Of a pixel: colour, alpha, depth, normal; R, G, B, A; planes of a file of floats, or bytes and PNG of a
- * page. */
-enum { FLOATS = 8, ENCODED = 4, PLANES = 6, PAGE = 2 };
+/* Of a pixel: colour, alpha, depth, normal; R, G, B, A; planes of a file of floats. */
+enum { FLOATS = 8, ENCODED = 4, PLANES = 6 };
 
 static const char *const linear_names[FLOATS] = {"R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z"};
 
@@ -21,44 +18,8 @@ static bool is_linear(const char *path) {
            cli_has_ending(path, "rla");
 }
 
-/* What stands for the frame's number: "%d", "%4d" or "%04d", and its end; NULL where there is none, or more
- * than one or another %. */
-static const char *find_number(const char *path, const char **end, int *digits) {
-    const char *at = strchr(path, '%');
-    if (at == NULL) {
-        return NULL;
-    }
-    *digits = 0;
-    *end = at + 1;
-    while (**end >= '0' && **end <= '9' && *digits < 100) {
-        *digits = 10 * *digits + (*(*end)++ - '0');
-    }
-    return *(*end)++ == 'd' && *digits < 20 && strchr(*end, '%') == NULL ? at : NULL;
-}
-
-void render_output_path(const render_settings *s, int32_t index, char *path, size_t capacity) {
-    const char *output = s->bake.output, *end;
-    int digits;
-    const char *at = s->frames > 0 && !s->page ? find_number(output, &end, &digits) : NULL;
-    if (at == NULL) {
-        snprintf(path, capacity, "%s", output);
-    } else {
-        snprintf(path, capacity, "%.*s%0*d%s", (int)(at - output), output, digits, index, end);
-    }
-}
-
 int render_output_check(const render_settings *s) {
-    const char *output = s->bake.output, *end;
-    int digits;
-    if (s->frames > 0 && !s->page && find_number(output, &end, &digits) == NULL) {
-        return cli_usage("-o '%s': the name of a turntable's frames has one %%d or %%04d; or end it in .html",
-                         output);
-    }
-    if (strlen(output) >= PATH_MAX - 64) {
-        return cli_usage("-o '%s': the name is too long", output);
-    }
-    char path[PATH_MAX];
-    render_output_path(s, 0, path, sizeof path);
+    const char *path = s->bake.output;
     for (size_t i = 0; i < s->lightmap_count; ++i) {
         if (cli_same_file(path, s->lightmaps[i])) {
             return cli_usage("%s: the output is also a lightmap", path);
@@ -67,23 +28,20 @@ int render_output_check(const render_settings *s) {
     if (s->bake.stats != NULL && cli_same_file(path, s->bake.stats)) {
         return cli_usage("%s: both the output and the --stats file", path);
     }
-    if (!s->page) {
-        const bool linear = is_linear(path);
-        const vsh_image image = {s->width,     s->height, s->transparent || linear ? 4 : 3,
-                                 linear_names, NULL,      NULL};
-        vsh_image_options options = vsh_image_options_default();
-        options.bits = linear ? 0 : 8;
-        vsh_error error;
-        if (vsh_image_check(path, &image, &options, &error) != VSH_OK) {
-            return cli_fail(&error);
-        }
+    const bool linear = is_linear(path);
+    const vsh_image image = {s->width, s->height, s->transparent || linear ? 4 : 3, linear_names, NULL, NULL};
+    vsh_image_options options = vsh_image_options_default();
+    options.bits = linear ? 0 : 8;
+    vsh_error error;
+    if (vsh_image_check(path, &image, &options, &error) != VSH_OK) {
+        return cli_fail(&error);
     }
     return cli_temporary_check(path);
 }
 
 uint64_t render_picture_bytes(const render_settings *s) {
     const uint64_t pixels = (uint64_t)s->width * (uint64_t)s->height;
-    const uint64_t more = s->page ? PAGE : is_linear(s->bake.output) ? PLANES : 0;
+    const uint64_t more = is_linear(s->bake.output) ? PLANES : 0;
     return pixels * (FLOATS + ENCODED + more) * sizeof(float);
 }
 
@@ -141,7 +99,7 @@ static int write_linear(const render_settings *s, const render_picture *p, const
     return code;
 }
 
-int render_output_encode(const render_settings *s, const render_picture *p) {
+static int encode(const render_settings *s, const render_picture *p) {
     vsh_error error;
     return vsh_picture_encode(&p->picture, s->width, s->height, s->exposure, p->encoded,
                               s->transparent ? p->encoded[3] : NULL, &error) == VSH_OK
@@ -149,11 +107,12 @@ int render_output_encode(const render_settings *s, const render_picture *p) {
                : cli_fail(&error);
 }
 
-int render_output_write(const render_settings *s, const render_picture *p, const char *path) {
+int render_output_write(const render_settings *s, const render_picture *p) {
+    const char *path = s->bake.output;
     if (is_linear(path)) {
         return write_linear(s, p, path);
     }
-    const int code = render_output_encode(s, p);
+    const int code = encode(s, p);
     const vsh_image image = {
         s->width, s->height, s->transparent ? 4 : 3, linear_names, (const float *const *)p->encoded, NULL};
     return code == CLI_OK ? write_image(path, &image, 8, p->origin) : code;

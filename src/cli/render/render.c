@@ -2,7 +2,6 @@
 #include "render.h"
 #include "base/bytes.h"
 #include "base/clock.h"
-#include "base/rounds.h"
 #include "cli/message.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
@@ -12,12 +11,9 @@
 #include "cli/warnings.h"
 
 #include <inttypes.h>
-#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-static const double degree = 0.017453292519943295;
 
 typedef struct render_work {
     const render_settings *settings;
@@ -31,7 +27,6 @@ typedef struct render_work {
     vsh_render_options options;
     cli_provenance origin;
     render_picture picture;
-    render_page *page;
     cli_stats stats;
 } render_work;
 
@@ -113,55 +108,22 @@ static const char *lightmap_named(const render_settings *s, const char *message)
                                                                                        : NULL;
 }
 
-static int render_frame(render_work *work, int32_t index, const vsh_run *run) {
+static int draw_picture(render_work *work) {
     const render_settings *s = work->settings;
+    CLI_TRY(render_picture_create(s, &work->origin, &work->picture));
     double start = vshi_seconds();
     vsh_error error;
-    vsh_render_options o = work->options;
-    if (s->frames > 0) {
-        vsh_camera_orbit(&o.camera, 360.0 * degree * index / s->frames);
-    }
-    const vsh_result result =
-        vsh_render(work->surfaces.surfaces, work->surfaces.count, work->occluders, work->scene->lights,
-                   work->scene->light_count, &o, run, &work->picture.picture, &work->stats.shade, &error);
+    const vsh_result result = vsh_render(work->surfaces.surfaces, work->surfaces.count, work->occluders,
+                                         work->scene->lights, work->scene->light_count, &work->options,
+                                         &work->run, &work->picture.picture, &work->stats.shade, &error);
     start = cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
     if (result != VSH_OK) {
         return cli_fail_of(lightmap_named(s, error.message), &error);
     }
     work->stats.points += (uint64_t)s->width * (uint64_t)s->height * (uint64_t)(s->samples * s->samples);
-    char path[PATH_MAX];
-    render_output_path(s, index, path, sizeof path);
-    const int code =
-        s->page ? render_page_add(work->page, &work->picture) : render_output_write(s, &work->picture, path);
+    const int code = render_output_write(s, &work->picture);
     cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
     return code;
-}
-
-static int render_frames(render_work *work) {
-    const render_settings *s = work->settings;
-    const int32_t count = s->frames > 0 ? s->frames : 1;
-    CLI_TRY(render_picture_create(s, &work->origin, &work->picture));
-    if (s->page) {
-        work->page = render_page_begin(s);
-        if (work->page == NULL) {
-            return cli_out_of_memory("page");
-        }
-    }
-    vshi_rounds rounds;
-    vshi_rounds_begin(&rounds, &work->run, "render", 1);
-    for (int32_t i = 0; i < count; ++i) {
-        const vsh_run run = vshi_rounds_run(&rounds, 1.0 / count);
-        CLI_TRY(render_frame(work, i, &run));
-        vshi_rounds_next(&rounds);
-    }
-    if (s->page) {
-        const double start = vshi_seconds();
-        render_page *page = work->page;
-        work->page = NULL;
-        CLI_TRY(render_page_end(page));
-        cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
-    }
-    return CLI_OK;
 }
 
 /* Lightmaps that are shown are inputs, too, and so is a file whose lights are taken. */
@@ -196,11 +158,10 @@ static int run_render(const render_settings *s, vsh_scene *scene) {
     CLI_TRY_DONE(make_occluders(&work));
     CLI_TRY_DONE(set_options(&work));
     CLI_TRY_DONE(find_origin(&work));
-    CLI_TRY_DONE(render_frames(&work));
+    CLI_TRY_DONE(draw_picture(&work));
     CLI_TRY_DONE(cli_stats_finish(&work.stats, &work.run, s->bake.stats));
     say_results(&work);
 done:
-    render_page_abandon(work.page);
     render_picture_free(&work.picture);
     cli_provenance_free(&work.origin);
     free(work.lit);
@@ -211,31 +172,10 @@ done:
     return code;
 }
 
-/* That no frame replaces an input. */
-static int check_frames(const render_settings *s, const vsh_scene *scene) {
-    const int32_t count = s->frames > 0 && !s->page ? s->frames : 1;
-    char **paths = calloc((size_t)count, sizeof *paths);
-    int code = paths != NULL ? CLI_OK : cli_out_of_memory(s->bake.output);
-    for (int32_t i = 0; i < count && code == CLI_OK; ++i) {
-        char path[PATH_MAX];
-        render_output_path(s, i, path, sizeof path);
-        paths[i] = strdup(path);
-        code = paths[i] != NULL ? cli_bake_check_output(&s->bake, scene, path)
-                                : cli_out_of_memory(s->bake.output);
-    }
-    if (code == CLI_OK) {
-        code = cli_bake_check_inputs(&s->bake, scene, (const char *const *)paths, (size_t)count);
-    }
-    for (int32_t i = 0; i < count && paths != NULL; ++i) {
-        free(paths[i]);
-    }
-    free(paths);
-    return code;
-}
-
 /* What can be refused before anything is read but the scene. */
 static int check_files(const render_settings *s, const vsh_scene *scene) {
-    CLI_TRY(check_frames(s, scene));
+    CLI_TRY(cli_bake_check_output(&s->bake, scene, s->bake.output));
+    CLI_TRY(cli_bake_check_inputs(&s->bake, scene, &s->bake.output, 1));
     if (s->bake.stats != NULL) {
         CLI_TRY(cli_bake_check_output(&s->bake, scene, s->bake.stats));
         CLI_TRY(cli_bake_check_inputs(&s->bake, scene, &s->bake.stats, 1));

@@ -5,21 +5,20 @@
 #include "cli/bake/options.h"
 #include "cli/provenance.h"
 
-enum { RENDER_MOST_LIGHTMAPS = 64, RENDER_MOST_FRAMES = 1000, RENDER_PAGE_FRAMES = 36 };
+enum { RENDER_MOST_LIGHTMAPS = 64 };
 
 typedef struct render_settings {
     cli_bake_settings bake; /* the scene, as `bake` takes it; its output and stats are ours */
     double camera[3], look_at[3], up[3];
     double fov_deg, orbit_deg;
     int32_t width, height, samples;
-    int32_t frames; /* of a turntable; 0: one picture */
     double sky[3], background[3];
     double exposure, shafts;
     int32_t shaft_steps;
     const char *lightmaps[RENDER_MOST_LIGHTMAPS];
     size_t lightmap_count;
     const char *pack; /* of the lightmaps, as bake took it; NULL: their own names */
-    bool has_camera, has_look_at, has_sky, transparent, page;
+    bool has_camera, has_look_at, has_sky, transparent;
 } render_settings;
 
 /* Takes the command line, and checks what can be checked before anything is read. */
@@ -92,26 +91,10 @@ int render_picture_create(const render_settings *settings, const cli_provenance 
                           render_picture *picture);
 void render_picture_free(render_picture *picture);
 
-/* Whether pictures can go to the output: CLI_OK or an exit code, having said why. */
+/* Whether the picture can go to the output: CLI_OK or an exit code, having said why. */
 int render_output_check(const render_settings *settings);
 
-/* Frame `index`'s file into path[capacity]; "%04d" in the output stands for its number, from 0. */
-void render_output_path(const render_settings *settings, int32_t index, char *path, size_t capacity);
-
-/* Fills a picture's `encoded`. CLI_OK or an exit code, having said why. */
-int render_output_encode(const render_settings *settings, const render_picture *picture);
-
-/* Writes a picture. CLI_OK or an exit code, having said why. */
-int render_output_write(const render_settings *settings, const render_picture *picture, const char *path);
-
-/* --- a page that turns (render_page.c) */
-
-typedef struct render_page render_page;
-
-/* A page's frames come one after the other. NULL where memory is short. */
-render_page *render_page_begin(const render_settings *settings);
-int render_page_add(render_page *page, const render_picture *picture);
-int render_page_end(render_page *page); /* writes it, and frees it whatever the code */
-void render_page_abandon(render_page *page);
+/* Writes the picture. CLI_OK or an exit code, having said why. */
+int render_output_write(const render_settings *settings, const render_picture *picture);
 
 #endif
