@@ -83,26 +83,21 @@ typedef struct vsh_bake_job_options {
                             image shows is their unlit base colour */
     int32_t lit_image_place; /* VSH_LIT_IMAGES_… */
     const char *lit_exr;     /* EXR of all channels beside the one output; NULL: none */
-    int32_t shard; /* 1 … shard_count: vsh_bake_job_run() bakes only the rows that are its, as much work as
-                      any other's, and writes them into the file PARTS.SHARD-of-COUNT.part, whole or not at
-                      all; 0: all rows. Not with a sink or `invalid_picture` */
+    int32_t shard; /* 1 … shard_count: vsh_bake_job_run() bakes only the rows that are its, about as many
+                      texels as any other's, and writes them into the file PARTS.SHARD-of-COUNT.part, whole or
+                      not at all; 0: all rows. Not with a sink or `invalid_picture` */
     int32_t shard_count; /* 1 … 10000; for vsh_bake_job_merge() also 0: as many as there are beside PARTS */
     const char *parts;   /* what the names of parts begin with; NULL: the first lightmap's output */
     const char *const *words; /* [word_count]: kept in a part as they are, for vsh_part_words() */
     size_t word_count;
-    int32_t forecast;   /* nonzero: only what vsh_bake_job_forecast() tells is asked for, and the folders of
-                           outputs need not be there */
-    double shard_least; /* seconds of one thread, 0 … 1e9, that the rows of a shard are to take at least, as
-                           far as lightmaps' sizes, lights and errors tell; the borders of AO between shards
-                           take a tenth at most. Where there is not so much for all shards, the last ones
-                           have no rows, and their jobs no lightmaps: they read no file, and their parts
-                           say so. 0: all have rows */
+    int32_t forecast; /* nonzero: only what vsh_bake_job_forecast() tells is asked for, and the folders of
+                         outputs need not be there */
 } vsh_bake_job_options;
 
 static inline vsh_bake_job_options vsh_bake_job_options_default(void) {
     vsh_bake_job_options options = {
-        sizeof(vsh_bake_job_options), 0,    0, 0, NULL, NULL, NULL, NULL, 0,  NULL, NULL, NULL, 0,
-        VSH_LIT_IMAGES_AUTO,          NULL, 0, 0, NULL, NULL, 0,    0,    0.4};
+        sizeof(vsh_bake_job_options), 0,    0, 0, NULL, NULL, NULL, NULL, 0, NULL, NULL, NULL, 0,
+        VSH_LIT_IMAGES_AUTO,          NULL, 0, 0, NULL, NULL, 0,    0};
     return options;
 }
 
@@ -121,10 +116,6 @@ VSH_API vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_
 VSH_API vsh_result vsh_bake_job_create(const vsh_scene *scene, const vsh_bake_job_options *options,
                                        const vsh_run *run, vsh_bake_job **job, vsh_error *error);
 VSH_API void vsh_bake_job_free(vsh_bake_job *job); /* NULL does nothing */
-
-/* How many of options->shard_count shards have rows (shard_least): the first ones. 0 where an argument is
- * NULL or its struct_size is none. Reads no file. */
-VSH_API int32_t vsh_bake_job_shards(const vsh_scene *scene, const vsh_bake_job_options *options);
 
 /* Rasterises the lightmaps to count their texels, and warns of what is wrong with their UVs. Errors:
  * VSH_ERROR_INPUT (as vsh_charts_create(); UVs that cover no texel; objects that share more than
@@ -194,8 +185,7 @@ static inline vsh_result vsh_bake_scene(const vsh_scene *scene, const vsh_bake_j
 
 /* --- what a job will take */
 
-/* Found out by a small one: few voxels and a part of the texels are really made, by the same methods, and
- * what they took is scaled up. Texels, voxels and bands are close; times may be half or twice as much. */
+/* Found by making few voxels, and scaling up what they took. */
 typedef struct vsh_bake_forecast {
     uint64_t texels;  /* with at least one sample */
     uint64_t samples; /* evaluated positions */
@@ -205,9 +195,6 @@ typedef struct vsh_bake_forecast {
     double peak_bytes;     /* at most */
     double grid_bytes;     /* of the level sets */
     double field_bytes;    /* of the fields */
-    double voxelize_s;     /* seconds */
-    double field_s;        /* the same, fields and what rays are traced in */
-    double bake_s;         /* the same, texels */
     int32_t has_triangles; /* nonzero: they are traced, and auto is exact */
 } vsh_bake_forecast;
 

@@ -134,9 +134,6 @@ vsh_result vshi_baking_open(vshi_baking *bake, bool sky, float *deviation, float
     const vsh_occluders *occluders;
     vsh_points points;
     VSHI_TRY(place_points(bake, NULL, vshi_baking_traces_ao(bake), &shade, &occluders, &points, error));
-    if (bake->row_work != NULL) {
-        bake->origins.rows.work = bake->row_work + bake->origins.rows.count;
-    }
     if (!vshi_baking_shares(bake)) {
         return vshi_shade_ao(occluders, &points, bake->origins.face, &bake->origins.rows, &shade, &bake->run,
                              bake->values, deviation, bent, NULL, &bake->stats.shade, error);

@@ -21,17 +21,16 @@ typedef struct vshi_baking {
     vshi_work_planes work;
     vshi_origins origins;
     vshi_spread spread;
-    uint8_t *state;          /* [rows held][width]: VSHI_TEXEL_… */
-    uint32_t *known;         /* [own rows][width]: VSHI_PART_…, of a part; NULL: it is padded, too */
-    vshi_row_work *row_work; /* [2][rows of tiles held]: of lights, of what is open */
-    vshi_ao_keep keep;       /* of a part that leaves AO: what is kept */
-    float *values;           /* [origins.count]: of one light, or AO */
-    float *deviation;        /* [origins.count]: of the same; NULL where no plane is for it */
-    float *irradiance;       /* [origins.count][3] */
-    float *bent;             /* [origins.count][3] */
-    float *tinted;           /* [origins.count][3]: of one light */
-    vsh_layer *layers;       /* the occluders', of points that are lifted already; NULL: none */
-    vsh_occluders lifted;    /* with them */
+    uint8_t *state;       /* [rows held][width]: VSHI_TEXEL_… */
+    uint32_t *known;      /* [own rows][width]: VSHI_PART_…, of a part; NULL: it is padded, too */
+    vshi_ao_keep keep;    /* of a part that leaves AO: what is kept */
+    float *values;        /* [origins.count]: of one light, or AO */
+    float *deviation;     /* [origins.count]: of the same; NULL where no plane is for it */
+    float *irradiance;    /* [origins.count][3] */
+    float *bent;          /* [origins.count][3] */
+    float *tinted;        /* [origins.count][3]: of one light */
+    vsh_layer *layers;    /* the occluders', of points that are lifted already; NULL: none */
+    vsh_occluders lifted; /* with them */
     bool layered_ao;
     vshi_field_error held; /* samples that are held against the casters; none where that is not wanted */
     vsh_bake_stats stats;

@@ -232,7 +232,6 @@ static vsh_result run_bake(vshi_baking *bake, vsh_error *error) {
     const vshi_origins_for what = {needs(bake, VSHI_NEEDS_LIGHTS), needs(bake, NEEDS_ANY_AO)};
     VSHI_TRY_DONE(vshi_origins_create(bake->occluders, texels, &bake->shade, what, find_needed, bake,
                                       &bake->run, &bake->origins, error));
-    bake->origins.rows.work = bake->row_work;
     VSHI_TRY_DONE(hold(bake, VSHI_NEEDS_LIGHTS | NEEDS_ANY_AO, 1, &bake->values, error));
     VSHI_TRY_DONE(hold(bake, VSHI_NEEDS_DEVIATION | VSHI_NEEDS_LIGHTS, 1, &bake->deviation, error));
     VSHI_TRY_DONE(hold(bake, VSHI_NEEDS_IRRADIANCE, 3, &bake->irradiance, error));
@@ -289,7 +288,7 @@ static vsh_result check(const vsh_lightmap *lightmap, const vsh_texels *texels, 
 static vsh_result bake_texels(const vsh_occluders *occluders, const vsh_texels *texels,
                               const vsh_light *lights, size_t light_count, const vsh_shade_options *options,
                               const vsh_run *run, const vsh_lightmap *lightmap, uint32_t *known, void *kept,
-                              vshi_row_work *work, vsh_bake_stats *stats, vsh_error *error) {
+                              vsh_bake_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(occluders);
     VSHI_NEEDS(texels);
@@ -301,7 +300,6 @@ static vsh_result bake_texels(const vsh_occluders *occluders, const vsh_texels *
                         .light_count = light_count,
                         .lightmap = lightmap,
                         .known = known,
-                        .row_work = work,
                         .keep = {.cut = &texels->cut, .memory = kept},
                         .needs = vshi_planes_need(lightmap, light_count),
                         .stats = vsh_bake_stats_zero()};
@@ -332,15 +330,15 @@ vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_texels *t
                              const vsh_light *lights, size_t light_count, const vsh_shade_options *options,
                              const vsh_run *run, const vsh_lightmap *lightmap, vsh_bake_stats *stats,
                              vsh_error *error) {
-    return bake_texels(occluders, texels, lights, light_count, options, run, lightmap, NULL, NULL, NULL,
-                       stats, error);
+    return bake_texels(occluders, texels, lights, light_count, options, run, lightmap, NULL, NULL, stats,
+                       error);
 }
 
 vsh_result vshi_bake_part(const vsh_occluders *occluders, const vsh_texels *texels, const vsh_light *lights,
                           size_t light_count, const vsh_shade_options *options, const vsh_run *run,
-                          const vsh_lightmap *lightmap, uint32_t *known, void *kept, vshi_row_work *work,
-                          vsh_bake_stats *stats, vsh_error *error) {
+                          const vsh_lightmap *lightmap, uint32_t *known, void *kept, vsh_bake_stats *stats,
+                          vsh_error *error) {
     VSHI_NEEDS(known);
-    return bake_texels(occluders, texels, lights, light_count, options, run, lightmap, known, kept, work,
-                       stats, error);
+    return bake_texels(occluders, texels, lights, light_count, options, run, lightmap, known, kept, stats,
+                       error);
 }

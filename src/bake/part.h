@@ -32,13 +32,11 @@ vsh_result vshi_texels_create_part(const vsh_charts *charts, int32_t first_row, 
 /* vsh_bake_lightmap() of such texels: nothing is padded or filled. `known` [rows][width] takes VSHI_PART_… of
  * each, `kept` [rows that the cut keeps][width] what AO is finished by, of the kinds of these planes; NULL
  * where it leaves none. Values that are left are 0, or what is there of them: irradiance of lights. Errors of
- * what is filled, and of what is left, are not in the statistics. `work` [2][rows of tiles held] takes
- * what is done for each of them, for lights and for what is open, but for AO that texels share; NULL: nothing
- * does. */
+ * what is filled, and of what is left, are not in the statistics. */
 vsh_result vshi_bake_part(const vsh_occluders *occluders, const vsh_texels *texels, const vsh_light *lights,
                           size_t light_count, const vsh_shade_options *options, const vsh_run *run,
-                          const vsh_lightmap *lightmap, uint32_t *known, void *kept, vshi_row_work *work,
-                          vsh_bake_stats *stats, vsh_error *error);
+                          const vsh_lightmap *lightmap, uint32_t *known, void *kept, vsh_bake_stats *stats,
+                          vsh_error *error);
 
 /* --- what parts left of AO */
 

@@ -40,13 +40,6 @@ vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh
                             const vsh_run *run, bool limited, vsh_uv_report *uv_reports,
                             size_t uv_reports_size, vsh_charts **charts, vsh_error *error);
 
-/* Texels of a lightmap that is `step` times as small, a multiple of 16: texel (i, 8 j) has the first sample
- * of texel (step i + step / 2, step j + step / 2) of the charts', where that has any. So each row of samples
- * is a row of tiles by itself. *texels is NULL where no texel is. Errors: VSH_ERROR_MEMORY, VSH_ERROR_LIMIT,
- * VSH_ERROR_CANCELLED. */
-vsh_result vshi_texels_create_sparse(const vsh_charts *charts, int32_t step, const vsh_run *run,
-                                     vsh_texels **texels, vsh_error *error);
-
 /* Rows of texels that a band holds: its own, those beside it that its padding is copied from, and those below
  * them whose rays their AO shares. */
 typedef struct vshi_band {

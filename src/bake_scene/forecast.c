@@ -1,17 +1,12 @@
-/* What a bake will take, found out by a small one. */
+/* Texels, voxels and memory of a bake, from a trial with few voxels. */
 #include "bake_scene/job.h"
-#include "base/clock.h"
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
 
 #include <math.h>
 
-/* The trial: voxels along the longest side, and texels on a side. */
-enum { TRIAL_RESOLUTION = 96, TRIAL_SIZE = 128 };
-/* A march takes a few samples more on each finer level: this much more for twice the resolution, measured on
- * the project's scenes. */
-static const double MORE_PER_DOUBLING = 1.15;
+enum { TRIAL_RESOLUTION = 96 }; /* voxels along the longest side */
 /* Making a level set takes this many times its own memory (the cloister, 96 to 512 voxels: 6 to 4.2). */
 static const double MAKING = 4.3;
 
@@ -19,45 +14,8 @@ static const double MAKING = 4.3;
 typedef struct trial {
     double finer; /* the scene's resolution over the trial's */
     double resolution;
-    double sample_s; /* of one texel's sample, all lights and AO */
     vsh_occluders_info made;
 } trial;
-
-static vsh_result make_texels(const vsh_bake_job *job, const vsh_run *run, vsh_texels **texels,
-                              vsh_error *error) {
-    const vshi_target *target = &job->targets.list[0];
-    const vsh_receiver *receiver = &target->receiver;
-    const bool smaller = TRIAL_SIZE < receiver->width;
-    vsh_lightmap_options options = vsh_lightmap_options_default();
-    options.width = smaller ? TRIAL_SIZE : receiver->width;
-    options.height = receiver->height < TRIAL_SIZE ? receiver->height : TRIAL_SIZE;
-    options.supersample = smaller ? 1 : receiver->supersample;
-    options.padding = smaller ? 0 : receiver->padding;
-    options.tangents = job->scene.bent == 1 + VSH_BENT_TANGENT;
-    return vsh_texels_create(target->meshes, target->mesh_count, &options, run, NULL, texels, error);
-}
-
-static vsh_result bake_part(const vsh_bake_job *job, const vsh_occluders *occluders, const vsh_run *run,
-                            trial *t, vsh_error *error) {
-    const vsh_scene *scene = &job->scene;
-    vsh_texels *texels = NULL;
-    vshi_channels channels = {.rows = 0};
-    vsh_result result;
-    VSHI_TRY_DONE(make_texels(job, run, &texels, error));
-    vsh_texels_info info;
-    vsh_texels_get_info(texels, &info);
-    VSHI_TRY_DONE(vshi_channels_name(scene, info.width, info.height, &channels, error));
-    VSHI_TRY_DONE(vshi_channels_allocate(&channels, scene, info.height, scene->planes.invalid != 0,
-                                         run->memory_limit, job->lightmaps[0].output, error));
-    const double start = vshi_seconds();
-    VSHI_TRY_DONE(vsh_bake_lightmap(occluders, texels, scene->lights, scene->light_count, &scene->shade, run,
-                                    &channels.lightmap, NULL, error));
-    t->sample_s = (vshi_seconds() - start) / fmax(1.0, (double)info.samples);
-done:
-    vshi_channels_free(&channels);
-    vsh_texels_free(texels);
-    return result;
-}
 
 /* Voxels of the scene over those of the trial, on a side; `resolution`: as vsh_scene_resolution(). */
 static double finer(const vsh_scene *scene, int32_t resolution, double trial_voxel) {
@@ -102,9 +60,8 @@ static vsh_result try_small(const vsh_bake_job *job, const vsh_run *run, trial *
     t->finer = smaller ? finer(&job->scene, resolution, t->made.voxel_size) : 1.0;
     t->resolution =
         smaller ? TRIAL_RESOLUTION * t->finer : resolution_of(&job->scene, occluders, t->made.voxel_size);
-    const vsh_result result = bake_part(job, occluders, run, t, error);
     vsh_occluders_free(occluders);
-    return result;
+    return VSH_OK;
 }
 
 /* Bytes that the largest lightmap takes, the fields with it; plans all of them. */
@@ -146,15 +103,11 @@ vsh_result vsh_bake_job_forecast_sized(vsh_bake_job *job, const vsh_run *run, vs
                            .resolution = t.resolution,
                            .grid_bytes = (double)t.made.grid_bytes * more,
                            .field_bytes = (double)t.made.field_bytes * more,
-                           .voxelize_s = t.made.voxelize_s * more,
-                           .field_s = t.made.field_s * more,
                            .has_triangles = t.made.has_triangles};
     for (size_t i = 0; i < job->targets.count; ++i) {
         f.texels += job->lightmaps[i].covered;
         f.samples += job->lightmaps[i].samples;
     }
-    f.bake_s = job->report.bake_s +
-               (double)f.samples * t.sample_s * pow(MORE_PER_DOUBLING, fmax(0.0, log2(t.finer)));
     uint64_t largest;
     VSHI_TRY(plan_bands(job, f.field_bytes, &full, &largest, error));
     const double base =

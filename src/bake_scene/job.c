@@ -108,10 +108,6 @@ static vsh_result check_shard(const vsh_bake_job_options *options, vsh_error *er
                          "vsh_bake_job_options.shard %d of %d: expected 1 to %d, and no more than there are",
                          options->shard, count, VSHI_MOST_SHARDS);
     }
-    if (!(options->shard_least >= 0.0 && options->shard_least <= 1e9)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "vsh_bake_job_options.shard_least is %g, expected 0 to 1e9", options->shard_least);
-    }
     if (options->shard > 0 && (options->sink != NULL || options->invalid_picture != NULL)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_job_options.shard: not together with %s",
                          options->sink != NULL ? "a sink" : "invalid_picture");
@@ -197,13 +193,10 @@ vsh_result vsh_bake_job_create(const vsh_scene *scene, const vsh_bake_job_option
     made->report.shade = vsh_shade_stats_zero();
     vsh_result result;
     VSHI_TRY_DONE(take_scene(made, scene, error));
-    made->working = vsh_bake_job_shards(scene, &own);
-    if (!vshi_job_is_idle(made)) {
-        VSHI_TRY_DONE(vsh_assets_load(&made->scene, &full, &made->assets, error));
-        VSHI_TRY_DONE(vshi_targets_make(&made->scene, made->assets, &full, &made->targets, error));
-        VSHI_TRY_DONE(list_lightmaps(made, error));
-        VSHI_TRY_DONE(vshi_lit_check_uvs(made, &full, error));
-    }
+    VSHI_TRY_DONE(vsh_assets_load(&made->scene, &full, &made->assets, error));
+    VSHI_TRY_DONE(vshi_targets_make(&made->scene, made->assets, &full, &made->targets, error));
+    VSHI_TRY_DONE(list_lightmaps(made, error));
+    VSHI_TRY_DONE(vshi_lit_check_uvs(made, &full, error));
     made->report.load_s = vshi_seconds() - start;
     *job = made;
     return VSH_OK;
@@ -270,7 +263,7 @@ static vsh_result measure(vsh_bake_job *job, size_t index, bool bakes, const vsh
     vsh_charts_info counted;
     vsh_charts_get_info(charts, &counted);
     if (is_shard(job)) {
-        VSHI_TRY_DONE(vshi_shares_note(job, index, charts, run, error));
+        VSHI_TRY_DONE(vshi_shares_note(job, index, charts, error));
     } else {
         VSHI_TRY_DONE(vshi_job_plan(job, index, charts, 0, run, &bands, error));
     }
@@ -368,9 +361,6 @@ vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, vsh_error
     if (job->occluders != NULL) {
         return VSH_OK;
     }
-    if (vshi_job_is_idle(job)) {
-        return vshi_job_make_errors(job, error);
-    }
     vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
     options.receivers_min = job->receivers[0];
     options.receivers_max = job->receivers[1];
@@ -423,12 +413,12 @@ vsh_result vshi_job_bake_all(vsh_bake_job *job, const vsh_run *run, vsh_error *e
 
 vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
     VSHI_NEEDS(job);
-    if ((job->occluders == NULL && !vshi_job_is_idle(job)) || job->errors == NULL) {
+    if (job->occluders == NULL || job->errors == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: vsh_bake_job_prepare() comes first", __func__);
     }
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    if (job->options.sink == NULL && !vshi_job_is_idle(job)) {
+    if (job->options.sink == NULL) {
         VSHI_TRY(vshi_job_find_provenance(job, &full, error));
     }
     if (is_shard(job)) {

@@ -43,7 +43,6 @@ struct vsh_bake_job {
     size_t apart; /* lightmaps before it are not stitched together with others: there is no memory for it */
     vshi_lit_page *lit_pages; /* [lit_page_count]: of the receiver that is baked */
     size_t lit_page_count;
-    int32_t working;                /* of a shard's job: shards that have rows */
     struct vshi_share_rows *shares; /* [targets.count], of a shard once measured: what it is cut by */
     struct vshi_part_writer *part;  /* under way; NULL: none */
     char *part_path;
@@ -59,9 +58,6 @@ typedef struct vshi_lightmap_input {
     const vsh_texels *kept; /* NULL: none */
     vshi_bands bands;       /* of a shard's rows: of these alone */
 } vshi_lightmap_input;
-
-/* Whether it is of a shard that has no rows. */
-bool vshi_job_is_idle(const vsh_bake_job *job);
 
 /* Points that the lightmaps of a measured job have. */
 double vshi_job_points(const vsh_bake_job *job);

@@ -135,7 +135,7 @@ static vsh_result bake_band(vshi_lightmap_work *w, int32_t first, int32_t rows, 
     vsh_result result =
         known != NULL
             ? vshi_bake_part(w->job->occluders, texels, scene->lights, scene->light_count, &scene->shade, run,
-                             &w->channels.lightmap, known, w->channels.kept, NULL, &band, error)
+                             &w->channels.lightmap, known, w->channels.kept, &band, error)
             : vsh_bake_lightmap(w->job->occluders, texels, scene->lights, scene->light_count, &scene->shade,
                                 run, &w->channels.lightmap, &band, error);
     if (result == VSH_OK) {

@@ -106,24 +106,12 @@ static vsh_result check_left(const vsh_bake_job *job, const vshi_part *part, con
     return VSH_OK;
 }
 
-/* A part without rows tells of nothing; the others are of the job's inputs, and the first one's casters. */
+/* Parts are of the job's inputs, and of the first one's casters. */
 static vsh_result check_part(const vsh_bake_job *job, const vshi_part *part, const vshi_part *first,
                              int32_t shard, int32_t count, vsh_error *error) {
     const vshi_part_head *head = &part->head;
-    const bool idle = shard > head->working;
-    vshi_part_options own = vshi_job_part_options(job, count);
-    own.attribute_count = idle ? 0 : own.attribute_count;
+    const vshi_part_options own = vshi_job_part_options(job, count);
     VSHI_TRY(vshi_part_about_check(&head->about, part->path, shard, &own, error));
-    if (head->working != first->head.working) {
-        char theirs[24], ours[24];
-        snprintf(theirs, sizeof theirs, "%d", head->working);
-        snprintf(ours, sizeof ours, "%d", first->head.working);
-        return vshi_part_refuse(part->path, "number of parts with rows", theirs, ours, error);
-    }
-    if (idle) {
-        return head->piece_count == 0 ? VSH_OK
-                                      : vshi_part_damaged(part->path, "rows that are not its", error);
-    }
     VSHI_TRY(check_lightmaps(job, part, error));
     VSHI_TRY(check_casters(part, first, error));
     return check_left(job, part, first, error);

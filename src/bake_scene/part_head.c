@@ -10,7 +10,6 @@ void vshi_part_code_head(vshi_part_code *code, vshi_part_head *head) {
     vshi_part_code_u64(code, &head->field_bytes);
     vshi_part_code_i32(code, &head->levels);
     vshi_part_code_i32(code, &head->has_triangles);
-    vshi_part_code_i32(code, &head->working);
     vshi_part_code_i32(code, &head->kinds);
     vshi_part_code_count(code, &head->lightmap_count, sizeof(uint64_t), (void **)&head->lightmaps,
                          sizeof *head->lightmaps);

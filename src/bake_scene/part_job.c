@@ -10,15 +10,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool vshi_job_is_idle(const vsh_bake_job *job) {
-    return job->options.shard > job->working;
-}
-
 /* --- its head */
 
 /* Pieces and lightmaps of a shard; the lists are the head's. */
-static vsh_result list_pieces(const vsh_bake_job *job, const vsh_run *run, vshi_part_head *head,
-                              vsh_error *error) {
+static vsh_result list_pieces(const vsh_bake_job *job, vshi_part_head *head, vsh_error *error) {
     const size_t count = job->targets.count;
     VSHI_TRY(vshi_allocate((void **)&head->lightmaps, count + 1, sizeof *head->lightmaps, "part", error));
     head->lightmap_count = count;
@@ -28,8 +23,7 @@ static vsh_result list_pieces(const vsh_bake_job *job, const vsh_run *run, vshi_
         head->lightmaps[i] = (vshi_part_lightmap){own->width,   own->height,  own->mesh_count,
                                                   own->covered, own->samples, job->shares[i].left};
     }
-    return vshi_shares_list(job, job->options.shard, job->working, run, &head->pieces, &head->piece_count,
-                            error);
+    return vshi_shares_list(job, &head->pieces, &head->piece_count, error);
 }
 
 /* Copies of texts; false where memory is short. */
@@ -50,8 +44,8 @@ static bool copy_channels(const vshi_channels *channels, vshi_part_head *head) {
 }
 
 /* Begins the part, whose pieces are the caller's to free also after an error. */
-static vsh_result begin_part(vsh_bake_job *job, const vsh_run *run, vshi_part_piece **pieces,
-                             size_t *piece_count, vsh_error *error) {
+static vsh_result begin_part(vsh_bake_job *job, vshi_part_piece **pieces, size_t *piece_count,
+                             vsh_error *error) {
     *pieces = NULL;
     const vsh_occluders_info *casters = &job->report.occluders;
     const vshi_part_options options = vshi_job_part_options(job, job->options.shard_count);
@@ -60,15 +54,14 @@ static vsh_result begin_part(vsh_bake_job *job, const vsh_run *run, vshi_part_pi
                            .active_voxels = casters->active_voxels,
                            .field_bytes = casters->field_bytes,
                            .levels = casters->levels,
-                           .has_triangles = casters->has_triangles,
-                           .working = job->working};
+                           .has_triangles = casters->has_triangles};
     const vsh_lightmap planes = vshi_channels_shape(&job->scene);
     head.kinds = (int32_t)vshi_part_kinds(&planes);
     vshi_channels channels;
     vsh_result result;
     char *path = vshi_part_path(options.parts, options.shard, options.shard_count);
     VSHI_TRY_DONE(vshi_channels_name(&job->scene, 1, 1, &channels, error));
-    VSHI_TRY_DONE(list_pieces(job, run, &head, error));
+    VSHI_TRY_DONE(list_pieces(job, &head, error));
     VSHI_TRY_DONE(vshi_part_about_make(&options, &head.about, error));
     if (path == NULL || !copy_channels(&channels, &head)) {
         result = vshi_fail(error, VSH_ERROR_MEMORY, "part: the system refused memory");
@@ -170,7 +163,7 @@ vsh_result vshi_job_bake_part(vsh_bake_job *job, const vsh_run *run, vsh_error *
     vshi_part_piece *pieces;
     size_t count = 0;
     vsh_result result;
-    VSHI_TRY_DONE(begin_part(job, run, &pieces, &count, error));
+    VSHI_TRY_DONE(begin_part(job, &pieces, &count, error));
     tell_writing(job, job->part_path);
     result = bake_pieces(job, pieces, count, run, error);
     vshi_part_writer *part = job->part;

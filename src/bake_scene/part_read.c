@@ -39,10 +39,6 @@ static vsh_result check_pieces(vshi_part *part, const vshi_part_front *front, vs
     if (head->channel_count > VSH_MAX_CHANNELS || head->channel_count == 0) {
         return vshi_part_damaged(part->path, "its channels", error);
     }
-    if (head->working < 1 || head->working > head->about.shard_count ||
-        (head->about.shard > head->working && head->lightmap_count > 0)) {
-        return vshi_part_damaged(part->path, "the number of parts with rows", error);
-    }
     if (head->kinds < 0 || head->kinds > VSHI_KEEPS_ALL) {
         return vshi_part_damaged(part->path, "what no bake keeps", error);
     }

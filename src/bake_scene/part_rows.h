@@ -33,8 +33,7 @@ typedef struct vshi_part_head {
     double voxel_size;    /* these of what cast, as in vsh_occluders_info */
     uint64_t active_voxels, field_bytes;
     int32_t levels, has_triangles;
-    int32_t working; /* parts that have rows: the first ones. The others have nothing but their channels */
-    int32_t kinds;   /* of what is kept where AO is left: VSHI_KEEPS_… */
+    int32_t kinds;                 /* of what is kept where AO is left: VSHI_KEEPS_… */
     vshi_part_lightmap *lightmaps; /* [lightmap_count] */
     uint64_t lightmap_count;
     vshi_part_piece *pieces; /* [piece_count], in the order of their rows in the file */

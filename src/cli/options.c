@@ -257,7 +257,7 @@ static void append_option(const cli_option *option, const char *value) {
     static const char *const changes_nothing[] = {
         "output",    "output-folder", "stats", "threads", "memory-limit", "trusted",
         "confined",  "allow-outside", "quiet", "verbose", "progress",     "json",
-        "band-rows", "dry-run",       "help",  "view",    "shard",        "shard-least"};
+        "band-rows", "dry-run",       "help",  "view",    "shard"};
     for (size_t i = 0; i < sizeof changes_nothing / sizeof changes_nothing[0]; ++i) {
         if (strcmp(option->name, changes_nothing[i]) == 0) {
             return;

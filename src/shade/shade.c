@@ -123,11 +123,6 @@ static void run_piece(void *user, size_t piece, size_t next) {
     vsh_shade_stats stats = vsh_shade_stats_zero();
     run->fn(run->task, begin, begin + count, &stats);
     vshi_job_advance(run->job, count);
-    if (rows->work != NULL) {
-        atomic_fetch_add(&rows->work[row].marches, stats.marches);
-        atomic_fetch_add(&rows->work[row].samples, stats.samples);
-        atomic_fetch_add(&rows->work[row].rays, stats.rays);
-    }
     if (row < rows->first || row >= rows->last) {
         return;
     }
@@ -148,7 +143,7 @@ static void run_piece(void *user, size_t piece, size_t next) {
 vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows *rows, size_t grain,
                              vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error) {
     const size_t all[2] = {0, count};
-    const vshi_point_rows one = {1, all, 0, 1, false, NULL};
+    const vshi_point_rows one = {1, all, 0, 1, false};
     rows = rows != NULL ? rows : &one;
     size_t few[2] = {0, 0}, *before = few, left_out = 0;
     void *memory = NULL;

@@ -42,11 +42,6 @@ void vshi_shade_stats_add(vsh_shade_stats *stats, const vsh_shade_stats *more);
 vsh_result vshi_shade_sampler(const vsh_shade_options *options, int32_t rays, const char *what,
                               vshi_sampler **sampler, vsh_error *error);
 
-/* What shading some points took, as of vsh_shade_stats. */
-typedef struct vshi_row_work {
-    _Atomic uint64_t marches, samples, rays;
-} vshi_row_work;
-
 /* Rows that points come in. Each begins a piece of its own, so that what is worked on together, and with it
  * every value, does not depend on which rows there are. */
 typedef struct vshi_point_rows {
@@ -54,7 +49,6 @@ typedef struct vshi_point_rows {
     const size_t *start; /* [count + 1]: first point of each row, from 0 to the number of points */
     size_t first, last;  /* rows first … last - 1 are counted in the statistics */
     bool only;           /* and the others are not worked on at all */
-    vshi_row_work *work; /* [count]: what is done for each row is added, counted or not; NULL: nowhere */
 } vshi_point_rows;
 
 /* Runs fn over `count` points in pieces of `grain`, as a part of a job whose units are points. `rows` may be

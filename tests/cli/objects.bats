@@ -270,7 +270,7 @@ add_box() {
     local help="from all other objects; --no-cast 'sky' lets it through" name
     [[ $stderr == *"warning: 'sky' hides light sun $help"* && $stderr == *"warning: 'sky' hides the sky $help"* ]] || fail "no warning"
     for name in 1 2 merge; do
-        [[ $name == merge ]] || shade bake dome.obj "${sun[@]}" "${options[@]}" --shard "$name/2" --shard-least 0
+        [[ $name == merge ]] || shade bake dome.obj "${sun[@]}" "${options[@]}" --shard "$name/2"
         [[ $name != merge ]] || shade merge out.exr
         done_well
         [[ $name == merge || $stderr != *hides* ]] || fail "a part knows only its own rows"

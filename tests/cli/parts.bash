@@ -13,7 +13,7 @@ parts() { # OUT N "I …" INPUT [options]
     local out=$1 n=$2 which=${3:-$(seq "$2")} i
     shift 3
     for i in $which; do
-        "$VDBSHADE" bake "$@" -o "$out" --shard "$i/$n" --shard-least 0 --quiet
+        "$VDBSHADE" bake "$@" -o "$out" --shard "$i/$n" --quiet
     done
 }
 

@@ -62,7 +62,6 @@ static void bake_scene(source *s, int kind) {
         vsh_bake_job_options options = vsh_bake_job_options_default();
         options.shard = shard;
         options.shard_count = SHARDS;
-        options.shard_least = 0.0; /* both have rows */
         options.parts = s->name;
         options.words = words;
         options.word_count = 2;

@@ -118,8 +118,7 @@ static inline void bake_rows(const stage *s, const vsh_texels *texels, const vsh
     vsh_error error = {0};
     static uint32_t known[TEXELS];
     const vsh_occluders *casters = occluders_of_caster(&s->casters);
-    if ((part ? vshi_bake_part(casters, texels, NULL, 0, shade, &run, &lightmap, known, kept, NULL, &stats,
-                               &error)
+    if ((part ? vshi_bake_part(casters, texels, NULL, 0, shade, &run, &lightmap, known, kept, &stats, &error)
               : vsh_bake_lightmap(casters, texels, NULL, 0, shade, &run, &lightmap, &stats, &error)) !=
         VSH_OK) {
         fail_msg("%s", error.message);

@@ -44,22 +44,17 @@ static inline vsh_row_sink sink_of(taken *t) {
     return (vsh_row_sink){sizeof(vsh_row_sink), begin, add, end, t};
 }
 
-static inline void bake_parts_of(const case_scene *c, double least) {
+static inline void bake_parts(const case_scene *c) {
     static const char *const words[] = {"one", "", "three words"};
     for (int32_t i = 1; i <= SHARDS; ++i) {
         vsh_bake_job_options options = vsh_bake_job_options_default();
         options.shard = i;
         options.shard_count = SHARDS;
-        options.shard_least = least;
         options.words = words;
         options.word_count = 3;
         vsh_error error;
         assert_ok(vsh_bake_scene(&c->scene, &options, NULL, NULL, &error), &error);
     }
-}
-
-static inline void bake_parts(const case_scene *c) {
-    bake_parts_of(c, 0.0);
 }
 
 static inline vsh_result merge(const case_scene *c, taken *t, const vsh_run *run, vsh_error *error) {

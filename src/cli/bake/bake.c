@@ -157,12 +157,7 @@ static char *name_parts(const cli_bake_settings *s, const vsh_scene *scene) {
     return cli_end_path(output, ""); /* a folder, of objects */
 }
 
-static void say_part(const cli_bake_settings *s, const vsh_scene *scene, const char *parts, size_t lightmaps,
-                     const vsh_bake_report *report) {
-    if (lightmaps == 0) {
-        cli_bake_say_idle(s, parts, cli_bake_shards(s, scene));
-        return;
-    }
+static void say_part(const cli_bake_settings *s, const char *parts, const vsh_bake_report *report) {
     cli_say("%s.%d-of-%d.part: %" PRIu64 " texels, %" PRIu64
             " of them invalid; 'vdbshade merge %s' once all parts are there",
             parts, s->shard, s->shard_count, report->texels, report->invalid_texels, parts);
@@ -234,7 +229,7 @@ static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, v
     if (!settings->common.quiet) {
         say_all(t, job, &report);
         if (t->part) {
-            say_part(settings, scene, parts, t->count, &report);
+            say_part(settings, parts, &report);
         }
         if (t->count > 0) {
             cli_stats_say(&stats);
@@ -261,7 +256,6 @@ static int bake_scene(const cli_bake_settings *settings, const vsh_scene *scene)
     char *parts = name_parts(settings, scene);
     options.shard = settings->dry_run ? 0 : settings->shard; /* what is told is of the whole */
     options.shard_count = settings->shard_count;
-    options.shard_least = settings->shard_least;
     options.forecast = settings->dry_run;
     options.parts = settings->merged != NULL ? settings->merged : parts;
     options.words = settings->words;
@@ -281,9 +275,6 @@ static int bake_scene(const cli_bake_settings *settings, const vsh_scene *scene)
     CLI_TRY_DONE(check_outputs(settings, scene, job));
     code = settings->dry_run ? cli_bake_forecast(scene, job, &run)
                              : bake_job(settings, scene, job, &run, &t, parts);
-    if (settings->dry_run && part && code == CLI_OK) {
-        printf("parts         %d of %d have rows\n", cli_bake_shards(settings, scene), settings->shard_count);
-    }
 done:
     vsh_bake_job_free(job);
     free(parts);

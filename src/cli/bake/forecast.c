@@ -7,9 +7,6 @@
 #include <inttypes.h>
 #include <stdio.h>
 
-/* Whole numbers of texels and voxels are close, times are not: other work, caches, the share in penumbra. */
-static const char *const time_note = "by a small bake; half or twice as much is possible";
-
 static void print_methods(const vsh_scene *scene, int32_t has_triangles) {
     cli_stats stats = {.of = CLI_STATS_TEXELS};
     char text[128];
@@ -50,7 +47,5 @@ int cli_bake_forecast(const vsh_scene *scene, vsh_bake_job *job, const vsh_run *
            vshi_bytes_text((uint64_t)f.peak_bytes, peak, sizeof peak),
            vshi_bytes_text((uint64_t)f.grid_bytes, grid, sizeof grid),
            vshi_bytes_text((uint64_t)f.field_bytes, field, sizeof field));
-    printf("time          about %.2g s: voxelize %.2g s, field %.2g s, bake %.2g s (%s)\n",
-           f.voxelize_s + f.field_s + f.bake_s, f.voxelize_s, f.field_s, f.bake_s, time_note);
     return CLI_OK;
 }

@@ -44,12 +44,9 @@ static const cli_option options[] = {
     {KEY_VIEW, "view", "PAGE.html", "also a page to look at it in a browser: docs/view.md"},
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
     {KEY_DRY_RUN, "dry-run", NULL,
-     "bake nothing: print texels, voxels, memory and\nexpected time, found by a small bake"},
+     "bake nothing: print texels, voxels and memory"},
     CLI_SHARD_OPTION(
-        "bake part I of N, with as much work as the others, into\nOUT.I-of-N.part: on any machine, in any "
-        "order, again where\nit failed; 'vdbshade merge OUT' puts all parts together to\nthe bits of "
-        "one bake"),
-    CLI_SHARD_LEAST_OPTION,
+        "bake part I of N into OUT.I-of-N.part: on any machine, in\nany order, again where it failed; 'vdbshade merge OUT' puts\nall parts together to the bits of one bake"),
     {0, NULL, NULL, "Objects"},
     {KEY_RECEIVE, "receive", "NAME",
      "only objects of this name receive, all cast; * and ?\nmatch as in a shell; may be repeated"},
@@ -150,8 +147,6 @@ int cli_shared_parse(cli_bake_settings *s, int key, const char *name, const char
         return cli_parse_floor(name, value, s->floor_size, s->floor_center);
     case CLI_KEY_NO_CAST:
         return take_pattern(&s->no_cast, name, value);
-    case CLI_KEY_SHARD_LEAST:
-        return cli_parse_number(name, value, 0.0, 1e9, &s->shard_least);
     default:
         code = cli_patch_take(&s->patch, key, name, value, &taken);
         return taken ? code : cli_common_parse(&s->common, key, name, value, &taken);
@@ -213,7 +208,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
 int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings, bool *help) {
     memset(settings, 0, sizeof *settings);
     settings->common = cli_common_default();
-    settings->shard_least = vsh_bake_job_options_default().shard_least;
     settings->words = (const char *const *)argv;
     settings->word_count = (size_t)argc;
     const int code = cli_parse(&cli_bake, argc, argv, take, settings, "INPUT", &settings->input, help);

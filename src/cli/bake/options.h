@@ -22,19 +22,11 @@ enum {
     CLI_KEY_LIGHT_RADIUS,
     CLI_KEY_CASTER,
     CLI_KEY_NO_CAST,
-    CLI_KEY_FLOOR,
-    CLI_KEY_SHARD_LEAST
+    CLI_KEY_FLOOR
 };
 
 /* Stands for INPUT itself, in --lights. */
 #define CLI_LIGHTS_OF_INPUT "file"
-
-#define CLI_SHARD_LEAST_OPTION                                                                               \
-    {                                                                                                        \
-        CLI_KEY_SHARD_LEAST, "shard-least", "SECONDS",                                                       \
-            "work that a part has at least: where there is less for\neach, the last parts have nothing to "  \
-            "do; 0: all have some;\nthe same for all parts (0.4)"                                            \
-    }
 
 #define CLI_LIGHTS                                                                                           \
     {CLI_KEY_SUN, "sun", "X,Y,Z", "direction towards the sun; its channel is shadow.sun"},                   \
@@ -93,7 +85,6 @@ typedef struct cli_bake_settings {
     double floor_size[2], floor_center[3]; /* size 0: none */
     bool has_sun, has_sun_angle, has_light_radius, per_object, dry_run;
     int32_t shard, shard_count; /* 0: all of it */
-    double shard_least;         /* seconds; 0: all shards have rows */
     double height, world[2];    /* --height and --size-world; 0: not given. world[1] 0: the image says */
     const char *const *words;   /* [word_count]: the command line that this is */
     size_t word_count;
@@ -126,17 +117,11 @@ int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made)
 /* The same without its receivers: for points, which may ask for no light and no AO. */
 int cli_bake_scene_for_points(const cli_bake_settings *settings, cli_bake_scene *made);
 
-/* Says of a shard behind the `working` ones that it had nothing to do. */
-void cli_bake_say_idle(const cli_bake_settings *settings, const char *parts, int32_t working);
-
 /* Then adds the receivers, with the options put over them. CLI_OK or an exit code, having said why. */
 int cli_bake_scene_receivers(const cli_bake_settings *settings, cli_bake_scene *made);
 
 /* Whether a scene for points has anything to bake: CLI_OK, or CLI_USAGE having said why. */
 int cli_bake_check_work(const cli_bake_settings *settings, const cli_bake_scene *made);
-
-/* How many of the shards have rows. */
-int32_t cli_bake_shards(const cli_bake_settings *settings, const vsh_scene *scene);
 
 /* Refuses an output that is one of the scene's inputs. CLI_OK or an exit code, having said why. */
 int cli_bake_check_output(const cli_bake_settings *settings, const vsh_scene *scene, const char *output);

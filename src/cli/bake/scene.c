@@ -334,21 +334,6 @@ static int check_outputs(const cli_bake_settings *s, const vsh_scene *scene) {
     return s->stats != NULL ? cli_bake_check_output(s, scene, s->stats) : CLI_OK;
 }
 
-int32_t cli_bake_shards(const cli_bake_settings *s, const vsh_scene *scene) {
-    vsh_bake_job_options options = vsh_bake_job_options_default();
-    options.per_object = s->per_object;
-    options.shard_count = s->shard_count;
-    options.shard_least = s->shard_least;
-    return vsh_bake_job_shards(scene, &options);
-}
-
-void cli_bake_say_idle(const cli_bake_settings *s, const char *parts, int32_t working) {
-    cli_say(
-        "%s.%d-of-%d.part: nothing to do, as there is work for %d (--shard-least); 'vdbshade merge %s' once "
-        "all parts are there",
-        parts, s->shard, s->shard_count, working, parts);
-}
-
 /* The input, or defaults for a mesh, with what the options put over it. */
 static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scene *made) {
     memset(made, 0, sizeof *made);

@@ -126,10 +126,6 @@ class BakeJob(Handle):
         super().__init__(make(free, lib.vsh_bake_job_create, scene.struct, filled.pointer, RUN, place("vsh_bake_job"), run=run))
         self.scene, self._options = scene, filled
 
-    def shards(self) -> int:
-        """How many of `shard_count` shards have rows, the first ones: as many as have `shard_least` seconds of work each."""
-        return int(lib.vsh_bake_job_shards(self.scene.struct, self._options.pointer))
-
     def measure(self, *, run: Optional[Run] = None) -> None:
         """Counts texels, and warns of what is wrong with UVs."""
         call(lib.vsh_bake_job_measure, self.handle, RUN, run=run)
