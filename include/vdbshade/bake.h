@@ -61,14 +61,9 @@ typedef struct vsh_closeness {
 /* Measures a receiver's charts at a size; a chart is what hangs together by edges in space and in the UVs.
  * Errors: VSH_ERROR_ARGUMENT (sizes, run), VSH_ERROR_INPUT (no UVs, and as vsh_mesh_check()), VSH_ERROR_LIMIT
  * (run->memory_limit; 2^32 / 3 triangles), VSH_ERROR_MEMORY. */
-VSH_API vsh_result vsh_charts_closeness_sized(const vsh_mesh *meshes, size_t mesh_count, int32_t width,
-                                              int32_t height, const vsh_run *run, vsh_closeness *found,
-                                              size_t found_size, vsh_error *error);
-static inline vsh_result vsh_charts_closeness(const vsh_mesh *meshes, size_t mesh_count, int32_t width,
-                                              int32_t height, const vsh_run *run, vsh_closeness *found,
-                                              vsh_error *error) {
-    return vsh_charts_closeness_sized(meshes, mesh_count, width, height, run, found, sizeof *found, error);
-}
+VSH_API vsh_result vsh_charts_closeness(const vsh_mesh *meshes, size_t mesh_count, int32_t width,
+                                        int32_t height, const vsh_run *run, vsh_closeness *found,
+                                        vsh_error *error);
 
 /* The texels of a receiver at one size: where each lies in the world. The meshes are not needed any more. */
 typedef struct vsh_texels vsh_texels;
@@ -81,16 +76,9 @@ typedef struct vsh_texels vsh_texels;
  * - VSH_ERROR_INPUT: a mesh without UVs, UVs that are not finite, and as vsh_mesh_check();
  * - VSH_ERROR_LIMIT: run->memory_limit; more than 2^32 - 2 triangles;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_texels_create_sized(const vsh_mesh *meshes, size_t mesh_count,
-                                           const vsh_lightmap_options *options, const vsh_run *run,
-                                           vsh_uv_report *uv_reports, size_t uv_reports_size,
-                                           vsh_texels **texels, vsh_error *error);
-static inline vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_count,
-                                           const vsh_lightmap_options *options, const vsh_run *run,
-                                           vsh_uv_report *uv_reports, vsh_texels **texels, vsh_error *error) {
-    return vsh_texels_create_sized(meshes, mesh_count, options, run, uv_reports, sizeof *uv_reports, texels,
-                                   error);
-}
+VSH_API vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_count,
+                                     const vsh_lightmap_options *options, const vsh_run *run,
+                                     vsh_uv_report *uv_reports, vsh_texels **texels, vsh_error *error);
 VSH_API void vsh_texels_free(vsh_texels *texels); /* NULL does nothing */
 
 /* What texels come to. */
@@ -105,10 +93,7 @@ typedef struct vsh_texels_info {
 } vsh_texels_info;
 
 /* Cannot fail. */
-VSH_API void vsh_texels_get_info_sized(const vsh_texels *texels, vsh_texels_info *info, size_t info_size);
-static inline void vsh_texels_get_info(const vsh_texels *texels, vsh_texels_info *info) {
-    vsh_texels_get_info_sized(texels, info, sizeof *info);
-}
+VSH_API void vsh_texels_get_info(const vsh_texels *texels, vsh_texels_info *info);
 
 /* --- bands of rows: lightmaps larger than memory */
 
@@ -119,16 +104,9 @@ typedef struct vsh_charts vsh_charts;
 /* Checks and sorts the meshes' triangles and counts the samples of every row. The same arguments, reports,
  * warnings and errors as of vsh_texels_create(), but memory is taken for the triangles only. Free with
  * vsh_charts_free(). */
-VSH_API vsh_result vsh_charts_create_sized(const vsh_mesh *meshes, size_t mesh_count,
-                                           const vsh_lightmap_options *options, const vsh_run *run,
-                                           vsh_uv_report *uv_reports, size_t uv_reports_size,
-                                           vsh_charts **charts, vsh_error *error);
-static inline vsh_result vsh_charts_create(const vsh_mesh *meshes, size_t mesh_count,
-                                           const vsh_lightmap_options *options, const vsh_run *run,
-                                           vsh_uv_report *uv_reports, vsh_charts **charts, vsh_error *error) {
-    return vsh_charts_create_sized(meshes, mesh_count, options, run, uv_reports, sizeof *uv_reports, charts,
-                                   error);
-}
+VSH_API vsh_result vsh_charts_create(const vsh_mesh *meshes, size_t mesh_count,
+                                     const vsh_lightmap_options *options, const vsh_run *run,
+                                     vsh_uv_report *uv_reports, vsh_charts **charts, vsh_error *error);
 VSH_API void vsh_charts_free(vsh_charts *charts); /* NULL does nothing */
 
 /* What charts come to. */
@@ -141,10 +119,7 @@ typedef struct vsh_charts_info {
 } vsh_charts_info;
 
 /* Cannot fail. */
-VSH_API void vsh_charts_get_info_sized(const vsh_charts *charts, vsh_charts_info *info, size_t info_size);
-static inline void vsh_charts_get_info(const vsh_charts *charts, vsh_charts_info *info) {
-    vsh_charts_get_info_sized(charts, info, sizeof *info);
-}
+VSH_API void vsh_charts_get_info(const vsh_charts *charts, vsh_charts_info *info);
 
 /* World box of all samples, as of vsh_texels_info: of which vsh_scene_reach() makes a field's reach. Takes as
  * long as making the texels of those triangles that reach as far as it. Errors: VSH_ERROR_ARGUMENT (run),
@@ -176,13 +151,7 @@ typedef struct vsh_texel_samples {
 } vsh_texel_samples;
 
 /* Cannot fail; the arrays belong to the texels. */
-VSH_API void vsh_texels_samples_sized(const vsh_texels *texels, vsh_texel_samples *samples,
-                                      size_t samples_size);
-static inline vsh_texel_samples vsh_texels_samples(const vsh_texels *texels) {
-    vsh_texel_samples samples;
-    vsh_texels_samples_sized(texels, &samples, sizeof samples);
-    return samples;
-}
+VSH_API vsh_texel_samples vsh_texels_samples(const vsh_texels *texels);
 
 /* What the axes of bent normals are. Tangent space: x along growing u of the lightmap's UVs, orthogonal to
  * the normal; z along the normal that decides shadow; y across both, towards growing v (as in OpenGL).
@@ -363,17 +332,9 @@ typedef struct vsh_stitch_report {
  * - VSH_ERROR_ARGUMENT: charts, lightmap NULL, options out of range, run;
  * - VSH_ERROR_LIMIT: run->memory_limit, beside the charts and the planes; 2^32 / 3 triangles; 2^32 places;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_lightmap_stitch_sized(const vsh_charts *charts, const vsh_lightmap *lightmap,
-                                             size_t light_count, const vsh_stitch_options *options,
-                                             const vsh_run *run, vsh_stitch_report *report,
-                                             size_t report_size, vsh_error *error);
-static inline vsh_result vsh_lightmap_stitch(const vsh_charts *charts, const vsh_lightmap *lightmap,
-                                             size_t light_count, const vsh_stitch_options *options,
-                                             const vsh_run *run, vsh_stitch_report *report,
-                                             vsh_error *error) {
-    return vsh_lightmap_stitch_sized(charts, lightmap, light_count, options, run, report, sizeof *report,
-                                     error);
-}
+VSH_API vsh_result vsh_lightmap_stitch(const vsh_charts *charts, const vsh_lightmap *lightmap,
+                                       size_t light_count, const vsh_stitch_options *options,
+                                       const vsh_run *run, vsh_stitch_report *report, vsh_error *error);
 
 /* A lightmap among several that are stitched together. */
 typedef struct vsh_stitch_page {
@@ -383,17 +344,9 @@ typedef struct vsh_stitch_page {
 
 /* The same of several lightmaps of any sizes that have the same planes, such as pages of one atlas: borders
  * between them, too. Nothing is done where there are none. Errors: as there. */
-VSH_API vsh_result vsh_lightmaps_stitch_sized(const vsh_stitch_page *pages, size_t page_count,
-                                              size_t light_count, const vsh_stitch_options *options,
-                                              const vsh_run *run, vsh_stitch_report *report,
-                                              size_t report_size, vsh_error *error);
-static inline vsh_result vsh_lightmaps_stitch(const vsh_stitch_page *pages, size_t page_count,
-                                              size_t light_count, const vsh_stitch_options *options,
-                                              const vsh_run *run, vsh_stitch_report *report,
-                                              vsh_error *error) {
-    return vsh_lightmaps_stitch_sized(pages, page_count, light_count, options, run, report, sizeof *report,
-                                      error);
-}
+VSH_API vsh_result vsh_lightmaps_stitch(const vsh_stitch_page *pages, size_t page_count, size_t light_count,
+                                        const vsh_stitch_options *options, const vsh_run *run,
+                                        vsh_stitch_report *report, vsh_error *error);
 
 /* Gives a whole lightmap's texels that are not valid and that no valid one of their chart filled, as those of
  * faces that touch each other, the values of the texel that is nearest in the world, of the valid ones beside

@@ -143,11 +143,7 @@ VSH_API vsh_result vsh_bake_job_merge(vsh_bake_job *job, const vsh_run *run, vsh
 
 /* How many lightmaps there are (0 of a shard without rows), and one of them, whose `index` is below it. */
 VSH_API size_t vsh_bake_job_count(const vsh_bake_job *job);
-VSH_API void vsh_bake_job_lightmap_sized(const vsh_bake_job *job, size_t index, vsh_job_lightmap *lightmap,
-                                         size_t lightmap_size);
-static inline void vsh_bake_job_lightmap(const vsh_bake_job *job, size_t index, vsh_job_lightmap *lightmap) {
-    vsh_bake_job_lightmap_sized(job, index, lightmap, sizeof *lightmap);
-}
+VSH_API void vsh_bake_job_lightmap(const vsh_bake_job *job, size_t index, vsh_job_lightmap *lightmap);
 
 /* The files that it loaded; NULL before. They belong to the job. */
 VSH_API const vsh_assets *vsh_bake_job_assets(const vsh_bake_job *job);
@@ -167,21 +163,12 @@ typedef struct vsh_bake_report {
 } vsh_bake_report;
 
 /* Cannot fail. */
-VSH_API void vsh_bake_job_get_report_sized(const vsh_bake_job *job, vsh_bake_report *report,
-                                           size_t report_size);
-static inline void vsh_bake_job_get_report(const vsh_bake_job *job, vsh_bake_report *report) {
-    vsh_bake_job_get_report_sized(job, report, sizeof *report);
-}
+VSH_API void vsh_bake_job_get_report(const vsh_bake_job *job, vsh_bake_report *report);
 
 /* All of it: vsh_bake_job_create(), …_measure(), …_prepare() and …_run(). `report` (may be NULL) is filled on
  * success, without `errors`. Errors: as these. */
-VSH_API vsh_result vsh_bake_scene_sized(const vsh_scene *scene, const vsh_bake_job_options *options,
-                                        const vsh_run *run, vsh_bake_report *report, size_t report_size,
-                                        vsh_error *error);
-static inline vsh_result vsh_bake_scene(const vsh_scene *scene, const vsh_bake_job_options *options,
-                                        const vsh_run *run, vsh_bake_report *report, vsh_error *error) {
-    return vsh_bake_scene_sized(scene, options, run, report, sizeof *report, error);
-}
+VSH_API vsh_result vsh_bake_scene(const vsh_scene *scene, const vsh_bake_job_options *options,
+                                  const vsh_run *run, vsh_bake_report *report, vsh_error *error);
 
 /* --- what a job will take */
 
@@ -200,13 +187,8 @@ typedef struct vsh_bake_forecast {
 
 /* Of a job that was created and not measured. The job is then measured, without warnings. Errors: as
  * vsh_bake_job_measure() and …_prepare(), vsh_bake_lightmap(). */
-VSH_API vsh_result vsh_bake_job_forecast_sized(vsh_bake_job *job, const vsh_run *run,
-                                               vsh_bake_forecast *forecast, size_t forecast_size,
-                                               vsh_error *error);
-static inline vsh_result vsh_bake_job_forecast(vsh_bake_job *job, const vsh_run *run,
-                                               vsh_bake_forecast *forecast, vsh_error *error) {
-    return vsh_bake_job_forecast_sized(job, run, forecast, sizeof *forecast, error);
-}
+VSH_API vsh_result vsh_bake_job_forecast(vsh_bake_job *job, const vsh_run *run, vsh_bake_forecast *forecast,
+                                         vsh_error *error);
 
 /* The charts of a receiver's meshes, sorted and counted as its bake does, with the warnings of
  * vsh_bake_job_measure(). The meshes must outlive them. Free them with vsh_charts_free(). Errors: as there;

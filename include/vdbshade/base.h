@@ -16,13 +16,10 @@
  * - Arrays of voxels are [depth][height][width]: x fastest, then y, then z, as images have columns fastest. A
  *   texel is one number everywhere: vsh_texel() (points.h).
  * - A call that makes a handle leaves NULL in its place where it fails.
- * - Structs may get more members at their end; programs that were compiled against an older header then go on
- *   working. Those that begin with struct_size are filled by their …_default() or …_zero() function;
- *   VSH_ERROR_ARGUMENT where struct_size is 0, more than this library knows, or the size of no such struct.
- *   Calls that fill another struct are inline functions here, which hand its size to a …_sized() one.
- *   Bindings of other languages call these, and vsh_struct_init(). All else changes with the library's soname
- *   alone, which is that of the minor version: what is passed in without a size (vsh_mesh, vsh_light,
- *   vsh_lightmap, vsh_image …), and vsh_error, vsh_attribute and vsh_bake_error, which get no more members.
+ * - Structs of options begin with struct_size, which their …_default() or …_zero() function sets. They may
+ *   get more members at their end; programs that were compiled against an older header then go on working.
+ *   VSH_ERROR_ARGUMENT if struct_size is 0, more than this library knows, or the size of no such struct. All
+ *   else changes with the library's soname alone, which is that of the minor version.
  * - Calls compute in the default floating-point environment (round to nearest, denormals kept, no traps),
  *   whatever the caller has set, which is given back. Callbacks are called in the default one.
  * - Every call works on a stack of 128 KiB, of a thread or of a fibre. A call that finds less than 2 MiB left

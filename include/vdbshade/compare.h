@@ -27,12 +27,8 @@ typedef struct vsh_coverage {
 
 /* Compares two planes of coverage [count], a texel being covered where its value is above 1/2 (NULL: all
  * are), and writes 1 into mask[count] (may be NULL) where both are, else 0. Cannot fail. */
-VSH_API void vsh_compare_coverage_sized(uint64_t count, const float *golden, const float *values,
-                                        uint8_t *mask, vsh_coverage *coverage, size_t coverage_size);
-static inline void vsh_compare_coverage(uint64_t count, const float *golden, const float *values,
-                                        uint8_t *mask, vsh_coverage *coverage) {
-    vsh_compare_coverage_sized(count, golden, values, mask, coverage, sizeof *coverage);
-}
+VSH_API void vsh_compare_coverage(uint64_t count, const float *golden, const float *values, uint8_t *mask,
+                                  vsh_coverage *coverage);
 
 /* --- values */
 
@@ -127,13 +123,8 @@ typedef struct vsh_measures {
  * - VSH_ERROR_ARGUMENT: compared, its planes or measures NULL, sizes, options out of range, run;
  * - VSH_ERROR_LIMIT: run->memory_limit;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_compare_sized(const vsh_compared *compared, const vsh_compare_options *options,
-                                     const vsh_run *run, vsh_measures *measures, size_t measures_size,
-                                     vsh_error *error);
-static inline vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_options *options,
-                                     const vsh_run *run, vsh_measures *measures, vsh_error *error) {
-    return vsh_compare_sized(compared, options, run, measures, sizeof *measures, error);
-}
+VSH_API vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_options *options,
+                               const vsh_run *run, vsh_measures *measures, vsh_error *error);
 
 /* --- against a truth */
 
@@ -157,13 +148,8 @@ typedef struct vsh_accuracy {
  * - VSH_ERROR_ARGUMENT: planes or accuracy NULL, a plane's values NULL, its size, run;
  * - VSH_ERROR_LIMIT: run->memory_limit;
  * - VSH_ERROR_MEMORY. */
-VSH_API vsh_result vsh_compare_accuracy_sized(const vsh_compared *planes, size_t plane_count,
-                                              const vsh_run *run, vsh_accuracy *accuracy,
-                                              size_t accuracy_size, vsh_error *error);
-static inline vsh_result vsh_compare_accuracy(const vsh_compared *planes, size_t plane_count,
-                                              const vsh_run *run, vsh_accuracy *accuracy, vsh_error *error) {
-    return vsh_compare_accuracy_sized(planes, plane_count, run, accuracy, sizeof *accuracy, error);
-}
+VSH_API vsh_result vsh_compare_accuracy(const vsh_compared *planes, size_t plane_count, const vsh_run *run,
+                                        vsh_accuracy *accuracy, vsh_error *error);
 
 /* --- limits */
 
@@ -176,12 +162,7 @@ typedef struct vsh_limits {
 
 /* Limits that bakes pass which differ by rounding: another compiler, files of 16 instead of 32 bits; and that
  * fail penumbrae a tenth wider, a shift of a quarter of a texel, a lost caster of four texels. */
-VSH_API void vsh_limits_default_sized(vsh_limits *limits, size_t limits_size);
-static inline vsh_limits vsh_limits_default(void) {
-    vsh_limits limits;
-    vsh_limits_default_sized(&limits, sizeof limits);
-    return limits;
-}
+VSH_API vsh_limits vsh_limits_default(void);
 
 /* Widens limits, and sets options.noise, for values that were estimated: bakes whose standard errors are a
  * and b differ by noise of √(a² + b²), in units of the range, 0 … 1, and are alike all the same.

@@ -22,9 +22,9 @@ typedef struct vsh_field_options {
                       * of adaptive are traced against it instead of being marched. Values are as near to the
                       * casters, not the same. Pays from about two rays an active voxel on; some 30 bytes an
                       * active voxel */
-    double grown; /* voxels that casters are grown by for rays, 0 … 1. A trilinear sample over a convex edge is
-                   * too large, by up to 0.44 voxels, so what is voxelised seems smaller than it is. 0: voxels
-                   * are the definition, as those of a file */
+    double grown; /* voxels that casters are grown by for rays, 0 … 1. A trilinear sample over a convex edge
+                   * is too large, by up to 0.44 voxels, so what is voxelised seems smaller than it is. 0:
+                   * voxels are the definition, as those of a file */
 } vsh_field_options;
 
 static inline vsh_field_options vsh_field_options_default(void) {
@@ -66,10 +66,7 @@ typedef struct vsh_field_info {
 } vsh_field_info;
 
 /* Cannot fail. */
-VSH_API void vsh_field_get_info_sized(const vsh_field *field, vsh_field_info *info, size_t info_size);
-static inline void vsh_field_get_info(const vsh_field *field, vsh_field_info *info) {
-    vsh_field_get_info_sized(field, info, sizeof *info);
-}
+VSH_API void vsh_field_get_info(const vsh_field *field, vsh_field_info *info);
 
 /* What of a mesh a field does not hold: its voxels are too coarse for it, and nothing that marches against
  * them sees it. */
@@ -85,14 +82,8 @@ typedef struct vsh_lost {
  * ones, which voxels cut, from them; may be NULL. Takes some milliseconds, on the calling thread. Errors:
  * VSH_ERROR_ARGUMENT (field, meshes or lost NULL), VSH_ERROR_INPUT (as vsh_mesh_check()), VSH_ERROR_MEMORY.
  */
-VSH_API vsh_result vsh_field_find_lost_sized(const vsh_field *field, const vsh_mesh *meshes,
-                                             size_t mesh_count, const vsh_triangles *triangles,
-                                             vsh_lost *lost, size_t lost_size, vsh_error *error);
-static inline vsh_result vsh_field_find_lost(const vsh_field *field, const vsh_mesh *meshes,
-                                             size_t mesh_count, const vsh_triangles *triangles,
-                                             vsh_lost *lost, vsh_error *error) {
-    return vsh_field_find_lost_sized(field, meshes, mesh_count, triangles, lost, sizeof *lost, error);
-}
+VSH_API vsh_result vsh_field_find_lost(const vsh_field *field, const vsh_mesh *meshes, size_t mesh_count,
+                                       const vsh_triangles *triangles, vsh_lost *lost, vsh_error *error);
 
 #ifdef __cplusplus
 }

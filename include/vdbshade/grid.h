@@ -160,10 +160,7 @@ typedef struct vsh_grid_info {
 } vsh_grid_info;
 
 /* Cannot fail. */
-VSH_API void vsh_grid_get_info_sized(const vsh_grid *grid, vsh_grid_info *info, size_t info_size);
-static inline void vsh_grid_get_info(const vsh_grid *grid, vsh_grid_info *info) {
-    vsh_grid_get_info_sized(grid, info, sizeof *info);
-}
+VSH_API void vsh_grid_get_info(const vsh_grid *grid, vsh_grid_info *info);
 
 /* A dense copy: the distances of size[0] × size[1] × size[2] voxels from `index_min` on into values, x
  * fastest (base.h), world units, negative inside; beyond the band ± its half width. Runs on the calling
@@ -204,12 +201,8 @@ typedef struct vsh_vdb_entry {
  * - VSH_ERROR_READ: as vsh_grid_read();
  * - VSH_ERROR_LIMIT: a streamed file, which can only be read whole, that passes run->memory_limit;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_vdb_list_sized(const char *path, const vsh_run *run, vsh_vdb_entry *entries,
-                                      size_t entries_size, size_t capacity, size_t *count, vsh_error *error);
-static inline vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *entries,
-                                      size_t capacity, size_t *count, vsh_error *error) {
-    return vsh_vdb_list_sized(path, run, entries, sizeof *entries, capacity, count, error);
-}
+VSH_API vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t capacity,
+                                size_t *count, vsh_error *error);
 
 #ifdef __cplusplus
 }

@@ -70,10 +70,7 @@ typedef struct vsh_heights_info {
 } vsh_heights_info;
 
 /* Cannot fail. */
-VSH_API void vsh_heights_get_info_sized(const vsh_heights *heights, vsh_heights_info *info, size_t info_size);
-static inline void vsh_heights_get_info(const vsh_heights *heights, vsh_heights_info *info) {
-    vsh_heights_get_info_sized(heights, info, sizeof *info);
-}
+VSH_API void vsh_heights_get_info(const vsh_heights *heights, vsh_heights_info *info);
 
 #ifdef __cplusplus
 }

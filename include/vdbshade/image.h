@@ -112,13 +112,8 @@ typedef struct vsh_image_clipping {
 } vsh_image_clipping;
 
 /* Errors: VSH_ERROR_ARGUMENT (an argument is NULL). */
-VSH_API vsh_result vsh_image_writer_get_clipping_sized(const vsh_image_writer *writer,
-                                                       vsh_image_clipping *clipping, size_t clipping_size,
-                                                       vsh_error *error);
-static inline vsh_result vsh_image_writer_get_clipping(const vsh_image_writer *writer,
-                                                       vsh_image_clipping *clipping, vsh_error *error) {
-    return vsh_image_writer_get_clipping_sized(writer, clipping, sizeof *clipping, error);
-}
+VSH_API vsh_result vsh_image_writer_get_clipping(const vsh_image_writer *writer, vsh_image_clipping *clipping,
+                                                 vsh_error *error);
 
 /* Puts the file in place and frees the writer, also where it fails; the old file is then as it was. Errors:
  * VSH_ERROR_ARGUMENT (rows are missing), and as vsh_image_writer_add(). */

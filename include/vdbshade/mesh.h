@@ -108,11 +108,7 @@ typedef struct vsh_mesh_report {
  * - VSH_ERROR_INPUT: a vertex that is not finite (or not once transformed), an index out of range, a
  *   transform that is not finite or flattens;
  * - VSH_ERROR_MEMORY. */
-VSH_API vsh_result vsh_mesh_check_sized(const vsh_mesh *mesh, vsh_mesh_report *report, size_t report_size,
-                                        vsh_error *error);
-static inline vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error) {
-    return vsh_mesh_check_sized(mesh, report, sizeof *report, error);
-}
+VSH_API vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error);
 
 /* A file of meshes: OBJ, glTF or GLB (2.0), PLY, STL, FBX or Collada (.dae). A node's transform is that
  * of its mesh's view; a mesh that two nodes use is two meshes, and so are the instances of
@@ -183,13 +179,7 @@ typedef struct vsh_model_material {
 VSH_API size_t vsh_model_material_count(const vsh_model *model);
 
 /* Material `index` (< material count). What it points to belongs to the model. */
-VSH_API void vsh_model_get_material_sized(const vsh_model *model, size_t index, vsh_model_material *material,
-                                          size_t material_size);
-static inline vsh_model_material vsh_model_get_material(const vsh_model *model, size_t index) {
-    vsh_model_material material;
-    vsh_model_get_material_sized(model, index, &material, sizeof material);
-    return material;
-}
+VSH_API vsh_model_material vsh_model_get_material(const vsh_model *model, size_t index);
 
 /* The material of mesh `index` (< mesh count); -1: none. */
 VSH_API int32_t vsh_model_mesh_material(const vsh_model *model, size_t index);
@@ -219,13 +209,7 @@ typedef struct vsh_model_light {
 VSH_API size_t vsh_model_light_count(const vsh_model *model);
 
 /* Light `index` (< light count), in the order in which its nodes are met. Its name belongs to the model. */
-VSH_API void vsh_model_get_light_sized(const vsh_model *model, size_t index, vsh_model_light *light,
-                                       size_t light_size);
-static inline vsh_model_light vsh_model_get_light(const vsh_model *model, size_t index) {
-    vsh_model_light light;
-    vsh_model_get_light_sized(model, index, &light, sizeof light);
-    return light;
-}
+VSH_API vsh_model_light vsh_model_get_light(const vsh_model *model, size_t index);
 
 /* A view of mesh `index` (< mesh count), with the UVs of set `uv_set` (from 0); -1 takes the second set where
  * there is one, else the first. Where the set is missing, `uvs` is NULL. The view's arrays and name belong to

@@ -82,11 +82,7 @@ VSH_API void vsh_occluders_free(vsh_occluders *occluders); /* NULL does nothing 
 
 /* What a handle is made of: views into it. `field` is never NULL; it holds nothing where all casters are in
  * layers, and knows no distances (NaN) of casters without voxels. Cannot fail. */
-VSH_API void vsh_occluders_get_parts_sized(const vsh_occluders *occluders, vsh_occluder_parts *parts,
-                                           size_t parts_size);
-static inline void vsh_occluders_get_parts(const vsh_occluders *occluders, vsh_occluder_parts *parts) {
-    vsh_occluders_get_parts_sized(occluders, parts, sizeof *parts);
-}
+VSH_API void vsh_occluders_get_parts(const vsh_occluders *occluders, vsh_occluder_parts *parts);
 
 /* What occluders come to. */
 typedef struct vsh_occluders_info {
@@ -106,11 +102,7 @@ typedef struct vsh_occluders_info {
 } vsh_occluders_info;
 
 /* Cannot fail. */
-VSH_API void vsh_occluders_get_info_sized(const vsh_occluders *occluders, vsh_occluders_info *info,
-                                          size_t info_size);
-static inline void vsh_occluders_get_info(const vsh_occluders *occluders, vsh_occluders_info *info) {
-    vsh_occluders_get_info_sized(occluders, info, sizeof *info);
-}
+VSH_API void vsh_occluders_get_info(const vsh_occluders *occluders, vsh_occluders_info *info);
 
 #ifdef __cplusplus
 }

@@ -112,10 +112,7 @@ typedef struct vsh_outline_info {
 } vsh_outline_info;
 
 /* Cannot fail. */
-VSH_API void vsh_outline_get_info_sized(const vsh_outline *outline, vsh_outline_info *info, size_t info_size);
-static inline void vsh_outline_get_info(const vsh_outline *outline, vsh_outline_info *info) {
-    vsh_outline_get_info_sized(outline, info, sizeof *info);
-}
+VSH_API void vsh_outline_get_info(const vsh_outline *outline, vsh_outline_info *info);
 
 /* The points of contour `index`, [*count][2], which belong to the outline; the area lies to the left of the
  * way from each to the next, and from the last to the first. NULL and 0 for an index beyond the contours. */

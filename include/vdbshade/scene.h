@@ -295,12 +295,8 @@ typedef struct vsh_receiver_page {
 } vsh_receiver_page;
 
 /* Fills *page; false, and nothing changes, beyond what there is. */
-VSH_API int32_t vsh_assets_receiver_page_info_sized(const vsh_assets *assets, size_t index, size_t page,
-                                                    vsh_receiver_page *info, size_t info_size);
-static inline int32_t vsh_assets_receiver_page_info(const vsh_assets *assets, size_t index, size_t page,
-                                                    vsh_receiver_page *info) {
-    return vsh_assets_receiver_page_info_sized(assets, index, page, info, sizeof *info);
-}
+VSH_API int32_t vsh_assets_receiver_page_info(const vsh_assets *assets, size_t index, size_t page,
+                                              vsh_receiver_page *info);
 
 /* The meshes of vsh_assets_receiver() that lie on page `page`, which are some in a row of them: *first is the
  * place of the first in that list. NULL and a count of 0 beyond what there is. */

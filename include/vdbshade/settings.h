@@ -47,10 +47,7 @@ typedef struct vsh_setting {
 } vsh_setting;
 
 /* Setting `index`, from 0; 0 beyond the last one, and *setting is left alone. */
-VSH_API int32_t vsh_setting_get_sized(size_t index, vsh_setting *setting, size_t setting_size);
-static inline int32_t vsh_setting_get(size_t index, vsh_setting *setting) {
-    return vsh_setting_get_sized(index, setting, sizeof *setting);
-}
+VSH_API int32_t vsh_setting_get(size_t index, vsh_setting *setting);
 
 /* Sets what `name` says, a setting's key ("ao.method") or its option ("--ao-method"), to what `text` says:
  * "64", "exact", "0.1,0.2,0.3"; what is on or off is "true", "false", or NULL for true. Nothing else changes

@@ -27,13 +27,8 @@ typedef struct vsh_solidity_report {
 /* Looks at meshes that cast together, and fills reports[mesh_count]; parts of one object (vsh_mesh.object)
  * that follow each other have one report. Errors: as vsh_mesh_check(); VSH_ERROR_LIMIT (run->memory_limit,
  * more than 2^32 / 3 triangles in one object), VSH_ERROR_MEMORY. */
-VSH_API vsh_result vsh_mesh_solidity_sized(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
-                                           vsh_solidity_report *reports, size_t reports_size,
-                                           vsh_error *error);
-static inline vsh_result vsh_mesh_solidity(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
-                                           vsh_solidity_report *reports, vsh_error *error) {
-    return vsh_mesh_solidity_sized(meshes, mesh_count, run, reports, sizeof *reports, error);
-}
+VSH_API vsh_result vsh_mesh_solidity(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
+                                     vsh_solidity_report *reports, vsh_error *error);
 
 #ifdef __cplusplus
 }

@@ -33,10 +33,7 @@ typedef struct vsh_spheres_info {
 } vsh_spheres_info;
 
 /* Cannot fail. */
-VSH_API void vsh_spheres_get_info_sized(const vsh_spheres *spheres, vsh_spheres_info *info, size_t info_size);
-static inline void vsh_spheres_get_info(const vsh_spheres *spheres, vsh_spheres_info *info) {
-    vsh_spheres_get_info_sized(spheres, info, sizeof *info);
-}
+VSH_API void vsh_spheres_get_info(const vsh_spheres *spheres, vsh_spheres_info *info);
 
 /* Reads spheres from a CSV file: a row each of x, y, z and radius, parted by commas, semicolons, tabs or
  * blanks; numbers with a decimal point, perhaps in quotes. Empty rows and rows that begin with # are passed

@@ -138,48 +138,23 @@ typedef struct vsh_uvs_measures {
 
 /* Measures them in a lightmap of this size, texels. Errors: VSH_ERROR_ARGUMENT (mesh or measures NULL, a size
  * out of 1 … VSH_MAX_PAGE_SIZE, and as vsh_mesh_check()), VSH_ERROR_INPUT (as vsh_mesh_check()). */
-VSH_API vsh_result vsh_uvs_measure_sized(const vsh_mesh *mesh, int32_t width, int32_t height,
-                                         vsh_uvs_measures *measures, size_t measures_size, vsh_error *error);
-static inline vsh_result vsh_uvs_measure(const vsh_mesh *mesh, int32_t width, int32_t height,
-                                         vsh_uvs_measures *measures, vsh_error *error) {
-    return vsh_uvs_measure_sized(mesh, width, height, measures, sizeof *measures, error);
-}
+VSH_API vsh_result vsh_uvs_measure(const vsh_mesh *mesh, int32_t width, int32_t height,
+                                   vsh_uvs_measures *measures, vsh_error *error);
 
 /* None of these can fail; `atlas` must not be NULL. */
 VSH_API size_t vsh_atlas_mesh_count(const vsh_atlas *atlas); /* as were given */
 VSH_API size_t vsh_atlas_chart_count(const vsh_atlas *atlas);
 VSH_API size_t vsh_atlas_page_count(const vsh_atlas *atlas);
-VSH_API void vsh_atlas_get_info_sized(const vsh_atlas *atlas, vsh_atlas_info *info, size_t info_size);
-static inline void vsh_atlas_get_info(const vsh_atlas *atlas, vsh_atlas_info *info) {
-    vsh_atlas_get_info_sized(atlas, info, sizeof *info);
-}
+VSH_API void vsh_atlas_get_info(const vsh_atlas *atlas, vsh_atlas_info *info);
 
 /* A view of mesh `mesh` (< mesh count). */
-VSH_API void vsh_atlas_mesh_view_sized(const vsh_atlas *atlas, size_t mesh, vsh_atlas_mesh *view,
-                                       size_t view_size);
-static inline vsh_atlas_mesh vsh_atlas_mesh_view(const vsh_atlas *atlas, size_t mesh) {
-    vsh_atlas_mesh view;
-    vsh_atlas_mesh_view_sized(atlas, mesh, &view, sizeof view);
-    return view;
-}
+VSH_API vsh_atlas_mesh vsh_atlas_mesh_view(const vsh_atlas *atlas, size_t mesh);
 
 /* Chart `chart` (< chart count). */
-VSH_API void vsh_atlas_chart_view_sized(const vsh_atlas *atlas, size_t chart, vsh_atlas_chart *view,
-                                        size_t view_size);
-static inline vsh_atlas_chart vsh_atlas_chart_view(const vsh_atlas *atlas, size_t chart) {
-    vsh_atlas_chart view;
-    vsh_atlas_chart_view_sized(atlas, chart, &view, sizeof view);
-    return view;
-}
+VSH_API vsh_atlas_chart vsh_atlas_chart_view(const vsh_atlas *atlas, size_t chart);
 
 /* Page `page` (< page count). */
-VSH_API void vsh_atlas_page_view_sized(const vsh_atlas *atlas, size_t page, vsh_atlas_page *view,
-                                       size_t view_size);
-static inline vsh_atlas_page vsh_atlas_page_view(const vsh_atlas *atlas, size_t page) {
-    vsh_atlas_page view;
-    vsh_atlas_page_view_sized(atlas, page, &view, sizeof view);
-    return view;
-}
+VSH_API vsh_atlas_page vsh_atlas_page_view(const vsh_atlas *atlas, size_t page);
 
 /* All charts, [chart count]; they belong to the atlas. */
 VSH_API const vsh_atlas_chart *vsh_atlas_charts(const vsh_atlas *atlas);

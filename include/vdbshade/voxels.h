@@ -61,10 +61,7 @@ typedef struct vsh_voxels_info {
 } vsh_voxels_info;
 
 /* Cannot fail. */
-VSH_API void vsh_voxels_get_info_sized(const vsh_voxels *voxels, vsh_voxels_info *info, size_t info_size);
-static inline void vsh_voxels_get_info(const vsh_voxels *voxels, vsh_voxels_info *info) {
-    vsh_voxels_get_info_sized(voxels, info, sizeof *info);
-}
+VSH_API void vsh_voxels_get_info(const vsh_voxels *voxels, vsh_voxels_info *info);
 
 /* World position of a voxel's centre: where it is shaded, bit by bit. Cannot fail. */
 VSH_API void vsh_voxels_centre(const vsh_voxels *voxels, const int32_t index[3], double centre[3]);
@@ -95,15 +92,8 @@ typedef struct vsh_volume_grid {
 } vsh_volume_grid;
 
 /* Cannot fail; of a grid beyond the last, an empty name and zeros. */
-VSH_API void vsh_volume_get_info_sized(const vsh_volume *volume, vsh_volume_info *info, size_t info_size);
-static inline void vsh_volume_get_info(const vsh_volume *volume, vsh_volume_info *info) {
-    vsh_volume_get_info_sized(volume, info, sizeof *info);
-}
-VSH_API void vsh_volume_get_grid_sized(const vsh_volume *volume, size_t grid, vsh_volume_grid *info,
-                                       size_t info_size);
-static inline void vsh_volume_get_grid(const vsh_volume *volume, size_t grid, vsh_volume_grid *info) {
-    vsh_volume_get_grid_sized(volume, grid, info, sizeof *info);
-}
+VSH_API void vsh_volume_get_info(const vsh_volume *volume, vsh_volume_info *info);
+VSH_API void vsh_volume_get_grid(const vsh_volume *volume, size_t grid, vsh_volume_grid *info);
 
 /* Values of a grid at `count` world positions ([count][3]) into values[count], interpolated between the
  * eight voxels around each, as renderers do; the background where there are none, NaN for positions that are

@@ -282,8 +282,8 @@ done:
 }
 
 vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
-                            const vsh_run *run, bool limited, vsh_uv_report *uv_reports,
-                            size_t uv_reports_size, vsh_charts **charts, vsh_error *error) {
+                            const vsh_run *run, bool limited, vsh_uv_report *uv_reports, vsh_charts **charts,
+                            vsh_error *error) {
     *charts = NULL;
     vsh_lightmap_options full = vsh_lightmap_options_default();
     VSHI_TRY(vshi_options_resolve(options, &full, sizeof full, "vsh_lightmap_options", error));
@@ -312,8 +312,8 @@ vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh
     }
     made->shade = full.shade;
     VSHI_TRY_DONE(make(meshes, mesh_count, &full, run, limited, job, reports, made, error));
-    if (uv_reports != NULL) {
-        vshi_give_all(uv_reports, uv_reports_size, reports, sizeof *reports, mesh_count);
+    if (uv_reports != NULL && mesh_count > 0) {
+        memcpy(uv_reports, reports, mesh_count * sizeof *reports);
     }
     *charts = made;
     made = NULL;
@@ -324,18 +324,16 @@ done:
     return result;
 }
 
-vsh_result vsh_charts_create_sized(const vsh_mesh *meshes, size_t mesh_count,
-                                   const vsh_lightmap_options *options, const vsh_run *run,
-                                   vsh_uv_report *uv_reports, size_t uv_reports_size, vsh_charts **charts,
-                                   vsh_error *error) {
+vsh_result vsh_charts_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
+                             const vsh_run *run, vsh_uv_report *uv_reports, vsh_charts **charts,
+                             vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(charts);
     *charts = NULL;
     VSHI_NEEDS_OF(mesh_count, meshes);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    return vshi_charts_make(meshes, mesh_count, options, &full, false, uv_reports, uv_reports_size, charts,
-                            error);
+    return vshi_charts_make(meshes, mesh_count, options, &full, false, uv_reports, charts, error);
 }
 
 void vsh_charts_free(vsh_charts *charts) {
@@ -348,8 +346,8 @@ void vsh_charts_free(vsh_charts *charts) {
     free(charts);
 }
 
-void vsh_charts_get_info_sized(const vsh_charts *charts, vsh_charts_info *info, size_t info_size) {
-    vshi_give(info, info_size, &charts->info, sizeof charts->info);
+void vsh_charts_get_info(const vsh_charts *charts, vsh_charts_info *info) {
+    *info = charts->info;
 }
 
 /* --- bands */

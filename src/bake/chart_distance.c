@@ -213,9 +213,8 @@ done:
     return result;
 }
 
-vsh_result vsh_charts_closeness_sized(const vsh_mesh *meshes, size_t mesh_count, int32_t width,
-                                      int32_t height, const vsh_run *run, vsh_closeness *found,
-                                      size_t found_size, vsh_error *error) {
+vsh_result vsh_charts_closeness(const vsh_mesh *meshes, size_t mesh_count, int32_t width, int32_t height,
+                                const vsh_run *run, vsh_closeness *found, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS_OF(mesh_count, meshes);
     VSHI_NEEDS(found);
@@ -240,6 +239,6 @@ vsh_result vsh_charts_closeness_sized(const vsh_mesh *meshes, size_t mesh_count,
     }
     vsh_closeness all = {.gap = 1.0};
     const vsh_result result = find(&c, &full, &all, error);
-    vshi_give(found, found_size, &all, sizeof all);
+    *found = all;
     return result;
 }

@@ -333,9 +333,9 @@ static vsh_result check_pages(stitching *s, size_t light_count, vsh_run *run, vs
     return VSH_OK;
 }
 
-vsh_result vsh_lightmaps_stitch_sized(const vsh_stitch_page *pages, size_t page_count, size_t light_count,
-                                      const vsh_stitch_options *options, const vsh_run *run,
-                                      vsh_stitch_report *report, size_t report_size, vsh_error *error) {
+vsh_result vsh_lightmaps_stitch(const vsh_stitch_page *pages, size_t page_count, size_t light_count,
+                                const vsh_stitch_options *options, const vsh_run *run,
+                                vsh_stitch_report *report, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS_OF(page_count, pages);
     vsh_run full;
@@ -355,17 +355,16 @@ vsh_result vsh_lightmaps_stitch_sized(const vsh_stitch_page *pages, size_t page_
     const vsh_result result = stitch(&s, light_count, &full, &found, error);
     vshi_job_end(s.job);
     if (result == VSH_OK && report != NULL) {
-        vshi_give(report, report_size, &found, sizeof found);
+        *report = found;
     }
     return result;
 }
 
-vsh_result vsh_lightmap_stitch_sized(const vsh_charts *charts, const vsh_lightmap *lightmap,
-                                     size_t light_count, const vsh_stitch_options *options,
-                                     const vsh_run *run, vsh_stitch_report *report, size_t report_size,
-                                     vsh_error *error) {
+vsh_result vsh_lightmap_stitch(const vsh_charts *charts, const vsh_lightmap *lightmap, size_t light_count,
+                               const vsh_stitch_options *options, const vsh_run *run,
+                               vsh_stitch_report *report, vsh_error *error) {
     VSHI_NEEDS(charts);
     VSHI_NEEDS(lightmap);
     const vsh_stitch_page page = {charts, lightmap};
-    return vsh_lightmaps_stitch_sized(&page, 1, light_count, options, run, report, report_size, error);
+    return vsh_lightmaps_stitch(&page, 1, light_count, options, run, report, error);
 }

@@ -259,10 +259,9 @@ vsh_result vshi_texels_create_part(const vsh_charts *charts, int32_t first_row, 
     return create(charts, first_row, rows, cut, &full, texels, error);
 }
 
-vsh_result vsh_texels_create_sized(const vsh_mesh *meshes, size_t mesh_count,
-                                   const vsh_lightmap_options *options, const vsh_run *run,
-                                   vsh_uv_report *uv_reports, size_t uv_reports_size, vsh_texels **texels,
-                                   vsh_error *error) {
+vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
+                             const vsh_run *run, vsh_uv_report *uv_reports, vsh_texels **texels,
+                             vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(texels);
     *texels = NULL;
@@ -270,8 +269,7 @@ vsh_result vsh_texels_create_sized(const vsh_mesh *meshes, size_t mesh_count,
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     vsh_charts *charts = NULL;
-    VSHI_TRY(vshi_charts_make(meshes, mesh_count, options, &full, true, uv_reports, uv_reports_size, &charts,
-                              error));
+    VSHI_TRY(vshi_charts_make(meshes, mesh_count, options, &full, true, uv_reports, &charts, error));
     const vsh_result result = create(charts, 0, charts->info.height, false, &full, texels, error);
     vsh_charts_free(charts);
     return result;
@@ -292,15 +290,15 @@ void vsh_texels_free(vsh_texels *texels) {
     free(texels);
 }
 
-void vsh_texels_get_info_sized(const vsh_texels *texels, vsh_texels_info *info, size_t info_size) {
-    vshi_give(info, info_size, &texels->info, sizeof texels->info);
+void vsh_texels_get_info(const vsh_texels *texels, vsh_texels_info *info) {
+    *info = texels->info;
 }
 
-void vsh_texels_samples_sized(const vsh_texels *texels, vsh_texel_samples *samples, size_t samples_size) {
+vsh_texel_samples vsh_texels_samples(const vsh_texels *texels) {
     const vshi_band *band = &texels->band;
     const size_t first = texels->row_start[band->own_begin - band->held_begin];
     const size_t last = texels->row_start[band->own_end - band->held_begin];
     const vsh_texel_samples own = {last - first, texels->position + 3 * first, texels->normal + 3 * first,
                                    texels->geometric + 3 * first, texels->texel + first};
-    vshi_give(samples, samples_size, &own, sizeof own);
+    return own;
 }

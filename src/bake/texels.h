@@ -37,8 +37,8 @@ static inline size_t vshi_sample_bytes(bool tangents) {
 /* vsh_charts_create() with all that is checked, but for the memory of samples: VSH_ERROR_LIMIT where there
  * are more than the run's limit allows beside the charts, if `limited`. */
 vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
-                            const vsh_run *run, bool limited, vsh_uv_report *uv_reports,
-                            size_t uv_reports_size, vsh_charts **charts, vsh_error *error);
+                            const vsh_run *run, bool limited, vsh_uv_report *uv_reports, vsh_charts **charts,
+                            vsh_error *error);
 
 /* Rows of texels that a band holds: its own, those beside it that its padding is copied from, and those below
  * them whose rays their AO shares. */

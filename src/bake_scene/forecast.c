@@ -86,8 +86,8 @@ static vsh_result plan_bands(vsh_bake_job *job, double field_bytes, const vsh_ru
     return VSH_OK;
 }
 
-vsh_result vsh_bake_job_forecast_sized(vsh_bake_job *job, const vsh_run *run, vsh_bake_forecast *forecast,
-                                       size_t forecast_size, vsh_error *error) {
+vsh_result vsh_bake_job_forecast(vsh_bake_job *job, const vsh_run *run, vsh_bake_forecast *forecast,
+                                 vsh_error *error) {
     VSHI_NEEDS(job);
     VSHI_NEEDS(forecast);
     vsh_run full;
@@ -113,6 +113,6 @@ vsh_result vsh_bake_job_forecast_sized(vsh_bake_job *job, const vsh_run *run, vs
     const double base =
         fmax(0.0, (double)vshi_peak_bytes() - MAKING * (double)t.made.grid_bytes); /* program and assets */
     f.peak_bytes = base + fmax(fmax(MAKING * f.grid_bytes, f.grid_bytes + f.field_bytes), (double)largest);
-    vshi_give(forecast, forecast_size, &f, sizeof f);
+    *forecast = f;
     return VSH_OK;
 }

@@ -229,17 +229,16 @@ size_t vsh_bake_job_count(const vsh_bake_job *job) {
     return job->targets.count;
 }
 
-void vsh_bake_job_lightmap_sized(const vsh_bake_job *job, size_t index, vsh_job_lightmap *lightmap,
-                                 size_t lightmap_size) {
-    vshi_give(lightmap, lightmap_size, &job->lightmaps[index], sizeof job->lightmaps[index]);
+void vsh_bake_job_lightmap(const vsh_bake_job *job, size_t index, vsh_job_lightmap *lightmap) {
+    *lightmap = job->lightmaps[index];
 }
 
 const vsh_assets *vsh_bake_job_assets(const vsh_bake_job *job) {
     return job->assets;
 }
 
-void vsh_bake_job_get_report_sized(const vsh_bake_job *job, vsh_bake_report *report, size_t report_size) {
-    vshi_give(report, report_size, &job->report, sizeof job->report);
+void vsh_bake_job_get_report(const vsh_bake_job *job, vsh_bake_report *report) {
+    *report = job->report;
 }
 
 /* --- measured */
@@ -429,9 +428,8 @@ vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_error *er
     return VSH_OK;
 }
 
-vsh_result vsh_bake_scene_sized(const vsh_scene *scene, const vsh_bake_job_options *options,
-                                const vsh_run *run, vsh_bake_report *report, size_t report_size,
-                                vsh_error *error) {
+vsh_result vsh_bake_scene(const vsh_scene *scene, const vsh_bake_job_options *options, const vsh_run *run,
+                          vsh_bake_report *report, vsh_error *error) {
     vsh_bake_job *job = NULL;
     vsh_result result;
     VSHI_TRY_DONE(vsh_bake_job_create(scene, options, run, &job, error));
@@ -441,7 +439,7 @@ vsh_result vsh_bake_scene_sized(const vsh_scene *scene, const vsh_bake_job_optio
     if (report != NULL) {
         job->report.errors = NULL;
         job->report.error_count = 0;
-        vsh_bake_job_get_report_sized(job, report, report_size);
+        vsh_bake_job_get_report(job, report);
     }
 done:
     vsh_bake_job_free(job);

@@ -20,21 +20,6 @@ vsh_result vshi_allocate(void **memory, size_t count, size_t size, const char *w
  * written at once. Free with free(). Errors: VSH_ERROR_MEMORY, naming `what`. */
 vsh_result vshi_take_pages(void **memory, size_t bytes, const char *what, vsh_error *error);
 
-/* Gives a caller what a call tells, into a struct of `size` bytes, which may be of another version of the
- * header: cut to it, or with zeros behind. */
-static inline void vshi_give(void *to, size_t size, const void *from, size_t from_size) {
-    const size_t known = size < from_size ? size : from_size;
-    memcpy(to, from, known);
-    memset((char *)to + known, 0, size - known);
-}
-
-/* The same of an array of such structs. */
-static inline void vshi_give_all(void *to, size_t size, const void *from, size_t from_size, size_t count) {
-    for (size_t i = 0; i < count; ++i) {
-        vshi_give((char *)to + i * size, size, (const char *)from + i * from_size, from_size);
-    }
-}
-
 /* VSH_ERROR_LIMIT, naming `what`, where `bytes` (a double, so that estimates cannot overflow) pass
  * run->memory_limit together with run->memory_held. `run` may be NULL. */
 VSHI_SHARED vsh_result vshi_check_limit(const vsh_run *run, double bytes, const char *what, vsh_error *error);

@@ -1,6 +1,4 @@
 /* What bindings call instead of the headers' inline functions. */
-#include "base/memory.h"
-
 #include <vdbshade/vdbshade.h>
 
 #include <stdbool.h>
@@ -9,7 +7,7 @@
 #define SIZED(type, defaults)                                                                                \
     static void make_##type(void *made, size_t size) {                                                       \
         const type known = defaults();                                                                       \
-        vshi_give(made, size, &known, sizeof known);                                                         \
+        memcpy(made, &known, size < sizeof known ? size : sizeof known);                                     \
     }
 #define UNSIZED SIZED
 #include "bindings/structs.inc"

@@ -10,8 +10,8 @@
 
 enum { MOST_VALUES = INT32_MAX, MOST_REACH = 16 };
 
-void vsh_compare_coverage_sized(uint64_t count, const float *golden, const float *values, uint8_t *mask,
-                                vsh_coverage *coverage, size_t coverage_size) {
+void vsh_compare_coverage(uint64_t count, const float *golden, const float *values, uint8_t *mask,
+                          vsh_coverage *coverage) {
     VSHI_FLOATS;
     vsh_coverage c = {0, 0, 0, 0, count, 0.0};
     for (uint64_t i = 0; i < count; ++i) {
@@ -27,7 +27,7 @@ void vsh_compare_coverage_sized(uint64_t count, const float *golden, const float
     }
     const uint64_t either = c.golden + c.values - c.both;
     c.share = either > 0 ? (double)c.differs / (double)either : 0.0;
-    vshi_give(coverage, coverage_size, &c, sizeof c);
+    *coverage = c;
 }
 
 /* --- beforehand */
@@ -159,9 +159,8 @@ static vsh_result take_all(work *w, const vsh_run *run, vsh_error *error) {
     return VSH_OK;
 }
 
-vsh_result vsh_compare_sized(const vsh_compared *compared, const vsh_compare_options *options,
-                             const vsh_run *run, vsh_measures *measures, size_t measures_size,
-                             vsh_error *error) {
+vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_options *options, const vsh_run *run,
+                       vsh_measures *measures, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(compared);
     VSHI_NEEDS(measures);
@@ -186,7 +185,7 @@ vsh_result vsh_compare_sized(const vsh_compared *compared, const vsh_compare_opt
         vshi_follow_curve(&shapes, mapped, scratch, &m);
         VSHI_TRY_DONE(take_all(&w, &full, error));
     }
-    vshi_give(measures, measures_size, &m, sizeof m);
+    *measures = m;
 done:
     free(mapped);
     free(scratch);

@@ -45,12 +45,12 @@ int32_t vsh_measure_at_least(int32_t measure) {
     return measure >= 0 && measure < VSH_MEASURE_COUNT ? table[measure].at_least : 0;
 }
 
-void vsh_limits_default_sized(vsh_limits *limits, size_t limits_size) {
-    vsh_limits known = {.struct_size = limits_size, .options = vsh_compare_options_default()};
+vsh_limits vsh_limits_default(void) {
+    vsh_limits known = {.struct_size = sizeof known, .options = vsh_compare_options_default()};
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
         known.value[i] = table[i].value;
     }
-    vshi_give(limits, limits_size, &known, sizeof known);
+    return known;
 }
 
 /* Differences within the limits, and independent noise on top of them. Squares of errors add; the largest of

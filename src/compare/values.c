@@ -136,8 +136,8 @@ static void measure_accuracy(const vshi_pair *pairs, size_t pair_count, tally *t
     }
 }
 
-vsh_result vsh_compare_accuracy_sized(const vsh_compared *planes, size_t plane_count, const vsh_run *run,
-                                      vsh_accuracy *accuracy, size_t accuracy_size, vsh_error *error) {
+vsh_result vsh_compare_accuracy(const vsh_compared *planes, size_t plane_count, const vsh_run *run,
+                                vsh_accuracy *accuracy, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(planes);
     VSHI_NEEDS(accuracy);
@@ -167,7 +167,7 @@ vsh_result vsh_compare_accuracy_sized(const vsh_compared *planes, size_t plane_c
     tally t = {.worst = -1.0, .threshold = INFINITY, .bins = bins};
     vsh_accuracy made = {.count = 0};
     measure_accuracy(pairs, plane_count, &t, &made);
-    vshi_give(accuracy, accuracy_size, &made, sizeof made);
+    *accuracy = made;
 done:
     free(bins);
     free(mask_memory);

@@ -252,7 +252,7 @@ void vsh_field_sample(const vsh_field *field, size_t count, const double *positi
     }
 }
 
-void vsh_field_get_info_sized(const vsh_field *field, vsh_field_info *info, size_t info_size) {
+void vsh_field_get_info(const vsh_field *field, vsh_field_info *info) {
     VSHI_FLOATS;
     const vshi_level *top = &field->levels[field->level_count - 1];
     uint64_t bricks = 0;
@@ -271,5 +271,5 @@ void vsh_field_get_info_sized(const vsh_field *field, vsh_field_info *info, size
     };
     memcpy(found.bounds_min, field->world_min, sizeof found.bounds_min);
     memcpy(found.bounds_max, field->world_max, sizeof found.bounds_max);
-    vshi_give(info, info_size, &found, sizeof found);
+    *info = found;
 }

@@ -139,9 +139,8 @@ static void look_at_mesh(const vsh_field *field, const vsh_mesh *mesh, double ar
     lost->thickness = measured > 0 ? thickness[measured / 10] : 0.0;
 }
 
-vsh_result vsh_field_find_lost_sized(const vsh_field *field, const vsh_mesh *meshes, size_t mesh_count,
-                                     const vsh_triangles *triangles, vsh_lost *lost, size_t lost_size,
-                                     vsh_error *error) {
+vsh_result vsh_field_find_lost(const vsh_field *field, const vsh_mesh *meshes, size_t mesh_count,
+                               const vsh_triangles *triangles, vsh_lost *lost, vsh_error *error) {
     VSHI_NEEDS(field);
     VSHI_NEEDS_OF(mesh_count, meshes);
     VSHI_NEEDS_OF(mesh_count, lost);
@@ -159,7 +158,7 @@ vsh_result vsh_field_find_lost_sized(const vsh_field *field, const vsh_mesh *mes
         if (area > 0.0) {
             look_at_mesh(field, &meshes[m], area, places, triangles, thickness, &found);
         }
-        vshi_give((char *)lost + m * lost_size, lost_size, &found, sizeof found);
+        lost[m] = found;
     }
     free(thickness);
     return VSH_OK;

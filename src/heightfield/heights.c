@@ -139,8 +139,8 @@ void vsh_heights_free(vsh_heights *heights) {
     }
 }
 
-void vsh_heights_get_info_sized(const vsh_heights *heights, vsh_heights_info *info, size_t info_size) {
-    vshi_give(info, info_size, &heights->info, sizeof heights->info);
+void vsh_heights_get_info(const vsh_heights *heights, vsh_heights_info *info) {
+    *info = heights->info;
 }
 
 /* --- points */

@@ -127,11 +127,11 @@ static void count_clipped(vsh_image_writer *writer, size_t texels, const float *
     }
 }
 
-vsh_result vsh_image_writer_get_clipping_sized(const vsh_image_writer *writer, vsh_image_clipping *clipping,
-                                               size_t clipping_size, vsh_error *error) {
+vsh_result vsh_image_writer_get_clipping(const vsh_image_writer *writer, vsh_image_clipping *clipping,
+                                         vsh_error *error) {
     VSHI_NEEDS(writer);
     VSHI_NEEDS(clipping);
-    vshi_give(clipping, clipping_size, &writer->clipping, sizeof writer->clipping);
+    *clipping = writer->clipping;
     return VSH_OK;
 }
 

@@ -39,10 +39,10 @@ extern "C" {
     MAKE(vsh_grid_read,                                                                                      \
          (const char *path, const char *name, const vsh_run *run, vsh_grid **grid, vsh_error *error),        \
          (path, name, run, grid, error), grid)                                                               \
-    MAKE(vsh_vdb_list_sized,                                                                                 \
-         (const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t size, size_t capacity,        \
-          size_t *count, vsh_error *error),                                                                  \
-         (path, run, entries, size, capacity, count, error), count)                                          \
+    MAKE(vsh_vdb_list,                                                                                       \
+         (const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t capacity, size_t *count,      \
+          vsh_error *error),                                                                                 \
+         (path, run, entries, capacity, count, error), count)                                                \
     MAKE(vsh_vdb_copy,                                                                                       \
          (const char *path, const char *name, const int32_t index_min[3], const int32_t size[3],             \
           const vsh_run *run, float *values, float *active, vsh_error *error),                               \
@@ -124,19 +124,15 @@ extern "C" {
     GIVE(double, vshi_voxels_longest_axis, (const vsh_voxels *voxels), (voxels))
 
 #define VSHI_OPENVDB_DOES(DO)                                                                                \
-    DO(vsh_grid_get_info_sized, (const vsh_grid *grid, vsh_grid_info *info, size_t size),                    \
-       (grid, info, size))                                                                                   \
+    DO(vsh_grid_get_info, (const vsh_grid *grid, vsh_grid_info *info), (grid, info))                         \
     DO(vsh_grid_free, (vsh_grid * grid), (grid))                                                             \
-    DO(vsh_voxels_get_info_sized, (const vsh_voxels *voxels, vsh_voxels_info *info, size_t size),            \
-       (voxels, info, size))                                                                                 \
+    DO(vsh_voxels_get_info, (const vsh_voxels *voxels, vsh_voxels_info *info), (voxels, info))               \
     DO(vsh_voxels_centre, (const vsh_voxels *voxels, const int32_t index[3], double centre[3]),              \
        (voxels, index, centre))                                                                              \
     DO(vsh_voxels_free, (vsh_voxels * voxels), (voxels))                                                     \
-    DO(vsh_volume_get_info_sized, (const vsh_volume *volume, vsh_volume_info *info, size_t size),            \
-       (volume, info, size))                                                                                 \
-    DO(vsh_volume_get_grid_sized,                                                                            \
-       (const vsh_volume *volume, size_t grid, vsh_volume_grid *info, size_t size),                          \
-       (volume, grid, info, size))                                                                           \
+    DO(vsh_volume_get_info, (const vsh_volume *volume, vsh_volume_info *info), (volume, info))               \
+    DO(vsh_volume_get_grid, (const vsh_volume *volume, size_t grid, vsh_volume_grid *info),                  \
+       (volume, grid, info))                                                                                 \
     DO(vsh_volume_free, (vsh_volume * volume), (volume))                                                     \
     DO(vshi_grid_block_signs,                                                                                \
        (const vsh_grid *grid, const int32_t origin[3], const int32_t size[3], int8_t *signs),                \

@@ -287,8 +287,8 @@ vsh_grid *close_grid(const FloatGrid::Ptr &level_set, double shell, Stage &stage
 
 } // namespace vshi
 
-void vsh_grid_get_info_sized(const vsh_grid *grid, vsh_grid_info *info, size_t info_size) {
-    vshi_give(info, info_size, &grid->info, sizeof grid->info);
+void vsh_grid_get_info(const vsh_grid *grid, vsh_grid_info *info) {
+    *info = grid->info;
 }
 
 void vsh_grid_free(vsh_grid *grid) {

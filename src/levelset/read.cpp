@@ -124,8 +124,8 @@ void take_list(vshi_decoder *decoder, const char *path, std::vector<vsh_vdb_entr
     count = size_t(all);
 }
 
-vsh_result list(const char *path, const vsh_run &run, vsh_vdb_entry *entries, size_t entry_size,
-                size_t capacity, size_t *count, vsh_error *error) {
+vsh_result list(const char *path, const vsh_run &run, vsh_vdb_entry *entries, size_t capacity, size_t *count,
+                vsh_error *error) {
     std::vector<vsh_vdb_entry> found;
     if (run.reader != nullptr) {
         Stage stage(run, "load", error);
@@ -135,7 +135,7 @@ vsh_result list(const char *path, const vsh_run &run, vsh_vdb_entry *entries, si
     } else {
         list_grids(path, run, found, capacity, *count, error);
     }
-    vshi_give_all(entries, entry_size, found.data(), sizeof(vsh_vdb_entry), found.size());
+    std::copy(found.begin(), found.end(), entries);
     return VSH_OK;
 }
 
@@ -197,13 +197,13 @@ vsh_result vsh_grid_read(const char *path, const char *name, const vsh_run *run,
                       [&](const vsh_run &full) { return vshi::read(path, name, full, grid, error); });
 }
 
-vsh_result vsh_vdb_list_sized(const char *path, const vsh_run *run, vsh_vdb_entry *entries,
-                              size_t entries_size, size_t capacity, size_t *count, vsh_error *error) {
+vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t capacity,
+                        size_t *count, vsh_error *error) {
     VSHI_NEEDS(count);
     *count = 0;
     VSHI_NEEDS(path);
     VSHI_NEEDS_OF(capacity, entries);
     return vshi::call(run, path, error, [&](const vsh_run &full) {
-        return vshi::list(path, full, entries, entries_size, capacity, count, error);
+        return vshi::list(path, full, entries, capacity, count, error);
     });
 }

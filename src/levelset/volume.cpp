@@ -186,15 +186,13 @@ void vsh_volume_free(vsh_volume *volume) {
     delete volume;
 }
 
-void vsh_volume_get_info_sized(const vsh_volume *volume, vsh_volume_info *info, size_t info_size) {
-    vshi_give(info, info_size, &volume->info, sizeof volume->info);
+void vsh_volume_get_info(const vsh_volume *volume, vsh_volume_info *info) {
+    *info = volume->info;
 }
 
-void vsh_volume_get_grid_sized(const vsh_volume *volume, size_t grid, vsh_volume_grid *info,
-                               size_t info_size) {
+void vsh_volume_get_grid(const vsh_volume *volume, size_t grid, vsh_volume_grid *info) {
     const vsh_volume_grid none{};
-    vshi_give(info, info_size, grid < volume->channels.size() ? &volume->channels[grid].info : &none,
-              sizeof none);
+    *info = grid < volume->channels.size() ? volume->channels[grid].info : none;
 }
 
 vsh_result vsh_volume_sample(const vsh_volume *volume, size_t grid, size_t count, const double *positions,

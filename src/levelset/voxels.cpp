@@ -379,8 +379,8 @@ void vsh_voxels_free(vsh_voxels *voxels) {
     delete voxels;
 }
 
-void vsh_voxels_get_info_sized(const vsh_voxels *voxels, vsh_voxels_info *info, size_t info_size) {
-    vshi_give(info, info_size, &voxels->info, sizeof voxels->info);
+void vsh_voxels_get_info(const vsh_voxels *voxels, vsh_voxels_info *info) {
+    *info = voxels->info;
 }
 
 void vsh_voxels_centre(const vsh_voxels *voxels, const int32_t index[3], double centre[3]) {

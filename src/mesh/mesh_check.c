@@ -35,14 +35,13 @@ vsh_result vshi_mesh_look_over(const vsh_mesh *mesh, size_t index, vsh_mesh_repo
     return VSH_OK;
 }
 
-vsh_result vsh_mesh_check_sized(const vsh_mesh *mesh, vsh_mesh_report *report, size_t report_size,
-                                vsh_error *error) {
+vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(mesh);
     VSHI_NEEDS(report);
     vsh_mesh_report found;
     VSHI_TRY(vshi_mesh_look_over(mesh, VSHI_MESH_ALONE, &found, error));
     VSHI_TRY(vshi_mesh_count_edges(mesh, &found, error));
-    vshi_give(report, report_size, &found, sizeof found);
+    *report = found;
     return VSH_OK;
 }

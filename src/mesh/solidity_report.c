@@ -21,8 +21,8 @@ static void add(const vshi_component *c, vsh_solidity_report *report) {
     }
 }
 
-vsh_result vsh_mesh_solidity_sized(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
-                                   vsh_solidity_report *reports, size_t reports_size, vsh_error *error) {
+vsh_result vsh_mesh_solidity(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
+                             vsh_solidity_report *reports, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS_OF(mesh_count, meshes);
     VSHI_NEEDS_OF(mesh_count, reports);
@@ -41,7 +41,7 @@ vsh_result vsh_mesh_solidity_sized(const vsh_mesh *meshes, size_t mesh_count, co
             add(&components[i], &report);
         }
         for (size_t m = wholes->first[w]; m < wholes->first[w + 1]; ++m) {
-            vshi_give((char *)reports + m * reports_size, reports_size, &report, sizeof report);
+            reports[m] = report;
         }
     }
 done:

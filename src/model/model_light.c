@@ -12,9 +12,8 @@ size_t vsh_model_light_count(const vsh_model *model) {
     return model->light_count;
 }
 
-void vsh_model_get_light_sized(const vsh_model *model, size_t index, vsh_model_light *light,
-                               size_t light_size) {
-    vshi_give(light, light_size, &model->lights[index], sizeof model->lights[index]);
+vsh_model_light vsh_model_get_light(const vsh_model *model, size_t index) {
+    return model->lights[index];
 }
 
 static vsh_result grow(vsh_model *model, vsh_error *error) {

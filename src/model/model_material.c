@@ -13,8 +13,7 @@ size_t vsh_model_material_count(const vsh_model *model) {
     return model->material_count;
 }
 
-void vsh_model_get_material_sized(const vsh_model *model, size_t index, vsh_model_material *material,
-                                  size_t material_size) {
+vsh_model_material vsh_model_get_material(const vsh_model *model, size_t index) {
     const vshi_model_material *kept = &model->materials[index];
     vsh_model_material told = kept->told;
     told.name = kept->name;
@@ -24,7 +23,7 @@ void vsh_model_get_material_sized(const vsh_model *model, size_t index, vsh_mode
         told.image_size = image->size;
         told.image_path = image->path;
     }
-    vshi_give(material, material_size, &told, sizeof told);
+    return told;
 }
 
 int32_t vsh_model_mesh_material(const vsh_model *model, size_t index) {

@@ -251,7 +251,7 @@ vsh_result vsh_outline_unite(const vsh_outline_instance *instances, size_t insta
     return vshi_contours_finish(&contours, instance_count == 1, "outlines", outline);
 }
 
-void vsh_outline_get_info_sized(const vsh_outline *o, vsh_outline_info *info, size_t info_size) {
+void vsh_outline_get_info(const vsh_outline *o, vsh_outline_info *info) {
     const size_t points = o->starts[o->contour_count];
     vsh_outline_info found = {.contours = o->contour_count,
                               .points = points - o->contour_count,
@@ -260,7 +260,7 @@ void vsh_outline_get_info_sized(const vsh_outline *o, vsh_outline_info *info, si
                                        (o->contour_count + 1) * sizeof *o->starts + sizeof *o};
     memcpy(found.bounds_min, o->nodes[0].low, sizeof found.bounds_min);
     memcpy(found.bounds_max, o->nodes[0].high, sizeof found.bounds_max);
-    vshi_give(info, info_size, &found, sizeof found);
+    *info = found;
 }
 
 _Static_assert(sizeof(vshi_point) == 2 * sizeof(double), "points are handed out as pairs of doubles");

@@ -371,13 +371,13 @@ size_t vsh_assets_receiver_pages(const vsh_assets *assets, size_t index) {
     return made->page_begins != NULL ? made->page_count : 1;
 }
 
-int32_t vsh_assets_receiver_page_info_sized(const vsh_assets *assets, size_t index, size_t page,
-                                            vsh_receiver_page *info, size_t info_size) {
+int32_t vsh_assets_receiver_page_info(const vsh_assets *assets, size_t index, size_t page,
+                                      vsh_receiver_page *info) {
     if (page >= vsh_assets_receiver_pages(assets, index)) {
         return 0;
     }
     const vshi_unwrapped *made = &assets->receivers[index].unwrapped;
-    vshi_give(info, info_size, made->pages != NULL ? &made->pages[page] : &made->whole, sizeof *made->pages);
+    *info = made->pages != NULL ? made->pages[page] : made->whole;
     return 1;
 }
 

@@ -48,7 +48,7 @@ static void tell_default(const vshi_key *key, int32_t owner, char *text, size_t 
     vshi_key_value(key, defaults[owner], text, size);
 }
 
-int32_t vsh_setting_get_sized(size_t index, vsh_setting *setting, size_t setting_size) {
+int32_t vsh_setting_get(size_t index, vsh_setting *setting) {
     size_t place;
     const vshi_key *key = key_at(index, &place);
     if (key == NULL) {
@@ -64,7 +64,7 @@ int32_t vsh_setting_get_sized(size_t index, vsh_setting *setting, size_t setting
     tell_default(key, places[place].owner, told.otherwise, sizeof told.otherwise);
     told.group = key->option.group;
     told.owner = places[place].owner;
-    vshi_give(setting, setting_size, &told, sizeof told);
+    *setting = told;
     return 1;
 }
 

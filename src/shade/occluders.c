@@ -180,16 +180,15 @@ void vsh_occluders_free(vsh_occluders *occluders) {
     }
 }
 
-void vsh_occluders_get_parts_sized(const vsh_occluders *occluders, vsh_occluder_parts *parts,
-                                   size_t parts_size) {
-    const vsh_occluder_parts made = {.struct_size = parts_size,
+void vsh_occluders_get_parts(const vsh_occluders *occluders, vsh_occluder_parts *parts) {
+    const vsh_occluder_parts made = {.struct_size = sizeof made,
                                      .field = occluders->field,
                                      .triangles = occluders->triangles,
                                      .layers = occluders->layers,
                                      .layer_count = occluders->layer_count,
                                      .true_triangles = occluders->true_triangles,
                                      .true_solids = occluders->true_solids};
-    vshi_give(parts, parts_size, &made, sizeof made);
+    *parts = made;
 }
 
 /* Adds up what fields take; sizes are those of the first. */
@@ -208,8 +207,7 @@ static void count(const vsh_field *field, vsh_occluders_info *info) {
     info->field_bytes += own.bytes;
 }
 
-void vsh_occluders_get_info_sized(const vsh_occluders *occluders, vsh_occluders_info *info,
-                                  size_t info_size) {
+void vsh_occluders_get_info(const vsh_occluders *occluders, vsh_occluders_info *info) {
     const vshi_occluders_own *own = occluders->own;
     vsh_occluders_info made = {.layer_count = occluders->layer_count,
                                .has_triangles = occluders->triangles != NULL,
@@ -227,5 +225,5 @@ void vsh_occluders_get_info_sized(const vsh_occluders *occluders, vsh_occluders_
     if (occluders->true_triangles != NULL && occluders->true_triangles != occluders->triangles) {
         made.triangles_bytes += vsh_triangles_bytes(occluders->true_triangles);
     }
-    vshi_give(info, info_size, &made, sizeof made);
+    *info = made;
 }

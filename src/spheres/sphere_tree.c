@@ -282,8 +282,8 @@ void vsh_spheres_free(vsh_spheres *spheres) {
     }
 }
 
-void vsh_spheres_get_info_sized(const vsh_spheres *spheres, vsh_spheres_info *info, size_t info_size) {
-    vshi_give(info, info_size, &spheres->info, sizeof spheres->info);
+void vsh_spheres_get_info(const vsh_spheres *spheres, vsh_spheres_info *info) {
+    *info = spheres->info;
 }
 
 uint64_t vshi_sphere_tree_search(const vsh_spheres *spheres, const vshi_ball_cone *cone, vshi_ball_fn *fn,

@@ -271,21 +271,20 @@ size_t vsh_atlas_page_count(const vsh_atlas *atlas) {
     return atlas->info.pages;
 }
 
-void vsh_atlas_get_info_sized(const vsh_atlas *atlas, vsh_atlas_info *info, size_t info_size) {
-    vshi_give(info, info_size, &atlas->info, sizeof atlas->info);
+void vsh_atlas_get_info(const vsh_atlas *atlas, vsh_atlas_info *info) {
+    *info = atlas->info;
 }
 
-void vsh_atlas_mesh_view_sized(const vsh_atlas *atlas, size_t mesh, vsh_atlas_mesh *view, size_t view_size) {
-    vshi_give(view, view_size, &atlas->meshes[mesh], sizeof atlas->meshes[mesh]);
+vsh_atlas_mesh vsh_atlas_mesh_view(const vsh_atlas *atlas, size_t mesh) {
+    return atlas->meshes[mesh];
 }
 
-void vsh_atlas_chart_view_sized(const vsh_atlas *atlas, size_t chart, vsh_atlas_chart *view,
-                                size_t view_size) {
-    vshi_give(view, view_size, &atlas->charts[chart], sizeof atlas->charts[chart]);
+vsh_atlas_chart vsh_atlas_chart_view(const vsh_atlas *atlas, size_t chart) {
+    return atlas->charts[chart];
 }
 
-void vsh_atlas_page_view_sized(const vsh_atlas *atlas, size_t page, vsh_atlas_page *view, size_t view_size) {
-    vshi_give(view, view_size, &atlas->pages[page], sizeof atlas->pages[page]);
+vsh_atlas_page vsh_atlas_page_view(const vsh_atlas *atlas, size_t page) {
+    return atlas->pages[page];
 }
 
 const vsh_atlas_chart *vsh_atlas_charts(const vsh_atlas *atlas) {

@@ -50,8 +50,8 @@ static void add_triangle(const vsh_mesh *mesh, size_t triangle, const double siz
     }
 }
 
-vsh_result vsh_uvs_measure_sized(const vsh_mesh *mesh, int32_t width, int32_t height,
-                                 vsh_uvs_measures *measures, size_t measures_size, vsh_error *error) {
+vsh_result vsh_uvs_measure(const vsh_mesh *mesh, int32_t width, int32_t height, vsh_uvs_measures *measures,
+                           vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(mesh);
     VSHI_NEEDS(measures);
@@ -72,6 +72,6 @@ vsh_result vsh_uvs_measure_sized(const vsh_mesh *mesh, int32_t width, int32_t he
             found.stretch = sqrt(s.square / s.area) * found.texels_per_unit;
         }
     }
-    vshi_give(measures, measures_size, &found, sizeof found);
+    *measures = found;
     return VSH_OK;
 }

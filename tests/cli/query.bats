@@ -492,7 +492,7 @@ write_binary_ply() {
     shade query --help
     done_well
     for option in points points-format output format normals answers-only strict batch stats sun ao method distance gradient \
-        max-error rays error caster resolution within threads memory-limit quiet isa; do
+        max-error rays error caster resolution within threads memory-limit quiet; do
         [[ $output == *"--$option"* ]] || fail "no --$option"
     done
 }

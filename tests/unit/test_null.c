@@ -56,7 +56,7 @@ static void casters_are_not_made_of_nothing(void **state) {
     REFUSED(vsh_receiver_needs_unwrap(NULL, &mesh, 1, NULL, &(int32_t){0}, &error));
     REFUSED(vsh_receiver_needs_unwrap(&(vsh_receiver){0}, &mesh, 1, NULL, NULL, &error));
     REFUSED(vsh_uvs_measure(NULL, 16, 16, &(vsh_uvs_measures){0}, &error));
-    REFUSED(vsh_uvs_measure_sized(&mesh, 16, 16, NULL, sizeof(vsh_uvs_measures), &error));
+    REFUSED(vsh_uvs_measure(&mesh, 16, 16, NULL, &error));
     REFUSED(vsh_uvs_usable(NULL, NULL, &(int32_t){0}, &error));
     REFUSED(vsh_uvs_usable(&mesh, NULL, NULL, &error));
     REFUSED(vsh_sdf_check(NULL, &error));

@@ -171,7 +171,7 @@ class BakeJob(Handle):
         found = ffi.new("vsh_job_lightmap *")
         result = []
         for index in range(lib.vsh_bake_job_count(self.handle)):
-            lib.vsh_bake_job_lightmap_sized(self.handle, index, found, ffi.sizeof("vsh_job_lightmap"))
+            lib.vsh_bake_job_lightmap(self.handle, index, found)
             result.append(_told(found[0]))
         return result
 
@@ -190,7 +190,7 @@ class BakeJob(Handle):
     def report(self) -> types.BakeReport:
         """What it has done so far; `errors` is a list of vdbshade.types.BakeError: of each light, of AO, of the sky."""
         found = ffi.new("vsh_bake_report *")
-        lib.vsh_bake_job_get_report_sized(self.handle, found, ffi.sizeof("vsh_bake_report"))
+        lib.vsh_bake_job_get_report(self.handle, found)
         report = told(found[0], "vsh_bake_report")
         report.errors = [told(found.errors[i], "vsh_bake_error") for i in range(found.error_count)]
         return report
@@ -198,7 +198,7 @@ class BakeJob(Handle):
     def forecast(self, *, run: Optional[Run] = None) -> types.BakeForecast:
         """What it will take, of a job that was not measured."""
         forecast = ffi.new("vsh_bake_forecast *")
-        call(lib.vsh_bake_job_forecast_sized, self.handle, RUN, forecast, ffi.sizeof("vsh_bake_forecast"), run=run)
+        call(lib.vsh_bake_job_forecast, self.handle, RUN, forecast, run=run)
         return told(forecast[0], "vsh_bake_forecast")
 
 
@@ -209,7 +209,7 @@ def bake_scene(scene: Scene, *, files: Sequence[Any] = (), words: Sequence[str] 
         raise TypeError(f"scene: expected a vdbshade.Scene, got {type(scene).__name__}")
     filled = _options(options, files, words)
     report = ffi.new("vsh_bake_report *")
-    call(lib.vsh_bake_scene_sized, scene.struct, filled.pointer, RUN, report, ffi.sizeof("vsh_bake_report"), run=run)
+    call(lib.vsh_bake_scene, scene.struct, filled.pointer, RUN, report, run=run)
     return told(report[0], "vsh_bake_report")
 
 

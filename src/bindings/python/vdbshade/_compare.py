@@ -61,8 +61,7 @@ def compare(golden: ArrayLike, values: ArrayLike, mask: Optional[ArrayLike] = No
     """
     compared, keeps = _compared(golden, values, mask)
     measures = ffi.new("vsh_measures *")
-    call(lib.vsh_compare_sized, compared, Filled("vsh_compare_options", options).pointer, RUN, measures,
-         ffi.sizeof("vsh_measures"), run=run)
+    call(lib.vsh_compare, compared, Filled("vsh_compare_options", options).pointer, RUN, measures, run=run)
     del keeps
     return _measures(measures[0])
 
@@ -75,7 +74,7 @@ def compare_coverage(golden: Optional[ArrayLike], values: Optional[ArrayLike]) -
         raise TypeError("golden, values: expected an array for one of them")
     given = [None if p is None else array(p, numpy.float32, shape, "coverage") for p in planes]
     mask, found = numpy.empty(shape, numpy.uint8), ffi.new("vsh_coverage *")
-    lib.vsh_compare_coverage_sized(mask.size, pointer(given[0]), pointer(given[1]), pointer(mask), found, ffi.sizeof("vsh_coverage"))
+    lib.vsh_compare_coverage(mask.size, pointer(given[0]), pointer(given[1]), pointer(mask), found)
     return told(found[0], "vsh_coverage"), mask
 
 
@@ -87,7 +86,7 @@ def compare_accuracy(truths: Sequence[ArrayLike], values: Sequence[ArrayLike], m
     parts = [_compared(t, v, None if masks is None else masks[i]) for i, (t, v) in enumerate(zip(truths, values))]
     planes = ffi.new("vsh_compared[]", [p[0][0] for p in parts] or 1)
     found = ffi.new("vsh_accuracy *")
-    call(lib.vsh_compare_accuracy_sized, planes, len(parts), RUN, found, ffi.sizeof("vsh_accuracy"), run=run)
+    call(lib.vsh_compare_accuracy, planes, len(parts), RUN, found, run=run)
     return told(found[0], "vsh_accuracy")
 
 
@@ -104,7 +103,7 @@ class Limits:
 
     def __init__(self, *, noise: float = 0.0, **values: float) -> None:
         self.struct = ffi.new("vsh_limits *")
-        lib.vsh_limits_default_sized(self.struct, ffi.sizeof("vsh_limits"))
+        self.struct[0] = lib.vsh_limits_default()
         if noise:
             lib.vsh_limits_allow_noise(self.struct, noise)
         for name, value in values.items():

@@ -76,14 +76,14 @@ class Field(Handle):
 
     @property
     def info(self) -> "types.FieldInfo":
-        return info(lib.vsh_field_get_info_sized, "vsh_field_info", self.handle)
+        return info(lib.vsh_field_get_info, "vsh_field_info", self.handle)
 
     def find_lost(self, meshes: Meshes, triangles: Optional[Triangles] = None) -> "List[types.Lost]":
         """What of the meshes that it was made of it does not hold: a record for each."""
         structs, count, _ = meshes_of(meshes)
         lost = ffi.new("vsh_lost[]", max(count, 1))
         rays = ffi.NULL if triangles is None else handle_of(triangles, Triangles, "triangles")
-        call(lib.vsh_field_find_lost_sized, self.handle, structs, count, rays, lost, ffi.sizeof("vsh_lost"))
+        call(lib.vsh_field_find_lost, self.handle, structs, count, rays, lost)
         return [told(lost[i], "vsh_lost") for i in range(count)]
 
 
@@ -98,7 +98,7 @@ class Heights(Handle):
 
     @property
     def info(self) -> "types.HeightsInfo":
-        return info(lib.vsh_heights_get_info_sized, "vsh_heights_info", self.handle)
+        return info(lib.vsh_heights_get_info, "vsh_heights_info", self.handle)
 
 
 class Spheres(Handle):
@@ -118,7 +118,7 @@ class Spheres(Handle):
 
     @property
     def info(self) -> "types.SpheresInfo":
-        return info(lib.vsh_spheres_get_info_sized, "vsh_spheres_info", self.handle)
+        return info(lib.vsh_spheres_get_info, "vsh_spheres_info", self.handle)
 
 
 def spheres_read(path: "str | os.PathLike[str]", *, run: Optional[Run] = None) -> numpy.ndarray:

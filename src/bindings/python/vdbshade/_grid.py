@@ -159,7 +159,7 @@ class Grid(Handle):
 
     @property
     def info(self) -> "types.GridInfo":
-        return info(lib.vsh_grid_get_info_sized, "vsh_grid_info", self.handle)
+        return info(lib.vsh_grid_get_info, "vsh_grid_info", self.handle)
 
     def values(self, index_min: Optional[Sequence[int]] = None, shape: Optional[Sequence[int]] = None,
                out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
@@ -200,7 +200,7 @@ def vdb_list(path: "str | os.PathLike[str]", *, run: Optional[Run] = None) -> "L
     count, capacity = ffi.new("size_t *"), 16
     while True:
         entries = ffi.new("vsh_vdb_entry[]", capacity)
-        call(lib.vsh_vdb_list_sized, path_of(path, "path"), RUN, entries, ffi.sizeof("vsh_vdb_entry"), capacity, count, run=run)
+        call(lib.vsh_vdb_list, path_of(path, "path"), RUN, entries, capacity, count, run=run)
         if count[0] <= capacity:
             return [told(entries[i], "vsh_vdb_entry") for i in range(count[0])]
         capacity = count[0]

@@ -180,7 +180,7 @@ class ImageWriter:
     def clipping(self) -> types.ImageClipping:
         """Light that integers cut, of the rows so far."""
         found = ffi.new("vsh_image_clipping *")
-        call(lib.vsh_image_writer_get_clipping_sized, self._open(), found, ffi.sizeof("vsh_image_clipping"))
+        call(lib.vsh_image_writer_get_clipping, self._open(), found)
         return told(found[0], "vsh_image_clipping")
 
     def finish(self) -> None:

@@ -29,7 +29,7 @@ def charts_closeness(meshes: Meshes, width: int, height: int, *, run: Optional[R
     """How close to each other the charts of a lightmap of this size (texels) lie."""
     structs, count, _ = meshes_of(meshes)
     found = ffi.new("vsh_closeness *")
-    call(lib.vsh_charts_closeness_sized, structs, count, width, height, RUN, found, ffi.sizeof("vsh_closeness"), run=run)
+    call(lib.vsh_charts_closeness, structs, count, width, height, RUN, found, run=run)
     return told(found[0], "vsh_closeness")
 
 
@@ -53,8 +53,8 @@ class Texels(Handle):
     def __init__(self, meshes: Meshes, *, run: Optional[Run] = None, **options: Any) -> None:
         structs, count, _ = meshes_of(meshes)
         reports = ffi.new("vsh_uv_report[]", max(count, 1))
-        super().__init__(make(lib.vsh_texels_free, lib.vsh_texels_create_sized, structs, count, _lightmap_options(options).pointer,
-                              RUN, reports, ffi.sizeof("vsh_uv_report"), place("vsh_texels"), run=run))
+        super().__init__(make(lib.vsh_texels_free, lib.vsh_texels_create, structs, count, _lightmap_options(options).pointer,
+                              RUN, reports, place("vsh_texels"), run=run))
         #: what is wrong with the UVs, mesh by mesh
         self.uv_reports: List[types.UvReport] = [told(reports[i], "vsh_uv_report") for i in range(count)]
         self.shape: Tuple[int, int] = (self.info.height, self.info.width)
@@ -62,14 +62,14 @@ class Texels(Handle):
 
     @property
     def info(self) -> types.TexelsInfo:
-        return info(lib.vsh_texels_get_info_sized, "vsh_texels_info", self.handle)
+        return info(lib.vsh_texels_get_info, "vsh_texels_info", self.handle)
 
     @property
     def samples(self) -> Dict[str, numpy.ndarray]:
         """The samples in the order in which they are shaded, views: "positions" float64 (n, 3), "normals" and
         "geometric_normals" float32 (n, 3), "texels" uint32 (n,)."""
         found = ffi.new("vsh_texel_samples *")
-        lib.vsh_texels_samples_sized(self.handle, found, ffi.sizeof("vsh_texel_samples"))
+        found[0] = lib.vsh_texels_samples(self.handle)
         n, owner = found.count, self.handle
         return dict(positions=borrowed(found.positions, (n, 3), numpy.float64, owner),
                     normals=borrowed(found.normals, (n, 3), numpy.float32, owner),
@@ -84,8 +84,8 @@ class Charts(Handle):
     def __init__(self, meshes: Meshes, *, run: Optional[Run] = None, **options: Any) -> None:
         structs, count, keeps = meshes_of(meshes)
         reports = ffi.new("vsh_uv_report[]", max(count, 1))
-        self._begin(make(_freeing(lib.vsh_charts_free, (structs, keeps)), lib.vsh_charts_create_sized, structs, count,
-                         _lightmap_options(options).pointer, RUN, reports, ffi.sizeof("vsh_uv_report"), place("vsh_charts"), run=run),
+        self._begin(make(_freeing(lib.vsh_charts_free, (structs, keeps)), lib.vsh_charts_create, structs, count,
+                         _lightmap_options(options).pointer, RUN, reports, place("vsh_charts"), run=run),
                     count)
         self.uv_reports: List[types.UvReport] = [told(reports[i], "vsh_uv_report") for i in range(count)]
 
@@ -96,7 +96,7 @@ class Charts(Handle):
 
     @property
     def info(self) -> types.ChartsInfo:
-        return info(lib.vsh_charts_get_info_sized, "vsh_charts_info", self.handle)
+        return info(lib.vsh_charts_get_info, "vsh_charts_info", self.handle)
 
     def bounds(self, *, run: Optional[Run] = None) -> Tuple[Tuple[float, ...], Tuple[float, ...]]:
         """World box of all samples."""
@@ -279,8 +279,8 @@ def lightmap_stitch(charts: Charts, lightmap: Mapping[str, numpy.ndarray], *, ru
     names = _shadows(lightmap)
     planes = _given(charts.shape, names, lightmap)
     report = ffi.new("vsh_stitch_report *")
-    call(lib.vsh_lightmap_stitch_sized, handle_of(charts, Charts, "charts"), planes.struct, len(names),
-         Filled("vsh_stitch_options", options).pointer, RUN, report, ffi.sizeof("vsh_stitch_report"), run=run)
+    call(lib.vsh_lightmap_stitch, handle_of(charts, Charts, "charts"), planes.struct, len(names),
+         Filled("vsh_stitch_options", options).pointer, RUN, report, run=run)
     return told(report[0], "vsh_stitch_report")
 
 
@@ -305,8 +305,7 @@ def lightmaps_stitch(pages: Sequence[Tuple[Charts, Mapping[str, numpy.ndarray]]]
         keeps += [handle_of(charts, Charts, "charts"), _given(charts.shape, names, lightmap)]
         structs[i].charts, structs[i].lightmap = keeps[-2], keeps[-1].struct
     report = ffi.new("vsh_stitch_report *")
-    call(lib.vsh_lightmaps_stitch_sized, structs, len(pages), len(names), Filled("vsh_stitch_options", options).pointer, RUN, report,
-         ffi.sizeof("vsh_stitch_report"), run=run)
+    call(lib.vsh_lightmaps_stitch, structs, len(pages), len(names), Filled("vsh_stitch_options", options).pointer, RUN, report, run=run)
     return told(report[0], "vsh_stitch_report")
 
 

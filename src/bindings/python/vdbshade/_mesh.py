@@ -205,7 +205,7 @@ class Mesh:
     def check(self) -> types.MeshReport:
         """Looks it over; InputError for what is not finite or out of range."""
         report = ffi.new("vsh_mesh_report *")
-        call(lib.vsh_mesh_check_sized, self.struct, report, ffi.sizeof("vsh_mesh_report"))
+        call(lib.vsh_mesh_check, self.struct, report)
         return told(report[0], "vsh_mesh_report")
 
     def uvs_usable(self, *, run: Optional[Run] = None) -> bool:
@@ -217,7 +217,7 @@ class Mesh:
     def measure_uvs(self, width: int, height: int) -> types.UvsMeasures:
         """How its UVs lie on its surface, in a lightmap of this size (texels)."""
         measures = ffi.new("vsh_uvs_measures *")
-        call(lib.vsh_uvs_measure_sized, self.struct, width, height, measures, ffi.sizeof("vsh_uvs_measures"))
+        call(lib.vsh_uvs_measure, self.struct, width, height, measures)
         return told(measures[0], "vsh_uvs_measures")
 
 
@@ -241,7 +241,7 @@ def mesh_solidity(meshes: Meshes, *, run: Optional[Run] = None) -> List[types.So
     """What the pieces of meshes that cast together are taken for: a report for each mesh."""
     structs, count, _ = meshes_of(meshes)
     reports = ffi.new("vsh_solidity_report[]", max(count, 1))
-    call(lib.vsh_mesh_solidity_sized, structs, count, RUN, reports, ffi.sizeof("vsh_solidity_report"), run=run)
+    call(lib.vsh_mesh_solidity, structs, count, RUN, reports, run=run)
     return [told(reports[i], "vsh_solidity_report") for i in range(count)]
 
 
@@ -317,7 +317,7 @@ class Model(Handle):
     @property
     def materials(self) -> List[types.ModelMaterial]:
         """Materials of a glTF or an OBJ, as far as they decide where light comes through."""
-        return [info(lib.vsh_model_get_material_sized, "vsh_model_material", self.handle, i)
+        return [info(lib.vsh_model_get_material, "vsh_model_material", self.handle, i)
                 for i in range(lib.vsh_model_material_count(self.handle))]
 
     def mesh_material(self, index: int) -> int:
@@ -344,7 +344,7 @@ class Model(Handle):
     @property
     def lights(self) -> List[types.ModelLight]:
         """Lights of a glTF."""
-        return [info(lib.vsh_model_get_light_sized, "vsh_model_light", self.handle, i)
+        return [info(lib.vsh_model_get_light, "vsh_model_light", self.handle, i)
                 for i in range(lib.vsh_model_light_count(self.handle))]
 
     def lights_from_model(self, angle: float, radius: float, unit: float = 0.0) -> "List[Light]":

@@ -108,13 +108,13 @@ class Occluders(Handle):
 
     @property
     def info(self) -> "types.OccludersInfo":
-        return info(lib.vsh_occluders_get_info_sized, "vsh_occluders_info", self.handle)
+        return info(lib.vsh_occluders_get_info, "vsh_occluders_info", self.handle)
 
     @property
     def field(self) -> Field:
         """Its field, which lives as long as anything that refers to either."""
         parts = ffi.new("vsh_occluder_parts *")
-        lib.vsh_occluders_get_parts_sized(self.handle, parts, ffi.sizeof("vsh_occluder_parts"))
+        lib.vsh_occluders_get_parts(self.handle, parts)
         field = Field.__new__(Field)
         owner = self.handle
         Handle.__init__(field, ffi.gc(ffi.cast("vsh_field *", parts.field), lambda _, keeps=owner: None), owner)

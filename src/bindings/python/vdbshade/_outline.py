@@ -62,7 +62,7 @@ class Outline(Handle):
 
     @property
     def info(self) -> "types.OutlineInfo":
-        return info(lib.vsh_outline_get_info_sized, "vsh_outline_info", self.handle)
+        return info(lib.vsh_outline_get_info, "vsh_outline_info", self.handle)
 
     @property
     def contours(self) -> List[numpy.ndarray]:

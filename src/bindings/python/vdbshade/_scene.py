@@ -25,7 +25,7 @@ def settings() -> List[types.Setting]:
     """All settings of scenes, of what receives in them and of flat scenes, with their help, range and default."""
     found: List[types.Setting] = []
     setting = ffi.new("vsh_setting *")
-    while lib.vsh_setting_get_sized(len(found), setting, ffi.sizeof("vsh_setting")):
+    while lib.vsh_setting_get(len(found), setting):
         found.append(told(setting[0], "vsh_setting"))
     return found
 
@@ -309,7 +309,7 @@ class Assets(Handle):
         """A page of a receiver: width and height (texels), and the object whose it is, None where it is shared; None beyond
         what there is."""
         found = ffi.new("vsh_receiver_page *")
-        if not lib.vsh_assets_receiver_page_info_sized(self.handle, index, page, found, ffi.sizeof("vsh_receiver_page")):
+        if not lib.vsh_assets_receiver_page_info(self.handle, index, page, found):
             return None
         return told(found[0], "vsh_receiver_page")
 

@@ -207,7 +207,9 @@ def _value(value: Any, field: Any, prefix: Optional[str]) -> Any:
 
 
 def info(function: Any, kind: str, *arguments: Any) -> Any:
-    """What a …_get_…_sized() function tells: ``info(lib.vsh_grid_get_info_sized, "vsh_grid_info", grid)``."""
+    """The struct that a …_get_…() function returns or fills: ``info(lib.vsh_grid_get_info, "vsh_grid_info", grid)``."""
+    if ffi.typeof(function).result.kind == "struct":
+        return told(function(*arguments), kind)
     struct = ffi.new(kind + " *")
-    function(*arguments, struct, ffi.sizeof(kind))
+    function(*arguments, struct)
     return told(struct[0], kind)

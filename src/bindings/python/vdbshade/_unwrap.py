@@ -55,7 +55,7 @@ class Atlas(Handle):
 
     @property
     def info(self) -> types.AtlasInfo:
-        return info(lib.vsh_atlas_get_info_sized, "vsh_atlas_info", self.handle)
+        return info(lib.vsh_atlas_get_info, "vsh_atlas_info", self.handle)
 
     @property
     def pages(self) -> int:
@@ -65,7 +65,7 @@ class Atlas(Handle):
         """What a page comes to: its size (texels), texels_per_unit, share that is covered, first mesh."""
         if not -self.pages <= index < self.pages:
             raise IndexError(f"page {index}: the atlas has {self.pages}")
-        return info(lib.vsh_atlas_page_view_sized, "vsh_atlas_page", self.handle, index % self.pages)
+        return info(lib.vsh_atlas_page_view, "vsh_atlas_page", self.handle, index % self.pages)
 
     @property
     def charts(self) -> List[types.AtlasChart]:
@@ -80,7 +80,7 @@ class Atlas(Handle):
         if not -len(self) <= index < len(self):
             raise IndexError(f"mesh {index}: the atlas has {len(self)}")
         view = ffi.new("vsh_atlas_mesh *")
-        lib.vsh_atlas_mesh_view_sized(self.handle, index % len(self), view, ffi.sizeof("vsh_atlas_mesh"))
+        view[0] = lib.vsh_atlas_mesh_view(self.handle, index % len(self))
         return AtlasMesh(view, self.handle)
 
 

@@ -46,7 +46,7 @@ class Voxels(Handle):
 
     @property
     def info(self) -> types.VoxelsInfo:
-        return info(lib.vsh_voxels_get_info_sized, "vsh_voxels_info", self.handle)
+        return info(lib.vsh_voxels_get_info, "vsh_voxels_info", self.handle)
 
     def centre(self, x: int, y: int, z: int) -> Tuple[float, ...]:
         """World position of a voxel's centre."""
@@ -60,12 +60,12 @@ class Volume(Handle):
 
     @property
     def info(self) -> types.VolumeInfo:
-        return info(lib.vsh_volume_get_info_sized, "vsh_volume_info", self.handle)
+        return info(lib.vsh_volume_get_info, "vsh_volume_info", self.handle)
 
     @property
     def grids(self) -> List[types.VolumeGrid]:
         """What grids there are."""
-        return [info(lib.vsh_volume_get_grid_sized, "vsh_volume_grid", self.handle, i) for i in range(self.info.grids)]
+        return [info(lib.vsh_volume_get_grid, "vsh_volume_grid", self.handle, i) for i in range(self.info.grids)]
 
     def _number(self, grid: Union[int, str]) -> int:
         if isinstance(grid, int):
