@@ -98,15 +98,14 @@ static table tables[] = {{"", bench_header, NULL},
                          {"-scaling", bench_scaling_header, NULL},
                          {"-features", bench_features_header, NULL},
                          {"-read", bench_read_header, NULL},
-                         {"-levelset", bench_levelset_header, NULL},
-                         {"-penumbra", bench_penumbra_header, NULL}};
+                         {"-levelset", bench_levelset_header, NULL}};
 
 static table *table_of(const char *part) {
     static const struct {
         const char *part, *suffix;
     } others[] = {{"intersector", "-ratios"}, {"nanovdb", "-ratios"},    {"cores", "-ratios"},
                   {"scaling", "-scaling"},    {"features", "-features"}, {"read", "-read"},
-                  {"levelset", "-levelset"},  {"penumbra", "-penumbra"}};
+                  {"levelset", "-levelset"}};
     const char *suffix = "";
     for (size_t i = 0; i < sizeof others / sizeof others[0]; ++i) {
         suffix = strcmp(part, others[i].part) == 0 ? others[i].suffix : suffix;
@@ -165,8 +164,7 @@ int main(int argc, char **argv) {
                  {"scaling", bench_scaling},
                  {"features", bench_features},
                  {"read", bench_read},
-                 {"levelset", bench_levelset},
-                 {"penumbra", bench_penumbra}};
+                 {"levelset", bench_levelset}};
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
         if (only == NULL || strcmp(only, parts[i].name) == 0) {
             parts[i].run(begin_table(table_of(parts[i].name), path));

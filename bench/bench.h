@@ -50,8 +50,6 @@ void bench_methods(FILE *csv, const char *scene, const vsh_field *field, const v
                    const vsh_light *light, double ray, const float *truth, const float *valid, float *values);
 
 void bench_seeds(FILE *csv);
-void bench_penumbra(FILE *csv);
-void bench_penumbra_header(FILE *csv);
 void bench_asset(FILE *csv);
 void bench_shadow_lightmaps(FILE *csv);
 void bench_ao_lightmaps(FILE *csv);

@@ -8,8 +8,8 @@
 
 /* As vsh_shade_ao() at the origins' points, `points`, of a lightmap of one sample a texel, by a method that
  * keeps an error. Values of rows that are wanted alone are those of the whole. `deviation` and `bent`, as of
- * vshi_ao_task, may be NULL. What `keep` has memory for is set, but for
- * what holds it against the casters and tangents, where texels have rays; values that are left are 0. */
+ * vshi_ao_task, may be NULL. Fills the memory of `keep` for texels that have rays, but for its tangents and
+ * its comparison with the casters. Values that are left to merging are 0. */
 vsh_result vshi_ao_texels(const vsh_occluders *occluders, const vsh_texels *texels,
                           const vshi_origins *origins, const vsh_points *points,
                           const vsh_shade_options *options, const vsh_run *run, const vshi_ao_keep *keep,

@@ -10,7 +10,7 @@ typedef struct vshi_share_rows {
     size_t count;    /* rows of tiles */
     size_t *samples; /* [count] */
     int32_t spacing; /* of texels that may share AO rays */
-    int32_t left;    /* of those that do, whose AO is left at the ends of pieces (bake/ao_cut.h); else 1 */
+    int32_t left;    /* spacing of texels whose AO is left to merging at the ends of pieces; else 1 */
 } vshi_share_rows;
 
 /* Records the rows of a measured lightmap. Errors: VSH_ERROR_MEMORY. */

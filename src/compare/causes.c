@@ -1,4 +1,4 @@
-/* What explains a difference as a whole, without any shadow that changed: noise, or a curve over the values.
+/* Finds what explains a difference if no shadow changed: noise, or a curve over the values.
  *
  * Noise is what neighbours along an edge do not share. Each value is compared with its two neighbours in the
  * direction in which the two bakes change least, so that penumbrae that got wider or moved count for nothing.
@@ -36,8 +36,8 @@ static bool find_neighbours(const vshi_pair *pair, size_t i, const size_t place[
     return pair->mask[neighbour[0]] && pair->mask[neighbour[1]];
 }
 
-/* Squared difference of a value to what its two neighbours have, along the direction that changes least;
- * negative where there are none. */
+/* Squared difference between a value and the mean of its two neighbours, along the direction that changes
+ * least; negative if it has no neighbours. */
 static double find_unshared(const vshi_pair *pair, size_t i) {
     const int count = pair->size[2] > 1 ? 13 : 4;
     double least = INFINITY, unshared = -1.0;
@@ -67,7 +67,7 @@ static double find_unshared(const vshi_pair *pair, size_t i) {
 }
 
 void vshi_find_noise(const vshi_pair *pair, vsh_measures *m) {
-    static const double VARIANCE = 1.5; /* of a value less the mean of two others, of noise of 1 */
+    static const double VARIANCE = 1.5; /* of a value minus the mean of two others, if each has variance 1 */
     double sum = 0.0, all = 0.0, count = 0.0;
     for (size_t i = 0; i < pair->count; ++i) {
         const double unshared = pair->mask[i] ? find_unshared(pair, i) : -1.0;

@@ -26,7 +26,7 @@ vsh_result vshi_scene_caster_grid(const vsh_scene *scene, const vsh_assets *asse
                                   const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
                                   vsh_error *error);
 
-/* What rays of AO meet of one caster that is shaded without voxels: as vsh_scene_triangles(). */
+/* vsh_scene_triangles() of one caster alone, for the AO of casters that are shaded without voxels. */
 vsh_result vshi_scene_caster_triangles(const vsh_scene *scene, const vsh_assets *assets, size_t caster,
                                        const vsh_run *run, vsh_triangles **triangles, vsh_error *error);
 

@@ -115,7 +115,7 @@ static void errors_are_below_those_asked_for_with_few_rays(void **state) {
     free(truth);
 }
 
-/* Held against rays on the same field that no texel shares. */
+/* Compared with rays on the same field that no texels share. */
 static void marched_rays_are_shared_too(void **state) {
     baked *truth = bake(*state, (how){.spacing = 1, .max_error = 0.004, .marched = true}),
           *shared = bake(*state, (how){.spacing = 4, .max_error = 0.02, .marched = true}),

@@ -59,9 +59,9 @@ static void bake_floor(double scale, const double offset[3], picture *p) {
     caster_free(&c);
 }
 
-/* Estimators differ by less than `rms` and `worst`, rays by `rays` rms. A value of `hard`, and a ray, is one
- * or the other, so that a texel on an edge may change by all of it: one of 4096 gives an rms of 0.0156 for
- * `hard` and 2.4e-4 for a ray of 64. */
+/* Estimators differ by less than `rms` and `worst`, rays by `rays` rms. Values of `hard` are
+ * 0 or 1, so a texel on an edge may change by 1: one of 4096 gives an rms of 0.0156, and one ray of 64 gives
+ * 2.4e-4. */
 static void assert_alike(const char *where, double at, const picture *a, const picture *b, double rms,
                          double worst, double rays) {
     for (int kind = 0; kind < KINDS; ++kind) {

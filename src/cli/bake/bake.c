@@ -254,7 +254,7 @@ static int bake_scene(const cli_bake_settings *settings, const vsh_scene *scene)
     options.files = files;
     options.file_count = settings->lights != NULL ? 2 : 1;
     char *parts = name_parts(settings, scene);
-    options.shard = settings->dry_run ? 0 : settings->shard; /* what is told is of the whole */
+    options.shard = settings->dry_run ? 0 : settings->shard; /* a forecast is of the whole bake */
     options.shard_count = settings->shard_count;
     options.forecast = settings->dry_run;
     options.parts = settings->merged != NULL ? settings->merged : parts;
