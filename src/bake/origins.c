@@ -356,7 +356,8 @@ vsh_result vshi_origins_create(const vsh_occluders *occluders, const vsh_texels 
         const vsh_layer *layer = &occluders->layers[i];
         if (layer->field != NULL) {
             const int32_t method = layer->method < 0 ? options->method : layer->method;
-            const vshi_origins_for here = {what.lights && layer->heights == NULL, what.ao && layer->ao != 0};
+            const vshi_origins_for here = {what.lights && !vshi_layer_is_closed(layer),
+                                           what.ao && layer->ao != 0};
             look_in(&l, layer->field, layer->triangles, method, options->ao_method, here);
         } else {
             l.heights[l.solid_count] = layer->heights;

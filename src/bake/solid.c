@@ -11,12 +11,12 @@ vshi_solid vshi_solid_of(const vsh_occluders *occluders) {
     vshi_solid solid = {.fields = {occluders->field}, .field_count = 1};
     for (size_t i = 0; i < occluders->layer_count; ++i) {
         const vsh_layer *layer = &occluders->layers[i];
-        if (layer->field != NULL) {
-            solid.fields[solid.field_count++] = layer->field;
-        } else if (layer->spheres != NULL) {
+        if (layer->spheres != NULL) { /* their field is for rays of AO, and may have no distances */
             solid.spheres[solid.spheres_count++] = layer->spheres;
-        } else {
+        } else if (layer->heights != NULL) {
             solid.heights[solid.heights_count++] = layer->heights;
+        } else {
+            solid.fields[solid.field_count++] = layer->field;
         }
     }
     for (size_t i = 0; i < solid.field_count; ++i) {

@@ -38,11 +38,6 @@ struct vshi_layers {
     prepared items[];
 };
 
-/* Whether shadows of a layer's casters need no field: heights are marched, spheres have closed forms. */
-static bool is_closed(const vsh_layer *layer) {
-    return layer->heights != NULL || layer->spheres != NULL;
-}
-
 static vsh_result resolve(const void *given, vsh_layer *layer, vsh_error *error) {
     *layer = vsh_layer_default();
     VSHI_TRY(vshi_options_resolve(given, layer, sizeof *layer, "vsh_layer", error));
@@ -71,7 +66,7 @@ static vsh_result resolve(const void *given, vsh_layer *layer, vsh_error *error)
     if (layer->heights != NULL && layer->spheres != NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "both heights and spheres: expected one of them");
     }
-    if (layer->field == NULL && !is_closed(layer)) {
+    if (layer->field == NULL && !vshi_layer_is_closed(layer)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "none of field, heights and spheres: expected one");
     }
     for (size_t i = 0; layer->lights != NULL && i < layer->light_count; ++i) {
@@ -134,7 +129,7 @@ static vsh_result prepare(prepared *item, size_t index, double lifted, const vsh
     if (light != NULL) {
         item->light = vshi_light_resized(light, layer->softness);
     }
-    if (light != NULL && is_closed(layer)) {
+    if (light != NULL && vshi_layer_is_closed(layer)) {
         if (options->method != VSH_SHADOW_HARD && options->method != VSH_SHADOW_CLASSIC) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT,
                              "heights and spheres are shaded by the methods hard and classic; for method %s "
@@ -291,7 +286,7 @@ void vshi_layers_shadow(const vshi_layers *layers, const vshi_shadow_task *task,
     for (size_t k = 0; k < layers->count; ++k) {
         const prepared *item = &layers->items[k];
         const double *remap = item->layer.remap;
-        if (is_closed(&item->layer)) {
+        if (vshi_layer_is_closed(&item->layer)) {
             shade_closed(item, task, begin, &piece, stats);
         } else {
             shade_field(item, task, &piece, stats);

@@ -12,6 +12,11 @@ typedef struct vshi_layers vshi_layers;
  * value and limit. */
 vsh_result vshi_layer_resolve(const vsh_layer *layers, size_t index, vsh_layer *layer, vsh_error *error);
 
+/* Whether a layer's shadows need no field: heights are marched, spheres have closed forms. */
+static inline bool vshi_layer_is_closed(const vsh_layer *layer) {
+    return layer->heights != NULL || layer->spheres != NULL;
+}
+
 /* Bytes of what a resolved layer refers to, triangles aside. */
 double vshi_layer_bytes(const vsh_layer *layer);
 
