@@ -90,8 +90,8 @@ typedef struct vsh_bake_job_options {
     const char *parts;   /* what the names of parts begin with; NULL: the first lightmap's output */
     const char *const *words; /* [word_count]: kept in a part as they are, for vsh_part_words() */
     size_t word_count;
-    int32_t forecast; /* nonzero: only what vsh_bake_job_forecast() tells is asked for, and the folders of
-                         outputs need not be there */
+    int32_t forecast; /* nonzero: the job is for vsh_bake_job_forecast() alone, so folders of outputs
+                         need not exist */
 } vsh_bake_job_options;
 
 static inline vsh_bake_job_options vsh_bake_job_options_default(void) {

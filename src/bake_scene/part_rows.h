@@ -33,7 +33,7 @@ typedef struct vshi_part_head {
     double voxel_size;    /* these of what cast, as in vsh_occluders_info */
     uint64_t active_voxels, field_bytes;
     int32_t levels, has_triangles;
-    int32_t kinds;                 /* of what is kept where AO is left: VSHI_KEEPS_… */
+    int32_t kinds;                 /* VSHI_KEEPS_… of the AO that is left to merging */
     vshi_part_lightmap *lightmaps; /* [lightmap_count] */
     uint64_t lightmap_count;
     vshi_part_piece *pieces; /* [piece_count], in the order of their rows in the file */

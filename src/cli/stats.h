@@ -31,7 +31,7 @@ typedef struct cli_stats {
     int of; /* CLI_STATS_…: what is counted */
     uint64_t points, bad_rows;
     uint64_t voxels, inside_voxels, tiles;
-    int32_t ao_spacing; /* of lightmaps, the least that was asked for; 0: there is none */
+    int32_t ao_spacing; /* the smallest of all lightmaps; 0: no lightmap */
     uint64_t bands;     /* that lightmaps were baked in: one each where they were baked whole */
     vsh_shade_stats shade;
     const vsh_bake_error

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of a pixel: colour, alpha, depth, normal; R, G, B, A; planes of a file of floats. */
+/* Floats of a pixel (colour, alpha, depth, normal), encoded channels (R, G, B, A), planes of a float file. */
 enum { FLOATS = 8, ENCODED = 4, PLANES = 6 };
 
 static const char *const linear_names[FLOATS] = {"R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z"};

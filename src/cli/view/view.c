@@ -45,7 +45,7 @@ const cli_command cli_view = {
     "view",
     "INPUT [OTHER] -o OUT.html [options]",
     "Writes a page that shows a lit mesh in a browser, in three dimensions: its light, AO, every channel\n"
-    "of its bake, texel density, charts; and a second bake beside it. A page of a scene (.json) shows the\n"
+    "of its bake, texel density and charts, and compares two bakes. A page of a scene (.json) shows the\n"
     "surface of the casters' voxels, with shadows and AO at its vertices. The page needs no other file;\n"
     "docs/view.md",
     options,

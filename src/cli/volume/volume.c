@@ -72,7 +72,7 @@ const cli_command cli_volume = {
     "INPUT -o OUT.vdb [options]",
     "Bakes soft shadows and ambient occlusion into sparse grids. INPUT is a mesh file, a level set\n"
     "(FILE.vdb, FILE.vdb:GRID) or a scene file (.json; its casters, lights and ao, not its receivers).\n"
-    "What is written, and how to read it: docs/volume.md. Numbers in brackets are the defaults.",
+    "docs/volume.md describes the output. Numbers in brackets are the defaults.",
     options,
     sizeof options / sizeof options[0],
     volume_main};
@@ -149,7 +149,7 @@ static int check_output(const volume_settings *s, const vsh_scene *scene, const 
     return cli_temporary_check(output);
 }
 
-/* What can be refused before anything is read. */
+/* Refuses bad outputs before anything is read. */
 static int check_files(const volume_settings *s, const vsh_scene *scene) {
     const char *output = s->bake.output, *stats = s->bake.stats;
     if (stats != NULL && cli_same_file(output, stats)) {
