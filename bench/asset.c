@@ -34,7 +34,8 @@ static const double CREASE = 0.75, CLEAR = 0.25;
 
 /* Every STRIDE-th sample in both directions of the tiles, so that the truth takes a minute and not an hour.
  */
-static receiver take_texels(const vsh_field *field, const vsh_texels *texels) {
+static receiver take_texels(const vsh_field *field, const vsh_charts *charts) {
+    vsh_texels *texels = bench_texels(charts);
     const vsh_texel_samples s = vsh_texels_samples(texels);
     vsh_field_info info;
     vsh_field_get_info(field, &info);
@@ -68,19 +69,20 @@ static receiver take_texels(const vsh_field *field, const vsh_texels *texels) {
         }
         r.valid[r.count++] = clear >= CLEAR ? 1.0f : 0.0f;
     }
+    vsh_texels_free(texels);
     return r;
 }
 
 void bench_asset(FILE *csv) {
     vsh_error error;
     vsh_run run = vsh_run_default();
-    vsh_texels *texels = NULL;
+    vsh_charts *charts = NULL;
     bench_scene scene;
     bench_scene_make(BENCH_CLOISTER, &scene);
     vsh_field *field = bench_scene_field(&scene, RESOLUTION);
     vsh_lightmap_options size = vsh_lightmap_options_default();
     size.width = size.height = SIZE;
-    bench_check(vsh_texels_create(scene.meshes, scene.mesh_count, &size, &run, NULL, &texels, &error),
+    bench_check(vsh_charts_create(scene.meshes, scene.mesh_count, &size, &run, NULL, &charts, &error),
                 &error);
     truth_mesh *mesh = truth_mesh_create(scene.meshes, scene.mesh_count);
     if (mesh == NULL) {
@@ -88,7 +90,7 @@ void bench_asset(FILE *csv) {
         exit(2);
     }
 
-    receiver r = take_texels(field, texels);
+    receiver r = take_texels(field, charts);
     float *values = bench_take(r.count * sizeof *values), *truth = bench_take(r.count * sizeof *truth);
     const vsh_points points = {r.count, r.positions, r.normals, NULL};
     vsh_light sun = vsh_light_default();
@@ -159,7 +161,7 @@ void bench_asset(FILE *csv) {
     free(r.lifted);
     free(r.positions);
     truth_mesh_free(mesh);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     vsh_field_free(field);
     bench_scene_free(&scene);
 }

@@ -26,6 +26,9 @@ void *bench_take(size_t bytes);
 /* Ends the program with the error where a call has failed. */
 void bench_check(vsh_result result, const vsh_error *error);
 
+/* The samples of charts; free them with vsh_texels_free(). */
+vsh_texels *bench_texels(const vsh_charts *charts);
+
 /* One row: scene, what, µs a texel (median), samples a texel, times an outside measure, error against truth.
  */
 void bench_header(FILE *csv);

@@ -24,7 +24,7 @@ static struct {
     vsh_field *field;
     vsh_occluders *occluders; /* with triangles */
     vsh_occluders *marched;   /* without */
-    vsh_texels *texels;
+    vsh_charts *charts;
     vsh_voxels *voxels;
     vsh_triangles *triangles;
     vsh_outline *outline;
@@ -153,13 +153,13 @@ static vsh_result make_field(const vsh_run *run) {
     return result;
 }
 
-static vsh_result make_texels(const vsh_run *run) {
+static vsh_result make_charts(const vsh_run *run) {
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = SIDE;
-    vsh_texels *texels;
+    vsh_charts *charts;
     const vsh_result result =
-        vsh_texels_create(made.meshes, made.mesh_count, &options, run, NULL, &texels, NULL);
-    vsh_texels_free(texels);
+        vsh_charts_create(made.meshes, made.mesh_count, &options, run, NULL, &charts, NULL);
+    vsh_charts_free(charts);
     return result;
 }
 
@@ -169,7 +169,7 @@ static vsh_result bake(const vsh_run *run, int32_t shadow, int32_t ao) {
     shade.ao_method = ao;
     shade.max_error = 0.1;
     const vsh_lightmap map = {.shadow = &made.planes[0], .ao = made.planes[1], .coverage = made.planes[2]};
-    return vsh_bake_lightmap(made.occluders, made.texels, &made.light, 1, &shade, run, &map, NULL, NULL);
+    return vsh_bake_lightmap(made.occluders, made.charts, &made.light, 1, &shade, run, &map, NULL, NULL);
 }
 
 static vsh_result bake_cones(const vsh_run *run) {
@@ -262,7 +262,7 @@ static const struct {
     {"outline_from_image", trace_mask},
     {"grid_from_outline", extrude},
     {"field_create", make_field},
-    {"texels_create", make_texels},
+    {"charts_create", make_charts},
     {"triangles_create", make_triangles},
     {"bake cones", bake_cones},
     {"bake adaptive", bake_adaptive},
@@ -295,7 +295,7 @@ static void prepare(void) {
     bench_check(vsh_field_create(made.grid, &reach, &run, &made.field, &error), &error);
     vsh_lightmap_options lightmap = vsh_lightmap_options_default();
     lightmap.width = lightmap.height = SIDE;
-    bench_check(vsh_texels_create(made.meshes, made.mesh_count, &lightmap, &run, NULL, &made.texels, &error),
+    bench_check(vsh_charts_create(made.meshes, made.mesh_count, &lightmap, &run, NULL, &made.charts, &error),
                 &error);
     bench_check(vsh_triangles_create(made.meshes, made.mesh_count, &run, &made.triangles, &error), &error);
     vsh_occluder_parts parts = vsh_occluder_parts_default();
@@ -311,7 +311,8 @@ static void prepare(void) {
         made.planes[i] = bench_take((size_t)3 * SIDE * SIDE * sizeof(float));
     }
     bench_check(vsh_query_create(made.marched, &made.light, 1, NULL, &made.query, &error), &error);
-    const vsh_texel_samples samples = vsh_texels_samples(made.texels);
+    vsh_texels *texels = bench_texels(made.charts);
+    const vsh_texel_samples samples = vsh_texels_samples(texels);
     made.positions = bench_take((size_t)POINTS * 3 * sizeof *made.positions);
     made.normals = bench_take((size_t)POINTS * 3 * sizeof *made.normals);
     for (size_t i = 0; i < POINTS; ++i) {
@@ -319,6 +320,7 @@ static void prepare(void) {
         memcpy(made.positions + 3 * i, samples.positions + 3 * from, 3 * sizeof(double));
         memcpy(made.normals + 3 * i, samples.normals + 3 * from, 3 * sizeof(float));
     }
+    vsh_texels_free(texels);
 }
 
 /* Seconds from the callback's answer to the return; negative: the stage passed over the fraction. */

@@ -46,3 +46,10 @@ void bench_check(vsh_result result, const vsh_error *error) {
         exit(2);
     }
 }
+
+vsh_texels *bench_texels(const vsh_charts *charts) {
+    vsh_texels *texels;
+    vsh_error error;
+    bench_check(vsh_texels_create(charts, NULL, &texels, &error), &error);
+    return texels;
+}

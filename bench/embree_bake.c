@@ -6,9 +6,8 @@
  * It loads, rasterises, judges validity, pads and writes as `vdbshade bake` does, by the same code; between
  * that it traces N rays a texel (16) of the same sampler in Embree's packets. No level set, no field, no
  * proofs, nothing that texels share. Truth is that of many rays of another frame. */
-#include "bake/average.h"
-#include "bake/nearest_valid.h"
 #include "bake/origins.h"
+#include "bake/page.h"
 #include "bake_scene/channels.h"
 #include "bake_scene/job.h"
 #include "base/clock.h"
@@ -33,13 +32,12 @@ typedef struct options {
 
 /* A lightmap under way. */
 typedef struct baking {
-    const vsh_texels *texels;
-    const vsh_occluders *occluders;
-    vshi_origins origins;
-    vshi_channels channels;
-    bench_rays_task task;
+    vshi_page page;
+    vshi_placement placement;
+    vshi_lifter lifters[2]; /* of the sun, of AO */
+    bench_rays_task tasks[2];
+    float *planes[2]; /* NULL: not baked */
     uint32_t (*net)[2];
-    float *plane; /* of the channel that is baked */
 } baking;
 
 static void usage(void) {
@@ -111,78 +109,92 @@ static const vsh_field *field_of_nothing_known(const vsh_triangles *triangles) {
     return &field;
 }
 
-/* A vshi_origins_keep: all samples are needed. */
-static vsh_result keep_all(void *user, const vshi_origins *origins, uint8_t *rows, vsh_error *error) {
-    (void)user, (void)origins, (void)rows, (void)error;
-    return VSH_OK;
-}
+/* A tile's samples, one a texel, and where their rays begin. */
+typedef struct tile_work {
+    vshi_samples samples;
+    vshi_origins origins;
+    double *from; /* [VSHI_TILE²][3] */
+    float *values;
+} tile_work;
 
-/* Valid samples begin … end - 1. */
-static void shade(void *user, size_t begin, size_t end) {
-    const baking *b = user;
-    const vshi_origins *o = &b->origins;
-    const double lift = vshi_triangles_lift(b->task.triangles);
-    double from[3 * VSHI_ORIGIN_BLOCK];
-    float values[VSHI_ORIGIN_BLOCK];
-    const float *faces = o->face != NULL ? o->face + 3 * begin : NULL;
-    const float *up = faces != NULL ? faces : o->normal + 3 * begin;
-    for (size_t k = 0; k < 3 * (end - begin); ++k) {
-        from[k] = o->start[3 * begin + k] + lift * (double)up[k];
+static void trace_plane(const baking *b, tile_work *w, size_t channel) {
+    const bench_rays_task *task = &b->tasks[channel];
+    vshi_origins *o = &w->origins;
+    const double lift = vshi_triangles_lift(task->triangles);
+    vshi_origins_lift(&b->lifters[channel], &w->samples, true, o);
+    for (size_t k = 0; k < 3 * o->count; ++k) {
+        w->from[k] = o->start[k] + lift * (double)o->face[k];
     }
-    bench_rays_trace(&b->task, (const uint32_t(*)[2])b->net, end - begin, from, o->normal + 3 * begin, faces,
-                     o->texel + begin, values);
-    for (size_t i = begin; i < end; ++i) {
-        b->plane[vsh_texel_place(o->texel[i], b->texels->info.width)] = values[i - begin];
+    bench_rays_trace(task, (const uint32_t(*)[2])b->net, o->count, w->from, o->normal, o->face, o->texel,
+                     w->values);
+    for (size_t k = 0; k < o->count; ++k) {
+        b->planes[channel][vshi_page_place(&b->page, o->texel[k])] = w->values[k];
     }
 }
 
-/* A light's visibility, or (NULL) AO, of all valid texels. */
-static void bake_plane(baking *b, const vsh_light *light, const vsh_run *run, float *plane) {
+static void bake_tile(baking *b, tile_work *w, size_t number) {
+    vshi_tile tile;
     vsh_error error;
-    const vshi_lifter lifter = vshi_lifter_open(b->occluders, light);
-    b->task.light = light != NULL ? &lifter.place : NULL;
-    b->plane = plane;
-    bench_check(vshi_origins_lift(&lifter, b->texels, true, run, &b->origins, &error), &error);
-    vshi_job *job = vshi_job_begin(run, "bake", b->origins.count);
-    bench_check(vshi_parallel_for(job, b->origins.count, VSHI_ORIGIN_BLOCK, 1, shade, b, &error), &error);
+    bench_check(vshi_tile_open(&b->page.charts->sorted, number, &tile, &error), &error);
+    vshi_sample_writer writer = {.charts = b->page.charts, .tile = &tile, .samples = &w->samples};
+    w->samples.count = 0;
+    vshi_samples_write_rows(&writer, &tile, 0, VSHI_TILE_CELLS);
+    vshi_tile_close(&tile);
+    vshi_origins_find(&b->placement, &w->samples, &w->origins);
+    for (size_t i = 0; i < w->samples.count; ++i) {
+        const size_t place = vshi_page_place(&b->page, w->samples.texel[i]);
+        b->page.mesh[place] = vshi_sample_mesh(&w->samples, i) + 1;
+        b->page.state[place] = w->origins.valid[i] != 0 ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
+    }
+    for (size_t channel = 0; channel < 2; ++channel) {
+        if (b->planes[channel] != NULL) {
+            trace_plane(b, w, channel);
+        }
+    }
+}
+
+static void bake_tiles(void *user, size_t begin, size_t end) {
+    enum { ROOM = VSHI_TILE * VSHI_TILE };
+    baking *b = user;
+    tile_work w = {.from = bench_take(3 * ROOM * sizeof *w.from),
+                   .values = bench_take(ROOM * sizeof *w.values)};
+    vsh_error error;
+    bench_check(vshi_samples_allocate(&w.samples, ROOM, false, &error), &error);
+    bench_check(vshi_origins_allocate(&w.origins, ROOM, &error), &error);
+    for (size_t tile = begin; tile < end; ++tile) {
+        if (vshi_page_has_tile(&b->page, tile)) {
+            bake_tile(b, &w, tile);
+        }
+    }
+    vshi_origins_free(&w.origins);
+    vshi_samples_free(&w.samples);
+    free(w.values);
+    free(w.from);
+}
+
+static void bake_all(baking *b, const vsh_run *run, vsh_bake_stats *stats) {
+    vsh_error error;
+    const size_t tiles = vshi_charts_tiles(&b->page.charts->sorted);
+    vshi_job *job = vshi_job_begin(run, "bake", tiles);
+    bench_check(vshi_parallel_for(job, tiles, 1, 1, bake_tiles, b, &error), &error);
     vshi_job_end(job);
+    bench_check(vshi_page_finish(&b->page, run, stats, &error), &error);
 }
 
-/* As vsh_bake_lightmap() leaves it: coverage, and values for texels without. */
-static void fill(baking *b, const vsh_run *run) {
+static void write_image(vshi_channels *channels, const vsh_receiver *receiver) {
     vsh_error error;
-    const vsh_texels *texels = b->texels;
-    const vsh_lightmap *map = &b->channels.lightmap;
-    const size_t count = vshi_texels_held(texels);
-    uint8_t *state = bench_take(count);
-    memset(state, VSHI_TEXEL_EMPTY, count);
-    const vshi_average find = {.texels = texels, .origins = &b->origins, .state = state};
-    bench_check(vshi_average_run(&find, run, &error), &error);
-    for (size_t i = 0; i < count; ++i) {
-        map->coverage[i] = state[i] == VSHI_TEXEL_VALID ? 1.0f : 0.0f;
-    }
-    vshi_plane planes[2];
-    size_t plane_count = 0;
-    if (map->shadow != NULL) {
-        planes[plane_count++] = (vshi_plane){map->shadow[0], 1};
-    }
-    if (map->ao != NULL) {
-        planes[plane_count++] = (vshi_plane){map->ao, 1};
-    }
-    vshi_spread spread = {0};
-    bench_check(vshi_spread_find(texels, state, &spread, &error), &error);
-    vshi_spread_copy(&spread, state, planes, plane_count);
-    const int32_t padding = texels->padding, least = VSHI_LEAST_INVALID_RADIUS;
-    const int32_t radius[VSHI_TEXEL_KINDS] = {
-        [VSHI_TEXEL_EMPTY] = padding, [VSHI_TEXEL_INVALID] = padding > least ? padding : least};
-    bench_check(vshi_padding_fill(run, texels->info.width, texels->info.height, state, radius, planes,
-                                  plane_count, NULL, &error),
-                &error);
-    vshi_spread_free(&spread);
-    free(state);
+    float *memory;
+    const float *planes[VSH_MAX_CHANNELS];
+    bench_check(vshi_channels_allocate_rows(channels, receiver->height, &memory, &error), &error);
+    vshi_channels_rows(channels, 0, receiver->height, memory, planes);
+    vsh_image image = channels->image;
+    image.planes = planes;
+    const vsh_image_options how = vshi_receiver_image(receiver);
+    bench_check(vsh_image_write(receiver->output, &image, &how, &error), &error);
+    free(memory);
 }
 
-static void write_stats(const options *o, const baking *b, const double at[5]) {
+static void write_stats(const options *o, const vsh_bake_stats *stats, const double at[5]) {
     FILE *file = fopen(o->stats, "w");
     if (file == NULL) {
         perror(o->stats);
@@ -190,9 +202,9 @@ static void write_stats(const options *o, const baking *b, const double at[5]) {
     }
     fprintf(file,
             "{\"stages_s\": {\"load\": %.4f, \"texels\": %.4f, \"tree\": %.4f, \"bake\": %.4f, "
-            "\"write\": %.4f}, \"texels\": %zu, \"invalid_texels\": %zu}\n",
-            at[0], at[1] - at[0], at[2] - at[1], at[3] - at[2], at[4] - at[3], b->texels->count,
-            b->texels->count - b->origins.count);
+            "\"write\": %.4f}, \"texels\": %llu, \"invalid_texels\": %llu}\n",
+            at[0], at[1] - at[0], at[2] - at[1], at[3] - at[2], at[4] - at[3],
+            (unsigned long long)stats->texels, (unsigned long long)stats->invalid_texels);
     fclose(file);
 }
 
@@ -235,9 +247,7 @@ int main(int argc, char **argv) {
                 &error);
     at[2] = vshi_seconds() - start;
     vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, o.rays, o.frame);
-    baking b = {.texels = job->texels};
-    b.task = (bench_rays_task){.triangles = triangles, .sampler = sampler, .rays = o.rays, .distance = o.ao};
-    b.net = sampler != NULL ? bench_rays_net(sampler, o.rays) : NULL;
+    baking b = {.net = sampler != NULL ? bench_rays_net(sampler, o.rays) : NULL};
     if (b.net == NULL) {
         fputs("embree_bake: the system refused memory\n", stderr);
         return 4;
@@ -248,33 +258,40 @@ int main(int argc, char **argv) {
     parts.triangles = triangles;
     parts.field = field_of_nothing_known(triangles);
     bench_check(vsh_occluders_from_parts(&parts, &occluders, &error), &error);
-    b.occluders = occluders;
     vsh_shade_options exact = vsh_shade_options_default();
     exact.method = VSH_SHADOW_EXACT;
     exact.ao_method = VSH_AO_EXACT;
+    exact.ao_distance = o.ao > 0.0 ? o.ao : exact.ao_distance;
     const vshi_origins_for what = {.lights = o.lit, .ao = scene.ao != 0};
-    bench_check(
-        vshi_origins_create(occluders, b.texels, &exact, what, keep_all, NULL, &run, &b.origins, &error),
-        &error);
-    bench_check(vshi_channels_name(&scene, o.size, o.size, &b.channels, &error), &error);
-    bench_check(vshi_channels_allocate(&b.channels, &scene, o.size, false, 0, o.output, &error), &error);
-    if (o.lit) {
-        bake_plane(&b, &sun, &run, b.channels.lightmap.shadow[0]);
+    b.placement = vshi_placement_open(occluders, &exact, what, run.isa);
+    vshi_store store = {.run = &run};
+    vshi_channels channels;
+    bench_check(vshi_channels_name(&scene, o.size, o.size, &channels, &error), &error);
+    bench_check(vshi_channels_allocate(&channels, &scene, &store, o.output, &error), &error);
+    bench_check(vshi_page_open(job->charts[0], &channels.lightmap, scene.light_count, &exact, false, &store,
+                               &b.page, &error),
+                &error);
+    b.planes[0] = o.lit ? channels.lightmap.shadow[0] : NULL;
+    b.planes[1] = channels.lightmap.ao;
+    for (size_t i = 0; i < 2; ++i) {
+        b.lifters[i] = vshi_lifter_open(occluders, i == 0 ? &sun : NULL);
+        b.tasks[i] = (bench_rays_task){.triangles = triangles,
+                                       .sampler = sampler,
+                                       .rays = o.rays,
+                                       .light = i == 0 ? &b.lifters[i].place : NULL,
+                                       .distance = o.ao};
     }
-    if (scene.ao) {
-        bake_plane(&b, NULL, &run, b.channels.lightmap.ao);
-    }
-    fill(&b, &run);
+    vsh_bake_stats stats = vsh_bake_stats_zero();
+    bake_all(&b, &run, &stats);
     at[3] = vshi_seconds() - start;
-    const vsh_image_options image = vshi_receiver_image(&receiver);
-    vshi_channels_split(&b.channels, &scene);
-    bench_check(vsh_image_write(o.output, &b.channels.image, &image, &error), &error);
+    write_image(&channels, &receiver);
     at[4] = vshi_seconds() - start;
     if (o.stats != NULL) {
-        write_stats(&o, &b, at);
+        write_stats(&o, &stats, at);
     }
-    vshi_channels_free(&b.channels);
-    vshi_origins_free(&b.origins);
+    vshi_page_close(&b.page);
+    vshi_channels_free(&channels);
+    vshi_store_close(&store);
     vsh_occluders_free(occluders);
     free(b.net);
     vshi_sampler_free(sampler);

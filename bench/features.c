@@ -87,7 +87,7 @@ int bench_feature(int index) {
     bench_scene_make(BENCH_CLOISTER, &scene);
     vsh_field *field = bench_scene_field(&scene, RESOLUTION);
     vsh_triangles *triangles = NULL;
-    vsh_texels *texels = NULL;
+    vsh_charts *charts = NULL;
     vsh_lightmap_options size = vsh_lightmap_options_default();
     size.width = size.height = SIZE;
     size.supersample = f->supersample > 0 ? f->supersample : 1;
@@ -98,7 +98,7 @@ int bench_feature(int index) {
         bench_check(vsh_triangles_create(scene.meshes, scene.mesh_count, &run, &triangles, &error), &error);
     }
     const double tree = bench_seconds();
-    bench_check(vsh_texels_create(scene.meshes, scene.mesh_count, &size, &run, NULL, &texels, &error),
+    bench_check(vsh_charts_create(scene.meshes, scene.mesh_count, &size, &run, NULL, &charts, &error),
                 &error);
     const double rastered = bench_seconds();
 
@@ -140,7 +140,7 @@ int bench_feature(int index) {
     for (int i = 0; i < BENCH_RUNS; ++i) {
         stats = vsh_bake_stats_zero();
         const double start = bench_seconds();
-        bench_check(vsh_bake_lightmap(bench_traced(field, triangles), texels, lights, f->lights, &shade, &run,
+        bench_check(vsh_bake_lightmap(bench_traced(field, triangles), charts, lights, f->lights, &shade, &run,
                                       &planes, &stats, &error),
                     &error);
         seconds[i] = bench_seconds() - start;

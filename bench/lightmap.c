@@ -38,7 +38,7 @@ static void average(const vsh_texel_samples *s, const float *values, size_t texe
 static int make_truth(char **arguments) {
     vsh_error error;
     vsh_model *model = NULL;
-    vsh_texels *texels = NULL;
+    vsh_charts *charts = NULL;
     double sun[3];
     const double w = tan(0.5 * atof(arguments[3]) * 3.14159265358979323846 / 180.0);
     if (sscanf(arguments[2], "%lf,%lf,%lf", &sun[0], &sun[1], &sun[2]) != 3) {
@@ -53,12 +53,13 @@ static int make_truth(char **arguments) {
     vsh_lightmap_options size = vsh_lightmap_options_default();
     size.width = size.height = atoi(arguments[1]);
     size.supersample = atoi(arguments[6]);
-    bench_check(vsh_texels_create(meshes, mesh_count, &size, NULL, NULL, &texels, &error), &error);
+    bench_check(vsh_charts_create(meshes, mesh_count, &size, NULL, NULL, &charts, &error), &error);
     truth_mesh *mesh = truth_mesh_create(meshes, mesh_count);
     if (mesh == NULL) {
         fputs("lightmap: no Embree, no truth\n", stderr);
         return 2;
     }
+    vsh_texels *texels = bench_texels(charts);
     const vsh_texel_samples s = vsh_texels_samples(texels);
     const size_t count = (size_t)size.width * (size_t)size.height;
     double *origins = bench_take(s.count * 3 * sizeof *origins);
@@ -97,6 +98,7 @@ static int make_truth(char **arguments) {
     free(origins);
     truth_mesh_free(mesh);
     vsh_texels_free(texels);
+    vsh_charts_free(charts);
     free(meshes);
     vsh_model_free(model);
     return 0;

@@ -67,9 +67,10 @@ static void measure(FILE *csv, const bench_scene *scene, bool sunlit, const ladd
     size.width = size.height = SIZE;
     vsh_run run = vsh_run_default();
     run.threads = 1;
-    vsh_texels *texels;
-    bench_check(vsh_texels_create(scene->meshes, scene->mesh_count, &size, &run, NULL, &texels, &error),
+    vsh_charts *charts;
+    bench_check(vsh_charts_create(scene->meshes, scene->mesh_count, &size, &run, NULL, &charts, &error),
                 &error);
+    vsh_texels *texels = bench_texels(charts);
     const vsh_texel_samples samples = vsh_texels_samples(texels);
     const size_t most = samples.count / APART + RUN;
     double *origins = bench_take(most * 3 * sizeof *origins);
@@ -108,7 +109,7 @@ static void measure(FILE *csv, const bench_scene *scene, bool sunlit, const ladd
     lightmap.ao_error = sunlit ? NULL : deviation;
     const size_t lights = sunlit ? 1 : 0;
     bench_check(
-        vsh_bake_lightmap(bench_casts(field), texels, &sun, lights, NULL, NULL, &lightmap, NULL, &error),
+        vsh_bake_lightmap(bench_casts(field), charts, &sun, lights, NULL, NULL, &lightmap, NULL, &error),
         &error);
     for (size_t i = 0; i < count; ++i) {
         valid[i] = coverage[at[i]];
@@ -129,15 +130,15 @@ static void measure(FILE *csv, const bench_scene *scene, bool sunlit, const ladd
         shade.max_error = step->max_error;
         shade.ao_distance = AO_DISTANCE;
         size.ao_spacing = step->spacing;
-        vsh_texels_free(texels);
-        bench_check(vsh_texels_create(scene->meshes, scene->mesh_count, &size, &run, NULL, &texels, &error),
+        vsh_charts_free(charts);
+        bench_check(vsh_charts_create(scene->meshes, scene->mesh_count, &size, &run, NULL, &charts, &error),
                     &error);
         double seconds[BENCH_RUNS];
         vsh_bake_stats stats;
         for (int k = 0; k < 3; ++k) {
             stats = vsh_bake_stats_zero();
             const double start = bench_seconds();
-            bench_check(vsh_bake_lightmap(bench_traced(field, triangles), texels, &sun, lights, &shade, &run,
+            bench_check(vsh_bake_lightmap(bench_traced(field, triangles), charts, &sun, lights, &shade, &run,
                                           &lightmap, &stats, &error),
                         &error);
             seconds[k] = bench_seconds() - start;
@@ -168,6 +169,7 @@ static void measure(FILE *csv, const bench_scene *scene, bool sunlit, const ladd
     free(normals);
     free(origins);
     vsh_texels_free(texels);
+    vsh_charts_free(charts);
     truth_mesh_free(mesh);
     vsh_triangles_free(triangles);
     vsh_field_free(field);

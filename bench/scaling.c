@@ -32,7 +32,7 @@ typedef struct subject {
 typedef struct lightmap {
     const subject *s;
     const vsh_field *field;
-    const vsh_texels *texels;
+    const vsh_charts *charts;
     const vsh_triangles *triangles;
     float *plane[MOST_LIGHTS];
 } lightmap;
@@ -60,7 +60,7 @@ static double bake(const lightmap *m, int what) {
     const vsh_lightmap planes = {.shadow = what == AO ? NULL : m->plane,
                                  .ao = what == AO ? m->plane[0] : NULL};
     const double start = m->s->now();
-    bench_check(vsh_bake_lightmap(bench_traced(m->field, what == EXACT ? m->triangles : NULL), m->texels,
+    bench_check(vsh_bake_lightmap(bench_traced(m->field, what == EXACT ? m->triangles : NULL), m->charts,
                                   lights, what == AO ? 0 : m->s->lights, &shade, &run, &planes, NULL, &error),
                 &error);
     return m->s->now() - start;
@@ -82,7 +82,7 @@ static void measure(const subject *s, double costs[COSTS]) {
     vsh_grid *grid = NULL;
     vsh_field *field = NULL;
     vsh_triangles *triangles = NULL;
-    vsh_texels *texels = NULL;
+    vsh_charts *charts = NULL;
     vsh_grid_options voxels = vsh_grid_options_default();
     voxels.resolution = s->resolution;
     vsh_lightmap_options size = vsh_lightmap_options_default();
@@ -97,12 +97,12 @@ static void measure(const subject *s, double costs[COSTS]) {
         bench_check(vsh_triangles_create(s->meshes, s->mesh_count, &run, &triangles, &error), &error);
     }
     at[3] = s->now();
-    bench_check(vsh_texels_create(s->meshes, s->mesh_count, &size, &run, NULL, &texels, &error), &error);
+    bench_check(vsh_charts_create(s->meshes, s->mesh_count, &size, &run, NULL, &charts, &error), &error);
     at[4] = s->now();
     for (int k = 0; k < 4; ++k) {
         costs[VOXELIZE + k] = at[k + 1] - at[k];
     }
-    lightmap m = {s, field, texels, triangles, {NULL}};
+    lightmap m = {s, field, charts, triangles, {NULL}};
     for (size_t i = 0; i < s->lights; ++i) {
         m.plane[i] = bench_take((size_t)s->size * (size_t)s->size * sizeof(float));
     }
@@ -115,7 +115,7 @@ static void measure(const subject *s, double costs[COSTS]) {
     for (size_t i = 0; i < s->lights; ++i) {
         free(m.plane[i]);
     }
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     vsh_triangles_free(triangles);
     vsh_field_free(field);
     vsh_grid_free(grid);

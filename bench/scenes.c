@@ -43,11 +43,12 @@ void bench_scene_points(const bench_scene *scene, const vsh_field *field, uint64
     enum { SIZE = 1024, RUN = 64 };
     static const double CLEAR = 0.25; /* voxels, as the bake judges (src/bake/origins.c) */
     vsh_error error;
-    vsh_texels *texels = NULL;
+    vsh_charts *charts = NULL;
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = SIZE;
-    bench_check(vsh_texels_create(scene->meshes, scene->mesh_count, &options, NULL, NULL, &texels, &error),
+    bench_check(vsh_charts_create(scene->meshes, scene->mesh_count, &options, NULL, NULL, &charts, &error),
                 &error);
+    vsh_texels *texels = bench_texels(charts);
     const vsh_texel_samples samples = vsh_texels_samples(texels);
     vsh_field_info info;
     vsh_field_get_info(field, &info);
@@ -65,4 +66,5 @@ void bench_scene_points(const bench_scene *scene, const vsh_field *field, uint64
         valid[i] = (double)distance >= CLEAR * info.voxel_size ? 1.0f : 0.0f;
     }
     vsh_texels_free(texels);
+    vsh_charts_free(charts);
 }

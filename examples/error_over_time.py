@@ -29,12 +29,12 @@ given = ask.parse_args()
 # %% Casters with triangles and voxels, texels, a sun of three degrees
 model = vdbshade.Model(given.model)
 occluders = vdbshade.Occluders(model, resolution=given.resolution)
-texels = vdbshade.Texels(model, width=given.size, height=given.size)
+charts = vdbshade.Charts(model, width=given.size, height=given.size)
 sun = vdbshade.Light("directional", direction=(0.6, 0.75, 0.5), angle=np.radians(3))
 run = vdbshade.Run(threads=1, warning=lambda message: None)
 
 # %% The truth: rays against the triangles, of another frame than those that are held against it
-truth = vdbshade.bake_lightmap(occluders, texels, sun, method="exact", max_error=1e-4, rays=given.truth, frame=7, run=run)
+truth = vdbshade.bake_lightmap(occluders, charts, sun, method="exact", max_error=1e-4, rays=given.truth, frame=7, run=run)
 valid = truth["A"] > 0.5
 
 
@@ -43,7 +43,7 @@ def measured(**options):
     seconds = []
     for _ in range(given.rounds):
         begin = time.process_time()
-        baked = vdbshade.bake_lightmap(occluders, texels, sun, run=run, **options)
+        baked = vdbshade.bake_lightmap(occluders, charts, sun, run=run, **options)
         seconds.append(time.process_time() - begin)
     both = valid & (baked["A"] > 0.5)
     difference = baked["shadow.sun"][both] - truth["shadow.sun"][both]

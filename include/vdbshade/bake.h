@@ -21,8 +21,7 @@ typedef struct vsh_lightmap_options {
     int32_t supersample;     /* N: N × N samples a texel, 1 … 16 */
     int32_t padding;         /* texels that charts are grown by, 0 … 4096; fills values, never coverage.
                               * VSH_PADDING_AUTO: by 16, and all that is farther takes the mean of what a mip
-                              * level holds around it, so that no level reads background; bands of rows are
-                              * grown only */
+                              * level holds around it, so that no level reads background */
     vsh_shade_options shade; /* of a bake that is given none; checked there */
     int32_t ao_spacing; /* 1, 2, 4 or 8 texels: AO by cones or adaptive is shaded no closer than this where
                          * casters are far enough, and interpolated between. Over 1 texels share the rays
@@ -65,45 +64,18 @@ VSH_API vsh_result vsh_charts_closeness(const vsh_mesh *meshes, size_t mesh_coun
                                         int32_t height, const vsh_run *run, vsh_closeness *found,
                                         vsh_error *error);
 
-/* The texels of a receiver at one size: where each lies in the world. The meshes are not needed any more. */
-typedef struct vsh_texels vsh_texels;
+/* The charts of a receiver at one size of lightmap: its triangles, checked, sorted into tiles of 64 × 64
+ * texels and counted. They refer to the meshes and to the arrays behind them, which must outlive them. */
+typedef struct vsh_charts vsh_charts;
 
-/* Rasterises the meshes' UVs, with a warning for what the reports hold. `uv_reports` [mesh_count] may be
- * NULL and is filled on success. Where triangles overlap, the first in the order of meshes and triangles
- * keeps the texel. Free the result with vsh_texels_free(). Errors:
- * - VSH_ERROR_ARGUMENT: texels or meshes NULL, no meshes or more than 2^32 - 1, sizes out of range, run,
- *   and as vsh_mesh_check();
+/* Sorts the meshes' UVs and counts their texels, with a warning for what the reports hold. `uv_reports`
+ * [mesh_count] may be NULL and is filled on success. Where triangles overlap, the first in the order of
+ * meshes and triangles keeps the texel. Free the result with vsh_charts_free(). Errors:
+ * - VSH_ERROR_ARGUMENT: charts or meshes NULL, no meshes or more than 2^30 - 1, sizes out of range, run, and
+ *   as vsh_mesh_check();
  * - VSH_ERROR_INPUT: a mesh without UVs, UVs that are not finite, and as vsh_mesh_check();
  * - VSH_ERROR_LIMIT: run->memory_limit; more than 2^32 - 2 triangles;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_count,
-                                     const vsh_lightmap_options *options, const vsh_run *run,
-                                     vsh_uv_report *uv_reports, vsh_texels **texels, vsh_error *error);
-VSH_API void vsh_texels_free(vsh_texels *texels); /* NULL does nothing */
-
-/* What texels come to. */
-typedef struct vsh_texels_info {
-    int32_t width; /* texels */
-    int32_t height;
-    uint64_t covered;     /* texels with at least one sample */
-    uint64_t samples;     /* evaluated positions, supersampling counted */
-    double bounds_min[3]; /* world box of the samples; 0 where there are none */
-    double bounds_max[3];
-    uint64_t bytes; /* in memory */
-} vsh_texels_info;
-
-/* Cannot fail. */
-VSH_API void vsh_texels_get_info(const vsh_texels *texels, vsh_texels_info *info);
-
-/* --- bands of rows: lightmaps larger than memory */
-
-/* A receiver's triangles, sorted and counted for one size of lightmap: the texels of any band of its rows are
- * made from them. They refer to the meshes and to the arrays behind them, which must outlive them. */
-typedef struct vsh_charts vsh_charts;
-
-/* Checks and sorts the meshes' triangles and counts the samples of every row. The same arguments, reports,
- * warnings and errors as of vsh_texels_create(), but memory is taken for the triangles only. Free with
- * vsh_charts_free(). */
 VSH_API vsh_result vsh_charts_create(const vsh_mesh *meshes, size_t mesh_count,
                                      const vsh_lightmap_options *options, const vsh_run *run,
                                      vsh_uv_report *uv_reports, vsh_charts **charts, vsh_error *error);
@@ -113,32 +85,29 @@ VSH_API void vsh_charts_free(vsh_charts *charts); /* NULL does nothing */
 typedef struct vsh_charts_info {
     int32_t width; /* texels */
     int32_t height;
-    uint64_t covered; /* as of vsh_texels_info, of the whole lightmap */
-    uint64_t samples; /* evaluated positions */
+    uint64_t covered; /* texels with at least one sample */
+    uint64_t samples; /* evaluated positions, supersampling counted */
     uint64_t bytes;   /* in memory */
 } vsh_charts_info;
 
 /* Cannot fail. */
 VSH_API void vsh_charts_get_info(const vsh_charts *charts, vsh_charts_info *info);
 
-/* World box of all samples, as of vsh_texels_info: of which vsh_scene_reach() makes a field's reach. Takes as
- * long as making the texels of those triangles that reach as far as it. Errors: VSH_ERROR_ARGUMENT (run),
- * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+/* World box of all samples, zeros where there are none; vsh_scene_reach() makes a field's reach of it.
+ * Errors: VSH_ERROR_ARGUMENT (run), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, double bounds_min[3],
                                      double bounds_max[3], vsh_error *error);
 
-enum { VSH_BAND_STEP = 8 }; /* bands of rows begin at multiples of it */
+/* The samples of all texels. The charts are not needed any more. */
+typedef struct vsh_texels vsh_texels;
 
-/* The texels of `rows` rows from `first_row` on, and those beside them that padding copies from. `first_row`
- * is a multiple of VSH_BAND_STEP, and so is `rows`, but where it goes to the last row. vsh_bake_lightmap()
- * then fills planes of [rows][width], with the values that baking the whole lightmap gives there, bit by bit;
- * infos and statistics are the band's share of the whole's. The charts are not needed any more. Errors:
- * VSH_ERROR_ARGUMENT (texels or charts NULL, rows, run), VSH_ERROR_LIMIT (run->memory_limit),
- * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_texels_create_band(const vsh_charts *charts, int32_t first_row, int32_t rows,
-                                          const vsh_run *run, vsh_texels **texels, vsh_error *error);
+/* Rasterizes the charts. Free the result with vsh_texels_free(). Errors: VSH_ERROR_ARGUMENT (texels or charts
+ * NULL, run), VSH_ERROR_LIMIT (run->memory_limit), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_texels_create(const vsh_charts *charts, const vsh_run *run, vsh_texels **texels,
+                                     vsh_error *error);
+VSH_API void vsh_texels_free(vsh_texels *texels); /* NULL does nothing */
 
-/* The samples behind a lightmap, in the order in which they are shaded. A view into the texels. Positions are
+/* The samples behind a lightmap, tile by tile. A view into the texels. Positions are
  * lifted off coarse triangles towards the smooth surface (Hanika, "Hacking the shadow terminator", 2021).
  * Shadow rays begin there where the light grazes the triangle. They begin on the triangle where the light
  * stands well above it, and in between near other triangles. Rays of AO begin on the triangle. */
@@ -147,7 +116,7 @@ typedef struct vsh_texel_samples {
     const double *positions; /* [count][3], world units */
     const float *normals;    /* [count][3], unit, decide shadow: smooth where the mesh is, or geometric */
     const float *geometric_normals; /* [count][3], unit */
-    const uint32_t *texels;         /* [count], each vsh_texel(), in the whole lightmap */
+    const uint32_t *texels;         /* [count], each vsh_texel() */
 } vsh_texel_samples;
 
 /* Cannot fail; the arrays belong to the texels. */
@@ -186,8 +155,7 @@ typedef struct vsh_planes {
 /* How many of them are shaded by themselves, as AO is. Cannot fail. */
 VSH_API int32_t vsh_planes_shaded(const vsh_planes *planes);
 
-/* A lightmap in the caller's arrays; each plane is [height][width] with row 0 at v = 1, and for the texels of
- * a band [rows][width] from its first row on. NULL planes are not
+/* A lightmap in the caller's arrays; each plane is [height][width] with row 0 at v = 1. NULL planes are not
  * baked and cost nothing. Texels that neither a chart covers nor padding reaches are 0. */
 typedef struct vsh_lightmap {
     float *const *shadow; /* [light_count] planes: visible fraction of each light; may be NULL */
@@ -205,7 +173,7 @@ typedef struct vsh_lightmap {
     vsh_tint tint_by;   /* of these planes, and of the visibility in irradiance */
     const double *ambient; /* [3]: of irradiance: light from all around, linear RGB ≥ 0; NULL: none, and AO
                               darkens all light */
-    int32_t bent_space;    /* VSH_BENT_…; in tangent space the texels need vsh_lightmap_options.tangents */
+    int32_t bent_space;    /* VSH_BENT_…; in tangent space the charts need vsh_lightmap_options.tangents */
     float *invalid;        /* 1: a chart covers the texel, but no sample is valid; 0 elsewhere. Not padded */
     vsh_planes asked;      /* options of planes, such as the axis of the sky */
     float *sky; /* what of the light of an even sky, over the horizon of `asked.sky`, comes straight to the
@@ -216,22 +184,13 @@ typedef struct vsh_lightmap {
                    part in AO */
 } vsh_lightmap;
 
-/* Bytes that baking a band into such planes takes at most, beside charts and field: texels, the planes of its
- * rows and what vsh_bake_lightmap() takes, with the shading options given to vsh_charts_create(). Of
- * `lightmap` only which members are NULL is looked at, so whatever is not stands for a plane, or for
- * light_count of them. 0 where the rows are no band. */
-VSH_API uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows,
-                                       const vsh_lightmap *lightmap, size_t light_count);
-
-/* What is known of a channel's error, in sums over its values, so that those of bands add up. Begins as
- * zeros. */
+/* What is known of a channel's error, in sums over its values, which add up. Begins as zeros. */
 typedef struct vsh_bake_error {
     double values;       /* valid samples, where the channel's method keeps an error; else 0 */
     double square_error; /* over them: the squared error that rays leave, as the method estimates it; of the
                             sky before it is weighed by (1 + n · up) / 2, which makes it less */
     double held;         /* values that stand for the samples that were held against the casters themselves */
-    double held_square_error; /* over them: the squared error, of whatever cause: rays, voxels, samples that
-                                 are invalid by mistake and were filled */
+    double held_square_error; /* over them: the squared error, of whatever cause: rays or voxels */
     double worst;             /* the largest error that rays leave in a value, as the method estimates it */
 } vsh_bake_error;
 
@@ -257,9 +216,9 @@ typedef struct vsh_bake_stats {
                                   light, of AO, of the sky; added to; NULL: not wanted.
                                   Where a method keeps an error and the occluders have what stands for the
                                   truth (vsh_occluder_parts), a part of its samples (one in 16, 4096 to 16384
-                                  of a lightmap; of exact methods one in 64, 1024 to 4096; the same ones for
-                                  all bands) is held against rays to that. Which part, and so what is found,
-                                  depends on nothing but the lightmap */
+                                  of a lightmap; of exact methods one in 64, 1024 to 4096) is held against
+                                  rays to that. Which part, and so what is found, depends on nothing but the
+                                  lightmap */
 } vsh_bake_stats;
 
 static inline vsh_bake_stats vsh_bake_stats_zero(void) {
@@ -267,15 +226,16 @@ static inline vsh_bake_stats vsh_bake_stats_zero(void) {
     return stats;
 }
 
-/* Shades the texels and fills the lightmap's planes. NULL options are those given to vsh_texels_create().
+/* Shades the charts' texels and fills the lightmap's planes. NULL options are those given to
+ * vsh_charts_create().
  * Rays begin start_offset + surface_offset above the surface (a voxel at least in creases), for sheets
  * half of the field's shell_thickness farther. `lights` may be NULL where light_count is 0; `stats` is
  * filled on success. Errors (planes then hold nothing of use):
- * - VSH_ERROR_ARGUMENT: occluders, texels, lightmap or lights NULL, options out of range, run, and as
+ * - VSH_ERROR_ARGUMENT: occluders, charts, lightmap or lights NULL, options out of range, run, and as
  *   vsh_light_check();
- * - VSH_ERROR_LIMIT: run->memory_limit, for occluders, texels and what the bake itself takes;
+ * - VSH_ERROR_LIMIT: run->memory_limit, for occluders, charts and what the bake itself takes;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_texels *texels,
+VSH_API vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_charts *charts,
                                      const vsh_light *lights, size_t light_count,
                                      const vsh_shade_options *options, const vsh_run *run,
                                      const vsh_lightmap *lightmap, vsh_bake_stats *stats, vsh_error *error);
@@ -351,12 +311,12 @@ VSH_API vsh_result vsh_lightmaps_stitch(const vsh_stitch_page *pages, size_t pag
 /* Gives a whole lightmap's texels that are not valid and that no valid one of their chart filled, as those of
  * faces that touch each other, the values of the texel that is nearest in the world, of the valid ones beside
  * such that are not; and what is empty around them, up to 4 texels or the padding. Bent normals in tangent
- * space are left. `texels` are those that the lightmap was baked of, all rows. *filled (may be NULL) is how
- * many there are. Errors:
- * - VSH_ERROR_ARGUMENT: texels, lightmap or its coverage NULL; texels of a band; run;
- * - VSH_ERROR_LIMIT: run->memory_limit, beside texels and planes; 2^32 texels or samples;
+ * space are left. `charts` are those that the lightmap was baked of. *filled (may be NULL) is how many there
+ * are. Errors:
+ * - VSH_ERROR_ARGUMENT: charts, lightmap or its coverage NULL; run;
+ * - VSH_ERROR_LIMIT: run->memory_limit, beside charts and planes; 2^32 texels;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED (nothing has changed then). */
-VSH_API vsh_result vsh_lightmap_fill_hidden(const vsh_texels *texels, const vsh_lightmap *lightmap,
+VSH_API vsh_result vsh_lightmap_fill_hidden(const vsh_charts *charts, const vsh_lightmap *lightmap,
                                             size_t light_count, const vsh_run *run, uint64_t *filled,
                                             vsh_error *error);
 

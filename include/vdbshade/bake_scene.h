@@ -22,10 +22,8 @@ typedef struct vsh_job_lightmap {
     size_t mesh_count;
     int32_t width; /* texels */
     int32_t height;
-    uint64_t covered;        /* texels with at least one sample; these four from vsh_bake_job_measure() on */
+    uint64_t covered;        /* texels with at least one sample; these two from vsh_bake_job_measure() on */
     uint64_t samples;        /* evaluated positions, supersampling counted */
-    int32_t bands;           /* that it is baked in; 1: whole */
-    int32_t band_rows;       /* of each band but the last */
     uint64_t invalid_texels; /* once it is baked: as in vsh_bake_stats */
     size_t page; /* of the receiver, where it is unwrapped onto several, or has one for each object: an
                     image's name then has its number before the ending, OUT.0.exr, or the object's name */
@@ -59,8 +57,8 @@ typedef struct vsh_bake_job_options {
                               image's name has the object's, in place of "%s", or else before the ending:
                               OUT.NAME.exr */
     int32_t allow_overlap; /* nonzero: objects may share texels, whatever their receivers say */
-    int32_t band_rows;     /* rows that are baked at a time, up to a multiple of VSH_BAND_STEP; 0: all, or as
-                              many as run->memory_limit lets */
+    const char *scratch;   /* folder of nameless files for what run->memory_limit has no room for; NULL: that
+                              of the lightmap's output */
     const char *invalid_picture; /* PNG of the texels that are not valid, for each lightmap: where there are
                                     several, FILE.OUTPUT.png, of pages of an asset with the number or the
                                     object; of outputs of one name FILE.OUTPUT-2.png and so on from the
@@ -83,9 +81,9 @@ typedef struct vsh_bake_job_options {
                             image shows is their unlit base colour */
     int32_t lit_image_place; /* VSH_LIT_IMAGES_… */
     const char *lit_exr;     /* EXR of all channels beside the one output; NULL: none */
-    int32_t shard; /* 1 … shard_count: vsh_bake_job_run() bakes only the rows that are its, about as many
-                      texels as any other's, and writes them into the file PARTS.SHARD-of-COUNT.part, whole or
-                      not at all; 0: all rows. Not with a sink or `invalid_picture` */
+    int32_t shard; /* 1 … shard_count: vsh_bake_job_run() bakes every shard_count-th tile of those with
+                      texels, and writes them into the file PARTS.SHARD-of-COUNT.part, whole or not at all; 0:
+                      all tiles. Not with a sink or `invalid_picture` */
     int32_t shard_count; /* 1 … 10000; for vsh_bake_job_merge() also 0: as many as there are beside PARTS */
     const char *parts;   /* what the names of parts begin with; NULL: the first lightmap's output */
     const char *const *words; /* [word_count]: kept in a part as they are, for vsh_part_words() */
@@ -96,8 +94,8 @@ typedef struct vsh_bake_job_options {
 
 static inline vsh_bake_job_options vsh_bake_job_options_default(void) {
     vsh_bake_job_options options = {
-        sizeof(vsh_bake_job_options), 0,    0, 0, NULL, NULL, NULL, NULL, 0, NULL, NULL, NULL, 0,
-        VSH_LIT_IMAGES_AUTO,          NULL, 0, 0, NULL, NULL, 0,    0};
+        sizeof(vsh_bake_job_options), 0,    0, NULL, NULL, NULL, NULL, NULL, 0, NULL, NULL, NULL, 0,
+        VSH_LIT_IMAGES_AUTO,          NULL, 0, 0,    NULL, NULL, 0,    0};
     return options;
 }
 
@@ -128,20 +126,18 @@ VSH_API vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, v
 
 /* Bakes every lightmap and hands over its rows, once vsh_bake_job_prepare() went well. Errors: as
  * vsh_bake_lightmap() and the sink, and for files as vsh_image_writer_create() to …_finish();
- * VSH_ERROR_INPUT (a lightmap whose texels are all invalid); VSH_ERROR_LIMIT (not even VSH_BAND_STEP rows fit
- * the limit). Lightmaps that are done by then stay. */
+ * VSH_ERROR_INPUT (a lightmap whose texels are all invalid); VSH_ERROR_LIMIT (what is worked on at a time is
+ * over the limit); VSH_ERROR_WRITE (no room in the scratch folder). Lightmaps that are done by then stay. */
 VSH_API vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
 
 /* Puts the parts of all shards together, which vsh_bake_job_run() wrote for the same scene and options on
- * whatever machines, in place of …_prepare() and …_run(): pads, fills, stitches, and writes the same files,
- * bit by bit, as one bake that holds its lightmaps whole. What casts is not made. A lightmap that
- * run->memory_limit does not let hold whole is written in bands of rows, as of a bake. Statistics are those
- * of the parts, where what filled texels are off is not known. The parts stay. Errors: as …_measure() and the
+ * whatever machines, in place of …_prepare() and …_run(): estimates AO, fills, pads, stitches, and writes the
+ * same files, bit by bit, as one bake. What casts is not made. The parts stay. Errors: as …_measure() and the
  * writing of …_run(); VSH_ERROR_READ (a part is missing), VSH_ERROR_INPUT (there are none; one is damaged, or
  * of other inputs, options or another version than this job, all of which it names). */
 VSH_API vsh_result vsh_bake_job_merge(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
 
-/* How many lightmaps there are (0 of a shard without rows), and one of them, whose `index` is below it. */
+/* How many lightmaps there are (0 of a shard without tiles), and one of them, whose `index` is below it. */
 VSH_API size_t vsh_bake_job_count(const vsh_bake_job *job);
 VSH_API void vsh_bake_job_lightmap(const vsh_bake_job *job, size_t index, vsh_job_lightmap *lightmap);
 
@@ -155,7 +151,6 @@ typedef struct vsh_bake_report {
     double write_s;  /* rows packed and written */
     uint64_t texels; /* these two of all lightmaps, as in vsh_bake_stats */
     uint64_t invalid_texels;
-    uint64_t bands;               /* baked, of all lightmaps */
     vsh_shade_stats shade;        /* of all lightmaps */
     vsh_occluders_info occluders; /* that all of them share */
     const vsh_bake_error *errors; /* [error_count]: of each light, of AO, of the sky; belong to the job */

@@ -140,8 +140,7 @@ typedef struct vsh_receiver {
     int32_t pages; /* that may be filled at most, ≤ VSH_MAX_PAGES; 0: one, or with texels_per_unit as
                       many as it takes */
     int32_t seams; /* mesh: VSH_SEAMS_…; FIX moves values by up to the scene's shade.max_error, and pads
-                      by 2 texels at least. A lightmap that is baked in bands of rows keeps its seams, with
-                      a warning */
+                      by 2 texels at least */
     int32_t
         atlas; /* mesh: VSH_ATLAS_…; OBJECTS: each object has a lightmap of its own, whose UVs, where it is
                   unwrapped, are packed alone. An image's name then has the object's (vsh_bake_job_create())

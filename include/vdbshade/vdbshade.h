@@ -11,7 +11,7 @@
  *     static vsh_result bake(const vsh_mesh *casters, size_t count, const vsh_mesh *receiver, float *shadow,
  *                            vsh_error *error) {
  *         vsh_occluders *occluders = NULL; // what casts
- *         vsh_texels *texels = NULL;       // what receives
+ *         vsh_charts *charts = NULL;       // what receives
  *         vsh_lightmap_options options = vsh_lightmap_options_default();
  *         options.width = options.height = SIZE;
  *         vsh_light sun = vsh_light_default();
@@ -20,12 +20,12 @@
  *         const vsh_lightmap lightmap = {.shadow = &shadow};
  *         vsh_result result = vsh_occluders_create(casters, count, NULL, NULL, &occluders, error);
  *         if (result == VSH_OK) {
- *             result = vsh_texels_create(receiver, 1, &options, NULL, NULL, &texels, error);
+ *             result = vsh_charts_create(receiver, 1, &options, NULL, NULL, &charts, error);
  *         }
  *         if (result == VSH_OK) {
- *             result = vsh_bake_lightmap(occluders, texels, &sun, 1, NULL, NULL, &lightmap, NULL, error);
+ *             result = vsh_bake_lightmap(occluders, charts, &sun, 1, NULL, NULL, &lightmap, NULL, error);
  *         }
- *         vsh_texels_free(texels);
+ *         vsh_charts_free(charts);
  *         vsh_occluders_free(occluders);
  *         return result;
  *     }

@@ -55,10 +55,51 @@ static bool is_outside(const vsh_mesh *mesh, size_t local) {
     return false;
 }
 
-/* Counts (fill false) or stores the triangles of each row. While it fills, row_start[r] is the end of what
- * row r - 1 … has been given so far; the caller has shifted it by one. */
-static vsh_result sort_rows(vshi_charts *charts, bool fill, vshi_job *job, vsh_uv_report *reports,
-                            vsh_error *error) {
+/* Columns of tiles first … last that a triangle reaches in a row of tiles, with the cells around both; false:
+ * none. */
+static bool find_columns(const vshi_charts *charts, const vshi_uv_triangle *triangle, size_t row,
+                         const size_t cell_rows[2], size_t columns[2]) {
+    const size_t begin = row * VSHI_TILE_CELLS, end = begin + VSHI_TILE_CELLS + 1;
+    size_t left = SIZE_MAX, right = 0;
+    for (size_t y = begin > cell_rows[0] + 1 ? begin - 1 : cell_rows[0]; y < end && y < cell_rows[1]; ++y) {
+        size_t first, last;
+        vshi_uv_cells(&charts->raster, triangle, y, &first, &last);
+        left = first < last && first < left ? first : left;
+        right = first < last && last > right ? last : right;
+    }
+    if (left >= right) {
+        return false;
+    }
+    columns[0] = left > 0 ? (left - 1) / VSHI_TILE_CELLS : 0;
+    columns[1] = right / VSHI_TILE_CELLS;
+    columns[1] = columns[1] < charts->columns ? columns[1] : charts->columns - 1;
+    return true;
+}
+
+/* Counts a triangle in the tiles that it reaches, or (`fill`) puts it there. */
+static void put_triangle(vshi_charts *charts, const vshi_uv_triangle *triangle, size_t number, bool fill) {
+    size_t cells[2], columns[2];
+    if (!vshi_uv_cell_rows(&charts->raster, triangle, &cells[0], &cells[1])) {
+        return;
+    }
+    const size_t first = cells[0] > 0 ? (cells[0] - 1) / VSHI_TILE_CELLS : 0;
+    for (size_t row = first; row <= cells[1] / VSHI_TILE_CELLS && row < charts->rows; ++row) {
+        if (!find_columns(charts, triangle, row, cells, columns)) {
+            continue;
+        }
+        for (size_t column = columns[0]; column <= columns[1]; ++column) {
+            const size_t place = charts->tile_start[row * charts->columns + column + 1]++;
+            if (fill) {
+                charts->tile_triangle[place] = (uint32_t)number;
+            }
+        }
+    }
+}
+
+/* Counts (fill false) or stores the triangles of each tile. While it fills, tile_start[t] is the end of what
+ * tile t - 1 has been given so far; the caller has shifted it by one. */
+static vsh_result sort_triangles(vshi_charts *charts, bool fill, vshi_job *job, vsh_uv_report *reports,
+                                 vsh_error *error) {
     for (size_t m = 0; m < charts->mesh_count; ++m) {
         const vsh_mesh *mesh = &charts->meshes[m];
         for (size_t i = 0; i < mesh->triangle_count; ++i) {
@@ -72,15 +113,8 @@ static vsh_result sort_rows(vshi_charts *charts, bool fill, vshi_job *job, vsh_u
                 reports[m].degenerate_triangles += solid && !used;
                 reports[m].outside_triangles += solid && is_outside(mesh, i);
             }
-            size_t begin, end;
-            if (!used || !vshi_uv_tile_rows(&charts->raster, &triangle, &begin, &end)) {
-                continue;
-            }
-            for (size_t row = begin; row < end; ++row) {
-                const size_t place = charts->row_start[row + 1]++;
-                if (fill) {
-                    charts->row_triangle[place] = (uint32_t)(charts->first[m] + i);
-                }
+            if (used) {
+                put_triangle(charts, &triangle, charts->first[m] + i, fill);
             }
         }
     }
@@ -91,7 +125,9 @@ vsh_result vshi_charts_create(const vsh_mesh *meshes, size_t mesh_count, vshi_ra
                               const vsh_run *run, vshi_job *job, vsh_uv_report *reports, vshi_charts *charts,
                               vsh_error *error) {
     *charts = (vshi_charts){.meshes = meshes, .mesh_count = mesh_count, .raster = raster};
+    charts->columns = ((size_t)raster.width + VSHI_TILE - 1) / VSHI_TILE;
     charts->rows = ((size_t)raster.height + VSHI_TILE - 1) / VSHI_TILE;
+    const size_t tiles = vshi_charts_tiles(charts);
     VSHI_TRY(
         vshi_allocate((void **)&charts->first, mesh_count + 1, sizeof *charts->first, "mesh list", error));
     for (size_t m = 0; m < mesh_count; ++m) {
@@ -104,25 +140,25 @@ vsh_result vshi_charts_create(const vsh_mesh *meshes, size_t mesh_count, vshi_ra
         charts->first[m + 1] = charts->first[m] + meshes[m].triangle_count;
     }
     /* One more than the starts: filling moves each start on to its end, which is the next one's start. */
-    VSHI_TRY(vshi_allocate((void **)&charts->row_start, charts->rows + 2, sizeof *charts->row_start,
-                           "tile rows", error));
-    VSHI_TRY(sort_rows(charts, false, job, reports, error));
+    VSHI_TRY(
+        vshi_allocate((void **)&charts->tile_start, tiles + 2, sizeof *charts->tile_start, "tiles", error));
+    VSHI_TRY(sort_triangles(charts, false, job, reports, error));
     size_t total = 0;
-    for (size_t row = 0; row <= charts->rows; ++row) {
-        const size_t count = charts->row_start[row + 1];
-        charts->row_start[row + 1] = total;
-        total += row < charts->rows ? count : 0;
+    for (size_t tile = 0; tile <= tiles; ++tile) {
+        const size_t count = charts->tile_start[tile + 1];
+        charts->tile_start[tile + 1] = total;
+        total += tile < tiles ? count : 0;
     }
-    charts->bytes = (mesh_count + charts->rows + 3) * sizeof(size_t) + total * sizeof *charts->row_triangle;
+    charts->bytes = (mesh_count + tiles + 3) * sizeof(size_t) + total * sizeof *charts->tile_triangle;
     VSHI_TRY(vshi_check_limit(run, (double)charts->bytes, "lightmap triangles", error));
-    VSHI_TRY(vshi_allocate((void **)&charts->row_triangle, total, sizeof *charts->row_triangle,
+    VSHI_TRY(vshi_allocate((void **)&charts->tile_triangle, total, sizeof *charts->tile_triangle,
                            "lightmap triangles", error));
-    return sort_rows(charts, true, job, reports, error);
+    return sort_triangles(charts, true, job, reports, error);
 }
 
 void vshi_charts_free(vshi_charts *charts) {
-    free(charts->row_triangle);
-    free(charts->row_start);
+    free(charts->tile_triangle);
+    free(charts->tile_start);
     free(charts->first);
     *charts = (vshi_charts){0};
 }

@@ -2,54 +2,76 @@
 #ifndef VSHI_BAKE_FIELD_ERROR_H
 #define VSHI_BAKE_FIELD_ERROR_H
 
-#include "bake/ao_kept.h"
 #include "bake/origins.h"
 #include "trace/trace.h"
 
-/* The most samples of a lightmap, and what each takes, bytes. */
-enum { VSHI_FIELD_ERROR_MOST = 16384, VSHI_FIELD_ERROR_BYTES = 80 };
+#include <vdbshade/bake.h>
 
-typedef struct vshi_field_error_sample vshi_field_error_sample;
-
-/* The samples that are held against the casters: one of each so many that follow each other, whichever its
- * hash says. */
+/* What holds the samples of a bake against the casters: one of each `step` that follow each other in a tile,
+ * whichever its hash says. */
 typedef struct vshi_field_error {
-    const vsh_texels *texels;
-    vshi_truth truth; /* but for what differs from channel to channel */
-    bool traced;
     const vsh_occluders *occluders;
-    size_t count;
-    vshi_field_error_sample *samples;
-    double *square; /* [count]: of one channel */
+    vshi_truth truth; /* but for what differs from channel to channel */
+    bool traced;      /* all values come by rays to the casters, which then decide what is valid, too */
+    size_t step;
 } vshi_field_error;
 
-/* What stands for the truth, and the lift of rays to them. */
-vshi_truth vshi_field_error_truth(const vsh_occluders *occluders, const vsh_shade_options *shade);
+/* Of a lightmap with so many samples. */
+vshi_field_error vshi_field_error_open(const vsh_occluders *occluders, const vsh_shade_options *shade,
+                                       uint64_t samples, bool traced);
 
-/* Chooses them of the band's own rows, and looks at which the casters leave valid. `state` [texels held]
- * holds VSHI_TEXEL_…; `truth` has the casters and the lift; `traced`: all values came by rays to them, so
- * that they decided what is valid too. Free with vshi_field_error_free() also after an error. Errors:
- * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-vsh_result vshi_field_error_choose(const vsh_texels *texels, const vshi_origins *origins,
-                                   const uint8_t *state, const vsh_occluders *occluders,
-                                   const vshi_truth *truth, bool traced, const vsh_run *run,
-                                   vshi_field_error *share, vsh_error *error);
-void vshi_field_error_free(vshi_field_error *share);
+/* One channel: a light, or (NULL) AO, or with options->ao_up the sky: all that goes up, of the whole
+ * hemisphere. Close it also after an error. Errors: VSH_ERROR_MEMORY. */
+typedef struct vshi_truth_channel {
+    vshi_truth truth;
+    vshi_lifter lifter;
+    vshi_vec up;
+    vshi_sampler *sampler;
+} vshi_truth_channel;
 
-/* Adds what is found of a channel to *sum: of valid samples by their `values`, or (NULL) of those that are
- * filled by the plane of the texels held, once it is. Where `light` is NULL it is AO's, or with
- * options->ao_up the sky's: all that goes up, of the whole hemisphere. Of samples that `keep` (may be NULL)
- * says are left, `held` of what is kept is set instead. Errors: the same. */
-vsh_result vshi_field_error_add(vshi_field_error *share, const vsh_light *light,
-                                const vsh_shade_options *options, const float *values, const float *filled,
-                                const vshi_ao_keep *keep, const vsh_run *run, vsh_bake_error *sum,
-                                vsh_error *error);
+vsh_result vshi_truth_channel_open(const vshi_field_error *of, const vsh_light *light,
+                                   const vsh_shade_options *options, vshi_truth_channel *channel,
+                                   vsh_error *error);
+void vshi_truth_channel_close(vshi_truth_channel *channel);
+
+/* A sample of a tile that is held against the casters. */
+typedef struct vshi_held_sample {
+    uint32_t sample, origin; /* its number among the samples, among the origins */
+    uint32_t weight;         /* samples that it stands for */
+} vshi_held_sample;
+
+/* The most samples of a tile that are. */
+static inline size_t vshi_field_error_most(const vshi_field_error *of, size_t samples) {
+    return (samples + of->step - 1) / of->step;
+}
+
+/* Chooses them, of those that the casters leave valid; returns how many. */
+size_t vshi_field_error_choose(const vshi_field_error *of, const vshi_samples *samples,
+                               const vshi_origins *origins, vshi_held_sample *held);
+
+/* Adds what a channel's values [origins] are off. */
+void vshi_field_error_add(const vshi_truth_channel *channel, const vshi_samples *samples,
+                          const vshi_held_sample *held, size_t count, const float *values,
+                          vsh_bake_error *sum);
+
+/* What the rays to the casters say of a texel whose value is not known yet. */
+typedef struct vshi_held_texel {
+    uint32_t texel; /* vsh_texel() */
+    uint32_t weight;
+    uint16_t free[2]; /* rays of each of two sets that are */
+    int16_t even;     /* VSHI_TRUTH_… */
+    int16_t zero;     /* no byte is left open: it is written as it is */
+} vshi_held_texel;
+
+/* Counts the rays of a channel; returns how many texels there are. */
+size_t vshi_field_error_count(const vshi_truth_channel *channel, const vshi_samples *samples,
+                              const vshi_held_sample *held, size_t count, vshi_held_texel *texels);
+
+/* Adds what a texel is off, once its value is known. */
+void vshi_field_error_settle(const vshi_held_texel *texel, double max_error, float value,
+                             vsh_bake_error *sum);
 
 /* Rays that each of a sample's two values is of, at most. */
 int32_t vshi_field_error_rays(double max_error);
-
-/* Adds what vshi_field_error_add() would have of a texel that was left, once its value is known. No more of
- * its rays are free than there are. */
-void vshi_field_error_settle(const vshi_ao_shot *shot, double max_error, double value, vsh_bake_error *sum);
 
 #endif

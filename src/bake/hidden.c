@@ -3,9 +3,9 @@
  * levels of the image have a part of them. So each texel takes the value of the texel that is nearest in the
  * world, of those at the edges of what is seen. */
 #include "bake/nearest_valid.h"
+#include "bake/page.h"
 #include "bake/places.h"
 #include "bake/planes.h"
-#include "bake/texels.h"
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -34,12 +34,16 @@ static const uint32_t NONE = UINT32_MAX;
 enum { HIDDEN = VSHI_TEXEL_KINDS, LOOKED_AT };
 
 typedef struct hiding {
-    const vsh_texels *texels;
+    const vsh_charts *charts;
+    const vsh_lightmap *lightmap;
     size_t width, height;
-    uint8_t *state;   /* [texels] */
-    uint32_t *sample; /* [texels]: the first of each, + 1; 0: none */
-    double centre[3]; /* of the world, so that 32 bits tell places apart */
+    vshi_store *store;
+    uint8_t *state; /* [texels] */
+    uint32_t *mesh; /* [texels]: of the first sample, + 1; 0: none. Then the texel's place in `at`, + 1 */
+    float *at;      /* [place_count][3]: of texels that are hidden, or give values */
+    size_t place_count;
     vshi_places seen;
+    _Atomic vsh_result result; /* of the tiles that failed */
     uint32_t *hidden, *source; /* [hidden_count]: texels, and those whose values they have, then take; NONE */
     size_t hidden_count;
     uint64_t filled;
@@ -47,22 +51,97 @@ typedef struct hiding {
 
 /* --- which texels */
 
-/* States as the bake left them, and each texel's first sample. */
-static void read_states(hiding *h, const float *coverage) {
-    const vsh_texels *texels = h->texels;
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t i = texels->count; i-- > 0;) {
-        const size_t at = vshi_sample_held(texels, i);
-        h->state[at] = coverage[at] != 0.0F ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
-        h->sample[at] = (uint32_t)i + 1;
-        for (size_t k = 0; k < 3; ++k) {
-            low[k] = fmin(low[k], texels->position[3 * i + k]);
-            high[k] = fmax(high[k], texels->position[3 * i + k]);
+/* A cell's states as the bake left them, and each texel's mesh. */
+static void read_cell(const hiding *h, const vshi_tile *tile) {
+    for (size_t bit = 0; bit < VSHI_CELL * VSHI_CELL; ++bit) {
+        const uint32_t owner = vshi_tile_owner(&h->charts->sorted, tile, bit);
+        const size_t x = tile->cell.column * VSHI_CELL + bit % VSHI_CELL,
+                     y = tile->cell.row * VSHI_CELL + bit / VSHI_CELL, at = y * h->width + x;
+        if (owner != 0) {
+            h->state[at] = h->lightmap->coverage[at] != 0.0F ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
+            h->mesh[at] = tile->mesh[owner - 1] + 1;
         }
     }
-    for (int k = 0; k < 3 && texels->count > 0; ++k) {
-        h->centre[k] = 0.5 * (low[k] + high[k]);
+}
+
+static void read_tiles(void *user, size_t begin, size_t end) {
+    hiding *h = user;
+    for (size_t number = begin; number < end; ++number) {
+        vshi_tile tile;
+        const vsh_result result = vshi_tile_open(&h->charts->sorted, number, &tile, NULL);
+        if (result != VSH_OK) {
+            atomic_store(&h->result, result);
+        }
+        for (int32_t k = 0; result == VSH_OK && k < VSHI_TILE_CELLS * VSHI_TILE_CELLS; ++k) {
+            if (vshi_tile_rasterize(&h->charts->sorted, &tile, k % VSHI_TILE_CELLS, k / VSHI_TILE_CELLS,
+                                    NULL)) {
+                read_cell(h, &tile);
+            }
+        }
+        vshi_tile_close(&tile);
     }
+}
+
+/* Where the first samples of texels are that have a place. */
+static vsh_result place_tile(const hiding *h, size_t number, vshi_tile *tile, vshi_samples *samples) {
+    const vsh_charts *charts = h->charts;
+    const size_t n = (size_t)charts->sorted.raster.supersample;
+    VSHI_TRY(vshi_tile_open(&charts->sorted, number, tile, NULL));
+    VSHI_TRY(vshi_samples_allocate(samples, (size_t)VSHI_TILE * VSHI_CELL * n * n, charts->tangents, NULL));
+    vshi_sample_writer writer = {.charts = charts, .tile = tile, .samples = samples};
+    for (int32_t row = 0; row < VSHI_TILE_CELLS; ++row) {
+        samples->count = 0;
+        vshi_samples_write_rows(&writer, tile, row, row + 1);
+        for (size_t i = samples->count; i-- > 0;) {
+            const uint32_t place = h->mesh[vsh_texel_place(samples->texel[i], (int32_t)h->width)];
+            for (size_t k = 0; place > 0 && k < 3; ++k) {
+                h->at[3 * (size_t)(place - 1) + k] =
+                    (float)(samples->position[3 * i + k] - charts->centre[k]);
+            }
+        }
+    }
+    return VSH_OK;
+}
+
+static bool has_places(const hiding *h, size_t number) {
+    const size_t left = number % h->charts->sorted.columns * VSHI_TILE,
+                 top = number / h->charts->sorted.columns * VSHI_TILE;
+    for (size_t y = top; y < top + VSHI_TILE && y < h->height; ++y) {
+        for (size_t x = left; x < left + VSHI_TILE && x < h->width; ++x) {
+            if (h->mesh[y * h->width + x] > 0) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+static void place_tiles(void *user, size_t begin, size_t end) {
+    hiding *h = user;
+    for (size_t number = begin; number < end; ++number) {
+        vshi_tile tile = {.count = 0};
+        vshi_samples samples = {.count = 0};
+        const vsh_result result = has_places(h, number) ? place_tile(h, number, &tile, &samples) : VSH_OK;
+        if (result != VSH_OK) {
+            atomic_store(&h->result, result);
+        }
+        vshi_samples_free(&samples);
+        vshi_tile_close(&tile);
+    }
+}
+
+static vsh_result over_tiles(hiding *h, vshi_range_fn *fn, const vsh_run *run, vsh_error *error) {
+    const size_t tiles = vshi_charts_tiles(&h->charts->sorted);
+    vshi_job *job = vshi_job_begin(run, what, tiles);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
+    }
+    vsh_result result = vshi_parallel_for(job, tiles, 1, 1, fn, h, error);
+    vshi_job_end(job);
+    if (result == VSH_OK && (result = atomic_load(&h->result)) != VSH_OK) {
+        vshi_fail(error, result, "%s: the system refused memory for a tile", what);
+    }
+    return result;
 }
 
 static bool is_far(const hiding *h, uint32_t a, uint32_t b) {
@@ -76,7 +155,7 @@ static vsh_result find_hidden(hiding *h, vsh_error *error) {
     const size_t count = h->width * h->height;
     vshi_spread spread;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_spread_find(h->texels, h->state, &spread, error));
+    VSHI_TRY(vshi_spread_find(h->store, h->width, h->height, h->mesh, h->state, &spread, error));
     for (size_t i = 0; i < spread.count; ++i) {
         h->state[spread.texel[i]] = VSHI_TEXEL_FILLED;
         h->hidden_count += is_far(h, spread.texel[i], spread.source[i]);
@@ -100,15 +179,12 @@ static vsh_result find_hidden(hiding *h, vsh_error *error) {
         }
     }
 done:
-    vshi_spread_free(&spread);
+    vshi_spread_free(h->store, &spread);
     return result;
 }
 
-static void place_of(const hiding *h, size_t texel, float at[3]) {
-    const double *position = h->texels->position + 3 * (size_t)(h->sample[texel] - 1);
-    for (int k = 0; k < 3; ++k) {
-        at[k] = (float)(position[k] - h->centre[k]);
-    }
+static const float *place_of(const hiding *h, size_t texel) {
+    return h->at + 3 * (size_t)(h->mesh[texel] - 1);
 }
 
 /* Whether a valid texel is at an edge of what is seen. */
@@ -121,24 +197,37 @@ static bool is_edge(const hiding *h, size_t texel) {
     return edge;
 }
 
-static vsh_result find_seen(hiding *h, vsh_error *error) {
+/* Numbers the places that are needed: of valid texels at edges first, then of others. */
+static void number_places(hiding *h) {
     const size_t count = h->width * h->height;
-    for (int pass = 0; pass < 2; ++pass) {
-        size_t found = 0;
-        for (size_t i = 0; i < count; ++i) {
-            if (h->state[i] != VSHI_TEXEL_VALID || !is_edge(h, i)) {
-                continue;
-            }
-            if (pass == 1) {
-                vshi_place *place = &h->seen.list[found];
-                place_of(h, i, place->at);
-                place->number = (uint32_t)i;
-            }
-            ++found;
+    memset(h->mesh, 0, count * sizeof *h->mesh);
+    for (size_t i = 0; i < count; ++i) {
+        if (h->state[i] == VSHI_TEXEL_VALID && is_edge(h, i)) {
+            h->mesh[i] = (uint32_t)++h->seen.count;
         }
-        if (pass == 0) {
-            h->seen.count = found;
-            VSHI_TRY(vshi_allocate((void **)&h->seen.list, found, sizeof *h->seen.list, what, error));
+    }
+    h->place_count = h->seen.count;
+    for (size_t i = 0; i < 2 * h->hidden_count; ++i) {
+        const uint32_t texel = i < h->hidden_count ? h->hidden[i] : h->source[i - h->hidden_count];
+        if (texel != NONE && h->mesh[texel] == 0) {
+            h->mesh[texel] = (uint32_t)++h->place_count;
+        }
+    }
+}
+
+static vsh_result find_seen(hiding *h, const vsh_run *run, vsh_error *error) {
+    number_places(h);
+    if (h->seen.count == 0) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_store_take(h->store, (void **)&h->at, h->place_count, 3 * sizeof *h->at, what, error));
+    VSHI_TRY(over_tiles(h, place_tiles, run, error));
+    VSHI_TRY(vshi_allocate((void **)&h->seen.list, h->seen.count, sizeof *h->seen.list, what, error));
+    for (size_t i = 0; i < h->width * h->height; ++i) {
+        if (h->mesh[i] > 0 && h->mesh[i] <= h->seen.count) {
+            vshi_place *place = &h->seen.list[h->mesh[i] - 1];
+            memcpy(place->at, place_of(h, i), sizeof place->at);
+            place->number = (uint32_t)i;
         }
     }
     return vshi_places_sort(&h->seen, error);
@@ -153,11 +242,10 @@ static float square_between(const float a[3], const float b[3]) {
 static void find_sources(void *user, size_t begin, size_t end) {
     const hiding *h = user;
     for (size_t i = begin; i < end; ++i) {
-        float at[3], own[3], square = INFINITY;
-        place_of(h, h->hidden[i], at);
+        const float *at = place_of(h, h->hidden[i]);
+        float square = INFINITY;
         if (h->source[i] != NONE) {
-            place_of(h, h->source[i], own);
-            square = NEARER * NEARER * square_between(at, own);
+            square = NEARER * NEARER * square_between(at, place_of(h, h->source[i]));
         }
         h->source[i] = vshi_places_nearest(&h->seen, at, square);
     }
@@ -226,7 +314,7 @@ static void pad_around(const hiding *h, size_t texel, int32_t reach, const vsh_l
 }
 
 static void fill(hiding *h, const vsh_lightmap *lightmap, size_t light_count) {
-    const int32_t padding = h->texels->padding, reach = padding < MOST_PADDING ? padding : MOST_PADDING;
+    const int32_t padding = h->charts->padding, reach = padding < MOST_PADDING ? padding : MOST_PADDING;
     for (size_t i = 0; i < h->hidden_count; ++i) {
         if (h->source[i] != NONE) {
             copy_value(lightmap, light_count, h->source[i], h->hidden[i]);
@@ -241,19 +329,16 @@ static void fill(hiding *h, const vsh_lightmap *lightmap, size_t light_count) {
     }
 }
 
-static vsh_result find_and_fill(hiding *h, const vsh_lightmap *lightmap, size_t light_count,
-                                const vsh_run *run, vsh_error *error) {
-    const double count = (double)h->width * (double)h->height;
-    const double bytes = count * (1.0 + 3.0 * sizeof(uint32_t) + VSHI_SPREAD_TEXEL_BYTES + VSHI_PLACE_BYTES);
-    VSHI_TRY(vshi_check_limit(run, bytes, what, error));
-    VSHI_TRY(vshi_allocate((void **)&h->state, h->width * h->height, 1, what, error));
-    VSHI_TRY(vshi_allocate((void **)&h->sample, h->width * h->height, sizeof *h->sample, what, error));
-    read_states(h, lightmap->coverage);
+static vsh_result find_and_fill(hiding *h, size_t light_count, const vsh_run *run, vsh_error *error) {
+    const size_t count = h->width * h->height;
+    VSHI_TRY(vshi_store_take(h->store, (void **)&h->state, count, 1, what, error));
+    VSHI_TRY(vshi_store_take(h->store, (void **)&h->mesh, count, sizeof *h->mesh, what, error));
+    VSHI_TRY(over_tiles(h, read_tiles, run, error));
     VSHI_TRY(find_hidden(h, error));
     if (h->hidden_count == 0) {
         return VSH_OK;
     }
-    VSHI_TRY(find_seen(h, error));
+    VSHI_TRY(find_seen(h, run, error));
     if (h->seen.count == 0) {
         return VSH_OK;
     }
@@ -264,37 +349,47 @@ static vsh_result find_and_fill(hiding *h, const vsh_lightmap *lightmap, size_t 
     const vsh_result result = vshi_parallel_for(job, h->hidden_count, 256, 1, find_sources, h, error);
     vshi_job_end(job);
     VSHI_TRY(result);
-    fill(h, lightmap, light_count);
+    fill(h, h->lightmap, light_count);
     return VSH_OK;
 }
 
-vsh_result vsh_lightmap_fill_hidden(const vsh_texels *texels, const vsh_lightmap *lightmap,
-                                    size_t light_count, const vsh_run *run, uint64_t *filled,
-                                    vsh_error *error) {
-    VSHI_FLOATS;
-    VSHI_NEEDS(texels);
-    VSHI_NEEDS(lightmap);
-    VSHI_NEEDS(lightmap->coverage);
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    if (texels->band.own_rows != texels->info.height) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %d rows of %d: the lightmap is not whole", what,
-                         texels->band.own_rows, texels->info.height);
+vsh_result vshi_lightmap_fill_hidden(const vsh_charts *charts, const vsh_lightmap *lightmap,
+                                     size_t light_count, vshi_store *store, const vsh_run *run,
+                                     uint64_t *filled, vsh_error *error) {
+    hiding h = {.charts = charts,
+                .lightmap = lightmap,
+                .width = (size_t)charts->info.width,
+                .height = (size_t)charts->info.height,
+                .store = store};
+    if (h.width * h.height >= UINT32_MAX) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu texels, at most %u", what, h.width * h.height,
+                         UINT32_MAX - 1);
     }
-    if (vshi_texels_held(texels) >= UINT32_MAX || texels->count >= UINT32_MAX) {
-        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu texels of %zu samples, at most %u of each", what,
-                         vshi_texels_held(texels), texels->count, UINT32_MAX - 1);
-    }
-    hiding h = {.texels = texels, .width = (size_t)texels->info.width, .height = (size_t)texels->info.height};
-    full.memory_held += texels->info.bytes;
-    const vsh_result result = find_and_fill(&h, lightmap, light_count, &full, error);
+    const vsh_result result = find_and_fill(&h, light_count, run, error);
     if (result == VSH_OK && filled != NULL) {
         *filled = h.filled;
     }
     vshi_places_free(&h.seen);
     free(h.source);
     free(h.hidden);
-    free(h.sample);
-    free(h.state);
+    vshi_store_give(store, h.at);
+    vshi_store_give(store, h.mesh);
+    vshi_store_give(store, h.state);
+    return result;
+}
+
+vsh_result vsh_lightmap_fill_hidden(const vsh_charts *charts, const vsh_lightmap *lightmap,
+                                    size_t light_count, const vsh_run *run, uint64_t *filled,
+                                    vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(charts);
+    VSHI_NEEDS(lightmap);
+    VSHI_NEEDS(lightmap->coverage);
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    vshi_store store = {.run = &full};
+    const vsh_result result =
+        vshi_lightmap_fill_hidden(charts, lightmap, light_count, &store, &full, filled, error);
+    vshi_store_close(&store);
     return result;
 }

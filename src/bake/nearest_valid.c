@@ -2,10 +2,8 @@
  * that its neighbours have from the waves before. So a texel's source depends on nothing farther than the
  * waves go, and not on the order of work. */
 #include "bake/nearest_valid.h"
-#include "base/memory.h"
 #include "base/try.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 static const uint32_t NONE = UINT32_MAX, WAITING = UINT32_MAX - 1; /* for the end of its wave */
@@ -94,8 +92,8 @@ static void run_waves(spreading *s, size_t texels) {
     }
 }
 
-vsh_result vshi_spread_find_among(size_t width, size_t height, const uint32_t *mesh, const uint8_t *state,
-                                  vshi_spread *spread, vsh_error *error) {
+vsh_result vshi_spread_find(vshi_store *store, size_t width, size_t height, const uint32_t *mesh,
+                            const uint8_t *state, vshi_spread *spread, vsh_error *error) {
     const size_t texels = width * height;
     const char *what = "invalid texels";
     size_t invalid = 0;
@@ -107,51 +105,21 @@ vsh_result vshi_spread_find_among(size_t width, size_t height, const uint32_t *m
         return VSH_OK;
     }
     spreading s = {.width = width, .height = height, .state = state, .mesh = mesh, .spread = spread};
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&s.source, texels, sizeof *s.source, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&spread->texel, invalid, sizeof *spread->texel, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&spread->source, invalid, sizeof *spread->source, what, error));
+    VSHI_TRY(vshi_store_take(store, (void **)&s.source, texels, sizeof *s.source, what, error));
+    VSHI_TRY(vshi_store_take(store, (void **)&spread->texel, invalid, sizeof *spread->texel, what, error));
+    VSHI_TRY(vshi_store_take(store, (void **)&spread->source, invalid, sizeof *spread->source, what, error));
     for (size_t i = 0; i < texels; ++i) {
         s.source[i] = state[i] == VSHI_TEXEL_VALID ? (uint32_t)i : NONE;
     }
     run_waves(&s, texels);
-done:
-    free(s.source);
-    return result;
+    vshi_store_give(store, s.source);
+    return VSH_OK;
 }
 
-vsh_result vshi_spread_find(const vsh_texels *texels, const uint8_t *state, vshi_spread *spread,
-                            vsh_error *error) {
-    uint32_t *mesh = NULL;
+void vshi_spread_free(vshi_store *store, vshi_spread *spread) {
+    vshi_store_give(store, spread->source);
+    vshi_store_give(store, spread->texel);
     *spread = (vshi_spread){0};
-    if (memchr(state, VSHI_TEXEL_INVALID, vshi_texels_held(texels)) == NULL) {
-        return VSH_OK;
-    }
-    VSHI_TRY(vshi_allocate((void **)&mesh, vshi_texels_held(texels), sizeof *mesh, "invalid texels", error));
-    for (size_t i = texels->count; i > 0; --i) { /* that of its first sample */
-        mesh[vshi_sample_held(texels, i - 1)] = vshi_sample_mesh(texels, i - 1);
-    }
-    const vsh_result result = vshi_spread_find_among((size_t)texels->info.width, (size_t)texels->band.rows,
-                                                     mesh, state, spread, error);
-    free(mesh);
-    return result;
-}
-
-void vshi_spread_free(vshi_spread *spread) {
-    free(spread->source);
-    free(spread->texel);
-    *spread = (vshi_spread){0};
-}
-
-void vshi_spread_mark(const vshi_spread *spread, const vsh_texels *texels, uint8_t *rows) {
-    const vshi_band *band = &texels->band;
-    const size_t tile = (size_t)texels->info.width * VSHI_TILE;
-    for (size_t i = 0; i < spread->count; ++i) {
-        const size_t row = spread->texel[i] / tile + band->held_begin;
-        if (row >= band->own_begin && row < band->own_end) {
-            rows[spread->source[i] / tile] = 1;
-        }
-    }
 }
 
 void vshi_spread_copy(const vshi_spread *spread, uint8_t *state, const vshi_plane *planes,

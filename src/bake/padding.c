@@ -2,7 +2,6 @@
  * columns of each row, outwards until no column can be nearer (Saito and Toriwaki, "New algorithms for
  * Euclidean distance transformation", 1994). Distances are whole numbers, so ties are exact. */
 #include "bake/padding.h"
-#include "base/memory.h"
 #include "base/parallel.h"
 #include "base/try.h"
 
@@ -101,9 +100,10 @@ static void fill_rows(void *user, size_t begin, size_t end) {
     }
 }
 
-vsh_result vshi_padding_fill(const vsh_run *run, int32_t width, int32_t height, const uint8_t *state,
-                             const int32_t radius[VSHI_TEXEL_KINDS], const vshi_plane *planes,
-                             size_t plane_count, uint8_t *filled, vsh_error *error) {
+vsh_result vshi_padding_fill(vshi_store *store, const vsh_run *run, int32_t width, int32_t height,
+                             const uint8_t *state, const int32_t radius[VSHI_TEXEL_KINDS],
+                             const vshi_plane *planes, size_t plane_count, uint8_t *filled,
+                             vsh_error *error) {
     filling f = {.width = (size_t)width,
                  .height = (size_t)height,
                  .state = state,
@@ -125,11 +125,11 @@ vsh_result vshi_padding_fill(const vsh_run *run, int32_t width, int32_t height, 
     }
     vsh_result result;
     VSHI_TRY_DONE(
-        vshi_allocate((void **)&f.down, f.width * f.height, VSHI_PADDING_TEXEL_BYTES, "padding", error));
+        vshi_store_take(store, (void **)&f.down, f.width * f.height, sizeof *f.down, "padding", error));
     VSHI_TRY_DONE(vshi_parallel_for(job, strips, 1, STRIP * f.height, search_columns, &f, error));
     VSHI_TRY_DONE(vshi_parallel_for(job, f.height, 4, f.width, fill_rows, &f, error));
 done:
-    free(f.down);
+    vshi_store_give(store, f.down);
     vshi_job_end(job);
     return result;
 }

@@ -3,6 +3,7 @@
 #define VSHI_BAKE_PADDING_H
 
 #include "base/job.h"
+#include "base/store.h"
 
 #include <stddef.h>
 #include <stdint.h>
@@ -28,15 +29,12 @@ typedef struct vshi_plane {
  * texels, since filtering reads across them. */
 enum { VSHI_LEAST_INVALID_RADIUS = 8 };
 
-/* Bytes that vshi_padding_fill() takes beside its arguments, each texel. */
-enum { VSHI_PADDING_TEXEL_BYTES = sizeof(int16_t) };
-
 /* Fills each texel of kind k from the valid texel whose centre is nearest (Euclidean), where that is at most
  * radius[k] texels away (0 … VSHI_MAX_PADDING; 0: not filled); of equally near ones from the first in the
  * image. State is left as it is. `filled` [height][width] (NULL: not asked for, else zeros) becomes 1 where
- * texels hold a value then. Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-vsh_result vshi_padding_fill(const vsh_run *run, int32_t width, int32_t height, const uint8_t *state,
-                             const int32_t radius[VSHI_TEXEL_KINDS], const vshi_plane *planes,
-                             size_t plane_count, uint8_t *filled, vsh_error *error);
+ * texels hold a value then. Takes 2 bytes a texel. Errors: as vshi_store_take(); VSH_ERROR_CANCELLED. */
+vsh_result vshi_padding_fill(vshi_store *store, const vsh_run *run, int32_t width, int32_t height,
+                             const uint8_t *state, const int32_t radius[VSHI_TEXEL_KINDS],
+                             const vshi_plane *planes, size_t plane_count, uint8_t *filled, vsh_error *error);
 
 #endif

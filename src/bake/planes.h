@@ -1,5 +1,4 @@
-/* The planes of a lightmap: one table, of which channels are named, memory is counted, bands are given rows
- * beside their own, and baking knows what to shade. */
+/* The planes of a lightmap. This table names channels, counts memory and tells the bake what to shade. */
 #ifndef VSHI_BAKE_PLANES_H
 #define VSHI_BAKE_PLANES_H
 
@@ -19,8 +18,6 @@ enum {
     VSHI_NEEDS_TINT = 64
 };
 
-struct vshi_baking;
-
 enum { VSHI_NO_WISH = -1 };
 
 /* What its values are, for who writes them as integers. */
@@ -33,8 +30,8 @@ enum {
     VSHI_RANGE_LIGHT  /* ≥ 0; errors of it are told of what is near */
 };
 
-/* A kind of plane. To add one: its member of vsh_lightmap, the wish for it in vsh_planes, a row and `fill`.
- */
+/* A kind of plane. To add one: its member of vsh_lightmap, the wish for it in vsh_planes, a row, and where
+ * its values come from (bake/trace.c, bake/finish.c). */
 typedef struct vshi_plane_kind {
     const char *name; /* of its channel in files: "ao"; "shadow.NAME" where there is one for each light */
     const char *axes; /* of three components, interleaved: channels "irradiance.R"; NULL: one component */
@@ -45,16 +42,14 @@ typedef struct vshi_plane_kind {
     uint32_t needs;
     int wish;     /* offset in vsh_planes; VSHI_NO_WISH: a scene has lights, AO … of its own members */
     size_t plane; /* offset in vsh_lightmap: of float *, or per_light of float *const * [lights] */
-    /* Fills it, once lights and AO are shaded; NULL: these did, or vshi_coverage_write(). */
-    vsh_result (*fill)(struct vshi_baking *bake, float *plane, vsh_error *error);
 } vshi_plane_kind;
 
 /* In the order of their channels in files. */
 const vshi_plane_kind *vshi_plane_kinds(size_t *count);
 
-/* Whether a bake can produce this value of the channel `name`, "shadow.sun" or "ao". If not, sets *low and
- * *high to the channel's range. */
-bool vshi_channel_can_hold(const char *name, float value, float *low, float *high);
+/* The range of what a bake puts into the channel `name`, "shadow.sun" or "ao". Returns whether that may be
+ * NaN, too. */
+bool vshi_channel_range(const char *name, float *low, float *high);
 
 static inline size_t vshi_plane_components(const vshi_plane_kind *kind) {
     return kind->axes != NULL ? 3 : 1;
@@ -73,6 +68,10 @@ void vshi_plane_put(vsh_lightmap *lightmap, const vshi_plane_kind *kind, float *
 
 /* VSHI_NEEDS_… of all its planes; of those of one light and of all lights together. */
 uint32_t vshi_planes_need(const vsh_lightmap *lightmap, size_t light_count);
+
+/* The same of planes of which only which members are NULL is looked at: of lights all or none. */
+uint32_t vshi_planes_need_given(const vsh_lightmap *lightmap);
+
 uint32_t vshi_planes_need_of_light(const vsh_lightmap *lightmap, size_t light);
 
 /* A channel of irradiance of lights, with what AO lets through of light from all around, or (NULL) of theirs.
@@ -83,6 +82,9 @@ static inline float vshi_irradiance_open(float lights, const double *ambient, si
 
 /* The axis that a sky is over, VSH_UP_…. */
 void vshi_sky_up(int32_t axis, double up[3]);
+
+/* The options that the sky is shaded by, as AO. */
+vsh_shade_options vshi_sky_options(const vsh_shade_options *options, int32_t axis);
 
 /* From the share of what is over the horizon to that of the whole hemisphere. */
 float vshi_sky_weighed(const float normal[3], const double up[3], float open);

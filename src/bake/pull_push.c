@@ -4,7 +4,6 @@
  * leaves the means of the levels above as they are. */
 #include "bake/pull_push.h"
 
-#include "base/memory.h"
 #include "base/parallel.h"
 #include "base/try.h"
 
@@ -46,12 +45,6 @@ static size_t coarse_texels(size_t width, size_t height) {
         total += width * height;
     }
     return total;
-}
-
-double vshi_pull_push_bytes(int32_t width, int32_t height) {
-    const double texels = (double)width * (double)height;
-    const double coarse = (double)coarse_texels((size_t)width, (size_t)height);
-    return texels + coarse * (1.0 + MOST_CHANNELS * sizeof(float));
 }
 
 /* The mean of up to four, in the order of the image. */
@@ -125,8 +118,9 @@ static vsh_result fill_plane(filling *f, const vshi_plane *plane, vshi_job *job,
     return VSH_OK;
 }
 
-vsh_result vshi_pull_push(const vsh_run *run, int32_t width, int32_t height, const uint8_t *filled,
-                          const vshi_plane *planes, size_t plane_count, vsh_error *error) {
+vsh_result vshi_pull_push(vshi_store *store, const vsh_run *run, int32_t width, int32_t height,
+                          const uint8_t *filled, const vshi_plane *planes, size_t plane_count,
+                          vsh_error *error) {
     filling f = {.count = 0};
     if (plane_count == 0) {
         return VSH_OK;
@@ -137,15 +131,16 @@ vsh_result vshi_pull_push(const vsh_run *run, int32_t width, int32_t height, con
         return vshi_fail(error, VSH_ERROR_MEMORY, "padding: the system refused memory");
     }
     vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&f.masks, coarse, 1, "padding", error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&f.memory, coarse, MOST_CHANNELS * sizeof(float), "padding", error));
+    VSHI_TRY_DONE(vshi_store_take(store, (void **)&f.masks, coarse, 1, "padding", error));
+    VSHI_TRY_DONE(
+        vshi_store_take(store, (void **)&f.memory, coarse, MOST_CHANNELS * sizeof(float), "padding", error));
     lay_out(&f, (size_t)width, (size_t)height, filled);
     for (size_t p = 0; p < plane_count && result == VSH_OK; ++p) {
         result = fill_plane(&f, &planes[p], job, error);
     }
 done:
-    free(f.memory);
-    free(f.masks);
+    vshi_store_give(store, f.memory);
+    vshi_store_give(store, f.masks);
     vshi_job_end(job);
     return result;
 }

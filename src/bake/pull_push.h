@@ -4,14 +4,12 @@
 
 #include "bake/padding.h"
 
-/* Bytes that it takes beside planes, `filled` [height][width] included. */
-double vshi_pull_push_bytes(int32_t width, int32_t height);
-
 /* Gives every texel whose `filled` is 0 the mean of the texels that hold a value among the 2, 4, 8 … on a
  * side that it is one of in the first mip level where there are any: a mip level that is made of means of 2 ×
  * 2 texels holds the means of values alone. Planes where no texel holds a value are left. Errors:
- * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-vsh_result vshi_pull_push(const vsh_run *run, int32_t width, int32_t height, const uint8_t *filled,
-                          const vshi_plane *planes, size_t plane_count, vsh_error *error);
+ * as vshi_store_take(); VSH_ERROR_CANCELLED. */
+vsh_result vshi_pull_push(vshi_store *store, const vsh_run *run, int32_t width, int32_t height,
+                          const uint8_t *filled, const vshi_plane *planes, size_t plane_count,
+                          vsh_error *error);
 
 #endif

@@ -63,7 +63,7 @@ bool vshi_uv_triangle_set(const vshi_raster *raster, const float *uv[3], vshi_uv
     return area != 0;
 }
 
-bool vshi_uv_tile_rows(const vshi_raster *raster, const vshi_uv_triangle *triangle, size_t *begin,
+bool vshi_uv_cell_rows(const vshi_raster *raster, const vshi_uv_triangle *triangle, size_t *begin,
                        size_t *end) {
     const int64_t steps = texel_steps(raster);
     int64_t top = least(triangle->grid_y), bottom = greatest(triangle->grid_y);
@@ -73,17 +73,17 @@ bool vshi_uv_tile_rows(const vshi_raster *raster, const vshi_uv_triangle *triang
     }
     top = top > 0 ? top : 0;
     bottom = bottom < steps * raster->height ? bottom : steps * raster->height;
-    *begin = (size_t)(top / (steps * VSHI_TILE));
-    *end = (size_t)((bottom - 1) / (steps * VSHI_TILE)) + 1;
+    *begin = (size_t)(top / (steps * VSHI_CELL));
+    *end = (size_t)((bottom - 1) / (steps * VSHI_CELL)) + 1;
     return true;
 }
 
-void vshi_uv_tiles(const vshi_raster *raster, const vshi_uv_triangle *triangle, size_t row, size_t *begin,
+void vshi_uv_cells(const vshi_raster *raster, const vshi_uv_triangle *triangle, size_t row, size_t *begin,
                    size_t *end) {
     /* Room for the rounding of the corners to the grid and of the clipping below; texels. */
     const double room = 0.01;
-    const double top = (double)row * VSHI_TILE - room;
-    const double bottom = (double)(row + 1) * VSHI_TILE + room;
+    const double top = (double)row * VSHI_CELL - room;
+    const double bottom = (double)(row + 1) * VSHI_CELL + room;
     double left = INFINITY, right = -INFINITY;
     for (int i = 0; i < 3; ++i) {
         const int j = (i + 1) % 3;
@@ -102,51 +102,51 @@ void vshi_uv_tiles(const vshi_raster *raster, const vshi_uv_triangle *triangle, 
             }
         }
     }
-    left = (left - room) / VSHI_TILE;
-    right = (right + room) / VSHI_TILE;
-    const size_t tiles = ((size_t)raster->width + VSHI_TILE - 1) / VSHI_TILE;
-    *begin = left > 0.0 ? (left < (double)tiles ? (size_t)left : tiles) : 0;
-    *end = right >= 0.0 ? (right < (double)tiles ? (size_t)right + 1 : tiles) : 0;
+    left = (left - room) / VSHI_CELL;
+    right = (right + room) / VSHI_CELL;
+    const size_t cells = ((size_t)raster->width + VSHI_CELL - 1) / VSHI_CELL;
+    *begin = left > 0.0 ? (left < (double)cells ? (size_t)left : cells) : 0;
+    *end = right >= 0.0 ? (right < (double)cells ? (size_t)right + 1 : cells) : 0;
     *end = *end < *begin ? *begin : *end;
 }
 
-void vshi_tile_begin(const vshi_raster *raster, size_t column, size_t row, vshi_tile *tile) {
-    const size_t side = (size_t)VSHI_TILE * (size_t)raster->supersample;
-    const size_t columns = (size_t)raster->width - column * VSHI_TILE;
-    const size_t rows = (size_t)raster->height - row * VSHI_TILE;
-    tile->column = column;
-    tile->row = row;
-    const uint64_t line = columns >= VSHI_TILE ? 0xff : ((uint64_t)1 << columns) - 1;
-    tile->inside = 0;
-    for (size_t y = 0; y < VSHI_TILE && y < rows; ++y) {
-        tile->inside |= line << (VSHI_TILE * y);
+void vshi_cell_begin(const vshi_raster *raster, size_t column, size_t row, vshi_cell *cell) {
+    const size_t side = (size_t)VSHI_CELL * (size_t)raster->supersample;
+    const size_t columns = (size_t)raster->width - column * VSHI_CELL;
+    const size_t rows = (size_t)raster->height - row * VSHI_CELL;
+    cell->column = column;
+    cell->row = row;
+    const uint64_t line = columns >= VSHI_CELL ? 0xff : ((uint64_t)1 << columns) - 1;
+    cell->inside = 0;
+    for (size_t y = 0; y < VSHI_CELL && y < rows; ++y) {
+        cell->inside |= line << (VSHI_CELL * y);
     }
-    tile->covered = 0;
-    tile->border = 0;
-    memset(tile->owner, 0, side * side * sizeof *tile->owner);
+    cell->covered = 0;
+    cell->border = 0;
+    memset(cell->owner, 0, side * side * sizeof *cell->owner);
 }
 
-/* First and last sample, within the tile, whose centres lie between two grid coordinates. */
-static void sample_range(int64_t low, int64_t high, int64_t tile_first, int64_t samples, int64_t *first,
+/* First and last sample, within the cell, whose centres lie between two grid coordinates. */
+static void sample_range(int64_t low, int64_t high, int64_t cell_first, int64_t samples, int64_t *first,
                          int64_t *last) {
-    *first = -floor_divide(HALF_STEP - low, 2 * HALF_STEP) - tile_first;
-    *last = floor_divide(high - HALF_STEP, 2 * HALF_STEP) - tile_first;
+    *first = -floor_divide(HALF_STEP - low, 2 * HALF_STEP) - cell_first;
+    *last = floor_divide(high - HALF_STEP, 2 * HALF_STEP) - cell_first;
     *first = *first > 0 ? *first : 0;
     *last = *last < samples - 1 ? *last : samples - 1;
 }
 
-vshi_tile_overlap vshi_tile_cover(const vshi_raster *raster, const vshi_uv_triangle *triangle,
-                                  uint32_t number, const uint64_t *object, vshi_tile *tile) {
+vshi_cell_overlap vshi_cell_cover(const vshi_raster *raster, const vshi_uv_triangle *triangle,
+                                  uint32_t number, const uint64_t *object, vshi_cell *cell) {
     const int32_t n = raster->supersample;
-    const int64_t side = (int64_t)VSHI_TILE * n;
-    const int64_t tile_x = (int64_t)tile->column * side, tile_y = (int64_t)tile->row * side;
-    const int64_t columns = (int64_t)raster->width * n - tile_x, rows = (int64_t)raster->height * n - tile_y;
+    const int64_t side = (int64_t)VSHI_CELL * n;
+    const int64_t left = (int64_t)cell->column * side, top = (int64_t)cell->row * side;
+    const int64_t columns = (int64_t)raster->width * n - left, rows = (int64_t)raster->height * n - top;
     int64_t x0, x1, y0, y1;
-    sample_range(least(triangle->grid_x), greatest(triangle->grid_x), tile_x, columns < side ? columns : side,
+    sample_range(least(triangle->grid_x), greatest(triangle->grid_x), left, columns < side ? columns : side,
                  &x0, &x1);
-    sample_range(least(triangle->grid_y), greatest(triangle->grid_y), tile_y, rows < side ? rows : side, &y0,
+    sample_range(least(triangle->grid_y), greatest(triangle->grid_y), top, rows < side ? rows : side, &y0,
                  &y1);
-    vshi_tile_overlap taken = {0, 0};
+    vshi_cell_overlap taken = {0, 0};
     if (x0 > x1 || y0 > y1) {
         return taken;
     }
@@ -156,7 +156,7 @@ vshi_tile_overlap vshi_tile_cover(const vshi_raster *raster, const vshi_uv_trian
         const int64_t dx = triangle->grid_x[j] - triangle->grid_x[i];
         const int64_t dy = triangle->grid_y[j] - triangle->grid_y[i];
         row_value[i] =
-            edge_at(triangle, i, (2 * (tile_x + x0) + 1) * HALF_STEP, (2 * (tile_y + y0) + 1) * HALF_STEP);
+            edge_at(triangle, i, (2 * (left + x0) + 1) * HALF_STEP, (2 * (top + y0) + 1) * HALF_STEP);
         step_x[i] = -(exact)dy * (2 * HALF_STEP);
         step_y[i] = (exact)dx * (2 * HALF_STEP);
         /* y points down and areas are positive: the inside lies below a top edge and right of a left one. */
@@ -164,14 +164,14 @@ vshi_tile_overlap vshi_tile_cover(const vshi_raster *raster, const vshi_uv_trian
     }
     for (int64_t y = y0; y <= y1; ++y) {
         exact value[3] = {row_value[0], row_value[1], row_value[2]};
-        uint32_t *owner = tile->owner + y * side;
-        const int64_t line = y / n * VSHI_TILE;
+        uint32_t *owner = cell->owner + y * side;
+        const int64_t line = y / n * VSHI_CELL;
         for (int64_t x = x0; x <= x1; ++x) {
             if (value[0] + bias[0] > 0 && value[1] + bias[1] > 0 && value[2] + bias[2] > 0) {
                 const uint64_t texel = (uint64_t)1 << (line + x / n);
                 if (owner[x] == 0) {
                     owner[x] = number;
-                    tile->covered |= texel;
+                    cell->covered |= texel;
                 } else {
                     const bool other = object != NULL && object[owner[x] - 1] != object[number - 1];
                     taken.texels |= texel;
@@ -204,35 +204,35 @@ static bool touches(const vshi_raster *raster, const vshi_uv_triangle *triangle,
     return true;
 }
 
-void vshi_tile_touch(const vshi_raster *raster, const vshi_uv_triangle *triangle, uint32_t number,
-                     vshi_tile *tile) {
-    const uint64_t open = tile->inside & ~tile->covered;
+void vshi_cell_touch(const vshi_raster *raster, const vshi_uv_triangle *triangle, uint32_t number,
+                     vshi_cell *cell) {
+    const uint64_t open = cell->inside & ~cell->covered;
     if (open == 0) {
         return;
     }
     const int64_t steps = texel_steps(raster);
-    const int64_t tile_x = (int64_t)tile->column * VSHI_TILE, tile_y = (int64_t)tile->row * VSHI_TILE;
-    int64_t x0 = floor_divide(least(triangle->grid_x), steps) - tile_x;
-    int64_t x1 = floor_divide(greatest(triangle->grid_x) - 1, steps) - tile_x;
-    int64_t y0 = floor_divide(least(triangle->grid_y), steps) - tile_y;
-    int64_t y1 = floor_divide(greatest(triangle->grid_y) - 1, steps) - tile_y;
+    const int64_t left = (int64_t)cell->column * VSHI_CELL, top = (int64_t)cell->row * VSHI_CELL;
+    int64_t x0 = floor_divide(least(triangle->grid_x), steps) - left;
+    int64_t x1 = floor_divide(greatest(triangle->grid_x) - 1, steps) - left;
+    int64_t y0 = floor_divide(least(triangle->grid_y), steps) - top;
+    int64_t y1 = floor_divide(greatest(triangle->grid_y) - 1, steps) - top;
     x0 = x0 > 0 ? x0 : 0;
     y0 = y0 > 0 ? y0 : 0;
-    x1 = x1 < VSHI_TILE - 1 ? x1 : VSHI_TILE - 1;
-    y1 = y1 < VSHI_TILE - 1 ? y1 : VSHI_TILE - 1;
+    x1 = x1 < VSHI_CELL - 1 ? x1 : VSHI_CELL - 1;
+    y1 = y1 < VSHI_CELL - 1 ? y1 : VSHI_CELL - 1;
     for (int64_t y = y0; y <= y1; ++y) {
         for (int64_t x = x0; x <= x1; ++x) {
-            const int64_t bit = y * VSHI_TILE + x;
-            if (((open >> bit) & 1) == 0 || !touches(raster, triangle, tile_x + x, tile_y + y)) {
+            const int64_t bit = y * VSHI_CELL + x;
+            if (((open >> bit) & 1) == 0 || !touches(raster, triangle, left + x, top + y)) {
                 continue;
             }
             double weight[3];
             const double distance =
-                vshi_uv_nearest(triangle, (double)(tile_x + x) + 0.5, (double)(tile_y + y) + 0.5, weight);
-            if (((tile->border >> bit) & 1) == 0 || distance < tile->distance[bit]) {
-                tile->border |= (uint64_t)1 << bit;
-                tile->nearest[bit] = number;
-                tile->distance[bit] = distance;
+                vshi_uv_nearest(triangle, (double)(left + x) + 0.5, (double)(top + y) + 0.5, weight);
+            if (((cell->border >> bit) & 1) == 0 || distance < cell->distance[bit]) {
+                cell->border |= (uint64_t)1 << bit;
+                cell->nearest[bit] = number;
+                cell->distance[bit] = distance;
             }
         }
     }

@@ -1,4 +1,4 @@
-/* Conservative rasterisation of UV triangles over tiles of 8 × 8 texels, exact and watertight. */
+/* Conservative rasterisation of UV triangles over cells of 8 × 8 texels, exact and watertight. */
 #ifndef VSHI_BAKE_RASTER_H
 #define VSHI_BAKE_RASTER_H
 
@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 enum {
-    VSHI_TILE = 8, /* texels along a tile: its 64 texels are the bits of a mask, row by row */
+    VSHI_CELL = 8, /* texels along a cell: its 64 texels are the bits of a mask, row by row */
     VSHI_MAX_SUPERSAMPLE = 16
 };
 
@@ -27,42 +27,42 @@ typedef struct vshi_uv_triangle {
 bool vshi_uv_triangle_set(const vshi_raster *raster, const float *uv[3], vshi_uv_triangle *triangle);
 
 /* Tile rows begin … end - 1 that the triangle's inside reaches within the image; false: none. */
-bool vshi_uv_tile_rows(const vshi_raster *raster, const vshi_uv_triangle *triangle, size_t *begin,
+bool vshi_uv_cell_rows(const vshi_raster *raster, const vshi_uv_triangle *triangle, size_t *begin,
                        size_t *end);
 
-/* Tiles begin … end - 1 of a tile row that the triangle may reach: never fewer than it does. */
-void vshi_uv_tiles(const vshi_raster *raster, const vshi_uv_triangle *triangle, size_t row, size_t *begin,
+/* Cells begin … end - 1 of a cell row that the triangle may reach: never fewer than it does. */
+void vshi_uv_cells(const vshi_raster *raster, const vshi_uv_triangle *triangle, size_t row, size_t *begin,
                    size_t *end);
 
-/* What covers one tile. `owner` has (8 N)² entries, row by row. */
-typedef struct vshi_tile {
-    size_t column, row;                      /* of the tile */
-    uint64_t inside;                         /* texels of the tile that lie in the image */
+/* What covers one cell. `owner` has (8 N)² entries, row by row. */
+typedef struct vshi_cell {
+    size_t column, row;                      /* of the cell */
+    uint64_t inside;                         /* texels of the cell that lie in the image */
     uint64_t covered;                        /* texels with a covered sample */
     uint64_t border;                         /* texels that triangles only touch */
     uint32_t *owner;                         /* triangle + 1 of each sample, 0: none */
-    uint32_t nearest[VSHI_TILE * VSHI_TILE]; /* of border texels: the nearest triangle + 1 */
-    double distance[VSHI_TILE * VSHI_TILE];  /* its squared distance to the centre, texels² */
-} vshi_tile;
+    uint32_t nearest[VSHI_CELL * VSHI_CELL]; /* of border texels: the nearest triangle + 1 */
+    double distance[VSHI_CELL * VSHI_CELL];  /* its squared distance to the centre, texels² */
+} vshi_cell;
 
-/* Empties a tile. */
-void vshi_tile_begin(const vshi_raster *raster, size_t column, size_t row, vshi_tile *tile);
+/* Empties a cell. */
+void vshi_cell_begin(const vshi_raster *raster, size_t column, size_t row, vshi_cell *cell);
 
-/* Texels of a tile where a triangle finds samples taken already; shared edges are none. */
-typedef struct vshi_tile_overlap {
+/* Texels of a cell where a triangle finds samples taken already; shared edges are none. */
+typedef struct vshi_cell_overlap {
     uint64_t texels;
     uint64_t others; /* of them, those with a sample that a triangle of another object took */
-} vshi_tile_overlap;
+} vshi_cell_overlap;
 
 /* Gives the free samples inside the triangle (top-left rule, so that shared edges are of one) to `number`
  * (triangle + 1). `object` [triangles] tells objects apart; NULL: not asked for. */
-vshi_tile_overlap vshi_tile_cover(const vshi_raster *raster, const vshi_uv_triangle *triangle,
-                                  uint32_t number, const uint64_t *object, vshi_tile *tile);
+vshi_cell_overlap vshi_cell_cover(const vshi_raster *raster, const vshi_uv_triangle *triangle,
+                                  uint32_t number, const uint64_t *object, vshi_cell *cell);
 
 /* Texels without any covered sample that the triangle's inside reaches become border texels; called in the
  * order of the triangles once all have covered, so that the first of equally near ones stays. */
-void vshi_tile_touch(const vshi_raster *raster, const vshi_uv_triangle *triangle, uint32_t number,
-                     vshi_tile *tile);
+void vshi_cell_touch(const vshi_raster *raster, const vshi_uv_triangle *triangle, uint32_t number,
+                     vshi_cell *cell);
 
 /* Barycentric coordinates of a point of the image, clamped into the triangle. */
 void vshi_uv_barycentric(const vshi_uv_triangle *triangle, double x, double y, double weight[3]);

@@ -1,8 +1,8 @@
 /* What is read along seams. All texels of it are marked in a bitmap of the image, whose set bits are counted
  * to number them; which chart covers each is asked of the tiles that have any; places that would read a third
  * chart are left out; what is left falls apart into islands that have no texel in common. */
-#include "bake/rows.h"
 #include "bake/seams.h"
+#include "bake/tile.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/try.h"
@@ -34,7 +34,7 @@ typedef struct making {
     uint32_t *number;        /* [unknowns]: island by island */
     vshi_seam_row *unsorted; /* [places] */
     size_t page;             /* whose owners are found */
-    _Atomic vsh_result row_result;
+    _Atomic vsh_result tile_result;
 } making;
 
 /* Texels that a lookup reads, and their weights in 2^-24. */
@@ -127,74 +127,80 @@ static uint32_t unknown_of(const making *m, uint64_t texel) {
     return m->rank[texel / 64] + (uint32_t)__builtin_popcountll(before);
 }
 
-/* Which chart a texel of a tile is of, as the bake shades it: that of its first sample. */
-static uint32_t owner_of(const making *m, const vshi_row *row, size_t bit) {
-    const vshi_tile *tile = &row->tile;
-    const size_t n = (size_t)m->pages->charts[m->page]->raster.supersample, side = VSHI_TILE * n;
-    uint32_t owner = 0;
-    if ((tile->covered >> bit & 1) != 0) {
-        const uint32_t *sample = tile->owner + bit / VSHI_TILE * n * side + bit % VSHI_TILE * n;
-        for (size_t k = 0; k < n * n && owner == 0; ++k) {
-            owner = sample[k / n * side + k % n];
-        }
-    } else if ((tile->border >> bit & 1) != 0) {
-        owner = tile->nearest[bit];
-    }
+/* Which chart a texel of the tile's cell is of, as the bake shades it: that of its first sample. */
+static uint32_t owner_of(const making *m, const vshi_tile *tile, size_t bit) {
+    const uint32_t owner = vshi_tile_owner(m->pages->charts[m->page], tile, bit);
     if (owner == 0) {
         return VSHI_NO_CHART;
     }
-    const size_t first = m->pages->first[m->page] + m->pages->charts[m->page]->first[row->mesh[owner - 1]];
-    return m->seams->chart[first + row->local[owner - 1]];
+    const size_t first = m->pages->first[m->page] + m->pages->charts[m->page]->first[tile->mesh[owner - 1]];
+    return m->seams->chart[first + tile->local[owner - 1]];
 }
 
-static bool has_marks(const making *m, size_t row) {
+/* Whether a texel of so many from (x, y) on is marked, both ways. */
+static bool has_marks(const making *m, size_t x, size_t y, size_t side) {
     const vshi_raster *raster = &m->pages->charts[m->page]->raster;
     const size_t width = (size_t)raster->width, height = (size_t)raster->height;
-    const uint64_t texel = m->pages->texel[m->page], begin = texel + row * VSHI_TILE * width;
-    const uint64_t last = texel + ((row + 1) * VSHI_TILE < height ? (row + 1) * VSHI_TILE : height) * width;
+    const size_t right = x + side < width ? x + side : width, bottom = y + side < height ? y + side : height;
     bool any = false;
-    for (uint64_t w = begin / 64; w <= (last - 1) / 64 && !any; ++w) {
-        any = m->marks[w] != 0;
+    for (; y < bottom && !any; ++y) {
+        for (size_t column = x; column < right && !any; ++column) {
+            any = is_marked(m, m->pages->texel[m->page] + y * width + column);
+        }
     }
     return any;
 }
 
-static void find_tile_owners(const making *m, vshi_row *row, size_t column) {
-    const vshi_charts *charts = m->pages->charts[m->page];
-    const size_t width = (size_t)charts->raster.width, height = (size_t)charts->raster.height;
-    const uint64_t texel = m->pages->texel[m->page];
-    bool rasterised = false;
-    for (size_t bit = 0; bit < VSHI_TILE * VSHI_TILE; ++bit) {
-        const size_t x = column * VSHI_TILE + bit % VSHI_TILE, y = row->row * VSHI_TILE + bit / VSHI_TILE;
-        if (x >= width || y >= height || !is_marked(m, texel + y * width + x)) {
-            continue;
+static void find_cell_owners(const making *m, const vshi_tile *tile) {
+    const vshi_raster *raster = &m->pages->charts[m->page]->raster;
+    const size_t width = (size_t)raster->width, height = (size_t)raster->height;
+    for (size_t bit = 0; bit < VSHI_CELL * VSHI_CELL; ++bit) {
+        const size_t x = tile->cell.column * VSHI_CELL + bit % VSHI_CELL,
+                     y = tile->cell.row * VSHI_CELL + bit / VSHI_CELL;
+        if (x < width && y < height && is_marked(m, m->pages->texel[m->page] + y * width + x)) {
+            m->system->chart[unknown_of(m, m->pages->texel[m->page] + y * width + x)] =
+                owner_of(m, tile, bit);
         }
-        if (!rasterised) {
-            vshi_row_tile(charts, row, column, NULL);
-            rasterised = true;
-        }
-        const uint32_t unknown = unknown_of(m, texel + y * width + x);
-        m->system->texel[unknown] = y * width + x;
-        m->system->page[unknown] = (uint32_t)m->page;
-        m->system->chart[unknown] = owner_of(m, row, bit);
     }
 }
 
 static void find_owners(void *user, size_t begin, size_t end) {
     making *m = user;
-    for (size_t row = begin; row < end; ++row) {
-        vshi_row work;
-        if (!has_marks(m, row)) {
+    const vshi_charts *charts = m->pages->charts[m->page];
+    for (size_t number = begin; number < end; ++number) {
+        const size_t x = number % charts->columns * VSHI_TILE, y = number / charts->columns * VSHI_TILE;
+        vshi_tile tile;
+        if (!has_marks(m, x, y, VSHI_TILE)) {
             continue;
         }
-        const vsh_result result = vshi_row_open(m->pages->charts[m->page], row, &work, NULL);
+        const vsh_result result = vshi_tile_open(charts, number, &tile, NULL);
         if (result != VSH_OK) {
-            atomic_store(&m->row_result, result);
+            atomic_store(&m->tile_result, result);
         }
-        for (size_t column = 0; result == VSH_OK && column < work.tiles; ++column) {
-            find_tile_owners(m, &work, column);
+        for (size_t k = 0; result == VSH_OK && k < VSHI_TILE_CELLS * VSHI_TILE_CELLS; ++k) {
+            const size_t cell_x = k % VSHI_TILE_CELLS, cell_y = k / VSHI_TILE_CELLS;
+            if (has_marks(m, x + VSHI_CELL * cell_x, y + VSHI_CELL * cell_y, VSHI_CELL) &&
+                vshi_tile_rasterize(charts, &tile, (int32_t)cell_x, (int32_t)cell_y, NULL)) {
+                find_cell_owners(m, &tile);
+            }
         }
-        vshi_row_close(&work);
+        vshi_tile_close(&tile);
+    }
+}
+
+/* Where the unknowns are; none of a chart so far. */
+static void place_unknowns(const making *m) {
+    const uint64_t first = m->pages->texel[m->page], end = m->pages->texel[m->page + 1];
+    for (uint64_t word = first / 64; word < (end + 63) / 64; ++word) {
+        for (uint64_t bits = m->marks[word]; bits != 0; bits &= bits - 1) {
+            const uint64_t texel = 64 * word + (uint64_t)__builtin_ctzll(bits);
+            if (texel >= first && texel < end) {
+                const uint32_t unknown = unknown_of(m, texel);
+                m->system->texel[unknown] = texel - first;
+                m->system->page[unknown] = (uint32_t)m->page;
+                m->system->chart[unknown] = VSHI_NO_CHART;
+            }
+        }
     }
 }
 
@@ -350,10 +356,10 @@ static vsh_result sort_unknowns(making *m, vsh_error *error) {
     return VSH_OK;
 }
 
-static double most_row_bytes(const making *m, int32_t threads) {
+static double most_tile_bytes(const making *m, int32_t threads) {
     double most = 0.0;
     for (size_t page = 0; page < m->pages->count; ++page) {
-        most = fmax(most, vshi_row_bytes(m->pages->charts[page], threads));
+        most = fmax(most, vshi_tile_bytes(m->pages->charts[page], threads));
     }
     return most;
 }
@@ -372,7 +378,7 @@ static vsh_result make(making *m, const vsh_run *run, vsh_error *error) {
     const double each = 2 * sizeof *s->texel + 2 * sizeof *s->chart + sizeof *m->parent + sizeof *m->number +
                         2 * sizeof *s->first_row;
     bytes += (double)s->unknown_count * each + 2.0 * (double)places * sizeof *s->rows +
-             most_row_bytes(m, run->threads);
+             most_tile_bytes(m, run->threads);
     VSHI_TRY(vshi_check_limit(run, bytes, what, error));
     VSHI_TRY(vshi_allocate((void **)&s->texel, s->unknown_count, sizeof *s->texel, what, error));
     VSHI_TRY(vshi_allocate((void **)&s->chart, s->unknown_count, sizeof *s->chart, what, error));
@@ -381,10 +387,12 @@ static vsh_result make(making *m, const vsh_run *run, vsh_error *error) {
     VSHI_TRY(vshi_allocate((void **)&m->number, s->unknown_count, sizeof *m->number, what, error));
     VSHI_TRY(vshi_allocate((void **)&m->unsorted, places, sizeof *m->unsorted, what, error));
     for (m->page = 0; m->page < m->pages->count; ++m->page) {
-        VSHI_TRY(vshi_parallel_for(m->job, m->pages->charts[m->page]->rows, 1, 0, find_owners, m, error));
+        place_unknowns(m);
+        VSHI_TRY(vshi_parallel_for(m->job, vshi_charts_tiles(m->pages->charts[m->page]), 1, 0, find_owners, m,
+                                   error));
     }
-    if (atomic_load(&m->row_result) != VSH_OK) {
-        return vshi_fail(error, atomic_load(&m->row_result), "seams: the system refused memory for a row");
+    if (atomic_load(&m->tile_result) != VSH_OK) {
+        return vshi_fail(error, atomic_load(&m->tile_result), "seams: the system refused memory for a tile");
     }
     VSHI_TRY(make_rows(m, error));
     VSHI_TRY(sort_islands(m, error));

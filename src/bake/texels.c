@@ -1,6 +1,6 @@
+/* The samples of all texels, and the box around them. */
 #include "bake/texels.h"
-#include "bake/part.h"
-#include "bake/samples.h"
+
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -10,152 +10,155 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { TRIANGLES = 1024 }; /* looked at together */
+enum { TRIANGLES = 1024 }; /* that are looked at together */
 
-typedef struct creation {
+/* A box of samples' positions: low, high. */
+typedef struct box {
+    double low[3], high[3];
+} box;
+
+static const box EMPTY = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+
+typedef struct rasterization {
     const vsh_charts *charts;
-    size_t first, step;            /* tile rows: where they begin, and how far they are apart */
-    vsh_texels *texels;            /* NULL: only the boxes are found */
-    vshi_sample_box *boxes;        /* [tile rows]; NULL: they are not asked for */
-    const double (*box)[3];        /* low, high: tiles whose samples lie in it are left out; NULL: none are */
-    bool *within;                  /* [triangles]: it holds all samples of the triangle; NULL: no box */
-    _Atomic vsh_result row_result; /* of the rows that failed */
-} creation;
-
-/* Every second bit of a number of six. */
-static size_t even_bits(size_t number) {
-    return (number & 1) | (number >> 1 & 2) | (number >> 2 & 4);
-}
-
-/* The texels of a tile in Morton's order, so that 4, 16 or all 64 that follow each other are a square. */
-static void write_tile(vshi_sample_writer *w) {
-    const vshi_tile *tile = &w->work->tile;
-    for (size_t place = 0; place < (size_t)VSHI_TILE * VSHI_TILE; ++place) {
-        const size_t x = even_bits(place), y = even_bits(place >> 1);
-        const size_t column = tile->column * VSHI_TILE + x, row = tile->row * VSHI_TILE + y;
-        vshi_samples_write(w, x, y, vsh_texel((uint32_t)column, (uint32_t)row), SIZE_MAX);
-    }
-}
-
-/* --- what is left out */
+    vshi_samples *samples; /* of all tiles; NULL: only boxes are found */
+    size_t *start;         /* [tiles]: where a tile's samples begin */
+    size_t step;           /* between tiles */
+    box *boxes;            /* [tiles / step]; NULL: not asked for */
+    const box *within;     /* tiles whose samples all lie in it are left out; NULL: none are */
+    bool *is_within;       /* [triangles]: all samples of the triangle are */
+    _Atomic vsh_result result;
+} rasterization;
 
 static void find_within(void *user, size_t begin, size_t end) {
-    const creation *all = user;
+    const rasterization *all = user;
     const vshi_charts *sorted = &all->charts->sorted;
     for (size_t triangle = begin; triangle < end; ++triangle) {
         size_t local;
         const size_t mesh = vshi_charts_mesh(sorted, triangle, &local);
-        all->within[triangle] =
-            vshi_surface_is_within(&sorted->meshes[mesh], local, all->box[0], all->box[1]);
+        all->is_within[triangle] =
+            vshi_surface_is_within(&sorted->meshes[mesh], local, all->within->low, all->within->high);
     }
 }
 
-static bool is_row_within(const creation *all, size_t row) {
+static bool is_tile_within(const rasterization *all, size_t number) {
     const vshi_charts *sorted = &all->charts->sorted;
-    bool within = all->within != NULL;
-    for (size_t i = sorted->row_start[row]; within && i < sorted->row_start[row + 1]; ++i) {
-        within = all->within[sorted->row_triangle[i]];
+    bool within = all->is_within != NULL;
+    for (size_t i = sorted->tile_start[number]; within && i < sorted->tile_start[number + 1]; ++i) {
+        within = all->is_within[sorted->tile_triangle[i]];
     }
     return within;
 }
 
-static bool is_tile_within(const creation *all, const vshi_row *work, size_t column) {
-    const size_t *first = all->charts->sorted.first;
-    bool within = all->within != NULL;
-    for (size_t i = work->tile_start[column]; within && i < work->tile_start[column + 1]; ++i) {
-        const uint32_t slot = work->tile_triangle[i];
-        within = all->within[first[work->mesh[slot]] + work->local[slot]];
+static void add_to_box(const vshi_samples *samples, box *b) {
+    for (size_t i = 0; i < 3 * samples->count; ++i) {
+        const double p = samples->position[i];
+        b->low[i % 3] = fmin(b->low[i % 3], p);
+        b->high[i % 3] = fmax(b->high[i % 3], p);
     }
-    return within;
 }
 
-static void write_rows(void *user, size_t begin, size_t end) {
-    creation *all = user;
-    const vshi_charts *sorted = &all->charts->sorted;
-    for (size_t row = begin; row < end; ++row) {
-        const size_t *start = all->texels != NULL ? all->texels->row_start + row : NULL;
-        all->boxes[row] =
-            (vshi_sample_box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-        const size_t of = all->first + row * all->step;
-        if ((start != NULL && start[0] == start[1]) || is_row_within(all, of)) {
+/* A view of a tile's part of all samples. */
+static vshi_samples part_of(const vshi_samples *all, size_t first, size_t room) {
+    return (vshi_samples){.room = room,
+                          .position = all->position + 3 * first,
+                          .normal = all->normal + 3 * first,
+                          .geometric = all->geometric + 3 * first,
+                          .lift = all->lift + 3 * first,
+                          .texel = all->texel + first,
+                          .mesh = all->mesh + first,
+                          .tangent = all->tangent != NULL ? all->tangent + 4 * first : NULL};
+}
+
+/* Rows of cells one after the other, so that supersampled tiles take little memory. */
+static vsh_result rasterize_tile(rasterization *all, size_t number, vshi_tile *tile) {
+    const vsh_charts *charts = all->charts;
+    const size_t row_samples = (size_t)VSHI_TILE * VSHI_CELL * (size_t)charts->sorted.raster.supersample *
+                               (size_t)charts->sorted.raster.supersample;
+    vshi_samples own = {.count = 0};
+    vsh_result result = vshi_tile_open(&charts->sorted, number, tile, NULL);
+    if (result == VSH_OK && all->samples != NULL) {
+        own = part_of(all->samples, all->start[number], (size_t)charts->samples[number]);
+    } else if (result == VSH_OK) {
+        result = vshi_samples_allocate(&own, row_samples, false, NULL);
+    }
+    vshi_sample_writer writer = {.charts = charts, .tile = tile, .samples = &own};
+    for (int32_t row = 0; result == VSH_OK && row < VSHI_TILE_CELLS; ++row) {
+        own.count = all->samples != NULL ? own.count : 0;
+        vshi_samples_write_rows(&writer, tile, row, row + 1);
+        if (all->boxes != NULL) {
+            add_to_box(&own, &all->boxes[number / all->step]);
+        }
+    }
+    if (all->samples == NULL) {
+        vshi_samples_free(&own);
+    }
+    vshi_tile_close(tile);
+    return result;
+}
+
+static void rasterize_tiles(void *user, size_t begin, size_t end) {
+    rasterization *all = user;
+    for (size_t i = begin; i < end; ++i) {
+        const size_t number = i * all->step;
+        if (all->boxes != NULL) {
+            all->boxes[i] = EMPTY;
+        }
+        if (all->charts->samples[number] == 0 || is_tile_within(all, number)) {
             continue;
         }
-        vshi_row work;
-        const vsh_result result = vshi_row_open(sorted, of, &work, NULL);
+        vshi_tile tile;
+        const vsh_result result = rasterize_tile(all, number, &tile);
         if (result != VSH_OK) {
-            atomic_store(&all->row_result, result);
-            vshi_row_close(&work);
-            continue;
+            atomic_store(&all->result, result);
         }
-        vshi_sample_writer w = {.charts = all->charts,
-                                .texels = all->texels,
-                                .work = &work,
-                                .box = &all->boxes[row],
-                                .next = start != NULL ? *start : 0};
-        for (size_t column = 0; column < work.tiles; ++column) {
-            if (work.tile_start[column] != work.tile_start[column + 1] &&
-                !is_tile_within(all, &work, column)) {
-                vshi_row_tile(sorted, &work, column, NULL);
-                write_tile(&w);
-            }
-        }
-        vshi_row_close(&work);
     }
 }
 
-/* Rasterises `rows` rows of tiles, or those of them that are `step` apart. */
-static vsh_result rasterise(creation *all, size_t rows, const vsh_run *run, vsh_error *error) {
+/* Rasterizes the tiles that are `step` apart. */
+static vsh_result rasterize(rasterization *all, const vsh_run *run, vsh_error *error) {
+    const vshi_charts *sorted = &all->charts->sorted;
+    const size_t tiles = vshi_charts_tiles(sorted), triangles = sorted->first[sorted->mesh_count];
+    const size_t count = (tiles + all->step - 1) / all->step;
     vsh_result result;
-    rows = (rows + all->step - 1) / all->step;
-    vshi_job *job = vshi_job_begin(run, "texels", rows);
+    vshi_job *job = vshi_job_begin(run, "texels", count);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "texels: the system refused memory");
     }
-    VSHI_TRY_DONE(vshi_allocate((void **)&all->boxes, rows, sizeof *all->boxes, "texels", error));
-    if (all->box != NULL) {
-        const vshi_charts *sorted = &all->charts->sorted;
-        const size_t triangles = sorted->first[sorted->mesh_count];
-        VSHI_TRY_DONE(vshi_allocate((void **)&all->within, triangles, sizeof *all->within, "texels", error));
+    if (all->within != NULL) {
+        VSHI_TRY_DONE(
+            vshi_allocate((void **)&all->is_within, triangles, sizeof *all->is_within, "texels", error));
         VSHI_TRY_DONE(vshi_parallel_for(job, triangles, TRIANGLES, 0, find_within, all, error));
     }
-    VSHI_TRY_DONE(vshi_parallel_for(job, rows, 1, 1, write_rows, all, error));
-    if (atomic_load(&all->row_result) != VSH_OK) {
-        result =
-            vshi_fail(error, atomic_load(&all->row_result), "texels: the system refused memory for a row");
+    VSHI_TRY_DONE(vshi_parallel_for(job, count, 1, 1, rasterize_tiles, all, error));
+    if (atomic_load(&all->result) != VSH_OK) {
+        result = vshi_fail(error, atomic_load(&all->result), "texels: the system refused memory for a tile");
     }
 done:
+    free(all->is_within);
     vshi_job_end(job);
     return result;
 }
 
-/* Box of the boxes begin … end - 1, empty where there are no samples, or zeros. */
-static void join(const vshi_sample_box *boxes, size_t begin, size_t end, bool zeros, double low[3],
-                 double high[3]) {
-    for (int k = 0; k < 3; ++k) {
-        double least = INFINITY, most = -INFINITY;
-        for (size_t row = begin; row < end; ++row) {
-            least = fmin(least, boxes[row].low[k]);
-            most = fmax(most, boxes[row].high[k]);
+/* The box of all samples of tiles that are `step` apart, but for those that lie within another. */
+static vsh_result find_box(const vsh_charts *charts, const box *within, size_t step, const vsh_run *run,
+                           box *found, vsh_error *error) {
+    rasterization all = {.charts = charts, .step = step, .within = within};
+    const size_t count = (vshi_charts_tiles(&charts->sorted) + step - 1) / step;
+    VSHI_TRY(vshi_allocate((void **)&all.boxes, count, sizeof *all.boxes, "texels", error));
+    const vsh_result result = rasterize(&all, run, error);
+    *found = EMPTY;
+    for (size_t i = 0; result == VSH_OK && i < count; ++i) {
+        for (int k = 0; k < 3; ++k) {
+            found->low[k] = fmin(found->low[k], all.boxes[i].low[k]);
+            found->high[k] = fmax(found->high[k], all.boxes[i].high[k]);
         }
-        low[k] = zeros && least > most ? 0.0 : least;
-        high[k] = zeros && least > most ? 0.0 : most;
     }
-}
-
-static vsh_result find_bounds(const vsh_charts *charts, const double (*within)[3], size_t step,
-                              const vsh_run *run, double low[3], double high[3], vsh_error *error) {
-    creation all = {.charts = charts, .step = step, .box = within};
-    const size_t rows = charts->sorted.rows;
-    vsh_result result;
-    VSHI_TRY_DONE(rasterise(&all, rows, run, error));
-    join(all.boxes, 0, (rows + step - 1) / step, false, low, high);
-done:
-    free(all.within);
     free(all.boxes);
     return result;
 }
 
-/* A few rows tell of most triangles that all their samples lie within the box of what is found. */
+/* A few tiles tell of most triangles that all their samples lie within the box of what is found. */
 vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, double bounds_min[3],
                              double bounds_max[3], vsh_error *error) {
     enum { FEW = 16 };
@@ -167,12 +170,12 @@ vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, doubl
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     vsh_run quiet = full;
     quiet.progress = NULL;
-    double few[2][3], low[3], high[3];
-    VSHI_TRY(find_bounds(charts, NULL, FEW, &quiet, few[0], few[1], error));
-    VSHI_TRY(find_bounds(charts, (const double(*)[3])few, 1, &full, low, high, error));
+    box few, rest;
+    VSHI_TRY(find_box(charts, NULL, FEW, &quiet, &few, error));
+    VSHI_TRY(find_box(charts, &few, 1, &full, &rest, error));
     for (int k = 0; k < 3; ++k) {
-        bounds_min[k] = fmin(few[0][k], low[k]);
-        bounds_max[k] = fmax(few[1][k], high[k]);
+        bounds_min[k] = fmin(few.low[k], rest.low[k]);
+        bounds_max[k] = fmax(few.high[k], rest.high[k]);
         if (bounds_min[k] > bounds_max[k]) { /* there are no samples */
             bounds_min[k] = bounds_max[k] = 0.0;
         }
@@ -180,56 +183,33 @@ vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, doubl
     return VSH_OK;
 }
 
-static vsh_result make_band(const vsh_charts *charts, const vsh_run *run, vsh_texels *texels,
-                            vsh_error *error) {
-    const vshi_band *band = &texels->band;
-    const size_t rows = band->held_end - band->held_begin;
-    VSHI_TRY(
-        vshi_allocate((void **)&texels->row_start, rows + 1, sizeof *texels->row_start, "texels", error));
-    for (size_t row = 0; row < rows; ++row) {
-        const vshi_tile_row *counted = &charts->rows[band->held_begin + row];
-        const size_t at = band->held_begin + row;
-        const bool own = at >= band->own_begin && at < band->own_end;
-        const bool laid = at >= band->laid_begin && at < band->laid_end;
-        texels->row_start[row + 1] = texels->row_start[row] + (laid ? counted->samples : 0);
-        texels->info.covered += own ? counted->texels : 0;
-        texels->info.samples += own ? counted->samples : 0;
+static vsh_result make(const vsh_charts *charts, const vsh_run *run, vsh_texels *texels, vsh_error *error) {
+    rasterization all = {.charts = charts, .samples = &texels->samples, .step = 1};
+    const size_t tiles = vshi_charts_tiles(&charts->sorted), count = (size_t)charts->info.samples;
+    const double bytes = (double)count * (double)vshi_sample_bytes(charts->tangents);
+    VSHI_TRY(vshi_check_limit(run, (double)charts->info.bytes + bytes, "texels", error));
+    VSHI_TRY(vshi_samples_allocate(&texels->samples, count, charts->tangents, error));
+    VSHI_TRY(vshi_allocate((void **)&all.start, tiles + 1, sizeof *all.start, "texels", error));
+    for (size_t i = 0; i < tiles; ++i) {
+        all.start[i + 1] = all.start[i] + (size_t)charts->samples[i];
     }
-    texels->count = texels->row_start[rows];
-    const size_t sample = vshi_sample_bytes(charts->tangents);
-    const double samples = (double)texels->count * (double)sample;
-    const double held = (double)charts->info.bytes + vshi_row_bytes(&charts->sorted, run->threads);
-    VSHI_TRY(vshi_check_limit(run, held + samples, "texels", error));
-    texels->info.bytes = sizeof *texels + texels->count * sample + (rows + 1) * sizeof *texels->row_start;
-    creation all = {.charts = charts, .first = band->held_begin, .step = 1, .texels = texels};
-    VSHI_TRY(vshi_samples_take(texels, charts->tangents, error));
-    vsh_result result;
-    VSHI_TRY_DONE(rasterise(&all, rows, run, error));
-    join(all.boxes, band->own_begin - band->held_begin, band->own_end - band->held_begin, true,
-         texels->info.bounds_min, texels->info.bounds_max);
-done:
-    free(all.boxes);
+    texels->samples.count = count;
+    const vsh_result result = rasterize(&all, run, error);
+    free(all.start);
     return result;
 }
 
-static vsh_result create(const vsh_charts *charts, int32_t first_row, int32_t rows, const vshi_ao_cut *cut,
-                         const vsh_run *run, vsh_texels **texels, vsh_error *error) {
-    vshi_band band;
+vsh_result vsh_texels_create(const vsh_charts *charts, const vsh_run *run, vsh_texels **texels,
+                             vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(texels);
+    *texels = NULL;
+    VSHI_NEEDS(charts);
+    vsh_run full;
     vsh_texels *made = NULL;
-    VSHI_TRY(vshi_band_set(charts, first_row, rows, cut, &band, error));
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
     VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "texels", error));
-    made->band = band;
-    made->cut = cut != NULL ? *cut : (vshi_ao_cut){.spacing = 1};
-    made->info.width = charts->info.width;
-    made->info.height = charts->info.height;
-    made->padding = charts->padding;
-    made->fills = charts->fills && rows == charts->info.height && cut == NULL;
-    made->ao_spacing = charts->ao_spacing;
-    made->shade = charts->shade;
-    made->smooth = charts->smooth;
-    made->whole = charts->info.samples;
-    made->mesh_count = charts->sorted.mesh_count;
-    const vsh_result result = make_band(charts, run, made, error);
+    const vsh_result result = make(charts, &full, made, error);
     if (result != VSH_OK) {
         vsh_texels_free(made);
         return result;
@@ -238,67 +218,14 @@ static vsh_result create(const vsh_charts *charts, int32_t first_row, int32_t ro
     return VSH_OK;
 }
 
-vsh_result vsh_texels_create_band(const vsh_charts *charts, int32_t first_row, int32_t rows,
-                                  const vsh_run *run, vsh_texels **texels, vsh_error *error) {
-    VSHI_FLOATS;
-    VSHI_NEEDS(texels);
-    *texels = NULL;
-    VSHI_NEEDS(charts);
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    return create(charts, first_row, rows, NULL, &full, texels, error);
-}
-
-vsh_result vshi_texels_create_part(const vsh_charts *charts, int32_t first_row, int32_t rows,
-                                   const vshi_ao_cut *cut, const vsh_run *run, vsh_texels **texels,
-                                   vsh_error *error) {
-    VSHI_FLOATS;
-    *texels = NULL;
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    return create(charts, first_row, rows, cut, &full, texels, error);
-}
-
-vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
-                             const vsh_run *run, vsh_uv_report *uv_reports, vsh_texels **texels,
-                             vsh_error *error) {
-    VSHI_FLOATS;
-    VSHI_NEEDS(texels);
-    *texels = NULL;
-    VSHI_NEEDS_OF(mesh_count, meshes);
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    vsh_charts *charts = NULL;
-    VSHI_TRY(vshi_charts_make(meshes, mesh_count, options, &full, true, uv_reports, &charts, error));
-    const vsh_result result = create(charts, 0, charts->info.height, false, &full, texels, error);
-    vsh_charts_free(charts);
-    return result;
-}
-
 void vsh_texels_free(vsh_texels *texels) {
-    if (texels == NULL) {
-        return;
+    if (texels != NULL) {
+        vshi_samples_free(&texels->samples);
+        free(texels);
     }
-    free(texels->tangent);
-    free(texels->mesh);
-    free(texels->texel);
-    free(texels->lift);
-    free(texels->geometric);
-    free(texels->normal);
-    free(texels->position);
-    free(texels->row_start);
-    free(texels);
-}
-
-void vsh_texels_get_info(const vsh_texels *texels, vsh_texels_info *info) {
-    *info = texels->info;
 }
 
 vsh_texel_samples vsh_texels_samples(const vsh_texels *texels) {
-    const vshi_band *band = &texels->band;
-    const size_t first = texels->row_start[band->own_begin - band->held_begin];
-    const size_t last = texels->row_start[band->own_end - band->held_begin];
-    const vsh_texel_samples own = {last - first, texels->position + 3 * first, texels->normal + 3 * first,
-                                   texels->geometric + 3 * first, texels->texel + first};
-    return own;
+    const vshi_samples *s = &texels->samples;
+    return (vsh_texel_samples){s->count, s->position, s->normal, s->geometric, s->texel};
 }

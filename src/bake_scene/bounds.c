@@ -1,10 +1,6 @@
 #include "bake_scene/bounds.h"
 
-#include "bake/texels.h"
-#include "base/try.h"
-
 #include <math.h>
-#include <string.h>
 
 /* Samples of all lightmaps, or more, where those up to `index` are counted. Fields are made where there are
  * enough points to gain by it, so that if none is for so many, none is for those that there are. */
@@ -39,17 +35,9 @@ static bool may_make_field(const vsh_bake_job *job, size_t index, const vsh_char
     return may;
 }
 
-vsh_result vshi_job_bounds(const vsh_bake_job *job, size_t index, const vsh_charts *charts,
-                           const vshi_bands *bands, bool whole, const vsh_run *run, vsh_texels **texels,
-                           double low[3], double high[3], vsh_error *error) {
-    if (whole) {
-        VSHI_TRY(vsh_texels_create_band(charts, 0, bands->rows, run, texels, error));
-        vsh_texels_info info;
-        vsh_texels_get_info(*texels, &info);
-        memcpy(low, info.bounds_min, sizeof info.bounds_min);
-        memcpy(high, info.bounds_max, sizeof info.bounds_max);
-        return VSH_OK;
-    }
+vsh_result vshi_job_bounds(const vsh_bake_job *job, size_t index, const vsh_run *run, double low[3],
+                           double high[3], vsh_error *error) {
+    const vsh_charts *charts = job->charts[index];
     if (may_make_field(job, index, charts)) {
         return vsh_charts_bounds(charts, run, low, high, error);
     }

@@ -1,7 +1,7 @@
 #include "bake_scene/channels.h"
 
 #include "bake/planes.h"
-#include "base/bytes.h"
+#include "base/memory.h"
 #include "base/try.h"
 
 #include <stdio.h>
@@ -47,11 +47,6 @@ static size_t count_of(const vshi_plane_kind *kind, const vsh_scene *scene) {
     return !is_asked(kind, scene) ? 0 : kind->per_light ? scene->light_count : 1;
 }
 
-/* The channel is 0 or 1, whatever else the bake tells of invalid texels. */
-static bool is_invalid(const vshi_plane_kind *kind) {
-    return kind->plane == offsetof(vsh_lightmap, invalid);
-}
-
 /* --- names */
 
 /* Names the channels of one value and returns how many there are. */
@@ -81,7 +76,7 @@ vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t hei
     for (size_t k = 0; k < kind_count; ++k) {
         const size_t values = count_of(&kinds[k], scene);
         count += values * vshi_plane_components(&kinds[k]);
-        channels->triple_count += kinds[k].axes != NULL ? values : 0;
+        channels->value_count += values;
     }
     if (count > VSH_MAX_CHANNELS) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "scene: %zu channels, at most %d", count,
@@ -90,15 +85,16 @@ vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t hei
     channels->names = calloc(count, sizeof *channels->names);
     channels->name_list = calloc(count, sizeof *channels->name_list);
     channels->holds = calloc(count, sizeof *channels->holds);
-    channels->planes = calloc(count, sizeof *channels->planes);
-    channels->triples = calloc(channels->triple_count + 1, sizeof *channels->triples);
+    channels->values = calloc(channels->value_count + 1, sizeof *channels->values);
+    channels->components = calloc(channels->value_count + 1, sizeof *channels->components);
     if (channels->names == NULL || channels->name_list == NULL || channels->holds == NULL ||
-        channels->planes == NULL || channels->triples == NULL) {
+        channels->values == NULL || channels->components == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "channels: the system refused memory");
     }
-    size_t at = 0;
+    size_t at = 0, value = 0;
     for (size_t k = 0; k < kind_count; ++k) {
         for (size_t i = 0; i < count_of(&kinds[k], scene); ++i) {
+            channels->components[value++] = vshi_plane_components(&kinds[k]);
             const size_t next = at + name_value(&kinds[k], kinds[k].per_light ? &scene->lights[i] : NULL,
                                                 channels->names + at);
             for (; at < next; ++at) {
@@ -109,9 +105,7 @@ vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t hei
     for (size_t i = 0; i < count; ++i) {
         channels->name_list[i] = channels->names[i];
     }
-    channels->image = (vsh_image){
-        width,          height, (int32_t)count, channels->name_list, (const float *const *)channels->planes,
-        channels->holds};
+    channels->image = (vsh_image){width, height, (int32_t)count, channels->name_list, NULL, channels->holds};
     return VSH_OK;
 }
 
@@ -122,23 +116,20 @@ static int32_t bent_space(const vsh_scene *scene) {
 }
 
 static void bind_all(vshi_channels *channels, const vsh_scene *scene) {
-    float *const *plane = channels->planes, *const *triple = channels->triples;
+    float *const *value = channels->values;
     size_t kind_count;
     const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
     for (size_t k = 0; k < kind_count; ++k) {
-        const vshi_plane_kind *kind = &kinds[k];
-        const size_t count = count_of(kind, scene);
+        const size_t count = count_of(&kinds[k], scene);
         if (count > 0) {
-            vshi_plane_put(&channels->lightmap, kind, kind->axes != NULL ? triple : plane);
+            vshi_plane_put(&channels->lightmap, &kinds[k], value);
         }
-        triple += kind->axes != NULL ? count : 0;
-        plane += count * vshi_plane_components(kind);
+        value += count;
     }
     channels->lightmap.tint_by = scene->tint; /* of irradiance too */
     channels->lightmap.ambient = scene->has_ambient ? scene->ambient : NULL;
     channels->lightmap.bent_space = bent_space(scene);
     channels->lightmap.asked = scene->planes;
-    channels->lightmap.invalid = channels->invalid;
 }
 
 vsh_lightmap vshi_channels_shape(const vsh_scene *scene) {
@@ -155,104 +146,51 @@ vsh_lightmap vshi_channels_shape(const vsh_scene *scene) {
     return lightmap;
 }
 
-vsh_result vshi_channels_allocate(vshi_channels *channels, const vsh_scene *scene, int32_t rows, bool invalid,
-                                  uint64_t limit, const char *output, vsh_error *error) {
-    const size_t count = (size_t)channels->image.channel_count;
-    const size_t texels = (size_t)channels->image.width * (size_t)rows; /* at most 2^32 */
-    const double bytes = (double)texels * sizeof(float) *
-                         ((double)count + 3.0 * (double)channels->triple_count + (invalid ? 1.0 : 0.0));
-    if (bytes > (double)SIZE_MAX / 2.0 || (limit > 0 && bytes > (double)limit)) {
-        char need[VSHI_BYTES_ROOM], have[VSHI_BYTES_ROOM];
-        return vshi_fail(
-            error, VSH_ERROR_LIMIT, "%s: %d × %d texels in %zu channels need %s; the memory limit is %s",
-            output, channels->image.width, rows, count, vshi_bytes_text((uint64_t)bytes, need, sizeof need),
-            vshi_bytes_text(limit, have, sizeof have));
-    }
-    channels->rows = rows;
-    bool all = true;
-    for (size_t i = 0; i < count && all; ++i) {
-        all = (channels->planes[i] = calloc(texels, sizeof(float))) != NULL;
-    }
-    for (size_t t = 0; t < channels->triple_count && all; ++t) {
-        all = (channels->triples[t] = calloc(texels, 3 * sizeof(float))) != NULL;
-    }
-    if (invalid && all) {
-        all = (channels->invalid = calloc(texels, sizeof(float))) != NULL;
-    }
-    if (!all) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", output);
+vsh_result vshi_channels_allocate(vshi_channels *channels, const vsh_scene *scene, vshi_store *store,
+                                  const char *output, vsh_error *error) {
+    const size_t texels = (size_t)channels->image.width * (size_t)channels->image.height;
+    channels->store = store;
+    for (size_t i = 0; i < channels->value_count; ++i) {
+        VSHI_TRY(vshi_store_take(store, (void **)&channels->values[i], texels,
+                                 channels->components[i] * sizeof(float), output, error));
     }
     bind_all(channels, scene);
     return VSH_OK;
 }
 
-static void split(const float *values, size_t texels, float *const *planes) {
-    for (size_t i = 0; i < texels; ++i) {
-        for (size_t c = 0; c < 3; ++c) {
-            planes[c][i] = values[3 * i + c];
-        }
+vsh_result vshi_channels_allocate_rows(const vshi_channels *channels, int32_t rows, float **memory,
+                                       vsh_error *error) {
+    const size_t texels = (size_t)channels->image.width * (size_t)rows;
+    size_t floats = 0;
+    for (size_t i = 0; i < channels->value_count; ++i) {
+        floats += channels->components[i] > 1 ? channels->components[i] : 0;
     }
+    return vshi_allocate((void **)memory, texels, floats * sizeof(float), "rows of a lightmap", error);
 }
 
-void vshi_channels_split(vshi_channels *channels, const vsh_scene *scene) {
-    const size_t texels = (size_t)channels->image.width * (size_t)channels->rows;
-    float *const *plane = channels->planes, *const *triple = channels->triples;
-    size_t kind_count;
-    const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
-    for (size_t k = 0; k < kind_count; ++k) {
-        const vshi_plane_kind *kind = &kinds[k];
-        for (size_t i = 0; i < count_of(kind, scene); ++i, plane += vshi_plane_components(kind)) {
-            if (kind->axes != NULL) {
-                split(*triple++, texels, plane);
-            } else if (is_invalid(kind)) {
-                for (size_t t = 0; t < texels; ++t) {
-                    plane[0][t] = channels->invalid[t] > 0.0f ? 1.0f : 0.0f;
-                }
+void vshi_channels_rows(const vshi_channels *channels, int32_t first, int32_t rows, float *memory,
+                        const float **planes) {
+    const size_t width = (size_t)channels->image.width, texels = width * (size_t)rows;
+    for (size_t i = 0; i < channels->value_count; ++i) {
+        const size_t components = channels->components[i];
+        const float *values = channels->values[i] + components * width * (size_t)first;
+        for (size_t c = 0; c < components; ++c) {
+            *planes = components > 1 ? memory : values;
+            for (size_t t = 0; components > 1 && t < texels; ++t) {
+                memory[t] = values[components * t + c];
             }
+            memory += components > 1 ? texels : 0;
+            ++planes;
         }
     }
-}
-
-void vshi_channels_join(vshi_channels *channels, const vsh_scene *scene) {
-    const size_t texels = (size_t)channels->image.width * (size_t)channels->rows;
-    float *const *plane = channels->planes, *const *triple = channels->triples;
-    size_t kind_count;
-    const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
-    for (size_t k = 0; k < kind_count; ++k) {
-        for (size_t i = 0; i < count_of(&kinds[k], scene); ++i, plane += vshi_plane_components(&kinds[k])) {
-            for (size_t at = 0; kinds[k].axes != NULL && at < 3 * texels; ++at) {
-                (*triple)[at] = plane[at % 3][at / 3];
-            }
-            triple += kinds[k].axes != NULL;
-        }
-    }
-}
-
-size_t vshi_channels_padded(const vsh_scene *scene, float *const *planes, vshi_plane *padded) {
-    size_t kind_count, count = 0;
-    const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
-    for (size_t k = 0; k < kind_count; ++k) {
-        const size_t channels = count_of(&kinds[k], scene) * vshi_plane_components(&kinds[k]);
-        for (size_t i = 0; kinds[k].padded && i < channels; ++i) {
-            padded[count++] = (vshi_plane){planes[i], 1};
-        }
-        planes += channels;
-    }
-    return count;
 }
 
 void vshi_channels_free(vshi_channels *channels) {
-    for (size_t t = 0; channels->triples != NULL && t < channels->triple_count; ++t) {
-        free(channels->triples[t]);
+    for (size_t i = 0; channels->store != NULL && i < channels->value_count; ++i) {
+        vshi_store_give(channels->store, channels->values[i]);
     }
-    for (int32_t i = 0; channels->planes != NULL && i < channels->image.channel_count; ++i) {
-        free(channels->planes[i]);
-    }
-    free(channels->invalid);
-    free(channels->known);
-    free(channels->kept);
-    free(channels->triples);
-    free(channels->planes);
+    free(channels->components);
+    free(channels->values);
     free(channels->holds);
     free(channels->name_list);
     free(channels->names);

@@ -1,5 +1,5 @@
 /* Texels, voxels and memory of a bake, from a trial with few voxels. */
-#include "bake_scene/job.h"
+#include "bake_scene/pages.h"
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
@@ -64,28 +64,6 @@ static vsh_result try_small(const vsh_bake_job *job, const vsh_run *run, trial *
     return VSH_OK;
 }
 
-/* Bytes that the largest lightmap takes, the fields with it; plans all of them. */
-static vsh_result plan_bands(vsh_bake_job *job, double field_bytes, const vsh_run *run, uint64_t *largest,
-                             vsh_error *error) {
-    *largest = 0;
-    for (size_t i = 0; i < job->targets.count; ++i) {
-        vsh_charts *own = NULL;
-        vshi_bands bands;
-        if (job->charts == NULL) {
-            VSHI_TRY(vshi_target_charts(&job->scene, &job->targets.list[i], job->options.allow_overlap != 0,
-                                        false, run, &own, error));
-        }
-        const vsh_result result =
-            vshi_job_plan(job, i, own != NULL ? own : job->charts, (uint64_t)field_bytes, run, &bands, error);
-        vsh_charts_free(own);
-        VSHI_TRY(result);
-        job->lightmaps[i].bands = bands.count;
-        job->lightmaps[i].band_rows = bands.rows;
-        *largest = bands.bytes > *largest ? bands.bytes : *largest;
-    }
-    return VSH_OK;
-}
-
 vsh_result vsh_bake_job_forecast(vsh_bake_job *job, const vsh_run *run, vsh_bake_forecast *forecast,
                                  vsh_error *error) {
     VSHI_NEEDS(job);
@@ -108,11 +86,13 @@ vsh_result vsh_bake_job_forecast(vsh_bake_job *job, const vsh_run *run, vsh_bake
         f.texels += job->lightmaps[i].covered;
         f.samples += job->lightmaps[i].samples;
     }
-    uint64_t largest;
-    VSHI_TRY(plan_bands(job, f.field_bytes, &full, &largest, error));
+    const double bake = f.field_bytes + vshi_job_bytes(job, full.threads);
     const double base =
         fmax(0.0, (double)vshi_peak_bytes() - MAKING * (double)t.made.grid_bytes); /* program and assets */
-    f.peak_bytes = base + fmax(fmax(MAKING * f.grid_bytes, f.grid_bytes + f.field_bytes), (double)largest);
+    f.peak_bytes = base + fmax(fmax(MAKING * f.grid_bytes, f.grid_bytes + f.field_bytes), bake);
+    if (full.memory_limit > 0) { /* what is over it lies in files */
+        f.peak_bytes = fmin(f.peak_bytes, (double)full.memory_limit);
+    }
     *forecast = f;
     return VSH_OK;
 }

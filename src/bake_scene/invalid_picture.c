@@ -118,14 +118,14 @@ vsh_result vshi_invalid_picture_open(vshi_invalid_picture *picture, const vsh_ba
     return vsh_image_writer_create(picture->path, &picture->image, &options, &picture->writer, error);
 }
 
-vsh_result vshi_invalid_picture_add(vshi_invalid_picture *picture, int32_t rows, const float *invalid,
-                                    const float *coverage, vsh_error *error) {
+vsh_result vshi_invalid_picture_add(vshi_invalid_picture *picture, int32_t rows, const uint8_t *state,
+                                    vsh_error *error) {
     if (picture->writer == NULL) {
         return VSH_OK;
     }
     const size_t texels = (size_t)picture->image.width * (size_t)rows;
     for (size_t i = 0; i < texels; ++i) {
-        const int kind = invalid[i] > 0.0f ? 2 : coverage[i] > 0.0f ? 1 : 0;
+        const int kind = state[i] == VSHI_TEXEL_EMPTY ? 0 : state[i] == VSHI_TEXEL_VALID ? 1 : 2;
         for (int c = 0; c < 3; ++c) {
             picture->planes[c][i] = COLOURS[kind][c];
         }

@@ -2,6 +2,7 @@
 #ifndef VSHI_INVALID_PICTURE_H
 #define VSHI_INVALID_PICTURE_H
 
+#include "bake/padding.h"
 #include "bake_scene/job.h"
 #include "base/error.h"
 
@@ -21,9 +22,9 @@ typedef struct vshi_invalid_picture {
 vsh_result vshi_invalid_picture_open(vshi_invalid_picture *picture, const vsh_bake_job *job, size_t index,
                                      int32_t rows, vsh_error *error);
 
-/* Adds rows, of planes as of vsh_lightmap. */
-vsh_result vshi_invalid_picture_add(vshi_invalid_picture *picture, int32_t rows, const float *invalid,
-                                    const float *coverage, vsh_error *error);
+/* Adds rows of texels, each VSHI_TEXEL_…. */
+vsh_result vshi_invalid_picture_add(vshi_invalid_picture *picture, int32_t rows, const uint8_t *state,
+                                    vsh_error *error);
 
 /* Completes the file where `result` is VSH_OK, else leaves what was there. Returns `result`, or why not. */
 vsh_result vshi_invalid_picture_close(vshi_invalid_picture *picture, vsh_result result, vsh_error *error);

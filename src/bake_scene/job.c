@@ -2,9 +2,8 @@
 
 #include "bake_scene/bounds.h"
 #include "bake_scene/lit_sink.h"
-#include "bake_scene/part_job.h"
-#include "bake_scene/seams.h"
-#include "bake_scene/shares.h"
+#include "bake_scene/pages.h"
+#include "bake_scene/parts.h"
 #include "bake_scene/warn.h"
 #include "base/clock.h"
 #include "base/file.h"
@@ -12,6 +11,8 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "image/write_plan.h"
+#include "shade/occluders.h"
+#include "shade/shade.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -124,6 +125,9 @@ static vsh_result check(const vsh_scene *scene, const vsh_bake_job_options *opti
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "scene: no receivers");
     }
     VSHI_TRY(check_shard(options, error));
+    if (options->invalid_picture != NULL && options->forecast == 0) {
+        VSHI_TRY(vshi_output_check(options->invalid_picture, error));
+    }
     for (size_t i = 0; i < scene->receiver_count && options->sink == NULL; ++i) {
         const vsh_result result = vsh_receiver_check(scene, i, error);
         if (result != VSH_OK && (result != VSH_ERROR_WRITE || options->forecast == 0)) {
@@ -209,15 +213,16 @@ void vsh_bake_job_free(vsh_bake_job *job) {
     if (job == NULL) {
         return;
     }
-    free(job->part_path);
-    vshi_shares_free(job);
     free(job->errors);
     free(job->lit);
     vshi_lit_pages_free(job);
     vsh_provenance_free(job->provenance);
+    vshi_tracer_free(job->tracer);
     vsh_occluders_free(job->occluders);
-    vsh_texels_free(job->texels);
-    vsh_charts_free(job->charts);
+    for (size_t i = 0; job->charts != NULL && i < job->targets.count; ++i) {
+        vsh_charts_free(job->charts[i]);
+    }
+    free(job->charts);
     free(job->lightmaps);
     vshi_targets_free(&job->targets);
     vsh_assets_free(job->assets);
@@ -243,50 +248,75 @@ void vsh_bake_job_get_report(const vsh_bake_job *job, vsh_bake_report *report) {
 
 /* --- measured */
 
-/* Whether some of its rows are baked, into a part. */
+enum { STITCHED_PADDING = 2 }; /* texels: what lookups at borders read is guessed from what is near */
+
+vsh_result vshi_target_charts(const vsh_scene *scene, const vshi_target *target, bool allow_overlap,
+                              bool warn, const vsh_run *run, vsh_charts **charts, vsh_error *error) {
+    const vsh_receiver *receiver = &target->receiver;
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = receiver->width;
+    options.height = receiver->height;
+    options.supersample = receiver->supersample;
+    options.padding = receiver->padding;
+    if (receiver->seams == VSH_SEAMS_FIX && options.padding >= 0 && options.padding < STITCHED_PADDING) {
+        options.padding = STITCHED_PADDING;
+    }
+    options.ao_spacing = scene->ao || vsh_planes_shaded(&scene->planes) > 0 ? receiver->ao_spacing : 1;
+    options.shade = scene->shade;
+    options.tangents = scene->bent == 1 + VSH_BENT_TANGENT;
+    vsh_uv_report *reports = calloc(target->mesh_count + 1, sizeof *reports);
+    if (reports == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", receiver->path);
+    }
+    vsh_run silent = *run;
+    silent.warning = NULL; /* its lines are told here, with the file, and not again for the second pass */
+    vsh_result result =
+        vsh_charts_create(target->meshes, target->mesh_count, &options, &silent, reports, charts, error);
+    if (result != VSH_OK) {
+        result = vshi_name_file(receiver->path, result, error);
+        goto done;
+    }
+    vsh_charts_info info;
+    vsh_charts_get_info(*charts, &info);
+    result = vshi_refuse_uvs(target, reports, info.covered, allow_overlap, error);
+    if (result != VSH_OK) {
+        vsh_charts_free(*charts);
+        *charts = NULL;
+        goto done;
+    }
+    if (warn) {
+        vshi_warn_uvs(target, reports, info.covered, run);
+    }
+done:
+    free(reports);
+    return result;
+}
+
+/* Whether some of its tiles are baked, into a part. */
 static bool is_shard(const vsh_bake_job *job) {
     return job->options.shard > 0;
 }
 
 static vsh_result measure(vsh_bake_job *job, size_t index, bool bakes, const vsh_run *run, vsh_error *error) {
     vsh_job_lightmap *lightmap = &job->lightmaps[index];
-    vsh_charts *charts = NULL;
-    vsh_texels *texels = NULL;
-    vshi_bands bands = {.count = 0};
     double low[3], high[3];
-    vsh_result result;
     /* the first part's bake tells of UVs */
     const bool tells = bakes && !job->merges && job->options.shard <= 1;
-    VSHI_TRY_DONE(vshi_target_charts(&job->scene, &job->targets.list[index], job->options.allow_overlap != 0,
-                                     tells, run, &charts, error));
+    VSHI_TRY(vshi_target_charts(&job->scene, &job->targets.list[index], job->options.allow_overlap != 0,
+                                tells, run, &job->charts[index], error));
     vsh_charts_info counted;
-    vsh_charts_get_info(charts, &counted);
-    if (is_shard(job)) {
-        VSHI_TRY_DONE(vshi_shares_note(job, index, charts, error));
-    } else {
-        VSHI_TRY_DONE(vshi_job_plan(job, index, charts, 0, run, &bands, error));
-    }
-    if (!job->merges) { /* which asks nothing of what casts */
-        const bool all = bakes && bands.count == 1 && !is_shard(job);
-        VSHI_TRY_DONE(vshi_job_bounds(job, index, charts, &bands, all, run, &texels, low, high, error));
-    }
+    vsh_charts_get_info(job->charts[index], &counted);
     lightmap->covered = counted.covered;
     lightmap->samples = counted.samples;
-    lightmap->bands = bands.count;
-    lightmap->band_rows = bands.rows;
-    for (int axis = 0; axis < 3 && counted.samples > 0 && !job->merges; ++axis) {
+    if (job->merges) { /* which asks nothing of what casts */
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_job_bounds(job, index, run, low, high, error));
+    for (int axis = 0; axis < 3 && counted.samples > 0; ++axis) {
         job->receivers[0][axis] = fmin(job->receivers[0][axis], low[axis]);
         job->receivers[1][axis] = fmax(job->receivers[1][axis], high[axis]);
     }
-    if (job->targets.count == 1) {
-        job->charts = charts;
-        job->texels = texels;
-        return VSH_OK;
-    }
-done:
-    vsh_texels_free(texels);
-    vsh_charts_free(charts);
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_job_measure(vsh_bake_job *job, bool bakes, const vsh_run *run, vsh_error *error) {
@@ -295,6 +325,8 @@ vsh_result vshi_job_measure(vsh_bake_job *job, bool bakes, const vsh_run *run, v
         job->receivers[0][axis] = INFINITY;
         job->receivers[1][axis] = -INFINITY;
     }
+    VSHI_TRY(vshi_allocate((void **)&job->charts, job->targets.count + 1, sizeof *job->charts, "lightmaps",
+                           error));
     for (size_t i = 0; i < job->targets.count; ++i) {
         VSHI_TRY(measure(job, i, bakes, run, error));
     }
@@ -367,47 +399,30 @@ vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, vsh_error
     options.points = vshi_job_points(job);
     VSHI_TRY(vsh_scene_occluders(&job->scene, job->assets, &options, run, &job->occluders, error));
     vsh_occluders_get_info(job->occluders, &job->report.occluders);
+    for (size_t i = 0; i < job->occluders->layer_count; ++i) {
+        job->layered_ao = job->layered_ao || job->occluders->layers[i].ao != 0;
+    }
     return vshi_job_make_errors(job, error);
 }
 
 /* --- run */
 
-vsh_result vshi_job_bake_one(vsh_bake_job *job, size_t index, const vsh_run *run, vsh_error *error) {
-    vshi_lightmap_input input = {.charts = job->charts};
-    vsh_charts *own = NULL;
-    if (job->charts == NULL) {
-        const double start = vshi_seconds();
-        VSHI_TRY(vshi_target_charts(&job->scene, &job->targets.list[index], job->options.allow_overlap != 0,
-                                    false, run, &own, error));
-        job->report.bake_s += vshi_seconds() - start;
-        input.charts = own;
-    }
-    const vsh_occluders_info *casters = &job->report.occluders;
-    const uint64_t held = job->parts != NULL ? 0 : casters->field_bytes + casters->triangles_bytes;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_job_plan(job, index, input.charts, held, run, &input.bands, error));
-    if (input.bands.count > 1) {
-        vsh_texels_free(job->texels);
-        job->texels = NULL;
-    }
-    input.kept = job->texels;
-    VSHI_TRY_DONE(vshi_job_bake(job, index, &input, run, error));
-done:
-    vsh_charts_free(own);
-    if (job->options.done != NULL) {
-        job->options.done(job->options.user, &job->lightmaps[index], result);
-    }
-    return result;
+static void add_error(vsh_bake_error *sum, const vsh_bake_error *more) {
+    sum->values += more->values;
+    sum->square_error += more->square_error;
+    sum->held += more->held;
+    sum->held_square_error += more->held_square_error;
+    sum->worst = fmax(sum->worst, more->worst);
 }
 
-vsh_result vshi_job_bake_all(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
-    for (size_t i = 0, count; i < job->targets.count; i += count) {
-        VSHI_TRY(vshi_count_together(job, i, run, &count, error));
-        VSHI_TRY(count > 1 ? vshi_bake_together(job, i, count, run, error)
-                           : vshi_job_bake_one(job, i, run, error));
+void vshi_job_add(vsh_bake_job *job, const vsh_bake_stats *baked) {
+    vsh_bake_report *report = &job->report;
+    report->texels += baked->texels;
+    report->invalid_texels += baked->invalid_texels;
+    vshi_shade_stats_add(&report->shade, &baked->shade);
+    for (size_t i = 0; i < report->error_count; ++i) {
+        add_error(&job->errors[i], &baked->errors[i]);
     }
-    vshi_warn_hidden_lights(job, run);
-    return VSH_OK;
 }
 
 vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
@@ -420,12 +435,8 @@ vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_error *er
     if (job->options.sink == NULL) {
         VSHI_TRY(vshi_job_find_provenance(job, &full, error));
     }
-    if (is_shard(job)) {
-        VSHI_TRY(vshi_job_bake_part(job, &full, error));
-    } else {
-        VSHI_TRY(vshi_job_bake_all(job, &full, error));
-    }
-    return VSH_OK;
+    VSHI_TRY(vshi_job_open_tracer(job, &full, error));
+    return is_shard(job) ? vshi_job_bake_part(job, &full, error) : vshi_job_bake_all(job, &full, error);
 }
 
 vsh_result vsh_bake_scene(const vsh_scene *scene, const vsh_bake_job_options *options, const vsh_run *run,

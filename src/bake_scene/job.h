@@ -2,7 +2,6 @@
 #ifndef VSHI_BAKE_JOB_H
 #define VSHI_BAKE_JOB_H
 
-#include "bake_scene/bands.h"
 #include "bake_scene/target.h"
 
 #include <vdbshade/bake_scene.h>
@@ -29,35 +28,21 @@ struct vsh_bake_job {
     vsh_assets *assets;
     vshi_targets targets;
     vsh_job_lightmap *lightmaps; /* [targets.count] */
-    /* of the only lightmap, kept from counting it; several are rasterised again, so as not to hold all at
-     * once */
-    vsh_charts *charts;
-    vsh_texels *texels;         /* NULL where it is baked in bands */
-    double receivers[2][3];     /* world box of all samples, min and max; min > max where there are none */
-    vsh_occluders *occluders;   /* NULL: not prepared */
-    vsh_provenance *provenance; /* NULL where a caller's sink takes the rows, and nothing is kept */
-    vsh_bake_error *errors;     /* [error_count], as in the report */
-    vshi_lit *lit;              /* [light_count + 1]: of each light, of the sky */
+    vsh_charts **charts;         /* [targets.count]; NULL before they are counted */
+    double receivers[2][3];      /* world box of all samples, min and max; min > max where there are none */
+    vsh_occluders *occluders;    /* NULL: not prepared */
+    bool layered_ao;             /* layers take part in AO, so that texels share no rays of it */
+    struct vshi_tracer *tracer;  /* NULL: nothing is traced yet */
+    vsh_provenance *provenance;  /* NULL where a caller's sink takes the rows, and nothing is kept */
+    vsh_bake_error *errors;      /* [error_count], as in the report */
+    vshi_lit *lit;               /* [light_count + 1]: of each light, of the sky */
     vsh_bake_report report;
     bool measured;
-    size_t apart; /* lightmaps before it are not stitched together with others: there is no memory for it */
     vshi_lit_page *lit_pages; /* [lit_page_count]: of the receiver that is baked */
     size_t lit_page_count;
-    struct vshi_share_rows *shares; /* [targets.count], of a shard once measured: what it is cut by */
-    struct vshi_part_writer *part;  /* under way; NULL: none */
-    char *part_path;
-    const struct vshi_part_piece *pieces; /* of it */
-    size_t piece;                         /* that is baked */
-    const struct vshi_parts *parts;       /* that lightmaps are put together from; NULL: they are baked */
-    bool merges;                          /* nothing is going to be baked */
+    struct vshi_parts *parts; /* that lightmaps are put together from; NULL: they are baked */
+    bool merges;              /* nothing is going to be baked */
 };
-
-/* The texels of some rows, or (`kept`, where they are all of them) those that are there already. */
-typedef struct vshi_lightmap_input {
-    const vsh_charts *charts;
-    const vsh_texels *kept; /* NULL: none */
-    vshi_bands bands;       /* of a shard's rows: of these alone */
-} vshi_lightmap_input;
 
 /* Points that the lightmaps of a measured job have. */
 double vshi_job_points(const vsh_bake_job *job);
@@ -68,22 +53,8 @@ double vshi_job_points(const vsh_bake_job *job);
 vsh_result vshi_target_charts(const vsh_scene *scene, const vshi_target *target, bool allow_overlap,
                               bool warn, const vsh_run *run, vsh_charts **charts, vsh_error *error);
 
-/* Plans the bands of target `index`, where `held` bytes are taken beside them. */
-vsh_result vshi_job_plan(const vsh_bake_job *job, size_t index, const vsh_charts *charts, uint64_t held,
-                         const vsh_run *run, vshi_bands *bands, vsh_error *error);
-
-/* Counts all targets; for a bake warns of their UVs, and keeps the texels of the only one. */
+/* Counts all targets; for a bake warns of their UVs. */
 vsh_result vshi_job_measure(vsh_bake_job *job, bool bakes, const vsh_run *run, vsh_error *error);
-
-/* Shades the texels of target `index` and hands its rows to the sink. */
-vsh_result vshi_job_bake(vsh_bake_job *job, size_t index, const vshi_lightmap_input *input,
-                         const vsh_run *run, vsh_error *error);
-
-/* All of it of target `index`, from its charts on; a shard's rows alone, or rows out of parts. */
-vsh_result vshi_job_bake_one(vsh_bake_job *job, size_t index, const vsh_run *run, vsh_error *error);
-
-/* All lightmaps; those whose seams are fixed together. */
-vsh_result vshi_job_bake_all(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
 
 /* Where the outputs come from, once it is known what casts. */
 vsh_result vshi_job_find_provenance(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
@@ -91,8 +62,7 @@ vsh_result vshi_job_find_provenance(vsh_bake_job *job, const vsh_run *run, vsh_e
 /* The report's errors and what lights reach, zeros. */
 vsh_result vshi_job_make_errors(vsh_bake_job *job, vsh_error *error);
 
-/* Statistics of bands and parts add up. */
-void vshi_add_shade(vsh_shade_stats *sum, const vsh_shade_stats *more);
-void vshi_add_bake_error(vsh_bake_error *sum, const vsh_bake_error *more);
+/* Adds what a lightmap came to to the report. */
+void vshi_job_add(vsh_bake_job *job, const vsh_bake_stats *baked);
 
 #endif

@@ -84,11 +84,6 @@ vsh_result vshi_lit_sink_check(const vsh_receiver *receiver, const vsh_image *im
     return vshi_output_check(receiver->output, error);
 }
 
-uint64_t vshi_lit_sink_bytes(int32_t width, int32_t height) {
-    const uint64_t texels = (uint64_t)width * (uint64_t)height;
-    return texels * (PLANES * sizeof(float) + 8); /* and the images, in the file and before */
-}
-
 /* --- rows */
 
 static void tell_writing(const vsh_bake_job *job, const char *path) {

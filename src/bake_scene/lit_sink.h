@@ -54,7 +54,4 @@ vsh_result vshi_lit_check_uvs(vsh_bake_job *job, const vsh_run *run, vsh_error *
 /* Frees the pages that wait for others. */
 void vshi_lit_pages_free(vsh_bake_job *job);
 
-/* Bytes that a page takes until it is written. */
-uint64_t vshi_lit_sink_bytes(int32_t width, int32_t height);
-
 #endif

@@ -130,7 +130,7 @@ static vsh_result check_receiver(vsh_bake_job *job, size_t index, const vsh_run 
         strcasecmp(vshi_path_ending(receiver->output), "obj") == 0) {
         return VSH_OK; /* no set is made, or (OBJ) there is one alone */
     }
-    vshi_channels channels = {.rows = 0};
+    vshi_channels channels = {.value_count = 0};
     vshi_lit_sink *lit = NULL;
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&lit, 1, sizeof *lit, lightmap.output, error));

@@ -2,7 +2,7 @@
 #ifndef VSHI_WARN_H
 #define VSHI_WARN_H
 
-#include "bake_scene/lightmap.h"
+#include "bake_scene/pages.h"
 
 /* Warns of faults in the target's UVs, one line for each mesh and kind. Warns of charts that lie too close
  * for the size, and of charts that cover few texels. */
@@ -21,8 +21,8 @@ vsh_result vshi_refuse_invalid(const vshi_target *target, const vsh_bake_stats *
 void vshi_warn_baked(const vsh_scene *scene, const vshi_target *target, const vsh_bake_stats *baked,
                      const vsh_run *run);
 
-/* Notes which lights, and whether the sky, reach a baked texel of the target's mesh `mesh`. */
-void vshi_note_lit(const vshi_lightmap_work *work, size_t texel, size_t mesh);
+/* Notes which lights, and whether the sky, reach the meshes of a baked page. */
+void vshi_note_lit(const vshi_job_page *page);
 
 /* Warns of lights, and of the sky, that one object hides from all other objects of a baked job. */
 void vshi_warn_hidden_lights(const vsh_bake_job *job, const vsh_run *run);

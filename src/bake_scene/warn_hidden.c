@@ -1,7 +1,6 @@
 /* Warns of a light that one object hides from all others: a sky dome hides the sun, a bulb its own lamp. The
  * shadow planes show which lights are hidden. Rays then find the object. */
 #include "bake/planes.h"
-#include "bake_scene/lightmap.h"
 #include "bake_scene/warn.h"
 #include "base/job.h"
 #include "light/light.h"
@@ -22,16 +21,25 @@ static bool is_same(const vsh_mesh *a, const vsh_mesh *b) {
     return strcmp(name_of(a), name_of(b)) == 0;
 }
 
-void vshi_note_lit(const vshi_lightmap_work *w, size_t texel, size_t mesh) {
-    const vsh_lightmap *planes = &w->channels.lightmap;
-    const size_t lights = w->job->scene.light_count;
-    const vsh_mesh *lit = mesh < w->target->mesh_count ? &w->target->meshes[mesh] : NULL;
-    for (size_t i = 0; i <= lights && lit != NULL && planes->coverage[texel] == 1.0f; ++i) {
-        const float *plane = i < lights ? planes->shadow[i] : planes->sky;
-        vshi_lit *so_far = &w->job->lit[i];
-        if (plane != NULL && !so_far->several && so_far->mesh != lit && plane[texel] > 0.0f) {
-            so_far->several = so_far->mesh != NULL && !is_same(so_far->mesh, lit);
-            so_far->mesh = lit;
+/* Notes what reaches a texel of a mesh. */
+static void note_texel(const vshi_job_page *page, size_t texel, const vsh_mesh *mesh) {
+    const vsh_lightmap *planes = &page->channels.lightmap;
+    const size_t lights = page->job->scene.light_count;
+    for (size_t i = 0; i <= lights; ++i) {
+        const float *plane = i == lights ? planes->sky : planes->shadow != NULL ? planes->shadow[i] : NULL;
+        vshi_lit *so_far = &page->job->lit[i];
+        if (plane != NULL && !so_far->several && so_far->mesh != mesh && plane[texel] > 0.0f) {
+            so_far->several = so_far->mesh != NULL && !is_same(so_far->mesh, mesh);
+            so_far->mesh = mesh;
+        }
+    }
+}
+
+void vshi_note_lit(const vshi_job_page *page) {
+    for (size_t i = 0; i < page->page.width * page->page.height; ++i) {
+        const uint32_t mesh = page->page.mesh[i];
+        if (mesh > 0 && page->channels.lightmap.coverage[i] == 1.0f) {
+            note_texel(page, i, &page->target->meshes[mesh - 1]);
         }
     }
 }

@@ -16,6 +16,9 @@ typedef void vshi_range_fn(void *user, size_t begin, size_t end);
  */
 VSHI_SHARED int32_t vshi_parallel_threads(int32_t wanted);
 
+/* The most threads that a loop of a job of so many (0: all cores) runs on at a time. */
+int32_t vshi_parallel_most(int32_t threads);
+
 /* Calls fn over 0 … count - 1 in pieces of `grain` (the last may be shorter), each piece starting at a
  * multiple of it, on the job's threads; advances the job by `units` × the elements of every piece and stops
  * early where the job is cancelled. Errors: VSH_ERROR_CANCELLED, VSH_ERROR_MEMORY, VSH_ERROR_INTERNAL. */

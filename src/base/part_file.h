@@ -1,8 +1,8 @@
 /* Parts' files. They appear whole or not at all, hold nothing that tells of time or machine (but those of
  * what measures time), and whoever reads one checks all of it.
  *
- * A file is: magic; numbers that tell the byte order and the sizes of what follows; the head, which begins
- * with a vshi_part_about; the body; the tail; a checksum. */
+ * A file is: magic; numbers that tell the byte order and the size of the head; the head, which begins with a
+ * vshi_part_about; the body; a checksum. */
 #ifndef VSHI_PART_FILE_H
 #define VSHI_PART_FILE_H
 
@@ -28,7 +28,7 @@ vsh_result vshi_parts_first(const char *parts, int32_t shard_count, char **path,
 typedef struct vshi_part_front {
     char magic[16];
     uint64_t order;
-    uint64_t head_bytes, body_bytes, tail_bytes; /* multiples of 4; the checksum's 8 are behind them */
+    uint64_t head_bytes; /* a multiple of 8; the body follows, then the checksum's 8 bytes */
 } vshi_part_front;
 
 /* --- writing */
@@ -43,9 +43,9 @@ typedef struct vshi_part_output {
 /* Begins a part with its head, whose memory is freed. Errors, and then nothing is under way: VSH_ERROR_WRITE,
  * VSH_ERROR_MEMORY. */
 vsh_result vshi_part_output_begin(vshi_part_output *part, const char *path, vshi_part_code *head,
-                                  uint64_t body_bytes, uint64_t tail_bytes, vsh_error *error);
+                                  vsh_error *error);
 
-/* The next bytes of body and tail, a multiple of 4. What could not be written is told at the end. */
+/* The next bytes of the body, a multiple of 4. What could not be written is told at the end. */
 void vshi_part_output_put(vshi_part_output *part, const void *bytes, size_t size);
 
 /* Puts the file in its place. Errors: VSH_ERROR_WRITE. */
@@ -58,6 +58,7 @@ typedef struct vshi_part_input {
     const char *path; /* the caller's */
     FILE *file;
     vshi_part_front front;
+    uint64_t body_bytes;
     uint64_t sum;
     vshi_part_code head; /* what is behind the vshi_part_about follows */
 } vshi_part_input;
@@ -70,16 +71,9 @@ vsh_result vshi_part_input_open(const char *path, const vsh_run *run, vshi_part_
 /* Whether all of the head was read. */
 vsh_result vshi_part_input_end_head(const vshi_part_input *part, vsh_error *error);
 
-/* Goes over the body, and (`whole`) sums it up. Errors: VSH_ERROR_READ, VSH_ERROR_MEMORY,
- * VSH_ERROR_CANCELLED. */
-vsh_result vshi_part_input_pass_body(vshi_part_input *part, bool whole, const vsh_run *run, vsh_error *error);
-
-/* Reads the tail, whose memory is the caller's to free also after an error. */
-vsh_result vshi_part_input_tail(vshi_part_input *part, const vsh_run *run, vshi_part_code *tail,
-                                vsh_error *error);
-
-/* Whether, with its body, it is what was written. */
-vsh_result vshi_part_input_check_sum(vshi_part_input *part, vsh_error *error);
+/* Goes over the body, and checks that the file is what was written. Errors: VSH_ERROR_READ, VSH_ERROR_INPUT,
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_part_input_check_body(vshi_part_input *part, const vsh_run *run, vsh_error *error);
 void vshi_part_input_close(vshi_part_input *part);
 
 /* --- reading again */
@@ -87,8 +81,6 @@ void vshi_part_input_close(vshi_part_input *part);
 /* Opens a part at a place in its body. Errors: VSH_ERROR_READ, VSH_ERROR_MEMORY. */
 vsh_result vshi_part_reopen(const char *path, uint64_t at, FILE **file, vsh_error *error);
 vsh_result vshi_part_read_bytes(FILE *file, const char *path, void *bytes, size_t size, vsh_error *error);
-
-vsh_result vshi_part_skip(FILE *file, const char *path, size_t size, vsh_error *error);
 
 /* VSH_ERROR_INPUT: `what` of it cannot be. */
 vsh_result vshi_part_damaged(const char *path, const char *what, vsh_error *error);

@@ -35,13 +35,9 @@ static vsh_result check_front(const char *path, const vshi_part_front *front, ui
                          path);
     }
     const uint64_t rest = size - sizeof *front - sizeof(uint64_t);
-    if (front->head_bytes > rest || front->tail_bytes > rest - front->head_bytes ||
-        front->body_bytes != rest - front->head_bytes - front->tail_bytes) {
-        return vshi_part_damaged(path, "it has not the size that it tells", error);
-    }
-    return front->head_bytes % 4 == 0 && front->tail_bytes % 4 == 0 && front->body_bytes % 4 == 0
+    return front->head_bytes <= rest && front->head_bytes % 8 == 0 && rest % 4 == 0
                ? VSH_OK
-               : vshi_part_damaged(path, "its sizes", error);
+               : vshi_part_damaged(path, "it has not the size that it tells", error);
 }
 
 /* Reads `size` bytes into memory of its own. */
@@ -81,6 +77,7 @@ vsh_result vshi_part_input_open(const char *path, const vsh_run *run, vshi_part_
     }
     VSHI_TRY(vshi_part_read_bytes(part->file, path, &part->front, sizeof part->front, error));
     VSHI_TRY(check_front(path, &part->front, size, error));
+    part->body_bytes = size - sizeof part->front - part->front.head_bytes - sizeof(uint64_t);
     part->sum = vshi_part_sum(part->sum, &part->front, sizeof part->front);
     VSHI_TRY(take(part, part->front.head_bytes, run, &part->head, error));
     vshi_part_about_code(&part->head, about);
@@ -98,13 +95,10 @@ vsh_result vshi_part_input_end_head(const vshi_part_input *part, vsh_error *erro
                : vshi_part_damaged(part->path, "its head", error);
 }
 
-vsh_result vshi_part_input_pass_body(vshi_part_input *part, bool whole, const vsh_run *run,
-                                     vsh_error *error) {
-    const uint64_t bytes = part->front.body_bytes;
-    if (!whole) {
-        return vshi_part_skip(part->file, part->path, (size_t)bytes, error);
-    }
+vsh_result vshi_part_input_check_body(vshi_part_input *part, const vsh_run *run, vsh_error *error) {
+    const uint64_t bytes = part->body_bytes;
     unsigned char *chunk = NULL;
+    uint64_t told;
     vshi_job *job = vshi_job_begin(run, "parts", (size_t)(bytes / CHUNK) + 1);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", part->path);
@@ -118,21 +112,12 @@ vsh_result vshi_part_input_pass_body(vshi_part_input *part, bool whole, const vs
         left -= size;
         VSHI_TRY_DONE(vshi_job_advance(job, 1) ? vshi_job_fail_cancelled(job, error) : VSH_OK);
     }
+    VSHI_TRY_DONE(vshi_part_read_bytes(part->file, part->path, &told, sizeof told, error));
+    result = told == part->sum ? VSH_OK : vshi_part_damaged(part->path, "its checksum does not match", error);
 done:
     free(chunk);
     vshi_job_end(job);
     return result;
-}
-
-vsh_result vshi_part_input_tail(vshi_part_input *part, const vsh_run *run, vshi_part_code *tail,
-                                vsh_error *error) {
-    return take(part, part->front.tail_bytes, run, tail, error);
-}
-
-vsh_result vshi_part_input_check_sum(vshi_part_input *part, vsh_error *error) {
-    uint64_t told;
-    VSHI_TRY(vshi_part_read_bytes(part->file, part->path, &told, sizeof told, error));
-    return told == part->sum ? VSH_OK : vshi_part_damaged(part->path, "its checksum does not match", error);
 }
 
 void vshi_part_input_close(vshi_part_input *part) {
@@ -142,12 +127,6 @@ void vshi_part_input_close(vshi_part_input *part) {
     }
     free(part->head.bytes);
     part->head.bytes = NULL;
-}
-
-vsh_result vshi_part_skip(FILE *file, const char *path, size_t size, vsh_error *error) {
-    return fseeko(file, (off_t)size, SEEK_CUR) == 0
-               ? VSH_OK
-               : vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, strerror(errno));
 }
 
 vsh_result vshi_part_reopen(const char *path, uint64_t at, FILE **file, vsh_error *error) {

@@ -33,10 +33,10 @@ static vsh_result begin(vshi_part_output *part, const char *path, vshi_part_code
 }
 
 vsh_result vshi_part_output_begin(vshi_part_output *part, const char *path, vshi_part_code *head,
-                                  uint64_t body_bytes, uint64_t tail_bytes, vsh_error *error) {
+                                  vsh_error *error) {
     *part = (vshi_part_output){.sum = VSHI_PART_SUM};
-    const vshi_part_front front = {VSHI_PART_MAGIC, VSHI_PART_ORDER, (head->size + ROUND - 1) / ROUND * ROUND,
-                                   body_bytes, tail_bytes};
+    const vshi_part_front front = {VSHI_PART_MAGIC, VSHI_PART_ORDER,
+                                   (head->size + ROUND - 1) / ROUND * ROUND};
     const vsh_result result = begin(part, path, head, &front, error);
     free(head->bytes);
     *head = (vshi_part_code){.reads = false};

@@ -7,7 +7,7 @@
 #include <string.h>
 
 /* The format's number is in the magic: another one is another version's. */
-#define VSHI_PART_MAGIC "vdbshade part 8\n"
+#define VSHI_PART_MAGIC "vdbshade part 9\n"
 #define VSHI_PART_MAGIC_BEGIN "vdbshade part "
 #define VSHI_PART_ORDER UINT64_C(0x0102030405060708)
 #define VSHI_PART_SUM UINT64_C(0xcbf29ce484222325) /* of no bytes */

@@ -233,9 +233,7 @@ static int write_file(const cli_stats *stats, const vsh_run *run, const char *pa
         uint64_t value;
     } count;
     const count own[][3] = {
-        [CLI_STATS_TEXELS] = {{"texels", stats->texels},
-                              {"invalid_texels", stats->invalid_texels},
-                              {"bands", stats->bands}},
+        [CLI_STATS_TEXELS] = {{"texels", stats->texels}, {"invalid_texels", stats->invalid_texels}},
         [CLI_STATS_POINTS] = {{"points", stats->points},
                               {"bad_rows", stats->bad_rows},
                               {"beyond_reach", stats->shade.beyond_reach}},
@@ -264,7 +262,9 @@ static int write_file(const cli_stats *stats, const vsh_run *run, const char *pa
     json_object_set_new(root, "version", json_string(vsh_version()));
     json_object_set_new(root, "stages_s", stages);
     for (size_t i = 0; i < sizeof counts / sizeof counts[0]; ++i) {
-        json_object_set_new(root, counts[i].name, json_integer((json_int_t)counts[i].value));
+        if (counts[i].name != NULL) { /* some have two counts of their own */
+            json_object_set_new(root, counts[i].name, json_integer((json_int_t)counts[i].value));
+        }
     }
     if (stats->of == CLI_STATS_TEXELS) {
         json_object_set_new(root, "ao_spacing",

@@ -32,7 +32,6 @@ typedef struct cli_stats {
     uint64_t points, bad_rows;
     uint64_t voxels, inside_voxels, tiles;
     int32_t ao_spacing; /* the smallest of all lightmaps; 0: no lightmap */
-    uint64_t bands;     /* that lightmaps were baked in: one each where they were baked whole */
     vsh_shade_stats shade;
     const vsh_bake_error
         *errors;             /* [light_count + 2]: of each light, of AO, of the sky; NULL: none are known */

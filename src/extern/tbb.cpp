@@ -88,6 +88,10 @@ int32_t vshi_parallel_threads(int32_t wanted) {
     return given;
 }
 
+int32_t vshi_parallel_most(int32_t threads) {
+    return threads > 0 ? threads : tbb::info::default_concurrency();
+}
+
 vsh_result vshi_parallel_for(vshi_job *job, size_t count, size_t grain, size_t units, vshi_range_fn *fn,
                              void *user, vsh_error *error) {
     return with_threads(error, [&]() -> vsh_result {

@@ -205,8 +205,10 @@ static vsh_result pad(const bake *b, const vsh_run *run, vsh_error *error) {
             planes[count++] = (vshi_plane){values, 1};
         }
     }
-    result = vshi_padding_fill(run, b->options.width, b->options.height, b->state, radius, planes, count,
-                               NULL, error);
+    vshi_store store = {.run = run};
+    result = vshi_padding_fill(&store, run, b->options.width, b->options.height, b->state, radius, planes,
+                               count, NULL, error);
+    vshi_store_close(&store);
     free(planes);
     return result;
 }
@@ -233,7 +235,7 @@ static vsh_result prepare(bake *b, const vsh_run *run, vsh_error *error) {
     const bool classic = b->options.method == VSH_FLAT_CLASSIC && b->casters != NULL;
     const bool padded = b->options.padding > 0 && b->casters != NULL;
     const double cell = fmin(b->texel[0], b->texel[1]);
-    double bytes = padded ? texels * (1.0 + VSHI_PADDING_TEXEL_BYTES) : 0.0;
+    double bytes = padded ? texels * (1.0 + sizeof(int16_t)) : 0.0;
     if (b->casters != NULL) {
         vsh_outline_info info;
         vsh_outline_get_info(b->casters, &info);

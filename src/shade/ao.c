@@ -49,7 +49,6 @@ void vshi_ao_shade(const void *user, size_t begin, size_t end, vsh_shade_stats *
     const int32_t method = task->options->ao_method;
     vshi_shade_fn *shade = method == VSH_AO_TAPS    ? vshi_ao_taps
                            : method == VSH_AO_CONES ? vshi_ao_by_cones
-                           : task->share != NULL    ? vshi_ao_by_square
                                                     : vshi_ao_by_rays;
     for (size_t i = begin; task->deviation != NULL && i < end; ++i) {
         task->deviation[i] = NAN;
@@ -154,6 +153,67 @@ void vshi_ao_bent(float *bent, const float *normal) {
     bent[2] = (float)b.z;
 }
 
+void vshi_ao_close(vshi_ao_shader *shader) {
+    vshi_sampler_free(shader->sampler);
+    vshi_layers_free(shader->layers);
+    *shader = (vshi_ao_shader){.sampler = NULL};
+}
+
+static vsh_result check_bent(const vsh_shade_options *options, vsh_error *error) {
+    const vshi_vec up = vshi_vec_of(options->ao_up);
+    if (options->ao_method == VSH_AO_TAPS) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "bent normals: AO by taps knows no directions; use cones or rays");
+    }
+    return vshi_dot(up, up) > 0.0
+               ? vshi_fail(error, VSH_ERROR_ARGUMENT, "bent normals: not of AO over a horizon")
+               : VSH_OK;
+}
+
+vsh_result vshi_ao_open(const vsh_occluders *occluders, const vsh_shade_options *options,
+                        vshi_ao_shading shading, int32_t isa, vshi_ao_shader *shader, vsh_error *error) {
+    *shader = (vshi_ao_shader){.sampler = NULL};
+    vsh_shade_options *full = &shader->options;
+    VSHI_TRY(vshi_shade_options_resolve(options, full, error));
+    VSHI_TRY(shading.bent ? check_bent(full, error) : VSH_OK);
+    VSHI_TRY(vshi_layers_prepare(occluders, full, NULL, &shader->layers, error));
+    vshi_shade_options_settle(full, occluders->triangles);
+    if (shading.shared) {
+        full->sampler = vshi_ao_tile_sampler(full->sampler);
+    }
+    VSHI_TRY(vshi_ao_prepare(occluders, full, &shader->cones, &shader->task, error));
+    if (vshi_ao_has_rays(full)) {
+        VSHI_TRY(vshi_shade_sampler(full, vshi_ao_most_rays(full), "ao", &shader->sampler, error));
+    }
+    shader->task.layers = shading.shared ? NULL : shader->layers; /* with layers nothing is shared */
+    shader->task.sampler = shader->sampler;
+    shader->task.kernel = vshi_kernel_of(isa);
+    shader->task.outside = shading.outside;
+    return VSH_OK;
+}
+
+void vshi_ao_points(const vshi_ao_shader *shader, const vsh_points *points, const float *faces, float *ao,
+                    float *deviation, float *bent, vsh_shade_stats *stats) {
+    vshi_ao_task task = shader->task;
+    task.points = points;
+    task.faces = faces;
+    task.ao = ao;
+    task.deviation = deviation;
+    task.bent = bent;
+    vshi_ao_shade(&task, 0, points->count, stats);
+}
+
+void vshi_ao_shoot(const vshi_ao_shader *shader, const vsh_points *points, const float *faces,
+                   const vshi_ao_share *share, float *shot, float *open, vsh_shade_stats *stats) {
+    vshi_ao_task task = shader->task;
+    task.points = points;
+    task.faces = faces;
+    task.ao = shot;
+    task.bent = open;
+    task.share = share;
+    vshi_ao_by_squares(&task, 0, vshi_ao_squares(share), stats);
+}
+
 vsh_result vsh_shade_ao(const vsh_occluders *occluders, const vsh_points *points,
                         const vsh_shade_options *options, const vsh_run *run, float *ao, float *deviation,
                         float *bent, vsh_shade_stats *stats, vsh_error *error) {
@@ -162,61 +222,24 @@ vsh_result vsh_shade_ao(const vsh_occluders *occluders, const vsh_points *points
     VSHI_NEEDS(points);
     VSHI_NEEDS_OF(points->count, points->positions);
     VSHI_NEEDS_OF(points->count, ao);
-    VSHI_TRY(
-        vshi_shade_ao(occluders, points, NULL, NULL, options, run, ao, deviation, bent, NULL, stats, error));
+    vsh_run full_run;
+    VSHI_TRY(vshi_run_resolve(run, &full_run, error));
+    VSHI_TRY(vshi_ao_check_points(points, error));
+    vshi_ao_shader shader;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_ao_open(occluders, options, (vshi_ao_shading){.bent = bent != NULL}, full_run.isa,
+                               &shader, error));
+    shader.task.points = points;
+    shader.task.ao = ao;
+    shader.task.deviation = deviation;
+    shader.task.bent = bent;
+    const size_t grain = shader.options.ao_method == VSH_AO_TAPS ? VSHI_CHUNK : VSHI_AO_GRAIN;
+    VSHI_TRY_DONE(
+        vshi_shade_run(&full_run, "ao", points->count, grain, vshi_ao_shade, &shader.task, stats, error));
     for (size_t i = 0; bent != NULL && i < points->count; ++i) {
         vshi_ao_bent(bent + 3 * i, points->normals + 3 * i);
     }
-    return VSH_OK;
-}
-
-vsh_result vshi_shade_ao(const vsh_occluders *occluders, const vsh_points *points, const float *faces,
-                         const vshi_point_rows *rows, const vsh_shade_options *options, const vsh_run *run,
-                         float *ao, float *deviation, float *bent, const vshi_ao_share *share,
-                         vsh_shade_stats *stats, vsh_error *error) {
-    VSHI_FLOATS;
-    vsh_shade_options full;
-    vsh_run full_run;
-    vshi_ao_task task;
-    vshi_ao_cones cones;
-    vshi_sampler *sampler = NULL;
-    vshi_layers *layers = NULL;
-    vsh_result result = VSH_OK;
-    VSHI_TRY_DONE(vshi_shade_options_resolve(options, &full, error));
-    VSHI_TRY_DONE(vshi_run_resolve(run, &full_run, error));
-    VSHI_TRY_DONE(vshi_ao_check_points(points, error));
-    if (bent != NULL && full.ao_method == VSH_AO_TAPS) {
-        VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_ARGUMENT,
-                                "bent normals: AO by taps knows no directions; use cones or rays"));
-    }
-    if (bent != NULL && vshi_dot(vshi_vec_of(full.ao_up), vshi_vec_of(full.ao_up)) > 0.0) {
-        VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_ARGUMENT, "bent normals: not of AO over a horizon"));
-    }
-    VSHI_TRY_DONE(vshi_layers_prepare(occluders, &full, NULL, &layers, error));
-    vshi_shade_options_settle(&full, occluders->triangles);
-    if (share != NULL) {
-        full.sampler = vshi_ao_tile_sampler(full.sampler);
-    }
-    VSHI_TRY_DONE(vshi_ao_prepare(occluders, &full, &cones, &task, error));
-    if (vshi_ao_has_rays(&full)) {
-        VSHI_TRY_DONE(vshi_shade_sampler(&full, vshi_ao_most_rays(&full), "ao", &sampler, error));
-    }
-    task.layers = share == NULL ? layers : NULL; /* those that hold AO share nothing */
-    task.sampler = sampler;
-    task.kernel = vshi_kernel_of(full_run.isa);
-    task.outside = rows != NULL || share != NULL;
-    task.points = points;
-    task.faces = faces;
-    task.ao = ao;
-    task.deviation = deviation;
-    task.bent = bent;
-    task.share = share;
-    const size_t grain = full.ao_method == VSH_AO_TAPS ? VSHI_CHUNK : VSHI_AO_GRAIN;
-    const size_t units = share != NULL ? vshi_ao_squares(share) : points->count;
-    VSHI_TRY_DONE(vshi_shade_run(&full_run, "ao", units, rows, share != NULL ? 1 : grain, vshi_ao_shade,
-                                 &task, stats, error));
 done:
-    vshi_sampler_free(sampler);
-    vshi_layers_free(layers);
+    vshi_ao_close(&shader);
     return result;
 }

@@ -21,16 +21,13 @@ typedef struct vshi_ao_cones {
  * the texels between need none; where it bends more, those of a lattice of half the spacing, down to all
  * texels. */
 typedef struct vshi_ao_share {
-    vshi_texel_map map; /* the texels' points */
-    int32_t spacing;    /* texels, the largest: 1, 2, 4 or 8 */
-    int32_t *rays;      /* [points]: those that each shot */
+    vshi_texel_map map;      /* of the tile that shoots and what lies around it; numbers are the task's */
+    int32_t left, top, side; /* where in the map the tile is, a multiple of the square's side */
+    int32_t spacing;         /* texels, the largest: 1, 2, 4 or 8 */
+    int32_t *rays;           /* [points]: those that each shot */
     /* [points]: spacing of the lattice that the texel's value is to come from, by a window over it where the
      * texel shot rays, else by those of its cell's corners */
     uint8_t *level;
-    /* [rows of tiles][columns of tiles], of 8 texels: which lattices shoot there, as the sum of their
-     * spacings, for a lattice's own tile the same all over it. What a tile shoots depends on those of wider
-     * lattices over it and, for its cells, over the texels behind it, where these are of its square */
-    const uint8_t *lattices;
 } vshi_ao_share;
 
 /* Levels of no lattice: not chosen yet; the value is known without rays. */
@@ -42,14 +39,14 @@ static inline int32_t vshi_ao_square(const vshi_ao_share *share) {
 }
 
 static inline size_t vshi_ao_squares(const vshi_ao_share *share) {
-    const int32_t side = vshi_ao_square(share);
-    return (size_t)((share->map.width + side - 1) / side) * (size_t)((share->map.height + side - 1) / side);
+    const size_t across = (size_t)(share->side / vshi_ao_square(share));
+    return across * across;
 }
 
 /* The corners of a lattice's cell that a texel in it is estimated from, as bits, of those that hang together
  * with it; `whole`: vshi_links_whole()'s. Corner k is k & 1 spacings to the right and k >> 1 down. */
-uint32_t vshi_ao_corners(const vsh_points *points, const vshi_texel_map *map, const int32_t cell[2],
-                         int32_t spacing, bool whole, int32_t column, int32_t row);
+uint32_t vshi_ao_corners(const vshi_texel_map *map, const int32_t cell[2], int32_t spacing, bool whole,
+                         int32_t column, int32_t row);
 
 typedef struct vshi_ao_task {
     const vsh_field *field;
@@ -73,6 +70,37 @@ typedef struct vshi_ao_task {
     float *bent; /* [count][3]: the directions that are open, averaged over the whole cosine-weighted
                   * hemisphere (2/3 of the normal where all is open), world space; may be NULL */
 } vshi_ao_task;
+
+/* What AO is shaded for. */
+typedef struct vshi_ao_shading {
+    bool shared;  /* texels share their rays */
+    bool bent;    /* bent normals are asked for, too */
+    bool outside; /* the points are known to lie in no solid */
+} vshi_ao_shading;
+
+/* AO, prepared for points that come later. It must not be moved, and what it was made of must outlive it. */
+typedef struct vshi_ao_shader {
+    vsh_shade_options options; /* settled */
+    struct vshi_layers *layers;
+    vshi_sampler *sampler;
+    vshi_ao_cones cones;
+    vshi_ao_task task; /* refers to the four above */
+} vshi_ao_shader;
+
+/* Close it also after an error. Errors: as vsh_shade_ao(). */
+vsh_result vshi_ao_open(const vsh_occluders *occluders, const vsh_shade_options *options,
+                        vshi_ao_shading shading, int32_t isa, vshi_ao_shader *shader, vsh_error *error);
+void vshi_ao_close(vshi_ao_shader *shader);
+
+/* Shades points on the calling thread; values depend on the points and their order alone. Any thread.
+ * `faces`, `deviation` and `bent`, as of vshi_ao_task, may be NULL. */
+void vshi_ao_points(const vshi_ao_shader *shader, const vsh_points *points, const float *faces, float *ao,
+                    float *deviation, float *bent, vsh_shade_stats *stats);
+
+/* Shoots the rays of a tile whose texels share them: sets levels and rays of the share's points in the tile,
+ * `shot`, the share of each one's own rays that are free, and unless it is NULL `open`, their bent. */
+void vshi_ao_shoot(const vshi_ao_shader *shader, const vsh_points *points, const float *faces,
+                   const vshi_ao_share *share, float *shot, float *open, vsh_shade_stats *stats);
 
 /* Length of what `bent` is under an open sky: the mean cosine. */
 #define VSHI_AO_OPEN (2.0 / 3.0)
@@ -165,7 +193,7 @@ static inline vshi_vec vshi_ao_direction(const vshi_vec axes[3], vshi_vec d) {
 vshi_shade_fn vshi_ao_taps;
 vshi_shade_fn vshi_ao_by_cones;
 vshi_shade_fn vshi_ao_by_rays;
-vshi_shade_fn vshi_ao_by_square; /* squares of a share, row by row */
+vshi_shade_fn vshi_ao_by_squares; /* squares of a share, row by row */
 
 /* The sampler of texels that share their rays: blue noise is the same few rays in each, turned, and what
  * those miss no average finds. */

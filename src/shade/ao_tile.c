@@ -43,7 +43,7 @@ typedef struct tile {
     vshi_windows windows;
     vshi_window_texel texels[TILE * TILE];
     vshi_window_sums sums[(TILE + 1) * (TILE + 1)];
-    uint32_t at[TILE * TILE]; /* points + 1 */
+    size_t at[TILE * TILE]; /* points + 1 */
     size_t wanted[TILE * TILE];
     size_t count;
     uint8_t place[TILE * TILE]; /* of the wanted */
@@ -126,11 +126,11 @@ static void open_tile(const vshi_ao_task *task, const vshi_texel_lattice *lattic
         return;
     }
     memset(t->texels, 0, sizeof t->texels);
-    vshi_links_find(task->points, &share->map, lattice, t->texels);
+    vshi_links_find(&share->map, lattice, t->texels);
     uint8_t shoots[TILE * TILE] = {0};
     for (int32_t n = 0; n < TILE * TILE; ++n) {
         const int32_t k = in_curve(n);
-        const size_t i = (size_t)t->at[k] - 1;
+        const size_t i = t->at[k] - 1;
         if (t->at[k] == 0) {
             continue;
         }
@@ -257,12 +257,12 @@ static void look_beyond(const vshi_ao_task *task, const int32_t square[2], const
         for (int32_t axis = 0; axis < 2; ++axis) {
             int32_t to[2] = {at[0], at[1]};
             to[axis] += spacing;
-            const uint32_t beyond =
+            const size_t beyond =
                 to[axis] == square[axis] + side ? vshi_texel_at(&share->map, to[0], to[1]) : 0;
-            if (beyond > 0 && vshi_links_lead(task->points, &share->map, at, to)) {
+            if (beyond > 0 && vshi_links_lead(&share->map, at, to)) {
                 place[count] = k;
                 along[count] = axis;
-                next[count++] = (size_t)beyond - 1;
+                next[count++] = beyond - 1;
             }
         }
     }
@@ -306,13 +306,13 @@ static void grade(const vshi_ao_task *task, const int32_t square[2], const tile 
     look_beyond(task, square, t, e, stats);
 }
 
-uint32_t vshi_ao_corners(const vsh_points *points, const vshi_texel_map *map, const int32_t cell[2],
-                         int32_t spacing, bool whole, int32_t column, int32_t row) {
+uint32_t vshi_ao_corners(const vshi_texel_map *map, const int32_t cell[2], int32_t spacing, bool whole,
+                         int32_t column, int32_t row) {
     uint32_t corners = 0;
     for (int32_t k = 0; k < 4; ++k) {
         const int32_t corner[2] = {cell[0] + (k & 1) * spacing, cell[1] + (k >> 1) * spacing};
         if (whole || (vshi_texel_at(map, corner[0], corner[1]) > 0 &&
-                      vshi_links_lead(points, map, (const int32_t[]){column, row}, corner))) {
+                      vshi_links_lead(map, (const int32_t[]){column, row}, corner))) {
             corners |= 1u << k;
         }
     }
@@ -334,62 +334,36 @@ static void cover(const vshi_ao_task *task, const int32_t square[2], const int32
     uint32_t looked_at = 0, good = 0;
     for (int32_t k = 0; k < 4; ++k) {
         const int32_t x = cell[0] + (k & 1) * spacing, y = cell[1] + (k >> 1) * spacing;
-        const uint32_t at =
-            x < square[0] + side && y < square[1] + side ? vshi_texel_at(&share->map, x, y) : 0;
+        const size_t at = x < square[0] + side && y < square[1] + side ? vshi_texel_at(&share->map, x, y) : 0;
         looked_at |= (uint32_t)(at > 0) << k;
         good |= (uint32_t)(at > 0 && share->rays[at - 1] > 0 && share->level[at - 1] >= spacing) << k;
     }
     if (good == 0) {
         return;
     }
-    const bool whole = vshi_links_whole(task->points, &share->map, cell[0], cell[1], spacing);
+    const bool whole = vshi_links_whole(&share->map, cell[0], cell[1], spacing);
     for (int32_t k = 0; k < spacing * spacing; ++k) {
         const int32_t column = cell[0] + k % spacing, row = cell[1] + k / spacing;
-        const uint32_t at = vshi_texel_at(&share->map, column, row);
+        const size_t at = vshi_texel_at(&share->map, column, row);
         if (at == 0 || share->level[at - 1] != VSHI_AO_OPEN_LEVEL || is_edge(&share->map, column, row)) {
             continue;
         }
-        const uint32_t corners =
-            looked_at & vshi_ao_corners(task->points, &share->map, cell, spacing, whole, column, row);
+        const uint32_t corners = looked_at & vshi_ao_corners(&share->map, cell, spacing, whole, column, row);
         if (corners != 0 && (corners & ~good) == 0) {
             share->level[at - 1] = (uint8_t)spacing;
         }
     }
 }
 
-/* Whether a tile is among those that are to shoot. */
-static bool shoots(const vshi_ao_share *share, const vshi_texel_lattice *of) {
-    const int32_t columns = (share->map.width + TILE - 1) / TILE;
-    return of->left < share->map.width && of->top < share->map.height &&
-           (share->lattices[of->top / TILE * columns + of->left / TILE] & of->spacing) != 0;
-}
-
-static bool any_shoots(const vshi_ao_share *share, const int32_t square[2]) {
-    bool any = false;
-    for (int32_t k = 0; k < share->spacing * share->spacing; ++k) {
-        const vshi_texel_lattice of = {.left = square[0] + k % share->spacing * TILE,
-                                       .top = square[1] + k / share->spacing * TILE,
-                                       .spacing = 2 * share->spacing - 1};
-        any = any || shoots(share, &of);
-    }
-    return any;
-}
-
 static void shade_square(const vshi_ao_task *task, const int32_t square[2], vsh_shade_stats *stats) {
     const int32_t side = vshi_ao_square(task->share);
     tile t;
-    if (!any_shoots(task->share, square)) {
-        return;
-    }
     const bool fine = task->options->max_error < FINE || task->options->sampler == VSH_SAMPLER_WHITE;
     for (int32_t spacing = fine ? 1 : task->share->spacing; spacing > 0; spacing /= 2) {
         const int32_t step = TILE * spacing;
         for (int32_t k = 0; k < side / step * (side / step); ++k) {
             const vshi_texel_lattice lattice = {square[0] + k % (side / step) * step,
                                                 square[1] + k / (side / step) * step, spacing, TILE, TILE};
-            if (!shoots(task->share, &lattice)) {
-                continue;
-            }
             open_tile(task, &lattice, &t);
             if (t.count > 0) {
                 shoot_tile(task, &t, stats);
@@ -406,12 +380,13 @@ static void shade_square(const vshi_ao_task *task, const int32_t square[2], vsh_
     }
 }
 
-void vshi_ao_by_square(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
+void vshi_ao_by_squares(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
     const vshi_ao_task *task = user;
-    const int32_t side = vshi_ao_square(task->share);
-    const size_t columns = (size_t)((task->share->map.width + side - 1) / side);
+    const vshi_ao_share *share = task->share;
+    const int32_t side = vshi_ao_square(share), across = share->side / side;
     for (size_t n = begin; n < end; ++n) {
-        shade_square(task, (const int32_t[]){(int32_t)(n % columns) * side, (int32_t)(n / columns) * side},
-                     stats);
+        const int32_t square[2] = {share->left + (int32_t)n % across * side,
+                                   share->top + (int32_t)n / across * side};
+        shade_square(task, square, stats);
     }
 }

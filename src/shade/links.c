@@ -13,36 +13,34 @@ static const float LONG = 4.0f;
 static const double FLAT = 0.1;
 
 /* Length of the step between two points; infinite where no surface goes from one to the other. */
-static float step_of(const vsh_points *points, uint32_t a, uint32_t b) {
+static float step_of(const vshi_texel_map *map, size_t a, size_t b) {
     if (a == 0 || b == 0) {
         return INFINITY;
     }
-    const vshi_vec na = vshi_vec_off(points->normals + 3 * (size_t)(a - 1)),
-                   nb = vshi_vec_off(points->normals + 3 * (size_t)(b - 1));
+    const vshi_vec na = vshi_vec_off(map->normal + 3 * (a - 1)), nb = vshi_vec_off(map->normal + 3 * (b - 1));
     if (!(vshi_dot(na, nb) >= ALIKE)) {
         return INFINITY;
     }
-    const vshi_vec d = vshi_sub(vshi_vec_of(points->positions + 3 * (size_t)(b - 1)),
-                                vshi_vec_of(points->positions + 3 * (size_t)(a - 1)));
+    const vshi_vec d =
+        vshi_sub(vshi_vec_off(map->position + 3 * (b - 1)), vshi_vec_off(map->position + 3 * (a - 1)));
     const double square = vshi_dot(d, d), up = vshi_dot(d, na), down = vshi_dot(d, nb);
     const double most = STEEP * STEEP * square;
     return up * up <= most && down * down <= most ? (float)sqrt(square) : INFINITY;
 }
 
 /* The same along so many texels in a row. */
-static float path_of(const vsh_points *points, const vshi_texel_map *map, int32_t x, int32_t y, int32_t dx,
-                     int32_t dy, int32_t steps) {
-    const uint32_t from = vshi_texel_at(map, x, y);
-    uint32_t last = from;
+static float path_of(const vshi_texel_map *map, int32_t x, int32_t y, int32_t dx, int32_t dy, int32_t steps) {
+    const size_t from = vshi_texel_at(map, x, y);
+    size_t last = from;
     for (int32_t k = 1; k < steps; ++k) {
-        const uint32_t next = vshi_texel_at(map, x + k * dx, y + k * dy);
-        if (!(step_of(points, last, next) < INFINITY)) {
+        const size_t next = vshi_texel_at(map, x + k * dx, y + k * dy);
+        if (!(step_of(map, last, next) < INFINITY)) {
             return INFINITY;
         }
         last = next;
     }
-    const uint32_t end = vshi_texel_at(map, x + steps * dx, y + steps * dy);
-    return last == from || step_of(points, last, end) < INFINITY ? step_of(points, from, end) : INFINITY;
+    const size_t end = vshi_texel_at(map, x + steps * dx, y + steps * dy);
+    return last == from || step_of(map, last, end) < INFINITY ? step_of(map, from, end) : INFINITY;
 }
 
 /* The shortest step from a texel. */
@@ -53,15 +51,15 @@ static float shortest(const vshi_window_texel *texels, int32_t width, int32_t he
     return y + 1 < height ? fminf(least, e[width].step[1]) : least;
 }
 
-void vshi_links_find(const vsh_points *points, const vshi_texel_map *map, const vshi_texel_lattice *lattice,
+void vshi_links_find(const vshi_texel_map *map, const vshi_texel_lattice *lattice,
                      vshi_window_texel *texels) {
     const int32_t width = lattice->width, height = lattice->height, spacing = lattice->spacing;
     for (int32_t y = 0; y < height; ++y) {
         for (int32_t x = 0; x < width; ++x) {
             const int32_t column = lattice->left + x * spacing, row = lattice->top + y * spacing;
             vshi_window_texel *e = texels + (size_t)y * (size_t)width + (size_t)x;
-            e->step[0] = x > 0 ? path_of(points, map, column, row, -1, 0, spacing) : INFINITY;
-            e->step[1] = y > 0 ? path_of(points, map, column, row, 0, -1, spacing) : INFINITY;
+            e->step[0] = x > 0 ? path_of(map, column, row, -1, 0, spacing) : INFINITY;
+            e->step[1] = y > 0 ? path_of(map, column, row, 0, -1, spacing) : INFINITY;
         }
     }
     for (int32_t y = 0; y < height; ++y) {
@@ -77,30 +75,26 @@ void vshi_links_find(const vsh_points *points, const vshi_texel_map *map, const 
     }
 }
 
-bool vshi_links_whole(const vsh_points *points, const vshi_texel_map *map, int32_t column, int32_t row,
-                      int32_t spacing) {
-    const uint32_t corner = vshi_texel_at(map, column, row),
-                   right = vshi_texel_at(map, column + spacing, row),
-                   below = vshi_texel_at(map, column, row + spacing);
+bool vshi_links_whole(const vshi_texel_map *map, int32_t column, int32_t row, int32_t spacing) {
+    const size_t corner = vshi_texel_at(map, column, row), right = vshi_texel_at(map, column + spacing, row),
+                 below = vshi_texel_at(map, column, row + spacing);
     if (corner == 0 || right == 0 || below == 0) {
         return false;
     }
-    const vshi_vec p = vshi_vec_of(points->positions + 3 * (size_t)(corner - 1)),
-                   n = vshi_vec_off(points->normals + 3 * (size_t)(corner - 1));
+    const vshi_vec p = vshi_vec_off(map->position + 3 * (corner - 1)),
+                   n = vshi_vec_off(map->normal + 3 * (corner - 1));
     const double part = 1.0 / spacing;
-    const vshi_vec u =
-        vshi_scale(vshi_sub(vshi_vec_of(points->positions + 3 * (size_t)(right - 1)), p), part);
-    const vshi_vec v =
-        vshi_scale(vshi_sub(vshi_vec_of(points->positions + 3 * (size_t)(below - 1)), p), part);
+    const vshi_vec u = vshi_scale(vshi_sub(vshi_vec_off(map->position + 3 * (right - 1)), p), part);
+    const vshi_vec v = vshi_scale(vshi_sub(vshi_vec_off(map->position + 3 * (below - 1)), p), part);
     const double most = FLAT * FLAT * (vshi_dot(u, u) + vshi_dot(v, v)) * spacing * spacing;
     for (int32_t y = 0; y <= spacing; ++y) {
         for (int32_t x = 0; x <= spacing; ++x) {
-            const uint32_t at = vshi_texel_at(map, column + x, row + y);
-            if (at == 0 || !(vshi_dot(n, vshi_vec_off(points->normals + 3 * (size_t)(at - 1))) >= ALIKE)) {
+            const size_t at = vshi_texel_at(map, column + x, row + y);
+            if (at == 0 || !(vshi_dot(n, vshi_vec_off(map->normal + 3 * (at - 1))) >= ALIKE)) {
                 return false;
             }
             const vshi_vec expected = vshi_add(p, vshi_add(vshi_scale(u, x), vshi_scale(v, y)));
-            const vshi_vec off = vshi_sub(vshi_vec_of(points->positions + 3 * (size_t)(at - 1)), expected);
+            const vshi_vec off = vshi_sub(vshi_vec_off(map->position + 3 * (at - 1)), expected);
             if (!(vshi_dot(off, off) <= most)) {
                 return false;
             }
@@ -109,16 +103,15 @@ bool vshi_links_whole(const vsh_points *points, const vshi_texel_map *map, int32
     return true;
 }
 
-bool vshi_links_lead(const vsh_points *points, const vshi_texel_map *map, const int32_t from[2],
-                     const int32_t to[2]) {
+bool vshi_links_lead(const vshi_texel_map *map, const int32_t from[2], const int32_t to[2]) {
     float least = INFINITY, most = 0.0f;
     int32_t at[2] = {from[0], from[1]};
-    uint32_t last = vshi_texel_at(map, at[0], at[1]);
+    size_t last = vshi_texel_at(map, at[0], at[1]);
     while (at[0] != to[0] || at[1] != to[1]) {
         const int axis = at[0] != to[0] ? 0 : 1;
         at[axis] += to[axis] > at[axis] ? 1 : -1;
-        const uint32_t next = vshi_texel_at(map, at[0], at[1]);
-        const float step = step_of(points, last, next);
+        const size_t next = vshi_texel_at(map, at[0], at[1]);
+        const float step = step_of(map, last, next);
         least = step < least ? step : least;
         most = step > most ? step : most;
         if (!(most < INFINITY)) {

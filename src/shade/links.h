@@ -4,17 +4,23 @@
 
 #include "shade/window.h"
 
-#include <vdbshade/shade.h>
-
-/* The points of texels [height][width], numbers + 1; 0: none. */
+/* Texels [height][width], where each of them is and which way it faces. */
 typedef struct vshi_texel_map {
-    const uint32_t *at;
     int32_t width, height;
+    const uint32_t *at;    /* [height][width]: number of the texel's point, + 1; 0: none. NULL: points are
+                              numbered as texels */
+    const uint8_t *level;  /* without `at`, [height][width]: 0 where there is no point */
+    const float *position; /* [points][3], from any one place, world units */
+    const float *normal;   /* [points][3], unit */
 } vshi_texel_map;
 
-static inline uint32_t vshi_texel_at(const vshi_texel_map *map, int32_t column, int32_t row) {
-    const bool inside = column >= 0 && row >= 0 && column < map->width && row < map->height;
-    return inside ? map->at[(size_t)row * (size_t)map->width + (size_t)column] : 0;
+/* The number of a texel's point, + 1; 0: there is none. */
+static inline size_t vshi_texel_at(const vshi_texel_map *map, int32_t column, int32_t row) {
+    if (column < 0 || row < 0 || column >= map->width || row >= map->height) {
+        return 0;
+    }
+    const size_t place = (size_t)row * (size_t)map->width + (size_t)column;
+    return map->at != NULL ? map->at[place] : map->level[place] != 0 ? place + 1 : 0;
 }
 
 /* A rectangle of every `spacing`th texel of every `spacing`th row, from a texel on. */
@@ -24,15 +30,12 @@ typedef struct vshi_texel_lattice {
 
 /* Sets `left`, `above` and `step` of texels [height][width] of a lattice. Its texels hang together where all
  * between them do. */
-void vshi_links_find(const vsh_points *points, const vshi_texel_map *map, const vshi_texel_lattice *lattice,
-                     vshi_window_texel *texels);
+void vshi_links_find(const vshi_texel_map *map, const vshi_texel_lattice *lattice, vshi_window_texel *texels);
 
 /* Whether the square of `spacing` + 1 texels from (column, row) on is whole: all are there and in a plane. */
-bool vshi_links_whole(const vsh_points *points, const vshi_texel_map *map, int32_t column, int32_t row,
-                      int32_t spacing);
+bool vshi_links_whole(const vshi_texel_map *map, int32_t column, int32_t row, int32_t spacing);
 
 /* Whether texels hang together from one to the other, along its row and then the other's column. */
-bool vshi_links_lead(const vsh_points *points, const vshi_texel_map *map, const int32_t from[2],
-                     const int32_t to[2]);
+bool vshi_links_lead(const vshi_texel_map *map, const int32_t from[2], const int32_t to[2]);
 
 #endif

@@ -201,7 +201,7 @@ static vsh_result shade_many(query_call *call, const vsh_run *run, vshi_job *job
             VSHI_TRY_DONE(vshi_order_points(job, field, &call->view, call->first, now, &order, error));
             call->order = order.point;
         }
-        VSHI_TRY_DONE(vshi_shade_pieces(job, now, NULL, VSHI_PIECE,
+        VSHI_TRY_DONE(vshi_shade_pieces(job, now, VSHI_PIECE,
                                         ordered || call->points == NULL ? shade_gathered : shade_in_place,
                                         call, stats, error));
     }

@@ -95,37 +95,16 @@ void vshi_shade_stats_add(vsh_shade_stats *stats, const vsh_shade_stats *more) {
 typedef struct shade_run {
     vshi_shade_fn *fn;
     const void *task;
-    vshi_job *job;
-    size_t grain;
-    const vshi_point_rows *rows;
-    const size_t *pieces; /* [rows + 1]: before each row */
     _Atomic uint64_t marches, samples, skipped, certified, unfinished, invalid, beyond_reach, rays, refined;
     _Atomic uint64_t square_error,
         ao_square_error; /* in units of VSHI_SQUARE_UNIT, so that the order of threads changes no bit */
     _Atomic double worst_error;
 } shade_run;
 
-static void run_piece(void *user, size_t piece, size_t next) {
-    (void)next; /* one at a time */
+static void run_piece(void *user, size_t begin, size_t end) {
     shade_run *run = user;
-    const vshi_point_rows *rows = run->rows;
-    size_t row = 0, beyond = rows->count;
-    while (beyond - row > 1) {
-        const size_t middle = row + (beyond - row) / 2;
-        if (run->pieces[middle] <= piece) {
-            row = middle;
-        } else {
-            beyond = middle;
-        }
-    }
-    const size_t begin = rows->start[row] + (piece - run->pieces[row]) * run->grain;
-    const size_t left = rows->start[row + 1] - begin, count = left < run->grain ? left : run->grain;
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    run->fn(run->task, begin, begin + count, &stats);
-    vshi_job_advance(run->job, count);
-    if (row < rows->first || row >= rows->last) {
-        return;
-    }
+    run->fn(run->task, begin, end, &stats);
     atomic_fetch_add(&run->marches, stats.marches);
     atomic_fetch_add(&run->samples, stats.samples);
     atomic_fetch_add(&run->skipped, stats.skipped);
@@ -140,31 +119,10 @@ static void run_piece(void *user, size_t piece, size_t next) {
     vshi_raise(&run->worst_error, stats.worst_error);
 }
 
-vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows *rows, size_t grain,
-                             vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error) {
-    const size_t all[2] = {0, count};
-    const vshi_point_rows one = {1, all, 0, 1, false};
-    rows = rows != NULL ? rows : &one;
-    size_t few[2] = {0, 0}, *before = few, left_out = 0;
-    void *memory = NULL;
-    if (rows->count > 1) {
-        const vsh_result result =
-            vshi_allocate(&memory, rows->count + 1, sizeof *before, "rows of points", error);
-        if (result != VSH_OK) {
-            return result;
-        }
-        before = memory;
-    }
-    for (size_t row = 0; row < rows->count; ++row) {
-        const size_t points = rows->start[row + 1] - rows->start[row];
-        const bool skipped = rows->only && (row < rows->first || row >= rows->last);
-        before[row + 1] = before[row] + (skipped ? 0 : (points + grain - 1) / grain);
-        left_out += skipped ? points : 0;
-    }
-    vshi_job_advance(job, left_out);
-    shade_run pieces = {.fn = fn, .task = task, .job = job, .grain = grain, .rows = rows, .pieces = before};
-    const vsh_result result = vshi_parallel_for(job, before[rows->count], 1, 0, run_piece, &pieces, error);
-    free(memory);
+vsh_result vshi_shade_pieces(vshi_job *job, size_t count, size_t grain, vshi_shade_fn *fn, const void *task,
+                             vsh_shade_stats *stats, vsh_error *error) {
+    shade_run pieces = {.fn = fn, .task = task};
+    const vsh_result result = vshi_parallel_for(job, count, grain, 1, run_piece, &pieces, error);
     if (stats != NULL) {
         const vsh_shade_stats done = {.marches = pieces.marches,
                                       .samples = pieces.samples,
@@ -183,14 +141,13 @@ vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows 
     return result;
 }
 
-vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, const vshi_point_rows *rows,
-                          size_t grain, vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats,
-                          vsh_error *error) {
+vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, size_t grain,
+                          vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error) {
     vshi_job *job = vshi_job_begin(run, stage, count);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stage);
     }
-    const vsh_result result = vshi_shade_pieces(job, count, rows, grain, fn, task, stats, error);
+    const vsh_result result = vshi_shade_pieces(job, count, grain, fn, task, stats, error);
     vshi_job_end(job);
     return result;
 }

@@ -42,19 +42,9 @@ void vshi_shade_stats_add(vsh_shade_stats *stats, const vsh_shade_stats *more);
 vsh_result vshi_shade_sampler(const vsh_shade_options *options, int32_t rays, const char *what,
                               vshi_sampler **sampler, vsh_error *error);
 
-/* Rows that points come in. Each begins a piece of its own, so that what is worked on together, and with it
- * every value, does not depend on which rows there are. */
-typedef struct vshi_point_rows {
-    size_t count;        /* of the rows, at least 1 */
-    const size_t *start; /* [count + 1]: first point of each row, from 0 to the number of points */
-    size_t first, last;  /* rows first … last - 1 are counted in the statistics */
-    bool only;           /* and the others are not worked on at all */
-} vshi_point_rows;
-
-/* Runs fn over `count` points in pieces of `grain`, as a part of a job whose units are points. `rows` may be
- * NULL: the points are one row. */
-vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows *rows, size_t grain,
-                             vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error);
+/* Runs fn over `count` points in pieces of `grain`, as a part of a job whose units are points. */
+vsh_result vshi_shade_pieces(vshi_job *job, size_t count, size_t grain, vshi_shade_fn *fn, const void *task,
+                             vsh_shade_stats *stats, vsh_error *error);
 
 /* A value's estimated error. */
 static inline void vshi_stats_add_error(vsh_shade_stats *stats, double error) {
@@ -70,23 +60,8 @@ static inline void vshi_raise(_Atomic double *most, double value) {
 }
 
 /* The same as a job of its own, under progress stage `stage`. `run` is a resolved one. */
-vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, const vshi_point_rows *rows,
-                          size_t grain, vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats,
-                          vsh_error *error);
-
-struct vshi_ao_share;
-
-/* vsh_shade_shadow() and vsh_shade_ao() for points in rows; `rows` may be NULL, and so may `faces`,
- * `bent` and `share`, as of vshi_ao_task. With `share` no rows are taken, and points are values of their own
- * rays only. */
-vsh_result vshi_shade_shadow(const vsh_occluders *occluders, const vsh_points *points,
-                             const vshi_point_rows *rows, const vsh_light *light,
-                             const vsh_shade_options *options, const vsh_run *run, float *visibility,
-                             float *deviation, vsh_shade_stats *stats, vsh_error *error);
-vsh_result vshi_shade_ao(const vsh_occluders *occluders, const vsh_points *points, const float *faces,
-                         const vshi_point_rows *rows, const vsh_shade_options *options, const vsh_run *run,
-                         float *ao, float *deviation, float *bent, const struct vshi_ao_share *share,
-                         vsh_shade_stats *stats, vsh_error *error);
+vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, size_t grain,
+                          vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error);
 
 /* vsh_shade_irradiance() by a tinted visibility; the tint is one that vsh_tint_check() has passed. */
 void vshi_shade_irradiance(const vsh_points *points, const float *shading_normals, const vsh_light *light,

@@ -192,50 +192,65 @@ vsh_result vshi_shadow_prepare(const vsh_occluders *occluders, const vsh_light *
     return VSH_OK;
 }
 
+void vshi_shadow_close(vshi_shadow_shader *shader) {
+    vshi_sampler_free(shader->sampler);
+    vshi_layers_free(shader->layers);
+    *shader = (vshi_shadow_shader){.sampler = NULL};
+}
+
+vsh_result vshi_shadow_open(const vsh_occluders *occluders, const vsh_light *light,
+                            const vsh_shade_options *options, int32_t isa, vshi_shadow_shader *shader,
+                            vsh_error *error) {
+    *shader = (vshi_shadow_shader){.sampler = NULL};
+    VSHI_TRY(vshi_shade_options_resolve(options, &shader->options, error));
+    VSHI_TRY(vsh_light_check(light, error));
+    VSHI_TRY(vshi_layers_prepare(occluders, &shader->options, light, &shader->layers, error));
+    vshi_shade_options_settle(&shader->options, occluders->triangles);
+    VSHI_TRY(vshi_shadow_prepare(occluders, light, &shader->options, &shader->task, error));
+    if (vshi_shadow_has_rays(&shader->options)) {
+        VSHI_TRY(vshi_shade_sampler(&shader->options, vshi_shadow_most_rays(&shader->options), "shadow",
+                                    &shader->sampler, error));
+    }
+    shader->task.layers = shader->layers;
+    shader->task.sampler = shader->sampler;
+    shader->task.kernel = vshi_kernel_of(isa);
+    return VSH_OK;
+}
+
+void vshi_shadow_points(const vshi_shadow_shader *shader, const vsh_points *points, float *visibility,
+                        float *deviation, vsh_shade_stats *stats) {
+    vshi_shadow_task task = shader->task;
+    task.points = points;
+    task.visibility = visibility;
+    task.deviation = deviation;
+    for (size_t begin = 0; begin < points->count; begin += VSHI_PIECE) {
+        const size_t left = points->count - begin;
+        vshi_shadow_shade(&task, begin, begin + (left < VSHI_PIECE ? left : VSHI_PIECE), stats);
+    }
+}
+
 vsh_result vsh_shade_shadow(const vsh_occluders *occluders, const vsh_points *points, const vsh_light *light,
                             const vsh_shade_options *options, const vsh_run *run, float *visibility,
                             float *deviation, vsh_shade_stats *stats, vsh_error *error) {
+    VSHI_FLOATS;
     VSHI_NEEDS(occluders);
     VSHI_NEEDS(points);
     VSHI_NEEDS_OF(points->count, points->positions);
     VSHI_NEEDS_OF(points->count, visibility);
-    return vshi_shade_shadow(occluders, points, NULL, light, options, run, visibility, deviation, stats,
-                             error);
-}
-
-vsh_result vshi_shade_shadow(const vsh_occluders *occluders, const vsh_points *points,
-                             const vshi_point_rows *rows, const vsh_light *light,
-                             const vsh_shade_options *options, const vsh_run *run, float *visibility,
-                             float *deviation, vsh_shade_stats *stats, vsh_error *error) {
-    VSHI_FLOATS;
-    vsh_shade_options full;
     vsh_run full_run;
-    vshi_shadow_task task;
-    vshi_sampler *sampler = NULL;
-    vshi_layers *layers = NULL;
-    VSHI_TRY(vshi_shade_options_resolve(options, &full, error));
     VSHI_TRY(vshi_run_resolve(run, &full_run, error));
-    VSHI_TRY(vsh_light_check(light, error));
-    VSHI_TRY(vshi_layers_prepare(occluders, &full, light, &layers, error));
-    vshi_shade_options_settle(&full, occluders->triangles);
-    vsh_result result = VSH_OK;
-    VSHI_TRY_DONE(vshi_shadow_prepare(occluders, light, &full, &task, error));
+    vshi_shadow_shader shader;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_shadow_open(occluders, light, options, full_run.isa, &shader, error));
     char stage[sizeof light->name + 8];
     snprintf(stage, sizeof stage, "shadow.%.*s", (int)sizeof light->name, light->name);
-    if (vshi_shadow_has_rays(&full)) {
-        VSHI_TRY_DONE(vshi_shade_sampler(&full, vshi_shadow_most_rays(&full), stage, &sampler, error));
-    }
-    task.layers = layers;
-    task.sampler = sampler;
-    task.kernel = vshi_kernel_of(full_run.isa);
-    task.points = points;
-    task.visibility = visibility;
-    task.deviation = deviation;
-    result = vshi_shade_run(&full_run, stage, points->count, rows, VSHI_PIECE, vshi_shadow_shade, &task,
+    shader.task.points = points;
+    shader.task.visibility = visibility;
+    shader.task.deviation = deviation;
+    result = vshi_shade_run(&full_run, stage, points->count, VSHI_PIECE, vshi_shadow_shade, &shader.task,
                             stats, error);
 done:
-    vshi_sampler_free(sampler);
-    vshi_layers_free(layers);
+    vshi_shadow_close(&shader);
     return result;
 }
 

@@ -52,6 +52,26 @@ double vshi_shadow_above(const vshi_shadow_task *task, size_t i);
 /* A vshi_shade_fn of a vshi_shadow_task, at most VSHI_PIECE points at once. */
 void vshi_shadow_shade(const void *task, size_t begin, size_t end, vsh_shade_stats *stats);
 
+/* Shadow of one light, prepared for points that come later. It must not be moved, and what it was made of
+ * must outlive it. */
+typedef struct vshi_shadow_shader {
+    vsh_shade_options options; /* settled */
+    struct vshi_layers *layers;
+    vshi_sampler *sampler;
+    vshi_shadow_task task; /* refers to the three above */
+} vshi_shadow_shader;
+
+/* Close it also after an error. Errors: as vsh_shade_shadow(). */
+vsh_result vshi_shadow_open(const vsh_occluders *occluders, const vsh_light *light,
+                            const vsh_shade_options *options, int32_t isa, vshi_shadow_shader *shader,
+                            vsh_error *error);
+void vshi_shadow_close(vshi_shadow_shader *shader);
+
+/* Shades points on the calling thread; values depend on the points and their order alone. Any thread.
+ * `deviation` may be NULL. */
+void vshi_shadow_points(const vshi_shadow_shader *shader, const vsh_points *points, float *visibility,
+                        float *deviation, vsh_shade_stats *stats);
+
 enum { VSHI_PIECE = 512 }; /* points: with their rays 300 KB of the stack */
 
 /* The points of a piece that the light's cones rise above. */

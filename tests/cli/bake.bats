@@ -131,7 +131,7 @@ of_preview() {
 @test "progress on request, by stage" {
     shade bake box.obj "${SMALL[@]}" --ao 1 --progress -o out.exr
     done_well
-    for stage in load voxelize field shadow.sun ao; do
+    for stage in load charts voxelize field bake ao padding write; do
         [[ $stderr == *"vdbshade: $stage "*%* ]] || fail "no $stage"
     done
 }

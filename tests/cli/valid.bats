@@ -33,20 +33,6 @@ load helper
     [[ $output == *"'invalid': min 0, "*", max 1"* ]] || fail "$output"
 }
 
-@test "bands give the same channel of invalid texels" {
-    write_box box.obj
-    awk '$1 == "v" { print "v", $2, $3 + 0.25, $4; next } { print }' box.obj >above.obj
-    options=(--caster above.obj --ao 0.5 --method exact --ao-method exact --size 64 --resolution 24 --quiet)
-    write_scene box.json box.obj '"invalid": true'
-    shade bake box.json "${options[@]}" -o whole.exr
-    done_well
-    shade bake box.json "${options[@]}" --band-rows 8 -o bands.exr --invalid bands.png
-    done_well
-    shade bake box.json "${options[@]}" -o whole.exr --invalid whole.png
-    same_values whole.exr bands.exr
-    cmp whole.png bands.png
-}
-
 @test "a bake whose every texel is in a solid is refused, and the old output stays" {
     write_box box.obj
     awk '$1 == "v" { print "v", 3 * $2 - 1, 3 * $3 - 1, 3 * $4 - 1; next } { print }' box.obj >around.obj

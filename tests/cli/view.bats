@@ -225,6 +225,8 @@ int main(int argc, char **argv) {
             printf("%g ", imath_half_to_float((imath_half_bits_t)(planes[k][i] << 8 | planes[k][texels + i])));
         printf("\n");
     }
+    for (int k = 0; k < argc - 2; ++k) free(planes[k]);
+    free(glb);
     return 0;
 }
 C

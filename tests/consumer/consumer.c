@@ -176,8 +176,8 @@ static void bake_floor(const vsh_occluders *occluders, double least_open, double
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = SIZE;
     options.height = SIZE;
-    vsh_texels *texels = NULL;
-    check("texels", vsh_texels_create(&floor_mesh, 1, &options, NULL, NULL, &texels, error), error);
+    vsh_charts *charts = NULL;
+    check("charts", vsh_charts_create(&floor_mesh, 1, &options, NULL, NULL, &charts, error), error);
 
     static float shadow[SIZE * SIZE], ao[SIZE * SIZE], irradiance[3 * SIZE * SIZE], coverage[SIZE * SIZE];
     float *planes[1] = {shadow};
@@ -186,9 +186,9 @@ static void bake_floor(const vsh_occluders *occluders, double least_open, double
         .shadow = planes, .ao = ao, .irradiance = irradiance, .coverage = coverage};
     vsh_bake_stats stats = vsh_bake_stats_zero();
     check("bake",
-          vsh_bake_lightmap(occluders, texels, &light, 1, &options.shade, NULL, &lightmap, &stats, error),
+          vsh_bake_lightmap(occluders, charts, &light, 1, &options.shade, NULL, &lightmap, &stats, error),
           error);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
 
     const size_t under = 24 * SIZE + 16;
     const size_t mirrored = 7 * SIZE + 16; /* where it would be if v pointed down */

@@ -13,8 +13,8 @@ vsh_result bake_lightmap(const vsh_run *run, vsh_error *error) {
     vsh_model *model = NULL;
     vsh_grid *grid = NULL;
     vsh_occluders *occluders = NULL;
-    vsh_texels *texels = NULL, *band = NULL;
-    vsh_charts *charts = NULL;
+    vsh_charts *charts = NULL, *fine = NULL;
+    vsh_texels *texels = NULL;
     float planes[8][3 * SIDE * SIDE];
     vsh_result result;
     MAKE(model, vsh_model_read("box.obj", run, &model, error));
@@ -23,7 +23,8 @@ vsh_result bake_lightmap(const vsh_run *run, vsh_error *error) {
     vsh_lightmap_options options = preview_lightmap_options();
     options.width = options.height = SIDE;
     options.tangents = 1;
-    MAKE(texels, vsh_texels_create(&mesh, 1, &options, run, NULL, &texels, error));
+    MAKE(charts, vsh_charts_create(&mesh, 1, &options, run, NULL, &charts, error));
+    MAKE(texels, vsh_texels_create(charts, run, &texels, error));
     vsh_light lights[] = {vsh_light_default(), vsh_light_default()};
     strcpy(lights[1].name, "moon");
     lights[1].direction[0] = 1.0;
@@ -36,27 +37,26 @@ vsh_result bake_lightmap(const vsh_run *run, vsh_error *error) {
                               .tint = tint,
                               .tint_by = {VSH_TINT_QUADRATIC, {1, 1, 1}},
                               .bent_space = VSH_BENT_TANGENT};
-    TRY(vsh_bake_lightmap(occluders, texels, lights, 2, NULL, run, &all, NULL, error));
+    TRY(vsh_bake_lightmap(occluders, charts, lights, 2, NULL, run, &all, NULL, error));
     vsh_shade_options adaptive = preview_options();
     adaptive.method = VSH_SHADOW_ADAPTIVE;
     adaptive.ao_method = VSH_AO_ADAPTIVE;
     adaptive.rays = 16;
     const vsh_lightmap some = {
         .shadow = shadow, .ao = planes[4], .coverage = planes[6], .ao_error = planes[7]};
-    TRY(vsh_bake_lightmap(occluders, texels, lights, 2, &adaptive, run, &some, NULL, error));
+    TRY(vsh_bake_lightmap(occluders, charts, lights, 2, &adaptive, run, &some, NULL, error));
     options.supersample = 2;
-    MAKE(charts, vsh_charts_create(&mesh, 1, &options, run, NULL, &charts, error));
+    MAKE(fine, vsh_charts_create(&mesh, 1, &options, run, NULL, &fine, error));
     double box[6];
-    TRY(vsh_charts_bounds(charts, run, box, box + 3, error));
+    TRY(vsh_charts_bounds(fine, run, box, box + 3, error));
     vsh_stitch_options creases = vsh_stitch_options_default();
     creases.max_angle = 180.0; /* a box has no other seams */
-    TRY(vsh_lightmap_stitch(charts, &all, 2, &creases, run, NULL, error));
-    MAKE(band, vsh_texels_create_band(charts, 0, 8, run, &band, error));
-    TRY(vsh_bake_lightmap(occluders, band, lights, 2, NULL, run, &some, NULL, error));
+    TRY(vsh_lightmap_stitch(fine, &all, 2, &creases, run, NULL, error));
+    TRY(vsh_bake_lightmap(occluders, fine, lights, 2, NULL, run, &some, NULL, error));
 end:
-    vsh_texels_free(band);
-    vsh_charts_free(charts);
     vsh_texels_free(texels);
+    vsh_charts_free(fine);
+    vsh_charts_free(charts);
     vsh_occluders_free(occluders);
     vsh_grid_free(grid);
     vsh_model_free(model);

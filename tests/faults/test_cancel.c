@@ -101,7 +101,8 @@ static void every_stage_can_be_cancelled(void **state) {
                 stop_at(s, 1 + (stage + (int)f) % 2, stage, fractions[f], &here);
             }
             if (here < 3) {
-                fail_msg("%s: stage %d of %d: only %d callbacks", s->name, stage, stages, (int)here);
+                fail_msg("%s: stage %d of %d (%s): only %d callbacks", s->name, stage, stages, all.name,
+                         (int)here);
             }
             stopped += here;
         }

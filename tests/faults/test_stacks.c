@@ -182,7 +182,7 @@ static int32_t shadow_method, ao_method;
 static vsh_result bake_by_methods(const vsh_run *run, vsh_error *error) {
     vsh_model *model = NULL;
     vsh_occluders *occluders = NULL;
-    vsh_texels *texels = NULL;
+    vsh_charts *texels = NULL;
     float shadow[SIDE * SIDE], ao[SIDE * SIDE];
     vsh_result result;
     MAKE(model, vsh_model_read("box.obj", run, &model, error));
@@ -193,7 +193,7 @@ static vsh_result bake_by_methods(const vsh_run *run, vsh_error *error) {
     MAKE(occluders, vsh_occluders_create(&mesh, 1, &casting, run, &occluders, error));
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = SIDE;
-    MAKE(texels, vsh_texels_create(&mesh, 1, &options, run, NULL, &texels, error));
+    MAKE(texels, vsh_charts_create(&mesh, 1, &options, run, NULL, &texels, error));
     vsh_light light = vsh_light_default();
     light.angle = 0.3;
     vsh_shade_options shade = vsh_shade_options_default();
@@ -203,7 +203,7 @@ static vsh_result bake_by_methods(const vsh_run *run, vsh_error *error) {
     const vsh_lightmap planes = {.shadow = shadows, .ao = ao};
     TRY(vsh_bake_lightmap(occluders, texels, &light, 1, &shade, run, &planes, NULL, error));
 end:
-    vsh_texels_free(texels);
+    vsh_charts_free(texels);
     vsh_occluders_free(occluders);
     vsh_model_free(model);
     return result;

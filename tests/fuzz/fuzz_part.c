@@ -1,18 +1,19 @@
 /* Parts of bakes, merged: those that the library made when this began, changed in some places, or any bytes.
- * Their sizes and sums are made those of what is there: else no input would come farther than them. The first
+ * Their sums are made those of what is there: else no input would come farther than them. The first
  * byte chooses the bake and the part, the second how the others are taken. */
 #include "fuzz.h"
 
+#include "bake_scene/part_tile.h"
 #include "base/part_file.h"
 #include "base/part_sum.h"
 
-#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <vdbshade/vdbshade.h>
 
-enum { WIDTH = 16, HEIGHT = 40, SHARDS = 2, MOST = 1 << 20 };
+/* Two tiles, one below the other: one for each shard. */
+enum { WIDTH = 16, HEIGHT = 80, SHARDS = 2, MOST = 1 << 20 };
 
 static const char floor_text[] = "v -2 0 -2\nv 2 0 -2\nv 2 0 2\nv -2 0 2\nvt 0 1\nvt 1 1\nvt 1 0\nvt 0 0\n"
                                  "f 1/1 3/3 2/2\nf 1/1 4/4 3/3\n";
@@ -24,11 +25,11 @@ static const char *const scenes[] = {
     "\"method\":\"cone\","
     "\"lights\":[{\"name\":\"sun\",\"type\":\"directional\",\"direction\":[0,1,0],\"angle_deg\":5}],"
     "\"ao\":{\"distance\":1,\"method\":\"cones\"},"
-    "\"receivers\":[{\"mesh\":\"floor.obj\",\"size\":[16,40],\"padding\":2,\"output\":\"0.exr\"}]}",
+    "\"receivers\":[{\"mesh\":\"floor.obj\",\"size\":[16,80],\"padding\":2,\"output\":\"0.exr\"}]}",
     "{\"casters\":[{\"mesh\":\"wall.obj\"}],\"error\":true,\"irradiance\":true,\"sky\":\"y\","
     "\"lights\":[{\"name\":\"sun\",\"type\":\"directional\",\"direction\":[0,1,0],\"angle_deg\":5}],"
     "\"ao\":{\"distance\":1,\"method\":\"exact\",\"bent_normals\":\"tangent\"},"
-    "\"receivers\":[{\"mesh\":\"floor.obj\",\"size\":[16,40],\"ao_spacing\":2,\"output\":\"1.exr\"}]}"};
+    "\"receivers\":[{\"mesh\":\"floor.obj\",\"size\":[16,80],\"ao_spacing\":2,\"output\":\"1.exr\"}]}"};
 
 enum { KINDS = sizeof scenes / sizeof scenes[0] };
 
@@ -101,7 +102,7 @@ typedef struct part {
     size_t size;
 } part;
 
-/* Changes, cuts out or puts in a few bytes, in the head, the tail or anywhere. */
+/* Changes, cuts out or puts in a few bytes, in the head, the numbers of the first tile or anywhere. */
 static void change(fuzz_input *input, part *p) {
     vshi_part_front front;
     uint32_t place;
@@ -109,11 +110,13 @@ static void change(fuzz_input *input, part *p) {
     const uint8_t how = fuzz_byte(input);
     fuzz_fill(input, &place, sizeof place);
     const size_t width = (size_t)1 << how % 4, body = p->size - sizeof(uint64_t);
+    const size_t numbers = sizeof(vshi_part_tile) + sizeof(vsh_shade_stats);
     size_t begin = 0, end = body;
     if ((how & 12) == 4 && front.head_bytes < body - sizeof front) {
         end = sizeof front + (size_t)front.head_bytes;
-    } else if ((how & 12) == 8 && front.tail_bytes < body) {
-        begin = body - (size_t)front.tail_bytes;
+    } else if ((how & 12) == 8 && front.head_bytes < body - sizeof front - numbers) {
+        begin = sizeof front + (size_t)front.head_bytes;
+        end = begin + numbers;
     }
     if (end - begin < width) {
         return;
@@ -132,16 +135,8 @@ static void change(fuzz_input *input, part *p) {
     }
 }
 
-/* Sizes, where those of head and tail are within the whole, and the sum. */
-static void forge(part *p) {
-    vshi_part_front front;
+static void forge_sum(part *p) {
     const size_t body = p->size - sizeof(uint64_t);
-    memcpy(&front, p->at, sizeof front);
-    const size_t rest = body - sizeof front;
-    if (front.head_bytes <= rest && front.tail_bytes <= rest - front.head_bytes) {
-        front.body_bytes = rest - front.head_bytes - front.tail_bytes;
-        memcpy(p->at, &front, sizeof front);
-    }
     const uint64_t sum = vshi_part_sum(VSHI_PART_SUM, p->at, body);
     memcpy(p->at + body, &sum, sizeof sum);
 }
@@ -163,7 +158,7 @@ static part make_part(fuzz_input *input, const source *s, int shard) {
         }
     }
     if (p.size >= sizeof(vshi_part_front) + sizeof(uint64_t) && how < 0xf0) {
-        forge(&p);
+        forge_sum(&p);
     }
     return p;
 }
@@ -200,7 +195,7 @@ static vsh_result end(void *user, vsh_result result, vsh_error *error) {
     return result;
 }
 
-static void merge_lightmaps(const source *s, bool bands) {
+static void merge_lightmaps(const source *s) {
     int32_t rows;
     vsh_row_sink sink = vsh_row_sink_default();
     sink.begin = begin;
@@ -211,7 +206,6 @@ static void merge_lightmaps(const source *s, bool bands) {
     vsh_bake_job_options options = vsh_bake_job_options_default();
     options.sink = &sink;
     options.parts = s->name;
-    options.band_rows = bands ? VSH_BAND_STEP : 0;
     vsh_error error;
     vsh_bake_job *job;
     FUZZ_MAKE(job, vsh_bake_job_create(s->scene, &options, &run, &job, fuzz_error(&error)));
@@ -247,7 +241,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     char name[64];
     snprintf(name, sizeof name, "%s.%d-of-%d.part", strrchr(s->name, '/') + 1, shard + 1, SHARDS);
     fuzz_file(name, p.at, p.size);
-    merge_lightmaps(s, which >= 128);
+    merge_lightmaps(s);
     read_words(s);
     fuzz_file(name, s->bytes[shard], s->size[shard]);
     free(p.at);

@@ -102,23 +102,14 @@ static void lightmap(fuzz_input *input) {
     mesh.uvs = places;
     mesh.normals = fuzz_byte(input) & 1 ? fuzz_corners : NULL;
     vsh_error error;
-    vsh_texels *texels;
-    FUZZ_MAKE(texels, vsh_texels_create(&mesh, 1, &options, &run, NULL, &texels, fuzz_error(&error)));
     vsh_charts *charts;
     FUZZ_MAKE(charts, vsh_charts_create(&mesh, 1, &options, &run, NULL, &charts, fuzz_error(&error)));
     if (charts != NULL) {
-        int32_t rows[2] = {0, 8};
-        fuzz_take(input, rows, sizeof rows);
-        vsh_texels *band;
-        FUZZ_MAKE(band, vsh_texels_create_band(charts, rows[0], rows[1], &run, &band, fuzz_error(&error)));
-        vsh_texels_free(band);
-        static float one;
-        float *const planes[] = {&one};
-        const vsh_lightmap all = {planes, &one, &one, &one, planes, &one, &one, planes, .invalid = &one};
-        vsh_charts_band_bytes(charts, rows[0], rows[1], &all, 1);
+        vsh_texels *texels;
+        FUZZ_MAKE(texels, vsh_texels_create(charts, &run, &texels, fuzz_error(&error)));
+        vsh_texels_free(texels);
     }
-    vsh_charts_free(charts);
-    if (texels != NULL && FITS(options)) {
+    if (charts != NULL && FITS(options)) {
         static float planes[6][3 * MOST_TEXELS];
         vsh_shade_options shading = vsh_shade_options_default();
         shading.ao_cones = 4;
@@ -141,11 +132,11 @@ static void lightmap(fuzz_input *input) {
         map.tint = how & 16 ? tint : NULL;
         map.ambient = how & 32 ? ambient : NULL;
         fuzz_ended_plain(
-            vsh_bake_lightmap(occluders, texels, &light, 1, &shading, &run, &map, NULL, fuzz_error(&error)),
+            vsh_bake_lightmap(occluders, charts, &light, 1, &shading, &run, &map, NULL, fuzz_error(&error)),
             &error);
         fuzz_free_occluders(occluders);
     }
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
 }
 
 static void volume(fuzz_input *input) {

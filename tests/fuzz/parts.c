@@ -34,9 +34,6 @@ static void make(void) {
     field.reach = 2.0;
     fuzz_must(vsh_field_create(made.grid, &field, &run, &made.field, NULL));
     fuzz_must(vsh_occluders_from_grid(made.grid, &field, &run, &made.occluders, NULL));
-    vsh_lightmap_options lightmap = vsh_lightmap_options_default();
-    lightmap.width = lightmap.height = FUZZ_SIDE;
-    fuzz_must(vsh_texels_create(&made.mesh, 1, &lightmap, &run, NULL, &made.texels, NULL));
     const double square[] = {-1, -1, 1, -1, 1, 1, -1, 1};
     const size_t counts[] = {4};
     fuzz_must(vsh_outline_from_polygons(square, counts, 1, &run, &made.outline, NULL));

@@ -16,7 +16,6 @@ typedef struct fuzz_handles {
     vsh_grid *grid;
     vsh_field *field;
     vsh_occluders *occluders; /* of the field alone */
-    vsh_texels *texels;
     vsh_outline *outline;
     vsh_voxels *voxels;
     vsh_heights *heights;

@@ -63,9 +63,9 @@ class NoCopy(Case):
             vdbshade._points.lib = real
 
     def test_values_are_written_into_the_callers_arrays(self):
-        texels, occluders = vdbshade.Texels(floor(), width=32, height=16), vdbshade.Occluders(box())
+        charts, occluders = vdbshade.Charts(floor(), width=32, height=16), vdbshade.Occluders(box())
         mine = {"shadow.sun": numpy.full((16, 32), 7, numpy.float32), "irradiance": numpy.full((16, 32, 3), 7, numpy.float32)}
-        lightmap = vdbshade.bake_lightmap(occluders, texels, sun(), irradiance=True, out=mine)
+        lightmap = vdbshade.bake_lightmap(occluders, charts, sun(), irradiance=True, out=mine)
         for name, plane in mine.items():
             self.assertIs(lightmap[name], plane)
             self.assertLessEqual(plane.max(), 1.0)
@@ -78,7 +78,7 @@ class NoCopy(Case):
         self.assertSame(values, grid.values((0, 0, 0), (2, 3, 4)))
 
     def test_what_the_library_has_is_viewed_and_not_to_be_written(self):
-        texels = vdbshade.Texels(floor(), width=8, height=8)
+        texels = vdbshade.Charts(floor(), width=8, height=8).texels()
         samples = texels.samples
         self.assertEqual(samples["positions"].shape, (64, 3))
         self.assertEqual(address(samples["positions"]), address(texels.samples["positions"]))
@@ -140,9 +140,9 @@ class Refused(Case):
         query = vdbshade.Query(occluders, sun())
         self.refused(ValueError, "no value 'shadows'", query.points, positions, out=dict(shadows=locked))
         self.refused(ValueError, "writeable", query.points, positions, normals, out=dict(ao=locked))
-        texels = vdbshade.Texels(floor(), width=8, height=8)
-        self.refused(ValueError, "out: ao: not asked for", vdbshade.bake_lightmap, occluders, texels, sun(), out=dict(ao=numpy.zeros((8, 8))))
-        self.refused(ValueError, "two of one name", vdbshade.bake_lightmap, occluders, texels, [sun(), sun()])
+        charts = vdbshade.Charts(floor(), width=8, height=8)
+        self.refused(ValueError, "out: ao: not asked for", vdbshade.bake_lightmap, occluders, charts, sun(), out=dict(ao=numpy.zeros((8, 8))))
+        self.refused(ValueError, "two of one name", vdbshade.bake_lightmap, occluders, charts, [sun(), sun()])
         self.refused(ValueError, "shape", vdbshade.Grid.from_meshes(box(), resolution=8).values, (0, 0, 0), (1, 1, 1),
                      numpy.empty((2, 2, 2), numpy.float32))
 
@@ -168,15 +168,15 @@ class Refused(Case):
         self.refused(vdbshade.InputError, "without a triangle", vdbshade.Grid.from_meshes, vdbshade.Mesh([], []))
         self.refused(vdbshade.ArgumentError, "no meshes", vdbshade.Occluders, [])
         self.refused(TypeError, "meshes: expected a vdbshade.Mesh", vdbshade.Occluders, [BOX])
-        self.refused(vdbshade.ArgumentError, "width", vdbshade.Texels, floor(), width=0, height=8)
+        self.refused(vdbshade.ArgumentError, "width", vdbshade.Charts, floor(), width=0, height=8)
 
     def test_huge_sizes_are_refused_before_memory_is_taken(self):
         wide = numpy.broadcast_to(numpy.float32(0.5), (70000, 70000))
         self.refused(ValueError, "at most 65536 rows and columns", vdbshade.Model.from_heights, wide)
         run = vdbshade.Run(memory_limit=2**30)
-        self.refused(vdbshade.LimitError, "memory", vdbshade.Texels, floor(), width=65536, height=65536, run=run)
-        self.refused(vdbshade.ArgumentError, "width|65536", vdbshade.Texels, floor(), width=2**31 - 1, height=2**31 - 1)
-        self.refused(ValueError, "width .*: too large", vdbshade.Texels, floor(), width=2**31, height=8)
+        self.refused(vdbshade.LimitError, "memory", vdbshade.Charts(floor(), width=8192, height=8192).texels, run=run)
+        self.refused(vdbshade.ArgumentError, "width|65536", vdbshade.Charts, floor(), width=2**31 - 1, height=2**31 - 1)
+        self.refused(ValueError, "width .*: too large", vdbshade.Charts, floor(), width=2**31, height=8)
         self.refused(vdbshade.LimitError, "memory|voxel", vdbshade.Grid.from_meshes, box(), voxel_size=1e-9)
         grid = vdbshade.Grid.from_meshes(box(), resolution=8)
         self.refused(ValueError, "sizes", grid.values, (0, 0, 0), (2**40, 1, 1))

@@ -137,7 +137,7 @@ class Running(Case):
         for _ in range(20):
             seen = []
             run = vdbshade.Run(threads=4, progress=lambda stage, fraction: seen.append((stage, fraction)), interval=1000.0)
-            vdbshade.Texels(floor(), width=256, height=256, run=run)
+            vdbshade.Charts(floor(), width=256, height=256, run=run)
             self.assertEqual({s for s, _ in seen}, {s for s, f in seen if f == 1.0})
             self.assertEqual(seen[-1][1], 1.0)
 
@@ -325,10 +325,10 @@ class Memory(Case):
         self.assertLess(self.grows(lambda: vdbshade.Grid.from_meshes(box(), resolution=16).info, 300), 2000 * kib)
 
     def test_large_things_are_freed_when_nothing_refers_to_them(self):
-        texels = vdbshade.Texels(floor(), width=256, height=256)
+        charts = vdbshade.Charts(floor(), width=256, height=256)
         occluders = vdbshade.Occluders(box())
         megabyte = 1 << 20
-        self.assertLess(self.grows(lambda: vdbshade.bake_lightmap(occluders, texels, sun()), 20), 4 * megabyte)
+        self.assertLess(self.grows(lambda: vdbshade.bake_lightmap(occluders, charts, sun()), 20), 4 * megabyte)
         self.assertLess(self.grows(lambda: vdbshade.Model(ASSETS / "cloister.glb")[0].positions.sum(), 20), 2 * megabyte)
         self.assertLess(self.grows(lambda: vdbshade.image_read(ASSETS / "terrain.png"), 20), 4 * megabyte)
 

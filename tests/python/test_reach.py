@@ -116,11 +116,10 @@ class Reach(Case):
         v.Query(occluders, lamp).points(positions, normals)
         v.trace_shadow(positions, normals, lamp, triangles=triangles), v.trace_ao(positions, normals, 1.0, solids=solids)
         # lightmaps
-        texels = v.Texels(floor(), width=16, height=16)
-        texels.info, texels.samples, v.charts_closeness(floor(), 16, 16)
-        lightmap = v.bake_lightmap(occluders, texels, lamp, ao=True)
         charts = v.Charts(floor(), width=16, height=16)
-        charts.info, charts.bounds(), charts.band_bytes(0, 16), charts.band(0, 8), v.lightmap_stitch(charts, lightmap)
+        charts.info, charts.bounds(), charts.texels().samples, v.charts_closeness(floor(), 16, 16)
+        lightmap = v.bake_lightmap(occluders, charts, lamp, ao=True)
+        v.lightmap_stitch(charts, lightmap)
         lightmap.write(here / "a.exr")
         image = v.image_read(here / "a.exr")
         v.image_check(here / "b.exr", ["ao"], (2, 2)), v.provenance_max_error(image.attributes, "ao")
@@ -203,13 +202,13 @@ class Reach(Case):
         """A square that is all hidden takes the values of the border of one that lies in the same place."""
         uvs = FLOOR_UVS * [0.4, 0.8] + [0.05, 0.1]
         meshes = [vdbshade.Mesh(FLOOR, FLOOR_TRIANGLES, uvs=uvs + [shift, 0]) for shift in (0, 0.5)]
-        texels = vdbshade.Texels(meshes, width=32, height=32)
-        ao, coverage = numpy.zeros((32, 32), numpy.float32), vdbshade.bake_lightmap(vdbshade.Occluders(box()), texels)["A"]
+        charts = vdbshade.Charts(meshes, width=32, height=32)
+        ao, coverage = numpy.zeros((32, 32), numpy.float32), vdbshade.bake_lightmap(vdbshade.Occluders(box()), charts)["A"]
         left, right = coverage[:, :16] > 0, coverage[:, 16:] > 0
         ao[:, :16][left] = numpy.linspace(0.1, 0.9, left.sum())
         self.assertTrue(numpy.array_equal(left, right))
         coverage[:, 16:] = 0
-        self.assertEqual(vdbshade.lightmap_fill_hidden(texels, {"ao": ao, "A": coverage}), right.sum())
+        self.assertEqual(vdbshade.lightmap_fill_hidden(charts, {"ao": ao, "A": coverage}), right.sum())
         border = left & ~(numpy.roll(left, 1, 0) & numpy.roll(left, -1, 0) & numpy.roll(left, 1, 1) & numpy.roll(left, -1, 1))
         self.assertSame(ao[:, 16:][border], ao[:, :16][border])
         self.assertTrue(set(ao[:, 16:][right]) <= set(ao[:, :16][border]))

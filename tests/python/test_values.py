@@ -21,7 +21,7 @@ class Values(Case):
         self.cli("bake", model, "--sun", "0.6,0.75,0.5", "--sun-angle", 3, "--ao", 0.6, "--size", 128, "--pack", "channels", "-o", "cli.exr")
         baked = vdbshade.image_read(self.folder / "cli.exr")
         meshes = vdbshade.Model(model)
-        lightmap = vdbshade.bake_lightmap(vdbshade.Occluders(meshes), vdbshade.Texels(meshes, width=128, height=128),
+        lightmap = vdbshade.bake_lightmap(vdbshade.Occluders(meshes), vdbshade.Charts(meshes, width=128, height=128),
                                           sun(**LIT), ao=True, ao_distance=0.6)
         self.assertEqual(set(lightmap), set(baked))
         for name in baked:
@@ -133,15 +133,10 @@ class Values(Case):
         backwards = query.points(positions[::-1], normals[::-1])["shadow"]
         self.assertSame(numpy.ascontiguousarray(backwards[:, ::-1]), want["shadow"])
 
-    def test_bands_of_rows_are_those_of_the_whole(self):
-        occluders, options = vdbshade.Occluders(box()), dict(width=64, height=64)
-        whole = vdbshade.bake_lightmap(occluders, vdbshade.Texels(floor(), **options), sun())
-        charts = vdbshade.Charts(floor(), **options)
-        bands = [vdbshade.bake_lightmap(occluders, charts.band(row, 16), sun())["shadow.sun"] for row in range(0, 64, 16)]
-        self.assertSame(numpy.concatenate(bands), whole["shadow.sun"])
-        low, high = charts.bounds()
-        self.assertTrue(numpy.allclose([low[0], high[0]], [-2, 2], atol=0.1))
-        self.assertGreater(charts.band_bytes(0, 64, ao=True), charts.band_bytes(0, 16))
+    def test_bounds_of_charts_are_those_of_their_samples(self):
+        charts = vdbshade.Charts(floor(), width=64, height=64)
+        positions = charts.texels().samples["positions"]
+        self.assertEqual(charts.bounds(), (tuple(positions.min(0)), tuple(positions.max(0))))
 
     def test_threads_that_call_at_once_get_the_same(self):
         query = vdbshade.Query(vdbshade.Occluders(box(), resolution=64), sun(), method="cone")

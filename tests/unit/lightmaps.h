@@ -69,18 +69,18 @@ static inline vsh_field *floor_field(int wall) {
     return field;
 }
 
-static inline vsh_texels *make_texels(const vsh_mesh *meshes, size_t count, int32_t size, int32_t supersample,
+static inline vsh_charts *make_texels(const vsh_mesh *meshes, size_t count, int32_t size, int32_t supersample,
                                       int32_t padding) {
     vsh_lightmap_options options = preview_lightmap_options();
     options.width = options.height = size;
     options.supersample = supersample;
     options.padding = padding;
-    vsh_texels *texels = NULL;
+    vsh_charts *charts = NULL;
     vsh_error error = {0};
-    if (vsh_texels_create(meshes, count, &options, NULL, NULL, &texels, &error) != VSH_OK) {
+    if (vsh_charts_create(meshes, count, &options, NULL, NULL, &charts, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
-    return texels;
+    return charts;
 }
 
 static inline vsh_light sun(double x, double y, double z, double angle) {
@@ -108,12 +108,12 @@ static inline planes *new_planes(void) {
     return p;
 }
 
-static inline void bake(const vsh_field *field, const vsh_texels *texels, const vsh_light *light,
+static inline void bake(const vsh_field *field, const vsh_charts *charts, const vsh_light *light,
                         const vsh_lightmap *lightmap, vsh_bake_stats *stats, int32_t threads) {
     vsh_run run = vsh_run_default();
     run.threads = threads;
     vsh_error error = {0};
-    if (vsh_bake_lightmap(occluders_of(field), texels, light, light != NULL ? 1 : 0, NULL, &run, lightmap,
+    if (vsh_bake_lightmap(occluders_of(field), charts, light, light != NULL ? 1 : 0, NULL, &run, lightmap,
                           stats, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }

@@ -4,7 +4,7 @@
 
 #include "floor_under_ball.h"
 
-enum { SIZE = 48, SHARDS = 2, CHANNELS = 12 };
+enum { SIZE = 80, SHARDS = 2, CHANNELS = 12 };
 
 /* Rows as they come. */
 typedef struct taken {

@@ -253,8 +253,10 @@ static void ao_between_texels_keeps_the_error_beside_what_is_low(void **state) {
     caster c = make(meshes, 2, VOXEL);
     vsh_lightmap_options size = vsh_lightmap_options_default();
     size.width = size.height = SIZE;
+    vsh_charts *charts = NULL;
     vsh_texels *of = NULL;
-    assert_int_equal(vsh_texels_create(&ground.mesh, 1, &size, NULL, NULL, &of, NULL), VSH_OK);
+    assert_int_equal(vsh_charts_create(&ground.mesh, 1, &size, NULL, NULL, &charts, NULL), VSH_OK);
+    assert_int_equal(vsh_texels_create(charts, NULL, &of, NULL), VSH_OK);
     const vsh_texel_samples samples = vsh_texels_samples(of);
     float *open = malloc(samples.count * sizeof *open);
     assert_int_equal(vsh_trace_ao(c.triangles, NULL, samples.count, samples.positions, samples.normals, LIFT,
@@ -264,7 +266,7 @@ static void ao_between_texels_keeps_the_error_beside_what_is_low(void **state) {
     options.ao_distance = 0.5;
     const vsh_lightmap lightmap = {.ao = plane, .coverage = covered};
     assert_int_equal(
-        vsh_bake_lightmap(occluders_of_caster(&c), of, NULL, 0, &options, NULL, &lightmap, NULL, NULL),
+        vsh_bake_lightmap(occluders_of_caster(&c), charts, NULL, 0, &options, NULL, &lightmap, NULL, NULL),
         VSH_OK);
     double sum = 0.0, count = 0.0;
     for (size_t i = 0; i < samples.count; ++i) {
@@ -277,6 +279,7 @@ static void ao_between_texels_keeps_the_error_beside_what_is_low(void **state) {
     assert_true(count > 0.5 * TEXELS && sqrt(sum / count) <= 0.02);
     free(open);
     vsh_texels_free(of);
+    vsh_charts_free(charts);
     caster_free(&c);
 }
 

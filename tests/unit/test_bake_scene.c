@@ -1,7 +1,8 @@
 /* A scene's lightmaps, from its files to its rows, by one call and by steps. */
 #include "floor_under_ball.h"
 
-enum { SIZE = 48 };
+/* Rows come 64 at a time. */
+enum { SIZE = 384, LIMIT = 4 << 20 };
 
 /* Rows as they come. */
 typedef struct taken {
@@ -63,12 +64,13 @@ static vsh_row_sink sink_of(taken *t) {
     return sink;
 }
 
-static vsh_result bake_into(const case_scene *c, int32_t band_rows, taken *t, vsh_error *error) {
+static vsh_result bake_into(const case_scene *c, const char *scratch, const vsh_run *run, taken *t,
+                            vsh_error *error) {
     const vsh_row_sink sink = sink_of(t);
     vsh_bake_job_options options = vsh_bake_job_options_default();
     options.sink = &sink;
-    options.band_rows = band_rows;
-    return vsh_bake_scene(&c->scene, &options, NULL, NULL, error);
+    options.scratch = scratch;
+    return vsh_bake_scene(&c->scene, &options, run, NULL, error);
 }
 
 static void one_call_writes_the_file_that_a_sink_is_handed(void **state) {
@@ -81,11 +83,10 @@ static void one_call_writes_the_file_that_a_sink_is_handed(void **state) {
     vsh_bake_report report;
     assert_ok(vsh_bake_scene(&c.scene, NULL, NULL, &report, &error), &error);
     assert_int_equal(report.texels, SIZE * SIZE);
-    assert_int_equal(report.bands, 1);
     assert_int_equal(report.error_count, 0);
     assert_true(report.occluders.active_voxels > 0 && report.shade.marches > 0);
     taken t = {.fail_at = 0};
-    assert_ok(bake_into(&c, 0, &t, &error), &error);
+    assert_ok(bake_into(&c, NULL, NULL, &t, &error), &error);
     assert_int_equal(t.begun, 1);
     assert_int_equal(t.ended, 1);
     assert_int_equal(t.result, VSH_OK);
@@ -114,20 +115,41 @@ static void one_call_writes_the_file_that_a_sink_is_handed(void **state) {
     free(t.values);
 }
 
-static void rows_of_bands_are_the_rows_of_the_whole(void **state) {
+/* The ball stands in the floor, so that some texels are invalid, over several tiles. */
+static void threads_and_memory_limits_change_no_bit(void **state) {
     (void)state;
-    case_scene c;
-    fill(&c, SIZE, 1.0);
-    vsh_error error;
-    taken whole = {.fail_at = 0}, banded = {.fail_at = 0};
-    assert_ok(bake_into(&c, 0, &whole, &error), &error);
-    assert_ok(bake_into(&c, 16, &banded, &error), &error);
-    assert_int_equal(whole.adds, 1);
-    assert_int_equal(banded.adds, 3);
-    assert_int_equal(banded.rows, SIZE);
-    assert_memory_equal(whole.values, banded.values, (size_t)whole.channels * SIZE * SIZE * sizeof(float));
-    free(whole.values);
-    free(banded.values);
+    static const struct {
+        int32_t method, ao_method, supersample;
+    } cases[] = {{VSH_SHADOW_CONE, VSH_AO_CONES, 1},
+                 {VSH_SHADOW_IMPROVED, VSH_AO_TAPS, 2},
+                 {VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE, 1}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        case_scene c;
+        fill(&c, SIZE, 0.4);
+        c.receiver.supersample = cases[i].supersample;
+        c.receiver.ao_spacing = 4;
+        c.scene.shade.method = cases[i].method;
+        c.scene.shade.ao_method = cases[i].ao_method;
+        c.scene.shade.rays = 32;
+        vsh_error error;
+        vsh_run run = vsh_run_default();
+        taken one = {.fail_at = 0}, more = {.fail_at = 0}, limited = {.fail_at = 0}, none = {.fail_at = 0};
+        run.threads = 1;
+        assert_ok(bake_into(&c, NULL, &run, &one, &error), &error);
+        run.threads = 4;
+        assert_ok(bake_into(&c, NULL, &run, &more, &error), &error);
+        run.threads = 2;
+        run.memory_limit = LIMIT;
+        assert_ok(bake_into(&c, at("."), &run, &limited, &error), &error);
+        const size_t bytes = (size_t)one.channels * SIZE * SIZE * sizeof(float);
+        assert_memory_equal(one.values, more.values, bytes);
+        assert_memory_equal(one.values, limited.values, bytes);
+        /* the folder is needed */
+        assert_int_equal(bake_into(&c, at("missing"), &run, &none, &error), VSH_ERROR_WRITE);
+        free(one.values);
+        free(more.values);
+        free(limited.values);
+    }
 }
 
 static void what_a_sink_refuses_ends_the_bake_as_it_says(void **state) {
@@ -136,7 +158,7 @@ static void what_a_sink_refuses_ends_the_bake_as_it_says(void **state) {
     fill(&c, SIZE, 1.0);
     vsh_error error;
     taken t = {.fail_at = 2};
-    assert_int_equal(bake_into(&c, 16, &t, &error), VSH_ERROR_WRITE);
+    assert_int_equal(bake_into(&c, NULL, NULL, &t, &error), VSH_ERROR_WRITE);
     assert_string_equal(error.message, "the sink is full");
     assert_int_equal(t.adds, 2);
     assert_int_equal(t.ended, 1);
@@ -158,7 +180,6 @@ static void steps_come_in_their_order(void **state) {
     vsh_job_lightmap lightmap;
     vsh_bake_job_lightmap(job, 0, &lightmap);
     assert_int_equal(lightmap.covered, SIZE * SIZE);
-    assert_int_equal(lightmap.bands, 1);
     assert_string_equal(lightmap.output, c.output);
     assert_ok(vsh_bake_job_prepare(job, NULL, &error), &error);
     vsh_bake_report report;
@@ -219,7 +240,7 @@ static void lightmaps_of_objects_have_their_names(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(one_call_writes_the_file_that_a_sink_is_handed),
-        cmocka_unit_test(rows_of_bands_are_the_rows_of_the_whole),
+        cmocka_unit_test(threads_and_memory_limits_change_no_bit),
         cmocka_unit_test(what_a_sink_refuses_ends_the_bake_as_it_says),
         cmocka_unit_test(steps_come_in_their_order),
         cmocka_unit_test(what_cannot_be_is_refused_before_a_file_is_read),

@@ -45,8 +45,8 @@ static vsh_result bake(const vsh_field *field, const asked *ask, baked *into, vs
     vsh_lightmap_options options = preview_lightmap_options();
     options.width = options.height = SIZE;
     options.tangents = ask->tangents;
-    vsh_texels *texels = NULL;
-    assert_int_equal(vsh_texels_create(&mesh, 1, &options, NULL, NULL, &texels, NULL), VSH_OK);
+    vsh_charts *texels = NULL;
+    assert_int_equal(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &texels, NULL), VSH_OK);
     vsh_shade_options shade = preview_options();
     shade.ao_method = ask->ao_method;
     shade.ao_cones = 64;
@@ -67,7 +67,7 @@ static vsh_result bake(const vsh_field *field, const asked *ask, baked *into, vs
     const vsh_result result =
         vsh_bake_lightmap(occluders_with(field, ask->layer, ask->layer != NULL), texels, &light,
                           ask->light ? 1 : 0, &shade, NULL, &lightmap, NULL, error);
-    vsh_texels_free(texels);
+    vsh_charts_free(texels);
     return result;
 }
 
@@ -249,9 +249,9 @@ static void test_refused(void **state) {
         {{.ao_method = VSH_AO_TAPS, .bent = true},
          "bent normals: AO by taps knows no directions; use cones or rays"},
         {{.ao_method = VSH_AO_CONES, .bent = true, .bent_space = VSH_BENT_TANGENT},
-         "bent_space 1: expected 0, or 1 with texels that have tangents"},
+         "bent_space 1: expected 0, or 1 with charts that have tangents"},
         {{.ao_method = VSH_AO_CONES, .bent = true, .bent_space = 2, .tangents = 1},
-         "bent_space 2: expected 0, or 1 with texels that have tangents"},
+         "bent_space 2: expected 0, or 1 with charts that have tangents"},
         {{.ao_method = VSH_AO_CONES, .tint = {3, {1, 1, 1}}}, "tint: type 3 is out of range 0 … 2"},
         {{.ao_method = VSH_AO_CONES, .tint = {VSH_TINT_POWER, {1, NAN, 1}}},
          "tint: power[1] nan is out of range 0.0625 … 16"},

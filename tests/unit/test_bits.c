@@ -154,14 +154,14 @@ static void lightmap(const context *c, int32_t method, bits *b) {
     options.shade.ao_distance = 0.75;
     float *planes[1] = {shadow_plane};
     vsh_lightmap map = {.shadow = planes, .ao = ao_plane, .irradiance = rgb, .coverage = coverage};
-    vsh_texels *made = NULL;
+    vsh_charts *made = NULL;
     const vsh_light light = sun();
     vsh_error error;
-    check(vsh_texels_create(&floor, 1, &options, &c->run, NULL, &made, &error), &error);
+    check(vsh_charts_create(&floor, 1, &options, &c->run, NULL, &made, &error), &error);
     check(vsh_bake_lightmap(occluders_of(c->field), made, &light, 1, &options.shade, &c->run, &map, NULL,
                             &error),
           &error);
-    vsh_texels_free(made);
+    vsh_charts_free(made);
     add_floats(b, shadow_plane, TEXELS);
     add_floats(b, ao_plane, TEXELS);
     add_floats(b, rgb, 3 * TEXELS);

@@ -126,8 +126,8 @@ static void bake_floor(const char *casters, float *shadow, float *coverage, int3
     options.padding = 0;
     size_t count = 0;
     const vsh_mesh *meshes = vsh_assets_receiver(assets, 0, &count);
-    vsh_texels *texels = NULL;
-    assert_int_equal(vsh_texels_create(meshes, count, &options, NULL, NULL, &texels, &error), VSH_OK);
+    vsh_charts *texels = NULL;
+    assert_int_equal(vsh_charts_create(meshes, count, &options, NULL, NULL, &texels, &error), VSH_OK);
     static const double high[3] = {0.0, 1.0, 0.0};
     const vsh_light light = sun(high, 0.1);
     float *const planes[1] = {shadow};
@@ -138,7 +138,7 @@ static void bake_floor(const char *casters, float *shadow, float *coverage, int3
         fail_msg("%s", error.message);
     }
     vsh_field_free(empty);
-    vsh_texels_free(texels);
+    vsh_charts_free(texels);
     vsh_assets_free(assets);
     vsh_scene_free(scene);
 }

@@ -61,7 +61,8 @@ static outcome try(const stage *s, const trial *t) {
     options.shade.start_offset = 0.0;
     options.ao_spacing = vsh_lightmap_options_default().ao_spacing;
     vsh_light light = sun((double[]){0.0, 1.0, 0.0}, 2.0 * atan(WIDE));
-    vsh_texels *texels = create(&floor.mesh, 1, options, NULL);
+    vsh_charts *charts = create(&floor.mesh, 1, options, NULL);
+    vsh_texels *texels = rasterize(charts);
     const vsh_texel_samples all = vsh_texels_samples(texels);
     outcome o = {0};
     vsh_error error = {0};
@@ -74,7 +75,7 @@ static outcome try(const stage *s, const trial *t) {
         stats.errors = errors;
         const vsh_occluders casters = {
             .field = s->field, .triangles = s->triangles, .true_triangles = t->held ? s->triangles : NULL};
-        result = vsh_bake_lightmap(&casters, texels, s->ao ? NULL : &light, s->ao ? 0 : 1, &options.shade,
+        result = vsh_bake_lightmap(&casters, charts, s->ao ? NULL : &light, s->ao ? 0 : 1, &options.shade,
                                    NULL, &lightmap, &stats, &error);
         o.claimed = vsh_bake_error_rmse(&errors[0]);
         o.rays = (double)stats.shade.rays;
@@ -115,6 +116,7 @@ static outcome try(const stage *s, const trial *t) {
     o.inside = sqrt(within / fmax(1.0, inside));
     o.rays /= (double)all.count;
     vsh_texels_free(texels);
+    vsh_charts_free(charts);
     return o;
 }
 

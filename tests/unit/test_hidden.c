@@ -73,13 +73,13 @@ static charts_mesh *four_squares(void) {
     return m;
 }
 
-static vsh_texels *texels_of(const charts_mesh *m, int32_t padding) {
+static vsh_charts *make_charts(const charts_mesh *m, int32_t padding) {
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = SIDE;
     options.padding = padding;
-    vsh_texels *texels = NULL;
-    assert_int_equal(vsh_texels_create(&m->mesh, 1, &options, NULL, NULL, &texels, NULL), VSH_OK);
-    return texels;
+    vsh_charts *charts = NULL;
+    assert_int_equal(vsh_charts_create(&m->mesh, 1, &options, NULL, NULL, &charts, NULL), VSH_OK);
+    return charts;
 }
 
 /* Column and row of a texel in its chart (v downwards); -1: outside. */
@@ -123,13 +123,13 @@ static void free_planes(planes *p) {
     free(p->light);
 }
 
-static uint64_t fill(const vsh_texels *texels, const planes *p, int32_t threads) {
+static uint64_t fill(const vsh_charts *charts, const planes *p, int32_t threads) {
     const vsh_lightmap map = {.ao = p->ao, .coverage = p->coverage, .irradiance = p->light};
     vsh_run run = vsh_run_default();
     uint64_t filled = UINT64_MAX;
     vsh_error error = {0};
     run.threads = threads;
-    if (vsh_lightmap_fill_hidden(texels, &map, 0, &run, &filled, &error) != VSH_OK) {
+    if (vsh_lightmap_fill_hidden(charts, &map, 0, &run, &filled, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     return filled;
@@ -138,9 +138,9 @@ static uint64_t fill(const vsh_texels *texels, const planes *p, int32_t threads)
 static void a_hidden_chart_takes_the_nearest_values_of_the_world(void **state) {
     (void)state;
     charts_mesh *m = four_squares();
-    vsh_texels *texels = texels_of(m, 2);
+    vsh_charts *charts = make_charts(m, 2);
     planes p = make_planes(0);
-    assert_int_equal(fill(texels, &p, 1), CHART_TEXELS * CHART_TEXELS);
+    assert_int_equal(fill(charts, &p, 1), CHART_TEXELS * CHART_TEXELS);
     for (size_t i = 0; i < TEXELS; ++i) {
         int column, row;
         const int chart = chart_at(i, &column, &row);
@@ -159,7 +159,7 @@ static void a_hidden_chart_takes_the_nearest_values_of_the_world(void **state) {
         assert_true(p.coverage[i] == (chart != HIDDEN_CHART));
     }
     free_planes(&p);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     free(m);
 }
 
@@ -167,9 +167,9 @@ static void what_is_empty_around_it_is_padded_as_far_as_it_is_the_nearest(void *
     (void)state;
     charts_mesh *m = four_squares();
     for (int32_t padding = 0; padding <= 6; padding += 2) {
-        vsh_texels *texels = texels_of(m, padding);
+        vsh_charts *charts = make_charts(m, padding);
         planes p = make_planes(0);
-        fill(texels, &p, 1);
+        fill(charts, &p, 1);
         const int reach = padding < 4 ? padding : 4, x = 24, y = 8; /* the chart's first texel */
         for (int d = 1; d <= 6; ++d) {
             const size_t left = (size_t)(y + 5) * SIDE + (size_t)(x - d);
@@ -187,7 +187,7 @@ static void what_is_empty_around_it_is_padded_as_far_as_it_is_the_nearest(void *
             }
         }
         free_planes(&p);
-        vsh_texels_free(texels);
+        vsh_charts_free(charts);
     }
     free(m);
 }
@@ -195,7 +195,7 @@ static void what_is_empty_around_it_is_padded_as_far_as_it_is_the_nearest(void *
 static void a_chart_in_part_hidden_keeps_its_own_values_near_what_is_seen(void **state) {
     (void)state;
     charts_mesh *m = four_squares();
-    vsh_texels *texels = texels_of(m, 2);
+    vsh_charts *charts = make_charts(m, 2);
     planes p = make_planes(1);
     for (size_t i = 0; i < TEXELS; ++i) { /* as the bake fills them */
         int column, row;
@@ -203,7 +203,7 @@ static void a_chart_in_part_hidden_keeps_its_own_values_near_what_is_seen(void *
             p.ao[i] = p.light[3 * i + 2] = value_of(HIDDEN_CHART, 2, row);
         }
     }
-    fill(texels, &p, 1);
+    fill(charts, &p, 1);
     for (size_t i = 0; i < TEXELS; ++i) {
         int column, row;
         if (chart_at(i, &column, &row) != HIDDEN_CHART || column < 3) {
@@ -217,7 +217,7 @@ static void a_chart_in_part_hidden_keeps_its_own_values_near_what_is_seen(void *
         }
     }
     free_planes(&p);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     free(m);
 }
 
@@ -229,14 +229,14 @@ static void what_lookups_beside_the_seen_read_is_its_own(void **state) {
     for (int c = 0; c < CHARTS; ++c) {
         add_square(m, places[c], corners[c], CHART_TEXELS, 0.0, 1.0);
     }
-    vsh_texels *texels = texels_of(m, 2);
+    vsh_charts *charts = make_charts(m, 2);
     planes p = make_planes(1);
     const int row = 5;
     const size_t first = (size_t)(8 + row) * SIDE + 24;
     for (size_t column = 3; column < CHART_TEXELS; ++column) {
         p.ao[first + column] = value_of(HIDDEN_CHART, 2, row);
     }
-    fill(texels, &p, 1);
+    fill(charts, &p, 1);
     for (int column = 3; column < 8; ++column) {
         const float wanted = column == 5 ? value_of(ACROSS, 0, row) : value_of(HIDDEN_CHART, 2, row);
         if (p.ao[first + (size_t)column] != wanted) {
@@ -244,25 +244,25 @@ static void what_lookups_beside_the_seen_read_is_its_own(void **state) {
         }
     }
     free_planes(&p);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     free(m);
 }
 
 static void nothing_changes_where_all_is_seen_or_nothing(void **state) {
     (void)state;
     charts_mesh *m = four_squares();
-    vsh_texels *texels = texels_of(m, 2);
+    vsh_charts *charts = make_charts(m, 2);
     for (int seen = 0; seen < 2; ++seen) {
         planes p = make_planes(0), q = make_planes(0);
         for (size_t i = 0; i < TEXELS; ++i) {
             p.coverage[i] = (float)seen;
         }
-        assert_int_equal(fill(texels, &p, 1), 0);
+        assert_int_equal(fill(charts, &p, 1), 0);
         assert_memory_equal(p.ao, q.ao, TEXELS * sizeof *p.ao);
         free_planes(&p);
         free_planes(&q);
     }
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     free(m);
 }
 
@@ -276,32 +276,26 @@ static int32_t stop(void *user, const char *stage, double fraction) {
 static void threads_limits_and_bad_calls(void **state) {
     (void)state;
     charts_mesh *m = four_squares();
-    vsh_texels *texels = texels_of(m, 2);
+    vsh_charts *charts = make_charts(m, 2);
     planes p = make_planes(0), q = make_planes(0);
-    fill(texels, &p, 1);
+    fill(charts, &p, 1);
     const vsh_lightmap map = {.ao = q.ao, .coverage = q.coverage}, none = {.ao = q.ao};
     vsh_run run = vsh_run_default();
     vsh_error error = {0};
     run.memory_limit = 1000;
-    assert_int_equal(vsh_lightmap_fill_hidden(texels, &map, 0, &run, NULL, &error), VSH_ERROR_LIMIT);
+    assert_int_equal(vsh_lightmap_fill_hidden(charts, &map, 0, &run, NULL, &error), VSH_ERROR_LIMIT);
     assert_non_null(strstr(error.message, "hidden charts"));
     run = vsh_run_default();
     run.progress = stop;
-    assert_int_equal(vsh_lightmap_fill_hidden(texels, &map, 0, &run, NULL, &error), VSH_ERROR_CANCELLED);
-    assert_int_equal(vsh_lightmap_fill_hidden(texels, &none, 0, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_lightmap_fill_hidden(charts, &map, 0, &run, NULL, &error), VSH_ERROR_CANCELLED);
+    assert_int_equal(vsh_lightmap_fill_hidden(charts, &none, 0, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
     assert_int_equal(vsh_lightmap_fill_hidden(NULL, &map, 0, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_lightmap_fill_hidden(texels, NULL, 0, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
-    vsh_charts *charts = charts_of(&m->mesh, 1);
-    vsh_texels *band = NULL;
-    assert_int_equal(vsh_texels_create_band(charts, 0, 32, NULL, &band, NULL), VSH_OK);
-    assert_int_equal(vsh_lightmap_fill_hidden(band, &map, 0, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
-    vsh_texels_free(band);
-    vsh_charts_free(charts);
-    fill(texels, &q, 4); /* and none of these had changed it */
+    assert_int_equal(vsh_lightmap_fill_hidden(charts, NULL, 0, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
+    fill(charts, &q, 4); /* and none of these had changed it */
     assert_memory_equal(p.ao, q.ao, TEXELS * sizeof *p.ao);
     free_planes(&p);
     free_planes(&q);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     free(m);
 }
 

@@ -30,6 +30,7 @@ static counts compare(const vsh_mesh *meshes, size_t mesh_count, int32_t size) {
     vsh_error error = {VSH_OK, ""};
     vsh_triangles *triangles = NULL;
     vsh_occluders *occluders = NULL;
+    vsh_charts *charts = NULL;
     vsh_texels *texels = NULL;
     check(vsh_triangles_create(meshes, mesh_count, NULL, &triangles, &error), &error);
     vsh_occluder_parts parts = vsh_occluder_parts_default();
@@ -41,21 +42,23 @@ static counts compare(const vsh_mesh *meshes, size_t mesh_count, int32_t size) {
     options.shade.ao_method = VSH_AO_EXACT;
     options.shade.ao_distance = 0.1;
     options.shade.rays = 4;
-    check(vsh_texels_create(meshes, mesh_count, &options, NULL, NULL, &texels, &error), &error);
+    check(vsh_charts_create(meshes, mesh_count, &options, NULL, NULL, &charts, &error), &error);
+    check(vsh_texels_create(charts, NULL, &texels, &error), &error);
+    const vshi_samples *samples = &texels->samples;
     const size_t count = (size_t)size * (size_t)size;
     float *ao = calloc(count, sizeof *ao), *coverage = calloc(count, sizeof *coverage);
     const vsh_lightmap lightmap = {.ao = ao, .coverage = coverage};
-    check(vsh_bake_lightmap(occluders, texels, NULL, 0, NULL, NULL, &lightmap, NULL, &error), &error);
+    check(vsh_bake_lightmap(occluders, charts, NULL, 0, NULL, NULL, &lightmap, NULL, &error), &error);
     counts found = {0, 0, 0};
-    for (size_t i = 0; i < texels->count; ++i) {
-        const float *lift = texels->lift + 3 * i;
+    for (size_t i = 0; i < samples->count; ++i) {
+        const float *lift = samples->lift + 3 * i;
         if (lift[0] != 0.0f || lift[1] != 0.0f || lift[2] != 0.0f) {
             continue;
         }
         uint8_t where;
-        vshi_inside(triangles, 1, texels->position + 3 * i, texels->geometric + 3 * i, NULL, NULL, NULL,
+        vshi_inside(triangles, 1, samples->position + 3 * i, samples->geometric + 3 * i, NULL, NULL, NULL,
                     &where);
-        const bool valid = coverage[vsh_texel_place(texels->texel[i], size)] == 1.0f;
+        const bool valid = coverage[vsh_texel_place(samples->texel[i], size)] == 1.0f;
         ++found.samples;
         found.invalid += where != VSHI_OUTSIDE;
         found.other += valid != (where == VSHI_OUTSIDE);
@@ -63,6 +66,7 @@ static counts compare(const vsh_mesh *meshes, size_t mesh_count, int32_t size) {
     free(coverage);
     free(ao);
     vsh_texels_free(texels);
+    vsh_charts_free(charts);
     vsh_occluders_free(occluders);
     vsh_triangles_free(triangles);
     return found;

@@ -286,8 +286,8 @@ static void bake_floor(const vsh_field *field, const vsh_layer *layers, size_t l
     options.width = options.height = SIZE;
     options.padding = 0;
     options.ao_spacing = 1;
-    vsh_texels *texels = NULL;
-    assert_int_equal(vsh_texels_create(&mesh, 1, &options, NULL, NULL, &texels, NULL), VSH_OK);
+    vsh_charts *texels = NULL;
+    assert_int_equal(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &texels, NULL), VSH_OK);
     const double over[3] = {-1.0, 0.7, 0.1};
     const vsh_light light = sun(over, 0.2);
     const vsh_shade_options shade = preview_options();
@@ -299,7 +299,7 @@ static void bake_floor(const vsh_field *field, const vsh_layer *layers, size_t l
                           &lightmap, &baked->stats, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
-    vsh_texels_free(texels);
+    vsh_charts_free(texels);
 }
 
 /* A wall of [-0.2, 0.2] × [0, 1] across the floor's slab: as one field, in a layer of its own, and all of it

@@ -1,6 +1,7 @@
 /* Meshes with smooth normals: where shadow rays begin, and which directions count for AO. The truth is that
  * of the facets. */
 #include "bake/origins.h"
+#include "bake/texels.h"
 #include "casts.h"
 #include "texels_of.h"
 
@@ -40,6 +41,7 @@ typedef struct scene {
     sphere ball;
     vsh_field *field;
     vsh_triangles *triangles;
+    vsh_charts *charts;
     vsh_texels *texels, *facets; /* the same samples, of the sphere without normals */
     vsh_texel_samples lifted, flat;
 } scene;
@@ -66,8 +68,11 @@ static void open_scene(scene *s, const box *other) {
     options.shade.rays = 64;
     vsh_mesh faceted = s->ball.mesh;
     faceted.normals = NULL;
-    s->texels = create(&s->ball.mesh, 1, options, NULL);
-    s->facets = create(&faceted, 1, options, NULL);
+    s->charts = create(&s->ball.mesh, 1, options, NULL);
+    s->texels = rasterize(s->charts);
+    vsh_charts *facets = create(&faceted, 1, options, NULL);
+    s->facets = rasterize(facets);
+    vsh_charts_free(facets);
     s->lifted = vsh_texels_samples(s->texels);
     s->flat = vsh_texels_samples(s->facets);
     assert_int_equal(s->lifted.count, s->flat.count);
@@ -76,6 +81,7 @@ static void open_scene(scene *s, const box *other) {
 static void close_scene(scene *s) {
     vsh_texels_free(s->facets);
     vsh_texels_free(s->texels);
+    vsh_charts_free(s->charts);
     vsh_triangles_free(s->triangles);
     vsh_field_free(s->field);
     free_sphere(&s->ball);
@@ -83,7 +89,7 @@ static void close_scene(scene *s) {
 
 static void bake(const scene *s, const vsh_light *lights, size_t light_count, const vsh_lightmap *planes) {
     vsh_error error = {VSH_OK, ""};
-    check(vsh_bake_lightmap(occluders_traced(s->field, s->triangles), s->texels, lights, light_count, NULL,
+    check(vsh_bake_lightmap(occluders_traced(s->field, s->triangles), s->charts, lights, light_count, NULL,
                             NULL, planes, NULL, &error),
           &error);
 }
@@ -343,17 +349,17 @@ static double mean_ao_between_walls(const float *normals) {
     options.shade.ao_method = VSH_AO_EXACT;
     options.shade.ao_distance = 50.0;
     options.shade.max_error = 0.01;
-    vsh_texels *texels = create(&strip.mesh, 1, options, NULL);
+    vsh_charts *charts = create(&strip.mesh, 1, options, NULL);
     static float ao[128 * 128], coverage[128 * 128];
     const vsh_lightmap planes = {.ao = ao, .coverage = coverage};
-    check(vsh_bake_lightmap(occluders, texels, NULL, 0, NULL, NULL, &planes, NULL, &error), &error);
+    check(vsh_bake_lightmap(occluders, charts, NULL, 0, NULL, NULL, &planes, NULL, &error), &error);
     double sum = 0.0, count = 0.0;
     for (size_t i = 0; i < 128 * 128; ++i) {
         sum += coverage[i] > 0.0f ? (double)ao[i] : 0.0;
         count += coverage[i] > 0.0f;
     }
     assert_true(count > 1000.0);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     vsh_occluders_free(occluders);
     vsh_triangles_free(triangles);
     return sum / count;
@@ -390,11 +396,11 @@ static void a_lift_fades_as_neighbours_come_near(void **state) {
         before = before != NULL ? before : calloc(s.flat.count, sizeof *before);
         const vshi_lifter lifter = vshi_lifter_open(occluders_traced(s.field, s.triangles), &light);
         for (size_t i = 0; i < s.flat.count; ++i) {
-            const vshi_lift_point point = vshi_sample_lift_point(s.texels, i);
+            const vshi_lift_point point = vshi_sample_lift_point(&s.texels->samples, i);
             const double length = vshi_length(vshi_lift_find(&lifter, &point));
             const double room = face - s.flat.positions[3 * i];
-            const double x = (double)s.texels->lift[3 * i],
-                         whole = vshi_length(vshi_vec_off(s.texels->lift + 3 * i));
+            const double x = (double)s.texels->samples.lift[3 * i],
+                         whole = vshi_length(vshi_vec_off(s.texels->samples.lift + 3 * i));
             assert_true(length <= whole * (1.0 + 1e-6));
             if (x > 0.9 * whole && whole > 0.0) {
                 /* up to a quarter of the distance along the lift, which leans by 26 degrees at most */

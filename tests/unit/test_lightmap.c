@@ -6,11 +6,11 @@ static void a_floor_under_open_sky_is_exactly_lit(void **state) {
     (void)state;
     vsh_field *field = floor_field(0);
     const vsh_mesh mesh = floor_mesh();
-    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 1, 0);
+    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
     const vsh_light light = sun(0.3, 1.0, 0.2, 0.2);
     planes *p = new_planes();
     vsh_bake_stats stats = vsh_bake_stats_zero();
-    bake(field, texels, &light, &p->all, &stats, 0);
+    bake(field, charts, &light, &p->all, &stats, 0);
     for (int i = 0; i < TEXELS; ++i) {
         assert_true(p->shadow[i] == 1.0f);
         assert_true(p->coverage[i] == 1.0f);
@@ -18,7 +18,7 @@ static void a_floor_under_open_sky_is_exactly_lit(void **state) {
     assert_int_equal(stats.texels, TEXELS);
     assert_int_equal(stats.invalid_texels, 0);
     free(p);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     vsh_field_free(field);
 }
 
@@ -26,13 +26,13 @@ static void texels_under_a_wall_are_invalid_and_nothing_leaks_on_either_side(voi
     (void)state;
     vsh_field *field = floor_field(1);
     const vsh_mesh mesh = floor_mesh();
-    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 1, 0);
+    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
     planes *p = new_planes();
     uint64_t invalid_by_mesh[1] = {77};
     vsh_bake_stats stats = vsh_bake_stats_zero();
     stats.invalid_by_mesh = invalid_by_mesh;
-    bake(field, texels, &light, &p->all, &stats, 0);
+    bake(field, charts, &light, &p->all, &stats, 0);
     uint64_t invalid = 0;
     for (uint32_t i = 0; i < TEXELS; ++i) {
         const double x = texel_x(i);
@@ -60,7 +60,7 @@ static void texels_under_a_wall_are_invalid_and_nothing_leaks_on_either_side(voi
         }
     }
     free(p);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     vsh_field_free(field);
 }
 
@@ -74,10 +74,10 @@ static void padding_copies_dark_and_lit_texels_and_leaves_coverage(void **state)
     vsh_mesh mesh = floor_mesh();
     mesh.positions = positions;
     mesh.uvs = uvs;
-    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 1, PADDING);
+    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, PADDING);
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
     planes *p = new_planes();
-    bake(field, texels, &light, &p->all, NULL, 0);
+    bake(field, charts, &light, &p->all, NULL, 0);
     for (int i = 0; i < TEXELS; ++i) {
         const int x = i % SIZE, y = i / SIZE;
         const int dx = x < 16 ? 16 - x : x > 47 ? x - 47 : 0, dy = y < 16 ? 16 - y : y > 47 ? y - 47 : 0;
@@ -93,7 +93,7 @@ static void padding_copies_dark_and_lit_texels_and_leaves_coverage(void **state)
         assert_true(p->shadow[i] < 0.01f);
     }
     free(p);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     vsh_field_free(field);
 }
 
@@ -102,11 +102,11 @@ static void a_texel_is_the_mean_of_its_valid_samples(void **state) {
     enum { N = 3, SMALL = 16 };
     vsh_field *field = floor_field(1);
     const vsh_mesh mesh = floor_mesh();
-    vsh_texels *texels = make_texels(&mesh, 1, SMALL, N, 0);
-    vsh_texels *fine = make_texels(&mesh, 1, SMALL * N, 1, 0);
+    vsh_charts *charts = make_texels(&mesh, 1, SMALL, N, 0);
+    vsh_charts *fine = make_texels(&mesh, 1, SMALL * N, 1, 0);
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.3);
     planes *p = new_planes(), *q = new_planes();
-    bake(field, texels, &light, &p->all, NULL, 0);
+    bake(field, charts, &light, &p->all, NULL, 0);
     bake(field, fine, &light, &q->all, NULL, 0);
     for (int i = 0; i < SMALL * SMALL; ++i) {
         double sum = 0.0, count = 0.0;
@@ -122,8 +122,8 @@ static void a_texel_is_the_mean_of_its_valid_samples(void **state) {
     }
     free(q);
     free(p);
-    vsh_texels_free(fine);
-    vsh_texels_free(texels);
+    vsh_charts_free(fine);
+    vsh_charts_free(charts);
     vsh_field_free(field);
 }
 
@@ -131,15 +131,15 @@ static void a_lightmap_of_one_texel_is_the_value_at_its_middle(void **state) {
     (void)state;
     vsh_field *field = floor_field(0);
     const vsh_mesh mesh = floor_mesh();
-    vsh_texels *texels = make_texels(&mesh, 1, 1, 1, 4);
+    vsh_charts *charts = make_texels(&mesh, 1, 1, 1, 4);
     const vsh_light light = sun(0.0, 1.0, 0.0, 0.1);
     planes *p = new_planes();
-    bake(field, texels, &light, &p->all, NULL, 0);
+    bake(field, charts, &light, &p->all, NULL, 0);
     assert_true(p->shadow[0] == 1.0f);
     assert_true(p->coverage[0] == 1.0f);
     assert_true(isnan(p->coverage[1]));
     free(p);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     vsh_field_free(field);
 }
 
@@ -183,13 +183,15 @@ static void a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne(void **sta
         vsh_field_create(grid, NULL, NULL, &field, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
-    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 1, 0);
+    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
     const vsh_light light = sun(0.3, 0.9, 0.2, 0.01);
     const double length = sqrt(0.09 + 0.81 + 0.04);
     planes *p = new_planes();
     vsh_bake_stats stats = vsh_bake_stats_zero();
-    bake(field, texels, &light, &p->all, &stats, 0);
+    bake(field, charts, &light, &p->all, &stats, 0);
     assert_int_equal(stats.invalid_texels, 0);
+    vsh_texels *texels = NULL;
+    assert_int_equal(vsh_texels_create(charts, NULL, &texels, NULL), VSH_OK);
     const vsh_texel_samples samples = vsh_texels_samples(texels);
     for (size_t s = 0; s < samples.count; ++s) {
         const float *n = samples.normals + 3 * s;
@@ -203,6 +205,7 @@ static void a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne(void **sta
     }
     free(p);
     vsh_texels_free(texels);
+    vsh_charts_free(charts);
     vsh_field_free(field);
     vsh_grid_free(grid);
 }
@@ -219,16 +222,16 @@ static void an_open_sheet_does_not_shade_itself(void **state) {
         vsh_field_create(grid, NULL, NULL, &field, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
-    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 1, 0);
+    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
     const vsh_light light = sun(0.5, 0.8, 0.1, 0.1);
     planes *p = new_planes();
-    bake(field, texels, &light, &p->all, NULL, 0);
+    bake(field, charts, &light, &p->all, NULL, 0);
     for (int i = 0; i < TEXELS; ++i) {
         assert_true(p->coverage[i] == 1.0f);
         assert_true(p->shadow[i] == 1.0f);
     }
     free(p);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     vsh_field_free(field);
     vsh_grid_free(grid);
 }
@@ -239,13 +242,13 @@ static void irradiance_is_visibility_times_colour_times_cosine_times_ao(void **s
     (void)state;
     vsh_field *field = floor_field(1);
     const vsh_mesh mesh = floor_mesh();
-    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 1, 0);
+    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
     vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
     light.color[0] = 2.0;
     light.color[1] = 0.5;
     light.color[2] = 0.0;
     planes *p = new_planes();
-    bake(field, texels, &light, &p->all, NULL, 0);
+    bake(field, charts, &light, &p->all, NULL, 0);
     for (size_t i = 0; i < TEXELS; ++i) {
         const double expected = (double)p->shadow[i] * sqrt(0.5) * (double)p->ao[i];
         assert_true(fabs((double)p->irradiance[3 * i] - 2.0 * expected) < 1e-5);
@@ -254,13 +257,13 @@ static void irradiance_is_visibility_times_colour_times_cosine_times_ao(void **s
     }
     planes *alone = new_planes();
     alone->all = (vsh_lightmap){.irradiance = alone->irradiance};
-    bake(field, texels, &light, &alone->all, NULL, 0);
+    bake(field, charts, &light, &alone->all, NULL, 0);
     for (size_t i = 0; i < TEXELS; ++i) {
         assert_true(fabs((double)alone->irradiance[3 * i] - 2.0 * sqrt(0.5) * (double)p->shadow[i]) < 1e-5);
     }
     free(alone);
     free(p);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     vsh_field_free(field);
 }
 
@@ -268,27 +271,27 @@ static void planes_that_are_not_asked_for_cost_nothing_and_change_nothing(void *
     (void)state;
     vsh_field *field = floor_field(1);
     const vsh_mesh mesh = floor_mesh();
-    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 1, 2);
+    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 2);
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
     planes *all = new_planes(), *some = new_planes();
-    bake(field, texels, &light, &all->all, NULL, 0);
+    bake(field, charts, &light, &all->all, NULL, 0);
 
     vsh_bake_stats stats = vsh_bake_stats_zero();
     const vsh_lightmap coverage = {.coverage = some->coverage};
-    bake(field, texels, &light, &coverage, &stats, 0);
+    bake(field, charts, &light, &coverage, &stats, 0);
     assert_int_equal(stats.shade.marches, 0);
     assert_int_equal(stats.shade.samples, 0);
     assert_memory_equal(some->coverage, all->coverage, sizeof all->coverage);
 
     const vsh_lightmap ao = {.ao = some->ao};
-    bake(field, texels, NULL, &ao, NULL, 0);
+    bake(field, charts, NULL, &ao, NULL, 0);
     assert_memory_equal(some->ao, all->ao, sizeof all->ao);
     const vsh_lightmap shadow = {.shadow = some->lights};
-    bake(field, texels, &light, &shadow, NULL, 0);
+    bake(field, charts, &light, &shadow, NULL, 0);
     assert_memory_equal(some->shadow, all->shadow, sizeof all->shadow);
     free(some);
     free(all);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     vsh_field_free(field);
 }
 
@@ -296,13 +299,13 @@ static void any_number_of_threads_gives_the_same_bits(void **state) {
     (void)state;
     vsh_field *field = floor_field(1);
     const vsh_mesh mesh = floor_mesh();
-    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 3, 4);
+    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 3, 4);
     const vsh_light light = sun(1.0, 0.7, 0.3, 0.2);
     planes *p[3];
     const int32_t threads[3] = {1, 2, 5};
     for (int t = 0; t < 3; ++t) {
         p[t] = new_planes();
-        bake(field, texels, &light, &p[t]->all, NULL, threads[t]);
+        bake(field, charts, &light, &p[t]->all, NULL, threads[t]);
         assert_memory_equal(p[t]->shadow, p[0]->shadow, sizeof p[0]->shadow);
         assert_memory_equal(p[t]->ao, p[0]->ao, sizeof p[0]->ao);
         assert_memory_equal(p[t]->irradiance, p[0]->irradiance, sizeof p[0]->irradiance);
@@ -311,50 +314,50 @@ static void any_number_of_threads_gives_the_same_bits(void **state) {
     for (int t = 0; t < 3; ++t) {
         free(p[t]);
     }
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     vsh_field_free(field);
 }
 
-static int32_t stop_in_shadow(void *user, const char *stage, double fraction) {
+static int32_t stop_in_bake(void *user, const char *stage, double fraction) {
     (void)user;
-    return strcmp(stage, "shadow.sun") == 0 && fraction > 0.0;
+    return strcmp(stage, "bake") == 0 && fraction > 0.0;
 }
 
 static void bad_options_limits_and_cancelling_are_reported(void **state) {
     (void)state;
     vsh_field *field = floor_field(1);
     const vsh_mesh mesh = floor_mesh();
-    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 1, 0);
+    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
     vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
     planes *p = new_planes();
     vsh_error error = {0};
     vsh_shade_options options = preview_options();
     options.start_offset = NAN;
     assert_int_equal(
-        vsh_bake_lightmap(occluders_of(field), texels, &light, 1, &options, NULL, &p->all, NULL, &error),
+        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, &options, NULL, &p->all, NULL, &error),
         VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "start_offset"));
     options = preview_options();
     options.surface_offset = -1.0;
     assert_int_equal(
-        vsh_bake_lightmap(occluders_of(field), texels, &light, 1, &options, NULL, &p->all, NULL, &error),
+        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, &options, NULL, &p->all, NULL, &error),
         VSH_ERROR_ARGUMENT);
     vsh_run run = vsh_run_default();
     run.memory_limit = 1000;
     assert_int_equal(
-        vsh_bake_lightmap(occluders_of(field), texels, &light, 1, NULL, &run, &p->all, NULL, &error),
+        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, NULL, &run, &p->all, NULL, &error),
         VSH_ERROR_LIMIT);
     run = vsh_run_default();
-    run.progress = stop_in_shadow;
+    run.progress = stop_in_bake;
     assert_int_equal(
-        vsh_bake_lightmap(occluders_of(field), texels, &light, 1, NULL, &run, &p->all, NULL, &error),
+        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, NULL, &run, &p->all, NULL, &error),
         VSH_ERROR_CANCELLED);
     light.angle = -1.0;
     assert_int_equal(
-        vsh_bake_lightmap(occluders_of(field), texels, &light, 1, NULL, NULL, &p->all, NULL, &error),
+        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, NULL, NULL, &p->all, NULL, &error),
         VSH_ERROR_ARGUMENT);
     free(p);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     vsh_field_free(field);
 }
 
@@ -362,7 +365,7 @@ static void bad_options_limits_and_cancelling_are_reported(void **state) {
 static vsh_bake_stats bake_errors(int32_t method, float *shadow, float *shadow_error, float *ao_error) {
     vsh_field *field = floor_field(1);
     const vsh_mesh mesh = floor_mesh();
-    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 2, 4);
+    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 2, 4);
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.5);
     vsh_shade_options shade = preview_options();
     shade.method = method;
@@ -371,11 +374,11 @@ static vsh_bake_stats bake_errors(int32_t method, float *shadow, float *shadow_e
         .shadow = shadow != NULL ? shadows : NULL, .shadow_error = errors, .ao_error = ao_error};
     vsh_bake_stats stats = vsh_bake_stats_zero();
     vsh_error error = {0};
-    if (vsh_bake_lightmap(occluders_of(field), texels, &light, 1, &shade, NULL, &lightmap, &stats, &error) !=
+    if (vsh_bake_lightmap(occluders_of(field), charts, &light, 1, &shade, NULL, &lightmap, &stats, &error) !=
         VSH_OK) {
         fail_msg("%s", error.message);
     }
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
     vsh_field_free(field);
     return stats;
 }

@@ -250,12 +250,10 @@ static void nothing_is_baked_without_what_it_takes(void **state) {
     const vsh_mesh mesh = {.name = "none", .vertex_count = 3, .triangle_count = 1};
     assert_int_equal(vsh_voxels_from_box(low, high, 0.5, NULL, &voxels, &error), VSH_OK);
     assert_int_equal(vsh_bake_volume(casters, voxels, &light, 1, NULL, NULL, &volume, NULL, &error), VSH_OK);
-    MAKES_NONE(vsh_texels_create(NULL, 1, NULL, NULL, NULL, PLACE, &error));
-    REFUSED(vsh_texels_create(&mesh, 1, NULL, NULL, NULL, NULL, &error));
     MAKES_NONE(vsh_charts_create(NULL, 1, NULL, NULL, NULL, PLACE, &error));
     REFUSED(vsh_charts_create(&mesh, 1, NULL, NULL, NULL, NULL, &error));
     REFUSED(vsh_charts_bounds(NULL, NULL, bounds, bounds, &error));
-    MAKES_NONE(vsh_texels_create_band(NULL, 0, 1, NULL, PLACE, &error));
+    MAKES_NONE(vsh_texels_create(NULL, NULL, PLACE, &error));
     REFUSED(vsh_bake_lightmap(casters, NULL, &light, 1, NULL, NULL, &lightmap, NULL, &error));
     REFUSED(vsh_bake_lightmap(NULL, NULL, &light, 1, NULL, NULL, &lightmap, NULL, &error));
     REFUSED(vsh_lightmap_stitch(NULL, &lightmap, 1, NULL, NULL, NULL, &error));
@@ -266,6 +264,7 @@ static void nothing_is_baked_without_what_it_takes(void **state) {
         .positions = corners, .uvs = places, .indices = triangle, .vertex_count = 3, .triangle_count = 1};
     assert_int_equal(vsh_charts_create(&one, 1, NULL, NULL, NULL, &charts, &error), VSH_OK);
     REFUSED(vsh_lightmap_stitch(charts, NULL, 1, NULL, NULL, NULL, &error));
+    REFUSED(vsh_texels_create(charts, NULL, NULL, &error));
     vsh_charts_free(charts);
     REFUSED(vsh_flat_bake(NULL, NULL, 1, &plane, NULL, &flat, &error));
     REFUSED(vsh_flat_bake(NULL, &light, 1, &plane, NULL, NULL, &error));

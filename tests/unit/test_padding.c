@@ -18,7 +18,10 @@ static void fill(const vsh_run *run, int32_t width, int32_t height, const uint8_
                  int32_t invalid, float *values, size_t channels) {
     const int32_t radius[VSHI_TEXEL_KINDS] = {padding, 0, invalid};
     const vshi_plane plane = {values, channels};
-    assert_int_equal(vshi_padding_fill(run, width, height, state, radius, &plane, 1, NULL, NULL), VSH_OK);
+    vshi_store store = {.run = run};
+    assert_int_equal(vshi_padding_fill(&store, run, width, height, state, radius, &plane, 1, NULL, NULL),
+                     VSH_OK);
+    vshi_store_close(&store);
 }
 
 /* The definition, texel by texel: index of the source, or -1. */
@@ -140,23 +143,18 @@ static void any_number_of_threads_gives_the_same_bits(void **unused) {
 
 enum { MOST = 4096, NOWHERE = -1 };
 
-/* A lightmap of one band. A letter a texel: of the mesh of that letter, valid in upper case, invalid in lower
- * case; a blank is empty. */
+/* A lightmap. A letter is a texel of the mesh of that letter, valid in upper case, invalid in lower case. A
+ * blank is empty. */
 typedef struct map {
-    vsh_texels texels;
-    uint32_t texel[MOST], mesh[MOST];
+    uint32_t mesh[MOST];
     uint8_t state[MOST];
     int from[MOST]; /* the texel that each takes its value from */
 } map;
 
-static void spread_over(map *m, int32_t width, const char *letters) {
+static void spread_over(map *m, size_t width, const char *letters) {
     const size_t count = strlen(letters);
     assert_true(count <= MOST);
     memset(m, 0, sizeof *m);
-    m->texels.info.width = width;
-    m->texels.info.height = m->texels.band.rows = (int32_t)count / width;
-    m->texels.texel = m->texel;
-    m->texels.mesh = m->mesh;
     for (size_t i = 0; i < count; ++i) {
         m->from[i] = NOWHERE;
         m->state[i] = VSHI_TEXEL_EMPTY;
@@ -165,18 +163,20 @@ static void spread_over(map *m, int32_t width, const char *letters) {
         }
         const bool valid = letters[i] < 'a';
         m->state[i] = valid ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
-        m->texel[m->texels.count] = vsh_texel((uint32_t)i % (uint32_t)width, (uint32_t)i / (uint32_t)width);
-        m->mesh[m->texels.count++] = (uint32_t)(letters[i] - (valid ? 'A' : 'a'));
+        m->mesh[i] = 1 + (uint32_t)(letters[i] - (valid ? 'A' : 'a'));
     }
     vshi_spread spread;
+    vshi_store store = {.run = NULL};
     vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vshi_spread_find(&m->texels, m->state, &spread, &error), VSH_OK);
+    assert_int_equal(vshi_spread_find(&store, width, count / width, m->mesh, m->state, &spread, &error),
+                     VSH_OK);
     for (size_t i = 0; i < spread.count; ++i) {
         assert_int_equal(m->state[spread.texel[i]], VSHI_TEXEL_INVALID);
         assert_int_equal(m->from[spread.texel[i]], NOWHERE);
         m->from[spread.texel[i]] = (int)spread.source[i];
     }
-    vshi_spread_free(&spread);
+    vshi_spread_free(&store, &spread);
+    vshi_store_close(&store);
 }
 
 static void an_invalid_texel_is_filled_from_at_most_64_texels_away(void **state) {

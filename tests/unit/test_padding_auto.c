@@ -54,8 +54,10 @@ static void every_level_holds_the_means_of_values_alone(void **state) {
         }
         memcpy(means_mask, mask, count);
         const vshi_plane plane = {filled, 3};
-        assert_int_equal(vshi_pull_push(NULL, (int32_t)width, (int32_t)height, mask, &plane, 1, NULL),
+        vshi_store store = {.run = NULL};
+        assert_int_equal(vshi_pull_push(&store, NULL, (int32_t)width, (int32_t)height, mask, &plane, 1, NULL),
                          VSH_OK);
+        vshi_store_close(&store);
         for (size_t i = 0; i < 3 * count; ++i) {
             assert_true(filled[i] >= 1.0f && filled[i] < 2.0f);
             assert_true(mask[i / 3] == 0 || filled[i] == given[i]);
@@ -91,7 +93,9 @@ static void a_plane_without_values_is_left(void **state) {
         values[i] = HOLE;
     }
     const vshi_plane plane = {values, 1};
-    assert_int_equal(vshi_pull_push(NULL, 4, 3, mask, &plane, 1, NULL), VSH_OK);
+    vshi_store store = {.run = NULL};
+    assert_int_equal(vshi_pull_push(&store, NULL, 4, 3, mask, &plane, 1, NULL), VSH_OK);
+    vshi_store_close(&store);
     for (int i = 0; i < 12; ++i) {
         assert_true(values[i] == HOLE);
     }
@@ -116,24 +120,16 @@ static vsh_charts *charts_with(const vsh_mesh *mesh, int32_t padding) {
     return charts;
 }
 
-static void bake_rows(const vsh_charts *charts, const vsh_field *field, int32_t first, int32_t rows,
-                      int32_t threads, const vsh_lightmap *map) {
-    const vsh_light light = sun(0.3, 1.0, 0.2, 0.14);
-    vsh_texels *texels = NULL;
-    assert_int_equal(vsh_texels_create_band(charts, first, rows, NULL, &texels, NULL), VSH_OK);
-    bake(field, texels, &light, map, NULL, threads);
-    vsh_texels_free(texels);
-}
-
 static void a_lightmap_is_filled_to_its_last_corner(void **state) {
     (void)state;
     float uvs[8];
     const vsh_mesh mesh = corner_mesh(uvs);
     vsh_charts *charts = charts_with(&mesh, VSH_PADDING_AUTO), *grown = charts_with(&mesh, 16);
     vsh_field *field = floor_field(0);
+    const vsh_light light = sun(0.3, 1.0, 0.2, 0.14);
     planes *all = new_planes(), *other = new_planes();
-    bake_rows(charts, field, 0, SIZE, 1, &all->all);
-    bake_rows(grown, field, 0, SIZE, 1, &other->all);
+    bake(field, charts, &light, &all->all, NULL, 1);
+    bake(field, grown, &light, &other->all, NULL, 1);
     size_t beyond = 0;
     for (size_t i = 0; i < TEXELS; ++i) {
         assert_true(all->coverage[i] == other->coverage[i]);
@@ -147,38 +143,12 @@ static void a_lightmap_is_filled_to_its_last_corner(void **state) {
     }
     assert_true(beyond > TEXELS / 4);
     for (int32_t threads = 2; threads <= 8; threads += 3) {
-        bake_rows(charts, field, 0, SIZE, threads, &other->all);
+        bake(field, charts, &light, &other->all, NULL, threads);
         assert_memory_equal(all->shadow, other->shadow, sizeof all->shadow);
         assert_memory_equal(all->irradiance, other->irradiance, sizeof all->irradiance);
     }
     free(other);
     free(all);
-    vsh_field_free(field);
-    vsh_charts_free(grown);
-    vsh_charts_free(charts);
-}
-
-static void bands_are_grown_only(void **state) {
-    (void)state;
-    float uvs[8];
-    const vsh_mesh mesh = corner_mesh(uvs);
-    vsh_charts *charts = charts_with(&mesh, VSH_PADDING_AUTO), *grown = charts_with(&mesh, 16);
-    vsh_field *field = floor_field(0);
-    planes *own = new_planes(), *other = new_planes();
-    for (int32_t first = 0; first < SIZE; first += 16) {
-        bake_rows(charts, field, first, 16, 1, &own->all);
-        bake_rows(grown, field, first, 16, 1, &other->all);
-        assert_memory_equal(own->ao, other->ao, 16 * SIZE * sizeof(float));
-        assert_memory_equal(own->shadow, other->shadow, 16 * SIZE * sizeof(float));
-    }
-    const vsh_lightmap both = {.shadow = own->lights, .ao = own->ao};
-    const uint64_t filled = vsh_charts_band_bytes(charts, 0, SIZE, &both, 1);
-    const uint64_t bare = vsh_charts_band_bytes(grown, 0, SIZE, &both, 1);
-    assert_true(filled > bare && filled < bare + 8 * TEXELS);
-    assert_int_equal(vsh_charts_band_bytes(charts, 0, 16, &both, 1),
-                     vsh_charts_band_bytes(grown, 0, 16, &both, 1));
-    free(other);
-    free(own);
     vsh_field_free(field);
     vsh_charts_free(grown);
     vsh_charts_free(charts);
@@ -200,7 +170,6 @@ int main(void) {
         cmocka_unit_test(every_level_holds_the_means_of_values_alone),
         cmocka_unit_test(a_plane_without_values_is_left),
         cmocka_unit_test(a_lightmap_is_filled_to_its_last_corner),
-        cmocka_unit_test(bands_are_grown_only),
         cmocka_unit_test(no_other_padding_is_below_0),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

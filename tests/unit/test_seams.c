@@ -261,8 +261,10 @@ static void without_coverage_charts_tell_what_is_a_guess(void **state) {
     }
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = SIDE;
+    vsh_charts *charts = NULL;
+    assert_int_equal(vsh_charts_create(&m->mesh, 1, &options, NULL, NULL, &charts, NULL), VSH_OK);
     vsh_texels *texels = NULL;
-    assert_int_equal(vsh_texels_create(&m->mesh, 1, &options, NULL, NULL, &texels, NULL), VSH_OK);
+    assert_int_equal(vsh_texels_create(charts, NULL, &texels, NULL), VSH_OK);
     const vsh_texel_samples samples = vsh_texels_samples(texels);
     float *plane = new_plane(0.0f), *before = new_plane(0.0f), *covered = new_plane(0.0f);
     for (size_t i = 0; i < samples.count; ++i) {
@@ -287,6 +289,7 @@ static void without_coverage_charts_tell_what_is_a_guess(void **state) {
     free(before);
     free(plane);
     vsh_texels_free(texels);
+    vsh_charts_free(charts);
     free(m);
 }
 

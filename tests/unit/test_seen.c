@@ -89,21 +89,21 @@ static void trace_points(const vsh_mesh *mesh, points *p) {
 static void bake_planes(const vsh_mesh *mesh, float *ao, float *shadow) {
     vsh_error error = {VSH_OK, ""};
     vsh_occluders *occluders = NULL;
-    vsh_texels *texels = NULL;
+    vsh_charts *charts = NULL;
     check(vsh_occluders_create(mesh, 1, NULL, NULL, &occluders, &error), &error);
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = TEXELS;
     options.shade.ao_distance = AO_DISTANCE;
     options.shade.max_error = 0.005;
     options.shade.rays = 1024;
-    check(vsh_texels_create(mesh, 1, &options, NULL, NULL, &texels, &error), &error);
+    check(vsh_charts_create(mesh, 1, &options, NULL, NULL, &charts, &error), &error);
     vsh_light sun = vsh_light_default();
     memcpy(sun.direction, SUN, sizeof SUN);
     sun.angle = SUN_ANGLE;
     float *const shadows[1] = {shadow};
     const vsh_lightmap lightmap = {.ao = ao, .shadow = shadows};
-    check(vsh_bake_lightmap(occluders, texels, &sun, 1, NULL, NULL, &lightmap, NULL, &error), &error);
-    vsh_texels_free(texels);
+    check(vsh_bake_lightmap(occluders, charts, &sun, 1, NULL, NULL, &lightmap, NULL, &error), &error);
+    vsh_charts_free(charts);
     vsh_occluders_free(occluders);
 }
 

@@ -14,8 +14,9 @@ typedef struct stage {
     vsh_field *field;
     vsh_triangles *triangles;
     float corners[12];
-    vsh_texels *texels;
-    float sky[COUNT], other[COUNT], coverage[COUNT];
+    vsh_mesh mesh; /* of the charts */
+    vsh_charts *charts;
+    float sky[COUNT], coverage[COUNT];
     vsh_bake_error errors[2]; /* of AO, which is not baked, and of the sky */
 } stage;
 
@@ -40,15 +41,6 @@ static void make_triangles(stage *s, size_t count) {
 static const float FLAT[8] = {0, 0, 1, 0, 1, 1, 0, 1};
 static const uint32_t QUAD[6] = {0, 1, 2, 0, 2, 3};
 
-static vsh_mesh receiver_of(const stage *s) {
-    return (vsh_mesh){.name = "receiver",
-                      .positions = s->corners,
-                      .uvs = FLAT,
-                      .indices = QUAD,
-                      .vertex_count = 4,
-                      .triangle_count = 2};
-}
-
 static vsh_lightmap_options sizes_of(int32_t spacing) {
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = SIDE;
@@ -64,11 +56,16 @@ static void receive(stage *s, const double origin[3], const double u[3], const d
         s->corners[6 + axis] = (float)(origin[axis] + u[axis] + v[axis]);
         s->corners[9 + axis] = (float)(origin[axis] + v[axis]);
     }
-    const vsh_mesh mesh = receiver_of(s);
+    s->mesh = (vsh_mesh){.name = "receiver",
+                         .positions = s->corners,
+                         .uvs = FLAT,
+                         .indices = QUAD,
+                         .vertex_count = 4,
+                         .triangle_count = 2};
     const vsh_lightmap_options options = sizes_of(spacing);
-    vsh_texels_free(s->texels);
-    s->texels = NULL;
-    assert_int_equal(vsh_texels_create(&mesh, 1, &options, NULL, NULL, &s->texels, NULL), VSH_OK);
+    vsh_charts_free(s->charts);
+    s->charts = NULL;
+    assert_int_equal(vsh_charts_create(&s->mesh, 1, &options, NULL, NULL, &s->charts, NULL), VSH_OK);
 }
 
 static void receive_floor(stage *s, int32_t spacing) {
@@ -95,30 +92,27 @@ static stage *set_up(double half_x, double half_z, double height, size_t boxes) 
 }
 
 static void tear_down(stage *s) {
-    vsh_texels_free(s->texels);
+    vsh_charts_free(s->charts);
     vsh_triangles_free(s->triangles);
     vsh_field_free(s->field);
     free(s);
 }
 
-static vsh_result bake_sky(stage *s, const vsh_texels *texels, int32_t method, int32_t up, int32_t threads,
-                           float *sky, vsh_error *error) {
+static vsh_result bake_sky(stage *s, int32_t method, int32_t up, vsh_error *error) {
     vsh_shade_options shade = vsh_shade_options_default();
     shade.ao_method = method;
-    vsh_run run = vsh_run_default();
-    run.threads = threads;
-    const vsh_lightmap lightmap = {.sky = sky, .asked = {.sky = up}, .coverage = s->coverage};
+    const vsh_lightmap lightmap = {.sky = s->sky, .asked = {.sky = up}, .coverage = s->coverage};
     vsh_occluders casters = *occluders_traced(s->field, s->triangles);
     casters.true_triangles = s->triangles;
     vsh_bake_stats stats = vsh_bake_stats_zero();
     stats.errors = s->errors;
     memset(s->errors, 0, sizeof s->errors);
-    return vsh_bake_lightmap(&casters, texels, NULL, 0, &shade, &run, &lightmap, &stats, error);
+    return vsh_bake_lightmap(&casters, s->charts, NULL, 0, &shade, NULL, &lightmap, &stats, error);
 }
 
 static void bake_well(stage *s, int32_t method, int32_t up) {
     vsh_error error = {VSH_OK, ""};
-    if (bake_sky(s, s->texels, method, up, 0, s->sky, &error) != VSH_OK) {
+    if (bake_sky(s, method, up, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
 }
@@ -193,40 +187,14 @@ static void open_floors_walls_and_ceilings_see_one_half_and_nothing(void **state
     tear_down(s);
 }
 
-static void threads_and_bands_change_no_bit(void **state) {
-    (void)state;
-    static const int32_t methods[] = {VSH_AO_EXACT, VSH_AO_ADAPTIVE};
-    stage *s = set_up(1.0, 1.0, 1.0, BOXES);
-    const vsh_mesh mesh = receiver_of(s);
-    const vsh_lightmap_options options = sizes_of(4);
-    vsh_charts *charts = NULL;
-    assert_int_equal(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &charts, NULL), VSH_OK);
-    for (int m = s->triangles != NULL ? 0 : 1; m < 2; ++m) {
-        assert_int_equal(bake_sky(s, s->texels, methods[m], VSH_UP_Y, 1, s->sky, NULL), VSH_OK);
-        assert_int_equal(bake_sky(s, s->texels, methods[m], VSH_UP_Y, 3, s->other, NULL), VSH_OK);
-        assert_memory_equal(s->sky, s->other, sizeof s->sky);
-        memset(s->other, 0, sizeof s->other);
-        for (int32_t row = 0; row < SIDE; row += 16) {
-            vsh_texels *band = NULL;
-            assert_int_equal(vsh_texels_create_band(charts, row, 16, NULL, &band, NULL), VSH_OK);
-            assert_int_equal(bake_sky(s, band, methods[m], VSH_UP_Y, 2, s->other + (size_t)row * SIDE, NULL),
-                             VSH_OK);
-            vsh_texels_free(band);
-        }
-        assert_memory_equal(s->sky, s->other, sizeof s->sky);
-    }
-    vsh_charts_free(charts);
-    tear_down(s);
-}
-
 static void a_sky_without_an_axis_or_rays_is_refused(void **state) {
     (void)state;
     stage *s = set_up(1.0, 1.0, 1.0, 1);
     vsh_error error = {VSH_OK, ""};
-    assert_int_equal(bake_sky(s, s->texels, VSH_AO_ADAPTIVE, 0, 0, s->sky, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(bake_sky(s, VSH_AO_ADAPTIVE, 0, &error), VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "asked.sky 0"));
-    assert_int_equal(bake_sky(s, s->texels, VSH_AO_ADAPTIVE, 7, 0, s->sky, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(bake_sky(s, s->texels, VSH_AO_CONES, VSH_UP_Y, 0, s->sky, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(bake_sky(s, VSH_AO_ADAPTIVE, 7, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(bake_sky(s, VSH_AO_CONES, VSH_UP_Y, &error), VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "cones"));
     assert_int_equal(vsh_up("-z"), VSH_UP_MINUS_Z);
     assert_int_equal(vsh_up("w"), -1);
@@ -237,7 +205,6 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_bottom_of_wells_and_trenches_sees_their_opening),
         cmocka_unit_test(open_floors_walls_and_ceilings_see_one_half_and_nothing),
-        cmocka_unit_test(threads_and_bands_change_no_bit),
         cmocka_unit_test(a_sky_without_an_axis_or_rays_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -4,10 +4,10 @@
 
 static void assert_fails(const vsh_mesh *mesh, vsh_lightmap_options options, vsh_result code,
                          const char *words[], size_t word_count) {
-    vsh_texels *texels = NULL;
+    vsh_charts *charts = NULL;
     vsh_error error = {0};
-    assert_int_equal(vsh_texels_create(mesh, 1, &options, NULL, NULL, &texels, &error), code);
-    assert_null(texels);
+    assert_int_equal(vsh_charts_create(mesh, 1, &options, NULL, NULL, &charts, &error), code);
+    assert_null(charts);
     assert_int_equal(error.code, code);
     for (size_t i = 0; i < word_count; ++i) {
         if (strstr(error.message, words[i]) == NULL) {
@@ -24,15 +24,16 @@ static void a_quad_over_the_unit_square_puts_every_texel_at_its_analytic_place(v
     for (size_t s = 0; s < sizeof sizes / sizeof sizes[0]; ++s) {
         const int32_t w = sizes[s][0], h = sizes[s][1], n = sizes[s][2];
         vsh_uv_report report;
-        vsh_texels *texels = create(&q.mesh, 1, size_of(w, h, n), &report);
-        vsh_texels_info info;
-        vsh_texels_get_info(texels, &info);
+        vsh_charts *charts = create(&q.mesh, 1, size_of(w, h, n), &report);
+        vsh_charts_info info;
+        vsh_charts_get_info(charts, &info);
         assert_int_equal(info.covered, w * h);
         assert_int_equal(info.samples, w * h * n * n);
         assert_int_equal(report.overlap_texels, 0);
         assert_int_equal(report.overlap_triangles, 0);
         assert_int_equal(report.outside_triangles, 0);
         assert_int_equal(report.degenerate_triangles, 0);
+        vsh_texels *texels = rasterize(charts);
         const vsh_texel_samples samples = vsh_texels_samples(texels);
         double *sum = calloc((size_t)(w * h), 2 * sizeof *sum);
         int *count = calloc((size_t)(w * h), sizeof *count);
@@ -58,20 +59,23 @@ static void a_quad_over_the_unit_square_puts_every_texel_at_its_analytic_place(v
         free(count);
         free(sum);
         vsh_texels_free(texels);
+        vsh_charts_free(charts);
     }
 }
 
-static void neighbouring_samples_come_tile_by_tile(void **state) {
+static void neighbouring_samples_come_cell_by_cell(void **state) {
     (void)state;
     quad q;
     make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
-    vsh_texels *texels = create(&q.mesh, 1, size_of(24, 16, 1), NULL);
+    vsh_charts *charts = create(&q.mesh, 1, size_of(24, 16, 1), NULL);
+    vsh_texels *texels = rasterize(charts);
     const vsh_texel_samples samples = vsh_texels_samples(texels);
     for (size_t i = 0; i < samples.count; ++i) {
         const size_t column = vsh_texel_column(samples.texels[i]), row = vsh_texel_row(samples.texels[i]);
         assert_int_equal(row / 8 * 3 + column / 8, i / 64);
     }
     vsh_texels_free(texels);
+    vsh_charts_free(charts);
 }
 
 /* A fan around a point that lies on a texel centre, and many that do not. */
@@ -103,14 +107,14 @@ static void triangles_that_share_edges_and_corners_leave_no_gap_and_no_overlap(v
                                .vertex_count = SPOKES + 1,
                                .triangle_count = SPOKES};
         vsh_uv_report report;
-        vsh_texels *texels = create(&mesh, 1, size_of(16, 16, 3), &report);
-        vsh_texels_info info;
-        vsh_texels_get_info(texels, &info);
+        vsh_charts *charts = create(&mesh, 1, size_of(16, 16, 3), &report);
+        vsh_charts_info info;
+        vsh_charts_get_info(charts, &info);
         assert_int_equal(info.samples, 16 * 16 * 9);
         assert_int_equal(report.overlap_texels, 0);
         assert_int_equal(report.overlap_triangles, 0);
         assert_int_equal(report.outside_triangles, SPOKES);
-        vsh_texels_free(texels);
+        vsh_charts_free(charts);
     }
 }
 
@@ -118,11 +122,11 @@ static void a_chart_that_fits_the_texels_has_no_border_texels(void **state) {
     (void)state;
     quad q;
     make_quad(&q, 4.0f / 16.0f, 4.0f / 16.0f, 12.0f / 16.0f, 12.0f / 16.0f);
-    vsh_texels *texels = create(&q.mesh, 1, size_of(16, 16, 1), NULL);
-    vsh_texels_info info;
-    vsh_texels_get_info(texels, &info);
+    vsh_charts *charts = create(&q.mesh, 1, size_of(16, 16, 1), NULL);
+    vsh_charts_info info;
+    vsh_charts_get_info(charts, &info);
     assert_int_equal(info.covered, 64);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
 }
 
 static void a_chart_that_does_not_fit_has_border_texels_near_and_inside_it(void **state) {
@@ -132,10 +136,11 @@ static void a_chart_that_does_not_fit_has_border_texels_near_and_inside_it(void 
     /* From 4.8 to 11.2 of 16: the texels 4 and 11 are touched, their centres and samples (n = 2) are not. */
     make_quad(&q, 0.3f, 0.3f, 0.7f, 0.7f);
     for (size_t s = 0; s < 2; ++s) {
-        vsh_texels *texels = create(&q.mesh, 1, size_of(16, 16, supersample[s]), NULL);
+        vsh_charts *charts = create(&q.mesh, 1, size_of(16, 16, supersample[s]), NULL);
+        vsh_texels *texels = rasterize(charts);
         const vsh_texel_samples samples = vsh_texels_samples(texels);
-        vsh_texels_info info;
-        vsh_texels_get_info(texels, &info);
+        vsh_charts_info info;
+        vsh_charts_get_info(charts, &info);
         assert_int_equal(info.covered, 64);
         int border = 0;
         for (size_t i = 0; i < samples.count; ++i) {
@@ -162,6 +167,7 @@ static void a_chart_that_does_not_fit_has_border_texels_near_and_inside_it(void 
             assert_true(samples.positions[3 * i] <= 2.0 * (double)0.7f + 1e-7);
         }
         vsh_texels_free(texels);
+        vsh_charts_free(charts);
     }
 }
 
@@ -172,13 +178,15 @@ static void a_triangle_smaller_than_a_texel_still_has_one(void **state) {
     const uint32_t indices[] = {0, 1, 2};
     const vsh_mesh mesh = {
         .positions = positions, .uvs = uvs, .indices = indices, .vertex_count = 3, .triangle_count = 1};
-    vsh_texels *texels = create(&mesh, 1, size_of(8, 8, 1), NULL);
+    vsh_charts *charts = create(&mesh, 1, size_of(8, 8, 1), NULL);
+    vsh_texels *texels = rasterize(charts);
     const vsh_texel_samples samples = vsh_texels_samples(texels);
     assert_int_equal(samples.count, 1);
     assert_int_equal(samples.texels[0], vsh_texel(4, 3));
     const double *p = samples.positions;
     assert_true(p[0] >= 0.0 && p[1] >= 0.0 && p[0] + p[1] <= 1.0 + 1e-12);
     vsh_texels_free(texels);
+    vsh_charts_free(charts);
 }
 
 static void overlaps_are_counted_where_two_meshes_share_texels(void **state) {
@@ -189,16 +197,16 @@ static void overlaps_are_counted_where_two_meshes_share_texels(void **state) {
     make_quad(&q[2], 0.25f, 0.25f, 0.5f, 0.5f);
     const vsh_mesh meshes[] = {q[0].mesh, q[1].mesh, q[2].mesh};
     vsh_uv_report reports[3];
-    vsh_texels *texels = create(meshes, 3, size_of(32, 32, 1), reports);
+    vsh_charts *charts = create(meshes, 3, size_of(32, 32, 1), reports);
     assert_int_equal(reports[0].overlap_texels, 0);
     assert_int_equal(reports[1].overlap_texels, 0);
     assert_int_equal(reports[2].overlap_texels, 8 * 8);
     assert_int_equal(reports[2].overlap_triangles, 2);
     assert_int_equal(reports[2].other_texels, 8 * 8);
-    vsh_texels_info info;
-    vsh_texels_get_info(texels, &info);
+    vsh_charts_info info;
+    vsh_charts_get_info(charts, &info);
     assert_int_equal(info.samples, 32 * 32);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
 }
 
 static void the_first_triangle_keeps_a_texel_that_two_cover(void **state) {
@@ -211,13 +219,15 @@ static void the_first_triangle_keeps_a_texel_that_two_cover(void **state) {
     }
     for (int first = 0; first < 2; ++first) {
         const vsh_mesh meshes[] = {q[first].mesh, q[1 - first].mesh};
-        vsh_texels *texels = create(meshes, 2, size_of(9, 9, 1), NULL);
+        vsh_charts *charts = create(meshes, 2, size_of(9, 9, 1), NULL);
+        vsh_texels *texels = rasterize(charts);
         const vsh_texel_samples samples = vsh_texels_samples(texels);
         assert_int_equal(samples.count, 81);
         for (size_t i = 0; i < samples.count; ++i) {
             assert_true(samples.positions[3 * i + 2] == (first == 0 ? 0.0 : 7.0));
         }
         vsh_texels_free(texels);
+        vsh_charts_free(charts);
     }
 }
 
@@ -228,6 +238,7 @@ static void any_number_of_threads_gives_the_same_bits(void **state) {
     make_sphere(&s[1], 13, 1.0); /* the same chart: everything overlaps */
     const vsh_mesh meshes[] = {s[0].mesh, s[1].mesh};
     const int32_t threads[] = {1, 2, 5};
+    vsh_charts *charts[3];
     vsh_texels *texels[3];
     vsh_uv_report reports[3][2];
     for (int t = 0; t < 3; ++t) {
@@ -235,7 +246,8 @@ static void any_number_of_threads_gives_the_same_bits(void **state) {
         run.threads = threads[t];
         const vsh_lightmap_options options = size_of(301, 203, 2);
         memset(reports[t], 0, sizeof reports[t]);
-        assert_int_equal(vsh_texels_create(meshes, 2, &options, &run, reports[t], &texels[t], NULL), VSH_OK);
+        assert_int_equal(vsh_charts_create(meshes, 2, &options, &run, reports[t], &charts[t], NULL), VSH_OK);
+        assert_int_equal(vsh_texels_create(charts[t], &run, &texels[t], NULL), VSH_OK);
     }
     const vsh_texel_samples a = vsh_texels_samples(texels[0]);
     for (int t = 1; t < 3; ++t) {
@@ -250,6 +262,7 @@ static void any_number_of_threads_gives_the_same_bits(void **state) {
     assert_true(reports[0][1].overlap_texels > 301 * 203 / 2);
     for (int t = 0; t < 3; ++t) {
         vsh_texels_free(texels[t]);
+        vsh_charts_free(charts[t]);
     }
     free_sphere(&s[1]);
     free_sphere(&s[0]);
@@ -265,8 +278,9 @@ static void huge_uvs_are_clipped_and_counted(void **state) {
         const vsh_mesh mesh = {
             .positions = positions, .uvs = uvs, .indices = indices, .vertex_count = 3, .triangle_count = 1};
         vsh_uv_report report;
-        vsh_texels *texels = create(&mesh, 1, size_of(64, 32, 2), &report);
+        vsh_charts *charts = create(&mesh, 1, size_of(64, 32, 2), &report);
         assert_int_equal(report.outside_triangles, 1);
+        vsh_texels *texels = rasterize(charts);
         const vsh_texel_samples samples = vsh_texels_samples(texels);
         assert_true(samples.count > 0 && samples.count <= 64 * 32 * 4);
         for (size_t i = 0; i < samples.count; ++i) {
@@ -275,6 +289,7 @@ static void huge_uvs_are_clipped_and_counted(void **state) {
             assert_true(p[0] >= 0.0 && p[1] >= 0.0 && p[0] + p[1] <= 1.0 + 1e-9 && p[2] == 0.0);
         }
         vsh_texels_free(texels);
+        vsh_charts_free(charts);
     }
 }
 
@@ -287,10 +302,10 @@ static void triangles_without_area_are_skipped_and_those_of_uv_space_counted(voi
     const vsh_mesh mesh = {
         .positions = positions, .uvs = uvs, .indices = indices, .vertex_count = 4, .triangle_count = 4};
     vsh_uv_report report;
-    vsh_texels *texels = create(&mesh, 1, size_of(8, 8, 1), &report);
+    vsh_charts *charts = create(&mesh, 1, size_of(8, 8, 1), &report);
     assert_int_equal(report.degenerate_triangles, 1);
     assert_int_equal(report.overlap_texels, 0);
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
 }
 
 static void bad_sizes_and_uvs_are_refused_with_the_value_and_the_limit(void **state) {
@@ -319,17 +334,17 @@ static void the_memory_limit_is_passed_by_no_lightmap(void **state) {
     quad q;
     make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
     vsh_run run = vsh_run_default();
-    vsh_texels *texels = NULL;
+    vsh_charts *charts = NULL;
     vsh_error error = {0};
     const vsh_lightmap_options small = size_of(64, 64, 1), large = size_of(65536, 65536, 16);
     run.memory_limit = 1000000;
-    assert_int_equal(vsh_texels_create(&q.mesh, 1, &small, &run, NULL, &texels, &error), VSH_OK);
-    vsh_texels_info info;
-    vsh_texels_get_info(texels, &info);
+    assert_int_equal(vsh_charts_create(&q.mesh, 1, &small, &run, NULL, &charts, &error), VSH_OK);
+    vsh_charts_info info;
+    vsh_charts_get_info(charts, &info);
     assert_true(info.bytes <= run.memory_limit);
-    vsh_texels_free(texels);
-    assert_int_equal(vsh_texels_create(&q.mesh, 1, &large, &run, NULL, &texels, &error), VSH_ERROR_LIMIT);
-    assert_null(texels);
+    vsh_charts_free(charts);
+    assert_int_equal(vsh_charts_create(&q.mesh, 1, &large, &run, NULL, &charts, &error), VSH_ERROR_LIMIT);
+    assert_null(charts);
     assert_non_null(strstr(error.message, "limit"));
 }
 
@@ -349,10 +364,10 @@ static void progress_rises_and_cancels(void **state) {
     double last = 0.0;
     run.progress = stop_at_half;
     run.user = &last;
-    vsh_texels *texels = NULL;
+    vsh_charts *charts = NULL;
     const vsh_lightmap_options options = size_of(256, 256, 1);
-    assert_int_equal(vsh_texels_create(&s.mesh, 1, &options, &run, NULL, &texels, NULL), VSH_ERROR_CANCELLED);
-    assert_null(texels);
+    assert_int_equal(vsh_charts_create(&s.mesh, 1, &options, &run, NULL, &charts, NULL), VSH_ERROR_CANCELLED);
+    assert_null(charts);
     assert_true(last >= 0.5 && last < 1.0);
     free_sphere(&s);
 }
@@ -382,9 +397,9 @@ static void overlaps_tell_own_charts_from_those_of_other_objects_and_name_the_wo
     for (int n = 1; n <= 2; ++n) {
         options.supersample = n;
         vsh_uv_report reports[COUNT];
-        vsh_texels *texels = NULL;
-        assert_int_equal(vsh_texels_create(meshes, COUNT, &options, NULL, reports, &texels, NULL), VSH_OK);
-        vsh_texels_free(texels);
+        vsh_charts *charts = NULL;
+        assert_int_equal(vsh_charts_create(meshes, COUNT, &options, NULL, reports, &charts, NULL), VSH_OK);
+        vsh_charts_free(charts);
         assert_int_equal(reports[1].overlap_texels, 32 * 16);
         assert_int_equal(reports[1].other_texels, 0);
         assert_int_equal(reports[3].overlap_texels, (16 + 32) * 32);
@@ -406,17 +421,17 @@ static void overlaps_are_warned_of_by_mesh(void **state) {
     vsh_run run = vsh_run_default();
     run.warning = count_warning;
     run.user = &warnings;
-    vsh_texels *texels = NULL;
+    vsh_charts *charts = NULL;
     const vsh_lightmap_options options = size_of(16, 16, 1);
-    assert_int_equal(vsh_texels_create(meshes, 2, &options, &run, NULL, &texels, NULL), VSH_OK);
+    assert_int_equal(vsh_charts_create(meshes, 2, &options, &run, NULL, &charts, NULL), VSH_OK);
     assert_int_equal(warnings, 2); /* overlap and outside, both of the second mesh */
-    vsh_texels_free(texels);
+    vsh_charts_free(charts);
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_quad_over_the_unit_square_puts_every_texel_at_its_analytic_place),
-        cmocka_unit_test(neighbouring_samples_come_tile_by_tile),
+        cmocka_unit_test(neighbouring_samples_come_cell_by_cell),
         cmocka_unit_test(triangles_that_share_edges_and_corners_leave_no_gap_and_no_overlap),
         cmocka_unit_test(a_chart_that_fits_the_texels_has_no_border_texels),
         cmocka_unit_test(a_chart_that_does_not_fit_has_border_texels_near_and_inside_it),

@@ -13,11 +13,12 @@ static void samples_of_a_coarse_smooth_sphere_are_lifted_to_within_its_sag(void 
     const double radius = 2.0;
     sphere s;
     make_sphere(&s, ROWS, radius);
-    vsh_texels *lifted = create(&s.mesh, 1, size_of(64, 32, 1), NULL);
+    vsh_charts *lifted = create(&s.mesh, 1, size_of(64, 32, 1), NULL);
     vsh_mesh flat = s.mesh;
     flat.normals = NULL;
-    vsh_texels *facets = create(&flat, 1, size_of(64, 32, 1), NULL);
-    const vsh_texel_samples a = vsh_texels_samples(lifted), b = vsh_texels_samples(facets);
+    vsh_charts *facets = create(&flat, 1, size_of(64, 32, 1), NULL);
+    vsh_texels *lifted_texels = rasterize(lifted), *facet_texels = rasterize(facets);
+    const vsh_texel_samples a = vsh_texels_samples(lifted_texels), b = vsh_texels_samples(facet_texels);
     assert_int_equal(a.count, b.count);
     /* The deepest point of a facet lies under the middle of a cell's diagonal: cos of half its angle, which
      * is at most that of the sides' angles together. */
@@ -42,8 +43,10 @@ static void samples_of_a_coarse_smooth_sphere_are_lifted_to_within_its_sag(void 
     }
     assert_true(before > 0.0);
     assert_true(worst <= sag * 1.05);
-    vsh_texels_free(facets);
-    vsh_texels_free(lifted);
+    vsh_texels_free(facet_texels);
+    vsh_texels_free(lifted_texels);
+    vsh_charts_free(facets);
+    vsh_charts_free(lifted);
     free_sphere(&s);
 }
 
@@ -59,16 +62,19 @@ static void the_inside_of_a_smooth_sphere_is_not_lifted(void **state) {
     for (size_t v = 0; v < 3 * s.mesh.vertex_count; ++v) {
         s.normals[v] = -s.normals[v];
     }
-    vsh_texels *smooth = create(&s.mesh, 1, size_of(32, 16, 1), NULL);
+    vsh_charts *smooth = create(&s.mesh, 1, size_of(32, 16, 1), NULL);
     s.mesh.normals = NULL;
-    vsh_texels *flat = create(&s.mesh, 1, size_of(32, 16, 1), NULL);
-    const vsh_texel_samples a = vsh_texels_samples(smooth), b = vsh_texels_samples(flat);
+    vsh_charts *flat = create(&s.mesh, 1, size_of(32, 16, 1), NULL);
+    vsh_texels *smooth_texels = rasterize(smooth), *flat_texels = rasterize(flat);
+    const vsh_texel_samples a = vsh_texels_samples(smooth_texels), b = vsh_texels_samples(flat_texels);
     assert_int_equal(a.count, b.count);
     for (size_t i = 0; i < 3 * a.count; ++i) {
         assert_true(fabs(a.positions[i] - b.positions[i]) < 1e-6);
     }
-    vsh_texels_free(flat);
-    vsh_texels_free(smooth);
+    vsh_texels_free(flat_texels);
+    vsh_texels_free(smooth_texels);
+    vsh_charts_free(flat);
+    vsh_charts_free(smooth);
     free_sphere(&s);
 }
 
@@ -84,7 +90,8 @@ static void normals_that_are_flat_or_broken_lift_nothing(void **state) {
             memcpy(all + 3 * k, normals[c], sizeof normals[c]);
         }
         q.mesh.normals = all;
-        vsh_texels *texels = create(&q.mesh, 1, size_of(8, 8, 1), NULL);
+        vsh_charts *charts = create(&q.mesh, 1, size_of(8, 8, 1), NULL);
+        vsh_texels *texels = rasterize(charts);
         const vsh_texel_samples samples = vsh_texels_samples(texels);
         assert_int_equal(samples.count, 64);
         for (size_t i = 0; i < samples.count; ++i) {
@@ -92,6 +99,7 @@ static void normals_that_are_flat_or_broken_lift_nothing(void **state) {
             assert_true(samples.normals[3 * i + 2] == 1.0f);
         }
         vsh_texels_free(texels);
+        vsh_charts_free(charts);
     }
 }
 
@@ -105,13 +113,15 @@ static void a_cube_with_averaged_normals_is_shaded_smooth_but_stays_in_its_place
                            .indices = QUAD_INDICES,
                            .vertex_count = 4,
                            .triangle_count = 2};
-    vsh_texels *texels = create(&mesh, 1, size_of(16, 16, 1), NULL);
+    vsh_charts *charts = create(&mesh, 1, size_of(16, 16, 1), NULL);
+    vsh_texels *texels = rasterize(charts);
     const vsh_texel_samples samples = vsh_texels_samples(texels);
     for (size_t i = 0; i < samples.count; ++i) {
         assert_true(samples.positions[3 * i + 2] == 1.0);
         assert_true(samples.normals[3 * i + 2] > 0.5f);
     }
     vsh_texels_free(texels);
+    vsh_charts_free(charts);
 }
 
 static void a_mirrored_transform_keeps_normals_outward(void **state) {
@@ -128,7 +138,8 @@ static void a_mirrored_transform_keeps_normals_outward(void **state) {
             if (!smooth) {
                 s.mesh.normals = NULL;
             }
-            vsh_texels *texels = create(&s.mesh, 1, size_of(32, 16, 1), NULL);
+            vsh_charts *charts = create(&s.mesh, 1, size_of(32, 16, 1), NULL);
+            vsh_texels *texels = rasterize(charts);
             const vsh_texel_samples samples = vsh_texels_samples(texels);
             assert_true(samples.count >= 512 - 32);
             for (size_t i = 0; i < samples.count; ++i) {
@@ -143,6 +154,7 @@ static void a_mirrored_transform_keeps_normals_outward(void **state) {
                 assert_true(deciding > 0.0);
             }
             vsh_texels_free(texels);
+            vsh_charts_free(charts);
             free_sphere(&s);
         }
     }
@@ -154,7 +166,8 @@ static void a_mirrored_transform_keeps_uvs_on_their_corners(void **state) {
     quad q;
     make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
     q.mesh.transform = mirror;
-    vsh_texels *texels = create(&q.mesh, 1, size_of(8, 8, 1), NULL);
+    vsh_charts *charts = create(&q.mesh, 1, size_of(8, 8, 1), NULL);
+    vsh_texels *texels = rasterize(charts);
     const vsh_texel_samples samples = vsh_texels_samples(texels);
     for (size_t i = 0; i < samples.count; ++i) {
         assert_true(fabs(samples.positions[3 * i] + 2.0 * (vsh_texel_column(samples.texels[i]) + 0.5) / 8) <
@@ -163,9 +176,10 @@ static void a_mirrored_transform_keeps_uvs_on_their_corners(void **state) {
                          3.0 * (1.0 - (vsh_texel_row(samples.texels[i]) + 0.5) / 8)) < 1e-12);
     }
     vsh_texels_free(texels);
+    vsh_charts_free(charts);
 }
 
-/* Whatever rows are looked at first: they have no samples, some, or all. */
+/* Some tiles are looked at first: they have no samples, some, or all. */
 static void bounds_of_charts_are_those_of_their_texels(void **state) {
     (void)state;
     sphere s;
@@ -174,16 +188,18 @@ static void bounds_of_charts_are_those_of_their_texels(void **state) {
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; ++i) {
         for (int32_t samples = 1; samples <= 2; ++samples) {
             const vsh_lightmap_options options = size_of(sizes[i][0], sizes[i][1], samples);
-            vsh_charts *charts = NULL;
-            vsh_texels *texels = NULL;
-            vsh_texels_info info;
-            double low[3], high[3];
-            assert_int_equal(vsh_charts_create(&s.mesh, 1, &options, NULL, NULL, &charts, NULL), VSH_OK);
-            assert_int_equal(vsh_texels_create(&s.mesh, 1, &options, NULL, NULL, &texels, NULL), VSH_OK);
-            vsh_texels_get_info(texels, &info);
-            assert_int_equal(vsh_charts_bounds(charts, NULL, low, high, NULL), VSH_OK);
-            assert_memory_equal(low, info.bounds_min, sizeof low);
-            assert_memory_equal(high, info.bounds_max, sizeof high);
+            vsh_charts *charts = create(&s.mesh, 1, options, NULL);
+            vsh_texels *texels = rasterize(charts);
+            const vsh_texel_samples all = vsh_texels_samples(texels);
+            double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+            double found_low[3], found_high[3];
+            for (size_t k = 0; k < 3 * all.count; ++k) {
+                low[k % 3] = fmin(low[k % 3], all.positions[k]);
+                high[k % 3] = fmax(high[k % 3], all.positions[k]);
+            }
+            assert_int_equal(vsh_charts_bounds(charts, NULL, found_low, found_high, NULL), VSH_OK);
+            assert_memory_equal(found_low, low, sizeof low);
+            assert_memory_equal(found_high, high, sizeof high);
             vsh_texels_free(texels);
             vsh_charts_free(charts);
         }

@@ -324,13 +324,14 @@ static void a_lightmap_and_a_band_agree_where_texel_and_voxel_meet(void **state)
                             .triangle_count = 2};
     vsh_lightmap_options lightmap = size_of(SIDE, SIDE, 1);
     lightmap.ao_spacing = 1;
-    vsh_texels *texels = create(&floor, 1, lightmap, NULL);
+    vsh_charts *charts = create(&floor, 1, lightmap, NULL);
     static float shadow[TEXELS], ao[TEXELS], coverage[TEXELS];
     float *const shadows_of[1] = {shadow};
     const vsh_lightmap planes = {.shadow = shadows_of, .ao = ao, .coverage = coverage};
     assert_int_equal(
-        vsh_bake_lightmap(occluders_of(field), texels, &light, 1, &options.shade, NULL, &planes, NULL, NULL),
+        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, &options.shade, NULL, &planes, NULL, NULL),
         VSH_OK);
+    vsh_texels *texels = rasterize(charts);
     const vsh_texel_samples samples = vsh_texels_samples(texels);
     assert_int_equal(samples.count, TEXELS);
     double worst[2] = {0.0, 0.0}, square[2] = {0.0, 0.0};
@@ -361,6 +362,7 @@ static void a_lightmap_and_a_band_agree_where_texel_and_voxel_meet(void **state)
         assert_true(worst[g] < 1e-4 && sqrt(square[g] / (double)count) < 0.002);
     }
     vsh_texels_free(texels);
+    vsh_charts_free(charts);
     vsh_volume_free(volume);
     vsh_voxels_free(voxels);
     vsh_field_free(field);

@@ -23,12 +23,21 @@ static inline vsh_lightmap_options size_of(int32_t width, int32_t height, int32_
     return options;
 }
 
-static inline vsh_texels *create(const vsh_mesh *meshes, size_t count, vsh_lightmap_options options,
+static inline vsh_charts *create(const vsh_mesh *meshes, size_t count, vsh_lightmap_options options,
                                  vsh_uv_report *reports) {
+    vsh_charts *charts = NULL;
+    vsh_error error = {0};
+    const vsh_result result = vsh_charts_create(meshes, count, &options, NULL, reports, &charts, &error);
+    if (result != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return charts;
+}
+
+static inline vsh_texels *rasterize(const vsh_charts *charts) {
     vsh_texels *texels = NULL;
     vsh_error error = {0};
-    const vsh_result result = vsh_texels_create(meshes, count, &options, NULL, reports, &texels, &error);
-    if (result != VSH_OK) {
+    if (vsh_texels_create(charts, NULL, &texels, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     return texels;

@@ -89,6 +89,7 @@ static inline vsh_mesh mesh_of(shape *s) {
 
 /* A lightmap of AO, and what is behind it. */
 typedef struct baked {
+    vsh_charts *charts;
     vsh_texels *texels;
     vsh_texel_samples samples; /* one a texel */
     float *ao, *coverage;
@@ -122,13 +123,14 @@ static inline baked bake(const vsh_mesh *mesh, int32_t resolution, int32_t threa
     options.shade.ao_method = VSH_AO_EXACT;
     options.shade.ao_distance = distance;
     options.shade.rays = 16;
-    check(vsh_texels_create(mesh, 1, &options, &run, NULL, &b.texels, &error), &error);
+    check(vsh_charts_create(mesh, 1, &options, &run, NULL, &b.charts, &error), &error);
+    check(vsh_texels_create(b.charts, &run, &b.texels, &error), &error);
     b.samples = vsh_texels_samples(b.texels);
     b.ao = calloc(SIZE * SIZE, sizeof *b.ao);
     b.coverage = calloc(SIZE * SIZE, sizeof *b.coverage);
     b.stats.invalid_by_mesh = &b.invalid;
     const vsh_lightmap lightmap = {.ao = b.ao, .coverage = b.coverage};
-    check(vsh_bake_lightmap(occluders_traced(field, triangles), b.texels, NULL, 0, NULL, &run, &lightmap,
+    check(vsh_bake_lightmap(occluders_traced(field, triangles), b.charts, NULL, 0, NULL, &run, &lightmap,
                             &b.stats, &error),
           &error);
     vsh_triangles_free(triangles);
@@ -139,6 +141,7 @@ static inline baked bake(const vsh_mesh *mesh, int32_t resolution, int32_t threa
 
 static inline void free_baked(baked *b) {
     vsh_texels_free(b->texels);
+    vsh_charts_free(b->charts);
     free(b->ao);
     free(b->coverage);
 }

@@ -143,12 +143,8 @@ static void say_lightmap(void *user, const vsh_job_lightmap *lightmap, vsh_resul
     if (result != VSH_OK || t->common->quiet || t->part || !is_each_told(t)) {
         return;
     }
-    char banded[64] = "";
-    if (lightmap->bands > 1) {
-        snprintf(banded, sizeof banded, ", in %d bands of %d rows", lightmap->bands, lightmap->band_rows);
-    }
-    cli_say("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid%s", lightmap->output,
-            lightmap->width, lightmap->height, lightmap->covered, lightmap->invalid_texels, banded);
+    cli_say("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid", lightmap->output, lightmap->width,
+            lightmap->height, lightmap->covered, lightmap->invalid_texels);
 }
 
 /* A name to go before ".I-of-N.part", to be freed. */
@@ -181,7 +177,6 @@ static cli_stats make_stats(const vsh_scene *scene, const vsh_bake_report *repor
     cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS, threads);
     stats.texels = report->texels;
     stats.invalid_texels = report->invalid_texels;
-    stats.bands = report->bands;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         const int32_t spacing = scene->receivers[i].supersample == 1 ? scene->receivers[i].ao_spacing : 1;
         stats.ao_spacing = i == 0 || spacing < stats.ao_spacing ? spacing : stats.ao_spacing;
@@ -245,7 +240,6 @@ static int bake_scene(const cli_bake_settings *settings, const vsh_scene *scene)
     telling t = {.common = &settings->common, .part = part};
     vsh_bake_job_options options = vsh_bake_job_options_default();
     options.per_object = settings->per_object;
-    options.band_rows = settings->band_rows;
     options.invalid_picture = settings->invalid_picture;
     options.lit_preview = settings->preview;
     options.lit_exr = settings->exr;

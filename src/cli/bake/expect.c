@@ -126,7 +126,9 @@ static double ao_us(const vsh_shade_options *o) {
     }
 }
 
-static const double chart_us = 0.13, texel_us = 0.15, bent_us = 1.0, padding_us = 0.1, seam_us = 0.05;
+static const double chart_us = 0.13, texel_us = 0.15, padding_us = 0.1, seam_us = 0.05;
+/* Of AO, what is estimated once all rays are shot. */
+static const double estimate = 0.2;
 /* Whether a sample is valid: by the field, or by rays. */
 static const double valid_us = 0.25, traced_valid_us = 1.0;
 /* Of a channel's texel, one thread. */
@@ -138,23 +140,11 @@ static void expect_lightmap(const vsh_scene *scene, const vsh_job_lightmap *r, d
     const double shadows = sample * light_us(&scene->shade),
                  ao = scene->ao ? sample * ao_us(&scene->shade) : 0.0;
     cli_progress_expect("charts", CLI_ESTIMATE_SHADE, texel * chart_us);
-    if (r->bands > 1) { /* told as one stage */
-        const double others = sample * (texel_us + valid) + texel * padding_us;
-        cli_progress_expect("bake", CLI_ESTIMATE_SHADE, (double)scene->light_count * shadows + ao + others);
-        return;
-    }
-    cli_progress_expect("texels", CLI_ESTIMATE_SHADE, sample * texel_us);
-    cli_progress_expect("validate", CLI_ESTIMATE_SHADE, sample * valid);
-    for (size_t l = 0; l < scene->light_count; ++l) {
-        char name[CLI_ESTIMATE_NAME];
-        snprintf(name, sizeof name, "shadow.%.60s", scene->lights[l].name);
-        cli_progress_expect(name, CLI_ESTIMATE_SHADE, shadows);
-    }
+    cli_progress_expect("bake", CLI_ESTIMATE_SHADE,
+                        sample * (texel_us + valid) + (double)scene->light_count * shadows +
+                            (1.0 - estimate) * ao);
     if (scene->ao) {
-        cli_progress_expect("ao", CLI_ESTIMATE_SHADE, ao);
-    }
-    if (scene->bent) {
-        cli_progress_expect("bent", CLI_ESTIMATE_SHADE, sample * bent_us);
+        cli_progress_expect("ao", CLI_ESTIMATE_SHADE, estimate * ao);
     }
     cli_progress_expect("padding", CLI_ESTIMATE_SHADE, texel * padding_us);
     const int32_t seams = scene->receivers[r->receiver].seams;

@@ -14,17 +14,6 @@ static void print_methods(const vsh_scene *scene, int32_t has_triangles) {
     printf("methods       %s\n", cli_stats_methods_text(&stats, text, sizeof text));
 }
 
-/* A line for each lightmap that is baked in bands. */
-static void print_bands(const vsh_bake_job *job) {
-    for (size_t i = 0; i < vsh_bake_job_count(job); ++i) {
-        vsh_job_lightmap lightmap;
-        vsh_bake_job_lightmap(job, i, &lightmap);
-        if (lightmap.bands > 1) {
-            printf("bands         %d of %d rows: %s\n", lightmap.bands, lightmap.band_rows, lightmap.output);
-        }
-    }
-}
-
 int cli_bake_forecast(const vsh_scene *scene, vsh_bake_job *job, const vsh_run *run) {
     vsh_bake_forecast f;
     vsh_error error;
@@ -36,7 +25,6 @@ int cli_bake_forecast(const vsh_scene *scene, vsh_bake_job *job, const vsh_run *
     print_methods(scene, f.has_triangles);
     printf("texels        %" PRIu64 " in %zu lightmap%s, %" PRIu64 " samples\n", f.texels, count,
            count == 1 ? "" : "s", f.samples);
-    print_bands(job);
     if (f.voxels == 0.0) {
         printf("voxels        none\n");
     } else {

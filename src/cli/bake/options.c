@@ -7,8 +7,7 @@
 #include <string.h>
 
 enum {
-    KEY_BAND_ROWS = 0x2000,
-    KEY_STATS,
+    KEY_STATS = 0x2000,
     KEY_DRY_RUN,
     KEY_OUTPUT_FOLDER,
     KEY_RECEIVE,
@@ -43,10 +42,9 @@ static const cli_option options[] = {
     {KEY_EXR, "exr", "FILE.exr", "also an EXR of all channels beside a .glb or .gltf"},
     {KEY_VIEW, "view", "PAGE.html", "also a page to look at it in a browser: docs/view.md"},
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
-    {KEY_DRY_RUN, "dry-run", NULL,
-     "bake nothing: print texels, voxels and memory"},
-    CLI_SHARD_OPTION(
-        "bake part I of N into OUT.I-of-N.part: on any machine, in\nany order, again where it failed; 'vdbshade merge OUT' puts\nall parts together to the bits of one bake"),
+    {KEY_DRY_RUN, "dry-run", NULL, "bake nothing: print texels, voxels and memory"},
+    CLI_SHARD_OPTION("bake part I of N into OUT.I-of-N.part: on any machine, in\nany order, again where it "
+                     "failed; 'vdbshade merge OUT' puts\nall parts together to the bits of one bake"),
     {0, NULL, NULL, "Objects"},
     {KEY_RECEIVE, "receive", "NAME",
      "only objects of this name receive, all cast; * and ?\nmatch as in a shell; may be repeated"},
@@ -72,9 +70,6 @@ static const cli_option options[] = {
     {KEY_DENSITY, "density", "PATTERN=X",
      "factor of --texels-per-unit, or of the density that\nfits, for objects of that name; repeatable, the "
      "last\nthat means one holds (1)"},
-    {KEY_BAND_ROWS, "band-rows", "N",
-     "rows baked and written at a time, 1 to 65536,\nrounded up to eights; changes no value (all, or as\n"
-     "many as --memory-limit allows)"},
     CLI_COMMON_OPTIONS,
 };
 
@@ -197,8 +192,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case CLI_KEY_SHARD:
         return cli_parse_shard(name, value, &s->shard, &s->shard_count);
-    case KEY_BAND_ROWS:
-        return cli_parse_integer(name, value, 1, VSH_MAX_LIGHTMAP_SIZE, &s->band_rows);
     default:
         break;
     }

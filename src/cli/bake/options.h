@@ -77,7 +77,6 @@ typedef struct cli_bake_settings {
     double sun_angle_deg;
     const char *lights; /* a file whose lights are taken, or CLI_LIGHTS_OF_INPUT; NULL: none */
     double light_radius;
-    int32_t band_rows; /* 0: as many as go */
     const char *casters[CLI_MAX_EXTRA_CASTERS];
     size_t caster_count;
     const char *exr;                       /* beside an asset; NULL: none */

@@ -14,9 +14,10 @@ static void find_box(const trade_work *work, double min[3], double max[3]) {
         min[axis] = INFINITY;
         max[axis] = -INFINITY;
         for (size_t r = 0; r < work->receiver_count; ++r) {
-            const vsh_texels_info *info = &work->receivers[r].info;
-            min[axis] = info->samples > 0 ? fmin(min[axis], info->bounds_min[axis]) : min[axis];
-            max[axis] = info->samples > 0 ? fmax(max[axis], info->bounds_max[axis]) : max[axis];
+            const trade_receiver *receiver = &work->receivers[r];
+            const bool any = receiver->info.samples > 0;
+            min[axis] = any ? fmin(min[axis], receiver->low[axis]) : min[axis];
+            max[axis] = any ? fmax(max[axis], receiver->high[axis]) : max[axis];
         }
     }
 }
@@ -143,7 +144,7 @@ int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh
                                        .ao = ao != NULL ? ao + first : NULL,
                                        .coverage = coverage != NULL ? coverage + first : NULL};
         vsh_error error;
-        if (vsh_bake_lightmap(occluders, work->receivers[r].texels, work->scene->lights, lights, shade,
+        if (vsh_bake_lightmap(occluders, work->receivers[r].charts, work->scene->lights, lights, shade,
                               &work->run, &lightmap, &baked, &error) != VSH_OK) {
             code = cli_fail_of(NULL, &error);
             goto done;

@@ -28,20 +28,17 @@ static int load_receivers(trade_work *work) {
         trade_receiver *receiver = &work->receivers[i];
         size_t mesh_count;
         const vsh_mesh *meshes = vsh_assets_receiver(work->assets, i, &mesh_count);
-        vsh_charts *charts = NULL;
         vsh_error error;
-        vsh_result result =
-            vsh_receiver_charts(work->scene, i, meshes, mesh_count, 1, &work->run, &charts, &error);
-        if (result == VSH_OK) {
-            result = vsh_texels_create_band(charts, 0, work->scene->receivers[i].height, &work->run,
-                                            &receiver->texels, &error);
-        }
-        vsh_charts_free(charts);
-        if (result != VSH_OK) {
+        if (vsh_receiver_charts(work->scene, i, meshes, mesh_count, 1, &work->run, &receiver->charts,
+                                &error) != VSH_OK) {
             return cli_fail_of(NULL, &error);
         }
         ++work->receiver_count;
-        vsh_texels_get_info(receiver->texels, &receiver->info);
+        if (vsh_charts_bounds(receiver->charts, &work->run, receiver->low, receiver->high, &error) !=
+            VSH_OK) {
+            return cli_fail_of(NULL, &error);
+        }
+        vsh_charts_get_info(receiver->charts, &receiver->info);
         receiver->path = work->scene->receivers[i].path;
         receiver->first = work->texels;
         work->texels += (size_t)receiver->info.width * (size_t)receiver->info.height;
@@ -142,6 +139,27 @@ static void raise(const trade_work *work, double *position, const float *normal,
     }
 }
 
+/* Points of the receiver's texels that any field finds valid, from *at on. */
+static void place_samples(trade_work *work, const trade_receiver *receiver, vsh_texel_samples samples,
+                          double lift, double voxel, size_t *at) {
+    for (size_t i = 0; i < samples.count; ++i) {
+        const size_t texel = receiver->first + vsh_texel_place(samples.texels[i], receiver->info.width);
+        if (!work->any[texel]) {
+            continue;
+        }
+        const float *geometric = samples.geometric_normals + 3 * i;
+        double *position = work->positions + 3 * *at;
+        for (size_t k = 0; k < 3; ++k) {
+            position[k] = samples.positions[3 * i + k] + lift * (double)geometric[k];
+            work->normals[3 * *at + k] = samples.normals[3 * i + k];
+        }
+        if (work->solids != NULL) {
+            raise(work, position, geometric, lift, voxel);
+        }
+        work->texel[(*at)++] = (uint32_t)texel;
+    }
+}
+
 int trade_place_points(trade_work *work) {
     work->positions = calloc(work->points, 3 * sizeof *work->positions);
     work->normals = calloc(work->points, 3 * sizeof *work->normals);
@@ -160,24 +178,13 @@ int trade_place_points(trade_work *work) {
     const double lift = TRUTH_LIFT * side;
     size_t at = 0;
     for (size_t r = 0; r < work->receiver_count; ++r) {
-        const vsh_texel_samples samples = vsh_texels_samples(work->receivers[r].texels);
-        for (size_t i = 0; i < samples.count; ++i) {
-            const size_t texel =
-                work->receivers[r].first + vsh_texel_place(samples.texels[i], work->receivers[r].info.width);
-            if (!work->any[texel]) {
-                continue;
-            }
-            const float *geometric = samples.geometric_normals + 3 * i;
-            double *position = work->positions + 3 * at;
-            for (size_t k = 0; k < 3; ++k) {
-                position[k] = samples.positions[3 * i + k] + lift * (double)geometric[k];
-                work->normals[3 * at + k] = samples.normals[3 * i + k];
-            }
-            if (work->solids != NULL) {
-                raise(work, position, geometric, lift, info.voxel_size);
-            }
-            work->texel[at++] = (uint32_t)texel;
+        vsh_texels *texels;
+        vsh_error error;
+        if (vsh_texels_create(work->receivers[r].charts, &work->run, &texels, &error) != VSH_OK) {
+            return cli_fail_of(NULL, &error);
         }
+        place_samples(work, &work->receivers[r], vsh_texels_samples(texels), lift, info.voxel_size, &at);
+        vsh_texels_free(texels);
     }
     work->points = at;
     return CLI_OK;

@@ -192,7 +192,7 @@ static void free_work(trade_work *work) {
         vsh_occluders_free(work->fields[i].occluders);
     }
     for (size_t i = 0; i < work->receiver_count; ++i) {
-        vsh_texels_free(work->receivers[i].texels);
+        vsh_charts_free(work->receivers[i].charts);
     }
     free(work->receivers);
     free(work->tasks);

@@ -41,9 +41,10 @@ typedef struct trade_task {
 /* Every plane of values holds the texels of all receivers, one receiver after the other. */
 typedef struct trade_receiver {
     const char *path;
-    vsh_texels *texels;
-    vsh_texels_info info;
-    size_t first; /* of its texels, in a plane */
+    vsh_charts *charts;
+    vsh_charts_info info;
+    double low[3], high[3]; /* world box of its samples */
+    size_t first;           /* of its texels, in a plane */
 } trade_receiver;
 
 /* One way to bake, and what came of it. */

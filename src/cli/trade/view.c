@@ -112,7 +112,7 @@ static int add(page *p, const trade_subject *subject, const trade_run *run) {
         snprintf(one->name, sizeof one->name, "%s: %s%s: RMSE %.4f, %.3f s", what,
                  run->embree ? "Embree, " : "", run->options, run->metrics.rmse, run->bake_s);
     }
-    const vsh_texels_info *info = &work->receivers[0].info;
+    const vsh_charts_info *info = &work->receivers[0].info;
     one->image =
         (vsh_image){info->width, info->height, (int32_t)subject->planes + 1, one->names, one->planes, NULL};
     one->bake = vsh_view_bake_default();

@@ -1,7 +1,7 @@
 """Soft shadows and ambient occlusion, baked from signed distance fields and triangles.
 
 Casters become :class:`Occluders`, of which points (:class:`Query`, :func:`shade_shadow`, :func:`shade_ao`), lightmaps
-(:class:`Texels`, :func:`bake_lightmap`), volumes (:func:`bake_volume`) and pictures (:func:`render`) are asked. A
+(:class:`Charts`, :func:`bake_lightmap`), volumes (:func:`bake_volume`) and pictures (:func:`render`) are asked. A
 :class:`Scene` bakes from files. Names are those of the C library without ``vsh_``; options are keywords, named and
 documented in :mod:`vdbshade.types`; constants are words; errors are :class:`Error`. World space is right-handed, in scene
 units; angles are radians. docs/python.md tells more.

@@ -103,7 +103,7 @@ class BakeJob(Handle):
     words : sequence of str, optional
         kept in a part as they are (part_words())
     **options
-        vdbshade.types.BakeJobOptions: per_object, allow_overlap, band_rows, invalid_picture, lit_preview,
+        vdbshade.types.BakeJobOptions: per_object, allow_overlap, scratch, invalid_picture, lit_preview,
         shard, shard_count, parts (a part of a bake that machines share), …
     """
 

@@ -34,7 +34,23 @@ def charts_closeness(meshes: Meshes, width: int, height: int, *, run: Optional[R
 
 
 class Texels(Handle):
-    """The texels of a receiver at one size: where each lies in the world. The meshes are not needed any more.
+    """Where each texel of a lightmap lies in the world, by Charts.texels()."""
+
+    @property
+    def samples(self) -> Dict[str, numpy.ndarray]:
+        """The samples, tile by tile, as views: "positions" float64 (n, 3), "normals" and "geometric_normals" float32 (n, 3),
+        "texels" uint32 (n,)."""
+        found = ffi.new("vsh_texel_samples *")
+        found[0] = lib.vsh_texels_samples(self.handle)
+        n, owner = found.count, self.handle
+        return dict(positions=borrowed(found.positions, (n, 3), numpy.float64, owner),
+                    normals=borrowed(found.normals, (n, 3), numpy.float32, owner),
+                    geometric_normals=borrowed(found.geometric_normals, (n, 3), numpy.float32, owner),
+                    texels=borrowed(found.texels, (n,), numpy.uint32, owner))
+
+
+class Charts(Handle):
+    """The charts of a receiver at one size of lightmap. They keep the meshes' arrays.
 
     Parameters
     ----------
@@ -51,42 +67,12 @@ class Texels(Handle):
     """
 
     def __init__(self, meshes: Meshes, *, run: Optional[Run] = None, **options: Any) -> None:
-        structs, count, _ = meshes_of(meshes)
-        reports = ffi.new("vsh_uv_report[]", max(count, 1))
-        super().__init__(make(lib.vsh_texels_free, lib.vsh_texels_create, structs, count, _lightmap_options(options).pointer,
-                              RUN, reports, place("vsh_texels"), run=run))
-        #: what is wrong with the UVs, mesh by mesh
-        self.uv_reports: List[types.UvReport] = [told(reports[i], "vsh_uv_report") for i in range(count)]
-        self.shape: Tuple[int, int] = (self.info.height, self.info.width)
-        self.mesh_count = count
-
-    @property
-    def info(self) -> types.TexelsInfo:
-        return info(lib.vsh_texels_get_info, "vsh_texels_info", self.handle)
-
-    @property
-    def samples(self) -> Dict[str, numpy.ndarray]:
-        """The samples in the order in which they are shaded, views: "positions" float64 (n, 3), "normals" and
-        "geometric_normals" float32 (n, 3), "texels" uint32 (n,)."""
-        found = ffi.new("vsh_texel_samples *")
-        found[0] = lib.vsh_texels_samples(self.handle)
-        n, owner = found.count, self.handle
-        return dict(positions=borrowed(found.positions, (n, 3), numpy.float64, owner),
-                    normals=borrowed(found.normals, (n, 3), numpy.float32, owner),
-                    geometric_normals=borrowed(found.geometric_normals, (n, 3), numpy.float32, owner),
-                    texels=borrowed(found.texels, (n,), numpy.uint32, owner))
-
-
-class Charts(Handle):
-    """A receiver's triangles, sorted for one size of lightmap: texels are made from them in bands of rows; arguments as of
-    Texels. The meshes' arrays live as long."""
-
-    def __init__(self, meshes: Meshes, *, run: Optional[Run] = None, **options: Any) -> None:
         structs, count, keeps = meshes_of(meshes)
         reports = ffi.new("vsh_uv_report[]", max(count, 1))
         self._begin(make(_freeing(lib.vsh_charts_free, (structs, keeps)), lib.vsh_charts_create, structs, count,
                          _lightmap_options(options).pointer, RUN, reports, place("vsh_charts"), run=run),
                     count)
+        #: what is wrong with the UVs, mesh by mesh
         self.uv_reports: List[types.UvReport] = [told(reports[i], "vsh_uv_report") for i in range(count)]
 
     def _begin(self, cdata: Any, mesh_count: int) -> None:
@@ -104,18 +90,9 @@ class Charts(Handle):
         call(lib.vsh_charts_bounds, self.handle, RUN, low, high, run=run)
         return tuple(low), tuple(high)
 
-    def band(self, first_row: int, rows: int, *, run: Optional[Run] = None) -> Texels:
-        """The texels of some rows, both multiples of 8 (but to the last row): a bake of them gives those rows of the whole."""
-        texels = Texels.__new__(Texels)
-        Handle.__init__(texels, make(lib.vsh_texels_free, lib.vsh_texels_create_band, self.handle, first_row, rows, RUN,
-                                     place("vsh_texels"), run=run))
-        texels.uv_reports, texels.shape, texels.mesh_count = [], (rows, self.shape[1]), self.mesh_count
-        return texels
-
-    def band_bytes(self, first_row: int, rows: int, lights: int = 1, **planes: Any) -> int:
-        """Bytes that baking such a band takes at most; planes as of bake_lightmap(), 0 where the rows are no band."""
-        wanted = _Planes((1, 1), [f"light{i}" for i in range(lights)], None, **planes)
-        return lib.vsh_charts_band_bytes(self.handle, first_row, rows, wanted.struct, lights)
+    def texels(self, *, run: Optional[Run] = None) -> Texels:
+        """Where each texel lies in the world."""
+        return Texels(make(lib.vsh_texels_free, lib.vsh_texels_create, self.handle, RUN, place("vsh_texels"), run=run))
 
 
 def _freeing(free: Any, keeps: Any) -> Any:
@@ -200,12 +177,12 @@ def _names(structs: Any, count: int) -> List[str]:
     return [ffi.string(structs[i].name).decode() for i in range(count)]
 
 
-def bake_lightmap(occluders: Occluders, texels: Texels, lights: Union[Light, Sequence[Light]] = (), *, ao: bool = False,
+def bake_lightmap(occluders: Occluders, charts: Charts, lights: Union[Light, Sequence[Light]] = (), *, ao: bool = False,
                   irradiance: bool = False, bent: Optional[str] = None, sky: Optional[str] = None, error: bool = False,
                   invalid: bool = False, tint: "str | types.Tint | None" = None, ambient: Optional[Sequence[float]] = None,
                   out: Optional[Mapping[str, numpy.ndarray]] = None, run: Optional[Run] = None,
                   **options: "Unpack[types.ShadeOptions]") -> Lightmap:
-    """Shades texels into planes: "shadow.NAME" of each light, "A" (1 where a texel is valid), and what is asked for.
+    """Shades the texels of charts into planes: "shadow.NAME" of each light, "A" (1 where a texel is valid), and what is asked for.
 
     Parameters
     ----------
@@ -216,7 +193,7 @@ def bake_lightmap(occluders: Occluders, texels: Texels, lights: Union[Light, Seq
     irradiance : bool
         linear RGB; with `ambient` (linear RGB) light from all around
     bent : str, optional
-        bent normals in "world" or "tangent" space (texels of ``tangents=True``)
+        bent normals in "world" or "tangent" space (charts of ``tangents=True``)
     sky : str, optional
         the sky that is seen, of one that is up: "y", "-z"
     error : bool
@@ -228,7 +205,7 @@ def bake_lightmap(occluders: Occluders, texels: Texels, lights: Union[Light, Seq
     out : mapping, optional
         arrays of float32 that planes are written into, by their names; (height, width) or (height, width, 3)
     **options
-        vdbshade.types.ShadeOptions; none: those that the texels were made with
+        vdbshade.types.ShadeOptions; none: those that the charts were made with
 
     Returns
     -------
@@ -236,12 +213,12 @@ def bake_lightmap(occluders: Occluders, texels: Texels, lights: Union[Light, Seq
     """
     structs, count = lights_of(lights)
     names = _names(structs, count)
-    target = handle_of(texels, Texels, "texels")
-    planes = _Planes(texels.shape, names, out, ao=ao, irradiance=irradiance, bent=bent, sky=sky, error=error, invalid=invalid,
+    target = handle_of(charts, Charts, "charts")
+    planes = _Planes(charts.shape, names, out, ao=ao, irradiance=irradiance, bent=bent, sky=sky, error=error, invalid=invalid,
                      tint=tint, ambient=ambient)
     stats = Filled("vsh_bake_stats")
     errors = ffi.new("vsh_bake_error[]", count + 2)
-    by_mesh = ffi.new("uint64_t[]", max(texels.mesh_count, 1))
+    by_mesh = ffi.new("uint64_t[]", max(charts.mesh_count, 1))
     stats.pointer.errors, stats.pointer.invalid_by_mesh = errors, by_mesh
     shade = Filled("vsh_shade_options", options).pointer if options else ffi.NULL
     call(lib.vsh_bake_lightmap, handle_of(occluders, Occluders, "occluders"), target, structs, count, shade, RUN, planes.struct,
@@ -249,7 +226,7 @@ def bake_lightmap(occluders: Occluders, texels: Texels, lights: Union[Light, Seq
     lightmap = Lightmap(planes.arrays)
     lightmap.stats = told(stats.pointer[0], "vsh_bake_stats")
     lightmap.stats.errors = None
-    lightmap.stats.invalid_by_mesh = list(by_mesh)[: texels.mesh_count]
+    lightmap.stats.invalid_by_mesh = list(by_mesh)[: charts.mesh_count]
     kinds = [f"shadow.{n}" for n in names] + ["ao"] + (["sky"] if sky else [])
     lightmap.errors = {n: lib.vsh_bake_error_rmse(errors + i) for i, n in enumerate(kinds) if n in lightmap}
     lightmap.field_errors = {n: lib.vsh_bake_error_field(errors + i) for i, n in enumerate(kinds) if n in lightmap}
@@ -309,15 +286,15 @@ def lightmaps_stitch(pages: Sequence[Tuple[Charts, Mapping[str, numpy.ndarray]]]
     return told(report[0], "vsh_stitch_report")
 
 
-def lightmap_fill_hidden(texels: Texels, lightmap: Mapping[str, numpy.ndarray], *, bent: Optional[str] = None,
+def lightmap_fill_hidden(charts: Charts, lightmap: Mapping[str, numpy.ndarray], *, bent: Optional[str] = None,
                          run: Optional[Run] = None) -> int:
     """Gives texels that are not valid and that no valid one of their chart filled, as those of faces that touch each other, the
     values of the texel that is nearest in the world, and pads around them. The lightmap's arrays are written into.
 
     Parameters
     ----------
-    texels : Texels
-        that the lightmap was baked of, all rows
+    charts : Charts
+        that the lightmap was baked of
     bent : str, optional
         the space of a plane "bent"; None: it is left, as one in "tangent" space is
 
@@ -327,8 +304,8 @@ def lightmap_fill_hidden(texels: Texels, lightmap: Mapping[str, numpy.ndarray], 
         how many texels were filled
     """
     names = _shadows(lightmap)
-    target = handle_of(texels, Texels, "texels")
-    planes = _given(texels.shape, names, lightmap, bent)
+    target = handle_of(charts, Charts, "charts")
+    planes = _given(charts.shape, names, lightmap, bent)
     filled = ffi.new("uint64_t *")
     call(lib.vsh_lightmap_fill_hidden, target, planes.struct, len(names), RUN, filled, run=run)
     return filled[0]
