@@ -36,15 +36,15 @@ static uint64_t machine_memory(void) {
 }
 
 cli_common cli_common_default(void) {
-    return (cli_common){0, machine_memory() / 4 * 3, false, false, false, false, false, false};
+    return (cli_common){.memory_limit = machine_memory() / 4 * 3, .sandbox = CLI_SANDBOX_AUTO};
 }
 
 vsh_run cli_common_run(const cli_common *common) {
     vsh_run run = vsh_run_default();
     run.threads = common->threads;
     run.memory_limit = common->memory_limit;
-    run.reader = common->trusted ? NULL : VSH_READER;
-    run.confined = common->confined;
+    run.reader = common->sandbox == CLI_SANDBOX_OFF ? NULL : VSH_READER;
+    run.confined = common->sandbox == CLI_SANDBOX_REQUIRE;
     run.allow_outside = common->allow_outside;
     run.progress = cli_progress_report;
     run.warning = cli_warnings_parse;
@@ -53,11 +53,16 @@ vsh_run cli_common_run(const cli_common *common) {
     return run;
 }
 
-static int check_reader(const cli_common *common) {
-    if (common->trusted && common->confined) {
-        return cli_usage("--trusted and --confined: give one of the two");
+static int parse_sandbox(const char *name, const char *value, int *sandbox) {
+    static const char *const names[] = {
+        [CLI_SANDBOX_AUTO] = "auto", [CLI_SANDBOX_REQUIRE] = "require", [CLI_SANDBOX_OFF] = "off"};
+    for (int i = CLI_SANDBOX_AUTO; i <= CLI_SANDBOX_OFF; ++i) {
+        if (strcmp(value, names[i]) == 0) {
+            *sandbox = i;
+            return CLI_OK;
+        }
     }
-    return CLI_OK;
+    return cli_usage("%s '%s': expected auto, require or off", name, value);
 }
 
 int cli_common_parse(cli_common *common, int key, const char *name, const char *value, bool *taken) {
@@ -67,12 +72,8 @@ int cli_common_parse(cli_common *common, int key, const char *name, const char *
         return cli_parse_integer(name, value, 1, 1024, &common->threads);
     case CLI_KEY_MEMORY_LIMIT:
         return cli_parse_bytes(name, value, &common->memory_limit);
-    case CLI_KEY_TRUSTED:
-        common->trusted = true;
-        return check_reader(common);
-    case CLI_KEY_CONFINED:
-        common->confined = true;
-        return check_reader(common);
+    case CLI_KEY_SANDBOX:
+        return parse_sandbox(name, value, &common->sandbox);
     case CLI_KEY_ALLOW_OUTSIDE:
         common->allow_outside = true;
         return CLI_OK;

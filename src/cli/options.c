@@ -255,9 +255,8 @@ static const char *without_folder(const char *path) {
 
 static void append_option(const cli_option *option, const char *value) {
     static const char *const changes_nothing[] = {
-        "output",   "output-folder", "stats", "threads", "memory-limit", "trusted",
-        "confined", "allow-outside", "quiet", "verbose", "progress",     "json",
-        "dry-run",  "help",          "view",  "shard"};
+        "output",  "output-folder", "stats", "threads", "memory-limit", "sandbox", "allow-outside", "quiet",
+        "verbose", "progress",      "json",  "dry-run", "help",         "view",    "shard"};
     for (size_t i = 0; i < sizeof changes_nothing / sizeof changes_nothing[0]; ++i) {
         if (strcmp(option->name, changes_nothing[i]) == 0) {
             return;

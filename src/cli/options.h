@@ -98,10 +98,11 @@ typedef struct cli_common {
     bool quiet;
     bool verbose; /* print each warning and notes */
     bool progress;
-    bool trusted;       /* files are parsed in this process */
-    bool confined;      /* … or in one that is confined wholly, or not at all */
+    int sandbox;        /* CLI_SANDBOX_…: how the process is confined that parses files */
     bool allow_outside; /* what models name may lie outside their folder */
 } cli_common;
+
+enum { CLI_SANDBOX_AUTO, CLI_SANDBOX_REQUIRE, CLI_SANDBOX_OFF };
 
 cli_common cli_common_default(void);
 vsh_run cli_common_run(const cli_common *common);
@@ -110,12 +111,9 @@ enum {
     CLI_KEY_THREADS = 0x1000,
     CLI_KEY_MEMORY_LIMIT,
     CLI_KEY_PROGRESS,
-    CLI_KEY_TRUSTED,
-    CLI_KEY_CONFINED,
+    CLI_KEY_SANDBOX,
     CLI_KEY_ALLOW_OUTSIDE,
-    CLI_KEY_SOLID,
-    CLI_KEY_SHELL,
-    CLI_KEY_INWARD,
+    CLI_KEY_TREAT,
     CLI_KEY_SHARD,
     CLI_KEY_QUIET = 'q', /* as one letter, too */
     CLI_KEY_VERBOSE = 'v'
@@ -126,12 +124,10 @@ enum {
     { CLI_KEY_SHARD, "shard", "I/N", what }
 
 #define CLI_READER_OPTIONS                                                                                   \
-    {CLI_KEY_TRUSTED, "trusted", NULL,                                                                       \
-     "parse files in this process, not in a confined one: a\nlittle faster, and a damaged file may crash "   \
-     "it"},                                                                                                  \
-        {CLI_KEY_CONFINED, "confined", NULL,                                                                 \
-         "read nothing where this system cannot confine the\nprocess that parses wholly; else that is a "    \
-         "warning"},                                                                                         \
+    {CLI_KEY_SANDBOX, "sandbox", "auto|require|off",                                                         \
+     "confine the process that parses files as far as this\nsystem can, and warn if that is not wholly; "    \
+     "require:\nelse read nothing; off: parse in this process, a\nlittle faster, where a damaged file may "  \
+     "crash it (auto)"},                                                                                     \
     {                                                                                                        \
         CLI_KEY_ALLOW_OUTSIDE, "allow-outside", NULL,                                                        \
             "models may name files (buffers, materials) outside\ntheir folder"                               \
@@ -157,12 +153,10 @@ enum {
 
 /* Voxels, and what meshes are taken for. */
 #define CLI_GRID_OPTIONS                                                                                     \
-    CLI_SETTINGS(VSH_SETTINGS_CASTERS),                                                                      \
-        {CLI_KEY_SOLID, "solid", "PATTERN",                                                                  \
-         "objects of casters that are solid whatever way their\nfaces look, closed over their holes; "       \
-         "repeatable"},                                                                                      \
-        {CLI_KEY_SHELL, "shell", "PATTERN", "objects that are sheets with air on both sides"}, {             \
-        CLI_KEY_INWARD, "inward", "PATTERN", "objects that are rooms: air in what they enclose"              \
+    CLI_SETTINGS(VSH_SETTINGS_CASTERS), {                                                                    \
+        CLI_KEY_TREAT, "treat", "PATTERN=solid|sheet|room",                                                  \
+            "take objects of casters for solids, closed over their\nholes, for sheets with air on both "     \
+            "sides, or for rooms\nwith air in what they enclose; repeatable"                                 \
     }
 
 /* Takes an option of the tables above; *taken tells whether it was one of them. */

@@ -38,12 +38,29 @@ static int give(cli_patch *patch, size_t index, const char *value) {
     return set(setting, patch->text[index], owners[setting->owner]);
 }
 
-static int take_rule(cli_patch *patch, const char *name, const char *pattern, int32_t solidity) {
-    if (patch->rule_count == CLI_MOST_RULES) {
-        return cli_usage("%s %s: more than %d patterns", name, pattern, CLI_MOST_RULES);
+/* Takes PATTERN=solid|sheet|room. */
+static int take_rule(cli_patch *patch, const char *name, const char *value) {
+    static const struct {
+        const char *name;
+        int32_t solidity;
+    } kinds[] = {{"solid", VSH_SOLIDITY_SOLID}, {"sheet", VSH_SOLIDITY_SHELL}, {"room", VSH_SOLIDITY_INWARD}};
+    const char *kind = strrchr(value, '=');
+    const size_t length = kind != NULL ? (size_t)(kind - value) : 0, used = patch->pattern_bytes;
+    if (patch->rule_count == CLI_MOST_RULES || length >= CLI_MOST_PATTERNS - used) {
+        return cli_usage("%s %s: more than %d patterns, or %d bytes of them", name, value, CLI_MOST_RULES,
+                         CLI_MOST_PATTERNS);
     }
-    patch->rules[patch->rule_count++] = (vsh_solidity_rule){pattern, solidity};
-    return CLI_OK;
+    for (size_t i = 0; length > 0 && i < sizeof kinds / sizeof kinds[0]; ++i) {
+        if (strcmp(kind + 1, kinds[i].name) == 0) {
+            char *pattern = patch->patterns + used;
+            memcpy(pattern, value, length);
+            pattern[length] = '\0';
+            patch->pattern_bytes += length + 1;
+            patch->rules[patch->rule_count++] = (vsh_solidity_rule){pattern, kinds[i].solidity};
+            return CLI_OK;
+        }
+    }
+    return cli_usage("%s '%s': expected PATTERN=solid, PATTERN=sheet or PATTERN=room", name, value);
 }
 
 int cli_patch_take(cli_patch *patch, int key, const char *name, const char *value, bool *taken) {
@@ -51,17 +68,8 @@ int cli_patch_take(cli_patch *patch, int key, const char *name, const char *valu
     if (key >= CLI_KEY_SETTING) {
         return give(patch, (size_t)(key - CLI_KEY_SETTING), value);
     }
-    switch (key) {
-    case CLI_KEY_SOLID:
-        return take_rule(patch, name, value, VSH_SOLIDITY_SOLID);
-    case CLI_KEY_SHELL:
-        return take_rule(patch, name, value, VSH_SOLIDITY_SHELL);
-    case CLI_KEY_INWARD:
-        return take_rule(patch, name, value, VSH_SOLIDITY_INWARD);
-    default:
-        *taken = false;
-        return CLI_OK;
-    }
+    *taken = key == CLI_KEY_TREAT;
+    return *taken ? take_rule(patch, name, value) : CLI_OK;
 }
 
 static size_t index_of(const char *name) {

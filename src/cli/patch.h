@@ -5,15 +5,17 @@
 
 #include "options.h"
 
-enum { CLI_MOST_RULES = 64 };
+enum { CLI_MOST_RULES = 64, CLI_MOST_PATTERNS = 4096 /* bytes of all */ };
 
 typedef struct cli_patch {
     const char *text[CLI_MOST_SETTINGS]; /* of each setting; NULL: not given */
     vsh_solidity_rule rules[CLI_MOST_RULES];
     size_t rule_count;
+    char patterns[CLI_MOST_PATTERNS]; /* the rules', one after the other */
+    size_t pattern_bytes;
 } cli_patch;
 
-/* Takes an option of a group of settings, or of CLI_RULE_OPTIONS; *taken tells whether it was one. */
+/* Takes an option of a group of settings, or --treat; *taken tells whether it was one. */
 int cli_patch_take(cli_patch *patch, int key, const char *name, const char *value, bool *taken);
 
 /* The same by the option's name, "--size". */

@@ -202,7 +202,7 @@ static void add_errors(const cli_stats *stats, json_t *root) {
 }
 
 /* The JSON file. */
-/* How a reader is confined here; null where files were read without one (--trusted). */
+/* How a reader is confined here; null where files were read without one (--sandbox off). */
 static json_t *confinement(const vsh_run *run) {
     static const struct {
         const char *name;

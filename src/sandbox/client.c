@@ -62,7 +62,7 @@ static vsh_result fail_start(const vshi_exchange *exchange, int reason, vsh_erro
     const bool missing = reason == ENOENT || reason == EACCES || reason == ENOEXEC || reason == ENOTDIR;
     return vshi_fail(error, missing ? VSH_ERROR_ARGUMENT : VSH_ERROR_MEMORY,
                      "%s: no process to read it in: '%s': %s; a file that is trusted can be read without "
-                     "(--trusted; no vsh_run.reader)",
+                     "(--sandbox off; no vsh_run.reader)",
                      exchange->path, exchange->run->reader, why != NULL ? why : "?");
 }
 

@@ -62,7 +62,7 @@ can() {
     grep -A 4 '"confined": {' probe.json | grep -q "\"$1\": true"
 }
 
-@test "what the system refuses is one warning (but for Landlock), and told by --stats; --confined makes it an error" {
+@test "what the system refuses is one warning (but for Landlock), and told by --stats; --sandbox require makes it an error" {
     local what part
     for what in "limits limits of resources" "seccomp seccomp (system calls)" "landlock Landlock (files)"; do
         part=${what#* }
@@ -73,22 +73,22 @@ can() {
         local told=1
         [ "${what%% *}" != landlock ] || told=0 # many systems have none
         [ "$(grep -c "warning: .*confined in part only: .*$part" <<<"$stderr")" -eq "$told" ] || fail "not $told warnings of it"
-        run --separate-stderr "$REFUSE" "${what%% *}" -- "$VDBSHADE" info box.obj --confined
+        run --separate-stderr "$REFUSE" "${what%% *}" -- "$VDBSHADE" info box.obj --sandbox require
         refused 2 "box.obj: not read: its reader is to be confined, and this system refuses it"
         [[ $stderr == *"$part"* ]] || fail "which is not said"
     done
     grep -A 4 '"confined": {' stats.json | grep -q '"files": false' || fail "not in --stats"
     run --separate-stderr "$REFUSE" limits seccomp landlock -- "$VDBSHADE" info box.obj
     [[ $stderr == *"limits of resources, seccomp (system calls), Landlock (files)"* ]] || fail "not all are said"
-    shade info box.obj --confined --trusted
-    refused 2 "--trusted and --confined"
-    "$VDBSHADE" bake box.obj -o out.exr "${SMALL[@]}" --quiet --trusted --stats stats.json
-    grep -q '"confined": null' stats.json || fail "nothing is confined with --trusted"
+    shade info box.obj --sandbox on
+    refused 2 "--sandbox 'on': expected auto, require or off"
+    "$VDBSHADE" bake box.obj -o out.exr "${SMALL[@]}" --quiet --sandbox off --stats stats.json
+    grep -q '"confined": null' stats.json || fail "nothing is confined with --sandbox off"
 }
 
-@test "--confined reads where all is had, without a word" {
+@test "--sandbox require reads where all is had, without a word" {
     can files && can calls && can limits || skip "not all is had here"
-    shade info box.obj --confined
+    shade info box.obj --sandbox require
     done_well
     [ -z "$stderr" ] || fail "it says something"
 }

@@ -87,7 +87,7 @@ differ() {
     write_level within.gltf "$(leaf MASK)" "data:image/png;base64,$(base64 -w0 emblem.png)"
     bake masked.gltf beside.exr
     bake within.gltf within.exr
-    bake within.gltf trusted.exr --trusted
+    bake within.gltf trusted.exr --sandbox off
     bake whole.gltf whole.exr
     same_values beside.exr within.exr || fail "beside and within"
     same_values beside.exr trusted.exr || fail "by the reader and here"
@@ -171,7 +171,7 @@ differ() {
     shade bake whole.gltf "${fit[@]}" --density earth=0.5 -o named.exr
     done_well
     same_values named.exr whole.exr || fail "--density"
-    shade bake whole.gltf "${BAKE[@]}" --receive floor --shell leaf --solid 'material:w*' -o named.exr
+    shade bake whole.gltf "${BAKE[@]}" --receive floor --treat leaf=sheet --treat 'material:w*=solid' -o named.exr
     done_well
     old_output out.exr
     shade bake whole.gltf "${BAKE[@]}" --no-cast woof -o out.exr

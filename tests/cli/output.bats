@@ -77,7 +77,7 @@ bake_to() {
 @test "a full disk leaves the old output" {
     old_output out.exr
     # The limit counts blocks of 1 KiB; the lightmap takes more.
-    run --separate-stderr bash -c 'ulimit -f 1; exec "$@"' - "$VDBSHADE" bake box.obj --trusted "${SMALL[@]}" \
+    run --separate-stderr bash -c 'ulimit -f 1; exec "$@"' - "$VDBSHADE" bake box.obj --sandbox off "${SMALL[@]}" \
         --size 256 --ao 1 --quiet -o out.exr
     refused 3 out.exr
     untouched out.exr
@@ -91,18 +91,18 @@ bake_to() {
     run --separate-stderr bash -c 'ulimit -f 4; exec "$@"' - "$VDBSHADE" bake strip.obj "${SMALL[@]}" --quiet -o out.exr
     refused 4 strip.obj "ulimit -f"
     untouched out.exr
-    run --separate-stderr bash -c 'ulimit -f 4; exec "$@"' - "$VDBSHADE" bake strip.obj --trusted "${SMALL[@]}" --quiet -o out.exr
+    run --separate-stderr bash -c 'ulimit -f 4; exec "$@"' - "$VDBSHADE" bake strip.obj --sandbox off "${SMALL[@]}" --quiet -o out.exr
     done_well
 }
 
 @test "a full disk leaves the old PNG and the old level set" {
     old_output out.png
-    run --separate-stderr bash -c 'ulimit -f 1; exec "$@"' - "$VDBSHADE" bake box.obj --trusted "${SMALL[@]}" \
+    run --separate-stderr bash -c 'ulimit -f 1; exec "$@"' - "$VDBSHADE" bake box.obj --sandbox off "${SMALL[@]}" \
         --size 256 --ao 1 --bits 16 --quiet -o out.png
     refused 3 out.png
     untouched out.png
     old_output out.vdb
-    run --separate-stderr bash -c 'ulimit -f 1; exec "$@"' - "$VDBSHADE" voxelize box.obj --trusted --quiet -o out.vdb
+    run --separate-stderr bash -c 'ulimit -f 1; exec "$@"' - "$VDBSHADE" voxelize box.obj --sandbox off --quiet -o out.vdb
     refused 3 out.vdb
     untouched out.vdb
 }

@@ -24,7 +24,7 @@ JSON
 @test "devices and pipes in place of files are refused at once, in a reader and without" {
     mkfifo waits waits.{csv,json,obj,glb,gltf,ply,stl,fbx,vdb,exr,png,tif,ttf}
     local caster file trust
-    for trust in "" --trusted; do
+    for trust in "" "--sandbox off"; do
         for file in waits.csv /dev/zero; do
             scene_of "{\"spheres\": \"$file\"}"
             at_once bake scene.json $trust
@@ -66,7 +66,7 @@ JSON
     { echo "mtllib a.mtl" && cat box.obj; } >a.obj
     at_once info a.obj
     done_well
-    at_once info a.obj --trusted
+    at_once info a.obj --sandbox off
     done_well
 }
 
@@ -80,7 +80,7 @@ JSON
     ln -s ../scene.bin inside/scene.bin
     local file trust
     for file in a.gltf a.obj b.gltf c.gltf; do
-        for trust in "" --trusted; do
+        for trust in "" "--sandbox off"; do
             at_once info "inside/$file" $trust
             refused 2 "inside/$file" "outside of its folder" "--allow-outside"
             at_once info "inside/$file" $trust --allow-outside

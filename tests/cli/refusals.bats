@@ -19,17 +19,17 @@ setup() {
     for most in 10 12 14 16; do
         run --separate-stderr bash -c 'ulimit -n "$1"; shift; exec "$@"' bash "$most" "${bake[@]}"
         [ "$status" -eq 4 ] || [ "$status" -eq 0 ] || fail "$most"
-        [ "$status" -eq 0 ] || refused 4 "box.obj: no process to read it in: " "Too many open files" --trusted
+        [ "$status" -eq 0 ] || refused 4 "box.obj: no process to read it in: " "Too many open files" --sandbox off
         [ "$status" -eq 0 ] || untouched out.exr
     done
-    run --separate-stderr bash -c 'ulimit -n 16; exec "$@"' bash "${bake[@]}" --trusted
+    run --separate-stderr bash -c 'ulimit -n 16; exec "$@"' bash "${bake[@]}" --sandbox off
     done_well
 }
 
 @test "a system without memfd_create is told with the way to do without" {
     old_output out.exr
     LD_PRELOAD=$calls REFUSE_MEMFD=1 run --separate-stderr "${bake[@]}"
-    refused 4 "box.obj: no process to read it in: " "Function not implemented" --trusted
+    refused 4 "box.obj: no process to read it in: " "Function not implemented" --sandbox off
     untouched out.exr
 }
 
@@ -73,7 +73,7 @@ setup() {
     for most in 40 60 80 100 120 140 160 200; do
         for what in "voxelize --resolution 16 -o out.vdb" "render --sun 1,2,1 --size 16 -o out.tif"; do
             run --separate-stderr bash -c 'ulimit -d "$1"; shift; exec "$@"' bash $((most * 1000)) "$VDBSHADE" ${what%% *} \
-                box.obj ${what#* } --trusted --threads 1 --quiet
+                box.obj ${what#* } --sandbox off --threads 1 --quiet
             [ "$status" -eq 0 ] || [ "$status" -eq 4 ] || fail "$most MB, $what"
             [[ $stderr != *"the system refused the "*" MB that libvdbshade_"* ]] || refused=$((refused + 1))
         done
@@ -91,7 +91,7 @@ setup() {
         out=out.${what##*.}
         for program in vdbshade vdbshade-reader; do
             read -ra words <<<"$what --threads 1 --quiet"
-            [ $program = vdbshade-reader ] || words+=(--trusted)
+            [ $program = vdbshade-reader ] || words+=(--sandbox off)
             "$VDBSHADE" "${words[@]}"
             mv "$out" "whole.${out##*.}"
             for ((n = 1; n < 3000; n += 1 + n)); do

@@ -204,9 +204,9 @@ asking() {
 @test "a folder's list cannot have files written, or parsed unconfined" {
     local one
     mkdir elsewhere
-    for one in --trusted "--stats $PWD/elsewhere/a" "--stats=$PWD/elsewhere/a" "-o $PWD/elsewhere/a.exr" "-o$PWD/elsewhere/a.exr" \
+    for one in "--sandbox off" "--stats $PWD/elsewhere/a" "--stats=$PWD/elsewhere/a" "-o $PWD/elsewhere/a.exr" "-o$PWD/elsewhere/a.exr" \
         "--output $PWD/elsewhere/a.exr" "--output-folder $PWD/elsewhere" "--invalid $PWD/elsewhere/a.png" --dry-run \
-        "--threads 1" "--memory-limit 0" "--trust" "--per-object" "-- x" "box.json" "--size 8 --trusted" "--size=8 --stats elsewhere/a"; do
+        "--threads 1" "--memory-limit 0" "--sand off" "--per-object" "-- x" "box.json" "--size 8 --sandbox off" "--size=8 --stats elsewhere/a"; do
         # shellcheck disable=SC2086 # words
         asking $one
         [[ $one != "--size"* ]] || one=${one#--size?8 }
@@ -216,12 +216,12 @@ asking() {
         COMMAND=$one asking --stats "$PWD/elsewhere/a"
         refused 2 "option '--stats' of '$one'"
     done
-    asking --method --trusted # a value, and no option
-    [[ $stderr == *"--method '--trusted': "* ]] || fail "not taken for a value"
+    asking --method --sandbox # a value, and no option
+    [[ $stderr == *"--method '--sandbox': "* ]] || fail "not taken for a value"
     asking --size 8 --method=hard
     [ "$status" -eq 1 ] || fail "options that change values"
-    regress --trusted --only sly
-    [ "$status" -eq 1 ] || fail "--trusted of regress itself"
+    regress --sandbox off --only sly
+    [ "$status" -eq 1 ] || fail "--sandbox off of regress itself"
     [ -z "$(ls elsewhere)" ] || fail "written elsewhere"
     clean
 }

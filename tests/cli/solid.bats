@@ -61,7 +61,7 @@ OBJ
     [[ $stderr == *"note: mesh 'hut'"*"taken for solid, closed by those"* ]] || fail "no note: $stderr"
     shade info stands.obj
     [ "$(grep -oE '"invalid_texels": [0-9]+' stats.json)" = '"invalid_texels": 400' ] || fail "$(cat stats.json)"
-    shade bake stands.obj --receive floor --shell hut -o floor.exr --ao 1 --size 60 --stats stats.json
+    shade bake stands.obj --receive floor --treat hut=sheet -o floor.exr --ao 1 --size 60 --stats stats.json
     done_well
     [ "$(grep -oE '"invalid_texels": [0-9]+' stats.json)" = '"invalid_texels": 0' ] || fail "$(cat stats.json)"
 }
@@ -109,23 +109,23 @@ write_studs() {
     shade voxelize crate.obj --verbose -o crate.vdb --resolution 32
     done_well
     [[ $stderr == *"baked as a shell"* ]] || fail "no shell: $stderr"
-    shade voxelize crate.obj --verbose -o crate.vdb --resolution 32 --solid '*'
+    shade voxelize crate.obj --verbose -o crate.vdb --resolution 32 --treat '*=solid'
     done_well
     [[ $stderr == *"closed over the holes"* ]] || fail "not closed: $stderr"
-    shade voxelize box.obj --verbose -o shell.vdb --resolution 32 --shell 'b*' --shell 'box'
+    shade voxelize box.obj --verbose -o shell.vdb --resolution 32 --treat 'b*=sheet' --treat 'box=sheet'
     done_well
     [[ $stderr == *"baked as a shell"* ]] || fail "no shell: $stderr"
-    shade voxelize box.obj --verbose -o wall.vdb --resolution 32 --inward box
+    shade voxelize box.obj --verbose -o wall.vdb --resolution 32 --treat box=room
     done_well
     [[ $stderr == *"triangles that face the other way"* ]] || fail "not turned: $stderr"
 }
 
 @test "a pattern that matches nothing is refused with names" {
-    shade voxelize box.obj -o out.vdb --solid 'bix'
+    shade voxelize box.obj -o out.vdb --treat 'bix=solid'
     refused 2 "no object is named 'bix'"
     [[ $stderr == *"did you mean 'box'"* ]] || fail "no name"
     [ ! -e out.vdb ] || fail "written all the same"
-    shade bake box.obj -o out.exr --ao 1 --inward 'none*'
+    shade bake box.obj -o out.exr --ao 1 --treat 'none*=room'
     refused 2 "no object is named 'none*'"
 }
 

@@ -48,7 +48,7 @@ best() {
     done_well
     grep -q 'calling init.*OpenImageIO' image.* # which is how it is told
     printf 'solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n' >a.stl
-    LD_DEBUG=libs LD_DEBUG_OUTPUT=model shade info a.stl --trusted
+    LD_DEBUG=libs LD_DEBUG_OUTPUT=model shade info a.stl --sandbox off
     done_well
     grep -q 'calling init.*assimp' model.* # the same
     LD_DEBUG=libs LD_DEBUG_OUTPUT=voxels shade bake box.obj --sun 0.3,1,0.2 --size 64 --method cone --quiet -o out.exr

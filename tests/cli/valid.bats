@@ -26,7 +26,7 @@ load helper
         $1 == "v" { print "v", 3 * $2 - 1, 3 * $3 - 1, 3 * $4 - 1; next } { print }' box.obj >around.obj
     printf 'o sheet\nv -9 -9 -3\nv 9 -9 -3\nv 9 9 -3\nv -9 9 -3\nf 1 2 3 4\n' >sheet.obj
     write_scene bar.json bar.obj '"invalid": true'
-    shade bake bar.json --caster around.obj --caster sheet.obj --solid around --ao 0.5 --size 64 --verbose -o bar.exr
+    shade bake bar.json --caster around.obj --caster sheet.obj --treat around=solid --ao 0.5 --size 64 --verbose -o bar.exr
     done_well
     [[ $stderr == *"texels are invalid"* && $stderr != *"plain sight"* ]] || fail "claimed"
     run -0 "$VDBSHADE" info bar.exr
@@ -38,7 +38,7 @@ load helper
     awk '$1 == "v" { print "v", 3 * $2 - 1, 3 * $3 - 1, 3 * $4 - 1; next } { print }' box.obj >around.obj
     old_output out.exr
     # what everything else lies within is a sky dome, unless it is said to be solid
-    shade bake box.obj --caster around.obj --solid box --ao 0.5 --method exact --ao-method exact --size 32 --resolution 24 \
+    shade bake box.obj --caster around.obj --treat box=solid --ao 0.5 --method exact --ao-method exact --size 32 --resolution 24 \
         -o out.exr
     refused 2 box.obj "inside solids" info
     untouched out.exr

@@ -118,7 +118,7 @@ static void a_missing_reader_is_an_error_that_says_how_to_do_without(void **stat
     vsh_error error;
     assert_int_equal(vsh_model_read(VSH_ASSETS "/thin.glb", &run, &model, &error), VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "vdbshade-reader"));
-    assert_non_null(strstr(error.message, "--trusted"));
+    assert_non_null(strstr(error.message, "--sandbox off"));
 }
 
 /* --- what is read in this process */

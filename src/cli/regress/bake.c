@@ -29,8 +29,8 @@ int regress_bake(const regress_work *work, const regress_case *one) {
     /* arrays: words of a command line may be written to */
     char program[] = "vdbshade", name[32], file[] = "--output", folder[] = "--output-folder",
          quiet[] = "--quiet";
-    char limit[] = "--memory-limit", pool[] = "--threads", trusted[] = "--trusted", confined[] = "--confined",
-         outside[] = "--allow-outside";
+    char limit[] = "--memory-limit", pool[] = "--threads", sandbox[] = "--sandbox", off[] = "off",
+         require[] = "require", outside[] = "--allow-outside";
     snprintf(name, sizeof name, "%s", one->command->name);
     /* a scene "--stats=x.json" is a file in the folder, and no option */
     char *scene = one->scene[0] == '-' ? regress_path(".", one->scene) : strdup(one->scene);
@@ -55,11 +55,9 @@ int regress_bake(const regress_work *work, const regress_case *one) {
         words[count++] = pool;
         words[count++] = threads;
     }
-    if (common->trusted) {
-        words[count++] = trusted;
-    }
-    if (common->confined) {
-        words[count++] = confined;
+    if (common->sandbox != CLI_SANDBOX_AUTO) {
+        words[count++] = sandbox;
+        words[count++] = common->sandbox == CLI_SANDBOX_OFF ? off : require;
     }
     if (common->allow_outside) {
         words[count++] = outside;

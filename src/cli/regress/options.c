@@ -9,9 +9,9 @@
 /* Of all commands of cases, what changes values beside settings, which all do. One that is not here is
  * refused: a new option is to be added when it is known to write nothing. */
 static const char *const changes_values[] = {
-    "receive", "no-receive", "no-cast",        "one-sided", "sun",    "sun-angle",  "lights", "light-radius",
-    "caster",  "solid",      "shell",          "inward",    "half",   "band",       "box",    "like",
-    "inside",  "name",       "box-voxel-size", "density",   "height", "size-world", "floor"};
+    "receive",      "no-receive", "no-cast",        "one-sided", "sun",    "sun-angle",  "lights",
+    "light-radius", "caster",     "treat",          "half",      "band",   "box",        "like",
+    "inside",       "name",       "box-voxel-size", "density",   "height", "size-world", "floor"};
 
 static bool is_setting(const char *name) {
     const vsh_setting *setting;
@@ -40,7 +40,7 @@ int regress_check_options(const regress_case *one, const char *list) {
         if (!found || !may_be_asked(&option)) {
             return cli_usage(
                 "%s: case '%s': option '%s' of '%s' is not taken from a file: none that changes values; "
-                "give --trusted, --threads and --memory-limit to 'vdbshade regress' itself",
+                "give --sandbox, --threads and --memory-limit to 'vdbshade regress' itself",
                 list, one->name, word, one->command->name);
         }
         i += option.value != NULL && strchr(word, '=') == NULL; /* its value, whatever that looks like */
