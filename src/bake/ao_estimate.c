@@ -226,7 +226,7 @@ static void fill_texel(const estimating *s, const cell *c, int32_t dx, int32_t d
                                                                    (double)s->map.normal[3 * corner + axis]);
         }
     }
-    if (!(sum > 0.0)) { /* of a damaged part */
+    if (!(sum > 0.0)) { /* the part is damaged */
         s->values[i] = 0.0f;
         return;
     }
@@ -271,7 +271,7 @@ static void fill_cells(void *user, size_t begin, size_t end) {
 
 /* --- all */
 
-/* What is known of a row of cells, and what it adds to the statistics. */
+/* Sums a row of cells for the statistics. */
 static void sum_row(const estimating *s, size_t row, row_sum *sum) {
     const size_t width = (size_t)s->map.width, end = (row + 1) * VSHI_CELL * width;
     const size_t all = width * (size_t)s->map.height;
@@ -302,7 +302,7 @@ static void sum_rows(void *user, size_t begin, size_t end) {
     }
 }
 
-/* What is curved is summed by rows of cells, whose sums are known well enough to tell what is above zero. */
+/* Curvature is summed by rows of cells: single texels are too noisy to tell it from zero. */
 static void add_sums(const estimating *s, size_t rows, vsh_shade_stats *stats) {
     double square = 0.0;
     for (size_t row = 0; row < rows; ++row) {

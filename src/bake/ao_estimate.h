@@ -5,7 +5,7 @@
 
 #include "bake/page.h"
 
-/* What a window says of its texel: the plane, a texel of the page on, and how well it is known. */
+/* The plane that a window fits at its texel (slopes a texel of the page), and its error. */
 typedef struct vshi_ao_plane {
     float slope[2], deviation, curved;
 } vshi_ao_plane;

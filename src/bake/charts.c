@@ -96,8 +96,8 @@ static void put_triangle(vshi_charts *charts, const vshi_uv_triangle *triangle, 
     }
 }
 
-/* Counts (fill false) or stores the triangles of each tile. While it fills, tile_start[t] is the end of what
- * tile t - 1 has been given so far; the caller has shifted it by one. */
+/* Counts (fill false) or stores the triangles of each tile. While it fills, tile_start[t] is the end of the
+ * triangles that tile t - 1 holds so far; the caller has shifted it by one. */
 static vsh_result sort_triangles(vshi_charts *charts, bool fill, vshi_job *job, vsh_uv_report *reports,
                                  vsh_error *error) {
     for (size_t m = 0; m < charts->mesh_count; ++m) {

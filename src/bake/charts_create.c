@@ -101,10 +101,10 @@ static vsh_result count(counting *all, const vsh_run *run, vshi_job *job, vsh_er
     return VSH_OK;
 }
 
-/* --- what is covered twice */
+/* --- overlaps */
 
-/* Whose texels the mesh with the most of other objects' has: rasterised again for it alone, as a count for
- * each pair of meshes would be too many. */
+/* Finds whose texels are covered again by the mesh that overlaps other objects most. Rasterises again, since
+ * counts for all pairs of meshes would be too many. */
 static vsh_result find_owners(counting *all, vshi_job *job, vsh_uv_report *reports, vsh_error *error) {
     const size_t count = all->charts->sorted.mesh_count;
     size_t worst = 0, owner = 0;

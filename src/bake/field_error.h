@@ -7,8 +7,7 @@
 
 #include <vdbshade/bake.h>
 
-/* What holds the samples of a bake against the casters: one of each `step` that follow each other in a tile,
- * whichever its hash says. */
+/* Compares samples of a bake with the casters: one of every `step` samples in a row, chosen by a hash. */
 typedef struct vshi_field_error {
     const vsh_occluders *occluders;
     vshi_truth truth; /* but for what differs from channel to channel */
@@ -16,7 +15,7 @@ typedef struct vshi_field_error {
     size_t step;
 } vshi_field_error;
 
-/* Of a lightmap with so many samples. */
+/* Prepares it for a lightmap with `samples` samples. */
 vshi_field_error vshi_field_error_open(const vsh_occluders *occluders, const vsh_shade_options *shade,
                                        uint64_t samples, bool traced);
 
@@ -34,7 +33,7 @@ vsh_result vshi_truth_channel_open(const vshi_field_error *of, const vsh_light *
                                    vsh_error *error);
 void vshi_truth_channel_close(vshi_truth_channel *channel);
 
-/* A sample of a tile that is held against the casters. */
+/* A sample of a tile to compare with the casters. */
 typedef struct vshi_held_sample {
     uint32_t sample, origin; /* its number among the samples, among the origins */
     uint32_t weight;         /* samples that it stands for */
@@ -54,7 +53,7 @@ void vshi_field_error_add(const vshi_truth_channel *channel, const vshi_samples 
                           const vshi_held_sample *held, size_t count, const float *values,
                           vsh_bake_error *sum);
 
-/* What the rays to the casters say of a texel whose value is not known yet. */
+/* Rays to the casters from a texel whose value is not known yet. */
 typedef struct vshi_held_texel {
     uint32_t texel; /* vsh_texel() */
     uint32_t weight;

@@ -1,4 +1,4 @@
-/* What follows once all tiles of a page are traced, over the whole page. */
+/* Finishes a page whose tiles are all traced: AO between texels, fills, padding, statistics. */
 #include "bake/ao_estimate.h"
 #include "bake/bent_normals.h"
 #include "bake/nearest_valid.h"
@@ -148,7 +148,7 @@ static void put_coverage(const vshi_page *page, vsh_bake_stats *stats) {
     stats->texels += page->charts->info.covered;
 }
 
-/* --- what is beyond the valid texels */
+/* --- padding */
 
 /* Lists the planes that are padded: values, not their errors and not the coverage. `list` has room for all.
  */

@@ -4,7 +4,7 @@
 
 #include "bake/padding.h"
 
-/* How far, texels along the chart: six levels of a mip map. */
+/* Reach in texels along the chart: six levels of a mip map. */
 enum { VSHI_SPREAD_REACH = 64 };
 
 typedef struct vshi_spread {

@@ -17,7 +17,7 @@ typedef struct vshi_probed_field {
     bool marched;                   /* it is looked at itself: methods march it, or there are no triangles */
 } vshi_probed_field;
 
-/* What decides which samples are valid, the same for all tiles of a bake. */
+/* Decides which samples are valid, by the same rules for all tiles of a bake. */
 typedef struct vshi_placement {
     double offset; /* of rays' beginnings over the surface, world units */
     size_t field_count;

@@ -27,7 +27,7 @@ static vsh_result take_shots(vshi_page *page, vshi_shots *shots, bool open, vsh_
     return vshi_store_take(store, (void **)&shots->held, tiles, sizeof *shots->held, what, error);
 }
 
-/* What the page needs, and of these planes what depends on AO. */
+/* Whether the page needs any of VSHI_NEEDS_…. */
 static bool needs(const vshi_page *page, uint32_t any) {
     return (page->needs & any) != 0;
 }

@@ -7,13 +7,13 @@
 #include "bake/texels.h"
 #include "shade/links.h"
 
-/* Texels of a tile that are held against the casters once their value is known. */
+/* Texels of a tile to compare with the casters once their values are known. */
 typedef struct vshi_held_texels {
     vshi_held_texel *list; /* [count], or NULL */
     size_t count;
 } vshi_held_texels;
 
-/* What the rays of texels that share them came to: of AO, or of the sky. */
+/* Results of the AO or sky rays that texels share. */
 typedef struct vshi_shots {
     float *share;   /* [height][width]: of a texel's own rays that are free; NULL: nothing is shared */
     int32_t *rays;  /* [height][width] */
@@ -36,7 +36,7 @@ typedef struct vshi_page {
     float *normal;   /* [height][width][3]: of the same */
     float *tangent;  /* [height][width][4]: of the same; NULL: not asked for */
     vshi_shots ao, sky;
-    vsh_shade_stats *stats; /* [tiles]: of what was shaded */
+    vsh_shade_stats *stats; /* [tiles] */
     vsh_bake_error *errors; /* [tiles][error_count]: of lights, AO, the sky */
     size_t error_count;
 } vshi_page;
@@ -48,7 +48,7 @@ vsh_result vshi_page_open(const vsh_charts *charts, const vsh_lightmap *lightmap
                           vsh_error *error);
 void vshi_page_close(vshi_page *page);
 
-/* Bytes of a page's planes, and of what baking them takes beside, at most. */
+/* The most bytes of a page: its planes and the memory for baking them. */
 double vshi_lightmap_bytes(const vsh_charts *charts, const vsh_lightmap *planes, size_t light_count,
                            bool shared);
 
@@ -76,12 +76,12 @@ static inline bool vshi_page_has_tile(const vshi_page *page, size_t tile) {
 void vshi_page_note(vshi_page *page, const vshi_samples *samples, size_t i);
 
 /* Rasterizes a tile again for what finishing needs of it: meshes, and where AO is shared, places and normals.
- * Of a page whose tiles another process traced. Errors: VSH_ERROR_MEMORY. */
+ * For pages whose tiles another process traced. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_page_rasterize(vshi_page *page, size_t tile, vsh_error *error);
 
 /* --- tracing tiles */
 
-/* What all tiles of a bake share. */
+/* Shared by all tiles of a bake. */
 typedef struct vshi_tracer vshi_tracer;
 
 /* Prepares what shades pages with these planes, of which only which are NULL is looked at, and what they are

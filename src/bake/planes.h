@@ -47,8 +47,8 @@ typedef struct vshi_plane_kind {
 /* In the order of their channels in files. */
 const vshi_plane_kind *vshi_plane_kinds(size_t *count);
 
-/* The range of what a bake puts into the channel `name`, "shadow.sun" or "ao". Returns whether that may be
- * NaN, too. */
+/* The range of values that a bake puts into the channel `name`, "shadow.sun" or "ao". Returns whether they
+ * may be NaN. */
 bool vshi_channel_range(const char *name, float *low, float *high);
 
 static inline size_t vshi_plane_components(const vshi_plane_kind *kind) {

@@ -34,7 +34,7 @@ bool vshi_uv_cell_rows(const vshi_raster *raster, const vshi_uv_triangle *triang
 void vshi_uv_cells(const vshi_raster *raster, const vshi_uv_triangle *triangle, size_t row, size_t *begin,
                    size_t *end);
 
-/* What covers one cell. `owner` has (8 N)² entries, row by row. */
+/* Triangles that cover one cell. `owner` has (8 N)² entries, row by row. */
 typedef struct vshi_cell {
     size_t column, row;                      /* of the cell */
     uint64_t inside;                         /* texels of the cell that lie in the image */

@@ -21,7 +21,7 @@ static const box EMPTY = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY,
 
 typedef struct rasterization {
     const vsh_charts *charts;
-    vshi_samples *samples; /* of all tiles; NULL: only boxes are found */
+    vshi_samples *samples; /* of all tiles; NULL: finds boxes only */
     size_t *start;         /* [tiles]: where a tile's samples begin */
     size_t step;           /* between tiles */
     box *boxes;            /* [tiles / step]; NULL: not asked for */
@@ -158,7 +158,7 @@ static vsh_result find_box(const vsh_charts *charts, const box *within, size_t s
     return result;
 }
 
-/* A few tiles tell of most triangles that all their samples lie within the box of what is found. */
+/* A first look at a few tiles gives a box; triangles inside it need no samples. */
 vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, double bounds_min[3],
                              double bounds_max[3], vsh_error *error) {
     enum { FEW = 16 };

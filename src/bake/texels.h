@@ -1,4 +1,4 @@
-/* What the bake knows of charts and texels beyond the public view. */
+/* Charts and texels, as the bake sees them. */
 #ifndef VSHI_BAKE_TEXELS_H
 #define VSHI_BAKE_TEXELS_H
 

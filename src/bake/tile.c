@@ -21,7 +21,7 @@ double vshi_tile_bytes(const vshi_charts *charts, int32_t threads) {
     return each * (at_work < total ? at_work : total);
 }
 
-/* Those without a number are objects of their own: theirs begin above all that meshes can have. */
+/* Meshes without an object number get numbers of their own, above all others. */
 static uint64_t object_of(const vsh_mesh *mesh, size_t index) {
     return mesh->object > 0 ? mesh->object : (uint64_t)UINT32_MAX + 1 + index;
 }

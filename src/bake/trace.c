@@ -29,7 +29,7 @@ struct vshi_tracer {
     vshi_shadow_shader *shadow;    /* [light_count] */
     vshi_ao_shader ao, sky;
     bool shared; /* AO is, if charts have a spacing */
-    bool held;   /* some samples are held against the casters */
+    bool held;   /* some samples are compared with the casters */
     int32_t threads, isa;
 };
 

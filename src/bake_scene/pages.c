@@ -142,7 +142,7 @@ vsh_result vshi_job_open_tracer(vsh_bake_job *job, const vsh_run *run, vsh_error
 typedef struct group {
     vsh_bake_job *job;
     const vsh_run *run; /* the job's */
-    vsh_run held;       /* with what is held meanwhile */
+    vsh_run held;       /* the same, with memory that the group holds */
     vshi_store store;
     vshi_job_page *pages; /* [count], of which so many are open */
     size_t count, open;

@@ -7,7 +7,7 @@
 #include <stdio.h>
 
 /* Begins a tile. Its statistics and the errors of channels follow, then its texels, array by array, then
- * those that are held against the casters. */
+ * those to compare with the casters. */
 typedef struct vshi_part_tile {
     uint32_t lightmap, tile;
     uint32_t held[2]; /* texels of AO, of the sky */

@@ -45,7 +45,7 @@ typedef struct vshi_part_output {
 vsh_result vshi_part_output_begin(vshi_part_output *part, const char *path, vshi_part_code *head,
                                   vsh_error *error);
 
-/* The next bytes of the body, a multiple of 4. What could not be written is told at the end. */
+/* The next bytes of the body, a multiple of 4. Write errors are reported by _finish(). */
 void vshi_part_output_put(vshi_part_output *part, const void *bytes, size_t size);
 
 /* Puts the file in its place. Errors: VSH_ERROR_WRITE. */
