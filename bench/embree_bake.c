@@ -9,7 +9,7 @@
 #include "bake/origins.h"
 #include "bake/page.h"
 #include "bake_scene/channels.h"
-#include "bake_scene/job.h"
+#include "bake_scene/pages.h"
 #include "base/clock.h"
 #include "base/parallel.h"
 #include "bench.h"
@@ -237,14 +237,16 @@ int main(int argc, char **argv) {
     scene.light_count = o.lit ? 1 : 0;
     scene.ao = o.ao > 0.0;
 
-    vsh_bake_job *job = NULL;
-    bench_check(vsh_bake_job_create(&scene, NULL, &run, &job, &error), &error);
+    vsh_assets *assets = NULL;
+    vsh_charts *charts = NULL;
+    size_t mesh_count = 0;
+    bench_check(vsh_assets_load(&scene, &run, &assets, &error), &error);
     at[0] = vshi_seconds() - start;
-    bench_check(vsh_bake_job_measure(job, &run, &error), &error);
+    const vsh_mesh *meshes = vsh_assets_receiver(assets, 0, &mesh_count);
+    bench_check(vsh_receiver_charts(&scene, 0, meshes, mesh_count, &run, &charts, &error), &error);
     at[1] = vshi_seconds() - start;
     vsh_triangles *triangles = NULL;
-    bench_check(vsh_scene_triangles(&scene, vsh_bake_job_assets(job), NULL, &run, &triangles, &error),
-                &error);
+    bench_check(vsh_scene_triangles(&scene, assets, NULL, &run, &triangles, &error), &error);
     at[2] = vshi_seconds() - start;
     vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, o.rays, o.frame);
     baking b = {.net = sampler != NULL ? bench_rays_net(sampler, o.rays) : NULL};
@@ -268,9 +270,9 @@ int main(int argc, char **argv) {
     vshi_channels channels;
     bench_check(vshi_channels_name(&scene, o.size, o.size, &channels, &error), &error);
     bench_check(vshi_channels_allocate(&channels, &scene, &store, o.output, &error), &error);
-    bench_check(vshi_page_open(job->charts[0], &channels.lightmap, scene.light_count, &exact, false, &store,
-                               &b.page, &error),
-                &error);
+    bench_check(
+        vshi_page_open(charts, &channels.lightmap, scene.light_count, &exact, false, &store, &b.page, &error),
+        &error);
     b.planes[0] = o.lit ? channels.lightmap.shadow[0] : NULL;
     b.planes[1] = channels.lightmap.ao;
     for (size_t i = 0; i < 2; ++i) {
@@ -296,6 +298,7 @@ int main(int argc, char **argv) {
     free(b.net);
     vshi_sampler_free(sampler);
     vsh_triangles_free(triangles);
-    vsh_bake_job_free(job);
+    vsh_charts_free(charts);
+    vsh_assets_free(assets);
     return 0;
 }

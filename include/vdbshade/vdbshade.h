@@ -50,7 +50,6 @@
 #include "method.h"
 #include "occluders.h"
 #include "outline.h"
-#include "parts.h"
 #include "points.h"
 #include "provenance.h"
 #include "query.h"

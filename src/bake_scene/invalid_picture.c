@@ -64,23 +64,23 @@ static char *name_for(const char *path, char *const *outputs, size_t count, size
 }
 
 /* Images have names of their own, pages of an asset do not. */
-static char *output_of(const vsh_bake_job *job, const vshi_target *target) {
+static char *output_of(const vshi_scene_bake *bake, const vshi_target *target) {
     const char *output = target->receiver.output;
     return vsh_lit_is_output(output)
-               ? vshi_target_file(target, vsh_assets_receiver_pages(job->assets, target->index), output)
+               ? vshi_target_file(target, vsh_assets_receiver_pages(bake->assets, target->index), output)
                : strdup(output != NULL ? output : "");
 }
 
-static char *picture_name(const vsh_bake_job *job, size_t index) {
-    const char *path = job->options.invalid_picture;
-    const size_t count = job->targets.count;
+static char *picture_name(const vshi_scene_bake *bake, size_t index) {
+    const char *path = bake->options.invalid_picture;
+    const size_t count = bake->targets.count;
     if (count == 1) {
         return strdup(path);
     }
     char **outputs = calloc(count, sizeof *outputs), *made = NULL;
     bool all = outputs != NULL;
     for (size_t i = 0; i < count && all; ++i) {
-        outputs[i] = output_of(job, &job->targets.list[i]);
+        outputs[i] = output_of(bake, &bake->targets.list[i]);
         all = outputs[i] != NULL;
     }
     if (all) {
@@ -95,16 +95,16 @@ static char *picture_name(const vsh_bake_job *job, size_t index) {
 
 /* --- rows */
 
-vsh_result vshi_invalid_picture_open(vshi_invalid_picture *picture, const vsh_bake_job *job, size_t index,
+vsh_result vshi_invalid_picture_open(vshi_invalid_picture *picture, const vshi_scene_bake *bake, size_t index,
                                      int32_t rows, vsh_error *error) {
-    const char *path = job->options.invalid_picture;
-    const vsh_receiver *receiver = &job->targets.list[index].receiver;
+    const char *path = bake->options.invalid_picture;
+    const vsh_receiver *receiver = &bake->targets.list[index].receiver;
     const int32_t width = receiver->width, height = receiver->height;
     memset(picture, 0, sizeof *picture);
     if (path == NULL) {
         return VSH_OK;
     }
-    picture->path = picture_name(job, index);
+    picture->path = picture_name(bake, index);
     for (int c = 0; c < 3; ++c) {
         picture->planes[c] = calloc((size_t)width * (size_t)rows, sizeof(float));
         if (picture->planes[c] == NULL || picture->path == NULL) {

@@ -3,7 +3,7 @@
 #define VSHI_INVALID_PICTURE_H
 
 #include "bake/padding.h"
-#include "bake_scene/job.h"
+#include "bake_scene/bake_scene.h"
 #include "base/error.h"
 
 #include <stdbool.h>
@@ -19,7 +19,7 @@ typedef struct vshi_invalid_picture {
 /* Opens the picture of lightmap `index`, of which `rows` come at a time: FILE.png, or where there are several
  * FILE.OUTPUT.png, no two of which are alike. Does nothing where none is asked for. Errors: as
  * vsh_image_writer_create(). Close it also after a failure. */
-vsh_result vshi_invalid_picture_open(vshi_invalid_picture *picture, const vsh_bake_job *job, size_t index,
+vsh_result vshi_invalid_picture_open(vshi_invalid_picture *picture, const vshi_scene_bake *bake, size_t index,
                                      int32_t rows, vsh_error *error);
 
 /* Adds rows of texels, each VSHI_TEXEL_…. */

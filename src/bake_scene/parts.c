@@ -1,13 +1,15 @@
 #include "bake_scene/parts.h"
 
-#include "bake_scene/part_tile.h"
+#include "bake/planes.h"
 #include "base/clock.h"
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/try.h"
+#include "shade/ao.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,7 +17,7 @@
 /* A lightmap of the job that a part is of. */
 typedef struct part_lightmap {
     int32_t width, height;
-    uint64_t mesh_count, covered, samples; /* as in vsh_job_lightmap */
+    uint64_t mesh_count, covered, samples; /* as in vsh_scene_lightmap */
 } part_lightmap;
 
 /* All of it is owned. */
@@ -66,20 +68,20 @@ static void free_head(part_head *head) {
 }
 
 /* What parts' files are named after: the options' name, or the first lightmap's output. */
-static const char *parts_name(const vsh_bake_job *job) {
-    return job->options.parts != NULL ? job->options.parts
-           : job->targets.count > 0   ? job->lightmaps[0].output
-                                      : job->scene.receivers[0].output;
+static const char *parts_name(const vshi_scene_bake *bake) {
+    return bake->options.parts != NULL ? bake->options.parts
+           : bake->targets.count > 0   ? bake->lightmaps[0].output
+                                       : bake->scene.receivers[0].output;
 }
 
 /* What its parts' files say of themselves, of `count` shards. */
-static vshi_part_options options_of(const vsh_bake_job *job, int32_t count) {
-    vshi_part_options options = {.parts = parts_name(job),
-                                 .shard = job->options.shard,
+static vshi_part_options options_of(const vshi_scene_bake *bake, int32_t count) {
+    vshi_part_options options = {.parts = parts_name(bake),
+                                 .shard = bake->options.shard,
                                  .shard_count = count,
-                                 .words = job->options.words,
-                                 .word_count = job->options.word_count};
-    options.attributes = vsh_provenance_attributes(job->provenance, &options.attribute_count);
+                                 .words = bake->options.words,
+                                 .word_count = bake->options.word_count};
+    options.attributes = vsh_provenance_attributes(bake->provenance, &options.attribute_count);
     return options;
 }
 
@@ -95,26 +97,26 @@ static vsh_result copy_channels(const vshi_channels *channels, part_head *head, 
     return VSH_OK;
 }
 
-static vsh_result make_head(const vsh_bake_job *job, part_head *head, vsh_error *error) {
-    const vsh_occluders_info *casters = &job->report.occluders;
-    const vshi_part_options options = options_of(job, job->options.shard_count);
-    const size_t count = job->targets.count;
-    *head = (part_head){.error_count = job->report.error_count,
+static vsh_result make_head(const vshi_scene_bake *bake, part_head *head, vsh_error *error) {
+    const vsh_occluders_info *casters = &bake->report.occluders;
+    const vshi_part_options options = options_of(bake, bake->options.shard_count);
+    const size_t count = bake->targets.count;
+    *head = (part_head){.error_count = bake->error_count,
                         .voxel_size = casters->voxel_size,
                         .active_voxels = casters->active_voxels,
                         .field_bytes = casters->field_bytes,
                         .levels = casters->levels,
                         .has_triangles = casters->has_triangles,
-                        .layered_ao = job->layered_ao};
+                        .layered_ao = bake->layered_ao};
     vshi_channels channels;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_channels_name(&job->scene, 1, 1, &channels, error));
+    VSHI_TRY_DONE(vshi_channels_name(&bake->scene, 1, 1, &channels, error));
     VSHI_TRY_DONE(copy_channels(&channels, head, error));
     VSHI_TRY_DONE(vshi_part_about_make(&options, &head->about, error));
     VSHI_TRY_DONE(
         vshi_allocate((void **)&head->lightmaps, count + 1, sizeof *head->lightmaps, "part", error));
     for (; head->lightmap_count < count; ++head->lightmap_count) {
-        const vsh_job_lightmap *own = &job->lightmaps[head->lightmap_count];
+        const vsh_scene_lightmap *own = &bake->lightmaps[head->lightmap_count];
         head->lightmaps[head->lightmap_count] =
             (part_lightmap){own->width, own->height, own->mesh_count, own->covered, own->samples};
     }
@@ -123,18 +125,173 @@ done:
     return result;
 }
 
+/* --- tiles */
+
+/* An array of a page, [height][width] elements of so many bytes. */
+typedef struct tile_array {
+    unsigned char *values;
+    size_t size;
+    const char *channel; /* of values that have a range; NULL: it is no channel */
+} tile_array;
+
+/* The most arrays of a page. */
+enum { MOST_ARRAYS = VSH_MAX_CHANNELS + 8 };
+
+/* Bytes of a tile's texels in an array, up to a multiple of 4. */
+enum { MOST_TILE_BYTES = VSHI_TILE * VSHI_TILE * 3 * sizeof(float) };
+
+/* Whether a plane is set when the page is finished, not by its tiles. */
+static bool is_finished_later(const vshi_scene_page *page, const float *plane) {
+    const vsh_lightmap *planes = &page->channels.lightmap;
+    return plane == planes->coverage || plane == planes->invalid ||
+           (page->page.ao.share != NULL &&
+            (plane == planes->ao || plane == planes->ao_error || plane == planes->bent)) ||
+           (page->page.sky.share != NULL && plane == planes->sky);
+}
+
+static size_t add_shots(const vshi_shots *shots, tile_array *arrays) {
+    if (shots->share == NULL) {
+        return 0;
+    }
+    arrays[0] = (tile_array){(unsigned char *)shots->share, sizeof *shots->share, NULL};
+    arrays[1] = (tile_array){(unsigned char *)shots->rays, sizeof *shots->rays, NULL};
+    arrays[2] = (tile_array){shots->level, sizeof *shots->level, NULL};
+    arrays[3] = (tile_array){(unsigned char *)shots->open, 3 * sizeof *shots->open, NULL};
+    return shots->open != NULL ? 4 : 3;
+}
+
+/* Lists the arrays of a page that its tiles set; returns how many there are. */
+static size_t list_arrays(const vshi_scene_page *page, tile_array arrays[MOST_ARRAYS]) {
+    const vshi_channels *channels = &page->channels;
+    size_t count = 0, channel = 0;
+    arrays[count++] = (tile_array){page->page.state, 1, NULL};
+    for (size_t i = 0; i < channels->value_count; ++i) {
+        if (!is_finished_later(page, channels->values[i])) {
+            arrays[count++] = (tile_array){(unsigned char *)channels->values[i],
+                                           channels->components[i] * sizeof(float), channels->names[channel]};
+        }
+        channel += channels->components[i];
+    }
+    count += add_shots(&page->page.ao, arrays + count);
+    return count + add_shots(&page->page.sky, arrays + count);
+}
+
+/* Texels of a tile: columns and rows from the first on. */
+typedef struct place {
+    size_t left, top, columns, rows;
+} place;
+
+static place place_of(const vshi_scene_page *page, size_t tile) {
+    const vshi_page *p = &page->page;
+    const size_t across = (p->width + VSHI_TILE - 1) / VSHI_TILE;
+    place at = {tile % across * VSHI_TILE, tile / across * VSHI_TILE, VSHI_TILE, VSHI_TILE};
+    at.columns = p->width - at.left < VSHI_TILE ? p->width - at.left : VSHI_TILE;
+    at.rows = p->height - at.top < VSHI_TILE ? p->height - at.top : VSHI_TILE;
+    return at;
+}
+
+/* Copies the texels of a tile out of an array, or into it. Returns the bytes. */
+static size_t copy_tile(const vshi_scene_page *page, const tile_array *array, size_t tile,
+                        unsigned char *bytes, bool in) {
+    const place at = place_of(page, tile);
+    const size_t size = at.columns * array->size;
+    size_t next = 0;
+    for (size_t y = 0; y < at.rows; ++y, next += size) {
+        unsigned char *row = array->values + ((at.top + y) * page->page.width + at.left) * array->size;
+        memcpy(in ? row : bytes + next, in ? bytes + next : row, size);
+    }
+    while (next % 4 != 0) {
+        bytes[next] = in ? bytes[next] : 0;
+        ++next;
+    }
+    return next;
+}
+
+static vsh_result check_values(const vshi_scene_page *page, const tile_array *array, size_t texel,
+                               const char *path, vsh_error *error) {
+    float low, high;
+    const bool may_be_nan = vshi_channel_range(array->channel, &low, &high);
+    const size_t count = array->size / sizeof(float);
+    for (size_t k = 0; k < count; ++k) {
+        const float value = ((const float *)(const void *)array->values)[count * texel + k];
+        if (!(value >= low && value <= high) && !(may_be_nan && isnan(value))) {
+            return vshi_fail(error, VSH_ERROR_INPUT,
+                             "%s: damaged: '%s' of texel (%zu, %zu) of lightmap %zu is %g, out of range %g … "
+                             "%g; bake this part again",
+                             path, array->channel, texel % page->page.width, texel / page->page.width,
+                             page->index, (double)value, (double)low, (double)high);
+        }
+    }
+    return VSH_OK;
+}
+
+/* Whether a texel's shots can be a bake's. */
+static bool is_sound(const vshi_scene_page *page, const vshi_shots *shots, size_t texel) {
+    enum { MOST_RAYS = 1 << 24 };
+    static const float LONGEST = 3.0f; /* mean of open directions: what they lean by is taken out */
+    if (shots->share == NULL) {
+        return true;
+    }
+    const uint32_t level = shots->level[texel], spacing = (uint32_t)page->charts->ao_spacing;
+    const float share = shots->share[texel];
+    bool sound = level == 0 || page->page.state[texel] != VSHI_TEXEL_EMPTY;
+    sound = sound &&
+            (level == 0 || level == VSHI_AO_KNOWN_LEVEL || (level <= spacing && (level & (level - 1)) == 0));
+    sound = sound && shots->rays[texel] >= 0 && shots->rays[texel] <= MOST_RAYS;
+    sound = sound && ((share >= 0.0f && share <= 1.0f) || (isnan(share) && shots->rays[texel] == 0));
+    for (size_t k = 0; k < 3 && shots->open != NULL; ++k) {
+        const float open = shots->open[3 * texel + k];
+        sound = sound && (fabsf(open) <= LONGEST || (isnan(open) && shots->rays[texel] == 0));
+    }
+    return sound;
+}
+
+static bool is_held_sound(const vshi_scene_page *page, const vshi_held_texel *held, size_t tile) {
+    const place at = place_of(page, tile);
+    const int32_t rays = vshi_field_error_rays(page->page.shade.max_error);
+    const size_t x = vsh_texel_column(held->texel), y = vsh_texel_row(held->texel);
+    return x >= at.left && x < at.left + at.columns && y >= at.top && y < at.top + at.rows &&
+           held->free[0] <= rays && held->free[1] <= rays && held->even >= -1 && held->even <= 1;
+}
+
+/* Checks that a bake can have left the values that were read, once the tile is rasterized. */
+static vsh_result check_tile_values(const vshi_scene_page *page, size_t tile, const char *path,
+                                    vsh_error *error) {
+    const place at = place_of(page, tile);
+    tile_array arrays[MOST_ARRAYS];
+    const size_t count = list_arrays(page, arrays);
+    const vshi_page *p = &page->page;
+    bool sound = true;
+    for (size_t k = 0; k < at.columns * at.rows; ++k) {
+        const size_t texel = (at.top + k / at.columns) * p->width + at.left + k % at.columns;
+        for (size_t i = 0; i < count; ++i) {
+            VSHI_TRY(arrays[i].channel != NULL ? check_values(page, &arrays[i], texel, path, error) : VSH_OK);
+        }
+        sound = sound && p->state[texel] <= VSHI_TEXEL_INVALID &&
+                (p->state[texel] != VSHI_TEXEL_EMPTY) == (p->mesh[texel] != 0) &&
+                is_sound(page, &p->ao, texel) && is_sound(page, &p->sky, texel);
+    }
+    const vshi_shots *shots[2] = {&p->ao, &p->sky};
+    for (size_t s = 0; s < 2; ++s) {
+        for (size_t k = 0; shots[s]->held != NULL && k < shots[s]->held[tile].count; ++k) {
+            sound = sound && is_held_sound(page, &shots[s]->held[tile].list[k], tile);
+        }
+    }
+    return sound ? VSH_OK : vshi_part_damaged(path, "its tiles", error);
+}
+
 /* --- writing */
 
 /* The tiles of a lightmap that are the shard's; *number is of the first tile that has texels, and moves on to
  * the next lightmap's. */
-static vsh_result list_tiles(const vsh_bake_job *job, const vsh_charts *charts, uint64_t *number,
+static vsh_result list_tiles(const vshi_scene_bake *bake, const vsh_charts *charts, uint64_t *number,
                              uint32_t **tiles, size_t *count, vsh_error *error) {
     const size_t all = vshi_charts_tiles(&charts->sorted);
     *count = 0;
     VSHI_TRY(vshi_allocate((void **)tiles, all, sizeof **tiles, "part", error));
     for (size_t tile = 0; tile < all; ++tile) {
-        const uint64_t shards = (uint64_t)job->options.shard_count;
-        if (charts->samples[tile] > 0 && (*number)++ % shards == (uint64_t)job->options.shard - 1) {
+        const uint64_t shards = (uint64_t)bake->options.shard_count;
+        if (charts->samples[tile] > 0 && (*number)++ % shards == (uint64_t)bake->options.shard - 1) {
             (*tiles)[(*count)++] = (uint32_t)tile;
         }
     }
@@ -152,82 +309,87 @@ static uint32_t count_held(const vshi_shots *shots, size_t tile) {
     return shots->held != NULL ? (uint32_t)shots->held[tile].count : 0;
 }
 
-static void write_tile(vshi_part_output *file, const vshi_job_page *page, size_t tile, unsigned char *bytes) {
+static void write_tile(vshi_part_output *file, const vshi_scene_page *page, size_t tile,
+                       unsigned char *bytes) {
     const vshi_page *p = &page->page;
     const vshi_part_tile head = {
         (uint32_t)page->index, (uint32_t)tile, {count_held(&p->ao, tile), count_held(&p->sky, tile)}};
-    vshi_part_array arrays[VSHI_PART_ARRAYS];
-    const size_t count = vshi_part_list(page, arrays);
+    tile_array arrays[MOST_ARRAYS];
+    const size_t count = list_arrays(page, arrays);
     vshi_part_output_put(file, &head, sizeof head);
     vshi_part_output_put(file, &p->stats[tile], sizeof *p->stats);
     vshi_part_output_put(file, &p->errors[tile * p->error_count], p->error_count * sizeof *p->errors);
     for (size_t i = 0; i < count; ++i) {
-        vshi_part_output_put(file, bytes, vshi_part_copy(page, &arrays[i], tile, bytes, false));
+        vshi_part_output_put(file, bytes, copy_tile(page, &arrays[i], tile, bytes, false));
     }
     write_held(file, &p->ao, tile);
     write_held(file, &p->sky, tile);
 }
 
 /* What the report counts of the part. */
-static void add_tile(vsh_bake_job *job, const vshi_job_page *page, size_t tile) {
+static void add_tile(vshi_scene_bake *bake, const vshi_scene_page *page, size_t tile) {
     const vshi_page *p = &page->page;
     const size_t left = tile % page->charts->sorted.columns * VSHI_TILE,
                  top = tile / page->charts->sorted.columns * VSHI_TILE;
     for (size_t y = top; y < top + VSHI_TILE && y < p->height; ++y) {
         for (size_t x = left; x < left + VSHI_TILE && x < p->width; ++x) {
-            job->report.texels += p->state[y * p->width + x] != VSHI_TEXEL_EMPTY;
-            job->report.invalid_texels += p->state[y * p->width + x] == VSHI_TEXEL_INVALID;
+            bake->report.texels += p->state[y * p->width + x] != VSHI_TEXEL_EMPTY;
+            bake->report.invalid_texels += p->state[y * p->width + x] == VSHI_TEXEL_INVALID;
         }
     }
-    vshi_shade_stats_add(&job->report.shade, &p->stats[tile]);
+    vshi_shade_stats_add(&bake->report.shade, &p->stats[tile]);
 }
 
-static vsh_result bake_lightmap(vsh_bake_job *job, size_t index, uint64_t *number, vshi_part_output *file,
-                                const vsh_run *run, vsh_error *error) {
-    vsh_run held = *run;
+/* Tiles that have texels are numbered over all lightmaps, in one sequence. */
+static size_t count_tiles(const vshi_scene_bake *bake) {
+    size_t count = 0;
+    for (size_t i = 0; i < bake->targets.count; ++i) {
+        for (size_t tile = 0; tile < vshi_charts_tiles(&bake->charts[i]->sorted); ++tile) {
+            count += bake->charts[i]->samples[tile] > 0;
+        }
+    }
+    return count;
+}
+
+static vsh_result bake_lightmap(vshi_scene_bake *bake, size_t index, uint64_t *number, vshi_part_output *file,
+                                vshi_job *tiles_done, vsh_error *error) {
+    vsh_run held = bake->run;
     vshi_store store = {.folder = NULL};
-    vshi_job_page page = {.job = job};
+    vshi_scene_page page = {.bake = bake};
     uint32_t *tiles = NULL;
     unsigned char *bytes = NULL;
     size_t count;
-    vshi_job *stage = NULL;
     const double start = vshi_seconds();
     vsh_result result;
-    VSHI_TRY_DONE(list_tiles(job, job->charts[index], number, &tiles, &count, error));
+    VSHI_TRY_DONE(list_tiles(bake, bake->charts[index], number, &tiles, &count, error));
     if (count == 0) {
         goto done;
     }
-    stage = vshi_job_begin(run, "bake", count);
-    if (stage == NULL) {
-        result = vshi_fail(error, VSH_ERROR_MEMORY, "lightmaps: the system refused memory");
-        goto done;
-    }
-    VSHI_TRY_DONE(vshi_allocate((void **)&bytes, VSHI_PART_TILE_MOST, 1, "part", error));
-    VSHI_TRY_DONE(vshi_job_store_open(job, index, &held, &store, error));
-    VSHI_TRY_DONE(vshi_job_page_open(job, index, &store, &page, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&bytes, MOST_TILE_BYTES, 1, "part", error));
+    VSHI_TRY_DONE(vshi_scene_store_open(bake, index, &held, &store, error));
+    VSHI_TRY_DONE(vshi_scene_page_open(bake, index, &store, &page, error));
     VSHI_TRY_DONE(vshi_name_file(page.target->receiver.path,
-                                 vshi_trace_tiles(job->tracer, &page.page, tiles, count, stage, error),
+                                 vshi_trace_tiles(bake->tracer, &page.page, tiles, count, tiles_done, error),
                                  error));
-    job->report.bake_s += vshi_seconds() - start;
+    bake->report.bake_s += vshi_seconds() - start;
     for (size_t i = 0; i < count; ++i) {
         write_tile(file, &page, tiles[i], bytes);
-        add_tile(job, &page, tiles[i]);
+        add_tile(bake, &page, tiles[i]);
     }
 done:
-    vshi_job_end(stage);
-    vshi_job_page_close(&page);
-    vshi_job_store_close(&store);
+    vshi_scene_page_close(&page);
+    vshi_scene_store_close(&store);
     free(bytes);
     free(tiles);
     return result;
 }
 
-static vsh_result begin_part(const vsh_bake_job *job, const char *path, vshi_part_output *file,
+static vsh_result begin_part(const vshi_scene_bake *bake, const char *path, vshi_part_output *file,
                              vsh_error *error) {
     part_head head;
     vshi_part_code code = {.reads = false};
     vsh_result result;
-    VSHI_TRY_DONE(make_head(job, &head, error));
+    VSHI_TRY_DONE(make_head(bake, &head, error));
     vshi_part_about_code(&code, &head.about);
     code_head(&code, &head);
     result = vshi_part_output_begin(file, path, &code, error);
@@ -236,34 +398,28 @@ done:
     return result;
 }
 
-static void tell_writing(const vsh_bake_job *job, const char *path) {
-    if (job->options.writing != NULL) {
-        job->options.writing(job->options.user, path);
-    }
-}
-
-vsh_result vshi_job_bake_part(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
+vsh_result vshi_bake_part(vshi_scene_bake *bake, vsh_error *error) {
+    const int32_t shards = bake->options.shard_count;
     vshi_part_output file = {.file = NULL};
     uint64_t number = 0;
-    char *path = vshi_part_path(parts_name(job), job->options.shard, job->options.shard_count);
-    if (path == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "part: the system refused memory");
-    }
+    vshi_job *tiles =
+        vshi_job_begin(&bake->run, "bake", (count_tiles(bake) + (size_t)shards - 1) / (size_t)shards);
+    char *path = vshi_part_path(parts_name(bake), bake->options.shard, shards);
     vsh_result result;
-    VSHI_TRY_DONE(begin_part(job, path, &file, error));
-    tell_writing(job, path);
-    for (size_t i = 0; i < job->targets.count && result == VSH_OK; ++i) {
-        result = bake_lightmap(job, i, &number, &file, run, error);
+    if (path == NULL || tiles == NULL) {
+        result = vshi_fail(error, VSH_ERROR_MEMORY, "part: the system refused memory");
+        goto done;
+    }
+    VSHI_TRY_DONE(begin_part(bake, path, &file, error));
+    for (size_t i = 0; i < bake->targets.count; ++i) {
+        VSHI_TRY_DONE(bake_lightmap(bake, i, &number, &file, tiles, error));
     }
     const double baked = vshi_seconds();
-    if (result == VSH_OK) {
-        result = vshi_part_output_finish(&file, error);
-    } else {
-        vshi_part_output_abandon(&file);
-    }
-    job->report.write_s += vshi_seconds() - baked;
-    tell_writing(job, NULL);
+    result = vshi_part_output_finish(&file, error);
+    bake->report.write_s += vshi_seconds() - baked;
 done:
+    vshi_part_output_abandon(&file);
+    vshi_job_end(tiles);
     free(path);
     return result;
 }
@@ -294,11 +450,10 @@ void vshi_parts_free(vshi_parts *parts) {
 }
 
 /* Reads the head, and checks that the file is what was written. */
-static vsh_result open_part(const char *path, const vsh_run *run, part *p, vsh_error *error) {
+static vsh_result open_part(const vsh_run *run, part *p, vsh_error *error) {
     vshi_part_input input;
     vsh_result result;
-    p->path = strdup(path);
-    VSHI_TRY_DONE(vshi_part_input_open(path, run, &input, &p->head.about, error));
+    VSHI_TRY_DONE(vshi_part_input_open(p->path, run, &input, &p->head.about, error));
     code_head(&input.head, &p->head);
     VSHI_TRY_DONE(vshi_part_input_end_head(&input, error));
     p->at = sizeof input.front + input.front.head_bytes;
@@ -306,21 +461,19 @@ static vsh_result open_part(const char *path, const vsh_run *run, part *p, vsh_e
     VSHI_TRY_DONE(vshi_part_input_check_body(&input, run, error));
 done:
     vshi_part_input_close(&input);
-    return result == VSH_OK && p->path == NULL
-               ? vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path)
-               : result;
+    return result;
 }
 
-static vsh_result check_lightmaps(const vsh_bake_job *job, const part *p, vsh_error *error) {
+static vsh_result check_lightmaps(const vshi_scene_bake *bake, const part *p, vsh_error *error) {
     const part_head *head = &p->head;
-    if (head->lightmap_count != job->targets.count || head->error_count != job->report.error_count) {
+    if (head->lightmap_count != bake->targets.count || head->error_count != bake->error_count) {
         return vshi_fail(error, VSH_ERROR_INPUT,
                          "%s: is of other inputs or options: of %" PRIu64
                          " lightmaps, not of %zu; bake this part again",
-                         p->path, head->lightmap_count, job->targets.count);
+                         p->path, head->lightmap_count, bake->targets.count);
     }
-    for (size_t i = 0; i < job->targets.count; ++i) {
-        const vsh_job_lightmap *own = &job->lightmaps[i];
+    for (size_t i = 0; i < bake->targets.count; ++i) {
+        const vsh_scene_lightmap *own = &bake->lightmaps[i];
         const part_lightmap *lightmap = &head->lightmaps[i];
         if (lightmap->width != own->width || lightmap->height != own->height ||
             lightmap->mesh_count != own->mesh_count || lightmap->covered != own->covered ||
@@ -336,10 +489,10 @@ static vsh_result check_lightmaps(const vsh_bake_job *job, const part *p, vsh_er
     return VSH_OK;
 }
 
-static vsh_result check_channels(const vsh_bake_job *job, const part *p, vsh_error *error) {
+static vsh_result check_channels(const vshi_scene_bake *bake, const part *p, vsh_error *error) {
     vshi_channels channels;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_channels_name(&job->scene, 1, 1, &channels, error));
+    VSHI_TRY_DONE(vshi_channels_name(&bake->scene, 1, 1, &channels, error));
     const bool same = (uint64_t)channels.image.channel_count == p->head.channel_count;
     for (int32_t c = 0; c < channels.image.channel_count && result == VSH_OK; ++c) {
         if (!same || strcmp(channels.names[c], p->head.channels[c]) != 0) {
@@ -366,64 +519,65 @@ static vsh_result check_casters(const part *p, const part *first, vsh_error *err
 }
 
 /* Checks that a part is of the job's inputs, and of the first one's casters. */
-static vsh_result check_part(const vsh_bake_job *job, const part *p, const part *first, int32_t shard,
+static vsh_result check_part(const vshi_scene_bake *bake, const part *p, const part *first, int32_t shard,
                              int32_t count, vsh_error *error) {
-    const vshi_part_options own = options_of(job, count);
+    const vshi_part_options own = options_of(bake, count);
     VSHI_TRY(vshi_part_about_check(&p->head.about, p->path, shard, &own, error));
-    VSHI_TRY(check_lightmaps(job, p, error));
-    VSHI_TRY(check_channels(job, p, error));
+    VSHI_TRY(check_lightmaps(bake, p, error));
+    VSHI_TRY(check_channels(bake, p, error));
     return check_casters(p, first, error);
 }
 
 /* What the report tells of casters, which are not made. */
-static vsh_result take_casters(vsh_bake_job *job, const part_head *head, const vsh_run *run,
-                               vsh_error *error) {
-    vsh_occluders_info *casters = &job->report.occluders;
+static vsh_result take_casters(vshi_scene_bake *bake, const part_head *head, vsh_error *error) {
+    vsh_occluders_info *casters = &bake->report.occluders;
     casters->voxel_size = head->voxel_size;
     casters->has_triangles = head->has_triangles;
     casters->active_voxels = head->active_voxels;
     casters->field_bytes = head->field_bytes;
     casters->levels = head->levels;
-    job->layered_ao = head->layered_ao != 0;
-    VSHI_TRY(vshi_job_make_errors(job, error));
-    return vshi_job_find_provenance(job, run, error);
+    bake->layered_ao = head->layered_ao != 0;
+    return vshi_bake_find_provenance(bake, error);
 }
 
-vsh_result vshi_parts_open(vsh_bake_job *job, int32_t count, const vsh_run *run, vshi_parts **parts,
-                           vsh_error *error) {
-    const char *name = parts_name(job);
-    vshi_parts *made = NULL;
-    vsh_result result;
-    *parts = NULL;
-    VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, "parts", error));
-    made->count = (size_t)count;
-    VSHI_TRY_DONE(vshi_allocate((void **)&made->list, made->count, sizeof *made->list, "parts", error));
-    for (int32_t i = 0; i < count; ++i) {
-        part *p = &made->list[i];
-        char *path = vshi_part_path(name, i + 1, count);
-        result = path != NULL ? open_part(path, run, p, error)
-                              : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", name);
-        free(path);
-        if (result == VSH_OK && i == 0) {
-            result = take_casters(job, &p->head, run, error);
-        }
-        VSHI_TRY_DONE(result == VSH_OK ? check_part(job, p, &made->list[0], i + 1, count, error) : result);
+vsh_result vshi_parts_find(const vshi_scene_bake *bake, int32_t *count, vsh_error *error) {
+    *count = bake->options.shard_count;
+    if (*count == 0) {
+        VSHI_TRY(vshi_parts_count(parts_name(bake), count, error));
     }
-    *parts = made;
-    made = NULL;
-done:
-    vshi_parts_free(made);
-    return result;
+    return vshi_parts_check_there(parts_name(bake), *count, error);
 }
 
-/* --- tiles */
+vsh_result vshi_parts_open(vshi_scene_bake *bake, int32_t count, vsh_error *error) {
+    const double start = vshi_seconds();
+    const char *name = parts_name(bake);
+    vshi_parts *parts = NULL;
+    VSHI_TRY(vshi_allocate((void **)&parts, 1, sizeof *parts, "parts", error));
+    bake->parts = parts;
+    parts->count = (size_t)count;
+    VSHI_TRY(vshi_allocate((void **)&parts->list, parts->count, sizeof *parts->list, "parts", error));
+    for (int32_t i = 0; i < count; ++i) {
+        part *p = &parts->list[i];
+        p->path = vshi_part_path(name, i + 1, count);
+        if (p->path == NULL) {
+            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", name);
+        }
+        VSHI_TRY(open_part(&bake->run, p, error));
+        VSHI_TRY(i == 0 ? take_casters(bake, &p->head, error) : VSH_OK);
+        VSHI_TRY(check_part(bake, p, &parts->list[0], i + 1, count, error));
+    }
+    bake->report.load_s += vshi_seconds() - start;
+    return VSH_OK;
+}
 
-/* A part's tiles of a lightmap under way. */
+/* --- reading tiles */
+
+/* A part's tiles of the current lightmap. */
 typedef struct taking {
     part *part;
     FILE *file;
-    vshi_job_page *page;
-    unsigned char *bytes; /* [VSHI_PART_TILE_MOST] */
+    vshi_scene_page *page;
+    unsigned char *bytes; /* [MOST_TILE_BYTES] */
 } taking;
 
 static vsh_result take_bytes(const taking *t, void *bytes, size_t size, vsh_error *error) {
@@ -451,13 +605,13 @@ static vsh_result take_held(const taking *t, vshi_shots *shots, size_t tile, uin
 static vsh_result take_tile(const taking *t, const vshi_part_tile *head, vsh_error *error) {
     vshi_page *p = &t->page->page;
     const size_t tile = head->tile;
-    vshi_part_array arrays[VSHI_PART_ARRAYS];
-    const size_t count = vshi_part_list(t->page, arrays);
+    tile_array arrays[MOST_ARRAYS];
+    const size_t count = list_arrays(t->page, arrays);
     VSHI_TRY(take_bytes(t, &p->stats[tile], sizeof *p->stats, error));
     VSHI_TRY(take_bytes(t, &p->errors[tile * p->error_count], p->error_count * sizeof *p->errors, error));
     for (size_t i = 0; i < count; ++i) {
-        VSHI_TRY(take_bytes(t, t->bytes, vshi_part_copy(t->page, &arrays[i], tile, t->bytes, false), error));
-        vshi_part_copy(t->page, &arrays[i], tile, t->bytes, true);
+        VSHI_TRY(take_bytes(t, t->bytes, copy_tile(t->page, &arrays[i], tile, t->bytes, false), error));
+        copy_tile(t->page, &arrays[i], tile, t->bytes, true);
     }
     VSHI_TRY(take_held(t, &p->ao, tile, head->held[0], error));
     return take_held(t, &p->sky, tile, head->held[1], error);
@@ -491,14 +645,14 @@ static vsh_result take_part(const taking *t, uint32_t *owner, uint32_t shard, vs
 /* Tiles that were taken, to be rasterized and checked. */
 typedef struct checking {
     const vshi_parts *parts;
-    vshi_job_page *page;
+    vshi_scene_page *page;
     const uint32_t *owner;
     _Atomic size_t failed; /* the first tile that could not be; SIZE_MAX: none */
 } checking;
 
 static vsh_result check_tile(const checking *c, size_t tile, vsh_error *error) {
     VSHI_TRY(vshi_page_rasterize(&c->page->page, tile, error));
-    return vshi_part_check_tile(c->page, tile, c->parts->list[(c->owner[tile] & ~TAKEN) - 1].path, error);
+    return check_tile_values(c->page, tile, c->parts->list[(c->owner[tile] & ~TAKEN) - 1].path, error);
 }
 
 static void check_tiles(void *user, size_t begin, size_t end) {
@@ -513,7 +667,7 @@ static void check_tiles(void *user, size_t begin, size_t end) {
     }
 }
 
-static vsh_result take_all(vshi_parts *parts, vshi_job_page *page, uint32_t *owner, unsigned char *bytes,
+static vsh_result take_all(vshi_parts *parts, vshi_scene_page *page, uint32_t *owner, unsigned char *bytes,
                            vshi_job *job, vsh_error *error) {
     const size_t tiles = vshi_charts_tiles(&page->charts->sorted);
     for (size_t tile = 0; tile < tiles; ++tile) {
@@ -538,38 +692,16 @@ static vsh_result take_all(vshi_parts *parts, vshi_job_page *page, uint32_t *own
     return c.failed == SIZE_MAX ? VSH_OK : check_tile(&c, c.failed, error);
 }
 
-vsh_result vshi_parts_take(vshi_parts *parts, vshi_job_page *page, vshi_job *job, vsh_error *error) {
+vsh_result vshi_parts_read(vshi_parts *parts, vshi_scene_page *page, vshi_job *job, vsh_error *error) {
     uint32_t *owner = NULL;
     unsigned char *bytes = NULL;
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&owner, vshi_charts_tiles(&page->charts->sorted), sizeof *owner,
                                 "parts", error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&bytes, VSHI_PART_TILE_MOST, 1, "parts", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&bytes, MOST_TILE_BYTES, 1, "parts", error));
     result = take_all(parts, page, owner, bytes, job, error);
 done:
     free(bytes);
     free(owner);
-    return result;
-}
-
-vsh_result vsh_bake_job_merge(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
-    VSHI_NEEDS(job);
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    int32_t count = job->options.shard_count;
-    if (count == 0) {
-        VSHI_TRY(vshi_parts_count(parts_name(job), &count, error));
-    }
-    VSHI_TRY(vshi_parts_check_there(parts_name(job), count, error)); /* before what takes a while */
-    job->merges = true;
-    if (!job->measured) {
-        VSHI_TRY(vshi_job_measure(job, true, &full, error));
-    }
-    const double start = vshi_seconds();
-    VSHI_TRY(vshi_parts_open(job, count, &full, &job->parts, error));
-    job->report.load_s += vshi_seconds() - start;
-    const vsh_result result = vshi_job_bake_all(job, &full, error);
-    vshi_parts_free(job->parts);
-    job->parts = NULL;
     return result;
 }

@@ -12,7 +12,7 @@ void vshi_warn_uvs(const vshi_target *target, const vsh_uv_report *reports, uint
 /* Charts that cover no texel's centre, or objects that lie over each other on more than VSH_LARGEST_OVERLAP
  * of the texels: VSH_ERROR_INPUT, with why. */
 vsh_result vshi_refuse_uvs(const vshi_target *target, const vsh_uv_report *reports, uint64_t covered,
-                           bool allow_overlap, vsh_error *error);
+                           vsh_error *error);
 
 /* A lightmap without one valid texel is no lightmap: VSH_ERROR_INPUT. */
 vsh_result vshi_refuse_invalid(const vshi_target *target, const vsh_bake_stats *baked, vsh_error *error);
@@ -22,10 +22,10 @@ void vshi_warn_baked(const vsh_scene *scene, const vshi_target *target, const vs
                      const vsh_run *run);
 
 /* Notes which lights, and whether the sky, reach the meshes of a baked page. */
-void vshi_note_lit(const vshi_job_page *page);
+void vshi_note_lit(const vshi_scene_page *page);
 
-/* Warns of lights, and of the sky, that one object hides from all other objects of a baked job. */
-void vshi_warn_hidden_lights(const vsh_bake_job *job, const vsh_run *run);
+/* Warns of lights, and of the sky, that one object hides from all other objects of a bake. */
+void vshi_warn_hidden_lights(const vshi_scene_bake *bake, const vsh_run *run);
 
 /* Warns of light that the file's integers cut. */
 void vshi_warn_clipping(const char *output, const vsh_image_clipping *cut, const vsh_run *run);

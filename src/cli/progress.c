@@ -1,7 +1,6 @@
 #include "progress.h"
 
 #include "base/clock.h"
-#include "estimate.h"
 #include "message.h"
 #include "signals.h"
 
@@ -14,29 +13,33 @@
 static const double terminal_interval = 0.1;
 static const double log_interval = 2.0;
 
-/* The time left is left out before this much is known. */
+/* The time left is shown after this much of a stage. */
 static const double estimate_fraction = 0.02;
 static const double estimate_seconds = 0.5;
+
+/* The clock goes on when a stage is interrupted by short ones: the next lightmap's tiles go on with "bake".
+ */
+enum { STAGES = 16, NAME = 32 };
+typedef struct stage_clock {
+    char name[NAME];
+    double began, fraction;
+} stage_clock;
 
 static struct {
     pthread_mutex_t lock; /* around everything here and around standard error */
     bool shown;
     bool terminal;
     bool standing; /* a line without its newline is on the terminal */
-    cli_estimate estimate;
-    double last; /* when something was written */
+    stage_clock stages[STAGES];
+    stage_clock *stage; /* the last one reported */
+    double last;        /* when something was written */
 } state = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
 void cli_progress_begin(bool wanted, bool quiet) {
     state.terminal = isatty(STDERR_FILENO) != 0;
     state.shown = !quiet && (wanted || state.terminal);
-    cli_estimate_begin(&state.estimate, vshi_seconds());
-}
-
-void cli_progress_expect(const char *stage, int kind, double seconds) {
-    pthread_mutex_lock(&state.lock);
-    cli_estimate_expect(&state.estimate, stage, kind, seconds);
-    pthread_mutex_unlock(&state.lock);
+    memset(state.stages, 0, sizeof state.stages);
+    state.stage = NULL;
 }
 
 static void clear_line(void) {
@@ -46,33 +49,32 @@ static void clear_line(void) {
     }
 }
 
-/* Seconds left of the whole command or, where nobody knows its stages, of the one under way; below 0: not
- * known yet. */
-static double left_at(double now) {
-    const cli_estimate *e = &state.estimate;
-    const double left = cli_estimate_left(e, now), elapsed = now - (left >= 0.0 ? e->first : e->began);
-    if (elapsed < estimate_seconds ||
-        (left < 0.0 && !(e->fraction >= estimate_fraction && e->fraction < 1.0))) {
-        return -1.0;
+/* Finds the clock of a stage, which starts again if the fraction falls. */
+static stage_clock *find_stage(const char *name, double fraction, double now) {
+    int i = 0;
+    while (i < STAGES - 1 && state.stages[i].name[0] != '\0' &&
+           strncmp(state.stages[i].name, name, NAME - 1) != 0) {
+        ++i;
     }
-    return left >= 0.0 ? left : elapsed * (1.0 - e->fraction) / e->fraction;
+    stage_clock *stage = &state.stages[i];
+    if (strncmp(stage->name, name, NAME - 1) != 0 || fraction < stage->fraction) {
+        snprintf(stage->name, NAME, "%s", name);
+        stage->began = now;
+    }
+    stage->fraction = fraction;
+    return stage;
 }
 
-static void show(double now) {
+static void show(const stage_clock *stage, double now) {
     char rest[32] = "";
-    cli_estimate *e = &state.estimate;
-    const double left = left_at(now), percent = 100.0 * cli_estimate_share(e, now);
-    if (left >= 100.0) {
-        snprintf(rest, sizeof rest, ", about %.0f min left", left / 60.0);
-    } else if (left >= 0.0) {
-        snprintf(rest, sizeof rest, ", about %.0f s left", left);
+    const double elapsed = now - stage->began;
+    if (elapsed >= estimate_seconds && stage->fraction >= estimate_fraction && stage->fraction < 1.0) {
+        const double left = elapsed * (1.0 - stage->fraction) / stage->fraction;
+        snprintf(rest, sizeof rest, ", about %.0f %s left", left >= 100.0 ? left / 60.0 : left,
+                 left >= 100.0 ? "min" : "s");
     }
     clear_line();
-    if (e->count > 0) {
-        fprintf(stderr, "vdbshade: %s (%.0f %% of all)%s", e->name, percent, rest);
-    } else {
-        fprintf(stderr, "vdbshade: %s %.0f %%%s", e->name, percent, rest);
-    }
+    fprintf(stderr, "vdbshade: %s %.0f %%%s", stage->name, 100.0 * stage->fraction, rest);
     if (state.terminal) {
         state.standing = true;
         fflush(stderr);
@@ -82,16 +84,16 @@ static void show(double now) {
     state.last = now;
 }
 
-int32_t cli_progress_report(void *user, const char *stage, double fraction) {
+int32_t cli_progress_report(void *user, const char *name, double fraction) {
     (void)user;
     if (state.shown) {
         pthread_mutex_lock(&state.lock);
         const double now = vshi_seconds();
-        const bool fresh = strncmp(state.estimate.name, stage, sizeof state.estimate.name - 1) != 0;
-        cli_estimate_report(&state.estimate, stage, fraction, now);
+        const stage_clock *before = state.stage;
+        state.stage = find_stage(name, fraction, now);
         if (now - state.last >= (state.terminal ? terminal_interval : log_interval) ||
-            (fresh && !state.terminal)) {
-            show(now);
+            (state.stage != before && !state.terminal)) {
+            show(state.stage, now);
         }
         pthread_mutex_unlock(&state.lock);
     }

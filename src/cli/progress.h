@@ -1,4 +1,4 @@
-/* Progress on standard error: the stage, how much of it all is done, and about how long the rest takes. */
+/* Progress on standard error: the stage, how much of it is done, and about how long the rest of it takes. */
 #ifndef CLI_PROGRESS_H
 #define CLI_PROGRESS_H
 
@@ -8,10 +8,6 @@
 /* Decides whether progress is shown: `wanted` shows it anywhere, else it is shown on a terminal only. `quiet`
  * silences it. */
 void cli_progress_begin(bool wanted, bool quiet);
-
-/* A stage that the command is to come to, and what it takes, about: CLI_ESTIMATE_… (estimate.h), seconds.
- * What is told is then of the whole command. */
-void cli_progress_expect(const char *stage, int kind, double seconds);
 
 /* For vsh_run: show, and stop where the user interrupted. */
 int32_t cli_progress_report(void *user, const char *stage, double fraction);

@@ -3,9 +3,7 @@
  * byte chooses the bake and the part, the second how the others are taken. */
 #include "fuzz.h"
 
-#include "bake_scene/part_tile.h"
-#include "base/part_file.h"
-#include "base/part_sum.h"
+#include "bake_scene/parts.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -60,7 +58,7 @@ static void bake_scene(source *s, int kind) {
          &error);
     for (int32_t shard = 1; shard <= SHARDS; ++shard) {
         static const char *const words[] = {"bake", "a b"};
-        vsh_bake_job_options options = vsh_bake_job_options_default();
+        vsh_bake_options options = vsh_bake_options_default();
         options.shard = shard;
         options.shard_count = SHARDS;
         options.parts = s->name;
@@ -165,55 +163,31 @@ static part make_part(fuzz_input *input, const source *s, int shard) {
 
 /* --- what takes it */
 
-static vsh_result begin(void *user, const vsh_job_lightmap *lightmap, const vsh_image *image,
-                        vsh_error *error) {
+static vsh_result count_rows(void *user, const vsh_scene_lightmap *lightmap, const vsh_image *image,
+                             int32_t first, int32_t count, const float *const *planes, vsh_error *error) {
     (void)error;
     int32_t *rows = user;
-    if (lightmap->width != WIDTH || image->width != WIDTH || image->height != HEIGHT) {
+    if (lightmap->width != WIDTH || image->width != WIDTH || image->height != HEIGHT || planes[0] == NULL ||
+        first + count > HEIGHT) {
         abort();
     }
-    *rows = 0;
+    *rows = first + count;
     return VSH_OK;
-}
-
-static vsh_result add(void *user, int32_t rows, const float *const *planes, vsh_error *error) {
-    (void)error;
-    int32_t *sum = user;
-    *sum += rows;
-    if (*sum > HEIGHT || planes[0] == NULL) {
-        abort();
-    }
-    return VSH_OK;
-}
-
-static vsh_result end(void *user, vsh_result result, vsh_error *error) {
-    (void)error;
-    const int32_t *rows = user;
-    if (result == VSH_OK && *rows != HEIGHT) {
-        abort();
-    }
-    return result;
 }
 
 static void merge_lightmaps(const source *s) {
-    int32_t rows;
-    vsh_row_sink sink = vsh_row_sink_default();
-    sink.begin = begin;
-    sink.add = add;
-    sink.end = end;
-    sink.user = &rows;
+    int32_t rows = 0;
     const vsh_run run = fuzz_run();
-    vsh_bake_job_options options = vsh_bake_job_options_default();
-    options.sink = &sink;
+    vsh_bake_options options = vsh_bake_options_default();
+    options.rows = count_rows;
+    options.user = &rows;
     options.parts = s->name;
     vsh_error error;
-    vsh_bake_job *job;
-    FUZZ_MAKE(job, vsh_bake_job_create(s->scene, &options, &run, &job, fuzz_error(&error)));
-    if (job != NULL) {
-        const vsh_result result = vsh_bake_job_merge(job, &run, fuzz_error(&error));
-        fuzz_ended(result, &error, result == VSH_OK ? job : NULL);
+    const vsh_result result = vsh_merge_scene(s->scene, &options, &run, NULL, fuzz_error(&error));
+    fuzz_ended(result, &error, result == VSH_OK ? &rows : NULL);
+    if (result == VSH_OK && rows != HEIGHT) {
+        abort();
     }
-    vsh_bake_job_free(job);
 }
 
 static void read_words(const source *s) {

@@ -29,7 +29,7 @@ LEFT_OUT = {
     "vsh_grid_to_openvdb": "the same",
     "vsh_volume_to_openvdb": "the same",
     "vsh_reader_serve": "for the main of a program that is its own reader; Run(reader=…) takes such a program's path",
-    "vsh_lit_check_uvs": "what lit_write() refuses, for bakes that begin long before it; BakeJob asks it",
+    "vsh_lit_check_uvs": "what lit_write() refuses, for bakes that begin long before it; bake_scene() asks it",
     "vsh_triangles_create_beside": "procedural solids beside meshes: scenes trace them so",
     "vsh_planes_shaded": "what a plane costs, for progress of several bakes together",
     "vsh_atlas_chart_view": "one chart of those that Atlas.charts lists",
@@ -137,12 +137,10 @@ class Reach(Case):
         self.assertTrue(scene.has_truth())
         scene.traceable(), scene.marches(), v.provenance(scene), scene.receiver_check(0)
         scene.check_outputs([here / "none.exr"])
-        job = v.BakeJob(scene)
-        job.forecast()
+        self.assertEqual(v.forecast_scene(scene).texels, 256)
         (baked,) = scene.bake()
-        job = v.BakeJob(scene, arrays=True)
-        job.bake(), job.report, job.lightmaps
-        assets = job.assets
+        self.assertEqual(baked.told.covered, 256)
+        assets = v.Assets(scene)
         meshes = assets.receiver(0)
         assets.receiver(0, page=0), assets.caster(0), assets.receiver_pages(0), assets.receiver_model(0), assets.receiver_atlas(0)
         self.assertIsNone(assets.heights(0))
@@ -173,7 +171,7 @@ class Reach(Case):
         camera = v.Camera().frame((-1, -1, -1), (1, 1, 1)).frame_points(positions).orbit(0.1)
         v.render([occluders.field], occluders, lamp, camera=camera, width=8, height=8,
                  lit=[v.LitMeshes(floor(), {"shadow.sun": lightmap["shadow.sun"]})]).encode(alpha=True)
-        del baked, volume, job, assets, atlas, writer
+        del baked, volume, assets, atlas, writer
         self.hidden(), self.pages(), self.job_parts()
 
     def lights(self):
@@ -258,11 +256,10 @@ class Reach(Case):
             return vdbshade.Scene(ASSETS / "seeds.json", size=32, resolution=32)
         parts = self.folder / "job"
         for shard in (1, 2):
-            job = vdbshade.BakeJob(scene(), shard=shard, shard_count=2, parts=parts, words=["w"])
-            self.assertEqual(job.bake(), [])
-        job = vdbshade.BakeJob(scene(), arrays=True, parts=parts)
-        job.measure()
-        (merged,), (whole,) = job.merge(), scene().bake()
+            baked = vdbshade.bake_scene(scene(), shard=shard, shard_count=2, parts=parts, words=["w"])
+            self.assertEqual(baked.lightmaps, [])
+        (merged,) = vdbshade.merge_scene(scene(), arrays=True, parts=parts).lightmaps
+        (whole,) = scene().bake()
         self.assertEqual(list(merged), list(whole))
         for name in whole:
             self.assertSame(merged[name], whole[name])

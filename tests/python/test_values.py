@@ -37,7 +37,7 @@ class Values(Case):
 
     def test_files_of_a_scene_are_those_of_the_command_line(self):
         arguments = dict(casters=[ASSETS / "cloister.glb"], lights=[sun(**LIT)], size=64, ao=0.6)
-        report = vdbshade.bake_scene(vdbshade.Scene(receivers=[dict(path=ASSETS / "cloister.glb", output=self.folder / "py.exr")], **arguments))
+        report = vdbshade.bake_scene(vdbshade.Scene(receivers=[dict(path=ASSETS / "cloister.glb", output=self.folder / "py.exr")], **arguments)).report
         self.cli("bake", ASSETS / "cloister.glb", "--sun", "0.6,0.75,0.5", "--sun-angle", 3, "--size", 64, "--ao", 0.6, "-o", "cli.exr")
         self.assertEqual(report.texels, 4096)
         self.assertTrue(vdbshade.compare_files(self.folder / "cli.exr", self.folder / "py.exr", limits=dict(max=0.0)))

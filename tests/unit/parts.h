@@ -12,42 +12,33 @@ typedef struct taken {
     int32_t rows, channels;
 } taken;
 
-static inline vsh_result begin(void *user, const vsh_job_lightmap *lightmap, const vsh_image *image,
-                               vsh_error *error) {
+static inline vsh_result add_rows(void *user, const vsh_scene_lightmap *lightmap, const vsh_image *image,
+                                  int32_t first, int32_t count, const float *const *planes,
+                                  vsh_error *error) {
     (void)lightmap;
     (void)error;
     taken *t = user;
-    t->rows = 0;
-    t->channels = image->channel_count;
     assert_in_range(image->channel_count, 1, CHANNELS);
-    return VSH_OK;
-}
-
-static inline vsh_result add(void *user, int32_t rows, const float *const *planes, vsh_error *error) {
-    (void)error;
-    taken *t = user;
-    assert_true(t->rows + rows <= SIZE);
-    for (int32_t c = 0; c < t->channels; ++c) {
-        memcpy(t->values[c] + t->rows * SIZE, planes[c], (size_t)rows * SIZE * sizeof(float));
+    assert_true(first + count <= SIZE);
+    for (int32_t c = 0; c < image->channel_count; ++c) {
+        memcpy(t->values[c] + first * SIZE, planes[c], (size_t)count * SIZE * sizeof(float));
     }
-    t->rows += rows;
+    t->rows = first + count;
+    t->channels = image->channel_count;
     return VSH_OK;
 }
 
-static inline vsh_result end(void *user, vsh_result result, vsh_error *error) {
-    (void)user;
-    (void)error;
-    return result;
-}
-
-static inline vsh_row_sink sink_of(taken *t) {
-    return (vsh_row_sink){sizeof(vsh_row_sink), begin, add, end, t};
+static inline vsh_bake_options options_of(taken *t) {
+    vsh_bake_options options = vsh_bake_options_default();
+    options.rows = add_rows;
+    options.user = t;
+    return options;
 }
 
 static inline void bake_parts(const case_scene *c) {
     static const char *const words[] = {"one", "", "three words"};
     for (int32_t i = 1; i <= SHARDS; ++i) {
-        vsh_bake_job_options options = vsh_bake_job_options_default();
+        vsh_bake_options options = vsh_bake_options_default();
         options.shard = i;
         options.shard_count = SHARDS;
         options.words = words;
@@ -58,14 +49,8 @@ static inline void bake_parts(const case_scene *c) {
 }
 
 static inline vsh_result merge(const case_scene *c, taken *t, const vsh_run *run, vsh_error *error) {
-    const vsh_row_sink sink = sink_of(t);
-    vsh_bake_job_options options = vsh_bake_job_options_default();
-    options.sink = &sink;
-    vsh_bake_job *job = NULL;
-    vsh_result result = vsh_bake_job_create(&c->scene, &options, run, &job, error);
-    result = result == VSH_OK ? vsh_bake_job_merge(job, run, error) : result;
-    vsh_bake_job_free(job);
-    return result;
+    const vsh_bake_options options = options_of(t);
+    return vsh_merge_scene(&c->scene, &options, run, NULL, error);
 }
 
 /* The ball becomes a wall that stands on the floor, to which rays of AO go that texels share. `made`: with

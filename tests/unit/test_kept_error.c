@@ -102,17 +102,12 @@ static void bake(const char *casters, double max_error, int size, baked *b) {
         "[{\"mesh\": \"%s/seeds_floor.obj\", \"size\": %d, \"output\": \"%s\"}]}",
         casters, SUN[0], SUN[1], SUN[2], AO_DISTANCE, max_error, VSH_ASSETS, size, at("out.exr"));
     vsh_scene *scene = parse(at("scene.json"), text);
-    vsh_bake_job *job;
     vsh_error error;
-    assert_ok(vsh_bake_job_create(scene, NULL, NULL, &job, &error), &error);
-    assert_ok(vsh_bake_job_measure(job, NULL, &error), &error);
-    assert_ok(vsh_bake_job_prepare(job, NULL, &error), &error);
-    assert_ok(vsh_bake_job_run(job, NULL, &error), &error);
-    vsh_bake_report report;
-    vsh_bake_job_get_report(job, &report);
-    b->shadow_error = vsh_bake_error_rmse(&report.errors[0]);
-    b->ao_error = vsh_bake_error_rmse(&report.errors[1]);
-    vsh_bake_job_free(job);
+    vsh_bake_error errors[3];
+    vsh_bake_report report = {.errors = errors};
+    assert_ok(vsh_bake_scene(scene, NULL, NULL, &report, &error), &error);
+    b->shadow_error = vsh_bake_error_rmse(&errors[0]);
+    b->ao_error = vsh_bake_error_rmse(&errors[1]);
     vsh_scene_free(scene);
     vsh_image_file *file;
     assert_ok(vsh_image_read(at("out.exr"), NULL, &file, &error), &error);

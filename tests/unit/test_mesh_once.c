@@ -56,7 +56,7 @@ static const char text[] =
     "\"layers\":[{\"name\":\"far\"}],\"resolution\":16,\"ao\":{\"distance\":0.5},\"method\":\"%s\","
     "\"lights\":[{\"name\":\"sun\",\"type\":\"directional\",\"direction\":[0,1,0.2],\"angle_deg\":5}],"
     "\"receivers\":[{\"mesh\":\"box.obj\",\"size\":16,\"output\":\"box.exr\"},"
-    "{\"mesh\":\"floor.obj\",\"size\":16,\"output\":\"floor.exr\"}]}";
+    "{\"mesh\":\"floor.obj\",\"size\":16,\"allow_overlap\":true,\"output\":\"floor.exr\"}]}";
 
 enum { CASTERS = 3, FLOORS = 2, MESHES = CASTERS + FLOORS };
 
@@ -76,10 +76,8 @@ static void bake(const char *method) {
     vsh_scene *scene = NULL;
     vsh_error error;
     assert_ok(vsh_scene_read(at("scene.json"), NULL, &scene, &error), &error);
-    vsh_bake_job_options options = vsh_bake_job_options_default();
-    options.allow_overlap = 1;
     validated = looked_over = welded = edges_counted = 0;
-    assert_ok(vsh_bake_scene(scene, &options, NULL, NULL, &error), &error);
+    assert_ok(vsh_bake_scene(scene, NULL, NULL, NULL, &error), &error);
     vsh_scene_free(scene);
     assert_int_equal(looked_over, MESHES);
     assert_int_equal(welded, MESHES);

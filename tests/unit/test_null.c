@@ -167,15 +167,12 @@ static void scenes_are_not_made_of_nothing(void **state) {
     MAKES_NONE(vsh_scene_triangles(&scene, NULL, NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_flat_scene_casters(NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_provenance_create(NULL, NULL, PLACE, &error));
-    MAKES_NONE(vsh_bake_job_create(NULL, NULL, NULL, PLACE, &error));
-    REFUSED(vsh_bake_job_create(&scene, NULL, NULL, NULL, &error));
-    REFUSED(vsh_bake_job_measure(NULL, NULL, &error));
-    REFUSED(vsh_bake_job_prepare(NULL, NULL, &error));
-    REFUSED(vsh_bake_job_run(NULL, NULL, &error));
-    REFUSED(vsh_bake_job_forecast(NULL, NULL, NULL, &error));
+    REFUSED(vsh_bake_scene(NULL, NULL, NULL, NULL, &error));
+    REFUSED(vsh_merge_scene(NULL, NULL, NULL, NULL, &error));
+    REFUSED(vsh_forecast_scene(NULL, NULL, NULL, NULL, &error));
     REFUSED(vsh_bake_scene(NULL, NULL, NULL, NULL, &error));
     REFUSED(vsh_receiver_check(NULL, 0, &error));
-    MAKES_NONE(vsh_receiver_charts(NULL, 0, NULL, 0, 0, NULL, PLACE, &error));
+    MAKES_NONE(vsh_receiver_charts(NULL, 0, NULL, 0, NULL, PLACE, &error));
 }
 
 /* Something that casts nothing. */

@@ -2,21 +2,19 @@
 #include "parts.h"
 
 static void bake_whole(const case_scene *c, taken *rows, vsh_bake_report *report) {
-    const vsh_row_sink sink = sink_of(rows);
-    vsh_bake_job_options options = vsh_bake_job_options_default();
-    options.sink = &sink;
+    const vsh_bake_options options = options_of(rows);
     vsh_error error;
     assert_ok(vsh_bake_scene(&c->scene, &options, NULL, report, &error), &error);
 }
 
-static void a_sink_takes_merged_rows_as_of_one_bake_and_words_come_back(void **state) {
+static void merged_rows_are_those_of_one_bake_and_words_come_back(void **state) {
     (void)state;
     case_scene c;
     fill(&c, SIZE, 0.4);
     taken *one = calloc(2, sizeof *one), *all = one + 1;
     assert_non_null(one);
     vsh_error error;
-    vsh_bake_report report;
+    vsh_bake_report report = {.errors = NULL};
     bake_whole(&c, one, &report);
     assert_true(report.invalid_texels > 20 && report.invalid_texels < SIZE * SIZE / 2);
     bake_parts(&c);
@@ -60,31 +58,27 @@ static void what_parts_leave_of_ao_is_as_of_one_bake(void **state) {
     }
 }
 
-static void a_job_of_a_part_is_refused_what_it_cannot_do(void **state) {
+static void options_that_a_part_cannot_have_are_refused(void **state) {
     (void)state;
     case_scene c;
     fill(&c, SIZE, 0.4);
     taken t;
-    const vsh_row_sink sink = sink_of(&t);
     static const int32_t wrong[][2] = {{1, 0}, {2, 1}, {-1, 3}, {1, 10001}, {1, -1}};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0] + 2; ++i) {
-        vsh_bake_job_options options = vsh_bake_job_options_default();
+        vsh_bake_options options = i == 5 ? options_of(&t) : vsh_bake_options_default();
         options.shard = i < 5 ? wrong[i][0] : 1;
         options.shard_count = i < 5 ? wrong[i][1] : 2;
-        options.sink = i == 5 ? &sink : NULL;
         options.word_count = i == 6;
-        vsh_bake_job *job = NULL;
         vsh_error error;
-        assert_int_equal(vsh_bake_job_create(&c.scene, &options, NULL, &job, &error), VSH_ERROR_ARGUMENT);
-        assert_null(job);
+        assert_int_equal(vsh_bake_scene(&c.scene, &options, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
     }
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_sink_takes_merged_rows_as_of_one_bake_and_words_come_back),
+        cmocka_unit_test(merged_rows_are_those_of_one_bake_and_words_come_back),
         cmocka_unit_test(what_parts_leave_of_ao_is_as_of_one_bake),
-        cmocka_unit_test(a_job_of_a_part_is_refused_what_it_cannot_do),
+        cmocka_unit_test(options_that_a_part_cannot_have_are_refused),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

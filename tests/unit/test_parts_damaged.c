@@ -1,7 +1,5 @@
 /* Parts of strangers: no file makes merging do worse than fail. */
-#include "bake_scene/part_tile.h"
-#include "base/part_file.h"
-#include "base/part_sum.h"
+#include "bake_scene/parts.h"
 #include "parts.h"
 
 typedef struct bytes {

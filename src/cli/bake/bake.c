@@ -1,6 +1,6 @@
 /* vdbshade bake: from files to lightmaps. */
 #include "bake.h"
-#include "base/try.h"
+#include "base/bytes.h"
 #include "cli/message.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
@@ -100,52 +100,69 @@ static int check_files(const cli_bake_settings *settings, const vsh_scene *scene
     return CLI_OK;
 }
 
-/* Outputs of objects have their names only now; the others are looked at once more, as inputs of models are
- * found by reading those. */
-static int check_outputs(const cli_bake_settings *settings, const vsh_scene *scene, const vsh_bake_job *job) {
-    const char *const others[] = {settings->stats, settings->exr, settings->view, settings->invalid_picture};
-    enum { OTHERS = sizeof others / sizeof others[0] };
-    const size_t lightmaps = vsh_bake_job_count(job);
-    const char **outputs = calloc(lightmaps + OTHERS, sizeof *outputs);
-    int code = outputs != NULL ? CLI_OK : cli_out_of_memory(settings->input);
+/* --- callbacks */
+
+enum { MOST_LINES = 8 }; /* lightmaps that get a line each */
+
+typedef struct baking {
+    const cli_bake_settings *settings;
+    const vsh_scene *scene;
+    size_t count;     /* lightmaps */
+    int code;         /* an exit code of check_outputs() */
+    bool files_known; /* their warnings are not printed yet */
+} baking;
+
+/* Checks the outputs again: objects' outputs have their names now, and models their textures. */
+static int check_outputs(const baking *b, const vsh_scene_lightmap *lightmaps, const char **outputs) {
+    const cli_bake_settings *s = b->settings;
+    const char *const others[] = {s->stats, s->exr, s->view, s->invalid_picture};
     size_t count = 0;
-    for (size_t i = 0; i < lightmaps && code == CLI_OK; ++i) {
-        vsh_job_lightmap lightmap;
-        vsh_bake_job_lightmap(job, i, &lightmap);
-        outputs[count++] = lightmap.output;
-        code = cli_bake_check_output(settings, scene, lightmap.output);
+    for (; count < b->count; ++count) {
+        outputs[count] = lightmaps[count].output;
+        CLI_TRY(cli_bake_check_output(s, b->scene, outputs[count]));
     }
-    for (size_t i = 0; i < OTHERS && code == CLI_OK; ++i) {
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; ++i) {
         outputs[count] = others[i];
         count += others[i] != NULL;
     }
-    code = code == CLI_OK ? cli_bake_check_inputs(settings, scene, outputs, count) : code;
+    return cli_bake_check_inputs(s, b->scene, outputs, count);
+}
+
+static vsh_result check_loaded(void *user, const vsh_scene_lightmap *lightmaps, size_t count,
+                               vsh_error *error) {
+    (void)error; /* check_outputs() has said why */
+    baking *b = user;
+    const char **outputs = calloc(count + 4, sizeof *outputs);
+    b->count = count;
+    b->files_known = true;
+    b->code = outputs != NULL ? check_outputs(b, lightmaps, outputs) : cli_out_of_memory(b->settings->input);
     free(outputs);
-    return code;
+    return b->code == CLI_OK ? VSH_OK : VSH_ERROR_CANCELLED;
 }
 
-/* --- what is told */
-
-enum { MOST_TOLD = 8 }; /* lightmaps that have a line each */
-
-typedef struct telling {
-    const cli_common *common;
-    bool part;    /* lightmaps are not whole */
-    size_t count; /* lightmaps */
-} telling;
-
-static bool is_each_told(const telling *t) {
-    return t->count <= MOST_TOLD || t->common->verbose;
-}
-
-static void say_lightmap(void *user, const vsh_job_lightmap *lightmap, vsh_result result) {
-    const telling *t = user;
-    if (result != VSH_OK || t->common->quiet || t->part || !is_each_told(t)) {
-        return;
+/* Prints the warnings about files before the long work. */
+static int32_t report_progress(void *user, const char *stage, double fraction) {
+    baking *b = user;
+    if (b->files_known && strcmp(stage, "bake") == 0) {
+        b->files_known = false;
+        cli_warnings_tell();
     }
-    cli_say("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid", lightmap->output, lightmap->width,
-            lightmap->height, lightmap->covered, lightmap->invalid_texels);
+    return cli_progress_report(NULL, stage, fraction);
 }
+
+static bool has_lines(const baking *b) {
+    return b->settings->shard == 0 && (b->count <= MOST_LINES || b->settings->common.verbose);
+}
+
+static void say_lightmap(void *user, const vsh_scene_lightmap *lightmap) {
+    const baking *b = user;
+    if (has_lines(b) && !b->settings->common.quiet) {
+        cli_say("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid", lightmap->output,
+                lightmap->width, lightmap->height, lightmap->covered, lightmap->invalid_texels);
+    }
+}
+
+/* --- reports */
 
 /* A name to go before ".I-of-N.part", to be freed. */
 static char *name_parts(const cli_bake_settings *s, const vsh_scene *scene) {
@@ -157,20 +174,6 @@ static void say_part(const cli_bake_settings *s, const char *parts, const vsh_ba
     cli_say("%s.%d-of-%d.part: %" PRIu64 " texels, %" PRIu64
             " of them invalid; 'vdbshade merge %s' once all parts are there",
             parts, s->shard, s->shard_count, report->texels, report->invalid_texels, parts);
-}
-
-/* Where there are too many for a line each. */
-static void say_all(const telling *t, const vsh_bake_job *job, const vsh_bake_report *report) {
-    if (t->part || is_each_told(t)) {
-        return;
-    }
-    vsh_job_lightmap first, last;
-    vsh_bake_job_lightmap(job, 0, &first);
-    vsh_bake_job_lightmap(job, t->count - 1, &last);
-    const bool one = strcmp(first.output, last.output) == 0;
-    cli_say("%zu lightmaps, %s%s%s: %" PRIu64 " texels, %" PRIu64 " of them invalid; --verbose tells of each",
-            t->count, one ? "in " : first.output, one ? "" : " to ", last.output, report->texels,
-            report->invalid_texels);
 }
 
 static cli_stats make_stats(const vsh_scene *scene, const vsh_bake_report *report, int32_t threads) {
@@ -192,85 +195,99 @@ static cli_stats make_stats(const vsh_scene *scene, const vsh_bake_report *repor
     return stats;
 }
 
-/* --- steps */
-
-/* Prints warnings as soon as they are known: what is wrong with the files, before the long work. */
-static vsh_result run_job(vsh_bake_job *job, const vsh_scene *scene, const vsh_run *run, vsh_error *error) {
-    VSHI_TRY(vsh_bake_job_measure(job, run, error));
-    if (vsh_bake_job_count(job) > 0) {
-        cli_bake_expect(scene, job, run->threads);
+static int report_bake(const baking *b, const char *parts, const vsh_bake_report *report,
+                       const vsh_run *run) {
+    const cli_bake_settings *s = b->settings;
+    const cli_stats stats = make_stats(b->scene, report, run->threads);
+    cli_stats_warn(&stats, b->scene, run);
+    CLI_TRY(cli_bake_view(s, b->scene, run));
+    CLI_TRY(cli_stats_finish(&stats, run, s->stats));
+    cli_warnings_tell();
+    if (s->common.quiet) {
+        return CLI_OK;
     }
-    cli_warnings_tell();
-    VSHI_TRY(vsh_bake_job_prepare(job, run, error));
-    cli_warnings_tell();
-    return vsh_bake_job_run(job, run, error);
-}
-
-static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, vsh_bake_job *job,
-                    const vsh_run *run, telling *t, const char *parts) {
-    t->count = vsh_bake_job_count(job);
-    vsh_error error;
-    if ((settings->merged != NULL ? vsh_bake_job_merge(job, run, &error)
-                                  : run_job(job, scene, run, &error)) != VSH_OK) {
-        return cli_fail_of(NULL, &error);
+    if (s->shard > 0) {
+        say_part(s, parts, report);
+    } else if (!has_lines(b)) {
+        cli_say("%zu lightmaps: %" PRIu64 " texels, %" PRIu64 " of them invalid; --verbose lists each",
+                b->count, report->texels, report->invalid_texels);
     }
-    vsh_bake_report report;
-    vsh_bake_job_get_report(job, &report);
-    const cli_stats stats = make_stats(scene, &report, run->threads);
-    cli_stats_warn(&stats, scene, run);
-    CLI_TRY(cli_bake_view(settings, scene, run));
-    CLI_TRY(cli_stats_finish(&stats, run, settings->stats));
-    cli_warnings_tell();
-    if (!settings->common.quiet) {
-        say_all(t, job, &report);
-        if (t->part) {
-            say_part(settings, parts, &report);
-        }
-        if (t->count > 0) {
-            cli_stats_say(&stats);
-        }
+    if (b->count > 0) {
+        cli_stats_say(&stats);
     }
     return CLI_OK;
 }
 
-/* Bakes a scene whose files were checked, or puts its parts together. */
+static int run_bake(baking *b, const char *parts, const vsh_bake_options *options, const vsh_run *run) {
+    const bool merges = b->settings->merged != NULL;
+    vsh_bake_report report = {.errors = calloc(b->scene->light_count + 2, sizeof *report.errors)};
+    vsh_error error;
+    if (report.errors == NULL) {
+        return cli_out_of_memory(b->settings->input);
+    }
+    const vsh_result result =
+        (merges ? vsh_merge_scene : vsh_bake_scene)(b->scene, options, run, &report, &error);
+    const int code = b->code != CLI_OK  ? b->code
+                     : result != VSH_OK ? cli_fail_of(NULL, &error)
+                                        : report_bake(b, parts, &report, run);
+    free(report.errors);
+    return code;
+}
+
+static int print_forecast(baking *b, const vsh_bake_options *options, const vsh_run *run) {
+    vsh_bake_forecast f;
+    vsh_error error;
+    const vsh_result result = vsh_forecast_scene(b->scene, options, run, &f, &error);
+    if (b->code != CLI_OK || result != VSH_OK) {
+        return b->code != CLI_OK ? b->code : cli_fail_of(NULL, &error);
+    }
+    cli_stats stats = {.of = CLI_STATS_TEXELS};
+    char methods[128], grid[32], field[32], peak[32];
+    cli_stats_methods(&stats, b->scene, f.has_triangles);
+    printf("methods       %s\n", cli_stats_methods_text(&stats, methods, sizeof methods));
+    printf("texels        %" PRIu64 " in %zu lightmap%s, %" PRIu64 " samples\n", f.texels, f.lightmap_count,
+           f.lightmap_count == 1 ? "" : "s", f.samples);
+    if (f.voxels == 0.0) {
+        printf("voxels        none\n");
+    } else {
+        printf("voxels        about %.3g of %.4g, %.4g along the longest side\n", f.voxels, f.voxel_size,
+               f.resolution);
+    }
+    printf("memory        about %s at most: level set %s, field %s\n",
+           vshi_bytes_text((uint64_t)f.peak_bytes, peak, sizeof peak),
+           vshi_bytes_text((uint64_t)f.grid_bytes, grid, sizeof grid),
+           vshi_bytes_text((uint64_t)f.field_bytes, field, sizeof field));
+    return CLI_OK;
+}
+
+/* Bakes a scene whose options were checked, or merges its parts, or forecasts the bake. */
 static int bake_scene(const cli_bake_settings *settings, const vsh_scene *scene) {
-    const vsh_run run = cli_common_run(&settings->common);
-    const bool part = settings->shard > 0;
-    telling t = {.common = &settings->common, .part = part};
-    vsh_bake_job_options options = vsh_bake_job_options_default();
-    options.per_object = settings->per_object;
+    baking b = {.settings = settings, .scene = scene};
+    vsh_run run = cli_common_run(&settings->common);
+    run.progress = report_progress;
+    run.user = &b;
+    const char *const files[] = {settings->input, cli_bake_lights(settings)};
+    char *parts = name_parts(settings, scene);
+    if (parts == NULL) {
+        return cli_out_of_memory(settings->input);
+    }
+    vsh_bake_options options = vsh_bake_options_default();
     options.invalid_picture = settings->invalid_picture;
     options.lit_preview = settings->preview;
     options.lit_exr = settings->exr;
     options.command = cli_parsed_command();
-    const char *const files[] = {settings->input, cli_bake_lights(settings)};
     options.files = files;
     options.file_count = settings->lights != NULL ? 2 : 1;
-    char *parts = name_parts(settings, scene);
     options.shard = settings->dry_run ? 0 : settings->shard; /* a forecast is of the whole bake */
     options.shard_count = settings->shard_count;
-    options.forecast = settings->dry_run;
     options.parts = settings->merged != NULL ? settings->merged : parts;
     options.words = settings->words;
     options.word_count = settings->word_count;
+    options.loaded = check_loaded;
     options.done = say_lightmap;
-    options.user = &t;
-    vsh_bake_job *job = NULL;
-    vsh_error error;
-    int code;
-    if (parts == NULL) {
-        return cli_out_of_memory(settings->input);
-    }
-    if (vsh_bake_job_create(scene, &options, &run, &job, &error) != VSH_OK) {
-        code = cli_fail_of(NULL, &error);
-        goto done;
-    }
-    CLI_TRY_DONE(check_outputs(settings, scene, job));
-    code = settings->dry_run ? cli_bake_forecast(scene, job, &run)
-                             : bake_job(settings, scene, job, &run, &t, parts);
-done:
-    vsh_bake_job_free(job);
+    options.user = &b;
+    const int code =
+        settings->dry_run ? print_forecast(&b, &options, &run) : run_bake(&b, parts, &options, &run);
     free(parts);
     return code;
 }

@@ -1,4 +1,4 @@
-/* Steps of `bake`: what is checked of options, expected of stages, and told by --dry-run. */
+/* Steps of `bake`. */
 #ifndef CLI_BAKE_H
 #define CLI_BAKE_H
 
@@ -14,14 +14,6 @@ int cli_bake_add_lights(const cli_bake_settings *s, cli_bake_scene *made);
 
 /* Refuses an output that is a file whose lights are taken. */
 int cli_bake_check_lights(const cli_bake_settings *s, const vsh_scene *scene, const char *output);
-
-/* Expects all that comes behind a job's vsh_bake_job_measure(). */
-void cli_bake_expect(const vsh_scene *scene, const vsh_bake_job *job, int32_t threads);
-
-/* Prints texels, voxels, memory and time of a job to standard output. CLI_OK or an exit code, having said
- * why.
- */
-int cli_bake_forecast(const vsh_scene *scene, vsh_bake_job *job, const vsh_run *run);
 
 /* Bakes, or puts parts together, by settings that were taken: frees nothing of them. CLI_OK or an exit code,
  * having said why. */

@@ -104,7 +104,10 @@ static int override_receiver(const cli_bake_settings *s, vsh_receiver *receiver)
         receiver->density = s->densities.list;
         receiver->density_count = s->densities.count;
     }
-    receiver->partial = s->per_object || receiver->partial;
+    if (s->per_object) {
+        receiver->partial = true;
+        receiver->atlas = VSH_ATLAS_OBJECTS;
+    }
     receiver->output = s->output != NULL ? s->output : receiver->output;
     return cli_patch_receiver(&s->patch, receiver);
 }

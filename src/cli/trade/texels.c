@@ -29,7 +29,7 @@ static int load_receivers(trade_work *work) {
         size_t mesh_count;
         const vsh_mesh *meshes = vsh_assets_receiver(work->assets, i, &mesh_count);
         vsh_error error;
-        if (vsh_receiver_charts(work->scene, i, meshes, mesh_count, 1, &work->run, &receiver->charts,
+        if (vsh_receiver_charts(work->scene, i, meshes, mesh_count, &work->run, &receiver->charts,
                                 &error) != VSH_OK) {
             return cli_fail_of(NULL, &error);
         }

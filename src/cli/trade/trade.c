@@ -332,6 +332,9 @@ static int trade_main(int argc, char **argv) {
     cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
     cli_bake_scene made;
     CLI_TRY_DONE(cli_bake_scene_make(&s.bake, &made));
+    for (size_t i = 0; i < made.scene.receiver_count; ++i) {
+        made.receivers[i].allow_overlap = 1; /* texels are measured, whatever they show */
+    }
     CLI_TRY_DONE(check_files(&s, &made.scene));
     CLI_TRY_DONE(choose_receiver(&s, &made.scene));
     CLI_TRY_DONE(trade_check_view(&s, &made.scene));

@@ -11,7 +11,7 @@ Every call lets other threads of Python run. What is passed in must not be chang
 from . import types
 from ._library import (ArgumentError, Cancelled, Error, InputError, InternalError, LimitError, OutOfMemoryError, ReadError, Run,
                        UnsupportedError, VdbshadeWarning, WriteError)
-from ._bake_scene import BakeJob, SceneLightmap, bake_scene
+from ._bake_scene import SceneBake, SceneLightmap, bake_scene, forecast_scene, merge_scene
 from ._compare import (Comparison, Limits, Measures, Tolerances, compare, compare_accuracy, compare_coverage, compare_files, compare_judge,
                       measure_at_least)
 from ._field import Field, Heights, Spheres, Triangles, spheres_read, trace_ao, trace_shadow

@@ -235,12 +235,12 @@ class Scene:
         """ArgumentError and the like where a receiver's image could not be written as it asks."""
         call(lib.vsh_receiver_check, self.struct, index)
 
-    def receiver_charts(self, index: int, meshes: Meshes, *, allow_overlap: bool = False, run: Optional[Run] = None) -> Charts:
+    def receiver_charts(self, index: int, meshes: Meshes, *, run: Optional[Run] = None) -> Charts:
         """The charts of a receiver's meshes, as its bake sorts them."""
         structs, count, keeps = meshes_of(meshes)
         charts = Charts.__new__(Charts)
         charts._begin(make(_freeing(lib.vsh_charts_free, (structs, keeps)), lib.vsh_receiver_charts, self.struct, index, structs, count,
-                           allow_overlap, RUN, place("vsh_charts"), run=run), count)
+                           RUN, place("vsh_charts"), run=run), count)
         charts.uv_reports = []
         return charts
 
@@ -264,9 +264,9 @@ class Scene:
         call(lib.vsh_view_write_scene, path_of(path, "path"), name.encode(), self.struct, RUN, run=run)
 
     def bake(self, *, run: Optional[Run] = None, **options: Any) -> Any:
-        """Bakes its lightmaps into arrays: a list of SceneLightmap; options of BakeJob. bake_scene() writes files."""
-        from ._bake_scene import BakeJob
-        return BakeJob(self, run=run, arrays=True, **options).bake(run=run)
+        """Bakes its lightmaps into arrays: a list of SceneLightmap; options of bake_scene()."""
+        from ._bake_scene import bake_scene
+        return bake_scene(self, arrays=True, run=run, **options).lightmaps
 
 
 class Assets(Handle):
