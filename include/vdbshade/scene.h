@@ -143,7 +143,7 @@ typedef struct vsh_receiver {
                       by 2 texels at least */
     int32_t
         atlas; /* mesh: VSH_ATLAS_…; OBJECTS: each object has a lightmap of its own, whose UVs, where it is
-                  unwrapped, are packed alone. An image's name then has the object's (vsh_bake_job_create())
+                  unwrapped, are packed alone. An image's name then has the object's (vsh_scene_lightmap)
                 */
     int32_t max_size;                /* where it is unwrapped, with texels_per_unit: a page has the fewest
                                         texels that it needs (vsh_unwrap_options.fit_pages), at most so many on

@@ -32,8 +32,8 @@ void vshi_scene_store_close(vshi_store *store);
 /* Bytes that the lightmaps held together take, at most. */
 double vshi_bake_bytes(const vshi_scene_bake *bake);
 
-/* Bakes lightmaps, or reads them from parts, finishes and writes them. Lightmaps whose seams are fixed are
- * held together. Errors: as vsh_bake_scene(). */
+/* Bakes lightmaps, or reads them from parts, finishes and writes them. Lightmaps whose seams are fixed
+ * stay in memory together. Errors: as vsh_bake_scene(). */
 vsh_result vshi_bake_pages(vshi_scene_bake *bake, vsh_error *error);
 
 /* Adds the file's name to an error of a function that knows arrays only. Returns `result`. */
