@@ -21,7 +21,8 @@ typedef struct vsh_solidity_report {
     size_t holes;       /* of those */
     size_t open_edges;  /* around these holes */
     size_t turned_triangles; /* that face the other way than those around, and are taken as turned over */
-    size_t standing;         /* of the solids: open ones that others close, which they stand on or run into */
+    size_t open_solids;      /* solids that lack a side: a house without a floor, a cup. Level sets have their
+                                faces      as sheets; for rays, points that see only their inner sides are hidden */
 } vsh_solidity_report;
 
 /* Looks at meshes that cast together, and fills reports[mesh_count]; parts of one object (vsh_mesh.object)

@@ -107,8 +107,7 @@ static vshi_vec place_of(const vsh_mesh *mesh, uint32_t vertex) {
     return vshi_transform_point(mesh->transform, vshi_vec_off(mesh->positions + 3 * (size_t)vertex));
 }
 
-static size_t close_holes(closing *k, const vshi_rim *rims, size_t count, vshi_vec (*caps)[3],
-                          uint32_t *hole_of) {
+static size_t close_holes(closing *k, const vshi_rim *rims, size_t count, vshi_vec (*caps)[3]) {
     size_t holes = 0;
     for (size_t i = 0; i < count; ++i) {
         k->parent[rims[i].a] = rims[i].a;
@@ -132,8 +131,7 @@ static size_t close_holes(closing *k, const vshi_rim *rims, size_t count, vshi_v
         h->length += length;
     }
     for (size_t i = 0; i < count; ++i) {
-        hole_of[i] = k->number[root_of(k->parent, rims[i].a)];
-        const hole *h = &k->holes[hole_of[i]];
+        const hole *h = &k->holes[k->number[root_of(k->parent, rims[i].a)]];
         caps[i][0] = place_of(k->mesh, rims[i].b);
         caps[i][1] = place_of(k->mesh, rims[i].a);
         caps[i][2] = h->length > 0.0 ? vshi_scale(h->sum, 1.0 / h->length) : caps[i][0];
@@ -197,7 +195,7 @@ static vsh_result find_of_whole(vshi_solidity *s, size_t whole, size_t caps, vsh
             ++c->open_edges;
         }
         if (c->open_edges > 0) { // where no edge is open there is no memory of them
-            c->holes = close_holes(&k, found->rims + rim, c->open_edges, s->caps + caps, s->hole_of + caps);
+            c->holes = close_holes(&k, found->rims + rim, c->open_edges, s->caps + caps);
             rim += c->open_edges;
             caps += c->open_edges;
         }

@@ -44,8 +44,8 @@ VSHI_SHARED void vshi_mesh_set_free(vshi_mesh_set *set);
  * is a small part of a second for a million triangles. Errors: as vshi_solidity_create(). */
 VSHI_SHARED vsh_result vshi_mesh_set_solve(vshi_mesh_set *set, const vsh_run *run, vsh_error *error);
 
-/* Sends notes on the sheets, the solids with holes and the flipped faces of a solved set. Sheets become shells
- * of `shell` voxels of size `voxel`. Where there are no voxels, `shell` is 0. */
+/* Sends notes on the sheets, the solids with holes and the flipped faces of a solved set. Sheets become
+ * shells of `shell` voxels of size `voxel`. Where there are no voxels, `shell` is 0. */
 VSHI_SHARED void vshi_mesh_set_note(const vshi_mesh_set *set, double shell, double voxel, const vsh_run *run);
 
 #ifdef __cplusplus

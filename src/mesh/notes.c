@@ -8,7 +8,6 @@
 typedef struct tally {
     size_t sheets, sheet_edges;
     size_t closed, closed_edges, holes; /* solids closed over their holes */
-    size_t standing, standing_edges;    /* closed by what they stand on */
     size_t turned;
     bool around_all;
 } tally;
@@ -22,9 +21,6 @@ static tally tally_of(const vshi_component *components, size_t count) {
         if (c->kind == VSHI_KIND_SHEET) {
             ++t.sheets;
             t.sheet_edges += c->open_edges;
-        } else if (c->stands) {
-            ++t.standing;
-            t.standing_edges += c->open_edges;
         } else if (c->kind != VSHI_KIND_WALL && c->open_edges > 0) {
             ++t.closed;
             t.closed_edges += c->open_edges;
@@ -74,13 +70,6 @@ void vshi_mesh_set_note(const vshi_mesh_set *set, double shell, double voxel, co
                       "enclose nearly all behind them: taken for solid, closed over the holes",
                       name.text, first + 1, set->count, t.closed_edges, plural(t.closed_edges), t.holes,
                       plural(t.holes), t.closed, count, plural(count));
-        }
-        if (t.standing > 0) {
-            vshi_note(run,
-                      "%s (%zu of %zu): %zu open edge%s of %zu of %zu component%s that stand on others or "
-                      "run into them: taken for solid, closed by those",
-                      name.text, first + 1, set->count, t.standing_edges, plural(t.standing_edges),
-                      t.standing, count, plural(count));
         }
         if (t.turned > 0) {
             vshi_note(run,

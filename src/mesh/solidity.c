@@ -33,7 +33,8 @@ static vsh_result allocate(vshi_solidity *s, const vsh_mesh *meshes, vsh_error *
                   {(void **)&s->first, s->wholes.count + 1, sizeof *s->first},
                   {(void **)&s->turned, triangles, 1},
                   {(void **)&s->sides, triangles, 1},
-                  {(void **)&s->holed, triangles, 1}};
+                  {(void **)&s->holed, triangles, 1},
+                  {(void **)&s->vessel, triangles, 1}};
     for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; ++i) {
         VSHI_TRY(vshi_allocate(wanted[i].memory, wanted[i].count, wanted[i].size, "what is solid", error));
     }
@@ -45,7 +46,9 @@ static void set_sides(vshi_solidity *s) {
         vshi_component *c = &s->components[i];
         const uint8_t *turned = vshi_solidity_turned(s, c);
         const size_t first = s->first_side[s->wholes.first[c->whole]];
-        c->stands = c->stands && c->kind == VSHI_KIND_SOLID;
+        for (size_t at = 0; at < c->triangles && c->vessel; ++at) {
+            s->vessel[first + c->list[at]] = turned[c->list[at]] ? VSHI_SIDE_BEFORE : VSHI_SIDE_BEHIND;
+        }
         for (size_t at = 0; at < c->triangles && c->kind != VSHI_KIND_SHEET; ++at) {
             const uint32_t triangle = c->list[at];
             s->sides[first + triangle] = turned[triangle] ? VSHI_SIDE_BEFORE : VSHI_SIDE_BEHIND;
@@ -134,9 +137,7 @@ static vsh_result find(vshi_solidity *s, const vsh_mesh *meshes, vshi_job *job, 
     VSHI_TRY(find_components(s, meshes, job, error));
     VSHI_TRY(vshi_allocate((void **)&s->components, s->count, sizeof *s->components, "components", error));
     VSHI_TRY(vshi_allocate((void **)&s->caps, s->cap_count, sizeof *s->caps, "holes", error));
-    VSHI_TRY(vshi_allocate((void **)&s->hole_of, s->cap_count, sizeof *s->hole_of, "holes", error));
     VSHI_TRY(vshi_kinds_find(s, job, error));
-    VSHI_TRY(vshi_standing_find(s, job, error));
     VSHI_TRY(vshi_rooms_find(s, error));
     set_sides(s);
     return VSH_OK;
@@ -179,7 +180,6 @@ void vshi_solidity_free(vshi_solidity *s) {
         return;
     }
     free(s->cuts);
-    free(s->hole_of);
     free(s->caps);
     free(s->components);
     for (size_t m = 0; s->found != NULL && s->lent != NULL && m < s->wholes.count; ++m) {
@@ -187,6 +187,7 @@ void vshi_solidity_free(vshi_solidity *s) {
             vshi_components_free(&s->found[m]);
         }
     }
+    free(s->vessel);
     free(s->holed);
     free(s->sides);
     free(s->turned);
@@ -229,6 +230,10 @@ const uint8_t *vshi_solidity_sides(const vshi_solidity *s, size_t mesh) {
 
 const uint8_t *vshi_solidity_holed(const vshi_solidity *s, size_t mesh) {
     return s->holed + s->first_side[mesh];
+}
+
+const uint8_t *vshi_solidity_vessels(const vshi_solidity *s, size_t mesh) {
+    return s->vessel + s->first_side[mesh];
 }
 
 const vshi_component *vshi_solidity_components(const vshi_solidity *s, size_t *count) {

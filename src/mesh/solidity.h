@@ -29,8 +29,7 @@ enum {
 
 typedef enum vshi_kind {
     VSHI_KIND_SHEET, /* air on both sides: a card, a leaf, a curtain, an open cup */
-    VSHI_KIND_SOLID, /* what it encloses is solid; where it is open, it is closed over its holes, or by what
-                        it stands on */
+    VSHI_KIND_SOLID, /* what it encloses is solid; where it is open, it is closed over its holes */
     VSHI_KIND_ROOM,  /* looks inwards and lies within solids: what it encloses is cut out of them */
     VSHI_KIND_WALL   /* a thin wall behind its faces, air on both sides of that: a room or a sky dome that
                         stands for itself, or the outer skin of a house with open rooms in it */
@@ -39,8 +38,8 @@ typedef enum vshi_kind {
 typedef struct vshi_component {
     vshi_kind kind;
     bool inward;          /* its faces look at what it encloses */
-    bool vessel;          /* a sheet that would be solid if its holes were closed */
-    bool stands;          /* a solid, because other components close its holes, or some of them */
+    bool vessel;          /* a sheet that would be solid if its holes were closed: a cup, a house without a
+                             floor. Points that see only its inner sides are hidden (shade/inside.h) */
     bool around_all;      /* a sheet, because as a solid it would bury everything else */
     uint32_t whole;       /* of vshi_solidity_wholes() */
     size_t triangles;     /* with some area, and those given twice */
@@ -72,6 +71,10 @@ const uint8_t *vshi_solidity_sides(const vshi_solidity *solidity, size_t mesh);
 /* 1 for triangles of a mesh [triangle_count] whose solid, room or wall has holes: what it encloses is not
  * shut off from the rest, and rays may go in by one hole and out by another. */
 const uint8_t *vshi_solidity_holed(const vshi_solidity *solidity, size_t mesh);
+
+/* VSHI_SIDE_BEHIND or VSHI_SIDE_BEFORE for triangles of a mesh [triangle_count] whose sheet is a vessel; else
+ * VSHI_SIDE_SHEET. */
+const uint8_t *vshi_solidity_vessels(const vshi_solidity *solidity, size_t mesh);
 
 /* The number of meshes that were looked at. */
 size_t vshi_solidity_mesh_count(const vshi_solidity *solidity);

@@ -15,12 +15,12 @@ struct vshi_solidity {
     uint8_t *turned;    /* of all meshes: found[].turned, and what was decided since */
     uint8_t *sides;     /* of all meshes */
     uint8_t *holed;     /* likewise */
+    uint8_t *vessel;    /* likewise */
     size_t *first_side; /* [mesh_count + 1] */
     vshi_component *components;
     size_t count;
     size_t *first; /* [wholes.count + 1]: the wholes' first components */
     vshi_vec (*caps)[3];
-    uint32_t *hole_of; /* [cap_count]: the hole of its component, from 0, that a cap closes */
     size_t cap_count;
     vshi_cut *cuts;
     size_t cut_count, cut_room;
@@ -37,19 +37,14 @@ vsh_result vshi_kinds_find(vshi_solidity *solidity, vshi_job *job, vsh_error *er
 /* Turns what encloses something to face the other way. */
 void vshi_component_turn(vshi_solidity *solidity, vshi_component *component);
 
-/* What an open surface must enclose (vshi_part_encloses()) to be taken for closed. Of shapes made for it: a
- * ball with small holes 0.98 and more, a head open at its neck 0.95, a tree's trunk 0.96; a cup 0.91, a box
- * without its lid 0.90, half a sphere 0.82, a short tube 0.79, a tent 0.64, a curtain 0.60. A bust without
- * its base (0.86 to 0.93) is a vessel turned over: nothing but what it stands on tells them apart
- * (mesh/standing.c). What is filled by mistake buries what stands in it, while what is taken for a sheet
- * only costs time, so such are sheets. */
+/* An open surface that encloses this share (vshi_part_encloses()) counts as closed. Measured: a ball with
+ * small holes 0.98 and more, a head open at its neck 0.95, a tree's trunk 0.96; a cup 0.91, a box without its
+ * lid 0.90, half a sphere 0.82, a short tube 0.79, a tent 0.64, a curtain 0.60. A cup that is filled by
+ * mistake buries its content, so the limit is above it. */
 #define VSHI_SOLID_ENCLOSES 0.945
 
 /* A component as a part of its whole. */
 vshi_surface_part vshi_component_part(const vshi_solidity *solidity, const vshi_component *component);
-
-/* Makes solids of open components whose holes others close: what stands on something, or runs into it. */
-vsh_result vshi_standing_find(vshi_solidity *solidity, vshi_job *job, vsh_error *error);
 
 /* Tells rooms from walls by what lies around them, and finds what they are cut out of. */
 vsh_result vshi_rooms_find(vshi_solidity *solidity, vsh_error *error);

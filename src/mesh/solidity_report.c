@@ -11,10 +11,9 @@ static void add(const vshi_component *c, vsh_solidity_report *report) {
                               [VSHI_KIND_SOLID] = &report->solids,
                               [VSHI_KIND_ROOM] = &report->rooms,
                               [VSHI_KIND_WALL] = &report->walls};
-    ++*counts[c->kind];
+    ++*(c->vessel ? &report->open_solids : counts[c->kind]);
     report->turned_triangles += c->turned;
-    report->standing += c->stands;
-    if (c->open_edges > 0 && !c->stands && (c->kind == VSHI_KIND_SOLID || c->kind == VSHI_KIND_ROOM)) {
+    if (c->open_edges > 0 && (c->kind == VSHI_KIND_SOLID || c->kind == VSHI_KIND_ROOM)) {
         ++report->closed_over;
         report->holes += c->holes;
         report->open_edges += c->open_edges;

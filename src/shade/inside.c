@@ -142,6 +142,42 @@ static uint8_t confirm(const looking *l, size_t point) {
     return VSHI_INSIDE;
 }
 
+/* Aims a direction lower, at `up` over the surface (sine). */
+static void aim_flat(const looking *l, size_t point, size_t direction, double up, vshi_segment_ray *ray) {
+    const double *by = DIRECTIONS[direction];
+    const double part = sqrt((1.0 - up * up) / (by[0] * by[0] + by[1] * by[1]));
+    vshi_vec u, v;
+    aim(l, point, direction, ray);
+    const vshi_vec normal = vshi_unit(vshi_vec_off(l->normals + 3 * point));
+    vshi_frame(normal, &u, &v);
+    const vshi_vec d =
+        vshi_add(vshi_add(vshi_scale(u, part * by[0]), vshi_scale(v, part * by[1])), vshi_scale(normal, up));
+    ray->direction[0] = d.x;
+    ray->direction[1] = d.y;
+    ray->direction[2] = d.z;
+}
+
+/* Whether a point sees only inner sides of solids and vessels, as below a house without a floor. Flat rays
+ * find the gap below a cloth that hangs over a table. */
+static bool is_hidden(const looking *l, size_t point) {
+    enum { ALL = FIRST + MORE, LEVELS = 3 };
+    static const double FLAT[LEVELS - 1] = {0.06, 0.2};
+    for (size_t k = 0; k < LEVELS * ALL; ++k) { /* mostly one of the first escapes */
+        vshi_segment_ray ray;
+        uint8_t meets;
+        if (k / ALL < LEVELS - 1) {
+            aim_flat(l, point, k % ALL, FLAT[k / ALL], &ray);
+        } else {
+            aim(l, point, k % ALL, &ray);
+        }
+        vshi_triangles_meet(l->triangles, &ray, 1, &meets);
+        if (meets < VSHI_MEETS_SOLID) {
+            return false;
+        }
+    }
+    return true;
+}
+
 /* Looks at `count` points, which are listed. */
 static void look(const looking *l, const size_t *points, size_t count, uint8_t *where) {
     vshi_segment_ray rays[FIRST * AT_ONCE];
@@ -163,7 +199,9 @@ static void look(const looking *l, const size_t *points, size_t count, uint8_t *
         const size_t point = points[i];
         const bool escapes = met[VSHI_MEETS_NOTHING] > 0;
         const int inside = met[VSHI_MEETS_SOLID] + met[VSHI_MEETS_HOLED];
-        if (inside == FIRST) {
+        if (met[VSHI_MEETS_VESSEL] > 0 && inside + met[VSHI_MEETS_VESSEL] == FIRST && is_hidden(l, point)) {
+            where[point] = VSHI_INSIDE;
+        } else if (inside == FIRST) {
             where[point] = met[VSHI_MEETS_HOLED] > 0 ? confirm(l, point) : VSHI_INSIDE;
         } else if (inside == 0 && ((escapes && !l->holes) || (l->open != NULL && l->open(l->user, point)))) {
             where[point] = VSHI_OUTSIDE;

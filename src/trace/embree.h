@@ -109,9 +109,10 @@ void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *b
 /* What a ray meets first that is no sheet: those have air on both sides. */
 enum {
     VSHI_MEETS_NOTHING,
-    VSHI_MEETS_AIR,   /* the side of a solid, or of a wall, that is to be seen */
-    VSHI_MEETS_SOLID, /* the other one: the ray begins in a solid, or behind a wall */
-    VSHI_MEETS_HOLED, /* the other one of a solid with holes: so it seems */
+    VSHI_MEETS_AIR,    /* the side of a solid, or of a wall, that is to be seen */
+    VSHI_MEETS_SOLID,  /* the other one: the ray begins in a solid, or behind a wall */
+    VSHI_MEETS_HOLED,  /* the other one of a solid with holes: so it seems */
+    VSHI_MEETS_VESSEL, /* the inner side of an open solid (mesh/solidity.h) */
     VSHI_MEETS_COUNT
 };
 void vshi_triangles_meet(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,

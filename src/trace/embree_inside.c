@@ -92,10 +92,13 @@ static void filter(const struct RTCFilterFunctionNArguments *args) {
         }
         const uint8_t solid =
             vshi_triangles_solid(look->triangles, hit[HIT_MESH * n + i], hit[HIT_TRIANGLE * n + i]);
-        if (solid == VSHI_AIR_AROUND || look->crossings != NULL) {
+        const bool vessel = (solid & VSHI_SOLID_VESSEL) != 0;
+        if (solid == VSHI_AIR_AROUND || look->crossings != NULL ||
+            (vessel && crosses(solid, vector_of((const float *)args->hit, HIT_NORMAL, n, i),
+                               vector_of(ray, RAY_DIRECTION, n, i)) < 0)) {
             args->valid[i] = 0;
         }
-        if (solid != VSHI_AIR_AROUND && look->crossings != NULL && look->count < MOST_CROSSINGS) {
+        if (solid != VSHI_AIR_AROUND && !vessel && look->crossings != NULL && look->count < MOST_CROSSINGS) {
             const vshi_vec normal = vector_of((const float *)args->hit, HIT_NORMAL, n, i);
             look->crossings[look->count++] =
                 (crossing){ray[RAY_FAR * n + i], crosses(solid, normal, vector_of(ray, RAY_DIRECTION, n, i))};
@@ -118,7 +121,10 @@ static uint8_t met(const vsh_triangles *triangles, const struct RTCRayHit *ray) 
     const vshi_vec normal = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
     const vshi_vec direction = {(double)ray->ray.dir_x, (double)ray->ray.dir_y, (double)ray->ray.dir_z};
     const bool out = crosses(solid, normal, direction) > 0;
-    return !out ? VSHI_MEETS_AIR : (solid & VSHI_SOLID_HOLED) != 0 ? VSHI_MEETS_HOLED : VSHI_MEETS_SOLID;
+    return !out                               ? VSHI_MEETS_AIR
+           : (solid & VSHI_SOLID_VESSEL) != 0 ? VSHI_MEETS_VESSEL
+           : (solid & VSHI_SOLID_HOLED) != 0  ? VSHI_MEETS_HOLED
+                                              : VSHI_MEETS_SOLID;
 }
 
 /* Aims a lone ray; false where it has no direction. */

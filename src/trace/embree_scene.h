@@ -55,6 +55,8 @@ vsh_result vshi_embree_load(const vshi_embree **embree, vsh_error *error);
 enum { VSHI_AIR_AROUND, VSHI_SOLID_BEHIND, VSHI_SOLID_BEFORE, VSHI_SOLID_SIDE = 3 };
 /* Added to it where the solid is closed over holes: rays from inside may leave by them. */
 enum { VSHI_SOLID_HOLED = 4 };
+/* Added to it for the faces of an open solid (vshi_component.vessel). */
+enum { VSHI_SOLID_VESSEL = 8 };
 
 struct vshi_sieve; /* embree_mask.h */
 

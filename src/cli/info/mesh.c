@@ -32,16 +32,13 @@ static void print_solidity(const vsh_solidity_report *report) {
     print_kind(report->rooms, "room in a solid", "rooms in solids", &first);
     print_kind(report->walls, "wall with air in front of its faces", "walls with air in front of their faces",
                &first);
+    print_kind(report->open_solids, "open solid, hidden where only its inner sides are seen",
+               "open solids, hidden where only their inner sides are seen", &first);
     print_kind(report->sheets, "sheet with air on both sides", "sheets with air on both sides", &first);
     puts(first ? "nothing" : "");
     if (report->closed_over > 0) {
         printf("  closed over: %zu hole%s with %zu open edges, of %zu of these\n", report->holes,
                report->holes == 1 ? "" : "s", report->open_edges, report->closed_over);
-    }
-    if (report->standing > 0) {
-        printf("  closed by what %s: %zu of these\n",
-               report->standing == 1 ? "it stands on or runs into" : "they stand on or run into",
-               report->standing);
     }
     print_count(report->turned_triangles, "triangles that face the other way than those around");
 }

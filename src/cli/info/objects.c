@@ -38,7 +38,7 @@ void cli_info_summary(const vsh_model *model) {
     putchar('\n');
 }
 
-/* "solid", "3 walls", "solid, closed by what it stands on", "mixed". */
+/* "solid", "3 walls", "mixed". */
 static void taken_for(const vsh_solidity_report *report, char *text, size_t capacity) {
     const struct {
         size_t count;
@@ -46,6 +46,7 @@ static void taken_for(const vsh_solidity_report *report, char *text, size_t capa
     } kinds[] = {{report->solids, "solid", "solids"},
                  {report->rooms, "room", "rooms"},
                  {report->walls, "wall", "walls"},
+                 {report->open_solids, "open solid", "open solids"},
                  {report->sheets, "sheet", "sheets"}};
     size_t found = 0;
     snprintf(text, capacity, "nothing");
@@ -59,10 +60,6 @@ static void taken_for(const vsh_solidity_report *report, char *text, size_t capa
     }
     if (found > 1) {
         snprintf(text, capacity, "mixed");
-    } else if (report->standing > 0 && report->solids == 1) {
-        snprintf(text, capacity, "solid, closed by what it stands on");
-    } else if (report->standing > 0 && report->standing == report->solids) {
-        snprintf(text, capacity, "%zu solids, closed by what they stand on", report->solids);
     }
 }
 

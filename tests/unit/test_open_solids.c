@@ -1,0 +1,159 @@
+/* Points that see only the inner sides of solids that lack a side are hidden. */
+#include "kinds.h"
+
+#include "shade/inside.h"
+#include "trace/embree.h"
+
+static const double ORIGIN[3] = {0, 0, 0};
+static const double CUP[][2] = {{0, 0}, {1, 0}, {1, 2}};
+
+/* Whether points that look along a normal are hidden among the triangles of a shape, which is emptied. */
+static void assert_hidden(shape *s, const char *what, const double at[][3], const double normal[3],
+                          size_t count, bool hidden) {
+    const vsh_mesh mesh = shape_mesh(s, what);
+    vsh_triangles *triangles = NULL;
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_triangles_create(&mesh, 1, NULL, &triangles, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    for (size_t i = 0; i < count; ++i) {
+        const float n[3] = {(float)normal[0], (float)normal[1], (float)normal[2]};
+        uint8_t where;
+        vshi_inside(triangles, 1, at[i], n, NULL, NULL, NULL, &where);
+        if ((where == VSHI_INSIDE) != hidden) {
+            fail_msg("%s: point (%g, %g, %g) is %s", what, at[i][0], at[i][1], at[i][2],
+                     hidden ? "not hidden" : "hidden");
+        }
+    }
+    vsh_triangles_free(triangles);
+    s->vertices = s->triangles = 0;
+}
+
+static void add_ground(shape *s, double thickness) {
+    const double low[3] = {-4, -4, -thickness}, high[3] = {4, 4, 0};
+    shape_box(s, low, high, thickness > 0.0 ? ALL_SIDES : TOP);
+}
+
+static void add_box(shape *s, double low, double high, unsigned sides) {
+    const double from[3] = {-1, -1, low}, to[3] = {1, 1, high};
+    shape_box(s, from, to, sides);
+}
+
+static const double UP[3] = {0, 0, 1};
+static const double BELOW[][3] = {
+    {0, 0, 0}, {0.6, 0.3, 0}, {-0.97, 0.1, 0}, {0.9, -0.95, 0}, {0.999, 0.4, 0}};
+static const double BESIDE[][3] = {{1.001, 0, 0}, {-1.02, 0.4, 0}, {1.5, -1.2, 0}, {0, 3, 0}};
+enum { POINTS_BELOW = 5, POINTS_BESIDE = 4 };
+
+static void floors_below_houses_without_floors_are_hidden(void **state) {
+    (void)state;
+    static const double THICKNESS[] = {0.0, 0.004, 0.01, 0.05, 0.1, 1.0}, SUNK[] = {0.0, 0.01, 0.3};
+    shape *s = shape_new();
+    for (size_t i = 0; i < sizeof THICKNESS / sizeof *THICKNESS; ++i) {
+        for (size_t k = 0; k < sizeof SUNK / sizeof *SUNK; ++k) {
+            char what[80];
+            snprintf(what, sizeof what, "ground of thickness %g, house sunk by %g", THICKNESS[i], SUNK[k]);
+            add_ground(s, THICKNESS[i]);
+            add_box(s, -SUNK[k], 2.0, ALL_SIDES & ~BOTTOM);
+            assert_hidden(s, what, BELOW, UP, POINTS_BELOW, true);
+            add_ground(s, THICKNESS[i]);
+            add_box(s, -SUNK[k], 2.0, ALL_SIDES & ~BOTTOM);
+            assert_hidden(s, what, BESIDE, UP, POINTS_BESIDE, false);
+        }
+    }
+    free(s);
+}
+
+static void walls_below_a_roof_hide_the_floor_and_a_pen_does_not(void **state) {
+    (void)state;
+    const double low[3] = {-1.5, -1.5, 1.8}, high[3] = {1.5, 1.5, 2.0};
+    shape *s = shape_new();
+    add_ground(s, 0.0);
+    add_box(s, -0.3, 2.0, ALL_SIDES & ~BOTTOM & ~TOP);
+    shape_box(s, low, high, ALL_SIDES & ~BOTTOM);
+    assert_hidden(s, "walls below a roof", BELOW, UP, POINTS_BELOW, true);
+    add_ground(s, 0.0);
+    add_box(s, -0.3, 1.0, ALL_SIDES & ~BOTTOM & ~TOP);
+    assert_hidden(s, "a pen", BELOW, UP, POINTS_BELOW, false);
+    free(s);
+}
+
+static void contents_of_cups_are_seen(void **state) {
+    (void)state;
+    static const double fruit[3] = {0.1, 0, 0.7}, top[][3] = {{0.1, 0, 1.3}},
+                        coffee[][2] = {{0.99, 1.5}, {0, 1.5}};
+    static const double surface[][3] = {{0, 0, 1.5}, {0.7, 0.2, 1.5}},
+                        bottom[][3] = {{0, 0, 0.01}, {0.5, 0, 0.01}};
+    static const double over[][2] = {{1, 0}, {1, 2}, {0, 2}}, on_table[][3] = {{0, 0, 0}, {0.9, 0, 0}};
+    shape *s = shape_new();
+    shape_turned(s, ORIGIN, CUP, 3, 32);
+    shape_ball(s, fruit, 0.6, -1.0, 1.0, 16);
+    assert_hidden(s, "fruit in a cup", top, UP, 1, false);
+    shape_turned(s, ORIGIN, CUP, 3, 32);
+    shape_turned(s, ORIGIN, coffee, 2, 32);
+    assert_hidden(s, "coffee in a cup", surface, UP, 2, false);
+    shape_turned(s, ORIGIN, CUP, 3, 32);
+    assert_hidden(s, "the bottom of a cup", bottom, UP, 2, false);
+    add_ground(s, 0.1);
+    shape_turned(s, ORIGIN, over, 3, 32);
+    assert_hidden(s, "a table below a cup upside down", on_table, UP, 2, true);
+    free(s);
+}
+
+/* The house lacks a wall: the ground in it sees out by that side. */
+static void a_house_without_a_wall_shows_its_ground(void **state) {
+    (void)state;
+    shape *s = shape_new();
+    add_ground(s, 0.0);
+    add_box(s, -0.3, 2.0, ALL_SIDES & ~BOTTOM & ~FRONT);
+    assert_hidden(s, "a house without a front", BELOW, UP, POINTS_BELOW, false);
+    free(s);
+}
+
+static void sheets_by_name_hide_nothing(void **state) {
+    (void)state;
+    shape *s = shape_new();
+    add_ground(s, 0.0);
+    add_box(s, -0.3, 2.0, ALL_SIDES & ~BOTTOM);
+    vsh_mesh mesh = shape_mesh(s, "house");
+    mesh.solidity = VSH_SOLIDITY_SHELL;
+    vshi_solidity *found = solidity_of(&mesh, 1);
+    const uint8_t *vessels = vshi_solidity_vessels(found, 0);
+    for (size_t i = 0; i < mesh.triangle_count; ++i) {
+        assert_int_equal(vessels[i], VSHI_SIDE_SHEET);
+    }
+    vshi_solidity_free(found);
+    free(s);
+}
+
+static void mirrored_houses_hide_too(void **state) {
+    (void)state;
+    static const double mirror[12] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    shape *s = shape_new();
+    add_ground(s, 0.0);
+    add_box(s, -0.3, 2.0, ALL_SIDES & ~BOTTOM);
+    vsh_mesh mesh = shape_mesh(s, "house");
+    mesh.transform = mirror;
+    vsh_triangles *triangles = NULL;
+    vsh_error error = {VSH_OK, ""};
+    assert_int_equal(vsh_triangles_create(&mesh, 1, NULL, &triangles, &error), VSH_OK);
+    for (size_t i = 0; i < POINTS_BELOW; ++i) {
+        uint8_t where;
+        vshi_inside(triangles, 1, BELOW[i], (const float[]){0, 0, 1}, NULL, NULL, NULL, &where);
+        assert_int_equal(where, VSHI_INSIDE);
+    }
+    vsh_triangles_free(triangles);
+    free(s);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(floors_below_houses_without_floors_are_hidden),
+        cmocka_unit_test(walls_below_a_roof_hide_the_floor_and_a_pen_does_not),
+        cmocka_unit_test(contents_of_cups_are_seen),
+        cmocka_unit_test(a_house_without_a_wall_shows_its_ground),
+        cmocka_unit_test(sheets_by_name_hide_nothing),
+        cmocka_unit_test(mirrored_houses_hide_too),
+    };
+    return vsh_triangles_available() ? cmocka_run_group_tests(tests, NULL, NULL) : 0;
+}
