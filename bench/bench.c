@@ -74,7 +74,7 @@ void bench_methods(FILE *csv, const char *scene, const vsh_field *field, const v
             bench_shadow(BENCH_RUNS, bench_casts(field), points, light, &shade, values, NULL, &stats) /
             (double)points->count;
         const truth_metrics metrics = truth_compare(points->count, values, truth, valid);
-        bench_row(csv, scene, vsh_shadow_method_name(method), 1e6 * each,
+        bench_row(csv, scene, vsh_get_name(VSH_NAMES_SHADOW, method), 1e6 * each,
                   (double)stats.samples / (double)points->count, ray > 0.0 ? each / ray : 0.0, &metrics);
     }
 }

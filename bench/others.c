@@ -172,7 +172,7 @@ static void compare(FILE *csv, const char *part, const subject *s, int32_t metho
             their_wall = fmin(their_wall, wall);
         }
         const double each = 1e6 / s->traced;
-        bench_ratio(csv, part, s->scene.name, vsh_shadow_method_name(method), other, threads,
+        bench_ratio(csv, part, s->scene.name, vsh_get_name(VSH_NAMES_SHADOW, method), other, threads,
                     each * (threads == 1 ? bench_median(ours, RUNS) : our_wall),
                     each * (threads == 1 ? bench_median(theirs, RUNS) : their_wall), difference(s, method));
     }

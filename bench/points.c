@@ -144,7 +144,7 @@ static void row(const points_bench *b, const char *how, int32_t method, size_t c
                 const vsh_shade_stats *stats) {
     char what[64];
     const truth_metrics off = truth_compare(count, b->values, b->reference, NULL);
-    snprintf(what, sizeof what, "%s %s", how, vsh_shadow_method_name(method));
+    snprintf(what, sizeof what, "%s %s", how, vsh_get_name(VSH_NAMES_SHADOW, method));
     bench_row(b->csv, "points", what, 1e6 * seconds / (double)count, (double)stats->samples / (double)count,
               0.0, &off);
 }

@@ -127,10 +127,6 @@ VSH_API vsh_texel_samples vsh_texels_samples(const vsh_texels *texels);
  * Tangents are those of the triangle. */
 enum { VSH_BENT_WORLD = 0, VSH_BENT_TANGENT = 1 };
 
-/* "tangent" to VSH_BENT_TANGENT and back; -1 and NULL for what is none. Names are static; NULL is none. */
-VSH_API int32_t vsh_bent_space(const char *name);
-VSH_API const char *vsh_bent_space_name(int32_t space);
-
 /* Which way is up. */
 enum {
     VSH_UP_NONE = 0,
@@ -141,10 +137,6 @@ enum {
     VSH_UP_MINUS_Y = 5,
     VSH_UP_MINUS_Z = 6
 };
-
-/* "none", "x", "-y", … to VSH_UP_… and back; -1 and NULL for what is none. Names are static; NULL is none. */
-VSH_API int32_t vsh_up(const char *name);
-VSH_API const char *vsh_up_name(int32_t up);
 
 /* Planes that a scene asks for beside those of its lights and AO: 0 not, else how. */
 typedef struct vsh_planes {
@@ -248,10 +240,6 @@ enum {
     VSH_SEAMS_KEEP = 1,    /* values are what was baked */
     VSH_SEAMS_FIX = 2      /* vsh_lightmap_stitch() */
 };
-
-/* "fix" to VSH_SEAMS_FIX and back; -1 and NULL for what is none. Names are static; NULL is none. */
-VSH_API int32_t vsh_seams(const char *name);
-VSH_API const char *vsh_seams_name(int32_t seams);
 
 /* How seams are stitched. */
 typedef struct vsh_stitch_options {

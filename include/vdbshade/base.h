@@ -139,9 +139,33 @@ enum {
     VSH_ISA_AVX512 = 3 /* F, DQ and VL */
 };
 
-/* "avx2" to VSH_ISA_AVX2 and back; -1 and NULL for what is none. Names are static strings; NULL is none. */
-VSH_API int32_t vsh_isa(const char *name);
-VSH_API const char *vsh_isa_name(int32_t isa);
+/* What has names in files and on command lines: VSH_NAMES_SHADOW are those of VSH_SHADOW_…. */
+enum {
+    VSH_NAMES_ISA = 0,
+    VSH_NAMES_SHADOW = 1,          /* method.h */
+    VSH_NAMES_AO = 2,              /* method.h */
+    VSH_NAMES_SAMPLER = 3,         /* method.h */
+    VSH_NAMES_FALLOFF = 4,         /* light.h */
+    VSH_NAMES_COLOR = 5,           /* image.h */
+    VSH_NAMES_ALIGN = 6,           /* outline.h */
+    VSH_NAMES_ATLAS = 7,           /* unwrap.h */
+    VSH_NAMES_COMBINE = 8,         /* layer.h */
+    VSH_NAMES_TINT = 9,            /* shade.h */
+    VSH_NAMES_BENT = 10,           /* bake.h */
+    VSH_NAMES_UP = 11,             /* bake.h: "-x" is VSH_UP_MINUS_X */
+    VSH_NAMES_SEAMS = 12,          /* bake.h */
+    VSH_NAMES_INSIDE = 13,         /* volume.h */
+    VSH_NAMES_FLAT = 14,           /* flat.h: methods */
+    VSH_NAMES_FLAT_LIGHT = 15,     /* flat.h: VSH_LIGHT_… in a plane, "directional", "disc", "spot" */
+    VSH_NAMES_RECEIVER_UNWRAP = 16 /* scene.h */
+};
+
+/* Finds the constant that a name stands for: VSH_SHADOW_CONE for "cone" of VSH_NAMES_SHADOW. -1: the name is
+ * NULL or unknown, or no VSH_NAMES_… is `kind`. */
+VSH_API int32_t vsh_find_name(int32_t kind, const char *name);
+
+/* Gets the name of a constant, a static string; NULL: unknown value or kind. A kind's values are 0, 1, … */
+VSH_API const char *vsh_get_name(int32_t kind, int32_t value);
 
 /* Whether this machine has an instruction set: 1 or 0, which it is for what is none. */
 VSH_API int32_t vsh_isa_available(int32_t isa);

@@ -21,15 +21,6 @@ enum {
                              rounding, whatever the outline */
 };
 
-/* "exact" to VSH_FLAT_EXACT and back; -1 and NULL for what is none. Names are static strings; NULL is none.
- */
-VSH_API int32_t vsh_flat_method(const char *name);
-VSH_API const char *vsh_flat_method_name(int32_t method);
-
-/* What a light of a VSH_LIGHT_… type is in a plane: "directional", "disc", "spot"; NULL where there is none.
- * A static string. */
-VSH_API const char *vsh_flat_light_name(int32_t type);
-
 /* How a light map of a plane is made. */
 typedef struct vsh_flat_options {
     size_t struct_size;

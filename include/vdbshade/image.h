@@ -42,9 +42,6 @@ enum {
     VSH_COLOR_ENCODED = 3 /* the caller's values have gone through it: the file only says so */
 };
 
-/* "auto", "linear", "srgb", "encoded"; NULL for other numbers. */
-VSH_API const char *vsh_color_space_name(int32_t color_space);
-
 /* Takes the sRGB curve off a value of 0 … 1. */
 VSH_API double vsh_srgb_to_linear(double encoded);
 

@@ -62,11 +62,6 @@ static inline vsh_layer vsh_layer_default(void) {
     return layer;
 }
 
-/* "multiply" to VSH_COMBINE_MULTIPLY and back; -1 and NULL for what is none. Names are static; NULL is none.
- */
-VSH_API int32_t vsh_combine(const char *name);
-VSH_API const char *vsh_combine_name(int32_t combine);
-
 #ifdef __cplusplus
 }
 #endif

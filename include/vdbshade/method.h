@@ -56,15 +56,6 @@ enum {
                             (Ulichney, "Void and cluster", 1993) that frames shift by the golden ratio */
 };
 
-/* "cone" to VSH_SHADOW_CONE and back; -1 and NULL for what is no method. Names are static strings; NULL is
- * none. */
-VSH_API int32_t vsh_shadow_method(const char *name);
-VSH_API const char *vsh_shadow_method_name(int32_t method);
-VSH_API int32_t vsh_ao_method(const char *name);
-VSH_API const char *vsh_ao_method_name(int32_t method);
-VSH_API int32_t vsh_sampler(const char *name);
-VSH_API const char *vsh_sampler_name(int32_t sampler);
-
 /* VSH_METHOD_… of a method, 0 for what is none; of auto, what holds for both that it may come to. */
 VSH_API uint32_t vsh_shadow_method_traits(int32_t method);
 VSH_API uint32_t vsh_ao_method_traits(int32_t method);

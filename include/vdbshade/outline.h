@@ -46,11 +46,6 @@ VSH_API vsh_result vsh_outline_from_image(const char *path, const vsh_mask_optio
 
 enum { VSH_ALIGN_LEFT = 0, VSH_ALIGN_CENTER = 1, VSH_ALIGN_RIGHT = 2 };
 
-/* "center" to VSH_ALIGN_CENTER and back; -1 and NULL for what is none. Names are static strings; NULL is
- * none. */
-VSH_API int32_t vsh_align(const char *name);
-VSH_API const char *vsh_align_name(int32_t align);
-
 /* How letters become an outline. */
 typedef struct vsh_text_options {
     size_t struct_size;

@@ -103,11 +103,6 @@ typedef struct vsh_density_rule {
     double factor;       /* finite, > 0 */
 } vsh_density_rule;
 
-/* "default", "never", "auto", "always" to VSH_RECEIVER_UNWRAP_… and back; -1 and NULL for what is none. Names
- * are static; NULL is none. */
-VSH_API int32_t vsh_receiver_unwrap(const char *name);
-VSH_API const char *vsh_receiver_unwrap_name(int32_t unwrap);
-
 /* A mesh, heightfield or plane that a lightmap is baked for. Begin with vsh_receiver_default() (settings.h).
  */
 typedef struct vsh_receiver {
@@ -160,11 +155,6 @@ typedef struct vsh_light_file {
     size_t first; /* lights[first …] of the scene, `count` > 0 of them, are the file's */
     size_t count; /* of its lights */
 } vsh_light_file;
-
-/* "shared", "objects" to VSH_ATLAS_… and back; -1 and NULL for what is none. Names are static; NULL is none.
- */
-VSH_API int32_t vsh_atlas_kind(const char *name);
-VSH_API const char *vsh_atlas_kind_name(int32_t atlas);
 
 /* A whole scene, read from a file or filled by the caller. Paths are as the system takes them (the reader has
  * put the scene file's folder in front of relative ones). */

@@ -99,11 +99,6 @@ typedef struct vsh_tint {
  * Runs on the calling thread. */
 VSH_API void vsh_shade_tint(size_t count, const float *visibility, const vsh_tint *tint, float *rgb);
 
-/* "quadratic" to VSH_TINT_QUADRATIC and back; -1 and NULL for what is no type. Names are static strings; NULL
- * is none. */
-VSH_API int32_t vsh_tint_type(const char *name);
-VSH_API const char *vsh_tint_type_name(int32_t type);
-
 /* Errors: VSH_ERROR_ARGUMENT (a type or a power out of range). */
 VSH_API vsh_result vsh_tint_check(const vsh_tint *tint, vsh_error *error);
 

@@ -34,11 +34,6 @@ static inline vsh_volume_options vsh_volume_options_default(void) {
     return options;
 }
 
-/* "nearest" to VSH_INSIDE_NEAREST and back; -1 and NULL for what is none. Names are static strings; NULL is
- * none. */
-VSH_API int32_t vsh_inside(const char *name);
-VSH_API const char *vsh_inside_name(int32_t inside);
-
 /* Shades the voxels. Values are those of vsh_query_points() at vsh_voxels_centre(): in free space without
  * normals; in a band with the central differences of vsh_field_sample() half a voxel to either side of the
  * centre along each of the lattice's axes as normals (voxels where they vanish, between two walls, count as

@@ -1,18 +1,6 @@
 #include "bake/bent_normals.h"
 
-#include "base/names.h"
 #include "shade/ao.h"
-
-static const char *const spaces_table[] = {[VSH_BENT_WORLD] = "world", [VSH_BENT_TANGENT] = "tangent"};
-static const vshi_names spaces = VSHI_NAMES(spaces_table);
-
-int32_t vsh_bent_space(const char *name) {
-    return vshi_name_find(spaces, name);
-}
-
-const char *vsh_bent_space_name(int32_t space) {
-    return vshi_name_at(spaces, space);
-}
 
 /* Turns a direction to tangent space: the sample's own axes. */
 static void turn_to_tangent(const float *normal, const float *given, float *bent) {

@@ -1,25 +1,10 @@
 #include "bake/planes.h"
 
-#include "base/names.h"
 #include "base/vec.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
-
-static const char *const ups_table[] = {
-    [VSH_UP_NONE] = "none",  [VSH_UP_X] = "x",        [VSH_UP_Y] = "y",        [VSH_UP_Z] = "z",
-    [VSH_UP_MINUS_X] = "-x", [VSH_UP_MINUS_Y] = "-y", [VSH_UP_MINUS_Z] = "-z",
-};
-static const vshi_names ups = VSHI_NAMES(ups_table);
-
-int32_t vsh_up(const char *name) {
-    return vshi_name_find(ups, name);
-}
-
-const char *vsh_up_name(int32_t up) {
-    return vshi_name_at(ups, up);
-}
 
 void vshi_sky_up(int32_t axis, double up[3]) {
     for (int k = 0; k < 3; ++k) {

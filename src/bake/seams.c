@@ -6,7 +6,6 @@
 #include "base/elementary.h"
 #include "base/floats.h"
 #include "base/memory.h"
-#include "base/names.h"
 #include "base/parallel.h"
 #include "base/try.h"
 
@@ -16,18 +15,6 @@
 /* What changing a texel that holds no value of its own costs, of what others cost: it is to give way first,
  * but not to run away where it is hardly read. */
 static const double GUESS = 0.1;
-
-static const char *const seams_table[] = {
-    [VSH_SEAMS_DEFAULT] = "default", [VSH_SEAMS_KEEP] = "keep", [VSH_SEAMS_FIX] = "fix"};
-static const vshi_names seams_names = VSHI_NAMES(seams_table);
-
-int32_t vsh_seams(const char *name) {
-    return vshi_name_find(seams_names, name);
-}
-
-const char *vsh_seams_name(int32_t seams) {
-    return vshi_name_at(seams_names, seams);
-}
 
 enum { VECTORS = 5 + VSHI_SEAM_WORK }; /* low, high, keep, gradient, change */
 

@@ -2,22 +2,6 @@
 
 #include <string.h>
 
-static const char *const names[VSHI_ISA_COUNT] = {
-    [VSH_ISA_BEST] = "best", [VSH_ISA_BASE] = "base", [VSH_ISA_AVX2] = "avx2", [VSH_ISA_AVX512] = "avx512"};
-
-int32_t vsh_isa(const char *name) {
-    for (int32_t i = 0; name != NULL && i < VSHI_ISA_COUNT; ++i) {
-        if (strcmp(names[i], name) == 0) {
-            return i;
-        }
-    }
-    return -1;
-}
-
-const char *vsh_isa_name(int32_t isa) {
-    return isa >= 0 && isa < VSHI_ISA_COUNT ? names[isa] : NULL;
-}
-
 /* What of a set this machine lacks, or NULL. */
 static const char *lacking(int32_t isa) {
 #if defined(__x86_64__)
@@ -37,16 +21,16 @@ static const char *lacking(int32_t isa) {
 }
 
 int32_t vsh_isa_available(int32_t isa) {
-    return vsh_isa_name(isa) != NULL && lacking(isa) == NULL;
+    return vsh_get_name(VSH_NAMES_ISA, isa) != NULL && lacking(isa) == NULL;
 }
 
 vsh_result vshi_isa_check(int32_t isa, vsh_error *error) {
-    if (vsh_isa_name(isa) == NULL) {
+    if (vsh_get_name(VSH_NAMES_ISA, isa) == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "isa %d is out of range 0 … %d", isa, VSHI_ISA_COUNT - 1);
     }
     if (lacking(isa) != NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "isa %s: this machine has no %s", names[isa],
-                         lacking(isa));
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "isa %s: this machine has no %s",
+                         vsh_get_name(VSH_NAMES_ISA, isa), lacking(isa));
     }
     return VSH_OK;
 }

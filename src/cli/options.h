@@ -87,9 +87,8 @@ int cli_parse_size(const char *name, const char *text, int32_t *w, int32_t *h); 
 int cli_parse_shard(const char *name, const char *text, int32_t *shard, int32_t *count);   /* I/N */
 int cli_parse_bytes(const char *name, const char *text, uint64_t *value);                  /* 500M, 2GiB */
 
-/* A name out of the library's list, or an error that shows the list. */
-int cli_parse_name(const char *name, const char *text, int32_t (*value_of)(const char *),
-                   const char *(*name_of)(int32_t), int32_t *value);
+/* Parses a name of a VSH_NAMES_… kind; an error lists all names. */
+int cli_parse_name(const char *name, const char *text, int32_t kind, int32_t *value);
 
 /* Options that every long command has. */
 typedef struct cli_common {

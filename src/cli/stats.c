@@ -60,9 +60,9 @@ void cli_stats_methods(cli_stats *stats, const vsh_scene *scene, int32_t has_tri
     stats->max_error = shade->max_error;
     if (scene->light_count > 0) {
         stats->methods[CLI_STATS_SHADOW] =
-            method_of(vsh_shadow_method_name(method), vsh_shadow_method_traits(method));
+            method_of(vsh_get_name(VSH_NAMES_SHADOW, method), vsh_shadow_method_traits(method));
     }
-    const cli_method open = method_of(vsh_ao_method_name(ao_method), vsh_ao_method_traits(ao_method));
+    const cli_method open = method_of(vsh_get_name(VSH_NAMES_AO, ao_method), vsh_ao_method_traits(ao_method));
     if (scene->ao) {
         stats->methods[CLI_STATS_AO] = open;
     }
@@ -118,7 +118,7 @@ static void say_help(const cli_stats *stats, const vsh_scene *scene, int kind, c
         snprintf(text, size, "%d rays are too few; raise --rays, or leave it off", scene->shade.rays);
     } else if (by_rays) {
         snprintf(text, size, "the sampler '%s' has no more rays; set \"sampler\": \"sobol\" in the scene",
-                 vsh_sampler_name(scene->shade.sampler));
+                 vsh_get_name(VSH_NAMES_SAMPLER, scene->shade.sampler));
     } else if (stats->methods[kind].traces) {
         snprintf(text, size, "values between rays are interpolated; --max-error %.1g keeps it",
                  0.5 * stats->max_error);

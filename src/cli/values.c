@@ -164,16 +164,16 @@ int cli_parse_bytes(const char *name, const char *text, uint64_t *value) {
     return cli_usage("%s '%s': expected bytes, with k, M, G, KiB, MiB or GiB behind the number", name, text);
 }
 
-int cli_parse_name(const char *option, const char *text, int32_t (*value_of)(const char *),
-                   const char *(*name_of)(int32_t), int32_t *value) {
-    *value = value_of(text);
+int cli_parse_name(const char *option, const char *text, int32_t kind, int32_t *value) {
+    *value = vsh_find_name(kind, text);
     if (*value >= 0) {
         return CLI_OK;
     }
     char list[256] = "";
     size_t used = 0;
-    for (int32_t i = 0; name_of(i) != NULL && used < sizeof list; ++i) {
-        used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "", name_of(i));
+    const char *name;
+    for (int32_t i = 0; (name = vsh_get_name(kind, i)) != NULL && used < sizeof list; ++i) {
+        used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "", name);
     }
     return cli_usage("%s '%s': expected one of %s", option, text, list);
 }

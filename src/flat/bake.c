@@ -17,28 +17,6 @@
 
 enum { MAX_SIZE = 65536, MAX_SUPERSAMPLE = 16, MAX_SAMPLES = MAX_SUPERSAMPLE * MAX_SUPERSAMPLE };
 
-static const char *const method_names[] = {
-    [VSH_FLAT_HARD] = "hard", [VSH_FLAT_CLASSIC] = "classic", [VSH_FLAT_EXACT] = "exact"};
-enum { METHOD_COUNT = sizeof method_names / sizeof method_names[0] };
-
-int32_t vsh_flat_method(const char *name) {
-    for (int32_t i = 0; name != NULL && i < METHOD_COUNT; ++i) {
-        if (strcmp(name, method_names[i]) == 0) {
-            return i;
-        }
-    }
-    return -1;
-}
-
-const char *vsh_flat_method_name(int32_t method) {
-    return method >= 0 && method < METHOD_COUNT ? method_names[method] : NULL;
-}
-
-const char *vsh_flat_light_name(int32_t type) {
-    const vshi_light_type *known = vshi_light_type_of(type);
-    return known != NULL ? known->flat_name : NULL;
-}
-
 /* --- what is asked for */
 
 static vsh_result check_options(const vsh_flat_options *o, vsh_error *error) {
@@ -47,7 +25,7 @@ static vsh_result check_options(const vsh_flat_options *o, vsh_error *error) {
         int32_t value, least, most;
     } integers[] = {{"width", o->width, 1, MAX_SIZE},
                     {"height", o->height, 1, MAX_SIZE},
-                    {"method", o->method, 0, METHOD_COUNT - 1},
+                    {"method", o->method, 0, VSH_FLAT_EXACT},
                     {"supersample", o->supersample, 1, MAX_SUPERSAMPLE},
                     {"padding", o->padding, 0, VSHI_MAX_PADDING},
                     {"max_steps", o->max_steps, 16, 65536}};
@@ -76,7 +54,7 @@ static vsh_result check_lights(const vsh_light *lights, size_t count, vsh_error 
         if (vsh_light_check(&lights[i], &reason) != VSH_OK) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "light %zu: %.900s", i, reason.message);
         }
-        if (vsh_flat_light_name(lights[i].type) == NULL) {
+        if (vsh_get_name(VSH_NAMES_FLAT_LIGHT, lights[i].type) == NULL) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "light %zu: '%s': a plane knows no %s lights", i,
                              lights[i].name, vshi_light_type_of(lights[i].type)->name);
         }
@@ -302,7 +280,7 @@ double vsh_flat_visibility(const vsh_outline *casters, const vsh_light *light, c
     VSHI_FLOATS;
     const vshi_point p = {point[0], point[1]};
     vshi_flat_view view;
-    if (!isfinite(p.x) || !isfinite(p.y) || vsh_flat_light_name(light->type) == NULL) {
+    if (!isfinite(p.x) || !isfinite(p.y) || vsh_get_name(VSH_NAMES_FLAT_LIGHT, light->type) == NULL) {
         return NAN;
     }
     return vshi_flat_look(light, p, &view) ? vshi_flat_visible(casters, &view) : 1.0;

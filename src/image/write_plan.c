@@ -240,12 +240,6 @@ static vsh_result plan_planes(const char *path, const vsh_image *image, const ch
 
 /* --- what numbers of a file stand for */
 
-const char *vsh_color_space_name(int32_t color_space) {
-    static const char *const names[] = {"auto", "linear", "srgb", "encoded"};
-    const size_t count = sizeof names / sizeof names[0];
-    return color_space >= 0 && (size_t)color_space < count ? names[color_space] : NULL;
-}
-
 double vsh_srgb_to_linear(double encoded) {
     return vshi_from_srgb(encoded);
 }
@@ -257,7 +251,7 @@ static float encode_srgb(float value) {
 /* Which planes are light, and which go through a curve. */
 static vsh_result plan_colors(const char *path, const vsh_image *image, int32_t color_space,
                               vshi_write_plan *plan, vsh_error *error) {
-    if (vsh_color_space_name(color_space) == NULL) {
+    if (vsh_get_name(VSH_NAMES_COLOR, color_space) == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: color_space %d is out of range %d … %d", path,
                          color_space, VSH_COLOR_AUTO, VSH_COLOR_ENCODED);
     }

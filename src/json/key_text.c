@@ -12,7 +12,7 @@ enum { MAX_NUMBERS = 8, MAX_NUMBER_TEXT = 64 };
 static void names(const vshi_key *key, char *text, size_t size) {
     text[0] = '\0';
     const char *name;
-    for (int32_t i = 0; (name = key->name_of(i)) != NULL; ++i) {
+    for (int32_t i = 0; (name = vshi_key_name(key, i)) != NULL; ++i) {
         const size_t length = strlen(text);
         snprintf(text + length, size - length, "%s%s", i == 0 ? "" : ", ", name);
     }
@@ -63,7 +63,7 @@ void vshi_key_value(const vshi_key *key, const void *target, char *text, size_t 
     memcpy(&integer, member, sizeof integer);
     text[0] = '\0';
     if (key->kind == VSHI_NAME) {
-        snprintf(text, size, "%s", key->name_of(integer));
+        snprintf(text, size, "%s", vshi_key_name(key, integer));
     } else if (key->kind == VSHI_INTEGER) {
         snprintf(text, size, "%d", integer);
     } else if (key->kind == VSHI_NUMBER) {

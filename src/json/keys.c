@@ -78,13 +78,17 @@ static vsh_result read_vector(const vshi_json *reader, const vshi_value *value, 
     return VSH_OK;
 }
 
-static vsh_result read_name(const vshi_json *reader, const vshi_value *value, vshi_name_fn *name_of,
+const char *vshi_key_name(const vshi_key *key, int32_t i) {
+    return key->name_of != NULL ? key->name_of(i) : vsh_get_name(key->names, i);
+}
+
+static vsh_result read_name(const vshi_json *reader, const vshi_value *value, const vshi_key *key,
                             int32_t *index) {
     VSHI_TRY(vshi_expect(reader, value, JSON_STRING));
     const char *given = json_string_value(value->json);
     char known[256] = "";
     const char *name;
-    for (int32_t i = 0; (name = name_of(i)) != NULL; ++i) {
+    for (int32_t i = 0; (name = vshi_key_name(key, i)) != NULL; ++i) {
         if (strcmp(name, given) == 0) {
             *index = i;
             return VSH_OK;
@@ -122,7 +126,7 @@ vsh_result vshi_read_value(vshi_json *reader, const vshi_value *value, const vsh
     case VSHI_VECTOR:
         return read_vector(reader, value, key, member);
     case VSHI_NAME:
-        return read_name(reader, value, key->name_of, member);
+        return read_name(reader, value, key, member);
     case VSHI_STRING:
     case VSHI_PATH:
         return read_string(reader, value, key->kind == VSHI_PATH, member);
@@ -134,10 +138,10 @@ vsh_result vshi_read_value(vshi_json *reader, const vshi_value *value, const vsh
     return VSH_OK;
 }
 
-vsh_result vshi_read_choice(vshi_json *reader, const vshi_value *object, const char *key,
-                            vshi_name_fn *name_of, int32_t *index) {
+vsh_result vshi_read_choice(vshi_json *reader, const vshi_value *object, const vshi_key *key,
+                            int32_t *index) {
     vshi_value value;
-    return vshi_member(object, key, &value) ? read_name(reader, &value, name_of, index) : VSH_OK;
+    return vshi_member(object, key->name, &value) ? read_name(reader, &value, key, index) : VSH_OK;
 }
 
 static bool has_variant(uint32_t variants, uint32_t variant) {

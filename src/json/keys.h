@@ -18,7 +18,7 @@ typedef enum vshi_kind {
     VSHI_INTEGER, /* int32_t */
     VSHI_BOOL,    /* int32_t */
     VSHI_VECTOR,  /* double[count] */
-    VSHI_NAME,    /* int32_t: number of the name that `name_of` gives back */
+    VSHI_NAME,    /* int32_t: a name's number */
     VSHI_STRING,  /* const char *, not empty */
     VSHI_PATH,    /* const char *, behind the folder of the scene file unless it is absolute */
     VSHI_CUSTOM,  /* what `read` makes of it */
@@ -58,7 +58,8 @@ typedef struct vshi_key {
     double highest;
     int32_t flags;
     int32_t count;
-    vshi_name_fn *name_of;
+    int32_t names;         /* VSH_NAMES_…, if name_of is NULL */
+    vshi_name_fn *name_of; /* other names */
     vshi_read_fn *read;
     void (*then)(void *target); /* after it was read: what else follows for the struct; may be NULL */
     vshi_option option;
@@ -98,9 +99,11 @@ void vshi_key_range(const vshi_key *key, char *text, size_t size);
 /* What `target` holds, "64"; "" where it holds nothing that is not off. */
 void vshi_key_value(const vshi_key *key, const void *target, char *text, size_t size);
 
-/* Number of the name that is the value of `key`; *index is left alone where there is no such key. */
-vsh_result vshi_read_choice(vshi_json *reader, const vshi_value *object, const char *key,
-                            vshi_name_fn *name_of, int32_t *index);
+/* Name of a value of a VSHI_NAME key, NULL behind the last. */
+const char *vshi_key_name(const vshi_key *key, int32_t i);
+
+/* Reads the value of a VSHI_NAME key before the rest of its object; keeps *index if there is no such key. */
+vsh_result vshi_read_choice(vshi_json *reader, const vshi_value *object, const vshi_key *key, int32_t *index);
 
 /* Fails where `value` is not of a JSON type. */
 vsh_result vshi_expect(const vshi_json *reader, const vshi_value *value, json_type type);

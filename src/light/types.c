@@ -97,20 +97,17 @@ static vsh_result check_spot(const vsh_light *light, vsh_error *error) {
 
 static const vshi_light_type types[] = {
     [VSH_LIGHT_DIRECTIONAL] = {.name = "directional",
-                               .flat_name = "directional",
                                .place = place_sun,
                                .gain = sun_gain,
                                .describe = describe_sun,
                                .resize = resize_sun},
     [VSH_LIGHT_SPHERE] = {.name = "sphere",
-                          .flat_name = "disc",
                           .falls_off = true,
                           .place = place_lamp,
                           .gain = lamp_gain,
                           .describe = describe_lamp,
                           .resize = resize_lamp},
     [VSH_LIGHT_SPOT] = {.name = "spot",
-                        .flat_name = "spot",
                         .falls_off = true,
                         .place = place_lamp,
                         .gain = spot_gain,
@@ -149,7 +146,7 @@ uint32_t vshi_light_types_falling(void) {
 uint32_t vshi_light_types_flat(void) {
     uint32_t bits = 0;
     for (int32_t i = 0; i < TYPES; ++i) {
-        bits |= types[i].flat_name != NULL ? 1U << i : 0;
+        bits |= vsh_get_name(VSH_NAMES_FLAT_LIGHT, i) != NULL ? 1U << i : 0;
     }
     return bits;
 }

@@ -8,9 +8,8 @@
 #include <stdint.h>
 
 typedef struct vshi_light_type {
-    const char *name;      /* in scene files */
-    const char *flat_name; /* in a plane; NULL: there is none. Types without one come last */
-    bool falls_off;        /* has `falloff` and `reach` */
+    const char *name; /* in scene files */
+    bool falls_off;   /* has `falloff` and `reach` */
     /* Where it is and how large, in world space. */
     void (*place)(const vsh_light *light, vshi_light_place *place);
     /* See vshi_light_gain(). */

@@ -14,23 +14,6 @@ static const size_t MAX_BYTES = (size_t)1 << 20;
 static const double TOLERANCE = 2e-5;
 enum { MAX_LINES = 1024 /* of a curve */ };
 
-static const char *const align_names[] = {
-    [VSH_ALIGN_LEFT] = "left", [VSH_ALIGN_CENTER] = "center", [VSH_ALIGN_RIGHT] = "right"};
-enum { ALIGN_COUNT = sizeof align_names / sizeof align_names[0] };
-
-int32_t vsh_align(const char *name) {
-    for (int32_t i = 0; name != NULL && i < ALIGN_COUNT; ++i) {
-        if (strcmp(name, align_names[i]) == 0) {
-            return i;
-        }
-    }
-    return -1;
-}
-
-const char *vsh_align_name(int32_t align) {
-    return align >= 0 && align < ALIGN_COUNT ? align_names[align] : NULL;
-}
-
 /* --- UTF-8 */
 
 /* The character at *at, which moves behind it; UINT32_MAX where there is no UTF-8 (RFC 3629). */
@@ -230,9 +213,9 @@ static vsh_result check_options(const vsh_text_options *options, vsh_error *erro
                          "text: line_spacing %.9g: expected more than 0, at most 1000",
                          options->line_spacing);
     }
-    if (vsh_align_name(options->align) == NULL) {
+    if (vsh_get_name(VSH_NAMES_ALIGN, options->align) == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "text: align %d: expected 0 … %d", options->align,
-                         ALIGN_COUNT - 1);
+                         VSH_ALIGN_RIGHT);
     }
     return VSH_OK;
 }

@@ -83,7 +83,7 @@ static const vshi_key scene_keys[] = {
     {.name = "method",
      .kind = VSHI_NAME,
      .offset = offsetof(vsh_flat_scene, options.method),
-     .name_of = vsh_flat_method_name,
+     .names = VSH_NAMES_FLAT,
      .option = {.name = "method",
                 .value = "NAME",
                 .group = VSH_SETTINGS_FLAT_TEXELS,

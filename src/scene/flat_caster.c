@@ -130,7 +130,7 @@ vsh_result vshi_read_flat_caster(vshi_json *reader, const vshi_value *value, voi
     }
     if (type == 2) {
         int32_t shape = 0;
-        result = vshi_read_choice(reader, value, "shape", shape_name, &shape);
+        result = vshi_read_choice(reader, value, &(vshi_key){.name = "shape", .name_of = shape_name}, &shape);
         if (result != VSH_OK) {
             return result;
         }

@@ -16,17 +16,13 @@ static const char *type_name(int32_t i) {
     return type != NULL ? type->name : behind ? "file" : NULL;
 }
 
-/* Lights in a plane are discs. */
-static const char *flat_type_name(int32_t i) {
-    return vsh_flat_light_name(i);
-}
-
-static const char *falloff_name(int32_t i) {
-    static const char *const names[] = {[VSH_FALLOFF_NONE] = "none",
-                                        [VSH_FALLOFF_INVERSE_SQUARE] = "inverse_square",
-                                        [VSH_FALLOFF_QUADRATIC] = "quadratic",
-                                        NULL};
-    return names[i];
+static vshi_key type_key(bool flat) {
+    return (vshi_key){.name = "type",
+                      .kind = VSHI_NAME,
+                      .required = VSHI_ALL,
+                      .offset = offsetof(vsh_light, type),
+                      .names = VSH_NAMES_FLAT_LIGHT,
+                      .name_of = flat ? NULL : type_name};
 }
 
 static vsh_result read_name(vshi_json *reader, const vshi_value *value, void *member) {
@@ -92,13 +88,10 @@ static vshi_key key_of(const vshi_light_member *m, int32_t dimensions) {
 
 static void make_keys(bool flat, light_keys *all) {
     const uint32_t types = flat ? vshi_light_types_flat() : VSHI_ALL, falling = vshi_light_types_falling();
+    const vshi_key type = type_key(flat);
     all->count = 0;
     add_key(all, &name_key);
-    add_key(all, &(vshi_key){.name = "type",
-                             .kind = VSHI_NAME,
-                             .required = VSHI_ALL,
-                             .offset = offsetof(vsh_light, type),
-                             .name_of = flat ? flat_type_name : type_name});
+    add_key(all, &type);
     for (size_t i = 0; i < vshi_light_member_count; ++i) {
         if ((vshi_light_members[i].types & types) != 0) {
             const vshi_key key = key_of(&vshi_light_members[i], flat ? 2 : 3);
@@ -119,19 +112,19 @@ static void make_keys(bool flat, light_keys *all) {
                              .kind = VSHI_NAME,
                              .variants = falling,
                              .offset = offsetof(vsh_light, falloff),
-                             .name_of = falloff_name});
+                             .names = VSH_NAMES_FALLOFF});
     add_key(all, &(vshi_key){.name = "layers", .kind = VSHI_LATER});
 }
 
 static vsh_result read_keys(vshi_json *reader, const vshi_value *value, bool flat, vsh_light *light) {
-    vshi_name_fn *types = flat ? flat_type_name : type_name;
+    const vshi_key key = type_key(flat);
     int32_t type = -1;
     VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
-    VSHI_TRY(vshi_read_choice(reader, value, "type", types, &type));
+    VSHI_TRY(vshi_read_choice(reader, value, &key, &type));
     /* A light without a type still has its keys looked over: "type" may be what is misspelt. */
     char what[32] = "a light";
     if (type >= 0) {
-        snprintf(what, sizeof what, "a %s light", types(type));
+        snprintf(what, sizeof what, "a %s light", vshi_key_name(&key, type));
     }
     light_keys keys;
     make_keys(flat, &keys);

@@ -51,7 +51,7 @@ vsh_result vshi_read_mask_size(vshi_json *reader, const vshi_value *value, void 
          .flags = VSHI_ABOVE},                                                                               \
     {                                                                                                        \
         .name = "align", .kind = VSHI_NAME, .variants = of_text, .offset = offsetof(target, letters.align),  \
-        .name_of = vsh_align_name                                                                            \
+        .names = VSH_NAMES_ALIGN                                                                             \
     }
 
 #endif

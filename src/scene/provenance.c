@@ -43,7 +43,7 @@ static void describe_rays(const vsh_shade_options *o, bool adaptive, char *text,
         used +=
             snprintf(text + used, size - (size_t)used, ", %d%s", o->rays > 0 ? o->rays : RAYS, RAYS_GIVEN);
     }
-    used += snprintf(text + used, size - (size_t)used, ", %s", vsh_sampler_name(o->sampler));
+    used += snprintf(text + used, size - (size_t)used, ", %s", vsh_get_name(VSH_NAMES_SAMPLER, o->sampler));
     if (o->frame != 0) {
         used += snprintf(text + used, size - (size_t)used, ", frame %d", o->frame);
     }
@@ -62,7 +62,7 @@ static vsh_result add_shadow(vsh_provenance *p, const vsh_provenance_source *sou
     } else if (o->jitter > 0.0) {
         snprintf(more, sizeof more, ", jitter %.9g", o->jitter);
     }
-    snprintf(text, sizeof text, "%s%s", vsh_shadow_method_name(method), more);
+    snprintf(text, sizeof text, "%s%s", vsh_get_name(VSH_NAMES_SHADOW, method), more);
     return add(p, "vdbshade_shadow", text, error);
 }
 
@@ -78,7 +78,7 @@ static vsh_result add_open(vsh_provenance *p, const vsh_provenance_source *sourc
     } else if (method == VSH_AO_CONES) {
         snprintf(more, sizeof more, ", %d cones", o->ao_cones);
     }
-    snprintf(text, sizeof text, "%s %s%s", vsh_ao_method_name(method), what, more);
+    snprintf(text, sizeof text, "%s %s%s", vsh_get_name(VSH_NAMES_AO, method), what, more);
     return add(p, name, text, error);
 }
 
@@ -93,7 +93,7 @@ static vsh_result add_scene(vsh_provenance *p, const vsh_provenance_source *sour
         VSHI_TRY(add_open(p, source, "vdbshade_ao", what, error));
     }
     if (source->lightmap != 0 && scene->planes.sky != VSH_UP_NONE) {
-        snprintf(what, sizeof what, "over %s", vsh_up_name(scene->planes.sky));
+        snprintf(what, sizeof what, "over %s", vsh_get_name(VSH_NAMES_UP, scene->planes.sky));
         VSHI_TRY(add_open(p, source, "vdbshade_sky", what, error));
     }
     for (size_t i = 0; i < scene->light_count; ++i) {

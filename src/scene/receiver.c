@@ -1,4 +1,3 @@
-#include "base/names.h"
 #include "base/try.h"
 #include "scene/parts.h"
 #include "scene/transform.h"
@@ -38,31 +37,6 @@ vsh_result vshi_read_bits(vshi_json *reader, const vshi_value *value, void *memb
         return vshi_json_fail(reader, value, "%d is none of 0, 8, 16, 32", *bits);
     }
     return VSH_OK;
-}
-
-static const char *const unwrap_table[] = {[VSH_RECEIVER_UNWRAP_DEFAULT] = "default",
-                                           [VSH_RECEIVER_UNWRAP_NEVER] = "never",
-                                           [VSH_RECEIVER_UNWRAP_AUTO] = "auto",
-                                           [VSH_RECEIVER_UNWRAP_ALWAYS] = "always"};
-static const vshi_names unwrap_names = VSHI_NAMES(unwrap_table);
-
-int32_t vsh_receiver_unwrap(const char *name) {
-    return vshi_name_find(unwrap_names, name);
-}
-
-const char *vsh_receiver_unwrap_name(int32_t unwrap) {
-    return vshi_name_at(unwrap_names, unwrap);
-}
-
-static const char *const atlas_table[] = {[VSH_ATLAS_SHARED] = "shared", [VSH_ATLAS_OBJECTS] = "objects"};
-static const vshi_names atlas_names = VSHI_NAMES(atlas_table);
-
-int32_t vsh_atlas_kind(const char *name) {
-    return vshi_name_find(atlas_names, name);
-}
-
-const char *vsh_atlas_kind_name(int32_t atlas) {
-    return vshi_name_at(atlas_names, atlas);
 }
 
 /* {"PATTERN": factor, …}, in the order of the file. */
@@ -170,7 +144,7 @@ static vsh_result read_plane(vshi_json *reader, const vshi_value *value, void *m
 }
 
 const char *vshi_color_space_key(int32_t i) {
-    return i < VSH_COLOR_ENCODED ? vsh_color_space_name(i) : NULL; /* bakes are never encoded yet */
+    return i < VSH_COLOR_ENCODED ? vsh_get_name(VSH_NAMES_COLOR, i) : NULL; /* bakes are never encoded yet */
 }
 
 static const vshi_key receiver_keys[] = {
@@ -235,7 +209,7 @@ static const vshi_key receiver_keys[] = {
      .kind = VSHI_NAME,
      .variants = MESH,
      .offset = offsetof(vsh_receiver, unwrap),
-     .name_of = vsh_receiver_unwrap_name,
+     .names = VSH_NAMES_RECEIVER_UNWRAP,
      .option = {.name = "unwrap",
                 .value = "MODE",
                 .group = VSH_SETTINGS_TEXELS,
@@ -268,7 +242,7 @@ static const vshi_key receiver_keys[] = {
      .kind = VSHI_NAME,
      .variants = MESH,
      .offset = offsetof(vsh_receiver, atlas),
-     .name_of = vsh_atlas_kind_name,
+     .names = VSH_NAMES_ATLAS,
      .option = {.name = "atlas",
                 .value = "WHAT",
                 .group = VSH_SETTINGS_FILE_ONLY,
@@ -321,7 +295,7 @@ static const vshi_key receiver_keys[] = {
      .kind = VSHI_NAME,
      .variants = MESH,
      .offset = offsetof(vsh_receiver, seams),
-     .name_of = vsh_seams_name,
+     .names = VSH_NAMES_SEAMS,
      .option = {.name = "seams",
                 .value = "WHAT",
                 .group = VSH_SETTINGS_TEXELS,

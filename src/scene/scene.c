@@ -105,7 +105,7 @@ static const vshi_key ao_keys[] = {
     {.name = "method",
      .kind = VSHI_NAME,
      .offset = offsetof(vsh_scene, shade.ao_method),
-     .name_of = vsh_ao_method_name,
+     .names = VSH_NAMES_AO,
      .option = {.name = "ao-method",
                 .value = "NAME",
                 .group = VSH_SETTINGS_OCCLUSION,
@@ -121,7 +121,7 @@ static const vshi_key ao_keys[] = {
      .kind = VSHI_NAME,
      .variants = ~(1U << VSH_AO_TAPS),
      .offset = offsetof(vsh_scene, bent),
-     .name_of = vsh_bent_space_name,
+     .names = VSH_NAMES_BENT,
      .then = wants_bent,
      .option = {.name = "bent-normals",
                 .value = "SPACE",
@@ -137,7 +137,8 @@ static vsh_result read_ao(vshi_json *reader, const vshi_value *value, void *memb
         [VSH_AO_TAPS] = "ao by taps", [VSH_AO_RAYS] = "ao by rays", [VSH_AO_AUTO] = NULL};
     vsh_scene *scene = member;
     VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
-    VSHI_TRY(vshi_read_choice(reader, value, "method", vsh_ao_method_name, &scene->shade.ao_method));
+    VSHI_TRY(vshi_read_choice(reader, value, &(vshi_key){.name = "method", .names = VSH_NAMES_AO},
+                              &scene->shade.ao_method));
     const char *what = whats[scene->shade.ao_method];
     return vshi_read_object(reader, value, &vshi_ao_table, 1U << scene->shade.ao_method,
                             what != NULL ? what : "ao", scene);
@@ -152,7 +153,7 @@ static vsh_result read_tint(vshi_json *reader, const vshi_value *value, void *me
         return vshi_read_value(reader, value, &powers, scene->tint.power);
     }
     VSHI_TRY(vshi_expect(reader, value, JSON_STRING));
-    scene->tint.type = vsh_tint_type(json_string_value(value->json));
+    scene->tint.type = vsh_find_name(VSH_NAMES_TINT, json_string_value(value->json));
     return scene->tint.type == VSH_TINT_NONE || scene->tint.type == VSH_TINT_QUADRATIC
                ? VSH_OK
                : vshi_json_fail(reader, value, "\"%.64s\" is none of none, quadratic, [r, g, b]",
@@ -265,7 +266,7 @@ static const vshi_key scene_keys[] = {
     {.name = "method",
      .kind = VSHI_NAME,
      .offset = offsetof(vsh_scene, shade.method),
-     .name_of = vsh_shadow_method_name,
+     .names = VSH_NAMES_SHADOW,
      .option = {.name = "method",
                 .value = "NAME",
                 .group = VSH_SETTINGS_OCCLUSION,
@@ -285,7 +286,7 @@ static const vshi_key scene_keys[] = {
     {.name = "sampler",
      .kind = VSHI_NAME,
      .offset = offsetof(vsh_scene, shade.sampler),
-     .name_of = vsh_sampler_name,
+     .names = VSH_NAMES_SAMPLER,
      .option =
          {.name = "sampler", .value = "NAME", .group = VSH_SETTINGS_FILE_ONLY, .help = "where they go"}},
     {.name = "frame",
@@ -339,7 +340,7 @@ static const vshi_key scene_keys[] = {
     {.name = "sky",
      .kind = VSHI_NAME,
      .offset = offsetof(vsh_scene, planes.sky),
-     .name_of = vsh_up_name,
+     .names = VSH_NAMES_UP,
      .option = {.name = "sky",
                 .value = "AXIS",
                 .group = VSH_SETTINGS_CHANNELS,

@@ -153,8 +153,9 @@ static vsh_result read_kind(vshi_json *reader, const vshi_value *value, int32_t 
     VSHI_TRY(vshi_reject_both(reader, value, "shape", "op"));
     int32_t operation = -1;
     *shape = -1;
-    VSHI_TRY(vshi_read_choice(reader, value, "shape", shape_name, shape));
-    VSHI_TRY(vshi_read_choice(reader, value, "op", operation_name, &operation));
+    VSHI_TRY(vshi_read_choice(reader, value, &(vshi_key){.name = "shape", .name_of = shape_name}, shape));
+    VSHI_TRY(
+        vshi_read_choice(reader, value, &(vshi_key){.name = "op", .name_of = operation_name}, &operation));
     if (operation >= 0) {
         *shape = VSH_SDF_UNION + operation;
     }

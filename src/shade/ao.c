@@ -98,14 +98,14 @@ vsh_result vshi_ao_prepare(const vsh_occluders *occluders, const vsh_shade_optio
     if (options->ao_method != VSH_AO_EXACT && occluders->field->unknown) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "AO method %s: the occluders have no voxels, which it marches; exact needs none",
-                         vsh_ao_method_name(options->ao_method));
+                         vsh_get_name(VSH_NAMES_AO, options->ao_method));
     }
     const vshi_vec up = vshi_vec_of(options->ao_up);
     const bool horizon = vshi_dot(up, up) > 0.0;
     if (horizon && !vshi_ao_has_rays(options)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "AO over a horizon: method %s knows none; rays, adaptive and exact do",
-                         vsh_ao_method_name(options->ao_method));
+                         vsh_get_name(VSH_NAMES_AO, options->ao_method));
     }
     if (options->ao_method == VSH_AO_CONES) {
         vshi_ao_cones_place(cones, options->ao_cones);

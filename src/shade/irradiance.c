@@ -1,25 +1,12 @@
 /* Irradiance: what the shadow value leaves out. */
 #include "base/elementary.h"
 #include "base/floats.h"
-#include "base/names.h"
 #include "base/vec.h"
 #include "light/light.h"
 #include "light/view.h"
 #include "shade/shade.h"
 
 #include <math.h>
-
-static const char *const tints_table[] = {
-    [VSH_TINT_NONE] = "none", [VSH_TINT_QUADRATIC] = "quadratic", [VSH_TINT_POWER] = "power"};
-static const vshi_names tints = VSHI_NAMES(tints_table);
-
-int32_t vsh_tint_type(const char *name) {
-    return vshi_name_find(tints, name);
-}
-
-const char *vsh_tint_type_name(int32_t type) {
-    return vshi_name_at(tints, type);
-}
 
 static void tint_one(const vsh_tint *tint, double v, double rgb[3]) {
     rgb[0] = rgb[1] = rgb[2] = v;

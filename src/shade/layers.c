@@ -1,5 +1,4 @@
 #include "shade/layers.h"
-#include "base/names.h"
 
 #include "base/memory.h"
 #include "base/try.h"
@@ -10,17 +9,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-static const char *const combines_table[] = {[VSH_COMBINE_MULTIPLY] = "multiply", [VSH_COMBINE_MIN] = "min"};
-static const vshi_names combines = VSHI_NAMES(combines_table);
-
-int32_t vsh_combine(const char *name) {
-    return vshi_name_find(combines, name);
-}
-
-const char *vsh_combine_name(int32_t combine) {
-    return vshi_name_at(combines, combine);
-}
 
 /* A layer as one light or AO sees it. */
 typedef struct prepared {
@@ -134,7 +122,7 @@ static vsh_result prepare(prepared *item, size_t index, double lifted, const vsh
             return vshi_fail(error, VSH_ERROR_ARGUMENT,
                              "heights and spheres are shaded by the methods hard and classic; for method %s "
                              "trace or voxelize them",
-                             vsh_shadow_method_name(options->method));
+                             vsh_get_name(VSH_NAMES_SHADOW, options->method));
         }
         return vsh_light_check(&item->light, error);
     }

@@ -174,7 +174,7 @@ vsh_result vshi_shadow_prepare(const vsh_occluders *occluders, const vsh_light *
     if (field->unknown && !vshi_shadow_traces(options, triangles)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "method %s: the occluders have no voxels, which it marches; exact needs none",
-                         vsh_shadow_method_name(options->method));
+                         vsh_get_name(VSH_NAMES_SHADOW, options->method));
     }
     const bool inner = (vsh_shadow_method_traits(options->method) & VSH_METHOD_INNER) != 0;
     *task = (vshi_shadow_task){.field = field,

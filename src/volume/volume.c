@@ -1,7 +1,6 @@
 /* Volumes: voxels are shaded block by block, then what is inside solids is filled. */
 #include "base/floats.h"
 #include "base/memory.h"
-#include "base/names.h"
 #include "base/numbers.h"
 #include "base/parallel.h"
 #include "base/try.h"
@@ -15,17 +14,6 @@
 
 /* Share of the progress: filling what is inside costs little. */
 enum { SHADE_UNITS = 15, FILL_UNITS = 1 };
-
-static const char *const insides_table[] = {[VSH_INSIDE_NEAREST] = "nearest", [VSH_INSIDE_OFF] = "off"};
-static const vshi_names insides = VSHI_NAMES(insides_table);
-
-int32_t vsh_inside(const char *name) {
-    return vshi_name_find(insides, name);
-}
-
-const char *vsh_inside_name(int32_t inside) {
-    return vshi_name_at(insides, inside);
-}
 
 static void fill_blocks(void *user, size_t begin, size_t end) {
     vshi_volume_bake *bake = user;
@@ -104,8 +92,8 @@ static vshi_channel *next_of(vshi_channel **next, const vshi_volume_bake *bake, 
 static void describe_shadow(const vshi_volume_bake *bake, const vsh_light *lights, bool error,
                             vshi_channel **next) {
     const vsh_shade_options *shade = &bake->options.shade;
-    const char *method =
-        vsh_shadow_method_name(vsh_shadow_method_resolve(shade->method, bake->occluders->triangles != NULL));
+    const char *method = vsh_get_name(
+        VSH_NAMES_SHADOW, vsh_shadow_method_resolve(shade->method, bake->occluders->triangles != NULL));
     for (size_t l = 0; l < bake->light_count; ++l) {
         const vsh_light *light = &lights[l];
         vshi_channel *c = next_of(next, bake, method);
@@ -119,7 +107,7 @@ static void describe_shadow(const vshi_volume_bake *bake, const vsh_light *light
 static void describe_ao(const vshi_volume_bake *bake, bool error, vshi_channel **next) {
     const vsh_shade_options *shade = &bake->options.shade;
     const int32_t method = vsh_ao_method_resolve(shade->ao_method, bake->occluders->triangles != NULL);
-    vshi_channel *c = next_of(next, bake, vsh_ao_method_name(method));
+    vshi_channel *c = next_of(next, bake, vsh_get_name(VSH_NAMES_AO, method));
     snprintf(c->name, sizeof c->name, "%s", error ? "error.ao" : "ao");
     snprintf(c->description, sizeof c->description, "%s within %g, 1 open, 0 closed",
              error ? "standard error of ambient occlusion" : "ambient occlusion", shade->ao_distance);
@@ -176,9 +164,9 @@ done:
 
 static vsh_result check(const vsh_light *lights, const vshi_volume_bake *bake, vsh_error *error) {
     const vsh_volume_options *options = &bake->options;
-    if (vsh_inside_name(options->inside) == NULL) {
+    if (vsh_get_name(VSH_NAMES_INSIDE, options->inside) == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "inside %d: expected %d … %d", options->inside, 0,
-                         insides.count - 1);
+                         VSH_INSIDE_OFF);
     }
     if (bake->light_count == 0 && options->ao == 0) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "volume: nothing to bake: no lights and no AO");

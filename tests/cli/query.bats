@@ -60,7 +60,7 @@ int main(int argc, char **argv) {
     CHECK(vsh_assets_load(scene, NULL, &assets, &error));
     CHECK(vsh_scene_occluders(scene, assets, NULL, NULL, &occluders, &error));
     vsh_shade_options shade = scene->shade;
-    shade.method = vsh_shadow_method(argv[1]);
+    shade.method = vsh_find_name(VSH_NAMES_SHADOW, argv[1]);
     shade.ao_method = VSH_AO_TAPS;
     CHECK(vsh_query_create(occluders, scene->lights, scene->light_count, &shade, &query, &error));
     enum { MOST = 100000 };

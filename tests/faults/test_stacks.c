@@ -217,8 +217,8 @@ static void lightmaps_are_baked_by_every_method(void **state) {
     for (shadow_method = VSH_SHADOW_HARD; shadow_method <= VSH_SHADOW_AUTO; ++shadow_method) {
         char name[64];
         ao_method = shadow_method % (VSH_AO_AUTO + 1);
-        snprintf(name, sizeof name, "%s, AO %s", vsh_shadow_method_name(shadow_method),
-                 vsh_ao_method_name(ao_method));
+        snprintf(name, sizeof name, "%s, AO %s", vsh_get_name(VSH_NAMES_SHADOW, shadow_method),
+                 vsh_get_name(VSH_NAMES_AO, ao_method));
         call c = {.scenario = bake_by_methods, .run = vsh_run_default()};
         run_everywhere(name, &c);
     }

@@ -85,8 +85,8 @@ static void compare(const vsh_field *field, const vsh_light *light, const vsh_sh
         }
         if (different > 0) {
             fail_msg("%s: %zu values of %zu differ in calls for %zu, point %zu by %g",
-                     light != NULL ? vsh_shadow_method_name(options->method)
-                                   : vsh_ao_method_name(options->ao_method),
+                     light != NULL ? vsh_get_name(VSH_NAMES_SHADOW, options->method)
+                                   : vsh_get_name(VSH_NAMES_AO, options->ao_method),
                      different, count, batches[b], most, (double)fabsf(alone[most] - among[most]));
         }
     }

@@ -136,8 +136,8 @@ static void more_rays_come_nearer_to_the_truth(void **state) {
             shade(p->field, &options, TEXELS, p->positions, p->normals, ao, NULL);
             double bias;
             const double error = rmse(ao, p->truth, &bias);
-            print_message("%s, %d rays: RMSE %.4f, bias %+.4f\n", vsh_sampler_name(sampler), options.rays,
-                          error, bias);
+            print_message("%s, %d rays: RMSE %.4f, bias %+.4f\n", vsh_get_name(VSH_NAMES_SAMPLER, sampler),
+                          options.rays, error, bias);
             assert_true(error < bounds[sampler][step]);
             /* best candidates crowd the disc's rim */
             assert_true(fabs(bias) < (sampler == VSH_SAMPLER_BLUE ? 0.025 : 0.004));
@@ -164,7 +164,8 @@ static void frames_may_be_averaged(void **state) {
             }
         }
         const double averaged = rmse(mean, p->truth, &bias);
-        print_message("%s: one frame %.4f, four %.4f\n", vsh_sampler_name(sampler), single, averaged);
+        print_message("%s: one frame %.4f, four %.4f\n", vsh_get_name(VSH_NAMES_SAMPLER, sampler), single,
+                      averaged);
         /* a turned copy of the same points is less than another set */
         assert_true(averaged < (sampler == VSH_SAMPLER_BLUE ? 0.9 : 0.6) * single);
     }
@@ -212,7 +213,7 @@ static void the_error_left_is_what_was_asked_for_and_said(void **state) {
                 said += (double)deviation[i] * (double)deviation[i];
             }
             print_message("%s, asked %g: said %.4f, is %.4f; %.1f marches a point\n",
-                          vsh_sampler_name(sampler), errors[e], sqrt(said / TEXELS), error,
+                          vsh_get_name(VSH_NAMES_SAMPLER, sampler), errors[e], sqrt(said / TEXELS), error,
                           (double)stats.marches / TEXELS);
             assert_true(error <= 1.1 * sqrt(said / TEXELS));
             assert_true(fabs(stats.square_error - said) < 1e-4 * said + 1e-9);

@@ -465,7 +465,7 @@ static void every_part_has_its_bits_for_any_threads_and_instruction_set(void **s
                     wrong = true;
                     print_error("%s: 0x%016llx, expected 0x%016llx (%s, %d threads)\n", parts[i].name,
                                 (unsigned long long)b.hash, (unsigned long long)parts[i].hash,
-                                vsh_isa_name(isa), threads);
+                                vsh_get_name(VSH_NAMES_ISA, isa), threads);
                 }
             }
         }

@@ -76,7 +76,8 @@ static void blocks_save_samples_and_change_no_value(void **state) {
             }
             const double samples = (double)few.samples / (double)many.samples;
             print_message("light %d, %s: %.2f of the samples, %.1f a point; %zu values differ\n", l,
-                          vsh_shadow_method_name(method), samples, (double)few.samples / POINTS, different);
+                          vsh_get_name(VSH_NAMES_SHADOW, method), samples, (double)few.samples / POINTS,
+                          different);
             assert_true(samples < 0.85);
             assert_int_equal(different, 0);
         }
@@ -116,8 +117,8 @@ static void no_block_is_proved_wrong(void **state) {
                 }
             }
             print_message("light %d, %s: %.2f proved of %.2f lit or dark, %.1f samples a point\n", l,
-                          vsh_shadow_method_name(method), (double)proved / POINTS, (double)decided / POINTS,
-                          (double)stats.samples / POINTS);
+                          vsh_get_name(VSH_NAMES_SHADOW, method), (double)proved / POINTS,
+                          (double)decided / POINTS, (double)stats.samples / POINTS);
             assert_true((double)proved > 0.7 * (double)decided);
         }
     }

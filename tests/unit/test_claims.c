@@ -133,9 +133,10 @@ static int judge(const stage *s, const trial *t, const outcome *o) {
             "%s of %s %s, %s, %s of %d x %d, asked %g: %.5f (%.5f where not all or nothing is seen, "
             "%.3f at worst), claimed %.5f, %.2f of it, %.1f rays\n",
             s->ao ? "AO" : "shadow", NAMES[s->shape],
-            s->ao ? vsh_ao_method_name(t->method) : vsh_shadow_method_name(t->method),
-            vsh_sampler_name(t->sampler), t->lightmap ? "lightmap" : "points", t->width, t->height,
-            t->max_error, o->measured, o->inside, o->worst, o->claimed, o->claimed / o->measured, o->rays);
+            s->ao ? vsh_get_name(VSH_NAMES_AO, t->method) : vsh_get_name(VSH_NAMES_SHADOW, t->method),
+            vsh_get_name(VSH_NAMES_SAMPLER, t->sampler), t->lightmap ? "lightmap" : "points", t->width,
+            t->height, t->max_error, o->measured, o->inside, o->worst, o->claimed, o->claimed / o->measured,
+            o->rays);
     }
     return !claimed + !kept;
 }

@@ -230,7 +230,7 @@ static void no_number_of_threads_shows(void **state) {
     static map one, more;
     vsh_outline *letters = text("flat", 1.0);
     const vsh_light lights[2] = {lamp(0.3, 1.5, 0.2), flat_sun(1.0, 0.5, 0.3)};
-    for (int32_t method = 0; vsh_flat_method_name(method) != NULL; ++method) {
+    for (int32_t method = 0; vsh_get_name(VSH_NAMES_FLAT, method) != NULL; ++method) {
         vsh_flat_options options = options_of(method);
         options.padding = 3;
         vsh_run run = vsh_run_default();

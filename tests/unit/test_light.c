@@ -1,4 +1,4 @@
-/* vsh_light_check() and the names of the methods. */
+/* vsh_light_check() and names of constants. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -9,8 +9,7 @@
 #include <math.h>
 #include <string.h>
 
-#include <vdbshade/light.h>
-#include <vdbshade/shade.h>
+#include <vdbshade/vdbshade.h>
 
 static vsh_light sun(void) {
     return vsh_light_default();
@@ -165,35 +164,84 @@ static void names_are_what_a_channel_can_hold(void **state) {
     assert_int_equal(vsh_light_check(&light, NULL), VSH_ERROR_ARGUMENT);
 }
 
-static void every_method_has_a_name_that_leads_back_to_it(void **state) {
+static void every_constant_has_its_name_and_every_name_its_constant(void **state) {
     (void)state;
-    int32_t count = 0;
-    for (; vsh_shadow_method_name(count) != NULL; ++count) {
-        assert_int_equal(vsh_shadow_method(vsh_shadow_method_name(count)), count);
+    enum { KINDS = VSH_NAMES_RECEIVER_UNWRAP + 1, MOST = 11 };
+    static const char *const names[KINDS][MOST] = {
+        [VSH_NAMES_ISA] = {[VSH_ISA_BEST] = "best",
+                           [VSH_ISA_BASE] = "base",
+                           [VSH_ISA_AVX2] = "avx2",
+                           [VSH_ISA_AVX512] = "avx512"},
+        [VSH_NAMES_SHADOW] = {[VSH_SHADOW_HARD] = "hard",
+                              [VSH_SHADOW_CLASSIC] = "classic",
+                              [VSH_SHADOW_PRACTICAL] = "practical",
+                              [VSH_SHADOW_IMPROVED] = "improved",
+                              [VSH_SHADOW_SMOOTH] = "smooth",
+                              [VSH_SHADOW_CONE] = "cone",
+                              [VSH_SHADOW_RAYS] = "rays",
+                              [VSH_SHADOW_ADAPTIVE] = "adaptive",
+                              [VSH_SHADOW_EXACT] = "exact",
+                              [VSH_SHADOW_AUTO] = "auto"},
+        [VSH_NAMES_AO] = {[VSH_AO_TAPS] = "taps",
+                          [VSH_AO_CONES] = "cones",
+                          [VSH_AO_RAYS] = "rays",
+                          [VSH_AO_ADAPTIVE] = "adaptive",
+                          [VSH_AO_EXACT] = "exact",
+                          [VSH_AO_AUTO] = "auto"},
+        [VSH_NAMES_SAMPLER] =
+            {[VSH_SAMPLER_SOBOL] = "sobol", [VSH_SAMPLER_WHITE] = "white", [VSH_SAMPLER_BLUE] = "blue"},
+        [VSH_NAMES_FALLOFF] = {[VSH_FALLOFF_NONE] = "none",
+                               [VSH_FALLOFF_INVERSE_SQUARE] = "inverse_square",
+                               [VSH_FALLOFF_QUADRATIC] = "quadratic"},
+        [VSH_NAMES_COLOR] = {[VSH_COLOR_AUTO] = "auto",
+                             [VSH_COLOR_LINEAR] = "linear",
+                             [VSH_COLOR_SRGB] = "srgb",
+                             [VSH_COLOR_ENCODED] = "encoded"},
+        [VSH_NAMES_ALIGN] =
+            {[VSH_ALIGN_LEFT] = "left", [VSH_ALIGN_CENTER] = "center", [VSH_ALIGN_RIGHT] = "right"},
+        [VSH_NAMES_ATLAS] = {[VSH_ATLAS_SHARED] = "shared", [VSH_ATLAS_OBJECTS] = "objects"},
+        [VSH_NAMES_COMBINE] = {[VSH_COMBINE_MULTIPLY] = "multiply", [VSH_COMBINE_MIN] = "min"},
+        [VSH_NAMES_TINT] =
+            {[VSH_TINT_NONE] = "none", [VSH_TINT_QUADRATIC] = "quadratic", [VSH_TINT_POWER] = "power"},
+        [VSH_NAMES_BENT] = {[VSH_BENT_WORLD] = "world", [VSH_BENT_TANGENT] = "tangent"},
+        [VSH_NAMES_UP] = {[VSH_UP_NONE] = "none",
+                          [VSH_UP_X] = "x",
+                          [VSH_UP_Y] = "y",
+                          [VSH_UP_Z] = "z",
+                          [VSH_UP_MINUS_X] = "-x",
+                          [VSH_UP_MINUS_Y] = "-y",
+                          [VSH_UP_MINUS_Z] = "-z"},
+        [VSH_NAMES_SEAMS] =
+            {[VSH_SEAMS_DEFAULT] = "default", [VSH_SEAMS_KEEP] = "keep", [VSH_SEAMS_FIX] = "fix"},
+        [VSH_NAMES_INSIDE] = {[VSH_INSIDE_NEAREST] = "nearest", [VSH_INSIDE_OFF] = "off"},
+        [VSH_NAMES_FLAT] =
+            {[VSH_FLAT_HARD] = "hard", [VSH_FLAT_CLASSIC] = "classic", [VSH_FLAT_EXACT] = "exact"},
+        [VSH_NAMES_FLAT_LIGHT] =
+            {[VSH_LIGHT_DIRECTIONAL] = "directional", [VSH_LIGHT_SPHERE] = "disc", [VSH_LIGHT_SPOT] = "spot"},
+        [VSH_NAMES_RECEIVER_UNWRAP] = {[VSH_RECEIVER_UNWRAP_DEFAULT] = "default",
+                                       [VSH_RECEIVER_UNWRAP_NEVER] = "never",
+                                       [VSH_RECEIVER_UNWRAP_AUTO] = "auto",
+                                       [VSH_RECEIVER_UNWRAP_ALWAYS] = "always"},
+    };
+    for (int32_t kind = 0; kind < KINDS; ++kind) {
+        int32_t value = 0;
+        for (; names[kind][value] != NULL; ++value) {
+            assert_string_equal(vsh_get_name(kind, value), names[kind][value]);
+            assert_int_equal(vsh_find_name(kind, names[kind][value]), value);
+        }
+        assert_true(value > 0);
+        assert_null(vsh_get_name(kind, value));
+        assert_null(vsh_get_name(kind, -1));
+        assert_null(vsh_get_name(kind, INT32_MAX));
+        assert_int_equal(vsh_find_name(kind, ""), -1);
+        assert_int_equal(vsh_find_name(kind, NULL), -1);
     }
-    assert_int_equal(count, VSH_SHADOW_AUTO + 1);
-    for (count = 0; vsh_ao_method_name(count) != NULL; ++count) {
-        assert_int_equal(vsh_ao_method(vsh_ao_method_name(count)), count);
+    assert_int_equal(vsh_find_name(VSH_NAMES_SHADOW, "Cone"), -1);
+    assert_int_equal(vsh_find_name(VSH_NAMES_AO, "cone"), -1);
+    for (int32_t kind = -1; kind <= KINDS; kind += KINDS + 1) {
+        assert_null(vsh_get_name(kind, 0));
+        assert_int_equal(vsh_find_name(kind, "none"), -1);
     }
-    assert_int_equal(count, VSH_AO_AUTO + 1);
-    for (count = 0; vsh_sampler_name(count) != NULL; ++count) {
-        assert_int_equal(vsh_sampler(vsh_sampler_name(count)), count);
-    }
-    assert_int_equal(count, VSH_SAMPLER_BLUE + 1);
-    assert_int_equal(vsh_shadow_method("improved"), VSH_SHADOW_IMPROVED);
-    assert_int_equal(vsh_ao_method("taps"), VSH_AO_TAPS);
-}
-
-static void what_is_no_method_is_minus_one_and_null(void **state) {
-    (void)state;
-    assert_int_equal(vsh_shadow_method("Cone"), -1);
-    assert_int_equal(vsh_shadow_method(""), -1);
-    assert_int_equal(vsh_shadow_method(NULL), -1);
-    assert_int_equal(vsh_ao_method("cone"), -1);
-    assert_int_equal(vsh_ao_method(NULL), -1);
-    assert_null(vsh_shadow_method_name(-1));
-    assert_null(vsh_ao_method_name(-1));
-    assert_null(vsh_ao_method_name(INT32_MAX));
 }
 
 int main(void) {
@@ -205,8 +253,7 @@ int main(void) {
         cmocka_unit_test(bad_values_are_named_with_field_and_limit),
         cmocka_unit_test(no_value_that_is_not_a_number_passes),
         cmocka_unit_test(names_are_what_a_channel_can_hold),
-        cmocka_unit_test(every_method_has_a_name_that_leads_back_to_it),
-        cmocka_unit_test(what_is_no_method_is_minus_one_and_null),
+        cmocka_unit_test(every_constant_has_its_name_and_every_name_its_constant),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -41,7 +41,7 @@ static void lights_of_0_to_179_degrees_stay_in_range_and_near_the_truth(void **s
                 const float v = cast_shadow_at(&open, &light, method, q, UP);
                 if (v != 1.0f) {
                     fail_msg("%g degrees over an open plate, %s: %.9g", angles[a],
-                             vsh_shadow_method_name(method), (double)v);
+                             vsh_get_name(VSH_NAMES_SHADOW, method), (double)v);
                 }
             }
         }
@@ -74,7 +74,8 @@ static void lamps_of_1e_6_to_1e6_units_are_seen_from_above_and_not_through_the_p
                 const float bare = cast_shadow_at(&c, &light, method, p, NULL);
                 if (lit != 1.0f || turned != 0.0f || !(bare >= 0.0f && bare <= 1.0f)) {
                     fail_msg("%g away, radius %g, %s: %.9g, %.9g, %.9g", away, radius,
-                             vsh_shadow_method_name(method), (double)lit, (double)turned, (double)bare);
+                             vsh_get_name(VSH_NAMES_SHADOW, method), (double)lit, (double)turned,
+                             (double)bare);
                 }
             }
         }
@@ -124,8 +125,8 @@ static void lamps_in_casters_light_nothing_outside(void **state) {
         for (int32_t method = 0; method < shadow_methods(); ++method) {
             const float v = cast_shadow_at(&c, &light, method, p, NULL);
             if (v != 0.0f) {
-                fail_msg("%s: %.9g from (%g, %g, %g)", vsh_shadow_method_name(method), (double)v, p[0], p[1],
-                         p[2]);
+                fail_msg("%s: %.9g from (%g, %g, %g)", vsh_get_name(VSH_NAMES_SHADOW, method), (double)v,
+                         p[0], p[1], p[2]);
             }
         }
         ++i;
@@ -159,7 +160,7 @@ static void lamps_at_the_receiver_are_cut_by_its_horizon_only(void **state) {
                     const float v = cast_shadow_at(&c, &light, method, p, UP);
                     if (whole ? v != 1.0f : !(v >= 0.4f && v <= 1.0f)) {
                         fail_msg("%g voxels away at %g degrees, radius %g, %s: %.9g", parts[d], elevations[e],
-                                 radii[r], vsh_shadow_method_name(method), (double)v);
+                                 radii[r], vsh_get_name(VSH_NAMES_SHADOW, method), (double)v);
                     }
                 }
             }
@@ -327,7 +328,7 @@ static void cast_on_stage(const ranges_stage *s, const vsh_light *light, int32_t
     }
     for (size_t i = 0; i < count; ++i) {
         if (!(values[i] >= 0.0f && values[i] <= 1.0f)) {
-            fail_msg("%s: %g", vsh_shadow_method_name(method), (double)values[i]);
+            fail_msg("%s: %g", vsh_get_name(VSH_NAMES_SHADOW, method), (double)values[i]);
         }
     }
 }
@@ -372,7 +373,7 @@ static void tiny_lights_are_hard_lights(void **state) {
                     const double off = mean_difference(values, hard);
                     if (SIZES[i] < 1e-3 && !(off < 0.002)) {
                         fail_msg("type %d, caster %d, %s, size %g: off by %g", type, (int)s.kind,
-                                 vsh_shadow_method_name(method), SIZES[i], off);
+                                 vsh_get_name(VSH_NAMES_SHADOW, method), SIZES[i], off);
                     }
                 }
             }
@@ -422,8 +423,8 @@ static void suns_just_below_180_degrees_are_as_those_of_179_99(void **state) {
                 cast_on_stage(&s, &light, method, 1.0, FLOOR, positions, normals, values);
                 const double off = mean_difference(values, neighbour);
                 if (!(off < 0.02)) {
-                    fail_msg("caster %d, %s, %.17g: off by %g", (int)s.kind, vsh_shadow_method_name(method),
-                             angles[a], off);
+                    fail_msg("caster %d, %s, %.17g: off by %g", (int)s.kind,
+                             vsh_get_name(VSH_NAMES_SHADOW, method), angles[a], off);
                 }
             }
         }

@@ -30,7 +30,7 @@ static bool here(int kind) {
 }
 
 static const char *name_of(int kind) {
-    return kind < SHADOWS ? vsh_shadow_method_name(kind) : vsh_ao_method_name(kind - SHADOWS);
+    return kind < SHADOWS ? vsh_get_name(VSH_NAMES_SHADOW, kind) : vsh_get_name(VSH_NAMES_AO, kind - SHADOWS);
 }
 
 /* Values that few rays make: they may change by a whole ray where an edge moves by a rounding. */
@@ -240,7 +240,7 @@ static void ao_distances_below_a_voxel_and_above_the_scene_are_what_they_say(voi
                     assert_int_equal(bits_of(v[i]), bits_of(all[i]));
                 }
             }
-            print_message("%s within %g: %.3f from all of the sky\n", vsh_ao_method_name(method),
+            print_message("%s within %g: %.3f from all of the sky\n", vsh_get_name(VSH_NAMES_AO, method),
                           distances[d], worst);
             /* 3 of the standard errors that were asked for; cones see a wall as its edges are smoothed */
             assert_true(distances[d] < 1.0 || method == VSH_AO_TAPS ||

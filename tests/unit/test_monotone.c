@@ -65,7 +65,7 @@ static int measure_all_voxels(void **state) {
                 cast_shadows(&c, &light, method, COUNT, positions, normals, values);
                 const truth_metrics metrics = truth_compare(COUNT, values, truth, outside);
                 print_message("voxel %g, w %g, %s: rmse %.4f\n", voxels[v], ws[w],
-                              vsh_shadow_method_name(method), metrics.rmse);
+                              vsh_get_name(VSH_NAMES_SHADOW, method), metrics.rmse);
                 assert_true(isfinite(metrics.rmse));
                 rmse[kind_of_shadow(w, method)][v] = metrics.rmse;
             }
@@ -74,7 +74,7 @@ static int measure_all_voxels(void **state) {
         for (int32_t method = 0; method < ao_methods(); ++method) {
             cast_ao(&c, method, AO_DISTANCE, COUNT, positions, normals, values);
             const truth_metrics metrics = truth_compare(COUNT, values, truth, outside);
-            print_message("voxel %g, AO %s: rmse %.4f\n", voxels[v], vsh_ao_method_name(method),
+            print_message("voxel %g, AO %s: rmse %.4f\n", voxels[v], vsh_get_name(VSH_NAMES_AO, method),
                           metrics.rmse);
             assert_true(isfinite(metrics.rmse));
             rmse[kind_of_ao(method)][v] = metrics.rmse;
@@ -158,7 +158,9 @@ static void more_rays_are_never_farther_from_the_truth(void **state) {
                                  VSH_OK);
                 const truth_metrics m = truth_compare(COUNT, values, truth, outside);
                 print_message("%s %s, step %d: rmse %.4f\n", ao ? "AO" : "shadow",
-                              ao ? vsh_ao_method_name(method) : vsh_shadow_method_name(method), step, m.rmse);
+                              ao ? vsh_get_name(VSH_NAMES_AO, method)
+                                 : vsh_get_name(VSH_NAMES_SHADOW, method),
+                              step, m.rmse);
                 assert_true(m.rmse < last);
                 last = m.rmse;
             }
@@ -235,7 +237,8 @@ static void a_growing_slab_hides_more(void **state) {
             continue;
         }
         print_message("%s %s rises by %.4f at most, and falls by %.3f\n", kind < SHADOWS ? "shadow" : "AO",
-                      kind < SHADOWS ? vsh_shadow_method_name(method) : vsh_ao_method_name(method),
+                      kind < SHADOWS ? vsh_get_name(VSH_NAMES_SHADOW, method)
+                                     : vsh_get_name(VSH_NAMES_AO, method),
                       (double)rise[kind], (double)fallen[kind]);
         assert_true((double)rise[kind] <= (kind < SHADOWS ? rise_of_shadow(method) : rise_of_ao(method)));
         assert_true(fallen[kind] > 0.05f); /* or nothing was tested; taps sample along the normal only */
@@ -263,7 +266,7 @@ static void a_far_lamp_is_a_sun(void **state) {
         cast_shadows(&c, &s, method, COUNT, positions, normals, values);
         cast_shadows(&c, &l, method, COUNT, positions, normals, far);
         const truth_metrics m = truth_compare(COUNT, far, values, NULL);
-        print_message("%s: rms %.2g, worst %.2g\n", vsh_shadow_method_name(method), m.rmse, m.max);
+        print_message("%s: rms %.2g, worst %.2g\n", vsh_get_name(VSH_NAMES_SHADOW, method), m.rmse, m.max);
         /* a texel of a quarter of a million is one ray, or one edge, that rounds to the other side */
         assert_true(m.rmse < 1e-3);
     }

@@ -25,8 +25,8 @@ static void receivers_deep_inside_are_dark_and_far_outside_are_lit(void **state)
             const vsh_light light = sun(d, i % 2 ? 0.0 : 0.05), from = sun(out, 0.05);
             const float v = cast_shadow_at(&c, &light, method, p, NULL);
             if (v != 0.0f) {
-                fail_msg("inside at (%g, %g, %g), %s: %.9g", p[0], p[1], p[2], vsh_shadow_method_name(method),
-                         (double)v);
+                fail_msg("inside at (%g, %g, %g), %s: %.9g", p[0], p[1], p[2],
+                         vsh_get_name(VSH_NAMES_SHADOW, method), (double)v);
             }
             assert_true(cast_shadow_at(&c, &from, method, q, NULL) == 1.0f);
         }
@@ -35,8 +35,8 @@ static void receivers_deep_inside_are_dark_and_far_outside_are_lit(void **state)
             const float in = cast_ao_at(&c, method, 1.0, p, n), away_from = cast_ao_at(&c, method, 1.0, q, n);
             /* taps go up the normal by the AO distance, and may come out of the solid */
             if ((method == VSH_AO_TAPS ? !(in < 1.0f) : in != 0.0f) || away_from != 1.0f) {
-                fail_msg("AO %s: %.9g at (%g, %g, %g) inside, %.9g outside", vsh_ao_method_name(method),
-                         (double)in, p[0], p[1], p[2], (double)away_from);
+                fail_msg("AO %s: %.9g at (%g, %g, %g) inside, %.9g outside",
+                         vsh_get_name(VSH_NAMES_AO, method), (double)in, p[0], p[1], p[2], (double)away_from);
             }
         }
     }
@@ -65,8 +65,8 @@ static void receivers_at_any_distance_are_lit(void **state) {
                     const bool one_sided = l == 2 || l == 3 ? method < VSH_SHADOW_CONE : false;
                     const float v = cast_shadow_at(&c, &lights[l], method, q, NULL);
                     if (one_sided || l == 4 ? !(v >= 0.0f && v <= 1.0f) : v != 1.0f) {
-                        fail_msg("%g sizes away, light %d, %s: %.9g", away, l, vsh_shadow_method_name(method),
-                                 (double)v);
+                        fail_msg("%g sizes away, light %d, %s: %.9g", away, l,
+                                 vsh_get_name(VSH_NAMES_SHADOW, method), (double)v);
                     }
                 }
             }
@@ -74,7 +74,8 @@ static void receivers_at_any_distance_are_lit(void **state) {
                 assert_true(cast_ao_at(&c, method, scales[s], q, n) == 1.0f);
                 const float v = cast_ao_at(&c, method, 2.0 * far, q, n);
                 if (!(v > (method == VSH_AO_TAPS ? -1.0f : 0.9f) && v <= 1.0f)) {
-                    fail_msg("%g sizes away, AO %s: %.9g", away, vsh_ao_method_name(method), (double)v);
+                    fail_msg("%g sizes away, AO %s: %.9g", away, vsh_get_name(VSH_NAMES_AO, method),
+                             (double)v);
                 }
             }
         }
@@ -133,7 +134,8 @@ static void receivers_on_voxel_planes_see_what_their_neighbours_see(void **state
                     changed += apart > 1e-4;
                 }
             }
-            const char *name = ao ? vsh_ao_method_name(method) : vsh_shadow_method_name(method);
+            const char *name =
+                ao ? vsh_get_name(VSH_NAMES_AO, method) : vsh_get_name(VSH_NAMES_SHADOW, method);
             print_message("beside lattice planes, %s %s: %.3g apart at most, %zu of %d beyond 1e-4\n",
                           ao ? "AO" : "shadow", name, worst, changed, PLACES * SIDES);
             const bool rays =

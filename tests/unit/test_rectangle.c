@@ -28,7 +28,7 @@ static void rays_of_every_kind_see_what_brute_force_sees(void **state) {
             const difference d = compare(values, truth);
             if (!(d.root_mean_square < MOST[m][l]) || (m == 2 && !(fabs(d.bias) < 0.001))) {
                 fail_msg("light %d, %s: off by %g, on average %g, at most %g", l,
-                         vsh_shadow_method_name(METHODS[m]), d.root_mean_square, d.bias, d.largest);
+                         vsh_get_name(VSH_NAMES_SHADOW, METHODS[m]), d.root_mean_square, d.bias, d.largest);
             }
         }
         if (c->triangles != NULL) {
@@ -84,7 +84,8 @@ static void one_march_takes_the_disc_of_equal_solid_angle(void **state) {
             shade(c, &light, &options, values, NULL);
             const difference d = compare(values, truth);
             if (!(d.root_mean_square < 0.12)) {
-                fail_msg("light %d, %s: off by %g", l, vsh_shadow_method_name(method), d.root_mean_square);
+                fail_msg("light %d, %s: off by %g", l, vsh_get_name(VSH_NAMES_SHADOW, method),
+                         d.root_mean_square);
             }
         }
     }
@@ -102,7 +103,7 @@ static void one_march_takes_the_disc_of_equal_solid_angle(void **state) {
         shade(c, &ball, &options, of_ball, NULL);
         for (size_t i = 0; i < COUNT; ++i) {
             if (!(fabsf(values[i] - of_ball[i]) < 1e-6f)) {
-                fail_msg("%s, point %zu: %g, the ball %g", vsh_shadow_method_name(method), i,
+                fail_msg("%s, point %zu: %g, the ball %g", vsh_get_name(VSH_NAMES_SHADOW, method), i,
                          (double)values[i], (double)of_ball[i]);
             }
         }
@@ -120,8 +121,8 @@ static void a_tiny_rectangle_is_a_point(void **state) {
         shade(c, &point, &options, of_point, NULL);
         for (size_t i = 0; i < COUNT; ++i) {
             if (values[i] != of_point[i]) {
-                fail_msg("%s, point %zu: %g, not %g", vsh_shadow_method_name(method), i, (double)values[i],
-                         (double)of_point[i]);
+                fail_msg("%s, point %zu: %g, not %g", vsh_get_name(VSH_NAMES_SHADOW, method), i,
+                         (double)values[i], (double)of_point[i]);
             }
         }
     }

@@ -90,8 +90,8 @@ static void shade_all(const caster *c, const motion *m, values *all) {
 }
 
 static const char *name_of(int kind) {
-    return kind < 2 * SHADOWS ? vsh_shadow_method_name(kind % SHADOWS)
-                              : vsh_ao_method_name(kind - 2 * SHADOWS);
+    return kind < 2 * SHADOWS ? vsh_get_name(VSH_NAMES_SHADOW, kind % SHADOWS)
+                              : vsh_get_name(VSH_NAMES_AO, kind - 2 * SHADOWS);
 }
 
 /* How far two sets of values are apart. */

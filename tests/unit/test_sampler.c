@@ -49,8 +49,8 @@ static void estimates_of_the_error_are_true(void **state) {
         for (int32_t n = 16; n <= MOST; n *= 2) {
             double bias;
             const double ratio = error_over_estimate(KINDS[k], n, &bias);
-            print_message("%s %d: error over estimate %.2f, bias %.5f\n", vsh_sampler_name(KINDS[k]), n,
-                          ratio, bias);
+            print_message("%s %d: error over estimate %.2f, bias %.5f\n",
+                          vsh_get_name(VSH_NAMES_SAMPLER, KINDS[k]), n, ratio, bias);
             assert_true(ratio > 0.5 && ratio < 1.1);
             assert_true(fabs(bias) < 0.012);
         }

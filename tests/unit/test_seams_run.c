@@ -164,16 +164,6 @@ static void options_out_of_range_are_refused(void **state) {
     free(m);
 }
 
-static void names_of_what_is_done_go_both_ways(void **state) {
-    (void)state;
-    assert_int_equal(vsh_seams("fix"), VSH_SEAMS_FIX);
-    assert_int_equal(vsh_seams("keep"), VSH_SEAMS_KEEP);
-    assert_int_equal(vsh_seams("no"), -1);
-    assert_int_equal(vsh_seams(NULL), -1);
-    assert_string_equal(vsh_seams_name(VSH_SEAMS_FIX), "fix");
-    assert_null(vsh_seams_name(3));
-}
-
 static void what_is_no_value_of_light_is_left(void **state) {
     (void)state;
     charts_mesh *m = two_squares(37.0, 1.0);
@@ -235,7 +225,6 @@ int main(void) {
         cmocka_unit_test(what_is_no_value_of_light_is_left),
         cmocka_unit_test(it_is_cancelled_wherever_it_is_and_tells_how_far_it_is),
         cmocka_unit_test(options_out_of_range_are_refused),
-        cmocka_unit_test(names_of_what_is_done_go_both_ways),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -39,7 +39,7 @@ static void the_seeds_floor_is_as_near_to_the_truth_as_promised(void **state) {
         const vsh_shade_stats stats =
             shadows(field, &light, cases[i].method, count, positions, normals, visible);
         const truth_metrics m = truth_compare(count, visible, truth, NULL);
-        const char *name = vsh_shadow_method_name(cases[i].method);
+        const char *name = vsh_get_name(VSH_NAMES_SHADOW, cases[i].method);
         truth_metrics_print(name, &m);
         print_message("%.2f samples a texel\n", (double)stats.samples / (double)count);
         assert_true(m.rmse <= cases[i].rmse);
@@ -103,7 +103,7 @@ static void open_sky_is_exactly_1_at_any_distance_and_size_of_light(void **state
                         const float v = shadow_at(field, &light, method, position, NULL);
                         if (v != 1.0f) {
                             fail_msg("shape %d, %g away, %g degrees, %g apart (least %g), %s: %.9g", shape,
-                                     away, ANGLES[a], apart, least, vsh_shadow_method_name(method),
+                                     away, ANGLES[a], apart, least, vsh_get_name(VSH_NAMES_SHADOW, method),
                                      (double)v);
                         }
                     }
@@ -132,7 +132,8 @@ static void a_plane_is_fully_lit_while_the_whole_light_is_over_its_horizon(void 
                     const float v = shadow_at(field, &light, method, p, UP);
                     if (v != 1.0f) {
                         fail_msg("(%g, %g, %g), %g degrees, %g over the horizon, %s: %.9g", p[0], p[1], p[2],
-                                 ANGLES[a], over * 180.0 / PI, vsh_shadow_method_name(method), (double)v);
+                                 ANGLES[a], over * 180.0 / PI, vsh_get_name(VSH_NAMES_SHADOW, method),
+                                 (double)v);
                     }
                 }
             }
@@ -168,7 +169,7 @@ static void the_middle_of_a_wide_umbra_is_exactly_0_at_any_depth(void **state) {
                         const float v = shadow_at(field, &light, method, p, normal ? UP : NULL);
                         if (v != 0.0f) {
                             fail_msg("%g voxels deep, %g degrees, %s: %.9g", depth, lights[l],
-                                     vsh_shadow_method_name(method), (double)v);
+                                     vsh_get_name(VSH_NAMES_SHADOW, method), (double)v);
                         }
                     }
                 }
@@ -261,7 +262,7 @@ static edge_errors errors_across_an_edge(int32_t method, double tilt) {
     }
     const edge_errors errors = {sqrt(squares), second_differences(values) / second_differences(expected)};
     print_message("%s, tilt %g: rmse %.4f, second differences %.2f of the truth's\n",
-                  vsh_shadow_method_name(method), tilt, errors.rmse, errors.bands);
+                  vsh_get_name(VSH_NAMES_SHADOW, method), tilt, errors.rmse, errors.bands);
     return errors;
 }
 
@@ -295,7 +296,7 @@ static void a_point_near_the_shadow_sees_less_of_larger_lights(void **state) {
             }
             assert_true(last < 1.0f);
         }
-        print_message("%s: rises by %.4f at most\n", vsh_shadow_method_name(method), (double)rise);
+        print_message("%s: rises by %.4f at most\n", vsh_get_name(VSH_NAMES_SHADOW, method), (double)rise);
         /* samples of a ray lie h apart, so how near they come to the least h / t changes with the angle */
         assert_true(rise <=
                     (method == VSH_SHADOW_IMPROVED || method == VSH_SHADOW_PRACTICAL ? 0.025f : 0.015f));

@@ -137,7 +137,7 @@ static void meshes_that_touch_nest_or_coincide_are_one_solid(void **state) {
             const double wide = lightest_umbra(&made, RADIANS(20.0), 1.5, 0.3, method);
             if (hard != 0.0 || narrow != 0.0 || wide != 0.0) {
                 fail_msg("%s, %s: lightest umbra: hard %g, 0.5 degrees %g, 20 degrees %g", cases[c].what,
-                         vsh_shadow_method_name(method), hard, narrow, wide);
+                         vsh_get_name(VSH_NAMES_SHADOW, method), hard, narrow, wide);
             }
         }
         /* and beside the umbra as of the one box: its field's values differ by roundings of the mesh's */
@@ -147,8 +147,8 @@ static void meshes_that_touch_nest_or_coincide_are_one_solid(void **state) {
                 const truth_metrics m = truth_compare(ACROSS, other.v[kind], one.v[kind], NULL);
                 print_message("%s, %s %s: rms %.2g, worst %.2g from the one box\n", cases[c].what,
                               kind < SHADOWS ? "shadow" : "AO",
-                              kind < SHADOWS ? vsh_shadow_method_name(kind)
-                                             : vsh_ao_method_name(kind - SHADOWS),
+                              kind < SHADOWS ? vsh_get_name(VSH_NAMES_SHADOW, kind)
+                                             : vsh_get_name(VSH_NAMES_AO, kind - SHADOWS),
                               m.rmse, m.max);
                 assert_true(m.rmse < 0.01);
             }
@@ -216,8 +216,8 @@ static void fields_that_are_not_1_lipschitz_are_right_where_they_say_so(void **s
                 cast_ao(&made, method, 3.0, COUNT, positions, normals, open);
                 const truth_metrics m = truth_compare(COUNT, open, truth_open, NULL);
                 print_message("values times %g, %s: AO %s, rmse %.4f\n", factors[f],
-                              exact ? "taken as distances" : "made distances", vsh_ao_method_name(method),
-                              m.rmse);
+                              exact ? "taken as distances" : "made distances",
+                              vsh_get_name(VSH_NAMES_AO, method), m.rmse);
                 /* cones' own bias, and the error that rays keep, twice */
                 assert_true(exact || method == VSH_AO_TAPS || m.rmse < 0.04);
                 for (int i = 0; i < COUNT; ++i) {

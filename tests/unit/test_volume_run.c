@@ -433,10 +433,6 @@ static void bad_boxes_bands_and_options_are_refused(void **state) {
     assert_fails(vsh_volume_write(made, "/nowhere/at/all/x.vdb", 0, NULL, 0, &failure), VSH_ERROR_WRITE,
                  "/nowhere");
     vsh_volume_free(made);
-    assert_int_equal(vsh_inside("off"), VSH_INSIDE_OFF);
-    assert_int_equal(vsh_inside("none"), -1);
-    assert_string_equal(vsh_inside_name(VSH_INSIDE_NEAREST), "nearest");
-    assert_null(vsh_inside_name(2));
     vsh_voxels_free(voxels);
     vsh_field_free(field);
 }

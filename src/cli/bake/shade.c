@@ -18,8 +18,8 @@ static bool keeps_error(const vsh_scene *scene) {
 }
 
 static const char *method_of(const vsh_scene *scene) {
-    return scene->light_count > 0 ? vsh_shadow_method_name(scene->shade.method)
-                                  : vsh_ao_method_name(scene->shade.ao_method);
+    return scene->light_count > 0 ? vsh_get_name(VSH_NAMES_SHADOW, scene->shade.method)
+                                  : vsh_get_name(VSH_NAMES_AO, scene->shade.ao_method);
 }
 
 /* Who asks for an error is to get it: a method that keeps none is none that was meant, unless it was named.

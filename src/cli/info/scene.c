@@ -47,14 +47,14 @@ static void print_light(const vsh_light *light) {
 
 static void print_layer(const vsh_scene_layer *layer) {
     const vsh_layer *shade = &layer->shade;
-    printf("layer '%s': combine %s", layer->name, vsh_combine_name(shade->combine));
+    printf("layer '%s': combine %s", layer->name, vsh_get_name(VSH_NAMES_COMBINE, shade->combine));
     if (layer->voxel_size > 0.0) {
         printf(", voxel size %g", layer->voxel_size);
     } else if (layer->resolution > 0) {
         printf(", resolution %d", layer->resolution);
     }
     if (shade->method >= 0) {
-        printf(", method %s", vsh_shadow_method_name(shade->method));
+        printf(", method %s", vsh_get_name(VSH_NAMES_SHADOW, shade->method));
     }
     if (shade->softness != 1.0) {
         printf(", softness %g", shade->softness);
@@ -75,14 +75,15 @@ static bool print_flat(const char *path, const vsh_run *run) {
     }
     const vsh_flat_options *o = &scene->options;
     printf("flat scene: %g %g to %g %g, %d × %d, method %s\n", o->region_min[0], o->region_min[1],
-           o->region_max[0], o->region_max[1], o->width, o->height, vsh_flat_method_name(o->method));
+           o->region_max[0], o->region_max[1], o->width, o->height, vsh_get_name(VSH_NAMES_FLAT, o->method));
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const char *file = scene->casters[i].path;
         printf("caster %zu: %s%s%s\n", i, casters[scene->casters[i].type], file != NULL ? " " : "",
                file != NULL ? file : "");
     }
     for (size_t i = 0; i < scene->light_count; ++i) {
-        printf("light '%s': %s\n", scene->lights[i].name, vsh_flat_light_name(scene->lights[i].type));
+        printf("light '%s': %s\n", scene->lights[i].name,
+               vsh_get_name(VSH_NAMES_FLAT_LIGHT, scene->lights[i].type));
     }
     vsh_flat_scene_free(scene);
     return true;
@@ -113,9 +114,10 @@ int cli_info_scene(const char *path, const vsh_run *run) {
     } else {
         printf("resolution: %d\n", scene->grid.resolution);
     }
-    printf("method: %s\n", vsh_shadow_method_name(scene->shade.method));
+    printf("method: %s\n", vsh_get_name(VSH_NAMES_SHADOW, scene->shade.method));
     if (scene->ao) {
-        printf("ao: %s, within %g\n", vsh_ao_method_name(scene->shade.ao_method), scene->shade.ao_distance);
+        printf("ao: %s, within %g\n", vsh_get_name(VSH_NAMES_AO, scene->shade.ao_method),
+               scene->shade.ao_distance);
     }
     vsh_scene_free(scene);
     return CLI_OK;

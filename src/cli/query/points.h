@@ -9,9 +9,8 @@
 #include "cli/temporary.h"
 #include "table/table.h"
 
-/* "csv" to VSHI_TABLE_CSV and back; -1 and NULL for what is none. */
-int32_t cli_points_format(const char *name);
-const char *cli_points_format_name(int32_t format);
+/* Parses an option's "csv", "ply" or "raw" to VSHI_TABLE_CSV, …; returns an exit code. */
+int cli_points_parse_format(const char *option, const char *text, int32_t *format);
 int32_t cli_points_format_of_path(const char *path); /* by its ending; -1 */
 
 /* Rows in memory. */

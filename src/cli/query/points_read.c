@@ -18,8 +18,6 @@ enum { NX = 3 }; /* columns before the normal */
 
 enum { TOLD = 5 }; /* bad rows that are told one by one */
 
-static const char *const format_names[] = {"csv", "ply", "raw"};
-
 static const struct {
     const char *ending;
     int32_t format;
@@ -28,17 +26,14 @@ static const struct {
     {"ply", VSHI_TABLE_PLY}, {"raw", VSHI_TABLE_RAW}, {"f32", VSHI_TABLE_RAW}, {"bin", VSHI_TABLE_RAW},
 };
 
-int32_t cli_points_format(const char *name) {
-    for (int32_t i = 0; i < 3; ++i) {
-        if (strcmp(name, format_names[i]) == 0) {
-            return i;
+int cli_points_parse_format(const char *option, const char *text, int32_t *format) {
+    static const char *const names[] = {"csv", "ply", "raw"};
+    for (*format = 0; *format < 3; ++*format) {
+        if (strcmp(text, names[*format]) == 0) {
+            return CLI_OK;
         }
     }
-    return -1;
-}
-
-const char *cli_points_format_name(int32_t format) {
-    return format >= 0 && format < 3 ? format_names[format] : NULL;
+    return cli_usage("%s '%s': expected one of csv, ply, raw", option, text);
 }
 
 int32_t cli_points_format_of_path(const char *path) {

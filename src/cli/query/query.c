@@ -84,9 +84,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
         s->points = value;
         return CLI_OK;
     case KEY_POINTS_FORMAT:
-        return cli_parse_name(name, value, cli_points_format, cli_points_format_name, &s->points_format);
+        return cli_points_parse_format(name, value, &s->points_format);
     case KEY_FORMAT:
-        return cli_parse_name(name, value, cli_points_format, cli_points_format_name, &s->format);
+        return cli_points_parse_format(name, value, &s->format);
     case KEY_NORMALS:
         s->normals = strcmp(value, "yes") == 0;
         return s->normals == 1 || strcmp(value, "no") == 0

@@ -78,7 +78,8 @@ void trade_name_run(const trade_work *work, trade_run *run) {
         snprintf(run->options, room, "--max-error %g", task->max_error);
         return;
     }
-    run->method = ao ? vsh_ao_method_name(task->method) : vsh_shadow_method_name(task->method);
+    run->method =
+        ao ? vsh_get_name(VSH_NAMES_AO, task->method) : vsh_get_name(VSH_NAMES_SHADOW, task->method);
     run->resolution = work->fields[task->field].resolution;
     if (task->max_error > 0.0) {
         snprintf(more, sizeof more, " --max-error %g", task->max_error);

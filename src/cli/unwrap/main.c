@@ -87,8 +87,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
         s->picture = value;
         return CLI_OK;
     case KEY_ATLAS:
-        o->atlas = vsh_atlas_kind(value);
-        return o->atlas >= 0 ? CLI_OK : cli_usage("%s '%s': expected shared or objects", name, value);
+        return cli_parse_name(name, value, VSH_NAMES_ATLAS, &o->atlas);
     case KEY_SIZE:
         s->has_size = true;
         return cli_parse_size(name, value, &o->width, &o->height);

@@ -119,7 +119,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_LIKE:
         return take_like(s, name, value);
     case KEY_INSIDE:
-        return cli_parse_name(name, value, vsh_inside, vsh_inside_name, &s->inside);
+        return cli_parse_name(name, value, VSH_NAMES_INSIDE, &s->inside);
     default:
         break;
     }

@@ -75,7 +75,7 @@ def flat_visibility(casters: Optional[Outline], light: Light, points: ArrayLike)
 
 def flat_light_name(type: int) -> Optional[str]:
     """What a light of a type's number is in a plane: "directional", "disc", "spot"; None where there is none."""
-    name = lib.vsh_flat_light_name(type)
+    name = lib.vsh_get_name(lib.VSH_NAMES_FLAT_LIGHT, type)
     return None if name == ffi.NULL else ffi.string(name).decode()
 
 
