@@ -139,7 +139,7 @@ enum {
     VSH_ISA_AVX512 = 3 /* F, DQ and VL */
 };
 
-/* What has names in files and on command lines: VSH_NAMES_SHADOW are those of VSH_SHADOW_…. */
+/* Kinds of names in files and on command lines. VSH_NAMES_SHADOW stands for the names of VSH_SHADOW_…. */
 enum {
     VSH_NAMES_ISA = 0,
     VSH_NAMES_SHADOW = 1,          /* method.h */

@@ -1,4 +1,4 @@
-/* What shadow and AO methods are like. */
+/* Traits of shadow and AO methods. */
 #include <vdbshade/method.h>
 
 enum {
