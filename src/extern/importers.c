@@ -1,14 +1,15 @@
 /* Assimp and Draco are loaded when the first file asks for them: of what a program takes to start, loading
- * them with the library was half (2.5 ms, 43 000 relocations), and glTF, OBJ and PLY need neither. */
+ * them with the library was half (2.5 ms, 43 000 relocations), and glTF, OBJ and PLY need neither. Static
+ * libraries and tests link importers.cpp instead. */
 #include "extern/importers.h"
 #include "extern/module.h"
 
 static vshi_module module = VSHI_MODULE("models of this kind", "importers", 16 << 20, 0);
 
-static const vshi_importers_table *at(void) {
-    return vshi_module_table(&module);
+vsh_result vshi_importers_load(vsh_error *error) {
+    return vshi_module_load(&module, error);
 }
 
-VSHI_IMPORTERS_MAKES(VSHI_PASS_MAKE)
-VSHI_IMPORTERS_GIVES(VSHI_PASS_GIVE)
-VSHI_IMPORTERS_DOES(VSHI_PASS_DO)
+const vshi_importers_table *vshi_importers(void) {
+    return vshi_module_table(&module);
+}

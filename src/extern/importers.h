@@ -1,52 +1,73 @@
-/* What the module of importers gives, and importers.c passes on: Assimp and Draco. */
+/* The module of importers: Assimp, and Draco's decoder (KHR_draco_mesh_compression of glTF). */
 #ifndef VSHI_IMPORTERS_H
 #define VSHI_IMPORTERS_H
 
-#include "extern/assimp.h"
-#include "extern/draco.h"
-#include "extern/module_calls.h"
+#include "base/job.h"
+#include "base/shared.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-#define VSHI_IMPORTERS_MAKES(MAKE)                                                                           \
-    MAKE(vshi_import_read,                                                                                   \
-         (const char *path, bool outside, vshi_job *job, size_t units, vshi_import **import,                 \
-          vsh_error *error),                                                                                 \
-         (path, outside, job, units, import, error), import)                                                 \
-    MAKE(vshi_draco_decode,                                                                                  \
-         (const unsigned char *bytes, size_t size, const char *what, vshi_draco **mesh, vsh_error *error),   \
-         (bytes, size, what, mesh, error), mesh)
+struct aiScene;
+struct aiString;
 
-#define VSHI_IMPORTERS_GIVES(GIVE)                                                                           \
-    GIVE(double, vshi_import_unit, (const vshi_import *import), (import))                                    \
-    GIVE(const struct aiScene *, vshi_import_scene, (const vshi_import *import), (import))                   \
-    GIVE(float, vshi_import_opacity, (const struct aiScene *scene, unsigned material), (scene, material))    \
-    GIVE(bool, vshi_import_material_name,                                                                    \
-         (const struct aiScene *scene, unsigned material, struct aiString *name), (scene, material, name))   \
-    GIVE(size_t, vshi_draco_vertex_count, (const vshi_draco *mesh), (mesh))                                  \
-    GIVE(size_t, vshi_draco_triangle_count, (const vshi_draco *mesh), (mesh))                                \
-    GIVE(bool, vshi_draco_attribute, (const vshi_draco *mesh, uint32_t id, int components, float *values),   \
-         (mesh, id, components, values))                                                                     \
-    GIVE(bool, vshi_draco_elements,                                                                          \
-         (const vshi_draco *mesh, uint32_t id, int type, int components, void *values),                      \
-         (mesh, id, type, components, values))
+/* A file that Assimp has read. */
+typedef struct vshi_import {
+    const struct aiScene *scene; /* belongs to the import */
+    double unit;                 /* metres in one unit of an FBX, unscaled by Assimp; 0: another format */
+} vshi_import;
 
-#define VSHI_IMPORTERS_DOES(DO)                                                                              \
-    DO(vshi_draco_indices, (const vshi_draco *mesh, uint32_t *indices), (mesh, indices))                     \
-    DO(vshi_import_free, (vshi_import * import), (import))                                                   \
-    DO(vshi_draco_free, (vshi_draco * mesh), (mesh))
+/* A triangle mesh that Draco has decoded. */
+typedef struct vshi_draco {
+    size_t vertex_count, triangle_count;
+} vshi_draco;
+
+/* Types of components, by glTF's numbers. */
+enum {
+    VSHI_DRACO_BYTE = 5120,
+    VSHI_DRACO_UBYTE = 5121,
+    VSHI_DRACO_SHORT = 5122,
+    VSHI_DRACO_USHORT = 5123,
+    VSHI_DRACO_UINT = 5125,
+    VSHI_DRACO_FLOAT = 5126
+};
 
 typedef struct vshi_importers_table {
     const char *version; /* of the header that it was built with */
-    VSHI_IMPORTERS_MAKES(VSHI_MEMBER_MAKE)
-    VSHI_IMPORTERS_GIVES(VSHI_MEMBER_GIVE)
-    VSHI_IMPORTERS_DOES(VSHI_MEMBER_DO)
+
+    /* Reads the file as it is: polygons stay polygons, nothing is joined, generated or transformed. Opens
+     * only regular files that the file names, in its folder or `outside`: else VSH_ERROR_INPUT. Advances the
+     * job by up to `units`. Errors: VSH_ERROR_READ with Assimp's reason, VSH_ERROR_MEMORY,
+     * VSH_ERROR_CANCELLED (the readers of OBJ and a few others listen). */
+    vsh_result (*read)(const char *path, bool outside, vshi_job *job, size_t units, vshi_import **import,
+                       vsh_error *error);
+    void (*free)(vshi_import *import);
+
+    /* Of a material: its opacity, 1 if the file gives none; its name, false if the file gives none. */
+    float (*opacity)(const struct aiScene *scene, unsigned material);
+    bool (*material_name)(const struct aiScene *scene, unsigned material, struct aiString *name);
+
+    /* Decodes a triangle mesh. Errors: VSH_ERROR_INPUT with Draco's reason, VSH_ERROR_MEMORY. */
+    vsh_result (*draco_decode)(const unsigned char *bytes, size_t size, const char *what, vshi_draco **mesh,
+                               vsh_error *error);
+    void (*draco_free)(vshi_draco *mesh);
+
+    void (*draco_indices)(const vshi_draco *mesh, uint32_t *indices); /* [triangle_count][3] */
+
+    /* [vertex_count][components] of the attribute `id` as numbers of a VSHI_DRACO_… type; false where there
+     * is no such attribute, or it has another number of components. */
+    bool (*draco_elements)(const vshi_draco *mesh, uint32_t id, int type, int components, void *values);
 } vshi_importers_table;
 
 /* The module's one symbol. */
-extern const vshi_importers_table vshi_importers_module;
+VSHI_SHARED extern const vshi_importers_table vshi_importers_module;
+
+/* Loads the module. Errors: as of vshi_module_load(). */
+vsh_result vshi_importers_load(vsh_error *error);
+
+/* NULL before vshi_importers_load(). */
+const vshi_importers_table *vshi_importers(void);
 
 #ifdef __cplusplus
 }

@@ -12,6 +12,26 @@ static const vshi_openvdb_table *at(void) {
 
 static int *const nothing = NULL;
 
-VSHI_OPENVDB_MAKES(VSHI_PASS_MAKE)
-VSHI_OPENVDB_GIVES(VSHI_PASS_GIVE)
-VSHI_OPENVDB_DOES(VSHI_PASS_DO)
+#define PASS_MAKE(name, parameters, arguments, none)                                                         \
+    vsh_result name parameters {                                                                             \
+        const vsh_result result = vshi_module_load(&module, error);                                          \
+        if (result == VSH_OK) {                                                                              \
+            return at()->name arguments;                                                                     \
+        }                                                                                                    \
+        if ((none) != NULL) {                                                                                \
+            *(none) = 0;                                                                                     \
+        }                                                                                                    \
+        return result;                                                                                       \
+    }
+#define PASS_GIVE(result, name, parameters, arguments)                                                       \
+    result name parameters {                                                                                 \
+        return at()->name arguments;                                                                         \
+    }
+#define PASS_DO(name, parameters, arguments)                                                                 \
+    void name parameters {                                                                                   \
+        if (at() != NULL) {                                                                                  \
+            at()->name arguments;                                                                            \
+        }                                                                                                    \
+    }
+
+VSHI_OPENVDB_CALLS(PASS_MAKE, PASS_GIVE, PASS_DO)

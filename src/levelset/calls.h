@@ -1,9 +1,14 @@
-/* What the module of level sets gives, and openvdb.c passes on: everything that is compiled against OpenVDB.
- */
-#ifndef VSHI_OPENVDB_TABLE_H
-#define VSHI_OPENVDB_TABLE_H
+/* The calls of the module of level sets, which is everything that is compiled against OpenVDB. This list
+ * makes the members of the module's table, their values, and the library's functions that call them
+ * (calls.c).
+ *
+ * MAKE(name, parameters, arguments, none) returns a vsh_result and loads the module; its last parameter is
+ * `vsh_error *error`. If the module cannot be loaded it sets what `none` points to, if not NULL, to 0.
+ * GIVE(result, name, parameters, arguments) needs a handle that a MAKE made. DO(name, parameters, arguments)
+ * returns nothing, and does nothing before the module is loaded: there is nothing to free. */
+#ifndef VSHI_LEVELSET_CALLS_H
+#define VSHI_LEVELSET_CALLS_H
 
-#include "extern/module_calls.h"
 #include "levelset/leaves.h"
 #include "levelset/serve.h"
 #include "levelset/volume.h"
@@ -15,7 +20,7 @@
 extern "C" {
 #endif
 
-#define VSHI_OPENVDB_MAKES(MAKE)                                                                             \
+#define VSHI_OPENVDB_CALLS(MAKE, GIVE, DO)                                                                   \
     MAKE(vsh_grid_from_meshes,                                                                               \
          (const vsh_mesh *meshes, size_t count, const vsh_grid_options *options, const vsh_run *run,         \
           vsh_grid **grid, vsh_error *error),                                                                \
@@ -109,9 +114,7 @@ extern "C" {
           double held, vsh_volume **volume, vsh_error *error),                                               \
          (voxels, channels, count, run, held, volume, error), volume)                                        \
     MAKE(vshi_volume_close, (vsh_volume * volume, const vsh_volume_info *counts, vsh_error *error),          \
-         (volume, counts, error), nothing)
-
-#define VSHI_OPENVDB_GIVES(GIVE)                                                                             \
+         (volume, counts, error), nothing)                                                                   \
     GIVE(size_t, vshi_grid_leaves, (const vsh_grid *grid, vshi_leaf *leaves, size_t capacity),               \
          (grid, leaves, capacity))                                                                           \
     GIVE(const double *, vshi_grid_transform, (const vsh_grid *grid), (grid))                                \
@@ -121,9 +124,7 @@ extern "C" {
          (volume, channel, block))                                                                           \
     GIVE(const vshi_block *, vshi_voxels_blocks, (const vsh_voxels *voxels, size_t *count), (voxels, count)) \
     GIVE(size_t, vshi_voxels_find, (const vsh_voxels *voxels, const int32_t origin[3]), (voxels, origin))    \
-    GIVE(double, vshi_voxels_longest_axis, (const vsh_voxels *voxels), (voxels))
-
-#define VSHI_OPENVDB_DOES(DO)                                                                                \
+    GIVE(double, vshi_voxels_longest_axis, (const vsh_voxels *voxels), (voxels))                             \
     DO(vsh_grid_get_info, (const vsh_grid *grid, vsh_grid_info *info), (grid, info))                         \
     DO(vsh_grid_free, (vsh_grid * grid), (grid))                                                             \
     DO(vsh_voxels_get_info, (const vsh_voxels *voxels, vsh_voxels_info *info), (voxels, info))               \
@@ -147,11 +148,13 @@ extern "C" {
        (const vsh_voxels *voxels, size_t block, size_t count, const uint16_t *voxel, double(*centres)[3]),   \
        (voxels, block, count, voxel, centres))
 
+#define VSHI_MEMBER_MAKE(name, parameters, arguments, none) vsh_result(*name) parameters;
+#define VSHI_MEMBER_GIVE(result, name, parameters, arguments) result(*name) parameters;
+#define VSHI_MEMBER_DO(name, parameters, arguments) void(*name) parameters;
+
 typedef struct vshi_openvdb_table {
     const char *version; /* of the header that it was built with */
-    VSHI_OPENVDB_MAKES(VSHI_MEMBER_MAKE)
-    VSHI_OPENVDB_GIVES(VSHI_MEMBER_GIVE)
-    VSHI_OPENVDB_DOES(VSHI_MEMBER_DO)
+    VSHI_OPENVDB_CALLS(VSHI_MEMBER_MAKE, VSHI_MEMBER_GIVE, VSHI_MEMBER_DO)
 } vshi_openvdb_table;
 
 /* The module's one symbol. */

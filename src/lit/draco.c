@@ -1,7 +1,7 @@
 #include "lit/draco.h"
 
 #include "base/memory.h"
-#include "extern/draco.h"
+#include "extern/importers.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -66,10 +66,10 @@ static vsh_result take_attribute(vshi_lit_document *document, const vshi_draco *
     VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
     *attribute = (vshi_lit_draco_attribute){id, accessor.type, accessor.components, NULL};
     const size_t size = (size_t)accessor.components * sizeof(float); /* at most, of a component */
-    VSHI_TRY(
-        vshi_gltf_allocate(gltf, (void **)&attribute->values, vshi_draco_vertex_count(mesh), size, error));
-    return accessor.components <= 4 && vshi_draco_elements(mesh, (uint32_t)id, accessor.type,
-                                                           accessor.components, attribute->values)
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&attribute->values, mesh->vertex_count, size, error));
+    return accessor.components <= 4 &&
+                   vshi_importers()->draco_elements(mesh, (uint32_t)id, accessor.type, accessor.components,
+                                                    attribute->values)
                ? VSH_OK
                : vshi_gltf_fail(gltf, error, "%s: its Draco data has no attribute %zu of %d components",
                                 where, id, accessor.components);
@@ -77,12 +77,12 @@ static vsh_result take_attribute(vshi_lit_document *document, const vshi_draco *
 
 static vsh_result take_indices(vshi_lit_document *document, const vshi_draco *mesh, const char *where,
                                vshi_lit_draco *draco, vsh_error *error) {
-    draco->vertex_count = vshi_draco_vertex_count(mesh);
-    draco->triangle_count = vshi_draco_triangle_count(mesh);
+    draco->vertex_count = mesh->vertex_count;
+    draco->triangle_count = mesh->triangle_count;
     VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)&draco->indices, draco->triangle_count,
                                 sizeof(uint32_t[3]), error));
     if (draco->triangle_count > 0) {
-        vshi_draco_indices(mesh, draco->indices);
+        vshi_importers()->draco_indices(mesh, draco->indices);
     }
     for (size_t i = 0; i < 3 * draco->triangle_count; ++i) {
         if (draco->indices[i] >= draco->vertex_count) {
@@ -122,9 +122,10 @@ static vsh_result decode(vshi_lit_document *document, json_t *primitive, vshi_li
     }
     VSHI_TRY(vshi_gltf_view(gltf, view, &bytes, &stride, error));
     vshi_draco *mesh = NULL;
-    VSHI_TRY(vshi_draco_decode(bytes.at, bytes.size, gltf->path, &mesh, error));
+    VSHI_TRY(vshi_importers_load(error));
+    VSHI_TRY(vshi_importers()->draco_decode(bytes.at, bytes.size, gltf->path, &mesh, error));
     const vsh_result result = take(document, mesh, primitive, where, draco, error);
-    vshi_draco_free(mesh);
+    vshi_importers()->draco_free(mesh);
     return result;
 }
 

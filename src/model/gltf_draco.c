@@ -2,7 +2,7 @@
 #include "model/gltf.h"
 
 #include "base/memory.h"
-#include "extern/draco.h"
+#include "extern/importers.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,9 +17,10 @@ static vsh_result take_attribute(vshi_gltf *gltf, const vshi_draco *mesh, const 
     if (id == SIZE_MAX) {
         return VSH_OK;
     }
-    const size_t count = vshi_draco_vertex_count(mesh), size = (size_t)components * sizeof **values;
+    const size_t count = mesh->vertex_count, size = (size_t)components * sizeof **values;
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)values, count, size, error));
-    if (id > UINT32_MAX || !vshi_draco_attribute(mesh, (uint32_t)id, components, *values)) {
+    if (id > UINT32_MAX ||
+        !vshi_importers()->draco_elements(mesh, (uint32_t)id, VSHI_DRACO_FLOAT, components, *values)) {
         return vshi_gltf_fail(gltf, error, "%s: its Draco data has no attribute %zu of %d components", where,
                               id, components);
     }
@@ -28,9 +29,9 @@ static vsh_result take_attribute(vshi_gltf *gltf, const vshi_draco *mesh, const 
 
 static vsh_result take_indices(vshi_gltf *gltf, const vshi_draco *mesh, const char *where,
                                vshi_model_shape *shape, vsh_error *error) {
-    const size_t count = vshi_draco_triangle_count(mesh);
+    const size_t count = mesh->triangle_count;
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&shape->indices, count, sizeof(uint32_t[3]), error));
-    vshi_draco_indices(mesh, shape->indices);
+    vshi_importers()->draco_indices(mesh, shape->indices);
     for (size_t i = 0; i < 3 * count; ++i) {
         if (shape->indices[i] >= shape->vertex_count) {
             return vshi_gltf_fail(gltf, error, "%s: its Draco data uses vertex %u of %zu", where,
@@ -43,7 +44,7 @@ static vsh_result take_indices(vshi_gltf *gltf, const vshi_draco *mesh, const ch
 
 static vsh_result take_mesh(vshi_gltf *gltf, const vshi_draco *mesh, const json_t *attributes,
                             const char *where, vshi_model_shape *shape, vsh_error *error) {
-    shape->vertex_count = vshi_draco_vertex_count(mesh);
+    shape->vertex_count = mesh->vertex_count;
     VSHI_TRY(take_attribute(gltf, mesh, attributes, "POSITION", 3, where, &shape->positions, error));
     if (shape->positions == NULL) {
         return vshi_gltf_fail(gltf, error, "%s: its Draco data has no positions", where);
@@ -69,8 +70,9 @@ vsh_result vshi_gltf_read_draco(vshi_gltf *gltf, const json_t *extension, const 
         return vshi_gltf_fail(gltf, error, "%s: its Draco data has no buffer view", where);
     }
     VSHI_TRY(vshi_gltf_view(gltf, view, &bytes, &stride, error));
-    VSHI_TRY(vshi_draco_decode(bytes.at, bytes.size, gltf->path, &mesh, error));
+    VSHI_TRY(vshi_importers_load(error));
+    VSHI_TRY(vshi_importers()->draco_decode(bytes.at, bytes.size, gltf->path, &mesh, error));
     const vsh_result result = take_mesh(gltf, mesh, attributes, where, shape, error);
-    vshi_draco_free(mesh);
+    vshi_importers()->draco_free(mesh);
     return result;
 }

@@ -125,12 +125,12 @@ static vsh_result read_file(void *user, vsh_error *error) {
     const vshi_model_source source = {.path = r->path,
                                       .run = r->run,
                                       .job = r->job,
-                                      .scene = vshi_import_scene(import),
+                                      .scene = import->scene,
                                       .keep_normals = wants_normals(r->path),
-                                      .unit = unit > 0.0 ? unit : vshi_import_unit(import),
+                                      .unit = unit > 0.0 ? unit : import->unit,
                                       .in_metres = unit > 0.0};
     const vsh_result result = vshi_model_build(&source, r->model, error);
-    vshi_import_free(import);
+    vshi_importers()->free(import);
     return result;
 }
 

@@ -1,7 +1,7 @@
 /* From Assimp's scene to a model: arrays, polygons cut into triangles, skins at rest, places. */
 #include "base/memory.h"
 #include "base/try.h"
-#include "extern/assimp.h"
+#include "extern/importers.h"
 #include "mesh/mesh.h"
 #include "model/faces.h"
 #include "model/model.h"
@@ -75,7 +75,7 @@ static vsh_result copy_faces(const vshi_model_source *source, const struct aiMes
 
 static int32_t alpha_of(const struct aiScene *scene, const struct aiMesh *mesh) {
     return mesh->mMaterialIndex < scene->mNumMaterials &&
-                   vshi_import_opacity(scene, mesh->mMaterialIndex) < 1.0F
+                   vshi_importers()->opacity(scene, mesh->mMaterialIndex) < 1.0F
                ? VSH_ALPHA_BLENDED
                : VSH_ALPHA_OPAQUE;
 }
@@ -173,7 +173,7 @@ static vsh_result copy_materials(const vshi_model_source *source, vsh_model *mod
     }
     for (unsigned i = 0; i < scene->mNumMaterials; ++i) {
         struct aiString name;
-        if (vshi_import_material_name(scene, i, &name)) {
+        if (vshi_importers()->material_name(scene, i, &name)) {
             VSHI_TRY(vshi_model_copy_line(name.data, &model->materials[i].name, error));
         }
     }

@@ -214,16 +214,20 @@ vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *
                                                    : scan_file(&scan, ending, run, alone, model, error));
     *unit = scan.unit;
     if (*model == NULL) {
-        VSHI_TRY_DONE(vshi_import_read(path, run->allow_outside != 0, job, IMPORT_UNITS, import, error));
-        VSHI_TRY_DONE(check_scene(path, vshi_import_scene(*import), scan.faces, job, error));
+        VSHI_TRY_DONE(vshi_importers_load(error));
+        VSHI_TRY_DONE(
+            vshi_importers()->read(path, run->allow_outside != 0, job, IMPORT_UNITS, import, error));
+        VSHI_TRY_DONE(check_scene(path, (*import)->scene, scan.faces, job, error));
     }
     if (vshi_job_advance(job, CHECK_UNITS + (*import == NULL ? IMPORT_UNITS : 0))) {
         result = vshi_job_fail_cancelled(job, error);
     }
 done:
     if (result != VSH_OK) {
-        vshi_import_free(*import);
-        *import = NULL;
+        if (*import != NULL) {
+            vshi_importers()->free(*import);
+            *import = NULL;
+        }
         vsh_model_free(*model);
         *model = NULL;
     }
