@@ -67,7 +67,4 @@ vsh_result vshi_ply_read_plain_rows(vshi_ply_reader *reader, int role, vsh_error
 /* Keeps the vertex that was read. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
 vsh_result vshi_ply_keep_vertex(vshi_ply_reader *reader, vsh_error *error);
 
-/* A number of a binary file. */
-float vshi_ply_float(const char *at, int type, bool big_endian);
-
 #endif

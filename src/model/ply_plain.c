@@ -21,23 +21,11 @@ static size_t row_bytes(const vshi_ply_reader *r) {
     return bytes;
 }
 
-static inline uint32_t word_at(const char *at, bool big_endian) {
-    uint32_t word;
-    memcpy(&word, at, sizeof word);
-    return big_endian != (__BYTE_ORDER__ == __ORDER_BIG_ENDIAN__) ? __builtin_bswap32(word) : word;
-}
-
 static void binary_vertex(vshi_ply_reader *r, const char *at) {
     for (int p = r->element->first; p < r->element->end; at += r->property[p++].size) {
         const vshi_ply_row_property *property = &r->property[p];
-        if (property->role >= VSHI_PLY_NUMBERS) {
-            continue;
-        }
-        if (property->type == VSHI_PLY_FLOAT) {
-            const uint32_t word = word_at(at, r->head.big_endian);
-            memcpy(&r->number[property->role], &word, sizeof word);
-        } else {
-            r->number[property->role] = vshi_ply_float(at, property->type, r->head.big_endian);
+        if (property->role < VSHI_PLY_NUMBERS) {
+            r->number[property->role] = (float)vshi_ply_number(at, property->type, r->head.big_endian);
         }
     }
 }
@@ -107,7 +95,7 @@ static const char *binary_face(const vshi_ply_reader *r, const char *at, const c
         return NULL;
     }
     for (size_t i = 0; i < *count; ++i, at += 4) {
-        corners[i] = word_at(at, r->head.big_endian);
+        corners[i] = vshi_ply_word(at, r->head.big_endian);
     }
     return at;
 }

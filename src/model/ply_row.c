@@ -156,28 +156,12 @@ static bool take_text_property(ply_cursor *c, const vshi_ply_row_property *prope
 
 /* --- binary */
 
-float vshi_ply_float(const char *at, int type, bool big_endian) {
-    if (type < VSHI_PLY_FLOAT) {
-        return (float)vshi_bytes_integer(at, 1 << type / 2, type % 2 == 0, big_endian);
-    }
-    const uint64_t bits = vshi_bytes_number(at, type == VSHI_PLY_FLOAT ? 4 : 8, big_endian);
-    if (type == VSHI_PLY_FLOAT) {
-        const uint32_t word = (uint32_t)bits;
-        float number;
-        memcpy(&number, &word, sizeof number);
-        return number;
-    }
-    double number;
-    memcpy(&number, &bits, sizeof number);
-    return (float)number;
-}
-
 /* Indices that are floats (nobody writes them so) are whole, or none. */
 static int64_t index_at(const char *at, int type, bool big_endian) {
     if (type < VSHI_PLY_FLOAT) {
         return vshi_bytes_integer(at, 1 << type / 2, type % 2 == 0, big_endian);
     }
-    const float number = vshi_ply_float(at, type, big_endian);
+    const float number = (float)vshi_ply_number(at, type, big_endian);
     return number >= 0.0F && number <= 16777216.0F && floorf(number) == number ? (int64_t)number : -2;
 }
 
@@ -198,7 +182,7 @@ static bool take_binary_property(ply_cursor *c, const vshi_ply_row_property *pro
     c->at += values * (uint64_t)property->size;
     for (; property->role != VSHI_PLY_NOTHING && at < c->at; at += property->size) {
         if (property->role != VSHI_PLY_CORNERS && property->role != VSHI_PLY_STRIP) {
-            push_number(c, property->role, vshi_ply_float(at, property->type, big));
+            push_number(c, property->role, (float)vshi_ply_number(at, property->type, big));
         } else if (!push_index(c, property->role, index_at(at, property->type, big))) {
             return false;
         }

@@ -2,11 +2,13 @@
 #ifndef VSHI_PLY_H
 #define VSHI_PLY_H
 
+#include "base/bytes.h"
 #include "base/error.h"
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 /* Types of numbers: those below are whole, every second one of them unsigned. */
 enum { VSHI_PLY_FLOAT = 6, VSHI_PLY_DOUBLE = 7 };
@@ -46,6 +48,30 @@ vsh_result vshi_ply_fail_short(const char *name, const vshi_ply_element *element
 /* Bytes of a binary number. */
 static inline int vshi_ply_size(int type) {
     return type < VSHI_PLY_FLOAT ? 1 << type / 2 : type == VSHI_PLY_FLOAT ? 4 : 8;
+}
+
+/* Four bytes of a binary file, by one load. */
+static inline uint32_t vshi_ply_word(const char *bytes, bool big_endian) {
+    uint32_t word;
+    memcpy(&word, bytes, sizeof word);
+    return big_endian != (__BYTE_ORDER__ == __ORDER_BIG_ENDIAN__) ? __builtin_bswap32(word) : word;
+}
+
+/* A number of a binary file. */
+static inline double vshi_ply_number(const char *bytes, int type, bool big_endian) {
+    if (type == VSHI_PLY_FLOAT) {
+        const uint32_t bits = vshi_ply_word(bytes, big_endian);
+        float number;
+        memcpy(&number, &bits, sizeof number);
+        return (double)number;
+    }
+    if (type == VSHI_PLY_DOUBLE) {
+        const uint64_t bits = vshi_bytes_number(bytes, sizeof bits, big_endian);
+        double number;
+        memcpy(&number, &bits, sizeof number);
+        return number;
+    }
+    return (double)vshi_bytes_integer(bytes, vshi_ply_size(type), type % 2 == 0, big_endian);
 }
 
 #endif

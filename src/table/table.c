@@ -1,6 +1,5 @@
 #include "table/table.h"
 
-#include "base/bytes.h"
 #include "base/try.h"
 
 #include <inttypes.h>
@@ -74,25 +73,6 @@ static vsh_result next_line(vshi_table *t, vshi_table_row *row, vsh_error *error
     return VSH_OK;
 }
 
-static double number_of(const char *bytes, int type, bool big_endian) {
-    float single;
-    double wide;
-    uint64_t bits;
-    uint32_t low;
-    switch (type) {
-    case VSHI_PLY_FLOAT: /* sizes that are constants make it one load */
-        low = (uint32_t)vshi_bytes_number(bytes, sizeof low, big_endian);
-        memcpy(&single, &low, sizeof single);
-        return (double)single;
-    case VSHI_PLY_DOUBLE:
-        bits = vshi_bytes_number(bytes, sizeof bits, big_endian);
-        memcpy(&wide, &bits, sizeof wide);
-        return wide;
-    default:
-        return (double)vshi_bytes_integer(bytes, vshi_ply_size(type), type % 2 == 0, big_endian);
-    }
-}
-
 vsh_result vshi_table_next(vshi_table *t, vshi_table_row *row, vsh_error *error) {
     row->bytes = NULL;
     row->bad[0] = '\0';
@@ -113,7 +93,7 @@ vsh_result vshi_table_next(vshi_table *t, vshi_table_row *row, vsh_error *error)
         return fail_short(t, available, error);
     }
     for (int i = 0; i < t->columns; ++i) {
-        row->value[i] = number_of(bytes + t->offset[i], t->type[i], t->ply.big_endian);
+        row->value[i] = vshi_ply_number(bytes + t->offset[i], t->type[i], t->ply.big_endian);
     }
     row->bytes = bytes;
     row->size = t->row_size;
