@@ -1,6 +1,5 @@
-// The module of importers: what Assimp and Draco do for the library. Assimp's C API keeps the last error in
-// one global string, shows no progress and cannot be stopped; an importer of its own for each file has none
-// of this.
+// The module of importers: what Assimp and Draco do for the library. Each file gets an importer of its own,
+// because Assimp's C API keeps the last error in one global string, shows no progress and cannot be stopped.
 #include "extern/importers.h"
 
 #include "base/input.h"
@@ -97,7 +96,7 @@ double unit_of(const aiScene *scene) {
     static const double metres_a_centimetre = 0.01;
     const aiMetadata *facts = scene->mMetaData;
     aiString format;
-    float centimetres = 1.0F; // what FBX is in where it says nothing
+    float centimetres = 1.0F; // the default of FBX
     if (facts == nullptr || !facts->Get(AI_METADATA_SOURCE_FORMAT, format)) {
         return 0.0;
     }

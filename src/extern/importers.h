@@ -44,7 +44,7 @@ typedef struct vshi_importers_table {
                        vsh_error *error);
     void (*free)(vshi_import *import);
 
-    /* Of a material: its opacity, 1 if the file gives none; its name, false if the file gives none. */
+    /* Get a material's opacity, 1 if the file gives none, and its name; false: the file gives none. */
     float (*opacity)(const struct aiScene *scene, unsigned material);
     bool (*material_name)(const struct aiScene *scene, unsigned material, struct aiString *name);
 

@@ -36,9 +36,10 @@ static void free_writer(vsh_image_writer *writer) {
 
 /* Closes the file, and says what its closing came to. */
 static vsh_result close_file(vsh_image_writer *writer, vsh_error *error) {
-    const vsh_result result = writer->plan.exr   ? vshi_exr_end(writer->exr, error)
-                              : writer->plan.png ? vshi_png_end(writer->png, error)
-                                                 : vshi_oiio_end(writer->oiio, error);
+    const vsh_result result = writer->plan.exr       ? vshi_exr_end(writer->exr, error)
+                              : writer->plan.png     ? vshi_png_end(writer->png, error)
+                              : writer->oiio != NULL ? vshi_oiio()->end(writer->oiio, error)
+                                                     : VSH_OK;
     writer->exr = NULL;
     writer->png = NULL;
     writer->oiio = NULL;
@@ -88,8 +89,8 @@ vsh_result vsh_image_writer_create(const char *path, const vsh_image *image, con
     } else if (plan->png) {
         VSHI_TRY_DONE(vshi_png_begin(temporary, made->path, &plan->planes, plan->bits, &made->png, error));
     } else {
-        VSHI_TRY_DONE(vshi_oiio_begin(temporary, made->path, &plan->format, &plan->planes, plan->bits,
-                                      &made->oiio, error));
+        VSHI_TRY_DONE(vshi_oiio()->begin(temporary, made->path, &plan->format, &plan->planes, plan->bits,
+                                         &made->oiio, error));
     }
     *writer = made;
     made = NULL;
@@ -162,7 +163,7 @@ vsh_result vsh_image_writer_add(vsh_image_writer *writer, int32_t rows, const fl
     count_clipped(writer, (size_t)rows * (size_t)list->width, planes);
     const vsh_result result = writer->plan.exr   ? vshi_exr_add(writer->exr, list, rows, error)
                               : writer->plan.png ? vshi_png_add(writer->png, list, rows, error)
-                                                 : vshi_oiio_add(writer->oiio, list, rows, error);
+                                                 : vshi_oiio()->add(writer->oiio, list, rows, error);
     writer->row += rows;
     return result;
 }
@@ -229,5 +230,5 @@ uint64_t vsh_image_writer_bytes(const char *path, const vsh_image *image, const 
     }
     return (uint64_t)(plan.exr   ? vshi_exr_writer_bytes(&plan.planes, plan.bits)
                       : plan.png ? vshi_png_writer_bytes(&plan.planes, plan.bits)
-                                 : vshi_oiio_writer_bytes(&plan.format, &plan.planes, plan.bits));
+                                 : vshi_oiio()->writer_bytes(&plan.format, &plan.planes, plan.bits));
 }

@@ -53,24 +53,26 @@ static vsh_result check_image(const char *path, const vsh_image *image, vsh_erro
 
 /* A format of OpenImageIO's. */
 static vsh_result plan_other(const char *path, const char *ending, vshi_format *format, vsh_error *error) {
-    VSHI_TRY(vshi_oiio_have(path, error));
-    const char *refusal = vshi_oiio_refusal(path);
+    static const char others[] =
+        "tif, jpg, tga, bmp, hdr, ppm, pgm, webp, jp2, dpx, gif, sgi, iff, rla, ico, heic, avif";
+    VSHI_TRY(vshi_oiio_load(path, error));
+    const char *refusal = vshi_oiio()->refusal(path);
     if (refusal != NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "%s: '%s' is not written: %s; expected one of exr, png, %s", path, ending, refusal,
-                         vshi_oiio_endings());
+                         others);
     }
-    return vshi_oiio_format(path, format)
+    return vshi_oiio()->format(path, format)
                ? VSH_OK
                : vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: ending '%s': expected one of exr, png, %s", path,
-                           ending, vshi_oiio_endings());
+                           ending, others);
 }
 
 bool vshi_image_is_written(const char *path) {
     const char *ending = vshi_path_ending(path);
     vshi_format format;
     return strcasecmp(ending, "exr") == 0 || strcasecmp(ending, vshi_png_format.name) == 0 ||
-           (vshi_oiio_have(path, NULL) == VSH_OK && vshi_oiio_format(path, &format));
+           (vshi_oiio_load(path, NULL) == VSH_OK && vshi_oiio()->format(path, &format));
 }
 
 static vsh_result plan_format(const char *path, const vsh_image *image, vshi_write_plan *plan,

@@ -107,13 +107,11 @@ int rows_of_band(int64_t width, int64_t height, int64_t count) {
     return static_cast<int>(std::clamp<int64_t>(BAND / (width * count), 1, std::min(height, MOST_ROWS)));
 }
 
-} // namespace vshi
-
-const char *vshi_oiio_refusal(const char *path) {
+const char *refusal_of(const char *path) {
     const char *reason = nullptr;
-    vshi::guard(nullptr, VSH_ERROR_INTERNAL, path, [&]() -> vsh_result {
-        const std::string ending = vshi::ending_of(path);
-        for (const auto &entry : vshi::refused) {
+    guard(nullptr, VSH_ERROR_INTERNAL, path, [&]() -> vsh_result {
+        const std::string ending = ending_of(path);
+        for (const auto &entry : refused) {
             reason = ending == entry.ending ? entry.reason : reason;
         }
         return VSH_OK;
@@ -121,15 +119,15 @@ const char *vshi_oiio_refusal(const char *path) {
     return reason;
 }
 
-bool vshi_oiio_format(const char *path, vshi_format *format) {
+bool find_format(const char *path, vshi_format *format) {
     bool found = false;
-    if (vshi_oiio_refusal(path) != nullptr) {
+    if (refusal_of(path) != nullptr) {
         return false;
     }
-    vshi::guard(nullptr, VSH_ERROR_INTERNAL, path, [&]() -> vsh_result {
-        const std::string ending = vshi::ending_of(path);
-        const std::string name = vshi::format_of_ending(ending);
-        for (const vshi_format &entry : vshi::writable) {
+    guard(nullptr, VSH_ERROR_INTERNAL, path, [&]() -> vsh_result {
+        const std::string ending = ending_of(path);
+        const std::string name = format_of_ending(ending);
+        for (const vshi_format &entry : writable) {
             if (name == entry.name) {
                 *format = entry;
                 format->grey = ending == "pgm";
@@ -140,3 +138,5 @@ bool vshi_oiio_format(const char *path, vshi_format *format) {
     });
     return found;
 }
+
+} // namespace vshi

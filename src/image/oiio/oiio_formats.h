@@ -7,6 +7,12 @@
 
 namespace vshi {
 
+// Functions of the module's table.
+bool find_format(const char *path, vshi_format *format);
+const char *refusal_of(const char *path);
+vsh_result read_image(const char *path, const vshi_image_bytes *bytes, const vsh_run *run,
+                      vsh_image_file **file, vsh_error *error);
+
 // Lower case, without the dot.
 std::string ending_of(const char *path);
 

@@ -139,11 +139,10 @@ vsh_result read_file(const char *path, const vshi_image_bytes *bytes, const vsh_
 
 } // namespace
 
-} // namespace vshi
-
-vsh_result vshi_oiio_read(const char *path, const vshi_image_bytes *bytes, const vsh_run *run,
-                          vsh_image_file **file, vsh_error *error) {
+vsh_result read_image(const char *path, const vshi_image_bytes *bytes, const vsh_run *run,
+                      vsh_image_file **file, vsh_error *error) {
     *file = nullptr;
-    return vshi::guard(error, VSH_ERROR_READ, path,
-                       [&] { return vshi::read_file(path, bytes, run, file, error); });
+    return guard(error, VSH_ERROR_READ, path, [&] { return read_file(path, bytes, run, file, error); });
 }
+
+} // namespace vshi

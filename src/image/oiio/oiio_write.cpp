@@ -298,39 +298,38 @@ std::unique_ptr<vshi_oiio_writer> make_writer(const char *temporary, const char 
     }
 }
 
-} // namespace
-
-} // namespace vshi
-
-vsh_result vshi_oiio_begin(const char *temporary, const char *path, const vshi_format *format,
-                           const vshi_planes *planes, int32_t bits, vshi_oiio_writer **writer,
-                           vsh_error *error) {
-    return vshi::guard(error, VSH_ERROR_WRITE, path, [&]() -> vsh_result {
-        auto made = vshi::make_writer(temporary, path, *format, *planes, bits);
+vsh_result begin_file(const char *temporary, const char *path, const vshi_format *format,
+                      const vshi_planes *planes, int32_t bits, vshi_oiio_writer **writer, vsh_error *error) {
+    return guard(error, VSH_ERROR_WRITE, path, [&]() -> vsh_result {
+        auto made = make_writer(temporary, path, *format, *planes, bits);
         VSHI_TRY(made->open(error));
         *writer = made.release();
         return VSH_OK;
     });
 }
 
-vsh_result vshi_oiio_add(vshi_oiio_writer *writer, const vshi_planes *planes, int32_t rows,
-                         vsh_error *error) {
-    return vshi::guard(error, VSH_ERROR_WRITE, writer->path,
-                       [&]() -> vsh_result { return writer->add(*planes, rows, error); });
+vsh_result add_rows(vshi_oiio_writer *writer, const vshi_planes *planes, int32_t rows, vsh_error *error) {
+    return guard(error, VSH_ERROR_WRITE, writer->path,
+                 [&]() -> vsh_result { return writer->add(*planes, rows, error); });
 }
 
-vsh_result vshi_oiio_end(vshi_oiio_writer *writer, vsh_error *error) {
-    if (writer == nullptr) {
-        return VSH_OK;
-    }
+vsh_result end_file(vshi_oiio_writer *writer, vsh_error *error) {
     const std::unique_ptr<vshi_oiio_writer> owned(writer);
-    return vshi::guard(error, VSH_ERROR_WRITE, writer->path,
-                       [&]() -> vsh_result { return writer->close(error); });
+    return guard(error, VSH_ERROR_WRITE, writer->path, [&]() -> vsh_result { return writer->close(error); });
 }
 
-double vshi_oiio_writer_bytes(const vshi_format *format, const vshi_planes *planes, int32_t bits) {
+double writer_bytes(const vshi_format *format, const vshi_planes *planes, int32_t bits) {
     const double values = static_cast<double>(planes->width) * planes->height * planes->count;
-    const double step = vshi::rows_of_band(planes->width, planes->height, planes->count);
+    const double step = rows_of_band(planes->width, planes->height, planes->count);
     const double rows = step * planes->width * planes->count;
     return (bits / 8) * (4.0 * rows + format->held * values); // rows: ours, and the format's on their way
 }
+
+} // namespace
+
+} // namespace vshi
+
+// Every symbol of the module but this one is hidden (module.map).
+const vshi_oiio_table vshi_oiio_module = {VSHI_VERSION,       vshi::find_format, vshi::refusal_of,
+                                          vshi::begin_file,   vshi::add_rows,    vshi::end_file,
+                                          vshi::writer_bytes, vshi::read_image};
