@@ -1,7 +1,5 @@
 #include "base/isa.h"
 
-#include <string.h>
-
 /* What of a set this machine lacks, or NULL. */
 static const char *lacking(int32_t isa) {
 #if defined(__x86_64__)

@@ -5,7 +5,6 @@
 #include "model/ply.h"
 
 #include <math.h>
-#include <string.h>
 
 enum { MOST_CORNERS = 8 };
 

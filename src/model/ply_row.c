@@ -7,7 +7,6 @@
 
 #include <inttypes.h>
 #include <math.h>
-#include <string.h>
 #include <strings.h>
 
 /* A row on its way. */

@@ -3,8 +3,6 @@
 #include "light/types.h"
 #include "scene/parts.h"
 
-#include <vdbshade/flat.h>
-
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

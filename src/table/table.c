@@ -4,7 +4,6 @@
 
 #include <inttypes.h>
 #include <stdlib.h>
-#include <string.h>
 
 const char *vshi_table_choose(vshi_table *t, const bool found[VSHI_TABLE_COLUMNS], int fields) {
     t->columns = t->wanted.count;
