@@ -116,6 +116,10 @@ int cli_fail_of(const char *path, const vsh_error *error) {
     return code_of(error->code);
 }
 
+int cli_check_result(vsh_result result, const vsh_error *error) {
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, error);
+}
+
 int cli_out_of_memory(const char *what) {
     cli_warnings_tell();
     cli_say("%s: the system refused memory", what);

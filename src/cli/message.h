@@ -32,6 +32,9 @@ int cli_fail(const vsh_error *error);
  * begins with none of a file that is there begins with `path`, or (NULL) the command's first operand. */
 int cli_fail_of(const char *path, const vsh_error *error);
 
+/* CLI_OK of VSH_OK; else as cli_fail_of() without a path. */
+int cli_check_result(vsh_result result, const vsh_error *error);
+
 /* What that operand is; it must live on. */
 void cli_message_input(const char *path);
 

@@ -349,5 +349,7 @@ JSON
     refused 3 nowhere
     shade bake box.obj "${SMALL[@]}" --per-object -o objects/ --view page.html
     refused 2 'one lightmap of one mesh'
+    shade bake box.obj --ao 1 --unwrap always -o unwrapped.png --view page.html
+    refused 2 "--view 'page.html': an image does not hold the UVs that are made"
     untouched page.html
 }

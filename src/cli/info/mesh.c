@@ -66,9 +66,8 @@ static int print_lights(const vsh_model *model, double unit) {
     vsh_light *lights = NULL;
     size_t count = 0;
     vsh_error error;
-    if (vsh_lights_from_model(model, angle, 0.0, unit, &lights, &count, &error) != VSH_OK) {
-        return cli_fail_of(NULL, &error);
-    }
+    CLI_TRY(
+        cli_check_result(vsh_lights_from_model(model, angle, 0.0, unit, &lights, &count, &error), &error));
     for (size_t i = 0; i < count; ++i) {
         char text[512];
         vsh_light_text(&lights[i], text, sizeof text);
@@ -81,9 +80,7 @@ static int print_lights(const vsh_model *model, double unit) {
 static int print_uvs(const vsh_mesh *mesh, const cli_info_look *look) {
     vsh_uvs_measures measures;
     vsh_error error;
-    if (vsh_uvs_measure(mesh, look->width, look->height, &measures, &error) != VSH_OK) {
-        return cli_fail_of(NULL, &error);
-    }
+    CLI_TRY(cli_check_result(vsh_uvs_measure(mesh, look->width, look->height, &measures, &error), &error));
     if (measures.texels_per_unit > 0.0) {
         printf("  lightmap UVs: %.4g texels a unit at %d × %d, stretch %.3f\n", measures.texels_per_unit,
                look->width, look->height, measures.stretch);
@@ -101,9 +98,7 @@ static int print_mesh(const vsh_model *model, size_t index, const cli_info_look 
     mesh.transform = scaled;
     vsh_mesh_report report;
     vsh_error error;
-    if (vsh_mesh_check(&mesh, &report, &error) != VSH_OK) {
-        return cli_fail_of(NULL, &error);
-    }
+    CLI_TRY(cli_check_result(vsh_mesh_check(&mesh, &report, &error), &error));
     printf("mesh %zu '%s'\n", index, name_of(&mesh));
     printf("  triangles: %zu\n  vertices: %zu\n", mesh.triangle_count, mesh.vertex_count);
     printf("  UV sets: %d\n", vsh_model_uv_sets(model, index));
@@ -134,9 +129,8 @@ static int print_unwrap(const vsh_mesh *meshes, size_t count, const cli_info_loo
     receiver.unwrap = VSH_RECEIVER_UNWRAP_AUTO;
     int32_t needs;
     vsh_error error;
-    if (vsh_receiver_needs_unwrap(&receiver, meshes, count, run, &needs, &error) != VSH_OK) {
-        return cli_fail_of(NULL, &error);
-    }
+    CLI_TRY(
+        cli_check_result(vsh_receiver_needs_unwrap(&receiver, meshes, count, run, &needs, &error), &error));
     if (needs == 0) {
         puts("--unwrap auto: bakes these UVs as they are");
         return CLI_OK;
@@ -157,9 +151,7 @@ static int print_unwrap(const vsh_mesh *meshes, size_t count, const cli_info_loo
 int cli_info_mesh(const char *path, const cli_info_look *given, const vsh_run *run) {
     vsh_model *model = NULL;
     vsh_error error;
-    if (vsh_model_read(path, run, &model, &error) != VSH_OK) {
-        return cli_fail_of(NULL, &error);
-    }
+    CLI_TRY(cli_check_result(vsh_model_read(path, run, &model, &error), &error));
     const size_t count = vsh_model_mesh_count(model);
     vsh_mesh *with_uvs = calloc(count, sizeof *with_uvs);
     size_t with_uv_count = 0;
@@ -179,10 +171,7 @@ int cli_info_mesh(const char *path, const cli_info_look *given, const vsh_run *r
     for (size_t i = 0; i < count; ++i) {
         meshes[i] = vsh_model_mesh(model, i, -1);
     }
-    if (vsh_mesh_solidity(meshes, count, run, solidity, &error) != VSH_OK) {
-        code = cli_fail_of(NULL, &error);
-        goto done;
-    }
+    CLI_TRY_DONE(cli_check_result(vsh_mesh_solidity(meshes, count, run, solidity, &error), &error));
     for (size_t i = 0; i < count; ++i) {
         if (!look.table) {
             CLI_TRY_DONE(print_mesh(model, i, &look, scale_for(model, look.unit), &solidity[i]));

@@ -218,7 +218,7 @@ static int load(query_work *work) {
     vsh_error error;
     const vsh_result result = vsh_assets_load(work->scene, &work->run, &work->assets, &error);
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
-    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+    return cli_check_result(result, &error);
 }
 
 static int make_query(query_work *work) {
@@ -237,9 +237,9 @@ static int make_query(query_work *work) {
     if (!work->scene->ao) {
         shade.ao_method = VSH_AO_AUTO; /* not asked for: it may want triangles that are not there */
     }
-    const vsh_result result = vsh_query_create(work->occluders, work->scene->lights, work->scene->light_count,
-                                               &shade, &work->query, &error);
-    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+    return cli_check_result(vsh_query_create(work->occluders, work->scene->lights, work->scene->light_count,
+                                             &shade, &work->query, &error),
+                            &error);
 }
 
 static void say_results(const query_work *work) {

@@ -121,7 +121,7 @@ static int answer_batch(const vsh_query *query, const query_answers *answers, co
     const vsh_result result =
         vsh_query_points(query, &view, NULL, &run, &answers->output, &stats->shade, &error);
     cli_stats_stage(stats, CLI_STAGE_BAKE, start);
-    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+    return cli_check_result(result, &error);
 }
 
 static int answer_rows(const query_settings *s, const vsh_query *query, const query_answers *answers,

@@ -33,9 +33,7 @@ typedef struct render_work {
 static int load(render_work *work) {
     const double start = vshi_seconds();
     vsh_error error;
-    if (vsh_assets_load(work->scene, &work->run, &work->assets, &error) != VSH_OK) {
-        return cli_fail_of(NULL, &error);
-    }
+    CLI_TRY(cli_check_result(vsh_assets_load(work->scene, &work->run, &work->assets, &error), &error));
     CLI_TRY(render_lightmaps_read(work->settings, work->scene, work->assets, &work->run, &work->lightmaps));
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
     return CLI_OK;

@@ -2,7 +2,7 @@
  * Those of a layer are all in one field, which knows nothing of casters; where they differ in colour, or some
  * have triangles, each colour gets a field of its own, for camera rays alone. */
 #include "cli/casters.h"
-#include "cli/message.h"
+#include "cli/try.h"
 #include "render.h"
 
 #include <math.h>
@@ -118,9 +118,7 @@ static int make_own(const vsh_scene *colored, const vsh_assets *assets, const vs
     vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
     what.voxels = 1; /* which are seen */
     vsh_error error;
-    if (vsh_scene_occluders(colored, assets, &what, run, &s->own, &error) != VSH_OK) {
-        return cli_fail_of(NULL, &error);
-    }
+    CLI_TRY(cli_check_result(vsh_scene_occluders(colored, assets, &what, run, &s->own, &error), &error));
     vsh_occluder_parts own;
     vsh_occluders_get_parts(s->own, &own);
     for (size_t k = 0; k < own.layer_count; ++k) {

@@ -1,5 +1,9 @@
-/* Bakes the scene in every way that is worth a look, and takes the time. */
-#include "cli/message.h"
+/* Bakes the scene in many ways, and measures time and error of each.
+ *
+ * Every voxel size finds other texels valid (neither inside a solid nor behind a wall). Runs are compared
+ * over the texels that all sizes find valid, and each run over its own valid texels too. */
+#include "base/clock.h"
+#include "cli/casters.h"
 #include "cli/progress.h"
 #include "cli/try.h"
 #include "trade.h"
@@ -7,161 +11,363 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <time.h>
 
-/* The world box of the receivers' samples; empty, min > max, where there are none. */
-static void find_box(const trade_work *work, double min[3], double max[3]) {
-    for (int axis = 0; axis < 3; ++axis) {
-        min[axis] = INFINITY;
-        max[axis] = -INFINITY;
-        for (size_t r = 0; r < work->receiver_count; ++r) {
-            const trade_receiver *receiver = &work->receivers[r];
-            const bool any = receiver->info.samples > 0;
-            min[axis] = any ? fmin(min[axis], receiver->low[axis]) : min[axis];
-            max[axis] = any ? fmax(max[axis], receiver->high[axis]) : max[axis];
-        }
+/* The truth's rays begin above the texel by this part of the casters' longest side: clear of Embree's
+ * rounding (60 ulp of its floats). On a smooth mesh, grazing light shows a difference from 1e-5 on. */
+static const double TRUTH_LIFT = 0x1p-18;
+
+/* A mesh that approximates a curved solid has chords inside of it: so many steps lift a point out. A step at
+ * least halves the distance if the normals of mesh and solid differ by less than 60°. */
+enum { SURFACE_STEPS = 16 };
+
+/* A short run is repeated, and the median of its times counts. */
+enum { REPEATS = 3 };
+static const double SHORT_SECONDS = 0.3;
+
+/* Embree's curve ends at so many rays, or at half of the truth's. */
+enum { CURVE_RAYS = 256 };
+
+/* Seconds for differences. One thread's is processor time, which ignores other work on the machine. */
+static double read_clock(const trade_work *work) {
+    if (work->run.threads != 1) {
+        return vshi_seconds();
     }
+    struct timespec now = {0, 0};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* A scene's, with its triangles and as many voxels as pay for its receivers, or (`voxels`) its voxels alone.
- */
-static int make_occluders(const trade_work *work, const vsh_scene *scene, int32_t voxels,
-                          vsh_occluders **occluders, double *seconds) {
-    const double start = trade_now(work);
-    double min[3], max[3];
-    find_box(work, min, max);
-    vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
-    options.receivers_min = min;
-    options.receivers_max = max;
-    options.voxels = voxels;
-    options.triangles = voxels == 0; /* else the same for all resolutions */
-    for (size_t r = 0; r < work->receiver_count; ++r) {
-        options.points += (double)work->receivers[r].info.samples;
+/* --- the scene */
+
+static int load_receiver(trade_work *work, size_t index) {
+    trade_receiver *receiver = &work->receivers[index];
+    size_t mesh_count;
+    const vsh_mesh *meshes = vsh_assets_receiver(work->assets, index, &mesh_count);
+    double low[3], high[3];
+    vsh_error error;
+    CLI_TRY(cli_check_result(
+        vsh_receiver_charts(work->scene, index, meshes, mesh_count, &work->run, &receiver->charts, &error),
+        &error));
+    ++work->receiver_count;
+    CLI_TRY(cli_check_result(vsh_charts_bounds(receiver->charts, &work->run, low, high, &error), &error));
+    vsh_charts_get_info(receiver->charts, &receiver->info);
+    for (int k = 0; k < 3 && receiver->info.samples > 0; ++k) {
+        work->low[k] = fmin(work->low[k], low[k]);
+        work->high[k] = fmax(work->high[k], high[k]);
     }
+    receiver->path = work->scene->receivers[index].path;
+    receiver->first = work->texels;
+    work->texels += (size_t)receiver->info.width * (size_t)receiver->info.height;
+    work->covered += receiver->info.covered;
+    work->samples += (double)receiver->info.samples;
+    if (work->texels > UINT32_MAX) {
+        cli_say("%s: more than %u texels in all receivers together", work->settings->bake.input, UINT32_MAX);
+        return CLI_LIMIT;
+    }
+    return CLI_OK;
+}
+
+static int load(trade_work *work) {
+    const vsh_scene *scene = work->scene;
+    vsh_error error;
+    CLI_TRY(cli_check_result(vsh_assets_load(scene, &work->run, &work->assets, &error), &error));
+    work->receivers = calloc(scene->receiver_count, sizeof *work->receivers);
+    if (work->receivers == NULL) {
+        return cli_out_of_memory("receivers");
+    }
+    for (int k = 0; k < 3; ++k) {
+        work->low[k] = INFINITY;
+        work->high[k] = -INFINITY;
+    }
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        CLI_TRY(load_receiver(work, i));
+    }
+    work->meshes = vsh_triangles_available() != 0;
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        work->meshes = work->meshes && cli_caster_has_triangles(&scene->casters[i]);
+    }
+    const double start = read_clock(work);
+    const vsh_result result =
+        vsh_scene_truth(scene, work->assets, &work->run, &work->triangles, &work->solids, &error);
+    work->triangles_s = read_clock(work) - start;
+    return cli_check_result(result, &error);
+}
+
+static int allocate(trade_work *work) {
+    if (work->scene->light_count > 0) {
+        work->subjects[work->subject_count++] = (trade_subject){.planes = work->scene->light_count};
+    }
+    if (work->scene->ao) {
+        work->subjects[work->subject_count++] = (trade_subject){.ao = true, .planes = 1};
+    }
+    for (size_t s = 0; s < work->subject_count; ++s) {
+        trade_subject *subject = &work->subjects[s];
+        subject->truth = calloc(subject->planes * work->texels, sizeof *subject->truth);
+        if (subject->truth == NULL) {
+            return cli_out_of_memory("truth");
+        }
+    }
+    work->values = calloc((work->scene->light_count + 1) * work->texels, sizeof *work->values);
+    work->mask = malloc(work->texels);
+    work->common = malloc(work->texels);
+    work->any = calloc(work->texels, 1);
+    if (work->values == NULL || work->mask == NULL || work->common == NULL || work->any == NULL) {
+        return cli_out_of_memory("values");
+    }
+    memset(work->common, 1, work->texels);
+    return CLI_OK;
+}
+
+/* --- baking */
+
+/* Makes the scene's casters: `voxels` alone, or what auto chooses with triangles. */
+static int make_occluders(const trade_work *work, const vsh_scene *scene, bool voxels,
+                          vsh_occluders **occluders, double *seconds) {
+    const double start = read_clock(work);
+    vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
+    options.receivers_min = work->low;
+    options.receivers_max = work->high;
+    options.points = work->samples;
+    options.voxels = voxels;
+    options.triangles = !voxels;
     vsh_error error;
     const vsh_result result =
         vsh_scene_occluders(scene, work->assets, &options, &work->run, occluders, &error);
-    *seconds = trade_now(work) - start;
-    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+    *seconds = read_clock(work) - start;
+    return cli_check_result(result, &error);
 }
 
-int trade_make_occluders(trade_work *work, int32_t resolution, vsh_occluders **occluders, double *seconds) {
+static int make_voxels(const trade_work *work, int32_t resolution, vsh_occluders **occluders,
+                       double *seconds) {
     vsh_scene scene = *work->scene;
     scene.grid.resolution = resolution;
     scene.grid.voxel_size = 0.0;
-    return make_occluders(work, &scene, 1, occluders, seconds);
+    return make_occluders(work, &scene, true, occluders, seconds);
 }
 
-int trade_add_triangles(const trade_work *work, trade_field *field) {
-    vsh_occluder_parts parts;
-    vsh_occluders_get_parts(field->occluders, &parts);
-    parts.triangles = work->meshes ? work->triangles : NULL;
-    vsh_error error;
-    return vsh_occluders_from_parts(&parts, &field->traced, &error) == VSH_OK ? CLI_OK
-                                                                              : cli_fail_of(NULL, &error);
-}
-
-void trade_name_run(const trade_work *work, trade_run *run) {
-    const trade_task *task = &work->tasks[run->task];
-    const bool ao = work->subjects[task->subject].ao;
-    const char *flag = ao ? "--ao-method" : "--method";
-    const bool rays = ao ? task->method == VSH_AO_RAYS : task->method == VSH_SHADOW_RAYS;
-    const size_t room = sizeof run->options;
-    char more[64] = "";
-    if (task->kind == TRADE_EMBREE) {
-        run->method = "embree";
-        run->embree = true;
-        snprintf(run->options, room, "%d ray%s a texel", task->number, task->number == 1 ? "" : "s");
-        return;
-    }
-    if (task->kind == TRADE_AUTO) {
-        run->method = "auto";
-        snprintf(run->options, room, "--max-error %g", task->max_error);
-        return;
-    }
-    run->method =
-        ao ? vsh_get_name(VSH_NAMES_AO, task->method) : vsh_get_name(VSH_NAMES_SHADOW, task->method);
-    run->resolution = work->fields[task->field].resolution;
-    if (task->max_error > 0.0) {
-        snprintf(more, sizeof more, " --max-error %g", task->max_error);
-    } else if (task->number > 0) {
-        snprintf(more, sizeof more, " %s %d", rays ? "--rays" : "--ao-cones", task->number);
-    }
-    snprintf(run->options, room, "%s %s%s --resolution %d", flag, run->method, more, run->resolution);
-}
-
-/* A task's options, for the library. */
-static vsh_shade_options shade_of(const trade_work *work, const trade_task *task) {
-    vsh_shade_options shade = work->scene->shade;
-    shade.early_rays = 0;
-    if (work->subjects[task->subject].ao) {
-        const bool cones = task->method != VSH_AO_RAYS && task->number > 0;
-        shade.ao_method = task->method;
-        shade.ao_cones = cones ? task->number : shade.ao_cones;
-        shade.rays = task->method == VSH_AO_RAYS ? task->number : shade.rays;
-    } else {
-        shade.method = task->method;
-        shade.rays = task->method == VSH_SHADOW_RAYS ? task->number : shade.rays;
-    }
-    if (task->max_error > 0.0) {
-        shade.max_error = task->max_error;
-        shade.rays = 0; /* as many as that takes */
-    }
-    return shade;
-}
-
-/* Share of the subject's values that a cone proved. */
-static double certified_share(const trade_subject *subject, size_t valid, const vsh_shade_options *shade,
-                              const vsh_shade_stats *stats) {
-    const int32_t method = subject->ao ? shade->ao_method : shade->method;
-    const int32_t rays = subject->ao ? (int32_t)VSH_AO_RAYS : (int32_t)VSH_SHADOW_RAYS;
-    if (method == rays || (subject->ao && method == VSH_AO_TAPS)) {
-        return NAN;
-    }
-    double values = (double)(subject->planes * valid);
-    double proved = (double)(stats->certified + stats->skipped);
-    if (method > rays) {
-        proved = values - (double)stats->refined;
-    } else if (subject->ao) {
-        values *= (double)shade->ao_cones;
-    }
-    return fmax(0.0, fmin(1.0, proved / values));
-}
-
-int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh_shade_options *shade,
-               float *shadow, float *ao, float *coverage, vsh_shade_stats *stats) {
-    const size_t lights = shadow != NULL ? work->scene->light_count : 0;
+/* Bakes the subject, or (NULL) coverage, of all receivers into `values`. */
+static int bake(const trade_work *work, const trade_subject *subject, const vsh_occluders *occluders,
+                const vsh_shade_options *shade, float *values) {
+    const size_t lights = subject != NULL && !subject->ao ? subject->planes : 0;
     float **planes = calloc(lights + 1, sizeof *planes);
     if (planes == NULL) {
         return cli_out_of_memory("planes");
     }
     vsh_bake_stats baked = vsh_bake_stats_zero();
-    int code = CLI_OK;
-    for (size_t r = 0; r < work->receiver_count; ++r) {
-        const size_t first = work->receivers[r].first;
+    vsh_result result = VSH_OK;
+    vsh_error error;
+    for (size_t r = 0; r < work->receiver_count && result == VSH_OK; ++r) {
+        float *first = values + work->receivers[r].first;
         for (size_t i = 0; i < lights; ++i) {
-            planes[i] = shadow + i * work->texels + first;
+            planes[i] = first + i * work->texels;
         }
         const vsh_lightmap lightmap = {.shadow = lights > 0 ? planes : NULL,
-                                       .ao = ao != NULL ? ao + first : NULL,
-                                       .coverage = coverage != NULL ? coverage + first : NULL};
-        vsh_error error;
-        if (vsh_bake_lightmap(occluders, work->receivers[r].charts, work->scene->lights, lights, shade,
-                              &work->run, &lightmap, &baked, &error) != VSH_OK) {
-            code = cli_fail_of(NULL, &error);
-            goto done;
+                                       .ao = subject != NULL && subject->ao ? first : NULL,
+                                       .coverage = subject == NULL ? first : NULL};
+        result = vsh_bake_lightmap(occluders, work->receivers[r].charts, work->scene->lights, lights, shade,
+                                   &work->run, &lightmap, &baked, &error);
+    }
+    free(planes);
+    return cli_check_result(result, &error);
+}
+
+/* Sets mask[texels] to 1 where a texel is valid, else to 0, and counts those. */
+static int find_valid(const trade_work *work, const vsh_occluders *occluders, const vsh_shade_options *shade,
+                      uint8_t *mask, size_t *count) {
+    CLI_TRY(bake(work, NULL, occluders, shade, work->values));
+    *count = 0;
+    for (size_t i = 0; i < work->texels; ++i) {
+        mask[i] = work->values[i] > 0.0f;
+        *count += mask[i];
+    }
+    return CLI_OK;
+}
+
+static int make_field(trade_work *work, trade_field *field) {
+    CLI_TRY(make_voxels(work, field->resolution, &field->voxels, &field->build_s));
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(field->voxels, &parts);
+    parts.triangles = work->meshes ? work->triangles : NULL;
+    vsh_error error;
+    CLI_TRY(cli_check_result(vsh_occluders_from_parts(&parts, &field->traced, &error), &error));
+    field->mask = malloc(work->texels);
+    if (field->mask == NULL) {
+        return cli_out_of_memory("coverage");
+    }
+    CLI_TRY(find_valid(work, field->voxels, &work->scene->shade, field->mask, &field->valid));
+    for (size_t i = 0; i < work->texels; ++i) {
+        work->common[i] &= field->mask[i];
+        work->any[i] |= field->mask[i];
+    }
+    return CLI_OK;
+}
+
+static int make_fields(trade_work *work) {
+    for (; work->field_count < work->settings->resolution_count;) {
+        trade_field *field = &work->fields[work->field_count];
+        field->resolution = work->settings->resolutions[work->field_count++];
+        CLI_TRY(make_field(work, field));
+    }
+    for (size_t i = 0; i < work->texels; ++i) {
+        work->common_count += work->common[i];
+        work->points += work->any[i];
+    }
+    return work->common_count > 0 ? CLI_OK
+                                  : cli_usage("%s: no texel is valid at all voxel sizes: nothing to measure",
+                                              work->settings->bake.input);
+}
+
+/* --- the truth: rays against the casters themselves, or against a finer field if rays cannot meet them */
+
+/* Moves a point that is inside a solid, by less than a voxel, along its normal to just outside. */
+static void leave_solid(const trade_work *work, double *position, const float *normal, double lift,
+                        double voxel) {
+    double moved[3] = {position[0], position[1], position[2]}, height = 0.0;
+    for (int step = 0; step < SURFACE_STEPS && height < voxel; ++step) {
+        const double missing = lift - vsh_solids_distance(work->solids, moved);
+        if (!(missing > 0.5 * lift)) {
+            memcpy(position, moved, sizeof moved);
+            return;
+        }
+        height += missing;
+        for (int k = 0; k < 3; ++k) {
+            moved[k] = position[k] + height * (double)normal[k];
         }
     }
-    if (stats != NULL) {
-        *stats = baked.shade;
+}
+
+/* Adds points for the receiver's texels in `any`, from index *at on. */
+static void place_samples(trade_work *work, const trade_receiver *receiver, vsh_texel_samples samples,
+                          double lift, double voxel, size_t *at) {
+    for (size_t i = 0; i < samples.count; ++i) {
+        const size_t texel = receiver->first + vsh_texel_place(samples.texels[i], receiver->info.width);
+        if (!work->any[texel]) {
+            continue;
+        }
+        const float *geometric = samples.geometric_normals + 3 * i;
+        double *position = work->positions + 3 * *at;
+        for (size_t k = 0; k < 3; ++k) {
+            position[k] = samples.positions[3 * i + k] + lift * (double)geometric[k];
+            work->normals[3 * *at + k] = samples.normals[3 * i + k];
+        }
+        if (work->solids != NULL) {
+            leave_solid(work, position, geometric, lift, voxel);
+        }
+        work->texel[(*at)++] = (uint32_t)texel;
     }
-done:
-    free(planes);
+}
+
+static int place_points(trade_work *work) {
+    work->positions = calloc(work->points, 3 * sizeof *work->positions);
+    work->normals = calloc(work->points, 3 * sizeof *work->normals);
+    work->texel = calloc(work->points, sizeof *work->texel);
+    if (work->positions == NULL || work->normals == NULL || work->texel == NULL) {
+        return cli_out_of_memory("points");
+    }
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(work->fields[0].voxels, &parts);
+    vsh_field_info info;
+    vsh_field_get_info(parts.field, &info);
+    double side = 0.0;
+    for (int k = 0; k < 3; ++k) {
+        side = fmax(side, info.bounds_max[k] - info.bounds_min[k]);
+    }
+    size_t at = 0;
+    for (size_t r = 0; r < work->receiver_count; ++r) {
+        vsh_texels *texels;
+        vsh_error error;
+        CLI_TRY(cli_check_result(vsh_texels_create(work->receivers[r].charts, &work->run, &texels, &error),
+                                 &error));
+        place_samples(work, &work->receivers[r], vsh_texels_samples(texels), TRUTH_LIFT * side,
+                      info.voxel_size, &at);
+        vsh_texels_free(texels);
+    }
+    work->points = at;
+    return CLI_OK;
+}
+
+/* Traces rays from the points into the subject's planes; *seconds is the time of the tracing alone. */
+static int trace(const trade_work *work, const trade_subject *subject, int32_t rays, float *values,
+                 double *seconds) {
+    float *packed = calloc(work->points, sizeof *packed);
+    if (packed == NULL) {
+        return cli_out_of_memory("rays");
+    }
+    *seconds = 0.0;
+    vsh_result result = VSH_OK;
+    vsh_error error;
+    for (size_t plane = 0; plane < subject->planes && result == VSH_OK; ++plane) {
+        const double start = read_clock(work);
+        result = subject->ao ? vsh_trace_ao(work->triangles, work->solids, work->points, work->positions,
+                                            work->normals, 0.0, work->scene->shade.ao_distance, rays,
+                                            &work->run, packed, &error)
+                             : vsh_trace_shadow(work->triangles, work->solids, work->points, work->positions,
+                                                work->normals, 0.0, &work->scene->lights[plane], rays,
+                                                &work->run, packed, &error);
+        *seconds += read_clock(work) - start;
+        for (size_t i = 0; i < work->points; ++i) {
+            values[plane * work->texels + work->texel[i]] = packed[i];
+        }
+    }
+    free(packed);
+    return cli_check_result(result, &error);
+}
+
+int32_t trade_truth_resolution(const trade_work *work) {
+    const int32_t finest = work->fields[0].resolution;
+    return finest <= 32768 ? 2 * finest : finest;
+}
+
+int32_t trade_marched_rays(const trade_work *work) {
+    return work->settings->truth_rays < 4096 ? work->settings->truth_rays : 4096;
+}
+
+static int march_truth(trade_work *work) {
+    vsh_occluders *occluders = NULL;
+    double seconds;
+    int code = make_voxels(work, trade_truth_resolution(work), &occluders, &seconds);
+    vsh_shade_options shade = work->scene->shade;
+    shade.method = VSH_SHADOW_RAYS;
+    shade.ao_method = VSH_AO_RAYS;
+    shade.rays = trade_marched_rays(work);
+    shade.early_rays = 0;
+    for (size_t s = 0; s < work->subject_count && code == CLI_OK; ++s) {
+        code = bake(work, &work->subjects[s], occluders, &shade, work->subjects[s].truth);
+    }
+    vsh_occluders_free(occluders);
     return code;
 }
 
-/* Every receiver's lightmap of every plane is one of its own: no penumbra goes on in the next. */
-static int compare(const trade_work *work, const trade_subject *subject, const float *values,
-                   const uint8_t *mask, vsh_accuracy *accuracy) {
+static int make_truth(trade_work *work) {
+    const double start = read_clock(work);
+    if (vsh_scene_has_truth(work->scene)) {
+        for (size_t s = 0; s < work->subject_count; ++s) {
+            double seconds;
+            CLI_TRY(trace(work, &work->subjects[s], work->settings->truth_rays, work->subjects[s].truth,
+                          &seconds));
+        }
+    } else {
+        CLI_TRY(march_truth(work));
+    }
+    work->truth_s = read_clock(work) - start;
+    return CLI_OK;
+}
+
+/* --- one run */
+
+/* How a run's values are made: by a bake, or (occluders NULL) by Embree's rays alone. */
+typedef struct way {
+    const vsh_occluders *occluders;
+    vsh_shade_options shade;
+    int32_t rays;
+} way;
+
+/* Compares work->values with the truth where the mask is 1. A receiver's lightmap is a plane of its own, so
+ * that no penumbra continues in the next. */
+static int compare(const trade_work *work, const trade_subject *subject, const uint8_t *mask,
+                   vsh_accuracy *accuracy) {
     const size_t count = subject->planes * work->receiver_count;
     vsh_compared *planes = calloc(count, sizeof *planes);
     if (planes == NULL) {
@@ -172,155 +378,259 @@ static int compare(const trade_work *work, const trade_subject *subject, const f
         const size_t first = i / work->receiver_count * work->texels + receiver->first;
         planes[i] = (vsh_compared){{receiver->info.width, receiver->info.height, 1},
                                    subject->truth + first,
-                                   values + first,
+                                   work->values + first,
                                    mask + receiver->first};
     }
     vsh_error error;
     const vsh_result result = vsh_compare_accuracy(planes, count, &work->run, accuracy, &error);
     free(planes);
-    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+    return cli_check_result(result, &error);
 }
 
-/* On the texels that all runs have, and on all of its own. */
-static int compare_both(const trade_work *work, trade_run *run) {
-    const trade_task *task = &work->tasks[run->task];
-    const trade_subject *subject = &work->subjects[task->subject];
-    const uint8_t *mask = task->kind == TRADE_METHOD   ? work->fields[task->field].mask
-                          : task->kind == TRADE_EMBREE ? work->any
-                                                       : run->mask;
-    vsh_accuracy valid;
-    CLI_TRY(compare(work, subject, run->values, mask, &valid));
-    run->valid_rmse = valid.rmse;
-    return compare(work, subject, run->values, work->common, &run->metrics);
+static int compare_times(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
 }
 
-static void say(const trade_work *work, const trade_run *run) {
-    char line[256];
-    if (work->settings->bake.common.quiet) {
-        return;
-    }
-    snprintf(line, sizeof line, "%s%s: RMSE %.4f, %.3f s", run->embree ? "Embree, " : "", run->options,
-             run->metrics.rmse, run->bake_s);
-    cli_progress_line(line);
-}
-
-int trade_add(trade_work *work, trade_run *run) {
-    trade_subject *subject = &work->subjects[work->tasks[run->task].subject];
+/* Makes the run's values and sets its time. */
+static int time_run(const trade_work *work, const trade_subject *subject, const way *by, trade_run *run) {
+    double times[REPEATS];
+    size_t count = 0;
+    do {
+        const double start = read_clock(work);
+        if (by->occluders == NULL) {
+            CLI_TRY(trace(work, subject, by->rays, work->values, &times[count]));
+        } else {
+            CLI_TRY(bake(work, subject, by->occluders, &by->shade, work->values));
+            times[count] = read_clock(work) - start;
+        }
+    } while (++count < REPEATS && times[0] < SHORT_SECONDS);
+    qsort(times, count, sizeof times[0], compare_times);
+    run->bake_s = times[count / 2];
     run->rate = 1e6 * run->bake_s / (double)(subject->planes * run->valid);
-    CLI_TRY(compare_both(work, run));
+    return CLI_OK;
+}
+
+/* Measures a run that is filled in but for its results, and adds it to its subject. `mask` has the texels of
+ * its own that the truth is known for. */
+static int measure_run(const trade_work *work, trade_subject *subject, const way *by, const uint8_t *mask,
+                       trade_run *run) {
+    vsh_accuracy valid;
+    CLI_TRY(time_run(work, subject, by, run));
+    CLI_TRY(compare(work, subject, mask, &valid));
+    CLI_TRY(compare(work, subject, work->common, &run->metrics));
+    run->valid_rmse = valid.rmse;
     trade_run *more = realloc(subject->runs, (subject->run_count + 1) * sizeof *more);
     if (more == NULL) {
         return cli_out_of_memory("runs");
     }
     subject->runs = more;
     more[subject->run_count++] = *run;
-    say(work, run);
+    if (!work->settings->bake.common.quiet) {
+        char line[256];
+        snprintf(line, sizeof line, "%s%s: RMSE %.4f, %.3f s", run->embree ? "Embree, " : "", run->options,
+                 run->metrics.rmse, run->bake_s);
+        cli_progress_line(line);
+    }
     return CLI_OK;
 }
 
-/* Bakes the run's values, several times where it is quick. */
-static int bake(const trade_work *work, const trade_subject *subject, const vsh_occluders *occluders,
-                const vsh_shade_options *shade, trade_run *run, vsh_shade_stats *stats) {
-    trade_clock clock = {.count = 0};
-    int code = CLI_OK;
-    do {
-        const double start = trade_now(work);
-        code = trade_bake(work, occluders, shade, subject->ao ? NULL : run->values,
-                          subject->ao ? run->values : NULL, NULL, stats);
-        clock.times[clock.count++] = trade_now(work) - start;
-    } while (code == CLI_OK && trade_again(&clock));
-    run->bake_s = trade_median(&clock);
-    return code;
-}
-
-/* A guess: what the method took last time, or several times that where the plan asks for more. */
-static double expected(const trade_subject *subject, const trade_run *run, bool first) {
+/* Whether the run is to be left out, and counts it then. It takes about as long as the method's last one, or
+ * longer by `factor`. */
+static bool exceeds_budget(trade_work *work, const trade_subject *subject, const char *method,
+                           double factor) {
     double seconds = 0.0;
     for (size_t i = 0; i < subject->run_count; ++i) {
-        if (subject->runs[i].method == run->method) {
-            seconds = subject->runs[i].bake_s;
+        if (strcmp(subject->runs[i].method, method) == 0) {
+            seconds = factor * subject->runs[i].bake_s;
         }
     }
-    return first ? 4.0 * seconds : seconds;
+    const bool exceeds = vshi_seconds() - work->measuring + seconds > work->settings->budget;
+    work->skipped += exceeds;
+    return exceeds;
 }
 
-static int run_method(trade_work *work, const trade_task *task) {
-    const trade_field *on = &work->fields[task->field];
-    const trade_subject *subject = &work->subjects[task->subject];
-    trade_run run = {.task = (size_t)(task - work->tasks), .build_s = on->build_s, .valid = on->valid};
-    const vsh_shade_options shade = shade_of(work, task);
-    const bool exact =
-        subject->ao ? task->method == (int32_t)VSH_AO_EXACT : task->method == (int32_t)VSH_SHADOW_EXACT;
-    trade_name_run(work, &run);
-    if (trade_left(work) < expected(subject, &run, on == work->fields)) {
-        ++work->skipped;
+/* --- Embree's rays alone: the curve that every method has to beat */
+
+static int measure_embree(trade_work *work) {
+    for (size_t s = 0; s < work->subject_count && work->meshes; ++s) {
+        for (int32_t rays = 1; rays <= CURVE_RAYS && 2 * rays <= work->settings->truth_rays; rays *= 2) {
+            trade_run run = {.method = "embree",
+                             .embree = true,
+                             .build_s = work->triangles_s,
+                             .bytes = vsh_triangles_bytes(work->triangles),
+                             .valid = work->points};
+            snprintf(run.options, sizeof run.options, "%d ray%s a texel", rays, rays == 1 ? "" : "s");
+            CLI_TRY(measure_run(work, &work->subjects[s], &(way){.rays = rays}, work->any, &run));
+        }
+    }
+    return CLI_OK;
+}
+
+/* --- auto, with what `bake` chooses for an error */
+
+static int measure_auto(trade_work *work, trade_subject *subject, double max_error) {
+    trade_run run = {.method = "auto"};
+    snprintf(run.options, sizeof run.options, "--max-error %g", max_error);
+    if (exceeds_budget(work, subject, run.method, 1.0)) {
         return CLI_OK;
     }
-    run.values = calloc(subject->planes * work->texels, sizeof *run.values);
-    if (run.values == NULL) {
-        return cli_out_of_memory("values");
-    }
-    vsh_occluders_info info;
-    vsh_occluders_get_info(on->occluders, &info);
-    run.bytes = info.field_bytes + (exact ? vsh_triangles_bytes(work->triangles) : 0);
-    run.build_s += exact ? work->triangles_s : 0.0;
-    vsh_shade_stats stats = vsh_shade_stats_zero();
-    int code = bake(work, subject, on->traced, &shade, &run, &stats);
-    run.certified = certified_share(subject, run.valid, &shade, &stats);
-    code = code == CLI_OK ? trade_add(work, &run) : code;
-    if (code != CLI_OK) {
-        free(run.values);
-    }
-    return code;
-}
-
-/* What `bake` makes of an error with nothing else said: what casts is made for each, as it depends on it. */
-static int run_auto(trade_work *work, const trade_task *task) {
-    const trade_subject *subject = &work->subjects[task->subject];
-    trade_run run = {.task = (size_t)(task - work->tasks), .certified = NAN};
     vsh_scene scene = *work->scene;
     scene.ao = subject->ao ? scene.ao : 0;
     scene.light_count = subject->ao ? 0 : scene.light_count;
     scene.shade.method = VSH_SHADOW_AUTO;
     scene.shade.ao_method = VSH_AO_AUTO;
-    scene.shade.max_error = task->max_error;
+    scene.shade.max_error = max_error;
     scene.shade.rays = 0;
-    trade_name_run(work, &run);
-    if (trade_left(work) < expected(subject, &run, false)) {
-        ++work->skipped;
-        return CLI_OK;
-    }
     vsh_occluders *occluders = NULL;
-    float *coverage = calloc(work->texels, sizeof *coverage);
-    run.mask = calloc(work->texels, 1);
-    run.values = calloc(subject->planes * work->texels, sizeof *run.values);
-    vsh_shade_stats stats = vsh_shade_stats_zero();
-    int code = CLI_OK;
-    if (run.mask == NULL || coverage == NULL || run.values == NULL) {
-        code = cli_out_of_memory("values");
-        goto done;
-    }
-    CLI_TRY_DONE(make_occluders(work, &scene, 0, &occluders, &run.build_s));
-    CLI_TRY_DONE(trade_bake(work, occluders, &scene.shade, NULL, NULL, coverage, NULL));
+    int code;
+    CLI_TRY_DONE(make_occluders(work, &scene, false, &occluders, &run.build_s));
+    CLI_TRY_DONE(find_valid(work, occluders, &scene.shade, work->mask, &run.valid));
     for (size_t i = 0; i < work->texels; ++i) {
-        run.valid += coverage[i] > 0.0f;
-        run.mask[i] = coverage[i] > 0.0f && work->any[i]; /* where the truth was looked for */
+        work->mask[i] &= work->any[i];
     }
     vsh_occluders_info info;
     vsh_occluders_get_info(occluders, &info);
     run.bytes = info.field_bytes + info.triangles_bytes;
-    CLI_TRY_DONE(bake(work, subject, occluders, &scene.shade, &run, &stats));
-    CLI_TRY_DONE(trade_add(work, &run));
-    run.values = NULL;
-    run.mask = NULL;
+    const way by = {.occluders = occluders, .shade = scene.shade};
+    CLI_TRY_DONE(measure_run(work, subject, &by, work->mask, &run));
 done:
     vsh_occluders_free(occluders);
-    free(run.values);
-    free(run.mask);
-    free(coverage);
     return code;
 }
 
-int trade_measure(trade_work *work, const trade_task *task) {
-    return task->kind == TRADE_AUTO ? run_auto(work, task) : run_method(work, task);
+static int measure_autos(trade_work *work) {
+    static const double errors[] = {0.05, 0.02, 0.01, 0.005};
+    for (size_t e = 0; e < sizeof errors / sizeof errors[0]; ++e) {
+        for (size_t s = 0; s < work->subject_count; ++s) {
+            CLI_TRY(measure_auto(work, &work->subjects[s], errors[e]));
+        }
+    }
+    return CLI_OK;
+}
+
+/* --- the methods */
+
+typedef struct plan {
+    bool ao;
+    int32_t method;
+    int32_t number;   /* rays or cones; 0: none */
+    double max_error; /* 0: none */
+} plan;
+
+/* The quick ones first: the budget leaves out the slow ones. */
+static const plan plans[] = {
+    {false, VSH_SHADOW_HARD, 0, 0.0},       {true, VSH_AO_TAPS, 0, 0.0},
+    {false, VSH_SHADOW_CLASSIC, 0, 0.0},    {true, VSH_AO_CONES, 4, 0.0},
+    {false, VSH_SHADOW_IMPROVED, 0, 0.0},   {true, VSH_AO_CONES, 16, 0.0},
+    {false, VSH_SHADOW_SMOOTH, 0, 0.0},     {true, VSH_AO_RAYS, 4, 0.0},
+    {false, VSH_SHADOW_CONE, 0, 0.0},       {true, VSH_AO_ADAPTIVE, 0, 0.05},
+    {false, VSH_SHADOW_RAYS, 4, 0.0},       {true, VSH_AO_EXACT, 0, 0.05},
+    {false, VSH_SHADOW_ADAPTIVE, 0, 0.05},  {true, VSH_AO_ADAPTIVE, 0, 0.02},
+    {false, VSH_SHADOW_EXACT, 0, 0.05},     {true, VSH_AO_EXACT, 0, 0.02},
+    {false, VSH_SHADOW_ADAPTIVE, 0, 0.02},  {true, VSH_AO_RAYS, 16, 0.0},
+    {false, VSH_SHADOW_EXACT, 0, 0.02},     {true, VSH_AO_ADAPTIVE, 0, 0.01},
+    {false, VSH_SHADOW_ADAPTIVE, 0, 0.01},  {true, VSH_AO_EXACT, 0, 0.01},
+    {false, VSH_SHADOW_EXACT, 0, 0.01},     {true, VSH_AO_RAYS, 64, 0.0},
+    {false, VSH_SHADOW_RAYS, 16, 0.0},      {true, VSH_AO_CONES, 64, 0.0},
+    {false, VSH_SHADOW_EXACT, 0, 0.005},    {true, VSH_AO_EXACT, 0, 0.005},
+    {false, VSH_SHADOW_ADAPTIVE, 0, 0.005}, {true, VSH_AO_ADAPTIVE, 0, 0.005},
+    {false, VSH_SHADOW_RAYS, 64, 0.0},
+};
+
+/* Writes the plan as options of `bake`. */
+static void name_plan(const plan *p, trade_run *run) {
+    char more[64] = "";
+    if (p->max_error > 0.0) {
+        snprintf(more, sizeof more, " --max-error %g", p->max_error);
+    } else if (p->number > 0) {
+        const bool cones = p->ao && p->method == VSH_AO_CONES;
+        snprintf(more, sizeof more, " %s %d", cones ? "--ao-cones" : "--rays", p->number);
+    }
+    run->method = p->ao ? vsh_get_name(VSH_NAMES_AO, p->method) : vsh_get_name(VSH_NAMES_SHADOW, p->method);
+    snprintf(run->options, sizeof run->options, "%s %s%s --resolution %d", p->ao ? "--ao-method" : "--method",
+             run->method, more, run->resolution);
+}
+
+static vsh_shade_options shade_of(const trade_work *work, const plan *p) {
+    vsh_shade_options shade = work->scene->shade;
+    shade.early_rays = 0;
+    if (p->ao) {
+        shade.ao_method = p->method;
+    } else {
+        shade.method = p->method;
+    }
+    if (p->max_error > 0.0) {
+        shade.max_error = p->max_error;
+        shade.rays = 0; /* as many as the error needs */
+    } else if (p->ao && p->method == VSH_AO_CONES) {
+        shade.ao_cones = p->number;
+    } else if (p->number > 0) {
+        shade.rays = p->number;
+    }
+    return shade;
+}
+
+static int measure_plan(trade_work *work, trade_subject *subject, const trade_field *field, const plan *p) {
+    const bool exact = p->method == (p->ao ? (int32_t)VSH_AO_EXACT : (int32_t)VSH_SHADOW_EXACT);
+    if (exact && !work->meshes) {
+        return CLI_OK;
+    }
+    trade_run run = {.resolution = field->resolution, .build_s = field->build_s, .valid = field->valid};
+    name_plan(p, &run);
+    /* on the first field, the method's last run had an easier setting */
+    if (exceeds_budget(work, subject, run.method, field == work->fields ? 4.0 : 1.0)) {
+        return CLI_OK;
+    }
+    vsh_occluders_info info;
+    vsh_occluders_get_info(field->voxels, &info);
+    run.bytes = info.field_bytes + (exact ? vsh_triangles_bytes(work->triangles) : 0);
+    run.build_s += exact ? work->triangles_s : 0.0;
+    const way by = {.occluders = field->traced, .shade = shade_of(work, p)};
+    return measure_run(work, subject, &by, field->mask, &run);
+}
+
+static int measure_plans(trade_work *work) {
+    for (size_t i = 0; i < sizeof plans / sizeof plans[0]; ++i) {
+        for (size_t s = 0; s < work->subject_count; ++s) {
+            for (size_t f = 0; f < work->field_count && work->subjects[s].ao == plans[i].ao; ++f) {
+                CLI_TRY(measure_plan(work, &work->subjects[s], &work->fields[f], &plans[i]));
+            }
+        }
+    }
+    return CLI_OK;
+}
+
+/* --- all of it */
+
+static bool beats(const trade_run *a, const trade_run *b) {
+    return a->rate <= b->rate && a->metrics.rmse <= b->metrics.rmse &&
+           (a->rate < b->rate || a->metrics.rmse < b->metrics.rmse);
+}
+
+/* Marks the runs on the Pareto front. Embree's own are not on it and beat no other. */
+static void mark_front(trade_subject *subject) {
+    for (size_t i = 0; i < subject->run_count; ++i) {
+        trade_run *run = &subject->runs[i];
+        run->front = !run->embree;
+        for (size_t k = 0; k < subject->run_count && run->front; ++k) {
+            run->front = subject->runs[k].embree || !beats(&subject->runs[k], run);
+        }
+    }
+}
+
+int trade_measure(trade_work *work) {
+    CLI_TRY(load(work));
+    CLI_TRY(allocate(work));
+    CLI_TRY(make_fields(work));
+    CLI_TRY(place_points(work));
+    CLI_TRY(make_truth(work));
+    work->measuring = vshi_seconds();
+    CLI_TRY(measure_embree(work));
+    CLI_TRY(measure_autos(work));
+    CLI_TRY(measure_plans(work));
+    for (size_t s = 0; s < work->subject_count; ++s) {
+        mark_front(&work->subjects[s]);
+    }
+    return CLI_OK;
 }
