@@ -22,14 +22,12 @@ typedef struct vsh_view_bake {
                        of their occlusionTexture where it has one of its own, else as of vsh_model_mesh() */
     const char
         *name; /* shown; NULL: the model's file name, or of a second bake without a model its planes' */
-    const vsh_image *images; /* [image_count], in place of `planes`: the same in memory, values as they are */
-    size_t image_count;
 } vsh_view_bake;
 
 enum { VSH_MAX_VIEW_PLANES = 1024 };
 
 static inline vsh_view_bake vsh_view_bake_default(void) {
-    vsh_view_bake bake = {sizeof(vsh_view_bake), NULL, NULL, 0, -1, NULL, NULL, 0};
+    vsh_view_bake bake = {sizeof(vsh_view_bake), NULL, NULL, 0, -1, NULL};
     return bake;
 }
 
@@ -37,22 +35,13 @@ static inline vsh_view_bake vsh_view_bake_default(void) {
  * one of its channels, checkers, texel density or charts (docs/view.md), each texel's values to be picked.
  * `other` is a second bake beside it, with a slider between; it may be NULL. Values of planes are half floats
  * there. Atomic, as vsh_image_write(). The stages are "load" and "page". Errors:
- * - VSH_ERROR_ARGUMENT: path, bake or its model NULL; planes, images, a size or a UV set out of range, planes
- *   and images both, images and no name; run;
+ * - VSH_ERROR_ARGUMENT: path, bake or its model NULL; planes or a UV set out of range; run;
  * - those of vsh_model_read() and vsh_image_read() for the files, which may be anybody's: use run->reader;
  * - VSH_ERROR_LIMIT: a model of more than VSH_MAX_VIEW_MODEL bytes, as the page holds it;
  * run->memory_limit;
  * - VSH_ERROR_WRITE, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_view_write(const char *path, const vsh_view_bake *bake, const vsh_view_bake *other,
                                   const vsh_run *run, vsh_error *error);
-
-/* The same of `count` bakes, 1 … VSH_MAX_VIEW_BAKES, of which the page lets one be chosen for each side of
- * the slider: the first and the second, until another is. The first has a model, and those without one have
- * that. */
-VSH_API vsh_result vsh_view_write_bakes(const char *path, const vsh_view_bake *const *bakes, size_t count,
-                                        const vsh_run *run, vsh_error *error);
-
-enum { VSH_MAX_VIEW_BAKES = 4096 };
 
 /* The same of a scene that is not baked: the surface of its casters' voxels, with its shadows, AO and light
  * at every vertex. All casters are voxelised; receivers, tint, bent normals and the sky are left out. `name`

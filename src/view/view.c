@@ -149,9 +149,6 @@ static vsh_result put_bake(vshi_view *view, const vsh_view_bake *bake, vsh_error
     for (size_t i = 0; i < bake->plane_count; ++i) {
         VSHI_TRY_DONE(vshi_view_put_planes(view, bake->planes[i], pages, error));
     }
-    for (size_t i = 0; i < bake->image_count; ++i) {
-        VSHI_TRY_DONE(vshi_view_put_image(view, bake->name, &bake->images[i], pages, error));
-    }
     VSHI_TRY_DONE(vshi_view_tell(about, "pages", json_incref(pages), error));
     VSHI_TRY_DONE(vshi_view_tell(view->about, NULL, json_incref(about), error));
 done:
@@ -181,34 +178,6 @@ done:
     return result;
 }
 
-static vsh_result check_images(const vsh_view_bake *bake, const char *what, vsh_error *error) {
-    VSHI_NEEDS_OF(bake->image_count, bake->images);
-    if (bake->image_count > 0 && (bake->plane_count > 0 || bake->name == NULL)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: images %s", what,
-                         bake->name == NULL ? "without a name" : "and files of planes; expected one of them");
-    }
-    if (bake->image_count > VSH_MAX_VIEW_PLANES) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %zu images, at most %d", what, bake->image_count,
-                         VSH_MAX_VIEW_PLANES);
-    }
-    for (size_t i = 0; i < bake->image_count; ++i) {
-        const vsh_image *image = &bake->images[i];
-        const double texels = (double)image->width * (double)image->height;
-        if (image->width < 1 || image->height < 1 || image->channel_count < 1 ||
-            image->channel_count > VSH_MAX_CHANNELS || texels * image->channel_count > 0x1p31) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: image %zu has %d × %d texels, %d channels", what,
-                             i, image->width, image->height, image->channel_count);
-        }
-        VSHI_NEEDS(image->names);
-        VSHI_NEEDS(image->planes);
-        for (int32_t c = 0; c < image->channel_count; ++c) {
-            VSHI_NEEDS(image->names[c]);
-            VSHI_NEEDS(image->planes[c]);
-        }
-    }
-    return VSH_OK;
-}
-
 static vsh_result check(const vsh_view_bake *given, const char *what, vsh_view_bake *bake, vsh_error *error) {
     *bake = vsh_view_bake_default();
     VSHI_TRY(vshi_options_resolve(given, bake, sizeof *bake, what, error));
@@ -224,10 +193,10 @@ static vsh_result check(const vsh_view_bake *given, const char *what, vsh_view_b
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: UV set %d: expected -1 … %d", what, bake->uv_set,
                          VSH_MAX_UV_SETS - 1);
     }
-    if (bake->model == NULL && bake->plane_count == 0 && bake->image_count == 0) {
+    if (bake->model == NULL && bake->plane_count == 0) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: neither a model nor planes", what);
     }
-    return check_images(bake, what, error);
+    return VSH_OK;
 }
 
 typedef struct writing {
@@ -284,39 +253,20 @@ vsh_result vshi_view_write_page(const char *path, const vsh_view_bake *bakes, si
     return vshi_on_stack(write_page, &w, error);
 }
 
-vsh_result vsh_view_write_bakes(const char *path, const vsh_view_bake *const *bakes, size_t count,
-                                const vsh_run *run, vsh_error *error) {
-    VSHI_FLOATS;
-    VSHI_NEEDS(path);
-    VSHI_NEEDS(bakes);
-    if (count < 1 || count > VSH_MAX_VIEW_BAKES) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %zu bakes: expected 1 … %d", __func__, count,
-                         VSH_MAX_VIEW_BAKES);
-    }
-    vsh_view_bake *full = NULL;
-    vsh_run resolved;
-    vsh_result result = VSH_OK;
-    VSHI_TRY(vshi_allocate((void **)&full, count, sizeof *full, "bakes", error));
-    for (size_t i = 0; i < count; ++i) {
-        char what[32];
-        snprintf(what, sizeof what, "bake %zu", i);
-        VSHI_TRY_DONE(check(bakes[i], what, &full[i], error));
-    }
-    if (full[0].model == NULL) {
-        result = vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: the first bake's model is NULL", __func__);
-        goto done;
-    }
-    VSHI_TRY_DONE(vshi_run_resolve(run, &resolved, error));
-    result = vshi_view_write_page(path, full, count, NULL, &resolved, error);
-done:
-    free(full);
-    return result;
-}
-
 vsh_result vsh_view_write(const char *path, const vsh_view_bake *bake, const vsh_view_bake *other,
                           const vsh_run *run, vsh_error *error) {
+    VSHI_FLOATS;
     VSHI_NEEDS(path);
     VSHI_NEEDS(bake);
-    const vsh_view_bake *const bakes[] = {bake, other};
-    return vsh_view_write_bakes(path, bakes, other != NULL ? 2 : 1, run, error);
+    vsh_view_bake bakes[2];
+    vsh_run resolved;
+    VSHI_TRY(check(bake, "bake", &bakes[0], error));
+    if (bakes[0].model == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: the first bake's model is NULL", __func__);
+    }
+    if (other != NULL) {
+        VSHI_TRY(check(other, "other bake", &bakes[1], error));
+    }
+    VSHI_TRY(vshi_run_resolve(run, &resolved, error));
+    return vshi_view_write_page(path, bakes, other != NULL ? 2 : 1, NULL, &resolved, error);
 }

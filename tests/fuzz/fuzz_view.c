@@ -58,7 +58,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (size < 2 || size < 2 + (size_t)data[1]) {
         return 0;
     }
-    char name[256], output[1024];
+    char name[256], output[1024], planes_file[1024];
     memcpy(name, data + 2, data[1]);
     name[data[1]] = '\0';
     const char *path =
@@ -68,13 +68,18 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     const char *const channels[] = {name[0] != '\0' ? name : "shadow", "A"};
     const vsh_image image = {2, 2, 2, channels, planes, NULL};
     vsh_view_bake bake = vsh_view_bake_default(), other = vsh_view_bake_default();
+    const char *const files[] = {planes_file};
+    snprintf(planes_file, sizeof planes_file, "%s/planes.exr", fuzz_folder());
     bake.model = path;
     bake.name = name;
-    other.images = &image;
-    other.image_count = 1;
+    other.planes = files;
+    other.plane_count = 1;
     other.name = name;
     const vsh_run run = fuzz_run();
     vsh_error error;
+    if (vsh_image_write(planes_file, &image, NULL, &error) != VSH_OK) {
+        return 0; /* a name that no channel can have */
+    }
     const vsh_result result = vsh_view_write(output, &bake, &other, &run, fuzz_error(&error));
     fuzz_ended(result, &error, result == VSH_OK ? output : NULL);
     if (result == VSH_OK) {

@@ -243,9 +243,6 @@ class Reach(Case):
                          [(p.width, p.height) for p in map(assets.receiver_atlas(0)[0].page, range(count))])
         self.assertTrue(all(assets.receiver(0, page=i)[0].object_name in (p.object, None) for i, p in enumerate(infos)))
         self.assertIsNone(assets.receiver_page_info(0, count))
-        v.view_write_bakes(self.folder / "bakes.html", [dict(model=glb), dict(name="grey", images=[maps[0]]),
-                                                        dict(name="b", images=[maps[1]])])
-        self.assertIn("grey", (self.folder / "bakes.html").read_text())
         v.Scene(ASSETS / "seeds.json", resolution=24).view(self.folder / "scene.html", "the seeds")
         self.assertIn("the seeds", (self.folder / "scene.html").read_text())
 

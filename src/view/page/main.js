@@ -4,26 +4,16 @@
 (function () {
     const byId = id => document.getElementById(id);
     const state = {mode: 'lit', channel: null, exposure: 0, split: 0.5, texels: false, wireframe: false, sides: false,
-        theme: matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark', ui: true, picks: null,
-        left: 0, right: 1};
+        theme: matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark', ui: true, picks: null};
     let renderer, camera, controls, bakes = [], box = null, due = false;
 
-    /* The bakes that are seen: one, or those on both sides of the slider, whose meshes are made when they are first. */
-    function sides() {
-        const seen = bakes.length > 1 ? [bakes[state.left], bakes[state.right]] : bakes;
-        seen.filter(bake => !bake.scene).forEach(bake => VIEW.build(bake, bake.shared));
-        return seen;
-    }
-
     /* --- the address: #mode=ao&camera=X,Y,Z,X,Y,Z is a view to come back to */
-
-    const numberOf = (text, otherwise) => Number.isInteger(+text) && bakes[+text] ? +text : Math.min(otherwise, bakes.length - 1);
 
     const readers = {
         mode: text => VIEW.MODES.some(mode => mode[0] === text) ? text : 'lit', channel: text => text,
         exposure: text => Math.min(Math.max(+text || 0, -8), 8),
         split: text => Math.min(Math.max(+text || 0, 0), 1), texels: text => text === '1',
-        left: text => numberOf(text, 0), right: text => numberOf(text, 1), wireframe: text => text === '1', sides: text => text === '1', ui: text => text !== '0',
+        wireframe: text => text === '1', sides: text => text === '1', ui: text => text !== '0',
         theme: text => text === 'light' ? 'light' : 'dark'
     };
 
@@ -65,7 +55,7 @@
     function draw() {
         due = false;
         const width = innerWidth, height = innerHeight, edge = bakes.length > 1 ? Math.round(state.split * width) : width;
-        const [one, other] = sides();
+        const [one, other] = bakes;
         renderer.setScissorTest(false);
         renderer.clear();
         renderer.setScissorTest(true);
@@ -93,15 +83,15 @@
     }
 
     function update() {
-        const seen = sides(), lights = seen.flatMap(bake => VIEW.lightsOf(bake));
+        const lights = bakes.flatMap(bake => VIEW.lightsOf(bake));
         if (!lights.includes(state.channel)) {
             state.channel = lights[0] || null;
         }
-        if (!seen.some(bake => VIEW.has(bake, state.mode))) {
+        if (!bakes.some(bake => VIEW.has(bake, state.mode))) {
             state.mode = 'lit';
         }
-        seen.forEach(bake => VIEW.show(bake, state));
-        VIEW.tell(state, seen);
+        bakes.forEach(bake => VIEW.show(bake, state));
+        VIEW.tell(state, bakes);
         redraw();
     }
 
@@ -133,9 +123,9 @@
     /* --- picking */
 
     function pick(x, y) {
-        const device = [2 * x / innerWidth - 1, 1 - 2 * y / innerHeight], seen = sides();
-        const at = seen.map(bake => VIEW.pick(bake, camera, device[0], device[1]));
-        for (const bake of seen) {
+        const device = [2 * x / innerWidth - 1, 1 - 2 * y / innerHeight];
+        const at = bakes.map(bake => VIEW.pick(bake, camera, device[0], device[1]));
+        for (const bake of bakes) {
             bake.meshes.forEach(mesh => mesh.material.uniforms.picked.value.set(-1, -1));
         }
         for (const found of at.filter(Boolean)) {
@@ -145,12 +135,12 @@
         }
         VIEW.tellPicked(at.filter(Boolean));
         redraw();
-        return at[seen.length > 1 && x / innerWidth > state.split ? 1 : 0];
+        return at[bakes.length > 1 && x / innerWidth > state.split ? 1 : 0];
     }
 
     /* --- what is done to it */
 
-    const modeKeys = index => VIEW.MODES[index] && sides().some(bake => VIEW.has(bake, VIEW.MODES[index][0]))
+    const modeKeys = index => VIEW.MODES[index] && bakes.some(bake => VIEW.has(bake, VIEW.MODES[index][0]))
         ? set({mode: VIEW.MODES[index][0]}) : undefined;
 
     const keys = {
@@ -266,7 +256,7 @@
         }
         VIEW.problems([...problems]);
         box = new THREE.Box3();
-        for (const bake of bakes.filter(one => one.model !== undefined)) {
+        for (const bake of bakes) {
             VIEW.build(bake, bake.shared);
             box.expandByObject(bake.scene);
         }
@@ -290,7 +280,6 @@
         clip();
         VIEW.makeModes(mode => set({mode}));
         byId('channel').onchange = event => set({channel: event.target.value});
-        VIEW.makeSides(bakes, set);
         watch(canvas);
         resize();
         update();

@@ -36,18 +36,7 @@
         });
     };
 
-    /* Of more than two bakes, one is chosen for each side of the slider. */
-    VIEW.makeSides = function (bakes, set) {
-        for (const side of ['left', 'right']) {
-            const select = byId(side + '-bake');
-            bakes.forEach((bake, i) => select.append(new Option(bake.name, i)));
-            select.onchange = () => set({[side]: +select.value});
-            select.hidden = bakes.length < 3;
-            byId(side).hidden = bakes.length > 2;
-        }
-    };
-
-    /* What no bake that is seen has is off. */
+    /* Disables the modes that no bake has. */
     function tellModes(state, bakes) {
         VIEW.MODES.forEach(([mode, , what], i) => {
             const button = byId('modes').children[i], there = bakes.some(bake => VIEW.has(bake, mode));
@@ -74,7 +63,6 @@
         byId('bar').style.left = 100 * state.split + '%';
         ['left', 'right'].forEach((side, i) => {
             byId(side).textContent = byId(side).title = bakes[i] ? bakes[i].name : '';
-            byId(side + '-bake').value = state[side];
         });
     }
 

@@ -30,7 +30,7 @@ from ._points import (Query, Stats, ao_method_resolve, ao_method_traits, shade_a
 from ._render import Camera, LitMeshes, Picture, render
 from ._scene import Assets, Scene, settings
 from ._sdf import Sdf, Solids
-from ._unwrap import Atlas, AtlasMesh, LitImage, lit_is_output, lit_write, unwrap, view_write, view_write_bakes
+from ._unwrap import Atlas, AtlasMesh, LitImage, lit_is_output, lit_write, unwrap, view_write
 from ._volume import Volume, Voxels, bake_volume
 
 __version__ = version()

@@ -11,7 +11,6 @@ from . import types
 from ._arrays import array, borrowed, pointer
 from ._library import RUN, Handle, Run, call, ffi, handle_of, lib, make, place
 from ._structs import Filled, info, path_of, told
-from ._image import _Image
 from ._mesh import Mesh, Meshes, Model, meshes_of
 
 if TYPE_CHECKING:
@@ -202,11 +201,7 @@ def _bake(given: Dict[str, Any]) -> Filled:
     planes = given.pop("planes", ())
     if isinstance(planes, (str, bytes, os.PathLike)):
         planes = [planes]
-    images = given.pop("images", ())
     filled = Filled("vsh_view_bake", given)
-    views = [_Image(channels).struct for channels in images]
-    filled.keeps += [views, ffi.new("vsh_image[]", [view[0] for view in views] or 1)]
-    filled.pointer.images, filled.pointer.image_count = filled.keeps[-1], len(views)
     names = ffi.new("char *[]", [filled.text(p, "planes") for p in planes] or 1)
     filled.keeps.append(names)
     filled.pointer.planes, filled.pointer.plane_count = names, len(planes)
@@ -224,26 +219,11 @@ def view_write(path: "str | os.PathLike[str]", model: "str | os.PathLike[str]", 
     planes : path or sequence of paths
         image files of its bake, one a page; none: its light is in its materials
     other : dict, optional
-        a second bake beside it: model, planes or images, uv_set, name
+        a second bake beside it: model, planes, uv_set, name
     """
     first = _bake(dict(model=model, planes=planes, uv_set=uv_set, name=name))
     second = None if other is None else _bake(dict(other))
     call(lib.vsh_view_write, path_of(path, "path"), first.pointer, ffi.NULL if second is None else second.pointer, RUN, run=run)
 
 
-def view_write_bakes(path: "str | os.PathLike[str]", bakes: "Sequence[types.ViewBake]", *, run: Optional[Run] = None) -> None:
-    """As view_write() of up to 4096 bakes, of which the page lets one be chosen for each side of its slider.
-
-    Parameters
-    ----------
-    bakes : sequence of dict
-        members of ``vsh_view_bake`` (vdbshade.types.ViewBake): model (a path; the first one's where there is none), planes (paths
-        of images, one a page) or in their place images (mappings of channels' names to arrays of float32 of shape (height,
-        width), row 0 at v = 1, such as a Lightmap; they want a name), uv_set, name
-    """
-    filled = [_bake(dict(bake)) for bake in bakes]
-    pointers = ffi.new("vsh_view_bake *[]", [bake.pointer for bake in filled] or 1)
-    call(lib.vsh_view_write_bakes, path_of(path, "path"), pointers, len(filled), RUN, run=run)
-
-
-__all__ = ["Atlas", "AtlasMesh", "LitImage", "lit_is_output", "lit_write", "unwrap", "view_write", "view_write_bakes"]
+__all__ = ["Atlas", "AtlasMesh", "LitImage", "lit_is_output", "lit_write", "unwrap", "view_write"]
