@@ -69,7 +69,7 @@ typedef struct cli_points_writer {
     const char *name;
     int32_t format;
     bool answers_only, keep;
-    bool ascii, big_endian, floats, normals; /* of the rows */
+    bool text, big_endian, floats, normals; /* of the rows */
     char delimiter;
     const cli_points_column *columns;
     size_t column_count;
@@ -77,9 +77,8 @@ typedef struct cli_points_writer {
     FILE *spool; /* which is this where the head needs their number, and standard output cannot go back */
     cli_temporary temporary;
     uint64_t rows;
-    long count_at; /* of the head that is written again with the number of rows; -1: none */
-    char *buffer;
-    size_t used;
+    bool counted; /* the head is written again with the number of rows */
+    char *row;    /* room for one */
 } cli_points_writer;
 
 /* Begins a file, or standard output for "-". The reader's header is open. */

@@ -1,16 +1,43 @@
 /* vdbshade query: shadow, AO and distance at points of a file or a pipe. */
-#include "query.h"
+#include "base/bytes.h"
 #include "base/clock.h"
-#include "cli/message.h"
+#include "cli/bake/options.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
+#include "cli/stats.h"
 #include "cli/try.h"
 #include "cli/warnings.h"
+#include "points.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+
+typedef struct query_settings {
+    cli_bake_settings bake; /* the scene, with the options that `bake` has too */
+    const char *points;
+    int32_t format, points_format; /* VSHI_TABLE_…; -1: not given */
+    int normals;                   /* as of cli_points_open() */
+    bool distance, gradient, answers_only, strict;
+    int32_t batch; /* rows; 0: not given */
+    double within; /* 0: not given */
+} query_settings;
+
+/* What each point is asked for, and a batch's values. */
+typedef struct query_answers {
+    size_t lights;
+    const vsh_light *light;
+    bool ao, distance, gradient;
+    bool shadow_error, ao_error; /* standard errors, if the method knows them */
+    float *memory;
+    float **visibility, **deviation; /* [lights] */
+    vsh_query_output output;
+    cli_points_column *columns;
+    size_t column_count;
+} query_answers;
 
 enum {
     KEY_POINTS = 0x2000,
@@ -74,7 +101,7 @@ const cli_command cli_query = {
 
 /* --- options */
 
-static int take(void *settings, int key, const char *name, const char *value) {
+static int parse_option(void *settings, int key, const char *name, const char *value) {
     query_settings *s = settings;
     switch (key) {
     case 'o':
@@ -112,16 +139,15 @@ static int take(void *settings, int key, const char *name, const char *value) {
         s->bake.stats = value;
         return CLI_OK;
     default:
-        break;
+        return cli_shared_parse(&s->bake, key, name, value);
     }
-    return cli_shared_parse(&s->bake, key, name, value);
 }
 
 static bool is_standard(const char *path) {
     return strcmp(path, "-") == 0;
 }
 
-/* What is not said of formats. */
+/* Chooses the formats that no option names. */
 static int find_formats(query_settings *s) {
     if (s->points == NULL) {
         return cli_usage("query: no points; give --points FILE, or - for standard input");
@@ -159,7 +185,7 @@ static int check_output(const query_settings *s, const vsh_scene *scene, const c
     return cli_temporary_check(output);
 }
 
-/* What can be refused before anything is read. */
+/* Refuses an output before anything is read. */
 static int check_files(const query_settings *s, const vsh_scene *scene) {
     const char *output = s->bake.output, *stats = s->bake.stats;
     if (stats != NULL && cli_same_file(output, stats)) {
@@ -181,9 +207,169 @@ typedef struct query_work {
     cli_points_reader reader;
     query_answers answers;
     cli_stats stats;
+    double begin, share; /* of the batch, as parts of the file */
 } query_work;
 
-/* What the scene, the options and the points' normals let be asked. */
+/* --- batches: VSH_QUERY_BATCH rows, so that the bits are those of one call for all points, or as many as the
+ * memory limit allows */
+
+enum {
+    ORDER_BYTES = 16, /* a point of a call, as query.h says */
+    TEXT_BYTES = 256, /* of a kept row of text; longer rows make batches smaller */
+    LEAST_ROWS = 1024 /* smaller batches are not worth it */
+};
+
+/* Floats that the answers take for a point. */
+static size_t count_floats(const query_answers *a) {
+    return a->lights * (a->shadow_error ? 2 : 1) + (a->ao ? a->ao_error ? 2 : 1 : 0) + (a->distance ? 1 : 0) +
+           (a->gradient ? 3 : 0);
+}
+
+static float *add_column(query_answers *a, float **next, size_t room, const char *kind, const char *name,
+                         size_t width) {
+    static const char *const axes[] = {".x", ".y", ".z"};
+    float *values = *next;
+    *next += width * room;
+    for (size_t i = 0; i < width; ++i) {
+        cli_points_column *column = &a->columns[a->column_count++];
+        snprintf(column->name, sizeof column->name, "%s%s%s", kind, name, width > 1 ? axes[i] : "");
+        column->values = values + i;
+        column->stride = width;
+    }
+    return values;
+}
+
+static int create_answers(query_answers *a, size_t room) {
+    const size_t floats = count_floats(a);
+    a->memory = malloc(room * floats * sizeof *a->memory);
+    a->columns = calloc(floats, sizeof *a->columns);
+    a->visibility = calloc(a->lights + 1, sizeof *a->visibility);
+    a->deviation = calloc(a->lights + 1, sizeof *a->deviation);
+    if (a->memory == NULL || a->columns == NULL || a->visibility == NULL || a->deviation == NULL) {
+        return cli_out_of_memory("points");
+    }
+    float *next = a->memory;
+    a->output = vsh_query_output_default();
+    a->output.visibility = a->visibility;
+    a->output.deviation = a->deviation;
+    for (size_t l = 0; l < a->lights; ++l) {
+        a->visibility[l] = add_column(a, &next, room, "shadow.", a->light[l].name, 1);
+    }
+    a->output.ao = a->ao ? add_column(a, &next, room, "ao", "", 1) : NULL;
+    for (size_t l = 0; a->shadow_error && l < a->lights; ++l) {
+        a->deviation[l] = add_column(a, &next, room, "error.", a->light[l].name, 1);
+    }
+    a->output.ao_deviation = a->ao && a->ao_error ? add_column(a, &next, room, "error.", "ao", 1) : NULL;
+    a->output.distance = a->distance ? add_column(a, &next, room, "distance", "", 1) : NULL;
+    a->output.gradient = a->gradient ? add_column(a, &next, room, "gradient", "", 3) : NULL;
+    return CLI_OK;
+}
+
+static void free_answers(query_answers *a) {
+    free(a->memory);
+    free(a->columns);
+    free(a->visibility);
+    free(a->deviation);
+}
+
+/* Chooses the rows of a batch, and the most of their own bytes that it holds. */
+static int plan_batch(const query_work *work, bool keep, size_t *rows, size_t *most_kept) {
+    const int32_t asked = work->settings->batch;
+    const uint64_t limit = work->settings->bake.common.memory_limit;
+    const uint64_t held = work->stats.casters.field_bytes + work->stats.casters.triangles_bytes +
+                          work->reader.face_vertices * (uint64_t)sizeof(float[6]);
+    const size_t row_size = work->reader.table.row_size;   /* 0: of text */
+    size_t own = row_size > 0 ? 2 * row_size : TEXT_BYTES; /* twice: room grows by doubling */
+    own = keep ? own : 0;
+    const size_t each = cli_points_bytes(work->reader.has_normals, keep) + ORDER_BYTES + own +
+                        count_floats(&work->answers) * sizeof(float);
+    const size_t least = asked > 0 && asked < LEAST_ROWS ? (size_t)asked : LEAST_ROWS;
+    *rows = asked > 0 ? (size_t)asked : VSH_QUERY_BATCH;
+    while (limit > 0 && held + (uint64_t)*rows * each > limit && *rows / 2 >= least) {
+        *rows /= 2;
+    }
+    if (limit > 0 && held + (uint64_t)*rows * each > limit) {
+        char all[32], most[32];
+        cli_say("%s: the field and %zu points at a time need %s, over the memory limit of %s",
+                work->reader.table.source.name, *rows,
+                vshi_bytes_text(held + (uint64_t)*rows * each, all, sizeof all),
+                vshi_bytes_text(limit, most, sizeof most));
+        return CLI_LIMIT;
+    }
+    *most_kept = *rows * own / 2;
+    return CLI_OK;
+}
+
+/* Shows a batch's progress as a part of the file. */
+static int32_t report_progress(void *user, const char *stage, double fraction) {
+    const query_work *work = user;
+    return work->run.progress(work->run.user, stage, work->begin + work->share * fraction);
+}
+
+static int answer_batch(query_work *work, const cli_points *points) {
+    const double start = vshi_seconds();
+    const vshi_source *source = &work->reader.table.source;
+    const double done = source->size > 0 ? (double)source->taken / (double)source->size : 1.0;
+    work->begin = source->size > 0 ? work->begin + work->share : 0.0;
+    work->share = fmin(done, 1.0) - work->begin;
+    vsh_run run = work->run;
+    run.progress = report_progress;
+    run.user = work;
+    const vsh_points view = {points->count, points->positions, points->normals, points->texels};
+    vsh_error error;
+    const vsh_result result =
+        vsh_query_points(work->query, &view, NULL, &run, &work->answers.output, &work->stats.shade, &error);
+    cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
+    return cli_check_result(result, &error);
+}
+
+static int answer_rows(query_work *work, size_t most_kept, cli_points *points, cli_points_writer *writer) {
+    const bool flush = work->settings->batch > 0 || work->reader.table.source.size == 0;
+    for (;;) {
+        double start = vshi_seconds();
+        CLI_TRY(cli_points_read(&work->reader, most_kept, points));
+        cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
+        if (points->count == 0) {
+            break;
+        }
+        CLI_TRY(answer_batch(work, points));
+        start = vshi_seconds();
+        CLI_TRY(cli_points_write(writer, points));
+        CLI_TRY(flush ? cli_points_writer_flush(writer) : CLI_OK);
+        cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
+    }
+    const double start = vshi_seconds();
+    CLI_TRY(cli_points_writer_commit(writer, &work->reader));
+    cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
+    work->stats.points = work->reader.table.rows;
+    work->stats.bad_rows = work->reader.bad;
+    return CLI_OK;
+}
+
+/* Reads, answers and writes until the points end. */
+static int answer_points(query_work *work) {
+    const query_settings *s = work->settings;
+    cli_points_reader *reader = &work->reader;
+    cli_points points = {0};
+    cli_points_writer writer = {0};
+    size_t rows = 0, most_kept = 0;
+    const bool keep = !s->answers_only && s->format == s->points_format && cli_points_can_keep(reader);
+    int code = CLI_OK;
+    CLI_TRY_DONE(plan_batch(work, keep, &rows, &most_kept));
+    CLI_TRY_DONE(cli_points_create(rows, reader->has_normals, keep, &points));
+    CLI_TRY_DONE(create_answers(&work->answers, rows));
+    CLI_TRY_DONE(cli_points_writer_open(s->bake.output, s->format, s->answers_only, reader,
+                                        work->answers.columns, work->answers.column_count, &writer));
+    CLI_TRY_DONE(answer_rows(work, most_kept, &points, &writer));
+done:
+    cli_points_writer_free(&writer);
+    cli_points_free(&points);
+    return code;
+}
+
+/* --- the command */
+
+/* Chooses the answers by the scene, the options and the points' normals. */
 static int choose_answers(query_work *work, const char *why) {
     const query_settings *s = work->settings;
     query_answers *a = &work->answers;
@@ -205,7 +391,7 @@ static int choose_answers(query_work *work, const char *why) {
                       (vsh_shadow_method_traits(scene->shade.method) & VSH_METHOD_RAYS) != 0;
     a->ao_error =
         scene->error && scene->ao && (vsh_ao_method_traits(scene->shade.ao_method) & VSH_METHOD_RAYS) != 0;
-    if (query_answers_floats(a) == 0) {
+    if (count_floats(a) == 0) {
         return cli_usage(
             "%s: nothing to answer: no lights and no ao; give --sun, --ao, --distance or --gradient",
             s->bake.input);
@@ -226,16 +412,14 @@ static int make_query(query_work *work) {
     what.within = work->settings->within;
     what.voxels = work->settings->distance || work->settings->gradient;
     vsh_error error;
-    if (vsh_scene_occluders(work->scene, work->assets, &what, &work->run, &work->occluders, &error) !=
-        VSH_OK) {
-        return cli_fail_of(NULL, &error);
-    }
+    CLI_TRY(cli_check_result(
+        vsh_scene_occluders(work->scene, work->assets, &what, &work->run, &work->occluders, &error), &error));
     vsh_occluders_info casters;
     vsh_occluders_get_info(work->occluders, &casters);
     cli_stats_casters(&work->stats, work->scene, &casters);
     vsh_shade_options shade = work->scene->shade;
     if (!work->scene->ao) {
-        shade.ao_method = VSH_AO_AUTO; /* not asked for: it may want triangles that are not there */
+        shade.ao_method = VSH_AO_AUTO; /* not asked for, and it may need triangles that are not there */
     }
     return cli_check_result(vsh_query_create(work->occluders, work->scene->lights, work->scene->light_count,
                                              &shade, &work->query, &error),
@@ -272,13 +456,11 @@ static int run_query(const query_settings *s, vsh_scene *scene) {
     CLI_TRY_DONE(choose_answers(&work, why.message));
     CLI_TRY_DONE(load(&work));
     CLI_TRY_DONE(make_query(&work));
-    const uint64_t held = work.stats.casters.field_bytes + work.stats.casters.triangles_bytes +
-                          work.reader.face_vertices * (uint64_t)sizeof(float[6]);
-    CLI_TRY_DONE(query_stream(s, work.query, &work.answers, held, &work.run, &work.reader, &work.stats));
+    CLI_TRY_DONE(answer_points(&work));
     CLI_TRY_DONE(cli_stats_finish(&work.stats, &work.run, s->bake.stats));
     say_results(&work);
 done:
-    query_answers_free(&work.answers);
+    free_answers(&work.answers);
     vsh_query_free(work.query);
     vsh_occluders_free(work.occluders);
     vsh_assets_free(work.assets);
@@ -292,7 +474,7 @@ static int query_main(int argc, char **argv) {
     s.bake.common = cli_common_default();
     s.format = s.points_format = s.normals = -1;
     bool help;
-    int code = cli_parse(&cli_query, argc, argv, take, &s, "INPUT", &s.bake.input, &help);
+    int code = cli_parse(&cli_query, argc, argv, parse_option, &s, "INPUT", &s.bake.input, &help);
     if (code != CLI_OK || help) {
         return code;
     }
