@@ -110,7 +110,7 @@ static int print_image(const char *path, const vsh_run *run) {
 
 enum { MAX_LISTED = 4096 };
 
-/* Whether it is of `vdbshade volume`: what is wrong with it as a caster is then no problem. */
+/* Whether `vdbshade volume` made the grid: it need not be a caster then. */
 static bool is_ours(const vsh_vdb_entry *grid) {
     return strstr(grid->attributes, "vdbshade_version") != NULL && strcmp(grid->grid_class, "level set") != 0;
 }
@@ -243,7 +243,7 @@ static void print_layer(const vsh_scene_layer *layer) {
     printf("%s\n", shade->ao ? "" : ", no ao");
 }
 
-/* False where the file is no flat scene. */
+/* Returns false if the file is no flat scene. */
 static bool print_flat(const char *path, const vsh_run *run) {
     static const char *const casters[] = {"mask", "text", "circle", "box", "polygon"};
     vsh_flat_scene *scene = NULL;

@@ -55,7 +55,7 @@ static void print_summary(const vsh_model *model) {
     putchar('\n');
 }
 
-/* --- what meshes are taken for */
+/* --- solids, rooms, walls and sheets */
 
 enum { KINDS = 4 };
 
@@ -75,7 +75,7 @@ static void count_kinds(const vsh_solidity_report *report, size_t counts[KINDS])
     counts[3] = report->sheets;
 }
 
-/* Writes "solid", "3 walls", "solid, closed by what it stands on" or "mixed". */
+/* Writes a few words, such as "solid", "3 walls" or "mixed". */
 static void describe_kind(const vsh_solidity_report *report, char *text, size_t capacity) {
     size_t counts[KINDS], found = 0;
     count_kinds(report, counts);
@@ -90,10 +90,6 @@ static void describe_kind(const vsh_solidity_report *report, char *text, size_t 
     }
     if (found > 1) {
         snprintf(text, capacity, "mixed");
-    } else if (report->standing > 0 && report->solids == 1) {
-        snprintf(text, capacity, "solid, closed by what it stands on");
-    } else if (report->standing > 0 && report->standing == report->solids) {
-        snprintf(text, capacity, "%zu solids, closed by what they stand on", report->solids);
     }
 }
 
@@ -119,17 +115,12 @@ static void print_solidity(const vsh_solidity_report *report) {
         printf("  closed over: %zu hole%s with %zu open edges, of %zu of these\n", report->holes,
                report->holes == 1 ? "" : "s", report->open_edges, report->closed_over);
     }
-    if (report->standing > 0) {
-        printf("  closed by what %s: %zu of these\n",
-               report->standing == 1 ? "it stands on or runs into" : "they stand on or run into",
-               report->standing);
-    }
     print_problem(report->turned_triangles, "triangles that face the other way than those around");
 }
 
 /* --- a paragraph for each mesh */
 
-/* What positions are multiplied by, where the user says what unit they are in. */
+/* The factor on positions if the user gives their unit. */
 static double scale_for(const vsh_model *model, double unit) {
     const double own = vsh_model_unit(model);
     return unit > 0.0 ? unit / (own > 0.0 ? own : 1.0) : 1.0;
@@ -146,7 +137,7 @@ static void print_unit(const vsh_model *model, double unit) {
     }
 }
 
-/* As 'bake --lights' takes them where nothing else is said. */
+/* Prints the lights that 'bake --lights' would read with its defaults. */
 static int print_lights(const vsh_model *model, double unit) {
     static const double angle = 0.53 * 0.017453292519943295; /* radians */
     vsh_light *lights = NULL;
@@ -319,7 +310,7 @@ done:
     return code;
 }
 
-/* What `bake --unwrap auto` would do. */
+/* Prints the work of `bake --unwrap auto`. */
 static int print_unwrap(const vsh_mesh *meshes, size_t count, const info_look *look, const vsh_run *run) {
     vsh_receiver receiver = vsh_receiver_default();
     receiver.width = look->width;

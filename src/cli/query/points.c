@@ -16,7 +16,7 @@
 
 enum { NX = 3 }; /* columns before the normal */
 
-enum { TOLD = 5 }; /* bad rows that get a message each */
+enum { SAID = 5 }; /* bad rows that get a message each */
 
 int cli_points_parse_format(const char *option, const char *text, int32_t *format) {
     static const char *const names[] = {"csv", "ply", "raw"};
@@ -264,7 +264,7 @@ int cli_points_read(cli_points_reader *reader, size_t most_kept, cli_points *poi
         if (row.bad[0] == '\0') {
             check_row(reader, &row);
         }
-        if (row.bad[0] != '\0' && (++reader->bad <= TOLD || reader->strict)) {
+        if (row.bad[0] != '\0' && (++reader->bad <= SAID || reader->strict)) {
             cli_say("%s: row %" PRIu64 ": %s", reader->table.source.name, reader->table.rows, row.bad);
         }
         if (row.bad[0] != '\0' && reader->strict) {
@@ -299,7 +299,7 @@ static int fail(const cli_points_writer *w) {
 
 /* --- heads */
 
-/* "x", "y" … before the answers, where rows are not kept; NULL behind the last. */
+/* The name of a column before the answers, if rows are not kept; NULL behind the last. */
 static const char *own_name(const cli_points_writer *w, int i) {
     static const char *const names[] = {"x", "y", "z", "nx", "ny", "nz"};
     return w->answers_only || w->keep || i >= (w->normals ? 6 : 3) ? NULL : names[i];
@@ -309,7 +309,7 @@ static void write_csv_head(cli_points_writer *w, const cli_points_reader *reader
     size_t written = 0;
     if (w->keep) {
         if (reader->table.header == NULL) {
-            return; /* none came, none goes */
+            return; /* a file without a header stays one */
         }
         fwrite(reader->table.header, 1, reader->table.header_size, w->file);
         ++written;

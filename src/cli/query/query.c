@@ -26,7 +26,7 @@ typedef struct query_settings {
     double within; /* 0: not given */
 } query_settings;
 
-/* What each point is asked for, and a batch's values. */
+/* The values of a point, and those of a batch. */
 typedef struct query_answers {
     size_t lights;
     const vsh_light *light;
@@ -214,8 +214,8 @@ typedef struct query_work {
  * memory limit allows */
 
 enum {
-    ORDER_BYTES = 16, /* a point of a call, as query.h says */
-    TEXT_BYTES = 256, /* of a kept row of text; longer rows make batches smaller */
+    ORDER_BYTES = 16, /* of vsh_query_points(), a point */
+    TEXT_BYTES = 256, /* room for a kept row of text; longer rows make batches smaller */
     LEAST_ROWS = 1024 /* smaller batches are not worth it */
 };
 
@@ -278,7 +278,7 @@ static int plan_batch(const query_work *work, bool keep, size_t *rows, size_t *m
     const uint64_t limit = work->settings->bake.common.memory_limit;
     const uint64_t held = work->stats.casters.field_bytes + work->stats.casters.triangles_bytes +
                           work->reader.face_vertices * (uint64_t)sizeof(float[6]);
-    const size_t row_size = work->reader.table.row_size;   /* 0: of text */
+    const size_t row_size = work->reader.table.row_size;   /* 0: text */
     size_t own = row_size > 0 ? 2 * row_size : TEXT_BYTES; /* twice: room grows by doubling */
     own = keep ? own : 0;
     const size_t each = cli_points_bytes(work->reader.has_normals, keep) + ORDER_BYTES + own +

@@ -29,11 +29,11 @@ typedef struct render_lightmap {
     char text[VSH_CHANNEL_NAME * 4];
 } render_lightmap;
 
-/* What the camera sees. */
+/* Everything in the picture. */
 typedef struct render_shown {
     vsh_surface *surfaces; /* [count]: of casters without triangles */
     size_t count;
-    vsh_occluders *own; /* of colours that share a layer */
+    vsh_occluders *own; /* fields of the surfaces whose colours share a layer */
     render_lightmap *maps;
     size_t map_count;
     vsh_lit_meshes *lit; /* [lit_count]: receivers with lightmaps, and behind them casters with triangles */

@@ -1,4 +1,4 @@
-/* What the camera sees, and where it stands.
+/* The casters and lightmaps in the picture, and the camera.
  *
  * Casters with triangles are shown as these, the others as a field for each colour. A layer's casters share
  * one field, which knows no casters. If they differ in colour, or some have triangles, each colour gets a
@@ -109,7 +109,7 @@ typedef struct split {
 static int make_own(const vsh_scene *colored, const vsh_assets *assets, const vsh_run *run, const split *p,
                     render_shown *shown) {
     vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
-    what.voxels = 1; /* which are seen */
+    what.voxels = 1; /* the camera sees them */
     vsh_error error;
     CLI_TRY(cli_check_result(vsh_scene_occluders(colored, assets, &what, run, &shown->own, &error), &error));
     vsh_occluder_parts own;
@@ -129,7 +129,7 @@ static int make_split(const vsh_scene *scene, const vsh_assets *assets, const vs
         p->casters[i] = scene->casters[i];
         p->casters[i].layer = p->names[i];
         if (is_shown_as_mesh(assets, i)) {
-            snprintf(p->names[i], sizeof p->names[i], "mesh"); /* no layer that is made */
+            snprintf(p->names[i], sizeof p->names[i], "mesh"); /* a layer that is not made */
             continue;
         }
         const size_t group = group_of(scene, assets, i);
@@ -161,7 +161,7 @@ static int make_split(const vsh_scene *scene, const vsh_assets *assets, const vs
         p->casters[i].direct = 0;
         p->casters[i].voxelised = 1;
     }
-    vsh_assets *again = NULL; /* what is direct was not read as something to voxelise */
+    vsh_assets *again = NULL; /* direct casters were loaded without their voxels */
     vsh_error error;
     if (direct && vsh_assets_load(&colored, run, &again, &error) != VSH_OK) {
         return cli_fail_of(NULL, &error);
@@ -203,7 +203,7 @@ done:
 
 /* --- lightmaps */
 
-/* Names the channels R, G, B, A (Y: R) as a pack says: "R=shadow.sun,G=ao". */
+/* Renames the channels R, G, B, A (Y: R) by a pack such as "R=shadow.sun,G=ao". */
 static int unpack(const char *pack, const char *path, render_lightmap *map) {
     const char *names[VSH_MAX_CHANNELS];
     const float *planes[VSH_MAX_CHANNELS];
@@ -255,7 +255,7 @@ static bool says_srgb(const vsh_image_file *file) {
     return says;
 }
 
-/* Takes the curve off what a PNG of ours says is sRGB: R, G and B. The image is then one of map->planes. */
+/* Makes R, G and B linear, whose file says that they are sRGB. The image is then one of map->planes. */
 static int decode(render_lightmap *map) {
     const vsh_image read = map->image;
     const size_t texels = (size_t)read.width * (size_t)read.height;
@@ -351,7 +351,7 @@ static size_t count_vertices(const vsh_lit_meshes *lit, size_t count) {
     return vertices;
 }
 
-/* A mesh's vertices in the world, those that its triangles use. */
+/* Adds the vertices that the mesh's triangles use, in the world. */
 static bool add_vertices(const vsh_mesh *mesh, double *points, size_t *count) {
     static const double identity[12] = {1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0};
     const double *t = mesh->transform != NULL ? mesh->transform : identity;
@@ -386,7 +386,7 @@ static void add_box(const vsh_field *field, double *points, size_t *count) {
     }
 }
 
-/* What is to be seen: vertices of meshes, and the corners of the boxes around surfaces. [*count][3] */
+/* Finds the points to keep in view: vertices of meshes, corners of the fields' boxes. [*count][3] */
 static double *find_points(const render_shown *seen, size_t *count) {
     const size_t room = 8 * seen->count + count_vertices(seen->lit, seen->lit_count) + 1;
     double *points = malloc(3 * room * sizeof *points);

@@ -562,7 +562,7 @@ static vsh_shade_options shade_of(const trade_work *work, const plan *p) {
     }
     if (p->max_error > 0.0) {
         shade.max_error = p->max_error;
-        shade.rays = 0; /* as many as the error needs */
+        shade.rays = 0; /* the error decides */
     } else if (p->ao && p->method == VSH_AO_CONES) {
         shade.ao_cones = p->number;
     } else if (p->number > 0) {

@@ -328,15 +328,10 @@ static void write_receivers(FILE *out, const trade_work *work) {
 
 static void write_truth(FILE *out, const trade_work *work) {
     if (vsh_scene_has_truth(work->scene)) {
-        static const char *const against[] = {
-            "procedural casters themselves (sphere tracing in double precision)", "triangles (Embree)",
-            "triangles (Embree) and procedural casters (sphere tracing in double precision), hidden by "
-            "either"};
-        fprintf(out, "<dt>Truth</dt><dd>%d rays a texel, from just above it, against the %s",
-                work->settings->truth_rays,
-                against[work->triangles == NULL ? 0
-                        : work->solids == NULL  ? 1
-                                                : 2]);
+        fprintf(out,
+                "<dt>Truth</dt><dd>%d rays a texel, from just above it, against the casters themselves%s%s",
+                work->settings->truth_rays, work->triangles != NULL ? "; triangles by Embree" : "",
+                work->solids != NULL ? "; procedural shapes by sphere tracing in double precision" : "");
     } else {
         fprintf(out, "<dt>Truth</dt><dd>%d rays a texel in a field of %d voxels along the longest side: %s",
                 trade_marched_rays(work), trade_truth_resolution(work),
