@@ -44,7 +44,7 @@ static const cli_option options[] = {
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
     {0, NULL, NULL, "Camera"},
     {KEY_CAMERA, "camera", "X,Y,Z", "where it stands (where all casters are in view)"},
-    {KEY_LOOK_AT, "look-at", "X,Y,Z", "what it looks at (the middle of the casters' box)"},
+    {KEY_LOOK_AT, "look-at", "X,Y,Z", "the point it looks at (the middle of the casters' box)"},
     {KEY_UP, "up", "X,Y,Z", "the way up (0,1,0)"},
     {KEY_FOV, "fov", "DEG", "angle over the picture's height, 0.1 to 170 (35)"},
     {KEY_ORBIT, "orbit", "DEG", "turn it so far around what it looks at (0)"},
@@ -61,7 +61,7 @@ static const cli_option options[] = {
      "the "
      "scene's\nnext receivers"},
     {KEY_LIGHTMAP_PACK, "lightmap-pack", "PACK",
-     "what lightmaps hold that do not name channels, as --pack\nof bake: \"R=shadow.sun,G=ao\""},
+     "the channels of lightmaps that do not name them, as\n--pack of bake: \"R=shadow.sun,G=ao\""},
     CLI_ACCURACY_OPTIONS,
     CLI_CASTER_OPTIONS,
     CLI_GRID_OPTIONS,

@@ -3,7 +3,6 @@
  * Every voxel size finds other texels valid (neither inside a solid nor behind a wall). Runs are compared
  * over the texels that all sizes find valid, and each run over its own valid texels too. */
 #include "base/clock.h"
-#include "cli/casters.h"
 #include "cli/progress.h"
 #include "cli/try.h"
 #include "trade.h"
@@ -86,7 +85,8 @@ static int load(trade_work *work) {
     }
     work->meshes = vsh_triangles_available() != 0;
     for (size_t i = 0; i < scene->caster_count; ++i) {
-        work->meshes = work->meshes && cli_caster_has_triangles(&scene->casters[i]);
+        const int32_t type = scene->casters[i].type;
+        work->meshes = work->meshes && (type == VSH_CASTER_MESH || type == VSH_CASTER_HEIGHTFIELD);
     }
     const double start = read_clock(work);
     const vsh_result result =
