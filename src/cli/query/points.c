@@ -29,12 +29,10 @@ int cli_points_parse_format(const char *option, const char *text, int32_t *forma
 }
 
 int32_t cli_points_format_of_path(const char *path) {
-    for (size_t i = 0; i < sizeof endings / sizeof endings[0]; ++i) {
-        if (cli_has_ending(path, endings[i].ending)) {
-            return endings[i].format;
-        }
-    }
-    return -1;
+    return cli_has_ending_of(path, "csv tsv txt xyz") ? VSHI_TABLE_CSV
+           : cli_has_ending(path, "ply")              ? VSHI_TABLE_PLY
+           : cli_has_ending_of(path, "raw f32 bin")   ? VSHI_TABLE_RAW
+                                                      : -1;
 }
 
 /* --- batches */
@@ -139,18 +137,16 @@ static bool make_normals(const vsh_mesh *mesh, cli_points_reader *reader) {
     double *sums = calloc(count, 3 * sizeof *sums);
     const bool good = positions != NULL && normals != NULL && sums != NULL;
     for (size_t t = 0; good && t < mesh->triangle_count; ++t) {
-        const uint32_t *corner = mesh->indices + 3 * t;
+        const size_t corner[] = {mesh->indices[3 * t], mesh->indices[3 * t + 1], mesh->indices[3 * t + 2]};
+        const float *p = mesh->positions + 3 * corner[0];
         double a[3], b[3];
-        for (int k = 0; k < 3; ++k) {
-            const double at = (double)mesh->positions[3 * (size_t)corner[0] + (size_t)k];
-            a[k] = (double)mesh->positions[3 * (size_t)corner[1] + (size_t)k] - at;
-            b[k] = (double)mesh->positions[3 * (size_t)corner[2] + (size_t)k] - at;
+        for (size_t k = 0; k < 3; ++k) {
+            a[k] = (double)mesh->positions[3 * corner[1] + k] - (double)p[k];
+            b[k] = (double)mesh->positions[3 * corner[2] + k] - (double)p[k];
         }
-        for (int i = 0; i < 3; ++i) {
-            for (int k = 0; k < 3; ++k) {
-                sums[3 * (size_t)corner[i] + (size_t)k] +=
-                    a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
-            }
+        for (size_t i = 0; i < 9; ++i) {
+            const size_t k = i % 3, x = (k + 1) % 3, y = (k + 2) % 3;
+            sums[3 * corner[i / 3] + k] += a[x] * b[y] - a[y] * b[x];
         }
     }
     for (size_t v = 0; good && v < count; ++v) {

@@ -24,11 +24,12 @@ static bool is_shown_as_mesh(const vsh_assets *assets, size_t index) {
 }
 
 bool render_shows_fields(const vsh_scene *scene, const vsh_assets *assets) {
-    bool shows = false;
-    for (size_t i = 0; i < scene->caster_count && !shows; ++i) {
-        shows = !is_shown_as_mesh(assets, i);
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        if (!is_shown_as_mesh(assets, i)) {
+            return true;
+        }
     }
-    return shows;
+    return false;
 }
 
 static void find_color(const vsh_caster *caster, double color[3]) {
@@ -67,12 +68,15 @@ static size_t group_of(const vsh_scene *scene, const vsh_assets *assets, size_t 
 
 /* The field of a layer, or (NULL) of casters in none. */
 static const vsh_field *field_of(const vsh_occluder_parts *parts, const char *layer) {
-    const vsh_field *field = layer == NULL ? parts->field : NULL;
-    for (size_t l = 0; layer != NULL && field == NULL && l < parts->layer_count; ++l) {
-        const vsh_layer *own = &parts->layers[l];
-        field = own->field != NULL && strcmp(own->name, layer) == 0 ? own->field : NULL;
+    if (layer == NULL) {
+        return parts->field;
     }
-    return field;
+    for (size_t l = 0; l < parts->layer_count; ++l) {
+        if (parts->layers[l].field != NULL && strcmp(parts->layers[l].name, layer) == 0) {
+            return parts->layers[l].field;
+        }
+    }
+    return NULL;
 }
 
 /* Whether all casters of a layer have one colour and no triangles, and are in its field. */
@@ -80,11 +84,12 @@ static bool is_plain(const vsh_scene *scene, const vsh_assets *assets, const cha
     const vsh_caster *first = NULL;
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
-        if (same_layer(caster->layer, layer)) {
-            first = first == NULL ? caster : first;
-            if (cli_caster_is_direct(caster) || !same_color(first, caster) || is_shown_as_mesh(assets, i)) {
-                return false;
-            }
+        if (!same_layer(caster->layer, layer)) {
+            continue;
+        }
+        first = first == NULL ? caster : first;
+        if (cli_caster_is_direct(caster) || !same_color(first, caster) || is_shown_as_mesh(assets, i)) {
+            return false;
         }
     }
     return true;
@@ -247,12 +252,13 @@ static int unpack(const char *pack, const char *path, render_lightmap *map) {
 static bool says_srgb(const vsh_image_file *file) {
     size_t count = 0;
     const vsh_attribute *attributes = vsh_image_attributes(file, &count);
-    bool says = false;
-    for (size_t i = 0; i < count && !says; ++i) {
-        says = strcmp(attributes[i].name, "vdbshade_color_space") == 0 &&
-               strcmp(attributes[i].value, "sRGB") == 0;
+    for (size_t i = 0; i < count; ++i) {
+        if (strcmp(attributes[i].name, "vdbshade_color_space") == 0 &&
+            strcmp(attributes[i].value, "sRGB") == 0) {
+            return true;
+        }
     }
-    return says;
+    return false;
 }
 
 /* Makes R, G and B linear, whose file says that they are sRGB. The image is then one of map->planes. */
@@ -390,19 +396,17 @@ static void add_box(const vsh_field *field, double *points, size_t *count) {
 static double *find_points(const render_shown *seen, size_t *count) {
     const size_t room = 8 * seen->count + count_vertices(seen->lit, seen->lit_count) + 1;
     double *points = malloc(3 * room * sizeof *points);
-    bool done = points != NULL;
     *count = 0;
-    for (size_t i = 0; done && i < seen->count; ++i) {
+    for (size_t i = 0; points != NULL && i < seen->count; ++i) {
         add_box(seen->surfaces[i].field, points, count);
     }
-    for (size_t i = 0; done && i < seen->lit_count; ++i) {
-        for (size_t m = 0; done && m < seen->lit[i].mesh_count; ++m) {
-            done = add_vertices(&seen->lit[i].meshes[m], points, count);
+    for (size_t i = 0; points != NULL && i < seen->lit_count; ++i) {
+        for (size_t m = 0; m < seen->lit[i].mesh_count; ++m) {
+            if (!add_vertices(&seen->lit[i].meshes[m], points, count)) {
+                free(points);
+                return NULL;
+            }
         }
-    }
-    if (!done) {
-        free(points);
-        return NULL;
     }
     return points;
 }
