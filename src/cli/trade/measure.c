@@ -25,6 +25,9 @@ enum { SURFACE_STEPS = 16 };
 enum { REPEATS = 3 };
 static const double SHORT_SECONDS = 0.3;
 
+/* Most voxels along a side, and most rays a texel that `bake` marches. */
+enum { MOST_TRUTH_RESOLUTION = 65536, MOST_MARCHED_RAYS = 4096 };
+
 /* Embree's curve ends at so many rays, or at half of the truth's. */
 enum { CURVE_RAYS = 256 };
 
@@ -315,23 +318,17 @@ static int trace(const trade_work *work, const trade_subject *subject, int32_t r
     return cli_check_result(result, &error);
 }
 
-int32_t trade_truth_resolution(const trade_work *work) {
-    const int32_t finest = work->fields[0].resolution;
-    return finest <= 32768 ? 2 * finest : finest;
-}
-
-int32_t trade_marched_rays(const trade_work *work) {
-    return work->settings->truth_rays < 4096 ? work->settings->truth_rays : 4096;
-}
-
 static int march_truth(trade_work *work) {
+    const int32_t finest = work->fields[0].resolution;
+    work->truth_resolution = finest <= MOST_TRUTH_RESOLUTION / 2 ? 2 * finest : finest;
+    work->truth_rays = work->truth_rays < MOST_MARCHED_RAYS ? work->truth_rays : MOST_MARCHED_RAYS;
     vsh_occluders *occluders = NULL;
     double seconds;
-    int code = make_voxels(work, trade_truth_resolution(work), &occluders, &seconds);
+    int code = make_voxels(work, work->truth_resolution, &occluders, &seconds);
     vsh_shade_options shade = work->scene->shade;
     shade.method = VSH_SHADOW_RAYS;
     shade.ao_method = VSH_AO_RAYS;
-    shade.rays = trade_marched_rays(work);
+    shade.rays = work->truth_rays;
     shade.early_rays = 0;
     for (size_t s = 0; s < work->subject_count && code == CLI_OK; ++s) {
         code = bake(work, &work->subjects[s], occluders, &shade, work->subjects[s].truth);
@@ -342,11 +339,11 @@ static int march_truth(trade_work *work) {
 
 static int make_truth(trade_work *work) {
     const double start = read_clock(work);
+    work->truth_rays = work->settings->truth_rays;
     if (vsh_scene_has_truth(work->scene)) {
         for (size_t s = 0; s < work->subject_count; ++s) {
             double seconds;
-            CLI_TRY(trace(work, &work->subjects[s], work->settings->truth_rays, work->subjects[s].truth,
-                          &seconds));
+            CLI_TRY(trace(work, &work->subjects[s], work->truth_rays, work->subjects[s].truth, &seconds));
         }
     } else {
         CLI_TRY(march_truth(work));

@@ -327,14 +327,14 @@ static void write_receivers(FILE *out, const trade_work *work) {
 }
 
 static void write_truth(FILE *out, const trade_work *work) {
-    if (vsh_scene_has_truth(work->scene)) {
+    if (work->truth_resolution == 0) {
         fprintf(out,
                 "<dt>Truth</dt><dd>%d rays a texel, from just above it, against the casters themselves%s%s",
-                work->settings->truth_rays, work->triangles != NULL ? "; triangles by Embree" : "",
+                work->truth_rays, work->triangles != NULL ? "; triangles by Embree" : "",
                 work->solids != NULL ? "; procedural shapes by sphere tracing in double precision" : "");
     } else {
         fprintf(out, "<dt>Truth</dt><dd>%d rays a texel in a field of %d voxels along the longest side: %s",
-                trade_marched_rays(work), trade_truth_resolution(work),
+                work->truth_rays, work->truth_resolution,
                 vsh_triangles_available() ? "a caster is neither a mesh nor procedural"
                                           : "this build has no Embree");
     }

@@ -91,11 +91,9 @@ typedef struct trade_work {
     size_t skipped;   /* runs that did not fit into the budget */
     double measuring; /* when the budget began, seconds */
     double truth_s;
+    int32_t truth_rays;       /* a texel */
+    int32_t truth_resolution; /* of the field that they are marched in; 0: they meet the casters themselves */
 } trade_work;
-
-/* Rays of the truth where no rays can meet the casters: marched in a field of this resolution. */
-int32_t trade_truth_resolution(const trade_work *work);
-int32_t trade_marched_rays(const trade_work *work);
 
 /* Loads the scene, makes its truth and measures all runs. CLI_OK or an exit code, having said why. */
 int trade_measure(trade_work *work);
