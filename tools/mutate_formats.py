@@ -190,8 +190,8 @@ FORMATS = [
                                       {"scene": "a.json", "command": "volume", "options": ["--band", "1"], "output": "a.vdb"}]})],
            "regress.json", lambda _: {"a.json": GOLDEN}),
     Format("tolerance", "json", J, [["compare", "LIKE", "LIKE", "--tolerances", "IN"]],
-           lambda _: [text({"rmse": 0.01, "bias": 0.002, "max": 0.2, "p99": 0.02, "share": 0.01, "ssim": 0.98, "penumbra": 0.05, "shift": 0.1,
-                            "lost": 3, "threshold": 0.02, "reach": 2, "coverage": 0.002, "channels": {"shadow.*": {"penumbra": 0.05}}})]),
+           lambda _: [text({"rmse": 0.01, "max": 0.2, "p99": 0.02, "penumbra": 0.05, "shift": 0.1,
+                            "lost": 3, "step": 0.2, "reach": 2, "coverage": 0.002, "channels": {"shadow.*": {"penumbra": 0.05}}})]),
     Format("spheres", "csv", T, SPHERES, lambda sound: sound.read("assets/spheres.csv"), None, lambda _: {
         "spheres.json": scene({"spheres": "in.csv"}), "voxels.json": scene({"spheres": "in.csv", "voxelised": True})}),
     Format("points-csv", "csv", T, POINTS, lambda sound: [every(sound)["points.csv"] * 1, b"# a\nx;y;z\n" + b"1;2;3\n" * 20,

@@ -1,12 +1,13 @@
-/* Comparing two planes: what is asked is checked, and the measures are taken side by side. */
+/* Compares two planes: coverage, differences value by value, and the order of the other measures. */
+#include "compare/compare.h"
 #include "base/floats.h"
+#include "base/job.h"
 #include "base/memory.h"
-#include "base/parallel.h"
 #include "base/try.h"
-#include "compare/pair.h"
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { MOST_VALUES = INT32_MAX, MOST_REACH = 16 };
 
@@ -30,9 +31,9 @@ void vsh_compare_coverage(uint64_t count, const float *golden, const float *valu
     *coverage = c;
 }
 
-/* --- beforehand */
+/* --- pairs */
 
-vsh_result vshi_pair_check(const vsh_compared *compared, double *values, vsh_error *error) {
+static vsh_result check_pair(const vsh_compared *compared, double *values, vsh_error *error) {
     if (compared->golden == NULL || compared->values == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "comparison: the %s values are NULL",
                          compared->golden == NULL ? "golden" : "new");
@@ -50,34 +51,9 @@ vsh_result vshi_pair_check(const vsh_compared *compared, double *values, vsh_err
     return VSH_OK;
 }
 
-static vsh_result check(const vsh_compared *compared, const vsh_compare_options *given, const vsh_run *run,
-                        vsh_compare_options *options, vsh_error *error) {
-    double count;
-    VSHI_TRY(vshi_pair_check(compared, &count, error));
-    *options = vsh_compare_options_default();
-    if (given != NULL) {
-        VSHI_TRY(vshi_options_resolve(given, options, sizeof *options, "options", error));
-    }
-    if (!(options->threshold >= 0.0 && options->threshold <= 1.0)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "threshold of %g: expected 0 … 1", options->threshold);
-    }
-    if (!(options->step > 0.0 && options->step <= 1.0)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "step of %g: expected 0 (excluded) … 1", options->step);
-    }
-    if (options->reach < 0 || options->reach > MOST_REACH) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "reach of %d texels: expected 0 … %d", options->reach,
-                         MOST_REACH);
-    }
-    if (!(options->noise >= 0.0 && options->noise <= 1.0)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "noise of %g: expected 0 … 1", options->noise);
-    }
-    /* the caller's values and mask, then ours */
-    const double bytes = count * (9.0 + 1.0 + VSHI_CURVE_SCRATCH + VSHI_SHIFT_SCRATCH + VSHI_REGIONS_SCRATCH);
-    return vshi_check_limit(run, bytes, "comparison", error);
-}
-
-/* Leaves out of the mask what is not finite, counts it, and finds the range. */
-void vshi_pair_make(const vsh_compared *compared, uint8_t *mask, vshi_pair *pair, vsh_measures *m) {
+/* Makes a pair with `mask` [count] as its mask, and fills the measures' count, range and nonfinite values.
+ * The other measures become NaN or 0. */
+static void make_pair(const vsh_compared *compared, uint8_t *mask, vshi_pair *pair, vsh_measures *m) {
     *m = (vsh_measures){.width = {NAN, NAN}};
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
         m->value[i] = NAN;
@@ -109,54 +85,195 @@ void vshi_pair_make(const vsh_compared *compared, uint8_t *mask, vshi_pair *pair
     m->value[VSH_MEASURE_NONFINITE] = (double)(m->nonfinite[0] + m->nonfinite[1]);
 }
 
-/* --- the measures, each a piece of the work */
+/* --- differences */
 
-typedef struct work {
-    const vshi_pair *pair, *shapes; /* the latter with golden on the curve of causes.c */
-    const vsh_compare_options *options;
-    vsh_measures *measures;
-    uint8_t *scratch;
-    vsh_result results[8];
-} work;
+enum { BINS = 1 << 16 };
 
-static const struct {
-    vshi_measure_fn *take;
-    size_t scratch;
-    bool shapes; /* it compares shapes, whatever the curve over the values */
-} parts[] = {{vshi_measure_regions, VSHI_REGIONS_SCRATCH, true},
-             {vshi_measure_shift, VSHI_SHIFT_SCRATCH, true},
-             {vshi_measure_ssim, 0, false},
-             {vshi_measure_edges, 0, true},
-             {vshi_measure_values, 0, false}};
-enum { PARTS = sizeof parts / sizeof parts[0] };
+/* Histograms use 16 bits at a time: floats that are not negative sort like their bits. */
+static uint32_t bits_of(double difference) {
+    const float value = (float)fabs(difference);
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits;
+}
 
-static void take_parts(void *user, size_t begin, size_t end) {
-    work *w = user;
-    for (size_t i = begin; i < end; ++i) {
-        size_t before = 0;
-        for (size_t k = 0; k < i; ++k) {
-            before += parts[k].scratch * w->pair->count;
+/* Finds the bin of element `rank` (from 0), and turns `rank` into the rank within that bin. */
+static uint32_t find_bin(const uint64_t *bins, uint64_t *rank) {
+    uint32_t bin = 0;
+    while (bin + 1 < BINS && *rank >= bins[bin]) {
+        *rank -= bins[bin++];
+    }
+    return bin;
+}
+
+/* Sums over the differences of one or several pairs. */
+typedef struct tally {
+    uint64_t count;
+    double sum, squares, worst;
+    size_t worst_at; /* index within its pair */
+    uint64_t *bins;  /* [BINS] by upper halves, then [BINS] of scratch for find_percentile() */
+} tally;
+
+static void add_differences(const vshi_pair *pair, tally *t) {
+    for (size_t i = 0; i < pair->count; ++i) {
+        if (!pair->mask[i]) {
+            continue;
         }
-        const vshi_pair *pair = parts[i].shapes ? w->shapes : w->pair;
-        w->results[i] =
-            parts[i].take(pair, w->options, w->scratch + before, w->measures) ? VSH_OK : VSH_ERROR_MEMORY;
+        const double difference = vshi_difference_at(pair, i);
+        ++t->count;
+        t->sum += difference;
+        t->squares += difference * difference;
+        ++t->bins[bits_of(difference) >> 16];
+        if (fabs(difference) > t->worst) {
+            t->worst = fabs(difference);
+            t->worst_at = i;
+        }
     }
 }
 
-static vsh_result take_all(work *w, const vsh_run *run, vsh_error *error) {
-    vshi_job *job = vshi_job_begin(run, "compare", PARTS);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "comparison: the system refused memory");
-    }
-    const vsh_result result = vshi_parallel_for(job, PARTS, 1, 1, take_parts, w, error);
-    vshi_job_end(job);
-    VSHI_TRY(result);
-    for (size_t i = 0; i < PARTS; ++i) {
-        if (w->results[i] != VSH_OK) {
-            return vshi_fail(error, w->results[i], "comparison: the system refused memory");
+/* Finds the exact percentile by nearest rank: first the upper half of its bits, then the lower one. */
+static double find_percentile(const vshi_pair *pairs, size_t pair_count, const tally *t, double share) {
+    uint64_t rank = (uint64_t)ceil(share * (double)t->count) - 1;
+    const uint32_t high = find_bin(t->bins, &rank);
+    uint64_t *bins = t->bins + BINS;
+    memset(bins, 0, BINS * sizeof *bins);
+    for (size_t k = 0; k < pair_count; ++k) {
+        for (size_t i = 0; i < pairs[k].count; ++i) {
+            const uint32_t bits = pairs[k].mask[i] ? bits_of(vshi_difference_at(&pairs[k], i)) : 0;
+            bins[bits & 0xffff] += pairs[k].mask[i] && bits >> 16 == high;
         }
     }
+    const uint32_t bits = high << 16 | find_bin(bins, &rank);
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    return (double)value;
+}
+
+static vsh_result measure_values(const vshi_pair *pair, vsh_measures *m, vsh_error *error) {
+    tally t = {.worst = -1.0};
+    void *bins;
+    VSHI_TRY(vshi_allocate(&bins, (size_t)2 * BINS, sizeof(uint64_t), "comparison", error));
+    t.bins = bins;
+    add_differences(pair, &t);
+    m->value[VSH_MEASURE_RMSE] = sqrt(t.squares / (double)t.count);
+    m->value[VSH_MEASURE_MAX] = t.worst;
+    m->value[VSH_MEASURE_P99] = find_percentile(pair, 1, &t, 0.99);
+    m->worst = t.worst_at;
+    m->worst_value[VSHI_GOLDEN] = (double)pair->plane[VSHI_GOLDEN][m->worst];
+    m->worst_value[VSHI_NEW] = (double)pair->plane[VSHI_NEW][m->worst];
+    free(bins);
     return VSH_OK;
+}
+
+/* --- against a truth */
+
+static const double DARK = 0.02, LIGHT = 0.98; /* values between are penumbra */
+
+static void add_penumbra(const vshi_pair *pair, double *squares, uint64_t *count) {
+    for (size_t i = 0; i < pair->count; ++i) {
+        const double truth = vshi_value_at(pair, VSHI_GOLDEN, i);
+        if (pair->mask[i] && truth >= DARK && truth <= LIGHT) {
+            const double difference = vshi_difference_at(pair, i);
+            *squares += difference * difference;
+            ++*count;
+        }
+    }
+}
+
+static void measure_accuracy(const vshi_pair *pairs, size_t pair_count, tally *t, vsh_accuracy *a) {
+    double squares = 0.0, width = 0.0, off = 0.0;
+    for (size_t k = 0; k < pair_count; ++k) {
+        add_differences(&pairs[k], t);
+        add_penumbra(&pairs[k], &squares, &a->penumbra);
+        vshi_add_widths(&pairs[k], &width, &off);
+    }
+    a->count = t->count;
+    a->width_error = width > 0.0 ? off / width : NAN;
+    if (t->count > 0) {
+        a->rmse = sqrt(t->squares / (double)t->count);
+        a->bias = t->sum / (double)t->count;
+        a->p95 = find_percentile(pairs, pair_count, t, 0.95);
+        a->p99 = find_percentile(pairs, pair_count, t, 0.99);
+        a->max = t->worst;
+        a->penumbra_rmse = a->penumbra > 0 ? sqrt(squares / (double)a->penumbra) : 0.0;
+    }
+}
+
+vsh_result vsh_compare_accuracy(const vsh_compared *planes, size_t plane_count, const vsh_run *run,
+                                vsh_accuracy *accuracy, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(planes);
+    VSHI_NEEDS(accuracy);
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    double values = 0.0;
+    for (size_t i = 0; i < plane_count; ++i) {
+        double count = 0.0;
+        VSHI_TRY(check_pair(&planes[i], &count, error));
+        values += count;
+    }
+    /* the caller's values and masks, then our masks */
+    VSHI_TRY(vshi_check_limit(&full, values * (9.0 + 1.0), "comparison", error));
+    void *pair_memory = NULL, *mask_memory = NULL, *bins = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate(&pair_memory, plane_count, sizeof(vshi_pair), "comparison", error));
+    VSHI_TRY_DONE(vshi_allocate(&mask_memory, (size_t)values, 1, "comparison", error));
+    VSHI_TRY_DONE(vshi_allocate(&bins, (size_t)2 * BINS, sizeof(uint64_t), "comparison", error));
+    vshi_pair *pairs = pair_memory;
+    uint8_t *mask = mask_memory;
+    for (size_t i = 0; i < plane_count; ++i) {
+        vsh_measures unused;
+        make_pair(&planes[i], mask, &pairs[i], &unused);
+        pairs[i].scale = 1.0;
+        mask += pairs[i].count;
+    }
+    tally t = {.worst = -1.0, .bins = bins};
+    vsh_accuracy made = {.count = 0};
+    measure_accuracy(pairs, plane_count, &t, &made);
+    *accuracy = made;
+done:
+    free(bins);
+    free(mask_memory);
+    free(pair_memory);
+    return result;
+}
+
+/* --- all measures */
+
+static vsh_result check_options(const vsh_compare_options *options, vsh_error *error) {
+    if (!(options->step > 0.0 && options->step <= 1.0)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "step of %g: expected 0 (excluded) … 1", options->step);
+    }
+    if (options->reach < 0 || options->reach > MOST_REACH) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "reach of %d texels: expected 0 … %d", options->reach,
+                         MOST_REACH);
+    }
+    if (!(options->noise >= 0.0 && options->noise <= 1.0)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "noise of %g: expected 0 … 1", options->noise);
+    }
+    return VSH_OK;
+}
+
+static vsh_result advance(vshi_job *job, vsh_error *error) {
+    return vshi_job_advance(job, 1) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
+}
+
+/* A displacement explains more than a curve, so it is measured first: a straight edge that moved fits a
+ * curve, too. */
+static vsh_result measure_all(vshi_pair pair, const vsh_compare_options *options, vshi_job *job,
+                              float *mapped, void *scratch, vsh_measures *m, vsh_error *error) {
+    VSHI_TRY(measure_values(&pair, m, error));
+    VSHI_TRY(advance(job, error));
+    vshi_measure_noise(&pair, m);
+    vshi_measure_shift(&pair, scratch, m);
+    VSHI_TRY(advance(job, error));
+    if (m->value[VSH_MEASURE_SHIFT] == 0.0 && vshi_follow_curve(&pair, mapped, m)) {
+        vshi_measure_shift(&pair, scratch, m);
+    }
+    VSHI_TRY(vshi_measure_penumbrae(&pair, options->noise, m, error));
+    VSHI_TRY(advance(job, error));
+    vshi_measure_regions(&pair, options, scratch, m);
+    return advance(job, error);
 }
 
 vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_options *options, const vsh_run *run,
@@ -165,28 +282,34 @@ vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_options *
     VSHI_NEEDS(compared);
     VSHI_NEEDS(measures);
     vsh_run full;
-    vsh_compare_options chosen;
+    vsh_compare_options chosen = vsh_compare_options_default();
+    double values = 0.0;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    VSHI_TRY(check(compared, options, &full, &chosen, error));
-    const size_t count = (size_t)compared->size[0] * (size_t)compared->size[1] * (size_t)compared->size[2];
+    VSHI_TRY(check_pair(compared, &values, error));
+    if (options != NULL) {
+        VSHI_TRY(vshi_options_resolve(options, &chosen, sizeof chosen, "options", error));
+    }
+    VSHI_TRY(check_options(&chosen, error));
+    /* the caller's values and mask, then our mask, mapped values and scratch */
+    VSHI_TRY(vshi_check_limit(&full, values * (9.0 + 1.0 + 4.0 + VSHI_REGIONS_SCRATCH), "comparison", error));
+    const size_t count = (size_t)values;
     void *mask = NULL, *scratch = NULL, *mapped = NULL;
+    vshi_job *job = NULL;
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate(&mask, count, 1, "comparison", error));
-    VSHI_TRY_DONE(
-        vshi_allocate(&scratch, count, VSHI_SHIFT_SCRATCH + VSHI_REGIONS_SCRATCH, "comparison", error));
-    VSHI_TRY_DONE(vshi_allocate(&mapped, count, VSHI_CURVE_SCRATCH, "comparison", error));
+    VSHI_TRY_DONE(vshi_allocate(&scratch, count, VSHI_REGIONS_SCRATCH, "comparison", error));
+    VSHI_TRY_DONE(vshi_allocate(&mapped, count, sizeof(float), "comparison", error));
     vshi_pair pair;
     vsh_measures m;
-    vshi_pair_make(compared, mask, &pair, &m);
-    vshi_pair shapes = pair;
-    work w = {&pair, &shapes, &chosen, &m, scratch, {VSH_OK}};
+    make_pair(compared, mask, &pair, &m);
     if (m.count > 0) {
-        vshi_find_noise(&pair, &m);
-        vshi_follow_curve(&shapes, mapped, scratch, &m);
-        VSHI_TRY_DONE(take_all(&w, &full, error));
+        job = vshi_job_begin(&full, "compare", 4);
+        VSHI_TRY_DONE(job != NULL ? VSH_OK : vshi_fail(error, VSH_ERROR_MEMORY, "comparison: out of memory"));
+        VSHI_TRY_DONE(measure_all(pair, &chosen, job, mapped, scratch, &m, error));
     }
     *measures = m;
 done:
+    vshi_job_end(job);
     free(mapped);
     free(scratch);
     free(mask);

@@ -1,31 +1,59 @@
-/* Two files, of one kind or not: images, or grids. */
-#include "compare/files.h"
-
+/* Compares two files: images channel by channel, or .vdb files grid by grid, over what both cover. */
 #include "base/file.h"
 #include "base/floats.h"
 #include "base/job.h"
+#include "base/memory.h"
 #include "base/try.h"
 
 #include <math.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <unistd.h>
+#include <vdbshade/compare.h>
 #include <vdbshade/provenance.h>
+#include <vdbshade/voxels.h>
+
+enum { MAX_GRIDS = 4096, MOST_TEXTS = 64 };
 
 static const double COVERAGE_LIMIT = 0.001;
+static const double SAME_PLACE = 1e-3; /* voxels that two lattices may be apart */
 
-static vsh_result no_memory(const vshi_compare_work *work, vsh_error *error) {
-    return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", work->path[0]);
+struct vsh_comparison {
+    vsh_channel_comparison *channels;
+    size_t channel_count;
+    char (*problems)[320]; /* other sizes, channels, voxels, formats */
+    size_t problem_count;
+    bool alike;
+};
+
+typedef struct files {
+    const char *path[2]; /* golden, new */
+    vsh_compare_files_options options;
+    vsh_run run;
+    vsh_tolerances *tolerances; /* may be NULL */
+    vsh_comparison *comparison;
+} files;
+
+/* Attributes of a file. */
+typedef struct attributes {
+    const vsh_attribute *list;
+    size_t count;
+} attributes;
+
+static vsh_result no_memory(const files *f, vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", f->path[0]);
 }
 
-vsh_result vshi_compare_problem(const vshi_compare_work *work, vsh_error *error, const char *format, ...) {
-    vsh_comparison *c = work->comparison;
+static vsh_result __attribute__((format(printf, 3, 4)))
+add_problem(const files *f, vsh_error *error, const char *format, ...) {
+    vsh_comparison *c = f->comparison;
     void *more = realloc(c->problems, (c->problem_count + 1) * sizeof *c->problems);
     if (more == NULL) {
-        return no_memory(work, error);
+        return no_memory(f, error);
     }
     c->problems = more;
     va_list arguments;
@@ -37,27 +65,27 @@ vsh_result vshi_compare_problem(const vshi_compare_work *work, vsh_error *error,
 
 /* --- one channel */
 
-/* A channel's method, error, sampler and frame, in the file's words. */
-static const char *method_of(const vshi_texts *texts, const char *channel) {
+/* Finds the attribute with a channel's method, error, sampler and frame. */
+static const char *method_of(const attributes *texts, const char *channel) {
     char name[VSH_CHANNEL_NAME + 16];
     snprintf(name, sizeof name, "vdbshade_%.*s", (int)strcspn(channel, "."), channel);
-    size_t i = 0;
-    while (i < texts->count && strcmp(texts->list[i].name, name) != 0) {
-        ++i;
+    for (size_t i = 0; i < texts->count; ++i) {
+        if (strcmp(texts->list[i].name, name) == 0) {
+            return texts->list[i].value;
+        }
     }
-    return i < texts->count ? texts->list[i].value : "";
+    return "";
 }
 
-/* Bakes made in one way cast the same rays and have no noise between them. */
-static double noise_between(const vshi_texts texts[2], const char *channel, const double max_error[2]) {
+/* Bakes made in the same way cast the same rays, so there is no noise between them. */
+static double noise_between(const attributes texts[2], const char *channel, const double max_error[2]) {
     const bool known = !isnan(max_error[0]) && !isnan(max_error[1]);
     const bool differ = strcmp(method_of(&texts[0], channel), method_of(&texts[1], channel)) != 0;
     return known && differ ? sqrt(max_error[0] * max_error[0] + max_error[1] * max_error[1]) : 0.0;
 }
 
-static void set_limits(const vshi_compare_work *work, const vshi_texts texts[2],
-                       vsh_channel_comparison *channel) {
-    const vsh_compare_files_options *o = &work->options;
+static void set_limits(const files *f, const attributes texts[2], vsh_channel_comparison *channel) {
+    const vsh_compare_files_options *o = &f->options;
     channel->limits = vsh_limits_default();
     for (int which = 0; which < 2; ++which) {
         channel->max_error[which] =
@@ -67,63 +95,406 @@ static void set_limits(const vshi_compare_work *work, const vshi_texts texts[2],
                                                  ? noise_between(texts, channel->name, channel->max_error)
                                                  : o->noise);
     channel->coverage_limit = COVERAGE_LIMIT;
-    vsh_tolerances_apply(work->tolerances, channel->name, &channel->limits, &channel->coverage_limit);
+    vsh_tolerances_apply(f->tolerances, channel->name, &channel->limits, &channel->coverage_limit);
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
         channel->limits.value[i] = isnan(o->limits[i]) ? channel->limits.value[i] : o->limits[i];
     }
     vsh_compare_options *options = &channel->limits.options;
-    options->threshold = isnan(o->threshold) ? options->threshold : o->threshold;
     options->step = isnan(o->step) ? options->step : o->step;
     options->reach = o->reach < 0 ? options->reach : o->reach;
     channel->coverage_limit = isnan(o->coverage_limit) ? channel->coverage_limit : o->coverage_limit;
 }
 
-vsh_result vshi_compare_channel(const vshi_compare_work *work, const char *name, const vshi_texts texts[2],
-                                vsh_channel_comparison **channel, vsh_error *error) {
-    vsh_comparison *c = work->comparison;
+static vsh_result add_channel(const files *f, const char *name, const attributes texts[2],
+                              vsh_channel_comparison **channel, vsh_error *error) {
+    vsh_comparison *c = f->comparison;
     vsh_channel_comparison *more = realloc(c->channels, (c->channel_count + 1) * sizeof *more);
     if (more == NULL) {
-        return no_memory(work, error);
+        return no_memory(f, error);
     }
     c->channels = more;
     *channel = &more[c->channel_count++];
     memset(*channel, 0, sizeof **channel);
     snprintf((*channel)->name, sizeof(*channel)->name, "%s", name);
-    set_limits(work, texts, *channel);
+    set_limits(f, texts, *channel);
     return VSH_OK;
 }
 
-vsh_result vshi_compare_measure(const vshi_compare_work *work, vsh_channel_comparison *channel,
-                                const vsh_compared *compared, vsh_error *error) {
-    vsh_run run = work->run;
+static void set_coverage(vsh_channel_comparison *channel, const vsh_coverage *coverage) {
+    channel->coverage = *coverage;
+    channel->coverage_failed = coverage->share > channel->coverage_limit;
+}
+
+/* Measures and judges a channel. The caller holds its values already. */
+static vsh_result measure(const files *f, vsh_channel_comparison *channel, const vsh_compared *compared,
+                          vsh_error *error) {
+    vsh_run run = f->run;
     const uint64_t given = 2 * sizeof(float) * (uint64_t)compared->size[0] * (uint64_t)compared->size[1] *
-                           (uint64_t)compared->size[2]; /* of what is held */
+                           (uint64_t)compared->size[2];
     run.memory_held -= run.memory_held < given ? run.memory_held : given;
     VSHI_TRY(vsh_compare(compared, &channel->limits.options, &run, &channel->measures, error));
     channel->failed = vsh_compare_judge(&channel->measures, &channel->limits);
-    if (work->options.look != NULL &&
-        work->options.look(work->options.user, work->comparison->channel_count - 1, channel, compared) != 0) {
-        return vshi_fail(error, VSH_ERROR_CANCELLED, "%s: comparing was stopped", work->path[1]);
+    if (f->options.look != NULL &&
+        f->options.look(f->options.user, f->comparison->channel_count - 1, channel, compared) != 0) {
+        return vshi_fail(error, VSH_ERROR_CANCELLED, "%s: comparing was stopped", f->path[1]);
     }
     return VSH_OK;
 }
 
+/* --- images */
+
+typedef struct images {
+    vsh_image_file *file[2]; /* golden, new */
+    vsh_image image[2];
+    attributes texts[2];
+    const char *names[2][VSH_MAX_CHANNELS]; /* of the images */
+    const float *planes[2][VSH_MAX_CHANNELS];
+    uint8_t *mask; /* texels to compare */
+} images;
+
+static const float *find_plane(const vsh_image *image, const char *name) {
+    for (int32_t i = 0; i < image->channel_count; ++i) {
+        if (strcmp(image->names[i], name) == 0) {
+            return image->planes[i];
+        }
+    }
+    return NULL;
+}
+
+/* Lists the channels of a file once: without R, G and B if they only show other channels. */
+static void list_channels(images *both, int which) {
+    const vsh_image all = vsh_image_view(both->file[which]);
+    const attributes *texts = &both->texts[which];
+    bool shown = false, others = false;
+    for (size_t i = 0; i < texts->count; ++i) {
+        shown = shown || strcmp(texts->list[i].name, VSH_IMAGE_RGB) == 0;
+    }
+    for (int32_t c = 0; c < all.channel_count; ++c) {
+        others = others || strlen(all.names[c]) != 1;
+    }
+    vsh_image *image = &both->image[which];
+    *image = (vsh_image){all.width, all.height, 0, both->names[which], both->planes[which], NULL};
+    for (int32_t c = 0; c < all.channel_count; ++c) {
+        const char *name = all.names[c];
+        if (!shown || !others || strlen(name) != 1 || strchr("RGB", name[0]) == NULL) {
+            both->names[which][image->channel_count] = name;
+            both->planes[which][image->channel_count++] = all.planes[c];
+        }
+    }
+}
+
+static vsh_result read_both(files *f, images *both, vsh_error *error) {
+    for (int which = 0; which < 2; ++which) {
+        VSHI_TRY(vsh_image_read(f->path[which], &f->run, &both->file[which], error));
+        const vsh_image all = vsh_image_view(both->file[which]);
+        f->run.memory_held +=
+            sizeof(float) * (uint64_t)all.width * (uint64_t)all.height * (uint64_t)all.channel_count;
+        both->texts[which].list = vsh_image_attributes(both->file[which], &both->texts[which].count);
+        list_channels(both, which);
+    }
+    return VSH_OK;
+}
+
+static vsh_result compare_names(const files *f, const images *both, vsh_error *error) {
+    for (int which = 0; which < 2; ++which) {
+        const vsh_image *image = &both->image[which];
+        for (int32_t i = 0; i < image->channel_count; ++i) {
+            if (find_plane(&both->image[1 - which], image->names[i]) == NULL) {
+                VSHI_TRY(add_problem(f, error, "channel '%s': in %s alone", image->names[i],
+                                     which == 0 ? "golden" : "the new image"));
+            }
+        }
+    }
+    return VSH_OK;
+}
+
+/* Makes the mask. Coverage is a channel of the results if one of the files has it. */
+static vsh_result compare_coverage(const files *f, images *both, vsh_error *error) {
+    const vsh_image *golden = &both->image[0];
+    const char *name = f->options.coverage;
+    const size_t count = (size_t)golden->width * (size_t)golden->height;
+    void *mask;
+    VSHI_TRY(vshi_allocate(&mask, count, 1, f->path[0], error));
+    both->mask = mask;
+    const float *was = find_plane(golden, name), *is = find_plane(&both->image[1], name);
+    vsh_coverage coverage;
+    vsh_compare_coverage(count, was, is, both->mask, &coverage);
+    if (f->options.padding) {
+        memset(both->mask, 1, count);
+    }
+    if (was == NULL && is == NULL) {
+        return VSH_OK;
+    }
+    vsh_channel_comparison *channel;
+    VSHI_TRY(add_channel(f, name, both->texts, &channel, error));
+    memcpy(channel->size, (const int32_t[]){golden->width, golden->height, 1}, sizeof channel->size);
+    channel->is_coverage = 1;
+    set_coverage(channel, &coverage);
+    return VSH_OK;
+}
+
+static vsh_result compare_channels(const files *f, const images *both, vsh_error *error) {
+    const vsh_image *golden = &both->image[0];
+    for (int32_t i = 0; i < golden->channel_count; ++i) {
+        const char *name = golden->names[i];
+        const float *values = find_plane(&both->image[1], name);
+        if (values == NULL || strcmp(name, f->options.coverage) == 0) {
+            continue;
+        }
+        vsh_channel_comparison *channel;
+        VSHI_TRY(add_channel(f, name, both->texts, &channel, error));
+        const vsh_compared compared = {
+            {golden->width, golden->height, 1}, golden->planes[i], values, both->mask};
+        memcpy(channel->size, compared.size, sizeof channel->size);
+        VSHI_TRY(measure(f, channel, &compared, error));
+    }
+    return VSH_OK;
+}
+
+static vsh_result compare_planes(files *f, images *both, vsh_error *error) {
+    VSHI_TRY(read_both(f, both, error));
+    VSHI_TRY(compare_names(f, both, error));
+    const vsh_image *golden = &both->image[0], *fresh = &both->image[1];
+    if (golden->width != fresh->width || golden->height != fresh->height) {
+        return add_problem(f, error, "size: golden is %d × %d, new is %d × %d", golden->width, golden->height,
+                           fresh->width, fresh->height);
+    }
+    VSHI_TRY(compare_coverage(f, both, error));
+    return compare_channels(f, both, error);
+}
+
+static vsh_result compare_images(files *f, vsh_error *error) {
+    images both = {.mask = NULL};
+    const vsh_result result = compare_planes(f, &both, error);
+    free(both.mask);
+    vsh_image_free(both.file[0]);
+    vsh_image_free(both.file[1]);
+    return result;
+}
+
+/* --- grids */
+
+typedef struct listing {
+    vsh_vdb_entry *entries;
+    size_t count;
+} listing;
+
+static vsh_vdb_entry *find_grid(const listing *list, const char *name) {
+    for (size_t i = 0; i < list->count; ++i) {
+        if (strcmp(list->entries[i].name, name) == 0) {
+            return &list->entries[i];
+        }
+    }
+    return NULL;
+}
+
+static vsh_result list_grids(const files *f, const char *path, listing *list, vsh_error *error) {
+    void *entries;
+    VSHI_TRY(vshi_allocate(&entries, MAX_GRIDS, sizeof *list->entries, path, error));
+    list->entries = entries;
+    VSHI_TRY(vsh_vdb_list(path, &f->run, list->entries, MAX_GRIDS, &list->count, error));
+    return list->count <= MAX_GRIDS
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_INPUT, "%s: %zu grids; up to %d are compared", path, list->count,
+                           MAX_GRIDS);
+}
+
+/* Finds the world positions of voxel (0, 0, 0) and of its neighbour along each axis. */
+static vsh_result read_lattice(const files *f, const char *path, const char *name, double places[4][3],
+                               vsh_error *error) {
+    vsh_voxels *voxels = NULL;
+    VSHI_TRY(vsh_voxels_from_vdb(path, name, &f->run, &voxels, error));
+    for (int i = 0; i < 4; ++i) {
+        const int32_t index[3] = {i == 1, i == 2, i == 3};
+        vsh_voxels_centre(voxels, index, places[i]);
+    }
+    vsh_voxels_free(voxels);
+    return VSH_OK;
+}
+
+/* Compares where the voxels of both lie. */
+static vsh_result compare_lattices(const files *f, const char *name, bool *same, vsh_error *error) {
+    double golden[4][3], fresh[4][3];
+    VSHI_TRY(read_lattice(f, f->path[0], name, golden, error));
+    VSHI_TRY(read_lattice(f, f->path[1], name, fresh, error));
+    double largest = 0.0, voxel = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double side = golden[1][axis] - golden[0][axis];
+        voxel += side * side;
+        for (int i = 0; i < 4; ++i) {
+            largest = fmax(largest, fabs(golden[i][axis] - fresh[i][axis]));
+        }
+    }
+    *same = largest <= SAME_PLACE * sqrt(voxel);
+    return VSH_OK;
+}
+
+/* Finds out whether the values of two grids can be compared. */
+static vsh_result compare_kinds(const files *f, const vsh_vdb_entry *golden, const vsh_vdb_entry *fresh,
+                                bool *comparable, vsh_error *error) {
+    *comparable = false;
+    if (golden->active_voxels == 0 && fresh->active_voxels == 0) {
+        return add_problem(f, error, "grid '%s': no active voxels: nothing is compared", golden->name);
+    }
+    if (golden->active_voxels == 0 || fresh->active_voxels == 0) {
+        return add_problem(f, error, "grid '%s': no active voxels in %s", golden->name,
+                           golden->active_voxels == 0 ? "golden" : "the new file");
+    }
+    if (strcmp(golden->grid_class, fresh->grid_class) != 0) {
+        return add_problem(f, error, "grid '%s': golden is a '%s', new is a '%s'", golden->name,
+                           golden->grid_class, fresh->grid_class);
+    }
+    VSHI_TRY(compare_lattices(f, golden->name, comparable, error));
+    if (!*comparable) {
+        return add_problem(
+            f, error,
+            "grid '%s': other voxels: golden's are %g × %g × %g, new ones %g × %g × %g, or stand elsewhere",
+            golden->name, golden->voxel_size[0], golden->voxel_size[1], golden->voxel_size[2],
+            fresh->voxel_size[0], fresh->voxel_size[1], fresh->voxel_size[2]);
+    }
+    return VSH_OK;
+}
+
+/* Finds the box around the active voxels of both. */
+static vsh_result set_box(const files *f, const vsh_vdb_entry *golden, const vsh_vdb_entry *fresh,
+                          vsh_channel_comparison *channel, size_t *count, vsh_error *error) {
+    double voxels = 1.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const int32_t low = golden->index_min[axis] < fresh->index_min[axis] ? golden->index_min[axis]
+                                                                             : fresh->index_min[axis];
+        const int32_t high = golden->index_max[axis] > fresh->index_max[axis] ? golden->index_max[axis]
+                                                                              : fresh->index_max[axis];
+        channel->origin[axis] = low;
+        const double side = (double)high - (double)low + 1.0;
+        channel->size[axis] = side < (double)INT32_MAX ? (int32_t)side : INT32_MAX;
+        voxels *= side;
+    }
+    const double bytes =
+        voxels * 38.0; /* two copies with active states, a mask, and those of vsh_compare() */
+    if (voxels > (double)INT32_MAX || (f->run.memory_limit > 0 && bytes > (double)f->run.memory_limit)) {
+        return vshi_fail(error, VSH_ERROR_LIMIT,
+                         "%s: grid '%s': a box of %d × %d × %d voxels holds both: comparing takes about %.0f "
+                         "MB, over the memory limit of %.0f MB",
+                         f->path[0], channel->name, channel->size[0], channel->size[1], channel->size[2],
+                         bytes / 1e6, (double)f->run.memory_limit / 1e6);
+    }
+    *count = (size_t)voxels;
+    return VSH_OK;
+}
+
+/* Scales distances to half widths of the band. */
+static void scale_distances(const vsh_vdb_entry *golden, float *values, size_t count) {
+    if (strcmp(golden->grid_class, "level set") != 0 || !(fabs(golden->background) > 0.0)) {
+        return;
+    }
+    const double scale = 1.0 / fabs(golden->background);
+    for (size_t i = 0; i < count; ++i) {
+        values[i] = (float)(scale * (double)values[i]);
+    }
+}
+
+/* Splits lines "NAME: VALUE" in place. */
+static attributes split_lines(char *lines, vsh_attribute list[MOST_TEXTS]) {
+    attributes texts = {list, 0};
+    char *rest = NULL;
+    for (char *line = strtok_r(lines, "\n", &rest); line != NULL && texts.count < MOST_TEXTS;
+         line = strtok_r(NULL, "\n", &rest)) {
+        char *colon = strstr(line, ": ");
+        if (colon != NULL) {
+            *colon = '\0';
+            list[texts.count++] = (vsh_attribute){line, colon + 2};
+        }
+    }
+    return texts;
+}
+
+static vsh_result compare_values(const files *f, vsh_vdb_entry *golden, vsh_vdb_entry *fresh, void **memory,
+                                 vsh_error *error) {
+    vsh_attribute lists[2][MOST_TEXTS];
+    const attributes texts[2] = {split_lines(golden->attributes, lists[0]),
+                                 split_lines(fresh->attributes, lists[1])};
+    vsh_channel_comparison *channel;
+    size_t count = 0;
+    VSHI_TRY(add_channel(f, golden->name, texts, &channel, error));
+    VSHI_TRY(set_box(f, golden, fresh, channel, &count, error));
+    VSHI_TRY(vshi_allocate(memory, count, 4 * sizeof(float) + 1, f->path[0], error));
+    float *values = *memory, *active = values + 2 * count;
+    uint8_t *mask = (uint8_t *)(active + 2 * count);
+    for (int which = 0; which < 2; ++which) {
+        const size_t first = which == 0 ? 0 : count;
+        VSHI_TRY(vsh_vdb_copy(f->path[which], channel->name, channel->origin, channel->size, &f->run,
+                              values + first, active + first, error));
+    }
+    scale_distances(golden, values, 2 * count);
+    vsh_coverage coverage;
+    vsh_compare_coverage(count, active, active + count, mask, &coverage);
+    set_coverage(channel, &coverage);
+    const vsh_compared compared = {{channel->size[0], channel->size[1], channel->size[2]},
+                                   values,
+                                   values + count,
+                                   f->options.padding ? NULL : mask};
+    return measure(f, channel, &compared, error);
+}
+
+static vsh_result compare_grid(const files *f, vsh_vdb_entry *golden, vsh_vdb_entry *fresh,
+                               vsh_error *error) {
+    bool comparable;
+    VSHI_TRY(compare_kinds(f, golden, fresh, &comparable, error));
+    if (!comparable) {
+        return VSH_OK;
+    }
+    void *memory = NULL;
+    const vsh_result result = compare_values(f, golden, fresh, &memory, error);
+    free(memory);
+    return result;
+}
+
+static vsh_result compare_lists(const files *f, listing lists[2], vsh_error *error) {
+    for (int which = 0; which < 2; ++which) {
+        VSHI_TRY(list_grids(f, f->path[which], &lists[which], error));
+    }
+    for (int which = 0; which < 2; ++which) {
+        for (size_t i = 0; i < lists[which].count; ++i) {
+            const char *name = lists[which].entries[i].name;
+            if (find_grid(&lists[1 - which], name) == NULL) {
+                VSHI_TRY(add_problem(f, error, "grid '%s': in %s alone", name,
+                                     which == 0 ? "golden" : "the new file"));
+            }
+        }
+    }
+    for (size_t i = 0; i < lists[0].count; ++i) {
+        vsh_vdb_entry *golden = &lists[0].entries[i], *fresh = find_grid(&lists[1], golden->name);
+        if (fresh != NULL) {
+            VSHI_TRY(compare_grid(f, golden, fresh, error));
+        }
+    }
+    return lists[0].count > 0 ? VSH_OK : add_problem(f, error, "golden holds no grids");
+}
+
+static vsh_result compare_grids(files *f, vsh_error *error) {
+    listing lists[2] = {{NULL, 0}, {NULL, 0}};
+    const vsh_result result = compare_lists(f, lists, error);
+    free(lists[0].entries);
+    free(lists[1].entries);
+    return result;
+}
+
 /* --- both files */
 
-static vsh_result read_tolerances(vshi_compare_work *work, vsh_error *error) {
+static vsh_result read_tolerances(files *f, vsh_error *error) {
     char path[4096];
-    const char *file = work->options.tolerances;
+    const char *file = f->options.tolerances;
     if (file == NULL) {
-        if (snprintf(path, sizeof path, "%s.tolerance.json", work->path[0]) >= (int)sizeof path ||
+        if (snprintf(path, sizeof path, "%s.tolerance.json", f->path[0]) >= (int)sizeof path ||
             access(path, F_OK) != 0) {
             return VSH_OK;
         }
         file = path;
     }
-    return vsh_tolerances_read(file, &work->tolerances, error);
+    return vsh_tolerances_read(file, &f->tolerances, error);
 }
 
-/* One name for each format. */
+/* Maps endings of one format to one name. */
 static const char *format_of(const char *path) {
     static const struct {
         const char *ending, *format;
@@ -138,17 +509,17 @@ static const char *format_of(const char *path) {
     return ending;
 }
 
-static vsh_result compare(vshi_compare_work *work, vsh_error *error) {
-    VSHI_TRY(read_tolerances(work, error));
-    const char *was = format_of(work->path[0]), *is = format_of(work->path[1]);
+static vsh_result compare(files *f, vsh_error *error) {
+    VSHI_TRY(read_tolerances(f, error));
+    const char *was = format_of(f->path[0]), *is = format_of(f->path[1]);
     if (strcasecmp(was, is) != 0) {
-        VSHI_TRY(vshi_compare_problem(work, error, "format: golden is '%.100s', new is '%.100s'", was, is));
+        VSHI_TRY(add_problem(f, error, "format: golden is '%.100s', new is '%.100s'", was, is));
     }
     const bool grids = strcasecmp(was, "vdb") == 0;
     if (grids == (strcasecmp(is, "vdb") == 0)) {
-        VSHI_TRY(grids ? vshi_compare_grids(work, error) : vshi_compare_images(work, error));
+        VSHI_TRY(grids ? compare_grids(f, error) : compare_images(f, error));
     }
-    vsh_comparison *c = work->comparison;
+    vsh_comparison *c = f->comparison;
     c->alike = c->problem_count == 0;
     for (size_t i = 0; i < c->channel_count; ++i) {
         vsh_channel_comparison *channel = &c->channels[i];
@@ -165,22 +536,22 @@ vsh_result vsh_compare_files(const char *golden, const char *fresh, const vsh_co
     *comparison = NULL;
     VSHI_NEEDS(golden);
     VSHI_NEEDS(fresh);
-    vshi_compare_work work = {.path = {golden, fresh}, .options = vsh_compare_files_options_default()};
-    VSHI_TRY(vshi_run_resolve(run, &work.run, error));
+    files f = {.path = {golden, fresh}, .options = vsh_compare_files_options_default()};
+    VSHI_TRY(vshi_run_resolve(run, &f.run, error));
     if (options != NULL) {
-        VSHI_TRY(vshi_options_resolve(options, &work.options, sizeof work.options, "options", error));
+        VSHI_TRY(vshi_options_resolve(options, &f.options, sizeof f.options, "options", error));
     }
-    work.comparison = calloc(1, sizeof *work.comparison);
-    if (work.comparison == NULL) {
-        return no_memory(&work, error);
+    f.comparison = calloc(1, sizeof *f.comparison);
+    if (f.comparison == NULL) {
+        return no_memory(&f, error);
     }
-    const vsh_result result = compare(&work, error);
-    vsh_tolerances_free(work.tolerances);
+    const vsh_result result = compare(&f, error);
+    vsh_tolerances_free(f.tolerances);
     if (result != VSH_OK) {
-        vsh_comparison_free(work.comparison);
+        vsh_comparison_free(f.comparison);
         return result;
     }
-    *comparison = work.comparison;
+    *comparison = f.comparison;
     return VSH_OK;
 }
 

@@ -1,31 +1,31 @@
-/* What the measures are called, what they may come to, and whether they do. */
-#include "compare/pair.h"
-
+/* The table of measures with their limits, the verdict, and files of limits, which are JSON. */
 #include "base/floats.h"
-#include "base/memory.h"
+#include "base/job.h"
+#include "base/threads.h"
+#include "base/try.h"
+#include "compare/compare.h"
+#include "json/keys.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
-/* The table of measures. */
+enum { MOST_REACH = 16, MOST_BYTES = 64 << 20 };
+
+static const double MOST = 1e15; /* this limit, and larger ones, switch a measure off */
+
 static const struct {
     const char *name;
-    int32_t at_least; /* 1: the limit is the least that will do */
-    double value;     /* what holds without another */
+    double limit; /* the default */
 } table[VSH_MEASURE_COUNT] = {
-    [VSH_MEASURE_NONFINITE] = {"nonfinite", 0, 0.0},
-    [VSH_MEASURE_RMSE] = {"rmse", 0, 0.004},
-    [VSH_MEASURE_BIAS] = {"bias", 0, 0.002},
-    [VSH_MEASURE_MAX] = {"max", 0, 0.25},
-    [VSH_MEASURE_P99] = {"p99", 0, 0.02},
-    [VSH_MEASURE_SHARE] = {"share", 0, 0.01},
-    [VSH_MEASURE_SSIM] = {"ssim", 1, 0.98},
-    [VSH_MEASURE_PENUMBRA] = {"penumbra", 0, 0.03},
-    [VSH_MEASURE_WIDTHS] = {"widths", 0, 0.05},
-    [VSH_MEASURE_EDGES] = {"edges", 0, 0.02},
-    [VSH_MEASURE_SHIFT] = {"shift", 0, 0.1},
-    [VSH_MEASURE_LOST] = {"lost", 0, 3.0},
-    [VSH_MEASURE_GAINED] = {"gained", 0, 3.0},
+    [VSH_MEASURE_NONFINITE] = {"nonfinite", 0.0},
+    [VSH_MEASURE_SHIFT] = {"shift", 0.1},
+    [VSH_MEASURE_PENUMBRA] = {"penumbra", 0.03},
+    [VSH_MEASURE_LOST] = {"lost", 3.0},
+    [VSH_MEASURE_GAINED] = {"gained", 3.0},
+    [VSH_MEASURE_RMSE] = {"rmse", 0.004},
+    [VSH_MEASURE_P99] = {"p99", 0.02},
+    [VSH_MEASURE_MAX] = {"max", 0.25},
 };
 
 int32_t vsh_measure(const char *name) {
@@ -41,32 +41,25 @@ const char *vsh_measure_name(int32_t measure) {
     return measure >= 0 && measure < VSH_MEASURE_COUNT ? table[measure].name : NULL;
 }
 
-int32_t vsh_measure_at_least(int32_t measure) {
-    return measure >= 0 && measure < VSH_MEASURE_COUNT ? table[measure].at_least : 0;
-}
-
 vsh_limits vsh_limits_default(void) {
     vsh_limits known = {.struct_size = sizeof known, .options = vsh_compare_options_default()};
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-        known.value[i] = table[i].value;
+        known.value[i] = table[i].limit;
     }
     return known;
 }
 
-/* Differences within the limits, and independent noise on top of them. Squares of errors add; the largest of
- * a million normal values is 5 of their standard errors away, the 99th percentile of their sizes 2.6. A fifth
- * of the noise may be bias, as of texels that share rays (the seeds' scene under a sun of 25°: 0.2). */
+/* The noise is independent of the differences that the limits pass, so squares of errors add. The largest of
+ * a million normal values is 5 standard errors away. The mean of the 16 edges or more that a penumbra needs
+ * moves by a quarter of one edge's change. */
 void vsh_limits_allow_noise(vsh_limits *limits, double noise) {
     VSHI_FLOATS;
     double *limit = limits->value;
     limits->options.noise = noise;
     limit[VSH_MEASURE_RMSE] = sqrt(limit[VSH_MEASURE_RMSE] * limit[VSH_MEASURE_RMSE] + noise * noise);
-    limit[VSH_MEASURE_BIAS] += 0.2 * noise;
     limit[VSH_MEASURE_MAX] += 5.0 * noise;
-    limit[VSH_MEASURE_P99] += 2.6 * noise;
-    limit[VSH_MEASURE_SSIM] *= vshi_ssim_of_noise(noise);
-    limit[VSH_MEASURE_PENUMBRA] += VSHI_NOISY_WIDTH * noise;
-    limit[VSH_MEASURE_WIDTHS] += VSHI_NOISY_EDGE * noise;
+    limit[VSH_MEASURE_P99] += VSHI_NOISE_P99 * noise;
+    limit[VSH_MEASURE_PENUMBRA] += 0.25 * VSHI_NOISE_WIDTH * noise;
 }
 
 uint32_t vsh_compare_judge(const vsh_measures *measures, const vsh_limits *limits) {
@@ -75,12 +68,162 @@ uint32_t vsh_compare_judge(const vsh_measures *measures, const vsh_limits *limit
         return (UINT32_C(1) << VSH_MEASURE_COUNT) - 1;
     }
     uint32_t failed = measures->nonfinite[0] + measures->nonfinite[1] > 0 ? 1 << VSH_MEASURE_NONFINITE : 0;
-    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-        const double value = measures->value[i], limit = limits->value[i];
-        const bool holds = table[i].at_least ? value >= limit : value <= limit;
-        if (i != VSH_MEASURE_NONFINITE && !isnan(value) && !holds) {
+    for (int i = VSH_MEASURE_NONFINITE + 1; i < VSH_MEASURE_COUNT; ++i) {
+        if (!isnan(measures->value[i]) && !(measures->value[i] <= limits->value[i])) {
             failed |= UINT32_C(1) << i;
         }
     }
     return failed;
+}
+
+/* --- files */
+
+/* Values of one object; NaN and -1: not given. */
+typedef struct entry {
+    const char *channel; /* a name, or a prefix and '*' */
+    double value[VSH_MEASURE_COUNT];
+    double step, coverage;
+    int32_t reach;
+} entry;
+
+struct vsh_tolerances {
+    entry all;
+    entry *channels; /* in the file's order */
+    size_t channel_count;
+    vshi_json_block *blocks;
+};
+
+static entry no_entry(const char *channel) {
+    entry e = {.channel = channel, .step = NAN, .coverage = NAN, .reach = -1};
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        e.value[i] = NAN;
+    }
+    return e;
+}
+
+#define LIMIT(key, measure)                                                                                  \
+    { .name = key, .kind = VSHI_NUMBER, .offset = offsetof(entry, value[measure]), .highest = 1e15 }
+#define LIMITS                                                                                               \
+    LIMIT("shift", VSH_MEASURE_SHIFT), LIMIT("penumbra", VSH_MEASURE_PENUMBRA),                              \
+        LIMIT("lost", VSH_MEASURE_LOST), LIMIT("gained", VSH_MEASURE_GAINED),                                \
+        LIMIT("rmse", VSH_MEASURE_RMSE), LIMIT("p99", VSH_MEASURE_P99), LIMIT("max", VSH_MEASURE_MAX),       \
+        {.name = "step",                                                                                     \
+         .kind = VSHI_NUMBER,                                                                                \
+         .offset = offsetof(entry, step),                                                                    \
+         .highest = 1.0,                                                                                     \
+         .flags = VSHI_ABOVE},                                                                               \
+    {                                                                                                        \
+        .name = "reach", .kind = VSHI_INTEGER, .offset = offsetof(entry, reach), .highest = MOST_REACH       \
+    }
+
+static const vshi_key channel_keys[] = {LIMITS};
+static const vshi_table channel_table = VSHI_TABLE(channel_keys);
+
+static vsh_result read_channels(vshi_json *reader, const vshi_value *value, void *member) {
+    vsh_tolerances *made = member;
+    VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&made->channels, json_object_size(value->json),
+                                sizeof(entry), "channels"));
+    for (void *i = json_object_iter(value->json); i != NULL; i = json_object_iter_next(value->json, i)) {
+        const vshi_value item = {value, json_object_iter_key(i), made->channel_count, value->depth + 1,
+                                 json_object_iter_value(i)};
+        entry *e = &made->channels[made->channel_count];
+        const char *name;
+        VSHI_TRY(vshi_json_copy(reader, 0, item.key, &name));
+        *e = no_entry(name);
+        VSHI_TRY(vshi_read_object(reader, &item, &channel_table, 1, "a channel's tolerances", e));
+        ++made->channel_count;
+    }
+    return VSH_OK;
+}
+
+static const vshi_key file_keys[] = {
+    LIMITS,
+    {.name = "coverage", .kind = VSHI_NUMBER, .offset = offsetof(entry, coverage), .highest = 1.0},
+    {.name = "channels", .kind = VSHI_CUSTOM, .read = read_channels},
+};
+static const vshi_table file_table = VSHI_TABLE(file_keys);
+_Static_assert(offsetof(vsh_tolerances, all) == 0, "the keys' offsets are those of an entry");
+
+typedef struct parsing {
+    vshi_json reader;
+    vsh_tolerances *made;
+} parsing;
+
+static vsh_result parse(void *user, vsh_error *error) {
+    (void)error; /* the reader has it */
+    vshi_json *reader = &((parsing *)user)->reader;
+    vsh_tolerances *made = ((parsing *)user)->made;
+    json_t *json;
+    VSHI_TRY(vshi_json_load(reader, &json));
+    const vshi_value root = {NULL, NULL, 0, 0, json};
+    made->all = no_entry(NULL);
+    const vsh_result result = vshi_read_object(reader, &root, &file_table, 1, "tolerances", made);
+    made->blocks = reader->blocks;
+    json_decref(json);
+    return result;
+}
+
+vsh_result vsh_tolerances_read(const char *path, vsh_tolerances **tolerances, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(tolerances);
+    *tolerances = NULL;
+    VSHI_NEEDS(path);
+    char *text;
+    size_t size;
+    vsh_run run = vsh_run_default();
+    run.memory_limit = MOST_BYTES;
+    VSHI_TRY(vshi_json_text(path, &run, &text, &size, error));
+    vsh_tolerances *made = calloc(1, sizeof *made);
+    parsing p = {{path, text, size, NULL, error}, made};
+    const vsh_result result =
+        made != NULL
+            ? vshi_on_stack(parse, &p, error)
+            : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
+    free(text);
+    if (result != VSH_OK) {
+        vsh_tolerances_free(made);
+        return result;
+    }
+    *tolerances = made;
+    return VSH_OK;
+}
+
+void vsh_tolerances_free(vsh_tolerances *tolerances) {
+    if (tolerances != NULL) {
+        vshi_blocks_free(tolerances->blocks);
+        free(tolerances);
+    }
+}
+
+static void apply(const entry *e, vsh_limits *limits) {
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        if (!isnan(e->value[i])) {
+            limits->value[i] = e->value[i] < MOST ? e->value[i] : INFINITY;
+        }
+    }
+    limits->options.step = isnan(e->step) ? limits->options.step : e->step;
+    limits->options.reach = e->reach < 0 ? limits->options.reach : e->reach;
+}
+
+static bool is_for(const entry *e, const char *channel) {
+    const size_t length = strlen(e->channel);
+    return length > 0 && e->channel[length - 1] == '*' ? strncmp(e->channel, channel, length - 1) == 0
+                                                       : strcmp(e->channel, channel) == 0;
+}
+
+void vsh_tolerances_apply(const vsh_tolerances *tolerances, const char *channel, vsh_limits *limits,
+                          double *coverage) {
+    if (tolerances == NULL) {
+        return;
+    }
+    apply(&tolerances->all, limits);
+    for (size_t i = 0; i < tolerances->channel_count; ++i) {
+        if (is_for(&tolerances->channels[i], channel)) {
+            apply(&tolerances->channels[i], limits);
+        }
+    }
+    if (coverage != NULL && !isnan(tolerances->all.coverage)) {
+        *coverage = tolerances->all.coverage;
+    }
 }

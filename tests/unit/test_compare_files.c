@@ -75,19 +75,20 @@ static void every_measure_but_one_has_a_key_of_its_name(void **unused) {
 
 static void channels_come_over_the_rest_in_their_order(void **unused) {
     (void)unused;
-    static const char text[] = "{\"rmse\": 0.5, \"coverage\": 0.25, \"threshold\": 0.125, \"channels\": {"
+    static const char text[] = "{\"rmse\": 0.5, \"coverage\": 0.25, \"step\": 0.125, \"channels\": {"
                                "\"shadow.*\": {\"rmse\": 0.25, \"reach\": 4},"
-                               "\"shadow.sun\": {\"rmse\": 0.0625, \"step\": 0.5}, \"*\": {\"ssim\": 0.5}}}";
+                               "\"shadow.sun\": {\"rmse\": 0.0625, \"step\": 0.5}, \"*\": {\"max\": 0.5}}}";
     double coverage = -1.0;
     const vsh_limits sun = limits_of(text, "shadow.sun", &coverage),
                      lamp = limits_of(text, "shadow.lamp", NULL);
     const vsh_limits ao = limits_of(text, "ao", NULL), sunny = limits_of(text, "shadow.sunny", NULL);
     assert_true(coverage == 0.25);
     assert_true(sun.value[VSH_MEASURE_RMSE] == 0.0625 && sun.options.step == 0.5 && sun.options.reach == 4);
-    assert_true(lamp.value[VSH_MEASURE_RMSE] == 0.25 && lamp.options.step == 0.1 && lamp.options.reach == 4);
-    assert_true(sunny.value[VSH_MEASURE_RMSE] == 0.25 && sunny.options.step == 0.1);
-    assert_true(ao.value[VSH_MEASURE_RMSE] == 0.5 && ao.options.reach == 2 && ao.options.threshold == 0.125);
-    assert_true(ao.value[VSH_MEASURE_SSIM] == 0.5 && sun.value[VSH_MEASURE_SSIM] == 0.5);
+    assert_true(lamp.value[VSH_MEASURE_RMSE] == 0.25 && lamp.options.step == 0.125 &&
+                lamp.options.reach == 4);
+    assert_true(sunny.value[VSH_MEASURE_RMSE] == 0.25 && sunny.options.step == 0.125);
+    assert_true(ao.value[VSH_MEASURE_RMSE] == 0.5 && ao.options.reach == 2 && ao.options.step == 0.125);
+    assert_true(ao.value[VSH_MEASURE_MAX] == 0.5 && sun.value[VSH_MEASURE_MAX] == 0.5);
 }
 
 static void bad_files_are_refused_with_the_place(void **unused) {
@@ -99,7 +100,7 @@ static void bad_files_are_refused_with_the_place(void **unused) {
         {"{\"nonfinite\": 1}", {"nonfinite: unknown key", ""}},
         {"{\"rmse\": -1}", {"1:10: rmse: -1 is out of range", "0 … "}},
         {"{\"rmse\": \"0\"}", {"expected a number", "a string"}},
-        {"{\"ssim\": 1.5}", {"ssim: 1.5 is out of range", "-1 … 1"}},
+        {"{\"ssim\": 0.5}", {"1:2: ssim: unknown key", ""}},
         {"{\"step\": 0}", {"step: 0 is out of range", "(excluded)"}},
         {"{\"reach\": 1.5}", {"reach: 1.5", "whole"}},
         {"{\"channels\": []}", {"channels: expected an object", "an array"}},
@@ -183,7 +184,7 @@ static void two_files_are_compared_channel_by_channel(void **state) {
     assert_int_equal(ao->measures.worst, COUNT / 2);
     vsh_comparison_free(c);
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-        options.limits[i] = i == VSH_MEASURE_SSIM ? -1.0 : 1e9;
+        options.limits[i] = 1e9;
     }
     assert_int_equal(vsh_compare_files(golden, fresh, &options, NULL, &c, &error), VSH_OK);
     assert_int_equal(vsh_comparison_alike(c), 1);

@@ -35,10 +35,10 @@ static void a_ramp_is_as_wide_as_it_is_in_every_direction(void **unused) {
         for (double width = 6.0; width <= 24.0; width *= 2.0) {
             const vsh_measures m =
                 compare_ramps((ramp){width, angles[i], 0.0}, (ramp){width, angles[i], 0.0});
-            assert_true(m.pairs >= SIDE / 2 && m.pairs == m.edges[0] && m.pairs == m.edges[1]);
+            assert_true(m.pairs >= SIDE / 2);
             assert_true(angles[i] != 0.3 || m.pairs == SIDE); /* rows cross it, columns do not count */
             assert_near(m.width[0], 0.8 * width, 0.2);        /* from 10 % to 90 % */
-            assert_true(m.value[VSH_MEASURE_PENUMBRA] == 0.0 && m.value[VSH_MEASURE_WIDTHS] == 0.0);
+            assert_true(m.value[VSH_MEASURE_PENUMBRA] == 0.0);
         }
     }
 }
@@ -53,9 +53,6 @@ static void wider_and_narrower_penumbrae_are_told_by_how_much(void **unused) {
             const double ratio = factors[k] > 1.0 ? factors[k] : 1.0 / factors[k];
             assert_near(m.width[1] / m.width[0], factors[k], 0.02);
             assert_near(m.value[VSH_MEASURE_PENUMBRA], ratio - 1.0, 0.04);
-            assert_near(m.value[VSH_MEASURE_WIDTHS], fabs(factors[k] - 1.0), 0.02);
-            assert_true(m.value[VSH_MEASURE_EDGES] <
-                        (factors[k] < 2.0 ? 0.07 : 0.2)); /* cut at the corners */
             assert_near(m.value[VSH_MEASURE_SHIFT], 0.0, 0.1);
         }
     }
@@ -126,7 +123,6 @@ static void noise_does_not_change_a_penumbras_width(void **unused) {
     for (size_t i = 0; i < ANGLES; ++i) {
         const vsh_measures m = compare_ramps((ramp){12.0, angles[i], 0.0}, (ramp){12.0, angles[i], 0.04});
         assert_near(m.value[VSH_MEASURE_PENUMBRA], 0.0, 0.03);
-        assert_near(m.value[VSH_MEASURE_EDGES], 0.0, 0.02);
         assert_near(m.value[VSH_MEASURE_SHIFT], 0.0, 0.05);
     }
 }
@@ -140,38 +136,8 @@ static void an_edge_that_is_cut_off_is_no_edge(void **unused) {
         mask[i] = i % SIDE < SIDE / 2 || i / SIDE < 8; /* up to the middle of the ramp, but for eight rows */
     }
     const vsh_measures m = measure(&golden, &values, mask);
-    assert_int_equal(m.edges[0], 8);
+    assert_int_equal(m.pairs, 8);
     assert_true(isnan(m.value[VSH_MEASURE_PENUMBRA])); /* too few to say anything */
-    free(golden.values);
-    free(values.values);
-}
-
-static void part_of_the_penumbrae_shows_in_the_widths(void **unused) {
-    (void)unused;
-    const ramp soft = {8.0, 0.0, 0.0}, wider = {9.6, 0.0, 0.0}, narrower = {6.4, 0.0, 0.0};
-    plane golden = make_plane(SIDE, SIDE, 1, ramp_at, &soft),
-          values = make_plane(SIDE, SIDE, 1, ramp_at, &wider);
-    plane other = make_plane(SIDE, SIDE, 1, ramp_at, &narrower);
-    memcpy(values.values, other.values, SIDE * SIDE / 2 * sizeof(float)); /* the upper half the other way */
-    const vsh_measures m = measure(&golden, &values, NULL);
-    assert_near(m.value[VSH_MEASURE_PENUMBRA], 0.0, 0.01);
-    assert_near(m.value[VSH_MEASURE_WIDTHS], 0.2, 0.02);
-    free(golden.values);
-    free(values.values);
-    free(other.values);
-}
-
-static void an_edge_without_a_counterpart_is_told(void **unused) {
-    (void)unused;
-    const ramp r = {4.0, 0.0, 0.0};
-    plane golden = make_plane(SIDE, SIDE, 1, ramp_at, &r), values = make_plane(SIDE, SIDE, 1, ramp_at, &r);
-    for (size_t i = 0; i < SIDE * SIDE / 4; ++i) {
-        values.values[i] = 1.0f; /* the upper quarter has no shadow */
-    }
-    const vsh_measures m = measure(&golden, &values, NULL);
-    assert_int_equal(m.edges[0], SIDE);
-    assert_near(m.value[VSH_MEASURE_EDGES], 48.0 / 120.0, 0.01); /* of the new ones: below it, one along x */
-    assert_near(m.value[VSH_MEASURE_PENUMBRA], 0.0, 0.01);
     free(golden.values);
     free(values.values);
 }
@@ -366,8 +332,6 @@ int main(void) {
         cmocka_unit_test(a_penumbra_that_is_gone_is_off_by_all_of_its_width),
         cmocka_unit_test(noise_does_not_change_a_penumbras_width),
         cmocka_unit_test(an_edge_that_is_cut_off_is_no_edge),
-        cmocka_unit_test(part_of_the_penumbrae_shows_in_the_widths),
-        cmocka_unit_test(an_edge_without_a_counterpart_is_told),
         cmocka_unit_test(a_displacement_is_found_with_its_direction),
         cmocka_unit_test(a_displacement_is_found_in_space),
         cmocka_unit_test(hard_edges_are_found_to_have_moved_by_a_texel),

@@ -1,20 +1,24 @@
-/* vdbshade compare: whether a bake is like its golden one. */
+/* vdbshade compare: compares a bake with its golden one, and explains the differences in words. */
 #include "cli/commands.h"
+#include "cli/compare/comparison.h"
 #include "cli/message.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
 #include "cli/temporary.h"
-#include "comparison.h"
 
+#include <inttypes.h>
+#include <math.h>
+#include <stdarg.h>
 #include <stdlib.h>
+#include <string.h>
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Reports"},
     CLI_REPORT_OPTIONS,
     CLI_COMPARE_OPTIONS,
     {CLI_KEY_TOLERANCES, "tolerances", "FILE.json",
-     "limits, also for single channels\n(GOLDEN.tolerance.json where it is there)"},
+     "limits, also for single channels\n(GOLDEN.tolerance.json if it exists)"},
     CLI_COMMON_OPTIONS,
 };
 
@@ -23,11 +27,10 @@ static int compare_main(int argc, char **argv);
 const cli_command cli_compare = {
     "compare",
     "GOLDEN NEW [options]",
-    "Compares two images or two .vdb files, channel by channel and grid by grid, over the texels that\n"
-    "both cover: values, structure, widths of penumbrae, displacement, lost shadows. One line a channel.\n"
-    "Ends with 0 where they are alike, 1 where they are not: also by size, channels, voxels or format,\n"
-    "which are told as such. What the measures are: docs/regression.md. Numbers in brackets are what\n"
-    "holds without the option.",
+    "Compares two images channel by channel, or two .vdb files grid by grid, over the texels that both\n"
+    "cover: values, widths of penumbrae, displacement, lost shadows. Prints one line a channel. Ends with\n"
+    "0 if they are alike, and with 1 if not, or if size, channels, voxels or format differ. For the\n"
+    "measures see docs/regression.md. Numbers in brackets are defaults.",
     options,
     sizeof options / sizeof options[0],
     compare_main};
@@ -36,14 +39,16 @@ static int take(void *settings, int key, const char *name, const char *value) {
     return cli_compare_parse(settings, key, name, value);
 }
 
+int cli_print_json(json_t *root, const char *what) {
+    const bool whole = root != NULL && json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) == 0;
+    json_decref(root);
+    putchar('\n');
+    return whole ? CLI_OK : cli_out_of_memory(what);
+}
+
 static int print(const cli_compare_settings *s, const cli_comparison *c) {
     if (s->json) {
-        json_t *root = cli_comparison_json(c);
-        const bool whole =
-            root != NULL && json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) == 0;
-        json_decref(root);
-        putchar('\n');
-        return whole ? CLI_OK : cli_out_of_memory(c->golden);
+        return cli_print_json(cli_comparison_json(c), c->golden);
     }
     if (!s->common.quiet) {
         cli_comparison_print(stdout, c, "");
@@ -78,7 +83,7 @@ static int compare_main(int argc, char **argv) {
     return code;
 }
 
-/* --- what `regress` has too */
+/* --- options */
 
 cli_compare_settings cli_compare_settings_default(void) {
     cli_compare_settings s = {.common = cli_common_default(), .options = vsh_compare_files_options_default()};
@@ -87,10 +92,7 @@ cli_compare_settings cli_compare_settings_default(void) {
 
 int cli_compare_parse(cli_compare_settings *s, int key, const char *name, const char *value) {
     if (key >= CLI_KEY_LIMIT && key < CLI_KEY_LIMIT + VSH_MEASURE_COUNT) {
-        const int32_t measure = key - CLI_KEY_LIMIT;
-        const bool least = vsh_measure_at_least(measure) != 0;
-        return cli_parse_number(name, value, least ? -1.0 : 0.0, least ? 1.0 : 1e15,
-                                &s->options.limits[measure]);
+        return cli_parse_number(name, value, 0.0, 1e15, &s->options.limits[key - CLI_KEY_LIMIT]);
     }
     switch (key) {
     case CLI_KEY_TOLERANCES:
@@ -101,8 +103,6 @@ int cli_compare_parse(cli_compare_settings *s, int key, const char *name, const 
         return CLI_OK;
     case CLI_KEY_MAX_COVERAGE:
         return cli_parse_number(name, value, 0.0, 1.0, &s->options.coverage_limit);
-    case CLI_KEY_THRESHOLD:
-        return cli_parse_number(name, value, 0.0, 1.0, &s->options.threshold);
     case CLI_KEY_STEP:
         return cli_parse_number(name, value, 1e-6, 1.0, &s->options.step);
     case CLI_KEY_REACH:
@@ -145,4 +145,263 @@ int cli_compare_check_reports(const cli_compare_settings *s, const char *const *
         }
     }
     return CLI_OK;
+}
+
+/* --- comparing */
+
+/* State of draw(). */
+typedef struct drawing {
+    const char *page;
+    cli_comparison *comparison;
+    int code;
+} drawing;
+
+static int32_t draw(void *user, size_t index, const vsh_channel_comparison *channel,
+                    const vsh_compared *compared) {
+    drawing *d = user;
+    cli_comparison *c = d->comparison;
+    char **more = realloc(c->pictures, (index + 1) * sizeof *more);
+    if (more == NULL) {
+        d->code = cli_out_of_memory(d->page);
+        return 1;
+    }
+    c->pictures = more;
+    while (c->picture_count <= index) {
+        c->pictures[c->picture_count++] = NULL;
+    }
+    c->pictures[index] = cli_comparison_pictures(d->page, channel, compared);
+    d->code = c->pictures[index] != NULL ? CLI_OK : CLI_LIMIT;
+    return d->code;
+}
+
+int cli_comparison_make(const cli_compare_settings *settings, const char *golden, const char *fresh,
+                        cli_comparison *c) {
+    memset(c, 0, sizeof *c);
+    c->golden = strdup(golden);
+    c->fresh = strdup(fresh);
+    if (c->golden == NULL || c->fresh == NULL) {
+        return cli_out_of_memory(golden);
+    }
+    const vsh_run run = cli_common_run(&settings->common);
+    drawing d = {settings->html, c, CLI_OK};
+    vsh_compare_files_options wanted = settings->options;
+    wanted.look = settings->html != NULL ? draw : NULL;
+    wanted.user = &d;
+    vsh_error error;
+    if (vsh_compare_files(golden, fresh, &wanted, &run, &c->made, &error) != VSH_OK) {
+        return d.code != CLI_OK ? d.code : cli_fail(&error);
+    }
+    c->alike = vsh_comparison_alike(c->made) != 0;
+    return CLI_OK;
+}
+
+const char *cli_comparison_problem(const cli_comparison *c, size_t index) {
+    if (c->problem[0] != '\0') {
+        return index == 0 ? c->problem : NULL;
+    }
+    return vsh_comparison_problem(c->made, index);
+}
+
+void cli_comparison_free(cli_comparison *c) {
+    for (size_t i = 0; i < c->picture_count; ++i) {
+        free(c->pictures[i]);
+    }
+    free(c->pictures);
+    vsh_comparison_free(c->made);
+    free(c->name);
+    free(c->golden);
+    free(c->fresh);
+    memset(c, 0, sizeof *c);
+}
+
+/* --- words */
+
+typedef struct text {
+    char *at;
+    size_t left;
+} text;
+
+static void __attribute__((format(printf, 2, 3))) add(text *t, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    const int length = vsnprintf(t->at, t->left, format, arguments);
+    va_end(arguments);
+    const size_t used = length < 0 ? 0 : (size_t)length < t->left ? (size_t)length : t->left - 1;
+    t->at += used;
+    t->left -= used;
+}
+
+const char *cli_channel_place(const vsh_channel_comparison *channel, uint64_t index, char place[64]) {
+    const uint64_t width = (uint64_t)channel->size[0], height = (uint64_t)channel->size[1];
+    const int64_t x = (int64_t)(index % width) + channel->origin[0];
+    const int64_t y = (int64_t)(index / width % height) + channel->origin[1];
+    const int64_t z = (int64_t)(index / width / height) + channel->origin[2];
+    if (channel->size[2] == 1 && channel->origin[2] == 0) {
+        snprintf(place, 64, "(%" PRId64 ", %" PRId64 ")", x, y);
+    } else {
+        snprintf(place, 64, "(%" PRId64 ", %" PRId64 ", %" PRId64 ")", x, y, z);
+    }
+    return place;
+}
+
+static const char *texel(const vsh_channel_comparison *channel) {
+    return channel->size[2] == 1 && channel->origin[2] == 0 ? "texel" : "voxel";
+}
+
+static void add_nonfinite(text *t, const vsh_channel_comparison *channel) {
+    const vsh_measures *m = &channel->measures;
+    char place[64];
+    for (int which = 0; which < 2; ++which) {
+        if (m->nonfinite[which] > 0) {
+            add(t, "%s%" PRIu64 " %s value%s NaN or infinite, the first at %s",
+                which > 0 && m->nonfinite[0] > 0 ? ", " : "", m->nonfinite[which],
+                which == 0 ? "golden" : "new", m->nonfinite[which] == 1 ? " is" : "s are",
+                cli_channel_place(channel, m->nonfinite_first[which], place));
+        }
+    }
+}
+
+static void add_region(text *t, const vsh_channel_comparison *channel, const vsh_region *region, double limit,
+                       const char *caster) {
+    const uint32_t others = UINT32_C(1) << VSH_MEASURE_SHIFT | UINT32_C(1) << VSH_MEASURE_PENUMBRA;
+    char place[64];
+    add(t, "%" PRIu64 " %ss around %s got %s by up to %.2f with nothing like it nearby%s (limit %g)",
+        region->count, texel(channel), cli_channel_place(channel, region->worst, place),
+        region->by > 0.0 ? "lighter" : "darker", fabs(region->by),
+        (channel->failed & others) == 0 ? caster : "", limit);
+}
+
+static void add_shift(text *t, const vsh_channel_comparison *channel) {
+    const vsh_measures *m = &channel->measures;
+    add(t, "shifted by (%.2f, %.2f", m->shift[0], m->shift[1]);
+    if (channel->size[2] > 1) {
+        add(t, ", %.2f", m->shift[2]);
+    }
+    add(t, ") %ss, which explains %.0f %% of the difference (limit %g)", texel(channel), 100.0 * m->explained,
+        channel->limits.value[VSH_MEASURE_SHIFT]);
+}
+
+static void add_penumbra(text *t, const vsh_channel_comparison *channel) {
+    const vsh_measures *m = &channel->measures;
+    add(t, "penumbrae %.3f times as wide, %.2f for %.2f %ss (limit ±%g %%)", m->width[1] / m->width[0],
+        m->width[1], m->width[0], texel(channel), 100.0 * channel->limits.value[VSH_MEASURE_PENUMBRA]);
+}
+
+static void add_failure(text *t, const vsh_channel_comparison *channel, int measure) {
+    const vsh_measures *m = &channel->measures;
+    const double limit = channel->limits.value[measure];
+    switch (measure) {
+    case VSH_MEASURE_NONFINITE:
+        add_nonfinite(t, channel);
+        break;
+    case VSH_MEASURE_LOST:
+        add_region(t, channel, &m->lost, limit, ": a lost caster?");
+        break;
+    case VSH_MEASURE_GAINED:
+        add_region(t, channel, &m->gained, limit, ": a new caster?");
+        break;
+    case VSH_MEASURE_SHIFT:
+        add_shift(t, channel);
+        break;
+    case VSH_MEASURE_PENUMBRA:
+        add_penumbra(t, channel);
+        break;
+    default:
+        add(t, "%s %.3g (limit %g)", vsh_measure_name(measure), m->value[measure], limit);
+    }
+}
+
+/* Names noise or a curve if it explains most of the difference. */
+static void add_causes(text *t, const vsh_channel_comparison *channel) {
+    const vsh_measures *m = &channel->measures;
+    if (m->curve[2][0] > 0.0) {
+        add(t, "values follow a curve that takes %.2f, %.2f, %.2f to %.2f, %.2f, %.2f: gamma or exposure?",
+            m->curve[0][0], m->curve[1][0], m->curve[2][0], m->curve[0][1], m->curve[1][1], m->curve[2][1]);
+    } else if (m->noise_share >= 0.5 && m->noise > channel->limits.options.noise) {
+        add(t, "noise of %.3g, which is %.0f %% of the squared difference", m->noise, 100.0 * m->noise_share);
+    }
+}
+
+void cli_channel_explain(const vsh_channel_comparison *channel, char out[CLI_EXPLANATION]) {
+    text t = {out, CLI_EXPLANATION};
+    out[0] = '\0';
+    if (channel->coverage_failed) {
+        const vsh_coverage *c = &channel->coverage;
+        char place[64];
+        add(&t, "coverage differs in %" PRIu64 " %ss, %.3g of those covered, the first at %s (limit %g)",
+            c->differs, texel(channel), c->share, cli_channel_place(channel, c->first, place),
+            channel->coverage_limit);
+    }
+    if (channel->is_coverage) {
+        return;
+    }
+    if (channel->measures.count == 0) {
+        add(&t, "%snothing is covered in both: nothing was compared", out[0] != '\0' ? "; " : "");
+        if (channel->measures.nonfinite[0] + channel->measures.nonfinite[1] > 0) {
+            add(&t, "; ");
+            add_nonfinite(&t, channel);
+        }
+        return;
+    }
+    if (channel->failed != 0) {
+        add_causes(&t, channel);
+    }
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        if ((channel->failed >> i & 1) != 0) {
+            add(&t, "%s", out[0] != '\0' ? "; " : "");
+            add_failure(&t, channel, i);
+        }
+    }
+}
+
+/* --- lines */
+
+static void print_measures(FILE *out, const vsh_channel_comparison *channel) {
+    const vsh_measures *m = &channel->measures;
+    const char *separator = "; ";
+    char place[64];
+    for (int i = VSH_MEASURE_NONFINITE + 1; i < VSH_MEASURE_COUNT; ++i) {
+        if (!isnan(m->value[i])) {
+            fprintf(out, "%s%s %.3g", separator, vsh_measure_name(i), m->value[i]);
+            separator = ", ";
+        }
+    }
+    fprintf(out, " at %s", cli_channel_place(channel, m->worst, place));
+}
+
+static void print_noise(FILE *out, const vsh_channel_comparison *channel) {
+    const double *made_to = channel->max_error;
+    fprintf(out, "; noise of %.3g is allowed for", channel->limits.options.noise);
+    if (!isnan(made_to[0]) && !isnan(made_to[1])) {
+        fprintf(out, " (made to max errors %.3g and %.3g)", made_to[0], made_to[1]);
+    }
+}
+
+static void print_channel(FILE *out, const vsh_channel_comparison *channel) {
+    char what[CLI_EXPLANATION];
+    cli_channel_explain(channel, what);
+    fprintf(out, "%s: %s%s%s", channel->name, channel->alike ? "alike" : "not alike",
+            what[0] != '\0' ? ": " : "", what);
+    if (!channel->is_coverage && channel->limits.options.noise > 0.0) {
+        print_noise(out, channel);
+    }
+    if (channel->is_coverage) {
+        fprintf(out, "; %" PRIu64 " and %" PRIu64 " covered, %" PRIu64 " in one alone",
+                channel->coverage.golden, channel->coverage.values, channel->coverage.differs);
+    } else if (channel->measures.count > 0) {
+        print_measures(out, channel);
+    }
+}
+
+void cli_comparison_print(FILE *out, const cli_comparison *c, const char *prefix) {
+    const char *problem;
+    const vsh_channel_comparison *channel;
+    for (size_t i = 0; (problem = cli_comparison_problem(c, i)) != NULL; ++i) {
+        fprintf(out, "%snot alike: %s\n", prefix, problem);
+    }
+    for (size_t i = 0; (channel = vsh_comparison_channel(c->made, i)) != NULL; ++i) {
+        fputs(prefix, out);
+        print_channel(out, channel);
+        fputc('\n', out);
+    }
 }

@@ -33,8 +33,8 @@ static int add_limits(const regress_work *work, regress_case *one) {
     const vsh_compare_files_options *s = &work->settings->compare.options;
     bool good = regress_lines_add(&one->inputs, "coverage: %s, at most %.9g, padding %d", s->coverage,
                                   s->coverage_limit, s->padding);
-    good = good && regress_lines_add(&one->inputs, "threshold %.9g, step %.9g, reach %d, noise %.9g",
-                                     s->threshold, s->step, s->reach, s->noise);
+    good = good && regress_lines_add(&one->inputs, "step %.9g, reach %d, noise %.9g", s->step, s->reach,
+                                     s->noise);
     for (int i = 0; i < VSH_MEASURE_COUNT && good; ++i) {
         if (!isnan(s->limits[i])) {
             good = regress_lines_add(&one->inputs, "limit of %s: %.9g", vsh_measure_name(i), s->limits[i]);

@@ -24,8 +24,8 @@ static void print_updated(const cli_comparison *c, const char *output) {
         printf("    %s\n", problem);
     }
     for (size_t i = 0; (channel = vsh_comparison_channel(c->made, i)) != NULL; ++i) {
-        char what[2048];
-        cli_channel_explain(channel, what, sizeof what);
+        char what[CLI_EXPLANATION];
+        cli_channel_explain(channel, what);
         if (what[0] != '\0') {
             printf("    %s: %s\n", channel->name, what);
         }

@@ -12,8 +12,7 @@ from . import types
 from ._library import (ArgumentError, Cancelled, Error, InputError, InternalError, LimitError, OutOfMemoryError, ReadError, Run,
                        UnsupportedError, VdbshadeWarning, WriteError)
 from ._bake_scene import SceneBake, SceneLightmap, bake_scene, forecast_scene, merge_scene
-from ._compare import (Comparison, Limits, Measures, Tolerances, compare, compare_accuracy, compare_coverage, compare_files, compare_judge,
-                      measure_at_least)
+from ._compare import (Comparison, Limits, Measures, Tolerances, compare, compare_accuracy, compare_coverage, compare_files, compare_judge)
 from ._field import Field, Heights, Spheres, Triangles, spheres_read, trace_ao, trace_shadow
 from ._flat import FlatScene, flat_bake, flat_light_name, flat_visibility
 from ._grid import Grid, vdb_copy, vdb_list

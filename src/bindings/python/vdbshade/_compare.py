@@ -20,8 +20,8 @@ MEASURES = tuple(WORDS["VSH_MEASURE_"])
 
 
 class Measures(types.Measures):
-    """How far values are from golden ones. `value` is a dict of "rmse", "bias", "max", "p99", "share", "ssim", "penumbra",
-    "widths", "edges", "shift", "lost", "gained", "nonfinite"; NaN where a measure does not apply."""
+    """How far values are from golden ones. `value` is a dict of "nonfinite", "shift", "penumbra", "lost", "gained", "rmse",
+    "p99" and "max"; NaN if a measure does not apply."""
 
     value: Dict[str, float]  # type: ignore[assignment]
     _struct: Any
@@ -98,7 +98,7 @@ class Limits:
     noise : float
         standard error that the differences may have by sampling, in units of the range
     **values
-        limits: rmse=0.01, ssim=0.99, …
+        limits: rmse=0.01, shift=0.2, …
     """
 
     def __init__(self, *, noise: float = 0.0, **values: float) -> None:
@@ -182,10 +182,5 @@ def compare_files(golden: "str | os.PathLike[str]", fresh: "str | os.PathLike[st
                            filled.pointer, RUN, place("vsh_comparison"), run=run))
 
 
-def measure_at_least(name: str) -> bool:
-    """Whether a measure's limit is the least that will do ("ssim"), not the most."""
-    return bool(lib.vsh_measure_at_least(constant("VSH_MEASURE_", name, "measure")))
-
-
 __all__ = ["Comparison", "Limits", "Measures", "Tolerances", "compare", "compare_accuracy", "compare_coverage", "compare_files",
-           "compare_judge", "measure_at_least"]
+           "compare_judge"]

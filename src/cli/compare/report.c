@@ -1,0 +1,473 @@
+/* Reports of comparisons: JSON, JUnit's XML for a CI, and a page with pictures. */
+#include "cli/compare/comparison.h"
+#include "cli/document.h"
+#include "cli/message.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+
+/* --- JSON */
+
+static json_t *number(double value) {
+    return isfinite(value) ? json_real(value) : json_null();
+}
+
+static json_t *place(const vsh_channel_comparison *channel, uint64_t index) {
+    const uint64_t width = (uint64_t)channel->size[0], height = (uint64_t)channel->size[1];
+    const json_int_t x = (json_int_t)(index % width), y = (json_int_t)(index / width % height);
+    const json_int_t z = (json_int_t)(index / width / height);
+    return json_pack("[I,I,I]", x + channel->origin[0], y + channel->origin[1], z + channel->origin[2]);
+}
+
+static json_t *region(const vsh_channel_comparison *channel, const vsh_region *r) {
+    if (r->count == 0) {
+        return json_null();
+    }
+    json_t *min = json_array(), *max = json_array();
+    for (int axis = 0; axis < 3; ++axis) {
+        json_array_append_new(min, json_integer(r->min[axis] + channel->origin[axis]));
+        json_array_append_new(max, json_integer(r->max[axis] + channel->origin[axis]));
+    }
+    return json_pack("{s:I,s:o,s:f,s:o,s:o}", "texels", (json_int_t)r->count, "worst",
+                     place(channel, r->worst), "by", r->by, "min", min, "max", max);
+}
+
+static json_t *nonfinite(const vsh_channel_comparison *channel, int which) {
+    const vsh_measures *m = &channel->measures;
+    return json_pack("{s:I,s:o}", "count", (json_int_t)m->nonfinite[which], "first",
+                     m->nonfinite[which] > 0 ? place(channel, m->nonfinite_first[which]) : json_null());
+}
+
+static void set_measures(json_t *root, const vsh_channel_comparison *channel) {
+    const vsh_measures *m = &channel->measures;
+    json_t *values = json_object(), *limits = json_object(), *failed = json_array();
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        const char *name = vsh_measure_name(i);
+        json_object_set_new(values, name, number(m->value[i]));
+        json_object_set_new(limits, name, number(channel->limits.value[i]));
+        if ((channel->failed >> i & 1) != 0) {
+            json_array_append_new(failed, json_string(name));
+        }
+    }
+    json_object_set_new(root, "compared", json_integer((json_int_t)m->count));
+    json_object_set_new(root, "range", number(m->range));
+    json_object_set_new(root, "max_error",
+                        json_pack("[o,o]", number(channel->max_error[0]), number(channel->max_error[1])));
+    json_object_set_new(root, "noise", number(channel->limits.options.noise));
+    json_object_set_new(root, "failed", failed);
+    json_object_set_new(root, "measures", values);
+    json_object_set_new(root, "limits", limits);
+    json_object_set_new(root, "golden_nonfinite", nonfinite(channel, 0));
+    json_object_set_new(root, "new_nonfinite", nonfinite(channel, 1));
+    if (m->count == 0) {
+        return;
+    }
+    json_object_set_new(root, "worst",
+                        json_pack("{s:o,s:o,s:o}", "at", place(channel, m->worst), "golden",
+                                  number(m->worst_value[0]), "new", number(m->worst_value[1])));
+    json_object_set_new(root, "edges", json_integer((json_int_t)m->pairs));
+    json_object_set_new(root, "penumbra_width",
+                        json_pack("{s:o,s:o}", "golden", number(m->width[0]), "new", number(m->width[1])));
+    json_object_set_new(root, "shift", json_pack("[f,f,f]", m->shift[0], m->shift[1], m->shift[2]));
+    json_object_set_new(root, "shift_explains", number(m->explained));
+    json_object_set_new(root, "measured_noise", number(m->noise));
+    json_object_set_new(root, "noise_explains", number(m->noise_share));
+    json_object_set_new(root, "curve",
+                        m->curve[2][0] > 0.0
+                            ? json_pack("[[f,f],[f,f],[f,f]]", m->curve[0][0], m->curve[0][1], m->curve[1][0],
+                                        m->curve[1][1], m->curve[2][0], m->curve[2][1])
+                            : json_null());
+    json_object_set_new(root, "lost", region(channel, &m->lost));
+    json_object_set_new(root, "gained", region(channel, &m->gained));
+}
+
+static json_t *coverage(const vsh_channel_comparison *channel) {
+    const vsh_coverage *c = &channel->coverage;
+    return json_pack("{s:I,s:I,s:I,s:f,s:f}", "golden", (json_int_t)c->golden, "new", (json_int_t)c->values,
+                     "differs", (json_int_t)c->differs, "share", c->share, "limit", channel->coverage_limit);
+}
+
+static json_t *describe(const vsh_channel_comparison *channel) {
+    char what[CLI_EXPLANATION];
+    cli_channel_explain(channel, what);
+    json_t *root = json_pack("{s:o,s:b,s:o}", "name", cli_utf8_json(channel->name), "alike", channel->alike,
+                             "what", cli_utf8_json(what));
+    if (root != NULL && (channel->is_coverage || channel->coverage.golden + channel->coverage.values > 0)) {
+        json_object_set_new(root, "coverage", coverage(channel));
+    }
+    if (root != NULL && !channel->is_coverage) {
+        set_measures(root, channel);
+    }
+    return root;
+}
+
+static json_t *path(const char *name) {
+    return name != NULL ? cli_utf8_json(name) : json_null();
+}
+
+json_t *cli_comparison_json(const cli_comparison *c) {
+    json_t *problems = json_array(), *channels = json_array();
+    const char *problem;
+    const vsh_channel_comparison *channel;
+    for (size_t i = 0; (problem = cli_comparison_problem(c, i)) != NULL; ++i) {
+        json_array_append_new(problems, cli_utf8_json(problem));
+    }
+    for (size_t i = 0; (channel = vsh_comparison_channel(c->made, i)) != NULL; ++i) {
+        json_array_append_new(channels, describe(channel));
+    }
+    return json_pack("{s:o,s:o,s:b,s:o,s:o}", "golden", path(c->golden), "new", path(c->fresh), "alike",
+                     c->alike, "problems", problems, "channels", channels);
+}
+
+/* --- pictures: golden, new and difference, for the page */
+
+enum { LONGEST = 512 }; /* texels along a side of a picture: larger ones are shrunk */
+
+static const float nothing[3] = {0.83f, 0.86f, 0.90f}; /* what is not compared: no shade of grey */
+
+/* A slice of the planes, and how it is shrunk. */
+typedef struct view {
+    const vsh_compared *compared;
+    size_t first;          /* of the slice */
+    int32_t width, height; /* of the picture */
+    double least, most;    /* of golden values: black and white */
+    double full;           /* difference that is all red, or all blue */
+} view;
+
+static bool shown(const view *v, size_t at) {
+    const vsh_compared *c = v->compared;
+    return (c->mask == NULL || c->mask[at] != 0) && isfinite(c->golden[at]) && isfinite(c->values[at]);
+}
+
+enum { GOLDEN, FRESH, DIFFERENCE, PICTURES };
+
+/* Mean of the values that a pixel shows; of differences the largest, so that none is lost by shrinking. */
+static bool find_value(const view *v, int what, int32_t px, int32_t py, double *value) {
+    const vsh_compared *c = v->compared;
+    const size_t w = (size_t)c->size[0], h = (size_t)c->size[1];
+    const size_t x0 = (size_t)px * w / (size_t)v->width, x1 = ((size_t)px + 1) * w / (size_t)v->width;
+    const size_t y0 = (size_t)py * h / (size_t)v->height, y1 = ((size_t)py + 1) * h / (size_t)v->height;
+    double sum = 0.0, count = 0.0, largest = 0.0;
+    for (size_t y = y0; y < y1; ++y) {
+        for (size_t x = x0; x < x1; ++x) {
+            const size_t at = v->first + y * w + x;
+            if (shown(v, at)) {
+                const double difference = (double)c->values[at] - (double)c->golden[at];
+                largest = fabs(difference) > fabs(largest) ? difference : largest;
+                sum += what == GOLDEN ? (double)c->golden[at] : (double)c->values[at];
+                count += 1.0;
+            }
+        }
+    }
+    *value = what == DIFFERENCE ? largest : count > 0.0 ? sum / count : 0.0;
+    return count > 0.0;
+}
+
+static float between(double value) {
+    return (float)fmin(1.0, fmax(0.0, value));
+}
+
+/* Grey, or white where there is no difference, red where new is lighter, blue where it is darker. */
+static void colour(const view *v, int what, double value, float rgb[3]) {
+    if (what != DIFFERENCE) {
+        rgb[0] = rgb[1] = rgb[2] = between((value - v->least) / (v->most - v->least));
+        return;
+    }
+    const float off = between(fabs(value) / v->full);
+    rgb[0] = value > 0.0 ? 1.0f : 1.0f - off;
+    rgb[1] = 1.0f - off;
+    rgb[2] = value > 0.0 ? 1.0f - off : 1.0f;
+}
+
+static int write_picture(FILE *out, const char *page, const view *v, int what) {
+    const size_t count = (size_t)v->width * (size_t)v->height;
+    uint8_t *values = malloc(3 * count);
+    if (values == NULL) {
+        return cli_out_of_memory(page);
+    }
+    for (size_t i = 0; i < count; ++i) {
+        double value;
+        float rgb[3] = {nothing[0], nothing[1], nothing[2]};
+        if (find_value(v, what, (int32_t)(i % (size_t)v->width), (int32_t)(i / (size_t)v->width), &value)) {
+            colour(v, what, value, rgb);
+        }
+        for (size_t k = 0; k < 3; ++k) {
+            values[3 * i + k] = (uint8_t)lround(255.0 * (double)rgb[k]);
+        }
+    }
+    const cli_pixels pixels = {v->width, v->height, 3, values};
+    const int code = cli_document_png(out, page, &pixels);
+    free(values);
+    return code;
+}
+
+/* The scale of greys, from 0 to 1 where that is what there is; and of differences, up to a round number. */
+static void set_scales(view *v, const vsh_channel_comparison *channel) {
+    const vsh_compared *c = v->compared;
+    const size_t count = (size_t)c->size[0] * (size_t)c->size[1] * (size_t)c->size[2];
+    v->least = 0.0;
+    v->most = 1.0;
+    for (size_t i = 0; i < count; ++i) {
+        if (shown(v, i)) {
+            v->least = fmin(v->least, (double)c->golden[i]);
+            v->most = fmax(v->most, (double)c->golden[i]);
+        }
+    }
+    /* at the 99th percentile, but no less than what is a hundredth of the range */
+    const vsh_measures *m = &channel->measures;
+    const double wanted = m->count > 0 ? m->range * fmax(0.01, m->value[VSH_MEASURE_P99]) : 1.0;
+    const double power = pow(10.0, floor(log10(wanted)));
+    v->full = wanted <= power         ? power
+              : wanted <= 2.0 * power ? 2.0 * power
+              : wanted <= 5.0 * power ? 5.0 * power
+                                      : 10.0 * power;
+}
+
+static void write_scale(FILE *out, const view *v, int what) {
+    if (what == DIFFERENCE) {
+        fprintf(out,
+                "<div class=\"scale\" style=\"background:linear-gradient(90deg,#00f,#fff,#f00)\"></div><div "
+                "class=\"ends\"><span>−%g, darker</span><span>0</span><span>lighter, +%g</span></div>",
+                v->full, v->full);
+    } else {
+        fprintf(out,
+                "<div class=\"scale\" style=\"background:linear-gradient(90deg,#000,#fff)\"></div><div "
+                "class=\"ends\"><span>%g</span><span>%g</span></div>",
+                v->least, v->most);
+    }
+}
+
+char *cli_comparison_pictures(const char *page, const vsh_channel_comparison *channel,
+                              const vsh_compared *compared) {
+    static const char *const what[PICTURES] = {"golden", "new", "difference"};
+    const int32_t w = compared->size[0], h = compared->size[1], longest = w > h ? w : h;
+    const int32_t most = longest < LONGEST ? longest : LONGEST;
+    view v = {.compared = compared};
+    v.width = (int32_t)fmax(1.0, (double)w * most / longest);
+    v.height = (int32_t)fmax(1.0, (double)h * most / longest);
+    const size_t slice = (size_t)channel->measures.worst / ((size_t)w * (size_t)h);
+    v.first = slice * (size_t)w * (size_t)h;
+    set_scales(&v, channel);
+    char *text = NULL;
+    size_t size = 0;
+    FILE *out = open_memstream(&text, &size);
+    if (out == NULL) {
+        cli_out_of_memory(page);
+        return NULL;
+    }
+    if (compared->size[2] > 1) {
+        fprintf(out, "<p>The slice of z = %d, where the difference is largest.</p>\n",
+                (int32_t)slice + channel->origin[2]);
+    }
+    fputs("<div class=\"three\">\n", out);
+    int code = CLI_OK;
+    for (int i = 0; i < PICTURES && code == CLI_OK; ++i) {
+        fprintf(out, "<figure><img alt=\"%s\" src=\"data:image/png;base64,", what[i]);
+        code = write_picture(out, page, &v, i);
+        fprintf(out, "\"><figcaption>%s", what[i]);
+        if (i == DIFFERENCE) {
+            fprintf(out, ", %.3g times", 1.0 / v.full);
+        }
+        write_scale(out, &v, i);
+        fputs("</figcaption></figure>\n", out);
+    }
+    fputs("</div>\n", out);
+    const bool whole = !ferror(out);
+    if (fclose(out) != 0 || !whole) {
+        code = cli_out_of_memory(page);
+    }
+    if (code != CLI_OK) {
+        free(text);
+        return NULL;
+    }
+    return text;
+}
+
+typedef struct all {
+    const cli_comparison *comparisons;
+    size_t count;
+} all;
+
+static const char *name_of(const cli_comparison *c) {
+    return c->name != NULL ? c->name : c->golden;
+}
+
+/* --- JUnit (the schema of Ant's and Jenkins' reports) */
+
+/* A test of the files, and one of each channel. */
+static size_t count_tests(const cli_comparison *c, size_t *failures) {
+    const vsh_channel_comparison *channel;
+    size_t tests = 1;
+    *failures += cli_comparison_problem(c, 0) != NULL;
+    for (; (channel = vsh_comparison_channel(c->made, tests - 1)) != NULL; ++tests) {
+        *failures += !channel->alike;
+    }
+    return tests;
+}
+
+static void write_case(FILE *out, const cli_comparison *c, const char *name, const char *failure) {
+    fputs("    <testcase classname=\"", out);
+    cli_document_escape(out, name_of(c));
+    fputs("\" name=\"", out);
+    cli_document_escape(out, name);
+    if (failure[0] == '\0') {
+        fputs("\"/>\n", out);
+        return;
+    }
+    fputs("\">\n      <failure message=\"", out);
+    cli_document_escape(out, failure);
+    fputs("\"/>\n    </testcase>\n", out);
+}
+
+static void write_junit(FILE *out, const void *user) {
+    const all *a = user;
+    size_t tests = 0, failures = 0;
+    for (size_t i = 0; i < a->count; ++i) {
+        tests += count_tests(&a->comparisons[i], &failures);
+    }
+    fprintf(out, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites tests=\"%zu\" failures=\"%zu\">\n",
+            tests, failures);
+    for (size_t i = 0; i < a->count; ++i) {
+        const cli_comparison *c = &a->comparisons[i];
+        fputs("  <testsuite name=\"", out);
+        cli_document_escape(out, name_of(c));
+        failures = 0;
+        tests = count_tests(c, &failures);
+        fprintf(out, "\" tests=\"%zu\" failures=\"%zu\" errors=\"0\">\n", tests, failures);
+        const char *problem;
+        const vsh_channel_comparison *channel;
+        char text[CLI_EXPLANATION];
+        size_t used = 0;
+        text[0] = '\0';
+        for (size_t k = 0; (problem = cli_comparison_problem(c, k)) != NULL && used < sizeof text; ++k) {
+            used += (size_t)snprintf(text + used, sizeof text - used, "%s%s", k > 0 ? "; " : "", problem);
+        }
+        write_case(out, c, "files", text);
+        for (size_t k = 0; (channel = vsh_comparison_channel(c->made, k)) != NULL; ++k) {
+            cli_channel_explain(channel, text);
+            write_case(out, c, channel->name, text);
+        }
+        fputs("  </testsuite>\n", out);
+    }
+    fputs("</testsuites>\n", out);
+}
+
+/* --- the page */
+
+static const char head[] =
+    "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n"
+    "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<style>\n"
+    "body{font:15px/1.5 system-ui,sans-serif;margin:1.5em auto;max-width:1200px;padding:0 1em;color:#111;"
+    "background:#fff;overflow-wrap:break-word}\n"
+    "h2{margin-top:2em}h2,h3{line-height:1.25}.good{color:#186a3b}.bad{color:#b00020}\n"
+    ".three{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,280px),1fr));gap:1em}\n"
+    "figure{margin:0;font-size:13px}img{image-rendering:pixelated;outline:1px solid "
+    "#ddd;width:100%;height:auto}\n"
+    ".scale{height:10px;margin:.3em 0 0}.ends{display:flex;justify-content:space-between;"
+    "font-variant-numeric:tabular-nums}\n"
+    ".wide{overflow-x:auto}table{border-collapse:collapse;font-size:13px;margin:1em 0}"
+    "th,td{padding:.25em .7em;text-align:right;border-bottom:1px solid #e4e4e4;white-space:nowrap;"
+    "font-variant-numeric:tabular-nums}\n"
+    "td:first-child,th:first-child{text-align:left}td.bad{font-weight:600}code{font:13px "
+    "ui-monospace,monospace}\n"
+    "</style>\n";
+
+static const char *verdict(bool alike) {
+    return alike ? "<span class=\"good\">alike</span>" : "<span class=\"bad\">not alike</span>";
+}
+
+static void write_measures(FILE *out, const vsh_channel_comparison *channel) {
+    const vsh_measures *m = &channel->measures;
+    fputs("<div class=\"wide\"><table><tr><th>measure</th>", out);
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        fprintf(out, "<th>%s</th>", vsh_measure_name(i));
+    }
+    fputs("</tr>\n<tr><td>value</td>", out);
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        fprintf(out, "<td%s>", (channel->failed >> i & 1) != 0 ? " class=\"bad\"" : "");
+        fprintf(out, isnan(m->value[i]) ? "–</td>" : "%.4g</td>", m->value[i]);
+    }
+    fputs("</tr>\n<tr><td>limit</td>", out);
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        fprintf(out, "<td>≤ %g</td>", channel->limits.value[i]);
+    }
+    fputs("</tr></table></div>\n", out);
+    char place[64];
+    fprintf(out, "<p>%" PRIu64 " values compared, in units of %g. Largest difference: %.6g for %.6g at %s.",
+            m->count, m->range, m->worst_value[1], m->worst_value[0],
+            cli_channel_place(channel, m->worst, place));
+    if (m->pairs > 0) {
+        fprintf(out, " Penumbrae are %.2f texels wide for %.2f (10 %% to 90 %%, mean of %" PRIu64 " edges).",
+                m->width[1], m->width[0], m->pairs);
+    }
+    fputs("</p>\n", out);
+}
+
+static void write_channel(FILE *out, const vsh_channel_comparison *channel, const char *pictures) {
+    char what[CLI_EXPLANATION];
+    cli_channel_explain(channel, what);
+    fputs("<h3>", out);
+    cli_document_escape(out, channel->name);
+    fprintf(out, ": %s</h3>\n", verdict(channel->alike));
+    if (what[0] != '\0') {
+        fputs("<p>", out);
+        cli_document_escape(out, what);
+        fputs("</p>\n", out);
+    }
+    if (channel->is_coverage) {
+        fprintf(out,
+                "<p>Coverage: %" PRIu64 " texels in golden, %" PRIu64 " in new, %" PRIu64
+                " in one alone.</p>\n",
+                channel->coverage.golden, channel->coverage.values, channel->coverage.differs);
+        return;
+    }
+    fputs(pictures != NULL ? pictures : "", out);
+    if (channel->measures.count > 0) {
+        write_measures(out, channel);
+    }
+}
+
+static void write_page(FILE *out, const void *user) {
+    const all *a = user;
+    fputs(head, out);
+    fputs("<title>vdbshade: golden and new</title>\n<h1>Golden and new</h1>\n", out);
+    for (size_t i = 0; i < a->count; ++i) {
+        const cli_comparison *c = &a->comparisons[i];
+        fputs("<h2>", out);
+        cli_document_escape(out, name_of(c));
+        fprintf(out, ": %s</h2>\n<p>", verdict(c->alike));
+        if (c->golden != NULL && c->fresh != NULL) {
+            fputs("Golden: <code>", out);
+            cli_document_escape(out, c->golden);
+            fputs("</code>, new: <code>", out);
+            cli_document_escape(out, c->fresh);
+            fputs("</code>", out);
+        }
+        fputs("</p>\n", out);
+        const char *problem;
+        for (size_t k = 0; (problem = cli_comparison_problem(c, k)) != NULL; ++k) {
+            fputs("<p class=\"bad\">", out);
+            cli_document_escape(out, problem);
+            fputs("</p>\n", out);
+        }
+        const vsh_channel_comparison *channel;
+        for (size_t k = 0; (channel = vsh_comparison_channel(c->made, k)) != NULL; ++k) {
+            write_channel(out, channel, k < c->picture_count ? c->pictures[k] : NULL);
+        }
+    }
+    fprintf(
+        out,
+        "<p>Grey-blue is not compared. What the measures are stands in docs/regression.md. Made by vdbshade "
+        "%s.</p>\n</html>\n",
+        vsh_version());
+}
+
+int cli_comparison_report(const cli_compare_settings *s, const cli_comparison *comparisons, size_t count) {
+    const all a = {comparisons, count};
+    int code = 0;
+    if (s->junit != NULL) {
+        code = cli_document_write(s->junit, write_junit, &a);
+    }
+    return code == 0 && s->html != NULL ? cli_document_write(s->html, write_page, &a) : code;
+}

@@ -1,0 +1,306 @@
+/* Finds regions that lost or gained a shadow, and two causes that look like one: noise and a curve.
+ *
+ * Regions: a texel is off by how far its new value lies outside the range of nearby golden values, or its
+ * golden value outside that of nearby new ones (flat dilation and erosion: Serra, "Image Analysis and
+ * Mathematical Morphology", 1982). The first finds new shadows, the second lost ones, even one texel wide.
+ * Shadows that moved within the reach, or got a little softer, have like values nearby. Touching texels
+ * (corners count) that are off by a step or more to one side are a region. Limits: fainter shadows are not
+ * seen, and penumbrae that change by many texels are off, too.
+ *
+ * Noise is what neighbours along an edge do not share. Each value is compared with its two neighbours in the
+ * direction in which the two bakes change least, so wider and shifted penumbrae do not count.
+ *
+ * A curve (gamma, exposure) takes equal golden values to equal new ones, all lighter or all darker. A
+ * penumbra of another width gets lighter on one side and darker on the other. */
+#include "compare/compare.h"
+
+#include <math.h>
+#include <string.h>
+
+/* --- regions */
+
+/* Planes of the least and the greatest value within the reach of each texel. */
+typedef struct extremes {
+    float *least, *greatest;
+} extremes;
+
+enum { MOST_REACH = 16, WINDOW = 2 * MOST_REACH + 1 };
+
+/* Extends the extremes by `reach` along the line that begins at `first`. */
+static void spread(const vshi_pair *pair, const extremes *e, int axis, size_t first, size_t reach) {
+    const size_t stride = pair->stride[axis], count = pair->size[axis], window = 2 * reach + 1;
+    float least[WINDOW], greatest[WINDOW]; /* a ring of the original values */
+    for (size_t next = 0; next < count + reach; ++next) {
+        const size_t slot = next % window, at = first + next * stride;
+        least[slot] = next < count ? e->least[at] : INFINITY;
+        greatest[slot] = next < count ? e->greatest[at] : -INFINITY;
+        if (next < reach) {
+            continue;
+        }
+        const size_t i = next - reach, begin = i > reach ? i - reach : 0;
+        float low = INFINITY, high = -INFINITY;
+        for (size_t k = begin; k <= next; ++k) {
+            low = fminf(low, least[k % window]);
+            high = fmaxf(high, greatest[k % window]);
+        }
+        e->least[first + i * stride] = low;
+        e->greatest[first + i * stride] = high;
+    }
+}
+
+/* Raises `off` to how far the values of `one` lie outside the range of the other plane nearby; `sign` turns
+ * that into new - golden. */
+static void compare_nearby(const vshi_pair *pair, int one, double sign, size_t reach, const extremes *e,
+                           float *off) {
+    for (size_t i = 0; i < pair->count; ++i) {
+        const float value = (float)vshi_value_at(pair, 1 - one, i);
+        e->least[i] = pair->mask[i] ? value : INFINITY;
+        e->greatest[i] = pair->mask[i] ? value : -INFINITY;
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+        for (size_t i = 0; i < pair->count && pair->size[axis] > 1; ++i) {
+            if (i / pair->stride[axis] % pair->size[axis] == 0) {
+                spread(pair, e, axis, i, reach);
+            }
+        }
+    }
+    for (size_t i = 0; i < pair->count; ++i) {
+        if (pair->mask[i]) {
+            const double value = vshi_value_at(pair, one, i);
+            const double outside =
+                fmax(0.0, value - (double)e->greatest[i]) + fmin(0.0, value - (double)e->least[i]);
+            if (fabs(outside) > fabs((double)off[i])) {
+                off[i] = (float)(sign * outside);
+            }
+        }
+    }
+}
+
+/* Measures the region of texel `start`, and clears it in `off`. */
+static vsh_region extract_region(const vshi_pair *pair, float *off, uint32_t *stack, size_t start,
+                                 double step) {
+    const double sign = off[start] > 0.0f ? 1.0 : -1.0;
+    vsh_region region = {.worst = start, .by = (double)off[start]};
+    size_t height = 0;
+    stack[height++] = (uint32_t)start;
+    off[start] = 0.0f;
+    for (int axis = 0; axis < 3; ++axis) {
+        region.min[axis] = INT32_MAX;
+        region.max[axis] = INT32_MIN;
+    }
+    while (height > 0) {
+        const size_t at = stack[--height];
+        size_t place[3];
+        vshi_find_place(pair, at, place);
+        ++region.count;
+        for (int axis = 0; axis < 3; ++axis) {
+            const int32_t p = (int32_t)place[axis];
+            region.min[axis] = p < region.min[axis] ? p : region.min[axis];
+            region.max[axis] = p > region.max[axis] ? p : region.max[axis];
+        }
+        for (int neighbour = 0; neighbour < 27; ++neighbour) {
+            size_t to = 0;
+            bool inside = true;
+            for (int axis = 0, rest = neighbour; axis < 3; ++axis, rest /= 3) {
+                const size_t p = place[axis] + (size_t)(rest % 3); /* its place plus one */
+                inside = inside && p >= 1 && p <= pair->size[axis];
+                to += inside ? (p - 1) * pair->stride[axis] : 0;
+            }
+            if (inside && sign * (double)off[to] >= step) {
+                if (fabs((double)off[to]) > fabs(region.by)) {
+                    region.by = (double)off[to];
+                    region.worst = to;
+                }
+                off[to] = 0.0f;
+                stack[height++] = (uint32_t)to;
+            }
+        }
+    }
+    return region;
+}
+
+void vshi_measure_regions(const vshi_pair *pair, const vsh_compare_options *options, void *scratch,
+                          vsh_measures *m) {
+    float *planes = scratch;
+    float *off = planes + 2 * pair->count;
+    const extremes e = {planes, planes + pair->count};
+    memset(off, 0, pair->count * sizeof *off);
+    compare_nearby(pair, VSHI_NEW, 1.0, (size_t)options->reach, &e, off);
+    compare_nearby(pair, VSHI_GOLDEN, -1.0, (size_t)options->reach, &e, off);
+    const double step = options->step + VSHI_NOISE_P99 * fmax(options->noise, m->noise);
+    uint32_t *stack = (uint32_t *)(planes + 3 * pair->count); /* no texel is on it twice */
+    for (size_t i = 0; i < pair->count; ++i) {
+        if (fabs((double)off[i]) >= step) {
+            vsh_region *largest = off[i] > 0.0f ? &m->lost : &m->gained;
+            const vsh_region region = extract_region(pair, off, stack, i, step);
+            if (region.count > largest->count) {
+                *largest = region;
+            }
+        }
+    }
+    m->value[VSH_MEASURE_LOST] = (double)m->lost.count;
+    m->value[VSH_MEASURE_GAINED] = (double)m->gained.count;
+}
+
+/* --- noise */
+
+/* Finds both neighbours along a direction; false if one is not compared. */
+static bool find_neighbours(const vshi_pair *pair, size_t i, const size_t place[3], const int direction[3],
+                            size_t neighbour[2]) {
+    neighbour[0] = neighbour[1] = i;
+    for (int axis = 0; axis < 3; ++axis) {
+        if (direction[axis] != 0 && (place[axis] == 0 || place[axis] + 1 >= pair->size[axis])) {
+            return false;
+        }
+        neighbour[0] -= (size_t)direction[axis] * pair->stride[axis]; /* wraps around twice if negative */
+        neighbour[1] += (size_t)direction[axis] * pair->stride[axis];
+    }
+    return pair->mask[neighbour[0]] && pair->mask[neighbour[1]];
+}
+
+/* Squares the difference's deviation from the mean of its two neighbours, along the direction in which the
+ * bakes change least. Negative if there are no neighbours. */
+static double find_unshared(const vshi_pair *pair, size_t i) {
+    double least = INFINITY, unshared = -1.0;
+    size_t place[3];
+    vshi_find_place(pair, i, place);
+    for (int d = 14; d < (pair->size[2] > 1 ? 27 : 18); ++d) { /* half of 3 × 3 × 3: the rest is opposite */
+        const int direction[3] = {d % 3 - 1, d / 3 % 3 - 1, d / 9 - 1};
+        size_t at[2];
+        if (!find_neighbours(pair, i, place, direction, at)) {
+            continue;
+        }
+        double steps = 0.0, length = 0.0;
+        for (int axis = 0; axis < 3; ++axis) {
+            length += direction[axis] * direction[axis];
+        }
+        for (int which = 0; which < 2; ++which) {
+            steps += vshi_value_at(pair, which, at[1]) - vshi_value_at(pair, which, at[0]);
+        }
+        const double change = steps * steps / length;
+        if (change < least) {
+            const double own = vshi_difference_at(pair, i) -
+                               0.5 * (vshi_difference_at(pair, at[0]) + vshi_difference_at(pair, at[1]));
+            least = change;
+            unshared = own * own;
+        }
+    }
+    return unshared;
+}
+
+void vshi_measure_noise(const vshi_pair *pair, vsh_measures *m) {
+    static const double VARIANCE = 1.5; /* of a value minus the mean of two others, each of variance 1 */
+    double sum = 0.0, all = 0.0, count = 0.0;
+    for (size_t i = 0; i < pair->count; ++i) {
+        const double unshared = pair->mask[i] ? find_unshared(pair, i) : -1.0;
+        if (unshared >= 0.0) {
+            sum += unshared / VARIANCE;
+            all += vshi_difference_at(pair, i) * vshi_difference_at(pair, i);
+            count += 1.0;
+        }
+    }
+    m->noise = count > 0.0 ? sqrt(sum / count) : 0.0;
+    m->noise_share = all > 0.0 ? fmin(sum / all, 1.0) : 0.0;
+}
+
+/* --- a curve */
+
+enum { BINS = 64, FEWEST_BINS = 16 }; /* fewer points fit anything */
+static const double LEAST_EXPLAINED = 0.98;
+static const double LEAST_RISE = 0.05; /* share of the rise in each half: a lost shadow has none in one */
+static const double MOST_MIXED =
+    0.1; /* smaller of the sums of lighter and darker, as a share of the larger */
+
+typedef struct curve {
+    int count;
+    double from[BINS], to[BINS]; /* mean golden and new values of each bin that has any */
+    double lighter, darker;      /* sums over all values */
+    bool falls;                  /* somewhere, by more than noise */
+} curve;
+
+static double value_on(const curve *c, double v) {
+    int i = 1;
+    while (i + 1 < c->count && v > c->from[i]) {
+        ++i;
+    }
+    const double t = (v - c->from[i - 1]) / (c->from[i] - c->from[i - 1]);
+    return c->to[i - 1] + t * (c->to[i] - c->to[i - 1]);
+}
+
+static void add_point(curve *c, double from, double to, size_t count, double noise) {
+    const double n = (double)count, tolerance = noise * (1.0 + 3.0 / sqrt(n));
+    c->lighter += fmax(0.0, to - from - n * noise); /* noise clipped at 0 and 1 has a mean */
+    c->darker += fmax(0.0, from - to - n * noise);
+    c->falls = c->falls || (c->count > 0 && to / n < c->to[c->count - 1] - tolerance);
+    c->from[c->count] = from / n;
+    c->to[c->count++] = to / n;
+}
+
+static void fit_curve(const vshi_pair *pair, double noise, curve *c) {
+    double low = INFINITY, high = -INFINITY, from[BINS] = {0.0}, to[BINS] = {0.0};
+    size_t count[BINS] = {0};
+    for (size_t i = 0; i < pair->count; ++i) {
+        if (pair->mask[i]) {
+            low = fmin(low, vshi_value_at(pair, VSHI_GOLDEN, i));
+            high = fmax(high, vshi_value_at(pair, VSHI_GOLDEN, i));
+        }
+    }
+    for (size_t i = 0; i < pair->count && high > low; ++i) {
+        if (pair->mask[i]) {
+            const double v = vshi_value_at(pair, VSHI_GOLDEN, i);
+            const int bin = (int)fmin((v - low) / (high - low) * BINS, BINS - 1.0);
+            from[bin] += v;
+            to[bin] += vshi_value_at(pair, VSHI_NEW, i);
+            ++count[bin];
+        }
+    }
+    *c = (curve){.count = 0};
+    for (int bin = 0; bin < BINS; ++bin) {
+        if (count[bin] > 0) {
+            add_point(c, from[bin], to[bin], count[bin], noise);
+        }
+    }
+}
+
+static bool is_tone(const curve *c) {
+    if (c->count < FEWEST_BINS || c->falls ||
+        fmin(c->lighter, c->darker) > MOST_MIXED * fmax(c->lighter, c->darker)) {
+        return false;
+    }
+    const double first = c->to[0], last = c->to[c->count - 1], least = LEAST_RISE * (last - first);
+    const double middle = value_on(c, 0.5 * (c->from[0] + c->from[c->count - 1]));
+    return last > first && middle - first >= least && last - middle >= least;
+}
+
+/* Applies the curve to golden, and returns the share of the squared difference that it explains, apart from
+ * noise. */
+static double map_golden(const vshi_pair *pair, const curve *c, double noise, float *mapped) {
+    double before = 0.0, after = 0.0, count = 0.0;
+    for (size_t i = 0; i < pair->count; ++i) {
+        const double w = value_on(c, vshi_value_at(pair, VSHI_GOLDEN, i));
+        mapped[i] = (float)(w / pair->scale);
+        if (pair->mask[i]) {
+            const double off = vshi_value_at(pair, VSHI_NEW, i) - w;
+            before += vshi_difference_at(pair, i) * vshi_difference_at(pair, i);
+            after += off * off;
+            count += 1.0;
+        }
+    }
+    const double unshared = noise * noise * count;
+    return before > 2.0 * unshared ? (before - after) / (before - unshared) : 0.0;
+}
+
+bool vshi_follow_curve(vshi_pair *pair, float *mapped, vsh_measures *m) {
+    curve c;
+    fit_curve(pair, m->noise, &c);
+    if (!is_tone(&c) || map_golden(pair, &c, m->noise, mapped) < LEAST_EXPLAINED) {
+        return false;
+    }
+    for (int k = 0; k < 3; ++k) {
+        const double low = c.from[0], high = c.from[c.count - 1];
+        m->curve[k][0] = low + 0.25 * (k + 1) * (high - low);
+        m->curve[k][1] = value_on(&c, m->curve[k][0]);
+    }
+    pair->plane[VSHI_GOLDEN] = mapped;
+    return true;
+}

@@ -1,0 +1,320 @@
+/* Measures how wide penumbrae are: finds shadow edges in both bakes, and compares those found in both.
+ *
+ * Every line of texels along each axis is walked. An edge goes from one side (at most 10 % of the way from
+ * the darkest to the lightest golden value) to the other (at least 90 %). Its width is the length between:
+ * only noise of 80 % of the range makes an edge. A border of the coverage ends an edge uncounted. The length
+ * along the line times the cosine of the angle between line and mean gradient is the width across the edge.
+ * Each edge is measured along the axis nearest to its gradient, so that it counts by its length. (By the
+ * coarea formula, the lengths along parallel lines add up to the area of the penumbra.) A golden and a new
+ * edge are a pair if each is the nearest to the other, in one direction, no farther away than the wider is
+ * wide.
+ *
+ * A value close to a mark reaches it in one bake and misses it in the other. So a width counts only if moving
+ * the marks a little changes it by at most twice as much as on an even slope.
+ *
+ * Limits: an edge between two neighbours reads as 0.8 texels. Widths below about two texels are not resolved.
+ * A caster too thin for a dark core has no edge. */
+#include "compare/compare.h"
+
+#include "base/memory.h"
+#include "base/try.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { OUTLIERS = 8 };      /* values ignored at each end of the range */
+enum { FEWEST_EDGES = 16 }; /* fewer do not make a mean */
+
+static const double LOW = 0.1, HIGH = 0.9;
+static const double ROOM = 0.02;        /* how far the marks move to test whether a width is steady */
+static const double LEAST_NOISE = 0.25; /* share of the squared difference: penumbrae alone make less */
+static const double MOST_ROOM = 0.3;    /* of the range, that each mark moves */
+static const double LEAST_RANGE = 0.05; /* from the darkest to the lightest: less is no shadow */
+static const double REACH = 2.0;        /* texels that narrow edges of a pair may be apart */
+
+typedef struct edge {
+    double at;    /* texels along the line */
+    double width; /* across the edge */
+    int rises;    /* 1: dark to light; -1 */
+    bool own;     /* this axis is the nearest to its gradient */
+    bool steady;  /* its width hardly depends on the marks */
+    size_t near;  /* index of the nearest of the others; SIZE_MAX: none */
+} edge;
+
+/* Values that count as the two sides of an edge. */
+typedef struct marks {
+    double low, high;
+} marks;
+
+typedef struct line {
+    const vshi_pair *pair;
+    size_t first, stride, count;
+    int axis;
+    marks sides, closer; /* `closer`: moved towards each other by ROOM and noise */
+} line;
+
+static bool valid(const line *l, size_t i) {
+    return l->pair->mask[l->first + i * l->stride] != 0;
+}
+
+static double value(const line *l, int which, size_t i) {
+    return vshi_value_at(l->pair, which, l->first + i * l->stride);
+}
+
+/* Length that a line spends between the marks from one texel to the next. */
+static double length_between(marks m, double a, double b) {
+    const double least = fmax(fmin(a, b), m.low), most = fmin(fmax(a, b), m.high);
+    if (a == b) {
+        return a > m.low && a < m.high ? 1.0 : 0.0;
+    }
+    return most > least ? (most - least) / fabs(b - a) : 0.0;
+}
+
+/* Slope along an axis at a texel: a central difference if both neighbours are valid. */
+static double slope(const line *l, int which, size_t i, int axis) {
+    const vshi_pair *pair = l->pair;
+    const size_t at = l->first + i * l->stride, step = pair->stride[axis];
+    size_t place[3];
+    vshi_find_place(pair, at, place);
+    const bool before = place[axis] > 0 && pair->mask[at - step];
+    const bool after = place[axis] + 1 < pair->size[axis] && pair->mask[at + step];
+    if (!before && !after) {
+        return 0.0;
+    }
+    const double low = vshi_value_at(pair, which, before ? at - step : at);
+    const double high = vshi_value_at(pair, which, after ? at + step : at);
+    return (high - low) / (before && after ? 2.0 : 1.0);
+}
+
+/* Measures the edge between texels `begin` and `end`, which are on different sides. */
+static edge measure_edge(const line *l, int which, size_t begin, size_t end) {
+    const marks m = l->sides;
+    const double first = value(l, which, begin), last = value(l, which, end);
+    edge e = {.rises = last > first ? 1 : -1, .near = SIZE_MAX};
+    double width = 0.0, closer = 0.0, lit = 0.0;
+    for (size_t i = begin; i < end; ++i) {
+        const double a = value(l, which, i), b = value(l, which, i + 1);
+        width += length_between(m, a, b);
+        closer += length_between(l->closer, a, b);
+        lit += 0.5 * (fmin(m.high, fmax(m.low, a)) + fmin(m.high, fmax(m.low, b))) - m.low;
+    }
+    const double even =
+        (l->closer.high - l->closer.low) / (m.high - m.low); /* share that is left on an even slope */
+    e.steady = closer >= width * (2.0 * even - 1.0);
+    const double share = lit / (m.high - m.low); /* texels beyond a rising edge */
+    e.at = e.rises > 0 ? (double)end - share : (double)begin + share;
+    double along = 0.0, squares = 0.0, widest = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        double sum = 0.0; /* trapezia along the line, as across it: errors cancel */
+        for (size_t i = begin; i <= end && l->pair->size[axis] > 1; ++i) {
+            sum += (i == begin || i == end ? 0.5 : 1.0) * slope(l, which, i, axis);
+        }
+        along = axis == l->axis ? fabs(sum) : along;
+        squares += sum * sum;
+        widest = fmax(widest, fabs(sum));
+    }
+    e.own = along >= widest;
+    e.width = squares > 0.0 ? width * along / sqrt(squares) : width;
+    return e;
+}
+
+/* -1 dark, 1 light, 0 between. */
+static int side_of(const line *l, double v) {
+    return v <= l->sides.low ? -1 : v >= l->sides.high ? 1 : 0;
+}
+
+static size_t find_edges(const line *l, int which, edge *edges) {
+    size_t count = 0, last = 0;
+    int side = 0; /* of texel `last`; 0: none yet */
+    for (size_t i = 0; i < l->count; ++i) {
+        if (!valid(l, i)) {
+            side = 0;
+            continue;
+        }
+        const int now = side_of(l, value(l, which, i));
+        if (now == 0) {
+            continue;
+        }
+        if (side != 0 && now != side) {
+            edges[count++] = measure_edge(l, which, last, i);
+        }
+        side = now;
+        last = i;
+    }
+    return count;
+}
+
+/* Finds for each edge the nearest of the others that may be the same one. */
+static void find_nearest(edge *edges, size_t count, const edge *others, size_t other_count) {
+    for (size_t i = 0, begin = 0; i < count; ++i) {
+        double best = INFINITY;
+        edges[i].near = SIZE_MAX;
+        while (begin < other_count && others[begin].at < edges[i].at && begin + 1 < other_count &&
+               others[begin + 1].at < edges[i].at) {
+            ++begin;
+        }
+        for (size_t k = begin > 0 ? begin - 1 : 0; k < other_count && k < begin + 4; ++k) {
+            const double off = fabs(others[k].at - edges[i].at);
+            if (others[k].rises == edges[i].rises && off < best &&
+                off <= REACH + fmax(edges[i].width, others[k].width)) {
+                best = off;
+                edges[i].near = k;
+            }
+        }
+    }
+}
+
+typedef struct tally {
+    uint64_t pairs;
+    double width[2]; /* sums over the pairs */
+} tally;
+
+static void add_line(const line *l, edge *golden, edge *fresh, tally *t) {
+    const size_t golden_count = find_edges(l, VSHI_GOLDEN, golden);
+    const size_t fresh_count = find_edges(l, VSHI_NEW, fresh);
+    find_nearest(golden, golden_count, fresh, fresh_count);
+    find_nearest(fresh, fresh_count, golden, golden_count);
+    for (size_t i = 0; i < golden_count; ++i) {
+        const edge *one = &golden[i], *other = one->near != SIZE_MAX ? &fresh[one->near] : NULL;
+        /* near a diagonal the axis may be one edge's own and not the other's */
+        if (other != NULL && other->near == i && (one->own || other->own) && one->steady && other->steady) {
+            ++t->pairs;
+            t->width[VSHI_GOLDEN] += one->width;
+            t->width[VSHI_NEW] += other->width;
+        }
+    }
+}
+
+/* Keeps the OUTLIERS smallest values, the largest of them first. */
+static void keep_smallest(double kept[OUTLIERS], double v) {
+    if (v >= kept[0]) {
+        return;
+    }
+    size_t i = 0;
+    for (; i + 1 < OUTLIERS && kept[i + 1] > v; ++i) {
+        kept[i] = kept[i + 1];
+    }
+    kept[i] = v;
+}
+
+/* Finds the marks; false if there is no shadow. */
+static bool find_sides(const vshi_pair *pair, double noise, line *l) {
+    double dark[OUTLIERS], light[OUTLIERS]; /* light: negated */
+    for (int i = 0; i < OUTLIERS; ++i) {
+        dark[i] = light[i] = INFINITY;
+    }
+    for (size_t i = 0; i < pair->count; ++i) {
+        if (pair->mask[i]) {
+            keep_smallest(dark, vshi_value_at(pair, VSHI_GOLDEN, i));
+            keep_smallest(light, -vshi_value_at(pair, VSHI_GOLDEN, i));
+        }
+    }
+    const double range = -light[0] - dark[0];
+    const double room = fmin(ROOM + VSHI_NOISE_P99 * noise, MOST_ROOM * range);
+    l->sides = (marks){dark[0] + LOW * range, dark[0] + HIGH * range};
+    l->closer = (marks){l->sides.low + room, l->sides.high - room};
+    return range >= LEAST_RANGE; /* -inf if there are too few values */
+}
+
+/* Whether value `i` is the first of a line along the axis, which `l` then is. */
+static bool begins_line(line *l, size_t i) {
+    l->first = i;
+    return i / l->stride % l->count == 0;
+}
+
+static void set_axis(line *l, int axis) {
+    l->axis = axis;
+    l->stride = l->pair->stride[axis];
+    l->count = l->pair->size[axis];
+}
+
+vsh_result vshi_measure_penumbrae(const vshi_pair *pair, double allowed, vsh_measures *m, vsh_error *error) {
+    line l = {.pair = pair};
+    const double noise = m->noise_share >= LEAST_NOISE ? m->noise : 0.0;
+    if (!find_sides(pair, fmax(noise, allowed), &l)) {
+        return VSH_OK;
+    }
+    size_t longest = 1;
+    for (int axis = 0; axis < 3; ++axis) {
+        longest = pair->size[axis] > longest ? pair->size[axis] : longest;
+    }
+    void *memory;
+    VSHI_TRY(vshi_allocate(&memory, 2 * longest, sizeof(edge), "comparison", error));
+    edge *edges = memory;
+    tally t = {.pairs = 0};
+    for (int axis = 0; axis < 3; ++axis) {
+        set_axis(&l, axis);
+        for (size_t i = 0; i < pair->count; ++i) {
+            if (begins_line(&l, i)) {
+                add_line(&l, edges, edges + longest, &t);
+            }
+        }
+    }
+    free(memory);
+    m->pairs = t.pairs;
+    for (int which = 0; which < 2 && t.pairs > 0; ++which) {
+        m->width[which] = t.width[which] / (double)t.pairs;
+    }
+    if (t.pairs >= FEWEST_EDGES) {
+        /* Many texels of a wide penumbra may pass a mark, so noise moves the mean width as far as one edge's.
+         */
+        const double range = (l.sides.high - l.sides.low) / (HIGH - LOW);
+        const double excused = VSHI_NOISE_WIDTH * fmax(0.0, noise - allowed) / range;
+        const double ratio = t.width[VSHI_NEW] / t.width[VSHI_GOLDEN];
+        m->value[VSH_MEASURE_PENUMBRA] = fmax(0.0, fmax(ratio, 1.0 / ratio) - 1.0 - excused);
+    }
+    return VSH_OK;
+}
+
+/* --- widths over golden's penumbrae, whatever the new values are there */
+
+/* Length between the sides, from `begin` to `end`. */
+static double length_of(const line *l, int which, size_t begin, size_t end) {
+    double length = 0.0;
+    for (size_t i = begin; i < end; ++i) {
+        length += length_between(l->sides, value(l, which, i), value(l, which, i + 1));
+    }
+    return length;
+}
+
+/* Adds golden's penumbra between two texels on different sides. The new one may be wider, so the window
+ * reaches as far again to both ends. */
+static void add_width(const line *l, size_t begin, size_t end, double *golden, double *off) {
+    for (size_t reach = end - begin + 1, k = 0; k < reach; ++k) {
+        begin -= begin > 0 && valid(l, begin - 1);
+        end += end + 1 < l->count && valid(l, end + 1);
+    }
+    const double width = length_of(l, VSHI_GOLDEN, begin, end);
+    *golden += width;
+    *off += fabs(length_of(l, VSHI_NEW, begin, end) - width);
+}
+
+static void add_widths_of_line(const line *l, double *golden, double *off) {
+    size_t last = 0;
+    int side = 0; /* of texel `last`; 0: none yet */
+    for (size_t i = 0; i < l->count; ++i) {
+        const double v = valid(l, i) ? value(l, VSHI_GOLDEN, i) : NAN;
+        const int now = side_of(l, v);
+        if (now == 0) {
+            side = isnan(v) ? 0 : side;
+            continue;
+        }
+        if (side != 0 && now != side) {
+            add_width(l, last, i, golden, off);
+        }
+        side = now;
+        last = i;
+    }
+}
+
+void vshi_add_widths(const vshi_pair *pair, double *golden, double *off) {
+    line l = {.pair = pair, .sides = {LOW, HIGH}};
+    for (int axis = 0; axis < 3; ++axis) {
+        set_axis(&l, axis);
+        for (size_t i = 0; i < pair->count; ++i) {
+            if (begins_line(&l, i)) {
+                add_widths_of_line(&l, golden, off);
+            }
+        }
+    }
+}
