@@ -271,22 +271,6 @@ static void add_region(text *t, const vsh_channel_comparison *channel, const vsh
         (channel->failed & others) == 0 ? caster : "", limit);
 }
 
-static void add_shift(text *t, const vsh_channel_comparison *channel) {
-    const vsh_measures *m = &channel->measures;
-    add(t, "shifted by (%.2f, %.2f", m->shift[0], m->shift[1]);
-    if (channel->size[2] > 1) {
-        add(t, ", %.2f", m->shift[2]);
-    }
-    add(t, ") %ss, which explains %.0f %% of the difference (limit %g)", texel(channel), 100.0 * m->explained,
-        channel->limits.value[VSH_MEASURE_SHIFT]);
-}
-
-static void add_penumbra(text *t, const vsh_channel_comparison *channel) {
-    const vsh_measures *m = &channel->measures;
-    add(t, "penumbrae %.3f times as wide, %.2f for %.2f %ss (limit ±%g %%)", m->width[1] / m->width[0],
-        m->width[1], m->width[0], texel(channel), 100.0 * channel->limits.value[VSH_MEASURE_PENUMBRA]);
-}
-
 static void add_failure(text *t, const vsh_channel_comparison *channel, int measure) {
     const vsh_measures *m = &channel->measures;
     const double limit = channel->limits.value[measure];
@@ -301,10 +285,14 @@ static void add_failure(text *t, const vsh_channel_comparison *channel, int meas
         add_region(t, channel, &m->gained, limit, ": a new caster?");
         break;
     case VSH_MEASURE_SHIFT:
-        add_shift(t, channel);
+        add(t, "shifted by (%.2f, %.2f", m->shift[0], m->shift[1]);
+        add(t, channel->size[2] > 1 ? ", %.2f)" : ")", m->shift[2]);
+        add(t, " %ss, which explains %.0f %% of the difference (limit %g)", texel(channel),
+            100.0 * m->explained, limit);
         break;
     case VSH_MEASURE_PENUMBRA:
-        add_penumbra(t, channel);
+        add(t, "penumbrae %.3f times as wide, %.2f for %.2f %ss (limit ±%g %%)", m->width[1] / m->width[0],
+            m->width[1], m->width[0], texel(channel), 100.0 * limit);
         break;
     default:
         add(t, "%s %.3g (limit %g)", vsh_measure_name(measure), m->value[measure], limit);

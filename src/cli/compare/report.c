@@ -13,24 +13,21 @@ static json_t *number(double value) {
     return isfinite(value) ? json_real(value) : json_null();
 }
 
+static json_t *corner(const vsh_channel_comparison *c, const int32_t place[3]) {
+    return json_pack("[i,i,i]", place[0] + c->origin[0], place[1] + c->origin[1], place[2] + c->origin[2]);
+}
+
 static json_t *place(const vsh_channel_comparison *channel, uint64_t index) {
     const uint64_t width = (uint64_t)channel->size[0], height = (uint64_t)channel->size[1];
-    const json_int_t x = (json_int_t)(index % width), y = (json_int_t)(index / width % height);
-    const json_int_t z = (json_int_t)(index / width / height);
-    return json_pack("[I,I,I]", x + channel->origin[0], y + channel->origin[1], z + channel->origin[2]);
+    return corner(channel, (const int32_t[3]){(int32_t)(index % width), (int32_t)(index / width % height),
+                                              (int32_t)(index / width / height)});
 }
 
 static json_t *region(const vsh_channel_comparison *channel, const vsh_region *r) {
-    if (r->count == 0) {
-        return json_null();
-    }
-    json_t *min = json_array(), *max = json_array();
-    for (int axis = 0; axis < 3; ++axis) {
-        json_array_append_new(min, json_integer(r->min[axis] + channel->origin[axis]));
-        json_array_append_new(max, json_integer(r->max[axis] + channel->origin[axis]));
-    }
-    return json_pack("{s:I,s:o,s:f,s:o,s:o}", "texels", (json_int_t)r->count, "worst",
-                     place(channel, r->worst), "by", r->by, "min", min, "max", max);
+    return r->count == 0 ? json_null()
+                         : json_pack("{s:I,s:o,s:f,s:o,s:o}", "texels", (json_int_t)r->count, "worst",
+                                     place(channel, r->worst), "by", r->by, "min", corner(channel, r->min),
+                                     "max", corner(channel, r->max));
 }
 
 static json_t *nonfinite(const vsh_channel_comparison *channel, int which) {
@@ -39,7 +36,14 @@ static json_t *nonfinite(const vsh_channel_comparison *channel, int which) {
                      m->nonfinite[which] > 0 ? place(channel, m->nonfinite_first[which]) : json_null());
 }
 
-static void set_measures(json_t *root, const vsh_channel_comparison *channel) {
+static json_t *curve(const vsh_measures *m) {
+    const double(*c)[2] = m->curve;
+    return c[2][0] > 0.0
+               ? json_pack("[[f,f],[f,f],[f,f]]", c[0][0], c[0][1], c[1][0], c[1][1], c[2][0], c[2][1])
+               : json_null();
+}
+
+static json_t *measures(const vsh_channel_comparison *channel) {
     const vsh_measures *m = &channel->measures;
     json_t *values = json_object(), *limits = json_object(), *failed = json_array();
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
@@ -50,54 +54,45 @@ static void set_measures(json_t *root, const vsh_channel_comparison *channel) {
             json_array_append_new(failed, json_string(name));
         }
     }
-    json_object_set_new(root, "compared", json_integer((json_int_t)m->count));
-    json_object_set_new(root, "range", number(m->range));
-    json_object_set_new(root, "max_error",
-                        json_pack("[o,o]", number(channel->max_error[0]), number(channel->max_error[1])));
-    json_object_set_new(root, "noise", number(channel->limits.options.noise));
-    json_object_set_new(root, "failed", failed);
-    json_object_set_new(root, "measures", values);
-    json_object_set_new(root, "limits", limits);
-    json_object_set_new(root, "golden_nonfinite", nonfinite(channel, 0));
-    json_object_set_new(root, "new_nonfinite", nonfinite(channel, 1));
-    if (m->count == 0) {
-        return;
-    }
-    json_object_set_new(root, "worst",
-                        json_pack("{s:o,s:o,s:o}", "at", place(channel, m->worst), "golden",
-                                  number(m->worst_value[0]), "new", number(m->worst_value[1])));
-    json_object_set_new(root, "edges", json_integer((json_int_t)m->pairs));
-    json_object_set_new(root, "penumbra_width",
-                        json_pack("{s:o,s:o}", "golden", number(m->width[0]), "new", number(m->width[1])));
-    json_object_set_new(root, "shift", json_pack("[f,f,f]", m->shift[0], m->shift[1], m->shift[2]));
-    json_object_set_new(root, "shift_explains", number(m->explained));
-    json_object_set_new(root, "measured_noise", number(m->noise));
-    json_object_set_new(root, "noise_explains", number(m->noise_share));
-    json_object_set_new(root, "curve",
-                        m->curve[2][0] > 0.0
-                            ? json_pack("[[f,f],[f,f],[f,f]]", m->curve[0][0], m->curve[0][1], m->curve[1][0],
-                                        m->curve[1][1], m->curve[2][0], m->curve[2][1])
-                            : json_null());
-    json_object_set_new(root, "lost", region(channel, &m->lost));
-    json_object_set_new(root, "gained", region(channel, &m->gained));
+    return json_pack("{s:I,s:f,s:[o,o],s:f,s:o,s:o,s:o,s:o,s:o}", "compared", (json_int_t)m->count, "range",
+                     m->range, "max_error", number(channel->max_error[0]), number(channel->max_error[1]),
+                     "noise", channel->limits.options.noise, "failed", failed, "measures", values, "limits",
+                     limits, "golden_nonfinite", nonfinite(channel, 0), "new_nonfinite",
+                     nonfinite(channel, 1));
 }
 
-static json_t *coverage(const vsh_channel_comparison *channel) {
-    const vsh_coverage *c = &channel->coverage;
-    return json_pack("{s:I,s:I,s:I,s:f,s:f}", "golden", (json_int_t)c->golden, "new", (json_int_t)c->values,
-                     "differs", (json_int_t)c->differs, "share", c->share, "limit", channel->coverage_limit);
+static json_t *details(const vsh_channel_comparison *channel) {
+    const vsh_measures *m = &channel->measures;
+    return json_pack("{s:{s:o,s:f,s:f},s:I,s:{s:o,s:o},s:[f,f,f],s:f,s:f,s:f,s:o,s:o,s:o}", "worst", "at",
+                     place(channel, m->worst), "golden", m->worst_value[0], "new", m->worst_value[1], "edges",
+                     (json_int_t)m->pairs, "penumbra_width", "golden", number(m->width[0]), "new",
+                     number(m->width[1]), "shift", m->shift[0], m->shift[1], m->shift[2], "shift_explains",
+                     m->explained, "measured_noise", m->noise, "noise_explains", m->noise_share, "curve",
+                     curve(m), "lost", region(channel, &m->lost), "gained", region(channel, &m->gained));
+}
+
+/* Adds the keys of `more`, and drops it. */
+static void merge(json_t *root, json_t *more) {
+    json_object_update(root, more);
+    json_decref(more);
 }
 
 static json_t *describe(const vsh_channel_comparison *channel) {
     char what[CLI_EXPLANATION];
+    const vsh_coverage *c = &channel->coverage;
     cli_channel_explain(channel, what);
     json_t *root = json_pack("{s:o,s:b,s:o}", "name", cli_utf8_json(channel->name), "alike", channel->alike,
                              "what", cli_utf8_json(what));
-    if (root != NULL && (channel->is_coverage || channel->coverage.golden + channel->coverage.values > 0)) {
-        json_object_set_new(root, "coverage", coverage(channel));
+    if (channel->is_coverage || c->golden + c->values > 0) {
+        merge(root, json_pack("{s:{s:I,s:I,s:I,s:f,s:f}}", "coverage", "golden", (json_int_t)c->golden, "new",
+                              (json_int_t)c->values, "differs", (json_int_t)c->differs, "share", c->share,
+                              "limit", channel->coverage_limit));
     }
-    if (root != NULL && !channel->is_coverage) {
-        set_measures(root, channel);
+    if (!channel->is_coverage) {
+        merge(root, measures(channel));
+    }
+    if (channel->measures.count > 0) {
+        merge(root, details(channel));
     }
     return root;
 }
@@ -122,9 +117,9 @@ json_t *cli_comparison_json(const cli_comparison *c) {
 
 /* --- pictures: golden, new and difference, for the page */
 
-enum { LONGEST = 512 }; /* texels along a side of a picture: larger ones are shrunk */
+enum { LONGEST = 512 }; /* texels along a side of a picture: larger planes are shrunk */
 
-static const float nothing[3] = {0.83f, 0.86f, 0.90f}; /* what is not compared: no shade of grey */
+static const float nothing[3] = {0.83f, 0.86f, 0.90f}; /* texels that are not compared: no shade of grey */
 
 /* A slice of the planes, and how it is shrunk. */
 typedef struct view {
@@ -132,7 +127,7 @@ typedef struct view {
     size_t first;          /* of the slice */
     int32_t width, height; /* of the picture */
     double least, most;    /* of golden values: black and white */
-    double full;           /* difference that is all red, or all blue */
+    double full;           /* difference drawn in full red or blue */
 } view;
 
 static bool shown(const view *v, size_t at) {
@@ -142,7 +137,7 @@ static bool shown(const view *v, size_t at) {
 
 enum { GOLDEN, FRESH, DIFFERENCE, PICTURES };
 
-/* Mean of the values that a pixel shows; of differences the largest, so that none is lost by shrinking. */
+/* Finds the mean of the values in a pixel, and of differences the largest, so that shrinking hides none. */
 static bool find_value(const view *v, int what, int32_t px, int32_t py, double *value) {
     const vsh_compared *c = v->compared;
     const size_t w = (size_t)c->size[0], h = (size_t)c->size[1];
@@ -168,7 +163,7 @@ static float between(double value) {
     return (float)fmin(1.0, fmax(0.0, value));
 }
 
-/* Grey, or white where there is no difference, red where new is lighter, blue where it is darker. */
+/* Colours values grey. Differences are white at 0, red if new is lighter, blue if it is darker. */
 static void colour(const view *v, int what, double value, float rgb[3]) {
     if (what != DIFFERENCE) {
         rgb[0] = rgb[1] = rgb[2] = between((value - v->least) / (v->most - v->least));
@@ -202,9 +197,10 @@ static int write_picture(FILE *out, const char *page, const view *v, int what) {
     return code;
 }
 
-/* The scale of greys, from 0 to 1 where that is what there is; and of differences, up to a round number. */
+/* Greys go from 0 to 1, or as far as golden does. Differences are scaled to the 99th percentile. */
 static void set_scales(view *v, const vsh_channel_comparison *channel) {
     const vsh_compared *c = v->compared;
+    const vsh_measures *m = &channel->measures;
     const size_t count = (size_t)c->size[0] * (size_t)c->size[1] * (size_t)c->size[2];
     v->least = 0.0;
     v->most = 1.0;
@@ -214,28 +210,7 @@ static void set_scales(view *v, const vsh_channel_comparison *channel) {
             v->most = fmax(v->most, (double)c->golden[i]);
         }
     }
-    /* at the 99th percentile, but no less than what is a hundredth of the range */
-    const vsh_measures *m = &channel->measures;
-    const double wanted = m->count > 0 ? m->range * fmax(0.01, m->value[VSH_MEASURE_P99]) : 1.0;
-    const double power = pow(10.0, floor(log10(wanted)));
-    v->full = wanted <= power         ? power
-              : wanted <= 2.0 * power ? 2.0 * power
-              : wanted <= 5.0 * power ? 5.0 * power
-                                      : 10.0 * power;
-}
-
-static void write_scale(FILE *out, const view *v, int what) {
-    if (what == DIFFERENCE) {
-        fprintf(out,
-                "<div class=\"scale\" style=\"background:linear-gradient(90deg,#00f,#fff,#f00)\"></div><div "
-                "class=\"ends\"><span>−%g, darker</span><span>0</span><span>lighter, +%g</span></div>",
-                v->full, v->full);
-    } else {
-        fprintf(out,
-                "<div class=\"scale\" style=\"background:linear-gradient(90deg,#000,#fff)\"></div><div "
-                "class=\"ends\"><span>%g</span><span>%g</span></div>",
-                v->least, v->most);
-    }
+    v->full = m->count > 0 ? m->range * fmax(0.01, m->value[VSH_MEASURE_P99]) : 1.0;
 }
 
 char *cli_comparison_pictures(const char *page, const vsh_channel_comparison *channel,
@@ -257,7 +232,7 @@ char *cli_comparison_pictures(const char *page, const vsh_channel_comparison *ch
         return NULL;
     }
     if (compared->size[2] > 1) {
-        fprintf(out, "<p>The slice of z = %d, where the difference is largest.</p>\n",
+        fprintf(out, "<p>The slice at z = %d has the largest difference.</p>\n",
                 (int32_t)slice + channel->origin[2]);
     }
     fputs("<div class=\"three\">\n", out);
@@ -265,11 +240,12 @@ char *cli_comparison_pictures(const char *page, const vsh_channel_comparison *ch
     for (int i = 0; i < PICTURES && code == CLI_OK; ++i) {
         fprintf(out, "<figure><img alt=\"%s\" src=\"data:image/png;base64,", what[i]);
         code = write_picture(out, page, &v, i);
-        fprintf(out, "\"><figcaption>%s", what[i]);
+        fprintf(out, "\"><figcaption>%s, ", what[i]);
         if (i == DIFFERENCE) {
-            fprintf(out, ", %.3g times", 1.0 / v.full);
+            fprintf(out, "red: lighter, blue: darker, full at ±%.2g", v.full);
+        } else {
+            fprintf(out, "black: %g, white: %g", v.least, v.most);
         }
-        write_scale(out, &v, i);
         fputs("</figcaption></figure>\n", out);
     }
     fputs("</div>\n", out);
@@ -295,7 +271,7 @@ static const char *name_of(const cli_comparison *c) {
 
 /* --- JUnit (the schema of Ant's and Jenkins' reports) */
 
-/* A test of the files, and one of each channel. */
+/* Counts a test for the files, and one for each channel. */
 static size_t count_tests(const cli_comparison *c, size_t *failures) {
     const vsh_channel_comparison *channel;
     size_t tests = 1;
@@ -364,8 +340,6 @@ static const char head[] =
     ".three{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,280px),1fr));gap:1em}\n"
     "figure{margin:0;font-size:13px}img{image-rendering:pixelated;outline:1px solid "
     "#ddd;width:100%;height:auto}\n"
-    ".scale{height:10px;margin:.3em 0 0}.ends{display:flex;justify-content:space-between;"
-    "font-variant-numeric:tabular-nums}\n"
     ".wide{overflow-x:auto}table{border-collapse:collapse;font-size:13px;margin:1em 0}"
     "th,td{padding:.25em .7em;text-align:right;border-bottom:1px solid #e4e4e4;white-space:nowrap;"
     "font-variant-numeric:tabular-nums}\n"
@@ -458,7 +432,7 @@ static void write_page(FILE *out, const void *user) {
     }
     fprintf(
         out,
-        "<p>Grey-blue is not compared. What the measures are stands in docs/regression.md. Made by vdbshade "
+        "<p>Grey-blue texels are not compared. docs/regression.md explains the measures. Made by vdbshade "
         "%s.</p>\n</html>\n",
         vsh_version());
 }

@@ -1,10 +1,13 @@
-/* What there is to bake in a folder: its scenes, and what its regress.json says of them. */
+/* Finds the cases of a folder: its scenes, and those of its regress.json, whose options are checked. The
+ * folder may be a stranger's that a CI runs as it came. So only the command line of `regress` itself may ask
+ * to write files, or to parse them unconfined. */
 #define _GNU_SOURCE /* asprintf */
 #include "base/input.h"
 #include "cli/commands.h"
 #include "cli/message.h"
 #include "cli/paths.h"
-#include "regress.h"
+#include "cli/regress/regress.h"
+#include "cli/try.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -14,13 +17,13 @@
 #include <unistd.h>
 #include <vdbshade/flat.h>
 
-static const char list_name[] = "regress.json";
+static const char list_name[] = "regress.json", tolerance_ending[] = ".tolerance.json";
 
-/* Of a list of cases or what a cache keeps, which strangers may have made: as JSON a hundred times that. */
+/* Sizes of files that strangers may have made; parsed JSON takes a hundred times as much. */
 enum { MOST_BYTES = 4 << 20, MOST_SCENE = 64 << 20 };
 
-bool regress_lines_add(regress_lines *lines, const char *format, ...) {
-    char **more = realloc(lines->line, (lines->count + 1) * sizeof *more);
+bool regress_add_line(regress_lines *lines, const char *format, ...) {
+    char **more = realloc(lines->line, (lines->count + 2) * sizeof *more);
     if (more == NULL) {
         return false;
     }
@@ -30,10 +33,11 @@ bool regress_lines_add(regress_lines *lines, const char *format, ...) {
     const int length = vasprintf(&more[lines->count], format, arguments);
     va_end(arguments);
     lines->count += length >= 0;
+    more[lines->count] = NULL;
     return length >= 0;
 }
 
-void regress_lines_free(regress_lines *lines) {
+void regress_free_lines(regress_lines *lines) {
     for (size_t i = 0; i < lines->count; ++i) {
         free(lines->line[i]);
     }
@@ -51,9 +55,9 @@ void regress_free_case(regress_case *one) {
         cli_comparison_free(&one->comparisons[i]);
     }
     free(one->comparisons);
-    regress_lines_free(&one->options);
-    regress_lines_free(&one->outputs);
-    regress_lines_free(&one->inputs);
+    regress_free_lines(&one->options);
+    regress_free_lines(&one->outputs);
+    regress_free_lines(&one->inputs);
     free(one->changed);
     free(one->reason);
     free(one->output);
@@ -62,27 +66,35 @@ void regress_free_case(regress_case *one) {
     memset(one, 0, sizeof *one);
 }
 
-static int no_memory(const regress_work *work) {
-    return cli_out_of_memory(work->folder);
+void regress_mark_failed(regress_case *one, int code) {
+    one->status = REGRESS_FAILED;
+    one->code = code;
+    free(one->reason);
+    one->reason = cli_last_message()[0] != '\0' ? strdup(cli_last_message()) : NULL;
 }
 
-static regress_case *add_case(regress_work *work) {
+int regress_fail_alone(regress_case *one, int code) {
+    if (code != CLI_USAGE && code != CLI_FILE) {
+        return code;
+    }
+    regress_mark_failed(one, code);
+    return CLI_OK;
+}
+
+static int add_case(regress_work *work, const char *scene, const char *name, size_t name_length) {
     regress_case *more = realloc(work->cases, (work->case_count + 1) * sizeof *more);
     if (more == NULL) {
-        return NULL;
+        return cli_out_of_memory(work->folder);
     }
     work->cases = more;
     regress_case *one = &more[work->case_count++];
     memset(one, 0, sizeof *one);
-    return one;
+    one->scene = strdup(scene);
+    one->name = strndup(name, name_length);
+    return one->scene != NULL && one->name != NULL ? CLI_OK : cli_out_of_memory(work->folder);
 }
 
-static const char *last_part(const char *path) {
-    const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
-}
-
-/* --- what a scene writes */
+/* --- outputs of scenes */
 
 static json_t *load(const char *path, uint64_t most) {
     FILE *file;
@@ -99,13 +111,12 @@ json_t *regress_load(const char *path) {
     return load(path, MOST_BYTES);
 }
 
-/* Scenes for 2D have a region, and a command of their own. Read as a scene first, which finds the memory
- * limit passed before any of it is taken. */
-static int find_command(const regress_work *work, regress_case *one, const char *path) {
-    const vsh_run run = cli_common_run(&work->settings->compare.common);
+/* Finds out whether a scene is for `flat`: those have a region. Reads it as a scene first, because that
+ * checks the memory limit before taking any. */
+static int find_command(const char *path, const vsh_run *run, regress_case *one) {
     vsh_error error;
     vsh_flat_scene *scene = NULL;
-    bool flat = vsh_flat_scene_read(path, &run, &scene, &error) == VSH_OK;
+    bool flat = vsh_flat_scene_read(path, run, &scene, &error) == VSH_OK;
     vsh_flat_scene_free(scene);
     if (!flat && error.code == VSH_ERROR_LIMIT) {
         return cli_fail(&error);
@@ -119,156 +130,147 @@ static int find_command(const regress_work *work, regress_case *one, const char 
     return CLI_OK;
 }
 
-static int list_scene_outputs(const regress_work *work, regress_case *one, const char *path) {
-    const vsh_run run = cli_common_run(&work->settings->compare.common);
+static bool add_output(regress_case *one, const char *path) {
+    const char *slash = strrchr(path, '/');
+    return regress_add_line(&one->outputs, "%s", slash != NULL ? slash + 1 : path);
+}
+
+static int list_scene_outputs(const char *path, const vsh_run *run, regress_case *one) {
     vsh_error error;
-    vsh_scene *scene = NULL;
-    if (vsh_scene_read(path, &run, &scene, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
     bool good = true;
-    for (size_t i = 0; i < scene->receiver_count && good; ++i) {
-        good = regress_lines_add(&one->outputs, "%s", last_part(scene->receivers[i].output));
-    }
-    vsh_scene_free(scene);
-    return good ? CLI_OK : no_memory(work);
-}
-
-static int list_flat_output(const regress_work *work, regress_case *one, const char *path) {
-    const vsh_run run = cli_common_run(&work->settings->compare.common);
-    vsh_error error;
-    vsh_flat_scene *scene = NULL;
-    if (vsh_flat_scene_read(path, &run, &scene, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
-    if (scene->output != NULL) {
-        one->output = strdup(last_part(scene->output));
-        if (one->output == NULL || !regress_lines_add(&one->outputs, "%s", one->output)) {
-            vsh_flat_scene_free(scene);
-            return no_memory(work);
+    if (one->command == &cli_bake) {
+        vsh_scene *scene = NULL;
+        if (vsh_scene_read(path, run, &scene, &error) != VSH_OK) {
+            return cli_fail(&error);
         }
+        for (size_t i = 0; i < scene->receiver_count && good; ++i) {
+            good = add_output(one, scene->receivers[i].output);
+        }
+        vsh_scene_free(scene);
+    } else if (one->command == &cli_flat) {
+        vsh_flat_scene *scene = NULL;
+        if (vsh_flat_scene_read(path, run, &scene, &error) != VSH_OK) {
+            return cli_fail(&error);
+        }
+        if (scene->output != NULL) {
+            good = add_output(one, scene->output);
+            one->output = good ? strdup(one->outputs.line[0]) : NULL;
+            good = one->output != NULL;
+        }
+        vsh_flat_scene_free(scene);
     }
-    vsh_flat_scene_free(scene);
-    return CLI_OK;
+    return good ? CLI_OK : cli_out_of_memory(path);
 }
 
-/* After scene, command and -o are known. */
+/* Completes command and outputs. */
 static int list_outputs(const regress_work *work, regress_case *one) {
+    const vsh_run run = cli_common_run(&work->settings->compare.common);
     char *path = regress_path(work->folder, one->scene);
     if (path == NULL) {
-        return no_memory(work);
+        return cli_out_of_memory(work->folder);
     }
-    int code = one->command == NULL ? find_command(work, one, path) : CLI_OK;
-    if (code != CLI_OK) {
-        free(path);
-        return code;
+    int code = CLI_OK;
+    if (one->command == NULL) {
+        CLI_TRY_DONE(find_command(path, &run, one));
     }
     if (one->output != NULL) {
-        code = regress_lines_add(&one->outputs, "%s", one->output) ? CLI_OK : no_memory(work);
-    } else if (one->command == &cli_bake) {
-        code = list_scene_outputs(work, one, path);
-    } else if (one->command == &cli_flat) {
-        code = list_flat_output(work, one, path);
+        code = add_output(one, one->output) ? CLI_OK : cli_out_of_memory(work->folder);
+    } else {
+        code = list_scene_outputs(path, &run, one);
     }
     if (code == CLI_OK && one->outputs.count == 0) {
         code = cli_usage("%s: nothing says what '%s' writes; give it an \"output\" in %s", path, one->name,
                          list_name);
     }
+done:
     free(path);
     return code;
 }
 
 /* --- regress.json */
 
-static const cli_command *const commands[] = {&cli_bake, &cli_volume, &cli_flat, &cli_voxelize};
-
-static int bad_list(const regress_work *work, size_t i, const char *what) {
+static int bad_case(const regress_work *work, size_t i, const char *what) {
     return cli_usage("%s/%s: cases[%zu]: %s", work->folder, list_name, i, what);
 }
 
-static int read_options(const regress_work *work, const json_t *options, size_t i, regress_case *one) {
-    size_t k;
-    json_t *word;
-    if (options != NULL && !json_is_array(options)) {
-        return bad_list(work, i, "options: expected an array of strings");
-    }
-    json_array_foreach(options, k, word) {
-        if (!json_is_string(word)) {
-            return bad_list(work, i, "options: expected an array of strings");
+static int check_keys(const regress_work *work, json_t *json, size_t i) {
+    static const char *const keys[] = {"name", "scene", "command", "options", "output"};
+    enum { KEYS = sizeof keys / sizeof keys[0] };
+    const char *key;
+    json_t *value;
+    json_object_foreach(json, key, value) {
+        bool known = false;
+        for (size_t k = 0; k < KEYS; ++k) {
+            known = known || strcmp(keys[k], key) == 0;
         }
-        if (!regress_lines_add(&one->options, "%s", json_string_value(word))) {
-            return no_memory(work);
+        if (!known) {
+            char text[160];
+            const char *near = cli_nearest(key, keys, KEYS);
+            snprintf(text, sizeof text,
+                     near != NULL ? "%.60s: unknown key; did you mean \"%s\"?" : "%.60s: unknown key", key,
+                     near);
+            return bad_case(work, i, text);
+        }
+        if (strcmp(key, "options") != 0 && (!json_is_string(value) || json_string_length(value) == 0)) {
+            return bad_case(work, i, "name, scene, command and output are strings, not empty");
         }
     }
     return CLI_OK;
 }
 
+static int read_options(const regress_work *work, const json_t *options, size_t i, regress_case *one) {
+    size_t k;
+    json_t *word;
+    bool strings = options == NULL || json_is_array(options), good = true;
+    json_array_foreach(options, k, word) {
+        strings = strings && json_is_string(word);
+        good = good && (!strings || regress_add_line(&one->options, "%s", json_string_value(word)));
+    }
+    if (!strings) {
+        return bad_case(work, i, "options: expected an array of strings");
+    }
+    return good ? CLI_OK : cli_out_of_memory(work->folder);
+}
+
 static int read_case(regress_work *work, json_t *json, size_t i) {
-    static const char *const keys[] = {"name", "scene", "command", "options", "output"};
-    const char *key;
-    json_t *value;
+    static const cli_command *const commands[] = {&cli_bake, &cli_volume, &cli_flat, &cli_voxelize};
     if (!json_is_object(json)) {
-        return bad_list(work, i, "expected an object");
+        return bad_case(work, i, "expected an object");
     }
-    json_object_foreach(json, key, value) {
-        bool known = false;
-        for (size_t k = 0; k < sizeof keys / sizeof keys[0]; ++k) {
-            known = known || strcmp(keys[k], key) == 0;
-        }
-        if (!known) {
-            char text[160];
-            const char *near = cli_nearest(key, keys, sizeof keys / sizeof keys[0]);
-            snprintf(text, sizeof text,
-                     near != NULL ? "%.60s: unknown key; did you mean \"%s\"?" : "%.60s: unknown key", key,
-                     near);
-            return bad_list(work, i, text);
-        }
-        if (strcmp(key, "options") != 0 && (!json_is_string(value) || json_string_length(value) == 0)) {
-            return bad_list(work, i, "name, scene, command and output are strings, not empty");
-        }
-    }
+    CLI_TRY(check_keys(work, json, i));
     const char *scene = json_string_value(json_object_get(json, "scene"));
     const char *name = json_string_value(json_object_get(json, "name"));
     const char *output = json_string_value(json_object_get(json, "output"));
     const char *command = json_string_value(json_object_get(json, "command"));
     if (scene == NULL) {
-        return bad_list(work, i, "key \"scene\" is missing");
+        return bad_case(work, i, "key \"scene\" is missing");
     }
     if (output != NULL &&
         (strchr(output, '/') != NULL || strcmp(output, ".") == 0 || strcmp(output, "..") == 0)) {
-        return bad_list(work, i, "output: a name without a folder is expected");
+        return bad_case(work, i, "output: a name without a folder is expected");
     }
-    regress_case *one = add_case(work);
-    if (one == NULL) {
-        return no_memory(work);
-    }
-    one->scene = strdup(scene);
-    one->name = name != NULL ? strdup(name) : strndup(scene, strcspn(scene, "."));
+    CLI_TRY(name != NULL ? add_case(work, scene, name, strlen(name))
+                         : add_case(work, scene, scene, strcspn(scene, ".")));
+    regress_case *one = &work->cases[work->case_count - 1];
     one->output = output != NULL ? strdup(output) : NULL;
-    if (one->scene == NULL || one->name == NULL || (output != NULL && one->output == NULL)) {
-        return no_memory(work);
+    if (output != NULL && one->output == NULL) {
+        return cli_out_of_memory(work->folder);
     }
     for (size_t k = 0; command != NULL && k < sizeof commands / sizeof commands[0]; ++k) {
         one->command = strcmp(commands[k]->name, command) == 0 ? commands[k] : one->command;
     }
     if (command != NULL && one->command == NULL) {
-        return bad_list(work, i, "command: expected bake, volume, flat or voxelize");
+        return bad_case(work, i, "command: expected bake, volume, flat or voxelize");
     }
     return read_options(work, json_object_get(json, "options"), i, one);
 }
 
-static int read_list(regress_work *work) {
-    char *path = regress_path(work->folder, list_name);
-    if (path == NULL) {
-        return no_memory(work);
-    }
+static int read_list(regress_work *work, const char *path) {
     FILE *file;
     uint64_t size;
     vsh_error error;
     if (vshi_input_open(path, path, MOST_BYTES, &file, &size, &error) != VSH_OK) {
-        const int failed = access(path, F_OK) != 0 && errno == ENOENT ? CLI_OK : cli_fail(&error);
-        free(path);
-        return failed;
+        return access(path, F_OK) != 0 && errno == ENOENT ? CLI_OK : cli_fail(&error);
     }
     int code = CLI_OK;
     json_error_t where;
@@ -284,19 +286,57 @@ static int read_list(regress_work *work) {
         code = read_case(work, json_array_get(cases, i), i);
     }
     json_decref(root);
-    free(path);
     return code;
+}
+
+/* --- options of regress.json */
+
+/* Options of all commands that change values, besides settings, which all do. Others are refused. Add a new
+ * option here if it writes nothing. */
+static const char *const changes_values[] = {
+    "receive",      "no-receive", "no-cast",        "one-sided", "sun",    "sun-angle",  "lights",
+    "light-radius", "caster",     "treat",          "half",      "band",   "box",        "like",
+    "inside",       "name",       "box-voxel-size", "density",   "height", "size-world", "floor"};
+
+static bool is_allowed(const char *option) {
+    const vsh_setting *setting;
+    for (size_t i = 0; (setting = cli_setting(i)) != NULL; ++i) {
+        if (strcmp(setting->option, option) == 0) {
+            return true;
+        }
+    }
+    for (size_t i = 0; i < sizeof changes_values / sizeof changes_values[0]; ++i) {
+        if (strcmp(changes_values[i], option) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static int check_options(const regress_work *work, const regress_case *one) {
+    for (size_t i = 0; i < one->options.count; ++i) {
+        const char *word = one->options.line[i];
+        cli_option option; /* of a word "--NAME" or "--NAME=VALUE" */
+        const bool found = strncmp(word, "--", 2) == 0 &&
+                           cli_find_option(one->command, word + 2, strcspn(word + 2, "="), &option);
+        if (!found || !is_allowed(option.name)) {
+            return cli_usage(
+                "%s/%s: case '%s': option '%s' of '%s' may not be in this file, because it does not change "
+                "values; give --sandbox, --threads and --memory-limit to 'vdbshade regress' itself",
+                work->folder, list_name, one->name, word, one->command->name);
+        }
+        i += option.value != NULL && strchr(word, '=') == NULL; /* skip its value */
+    }
+    return CLI_OK;
 }
 
 /* --- the folder's other scenes */
 
 static int is_scene(const struct dirent *entry) {
     const char *name = entry->d_name;
-    const size_t length = strlen(name);
-    static const char tolerance[] = ".tolerance.json";
-    const bool tolerances =
-        length >= sizeof tolerance - 1 && strcmp(name + length - (sizeof tolerance - 1), tolerance) == 0;
-    return name[0] != '.' && cli_has_ending(name, "json") && !tolerances && strcmp(name, list_name) != 0;
+    const size_t length = strlen(name), tolerance = sizeof tolerance_ending - 1;
+    return name[0] != '.' && cli_has_ending(name, "json") && strcmp(name, list_name) != 0 &&
+           (length < tolerance || strcmp(name + length - tolerance, tolerance_ending) != 0);
 }
 
 static bool is_listed(const regress_work *work, size_t listed, const char *scene) {
@@ -320,13 +360,7 @@ static int add_scenes(regress_work *work) {
     for (int i = 0; i < count; ++i) {
         const char *scene = entries[i]->d_name;
         if (code == CLI_OK && !is_listed(work, listed, scene)) {
-            regress_case *one = add_case(work);
-            code = one != NULL ? CLI_OK : no_memory(work);
-            if (one != NULL) {
-                one->scene = strdup(scene);
-                one->name = strndup(scene, strlen(scene) - strlen(".json"));
-                code = one->scene != NULL && one->name != NULL ? CLI_OK : no_memory(work);
-            }
+            code = add_case(work, scene, scene, strlen(scene) - strlen(".json"));
         }
         free(entries[i]);
     }
@@ -334,14 +368,7 @@ static int add_scenes(regress_work *work) {
     return code;
 }
 
-/* --- all of them */
-
-static int check_options(const regress_work *work, const regress_case *one) {
-    char *list = regress_path(work->folder, list_name);
-    const int code = list != NULL ? regress_check_options(one, list) : no_memory(work);
-    free(list);
-    return code;
-}
+/* --- all cases */
 
 static int check_unique(const regress_work *work) {
     for (size_t i = 0; i < work->case_count; ++i) {
@@ -365,49 +392,40 @@ static int check_unique(const regress_work *work) {
     return CLI_OK;
 }
 
-void regress_mark_failed(regress_case *one, int code) {
-    one->status = REGRESS_FAILED;
-    one->code = code;
-    free(one->reason);
-    one->reason = cli_last_message()[0] != '\0' ? strdup(cli_last_message()) : NULL;
-}
-
-int regress_failed(regress_case *one, int code) {
-    if (code != CLI_USAGE && code != CLI_FILE) {
-        return code;
+static int complete_case(const regress_work *work, regress_case *one) {
+    CLI_TRY(regress_fail_alone(one, list_outputs(work, one)));
+    CLI_TRY(one->options.count > 0 ? check_options(work, one) : CLI_OK);
+    bool good = true;
+    if (one->status == REGRESS_FAILED) { /* reported under the scene's own name */
+        regress_free_lines(&one->outputs);
+        good = regress_add_line(&one->outputs, "%s", one->scene);
     }
-    regress_mark_failed(one, code);
-    return CLI_OK;
+    one->comparisons = good ? calloc(one->outputs.count, sizeof *one->comparisons) : NULL;
+    return one->comparisons != NULL ? CLI_OK : cli_out_of_memory(work->folder);
 }
 
 int regress_find_cases(regress_work *work) {
-    int code = read_list(work);
-    code = code == CLI_OK ? add_scenes(work) : code;
+    char *list = regress_path(work->folder, list_name);
+    int code = list != NULL ? read_list(work, list) : cli_out_of_memory(work->folder);
+    free(list);
+    CLI_TRY(code);
+    CLI_TRY(add_scenes(work));
     const char *only = work->settings->only;
     size_t kept = 0;
     for (size_t i = 0; i < work->case_count; ++i) {
-        regress_case *one = &work->cases[i];
-        if (code == CLI_OK && only != NULL && strstr(one->name, only) == NULL) {
-            regress_free_case(one);
-            continue;
-        }
-        work->cases[kept] = *one;
-        one = &work->cases[kept++];
-        code = code == CLI_OK ? regress_failed(one, list_outputs(work, one)) : code;
-        code = code == CLI_OK && one->options.count > 0 ? check_options(work, one) : code;
-        if (code == CLI_OK && one->status == REGRESS_FAILED) { /* to be told of by the scene's own name */
-            regress_lines_free(&one->outputs);
-            code = regress_lines_add(&one->outputs, "%s", one->scene) ? CLI_OK : no_memory(work);
-        }
-        if (code == CLI_OK) {
-            one->comparisons = calloc(one->outputs.count, sizeof *one->comparisons);
-            code = one->comparisons != NULL ? CLI_OK : no_memory(work);
+        if (only != NULL && strstr(work->cases[i].name, only) == NULL) {
+            regress_free_case(&work->cases[i]);
+        } else {
+            work->cases[kept++] = work->cases[i];
         }
     }
     work->case_count = kept;
-    if (code == CLI_OK && kept == 0) {
+    if (kept == 0) {
         return only != NULL ? cli_usage("%s: no case's name holds '%s'", work->folder, only)
                             : cli_usage("%s: no scenes (.json) in it", work->folder);
     }
-    return code == CLI_OK ? check_unique(work) : code;
+    for (size_t i = 0; i < kept; ++i) {
+        CLI_TRY(complete_case(work, &work->cases[i]));
+    }
+    return check_unique(work);
 }

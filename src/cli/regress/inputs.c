@@ -1,10 +1,10 @@
-/* What a bake and its verdict depend on, and what of it changed since it last was alike. */
+/* Lists the inputs of a bake and its verdict, and finds what changed since the case was last alike. */
 #define _GNU_SOURCE /* asprintf */
 #include "cli/commands.h"
 #include "cli/message.h"
+#include "cli/regress/regress.h"
 #include "cli/temporary.h"
 #include "cli/try.h"
-#include "regress.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -14,10 +14,6 @@
 #include <vdbshade/flat.h>
 #include <vdbshade/provenance.h>
 
-static int no_memory(const regress_work *work) {
-    return cli_out_of_memory(work->folder);
-}
-
 static int add_digest(const regress_work *work, regress_case *one, const char *what, const char *path) {
     const vsh_run run = cli_common_run(&work->settings->compare.common);
     char digest[VSH_DIGEST_TEXT] = "none";
@@ -25,25 +21,24 @@ static int add_digest(const regress_work *work, regress_case *one, const char *w
     if (access(path, F_OK) == 0 && vsh_file_digest(path, &run, digest, &error) != VSH_OK) {
         return cli_fail(&error);
     }
-    return regress_lines_add(&one->inputs, "%s: %s", what, digest) ? CLI_OK : no_memory(work);
+    return regress_add_line(&one->inputs, "%s: %s", what, digest) ? CLI_OK : cli_out_of_memory(work->folder);
 }
 
-/* The limits of the command line, which are over those of files. */
+/* Adds the limits of the command line. */
 static int add_limits(const regress_work *work, regress_case *one) {
-    const vsh_compare_files_options *s = &work->settings->compare.options;
-    bool good = regress_lines_add(&one->inputs, "coverage: %s, at most %.9g, padding %d", s->coverage,
-                                  s->coverage_limit, s->padding);
-    good = good && regress_lines_add(&one->inputs, "step %.9g, reach %d, noise %.9g", s->step, s->reach,
-                                     s->noise);
+    const vsh_compare_files_options *o = &work->settings->compare.options;
+    bool good =
+        regress_add_line(&one->inputs, "coverage: %s, at most %.9g, padding %d", o->coverage,
+                         o->coverage_limit, o->padding) &&
+        regress_add_line(&one->inputs, "step %.9g, reach %d, noise %.9g", o->step, o->reach, o->noise);
     for (int i = 0; i < VSH_MEASURE_COUNT && good; ++i) {
-        if (!isnan(s->limits[i])) {
-            good = regress_lines_add(&one->inputs, "limit of %s: %.9g", vsh_measure_name(i), s->limits[i]);
-        }
+        good = isnan(o->limits[i]) ||
+               regress_add_line(&one->inputs, "limit of %s: %.9g", vsh_measure_name(i), o->limits[i]);
     }
-    return good ? CLI_OK : no_memory(work);
+    return good ? CLI_OK : cli_out_of_memory(work->folder);
 }
 
-/* Files that a flat scene names. */
+/* Adds the files that a flat scene names. */
 static int add_flat_files(const regress_work *work, const char *path, regress_lines *files) {
     const vsh_run run = cli_common_run(&work->settings->compare.common);
     vsh_flat_scene *scene = NULL;
@@ -53,19 +48,19 @@ static int add_flat_files(const regress_work *work, const char *path, regress_li
     }
     bool good = true;
     for (size_t i = 0; i < scene->caster_count && good; ++i) {
-        good = scene->casters[i].path == NULL || regress_lines_add(files, "%s", scene->casters[i].path);
+        good = scene->casters[i].path == NULL || regress_add_line(files, "%s", scene->casters[i].path);
     }
     vsh_flat_scene_free(scene);
-    return good ? CLI_OK : no_memory(work);
+    return good ? CLI_OK : cli_out_of_memory(work->folder);
 }
 
-/* Options that name a file, behind which there may be the name of a grid. */
+/* Adds files in options, which may be FILE.vdb:GRID. */
 static int add_option_files(const regress_work *work, const regress_case *one, regress_lines *files) {
     for (size_t i = 0; i < one->options.count; ++i) {
         const char *word = one->options.line[i];
         char *path = word[0] == '/' ? strdup(word) : regress_path(work->folder, word);
         if (path == NULL) {
-            return no_memory(work);
+            return cli_out_of_memory(work->folder);
         }
         struct stat status;
         bool good = stat(path, &status) == 0;
@@ -74,16 +69,16 @@ static int add_option_files(const regress_work *work, const regress_case *one, r
             *colon = '\0';
             good = stat(path, &status) == 0;
         }
-        const bool added = !good || !S_ISREG(status.st_mode) || regress_lines_add(files, "%s", path);
+        const bool added = !good || !S_ISREG(status.st_mode) || regress_add_line(files, "%s", path);
         free(path);
         if (!added) {
-            return no_memory(work);
+            return cli_out_of_memory(work->folder);
         }
     }
     return CLI_OK;
 }
 
-/* The scene's own file and what it names, as outputs tell it. */
+/* Adds digests of the scene's file and of all files it names. */
 static int add_provenance(const regress_work *work, regress_case *one, const char *path) {
     const bool flat = one->command == &cli_flat;
     const vsh_run run = cli_common_run(&work->settings->compare.common);
@@ -95,7 +90,7 @@ static int add_provenance(const regress_work *work, regress_case *one, const cha
     regress_lines files = {NULL, 0};
     vsh_provenance *provenance = NULL;
     int code;
-    CLI_TRY_DONE(regress_lines_add(&files, "%s", path) ? CLI_OK : no_memory(work));
+    CLI_TRY_DONE(regress_add_line(&files, "%s", path) ? CLI_OK : cli_out_of_memory(work->folder));
     if (flat) {
         CLI_TRY_DONE(add_flat_files(work, path, &files));
     }
@@ -111,73 +106,67 @@ static int add_provenance(const regress_work *work, regress_case *one, const cha
     size_t count;
     const vsh_attribute *attributes = vsh_provenance_attributes(provenance, &count);
     for (size_t i = 0; i < count; ++i) {
-        CLI_TRY_DONE(regress_lines_add(&one->inputs, "%s: %s", attributes[i].name, attributes[i].value)
+        CLI_TRY_DONE(regress_add_line(&one->inputs, "%s: %s", attributes[i].name, attributes[i].value)
                          ? CLI_OK
-                         : no_memory(work));
+                         : cli_out_of_memory(work->folder));
     }
 done:
     vsh_provenance_free(provenance);
-    regress_lines_free(&files);
+    regress_free_lines(&files);
     vsh_scene_free(scene);
     return code;
 }
 
-/* Golden bakes and their tolerances. */
+/* Adds golden bakes and their tolerances. */
 static int add_golden(const regress_work *work, regress_case *one) {
+    static const char *const endings[] = {"", ".tolerance.json"};
     int code = CLI_OK;
-    for (size_t i = 0; i < one->outputs.count && code == CLI_OK; ++i) {
-        const char *const endings[] = {"", ".tolerance.json"};
-        for (size_t k = 0; k < 2 && code == CLI_OK; ++k) {
-            char *path, *what = NULL;
-            if (asprintf(&path, "%s/%s%s", work->golden, one->outputs.line[i], endings[k]) < 0) {
-                return no_memory(work);
-            }
-            if (asprintf(&what, "golden %s%s", one->outputs.line[i], endings[k]) < 0) {
-                free(path);
-                return no_memory(work);
-            }
-            code = add_digest(work, one, what, path);
-            free(what);
-            free(path);
+    for (size_t i = 0; i < 2 * one->outputs.count && code == CLI_OK; ++i) {
+        char *name, *path;
+        if (asprintf(&name, "golden %s%s", one->outputs.line[i / 2], endings[i % 2]) < 0) {
+            return cli_out_of_memory(work->folder);
         }
+        path = regress_path(work->golden, name + strlen("golden "));
+        code = path != NULL ? add_digest(work, one, name, path) : cli_out_of_memory(work->folder);
+        free(path);
+        free(name);
     }
     const char *tolerances = work->settings->compare.options.tolerances;
     return code == CLI_OK && tolerances != NULL ? add_digest(work, one, "tolerances", tolerances) : code;
 }
 
 int regress_list_inputs(const regress_work *work, regress_case *one) {
-    regress_lines_free(&one->inputs);
+    regress_free_lines(&one->inputs);
     char *path = regress_path(work->folder, one->scene);
     if (path == NULL) {
-        return no_memory(work);
+        return cli_out_of_memory(work->folder);
     }
-    bool good = regress_lines_add(&one->inputs, "program: %s", work->program) &&
-                regress_lines_add(&one->inputs, "command: %s", one->command->name);
+    bool good = regress_add_line(&one->inputs, "program: %s", work->program) &&
+                regress_add_line(&one->inputs, "command: %s", one->command->name);
     for (size_t i = 0; i < one->options.count && good; ++i) {
-        good = regress_lines_add(&one->inputs, "option: %s", one->options.line[i]);
+        good = regress_add_line(&one->inputs, "option: %s", one->options.line[i]);
     }
-    int code = good ? add_provenance(work, one, path) : no_memory(work);
+    int code = good ? add_provenance(work, one, path) : cli_out_of_memory(work->folder);
     code = code == CLI_OK ? add_limits(work, one) : code;
     code = code == CLI_OK ? add_golden(work, one) : code;
     free(path);
     return code;
 }
 
-/* --- the cache: for each case that was alike the lines above */
+/* --- the cache: the lines above for each case that was alike */
 
 static bool has_line(json_t *lines, const char *text) {
     size_t i;
     json_t *line;
     json_array_foreach(lines, i, line) {
-        const char *one = json_string_value(line);
-        if (one != NULL && strcmp(one, text) == 0) {
+        if (json_is_string(line) && strcmp(json_string_value(line), text) == 0) {
             return true;
         }
     }
     return false;
 }
 
-/* What is told of a line: of an input its file's name, of others what stands before the colon. */
+/* Names the input of a line: a file's name, or the text before the colon. */
 static char *name_of(const char *line) {
     static const char input[] = "vdbshade_input_", sum[] = "sha256:";
     const char *colon = strchr(line, ':');
@@ -215,11 +204,7 @@ void regress_read_cache(regress_work *work) {
     json_decref(root);
 }
 
-static bool was_alike(const regress_case *one) {
-    return one->status == REGRESS_UNCHANGED || one->status == REGRESS_ALIKE || one->status == REGRESS_UPDATED;
-}
-
-/* Cases that --only left out stay as they were. */
+/* Keeps cases that --only left out. */
 int regress_write_cache(const regress_work *work) {
     json_t *old = regress_load(work->cache), *alike = json_object(), *root = json_object();
     if (work->settings->only != NULL) {
@@ -228,7 +213,7 @@ int regress_write_cache(const regress_work *work) {
     for (size_t i = 0; i < work->case_count; ++i) {
         const regress_case *one = &work->cases[i];
         json_object_del(alike, one->name);
-        if (was_alike(one)) {
+        if (one->status != REGRESS_UNLIKE && one->status != REGRESS_FAILED) {
             json_t *lines = json_array();
             for (size_t k = 0; k < one->inputs.count; ++k) {
                 json_array_append_new(lines, json_string(one->inputs.line[k]));
@@ -240,7 +225,7 @@ int regress_write_cache(const regress_work *work) {
     char *text = json_dumps(root, JSON_INDENT(1));
     json_decref(root);
     json_decref(old);
-    const int code = text != NULL ? cli_temporary_write(work->cache, text) : no_memory(work);
+    const int code = text != NULL ? cli_temporary_write(work->cache, text) : cli_out_of_memory(work->folder);
     free(text);
     return code;
 }

@@ -1,19 +1,19 @@
-/* vdbshade regress: a folder of scenes, baked where something changed and held against their golden bakes. */
+/* vdbshade regress: bakes the scenes of a folder that changed, compares them with golden bakes, and reports.
+ */
 #define _GNU_SOURCE /* asprintf, dladdr */
-#include "regress.h"
+#include "cli/regress/regress.h"
 #include "cli/commands.h"
+#include "cli/document.h"
 #include "cli/message.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
 #include "cli/temporary.h"
+#include "cli/try.h"
 
-#include <dirent.h>
 #include <dlfcn.h>
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 #include <vdbshade/provenance.h>
 
@@ -21,17 +21,16 @@ enum { KEY_UPDATE = 0x2000, KEY_ALL, KEY_CACHE, KEY_BAKES, KEY_ONLY };
 
 static const cli_option options[] = {
     {0, NULL, NULL, "What is done"},
-    {KEY_UPDATE, "update", NULL,
-     "put new bakes in the place of golden ones that they are\nnot like, and of missing ones"},
-    {KEY_ALL, "all", NULL, "bake what did not change, too"},
-    {KEY_ONLY, "only", "TEXT", "only cases whose names hold it"},
-    {KEY_CACHE, "cache", "FILE", "what was alike, and of what inputs\n(DIR/.regress-cache.json)"},
+    {KEY_UPDATE, "update", NULL, "replace golden bakes that differ, and add missing ones"},
+    {KEY_ALL, "all", NULL, "bake unchanged cases, too"},
+    {KEY_ONLY, "only", "TEXT", "only cases whose names contain it"},
+    {KEY_CACHE, "cache", "FILE", "cases that were alike, with their inputs\n(DIR/.regress-cache.json)"},
     {KEY_BAKES, "bakes", "FOLDER", "keep the new bakes there"},
     {0, NULL, NULL, "Reports"},
     CLI_REPORT_OPTIONS,
     CLI_COMPARE_OPTIONS,
     {CLI_KEY_TOLERANCES, "tolerances", "FILE.json",
-     "limits of all, in place of their own\nDIR/golden/OUTPUT.tolerance.json"},
+     "limits of all, instead of\nDIR/golden/OUTPUT.tolerance.json"},
     CLI_COMMON_OPTIONS,
 };
 
@@ -40,10 +39,10 @@ static int regress_main(int argc, char **argv);
 const cli_command cli_regress = {
     "regress",
     "DIR [options]",
-    "Bakes the scenes of a folder whose inputs, options or golden bakes changed, and compares as\n"
-    "'vdbshade compare' does with DIR/golden. Scenes are DIR/*.json; DIR/regress.json names cases with\n"
-    "commands and options of their own. Ends with 0 where all are alike, 1 where one is not or has no\n"
-    "golden bake. See docs/regression.md. Numbers in brackets are what holds without the option.",
+    "Bakes the scenes of a folder whose inputs, options or golden bakes changed, and compares them with\n"
+    "DIR/golden as 'vdbshade compare' does. Scenes are DIR/*.json. DIR/regress.json names cases with\n"
+    "commands and options of their own. Ends with 0 if all are alike, and with 1 if one is not, or has no\n"
+    "golden bake. See docs/regression.md. Numbers in brackets are defaults.",
     options,
     sizeof options / sizeof options[0],
     regress_main};
@@ -71,9 +70,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
     }
 }
 
-/* --- beforehand */
+/* --- preparing */
 
-/* Another program may bake otherwise: its bytes are an input too, and those of the library. */
+/* Hashes program and library: another version may bake other values. */
 static int hash_program(regress_work *work) {
     char program[VSH_DIGEST_TEXT], library[VSH_DIGEST_TEXT] = "";
     vsh_error error;
@@ -85,29 +84,11 @@ static int hash_program(regress_work *work) {
     void *address;
     memcpy(&address, &version, sizeof address);
     if (dladdr(address, &found) != 0 && found.dli_fname != NULL) {
-        vsh_file_digest(found.dli_fname, NULL, library, &error); /* a name that is not there adds nothing */
+        vsh_file_digest(found.dli_fname, NULL, library, &error); /* empty if there is no such file */
     }
     return asprintf(&work->program, "%s %s %s", vsh_version(), program, library) >= 0
                ? CLI_OK
                : cli_out_of_memory("program");
-}
-
-/* The folder for new bakes. */
-static int make_bakes(regress_work *work) {
-    const char *given = work->settings->bakes;
-    if (given == NULL) {
-        return regress_folder_make(&work->folder_of_bakes, &work->bakes);
-    }
-    if (mkdir(given, 0777) != 0 && errno != EEXIST) {
-        cli_say("%s: cannot be made: %s", given, strerror(errno));
-        return CLI_FILE;
-    }
-    work->bakes = realpath(given, NULL);
-    if (work->bakes == NULL) {
-        cli_say("%s: cannot be made: %s", given, strerror(errno));
-        return CLI_FILE;
-    }
-    return CLI_OK;
 }
 
 static int prepare(regress_work *work) {
@@ -118,22 +99,21 @@ static int prepare(regress_work *work) {
     if (work->folder == NULL || work->golden == NULL || work->cache == NULL) {
         return cli_out_of_memory(s->folder);
     }
-    int code = regress_find_cases(work);
-    code =
-        code == CLI_OK ? cli_compare_check_reports(&s->compare, (const char *const *)&work->cache, 1) : code;
-    code = code == CLI_OK && s->cache == NULL ? cli_check_links(work->golden, work->cache) : code;
-    code = code == CLI_OK ? cli_temporary_check(work->cache) : code;
-    code = code == CLI_OK ? hash_program(work) : code;
-    for (size_t i = 0; i < work->case_count && code == CLI_OK; ++i) {
+    CLI_TRY(regress_find_cases(work));
+    CLI_TRY(cli_compare_check_reports(&s->compare, (const char *const *)&work->cache, 1));
+    CLI_TRY(s->cache == NULL ? cli_check_links(work->golden, work->cache) : CLI_OK);
+    CLI_TRY(cli_temporary_check(work->cache));
+    CLI_TRY(hash_program(work));
+    for (size_t i = 0; i < work->case_count; ++i) {
         regress_case *one = &work->cases[i];
         if (one->status != REGRESS_FAILED) {
-            code = regress_failed(one, regress_list_inputs(work, one));
+            CLI_TRY(regress_fail_alone(one, regress_list_inputs(work, one)));
         }
     }
-    return code;
+    return CLI_OK;
 }
 
-/* --- baking, before there are threads; then comparing */
+/* --- baking, before there are threads, then comparing */
 
 static int bake_all(regress_work *work) {
     for (size_t i = 0; i < work->case_count; ++i) {
@@ -158,78 +138,179 @@ static int bake_all(regress_work *work) {
     return CLI_OK;
 }
 
-/* Both files of an output; to be freed. */
-static bool output_paths(const regress_work *work, const char *output, char *paths[2]) {
-    paths[0] = regress_path(work->golden, output);
-    paths[1] = regress_path(work->bakes, output);
-    return paths[0] != NULL && paths[1] != NULL;
-}
-
-typedef int output_fn(regress_work *work, regress_case *one, size_t output, const char *golden,
-                      const char *fresh);
-
-/* Calls fn for each output that was baked. */
-static int each_output(regress_work *work, output_fn *fn) {
-    int code = CLI_OK;
-    for (size_t i = 0; i < work->case_count && code == CLI_OK; ++i) {
-        regress_case *one = &work->cases[i];
-        for (size_t k = 0; k < one->outputs.count && code == CLI_OK && one->status == REGRESS_UNLIKE; ++k) {
-            char *paths[2];
-            code = output_paths(work, one->outputs.line[k], paths) ? fn(work, one, k, paths[0], paths[1])
-                                                                   : cli_out_of_memory(work->folder);
-            free(paths[0]);
-            free(paths[1]);
-        }
-    }
-    return code;
-}
-
-static int compare_output(regress_work *work, regress_case *one, size_t output, const char *golden,
-                          const char *fresh) {
+static int compare_output(const regress_work *work, const regress_case *one, size_t output) {
     cli_comparison *c = &one->comparisons[output];
+    const char *name = one->outputs.line[output];
+    char *golden = regress_path(work->golden, name), *fresh = regress_path(work->bakes, name);
     int code = CLI_OK;
-    if (access(golden, F_OK) == 0) {
+    if (golden == NULL || fresh == NULL) {
+        code = cli_out_of_memory(work->folder);
+    } else if (access(golden, F_OK) == 0) {
         code = cli_comparison_make(&work->settings->compare, golden, fresh, c);
     } else {
         snprintf(c->problem, sizeof c->problem, "no golden bake %.200s; 'vdbshade regress --update' makes it",
                  golden);
     }
-    if (code == CLI_OK && asprintf(&c->name, "%s/%s", one->name, one->outputs.line[output]) < 0) {
-        c->name = NULL;
-        code = cli_out_of_memory(golden);
-    }
+    free(golden);
+    free(fresh);
     return code;
 }
 
-static void judge(regress_work *work) {
+static int compare_case(const regress_work *work, regress_case *one) {
+    bool alike = true;
+    for (size_t k = 0; k < one->outputs.count; ++k) {
+        CLI_TRY(compare_output(work, one, k));
+        alike = alike && one->comparisons[k].alike;
+    }
+    one->status = alike ? REGRESS_ALIKE : REGRESS_UNLIKE;
+    return CLI_OK;
+}
+
+/* Replaces golden bakes. They are inputs, so those are listed again. */
+static int update_case(const regress_work *work, regress_case *one) {
+    for (size_t k = 0; k < one->outputs.count; ++k) {
+        CLI_TRY(one->comparisons[k].alike ? CLI_OK : regress_update(work, one->outputs.line[k]));
+    }
+    one->status = REGRESS_UPDATED;
+    return regress_list_inputs(work, one);
+}
+
+static int compare_all(regress_work *work) {
     for (size_t i = 0; i < work->case_count; ++i) {
-        regress_case *one = &work->cases[i];
-        bool alike = one->status == REGRESS_UNLIKE;
-        for (size_t k = 0; k < one->outputs.count && alike; ++k) {
-            alike = one->comparisons[k].alike;
-        }
-        one->status = alike ? REGRESS_ALIKE : one->status;
-    }
-}
-
-static int update_output(regress_work *work, regress_case *one, size_t output, const char *golden,
-                         const char *fresh) {
-    (void)golden;
-    (void)fresh;
-    return one->comparisons[output].alike ? CLI_OK : regress_update(work, one->outputs.line[output]);
-}
-
-/* What they depend on is listed anew: golden bakes are part of it. */
-static int update_all(regress_work *work) {
-    int code = each_output(work, update_output);
-    for (size_t i = 0; i < work->case_count && code == CLI_OK; ++i) {
         if (work->cases[i].status == REGRESS_UNLIKE) {
-            work->cases[i].status = REGRESS_UPDATED;
-            code = regress_list_inputs(work, &work->cases[i]);
+            CLI_TRY(compare_case(work, &work->cases[i]));
         }
     }
+    for (size_t i = 0; i < work->case_count && work->settings->update; ++i) {
+        if (work->cases[i].status == REGRESS_UNLIKE) {
+            CLI_TRY(update_case(work, &work->cases[i]));
+        }
+    }
+    return CLI_OK;
+}
+
+/* --- reports */
+
+static const char *const status_names[] = {"unchanged", "alike", "not alike", "failed", "updated"};
+
+/* Prints how the replaced golden bake differed. */
+static void print_updated(const cli_comparison *c, const char *output) {
+    if (c->alike) {
+        return;
+    }
+    if (c->golden == NULL) {
+        printf("  %s: is the golden bake now; there was none\n", output);
+        return;
+    }
+    printf("  %s: is the golden bake now; the one before differed:\n", output);
+    const char *problem;
+    const vsh_channel_comparison *channel;
+    for (size_t i = 0; (problem = cli_comparison_problem(c, i)) != NULL; ++i) {
+        printf("    %s\n", problem);
+    }
+    for (size_t i = 0; (channel = vsh_comparison_channel(c->made, i)) != NULL; ++i) {
+        char what[CLI_EXPLANATION];
+        cli_channel_explain(channel, what);
+        if (what[0] != '\0') {
+            printf("    %s: %s\n", channel->name, what);
+        }
+    }
+}
+
+static const char *failure_of(const regress_case *one, char *text, size_t size) {
+    snprintf(text, size, "the bake ended with exit code %d%s%s", one->code, one->reason != NULL ? ": " : "",
+             one->reason != NULL ? one->reason : "");
+    return text;
+}
+
+static void print_lines(const regress_work *work) {
+    for (size_t i = 0; i < work->case_count; ++i) {
+        const regress_case *one = &work->cases[i];
+        printf("%s: %s", one->name, status_names[one->status]);
+        if (one->changed != NULL) {
+            printf(" (changed: %s)", one->changed);
+        }
+        putchar('\n');
+        for (size_t k = 0; k < one->outputs.count; ++k) {
+            if (one->status == REGRESS_FAILED) {
+                char why[1200];
+                printf("  %s: %s\n", one->outputs.line[k], failure_of(one, why, sizeof why));
+            } else if (one->status == REGRESS_UPDATED) {
+                print_updated(&one->comparisons[k], one->outputs.line[k]);
+            } else if (one->status != REGRESS_UNCHANGED && !one->comparisons[k].alike) {
+                char prefix[300];
+                snprintf(prefix, sizeof prefix, "  %.250s: ", one->outputs.line[k]);
+                cli_comparison_print(stdout, &one->comparisons[k], prefix);
+            }
+        }
+    }
+}
+
+static bool is_compared(const regress_case *one) {
+    return one->status != REGRESS_UNCHANGED && one->status != REGRESS_FAILED;
+}
+
+static int print_json(const regress_work *work) {
+    json_t *cases = json_array();
+    for (size_t i = 0; i < work->case_count; ++i) {
+        const regress_case *one = &work->cases[i];
+        json_t *outputs = json_array();
+        for (size_t k = 0; k < one->outputs.count && is_compared(one); ++k) {
+            json_array_append_new(outputs, cli_comparison_json(&one->comparisons[k]));
+        }
+        const bool failed = one->status == REGRESS_FAILED;
+        json_array_append_new(
+            cases, json_pack("{s:o,s:s,s:o,s:o,s:o,s:o}", "name", cli_utf8_json(one->name), "status",
+                             status_names[one->status], "changed",
+                             one->changed != NULL ? cli_utf8_json(one->changed) : json_null(), "exit_code",
+                             failed ? json_integer(one->code) : json_null(), "reason",
+                             failed && one->reason != NULL ? cli_utf8_json(one->reason) : json_null(),
+                             "outputs", outputs));
+    }
+    return cli_print_json(json_pack("{s:o}", "cases", cases), work->folder);
+}
+
+/* Writes JUnit and HTML, also for cases that were not baked. */
+static int write_files(const regress_work *work) {
+    const cli_compare_settings *s = &work->settings->compare;
+    size_t count = 0, at = 0;
+    for (size_t i = 0; i < work->case_count; ++i) {
+        count += work->cases[i].outputs.count;
+    }
+    cli_comparison *all = calloc(count + 1, sizeof *all);
+    bool good = all != NULL;
+    for (size_t i = 0; i < work->case_count && good; ++i) {
+        regress_case *one = &work->cases[i];
+        for (size_t k = 0; k < one->outputs.count && good; ++k) {
+            cli_comparison *c = &one->comparisons[k];
+            if (asprintf(&c->name, "%s/%s", one->name, one->outputs.line[k]) < 0) {
+                c->name = NULL;
+                good = false;
+            }
+            c->alike = c->alike || one->status == REGRESS_UNCHANGED;
+            if (one->status == REGRESS_FAILED && cli_comparison_problem(c, 0) == NULL) {
+                failure_of(one, c->problem, sizeof c->problem);
+            }
+            all[at++] = *c;
+        }
+    }
+    const int code = good ? cli_comparison_report(s, all, at) : cli_out_of_memory(work->folder);
+    free(all);
     return code;
 }
+
+static int report(const regress_work *work) {
+    const cli_compare_settings *s = &work->settings->compare;
+    int code = CLI_OK;
+    if (s->json) {
+        code = print_json(work);
+    } else if (!s->common.quiet) {
+        print_lines(work);
+    }
+    return code == CLI_OK && (s->junit != NULL || s->html != NULL) ? write_files(work) : code;
+}
+
+/* --- the command */
 
 static int verdict(const regress_work *work) {
     int code = CLI_OK;
@@ -245,22 +326,14 @@ static int verdict(const regress_work *work) {
 }
 
 static int run(regress_work *work) {
-    const regress_settings *s = work->settings;
-    int code = prepare(work);
-    if (code != CLI_OK) {
-        return code;
-    }
+    CLI_TRY(prepare(work));
     regress_read_cache(work);
-    code = make_bakes(work);
-    code = code == CLI_OK ? bake_all(work) : code;
-    code = code == CLI_OK ? each_output(work, compare_output) : code;
-    if (code == CLI_OK) {
-        judge(work);
-        code = s->update ? update_all(work) : CLI_OK;
-    }
-    code = code == CLI_OK ? regress_write_cache(work) : code;
-    code = code == CLI_OK ? regress_report(work) : code;
-    return code == CLI_OK ? verdict(work) : code;
+    CLI_TRY(regress_make_folder(work));
+    CLI_TRY(bake_all(work));
+    CLI_TRY(compare_all(work));
+    CLI_TRY(regress_write_cache(work));
+    CLI_TRY(report(work));
+    return verdict(work);
 }
 
 static int regress_main(int argc, char **argv) {
@@ -273,7 +346,7 @@ static int regress_main(int argc, char **argv) {
     cli_progress_begin(s.compare.common.progress, s.compare.common.quiet);
     regress_work work = {.settings = &s};
     code = run(&work);
-    regress_folder_remove(&work.folder_of_bakes, work.bakes);
+    regress_remove_folder(&work);
     for (size_t i = 0; i < work.case_count; ++i) {
         regress_free_case(&work.cases[i]);
     }

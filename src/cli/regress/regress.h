@@ -6,30 +6,30 @@
 
 /* Lines of text that grow. */
 typedef struct regress_lines {
-    char **line; /* [count] */
+    char **line; /* [count], and NULL after the last */
     size_t count;
 } regress_lines;
 
-/* A copy of the text is added. False where memory is short. */
-bool regress_lines_add(regress_lines *lines, const char *format, ...) __attribute__((format(printf, 2, 3)));
-void regress_lines_free(regress_lines *lines);
+/* Adds a line. False if memory is short. */
+bool regress_add_line(regress_lines *lines, const char *format, ...) __attribute__((format(printf, 2, 3)));
+void regress_free_lines(regress_lines *lines);
 
 enum { REGRESS_UNCHANGED, REGRESS_ALIKE, REGRESS_UNLIKE, REGRESS_FAILED, REGRESS_UPDATED };
 
-/* A scene, the command that bakes it, and what that writes. */
+/* A scene, the command that bakes it, and the files which that writes. */
 typedef struct regress_case {
     char *name;
-    char *scene; /* its file, within the folder */
+    char *scene; /* file within the folder */
     const cli_command *command;
     regress_lines options;
-    char *output;          /* -o; NULL: the scene names them */
-    regress_lines outputs; /* names of all that is written */
-    regress_lines inputs;  /* what the bake depends on, and how it is judged: equal where nothing changed */
-    char *changed;         /* which of them did; NULL: none that is known */
-    int status;            /* REGRESS_… */
-    int code;              /* of a bake that failed */
-    char *reason;          /* its last error; NULL: none is known */
-    cli_comparison *comparisons; /* [outputs.count]; zeroed where there is none */
+    char *output;                /* for -o; NULL: the scene names its outputs */
+    regress_lines outputs;       /* names of all files written */
+    regress_lines inputs;        /* everything that the result depends on, equal if nothing changed */
+    char *changed;               /* the input that changed; NULL: unknown */
+    int status;                  /* REGRESS_… */
+    int code;                    /* exit code of a failed bake */
+    char *reason;                /* its last error; NULL: unknown */
+    cli_comparison *comparisons; /* [outputs.count]; zeroed if there is none */
 } regress_case;
 
 typedef struct regress_settings {
@@ -40,62 +40,54 @@ typedef struct regress_settings {
 
 typedef struct regress_work {
     const regress_settings *settings;
-    char *folder, *golden; /* golden: the folder of those */
+    char *folder, *golden; /* `golden` is the folder of golden bakes */
     char *cache;           /* file */
-    char *bakes;           /* folder of the new ones, absolute */
-    int folder_of_bakes;   /* descriptor + 1 that holds it, where it is temporary */
+    char *bakes;           /* folder of the new bakes, absolute */
+    int folder_of_bakes;   /* descriptor + 1 of that folder if it is temporary */
     char *program;         /* hashes of the program and the library */
     regress_case *cases;
     size_t case_count;
 } regress_work;
 
-/* A file of JSON in a folder that strangers may have made; NULL where it is none, or cannot be read. */
-json_t *regress_load(const char *path);
-
-/* "FOLDER/NAME", to be freed; NULL where memory is short. */
+/* Returns "FOLDER/NAME", to be freed; NULL if memory is short. */
 char *regress_path(const char *folder, const char *name);
 
-/* The cases of a folder: those of its regress.json, then its other scenes, by name. CLI_OK or an exit code,
- * having said why. */
+/* Reads a JSON file that strangers may have made; NULL if that fails. */
+json_t *regress_load(const char *path);
+
+/* Finds the cases of a folder: those of its regress.json, then its other scenes by name. This and the other
+ * functions with a result return CLI_OK, or an exit code after printing why. */
 int regress_find_cases(regress_work *work);
 void regress_free_case(regress_case *one);
 
-/* That a case's options, from the file `list`, only change values. CLI_OK or an exit code, having said why.
- */
-int regress_check_options(const regress_case *one, const char *list);
-
-/* With the last error as the reason. */
+/* Marks a case as failed, with the last error as the reason. */
 void regress_mark_failed(regress_case *one, int code);
 
-/* A case that cannot be read or written fails by itself, and the others go on: marks it and gives CLI_OK;
- * other codes, which end all, as they are. */
-int regress_failed(regress_case *one, int code);
+/* If a case cannot be read or written, marks it and returns CLI_OK, so that the others go on. Returns other
+ * codes unchanged. */
+int regress_fail_alone(regress_case *one, int code);
 
-/* Lists what a case depends on, new. */
+/* Lists the inputs of a case anew. */
 int regress_list_inputs(const regress_work *work, regress_case *one);
 
-/* Marks the cases that are as they were when they last were alike, and says of the others what changed. A
- * cache that cannot be read marks none. */
+/* Marks cases that did not change since they were alike, and notes what changed in others. Ignores a cache
+ * that cannot be read. */
 void regress_read_cache(regress_work *work);
 
-/* Keeps what the cases that are alike depend on. */
+/* Saves the inputs of cases that are alike. */
 int regress_write_cache(const regress_work *work);
 
-/* Makes a folder for new bakes among the system's temporary ones, and takes away those that killed runs of
- * this user left there: a lock on the folder, *held (to be 0 before), tells that its run lives. CLI_OK or
- * CLI_FILE, having said why. */
-int regress_folder_make(int *held, char **path);
+/* Makes the folder for new bakes. Without --bakes it is temporary, and folders of killed runs of this user
+ * are removed: each run locks its folder. */
+int regress_make_folder(regress_work *work);
 
-/* Takes it away, and what is in it; nothing where none was made. */
-void regress_folder_remove(int *held, const char *path);
+/* Removes the folder if it is temporary. */
+void regress_remove_folder(regress_work *work);
 
-/* Bakes a case in a child process. CLI_OK or an exit code, having said why. */
+/* Bakes a case in a child process. */
 int regress_bake(const regress_work *work, const regress_case *one);
 
-/* Tells of all cases on standard output, and in the files that were asked for. */
-int regress_report(const regress_work *work);
-
-/* Puts a new bake in the place of its golden one: whole, or not at all. */
+/* Replaces a golden bake by the new one: whole, or not at all. */
 int regress_update(const regress_work *work, const char *output);
 
 #endif
