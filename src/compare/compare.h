@@ -61,4 +61,7 @@ bool vshi_follow_curve(vshi_pair *pair, float *mapped, vsh_measures *measures);
 /* Adds up golden's penumbra widths and the new values' deviation from them, for vsh_accuracy.width_error. */
 void vshi_add_widths(const vshi_pair *pair, double *golden, double *off);
 
+/* Overwrites limits, and *coverage (may be NULL), with those that are given. */
+void vshi_apply_options(const vsh_compare_files_options *given, vsh_limits *limits, double *coverage);
+
 #endif

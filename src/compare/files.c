@@ -4,16 +4,15 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
+#include "compare/compare.h"
 
 #include <math.h>
 #include <stdarg.h>
-#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <unistd.h>
-#include <vdbshade/compare.h>
 #include <vdbshade/provenance.h>
 #include <vdbshade/voxels.h>
 
@@ -96,13 +95,7 @@ static void set_limits(const files *f, const attributes texts[2], vsh_channel_co
                                                  : o->noise);
     channel->coverage_limit = COVERAGE_LIMIT;
     vsh_tolerances_apply(f->tolerances, channel->name, &channel->limits, &channel->coverage_limit);
-    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-        channel->limits.value[i] = isnan(o->limits[i]) ? channel->limits.value[i] : o->limits[i];
-    }
-    vsh_compare_options *options = &channel->limits.options;
-    options->step = isnan(o->step) ? options->step : o->step;
-    options->reach = o->reach < 0 ? options->reach : o->reach;
-    channel->coverage_limit = isnan(o->coverage_limit) ? channel->coverage_limit : o->coverage_limit;
+    vshi_apply_options(o, &channel->limits, &channel->coverage_limit);
 }
 
 static vsh_result add_channel(const files *f, const char *name, const attributes texts[2],

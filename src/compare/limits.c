@@ -78,12 +78,10 @@ uint32_t vsh_compare_judge(const vsh_measures *measures, const vsh_limits *limit
 
 /* --- files */
 
-/* Values of one object; NaN and -1: not given. */
+/* Limits of all channels, or of those that match. */
 typedef struct entry {
+    vsh_compare_files_options given;
     const char *channel; /* a name, or a prefix and '*' */
-    double value[VSH_MEASURE_COUNT];
-    double step, coverage;
-    int32_t reach;
 } entry;
 
 struct vsh_tolerances {
@@ -93,31 +91,29 @@ struct vsh_tolerances {
     vshi_json_block *blocks;
 };
 
-static entry no_entry(const char *channel) {
-    entry e = {.channel = channel, .step = NAN, .coverage = NAN, .reach = -1};
-    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-        e.value[i] = NAN;
-    }
-    return e;
-}
+enum { OF_CHANNEL = 1, OF_FILE = 2 };
 
+static vsh_result read_channels(vshi_json *reader, const vshi_value *value, void *member);
+
+#define AT(member) .offset = offsetof(entry, given.member)
 #define LIMIT(key, measure)                                                                                  \
-    { .name = key, .kind = VSHI_NUMBER, .offset = offsetof(entry, value[measure]), .highest = 1e15 }
-#define LIMITS                                                                                               \
-    LIMIT("shift", VSH_MEASURE_SHIFT), LIMIT("penumbra", VSH_MEASURE_PENUMBRA),                              \
-        LIMIT("lost", VSH_MEASURE_LOST), LIMIT("gained", VSH_MEASURE_GAINED),                                \
-        LIMIT("rmse", VSH_MEASURE_RMSE), LIMIT("p99", VSH_MEASURE_P99), LIMIT("max", VSH_MEASURE_MAX),       \
-        {.name = "step",                                                                                     \
-         .kind = VSHI_NUMBER,                                                                                \
-         .offset = offsetof(entry, step),                                                                    \
-         .highest = 1.0,                                                                                     \
-         .flags = VSHI_ABOVE},                                                                               \
-    {                                                                                                        \
-        .name = "reach", .kind = VSHI_INTEGER, .offset = offsetof(entry, reach), .highest = MOST_REACH       \
-    }
+    { .name = key, .kind = VSHI_NUMBER, AT(limits[measure]), .highest = 1e15 }
 
-static const vshi_key channel_keys[] = {LIMITS};
-static const vshi_table channel_table = VSHI_TABLE(channel_keys);
+static const vshi_key keys[] = {
+    LIMIT("shift", VSH_MEASURE_SHIFT),
+    LIMIT("penumbra", VSH_MEASURE_PENUMBRA),
+    LIMIT("lost", VSH_MEASURE_LOST),
+    LIMIT("gained", VSH_MEASURE_GAINED),
+    LIMIT("rmse", VSH_MEASURE_RMSE),
+    LIMIT("p99", VSH_MEASURE_P99),
+    LIMIT("max", VSH_MEASURE_MAX),
+    {.name = "step", .kind = VSHI_NUMBER, AT(step), .highest = 1.0, .flags = VSHI_ABOVE},
+    {.name = "reach", .kind = VSHI_INTEGER, AT(reach), .highest = MOST_REACH},
+    {.name = "coverage", .kind = VSHI_NUMBER, .variants = OF_FILE, AT(coverage_limit), .highest = 1.0},
+    {.name = "channels", .kind = VSHI_CUSTOM, .variants = OF_FILE, .read = read_channels},
+};
+static const vshi_table key_table = VSHI_TABLE(keys);
+_Static_assert(offsetof(vsh_tolerances, all) == 0, "offsets of keys are those in an entry");
 
 static vsh_result read_channels(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_tolerances *made = member;
@@ -130,20 +126,12 @@ static vsh_result read_channels(vshi_json *reader, const vshi_value *value, void
         entry *e = &made->channels[made->channel_count];
         const char *name;
         VSHI_TRY(vshi_json_copy(reader, 0, item.key, &name));
-        *e = no_entry(name);
-        VSHI_TRY(vshi_read_object(reader, &item, &channel_table, 1, "a channel's tolerances", e));
+        *e = (entry){vsh_compare_files_options_default(), name};
+        VSHI_TRY(vshi_read_object(reader, &item, &key_table, OF_CHANNEL, "a channel's tolerances", e));
         ++made->channel_count;
     }
     return VSH_OK;
 }
-
-static const vshi_key file_keys[] = {
-    LIMITS,
-    {.name = "coverage", .kind = VSHI_NUMBER, .offset = offsetof(entry, coverage), .highest = 1.0},
-    {.name = "channels", .kind = VSHI_CUSTOM, .read = read_channels},
-};
-static const vshi_table file_table = VSHI_TABLE(file_keys);
-_Static_assert(offsetof(vsh_tolerances, all) == 0, "the keys' offsets are those of an entry");
 
 typedef struct parsing {
     vshi_json reader;
@@ -157,8 +145,8 @@ static vsh_result parse(void *user, vsh_error *error) {
     json_t *json;
     VSHI_TRY(vshi_json_load(reader, &json));
     const vshi_value root = {NULL, NULL, 0, 0, json};
-    made->all = no_entry(NULL);
-    const vsh_result result = vshi_read_object(reader, &root, &file_table, 1, "tolerances", made);
+    made->all.given = vsh_compare_files_options_default();
+    const vsh_result result = vshi_read_object(reader, &root, &key_table, OF_FILE, "tolerances", made);
     made->blocks = reader->blocks;
     json_decref(json);
     return result;
@@ -196,14 +184,17 @@ void vsh_tolerances_free(vsh_tolerances *tolerances) {
     }
 }
 
-static void apply(const entry *e, vsh_limits *limits) {
+void vshi_apply_options(const vsh_compare_files_options *given, vsh_limits *limits, double *coverage) {
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-        if (!isnan(e->value[i])) {
-            limits->value[i] = e->value[i] < MOST ? e->value[i] : INFINITY;
+        if (!isnan(given->limits[i])) {
+            limits->value[i] = given->limits[i] < MOST ? given->limits[i] : INFINITY;
         }
     }
-    limits->options.step = isnan(e->step) ? limits->options.step : e->step;
-    limits->options.reach = e->reach < 0 ? limits->options.reach : e->reach;
+    limits->options.step = isnan(given->step) ? limits->options.step : given->step;
+    limits->options.reach = given->reach < 0 ? limits->options.reach : given->reach;
+    if (coverage != NULL && !isnan(given->coverage_limit)) {
+        *coverage = given->coverage_limit;
+    }
 }
 
 static bool is_for(const entry *e, const char *channel) {
@@ -217,13 +208,10 @@ void vsh_tolerances_apply(const vsh_tolerances *tolerances, const char *channel,
     if (tolerances == NULL) {
         return;
     }
-    apply(&tolerances->all, limits);
+    vshi_apply_options(&tolerances->all.given, limits, coverage);
     for (size_t i = 0; i < tolerances->channel_count; ++i) {
         if (is_for(&tolerances->channels[i], channel)) {
-            apply(&tolerances->channels[i], limits);
+            vshi_apply_options(&tolerances->channels[i].given, limits, NULL);
         }
-    }
-    if (coverage != NULL && !isnan(tolerances->all.coverage)) {
-        *coverage = tolerances->all.coverage;
     }
 }

@@ -105,7 +105,7 @@ static void bad_files_are_refused_with_the_place(void **unused) {
         {"{\"reach\": 1.5}", {"reach: 1.5", "whole"}},
         {"{\"channels\": []}", {"channels: expected an object", "an array"}},
         {"{\"channels\": {\"ao\": {\"max\": 1, \"coverage\": 1}}}",
-         {"channels.ao.coverage: unknown key", ""}},
+         {"channels.ao.coverage: is no key of a channel's tolerances", ""}},
         {"{\"rmse\": 1,}", {"1:", ""}},
         {"", {"1:", ""}},
     };

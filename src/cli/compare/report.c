@@ -119,15 +119,13 @@ json_t *cli_comparison_json(const cli_comparison *c) {
 
 enum { LONGEST = 512 }; /* texels along a side of a picture: larger planes are shrunk */
 
-static const float nothing[3] = {0.83f, 0.86f, 0.90f}; /* texels that are not compared: no shade of grey */
-
 /* A slice of the planes, and how it is shrunk. */
 typedef struct view {
     const vsh_compared *compared;
-    size_t first;          /* of the slice */
-    int32_t width, height; /* of the picture */
-    double least, most;    /* of golden values: black and white */
-    double full;           /* difference drawn in full red or blue */
+    size_t first;         /* of the slice */
+    size_t width, height; /* of the picture */
+    double least, most;   /* of golden values: black and white */
+    double full;          /* difference drawn in full red or blue */
 } view;
 
 static bool shown(const view *v, size_t at) {
@@ -137,12 +135,13 @@ static bool shown(const view *v, size_t at) {
 
 enum { GOLDEN, FRESH, DIFFERENCE, PICTURES };
 
-/* Finds the mean of the values in a pixel, and of differences the largest, so that shrinking hides none. */
-static bool find_value(const view *v, int what, int32_t px, int32_t py, double *value) {
+/* Draws the mean of the values in a pixel, and of differences the largest, so that shrinking hides none. They
+ * are white at 0, red if new is lighter, blue if it is darker. */
+static void draw_pixel(const view *v, int what, size_t px, size_t py, uint8_t rgb[3]) {
     const vsh_compared *c = v->compared;
     const size_t w = (size_t)c->size[0], h = (size_t)c->size[1];
-    const size_t x0 = (size_t)px * w / (size_t)v->width, x1 = ((size_t)px + 1) * w / (size_t)v->width;
-    const size_t y0 = (size_t)py * h / (size_t)v->height, y1 = ((size_t)py + 1) * h / (size_t)v->height;
+    const size_t x0 = px * w / v->width, x1 = (px + 1) * w / v->width;
+    const size_t y0 = py * h / v->height, y1 = (py + 1) * h / v->height;
     double sum = 0.0, count = 0.0, largest = 0.0;
     for (size_t y = y0; y < y1; ++y) {
         for (size_t x = x0; x < x1; ++x) {
@@ -155,43 +154,28 @@ static bool find_value(const view *v, int what, int32_t px, int32_t py, double *
             }
         }
     }
-    *value = what == DIFFERENCE ? largest : count > 0.0 ? sum / count : 0.0;
-    return count > 0.0;
-}
-
-static float between(double value) {
-    return (float)fmin(1.0, fmax(0.0, value));
-}
-
-/* Colours values grey. Differences are white at 0, red if new is lighter, blue if it is darker. */
-static void colour(const view *v, int what, double value, float rgb[3]) {
-    if (what != DIFFERENCE) {
-        rgb[0] = rgb[1] = rgb[2] = between((value - v->least) / (v->most - v->least));
-        return;
+    if (count == 0.0) { /* not compared: grey-blue */
+        rgb[0] = 212;
+        rgb[1] = 219;
+        rgb[2] = 230;
+    } else if (what == DIFFERENCE) {
+        rgb[0] = rgb[1] = rgb[2] = (uint8_t)lround(255.0 * fmax(0.0, 1.0 - fabs(largest) / v->full));
+        rgb[largest > 0.0 ? 0 : 2] = 255;
+    } else {
+        const double grey = (sum / count - v->least) / (v->most - v->least);
+        rgb[0] = rgb[1] = rgb[2] = (uint8_t)lround(255.0 * fmin(1.0, fmax(0.0, grey)));
     }
-    const float off = between(fabs(value) / v->full);
-    rgb[0] = value > 0.0 ? 1.0f : 1.0f - off;
-    rgb[1] = 1.0f - off;
-    rgb[2] = value > 0.0 ? 1.0f - off : 1.0f;
 }
 
 static int write_picture(FILE *out, const char *page, const view *v, int what) {
-    const size_t count = (size_t)v->width * (size_t)v->height;
-    uint8_t *values = malloc(3 * count);
+    uint8_t *values = malloc(3 * v->width * v->height);
     if (values == NULL) {
         return cli_out_of_memory(page);
     }
-    for (size_t i = 0; i < count; ++i) {
-        double value;
-        float rgb[3] = {nothing[0], nothing[1], nothing[2]};
-        if (find_value(v, what, (int32_t)(i % (size_t)v->width), (int32_t)(i / (size_t)v->width), &value)) {
-            colour(v, what, value, rgb);
-        }
-        for (size_t k = 0; k < 3; ++k) {
-            values[3 * i + k] = (uint8_t)lround(255.0 * (double)rgb[k]);
-        }
+    for (size_t i = 0; i < v->width * v->height; ++i) {
+        draw_pixel(v, what, i % v->width, i / v->width, &values[3 * i]);
     }
-    const cli_pixels pixels = {v->width, v->height, 3, values};
+    const cli_pixels pixels = {(int32_t)v->width, (int32_t)v->height, 3, values};
     const int code = cli_document_png(out, page, &pixels);
     free(values);
     return code;
@@ -219,8 +203,8 @@ char *cli_comparison_pictures(const char *page, const vsh_channel_comparison *ch
     const int32_t w = compared->size[0], h = compared->size[1], longest = w > h ? w : h;
     const int32_t most = longest < LONGEST ? longest : LONGEST;
     view v = {.compared = compared};
-    v.width = (int32_t)fmax(1.0, (double)w * most / longest);
-    v.height = (int32_t)fmax(1.0, (double)h * most / longest);
+    v.width = (size_t)fmax(1.0, (double)w * most / longest);
+    v.height = (size_t)fmax(1.0, (double)h * most / longest);
     const size_t slice = (size_t)channel->measures.worst / ((size_t)w * (size_t)h);
     v.first = slice * (size_t)w * (size_t)h;
     set_scales(&v, channel);
@@ -282,18 +266,19 @@ static size_t count_tests(const cli_comparison *c, size_t *failures) {
     return tests;
 }
 
+/* Writes text with its special characters escaped, between markup. */
+static void put(FILE *out, const char *before, const char *text, const char *after) {
+    fputs(before, out);
+    cli_document_escape(out, text);
+    fputs(after, out);
+}
+
 static void write_case(FILE *out, const cli_comparison *c, const char *name, const char *failure) {
-    fputs("    <testcase classname=\"", out);
-    cli_document_escape(out, name_of(c));
-    fputs("\" name=\"", out);
-    cli_document_escape(out, name);
-    if (failure[0] == '\0') {
-        fputs("\"/>\n", out);
-        return;
+    put(out, "    <testcase classname=\"", name_of(c), "\"");
+    put(out, " name=\"", name, failure[0] == '\0' ? "\"/>\n" : "\">\n");
+    if (failure[0] != '\0') {
+        put(out, "      <failure message=\"", failure, "\"/>\n    </testcase>\n");
     }
-    fputs("\">\n      <failure message=\"", out);
-    cli_document_escape(out, failure);
-    fputs("\"/>\n    </testcase>\n", out);
 }
 
 static void write_junit(FILE *out, const void *user) {
@@ -306,11 +291,10 @@ static void write_junit(FILE *out, const void *user) {
             tests, failures);
     for (size_t i = 0; i < a->count; ++i) {
         const cli_comparison *c = &a->comparisons[i];
-        fputs("  <testsuite name=\"", out);
-        cli_document_escape(out, name_of(c));
         failures = 0;
         tests = count_tests(c, &failures);
-        fprintf(out, "\" tests=\"%zu\" failures=\"%zu\" errors=\"0\">\n", tests, failures);
+        put(out, "  <testsuite name=\"", name_of(c), "\"");
+        fprintf(out, " tests=\"%zu\" failures=\"%zu\" errors=\"0\">\n", tests, failures);
         const char *problem;
         const vsh_channel_comparison *channel;
         char text[CLI_EXPLANATION];
@@ -334,18 +318,12 @@ static void write_junit(FILE *out, const void *user) {
 static const char head[] =
     "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n"
     "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<style>\n"
-    "body{font:15px/1.5 system-ui,sans-serif;margin:1.5em auto;max-width:1200px;padding:0 1em;color:#111;"
-    "background:#fff;overflow-wrap:break-word}\n"
-    "h2{margin-top:2em}h2,h3{line-height:1.25}.good{color:#186a3b}.bad{color:#b00020}\n"
+    "body{font:15px/1.5 system-ui,sans-serif;margin:1.5em auto;max-width:1200px;padding:0 1em;"
+    "overflow-wrap:break-word}\n"
+    ".good{color:#186a3b}.bad{color:#b00020}figure{margin:0;font-size:13px}\n"
     ".three{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,280px),1fr));gap:1em}\n"
-    "figure{margin:0;font-size:13px}img{image-rendering:pixelated;outline:1px solid "
-    "#ddd;width:100%;height:auto}\n"
-    ".wide{overflow-x:auto}table{border-collapse:collapse;font-size:13px;margin:1em 0}"
-    "th,td{padding:.25em .7em;text-align:right;border-bottom:1px solid #e4e4e4;white-space:nowrap;"
-    "font-variant-numeric:tabular-nums}\n"
-    "td:first-child,th:first-child{text-align:left}td.bad{font-weight:600}code{font:13px "
-    "ui-monospace,monospace}\n"
-    "</style>\n";
+    "img{image-rendering:pixelated;outline:1px solid #ddd;width:100%;height:auto}\n"
+    "table{font-size:13px;margin:1em 0}th,td{padding:.2em .7em;text-align:left}\n</style>\n";
 
 static const char *verdict(bool alike) {
     return alike ? "<span class=\"good\">alike</span>" : "<span class=\"bad\">not alike</span>";
@@ -353,22 +331,17 @@ static const char *verdict(bool alike) {
 
 static void write_measures(FILE *out, const vsh_channel_comparison *channel) {
     const vsh_measures *m = &channel->measures;
-    fputs("<div class=\"wide\"><table><tr><th>measure</th>", out);
-    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-        fprintf(out, "<th>%s</th>", vsh_measure_name(i));
-    }
-    fputs("</tr>\n<tr><td>value</td>", out);
-    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-        fprintf(out, "<td%s>", (channel->failed >> i & 1) != 0 ? " class=\"bad\"" : "");
-        fprintf(out, isnan(m->value[i]) ? "–</td>" : "%.4g</td>", m->value[i]);
-    }
-    fputs("</tr>\n<tr><td>limit</td>", out);
-    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-        fprintf(out, "<td>≤ %g</td>", channel->limits.value[i]);
-    }
-    fputs("</tr></table></div>\n", out);
     char place[64];
-    fprintf(out, "<p>%" PRIu64 " values compared, in units of %g. Largest difference: %.6g for %.6g at %s.",
+    fputs("<table><tr><th>measure</th><th>value</th><th>limit</th></tr>\n", out);
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        fprintf(out, "<tr><td>%s</td><td%s>", vsh_measure_name(i),
+                (channel->failed >> i & 1) != 0 ? " class=\"bad\"" : "");
+        fprintf(out, isnan(m->value[i]) ? "–" : "%.4g", m->value[i]);
+        fprintf(out, "</td><td>%g</td></tr>\n", channel->limits.value[i]);
+    }
+    fprintf(out,
+            "</table>\n<p>%" PRIu64 " values compared, in units of %g. Largest difference: %.6g for %.6g "
+            "at %s.",
             m->count, m->range, m->worst_value[1], m->worst_value[0],
             cli_channel_place(channel, m->worst, place));
     if (m->pairs > 0) {
@@ -381,17 +354,12 @@ static void write_measures(FILE *out, const vsh_channel_comparison *channel) {
 static void write_channel(FILE *out, const vsh_channel_comparison *channel, const char *pictures) {
     char what[CLI_EXPLANATION];
     cli_channel_explain(channel, what);
-    fputs("<h3>", out);
-    cli_document_escape(out, channel->name);
-    fprintf(out, ": %s</h3>\n", verdict(channel->alike));
-    if (what[0] != '\0') {
-        fputs("<p>", out);
-        cli_document_escape(out, what);
-        fputs("</p>\n", out);
-    }
+    put(out, "<h3>", channel->name, ": ");
+    fprintf(out, "%s</h3>\n", verdict(channel->alike));
+    put(out, "<p>", what, "</p>\n");
     if (channel->is_coverage) {
         fprintf(out,
-                "<p>Coverage: %" PRIu64 " texels in golden, %" PRIu64 " in new, %" PRIu64
+                "<p>%" PRIu64 " texels covered in golden, %" PRIu64 " in new, %" PRIu64
                 " in one alone.</p>\n",
                 channel->coverage.golden, channel->coverage.values, channel->coverage.differs);
         return;
@@ -408,22 +376,15 @@ static void write_page(FILE *out, const void *user) {
     fputs("<title>vdbshade: golden and new</title>\n<h1>Golden and new</h1>\n", out);
     for (size_t i = 0; i < a->count; ++i) {
         const cli_comparison *c = &a->comparisons[i];
-        fputs("<h2>", out);
-        cli_document_escape(out, name_of(c));
-        fprintf(out, ": %s</h2>\n<p>", verdict(c->alike));
+        put(out, "<h2>", name_of(c), ": ");
+        fprintf(out, "%s</h2>\n", verdict(c->alike));
         if (c->golden != NULL && c->fresh != NULL) {
-            fputs("Golden: <code>", out);
-            cli_document_escape(out, c->golden);
-            fputs("</code>, new: <code>", out);
-            cli_document_escape(out, c->fresh);
-            fputs("</code>", out);
+            put(out, "<p>Golden: <code>", c->golden, "</code>");
+            put(out, ", new: <code>", c->fresh, "</code></p>\n");
         }
-        fputs("</p>\n", out);
         const char *problem;
         for (size_t k = 0; (problem = cli_comparison_problem(c, k)) != NULL; ++k) {
-            fputs("<p class=\"bad\">", out);
-            cli_document_escape(out, problem);
-            fputs("</p>\n", out);
+            put(out, "<p class=\"bad\">", problem, "</p>\n");
         }
         const vsh_channel_comparison *channel;
         for (size_t k = 0; (channel = vsh_comparison_channel(c->made, k)) != NULL; ++k) {
