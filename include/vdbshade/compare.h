@@ -101,7 +101,7 @@ typedef struct vsh_measures {
                               * are then measured after applying the curve to golden */
 } vsh_measures;
 
-/* Measures how far values are from golden ones. Takes 21 bytes a value beside the caller's, and runs under
+/* Measures how far values are from golden ones. Takes 13 bytes a value beside the caller's, and runs under
  * the stage "compare" on one thread. Errors:
  * - VSH_ERROR_ARGUMENT: compared, its planes or measures are NULL; sizes, options or run out of range;
  * - VSH_ERROR_LIMIT: run->memory_limit;

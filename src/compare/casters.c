@@ -15,65 +15,31 @@
 #include "compare/compare.h"
 
 #include <math.h>
-#include <string.h>
 
 /* --- regions */
 
-/* Planes of the least and the greatest value within the reach of each texel. */
-typedef struct extremes {
-    float *least, *greatest;
-} extremes;
-
-enum { MOST_REACH = 16, WINDOW = 2 * MOST_REACH + 1 };
-
-/* Extends the extremes by `reach` along the line that begins at `first`. */
-static void spread(const vshi_pair *pair, const extremes *e, int axis, size_t first, size_t reach) {
-    const size_t stride = pair->stride[axis], count = pair->size[axis], window = 2 * reach + 1;
-    float least[WINDOW], greatest[WINDOW]; /* a ring of the original values */
-    for (size_t next = 0; next < count + reach; ++next) {
-        const size_t slot = next % window, at = first + next * stride;
-        least[slot] = next < count ? e->least[at] : INFINITY;
-        greatest[slot] = next < count ? e->greatest[at] : -INFINITY;
-        if (next < reach) {
-            continue;
-        }
-        const size_t i = next - reach, begin = i > reach ? i - reach : 0;
-        float low = INFINITY, high = -INFINITY;
-        for (size_t k = begin; k <= next; ++k) {
-            low = fminf(low, least[k % window]);
-            high = fmaxf(high, greatest[k % window]);
-        }
-        e->least[first + i * stride] = low;
-        e->greatest[first + i * stride] = high;
-    }
-}
-
-/* Raises `off` to how far the values of `one` lie outside the range of the other plane nearby; `sign` turns
- * that into new - golden. */
-static void compare_nearby(const vshi_pair *pair, int one, double sign, size_t reach, const extremes *e,
-                           float *off) {
-    for (size_t i = 0; i < pair->count; ++i) {
-        const float value = (float)vshi_value_at(pair, 1 - one, i);
-        e->least[i] = pair->mask[i] ? value : INFINITY;
-        e->greatest[i] = pair->mask[i] ? value : -INFINITY;
-    }
+/* Finds how far a value of plane `one` lies outside the range of the other plane within `reach`. */
+static double find_excess(const vshi_pair *pair, int one, size_t i, size_t reach) {
+    const double value = vshi_value_at(pair, one, i);
+    double low = vshi_value_at(pair, 1 - one, i), high = low;
+    size_t place[3], first[3], last[3];
+    vshi_find_place(pair, i, place);
     for (int axis = 0; axis < 3; ++axis) {
-        for (size_t i = 0; i < pair->count && pair->size[axis] > 1; ++i) {
-            if (i / pair->stride[axis] % pair->size[axis] == 0) {
-                spread(pair, e, axis, i, reach);
+        first[axis] = place[axis] > reach ? place[axis] - reach : 0;
+        last[axis] = place[axis] + reach < pair->size[axis] ? place[axis] + reach : pair->size[axis] - 1;
+    }
+    for (size_t z = first[2]; z <= last[2]; ++z) {
+        for (size_t y = first[1]; y <= last[1]; ++y) {
+            for (size_t x = first[0]; x <= last[0] && (value < low || value > high); ++x) {
+                const size_t at = x + y * pair->stride[1] + z * pair->stride[2];
+                if (pair->mask[at]) {
+                    low = fmin(low, vshi_value_at(pair, 1 - one, at));
+                    high = fmax(high, vshi_value_at(pair, 1 - one, at));
+                }
             }
         }
     }
-    for (size_t i = 0; i < pair->count; ++i) {
-        if (pair->mask[i]) {
-            const double value = vshi_value_at(pair, one, i);
-            const double outside =
-                fmax(0.0, value - (double)e->greatest[i]) + fmin(0.0, value - (double)e->least[i]);
-            if (fabs(outside) > fabs((double)off[i])) {
-                off[i] = (float)(sign * outside);
-            }
-        }
-    }
+    return fmax(0.0, value - high) + fmin(0.0, value - low);
 }
 
 /* Measures the region of texel `start`, and clears it in `off`. */
@@ -121,14 +87,15 @@ static vsh_region extract_region(const vshi_pair *pair, float *off, uint32_t *st
 
 void vshi_measure_regions(const vshi_pair *pair, const vsh_compare_options *options, void *scratch,
                           vsh_measures *m) {
-    float *planes = scratch;
-    float *off = planes + 2 * pair->count;
-    const extremes e = {planes, planes + pair->count};
-    memset(off, 0, pair->count * sizeof *off);
-    compare_nearby(pair, VSHI_NEW, 1.0, (size_t)options->reach, &e, off);
-    compare_nearby(pair, VSHI_GOLDEN, -1.0, (size_t)options->reach, &e, off);
+    float *off = scratch;
+    uint32_t *stack = (uint32_t *)(off + pair->count); /* holds no texel twice */
     const double step = options->step + VSHI_NOISE_P99 * fmax(options->noise, m->noise);
-    uint32_t *stack = (uint32_t *)(planes + 3 * pair->count); /* no texel is on it twice */
+    for (size_t i = 0; i < pair->count; ++i) {
+        const size_t reach = (size_t)options->reach;
+        const double came = pair->mask[i] ? find_excess(pair, VSHI_NEW, i, reach) : 0.0;
+        const double went = pair->mask[i] ? -find_excess(pair, VSHI_GOLDEN, i, reach) : 0.0;
+        off[i] = (float)(fabs(went) > fabs(came) ? went : came);
+    }
     for (size_t i = 0; i < pair->count; ++i) {
         if (fabs((double)off[i]) >= step) {
             vsh_region *largest = off[i] > 0.0f ? &m->lost : &m->gained;

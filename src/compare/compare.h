@@ -40,7 +40,7 @@ static inline void vshi_find_place(const vshi_pair *pair, size_t i, size_t place
 #define VSHI_NOISE_WIDTH 5.0
 
 /* Bytes of scratch for each value. */
-enum { VSHI_SHIFT_SCRATCH = 5, VSHI_REGIONS_SCRATCH = 16 };
+enum { VSHI_SHIFT_SCRATCH = 5, VSHI_REGIONS_SCRATCH = 8 };
 
 /* Each function fills its own members of the measures. */
 void vshi_measure_shift(const vshi_pair *pair, void *scratch, vsh_measures *measures);
