@@ -64,15 +64,10 @@ static vsh_region extract_region(const vshi_pair *pair, float *off, uint32_t *st
             region.min[axis] = p < region.min[axis] ? p : region.min[axis];
             region.max[axis] = p > region.max[axis] ? p : region.max[axis];
         }
-        for (int neighbour = 0; neighbour < 27; ++neighbour) {
-            size_t to = 0;
-            bool inside = true;
-            for (int axis = 0, rest = neighbour; axis < 3; ++axis, rest /= 3) {
-                const size_t p = place[axis] + (size_t)(rest % 3); /* its place plus one */
-                inside = inside && p >= 1 && p <= pair->size[axis];
-                to += inside ? (p - 1) * pair->stride[axis] : 0;
-            }
-            if (inside && sign * (double)off[to] >= step) {
+        for (int k = 0; k < 27; ++k) {
+            const int offset[3] = {k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1};
+            size_t to;
+            if (vshi_find_offset(pair, place, offset, &to) && sign * (double)off[to] >= step) {
                 if (fabs((double)off[to]) > fabs(region.by)) {
                     region.by = (double)off[to];
                     region.worst = to;
@@ -111,20 +106,6 @@ void vshi_measure_regions(const vshi_pair *pair, const vsh_compare_options *opti
 
 /* --- noise */
 
-/* Finds both neighbours along a direction; false if one is not compared. */
-static bool find_neighbours(const vshi_pair *pair, size_t i, const size_t place[3], const int direction[3],
-                            size_t neighbour[2]) {
-    neighbour[0] = neighbour[1] = i;
-    for (int axis = 0; axis < 3; ++axis) {
-        if (direction[axis] != 0 && (place[axis] == 0 || place[axis] + 1 >= pair->size[axis])) {
-            return false;
-        }
-        neighbour[0] -= (size_t)direction[axis] * pair->stride[axis]; /* wraps around twice if negative */
-        neighbour[1] += (size_t)direction[axis] * pair->stride[axis];
-    }
-    return pair->mask[neighbour[0]] && pair->mask[neighbour[1]];
-}
-
 /* Squares the difference's deviation from the mean of its two neighbours, along the direction in which the
  * bakes change least. Negative if there are no neighbours. */
 static double find_unshared(const vshi_pair *pair, size_t i) {
@@ -132,15 +113,15 @@ static double find_unshared(const vshi_pair *pair, size_t i) {
     size_t place[3];
     vshi_find_place(pair, i, place);
     for (int d = 14; d < (pair->size[2] > 1 ? 27 : 18); ++d) { /* half of 3 × 3 × 3: the rest is opposite */
-        const int direction[3] = {d % 3 - 1, d / 3 % 3 - 1, d / 9 - 1};
+        const int front[3] = {d % 3 - 1, d / 3 % 3 - 1, d / 9 - 1},
+                  back[3] = {-front[0], -front[1], -front[2]};
         size_t at[2];
-        if (!find_neighbours(pair, i, place, direction, at)) {
+        if (!vshi_find_offset(pair, place, back, &at[0]) || !vshi_find_offset(pair, place, front, &at[1]) ||
+            !pair->mask[at[0]] || !pair->mask[at[1]]) {
             continue;
         }
-        double steps = 0.0, length = 0.0;
-        for (int axis = 0; axis < 3; ++axis) {
-            length += direction[axis] * direction[axis];
-        }
+        const double length = front[0] * front[0] + front[1] * front[1] + front[2] * front[2];
+        double steps = 0.0;
         for (int which = 0; which < 2; ++which) {
             steps += vshi_value_at(pair, which, at[1]) - vshi_value_at(pair, which, at[0]);
         }

@@ -32,6 +32,20 @@ static inline void vshi_find_place(const vshi_pair *pair, size_t i, size_t place
     place[2] = i / pair->stride[2];
 }
 
+/* Finds the value at an offset from a place; false if it lies outside. */
+static inline bool vshi_find_offset(const vshi_pair *pair, const size_t place[3], const int offset[3],
+                                    size_t *at) {
+    *at = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const ptrdiff_t p = (ptrdiff_t)place[axis] + offset[axis];
+        if (p < 0 || p >= (ptrdiff_t)pair->size[axis]) {
+            return false;
+        }
+        *at += (size_t)p * pair->stride[axis];
+    }
+    return true;
+}
+
 /* 99 of 100 normal values lie within so many standard errors. The 99th percentile of sizes is there, too. */
 #define VSHI_NOISE_P99 2.6
 

@@ -38,34 +38,27 @@ typedef struct registration {
 
 /* Golden's slope at a value, smoothed by 1 2 1 across each axis (Sobel), which removes most of the stairs of
  * hard edges. False if a neighbour is missing. */
-static bool smooth_slope(const vshi_pair *pair, size_t i, const size_t place[3], double slope[3]) {
-    slope[0] = slope[1] = slope[2] = 0.0;
-    for (int axis = 0; axis < 3; ++axis) {
-        if (pair->size[axis] > 1 && (place[axis] == 0 || place[axis] + 1 == pair->size[axis])) {
-            return false;
-        }
-    }
+static bool smooth_slope(const vshi_pair *pair, const size_t place[3], double slope[3]) {
     const bool flat = pair->size[2] == 1;
-    for (int corner = flat ? 9 : 0; corner < (flat ? 18 : 27); ++corner) {
-        const int off[3] = {corner % 3 - 1, corner / 3 % 3 - 1, corner / 9 - 1};
-        size_t at = i;
+    slope[0] = slope[1] = slope[2] = 0.0;
+    for (int k = flat ? 9 : 0; k < (flat ? 18 : 27); ++k) {
+        const int offset[3] = {k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1};
         double weight[3]; /* across each axis */
         bool there = true;
         for (int axis = 0; axis < 3; ++axis) {
-            there = there && (pair->size[axis] > 1 || off[axis] == 0);
-            at += (size_t)off[axis] * pair->stride[axis]; /* wraps around twice if negative */
-            weight[axis] = pair->size[axis] == 1 ? 1.0 : off[axis] == 0 ? 0.5 : 0.25;
+            there = there && (pair->size[axis] > 1 || offset[axis] == 0);
+            weight[axis] = pair->size[axis] == 1 ? 1.0 : offset[axis] == 0 ? 0.5 : 0.25;
         }
+        size_t at;
         if (!there) {
             continue;
         }
-        if (!pair->mask[at]) {
+        if (!vshi_find_offset(pair, place, offset, &at) || !pair->mask[at]) {
             return false;
         }
-        const double v = vshi_value_at(pair, VSHI_GOLDEN, at);
         for (int axis = 0; axis < 3; ++axis) {
-            const double across = weight[(axis + 1) % 3] * weight[(axis + 2) % 3];
-            slope[axis] += 0.5 * off[axis] * across * v;
+            slope[axis] += 0.5 * offset[axis] * weight[(axis + 1) % 3] * weight[(axis + 2) % 3] *
+                           vshi_value_at(pair, VSHI_GOLDEN, at);
         }
     }
     return true;
@@ -101,7 +94,7 @@ static void find_directions(registration *r) {
         size_t place[3];
         double slope[3];
         vshi_find_place(r->pair, i, place);
-        if (r->pair->mask[i] && smooth_slope(r->pair, i, place, slope)) {
+        if (r->pair->mask[i] && smooth_slope(r->pair, place, slope)) {
             for (int k = 0; k < 9; ++k) {
                 tensor[k / 3][k % 3] += slope[k / 3] * slope[k % 3];
             }
@@ -128,30 +121,28 @@ static void find_directions(registration *r) {
 /* Interpolates the new values at p + shift into moved[p]. */
 static void move_back(registration *r, const double shift[3]) {
     const vshi_pair *pair = r->pair;
-    ptrdiff_t base[3];
+    int base[3];
     double part[3];
     for (int axis = 0; axis < 3; ++axis) {
-        base[axis] = (ptrdiff_t)floor(shift[axis]);
+        base[axis] = (int)floor(shift[axis]);
         part[axis] = shift[axis] - (double)base[axis];
     }
     for (size_t i = 0; i < pair->count; ++i) {
-        size_t place[3];
+        size_t place[3], at;
         vshi_find_place(pair, i, place);
         double sum = 0.0;
         bool good = pair->mask[i] != 0;
         for (int corner = 0; corner < 8 && good; ++corner) {
             double weight = 1.0;
-            size_t at = 0;
+            int offset[3];
             for (int axis = 0; axis < 3; ++axis) {
                 const int up = corner >> axis & 1;
-                const ptrdiff_t k = (ptrdiff_t)place[axis] + base[axis] + up;
                 weight *= up ? part[axis] : 1.0 - part[axis];
-                good = good && (weight == 0.0 || (k >= 0 && k < (ptrdiff_t)pair->size[axis]));
-                at += weight == 0.0 ? 0 : (size_t)k * pair->stride[axis];
+                offset[axis] = base[axis] + up;
             }
-            if (weight != 0.0 && good) {
-                good = pair->mask[at] != 0;
-                sum += weight * vshi_value_at(pair, VSHI_NEW, at);
+            if (weight != 0.0) {
+                good = vshi_find_offset(pair, place, offset, &at) && pair->mask[at] != 0;
+                sum += good ? weight * vshi_value_at(pair, VSHI_NEW, at) : 0.0;
             }
         }
         r->valid[i] = good;
