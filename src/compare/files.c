@@ -140,13 +140,17 @@ typedef struct images {
     vsh_image_file *file[2]; /* golden, new */
     vsh_image image[2];
     attributes texts[2];
-    const char *names[2][VSH_MAX_CHANNELS]; /* of the images */
-    const float *planes[2][VSH_MAX_CHANNELS];
-    uint8_t *mask; /* texels to compare */
+    bool picture[2]; /* R, G and B only show other channels of the file */
+    uint8_t *mask;   /* texels to compare */
 } images;
 
-static const float *find_plane(const vsh_image *image, const char *name) {
-    for (int32_t i = 0; i < image->channel_count; ++i) {
+static bool is_compared(const images *both, int which, const char *name) {
+    return !both->picture[which] || strlen(name) != 1 || strchr("RGB", name[0]) == NULL;
+}
+
+static const float *find_plane(const images *both, int which, const char *name) {
+    const vsh_image *image = &both->image[which];
+    for (int32_t i = 0; i < image->channel_count && is_compared(both, which, name); ++i) {
         if (strcmp(image->names[i], name) == 0) {
             return image->planes[i];
         }
@@ -154,46 +158,32 @@ static const float *find_plane(const vsh_image *image, const char *name) {
     return NULL;
 }
 
-/* Lists the channels of a file once: without R, G and B if they only show other channels. */
-static void list_channels(images *both, int which) {
-    const vsh_image all = vsh_image_view(both->file[which]);
-    const attributes *texts = &both->texts[which];
-    bool shown = false, others = false;
-    for (size_t i = 0; i < texts->count; ++i) {
-        shown = shown || strcmp(texts->list[i].name, VSH_IMAGE_RGB) == 0;
-    }
-    for (int32_t c = 0; c < all.channel_count; ++c) {
-        others = others || strlen(all.names[c]) != 1;
-    }
-    vsh_image *image = &both->image[which];
-    *image = (vsh_image){all.width, all.height, 0, both->names[which], both->planes[which], NULL};
-    for (int32_t c = 0; c < all.channel_count; ++c) {
-        const char *name = all.names[c];
-        if (!shown || !others || strlen(name) != 1 || strchr("RGB", name[0]) == NULL) {
-            both->names[which][image->channel_count] = name;
-            both->planes[which][image->channel_count++] = all.planes[c];
-        }
-    }
-}
-
 static vsh_result read_both(files *f, images *both, vsh_error *error) {
     for (int which = 0; which < 2; ++which) {
         VSHI_TRY(vsh_image_read(f->path[which], &f->run, &both->file[which], error));
-        const vsh_image all = vsh_image_view(both->file[which]);
+        const vsh_image image = both->image[which] = vsh_image_view(both->file[which]);
         f->run.memory_held +=
-            sizeof(float) * (uint64_t)all.width * (uint64_t)all.height * (uint64_t)all.channel_count;
-        both->texts[which].list = vsh_image_attributes(both->file[which], &both->texts[which].count);
-        list_channels(both, which);
+            sizeof(float) * (uint64_t)image.width * (uint64_t)image.height * (uint64_t)image.channel_count;
+        attributes *texts = &both->texts[which];
+        texts->list = vsh_image_attributes(both->file[which], &texts->count);
+        bool shown = false, others = false;
+        for (size_t i = 0; i < texts->count; ++i) {
+            shown = shown || strcmp(texts->list[i].name, VSH_IMAGE_RGB) == 0;
+        }
+        for (int32_t c = 0; c < image.channel_count; ++c) {
+            others = others || strlen(image.names[c]) != 1;
+        }
+        both->picture[which] = shown && others;
     }
     return VSH_OK;
 }
 
 static vsh_result compare_names(const files *f, const images *both, vsh_error *error) {
     for (int which = 0; which < 2; ++which) {
-        const vsh_image *image = &both->image[which];
-        for (int32_t i = 0; i < image->channel_count; ++i) {
-            if (find_plane(&both->image[1 - which], image->names[i]) == NULL) {
-                VSHI_TRY(add_problem(f, error, "channel '%s': in %s alone", image->names[i],
+        for (int32_t i = 0; i < both->image[which].channel_count; ++i) {
+            const char *name = both->image[which].names[i];
+            if (is_compared(both, which, name) && find_plane(both, 1 - which, name) == NULL) {
+                VSHI_TRY(add_problem(f, error, "channel '%s': in %s alone", name,
                                      which == 0 ? "golden" : "the new image"));
             }
         }
@@ -203,24 +193,24 @@ static vsh_result compare_names(const files *f, const images *both, vsh_error *e
 
 /* Makes the mask. Coverage is a channel of the results if one of the files has it. */
 static vsh_result compare_coverage(const files *f, images *both, vsh_error *error) {
-    const vsh_image *golden = &both->image[0];
-    const char *name = f->options.coverage;
-    const size_t count = (size_t)golden->width * (size_t)golden->height;
+    const int32_t width = both->image[0].width, height = both->image[0].height;
+    const size_t count = (size_t)width * (size_t)height;
     void *mask;
     VSHI_TRY(vshi_allocate(&mask, count, 1, f->path[0], error));
     both->mask = mask;
-    const float *was = find_plane(golden, name), *is = find_plane(&both->image[1], name);
+    const float *golden = find_plane(both, 0, f->options.coverage);
+    const float *fresh = find_plane(both, 1, f->options.coverage);
     vsh_coverage coverage;
-    vsh_compare_coverage(count, was, is, both->mask, &coverage);
+    vsh_compare_coverage(count, golden, fresh, both->mask, &coverage);
     if (f->options.padding) {
         memset(both->mask, 1, count);
     }
-    if (was == NULL && is == NULL) {
+    if (golden == NULL && fresh == NULL) {
         return VSH_OK;
     }
     vsh_channel_comparison *channel;
-    VSHI_TRY(add_channel(f, name, both->texts, &channel, error));
-    memcpy(channel->size, (const int32_t[]){golden->width, golden->height, 1}, sizeof channel->size);
+    VSHI_TRY(add_channel(f, f->options.coverage, both->texts, &channel, error));
+    memcpy(channel->size, (const int32_t[]){width, height, 1}, sizeof channel->size);
     channel->is_coverage = 1;
     set_coverage(channel, &coverage);
     return VSH_OK;
@@ -230,7 +220,7 @@ static vsh_result compare_channels(const files *f, const images *both, vsh_error
     const vsh_image *golden = &both->image[0];
     for (int32_t i = 0; i < golden->channel_count; ++i) {
         const char *name = golden->names[i];
-        const float *values = find_plane(&both->image[1], name);
+        const float *values = is_compared(both, 0, name) ? find_plane(both, 1, name) : NULL;
         if (values == NULL || strcmp(name, f->options.coverage) == 0) {
             continue;
         }
@@ -244,21 +234,20 @@ static vsh_result compare_channels(const files *f, const images *both, vsh_error
     return VSH_OK;
 }
 
-static vsh_result compare_planes(files *f, images *both, vsh_error *error) {
-    VSHI_TRY(read_both(f, both, error));
-    VSHI_TRY(compare_names(f, both, error));
-    const vsh_image *golden = &both->image[0], *fresh = &both->image[1];
-    if (golden->width != fresh->width || golden->height != fresh->height) {
-        return add_problem(f, error, "size: golden is %d × %d, new is %d × %d", golden->width, golden->height,
-                           fresh->width, fresh->height);
-    }
-    VSHI_TRY(compare_coverage(f, both, error));
-    return compare_channels(f, both, error);
-}
-
 static vsh_result compare_images(files *f, vsh_error *error) {
     images both = {.mask = NULL};
-    const vsh_result result = compare_planes(f, &both, error);
+    vsh_result result;
+    VSHI_TRY_DONE(read_both(f, &both, error));
+    VSHI_TRY_DONE(compare_names(f, &both, error));
+    const vsh_image *golden = &both.image[0], *fresh = &both.image[1];
+    if (golden->width != fresh->width || golden->height != fresh->height) {
+        result = add_problem(f, error, "size: golden is %d × %d, new is %d × %d", golden->width,
+                             golden->height, fresh->width, fresh->height);
+        goto done;
+    }
+    VSHI_TRY_DONE(compare_coverage(f, &both, error));
+    VSHI_TRY_DONE(compare_channels(f, &both, error));
+done:
     free(both.mask);
     vsh_image_free(both.file[0]);
     vsh_image_free(both.file[1]);
@@ -298,8 +287,7 @@ static vsh_result read_lattice(const files *f, const char *path, const char *nam
     vsh_voxels *voxels = NULL;
     VSHI_TRY(vsh_voxels_from_vdb(path, name, &f->run, &voxels, error));
     for (int i = 0; i < 4; ++i) {
-        const int32_t index[3] = {i == 1, i == 2, i == 3};
-        vsh_voxels_centre(voxels, index, places[i]);
+        vsh_voxels_centre(voxels, (const int32_t[3]){i == 1, i == 2, i == 3}, places[i]);
     }
     vsh_voxels_free(voxels);
     return VSH_OK;
@@ -307,10 +295,9 @@ static vsh_result read_lattice(const files *f, const char *path, const char *nam
 
 /* Compares where the voxels of both lie. */
 static vsh_result compare_lattices(const files *f, const char *name, bool *same, vsh_error *error) {
-    double golden[4][3], fresh[4][3];
+    double golden[4][3], fresh[4][3], largest = 0.0, voxel = 0.0;
     VSHI_TRY(read_lattice(f, f->path[0], name, golden, error));
     VSHI_TRY(read_lattice(f, f->path[1], name, fresh, error));
-    double largest = 0.0, voxel = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
         const double side = golden[1][axis] - golden[0][axis];
         voxel += side * side;
@@ -353,12 +340,10 @@ static vsh_result set_box(const files *f, const vsh_vdb_entry *golden, const vsh
                           vsh_channel_comparison *channel, size_t *count, vsh_error *error) {
     double voxels = 1.0;
     for (int axis = 0; axis < 3; ++axis) {
-        const int32_t low = golden->index_min[axis] < fresh->index_min[axis] ? golden->index_min[axis]
-                                                                             : fresh->index_min[axis];
-        const int32_t high = golden->index_max[axis] > fresh->index_max[axis] ? golden->index_max[axis]
-                                                                              : fresh->index_max[axis];
-        channel->origin[axis] = low;
-        const double side = (double)high - (double)low + 1.0;
+        const double low = fmin(golden->index_min[axis], fresh->index_min[axis]);
+        const double high = fmax(golden->index_max[axis], fresh->index_max[axis]);
+        channel->origin[axis] = (int32_t)low;
+        const double side = high - low + 1.0;
         channel->size[axis] = side < (double)INT32_MAX ? (int32_t)side : INT32_MAX;
         voxels *= side;
     }
@@ -444,9 +429,6 @@ static vsh_result compare_grid(const files *f, vsh_vdb_entry *golden, vsh_vdb_en
 
 static vsh_result compare_lists(const files *f, listing lists[2], vsh_error *error) {
     for (int which = 0; which < 2; ++which) {
-        VSHI_TRY(list_grids(f, f->path[which], &lists[which], error));
-    }
-    for (int which = 0; which < 2; ++which) {
         for (size_t i = 0; i < lists[which].count; ++i) {
             const char *name = lists[which].entries[i].name;
             if (find_grid(&lists[1 - which], name) == NULL) {
@@ -466,7 +448,11 @@ static vsh_result compare_lists(const files *f, listing lists[2], vsh_error *err
 
 static vsh_result compare_grids(files *f, vsh_error *error) {
     listing lists[2] = {{NULL, 0}, {NULL, 0}};
-    const vsh_result result = compare_lists(f, lists, error);
+    vsh_result result;
+    VSHI_TRY_DONE(list_grids(f, f->path[0], &lists[0], error));
+    VSHI_TRY_DONE(list_grids(f, f->path[1], &lists[1], error));
+    VSHI_TRY_DONE(compare_lists(f, lists, error));
+done:
     free(lists[0].entries);
     free(lists[1].entries);
     return result;
