@@ -118,28 +118,26 @@ static edge measure_edge(const line *l, int which, size_t begin, size_t end) {
     return e;
 }
 
-/* -1 dark, 1 light, 0 between. */
-static int side_of(const line *l, double v) {
-    return v <= l->sides.low ? -1 : v >= l->sides.high ? 1 : 0;
+/* Finds the next two texels on different sides, from crossing[1] on. */
+static bool find_crossing(const line *l, int which, size_t crossing[2]) {
+    int side = 0; /* of texel crossing[0]: -1 dark, 1 light */
+    for (size_t i = crossing[1]; i < l->count; ++i) {
+        const double v = valid(l, i) ? value(l, which, i) : NAN;
+        const int now = v <= l->sides.low ? -1 : v >= l->sides.high ? 1 : 0;
+        if (side != 0 && now == -side) {
+            crossing[1] = i;
+            return true;
+        }
+        side = isnan(v) ? 0 : now != 0 ? now : side;
+        crossing[0] = now != 0 ? i : crossing[0];
+    }
+    return false;
 }
 
 static size_t find_edges(const line *l, int which, edge *edges) {
-    size_t count = 0, last = 0;
-    int side = 0; /* of texel `last`; 0: none yet */
-    for (size_t i = 0; i < l->count; ++i) {
-        if (!valid(l, i)) {
-            side = 0;
-            continue;
-        }
-        const int now = side_of(l, value(l, which, i));
-        if (now == 0) {
-            continue;
-        }
-        if (side != 0 && now != side) {
-            edges[count++] = measure_edge(l, which, last, i);
-        }
-        side = now;
-        last = i;
+    size_t count = 0, crossing[2] = {0, 0};
+    while (find_crossing(l, which, crossing)) {
+        edges[count++] = measure_edge(l, which, crossing[0], crossing[1]);
     }
     return count;
 }
@@ -149,8 +147,7 @@ static void find_nearest(edge *edges, size_t count, const edge *others, size_t o
     for (size_t i = 0, begin = 0; i < count; ++i) {
         double best = INFINITY;
         edges[i].near = SIZE_MAX;
-        while (begin < other_count && others[begin].at < edges[i].at && begin + 1 < other_count &&
-               others[begin + 1].at < edges[i].at) {
+        while (begin + 1 < other_count && others[begin + 1].at < edges[i].at) {
             ++begin;
         }
         for (size_t k = begin > 0 ? begin - 1 : 0; k < other_count && k < begin + 4; ++k) {
@@ -256,8 +253,7 @@ vsh_result vshi_measure_penumbrae(const vshi_pair *pair, double allowed, vsh_mea
         m->width[which] = t.width[which] / (double)t.pairs;
     }
     if (t.pairs >= FEWEST_EDGES) {
-        /* Many texels of a wide penumbra may pass a mark, so noise moves the mean width as far as one edge's.
-         */
+        /* many texels of a wide penumbra may pass a mark: noise moves the mean as far as one edge's width */
         const double range = (l.sides.high - l.sides.low) / (HIGH - LOW);
         const double excused = VSHI_NOISE_WIDTH * fmax(0.0, noise - allowed) / range;
         const double ratio = t.width[VSHI_NEW] / t.width[VSHI_GOLDEN];
@@ -289,31 +285,14 @@ static void add_width(const line *l, size_t begin, size_t end, double *golden, d
     *off += fabs(length_of(l, VSHI_NEW, begin, end) - width);
 }
 
-static void add_widths_of_line(const line *l, double *golden, double *off) {
-    size_t last = 0;
-    int side = 0; /* of texel `last`; 0: none yet */
-    for (size_t i = 0; i < l->count; ++i) {
-        const double v = valid(l, i) ? value(l, VSHI_GOLDEN, i) : NAN;
-        const int now = side_of(l, v);
-        if (now == 0) {
-            side = isnan(v) ? 0 : side;
-            continue;
-        }
-        if (side != 0 && now != side) {
-            add_width(l, last, i, golden, off);
-        }
-        side = now;
-        last = i;
-    }
-}
-
 void vshi_add_widths(const vshi_pair *pair, double *golden, double *off) {
     line l = {.pair = pair, .sides = {LOW, HIGH}};
     for (int axis = 0; axis < 3; ++axis) {
         set_axis(&l, axis);
         for (size_t i = 0; i < pair->count; ++i) {
-            if (begins_line(&l, i)) {
-                add_widths_of_line(&l, golden, off);
+            size_t crossing[2] = {0, 0};
+            while (begins_line(&l, i) && find_crossing(&l, VSHI_GOLDEN, crossing)) {
+                add_width(&l, crossing[0], crossing[1], golden, off);
             }
         }
     }
