@@ -304,6 +304,27 @@ static void a_shadow_below_the_step_is_not_seen(void **unused) {
     assert_int_equal(compare_bars((bar){3.0, 0.88, 0.0}, gone).lost.count, 60);
 }
 
+static void faults_of_the_promised_size_fail(void **unused) {
+    (void)unused;
+    const vsh_limits limits = vsh_limits_default();
+    const ball still = {{40.0, 45.0, 0.0}, 18.0, 2.5}, shifted = {{40.25, 45.0, 0.0}, 18.0, 2.5};
+    const ball wider = {{40.0, 45.0, 0.0}, 18.0, 2.75};
+    plane a = make_plane(SIDE, SIDE, 1, ball_at, &still), b = make_plane(SIDE, SIDE, 1, ball_at, &shifted);
+    vsh_measures m = measure(&a, &b, NULL);
+    assert_true(vsh_compare_judge(&m, &limits) >> VSH_MEASURE_SHIFT & 1);
+    free(b.values);
+    b = make_plane(SIDE, SIDE, 1, ball_at, &wider);
+    m = measure(&a, &b, NULL);
+    assert_true(vsh_compare_judge(&m, &limits) >> VSH_MEASURE_PENUMBRA & 1);
+    for (size_t i = 0; i < 4; ++i) { /* a shadow of four texels, in the lit corner */
+        b.values[(90 + i / 2) * SIDE + 90 + i % 2] = 0.0f;
+    }
+    m = measure(&b, &a, NULL);
+    assert_true(vsh_compare_judge(&m, &limits) >> VSH_MEASURE_LOST & 1);
+    free(a.values);
+    free(b.values);
+}
+
 static double ball_in_a_corner(const void *user, double x, double y, double z) {
     (void)user;
     return x * x + y * y + z * z < 16.0 ? 0.0 : 1.0;
@@ -340,6 +361,7 @@ int main(void) {
         cmocka_unit_test(a_lost_bar_is_a_lost_region_of_its_size_however_thin),
         cmocka_unit_test(what_moved_within_reach_is_not_lost),
         cmocka_unit_test(a_shadow_below_the_step_is_not_seen),
+        cmocka_unit_test(faults_of_the_promised_size_fail),
         cmocka_unit_test(a_region_in_space_is_counted_in_voxels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
