@@ -17,16 +17,16 @@ extern "C" {
 /* --- coverage */
 
 typedef struct vsh_coverage {
-    uint64_t golden;  /* texels covered in each */
-    uint64_t values;  /* … */
-    uint64_t both;    /* in both: what values are compared over */
-    uint64_t differs; /* in one of the two alone */
-    uint64_t first;   /* index of the first of those; `count` where there is none */
-    double share;     /* differs / covered in either; 0 where nothing is covered */
+    uint64_t golden;  /* texels covered in golden */
+    uint64_t values;  /* texels covered in the new values */
+    uint64_t both;    /* texels covered in both: there, values are compared */
+    uint64_t differs; /* texels covered in one alone */
+    uint64_t first;   /* index of the first of those; `count` if there are none */
+    double share;     /* differs / texels covered in either; 0 if there are none */
 } vsh_coverage;
 
-/* Compares two planes of coverage [count], a texel being covered where its value is above 1/2 (NULL: all
- * are), and writes 1 into mask[count] (may be NULL) where both are, else 0. Cannot fail. */
+/* Compares two planes of coverage [count]. Texels above 1/2 are covered (NULL: all are). Writes 1 into
+ * mask[count] (may be NULL) where both are covered, else 0. Cannot fail. */
 VSH_API void vsh_compare_coverage(uint64_t count, const float *golden, const float *values, uint8_t *mask,
                                   vsh_coverage *coverage);
 
@@ -36,8 +36,8 @@ VSH_API void vsh_compare_coverage(uint64_t count, const float *golden, const flo
 typedef struct vsh_compared {
     int32_t size[3];     /* width, height, depth, 1 … 2^31 values in all; depth 1: an image */
     const float *golden; /* [depth][height][width] */
-    const float *values; /* the same: what is to be like `golden` */
-    const uint8_t *mask; /* the same: compared where it is not 0. NULL: everywhere */
+    const float *values; /* [depth][height][width]: the new values */
+    const uint8_t *mask; /* [depth][height][width]: nonzero values are compared. NULL: all are */
 } vsh_compared;
 
 /* How values are compared. Values are in units of the range (vsh_measures.range). */
@@ -111,23 +111,23 @@ VSH_API vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_o
 
 /* --- against a truth */
 
-/* How far values are from the truth, over several planes together. Zeros where nothing is compared. */
+/* Errors of values against the truth, over several planes together. Zeros if nothing is compared. */
 typedef struct vsh_accuracy {
     uint64_t count;       /* values compared: masked in, finite in both */
-    uint64_t penumbra;    /* of them with a truth in 0.02 … 0.98 */
-    double rmse;          /* over all */
-    double penumbra_rmse; /* over the penumbra; 0 where there is none */
+    uint64_t penumbra;    /* number of values with a truth of 0.02 … 0.98 */
+    double rmse;          /* of all values */
+    double penumbra_rmse; /* of the penumbra; 0 if there is none */
     double bias;          /* mean of value - truth */
     double p95, p99;      /* of |value - truth|, nearest rank */
-    double max;           /* the same, the largest */
-    /* Σ |w - v| / Σ v over the penumbrae that lines of the truth along each axis cross from 0.1 to 0.9, v and
-     * w the lengths that truth and values spend between the two around that place; NaN if there are none.
-     * A penumbra without a counterpart counts as 1. */
+    double max;           /* largest |value - truth| */
+    /* Σ |w - v| / Σ v over the penumbrae that the truth has along lines of each axis, from 0.1 to 0.9. v is
+     * the length of the truth between these values, and w that of the values at the same place. A penumbra
+     * without a counterpart counts as 1. NaN if there are no penumbrae. */
     double width_error;
 } vsh_accuracy;
 
-/* Measures how far planes of values, which lie in 0 … 1, are from their truth, which is `golden`. Takes 10
- * bytes a value with the caller's. Errors:
+/* Measures how far planes of values, 0 … 1, are from their truth, which is `golden`. Takes a byte a value
+ * beside the caller's. Errors:
  * - VSH_ERROR_ARGUMENT: planes or accuracy NULL, a plane's values NULL, its size, run;
  * - VSH_ERROR_LIMIT: run->memory_limit;
  * - VSH_ERROR_MEMORY. */
@@ -161,12 +161,12 @@ typedef struct vsh_tolerances vsh_tolerances;
 
 /* Reads such a file. Free it with vsh_tolerances_free(). Errors: VSH_ERROR_ARGUMENT (path or tolerances
  * NULL), VSH_ERROR_READ, VSH_ERROR_INPUT (no JSON, unknown keys, values out of range, with the place),
- * VSH_ERROR_LIMIT (one whose values may take over 64 MiB). */
+ * VSH_ERROR_LIMIT (the parsed file may take over 64 MiB). */
 VSH_API vsh_result vsh_tolerances_read(const char *path, vsh_tolerances **tolerances, vsh_error *error);
 VSH_API void vsh_tolerances_free(vsh_tolerances *tolerances); /* NULL does nothing */
 
 /* Overwrites *limits with the file's limits for a channel, and *coverage (may be NULL) with the share of
- * covered texels that may differ. What the file does not name stays. Does nothing if tolerances is NULL.
+ * covered texels that may differ. Other limits stay. Does nothing if tolerances is NULL.
  * Cannot fail. */
 VSH_API void vsh_tolerances_apply(const vsh_tolerances *tolerances, const char *channel, vsh_limits *limits,
                                   double *coverage);
@@ -183,7 +183,7 @@ typedef struct vsh_channel_comparison {
     double coverage_limit;          /* share of covered texels that may differ */
     double max_error[2];            /* --max-error of golden and new by their files; NaN: unknown */
     vsh_limits limits;              /* limits used */
-    vsh_measures measures;          /* how far the values differ */
+    vsh_measures measures;          /* measured differences */
     uint32_t failed;                /* bits as of vsh_compare_judge() */
     int32_t coverage_failed, alike; /* 1 or 0 */
 } vsh_channel_comparison;

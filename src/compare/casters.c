@@ -137,7 +137,7 @@ static double find_unshared(const vshi_pair *pair, size_t i) {
 }
 
 void vshi_measure_noise(const vshi_pair *pair, vsh_measures *m) {
-    static const double VARIANCE = 1.5; /* of a value minus the mean of two others, each of variance 1 */
+    static const double VARIANCE = 1.5; /* 1 of the value, and 1/2 of the mean of its neighbours */
     double sum = 0.0, all = 0.0, count = 0.0;
     for (size_t i = 0; i < pair->count; ++i) {
         const double unshared = pair->mask[i] ? find_unshared(pair, i) : -1.0;

@@ -1,15 +1,16 @@
 /* Measures how wide penumbrae are: finds shadow edges in both bakes, and compares those found in both.
  *
  * Every line of texels along each axis is walked. An edge goes from one side (at most 10 % of the way from
- * the darkest to the lightest golden value) to the other (at least 90 %). Its width is the length between:
- * only noise of 80 % of the range makes an edge. A border of the coverage ends an edge uncounted. The length
- * along the line times the cosine of the angle between line and mean gradient is the width across the edge.
- * Each edge is measured along the axis nearest to its gradient, so that it counts by its length. (By the
- * coarea formula, the lengths along parallel lines add up to the area of the penumbra.) A golden and a new
- * edge are a pair if each is the nearest to the other, in one direction, no farther away than the wider is
- * wide.
+ * the darkest to the lightest golden value) to the other (at least 90 %). Only noise of 80 % of the range
+ * looks like an edge. Edges that a border cuts off do not count. The length between the sides, times the
+ * cosine of the angle between line and mean gradient, is the width across the edge. Each edge is measured
+ * along the axis nearest to its gradient, so that it counts by its length: by the coarea formula, lengths
+ * along parallel lines add up to the area of the penumbra.
  *
- * A value close to a mark reaches it in one bake and misses it in the other. So a width counts only if moving
+ * A golden and a new edge are a pair if each is the nearest to the other. Both must rise or both fall, and
+ * they must not be farther apart than the wider is wide.
+ *
+ * A value close to a mark may reach it in one bake and miss it in the other. So a width counts only if moving
  * the marks a little changes it by at most twice as much as on an even slope.
  *
  * Limits: an edge between two neighbours reads as 0.8 texels. Widths below about two texels are not resolved.
@@ -26,7 +27,7 @@ enum { OUTLIERS = 8 };      /* values ignored at each end of the range */
 enum { FEWEST_EDGES = 16 }; /* fewer do not make a mean */
 
 static const double LOW = 0.1, HIGH = 0.9;
-static const double ROOM = 0.02;        /* how far the marks move to test whether a width is steady */
+static const double ROOM = 0.02;        /* move of the marks that tests if a width is steady */
 static const double LEAST_NOISE = 0.25; /* share of the squared difference: penumbrae alone make less */
 static const double MOST_ROOM = 0.3;    /* of the range, that each mark moves */
 static const double LEAST_RANGE = 0.05; /* from the darkest to the lightest: less is no shadow */

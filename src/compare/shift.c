@@ -1,6 +1,7 @@
-/* Measures how far new values are shifted: registration by least squares on the gradient (Lucas and Kanade,
- * "An iterative image registration technique with an application to stereo vision", 1981), with the mean of
- * both gradients, which makes each step exact to the second order. Each step moves the new values back first.
+/* Measures how far new values are shifted, by registration (Lucas and Kanade, "An iterative image
+ * registration technique with an application to stereo vision", 1981): least squares on the gradient. The
+ * mean of both gradients makes each step exact to the second order. Each step moves the new values back
+ * first.
  *
  * Edges along one direction do not show a shift along themselves: an edge of slope 0.1 that moves across
  * itself by 0.02 texels looks the same as one that moves by 0.2 along x. So shifts are only sought along

@@ -316,7 +316,7 @@ static bool is_allowed(const char *option) {
 static int check_options(const regress_work *work, const regress_case *one) {
     for (size_t i = 0; i < one->options.count; ++i) {
         const char *word = one->options.line[i];
-        cli_option option; /* of a word "--NAME" or "--NAME=VALUE" */
+        cli_option option; /* the word is "--NAME" or "--NAME=VALUE" */
         const bool found = strncmp(word, "--", 2) == 0 &&
                            cli_find_option(one->command, word + 2, strcspn(word + 2, "="), &option);
         if (!found || !is_allowed(option.name)) {

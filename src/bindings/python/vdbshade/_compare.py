@@ -20,7 +20,7 @@ MEASURES = tuple(WORDS["VSH_MEASURE_"])
 
 
 class Measures(types.Measures):
-    """How far values are from golden ones. `value` is a dict of "nonfinite", "shift", "penumbra", "lost", "gained", "rmse",
+    """Differences of values from golden ones. `value` is a dict of "nonfinite", "shift", "penumbra", "lost", "gained", "rmse",
     "p99" and "max"; NaN if a measure does not apply."""
 
     value: Dict[str, float]  # type: ignore[assignment]
