@@ -135,38 +135,34 @@ void regress_remove_folder(regress_work *work) {
 
 /* --- baking */
 
-static bool list_words(const regress_work *work, const regress_case *one, regress_lines *words) {
+static int list_words(const regress_work *work, const regress_case *one, regress_lines *words) {
     static const char *const sandbox[] = {[CLI_SANDBOX_OFF] = "off", [CLI_SANDBOX_REQUIRE] = "require"};
     const cli_common *common = &work->settings->compare.common;
+    CLI_TRY(regress_add_line(words, "vdbshade"));
+    CLI_TRY(regress_add_line(words, "%s", one->command->name));
     /* a scene "--stats=x.json" is a file in the folder, and no option */
-    bool good = regress_add_line(words, "vdbshade") && regress_add_line(words, "%s", one->command->name) &&
-                regress_add_line(words, "%s%s", one->scene[0] == '-' ? "./" : "", one->scene);
-    for (size_t i = 0; i < one->options.count && good; ++i) {
-        good = regress_add_line(words, "%s", one->options.line[i]);
+    CLI_TRY(regress_add_line(words, "%s%s", one->scene[0] == '-' ? "./" : "", one->scene));
+    for (size_t i = 0; i < one->options.count; ++i) {
+        CLI_TRY(regress_add_line(words, "%s", one->options.line[i]));
     }
-    if (one->output != NULL) {
-        good = good && regress_add_line(words, "--output") &&
-               regress_add_line(words, "%s/%s", work->bakes, one->output);
-    } else {
-        good =
-            good && regress_add_line(words, "--output-folder") && regress_add_line(words, "%s", work->bakes);
-    }
-    good = good && regress_add_line(words, "--quiet") && regress_add_line(words, "--memory-limit") &&
-           regress_add_line(words, "%llu", (unsigned long long)common->memory_limit);
+    CLI_TRY(one->output != NULL ? regress_add_line(words, "--output=%s/%s", work->bakes, one->output)
+                                : regress_add_line(words, "--output-folder=%s", work->bakes));
+    CLI_TRY(regress_add_line(words, "--quiet"));
+    CLI_TRY(regress_add_line(words, "--memory-limit=%llu", (unsigned long long)common->memory_limit));
     if (common->threads > 0) {
-        good = good && regress_add_line(words, "--threads=%d", common->threads);
+        CLI_TRY(regress_add_line(words, "--threads=%d", common->threads));
     }
     if (common->sandbox != CLI_SANDBOX_AUTO) {
-        good = good && regress_add_line(words, "--sandbox=%s", sandbox[common->sandbox]);
+        CLI_TRY(regress_add_line(words, "--sandbox=%s", sandbox[common->sandbox]));
     }
-    return good && (!common->allow_outside || regress_add_line(words, "--allow-outside"));
+    return common->allow_outside ? regress_add_line(words, "--allow-outside") : CLI_OK;
 }
 
 int regress_bake(const regress_work *work, const regress_case *one) {
     regress_lines words = {NULL, 0};
+    int code = list_words(work, one, &words);
     /* in the folder of the scenes, because options name files relative to it */
-    const int code = list_words(work, one, &words) ? cli_in_child(one->scene, work->folder, words.line)
-                                                   : cli_out_of_memory(work->folder);
+    code = code == CLI_OK ? cli_in_child(one->scene, work->folder, words.line) : code;
     regress_free_lines(&words);
     return code;
 }

@@ -22,10 +22,10 @@ static const char list_name[] = "regress.json", tolerance_ending[] = ".tolerance
 /* Sizes of files that strangers may have made; parsed JSON takes a hundred times as much. */
 enum { MOST_BYTES = 4 << 20, MOST_SCENE = 64 << 20 };
 
-bool regress_add_line(regress_lines *lines, const char *format, ...) {
+int regress_add_line(regress_lines *lines, const char *format, ...) {
     char **more = realloc(lines->line, (lines->count + 2) * sizeof *more);
     if (more == NULL) {
-        return false;
+        return cli_out_of_memory("list");
     }
     lines->line = more;
     va_list arguments;
@@ -34,7 +34,7 @@ bool regress_add_line(regress_lines *lines, const char *format, ...) {
     va_end(arguments);
     lines->count += length >= 0;
     more[lines->count] = NULL;
-    return length >= 0;
+    return length >= 0 ? CLI_OK : cli_out_of_memory("list");
 }
 
 void regress_free_lines(regress_lines *lines) {
@@ -61,6 +61,7 @@ void regress_free_case(regress_case *one) {
     free(one->changed);
     free(one->reason);
     free(one->output);
+    free(one->path);
     free(one->scene);
     free(one->name);
     memset(one, 0, sizeof *one);
@@ -90,8 +91,10 @@ static int add_case(regress_work *work, const char *scene, const char *name, siz
     regress_case *one = &more[work->case_count++];
     memset(one, 0, sizeof *one);
     one->scene = strdup(scene);
+    one->path = regress_path(work->folder, scene);
     one->name = strndup(name, name_length);
-    return one->scene != NULL && one->name != NULL ? CLI_OK : cli_out_of_memory(work->folder);
+    return one->scene != NULL && one->path != NULL && one->name != NULL ? CLI_OK
+                                                                        : cli_out_of_memory(work->folder);
 }
 
 /* --- outputs of scenes */
@@ -113,16 +116,16 @@ json_t *regress_load(const char *path) {
 
 /* Finds out whether a scene is for `flat`: those have a region. Reads it as a scene first, because that
  * checks the memory limit before taking any. */
-static int find_command(const char *path, const vsh_run *run, regress_case *one) {
+static int find_command(const regress_work *work, regress_case *one) {
     vsh_error error;
     vsh_flat_scene *scene = NULL;
-    bool flat = vsh_flat_scene_read(path, run, &scene, &error) == VSH_OK;
+    bool flat = vsh_flat_scene_read(one->path, &work->run, &scene, &error) == VSH_OK;
     vsh_flat_scene_free(scene);
     if (!flat && error.code == VSH_ERROR_LIMIT) {
         return cli_fail(&error);
     }
     if (!flat) {
-        json_t *root = load(path, MOST_SCENE);
+        json_t *root = load(one->path, MOST_SCENE);
         flat = json_object_get(root, "region") != NULL;
         json_decref(root);
     }
@@ -130,61 +133,54 @@ static int find_command(const char *path, const vsh_run *run, regress_case *one)
     return CLI_OK;
 }
 
-static bool add_output(regress_case *one, const char *path) {
+static int add_output(regress_case *one, const char *path) {
     const char *slash = strrchr(path, '/');
     return regress_add_line(&one->outputs, "%s", slash != NULL ? slash + 1 : path);
 }
 
-static int list_scene_outputs(const char *path, const vsh_run *run, regress_case *one) {
+static int list_scene_outputs(const regress_work *work, regress_case *one) {
     vsh_error error;
-    bool good = true;
-    if (one->command == &cli_bake) {
-        vsh_scene *scene = NULL;
-        if (vsh_scene_read(path, run, &scene, &error) != VSH_OK) {
-            return cli_fail(&error);
-        }
-        for (size_t i = 0; i < scene->receiver_count && good; ++i) {
-            good = add_output(one, scene->receivers[i].output);
-        }
-        vsh_scene_free(scene);
-    } else if (one->command == &cli_flat) {
-        vsh_flat_scene *scene = NULL;
-        if (vsh_flat_scene_read(path, run, &scene, &error) != VSH_OK) {
-            return cli_fail(&error);
-        }
-        if (scene->output != NULL) {
-            good = add_output(one, scene->output);
-            one->output = good ? strdup(one->outputs.line[0]) : NULL;
-            good = one->output != NULL;
-        }
-        vsh_flat_scene_free(scene);
+    vsh_scene *scene = NULL;
+    if (vsh_scene_read(one->path, &work->run, &scene, &error) != VSH_OK) {
+        return cli_fail(&error);
     }
-    return good ? CLI_OK : cli_out_of_memory(path);
+    int code = CLI_OK;
+    for (size_t i = 0; i < scene->receiver_count && code == CLI_OK; ++i) {
+        code = add_output(one, scene->receivers[i].output);
+    }
+    vsh_scene_free(scene);
+    return code;
+}
+
+static int list_flat_output(const regress_work *work, regress_case *one) {
+    vsh_error error;
+    vsh_flat_scene *scene = NULL;
+    if (vsh_flat_scene_read(one->path, &work->run, &scene, &error) != VSH_OK) {
+        return cli_fail(&error);
+    }
+    int code = scene->output != NULL ? add_output(one, scene->output) : CLI_OK;
+    vsh_flat_scene_free(scene);
+    if (code == CLI_OK && one->outputs.count > 0) {
+        one->output = strdup(one->outputs.line[0]);
+        code = one->output != NULL ? CLI_OK : cli_out_of_memory(one->path);
+    }
+    return code;
 }
 
 /* Completes command and outputs. */
 static int list_outputs(const regress_work *work, regress_case *one) {
-    const vsh_run run = cli_common_run(&work->settings->compare.common);
-    char *path = regress_path(work->folder, one->scene);
-    if (path == NULL) {
-        return cli_out_of_memory(work->folder);
-    }
-    int code = CLI_OK;
-    if (one->command == NULL) {
-        CLI_TRY_DONE(find_command(path, &run, one));
-    }
+    CLI_TRY(one->command == NULL ? find_command(work, one) : CLI_OK);
     if (one->output != NULL) {
-        code = add_output(one, one->output) ? CLI_OK : cli_out_of_memory(work->folder);
-    } else {
-        code = list_scene_outputs(path, &run, one);
+        CLI_TRY(add_output(one, one->output));
+    } else if (one->command == &cli_bake) {
+        CLI_TRY(list_scene_outputs(work, one));
+    } else if (one->command == &cli_flat) {
+        CLI_TRY(list_flat_output(work, one));
     }
-    if (code == CLI_OK && one->outputs.count == 0) {
-        code = cli_usage("%s: nothing says what '%s' writes; give it an \"output\" in %s", path, one->name,
-                         list_name);
-    }
-done:
-    free(path);
-    return code;
+    return one->outputs.count > 0
+               ? CLI_OK
+               : cli_usage("%s: nothing says what '%s' writes; give it an \"output\" in %s", one->path,
+                           one->name, list_name);
 }
 
 /* --- regress.json */
@@ -221,15 +217,12 @@ static int check_keys(const regress_work *work, json_t *json, size_t i) {
 static int read_options(const regress_work *work, const json_t *options, size_t i, regress_case *one) {
     size_t k;
     json_t *word;
-    bool strings = options == NULL || json_is_array(options), good = true;
+    bool strings = options == NULL || json_is_array(options);
     json_array_foreach(options, k, word) {
         strings = strings && json_is_string(word);
-        good = good && (!strings || regress_add_line(&one->options, "%s", json_string_value(word)));
+        CLI_TRY(strings ? regress_add_line(&one->options, "%s", json_string_value(word)) : CLI_OK);
     }
-    if (!strings) {
-        return bad_case(work, i, "options: expected an array of strings");
-    }
-    return good ? CLI_OK : cli_out_of_memory(work->folder);
+    return strings ? CLI_OK : bad_case(work, i, "options: expected an array of strings");
 }
 
 static int read_case(regress_work *work, json_t *json, size_t i) {
@@ -395,12 +388,11 @@ static int check_unique(const regress_work *work) {
 static int complete_case(const regress_work *work, regress_case *one) {
     CLI_TRY(regress_fail_alone(one, list_outputs(work, one)));
     CLI_TRY(one->options.count > 0 ? check_options(work, one) : CLI_OK);
-    bool good = true;
     if (one->status == REGRESS_FAILED) { /* reported under the scene's own name */
         regress_free_lines(&one->outputs);
-        good = regress_add_line(&one->outputs, "%s", one->scene);
+        CLI_TRY(regress_add_line(&one->outputs, "%s", one->scene));
     }
-    one->comparisons = good ? calloc(one->outputs.count, sizeof *one->comparisons) : NULL;
+    one->comparisons = calloc(one->outputs.count, sizeof *one->comparisons);
     return one->comparisons != NULL ? CLI_OK : cli_out_of_memory(work->folder);
 }
 

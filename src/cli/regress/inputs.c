@@ -15,43 +15,42 @@
 #include <vdbshade/provenance.h>
 
 static int add_digest(const regress_work *work, regress_case *one, const char *what, const char *path) {
-    const vsh_run run = cli_common_run(&work->settings->compare.common);
     char digest[VSH_DIGEST_TEXT] = "none";
     vsh_error error;
-    if (access(path, F_OK) == 0 && vsh_file_digest(path, &run, digest, &error) != VSH_OK) {
+    if (access(path, F_OK) == 0 && vsh_file_digest(path, &work->run, digest, &error) != VSH_OK) {
         return cli_fail(&error);
     }
-    return regress_add_line(&one->inputs, "%s: %s", what, digest) ? CLI_OK : cli_out_of_memory(work->folder);
+    return regress_add_line(&one->inputs, "%s: %s", what, digest);
 }
 
 /* Adds the limits of the command line. */
 static int add_limits(const regress_work *work, regress_case *one) {
     const vsh_compare_files_options *o = &work->settings->compare.options;
-    bool good =
-        regress_add_line(&one->inputs, "coverage: %s, at most %.9g, padding %d", o->coverage,
-                         o->coverage_limit, o->padding) &&
-        regress_add_line(&one->inputs, "step %.9g, reach %d, noise %.9g", o->step, o->reach, o->noise);
-    for (int i = 0; i < VSH_MEASURE_COUNT && good; ++i) {
-        good = isnan(o->limits[i]) ||
-               regress_add_line(&one->inputs, "limit of %s: %.9g", vsh_measure_name(i), o->limits[i]);
+    CLI_TRY(regress_add_line(&one->inputs, "coverage: %s, at most %.9g, padding %d", o->coverage,
+                             o->coverage_limit, o->padding));
+    CLI_TRY(regress_add_line(&one->inputs, "step %.9g, reach %d, noise %.9g", o->step, o->reach, o->noise));
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        if (!isnan(o->limits[i])) {
+            CLI_TRY(regress_add_line(&one->inputs, "limit of %s: %.9g", vsh_measure_name(i), o->limits[i]));
+        }
     }
-    return good ? CLI_OK : cli_out_of_memory(work->folder);
+    return CLI_OK;
 }
 
 /* Adds the files that a flat scene names. */
-static int add_flat_files(const regress_work *work, const char *path, regress_lines *files) {
-    const vsh_run run = cli_common_run(&work->settings->compare.common);
+static int add_flat_files(const regress_work *work, const regress_case *one, regress_lines *files) {
     vsh_flat_scene *scene = NULL;
     vsh_error error;
-    if (vsh_flat_scene_read(path, &run, &scene, &error) != VSH_OK) {
+    if (vsh_flat_scene_read(one->path, &work->run, &scene, &error) != VSH_OK) {
         return cli_fail(&error);
     }
-    bool good = true;
-    for (size_t i = 0; i < scene->caster_count && good; ++i) {
-        good = scene->casters[i].path == NULL || regress_add_line(files, "%s", scene->casters[i].path);
+    int code = CLI_OK;
+    for (size_t i = 0; i < scene->caster_count && code == CLI_OK; ++i) {
+        const char *path = scene->casters[i].path;
+        code = path != NULL ? regress_add_line(files, "%s", path) : CLI_OK;
     }
     vsh_flat_scene_free(scene);
-    return good ? CLI_OK : cli_out_of_memory(work->folder);
+    return code;
 }
 
 /* Adds files in options, which may be FILE.vdb:GRID. */
@@ -69,46 +68,39 @@ static int add_option_files(const regress_work *work, const regress_case *one, r
             *colon = '\0';
             good = stat(path, &status) == 0;
         }
-        const bool added = !good || !S_ISREG(status.st_mode) || regress_add_line(files, "%s", path);
+        const int code = good && S_ISREG(status.st_mode) ? regress_add_line(files, "%s", path) : CLI_OK;
         free(path);
-        if (!added) {
-            return cli_out_of_memory(work->folder);
-        }
+        CLI_TRY(code);
     }
     return CLI_OK;
 }
 
 /* Adds digests of the scene's file and of all files it names. */
-static int add_provenance(const regress_work *work, regress_case *one, const char *path) {
+static int add_provenance(const regress_work *work, regress_case *one) {
     const bool flat = one->command == &cli_flat;
-    const vsh_run run = cli_common_run(&work->settings->compare.common);
     vsh_scene *scene = NULL;
     vsh_error error;
-    if (!flat && vsh_scene_read(path, &run, &scene, &error) != VSH_OK) {
+    if (!flat && vsh_scene_read(one->path, &work->run, &scene, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     regress_lines files = {NULL, 0};
     vsh_provenance *provenance = NULL;
     int code;
-    CLI_TRY_DONE(regress_add_line(&files, "%s", path) ? CLI_OK : cli_out_of_memory(work->folder));
-    if (flat) {
-        CLI_TRY_DONE(add_flat_files(work, path, &files));
-    }
+    CLI_TRY_DONE(regress_add_line(&files, "%s", one->path));
+    CLI_TRY_DONE(flat ? add_flat_files(work, one, &files) : CLI_OK);
     CLI_TRY_DONE(add_option_files(work, one, &files));
     vsh_provenance_source source = vsh_provenance_source_default();
     source.scene = scene;
     source.files = (const char *const *)files.line;
     source.file_count = files.count;
-    if (vsh_provenance_create(&source, &run, &provenance, &error) != VSH_OK) {
+    if (vsh_provenance_create(&source, &work->run, &provenance, &error) != VSH_OK) {
         code = cli_fail(&error);
         goto done;
     }
     size_t count;
     const vsh_attribute *attributes = vsh_provenance_attributes(provenance, &count);
     for (size_t i = 0; i < count; ++i) {
-        CLI_TRY_DONE(regress_add_line(&one->inputs, "%s: %s", attributes[i].name, attributes[i].value)
-                         ? CLI_OK
-                         : cli_out_of_memory(work->folder));
+        CLI_TRY_DONE(regress_add_line(&one->inputs, "%s: %s", attributes[i].name, attributes[i].value));
     }
 done:
     vsh_provenance_free(provenance);
@@ -137,20 +129,14 @@ static int add_golden(const regress_work *work, regress_case *one) {
 
 int regress_list_inputs(const regress_work *work, regress_case *one) {
     regress_free_lines(&one->inputs);
-    char *path = regress_path(work->folder, one->scene);
-    if (path == NULL) {
-        return cli_out_of_memory(work->folder);
+    CLI_TRY(regress_add_line(&one->inputs, "program: %s", work->program));
+    CLI_TRY(regress_add_line(&one->inputs, "command: %s", one->command->name));
+    for (size_t i = 0; i < one->options.count; ++i) {
+        CLI_TRY(regress_add_line(&one->inputs, "option: %s", one->options.line[i]));
     }
-    bool good = regress_add_line(&one->inputs, "program: %s", work->program) &&
-                regress_add_line(&one->inputs, "command: %s", one->command->name);
-    for (size_t i = 0; i < one->options.count && good; ++i) {
-        good = regress_add_line(&one->inputs, "option: %s", one->options.line[i]);
-    }
-    int code = good ? add_provenance(work, one, path) : cli_out_of_memory(work->folder);
-    code = code == CLI_OK ? add_limits(work, one) : code;
-    code = code == CLI_OK ? add_golden(work, one) : code;
-    free(path);
-    return code;
+    CLI_TRY(add_provenance(work, one));
+    CLI_TRY(add_limits(work, one));
+    return add_golden(work, one);
 }
 
 /* --- the cache: the lines above for each case that was alike */

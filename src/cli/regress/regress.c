@@ -344,7 +344,7 @@ static int regress_main(int argc, char **argv) {
         return code;
     }
     cli_progress_begin(s.compare.common.progress, s.compare.common.quiet);
-    regress_work work = {.settings = &s};
+    regress_work work = {.settings = &s, .run = cli_common_run(&s.compare.common)};
     code = run(&work);
     regress_remove_folder(&work);
     for (size_t i = 0; i < work.case_count; ++i) {

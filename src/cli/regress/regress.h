@@ -10,8 +10,8 @@ typedef struct regress_lines {
     size_t count;
 } regress_lines;
 
-/* Adds a line. False if memory is short. */
-bool regress_add_line(regress_lines *lines, const char *format, ...) __attribute__((format(printf, 2, 3)));
+/* Adds a line. This and the other functions with an int return CLI_OK, or an exit code after printing why. */
+int regress_add_line(regress_lines *lines, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void regress_free_lines(regress_lines *lines);
 
 enum { REGRESS_UNCHANGED, REGRESS_ALIKE, REGRESS_UNLIKE, REGRESS_FAILED, REGRESS_UPDATED };
@@ -20,6 +20,7 @@ enum { REGRESS_UNCHANGED, REGRESS_ALIKE, REGRESS_UNLIKE, REGRESS_FAILED, REGRESS
 typedef struct regress_case {
     char *name;
     char *scene; /* file within the folder */
+    char *path;  /* FOLDER/SCENE */
     const cli_command *command;
     regress_lines options;
     char *output;                /* for -o; NULL: the scene names its outputs */
@@ -40,6 +41,7 @@ typedef struct regress_settings {
 
 typedef struct regress_work {
     const regress_settings *settings;
+    vsh_run run;
     char *folder, *golden; /* `golden` is the folder of golden bakes */
     char *cache;           /* file */
     char *bakes;           /* folder of the new bakes, absolute */
@@ -55,8 +57,7 @@ char *regress_path(const char *folder, const char *name);
 /* Reads a JSON file that strangers may have made; NULL if that fails. */
 json_t *regress_load(const char *path);
 
-/* Finds the cases of a folder: those of its regress.json, then its other scenes by name. This and the other
- * functions with a result return CLI_OK, or an exit code after printing why. */
+/* Finds the cases of a folder: those of its regress.json, then its other scenes by name. */
 int regress_find_cases(regress_work *work);
 void regress_free_case(regress_case *one);
 
