@@ -162,8 +162,6 @@ static const double MOST_MIXED =
 typedef struct curve {
     int count;
     double from[BINS], to[BINS]; /* mean golden and new values of each bin that has any */
-    double lighter, darker;      /* sums over all values */
-    bool falls;                  /* somewhere, by more than noise */
 } curve;
 
 static double value_on(const curve *c, double v) {
@@ -175,18 +173,9 @@ static double value_on(const curve *c, double v) {
     return c->to[i - 1] + t * (c->to[i] - c->to[i - 1]);
 }
 
-static void add_point(curve *c, double from, double to, size_t count, double noise) {
-    const double n = (double)count, tolerance = noise * (1.0 + 3.0 / sqrt(n));
-    c->lighter += fmax(0.0, to - from - n * noise); /* noise clipped at 0 and 1 has a mean */
-    c->darker += fmax(0.0, from - to - n * noise);
-    c->falls = c->falls || (c->count > 0 && to / n < c->to[c->count - 1] - tolerance);
-    c->from[c->count] = from / n;
-    c->to[c->count++] = to / n;
-}
-
-static void fit_curve(const vshi_pair *pair, double noise, curve *c) {
-    double low = INFINITY, high = -INFINITY, from[BINS] = {0.0}, to[BINS] = {0.0};
-    size_t count[BINS] = {0};
+/* Averages values in bins of golden's. */
+static void fit_curve(const vshi_pair *pair, curve *c, double counts[BINS]) {
+    double low = INFINITY, high = -INFINITY, from[BINS] = {0.0}, to[BINS] = {0.0}, count[BINS] = {0.0};
     for (size_t i = 0; i < pair->count; ++i) {
         if (pair->mask[i]) {
             low = fmin(low, vshi_value_at(pair, VSHI_GOLDEN, i));
@@ -199,20 +188,31 @@ static void fit_curve(const vshi_pair *pair, double noise, curve *c) {
             const int bin = (int)fmin((v - low) / (high - low) * BINS, BINS - 1.0);
             from[bin] += v;
             to[bin] += vshi_value_at(pair, VSHI_NEW, i);
-            ++count[bin];
+            count[bin] += 1.0;
         }
     }
-    *c = (curve){.count = 0};
+    c->count = 0;
     for (int bin = 0; bin < BINS; ++bin) {
-        if (count[bin] > 0) {
-            add_point(c, from[bin], to[bin], count[bin], noise);
+        if (count[bin] > 0.0) {
+            c->from[c->count] = from[bin] / count[bin];
+            c->to[c->count] = to[bin] / count[bin];
+            counts[c->count++] = count[bin];
         }
     }
 }
 
-static bool is_tone(const curve *c) {
-    if (c->count < FEWEST_BINS || c->falls ||
-        fmin(c->lighter, c->darker) > MOST_MIXED * fmax(c->lighter, c->darker)) {
+/* Whether the curve rises everywhere, and makes values only lighter or only darker, apart from noise. */
+static bool is_tone(const curve *c, const double counts[BINS], double noise) {
+    double lighter = 0.0, darker = 0.0;
+    for (int i = 0; i < c->count; ++i) {
+        const double change = c->to[i] - c->from[i];
+        lighter += counts[i] * fmax(0.0, change - noise); /* noise clipped at 0 and 1 has a mean */
+        darker += counts[i] * fmax(0.0, -change - noise);
+        if (i > 0 && c->to[i] < c->to[i - 1] - noise * (1.0 + 3.0 / sqrt(counts[i]))) {
+            return false;
+        }
+    }
+    if (c->count < FEWEST_BINS || fmin(lighter, darker) > MOST_MIXED * fmax(lighter, darker)) {
         return false;
     }
     const double first = c->to[0], last = c->to[c->count - 1], least = LEAST_RISE * (last - first);
@@ -240,8 +240,9 @@ static double map_golden(const vshi_pair *pair, const curve *c, double noise, fl
 
 bool vshi_follow_curve(vshi_pair *pair, float *mapped, vsh_measures *m) {
     curve c;
-    fit_curve(pair, m->noise, &c);
-    if (!is_tone(&c) || map_golden(pair, &c, m->noise, mapped) < LEAST_EXPLAINED) {
+    double counts[BINS];
+    fit_curve(pair, &c, counts);
+    if (!is_tone(&c, counts, m->noise) || map_golden(pair, &c, m->noise, mapped) < LEAST_EXPLAINED) {
         return false;
     }
     for (int k = 0; k < 3; ++k) {
