@@ -142,22 +142,23 @@ enum {
 /* Kinds of names in files and on command lines. VSH_NAMES_SHADOW stands for the names of VSH_SHADOW_…. */
 enum {
     VSH_NAMES_ISA = 0,
-    VSH_NAMES_SHADOW = 1,          /* method.h */
-    VSH_NAMES_AO = 2,              /* method.h */
-    VSH_NAMES_SAMPLER = 3,         /* method.h */
-    VSH_NAMES_FALLOFF = 4,         /* light.h */
-    VSH_NAMES_COLOR = 5,           /* image.h */
-    VSH_NAMES_ALIGN = 6,           /* outline.h */
-    VSH_NAMES_ATLAS = 7,           /* unwrap.h */
-    VSH_NAMES_COMBINE = 8,         /* layer.h */
-    VSH_NAMES_TINT = 9,            /* shade.h */
-    VSH_NAMES_BENT = 10,           /* bake.h */
-    VSH_NAMES_UP = 11,             /* bake.h: "-x" is VSH_UP_MINUS_X */
-    VSH_NAMES_SEAMS = 12,          /* bake.h */
-    VSH_NAMES_INSIDE = 13,         /* volume.h */
-    VSH_NAMES_FLAT = 14,           /* flat.h: methods */
-    VSH_NAMES_FLAT_LIGHT = 15,     /* flat.h: VSH_LIGHT_… in a plane, "directional", "disc", "spot" */
-    VSH_NAMES_RECEIVER_UNWRAP = 16 /* scene.h */
+    VSH_NAMES_SHADOW = 1,           /* method.h */
+    VSH_NAMES_AO = 2,               /* method.h */
+    VSH_NAMES_SAMPLER = 3,          /* method.h */
+    VSH_NAMES_FALLOFF = 4,          /* light.h */
+    VSH_NAMES_COLOR = 5,            /* image.h */
+    VSH_NAMES_ALIGN = 6,            /* outline.h */
+    VSH_NAMES_ATLAS = 7,            /* unwrap.h */
+    VSH_NAMES_COMBINE = 8,          /* layer.h */
+    VSH_NAMES_TINT = 9,             /* shade.h */
+    VSH_NAMES_BENT = 10,            /* bake.h */
+    VSH_NAMES_UP = 11,              /* bake.h: "-x" is VSH_UP_MINUS_X */
+    VSH_NAMES_SEAMS = 12,           /* bake.h */
+    VSH_NAMES_INSIDE = 13,          /* volume.h */
+    VSH_NAMES_FLAT = 14,            /* flat.h: methods */
+    VSH_NAMES_FLAT_LIGHT = 15,      /* flat.h: VSH_LIGHT_… in a plane, "directional", "disc", "spot" */
+    VSH_NAMES_RECEIVER_UNWRAP = 16, /* scene.h */
+    VSH_NAMES_MEASURE = 17          /* compare.h */
 };
 
 /* Finds the constant that a name stands for: VSH_SHADOW_CONE for "cone" of VSH_NAMES_SHADOW. -1: the name is

@@ -67,10 +67,6 @@ enum {
     VSH_MEASURE_COUNT = 8
 };
 
-/* Converts "rmse" to VSH_MEASURE_RMSE and back; -1 and NULL if there is no such measure. Names are static. */
-VSH_API int32_t vsh_measure(const char *name);
-VSH_API const char *vsh_measure_name(int32_t measure);
-
 /* Touching texels that all got lighter, or all darker, with no like value nearby. Zeros if there are none. */
 typedef struct vsh_region {
     uint64_t count; /* texels */

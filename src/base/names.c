@@ -23,6 +23,7 @@ static const char *const *const tables[] = {
     [VSH_NAMES_FLAT] = NAMES("hard", "classic", "exact"),
     [VSH_NAMES_FLAT_LIGHT] = NAMES("directional", "disc", "spot"),
     [VSH_NAMES_RECEIVER_UNWRAP] = NAMES("default", "never", "auto", "always"),
+    [VSH_NAMES_MEASURE] = NAMES("nonfinite", "shift", "penumbra", "lost", "gained", "rmse", "p99", "max"),
 };
 enum { TABLES = sizeof tables / sizeof tables[0] };
 

@@ -14,37 +14,16 @@ enum { MOST_REACH = 16, MOST_BYTES = 64 << 20 };
 
 static const double MOST = 1e15; /* this limit, and larger ones, switch a measure off */
 
-static const struct {
-    const char *name;
-    double limit; /* the default */
-} table[VSH_MEASURE_COUNT] = {
-    [VSH_MEASURE_NONFINITE] = {"nonfinite", 0.0},
-    [VSH_MEASURE_SHIFT] = {"shift", 0.1},
-    [VSH_MEASURE_PENUMBRA] = {"penumbra", 0.03},
-    [VSH_MEASURE_LOST] = {"lost", 3.0},
-    [VSH_MEASURE_GAINED] = {"gained", 3.0},
-    [VSH_MEASURE_RMSE] = {"rmse", 0.004},
-    [VSH_MEASURE_P99] = {"p99", 0.02},
-    [VSH_MEASURE_MAX] = {"max", 0.25},
+static const double default_limits[VSH_MEASURE_COUNT] = {
+    [VSH_MEASURE_SHIFT] = 0.1,  [VSH_MEASURE_PENUMBRA] = 0.03, [VSH_MEASURE_LOST] = 3.0,
+    [VSH_MEASURE_GAINED] = 3.0, [VSH_MEASURE_RMSE] = 0.004,    [VSH_MEASURE_P99] = 0.02,
+    [VSH_MEASURE_MAX] = 0.25,
 };
-
-int32_t vsh_measure(const char *name) {
-    for (int32_t i = 0; name != NULL && i < VSH_MEASURE_COUNT; ++i) {
-        if (strcmp(table[i].name, name) == 0) {
-            return i;
-        }
-    }
-    return -1;
-}
-
-const char *vsh_measure_name(int32_t measure) {
-    return measure >= 0 && measure < VSH_MEASURE_COUNT ? table[measure].name : NULL;
-}
 
 vsh_limits vsh_limits_default(void) {
     vsh_limits known = {.struct_size = sizeof known, .options = vsh_compare_options_default()};
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-        known.value[i] = table[i].limit;
+        known.value[i] = default_limits[i];
     }
     return known;
 }

@@ -16,7 +16,7 @@ interrupt() {
     rm -f err.txt # it is what is waited for
     (
         ulimit -t 60
-        exec "$VDBSHADE" bake "$ASSETS/cloister.glb" --sun -0.5,0.8,-0.6 --sun-angle 20 --ao 2 --ao-cones 256 \
+        exec "$VDBSHADE" bake "$ASSETS/cloister.glb" --sun -0.5,0.8,-0.6 --sun-angle 20 --ao 2 --ao-method cones \
             --size 4096 --supersample 2 --resolution 512 --progress -o out.exr 2>err.txt
     ) &
     local pid=$! start

@@ -116,8 +116,6 @@ fits() {
 --ao nan
 --ao 1m
 --ao 0x10
---ao-cones 0
---ao-cones 257
 --ao-method ray
 --rays 0
 --rays 4097
@@ -187,8 +185,8 @@ LIST
     refused 2 --sun --ao
     shade bake box.obj -o out.exr --ao 1 --sun-angle 5
     refused 2 --sun-angle
-    shade bake box.obj -o out.exr --sun 0,1,0 --ao-cones 5
-    refused 2 --ao-cones
+    shade bake box.obj -o out.exr --sun 0,1,0 --ao-method cones
+    refused 2 --ao-method
     shade bake box.obj -o out.exr --ao 1 --irradiance
     refused 2 --irradiance
     shade bake box.obj --ao 1

@@ -181,7 +181,7 @@ info() {
     rm -f err.txt
     (
         ulimit -t 60
-        exec "$VDBSHADE" volume scene.json -o out.vdb --box -4,-4,-4,4,4,4 --box-voxel-size 0.04 --ao 3 --ao-cones 256 \
+        exec "$VDBSHADE" volume scene.json -o out.vdb --box -4,-4,-4,4,4,4 --box-voxel-size 0.03 --ao 3 --ao-method cones \
             --progress 2>err.txt
     ) &
     local pid=$!

@@ -126,12 +126,11 @@ static void each_measure_is_held_to_its_own_limit(void **unused) {
         assert_int_equal(vsh_compare_judge(&off, &limits), 1 << i);
         off.value[i] = NAN; /* does not apply */
         assert_int_equal(vsh_compare_judge(&off, &limits), 0);
-        assert_int_equal(vsh_measure(vsh_measure_name(i)), i);
+        assert_int_equal(vsh_find_name(VSH_NAMES_MEASURE, vsh_get_name(VSH_NAMES_MEASURE, i)), i);
     }
-    assert_int_equal(vsh_measure("rms"), -1);
-    assert_int_equal(vsh_measure(NULL), -1);
-    assert_null(vsh_measure_name(VSH_MEASURE_COUNT));
-    assert_null(vsh_measure_name(-1));
+    assert_int_equal(vsh_find_name(VSH_NAMES_MEASURE, "rmse"), VSH_MEASURE_RMSE);
+    assert_int_equal(vsh_find_name(VSH_NAMES_MEASURE, "rms"), -1);
+    assert_null(vsh_get_name(VSH_NAMES_MEASURE, VSH_MEASURE_COUNT));
 }
 
 /* --- coverage */

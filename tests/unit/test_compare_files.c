@@ -63,7 +63,7 @@ static void every_measure_but_one_has_a_key_of_its_name(void **unused) {
     const vsh_limits defaults = vsh_limits_default();
     for (int i = 1; i < VSH_MEASURE_COUNT; ++i) {
         char text[64];
-        snprintf(text, sizeof text, "{\"%s\": 0.625}", vsh_measure_name(i));
+        snprintf(text, sizeof text, "{\"%s\": 0.625}", vsh_get_name(VSH_NAMES_MEASURE, i));
         vsh_limits expected = defaults;
         expected.value[i] = 0.625;
         const vsh_limits limits = limits_of(text, "shadow.sun", NULL);

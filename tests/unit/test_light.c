@@ -166,7 +166,7 @@ static void names_are_what_a_channel_can_hold(void **state) {
 
 static void every_constant_has_its_name_and_every_name_its_constant(void **state) {
     (void)state;
-    enum { KINDS = VSH_NAMES_RECEIVER_UNWRAP + 1, MOST = 11 };
+    enum { KINDS = VSH_NAMES_MEASURE + 1, MOST = 11 };
     static const char *const names[KINDS][MOST] = {
         [VSH_NAMES_ISA] = {[VSH_ISA_BEST] = "best",
                            [VSH_ISA_BASE] = "base",
@@ -222,6 +222,14 @@ static void every_constant_has_its_name_and_every_name_its_constant(void **state
                                        [VSH_RECEIVER_UNWRAP_NEVER] = "never",
                                        [VSH_RECEIVER_UNWRAP_AUTO] = "auto",
                                        [VSH_RECEIVER_UNWRAP_ALWAYS] = "always"},
+        [VSH_NAMES_MEASURE] = {[VSH_MEASURE_NONFINITE] = "nonfinite",
+                               [VSH_MEASURE_SHIFT] = "shift",
+                               [VSH_MEASURE_PENUMBRA] = "penumbra",
+                               [VSH_MEASURE_LOST] = "lost",
+                               [VSH_MEASURE_GAINED] = "gained",
+                               [VSH_MEASURE_RMSE] = "rmse",
+                               [VSH_MEASURE_P99] = "p99",
+                               [VSH_MEASURE_MAX] = "max"},
     };
     for (int32_t kind = 0; kind < KINDS; ++kind) {
         int32_t value = 0;

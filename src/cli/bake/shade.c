@@ -50,12 +50,10 @@ static const char *first_given(const cli_patch *given, const char *const *option
 }
 
 int cli_bake_check_shade(const cli_bake_settings *s, vsh_scene *scene) {
-    static const char *const of_ao[] = {"--ao-method", "--ao-cones"};
     static const char *const of_rays[] = {"--rays", "--error"};
     const cli_patch *given = &s->patch;
-    const char *option = first_given(given, of_ao, sizeof of_ao / sizeof of_ao[0]);
-    if (option != NULL && !scene->ao && vsh_planes_shaded(&scene->planes) == 0) {
-        return cli_usage("%s: there is no --ao", option);
+    if (cli_patch_has(given, "--ao-method") && !scene->ao && vsh_planes_shaded(&scene->planes) == 0) {
+        return cli_usage("--ao-method: there is no --ao");
     }
     scene->irradiance = scene->irradiance || cli_patch_has(given, "--ambient");
     if (scene->bent > 0 && (!scene->ao || scene->shade.ao_method == VSH_AO_TAPS)) {
@@ -71,7 +69,7 @@ int cli_bake_check_shade(const cli_bake_settings *s, vsh_scene *scene) {
             return code;
         }
     }
-    option = first_given(given, of_rays, sizeof of_rays / sizeof of_rays[0]);
+    const char *option = first_given(given, of_rays, sizeof of_rays / sizeof of_rays[0]);
     if (option != NULL && !knows_error(scene)) {
         return cli_usage("%s: method %s takes no rays; rays, adaptive and exact do", option,
                          method_of(scene));

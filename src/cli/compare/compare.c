@@ -295,7 +295,7 @@ static void add_failure(text *t, const vsh_channel_comparison *channel, int meas
             m->width[1], m->width[0], texel(channel), 100.0 * limit);
         break;
     default:
-        add(t, "%s %.3g (limit %g)", vsh_measure_name(measure), m->value[measure], limit);
+        add(t, "%s %.3g (limit %g)", vsh_get_name(VSH_NAMES_MEASURE, measure), m->value[measure], limit);
     }
 }
 
@@ -350,7 +350,7 @@ static void print_measures(FILE *out, const vsh_channel_comparison *channel) {
     char place[64];
     for (int i = VSH_MEASURE_NONFINITE + 1; i < VSH_MEASURE_COUNT; ++i) {
         if (!isnan(m->value[i])) {
-            fprintf(out, "%s%s %.3g", separator, vsh_measure_name(i), m->value[i]);
+            fprintf(out, "%s%s %.3g", separator, vsh_get_name(VSH_NAMES_MEASURE, i), m->value[i]);
             separator = ", ";
         }
     }

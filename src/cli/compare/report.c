@@ -47,7 +47,7 @@ static json_t *measures(const vsh_channel_comparison *channel) {
     const vsh_measures *m = &channel->measures;
     json_t *values = json_object(), *limits = json_object(), *failed = json_array();
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-        const char *name = vsh_measure_name(i);
+        const char *name = vsh_get_name(VSH_NAMES_MEASURE, i);
         json_object_set_new(values, name, number(m->value[i]));
         json_object_set_new(limits, name, number(channel->limits.value[i]));
         if ((channel->failed >> i & 1) != 0) {
@@ -334,7 +334,7 @@ static void write_measures(FILE *out, const vsh_channel_comparison *channel) {
     char place[64];
     fputs("<table><tr><th>measure</th><th>value</th><th>limit</th></tr>\n", out);
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-        fprintf(out, "<tr><td>%s</td><td%s>", vsh_measure_name(i),
+        fprintf(out, "<tr><td>%s</td><td%s>", vsh_get_name(VSH_NAMES_MEASURE, i),
                 (channel->failed >> i & 1) != 0 ? " class=\"bad\"" : "");
         fprintf(out, isnan(m->value[i]) ? "–" : "%.4g", m->value[i]);
         fprintf(out, "</td><td>%g</td></tr>\n", channel->limits.value[i]);

@@ -31,7 +31,8 @@ static int add_limits(const regress_work *work, regress_case *one) {
     CLI_TRY(regress_add_line(&one->inputs, "step %.9g, reach %d, noise %.9g", o->step, o->reach, o->noise));
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
         if (!isnan(o->limits[i])) {
-            CLI_TRY(regress_add_line(&one->inputs, "limit of %s: %.9g", vsh_measure_name(i), o->limits[i]));
+            CLI_TRY(regress_add_line(&one->inputs, "limit of %s: %.9g", vsh_get_name(VSH_NAMES_MEASURE, i),
+                                     o->limits[i]));
         }
     }
     return CLI_OK;

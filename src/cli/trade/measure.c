@@ -542,7 +542,7 @@ static void name_plan(const plan *p, trade_run *run) {
         snprintf(more, sizeof more, " --max-error %g", p->max_error);
     } else if (p->number > 0) {
         const bool cones = p->ao && p->method == VSH_AO_CONES;
-        snprintf(more, sizeof more, " %s %d", cones ? "--ao-cones" : "--rays", p->number);
+        snprintf(more, sizeof more, cones ? " with %d cones" : " --rays %d", p->number);
     }
     run->method = p->ao ? vsh_get_name(VSH_NAMES_AO, p->method) : vsh_get_name(VSH_NAMES_SHADOW, p->method);
     snprintf(run->options, sizeof run->options, "%s %s%s --resolution %d", p->ao ? "--ao-method" : "--method",
