@@ -144,20 +144,12 @@ void a_cut_file_is_an_error_at_every_length(void **) {
     file.setCompression(openvdb::io::COMPRESS_NONE);
     file.write(openvdb::GridPtrVec{sphere()});
     const std::string whole = content(whole_path);
-    int crashes = 0;
     for (size_t length = 0; length < whole.size(); length += length < 700 ? 13 : whole.size() / 37) {
         put(path, whole.substr(0, length));
-        const pid_t child = fork();
-        if (child == 0) {
-            vsh_grid *grid = nullptr;
-            _exit(vsh_grid_read(path.c_str(), nullptr, nullptr, &grid, &failure));
-        }
-        int status = 0;
-        waitpid(child, &status, 0);
-        crashes += !WIFEXITED(status);
-        assert_true(!WIFEXITED(status) || WEXITSTATUS(status) == VSH_ERROR_READ);
+        vsh_grid *grid = nullptr;
+        assert_int_equal(vsh_grid_read(path.c_str(), nullptr, nullptr, &grid, &failure), VSH_ERROR_READ);
+        assert_null(grid);
     }
-    assert_int_equal(crashes, 0);
 }
 
 void what_casts_no_shadows_is_refused(void **) {
