@@ -309,7 +309,7 @@ static vsh_result take(vshi_part_input *part, uint64_t size, const vsh_run *run,
     return VSH_OK;
 }
 
-/* What is too short for a part. */
+/* Refuses a file that is too short for a part. */
 static vsh_result refuse_short(vshi_part_input *part, vsh_error *error) {
     char magic[sizeof part->front.magic] = "";
     const size_t count = fread(magic, 1, sizeof magic, part->file);

@@ -1,5 +1,5 @@
-/* Parts' files. They appear whole or not at all, hold nothing that tells of time or machine (but those of
- * what measures time), and whoever reads one checks all of it.
+/* Files of parts. A file appears whole or not at all, and holds no time and no name of a machine. Readers
+ * check all of it.
  *
  * A file is: magic; numbers that tell the byte order and the size of the head; the head, which begins with a
  * vshi_part_about; the body; a checksum. */
@@ -37,7 +37,7 @@ typedef struct vshi_part_code {
     bool failed;          /* memory was short, or what is read is not what was written */
     unsigned char *bytes; /* owned */
     size_t size;          /* bytes: written, or of those that are read the ones that were */
-    size_t room;          /* that there is memory for; of what is read: all */
+    size_t room;          /* bytes of memory; when reading, all of them */
 } vshi_part_code;
 
 void vshi_part_code_bytes(vshi_part_code *code, void *value, size_t size);
@@ -140,7 +140,7 @@ void vshi_part_output_put(vshi_part_output *part, const void *bytes, size_t size
 
 /* Puts the file in its place. Errors: VSH_ERROR_WRITE. */
 vsh_result vshi_part_output_finish(vshi_part_output *part, vsh_error *error);
-void vshi_part_output_abandon(vshi_part_output *part); /* what is not under way, too */
+void vshi_part_output_abandon(vshi_part_output *part); /* zeroed ones too */
 
 /* --- reading, in this order */
 
@@ -150,7 +150,7 @@ typedef struct vshi_part_input {
     vshi_part_front front;
     uint64_t body_bytes;
     uint64_t sum;
-    vshi_part_code head; /* what is behind the vshi_part_about follows */
+    vshi_part_code head; /* positioned behind the vshi_part_about */
 } vshi_part_input;
 
 /* Opens a part and reads its head. Errors: VSH_ERROR_READ, VSH_ERROR_INPUT (no part, damaged, another

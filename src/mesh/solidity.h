@@ -29,7 +29,7 @@ enum {
 
 typedef enum vshi_kind {
     VSHI_KIND_SHEET, /* air on both sides: a card, a leaf, a curtain, an open cup */
-    VSHI_KIND_SOLID, /* what it encloses is solid; where it is open, it is closed over its holes */
+    VSHI_KIND_SOLID, /* encloses a solid, and is closed over its holes */
     VSHI_KIND_ROOM,  /* looks inwards and lies within solids: what it encloses is cut out of them */
     VSHI_KIND_WALL   /* a thin wall behind its faces, air on both sides of that: a room or a sky dome that
                         stands for itself, or the outer skin of a house with open rooms in it */
