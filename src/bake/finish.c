@@ -13,7 +13,7 @@
 
 /* --- statistics of the tiles */
 
-static void add_error(vsh_bake_error *sum, const vsh_bake_error *more) {
+void vshi_bake_error_add(vsh_bake_error *sum, const vsh_bake_error *more) {
     sum->values += more->values;
     sum->square_error += more->square_error;
     sum->held += more->held;
@@ -27,7 +27,7 @@ static void add_tiles(const vshi_page *page, vsh_bake_stats *stats) {
         vshi_shade_stats_add(&stats->shade, &page->stats[tile]);
         for (size_t i = 0; stats->errors != NULL && i < page->error_count; ++i) {
             if (i <= page->light_count || page->lightmap.sky != NULL) {
-                add_error(&stats->errors[i], &page->errors[tile * page->error_count + i]);
+                vshi_bake_error_add(&stats->errors[i], &page->errors[tile * page->error_count + i]);
             }
         }
     }

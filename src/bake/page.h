@@ -120,4 +120,7 @@ double vshi_occluders_bytes(const vsh_occluders *occluders);
  * texels, pads. Adds to *stats. Errors: as vshi_store_take(); VSH_ERROR_CANCELLED. */
 vsh_result vshi_page_finish(vshi_page *page, const vsh_run *run, vsh_bake_stats *stats, vsh_error *error);
 
+/* Adds the errors of tiles, or of lightmaps. */
+void vshi_bake_error_add(vsh_bake_error *sum, const vsh_bake_error *more);
+
 #endif

@@ -334,21 +334,13 @@ vsh_result vshi_bake_find_provenance(vshi_scene_bake *bake, vsh_error *error) {
 
 /* --- baking and merging */
 
-static void add_error(vsh_bake_error *sum, const vsh_bake_error *more) {
-    sum->values += more->values;
-    sum->square_error += more->square_error;
-    sum->held += more->held;
-    sum->held_square_error += more->held_square_error;
-    sum->worst = fmax(sum->worst, more->worst);
-}
-
 void vshi_bake_report_add(vshi_scene_bake *bake, const vsh_bake_stats *baked) {
     vsh_bake_report *report = &bake->report;
     report->texels += baked->texels;
     report->invalid_texels += baked->invalid_texels;
     vshi_shade_stats_add(&report->shade, &baked->shade);
     for (size_t i = 0; i < bake->error_count; ++i) {
-        add_error(&bake->errors[i], &baked->errors[i]);
+        vshi_bake_error_add(&bake->errors[i], &baked->errors[i]);
     }
 }
 
