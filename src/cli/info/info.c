@@ -359,7 +359,7 @@ static void print_summary(const vsh_model *model) {
 
 /* --- solids, rooms, walls and sheets */
 
-enum { KINDS = 4 };
+enum { KINDS = 5 };
 
 static const struct {
     const char *one, *many, *more_of_one, *more_of_many;
@@ -367,6 +367,8 @@ static const struct {
     {"solid", "solids", "", ""},
     {"room", "rooms", " in a solid", " in solids"},
     {"wall", "walls", " with air in front of its faces", " with air in front of their faces"},
+    {"open solid", "open solids", ", hidden where only its inner sides are seen",
+     ", hidden where only their inner sides are seen"},
     {"sheet", "sheets", " with air on both sides", " with air on both sides"},
 };
 
@@ -374,7 +376,8 @@ static void count_kinds(const vsh_solidity_report *report, size_t counts[KINDS])
     counts[0] = report->solids;
     counts[1] = report->rooms;
     counts[2] = report->walls;
-    counts[3] = report->sheets;
+    counts[3] = report->open_solids;
+    counts[4] = report->sheets;
 }
 
 /* Writes a few words, such as "solid", "3 walls" or "mixed". */
