@@ -33,8 +33,7 @@ static vsh_result allocate(vshi_solidity *s, const vsh_mesh *meshes, vsh_error *
                   {(void **)&s->first, s->wholes.count + 1, sizeof *s->first},
                   {(void **)&s->turned, triangles, 1},
                   {(void **)&s->sides, triangles, 1},
-                  {(void **)&s->holed, triangles, 1},
-                  {(void **)&s->vessel, triangles, 1}};
+                  {(void **)&s->holed, triangles, 1}};
     for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; ++i) {
         VSHI_TRY(vshi_allocate(wanted[i].memory, wanted[i].count, wanted[i].size, "what is solid", error));
     }
@@ -46,14 +45,13 @@ static void set_sides(vshi_solidity *s) {
         vshi_component *c = &s->components[i];
         const uint8_t *turned = vshi_solidity_turned(s, c);
         const size_t first = s->first_side[s->wholes.first[c->whole]];
-        for (size_t at = 0; at < c->triangles && c->vessel; ++at) {
-            s->vessel[first + c->list[at]] = turned[c->list[at]] ? VSHI_SIDE_BEFORE : VSHI_SIDE_BEHIND;
-        }
-        for (size_t at = 0; at < c->triangles && c->kind != VSHI_KIND_SHEET; ++at) {
+        const bool encloses = c->kind != VSHI_KIND_SHEET;
+        for (size_t at = 0; at < c->triangles && (encloses || c->vessel); ++at) {
             const uint32_t triangle = c->list[at];
-            s->sides[first + triangle] = turned[triangle] ? VSHI_SIDE_BEFORE : VSHI_SIDE_BEHIND;
-            s->holed[first + triangle] = c->open_edges > 0;
-            c->turned += turned[triangle];
+            const uint8_t side = turned[triangle] ? VSHI_SIDE_BEFORE : VSHI_SIDE_BEHIND;
+            s->sides[first + triangle] = encloses ? side : VSHI_SIDE_SHEET;
+            s->holed[first + triangle] = c->open_edges > 0 ? side : VSHI_SIDE_SHEET;
+            c->turned += encloses && turned[triangle];
         }
     }
 }
@@ -187,7 +185,6 @@ void vshi_solidity_free(vshi_solidity *s) {
             vshi_components_free(&s->found[m]);
         }
     }
-    free(s->vessel);
     free(s->holed);
     free(s->sides);
     free(s->turned);
@@ -230,10 +227,6 @@ const uint8_t *vshi_solidity_sides(const vshi_solidity *s, size_t mesh) {
 
 const uint8_t *vshi_solidity_holed(const vshi_solidity *s, size_t mesh) {
     return s->holed + s->first_side[mesh];
-}
-
-const uint8_t *vshi_solidity_vessels(const vshi_solidity *s, size_t mesh) {
-    return s->vessel + s->first_side[mesh];
 }
 
 const vshi_component *vshi_solidity_components(const vshi_solidity *s, size_t *count) {

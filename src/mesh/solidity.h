@@ -68,13 +68,10 @@ VSHI_SHARED void vshi_solidity_free(vshi_solidity *solidity); /* NULL does nothi
 /* VSHI_SIDE_… of the triangles of a mesh [triangle_count]; those without area are sheets. */
 const uint8_t *vshi_solidity_sides(const vshi_solidity *solidity, size_t mesh);
 
-/* 1 for triangles of a mesh [triangle_count] whose solid, room or wall has holes: what it encloses is not
- * shut off from the rest, and rays may go in by one hole and out by another. */
+/* VSHI_SIDE_… of the triangles of a mesh [triangle_count] by their own component if it has holes and is a
+ * solid, a room, a wall or a vessel: rays may enter it by one hole and leave by another. VSHI_SIDE_SHEET for
+ * all others. */
 const uint8_t *vshi_solidity_holed(const vshi_solidity *solidity, size_t mesh);
-
-/* VSHI_SIDE_BEHIND or VSHI_SIDE_BEFORE for triangles of a mesh [triangle_count] whose sheet is a vessel; else
- * VSHI_SIDE_SHEET. */
-const uint8_t *vshi_solidity_vessels(const vshi_solidity *solidity, size_t mesh);
 
 /* The number of meshes that were looked at. */
 size_t vshi_solidity_mesh_count(const vshi_solidity *solidity);

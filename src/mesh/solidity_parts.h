@@ -15,7 +15,6 @@ struct vshi_solidity {
     uint8_t *turned;    /* of all meshes: found[].turned, and what was decided since */
     uint8_t *sides;     /* of all meshes */
     uint8_t *holed;     /* likewise */
-    uint8_t *vessel;    /* likewise */
     size_t *first_side; /* [mesh_count + 1] */
     vshi_component *components;
     size_t count;

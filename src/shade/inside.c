@@ -58,7 +58,8 @@ typedef struct looking {
     const double *positions; /* [count][3] */
     const float *normals;
     double lift;
-    bool holes; /* solids have some: a ray that escapes proves nothing */
+    bool holes;   /* solids have some: a ray that escapes proves nothing */
+    bool vessels; /* there are some: neighbours may differ with nothing between them */
     vshi_open_fn *open;
     const void *user;
 } looking;
@@ -69,19 +70,23 @@ static vshi_vec lifted(const looking *l, size_t point) {
     return vshi_add(vshi_vec_of(l->positions + 3 * point), vshi_scale(normal, l->lift));
 }
 
-static void aim(const looking *l, size_t point, size_t direction, vshi_segment_ray *ray) {
+/* Aims a ray at a direction over the hemisphere around +z. */
+static void aim_at(const looking *l, size_t point, const double by[3], vshi_segment_ray *ray) {
     vshi_vec normal = vshi_unit(vshi_vec_off(l->normals + 3 * point)), u, v;
     const vshi_vec p = lifted(l, point);
     if (!(vshi_dot(normal, normal) > 0.5)) {
         normal = (vshi_vec){0.0, 0.0, 1.0};
     }
     vshi_frame(normal, &u, &v);
+    const vshi_vec d =
+        vshi_unit(vshi_add(vshi_add(vshi_scale(u, by[0]), vshi_scale(v, by[1])), vshi_scale(normal, by[2])));
+    *ray = (vshi_segment_ray){{p.x, p.y, p.z}, {d.x, d.y, d.z}, INFINITY};
+}
+
+static void aim(const looking *l, size_t point, size_t direction, vshi_segment_ray *ray) {
     const size_t turn = direction < FIRST ? 0 : (direction - FIRST) / MORE;
     const double *by = DIRECTIONS[direction - turn * MORE], c = TURNED[turn][0], s = TURNED[turn][1];
-    const double a = c * by[0] - s * by[1], b = s * by[0] + c * by[1];
-    const vshi_vec d =
-        vshi_unit(vshi_add(vshi_add(vshi_scale(u, a), vshi_scale(v, b)), vshi_scale(normal, by[2])));
-    *ray = (vshi_segment_ray){{p.x, p.y, p.z}, {d.x, d.y, d.z}, INFINITY};
+    aim_at(l, point, (const double[]){c * by[0] - s * by[1], s * by[0] + c * by[1], by[2]}, ray);
 }
 
 /* Whether a ray begins in a solid, followed all the way. */
@@ -135,41 +140,25 @@ static uint8_t confirm(const looking *l, size_t point) {
     }
     vshi_triangles_meet(l->triangles, rays, SECOND, meets);
     for (size_t k = 0; k < SECOND; ++k) {
-        if (meets[k] < VSHI_MEETS_SOLID) {
+        if (meets[k] != VSHI_MEETS_SOLID && meets[k] != VSHI_MEETS_HOLED) {
             return count_through(l, point);
         }
     }
     return VSHI_INSIDE;
 }
 
-/* Aims a direction lower, at `up` over the surface (sine). */
-static void aim_flat(const looking *l, size_t point, size_t direction, double up, vshi_segment_ray *ray) {
-    const double *by = DIRECTIONS[direction];
-    const double part = sqrt((1.0 - up * up) / (by[0] * by[0] + by[1] * by[1]));
-    vshi_vec u, v;
-    aim(l, point, direction, ray);
-    const vshi_vec normal = vshi_unit(vshi_vec_off(l->normals + 3 * point));
-    vshi_frame(normal, &u, &v);
-    const vshi_vec d =
-        vshi_add(vshi_add(vshi_scale(u, part * by[0]), vshi_scale(v, part * by[1])), vshi_scale(normal, up));
-    ray->direction[0] = d.x;
-    ray->direction[1] = d.y;
-    ray->direction[2] = d.z;
-}
-
 /* Whether a point sees only inner sides of solids and vessels, as below a house without a floor. Flat rays
  * find the gap below a cloth that hangs over a table. */
 static bool is_hidden(const looking *l, size_t point) {
     enum { ALL = FIRST + MORE, LEVELS = 3 };
-    static const double FLAT[LEVELS - 1] = {0.06, 0.2};
-    for (size_t k = 0; k < LEVELS * ALL; ++k) { /* mostly one of the first escapes */
+    static const double FLAT[LEVELS - 1] = {0.06, 0.2}; /* tangents of the height over the surface */
+    for (size_t k = 0; k < LEVELS * ALL; ++k) {         /* mostly one of the first escapes */
+        const double *by = DIRECTIONS[k % ALL];
+        const double across = sqrt(by[0] * by[0] + by[1] * by[1]);
+        const double up = k / ALL < LEVELS - 1 ? FLAT[k / ALL] * across : by[2];
         vshi_segment_ray ray;
         uint8_t meets;
-        if (k / ALL < LEVELS - 1) {
-            aim_flat(l, point, k % ALL, FLAT[k / ALL], &ray);
-        } else {
-            aim(l, point, k % ALL, &ray);
-        }
+        aim_at(l, point, (const double[]){by[0], by[1], up}, &ray);
         vshi_triangles_meet(l->triangles, &ray, 1, &meets);
         if (meets < VSHI_MEETS_SOLID) {
             return false;
@@ -246,7 +235,8 @@ static void link_points(const looking *l, const bool *follows, size_t first, siz
     for (size_t k = 0; k < count; ++k) {
         const size_t i = first + k;
         linked[k] = false;
-        if (follows == NULL || !follows[i] || l->holes) { /* beside a hole rays disagree more and more */
+        if (follows == NULL || !follows[i] || l->holes ||
+            l->vessels) { /* beside a hole rays disagree more and more */
             continue;
         }
         const vshi_vec from = lifted(l, i - 1), way = vshi_sub(lifted(l, i), from);
@@ -291,9 +281,14 @@ void vshi_inside(const vsh_triangles *triangles, size_t count, const double *pos
     if (!vshi_triangles_have_solids(triangles)) {
         return;
     }
-    const looking l = {
-        triangles, positions, normals, vshi_triangles_lift(triangles), vshi_triangles_have_holes(triangles),
-        open,      user};
+    const looking l = {triangles,
+                       positions,
+                       normals,
+                       vshi_triangles_lift(triangles),
+                       vshi_triangles_have_holes(triangles),
+                       vshi_triangles_have_vessels(triangles),
+                       open,
+                       user};
     for (size_t first = 0; first < count; first += AT_ONCE) {
         const size_t some = count - first < AT_ONCE ? count - first : AT_ONCE;
         look_linked(&l, follows, first, some, where);

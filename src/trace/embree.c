@@ -160,19 +160,17 @@ static void put(const vsh_triangles *triangles, vshi_vec world, float *out) {
 }
 
 /* VSHI_SOLID_… of triangle i of a mesh, as its corners turn, also where the transform mirrors. */
-static uint8_t find_solid(const vsh_mesh *mesh, const uint8_t *sides, const uint8_t *holed,
-                          const uint8_t *vessels, size_t i) {
-    const bool is_mirrored = vshi_transform_determinant(mesh->transform) < 0.0;
-    if (vessels[i] != VSHI_SIDE_SHEET) {
-        const bool is_behind = (vessels[i] == VSHI_SIDE_BEHIND) != is_mirrored;
-        return (uint8_t)((is_behind ? VSHI_SOLID_BEHIND : VSHI_SOLID_BEFORE) | VSHI_SOLID_VESSEL);
-    }
-    if (sides[i] == VSHI_SIDE_SHEET) {
+static uint8_t find_solid(const vsh_mesh *mesh, const uint8_t *sides, const uint8_t *holed, size_t i) {
+    const uint8_t side = holed[i] != VSHI_SIDE_SHEET ? holed[i] : sides[i];
+    if (side == VSHI_SIDE_SHEET) {
         return VSHI_AIR_AROUND;
     }
     const bool mirrored = vshi_transform_determinant(mesh->transform) < 0.0;
-    const bool behind = (sides[i] == VSHI_SIDE_BEHIND) != mirrored;
-    return (uint8_t)((behind ? VSHI_SOLID_BEHIND : VSHI_SOLID_BEFORE) | (holed[i] ? VSHI_SOLID_HOLED : 0));
+    const bool behind = (side == VSHI_SIDE_BEHIND) != mirrored;
+    return (uint8_t)((behind ? VSHI_SOLID_BEHIND : VSHI_SOLID_BEFORE) |
+                     (sides[i] == VSHI_SIDE_SHEET   ? VSHI_SOLID_VESSEL
+                      : holed[i] != VSHI_SIDE_SHEET ? VSHI_SOLID_HOLED
+                                                    : 0));
 }
 
 /* Finds the large terrains that are solid beneath, as they are unless a caller says otherwise. */
@@ -276,7 +274,6 @@ static vsh_result make_sheet(vsh_triangles *triangles, const vshi_mesh_set *set,
         const vsh_mesh *mesh = &meshes[m];
         const uint8_t *sides = vshi_solidity_sides(set->solidity, m);
         const uint8_t *holed = vshi_solidity_holed(set->solidity, m);
-        const uint8_t *vessels = vshi_solidity_vessels(set->solidity, m);
         triangles->first[m] = (uint32_t)triangle;
         const vshi_terrain_part *part = terrain_of(triangles, m);
         if (part != NULL) {
@@ -293,10 +290,11 @@ static vsh_result make_sheet(vsh_triangles *triangles, const vshi_mesh_set *set,
             for (size_t k = 0; k < 3; ++k) {
                 sheet->corners[3 * triangle + k] = (uint32_t)vertex + weld[mesh->indices[3 * i + k]];
             }
-            const uint8_t solid = find_solid(mesh, sides, holed, vessels, i);
+            const uint8_t solid = find_solid(mesh, sides, holed, i);
             triangles->solid[triangle++] = solid;
             triangles->has_solids = triangles->has_solids || solid != VSHI_AIR_AROUND;
             triangles->has_holes = triangles->has_holes || (solid & VSHI_SOLID_HOLED) != 0;
+            triangles->has_vessels = triangles->has_vessels || (solid & VSHI_SOLID_VESSEL) != 0;
         }
         for (size_t v = 0; v < mesh->vertex_count; ++v) {
             const vshi_vec local = vshi_vec_off(mesh->positions + 3 * v);

@@ -128,6 +128,9 @@ bool vshi_triangles_have_solids(const vsh_triangles *triangles);
 /* Whether any solid or wall has holes, by which rays go in and out. */
 bool vshi_triangles_have_holes(const vsh_triangles *triangles);
 
+/* Whether any sheet is a vessel (mesh/solidity.h). */
+bool vshi_triangles_have_vessels(const vsh_triangles *triangles);
+
 /* The box around all triangles, world space; min > max where there are none. */
 void vshi_triangles_bounds(const vsh_triangles *triangles, double low[3], double high[3]);
 

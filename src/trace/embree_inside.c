@@ -30,6 +30,11 @@ bool vshi_triangles_have_holes(const vsh_triangles *triangles) {
     return false;
 }
 
+bool vshi_triangles_have_vessels(const vsh_triangles *triangles) {
+    (void)triangles;
+    return false;
+}
+
 void vshi_triangles_bounds(const vsh_triangles *triangles, double low[3], double high[3]) {
     (void)triangles;
     low[0] = low[1] = low[2] = 1.0;
@@ -214,6 +219,10 @@ bool vshi_triangles_have_solids(const vsh_triangles *triangles) {
 
 bool vshi_triangles_have_holes(const vsh_triangles *triangles) {
     return triangles->has_holes;
+}
+
+bool vshi_triangles_have_vessels(const vsh_triangles *triangles) {
+    return triangles->has_vessels;
 }
 
 void vshi_triangles_bounds(const vsh_triangles *triangles, double low[3], double high[3]) {

@@ -90,6 +90,7 @@ struct vsh_triangles {
     unsigned first_terrain; /* geometries from here on are the tops of terrains */
     bool has_solids;        /* any */
     bool has_holes;         /* in any of them */
+    bool has_vessels;       /* any sheet is a vessel */
     bool wide;              /* VSHI_PACKET rays are traced at once, not in two halves */
     double low[3], high[3]; /* the triangles' box, world space; min > max where there are none */
     bool fine; /* a surface's quads, smaller than what lies between rays that go together: traced one by

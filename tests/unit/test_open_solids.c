@@ -118,9 +118,9 @@ static void sheets_by_name_hide_nothing(void **state) {
     vsh_mesh mesh = shape_mesh(s, "house");
     mesh.solidity = VSH_SOLIDITY_SHELL;
     vshi_solidity *found = solidity_of(&mesh, 1);
-    const uint8_t *vessels = vshi_solidity_vessels(found, 0);
+    const uint8_t *holed = vshi_solidity_holed(found, 0);
     for (size_t i = 0; i < mesh.triangle_count; ++i) {
-        assert_int_equal(vessels[i], VSHI_SIDE_SHEET);
+        assert_int_equal(holed[i], VSHI_SIDE_SHEET);
     }
     vshi_solidity_free(found);
     free(s);
