@@ -58,8 +58,7 @@ typedef struct looking {
     const double *positions; /* [count][3] */
     const float *normals;
     double lift;
-    bool holes;   /* solids have some: a ray that escapes proves nothing */
-    bool vessels; /* there are some: neighbours may differ with nothing between them */
+    bool holes; /* solids have some: a ray that escapes proves nothing */
     vshi_open_fn *open;
     const void *user;
 } looking;
@@ -70,23 +69,31 @@ static vshi_vec lifted(const looking *l, size_t point) {
     return vshi_add(vshi_vec_of(l->positions + 3 * point), vshi_scale(normal, l->lift));
 }
 
-/* Aims a ray at a direction over the hemisphere around +z. */
-static void aim_at(const looking *l, size_t point, const double by[3], vshi_segment_ray *ray) {
-    vshi_vec normal = vshi_unit(vshi_vec_off(l->normals + 3 * point)), u, v;
-    const vshi_vec p = lifted(l, point);
-    if (!(vshi_dot(normal, normal) > 0.5)) {
-        normal = (vshi_vec){0.0, 0.0, 1.0};
+/* A place where a point's rays begin, and axes for their directions. */
+typedef struct frame {
+    vshi_vec origin, u, v, normal;
+} frame;
+
+static frame frame_of(const looking *l, size_t point) {
+    frame f = {.origin = lifted(l, point), .normal = vshi_unit(vshi_vec_off(l->normals + 3 * point))};
+    if (!(vshi_dot(f.normal, f.normal) > 0.5)) {
+        f.normal = (vshi_vec){0.0, 0.0, 1.0};
     }
-    vshi_frame(normal, &u, &v);
+    vshi_frame(f.normal, &f.u, &f.v);
+    return f;
+}
+
+static vshi_segment_ray aim_in(const frame *f, double x, double y, double z) {
     const vshi_vec d =
-        vshi_unit(vshi_add(vshi_add(vshi_scale(u, by[0]), vshi_scale(v, by[1])), vshi_scale(normal, by[2])));
-    *ray = (vshi_segment_ray){{p.x, p.y, p.z}, {d.x, d.y, d.z}, INFINITY};
+        vshi_unit(vshi_add(vshi_add(vshi_scale(f->u, x), vshi_scale(f->v, y)), vshi_scale(f->normal, z)));
+    return (vshi_segment_ray){{f->origin.x, f->origin.y, f->origin.z}, {d.x, d.y, d.z}, INFINITY};
 }
 
 static void aim(const looking *l, size_t point, size_t direction, vshi_segment_ray *ray) {
     const size_t turn = direction < FIRST ? 0 : (direction - FIRST) / MORE;
     const double *by = DIRECTIONS[direction - turn * MORE], c = TURNED[turn][0], s = TURNED[turn][1];
-    aim_at(l, point, (const double[]){c * by[0] - s * by[1], s * by[0] + c * by[1], by[2]}, ray);
+    const frame f = frame_of(l, point);
+    *ray = aim_in(&f, c * by[0] - s * by[1], s * by[0] + c * by[1], by[2]);
 }
 
 /* Whether a ray begins in a solid, followed all the way. */
@@ -140,31 +147,11 @@ static uint8_t confirm(const looking *l, size_t point) {
     }
     vshi_triangles_meet(l->triangles, rays, SECOND, meets);
     for (size_t k = 0; k < SECOND; ++k) {
-        if (meets[k] != VSHI_MEETS_SOLID && meets[k] != VSHI_MEETS_HOLED) {
+        if (meets[k] < VSHI_MEETS_SOLID) {
             return count_through(l, point);
         }
     }
     return VSHI_INSIDE;
-}
-
-/* Whether a point sees only inner sides of solids and vessels, as below a house without a floor. Flat rays
- * find the gap below a cloth that hangs over a table. */
-static bool is_hidden(const looking *l, size_t point) {
-    enum { ALL = FIRST + MORE, LEVELS = 3 };
-    static const double FLAT[LEVELS - 1] = {0.06, 0.2}; /* tangents of the height over the surface */
-    for (size_t k = 0; k < LEVELS * ALL; ++k) {         /* mostly one of the first escapes */
-        const double *by = DIRECTIONS[k % ALL];
-        const double across = sqrt(by[0] * by[0] + by[1] * by[1]);
-        const double up = k / ALL < LEVELS - 1 ? FLAT[k / ALL] * across : by[2];
-        vshi_segment_ray ray;
-        uint8_t meets;
-        aim_at(l, point, (const double[]){by[0], by[1], up}, &ray);
-        vshi_triangles_meet(l->triangles, &ray, 1, &meets);
-        if (meets < VSHI_MEETS_SOLID) {
-            return false;
-        }
-    }
-    return true;
 }
 
 /* Looks at `count` points, which are listed. */
@@ -188,9 +175,7 @@ static void look(const looking *l, const size_t *points, size_t count, uint8_t *
         const size_t point = points[i];
         const bool escapes = met[VSHI_MEETS_NOTHING] > 0;
         const int inside = met[VSHI_MEETS_SOLID] + met[VSHI_MEETS_HOLED];
-        if (met[VSHI_MEETS_VESSEL] > 0 && inside + met[VSHI_MEETS_VESSEL] == FIRST && is_hidden(l, point)) {
-            where[point] = VSHI_INSIDE;
-        } else if (inside == FIRST) {
+        if (inside == FIRST) {
             where[point] = met[VSHI_MEETS_HOLED] > 0 ? confirm(l, point) : VSHI_INSIDE;
         } else if (inside == 0 && ((escapes && !l->holes) || (l->open != NULL && l->open(l->user, point)))) {
             where[point] = VSHI_OUTSIDE;
@@ -235,8 +220,7 @@ static void link_points(const looking *l, const bool *follows, size_t first, siz
     for (size_t k = 0; k < count; ++k) {
         const size_t i = first + k;
         linked[k] = false;
-        if (follows == NULL || !follows[i] || l->holes ||
-            l->vessels) { /* beside a hole rays disagree more and more */
+        if (follows == NULL || !follows[i] || l->holes) { /* beside a hole rays disagree more and more */
             continue;
         }
         const vshi_vec from = lifted(l, i - 1), way = vshi_sub(lifted(l, i), from);
@@ -275,25 +259,58 @@ static void look_linked(const looking *l, const bool *follows, size_t first, siz
     }
 }
 
+/* Whether a point sees only inner sides of solids and vessels, as below a house without a floor. Flat rays
+ * find the gap below a cloth that hangs over a table. */
+static bool is_hidden(const looking *l, size_t point) {
+    enum { ALL = FIRST + MORE };
+    static const double FLAT = 0.06; /* tangent of their height over the surface */
+    const frame f = frame_of(l, point);
+    for (size_t k = 0; k < 2 * ALL; ++k) { /* mostly one of the first escapes */
+        const double *by = DIRECTIONS[k % ALL];
+        const double up = k < ALL ? FLAT * sqrt(by[0] * by[0] + by[1] * by[1]) : by[2];
+        const vshi_segment_ray ray = aim_in(&f, by[0], by[1], up);
+        if (!vshi_triangles_meet_inner(l->triangles, &ray)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Finds the hidden ones of points first … first + count - 1 that are outside: there is a triangle above each.
+ */
+static void look_for_hidden(const looking *l, size_t first, size_t count, uint8_t *where) {
+    vshi_segment_ray rays[AT_ONCE];
+    bool blocked[AT_ONCE];
+    for (size_t k = 0; k < count; ++k) {
+        const frame f = frame_of(l, first + k);
+        rays[k] = aim_in(&f, 0.0, 0.0, 1.0);
+    }
+    vshi_triangles_blocked(l->triangles, rays, count, blocked);
+    for (size_t k = 0; k < count; ++k) {
+        if (blocked[k] && where[first + k] == VSHI_OUTSIDE && is_hidden(l, first + k)) {
+            where[first + k] = VSHI_INSIDE;
+        }
+    }
+}
+
 void vshi_inside(const vsh_triangles *triangles, size_t count, const double *positions, const float *normals,
                  const bool *follows, vshi_open_fn *open, const void *user, uint8_t *where) {
     memset(where, VSHI_OUTSIDE, count);
     if (!vshi_triangles_have_solids(triangles)) {
         return;
     }
-    const looking l = {triangles,
-                       positions,
-                       normals,
-                       vshi_triangles_lift(triangles),
-                       vshi_triangles_have_holes(triangles),
-                       vshi_triangles_have_vessels(triangles),
-                       open,
-                       user};
+    const looking l = {
+        triangles, positions, normals, vshi_triangles_lift(triangles), vshi_triangles_have_holes(triangles),
+        open,      user};
     for (size_t first = 0; first < count; first += AT_ONCE) {
         const size_t some = count - first < AT_ONCE ? count - first : AT_ONCE;
         look_linked(&l, follows, first, some, where);
     }
     for (size_t first = 0; first < count; first += AT_ONCE) {
-        look_nearer(&l, first, count - first < AT_ONCE ? count - first : AT_ONCE, where);
+        const size_t some = count - first < AT_ONCE ? count - first : AT_ONCE;
+        look_nearer(&l, first, some, where);
+        if (vshi_triangles_have_vessels(triangles)) {
+            look_for_hidden(&l, first, some, where);
+        }
     }
 }

@@ -109,14 +109,16 @@ void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *b
 /* What a ray meets first that is no sheet: those have air on both sides. */
 enum {
     VSHI_MEETS_NOTHING,
-    VSHI_MEETS_AIR,    /* the side of a solid, or of a wall, that is to be seen */
-    VSHI_MEETS_SOLID,  /* the other one: the ray begins in a solid, or behind a wall */
-    VSHI_MEETS_HOLED,  /* the other one of a solid with holes: so it seems */
-    VSHI_MEETS_VESSEL, /* the inner side of an open solid (mesh/solidity.h) */
+    VSHI_MEETS_AIR,   /* the side of a solid, or of a wall, that is to be seen */
+    VSHI_MEETS_SOLID, /* the other one: the ray begins in a solid, or behind a wall */
+    VSHI_MEETS_HOLED, /* the other one of a solid with holes: so it seems */
     VSHI_MEETS_COUNT
 };
 void vshi_triangles_meet(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
                          uint8_t *meets);
+
+/* Whether a ray meets the inner side of a solid or of a vessel before any other side of a solid. */
+bool vshi_triangles_meet_inner(const vsh_triangles *triangles, const vshi_segment_ray *ray);
 
 /* How many solids hold the origin of a ray, by what it crosses on its way: the most that it leaves before it
  * enters as many. Also right where solids lie in each other. Walls count as solids behind them. */

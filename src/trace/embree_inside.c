@@ -10,6 +10,11 @@ void vshi_triangles_meet(const vsh_triangles *triangles, const vshi_segment_ray 
     (void)triangles, (void)rays, (void)count, (void)meets;
 }
 
+bool vshi_triangles_meet_inner(const vsh_triangles *triangles, const vshi_segment_ray *ray) {
+    (void)triangles, (void)ray;
+    return false;
+}
+
 int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray *ray) {
     (void)triangles, (void)ray;
     return 0;
@@ -63,6 +68,7 @@ typedef struct crossing {
 typedef struct looking {
     struct RTCIntersectContext context; /* first: the filter is given this */
     const vsh_triangles *triangles;
+    bool vessels; /* their inner sides are met, too */
     size_t count;
     crossing *crossings; /* NULL: the first is looked for */
 } looking;
@@ -97,16 +103,15 @@ static void filter(const struct RTCFilterFunctionNArguments *args) {
         }
         const uint8_t solid =
             vshi_triangles_solid(look->triangles, hit[HIT_MESH * n + i], hit[HIT_TRIANGLE * n + i]);
+        const vshi_vec normal = vector_of((const float *)args->hit, HIT_NORMAL, n, i);
+        const int8_t out = crosses(solid, normal, vector_of(ray, RAY_DIRECTION, n, i));
         const bool vessel = (solid & VSHI_SOLID_VESSEL) != 0;
-        if (solid == VSHI_AIR_AROUND || look->crossings != NULL ||
-            (vessel && crosses(solid, vector_of((const float *)args->hit, HIT_NORMAL, n, i),
-                               vector_of(ray, RAY_DIRECTION, n, i)) < 0)) {
+        const bool sheet = vessel ? !look->vessels || out < 0 : solid == VSHI_AIR_AROUND;
+        if (sheet || look->crossings != NULL) {
             args->valid[i] = 0;
         }
-        if (solid != VSHI_AIR_AROUND && !vessel && look->crossings != NULL && look->count < MOST_CROSSINGS) {
-            const vshi_vec normal = vector_of((const float *)args->hit, HIT_NORMAL, n, i);
-            look->crossings[look->count++] =
-                (crossing){ray[RAY_FAR * n + i], crosses(solid, normal, vector_of(ray, RAY_DIRECTION, n, i))};
+        if (!sheet && look->crossings != NULL && look->count < MOST_CROSSINGS) {
+            look->crossings[look->count++] = (crossing){ray[RAY_FAR * n + i], out};
         }
     }
 }
@@ -126,10 +131,7 @@ static uint8_t met(const vsh_triangles *triangles, const struct RTCRayHit *ray) 
     const vshi_vec normal = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
     const vshi_vec direction = {(double)ray->ray.dir_x, (double)ray->ray.dir_y, (double)ray->ray.dir_z};
     const bool out = crosses(solid, normal, direction) > 0;
-    return !out                               ? VSHI_MEETS_AIR
-           : (solid & VSHI_SOLID_VESSEL) != 0 ? VSHI_MEETS_VESSEL
-           : (solid & VSHI_SOLID_HOLED) != 0  ? VSHI_MEETS_HOLED
-                                              : VSHI_MEETS_SOLID;
+    return !out ? VSHI_MEETS_AIR : (solid & VSHI_SOLID_HOLED) != 0 ? VSHI_MEETS_HOLED : VSHI_MEETS_SOLID;
 }
 
 /* Aims a lone ray; false where it has no direction. */
@@ -164,6 +166,18 @@ void vshi_triangles_meet(const vsh_triangles *triangles, const vshi_segment_ray 
             meets[i] = met(triangles, &lone);
         }
     }
+}
+
+bool vshi_triangles_meet_inner(const vsh_triangles *triangles, const vshi_segment_ray *ray) {
+    looking look;
+    struct RTCRayHit lone;
+    begin_look(&look, triangles, NULL);
+    look.vessels = true;
+    if (!aim_lone(triangles, ray, &lone)) {
+        return false;
+    }
+    triangles->embree->rtcIntersect1(triangles->scene, &look.context, &lone);
+    return met(triangles, &lone) >= VSHI_MEETS_SOLID;
 }
 
 /* Whether one crossing comes before another; of two in the same place that into a solid, so that no order in
