@@ -171,7 +171,7 @@ static void distances_are_to_the_nearest_triangle_and_sides_by_crossings(void **
         vsh_grid_options options = with_voxel(cases[i].voxel);
         options.half_width = cases[i].half_width;
         vsh_grid *grid = grid_of(s, &options, NULL);
-        compare(s, grid, 4000);
+        compare(s, grid, 1500);
         vsh_grid_free(grid);
         free(s);
     }
