@@ -20,7 +20,6 @@
 /* --- checks */
 
 static vsh_result check_index(const vsh_scene *scene, size_t index, vsh_error *error) {
-    VSHI_NEEDS(scene);
     return index < scene->receiver_count
                ? VSH_OK
                : vshi_fail(error, VSH_ERROR_ARGUMENT, "receivers[%zu]: there are %zu", index,
@@ -39,6 +38,7 @@ static vsh_result check_image(const char *path, const vsh_image *image, const vs
 }
 
 vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_error *error) {
+    VSHI_NEEDS(scene);
     VSHI_TRY(check_index(scene, index, error));
     const vsh_receiver *receiver = &scene->receivers[index];
     const vsh_image_options options = vshi_receiver_image(receiver);
@@ -64,9 +64,10 @@ static vsh_result check_shard(const vsh_bake_options *options, vsh_error *error)
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_options.shard: not together with %s",
                          options->rows != NULL ? "rows" : "invalid_picture");
     }
-    VSHI_NEEDS_OF(options->word_count, options->words);
     for (size_t i = 0; i < options->word_count; ++i) {
-        VSHI_NEEDS(options->words[i]);
+        if (options->words == NULL || options->words[i] == NULL) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_options.words[%zu] is NULL", i);
+        }
     }
     return VSH_OK;
 }
@@ -122,7 +123,6 @@ static vsh_result load(vshi_scene_bake *bake, const vsh_scene *scene, const vsh_
                        const vsh_run *run, bool forecast, vsh_error *error) {
     const double start = vshi_seconds();
     *bake = (vshi_scene_bake){.options = vsh_bake_options_default(), .report.shade = vsh_shade_stats_zero()};
-    VSHI_NEEDS(scene);
     bake->scene = *scene;
     VSHI_TRY(vshi_run_resolve(run, &bake->run, error));
     VSHI_TRY(vshi_options_resolve(options, &bake->options, sizeof bake->options, "vsh_bake_options", error));
@@ -210,6 +210,7 @@ vsh_result vsh_receiver_charts(const vsh_scene *scene, size_t index, const vsh_m
                                size_t mesh_count, const vsh_run *run, vsh_charts **charts, vsh_error *error) {
     VSHI_NEEDS(charts);
     *charts = NULL;
+    VSHI_NEEDS(scene);
     VSHI_TRY(check_index(scene, index, error));
     VSHI_NEEDS_OF(mesh_count, meshes);
     vsh_run full;
@@ -358,6 +359,7 @@ static void fill_report(const vshi_scene_bake *bake, vsh_bake_report *report) {
 
 vsh_result vsh_bake_scene(const vsh_scene *scene, const vsh_bake_options *options, const vsh_run *run,
                           vsh_bake_report *report, vsh_error *error) {
+    VSHI_NEEDS(scene);
     vshi_scene_bake bake;
     vsh_result result;
     VSHI_TRY_DONE(load(&bake, scene, options, run, false, error));
@@ -372,6 +374,7 @@ done:
 
 vsh_result vsh_merge_scene(const vsh_scene *scene, const vsh_bake_options *options, const vsh_run *run,
                            vsh_bake_report *report, vsh_error *error) {
+    VSHI_NEEDS(scene);
     vshi_scene_bake bake;
     int32_t count;
     vsh_result result;
@@ -450,6 +453,7 @@ static vsh_result try_few_voxels(const vshi_scene_bake *bake, vsh_bake_forecast 
 
 vsh_result vsh_forecast_scene(const vsh_scene *scene, const vsh_bake_options *options, const vsh_run *run,
                               vsh_bake_forecast *forecast, vsh_error *error) {
+    VSHI_NEEDS(scene);
     VSHI_NEEDS(forecast);
     vshi_scene_bake bake;
     vsh_bake_forecast f = {.lightmap_count = 0};
