@@ -1,7 +1,12 @@
-/* Ends of edges, held against each other. */
-#include "bake/seams_parts.h"
+/* Two edges of equal ends in the world, compared. */
+#include "bake/seams_search.h"
+
+#include "base/memory.h"
+#include "base/try.h"
+#include "mesh/weld.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 /* How far apart the ends of an edge may be for two triangles to be of one chart, texels: what is rounded when
  * a file is written. A seam as narrow would be read at the same place on both sides. */
@@ -28,15 +33,7 @@ void vshi_edge_look_at(const vshi_seam_pages *pages, uint32_t edge, vshi_edge_en
     }
 }
 
-void vshi_ends_turn(const vshi_edge_end first[2], vshi_edge_end second[2]) {
-    if (!vshi_same_place(first[0].at, second[0].at)) {
-        const vshi_edge_end turned = second[0];
-        second[0] = second[1];
-        second[1] = turned;
-    }
-}
-
-bool vshi_ends_same_in_lightmap(const vshi_edge_end a[2], const vshi_edge_end b[2]) {
+static bool are_same_in_lightmap(const vshi_edge_end a[2], const vshi_edge_end b[2]) {
     bool all = a[0].page == b[0].page;
     for (int k = 0; k < 2; ++k) {
         all = all && fabs(a[k].x - b[k].x) <= SAME_PLACE && fabs(a[k].y - b[k].y) <= SAME_PLACE;
@@ -65,7 +62,7 @@ static vshi_vec normal_at(const vshi_edge_end *end) {
     return normal;
 }
 
-bool vshi_ends_smooth(const vshi_edge_end a[2], const vshi_edge_end b[2], double cosine) {
+static bool are_smooth(const vshi_edge_end a[2], const vshi_edge_end b[2], double cosine) {
     bool all = true;
     for (int k = 0; k < 2; ++k) {
         all = all && vshi_dot(normal_at(&a[k]), normal_at(&b[k])) >= cosine;
@@ -74,7 +71,7 @@ bool vshi_ends_smooth(const vshi_edge_end a[2], const vshi_edge_end b[2], double
 }
 
 /* What lies outside of the image is not baked. */
-bool vshi_ends_inside(const vshi_edge_end a[2]) {
+static bool are_inside(const vshi_edge_end a[2]) {
     const vshi_raster *raster = a[0].raster;
     bool all = true;
     for (int k = 0; k < 2; ++k) {
@@ -84,10 +81,36 @@ bool vshi_ends_inside(const vshi_edge_end a[2]) {
     return all;
 }
 
-vshi_seam vshi_seam_between(const vshi_edge_end a[2], const vshi_edge_end b[2], uint32_t *chart,
-                            uint32_t first_triangle, uint32_t second_triangle) {
-    return (vshi_seam){{{a[0].x, a[1].x}, {b[0].x, b[1].x}},
-                       {{a[0].y, a[1].y}, {b[0].y, b[1].y}},
-                       {vshi_chart_of(chart, first_triangle), vshi_chart_of(chart, second_triangle)},
-                       {a[0].page, b[0].page}};
+static vsh_result add_seam(vshi_seam_search *search, const vshi_seam *seam, vsh_error *error) {
+    vshi_seams *seams = search->seams;
+    if (seams->count == search->room) {
+        search->room = 2 * search->room + 64;
+        const size_t bytes = search->room * sizeof *seams->list;
+        VSHI_TRY(vshi_check_limit(search->run, search->held + (double)bytes, "seams", error));
+        vshi_seam *grown = realloc(seams->list, bytes);
+        if (grown == NULL) {
+            return vshi_fail(error, VSH_ERROR_MEMORY, "seams: the system refused memory");
+        }
+        seams->list = grown;
+    }
+    seams->list[seams->count++] = *seam;
+    return VSH_OK;
+}
+
+vsh_result vshi_seam_compare(vshi_seam_search *search, const uint32_t edge[2], const vshi_edge_end a[2],
+                             const vshi_edge_end b[2], bool *goes_on, vsh_error *error) {
+    const bool turned = !vshi_same_place(a[0].at, b[0].at);
+    const vshi_edge_end second[2] = {b[turned], b[!turned]};
+    const bool one_chart = are_same_in_lightmap(a, second);
+    *goes_on = one_chart || are_smooth(a, second, search->cosine);
+    if (one_chart) {
+        vshi_set_join(search->seams->chart, edge[0] / 3, edge[1] / 3);
+    } else if (*goes_on && are_inside(a) && are_inside(second)) {
+        const vshi_seam seam = {{{a[0].x, a[1].x}, {second[0].x, second[1].x}},
+                                {{a[0].y, a[1].y}, {second[0].y, second[1].y}},
+                                {edge[0] / 3, edge[1] / 3},
+                                {a[0].page, second[0].page}};
+        return add_seam(search, &seam, error);
+    }
+    return VSH_OK;
 }

@@ -1,7 +1,7 @@
 /* T-junctions: where an edge ends in the middle of a longer one. Ends of edges that the surface does not go
  * on beyond are put into a tree, which each of these edges is led through; those that lie on it cut it in
  * parts, whose ends are then the very places of others. */
-#include "bake/seams_parts.h"
+#include "bake/seams_search.h"
 
 #include "bake/places.h"
 #include "base/hash.h"
@@ -40,11 +40,7 @@ typedef struct on_edge {
 } on_edge;
 
 typedef struct finding {
-    const vshi_seam_pages *pages;
-    double cosine;
-    const vsh_run *run;
-    vshi_job *job;
-    uint32_t *chart;
+    vshi_seam_search *search;
     uint32_t *edges; /* [count]: that end somewhere */
     size_t count;
     vshi_vec centre;
@@ -61,7 +57,7 @@ typedef struct finding {
 
 static void places_of(const finding *f, uint32_t edge, vshi_vec at[2]) {
     size_t local;
-    const vsh_mesh *mesh = vshi_edge_mesh(f->pages, edge, &local);
+    const vsh_mesh *mesh = vshi_edge_mesh(f->search->pages, edge, &local);
     for (uint32_t k = 0; k < 2; ++k) {
         at[k] = vshi_edge_place(mesh, mesh->indices[3 * local + (edge % 3 + k) % 3]);
     }
@@ -74,13 +70,20 @@ static void to_floats(const finding *f, vshi_vec place, float at[3]) {
     at[2] = (float)from.z;
 }
 
-static vsh_result list_edges(finding *f, const uint8_t *goes_on, vsh_error *error) {
-    const size_t all = 3 * f->pages->first[f->pages->count];
+/* Whether memory allows for `bytes` more than the search holds. */
+static vsh_result check_bytes(const finding *f, double bytes, vsh_error *error) {
+    const vshi_seam_search *s = f->search;
+    return vshi_check_limit(s->run, s->held + (double)s->room * sizeof *s->seams->list + bytes, what, error);
+}
+
+static vsh_result list_edges(finding *f, vsh_error *error) {
+    const uint8_t *goes_on = f->search->goes_on;
+    const size_t all = 3 * f->search->pages->first[f->search->pages->count];
     for (size_t edge = 0; edge < all; ++edge) {
         f->count += goes_on[edge] == 0;
     }
     const double each = sizeof *f->edges + 2.0 * VSHI_PLACE_BYTES + 2.0 * sizeof *f->parts;
-    VSHI_TRY(vshi_check_limit(f->run, (double)f->count * each, what, error));
+    VSHI_TRY(check_bytes(f, (double)f->count * each, error));
     VSHI_TRY(vshi_allocate((void **)&f->edges, f->count, sizeof *f->edges, what, error));
     for (size_t edge = 0, at = 0; edge < all; ++edge) {
         if (goes_on[edge] == 0) {
@@ -158,7 +161,7 @@ static vsh_result add_part(finding *f, part added, vsh_error *error) {
     }
     if (f->part_count == f->part_room) {
         f->part_room = 2 * f->part_room + 64;
-        VSHI_TRY(vshi_check_limit(f->run, (double)f->part_room * sizeof *f->parts, what, error));
+        VSHI_TRY(check_bytes(f, (double)f->part_room * sizeof *f->parts, error));
         part *grown = realloc(f->parts, f->part_room * sizeof *grown);
         if (grown == NULL) {
             return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
@@ -196,7 +199,7 @@ static vsh_result cut_edge(finding *f, uint32_t edge, vsh_error *error) {
     return add_part(f, next, error);
 }
 
-static int compare_parts(const void *a, const void *b) {
+static int order_parts(const void *a, const void *b) {
     const part *x = a, *y = b;
     if (x->key != y->key) {
         return x->key < y->key ? -1 : 1;
@@ -209,7 +212,7 @@ static int compare_parts(const void *a, const void *b) {
 
 static void look_at_part(const finding *f, const part *p, vshi_edge_end ends[2]) {
     vshi_edge_end whole[2];
-    vshi_edge_look_at(f->pages, p->edge, whole);
+    vshi_edge_look_at(f->search->pages, p->edge, whole);
     for (int k = 0; k < 2; ++k) {
         ends[k] = whole[0];
         ends[k].t = p->t[k];
@@ -224,84 +227,52 @@ static bool same_ends(const part *p, const part *q) {
            (vshi_same_place(p->at[0], q->at[1]) && vshi_same_place(p->at[1], q->at[0]));
 }
 
-/* Joins charts, counts what is smooth, and (`pairs`) lists it. */
-static size_t pair_parts(const finding *f, vshi_part_pair *pairs) {
-    size_t count = 0;
+/* Compares parts with those before them. Whole edges have been compared. */
+static vsh_result compare_parts(const finding *f, vsh_error *error) {
     for (size_t i = 0; i < f->part_count; ++i) {
         const part *p = &f->parts[i];
         for (size_t k = i; k > 0 && i - k < MOST_PAIRS && f->parts[k - 1].key == p->key; --k) {
             const part *q = &f->parts[k - 1];
+            const uint32_t pair[2] = {q->edge, p->edge};
             vshi_edge_end a[2], b[2];
-            if ((!p->cut && !q->cut) || !same_ends(p, q)) {
-                continue; /* whole edges have been held against each other */
-            }
-            look_at_part(f, q, a);
-            look_at_part(f, p, b);
-            vshi_ends_turn(a, b);
-            if (vshi_ends_same_in_lightmap(a, b)) {
-                vshi_chart_join(f->chart, q->edge / 3, p->edge / 3);
-            } else if (vshi_ends_smooth(a, b, f->cosine) && vshi_ends_inside(a) && vshi_ends_inside(b)) {
-                if (pairs != NULL) {
-                    pairs[count] = (vshi_part_pair){{a[0], a[1]}, {b[0], b[1]}, {q->edge / 3, p->edge / 3}};
-                }
-                ++count;
+            bool goes_on;
+            if ((p->cut || q->cut) && same_ends(p, q)) {
+                look_at_part(f, q, a);
+                look_at_part(f, p, b);
+                VSHI_TRY(vshi_seam_compare(f->search, pair, a, b, &goes_on, error));
             }
         }
     }
-    return count;
+    return VSH_OK;
 }
 
-static vsh_result find(finding *f, const uint8_t *goes_on, vshi_seam_parts *parts, vsh_error *error) {
-    VSHI_TRY(list_edges(f, goes_on, error));
+static vsh_result find(finding *f, vsh_error *error) {
+    VSHI_TRY(list_edges(f, error));
     if (f->count == 0 || f->count > UINT32_MAX / 2) {
-        return VSH_OK; /* what is as much is not numbered */
+        return VSH_OK; /* more are not numbered */
     }
     VSHI_TRY(list_ends(f, error));
     for (size_t i = 0; i < f->count; ++i) {
-        if (i % POLL_EDGES == 0 && vshi_job_advance(f->job, 0)) {
-            return vshi_job_fail_cancelled(f->job, error);
+        if (i % POLL_EDGES == 0 && vshi_job_advance(f->search->job, 0)) {
+            return vshi_job_fail_cancelled(f->search->job, error);
         }
         VSHI_TRY(cut_edge(f, f->edges[i], error));
     }
     if (!f->any_cut) {
         return VSH_OK;
     }
-    qsort(f->parts, f->part_count, sizeof *f->parts, compare_parts);
-    const size_t count = pair_parts(f, NULL);
-    parts->bytes = (double)count * sizeof *parts->pairs;
-    VSHI_TRY(vshi_check_limit(f->run, parts->bytes + (double)f->part_room * sizeof *f->parts, what, error));
-    VSHI_TRY(vshi_allocate((void **)&parts->pairs, count, sizeof *parts->pairs, what, error));
-    parts->count = pair_parts(f, parts->pairs);
-    return VSH_OK;
+    qsort(f->parts, f->part_count, sizeof *f->parts, order_parts);
+    return compare_parts(f, error);
 }
 
-vsh_result vshi_seam_parts_find(const vshi_seam_pages *pages, const uint8_t *goes_on, double cosine,
-                                const vsh_run *run, vshi_job *job, uint32_t *chart, vshi_seam_parts *parts,
-                                vsh_error *error) {
-    *parts = (vshi_seam_parts){NULL, 0, 0.0};
+vsh_result vshi_seam_parts_find(vshi_seam_search *search, vsh_error *error) {
     finding *f = NULL;
     VSHI_TRY(vshi_allocate((void **)&f, 1, sizeof *f, what, error));
-    f->pages = pages;
-    f->cosine = cosine;
-    f->run = run;
-    f->job = job;
-    f->chart = chart;
-    const vsh_result result = find(f, goes_on, parts, error);
+    f->search = search;
+    const vsh_result result = find(f, error);
     free(f->parts);
     vshi_places_free(&f->ends);
     free(f->edges);
     free(f);
     return result;
-}
-
-void vshi_seam_parts_list(const vshi_seam_parts *parts, uint32_t *chart, vshi_seam *list) {
-    for (size_t i = 0; i < parts->count; ++i) {
-        const vshi_part_pair *p = &parts->pairs[i];
-        list[i] = vshi_seam_between(p->a, p->b, chart, p->triangle[0], p->triangle[1]);
-    }
-}
-
-void vshi_seam_parts_free(vshi_seam_parts *parts) {
-    free(parts->pairs);
-    *parts = (vshi_seam_parts){NULL, 0, 0.0};
 }

@@ -1,21 +1,21 @@
-/* Sides of triangles are filed under the lower of their vertices and sorted, so that those of one edge follow
- * each other. Two at an edge are partners. Where there are more, the triangles are sorted by their angle
- * around the edge: one whose back looks onwards begins a wedge of solid, the next whose back looks back ends
- * it. So boxes that share an edge or a face in one mesh stay boxes. */
+/* Two sides at an edge are partners. Where there are more, the triangles are sorted by their angle around the
+ * edge: one whose back looks onwards begins a wedge of solid, the next whose back looks back ends it. So
+ * boxes that share an edge or a face in one mesh stay boxes. */
 #include "mesh/edges.h"
 
 #include "base/elementary.h"
 #include "base/memory.h"
 #include "base/try.h"
+#include "mesh/weld.h"
 
 #include <stdlib.h>
 #include <string.h>
 
+/* A side at the edge that is looked at. */
 typedef struct use {
-    uint32_t upper; /* vertex of the edge */
-    uint32_t third; /* vertex of the triangle */
     uint32_t side;
-    uint32_t downwards; /* it runs from the upper to the lower vertex */
+    uint32_t third;     /* vertex of the triangle, beside the edge's */
+    uint32_t downwards; /* it runs from the higher to the lower vertex */
 } use;
 
 typedef struct finding {
@@ -23,17 +23,15 @@ typedef struct finding {
     bool mirrored;
     vshi_edges *edges;
     const uint8_t *flat; /* [triangle_count]: of no area */
-    size_t *ends;        /* [vertex_count + 1]: past the last use filed under a vertex, once filled */
-    use *uses;
+    uint32_t *corners;   /* [triangle_count][3]: welded, in the world's order */
+    vshi_sorted_sides sides;
+    use *uses;             /* [most sides of an edge] */
     size_t odd;            /* edges of three triangles, five, … */
     const uint8_t *frayed; /* [triangle_count]; NULL: not known */
 } finding;
 
 static int compare_uses(const void *a, const void *b) {
     const use *x = a, *y = b;
-    if (x->upper != y->upper) {
-        return x->upper < y->upper ? -1 : 1;
-    }
     if (x->third != y->third) {
         return x->third < y->third ? -1 : 1;
     }
@@ -41,22 +39,6 @@ static int compare_uses(const void *a, const void *b) {
         return x->downwards < y->downwards ? -1 : 1;
     }
     return (x->side > y->side) - (x->side < y->side);
-}
-
-static void sort_uses(use *uses, size_t count) {
-    enum { FEW = 24 };
-    if (count > FEW) {
-        qsort(uses, count, sizeof *uses, compare_uses);
-        return;
-    }
-    for (size_t i = 1; i < count; ++i) {
-        const use one = uses[i];
-        size_t k = i;
-        for (; k > 0 && compare_uses(&uses[k - 1], &one) > 0; --k) {
-            uses[k] = uses[k - 1];
-        }
-        uses[k] = one;
-    }
 }
 
 static vshi_vec place_of(const finding *f, uint32_t vertex) {
@@ -134,12 +116,15 @@ static void join_spokes(vshi_edges *edges, spoke *s, size_t count) {
     }
 }
 
-/* More than two triangles at the edge from `lower` to the uses' upper vertex. */
-static vsh_result join_many(finding *f, uint32_t lower, const use *uses, size_t count, vsh_error *error) {
+/* Joins more than two sides of an edge. */
+static vsh_result join_many(finding *f, size_t count, vsh_error *error) {
+    const use *uses = f->uses;
+    uint32_t ends[2];
     spoke *spokes = NULL;
     VSHI_TRY(vshi_allocate((void **)&spokes, count, sizeof *spokes, "triangles of an edge", error));
-    const vshi_vec origin = place_of(f, lower);
-    const vshi_vec axis = vshi_unit(vshi_sub(place_of(f, uses[0].upper), origin));
+    vshi_side_ends(f->corners, uses[0].side, ends);
+    const vshi_vec origin = place_of(f, ends[0]);
+    const vshi_vec axis = vshi_unit(vshi_sub(place_of(f, ends[1]), origin));
     vshi_vec u, v;
     vshi_frame(axis, &u, &v);
     for (size_t i = 0; i < count; ++i) {
@@ -152,15 +137,21 @@ static vsh_result join_many(finding *f, uint32_t lower, const use *uses, size_t 
     return VSH_OK;
 }
 
-/* The uses of one edge, in which those of triangles given before go to the end; returns how many stay. */
-static size_t leave_out_repeated(finding *f, use *uses, size_t count) {
+/* Lists the sides of an edge that count: of triangles that are not skipped, nor given before. */
+static size_t list_uses(finding *f, size_t begin, size_t end) {
     vshi_edges *edges = f->edges;
-    size_t kept = 0;
-    for (size_t i = 0; i < count; ++i) {
-        const use one = uses[i], *before = kept > 0 ? &uses[kept - 1] : NULL;
-        if (edges->skipped[one.side / 3]) { /* by another of its edges, or an earlier call */
-            continue;
+    size_t count = 0, kept = 0;
+    for (size_t i = begin; i < end; ++i) {
+        const uint32_t side = f->sides.sorted[i], *v = f->corners + side / 3 * (size_t)3;
+        if (!edges->skipped[side / 3]) {
+            f->uses[count++] = (use){side, v[(side + 2) % 3], v[side % 3] > v[(side + 1) % 3]};
         }
+    }
+    if (count > 1) {
+        qsort(f->uses, count, sizeof *f->uses, compare_uses);
+    }
+    for (size_t i = 0; i < count; ++i) {
+        const use one = f->uses[i], *before = kept > 0 ? &f->uses[kept - 1] : NULL;
         if (before != NULL && before->third == one.third) {
             if (before->downwards == one.downwards) {
                 edges->first[one.side / 3] = before->side / 3;
@@ -170,20 +161,24 @@ static size_t leave_out_repeated(finding *f, use *uses, size_t count) {
             edges->doubled[one.side / 3] = 1;
             edges->doubled[before->side / 3] = 1;
         }
-        uses[i] = uses[kept];
-        uses[kept++] = one;
+        f->uses[kept++] = one;
     }
     return kept;
 }
 
-static vsh_result join_edge(finding *f, uint32_t lower, use *uses, size_t given, vsh_error *error) {
-    const size_t count = leave_out_repeated(f, uses, given);
-    if (count == 2) {
-        join(f->edges, uses[0].side, uses[1].side);
-    } else if (count > 2 && count % 2 == 0) {
-        return join_many(f, lower, uses, count, error);
-    } else if (count > 2) {
-        ++f->odd; /* later, when it is known what is frayed */
+/* Joins the sides of each edge that has two, four, …; those of others wait until it is known what is frayed.
+ */
+static vsh_result join_even(finding *f, vsh_error *error) {
+    for (size_t i = 0, end; i < 3 * f->mesh->triangle_count; i = end) {
+        end = vshi_next_edge(&f->sides, i);
+        const size_t count = list_uses(f, i, end);
+        if (count == 2) {
+            join(f->edges, f->uses[0].side, f->uses[1].side);
+        } else if (count > 2 && count % 2 == 0) {
+            VSHI_TRY(join_many(f, count, error));
+        } else if (count > 2) {
+            ++f->odd;
+        }
     }
     return VSH_OK;
 }
@@ -191,19 +186,15 @@ static vsh_result join_edge(finding *f, uint32_t lower, use *uses, size_t given,
 /* Marks the triangles that hang together with one at an edge of its own. */
 static vsh_result find_frayed(finding *f, uint8_t *frayed, vsh_error *error) {
     const vshi_edges *edges = f->edges;
-    const size_t count = f->mesh->triangle_count;
     uint32_t *queue = NULL;
     size_t waiting = 0;
-    VSHI_TRY(vshi_allocate((void **)&queue, count, sizeof *queue, "edges of triangles", error));
-    for (size_t vertex = 0, begin = 0; vertex < f->mesh->vertex_count; begin = f->ends[vertex], ++vertex) {
-        for (size_t i = begin, next; i < f->ends[vertex]; i = next) {
-            for (next = i + 1; next < f->ends[vertex] && f->uses[next].upper == f->uses[i].upper; ++next) {
-            }
-            const uint32_t triangle = f->uses[i].side / 3;
-            if (next - i == 1 && !frayed[triangle]) {
-                frayed[triangle] = 1;
-                queue[waiting++] = triangle;
-            }
+    VSHI_TRY(
+        vshi_allocate((void **)&queue, f->mesh->triangle_count, sizeof *queue, "edges of triangles", error));
+    for (size_t i = 0, end; i < 3 * f->mesh->triangle_count; i = end) {
+        end = vshi_next_edge(&f->sides, i);
+        if (list_uses(f, i, end) == 1 && !frayed[f->uses[0].side / 3]) {
+            frayed[f->uses[0].side / 3] = 1;
+            queue[waiting++] = f->uses[0].side / 3;
         }
     }
     for (size_t at = 0; at < waiting; ++at) {
@@ -226,14 +217,11 @@ static vsh_result join_odd(finding *f, vsh_error *error) {
     VSHI_TRY(vshi_allocate((void **)&frayed, f->mesh->triangle_count, 1, "edges of triangles", error));
     VSHI_TRY_DONE(find_frayed(f, frayed, error));
     f->frayed = frayed;
-    for (size_t vertex = 0, begin = 0; vertex < f->mesh->vertex_count; begin = f->ends[vertex], ++vertex) {
-        for (size_t i = begin, next; i < f->ends[vertex]; i = next) {
-            for (next = i + 1; next < f->ends[vertex] && f->uses[next].upper == f->uses[i].upper; ++next) {
-            }
-            const size_t count = leave_out_repeated(f, f->uses + i, next - i);
-            if (count > 2 && count % 2 != 0) {
-                VSHI_TRY_DONE(join_many(f, (uint32_t)vertex, f->uses + i, count, error));
-            }
+    for (size_t i = 0, end; i < 3 * f->mesh->triangle_count; i = end) {
+        end = vshi_next_edge(&f->sides, i);
+        const size_t count = end - i > 2 ? list_uses(f, i, end) : 0;
+        if (count > 2 && count % 2 != 0) {
+            VSHI_TRY_DONE(join_many(f, count, error));
         }
     }
 done:
@@ -254,43 +242,15 @@ static size_t count_open(const vsh_mesh *mesh, const vshi_edges *edges) {
 static vsh_result join_edges(finding *f, bool with_flat, vsh_error *error) {
     const vsh_mesh *mesh = f->mesh;
     vshi_edges *edges = f->edges;
-    uint32_t v[3];
-    f->odd = 0;
-    memset(f->ends, 0, (mesh->vertex_count + 1) * sizeof *f->ends);
     memset(edges->partner, 0xff, 3 * mesh->triangle_count * sizeof *edges->partner);
     for (size_t i = 0; i < mesh->triangle_count; ++i) {
+        const uint32_t *v = f->corners + 3 * i;
         edges->first[i] = (uint32_t)i;
         edges->doubled[i] = 0;
-        const bool whole = vshi_edges_corners(mesh, edges->weld, f->mirrored, i, v);
-        edges->skipped[i] = !whole || (!with_flat && f->flat[i]);
-        for (int k = 0; k < 3 && !edges->skipped[i]; ++k) {
-            const uint32_t a = v[k], b = v[(k + 1) % 3];
-            ++f->ends[(a < b ? a : b) + (size_t)1];
-        }
+        edges->skipped[i] = v[0] == v[1] || v[1] == v[2] || v[2] == v[0] || (!with_flat && f->flat[i]);
     }
-    for (size_t i = 0; i < mesh->vertex_count; ++i) {
-        f->ends[i + 1] += f->ends[i];
-    }
-    for (size_t i = 0; i < mesh->triangle_count; ++i) {
-        if (edges->skipped[i]) {
-            continue;
-        }
-        vshi_edges_corners(mesh, edges->weld, f->mirrored, i, v);
-        for (int k = 0; k < 3; ++k) {
-            const uint32_t a = v[k], b = v[(k + 1) % 3];
-            f->uses[f->ends[a < b ? a : b]++] =
-                (use){a < b ? b : a, v[(k + 2) % 3], (uint32_t)(3 * i) + (uint32_t)k, a > b};
-        }
-    }
-    for (size_t vertex = 0, begin = 0; vertex < mesh->vertex_count; begin = f->ends[vertex], ++vertex) {
-        const size_t end = f->ends[vertex];
-        sort_uses(f->uses + begin, end - begin);
-        for (size_t i = begin, next; i < end; i = next) {
-            for (next = i + 1; next < end && f->uses[next].upper == f->uses[i].upper; ++next) {
-            }
-            VSHI_TRY(join_edge(f, (uint32_t)vertex, f->uses + i, next - i, error));
-        }
-    }
+    f->odd = 0;
+    VSHI_TRY(join_even(f, error));
     if (f->odd > 0) {
         VSHI_TRY(join_odd(f, error));
     }
@@ -309,13 +269,27 @@ static vsh_result take(const vsh_mesh *mesh, vshi_edges *edges, finding *f, uint
                   {(void **)&edges->doubled, mesh->triangle_count, 1},
                   {(void **)&edges->partner, 3 * mesh->triangle_count, sizeof *edges->partner},
                   {(void **)flat, mesh->triangle_count, 1},
-                  {(void **)&f->ends, mesh->vertex_count + 1, sizeof *f->ends},
-                  {(void **)&f->uses, 3 * mesh->triangle_count, sizeof *f->uses}};
+                  {(void **)&f->corners, mesh->triangle_count, 3 * sizeof *f->corners}};
     for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; ++i) {
         VSHI_TRY(
             vshi_allocate(wanted[i].memory, wanted[i].count, wanted[i].size, "edges of triangles", error));
     }
     return VSH_OK;
+}
+
+static vsh_result sort_sides(finding *f, vsh_error *error) {
+    const vsh_mesh *mesh = f->mesh;
+    size_t most = 0;
+    for (size_t i = 0; i < mesh->triangle_count; ++i) {
+        vshi_edges_corners(mesh, f->edges->weld, f->mirrored, i, f->corners + 3 * i);
+    }
+    f->sides = (vshi_sorted_sides){f->corners, mesh->triangle_count, mesh->vertex_count, NULL};
+    VSHI_TRY(vshi_sort_sides(&f->sides, error));
+    for (size_t i = 0, end; i < 3 * mesh->triangle_count; i = end) {
+        end = vshi_next_edge(&f->sides, i);
+        most = end - i > most ? end - i : most;
+    }
+    return vshi_allocate((void **)&f->uses, most, sizeof *f->uses, "edges of triangles", error);
 }
 
 vsh_result vshi_edges_check(const vsh_mesh *mesh, size_t index, vsh_error *error) {
@@ -337,6 +311,7 @@ vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, vshi_edges *edges
     vsh_result result;
     VSHI_TRY_DONE(take(mesh, edges, &f, &flat, error));
     VSHI_TRY_DONE(vshi_mesh_weld(mesh, edges->weld, error));
+    VSHI_TRY_DONE(sort_sides(&f, error));
     for (size_t i = 0; i < mesh->triangle_count; ++i) {
         flat[i] = vshi_mesh_degenerate(mesh, i);
         flats += flat[i];
@@ -352,7 +327,8 @@ vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, vshi_edges *edges
     }
 done:
     free(f.uses);
-    free(f.ends);
+    free(f.sides.sorted);
+    free(f.corners);
     free(flat);
     return result;
 }

@@ -6,10 +6,10 @@
 
 #include "base/memory.h"
 #include "base/try.h"
+#include "mesh/weld.h"
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* Room for the rounding of floats and for what rays are lifted off a surface, in a scene of half size 1. */
 static const double ROUNDING = 0x1p-16;
@@ -41,74 +41,24 @@ double vshi_sheet_bytes(double vertex_count, double triangle_count) {
     return vertex_count * 3.0 * sizeof(float) + triangle_count * 6.0 * sizeof(uint32_t);
 }
 
-/* Edge k of triangle t is number 3 t + k: its vertices, the lower one first. */
-static void ends_of(const vshi_sheet *sheet, uint32_t edge, uint32_t ends[2]) {
-    const uint32_t *corners = sheet->corners + edge / 3 * (size_t)3;
-    const uint32_t a = corners[edge % 3], b = corners[(edge + 1) % 3];
-    ends[0] = a < b ? a : b;
-    ends[1] = a < b ? b : a;
-}
-
-/* Sorts edges by one of their ends, and leaves those alike in order; `from` NULL: as they are numbered.
- * Vertices near each other in a mesh mostly have numbers near each other, so that memory is gone through in
- * order, which a hash table's is not. */
-static void sort_by_end(const vshi_sheet *sheet, int end, const uint32_t *from, uint32_t *first,
-                        uint32_t *sorted) {
-    const uint32_t count = (uint32_t)(3 * sheet->triangle_count);
-    uint32_t ends[2];
-    memset(first, 0, (sheet->vertex_count + 1) * sizeof *first);
-    for (uint32_t edge = 0; edge < count; ++edge) {
-        ends_of(sheet, edge, ends);
-        ++first[ends[end] + (size_t)1];
-    }
-    for (size_t v = 0; v < sheet->vertex_count; ++v) {
-        first[v + 1] += first[v];
-    }
-    for (uint32_t i = 0; i < count; ++i) {
-        const uint32_t edge = from != NULL ? from[i] : i;
-        ends_of(sheet, edge, ends);
-        sorted[first[ends[end]]++] = edge;
-    }
-}
-
-/* Edges that are alone between their vertices are borders, and so are those where more than two meet. */
-static void join_edges(vshi_sheet *sheet, const uint32_t *sorted) {
-    const uint32_t count = (uint32_t)(3 * sheet->triangle_count);
-    for (uint32_t i = 0, next; i < count; i = next) {
-        uint32_t ends[2], other[2];
-        ends_of(sheet, sorted[i], ends);
-        for (next = i + 1; next < count; ++next) {
-            ends_of(sheet, sorted[next], other);
-            if (other[0] != ends[0] || other[1] != ends[1]) {
-                break;
-            }
-        }
-        if (next - i == 2 && ends[0] != ends[1]) {
-            sheet->neighbours[sorted[i]] = sorted[i + 1] / 3;
-            sheet->neighbours[sorted[i + 1]] = sorted[i] / 3;
-        }
-    }
-}
-
 vsh_result vshi_sheet_join(vshi_sheet *sheet, vsh_error *error) {
-    const char *what = "triangles' neighbours";
-    const size_t edges = 3 * sheet->triangle_count;
-    if (edges == 0) {
-        return VSH_OK;
+    const size_t count = 3 * sheet->triangle_count;
+    vshi_sorted_sides sides = {sheet->corners, sheet->triangle_count, sheet->vertex_count, NULL};
+    const vsh_result result = vshi_sort_sides(&sides, error);
+    for (size_t i = 0, end; result == VSH_OK && i < count; i = end) {
+        const uint32_t *side = sides.sorted + i;
+        end = vshi_next_edge(&sides, i);
+        for (size_t k = i; k < end; ++k) {
+            sheet->neighbours[sides.sorted[k]] = VSHI_SHEET_BORDER;
+        }
+        uint32_t ends[2];
+        vshi_side_ends(sheet->corners, side[0], ends);
+        if (end - i == 2 && ends[0] != ends[1]) {
+            sheet->neighbours[side[0]] = side[1] / 3;
+            sheet->neighbours[side[1]] = side[0] / 3;
+        }
     }
-    memset(sheet->neighbours, 0xff, edges * sizeof *sheet->neighbours);
-    uint32_t *first = NULL, *by_end = NULL, *sorted = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&first, sheet->vertex_count + 1, sizeof *first, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&by_end, edges, sizeof *by_end, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&sorted, edges, sizeof *sorted, what, error));
-    sort_by_end(sheet, 1, NULL, first, by_end);
-    sort_by_end(sheet, 0, by_end, first, sorted);
-    join_edges(sheet, sorted);
-done:
-    free(sorted);
-    free(by_end);
-    free(first);
+    free(sides.sorted);
     return result;
 }
 
