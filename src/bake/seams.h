@@ -99,7 +99,7 @@ typedef struct vshi_seam_problem {
     vshi_job *job;          /* looked at: it may be cancelled */
 } vshi_seam_problem;
 
-enum { VSHI_SEAM_WORK = 3 }; /* vectors */
+enum { VSHI_SEAM_WORK = 2 }; /* vectors */
 
 /* values[unknown] → gradient of ½ Σ share (row · values)². */
 void vshi_seam_gradient(const vshi_seam_problem *problem, const double *values, double *gradient);
