@@ -1,5 +1,5 @@
 /* Estimates of texels by what they and those around them shot. */
-#include "bake/ao_estimate.h"
+#include "bake/page.h"
 
 #include "bake/raster.h"
 #include "base/memory.h"

@@ -1,4 +1,4 @@
-#include "bake/bent_normals.h"
+#include "bake/page.h"
 
 #include "shade/ao.h"
 

@@ -1,6 +1,4 @@
 /* Finishes a page whose tiles are all traced: AO between texels, fills, padding, statistics. */
-#include "bake/ao_estimate.h"
-#include "bake/bent_normals.h"
 #include "bake/nearest_valid.h"
 #include "bake/page.h"
 #include "bake/planes.h"

@@ -83,4 +83,18 @@ static inline vshi_lift_point vshi_sample_lift_point(const vshi_samples *samples
 void vshi_origins_lift(const vshi_lifter *lifter, const vshi_samples *samples, bool traced,
                        vshi_origins *origins);
 
+/* --- shadow values that rays left noise in, smoothed along penumbrae */
+
+/* Memory that it works in: which sample each texel of a tile has, and what is made of the values. */
+typedef struct vshi_smooth_work {
+    const vshi_origins *origins;
+    const float *deviation;
+    uint16_t sample[VSHI_TILE * VSHI_TILE];
+    float across[VSHI_TILE * VSHI_TILE], smooth[VSHI_TILE * VSHI_TILE];
+} vshi_smooth_work;
+
+/* Smooths the values of a tile's origins by their deviations, where each texel has one sample. */
+void vshi_shadow_smooth(const vshi_origins *origins, float *values, const float *deviation,
+                        vshi_smooth_work *work);
+
 #endif

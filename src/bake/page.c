@@ -1,6 +1,5 @@
 #include "bake/page.h"
 
-#include "bake/ao_estimate.h"
 #include "bake/planes.h"
 #include "base/memory.h"
 #include "base/try.h"

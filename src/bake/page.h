@@ -7,6 +7,8 @@
 #include "bake/texels.h"
 #include "shade/links.h"
 
+#include <vdbshade/bake.h>
+
 /* Texels of a tile to compare with the casters once their values are known. */
 typedef struct vshi_held_texels {
     vshi_held_texel *list; /* [count], or NULL */
@@ -122,5 +124,29 @@ vsh_result vshi_page_finish(vshi_page *page, const vsh_run *run, vsh_bake_stats 
 
 /* Adds the errors of tiles, or of lightmaps. */
 void vshi_bake_error_add(vsh_bake_error *sum, const vsh_bake_error *more);
+
+/* Values of AO of texels that share rays: each is the best estimate that its own rays and those of the texels
+ * around it allow. */
+
+/* The plane that a window fits at its texel (slopes a texel of the page), and its error. */
+typedef struct vshi_ao_plane {
+    float slope[2], deviation, curved;
+} vshi_ao_plane;
+
+/* Sets values and planes [height][width] of all texels with a level and, unless it is NULL, bent
+ * [height][width][3], the mean of their open directions. Adds what is known of them to *stats. Errors:
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_ao_estimate(const vshi_page *page, const vshi_shots *shots, float *values,
+                            vshi_ao_plane *planes, float *bent, const vsh_run *run, vsh_shade_stats *stats,
+                            vsh_error *error);
+
+/* --- bent normals of samples, from the mean of their open directions */
+
+/* Makes a unit bent normal of a mean of open directions, as of vshi_ao_task; in tangent space where a tangent
+ * [4] is given, else (NULL) in world space. */
+void vshi_bent_normal(const float *normal, const float *tangent, float *bent);
+
+/* Makes a mean of bent normals one of unit length. */
+void vshi_bent_normalize(float *bent);
 
 #endif

@@ -3,7 +3,7 @@
  * and columns of texels. None is moved by more than its rays may be off. On the seeds' scene second
  * differences along penumbrae fall from 2.4 times those of the truth to 1.4, and the error from 0.0058 to
  * 0.0044. */
-#include "bake/shadow_smooth.h"
+#include "bake/origins.h"
 
 #include "base/vec.h"
 

@@ -1,4 +1,4 @@
-#include "bake/solid.h"
+#include "bake/fill.h"
 
 #include "field/field.h"
 #include "heightfield/heights.h"

@@ -1,8 +1,7 @@
 /* Tiles of a lightmap, traced: shadow values are final, shared AO leaves its shots. */
-#include "bake/bent_normals.h"
+#include "bake/origins.h"
 #include "bake/page.h"
 #include "bake/planes.h"
-#include "bake/shadow_smooth.h"
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"

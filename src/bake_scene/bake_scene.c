@@ -3,7 +3,6 @@
 #include "bake_scene/lit_output.h"
 #include "bake_scene/pages.h"
 #include "bake_scene/parts.h"
-#include "bake_scene/warn.h"
 #include "base/clock.h"
 #include "base/file.h"
 #include "base/job.h"

@@ -1,4 +1,4 @@
-#include "bake_scene/invalid_picture.h"
+#include "bake_scene/pages.h"
 
 #include <stdio.h>
 #include <stdlib.h>

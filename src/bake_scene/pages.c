@@ -1,9 +1,8 @@
 #include "bake_scene/pages.h"
 
-#include "bake_scene/invalid_picture.h"
+#include "bake_scene/bake_scene.h"
 #include "bake_scene/lit_output.h"
 #include "bake_scene/parts.h"
-#include "bake_scene/warn.h"
 #include "base/bytes.h"
 #include "base/clock.h"
 #include "base/job.h"

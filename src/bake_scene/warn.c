@@ -1,10 +1,10 @@
-#include "bake_scene/warn.h"
+#include "bake_scene/pages.h"
 
 #include "bake/planes.h"
 #include "base/job.h"
 #include "light/light.h"
 #include "light/view.h"
-#include "mesh/enclosure.h"
+#include "mesh/solidity_parts.h"
 #include "trace/embree.h"
 
 #include <inttypes.h>

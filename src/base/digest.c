@@ -2,7 +2,6 @@
 #include "base/digest.h"
 
 #include "base/input.h"
-#include "base/sha256.h"
 #include "base/try.h"
 
 #include <sha256.h>

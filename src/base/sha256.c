@@ -1,6 +1,6 @@
 /* The registers' order (ABEF, CDGH) is that of the instructions: S. Gulley et al., "Intel SHA Extensions",
  * 2013. */
-#include "base/sha256.h"
+#include "base/digest.h"
 
 #if defined(__x86_64__)
 

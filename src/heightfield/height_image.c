@@ -1,4 +1,4 @@
-#include "heightfield/height_image.h"
+#include "heightfield/heights.h"
 
 #include "base/memory.h"
 #include "base/try.h"

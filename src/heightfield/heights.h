@@ -2,14 +2,14 @@
 #ifndef VSHI_HEIGHTS_H
 #define VSHI_HEIGHTS_H
 
+#include "base/error.h"
 #include "base/vec.h"
 
+#include <stdbool.h>
 #include <vdbshade/heights.h>
 #include <vdbshade/light.h>
 #include <vdbshade/method.h>
 #include <vdbshade/points.h>
-
-#include <stdbool.h>
 
 /* Marches from points begin … end - 1 to a light that was checked before. Writes its visible share into
  * visibility[end - begin]: for VSH_SHADOW_HARD 0 or 1, for any other method that of VSH_SHADOW_CLASSIC.
@@ -24,5 +24,19 @@ double vshi_heights_lift(const vsh_heights *heights, double start_offset);
 
 /* Whether a world position is within the solid, deeper than receivers may be off. */
 bool vshi_heights_hold(const vsh_heights *heights, const double position[3]);
+
+/* --- heights read from an image */
+
+typedef struct vshi_height_image {
+    int32_t columns, rows;
+    float *values; /* [rows][columns]; free() */
+} vshi_height_image;
+
+/* Integers become 0 … 1, floats stay as they are; of an image with R, G and B their luminance (ITU-R BT.709),
+ * of every other the first channel. Errors: as vsh_image_read(); VSH_ERROR_INPUT for an image that is less
+ * than 2 or more than VSH_MAX_HEIGHTS_SIDE pixels along a side; VSH_ERROR_LIMIT (run->memory_limit),
+ * VSH_ERROR_MEMORY. */
+vsh_result vshi_height_image_read(const char *path, const vsh_run *run, vshi_height_image *map,
+                                  vsh_error *error);
 
 #endif

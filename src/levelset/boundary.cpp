@@ -1,4 +1,4 @@
-#include "levelset/boundary.h"
+#include "levelset/sides.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // Grids from outside call themselves level sets whether they hold distances or not (filtered, scaled and
 // advected ones do not), so their values are looked at: whether they change by a voxel's size from voxel to
 // voxel at the surface, and reach the background where the band ends.
-#include "levelset/examine.h"
+#include "levelset/file.h"
 
 #include "base/elementary.h"
 #include "levelset/redistance.h"

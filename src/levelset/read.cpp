@@ -1,6 +1,5 @@
 // vsh_grid_read() and vsh_vdb_list(): a file's content, from this process or from a reader, looked over.
 #include "base/try.h"
-#include "levelset/examine.h"
 #include "levelset/file.h"
 #include "levelset/message.h"
 

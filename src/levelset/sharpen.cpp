@@ -1,6 +1,6 @@
 // Ju, Losasso, Schaefer and Warren, "Dual contouring of Hermite data", 2002: the point of a cell minimises
 // the squared distances to the planes of the surface where it cuts the cell's edges.
-#include "levelset/sharpen.h"
+#include "levelset/redistance.h"
 
 #include <cmath>
 

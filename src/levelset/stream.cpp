@@ -1,4 +1,4 @@
-#include "levelset/stream.h"
+#include "levelset/grid_reader.h"
 
 #include <cstring>
 #include <zlib.h>

@@ -1,7 +1,7 @@
 // Grids of the distances to surfaces of triangles and quads.
 #include "levelset/surface.h"
 
-#include "levelset/boundary.h"
+#include "levelset/sides.h"
 
 #include <memory>
 #include <openvdb/tools/SignedFloodFill.h>

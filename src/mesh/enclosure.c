@@ -1,7 +1,7 @@
 /* Generalized winding numbers (A. Jacobson, L. Kavan, O. Sorkine-Hornung, "Robust inside-outside segmentation
  * using generalized winding numbers", 2013): the sum of the triangles' solid angles over the whole sphere's.
  */
-#include "mesh/enclosure.h"
+#include "mesh/solidity_parts.h"
 
 #include "base/elementary.h"
 

@@ -1,4 +1,4 @@
-#include "mesh/whole.h"
+#include "mesh/solidity.h"
 
 #include "base/memory.h"
 #include "base/try.h"

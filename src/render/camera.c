@@ -1,4 +1,4 @@
-#include "render/camera.h"
+#include "render/grid.h"
 
 #include "base/elementary.h"
 #include "base/error.h"

@@ -1,6 +1,6 @@
 /* The filter is Blackman and Harris' window over three pixels (F. J. Harris, "On the use of windows for
  * harmonic analysis with the discrete Fourier transform", 1978): edges without steps or ringing. */
-#include "render/film.h"
+#include "render/grid.h"
 
 #include "base/elementary.h"
 #include "base/parallel.h"

@@ -3,7 +3,30 @@
 #define VSHI_SAMPLE_GRID_H
 
 #include "base/hash.h"
-#include "render/camera.h"
+#include "base/job.h"
+#include "base/vec.h"
+
+#include <vdbshade/render.h>
+
+/* --- cameras as rays */
+
+/* A camera's frame, for pictures of one size. */
+typedef struct vshi_view_frame {
+    vshi_vec eye;
+    vshi_vec forward;     /* unit */
+    vshi_vec right, down; /* of a pixel's width and height, a unit away */
+    double middle[2];     /* of the picture, pixels */
+} vshi_view_frame;
+
+vshi_view_frame vshi_camera_frame(const vsh_camera *camera, int32_t width, int32_t height);
+
+/* Direction, not unit but with 1 along the axis, through a place of the picture, pixels from its left top. */
+static inline vshi_vec vshi_camera_ray(const vshi_view_frame *frame, double x, double y) {
+    return vshi_add(frame->forward, vshi_add(vshi_scale(frame->right, x - frame->middle[0]),
+                                             vshi_scale(frame->down, y - frame->middle[1])));
+}
+
+/* --- samples */
 
 typedef struct vshi_sample_grid {
     vshi_view_frame frame;
@@ -32,5 +55,32 @@ static inline vshi_vec vshi_sample_ray(const vshi_sample_grid *grid, int32_t col
     }
     return vshi_camera_ray(&grid->frame, (column + x) / grid->samples - 1.0, (row + y) / grid->samples - 1.0);
 }
+
+/* --- from samples to pixels */
+
+/* What a ray brought back. */
+typedef struct vshi_seen {
+    float color[3];
+    float alpha;
+    float depth; /* infinite: nothing */
+    float normal[3];
+} vshi_seen;
+
+typedef struct vshi_film {
+    const vshi_sample_grid *grid;
+    const vsh_picture *picture;
+    double weight[3 * 16]; /* of the 3 N samples across the filter */
+} vshi_film;
+
+/* Empties the picture's planes. */
+void vshi_film_begin(vshi_film *film, const vshi_sample_grid *grid, const vsh_picture *picture);
+
+/* Adds rows of samples, [rows × columns], to the pixels that they reach. Every row is added once, in order.
+ */
+vsh_result vshi_film_add(const vshi_film *film, const vshi_seen *seen, int32_t first_row, int32_t rows,
+                         vshi_job *job, vsh_error *error);
+
+/* Makes normals unit. */
+void vshi_film_end(const vshi_film *film);
 
 #endif

@@ -1,7 +1,7 @@
 /* Sphere tracing (J. C. Hart, "Sphere tracing", 1996) through the pyramid, on to where the sign changes. The
  * finest level's trilinear interpolant is the surface; a ray is looked at every tenth of a voxel next to it,
  * so that what it can miss is thinner than that. */
-#include "render/hit.h"
+#include "render/tile.h"
 
 /* Of the distance to go at once on the finest level, whose samples can be wrong by most of a voxel at edges.
  */

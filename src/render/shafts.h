@@ -3,7 +3,7 @@
 #define VSHI_SHAFTS_H
 
 #include "base/vec.h"
-#include "render/film.h"
+#include "render/grid.h"
 #include "trace/sampler.h"
 
 #include <vdbshade/query.h>

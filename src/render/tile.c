@@ -1,7 +1,6 @@
 #include "render/tile.h"
 
 #include "base/try.h"
-#include "render/hit.h"
 #include "shade/shade.h"
 
 /* How much nearer than a lit mesh a surface of the same shape may be, its voxels. */

@@ -2,6 +2,7 @@
 #ifndef VSHI_TILE_H
 #define VSHI_TILE_H
 
+#include "field/field.h"
 #include "render/lit.h"
 #include "render/shafts.h"
 
@@ -33,5 +34,20 @@ typedef struct vshi_rows {
  * vsh_query_points(). */
 vsh_result vshi_tile_render(const vshi_scenery *scenery, const vshi_rows *rows, int32_t column, int32_t row,
                             vsh_shade_stats *stats, vsh_error *error);
+
+/* --- where a ray meets the zero surface of a field */
+
+/* In world space; `direction` is unit. */
+typedef struct vshi_eye_ray {
+    vshi_vec origin, direction;
+} vshi_eye_ray;
+
+/* Adds to *samples what it takes. Returns the distance, world units, or `end` where the ray meets nothing
+ * before it, *finished telling whether that is certain. */
+double vshi_field_hit(const vsh_field *field, const vshi_eye_ray *ray, double end, uint64_t *samples,
+                      bool *finished);
+
+/* Unit normal next to the surface, world space; `otherwise` where the field has none. */
+vshi_vec vshi_field_normal(const vsh_field *field, vshi_vec position, vshi_vec otherwise);
 
 #endif

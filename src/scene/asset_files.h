@@ -2,7 +2,7 @@
 #ifndef VSHI_ASSET_FILES_H
 #define VSHI_ASSET_FILES_H
 
-#include "heightfield/height_image.h"
+#include "heightfield/heights.h"
 #include "scene/masks.h"
 
 #include <vdbshade/scene.h>

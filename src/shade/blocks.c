@@ -8,7 +8,7 @@
  * Near its points a beam holds their own surface. There each point is on its own, with the ball that touches
  * its tangent plane: it holds the rays of its cone from next to the point to where the beams of its
  * neighbours are clear of the surface. */
-#include "shade/blocks.h"
+#include "shade/shadow.h"
 
 #include "trace/embree.h"
 

@@ -6,9 +6,7 @@
 #include "base/try.h"
 #include "field/level.h"
 #include "shade/layers.h"
-#include "shade/order.h"
 #include "shade/query.h"
-#include "shade/view.h"
 
 #include <stdlib.h>
 #include <string.h>

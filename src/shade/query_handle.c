@@ -2,8 +2,8 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/try.h"
-#include "shade/blocks.h"
 #include "shade/query.h"
+#include "shade/shadow.h"
 
 #include <stdlib.h>
 

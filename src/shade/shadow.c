@@ -1,9 +1,9 @@
 /* Shadow values: the visible fraction of a light, by one cone or ray a point. */
+#include "shade/shadow.h"
 #include "base/elementary.h"
 #include "base/floats.h"
 #include "base/hash.h"
 #include "base/try.h"
-#include "shade/blocks.h"
 #include "shade/layers.h"
 #include "trace/embree.h"
 

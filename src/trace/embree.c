@@ -1,4 +1,4 @@
-#include "trace/embree_mask.h"
+#include "trace/embree_scene.h"
 
 #include "base/floats.h"
 #include "base/job.h"

@@ -1,5 +1,5 @@
 /* Rays against the triangles of a vsh_triangles: whether they meet any. */
-#include "trace/embree_mask.h"
+#include "trace/embree_scene.h"
 
 #ifndef VSH_EMBREE
 

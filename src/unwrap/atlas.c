@@ -2,7 +2,7 @@
 
 #include "base/memory.h"
 #include "base/try.h"
-#include "unwrap/settle.h"
+#include "unwrap/patch.h"
 
 #include <stdlib.h>
 

@@ -2,7 +2,6 @@
 
 #include "base/memory.h"
 #include "base/try.h"
-#include "unwrap/sides.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "unwrap/dissect.h"
+#include "unwrap/sparse.h"
 
 #include "base/memory.h"
 #include "base/try.h"

@@ -1,4 +1,4 @@
-#include "unwrap/flatten.h"
+#include "unwrap/patch.h"
 
 #include "base/memory.h"
 #include "base/try.h"

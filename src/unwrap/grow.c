@@ -3,7 +3,7 @@
  * a first partition grows one chart after the other, from the largest unit that is left, as far as normals
  * allow; then all charts are grown again at once, from the unit in the middle of each, which evens them out.
  */
-#include "unwrap/grow.h"
+#include "unwrap/units.h"
 
 #include "base/memory.h"
 #include "base/try.h"

@@ -1,9 +1,8 @@
-#include "unwrap/keep.h"
 
 #include "base/memory.h"
 #include "base/try.h"
-#include "unwrap/flatten.h"
 #include "unwrap/overlap.h"
+#include "unwrap/patch.h"
 
 #include <stdlib.h>
 

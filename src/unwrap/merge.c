@@ -2,7 +2,7 @@
 
 #include "base/memory.h"
 #include "base/try.h"
-#include "unwrap/flatten.h"
+#include "unwrap/patch.h"
 #include "unwrap/units.h"
 
 #include <stdlib.h>

@@ -3,7 +3,7 @@
 #ifndef VSHI_UNWRAP_MERGE_H
 #define VSHI_UNWRAP_MERGE_H
 
-#include "unwrap/split.h"
+#include "unwrap/patch.h"
 
 /* Two charts that are tried as one. */
 typedef struct vshi_trial {

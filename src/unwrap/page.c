@@ -1,7 +1,7 @@
 /* All columns of a row are asked at once: bit x of `forbidden` says that the mask meets a taken texel if it
  * stands at x. A run of n texels from b on is in the way of x where any of the n texels from x + b on is
  * taken, which is the row's bits or-ed over n shifts, by doubling. */
-#include "unwrap/page.h"
+#include "unwrap/place.h"
 
 #include "base/memory.h"
 #include "base/try.h"

@@ -1,6 +1,6 @@
 /* All charts go onto pages together, or those of each object onto one of its own; then pages are made as
  * small as what lies on them allows. */
-#include "unwrap/pages.h"
+#include "unwrap/atlas.h"
 
 #include "base/memory.h"
 #include "base/try.h"

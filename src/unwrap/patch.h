@@ -31,4 +31,53 @@ static inline double vshi_patch_doubled_area(const vshi_patch *p, uint32_t i) {
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
+/* --- laying a chart out flat */
+
+/* What came of it. */
+enum {
+    VSHI_FLAT = 0,      /* no triangle flips, none lies over another, the stretch is within the limit */
+    VSHI_STRETCHED = 1, /* beyond the limit, but else as it should be */
+    VSHI_FOLDED = 2     /* triangles flip or lie over each other */
+};
+
+/* Fills the patch's uv and stretch. Parts of a plane are projected; else least squares conformal maps (Lévy
+ * and others, 2002), made as rigid as possible (Liu and others, "A local/global approach to mesh
+ * parameterization", 2008) where that stretches less. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_flatten(vshi_patch *patch, double max_stretch, int *came_to, vsh_error *error);
+
+/* Scales uv to the patch's area and measures its stretch; false where a triangle flips or has no area. */
+bool vshi_flatten_measure(vshi_patch *patch);
+
+/* --- places in 32-bit UVs */
+
+/* Triangles that rounding has flipped or flattened, slivers all of them, are turned right by moving a corner
+ * by some last places: uvs[vertex_count] of the patch, 0 … 1. What cannot be helped so stays. Errors:
+ * VSH_ERROR_MEMORY. */
+vsh_result vshi_settle(const vshi_patch *patch, float (*uvs)[2], vsh_error *error);
+
+/* --- charts in parts that can be laid out */
+
+/* Some charts of one surface. */
+typedef struct vshi_patches {
+    vshi_patch *list; /* [count] */
+    size_t count, capacity;
+} vshi_patches;
+
+/* Takes over the patch, also where it fails. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_patches_add(vshi_patches *patches, const vshi_patch *patch, vsh_error *error);
+void vshi_patches_free(vshi_patches *patches);
+
+/* Lays triangles (ascending, taken over) out as one chart, or as many as it takes so that none folds or
+ * stretches beyond the limit; adds them to `patches`. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_lay_out(const vshi_cut_mesh *surface, uint32_t *triangles, uint32_t count, double max_stretch,
+                        vshi_patches *patches, vsh_error *error);
+
+/* --- charts of the UVs that a mesh has */
+
+/* Whether the UVs of a surface that was cut along them are of use (vsh_uvs_usable()), and if so, and
+ * `patches` is not NULL, a patch for each part of it that hangs together. All are scaled alike, so that they
+ * have the surface's area together. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_keep_charts(const vshi_cut_mesh *surface, vshi_patches *patches, bool *usable,
+                            vsh_error *error);
+
 #endif

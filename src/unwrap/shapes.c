@@ -6,8 +6,8 @@
 #include "base/parallel.h"
 #include "base/try.h"
 #include "mesh/mesh.h"
-#include "unwrap/grow.h"
-#include "unwrap/keep.h"
+#include "unwrap/patch.h"
+#include "unwrap/units.h"
 
 #include <stdlib.h>
 

@@ -1,4 +1,4 @@
-#include "unwrap/sides.h"
+#include "unwrap/cut_mesh.h"
 
 #include "base/hash.h"
 #include "base/memory.h"

@@ -4,7 +4,6 @@
 
 #include "base/memory.h"
 #include "base/try.h"
-#include "unwrap/dissect.h"
 
 #include <stdlib.h>
 

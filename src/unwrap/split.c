@@ -1,12 +1,11 @@
 /* A chart that folds or stretches is cut in two between its triangles that are the farthest from each other,
  * along the border where regions grown from both meet; each half is laid out anew. A triangle alone always
  * lies flat. */
-#include "unwrap/split.h"
 
 #include "base/memory.h"
 #include "base/try.h"
-#include "unwrap/flatten.h"
 #include "unwrap/heap.h"
+#include "unwrap/patch.h"
 #include "unwrap/units.h"
 
 #include <stdlib.h>

@@ -2,6 +2,7 @@
 #ifndef VSHI_UNWRAP_UNITS_H
 #define VSHI_UNWRAP_UNITS_H
 
+#include "base/job.h"
 #include "unwrap/cut_mesh.h"
 
 typedef struct vshi_unit_shape {
@@ -32,5 +33,13 @@ static inline double vshi_side_length(const vshi_cut_mesh *s, uint32_t side) {
     return vshi_length(
         vshi_sub(s->place[s->mesh->indices[side]], s->place[s->mesh->indices[vshi_next_side(side)]]));
 }
+
+/* --- charts grown over a surface */
+
+/* Gives each unit the number of its chart, owner[units->count], and tells how many there are. A chart hangs
+ * together, and its normals are within some 60° of their mean. Advances the job by the units' triangles.
+ * Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_grow_charts(const vshi_units *units, vshi_job *job, uint32_t *owner, uint32_t *chart_count,
+                            vsh_error *error);
 
 #endif

@@ -2,7 +2,7 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "unwrap/atlas.h"
-#include "unwrap/keep.h"
+#include "unwrap/patch.h"
 
 #include <stdlib.h>
 
