@@ -17,25 +17,44 @@ static const double STEP = 0.5; /* texels */
 
 enum { NONE = UINT32_MAX };
 
+static const char what[] = "closeness of charts";
+
 /* --- borders of charts */
 
-/* Borders of charts. Vertices of one place, in space and in the UVs, are one. Triangles that share an edge
- * between them are of one chart. */
-typedef struct chart_borders {
-    uint32_t *charts; /* [triangles of all meshes]: one number for all triangles of a chart */
-    uint32_t *edges; /* [edge_count]: 3 × triangle + the corner that it begins with, of those that a triangle
-                        of some area in the UVs has to itself; ascending */
-    size_t edge_count;
-} chart_borders;
+/* An edge that a triangle of some area in the UVs has to itself. */
+typedef struct border {
+    double x[2], y[2]; /* texels */
+    uint32_t chart;    /* first a triangle of it */
+    uint32_t mesh;
+} border;
 
-/* What one mesh needs, for the largest. */
-typedef struct finding {
-    uint32_t *weld;    /* [vertices] */
-    uint32_t *corners; /* [triangles][3] */
-    uint8_t *open;     /* [3 × triangles of all meshes] */
-    uint32_t *charts;
-} finding;
+/* A border in a texel. */
+typedef struct passing {
+    uint64_t texel;
+    uint32_t border, next; /* of the same place in the table; NONE: none */
+} passing;
 
+typedef struct closeness {
+    const vsh_mesh *meshes;
+    size_t mesh_count, triangles; /* of all meshes */
+    double width, height;
+    const vsh_run *run;
+    uint32_t *charts; /* [triangles]: sets of triangles */
+    border *borders;
+    size_t border_count, border_room;
+    passing *passings;
+    uint32_t *heads; /* [head_count], a power of two */
+    size_t passing_count, head_count;
+} closeness;
+
+/* Whether memory allows for `bytes` more than the charts and borders take. */
+static vsh_result check_bytes(const closeness *c, double bytes, vsh_error *error) {
+    const double held =
+        (double)c->triangles * sizeof *c->charts + (double)c->border_room * sizeof *c->borders;
+    return vshi_check_limit(c->run, held + bytes, what, error);
+}
+
+/* Vertices are one where their places in space and in the UVs are equal. */
 static void key_of(const void *user, size_t vertex, uint64_t key[VSHI_KEY_WORDS]) {
     const vsh_mesh *mesh = user;
     float values[2 * VSHI_KEY_WORDS] = {0.0f};
@@ -57,113 +76,85 @@ static bool is_flat(const vsh_mesh *mesh, size_t local) {
     return ux * vy - uy * vx == 0.0;
 }
 
-/* Joins the charts on all sides of an edge, and marks edges that have one. `first`: triangle of the mesh. */
-static vsh_result join_charts(const finding *f, const vsh_mesh *mesh, uint32_t first, vsh_error *error) {
-    vshi_sorted_sides sides = {f->corners, mesh->triangle_count, mesh->vertex_count, NULL};
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_weld(mesh->vertex_count, key_of, mesh, f->weld, error));
-    for (size_t side = 0; side < 3 * mesh->triangle_count; ++side) {
-        f->corners[side] = f->weld[mesh->indices[side]];
+static vsh_result add_border(closeness *c, size_t m, uint32_t side, uint32_t triangle, vsh_error *error) {
+    const vsh_mesh *mesh = &c->meshes[m];
+    if (c->border_count == c->border_room) {
+        const size_t room = 2 * c->border_room + 64;
+        VSHI_TRY(check_bytes(c, (double)room * sizeof *c->borders, error));
+        border *grown = realloc(c->borders, room * sizeof *grown);
+        if (grown == NULL) {
+            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
+        }
+        c->borders = grown;
+        c->border_room = room;
     }
+    border *b = &c->borders[c->border_count++];
+    *b = (border){.chart = triangle, .mesh = (uint32_t)m};
+    for (uint32_t end = 0; end < 2; ++end) {
+        const uint32_t corner = side / 3 * 3 + (side + end) % 3;
+        const float *uv = mesh->uvs + 2 * (size_t)mesh->indices[corner];
+        b->x[end] = (double)uv[0] * c->width;
+        b->y[end] = (1.0 - (double)uv[1]) * c->height;
+    }
+    return VSH_OK;
+}
+
+/* Joins the charts on all sides of an edge, and lists edges that have one. `first`: triangle of the mesh. */
+static vsh_result join_charts(closeness *c, size_t m, uint32_t first, vsh_error *error) {
+    const vsh_mesh *mesh = &c->meshes[m];
+    const size_t triangles = mesh->triangle_count, vertices = mesh->vertex_count;
+    uint32_t *weld = NULL, *corners = NULL;
+    vshi_sorted_sides sides = {NULL, triangles, vertices, NULL};
+    vsh_result result;
+    /* welding takes four slots a vertex at most, sorting one count a vertex and two numbers a side */
+    VSHI_TRY_DONE(check_bytes(
+        c, (double)vertices * 6.0 * sizeof *weld + 9.0 * (double)triangles * sizeof *corners, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&weld, vertices, sizeof *weld, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&corners, triangles, 3 * sizeof *corners, what, error));
+    VSHI_TRY_DONE(vshi_weld(vertices, key_of, mesh, weld, error));
+    for (size_t side = 0; side < 3 * triangles; ++side) {
+        corners[side] = weld[mesh->indices[side]];
+    }
+    sides.corners = corners;
     VSHI_TRY_DONE(vshi_sort_sides(&sides, error));
-    for (size_t i = 0, end; i < 3 * mesh->triangle_count; i = end) {
+    for (size_t i = 0, end; i < 3 * triangles; i = end) {
         uint32_t own = 0, count = 0;
         end = vshi_next_edge(&sides, i);
         for (size_t k = i; k < end; ++k) {
             const uint32_t side = sides.sorted[k];
             if (!is_flat(mesh, side / 3)) {
                 own = count++ == 0 ? side : own;
-                vshi_set_join(f->charts, first + side / 3, first + own / 3);
+                vshi_set_join(c->charts, first + side / 3, first + own / 3);
             }
         }
-        f->open[3 * (size_t)first + own] |= count == 1;
+        if (count == 1) {
+            VSHI_TRY_DONE(add_border(c, m, own, first + own / 3, error));
+        }
     }
 done:
     free(sides.sorted);
+    free(corners);
+    free(weld);
     return result;
 }
 
-static vsh_result list_borders(finding *f, const vsh_mesh *meshes, size_t mesh_count, size_t all,
-                               const char *what, chart_borders *borders, vsh_error *error) {
-    for (uint32_t t = 0; t < all; ++t) {
-        f->charts[t] = t;
+static vsh_result find_borders(closeness *c, vsh_error *error) {
+    VSHI_TRY(check_bytes(c, 0.0, error));
+    VSHI_TRY(vshi_allocate((void **)&c->charts, c->triangles, sizeof *c->charts, what, error));
+    for (uint32_t t = 0; t < c->triangles; ++t) {
+        c->charts[t] = t;
     }
     uint32_t first = 0;
-    for (size_t m = 0; m < mesh_count; first += (uint32_t)meshes[m++].triangle_count) {
-        VSHI_TRY(join_charts(f, &meshes[m], first, error));
+    for (size_t m = 0; m < c->mesh_count; first += (uint32_t)c->meshes[m++].triangle_count) {
+        VSHI_TRY(join_charts(c, m, first, error));
     }
-    size_t count = 0;
-    for (size_t side = 0; side < 3 * all; ++side) {
-        f->charts[side / 3] = vshi_set_of(f->charts, (uint32_t)(side / 3));
-        count += f->open[side];
-    }
-    VSHI_TRY(vshi_allocate((void **)&borders->edges, count, sizeof *borders->edges, what, error));
-    for (size_t side = 0; side < 3 * all; ++side) {
-        if (f->open[side]) {
-            borders->edges[borders->edge_count++] = (uint32_t)side;
-        }
+    for (size_t b = 0; b < c->border_count; ++b) {
+        c->borders[b].chart = vshi_set_of(c->charts, c->borders[b].chart);
     }
     return VSH_OK;
 }
 
-static vsh_result find_borders(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
-                               const char *what, chart_borders *borders, vsh_error *error) {
-    *borders = (chart_borders){NULL, NULL, 0};
-    size_t vertices = 0, triangles = 0, all = 0;
-    for (size_t m = 0; m < mesh_count; ++m) {
-        vertices = meshes[m].vertex_count > vertices ? meshes[m].vertex_count : vertices;
-        triangles = meshes[m].triangle_count > triangles ? meshes[m].triangle_count : triangles;
-        all += meshes[m].triangle_count;
-    }
-    finding f = {NULL, NULL, NULL, NULL};
-    /* welding takes four slots a vertex at most, sorting one count a vertex and two numbers a side */
-    const double bytes = (double)vertices * 6.0 * sizeof *f.weld +
-                         3.0 * (double)triangles * 3.0 * sizeof *f.corners +
-                         (double)all * (sizeof *borders->charts + 3.0 * (1.0 + sizeof *borders->edges));
-    VSHI_TRY(vshi_check_limit(run, bytes, what, error));
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&borders->charts, all, sizeof *borders->charts, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&f.weld, vertices, sizeof *f.weld, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&f.corners, triangles, 3 * sizeof *f.corners, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&f.open, 3 * all, sizeof *f.open, what, error));
-    f.charts = borders->charts;
-    result = list_borders(&f, meshes, mesh_count, all, what, borders, error);
-done:
-    free(f.open);
-    free(f.corners);
-    free(f.weld);
-    return result;
-}
-
-static void free_borders(chart_borders *borders) {
-    free(borders->edges);
-    free(borders->charts);
-    *borders = (chart_borders){NULL, NULL, 0};
-}
-
 /* --- how near they come */
-
-typedef struct border {
-    double x[2], y[2]; /* texels */
-    uint32_t chart, mesh;
-} border;
-
-/* A border in a texel. */
-typedef struct passing {
-    uint64_t texel;
-    uint32_t border, next; /* of the same place in the table; NONE: none */
-} passing;
-
-typedef struct closeness {
-    const vsh_mesh *meshes;
-    size_t mesh_count, triangles;
-    double width, height;
-    border *borders;
-    size_t border_count;
-    passing *passings;
-    uint32_t *heads; /* [head_count], a power of two */
-    size_t passing_count, head_count;
-} closeness;
 
 static size_t power_above(size_t count) {
     size_t power = 16;
@@ -171,25 +162,6 @@ static size_t power_above(size_t count) {
         power *= 2;
     }
     return power;
-}
-
-static void place_borders(closeness *c, const chart_borders *found) {
-    size_t m = 0, first = 0;
-    for (size_t i = 0; i < found->edge_count; ++i) {
-        const uint32_t triangle = found->edges[i] / 3, corner = found->edges[i] % 3;
-        while (triangle - first >= c->meshes[m].triangle_count) {
-            first += c->meshes[m++].triangle_count;
-        }
-        const vsh_mesh *mesh = &c->meshes[m];
-        border *b = &c->borders[c->border_count++];
-        *b = (border){.chart = found->charts[triangle], .mesh = (uint32_t)m};
-        for (size_t end = 0; end < 2; ++end) {
-            const float *uv =
-                mesh->uvs + 2 * (size_t)mesh->indices[3 * (triangle - first) + (corner + end) % 3];
-            b->x[end] = (double)uv[0] * c->width;
-            b->y[end] = (1.0 - (double)uv[1]) * c->height;
-        }
-    }
 }
 
 /* Steps along a border. */
@@ -305,26 +277,19 @@ static void measure(const closeness *c, uint64_t *by_mesh, vsh_closeness *found)
     }
 }
 
-static vsh_result find(closeness *c, const vsh_run *run, vsh_closeness *found, vsh_error *error) {
-    const char *what = "closeness of charts";
+static vsh_result find(closeness *c, vsh_closeness *found, vsh_error *error) {
     uint64_t *by_mesh = NULL;
-    chart_borders charts;
-    vsh_result result;
-    VSHI_TRY_DONE(find_borders(c->meshes, c->mesh_count, run, what, &charts, error));
-    const double bytes = (double)c->triangles * sizeof *charts.charts +
-                         (double)charts.edge_count * (sizeof *charts.edges + sizeof *c->borders);
-    VSHI_TRY_DONE(vshi_check_limit(run, bytes, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&by_mesh, c->mesh_count, sizeof *by_mesh, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&c->borders, charts.edge_count, sizeof *c->borders, what, error));
-    place_borders(c, &charts);
     size_t most = 0;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&by_mesh, c->mesh_count, sizeof *by_mesh, what, error));
+    VSHI_TRY_DONE(find_borders(c, error));
     for (size_t b = 0; b < c->border_count; ++b) {
         most += steps_of(&c->borders[b]) + 1;
     }
     c->head_count = power_above(most);
-    const double passings = (double)most * sizeof *c->passings + (double)c->head_count * sizeof *c->heads;
     if (most < NONE) {
-        VSHI_TRY_DONE(vshi_check_limit(run, bytes + passings, what, error));
+        VSHI_TRY_DONE(check_bytes(
+            c, (double)most * sizeof *c->passings + (double)c->head_count * sizeof *c->heads, error));
         VSHI_TRY_DONE(vshi_allocate((void **)&c->passings, most, sizeof *c->passings, what, error));
         VSHI_TRY_DONE(vshi_allocate((void **)&c->heads, c->head_count, sizeof *c->heads, what, error));
         put_borders(c);
@@ -334,8 +299,8 @@ done:
     free(c->heads);
     free(c->passings);
     free(c->borders);
+    free(c->charts);
     free(by_mesh);
-    free_borders(&charts);
     return result;
 }
 
@@ -350,7 +315,8 @@ vsh_result vsh_charts_closeness(const vsh_mesh *meshes, size_t mesh_count, int32
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "closeness of charts at %d × %d: expected 1 … %d", width,
                          height, VSH_MAX_LIGHTMAP_SIZE);
     }
-    closeness c = {.meshes = meshes, .mesh_count = mesh_count, .width = width, .height = height};
+    closeness c = {
+        .meshes = meshes, .mesh_count = mesh_count, .width = width, .height = height, .run = &full};
     for (size_t m = 0; m < mesh_count; ++m) {
         VSHI_TRY(vshi_mesh_check_data(&meshes[m], m, error));
         if (meshes[m].uvs == NULL && meshes[m].triangle_count > 0) {
@@ -364,7 +330,7 @@ vsh_result vsh_charts_closeness(const vsh_mesh *meshes, size_t mesh_count, int32
                          c.triangles, UINT32_MAX / 3 - 1);
     }
     vsh_closeness all = {.gap = 1.0};
-    const vsh_result result = find(&c, &full, &all, error);
+    const vsh_result result = find(&c, &all, error);
     *found = all;
     return result;
 }
