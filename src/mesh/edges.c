@@ -22,8 +22,10 @@ typedef struct finding {
     const vsh_mesh *mesh;
     bool mirrored;
     vshi_edges *edges;
-    const uint8_t *flat; /* [triangle_count]: of no area */
-    uint32_t *corners;   /* [triangle_count][3]: welded, in the world's order */
+    const uint8_t *flat;  /* [triangle_count]: of no area */
+    const uint8_t *layer; /* [triangle_count]; NULL: there is one */
+    int layers;
+    uint32_t *corners; /* [triangle_count][3]: welded, in the world's order */
     vshi_sorted_sides sides;
     use *uses;             /* [most sides of an edge] */
     size_t odd;            /* edges of three triangles, five, … */
@@ -137,13 +139,13 @@ static vsh_result join_many(finding *f, size_t count, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Lists the sides of an edge that count: of triangles that are not skipped, nor given before. */
-static size_t list_uses(finding *f, size_t begin, size_t end) {
+/* Lists the sides of an edge that count: of triangles of a layer that are not skipped, nor given before. */
+static size_t list_uses(finding *f, size_t begin, size_t end, int layer) {
     vshi_edges *edges = f->edges;
     size_t count = 0, kept = 0;
     for (size_t i = begin; i < end; ++i) {
         const uint32_t side = f->sides.sorted[i], *v = f->corners + side / 3 * (size_t)3;
-        if (!edges->skipped[side / 3]) {
+        if (!edges->skipped[side / 3] && (f->layer == NULL || f->layer[side / 3] == layer)) {
             f->uses[count++] = (use){side, v[(side + 2) % 3], v[side % 3] > v[(side + 1) % 3]};
         }
     }
@@ -166,12 +168,31 @@ static size_t list_uses(finding *f, size_t begin, size_t end) {
     return kept;
 }
 
+/* An edge of a layer. */
+typedef struct cursor {
+    size_t begin, end; /* of its sides */
+    int layer;
+} cursor;
+
+/* Lists the uses of the edge after `at`, which begins as {0, 0, 0}; false after the last. */
+static bool next_uses(finding *f, cursor *at, size_t *count) {
+    if (at->begin == at->end || ++at->layer == f->layers) {
+        at->layer = 0;
+        at->begin = at->end;
+        if (at->begin == 3 * f->mesh->triangle_count) {
+            return false;
+        }
+        at->end = vshi_next_edge(&f->sides, at->begin);
+    }
+    *count = list_uses(f, at->begin, at->end, at->layer);
+    return true;
+}
+
 /* Joins the sides of each edge that has two, four, …; those of others wait until it is known what is frayed.
  */
 static vsh_result join_even(finding *f, vsh_error *error) {
-    for (size_t i = 0, end; i < 3 * f->mesh->triangle_count; i = end) {
-        end = vshi_next_edge(&f->sides, i);
-        const size_t count = list_uses(f, i, end);
+    size_t count;
+    for (cursor at = {0, 0, 0}; next_uses(f, &at, &count);) {
         if (count == 2) {
             join(f->edges, f->uses[0].side, f->uses[1].side);
         } else if (count > 2 && count % 2 == 0) {
@@ -190,9 +211,9 @@ static vsh_result find_frayed(finding *f, uint8_t *frayed, vsh_error *error) {
     size_t waiting = 0;
     VSHI_TRY(
         vshi_allocate((void **)&queue, f->mesh->triangle_count, sizeof *queue, "edges of triangles", error));
-    for (size_t i = 0, end; i < 3 * f->mesh->triangle_count; i = end) {
-        end = vshi_next_edge(&f->sides, i);
-        if (list_uses(f, i, end) == 1 && !frayed[f->uses[0].side / 3]) {
+    size_t count;
+    for (cursor c = {0, 0, 0}; next_uses(f, &c, &count);) {
+        if (count == 1 && !frayed[f->uses[0].side / 3]) {
             frayed[f->uses[0].side / 3] = 1;
             queue[waiting++] = f->uses[0].side / 3;
         }
@@ -217,9 +238,8 @@ static vsh_result join_odd(finding *f, vsh_error *error) {
     VSHI_TRY(vshi_allocate((void **)&frayed, f->mesh->triangle_count, 1, "edges of triangles", error));
     VSHI_TRY_DONE(find_frayed(f, frayed, error));
     f->frayed = frayed;
-    for (size_t i = 0, end; i < 3 * f->mesh->triangle_count; i = end) {
-        end = vshi_next_edge(&f->sides, i);
-        const size_t count = end - i > 2 ? list_uses(f, i, end) : 0;
+    size_t count;
+    for (cursor at = {0, 0, 0}; next_uses(f, &at, &count);) {
         if (count > 2 && count % 2 != 0) {
             VSHI_TRY_DONE(join_many(f, count, error));
         }
@@ -299,13 +319,18 @@ vsh_result vshi_edges_check(const vsh_mesh *mesh, size_t index, vsh_error *error
                            vshi_mesh_label(mesh, index).text, mesh->triangle_count, UINT32_MAX / 3);
 }
 
-vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, vshi_edges *edges, vsh_error *error) {
+vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, const uint8_t *layer, int layers,
+                           vshi_edges *edges, vsh_error *error) {
     *edges = (vshi_edges){0};
     VSHI_TRY(vshi_edges_check(mesh, index, error));
     if (mesh->triangle_count == 0) {
         return VSH_OK;
     }
-    finding f = {.mesh = mesh, .mirrored = vshi_transform_determinant(mesh->transform) < 0.0, .edges = edges};
+    finding f = {.mesh = mesh,
+                 .mirrored = vshi_transform_determinant(mesh->transform) < 0.0,
+                 .edges = edges,
+                 .layer = layer,
+                 .layers = layer != NULL ? layers : 1};
     uint8_t *flat = NULL;
     size_t flats = 0;
     vsh_result result;

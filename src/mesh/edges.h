@@ -21,8 +21,10 @@ typedef struct vshi_edges {
 /* VSH_ERROR_LIMIT where a mesh has more triangles than edges can be numbered of. */
 vsh_result vshi_edges_check(const vsh_mesh *mesh, size_t index, vsh_error *error);
 
-/* Errors: of vshi_edges_check(), VSH_ERROR_MEMORY. Free with vshi_edges_free(), after a failure too. */
-vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, vshi_edges *edges, vsh_error *error);
+/* Finds partners within each of `layers` layers of triangles by themselves; layer NULL: there is one. Errors:
+ * of vshi_edges_check(), VSH_ERROR_MEMORY. Free with vshi_edges_free(), after a failure too. */
+vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, const uint8_t *layer, int layers,
+                           vshi_edges *edges, vsh_error *error);
 void vshi_edges_free(vshi_edges *edges);
 
 /* The welded vertices of triangle i in the world's order; false where two are one. */

@@ -57,91 +57,10 @@ static vsh_result find_layers(const vsh_mesh *mesh, const uint32_t *weld, uint8_
     return VSH_OK;
 }
 
-/* The triangles of a layer as a mesh of their own. */
-typedef struct layer_mesh {
-    vsh_mesh mesh;
-    float *positions;
-    uint32_t *indices, *whole; /* whole[i]: the triangle that i is in the mesh */
-    uint32_t *small;           /* [vertex_count]: vertex + 1 in the layer, 0: not in it */
-} layer_mesh;
-
-static void layer_free(layer_mesh *l) {
-    free(l->small);
-    free(l->whole);
-    free(l->indices);
-    free(l->positions);
-}
-
-static vsh_result layer_make(const vsh_mesh *mesh, const uint8_t *layer, int which, layer_mesh *l,
-                             vsh_error *error) {
-    static const char what[] = "copies of triangles";
-    size_t count = 0, vertices = 0;
-    for (size_t i = 0; i < mesh->triangle_count; ++i) {
-        count += layer[i] == which;
-    }
-    VSHI_TRY(vshi_allocate((void **)&l->small, mesh->vertex_count, sizeof *l->small, what, error));
-    VSHI_TRY(vshi_allocate((void **)&l->whole, count, sizeof *l->whole, what, error));
-    VSHI_TRY(vshi_allocate((void **)&l->indices, count, 3 * sizeof *l->indices, what, error));
-    count = 0;
-    for (size_t i = 0; i < mesh->triangle_count; ++i) {
-        if (layer[i] != which) {
-            continue;
-        }
-        for (size_t k = 0; k < 3; ++k) {
-            uint32_t *small = &l->small[mesh->indices[3 * i + k]];
-            if (*small == 0) {
-                *small = (uint32_t)++vertices;
-            }
-            l->indices[3 * count + k] = *small - 1;
-        }
-        l->whole[count++] = (uint32_t)i;
-    }
-    VSHI_TRY(vshi_allocate((void **)&l->positions, vertices, 3 * sizeof *l->positions, what, error));
-    for (size_t v = 0; v < mesh->vertex_count; ++v) {
-        for (size_t k = 0; k < 3 && l->small[v] != 0; ++k) {
-            l->positions[3 * (size_t)(l->small[v] - 1) + k] = mesh->positions[3 * v + k];
-        }
-    }
-    l->mesh = (vsh_mesh){.name = mesh->name,
-                         .positions = l->positions,
-                         .indices = l->indices,
-                         .vertex_count = vertices,
-                         .triangle_count = count};
-    return VSH_OK;
-}
-
 /* Whether the two sides run between the same places, the other way. */
 static bool opposite(const vsh_mesh *mesh, const uint32_t *weld, uint32_t a, uint32_t b) {
     const uint32_t *v = mesh->indices + 3 * (size_t)(a / 3), *w = mesh->indices + 3 * (size_t)(b / 3);
     return weld[v[a % 3]] == weld[w[(b + 1) % 3]] && weld[v[(a + 1) % 3]] == weld[w[b % 3]];
-}
-
-/* `whole` as of layer_mesh; NULL: all triangles. */
-static void take_partners(const vsh_mesh *mesh, const vshi_edges *edges, const uint32_t *whole,
-                          uint32_t *partner) {
-    for (uint32_t side = 0; side < 3 * (uint32_t)mesh->triangle_count; ++side) {
-        const uint32_t other = edges->partner[side],
-                       own = whole != NULL ? 3 * whole[side / 3] + side % 3 : side;
-        partner[own] = UINT32_MAX;
-        if (other != VSHI_NO_PARTNER && opposite(mesh, edges->weld, side, other) &&
-            !vshi_mesh_degenerate(mesh, side / 3) && !vshi_mesh_degenerate(mesh, other / 3)) {
-            partner[own] = whole != NULL ? 3 * whole[other / 3] + other % 3 : other;
-        }
-    }
-}
-
-static vsh_result find_of_layer(const vsh_mesh *mesh, size_t index, const uint8_t *layer, int which,
-                                uint32_t *partner, vsh_error *error) {
-    layer_mesh l = {0};
-    vshi_edges edges = {0};
-    vsh_result result;
-    VSHI_TRY_DONE(layer_make(mesh, layer, which, &l, error));
-    VSHI_TRY_DONE(vshi_edges_find(&l.mesh, index, &edges, error));
-    take_partners(&l.mesh, &edges, l.whole, partner);
-done:
-    vshi_edges_free(&edges);
-    layer_free(&l);
-    return result;
 }
 
 vsh_result vshi_sides_find(const vsh_mesh *mesh, size_t index, uint32_t *partner, vsh_error *error) {
@@ -149,23 +68,26 @@ vsh_result vshi_sides_find(const vsh_mesh *mesh, size_t index, uint32_t *partner
     local.transform = NULL;
     vshi_edges edges = {0};
     uint8_t *layer = NULL;
+    uint32_t *weld = NULL;
     int layers = 1;
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&layer, mesh->triangle_count, 1, "copies of triangles", error));
-    VSHI_TRY_DONE(vshi_edges_find(&local, index, &edges, error));
-    VSHI_TRY_DONE(find_layers(&local, edges.weld, layer, &layers, error));
-    if (layers == 1) {
-        take_partners(&local, &edges, NULL, partner);
-        goto done;
-    }
-    for (size_t side = 0; side < 3 * mesh->triangle_count; ++side) {
-        partner[side] = UINT32_MAX;
-    }
-    for (int which = 0; which < layers && which < MOST_LAYERS; ++which) {
-        VSHI_TRY_DONE(find_of_layer(&local, index, layer, which, partner, error));
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&weld, mesh->vertex_count, sizeof *weld, "copies of triangles", error));
+    VSHI_TRY_DONE(vshi_mesh_weld(&local, weld, error));
+    VSHI_TRY_DONE(find_layers(&local, weld, layer, &layers, error));
+    VSHI_TRY_DONE(
+        vshi_edges_find(&local, index, layer, layers < MOST_LAYERS ? layers : MOST_LAYERS, &edges, error));
+    for (uint32_t side = 0; side < 3 * (uint32_t)mesh->triangle_count; ++side) {
+        const uint32_t other = edges.partner[side];
+        const bool joined = other != VSHI_NO_PARTNER && opposite(&local, weld, side, other) &&
+                            !vshi_mesh_degenerate(&local, side / 3) &&
+                            !vshi_mesh_degenerate(&local, other / 3);
+        partner[side] = joined ? other : UINT32_MAX;
     }
 done:
     vshi_edges_free(&edges);
+    free(weld);
     free(layer);
     return result;
 }
