@@ -22,7 +22,7 @@ typedef struct query_call {
     const vsh_query_output *output;
     const vshi_kernel *kernel;
     size_t first;          /* of the points that are under way */
-    const uint32_t *order; /* their numbers from `first` on, or NULL: as they come */
+    const uint64_t *order; /* vshi_order_points(), or NULL: as they come */
 } query_call;
 
 static inline float *array_of(float *const *arrays, size_t light) {
@@ -113,7 +113,7 @@ typedef struct piece {
 
 static inline size_t number_of(const piece *p, size_t i) {
     const query_call *call = p->call;
-    return call->first + (call->order != NULL ? call->order[p->begin + i] : p->begin + i);
+    return call->first + (call->order != NULL ? call->order[p->begin + i] & VSHI_ORDER_POINT : p->begin + i);
 }
 
 static void scatter(const piece *p, size_t width, const float *values, float *to) {
@@ -177,34 +177,34 @@ static void shade_gathered(const void *user, size_t begin, size_t end, vsh_shade
     }
 }
 
-/* VSHI_ORDER_MOST points at a time, so that calls for so many each give the same bits. */
+/* VSH_QUERY_BATCH points at a time, so that calls for so many each give the same bits. */
 static vsh_result shade_many(query_call *call, const vsh_run *run, vshi_job *job, vsh_shade_stats *stats,
                              vsh_error *error) {
     const vsh_field *field = call->query->ao.field;
     const size_t count = call->view.count;
-    const size_t most = count < VSHI_ORDER_MOST ? count : VSHI_ORDER_MOST;
-    vshi_order order = {NULL, NULL, 0};
+    const size_t most = count < VSH_QUERY_BATCH ? count : VSH_QUERY_BATCH;
+    uint64_t *order = NULL;
     vsh_result result = VSH_OK;
     for (; call->first < count; call->first += most) {
         const size_t left = count - call->first;
         const size_t now = left < most ? left : most;
         const bool ordered = vshi_order_pays(field, &call->view, call->first, now);
         call->order = NULL;
-        if (ordered && order.memory == NULL) {
-            VSHI_TRY_DONE(vshi_check_limit(run, vshi_field_bytes(field) + (double)most * VSHI_ORDER_BYTES,
+        if (ordered && order == NULL) {
+            VSHI_TRY_DONE(vshi_check_limit(run, vshi_field_bytes(field) + (double)most * 2.0 * sizeof *order,
                                            "query", error));
-            VSHI_TRY_DONE(vshi_order_create(most, &order, error));
+            VSHI_TRY_DONE(vshi_allocate((void **)&order, most, 2 * sizeof *order, "order of points", error));
         }
         if (ordered) {
-            VSHI_TRY_DONE(vshi_order_points(job, field, &call->view, call->first, now, &order, error));
-            call->order = order.point;
+            VSHI_TRY_DONE(vshi_order_points(job, field, &call->view, call->first, now, order, error));
+            call->order = order;
         }
         VSHI_TRY_DONE(vshi_shade_pieces(job, now, VSHI_PIECE,
                                         ordered || call->points == NULL ? shade_gathered : shade_in_place,
                                         call, stats, error));
     }
 done:
-    vshi_order_free(&order);
+    free(order);
     return result;
 }
 
