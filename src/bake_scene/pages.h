@@ -47,14 +47,14 @@ vsh_result vshi_name_file(const char *path, vsh_result result, vsh_error *error)
 /* --- a picture of a lightmap's charts, and of the texels of them that are not valid */
 
 typedef struct vshi_invalid_picture {
-    char *path; /* NULL: none is asked for */
+    char *path; /* NULL: nobody wants one */
     vsh_image image;
     float *planes[3]; /* R, G, B of as many rows as are baked at a time */
     vsh_image_writer *writer;
 } vshi_invalid_picture;
 
 /* Opens the picture of lightmap `index`, of which `rows` come at a time: FILE.png, or where there are several
- * FILE.OUTPUT.png, no two of which are alike. Does nothing where none is asked for. Errors: as
+ * FILE.OUTPUT.png, no two of which are alike. Does nothing if nobody wants it. Errors: as
  * vsh_image_writer_create(). Close it also after a failure. */
 vsh_result vshi_invalid_picture_open(vshi_invalid_picture *picture, const vshi_scene_bake *bake, size_t index,
                                      int32_t rows, vsh_error *error);
@@ -66,7 +66,7 @@ vsh_result vshi_invalid_picture_add(vshi_invalid_picture *picture, int32_t rows,
 /* Completes the file where `result` is VSH_OK, else leaves what was there. Returns `result`, or why not. */
 vsh_result vshi_invalid_picture_close(vshi_invalid_picture *picture, vsh_result result, vsh_error *error);
 
-/* --- what is odd about a lightmap, as warnings and as errors: its UVs, its texels, its file */
+/* --- warnings and errors about a lightmap's UVs, texels and file */
 
 /* Warns of faults in the target's UVs, one line for each mesh and kind. Warns of charts that lie too close
  * for the size, and of charts that cover few texels. */

@@ -6,7 +6,7 @@
 
 #include <vdbshade/light.h>
 
-/* --- how much of a light is seen from a point of the plane: exactly */
+/* --- the exact share of a light that a point of the plane sees */
 
 /* A light as a point sees it. */
 typedef struct vshi_flat_view {

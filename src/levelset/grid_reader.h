@@ -17,9 +17,8 @@ namespace vshi {
 
 // --- the stream that .vdb files are read from
 
-// A file whose Zip data are held against their check sums (Adler-32, RFC 1950) as they pass by: OpenVDB 10.0
-// takes no notice where they do not fit, and goes on with wrong values. Data come as their size, 8 bytes, and
-// then in one piece.
+// Checks the sums (Adler-32, RFC 1950) of a file's Zip data as they are read. OpenVDB 10.0 ignores wrong sums
+// and goes on with wrong values. The file gives a size in 8 bytes, then the data in one piece.
 class CheckedFile final : public std::filebuf {
   public:
     bool sound() const { return !damaged; }
@@ -28,7 +27,7 @@ class CheckedFile final : public std::filebuf {
     std::streamsize xsgetn(char *bytes, std::streamsize size) override;
 
   private:
-    int64_t announced = 0; // by what was read last
+    int64_t announced = 0; // size that was read last
     bool damaged = false;
 };
 

@@ -47,8 +47,8 @@ class Sides {
 
 // --- distances of the inside where surfaces meet or overlap within it
 
-// What is left of a surface without what has the inside on both of its sides, as faces where solids touch and
-// all that is within others: it bounds nothing. Large triangles are cut in pieces, to about a voxel.
+// The part of a surface that bounds the inside. Faces with the inside on both sides go: where solids touch,
+// and within others. Large triangles are cut into pieces of about a voxel.
 Surface boundary_of(const Surface &surface, const LeafTable &table, const std::vector<Sides::Told> &told,
                     double begin, double end, Stage &stage);
 

@@ -63,7 +63,7 @@ typedef struct vshi_component {
     size_t holes;      /* groups of open edges that hang together */
     double area;       /* world units² */
     double enclosed; /* 1: it encloses all that lies behind its faces, 1/2: a plane (vshi_part_encloses()) */
-    double volume;   /* world units³, of what it encloses; 0 where it has no inside */
+    double volume;   /* world units³; 0 if it has no inside */
     vshi_vec low, high;       /* box, world */
     const uint32_t *list;     /* its triangles [triangles], ascending */
     const vshi_vec (*cap)[3]; /* triangles that close its holes [open_edges], world, facing as its faces */

@@ -9,9 +9,9 @@
 
 #include <stdint.h>
 
-/* --- how far a surface encloses what lies behind it, and how often it goes around a point */
+/* --- the share of its back that a surface encloses, and winding numbers */
 
-/* Part of a mesh's triangles, some of them turned over, and triangles beside them. */
+/* Some of a mesh's triangles, of which some are turned over. */
 typedef struct vshi_surface_part {
     const vsh_mesh *mesh;
     const uint32_t *list; /* [count] */
@@ -35,8 +35,8 @@ vshi_vec vshi_point_in(const vshi_vec corner[3], size_t number);
 /* `count` points spread over a part by area. */
 void vshi_part_samples(const vshi_surface_part *part, double area, size_t count, vshi_vec *samples);
 
-/* How far a part with `cap_count` triangles over its holes encloses one of its sides: 1 where it is closed,
- * 1/2 for a plane. */
+/* The share of one of its sides that a part encloses: 1 if it is closed, 1/2 for a plane. `caps` are
+ * triangles over its holes. */
 double vshi_part_encloses(const vshi_surface_part *part, double area, const vshi_vec (*caps)[3],
                           size_t cap_count);
 

@@ -14,7 +14,7 @@
 typedef struct vshi_view_frame {
     vshi_vec eye;
     vshi_vec forward;     /* unit */
-    vshi_vec right, down; /* of a pixel's width and height, a unit away */
+    vshi_vec right, down; /* a pixel's width and height, a unit away */
     double middle[2];     /* of the picture, pixels */
 } vshi_view_frame;
 
@@ -58,7 +58,7 @@ static inline vshi_vec vshi_sample_ray(const vshi_sample_grid *grid, int32_t col
 
 /* --- from samples to pixels */
 
-/* What a ray brought back. */
+/* The result of a ray. */
 typedef struct vshi_seen {
     float color[3];
     float alpha;

@@ -102,11 +102,11 @@ static inline void vshi_shadow_settle(const vshi_shadow_task *task, size_t point
 /* rays, adaptive and exact: a vshi_shade_fn of a vshi_shadow_task. */
 void vshi_shadow_by_rays(const void *task, size_t begin, size_t end, vsh_shade_stats *stats);
 
-/* --- what neighbouring points share on their way to a light */
+/* --- proofs that neighbouring points share */
 
 /* Looks at points that follow each other together: one beam around the cones of 64 of them, then of 16, tells
- * that all are hidden, or from where on all are free. Those are settled, these end there: what is left to
- * march is what is near. Nothing is lost by points that lie apart but the look. */
+ * that all are hidden, or from where on all are free. Hidden points are done. The cones of free points end
+ * there, so only what is near is marched. Points that lie apart lose only the time of the look. */
 void vshi_blocks_prove(const vshi_shadow_task *task, vshi_facing *facing, vshi_chunk *chunk,
                        vsh_shade_stats *stats);
 

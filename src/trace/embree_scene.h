@@ -151,7 +151,7 @@ bool vshi_rays_together(const vshi_segment_ray *rays, int count);
 
 #endif
 
-/* What of a triangle lets rays through: where a mask cuts it out, and its back where it is one-sided. */
+/* Triangles let rays through where a mask cuts them out, and from behind if they are one-sided. */
 
 #ifdef VSH_EMBREE
 
@@ -159,7 +159,7 @@ bool vshi_rays_together(const vshi_segment_ray *rays, int count);
 
 /* Of a geometry. */
 typedef struct vshi_sieve {
-    vsh_alpha_mask mask;     /* whose texels are the triangles' own */
+    vsh_alpha_mask mask;     /* its texels belong to the triangles */
     vshi_mask_place *places; /* [triangles][3]: of the corners, in the mask; NULL: it has none */
     bool one_sided;
     bool mirrored; /* its faces look where their corners run clockwise */
@@ -171,8 +171,7 @@ vsh_result vshi_sieves_create(vsh_triangles *triangles, const vsh_mesh *meshes, 
                               const vsh_run *run, double held, vsh_error *error);
 void vshi_sieves_free(vsh_triangles *triangles);
 
-/* Has rays that meet a geometry, which is that of a mesh, pass through it where they can; a geometry that
- * lets nothing through stays as it is. */
+/* Lets rays pass through the geometry of a mesh where its mask and its sides allow. */
 void vshi_sieve_attach(const vsh_triangles *triangles, size_t mesh, RTCGeometry geometry);
 
 /* Whether a geometry lets anything through; no beam is cut by one that does, nor together with another, as

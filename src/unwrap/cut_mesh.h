@@ -57,8 +57,8 @@ static inline uint32_t vshi_next_side(uint32_t side) {
 /* --- which sides of a mesh's triangles a chart may be grown across */
 
 /* Fills partner[3 triangle_count] with the side beyond each that runs the other way between vertices at the
- * same places, or UINT32_MAX. Of triangles with the same corners each belongs to a layer of its own, so that
- * copies and faces that look both ways hang together among themselves. Errors: VSH_ERROR_LIMIT,
+ * same places, or UINT32_MAX. Triangles with the same corners are in different layers. Sides are
+ * paired within a layer, so copies, and faces that look both ways, do not mix. Errors: VSH_ERROR_LIMIT,
  * VSH_ERROR_MEMORY. */
 vsh_result vshi_sides_find(const vsh_mesh *mesh, size_t index, uint32_t *partner, vsh_error *error);
 

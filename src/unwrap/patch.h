@@ -33,7 +33,7 @@ static inline double vshi_patch_doubled_area(const vshi_patch *p, uint32_t i) {
 
 /* --- laying a chart out flat */
 
-/* What came of it. */
+/* How well a chart lies flat. */
 enum {
     VSHI_FLAT = 0,      /* no triangle flips, none lies over another, the stretch is within the limit */
     VSHI_STRETCHED = 1, /* beyond the limit, but else as it should be */
@@ -51,7 +51,7 @@ bool vshi_flatten_measure(vshi_patch *patch);
 /* --- places in 32-bit UVs */
 
 /* Triangles that rounding has flipped or flattened, slivers all of them, are turned right by moving a corner
- * by some last places: uvs[vertex_count] of the patch, 0 … 1. What cannot be helped so stays. Errors:
+ * by some last places: uvs[vertex_count] of the patch, 0 … 1. Some may stay. Errors:
  * VSH_ERROR_MEMORY. */
 vsh_result vshi_settle(const vshi_patch *patch, float (*uvs)[2], vsh_error *error);
 

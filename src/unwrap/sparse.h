@@ -67,7 +67,7 @@ bool vshi_sparse_factor(vshi_sparse *system);
 /* Solves for one right side [count], by vertex, in place. */
 void vshi_sparse_solve(const vshi_sparse *system, vshi_complex *right);
 
-/* --- in which order vertices are eliminated */
+/* --- the order of elimination */
 
 /* Nested dissection (George, "Nested dissection of a regular finite element mesh", 1973) by planes through
  * space: order[v] is the row of vertex v. neighbours[begin[v] … begin[v + 1]] are the vertices beside v.
