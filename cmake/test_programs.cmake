@@ -16,6 +16,7 @@ function(vsh_add_program name)
   add_executable(${name} ${given_SOURCES})
   vsh_set_flags(${name})
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>) # more takes longer than it saves
+  target_compile_options(${name} PRIVATE -Wno-unused-parameter) # cmocka passes a state that few tests need
   if(VSH_LLD)
     target_link_options(${name} PRIVATE -fuse-ld=lld)
   endif()
