@@ -17,7 +17,6 @@
 enum { SIDE = 65 };
 
 static void a_solid_is_closed_wound_outwards_and_of_its_volume(void **state) {
-    (void)state;
     float *values = hills(SIDE, 40);
     vsh_heights_source source = source_of(values, SIDE, 40, 10.0, 2.0);
     source.base = 0.5;
@@ -56,7 +55,6 @@ static void a_solid_is_closed_wound_outwards_and_of_its_volume(void **state) {
 }
 
 static void a_surface_lies_under_its_lightmap_as_the_image_does(void **state) {
-    (void)state;
     /* one high sample, in row 1 of 4 and column 3 of 5 */
     float values[20] = {0};
     values[1 * 5 + 3] = 1.0f;
@@ -80,7 +78,6 @@ static void a_surface_lies_under_its_lightmap_as_the_image_does(void **state) {
 }
 
 static void a_surface_keeps_the_heights_beside_each_texel_s_middle(void **state) {
-    (void)state;
     static const struct {
         size_t texels, most; /* columns of texels, and of heights that are kept */
     } cases[] = {{1, 5}, {15, 33}, {16, 50}, {32, SIDE}, {100, SIDE}};
@@ -112,13 +109,11 @@ static void a_surface_keeps_the_heights_beside_each_texel_s_middle(void **state)
 }
 
 static int stop_at_once(void *user, const char *stage, double fraction) {
-    (void)user, (void)stage, (void)fraction;
     return 1;
 }
 
 /* A band of 100 voxels took ten minutes. */
 static void a_band_that_would_take_minutes_is_refused_and_the_one_it_names_is_not(void **state) {
-    (void)state;
     enum { FINE = 257 };
     float *values = hills(FINE, FINE);
     const vsh_heights_source source = source_of(values, FINE, FINE, 10.0, 2.0);
@@ -147,7 +142,6 @@ static void a_band_that_would_take_minutes_is_refused_and_the_one_it_names_is_no
 }
 
 static void the_field_of_a_heightfield_holds_distances_not_gaps(void **state) {
-    (void)state;
     /* a ramp of slope 2 along x: a gap g over it is a distance g / √5 */
     float values[SIDE * 5];
     for (int i = 0; i < SIDE * 5; ++i) {
@@ -187,7 +181,6 @@ static vsh_mesh reindexed(const vsh_mesh *mesh, uint32_t *indices) {
 }
 
 static void a_terrain_is_solid_or_open_as_its_triangles_are(void **state) {
-    (void)state;
     static const double mirrors[12] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     float *values = hills(SIDE, 40);
     const vsh_heights_source source = source_of(values, SIDE, 40, 10.0, 2.0);
@@ -259,7 +252,6 @@ static vshi_segment_ray random_ray(const vsh_triangles *of, int number, uint32_t
 }
 
 static void rays_meet_a_terrain_as_they_meet_its_triangles(void **state) {
-    (void)state;
     enum { RAYS = 20000, COLUMNS = 500, ROWS = 530 }; /* smaller terrains are triangles */
     static const double transforms[][12] = {
         {-0.6, 0.8, 0, 5, 0.8, 0.6, 0, 1e3, 0, 0, 1, 0},       /* mirrored, and tilted */
@@ -311,7 +303,6 @@ static void rays_meet_a_terrain_as_they_meet_its_triangles(void **state) {
 }
 
 static void every_instruction_set_finds_the_same_crossings(void **state) {
-    (void)state;
     static const struct {
         int32_t isa;
         vshi_terrain_kernel *kernel;
@@ -401,7 +392,6 @@ static size_t stand_on_top(const vsh_mesh *mesh, size_t step, double *positions,
 
 /* `direct` had dark lumps on the flanks. */
 static void no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_default(void **state) {
-    (void)state;
     enum { POINTS = 2 * (SIDE - 1) * (SIDE - 1), RAYS = 256 };
     static float values[SIDE * SIDE], normals[3 * POINTS], shadow[POINTS], ao[POINTS], truth[2][POINTS];
     static double positions[3 * POINTS];
@@ -493,7 +483,6 @@ static void check_image(const char *name, int32_t bits, int32_t channels, const 
 }
 
 static void images_of_8_16_and_32_bits_are_read(void **state) {
-    (void)state;
     double grey[12], luminance[12];
     for (int i = 0; i < 12; ++i) {
         grey[i] = i / 36.0;
@@ -509,7 +498,6 @@ static void images_of_8_16_and_32_bits_are_read(void **state) {
 }
 
 static void bad_images_are_refused_with_their_place(void **state) {
-    (void)state;
     static const char *const names[] = {"Y"};
     float values[12] = {0};
     const float *views[1] = {values};
@@ -533,7 +521,6 @@ static void bad_images_are_refused_with_their_place(void **state) {
 }
 
 static void bad_sources_are_refused(void **state) {
-    (void)state;
     static const double shear[12] = {1, 1, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     float values[4] = {0, 1, 2, 3}, nan[4] = {0, 1, NAN, 3};
     const vsh_heights_source good = {
@@ -591,7 +578,6 @@ static void bad_sources_are_refused(void **state) {
 }
 
 static void memory_limits_hold_before_memory_is_taken(void **state) {
-    (void)state;
     float *values = hills(SIDE, SIDE);
     const vsh_heights_source source = source_of(values, SIDE, SIDE, 10.0, 2.0);
     vsh_run run = vsh_run_default();

@@ -83,7 +83,6 @@ static void shadow(const stage *s, const vsh_light *light, int32_t method, float
 }
 
 static void a_hard_march_is_the_ray_but_for_ridges_narrower_than_its_step(void **state) {
-    (void)state;
     /* turned, mirrored, three times as large */
     static const double transform[12] = {0, 0, -3, 100, 0, 3, 0, -40, -3, 0, 0, 7};
     static const double directions[][3] = {
@@ -112,7 +111,6 @@ static void a_hard_march_is_the_ray_but_for_ridges_narrower_than_its_step(void *
 /* A plateau of height 4 from x = 0 on, seen from the ground before it: h / (w t) is least at its edge, or
  * where the ray leaves the terrain's height. */
 static void a_classic_march_is_the_least_height_over_the_cone_s_width(void **state) {
-    (void)state;
     float plateau[65 * 9];
     for (int i = 0; i < 65 * 9; ++i) {
         plateau[i] = i % 65 >= 32 ? 1.0f : 0.0f;
@@ -141,7 +139,6 @@ static void a_classic_march_is_the_least_height_over_the_cone_s_width(void **sta
 }
 
 static void points_that_are_no_points_are_nan_and_buried_ones_dark(void **state) {
-    (void)state;
     stage s = set_up(SIDE, SIDE, 2.0, NULL);
     const double positions[12] = {NAN, 0, 0, 0, 5, 0, 0, -0.3, 0, 0, 5, 0};
     const float normals[12] = {0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0};

@@ -22,7 +22,6 @@ static uint32_t nearest_of_all(const vshi_place *list, size_t count, const float
 
 /* Places anywhere, on a plane, on a coarse lattice (many at one place), and all at one. */
 static void the_tree_finds_what_a_look_at_all_finds(void **state) {
-    (void)state;
     enum { MOST = 1500 };
     uint32_t seed = 5;
     for (int kind = 0; kind < 4; ++kind) {
@@ -136,7 +135,6 @@ static uint64_t fill(const vsh_charts *charts, const planes *p, int32_t threads)
 }
 
 static void a_hidden_chart_takes_the_nearest_values_of_the_world(void **state) {
-    (void)state;
     charts_mesh *m = four_squares();
     vsh_charts *charts = make_charts(m, 2);
     planes p = make_planes(0);
@@ -164,7 +162,6 @@ static void a_hidden_chart_takes_the_nearest_values_of_the_world(void **state) {
 }
 
 static void what_is_empty_around_it_is_padded_as_far_as_it_is_the_nearest(void **state) {
-    (void)state;
     charts_mesh *m = four_squares();
     for (int32_t padding = 0; padding <= 6; padding += 2) {
         vsh_charts *charts = make_charts(m, padding);
@@ -193,7 +190,6 @@ static void what_is_empty_around_it_is_padded_as_far_as_it_is_the_nearest(void *
 }
 
 static void a_chart_in_part_hidden_keeps_its_own_values_near_what_is_seen(void **state) {
-    (void)state;
     charts_mesh *m = four_squares();
     vsh_charts *charts = make_charts(m, 2);
     planes p = make_planes(1);
@@ -223,7 +219,6 @@ static void a_chart_in_part_hidden_keeps_its_own_values_near_what_is_seen(void *
 
 /* The square that is across lies over the hidden one from its fifth column on. */
 static void what_lookups_beside_the_seen_read_is_its_own(void **state) {
-    (void)state;
     charts_mesh *m = new_mesh();
     static const double places[CHARTS] = {0.0, 1.0, 1.0 + 4.0 / CHART_TEXELS, 40.0};
     for (int c = 0; c < CHARTS; ++c) {
@@ -249,7 +244,6 @@ static void what_lookups_beside_the_seen_read_is_its_own(void **state) {
 }
 
 static void nothing_changes_where_all_is_seen_or_nothing(void **state) {
-    (void)state;
     charts_mesh *m = four_squares();
     vsh_charts *charts = make_charts(m, 2);
     for (int seen = 0; seen < 2; ++seen) {
@@ -267,14 +261,10 @@ static void nothing_changes_where_all_is_seen_or_nothing(void **state) {
 }
 
 static int32_t stop(void *user, const char *stage, double fraction) {
-    (void)user;
-    (void)stage;
-    (void)fraction;
     return 1;
 }
 
 static void threads_limits_and_bad_calls(void **state) {
-    (void)state;
     charts_mesh *m = four_squares();
     vsh_charts *charts = make_charts(m, 2);
     planes p = make_planes(0), q = make_planes(0);

@@ -107,7 +107,6 @@ static void find_truth(stage *s, const double up[3]) {
 }
 
 static void shares_of_what_is_over_a_horizon_are_the_rays(void **state) {
-    (void)state;
     static const double ups[2][3] = {{0.0, 1.0, 0.0}, {0.48, -0.6, 0.64}};
     static const int32_t methods[] = {VSH_AO_RAYS, VSH_AO_ADAPTIVE, VSH_AO_EXACT};
     stage *s = set_up();
@@ -134,7 +133,6 @@ static void shares_of_what_is_over_a_horizon_are_the_rays(void **state) {
 }
 
 static void what_knows_no_horizon_says_so(void **state) {
-    (void)state;
     static const double up[3] = {0.0, 1.0, 0.0};
     stage *s = set_up();
     static const int32_t methods[] = {VSH_AO_TAPS, VSH_AO_CONES};

@@ -12,7 +12,6 @@ enum { MANY = 1000000 };
 static char warned[4096];
 
 static void keep_warning(void *user, const char *message) {
-    (void)user;
     snprintf(warned + strlen(warned), sizeof warned - strlen(warned), "%s\n", message);
 }
 
@@ -51,7 +50,6 @@ static void assert_cube(const vsh_grid *grid) {
 }
 
 static void faces_given_twice_change_nothing(void **state) {
-    (void)state;
     uint32_t twice[72];
     memcpy(twice, outward, sizeof outward);
     memcpy(twice + 36, outward, sizeof outward);
@@ -62,7 +60,6 @@ static void faces_given_twice_change_nothing(void **state) {
 }
 
 static void a_face_given_twice_among_others_is_the_same_solid(void **state) {
-    (void)state;
     uint32_t more[39];
     memcpy(more, outward, sizeof outward);
     memcpy(more + 36, outward, 3 * sizeof *more);
@@ -78,7 +75,6 @@ static double room_truth(const double p[3]) { /* walls of 0.2 around the cube */
 }
 
 static void an_inverted_mesh_is_a_room_or_the_same_solid_if_asked(void **state) {
-    (void)state;
     uint32_t inward[36];
     for (size_t t = 0; t < 12; ++t) {
         const uint32_t *from = outward + 3 * t;
@@ -96,7 +92,6 @@ static void an_inverted_mesh_is_a_room_or_the_same_solid_if_asked(void **state) 
 }
 
 static void faces_that_disagree_are_told_and_are_the_same_solid(void **state) {
-    (void)state;
     uint32_t mixed[36];
     memcpy(mixed, outward, sizeof mixed);
     for (size_t t = 0; t < 12; t += 3) {
@@ -111,7 +106,6 @@ static void faces_that_disagree_are_told_and_are_the_same_solid(void **state) {
 }
 
 static void missing_faces_are_told_and_make_a_shell(void **state) {
-    (void)state;
     const vsh_mesh mesh = cube_of(positions, outward, 10);
     vsh_grid *grid = grid_of(&mesh);
     assert_non_null(strstr(warned, "open edges"));
@@ -122,7 +116,6 @@ static void missing_faces_are_told_and_make_a_shell(void **state) {
 }
 
 static void a_million_triangles_without_area_change_nothing(void **state) {
-    (void)state;
     uint32_t *indices = calloc(MANY * 3 + 36, sizeof *indices);
     assert_non_null(indices);
     memcpy(indices, outward, sizeof outward);
@@ -142,7 +135,6 @@ static void a_million_triangles_without_area_change_nothing(void **state) {
 }
 
 static void vertices_out_of_the_world_are_refused(void **state) {
-    (void)state;
     static const struct {
         float value;
         vsh_result expected;
@@ -176,7 +168,6 @@ static void vertices_out_of_the_world_are_refused(void **state) {
 }
 
 static void indices_out_of_range_are_refused(void **state) {
-    (void)state;
     static const uint32_t bad[] = {8, 9, 1u << 20, 1u << 31, UINT32_MAX};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
         for (size_t k = 0; k < 36; k += 5) {

@@ -34,7 +34,6 @@ static double worst(const float *a, const float *b, size_t count) {
 }
 
 static void exr_32_is_bit_exact(void **state) {
-    (void)state;
     static const int32_t sizes[][2] = {{37, 23}, {1, 1}, {1, 5000}, {5000, 1}, {16, 16}};
     for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; ++k) {
         sample s;
@@ -57,7 +56,6 @@ static void exr_32_is_bit_exact(void **state) {
 /* The writer stores a chunk raw if its compressed data are as long as the raw data. Small images with few
  * values have such chunks. */
 static void exr_keeps_every_small_size(void **state) {
-    (void)state;
     static const char *const names[] = {"a", "b", "c", "d", "e", "f", "g"};
     static const float levels[] = {0.0f, 1.0f, 0.5f, 0.25f, 1.0f / 3.0f, 0.7f, 0.9f};
     enum { LARGEST = 12, KINDS = 4 };
@@ -90,7 +88,6 @@ static void exr_keeps_every_small_size(void **state) {
 }
 
 static void exr_channels_come_back_sorted_by_name(void **state) {
-    (void)state;
     sample s;
     make(&s, 5, 4, 3, LIGHTMAP);
     vsh_image_file *file = write_and_read(at("sorted.exr"), &s.image, 32, NULL);
@@ -105,7 +102,6 @@ static void exr_channels_come_back_sorted_by_name(void **state) {
 }
 
 static void exr_keeps_names_of_127_bytes(void **state) {
-    (void)state;
     char a[128];
     char b[128];
     memset(a, 'n', 127);
@@ -125,7 +121,6 @@ static void exr_keeps_names_of_127_bytes(void **state) {
 }
 
 static void exr_16_is_right_to_half_precision(void **state) {
-    (void)state;
     sample s;
     make(&s, 61, 50, 3, LIGHTMAP);
     vsh_image_file *file = write_and_read(at("half.exr"), &s.image, 16, NULL);
@@ -142,7 +137,6 @@ static void exr_16_is_right_to_half_precision(void **state) {
 }
 
 static void exr_writes_the_packed_names_when_packed(void **state) {
-    (void)state;
     sample s;
     make(&s, 6, 20, 3, LIGHTMAP);
     vsh_image_file *file = write_and_read(at("packed.exr"), &s.image, 32, "G=ao,R=shadow.sun,A=1");
@@ -159,7 +153,6 @@ static void exr_writes_the_packed_names_when_packed(void **state) {
 
 /* Every format: the file's R, G and B are the channels asked for, also where A is 0. */
 static void every_format_keeps_values_to_half_a_step(void **state) {
-    (void)state;
     static const struct {
         const char *name;
         int32_t bits;
@@ -278,7 +271,6 @@ static vsh_image_file *write_and_read_iff(const char *path, const vsh_image *ima
 /* Sizes at which tiles, rows of whole words and runs of equal values end in every way; values that pack well
  * and values that do not. */
 static void formats_of_their_own_writers_keep_every_size(void **state) {
-    (void)state;
     static const char *const names[] = {"o.sgi", "o.rla", "o.ico", "o.iff"};
     static const int32_t sizes[][2] = {{1, 1}, {1, 7}, {3, 5}, {8, 1}, {64, 64}, {65, 130}, {255, 254}};
     for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; ++k) {
@@ -319,7 +311,6 @@ static void formats_of_their_own_writers_keep_every_size(void **state) {
 }
 
 static void lossy_formats_keep_grey(void **state) {
-    (void)state;
     sample s;
     make(&s, 70, 90, 2, (const char *const[]){"ao", "A"});
     static const char *const names[] = {"g.heic", "g.avif", "g.webp", "g.jpg"};
@@ -339,7 +330,6 @@ static void lossy_formats_keep_grey(void **state) {
 }
 
 static void icons_of_fewer_bits_are_not_given_to_their_reader(void **state) {
-    (void)state;
     sample s;
     make(&s, 5, 5, 3, LIGHTMAP);
     vsh_error error = {0};
@@ -356,7 +346,6 @@ static void icons_of_fewer_bits_are_not_given_to_their_reader(void **state) {
 }
 
 static void pgm_is_grey(void **state) {
-    (void)state;
     sample s;
     make(&s, 9, 7, 3, LIGHTMAP);
     static const char *const packs[] = {NULL, "R=shadow.sun", "R=shadow.sun,G=shadow.sun,B=shadow.sun"};
@@ -371,7 +360,6 @@ static void pgm_is_grey(void **state) {
 }
 
 static void integers_clamp_and_turn_nan_to_0(void **state) {
-    (void)state;
     const float values[6] = {NAN, -1.0f, 2.0f, INFINITY, -INFINITY, 0.5f};
     const float expected[6] = {0.0f, 0.0f, 1.0f, 1.0f, 0.0f, 0.5f};
     const char *const name = "ao";
@@ -387,7 +375,6 @@ static void integers_clamp_and_turn_nan_to_0(void **state) {
 }
 
 static void default_bits_are_the_formats_best(void **state) {
-    (void)state;
     sample s;
     make(&s, 40, 30, 3, LIGHTMAP);
     vsh_image_file *file = write_and_read(at("bits.png"), &s.image, 0, NULL);
@@ -401,7 +388,6 @@ static void default_bits_are_the_formats_best(void **state) {
 }
 
 static void colours_that_are_not_given_are_0(void **state) {
-    (void)state;
     sample s;
     make(&s, 4, 4, 3, LIGHTMAP);
     vsh_image_file *file = write_and_read(at("zero.png"), &s.image, 8, "G=ao");
@@ -416,7 +402,6 @@ static void colours_that_are_not_given_are_0(void **state) {
 }
 
 static void default_pack_takes_the_first_three_and_coverage(void **state) {
-    (void)state;
     static const struct {
         int32_t count;
         const char *names[5];
@@ -444,7 +429,6 @@ static void default_pack_takes_the_first_three_and_coverage(void **state) {
 }
 
 static void channel_names_may_have_commas_and_equals(void **state) {
-    (void)state;
     sample s;
     make(&s, 3, 3, 3, (const char *const[]){"shadow.a", "shadow.a,b=c", "1"});
     vsh_image_file *file = write_and_read(at("comma.exr"), &s.image, 32, "R=shadow.a,b=c,G=1,B=shadow.a");

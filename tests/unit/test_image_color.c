@@ -48,7 +48,6 @@ static double srgb(double x) {
 }
 
 static void light_is_srgb_and_its_file_says_so(void **state) {
-    (void)state;
     for (int32_t bits = 8; bits <= 16; bits += 8) {
         sample s;
         make(&s, 30, 20, 5, IRRADIANCE);
@@ -73,7 +72,6 @@ static void light_is_srgb_and_its_file_says_so(void **state) {
 }
 
 static void data_is_linear_and_its_file_says_nothing_to_be_undone(void **state) {
-    (void)state;
     sample s;
     make(&s, 30, 20, 5, IRRADIANCE);
     s.image.holds = HOLDS;
@@ -92,7 +90,6 @@ static void data_is_linear_and_its_file_says_nothing_to_be_undone(void **state) 
 }
 
 static void a_space_that_is_asked_for_is_taken(void **state) {
-    (void)state;
     sample s;
     make(&s, 30, 20, 5, IRRADIANCE);
     s.image.holds = HOLDS;
@@ -114,7 +111,6 @@ static void a_space_that_is_asked_for_is_taken(void **state) {
 
 /* Names say nothing of it. */
 static void what_a_channel_holds_says_how_integers_hold_it(void **state) {
-    (void)state;
     sample s;
     make(&s, 30, 20, 5, IRRADIANCE);
     const double value = s.planes[1][50];
@@ -136,7 +132,6 @@ static void what_a_channel_holds_says_how_integers_hold_it(void **state) {
 }
 
 static void floats_are_linear(void **state) {
-    (void)state;
     sample s;
     make(&s, 30, 20, 5, IRRADIANCE);
     s.image.holds = HOLDS;
@@ -168,7 +163,6 @@ static vsh_image_clipping clipping_of(const char *path, const vsh_image *image, 
 }
 
 static void light_over_1_is_counted_where_it_is_cut(void **state) {
-    (void)state;
     sample s;
     make(&s, 10, 10, 5, IRRADIANCE);
     s.image.holds = HOLDS;

@@ -31,7 +31,6 @@ static void refused(const char *path, const vsh_image *image, int32_t bits, cons
 }
 
 static void bad_packs_are_refused_by_part(void **state) {
-    (void)state;
     sample s;
     make(&s, 2, 2, 3, LIGHTMAP);
     static const char *const cases[][2] = {
@@ -60,7 +59,6 @@ static void bad_packs_are_refused_by_part(void **state) {
 }
 
 static void what_a_format_lacks_is_refused(void **state) {
-    (void)state;
     sample s;
     make(&s, 2, 2, 3, LIGHTMAP);
     refused(at("x.png"), &s.image, 32, NULL, VSH_ERROR_ARGUMENT, "8 16");
@@ -90,7 +88,6 @@ static void what_a_format_lacks_is_refused(void **state) {
 }
 
 static void bad_images_are_refused(void **state) {
-    (void)state;
     sample s;
     make(&s, 2, 2, 3, LIGHTMAP);
     vsh_image bad = s.image;
@@ -128,7 +125,6 @@ static void bad_images_are_refused(void **state) {
 }
 
 static void places_that_cannot_be_written_are_refused(void **state) {
-    (void)state;
     sample s;
     make(&s, 2, 2, 3, LIGHTMAP);
     char path[600];
@@ -148,7 +144,6 @@ static void places_that_cannot_be_written_are_refused(void **state) {
 /* The limit on a file's size stands for a full disk: at the first byte, in the middle, at the very last one.
  */
 static void a_full_disk_leaves_the_old_file_and_nothing_else(void **state) {
-    (void)state;
     static const char *const names[] = {"d.exr", "d.png", "d.tif",  "d.jpg",  "d.tga", "d.bmp", "d.hdr",
                                         "d.ppm", "d.pgm", "d.webp", "d.jp2",  "d.dpx", "d.gif", "d.sgi",
                                         "d.iff", "d.rla", "d.ico",  "d.heic", "d.avif"};
@@ -190,7 +185,6 @@ static void a_full_disk_leaves_the_old_file_and_nothing_else(void **state) {
 
 /* Neither the time nor the file's name: and no path so long that a header had no room for its end. */
 static void the_same_image_is_the_same_bytes_later_elsewhere(void **state) {
-    (void)state;
     static const char *const formats[] = {"exr", "png", "tif",  "jpg",  "tga", "bmp", "hdr",
                                           "ppm", "pgm", "webp", "jp2",  "dpx", "gif", "sgi",
                                           "iff", "rla", "ico",  "heic", "avif"};
@@ -229,7 +223,6 @@ static void the_same_image_is_the_same_bytes_later_elsewhere(void **state) {
 }
 
 static void cut_files_are_errors(void **state) {
-    (void)state;
     static const char *const names[] = {"c.exr", "c.png", "c.tif", "c.tga", "c.bmp", "c.hdr",
                                         "c.ppm", "c.dpx", "c.sgi", "c.rla", "c.ico"};
     sample s;
@@ -267,7 +260,6 @@ static void cut_files_are_errors(void **state) {
 }
 
 static void damaged_files_do_no_harm(void **state) {
-    (void)state;
     static const char *const names[] = {"b.exr", "b.png", "b.tif", "b.jpg", "b.tga",
                                         "b.bmp", "b.sgi", "b.rla", "b.ico"};
     sample s;
@@ -299,7 +291,6 @@ static void damaged_files_do_no_harm(void **state) {
 }
 
 static void unreadable_paths_are_read_errors(void **state) {
-    (void)state;
     vsh_error error = {0};
     vsh_image_file *file = NULL;
     assert_int_equal(vsh_image_read(at("nothing.exr"), NULL, &file, &error), VSH_ERROR_READ);
@@ -318,7 +309,6 @@ static void unreadable_paths_are_read_errors(void **state) {
 }
 
 static void the_memory_limit_holds_without_a_reader(void **state) {
-    (void)state;
     static const char *const names[] = {"m.exr", "m.png", "m.tif"};
     sample s;
     make(&s, 33, 40, 3, LIGHTMAP);
@@ -342,7 +332,6 @@ static void the_memory_limit_holds_without_a_reader(void **state) {
 }
 
 static void a_written_file_follows_links_and_keeps_its_mode(void **state) {
-    (void)state;
     sample s;
     make(&s, 3, 3, 3, LIGHTMAP);
     const char *target = at("target.exr");
@@ -361,7 +350,6 @@ static void a_written_file_follows_links_and_keeps_its_mode(void **state) {
 }
 
 static void outputs_are_made_beside_the_target_and_keep_its_ending(void **state) {
-    (void)state;
     vshi_output first;
     vshi_output second;
     vsh_error error = {0};
@@ -388,7 +376,6 @@ static void outputs_are_made_beside_the_target_and_keep_its_ending(void **state)
 }
 
 static void no_temporary_is_left(void **state) {
-    (void)state;
     DIR *directory = opendir(folder);
     assert_non_null(directory);
     for (const struct dirent *entry = readdir(directory); entry != NULL; entry = readdir(directory)) {

@@ -52,7 +52,6 @@ static void assert_same_file(const char *path, const char *other) {
 }
 
 static void rows_make_the_bytes_of_the_whole_image(void **state) {
-    (void)state;
     sample s;
     make(&s, 200, 150, 3, LIGHTMAP);
     for (size_t e = 0; e < ENDING_COUNT; ++e) {
@@ -71,7 +70,6 @@ static void rows_make_the_bytes_of_the_whole_image(void **state) {
 
 /* Wide enough that OpenImageIO is handed several lots of rows. */
 static void long_rows_make_them_too(void **state) {
-    (void)state;
     sample s;
     make(&s, 8192, 100, 4, (const char *const[]){"shadow.sun", "ao", "shadow.lamp", "A"});
     static const char *const endings[] = {"exr", "png", "tif", "tga", "iff", "sgi", "rla", "jpg"};
@@ -109,7 +107,6 @@ static void assert_untouched(const char *path, const unsigned char *old, size_t 
 }
 
 static void what_is_given_up_or_short_of_rows_leaves_the_old_file(void **state) {
-    (void)state;
     const unsigned char old[] = "the old content";
     sample s;
     make(&s, 200, 150, 3, LIGHTMAP);
@@ -138,7 +135,6 @@ static void what_is_given_up_or_short_of_rows_leaves_the_old_file(void **state) 
 }
 
 static void rows_that_are_none_of_it_are_refused(void **state) {
-    (void)state;
     sample s;
     make(&s, 20, 10, 3, LIGHTMAP);
     vsh_error error = {0};
@@ -157,7 +153,6 @@ static void rows_that_are_none_of_it_are_refused(void **state) {
 
 /* The limit on a file's size stands for a full disk, met in the middle of the rows. */
 static void a_full_disk_leaves_the_old_file(void **state) {
-    (void)state;
     const unsigned char old[] = "the old content";
     signal(SIGXFSZ, SIG_IGN);
     struct rlimit old_limit;
@@ -262,7 +257,6 @@ static void write_tiles(const char *path, const tiling *t, const sample *s) {
 }
 
 static void the_finest_level_is_read_to_the_bit(void **state) {
-    (void)state;
     const tiling tilings[] = {
         {37, 23, 16, 8, 0, 0, EXR_TILE_ONE_LEVEL},      {16, 16, 64, 64, 0, 0, EXR_TILE_ONE_LEVEL},
         {1, 40, 8, 8, 0, 0, EXR_TILE_ONE_LEVEL},        {37, 23, 16, 16, -7, 1000, EXR_TILE_ONE_LEVEL},
@@ -291,13 +285,11 @@ static void the_finest_level_is_read_to_the_bit(void **state) {
 }
 
 static int32_t stop_at_half(void *user, const char *stage, double fraction) {
-    (void)user;
     assert_string_equal(stage, "load");
     return fraction >= 0.5;
 }
 
 static void reading_can_be_cancelled_between_rows_of_tiles(void **state) {
-    (void)state;
     const tiling t = {40, 64, 16, 16, 0, 0, EXR_TILE_ONE_LEVEL};
     sample s;
     make(&s, t.width, t.height, CHANNELS, NAMES);
@@ -312,7 +304,6 @@ static void reading_can_be_cancelled_between_rows_of_tiles(void **state) {
 }
 
 static void cut_files_are_refused(void **state) {
-    (void)state;
     const tiling t = {37, 23, 16, 8, 0, 0, EXR_TILE_ONE_LEVEL};
     sample s;
     make(&s, t.width, t.height, CHANNELS, NAMES);

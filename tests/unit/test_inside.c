@@ -74,7 +74,6 @@ static counts compare(const vsh_mesh *meshes, size_t mesh_count, int32_t size) {
 
 /* Walls whose arches stand in them, columns on their bases, all solids: charts end where others begin. */
 static void samples_of_solids_in_each_other_are_where_they_are_by_themselves(void **state) {
-    (void)state;
     vsh_error error = {VSH_OK, ""};
     vsh_model *model = NULL;
     check(vsh_model_read(VSH_ASSETS "/cloister.glb", NULL, &model, &error), &error);
@@ -129,7 +128,6 @@ static void add_ball(head *h, double radius, double z, double hole, float left) 
 
 /* A head with a hole, and an eye that looks out of it: how many rays find their way grows over the eye. */
 static void samples_beside_a_hole_are_where_they_are_by_themselves(void **state) {
-    (void)state;
     head *h = calloc(1, sizeof *h);
     add_ball(h, 1.0, 0.0, 0.35, 0.0f);
     add_ball(h, 0.4, 0.5, 0.0, 0.5f);
@@ -150,7 +148,6 @@ static void samples_beside_a_hole_are_where_they_are_by_themselves(void **state)
 /* A hood, which is a box without its bottom, over a floor. Points deep below it see its inner sides alone,
  * others see out by the gap, and no triangle parts the two. */
 static void samples_below_a_hood_are_where_they_are_by_themselves(void **state) {
-    (void)state;
     static const float positions[] = {-2, -2, 0,     2, -2, 0,     2, 2, 0,     -2, 2, 0,
                                       -1, -1, 0.04f, 1, -1, 0.04f, 1, 1, 0.04f, -1, 1, 0.04f,
                                       -1, -1, 1,     1, -1, 1,     1, 1, 1,     -1, 1, 1};

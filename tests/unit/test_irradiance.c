@@ -19,7 +19,6 @@ static float red(const vsh_light *light) {
 }
 
 static void the_cosine_to_the_light_weighs_it(void **state) {
-    (void)state;
     for (int degrees = 0; degrees <= 180; degrees += 5) {
         double towards[3];
         direction_at(RADIANS(degrees - 90), 0.7, towards);
@@ -37,7 +36,6 @@ static void the_cosine_to_the_light_weighs_it(void **state) {
 }
 
 static void shading_normals_stand_in_for_geometric_ones(void **state) {
-    (void)state;
     const vsh_points points = {1, ORIGIN, UP, NULL};
     const float one = 1.0f, sideways[3] = {1.0f, 0.0f, 0.0f};
     const vsh_light light = sun((const double[]){1.0, 0.0, 0.0}, 0.1);
@@ -49,7 +47,6 @@ static void shading_normals_stand_in_for_geometric_ones(void **state) {
 }
 
 static void falloffs_follow_their_formulas(void **state) {
-    (void)state;
     for (double d = 0.3; d < 20.0; d *= 1.4) {
         vsh_light light = lamp((const double[]){0.0, d, 0.0}, 0.25);
         assert_float_equal(red(&light), 1.0, 1e-6);
@@ -63,7 +60,6 @@ static void falloffs_follow_their_formulas(void **state) {
 }
 
 static void a_point_at_the_light_gets_no_infinity(void **state) {
-    (void)state;
     const double distances[] = {0.0, 1e-300, 1e-30, 1e-3, 0.2};
     for (size_t i = 0; i < sizeof distances / sizeof distances[0]; ++i) {
         vsh_light light = lamp((const double[]){0.0, distances[i], 0.0}, 0.25);
@@ -74,7 +70,6 @@ static void a_point_at_the_light_gets_no_infinity(void **state) {
 }
 
 static void a_spot_fades_smoothly_between_its_angles(void **state) {
-    (void)state;
     vsh_light light = lamp((const double[]){0.0, 2.0, 0.0}, 0.1);
     light.type = VSH_LIGHT_SPOT;
     light.inner_angle = RADIANS(20.0);
@@ -115,7 +110,6 @@ static void a_spot_fades_smoothly_between_its_angles(void **state) {
 }
 
 static void colour_and_visibility_multiply_and_lights_add(void **state) {
-    (void)state;
     enum { COUNT = 5 };
     const double positions[3 * COUNT] = {0.0};
     float normals[3 * COUNT], rgb[3 * COUNT];
@@ -141,7 +135,6 @@ static void colour_and_visibility_multiply_and_lights_add(void **state) {
 }
 
 static void what_has_no_place_or_normal_adds_nothing(void **state) {
-    (void)state;
     const double positions[6] = {(double)NAN, 0.0, 0.0, 0.0, (double)INFINITY, 0.0};
     const float normals[6] = {0.0f, 1.0f, 0.0f, 0.0f, 1.0f, 0.0f};
     const float visible[2] = {1.0f, 1.0f};

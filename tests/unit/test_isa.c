@@ -83,7 +83,6 @@ static void expect_same(const march_result *a, const march_result *b, size_t cou
 }
 
 static void every_kernel_marches_the_same_bits(void **state) {
-    (void)state;
     vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
     static march_result base, other;
     const size_t counts[] = {0, 1, 3, 4, 5, 15, 16, 17, 100, 1000};
@@ -164,7 +163,6 @@ static void shade_with(const caster *c, const vsh_light *light, int32_t method, 
 }
 
 static void every_method_gives_the_same_bits_on_every_instruction_set(void **state) {
-    (void)state;
     static outcome base, other;
     int32_t sets[VSHI_ISA_COUNT];
     const size_t count = sets_here(sets);
@@ -195,7 +193,6 @@ static void every_method_gives_the_same_bits_on_every_instruction_set(void **sta
 }
 
 static void an_instruction_set_that_is_missing_or_unknown_is_refused_by_name(void **state) {
-    (void)state;
     vsh_field *field = field_of(truth_seeds(), 0.2, 1.0);
     const double place[3] = {0.0, 3.0, 0.0};
     const vsh_points points = {1, place, NULL, NULL};
@@ -226,7 +223,6 @@ static void an_instruction_set_that_is_missing_or_unknown_is_refused_by_name(voi
 }
 
 static void the_best_set_is_one_that_this_machine_has(void **state) {
-    (void)state;
     assert_true(vsh_isa_available(VSH_ISA_BASE) && vsh_isa_available(VSH_ISA_BEST));
     assert_false(vsh_isa_available(-1) || vsh_isa_available(VSHI_ISA_COUNT));
     const int32_t best = vshi_isa_resolve(VSH_ISA_BEST);

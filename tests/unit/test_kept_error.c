@@ -127,7 +127,6 @@ static void check(const char *what, double max_error, const float *values, const
 }
 
 static void procedural_scenes_keep_the_error_that_is_asked_for(void **state) {
-    (void)state;
     static const struct {
         const char *name;
         void (*make)(shapes *s);
@@ -166,7 +165,6 @@ static void procedural_scenes_keep_the_error_that_is_asked_for(void **state) {
 /* A box and a sphere in a level set of 0.0117; beside it a plane of 16 units, whose voxels would be larger.
  */
 static void a_level_set_keeps_its_voxels_beside_a_large_plane(void **state) {
-    (void)state;
     static baked alone, beside;
     char text[1024];
     vsh_sdf_node nodes[3] = {vsh_sdf_node_default(), vsh_sdf_node_default(), vsh_sdf_node_default()};
@@ -215,7 +213,6 @@ static double bend(const float *values, const float *truth, int first, int last)
 }
 
 static void penumbrae_rise_smoothly_at_their_ends(void **state) {
-    (void)state;
     enum { FIRST = 200, LAST = 240 };
     static const double up[3] = {0.0, 1.0, 0.0};
     static baked b;

@@ -46,7 +46,6 @@ static vsh_layer layer_of(const vsh_field *field) {
 
 /* Where nothing casts, all light arrives that the receiver's horizon lets through. */
 static void test_nothing_hides(void **state) {
-    (void)state;
     vsh_field *empty = nothing(0.05);
     const vsh_light above = sun(towards, 0.2);
     const double level[3] = {1.0, 0.0, 0.0}; /* half of it below the horizon */
@@ -81,7 +80,6 @@ static void test_nothing_hides(void **state) {
 /* All casters in a layer over an empty field: as in the field itself. Light from so low that the horizon cuts
  * into it, which is not to count twice. */
 static void test_layer_alone(void **state) {
-    (void)state;
     vsh_field *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05), *empty = nothing(0.05);
     const vsh_layer layer = layer_of(field);
     const double low[3] = {1.0, 0.05, 0.2};
@@ -106,7 +104,6 @@ static void test_layer_alone(void **state) {
 /* Two balls whose shadows do not meet: the product of their layers is the shadow of both. The truth is the
  * union in one field. Where their discs overlap in the sky, the product is that of independent shares. */
 static void test_product(void **state) {
-    (void)state;
     vsh_field *a = field_of_ball(-1.0, 0.6, -0.6, 0.3, 0.025), *b = field_of_ball(1.0, 0.6, 0.6, 0.3, 0.025);
     const truth_solid both[2] = {ball(-1.0, 0.6, -0.6, 0.3), ball(1.0, 0.6, 0.6, 0.3)};
     vsh_field *all = field_of((truth_scene){both, 2}, 0.025, 4.0);
@@ -132,7 +129,6 @@ static void test_product(void **state) {
 /* A layer that repeats the field: the darker of both is the field alone, bit by bit, the product its square.
  */
 static void test_combinations(void **state) {
-    (void)state;
     vsh_field *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05);
     const vsh_light light = sun(towards, 0.2);
     vsh_layer layer = layer_of(field);
@@ -163,7 +159,6 @@ static void test_combinations(void **state) {
 
 /* Half the softness is half the light. */
 static void test_softness(void **state) {
-    (void)state;
     vsh_field *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05), *empty = nothing(0.05);
     const vsh_light full = sun(towards, 2.0 * atan(0.1)), half = sun(towards, 2.0 * atan(0.05));
     vsh_layer layer = layer_of(field);
@@ -189,7 +184,6 @@ static void test_softness(void **state) {
 
 /* A layer casts for the lights it names, and takes part in AO where it says so. */
 static void test_where_it_counts(void **state) {
-    (void)state;
     vsh_field *field = field_of_ball(0.0, 0.4, 0.0, 0.4, 0.05), *empty = nothing(0.05);
     vsh_light light = sun(towards, 0.2);
     const char *const names[] = {"moon", "sun"};
@@ -241,7 +235,6 @@ static void test_where_it_counts(void **state) {
 
 /* Deviations of independent values add up. */
 static void test_deviation(void **state) {
-    (void)state;
     vsh_field *a = field_of_ball(-0.2, 0.8, 0.0, 0.5, 0.05), *b = field_of_ball(0.2, 0.9, 0.1, 0.5, 0.05);
     const vsh_light light = sun(towards, 0.3);
     vsh_layer layer = layer_of(b);
@@ -306,7 +299,6 @@ static void bake_floor(const vsh_field *field, const vsh_layer *layers, size_t l
  * in a layer of voxels four times as large as those that start offsets are measured in. The receiver must not
  * shade itself, and what is under the wall is invalid and filled in each way. */
 static void test_bake(void **state) {
-    (void)state;
     const truth_solid slab = {.shape = TRUTH_BOX, .center = {0.0, -0.25, 0.0}, .half = {1.5, 0.25, 1.5}};
     const truth_solid wall = {.shape = TRUTH_BOX, .center = {0.0, 0.4, 0.0}, .half = {0.2, 0.6, 1.5}};
     const truth_solid both[2] = {slab, wall};
@@ -342,7 +334,6 @@ static void test_bake(void **state) {
 }
 
 static void test_refused(void **state) {
-    (void)state;
     vsh_field *empty = nothing(0.05);
     const vsh_light light = sun(towards, 0.2);
     const vsh_points points = {1, positions, normals, NULL};
@@ -383,7 +374,6 @@ static void test_refused(void **state) {
 }
 
 static int fill(void **state) {
-    (void)state;
     floor_texels(SIZE, positions, normals);
     return 0;
 }

@@ -122,7 +122,6 @@ static double towards(const vsh_light *light, const double *from, double to[3]) 
 
 /* A bar over the sphere: its shadow is narrower than two of the lifts that would move it. */
 static void rays_to_a_light_well_above_a_facet_begin_on_it(void **state) {
-    (void)state;
     box bar;
     make_box(&bar, (double[]){-0.03, 1.05, -1.0}, (double[]){0.0, 1.08, 1.0});
     scene s;
@@ -160,7 +159,6 @@ static void rays_to_a_light_well_above_a_facet_begin_on_it(void **state) {
 
 /* A light of 11.5° each way, near and far. */
 static void facets_do_not_hide_a_light_that_is_over_the_smooth_sphere(void **state) {
-    (void)state;
     static const double SINE = 0.2;
     scene s;
     open_scene(&s, NULL);
@@ -195,7 +193,6 @@ static void facets_do_not_hide_a_light_that_is_over_the_smooth_sphere(void **sta
 /* A box whose face cuts the sphere: between the facets and the smooth sphere, near the cut. */
 /* Its light is the cosine of the smooth normal, from where the light stands over the horizon. */
 static void pictures_show_no_facets_where_light_grazes_a_smooth_sphere(void **state) {
-    (void)state;
     enum { SIZE = 64 };
     static float color[3 * SIZE * SIZE], alpha[SIZE * SIZE], depth[SIZE * SIZE], normal[3 * SIZE * SIZE];
     scene s;
@@ -229,7 +226,6 @@ static void pictures_show_no_facets_where_light_grazes_a_smooth_sphere(void **st
 }
 
 static void samples_are_valid_by_where_their_facets_are(void **state) {
-    (void)state;
     static const double FACE = 0.953, CLEAR = 1e-4;
     box wall;
     make_box(&wall, (double[]){FACE, -2.0, -2.0}, (double[]){3.0, 2.0, 2.0});
@@ -253,7 +249,6 @@ static void samples_are_valid_by_where_their_facets_are(void **state) {
 
 /* A box just beyond the smooth sphere. */
 static void ao_close_to_a_wall_is_that_of_the_facets(void **state) {
-    (void)state;
     static const double FACE = 1.018;
     box over;
     make_box(&over, (double[]){FACE, -2.0, -2.0}, (double[]){3.0, 2.0, 2.0});
@@ -281,7 +276,6 @@ static void ao_close_to_a_wall_is_that_of_the_facets(void **state) {
 }
 
 static void ao_of_a_smooth_convex_body_in_the_open_is_1(void **state) {
-    (void)state;
     scene s;
     open_scene(&s, NULL);
     float *ao = calloc(TEXELS, sizeof *ao);
@@ -294,7 +288,6 @@ static void ao_of_a_smooth_convex_body_in_the_open_is_1(void **state) {
 }
 
 static void queries_take_the_normals_of_faces_for_ao(void **state) {
-    (void)state;
     scene s;
     open_scene(&s, NULL);
     vsh_error error = {VSH_OK, ""};
@@ -369,7 +362,6 @@ static double mean_ao_between_walls(const float *normals) {
  * walls.
  */
 static void leaning_normals_do_not_lift_ao_over_low_walls(void **state) {
-    (void)state;
     static const float SIN = 0.17364818f, COS = 0.98480775f;
     const float leaning[12] = {0.0f, -SIN, COS, 0.0f, -SIN, COS, 0.0f, SIN, COS, 0.0f, SIN, COS};
     const double flat = mean_ao_between_walls(NULL), bent = mean_ao_between_walls(leaning);
@@ -380,7 +372,6 @@ static void leaning_normals_do_not_lift_ao_over_low_walls(void **state) {
 
 /* A wall at growing distances from the sphere, under a wide sun that the facets' planes cut. */
 static void a_lift_fades_as_neighbours_come_near(void **state) {
-    (void)state;
     enum { WALLS = 40 };
     static const double FIRST = 1.0, STEP = 0.002;
     vsh_light light = sun_towards(0.0, 1.0, 0.0);
@@ -418,7 +409,6 @@ static void a_lift_fades_as_neighbours_come_near(void **state) {
 }
 
 static void a_light_changes_nothing_for_other_lights_and_ao(void **state) {
-    (void)state;
     scene s;
     open_scene(&s, NULL);
     const vsh_light lights[2] = {sun_towards(0.0, 1.0, 0.0), sun_towards(1.0, 0.0, 0.0)};

@@ -3,7 +3,6 @@
 #include "previews.h"
 
 static void a_floor_under_open_sky_is_exactly_lit(void **state) {
-    (void)state;
     vsh_field *field = floor_field(0);
     const vsh_mesh mesh = floor_mesh();
     vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
@@ -23,7 +22,6 @@ static void a_floor_under_open_sky_is_exactly_lit(void **state) {
 }
 
 static void texels_under_a_wall_are_invalid_and_nothing_leaks_on_either_side(void **state) {
-    (void)state;
     vsh_field *field = floor_field(1);
     const vsh_mesh mesh = floor_mesh();
     vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
@@ -65,7 +63,6 @@ static void texels_under_a_wall_are_invalid_and_nothing_leaks_on_either_side(voi
 }
 
 static void padding_copies_dark_and_lit_texels_and_leaves_coverage(void **state) {
-    (void)state;
     enum { PADDING = 3 };
     vsh_field *field = floor_field(1);
     /* The part x < -0.5 of the floor, all of it in shadow, and a chart around it. */
@@ -98,7 +95,6 @@ static void padding_copies_dark_and_lit_texels_and_leaves_coverage(void **state)
 }
 
 static void a_texel_is_the_mean_of_its_valid_samples(void **state) {
-    (void)state;
     enum { N = 3, SMALL = 16 };
     vsh_field *field = floor_field(1);
     const vsh_mesh mesh = floor_mesh();
@@ -128,7 +124,6 @@ static void a_texel_is_the_mean_of_its_valid_samples(void **state) {
 }
 
 static void a_lightmap_of_one_texel_is_the_value_at_its_middle(void **state) {
-    (void)state;
     vsh_field *field = floor_field(0);
     const vsh_mesh mesh = floor_mesh();
     vsh_charts *charts = make_texels(&mesh, 1, 1, 1, 4);
@@ -145,7 +140,6 @@ static void a_lightmap_of_one_texel_is_the_value_at_its_middle(void **state) {
 
 /* A UV sphere, smooth, of `ROWS` × 2 `ROWS` cells, as receiver and caster. */
 static void a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne(void **state) {
-    (void)state;
     enum { ROWS = 8, COLUMNS = 2 * ROWS, VERTICES = (ROWS + 1) * (COLUMNS + 1) };
     float positions[3 * VERTICES], uvs[2 * VERTICES];
     uint32_t indices[6 * ROWS * COLUMNS];
@@ -211,7 +205,6 @@ static void a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne(void **sta
 }
 
 static void an_open_sheet_does_not_shade_itself(void **state) {
-    (void)state;
     const vsh_mesh mesh = floor_mesh();
     vsh_grid_options options = vsh_grid_options_default();
     options.voxel_size = VOXEL;
@@ -239,7 +232,6 @@ static void an_open_sheet_does_not_shade_itself(void **state) {
 /* --- How a lightmap is baked: its planes, their errors, threads, options, limits. */
 
 static void irradiance_is_visibility_times_colour_times_cosine_times_ao(void **state) {
-    (void)state;
     vsh_field *field = floor_field(1);
     const vsh_mesh mesh = floor_mesh();
     vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
@@ -268,7 +260,6 @@ static void irradiance_is_visibility_times_colour_times_cosine_times_ao(void **s
 }
 
 static void planes_that_are_not_asked_for_cost_nothing_and_change_nothing(void **state) {
-    (void)state;
     vsh_field *field = floor_field(1);
     const vsh_mesh mesh = floor_mesh();
     vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 2);
@@ -296,7 +287,6 @@ static void planes_that_are_not_asked_for_cost_nothing_and_change_nothing(void *
 }
 
 static void any_number_of_threads_gives_the_same_bits(void **state) {
-    (void)state;
     vsh_field *field = floor_field(1);
     const vsh_mesh mesh = floor_mesh();
     vsh_charts *charts = make_texels(&mesh, 1, SIZE, 3, 4);
@@ -319,12 +309,10 @@ static void any_number_of_threads_gives_the_same_bits(void **state) {
 }
 
 static int32_t stop_in_bake(void *user, const char *stage, double fraction) {
-    (void)user;
     return strcmp(stage, "bake") == 0 && fraction > 0.0;
 }
 
 static void bad_options_limits_and_cancelling_are_reported(void **state) {
-    (void)state;
     vsh_field *field = floor_field(1);
     const vsh_mesh mesh = floor_mesh();
     vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
@@ -384,7 +372,6 @@ static vsh_bake_stats bake_errors(int32_t method, float *shadow, float *shadow_e
 }
 
 static void errors_are_baked_where_the_method_knows_them(void **state) {
-    (void)state;
     static float shadow[TEXELS], errors[TEXELS], alone[TEXELS], ao[TEXELS];
     const vsh_bake_stats stats = bake_errors(VSH_SHADOW_ADAPTIVE, shadow, errors, ao);
     size_t some = 0, none = 0;

@@ -108,14 +108,12 @@ static void lay_plane(image *m, double along, double down) {
 }
 
 static void texels_of_a_plane_hang_together(void **state) {
-    (void)state;
     static image m;
     lay_plane(&m, 0.03, 0.03);
     assert_links(&m, always);
 }
 
 static void stretched_charts_hang_together(void **state) {
-    (void)state;
     static image m;
     lay_plane(&m, 0.09, 0.03);
     assert_links(&m, always);
@@ -125,7 +123,6 @@ static void stretched_charts_hang_together(void **state) {
 
 /* A cylinder of 60 texels around, whose neighbours' normals are 6 degrees apart. */
 static void round_things_hang_together(void **state) {
-    (void)state;
     static image m;
     for (int32_t y = 0; y < HEIGHT; ++y) {
         for (int32_t x = 0; x < WIDTH; ++x) {
@@ -138,7 +135,6 @@ static void round_things_hang_together(void **state) {
 
 /* A floor whose chart goes on up a wall, in the image as in the world. */
 static void nothing_hangs_together_over_a_crease(void **state) {
-    (void)state;
     static image m;
     for (int32_t y = 0; y < HEIGHT; ++y) {
         for (int32_t x = 0; x < WIDTH; ++x) {
@@ -163,7 +159,6 @@ static void lay_pieces(image *m, double gap, bool turned) {
 }
 
 static void charts_that_touch_but_lie_apart_do_not(void **state) {
-    (void)state;
     static image m;
     static const double gaps[] = {1000.0, 10.0, 5.0, -5.0, -300.0};
     for (size_t g = 0; g < sizeof gaps / sizeof gaps[0]; ++g) {
@@ -178,7 +173,6 @@ static void charts_that_touch_but_lie_apart_do_not(void **state) {
 
 /* Fine texels beside coarse ones, whose step the one between them is not too long for. */
 static void charts_of_other_sizes_that_touch_do_not(void **state) {
-    (void)state;
     static image m;
     for (int32_t k = 0; k < 4; ++k) {
         const bool turned = k >= 2, coarse_first = (k & 1) != 0;
@@ -213,7 +207,6 @@ static bool in_one_lower_column(int32_t x0, int32_t y0, int32_t x1, int32_t y1) 
 
 /* Charts a texel wide, of which each has but one other step that tells how long they are; or of a texel. */
 static void strips_that_touch_but_lie_apart_do_not(void **state) {
-    (void)state;
     static image m;
     static expected_fn *const expected[2][2] = {{in_one_row, in_one_later_row},
                                                 {in_one_column, in_one_lower_column}};
@@ -232,7 +225,6 @@ static void strips_that_touch_but_lie_apart_do_not(void **state) {
 
 /* Two floors, one half a texel over the other or more. */
 static void nothing_hangs_together_over_a_step_in_height(void **state) {
-    (void)state;
     static image m;
     static const double heights[] = {0.05, 0.1, 0.3, -0.05, -2.0};
     for (size_t h = 0; h < sizeof heights / sizeof heights[0]; ++h) {
@@ -247,7 +239,6 @@ static void nothing_hangs_together_over_a_step_in_height(void **state) {
 
 /* The two sides of a sheet, laid out beside each other. */
 static void sides_of_a_sheet_do_not_hang_together(void **state) {
-    (void)state;
     static image m;
     for (int32_t y = 0; y < HEIGHT; ++y) {
         for (int32_t x = 0; x < WIDTH; ++x) {
@@ -266,7 +257,6 @@ static bool without_holes(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
 }
 
 static void texels_without_a_point_hang_together_with_none(void **state) {
-    (void)state;
     static image m;
     lay_plane(&m, 0.03, 0.03);
     for (int32_t i = 0; i < TEXELS; ++i) {
@@ -278,7 +268,6 @@ static void texels_without_a_point_hang_together_with_none(void **state) {
 /* A column of texels without points, as under the wall of a shed, lies between those of a lattice. */
 static void lattices_do_not_hang_together_over_a_gap_between_their_texels(void **state) {
     enum { SPACING = 4, GAP = 10, COLUMNS = WIDTH / SPACING, ROWS = HEIGHT / SPACING };
-    (void)state;
     static image m;
     lay_plane(&m, 0.03, 0.03);
     for (int32_t y = 0; y < HEIGHT; ++y) {

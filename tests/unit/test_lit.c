@@ -102,7 +102,6 @@ static void assert_shows(const char *path, const vsh_model *model, const vsh_lit
 
 /* tests/models as they are, and the rich one. */
 static void lit_by_their_own_uvs_files_change_in_their_materials_alone(void **state) {
-    (void)state;
     static const char *const names[] = {"scene.glb", "figure.glb", "scene.gltf", "scene_draco.glb"};
     const vsh_lit_image image = white_image(VSH_LIT_OCCLUSION, 0);
     const vsh_lit_options options = options_of(&image, 1);
@@ -130,7 +129,6 @@ static void lit_by_their_own_uvs_files_change_in_their_materials_alone(void **st
 }
 
 static void new_uvs_leave_all_other_accessors_alone(void **state) {
-    (void)state;
     asset in = write_rich("in.glb");
     vsh_model *model = read_model(path_of("in.glb").text);
     vsh_lit_mesh *lit = make_all_lit(model, false);
@@ -191,7 +189,6 @@ static void assert_gathered(const asset *in, const asset *out, size_t from, size
 }
 
 static void split_vertices_take_all_their_attributes_along(void **state) {
-    (void)state;
     static const struct {
         const char *name;
         size_t size;
@@ -253,7 +250,6 @@ static void assert_same_floats(const asset *in, const asset *out, size_t accesso
 /* Bytes that only replaced vertices had are dropped, where no extension is unknown that may refer to them; no
  * index of what stays changes. */
 static void replaced_vertices_are_dropped_where_nobody_else_can_use_them(void **state) {
-    (void)state;
     size_t sizes[2], accessors[2], image_view = 0;
     for (int known = 0; known < 2; ++known) {
         asset in = make_rich();
@@ -314,7 +310,6 @@ static void replaced_vertices_are_dropped_where_nobody_else_can_use_them(void **
 }
 
 static void instances_become_nodes_where_their_uvs_differ(void **state) {
-    (void)state;
     asset in = write_rich("in.glb");
     vsh_model *model = read_model(path_of("in.glb").text);
     const vsh_lit_image image = white_image(VSH_LIT_OCCLUSION, 0);
@@ -369,7 +364,6 @@ static void put_on_pages(vsh_lit_mesh *lit, size_t count) {
 }
 
 static void primitives_on_two_pages_become_two(void **state) {
-    (void)state;
     static const uint32_t pages[2] = {0, 1};
     for (int split = 0; split < 2; ++split) {
         asset in = write_rich("in.glb");
@@ -413,7 +407,6 @@ static void primitives_on_two_pages_become_two(void **state) {
 
 /* Documents of other formats keep all triangles, their places and the first set. The second set is new. */
 static void other_formats_become_documents(void **state) {
-    (void)state;
     static const char *const names[] = {"scene.obj", "scene.ply", "scene.stl",
                                         "scene.fbx", "scene.dae", "figure.fbx"};
     const vsh_lit_image image = white_image(VSH_LIT_PREVIEW, 0);
@@ -443,7 +436,6 @@ static void other_formats_become_documents(void **state) {
 }
 
 static void compressed_primitives_that_change_are_written_plain(void **state) {
-    (void)state;
     char path[512];
     snprintf(path, sizeof path, "%s/scene_draco.glb", VSH_MODELS);
     const vsh_lit_image image = white_image(VSH_LIT_OCCLUSION, 0);

@@ -96,7 +96,6 @@ static void assert_shown(const asset *out, int purposes) {
 }
 
 static void what_a_bake_made_is_replaced_by_the_next_to_the_same_file(void **state) {
-    (void)state;
     asset in = make_scene(), one = light_again(&in, OCCLUSION | LIGHTMAP, 1);
     assert_own_kept(&in, &one);
     assert_shown(&one, OCCLUSION | LIGHTMAP);
@@ -122,7 +121,6 @@ static void what_a_bake_made_is_replaced_by_the_next_to_the_same_file(void **sta
 }
 
 static void fewer_pages_leave_fewer_textures(void **state) {
-    (void)state;
     asset in = make_scene(), two = light_again(&in, OCCLUSION | LIGHTMAP, 2);
     asset one = light_again(&in, OCCLUSION | LIGHTMAP, 1);
     assert_int_equal(count_of(&two, "textures"), 6);
@@ -149,7 +147,6 @@ static void fewer_pages_leave_fewer_textures(void **state) {
 }
 
 static void what_others_use_or_made_stays(void **state) {
-    (void)state;
     static const char *const nothing[] = {NULL}, *const source[] = {"source", NULL};
     asset in = make_scene(), one = light_again(&in, LIGHTMAP, 1);
     const json_int_t image = (json_int_t)number_of(item_of(&one, "textures", 2), "source");
@@ -185,7 +182,6 @@ static void what_others_use_or_made_stays(void **state) {
 
 /* What pads an image to whole eights of bytes goes with it, unless something begins there. */
 static void bytes_that_begin_where_those_of_a_bake_end_stay(void **state) {
-    (void)state;
     static const unsigned char bytes[12] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
     asset in = make_scene(), one = light_again(&in, LIGHTMAP, 1);
     const json_t *last = item_of(&one, "bufferViews", count_of(&one, "bufferViews") - 1);
@@ -204,7 +200,6 @@ static void bytes_that_begin_where_those_of_a_bake_end_stay(void **state) {
 }
 
 static void beside_an_extension_that_is_not_known_all_stays(void **state) {
-    (void)state;
     asset in = make_scene(), one = light_again(&in, LIGHTMAP, 1);
     put_item(&one, "extensionsUsed", json_string("VENDOR_skylights"));
     json_object_set_new(one.root, "extensions", parsed("{\"VENDOR_skylights\":{\"texture\":2}}"));
@@ -220,7 +215,6 @@ static void beside_an_extension_that_is_not_known_all_stays(void **state) {
 
 /* A number of another list, in a material of an extension that is known by its beginning. */
 static void numbers_in_extensions_of_materials_stay_as_they_are(void **state) {
-    (void)state;
     asset in = make_scene(), one = light_again(&in, LIGHTMAP, 1);
     json_t *extensions = json_object_get(json_array_get(list_of(&one, "materials"), 0), "extensions");
     put_item(&one, "extensionsUsed", json_string("KHR_materials_woven"));
@@ -237,7 +231,6 @@ static void numbers_in_extensions_of_materials_stay_as_they_are(void **state) {
 }
 
 static void files_that_were_made_are_left_and_no_longer_named(void **state) {
-    (void)state;
     asset in = make_scene();
     write_glb(&in, "in.glb");
     light_file("in.glb", LIGHTMAP, 1, VSH_LIT_IMAGES_BESIDE, "lit.gltf", NULL);

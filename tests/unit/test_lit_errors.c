@@ -74,7 +74,6 @@ static json_t *at_path(json_t *value, const char *path) {
 
 /* What the model does not read, or what has changed since, is found all the same. */
 static void damaged_documents_are_refused(void **state) {
-    (void)state;
     static const struct {
         const char *object, *key, *value, *part;
     } damages[] = {
@@ -133,7 +132,6 @@ static void damaged_documents_are_refused(void **state) {
 }
 
 static void sparse_indices_out_of_range_are_refused(void **state) {
-    (void)state;
     sound s = make_sound();
     const size_t target =
         number_of(json_array_get(json_object_get(primitive_of(&s.in, 0, 0), "targets"), 0), "POSITION");
@@ -150,7 +148,6 @@ static void sparse_indices_out_of_range_are_refused(void **state) {
 
 /* As many triangles of as many vertices, one of which is turned over. */
 static void other_triangles_than_the_models_are_refused(void **state) {
-    (void)state;
     sound s = make_sound();
     const size_t accessor = number_of(primitive_of(&s.in, 1, 0), "indices");
     unsigned char *indices = s.in.bytes + (element_of(&s.in, accessor, 0, 2) - s.in.bytes);
@@ -165,7 +162,6 @@ static void other_triangles_than_the_models_are_refused(void **state) {
 }
 
 static void cut_files_are_refused_at_every_length(void **state) {
-    (void)state;
     sound s = make_sound();
     size_t size;
     unsigned char *bytes = load_bytes(path_of("in.glb").text, &size);
@@ -180,7 +176,6 @@ static void cut_files_are_refused_at_every_length(void **state) {
 
 /* Whatever a byte becomes, it is a sound file or a refusal. */
 static void flipped_bytes_end_in_a_file_or_a_reason(void **state) {
-    (void)state;
     enum { TRIES = 500 };
     sound s = make_sound();
     size_t size, written = 0;
@@ -212,7 +207,6 @@ static void flipped_bytes_end_in_a_file_or_a_reason(void **state) {
 }
 
 static void missing_buffers_are_refused(void **state) {
-    (void)state;
     sound s = make_sound();
     json_object_set_new(json_array_get(json_object_get(s.in.root, "buffers"), 0), "uri",
                         json_string("gone.bin"));
@@ -235,7 +229,6 @@ static void missing_buffers_are_refused(void **state) {
 /* --- callers */
 
 static void atlases_that_do_not_fit_are_refused(void **state) {
-    (void)state;
     sound s = make_sound();
     vsh_lit_mesh *lit = &s.lit[0];
     const vsh_lit_mesh good = *lit;
@@ -281,7 +274,6 @@ static void atlases_that_do_not_fit_are_refused(void **state) {
 }
 
 static void images_out_of_range_are_refused(void **state) {
-    (void)state;
     static const float value[1] = {1.0F};
     static const float *const one[1] = {value};
     sound s = make_sound();
@@ -322,7 +314,6 @@ static void images_out_of_range_are_refused(void **state) {
 }
 
 static void outputs_that_are_inputs_are_refused(void **state) {
-    (void)state;
     sound s = make_sound();
     vsh_error error = {0};
     assert_int_equal(
@@ -339,7 +330,6 @@ static void outputs_that_are_inputs_are_refused(void **state) {
 
 /* What another document may use too. */
 static void files_of_the_input_are_not_replaced_but_others_named(void **state) {
-    (void)state;
     sound s = make_sound();
     vsh_error error = {0};
     write_bytes("all.bin", s.in.bytes, s.in.size);
@@ -365,12 +355,10 @@ static void files_of_the_input_are_not_replaced_but_others_named(void **state) {
 }
 
 static int32_t stop(void *user, const char *stage, double fraction) {
-    (void)stage;
     return fraction >= *(double *)user;
 }
 
 static void limits_and_cancelling_leave_the_old_file(void **state) {
-    (void)state;
     sound s = make_sound();
     vsh_run run = vsh_run_default();
     vsh_error error = {0};

@@ -53,7 +53,6 @@ static asset write_scene(const vsh_lit_image *images, size_t count) {
 }
 
 static void planes_become_images_of_their_values(void **state) {
-    (void)state;
     float grey[TEXELS], light[3][TEXELS];
     for (int i = 0; i < TEXELS; ++i) {
         grey[i] = (float)i / (TEXELS - 1);
@@ -103,7 +102,6 @@ static void planes_become_images_of_their_values(void **state) {
 }
 
 static void previews_are_unlit_base_colour_of_srgb(void **state) {
-    (void)state;
     float grey[TEXELS];
     double expected[TEXELS];
     for (int i = 0; i < TEXELS; ++i) {
@@ -132,7 +130,6 @@ static void previews_are_unlit_base_colour_of_srgb(void **state) {
 /* --- materials */
 
 static void materials_are_copied_only_where_they_must(void **state) {
-    (void)state;
     asset in = make_rich();
     write_glb(&in, "in.glb");
     vsh_model *model = read_model(path_of("in.glb").text);
@@ -179,7 +176,6 @@ static void materials_are_copied_only_where_they_must(void **state) {
 }
 
 static void cut_out_materials_have_no_preview(void **state) {
-    (void)state;
     asset in = make_rich();
     json_object_set_new(json_array_get(json_object_get(in.root, "materials"), 0), "alphaMode",
                         json_string("MASK"));
@@ -205,7 +201,6 @@ static void cut_out_materials_have_no_preview(void **state) {
 /* --- where they go */
 
 static void images_go_beside_a_gltf_with_its_buffer(void **state) {
-    (void)state;
     static const uint32_t pages[2] = {0, 1};
     asset in = make_rich();
     write_glb(&in, "in.glb");
@@ -253,7 +248,6 @@ static void images_go_beside_a_gltf_with_its_buffer(void **state) {
 }
 
 static void images_come_along_into_another_folder(void **state) {
-    (void)state;
     asset in = make_rich();
     json_array_append_new(json_object_get(in.root, "images"), parsed("{\"uri\":\"gone.png\"}"));
     json_array_append_new(json_object_get(in.root, "images"), parsed("{\"uri\":\"link.png\"}"));
@@ -293,7 +287,6 @@ static void images_come_along_into_another_folder(void **state) {
 /* --- the reader */
 
 static void draco_is_decoded_by_a_reader_to_the_same_bytes(void **state) {
-    (void)state;
     char path[512];
     snprintf(path, sizeof path, "%s/scene_draco.glb", VSH_MODELS);
     vsh_model *model = read_model(path);

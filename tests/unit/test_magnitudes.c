@@ -83,7 +83,6 @@ static void assert_alike(const char *where, double at, const picture *a, const p
 
 /* Scales that are no powers of two: sums round elsewhere. */
 static void voxels_from_1e_12_to_1e12_give_the_same_picture(void **state) {
-    (void)state;
     static picture middle, there;
     floor_texels(SIDE, positions, normals);
     bake_floor(1.0, NOWHERE, &middle);
@@ -95,7 +94,6 @@ static void voxels_from_1e_12_to_1e12_give_the_same_picture(void **state) {
 }
 
 static void voxels_beyond_the_ends_are_refused_by_size(void **state) {
-    (void)state;
     const double voxels[] = {0.9e-12, 1e-30, 1.1e12, 1e30};
     for (size_t v = 0; v < sizeof voxels / sizeof voxels[0]; ++v) {
         vsh_sdf_node node = vsh_sdf_node_default();
@@ -112,7 +110,6 @@ static void voxels_beyond_the_ends_are_refused_by_size(void **state) {
 }
 
 static void far_from_the_origin_the_picture_stays(void **state) {
-    (void)state;
     static picture middle, there;
     floor_texels(SIDE, positions, normals);
     bake_floor(1.0, NOWHERE, &middle);
@@ -130,7 +127,6 @@ static void far_from_the_origin_the_picture_stays(void **state) {
 
 /* Bands wider than 6 voxels are cut: the field makes its levels from them. */
 static void half_widths_from_6_to_100_give_the_same_picture_and_3_one_as_near_the_truth(void **state) {
-    (void)state;
     static picture at_6, there;
     static float truth[2][COUNT], outside[COUNT];
     const double up[3] = {0.0, 1.0, 0.0};
@@ -207,7 +203,6 @@ static void half_widths_from_6_to_100_give_the_same_picture_and_3_one_as_near_th
 }
 
 static void ao_distances_below_a_voxel_and_above_the_scene_are_what_they_say(void **state) {
-    (void)state;
     const truth_solid solids[2] = {{TRUTH_BOX, {0.0, -0.5, 0.0}, {2.0, 0.5, 2.0}, 0.0, 0.0},
                                    {TRUTH_BOX, {-1.5, 1.0, 0.0}, {0.5, 1.0, 2.0}, 0.0, 0.0}};
     const truth_scene scene = {solids, 2};
@@ -253,7 +248,6 @@ static void ao_distances_below_a_voxel_and_above_the_scene_are_what_they_say(voi
 /* A bar of 30 000 voxels, and a ray along it so near to its face that each step is the least one, a quarter
  * of a voxel: the distance along the ray is what is sampled at, so nothing adds up. */
 static void a_hundred_thousand_least_steps_lose_nothing(void **state) {
-    (void)state;
     const double length = 30000.0;
     const truth_solid bar = {TRUTH_BOX, {0.0, -4.0, 0.0}, {0.5 * length, 4.0, 4.0}, 0.0, 0.0};
     vsh_field *field = field_of((truth_scene){&bar, 1}, 1.0, 8.0);

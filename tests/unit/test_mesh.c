@@ -44,7 +44,6 @@ static void assert_near(double value, double expected, double tolerance) {
 }
 
 static void a_cube_is_closed(void **state) {
-    (void)state;
     const vsh_mesh mesh = cube();
     const vsh_mesh_report report = check(&mesh);
     assert_int_equal(report.open_edges, 0);
@@ -59,7 +58,6 @@ static void a_cube_is_closed(void **state) {
 
 /* Every triangle with vertices of its own, every other zero negative. */
 static void split_vertices_and_negative_zeros_open_nothing(void **state) {
-    (void)state;
     float positions[36][3];
     uint32_t indices[36];
     for (uint32_t i = 0; i < 36; ++i) {
@@ -77,7 +75,6 @@ static void split_vertices_and_negative_zeros_open_nothing(void **state) {
 }
 
 static void a_cube_without_its_top_has_four_open_edges(void **state) {
-    (void)state;
     vsh_mesh mesh = cube();
     mesh.triangle_count = 10;
     const vsh_mesh_report report = check(&mesh);
@@ -87,7 +84,6 @@ static void a_cube_without_its_top_has_four_open_edges(void **state) {
 }
 
 static void a_flipped_face_has_its_four_sides_flipped(void **state) {
-    (void)state;
     uint32_t indices[12][3];
     memcpy(indices, cube_indices, sizeof indices);
     for (int i = 10; i < 12; ++i) {
@@ -103,7 +99,6 @@ static void a_flipped_face_has_its_four_sides_flipped(void **state) {
 
 /* Two cubes that share the edge x = y = 1: four triangles meet there, two each way. */
 static void two_cubes_touching_along_an_edge_are_closed_and_agree(void **state) {
-    (void)state;
     float positions[16][3];
     uint32_t indices[24][3];
     for (int i = 0; i < 16; ++i) {
@@ -124,7 +119,6 @@ static void two_cubes_touching_along_an_edge_are_closed_and_agree(void **state) 
 }
 
 static void degenerate_triangles_are_counted_and_change_nothing_else(void **state) {
-    (void)state;
     float positions[11][3] = {{0}};
     memcpy(positions, cube_positions, sizeof cube_positions);
     for (int i = 0; i < 3; ++i) {
@@ -145,7 +139,6 @@ static void degenerate_triangles_are_counted_and_change_nothing_else(void **stat
 /* The top's front edge is cut at (1/2, 0, 1), that of the front is not: the triangle (4, 8, 5) closes the
  * gap. */
 static void a_flat_triangle_that_joins_a_cut_edge_closes_the_mesh(void **state) {
-    (void)state;
     float positions[9][3];
     memcpy(positions, cube_positions, sizeof cube_positions);
     memcpy(positions[8], (float[3]){0.5F, 0.0F, 1.0F}, sizeof positions[8]);
@@ -166,7 +159,6 @@ static void a_flat_triangle_that_joins_a_cut_edge_closes_the_mesh(void **state) 
 }
 
 static void an_empty_mesh_has_empty_bounds(void **state) {
-    (void)state;
     vsh_mesh mesh = cube();
     mesh.triangle_count = 0;
     const vsh_mesh_report report = check(&mesh);
@@ -180,7 +172,6 @@ static void an_empty_mesh_has_empty_bounds(void **state) {
 static const double turned[12] = {0, -3, 0, 100, 2, 0, 0, 200, 0, 0, 4, 300};
 
 static void area_and_bounds_are_of_the_world(void **state) {
-    (void)state;
     vsh_mesh mesh = cube();
     mesh.transform = turned;
     const vsh_mesh_report report = check(&mesh);
@@ -205,7 +196,6 @@ static double volume(const vsh_mesh *mesh) {
 }
 
 static void a_mirrored_transform_keeps_the_outside_outside(void **state) {
-    (void)state;
     const double mirrored[12] = {-2, 0, 0, 0, 0, 3, 0, 0, 0, 0, 4, 0};
     vsh_mesh mesh = cube();
     assert_near(volume(&mesh), 1.0, 1e-12);
@@ -232,7 +222,6 @@ static void refused(const vsh_mesh *mesh, vsh_result code, const char *part, con
 }
 
 static void vertices_that_are_not_finite_are_refused_by_number(void **state) {
-    (void)state;
     static const float bad[] = {NAN, INFINITY, -INFINITY};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
         float positions[8][3];
@@ -245,7 +234,6 @@ static void vertices_that_are_not_finite_are_refused_by_number(void **state) {
 }
 
 static void an_index_out_of_range_is_refused_by_number(void **state) {
-    (void)state;
     uint32_t indices[12][3];
     memcpy(indices, cube_indices, sizeof indices);
     indices[7][2] = 99;
@@ -257,7 +245,6 @@ static void an_index_out_of_range_is_refused_by_number(void **state) {
 }
 
 static void transforms_that_flatten_or_are_not_finite_are_refused(void **state) {
-    (void)state;
     double transform[12];
     vsh_mesh mesh = cube();
     mesh.transform = transform;
@@ -278,7 +265,6 @@ static void transforms_that_flatten_or_are_not_finite_are_refused(void **state) 
 }
 
 static void arrays_that_are_missing_are_refused(void **state) {
-    (void)state;
     vsh_mesh mesh = cube();
     mesh.indices = NULL;
     refused(&mesh, VSH_ERROR_ARGUMENT, "'cube'", "indices");
@@ -292,7 +278,6 @@ static void arrays_that_are_missing_are_refused(void **state) {
 }
 
 static void labels_say_name_or_number_and_keep_whole_characters(void **state) {
-    (void)state;
     vsh_mesh mesh = {.name = "sail"};
     assert_string_equal(vshi_mesh_label(&mesh, 3).text, "mesh 'sail'");
     mesh.name = "";
@@ -313,7 +298,6 @@ static void labels_say_name_or_number_and_keep_whole_characters(void **state) {
 
 /* A closed grid: two sheets of n × n quads over each other, joined at the rim. */
 static void a_million_triangles_take_about_a_second(void **state) {
-    (void)state;
     enum { N = 500, SIDE = N + 1 };
     float *positions = malloc(2 * SIDE * SIDE * sizeof(float[3]));
     uint32_t *indices = malloc((4 * N * N + 8 * N) * sizeof(uint32_t[3]));
@@ -361,7 +345,6 @@ static void a_million_triangles_take_about_a_second(void **state) {
 }
 
 static void names_match_patterns_as_in_a_shell(void **state) {
-    (void)state;
     static const struct {
         const char *name, *pattern;
         int match;
@@ -414,7 +397,6 @@ static void names_match_patterns_as_in_a_shell(void **state) {
 }
 
 static void a_pattern_of_many_stars_takes_no_time(void **state) {
-    (void)state;
     char name[4001], pattern[2002];
     memset(name, 'a', sizeof name - 1);
     name[sizeof name - 1] = '\0';

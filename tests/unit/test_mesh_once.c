@@ -86,18 +86,15 @@ static void bake(const char *method) {
 }
 
 static void a_bake_checks_and_welds_each_mesh_once(void **state) {
-    (void)state;
     bake("adaptive");
 }
 
 static void so_does_one_that_traces_triangles(void **state) {
-    (void)state;
     bake("exact");
 }
 
 /* The calls that take arrays of meshes, too. */
 static void occluders_of_arrays_are_checked_and_welded_once(void **state) {
-    (void)state;
     static const float positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
     static const uint32_t indices[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
     const vsh_mesh mesh = {

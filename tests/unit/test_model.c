@@ -29,7 +29,6 @@ static void assert_quad_uvs(const vsh_mesh *mesh, float scale) {
 }
 
 static void uvs_point_up_whatever_the_format(void **state) {
-    (void)state;
     char gltf[4096];
     quad_gltf(gltf, one_node, NULL, 3);
     unsigned char glb[8192];
@@ -60,7 +59,6 @@ static void uvs_point_up_whatever_the_format(void **state) {
 }
 
 static void the_second_uv_set_is_the_default(void **state) {
-    (void)state;
     char gltf[4096];
     quad_gltf(gltf, one_node, NULL, 3);
     vsh_model *model = read_text("sets.gltf", gltf);
@@ -84,7 +82,6 @@ static void the_second_uv_set_is_the_default(void **state) {
 }
 
 static void nodes_are_instances_that_share_arrays(void **state) {
-    (void)state;
     char gltf[4096];
     quad_gltf(gltf, instances, NULL, 3);
     vsh_model *model = read_text("instances.gltf", gltf);
@@ -117,7 +114,6 @@ static void nodes_are_instances_that_share_arrays(void **state) {
 }
 
 static void a_node_scaled_to_nothing_is_left_out_with_a_warning(void **state) {
-    (void)state;
     char gltf[4096];
     quad_gltf(gltf,
               "{\"children\":[1,2]},{\"name\":\"hidden\",\"mesh\":0,\"scale\":[0,0,0]},"
@@ -133,7 +129,6 @@ static void a_node_scaled_to_nothing_is_left_out_with_a_warning(void **state) {
 }
 
 static void meshes_objects_and_polygons_become_triangles_and_lines_are_dropped(void **state) {
-    (void)state;
     vsh_model *model =
         read_text("parts.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 0.25 0\n"
                                "vn 0 0 2\no first\nf 1//1 2//1 3//1\no second\nf 1 5 2 3 4\nl 1 2\n"
@@ -152,7 +147,6 @@ static void meshes_objects_and_polygons_become_triangles_and_lines_are_dropped(v
 
 /* An FBX says what its numbers are in; a Collada file, too (test_exported.c). */
 static void an_fbx_is_in_metres(void **state) {
-    (void)state;
     static const struct {
         const char *factor;
         double metres;
@@ -170,7 +164,6 @@ static void an_fbx_is_in_metres(void **state) {
 
 /* Twelve triangles with corners of their own, as STL has them. */
 static void a_cube_in_stl_is_closed(void **state) {
-    (void)state;
     static const uint8_t corners[36] = {0, 2, 3, 0, 3, 1, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3,
                                         0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5, 4, 5, 7, 4, 7, 6};
     float positions[36][3];
@@ -196,7 +189,6 @@ static void a_cube_in_stl_is_closed(void **state) {
 }
 
 static void binary_ply_of_either_byte_order_is_read(void **state) {
-    (void)state;
     for (int big_endian = 0; big_endian < 2; ++big_endian) {
         unsigned char bytes[1024];
         vsh_model *model = read_good("binary.ply", bytes, binary_ply(bytes, big_endian));
@@ -210,7 +202,6 @@ static void binary_ply_of_either_byte_order_is_read(void **state) {
 /* --- Model files that are wrong, cut, too large or not there; cancelling. */
 
 static void bad_obj_is_refused_with_line_and_value(void **state) {
-    (void)state;
 #define CORNERS "v 0 0 0\nv 1 0 0\nv 1 1 0\n"
     refused("a.obj", "v nan 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n", VSH_ERROR_INPUT, "line 1", "'nan'");
     refused("a.obj", "v 0 0 0\nv 1 -inf 0\nv 1 1 0\nf 1 2 3\n", VSH_ERROR_INPUT, "line 2", "'-inf'");
@@ -233,7 +224,6 @@ static void bad_obj_is_refused_with_line_and_value(void **state) {
 }
 
 static void bad_ply_and_stl_are_refused(void **state) {
-    (void)state;
 #define HEAD(n)                                                                                              \
     "ply\nformat ascii 1.0\nelement vertex " n "\nproperty float x\nproperty float y\nproperty float z\n"    \
     "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
@@ -268,7 +258,6 @@ static void bad_ply_and_stl_are_refused(void **state) {
 
 /* By their endings, and by their first bytes whatever the ending. */
 static void alembic_and_usd_are_refused_by_name(void **state) {
-    (void)state;
     static const char *const endings[] = {"a.usd", "a.usda", "a.USDC", "a.usdz"};
     for (size_t i = 0; i < sizeof endings / sizeof endings[0]; ++i) {
         refused(endings[i], "anything", VSH_ERROR_INPUT, "is a USD file",
@@ -294,7 +283,6 @@ static void alembic_and_usd_are_refused_by_name(void **state) {
 }
 
 static void bad_gltf_is_refused(void **state) {
-    (void)state;
     char gltf[4096];
     quad_gltf(gltf, one_node, (float[]){1, NAN, 0}, 3);
     refused("a.gltf", gltf, VSH_ERROR_INPUT, "'quad'", "vertex 2");
@@ -312,7 +300,6 @@ static void bad_gltf_is_refused(void **state) {
 }
 
 static void files_that_cannot_be_read_say_why(void **state) {
-    (void)state;
     vsh_model *model;
     vsh_error error = {0};
     assert_int_equal(vsh_model_read(path_of("missing.obj").text, NULL, &model, &error), VSH_ERROR_READ);
@@ -334,7 +321,6 @@ static void files_that_cannot_be_read_say_why(void **state) {
 }
 
 static void the_memory_limit_is_checked(void **state) {
-    (void)state;
     write_bytes("limit.obj", quad_obj, strlen(quad_obj));
     vsh_run run = vsh_run_default();
     vsh_model *model;
@@ -363,7 +349,6 @@ static int32_t watch_progress(void *user, const char *stage, double fraction) {
 }
 
 static void progress_rises_to_one_and_can_cancel_anywhere(void **state) {
-    (void)state;
     static const double stops[] = {2.0, 0.0, 0.1, 0.5, 0.99, 1.0};
     write_bytes("watch.obj", quad_obj, strlen(quad_obj));
     for (size_t i = 0; i < sizeof stops / sizeof stops[0]; ++i) {
@@ -411,7 +396,6 @@ static void cut_everywhere(const char *name, const void *bytes, size_t size, boo
 }
 
 static void files_cut_at_any_length_do_no_harm(void **state) {
-    (void)state;
     char gltf[4096];
     quad_gltf(gltf, instances, NULL, 3);
     unsigned char bytes[8192];

@@ -49,7 +49,6 @@ static int kind_of_ao(int32_t method) {
 
 /* Of the methods that know the whole penumbra; the others' errors are their definition's. */
 static int measure_all_voxels(void **state) {
-    (void)state;
     place_floor();
     for (int kind = 0; kind < KINDS; ++kind) {
         for (int v = 0; v < VOXELS; ++v) {
@@ -97,7 +96,6 @@ static bool errors_are_of_voxels(int kind) {
 }
 
 static void finer_voxels_are_never_farther_from_the_truth(void **state) {
-    (void)state;
     for (int kind = 0; kind < KINDS; ++kind) {
         for (int v = 1; v < VOXELS && errors_are_of_voxels(kind); ++v) {
             if (rmse[kind][v] > rmse[kind][v - 1]) {
@@ -111,7 +109,6 @@ static void finer_voxels_are_never_farther_from_the_truth(void **state) {
 /* Where an error is the method's own, not the voxels', it wanders: by 8 % of itself and 0.002, a fortieth of
  * a penumbra. Exact sees no voxels but by what cones prove. */
 static void errors_that_are_the_methods_own_change_little_with_voxels(void **state) {
-    (void)state;
     for (int kind = 0; kind < KINDS; ++kind) {
         for (int v = 1; v < VOXELS; ++v) {
             assert_false(rmse[kind][v] >= 1.08 * rmse[kind][v - 1] + 0.002);
@@ -120,7 +117,6 @@ static void errors_that_are_the_methods_own_change_little_with_voxels(void **sta
 }
 
 static void rays_at_fine_voxels_keep_the_error_that_was_asked_for(void **state) {
-    (void)state;
     for (int w = 1; w < WIDTHS; ++w) {
         for (int32_t method = VSH_SHADOW_RAYS; method < shadow_methods(); ++method) {
             assert_true(rmse[kind_of_shadow(w, method)][VOXELS - 1] < 0.02);
@@ -130,7 +126,6 @@ static void rays_at_fine_voxels_keep_the_error_that_was_asked_for(void **state) 
 
 /* Rays, or the error that is asked for: four times the rays, or half of the error. */
 static void more_rays_are_never_farther_from_the_truth(void **state) {
-    (void)state;
     place_floor();
     caster c = caster_of(truth_seeds(), 0.02, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(0.1));
@@ -190,7 +185,6 @@ static double rise_of_ao(int32_t method) {
 
 /* A slab that grows from a sliver over half of the receivers to all of them, by less than a voxel a time. */
 static void a_growing_slab_hides_more(void **state) {
-    (void)state;
     enum { PLACES = 16, HIDDEN_KINDS = SHADOWS + VSH_AO_EXACT + 1 };
     const double up[3] = {0.0, 1.0, 0.0}, voxel = 0.04;
     const vsh_light light = sun(up, RADIANS(15.0));
@@ -247,7 +241,6 @@ static void a_growing_slab_hides_more(void **state) {
 
 /* A million units away: what is left of it is the rounding of its direction. */
 static void a_far_lamp_is_a_sun(void **state) {
-    (void)state;
     static float far[COUNT];
     place_floor();
     caster c = caster_of(truth_seeds(), 0.04, 0.0);

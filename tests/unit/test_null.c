@@ -30,12 +30,10 @@ static void expect_refused(const char *call, vsh_result result) {
 #define PLACE (void *)&made
 
 static double far_away(void *user, const double position[3]) {
-    (void)user;
     return position[0];
 }
 
 static void casters_are_not_made_of_nothing(void **state) {
-    (void)state;
     const double square[8] = {-1, -1, 1, -1, 1, 1, -1, 1},
                  transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     const size_t corners = 4;
@@ -105,7 +103,6 @@ static void casters_are_not_made_of_nothing(void **state) {
 }
 
 static void files_have_paths_and_places(void **state) {
-    (void)state;
     const int32_t low[3] = {0, 0, 0}, size[3] = {1, 1, 1};
     vsh_vdb_entry entry;
     size_t count;
@@ -149,7 +146,6 @@ static void files_have_paths_and_places(void **state) {
 }
 
 static void scenes_are_not_made_of_nothing(void **state) {
-    (void)state;
     const vsh_scene scene = {0};
     MAKES_NONE(vsh_assets_load(NULL, NULL, PLACE, &error));
     REFUSED(vsh_assets_load(&scene, NULL, NULL, &error));
@@ -185,7 +181,6 @@ static vsh_occluders *no_casters(void) {
 }
 
 static void nothing_is_shaded_without_what_it_takes(void **state) {
-    (void)state;
     vsh_occluders *casters = no_casters();
     const vsh_light light = vsh_light_default();
     const double positions[3] = {0, 0, 0};
@@ -231,7 +226,6 @@ static void nothing_is_shaded_without_what_it_takes(void **state) {
 }
 
 static void nothing_is_baked_without_what_it_takes(void **state) {
-    (void)state;
     vsh_occluders *casters = no_casters();
     vsh_voxels *voxels = NULL;
     vsh_volume *volume = NULL;
@@ -287,7 +281,6 @@ static void nothing_is_baked_without_what_it_takes(void **state) {
 }
 
 static void nothing_is_drawn_or_compared_without_what_it_takes(void **state) {
-    (void)state;
     vsh_occluders *casters = no_casters();
     const vsh_surface nothing = {NULL, {0.5, 0.5, 0.5}};
     const vsh_light light = vsh_light_default();

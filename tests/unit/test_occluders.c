@@ -17,7 +17,6 @@ static vsh_mesh plate(void) {
 }
 
 static void meshes_make_the_field_and_triangles_that_their_parts_make(void **state) {
-    (void)state;
     const vsh_mesh mesh = plate();
     vsh_occluders_options options = vsh_occluders_options_default();
     options.grid.resolution = 64;
@@ -59,7 +58,6 @@ static void meshes_make_the_field_and_triangles_that_their_parts_make(void **sta
 }
 
 static void bad_meshes_and_options_are_refused_with_nothing_made(void **state) {
-    (void)state;
     const vsh_mesh mesh = plate();
     vsh_mesh bad = mesh;
     bad.vertex_count = 5; /* indices beyond */
@@ -89,7 +87,6 @@ static void expect_refused(const vsh_occluder_parts *parts, const char *text) {
 }
 
 static void parts_that_are_none_are_refused_by_name(void **state) {
-    (void)state;
     const double ball[] = {0, 0, 0, 1};
     vsh_spheres *spheres = NULL;
     assert_int_equal(vsh_spheres_create(ball, 1, NULL, NULL, &spheres, &why), VSH_OK);
@@ -114,7 +111,6 @@ static void parts_that_are_none_are_refused_by_name(void **state) {
 }
 
 static void layers_alone_say_what_offsets_are_measured_in(void **state) {
-    (void)state;
     const double ball[] = {0, 0, 0, 1};
     vsh_spheres *spheres = NULL;
     assert_int_equal(vsh_spheres_create(ball, 1, NULL, NULL, &spheres, &why), VSH_OK);
@@ -151,7 +147,6 @@ static void layers_alone_say_what_offsets_are_measured_in(void **state) {
 }
 
 static void a_level_set_makes_the_field_that_vsh_field_create_makes(void **state) {
-    (void)state;
     const truth_solid solid = {.shape = TRUTH_SPHERE, .radius = 0.5};
     vsh_grid *grid = grid_of((truth_scene){&solid, 1}, 0.125);
     vsh_field_options options = vsh_field_options_default();
@@ -193,7 +188,6 @@ static float lit_under(const vsh_occluders *occluders, int32_t method, vsh_resul
 }
 
 static void auto_is_exact_where_triangles_are_kept_and_adaptive_where_not(void **state) {
-    (void)state;
     if (!vsh_triangles_available()) {
         skip();
     }
@@ -238,7 +232,6 @@ static vsh_occluders *of_scene(const char *text, const vsh_scene_occluders_optio
 #define BALL "{\"sdf\": {\"shape\": \"sphere\", \"radius\": 1}}"
 
 static void a_scene_keeps_the_truth_only_where_an_error_is_kept(void **state) {
-    (void)state;
     vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
     const struct {
         const char *text;
@@ -260,7 +253,6 @@ static void a_scene_keeps_the_truth_only_where_an_error_is_kept(void **state) {
 }
 
 static void a_box_without_a_half_is_refused(void **state) {
-    (void)state;
     const double corner[3] = {0, 0, 0};
     vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
     options.receivers_min = corner;
@@ -268,7 +260,6 @@ static void a_box_without_a_half_is_refused(void **state) {
 }
 
 static void more_layers_than_can_be_are_refused(void **state) {
-    (void)state;
     const double ball[4] = {0, 0, 0, 1};
     vsh_caster casters[VSH_MAX_LAYERS + 1] = {{.type = VSH_CASTER_SPHERES}};
     for (size_t i = 0; i <= VSH_MAX_LAYERS; ++i) {
@@ -297,7 +288,6 @@ static void more_layers_than_can_be_are_refused(void **state) {
 }
 
 static void a_default_caster_stands_where_its_file_says_and_a_zeroed_transform_is_named(void **state) {
-    (void)state;
     enum { COUNT = 2 };
     vsh_caster casters[COUNT] = {vsh_caster_default(), vsh_caster_default()};
     vsh_receiver receiver = vsh_receiver_default();
@@ -338,7 +328,6 @@ static void count_lost(void *user, const char *message) {
 }
 
 static void what_voxels_lose_is_told_where_they_decide_unless_they_are_a_trial(void **state) {
-    (void)state;
     static const struct {
         int32_t method, silent;
         bool told;

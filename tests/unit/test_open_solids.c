@@ -46,7 +46,6 @@ static const double BESIDE[][3] = {{1.001, 0, 0}, {-1.02, 0.4, 0}, {1.5, -1.2, 0
 enum { POINTS_BELOW = 5, POINTS_BESIDE = 4 };
 
 static void floors_below_houses_without_floors_are_hidden(void **state) {
-    (void)state;
     static const double THICKNESS[] = {0.0, 0.004, 0.01, 0.05, 0.1, 1.0}, SUNK[] = {0.0, 0.01, 0.3};
     shape *s = shape_new();
     for (size_t i = 0; i < sizeof THICKNESS / sizeof *THICKNESS; ++i) {
@@ -65,7 +64,6 @@ static void floors_below_houses_without_floors_are_hidden(void **state) {
 }
 
 static void walls_below_a_roof_hide_the_floor_and_a_pen_does_not(void **state) {
-    (void)state;
     const double low[3] = {-1.5, -1.5, 1.8}, high[3] = {1.5, 1.5, 2.0};
     shape *s = shape_new();
     add_ground(s, 0.0);
@@ -79,7 +77,6 @@ static void walls_below_a_roof_hide_the_floor_and_a_pen_does_not(void **state) {
 }
 
 static void contents_of_cups_are_seen(void **state) {
-    (void)state;
     static const double fruit[3] = {0.1, 0, 0.7}, top[][3] = {{0.1, 0, 1.3}},
                         coffee[][2] = {{0.99, 1.5}, {0, 1.5}};
     static const double surface[][3] = {{0, 0, 1.5}, {0.7, 0.2, 1.5}},
@@ -102,7 +99,6 @@ static void contents_of_cups_are_seen(void **state) {
 
 /* The house lacks a wall: the ground in it sees out by that side. */
 static void a_house_without_a_wall_shows_its_ground(void **state) {
-    (void)state;
     shape *s = shape_new();
     add_ground(s, 0.0);
     add_box(s, -0.3, 2.0, ALL_SIDES & ~BOTTOM & ~FRONT);
@@ -111,7 +107,6 @@ static void a_house_without_a_wall_shows_its_ground(void **state) {
 }
 
 static void sheets_by_name_hide_nothing(void **state) {
-    (void)state;
     shape *s = shape_new();
     add_ground(s, 0.0);
     add_box(s, -0.3, 2.0, ALL_SIDES & ~BOTTOM);
@@ -127,7 +122,6 @@ static void sheets_by_name_hide_nothing(void **state) {
 }
 
 static void mirrored_houses_hide_too(void **state) {
-    (void)state;
     static const double mirror[12] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     shape *s = shape_new();
     add_ground(s, 0.0);

@@ -2,7 +2,6 @@
 #include "outlines.h"
 
 static void a_square_s_distance(void **state) {
-    (void)state;
     vsh_outline *square = box(-1.0, -1.0, 1.0, 1.0);
     for (int i = 0; i < 2000; ++i) {
         const double p[2] = {6.0 * any(2 * (uint64_t)i) - 3.0, 6.0 * any(2 * (uint64_t)i + 1) - 3.0};
@@ -16,7 +15,6 @@ static void a_square_s_distance(void **state) {
 }
 
 static void the_tree_finds_what_looking_at_all_finds(void **state) {
-    (void)state;
     vsh_outline *letters = text("R&8\nqi%", 1.0);
     int inside = 0;
     for (int i = 0; i < 2000; ++i) {
@@ -39,7 +37,6 @@ static vsh_outline *polygons(const double *points, const size_t *counts, size_t 
 }
 
 static void overlapping_squares_are_one_area(void **state) {
-    (void)state;
     /* one runs backwards; their overlap, 1 × 1, is inside all the same, as each is given alone and they are
      * united */
     const double first[8] = {0, 0, 2, 0, 2, 2, 0, 2}, second[8] = {1, 1, 1, 3, 3, 3, 3, 1};
@@ -58,7 +55,6 @@ static void overlapping_squares_are_one_area(void **state) {
 }
 
 static void squares_that_share_an_edge_are_one_area(void **state) {
-    (void)state;
     const double points[16] = {0, 0, 1, 0, 1, 1, 0, 1, 1, 0.25, 2, 0.25, 2, 0.75, 1, 0.75};
     const size_t counts[2] = {4, 4};
     vsh_outline *both = polygons(points, counts, 2);
@@ -68,7 +64,6 @@ static void squares_that_share_an_edge_are_one_area(void **state) {
 }
 
 static void a_contour_the_other_way_is_a_hole(void **state) {
-    (void)state;
     const double points[24] = {0, 0, 4, 0, 4,   4,   0,   4,   1,   1,   1,   3,
                                3, 3, 3, 1, 1.5, 1.5, 2.5, 1.5, 2.5, 2.5, 1.5, 2.5};
     const size_t counts[3] = {4, 4, 4};
@@ -95,7 +90,6 @@ static void a_contour_the_other_way_is_a_hole(void **state) {
 
 /* Five lines that cross: wound around twice in the middle. */
 static void a_pentagram_is_filled(void **state) {
-    (void)state;
     double points[10];
     for (int i = 0; i < 5; ++i) {
         points[2 * i] = cos(4.0 * PI * i / 5.0);
@@ -111,7 +105,6 @@ static void a_pentagram_is_filled(void **state) {
 }
 
 static void many_overlaps_leave_the_union(void **state) {
-    (void)state;
     enum { COUNT = 40 };
     double points[8 * COUNT];
     size_t counts[COUNT];
@@ -171,7 +164,6 @@ static double width_of(const char *letters) {
 
 /* DejaVu Sans: 2048 units an em; l is a bar from 193 to 377 and to 1556, of exact lines. */
 static void letters_have_the_font_s_measures(void **state) {
-    (void)state;
     vsh_outline *bar = lines_of("l", VSH_ALIGN_LEFT);
     const vsh_outline_info info = info_of(bar);
     assert_int_equal(info.points, 4);
@@ -187,7 +179,6 @@ static void letters_have_the_font_s_measures(void **state) {
 }
 
 static void letters_are_kerned(void **state) {
-    (void)state;
     assert_true(width_of("AVA") < width_of("AHA") - 0.05);
     /* H is 1540 units wide, and pairs of them are not kerned */
     assert_true(fabs(width_of("HH") - width_of("H") - 1540.0 / 2048.0) < 1e-9);
@@ -195,7 +186,6 @@ static void letters_are_kerned(void **state) {
 }
 
 static void lines_lie_as_they_are_told_to(void **state) {
-    (void)state;
     vsh_outline *lines = lines_of("l\r\nlll\n\nl", VSH_ALIGN_LEFT);
     /* three line heights of 2384 units below */
     assert_true(fabs(info_of(lines).bounds_min[1] + 3.0 * 2384.0 / 2048.0) < 1e-12);
@@ -217,7 +207,6 @@ static void lines_lie_as_they_are_told_to(void **state) {
 
 /* Å is A with a ring, which other fonts let overlap; the same letter over itself adds nothing. */
 static void letters_that_overlap_are_one_area(void **state) {
-    (void)state;
     vsh_outline *o = lines_of("o", VSH_ALIGN_LEFT), *both = NULL;
     const double aside[6] = {1.0, 0.0, 0.3, 0.0, 1.0, 0.0};
     const vsh_outline_instance instances[3] = {{o, NULL}, {o, aside}, {o, NULL}};
@@ -245,7 +234,6 @@ static void letters_that_overlap_are_one_area(void **state) {
 
 /* Cut eight times as fine the outline's area changes by less than the tolerance times its length. */
 static void curves_are_followed(void **state) {
-    (void)state;
     /* the outer contour of O: its points lie on the curve, so the polygon's error is in its area */
     vsh_outline *o = lines_of("O", VSH_ALIGN_LEFT);
     const vsh_outline_info info = info_of(o);
@@ -266,7 +254,6 @@ static void curves_are_followed(void **state) {
 }
 
 static void bad_text_is_refused(void **state) {
-    (void)state;
     vsh_outline *outline = NULL;
     const struct {
         const char *text;
@@ -314,7 +301,6 @@ static void bad_text_is_refused(void **state) {
 }
 
 static void bad_polygons_are_refused(void **state) {
-    (void)state;
     vsh_outline *outline = NULL;
     const double line[8] = {0, 0, 1, 0, 2, 0, 3, 0}, bad[6] = {0, 0, 1, NAN, 0, 1},
                  far[6] = {0, 0, 1e16, 0, 0, 1};

@@ -19,7 +19,6 @@ static double box_distance(const double p[3]) {
 }
 
 static void a_box_is_a_box(void **state) {
-    (void)state;
     vsh_outline *outline = box(1.0, 0.5);
     vsh_grid *grid = NULL;
     const vsh_grid_options options = with_voxel(0.02);
@@ -40,7 +39,6 @@ static double placed_distance(const double p[3]) {
 }
 
 static void a_transform_moves_the_solid(void **state) {
-    (void)state;
     vsh_outline *outline = box(1.0, 0.5);
     vsh_grid *grid = NULL;
     const vsh_grid_options options = with_voxel(0.05);
@@ -75,7 +73,6 @@ static double letters_distance(const double p[3]) {
 }
 
 static void text_is_extruded_with_its_distance(void **state) {
-    (void)state;
     assert_int_equal(vsh_outline_from_text("d&", "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf", NULL,
                                            NULL, &letters, &failure),
                      VSH_OK);
@@ -95,7 +92,6 @@ static void text_is_extruded_with_its_distance(void **state) {
 }
 
 static void bad_solids_are_refused(void **state) {
-    (void)state;
     vsh_outline *outline = box(1.0, 0.5);
     vsh_grid *grid = NULL;
     const vsh_grid_options options = with_voxel(0.02);

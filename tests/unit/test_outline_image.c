@@ -27,7 +27,6 @@ static vsh_outline *outline_of_image(const vsh_mask_options *options) {
 }
 
 static void a_solid_image_is_its_rectangle(void **state) {
-    (void)state;
     float white[12];
     for (int i = 0; i < 12; ++i) {
         white[i] = 1.0f;
@@ -50,7 +49,6 @@ static void a_solid_image_is_its_rectangle(void **state) {
 
 /* A disc as a painter anti-aliases it: the share of each pixel that it covers, by 16 × 16 samples. */
 static void an_anti_aliased_disc_is_round(void **state) {
-    (void)state;
     enum { SIZE = 64 };
     static float plane[SIZE * SIZE], hard[SIZE * SIZE];
     const double radius = 20.3, cx = 31.7, cy = 32.4; /* pixels, from the upper left corner */
@@ -88,7 +86,6 @@ static void an_anti_aliased_disc_is_round(void **state) {
 
 /* Pixels that touch at corners only: by the middle of the four. */
 static void corners_join_by_their_middle(void **state) {
-    (void)state;
     float plane[16] = {0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0};
     vsh_mask_options options = vsh_mask_options_default();
     options.width = 4.0;
@@ -106,7 +103,6 @@ static void corners_join_by_their_middle(void **state) {
 }
 
 static void any_image_closes(void **state) {
-    (void)state;
     enum { W = 37, H = 23 };
     float plane[W * H];
     for (int i = 0; i < W * H; ++i) {
@@ -131,7 +127,6 @@ static void any_image_closes(void **state) {
 }
 
 static void channels_are_chosen(void **state) {
-    (void)state;
     const float r[4] = {1, 0, 0, 0}, g[4] = {0, 1, 0, 0}, b[4] = {0, 0, 1, 1}, a[4] = {1, 1, 0, 1};
     const float one[4] = {1, 1, 1, 1};
     const char *const names[4] = {"R", "G", "B", "A"};
@@ -160,7 +155,6 @@ static void channels_are_chosen(void **state) {
 }
 
 static void bad_images_are_refused(void **state) {
-    (void)state;
     vsh_outline *outline = NULL;
     float plane[4] = {0, 0, 0, 0};
     write_mask(2, 2, plane);
@@ -205,13 +199,11 @@ static void bad_images_are_refused(void **state) {
 }
 
 static int remove_image(void **state) {
-    (void)state;
     unlink(image_path);
     return 0;
 }
 
 static int name_image(void **state) {
-    (void)state;
     const int file = mkstemps(image_path, 4);
     return file < 0 || close(file) != 0;
 }

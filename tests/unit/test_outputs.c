@@ -50,7 +50,6 @@ static void begin(vshi_output *outputs, vshi_output **list) {
 }
 
 static void all_are_in_place_in_the_end(void **state) {
-    (void)state;
     vshi_output outputs[COUNT], *list[COUNT];
     vsh_error error;
     put_text(at(names[1]), "old");
@@ -67,7 +66,6 @@ static void all_are_in_place_in_the_end(void **state) {
 
 /* A folder that came into the way of each in turn, as nothing but a file can be replaced. */
 static void one_that_fails_leaves_all_as_they_were(void **state) {
-    (void)state;
     for (size_t failing = 0; failing < COUNT; ++failing) {
         vshi_output outputs[COUNT], *list[COUNT];
         vsh_error error;

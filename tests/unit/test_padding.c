@@ -38,7 +38,6 @@ static int64_t nearest(int32_t width, int32_t height, const uint8_t *state, int6
 }
 
 static void every_texel_takes_the_nearest_value_and_the_first_of_equally_near_ones(void **unused) {
-    (void)unused;
     const int32_t sizes[][2] = {{1, 1}, {37, 23}, {130, 70}, {1, 50}, {50, 1}};
     const int32_t radii[][2] = {{0, 8}, {1, 8}, {2, 0}, {5, 8}, {7, 3}, {4096, 4096}};
     uint32_t random = 12345;
@@ -69,7 +68,6 @@ static void every_texel_takes_the_nearest_value_and_the_first_of_equally_near_on
 }
 
 static void a_ring_is_exactly_as_wide_as_asked(void **unused) {
-    (void)unused;
     enum { SIZE = 41, PADDING = 5 };
     uint8_t state[SIZE * SIZE] = {0};
     float values[SIZE * SIZE];
@@ -86,7 +84,6 @@ static void a_ring_is_exactly_as_wide_as_asked(void **unused) {
 }
 
 static void dark_texels_are_no_holes(void **unused) {
-    (void)unused;
     uint8_t state[16] = {0};
     float values[16];
     for (int i = 0; i < 16; ++i) {
@@ -102,7 +99,6 @@ static void dark_texels_are_no_holes(void **unused) {
 }
 
 static void the_state_is_left_as_it_is_and_all_channels_are_copied(void **unused) {
-    (void)unused;
     uint8_t state[9] = {VSHI_TEXEL_VALID, 0, 0, 0, VSHI_TEXEL_INVALID, 0, 0, 0, 0}, before[9];
     float values[27];
     for (int i = 0; i < 27; ++i) {
@@ -117,7 +113,6 @@ static void the_state_is_left_as_it_is_and_all_channels_are_copied(void **unused
 }
 
 static void any_number_of_threads_gives_the_same_bits(void **unused) {
-    (void)unused;
     enum { WIDTH = 300, HEIGHT = 211, COUNT = WIDTH * HEIGHT };
     const int32_t threads[] = {1, 2, 5};
     uint8_t *state = calloc(COUNT, 1);
@@ -180,7 +175,6 @@ static void spread_over(map *m, size_t width, const char *letters) {
 }
 
 static void an_invalid_texel_is_filled_from_at_most_64_texels_away(void **state) {
-    (void)state;
     map *m = malloc(sizeof *m);
     char letters[201];
     memset(letters, 'a', 200);
@@ -197,7 +191,6 @@ static void an_invalid_texel_is_filled_from_at_most_64_texels_away(void **state)
 }
 
 static void texels_of_other_charts_are_never_taken_from(void **state) {
-    (void)state;
     map *m = malloc(sizeof *m);
     /* another mesh touches; another chart of the same mesh does not */
     spread_over(m, 10,
@@ -222,7 +215,6 @@ static void texels_of_other_charts_are_never_taken_from(void **state) {
 }
 
 static void the_nearest_valid_texel_of_a_chart_is_taken_and_the_first_of_equals(void **state) {
-    (void)state;
     map *m = malloc(sizeof *m);
     spread_over(m, 7,
                 "AaaaaaA"
@@ -238,7 +230,6 @@ static void the_nearest_valid_texel_of_a_chart_is_taken_and_the_first_of_equals(
 }
 
 static void values_are_copied_from_texels_that_have_one(void **state) {
-    (void)state;
     uint8_t states[4] = {VSHI_TEXEL_VALID, VSHI_TEXEL_INVALID, VSHI_TEXEL_INVALID, VSHI_TEXEL_INVALID};
     float values[8] = {1.0f, 2.0f, 0.0f, 0.0f, 0.0f, 0.0f, 5.0f, 6.0f};
     uint32_t texels[2] = {1, 2}, sources[2] = {0, 3}; /* the second one lost its value to a method */

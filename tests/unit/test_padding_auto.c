@@ -38,7 +38,6 @@ static void halve(size_t width, size_t height, size_t channels, const float *val
 }
 
 static void every_level_holds_the_means_of_values_alone(void **state) {
-    (void)state;
     const int32_t sizes[][2] = {{64, 64}, {1, 1}, {37, 90}, {128, 16}, {1, 77}, {255, 3}};
     for (size_t s = 0; s < sizeof sizes / sizeof sizes[0]; ++s) {
         size_t width = (size_t)sizes[s][0], height = (size_t)sizes[s][1], count = width * height;
@@ -86,7 +85,6 @@ static void every_level_holds_the_means_of_values_alone(void **state) {
 }
 
 static void a_plane_without_values_is_left(void **state) {
-    (void)state;
     uint8_t mask[12] = {0};
     float values[12];
     for (int i = 0; i < 12; ++i) {
@@ -121,7 +119,6 @@ static vsh_charts *charts_with(const vsh_mesh *mesh, int32_t padding) {
 }
 
 static void a_lightmap_is_filled_to_its_last_corner(void **state) {
-    (void)state;
     float uvs[8];
     const vsh_mesh mesh = corner_mesh(uvs);
     vsh_charts *charts = charts_with(&mesh, VSH_PADDING_AUTO), *grown = charts_with(&mesh, 16);
@@ -155,7 +152,6 @@ static void a_lightmap_is_filled_to_its_last_corner(void **state) {
 }
 
 static void no_other_padding_is_below_0(void **state) {
-    (void)state;
     const vsh_mesh mesh = floor_mesh();
     vsh_lightmap_options options = vsh_lightmap_options_default();
     vsh_charts *charts = NULL;

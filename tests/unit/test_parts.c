@@ -8,7 +8,6 @@ static void bake_whole(const case_scene *c, taken *rows, vsh_bake_report *report
 }
 
 static void merged_rows_are_those_of_one_bake_and_words_come_back(void **state) {
-    (void)state;
     case_scene c;
     fill(&c, SIZE, 0.4);
     taken *one = calloc(2, sizeof *one), *all = one + 1;
@@ -35,7 +34,6 @@ static void merged_rows_are_those_of_one_bake_and_words_come_back(void **state) 
 }
 
 static void what_parts_leave_of_ao_is_as_of_one_bake(void **state) {
-    (void)state;
     case_scene c;
     char wall[300];
     if (!vsh_triangles_available()) {
@@ -59,7 +57,6 @@ static void what_parts_leave_of_ao_is_as_of_one_bake(void **state) {
 }
 
 static void options_that_a_part_cannot_have_are_refused(void **state) {
-    (void)state;
     case_scene c;
     fill(&c, SIZE, 0.4);
     taken t;

@@ -89,14 +89,12 @@ static void try_all_of(case_scene *c) {
 }
 
 static void no_part_of_a_lightmap_does_worse_than_fail(void **state) {
-    (void)state;
     case_scene c;
     fill(&c, SIZE, 0.4);
     try_all_of(&c);
 }
 
 static void no_part_that_leaves_ao_does_worse_than_fail(void **state) {
-    (void)state;
     case_scene c;
     char wall[300];
     if (!vsh_triangles_available()) {
@@ -140,7 +138,6 @@ static void try_values(const char *path, const char *place, bake_case *one) {
 }
 
 static void values_out_of_range_are_refused_by_part_plane_and_texel(void **state) {
-    (void)state;
     case_scene c;
     fill(&c, SIZE, 0.4);
     bake_parts(&c);

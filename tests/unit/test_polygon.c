@@ -127,7 +127,6 @@ static bool make_twisted(shape *s, size_t count, int grid) {
 }
 
 static void every_simple_polygon_is_covered_and_no_triangle_is_flipped(void **state) {
-    (void)state;
     static shape s;
     seed = 7;
     size_t made = 0;
@@ -143,7 +142,6 @@ static void every_simple_polygon_is_covered_and_no_triangle_is_flipped(void **st
 
 /* Combs, spirals and stars, of many corners, in both directions of turning. */
 static void long_and_narrow_polygons_are_covered(void **state) {
-    (void)state;
     static shape s;
     static float at[MOST][2];
     size_t n = 0;
@@ -178,7 +176,6 @@ static void long_and_narrow_polygons_are_covered(void **state) {
 }
 
 static void an_l_has_no_triangle_over_the_void(void **state) {
-    (void)state;
     static const float corners[6][2] = {{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}};
     static shape s;
     for (size_t first = 0; first < 6; ++first) {
@@ -193,7 +190,6 @@ static void an_l_has_no_triangle_over_the_void(void **state) {
 
 /* Holes joined to the outline by an edge there and back. */
 static void holes_at_the_end_of_bridges_stay_open(void **state) {
-    (void)state;
     static const float one[10][2] = {{0, 0}, {4, 0}, {4, 4}, {0, 4}, {0, 0},
                                      {1, 1}, {1, 3}, {3, 3}, {3, 1}, {1, 1}};
     static const float two[16][2] = {{0, 0}, {8, 0}, {8, 4}, {0, 4}, {0, 0}, {1, 1}, {1, 3}, {3, 3},
@@ -209,7 +205,6 @@ static void holes_at_the_end_of_bridges_stay_open(void **state) {
 
 /* Points within an edge must stay corners of triangles: else the neighbours' edges would be open. */
 static void corners_on_a_line_all_stay_corners(void **state) {
-    (void)state;
     static const float edge[6][2] = {{4, 0}, {0, 4}, {0, 0}, {1, 0}, {2, 0}, {3, 0}};
     static const float quad[4][2] = {{0, 0}, {2, 0}, {0, 2}, {0, 1}};
     static const float square[8][2] = {{0, 0}, {1, 0}, {2, 0}, {2, 1}, {2, 2}, {1, 2}, {0, 2}, {0, 1}};
@@ -236,7 +231,6 @@ static void corners_on_a_line_all_stay_corners(void **state) {
 
 /* The fans that they have always been: bakes keep their bits. */
 static void convex_polygons_are_fans_from_the_last_corner_and_quads_from_the_first(void **state) {
-    (void)state;
     static const float corners[6][2] = {{2, 0}, {1, 2}, {-1, 2}, {-2, 0}, {-1, -2}, {1, -2}};
     static const uint32_t fan[12] = {5, 0, 1, 5, 1, 2, 5, 2, 3, 3, 4, 5}, quad[6] = {0, 1, 2, 0, 2, 3};
     static shape s;
@@ -249,7 +243,6 @@ static void convex_polygons_are_fans_from_the_last_corner_and_quads_from_the_fir
 }
 
 static void polygons_that_cross_themselves_are_told(void **state) {
-    (void)state;
     static const float tie[4][2] = {{0, 0}, {2, 2}, {2, 0}, {0, 1}};
     static const float even[4][2] = {{0, 0}, {2, 2}, {2, 0}, {0, 2}};
     static const float star[5][2] = {{0, 10}, {6, -8}, {-9, 3}, {9, 3}, {-6, -8}};
@@ -268,7 +261,6 @@ static void polygons_that_cross_themselves_are_told(void **state) {
 /* On integers, many corners lie on edges of others, which is more than simple polygons may do: whatever is
  * said of them, the triangles add up. */
 static void polygons_that_touch_themselves_do_no_harm(void **state) {
-    (void)state;
     static shape s;
     seed = 11;
     vshi_polygon_cutter cutter = {0};

@@ -7,7 +7,6 @@
 #include <vdbshade/volume.h>
 
 static void digests_are_those_of_the_standard(void **state) {
-    (void)state;
     /* FIPS 180-4's examples, and a million times 'a' (NIST, "SHA examples") */
     static const struct {
         const char *text;
@@ -43,7 +42,6 @@ static void digests_are_those_of_the_standard(void **state) {
 }
 
 static void digests_of_what_is_no_file_are_refused(void **state) {
-    (void)state;
     char digest[VSH_DIGEST_TEXT];
     vsh_error error;
     assert_int_equal(vsh_file_digest(at("nothing"), NULL, digest, &error), VSH_ERROR_READ);
@@ -70,7 +68,6 @@ static void write_text(const char *name, const char *text) {
 
 /* A glTF with a buffer beside it, one within, and one behind an escaped name. */
 static void settings_and_inputs_are_told_in_order_and_once(void **state) {
-    (void)state;
     write_text("scene.json", "{}");
     write_text("one.bin", "1");
     write_text("two parts.bin", "2");
@@ -140,7 +137,6 @@ static void settings_and_inputs_are_told_in_order_and_once(void **state) {
 }
 
 static void the_error_that_a_channel_was_made_to_is_told(void **state) {
-    (void)state;
     const vsh_attribute list[] = {{"vdbshade_version", "0.2.0"},
                                   {"vdbshade_shadow", "adaptive, max error 0.005, sobol, frame 3"},
                                   {"vdbshade_ao", "exact within 2.5, max error 0.02, sobol"},
@@ -166,7 +162,6 @@ static void the_error_that_a_channel_was_made_to_is_told(void **state) {
 }
 
 static void images_carry_them_and_give_them_back(void **state) {
-    (void)state;
     static const char *const files[] = {"told.exr", "told.png"};
     static const vsh_attribute told[] = {{"vdbshade_version", "0.2.0"}, {"long", "a line, with = and ;"}};
     sample s;
@@ -193,7 +188,6 @@ static void images_carry_them_and_give_them_back(void **state) {
 }
 
 static void level_sets_and_volumes_carry_them(void **state) {
-    (void)state;
     const vsh_sdf_node ball = vsh_sdf_node_default();
     const vsh_sdf sdf = {&ball, 1};
     vsh_grid_options options = vsh_grid_options_default();
@@ -227,7 +221,6 @@ static void level_sets_and_volumes_carry_them(void **state) {
 }
 
 static void attributes_that_no_file_could_hold_are_refused(void **state) {
-    (void)state;
     static const char long_name[] =
         "an_attribute_name_of_eighty_letters_which_is_one_more_than_PNG_has_room_for_"
         "1234";

@@ -89,7 +89,6 @@ static void expect(const caster *c, const vsh_points *points, const vsh_light *l
 }
 
 static void values_and_deviations_are_those_of_the_shade_calls(void **state) {
-    (void)state;
     caster c = caster_of(truth_seeds(), 0.04, 0.0);
     vsh_light lights[LIGHTS];
     lights_of(lights);
@@ -117,7 +116,6 @@ static void values_and_deviations_are_those_of_the_shade_calls(void **state) {
 }
 
 static void values_follow_points_that_are_shuffled_on_any_number_of_threads(void **state) {
-    (void)state;
     caster c = caster_of(truth_seeds(), 0.04, 0.0);
     vsh_light lights[LIGHTS];
     lights_of(lights);
@@ -154,7 +152,6 @@ static void values_follow_points_that_are_shuffled_on_any_number_of_threads(void
 
 /* The order tells its samplers the points' numbers, where there are no texels. */
 static void points_without_texels_are_told_apart_by_their_numbers_in_any_order(void **state) {
-    (void)state;
     caster c = caster_of(truth_seeds(), 0.1, 0.0);
     vsh_light lights[LIGHTS];
     lights_of(lights);
@@ -177,7 +174,6 @@ static void points_without_texels_are_told_apart_by_their_numbers_in_any_order(v
 }
 
 static void points_that_are_invalid_are_nan_and_leave_the_others_alone(void **state) {
-    (void)state;
     vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
     vsh_light lights[LIGHTS];
     lights_of(lights);
@@ -218,7 +214,6 @@ static void points_that_are_invalid_are_nan_and_leave_the_others_alone(void **st
 }
 
 static void one_point_has_the_value_that_it_has_among_many(void **state) {
-    (void)state;
     vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
     vsh_light lights[LIGHTS];
     lights_of(lights);
@@ -247,7 +242,6 @@ static void one_point_has_the_value_that_it_has_among_many(void **state) {
 }
 
 static void what_is_not_asked_for_is_not_marched(void **state) {
-    (void)state;
     vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
     vsh_light lights[LIGHTS];
     lights_of(lights);
@@ -295,7 +289,6 @@ static void *ask_alone(void *user) {
 }
 
 static void a_handle_is_shared_by_threads(void **state) {
-    (void)state;
     vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     fill_points();
@@ -325,7 +318,6 @@ static int32_t stop_at(void *user, const char *stage, double fraction) {
 }
 
 static void limits_and_cancelling_have_their_codes(void **state) {
-    (void)state;
     vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
     vsh_light lights[LIGHTS];
     lights_of(lights);
@@ -359,7 +351,6 @@ static void limits_and_cancelling_have_their_codes(void **state) {
 }
 
 static void bad_arguments_are_refused_by_name(void **state) {
-    (void)state;
     vsh_field *field = field_of(truth_seeds(), 0.2, 1.0);
     vsh_light lights[LIGHTS];
     lights_of(lights);

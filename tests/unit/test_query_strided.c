@@ -69,7 +69,6 @@ static void ask_packed(const vsh_query *query, size_t count) {
 }
 
 static void strides_floats_and_gaps_give_the_bits_of_packed_arrays(void **state) {
-    (void)state;
     vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     fill_points();
@@ -127,7 +126,6 @@ static void strides_floats_and_gaps_give_the_bits_of_packed_arrays(void **state)
 }
 
 static void distance_is_the_fields_and_near_the_truth(void **state) {
-    (void)state;
     const double voxel = 0.04;
     vsh_field *field = field_of(truth_seeds(), voxel, 0.0);
     fill_points();
@@ -152,7 +150,6 @@ static void distance_is_the_fields_and_near_the_truth(void **state) {
 }
 
 static void gradients_are_unit_and_point_away_from_the_sphere(void **state) {
-    (void)state;
     const truth_solid ball = {.shape = TRUTH_SPHERE, .center = {0.3, -0.2, 0.1}, .radius = 1.0};
     const truth_scene scene = {&ball, 1};
     const double voxel = 0.05;
@@ -199,7 +196,6 @@ static void gradients_are_unit_and_point_away_from_the_sphere(void **state) {
 }
 
 static void there_is_no_gradient_beyond_the_reach_nor_where_nothing_is(void **state) {
-    (void)state;
     const truth_solid ball = {.shape = TRUTH_SPHERE, .radius = 1.0};
     vsh_field *field = field_of((truth_scene){&ball, 1}, 0.05, 1.0);
     vsh_query *query = query_of(field, NULL, VSH_SHADOW_CONE);
@@ -222,7 +218,6 @@ static void there_is_no_gradient_beyond_the_reach_nor_where_nothing_is(void **st
 }
 
 static void calls_for_a_batch_each_give_the_bits_of_one_call(void **state) {
-    (void)state;
     enum { ALL = VSH_QUERY_BATCH + 40000 };
     vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.1);
@@ -268,7 +263,6 @@ static void calls_for_a_batch_each_give_the_bits_of_one_call(void **state) {
 }
 
 static void strides_that_are_none_are_refused_by_name(void **state) {
-    (void)state;
     const truth_solid ball = {.shape = TRUTH_SPHERE, .radius = 1.0};
     vsh_field *field = field_of((truth_scene){&ball, 1}, 0.1, 1.0);
     vsh_query *query = query_of(field, NULL, VSH_SHADOW_CONE);

@@ -7,7 +7,6 @@ static const float UP[3] = {0.0f, 1.0f, 0.0f};
 static const double NOWHERE[3] = {0.0, 0.0, 0.0};
 
 static void receivers_deep_inside_are_dark_and_far_outside_are_lit(void **state) {
-    (void)state;
     const truth_solid block = {TRUTH_BOX, {0.0, 0.0, 0.0}, {2.0, 2.0, 2.0}, 0.0, 0.0};
     caster c = caster_of((truth_scene){&block, 1}, 0.05, 0.0);
     uint64_t counter = 12;
@@ -45,7 +44,6 @@ static void receivers_deep_inside_are_dark_and_far_outside_are_lit(void **state)
 
 /* As far as doubles go, in every direction from the casters, towards them and away, by every method. */
 static void receivers_at_any_distance_are_lit(void **state) {
-    (void)state;
     const truth_solid block = {TRUTH_BOX, {0.0, 0.0, 0.0}, {2.0, 2.0, 2.0}, 0.0, 0.0};
     const double scales[] = {1e-10, 1e-6, 1.0, 1e10};
     uint64_t counter = 5;
@@ -86,7 +84,6 @@ static void receivers_at_any_distance_are_lit(void **state) {
 /* Exactly on the planes, edges and corners of cells, bricks and levels, and beside them by less than a float
  * tells: the same to what a float tells; a ray of 64 may come to lie on the other side of an edge. */
 static void receivers_on_voxel_planes_see_what_their_neighbours_see(void **state) {
-    (void)state;
     enum { PLACES = 4000, SIDES = 6, ALL = PLACES * (SIDES + 1) };
     static double at[3 * ALL];
     static float ns[3 * ALL], values[ALL];
@@ -151,7 +148,6 @@ static void receivers_on_voxel_planes_see_what_their_neighbours_see(void **state
 }
 
 static void normals_of_any_length_are_directions(void **state) {
-    (void)state;
     caster c = caster_of(truth_seeds(), 0.0625, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     const int exponents[] = {-149, -126, -60, -1, 1, 60, 127};
@@ -175,7 +171,6 @@ static void normals_of_any_length_are_directions(void **state) {
 /* NaN and counted, in every method; the points beside them are as they are without them. The last place is a
  * double, but no place in field space. */
 static void points_that_are_none_are_nan_and_counted(void **state) {
-    (void)state;
     enum { PLACES = 9, BAD = 7 };
     caster c = caster_of_moved(truth_seeds(), 0.0625, 1e-9, NOWHERE, 8e-9);
     const vsh_light light = sun(truth_seeds_sun, 0.2);

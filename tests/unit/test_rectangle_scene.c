@@ -3,7 +3,6 @@
 #include "rectangles.h"
 
 static void the_horizon_cuts_it_by_solid_angle(void **state) {
-    (void)state;
     vsh_field *nothing = NULL;
     assert_int_equal(vshi_field_create_empty(0.1, &nothing, NULL), VSH_OK);
     vsh_layer layer = vsh_layer_default();
@@ -93,7 +92,6 @@ static float red_at(const vsh_light *light, const double *at) {
 }
 
 static void irradiance_has_the_cosine_at_which_it_shines(void **state) {
-    (void)state;
     const double centre[3] = {0.0, 2.0, 0.0}, u[3] = {1.0, 0.0, 0.0}, v[3] = {0.0, 0.0, 0.6};
     vsh_light light = panel(centre, u, v);
     for (double x = 0.0; x < 6.0; x += 0.7) {
@@ -125,7 +123,6 @@ static void refuses(const vsh_light *light, const char *message) {
 }
 
 static void what_is_no_rectangle_is_refused(void **state) {
-    (void)state;
     vsh_light light = light_of(0);
     assert_int_equal(vsh_light_check(&light, NULL), VSH_OK);
     memset(light.edge_u, 0, sizeof light.edge_u);

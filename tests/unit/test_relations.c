@@ -126,7 +126,6 @@ static void assert_same_field(const vsh_field *a, const vsh_field *b) {
 
 /* From 1e-10 to 1e10 of the voxel: the field's values are voxels, and only they are shaded. */
 static void scaled_by_a_power_of_two_every_bit_stays(void **state) {
-    (void)state;
     static values still, scaled;
     fill_points();
     caster c = caster_of_moved(truth_seeds(), 0.03125, 1.0, NOWHERE, 8.0);
@@ -187,7 +186,6 @@ static vsh_grid *grid_of_meshes(double scale, double half_width, bool open) {
 }
 
 static void meshes_scaled_by_a_power_of_two_keep_every_bit(void **state) {
-    (void)state;
     for (int open = 0; open < 2; ++open) {
         for (double half_width = 3.0; half_width < 20.0; half_width *= 3.0) {
             vsh_field *field = field_of_grid(grid_of_meshes(1.0, half_width, open != 0), 4.0);
@@ -224,7 +222,6 @@ static vsh_grid *grid_of_union(double scale) {
 }
 
 static void unions_scaled_by_a_power_of_two_keep_every_bit(void **state) {
-    (void)state;
     vsh_field *field = field_of_grid(grid_of_union(1.0), 4.0);
     const int exponents[] = {-35, -20, 20, 42};
     for (size_t e = 0; e < sizeof exponents / sizeof exponents[0]; ++e) {
@@ -267,7 +264,6 @@ static apart apart_when_moved(const double voxels[3]) {
 }
 
 static void moved_by_whole_voxels_every_bit_stays(void **state) {
-    (void)state;
     const double voxels[][3] = {{1, 0, 0}, {-3, 5, 7}, {8, 16, -24}, {1001, -2003, 4007}, {32e6, -16e6, 8e6}};
     for (size_t s = 0; s < sizeof voxels / sizeof voxels[0]; ++s) {
         assert_true(apart_when_moved(voxels[s]).worst == 0.0);
@@ -295,7 +291,6 @@ static caster caster_of_turned(const motion *m, double voxel) {
 }
 
 static void turned_by_right_angles_and_mirrored_values_stay_within_a_bound(void **state) {
-    (void)state;
     static values still, there;
     static const int orders[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
     fill_points();

@@ -2,7 +2,6 @@
 #include "pictures.h"
 
 static void a_sphere_is_where_it_is_with_its_normals(void **state) {
-    (void)state;
     enum { VOXELS = 50 };
     const double centre[3] = {0.1, -0.2, 0.3}, voxel = 1.0 / VOXELS;
     vsh_field *field = ball(centre[0], centre[1], centre[2], 1.0, voxel);
@@ -43,7 +42,6 @@ static void a_sphere_is_where_it_is_with_its_normals(void **state) {
 }
 
 static void a_silhouette_has_its_area_and_soft_edges(void **state) {
-    (void)state;
     vsh_field *field = ball(0.0, 0.0, 0.0, 1.0, 0.02);
     const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
     for (int32_t samples = 1; samples <= 4; samples += 3) {
@@ -65,7 +63,6 @@ static void a_silhouette_has_its_area_and_soft_edges(void **state) {
 }
 
 static void low_rays_do_not_miss_a_floor(void **state) {
-    (void)state;
     vsh_field *field = field_of(truth_seeds(), 0.05, 0.0);
     const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
     for (double height = 0.002; height < 0.2; height *= 1.7) {
@@ -90,7 +87,6 @@ static void low_rays_do_not_miss_a_floor(void **state) {
 
 /* What a sheet two voxels thick, seen from many sides, lets through. */
 static void thin_sheets_stop_every_ray(void **state) {
-    (void)state;
     const truth_solid sheet = {.shape = TRUTH_BOX, .half = {2.0, 0.05, 2.0}};
     vsh_field *field = field_of((truth_scene){&sheet, 1}, 0.05, 0.0);
     const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
@@ -173,7 +169,6 @@ static void check_floor(const vsh_field *field, const vsh_light *light, vsh_rend
 }
 
 static void a_floor_has_the_shadow_and_the_ao_of_its_points(void **state) {
-    (void)state;
     vsh_field *field = field_of(truth_seeds(), 0.03, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
     vsh_render_options o = small(camera_at(1.0, 5.0, 3.0, 0.0, 0.0, 0.0, 40.0), 1);
@@ -189,7 +184,6 @@ static void a_floor_has_the_shadow_and_the_ao_of_its_points(void **state) {
 }
 
 static void the_nearest_surface_has_its_own_color(void **state) {
-    (void)state;
     vsh_field *front = ball(0.0, 0.0, 1.0, 0.5, 0.05), *back = ball(0.4, 0.0, -1.0, 0.8, 0.05);
     const vsh_surface surfaces[2] = {{back, {0.9, 0.1, 0.2}}, {front, {0.1, 0.8, 0.3}}};
     vsh_render_options o = small(camera_at(0.0, 0.0, 6.0, 0.0, 0.0, 0.0, 25.0), 2);
@@ -209,7 +203,6 @@ static void the_nearest_surface_has_its_own_color(void **state) {
 }
 
 static void who_looks_from_within_sees_out(void **state) {
-    (void)state;
     vsh_field *within = ball(0.0, 0.0, 0.0, 1.0, 0.05), *beyond = ball(4.0, 0.0, 0.0, 1.0, 0.05);
     const vsh_surface surfaces[2] = {{within, {0.5, 0.5, 0.5}}, {beyond, {0.5, 0.5, 0.5}}};
     const vsh_render_options o = small(camera_at(0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 20.0), 1);
@@ -222,7 +215,6 @@ static void who_looks_from_within_sees_out(void **state) {
 /* --- what holds for all */
 
 static void threads_and_instruction_sets_change_no_bit(void **state) {
-    (void)state;
     static float first[3 * PIXELS];
     vsh_field *field = field_of(truth_seeds(), 0.05, 0.0);
     const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
@@ -246,7 +238,6 @@ static void threads_and_instruction_sets_change_no_bit(void **state) {
 }
 
 static int32_t stop(void *user, const char *stage, double fraction) {
-    (void)stage;
     double *seen = user;
     assert_true(fraction >= *seen && fraction <= 1.0);
     *seen = fraction;
@@ -254,7 +245,6 @@ static int32_t stop(void *user, const char *stage, double fraction) {
 }
 
 static void a_render_can_be_cancelled_and_limited(void **state) {
-    (void)state;
     vsh_field *field = ball(0.0, 0.0, 0.0, 1.0, 0.1);
     const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
     const vsh_render_options o = small(camera_at(0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 30.0), 4);
@@ -273,7 +263,6 @@ static void a_render_can_be_cancelled_and_limited(void **state) {
 }
 
 static void options_out_of_range_are_refused(void **state) {
-    (void)state;
     vsh_field *field = ball(0.0, 0.0, 0.0, 1.0, 0.1);
     const vsh_surface surface = {field, {0.5, 0.5, 0.5}}, bright = {field, {0.5, 1.5, 0.5}},
                       none = {NULL, {0.5, 0.5, 0.5}};

@@ -5,7 +5,6 @@
 
 /* The box around the sphere has a diagonal of 2 √3, and the fog a quarter of that around it. */
 static void fog_in_the_sun_shines_and_in_shadow_does_not(void **state) {
-    (void)state;
     vsh_field *field = ball(0.0, 0.0, 0.0, 1.0, 0.02);
     const vsh_surface surface = {field, {0.0, 0.0, 0.0}};
     const double x[3] = {1.0, 0.0, 0.0};
@@ -44,7 +43,6 @@ static vsh_mesh quad(void) {
 
 /* Texel centres at (i + ½) / N, row 0 at v = 1. */
 static void a_lightmap_is_looked_up_where_it_was_baked(void **state) {
-    (void)state;
     enum { N = 4 };
     float ao[N * N], shadow[N * N];
     for (int i = 0; i < N * N; ++i) {
@@ -109,7 +107,6 @@ static void a_lightmap_is_looked_up_where_it_was_baked(void **state) {
 }
 
 static void irradiance_comes_before_shadows(void **state) {
-    (void)state;
     const float red[1] = {0.2f}, green[1] = {0.4f}, blue[1] = {0.6f}, dark[1] = {0.0f};
     const char *const names[] = {"irradiance.B", "irradiance.G", "irradiance.R", "shadow.sun"};
     const float *const planes[] = {blue, green, red, dark};
@@ -130,7 +127,6 @@ static void irradiance_comes_before_shadows(void **state) {
 }
 
 static void gradients_are_dithered_to_srgb(void **state) {
-    (void)state;
     static float planes[4][PIXELS];
     float *const rgb[3] = {planes[0], planes[1], planes[2]};
     vsh_error error;

@@ -48,7 +48,6 @@ static void skip_without_embree(void) {
 /* --- casters without voxels */
 
 static void triangles_alone_give_shadows_within_the_error_of_the_truth(void **state) {
-    (void)state;
     skip_without_embree();
     vsh_occluders *made = plate_of(0);
     vsh_occluders_info info;
@@ -89,7 +88,6 @@ static void triangles_alone_give_shadows_within_the_error_of_the_truth(void **st
 }
 
 static void ao_by_rays_has_the_bits_that_it_has_with_voxels(void **state) {
-    (void)state;
     skip_without_embree();
     double positions[POINTS][3];
     float normals[POINTS][3], ao[2][POINTS];
@@ -104,7 +102,6 @@ static void ao_by_rays_has_the_bits_that_it_has_with_voxels(void **state) {
 }
 
 static void what_needs_voxels_is_refused_without_them(void **state) {
-    (void)state;
     skip_without_embree();
     vsh_occluders *made = plate_of(0);
     const double at[3] = {0.0, 0.0, 0.0};
@@ -140,7 +137,6 @@ static void what_needs_voxels_is_refused_without_them(void **state) {
 }
 
 static void parts_of_triangles_alone_cast(void **state) {
-    (void)state;
     skip_without_embree();
     const vsh_mesh mesh = plate();
     vsh_triangles *triangles = NULL;
@@ -196,7 +192,6 @@ static uint64_t shade_scene(bool layered, float lit[POINTS], float truth[POINTS]
 }
 
 static void scenes_and_layers_without_voxels_cast_as_the_truth_says(void **state) {
-    (void)state;
     skip_without_embree();
     for (int layered = 0; layered < 2; ++layered) {
         float lit[POINTS], truth[POINTS];
@@ -236,7 +231,6 @@ static int32_t chosen(const char *more, const char *casters, double points) {
 #define MARCHED_AO ", \"ao\": {\"distance\": 0.6, \"method\": \"adaptive\"}"
 
 static void traced_casters_get_voxels_only_where_shadows_pay_for_them(void **state) {
-    (void)state;
     skip_without_embree();
     assert_int_equal(chosen(AO, MESH, 1e9), 0);
     assert_int_equal(chosen(SUN AO, MESH, 0.0), 0);
@@ -252,7 +246,6 @@ static void traced_casters_get_voxels_only_where_shadows_pay_for_them(void **sta
 }
 
 static void marched_shapes_get_as_many_as_their_error_asks_for(void **state) {
-    (void)state;
     skip_without_embree();
     assert_int_equal(chosen(SUN AO, BALL, 1e6), 0); /* traced */
     assert_int_equal(chosen(SUN MARCHED, BALL, 1e6), 200);
@@ -264,7 +257,6 @@ static void marched_shapes_get_as_many_as_their_error_asks_for(void **state) {
 }
 
 static void what_is_named_stays_as_it_is(void **state) {
-    (void)state;
     assert_int_equal(chosen(SUN ", \"resolution\": 64", MESH, 1.0), VSH_RESOLUTION_NAMED);
     assert_int_equal(chosen(SUN ", \"resolution\": 256", MESH, 1.0), VSH_RESOLUTION_NAMED);
     assert_int_equal(chosen(SUN ", \"voxel_size\": 0.5", BALL, 1.0), VSH_RESOLUTION_NAMED);

@@ -7,7 +7,6 @@ static const double ORIGIN[3] = {0, 0, 0};
 static const double LOW[3] = {-1, -1, -1}, HIGH[3] = {1, 1, 1};
 
 static void rooms_and_domes_are_walls_around_air(void **state) {
-    (void)state;
     shape *s = shape_new();
     shape_box(s, LOW, HIGH, ALL_SIDES);
     shape_turn(s, 0);
@@ -50,7 +49,6 @@ static void build_house(shape *s, shape *room, shape *table) {
 }
 
 static void rooms_are_cut_out_of_houses(void **state) {
-    (void)state;
     shape *s = shape_new(), *room = shape_new(), *table = shape_new();
     build_house(s, s, s);
     assert_kinds_of(s, "house in one mesh", "SRS");
@@ -71,7 +69,6 @@ static void rooms_are_cut_out_of_houses(void **state) {
 }
 
 static void rooms_in_rooms_are_cut_out_of_what_they_lie_in(void **state) {
-    (void)state;
     shape *s = shape_new();
     const double half[5] = {5, 4, 3, 2, 1}; /* house, room, safe, room in it, gold */
     for (int i = 0; i < 5; ++i) {
@@ -96,7 +93,6 @@ static void rooms_in_rooms_are_cut_out_of_what_they_lie_in(void **state) {
 }
 
 static void a_pillar_that_reaches_into_a_room_is_not_cut(void **state) {
-    (void)state;
     shape *s = shape_new();
     build_house(s, s, s);
     s->triangles -= 12;
@@ -113,7 +109,6 @@ static void a_pillar_that_reaches_into_a_room_is_not_cut(void **state) {
 }
 
 static void rooms_of_separate_quads_are_sheets_and_never_nothing(void **state) {
-    (void)state;
     shape *s[6];
     vsh_mesh meshes[6];
     for (int i = 0; i < 6; ++i) {
@@ -143,7 +138,6 @@ static void rooms_of_separate_quads_are_sheets_and_never_nothing(void **state) {
 }
 
 static void an_open_room_in_an_open_house_closes_neither(void **state) {
-    (void)state;
     shape *s = shape_new();
     const double wide_low[3] = {-1.2, -1.2, -1.2}, wide_high[3] = {1.2, 1.2, 1.2};
     shape_ball(s, ORIGIN, 1.3, -1.0, 0.95, 48);
@@ -161,7 +155,6 @@ static void an_open_room_in_an_open_house_closes_neither(void **state) {
 
 /* A tube of 8, open at both ends, through whose length the sun is seen. */
 static void no_ray_through_two_holes_is_proved_hidden(void **state) {
-    (void)state;
     if (!vsh_triangles_available()) {
         skip();
     }
@@ -202,7 +195,6 @@ static void no_ray_through_two_holes_is_proved_hidden(void **state) {
 
 /* A room whose faces look inwards, and the floor of it. */
 static void the_floor_of_an_inward_room_has_the_ao_of_a_room(void **state) {
-    (void)state;
     const double low[3] = {-1, -1, -1}, high[3] = {1, 1, 1};
     shape *s = shape_new();
     shape_box(s, low, high, ALL_SIDES);
@@ -240,7 +232,6 @@ static void the_floor_of_an_inward_room_has_the_ao_of_a_room(void **state) {
 /* Points nearer to a sheet than half of the thickness that it has as a shell in the voxels, on the sun's side
  * of it. */
 static void no_ray_is_proved_hidden_by_the_thickness_of_a_sheet(void **state) {
-    (void)state;
     if (!vsh_triangles_available()) {
         skip();
     }
