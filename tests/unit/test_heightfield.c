@@ -1,4 +1,5 @@
 /* Heightfields as meshes and as images, and what is wrong with some. */
+#include "expect.h"
 #include "images.h"
 #include "terrain.h"
 
@@ -123,19 +124,18 @@ static void a_band_that_would_take_minutes_is_refused_and_the_one_it_names_is_no
     options.resolution = 24;
     options.half_width = 100.0;
     vsh_grid *grid = NULL;
-    vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &error), VSH_ERROR_LIMIT);
-    const char *most = strstr(error.message, "use at most ");
-    assert_non_null(strstr(error.message, "half_width 100"));
+    expect_error(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT, "");
+    const char *most = strstr(failure.message, "use at most ");
+    assert_non_null(strstr(failure.message, "half_width 100"));
     assert_non_null(most);
     /* cancelled as soon as it begins */
     options.half_width = atof(most + strlen("use at most "));
     vsh_run run = vsh_run_default();
     run.progress = stop_at_once;
-    assert_int_equal(vsh_grid_from_meshes(&mesh, 1, &options, &run, &grid, &error), VSH_ERROR_CANCELLED);
+    expect_error(vsh_grid_from_meshes(&mesh, 1, &options, &run, &grid, &failure), VSH_ERROR_CANCELLED, "");
     options.half_width = 12.0;
     run.progress = NULL;
-    assert_int_equal(vsh_grid_from_meshes(&mesh, 1, &options, &run, &grid, &error), VSH_OK);
+    expect_ok(vsh_grid_from_meshes(&mesh, 1, &options, &run, &grid, &failure));
     vsh_grid_free(grid);
     vsh_model_free(model);
     free(values);
@@ -155,8 +155,7 @@ static void the_field_of_a_heightfield_holds_distances_not_gaps(void **state) {
     options.voxel_size = 0.05;
     options.half_width = 8.0;
     vsh_grid *grid = NULL;
-    vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &error), VSH_OK);
+    expect_ok(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure));
     vsh_field *field = field_of_grid(grid, 0.0);
     for (int i = 0; i < 40; ++i) {
         const double gap = -0.6 + 1.2 * i / 39.0, x = -1.0 + i * 0.05;
@@ -406,8 +405,7 @@ static void no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_defaul
         const vsh_image image = {SIDE, SIDE, 1, names, views, NULL};
         vsh_image_options write = vsh_image_options_default();
         write.bits = 32;
-        vsh_error error = {VSH_OK, ""};
-        assert_ok(vsh_image_write(at("hill.exr"), &image, &write, &error), &error);
+        expect_ok(vsh_image_write(at("hill.exr"), &image, &write, &failure));
         const vsh_heights_source source = source_of(values, SIDE, SIDE, 10.0, 2.0);
         vsh_model *model = model_of(&source, VSH_HEIGHTS_SOLID);
         const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
@@ -429,13 +427,11 @@ static void no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_defaul
             scene.shade.ao_distance = 1.0;
             vsh_assets *assets = NULL;
             vsh_occluders *occluders = NULL;
-            assert_ok(vsh_assets_load(&scene, NULL, &assets, &error), &error);
-            assert_ok(vsh_scene_occluders(&scene, assets, NULL, NULL, &occluders, &error), &error);
-            assert_ok(
-                vsh_shade_shadow(occluders, &points, &light, &scene.shade, NULL, shadow, NULL, NULL, &error),
-                &error);
-            assert_ok(vsh_shade_ao(occluders, &points, &scene.shade, NULL, ao, NULL, NULL, NULL, &error),
-                      &error);
+            expect_ok(vsh_assets_load(&scene, NULL, &assets, &failure));
+            expect_ok(vsh_scene_occluders(&scene, assets, NULL, NULL, &occluders, &failure));
+            expect_ok(vsh_shade_shadow(occluders, &points, &light, &scene.shade, NULL, shadow, NULL, NULL,
+                                       &failure));
+            expect_ok(vsh_shade_ao(occluders, &points, &scene.shade, NULL, ao, NULL, NULL, NULL, &failure));
             truth_mesh_light(rays, points.count, positions, normals, towards, tan(RADIANS(2.0)), RAYS, 0,
                              truth[0]);
             truth_mesh_ao(rays, points.count, positions, normals, 1.0, RAYS, 0, truth[1]);
@@ -469,10 +465,9 @@ static void check_image(const char *name, int32_t bits, int32_t channels, const 
     vsh_image_options options = vsh_image_options_default();
     options.bits = bits;
     options.pack = channels == 3 ? NULL : strstr(name, ".exr") != NULL ? NULL : "R=Y,G=Y,B=Y";
-    vsh_error error = {VSH_OK, ""};
-    assert_ok(vsh_image_write(at(name), &image, &options, &error), &error);
+    expect_ok(vsh_image_write(at(name), &image, &options, &failure));
     vsh_assets *assets = NULL;
-    assert_ok(load(at(name), &assets, &error), &error);
+    expect_ok(load(at(name), &assets, &failure));
     size_t count = 0;
     const vsh_mesh *mesh = vsh_assets_caster(assets, 0, &count);
     assert_int_equal(count, 1);
@@ -503,21 +498,17 @@ static void bad_images_are_refused_with_their_place(void **state) {
     const float *views[1] = {values};
     values[7] = NAN;
     vsh_image image = {4, 3, 1, names, views, NULL};
-    vsh_error error = {VSH_OK, ""};
     vsh_assets *assets = NULL;
-    assert_ok(vsh_image_write(at("nan.exr"), &image, NULL, &error), &error);
-    assert_int_equal(load(at("nan.exr"), &assets, &error), VSH_ERROR_INPUT);
-    assert_non_null(strstr(error.message, "nan.exr: row 1, column 3: value"));
+    expect_ok(vsh_image_write(at("nan.exr"), &image, NULL, &failure));
+    expect_error(load(at("nan.exr"), &assets, &failure), VSH_ERROR_INPUT, "nan.exr: row 1, column 3: value");
     assert_null(assets);
     values[7] = 3e38f; /* finite, but not four times that */
-    assert_ok(vsh_image_write(at("huge.exr"), &image, NULL, &error), &error);
-    assert_int_equal(load(at("huge.exr"), &assets, &error), VSH_ERROR_INPUT);
-    assert_non_null(strstr(error.message, "row 1, column 3"));
+    expect_ok(vsh_image_write(at("huge.exr"), &image, NULL, &failure));
+    expect_error(load(at("huge.exr"), &assets, &failure), VSH_ERROR_INPUT, "row 1, column 3");
     image.height = 1;
-    assert_ok(vsh_image_write(at("line.exr"), &image, NULL, &error), &error);
-    assert_int_equal(load(at("line.exr"), &assets, &error), VSH_ERROR_INPUT);
-    assert_non_null(strstr(error.message, "4 × 1 pixels"));
-    assert_int_equal(load(at("none.png"), &assets, &error), VSH_ERROR_READ);
+    expect_ok(vsh_image_write(at("line.exr"), &image, NULL, &failure));
+    expect_error(load(at("line.exr"), &assets, &failure), VSH_ERROR_INPUT, "4 × 1 pixels");
+    expect_error(load(at("none.png"), &assets, &failure), VSH_ERROR_READ, "");
 }
 
 static void bad_sources_are_refused(void **state) {
@@ -562,15 +553,14 @@ static void bad_sources_are_refused(void **state) {
     for (size_t i = 0; i < 12; ++i) {
         vsh_heights *heights = NULL;
         vsh_model *model = NULL;
-        vsh_error error = {VSH_OK, ""};
-        assert_int_equal(vsh_heights_create(&cases[i].source, NULL, &heights, &error), cases[i].code);
-        if (strstr(error.message, cases[i].message) == NULL) {
-            fail_msg("%zu: %s", i, error.message);
+        assert_int_equal(vsh_heights_create(&cases[i].source, NULL, &heights, &failure), cases[i].code);
+        if (strstr(failure.message, cases[i].message) == NULL) {
+            fail_msg("%zu: %s", i, failure.message);
         }
         assert_null(heights);
         if (i != 11) {
             assert_int_equal(
-                vsh_model_from_heights(&cases[i].source, VSH_HEIGHTS_SOLID, NULL, &model, &error),
+                vsh_model_from_heights(&cases[i].source, VSH_HEIGHTS_SOLID, NULL, &model, &failure),
                 cases[i].code);
             assert_null(model);
         }
@@ -581,15 +571,14 @@ static void memory_limits_hold_before_memory_is_taken(void **state) {
     float *values = hills(SIDE, SIDE);
     const vsh_heights_source source = source_of(values, SIDE, SIDE, 10.0, 2.0);
     vsh_run run = vsh_run_default();
-    vsh_error error = {VSH_OK, ""};
     run.memory_limit = 3 * SIDE * SIDE;
     vsh_heights *heights = NULL;
     vsh_model *model = NULL;
-    assert_int_equal(vsh_heights_create(&source, &run, &heights, &error), VSH_ERROR_LIMIT);
-    assert_int_equal(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, &run, &model, &error),
-                     VSH_ERROR_LIMIT);
+    expect_error(vsh_heights_create(&source, &run, &heights, &failure), VSH_ERROR_LIMIT, "");
+    expect_error(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, &run, &model, &failure), VSH_ERROR_LIMIT,
+                 "");
     run.memory_limit = 5 * SIDE * SIDE;
-    assert_int_equal(vsh_heights_create(&source, &run, &heights, &error), VSH_OK);
+    expect_ok(vsh_heights_create(&source, &run, &heights, &failure));
     vsh_heights_info info;
     vsh_heights_get_info(heights, &info);
     assert_true(info.bytes <= run.memory_limit);

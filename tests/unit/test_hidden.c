@@ -1,4 +1,5 @@
 /* What is hidden where surfaces touch: vsh_lightmap_fill_hidden(), and the tree that it asks. */
+#include "expect.h"
 #include "seams.h"
 
 #include "bake/places.h"
@@ -126,11 +127,8 @@ static uint64_t fill(const vsh_charts *charts, const planes *p, int32_t threads)
     const vsh_lightmap map = {.ao = p->ao, .coverage = p->coverage, .irradiance = p->light};
     vsh_run run = vsh_run_default();
     uint64_t filled = UINT64_MAX;
-    vsh_error error = {0};
     run.threads = threads;
-    if (vsh_lightmap_fill_hidden(charts, &map, 0, &run, &filled, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(vsh_lightmap_fill_hidden(charts, &map, 0, &run, &filled, &failure));
     return filled;
 }
 
@@ -271,16 +269,15 @@ static void threads_limits_and_bad_calls(void **state) {
     fill(charts, &p, 1);
     const vsh_lightmap map = {.ao = q.ao, .coverage = q.coverage}, none = {.ao = q.ao};
     vsh_run run = vsh_run_default();
-    vsh_error error = {0};
     run.memory_limit = 1000;
-    assert_int_equal(vsh_lightmap_fill_hidden(charts, &map, 0, &run, NULL, &error), VSH_ERROR_LIMIT);
-    assert_non_null(strstr(error.message, "hidden charts"));
+    expect_error(vsh_lightmap_fill_hidden(charts, &map, 0, &run, NULL, &failure), VSH_ERROR_LIMIT,
+                 "hidden charts");
     run = vsh_run_default();
     run.progress = stop;
-    assert_int_equal(vsh_lightmap_fill_hidden(charts, &map, 0, &run, NULL, &error), VSH_ERROR_CANCELLED);
-    assert_int_equal(vsh_lightmap_fill_hidden(charts, &none, 0, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_lightmap_fill_hidden(NULL, &map, 0, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_lightmap_fill_hidden(charts, NULL, 0, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
+    expect_error(vsh_lightmap_fill_hidden(charts, &map, 0, &run, NULL, &failure), VSH_ERROR_CANCELLED, "");
+    expect_error(vsh_lightmap_fill_hidden(charts, &none, 0, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
+    expect_error(vsh_lightmap_fill_hidden(NULL, &map, 0, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
+    expect_error(vsh_lightmap_fill_hidden(charts, NULL, 0, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
     fill(charts, &q, 4); /* and none of these had changed it */
     assert_memory_equal(p.ao, q.ao, TEXELS * sizeof *p.ao);
     free_planes(&p);

@@ -1,4 +1,5 @@
 /* AO of what is over a horizon: the share of those directions that is free. */
+#include "expect.h"
 #include "previews.h"
 #include "shading.h"
 
@@ -113,10 +114,7 @@ static void shares_of_what_is_over_a_horizon_are_the_rays(void **state) {
     for (int u = 0; u < 2; ++u) {
         find_truth(s, ups[u]);
         for (int m = 0; m < (s->triangles != NULL ? 3 : 2); ++m) {
-            vsh_error error = {VSH_OK, ""};
-            if (shade(s, methods[m], ups[u], s->values, &error) != VSH_OK) {
-                fail_msg("%s", error.message);
-            }
+            expect_ok(shade(s, methods[m], ups[u], s->values, &failure));
             double square = 0.0, mean = 0.0;
             for (size_t i = 0; i < POINTS; ++i) {
                 const double off =
@@ -137,9 +135,7 @@ static void what_knows_no_horizon_says_so(void **state) {
     stage *s = set_up();
     static const int32_t methods[] = {VSH_AO_TAPS, VSH_AO_CONES};
     for (int m = 0; m < 2; ++m) {
-        vsh_error error = {VSH_OK, ""};
-        assert_int_equal(shade(s, methods[m], up, s->values, &error), VSH_ERROR_ARGUMENT);
-        assert_non_null(strstr(error.message, "over a horizon"));
+        expect_error(shade(s, methods[m], up, s->values, &failure), VSH_ERROR_ARGUMENT, "over a horizon");
     }
     vsh_shade_options options = vsh_shade_options_default();
     options.ao_method = VSH_AO_ADAPTIVE;

@@ -1,5 +1,6 @@
 /* Meshes that nobody should make: each becomes the right solid, with a warning where there is a doubt, or is
  * refused with the reason. */
+#include "expect.h"
 #include "grids.h"
 
 static const float positions[24] = {-1, -1, -1, 1, -1, -1, 1, 1, -1, -1, 1, -1,
@@ -27,9 +28,7 @@ static vsh_grid *grid_of(const vsh_mesh *mesh) {
     run.notes = 1;
     warned[0] = '\0';
     vsh_grid *grid = NULL;
-    if (vsh_grid_from_meshes(mesh, 1, &options, &run, &grid, &failure) != VSH_OK) {
-        fail_msg("%s", failure.message);
-    }
+    expect_ok(vsh_grid_from_meshes(mesh, 1, &options, &run, &grid, &failure));
     return grid;
 }
 
@@ -125,7 +124,7 @@ static void a_million_triangles_without_area_change_nothing(void **state) {
     }
     const vsh_mesh mesh = cube_of(positions, indices, MANY + 12);
     vsh_mesh_report report;
-    assert_int_equal(vsh_mesh_check(&mesh, &report, &failure), VSH_OK);
+    expect_ok(vsh_mesh_check(&mesh, &report, &failure));
     assert_int_equal(report.degenerate_triangles, MANY);
     assert_int_equal(report.open_edges, 0);
     vsh_grid *grid = grid_of(&mesh);

@@ -1,4 +1,5 @@
 /* Images: what formats keep. test_image_errors.c has what is refused, and damaged files. */
+#include "expect.h"
 #include "images.h"
 
 static int32_t channel_of(const vsh_image *image, const char *name) {
@@ -13,14 +14,13 @@ static int32_t channel_of(const vsh_image *image, const char *name) {
 
 static vsh_image_file *write_and_read(const char *path, const vsh_image *image, int32_t bits,
                                       const char *pack) {
-    vsh_error error = {0};
     vsh_image_options options = vsh_image_options_default();
     options.bits = bits;
     options.pack = pack;
-    assert_ok(vsh_image_check(path, image, &options, &error), &error);
-    assert_ok(vsh_image_write(path, image, &options, &error), &error);
+    expect_ok(vsh_image_check(path, image, &options, &failure));
+    expect_ok(vsh_image_write(path, image, &options, &failure));
     vsh_image_file *file = NULL;
-    assert_ok(vsh_image_read(path, NULL, &file, &error), &error);
+    expect_ok(vsh_image_read(path, NULL, &file, &failure));
     return file;
 }
 
@@ -229,19 +229,17 @@ static void unpack_iff_tile(const unsigned char *from, size_t size, size_t pixel
 /* Maya's IFF, which the library does not read: FOR4 CIMG { TBHD, FOR4 TBMP { RGBA … } }, tiles from the
  * bottom up, of 8 bits with alpha. */
 static vsh_image_file *write_and_read_iff(const char *path, const vsh_image *image, const char *pack) {
-    vsh_error error = {0};
     vsh_image_options options = vsh_image_options_default();
     options.pack = pack;
-    assert_ok(vsh_image_write(path, image, &options, &error), &error);
+    expect_ok(vsh_image_write(path, image, &options, &failure));
     unsigned char *bytes, *tile = malloc(4 * 64 * 64);
     const size_t size = read_all(path, &bytes);
     assert_memory_equal(bytes, "FOR4", 4);
     assert_int_equal(big_endian(bytes + 4, 4), size - 8);
     assert_memory_equal(bytes + 8, "CIMGTBHD", 8);
     vsh_image_file *file;
-    assert_ok(vshi_image_file_new(path, NULL, big_endian(bytes + 20, 4), big_endian(bytes + 24, 4), 4, &file,
-                                  &error),
-              &error);
+    expect_ok(vshi_image_file_new(path, NULL, big_endian(bytes + 20, 4), big_endian(bytes + 24, 4), 4, &file,
+                                  &failure));
     const size_t header = 20 + big_endian(bytes + 16, 4), tiles = big_endian(bytes + 38, 2);
     assert_memory_equal(bytes + header, "FOR4", 4);
     assert_memory_equal(bytes + header + 8, "TBMP", 4);
@@ -332,15 +330,13 @@ static void lossy_formats_keep_grey(void **state) {
 static void icons_of_fewer_bits_are_not_given_to_their_reader(void **state) {
     sample s;
     make(&s, 5, 5, 3, LIGHTMAP);
-    vsh_error error = {0};
-    assert_ok(vsh_image_write(at("icon.ico"), &s.image, NULL, &error), &error);
+    expect_ok(vsh_image_write(at("icon.ico"), &s.image, NULL, &failure));
     unsigned char *bytes;
     const size_t size = read_all(at("icon.ico"), &bytes);
     bytes[22 + 14] = 24;
     write_all(at("icon.ico"), bytes, size);
     vsh_image_file *file = NULL;
-    assert_int_equal(vsh_image_read(at("icon.ico"), NULL, &file, &error), VSH_ERROR_UNSUPPORTED);
-    assert_non_null(strstr(error.message, "32 bits"));
+    expect_error(vsh_image_read(at("icon.ico"), NULL, &file, &failure), VSH_ERROR_UNSUPPORTED, "32 bits");
     free(bytes);
     unmake(&s);
 }

@@ -1,4 +1,5 @@
 /* Images that cannot be written or read: what is refused, what is left behind, damaged files. */
+#include "expect.h"
 #include "images.h"
 
 #include <fcntl.h>
@@ -20,12 +21,11 @@ static void refused(const char *path, const vsh_image *image, int32_t bits, cons
     options.bits = bits;
     options.pack = pack;
     for (int write = 0; write < 2; ++write) {
-        vsh_error error = {0};
-        const vsh_result result = write ? vsh_image_write(path, image, &options, &error)
-                                        : vsh_image_check(path, image, &options, &error);
-        if (result != code || error.code != code || strstr(error.message, named) == NULL) {
+        const vsh_result result = write ? vsh_image_write(path, image, &options, &failure)
+                                        : vsh_image_check(path, image, &options, &failure);
+        if (result != code || failure.code != code || strstr(failure.message, named) == NULL) {
             fail_msg("%s, pack '%s', %d bits: %s '%s', expected %s with '%s'", path, pack != NULL ? pack : "",
-                     bits, vsh_result_name(result), error.message, vsh_result_name(code), named);
+                     bits, vsh_result_name(result), failure.message, vsh_result_name(code), named);
         }
     }
 }
@@ -96,9 +96,9 @@ static void bad_images_are_refused(void **state) {
     bad.width = 1 << 20;
     bad.height = 1 << 20;
     refused(at("x.tif"), &bad, 0, NULL, VSH_ERROR_LIMIT, "2^31");
-    vsh_error error = {0};
-    assert_int_equal(vsh_image_write(at("x.exr"), &bad, NULL, &error), VSH_ERROR_LIMIT); /* not row by row */
-    assert_non_null(strstr(error.message, "2^31"));
+    expect_error(vsh_image_write(at("x.exr"), &bad, NULL, &failure), VSH_ERROR_LIMIT,
+                 ""); /* not row by row */
+    assert_non_null(strstr(failure.message, "2^31"));
     bad = s.image;
     bad.channel_count = 0;
     refused(at("x.exr"), &bad, 0, NULL, VSH_ERROR_ARGUMENT, "0 channels");
@@ -116,11 +116,9 @@ static void bad_images_are_refused(void **state) {
     refused(at("x.exr"), &s.image, 0, NULL, VSH_ERROR_ARGUMENT, "127");
     s.names[1] = "ao";
     s.planes[1] = NULL;
-    error = (vsh_error){0};
-    assert_int_equal(vsh_image_write(at("x.exr"), &s.image, NULL, &error), VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "'ao'"));
+    expect_error(vsh_image_write(at("x.exr"), &s.image, NULL, &failure), VSH_ERROR_ARGUMENT, "'ao'");
     s.image.planes = NULL; /* enough for a check before the bake */
-    assert_int_equal(vsh_image_check(at("x.exr"), &s.image, NULL, &error), VSH_OK);
+    expect_ok(vsh_image_check(at("x.exr"), &s.image, NULL, &failure));
     unmake(&s);
 }
 
@@ -155,8 +153,7 @@ static void a_full_disk_leaves_the_old_file_and_nothing_else(void **state) {
     const unsigned char old[] = "the old content";
     for (size_t n = 0; n < sizeof names / sizeof names[0]; ++n) {
         const char *path = at(names[n]);
-        vsh_error error = {0};
-        assert_ok(vsh_image_write(path, &s.image, NULL, &error), &error);
+        expect_ok(vsh_image_write(path, &s.image, NULL, &failure));
         struct stat status;
         assert_int_equal(stat(path, &status), 0);
         const rlim_t limits[] = {0, 100, (rlim_t)status.st_size / 2, (rlim_t)status.st_size - 1};
@@ -165,7 +162,7 @@ static void a_full_disk_leaves_the_old_file_and_nothing_else(void **state) {
         for (size_t l = 0; l < sizeof limits / sizeof limits[0]; ++l) {
             const struct rlimit limit = {limits[l], old_limit.rlim_max};
             assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
-            const vsh_result result = vsh_image_write(path, &s.image, NULL, &error);
+            const vsh_result result = vsh_image_write(path, &s.image, NULL, &failure);
             assert_int_equal(setrlimit(RLIMIT_FSIZE, &old_limit), 0);
             if (result != VSH_ERROR_WRITE) {
                 fail_msg("%s at %llu of %llu bytes: %s", names[n], (unsigned long long)limits[l],
@@ -197,10 +194,9 @@ static void the_same_image_is_the_same_bytes_later_elsewhere(void **state) {
     assert_true(back >= 0 && chdir(at("")) == 0);
     for (int pass = 0; pass < 2; ++pass) {
         for (size_t n = 0; n < COUNT; ++n) {
-            vsh_error error = {0};
             char name[16];
             snprintf(name, sizeof name, "%s.%s", pass == 0 ? "t" : "other", formats[n]);
-            assert_ok(vsh_image_write(name, &s.image, NULL, &error), &error);
+            expect_ok(vsh_image_write(name, &s.image, NULL, &failure));
             if (pass == 0) {
                 sizes[n] = read_all(name, &bytes[n]);
                 continue;
@@ -229,8 +225,7 @@ static void cut_files_are_errors(void **state) {
     make(&s, 33, 40, 3, LIGHTMAP);
     for (size_t n = 0; n < sizeof names / sizeof names[0]; ++n) {
         const char *path = at(names[n]);
-        vsh_error error = {0};
-        assert_ok(vsh_image_write(path, &s.image, NULL, &error), &error);
+        expect_ok(vsh_image_write(path, &s.image, NULL, &failure));
         unsigned char *bytes;
         const size_t size = read_all(path, &bytes);
         /* what stands behind the pixels may be missing: PNG's last chunk, TGA's footer */
@@ -239,7 +234,7 @@ static void cut_files_are_errors(void **state) {
         for (size_t cut = 0; cut < size; cut += cut < 500 ? 1 : 37) {
             write_all(path, bytes, cut);
             vsh_image_file *file = NULL;
-            const vsh_result result = vsh_image_read(path, NULL, &file, &error);
+            const vsh_result result = vsh_image_read(path, NULL, &file, &failure);
             if (result == VSH_OK) {
                 if (cut + trailer < size) {
                     fail_msg("%s cut to %zu of %zu bytes was read", names[n], cut, size);
@@ -249,8 +244,8 @@ static void cut_files_are_errors(void **state) {
                 ++errors;
                 assert_true(result == VSH_ERROR_READ || result == VSH_ERROR_INPUT);
                 assert_null(file);
-                assert_null(strchr(error.message, '\n'));
-                assert_non_null(strstr(error.message, names[n]));
+                assert_null(strchr(failure.message, '\n'));
+                assert_non_null(strstr(failure.message, names[n]));
             }
         }
         assert_true(errors > 0);
@@ -267,8 +262,7 @@ static void damaged_files_do_no_harm(void **state) {
     uint32_t seed = 1;
     for (size_t n = 0; n < sizeof names / sizeof names[0]; ++n) {
         const char *path = at(names[n]);
-        vsh_error error = {0};
-        assert_ok(vsh_image_write(path, &s.image, NULL, &error), &error);
+        expect_ok(vsh_image_write(path, &s.image, NULL, &failure));
         unsigned char *bytes;
         const size_t size = read_all(path, &bytes);
         for (int trial = 0; trial < 150; ++trial) {
@@ -281,7 +275,7 @@ static void damaged_files_do_no_harm(void **state) {
             write_all(path, bytes, size);
             bytes[place] = old;
             vsh_image_file *file = NULL;
-            const vsh_result result = vsh_image_read(path, NULL, &file, &error);
+            const vsh_result result = vsh_image_read(path, NULL, &file, &failure);
             assert_true((result == VSH_OK) == (file != NULL));
             vsh_image_free(file);
         }
@@ -291,18 +285,16 @@ static void damaged_files_do_no_harm(void **state) {
 }
 
 static void unreadable_paths_are_read_errors(void **state) {
-    vsh_error error = {0};
     vsh_image_file *file = NULL;
-    assert_int_equal(vsh_image_read(at("nothing.exr"), NULL, &file, &error), VSH_ERROR_READ);
-    assert_non_null(strstr(error.message, "nothing.exr"));
-    assert_int_equal(vsh_image_read(folder, NULL, &file, &error), VSH_ERROR_READ);
+    expect_error(vsh_image_read(at("nothing.exr"), NULL, &file, &failure), VSH_ERROR_READ, "nothing.exr");
+    expect_error(vsh_image_read(folder, NULL, &file, &failure), VSH_ERROR_READ, "");
     write_all(at("empty.png"), (const unsigned char *)"", 0);
-    assert_int_equal(vsh_image_read(at("empty.png"), NULL, &file, &error), VSH_ERROR_READ);
+    expect_error(vsh_image_read(at("empty.png"), NULL, &file, &failure), VSH_ERROR_READ, "");
     static const char *const never[] = {"text.txt", "x.iff", "x.fits"};
     for (size_t i = 0; i < sizeof never / sizeof never[0]; ++i) {
         write_all(at(never[i]), (const unsigned char *)"hello", 5);
-        assert_int_equal(vsh_image_read(at(never[i]), NULL, &file, &error), VSH_ERROR_INPUT);
-        assert_non_null(strstr(error.message, "no image format that is read"));
+        expect_error(vsh_image_read(at(never[i]), NULL, &file, &failure), VSH_ERROR_INPUT,
+                     "no image format that is read");
     }
     assert_null(file);
     vsh_image_free(NULL);
@@ -313,20 +305,19 @@ static void the_memory_limit_holds_without_a_reader(void **state) {
     sample s;
     make(&s, 33, 40, 3, LIGHTMAP);
     for (size_t n = 0; n < sizeof names / sizeof names[0]; ++n) {
-        vsh_error error = {0};
-        assert_ok(vsh_image_write(at(names[n]), &s.image, NULL, &error), &error);
+        expect_ok(vsh_image_write(at(names[n]), &s.image, NULL, &failure));
         vsh_run run = vsh_run_default();
         vsh_image_file *file = NULL;
-        assert_ok(vsh_image_read(at(names[n]), &run, &file, &error), &error);
+        expect_ok(vsh_image_read(at(names[n]), &run, &file, &failure));
         const vsh_image image = vsh_image_view(file);
         run.memory_limit = (uint64_t)(image.width * image.height * image.channel_count) * sizeof(float);
         vsh_image_free(file);
-        assert_ok(vsh_image_read(at(names[n]), &run, &file, &error), &error);
+        expect_ok(vsh_image_read(at(names[n]), &run, &file, &failure));
         vsh_image_free(file);
         --run.memory_limit;
-        assert_int_equal(vsh_image_read(at(names[n]), &run, &file, &error), VSH_ERROR_LIMIT);
+        expect_error(vsh_image_read(at(names[n]), &run, &file, &failure), VSH_ERROR_LIMIT, "");
         assert_null(file);
-        assert_non_null(strstr(error.message, names[n]));
+        assert_non_null(strstr(failure.message, names[n]));
     }
     unmake(&s);
 }
@@ -352,24 +343,23 @@ static void a_written_file_follows_links_and_keeps_its_mode(void **state) {
 static void outputs_are_made_beside_the_target_and_keep_its_ending(void **state) {
     vshi_output first;
     vshi_output second;
-    vsh_error error = {0};
     const char *path = at("grid.v1.vdb");
-    assert_ok(vshi_output_begin(&first, path, &error), &error);
-    assert_ok(vshi_output_begin(&second, path, &error), &error);
+    expect_ok(vshi_output_begin(&first, path, &failure));
+    expect_ok(vshi_output_begin(&second, path, &failure));
     assert_string_not_equal(first.temporary, second.temporary);
     assert_memory_equal(first.temporary, folder, strlen(folder));
     assert_string_equal(vshi_path_ending(first.temporary), "vdb");
     assert_int_equal(access(path, F_OK), -1);
     vshi_output_abandon(&second);
     assert_null(second.temporary);
-    assert_ok(vshi_output_commit(&first, &error), &error);
+    expect_ok(vshi_output_commit(&first, &failure));
     assert_int_equal(access(path, F_OK), 0);
     vshi_output_abandon(&first); /* nothing is left to do */
     char name[256];
     memset(name, 'n', 255);
     memcpy(name + 251, ".exr", 5);
-    assert_ok(vshi_output_begin(&first, at(name), &error), &error); /* the longest name there is */
-    assert_ok(vshi_output_commit(&first, &error), &error);
+    expect_ok(vshi_output_begin(&first, at(name), &failure)); /* the longest name there is */
+    expect_ok(vshi_output_commit(&first, &failure));
     assert_string_equal(vshi_path_ending("a.b/c"), "");
     assert_string_equal(vshi_path_ending(".exr"), "");
     assert_string_equal(vshi_path_ending("a/b.c.EXR"), "EXR");

@@ -1,4 +1,5 @@
 /* Images in pieces: written as their rows come they are those that are written whole; tiles are read. */
+#include "expect.h"
 #include "images.h"
 
 #include <openexr.h>
@@ -19,25 +20,23 @@ static vsh_result add_rows(vsh_image_writer *writer, const sample *s, int32_t fi
 
 static vsh_image_writer *begin(const char *path, const sample *s) {
     vsh_image_writer *writer = NULL;
-    vsh_error error = {0};
     vsh_image shape = s->image;
     shape.planes = NULL;
-    assert_ok(vsh_image_writer_create(path, &shape, NULL, &writer, &error), &error);
+    expect_ok(vsh_image_writer_create(path, &shape, NULL, &writer, &failure));
     return writer;
 }
 
 /* Pieces of 1, 2, 3 … or of `step` rows. */
 static void write_in_pieces(const char *path, const sample *s, int32_t step) {
     vsh_image_writer *writer = begin(path, s);
-    vsh_error error = {0};
     int32_t next = 1;
     for (int32_t first = 0; first < s->image.height;) {
         const int32_t left = s->image.height - first, wanted = step > 0 ? step : next++;
         const int32_t rows = left < wanted ? left : wanted;
-        assert_ok(add_rows(writer, s, first, rows, &error), &error);
+        expect_ok(add_rows(writer, s, first, rows, &failure));
         first += rows;
     }
-    assert_ok(vsh_image_writer_finish(writer, &error), &error);
+    expect_ok(vsh_image_writer_finish(writer, &failure));
 }
 
 static void assert_same_file(const char *path, const char *other) {
@@ -58,8 +57,7 @@ static void rows_make_the_bytes_of_the_whole_image(void **state) {
         char whole[16], pieces[16];
         snprintf(whole, sizeof whole, "whole.%s", ENDINGS[e]);
         snprintf(pieces, sizeof pieces, "pieces.%s", ENDINGS[e]);
-        vsh_error error = {0};
-        assert_ok(vsh_image_write(at(whole), &s.image, NULL, &error), &error);
+        expect_ok(vsh_image_write(at(whole), &s.image, NULL, &failure));
         write_in_pieces(at(pieces), &s, 0);
         assert_same_file(at(whole), at(pieces));
         write_in_pieces(at(pieces), &s, 64);
@@ -77,8 +75,7 @@ static void long_rows_make_them_too(void **state) {
         char whole[16], pieces[16];
         snprintf(whole, sizeof whole, "whole.%s", endings[e]);
         snprintf(pieces, sizeof pieces, "pieces.%s", endings[e]);
-        vsh_error error = {0};
-        assert_ok(vsh_image_write(at(whole), &s.image, NULL, &error), &error);
+        expect_ok(vsh_image_write(at(whole), &s.image, NULL, &failure));
         write_in_pieces(at(pieces), &s, 24);
         assert_same_file(at(whole), at(pieces));
         unlink(at(whole));
@@ -115,20 +112,17 @@ static void what_is_given_up_or_short_of_rows_leaves_the_old_file(void **state) 
         snprintf(name, sizeof name, "old.%s", ENDINGS[e]);
         write_all(at(name), old, sizeof old);
         for (int32_t rows = 0; rows <= 150; rows += 50) {
-            vsh_error error = {0};
             vsh_image_writer *writer = begin(at(name), &s);
             if (rows > 0) {
-                assert_ok(add_rows(writer, &s, 0, rows, &error), &error);
+                expect_ok(add_rows(writer, &s, 0, rows, &failure));
             }
             assert_int_equal(hidden_files(), 1);
             vsh_image_writer_abandon(writer);
             assert_untouched(at(name), old, sizeof old);
         }
-        vsh_error error = {0};
         vsh_image_writer *writer = begin(at(name), &s);
-        assert_ok(add_rows(writer, &s, 0, 149, &error), &error);
-        assert_int_equal(vsh_image_writer_finish(writer, &error), VSH_ERROR_ARGUMENT);
-        assert_non_null(strstr(error.message, "149 of 150"));
+        expect_ok(add_rows(writer, &s, 0, 149, &failure));
+        expect_error(vsh_image_writer_finish(writer, &failure), VSH_ERROR_ARGUMENT, "149 of 150");
         assert_untouched(at(name), old, sizeof old);
     }
     unmake(&s);
@@ -137,16 +131,14 @@ static void what_is_given_up_or_short_of_rows_leaves_the_old_file(void **state) 
 static void rows_that_are_none_of_it_are_refused(void **state) {
     sample s;
     make(&s, 20, 10, 3, LIGHTMAP);
-    vsh_error error = {0};
     vsh_image_writer *writer = begin(at("refused.exr"), &s);
-    assert_int_equal(add_rows(writer, &s, 0, 0, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(add_rows(writer, &s, 0, 11, &error), VSH_ERROR_ARGUMENT);
+    expect_error(add_rows(writer, &s, 0, 0, &failure), VSH_ERROR_ARGUMENT, "");
+    expect_error(add_rows(writer, &s, 0, 11, &failure), VSH_ERROR_ARGUMENT, "");
     s.planes[1] = NULL;
-    assert_int_equal(vsh_image_writer_add(writer, 10, s.planes, &error), VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "'ao'"));
+    expect_error(vsh_image_writer_add(writer, 10, s.planes, &failure), VSH_ERROR_ARGUMENT, "'ao'");
     vsh_image_writer_abandon(writer);
     vsh_image_writer_abandon(NULL);
-    assert_int_equal(vsh_image_writer_create(at("x.exr"), NULL, NULL, &writer, &error), VSH_ERROR_ARGUMENT);
+    expect_error(vsh_image_writer_create(at("x.exr"), NULL, NULL, &writer, &failure), VSH_ERROR_ARGUMENT, "");
     assert_null(writer);
     unmake(&s);
 }
@@ -168,14 +160,13 @@ static void a_full_disk_leaves_the_old_file(void **state) {
         write_all(at(name), old, sizeof old);
         const struct rlimit limit = {(rlim_t)status.st_size / 2, old_limit.rlim_max};
         vsh_image_writer *writer = begin(at(name), &s);
-        vsh_error error = {0};
         vsh_result result = VSH_OK;
         assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
         for (int32_t first = 0; first < 150 && result == VSH_OK; first += 50) {
-            result = add_rows(writer, &s, first, 50, &error);
+            result = add_rows(writer, &s, first, 50, &failure);
         }
         if (result == VSH_OK) {
-            result = vsh_image_writer_finish(writer, &error);
+            result = vsh_image_writer_finish(writer, &failure);
         } else {
             vsh_image_writer_abandon(writer);
         }
@@ -268,8 +259,7 @@ static void the_finest_level_is_read_to_the_bit(void **state) {
         make(&s, t->width, t->height, CHANNELS, NAMES);
         write_tiles(at("tiles.exr"), t, &s);
         vsh_image_file *file = NULL;
-        vsh_error error = {0};
-        assert_ok(vsh_image_read(at("tiles.exr"), NULL, &file, &error), &error);
+        expect_ok(vsh_image_read(at("tiles.exr"), NULL, &file, &failure));
         const vsh_image view = vsh_image_view(file);
         assert_int_equal(view.width, t->width);
         assert_int_equal(view.height, t->height);
@@ -297,8 +287,7 @@ static void reading_can_be_cancelled_between_rows_of_tiles(void **state) {
     vsh_run run = vsh_run_default();
     run.progress = stop_at_half;
     vsh_image_file *file = NULL;
-    vsh_error error = {0};
-    assert_int_equal(vsh_image_read(at("cancelled.exr"), &run, &file, &error), VSH_ERROR_CANCELLED);
+    expect_error(vsh_image_read(at("cancelled.exr"), &run, &file, &failure), VSH_ERROR_CANCELLED, "");
     assert_null(file);
     unmake(&s);
 }
@@ -314,10 +303,9 @@ static void cut_files_are_refused(void **state) {
     for (size_t i = 0; i < sizeof cuts / sizeof cuts[0]; ++i) {
         write_all(at("cut.exr"), bytes, size - cuts[i]);
         vsh_image_file *file = NULL;
-        vsh_error error = {0};
-        const vsh_result result = vsh_image_read(at("cut.exr"), NULL, &file, &error);
+        const vsh_result result = vsh_image_read(at("cut.exr"), NULL, &file, &failure);
         assert_true(result == VSH_ERROR_INPUT || result == VSH_ERROR_READ);
-        assert_non_null(strstr(error.message, "cut.exr"));
+        assert_non_null(strstr(failure.message, "cut.exr"));
         assert_null(file);
     }
     free(bytes);

@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "bake/texels.h"
+#include "expect.h"
 #include "shade/inside.h"
 
 #include <vdbshade/vdbshade.h>
@@ -27,28 +28,27 @@ typedef struct counts {
 
 /* Bakes meshes without voxels, and looks at each sample on a flat triangle anew. */
 static counts compare(const vsh_mesh *meshes, size_t mesh_count, int32_t size) {
-    vsh_error error = {VSH_OK, ""};
     vsh_triangles *triangles = NULL;
     vsh_occluders *occluders = NULL;
     vsh_charts *charts = NULL;
     vsh_texels *texels = NULL;
-    check(vsh_triangles_create(meshes, mesh_count, NULL, &triangles, &error), &error);
+    check(vsh_triangles_create(meshes, mesh_count, NULL, &triangles, &failure), &failure);
     vsh_occluder_parts parts = vsh_occluder_parts_default();
     parts.triangles = triangles;
-    check(vsh_occluders_from_parts(&parts, &occluders, &error), &error);
+    check(vsh_occluders_from_parts(&parts, &occluders, &failure), &failure);
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = size;
     options.ao_spacing = 1;
     options.shade.ao_method = VSH_AO_EXACT;
     options.shade.ao_distance = 0.1;
     options.shade.rays = 4;
-    check(vsh_charts_create(meshes, mesh_count, &options, NULL, NULL, &charts, &error), &error);
-    check(vsh_texels_create(charts, NULL, &texels, &error), &error);
+    check(vsh_charts_create(meshes, mesh_count, &options, NULL, NULL, &charts, &failure), &failure);
+    check(vsh_texels_create(charts, NULL, &texels, &failure), &failure);
     const vshi_samples *samples = &texels->samples;
     const size_t count = (size_t)size * (size_t)size;
     float *ao = calloc(count, sizeof *ao), *coverage = calloc(count, sizeof *coverage);
     const vsh_lightmap lightmap = {.ao = ao, .coverage = coverage};
-    check(vsh_bake_lightmap(occluders, charts, NULL, 0, NULL, NULL, &lightmap, NULL, &error), &error);
+    check(vsh_bake_lightmap(occluders, charts, NULL, 0, NULL, NULL, &lightmap, NULL, &failure), &failure);
     counts found = {0, 0, 0};
     for (size_t i = 0; i < samples->count; ++i) {
         const float *lift = samples->lift + 3 * i;
@@ -74,9 +74,8 @@ static counts compare(const vsh_mesh *meshes, size_t mesh_count, int32_t size) {
 
 /* Walls whose arches stand in them, columns on their bases, all solids: charts end where others begin. */
 static void samples_of_solids_in_each_other_are_where_they_are_by_themselves(void **state) {
-    vsh_error error = {VSH_OK, ""};
     vsh_model *model = NULL;
-    check(vsh_model_read(VSH_ASSETS "/cloister.glb", NULL, &model, &error), &error);
+    check(vsh_model_read(VSH_ASSETS "/cloister.glb", NULL, &model, &failure), &failure);
     const size_t mesh_count = vsh_model_mesh_count(model);
     vsh_mesh *meshes = calloc(mesh_count, sizeof *meshes);
     for (size_t i = 0; i < mesh_count; ++i) {

@@ -1,4 +1,5 @@
 /* Instruction sets: each that this machine has gives the same bits, the others are refused by name. */
+#include "expect.h"
 #include "traced.h"
 
 #include "base/isa.h"
@@ -125,9 +126,8 @@ static size_t sets_here(int32_t sets[VSHI_ISA_COUNT]) {
         if (vsh_isa_available(isa)) {
             sets[count++] = isa;
         } else {
-            vsh_error error;
-            assert_int_equal(vshi_isa_check(isa, &error), VSH_ERROR_ARGUMENT);
-            print_message("skipped: %s\n", error.message);
+            expect_error(vshi_isa_check(isa, &failure), VSH_ERROR_ARGUMENT, "");
+            print_message("skipped: %s\n", failure.message);
         }
     }
     sets[count++] = VSH_ISA_BEST;
@@ -149,17 +149,12 @@ static void shade_with(const caster *c, const vsh_light *light, int32_t method, 
     vsh_run run = vsh_run_default();
     run.isa = isa;
     const vsh_points points = {COUNT, positions, normals, NULL};
-    vsh_error error = {VSH_OK, ""};
     memset(o, 0, sizeof *o);
     o->stats = vsh_shade_stats_zero();
-    const vsh_result result = light != NULL
-                                  ? vsh_shade_shadow(occluders_of_caster(c), &points, light, &options, &run,
-                                                     o->value, o->deviation, &o->stats, &error)
-                                  : vsh_shade_ao(occluders_of_caster(c), &points, &options, &run, o->value,
-                                                 o->deviation, NULL, &o->stats, &error);
-    if (result != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(light != NULL ? vsh_shade_shadow(occluders_of_caster(c), &points, light, &options, &run,
+                                               o->value, o->deviation, &o->stats, &failure)
+                            : vsh_shade_ao(occluders_of_caster(c), &points, &options, &run, o->value,
+                                           o->deviation, NULL, &o->stats, &failure));
 }
 
 static void every_method_gives_the_same_bits_on_every_instruction_set(void **state) {
@@ -198,27 +193,25 @@ static void an_instruction_set_that_is_missing_or_unknown_is_refused_by_name(voi
     const vsh_points points = {1, place, NULL, NULL};
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     vsh_run run = vsh_run_default();
-    vsh_error error = {VSH_OK, ""};
     float value;
     for (int32_t isa = -1; isa <= VSHI_ISA_COUNT; ++isa) {
         run.isa = isa;
         const vsh_result result =
-            vsh_shade_shadow(occluders_of(field), &points, &light, NULL, &run, &value, NULL, NULL, &error);
+            vsh_shade_shadow(occluders_of(field), &points, &light, NULL, &run, &value, NULL, NULL, &failure);
         if (vsh_isa_available(isa)) {
             assert_int_equal(result, VSH_OK);
             continue;
         }
         assert_int_equal(result, VSH_ERROR_ARGUMENT);
-        assert_non_null(strstr(error.message, "isa"));
+        assert_non_null(strstr(failure.message, "isa"));
         assert_true(vsh_get_name(VSH_NAMES_ISA, isa) == NULL ||
-                    strstr(error.message, vsh_get_name(VSH_NAMES_ISA, isa)) != NULL);
+                    strstr(failure.message, vsh_get_name(VSH_NAMES_ISA, isa)) != NULL);
     }
     /* a run from before it had an instruction set */
     run.isa = -1;
     run.struct_size = offsetof(vsh_run, isa);
-    assert_int_equal(
-        vsh_shade_shadow(occluders_of(field), &points, &light, NULL, &run, &value, NULL, NULL, &error),
-        VSH_OK);
+    expect_ok(
+        vsh_shade_shadow(occluders_of(field), &points, &light, NULL, &run, &value, NULL, NULL, &failure));
     vsh_field_free(field);
 }
 

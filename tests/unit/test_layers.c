@@ -1,4 +1,5 @@
 /* Layers beside the field: what they hide, and how it is combined. */
+#include "expect.h"
 #include "field/field.h"
 #include "previews.h"
 #include "shading.h"
@@ -31,11 +32,7 @@ static vsh_field *nothing(double voxel) {
 static void shade(const vsh_occluders *occluders, const vsh_light *light, const vsh_shade_options *options,
                   float *values, float *deviation) {
     const vsh_points points = {COUNT, positions, normals, NULL};
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_shadow(occluders, &points, light, options, NULL, values, deviation, NULL, &error) !=
-        VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(vsh_shade_shadow(occluders, &points, light, options, NULL, values, deviation, NULL, &failure));
 }
 
 static vsh_layer layer_of(const vsh_field *field) {
@@ -287,11 +284,8 @@ static void bake_floor(const vsh_field *field, const vsh_layer *layers, size_t l
     float *planes[1] = {baked->shadow};
     const vsh_lightmap lightmap = {.shadow = planes, .ao = baked->ao};
     baked->stats = vsh_bake_stats_zero();
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_bake_lightmap(occluders_with(field, layers, layer_count), texels, &light, 1, &shade, NULL,
-                          &lightmap, &baked->stats, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(vsh_bake_lightmap(occluders_with(field, layers, layer_count), texels, &light, 1, &shade, NULL,
+                                &lightmap, &baked->stats, &failure));
     vsh_charts_free(texels);
 }
 
@@ -338,7 +332,6 @@ static void test_refused(void **state) {
     const vsh_light light = sun(towards, 0.2);
     const vsh_points points = {1, positions, normals, NULL};
     float value;
-    vsh_error error;
     const struct {
         const char *message;
         vsh_layer layer;
@@ -362,12 +355,12 @@ static void test_refused(void **state) {
         parts.layers = &layer;
         parts.layer_count = 1;
         vsh_occluders *made = NULL;
-        vsh_result result = vsh_occluders_from_parts(&parts, &made, &error);
+        vsh_result result = vsh_occluders_from_parts(&parts, &made, &failure);
         if (result == VSH_OK) { /* only the call knows the method */
-            result = vsh_shade_shadow(made, &points, &light, NULL, NULL, &value, NULL, NULL, &error);
+            result = vsh_shade_shadow(made, &points, &light, NULL, NULL, &value, NULL, NULL, &failure);
         }
         assert_int_equal(result, VSH_ERROR_ARGUMENT);
-        assert_string_equal(error.message, cases[i].message);
+        assert_string_equal(failure.message, cases[i].message);
         vsh_occluders_free(made);
     }
     vsh_field_free(empty);

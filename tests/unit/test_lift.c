@@ -3,6 +3,7 @@
 #include "bake/origins.h"
 #include "bake/texels.h"
 #include "casts.h"
+#include "expect.h"
 #include "texels_of.h"
 
 #include <stdbool.h>
@@ -47,16 +48,15 @@ typedef struct scene {
 } scene;
 
 static void open_scene(scene *s, const box *other) {
-    vsh_error error = {VSH_OK, ""};
     make_sphere(&s->ball, ROWS, 1.0);
     const vsh_mesh casters[2] = {s->ball.mesh, other != NULL ? other->mesh : (vsh_mesh){0}};
     const size_t count = other != NULL ? 2 : 1;
     vsh_grid_options grid_options = vsh_grid_options_default();
     grid_options.resolution = 64;
     vsh_grid *grid = NULL;
-    check(vsh_grid_from_meshes(casters, count, &grid_options, NULL, &grid, &error), &error);
-    check(vsh_field_create(grid, NULL, NULL, &s->field, &error), &error);
-    check(vsh_triangles_create(casters, count, NULL, &s->triangles, &error), &error);
+    check(vsh_grid_from_meshes(casters, count, &grid_options, NULL, &grid, &failure), &failure);
+    check(vsh_field_create(grid, NULL, NULL, &s->field, &failure), &failure);
+    check(vsh_triangles_create(casters, count, NULL, &s->triangles, &failure), &failure);
     vsh_grid_free(grid);
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = WIDTH;
@@ -88,10 +88,9 @@ static void close_scene(scene *s) {
 }
 
 static void bake(const scene *s, const vsh_light *lights, size_t light_count, const vsh_lightmap *planes) {
-    vsh_error error = {VSH_OK, ""};
     check(vsh_bake_lightmap(occluders_traced(s->field, s->triangles), s->charts, lights, light_count, NULL,
-                            NULL, planes, NULL, &error),
-          &error);
+                            NULL, planes, NULL, &failure),
+          &failure);
 }
 
 static double dot(const float *a, const double *b) {
@@ -135,10 +134,9 @@ static void rays_to_a_light_well_above_a_facet_begin_on_it(void **state) {
         const vsh_light *light = &lights[l];
         float *shadow = calloc(TEXELS, sizeof *shadow), *truth = calloc(TEXELS, sizeof *truth);
         bake(&s, light, 1, &(vsh_lightmap){.shadow = &shadow});
-        vsh_error error = {VSH_OK, ""};
         check(vsh_trace_shadow(s.triangles, NULL, s.flat.count, s.flat.positions, s.flat.geometric_normals,
-                               HAIR, light, 64, NULL, truth, &error),
-              &error);
+                               HAIR, light, 64, NULL, truth, &failure),
+              &failure);
         size_t hidden = 0, off = 0;
         for (size_t i = 0; i < s.flat.count; ++i) {
             double to[3];
@@ -197,7 +195,6 @@ static void pictures_show_no_facets_where_light_grazes_a_smooth_sphere(void **st
     static float color[3 * SIZE * SIZE], alpha[SIZE * SIZE], depth[SIZE * SIZE], normal[3 * SIZE * SIZE];
     scene s;
     open_scene(&s, NULL);
-    vsh_error error = {VSH_OK, ""};
     const vsh_light light = sun_towards(1.0, 0.4, 0.2);
     const vsh_lit_meshes lit = {&s.ball.mesh, 1, NULL, {1.0, 1.0, 1.0}, 0};
     vsh_render_options options = vsh_render_options_default();
@@ -210,8 +207,8 @@ static void pictures_show_no_facets_where_light_grazes_a_smooth_sphere(void **st
     options.lit = &lit;
     options.lit_count = 1;
     check(vsh_render(NULL, 0, occluders_traced(s.field, s.triangles), &light, 1, &options, NULL,
-                     &(vsh_picture){color, alpha, depth, normal}, NULL, &error),
-          &error);
+                     &(vsh_picture){color, alpha, depth, normal}, NULL, &failure),
+          &failure);
     size_t near = 0, dark = 0;
     for (size_t i = 0; i < SIZE * SIZE; ++i) {
         const float cosine = (float)dot(normal + 3 * i, light.direction);
@@ -256,10 +253,9 @@ static void ao_close_to_a_wall_is_that_of_the_facets(void **state) {
     open_scene(&s, &over);
     float *ao = calloc(TEXELS, sizeof *ao), *truth = calloc(TEXELS, sizeof *truth);
     bake(&s, NULL, 0, &(vsh_lightmap){.ao = ao});
-    vsh_error error = {VSH_OK, ""};
     check(vsh_trace_ao(s.triangles, NULL, s.flat.count, s.flat.positions, s.lifted.normals, HAIR, 0.1, 256,
-                       NULL, truth, &error),
-          &error);
+                       NULL, truth, &failure),
+          &failure);
     size_t under = 0;
     double worst = 0.0;
     for (size_t i = 0; i < s.flat.count; ++i) {
@@ -290,13 +286,12 @@ static void ao_of_a_smooth_convex_body_in_the_open_is_1(void **state) {
 static void queries_take_the_normals_of_faces_for_ao(void **state) {
     scene s;
     open_scene(&s, NULL);
-    vsh_error error = {VSH_OK, ""};
     vsh_shade_options options = vsh_shade_options_default();
     options.ao_method = VSH_AO_EXACT;
     options.ao_distance = 0.1;
     vsh_query *query = NULL;
-    check(vsh_query_create(occluders_traced(s.field, s.triangles), NULL, 0, &options, &query, &error),
-          &error);
+    check(vsh_query_create(occluders_traced(s.field, s.triangles), NULL, 0, &options, &query, &failure),
+          &failure);
     float *ao = calloc(s.flat.count, sizeof *ao);
     vsh_query_output output = vsh_query_output_default();
     output.ao = ao;
@@ -307,7 +302,7 @@ static void queries_take_the_normals_of_faces_for_ao(void **state) {
         for (int faces = 0; faces < 2; ++faces) {
             const vsh_points points = {counts[k], s.flat.positions, s.lifted.normals, NULL};
             layout.face_normals = faces ? s.flat.geometric_normals : NULL;
-            check(vsh_query_points(query, &points, &layout, NULL, &output, NULL, &error), &error);
+            check(vsh_query_points(query, &points, &layout, NULL, &output, NULL, &failure), &failure);
             for (size_t i = 0; i < counts[k]; ++i) {
                 dark[faces] += ao[i] < 1.0f;
             }
@@ -322,7 +317,6 @@ static void queries_take_the_normals_of_faces_for_ao(void **state) {
 
 /* A strip of 0.2 × 3 between walls half as high as it is wide. */
 static double mean_ao_between_walls(const float *normals) {
-    vsh_error error = {VSH_OK, ""};
     quad strip;
     make_quad(&strip, 0.0f, 0.0f, 0.1f, 1.0f);
     strip.mesh.normals = normals;
@@ -331,11 +325,11 @@ static double mean_ao_between_walls(const float *normals) {
     make_box(&walls[1], (double[]){0.2, 0.0, -0.1}, (double[]){0.3, 3.0, 0.1});
     const vsh_mesh casters[3] = {strip.mesh, walls[0].mesh, walls[1].mesh};
     vsh_triangles *triangles = NULL;
-    check(vsh_triangles_create(casters, 3, NULL, &triangles, &error), &error);
+    check(vsh_triangles_create(casters, 3, NULL, &triangles, &failure), &failure);
     vsh_occluder_parts parts = vsh_occluder_parts_default();
     parts.triangles = triangles;
     vsh_occluders *occluders = NULL;
-    check(vsh_occluders_from_parts(&parts, &occluders, &error), &error);
+    check(vsh_occluders_from_parts(&parts, &occluders, &failure), &failure);
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = 128;
     options.padding = 0;
@@ -345,7 +339,7 @@ static double mean_ao_between_walls(const float *normals) {
     vsh_charts *charts = create(&strip.mesh, 1, options, NULL);
     static float ao[128 * 128], coverage[128 * 128];
     const vsh_lightmap planes = {.ao = ao, .coverage = coverage};
-    check(vsh_bake_lightmap(occluders, charts, NULL, 0, NULL, NULL, &planes, NULL, &error), &error);
+    check(vsh_bake_lightmap(occluders, charts, NULL, 0, NULL, NULL, &planes, NULL, &failure), &failure);
     double sum = 0.0, count = 0.0;
     for (size_t i = 0; i < 128 * 128; ++i) {
         sum += coverage[i] > 0.0f ? (double)ao[i] : 0.0;

@@ -1,4 +1,5 @@
 /* vsh_light_check() and names of constants. */
+#include "expect.h"
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -31,16 +32,15 @@ static vsh_light spot(void) {
 }
 
 static void accepts(const vsh_light *light) {
-    vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vsh_light_check(light, &error), VSH_OK);
-    assert_string_equal(error.message, "");
+    failure.message[0] = '\0';
+    expect_ok(vsh_light_check(light, &failure));
+    assert_string_equal(failure.message, "");
 }
 
 static void refuses(const vsh_light *light, const char *message) {
-    vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vsh_light_check(light, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(error.code, VSH_ERROR_ARGUMENT);
-    assert_string_equal(error.message, message);
+    expect_error(vsh_light_check(light, &failure), VSH_ERROR_ARGUMENT, message);
+    assert_int_equal(failure.code, VSH_ERROR_ARGUMENT);
+    assert_string_equal(failure.message, message);
     assert_int_equal(vsh_light_check(light, NULL), VSH_ERROR_ARGUMENT);
 }
 

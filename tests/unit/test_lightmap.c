@@ -1,4 +1,5 @@
 /* What a lightmap holds: a wall that stands on a floor, a coarse smooth sphere, an open sheet. */
+#include "expect.h"
 #include "lightmaps.h"
 #include "previews.h"
 
@@ -172,11 +173,8 @@ static void a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne(void **sta
     options.voxel_size = 0.02;
     vsh_grid *grid = NULL;
     vsh_field *field = NULL;
-    vsh_error error = {0};
-    if (vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &error) != VSH_OK ||
-        vsh_field_create(grid, NULL, NULL, &field, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure));
+    expect_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
     vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
     const vsh_light light = sun(0.3, 0.9, 0.2, 0.01);
     const double length = sqrt(0.09 + 0.81 + 0.04);
@@ -210,11 +208,8 @@ static void an_open_sheet_does_not_shade_itself(void **state) {
     options.voxel_size = VOXEL;
     vsh_grid *grid = NULL;
     vsh_field *field = NULL;
-    vsh_error error = {0};
-    if (vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &error) != VSH_OK ||
-        vsh_field_create(grid, NULL, NULL, &field, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure));
+    expect_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
     vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
     const vsh_light light = sun(0.5, 0.8, 0.1, 0.1);
     planes *p = new_planes();
@@ -318,32 +313,30 @@ static void bad_options_limits_and_cancelling_are_reported(void **state) {
     vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
     vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
     planes *p = new_planes();
-    vsh_error error = {0};
     vsh_shade_options options = preview_options();
     options.start_offset = NAN;
-    assert_int_equal(
-        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, &options, NULL, &p->all, NULL, &error),
-        VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "start_offset"));
+    expect_error(
+        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, &options, NULL, &p->all, NULL, &failure),
+        VSH_ERROR_ARGUMENT, "start_offset");
     options = preview_options();
     options.surface_offset = -1.0;
-    assert_int_equal(
-        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, &options, NULL, &p->all, NULL, &error),
-        VSH_ERROR_ARGUMENT);
+    expect_error(
+        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, &options, NULL, &p->all, NULL, &failure),
+        VSH_ERROR_ARGUMENT, "");
     vsh_run run = vsh_run_default();
     run.memory_limit = 1000;
-    assert_int_equal(
-        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, NULL, &run, &p->all, NULL, &error),
-        VSH_ERROR_LIMIT);
+    expect_error(
+        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, NULL, &run, &p->all, NULL, &failure),
+        VSH_ERROR_LIMIT, "");
     run = vsh_run_default();
     run.progress = stop_in_bake;
-    assert_int_equal(
-        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, NULL, &run, &p->all, NULL, &error),
-        VSH_ERROR_CANCELLED);
+    expect_error(
+        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, NULL, &run, &p->all, NULL, &failure),
+        VSH_ERROR_CANCELLED, "");
     light.angle = -1.0;
-    assert_int_equal(
-        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, NULL, NULL, &p->all, NULL, &error),
-        VSH_ERROR_ARGUMENT);
+    expect_error(
+        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, NULL, NULL, &p->all, NULL, &failure),
+        VSH_ERROR_ARGUMENT, "");
     free(p);
     vsh_charts_free(charts);
     vsh_field_free(field);
@@ -361,11 +354,8 @@ static vsh_bake_stats bake_errors(int32_t method, float *shadow, float *shadow_e
     const vsh_lightmap lightmap = {
         .shadow = shadow != NULL ? shadows : NULL, .shadow_error = errors, .ao_error = ao_error};
     vsh_bake_stats stats = vsh_bake_stats_zero();
-    vsh_error error = {0};
-    if (vsh_bake_lightmap(occluders_of(field), charts, &light, 1, &shade, NULL, &lightmap, &stats, &error) !=
-        VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(
+        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, &shade, NULL, &lightmap, &stats, &failure));
     vsh_charts_free(charts);
     vsh_field_free(field);
     return stats;

@@ -1,5 +1,6 @@
 /* What a lit asset is refused for: damaged documents, atlases that do not fit, limits. The old output stays.
  */
+#include "expect.h"
 #include "rich_asset.h"
 
 #include "base/hash.h"
@@ -119,13 +120,12 @@ static void damaged_documents_are_refused(void **state) {
         assert_non_null(object);
         json_object_set_new(object, damages[i].key, parsed(damages[i].value));
         write_glb(&damaged, "in.glb");
-        vsh_error error = {0};
-        const vsh_result result = write_in(&s, NULL, &error);
-        if (result == VSH_OK || strstr(error.message, damages[i].part) == NULL) {
+        const vsh_result result = write_in(&s, NULL, &failure);
+        if (result == VSH_OK || strstr(failure.message, damages[i].part) == NULL) {
             fail_msg("%s: %s %s is no error of '%s': %s", damages[i].object, damages[i].key, damages[i].value,
-                     damages[i].part, result == VSH_OK ? "none" : error.message);
+                     damages[i].part, result == VSH_OK ? "none" : failure.message);
         }
-        assert_refused(result, &error);
+        assert_refused(result, &failure);
         json_decref(damaged.root);
     }
     free_sound(&s);
@@ -140,9 +140,8 @@ static void sparse_indices_out_of_range_are_refused(void **state) {
     unsigned char *bytes = s.in.bytes + number_of(item_of(&s.in, "bufferViews", view), "byteOffset");
     bytes[4] = 25; /* the last of three */
     write_glb(&s.in, "in.glb");
-    vsh_error error = {0};
-    assert_refused(write_in(&s, NULL, &error), &error);
-    assert_non_null(strstr(error.message, "sparse index 2 of 3 is 25"));
+    assert_refused(write_in(&s, NULL, &failure), &failure);
+    assert_non_null(strstr(failure.message, "sparse index 2 of 3 is 25"));
     free_sound(&s);
 }
 
@@ -155,9 +154,8 @@ static void other_triangles_than_the_models_are_refused(void **state) {
     indices[2] = indices[4];
     indices[4] = first;
     write_glb(&s.in, "in.glb");
-    vsh_error error = {0};
-    assert_refused(write_in(&s, NULL, &error), &error);
-    assert_non_null(strstr(error.message, "the file has changed since"));
+    assert_refused(write_in(&s, NULL, &failure), &failure);
+    assert_non_null(strstr(failure.message, "the file has changed since"));
     free_sound(&s);
 }
 
@@ -167,8 +165,7 @@ static void cut_files_are_refused_at_every_length(void **state) {
     unsigned char *bytes = load_bytes(path_of("in.glb").text, &size);
     for (size_t cut = 0; cut < size; cut += cut < 64 || cut + 64 > size ? 1 : 37) {
         write_bytes("in.glb", bytes, cut);
-        vsh_error error = {0};
-        assert_refused(write_in(&s, NULL, &error), &error);
+        assert_refused(write_in(&s, NULL, &failure), &failure);
     }
     free(bytes);
     free_sound(&s);
@@ -189,15 +186,14 @@ static void flipped_bytes_end_in_a_file_or_a_reason(void **state) {
         bytes[at] = i % 3 == 0 ? (unsigned char)syntax[vshi_mix(i + TRIES) % (sizeof syntax - 1)]
                                : (unsigned char)(old ^ (1U << i % 8));
         write_bytes("in.glb", bytes, size);
-        vsh_error error = {0};
-        const vsh_result result = write_in(&s, NULL, &error);
+        const vsh_result result = write_in(&s, NULL, &failure);
         if (result == VSH_OK) {
             asset out = load_asset(path_of("out.glb").text);
             free_asset(&out);
             ++written;
             begin_output();
         } else {
-            assert_refused(result, &error);
+            assert_refused(result, &failure);
         }
         bytes[at] = old;
     }
@@ -211,18 +207,17 @@ static void missing_buffers_are_refused(void **state) {
     json_object_set_new(json_array_get(json_object_get(s.in.root, "buffers"), 0), "uri",
                         json_string("gone.bin"));
     write_glb(&s.in, "in.glb");
-    vsh_error error = {0};
-    assert_refused(write_in(&s, NULL, &error), &error);
-    assert_non_null(strstr(error.message, "gone.bin"));
+    assert_refused(write_in(&s, NULL, &failure), &failure);
+    assert_non_null(strstr(failure.message, "gone.bin"));
     json_object_set_new(json_array_get(json_object_get(s.in.root, "buffers"), 0), "uri",
                         json_string("../gone.bin"));
     write_glb(&s.in, "in.glb");
-    assert_refused(write_in(&s, NULL, &error), &error);
+    assert_refused(write_in(&s, NULL, &failure), &failure);
     json_object_set_new(json_array_get(json_object_get(s.in.root, "buffers"), 0), "uri",
                         json_string("https://a/b.bin"));
     write_glb(&s.in, "in.glb");
-    assert_refused(write_in(&s, NULL, &error), &error);
-    assert_int_equal(error.code, VSH_ERROR_UNSUPPORTED);
+    assert_refused(write_in(&s, NULL, &failure), &failure);
+    assert_int_equal(failure.code, VSH_ERROR_UNSUPPORTED);
     free_sound(&s);
 }
 
@@ -256,15 +251,13 @@ static void atlases_that_do_not_fit_are_refused(void **state) {
         {NULL, NULL, NULL, charts, 0, 0, 0, 0},
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
-        vsh_error error = {0};
         *lit = bad[i];
-        assert_refused(write_in(&s, NULL, &error), &error);
-        assert_int_equal(error.code, VSH_ERROR_ARGUMENT);
+        assert_refused(write_in(&s, NULL, &failure), &failure);
+        assert_int_equal(failure.code, VSH_ERROR_ARGUMENT);
     }
     *lit = (vsh_lit_mesh){.uv_set = 5};
-    vsh_error error = {0};
-    assert_refused(write_in(&s, NULL, &error), &error);
-    assert_non_null(strstr(error.message, "TEXCOORD_5"));
+    assert_refused(write_in(&s, NULL, &failure), &failure);
+    assert_non_null(strstr(failure.message, "TEXCOORD_5"));
     *lit = good;
     free(uvs);
     free(charts);
@@ -292,53 +285,48 @@ static void images_out_of_range_are_refused(void **state) {
         {.width = 1, .height = 1, .channels = NULL, .channel_count = 1},
     };
     for (size_t i = 0; i <= sizeof bad / sizeof bad[0]; ++i) {
-        vsh_error error = {0};
         const vsh_lit_image twice[2] = {white_image(0, 0), white_image(0, 0)};
         vsh_lit_options options = vsh_lit_options_default();
         options.images = i < sizeof bad / sizeof bad[0] ? &bad[i] : twice;
         options.image_count = i < sizeof bad / sizeof bad[0] ? 1 : 2;
         assert_refused(vsh_lit_write(path_of("in.glb").text, s.model, s.lit, &options,
-                                     path_of("out.glb").text, NULL, &error),
-                       &error);
-        assert_int_equal(error.code, VSH_ERROR_ARGUMENT);
+                                     path_of("out.glb").text, NULL, &failure),
+                       &failure);
+        assert_int_equal(failure.code, VSH_ERROR_ARGUMENT);
         /* before there are images, their purposes count */
         const bool purpose = options.images->purpose < 0 || options.images->purpose >= VSH_LIT_PURPOSES;
         const vsh_result early =
-            vsh_lit_check_uvs(path_of("in.glb").text, s.model, s.lit, &options, NULL, &error);
+            vsh_lit_check_uvs(path_of("in.glb").text, s.model, s.lit, &options, NULL, &failure);
         assert_int_equal(early, purpose ? VSH_ERROR_ARGUMENT : VSH_OK);
     }
-    vsh_error error;
-    assert_int_equal(vsh_lit_check_uvs(NULL, s.model, NULL, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_lit_check_uvs(NULL, NULL, s.lit, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
+    expect_error(vsh_lit_check_uvs(NULL, s.model, NULL, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
+    expect_error(vsh_lit_check_uvs(NULL, NULL, s.lit, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
     free_sound(&s);
 }
 
 static void outputs_that_are_inputs_are_refused(void **state) {
     sound s = make_sound();
-    vsh_error error = {0};
-    assert_int_equal(
-        vsh_lit_write(path_of("in.glb").text, s.model, s.lit, NULL, path_of("in.glb").text, NULL, &error),
-        VSH_ERROR_ARGUMENT);
-    assert_int_equal(
-        vsh_lit_write(path_of("in.glb").text, s.model, s.lit, NULL, path_of("out.ply").text, NULL, &error),
-        VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_lit_write(path_of("in.glb").text, s.model, s.lit, NULL, path_of("none/out.glb").text,
-                                   NULL, &error),
-                     VSH_ERROR_WRITE);
+    expect_error(
+        vsh_lit_write(path_of("in.glb").text, s.model, s.lit, NULL, path_of("in.glb").text, NULL, &failure),
+        VSH_ERROR_ARGUMENT, "");
+    expect_error(
+        vsh_lit_write(path_of("in.glb").text, s.model, s.lit, NULL, path_of("out.ply").text, NULL, &failure),
+        VSH_ERROR_ARGUMENT, "");
+    expect_error(vsh_lit_write(path_of("in.glb").text, s.model, s.lit, NULL, path_of("none/out.glb").text,
+                               NULL, &failure),
+                 VSH_ERROR_WRITE, "");
     free_sound(&s);
 }
 
 /* What another document may use too. */
 static void files_of_the_input_are_not_replaced_but_others_named(void **state) {
     sound s = make_sound();
-    vsh_error error = {0};
     write_bytes("all.bin", s.in.bytes, s.in.size);
     json_object_set_new(json_array_get(json_object_get(s.in.root, "buffers"), 0), "uri",
                         json_string("all.bin"));
     write_glb(&s.in, "in.glb");
-    assert_int_equal(
-        vsh_lit_write(path_of("in.glb").text, s.model, s.lit, NULL, path_of("all.gltf").text, NULL, &error),
-        VSH_OK);
+    expect_ok(vsh_lit_write(path_of("in.glb").text, s.model, s.lit, NULL, path_of("all.gltf").text, NULL,
+                            &failure));
     json_t *out = json_load_file(path_of("all.gltf").text, 0, NULL);
     const json_t *buffer = json_array_get(json_object_get(out, "buffers"), 0);
     assert_string_equal(json_string_value(json_object_get(buffer, "uri")), "all.1.bin");
@@ -361,18 +349,17 @@ static int32_t stop(void *user, const char *stage, double fraction) {
 static void limits_and_cancelling_leave_the_old_file(void **state) {
     sound s = make_sound();
     vsh_run run = vsh_run_default();
-    vsh_error error = {0};
     for (uint64_t limit = 1000; limit < 100000; limit *= 3) {
         run.memory_limit = limit;
-        assert_refused(write_in(&s, &run, &error), &error);
-        assert_int_equal(error.code, VSH_ERROR_LIMIT);
+        assert_refused(write_in(&s, &run, &failure), &failure);
+        assert_int_equal(failure.code, VSH_ERROR_LIMIT);
     }
     run.memory_limit = 0;
     run.progress = stop;
     for (double fraction = 0.0; fraction < 0.9; fraction += 0.2) {
         run.user = &fraction;
-        assert_refused(write_in(&s, &run, &error), &error);
-        assert_int_equal(error.code, VSH_ERROR_CANCELLED);
+        assert_refused(write_in(&s, &run, &failure), &failure);
+        assert_int_equal(failure.code, VSH_ERROR_CANCELLED);
     }
     free_sound(&s);
 }

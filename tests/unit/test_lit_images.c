@@ -1,4 +1,5 @@
 /* Images and materials of a lit asset: what they hold, where they go, and who shares them. */
+#include "expect.h"
 #include "rich_asset.h"
 
 #include "base/srgb.h"
@@ -18,10 +19,7 @@ static vsh_image_file *image_of(const asset *out, size_t texture) {
     write_bytes("image.png", bytes_of_view(out, view),
                 number_of(item_of(out, "bufferViews", view), "byteLength"));
     vsh_image_file *file = NULL;
-    vsh_error error = {0};
-    if (vsh_image_read(path_of("image.png").text, NULL, &file, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(vsh_image_read(path_of("image.png").text, NULL, &file, &failure));
     remove_file("image.png");
     return file;
 }
@@ -260,10 +258,8 @@ static void images_come_along_into_another_folder(void **state) {
     vsh_run run = vsh_run_default();
     run.warning = keep_warning;
     warnings[0] = '\0';
-    vsh_error error;
-    assert_int_equal(
-        vsh_lit_write(path_of("in.glb").text, model, NULL, NULL, path_of("other/out.glb").text, &run, &error),
-        VSH_OK);
+    expect_ok(vsh_lit_write(path_of("in.glb").text, model, NULL, NULL, path_of("other/out.glb").text, &run,
+                            &failure));
     asset out = load_asset(path_of("other/out.glb").text);
     const json_t *image = item_of(&out, "images", 0);
     assert_null(json_object_get(image, "uri"));
@@ -295,10 +291,7 @@ static void draco_is_decoded_by_a_reader_to_the_same_bytes(void **state) {
     for (int i = 0; i < 2; ++i) {
         vsh_run run = vsh_run_default();
         run.reader = i == 1 ? "/proc/self/exe" : NULL;
-        vsh_error error = {0};
-        if (vsh_lit_write(path, model, lit, NULL, path_of("out.glb").text, &run, &error) != VSH_OK) {
-            fail_msg("%s", error.message);
-        }
+        expect_ok(vsh_lit_write(path, model, lit, NULL, path_of("out.glb").text, &run, &failure));
         out[i] = load_asset(path_of("out.glb").text);
     }
     assert_json_equal(out[0].root, out[1].root, "the root");

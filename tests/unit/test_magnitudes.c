@@ -2,6 +2,7 @@
  * is either a closed form, or what it is in the middle of the range, or refused by name. docs/numerics.md has
  * the bounds; test_light_ranges.c has lights, test_receivers.c points and normals, test_field_run.c reaches.
  */
+#include "expect.h"
 #include "traced.h"
 
 #include "field/field.h"
@@ -102,10 +103,9 @@ static void voxels_beyond_the_ends_are_refused_by_size(void **state) {
         vsh_grid_options options = vsh_grid_options_default();
         options.voxel_size = voxels[v];
         vsh_grid *grid = NULL;
-        vsh_error error = {VSH_OK, ""};
-        assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &error), VSH_ERROR_LIMIT);
+        expect_error(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT, "");
         assert_null(grid);
-        assert_non_null(strstr(error.message, "1e-12"));
+        assert_non_null(strstr(failure.message, "1e-12"));
     }
 }
 
@@ -161,11 +161,10 @@ static void half_widths_from_6_to_100_give_the_same_picture_and_3_one_as_near_th
         options.voxel_size = 0.03;
         options.half_width = half_widths[h];
         vsh_grid *grid = NULL;
-        vsh_error error = {VSH_OK, ""};
-        const vsh_result result = vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &error);
+        const vsh_result result = vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure);
         if (half_widths[h] < 3.0 || half_widths[h] > 100.0) {
             assert_int_equal(result, VSH_ERROR_ARGUMENT);
-            assert_non_null(strstr(error.message, "half_width"));
+            assert_non_null(strstr(failure.message, "half_width"));
             continue;
         }
         assert_int_equal(result, VSH_OK);

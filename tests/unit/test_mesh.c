@@ -6,6 +6,7 @@
 
 #include <cmocka.h>
 
+#include "expect.h"
 #include "mesh/mesh.h"
 
 #include <stdlib.h>
@@ -30,10 +31,7 @@ static vsh_mesh cube(void) {
 
 static vsh_mesh_report check(const vsh_mesh *mesh) {
     vsh_mesh_report report;
-    vsh_error error = {0};
-    if (vsh_mesh_check(mesh, &report, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(vsh_mesh_check(mesh, &report, &failure));
     return report;
 }
 
@@ -212,12 +210,11 @@ static void a_mirrored_transform_keeps_the_outside_outside(void **state) {
 
 static void refused(const vsh_mesh *mesh, vsh_result code, const char *part, const char *other) {
     vsh_mesh_report report = {.open_edges = 77};
-    vsh_error error = {0};
-    assert_int_equal(vsh_mesh_check(mesh, &report, &error), code);
-    assert_int_equal(error.code, code);
+    assert_int_equal(vsh_mesh_check(mesh, &report, &failure), code);
+    assert_int_equal(failure.code, code);
     assert_int_equal(report.open_edges, 77);
-    if (strstr(error.message, part) == NULL || strstr(error.message, other) == NULL) {
-        fail_msg("'%s' does not name %s and %s", error.message, part, other);
+    if (strstr(failure.message, part) == NULL || strstr(failure.message, other) == NULL) {
+        fail_msg("'%s' does not name %s and %s", failure.message, part, other);
     }
 }
 
@@ -271,8 +268,7 @@ static void arrays_that_are_missing_are_refused(void **state) {
     mesh = cube();
     mesh.positions = NULL;
     refused(&mesh, VSH_ERROR_ARGUMENT, "'cube'", "positions");
-    vsh_error error;
-    assert_int_equal(vsh_mesh_check(NULL, NULL, &error), VSH_ERROR_ARGUMENT);
+    expect_error(vsh_mesh_check(NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
     mesh = cube();
     assert_int_equal(vsh_mesh_check(&mesh, NULL, NULL), VSH_ERROR_ARGUMENT);
 }

@@ -1,4 +1,5 @@
 /* Models: what files of every format become, and what is refused. */
+#include "expect.h"
 #include "models.h"
 
 static void assert_near(double value, double expected, double tolerance) {
@@ -251,9 +252,8 @@ static void bad_ply_and_stl_are_refused(void **state) {
     const float bad[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, NAN, 0}};
     unsigned char bytes[84 + 50];
     vsh_model *model = NULL;
-    vsh_error error = {0};
-    assert_int_equal(read_bytes("b.stl", bytes, binary_stl(bytes, bad, 1), &model, &error), VSH_ERROR_INPUT);
-    assert_non_null(strstr(error.message, "nan"));
+    expect_error(read_bytes("b.stl", bytes, binary_stl(bytes, bad, 1), &model, &failure), VSH_ERROR_INPUT,
+                 "nan");
 }
 
 /* By their endings, and by their first bytes whatever the ending. */
@@ -274,12 +274,10 @@ static void alembic_and_usd_are_refused_by_name(void **state) {
     zip[26] = 6;
     memcpy(zip + 30, "a.usdc", 6);
     vsh_model *model = NULL;
-    vsh_error error = {0};
-    assert_int_equal(read_bytes("b.obj", zip, sizeof zip, &model, &error), VSH_ERROR_INPUT);
-    assert_non_null(strstr(error.message, "is a USD file"));
+    expect_error(read_bytes("b.obj", zip, sizeof zip, &model, &failure), VSH_ERROR_INPUT, "is a USD file");
     memcpy(zip + 30, "a.text", 6); /* any other Zip file is what its ending says */
-    assert_int_equal(read_bytes("b.obj", zip, sizeof zip, &model, &error), VSH_ERROR_INPUT);
-    assert_null(strstr(error.message, "USD"));
+    expect_error(read_bytes("b.obj", zip, sizeof zip, &model, &failure), VSH_ERROR_INPUT, "");
+    assert_null(strstr(failure.message, "USD"));
 }
 
 static void bad_gltf_is_refused(void **state) {
@@ -301,9 +299,8 @@ static void bad_gltf_is_refused(void **state) {
 
 static void files_that_cannot_be_read_say_why(void **state) {
     vsh_model *model;
-    vsh_error error = {0};
-    assert_int_equal(vsh_model_read(path_of("missing.obj").text, NULL, &model, &error), VSH_ERROR_READ);
-    assert_non_null(strstr(error.message, "missing.obj: No such file"));
+    expect_error(vsh_model_read(path_of("missing.obj").text, NULL, &model, &failure), VSH_ERROR_READ,
+                 "missing.obj: No such file");
     assert_null(model);
     char as_folder[512];
     snprintf(as_folder, sizeof as_folder, "%s/.", folder);
@@ -315,8 +312,8 @@ static void files_that_cannot_be_read_say_why(void **state) {
     refused("other.3ds", quad_obj, VSH_ERROR_INPUT, ".3ds", "OBJ, glTF, GLB, PLY, STL, FBX or DAE");
     refused("none", quad_obj, VSH_ERROR_INPUT, "no ending", "");
     refused("text.fbx", "hello, world", VSH_ERROR_READ, "damaged or cut short", "");
-    assert_int_equal(vsh_model_read(NULL, NULL, &model, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_model_read("x.obj", NULL, NULL, &error), VSH_ERROR_ARGUMENT);
+    expect_error(vsh_model_read(NULL, NULL, &model, &failure), VSH_ERROR_ARGUMENT, "");
+    expect_error(vsh_model_read("x.obj", NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
     vsh_model_free(NULL);
 }
 
@@ -324,12 +321,11 @@ static void the_memory_limit_is_checked(void **state) {
     write_bytes("limit.obj", quad_obj, strlen(quad_obj));
     vsh_run run = vsh_run_default();
     vsh_model *model;
-    vsh_error error = {0};
     run.memory_limit = 100;
-    assert_int_equal(vsh_model_read(path_of("limit.obj").text, &run, &model, &error), VSH_ERROR_LIMIT);
-    assert_non_null(strstr(error.message, "limit.obj"));
+    expect_error(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure), VSH_ERROR_LIMIT,
+                 "limit.obj");
     run.memory_limit = 1 << 20;
-    assert_int_equal(vsh_model_read(path_of("limit.obj").text, &run, &model, &error), VSH_OK);
+    expect_ok(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure));
     vsh_model_free(model);
     unlink(path_of("limit.obj").text);
 }
@@ -378,8 +374,7 @@ static void cut_everywhere(const char *name, const void *bytes, size_t size, boo
     }
     for (size_t length = 0; length < last; ++length) {
         vsh_model *model = NULL;
-        vsh_error error = {0};
-        const vsh_result result = read_bytes(name, copy, length, &model, &error);
+        const vsh_result result = read_bytes(name, copy, length, &model, &failure);
         if (result == VSH_OK) {
             for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
                 check(model, i);
@@ -387,8 +382,8 @@ static void cut_everywhere(const char *name, const void *bytes, size_t size, boo
             if (knows_its_length) {
                 fail_msg("%s: nothing noticed at %zu of %zu bytes", name, length, size);
             }
-        } else if (strstr(error.message, name) == NULL) {
-            fail_msg("%s at %zu bytes: '%s' does not name the file", name, length, error.message);
+        } else if (strstr(failure.message, name) == NULL) {
+            fail_msg("%s at %zu bytes: '%s' does not name the file", name, length, failure.message);
         }
         vsh_model_free(model);
     }

@@ -1,5 +1,6 @@
 /* OBJ: what its statements become, where its file is read piece by piece, and what strangers may write into
  * it. */
+#include "expect.h"
 #include "models.h"
 
 #include <math.h>
@@ -98,11 +99,10 @@ static void files_of_any_length_are_read_piece_by_piece(void **state) {
     vsh_model_free(model);
     to += sprintf(to, "f 1 2 x\n");
     vsh_model *none = NULL;
-    vsh_error error = {0};
-    assert_int_equal(read_bytes("long.obj", text, (size_t)(to - text), &none, &error), VSH_ERROR_INPUT);
+    expect_error(read_bytes("long.obj", text, (size_t)(to - text), &none, &failure), VSH_ERROR_INPUT, "");
     char line[32];
     snprintf(line, sizeof line, "line %d:", COUNT + COUNT - 2 + (COUNT - 2) / 3 + 2);
-    assert_non_null(strstr(error.message, line));
+    assert_non_null(strstr(failure.message, line));
     free(text);
 }
 
@@ -165,9 +165,8 @@ static void materials_beside_the_file_say_what_is_blended(void **state) {
     }
     write_bytes("own.mtl", "newmtl a\nd x\n", 13);
     vsh_model *none = NULL;
-    vsh_error error = {0};
-    assert_int_equal(read_bytes("own.obj", "mtllib own.mtl\n", 15, &none, &error), VSH_ERROR_INPUT);
-    assert_non_null(strstr(error.message, "own.mtl: line 2: 'd' is 'x'"));
+    expect_error(read_bytes("own.obj", "mtllib own.mtl\n", 15, &none, &failure), VSH_ERROR_INPUT,
+                 "own.mtl: line 2: 'd' is 'x'");
     assert_int_equal(unlink(path_of("own.mtl").text), 0);
 }
 
@@ -184,12 +183,11 @@ static void memory_is_held_against_the_limit(void **state) {
     free(text);
     vsh_run run = vsh_run_default();
     vsh_model *model = NULL;
-    vsh_error error = {0};
     run.memory_limit = 1000000;
-    assert_int_equal(vsh_model_read(path_of("limit.obj").text, &run, &model, &error), VSH_ERROR_LIMIT);
+    expect_error(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure), VSH_ERROR_LIMIT, "");
     assert_null(model);
     run.memory_limit = 3000000;
-    assert_int_equal(vsh_model_read(path_of("limit.obj").text, &run, &model, &error), VSH_OK);
+    expect_ok(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure));
     vsh_model_free(model);
     assert_int_equal(unlink(path_of("limit.obj").text), 0);
 }

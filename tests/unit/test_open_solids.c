@@ -1,4 +1,5 @@
 /* Points that see only the inner sides of solids that lack a side are hidden. */
+#include "expect.h"
 #include "kinds.h"
 
 #include "shade/inside.h"
@@ -12,10 +13,7 @@ static void assert_hidden(shape *s, const char *what, const double at[][3], cons
                           size_t count, bool hidden) {
     const vsh_mesh mesh = shape_mesh(s, what);
     vsh_triangles *triangles = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_triangles_create(&mesh, 1, NULL, &triangles, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(vsh_triangles_create(&mesh, 1, NULL, &triangles, &failure));
     for (size_t i = 0; i < count; ++i) {
         const float n[3] = {(float)normal[0], (float)normal[1], (float)normal[2]};
         uint8_t where;
@@ -129,8 +127,7 @@ static void mirrored_houses_hide_too(void **state) {
     vsh_mesh mesh = shape_mesh(s, "house");
     mesh.transform = mirror;
     vsh_triangles *triangles = NULL;
-    vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vsh_triangles_create(&mesh, 1, NULL, &triangles, &error), VSH_OK);
+    expect_ok(vsh_triangles_create(&mesh, 1, NULL, &triangles, &failure));
     for (size_t i = 0; i < POINTS_BELOW; ++i) {
         uint8_t where;
         vshi_inside(triangles, 1, BELOW[i], (const float[]){0, 0, 1}, NULL, NULL, NULL, &where);

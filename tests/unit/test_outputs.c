@@ -1,4 +1,5 @@
 /* Files that belong together are put in place together, or not at all. */
+#include "expect.h"
 #include "images.h"
 
 #include "base/file.h"
@@ -41,9 +42,8 @@ static size_t entries(void) {
 }
 
 static void begin(vshi_output *outputs, vshi_output **list) {
-    vsh_error error;
     for (size_t i = 0; i < COUNT; ++i) {
-        assert_int_equal(vshi_output_begin(&outputs[i], at(names[i]), &error), VSH_OK);
+        expect_ok(vshi_output_begin(&outputs[i], at(names[i]), &failure));
         put_text(outputs[i].temporary, "new");
         list[i] = &outputs[i];
     }
@@ -51,10 +51,9 @@ static void begin(vshi_output *outputs, vshi_output **list) {
 
 static void all_are_in_place_in_the_end(void **state) {
     vshi_output outputs[COUNT], *list[COUNT];
-    vsh_error error;
     put_text(at(names[1]), "old");
     begin(outputs, list);
-    assert_int_equal(vshi_outputs_commit(list, COUNT, &error), VSH_OK);
+    expect_ok(vshi_outputs_commit(list, COUNT, &failure));
     for (size_t i = 0; i < COUNT; ++i) {
         expect_text(names[i], "new");
     }
@@ -68,16 +67,15 @@ static void all_are_in_place_in_the_end(void **state) {
 static void one_that_fails_leaves_all_as_they_were(void **state) {
     for (size_t failing = 0; failing < COUNT; ++failing) {
         vshi_output outputs[COUNT], *list[COUNT];
-        vsh_error error;
         put_text(at(names[1]), "old");
         if (failing == 1) {
             unlink(at(names[1]));
         }
         begin(outputs, list);
         assert_int_equal(mkdir(at(names[failing]), 0777), 0);
-        assert_int_equal(vshi_outputs_commit(list, COUNT, &error), VSH_ERROR_WRITE);
-        assert_non_null(strstr(error.message, names[failing]));
-        assert_non_null(strstr(error.message, "could not be put in place"));
+        expect_error(vshi_outputs_commit(list, COUNT, &failure), VSH_ERROR_WRITE, "");
+        assert_non_null(strstr(failure.message, names[failing]));
+        assert_non_null(strstr(failure.message, "could not be put in place"));
         assert_int_equal(rmdir(at(names[failing])), 0);
         for (size_t i = 0; i < COUNT; ++i) {
             expect_text(names[i], i == 1 && failing != 1 ? "old" : NULL);

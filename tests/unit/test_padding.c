@@ -10,6 +10,7 @@
 
 #include "bake/nearest_valid.h"
 #include "bake/padding.h"
+#include "expect.h"
 #include <stdbool.h>
 
 static const float HOLE = -7.0f; /* what an unfilled texel holds; no valid texel does */
@@ -162,9 +163,7 @@ static void spread_over(map *m, size_t width, const char *letters) {
     }
     vshi_spread spread;
     vshi_store store = {.run = NULL};
-    vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vshi_spread_find(&store, width, count / width, m->mesh, m->state, &spread, &error),
-                     VSH_OK);
+    expect_ok(vshi_spread_find(&store, width, count / width, m->mesh, m->state, &spread, &failure));
     for (size_t i = 0; i < spread.count; ++i) {
         assert_int_equal(m->state[spread.texel[i]], VSHI_TEXEL_INVALID);
         assert_int_equal(m->from[spread.texel[i]], NOWHERE);

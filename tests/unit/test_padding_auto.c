@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "bake/pull_push.h"
+#include "expect.h"
 #include "lightmaps.h"
 
 static const float HOLE = -1000.0f;
@@ -155,10 +156,9 @@ static void no_other_padding_is_below_0(void **state) {
     const vsh_mesh mesh = floor_mesh();
     vsh_lightmap_options options = vsh_lightmap_options_default();
     vsh_charts *charts = NULL;
-    vsh_error error = {0};
     options.padding = -2;
-    assert_int_equal(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &charts, &error), VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "padding -2"));
+    expect_error(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &charts, &failure), VSH_ERROR_ARGUMENT,
+                 "padding -2");
 }
 
 int main(void) {

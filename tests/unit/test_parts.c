@@ -1,10 +1,10 @@
 /* Parts of lightmaps, by the library: what merging takes, and which parts have rows. */
+#include "expect.h"
 #include "parts.h"
 
 static void bake_whole(const case_scene *c, taken *rows, vsh_bake_report *report) {
     const vsh_bake_options options = options_of(rows);
-    vsh_error error;
-    assert_ok(vsh_bake_scene(&c->scene, &options, NULL, report, &error), &error);
+    expect_ok(vsh_bake_scene(&c->scene, &options, NULL, report, &failure));
 }
 
 static void merged_rows_are_those_of_one_bake_and_words_come_back(void **state) {
@@ -12,18 +12,17 @@ static void merged_rows_are_those_of_one_bake_and_words_come_back(void **state) 
     fill(&c, SIZE, 0.4);
     taken *one = calloc(2, sizeof *one), *all = one + 1;
     assert_non_null(one);
-    vsh_error error;
     vsh_bake_report report = {.errors = NULL};
     bake_whole(&c, one, &report);
     assert_true(report.invalid_texels > 20 && report.invalid_texels < SIZE * SIZE / 2);
     bake_parts(&c);
-    assert_ok(merge(&c, all, NULL, &error), &error);
+    expect_ok(merge(&c, all, NULL, &failure));
     assert_int_equal(all->rows, SIZE);
     assert_int_equal(all->channels, 6);
     assert_memory_equal(one->values, all->values, sizeof one->values);
     char **words;
     size_t count;
-    assert_ok(vsh_part_words(c.output, 0, NULL, &words, &count, &error), &error);
+    expect_ok(vsh_part_words(c.output, 0, NULL, &words, &count, &failure));
     assert_int_equal(count, 3);
     assert_string_equal(words[0], "one");
     assert_string_equal(words[1], "");
@@ -46,10 +45,9 @@ static void what_parts_leave_of_ao_is_as_of_one_bake(void **state) {
         c.scene.ambient[2] = 0.75;
         taken *one = calloc(2, sizeof *one), *all = one + 1;
         assert_non_null(one);
-        vsh_error error;
         bake_whole(&c, one, NULL);
         bake_parts(&c);
-        assert_ok(merge(&c, all, NULL, &error), &error);
+        expect_ok(merge(&c, all, NULL, &failure));
         assert_int_equal(all->channels, made > 0 ? CHANNELS : 5);
         assert_memory_equal(one, all, sizeof *one);
         free(one);
@@ -66,8 +64,7 @@ static void options_that_a_part_cannot_have_are_refused(void **state) {
         options.shard = i < 5 ? wrong[i][0] : 1;
         options.shard_count = i < 5 ? wrong[i][1] : 2;
         options.word_count = i == 6;
-        vsh_error error;
-        assert_int_equal(vsh_bake_scene(&c.scene, &options, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
+        expect_error(vsh_bake_scene(&c.scene, &options, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
     }
 }
 

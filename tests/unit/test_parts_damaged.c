@@ -1,5 +1,6 @@
 /* Parts of strangers: no file makes merging do worse than fail. */
 #include "bake_scene/parts.h"
+#include "expect.h"
 #include "parts.h"
 
 typedef struct bytes {
@@ -58,13 +59,12 @@ static void try_all(const char *path, bake_case *one, size_t least_refused) {
         memcpy(bad.at, good.at, good.size);
         bad.at[at] = worst[at % sizeof worst] != good.at[at] ? worst[at % sizeof worst] : 0xaa;
         write_file(path, &bad);
-        vsh_error error = {VSH_OK, ""};
-        const vsh_result result = merge_bake(one, &error);
+        const vsh_result result = merge_bake(one, &failure);
         if (result == VSH_OK) {
             ++taken_all_the_same; /* a value, a count, a text of nobody's */
         } else if ((result != VSH_ERROR_INPUT && result != VSH_ERROR_READ && result != VSH_ERROR_LIMIT) ||
-                   strstr(error.message, strrchr(path, '/') + 1) == NULL) {
-            fail_msg("byte %zu: %s '%s'", at, vsh_result_name(result), error.message);
+                   strstr(failure.message, strrchr(path, '/') + 1) == NULL) {
+            fail_msg("byte %zu: %s '%s'", at, vsh_result_name(result), failure.message);
         } else {
             ++refused;
         }
@@ -72,8 +72,7 @@ static void try_all(const char *path, bake_case *one, size_t least_refused) {
     assert_true(refused > least_refused && taken_all_the_same > 10);
     memcpy(bad.at, good.at, good.size);
     write_file(path, &bad);
-    vsh_error error;
-    assert_ok(merge_bake(one, &error), &error);
+    expect_ok(merge_bake(one, &failure));
     free(bad.at);
     free(good.at);
 }
@@ -120,13 +119,12 @@ static void try_values(const char *path, const char *place, bake_case *one) {
         memcpy(bad.at, good.at, good.size);
         memcpy(bad.at + body + i * sizeof value, &value, sizeof value);
         write_file(path, &bad);
-        vsh_error error = {VSH_OK, ""};
-        const vsh_result result = merge_bake(one, &error);
+        const vsh_result result = merge_bake(one, &failure);
         char expected[64];
         snprintf(expected, sizeof expected, "is %g, out of range", (double)value);
-        if (result == VSH_ERROR_INPUT && strstr(error.message, expected) != NULL) {
-            assert_non_null(strstr(error.message, strrchr(path, '/') + 1));
-            assert_non_null(strstr(error.message, place));
+        if (result == VSH_ERROR_INPUT && strstr(failure.message, expected) != NULL) {
+            assert_non_null(strstr(failure.message, strrchr(path, '/') + 1));
+            assert_non_null(strstr(failure.message, place));
             ++refused;
         }
         free(bad.at);

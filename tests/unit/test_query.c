@@ -1,5 +1,6 @@
 /* Points asked for by a handle: the values of vsh_shade_shadow() and vsh_shade_ao(), whatever their order and
  * number. */
+#include "expect.h"
 #include "previews.h"
 #include "traced.h"
 
@@ -48,10 +49,7 @@ static void shuffle(void) {
 static vsh_query *query_of(const vsh_occluders *occluders, const vsh_light *lights, size_t count,
                            const vsh_shade_options *options) {
     vsh_query *query = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_query_create(occluders, lights, count, options, &query, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(vsh_query_create(occluders, lights, count, options, &query, &failure));
     return query;
 }
 
@@ -67,25 +65,17 @@ static vsh_shade_stats ask(const vsh_query *query, const vsh_points *points, int
     vsh_run run = vsh_run_default();
     run.threads = threads;
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_query_points(query, points, NULL, &run, &output, &stats, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(vsh_query_points(query, points, NULL, &run, &output, &stats, &failure));
     return stats;
 }
 
 /* What vsh_shade_…() give for light l, or AO. */
 static void expect(const caster *c, const vsh_points *points, const vsh_light *lights, int l,
                    const vsh_shade_options *options) {
-    vsh_error error = {VSH_OK, ""};
-    const vsh_result result = l < LIGHTS
-                                  ? vsh_shade_shadow(occluders_of_caster(c), points, &lights[l], options,
-                                                     NULL, expected, expected_deviation, NULL, &error)
-                                  : vsh_shade_ao(occluders_of_caster(c), points, options, NULL, expected,
-                                                 expected_deviation, NULL, NULL, &error);
-    if (result != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(l < LIGHTS ? vsh_shade_shadow(occluders_of_caster(c), points, &lights[l], options, NULL,
+                                            expected, expected_deviation, NULL, &failure)
+                         : vsh_shade_ao(occluders_of_caster(c), points, options, NULL, expected,
+                                        expected_deviation, NULL, NULL, &failure));
 }
 
 static void values_and_deviations_are_those_of_the_shade_calls(void **state) {
@@ -331,20 +321,19 @@ static void limits_and_cancelling_have_their_codes(void **state) {
     vsh_field_info info;
     vsh_field_get_info(field, &info);
     vsh_run run = vsh_run_default();
-    vsh_error error = {VSH_OK, ""};
     run.memory_limit = info.bytes + 16 * MANY - 4096;
-    assert_int_equal(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &error), VSH_ERROR_LIMIT);
-    assert_non_null(strstr(error.message, "query"));
+    expect_error(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &failure), VSH_ERROR_LIMIT,
+                 "query");
     run.memory_limit = info.bytes + 16 * MANY + 4096;
-    assert_int_equal(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &error), VSH_OK);
+    expect_ok(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &failure));
     run.memory_limit = 0;
     const double stops[] = {0.0, 0.1, 0.5};
     for (int i = 0; i < 3; ++i) {
         double stop = stops[i];
         run.progress = stop_at;
         run.user = &stop;
-        assert_int_equal(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &error),
-                         VSH_ERROR_CANCELLED);
+        expect_error(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &failure),
+                     VSH_ERROR_CANCELLED, "");
     }
     vsh_query_free(query);
     vsh_field_free(field);
@@ -355,47 +344,44 @@ static void bad_arguments_are_refused_by_name(void **state) {
     vsh_light lights[LIGHTS];
     lights_of(lights);
     fill_points();
-    vsh_error error = {VSH_OK, ""};
     vsh_query *query = NULL;
     lights[1].radius = -1.0;
-    assert_int_equal(vsh_query_create(occluders_of(field), lights, LIGHTS, NULL, &query, &error),
-                     VSH_ERROR_ARGUMENT);
+    expect_error(vsh_query_create(occluders_of(field), lights, LIGHTS, NULL, &query, &failure),
+                 VSH_ERROR_ARGUMENT, "");
     assert_null(query);
-    assert_non_null(strstr(error.message, "light 1"));
+    assert_non_null(strstr(failure.message, "light 1"));
     lights_of(lights);
     vsh_shade_options options = preview_options();
     options.method = VSH_SHADOW_EXACT;
-    assert_int_equal(vsh_query_create(occluders_of(field), lights, LIGHTS, &options, &query, &error),
-                     VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "triangles"));
+    expect_error(vsh_query_create(occluders_of(field), lights, LIGHTS, &options, &query, &failure),
+                 VSH_ERROR_ARGUMENT, "triangles");
     vsh_query_free(query_of(occluders_of(field), NULL, 0, &options)); /* of no light's shadow */
     options.ao_method = VSH_AO_EXACT;
-    assert_int_equal(vsh_query_create(occluders_of(field), NULL, 0, &options, &query, &error),
-                     VSH_ERROR_ARGUMENT);
+    expect_error(vsh_query_create(occluders_of(field), NULL, 0, &options, &query, &failure),
+                 VSH_ERROR_ARGUMENT, "");
     options = preview_options();
     options.rays = 4097;
-    assert_int_equal(vsh_query_create(occluders_of(field), NULL, 0, &options, &query, &error),
-                     VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "rays"));
+    expect_error(vsh_query_create(occluders_of(field), NULL, 0, &options, &query, &failure),
+                 VSH_ERROR_ARGUMENT, "rays");
 
     query = query_of(occluders_of(field), lights, LIGHTS, NULL);
     const vsh_points bare = {FEW, positions, NULL, NULL};
     vsh_query_output output = vsh_query_output_default();
     output.ao = values[0];
-    assert_int_equal(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &error), VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "normals"));
+    expect_error(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &failure), VSH_ERROR_ARGUMENT,
+                 "normals");
     output.ao = NULL;
     output.ao_deviation = values[0];
-    assert_int_equal(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &error), VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "ao_deviation"));
+    expect_error(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &failure), VSH_ERROR_ARGUMENT,
+                 "ao_deviation");
     float *const deviation[LIGHTS] = {NULL, values[0]};
     output = vsh_query_output_default();
     output.deviation = deviation;
-    assert_int_equal(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &error), VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "light 1"));
+    expect_error(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &failure), VSH_ERROR_ARGUMENT,
+                 "light 1");
     output = vsh_query_output_default();
     output.struct_size = 0;
-    assert_int_equal(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &error), VSH_ERROR_ARGUMENT);
+    expect_error(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &failure), VSH_ERROR_ARGUMENT, "");
     vsh_query_free(query);
     vsh_field_free(field);
 }

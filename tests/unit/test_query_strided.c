@@ -1,4 +1,5 @@
 /* Points with strides, in floats, and answers with gaps; distance and gradient; batches. */
+#include "expect.h"
 #include "previews.h"
 #include "traced.h"
 
@@ -44,15 +45,12 @@ static void fill_points(void) {
 
 static vsh_query *query_of(const vsh_field *field, const vsh_light *light, int32_t method) {
     vsh_query *query = NULL;
-    vsh_error error = {VSH_OK, ""};
     vsh_shade_options options = preview_options();
     options.method = method;
     options.ao_method = VSH_AO_TAPS;
     options.rays = method == VSH_SHADOW_ADAPTIVE ? 64 : 8;
-    if (vsh_query_create(occluders_of(field), light, light != NULL ? 1 : 0, &options, &query, &error) !=
-        VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(
+        vsh_query_create(occluders_of(field), light, light != NULL ? 1 : 0, &options, &query, &failure));
     return query;
 }
 
@@ -297,13 +295,12 @@ static void strides_that_are_none_are_refused_by_name(void **state) {
     cases[7].layout.struct_size = 0;
     cases[7].word = "vsh_point_layout";
     for (int i = 0; i < 8; ++i) {
-        vsh_error error = {VSH_OK, ""};
         output.stride = cases[i].stride;
-        assert_int_equal(
-            vsh_query_points(query, &cases[i].points, &cases[i].layout, NULL, &output, NULL, &error),
-            VSH_ERROR_ARGUMENT);
-        if (strstr(error.message, cases[i].word) == NULL) {
-            fail_msg("'%s' names no %s", error.message, cases[i].word);
+        expect_error(
+            vsh_query_points(query, &cases[i].points, &cases[i].layout, NULL, &output, NULL, &failure),
+            VSH_ERROR_ARGUMENT, "");
+        if (strstr(failure.message, cases[i].word) == NULL) {
+            fail_msg("'%s' names no %s", failure.message, cases[i].word);
         }
     }
     output.stride = 8; /* too near for a gradient */

@@ -1,5 +1,6 @@
 /* Rectangular area lights against brute force: every part of the rectangle, weighed by the solid angle that
  * it is seen under, and segments to it against boxes in closed form. Shares no code with the library. */
+#include "expect.h"
 #include "rectangles.h"
 
 /* Rays on the field see edges as it rounds them off, which a narrow light shows most: half as much with
@@ -32,10 +33,8 @@ static void rays_of_every_kind_see_what_brute_force_sees(void **state) {
             }
         }
         if (c->triangles != NULL) {
-            vsh_error error;
-            assert_int_equal(vsh_trace_shadow(c->triangles, NULL, COUNT, positions, normals, 0.0, &light,
-                                              4096, NULL, values, &error),
-                             VSH_OK);
+            expect_ok(vsh_trace_shadow(c->triangles, NULL, COUNT, positions, normals, 0.0, &light, 4096, NULL,
+                                       values, &failure));
             const difference d = compare(values, truth);
             if (!(d.root_mean_square < 0.003 && d.largest < 0.02)) {
                 fail_msg("light %d, traced: off by %g, at most %g", l, d.root_mean_square, d.largest);

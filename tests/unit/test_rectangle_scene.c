@@ -1,5 +1,6 @@
 /* Rectangular area lights among horizons, layers, casters without voxels, threads and irradiance; and what is
  * no rectangle. */
+#include "expect.h"
 #include "rectangles.h"
 
 static void the_horizon_cuts_it_by_solid_angle(void **state) {
@@ -117,9 +118,8 @@ static void irradiance_has_the_cosine_at_which_it_shines(void **state) {
 }
 
 static void refuses(const vsh_light *light, const char *message) {
-    vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vsh_light_check(light, &error), VSH_ERROR_ARGUMENT);
-    assert_string_equal(error.message, message);
+    expect_error(vsh_light_check(light, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_string_equal(failure.message, message);
 }
 
 static void what_is_no_rectangle_is_refused(void **state) {

@@ -1,6 +1,7 @@
 /* What must hold between two bakes where no truth is needed: scaled, moved, turned and mirrored scenes, of
  * every method. docs/numerics.md has the bounds. test_monotone.c has more of the voxels, of the rays and of
  * the casters; test_shadow_run.c and test_field_run.c: threads do not show. */
+#include "expect.h"
 #include "traced.h"
 
 #include "field/field.h"
@@ -178,9 +179,8 @@ static vsh_grid *grid_of_meshes(double scale, double half_width, bool open) {
     options.voxel_size = 0.0625 * scale;
     options.half_width = half_width;
     vsh_grid *grid = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_grid_from_meshes(meshes, open ? 2 : 1, &options, NULL, &grid, &error) != VSH_OK) {
-        fail_msg("scale %g: %s", scale, error.message);
+    if (vsh_grid_from_meshes(meshes, open ? 2 : 1, &options, NULL, &grid, &failure) != VSH_OK) {
+        fail_msg("scale %g: %s", scale, failure.message);
     }
     return grid;
 }

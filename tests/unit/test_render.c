@@ -1,4 +1,5 @@
 /* Pictures against closed forms: what a pinhole sees of spheres and planes, and the light there. */
+#include "expect.h"
 #include "pictures.h"
 
 static void a_sphere_is_where_it_is_with_its_normals(void **state) {
@@ -249,16 +250,15 @@ static void a_render_can_be_cancelled_and_limited(void **state) {
     const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
     const vsh_render_options o = small(camera_at(0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 30.0), 4);
     vsh_run run = vsh_run_default();
-    vsh_error error;
     double seen = 0.0;
     run.progress = stop;
     run.user = &seen;
-    assert_int_equal(vsh_render(&surface, 1, occluders_of(field), NULL, 0, &o, &run, &picture, NULL, &error),
-                     VSH_ERROR_CANCELLED);
+    expect_error(vsh_render(&surface, 1, occluders_of(field), NULL, 0, &o, &run, &picture, NULL, &failure),
+                 VSH_ERROR_CANCELLED, "");
     run = vsh_run_default();
     run.memory_limit = 100000;
-    assert_int_equal(vsh_render(&surface, 1, occluders_of(field), NULL, 0, &o, &run, &picture, NULL, &error),
-                     VSH_ERROR_LIMIT);
+    expect_error(vsh_render(&surface, 1, occluders_of(field), NULL, 0, &o, &run, &picture, NULL, &failure),
+                 VSH_ERROR_LIMIT, "");
     vsh_field_free(field);
 }
 
@@ -282,23 +282,20 @@ static void options_out_of_range_are_refused(void **state) {
     bad[5].background[2] = INFINITY;
     bad[6].shaft_steps = 65;
     bad[7].camera.fov = 4.0;
-    vsh_error error;
     for (int i = 0; i < 8; ++i) {
-        assert_int_equal(
-            vsh_render(&surface, 1, occluders_of(field), NULL, 0, &bad[i], NULL, &picture, NULL, &error),
-            VSH_ERROR_ARGUMENT);
-        assert_non_null(strstr(error.message, parts[i]));
+        expect_error(
+            vsh_render(&surface, 1, occluders_of(field), NULL, 0, &bad[i], NULL, &picture, NULL, &failure),
+            VSH_ERROR_ARGUMENT, "");
+        assert_non_null(strstr(failure.message, parts[i]));
     }
-    assert_int_equal(
-        vsh_render(&bright, 1, occluders_of(field), NULL, 0, &good, NULL, &picture, NULL, &error),
-        VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_render(&none, 1, occluders_of(field), NULL, 0, &good, NULL, &picture, NULL, &error),
-                     VSH_ERROR_ARGUMENT);
-    assert_int_equal(
-        vsh_render(&surface, 1, occluders_of(field), NULL, 1, &good, NULL, &picture, NULL, &error),
-        VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_render(&surface, 1, NULL, NULL, 0, &good, NULL, &picture, NULL, &error),
-                     VSH_ERROR_ARGUMENT);
+    expect_error(vsh_render(&bright, 1, occluders_of(field), NULL, 0, &good, NULL, &picture, NULL, &failure),
+                 VSH_ERROR_ARGUMENT, "");
+    expect_error(vsh_render(&none, 1, occluders_of(field), NULL, 0, &good, NULL, &picture, NULL, &failure),
+                 VSH_ERROR_ARGUMENT, "");
+    expect_error(vsh_render(&surface, 1, occluders_of(field), NULL, 1, &good, NULL, &picture, NULL, &failure),
+                 VSH_ERROR_ARGUMENT, "");
+    expect_error(vsh_render(&surface, 1, NULL, NULL, 0, &good, NULL, &picture, NULL, &failure),
+                 VSH_ERROR_ARGUMENT, "");
     vsh_field_free(field);
 }
 

@@ -1,4 +1,5 @@
 /* Fog and lightmaps in pictures, against closed forms; pictures of 8 bits. */
+#include "expect.h"
 #include "pictures.h"
 
 /* --- fog */
@@ -87,22 +88,17 @@ static void a_lightmap_is_looked_up_where_it_was_baked(void **state) {
     const char *const others[] = {"ao", "shadow.moon"};
     const vsh_image missing = {N, N, 2, others, planes, NULL};
     vsh_lit_meshes wrong = {&mesh, 1, &missing, {0.5, 0.5, 0.5}, 0};
-    vsh_error error;
     o.lit = &wrong;
-    assert_int_equal(
-        vsh_render(&surface, 1, occluders_of(field), &light, 1, &o, NULL, &picture, NULL, &error),
-        VSH_ERROR_INPUT);
-    assert_non_null(strstr(error.message, "shadow.sun"));
+    expect_error(vsh_render(&surface, 1, occluders_of(field), &light, 1, &o, NULL, &picture, NULL, &failure),
+                 VSH_ERROR_INPUT, "shadow.sun");
     wrong.meshes = NULL;
-    assert_int_equal(
-        vsh_render(&surface, 1, occluders_of(field), &light, 1, &o, NULL, &picture, NULL, &error),
-        VSH_ERROR_ARGUMENT);
-    assert_string_equal(error.message, "lit meshes 0: no lightmap, or no meshes");
+    expect_error(vsh_render(&surface, 1, occluders_of(field), &light, 1, &o, NULL, &picture, NULL, &failure),
+                 VSH_ERROR_ARGUMENT, "");
+    assert_string_equal(failure.message, "lit meshes 0: no lightmap, or no meshes");
     o.lit = NULL;
-    assert_int_equal(
-        vsh_render(&surface, 1, occluders_of(field), &light, 1, &o, NULL, &picture, NULL, &error),
-        VSH_ERROR_ARGUMENT);
-    assert_string_equal(error.message, "lit is NULL with a lit_count of 1");
+    expect_error(vsh_render(&surface, 1, occluders_of(field), &light, 1, &o, NULL, &picture, NULL, &failure),
+                 VSH_ERROR_ARGUMENT, "");
+    assert_string_equal(failure.message, "lit is NULL with a lit_count of 1");
     vsh_field_free(field);
 }
 
@@ -129,14 +125,13 @@ static void irradiance_comes_before_shadows(void **state) {
 static void gradients_are_dithered_to_srgb(void **state) {
     static float planes[4][PIXELS];
     float *const rgb[3] = {planes[0], planes[1], planes[2]};
-    vsh_error error;
     for (int i = 0; i < PIXELS; ++i) {
         color[3 * i] = 0.25f;
         color[3 * i + 1] = 0.0f;
         color[3 * i + 2] = 1.0f;
         alpha[i] = 0.5f;
     }
-    assert_int_equal(vsh_picture_encode(&picture, WIDE, HIGH, 1.0, rgb, NULL, &error), VSH_OK);
+    expect_ok(vsh_picture_encode(&picture, WIDE, HIGH, 1.0, rgb, NULL, &failure));
     double mean = 0.0;
     for (int i = 0; i < PIXELS; ++i) {
         const double steps = 255.0 * (double)planes[0][i];
@@ -145,10 +140,10 @@ static void gradients_are_dithered_to_srgb(void **state) {
         mean += steps / PIXELS;
     }
     assert_true(fabs(mean - 187.516) < 0.05); /* of 0.5: 0.735357 */
-    assert_int_equal(vsh_picture_encode(&picture, WIDE, HIGH, 0.0, rgb, planes[3], &error), VSH_OK);
+    expect_ok(vsh_picture_encode(&picture, WIDE, HIGH, 0.0, rgb, planes[3], &failure));
     assert_true(fabs(255.0 * (double)planes[0][7] - 187.516) < 1.0); /* 0.25 over half of a pixel */
     assert_true(fabs((double)planes[3][7] - 128.0 / 255.0) < 1e-6);
-    assert_int_equal(vsh_picture_encode(&picture, WIDE, HIGH, NAN, rgb, NULL, &error), VSH_ERROR_ARGUMENT);
+    expect_error(vsh_picture_encode(&picture, WIDE, HIGH, NAN, rgb, NULL, &failure), VSH_ERROR_ARGUMENT, "");
 }
 
 int main(void) {

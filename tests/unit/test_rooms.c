@@ -1,4 +1,5 @@
 /* What is taken for a room, and what it is cut out of; walls, and what is a sheet because neither fits. */
+#include "expect.h"
 #include "kinds.h"
 #include "shapes.h"
 #include "traced.h"
@@ -163,18 +164,15 @@ static void no_ray_through_two_holes_is_proved_hidden(void **state) {
     shape_turned(s, ORIGIN, rings, 2, 64);
     const vsh_mesh mesh = shape_mesh(s, "tube");
     vsh_solidity_report report;
-    vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vsh_mesh_solidity(&mesh, 1, NULL, &report, &error), VSH_OK);
+    expect_ok(vsh_mesh_solidity(&mesh, 1, NULL, &report, &failure));
     assert_true(report.solids == 1 && report.closed_over == 1 && report.holes == 2);
     assert_int_equal(report.open_edges, 128);
     vsh_grid_options options = vsh_grid_options_default();
     options.voxel_size = 0.02;
     vsh_grid *grid = NULL;
     vsh_triangles *triangles = NULL;
-    if (vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &error) != VSH_OK ||
-        vsh_triangles_create(&mesh, 1, NULL, &triangles, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure));
+    expect_ok(vsh_triangles_create(&mesh, 1, NULL, &triangles, &failure));
     caster c = {field_of_grid(grid, 0.0), triangles};
     const vsh_light narrow = sun(towards, RADIANS(1.0));
     double at[3 * 64];
@@ -204,10 +202,9 @@ static void the_floor_of_an_inward_room_has_the_ao_of_a_room(void **state) {
     options.voxel_size = 0.02;
     vsh_grid *grid = NULL;
     vsh_triangles *triangles = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &error) != VSH_OK ||
-        (vsh_triangles_available() && vsh_triangles_create(&mesh, 1, NULL, &triangles, &error) != VSH_OK)) {
-        fail_msg("%s", error.message);
+    if (vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure) != VSH_OK ||
+        (vsh_triangles_available() && vsh_triangles_create(&mesh, 1, NULL, &triangles, &failure) != VSH_OK)) {
+        fail_msg("%s", failure.message);
     }
     caster c = {field_of_grid(grid, 0.0), triangles};
     const double at[6] = {0.013, 0.021, -1.0, 0.9, 0.0, -1.0};
@@ -244,11 +241,8 @@ static void no_ray_is_proved_hidden_by_the_thickness_of_a_sheet(void **state) {
     options.voxel_size = 0.1;
     vsh_grid *grid = NULL;
     vsh_triangles *triangles = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &error) != VSH_OK ||
-        vsh_triangles_create(&mesh, 1, NULL, &triangles, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure));
+    expect_ok(vsh_triangles_create(&mesh, 1, NULL, &triangles, &failure));
     caster c = {field_of_grid(grid, 0.0), triangles};
     const vsh_light narrow = sun(towards, RADIANS(1.0));
     double at[3 * 64];
