@@ -2,6 +2,7 @@
 #ifndef TESTS_ASSETS_H
 #define TESTS_ASSETS_H
 
+#include "expect.h"
 #include "models.h"
 
 #include "base/uri.h"
@@ -23,6 +24,27 @@ static inline void free_asset(asset *a) {
     json_decref(a->root);
     free(a->bytes);
     *a = (asset){NULL, NULL, 0};
+}
+
+/* What "buffers/0/uri" leads to; NULL if nothing. */
+static inline json_t *json_at(json_t *value, const char *path) {
+    char part[64];
+    while (value != NULL && *path != '\0') {
+        const size_t length = strcspn(path, "/");
+        snprintf(part, sizeof part, "%.*s", (int)length, path);
+        value =
+            json_is_array(value) ? json_array_get(value, (size_t)atoi(part)) : json_object_get(value, part);
+        path += length + (path[length] == '/');
+    }
+    return value;
+}
+
+static inline const char *text_at(const asset *a, const char *path) {
+    return json_string_value(json_at(a->root, path));
+}
+
+static inline void set_at(const asset *a, const char *path, const char *key, json_t *value) {
+    assert_int_equal(json_object_set_new(json_at(a->root, path), key, value), 0);
 }
 
 /* --- making */
@@ -130,10 +152,8 @@ static inline asset load_asset(const char *path) {
         }
     } else {
         a.root = json_loadb((char *)bytes, size, 0, &error);
-        const char *uri =
-            json_string_value(json_object_get(json_array_get(json_object_get(a.root, "buffers"), 0), "uri"));
-        assert_non_null(uri);
-        char *beside = vshi_uri_path(path, uri);
+        assert_non_null(text_at(&a, "buffers/0/uri"));
+        char *beside = vshi_uri_path(path, text_at(&a, "buffers/0/uri"));
         a.bytes = load_bytes(beside, &a.size);
         free(beside);
     }
@@ -202,59 +222,59 @@ static inline void assert_json_equal(const json_t *a, const json_t *b, const cha
     }
 }
 
+static inline void assert_same_asset(const asset *a, const asset *b) {
+    assert_json_equal(a->root, b->root, "the root");
+    assert_int_equal(a->size, b->size);
+    assert_memory_equal(a->bytes, b->bytes, a->size);
+}
+
 /* --- what was kept */
 
-static inline json_t *without(const json_t *object, const char *const *keys) {
+/* `keys`: names with blanks between them. */
+static inline json_t *without(const json_t *object, const char *keys) {
     json_t *copy = json_deep_copy(object);
-    for (; *keys != NULL; ++keys) {
-        json_object_del(copy, *keys);
+    char key[64];
+    for (int used; sscanf(keys, " %63s%n", key, &used) == 1; keys += used) {
+        json_object_del(copy, key);
     }
     return copy;
 }
 
-static inline void assert_list_kept(const asset *in, const asset *out, const char *name,
-                                    const char *const *but) {
+static inline void assert_alike_but(const json_t *a, const json_t *b, const char *keys, const char *what) {
+    json_t *one = without(a, keys), *other = without(b, keys);
+    assert_json_equal(one, other, what);
+    json_decref(one);
+    json_decref(other);
+}
+
+static inline void assert_list_kept(const asset *in, const asset *out, const char *name, const char *but) {
     for (size_t i = 0; i < count_of(in, name); ++i) {
-        json_t *one = without(item_of(in, name, i), but), *other = without(item_of(out, name, i), but);
         char what[64];
         snprintf(what, sizeof what, "%s[%zu]", name, i);
-        assert_json_equal(one, other, what);
-        json_decref(one);
-        json_decref(other);
+        assert_alike_but(item_of(in, name, i), item_of(out, name, i), but, what);
     }
 }
 
-/* All of the input is in the output, at its place and byte by byte, but for what `…_but` name. */
-static inline void assert_kept(const asset *in, const asset *out, const char *const *node_but,
-                               const char *const *material_but) {
-    static const char *const nothing[] = {NULL}, *const place[] = {"buffer", "byteOffset", NULL},
-                             *const primitives[] = {"primitives", NULL};
-    static const char *const changing[] = {"buffers",
-                                           "bufferViews",
-                                           "accessors",
-                                           "nodes",
-                                           "meshes",
-                                           "materials",
-                                           "images",
-                                           "textures",
-                                           "samplers",
-                                           "extensionsUsed",
-                                           "extensionsRequired",
-                                           NULL};
-    json_t *rest = without(in->root, changing), *other = without(out->root, changing);
-    assert_json_equal(rest, other, "the root");
-    json_decref(rest);
-    json_decref(other);
-    assert_list_kept(in, out, "bufferViews", place);
+static inline void assert_views_kept(const asset *in, const asset *out) {
     for (size_t v = 0; v < count_of(in, "bufferViews"); ++v) {
         const size_t size = number_of(item_of(in, "bufferViews", v), "byteLength");
         assert_memory_equal(bytes_of_view(in, v), bytes_of_view(out, v), size);
     }
-    assert_list_kept(in, out, "accessors", nothing);
-    assert_list_kept(in, out, "images", nothing);
-    assert_list_kept(in, out, "textures", nothing);
-    assert_list_kept(in, out, "samplers", nothing);
-    assert_list_kept(in, out, "meshes", primitives);
+}
+
+/* All of the input is in the output, at its place and byte by byte, but for the keys of `…_but`. */
+static inline void assert_kept(const asset *in, const asset *out, const char *node_but,
+                               const char *material_but) {
+    static const char changing[] = "buffers bufferViews accessors nodes meshes materials images textures "
+                                   "samplers extensionsUsed extensionsRequired";
+    assert_alike_but(in->root, out->root, changing, "the root");
+    assert_list_kept(in, out, "bufferViews", "buffer byteOffset");
+    assert_views_kept(in, out);
+    static const char *const kept[] = {"accessors", "images", "textures", "samplers"};
+    for (size_t i = 0; i < 4; ++i) {
+        assert_list_kept(in, out, kept[i], "");
+    }
+    assert_list_kept(in, out, "meshes", "primitives");
     assert_list_kept(in, out, "nodes", node_but);
     assert_list_kept(in, out, "materials", material_but);
 }
@@ -287,19 +307,13 @@ static inline void keep_file(const char *path) {
 
 static inline vsh_model *read_model(const char *path) {
     vsh_model *model = NULL;
-    vsh_error error = {0};
-    if (vsh_model_read(path, NULL, &model, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(vsh_model_read(path, NULL, &model, &failure));
     return model;
 }
 
 static inline void write_lit(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
                              const vsh_lit_options *options, const char *output) {
-    vsh_error error = {0};
-    if (vsh_lit_write(path, model, meshes, options, output, NULL, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(vsh_lit_write(path, model, meshes, options, output, NULL, &failure));
     keep_file(output);
 }
 
@@ -308,14 +322,6 @@ static inline vsh_lit_options options_of(const vsh_lit_image *images, size_t cou
     options.images = images;
     options.image_count = count;
     return options;
-}
-
-/* "in.glb" as "out.glb", lit by one white image. */
-static inline asset write_white(const vsh_model *model, const vsh_lit_mesh *meshes, int32_t purpose) {
-    const vsh_lit_image image = white_image(purpose, 0);
-    const vsh_lit_options options = options_of(&image, 1);
-    write_lit(path_of("in.glb").text, model, meshes, &options, path_of("out.glb").text);
-    return load_asset(path_of("out.glb").text);
 }
 
 /* --- atlases */
@@ -370,6 +376,15 @@ static inline void free_lit(vsh_lit_mesh *meshes, size_t count) {
 
 static inline void remove_file(const char *name) {
     assert_int_equal(unlink(path_of(name).text), 0);
+}
+
+/* A file of tests/models lit as "out.glb", without an atlas by its own UVs; read again. */
+static inline asset light_model(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
+                                const vsh_lit_options *options) {
+    write_lit(path, model, meshes, options, path_of("out.glb").text);
+    asset out = load_asset(path_of("out.glb").text);
+    remove_file("out.glb");
+    return out;
 }
 
 #endif

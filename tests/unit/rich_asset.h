@@ -15,13 +15,9 @@ typedef struct rich_vertex {
 
 static inline void rich_vertices(asset *a, json_t **attributes) {
     rich_vertex v[VERTICES];
-    unsigned char colors[VERTICES][4], joints[VERTICES][4];
-    uint16_t ids[VERTICES][2];
-    float weights[VERTICES][4];
-    memset(colors, 0, sizeof colors);
-    memset(joints, 0, sizeof joints);
-    memset(ids, 0, sizeof ids);
-    memset(weights, 0, sizeof weights);
+    unsigned char colors[VERTICES][4] = {{0}}, joints[VERTICES][4] = {{0}};
+    uint16_t ids[VERTICES][2] = {{0}};
+    float weights[VERTICES][4] = {{0}};
     for (int i = 0; i < VERTICES; ++i) {
         const float x = (float)(i % SIDE), z = (float)(i / SIDE);
         v[i] = (rich_vertex){{x, 0.0F, z},
@@ -31,7 +27,6 @@ static inline void rich_vertices(asset *a, json_t **attributes) {
             colors[i][k] = (unsigned char)(i * 7 + k);
         }
         ids[i][0] = (uint16_t)(1000 + i);
-        joints[i][0] = 0;
         joints[i][1] = 1;
         weights[i][0] = 0.25F;
         weights[i][1] = 0.75F;
@@ -218,6 +213,47 @@ static inline asset make_rich(void) {
     json_object_set_new(a.root, "buffers",
                         json_pack("[{s:I,s:s}]", "byteLength", (json_int_t)a.size, "name", "all"));
     return a;
+}
+
+/* An asset in the test's folder, its model, an atlas, and the asset with its light. */
+typedef struct lighting {
+    asset in, out;
+    vsh_model *model;
+    vsh_lit_mesh *lit;
+} lighting;
+
+static inline lighting begin_lighting(asset in, bool split) {
+    lighting l = {.in = in};
+    write_glb(&in, "in.glb");
+    write_bytes("tile one.png", white_png, sizeof white_png);
+    l.model = read_model(path_of("in.glb").text);
+    l.lit = make_all_lit(l.model, split);
+    return l;
+}
+
+static inline void light(lighting *l, const vsh_lit_options *options) {
+    free_asset(&l->out);
+    write_lit(path_of("in.glb").text, l->model, l->lit, options, path_of("out.glb").text);
+    l->out = load_asset(path_of("out.glb").text);
+}
+
+/* By one white image. */
+static inline void light_white(lighting *l, int32_t purpose) {
+    const vsh_lit_image image = white_image(purpose, 0);
+    const vsh_lit_options options = options_of(&image, 1);
+    light(l, &options);
+}
+
+static inline void end_lighting(lighting *l) {
+    if (l->lit != NULL) {
+        free_lit(l->lit, vsh_model_mesh_count(l->model));
+    }
+    vsh_model_free(l->model);
+    free_asset(&l->in);
+    free_asset(&l->out);
+    unlink(path_of("out.glb").text);
+    remove_file("tile one.png");
+    remove_file("in.glb");
 }
 
 #endif

@@ -2,16 +2,23 @@
 #include "assets.h"
 #include "expect.h"
 
-enum { LIGHTMAP = 1 << VSH_LIT_LIGHTMAP, OCCLUSION = 1 << VSH_LIT_OCCLUSION };
+enum { LIGHTMAP = 1 << VSH_LIT_LIGHTMAP, OCCLUSION = 1 << VSH_LIT_OCCLUSION, LISTS = 6 };
 
-static const char *const lists[] = {"textures",    "images",    "samplers",
-                                    "bufferViews", "accessors", "materials"};
+static const char *const lists[LISTS] = {"textures",    "images",    "samplers",
+                                         "bufferViews", "accessors", "materials"};
+
+static void free_assets(int count, ...) {
+    va_list list;
+    va_start(list, count);
+    for (int i = 0; i < count; ++i) {
+        free_asset(va_arg(list, asset *));
+    }
+    va_end(list);
+}
 
 /* A scene with a texture that it shows and one that it does not: the glass's. */
 static asset make_scene(void) {
-    char path[512];
-    snprintf(path, sizeof path, "%s/scene.glb", VSH_MODELS);
-    asset a = load_asset(path);
+    asset a = load_asset(VSH_MODELS "/scene.glb");
     for (int i = 0; i < 2; ++i) {
         const int view = put_view(&a, white_png, sizeof white_png, 0, 0);
         put_item(&a, "images", json_pack("{s:i,s:s}", "bufferView", view, "mimeType", "image/png"));
@@ -19,10 +26,8 @@ static asset make_scene(void) {
     put_item(&a, "samplers", parsed("{\"wrapS\":10497}"));
     put_item(&a, "textures", parsed("{\"source\":0,\"sampler\":0}"));
     put_item(&a, "textures", parsed("{\"source\":1}"));
-    json_object_set_new(json_array_get(list_of(&a, "materials"), 1), "occlusionTexture",
-                        parsed("{\"index\":0}"));
-    json_object_set_new(json_array_get(list_of(&a, "buffers"), 0), "byteLength",
-                        json_integer((json_int_t)a.size));
+    set_at(&a, "materials/1", "occlusionTexture", parsed("{\"index\":0}"));
+    set_at(&a, "buffers/0", "byteLength", json_integer((json_int_t)a.size));
     return a;
 }
 
@@ -58,34 +63,38 @@ static asset light_again(const asset *in, int purposes, uint32_t pages) {
 
 /* What a scene had of its own is where it was. */
 static void assert_own_kept(const asset *in, const asset *out) {
-    static const char *const nothing[] = {NULL}, *const moved[] = {"bufferView", NULL};
-    assert_list_kept(in, out, "textures", nothing);
-    assert_list_kept(in, out, "samplers", nothing);
-    assert_list_kept(in, out, "images", moved);
+    assert_list_kept(in, out, "textures", "");
+    assert_list_kept(in, out, "samplers", "");
+    assert_list_kept(in, out, "images", "bufferView");
     for (size_t i = 0; i < 2; ++i) {
         const size_t view = number_of(item_of(out, "images", i), "bufferView");
         assert_memory_equal(bytes_of_view(out, view), white_png, sizeof white_png);
     }
 }
 
+static void assert_counts(const asset *a, const asset *b, size_t list_count) {
+    for (size_t k = 0; k < list_count; ++k) {
+        assert_int_equal(count_of(a, lists[k]), count_of(b, lists[k]));
+    }
+}
+
 /* Every index leads to what it did. */
 static void assert_shown(const asset *out, int purposes) {
+    static const struct {
+        const char *name, *info;
+    } shown[] = {[VSH_LIT_OCCLUSION] = {"occlusion", "occlusionTexture"},
+                 [VSH_LIT_LIGHTMAP] = {"lightmap", "extensions/MOZ_lightmap"}};
     for (size_t m = 0; m < count_of(out, "materials"); ++m) {
-        const json_t *material = item_of(out, "materials", m);
-        const json_t *const infos[] = {
-            [VSH_LIT_OCCLUSION] = json_object_get(material, "occlusionTexture"),
-            [VSH_LIT_LIGHTMAP] = json_object_get(json_object_get(material, "extensions"), "MOZ_lightmap"),
-        };
-        static const char *const names[] = {
-            [VSH_LIT_OCCLUSION] = "occlusion", [VSH_LIT_LIGHTMAP] = "lightmap"};
+        json_t *material = json_array_get(list_of(out, "materials"), m);
         for (int purpose = 0; purpose < 2; ++purpose) {
             if ((purposes >> purpose & 1) == 0) {
                 continue;
             }
-            const json_t *texture = item_of(out, "textures", number_of(infos[purpose], "index"));
+            const json_t *info = json_at(material, shown[purpose].info);
+            const json_t *texture = item_of(out, "textures", number_of(info, "index"));
             const json_t *image = item_of(out, "images", number_of(texture, "source"));
             const json_t *sampler = item_of(out, "samplers", number_of(texture, "sampler"));
-            assert_string_equal(json_string_value(json_object_get(image, "name")), names[purpose]);
+            assert_string_equal(json_string_value(json_object_get(image, "name")), shown[purpose].name);
             assert_int_equal(number_of(sampler, "wrapS"), 33071);
             assert_memory_equal(bytes_of_view(out, number_of(image, "bufferView")), white_png,
                                 sizeof white_png);
@@ -103,19 +112,13 @@ static void what_a_bake_made_is_replaced_by_the_next_to_the_same_file(void **sta
         asset again = light_again(&last, OCCLUSION | LIGHTMAP, 1);
         assert_own_kept(&in, &again);
         assert_shown(&again, OCCLUSION | LIGHTMAP);
-        for (size_t k = 0; k < sizeof lists / sizeof lists[0]; ++k) {
-            assert_int_equal(count_of(&one, lists[k]), count_of(&again, lists[k]));
-        }
+        assert_counts(&one, &again, LISTS);
         assert_int_equal(one.size, again.size);
-        assert_json_equal(last.root, again.root, "the root");
-        assert_int_equal(last.size, again.size);
-        assert_memory_equal(last.bytes, again.bytes, last.size);
+        assert_same_asset(&last, &again);
         free_asset(&last);
         last = again;
     }
-    free_asset(&last);
-    free_asset(&one);
-    free_asset(&in);
+    free_assets(3, &in, &one, &last);
 }
 
 static void fewer_pages_leave_fewer_textures(void **state) {
@@ -124,10 +127,8 @@ static void fewer_pages_leave_fewer_textures(void **state) {
     assert_int_equal(count_of(&two, "textures"), 6);
     asset less = light_again(&two, OCCLUSION | LIGHTMAP, 1),
           more = light_again(&one, OCCLUSION | LIGHTMAP, 2);
-    for (size_t k = 0; k < 3; ++k) {
-        assert_int_equal(count_of(&less, lists[k]), count_of(&one, lists[k]));
-        assert_int_equal(count_of(&more, lists[k]), count_of(&two, lists[k]));
-    }
+    assert_counts(&less, &one, 3);
+    assert_counts(&more, &two, 3);
     assert_own_kept(&in, &less);
     assert_own_kept(&in, &more);
     assert_shown(&less, OCCLUSION | LIGHTMAP);
@@ -136,16 +137,10 @@ static void fewer_pages_leave_fewer_textures(void **state) {
     assert_int_equal(count_of(&ao, "textures"), 4);
     assert_own_kept(&in, &ao);
     assert_shown(&ao, OCCLUSION | LIGHTMAP);
-    free_asset(&ao);
-    free_asset(&more);
-    free_asset(&less);
-    free_asset(&one);
-    free_asset(&two);
-    free_asset(&in);
+    free_assets(6, &in, &two, &one, &less, &more, &ao);
 }
 
 static void what_others_use_or_made_stays(void **state) {
-    static const char *const nothing[] = {NULL}, *const source[] = {"source", NULL};
     asset in = make_scene(), one = light_again(&in, LIGHTMAP, 1);
     const json_int_t image = (json_int_t)number_of(item_of(&one, "textures", 2), "source");
     /* a stranger's, with the same image */
@@ -154,8 +149,8 @@ static void what_others_use_or_made_stays(void **state) {
     asset two = light_again(&one, LIGHTMAP, 1);
     assert_int_equal(count_of(&two, "textures"), 4);
     assert_int_equal(count_of(&two, "images"), 4);
-    assert_list_kept(&one, &two, "textures", source);
-    assert_list_kept(&one, &two, "samplers", nothing);
+    assert_list_kept(&one, &two, "textures", "source");
+    assert_list_kept(&one, &two, "samplers", "");
     assert_int_equal(number_of(item_of(&two, "textures", 2), "source"), image + 1);
     assert_json_equal(item_of(&one, "textures", 3), item_of(&two, "textures", 3), "a texture");
     /* one that nothing shows, though it says that it was made */
@@ -167,15 +162,11 @@ static void what_others_use_or_made_stays(void **state) {
     assert_int_equal(count_of(&three, "samplers"), 3);
     assert_int_equal(number_of(item_of(&three, "textures", 2), "sampler"), 2);
     /* a mark that is gone */
-    json_object_del(json_array_get(list_of(&three, "textures"), 2), "extras");
+    json_object_del(json_at(three.root, "textures/2"), "extras");
     asset four = light_again(&three, LIGHTMAP, 1);
-    assert_list_kept(&three, &four, "textures", nothing);
+    assert_list_kept(&three, &four, "textures", "");
     assert_int_equal(count_of(&four, "textures"), 6);
-    free_asset(&four);
-    free_asset(&three);
-    free_asset(&two);
-    free_asset(&one);
-    free_asset(&in);
+    free_assets(5, &in, &one, &two, &three, &four);
 }
 
 /* What pads an image to whole eights of bytes goes with it, unless something begins there. */
@@ -188,44 +179,33 @@ static void bytes_that_begin_where_those_of_a_bake_end_stay(void **state) {
     const size_t view = (size_t)put_view(&one, bytes, sizeof bytes, 0, 0);
     assert_int_equal(number_of(item_of(&one, "bufferViews", view), "byteOffset") % 8, 4);
     put_accessor(&one, (int)view, 0, 5125, 3, "SCALAR", "");
-    json_object_set_new(json_array_get(list_of(&one, "buffers"), 0), "byteLength",
-                        json_integer((json_int_t)one.size));
+    set_at(&one, "buffers/0", "byteLength", json_integer((json_int_t)one.size));
     asset two = light_again(&one, LIGHTMAP, 1);
     assert_memory_equal(bytes_of_view(&two, view), bytes, sizeof bytes);
-    free_asset(&two);
-    free_asset(&one);
-    free_asset(&in);
+    free_assets(3, &in, &one, &two);
 }
 
 static void beside_an_extension_that_is_not_known_all_stays(void **state) {
     asset in = make_scene(), one = light_again(&in, LIGHTMAP, 1);
     put_item(&one, "extensionsUsed", json_string("VENDOR_skylights"));
-    json_object_set_new(one.root, "extensions", parsed("{\"VENDOR_skylights\":{\"texture\":2}}"));
+    set_at(&one, "", "extensions", parsed("{\"VENDOR_skylights\":{\"texture\":2}}"));
     asset two = light_again(&one, LIGHTMAP, 1);
-    static const char *const nothing[] = {NULL};
-    assert_list_kept(&one, &two, "textures", nothing);
-    assert_list_kept(&one, &two, "images", nothing);
+    assert_list_kept(&one, &two, "textures", "");
+    assert_list_kept(&one, &two, "images", "");
     assert_int_equal(count_of(&two, "textures"), count_of(&one, "textures") + 1);
-    free_asset(&two);
-    free_asset(&one);
-    free_asset(&in);
+    free_assets(3, &in, &one, &two);
 }
 
 /* A number of another list, in a material of an extension that is known by its beginning. */
 static void numbers_in_extensions_of_materials_stay_as_they_are(void **state) {
     asset in = make_scene(), one = light_again(&in, LIGHTMAP, 1);
-    json_t *extensions = json_object_get(json_array_get(list_of(&one, "materials"), 0), "extensions");
     put_item(&one, "extensionsUsed", json_string("KHR_materials_woven"));
-    json_object_set_new(extensions, "KHR_materials_woven", parsed("{\"weave\":{\"index\":3}}"));
+    set_at(&one, "materials/0/extensions", "KHR_materials_woven", parsed("{\"weave\":{\"index\":3}}"));
     asset two = light_again(&one, LIGHTMAP, 1);
     assert_int_equal(count_of(&two, "textures"), 3);
-    assert_json_equal(
-        json_object_get(extensions, "KHR_materials_woven"),
-        json_object_get(json_object_get(item_of(&two, "materials", 0), "extensions"), "KHR_materials_woven"),
-        "an extension");
-    free_asset(&two);
-    free_asset(&one);
-    free_asset(&in);
+    assert_json_equal(json_at(one.root, "materials/0/extensions/KHR_materials_woven"),
+                      json_at(two.root, "materials/0/extensions/KHR_materials_woven"), "an extension");
+    free_assets(3, &in, &one, &two);
 }
 
 static void files_that_were_made_are_left_and_no_longer_named(void **state) {
@@ -235,11 +215,8 @@ static void files_that_were_made_are_left_and_no_longer_named(void **state) {
     asset one = load_asset(path_of("lit.gltf").text);
     light_file("lit.gltf", LIGHTMAP, 1, VSH_LIT_IMAGES_BESIDE, "again.gltf", NULL);
     asset two = load_asset(path_of("again.gltf").text);
-    for (size_t k = 0; k < sizeof lists / sizeof lists[0]; ++k) {
-        assert_int_equal(count_of(&one, lists[k]), count_of(&two, lists[k]));
-    }
-    assert_string_equal(json_string_value(json_object_get(item_of(&two, "images", 2), "uri")),
-                        "again.lightmap.png");
+    assert_counts(&one, &two, LISTS);
+    assert_string_equal(text_at(&two, "images/2/uri"), "again.lightmap.png");
     assert_int_equal(one.size, two.size);
     remove_file("lit.lightmap.png"); /* which is there */
     /* what goes is not brought along, nor missed */
@@ -250,13 +227,9 @@ static void files_that_were_made_are_left_and_no_longer_named(void **state) {
     light_file("lit.gltf", LIGHTMAP, 1, VSH_LIT_IMAGES_BESIDE, "other/lit.gltf", &run);
     assert_string_equal(warnings, "");
     asset far = load_asset(path_of("other/lit.gltf").text);
-    assert_string_equal(json_string_value(json_object_get(item_of(&far, "images", 2), "uri")),
-                        "lit.lightmap.png");
+    assert_string_equal(text_at(&far, "images/2/uri"), "lit.lightmap.png");
     assert_int_equal(far.size, one.size);
-    free_asset(&far);
-    free_asset(&two);
-    free_asset(&one);
-    free_asset(&in);
+    free_assets(4, &in, &one, &two, &far);
     static const char *const left[] = {"in.glb",         "lit.gltf",      "lit.bin",
                                        "again.gltf",     "again.bin",     "again.lightmap.png",
                                        "other/lit.gltf", "other/lit.bin", "other/lit.lightmap.png"};

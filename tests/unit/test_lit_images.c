@@ -39,60 +39,52 @@ static void assert_values(const vsh_image_file *file, int32_t channel, const dou
 
 /* A scene's file, lit by its own UVs. */
 static asset write_scene(const vsh_lit_image *images, size_t count) {
-    char path[512];
-    snprintf(path, sizeof path, "%s/scene.glb", VSH_MODELS);
+    static const char path[] = VSH_MODELS "/scene.glb";
     const vsh_lit_options options = options_of(images, count);
     vsh_model *model = read_model(path);
-    write_lit(path, model, NULL, &options, path_of("out.glb").text);
+    asset out = light_model(path, model, NULL, &options);
     vsh_model_free(model);
-    asset out = load_asset(path_of("out.glb").text);
-    remove_file("out.glb");
     return out;
 }
 
+static vsh_lit_image image_with(int32_t purpose, const float *const *channels, int32_t count, int32_t bits,
+                                double intensity) {
+    return (vsh_lit_image){.purpose = purpose,
+                           .width = WIDTH,
+                           .height = HEIGHT,
+                           .channels = channels,
+                           .channel_count = count,
+                           .bits = bits,
+                           .intensity = intensity};
+}
+
 static void planes_become_images_of_their_values(void **state) {
-    float grey[TEXELS], light[3][TEXELS];
+    float planes[4][TEXELS]; /* one of grey, three of light up to 5.5 */
+    double expected[4][TEXELS];
     for (int i = 0; i < TEXELS; ++i) {
-        grey[i] = (float)i / (TEXELS - 1);
-        for (int c = 0; c < 3; ++c) {
-            light[c][i] = (float)(i + c) / 4.0F; /* up to 5.5 */
+        planes[0][i] = (float)i / (TEXELS - 1);
+        expected[0][i] = (double)planes[0][i];
+        for (int c = 1; c < 4; ++c) {
+            planes[c][i] = (float)(i + c - 1) / 4.0F;
+            expected[c][i] = (double)planes[c][i] / 5.5;
         }
     }
-    const float *const one[1] = {grey}, *const three[3] = {light[0], light[1], light[2]};
+    const float *const views[4] = {planes[0], planes[1], planes[2], planes[3]};
     for (int32_t bits = 8; bits <= 16; bits += 8) {
         const double most = bits == 8 ? 255.0 : 65535.0;
-        const vsh_lit_image images[2] = {{.purpose = VSH_LIT_OCCLUSION,
-                                          .width = WIDTH,
-                                          .height = HEIGHT,
-                                          .channels = one,
-                                          .channel_count = 1,
-                                          .bits = bits},
-                                         {.purpose = VSH_LIT_LIGHTMAP,
-                                          .width = WIDTH,
-                                          .height = HEIGHT,
-                                          .channels = three,
-                                          .channel_count = 3,
-                                          .bits = bits,
-                                          .intensity = 2.0}};
+        const vsh_lit_image images[2] = {image_with(VSH_LIT_OCCLUSION, views, 1, bits, 0.0),
+                                         image_with(VSH_LIT_LIGHTMAP, views + 1, 3, bits, 2.0)};
         asset out = write_scene(images, 2);
-        const json_t *material = item_of(&out, "materials", 0);
-        const json_t *occlusion = json_object_get(material, "occlusionTexture");
-        const json_t *lightmap = json_object_get(json_object_get(material, "extensions"), "MOZ_lightmap");
-        double expected[TEXELS];
-        vsh_image_file *file = image_of(&out, number_of(occlusion, "index"));
-        for (int i = 0; i < TEXELS; ++i) {
-            expected[i] = (double)grey[i];
-        }
-        assert_values(file, 0, expected, most);
+        const json_t *lightmap = json_at(out.root, "materials/0/extensions/MOZ_lightmap");
+        vsh_image_file *file =
+            image_of(&out, number_of(json_at(out.root, "materials/0/occlusionTexture"), "index"));
+        assert_values(file, 0, expected[0], most);
         vsh_image_free(file);
         /* what is over 1 is in the intensity */
         assert_true(json_number_value(json_object_get(lightmap, "intensity")) == 2.0 * 5.5);
         file = image_of(&out, number_of(lightmap, "index"));
         for (int c = 0; c < 3; ++c) {
-            for (int i = 0; i < TEXELS; ++i) {
-                expected[i] = (double)light[c][i] / 5.5;
-            }
-            assert_values(file, c, expected, most);
+            assert_values(file, c, expected[1 + c], most);
         }
         vsh_image_free(file);
         free_asset(&out);
@@ -107,17 +99,10 @@ static void previews_are_unlit_base_colour_of_srgb(void **state) {
         expected[i] = i == 3 || i == 4 ? 0.0 : vshi_to_srgb(fmin(0.75 * (double)grey[i], 1.0));
     }
     const float *const one[1] = {grey};
-    const vsh_lit_image image = {.purpose = VSH_LIT_PREVIEW,
-                                 .width = WIDTH,
-                                 .height = HEIGHT,
-                                 .channels = one,
-                                 .channel_count = 1,
-                                 .intensity = 0.75};
+    const vsh_lit_image image = image_with(VSH_LIT_PREVIEW, one, 1, 0, 0.75);
     asset out = write_scene(&image, 1);
-    const json_t *material = item_of(&out, "materials", 0);
-    assert_non_null(json_object_get(json_object_get(material, "extensions"), "KHR_materials_unlit"));
-    const json_t *base =
-        json_object_get(json_object_get(material, "pbrMetallicRoughness"), "baseColorTexture");
+    assert_non_null(json_at(out.root, "materials/0/extensions/KHR_materials_unlit"));
+    const json_t *base = json_at(out.root, "materials/0/pbrMetallicRoughness/baseColorTexture");
     assert_int_equal(number_of(base, "texCoord"), 1);
     vsh_image_file *file = image_of(&out, number_of(base, "index"));
     assert_values(file, 0, expected, 255.0);
@@ -128,100 +113,75 @@ static void previews_are_unlit_base_colour_of_srgb(void **state) {
 /* --- materials */
 
 static void materials_are_copied_only_where_they_must(void **state) {
-    asset in = make_rich();
-    write_glb(&in, "in.glb");
-    vsh_model *model = read_model(path_of("in.glb").text);
-    vsh_lit_mesh *lit = make_all_lit(model, false);
-    asset out = write_white(model, lit, VSH_LIT_OCCLUSION);
+    lighting l = begin_lighting(make_rich(), false);
+    light_white(&l, VSH_LIT_OCCLUSION);
     /* tiles: in set 1, and as it was for the mesh in the other scene. leaf: as variant there too, in set 1 as
      * a variant and by the instances, in set 0 by the skinned mesh. rail: set 0, and points. White: set 1 */
-    assert_int_equal(count_of(&out, "materials"), 3 + 1 + 2 + 1 + 1);
-    static const char *const names[] = {"tiles", "leaf", "rail"};
+    assert_int_equal(count_of(&l.out, "materials"), 3 + 1 + 2 + 1 + 1);
     for (size_t m = 0; m < 3; ++m) { /* all are shown unlit as well */
-        assert_json_equal(item_of(&in, "materials", m), item_of(&out, "materials", m), names[m]);
+        assert_json_equal(item_of(&l.in, "materials", m), item_of(&l.out, "materials", m), "a material");
     }
     /* left and right share theirs */
     size_t shared[2];
     for (size_t node = 1; node < 3; ++node) {
-        const json_t *primitive = primitive_of(&out, number_of(item_of(&out, "nodes", node), "mesh"), 0);
+        json_t *primitive = json_array_get(
+            json_object_get(item_of(&l.out, "meshes", number_of(item_of(&l.out, "nodes", node), "mesh")),
+                            "primitives"),
+            0);
         shared[node - 1] = number_of(primitive, "material");
-        const json_t *mappings = json_object_get(
-            json_object_get(json_object_get(primitive, "extensions"), "KHR_materials_variants"), "mappings");
+        const json_t *mappings = json_at(primitive, "extensions/KHR_materials_variants/mappings");
         assert_int_equal(number_of(json_array_get(mappings, 0), "material"), shared[0]);
-        const json_t *night = item_of(&out, "materials", number_of(json_array_get(mappings, 1), "material"));
+        const json_t *night =
+            item_of(&l.out, "materials", number_of(json_array_get(mappings, 1), "material"));
         assert_string_equal(json_string_value(json_object_get(night, "name")), "leaf");
         assert_int_equal(number_of(json_object_get(night, "occlusionTexture"), "texCoord"), 1);
     }
     assert_int_equal(shared[0], shared[1]);
-    free_asset(&out);
     /* without the other scene's node and the points, they change where they are */
-    json_array_remove(json_object_get(in.root, "scenes"), 1);
-    json_array_set_new(json_object_get(in.root, "nodes"), 8, json_pack("{s:s}", "name", "empty"));
-    json_array_remove(json_object_get(json_array_get(json_object_get(in.root, "meshes"), 3), "primitives"),
-                      1);
-    write_glb(&in, "in.glb");
-    out = write_white(model, lit, VSH_LIT_OCCLUSION);
-    assert_int_equal(count_of(&out, "materials"), 3 + 1 + 1);
+    json_array_remove(list_of(&l.in, "scenes"), 1);
+    json_array_set_new(list_of(&l.in, "nodes"), 8, parsed("{\"name\":\"empty\"}"));
+    json_array_remove(json_at(l.in.root, "meshes/3/primitives"), 1);
+    write_glb(&l.in, "in.glb");
+    light_white(&l, VSH_LIT_OCCLUSION);
+    assert_int_equal(count_of(&l.out, "materials"), 3 + 1 + 1);
     for (size_t m = 0; m < 3; ++m) {
-        assert_non_null(json_object_get(item_of(&out, "materials", m), "occlusionTexture"));
+        assert_non_null(json_object_get(item_of(&l.out, "materials", m), "occlusionTexture"));
     }
-    free_asset(&out);
-    free_lit(lit, vsh_model_mesh_count(model));
-    vsh_model_free(model);
-    free_asset(&in);
-    remove_file("out.glb");
-    remove_file("in.glb");
+    end_lighting(&l);
 }
 
 static void cut_out_materials_have_no_preview(void **state) {
     asset in = make_rich();
-    json_object_set_new(json_array_get(json_object_get(in.root, "materials"), 0), "alphaMode",
-                        json_string("MASK"));
-    write_glb(&in, "in.glb");
-    vsh_model *model = read_model(path_of("in.glb").text);
-    vsh_lit_mesh *lit = make_all_lit(model, false);
-    asset out = write_white(model, lit, VSH_LIT_PREVIEW);
-    for (size_t m = 0; m < count_of(&out, "materials"); ++m) {
-        const json_t *material = item_of(&out, "materials", m);
+    set_at(&in, "materials/0", "alphaMode", json_string("MASK"));
+    lighting l = begin_lighting(in, false);
+    light_white(&l, VSH_LIT_PREVIEW);
+    for (size_t m = 0; m < count_of(&l.out, "materials"); ++m) {
+        const json_t *material = item_of(&l.out, "materials", m);
         const char *name = json_string_value(json_object_get(material, "name"));
         if (name != NULL && strcmp(name, "tiles") == 0) {
             assert_json_equal(item_of(&in, "materials", 0), material, "tiles");
         }
     }
-    free_asset(&out);
-    free_lit(lit, vsh_model_mesh_count(model));
-    vsh_model_free(model);
-    free_asset(&in);
-    remove_file("out.glb");
-    remove_file("in.glb");
+    end_lighting(&l);
 }
 
 /* --- where they go */
 
 static void images_go_beside_a_gltf_with_its_buffer(void **state) {
     static const uint32_t pages[2] = {0, 1};
-    asset in = make_rich();
-    write_glb(&in, "in.glb");
-    write_bytes("tile one.png", white_png, sizeof white_png);
-    vsh_model *model = read_model(path_of("in.glb").text);
-    vsh_lit_mesh *lit = make_all_lit(model, false);
-    lit[0].page = 1;
+    lighting l = begin_lighting(make_rich(), false);
+    l.lit[0].page = 1;
     const vsh_lit_image images[2] = {white_image(VSH_LIT_LIGHTMAP, 0), white_image(VSH_LIT_LIGHTMAP, 1)};
     vsh_lit_options options = options_of(images, 2);
     options.chart_pages = pages;
     options.chart_count = 2;
-    write_lit(path_of("in.glb").text, model, lit, &options, path_of("a b.gltf").text);
-    asset out = load_asset(path_of("a b.gltf").text);
-    assert_string_equal(json_string_value(json_object_get(item_of(&out, "buffers", 0), "uri")), "a%20b.bin");
-    assert_string_equal(json_string_value(json_object_get(item_of(&out, "buffers", 0), "name")), "all");
-    assert_string_equal(json_string_value(json_object_get(item_of(&out, "images", 1), "uri")),
-                        "a%20b.lightmap.0.png");
-    assert_string_equal(json_string_value(json_object_get(item_of(&out, "images", 2), "uri")),
-                        "a%20b.lightmap.1.png");
-    for (size_t v = 0; v < count_of(&in, "bufferViews"); ++v) {
-        const size_t size = number_of(item_of(&in, "bufferViews", v), "byteLength");
-        assert_memory_equal(bytes_of_view(&in, v), bytes_of_view(&out, v), size);
-    }
+    write_lit(path_of("in.glb").text, l.model, l.lit, &options, path_of("a b.gltf").text);
+    l.out = load_asset(path_of("a b.gltf").text);
+    assert_string_equal(text_at(&l.out, "buffers/0/uri"), "a%20b.bin");
+    assert_string_equal(text_at(&l.out, "buffers/0/name"), "all");
+    assert_string_equal(text_at(&l.out, "images/1/uri"), "a%20b.lightmap.0.png");
+    assert_string_equal(text_at(&l.out, "images/2/uri"), "a%20b.lightmap.1.png");
+    assert_views_kept(&l.in, &l.out);
     static const char *const written[] = {"a b.lightmap.0.png", "a b.lightmap.1.png"};
     for (size_t i = 0; i < 2; ++i) {
         size_t size;
@@ -231,60 +191,48 @@ static void images_go_beside_a_gltf_with_its_buffer(void **state) {
         free(bytes);
         remove_file(written[i]);
     }
-    free_asset(&out);
-    /* and back: from a buffer beside it into a GLB, which is the one that was written from the GLB */
+    /* and it can be read again */
     vsh_model *again = read_model(path_of("a b.gltf").text);
-    assert_int_equal(vsh_model_mesh_count(again), vsh_model_mesh_count(model));
+    assert_int_equal(vsh_model_mesh_count(again), vsh_model_mesh_count(l.model));
     vsh_model_free(again);
     remove_file("a b.gltf");
     remove_file("a b.bin");
-    free_lit(lit, vsh_model_mesh_count(model));
-    vsh_model_free(model);
-    free_asset(&in);
-    remove_file("tile one.png");
-    remove_file("in.glb");
+    end_lighting(&l);
 }
 
 static void images_come_along_into_another_folder(void **state) {
     asset in = make_rich();
-    json_array_append_new(json_object_get(in.root, "images"), parsed("{\"uri\":\"gone.png\"}"));
-    json_array_append_new(json_object_get(in.root, "images"), parsed("{\"uri\":\"link.png\"}"));
-    json_array_append_new(json_object_get(in.root, "images"), parsed("{\"uri\":\"https://a.b/c.png\"}"));
-    write_glb(&in, "in.glb");
-    write_bytes("tile one.png", white_png, sizeof white_png);
+    put_item(&in, "images", parsed("{\"uri\":\"gone.png\"}"));
+    put_item(&in, "images", parsed("{\"uri\":\"link.png\"}"));
+    put_item(&in, "images", parsed("{\"uri\":\"https://a.b/c.png\"}"));
     assert_int_equal(symlink("/etc/passwd", path_of("link.png").text), 0);
     assert_int_equal(mkdir(path_of("other").text, 0777), 0);
-    vsh_model *model = read_model(path_of("in.glb").text);
+    lighting l = begin_lighting(in, false);
     vsh_run run = vsh_run_default();
     run.warning = keep_warning;
     warnings[0] = '\0';
-    expect_ok(vsh_lit_write(path_of("in.glb").text, model, NULL, NULL, path_of("other/out.glb").text, &run,
+    expect_ok(vsh_lit_write(path_of("in.glb").text, l.model, NULL, NULL, path_of("other/out.glb").text, &run,
                             &failure));
-    asset out = load_asset(path_of("other/out.glb").text);
-    const json_t *image = item_of(&out, "images", 0);
-    assert_null(json_object_get(image, "uri"));
-    assert_string_equal(json_string_value(json_object_get(image, "name")), "tile");
-    assert_memory_equal(bytes_of_view(&out, number_of(image, "bufferView")), white_png, sizeof white_png);
+    l.out = load_asset(path_of("other/out.glb").text);
+    assert_null(text_at(&l.out, "images/0/uri"));
+    assert_string_equal(text_at(&l.out, "images/0/name"), "tile");
+    assert_memory_equal(bytes_of_view(&l.out, number_of(item_of(&l.out, "images", 0), "bufferView")),
+                        white_png, sizeof white_png);
     for (size_t i = 1; i < 4; ++i) { /* what cannot be had stays as it was */
-        assert_json_equal(item_of(&in, "images", i), item_of(&out, "images", i), "an image");
+        assert_json_equal(item_of(&in, "images", i), item_of(&l.out, "images", i), "an image");
     }
     assert_non_null(strstr(warnings, "gone.png"));
     assert_non_null(strstr(warnings, "outside of the model's folder"));
-    free_asset(&out);
-    vsh_model_free(model);
-    free_asset(&in);
     remove_file("other/out.glb");
     assert_int_equal(rmdir(path_of("other").text), 0);
     remove_file("link.png");
-    remove_file("tile one.png");
-    remove_file("in.glb");
+    end_lighting(&l);
 }
 
 /* --- the reader */
 
 static void draco_is_decoded_by_a_reader_to_the_same_bytes(void **state) {
-    char path[512];
-    snprintf(path, sizeof path, "%s/scene_draco.glb", VSH_MODELS);
+    static const char path[] = VSH_MODELS "/scene_draco.glb";
     vsh_model *model = read_model(path);
     vsh_lit_mesh *lit = make_all_lit(model, true);
     asset out[2];
@@ -294,9 +242,7 @@ static void draco_is_decoded_by_a_reader_to_the_same_bytes(void **state) {
         expect_ok(vsh_lit_write(path, model, lit, NULL, path_of("out.glb").text, &run, &failure));
         out[i] = load_asset(path_of("out.glb").text);
     }
-    assert_json_equal(out[0].root, out[1].root, "the root");
-    assert_int_equal(out[0].size, out[1].size);
-    assert_memory_equal(out[0].bytes, out[1].bytes, out[0].size);
+    assert_same_asset(&out[0], &out[1]);
     free_asset(&out[0]);
     free_asset(&out[1]);
     free_lit(lit, vsh_model_mesh_count(model));
