@@ -3,16 +3,10 @@
 #define TESTS_LIGHTMAPS_H
 
 #include "casts.h"
+#include "expect.h"
 #include "previews.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
 
 #include <vdbshade/bake.h>
 
@@ -60,11 +54,19 @@ static inline vsh_field *floor_field(int wall) {
     options.voxel_size = VOXEL;
     vsh_grid *grid = NULL;
     vsh_field *field = NULL;
-    vsh_error error = {0};
-    if (vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &error) != VSH_OK ||
-        vsh_field_create(grid, NULL, NULL, &field, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
+    expect_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
+    vsh_grid_free(grid);
+    return field;
+}
+
+static inline vsh_field *field_of_mesh(const vsh_mesh *mesh, double voxel) {
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = voxel;
+    vsh_grid *grid = NULL;
+    vsh_field *field = NULL;
+    expect_ok(vsh_grid_from_meshes(mesh, 1, &options, NULL, &grid, &failure));
+    expect_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
     vsh_grid_free(grid);
     return field;
 }
@@ -76,10 +78,7 @@ static inline vsh_charts *make_texels(const vsh_mesh *meshes, size_t count, int3
     options.supersample = supersample;
     options.padding = padding;
     vsh_charts *charts = NULL;
-    vsh_error error = {0};
-    if (vsh_charts_create(meshes, count, &options, NULL, NULL, &charts, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(vsh_charts_create(meshes, count, &options, NULL, NULL, &charts, &failure));
     return charts;
 }
 
@@ -112,11 +111,8 @@ static inline void bake(const vsh_field *field, const vsh_charts *charts, const 
                         const vsh_lightmap *lightmap, vsh_bake_stats *stats, int32_t threads) {
     vsh_run run = vsh_run_default();
     run.threads = threads;
-    vsh_error error = {0};
-    if (vsh_bake_lightmap(occluders_of(field), charts, light, light != NULL ? 1 : 0, NULL, &run, lightmap,
-                          stats, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    expect_ok(vsh_bake_lightmap(occluders_of(field), charts, light, light != NULL ? 1 : 0, NULL, &run,
+                                lightmap, stats, &failure));
 }
 
 #endif

@@ -3,108 +3,115 @@
 #include "lightmaps.h"
 #include "previews.h"
 
+/* What most tests bake: a field, the charts of a mesh, planes. */
+typedef struct stage {
+    vsh_field *field;
+    vsh_charts *charts;
+    planes *p;
+    vsh_bake_stats stats;
+} stage;
+
+static stage begin(vsh_field *field, const vsh_mesh *mesh, int32_t size, int32_t supersample,
+                   int32_t padding) {
+    return (stage){field, make_texels(mesh, 1, size, supersample, padding), new_planes(),
+                   vsh_bake_stats_zero()};
+}
+
+/* The floor, with a wall on it or without. */
+static stage begin_floor(int wall, int32_t size, int32_t supersample, int32_t padding) {
+    static vsh_mesh mesh; /* charts refer to it */
+    mesh = floor_mesh();
+    return begin(floor_field(wall), &mesh, size, supersample, padding);
+}
+
+static void bake_stage(stage *s, const vsh_light *light) {
+    bake(s->field, s->charts, light, &s->p->all, &s->stats, 0);
+}
+
+static void end(stage *s) {
+    free(s->p);
+    vsh_charts_free(s->charts);
+    vsh_field_free(s->field);
+}
+
 static void a_floor_under_open_sky_is_exactly_lit(void **state) {
-    vsh_field *field = floor_field(0);
-    const vsh_mesh mesh = floor_mesh();
-    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
     const vsh_light light = sun(0.3, 1.0, 0.2, 0.2);
-    planes *p = new_planes();
-    vsh_bake_stats stats = vsh_bake_stats_zero();
-    bake(field, charts, &light, &p->all, &stats, 0);
-    for (int i = 0; i < TEXELS; ++i) {
-        assert_true(p->shadow[i] == 1.0f);
-        assert_true(p->coverage[i] == 1.0f);
+    static const int32_t sizes[][2] = {{SIZE, 0}, {1, 4}}; /* with their padding */
+    for (int k = 0; k < 2; ++k) {
+        stage s = begin_floor(0, sizes[k][0], 1, sizes[k][1]);
+        bake_stage(&s, &light);
+        const size_t texels = (size_t)(sizes[k][0] * sizes[k][0]);
+        for (size_t i = 0; i < texels; ++i) {
+            assert_true(s.p->shadow[i] == 1.0f);
+            assert_true(s.p->coverage[i] == 1.0f);
+        }
+        assert_true(texels == TEXELS || isnan(s.p->coverage[texels]));
+        assert_int_equal(s.stats.texels, texels);
+        assert_int_equal(s.stats.invalid_texels, 0);
+        end(&s);
     }
-    assert_int_equal(stats.texels, TEXELS);
-    assert_int_equal(stats.invalid_texels, 0);
-    free(p);
-    vsh_charts_free(charts);
-    vsh_field_free(field);
 }
 
 static void texels_under_a_wall_are_invalid_and_nothing_leaks_on_either_side(void **state) {
-    vsh_field *field = floor_field(1);
-    const vsh_mesh mesh = floor_mesh();
-    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
-    planes *p = new_planes();
-    uint64_t invalid_by_mesh[1] = {77};
-    vsh_bake_stats stats = vsh_bake_stats_zero();
-    stats.invalid_by_mesh = invalid_by_mesh;
-    bake(field, charts, &light, &p->all, &stats, 0);
-    uint64_t invalid = 0;
+    uint64_t invalid_by_mesh[1] = {77}, invalid = 0;
+    stage s = begin_floor(1, SIZE, 1, 0);
+    s.stats.invalid_by_mesh = invalid_by_mesh;
+    bake_stage(&s, &light);
     for (uint32_t i = 0; i < TEXELS; ++i) {
         const double x = texel_x(i);
-        invalid += p->coverage[i] == 0.0f;
-        if (fabs(x) < WALL - VOXEL) {
-            assert_true(p->coverage[i] == 0.0f);
-        } else if (fabs(x) > WALL + VOXEL) {
-            assert_true(p->coverage[i] == 1.0f);
-        }
+        const float shadow = s.p->shadow[i];
+        invalid += s.p->coverage[i] == 0.0f;
+        assert_true(fabs(x) >= WALL - VOXEL || s.p->coverage[i] == 0.0f);
+        assert_true(fabs(x) <= WALL + VOXEL || s.p->coverage[i] == 1.0f);
         /* The shadow of a wall of height 1 at 45° ends beyond the floor's edge. */
-        if (x < -WALL) {
-            assert_true(p->shadow[i] < 0.01f);
-        } else if (x > WALL + VOXEL) {
-            assert_true(p->shadow[i] > 0.99f);
-        }
-    }
-    assert_int_equal(invalid, stats.invalid_texels);
-    assert_int_equal(invalid, invalid_by_mesh[0]);
-    assert_int_equal(stats.texels, TEXELS);
-    /* Invalid texels take the value of the nearest valid one, dark or lit. */
-    for (uint32_t i = 0; i < TEXELS; ++i) {
-        const double x = texel_x(i);
+        assert_true(x >= -WALL || shadow < 0.01f);
+        assert_true(x <= WALL + VOXEL || shadow > 0.99f);
+        /* Invalid texels take the value of the nearest valid one, dark or lit. */
         if (fabs(x) < WALL - VOXEL && fabs(x) > WALL - 6.0 * 2.0 / SIZE) {
-            assert_true(x < 0.0 ? p->shadow[i] < 0.01f : p->shadow[i] > 0.9f);
+            assert_true(x < 0.0 ? shadow < 0.01f : shadow > 0.9f);
         }
     }
-    free(p);
-    vsh_charts_free(charts);
-    vsh_field_free(field);
+    assert_int_equal(invalid, s.stats.invalid_texels);
+    assert_int_equal(invalid, invalid_by_mesh[0]);
+    assert_int_equal(s.stats.texels, TEXELS);
+    end(&s);
 }
 
 static void padding_copies_dark_and_lit_texels_and_leaves_coverage(void **state) {
     enum { PADDING = 3 };
-    vsh_field *field = floor_field(1);
     /* The part x < -0.5 of the floor, all of it in shadow, and a chart around it. */
     const float positions[12] = {-1, 0, 1, -0.5f, 0, 1, -0.5f, 0, -1, -1, 0, -1};
     const float uvs[8] = {0.25f, 0.25f, 0.75f, 0.25f, 0.75f, 0.75f, 0.25f, 0.75f};
     vsh_mesh mesh = floor_mesh();
     mesh.positions = positions;
     mesh.uvs = uvs;
-    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, PADDING);
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
-    planes *p = new_planes();
-    bake(field, charts, &light, &p->all, NULL, 0);
+    stage s = begin(floor_field(1), &mesh, SIZE, 1, PADDING);
+    bake_stage(&s, &light);
+    const planes *p = s.p;
     for (int i = 0; i < TEXELS; ++i) {
         const int x = i % SIZE, y = i / SIZE;
         const int dx = x < 16 ? 16 - x : x > 47 ? x - 47 : 0, dy = y < 16 ? 16 - y : y > 47 ? y - 47 : 0;
-        const int inside = dx == 0 && dy == 0;
-        assert_true(p->coverage[i] == (inside ? 1.0f : 0.0f));
+        assert_true(p->coverage[i] == (dx == 0 && dy == 0 ? 1.0f : 0.0f));
         if (dx * dx + dy * dy > PADDING * PADDING) {
             assert_true(p->ao[i] == 0.0f);
         } else {
-            assert_true(p->ao[i] > 0.0f);
             const int source = (y < 16 ? 16 : y > 47 ? 47 : y) * SIZE + (x < 16 ? 16 : x > 47 ? 47 : x);
-            assert_true(p->ao[i] == p->ao[source]);
+            assert_true(p->ao[i] > 0.0f && p->ao[i] == p->ao[source]);
         }
         assert_true(p->shadow[i] < 0.01f);
     }
-    free(p);
-    vsh_charts_free(charts);
-    vsh_field_free(field);
+    end(&s);
 }
 
 static void a_texel_is_the_mean_of_its_valid_samples(void **state) {
     enum { N = 3, SMALL = 16 };
-    vsh_field *field = floor_field(1);
-    const vsh_mesh mesh = floor_mesh();
-    vsh_charts *charts = make_texels(&mesh, 1, SMALL, N, 0);
-    vsh_charts *fine = make_texels(&mesh, 1, SMALL * N, 1, 0);
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.3);
-    planes *p = new_planes(), *q = new_planes();
-    bake(field, charts, &light, &p->all, NULL, 0);
-    bake(field, fine, &light, &q->all, NULL, 0);
+    stage coarse = begin_floor(1, SMALL, N, 0), fine = begin_floor(1, SMALL * N, 1, 0);
+    bake_stage(&coarse, &light);
+    bake_stage(&fine, &light);
+    const planes *p = coarse.p, *q = fine.p;
     for (int i = 0; i < SMALL * SMALL; ++i) {
         double sum = 0.0, count = 0.0;
         for (int s = 0; s < N * N; ++s) {
@@ -113,30 +120,10 @@ static void a_texel_is_the_mean_of_its_valid_samples(void **state) {
             count += (double)q->coverage[at];
         }
         assert_true(p->coverage[i] == (count > 0.0 ? 1.0f : 0.0f));
-        if (count > 0.0) {
-            assert_true(fabs((double)p->shadow[i] - sum / count) < 1e-4);
-        }
+        assert_true(count == 0.0 || fabs((double)p->shadow[i] - sum / count) < 1e-4);
     }
-    free(q);
-    free(p);
-    vsh_charts_free(fine);
-    vsh_charts_free(charts);
-    vsh_field_free(field);
-}
-
-static void a_lightmap_of_one_texel_is_the_value_at_its_middle(void **state) {
-    vsh_field *field = floor_field(0);
-    const vsh_mesh mesh = floor_mesh();
-    vsh_charts *charts = make_texels(&mesh, 1, 1, 1, 4);
-    const vsh_light light = sun(0.0, 1.0, 0.0, 0.1);
-    planes *p = new_planes();
-    bake(field, charts, &light, &p->all, NULL, 0);
-    assert_true(p->shadow[0] == 1.0f);
-    assert_true(p->coverage[0] == 1.0f);
-    assert_true(isnan(p->coverage[1]));
-    free(p);
-    vsh_charts_free(charts);
-    vsh_field_free(field);
+    end(&fine);
+    end(&coarse);
 }
 
 /* A UV sphere, smooth, of `ROWS` × 2 `ROWS` cells, as receiver and caster. */
@@ -169,177 +156,127 @@ static void a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne(void **sta
                            .indices = indices,
                            .vertex_count = VERTICES,
                            .triangle_count = i / 3};
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = 0.02;
-    vsh_grid *grid = NULL;
-    vsh_field *field = NULL;
-    expect_ok(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure));
-    expect_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
-    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
     const vsh_light light = sun(0.3, 0.9, 0.2, 0.01);
     const double length = sqrt(0.09 + 0.81 + 0.04);
-    planes *p = new_planes();
-    vsh_bake_stats stats = vsh_bake_stats_zero();
-    bake(field, charts, &light, &p->all, &stats, 0);
-    assert_int_equal(stats.invalid_texels, 0);
+    stage s = begin(field_of_mesh(&mesh, 0.02), &mesh, SIZE, 1, 0);
+    bake_stage(&s, &light);
+    assert_int_equal(s.stats.invalid_texels, 0);
     vsh_texels *texels = NULL;
-    assert_int_equal(vsh_texels_create(charts, NULL, &texels, NULL), VSH_OK);
+    expect_ok(vsh_texels_create(s.charts, NULL, &texels, &failure));
     const vsh_texel_samples samples = vsh_texels_samples(texels);
-    for (size_t s = 0; s < samples.count; ++s) {
-        const float *n = samples.normals + 3 * s;
+    for (size_t k = 0; k < samples.count; ++k) {
+        const float *n = samples.normals + 3 * k;
         const double cosine = ((double)n[0] * 0.3 + (double)n[1] * 0.9 + (double)n[2] * 0.2) / length;
-        const float value = p->shadow[vsh_texel_place(samples.texels[s], SIZE)];
-        if (cosine > 0.15) {
-            assert_true(value > 0.98f);
-        } else if (cosine < -0.01) {
-            assert_true(value == 0.0f);
-        }
+        const float value = s.p->shadow[vsh_texel_place(samples.texels[k], SIZE)];
+        assert_true(cosine <= 0.15 || value > 0.98f);
+        assert_true(cosine >= -0.01 || value == 0.0f);
     }
-    free(p);
     vsh_texels_free(texels);
-    vsh_charts_free(charts);
-    vsh_field_free(field);
-    vsh_grid_free(grid);
+    end(&s);
 }
 
 static void an_open_sheet_does_not_shade_itself(void **state) {
     const vsh_mesh mesh = floor_mesh();
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = VOXEL;
-    vsh_grid *grid = NULL;
-    vsh_field *field = NULL;
-    expect_ok(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure));
-    expect_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
-    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
     const vsh_light light = sun(0.5, 0.8, 0.1, 0.1);
-    planes *p = new_planes();
-    bake(field, charts, &light, &p->all, NULL, 0);
+    stage s = begin(field_of_mesh(&mesh, VOXEL), &mesh, SIZE, 1, 0);
+    bake_stage(&s, &light);
     for (int i = 0; i < TEXELS; ++i) {
-        assert_true(p->coverage[i] == 1.0f);
-        assert_true(p->shadow[i] == 1.0f);
+        assert_true(s.p->coverage[i] == 1.0f);
+        assert_true(s.p->shadow[i] == 1.0f);
     }
-    free(p);
-    vsh_charts_free(charts);
-    vsh_field_free(field);
-    vsh_grid_free(grid);
+    end(&s);
 }
 
 /* --- How a lightmap is baked: its planes, their errors, threads, options, limits. */
 
 static void irradiance_is_visibility_times_colour_times_cosine_times_ao(void **state) {
-    vsh_field *field = floor_field(1);
-    const vsh_mesh mesh = floor_mesh();
-    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
     vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
     light.color[0] = 2.0;
     light.color[1] = 0.5;
     light.color[2] = 0.0;
-    planes *p = new_planes();
-    bake(field, charts, &light, &p->all, NULL, 0);
+    stage s = begin_floor(1, SIZE, 1, 0);
+    bake_stage(&s, &light);
+    planes *p = s.p, *alone = new_planes();
+    alone->all = (vsh_lightmap){.irradiance = alone->irradiance};
+    bake(s.field, s.charts, &light, &alone->all, NULL, 0);
     for (size_t i = 0; i < TEXELS; ++i) {
-        const double expected = (double)p->shadow[i] * sqrt(0.5) * (double)p->ao[i];
+        const double lit = (double)p->shadow[i] * sqrt(0.5), expected = lit * (double)p->ao[i];
         assert_true(fabs((double)p->irradiance[3 * i] - 2.0 * expected) < 1e-5);
         assert_true(fabs((double)p->irradiance[3 * i + 1] - 0.5 * expected) < 1e-5);
         assert_true(p->irradiance[3 * i + 2] == 0.0f);
-    }
-    planes *alone = new_planes();
-    alone->all = (vsh_lightmap){.irradiance = alone->irradiance};
-    bake(field, charts, &light, &alone->all, NULL, 0);
-    for (size_t i = 0; i < TEXELS; ++i) {
-        assert_true(fabs((double)alone->irradiance[3 * i] - 2.0 * sqrt(0.5) * (double)p->shadow[i]) < 1e-5);
+        assert_true(fabs((double)alone->irradiance[3 * i] - 2.0 * lit) < 1e-5);
     }
     free(alone);
-    free(p);
-    vsh_charts_free(charts);
-    vsh_field_free(field);
+    end(&s);
 }
 
 static void planes_that_are_not_asked_for_cost_nothing_and_change_nothing(void **state) {
-    vsh_field *field = floor_field(1);
-    const vsh_mesh mesh = floor_mesh();
-    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 2);
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
-    planes *all = new_planes(), *some = new_planes();
-    bake(field, charts, &light, &all->all, NULL, 0);
-
+    stage s = begin_floor(1, SIZE, 1, 2);
+    bake_stage(&s, &light);
+    planes *some = new_planes();
+    const vsh_lightmap coverage = {.coverage = some->coverage}, ao = {.ao = some->ao},
+                       shadow = {.shadow = some->lights};
     vsh_bake_stats stats = vsh_bake_stats_zero();
-    const vsh_lightmap coverage = {.coverage = some->coverage};
-    bake(field, charts, &light, &coverage, &stats, 0);
+    bake(s.field, s.charts, &light, &coverage, &stats, 0);
     assert_int_equal(stats.shade.marches, 0);
     assert_int_equal(stats.shade.samples, 0);
-    assert_memory_equal(some->coverage, all->coverage, sizeof all->coverage);
-
-    const vsh_lightmap ao = {.ao = some->ao};
-    bake(field, charts, NULL, &ao, NULL, 0);
-    assert_memory_equal(some->ao, all->ao, sizeof all->ao);
-    const vsh_lightmap shadow = {.shadow = some->lights};
-    bake(field, charts, &light, &shadow, NULL, 0);
-    assert_memory_equal(some->shadow, all->shadow, sizeof all->shadow);
+    bake(s.field, s.charts, NULL, &ao, NULL, 0);
+    bake(s.field, s.charts, &light, &shadow, NULL, 0);
+    assert_memory_equal(some->coverage, s.p->coverage, sizeof some->coverage);
+    assert_memory_equal(some->ao, s.p->ao, sizeof some->ao);
+    assert_memory_equal(some->shadow, s.p->shadow, sizeof some->shadow);
     free(some);
-    free(all);
-    vsh_charts_free(charts);
-    vsh_field_free(field);
+    end(&s);
 }
 
 static void any_number_of_threads_gives_the_same_bits(void **state) {
-    vsh_field *field = floor_field(1);
-    const vsh_mesh mesh = floor_mesh();
-    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 3, 4);
     const vsh_light light = sun(1.0, 0.7, 0.3, 0.2);
-    planes *p[3];
-    const int32_t threads[3] = {1, 2, 5};
-    for (int t = 0; t < 3; ++t) {
-        p[t] = new_planes();
-        bake(field, charts, &light, &p[t]->all, NULL, threads[t]);
-        assert_memory_equal(p[t]->shadow, p[0]->shadow, sizeof p[0]->shadow);
-        assert_memory_equal(p[t]->ao, p[0]->ao, sizeof p[0]->ao);
-        assert_memory_equal(p[t]->irradiance, p[0]->irradiance, sizeof p[0]->irradiance);
-        assert_memory_equal(p[t]->coverage, p[0]->coverage, sizeof p[0]->coverage);
+    stage s = begin_floor(1, SIZE, 3, 4);
+    bake(s.field, s.charts, &light, &s.p->all, NULL, 1);
+    static const int32_t threads[] = {2, 5};
+    for (int t = 0; t < 2; ++t) {
+        planes *p = new_planes();
+        bake(s.field, s.charts, &light, &p->all, NULL, threads[t]);
+        assert_memory_equal(p->shadow, s.p->shadow, sizeof p->shadow);
+        assert_memory_equal(p->ao, s.p->ao, sizeof p->ao);
+        assert_memory_equal(p->irradiance, s.p->irradiance, sizeof p->irradiance);
+        assert_memory_equal(p->coverage, s.p->coverage, sizeof p->coverage);
+        free(p);
     }
-    for (int t = 0; t < 3; ++t) {
-        free(p[t]);
-    }
-    vsh_charts_free(charts);
-    vsh_field_free(field);
+    end(&s);
 }
 
-static int32_t stop_in_bake(void *user, const char *stage, double fraction) {
-    return strcmp(stage, "bake") == 0 && fraction > 0.0;
+static int32_t stop_in_bake(void *user, const char *step, double fraction) {
+    return strcmp(step, "bake") == 0 && fraction > 0.0;
 }
 
 static void bad_options_limits_and_cancelling_are_reported(void **state) {
-    vsh_field *field = floor_field(1);
-    const vsh_mesh mesh = floor_mesh();
-    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 1, 0);
-    vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
-    planes *p = new_planes();
-    vsh_shade_options options = preview_options();
-    options.start_offset = NAN;
-    expect_error(
-        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, &options, NULL, &p->all, NULL, &failure),
-        VSH_ERROR_ARGUMENT, "start_offset");
-    options = preview_options();
-    options.surface_offset = -1.0;
-    expect_error(
-        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, &options, NULL, &p->all, NULL, &failure),
-        VSH_ERROR_ARGUMENT, "");
-    vsh_run run = vsh_run_default();
-    run.memory_limit = 1000;
-    expect_error(
-        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, NULL, &run, &p->all, NULL, &failure),
-        VSH_ERROR_LIMIT, "");
-    run = vsh_run_default();
-    run.progress = stop_in_bake;
-    expect_error(
-        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, NULL, &run, &p->all, NULL, &failure),
-        VSH_ERROR_CANCELLED, "");
-    light.angle = -1.0;
-    expect_error(
-        vsh_bake_lightmap(occluders_of(field), charts, &light, 1, NULL, NULL, &p->all, NULL, &failure),
-        VSH_ERROR_ARGUMENT, "");
-    free(p);
-    vsh_charts_free(charts);
-    vsh_field_free(field);
+    const struct {
+        double start_offset, surface_offset, angle;
+        uint64_t memory_limit;
+        int32_t (*progress)(void *, const char *, double);
+        vsh_result code;
+        const char *part;
+    } cases[] = {{NAN, 0.0, 0.05, 0, NULL, VSH_ERROR_ARGUMENT, "start_offset"},
+                 {1.0, -1.0, 0.05, 0, NULL, VSH_ERROR_ARGUMENT, ""},
+                 {1.0, 0.0, 0.05, 1000, NULL, VSH_ERROR_LIMIT, ""},
+                 {1.0, 0.0, 0.05, 0, stop_in_bake, VSH_ERROR_CANCELLED, ""},
+                 {1.0, 0.0, -1.0, 0, NULL, VSH_ERROR_ARGUMENT, ""}};
+    stage s = begin_floor(1, SIZE, 1, 0);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        const vsh_light light = sun(1.0, 1.0, 0.0, cases[i].angle);
+        vsh_shade_options options = preview_options();
+        options.start_offset = cases[i].start_offset;
+        options.surface_offset = cases[i].surface_offset;
+        vsh_run run = vsh_run_default();
+        run.memory_limit = cases[i].memory_limit;
+        run.progress = cases[i].progress;
+        expect_error(vsh_bake_lightmap(occluders_of(s.field), s.charts, &light, 1, &options, &run, &s.p->all,
+                                       NULL, &failure),
+                     cases[i].code, cases[i].part);
+    }
+    end(&s);
 }
 
 /* Bakes the floor under a wall by `method` into planes of values and errors. */
@@ -388,7 +325,6 @@ int main(void) {
         cmocka_unit_test(texels_under_a_wall_are_invalid_and_nothing_leaks_on_either_side),
         cmocka_unit_test(padding_copies_dark_and_lit_texels_and_leaves_coverage),
         cmocka_unit_test(a_texel_is_the_mean_of_its_valid_samples),
-        cmocka_unit_test(a_lightmap_of_one_texel_is_the_value_at_its_middle),
         cmocka_unit_test(a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne),
         cmocka_unit_test(an_open_sheet_does_not_shade_itself),
         cmocka_unit_test(errors_are_baked_where_the_method_knows_them),

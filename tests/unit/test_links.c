@@ -80,8 +80,6 @@ static bool always(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
 enum { BORDER = 11 };
 
 static bool on_one_side(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
-    (void)y0;
-    (void)y1;
     return (x0 < BORDER) == (x1 < BORDER);
 }
 
@@ -91,101 +89,109 @@ static bool on_one_side_of_rows(int32_t x0, int32_t y0, int32_t x1, int32_t y1) 
     return (y0 < BORDER) == (y1 < BORDER);
 }
 
-static const double UP[3] = {0.0, 1.0, 0.0};
+/* A point of a surface for each texel; `how` is what a layout takes. */
+typedef void layout_fn(int32_t x, int32_t y, const double how[2], double position[3], double normal[3]);
 
-/* A plane that stands askew, its steps `along` and `down` long; far from the origin. */
-static void lay_plane(image *m, double along, double down) {
-    const double a[3] = {0.6, 0.48, 0.64}, b[3] = {0.8, -0.36, -0.48}, normal[3] = {0.0, -0.8, 0.6};
-    for (int32_t y = 0; y < HEIGHT; ++y) {
-        for (int32_t x = 0; x < WIDTH; ++x) {
-            double p[3];
-            for (size_t axis = 0; axis < 3; ++axis) {
-                p[axis] = 70.0 + along * x * a[axis] + down * y * b[axis];
-            }
-            set(m, x, y, p, normal);
-        }
+static void lay(image *m, layout_fn *layout, double first, double second) {
+    for (int32_t i = 0; i < TEXELS; ++i) {
+        double position[3] = {0}, normal[3] = {0.0, 1.0, 0.0};
+        layout(i % WIDTH, i / WIDTH, (const double[2]){first, second}, position, normal);
+        set(m, i % WIDTH, i / WIDTH, position, normal);
     }
 }
 
-static void texels_of_a_plane_hang_together(void **state) {
-    static image m;
-    lay_plane(&m, 0.03, 0.03);
-    assert_links(&m, always);
-}
-
-static void stretched_charts_hang_together(void **state) {
-    static image m;
-    lay_plane(&m, 0.09, 0.03);
-    assert_links(&m, always);
-    lay_plane(&m, 0.03, 0.09);
-    assert_links(&m, always);
-}
-
-/* A cylinder of 60 texels around, whose neighbours' normals are 6 degrees apart. */
-static void round_things_hang_together(void **state) {
-    static image m;
-    for (int32_t y = 0; y < HEIGHT; ++y) {
-        for (int32_t x = 0; x < WIDTH; ++x) {
-            const double angle = 0.1047 * x, n[3] = {cos(angle), 0.0, sin(angle)};
-            set(&m, x, y, (double[]){n[0], 0.1 * y, n[2]}, n);
-        }
+/* A plane that stands askew, its steps how[0] and how[1] long; far from the origin. */
+static void plane(int32_t x, int32_t y, const double how[2], double position[3], double normal[3]) {
+    const double a[3] = {0.6, 0.48, 0.64}, b[3] = {0.8, -0.36, -0.48};
+    for (size_t axis = 0; axis < 3; ++axis) {
+        position[axis] = 70.0 + how[0] * x * a[axis] + how[1] * y * b[axis];
     }
-    assert_links(&m, always);
+    memcpy(normal, (const double[3]){0.0, -0.8, 0.6}, 3 * sizeof *normal);
+}
+
+/* Of 60 texels around, whose neighbours' normals are 6 degrees apart. */
+static void cylinder(int32_t x, int32_t y, const double how[2], double position[3], double normal[3]) {
+    normal[0] = position[0] = cos(0.1047 * x);
+    normal[2] = position[2] = sin(0.1047 * x);
+    normal[1] = 0.0;
+    position[1] = 0.1 * y;
 }
 
 /* A floor whose chart goes on up a wall, in the image as in the world. */
-static void nothing_hangs_together_over_a_crease(void **state) {
-    static image m;
-    for (int32_t y = 0; y < HEIGHT; ++y) {
-        for (int32_t x = 0; x < WIDTH; ++x) {
-            const double s = 0.1 * (x - BORDER + 0.5);
-            const bool wall = x >= BORDER;
-            set(&m, x, y, (double[]){wall ? 0.0 : s, wall ? s : 0.0, 0.1 * y},
-                (double[]){wall ? -1.0 : 0.0, wall ? 0.0 : 1.0, 0.0});
-        }
-    }
-    assert_links(&m, on_one_side);
+static void floor_and_wall(int32_t x, int32_t y, const double how[2], double position[3], double normal[3]) {
+    const bool wall = x >= BORDER;
+    position[wall ? 1 : 0] = 0.1 * (x - BORDER + 0.5);
+    position[2] = 0.1 * y;
+    normal[0] = wall ? -1.0 : 0.0;
+    normal[1] = wall ? 0.0 : 1.0;
 }
 
-/* Two pieces of one floor: neighbours in the image, `gap` texels apart in the world. */
-static void lay_pieces(image *m, double gap, bool turned) {
-    for (int32_t y = 0; y < HEIGHT; ++y) {
-        for (int32_t x = 0; x < WIDTH; ++x) {
-            const double s = 0.1 * (x + (!turned && x >= BORDER ? gap - 1.0 : 0.0)),
-                         t = 0.1 * (y + (turned && y >= BORDER ? gap - 1.0 : 0.0));
-            set(m, x, y, (double[]){s, 0.0, t}, UP);
-        }
-    }
-}
-
-static void charts_that_touch_but_lie_apart_do_not(void **state) {
-    static image m;
-    static const double gaps[] = {1000.0, 10.0, 5.0, -5.0, -300.0};
-    for (size_t g = 0; g < sizeof gaps / sizeof gaps[0]; ++g) {
-        lay_pieces(&m, gaps[g], false);
-        assert_links(&m, on_one_side);
-        lay_pieces(&m, gaps[g], true);
-        assert_links(&m, on_one_side_of_rows);
-    }
-    lay_pieces(&m, 2.0, false); /* what is left out of one surface is no border */
-    assert_links(&m, always);
+/* Two pieces of one floor: neighbours in the image, how[0] texels apart in the world, in rows if how[1]. */
+static void pieces(int32_t x, int32_t y, const double how[2], double position[3], double normal[3]) {
+    const bool rows = how[1] != 0.0;
+    position[0] = 0.1 * (x + (!rows && x >= BORDER ? how[0] - 1.0 : 0.0));
+    position[2] = 0.1 * (y + (rows && y >= BORDER ? how[0] - 1.0 : 0.0));
 }
 
 /* Fine texels beside coarse ones, whose step the one between them is not too long for. */
-static void charts_of_other_sizes_that_touch_do_not(void **state) {
+static void sizes(int32_t x, int32_t y, const double how[2], double position[3], double normal[3]) {
+    const bool rows = how[1] != 0.0;
+    const int32_t off = rows ? y - BORDER : x - BORDER;
+    const double step = (off < 0) == (how[0] != 0.0) ? 1.0 : 0.1;
+    position[rows ? 2 : 0] = off < 0 ? step * (off + 1) : 2.0 + step * off;
+    position[rows ? 0 : 2] = step * (rows ? x : y);
+}
+
+/* Two floors, one how[0] over the other. */
+static void two_floors(int32_t x, int32_t y, const double how[2], double position[3], double normal[3]) {
+    position[0] = 0.1 * x;
+    position[1] = x < BORDER ? 0.0 : how[0];
+    position[2] = 0.1 * y;
+}
+
+static void two_sides(int32_t x, int32_t y, const double how[2], double position[3], double normal[3]) {
+    position[0] = 0.1 * x;
+    position[2] = 0.1 * y;
+    normal[1] = x < BORDER ? 1.0 : -1.0;
+}
+
+static void texels_of_one_surface_hang_together_and_those_of_two_do_not(void **state) {
+    static const struct {
+        layout_fn *layout;
+        double how[2];
+        expected_fn *expected;
+    } cases[] = {
+        {plane, {0.03, 0.03}, always},
+        {plane, {0.09, 0.03}, always}, /* stretched */
+        {plane, {0.03, 0.09}, always},
+        {cylinder, {0.0, 0.0}, always},
+        {floor_and_wall, {0.0, 0.0}, on_one_side},
+        {pieces, {1000.0, 0.0}, on_one_side},
+        {pieces, {10.0, 0.0}, on_one_side},
+        {pieces, {5.0, 0.0}, on_one_side},
+        {pieces, {-5.0, 0.0}, on_one_side},
+        {pieces, {-300.0, 0.0}, on_one_side},
+        {pieces, {1000.0, 1.0}, on_one_side_of_rows},
+        {pieces, {10.0, 1.0}, on_one_side_of_rows},
+        {pieces, {5.0, 1.0}, on_one_side_of_rows},
+        {pieces, {-5.0, 1.0}, on_one_side_of_rows},
+        {pieces, {-300.0, 1.0}, on_one_side_of_rows},
+        {pieces, {2.0, 0.0}, always}, /* what is left out of one surface is no border */
+        {sizes, {0.0, 0.0}, on_one_side},
+        {sizes, {1.0, 0.0}, on_one_side},
+        {sizes, {0.0, 1.0}, on_one_side_of_rows},
+        {sizes, {1.0, 1.0}, on_one_side_of_rows},
+        {two_floors, {0.05, 0.0}, on_one_side},
+        {two_floors, {0.1, 0.0}, on_one_side},
+        {two_floors, {0.3, 0.0}, on_one_side},
+        {two_floors, {-0.05, 0.0}, on_one_side},
+        {two_floors, {-2.0, 0.0}, on_one_side},
+        {two_sides, {0.0, 0.0}, on_one_side},
+    };
     static image m;
-    for (int32_t k = 0; k < 4; ++k) {
-        const bool turned = k >= 2, coarse_first = (k & 1) != 0;
-        for (int32_t y = 0; y < HEIGHT; ++y) {
-            for (int32_t x = 0; x < WIDTH; ++x) {
-                const int32_t off = turned ? y - BORDER : x - BORDER;
-                const double step = (off < 0) == coarse_first ? 1.0 : 0.1;
-                const double across = off < 0 ? step * (off + 1) : 2.0 + step * off;
-                const double along = step * (turned ? x : y);
-                set(&m, x, y, (double[]){turned ? along : across, 0.0, turned ? across : along}, UP);
-            }
-        }
-        assert_links(&m, turned ? on_one_side_of_rows : on_one_side);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        lay(&m, cases[i].layout, cases[i].how[0], cases[i].how[1]);
+        assert_links(&m, cases[i].expected);
     }
 }
 
@@ -212,7 +218,7 @@ static void strips_that_touch_but_lie_apart_do_not(void **state) {
                                                 {in_one_column, in_one_lower_column}};
     for (int32_t turned = 0; turned < 2; ++turned) {
         for (int32_t lone = 0; lone < 2; ++lone) {
-            lay_pieces(&m, 50.0, turned != 0);
+            lay(&m, pieces, 50.0, turned);
             for (int32_t i = 0; i < TEXELS; ++i) {
                 const int32_t along = turned ? i / WIDTH : i % WIDTH, across = turned ? i % WIDTH : i / WIDTH;
                 const bool gone = across % 2 != 0 || (lone && along < BORDER - 1);
@@ -221,31 +227,6 @@ static void strips_that_touch_but_lie_apart_do_not(void **state) {
             assert_links(&m, expected[turned][lone]);
         }
     }
-}
-
-/* Two floors, one half a texel over the other or more. */
-static void nothing_hangs_together_over_a_step_in_height(void **state) {
-    static image m;
-    static const double heights[] = {0.05, 0.1, 0.3, -0.05, -2.0};
-    for (size_t h = 0; h < sizeof heights / sizeof heights[0]; ++h) {
-        for (int32_t y = 0; y < HEIGHT; ++y) {
-            for (int32_t x = 0; x < WIDTH; ++x) {
-                set(&m, x, y, (double[]){0.1 * x, x < BORDER ? 0.0 : heights[h], 0.1 * y}, UP);
-            }
-        }
-        assert_links(&m, on_one_side);
-    }
-}
-
-/* The two sides of a sheet, laid out beside each other. */
-static void sides_of_a_sheet_do_not_hang_together(void **state) {
-    static image m;
-    for (int32_t y = 0; y < HEIGHT; ++y) {
-        for (int32_t x = 0; x < WIDTH; ++x) {
-            set(&m, x, y, (double[]){0.1 * x, 0.0, 0.1 * y}, (double[]){0.0, x < BORDER ? 1.0 : -1.0, 0.0});
-        }
-    }
-    assert_links(&m, on_one_side);
 }
 
 static bool is_hole(int32_t x, int32_t y) {
@@ -258,7 +239,7 @@ static bool without_holes(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
 
 static void texels_without_a_point_hang_together_with_none(void **state) {
     static image m;
-    lay_plane(&m, 0.03, 0.03);
+    lay(&m, plane, 0.03, 0.03);
     for (int32_t i = 0; i < TEXELS; ++i) {
         m.at[i] = is_hole(i % WIDTH, i / WIDTH) ? 0 : m.at[i];
     }
@@ -269,7 +250,7 @@ static void texels_without_a_point_hang_together_with_none(void **state) {
 static void lattices_do_not_hang_together_over_a_gap_between_their_texels(void **state) {
     enum { SPACING = 4, GAP = 10, COLUMNS = WIDTH / SPACING, ROWS = HEIGHT / SPACING };
     static image m;
-    lay_plane(&m, 0.03, 0.03);
+    lay(&m, plane, 0.03, 0.03);
     for (int32_t y = 0; y < HEIGHT; ++y) {
         m.at[y * WIDTH + GAP] = 0;
     }
@@ -295,15 +276,8 @@ static void lattices_do_not_hang_together_over_a_gap_between_their_texels(void *
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(texels_of_a_plane_hang_together),
-        cmocka_unit_test(stretched_charts_hang_together),
-        cmocka_unit_test(round_things_hang_together),
-        cmocka_unit_test(nothing_hangs_together_over_a_crease),
-        cmocka_unit_test(charts_that_touch_but_lie_apart_do_not),
-        cmocka_unit_test(charts_of_other_sizes_that_touch_do_not),
+        cmocka_unit_test(texels_of_one_surface_hang_together_and_those_of_two_do_not),
         cmocka_unit_test(strips_that_touch_but_lie_apart_do_not),
-        cmocka_unit_test(nothing_hangs_together_over_a_step_in_height),
-        cmocka_unit_test(sides_of_a_sheet_do_not_hang_together),
         cmocka_unit_test(texels_without_a_point_hang_together_with_none),
         cmocka_unit_test(lattices_do_not_hang_together_over_a_gap_between_their_texels),
     };
