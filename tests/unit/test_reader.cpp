@@ -3,7 +3,6 @@
 
 #include <dirent.h>
 
-#include <map>
 #include <openvdb/tools/LevelSetSphere.h>
 #include <sys/resource.h>
 
@@ -17,6 +16,33 @@ std::string ball_file() {
 
 // --- the same bits
 
+// What is read in this process and by a reader.
+template <typename Handle> struct Both {
+    Handle *here = nullptr, *there = nullptr;
+    void (*const release)(Handle *);
+
+    template <typename Read> Both(void (*free)(Handle *), Read &&read) : release(free) {
+        for (Handle **place : {&here, &there}) {
+            const vsh_run run = with_reader(place == &there);
+            assert_int_equal(read(&run, place), VSH_OK);
+        }
+    }
+    ~Both() {
+        release(here);
+        release(there);
+    }
+};
+
+Both<vsh_grid> both_grids(const std::string &path) {
+    return {vsh_grid_free, [&](const vsh_run *run, vsh_grid **grid) {
+                return vsh_grid_read(path.c_str(), nullptr, run, grid, &failure);
+            }};
+}
+
+template <typename Info> void assert_same_info(const Info &here, const Info &there) {
+    assert_memory_equal(&here, &there, sizeof here);
+}
+
 void grids_are_the_same_for_every_kind_of_transform(void **) {
     using namespace openvdb::math;
     Mat4d turned = Mat4d::identity();
@@ -24,40 +50,31 @@ void grids_are_the_same_for_every_kind_of_transform(void **) {
     Mat4d affine = turned;
     affine.preScale(openvdb::Vec3d(-0.05));
     affine.setTranslation(openvdb::Vec3d(1e3, -7.0, 0.1));
-    const Mat3d rotation = turned.getMat3();
-    const std::map<std::string, MapBase::Ptr> maps{
-        {"translation", MapBase::Ptr(new TranslationMap(openvdb::Vec3d(0.1, 0.2, 0.3)))},
-        {"scale", MapBase::Ptr(new ScaleMap(openvdb::Vec3d(0.05, -0.05, 0.05)))},
-        {"uniform", MapBase::Ptr(new UniformScaleMap(0.05))},
-        {"moved", MapBase::Ptr(new UniformScaleTranslateMap(0.05, openvdb::Vec3d(1.0 / 3.0)))},
-        {"mirrored", MapBase::Ptr(new ScaleTranslateMap(openvdb::Vec3d(-0.05, 0.05, 0.05),
-                                                        openvdb::Vec3d(0.0, 1.0, 0.0)))},
-        {"unitary", MapBase::Ptr(new UnitaryMap(rotation))},
-        {"affine", MapBase::Ptr(new AffineMap(affine))},
+    const MapBase::Ptr maps[] = {
+        MapBase::Ptr(new TranslationMap(openvdb::Vec3d(0.1, 0.2, 0.3))),
+        MapBase::Ptr(new ScaleMap(openvdb::Vec3d(0.05, -0.05, 0.05))),
+        MapBase::Ptr(new UniformScaleMap(0.05)),
+        MapBase::Ptr(new UniformScaleTranslateMap(0.05, openvdb::Vec3d(1.0 / 3.0))),
+        MapBase::Ptr(new ScaleTranslateMap(openvdb::Vec3d(-0.05, 0.05, 0.05), openvdb::Vec3d(0.0, 1.0, 0.0))),
+        MapBase::Ptr(new UnitaryMap(turned.getMat3())),
+        MapBase::Ptr(new AffineMap(affine)),
     };
-    for (const auto &[name, map] : maps) {
+    for (const MapBase::Ptr &map : maps) {
         const FloatGrid::Ptr grid = sphere();
         grid->setTransform(std::make_shared<Transform>(map));
-        const std::string path = save((name + ".vdb").c_str(), {grid});
-        vsh_grid *read[2] = {nullptr, nullptr};
-        std::vector<std::string> said[2];
-        for (int i = 0; i < 2; ++i) {
-            const vsh_run run = with_reader(i == 1);
-            warned.clear();
-            assert_int_equal(vsh_grid_read(path.c_str(), nullptr, &run, &read[i], &failure), VSH_OK);
-            said[i] = warned;
-        }
-        assert_same(read[0], read[1]);
-        assert_true(said[0] == said[1]);
+        warned.clear();
+        const Both<vsh_grid> read = both_grids(save("map.vdb", {grid}));
+        assert_same(read.here, read.there);
+        const size_t half = warned.size() / 2; // each said the same
+        assert_true(warned.size() % 2 == 0 &&
+                    std::equal(warned.begin(), warned.begin() + long(half), warned.begin() + long(half)));
         vsh_grid_info info[2];
-        vsh_grid_get_info(read[0], &info[0]);
-        vsh_grid_get_info(read[1], &info[1]);
-        assert_memory_equal(&info[0], &info[1], sizeof info[0]);
+        vsh_grid_get_info(read.here, &info[0]);
+        vsh_grid_get_info(read.there, &info[1]);
+        assert_same_info(info[0], info[1]);
         const openvdb::Vec3d at(0.3, -0.4, 0.5); // what is not in the info: the map's inverse
-        assert_true(read[0]->level_set->transform().worldToIndex(at) ==
-                    read[1]->level_set->transform().worldToIndex(at));
-        vsh_grid_free(read[0]);
-        vsh_grid_free(read[1]);
+        assert_true(read.here->level_set->transform().worldToIndex(at) ==
+                    read.there->level_set->transform().worldToIndex(at));
     }
 }
 
@@ -72,71 +89,56 @@ void mended_grids_and_doubles_and_tiles_are_the_same(void **) {
     doubles->setName("doubles");
     const openvdb::GridPtrVec grids{narrow, tiled, wide, doubles};
     for (const openvdb::GridBase::Ptr &grid : grids) {
-        const std::string path = save("kind.vdb", {grid});
-        vsh_grid *here = nullptr, *there = nullptr;
-        const vsh_run plain = with_reader(false), run = with_reader();
-        assert_int_equal(vsh_grid_read(path.c_str(), nullptr, &plain, &here, &failure), VSH_OK);
-        assert_int_equal(vsh_grid_read(path.c_str(), nullptr, &run, &there, &failure), VSH_OK);
-        assert_same(here, there);
-        assert_true(here->level_set->tree().hasSameTopology(there->level_set->tree()));
-        assert_int_equal(here->info.bytes, there->info.bytes);
-        vsh_grid_free(here);
-        vsh_grid_free(there);
+        const Both<vsh_grid> read = both_grids(save("kind.vdb", {grid}));
+        assert_same(read.here, read.there);
+        assert_true(read.here->level_set->tree().hasSameTopology(read.there->level_set->tree()));
+        assert_int_equal(read.here->info.bytes, read.there->info.bytes);
+    }
+}
+
+// Both arrays are there, or neither is.
+template <typename Value> void assert_same_array(const Value *a, const Value *b, size_t count) {
+    assert_int_equal(a != nullptr, b != nullptr);
+    if (a != nullptr) {
+        assert_memory_equal(a, b, count * sizeof *a);
     }
 }
 
 void models_are_the_same(void **) {
     for (const char *name : {"/cloister.glb", "/cloister.obj", "/thin.glb", "/seeds_floor.obj"}) {
-        const std::string path = ASSETS + name;
-        vsh_model *here = nullptr, *there = nullptr;
-        const vsh_run plain = with_reader(false), run = with_reader();
-        assert_int_equal(vsh_model_read(path.c_str(), &plain, &here, &failure), VSH_OK);
-        assert_int_equal(vsh_model_read(path.c_str(), &run, &there, &failure), VSH_OK);
-        const size_t count = vsh_model_mesh_count(here);
-        assert_int_equal(vsh_model_mesh_count(there), count);
+        const Both<vsh_model> read(vsh_model_free, [&](const vsh_run *run, vsh_model **model) {
+            return vsh_model_read((ASSETS + name).c_str(), run, model, &failure);
+        });
+        const size_t count = vsh_model_mesh_count(read.here);
+        assert_int_equal(vsh_model_mesh_count(read.there), count);
         for (size_t i = 0; i < count; ++i) {
-            assert_int_equal(vsh_model_uv_sets(there, i), vsh_model_uv_sets(here, i));
-            for (int32_t set = -1; set < vsh_model_uv_sets(here, i); ++set) {
-                const vsh_mesh a = vsh_model_mesh(here, i, set), b = vsh_model_mesh(there, i, set);
+            assert_int_equal(vsh_model_uv_sets(read.there, i), vsh_model_uv_sets(read.here, i));
+            for (int32_t set = -1; set < vsh_model_uv_sets(read.here, i); ++set) {
+                const vsh_mesh a = vsh_model_mesh(read.here, i, set), b = vsh_model_mesh(read.there, i, set);
                 assert_int_equal(a.vertex_count, b.vertex_count);
                 assert_int_equal(a.triangle_count, b.triangle_count);
                 assert_string_equal(a.name, b.name);
-                assert_memory_equal(a.positions, b.positions, a.vertex_count * 12);
-                assert_memory_equal(a.indices, b.indices, a.triangle_count * 12);
-                assert_memory_equal(a.transform, b.transform, 96);
-                assert_int_equal(a.normals != nullptr, b.normals != nullptr);
-                assert_int_equal(a.uvs != nullptr, b.uvs != nullptr);
-                if (a.normals != nullptr) {
-                    assert_memory_equal(a.normals, b.normals, a.vertex_count * 12);
-                }
-                if (a.uvs != nullptr) {
-                    assert_memory_equal(a.uvs, b.uvs, a.vertex_count * 8);
-                }
+                assert_same_array(a.positions, b.positions, 3 * a.vertex_count);
+                assert_same_array(a.indices, b.indices, 3 * a.triangle_count);
+                assert_same_array(a.transform, b.transform, 12);
+                assert_same_array(a.normals, b.normals, 3 * a.vertex_count);
+                assert_same_array(a.uvs, b.uvs, 2 * a.vertex_count);
             }
         }
-        vsh_model_free(here);
-        vsh_model_free(there);
     }
 }
 
-void images_lists_voxels_and_texts_are_the_same(void **) {
-    const vsh_run plain = with_reader(false), run = with_reader();
-    vsh_image_file *image[2] = {nullptr, nullptr};
+void images_are_the_same(void **) {
     const std::string png = ASSETS + "/terrain.png", exr = in_folder("image.exr"),
                       tif = in_folder("image.tif");
-    assert_int_equal(vsh_image_read(png.c_str(), nullptr, &image[0], &failure), VSH_OK);
-    vsh_image view = vsh_image_view(image[0]);
-    for (const std::string &copy : {exr, tif}) {
-        assert_int_equal(vsh_image_write(copy.c_str(), &view, nullptr, &failure), VSH_OK);
-    }
-    vsh_image_free(image[0]);
     for (const std::string &path : {png, exr, tif}) {
-        assert_int_equal(vsh_image_read(path.c_str(), &plain, &image[0], &failure), VSH_OK);
-        assert_int_equal(vsh_image_read(path.c_str(), &run, &image[1], &failure), VSH_OK);
-        const vsh_image a = vsh_image_view(image[0]), b = vsh_image_view(image[1]);
+        const Both<vsh_image_file> read(vsh_image_free, [&](const vsh_run *run, vsh_image_file **file) {
+            return vsh_image_read(path.c_str(), run, file, &failure);
+        });
+        const vsh_image a = vsh_image_view(read.here), b = vsh_image_view(read.there);
         size_t attributes[2];
-        const vsh_attribute *left = vsh_image_attributes(image[0], &attributes[0]);
-        const vsh_attribute *right = vsh_image_attributes(image[1], &attributes[1]);
+        const vsh_attribute *left = vsh_image_attributes(read.here, &attributes[0]);
+        const vsh_attribute *right = vsh_image_attributes(read.there, &attributes[1]);
         assert_int_equal(attributes[0], attributes[1]);
         for (size_t i = 0; i < attributes[0]; ++i) {
             assert_string_equal(left[i].name, right[i].name);
@@ -145,77 +147,66 @@ void images_lists_voxels_and_texts_are_the_same(void **) {
         assert_true(a.width == b.width && a.height == b.height && a.channel_count == b.channel_count);
         for (int32_t c = 0; c < a.channel_count; ++c) {
             assert_string_equal(a.names[c], b.names[c]);
-            assert_memory_equal(a.planes[c], b.planes[c], size_t(a.width) * size_t(a.height) * sizeof(float));
+            assert_same_array(a.planes[c], b.planes[c], size_t(a.width) * size_t(a.height));
         }
-        vsh_image_free(image[0]);
-        vsh_image_free(image[1]);
+        for (const std::string &copy : {exr, tif}) { // which are read next
+            if (path == png) {
+                assert_int_equal(vsh_image_write(copy.c_str(), &a, nullptr, &failure), VSH_OK);
+            }
+        }
     }
+}
 
+void lists_voxels_and_texts_are_the_same(void **) {
     const std::string path = ball_file();
     vsh_vdb_entry entries[2][2] = {};
     size_t counts[2];
-    assert_int_equal(vsh_vdb_list(path.c_str(), &plain, entries[0], 2, &counts[0], &failure), VSH_OK);
-    assert_int_equal(vsh_vdb_list(path.c_str(), &run, entries[1], 2, &counts[1], &failure), VSH_OK);
+    for (int i = 0; i < 2; ++i) {
+        const vsh_run run = with_reader(i == 1);
+        assert_int_equal(vsh_vdb_list(path.c_str(), &run, entries[i], 2, &counts[i], &failure), VSH_OK);
+    }
     assert_int_equal(counts[0], counts[1]);
-    assert_memory_equal(&entries[0], &entries[1], sizeof entries[0]);
+    assert_same_info(entries[0], entries[1]);
 
-    vsh_voxels *voxels[2] = {nullptr, nullptr};
-    assert_int_equal(vsh_voxels_from_vdb(path.c_str(), nullptr, &plain, &voxels[0], &failure), VSH_OK);
-    assert_int_equal(vsh_voxels_from_vdb(path.c_str(), nullptr, &run, &voxels[1], &failure), VSH_OK);
-    size_t blocks[2];
-    const vshi_block *left = vshi_voxels_blocks(voxels[0], &blocks[0]);
-    const vshi_block *right = vshi_voxels_blocks(voxels[1], &blocks[1]);
-    assert_int_equal(blocks[0], blocks[1]);
-    for (size_t i = 0; i < blocks[0]; ++i) {
-        assert_memory_equal(left[i].origin, right[i].origin, sizeof left[i].origin);
-        assert_memory_equal(left[i].mask, right[i].mask, sizeof left[i].mask);
+    const Both<vsh_voxels> voxels(vsh_voxels_free, [&](const vsh_run *run, vsh_voxels **made) {
+        return vsh_voxels_from_vdb(path.c_str(), nullptr, run, made, &failure);
+    });
+    const vshi_block *left = vshi_voxels_blocks(voxels.here, &counts[0]);
+    const vshi_block *right = vshi_voxels_blocks(voxels.there, &counts[1]);
+    assert_int_equal(counts[0], counts[1]);
+    for (size_t i = 0; i < counts[0]; ++i) {
+        assert_same_info(left[i].origin, right[i].origin);
+        assert_same_info(left[i].mask, right[i].mask);
     }
     vsh_voxels_info info[2];
-    vsh_voxels_get_info(voxels[0], &info[0]);
-    vsh_voxels_get_info(voxels[1], &info[1]);
-    assert_memory_equal(info[0].bounds_min, info[1].bounds_min, sizeof info[0].bounds_min);
-    assert_memory_equal(info[0].voxel_size, info[1].voxel_size, sizeof info[0].voxel_size);
-    vsh_voxels_free(voxels[0]);
-    vsh_voxels_free(voxels[1]);
+    vsh_voxels_get_info(voxels.here, &info[0]);
+    vsh_voxels_get_info(voxels.there, &info[1]);
+    assert_same_info(info[0].bounds_min, info[1].bounds_min);
+    assert_same_info(info[0].voxel_size, info[1].voxel_size);
 
-    vsh_outline *outline[2] = {nullptr, nullptr};
     const char *font = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
-    for (int i = 0; i < 2; ++i) {
-        assert_int_equal(
-            vsh_outline_from_text("Ag&8\nx", font, nullptr, i == 0 ? &plain : &run, &outline[i], &failure),
-            VSH_OK);
-    }
-    assert_int_equal(outline[0]->contour_count, outline[1]->contour_count);
-    assert_memory_equal(outline[0]->points, outline[1]->points,
-                        outline[0]->starts[outline[0]->contour_count] * sizeof *outline[0]->points);
-    vsh_outline_free(outline[0]);
-    vsh_outline_free(outline[1]);
+    const Both<vsh_outline> outline(vsh_outline_free, [&](const vsh_run *run, vsh_outline **made) {
+        return vsh_outline_from_text("Ag&8\nx", font, nullptr, run, made, &failure);
+    });
+    const size_t contours = outline.here->contour_count;
+    assert_int_equal(contours, outline.there->contour_count);
+    assert_same_array(outline.here->points, outline.there->points, outline.here->starts[contours]);
 }
 
 void errors_are_the_same(void **) {
-    const std::string nothing = in_folder("none.vdb"), text = in_folder("text.vdb"),
-                      obj = in_folder("bad.obj");
+    const std::string text = in_folder("text.vdb"), obj = in_folder("bad.obj");
     put(text, "v 0 0 0\n");
     put(obj, "v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n");
-    for (const std::string &path : {nothing, text, ball_file()}) {
+    for (const std::string &path : {in_folder("none.vdb"), text, ball_file(), obj, in_folder("none.obj")}) {
         vsh_error said[2];
-        vsh_result results[2];
         for (int i = 0; i < 2; ++i) {
             const vsh_run run = with_reader(i == 1);
             vsh_grid *grid = nullptr;
-            results[i] = vsh_grid_read(path.c_str(), "missing", &run, &grid, &said[i]);
-            assert_null(grid);
-        }
-        assert_true(results[0] != VSH_OK && results[0] == results[1]);
-        assert_string_equal(said[0].message, said[1].message);
-    }
-    for (const std::string &path : {obj, in_folder("none.obj")}) {
-        vsh_error said[2];
-        for (int i = 0; i < 2; ++i) {
-            const vsh_run run = with_reader(i == 1);
             vsh_model *model = nullptr;
-            vsh_model_read(path.c_str(), &run, &model, &said[i]);
-            assert_null(model);
+            const vsh_result result = path.find(".vdb") != std::string::npos
+                                          ? vsh_grid_read(path.c_str(), "missing", &run, &grid, &said[i])
+                                          : vsh_model_read(path.c_str(), &run, &model, &said[i]);
+            assert_true(result != VSH_OK && result == said[i].code && grid == nullptr && model == nullptr);
         }
         assert_int_equal(said[0].code, said[1].code);
         assert_string_equal(said[0].message, said[1].message);
@@ -299,17 +290,16 @@ void a_program_that_names_itself_and_does_not_serve_starts_once(void **) {
 
 void a_program_that_is_missing_or_no_reader_is_an_argument(void **) {
     const std::string path = ball_file();
+    vsh_run run = with_reader();
+    vsh_grid *grid = nullptr;
     for (const char *program : {"/nowhere/reader", "/bin/true", "/tmp"}) {
-        vsh_run run = with_reader();
         run.reader = program;
-        vsh_grid *grid = nullptr;
         assert_said(vsh_grid_read(path.c_str(), nullptr, &run, &grid, &failure), VSH_ERROR_ARGUMENT,
                     {program, "ball.vdb"});
         assert_no_child();
     }
-    vsh_run run = with_reader();
+    run = with_reader();
     run.reader_seconds = -1.0;
-    vsh_grid *grid = nullptr;
     assert_int_equal(vsh_grid_read(path.c_str(), nullptr, &run, &grid, &failure), VSH_ERROR_ARGUMENT);
 }
 
@@ -317,18 +307,18 @@ void cancelling_kills_the_reader(void **) {
     misbehave("hang");
     const std::string path = ball_file();
     static int calls;
+    vsh_run run = with_reader();
+    run.progress = [](void *, const char *, double) { return int32_t(--calls <= 0); };
     for (const int after : {1, 2, 5}) {
-        vsh_run run = with_reader();
-        calls = after;
-        run.progress = [](void *, const char *, double) { return int32_t(--calls <= 0); };
         vsh_grid *grid = nullptr;
+        vsh_model *model = nullptr;
+        vsh_image_file *image = nullptr;
+        calls = after;
         assert_int_equal(vsh_grid_read(path.c_str(), nullptr, &run, &grid, &failure), VSH_ERROR_CANCELLED);
         calls = after;
-        vsh_model *model = nullptr;
         assert_int_equal(vsh_model_read((ASSETS + "/thin.glb").c_str(), &run, &model, &failure),
                          VSH_ERROR_CANCELLED);
         calls = after;
-        vsh_image_file *image = nullptr;
         assert_int_equal(vsh_image_read((ASSETS + "/terrain.png").c_str(), &run, &image, &failure),
                          VSH_ERROR_CANCELLED);
         assert_no_child();
@@ -436,7 +426,8 @@ int main(int argc, char **argv) {
         cmocka_unit_test(grids_are_the_same_for_every_kind_of_transform),
         cmocka_unit_test(mended_grids_and_doubles_and_tiles_are_the_same),
         cmocka_unit_test(models_are_the_same),
-        cmocka_unit_test(images_lists_voxels_and_texts_are_the_same),
+        cmocka_unit_test(images_are_the_same),
+        cmocka_unit_test(lists_voxels_and_texts_are_the_same),
         cmocka_unit_test(errors_are_the_same),
         cmocka_unit_test(a_reader_that_fails_is_an_error_with_its_reason),
         cmocka_unit_test(a_program_that_names_itself_and_does_not_serve_starts_once),
