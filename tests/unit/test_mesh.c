@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <vdbshade/heights.h>
 
 /* The unit cube, anticlockwise from outside: corner i is at (i & 1, i >> 1 & 1, i >> 2). The last two
  * triangles are its top (z = 1). */
@@ -41,119 +42,113 @@ static void assert_near(double value, double expected, double tolerance) {
     }
 }
 
-static void a_cube_is_closed(void **state) {
-    const vsh_mesh mesh = cube();
-    const vsh_mesh_report report = check(&mesh);
-    assert_int_equal(report.open_edges, 0);
-    assert_int_equal(report.flipped_edges, 0);
-    assert_int_equal(report.degenerate_triangles, 0);
-    assert_near(report.area, 6.0, 0.0);
-    for (int k = 0; k < 3; ++k) {
-        assert_near(report.bounds_min[k], 0.0, 0.0);
-        assert_near(report.bounds_max[k], 1.0, 0.0);
+enum { MOST = 36 };
+
+/* Vertices and triangles that a case adds to or changes in those of the cube. */
+typedef struct shape {
+    float positions[MOST][3];
+    uint32_t indices[MOST][3];
+    size_t vertices, triangles;
+} shape;
+
+static void keep(shape *s) {}
+
+static void take_off_top(shape *s) {
+    s->triangles = 10;
+}
+
+static void flip_top(shape *s) {
+    for (int i = 10; i < 12; ++i) {
+        s->indices[i][1] = cube_indices[i][2];
+        s->indices[i][2] = cube_indices[i][1];
     }
 }
 
 /* Every triangle with vertices of its own, every other zero negative. */
-static void split_vertices_and_negative_zeros_open_nothing(void **state) {
-    float positions[36][3];
-    uint32_t indices[36];
+static void split(shape *s) {
     for (uint32_t i = 0; i < 36; ++i) {
-        indices[i] = i;
         for (int k = 0; k < 3; ++k) {
             const float value = cube_positions[cube_indices[i / 3][i % 3]][k];
-            positions[i][k] = value == 0.0F && i % 2 == 1 ? -0.0F : value;
+            s->positions[i][k] = value == 0.0F && i % 2 == 1 ? -0.0F : value;
         }
+        s->indices[i / 3][i % 3] = i;
     }
-    const vsh_mesh mesh = {
-        .positions = positions[0], .indices = indices, .vertex_count = 36, .triangle_count = 12};
-    const vsh_mesh_report report = check(&mesh);
-    assert_int_equal(report.open_edges, 0);
-    assert_int_equal(report.flipped_edges, 0);
+    s->vertices = 36;
 }
 
-static void a_cube_without_its_top_has_four_open_edges(void **state) {
-    vsh_mesh mesh = cube();
-    mesh.triangle_count = 10;
-    const vsh_mesh_report report = check(&mesh);
-    assert_int_equal(report.open_edges, 4);
-    assert_int_equal(report.flipped_edges, 0);
-    assert_near(report.area, 5.0, 0.0);
-}
-
-static void a_flipped_face_has_its_four_sides_flipped(void **state) {
-    uint32_t indices[12][3];
-    memcpy(indices, cube_indices, sizeof indices);
-    for (int i = 10; i < 12; ++i) {
-        indices[i][1] = cube_indices[i][2];
-        indices[i][2] = cube_indices[i][1];
-    }
-    vsh_mesh mesh = cube();
-    mesh.indices = indices[0];
-    const vsh_mesh_report report = check(&mesh);
-    assert_int_equal(report.open_edges, 0);
-    assert_int_equal(report.flipped_edges, 4);
-}
-
-/* Two cubes that share the edge x = y = 1: four triangles meet there, two each way. */
-static void two_cubes_touching_along_an_edge_are_closed_and_agree(void **state) {
-    float positions[16][3];
-    uint32_t indices[24][3];
-    for (int i = 0; i < 16; ++i) {
-        for (int k = 0; k < 3; ++k) {
-            positions[i][k] = cube_positions[i % 8][k] + (i >= 8 && k < 2 ? 1.0F : 0.0F);
-        }
-    }
+/* Another cube that shares the edge x = y = 1: four triangles meet there, two each way. */
+static void touch(shape *s) {
     for (int i = 0; i < 24; ++i) {
+        s->positions[8 + i / 3][i % 3] = cube_positions[i / 3][i % 3] + (i % 3 < 2 ? 1.0F : 0.0F);
+    }
+    for (int i = 0; i < 36; ++i) {
+        s->indices[12 + i / 3][i % 3] = cube_indices[i / 3][i % 3] + 8;
+    }
+    s->vertices = 16;
+    s->triangles = 24;
+}
+
+/* Far away on a line, an edge there and back, a point. */
+static void add_degenerate(shape *s) {
+    static const uint32_t flat[3][3] = {{8, 9, 10}, {3, 3, 5}, {7, 7, 7}};
+    s->positions[8][0] = 10.0F;
+    s->positions[9][0] = 10.1F;
+    s->positions[10][0] = 2.0F * s->positions[9][0] - s->positions[8][0];
+    memcpy(s->indices + 12, flat, sizeof flat);
+    s->vertices = 11;
+    s->triangles = 15;
+}
+
+/* The top's front edge is cut at (1/2, 0, 1), that of the front is not. */
+static void cut_edge(shape *s) {
+    static const uint32_t top[3][3] = {{4, 8, 7}, {8, 5, 7}, {4, 7, 6}};
+    memcpy(s->positions[8], (float[3]){0.5F, 0.0F, 1.0F}, sizeof s->positions[8]);
+    memcpy(s->indices + 10, top, sizeof top);
+    s->vertices = 9;
+    s->triangles = 13;
+}
+
+static void cut_edge_and_join(shape *s) {
+    cut_edge(s);
+    memcpy(s->indices[s->triangles++], (uint32_t[3]){4, 5, 8}, sizeof s->indices[0]);
+}
+
+static void cubes_have_the_edges_area_and_bounds_that_they_have(void **state) {
+    static const struct {
+        const char *name;
+        void (*change)(shape *s);
+        size_t open_edges, flipped_edges, degenerate_triangles;
+        double area, far;
+    } cases[] = {
+        {"a cube", keep, 0, 0, 0, 6.0, 1.0},
+        {"without its top", take_off_top, 4, 0, 0, 5.0, 1.0},
+        {"with its top flipped", flip_top, 0, 4, 0, 6.0, 1.0},
+        {"of split vertices", split, 0, 0, 0, 6.0, 1.0},
+        {"touching another", touch, 0, 0, 0, 12.0, 2.0},
+        {"with degenerate triangles", add_degenerate, 0, 0, 3, 6.0, 1.0},
+        {"with a cut edge", cut_edge, 3, 0, 0, 6.0, 1.0},
+        {"with a cut edge that a flat triangle joins", cut_edge_and_join, 0, 0, 1, 6.0, 1.0},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        shape s = {.vertices = 8, .triangles = 12};
+        memcpy(s.positions, cube_positions, sizeof cube_positions);
+        memcpy(s.indices, cube_indices, sizeof cube_indices);
+        cases[i].change(&s);
+        const vsh_mesh mesh = {.positions = s.positions[0],
+                               .indices = s.indices[0],
+                               .vertex_count = s.vertices,
+                               .triangle_count = s.triangles};
+        const vsh_mesh_report report = check(&mesh);
+        print_message("%s\n", cases[i].name);
+        assert_int_equal(report.open_edges, cases[i].open_edges);
+        assert_int_equal(report.flipped_edges, cases[i].flipped_edges);
+        assert_int_equal(report.degenerate_triangles, cases[i].degenerate_triangles);
+        assert_near(report.area, cases[i].area, 0.0);
         for (int k = 0; k < 3; ++k) {
-            indices[i][k] = cube_indices[i % 12][k] + (i >= 12 ? 8 : 0);
+            assert_near(report.bounds_min[k], 0.0, 0.0);
+            assert_near(report.bounds_max[k], k < 2 ? cases[i].far : 1.0, 0.0);
         }
     }
-    const vsh_mesh mesh = {
-        .positions = positions[0], .indices = indices[0], .vertex_count = 16, .triangle_count = 24};
-    const vsh_mesh_report report = check(&mesh);
-    assert_int_equal(report.open_edges, 0);
-    assert_int_equal(report.flipped_edges, 0);
-}
-
-static void degenerate_triangles_are_counted_and_change_nothing_else(void **state) {
-    float positions[11][3] = {{0}};
-    memcpy(positions, cube_positions, sizeof cube_positions);
-    for (int i = 0; i < 3; ++i) {
-        positions[8 + i][0] = 10.0F + 0.1F * (float)i; /* far away, on a line */
-    }
-    positions[10][0] = 2.0F * positions[9][0] - positions[8][0];
-    uint32_t indices[15][3] = {{8, 9, 10}, {3, 3, 5}, {7, 7, 7}};
-    memcpy(indices + 3, cube_indices, sizeof cube_indices);
-    const vsh_mesh mesh = {
-        .positions = positions[0], .indices = indices[0], .vertex_count = 11, .triangle_count = 15};
-    const vsh_mesh_report report = check(&mesh);
-    assert_int_equal(report.degenerate_triangles, 3);
-    assert_int_equal(report.open_edges, 0);
-    assert_near(report.bounds_max[0], 1.0, 0.0);
-    assert_near(report.area, 6.0, 0.0);
-}
-
-/* The top's front edge is cut at (1/2, 0, 1), that of the front is not: the triangle (4, 8, 5) closes the
- * gap. */
-static void a_flat_triangle_that_joins_a_cut_edge_closes_the_mesh(void **state) {
-    float positions[9][3];
-    memcpy(positions, cube_positions, sizeof cube_positions);
-    memcpy(positions[8], (float[3]){0.5F, 0.0F, 1.0F}, sizeof positions[8]);
-    uint32_t indices[14][3];
-    memcpy(indices, cube_indices, sizeof cube_indices);
-    const uint32_t top[4][3] = {{4, 8, 7}, {8, 5, 7}, {4, 7, 6}, {4, 5, 8}};
-    memcpy(indices + 10, top, sizeof top);
-    const vsh_mesh mesh = {
-        .positions = positions[0], .indices = indices[0], .vertex_count = 9, .triangle_count = 14};
-    vsh_mesh_report report = check(&mesh);
-    assert_int_equal(report.degenerate_triangles, 1);
-    assert_int_equal(report.open_edges, 0);
-    assert_int_equal(report.flipped_edges, 0);
-    vsh_mesh cut = mesh;
-    cut.triangle_count = 13;
-    report = check(&cut);
-    assert_int_equal(report.open_edges, 3);
 }
 
 static void an_empty_mesh_has_empty_bounds(void **state) {
@@ -218,32 +213,30 @@ static void refused(const vsh_mesh *mesh, vsh_result code, const char *part, con
     }
 }
 
-static void vertices_that_are_not_finite_are_refused_by_number(void **state) {
+static void bad_vertices_indices_and_transforms_are_refused_by_number(void **state) {
+    float positions[8][3];
+    uint32_t indices[12][3];
+    double transform[12];
+    vsh_mesh mesh = cube();
     static const float bad[] = {NAN, INFINITY, -INFINITY};
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
-        float positions[8][3];
+    mesh.positions = positions[0];
+    for (size_t i = 0; i < 3; ++i) {
         memcpy(positions, cube_positions, sizeof positions);
         positions[6][i] = bad[i];
-        vsh_mesh mesh = cube();
-        mesh.positions = positions[0];
         refused(&mesh, VSH_ERROR_INPUT, "'cube'", "vertex 6");
     }
-}
-
-static void an_index_out_of_range_is_refused_by_number(void **state) {
-    uint32_t indices[12][3];
+    mesh.positions = NULL;
+    refused(&mesh, VSH_ERROR_ARGUMENT, "'cube'", "positions");
+    mesh = cube();
+    mesh.indices = indices[0];
     memcpy(indices, cube_indices, sizeof indices);
     indices[7][2] = 99;
-    vsh_mesh mesh = cube();
-    mesh.indices = indices[0];
     refused(&mesh, VSH_ERROR_INPUT, "triangle 7", "99");
     indices[7][2] = UINT32_MAX;
     refused(&mesh, VSH_ERROR_INPUT, "triangle 7", "4294967295");
-}
-
-static void transforms_that_flatten_or_are_not_finite_are_refused(void **state) {
-    double transform[12];
-    vsh_mesh mesh = cube();
+    mesh.indices = NULL;
+    refused(&mesh, VSH_ERROR_ARGUMENT, "'cube'", "indices");
+    mesh = cube();
     mesh.transform = transform;
     memcpy(transform, turned, sizeof transform);
     transform[3] = NAN;
@@ -259,18 +252,6 @@ static void transforms_that_flatten_or_are_not_finite_are_refused(void **state) 
         transform[i] = turned[i] * 1e-30;
     }
     check(&mesh); /* small is not flat */
-}
-
-static void arrays_that_are_missing_are_refused(void **state) {
-    vsh_mesh mesh = cube();
-    mesh.indices = NULL;
-    refused(&mesh, VSH_ERROR_ARGUMENT, "'cube'", "indices");
-    mesh = cube();
-    mesh.positions = NULL;
-    refused(&mesh, VSH_ERROR_ARGUMENT, "'cube'", "positions");
-    expect_error(vsh_mesh_check(NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
-    mesh = cube();
-    assert_int_equal(vsh_mesh_check(&mesh, NULL, NULL), VSH_ERROR_ARGUMENT);
 }
 
 static void labels_say_name_or_number_and_keep_whole_characters(void **state) {
@@ -292,52 +273,26 @@ static void labels_say_name_or_number_and_keep_whole_characters(void **state) {
     }
 }
 
-/* A closed grid: two sheets of n × n quads over each other, joined at the rim. */
+/* A closed box: a flat heightfield of n × n cells, as a solid. */
 static void a_million_triangles_take_about_a_second(void **state) {
-    enum { N = 500, SIDE = N + 1 };
-    float *positions = malloc(2 * SIDE * SIDE * sizeof(float[3]));
-    uint32_t *indices = malloc((4 * N * N + 8 * N) * sizeof(uint32_t[3]));
-    size_t count = 0;
-    for (uint32_t i = 0; i < 2 * SIDE * SIDE; ++i) {
-        const uint32_t cell = i % (SIDE * SIDE);
-        positions[3 * i] = (float)(cell % SIDE);
-        positions[3 * i + 1] = (float)(cell / SIDE);
-        positions[3 * i + 2] = i < SIDE * SIDE ? 0.0F : 1.0F;
-    }
-#define TRIANGLE(a, b, c) (memcpy(indices + 3 * count++, (uint32_t[3]){a, b, c}, sizeof(uint32_t[3])))
-    const uint32_t up = SIDE * SIDE;
-    for (uint32_t y = 0; y < N; ++y) {
-        for (uint32_t x = 0; x < N; ++x) {
-            const uint32_t a = y * SIDE + x, b = a + 1, c = a + SIDE + 1, d = a + SIDE;
-            TRIANGLE(a, c, b);
-            TRIANGLE(a, d, c);
-            TRIANGLE(up + a, up + b, up + c);
-            TRIANGLE(up + a, up + c, up + d);
-        }
-    }
-    for (uint32_t i = 0; i < N; ++i) {
-        const uint32_t sides[4][2] = {{i, i + 1},
-                                      {N + i * SIDE, N + (i + 1) * SIDE},
-                                      {N * SIDE + i + 1, N * SIDE + i},
-                                      {(i + 1) * SIDE, i * SIDE}};
-        for (int s = 0; s < 4; ++s) {
-            TRIANGLE(sides[s][0], sides[s][1], up + sides[s][1]);
-            TRIANGLE(sides[s][0], up + sides[s][1], up + sides[s][0]);
-        }
-    }
-#undef TRIANGLE
-    const vsh_mesh mesh = {
-        .positions = positions, .indices = indices, .vertex_count = 2 * SIDE * SIDE, .triangle_count = count};
+    enum { N = 710, SIDE = N + 1 };
+    float *heights = calloc(SIDE * SIDE, sizeof *heights);
+    const vsh_heights_source source = {
+        .columns = SIDE, .rows = SIDE, .values = heights, .size = {N, N}, .height = 1, .base = 1};
+    vsh_model *model = NULL;
+    expect_ok(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, NULL, &model, &failure));
+    const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     const clock_t start = clock();
     const vsh_mesh_report report = check(&mesh);
     const double seconds = (double)(clock() - start) / CLOCKS_PER_SEC;
+    assert_true(mesh.triangle_count > 1000000);
     assert_int_equal(report.open_edges, 0);
     assert_int_equal(report.flipped_edges, 0);
     assert_near(report.area, 2.0 * N * N + 4.0 * N, 1e-6);
-    print_message("%zu triangles: %.3f s\n", count, seconds);
+    print_message("%zu triangles: %.3f s\n", mesh.triangle_count, seconds);
     assert_true(seconds < 10.0); /* 0.12 s measured; sanitizers and busy machines take longer */
-    free(indices);
-    free(positions);
+    vsh_model_free(model);
+    free(heights);
 }
 
 static void names_match_patterns_as_in_a_shell(void **state) {
@@ -406,20 +361,11 @@ static void a_pattern_of_many_stars_takes_no_time(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_cube_is_closed),
-        cmocka_unit_test(split_vertices_and_negative_zeros_open_nothing),
-        cmocka_unit_test(a_cube_without_its_top_has_four_open_edges),
-        cmocka_unit_test(a_flipped_face_has_its_four_sides_flipped),
-        cmocka_unit_test(two_cubes_touching_along_an_edge_are_closed_and_agree),
-        cmocka_unit_test(degenerate_triangles_are_counted_and_change_nothing_else),
-        cmocka_unit_test(a_flat_triangle_that_joins_a_cut_edge_closes_the_mesh),
+        cmocka_unit_test(cubes_have_the_edges_area_and_bounds_that_they_have),
         cmocka_unit_test(an_empty_mesh_has_empty_bounds),
         cmocka_unit_test(area_and_bounds_are_of_the_world),
         cmocka_unit_test(a_mirrored_transform_keeps_the_outside_outside),
-        cmocka_unit_test(vertices_that_are_not_finite_are_refused_by_number),
-        cmocka_unit_test(an_index_out_of_range_is_refused_by_number),
-        cmocka_unit_test(transforms_that_flatten_or_are_not_finite_are_refused),
-        cmocka_unit_test(arrays_that_are_missing_are_refused),
+        cmocka_unit_test(bad_vertices_indices_and_transforms_are_refused_by_number),
         cmocka_unit_test(labels_say_name_or_number_and_keep_whole_characters),
         cmocka_unit_test(names_match_patterns_as_in_a_shell),
         cmocka_unit_test(a_pattern_of_many_stars_takes_no_time),
