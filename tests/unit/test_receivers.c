@@ -1,7 +1,6 @@
 /* Where receivers can be and what normals they can have: deep inside, far outside, on lattice planes; of any
  * length, zero, not finite. Of every method; docs/numerics.md has the bounds. */
-#include "previews.h"
-#include "traced.h"
+#include "methods.h"
 
 static const float UP[3] = {0.0f, 1.0f, 0.0f};
 static const double NOWHERE[3] = {0.0, 0.0, 0.0};
@@ -20,22 +19,19 @@ static void receivers_deep_inside_are_dark_and_far_outside_are_lit(void **state)
                              between(&counter, depth - 2.0, 2.0 - depth)};
         const double away = pow(10.0, between(&counter, 1.0, 15.0));
         const double q[3] = {away * out[0], away * out[1], away * out[2]};
-        for (int32_t method = 0; method < shadow_methods(); ++method) {
-            const vsh_light light = sun(d, i % 2 ? 0.0 : 0.05), from = sun(out, 0.05);
-            const float v = cast_shadow_at(&c, &light, method, p, NULL);
-            if (v != 0.0f) {
-                fail_msg("inside at (%g, %g, %g), %s: %.9g", p[0], p[1], p[2],
-                         vsh_get_name(VSH_NAMES_SHADOW, method), (double)v);
-            }
-            assert_true(cast_shadow_at(&c, &from, method, q, NULL) == 1.0f);
-        }
         const float n[3] = {(float)d[0], (float)d[1], (float)d[2]};
-        for (int32_t method = 0; method < ao_methods(); ++method) {
-            const float in = cast_ao_at(&c, method, 1.0, p, n), away_from = cast_ao_at(&c, method, 1.0, q, n);
+        const vsh_light light = sun(d, i % 2 ? 0.0 : 0.05), from = sun(out, 0.05);
+        for (int kind = 0; kind < KINDS; ++kind) {
+            if (!is_available(kind)) {
+                continue;
+            }
+            const float *facing = is_ao(kind) ? n : NULL;
+            const float inside = cast_kind_at(&c, kind, &light, 1.0, p, facing),
+                        outside = cast_kind_at(&c, kind, &from, 1.0, q, facing);
             /* taps go up the normal by the AO distance, and may come out of the solid */
-            if ((method == VSH_AO_TAPS ? !(in < 1.0f) : in != 0.0f) || away_from != 1.0f) {
-                fail_msg("AO %s: %.9g at (%g, %g, %g) inside, %.9g outside",
-                         vsh_get_name(VSH_NAMES_AO, method), (double)in, p[0], p[1], p[2], (double)away_from);
+            if ((kind == SHADOWS + VSH_AO_TAPS ? !(inside < 1.0f) : inside != 0.0f) || outside != 1.0f) {
+                fail_msg("%s: %.9g at (%g, %g, %g) inside, %.9g outside", name_of(kind), (double)inside, p[0],
+                         p[1], p[2], (double)outside);
             }
         }
     }
@@ -63,8 +59,7 @@ static void receivers_at_any_distance_are_lit(void **state) {
                     const bool one_sided = l == 2 || l == 3 ? method < VSH_SHADOW_CONE : false;
                     const float v = cast_shadow_at(&c, &lights[l], method, q, NULL);
                     if (one_sided || l == 4 ? !(v >= 0.0f && v <= 1.0f) : v != 1.0f) {
-                        fail_msg("%g sizes away, light %d, %s: %.9g", away, l,
-                                 vsh_get_name(VSH_NAMES_SHADOW, method), (double)v);
+                        fail_msg("%g sizes away, light %d, %s: %.9g", away, l, name_of(method), (double)v);
                     }
                 }
             }
@@ -72,8 +67,7 @@ static void receivers_at_any_distance_are_lit(void **state) {
                 assert_true(cast_ao_at(&c, method, scales[s], q, n) == 1.0f);
                 const float v = cast_ao_at(&c, method, 2.0 * far, q, n);
                 if (!(v > (method == VSH_AO_TAPS ? -1.0f : 0.9f) && v <= 1.0f)) {
-                    fail_msg("%g sizes away, AO %s: %.9g", away, vsh_get_name(VSH_NAMES_AO, method),
-                             (double)v);
+                    fail_msg("%g sizes away, %s: %.9g", away, name_of(SHADOWS + method), (double)v);
                 }
             }
         }
@@ -110,39 +104,29 @@ static void receivers_on_voxel_planes_see_what_their_neighbours_see(void **state
         }
     }
     const vsh_points points = {ALL, at, ns, texels};
-    for (int ao = 0; ao < 2; ++ao) {
-        for (int32_t method = 0; method < (ao ? ao_methods() : shadow_methods()); ++method) {
-            vsh_shade_options options = preview_options();
-            *(ao ? &options.ao_method : &options.method) = method;
-            options.ao_distance = 0.5;
-            assert_int_equal(ao ? vsh_shade_ao(occluders_of_caster(&c), &points, &options, NULL, values, NULL,
-                                               NULL, NULL, NULL)
-                                : vsh_shade_shadow(occluders_of_caster(&c), &points, &light, &options, NULL,
-                                                   values, NULL, NULL, NULL),
-                             VSH_OK);
-            double worst = 0.0;
-            size_t changed = 0;
-            for (size_t i = 0; i < PLACES; ++i) {
-                const float v = values[(SIDES + 1) * i + SIDES];
-                assert_true(v >= 0.0f && v <= 1.0f);
-                for (size_t side = 0; side < SIDES; ++side) {
-                    const double apart = fabs((double)(values[(SIDES + 1) * i + side] - v));
-                    worst = fmax(worst, apart);
-                    changed += apart > 1e-4;
-                }
-            }
-            const char *name =
-                ao ? vsh_get_name(VSH_NAMES_AO, method) : vsh_get_name(VSH_NAMES_SHADOW, method);
-            print_message("beside lattice planes, %s %s: %.3g apart at most, %zu of %d beyond 1e-4\n",
-                          ao ? "AO" : "shadow", name, worst, changed, PLACES * SIDES);
-            const bool rays =
-                ao ? method >= VSH_AO_RAYS : method >= VSH_SHADOW_RAYS || method == VSH_SHADOW_HARD;
-            if (rays) {
-                assert_true(changed < PLACES * SIDES / 100);
-            } else {
-                assert_true(worst < 1e-4);
+    for (int kind = 0; kind < KINDS; ++kind) {
+        if (!is_available(kind)) {
+            continue;
+        }
+        vsh_shade_options options = preview_options();
+        options.ao_distance = 0.5;
+        shade_kind(&c, kind, &light, options, &points, values);
+        double worst = 0.0;
+        size_t changed = 0;
+        for (size_t i = 0; i < PLACES; ++i) {
+            const float v = values[(SIDES + 1) * i + SIDES];
+            assert_true(v >= 0.0f && v <= 1.0f);
+            for (size_t side = 0; side < SIDES; ++side) {
+                const double apart = fabs((double)(values[(SIDES + 1) * i + side] - v));
+                worst = fmax(worst, apart);
+                changed += apart > 1e-4;
             }
         }
+        print_message("beside lattice planes, %s: %.3g apart at most, %zu of %d beyond 1e-4\n", name_of(kind),
+                      worst, changed, PLACES * SIDES);
+        const bool rays =
+            is_ao(kind) ? kind >= SHADOWS + VSH_AO_RAYS : kind >= VSH_SHADOW_RAYS || kind == VSH_SHADOW_HARD;
+        assert_true(rays ? changed < PLACES * SIDES / 100 : worst < 1e-4);
     }
     caster_free(&c);
 }
@@ -155,13 +139,9 @@ static void normals_of_any_length_are_directions(void **state) {
         const double p[3] = {-2.4 + 0.08 * i, 0.0, 0.3};
         for (size_t e = 0; e < sizeof exponents / sizeof exponents[0]; ++e) {
             const float n[3] = {0.0f, ldexpf(1.0f, exponents[e]), 0.0f};
-            for (int32_t method = 0; method < shadow_methods(); ++method) {
-                assert_int_equal(bits_of(cast_shadow_at(&c, &light, method, p, n)),
-                                 bits_of(cast_shadow_at(&c, &light, method, p, UP)));
-            }
-            for (int32_t method = 0; method < ao_methods(); ++method) {
-                assert_int_equal(bits_of(cast_ao_at(&c, method, 0.5, p, n)),
-                                 bits_of(cast_ao_at(&c, method, 0.5, p, UP)));
+            for (int kind = 0; kind < KINDS; ++kind) {
+                assert_true(!is_available(kind) || bits_of(cast_kind_at(&c, kind, &light, 0.5, p, n)) ==
+                                                       bits_of(cast_kind_at(&c, kind, &light, 0.5, p, UP)));
             }
         }
     }
@@ -181,17 +161,16 @@ static void points_that_are_none_are_nan_and_counted(void **state) {
         0,      0,     1e-9,   1e-12,       -1e-9};
     const float ns[3 * PLACES] = {0, 1, 0,   0, 1, 0, 0, 1, 0, 0, 0, 0, nan, 1,
                                   0, 0, inf, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0};
-    float all[PLACES], one;
-    for (int ao = 0; ao < 2; ++ao) {
-        for (int32_t method = 0; method < (ao ? ao_methods() : shadow_methods()); ++method) {
-            const vsh_shade_stats stats = ao ? cast_ao(&c, method, 0.5e-9, PLACES, at, ns, all)
-                                             : cast_shadows(&c, &light, method, PLACES, at, ns, all);
+    float all[PLACES];
+    for (int kind = 0; kind < KINDS; ++kind) {
+        if (is_available(kind)) {
+            const vsh_shade_stats stats = cast_kind(&c, kind, &light, 0.5e-9, PLACES, at, ns, all);
             assert_int_equal(stats.invalid, BAD);
             for (int i = 0; i < PLACES; ++i) {
                 assert_int_equal(isnan(all[i]) != 0, i > 0 && i <= BAD);
             }
             /* the samplers tell points apart by their numbers: the first keeps its own */
-            one = ao ? cast_ao_at(&c, method, 0.5e-9, at, ns) : cast_shadow_at(&c, &light, method, at, ns);
+            const float one = cast_kind_at(&c, kind, &light, 0.5e-9, at, ns);
             assert_int_equal(bits_of(one), bits_of(all[0]));
         }
     }
