@@ -2,14 +2,14 @@
  * every method. docs/numerics.md has the bounds. test_monotone.c has more of the voxels, of the rays and of
  * the casters; test_shadow_run.c and test_field_run.c: threads do not show. */
 #include "expect.h"
-#include "traced.h"
+#include "methods.h"
 
 #include "field/field.h"
 #include "levelset/leaves.h"
 
 #include <stdlib.h>
 
-enum { SIDE = 64, COUNT = SIDE * SIDE, SHADOWS = VSH_SHADOW_EXACT + 1, AOS = VSH_AO_EXACT + 1 };
+enum { SIDE = 64, COUNT = SIDE * SIDE, VALUES = SHADOWS + KINDS };
 
 static const double NOWHERE[3] = {0.0, 0.0, 0.0};
 static double positions[3 * COUNT];
@@ -31,10 +31,9 @@ static void fill_points(void) {
 
 /* Every kind of value at the points: shadows of a sun and of a lamp by each method, and AO. `scale` is that
  * of all lengths; the lights are given in the scene's own axes through `turn` (rows) and moved by `by`. */
-enum { KINDS = 2 * SHADOWS + AOS };
 
 typedef struct values {
-    float v[KINDS][COUNT];
+    float v[VALUES][COUNT];
 } values;
 
 typedef struct motion {
@@ -44,11 +43,6 @@ typedef struct motion {
 } motion;
 
 static const motion STILL = {1.0, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
-
-/* Whether this build can trace what the kind asks for. */
-static bool here(int kind) {
-    return kind < 2 * SHADOWS ? kind % SHADOWS < shadow_methods() : kind - 2 * SHADOWS < ao_methods();
-}
 
 static void turned(const motion *m, const double v[3], double out[3]) {
     for (int row = 0; row < 3; ++row) {
@@ -61,6 +55,11 @@ static void moved(const motion *m, const double p[3], double out[3]) {
     for (int axis = 0; axis < 3; ++axis) {
         out[axis] = m->scale * (out[axis] + m->by[axis]);
     }
+}
+
+/* Of value k: every shadow of the sun, then every kind of that of the lamp and AO. */
+static int kind_of(int k) {
+    return k < SHADOWS ? k : k - SHADOWS;
 }
 
 static void shade_all(const caster *c, const motion *m, values *all) {
@@ -79,20 +78,12 @@ static void shade_all(const caster *c, const motion *m, values *all) {
     turned(m, truth_seeds_sun, towards);
     moved(m, over, place);
     const vsh_light lights[2] = {sun(towards, 0.2), lamp(place, 0.25 * m->scale)};
-    for (int kind = 0; kind < KINDS; ++kind) {
-        if (!here(kind)) {
-            memset(all->v[kind], 0, sizeof all->v[kind]);
-        } else if (kind < 2 * SHADOWS) {
-            cast_shadows(c, &lights[kind / SHADOWS], kind % SHADOWS, COUNT, places, ns, all->v[kind]);
-        } else {
-            cast_ao(c, kind - 2 * SHADOWS, 0.75 * m->scale, COUNT, places, ns, all->v[kind]);
+    memset(all, 0, sizeof *all);
+    for (int k = 0; k < VALUES; ++k) {
+        if (is_available(kind_of(k))) {
+            cast_kind(c, kind_of(k), &lights[k >= SHADOWS], 0.75 * m->scale, COUNT, places, ns, all->v[k]);
         }
     }
-}
-
-static const char *name_of(int kind) {
-    return kind < 2 * SHADOWS ? vsh_get_name(VSH_NAMES_SHADOW, kind % SHADOWS)
-                              : vsh_get_name(VSH_NAMES_AO, kind - 2 * SHADOWS);
 }
 
 /* How far two sets of values are apart. */
@@ -141,9 +132,9 @@ static void scaled_by_a_power_of_two_every_bit_stays(void **state) {
         caster other = caster_of_moved(truth_seeds(), 0.03125, m.scale, NOWHERE, 8.0 * m.scale);
         assert_same_field(c.field, other.field);
         shade_all(&other, &m, &scaled);
-        for (int kind = 0; kind < KINDS; ++kind) {
-            if (memcmp(still.v[kind], scaled.v[kind], sizeof still.v[kind]) != 0) {
-                fail_msg("scaled by 2^%d: other bits of %s", exponents[e], name_of(kind));
+        for (int k = 0; k < VALUES; ++k) {
+            if (memcmp(still.v[k], scaled.v[k], sizeof still.v[k]) != 0) {
+                fail_msg("scaled by 2^%d: other bits of %s", exponents[e], name_of(kind_of(k)));
             }
         }
         caster_free(&other);
@@ -185,22 +176,6 @@ static vsh_grid *grid_of_meshes(double scale, double half_width, bool open) {
     return grid;
 }
 
-static void meshes_scaled_by_a_power_of_two_keep_every_bit(void **state) {
-    for (int open = 0; open < 2; ++open) {
-        for (double half_width = 3.0; half_width < 20.0; half_width *= 3.0) {
-            vsh_field *field = field_of_grid(grid_of_meshes(1.0, half_width, open != 0), 4.0);
-            const int exponents[] = {-35, -20, -12, 5, 20, 43};
-            for (size_t e = 0; e < sizeof exponents / sizeof exponents[0]; ++e) {
-                const double scale = ldexp(1.0, exponents[e]);
-                vsh_field *other = field_of_grid(grid_of_meshes(scale, half_width, open != 0), 4.0 * scale);
-                assert_same_field(field, other);
-                vsh_field_free(other);
-            }
-            vsh_field_free(field);
-        }
-    }
-}
-
 /* A ball taken as it is, and a box on another lattice, turned and measured anew. */
 static vsh_grid *grid_of_union(double scale) {
     vsh_sdf_node nodes[2] = {vsh_sdf_node_default(), vsh_sdf_node_default()};
@@ -221,16 +196,32 @@ static vsh_grid *grid_of_union(double scale) {
     return both;
 }
 
-static void unions_scaled_by_a_power_of_two_keep_every_bit(void **state) {
-    vsh_field *field = field_of_grid(grid_of_union(1.0), 4.0);
-    const int exponents[] = {-35, -20, 20, 42};
-    for (size_t e = 0; e < sizeof exponents / sizeof exponents[0]; ++e) {
-        const double scale = ldexp(1.0, exponents[e]);
-        vsh_field *other = field_of_grid(grid_of_union(scale), 4.0 * scale);
-        assert_same_field(field, other);
-        vsh_field_free(other);
+static void meshes_and_unions_scaled_by_a_power_of_two_keep_every_bit(void **state) {
+    static const struct {
+        double half_width; /* of meshes; 0: a union */
+        bool open;
+        int exponents[6];
+    } cases[] = {{3.0, false, {-35, -20, -12, 5, 20, 43}},
+                 {9.0, false, {-35, -20, -12, 5, 20, 43}},
+                 {3.0, true, {-35, -20, -12, 5, 20, 43}},
+                 {9.0, true, {-35, -20, -12, 5, 20, 43}},
+                 {0.0, false, {-35, -20, 20, 42}}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        vsh_field *field = NULL;
+        for (int e = -1; e < 6; ++e) {
+            const double scale = e < 0 ? 1.0 : ldexp(1.0, cases[i].exponents[e]);
+            vsh_field *scaled = field_of_grid(cases[i].half_width > 0.0
+                                                  ? grid_of_meshes(scale, cases[i].half_width, cases[i].open)
+                                                  : grid_of_union(scale),
+                                              4.0 * scale);
+            field = field != NULL ? field : scaled;
+            assert_same_field(field, scaled);
+            if (e >= 0) {
+                vsh_field_free(scaled);
+            }
+        }
+        vsh_field_free(field);
     }
-    vsh_field_free(field);
 }
 
 /* Of all kinds, between the scene where it is and the same moved. Voxels are of 2^-5 and places of few
@@ -252,14 +243,14 @@ static apart apart_when_moved(const double voxels[3]) {
     shade_all(&c, &m, &there);
     caster_free(&c);
     apart all = {0.0, 0.0, 0};
-    for (int kind = 0; kind < KINDS; ++kind) {
-        const apart a = compare(still.v[kind], there.v[kind]);
+    for (int k = 0; k < VALUES; ++k) {
+        const apart a = compare(still.v[k], there.v[k]);
         all.worst = fmax(all.worst, a.worst);
         all.rms = fmax(all.rms, a.rms);
         all.beyond += a.beyond;
     }
     print_message("moved by (%g, %g, %g) voxels: rms %.2g, worst %.2g, %zu of %d beyond 0.01\n", voxels[0],
-                  voxels[1], voxels[2], all.rms, all.worst, all.beyond, KINDS * COUNT);
+                  voxels[1], voxels[2], all.rms, all.worst, all.beyond, VALUES * COUNT);
     return all;
 }
 
@@ -296,7 +287,7 @@ static void turned_by_right_angles_and_mirrored_values_stay_within_a_bound(void 
     fill_points();
     caster c = caster_of_turned(&STILL, 0.04);
     shade_all(&c, &STILL, &still);
-    apart worst[KINDS] = {{0.0, 0.0, 0}};
+    apart worst[VALUES] = {{0.0, 0.0, 0}};
     for (int turn = 1; turn < 48; turn += 2 + turn % 3) {
         motion m = STILL;
         for (int row = 0; row < 3; ++row) {
@@ -308,22 +299,22 @@ static void turned_by_right_angles_and_mirrored_values_stay_within_a_bound(void 
         caster other = caster_of_turned(&m, 0.04);
         shade_all(&other, &m, &there);
         caster_free(&other);
-        for (int kind = 0; kind < KINDS; ++kind) {
-            const apart a = compare(still.v[kind], there.v[kind]);
-            worst[kind].rms = fmax(worst[kind].rms, a.rms);
-            worst[kind].worst = fmax(worst[kind].worst, a.worst);
-            worst[kind].beyond = a.beyond > worst[kind].beyond ? a.beyond : worst[kind].beyond;
+        for (int k = 0; k < VALUES; ++k) {
+            const apart a = compare(still.v[k], there.v[k]);
+            worst[k].rms = fmax(worst[k].rms, a.rms);
+            worst[k].worst = fmax(worst[k].worst, a.worst);
+            worst[k].beyond = a.beyond > worst[k].beyond ? a.beyond : worst[k].beyond;
         }
     }
-    for (int kind = 0; kind < KINDS; ++kind) {
-        print_message("turned, %s: rms %.2g, worst %.2g, %zu of %d beyond 0.01\n", name_of(kind),
-                      worst[kind].rms, worst[kind].worst, worst[kind].beyond, COUNT);
-        const int32_t method = kind % SHADOWS;
-        if (kind < 2 * SHADOWS ? method >= VSH_SHADOW_RAYS : kind > 2 * SHADOWS) {
+    for (int k = 0; k < VALUES; ++k) {
+        print_message("turned, %s: rms %.2g, worst %.2g, %zu of %d beyond 0.01\n", name_of(kind_of(k)),
+                      worst[k].rms, worst[k].worst, worst[k].beyond, COUNT);
+        const int kind = kind_of(k);
+        if (is_ao(kind) ? kind > SHADOWS + VSH_AO_TAPS : kind >= VSH_SHADOW_RAYS) {
             /* where rays and cones lie in the disc or hemisphere does not turn with the scene */
-            assert_true(worst[kind].rms < 0.03);
+            assert_true(worst[k].rms < 0.03);
         } else {
-            assert_true(worst[kind].rms < 1e-4 && worst[kind].worst < 2e-3 && worst[kind].beyond == 0);
+            assert_true(worst[k].rms < 1e-4 && worst[k].worst < 2e-3 && worst[k].beyond == 0);
         }
     }
     caster_free(&c);
@@ -332,8 +323,7 @@ static void turned_by_right_angles_and_mirrored_values_stay_within_a_bound(void 
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(scaled_by_a_power_of_two_every_bit_stays),
-        cmocka_unit_test(meshes_scaled_by_a_power_of_two_keep_every_bit),
-        cmocka_unit_test(unions_scaled_by_a_power_of_two_keep_every_bit),
+        cmocka_unit_test(meshes_and_unions_scaled_by_a_power_of_two_keep_every_bit),
         cmocka_unit_test(moved_by_whole_voxels_every_bit_stays),
         cmocka_unit_test(turned_by_right_angles_and_mirrored_values_stay_within_a_bound),
     };
