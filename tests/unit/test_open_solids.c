@@ -8,22 +8,25 @@
 static const double ORIGIN[3] = {0, 0, 0};
 static const double CUP[][2] = {{0, 0}, {1, 0}, {1, 2}};
 
-/* Whether points that look along a normal are hidden among the triangles of a shape, which is emptied. */
-static void assert_hidden(shape *s, const char *what, const double at[][3], const double normal[3],
-                          size_t count, bool hidden) {
-    const vsh_mesh mesh = shape_mesh(s, what);
+/* Whether points that look up are hidden among the triangles of a mesh. */
+static void assert_mesh_hides(const vsh_mesh *mesh, const double at[][3], size_t count, bool hidden) {
     vsh_triangles *triangles = NULL;
-    expect_ok(vsh_triangles_create(&mesh, 1, NULL, &triangles, &failure));
+    expect_ok(vsh_triangles_create(mesh, 1, NULL, &triangles, &failure));
     for (size_t i = 0; i < count; ++i) {
-        const float n[3] = {(float)normal[0], (float)normal[1], (float)normal[2]};
         uint8_t where;
-        vshi_inside(triangles, 1, at[i], n, NULL, NULL, NULL, &where);
+        vshi_inside(triangles, 1, at[i], (const float[]){0, 0, 1}, NULL, NULL, NULL, &where);
         if ((where == VSHI_INSIDE) != hidden) {
-            fail_msg("%s: point (%g, %g, %g) is %s", what, at[i][0], at[i][1], at[i][2],
+            fail_msg("%s: point (%g, %g, %g) is %s", mesh->name, at[i][0], at[i][1], at[i][2],
                      hidden ? "not hidden" : "hidden");
         }
     }
     vsh_triangles_free(triangles);
+}
+
+/* Among those of a shape, which is emptied. */
+static void assert_hidden(shape *s, const char *what, const double at[][3], size_t count, bool hidden) {
+    const vsh_mesh mesh = shape_mesh(s, what);
+    assert_mesh_hides(&mesh, at, count, hidden);
     s->vertices = s->triangles = 0;
 }
 
@@ -37,7 +40,12 @@ static void add_box(shape *s, double low, double high, unsigned sides) {
     shape_box(s, from, to, sides);
 }
 
-static const double UP[3] = {0, 0, 1};
+/* A house without its bottom on ground. */
+static void add_house(shape *s, double thickness, double sunk) {
+    add_ground(s, thickness);
+    add_box(s, -sunk, 2.0, ALL_SIDES & ~BOTTOM);
+}
+
 static const double BELOW[][3] = {
     {0, 0, 0}, {0.6, 0.3, 0}, {-0.97, 0.1, 0}, {0.9, -0.95, 0}, {0.999, 0.4, 0}};
 static const double BESIDE[][3] = {{1.001, 0, 0}, {-1.02, 0.4, 0}, {1.5, -1.2, 0}, {0, 3, 0}};
@@ -50,27 +58,34 @@ static void floors_below_houses_without_floors_are_hidden(void **state) {
         for (size_t k = 0; k < sizeof SUNK / sizeof *SUNK; ++k) {
             char what[80];
             snprintf(what, sizeof what, "ground of thickness %g, house sunk by %g", THICKNESS[i], SUNK[k]);
-            add_ground(s, THICKNESS[i]);
-            add_box(s, -SUNK[k], 2.0, ALL_SIDES & ~BOTTOM);
-            assert_hidden(s, what, BELOW, UP, POINTS_BELOW, true);
-            add_ground(s, THICKNESS[i]);
-            add_box(s, -SUNK[k], 2.0, ALL_SIDES & ~BOTTOM);
-            assert_hidden(s, what, BESIDE, UP, POINTS_BESIDE, false);
+            add_house(s, THICKNESS[i], SUNK[k]);
+            assert_hidden(s, what, BELOW, POINTS_BELOW, true);
+            add_house(s, THICKNESS[i], SUNK[k]);
+            assert_hidden(s, what, BESIDE, POINTS_BESIDE, false);
         }
     }
+    static const double mirror[12] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    add_house(s, 0.0, 0.3);
+    vsh_mesh mesh = shape_mesh(s, "mirrored house");
+    mesh.transform = mirror;
+    assert_mesh_hides(&mesh, BELOW, POINTS_BELOW, true);
     free(s);
 }
 
-static void walls_below_a_roof_hide_the_floor_and_a_pen_does_not(void **state) {
+/* Ground in a house that lacks a wall sees out by that side. */
+static void walls_below_a_roof_hide_the_floor_and_a_pen_or_three_walls_do_not(void **state) {
     const double low[3] = {-1.5, -1.5, 1.8}, high[3] = {1.5, 1.5, 2.0};
     shape *s = shape_new();
     add_ground(s, 0.0);
     add_box(s, -0.3, 2.0, ALL_SIDES & ~BOTTOM & ~TOP);
     shape_box(s, low, high, ALL_SIDES & ~BOTTOM);
-    assert_hidden(s, "walls below a roof", BELOW, UP, POINTS_BELOW, true);
+    assert_hidden(s, "walls below a roof", BELOW, POINTS_BELOW, true);
     add_ground(s, 0.0);
     add_box(s, -0.3, 1.0, ALL_SIDES & ~BOTTOM & ~TOP);
-    assert_hidden(s, "a pen", BELOW, UP, POINTS_BELOW, false);
+    assert_hidden(s, "a pen", BELOW, POINTS_BELOW, false);
+    add_ground(s, 0.0);
+    add_box(s, -0.3, 2.0, ALL_SIDES & ~BOTTOM & ~FRONT);
+    assert_hidden(s, "a house without a front", BELOW, POINTS_BELOW, false);
     free(s);
 }
 
@@ -83,31 +98,21 @@ static void contents_of_cups_are_seen(void **state) {
     shape *s = shape_new();
     shape_turned(s, ORIGIN, CUP, 3, 32);
     shape_ball(s, fruit, 0.6, -1.0, 1.0, 16);
-    assert_hidden(s, "fruit in a cup", top, UP, 1, false);
+    assert_hidden(s, "fruit in a cup", top, 1, false);
     shape_turned(s, ORIGIN, CUP, 3, 32);
     shape_turned(s, ORIGIN, coffee, 2, 32);
-    assert_hidden(s, "coffee in a cup", surface, UP, 2, false);
+    assert_hidden(s, "coffee in a cup", surface, 2, false);
     shape_turned(s, ORIGIN, CUP, 3, 32);
-    assert_hidden(s, "the bottom of a cup", bottom, UP, 2, false);
+    assert_hidden(s, "the bottom of a cup", bottom, 2, false);
     add_ground(s, 0.1);
     shape_turned(s, ORIGIN, over, 3, 32);
-    assert_hidden(s, "a table below a cup upside down", on_table, UP, 2, true);
-    free(s);
-}
-
-/* The house lacks a wall: the ground in it sees out by that side. */
-static void a_house_without_a_wall_shows_its_ground(void **state) {
-    shape *s = shape_new();
-    add_ground(s, 0.0);
-    add_box(s, -0.3, 2.0, ALL_SIDES & ~BOTTOM & ~FRONT);
-    assert_hidden(s, "a house without a front", BELOW, UP, POINTS_BELOW, false);
+    assert_hidden(s, "a table below a cup upside down", on_table, 2, true);
     free(s);
 }
 
 static void sheets_by_name_hide_nothing(void **state) {
     shape *s = shape_new();
-    add_ground(s, 0.0);
-    add_box(s, -0.3, 2.0, ALL_SIDES & ~BOTTOM);
+    add_house(s, 0.0, 0.3);
     vsh_mesh mesh = shape_mesh(s, "house");
     mesh.solidity = VSH_SOLIDITY_SHELL;
     vshi_solidity *found = solidity_of(&mesh, 1);
@@ -119,32 +124,12 @@ static void sheets_by_name_hide_nothing(void **state) {
     free(s);
 }
 
-static void mirrored_houses_hide_too(void **state) {
-    static const double mirror[12] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    shape *s = shape_new();
-    add_ground(s, 0.0);
-    add_box(s, -0.3, 2.0, ALL_SIDES & ~BOTTOM);
-    vsh_mesh mesh = shape_mesh(s, "house");
-    mesh.transform = mirror;
-    vsh_triangles *triangles = NULL;
-    expect_ok(vsh_triangles_create(&mesh, 1, NULL, &triangles, &failure));
-    for (size_t i = 0; i < POINTS_BELOW; ++i) {
-        uint8_t where;
-        vshi_inside(triangles, 1, BELOW[i], (const float[]){0, 0, 1}, NULL, NULL, NULL, &where);
-        assert_int_equal(where, VSHI_INSIDE);
-    }
-    vsh_triangles_free(triangles);
-    free(s);
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(floors_below_houses_without_floors_are_hidden),
-        cmocka_unit_test(walls_below_a_roof_hide_the_floor_and_a_pen_does_not),
+        cmocka_unit_test(walls_below_a_roof_hide_the_floor_and_a_pen_or_three_walls_do_not),
         cmocka_unit_test(contents_of_cups_are_seen),
-        cmocka_unit_test(a_house_without_a_wall_shows_its_ground),
         cmocka_unit_test(sheets_by_name_hide_nothing),
-        cmocka_unit_test(mirrored_houses_hide_too),
     };
     return vsh_triangles_available() ? cmocka_run_group_tests(tests, NULL, NULL) : 0;
 }
