@@ -47,10 +47,11 @@ struct Outcome {
     uint64_t hash = 0;
     std::string failure;
 
-    void check(vsh_result result, const vsh_error &error) {
+    bool check(vsh_result result, const vsh_error &error) {
         if (result != VSH_OK && failure.empty()) {
             failure = error.message;
         }
+        return result == VSH_OK;
     }
     template <typename Value> void add(const Value *values, size_t count) {
         const auto *bytes = reinterpret_cast<const unsigned char *>(values);
@@ -70,7 +71,6 @@ void write_text(const char *name, const char *text) {
 // Everything that reads numbers, computes with them or writes them.
 Outcome work(int32_t threads = 0) {
     Outcome o;
-    vsh_error error{};
     vsh_run run = vsh_run_default();
     run.threads = threads;
     vsh_scene *scene = nullptr;
@@ -78,21 +78,15 @@ Outcome work(int32_t threads = 0) {
     vsh_grid *grid = nullptr;
     vsh_occluders *occluders = nullptr;
     vsh_provenance *provenance = nullptr;
+    vsh_error error{};
     const std::string path = folder + "/scene.json";
-    o.check(vsh_scene_read(path.c_str(), nullptr, &scene, &error), error);
-    if (o.failure.empty()) {
-        o.check(vsh_assets_load(scene, &run, &assets, &error), error);
-    }
-    if (o.failure.empty()) {
-        o.check(vsh_scene_casters(scene, assets, &run, &grid, &error), error);
-    }
-    if (o.failure.empty()) {
-        o.check(vsh_occluders_from_grid(grid, nullptr, &run, &occluders, &error), error);
-    }
-    if (o.failure.empty()) {
+    if (o.check(vsh_scene_read(path.c_str(), nullptr, &scene, &error), error) &&
+        o.check(vsh_assets_load(scene, &run, &assets, &error), error) &&
+        o.check(vsh_scene_casters(scene, assets, &run, &grid, &error), error) &&
+        o.check(vsh_occluders_from_grid(grid, nullptr, &run, &occluders, &error), error)) {
         constexpr size_t COUNT = 400;
         std::vector<double> positions;
-        std::vector<float> normals, visible(COUNT), ao(COUNT);
+        std::vector<float> normals, values(COUNT);
         for (size_t i = 0; i < COUNT; ++i) {
             positions.insert(positions.end(),
                              {-1.4 + 0.15 * double(i % 20), 0.01, -1.4 + 0.15 * double(i / 20)});
@@ -103,15 +97,15 @@ Outcome work(int32_t threads = 0) {
         options.rays = 16;
         for (const int32_t method : {VSH_SHADOW_CONE, VSH_SHADOW_ADAPTIVE}) {
             options.method = method;
-            o.check(vsh_shade_shadow(occluders, &points, &scene->lights[0], &options, &run, visible.data(),
+            o.check(vsh_shade_shadow(occluders, &points, &scene->lights[0], &options, &run, values.data(),
                                      nullptr, nullptr, &error),
                     error);
-            o.add(visible.data(), COUNT);
+            o.add(values.data(), COUNT);
         }
-        o.check(
-            vsh_shade_ao(occluders, &points, &options, &run, ao.data(), nullptr, nullptr, nullptr, &error),
-            error);
-        o.add(ao.data(), COUNT);
+        o.check(vsh_shade_ao(occluders, &points, &options, &run, values.data(), nullptr, nullptr, nullptr,
+                             &error),
+                error);
+        o.add(values.data(), COUNT);
         vsh_provenance_source source = vsh_provenance_source_default();
         source.scene = scene;
         source.voxel_size = 0.0625;
@@ -227,12 +221,11 @@ void arenas_of_the_host_change_nothing(void **) {
     }
 }
 
-void many_threads_with_fields_of_their_own_get_the_same_bits(void **) {
-    const Outcome expected = plain();
-    std::vector<Outcome> all(8);
+template <typename Work> void expect_same_on_threads(const Outcome &expected, size_t count, Work &&work_of) {
+    std::vector<Outcome> all(count);
     std::vector<std::thread> threads;
-    for (size_t i = 0; i < all.size(); ++i) {
-        threads.emplace_back([&all, i] { all[i] = work(int32_t(i % 3)); });
+    for (size_t i = 0; i < count; ++i) {
+        threads.emplace_back([&, i] { all[i] = work_of(i); });
     }
     for (std::thread &thread : threads) {
         thread.join();
@@ -240,6 +233,10 @@ void many_threads_with_fields_of_their_own_get_the_same_bits(void **) {
     for (const Outcome &o : all) {
         expect_same(expected, o, "a thread");
     }
+}
+
+void many_threads_with_fields_of_their_own_get_the_same_bits(void **) {
+    expect_same_on_threads(plain(), 8, [](size_t i) { return work(int32_t(i % 3)); });
 }
 
 // One field, one query handle, one grid: shared by threads that shade, sample and bake volumes at once.
@@ -273,17 +270,7 @@ void many_threads_share_one_field(void **) {
     };
     const Outcome expected = bake(1);
     assert_true(expected.failure.empty());
-    std::vector<Outcome> all(12);
-    std::vector<std::thread> threads;
-    for (size_t i = 0; i < all.size(); ++i) {
-        threads.emplace_back([&, i] { all[i] = bake(int32_t(i % 4)); });
-    }
-    for (std::thread &thread : threads) {
-        thread.join();
-    }
-    for (const Outcome &o : all) {
-        expect_same(expected, o, "a thread");
-    }
+    expect_same_on_threads(expected, 12, [&](size_t i) { return bake(int32_t(i % 4)); });
     vsh_occluders_free(occluders);
     vsh_grid_free(grid);
 }

@@ -72,11 +72,10 @@ static void a_ring_is_exactly_as_wide_as_asked(void **unused) {
     enum { SIZE = 41, PADDING = 5 };
     uint8_t state[SIZE * SIZE] = {0};
     float values[SIZE * SIZE];
-    for (int i = 0; i < SIZE * SIZE; ++i) {
-        values[i] = HOLE;
-    }
     state[20 * SIZE + 20] = VSHI_TEXEL_VALID;
-    values[20 * SIZE + 20] = 3.0f;
+    for (int i = 0; i < SIZE * SIZE; ++i) {
+        values[i] = state[i] == VSHI_TEXEL_VALID ? 3.0f : HOLE;
+    }
     fill(NULL, SIZE, SIZE, state, PADDING, 0, values, 1);
     for (int i = 0; i < SIZE * SIZE; ++i) {
         const int dx = i % SIZE - 20, dy = i / SIZE - 20;
@@ -84,42 +83,30 @@ static void a_ring_is_exactly_as_wide_as_asked(void **unused) {
     }
 }
 
-static void dark_texels_are_no_holes(void **unused) {
-    uint8_t state[16] = {0};
-    float values[16];
-    for (int i = 0; i < 16; ++i) {
-        values[i] = HOLE;
-    }
+/* A dark texel beside a lit one keeps its value and hands it on, of all channels; the state stays. */
+static void dark_texels_are_no_holes_and_all_channels_are_copied(void **unused) {
+    uint8_t state[16] = {0}, before[16];
+    float values[3 * 16];
     state[5] = state[6] = VSHI_TEXEL_VALID;
-    values[5] = 0.0f; /* fully dark beside a lit one: keeps its value and hands it on */
-    values[6] = 1.0f;
-    fill(NULL, 16, 1, state, 3, 0, values, 1);
-    for (int i = 0; i < 16; ++i) {
-        assert_true(values[i] == (i < 2 || i > 9 ? HOLE : i <= 5 ? 0.0f : 1.0f));
-    }
-}
-
-static void the_state_is_left_as_it_is_and_all_channels_are_copied(void **unused) {
-    uint8_t state[9] = {VSHI_TEXEL_VALID, 0, 0, 0, VSHI_TEXEL_INVALID, 0, 0, 0, 0}, before[9];
-    float values[27];
-    for (int i = 0; i < 27; ++i) {
-        values[i] = i < 3 ? (float)(i + 1) : HOLE;
-    }
+    state[8] = VSHI_TEXEL_INVALID;
     memcpy(before, state, sizeof state);
-    fill(NULL, 3, 3, state, 8, 8, values, 3);
+    for (int i = 0; i < 3 * 16; ++i) {
+        values[i] = i / 3 == 5 ? 0.0f : i / 3 == 6 ? 1.0f + (float)(i % 3) : HOLE;
+    }
+    fill(NULL, 16, 1, state, 3, 8, values, 3);
     assert_memory_equal(state, before, sizeof state);
-    for (int i = 0; i < 27; ++i) {
-        assert_true(values[i] == (float)(i % 3 + 1));
+    for (int i = 0; i < 3 * 16; ++i) {
+        const int texel = i / 3;
+        assert_true(values[i] == (texel < 2 || texel > 9 ? HOLE : texel <= 5 ? 0.0f : 1.0f + (float)(i % 3)));
     }
 }
 
 static void any_number_of_threads_gives_the_same_bits(void **unused) {
     enum { WIDTH = 300, HEIGHT = 211, COUNT = WIDTH * HEIGHT };
-    const int32_t threads[] = {1, 2, 5};
-    uint8_t *state = calloc(COUNT, 1);
-    float *values[3];
+    static const int32_t threads[] = {1, 2, 5};
+    static uint8_t state[COUNT];
+    static float values[3][COUNT];
     for (int t = 0; t < 3; ++t) {
-        values[t] = malloc(COUNT * sizeof(float));
         for (uint32_t i = 0; i < COUNT; ++i) {
             state[i] = i * 2654435761u >> 26 == 0 ? VSHI_TEXEL_VALID : VSHI_TEXEL_EMPTY;
             values[t][i] = (float)i;
@@ -127,12 +114,8 @@ static void any_number_of_threads_gives_the_same_bits(void **unused) {
         vsh_run run = vsh_run_default();
         run.threads = threads[t];
         fill(&run, WIDTH, HEIGHT, state, 9, 0, values[t], 1);
-        assert_memory_equal(values[0], values[t], COUNT * sizeof(float));
+        assert_memory_equal(values[0], values[t], sizeof values[0]);
     }
-    for (int t = 0; t < 3; ++t) {
-        free(values[t]);
-    }
-    free(state);
 }
 
 /* --- Where invalid texels take their values from: within their chart, and how far. */
@@ -147,85 +130,65 @@ typedef struct map {
     int from[MOST]; /* the texel that each takes its value from */
 } map;
 
-static void spread_over(map *m, size_t width, const char *letters) {
+static map spread_over(size_t width, const char *letters) {
+    static map m;
     const size_t count = strlen(letters);
     assert_true(count <= MOST);
-    memset(m, 0, sizeof *m);
+    memset(&m, 0, sizeof m);
     for (size_t i = 0; i < count; ++i) {
-        m->from[i] = NOWHERE;
-        m->state[i] = VSHI_TEXEL_EMPTY;
-        if (letters[i] == ' ') {
-            continue;
-        }
-        const bool valid = letters[i] < 'a';
-        m->state[i] = valid ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
-        m->mesh[i] = 1 + (uint32_t)(letters[i] - (valid ? 'A' : 'a'));
+        const bool empty = letters[i] == ' ', valid = letters[i] < 'a';
+        m.from[i] = NOWHERE;
+        m.state[i] = empty ? VSHI_TEXEL_EMPTY : valid ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
+        m.mesh[i] = empty ? 0 : 1 + (uint32_t)(letters[i] - (valid ? 'A' : 'a'));
     }
     vshi_spread spread;
     vshi_store store = {.run = NULL};
-    expect_ok(vshi_spread_find(&store, width, count / width, m->mesh, m->state, &spread, &failure));
+    expect_ok(vshi_spread_find(&store, width, count / width, m.mesh, m.state, &spread, &failure));
     for (size_t i = 0; i < spread.count; ++i) {
-        assert_int_equal(m->state[spread.texel[i]], VSHI_TEXEL_INVALID);
-        assert_int_equal(m->from[spread.texel[i]], NOWHERE);
-        m->from[spread.texel[i]] = (int)spread.source[i];
+        assert_int_equal(m.state[spread.texel[i]], VSHI_TEXEL_INVALID);
+        assert_int_equal(m.from[spread.texel[i]], NOWHERE);
+        m.from[spread.texel[i]] = (int)spread.source[i];
     }
     vshi_spread_free(&store, &spread);
     vshi_store_close(&store);
+    return m;
 }
 
 static void an_invalid_texel_is_filled_from_at_most_64_texels_away(void **state) {
-    map *m = malloc(sizeof *m);
-    char letters[201];
-    memset(letters, 'a', 200);
-    letters[200] = '\0';
-    letters[0] = 'A';
-    spread_over(m, 200, letters);
+    char letters[201] = "A";
+    memset(letters + 1, 'a', 199);
+    const map across = spread_over(200, letters), down = spread_over(1, letters);
     for (int i = 1; i < 200; ++i) {
-        assert_int_equal(m->from[i], i <= 64 ? 0 : NOWHERE);
+        assert_int_equal(across.from[i], i <= 64 ? 0 : NOWHERE);
+        assert_int_equal(down.from[i], i <= 64 ? 0 : NOWHERE);
     }
-    spread_over(m, 1, letters);
-    assert_int_equal(m->from[64], 0);
-    assert_int_equal(m->from[65], NOWHERE);
-    free(m);
 }
 
 static void texels_of_other_charts_are_never_taken_from(void **state) {
-    map *m = malloc(sizeof *m);
     /* another mesh touches; another chart of the same mesh does not */
-    spread_over(m, 10,
-                "Aaaaaa    "
-                "BBBBBB AAA"
-                "          "
-                "aaaaaaa   ");
-    for (int i = 1; i <= 5; ++i) {
-        assert_int_equal(m->from[i], 0);
-    }
-    for (int i = 30; i <= 36; ++i) {
-        assert_int_equal(m->from[i], NOWHERE);
+    const map m = spread_over(10, "Aaaaaa    "
+                                  "BBBBBB AAA"
+                                  "          "
+                                  "aaaaaaa   ");
+    for (int i = 1; i <= 36; ++i) {
+        assert_true((i > 5 && i < 30) || m.from[i] == (i <= 5 ? 0 : NOWHERE));
     }
     /* over two arms of one chart the way goes around, not across */
-    spread_over(m, 9,
-                "AAAAAAAA "
-                "        A"
-                "aaaaaaaa ");
-    assert_int_equal(m->from[25], 17);
-    assert_int_equal(m->from[18], 17);
-    free(m);
+    const map arms = spread_over(9, "AAAAAAAA "
+                                    "        A"
+                                    "aaaaaaaa ");
+    assert_int_equal(arms.from[25], 17);
+    assert_int_equal(arms.from[18], 17);
 }
 
 static void the_nearest_valid_texel_of_a_chart_is_taken_and_the_first_of_equals(void **state) {
-    map *m = malloc(sizeof *m);
-    spread_over(m, 7,
-                "AaaaaaA"
-                "aaaaaaa"
-                "AaaaaaA");
     static const int FROM[21] = {NOWHERE, 0,  0,  0,  6,  6,  NOWHERE, /* */
                                  0,       0,  0,  0,  6,  6,  6,       /* */
                                  NOWHERE, 14, 14, 14, 20, 20, NOWHERE};
-    for (int i = 0; i < 21; ++i) {
-        assert_int_equal(m->from[i], FROM[i]);
-    }
-    free(m);
+    const map m = spread_over(7, "AaaaaaA"
+                                 "aaaaaaa"
+                                 "AaaaaaA");
+    assert_memory_equal(m.from, FROM, sizeof FROM);
 }
 
 static void values_are_copied_from_texels_that_have_one(void **state) {
@@ -245,8 +208,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_texel_takes_the_nearest_value_and_the_first_of_equally_near_ones),
         cmocka_unit_test(a_ring_is_exactly_as_wide_as_asked),
-        cmocka_unit_test(dark_texels_are_no_holes),
-        cmocka_unit_test(the_state_is_left_as_it_is_and_all_channels_are_copied),
+        cmocka_unit_test(dark_texels_are_no_holes_and_all_channels_are_copied),
         cmocka_unit_test(any_number_of_threads_gives_the_same_bits),
         cmocka_unit_test(an_invalid_texel_is_filled_from_at_most_64_texels_away),
         cmocka_unit_test(texels_of_other_charts_are_never_taken_from),
