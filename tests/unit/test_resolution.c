@@ -1,12 +1,11 @@
 /* Voxels that nobody named: how many are made of what, and what casts without any. */
+#include "expect.h"
 #include "fields.h"
 #include "scenes.h"
 
 #include <vdbshade/vdbshade.h>
 
 enum { POINTS = 400 };
-
-static vsh_error why;
 
 /* A plate of 2 × 2, 0.2 thick, whose top is at y = 1. */
 static vsh_mesh plate(void) {
@@ -22,8 +21,7 @@ static vsh_occluders *plate_of(int32_t resolution) {
     vsh_occluders_options options = vsh_occluders_options_default();
     options.grid.resolution = resolution;
     vsh_occluders *made = NULL;
-    assert_int_equal(vsh_occluders_create(&mesh, 1, resolution > 0 ? &options : NULL, NULL, &made, &why),
-                     VSH_OK);
+    expect_ok(vsh_occluders_create(&mesh, 1, resolution > 0 ? &options : NULL, NULL, &made, &failure));
     return made;
 }
 
@@ -69,12 +67,10 @@ static void triangles_alone_give_shadows_within_the_error_of_the_truth(void **st
         }
         vsh_shade_options options = vsh_shade_options_default();
         vsh_shade_stats stats = vsh_shade_stats_zero();
-        assert_int_equal(vsh_shade_shadow(made, &points, &light, &options, NULL, lit, NULL, &stats, &why),
-                         VSH_OK);
+        expect_ok(vsh_shade_shadow(made, &points, &light, &options, NULL, lit, NULL, &stats, &failure));
         assert_true(stats.samples == 0 && stats.marches == 0 && stats.rays > 0);
-        assert_int_equal(vsh_trace_shadow(parts.triangles, NULL, POINTS, positions[0], normals[0], 1e-6,
-                                          &light, 4096, NULL, truth, &why),
-                         VSH_OK);
+        expect_ok(vsh_trace_shadow(parts.triangles, NULL, POINTS, positions[0], normals[0], 1e-6, &light,
+                                   4096, NULL, truth, &failure));
         double square = 0.0;
         int between_both = 0;
         for (int i = 0; i < POINTS; ++i) {
@@ -95,7 +91,7 @@ static void ao_by_rays_has_the_bits_that_it_has_with_voxels(void **state) {
     const vsh_points points = {POINTS, positions[0], normals[0], NULL};
     for (int voxels = 0; voxels < 2; ++voxels) {
         vsh_occluders *made = plate_of(voxels ? 64 : 0);
-        assert_int_equal(vsh_shade_ao(made, &points, NULL, NULL, ao[voxels], NULL, NULL, NULL, &why), VSH_OK);
+        expect_ok(vsh_shade_ao(made, &points, NULL, NULL, ao[voxels], NULL, NULL, NULL, &failure));
         vsh_occluders_free(made);
     }
     assert_memory_equal(ao[0], ao[1], sizeof ao[0]);
@@ -113,14 +109,15 @@ static void what_needs_voxels_is_refused_without_them(void **state) {
         vsh_shade_options options = vsh_shade_options_default();
         options.method = method;
         const bool traced = method >= VSH_SHADOW_EXACT;
-        assert_int_equal(vsh_shade_shadow(made, &points, &light, &options, NULL, &value, NULL, NULL, &why),
-                         traced ? VSH_OK : VSH_ERROR_ARGUMENT);
-        assert_true(traced || strstr(why.message, "have no voxels") != NULL);
+        assert_int_equal(
+            vsh_shade_shadow(made, &points, &light, &options, NULL, &value, NULL, NULL, &failure),
+            traced ? VSH_OK : VSH_ERROR_ARGUMENT);
+        assert_true(traced || strstr(failure.message, "have no voxels") != NULL);
     }
     for (int32_t method = VSH_AO_TAPS; method <= VSH_AO_AUTO; ++method) {
         vsh_shade_options options = vsh_shade_options_default();
         options.ao_method = method;
-        assert_int_equal(vsh_shade_ao(made, &points, &options, NULL, &value, NULL, NULL, NULL, &why),
+        assert_int_equal(vsh_shade_ao(made, &points, &options, NULL, &value, NULL, NULL, NULL, &failure),
                          method >= VSH_AO_EXACT ? VSH_OK : VSH_ERROR_ARGUMENT);
     }
     vsh_occluder_parts parts;
@@ -128,10 +125,11 @@ static void what_needs_voxels_is_refused_without_them(void **state) {
     vsh_field_sample(parts.field, 1, at, &value);
     assert_true(isnan(value));
     vsh_query *query = NULL;
-    assert_int_equal(vsh_query_create(made, &light, 1, NULL, &query, &why), VSH_OK);
+    expect_ok(vsh_query_create(made, &light, 1, NULL, &query, &failure));
     vsh_query_output output = vsh_query_output_default();
     output.distance = &value;
-    assert_int_equal(vsh_query_points(query, &points, NULL, NULL, &output, NULL, &why), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_query_points(query, &points, NULL, NULL, &output, NULL, &failure),
+                     VSH_ERROR_ARGUMENT);
     vsh_query_free(query);
     vsh_occluders_free(made);
 }
@@ -140,16 +138,16 @@ static void parts_of_triangles_alone_cast(void **state) {
     skip_without_embree();
     const vsh_mesh mesh = plate();
     vsh_triangles *triangles = NULL;
-    assert_int_equal(vsh_triangles_create(&mesh, 1, NULL, &triangles, &why), VSH_OK);
+    expect_ok(vsh_triangles_create(&mesh, 1, NULL, &triangles, &failure));
     vsh_occluder_parts parts = vsh_occluder_parts_default();
     parts.triangles = triangles;
     vsh_occluders *made = NULL;
-    assert_int_equal(vsh_occluders_from_parts(&parts, &made, &why), VSH_OK);
+    expect_ok(vsh_occluders_from_parts(&parts, &made, &failure));
     const double at[2][3] = {{0.0, 0.0, 0.0}, {3.0, 0.0, 0.0}};
     const vsh_points points = {2, at[0], NULL, NULL};
     const vsh_light light = vsh_light_default();
     float lit[2];
-    assert_int_equal(vsh_shade_shadow(made, &points, &light, NULL, NULL, lit, NULL, NULL, &why), VSH_OK);
+    expect_ok(vsh_shade_shadow(made, &points, &light, NULL, NULL, lit, NULL, NULL, &failure));
     assert_true(lit[0] == 0.0f && lit[1] == 1.0f);
     vsh_occluders_free(made);
     vsh_triangles_free(triangles);
@@ -167,8 +165,8 @@ static uint64_t shade_scene(bool layered, float lit[POINTS], float truth[POINTS]
     vsh_scene *scene = parse("/scene.json", text);
     vsh_assets *assets = NULL;
     vsh_occluders *made = NULL;
-    assert_int_equal(vsh_assets_load(scene, NULL, &assets, &why), VSH_OK);
-    assert_int_equal(vsh_scene_occluders(scene, assets, NULL, NULL, &made, &why), VSH_OK);
+    expect_ok(vsh_assets_load(scene, NULL, &assets, &failure));
+    expect_ok(vsh_scene_occluders(scene, assets, NULL, NULL, &made, &failure));
     vsh_occluders_info info;
     vsh_occluders_get_info(made, &info);
     assert_int_equal(info.layer_count, layered ? 1 : 0);
@@ -176,14 +174,12 @@ static uint64_t shade_scene(bool layered, float lit[POINTS], float truth[POINTS]
     float normals[POINTS][3];
     scatter(positions, normals);
     const vsh_points points = {POINTS, positions[0], normals[0], NULL};
-    assert_int_equal(vsh_shade_shadow(made, &points, &scene->lights[0], NULL, NULL, lit, NULL, NULL, &why),
-                     VSH_OK);
+    expect_ok(vsh_shade_shadow(made, &points, &scene->lights[0], NULL, NULL, lit, NULL, NULL, &failure));
     vsh_triangles *triangles = NULL;
     vsh_solids *solids = NULL;
-    assert_int_equal(vsh_scene_truth(scene, assets, NULL, &triangles, &solids, &why), VSH_OK);
-    assert_int_equal(vsh_trace_shadow(triangles, solids, POINTS, positions[0], normals[0], 1e-6,
-                                      &scene->lights[0], 1024, NULL, truth, &why),
-                     VSH_OK);
+    expect_ok(vsh_scene_truth(scene, assets, NULL, &triangles, &solids, &failure));
+    expect_ok(vsh_trace_shadow(triangles, solids, POINTS, positions[0], normals[0], 1e-6, &scene->lights[0],
+                               1024, NULL, truth, &failure));
     vsh_triangles_free(triangles);
     vsh_occluders_free(made);
     vsh_assets_free(assets);
@@ -214,7 +210,7 @@ static int32_t chosen(const char *more, const char *casters, double points) {
     snprintf(text, sizeof text, "{\"casters\": [%s], \"receivers\": []%s}", casters, more);
     vsh_scene *scene = parse("/scene.json", text);
     vsh_assets *assets = NULL;
-    assert_int_equal(vsh_assets_load(scene, NULL, &assets, &why), VSH_OK);
+    expect_ok(vsh_assets_load(scene, NULL, &assets, &failure));
     const int32_t resolution = vsh_scene_resolution(scene, assets, NULL, points);
     vsh_assets_free(assets);
     vsh_scene_free(scene);
