@@ -13,12 +13,6 @@ enum { ROWS = 8, WIDTH = 256, HEIGHT = 128, TEXELS = WIDTH * HEIGHT };
 
 static const double HAIR = 1e-5; /* above the facets, for truth */
 
-static void check(vsh_result result, const vsh_error *error) {
-    if (result != VSH_OK) {
-        fail_msg("%s", error->message);
-    }
-}
-
 /* A box without UVs: it casts only. */
 typedef struct box {
     float positions[24];
@@ -54,9 +48,9 @@ static void open_scene(scene *s, const box *other) {
     vsh_grid_options grid_options = vsh_grid_options_default();
     grid_options.resolution = 64;
     vsh_grid *grid = NULL;
-    check(vsh_grid_from_meshes(casters, count, &grid_options, NULL, &grid, &failure), &failure);
-    check(vsh_field_create(grid, NULL, NULL, &s->field, &failure), &failure);
-    check(vsh_triangles_create(casters, count, NULL, &s->triangles, &failure), &failure);
+    expect_ok(vsh_grid_from_meshes(casters, count, &grid_options, NULL, &grid, &failure));
+    expect_ok(vsh_field_create(grid, NULL, NULL, &s->field, &failure));
+    expect_ok(vsh_triangles_create(casters, count, NULL, &s->triangles, &failure));
     vsh_grid_free(grid);
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = WIDTH;
@@ -78,6 +72,17 @@ static void open_scene(scene *s, const box *other) {
     assert_int_equal(s->lifted.count, s->flat.count);
 }
 
+/* Beyond x = face. */
+static void open_beside_wall(scene *s, box *wall, double face) {
+    make_box(wall, (double[]){face, -2.0, -2.0}, (double[]){3.0, 2.0, 2.0});
+    open_scene(s, wall);
+}
+
+/* What was baked at a sample. */
+static float value_at(const scene *s, const float *plane, size_t sample) {
+    return plane[vsh_texel_place(s->lifted.texels[sample], WIDTH)];
+}
+
 static void close_scene(scene *s) {
     vsh_texels_free(s->facets);
     vsh_texels_free(s->texels);
@@ -88,9 +93,8 @@ static void close_scene(scene *s) {
 }
 
 static void bake(const scene *s, const vsh_light *lights, size_t light_count, const vsh_lightmap *planes) {
-    check(vsh_bake_lightmap(occluders_traced(s->field, s->triangles), s->charts, lights, light_count, NULL,
-                            NULL, planes, NULL, &failure),
-          &failure);
+    expect_ok(vsh_bake_lightmap(occluders_traced(s->field, s->triangles), s->charts, lights, light_count,
+                                NULL, NULL, planes, NULL, &failure));
 }
 
 static double dot(const float *a, const double *b) {
@@ -121,6 +125,7 @@ static double towards(const vsh_light *light, const double *from, double to[3]) 
 
 /* A bar over the sphere: its shadow is narrower than two of the lifts that would move it. */
 static void rays_to_a_light_well_above_a_facet_begin_on_it(void **state) {
+    static float shadow[TEXELS], truth[TEXELS], *const planes[1] = {shadow};
     box bar;
     make_box(&bar, (double[]){-0.03, 1.05, -1.0}, (double[]){0.0, 1.08, 1.0});
     scene s;
@@ -131,26 +136,20 @@ static void rays_to_a_light_well_above_a_facet_begin_on_it(void **state) {
     lights[1].position[1] = 2.5;
     lights[1].radius = 0.02;
     for (int l = 0; l < 2; ++l) {
-        const vsh_light *light = &lights[l];
-        float *shadow = calloc(TEXELS, sizeof *shadow), *truth = calloc(TEXELS, sizeof *truth);
-        bake(&s, light, 1, &(vsh_lightmap){.shadow = &shadow});
-        check(vsh_trace_shadow(s.triangles, NULL, s.flat.count, s.flat.positions, s.flat.geometric_normals,
-                               HAIR, light, 64, NULL, truth, &failure),
-              &failure);
+        bake(&s, &lights[l], 1, &(vsh_lightmap){.shadow = planes});
+        expect_ok(vsh_trace_shadow(s.triangles, NULL, s.flat.count, s.flat.positions,
+                                   s.flat.geometric_normals, HAIR, &lights[l], 64, NULL, truth, &failure));
         size_t hidden = 0, off = 0;
         for (size_t i = 0; i < s.flat.count; ++i) {
             double to[3];
-            towards(light, s.flat.positions + 3 * i, to);
-            if (dot(s.flat.geometric_normals + 3 * i, to) < 0.35) {
-                continue;
+            towards(&lights[l], s.flat.positions + 3 * i, to);
+            if (dot(s.flat.geometric_normals + 3 * i, to) >= 0.35) {
+                hidden += truth[i] < 0.5f;
+                off += fabsf(value_at(&s, shadow, i) - truth[i]) > 0.5f;
             }
-            hidden += truth[i] < 0.5f;
-            off += fabsf(shadow[vsh_texel_place(s.lifted.texels[i], WIDTH)] - truth[i]) > 0.5f;
         }
         assert_true(hidden > 100);
         assert_int_equal(off, 0);
-        free(truth);
-        free(shadow);
     }
     close_scene(&s);
 }
@@ -158,6 +157,7 @@ static void rays_to_a_light_well_above_a_facet_begin_on_it(void **state) {
 /* A light of 11.5° each way, near and far. */
 static void facets_do_not_hide_a_light_that_is_over_the_smooth_sphere(void **state) {
     static const double SINE = 0.2;
+    static float shadow[TEXELS], *const planes[1] = {shadow};
     scene s;
     open_scene(&s, NULL);
     vsh_light lights[2] = {sun_towards(1.0, 0.3, 0.2), sun_towards(1.0, 0.3, 0.2)};
@@ -167,28 +167,24 @@ static void facets_do_not_hide_a_light_that_is_over_the_smooth_sphere(void **sta
     lights[1].position[1] = 1.0;
     lights[1].radius = SINE * 4.5;
     for (int l = 0; l < 2; ++l) {
-        const vsh_light *light = &lights[l];
-        float *shadow = calloc(TEXELS, sizeof *shadow);
-        bake(&s, light, 1, &(vsh_lightmap){.shadow = &shadow});
+        bake(&s, &lights[l], 1, &(vsh_lightmap){.shadow = planes});
         size_t cut = 0, dark = 0;
         for (size_t i = 0; i < s.flat.count; ++i) {
             double to[3];
-            const double length = towards(light, s.flat.positions + 3 * i, to);
-            const double sine = l == 0 ? SINE : light->radius / length;
+            const double length = towards(&lights[l], s.flat.positions + 3 * i, to);
+            const double sine = l == 0 ? SINE : lights[l].radius / length;
             if (dot(s.flat.geometric_normals + 3 * i, to) < sine &&
                 dot(s.lifted.normals + 3 * i, to) > sine + 0.02) {
                 ++cut;
-                dark += shadow[vsh_texel_place(s.lifted.texels[i], WIDTH)] < 0.95f;
+                dark += value_at(&s, shadow, i) < 0.95f;
             }
         }
         assert_true(cut > 200);
         assert_int_equal(dark, 0);
-        free(shadow);
     }
     close_scene(&s);
 }
 
-/* A box whose face cuts the sphere: between the facets and the smooth sphere, near the cut. */
 /* Its light is the cosine of the smooth normal, from where the light stands over the horizon. */
 static void pictures_show_no_facets_where_light_grazes_a_smooth_sphere(void **state) {
     enum { SIZE = 64 };
@@ -206,9 +202,8 @@ static void pictures_show_no_facets_where_light_grazes_a_smooth_sphere(void **st
     options.shade.method = VSH_SHADOW_EXACT;
     options.lit = &lit;
     options.lit_count = 1;
-    check(vsh_render(NULL, 0, occluders_traced(s.field, s.triangles), &light, 1, &options, NULL,
-                     &(vsh_picture){color, alpha, depth, normal}, NULL, &failure),
-          &failure);
+    expect_ok(vsh_render(NULL, 0, occluders_traced(s.field, s.triangles), &light, 1, &options, NULL,
+                         &(vsh_picture){color, alpha, depth, normal}, NULL, &failure));
     size_t near = 0, dark = 0;
     for (size_t i = 0; i < SIZE * SIZE; ++i) {
         const float cosine = (float)dot(normal + 3 * i, light.direction);
@@ -222,64 +217,55 @@ static void pictures_show_no_facets_where_light_grazes_a_smooth_sphere(void **st
     close_scene(&s);
 }
 
+/* A box whose face cuts the sphere: between the facets and the smooth sphere, near the cut. */
 static void samples_are_valid_by_where_their_facets_are(void **state) {
     static const double FACE = 0.953, CLEAR = 1e-4;
+    static float ao[TEXELS], coverage[TEXELS];
     box wall;
-    make_box(&wall, (double[]){FACE, -2.0, -2.0}, (double[]){3.0, 2.0, 2.0});
     scene s;
-    open_scene(&s, &wall);
-    float *ao = calloc(TEXELS, sizeof *ao), *coverage = calloc(TEXELS, sizeof *coverage);
+    open_beside_wall(&s, &wall, FACE);
     bake(&s, NULL, 0, &(vsh_lightmap){.ao = ao, .coverage = coverage});
     size_t between = 0, wrong = 0;
     for (size_t i = 0; i < s.flat.count; ++i) {
         const double x = s.flat.positions[3 * i];
-        const bool valid = coverage[vsh_texel_place(s.lifted.texels[i], WIDTH)] == 1.0f;
+        const bool valid = value_at(&s, coverage, i) == 1.0f;
         between += x < FACE && s.lifted.positions[3 * i] > FACE;
         wrong += fabs(x - FACE) > CLEAR && valid != (x < FACE);
     }
     assert_true(between > 50);
     assert_int_equal(wrong, 0);
-    free(coverage);
-    free(ao);
     close_scene(&s);
 }
 
 /* A box just beyond the smooth sphere. */
 static void ao_close_to_a_wall_is_that_of_the_facets(void **state) {
     static const double FACE = 1.018;
-    box over;
-    make_box(&over, (double[]){FACE, -2.0, -2.0}, (double[]){3.0, 2.0, 2.0});
+    static float ao[TEXELS], truth[TEXELS];
+    box wall;
     scene s;
-    open_scene(&s, &over);
-    float *ao = calloc(TEXELS, sizeof *ao), *truth = calloc(TEXELS, sizeof *truth);
+    open_beside_wall(&s, &wall, FACE);
     bake(&s, NULL, 0, &(vsh_lightmap){.ao = ao});
-    check(vsh_trace_ao(s.triangles, NULL, s.flat.count, s.flat.positions, s.lifted.normals, HAIR, 0.1, 256,
-                       NULL, truth, &failure),
-          &failure);
+    expect_ok(vsh_trace_ao(s.triangles, NULL, s.flat.count, s.flat.positions, s.lifted.normals, HAIR, 0.1,
+                           256, NULL, truth, &failure));
     size_t under = 0;
-    double worst = 0.0;
     for (size_t i = 0; i < s.flat.count; ++i) {
         if (FACE - s.flat.positions[3 * i] < 0.045) {
             ++under;
-            worst = fmax(worst, fabs((double)(ao[vsh_texel_place(s.lifted.texels[i], WIDTH)] - truth[i])));
+            assert_true(fabs((double)(value_at(&s, ao, i) - truth[i])) < 0.1);
         }
     }
     assert_true(under > 50);
-    assert_true(worst < 0.1);
-    free(truth);
-    free(ao);
     close_scene(&s);
 }
 
 static void ao_of_a_smooth_convex_body_in_the_open_is_1(void **state) {
+    static float ao[TEXELS];
     scene s;
     open_scene(&s, NULL);
-    float *ao = calloc(TEXELS, sizeof *ao);
     bake(&s, NULL, 0, &(vsh_lightmap){.ao = ao});
     for (size_t i = 0; i < s.flat.count; ++i) {
-        assert_true(ao[vsh_texel_place(s.lifted.texels[i], WIDTH)] == 1.0f);
+        assert_true(value_at(&s, ao, i) == 1.0f);
     }
-    free(ao);
     close_scene(&s);
 }
 
@@ -290,8 +276,7 @@ static void queries_take_the_normals_of_faces_for_ao(void **state) {
     options.ao_method = VSH_AO_EXACT;
     options.ao_distance = 0.1;
     vsh_query *query = NULL;
-    check(vsh_query_create(occluders_traced(s.field, s.triangles), NULL, 0, &options, &query, &failure),
-          &failure);
+    expect_ok(vsh_query_create(occluders_traced(s.field, s.triangles), NULL, 0, &options, &query, &failure));
     float *ao = calloc(s.flat.count, sizeof *ao);
     vsh_query_output output = vsh_query_output_default();
     output.ao = ao;
@@ -302,7 +287,7 @@ static void queries_take_the_normals_of_faces_for_ao(void **state) {
         for (int faces = 0; faces < 2; ++faces) {
             const vsh_points points = {counts[k], s.flat.positions, s.lifted.normals, NULL};
             layout.face_normals = faces ? s.flat.geometric_normals : NULL;
-            check(vsh_query_points(query, &points, &layout, NULL, &output, NULL, &failure), &failure);
+            expect_ok(vsh_query_points(query, &points, &layout, NULL, &output, NULL, &failure));
             for (size_t i = 0; i < counts[k]; ++i) {
                 dark[faces] += ao[i] < 1.0f;
             }
@@ -325,11 +310,11 @@ static double mean_ao_between_walls(const float *normals) {
     make_box(&walls[1], (double[]){0.2, 0.0, -0.1}, (double[]){0.3, 3.0, 0.1});
     const vsh_mesh casters[3] = {strip.mesh, walls[0].mesh, walls[1].mesh};
     vsh_triangles *triangles = NULL;
-    check(vsh_triangles_create(casters, 3, NULL, &triangles, &failure), &failure);
+    expect_ok(vsh_triangles_create(casters, 3, NULL, &triangles, &failure));
     vsh_occluder_parts parts = vsh_occluder_parts_default();
     parts.triangles = triangles;
     vsh_occluders *occluders = NULL;
-    check(vsh_occluders_from_parts(&parts, &occluders, &failure), &failure);
+    expect_ok(vsh_occluders_from_parts(&parts, &occluders, &failure));
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = 128;
     options.padding = 0;
@@ -339,7 +324,7 @@ static double mean_ao_between_walls(const float *normals) {
     vsh_charts *charts = create(&strip.mesh, 1, options, NULL);
     static float ao[128 * 128], coverage[128 * 128];
     const vsh_lightmap planes = {.ao = ao, .coverage = coverage};
-    check(vsh_bake_lightmap(occluders, charts, NULL, 0, NULL, NULL, &planes, NULL, &failure), &failure);
+    expect_ok(vsh_bake_lightmap(occluders, charts, NULL, 0, NULL, NULL, &planes, NULL, &failure));
     double sum = 0.0, count = 0.0;
     for (size_t i = 0; i < 128 * 128; ++i) {
         sum += coverage[i] > 0.0f ? (double)ao[i] : 0.0;
@@ -403,21 +388,16 @@ static void a_lift_fades_as_neighbours_come_near(void **state) {
 }
 
 static void a_light_changes_nothing_for_other_lights_and_ao(void **state) {
+    static float values[5][TEXELS];
+    float *const planes[5] = {values[0], values[1], values[2], values[3], values[4]};
     scene s;
     open_scene(&s, NULL);
     const vsh_light lights[2] = {sun_towards(0.0, 1.0, 0.0), sun_towards(1.0, 0.0, 0.0)};
-    float *planes[5];
-    for (int k = 0; k < 5; ++k) {
-        planes[k] = calloc(TEXELS, sizeof *planes[k]);
-    }
     bake(&s, lights, 2, &(vsh_lightmap){.shadow = planes, .ao = planes[2]});
     bake(&s, lights + 1, 1, &(vsh_lightmap){.shadow = planes + 3});
     bake(&s, NULL, 0, &(vsh_lightmap){.ao = planes[4]});
-    assert_memory_equal(planes[1], planes[3], TEXELS * sizeof(float));
-    assert_memory_equal(planes[2], planes[4], TEXELS * sizeof(float));
-    for (int k = 0; k < 5; ++k) {
-        free(planes[k]);
-    }
+    assert_memory_equal(planes[1], planes[3], sizeof values[1]);
+    assert_memory_equal(planes[2], planes[4], sizeof values[2]);
     close_scene(&s);
 }
 
