@@ -1,7 +1,6 @@
 /* AO of what is over a horizon: the share of those directions that is free. */
 #include "expect.h"
-#include "previews.h"
-#include "shading.h"
+#include "traced.h"
 
 #include "truth/directions.h"
 
@@ -16,40 +15,17 @@ static const truth_solid SCENE[SOLIDS] = {{TRUTH_BOX, {0.0, -0.5, 0.0}, {3.0, 0.
 static const double FAR = 20.0;
 
 typedef struct stage {
-    vsh_field *field;
-    vsh_triangles *triangles;
+    caster c;
     double positions[3 * POINTS];
     float normals[3 * POINTS];
     float values[POINTS], truth[POINTS];
 } stage;
 
-static vsh_triangles *triangles_of(const truth_solid *solids, size_t count) {
-    static const uint32_t indices[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
-                                         2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
-    float corners[SOLIDS][24];
-    vsh_mesh meshes[SOLIDS];
-    for (size_t i = 0; i < count; ++i) {
-        for (size_t k = 0; k < 24; ++k) {
-            const size_t axis = k % 3;
-            const double half = solids[i].half[axis];
-            corners[i][k] = (float)(solids[i].center[axis] + ((k / 3) >> axis & 1 ? half : -half));
-        }
-        meshes[i] =
-            (vsh_mesh){.positions = corners[i], .indices = indices, .vertex_count = 8, .triangle_count = 12};
-    }
-    vsh_triangles *triangles = NULL;
-    if (vsh_triangles_available()) {
-        assert_int_equal(vsh_triangles_create(meshes, count, NULL, &triangles, NULL), VSH_OK);
-    }
-    return triangles;
-}
-
 /* Points a little off everything, their normals to all sides. */
 static stage *set_up(void) {
     stage *s = calloc(1, sizeof *s);
     const truth_scene scene = {SCENE, SOLIDS};
-    s->field = field_of(scene, 0.04, 4.0);
-    s->triangles = triangles_of(SCENE, SOLIDS);
+    s->c = caster_of(scene, 0.04, 4.0);
     uint64_t counter = 5;
     for (size_t i = 0; i < POINTS;) {
         double *p = s->positions + 3 * i, normal[3];
@@ -66,8 +42,7 @@ static stage *set_up(void) {
 }
 
 static void tear_down(stage *s) {
-    vsh_triangles_free(s->triangles);
-    vsh_field_free(s->field);
+    caster_free(&s->c);
     free(s);
 }
 
@@ -75,7 +50,7 @@ static double whole(const float *normal, const double up[3]) {
     return 0.5 * (1.0 + (double)normal[0] * up[0] + (double)normal[1] * up[1] + (double)normal[2] * up[2]);
 }
 
-static vsh_result shade(const stage *s, int32_t method, const double up[3], float *values, vsh_error *error) {
+static vsh_result shade(const stage *s, int32_t method, const double up[3], float *values) {
     vsh_shade_options options = vsh_shade_options_default();
     options.ao_method = method;
     options.ao_distance = FAR;
@@ -85,8 +60,8 @@ static vsh_result shade(const stage *s, int32_t method, const double up[3], floa
         options.ao_up[k] = 3.0 * up[k]; /* of any length */
     }
     const vsh_points points = {POINTS, s->positions, s->normals, NULL};
-    return vsh_shade_ao(occluders_traced(s->field, s->triangles), &points, &options, NULL, values, NULL, NULL,
-                        NULL, error);
+    return vsh_shade_ao(occluders_of_caster(&s->c), &points, &options, NULL, values, NULL, NULL, NULL,
+                        &failure);
 }
 
 static void find_truth(stage *s, const double up[3]) {
@@ -113,8 +88,8 @@ static void shares_of_what_is_over_a_horizon_are_the_rays(void **state) {
     stage *s = set_up();
     for (int u = 0; u < 2; ++u) {
         find_truth(s, ups[u]);
-        for (int m = 0; m < (s->triangles != NULL ? 3 : 2); ++m) {
-            expect_ok(shade(s, methods[m], ups[u], s->values, &failure));
+        for (int m = 0; m < (s->c.triangles != NULL ? 3 : 2); ++m) {
+            expect_ok(shade(s, methods[m], ups[u], s->values));
             double square = 0.0, mean = 0.0;
             for (size_t i = 0; i < POINTS; ++i) {
                 const double off =
@@ -135,19 +110,19 @@ static void what_knows_no_horizon_says_so(void **state) {
     stage *s = set_up();
     static const int32_t methods[] = {VSH_AO_TAPS, VSH_AO_CONES};
     for (int m = 0; m < 2; ++m) {
-        expect_error(shade(s, methods[m], up, s->values, &failure), VSH_ERROR_ARGUMENT, "over a horizon");
+        expect_error(shade(s, methods[m], up, s->values), VSH_ERROR_ARGUMENT, "over a horizon");
     }
     vsh_shade_options options = vsh_shade_options_default();
     options.ao_method = VSH_AO_ADAPTIVE;
     options.ao_up[2] = NAN;
     const vsh_points points = {POINTS, s->positions, s->normals, NULL};
     assert_int_equal(
-        vsh_shade_ao(occluders_of(s->field), &points, &options, NULL, s->values, NULL, NULL, NULL, NULL),
+        vsh_shade_ao(occluders_of_caster(&s->c), &points, &options, NULL, s->values, NULL, NULL, NULL, NULL),
         VSH_ERROR_ARGUMENT);
     options.ao_up[2] = 1.0;
     static float bent[3 * POINTS];
     assert_int_equal(
-        vsh_shade_ao(occluders_of(s->field), &points, &options, NULL, s->values, NULL, bent, NULL, NULL),
+        vsh_shade_ao(occluders_of_caster(&s->c), &points, &options, NULL, s->values, NULL, bent, NULL, NULL),
         VSH_ERROR_ARGUMENT);
     tear_down(s);
 }

@@ -54,19 +54,15 @@ static void overlapping_squares_are_one_area(void **state) {
     vsh_outline_free(b);
 }
 
-static void squares_that_share_an_edge_are_one_area(void **state) {
-    const double points[16] = {0, 0, 1, 0, 1, 1, 0, 1, 1, 0.25, 2, 0.25, 2, 0.75, 1, 0.75};
-    const size_t counts[2] = {4, 4};
-    vsh_outline *both = polygons(points, counts, 2);
+static void contours_that_share_an_edge_are_one_area_and_those_the_other_way_holes(void **state) {
+    static const size_t counts[3] = {4, 4, 4};
+    const double beside[16] = {0, 0, 1, 0, 1, 1, 0, 1, 1, 0.25, 2, 0.25, 2, 0.75, 1, 0.75};
+    vsh_outline *both = polygons(beside, counts, 2);
     assert_true(fabs(info_of(both).area - 1.5) < 1e-14);
     assert_true(fabs(vsh_outline_distance(both, (const double[]){1.0, 0.5}) + 0.25) < 1e-14);
     vsh_outline_free(both);
-}
-
-static void a_contour_the_other_way_is_a_hole(void **state) {
     const double points[24] = {0, 0, 4, 0, 4,   4,   0,   4,   1,   1,   1,   3,
                                3, 3, 3, 1, 1.5, 1.5, 2.5, 1.5, 2.5, 2.5, 1.5, 2.5};
-    const size_t counts[3] = {4, 4, 4};
     vsh_outline *island = polygons(points, counts, 3);
     assert_true(fabs(info_of(island).area - 13.0) < 1e-14);
     assert_true(vsh_outline_distance(island, (const double[]){1.2, 2.0}) > 0.0);
@@ -254,68 +250,65 @@ static void curves_are_followed(void **state) {
 }
 
 static void bad_text_is_refused(void **state) {
-    vsh_outline *outline = NULL;
+    const vsh_text_options good = vsh_text_options_default();
+    vsh_text_options no_height = good, no_align = good, no_spacing = good;
+    no_height.height = NAN;
+    no_align.align = 3;
+    no_spacing.line_spacing = 0.0;
+    vsh_run run = vsh_run_default();
+    run.memory_limit = 1 << 20;
+    static char huge[(1 << 20) + 2], large[10001];
+    memset(huge, 'o', sizeof huge - 1);
+    memset(large, 'o', sizeof large - 1);
     const struct {
-        const char *text;
-        const char *font;
+        const char *text, *font;
+        const vsh_text_options *options;
+        const vsh_run *run;
         vsh_result result;
         const char *part;
-    } cases[] = {{"", FONT, VSH_ERROR_INPUT, "empty"},
-                 {"a\tb", FONT, VSH_ERROR_INPUT, "U+0009, at byte 1"},
-                 {"a\rb", FONT, VSH_ERROR_INPUT, "U+000D"},
-                 {"\xc3", FONT, VSH_ERROR_INPUT, "no UTF-8 at byte 0"},
-                 {"ab\xff", FONT, VSH_ERROR_INPUT, "no UTF-8 at byte 2"},
-                 {"\xed\xa0\x80", FONT, VSH_ERROR_INPUT, "no UTF-8"},
-                 {"\xc0\xaf", FONT, VSH_ERROR_INPUT, "no UTF-8"},
-                 {"\xf4\x90\x80\x80", FONT, VSH_ERROR_INPUT, "no UTF-8"},
-                 {"  \n ", FONT, VSH_ERROR_INPUT, "no outline"},
-                 {"\xe5\xad\x97", FONT, VSH_ERROR_INPUT, "no letter for U+5B57"},
-                 {"a", "none.ttf", VSH_ERROR_READ, "none.ttf"},
-                 {"a", ".", VSH_ERROR_READ, "."},
-                 {"a", VSH_ASSETS "/seeds.json", VSH_ERROR_INPUT, "no font"}};
+    } cases[] = {{"", FONT, NULL, NULL, VSH_ERROR_INPUT, "empty"},
+                 {"a\tb", FONT, NULL, NULL, VSH_ERROR_INPUT, "U+0009, at byte 1"},
+                 {"a\rb", FONT, NULL, NULL, VSH_ERROR_INPUT, "U+000D"},
+                 {"\xc3", FONT, NULL, NULL, VSH_ERROR_INPUT, "no UTF-8 at byte 0"},
+                 {"ab\xff", FONT, NULL, NULL, VSH_ERROR_INPUT, "no UTF-8 at byte 2"},
+                 {"\xed\xa0\x80", FONT, NULL, NULL, VSH_ERROR_INPUT, "no UTF-8"},
+                 {"\xc0\xaf", FONT, NULL, NULL, VSH_ERROR_INPUT, "no UTF-8"},
+                 {"\xf4\x90\x80\x80", FONT, NULL, NULL, VSH_ERROR_INPUT, "no UTF-8"},
+                 {"  \n ", FONT, NULL, NULL, VSH_ERROR_INPUT, "no outline"},
+                 {"\xe5\xad\x97", FONT, NULL, NULL, VSH_ERROR_INPUT, "no letter for U+5B57"},
+                 {"a", "none.ttf", NULL, NULL, VSH_ERROR_READ, "none.ttf"},
+                 {"a", ".", NULL, NULL, VSH_ERROR_READ, "."},
+                 {"a", VSH_ASSETS "/seeds.json", NULL, NULL, VSH_ERROR_INPUT, "no font"},
+                 {"a", FONT, &no_height, NULL, VSH_ERROR_ARGUMENT, "height"},
+                 {"a", FONT, &no_align, NULL, VSH_ERROR_ARGUMENT, "align"},
+                 {"a", FONT, &no_spacing, NULL, VSH_ERROR_ARGUMENT, "line_spacing"},
+                 {huge, FONT, NULL, NULL, VSH_ERROR_LIMIT, "bytes"},
+                 {large, FONT, NULL, &run, VSH_ERROR_LIMIT, "limit"}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-        assert_fails(vsh_outline_from_text(cases[i].text, cases[i].font, NULL, NULL, &outline, &failure),
+        vsh_outline *outline = NULL;
+        assert_fails(vsh_outline_from_text(cases[i].text, cases[i].font, cases[i].options, cases[i].run,
+                                           &outline, &failure),
                      cases[i].result, cases[i].part);
         assert_null(outline);
     }
-    vsh_text_options options = vsh_text_options_default();
-    options.height = NAN;
-    assert_fails(vsh_outline_from_text("a", FONT, &options, NULL, &outline, &failure), VSH_ERROR_ARGUMENT,
-                 "height");
-    options.height = 1.0;
-    options.align = 3;
-    assert_fails(vsh_outline_from_text("a", FONT, &options, NULL, &outline, &failure), VSH_ERROR_ARGUMENT,
-                 "align");
-    options.align = 0;
-    options.line_spacing = 0.0;
-    assert_fails(vsh_outline_from_text("a", FONT, &options, NULL, &outline, &failure), VSH_ERROR_ARGUMENT,
-                 "line_spacing");
-    char *huge = calloc(1, (1 << 20) + 2);
-    memset(huge, 'o', (1 << 20) + 1);
-    assert_fails(vsh_outline_from_text(huge, FONT, NULL, NULL, &outline, &failure), VSH_ERROR_LIMIT, "bytes");
-    vsh_run run = vsh_run_default();
-    run.memory_limit = 1 << 20;
-    huge[10000] = '\0';
-    assert_fails(vsh_outline_from_text(huge, FONT, NULL, &run, &outline, &failure), VSH_ERROR_LIMIT, "limit");
-    free(huge);
 }
 
 static void bad_polygons_are_refused(void **state) {
-    vsh_outline *outline = NULL;
-    const double line[8] = {0, 0, 1, 0, 2, 0, 3, 0}, bad[6] = {0, 0, 1, NAN, 0, 1},
-                 far[6] = {0, 0, 1e16, 0, 0, 1};
-    const size_t four = 4, three = 3, two = 2;
-    assert_fails(vsh_outline_from_polygons(line, &four, 1, NULL, &outline, &failure), VSH_ERROR_INPUT,
-                 "no outline");
-    assert_fails(vsh_outline_from_polygons(line, &two, 1, NULL, &outline, &failure), VSH_ERROR_INPUT,
-                 "no outline");
-    assert_fails(vsh_outline_from_polygons(bad, &three, 1, NULL, &outline, &failure), VSH_ERROR_INPUT, "nan");
-    assert_fails(vsh_outline_from_polygons(far, &three, 1, NULL, &outline, &failure), VSH_ERROR_INPUT,
-                 "1e+16");
+    static const struct {
+        double points[8];
+        size_t count;
+        const char *part;
+    } cases[] = {{{0, 0, 1, 0, 2, 0, 3, 0}, 4, "no outline"},
+                 {{0, 0, 1, 0, 2, 0, 3, 0}, 2, "no outline"},
+                 {{0, 0, 1, NAN, 0, 1}, 3, "nan"},
+                 {{0, 0, 1e16, 0, 0, 1}, 3, "1e+16"}};
+    vsh_outline *outline = NULL, *square = box(0, 0, 1, 1);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        assert_fails(vsh_outline_from_polygons(cases[i].points, &cases[i].count, 1, NULL, &outline, &failure),
+                     VSH_ERROR_INPUT, cases[i].part);
+    }
     assert_fails(vsh_outline_unite(NULL, 0, NULL, &outline, &failure), VSH_ERROR_ARGUMENT, "no instances");
-    vsh_outline *square = box(0, 0, 1, 1);
-    const double flat[6] = {1, 1, 0, 1, 1, 0};
-    const vsh_outline_instance instance = {square, flat};
+    const vsh_outline_instance instance = {square, (const double[6]){1, 1, 0, 1, 1, 0}};
     assert_fails(vsh_outline_unite(&instance, 1, NULL, &outline, &failure), VSH_ERROR_ARGUMENT, "flattens");
     vsh_outline_free(square);
     vsh_outline_free(NULL);
@@ -326,8 +319,7 @@ int main(void) {
         cmocka_unit_test(a_square_s_distance),
         cmocka_unit_test(the_tree_finds_what_looking_at_all_finds),
         cmocka_unit_test(overlapping_squares_are_one_area),
-        cmocka_unit_test(squares_that_share_an_edge_are_one_area),
-        cmocka_unit_test(a_contour_the_other_way_is_a_hole),
+        cmocka_unit_test(contours_that_share_an_edge_are_one_area_and_those_the_other_way_holes),
         cmocka_unit_test(a_pentagram_is_filled),
         cmocka_unit_test(many_overlaps_leave_the_union),
         cmocka_unit_test(letters_have_the_font_s_measures),
