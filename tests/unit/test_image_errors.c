@@ -1,4 +1,5 @@
-/* Images that cannot be written or read: what is refused, what is left behind, damaged files. */
+/* Images that cannot be written or read: what is refused, what is left behind, damaged files; files that are
+ * put in place together, or not at all. */
 #include "expect.h"
 #include "images.h"
 
@@ -298,6 +299,86 @@ static void no_temporary_is_left(void **state) {
     closedir(directory);
 }
 
+/* --- files that belong together */
+
+enum { COUNT = 3 };
+
+static const char *const together[COUNT] = {"one.bin", "two.png", "three.gltf"};
+
+static void put_text(const char *path, const char *text) {
+    write_all(path, (const unsigned char *)text, strlen(text));
+}
+
+static void expect_text(const char *name, const char *text) {
+    char found[16] = "";
+    FILE *file = fopen(at(name), "rb");
+    if (text == NULL) {
+        assert_null(file);
+        return;
+    }
+    assert_non_null(file);
+    found[fread(found, 1, sizeof found - 1, file)] = '\0';
+    fclose(file);
+    assert_string_equal(found, text);
+}
+
+static size_t entries(void) {
+    DIR *directory = opendir(folder);
+    assert_non_null(directory);
+    size_t count = 0;
+    while (readdir(directory) != NULL) {
+        ++count;
+    }
+    closedir(directory);
+    return count;
+}
+
+static void begin(vshi_output *outputs, vshi_output **list) {
+    for (size_t i = 0; i < COUNT; ++i) {
+        expect_ok(vshi_output_begin(&outputs[i], at(together[i]), &failure));
+        put_text(outputs[i].temporary, "new");
+        list[i] = &outputs[i];
+    }
+}
+
+static void all_are_in_place_in_the_end(void **state) {
+    vshi_output outputs[COUNT], *list[COUNT];
+    const size_t before = entries();
+    put_text(at(together[1]), "old");
+    begin(outputs, list);
+    expect_ok(vshi_outputs_commit(list, COUNT, &failure));
+    for (size_t i = 0; i < COUNT; ++i) {
+        expect_text(together[i], "new");
+    }
+    assert_int_equal(entries(), before + COUNT);
+    for (size_t i = 0; i < COUNT; ++i) {
+        unlink(at(together[i]));
+    }
+}
+
+/* A folder that came into the way of each in turn, as nothing but a file can be replaced. */
+static void one_that_fails_leaves_all_as_they_were(void **state) {
+    const size_t before = entries();
+    for (size_t failing = 0; failing < COUNT; ++failing) {
+        vshi_output outputs[COUNT], *list[COUNT];
+        put_text(at(together[1]), "old");
+        if (failing == 1) {
+            unlink(at(together[1]));
+        }
+        begin(outputs, list);
+        assert_int_equal(mkdir(at(together[failing]), 0777), 0);
+        expect_error(vshi_outputs_commit(list, COUNT, &failure), VSH_ERROR_WRITE, "");
+        assert_non_null(strstr(failure.message, together[failing]));
+        assert_non_null(strstr(failure.message, "could not be put in place"));
+        assert_int_equal(rmdir(at(together[failing])), 0);
+        for (size_t i = 0; i < COUNT; ++i) {
+            expect_text(together[i], i == 1 && failing != 1 ? "old" : NULL);
+        }
+        unlink(at(together[1]));
+        assert_int_equal(entries(), before);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bad_packs_are_refused_by_part),
@@ -311,6 +392,8 @@ int main(void) {
         cmocka_unit_test(a_written_file_follows_links_and_keeps_its_mode),
         cmocka_unit_test(outputs_are_made_beside_the_target_and_keep_its_ending),
         cmocka_unit_test(no_temporary_is_left),
+        cmocka_unit_test(all_are_in_place_in_the_end),
+        cmocka_unit_test(one_that_fails_leaves_all_as_they_were),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

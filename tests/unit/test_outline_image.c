@@ -155,36 +155,36 @@ static void channels_are_chosen(void **state) {
 }
 
 static void bad_images_are_refused(void **state) {
+    enum { SIZE = 300 };
+    static const struct {
+        float pixel; /* (0, 1) */
+        const char *channel;
+        double width, threshold;
+        vsh_result code;
+        const char *part;
+    } cases[] = {{0.0f, NULL, 1.0, 0.5, VSH_ERROR_INPUT, "no outline"},
+                 {0.0f, "alpha", 1.0, 0.5, VSH_ERROR_INPUT, "no channel 'alpha'; it has Y"},
+                 {0.0f, NULL, 0.0, 0.5, VSH_ERROR_ARGUMENT, "width"},
+                 {0.0f, NULL, -1.0, 0.5, VSH_ERROR_ARGUMENT, "width"},
+                 {0.0f, NULL, NAN, 0.5, VSH_ERROR_ARGUMENT, "width"},
+                 {0.0f, NULL, INFINITY, 0.5, VSH_ERROR_ARGUMENT, "width"},
+                 {0.0f, NULL, 1e16, 0.5, VSH_ERROR_ARGUMENT, "width"},
+                 {0.0f, NULL, 1.0, NAN, VSH_ERROR_ARGUMENT, "threshold"},
+                 {NAN, NULL, 1.0, 0.5, VSH_ERROR_INPUT, "pixel (0, 1)"}};
     vsh_outline *outline = NULL;
-    float plane[4] = {0, 0, 0, 0};
-    write_mask(2, 2, plane);
     vsh_mask_options options = vsh_mask_options_default();
-    assert_fails(vsh_outline_from_image(image_path, &options, NULL, &outline, &failure), VSH_ERROR_INPUT,
-                 "no outline");
-    assert_null(outline);
-    options.channel = "alpha";
-    assert_fails(vsh_outline_from_image(image_path, &options, NULL, &outline, &failure), VSH_ERROR_INPUT,
-                 "no channel 'alpha'; it has Y");
-    options.channel = NULL;
-    const double sizes[] = {0.0, -1.0, NAN, INFINITY, 1e16};
-    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; ++i) {
-        options.width = sizes[i];
-        assert_fails(vsh_outline_from_image(image_path, &options, NULL, &outline, &failure),
-                     VSH_ERROR_ARGUMENT, "width");
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        write_mask(2, 2, (const float[4]){0, 0, cases[i].pixel, 0});
+        options.channel = cases[i].channel;
+        options.width = cases[i].width;
+        options.threshold = cases[i].threshold;
+        assert_fails(vsh_outline_from_image(image_path, &options, NULL, &outline, &failure), cases[i].code,
+                     cases[i].part);
+        assert_null(outline);
     }
-    options.width = 1.0;
-    options.threshold = NAN;
-    assert_fails(vsh_outline_from_image(image_path, &options, NULL, &outline, &failure), VSH_ERROR_ARGUMENT,
-                 "threshold");
-    options.threshold = 0.5;
-    plane[2] = NAN;
-    write_mask(2, 2, plane);
-    assert_fails(vsh_outline_from_image(image_path, &options, NULL, &outline, &failure), VSH_ERROR_INPUT,
-                 "pixel (0, 1)");
     assert_fails(vsh_outline_from_image("none.png", &options, NULL, &outline, &failure), VSH_ERROR_READ,
                  "none.png");
     assert_fails(vsh_outline_from_image(".", &options, NULL, &outline, &failure), VSH_ERROR_READ, "folder");
-    enum { SIZE = 300 };
     static float noise[SIZE * SIZE];
     for (int i = 0; i < SIZE * SIZE; ++i) {
         noise[i] = (float)any((uint64_t)i);

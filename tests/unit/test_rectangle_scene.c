@@ -3,6 +3,8 @@
 #include "expect.h"
 #include "rectangles.h"
 
+#include <stdio.h>
+
 static void the_horizon_cuts_it_by_solid_angle(void **state) {
     vsh_field *nothing = NULL;
     assert_int_equal(vshi_field_create_empty(0.1, &nothing, NULL), VSH_OK);
@@ -117,39 +119,36 @@ static void irradiance_has_the_cosine_at_which_it_shines(void **state) {
     assert_true(isfinite(red_at(&light, here)));
 }
 
-static void refuses(const vsh_light *light, const char *message) {
-    expect_error(vsh_light_check(light, &failure), VSH_ERROR_ARGUMENT, "");
-    assert_string_equal(failure.message, message);
-}
-
 static void what_is_no_rectangle_is_refused(void **state) {
-    vsh_light light = light_of(0);
-    assert_int_equal(vsh_light_check(&light, NULL), VSH_OK);
-    memset(light.edge_u, 0, sizeof light.edge_u);
-    refuses(&light, "light 'panel': edge_u (0, 0, 0): expected a length over 0");
-    light.edge_u[0] = 1e-20;
-    refuses(&light, "light 'panel': edge_u has the length 1e-20, out of range 1e-15 … 1e+15");
-    light = light_of(0);
-    light.edge_v[2] = 1e200;
-    refuses(&light, "light 'panel': edge_v has the length inf, out of range 1e-15 … 1e+15");
-    light = light_of(0);
-    light.edge_v[1] = NAN;
-    refuses(&light, "light 'panel': edge_v[1] nan is out of range -inf (excluded) … inf (excluded)");
-    light = light_of(0);
-    memcpy(light.edge_v, (const double[]){1.0, 0.0, 1.0}, sizeof light.edge_v);
-    refuses(&light, "light 'panel': edge_u and edge_v are not at right angles: the cosine between them is "
-                    "0.707106781, of at most 0.001");
+    vsh_light light;
+    const struct {
+        double *field, value;
+        const char *message;
+    } cases[] = {
+        {&light.edge_u[0], 0.0, "edge_u (0, 0, 0): expected a length over 0"},
+        {&light.edge_u[0], 1e-20, "edge_u has the length 1e-20, out of range 1e-15 … 1e+15"},
+        {&light.edge_v[2], 1e200, "edge_v has the length inf, out of range 1e-15 … 1e+15"},
+        {&light.edge_v[1], NAN, "edge_v[1] nan is out of range -inf (excluded) … inf (excluded)"},
+        {&light.edge_v[0], 0.8,
+         "edge_u and edge_v are not at right angles: the cosine between them is 0.707106781, of at most "
+         "0.001"},
+        {&light.position[2], INFINITY, "position[2] inf is out of range -inf (excluded) … inf (excluded)"},
+        {&light.reach, 0.0, "reach 0 is out of range 0 (excluded) … inf (excluded)"},
+    };
+    char text[200];
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        light = light_of(0);
+        assert_int_equal(vsh_light_check(&light, NULL), VSH_OK);
+        light.falloff = VSH_FALLOFF_QUADRATIC;
+        *cases[i].field = cases[i].value;
+        snprintf(text, sizeof text, "light 'panel': %s", cases[i].message);
+        expect_error(vsh_light_check(&light, &failure), VSH_ERROR_ARGUMENT, "");
+        assert_string_equal(failure.message, text);
+    }
     light = light_of(0);
     light.two_sided = 2;
-    refuses(&light, "light 'panel': two_sided 2 is out of range 0 … 1");
-    light = light_of(0);
-    light.position[2] = INFINITY;
-    refuses(&light, "light 'panel': position[2] inf is out of range -inf (excluded) … inf (excluded)");
-    light = light_of(0);
-    light.falloff = VSH_FALLOFF_QUADRATIC;
-    light.reach = 0.0;
-    refuses(&light, "light 'panel': reach 0 is out of range 0 (excluded) … inf (excluded)");
-    char text[200];
+    expect_error(vsh_light_check(&light, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_string_equal(failure.message, "light 'panel': two_sided 2 is out of range 0 … 1");
     light = light_of(0);
     vsh_light_text(&light, text, sizeof text);
     assert_string_equal(text, "rectangle at 0.2 2.4 -0.3, sides 1.2 0 0 and 0 0 0.8, two-sided");
