@@ -2,12 +2,7 @@
 #ifndef TESTS_EXPECT_H
 #define TESTS_EXPECT_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "tests.h"
 
 #include <string.h>
 #include <vdbshade/base.h>

@@ -17,7 +17,7 @@
 
 enum { SIDE = 65 };
 
-static void a_solid_is_closed_wound_outwards_and_of_its_volume(void **state) {
+TEST(a_solid_is_closed_wound_outwards_and_of_its_volume) {
     float *values = hills(SIDE, 40);
     vsh_heights_source source = source_of(values, SIDE, 40, 10.0, 2.0);
     source.base = 0.5;
@@ -55,7 +55,7 @@ static void a_solid_is_closed_wound_outwards_and_of_its_volume(void **state) {
     free(values);
 }
 
-static void a_surface_lies_under_its_lightmap_as_the_image_does(void **state) {
+TEST(a_surface_lies_under_its_lightmap_as_the_image_does) {
     /* one high sample, in row 1 of 4 and column 3 of 5 */
     float values[20] = {0};
     values[1 * 5 + 3] = 1.0f;
@@ -78,7 +78,7 @@ static void a_surface_lies_under_its_lightmap_as_the_image_does(void **state) {
     vsh_model_free(model);
 }
 
-static void a_surface_keeps_the_heights_beside_each_texel_s_middle(void **state) {
+TEST(a_surface_keeps_the_heights_beside_each_texel_s_middle) {
     static const struct {
         size_t texels, most; /* columns of texels, and of heights that are kept */
     } cases[] = {{1, 5}, {15, 33}, {16, 50}, {32, SIDE}, {100, SIDE}};
@@ -114,7 +114,7 @@ static int stop_at_once(void *user, const char *stage, double fraction) {
 }
 
 /* A band of 100 voxels took ten minutes. */
-static void a_band_that_would_take_minutes_is_refused_and_the_one_it_names_is_not(void **state) {
+TEST(a_band_that_would_take_minutes_is_refused_and_the_one_it_names_is_not) {
     enum { FINE = 257 };
     float *values = hills(FINE, FINE);
     const vsh_heights_source source = source_of(values, FINE, FINE, 10.0, 2.0);
@@ -141,7 +141,7 @@ static void a_band_that_would_take_minutes_is_refused_and_the_one_it_names_is_no
     free(values);
 }
 
-static void the_field_of_a_heightfield_holds_distances_not_gaps(void **state) {
+TEST(the_field_of_a_heightfield_holds_distances_not_gaps) {
     /* a ramp of slope 2 along x: a gap g over it is a distance g / √5 */
     float values[SIDE * 5];
     for (int i = 0; i < SIDE * 5; ++i) {
@@ -179,7 +179,7 @@ static vsh_mesh reindexed(const vsh_mesh *mesh, uint32_t *indices) {
     return other;
 }
 
-static void a_terrain_is_solid_or_open_as_its_triangles_are(void **state) {
+TEST(a_terrain_is_solid_or_open_as_its_triangles_are) {
     static const double mirrors[12] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     float *values = hills(SIDE, 40);
     const vsh_heights_source source = source_of(values, SIDE, 40, 10.0, 2.0);
@@ -250,7 +250,7 @@ static vshi_segment_ray random_ray(const vsh_triangles *of, int number, uint32_t
     return ray;
 }
 
-static void rays_meet_a_terrain_as_they_meet_its_triangles(void **state) {
+TEST(rays_meet_a_terrain_as_they_meet_its_triangles) {
     enum { RAYS = 20000, COLUMNS = 500, ROWS = 530 }; /* smaller terrains are triangles */
     static const double transforms[][12] = {
         {-0.6, 0.8, 0, 5, 0.8, 0.6, 0, 1e3, 0, 0, 1, 0},       /* mirrored, and tilted */
@@ -301,7 +301,7 @@ static void rays_meet_a_terrain_as_they_meet_its_triangles(void **state) {
     free(values);
 }
 
-static void every_instruction_set_finds_the_same_crossings(void **state) {
+TEST(every_instruction_set_finds_the_same_crossings) {
     static const struct {
         int32_t isa;
         vshi_terrain_kernel *kernel;
@@ -391,7 +391,7 @@ static size_t stand_on_top(const vsh_mesh *mesh, size_t step, double *positions,
 }
 
 /* `direct` had dark lumps on the flanks. */
-static void no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_default(void **state) {
+TEST(no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_default) {
     enum { POINTS = 2 * (SIDE - 1) * (SIDE - 1), RAYS = 256 };
     static float values[SIDE * SIDE], normals[3 * POINTS], shadow[POINTS], ao[POINTS], truth[2][POINTS];
     static double positions[3 * POINTS];
@@ -451,7 +451,7 @@ static void no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_defaul
     }
 }
 
-static void images_of_8_16_and_32_bits_are_read(void **state) {
+TEST(images_of_8_16_and_32_bits_are_read) {
     static const struct {
         const char *name;
         int32_t bits, channels;
@@ -493,7 +493,7 @@ static void images_of_8_16_and_32_bits_are_read(void **state) {
     }
 }
 
-static void bad_images_are_refused_with_their_place(void **state) {
+TEST(bad_images_are_refused_with_their_place) {
     static const struct {
         const char *name;
         float value; /* of one texel */
@@ -514,7 +514,7 @@ static void bad_images_are_refused_with_their_place(void **state) {
     expect_error(load(at("none.png"), &assets, &failure), VSH_ERROR_READ, "");
 }
 
-static void bad_sources_are_refused(void **state) {
+TEST(bad_sources_are_refused) {
     static const double shear[12] = {1, 1, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     static const float values[4] = {0, 1, 2, 3}, nan[4] = {0, 1, NAN, 3};
     const struct {
@@ -558,7 +558,7 @@ static void bad_sources_are_refused(void **state) {
     }
 }
 
-static void memory_limits_hold_before_memory_is_taken(void **state) {
+TEST(memory_limits_hold_before_memory_is_taken) {
     float *values = hills(SIDE, SIDE);
     const vsh_heights_source source = source_of(values, SIDE, SIDE, 10.0, 2.0);
     vsh_run run = vsh_run_default();
@@ -578,20 +578,5 @@ static void memory_limits_hold_before_memory_is_taken(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_solid_is_closed_wound_outwards_and_of_its_volume),
-        cmocka_unit_test(a_surface_lies_under_its_lightmap_as_the_image_does),
-        cmocka_unit_test(a_surface_keeps_the_heights_beside_each_texel_s_middle),
-        cmocka_unit_test(a_band_that_would_take_minutes_is_refused_and_the_one_it_names_is_not),
-        cmocka_unit_test(the_field_of_a_heightfield_holds_distances_not_gaps),
-        cmocka_unit_test(a_terrain_is_solid_or_open_as_its_triangles_are),
-        cmocka_unit_test(rays_meet_a_terrain_as_they_meet_its_triangles),
-        cmocka_unit_test(every_instruction_set_finds_the_same_crossings),
-        cmocka_unit_test(no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_default),
-        cmocka_unit_test_setup_teardown(images_of_8_16_and_32_bits_are_read, make_folder, remove_folder),
-        cmocka_unit_test_setup_teardown(bad_images_are_refused_with_their_place, make_folder, remove_folder),
-        cmocka_unit_test(bad_sources_are_refused),
-        cmocka_unit_test(memory_limits_hold_before_memory_is_taken),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(make_folder, remove_folder);
 }

@@ -1,5 +1,6 @@
 /* Heightfields that are marched as they are: the methods hard and classic. */
 #include "terrain.h"
+#include "tests.h"
 
 #include "base/vec.h"
 #include "heightfield/heights.h"
@@ -82,7 +83,7 @@ static void shadow(const stage *s, const vsh_light *light, int32_t method, float
     assert_true(stats.samples > 0);
 }
 
-static void a_hard_march_is_the_ray_but_for_ridges_narrower_than_its_step(void **state) {
+TEST(a_hard_march_is_the_ray_but_for_ridges_narrower_than_its_step) {
     /* turned, mirrored, three times as large */
     static const double transform[12] = {0, 0, -3, 100, 0, 3, 0, -40, -3, 0, 0, 7};
     static const double directions[][3] = {
@@ -110,7 +111,7 @@ static void a_hard_march_is_the_ray_but_for_ridges_narrower_than_its_step(void *
 
 /* A plateau of height 4 from x = 0 on, seen from the ground before it: h / (w t) is least at its edge, or
  * where the ray leaves the terrain's height. */
-static void a_classic_march_is_the_least_height_over_the_cone_s_width(void **state) {
+TEST(a_classic_march_is_the_least_height_over_the_cone_s_width) {
     float plateau[65 * 9];
     for (int i = 0; i < 65 * 9; ++i) {
         plateau[i] = i % 65 >= 32 ? 1.0f : 0.0f;
@@ -138,7 +139,7 @@ static void a_classic_march_is_the_least_height_over_the_cone_s_width(void **sta
     vsh_heights_free(heights);
 }
 
-static void points_that_are_no_points_are_nan_and_buried_ones_dark(void **state) {
+TEST(points_that_are_no_points_are_nan_and_buried_ones_dark) {
     stage s = set_up(SIDE, SIDE, 2.0, NULL);
     const double positions[12] = {NAN, 0, 0, 0, 5, 0, 0, -0.3, 0, 0, 5, 0};
     const float normals[12] = {0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0};
@@ -158,10 +159,5 @@ static void points_that_are_no_points_are_nan_and_buried_ones_dark(void **state)
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_hard_march_is_the_ray_but_for_ridges_narrower_than_its_step),
-        cmocka_unit_test(a_classic_march_is_the_least_height_over_the_cone_s_width),
-        cmocka_unit_test(points_that_are_no_points_are_nan_and_buried_ones_dark),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -22,7 +22,7 @@ static uint32_t nearest_of_all(const vshi_place *list, size_t count, const float
 }
 
 /* Places anywhere, on a plane, on a coarse lattice (many at one place), and all at one. */
-static void the_tree_finds_what_a_look_at_all_finds(void **state) {
+TEST(the_tree_finds_what_a_look_at_all_finds) {
     enum { MOST = 1500 };
     uint32_t seed = 5;
     for (int kind = 0; kind < 4; ++kind) {
@@ -143,7 +143,7 @@ static void assert_value(const stage *s, size_t texel, float expected) {
     }
 }
 
-static void a_hidden_chart_takes_the_nearest_values_of_the_world(void **state) {
+TEST(a_hidden_chart_takes_the_nearest_values_of_the_world) {
     stage s = begin(2, false);
     assert_int_equal(fill(&s, 1), CHART_TEXELS * CHART_TEXELS);
     for (size_t i = 0; i < TEXELS; ++i) {
@@ -163,7 +163,7 @@ static void a_hidden_chart_takes_the_nearest_values_of_the_world(void **state) {
     end(&s);
 }
 
-static void what_is_empty_around_it_is_padded_as_far_as_it_is_the_nearest(void **state) {
+TEST(what_is_empty_around_it_is_padded_as_far_as_it_is_the_nearest) {
     for (int32_t padding = 0; padding <= 6; padding += 2) {
         stage s = begin(padding, false);
         fill(&s, 1);
@@ -186,7 +186,7 @@ static void what_is_empty_around_it_is_padded_as_far_as_it_is_the_nearest(void *
     }
 }
 
-static void a_chart_in_part_hidden_keeps_its_own_values_near_what_is_seen(void **state) {
+TEST(a_chart_in_part_hidden_keeps_its_own_values_near_what_is_seen) {
     stage s = begin(2, true);
     int column, row;
     for (size_t i = 0; i < TEXELS; ++i) { /* as the bake fills them */
@@ -206,7 +206,7 @@ static void a_chart_in_part_hidden_keeps_its_own_values_near_what_is_seen(void *
 }
 
 /* The square that is across lies over the hidden one from its fifth column on. */
-static void what_lookups_beside_the_seen_read_is_its_own(void **state) {
+TEST(what_lookups_beside_the_seen_read_is_its_own) {
     charts_mesh *m = new_mesh();
     static const double places[CHARTS] = {0.0, 1.0, 1.0 + 4.0 / CHART_TEXELS, 40.0};
     for (int c = 0; c < CHARTS; ++c) {
@@ -226,7 +226,7 @@ static void what_lookups_beside_the_seen_read_is_its_own(void **state) {
     end(&s);
 }
 
-static void nothing_changes_where_all_is_seen_or_nothing(void **state) {
+TEST(nothing_changes_where_all_is_seen_or_nothing) {
     for (int seen = 0; seen < 2; ++seen) {
         stage s = begin(2, false), before = begin(2, false);
         for (size_t i = 0; i < TEXELS; ++i) {
@@ -243,7 +243,7 @@ static int32_t stop(void *user, const char *step, double fraction) {
     return 1;
 }
 
-static void threads_change_nothing_nor_do_calls_that_fail(void **state) {
+TEST(threads_change_nothing_nor_do_calls_that_fail) {
     stage s = begin(2, false), other = begin(2, false);
     fill(&s, 1);
     const vsh_lightmap map = {.ao = other.ao, .coverage = other.coverage}, none = {.ao = other.ao};
@@ -266,14 +266,5 @@ static void threads_change_nothing_nor_do_calls_that_fail(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_tree_finds_what_a_look_at_all_finds),
-        cmocka_unit_test(a_hidden_chart_takes_the_nearest_values_of_the_world),
-        cmocka_unit_test(what_is_empty_around_it_is_padded_as_far_as_it_is_the_nearest),
-        cmocka_unit_test(a_chart_in_part_hidden_keeps_its_own_values_near_what_is_seen),
-        cmocka_unit_test(what_lookups_beside_the_seen_read_is_its_own),
-        cmocka_unit_test(nothing_changes_where_all_is_seen_or_nothing),
-        cmocka_unit_test(threads_change_nothing_nor_do_calls_that_fail),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

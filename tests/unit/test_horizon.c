@@ -82,7 +82,7 @@ static void find_truth(stage *s, const double up[3]) {
     }
 }
 
-static void shares_of_what_is_over_a_horizon_are_the_rays(void **state) {
+TEST(shares_of_what_is_over_a_horizon_are_the_rays) {
     static const double ups[2][3] = {{0.0, 1.0, 0.0}, {0.48, -0.6, 0.64}};
     static const int32_t methods[] = {VSH_AO_RAYS, VSH_AO_ADAPTIVE, VSH_AO_EXACT};
     stage *s = set_up();
@@ -105,7 +105,7 @@ static void shares_of_what_is_over_a_horizon_are_the_rays(void **state) {
     tear_down(s);
 }
 
-static void what_knows_no_horizon_says_so(void **state) {
+TEST(what_knows_no_horizon_says_so) {
     static const double up[3] = {0.0, 1.0, 0.0};
     stage *s = set_up();
     static const int32_t methods[] = {VSH_AO_TAPS, VSH_AO_CONES};
@@ -128,9 +128,5 @@ static void what_knows_no_horizon_says_so(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(shares_of_what_is_over_a_horizon_are_the_rays),
-        cmocka_unit_test(what_knows_no_horizon_says_so),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

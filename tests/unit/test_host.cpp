@@ -1,20 +1,12 @@
 // Hosts that have set something: rounding, flush to zero, a locale with a decimal comma, arenas and threads
 // of their own. Every call gives the same bits as in a plain program, and gives back what the host had set.
 #include <clocale>
-#include <csetjmp>
-#include <cstdarg>
-#include <cstddef>
-#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <string>
 #include <thread>
 #include <vector>
-
-extern "C" {
-#include <cmocka.h>
-}
 
 #include "base/floats.h"
 #include "base/hash.h"
@@ -27,6 +19,8 @@ extern "C" {
 #include <tbb/task_arena.h>
 #include <unistd.h>
 #include <vdbshade/vdbshade.h>
+
+#include "tests.h"
 
 // A host that exports its own Embree (tests/CMakeLists.txt).
 extern "C" {
@@ -141,7 +135,7 @@ Outcome plain() {
     return o;
 }
 
-void rounding_of_the_host_changes_nothing_and_is_given_back(void **) {
+TEST(rounding_of_the_host_changes_nothing_and_is_given_back) {
     const Outcome expected = plain();
     for (const int mode : {FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO}) {
         assert_int_equal(std::fesetround(mode), 0);
@@ -153,7 +147,7 @@ void rounding_of_the_host_changes_nothing_and_is_given_back(void **) {
     }
 }
 
-void flushing_to_zero_changes_nothing_and_is_given_back(void **) {
+TEST(flushing_to_zero_changes_nothing_and_is_given_back) {
 #if defined(__x86_64__)
     constexpr vshi_floats FLUSH = 0x8040; // FTZ and DAZ
     const Outcome expected = plain();
@@ -169,7 +163,7 @@ void flushing_to_zero_changes_nothing_and_is_given_back(void **) {
 #endif
 }
 
-void a_decimal_comma_changes_nothing_and_is_given_back(void **) {
+TEST(a_decimal_comma_changes_nothing_and_is_given_back) {
     const Outcome expected = plain();
     const std::string make =
         "localedef -i de_DE -f UTF-8 " + folder + "/de_DE.UTF-8 >" + folder + "/log 2>&1";
@@ -191,7 +185,7 @@ void a_decimal_comma_changes_nothing_and_is_given_back(void **) {
     expect_same(expected, there, "decimal comma");
 }
 
-void arenas_of_the_host_change_nothing(void **) {
+TEST(arenas_of_the_host_change_nothing) {
     const Outcome expected = plain();
     Outcome there;
     {
@@ -235,12 +229,12 @@ template <typename Work> void expect_same_on_threads(const Outcome &expected, si
     }
 }
 
-void many_threads_with_fields_of_their_own_get_the_same_bits(void **) {
+TEST(many_threads_with_fields_of_their_own_get_the_same_bits) {
     expect_same_on_threads(plain(), 8, [](size_t i) { return work(int32_t(i % 3)); });
 }
 
 // One field, one query handle, one grid: shared by threads that shade, sample and bake volumes at once.
-void many_threads_share_one_field(void **) {
+TEST(many_threads_share_one_field) {
     vsh_sdf_node node = vsh_sdf_node_default();
     const vsh_sdf sdf = {&node, 1};
     vsh_grid_options grid_options = vsh_grid_options_default();
@@ -275,7 +269,7 @@ void many_threads_share_one_field(void **) {
     vsh_grid_free(grid);
 }
 
-void embree_of_the_host_is_not_called(void **) {
+TEST(embree_of_the_host_is_not_called) {
     if (vsh_triangles_available() == 0) {
         skip();
     }
@@ -327,14 +321,5 @@ int remove_folder(void **) {
 } // namespace
 
 int main() {
-    const CMUnitTest tests[] = {
-        cmocka_unit_test(rounding_of_the_host_changes_nothing_and_is_given_back),
-        cmocka_unit_test(flushing_to_zero_changes_nothing_and_is_given_back),
-        cmocka_unit_test(a_decimal_comma_changes_nothing_and_is_given_back),
-        cmocka_unit_test(arenas_of_the_host_change_nothing),
-        cmocka_unit_test(many_threads_with_fields_of_their_own_get_the_same_bits),
-        cmocka_unit_test(many_threads_share_one_field),
-        cmocka_unit_test(embree_of_the_host_is_not_called),
-    };
-    return cmocka_run_group_tests_name("host", tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

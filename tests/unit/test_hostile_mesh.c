@@ -48,7 +48,7 @@ static void assert_cube(const vsh_grid *grid) {
     assert_int_equal(wrong_blocks(grid, cube_truth, 4), 0);
 }
 
-static void faces_given_twice_change_nothing(void **state) {
+TEST(faces_given_twice_change_nothing) {
     uint32_t twice[72];
     memcpy(twice, outward, sizeof outward);
     memcpy(twice + 36, outward, sizeof outward);
@@ -58,7 +58,7 @@ static void faces_given_twice_change_nothing(void **state) {
     vsh_grid_free(grid);
 }
 
-static void a_face_given_twice_among_others_is_the_same_solid(void **state) {
+TEST(a_face_given_twice_among_others_is_the_same_solid) {
     uint32_t more[39];
     memcpy(more, outward, sizeof outward);
     memcpy(more + 36, outward, 3 * sizeof *more);
@@ -73,7 +73,7 @@ static double room_truth(const double p[3]) { /* walls of 0.2 around the cube */
     return fmax(-d, d - 0.2);
 }
 
-static void an_inverted_mesh_is_a_room_or_the_same_solid_if_asked(void **state) {
+TEST(an_inverted_mesh_is_a_room_or_the_same_solid_if_asked) {
     uint32_t inward[36];
     for (size_t t = 0; t < 12; ++t) {
         const uint32_t *from = outward + 3 * t;
@@ -90,7 +90,7 @@ static void an_inverted_mesh_is_a_room_or_the_same_solid_if_asked(void **state) 
     vsh_grid_free(grid);
 }
 
-static void faces_that_disagree_are_told_and_are_the_same_solid(void **state) {
+TEST(faces_that_disagree_are_told_and_are_the_same_solid) {
     uint32_t mixed[36];
     memcpy(mixed, outward, sizeof mixed);
     for (size_t t = 0; t < 12; t += 3) {
@@ -104,7 +104,7 @@ static void faces_that_disagree_are_told_and_are_the_same_solid(void **state) {
     vsh_grid_free(grid);
 }
 
-static void missing_faces_are_told_and_make_a_shell(void **state) {
+TEST(missing_faces_are_told_and_make_a_shell) {
     const vsh_mesh mesh = cube_of(positions, outward, 10);
     vsh_grid *grid = grid_of(&mesh);
     assert_non_null(strstr(warned, "open edges"));
@@ -114,7 +114,7 @@ static void missing_faces_are_told_and_make_a_shell(void **state) {
     vsh_grid_free(grid);
 }
 
-static void a_million_triangles_without_area_change_nothing(void **state) {
+TEST(a_million_triangles_without_area_change_nothing) {
     uint32_t *indices = calloc(MANY * 3 + 36, sizeof *indices);
     assert_non_null(indices);
     memcpy(indices, outward, sizeof outward);
@@ -133,7 +133,7 @@ static void a_million_triangles_without_area_change_nothing(void **state) {
     free(indices);
 }
 
-static void vertices_out_of_the_world_are_refused(void **state) {
+TEST(vertices_out_of_the_world_are_refused) {
     static const struct {
         float value;
         vsh_result expected;
@@ -166,7 +166,7 @@ static void vertices_out_of_the_world_are_refused(void **state) {
                  "voxel size");
 }
 
-static void indices_out_of_range_are_refused(void **state) {
+TEST(indices_out_of_range_are_refused) {
     static const uint32_t bad[] = {8, 9, 1u << 20, 1u << 31, UINT32_MAX};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
         for (size_t k = 0; k < 36; k += 5) {
@@ -182,15 +182,5 @@ static void indices_out_of_range_are_refused(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(faces_given_twice_change_nothing),
-        cmocka_unit_test(a_face_given_twice_among_others_is_the_same_solid),
-        cmocka_unit_test(an_inverted_mesh_is_a_room_or_the_same_solid_if_asked),
-        cmocka_unit_test(faces_that_disagree_are_told_and_are_the_same_solid),
-        cmocka_unit_test(missing_faces_are_told_and_make_a_shell),
-        cmocka_unit_test(a_million_triangles_without_area_change_nothing),
-        cmocka_unit_test(vertices_out_of_the_world_are_refused),
-        cmocka_unit_test(indices_out_of_range_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

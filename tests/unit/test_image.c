@@ -59,7 +59,7 @@ static double worst(const float *a, const float *b, size_t count) {
     return result;
 }
 
-static void exr_32_is_bit_exact(void **state) {
+TEST(exr_32_is_bit_exact) {
     static const int32_t sizes[][2] = {{37, 23}, {1, 1}, {1, 5000}, {5000, 1}, {16, 16}};
     for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; ++k) {
         trip t;
@@ -76,7 +76,7 @@ static void exr_32_is_bit_exact(void **state) {
 
 /* The writer stores a chunk raw if its compressed data are as long as the raw data. Small images with few
  * values have such chunks. */
-static void exr_keeps_every_small_size(void **state) {
+TEST(exr_keeps_every_small_size) {
     static const char *const names[] = {"a", "b", "c", "d", "e", "f", "g"};
     static const float levels[] = {0.0f, 1.0f, 0.5f, 0.25f, 1.0f / 3.0f, 0.7f, 0.9f};
     enum { LARGEST = 12, KINDS = 4 };
@@ -104,7 +104,7 @@ static void exr_keeps_every_small_size(void **state) {
     }
 }
 
-static void exr_channels_come_back_sorted_by_names_of_up_to_127_bytes(void **state) {
+TEST(exr_channels_come_back_sorted_by_names_of_up_to_127_bytes) {
     trip t;
     make(&t.s, 5, 4, 3, LIGHTMAP);
     send(&t, "sorted.exr", 32, NULL);
@@ -125,7 +125,7 @@ static void exr_channels_come_back_sorted_by_names_of_up_to_127_bytes(void **sta
     end(&t);
 }
 
-static void exr_16_is_right_to_half_precision(void **state) {
+TEST(exr_16_is_right_to_half_precision) {
     trip t;
     make(&t.s, 61, 50, 3, LIGHTMAP);
     send(&t, "half.exr", 16, NULL);
@@ -138,7 +138,7 @@ static void exr_16_is_right_to_half_precision(void **state) {
     end(&t);
 }
 
-static void packs_name_the_channels_of_exr_which_may_have_commas_and_equals(void **state) {
+TEST(packs_name_the_channels_of_exr_which_may_have_commas_and_equals) {
     trip t;
     make(&t.s, 6, 20, 3, LIGHTMAP);
     send(&t, "packed.exr", 32, "G=ao,R=shadow.sun,A=1");
@@ -158,7 +158,7 @@ static void packs_name_the_channels_of_exr_which_may_have_commas_and_equals(void
 }
 
 /* Every format: the file's R, G and B are the channels asked for, also where A is 0. */
-static void every_format_keeps_values_to_half_a_step(void **state) {
+TEST(every_format_keeps_values_to_half_a_step) {
     static const struct {
         const char *name;
         int32_t bits;
@@ -274,7 +274,7 @@ static vsh_image_file *write_and_read_iff(const char *path, const vsh_image *ima
 
 /* Sizes at which tiles, rows of whole words and runs of equal values end in every way; values that pack well
  * and values that do not. */
-static void formats_of_their_own_writers_keep_every_size(void **state) {
+TEST(formats_of_their_own_writers_keep_every_size) {
     static const char *const names[] = {"o.sgi", "o.rla", "o.ico", "o.iff"};
     static const int32_t sizes[][2] = {{1, 1}, {1, 7}, {3, 5}, {8, 1}, {64, 64}, {65, 130}, {255, 254}};
     for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; ++k) {
@@ -314,7 +314,7 @@ static void formats_of_their_own_writers_keep_every_size(void **state) {
     }
 }
 
-static void lossy_formats_keep_grey(void **state) {
+TEST(lossy_formats_keep_grey) {
     sample s;
     make(&s, 70, 90, 2, (const char *const[]){"ao", "A"});
     static const char *const names[] = {"g.heic", "g.avif", "g.webp", "g.jpg"};
@@ -333,7 +333,7 @@ static void lossy_formats_keep_grey(void **state) {
     unmake(&s);
 }
 
-static void icons_of_fewer_bits_are_not_given_to_their_reader(void **state) {
+TEST(icons_of_fewer_bits_are_not_given_to_their_reader) {
     trip t;
     make(&t.s, 5, 5, 3, LIGHTMAP);
     send(&t, "icon.ico", 0, NULL);
@@ -346,7 +346,7 @@ static void icons_of_fewer_bits_are_not_given_to_their_reader(void **state) {
     free(bytes);
 }
 
-static void packs_and_formats_choose_the_file_s_channels_and_bits(void **state) {
+TEST(packs_and_formats_choose_the_file_s_channels_and_bits) {
     static const struct {
         const char *name, *pack;
         int32_t bits, channels, from[3]; /* which plane each channel is, -1: zeros */
@@ -375,7 +375,7 @@ static void packs_and_formats_choose_the_file_s_channels_and_bits(void **state) 
     }
 }
 
-static void integers_clamp_and_turn_nan_to_0(void **state) {
+TEST(integers_clamp_and_turn_nan_to_0) {
     static const float expected[6] = {0.0f, 0.0f, 1.0f, 1.0f, 0.0f, 0.5f};
     trip t;
     make(&t.s, 3, 2, 1, (const char *const[]){"ao"});
@@ -388,7 +388,7 @@ static void integers_clamp_and_turn_nan_to_0(void **state) {
     end(&t);
 }
 
-static void default_pack_takes_the_first_three_and_coverage(void **state) {
+TEST(default_pack_takes_the_first_three_and_coverage) {
     static const struct {
         int32_t count;
         const char *names[5];
@@ -416,19 +416,5 @@ static void default_pack_takes_the_first_three_and_coverage(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(exr_32_is_bit_exact),
-        cmocka_unit_test(exr_keeps_every_small_size),
-        cmocka_unit_test(exr_channels_come_back_sorted_by_names_of_up_to_127_bytes),
-        cmocka_unit_test(exr_16_is_right_to_half_precision),
-        cmocka_unit_test(packs_name_the_channels_of_exr_which_may_have_commas_and_equals),
-        cmocka_unit_test(every_format_keeps_values_to_half_a_step),
-        cmocka_unit_test(formats_of_their_own_writers_keep_every_size),
-        cmocka_unit_test(lossy_formats_keep_grey),
-        cmocka_unit_test(icons_of_fewer_bits_are_not_given_to_their_reader),
-        cmocka_unit_test(packs_and_formats_choose_the_file_s_channels_and_bits),
-        cmocka_unit_test(integers_clamp_and_turn_nan_to_0),
-        cmocka_unit_test(default_pack_takes_the_first_three_and_coverage),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

@@ -56,7 +56,7 @@ static double half_and_half(double x) { /* vectors */
 }
 
 /* What channels hold, not their names, says how integers hold them; alpha is linear. */
-static void light_is_srgb_and_all_else_linear_unless_a_space_is_named(void **state) {
+TEST(light_is_srgb_and_all_else_linear_unless_a_space_is_named) {
     static const int32_t vectors[] = {2, 2, 2, 2, 0};
     static const struct {
         const int32_t *holds;
@@ -103,7 +103,7 @@ static void light_is_srgb_and_all_else_linear_unless_a_space_is_named(void **sta
     unmake(&s);
 }
 
-static void floats_are_linear_and_bad_spaces_are_refused(void **state) {
+TEST(floats_are_linear_and_bad_spaces_are_refused) {
     static const int32_t none[] = {0, 0, 3, 0, 0};
     sample s;
     make(&s, 30, 20, 5, IRRADIANCE);
@@ -136,7 +136,7 @@ static vsh_image_clipping clipping_of(const char *path, const vsh_image *image, 
     return clipping;
 }
 
-static void light_over_1_is_counted_where_it_is_cut(void **state) {
+TEST(light_over_1_is_counted_where_it_is_cut) {
     sample s;
     make(&s, 10, 10, 5, IRRADIANCE);
     s.image.holds = HOLDS;
@@ -159,10 +159,5 @@ static void light_over_1_is_counted_where_it_is_cut(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(light_is_srgb_and_all_else_linear_unless_a_space_is_named),
-        cmocka_unit_test(floats_are_linear_and_bad_spaces_are_refused),
-        cmocka_unit_test(light_over_1_is_counted_where_it_is_cut),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

@@ -18,7 +18,7 @@ static void refused(const char *path, const vsh_image *image, int32_t bits, cons
     }
 }
 
-static void bad_packs_are_refused_by_part(void **state) {
+TEST(bad_packs_are_refused_by_part) {
     sample s;
     make(&s, 2, 2, 3, LIGHTMAP);
     static const char *const cases[][2] = {
@@ -46,7 +46,7 @@ static void bad_packs_are_refused_by_part(void **state) {
     unmake(&s);
 }
 
-static void what_a_format_lacks_is_refused(void **state) {
+TEST(what_a_format_lacks_is_refused) {
     static const struct {
         const char *name;
         int32_t bits;
@@ -89,7 +89,7 @@ static void what_a_format_lacks_is_refused(void **state) {
     unmake(&s);
 }
 
-static void bad_images_are_refused(void **state) {
+TEST(bad_images_are_refused) {
     sample s;
     make(&s, 2, 2, 3, LIGHTMAP);
     vsh_image bad = s.image;
@@ -124,7 +124,7 @@ static void bad_images_are_refused(void **state) {
     unmake(&s);
 }
 
-static void places_that_cannot_be_written_are_refused(void **state) {
+TEST(places_that_cannot_be_written_are_refused) {
     sample s;
     make(&s, 2, 2, 3, LIGHTMAP);
     assert_int_equal(mkdir(at("folder.exr"), 0777), 0);
@@ -137,7 +137,7 @@ static void places_that_cannot_be_written_are_refused(void **state) {
     unmake(&s);
 }
 
-static void cut_files_are_errors(void **state) {
+TEST(cut_files_are_errors) {
     static const char *const names[] = {"c.exr", "c.png", "c.tif", "c.tga", "c.bmp", "c.hdr",
                                         "c.ppm", "c.dpx", "c.sgi", "c.rla", "c.ico"};
     sample s;
@@ -173,7 +173,7 @@ static void cut_files_are_errors(void **state) {
     unmake(&s);
 }
 
-static void damaged_files_do_no_harm(void **state) {
+TEST(damaged_files_do_no_harm) {
     static const char *const names[] = {"b.exr", "b.png", "b.tif", "b.jpg", "b.tga",
                                         "b.bmp", "b.sgi", "b.rla", "b.ico"};
     sample s;
@@ -203,7 +203,7 @@ static void damaged_files_do_no_harm(void **state) {
     unmake(&s);
 }
 
-static void unreadable_paths_are_read_errors(void **state) {
+TEST(unreadable_paths_are_read_errors) {
     static const struct {
         const char *name, *text;
         vsh_result code;
@@ -225,7 +225,7 @@ static void unreadable_paths_are_read_errors(void **state) {
     vsh_image_free(NULL);
 }
 
-static void the_memory_limit_holds_without_a_reader(void **state) {
+TEST(the_memory_limit_holds_without_a_reader) {
     static const char *const names[] = {"m.exr", "m.png", "m.tif"};
     sample s;
     make(&s, 33, 40, 3, LIGHTMAP);
@@ -247,7 +247,7 @@ static void the_memory_limit_holds_without_a_reader(void **state) {
     unmake(&s);
 }
 
-static void a_written_file_follows_links_and_keeps_its_mode(void **state) {
+TEST(a_written_file_follows_links_and_keeps_its_mode) {
     sample s;
     make(&s, 3, 3, 3, LIGHTMAP);
     const char *target = at("target.exr");
@@ -265,7 +265,7 @@ static void a_written_file_follows_links_and_keeps_its_mode(void **state) {
     unmake(&s);
 }
 
-static void outputs_are_made_beside_the_target_and_keep_its_ending(void **state) {
+TEST(outputs_are_made_beside_the_target_and_keep_its_ending) {
     vshi_output first;
     vshi_output second;
     const char *path = at("grid.v1.vdb");
@@ -290,7 +290,7 @@ static void outputs_are_made_beside_the_target_and_keep_its_ending(void **state)
     assert_string_equal(vshi_path_ending("a/b.c.EXR"), "EXR");
 }
 
-static void no_temporary_is_left(void **state) {
+TEST(no_temporary_is_left) {
     DIR *directory = opendir(folder);
     assert_non_null(directory);
     for (const struct dirent *entry = readdir(directory); entry != NULL; entry = readdir(directory)) {
@@ -341,7 +341,7 @@ static void begin(vshi_output *outputs, vshi_output **list) {
     }
 }
 
-static void all_are_in_place_in_the_end(void **state) {
+TEST(all_are_in_place_in_the_end) {
     vshi_output outputs[COUNT], *list[COUNT];
     const size_t before = entries();
     put_text(at(together[1]), "old");
@@ -357,7 +357,7 @@ static void all_are_in_place_in_the_end(void **state) {
 }
 
 /* A folder that came into the way of each in turn, as nothing but a file can be replaced. */
-static void one_that_fails_leaves_all_as_they_were(void **state) {
+TEST(one_that_fails_leaves_all_as_they_were) {
     const size_t before = entries();
     for (size_t failing = 0; failing < COUNT; ++failing) {
         vshi_output outputs[COUNT], *list[COUNT];
@@ -380,20 +380,5 @@ static void one_that_fails_leaves_all_as_they_were(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(bad_packs_are_refused_by_part),
-        cmocka_unit_test(what_a_format_lacks_is_refused),
-        cmocka_unit_test(bad_images_are_refused),
-        cmocka_unit_test(places_that_cannot_be_written_are_refused),
-        cmocka_unit_test(cut_files_are_errors),
-        cmocka_unit_test(damaged_files_do_no_harm),
-        cmocka_unit_test(unreadable_paths_are_read_errors),
-        cmocka_unit_test(the_memory_limit_holds_without_a_reader),
-        cmocka_unit_test(a_written_file_follows_links_and_keeps_its_mode),
-        cmocka_unit_test(outputs_are_made_beside_the_target_and_keep_its_ending),
-        cmocka_unit_test(no_temporary_is_left),
-        cmocka_unit_test(all_are_in_place_in_the_end),
-        cmocka_unit_test(one_that_fails_leaves_all_as_they_were),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

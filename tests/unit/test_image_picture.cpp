@@ -1,9 +1,5 @@
 // EXR files as other programs see them: read by OpenImageIO, with no code of ours.
 #include <cmath>
-#include <csetjmp>
-#include <cstdarg>
-#include <cstddef>
-#include <cstdint>
 #include <cstdio>
 #include <string>
 #include <unistd.h>
@@ -13,9 +9,7 @@
 
 #include <OpenImageIO/imageio.h>
 
-extern "C" {
-#include <cmocka.h> // last: it has macros of common names
-}
+#include "tests.h"
 
 namespace {
 
@@ -94,7 +88,7 @@ void assert_names(const Seen &seen, const std::vector<const char *> &names) {
     assert_int_equal(seen.subimages, 1);
 }
 
-void rgba_come_first_and_the_named_channels_stay(void **) {
+TEST(rgba_come_first_and_the_named_channels_stay) {
     const Seen seen = write_and_see({"shadow.sun", "ao", "A"}, nullptr, 0);
     assert_names(seen, {"R", "G", "B", "A", "ao", "shadow.sun"});
     assert_true(seen.type == OIIO::TypeDesc::FLOAT);
@@ -109,7 +103,7 @@ void rgba_come_first_and_the_named_channels_stay(void **) {
     }
 }
 
-void the_picture_is_what_there_is(void **) {
+TEST(the_picture_is_what_there_is) {
     const struct {
         std::vector<const char *> names;
         const char *rgb;
@@ -139,7 +133,7 @@ void the_picture_is_what_there_is(void **) {
     assert_true(colors.at("B", 5) == value_at(0, 5) && colors.at("R", 5) == value_at(2, 5));
 }
 
-void other_channels_make_no_picture(void **) {
+TEST(other_channels_make_no_picture) {
     assert_names(write_and_see({"depth", "A"}, nullptr, 32), {"A", "depth"});
     const Seen own = write_and_see({"R", "G", "B", "shadow.sun"}, nullptr, 32);
     assert_names(own, {"R", "G", "B", "shadow.sun"}); // which it had itself
@@ -147,21 +141,21 @@ void other_channels_make_no_picture(void **) {
     assert_string_equal(own.rgb.c_str(), "");
 }
 
-void a_pack_chooses_picture_or_channels(void **) {
+TEST(a_pack_chooses_picture_or_channels) {
     const Seen picture = write_and_see({"shadow.sun", "ao", "A"}, "rgb", 32);
     assert_names(picture, {"R", "G", "B", "A"});
     assert_true(picture.at("G", 4) == value_at(0, 4) * value_at(1, 4));
     assert_names(write_and_see({"shadow.sun", "ao", "A"}, "channels", 32), {"A", "ao", "shadow.sun"});
 }
 
-void half_floats_are_half_all_over(void **) {
+TEST(half_floats_are_half_all_over) {
     const Seen seen = write_and_see({"shadow.sun", "A"}, nullptr, 16);
     assert_names(seen, {"R", "G", "B", "A", "shadow.sun"});
     assert_true(seen.type == OIIO::TypeDesc::HALF);
     assert_true(std::fabs(seen.at("B", 9) - value_at(0, 9)) <= 0x1p-12F);
 }
 
-void a_picture_of_nothing_is_refused(void **) {
+TEST(a_picture_of_nothing_is_refused) {
     const char *const names[] = {"depth"};
     const vsh_image image = {2, 2, 1, names, nullptr, NULL};
     vsh_image_options options = vsh_image_options_default();
@@ -177,13 +171,5 @@ void a_picture_of_nothing_is_refused(void **) {
 } // namespace
 
 int main() {
-    const CMUnitTest tests[] = {
-        cmocka_unit_test(rgba_come_first_and_the_named_channels_stay),
-        cmocka_unit_test(the_picture_is_what_there_is),
-        cmocka_unit_test(other_channels_make_no_picture),
-        cmocka_unit_test(a_pack_chooses_picture_or_channels),
-        cmocka_unit_test(half_floats_are_half_all_over),
-        cmocka_unit_test(a_picture_of_nothing_is_refused),
-    };
-    return cmocka_run_group_tests(tests, nullptr, nullptr);
+    return run_all_tests(nullptr, nullptr);
 }

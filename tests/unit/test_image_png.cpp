@@ -1,10 +1,6 @@
 // PNG files as other programs see them: read by OpenImageIO, with no code of ours.
 #include <algorithm>
 #include <cmath>
-#include <csetjmp>
-#include <cstdarg>
-#include <cstddef>
-#include <cstdint>
 #include <cstdio>
 #include <fstream>
 #include <limits>
@@ -17,9 +13,7 @@
 
 #include <OpenImageIO/imageio.h>
 
-extern "C" {
-#include <cmocka.h> // last: it has macros of common names
-}
+#include "tests.h"
 
 namespace {
 
@@ -147,7 +141,7 @@ void assert_channel(const Seen &seen, size_t at, int channel, int32_t bits, doub
     }
 }
 
-void values_are_those_that_were_given(void **) {
+TEST(values_are_those_that_were_given) {
     for (const int32_t bits : {8, 16}) {
         const Seen three = write_and_see({{"shadow.sun", "ao"}, "R=ao,B=shadow.sun", bits});
         assert_int_equal(three.spec.nchannels, 3);
@@ -172,7 +166,7 @@ void values_are_those_that_were_given(void **) {
 }
 
 // Beside data, a gamma chunk, or one of colours, would have them undone.
-void light_has_the_srgb_curve_and_says_so_and_data_has_none(void **) {
+TEST(light_has_the_srgb_curve_and_says_so_and_data_has_none) {
     for (const int32_t bits : {8, 16}) {
         const Seen seen = write_and_see(irradiance(bits, VSH_COLOR_AUTO));
         for (size_t c = 0; c < 4; ++c) {
@@ -190,7 +184,7 @@ void light_has_the_srgb_curve_and_says_so_and_data_has_none(void **) {
 }
 
 // Once each, in any script, and as long as they may be.
-void texts_are_those_that_were_given(void **) {
+TEST(texts_are_those_that_were_given) {
     const std::string software = std::string("vdbshade ") + vsh_version(), longest(65535, 'x'), name(79, 'n');
     Asked asked = {{"shadow.sun"}};
     asked.attributes = {{"vdbshade_command", "bake größe.obj"},
@@ -209,7 +203,7 @@ void texts_are_those_that_were_given(void **) {
     assert_true(other.chunks.rfind("IHDR tEXt tEXt IDAT ", 0) == 0);
 }
 
-void the_longest_row_is_written(void **) {
+TEST(the_longest_row_is_written) {
     std::vector<float> plane(1000000, 0.25F);
     const char *name = "shadow.sun", *const path = "png-long.png";
     const float *view = plane.data();
@@ -226,11 +220,5 @@ void the_longest_row_is_written(void **) {
 } // namespace
 
 int main() {
-    const CMUnitTest tests[] = {
-        cmocka_unit_test(values_are_those_that_were_given),
-        cmocka_unit_test(light_has_the_srgb_curve_and_says_so_and_data_has_none),
-        cmocka_unit_test(texts_are_those_that_were_given),
-        cmocka_unit_test(the_longest_row_is_written),
-    };
-    return cmocka_run_group_tests(tests, nullptr, nullptr);
+    return run_all_tests(nullptr, nullptr);
 }

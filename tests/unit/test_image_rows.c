@@ -55,7 +55,7 @@ static void assert_same_file(const char *path, const char *other) {
 }
 
 /* Neither the time nor the file's name: and no path so long that a header had no room for its end. */
-static void the_same_image_is_the_same_bytes_later_elsewhere(void **state) {
+TEST(the_same_image_is_the_same_bytes_later_elsewhere) {
     sample s;
     make(&s, 64, 50, 3, LIGHTMAP);
     const int back = open(".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -78,7 +78,7 @@ static void the_same_image_is_the_same_bytes_later_elsewhere(void **state) {
 }
 
 /* Pieces of the last size are wide enough that OpenImageIO is handed several lots of rows. */
-static void rows_make_the_bytes_of_the_whole_image(void **state) {
+TEST(rows_make_the_bytes_of_the_whole_image) {
     static const struct {
         int32_t width, height, step;
         size_t endings;
@@ -122,7 +122,7 @@ static void assert_untouched(const char *path, int entries) {
     assert_int_equal(entries_in_folder(), entries);
 }
 
-static void what_is_given_up_or_short_of_rows_leaves_the_old_file(void **state) {
+TEST(what_is_given_up_or_short_of_rows_leaves_the_old_file) {
     sample s;
     make(&s, 200, 150, 3, LIGHTMAP);
     for (size_t e = 0; e < ENDING_COUNT; ++e) {
@@ -145,7 +145,7 @@ static void what_is_given_up_or_short_of_rows_leaves_the_old_file(void **state) 
     unmake(&s);
 }
 
-static void rows_that_are_none_of_it_are_refused(void **state) {
+TEST(rows_that_are_none_of_it_are_refused) {
     sample s;
     make(&s, 20, 10, 3, LIGHTMAP);
     vsh_image_writer *writer = begin(at("refused.exr"), &s);
@@ -162,7 +162,7 @@ static void rows_that_are_none_of_it_are_refused(void **state) {
 
 /* The limit on a file's size stands for a full disk: at the first byte, in the middle, at the very last one.
  */
-static void a_full_disk_leaves_the_old_file_and_nothing_else(void **state) {
+TEST(a_full_disk_leaves_the_old_file_and_nothing_else) {
     signal(SIGXFSZ, SIG_IGN);
     struct rlimit old_limit;
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &old_limit), 0);
@@ -263,7 +263,7 @@ static void write_tiles(const char *path, const tiling *t, const sample *s) {
     must(exr_finish(&file));
 }
 
-static void the_finest_level_is_read_to_the_bit(void **state) {
+TEST(the_finest_level_is_read_to_the_bit) {
     const tiling tilings[] = {
         {37, 23, 16, 8, 0, 0, EXR_TILE_ONE_LEVEL},      {16, 16, 64, 64, 0, 0, EXR_TILE_ONE_LEVEL},
         {1, 40, 8, 8, 0, 0, EXR_TILE_ONE_LEVEL},        {37, 23, 16, 16, -7, 1000, EXR_TILE_ONE_LEVEL},
@@ -295,7 +295,7 @@ static int32_t stop_at_half(void *user, const char *stage, double fraction) {
     return fraction >= 0.5;
 }
 
-static void reading_can_be_cancelled_between_rows_of_tiles(void **state) {
+TEST(reading_can_be_cancelled_between_rows_of_tiles) {
     const tiling t = {40, 64, 16, 16, 0, 0, EXR_TILE_ONE_LEVEL};
     sample s;
     make(&s, t.width, t.height, CHANNELS, NAMES);
@@ -308,7 +308,7 @@ static void reading_can_be_cancelled_between_rows_of_tiles(void **state) {
     unmake(&s);
 }
 
-static void cut_files_are_refused(void **state) {
+TEST(cut_files_are_refused) {
     const tiling t = {37, 23, 16, 8, 0, 0, EXR_TILE_ONE_LEVEL};
     sample s;
     make(&s, t.width, t.height, CHANNELS, NAMES);
@@ -329,15 +329,5 @@ static void cut_files_are_refused(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rows_make_the_bytes_of_the_whole_image),
-        cmocka_unit_test(the_same_image_is_the_same_bytes_later_elsewhere),
-        cmocka_unit_test(what_is_given_up_or_short_of_rows_leaves_the_old_file),
-        cmocka_unit_test(rows_that_are_none_of_it_are_refused),
-        cmocka_unit_test(a_full_disk_leaves_the_old_file_and_nothing_else),
-        cmocka_unit_test(the_finest_level_is_read_to_the_bit),
-        cmocka_unit_test(reading_can_be_cancelled_between_rows_of_tiles),
-        cmocka_unit_test(cut_files_are_refused),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

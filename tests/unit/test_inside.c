@@ -1,14 +1,8 @@
 /* Samples that a ray links to the one before take over what is said of it (src/shade/inside.c,
  * src/bake/origins.c): held against each sample looked at by itself. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
-
-#include <cmocka.h>
 
 #include "bake/texels.h"
 #include "expect.h"
@@ -73,7 +67,7 @@ static counts compare(const vsh_mesh *meshes, size_t mesh_count, int32_t size) {
 }
 
 /* Walls whose arches stand in them, columns on their bases, all solids: charts end where others begin. */
-static void samples_of_solids_in_each_other_are_where_they_are_by_themselves(void **state) {
+TEST(samples_of_solids_in_each_other_are_where_they_are_by_themselves) {
     vsh_model *model = NULL;
     check(vsh_model_read(VSH_ASSETS "/cloister.glb", NULL, &model, &failure), &failure);
     const size_t mesh_count = vsh_model_mesh_count(model);
@@ -126,7 +120,7 @@ static void add_ball(head *h, double radius, double z, double hole, float left) 
 }
 
 /* A head with a hole, and an eye that looks out of it: how many rays find their way grows over the eye. */
-static void samples_beside_a_hole_are_where_they_are_by_themselves(void **state) {
+TEST(samples_beside_a_hole_are_where_they_are_by_themselves) {
     head *h = calloc(1, sizeof *h);
     add_ball(h, 1.0, 0.0, 0.35, 0.0f);
     add_ball(h, 0.4, 0.5, 0.0, 0.5f);
@@ -146,7 +140,7 @@ static void samples_beside_a_hole_are_where_they_are_by_themselves(void **state)
 
 /* A hood, which is a box without its bottom, over a floor. Points deep below it see its inner sides alone,
  * others see out by the gap, and no triangle parts the two. */
-static void samples_below_a_hood_are_where_they_are_by_themselves(void **state) {
+TEST(samples_below_a_hood_are_where_they_are_by_themselves) {
     static const float positions[] = {-2, -2, 0,     2, -2, 0,     2, 2, 0,     -2, 2, 0,
                                       -1, -1, 0.04f, 1, -1, 0.04f, 1, 1, 0.04f, -1, 1, 0.04f,
                                       -1, -1, 1,     1, -1, 1,     1, 1, 1,     -1, 1, 1};
@@ -173,10 +167,5 @@ int main(void) {
     if (!vsh_triangles_available()) {
         return 0;
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(samples_of_solids_in_each_other_are_where_they_are_by_themselves),
-        cmocka_unit_test(samples_beside_a_hole_are_where_they_are_by_themselves),
-        cmocka_unit_test(samples_below_a_hood_are_where_they_are_by_themselves),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

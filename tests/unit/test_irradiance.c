@@ -1,5 +1,6 @@
 /* Irradiance: visibility × colour × falloff × cosine, each against its closed form. */
 #include "shading.h"
+#include "tests.h"
 
 static const double ORIGIN[3] = {0.0, 0.0, 0.0};
 static const float UP[3] = {0.0f, 1.0f, 0.0f};
@@ -18,7 +19,7 @@ static float red(const vsh_light *light) {
     return rgb[0];
 }
 
-static void the_cosine_to_the_light_weighs_it(void **state) {
+TEST(the_cosine_to_the_light_weighs_it) {
     for (int degrees = 0; degrees <= 180; degrees += 5) {
         double towards[3];
         direction_at(RADIANS(degrees - 90), 0.7, towards);
@@ -35,7 +36,7 @@ static void the_cosine_to_the_light_weighs_it(void **state) {
     assert_float_equal(rgb[0], sqrt(0.5), 1e-6);
 }
 
-static void shading_normals_stand_in_for_geometric_ones(void **state) {
+TEST(shading_normals_stand_in_for_geometric_ones) {
     const vsh_points points = {1, ORIGIN, UP, NULL};
     const float one = 1.0f, sideways[3] = {1.0f, 0.0f, 0.0f};
     const vsh_light light = sun((const double[]){1.0, 0.0, 0.0}, 0.1);
@@ -46,7 +47,7 @@ static void shading_normals_stand_in_for_geometric_ones(void **state) {
     assert_float_equal(rgb[0], 1.0, 1e-6);
 }
 
-static void falloffs_follow_their_formulas(void **state) {
+TEST(falloffs_follow_their_formulas) {
     for (double d = 0.3; d < 20.0; d *= 1.4) {
         vsh_light light = lamp((const double[]){0.0, d, 0.0}, 0.25);
         assert_float_equal(red(&light), 1.0, 1e-6);
@@ -59,7 +60,7 @@ static void falloffs_follow_their_formulas(void **state) {
     }
 }
 
-static void a_point_at_the_light_gets_no_infinity(void **state) {
+TEST(a_point_at_the_light_gets_no_infinity) {
     const double distances[] = {0.0, 1e-300, 1e-30, 1e-3, 0.2};
     for (size_t i = 0; i < sizeof distances / sizeof distances[0]; ++i) {
         vsh_light light = lamp((const double[]){0.0, distances[i], 0.0}, 0.25);
@@ -69,7 +70,7 @@ static void a_point_at_the_light_gets_no_infinity(void **state) {
     }
 }
 
-static void a_spot_fades_smoothly_between_its_angles(void **state) {
+TEST(a_spot_fades_smoothly_between_its_angles) {
     vsh_light light = lamp((const double[]){0.0, 2.0, 0.0}, 0.1);
     light.type = VSH_LIGHT_SPOT;
     light.inner_angle = RADIANS(20.0);
@@ -109,7 +110,7 @@ static void a_spot_fades_smoothly_between_its_angles(void **state) {
     assert_true(red(&light) == 1.0f);
 }
 
-static void colour_and_visibility_multiply_and_lights_add(void **state) {
+TEST(colour_and_visibility_multiply_and_lights_add) {
     enum { COUNT = 5 };
     const double positions[3 * COUNT] = {0.0};
     float normals[3 * COUNT], rgb[3 * COUNT];
@@ -134,7 +135,7 @@ static void colour_and_visibility_multiply_and_lights_add(void **state) {
     assert_true(rgb[9] == 10.0f); /* NaN adds nothing */
 }
 
-static void what_has_no_place_or_normal_adds_nothing(void **state) {
+TEST(what_has_no_place_or_normal_adds_nothing) {
     const double positions[6] = {(double)NAN, 0.0, 0.0, 0.0, (double)INFINITY, 0.0};
     const float normals[6] = {0.0f, 1.0f, 0.0f, 0.0f, 1.0f, 0.0f};
     const float visible[2] = {1.0f, 1.0f};
@@ -154,14 +155,5 @@ static void what_has_no_place_or_normal_adds_nothing(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_cosine_to_the_light_weighs_it),
-        cmocka_unit_test(shading_normals_stand_in_for_geometric_ones),
-        cmocka_unit_test(falloffs_follow_their_formulas),
-        cmocka_unit_test(a_point_at_the_light_gets_no_infinity),
-        cmocka_unit_test(a_spot_fades_smoothly_between_its_angles),
-        cmocka_unit_test(colour_and_visibility_multiply_and_lights_add),
-        cmocka_unit_test(what_has_no_place_or_normal_adds_nothing),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -83,7 +83,7 @@ static void expect_same(const march_result *a, const march_result *b, size_t cou
     assert_int_equal(a->stats.unfinished, b->stats.unfinished);
 }
 
-static void every_kernel_marches_the_same_bits(void **state) {
+TEST(every_kernel_marches_the_same_bits) {
     vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
     static march_result base, other;
     const size_t counts[] = {0, 1, 3, 4, 5, 15, 16, 17, 100, 1000};
@@ -157,7 +157,7 @@ static void shade_with(const caster *c, const vsh_light *light, int32_t method, 
                                            o->deviation, NULL, &o->stats, &failure));
 }
 
-static void every_method_gives_the_same_bits_on_every_instruction_set(void **state) {
+TEST(every_method_gives_the_same_bits_on_every_instruction_set) {
     static outcome base, other;
     int32_t sets[VSHI_ISA_COUNT];
     const size_t count = sets_here(sets);
@@ -187,7 +187,7 @@ static void every_method_gives_the_same_bits_on_every_instruction_set(void **sta
     caster_free(&c);
 }
 
-static void an_instruction_set_that_is_missing_or_unknown_is_refused_by_name(void **state) {
+TEST(an_instruction_set_that_is_missing_or_unknown_is_refused_by_name) {
     vsh_field *field = field_of(truth_seeds(), 0.2, 1.0);
     const double place[3] = {0.0, 3.0, 0.0};
     const vsh_points points = {1, place, NULL, NULL};
@@ -215,7 +215,7 @@ static void an_instruction_set_that_is_missing_or_unknown_is_refused_by_name(voi
     vsh_field_free(field);
 }
 
-static void the_best_set_is_one_that_this_machine_has(void **state) {
+TEST(the_best_set_is_one_that_this_machine_has) {
     assert_true(vsh_isa_available(VSH_ISA_BASE) && vsh_isa_available(VSH_ISA_BEST));
     assert_false(vsh_isa_available(-1) || vsh_isa_available(VSHI_ISA_COUNT));
     const int32_t best = vshi_isa_resolve(VSH_ISA_BEST);
@@ -223,11 +223,5 @@ static void the_best_set_is_one_that_this_machine_has(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_kernel_marches_the_same_bits),
-        cmocka_unit_test(every_method_gives_the_same_bits_on_every_instruction_set),
-        cmocka_unit_test(an_instruction_set_that_is_missing_or_unknown_is_refused_by_name),
-        cmocka_unit_test(the_best_set_is_one_that_this_machine_has),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

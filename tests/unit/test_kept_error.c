@@ -126,7 +126,7 @@ static void check(const char *what, double max_error, const float *values, const
     }
 }
 
-static void procedural_scenes_keep_the_error_that_is_asked_for(void **state) {
+TEST(procedural_scenes_keep_the_error_that_is_asked_for) {
     static const struct {
         const char *name;
         void (*make)(shapes *s);
@@ -164,7 +164,7 @@ static void procedural_scenes_keep_the_error_that_is_asked_for(void **state) {
 
 /* A box and a sphere in a level set of 0.0117; beside it a plane of 16 units, whose voxels would be larger.
  */
-static void a_level_set_keeps_its_voxels_beside_a_large_plane(void **state) {
+TEST(a_level_set_keeps_its_voxels_beside_a_large_plane) {
     static baked alone, beside;
     char text[1024];
     vsh_sdf_node nodes[3] = {vsh_sdf_node_default(), vsh_sdf_node_default(), vsh_sdf_node_default()};
@@ -211,7 +211,7 @@ static double bend(const float *values, const float *truth, int first, int last)
     return sum / (double)count;
 }
 
-static void penumbrae_rise_smoothly_at_their_ends(void **state) {
+TEST(penumbrae_rise_smoothly_at_their_ends) {
     enum { FIRST = 200, LAST = 240 };
     static const double up[3] = {0.0, 1.0, 0.0};
     static baked b;
@@ -238,10 +238,5 @@ int main(void) {
     if (!vsh_triangles_available()) {
         return 0;
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(procedural_scenes_keep_the_error_that_is_asked_for),
-        cmocka_unit_test(penumbrae_rise_smoothly_at_their_ends),
-        cmocka_unit_test(a_level_set_keeps_its_voxels_beside_a_large_plane),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

@@ -66,7 +66,7 @@ static vsh_layer layer_of(const vsh_field *field) {
     return layer;
 }
 
-static void where_nothing_casts_all_light_arrives_that_the_horizon_lets_through(void **state) {
+TEST(where_nothing_casts_all_light_arrives_that_the_horizon_lets_through) {
     vsh_field *empty = nothing(0.05);
     const vsh_light above = sun(towards, 0.2);
     const vsh_light low = sun((const double[]){1.0, 0.0, 0.0}, 0.2); /* half of it below the horizon */
@@ -87,7 +87,7 @@ static void where_nothing_casts_all_light_arrives_that_the_horizon_lets_through(
 }
 
 /* Light from so low that the horizon cuts into it, which is not to count twice. */
-static void a_layer_over_nothing_is_as_the_field_itself(void **state) {
+TEST(a_layer_over_nothing_is_as_the_field_itself) {
     vsh_field *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05), *empty = nothing(0.05);
     const vsh_layer layer = layer_of(field);
     const vsh_light lights[2] = {sun(towards, 0.2), sun((const double[]){1.0, 0.05, 0.2}, 0.2)};
@@ -108,7 +108,7 @@ static void a_layer_over_nothing_is_as_the_field_itself(void **state) {
 
 /* Two balls whose shadows do not meet: the product of their layers is the shadow of both. The truth is the
  * union in one field. Where their discs overlap in the sky, the product is that of independent shares. */
-static void layers_whose_shadows_do_not_meet_are_as_their_union(void **state) {
+TEST(layers_whose_shadows_do_not_meet_are_as_their_union) {
     vsh_field *a = field_of_ball(-1.0, 0.6, -0.6, 0.3, 0.025), *b = field_of_ball(1.0, 0.6, 0.6, 0.3, 0.025);
     const truth_solid both[2] = {ball(-1.0, 0.6, -0.6, 0.3), ball(1.0, 0.6, 0.6, 0.3)};
     vsh_field *all = field_of((truth_scene){both, 2}, 0.025, 4.0);
@@ -131,7 +131,7 @@ static void layers_whose_shadows_do_not_meet_are_as_their_union(void **state) {
 }
 
 /* The darker of both is the field alone, bit by bit, the product its square. */
-static void a_layer_that_repeats_the_field_is_combined_as_it_says(void **state) {
+TEST(a_layer_that_repeats_the_field_is_combined_as_it_says) {
     vsh_field *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05);
     const vsh_light light = sun(towards, 0.2);
     vsh_layer layer = layer_of(field);
@@ -156,7 +156,7 @@ static void a_layer_that_repeats_the_field_is_combined_as_it_says(void **state) 
     vsh_field_free(field);
 }
 
-static void half_the_softness_is_half_the_light(void **state) {
+TEST(half_the_softness_is_half_the_light) {
     vsh_field *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05), *empty = nothing(0.05);
     const vsh_light full = sun(towards, 2.0 * atan(0.1)), half = sun(towards, 2.0 * atan(0.05));
     vsh_layer layer = layer_of(field);
@@ -177,7 +177,7 @@ static void half_the_softness_is_half_the_light(void **state) {
     vsh_field_free(empty);
 }
 
-static void a_layer_casts_for_the_lights_it_names_and_in_ao_where_it_says_so(void **state) {
+TEST(a_layer_casts_for_the_lights_it_names_and_in_ao_where_it_says_so) {
     vsh_field *field = field_of_ball(0.0, 0.4, 0.0, 0.4, 0.05), *empty = nothing(0.05);
     vsh_light light = sun(towards, 0.2);
     const char *const names[] = {"moon", "sun"};
@@ -209,7 +209,7 @@ static void a_layer_casts_for_the_lights_it_names_and_in_ao_where_it_says_so(voi
     vsh_field_free(empty);
 }
 
-static void deviations_of_independent_values_add_up(void **state) {
+TEST(deviations_of_independent_values_add_up) {
     vsh_field *a = field_of_ball(-0.2, 0.8, 0.0, 0.5, 0.05), *b = field_of_ball(0.2, 0.9, 0.1, 0.5, 0.05);
     const vsh_light light = sun(towards, 0.3);
     vsh_layer layer = layer_of(b);
@@ -268,7 +268,7 @@ static void bake_floor(const vsh_field *field, const vsh_layer *layers, size_t l
 /* A wall of [-0.2, 0.2] × [0, 1] across the floor's slab: as one field, in a layer of its own, and all of it
  * in a layer of voxels four times as large as those that start offsets are measured in. The receiver must not
  * shade itself, and what is under the wall is invalid and filled in each way. */
-static void lightmaps_are_the_same_however_casters_are_layered(void **state) {
+TEST(lightmaps_are_the_same_however_casters_are_layered) {
     const truth_solid slab = {.shape = TRUTH_BOX, .center = {0.0, -0.25, 0.0}, .half = {1.5, 0.25, 1.5}};
     const truth_solid wall = {.shape = TRUTH_BOX, .center = {0.0, 0.4, 0.0}, .half = {0.2, 0.6, 1.5}};
     const truth_solid both[2] = {slab, wall};
@@ -291,7 +291,7 @@ static void lightmaps_are_the_same_however_casters_are_layered(void **state) {
     vsh_field_free(empty);
 }
 
-static void layers_out_of_range_are_refused(void **state) {
+TEST(layers_out_of_range_are_refused) {
     vsh_field *empty = nothing(0.05);
     const vsh_light light = sun(towards, 0.2);
     const vsh_points points = {1, positions, normals, NULL};
@@ -336,16 +336,5 @@ static int fill(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(where_nothing_casts_all_light_arrives_that_the_horizon_lets_through),
-        cmocka_unit_test(a_layer_over_nothing_is_as_the_field_itself),
-        cmocka_unit_test(layers_whose_shadows_do_not_meet_are_as_their_union),
-        cmocka_unit_test(a_layer_that_repeats_the_field_is_combined_as_it_says),
-        cmocka_unit_test(half_the_softness_is_half_the_light),
-        cmocka_unit_test(a_layer_casts_for_the_lights_it_names_and_in_ao_where_it_says_so),
-        cmocka_unit_test(deviations_of_independent_values_add_up),
-        cmocka_unit_test(lightmaps_are_the_same_however_casters_are_layered),
-        cmocka_unit_test(layers_out_of_range_are_refused),
-    };
-    return cmocka_run_group_tests(tests, fill, NULL);
+    return run_all_tests(fill, NULL);
 }

@@ -124,7 +124,7 @@ static double towards(const vsh_light *light, const double *from, double to[3]) 
 }
 
 /* A bar over the sphere: its shadow is narrower than two of the lifts that would move it. */
-static void rays_to_a_light_well_above_a_facet_begin_on_it(void **state) {
+TEST(rays_to_a_light_well_above_a_facet_begin_on_it) {
     static float shadow[TEXELS], truth[TEXELS], *const planes[1] = {shadow};
     box bar;
     make_box(&bar, (double[]){-0.03, 1.05, -1.0}, (double[]){0.0, 1.08, 1.0});
@@ -155,7 +155,7 @@ static void rays_to_a_light_well_above_a_facet_begin_on_it(void **state) {
 }
 
 /* A light of 11.5° each way, near and far. */
-static void facets_do_not_hide_a_light_that_is_over_the_smooth_sphere(void **state) {
+TEST(facets_do_not_hide_a_light_that_is_over_the_smooth_sphere) {
     static const double SINE = 0.2;
     static float shadow[TEXELS], *const planes[1] = {shadow};
     scene s;
@@ -186,7 +186,7 @@ static void facets_do_not_hide_a_light_that_is_over_the_smooth_sphere(void **sta
 }
 
 /* Its light is the cosine of the smooth normal, from where the light stands over the horizon. */
-static void pictures_show_no_facets_where_light_grazes_a_smooth_sphere(void **state) {
+TEST(pictures_show_no_facets_where_light_grazes_a_smooth_sphere) {
     enum { SIZE = 64 };
     static float color[3 * SIZE * SIZE], alpha[SIZE * SIZE], depth[SIZE * SIZE], normal[3 * SIZE * SIZE];
     scene s;
@@ -218,7 +218,7 @@ static void pictures_show_no_facets_where_light_grazes_a_smooth_sphere(void **st
 }
 
 /* A box whose face cuts the sphere: between the facets and the smooth sphere, near the cut. */
-static void samples_are_valid_by_where_their_facets_are(void **state) {
+TEST(samples_are_valid_by_where_their_facets_are) {
     static const double FACE = 0.953, CLEAR = 1e-4;
     static float ao[TEXELS], coverage[TEXELS];
     box wall;
@@ -238,7 +238,7 @@ static void samples_are_valid_by_where_their_facets_are(void **state) {
 }
 
 /* A box just beyond the smooth sphere. */
-static void ao_close_to_a_wall_is_that_of_the_facets(void **state) {
+TEST(ao_close_to_a_wall_is_that_of_the_facets) {
     static const double FACE = 1.018;
     static float ao[TEXELS], truth[TEXELS];
     box wall;
@@ -258,7 +258,7 @@ static void ao_close_to_a_wall_is_that_of_the_facets(void **state) {
     close_scene(&s);
 }
 
-static void ao_of_a_smooth_convex_body_in_the_open_is_1(void **state) {
+TEST(ao_of_a_smooth_convex_body_in_the_open_is_1) {
     static float ao[TEXELS];
     scene s;
     open_scene(&s, NULL);
@@ -269,7 +269,7 @@ static void ao_of_a_smooth_convex_body_in_the_open_is_1(void **state) {
     close_scene(&s);
 }
 
-static void queries_take_the_normals_of_faces_for_ao(void **state) {
+TEST(queries_take_the_normals_of_faces_for_ao) {
     scene s;
     open_scene(&s, NULL);
     vsh_shade_options options = vsh_shade_options_default();
@@ -340,7 +340,7 @@ static double mean_ao_between_walls(const float *normals) {
 /* Normals that lean by 10 degrees at both ends turn the hemisphere by as much; they open no view over the
  * walls.
  */
-static void leaning_normals_do_not_lift_ao_over_low_walls(void **state) {
+TEST(leaning_normals_do_not_lift_ao_over_low_walls) {
     static const float SIN = 0.17364818f, COS = 0.98480775f;
     const float leaning[12] = {0.0f, -SIN, COS, 0.0f, -SIN, COS, 0.0f, SIN, COS, 0.0f, SIN, COS};
     const double flat = mean_ao_between_walls(NULL), bent = mean_ao_between_walls(leaning);
@@ -350,7 +350,7 @@ static void leaning_normals_do_not_lift_ao_over_low_walls(void **state) {
 }
 
 /* A wall at growing distances from the sphere, under a wide sun that the facets' planes cut. */
-static void a_lift_fades_as_neighbours_come_near(void **state) {
+TEST(a_lift_fades_as_neighbours_come_near) {
     enum { WALLS = 40 };
     static const double FIRST = 1.0, STEP = 0.002;
     vsh_light light = sun_towards(0.0, 1.0, 0.0);
@@ -387,7 +387,7 @@ static void a_lift_fades_as_neighbours_come_near(void **state) {
     assert_true(lifted > 100 && faded > 100);
 }
 
-static void a_light_changes_nothing_for_other_lights_and_ao(void **state) {
+TEST(a_light_changes_nothing_for_other_lights_and_ao) {
     static float values[5][TEXELS];
     float *const planes[5] = {values[0], values[1], values[2], values[3], values[4]};
     scene s;
@@ -405,17 +405,5 @@ int main(void) {
     if (!vsh_triangles_available()) {
         return 0;
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rays_to_a_light_well_above_a_facet_begin_on_it),
-        cmocka_unit_test(facets_do_not_hide_a_light_that_is_over_the_smooth_sphere),
-        cmocka_unit_test(pictures_show_no_facets_where_light_grazes_a_smooth_sphere),
-        cmocka_unit_test(samples_are_valid_by_where_their_facets_are),
-        cmocka_unit_test(ao_close_to_a_wall_is_that_of_the_facets),
-        cmocka_unit_test(ao_of_a_smooth_convex_body_in_the_open_is_1),
-        cmocka_unit_test(queries_take_the_normals_of_faces_for_ao),
-        cmocka_unit_test(leaning_normals_do_not_lift_ao_over_low_walls),
-        cmocka_unit_test(a_lift_fades_as_neighbours_come_near),
-        cmocka_unit_test(a_light_changes_nothing_for_other_lights_and_ao),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

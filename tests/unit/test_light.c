@@ -1,11 +1,5 @@
 /* vsh_light_check() and names of constants. */
 #include "expect.h"
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include <math.h>
 #include <stdio.h>
@@ -56,7 +50,7 @@ static void refuses(const vsh_light *light, const char *message) {
     assert_int_equal(vsh_light_check(light, NULL), VSH_ERROR_ARGUMENT);
 }
 
-static void defaults_zero_sizes_and_fields_of_other_types_pass(void **state) {
+TEST(defaults_zero_sizes_and_fields_of_other_types_pass) {
     vsh_light lights[7] = {sun(), lamp(), spot(), sun(), lamp(), sun(), lamp()};
     lights[3].angle = lights[4].radius = 0.0;
     vsh_light *light = &lights[5];
@@ -73,7 +67,7 @@ static void defaults_zero_sizes_and_fields_of_other_types_pass(void **state) {
     }
 }
 
-static void the_ends_of_angles_are_in_range(void **state) {
+TEST(the_ends_of_angles_are_in_range) {
     const double pi = 3.14159265358979323846;
     vsh_light light = sun();
     light.angle = nextafter(pi, 0.0);
@@ -83,7 +77,7 @@ static void the_ends_of_angles_are_in_range(void **state) {
     accepts(&light);
 }
 
-static void bad_values_are_named_with_field_and_limit(void **state) {
+TEST(bad_values_are_named_with_field_and_limit) {
     vsh_light light;
     const struct {
         vsh_light (*make)(void);
@@ -124,7 +118,7 @@ static void bad_values_are_named_with_field_and_limit(void **state) {
     refuses(NULL, "light: is NULL");
 }
 
-static void names_are_what_a_channel_can_hold(void **state) {
+TEST(names_are_what_a_channel_can_hold) {
     static const char *const good[] = {"key-Light_2", "",
                                        "xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx"};
     vsh_light light = sun();
@@ -138,7 +132,7 @@ static void names_are_what_a_channel_can_hold(void **state) {
     refuses(&light, "light: name 'a.b': expected at most 63 letters, digits, '_' and '-'");
 }
 
-static void every_constant_has_its_name_and_every_name_its_constant(void **state) {
+TEST(every_constant_has_its_name_and_every_name_its_constant) {
     enum { KINDS = VSH_NAMES_MEASURE + 1, MOST = 11 };
     static const char *const names[KINDS][MOST] = {
         [VSH_NAMES_ISA] = {[VSH_ISA_BEST] = "best",
@@ -226,12 +220,5 @@ static void every_constant_has_its_name_and_every_name_its_constant(void **state
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(defaults_zero_sizes_and_fields_of_other_types_pass),
-        cmocka_unit_test(the_ends_of_angles_are_in_range),
-        cmocka_unit_test(bad_values_are_named_with_field_and_limit),
-        cmocka_unit_test(names_are_what_a_channel_can_hold),
-        cmocka_unit_test(every_constant_has_its_name_and_every_name_its_constant),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

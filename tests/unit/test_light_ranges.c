@@ -4,6 +4,7 @@
 #include "field/field.h"
 #include "methods.h"
 #include "terrain.h"
+#include "tests.h"
 
 #include <vdbshade/spheres.h>
 
@@ -16,7 +17,7 @@ static caster plate(double voxel) {
 
 /* A ball over the receiver, out of the axis: truth by 4096 rays; cones of one edge are right to what a round
  * edge differs from a straight one. */
-static void lights_of_0_to_179_degrees_stay_in_range_and_near_the_truth(void **state) {
+TEST(lights_of_0_to_179_degrees_stay_in_range_and_near_the_truth) {
     const truth_solid ball = {TRUTH_SPHERE, {0.0, 2.0, 0.0}, {0.0, 0.0, 0.0}, 0.7, 0.0};
     const truth_scene scene = {&ball, 1};
     caster c = caster_of(scene, 0.04, 0.0), open = plate(0.06);
@@ -58,7 +59,7 @@ static void lights_of_0_to_179_degrees_stay_in_range_and_near_the_truth(void **s
 }
 
 /* A lamp over a plate, with nothing between them, and one under it; radii and distances of 1e-6 … 1e6. */
-static void lamps_of_1e_6_to_1e6_units_are_seen_from_above_and_not_through_the_plate(void **state) {
+TEST(lamps_of_1e_6_to_1e6_units_are_seen_from_above_and_not_through_the_plate) {
     caster c = plate(0.06);
     for (double away = 1e-6; away < 2e6; away *= 10.0) {
         for (double radius = 1e-6; radius < 2e6; radius *= 10.0) {
@@ -80,7 +81,7 @@ static void lamps_of_1e_6_to_1e6_units_are_seen_from_above_and_not_through_the_p
     caster_free(&c);
 }
 
-static void lamps_on_a_surface_light_its_own_side(void **state) {
+TEST(lamps_on_a_surface_light_its_own_side) {
     const double voxel = 0.05;
     caster c = plate(voxel);
     uint64_t counter = 6;
@@ -102,7 +103,7 @@ static void lamps_on_a_surface_light_its_own_side(void **state) {
 }
 
 /* Balls and boxes with a lamp in them, which may be larger than a voxel: rays to it meet the caster. */
-static void lamps_in_casters_light_nothing_outside(void **state) {
+TEST(lamps_in_casters_light_nothing_outside) {
     const truth_solid solids[2] = {{TRUTH_SPHERE, {-1.2, 0.0, 0.0}, {0, 0, 0}, 0.7, 0.0},
                                    {TRUTH_BOX, {1.2, 0.1, 0.0}, {0.6, 0.5, 0.7}, 0.0, 0.0}};
     const truth_scene scene = {solids, 2};
@@ -131,7 +132,7 @@ static void lamps_in_casters_light_nothing_outside(void **state) {
 /* Over a floor with nothing near, by its height and its radius: what the receiver sees of it is what its own
  * horizon leaves, however near it is; 0 away is in it. Turned aside, to `elevation` over the floor, it must
  * not sink under the place that rays begin at. */
-static void lamps_at_the_receiver_are_cut_by_its_horizon_only(void **state) {
+TEST(lamps_at_the_receiver_are_cut_by_its_horizon_only) {
     const double voxel = 0.06;
     caster c = plate(voxel);
     const double parts[] = {0.0, 1e-6, 0.01, 0.1, 0.2, 0.25, 0.3, 0.5, 1.0, 2.0}; /* of a voxel */
@@ -163,7 +164,7 @@ static void lamps_at_the_receiver_are_cut_by_its_horizon_only(void **state) {
 }
 
 /* With the triangles there is a truth for it: the one ray. */
-static void exact_of_a_light_without_size_is_one_traced_ray(void **state) {
+TEST(exact_of_a_light_without_size_is_one_traced_ray) {
     enum { SIDE = 64, COUNT = SIDE * SIDE };
     static double positions[3 * COUNT];
     static float normals[3 * COUNT], exact[COUNT], ray[COUNT];
@@ -225,7 +226,7 @@ static vsh_triangles *triangles_of_turned(const vsh_sdf_node *node, int axis, do
 
 /* Down to a millionth of a radian over the horizon: what the whole light is above of is lit, whichever way
  * the plate lies on the lattice. */
-static void grazing_light_reaches_an_open_plate(void **state) {
+TEST(grazing_light_reaches_an_open_plate) {
     for (int turn = 0; turn < 3; ++turn) {
         const double half = RADIANS(0.5 * (turn == 0 ? 0.0 : turn == 1 ? 31.0 : 10.0));
         vsh_sdf_node node = vsh_sdf_node_default();
@@ -343,7 +344,7 @@ static double mean_difference(const float *a, const float *b) {
 }
 
 /* Tries every type, size, method and kind of caster. Values of large lights only have to stay in range. */
-static void tiny_lights_are_hard_lights(void **state) {
+TEST(tiny_lights_are_hard_lights) {
     static const double SIZES[] = {5e-324, 1e-300, 1e-200, 1e-100, 1e-50, 1e-45, 1e-38, 1e-30,
                                    1e-20,  1e-15,  1e-10,  1e-8,   1e-7,  1e-6,  1e-5,  1e-4,
                                    1.0,    3.14,   1e3,    1e10,   1e15,  1e30,  1e99};
@@ -384,7 +385,7 @@ static void tiny_lights_are_hard_lights(void **state) {
 }
 
 /* Tries every method and kind of caster, and the last double below 180 degrees. */
-static void suns_just_below_180_degrees_are_as_those_of_179_99(void **state) {
+TEST(suns_just_below_180_degrees_are_as_those_of_179_99) {
     const double angles[] = {RADIANS(179.9999), RADIANS(179.999999), RADIANS(179.99999999),
                              RADIANS(179.9999999999), nextafter(PI, 0.0)};
     ranges_stage s = set_up();
@@ -406,16 +407,5 @@ static void suns_just_below_180_degrees_are_as_those_of_179_99(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lights_of_0_to_179_degrees_stay_in_range_and_near_the_truth),
-        cmocka_unit_test(lamps_of_1e_6_to_1e6_units_are_seen_from_above_and_not_through_the_plate),
-        cmocka_unit_test(lamps_on_a_surface_light_its_own_side),
-        cmocka_unit_test(lamps_in_casters_light_nothing_outside),
-        cmocka_unit_test(lamps_at_the_receiver_are_cut_by_its_horizon_only),
-        cmocka_unit_test(exact_of_a_light_without_size_is_one_traced_ray),
-        cmocka_unit_test(grazing_light_reaches_an_open_plate),
-        cmocka_unit_test(tiny_lights_are_hard_lights),
-        cmocka_unit_test(suns_just_below_180_degrees_are_as_those_of_179_99),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

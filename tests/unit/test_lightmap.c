@@ -34,7 +34,7 @@ static void end(stage *s) {
     vsh_field_free(s->field);
 }
 
-static void a_floor_under_open_sky_is_exactly_lit(void **state) {
+TEST(a_floor_under_open_sky_is_exactly_lit) {
     const vsh_light light = sun(0.3, 1.0, 0.2, 0.2);
     static const int32_t sizes[][2] = {{SIZE, 0}, {1, 4}}; /* with their padding */
     for (int k = 0; k < 2; ++k) {
@@ -52,7 +52,7 @@ static void a_floor_under_open_sky_is_exactly_lit(void **state) {
     }
 }
 
-static void texels_under_a_wall_are_invalid_and_nothing_leaks_on_either_side(void **state) {
+TEST(texels_under_a_wall_are_invalid_and_nothing_leaks_on_either_side) {
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
     uint64_t invalid_by_mesh[1] = {77}, invalid = 0;
     stage s = begin_floor(1, SIZE, 1, 0);
@@ -78,7 +78,7 @@ static void texels_under_a_wall_are_invalid_and_nothing_leaks_on_either_side(voi
     end(&s);
 }
 
-static void padding_copies_dark_and_lit_texels_and_leaves_coverage(void **state) {
+TEST(padding_copies_dark_and_lit_texels_and_leaves_coverage) {
     enum { PADDING = 3 };
     /* The part x < -0.5 of the floor, all of it in shadow, and a chart around it. */
     const float positions[12] = {-1, 0, 1, -0.5f, 0, 1, -0.5f, 0, -1, -1, 0, -1};
@@ -105,7 +105,7 @@ static void padding_copies_dark_and_lit_texels_and_leaves_coverage(void **state)
     end(&s);
 }
 
-static void a_texel_is_the_mean_of_its_valid_samples(void **state) {
+TEST(a_texel_is_the_mean_of_its_valid_samples) {
     enum { N = 3, SMALL = 16 };
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.3);
     stage coarse = begin_floor(1, SMALL, N, 0), fine = begin_floor(1, SMALL * N, 1, 0);
@@ -127,7 +127,7 @@ static void a_texel_is_the_mean_of_its_valid_samples(void **state) {
 }
 
 /* A UV sphere, smooth, of `ROWS` × 2 `ROWS` cells, as receiver and caster. */
-static void a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne(void **state) {
+TEST(a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne) {
     enum { ROWS = 8, COLUMNS = 2 * ROWS, VERTICES = (ROWS + 1) * (COLUMNS + 1) };
     float positions[3 * VERTICES], uvs[2 * VERTICES];
     uint32_t indices[6 * ROWS * COLUMNS];
@@ -175,7 +175,7 @@ static void a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne(void **sta
     end(&s);
 }
 
-static void an_open_sheet_does_not_shade_itself(void **state) {
+TEST(an_open_sheet_does_not_shade_itself) {
     const vsh_mesh mesh = floor_mesh();
     const vsh_light light = sun(0.5, 0.8, 0.1, 0.1);
     stage s = begin(field_of_mesh(&mesh, VOXEL), &mesh, SIZE, 1, 0);
@@ -189,7 +189,7 @@ static void an_open_sheet_does_not_shade_itself(void **state) {
 
 /* --- How a lightmap is baked: its planes, their errors, threads, options, limits. */
 
-static void irradiance_is_visibility_times_colour_times_cosine_times_ao(void **state) {
+TEST(irradiance_is_visibility_times_colour_times_cosine_times_ao) {
     vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
     light.color[0] = 2.0;
     light.color[1] = 0.5;
@@ -210,7 +210,7 @@ static void irradiance_is_visibility_times_colour_times_cosine_times_ao(void **s
     end(&s);
 }
 
-static void planes_that_are_not_asked_for_cost_nothing_and_change_nothing(void **state) {
+TEST(planes_that_are_not_asked_for_cost_nothing_and_change_nothing) {
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
     stage s = begin_floor(1, SIZE, 1, 2);
     bake_stage(&s, &light);
@@ -230,7 +230,7 @@ static void planes_that_are_not_asked_for_cost_nothing_and_change_nothing(void *
     end(&s);
 }
 
-static void any_number_of_threads_gives_the_same_bits(void **state) {
+TEST(any_number_of_threads_gives_the_same_bits) {
     const vsh_light light = sun(1.0, 0.7, 0.3, 0.2);
     stage s = begin_floor(1, SIZE, 3, 4);
     bake(s.field, s.charts, &light, &s.p->all, NULL, 1);
@@ -251,7 +251,7 @@ static int32_t stop_in_bake(void *user, const char *step, double fraction) {
     return strcmp(step, "bake") == 0 && fraction > 0.0;
 }
 
-static void bad_options_limits_and_cancelling_are_reported(void **state) {
+TEST(bad_options_limits_and_cancelling_are_reported) {
     const struct {
         double start_offset, surface_offset, angle;
         uint64_t memory_limit;
@@ -298,7 +298,7 @@ static vsh_bake_stats bake_errors(int32_t method, float *shadow, float *shadow_e
     return stats;
 }
 
-static void errors_are_baked_where_the_method_knows_them(void **state) {
+TEST(errors_are_baked_where_the_method_knows_them) {
     static float shadow[TEXELS], errors[TEXELS], alone[TEXELS], ao[TEXELS];
     const vsh_bake_stats stats = bake_errors(VSH_SHADOW_ADAPTIVE, shadow, errors, ao);
     size_t some = 0, none = 0;
@@ -320,18 +320,5 @@ static void errors_are_baked_where_the_method_knows_them(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_floor_under_open_sky_is_exactly_lit),
-        cmocka_unit_test(texels_under_a_wall_are_invalid_and_nothing_leaks_on_either_side),
-        cmocka_unit_test(padding_copies_dark_and_lit_texels_and_leaves_coverage),
-        cmocka_unit_test(a_texel_is_the_mean_of_its_valid_samples),
-        cmocka_unit_test(a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne),
-        cmocka_unit_test(an_open_sheet_does_not_shade_itself),
-        cmocka_unit_test(errors_are_baked_where_the_method_knows_them),
-        cmocka_unit_test(irradiance_is_visibility_times_colour_times_cosine_times_ao),
-        cmocka_unit_test(planes_that_are_not_asked_for_cost_nothing_and_change_nothing),
-        cmocka_unit_test(any_number_of_threads_gives_the_same_bits),
-        cmocka_unit_test(bad_options_limits_and_cancelling_are_reported),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,12 +1,6 @@
 /* Which neighbouring texels hang together: charts as an atlas may lay them out, whose surfaces are known. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "shade/links.h"
+#include "tests.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -155,7 +149,7 @@ static void two_sides(int32_t x, int32_t y, const double how[2], double position
     normal[1] = x < BORDER ? 1.0 : -1.0;
 }
 
-static void texels_of_one_surface_hang_together_and_those_of_two_do_not(void **state) {
+TEST(texels_of_one_surface_hang_together_and_those_of_two_do_not) {
     static const struct {
         layout_fn *layout;
         double how[2];
@@ -212,7 +206,7 @@ static bool in_one_lower_column(int32_t x0, int32_t y0, int32_t x1, int32_t y1) 
 }
 
 /* Charts a texel wide, of which each has but one other step that tells how long they are; or of a texel. */
-static void strips_that_touch_but_lie_apart_do_not(void **state) {
+TEST(strips_that_touch_but_lie_apart_do_not) {
     static image m;
     static expected_fn *const expected[2][2] = {{in_one_row, in_one_later_row},
                                                 {in_one_column, in_one_lower_column}};
@@ -237,7 +231,7 @@ static bool without_holes(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
     return !is_hole(x0, y0) && !is_hole(x1, y1);
 }
 
-static void texels_without_a_point_hang_together_with_none(void **state) {
+TEST(texels_without_a_point_hang_together_with_none) {
     static image m;
     lay(&m, plane, 0.03, 0.03);
     for (int32_t i = 0; i < TEXELS; ++i) {
@@ -247,7 +241,7 @@ static void texels_without_a_point_hang_together_with_none(void **state) {
 }
 
 /* A column of texels without points, as under the wall of a shed, lies between those of a lattice. */
-static void lattices_do_not_hang_together_over_a_gap_between_their_texels(void **state) {
+TEST(lattices_do_not_hang_together_over_a_gap_between_their_texels) {
     enum { SPACING = 4, GAP = 10, COLUMNS = WIDTH / SPACING, ROWS = HEIGHT / SPACING };
     static image m;
     lay(&m, plane, 0.03, 0.03);
@@ -275,11 +269,5 @@ static void lattices_do_not_hang_together_over_a_gap_between_their_texels(void *
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(texels_of_one_surface_hang_together_and_those_of_two_do_not),
-        cmocka_unit_test(strips_that_touch_but_lie_apart_do_not),
-        cmocka_unit_test(texels_without_a_point_hang_together_with_none),
-        cmocka_unit_test(lattices_do_not_hang_together_over_a_gap_between_their_texels),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

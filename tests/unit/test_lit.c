@@ -87,7 +87,7 @@ static void assert_shows(const char *path, const vsh_model *model, const vsh_lit
 /* --- tests */
 
 /* tests/models as they are, and the rich one. */
-static void lit_by_their_own_uvs_files_change_in_their_materials_alone(void **state) {
+TEST(lit_by_their_own_uvs_files_change_in_their_materials_alone) {
     static const char *const paths[] = {VSH_MODELS "/scene.glb", VSH_MODELS "/figure.glb",
                                         VSH_MODELS "/scene.gltf", VSH_MODELS "/scene_draco.glb"};
     const vsh_lit_image image = white_image(VSH_LIT_OCCLUSION, 0);
@@ -105,7 +105,7 @@ static void lit_by_their_own_uvs_files_change_in_their_materials_alone(void **st
     }
 }
 
-static void new_uvs_leave_all_other_accessors_alone(void **state) {
+TEST(new_uvs_leave_all_other_accessors_alone) {
     lighting l = begin_lighting(make_rich(), false);
     light_white(&l, VSH_LIT_OCCLUSION);
     forget_instances(&l);
@@ -148,7 +148,7 @@ static void assert_gathered(const lighting *l, size_t from, size_t to, size_t si
     }
 }
 
-static void split_vertices_take_all_their_attributes_along(void **state) {
+TEST(split_vertices_take_all_their_attributes_along) {
     static const struct {
         const char *name;
         size_t size;
@@ -199,7 +199,7 @@ static void assert_same_floats(const asset *in, const asset *out, size_t accesso
 
 /* Bytes that only replaced vertices had are dropped, where no extension is unknown that may refer to them; no
  * index of what stays changes. */
-static void replaced_vertices_are_dropped_where_nobody_else_can_use_them(void **state) {
+TEST(replaced_vertices_are_dropped_where_nobody_else_can_use_them) {
     size_t sizes[2], accessors[2], image_view = 0;
     for (int known = 0; known < 2; ++known) {
         asset in = make_rich();
@@ -249,7 +249,7 @@ static void replaced_vertices_are_dropped_where_nobody_else_can_use_them(void **
     assert_in_range(sizes[0] - sizes[1], VERTICES * (4 + 4 + 4 + 16 + 12) - 30 - 2 * 8, VERTICES * 100);
 }
 
-static void instances_become_nodes_where_their_uvs_differ(void **state) {
+TEST(instances_become_nodes_where_their_uvs_differ) {
     lighting l = begin_lighting(make_rich(), false);
     light_white(&l, VSH_LIT_OCCLUSION);
     const json_t *many = item_of(&l.out, "nodes", 7);
@@ -292,7 +292,7 @@ static void put_on_pages(vsh_lit_mesh *lit, size_t count) {
     }
 }
 
-static void primitives_on_two_pages_become_two(void **state) {
+TEST(primitives_on_two_pages_become_two) {
     static const uint32_t pages[2] = {0, 1};
     for (int split = 0; split < 2; ++split) {
         lighting l = begin_lighting(make_rich(), split != 0);
@@ -327,7 +327,7 @@ static void primitives_on_two_pages_become_two(void **state) {
 }
 
 /* Documents of other formats keep all triangles, their places and the first set. The second set is new. */
-static void other_formats_become_documents(void **state) {
+TEST(other_formats_become_documents) {
     static const char *const paths[] = {VSH_MODELS "/scene.obj", VSH_MODELS "/scene.ply",
                                         VSH_MODELS "/scene.stl", VSH_MODELS "/scene.fbx",
                                         VSH_MODELS "/scene.dae", VSH_MODELS "/figure.fbx"};
@@ -353,7 +353,7 @@ static void other_formats_become_documents(void **state) {
     }
 }
 
-static void compressed_primitives_that_change_are_written_plain(void **state) {
+TEST(compressed_primitives_that_change_are_written_plain) {
     static const char path[] = VSH_MODELS "/scene_draco.glb";
     const vsh_lit_image image = white_image(VSH_LIT_OCCLUSION, 0);
     const vsh_lit_options options = options_of(&image, 1);
@@ -374,15 +374,5 @@ static void compressed_primitives_that_change_are_written_plain(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lit_by_their_own_uvs_files_change_in_their_materials_alone),
-        cmocka_unit_test(new_uvs_leave_all_other_accessors_alone),
-        cmocka_unit_test(split_vertices_take_all_their_attributes_along),
-        cmocka_unit_test(replaced_vertices_are_dropped_where_nobody_else_can_use_them),
-        cmocka_unit_test(instances_become_nodes_where_their_uvs_differ),
-        cmocka_unit_test(primitives_on_two_pages_become_two),
-        cmocka_unit_test(other_formats_become_documents),
-        cmocka_unit_test(compressed_primitives_that_change_are_written_plain),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

@@ -102,7 +102,7 @@ static void assert_shown(const asset *out, int purposes) {
     }
 }
 
-static void what_a_bake_made_is_replaced_by_the_next_to_the_same_file(void **state) {
+TEST(what_a_bake_made_is_replaced_by_the_next_to_the_same_file) {
     asset in = make_scene(), one = light_again(&in, OCCLUSION | LIGHTMAP, 1);
     assert_own_kept(&in, &one);
     assert_shown(&one, OCCLUSION | LIGHTMAP);
@@ -121,7 +121,7 @@ static void what_a_bake_made_is_replaced_by_the_next_to_the_same_file(void **sta
     free_assets(3, &in, &one, &last);
 }
 
-static void fewer_pages_leave_fewer_textures(void **state) {
+TEST(fewer_pages_leave_fewer_textures) {
     asset in = make_scene(), two = light_again(&in, OCCLUSION | LIGHTMAP, 2);
     asset one = light_again(&in, OCCLUSION | LIGHTMAP, 1);
     assert_int_equal(count_of(&two, "textures"), 6);
@@ -140,7 +140,7 @@ static void fewer_pages_leave_fewer_textures(void **state) {
     free_assets(6, &in, &two, &one, &less, &more, &ao);
 }
 
-static void what_others_use_or_made_stays(void **state) {
+TEST(what_others_use_or_made_stays) {
     asset in = make_scene(), one = light_again(&in, LIGHTMAP, 1);
     const json_int_t image = (json_int_t)number_of(item_of(&one, "textures", 2), "source");
     /* a stranger's, with the same image */
@@ -170,7 +170,7 @@ static void what_others_use_or_made_stays(void **state) {
 }
 
 /* What pads an image to whole eights of bytes goes with it, unless something begins there. */
-static void bytes_that_begin_where_those_of_a_bake_end_stay(void **state) {
+TEST(bytes_that_begin_where_those_of_a_bake_end_stay) {
     static const unsigned char bytes[12] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
     asset in = make_scene(), one = light_again(&in, LIGHTMAP, 1);
     const json_t *last = item_of(&one, "bufferViews", count_of(&one, "bufferViews") - 1);
@@ -185,7 +185,7 @@ static void bytes_that_begin_where_those_of_a_bake_end_stay(void **state) {
     free_assets(3, &in, &one, &two);
 }
 
-static void beside_an_extension_that_is_not_known_all_stays(void **state) {
+TEST(beside_an_extension_that_is_not_known_all_stays) {
     asset in = make_scene(), one = light_again(&in, LIGHTMAP, 1);
     put_item(&one, "extensionsUsed", json_string("VENDOR_skylights"));
     set_at(&one, "", "extensions", parsed("{\"VENDOR_skylights\":{\"texture\":2}}"));
@@ -197,7 +197,7 @@ static void beside_an_extension_that_is_not_known_all_stays(void **state) {
 }
 
 /* A number of another list, in a material of an extension that is known by its beginning. */
-static void numbers_in_extensions_of_materials_stay_as_they_are(void **state) {
+TEST(numbers_in_extensions_of_materials_stay_as_they_are) {
     asset in = make_scene(), one = light_again(&in, LIGHTMAP, 1);
     put_item(&one, "extensionsUsed", json_string("KHR_materials_woven"));
     set_at(&one, "materials/0/extensions", "KHR_materials_woven", parsed("{\"weave\":{\"index\":3}}"));
@@ -208,7 +208,7 @@ static void numbers_in_extensions_of_materials_stay_as_they_are(void **state) {
     free_assets(3, &in, &one, &two);
 }
 
-static void files_that_were_made_are_left_and_no_longer_named(void **state) {
+TEST(files_that_were_made_are_left_and_no_longer_named) {
     asset in = make_scene();
     write_glb(&in, "in.glb");
     light_file("in.glb", LIGHTMAP, 1, VSH_LIT_IMAGES_BESIDE, "lit.gltf", NULL);
@@ -240,14 +240,5 @@ static void files_that_were_made_are_left_and_no_longer_named(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_a_bake_made_is_replaced_by_the_next_to_the_same_file),
-        cmocka_unit_test(fewer_pages_leave_fewer_textures),
-        cmocka_unit_test(what_others_use_or_made_stays),
-        cmocka_unit_test(bytes_that_begin_where_those_of_a_bake_end_stay),
-        cmocka_unit_test(beside_an_extension_that_is_not_known_all_stays),
-        cmocka_unit_test(numbers_in_extensions_of_materials_stay_as_they_are),
-        cmocka_unit_test(files_that_were_made_are_left_and_no_longer_named),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

@@ -47,7 +47,7 @@ static vsh_result write_in(const lighting *l, const vsh_run *run) {
 /* --- documents */
 
 /* What the model does not read, or what has changed since, is found all the same. */
-static void damaged_documents_are_refused(void **state) {
+TEST(damaged_documents_are_refused) {
     static const struct {
         const char *object, *key, *value, *part;
     } damages[] = {
@@ -98,7 +98,7 @@ static void damaged_documents_are_refused(void **state) {
     end_lighting(&l);
 }
 
-static void damaged_buffers_are_refused(void **state) {
+TEST(damaged_buffers_are_refused) {
     lighting l = begin_sound();
     /* as many triangles of as many vertices, one of which is turned over */
     unsigned char *indices =
@@ -130,7 +130,7 @@ static void damaged_buffers_are_refused(void **state) {
     end_lighting(&l);
 }
 
-static void cut_files_are_refused_at_every_length(void **state) {
+TEST(cut_files_are_refused_at_every_length) {
     lighting l = begin_sound();
     size_t size;
     unsigned char *bytes = load_bytes(path_of("in.glb").text, &size);
@@ -143,7 +143,7 @@ static void cut_files_are_refused_at_every_length(void **state) {
 }
 
 /* Whatever a byte becomes, it is a sound file or a refusal. */
-static void flipped_bytes_end_in_a_file_or_a_reason(void **state) {
+TEST(flipped_bytes_end_in_a_file_or_a_reason) {
     enum { TRIES = 500 };
     lighting l = begin_sound();
     size_t size, written = 0;
@@ -175,7 +175,7 @@ static void flipped_bytes_end_in_a_file_or_a_reason(void **state) {
 
 /* --- callers */
 
-static void atlases_that_do_not_fit_are_refused(void **state) {
+TEST(atlases_that_do_not_fit_are_refused) {
     enum { CASES = 11 };
     lighting l = begin_sound();
     const vsh_lit_mesh good = l.lit[0];
@@ -212,7 +212,7 @@ static void atlases_that_do_not_fit_are_refused(void **state) {
     end_lighting(&l);
 }
 
-static void images_out_of_range_are_refused(void **state) {
+TEST(images_out_of_range_are_refused) {
     static const float value[1] = {1.0F};
     static const float *const one[1] = {value};
     lighting l = begin_sound();
@@ -247,7 +247,7 @@ static void images_out_of_range_are_refused(void **state) {
     end_lighting(&l);
 }
 
-static void outputs_that_are_inputs_are_refused(void **state) {
+TEST(outputs_that_are_inputs_are_refused) {
     lighting l = begin_sound();
     static const struct {
         const char *output;
@@ -263,7 +263,7 @@ static void outputs_that_are_inputs_are_refused(void **state) {
 }
 
 /* What another document may use too. */
-static void files_of_the_input_are_not_replaced_but_others_named(void **state) {
+TEST(files_of_the_input_are_not_replaced_but_others_named) {
     lighting l = begin_sound();
     write_bytes("all.bin", l.in.bytes, l.in.size);
     set_at(&l.in, "buffers/0", "uri", json_string("all.bin"));
@@ -288,7 +288,7 @@ static int32_t stop(void *user, const char *stage, double fraction) {
     return fraction >= *(double *)user;
 }
 
-static void limits_and_cancelling_leave_the_old_file(void **state) {
+TEST(limits_and_cancelling_leave_the_old_file) {
     lighting l = begin_sound();
     vsh_run run = vsh_run_default();
     for (run.memory_limit = 1000; run.memory_limit < 100000; run.memory_limit *= 3) {
@@ -306,16 +306,5 @@ static void limits_and_cancelling_leave_the_old_file(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(damaged_documents_are_refused),
-        cmocka_unit_test(damaged_buffers_are_refused),
-        cmocka_unit_test(cut_files_are_refused_at_every_length),
-        cmocka_unit_test(flipped_bytes_end_in_a_file_or_a_reason),
-        cmocka_unit_test(atlases_that_do_not_fit_are_refused),
-        cmocka_unit_test(images_out_of_range_are_refused),
-        cmocka_unit_test(outputs_that_are_inputs_are_refused),
-        cmocka_unit_test(files_of_the_input_are_not_replaced_but_others_named),
-        cmocka_unit_test(limits_and_cancelling_leave_the_old_file),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

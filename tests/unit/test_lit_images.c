@@ -58,7 +58,7 @@ static vsh_lit_image image_with(int32_t purpose, const float *const *channels, i
                            .intensity = intensity};
 }
 
-static void planes_become_images_of_their_values(void **state) {
+TEST(planes_become_images_of_their_values) {
     float planes[4][TEXELS]; /* one of grey, three of light up to 5.5 */
     double expected[4][TEXELS];
     for (int i = 0; i < TEXELS; ++i) {
@@ -91,7 +91,7 @@ static void planes_become_images_of_their_values(void **state) {
     }
 }
 
-static void previews_are_unlit_base_colour_of_srgb(void **state) {
+TEST(previews_are_unlit_base_colour_of_srgb) {
     float grey[TEXELS];
     double expected[TEXELS];
     for (int i = 0; i < TEXELS; ++i) {
@@ -112,7 +112,7 @@ static void previews_are_unlit_base_colour_of_srgb(void **state) {
 
 /* --- materials */
 
-static void materials_are_copied_only_where_they_must(void **state) {
+TEST(materials_are_copied_only_where_they_must) {
     lighting l = begin_lighting(make_rich(), false);
     light_white(&l, VSH_LIT_OCCLUSION);
     /* tiles: in set 1, and as it was for the mesh in the other scene. leaf: as variant there too, in set 1 as
@@ -150,7 +150,7 @@ static void materials_are_copied_only_where_they_must(void **state) {
     end_lighting(&l);
 }
 
-static void cut_out_materials_have_no_preview(void **state) {
+TEST(cut_out_materials_have_no_preview) {
     asset in = make_rich();
     set_at(&in, "materials/0", "alphaMode", json_string("MASK"));
     lighting l = begin_lighting(in, false);
@@ -167,7 +167,7 @@ static void cut_out_materials_have_no_preview(void **state) {
 
 /* --- where they go */
 
-static void images_go_beside_a_gltf_with_its_buffer(void **state) {
+TEST(images_go_beside_a_gltf_with_its_buffer) {
     static const uint32_t pages[2] = {0, 1};
     lighting l = begin_lighting(make_rich(), false);
     l.lit[0].page = 1;
@@ -200,7 +200,7 @@ static void images_go_beside_a_gltf_with_its_buffer(void **state) {
     end_lighting(&l);
 }
 
-static void images_come_along_into_another_folder(void **state) {
+TEST(images_come_along_into_another_folder) {
     asset in = make_rich();
     put_item(&in, "images", parsed("{\"uri\":\"gone.png\"}"));
     put_item(&in, "images", parsed("{\"uri\":\"link.png\"}"));
@@ -231,7 +231,7 @@ static void images_come_along_into_another_folder(void **state) {
 
 /* --- the reader */
 
-static void draco_is_decoded_by_a_reader_to_the_same_bytes(void **state) {
+TEST(draco_is_decoded_by_a_reader_to_the_same_bytes) {
     static const char path[] = VSH_MODELS "/scene_draco.glb";
     vsh_model *model = read_model(path);
     vsh_lit_mesh *lit = make_all_lit(model, true);
@@ -251,17 +251,8 @@ static void draco_is_decoded_by_a_reader_to_the_same_bytes(void **state) {
 }
 
 int main(int argc, char **argv) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(planes_become_images_of_their_values),
-        cmocka_unit_test(previews_are_unlit_base_colour_of_srgb),
-        cmocka_unit_test(materials_are_copied_only_where_they_must),
-        cmocka_unit_test(cut_out_materials_have_no_preview),
-        cmocka_unit_test(images_go_beside_a_gltf_with_its_buffer),
-        cmocka_unit_test(images_come_along_into_another_folder),
-        cmocka_unit_test(draco_is_decoded_by_a_reader_to_the_same_bytes),
-    };
     if (argc >= 2 && strcmp(argv[1], VSH_READER_ARGUMENT) == 0) {
         return vsh_reader_serve(argc, argv);
     }
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

@@ -60,7 +60,7 @@ static void assert_alike(const char *where, double at, const picture *a, const p
 }
 
 /* Scales that are no powers of two: sums round elsewhere. */
-static void voxels_from_1e_12_to_1e12_give_the_same_picture(void **state) {
+TEST(voxels_from_1e_12_to_1e12_give_the_same_picture) {
     static picture middle, there;
     floor_texels(SIDE, positions, normals);
     bake_floor(1.0, NOWHERE, &middle);
@@ -71,7 +71,7 @@ static void voxels_from_1e_12_to_1e12_give_the_same_picture(void **state) {
     }
 }
 
-static void voxels_beyond_the_ends_are_refused_by_size(void **state) {
+TEST(voxels_beyond_the_ends_are_refused_by_size) {
     const double voxels[] = {0.9e-12, 1e-30, 1.1e12, 1e30};
     for (size_t v = 0; v < sizeof voxels / sizeof voxels[0]; ++v) {
         vsh_sdf_node node = vsh_sdf_node_default();
@@ -85,7 +85,7 @@ static void voxels_beyond_the_ends_are_refused_by_size(void **state) {
     }
 }
 
-static void far_from_the_origin_the_picture_stays(void **state) {
+TEST(far_from_the_origin_the_picture_stays) {
     static picture middle, there;
     floor_texels(SIDE, positions, normals);
     bake_floor(1.0, NOWHERE, &middle);
@@ -129,7 +129,7 @@ static vsh_field *field_of_half_width(double half_width) {
 }
 
 /* Bands wider than 6 voxels are cut: the field makes its levels from them. */
-static void half_widths_from_6_to_100_give_the_same_picture_and_3_one_as_near_the_truth(void **state) {
+TEST(half_widths_from_6_to_100_give_the_same_picture_and_3_one_as_near_the_truth) {
     static picture at_6, there;
     static float truth[2][COUNT], outside[COUNT];
     const double up[3] = {0.0, 1.0, 0.0};
@@ -174,7 +174,7 @@ static void half_widths_from_6_to_100_give_the_same_picture_and_3_one_as_near_th
     vsh_triangles_free(c.triangles);
 }
 
-static void ao_distances_below_a_voxel_and_above_the_scene_are_what_they_say(void **state) {
+TEST(ao_distances_below_a_voxel_and_above_the_scene_are_what_they_say) {
     const truth_solid solids[2] = {{TRUTH_BOX, {0.0, -0.5, 0.0}, {2.0, 0.5, 2.0}, 0.0, 0.0},
                                    {TRUTH_BOX, {-1.5, 1.0, 0.0}, {0.5, 1.0, 2.0}, 0.0, 0.0}};
     const truth_scene scene = {solids, 2};
@@ -219,7 +219,7 @@ static void ao_distances_below_a_voxel_and_above_the_scene_are_what_they_say(voi
 
 /* A bar of 30 000 voxels, and a ray along it so near to its face that each step is the least one, a quarter
  * of a voxel: the distance along the ray is what is sampled at, so nothing adds up. */
-static void a_hundred_thousand_least_steps_lose_nothing(void **state) {
+TEST(a_hundred_thousand_least_steps_lose_nothing) {
     const double length = 30000.0;
     const truth_solid bar = {TRUTH_BOX, {0.0, -4.0, 0.0}, {0.5 * length, 4.0, 4.0}, 0.0, 0.0};
     vsh_field *field = field_of((truth_scene){&bar, 1}, 1.0, 8.0);
@@ -267,13 +267,5 @@ static void a_hundred_thousand_least_steps_lose_nothing(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(voxels_from_1e_12_to_1e12_give_the_same_picture),
-        cmocka_unit_test(voxels_beyond_the_ends_are_refused_by_size),
-        cmocka_unit_test(far_from_the_origin_the_picture_stays),
-        cmocka_unit_test(half_widths_from_6_to_100_give_the_same_picture_and_3_one_as_near_the_truth),
-        cmocka_unit_test(ao_distances_below_a_voxel_and_above_the_scene_are_what_they_say),
-        cmocka_unit_test(a_hundred_thousand_least_steps_lose_nothing),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,11 +1,4 @@
 /* vsh_mesh_check() against solids whose edges, area and bounds are known. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "expect.h"
 #include "mesh/mesh.h"
 
@@ -113,7 +106,7 @@ static void cut_edge_and_join(shape *s) {
     memcpy(s->indices[s->triangles++], (uint32_t[3]){4, 5, 8}, sizeof s->indices[0]);
 }
 
-static void cubes_have_the_edges_area_and_bounds_that_they_have(void **state) {
+TEST(cubes_have_the_edges_area_and_bounds_that_they_have) {
     static const struct {
         const char *name;
         void (*change)(shape *s);
@@ -151,7 +144,7 @@ static void cubes_have_the_edges_area_and_bounds_that_they_have(void **state) {
     }
 }
 
-static void an_empty_mesh_has_empty_bounds(void **state) {
+TEST(an_empty_mesh_has_empty_bounds) {
     vsh_mesh mesh = cube();
     mesh.triangle_count = 0;
     const vsh_mesh_report report = check(&mesh);
@@ -164,7 +157,7 @@ static void an_empty_mesh_has_empty_bounds(void **state) {
 /* A quarter turn about z, scaled by (2, 3, 4), moved by (100, 200, 300). */
 static const double turned[12] = {0, -3, 0, 100, 2, 0, 0, 200, 0, 0, 4, 300};
 
-static void area_and_bounds_are_of_the_world(void **state) {
+TEST(area_and_bounds_are_of_the_world) {
     vsh_mesh mesh = cube();
     mesh.transform = turned;
     const vsh_mesh_report report = check(&mesh);
@@ -188,7 +181,7 @@ static double volume(const vsh_mesh *mesh) {
     return sum;
 }
 
-static void a_mirrored_transform_keeps_the_outside_outside(void **state) {
+TEST(a_mirrored_transform_keeps_the_outside_outside) {
     const double mirrored[12] = {-2, 0, 0, 0, 0, 3, 0, 0, 0, 0, 4, 0};
     vsh_mesh mesh = cube();
     assert_near(volume(&mesh), 1.0, 1e-12);
@@ -213,7 +206,7 @@ static void refused(const vsh_mesh *mesh, vsh_result code, const char *part, con
     }
 }
 
-static void bad_vertices_indices_and_transforms_are_refused_by_number(void **state) {
+TEST(bad_vertices_indices_and_transforms_are_refused_by_number) {
     float positions[8][3];
     uint32_t indices[12][3];
     double transform[12];
@@ -254,7 +247,7 @@ static void bad_vertices_indices_and_transforms_are_refused_by_number(void **sta
     check(&mesh); /* small is not flat */
 }
 
-static void labels_say_name_or_number_and_keep_whole_characters(void **state) {
+TEST(labels_say_name_or_number_and_keep_whole_characters) {
     vsh_mesh mesh = {.name = "sail"};
     assert_string_equal(vshi_mesh_label(&mesh, 3).text, "mesh 'sail'");
     mesh.name = "";
@@ -274,7 +267,7 @@ static void labels_say_name_or_number_and_keep_whole_characters(void **state) {
 }
 
 /* A closed box: a flat heightfield of n × n cells, as a solid. */
-static void a_million_triangles_take_about_a_second(void **state) {
+TEST(a_million_triangles_take_about_a_second) {
     enum { N = 710, SIDE = N + 1 };
     float *heights = calloc(SIDE * SIDE, sizeof *heights);
     const vsh_heights_source source = {
@@ -295,7 +288,7 @@ static void a_million_triangles_take_about_a_second(void **state) {
     free(heights);
 }
 
-static void names_match_patterns_as_in_a_shell(void **state) {
+TEST(names_match_patterns_as_in_a_shell) {
     static const struct {
         const char *name, *pattern;
         int match;
@@ -347,7 +340,7 @@ static void names_match_patterns_as_in_a_shell(void **state) {
                  vsh_mesh_matches(NULL, "*"));
 }
 
-static void a_pattern_of_many_stars_takes_no_time(void **state) {
+TEST(a_pattern_of_many_stars_takes_no_time) {
     char name[4001], pattern[2002];
     memset(name, 'a', sizeof name - 1);
     name[sizeof name - 1] = '\0';
@@ -360,16 +353,5 @@ static void a_pattern_of_many_stars_takes_no_time(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cubes_have_the_edges_area_and_bounds_that_they_have),
-        cmocka_unit_test(an_empty_mesh_has_empty_bounds),
-        cmocka_unit_test(area_and_bounds_are_of_the_world),
-        cmocka_unit_test(a_mirrored_transform_keeps_the_outside_outside),
-        cmocka_unit_test(bad_vertices_indices_and_transforms_are_refused_by_number),
-        cmocka_unit_test(labels_say_name_or_number_and_keep_whole_characters),
-        cmocka_unit_test(names_match_patterns_as_in_a_shell),
-        cmocka_unit_test(a_pattern_of_many_stars_takes_no_time),
-        cmocka_unit_test(a_million_triangles_take_about_a_second),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -85,16 +85,16 @@ static void bake(const char *method) {
     assert_int_equal(validated, MESHES);
 }
 
-static void a_bake_checks_and_welds_each_mesh_once(void **state) {
+TEST(a_bake_checks_and_welds_each_mesh_once) {
     bake("adaptive");
 }
 
-static void so_does_one_that_traces_triangles(void **state) {
+TEST(so_does_one_that_traces_triangles) {
     bake("exact");
 }
 
 /* The calls that take arrays of meshes, too. */
-static void occluders_of_arrays_are_checked_and_welded_once(void **state) {
+TEST(occluders_of_arrays_are_checked_and_welded_once) {
     static const float positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
     static const uint32_t indices[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
     const vsh_mesh mesh = {
@@ -111,10 +111,5 @@ static void occluders_of_arrays_are_checked_and_welded_once(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_bake_checks_and_welds_each_mesh_once),
-        cmocka_unit_test(so_does_one_that_traces_triangles),
-        cmocka_unit_test(occluders_of_arrays_are_checked_and_welded_once),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

@@ -29,7 +29,7 @@ static void assert_quad_uvs(const vsh_mesh *mesh, float scale) {
     }
 }
 
-static void uvs_point_up_whatever_the_format(void **state) {
+TEST(uvs_point_up_whatever_the_format) {
     char gltf[4096];
     quad_gltf(gltf, one_node, NULL, 3);
     unsigned char glb[8192];
@@ -59,7 +59,7 @@ static void uvs_point_up_whatever_the_format(void **state) {
     }
 }
 
-static void the_second_uv_set_is_the_default(void **state) {
+TEST(the_second_uv_set_is_the_default) {
     char gltf[4096];
     quad_gltf(gltf, one_node, NULL, 3);
     vsh_model *model = read_text("sets.gltf", gltf);
@@ -82,7 +82,7 @@ static void the_second_uv_set_is_the_default(void **state) {
     vsh_model_free(model);
 }
 
-static void nodes_are_instances_that_share_arrays(void **state) {
+TEST(nodes_are_instances_that_share_arrays) {
     char gltf[4096];
     quad_gltf(gltf, instances, NULL, 3);
     vsh_model *model = read_text("instances.gltf", gltf);
@@ -114,7 +114,7 @@ static void nodes_are_instances_that_share_arrays(void **state) {
     vsh_model_free(model);
 }
 
-static void a_node_scaled_to_nothing_is_left_out_with_a_warning(void **state) {
+TEST(a_node_scaled_to_nothing_is_left_out_with_a_warning) {
     char gltf[4096];
     quad_gltf(gltf,
               "{\"children\":[1,2]},{\"name\":\"hidden\",\"mesh\":0,\"scale\":[0,0,0]},"
@@ -129,7 +129,7 @@ static void a_node_scaled_to_nothing_is_left_out_with_a_warning(void **state) {
     refused("gone.gltf", gltf, VSH_ERROR_INPUT, "holds no triangles", "gone");
 }
 
-static void meshes_objects_and_polygons_become_triangles_and_lines_are_dropped(void **state) {
+TEST(meshes_objects_and_polygons_become_triangles_and_lines_are_dropped) {
     vsh_model *model =
         read_text("parts.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 0.25 0\n"
                                "vn 0 0 2\no first\nf 1//1 2//1 3//1\no second\nf 1 5 2 3 4\nl 1 2\n"
@@ -147,7 +147,7 @@ static void meshes_objects_and_polygons_become_triangles_and_lines_are_dropped(v
 }
 
 /* An FBX says what its numbers are in; a Collada file, too (test_exported.c). */
-static void an_fbx_is_in_metres(void **state) {
+TEST(an_fbx_is_in_metres) {
     static const struct {
         const char *factor;
         double metres;
@@ -164,7 +164,7 @@ static void an_fbx_is_in_metres(void **state) {
 }
 
 /* Twelve triangles with corners of their own, as STL has them. */
-static void a_cube_in_stl_is_closed(void **state) {
+TEST(a_cube_in_stl_is_closed) {
     static const uint8_t corners[36] = {0, 2, 3, 0, 3, 1, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3,
                                         0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5, 4, 5, 7, 4, 7, 6};
     float positions[36][3];
@@ -189,7 +189,7 @@ static void a_cube_in_stl_is_closed(void **state) {
     vsh_model_free(model);
 }
 
-static void binary_ply_of_either_byte_order_is_read(void **state) {
+TEST(binary_ply_of_either_byte_order_is_read) {
     for (int big_endian = 0; big_endian < 2; ++big_endian) {
         unsigned char bytes[1024];
         vsh_model *model = read_good("binary.ply", bytes, binary_ply(bytes, big_endian));
@@ -202,7 +202,7 @@ static void binary_ply_of_either_byte_order_is_read(void **state) {
 
 /* --- Model files that are wrong, cut, too large or not there; cancelling. */
 
-static void bad_obj_is_refused_with_line_and_value(void **state) {
+TEST(bad_obj_is_refused_with_line_and_value) {
 #define CORNERS "v 0 0 0\nv 1 0 0\nv 1 1 0\n"
     refused("a.obj", "v nan 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n", VSH_ERROR_INPUT, "line 1", "'nan'");
     refused("a.obj", "v 0 0 0\nv 1 -inf 0\nv 1 1 0\nf 1 2 3\n", VSH_ERROR_INPUT, "line 2", "'-inf'");
@@ -224,7 +224,7 @@ static void bad_obj_is_refused_with_line_and_value(void **state) {
     vsh_model_free(read_text("dos.obj", "v 0 0 0\r\nv 1 0 0 # corner\r\nv 1 1 0\r\nf 1 2 \\\r\n3\r\n"));
 }
 
-static void bad_ply_and_stl_are_refused(void **state) {
+TEST(bad_ply_and_stl_are_refused) {
 #define HEAD(n)                                                                                              \
     "ply\nformat ascii 1.0\nelement vertex " n "\nproperty float x\nproperty float y\nproperty float z\n"    \
     "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
@@ -257,7 +257,7 @@ static void bad_ply_and_stl_are_refused(void **state) {
 }
 
 /* By their endings, and by their first bytes whatever the ending. */
-static void alembic_and_usd_are_refused_by_name(void **state) {
+TEST(alembic_and_usd_are_refused_by_name) {
     static const char *const endings[] = {"a.usd", "a.usda", "a.USDC", "a.usdz"};
     for (size_t i = 0; i < sizeof endings / sizeof endings[0]; ++i) {
         refused(endings[i], "anything", VSH_ERROR_INPUT, "is a USD file",
@@ -280,7 +280,7 @@ static void alembic_and_usd_are_refused_by_name(void **state) {
     assert_null(strstr(failure.message, "USD"));
 }
 
-static void bad_gltf_is_refused(void **state) {
+TEST(bad_gltf_is_refused) {
     char gltf[4096];
     quad_gltf(gltf, one_node, (float[]){1, NAN, 0}, 3);
     refused("a.gltf", gltf, VSH_ERROR_INPUT, "'quad'", "vertex 2");
@@ -297,7 +297,7 @@ static void bad_gltf_is_refused(void **state) {
     refused("a.gltf", "{\"asset\": {\"version\": 2.0 \"x\"}}", VSH_ERROR_INPUT, "line 1", "column");
 }
 
-static void files_that_cannot_be_read_say_why(void **state) {
+TEST(files_that_cannot_be_read_say_why) {
     vsh_model *model;
     expect_error(vsh_model_read(path_of("missing.obj").text, NULL, &model, &failure), VSH_ERROR_READ,
                  "missing.obj: No such file");
@@ -317,7 +317,7 @@ static void files_that_cannot_be_read_say_why(void **state) {
     vsh_model_free(NULL);
 }
 
-static void the_memory_limit_is_checked(void **state) {
+TEST(the_memory_limit_is_checked) {
     write_bytes("limit.obj", quad_obj, strlen(quad_obj));
     vsh_run run = vsh_run_default();
     vsh_model *model;
@@ -344,7 +344,7 @@ static int32_t watch_progress(void *user, const char *stage, double fraction) {
     return fraction >= w->stop;
 }
 
-static void progress_rises_to_one_and_can_cancel_anywhere(void **state) {
+TEST(progress_rises_to_one_and_can_cancel_anywhere) {
     static const double stops[] = {2.0, 0.0, 0.1, 0.5, 0.99, 1.0};
     write_bytes("watch.obj", quad_obj, strlen(quad_obj));
     for (size_t i = 0; i < sizeof stops / sizeof stops[0]; ++i) {
@@ -390,7 +390,7 @@ static void cut_everywhere(const char *name, const void *bytes, size_t size, boo
     free(copy);
 }
 
-static void files_cut_at_any_length_do_no_harm(void **state) {
+TEST(files_cut_at_any_length_do_no_harm) {
     char gltf[4096];
     quad_gltf(gltf, instances, NULL, 3);
     unsigned char bytes[8192];
@@ -407,23 +407,5 @@ static void files_cut_at_any_length_do_no_harm(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(uvs_point_up_whatever_the_format),
-        cmocka_unit_test(the_second_uv_set_is_the_default),
-        cmocka_unit_test(nodes_are_instances_that_share_arrays),
-        cmocka_unit_test(a_node_scaled_to_nothing_is_left_out_with_a_warning),
-        cmocka_unit_test(meshes_objects_and_polygons_become_triangles_and_lines_are_dropped),
-        cmocka_unit_test(an_fbx_is_in_metres),
-        cmocka_unit_test(a_cube_in_stl_is_closed),
-        cmocka_unit_test(binary_ply_of_either_byte_order_is_read),
-        cmocka_unit_test(bad_obj_is_refused_with_line_and_value),
-        cmocka_unit_test(bad_ply_and_stl_are_refused),
-        cmocka_unit_test(alembic_and_usd_are_refused_by_name),
-        cmocka_unit_test(bad_gltf_is_refused),
-        cmocka_unit_test(files_that_cannot_be_read_say_why),
-        cmocka_unit_test(the_memory_limit_is_checked),
-        cmocka_unit_test(progress_rises_to_one_and_can_cancel_anywhere),
-        cmocka_unit_test(files_cut_at_any_length_do_no_harm),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

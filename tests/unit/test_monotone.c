@@ -2,6 +2,7 @@
  * no less (but for noise), and a lamp that goes away becomes a sun. Of every method; docs/numerics.md has the
  * bounds. test_shadow.c has balls that grow and lights of size 0. */
 #include "methods.h"
+#include "tests.h"
 #include "truth/metrics.h"
 
 enum { SIDE = 64, COUNT = SIDE * SIDE };
@@ -80,7 +81,7 @@ static bool errors_are_of_voxels(int k) {
 /* Where an error is the method's own, not the voxels', it wanders: by 8 % of itself and 0.002, a fortieth of
  * a penumbra. Exact sees no voxels but by what cones prove. Rays at fine voxels keep the error that was asked
  * for. */
-static void finer_voxels_are_never_farther_from_the_truth(void **state) {
+TEST(finer_voxels_are_never_farther_from_the_truth) {
     for (int k = 0; k < CASES; ++k) {
         for (int v = 1; v < VOXELS; ++v) {
             const double coarse = rmse[k][v - 1], fine = rmse[k][v];
@@ -95,7 +96,7 @@ static void finer_voxels_are_never_farther_from_the_truth(void **state) {
 }
 
 /* Rays, or the error that is asked for: four times the rays, or half of the error. */
-static void more_rays_are_never_farther_from_the_truth(void **state) {
+TEST(more_rays_are_never_farther_from_the_truth) {
     place_floor();
     caster c = caster_of(truth_seeds(), 0.02, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(0.1));
@@ -139,7 +140,7 @@ static double rise_of(int kind) {
 }
 
 /* A slab that grows from a sliver over half of the receivers to all of them, by less than a voxel a time. */
-static void a_growing_slab_hides_more(void **state) {
+TEST(a_growing_slab_hides_more) {
     enum { PLACES = 16 };
     const double up[3] = {0.0, 1.0, 0.0}, voxel = 0.04;
     const vsh_light light = sun(up, RADIANS(15.0));
@@ -183,7 +184,7 @@ static void a_growing_slab_hides_more(void **state) {
 }
 
 /* A million units away: what is left of it is the rounding of its direction. */
-static void a_far_lamp_is_a_sun(void **state) {
+TEST(a_far_lamp_is_a_sun) {
     static float far[COUNT];
     place_floor();
     caster c = caster_of(truth_seeds(), 0.04, 0.0);
@@ -210,11 +211,5 @@ static void a_far_lamp_is_a_sun(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(finer_voxels_are_never_farther_from_the_truth, measure_all_voxels),
-        cmocka_unit_test(more_rays_are_never_farther_from_the_truth),
-        cmocka_unit_test(a_growing_slab_hides_more),
-        cmocka_unit_test(a_far_lamp_is_a_sun),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(measure_all_voxels, NULL);
 }

@@ -1,11 +1,6 @@
 /* Every call that returns a code refuses NULL where it needs something else, says so, and leaves NULL in the
  * place of a handle. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "tests.h"
 
 #include <vdbshade/vdbshade.h>
 
@@ -33,7 +28,7 @@ static double far_away(void *user, const double position[3]) {
     return position[0];
 }
 
-static void casters_are_not_made_of_nothing(void **state) {
+TEST(casters_are_not_made_of_nothing) {
     const double square[8] = {-1, -1, 1, -1, 1, 1, -1, 1},
                  transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     const size_t corners = 4;
@@ -102,7 +97,7 @@ static void casters_are_not_made_of_nothing(void **state) {
     REFUSED(vsh_outline_from_image("a.png", NULL, NULL, NULL, &error));
 }
 
-static void files_have_paths_and_places(void **state) {
+TEST(files_have_paths_and_places) {
     const int32_t low[3] = {0, 0, 0}, size[3] = {1, 1, 1};
     vsh_vdb_entry entry;
     size_t count;
@@ -145,7 +140,7 @@ static void files_have_paths_and_places(void **state) {
     REFUSED(vsh_image_check("a.exr", NULL, NULL, &error));
 }
 
-static void scenes_are_not_made_of_nothing(void **state) {
+TEST(scenes_are_not_made_of_nothing) {
     const vsh_scene scene = {0};
     MAKES_NONE(vsh_assets_load(NULL, NULL, PLACE, &error));
     REFUSED(vsh_assets_load(&scene, NULL, NULL, &error));
@@ -180,7 +175,7 @@ static vsh_occluders *no_casters(void) {
     return casters;
 }
 
-static void nothing_is_shaded_without_what_it_takes(void **state) {
+TEST(nothing_is_shaded_without_what_it_takes) {
     vsh_occluders *casters = no_casters();
     const vsh_light light = vsh_light_default();
     const double positions[3] = {0, 0, 0};
@@ -225,7 +220,7 @@ static void nothing_is_shaded_without_what_it_takes(void **state) {
     vsh_occluders_free(casters);
 }
 
-static void nothing_is_baked_without_what_it_takes(void **state) {
+TEST(nothing_is_baked_without_what_it_takes) {
     vsh_occluders *casters = no_casters();
     vsh_voxels *voxels = NULL;
     vsh_volume *volume = NULL;
@@ -280,7 +275,7 @@ static void nothing_is_baked_without_what_it_takes(void **state) {
     vsh_occluders_free(casters);
 }
 
-static void nothing_is_drawn_or_compared_without_what_it_takes(void **state) {
+TEST(nothing_is_drawn_or_compared_without_what_it_takes) {
     vsh_occluders *casters = no_casters();
     const vsh_surface nothing = {NULL, {0.5, 0.5, 0.5}};
     const vsh_light light = vsh_light_default();
@@ -336,13 +331,5 @@ static void nothing_is_drawn_or_compared_without_what_it_takes(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(casters_are_not_made_of_nothing),
-        cmocka_unit_test(files_have_paths_and_places),
-        cmocka_unit_test(scenes_are_not_made_of_nothing),
-        cmocka_unit_test(nothing_is_shaded_without_what_it_takes),
-        cmocka_unit_test(nothing_is_baked_without_what_it_takes),
-        cmocka_unit_test(nothing_is_drawn_or_compared_without_what_it_takes),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

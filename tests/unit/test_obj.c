@@ -21,7 +21,7 @@ static void assert_parts(const char *text, const char *expected) {
     assert_string_equal(parts, expected);
 }
 
-static void objects_groups_and_materials_part_a_file(void **state) {
+TEST(objects_groups_and_materials_part_a_file) {
     char text[1024];
 #define PARTS(statements, expected)                                                                          \
     snprintf(text, sizeof text, "%s%s", corners, statements);                                                \
@@ -37,7 +37,7 @@ static void objects_groups_and_materials_part_a_file(void **state) {
 #undef PARTS
 }
 
-static void corners_that_agree_in_all_share_a_vertex(void **state) {
+TEST(corners_that_agree_in_all_share_a_vertex) {
     char text[512];
     snprintf(text, sizeof text,
              "%svt 0 0\nvt 1 1\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\nf 1/1/1 3/2/1 4/1/1\nf -4/-2/-1 3/2/1 4//1\n",
@@ -53,7 +53,7 @@ static void corners_that_agree_in_all_share_a_vertex(void **state) {
 }
 
 /* What other programs write, and what Assimp 5.2 did not read. */
-static void unusual_statements_are_read(void **state) {
+TEST(unusual_statements_are_read) {
     vsh_model *model =
         read_text("odd.obj", "\xef\xbb\xbfv 0 0 0 1 1 1 1\r# lone ends of lines\r  v 4 0 0 2\r"
                              "v 1e0 +1. 0 # a corner\rvt .5\rvp 1 2\rf 1/1/ \\\r2/1 3/1 # all\r"
@@ -68,7 +68,7 @@ static void unusual_statements_are_read(void **state) {
 
 /* A strip of triangles, larger than the window over the file, with a line longer than it and one that goes
  * on. */
-static void files_of_any_length_are_read_piece_by_piece(void **state) {
+TEST(files_of_any_length_are_read_piece_by_piece) {
     enum { COUNT = 60000, LONG = 700000 };
     char *text = malloc(COUNT * 64 + 2 * LONG), *to = text;
     assert_non_null(text);
@@ -106,7 +106,7 @@ static void files_of_any_length_are_read_piece_by_piece(void **state) {
     free(text);
 }
 
-static void hostile_statements_are_refused_and_name_their_line(void **state) {
+TEST(hostile_statements_are_refused_and_name_their_line) {
     char text[512];
 #define REFUSED(statement, what)                                                                             \
     snprintf(text, sizeof text, "%s%s", corners, statement);                                                 \
@@ -127,7 +127,7 @@ static void hostile_statements_are_refused_and_name_their_line(void **state) {
 }
 
 /* A place with very many normals, as a cone's tip may have. */
-static void a_place_with_many_vertices_takes_no_longer(void **state) {
+TEST(a_place_with_many_vertices_takes_no_longer) {
     enum { COUNT = 100000 };
     char *text = malloc(COUNT * 64), *to = text;
     assert_non_null(text);
@@ -141,7 +141,7 @@ static void a_place_with_many_vertices_takes_no_longer(void **state) {
     free(text);
 }
 
-static void materials_beside_the_file_say_what_is_blended(void **state) {
+TEST(materials_beside_the_file_say_what_is_blended) {
     static const char materials[] = "newmtl clear\nd 0.5\n\tnewmtl solid \r\nTr 0\nnewmtl thin\nTr 0.25\n"
                                     "newmtl edge\nd -halo 0.0\nnewmtl last\nd 1.0\n";
     static const char *const names[] = {"clear", "solid", "thin", "edge", "last", "other"};
@@ -171,7 +171,7 @@ static void materials_beside_the_file_say_what_is_blended(void **state) {
 }
 
 /* What a small file can make of itself is held against the limit first. */
-static void memory_is_held_against_the_limit(void **state) {
+TEST(memory_is_held_against_the_limit) {
     enum { COUNT = 50000 };
     char *text = malloc(COUNT * 8 + sizeof corners), *to = text;
     assert_non_null(text);
@@ -193,15 +193,5 @@ static void memory_is_held_against_the_limit(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(objects_groups_and_materials_part_a_file),
-        cmocka_unit_test(corners_that_agree_in_all_share_a_vertex),
-        cmocka_unit_test(unusual_statements_are_read),
-        cmocka_unit_test(files_of_any_length_are_read_piece_by_piece),
-        cmocka_unit_test(hostile_statements_are_refused_and_name_their_line),
-        cmocka_unit_test(a_place_with_many_vertices_takes_no_longer),
-        cmocka_unit_test(materials_beside_the_file_say_what_is_blended),
-        cmocka_unit_test(memory_is_held_against_the_limit),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

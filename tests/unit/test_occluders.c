@@ -15,7 +15,7 @@ static vsh_mesh plate(void) {
     return (vsh_mesh){.positions = positions, .vertex_count = 8, .indices = indices, .triangle_count = 12};
 }
 
-static void meshes_make_the_field_and_triangles_that_their_parts_make(void **state) {
+TEST(meshes_make_the_field_and_triangles_that_their_parts_make) {
     const vsh_mesh mesh = plate();
     vsh_occluders_options options = vsh_occluders_options_default();
     options.grid.resolution = 64;
@@ -56,7 +56,7 @@ static void meshes_make_the_field_and_triangles_that_their_parts_make(void **sta
     vsh_occluders_free(made);
 }
 
-static void bad_meshes_and_options_are_refused_with_nothing_made(void **state) {
+TEST(bad_meshes_and_options_are_refused_with_nothing_made) {
     vsh_occluders_options options = vsh_occluders_options_default(), coarse = options, behind = options;
     coarse.grid.resolution = 1;
     behind.reach = -1.0;
@@ -89,7 +89,7 @@ static void expect_refused(const vsh_occluder_parts *parts, const char *text) {
     assert_null(made);
 }
 
-static void parts_that_are_none_are_refused_by_name(void **state) {
+TEST(parts_that_are_none_are_refused_by_name) {
     const double ball[] = {0, 0, 0, 1};
     vsh_spheres *spheres = NULL;
     expect_ok(vsh_spheres_create(ball, 1, NULL, NULL, &spheres, &failure));
@@ -113,7 +113,7 @@ static void parts_that_are_none_are_refused_by_name(void **state) {
     vsh_spheres_free(spheres);
 }
 
-static void layers_alone_say_what_offsets_are_measured_in(void **state) {
+TEST(layers_alone_say_what_offsets_are_measured_in) {
     const double ball[] = {0, 0, 0, 1};
     vsh_spheres *spheres = NULL;
     expect_ok(vsh_spheres_create(ball, 1, NULL, NULL, &spheres, &failure));
@@ -149,7 +149,7 @@ static void layers_alone_say_what_offsets_are_measured_in(void **state) {
     vsh_spheres_free(spheres);
 }
 
-static void a_level_set_makes_the_field_that_vsh_field_create_makes(void **state) {
+TEST(a_level_set_makes_the_field_that_vsh_field_create_makes) {
     const truth_solid solid = {.shape = TRUTH_SPHERE, .radius = 0.5};
     vsh_grid *grid = grid_of((truth_scene){&solid, 1}, 0.125);
     vsh_field_options options = vsh_field_options_default();
@@ -186,7 +186,7 @@ static float lit_under(const vsh_occluders *occluders, int32_t method, vsh_resul
     return lit;
 }
 
-static void auto_is_exact_where_triangles_are_kept_and_adaptive_where_not(void **state) {
+TEST(auto_is_exact_where_triangles_are_kept_and_adaptive_where_not) {
     if (!vsh_triangles_available()) {
         skip();
     }
@@ -230,7 +230,7 @@ static vsh_occluders *of_scene(const char *text, const vsh_scene_occluders_optio
     "\"directional\", \"direction\": [0, 1, 0]}], \"receivers\": [], " more "}"
 #define BALL "{\"sdf\": {\"shape\": \"sphere\", \"radius\": 1}}"
 
-static void a_scene_keeps_the_truth_only_where_an_error_is_kept(void **state) {
+TEST(a_scene_keeps_the_truth_only_where_an_error_is_kept) {
     vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
     static const struct {
         const char *text;
@@ -253,7 +253,7 @@ static void a_scene_keeps_the_truth_only_where_an_error_is_kept(void **state) {
     assert_null(of_scene(cases[2].text, &options, VSH_ERROR_ARGUMENT));
 }
 
-static void more_layers_than_can_be_are_refused(void **state) {
+TEST(more_layers_than_can_be_are_refused) {
     const double ball[4] = {0, 0, 0, 1};
     vsh_caster casters[VSH_MAX_LAYERS + 1] = {{.type = VSH_CASTER_SPHERES}};
     for (size_t i = 0; i <= VSH_MAX_LAYERS; ++i) {
@@ -282,7 +282,7 @@ static void more_layers_than_can_be_are_refused(void **state) {
                         "0 layers and 129 casters that are not voxelised: at most 128 together");
 }
 
-static void a_default_caster_stands_where_its_file_says_and_a_zeroed_transform_is_named(void **state) {
+TEST(a_default_caster_stands_where_its_file_says_and_a_zeroed_transform_is_named) {
     enum { COUNT = 2 };
     vsh_caster casters[COUNT] = {vsh_caster_default(), vsh_caster_default()};
     vsh_receiver receiver = vsh_receiver_default();
@@ -322,7 +322,7 @@ static void count_lost(void *user, const char *message) {
     *(int *)user += strstr(message, "and casts nothing") != NULL;
 }
 
-static void what_voxels_lose_is_told_where_they_decide_unless_they_are_a_trial(void **state) {
+TEST(what_voxels_lose_is_told_where_they_decide_unless_they_are_a_trial) {
     static const struct {
         int32_t method, silent;
         bool told;
@@ -359,17 +359,5 @@ static void what_voxels_lose_is_told_where_they_decide_unless_they_are_a_trial(v
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(meshes_make_the_field_and_triangles_that_their_parts_make),
-        cmocka_unit_test(bad_meshes_and_options_are_refused_with_nothing_made),
-        cmocka_unit_test(parts_that_are_none_are_refused_by_name),
-        cmocka_unit_test(a_level_set_makes_the_field_that_vsh_field_create_makes),
-        cmocka_unit_test(auto_is_exact_where_triangles_are_kept_and_adaptive_where_not),
-        cmocka_unit_test(layers_alone_say_what_offsets_are_measured_in),
-        cmocka_unit_test(a_scene_keeps_the_truth_only_where_an_error_is_kept),
-        cmocka_unit_test(more_layers_than_can_be_are_refused),
-        cmocka_unit_test(a_default_caster_stands_where_its_file_says_and_a_zeroed_transform_is_named),
-        cmocka_unit_test(what_voxels_lose_is_told_where_they_decide_unless_they_are_a_trial),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -51,7 +51,7 @@ static const double BELOW[][3] = {
 static const double BESIDE[][3] = {{1.001, 0, 0}, {-1.02, 0.4, 0}, {1.5, -1.2, 0}, {0, 3, 0}};
 enum { POINTS_BELOW = 5, POINTS_BESIDE = 4 };
 
-static void floors_below_houses_without_floors_are_hidden(void **state) {
+TEST(floors_below_houses_without_floors_are_hidden) {
     static const double THICKNESS[] = {0.0, 0.004, 0.01, 0.05, 0.1, 1.0}, SUNK[] = {0.0, 0.01, 0.3};
     shape *s = shape_new();
     for (size_t i = 0; i < sizeof THICKNESS / sizeof *THICKNESS; ++i) {
@@ -73,7 +73,7 @@ static void floors_below_houses_without_floors_are_hidden(void **state) {
 }
 
 /* Ground in a house that lacks a wall sees out by that side. */
-static void walls_below_a_roof_hide_the_floor_and_a_pen_or_three_walls_do_not(void **state) {
+TEST(walls_below_a_roof_hide_the_floor_and_a_pen_or_three_walls_do_not) {
     const double low[3] = {-1.5, -1.5, 1.8}, high[3] = {1.5, 1.5, 2.0};
     shape *s = shape_new();
     add_ground(s, 0.0);
@@ -89,7 +89,7 @@ static void walls_below_a_roof_hide_the_floor_and_a_pen_or_three_walls_do_not(vo
     free(s);
 }
 
-static void contents_of_cups_are_seen(void **state) {
+TEST(contents_of_cups_are_seen) {
     static const double fruit[3] = {0.1, 0, 0.7}, top[][3] = {{0.1, 0, 1.3}},
                         coffee[][2] = {{0.99, 1.5}, {0, 1.5}};
     static const double surface[][3] = {{0, 0, 1.5}, {0.7, 0.2, 1.5}},
@@ -110,7 +110,7 @@ static void contents_of_cups_are_seen(void **state) {
     free(s);
 }
 
-static void sheets_by_name_hide_nothing(void **state) {
+TEST(sheets_by_name_hide_nothing) {
     shape *s = shape_new();
     add_house(s, 0.0, 0.3);
     vsh_mesh mesh = shape_mesh(s, "house");
@@ -125,11 +125,5 @@ static void sheets_by_name_hide_nothing(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(floors_below_houses_without_floors_are_hidden),
-        cmocka_unit_test(walls_below_a_roof_hide_the_floor_and_a_pen_or_three_walls_do_not),
-        cmocka_unit_test(contents_of_cups_are_seen),
-        cmocka_unit_test(sheets_by_name_hide_nothing),
-    };
-    return vsh_triangles_available() ? cmocka_run_group_tests(tests, NULL, NULL) : 0;
+    return vsh_triangles_available() ? run_all_tests(NULL, NULL) : 0;
 }

@@ -1,7 +1,8 @@
 /* Outlines of polygons and of text against closed forms. */
 #include "outlines.h"
+#include "tests.h"
 
-static void a_square_s_distance(void **state) {
+TEST(a_square_s_distance) {
     vsh_outline *square = box(-1.0, -1.0, 1.0, 1.0);
     for (int i = 0; i < 2000; ++i) {
         const double p[2] = {6.0 * any(2 * (uint64_t)i) - 3.0, 6.0 * any(2 * (uint64_t)i + 1) - 3.0};
@@ -14,7 +15,7 @@ static void a_square_s_distance(void **state) {
     vsh_outline_free(square);
 }
 
-static void the_tree_finds_what_looking_at_all_finds(void **state) {
+TEST(the_tree_finds_what_looking_at_all_finds) {
     vsh_outline *letters = text("R&8\nqi%", 1.0);
     int inside = 0;
     for (int i = 0; i < 2000; ++i) {
@@ -36,7 +37,7 @@ static vsh_outline *polygons(const double *points, const size_t *counts, size_t 
     return outline;
 }
 
-static void overlapping_squares_are_one_area(void **state) {
+TEST(overlapping_squares_are_one_area) {
     /* one runs backwards; their overlap, 1 × 1, is inside all the same, as each is given alone and they are
      * united */
     const double first[8] = {0, 0, 2, 0, 2, 2, 0, 2}, second[8] = {1, 1, 1, 3, 3, 3, 3, 1};
@@ -54,7 +55,7 @@ static void overlapping_squares_are_one_area(void **state) {
     vsh_outline_free(b);
 }
 
-static void contours_that_share_an_edge_are_one_area_and_those_the_other_way_holes(void **state) {
+TEST(contours_that_share_an_edge_are_one_area_and_those_the_other_way_holes) {
     static const size_t counts[3] = {4, 4, 4};
     const double beside[16] = {0, 0, 1, 0, 1, 1, 0, 1, 1, 0.25, 2, 0.25, 2, 0.75, 1, 0.75};
     vsh_outline *both = polygons(beside, counts, 2);
@@ -85,7 +86,7 @@ static void contours_that_share_an_edge_are_one_area_and_those_the_other_way_hol
 }
 
 /* Five lines that cross: wound around twice in the middle. */
-static void a_pentagram_is_filled(void **state) {
+TEST(a_pentagram_is_filled) {
     double points[10];
     for (int i = 0; i < 5; ++i) {
         points[2 * i] = cos(4.0 * PI * i / 5.0);
@@ -100,7 +101,7 @@ static void a_pentagram_is_filled(void **state) {
     vsh_outline_free(star);
 }
 
-static void many_overlaps_leave_the_union(void **state) {
+TEST(many_overlaps_leave_the_union) {
     enum { COUNT = 40 };
     double points[8 * COUNT];
     size_t counts[COUNT];
@@ -159,7 +160,7 @@ static double width_of(const char *letters) {
 }
 
 /* DejaVu Sans: 2048 units an em; l is a bar from 193 to 377 and to 1556, of exact lines. */
-static void letters_have_the_font_s_measures(void **state) {
+TEST(letters_have_the_font_s_measures) {
     vsh_outline *bar = lines_of("l", VSH_ALIGN_LEFT);
     const vsh_outline_info info = info_of(bar);
     assert_int_equal(info.points, 4);
@@ -174,14 +175,14 @@ static void letters_have_the_font_s_measures(void **state) {
     vsh_outline_free(o);
 }
 
-static void letters_are_kerned(void **state) {
+TEST(letters_are_kerned) {
     assert_true(width_of("AVA") < width_of("AHA") - 0.05);
     /* H is 1540 units wide, and pairs of them are not kerned */
     assert_true(fabs(width_of("HH") - width_of("H") - 1540.0 / 2048.0) < 1e-9);
     assert_true(width_of("AV") - width_of("V") < 1401.0 / 2048.0 - 0.02);
 }
 
-static void lines_lie_as_they_are_told_to(void **state) {
+TEST(lines_lie_as_they_are_told_to) {
     vsh_outline *lines = lines_of("l\r\nlll\n\nl", VSH_ALIGN_LEFT);
     /* three line heights of 2384 units below */
     assert_true(fabs(info_of(lines).bounds_min[1] + 3.0 * 2384.0 / 2048.0) < 1e-12);
@@ -202,7 +203,7 @@ static void lines_lie_as_they_are_told_to(void **state) {
 }
 
 /* Å is A with a ring, which other fonts let overlap; the same letter over itself adds nothing. */
-static void letters_that_overlap_are_one_area(void **state) {
+TEST(letters_that_overlap_are_one_area) {
     vsh_outline *o = lines_of("o", VSH_ALIGN_LEFT), *both = NULL;
     const double aside[6] = {1.0, 0.0, 0.3, 0.0, 1.0, 0.0};
     const vsh_outline_instance instances[3] = {{o, NULL}, {o, aside}, {o, NULL}};
@@ -229,7 +230,7 @@ static void letters_that_overlap_are_one_area(void **state) {
 }
 
 /* Cut eight times as fine the outline's area changes by less than the tolerance times its length. */
-static void curves_are_followed(void **state) {
+TEST(curves_are_followed) {
     /* the outer contour of O: its points lie on the curve, so the polygon's error is in its area */
     vsh_outline *o = lines_of("O", VSH_ALIGN_LEFT);
     const vsh_outline_info info = info_of(o);
@@ -249,7 +250,7 @@ static void curves_are_followed(void **state) {
     vsh_outline_free(o);
 }
 
-static void bad_text_is_refused(void **state) {
+TEST(bad_text_is_refused) {
     const vsh_text_options good = vsh_text_options_default();
     vsh_text_options no_height = good, no_align = good, no_spacing = good;
     no_height.height = NAN;
@@ -293,7 +294,7 @@ static void bad_text_is_refused(void **state) {
     }
 }
 
-static void bad_polygons_are_refused(void **state) {
+TEST(bad_polygons_are_refused) {
     static const struct {
         double points[8];
         size_t count;
@@ -315,20 +316,5 @@ static void bad_polygons_are_refused(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_square_s_distance),
-        cmocka_unit_test(the_tree_finds_what_looking_at_all_finds),
-        cmocka_unit_test(overlapping_squares_are_one_area),
-        cmocka_unit_test(contours_that_share_an_edge_are_one_area_and_those_the_other_way_holes),
-        cmocka_unit_test(a_pentagram_is_filled),
-        cmocka_unit_test(many_overlaps_leave_the_union),
-        cmocka_unit_test(letters_have_the_font_s_measures),
-        cmocka_unit_test(letters_are_kerned),
-        cmocka_unit_test(lines_lie_as_they_are_told_to),
-        cmocka_unit_test(letters_that_overlap_are_one_area),
-        cmocka_unit_test(curves_are_followed),
-        cmocka_unit_test(bad_text_is_refused),
-        cmocka_unit_test(bad_polygons_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

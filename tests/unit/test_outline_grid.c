@@ -19,7 +19,7 @@ static double box_distance(const double p[3]) {
     return outside + fmin(0.0, fmax(q[0], fmax(q[1], q[2])));
 }
 
-static void a_box_is_a_box(void **state) {
+TEST(a_box_is_a_box) {
     vsh_outline *outline = box(1.0, 0.5);
     vsh_grid *grid = NULL;
     const vsh_grid_options options = with_voxel(0.02);
@@ -39,7 +39,7 @@ static double placed_distance(const double p[3]) {
     return 2.0 * box_distance(local);
 }
 
-static void a_transform_moves_the_solid(void **state) {
+TEST(a_transform_moves_the_solid) {
     vsh_outline *outline = box(1.0, 0.5);
     vsh_grid *grid = NULL;
     const vsh_grid_options options = with_voxel(0.05);
@@ -73,7 +73,7 @@ static double letters_distance(const double p[3]) {
     return flat > 0.0 && above > 0.0 ? hypot(flat, above) : fmax(flat, above);
 }
 
-static void text_is_extruded_with_its_distance(void **state) {
+TEST(text_is_extruded_with_its_distance) {
     expect_ok(vsh_outline_from_text("d&", "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf", NULL, NULL,
                                     &letters, &failure));
     vsh_grid *grid = NULL, *again = NULL;
@@ -91,7 +91,7 @@ static void text_is_extruded_with_its_distance(void **state) {
     vsh_outline_free(letters);
 }
 
-static void bad_solids_are_refused(void **state) {
+TEST(bad_solids_are_refused) {
     vsh_outline *outline = box(1.0, 0.5);
     vsh_grid *grid = NULL;
     const vsh_grid_options options = with_voxel(0.02);
@@ -115,11 +115,5 @@ static void bad_solids_are_refused(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_box_is_a_box),
-        cmocka_unit_test(a_transform_moves_the_solid),
-        cmocka_unit_test(text_is_extruded_with_its_distance),
-        cmocka_unit_test(bad_solids_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

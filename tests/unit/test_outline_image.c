@@ -1,5 +1,6 @@
 /* Outlines of images against closed forms. */
 #include "outlines.h"
+#include "tests.h"
 
 #include <unistd.h>
 
@@ -26,7 +27,7 @@ static vsh_outline *outline_of_image(const vsh_mask_options *options) {
     return outline;
 }
 
-static void a_solid_image_is_its_rectangle(void **state) {
+TEST(a_solid_image_is_its_rectangle) {
     float white[12];
     for (int i = 0; i < 12; ++i) {
         white[i] = 1.0f;
@@ -48,7 +49,7 @@ static void a_solid_image_is_its_rectangle(void **state) {
 }
 
 /* A disc as a painter anti-aliases it: the share of each pixel that it covers, by 16 × 16 samples. */
-static void an_anti_aliased_disc_is_round(void **state) {
+TEST(an_anti_aliased_disc_is_round) {
     enum { SIZE = 64 };
     static float plane[SIZE * SIZE], hard[SIZE * SIZE];
     const double radius = 20.3, cx = 31.7, cy = 32.4; /* pixels, from the upper left corner */
@@ -85,7 +86,7 @@ static void an_anti_aliased_disc_is_round(void **state) {
 }
 
 /* Pixels that touch at corners only: by the middle of the four. */
-static void corners_join_by_their_middle(void **state) {
+TEST(corners_join_by_their_middle) {
     float plane[16] = {0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0};
     vsh_mask_options options = vsh_mask_options_default();
     options.width = 4.0;
@@ -102,7 +103,7 @@ static void corners_join_by_their_middle(void **state) {
     vsh_outline_free(outline);
 }
 
-static void any_image_closes(void **state) {
+TEST(any_image_closes) {
     enum { W = 37, H = 23 };
     float plane[W * H];
     for (int i = 0; i < W * H; ++i) {
@@ -126,7 +127,7 @@ static void any_image_closes(void **state) {
     assert_true(fabs(areas[0] + areas[1] - W * H) < 1e-9); /* what is not solid is the rest */
 }
 
-static void channels_are_chosen(void **state) {
+TEST(channels_are_chosen) {
     const float r[4] = {1, 0, 0, 0}, g[4] = {0, 1, 0, 0}, b[4] = {0, 0, 1, 1}, a[4] = {1, 1, 0, 1};
     const float one[4] = {1, 1, 1, 1};
     const char *const names[4] = {"R", "G", "B", "A"};
@@ -154,7 +155,7 @@ static void channels_are_chosen(void **state) {
     vsh_outline_free(outline);
 }
 
-static void bad_images_are_refused(void **state) {
+TEST(bad_images_are_refused) {
     enum { SIZE = 300 };
     static const struct {
         float pixel; /* (0, 1) */
@@ -209,13 +210,5 @@ static int name_image(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_solid_image_is_its_rectangle),
-        cmocka_unit_test(an_anti_aliased_disc_is_round),
-        cmocka_unit_test(corners_join_by_their_middle),
-        cmocka_unit_test(any_image_closes),
-        cmocka_unit_test(channels_are_chosen),
-        cmocka_unit_test(bad_images_are_refused),
-    };
-    return cmocka_run_group_tests(tests, name_image, remove_image);
+    return run_all_tests(name_image, remove_image);
 }

@@ -1,12 +1,6 @@
 /* Padding: texels outside the charts take their nearest neighbour's value. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "bake/nearest_valid.h"
 #include "bake/padding.h"
@@ -15,22 +9,22 @@
 
 static const float HOLE = -7.0f; /* what an unfilled texel holds; no valid texel does */
 
-static void fill(const vsh_run *run, int32_t width, int32_t height, const uint8_t *state, int32_t padding,
+static void fill(const vsh_run *run, int32_t width, int32_t height, const uint8_t *states, int32_t padding,
                  int32_t invalid, float *values, size_t channels) {
     const int32_t radius[VSHI_TEXEL_KINDS] = {padding, 0, invalid};
     const vshi_plane plane = {values, channels};
     vshi_store store = {.run = run};
-    assert_int_equal(vshi_padding_fill(&store, run, width, height, state, radius, &plane, 1, NULL, NULL),
+    assert_int_equal(vshi_padding_fill(&store, run, width, height, states, radius, &plane, 1, NULL, NULL),
                      VSH_OK);
     vshi_store_close(&store);
 }
 
 /* The definition, texel by texel: index of the source, or -1. */
-static int64_t nearest(int32_t width, int32_t height, const uint8_t *state, int64_t at, int32_t radius) {
+static int64_t nearest(int32_t width, int32_t height, const uint8_t *states, int64_t at, int32_t radius) {
     int64_t best = (int64_t)radius * radius + 1, source = -1;
     for (int64_t i = 0; i < (int64_t)width * height; ++i) {
         const int64_t dx = i % width - at % width, dy = i / width - at / width;
-        if (state[i] == VSHI_TEXEL_VALID && dx * dx + dy * dy < best) {
+        if (states[i] == VSHI_TEXEL_VALID && dx * dx + dy * dy < best) {
             best = dx * dx + dy * dy;
             source = i;
         }
@@ -38,82 +32,82 @@ static int64_t nearest(int32_t width, int32_t height, const uint8_t *state, int6
     return source;
 }
 
-static void every_texel_takes_the_nearest_value_and_the_first_of_equally_near_ones(void **unused) {
+TEST(every_texel_takes_the_nearest_value_and_the_first_of_equally_near_ones) {
     const int32_t sizes[][2] = {{1, 1}, {37, 23}, {130, 70}, {1, 50}, {50, 1}};
     const int32_t radii[][2] = {{0, 8}, {1, 8}, {2, 0}, {5, 8}, {7, 3}, {4096, 4096}};
     uint32_t random = 12345;
     for (size_t s = 0; s < sizeof sizes / sizeof sizes[0]; ++s) {
         const int32_t width = sizes[s][0], height = sizes[s][1];
         const size_t count = (size_t)width * (size_t)height;
-        uint8_t *state = malloc(count);
+        uint8_t *states = malloc(count);
         float *values = malloc(count * sizeof *values);
         for (size_t r = 0; r < sizeof radii / sizeof radii[0]; ++r) {
             for (size_t i = 0; i < count; ++i) {
                 random = random * 1664525u + 1013904223u;
                 const uint32_t dice = (random >> 16) % 50;
-                state[i] = dice == 0 ? VSHI_TEXEL_VALID : dice < 10 ? VSHI_TEXEL_INVALID : VSHI_TEXEL_EMPTY;
-                values[i] = state[i] == VSHI_TEXEL_VALID ? (float)i : HOLE;
+                states[i] = dice == 0 ? VSHI_TEXEL_VALID : dice < 10 ? VSHI_TEXEL_INVALID : VSHI_TEXEL_EMPTY;
+                values[i] = states[i] == VSHI_TEXEL_VALID ? (float)i : HOLE;
             }
-            fill(NULL, width, height, state, radii[r][0], radii[r][1], values, 1);
+            fill(NULL, width, height, states, radii[r][0], radii[r][1], values, 1);
             for (size_t i = 0; i < count; ++i) {
-                const int32_t radius = state[i] == VSHI_TEXEL_EMPTY ? radii[r][0] : radii[r][1];
-                const int64_t source = state[i] == VSHI_TEXEL_VALID ? (int64_t)i
-                                       : radius > 0 ? nearest(width, height, state, (int64_t)i, radius)
+                const int32_t radius = states[i] == VSHI_TEXEL_EMPTY ? radii[r][0] : radii[r][1];
+                const int64_t source = states[i] == VSHI_TEXEL_VALID ? (int64_t)i
+                                       : radius > 0 ? nearest(width, height, states, (int64_t)i, radius)
                                                     : -1;
                 assert_true(values[i] == (source < 0 ? HOLE : (float)source));
             }
         }
         free(values);
-        free(state);
+        free(states);
     }
 }
 
-static void a_ring_is_exactly_as_wide_as_asked(void **unused) {
+TEST(a_ring_is_exactly_as_wide_as_asked) {
     enum { SIZE = 41, PADDING = 5 };
-    uint8_t state[SIZE * SIZE] = {0};
+    uint8_t states[SIZE * SIZE] = {0};
     float values[SIZE * SIZE];
-    state[20 * SIZE + 20] = VSHI_TEXEL_VALID;
+    states[20 * SIZE + 20] = VSHI_TEXEL_VALID;
     for (int i = 0; i < SIZE * SIZE; ++i) {
-        values[i] = state[i] == VSHI_TEXEL_VALID ? 3.0f : HOLE;
+        values[i] = states[i] == VSHI_TEXEL_VALID ? 3.0f : HOLE;
     }
-    fill(NULL, SIZE, SIZE, state, PADDING, 0, values, 1);
+    fill(NULL, SIZE, SIZE, states, PADDING, 0, values, 1);
     for (int i = 0; i < SIZE * SIZE; ++i) {
         const int dx = i % SIZE - 20, dy = i / SIZE - 20;
         assert_true(values[i] == (dx * dx + dy * dy <= PADDING * PADDING ? 3.0f : HOLE));
     }
 }
 
-/* A dark texel beside a lit one keeps its value and hands it on, of all channels; the state stays. */
-static void dark_texels_are_no_holes_and_all_channels_are_copied(void **unused) {
-    uint8_t state[16] = {0}, before[16];
+/* A dark texel beside a lit one keeps its value and hands it on, of all channels; the states stays. */
+TEST(dark_texels_are_no_holes_and_all_channels_are_copied) {
+    uint8_t states[16] = {0}, before[16];
     float values[3 * 16];
-    state[5] = state[6] = VSHI_TEXEL_VALID;
-    state[8] = VSHI_TEXEL_INVALID;
-    memcpy(before, state, sizeof state);
+    states[5] = states[6] = VSHI_TEXEL_VALID;
+    states[8] = VSHI_TEXEL_INVALID;
+    memcpy(before, states, sizeof states);
     for (int i = 0; i < 3 * 16; ++i) {
         values[i] = i / 3 == 5 ? 0.0f : i / 3 == 6 ? 1.0f + (float)(i % 3) : HOLE;
     }
-    fill(NULL, 16, 1, state, 3, 8, values, 3);
-    assert_memory_equal(state, before, sizeof state);
+    fill(NULL, 16, 1, states, 3, 8, values, 3);
+    assert_memory_equal(states, before, sizeof states);
     for (int i = 0; i < 3 * 16; ++i) {
         const int texel = i / 3;
         assert_true(values[i] == (texel < 2 || texel > 9 ? HOLE : texel <= 5 ? 0.0f : 1.0f + (float)(i % 3)));
     }
 }
 
-static void any_number_of_threads_gives_the_same_bits(void **unused) {
+TEST(any_number_of_threads_gives_the_same_bits) {
     enum { WIDTH = 300, HEIGHT = 211, COUNT = WIDTH * HEIGHT };
     static const int32_t threads[] = {1, 2, 5};
-    static uint8_t state[COUNT];
+    static uint8_t states[COUNT];
     static float values[3][COUNT];
     for (int t = 0; t < 3; ++t) {
         for (uint32_t i = 0; i < COUNT; ++i) {
-            state[i] = i * 2654435761u >> 26 == 0 ? VSHI_TEXEL_VALID : VSHI_TEXEL_EMPTY;
+            states[i] = i * 2654435761u >> 26 == 0 ? VSHI_TEXEL_VALID : VSHI_TEXEL_EMPTY;
             values[t][i] = (float)i;
         }
         vsh_run run = vsh_run_default();
         run.threads = threads[t];
-        fill(&run, WIDTH, HEIGHT, state, 9, 0, values[t], 1);
+        fill(&run, WIDTH, HEIGHT, states, 9, 0, values[t], 1);
         assert_memory_equal(values[0], values[t], sizeof values[0]);
     }
 }
@@ -154,7 +148,7 @@ static map spread_over(size_t width, const char *letters) {
     return m;
 }
 
-static void an_invalid_texel_is_filled_from_at_most_64_texels_away(void **state) {
+TEST(an_invalid_texel_is_filled_from_at_most_64_texels_away) {
     char letters[201] = "A";
     memset(letters + 1, 'a', 199);
     const map across = spread_over(200, letters), down = spread_over(1, letters);
@@ -164,7 +158,7 @@ static void an_invalid_texel_is_filled_from_at_most_64_texels_away(void **state)
     }
 }
 
-static void texels_of_other_charts_are_never_taken_from(void **state) {
+TEST(texels_of_other_charts_are_never_taken_from) {
     /* another mesh touches; another chart of the same mesh does not */
     const map m = spread_over(10, "Aaaaaa    "
                                   "BBBBBB AAA"
@@ -181,7 +175,7 @@ static void texels_of_other_charts_are_never_taken_from(void **state) {
     assert_int_equal(arms.from[18], 17);
 }
 
-static void the_nearest_valid_texel_of_a_chart_is_taken_and_the_first_of_equals(void **state) {
+TEST(the_nearest_valid_texel_of_a_chart_is_taken_and_the_first_of_equals) {
     static const int FROM[21] = {NOWHERE, 0,  0,  0,  6,  6,  NOWHERE, /* */
                                  0,       0,  0,  0,  6,  6,  6,       /* */
                                  NOWHERE, 14, 14, 14, 20, 20, NOWHERE};
@@ -191,7 +185,7 @@ static void the_nearest_valid_texel_of_a_chart_is_taken_and_the_first_of_equals(
     assert_memory_equal(m.from, FROM, sizeof FROM);
 }
 
-static void values_are_copied_from_texels_that_have_one(void **state) {
+TEST(values_are_copied_from_texels_that_have_one) {
     uint8_t states[4] = {VSHI_TEXEL_VALID, VSHI_TEXEL_INVALID, VSHI_TEXEL_INVALID, VSHI_TEXEL_INVALID};
     float values[8] = {1.0f, 2.0f, 0.0f, 0.0f, 0.0f, 0.0f, 5.0f, 6.0f};
     uint32_t texels[2] = {1, 2}, sources[2] = {0, 3}; /* the second one lost its value to a method */
@@ -205,15 +199,5 @@ static void values_are_copied_from_texels_that_have_one(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_texel_takes_the_nearest_value_and_the_first_of_equally_near_ones),
-        cmocka_unit_test(a_ring_is_exactly_as_wide_as_asked),
-        cmocka_unit_test(dark_texels_are_no_holes_and_all_channels_are_copied),
-        cmocka_unit_test(any_number_of_threads_gives_the_same_bits),
-        cmocka_unit_test(an_invalid_texel_is_filled_from_at_most_64_texels_away),
-        cmocka_unit_test(texels_of_other_charts_are_never_taken_from),
-        cmocka_unit_test(the_nearest_valid_texel_of_a_chart_is_taken_and_the_first_of_equals),
-        cmocka_unit_test(values_are_copied_from_texels_that_have_one),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

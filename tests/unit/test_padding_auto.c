@@ -1,14 +1,8 @@
 /* Padding for mip levels: every texel holds a value, and levels hold the means of values alone. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "bake/pull_push.h"
 #include "expect.h"
@@ -38,7 +32,7 @@ static void halve(size_t width, size_t height, size_t channels, const float *val
     }
 }
 
-static void every_level_holds_the_means_of_values_alone(void **state) {
+TEST(every_level_holds_the_means_of_values_alone) {
     const int32_t sizes[][2] = {{64, 64}, {1, 1}, {37, 90}, {128, 16}, {1, 77}, {255, 3}};
     for (size_t s = 0; s < sizeof sizes / sizeof sizes[0]; ++s) {
         size_t width = (size_t)sizes[s][0], height = (size_t)sizes[s][1], count = width * height;
@@ -85,7 +79,7 @@ static void every_level_holds_the_means_of_values_alone(void **state) {
     }
 }
 
-static void a_plane_without_values_is_left(void **state) {
+TEST(a_plane_without_values_is_left) {
     uint8_t mask[12] = {0};
     float values[12];
     for (int i = 0; i < 12; ++i) {
@@ -119,7 +113,7 @@ static vsh_charts *charts_with(const vsh_mesh *mesh, int32_t padding) {
     return charts;
 }
 
-static void a_lightmap_is_filled_to_its_last_corner(void **state) {
+TEST(a_lightmap_is_filled_to_its_last_corner) {
     float uvs[8];
     const vsh_mesh mesh = corner_mesh(uvs);
     vsh_charts *charts = charts_with(&mesh, VSH_PADDING_AUTO), *grown = charts_with(&mesh, 16);
@@ -152,7 +146,7 @@ static void a_lightmap_is_filled_to_its_last_corner(void **state) {
     vsh_charts_free(charts);
 }
 
-static void no_other_padding_is_below_0(void **state) {
+TEST(no_other_padding_is_below_0) {
     const vsh_mesh mesh = floor_mesh();
     vsh_lightmap_options options = vsh_lightmap_options_default();
     vsh_charts *charts = NULL;
@@ -162,11 +156,5 @@ static void no_other_padding_is_below_0(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_level_holds_the_means_of_values_alone),
-        cmocka_unit_test(a_plane_without_values_is_left),
-        cmocka_unit_test(a_lightmap_is_filled_to_its_last_corner),
-        cmocka_unit_test(no_other_padding_is_below_0),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

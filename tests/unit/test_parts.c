@@ -75,7 +75,7 @@ static void bake_whole(const case_scene *c, taken *rows, vsh_bake_report *report
     expect_ok(vsh_bake_scene(&c->scene, &options, NULL, report, &failure));
 }
 
-static void merged_rows_are_those_of_one_bake_and_words_come_back(void **state) {
+TEST(merged_rows_are_those_of_one_bake_and_words_come_back) {
     case_scene c;
     fill(&c, SIZE, 0.4);
     taken *one = calloc(2, sizeof *one), *all = one + 1;
@@ -100,7 +100,7 @@ static void merged_rows_are_those_of_one_bake_and_words_come_back(void **state) 
     free(one);
 }
 
-static void what_parts_leave_of_ao_is_as_of_one_bake(void **state) {
+TEST(what_parts_leave_of_ao_is_as_of_one_bake) {
     case_scene c;
     char wall[300];
     if (!vsh_triangles_available()) {
@@ -122,7 +122,7 @@ static void what_parts_leave_of_ao_is_as_of_one_bake(void **state) {
     }
 }
 
-static void options_that_a_part_cannot_have_are_refused(void **state) {
+TEST(options_that_a_part_cannot_have_are_refused) {
     case_scene c;
     fill(&c, SIZE, 0.4);
     taken t;
@@ -198,7 +198,7 @@ static void try_all(const char *path, bake_case *one, size_t least_refused) {
     free(good.at);
 }
 
-static void no_part_does_worse_than_fail(void **state) {
+TEST(no_part_does_worse_than_fail) {
     for (int traced = 0; traced < (vsh_triangles_available() ? 2 : 1); ++traced) { /* which leave AO */
         case_scene c;
         char wall[300];
@@ -249,7 +249,7 @@ static void try_values(const char *path, const char *place, bake_case *one) {
     free(good.at);
 }
 
-static void values_out_of_range_are_refused_by_part_plane_and_texel(void **state) {
+TEST(values_out_of_range_are_refused_by_part_plane_and_texel) {
     case_scene c;
     fill(&c, SIZE, 0.4);
     bake_parts(&c);
@@ -260,12 +260,5 @@ static void values_out_of_range_are_refused_by_part_plane_and_texel(void **state
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(merged_rows_are_those_of_one_bake_and_words_come_back),
-        cmocka_unit_test(what_parts_leave_of_ao_is_as_of_one_bake),
-        cmocka_unit_test(options_that_a_part_cannot_have_are_refused),
-        cmocka_unit_test(no_part_does_worse_than_fail),
-        cmocka_unit_test(values_out_of_range_are_refused_by_part_plane_and_texel),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

@@ -34,12 +34,12 @@ static void assert_shape(vsh_model *model, double area, size_t triangles) {
     "property float z\nelement tristrips " rows "\nproperty list " list " vertex_indices\nend_header\n"      \
     "0 0 0\n0 1 0\n1 0 0\n1 1 0\n2 0 0\n2 1 0\n"
 
-static void a_strip_turns_every_second_triangle(void **state) {
+TEST(a_strip_turns_every_second_triangle) {
     assert_shape(read_text("a.ply", HEAD("1", "int int") "6 0 1 2 3 4 5\n"), -2.0, 4);
     assert_shape(read_text("a.ply", HEAD("1", "uchar short") "6 1 0 3 2 5 4\n"), 2.0, 4);
 }
 
-static void minus_one_and_each_row_begin_another_strip(void **state) {
+TEST(minus_one_and_each_row_begin_another_strip) {
     /* the second strip begins anew: its first triangle is not turned, whatever came before */
     assert_shape(read_text("a.ply", HEAD("1", "int int") "9 1 0 3 2 -1 3 2 5 4\n"), 2.0, 4);
     assert_shape(read_text("a.ply", HEAD("1", "int int") "8 1 0 3 -1 3 2 5 4\n"), 1.5, 3);
@@ -47,7 +47,7 @@ static void minus_one_and_each_row_begin_another_strip(void **state) {
     assert_shape(read_text("a.ply", HEAD("1", "int int") "10 -1 -1 0 -1 0 1 -1 1 0 3\n"), 0.5, 1);
 }
 
-static void triangles_without_area_that_join_strips_are_left_out(void **state) {
+TEST(triangles_without_area_that_join_strips_are_left_out) {
     /* 1 0 3 and 3 2 5, joined by repeats: the turns count on */
     assert_shape(read_text("a.ply", HEAD("1", "int int") "8 1 0 3 3 3 3 2 5\n"), 0.0, 2);
     assert_shape(read_text("a.ply", HEAD("1", "int int") "7 1 0 3 3 3 2 5\n"), 1.0, 2);
@@ -59,7 +59,7 @@ static void put(unsigned char **to, uint64_t value, int size, bool big) {
     }
 }
 
-static void strips_are_read_in_binary_of_either_order_and_every_size(void **state) {
+TEST(strips_are_read_in_binary_of_either_order_and_every_size) {
     static const struct {
         const char *name;
         int size;
@@ -93,7 +93,7 @@ static void strips_are_read_in_binary_of_either_order_and_every_size(void **stat
     }
 }
 
-static void strips_of_bad_indices_are_refused(void **state) {
+TEST(strips_of_bad_indices_are_refused) {
     refused("a.ply", HEAD("1", "int int") "3 0 1 6\n", VSH_ERROR_INPUT, "tristrips 0", "vertex 6");
     refused("a.ply", HEAD("2", "int int") "3 0 1 2\n3 0 -2 1\n", VSH_ERROR_INPUT, "tristrips 1", "-2");
     refused("a.ply", HEAD("1", "int int") "3 0 1.5 2\n", VSH_ERROR_INPUT, "tristrips 0", "'1.5'");
@@ -104,7 +104,7 @@ static void strips_of_bad_indices_are_refused(void **state) {
             "save it with faces");
 }
 
-static void strips_beside_faces_are_refused(void **state) {
+TEST(strips_beside_faces_are_refused) {
     refused("a.ply",
             "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
             "element face 1\nproperty list uchar int vertex_indices\n"
@@ -114,7 +114,7 @@ static void strips_beside_faces_are_refused(void **state) {
 }
 
 /* Indices of a byte unfold to much more than the file: that is held against the limit before it is taken. */
-static void a_limit_of_memory_holds_for_what_strips_unfold_to(void **state) {
+TEST(a_limit_of_memory_holds_for_what_strips_unfold_to) {
     enum { COUNT = 60000 };
     static unsigned char bytes[COUNT + 1024];
     unsigned char *to = bytes;
@@ -136,14 +136,5 @@ static void a_limit_of_memory_holds_for_what_strips_unfold_to(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_strip_turns_every_second_triangle),
-        cmocka_unit_test(minus_one_and_each_row_begin_another_strip),
-        cmocka_unit_test(triangles_without_area_that_join_strips_are_left_out),
-        cmocka_unit_test(strips_are_read_in_binary_of_either_order_and_every_size),
-        cmocka_unit_test(strips_of_bad_indices_are_refused),
-        cmocka_unit_test(strips_beside_faces_are_refused),
-        cmocka_unit_test(a_limit_of_memory_holds_for_what_strips_unfold_to),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

@@ -1,12 +1,6 @@
 /* Polygons cut into triangles: their area is that of the polygon, and none is flipped. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "model/polygon.h"
+#include "tests.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -126,7 +120,7 @@ static bool make_twisted(shape *s, size_t count, int grid) {
     return false;
 }
 
-static void every_simple_polygon_is_covered_and_no_triangle_is_flipped(void **state) {
+TEST(every_simple_polygon_is_covered_and_no_triangle_is_flipped) {
     static shape s;
     seed = 7;
     size_t made = 0;
@@ -141,7 +135,7 @@ static void every_simple_polygon_is_covered_and_no_triangle_is_flipped(void **st
 }
 
 /* Combs, spirals and stars, of many corners, in both directions of turning. */
-static void long_and_narrow_polygons_are_covered(void **state) {
+TEST(long_and_narrow_polygons_are_covered) {
     static shape s;
     static float at[MOST][2];
     size_t n = 0;
@@ -176,7 +170,7 @@ static void long_and_narrow_polygons_are_covered(void **state) {
 }
 
 /* From whichever corner each begins. */
-static void known_polygons_are_cut_into_as_many_triangles_as_they_should(void **state) {
+TEST(known_polygons_are_cut_into_as_many_triangles_as_they_should) {
     enum { NONE = -1 };
     static const struct {
         const char *name;
@@ -243,7 +237,7 @@ static void known_polygons_are_cut_into_as_many_triangles_as_they_should(void **
 }
 
 /* The fans that they have always been: bakes keep their bits. */
-static void convex_polygons_are_fans_from_the_last_corner_and_quads_from_the_first(void **state) {
+TEST(convex_polygons_are_fans_from_the_last_corner_and_quads_from_the_first) {
     static const float corners[6][2] = {{2, 0}, {1, 2}, {-1, 2}, {-2, 0}, {-1, -2}, {1, -2}};
     static const uint32_t fan[12] = {5, 0, 1, 5, 1, 2, 5, 2, 3, 3, 4, 5}, quad[6] = {0, 1, 2, 0, 2, 3};
     static shape s;
@@ -257,7 +251,7 @@ static void convex_polygons_are_fans_from_the_last_corner_and_quads_from_the_fir
 
 /* On integers, many corners lie on edges of others, which is more than simple polygons may do: whatever is
  * said of them, the triangles add up. */
-static void polygons_that_touch_themselves_do_no_harm(void **state) {
+TEST(polygons_that_touch_themselves_do_no_harm) {
     static shape s;
     seed = 11;
     vshi_polygon_cutter cutter = {0};
@@ -288,12 +282,5 @@ static void polygons_that_touch_themselves_do_no_harm(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_simple_polygon_is_covered_and_no_triangle_is_flipped),
-        cmocka_unit_test(long_and_narrow_polygons_are_covered),
-        cmocka_unit_test(known_polygons_are_cut_into_as_many_triangles_as_they_should),
-        cmocka_unit_test(convex_polygons_are_fans_from_the_last_corner_and_quads_from_the_first),
-        cmocka_unit_test(polygons_that_touch_themselves_do_no_harm),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

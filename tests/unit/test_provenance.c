@@ -7,7 +7,7 @@
 #include <vdbshade/provenance.h>
 #include <vdbshade/volume.h>
 
-static void digests_are_those_of_the_standard(void **state) {
+TEST(digests_are_those_of_the_standard) {
     /* FIPS 180-4's examples, and a million times 'a' (NIST, "SHA examples") */
     static const struct {
         const char *text;
@@ -41,7 +41,7 @@ static void digests_are_those_of_the_standard(void **state) {
     }
 }
 
-static void digests_of_what_is_no_file_are_refused(void **state) {
+TEST(digests_of_what_is_no_file_are_refused) {
     char digest[VSH_DIGEST_TEXT];
     expect_error(vsh_file_digest(at("nothing"), NULL, digest, &failure), VSH_ERROR_READ,
                  "nothing: cannot be read: No such file");
@@ -65,7 +65,7 @@ static void write_text(const char *name, const char *text) {
 }
 
 /* A glTF with a buffer beside it, one within, and one behind an escaped name. */
-static void settings_and_inputs_are_told_in_order_and_once(void **state) {
+TEST(settings_and_inputs_are_told_in_order_and_once) {
     write_text("scene.json", "{}");
     write_text("one.bin", "1");
     write_text("two parts.bin", "2");
@@ -133,7 +133,7 @@ static void settings_and_inputs_are_told_in_order_and_once(void **state) {
     assert_non_null(strstr(failure.message, "one.bin: cannot be read"));
 }
 
-static void the_error_that_a_channel_was_made_to_is_told(void **state) {
+TEST(the_error_that_a_channel_was_made_to_is_told) {
     const vsh_attribute list[] = {{"vdbshade_version", "0.2.0"},
                                   {"vdbshade_shadow", "adaptive, max error 0.005, sobol, frame 3"},
                                   {"vdbshade_ao", "exact within 2.5, max error 0.02, sobol"},
@@ -158,7 +158,7 @@ static void the_error_that_a_channel_was_made_to_is_told(void **state) {
     }
 }
 
-static void images_carry_them_and_give_them_back(void **state) {
+TEST(images_carry_them_and_give_them_back) {
     static const char *const files[] = {"told.exr", "told.png"};
     static const vsh_attribute told[] = {{"vdbshade_version", "0.2.0"}, {"long", "a line, with = and ;"}};
     sample s;
@@ -183,7 +183,7 @@ static void images_carry_them_and_give_them_back(void **state) {
     unmake(&s);
 }
 
-static void level_sets_and_volumes_carry_them(void **state) {
+TEST(level_sets_and_volumes_carry_them) {
     const vsh_sdf_node ball = vsh_sdf_node_default();
     const vsh_sdf sdf = {&ball, 1};
     vsh_grid_options options = vsh_grid_options_default();
@@ -214,7 +214,7 @@ static void level_sets_and_volumes_carry_them(void **state) {
     vsh_grid_free(grid);
 }
 
-static void attributes_that_no_file_could_hold_are_refused(void **state) {
+TEST(attributes_that_no_file_could_hold_are_refused) {
     static const char long_name[] =
         "an_attribute_name_of_eighty_letters_which_is_one_more_than_PNG_has_room_for_"
         "1234";
@@ -246,14 +246,5 @@ static void attributes_that_no_file_could_hold_are_refused(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(digests_are_those_of_the_standard),
-        cmocka_unit_test(digests_of_what_is_no_file_are_refused),
-        cmocka_unit_test(settings_and_inputs_are_told_in_order_and_once),
-        cmocka_unit_test(the_error_that_a_channel_was_made_to_is_told),
-        cmocka_unit_test(images_carry_them_and_give_them_back),
-        cmocka_unit_test(level_sets_and_volumes_carry_them),
-        cmocka_unit_test(attributes_that_no_file_could_hold_are_refused),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

@@ -76,7 +76,7 @@ static void expect(const caster *c, const vsh_points *points, int l, const vsh_s
                                         expected_deviation, NULL, NULL, &failure));
 }
 
-static void values_and_deviations_are_those_of_the_shade_calls(void **state) {
+TEST(values_and_deviations_are_those_of_the_shade_calls) {
     caster c = caster_of(truth_seeds(), 0.04, 0.0);
     const int32_t methods = shadow_methods() > ao_methods() ? shadow_methods() : ao_methods();
     for (int32_t method = 0; method < methods; ++method) {
@@ -100,7 +100,7 @@ static void values_and_deviations_are_those_of_the_shade_calls(void **state) {
     caster_free(&c);
 }
 
-static void values_follow_points_that_are_shuffled_on_any_number_of_threads(void **state) {
+TEST(values_follow_points_that_are_shuffled_on_any_number_of_threads) {
     caster c = caster_of(truth_seeds(), 0.04, 0.0);
     const int32_t methods[] = {VSH_SHADOW_HARD, VSH_SHADOW_CONE, VSH_SHADOW_RAYS};
     for (size_t m = 0; m < sizeof methods / sizeof methods[0]; ++m) {
@@ -129,7 +129,7 @@ static void values_follow_points_that_are_shuffled_on_any_number_of_threads(void
 }
 
 /* The order tells its samplers the points' numbers, where there are no texels. */
-static void points_without_texels_are_told_apart_by_their_numbers_in_any_order(void **state) {
+TEST(points_without_texels_are_told_apart_by_their_numbers_in_any_order) {
     caster c = caster_of(truth_seeds(), 0.1, 0.0);
     vsh_shade_options options = preview_options();
     options.method = VSH_SHADOW_RAYS;
@@ -147,7 +147,7 @@ static void points_without_texels_are_told_apart_by_their_numbers_in_any_order(v
     caster_free(&c);
 }
 
-static void points_that_are_invalid_are_nan_and_leave_the_others_alone(void **state) {
+TEST(points_that_are_invalid_are_nan_and_leave_the_others_alone) {
     vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
     const vsh_shade_options preview = preview_options(); /* rays of adaptive are shared with neighbours */
     vsh_query *query = query_of(occluders_of(field), lights, LIGHTS, &preview);
@@ -184,7 +184,7 @@ static void points_that_are_invalid_are_nan_and_leave_the_others_alone(void **st
     vsh_field_free(field);
 }
 
-static void one_point_has_the_value_that_it_has_among_many(void **state) {
+TEST(one_point_has_the_value_that_it_has_among_many) {
     vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
     const int32_t methods[] = {VSH_SHADOW_HARD, VSH_SHADOW_CLASSIC, VSH_SHADOW_IMPROVED, VSH_SHADOW_CONE,
                                VSH_SHADOW_RAYS};
@@ -209,7 +209,7 @@ static void one_point_has_the_value_that_it_has_among_many(void **state) {
     vsh_field_free(field);
 }
 
-static void what_is_not_asked_for_is_not_marched(void **state) {
+TEST(what_is_not_asked_for_is_not_marched) {
     vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
     vsh_query *query = query_of(occluders_of(field), lights, LIGHTS, NULL);
     const vsh_points points = {FEW, positions, normals, NULL};
@@ -253,7 +253,7 @@ static void *ask_alone(void *user) {
     return NULL;
 }
 
-static void a_handle_is_shared_by_threads(void **state) {
+TEST(a_handle_is_shared_by_threads) {
     vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     vsh_shade_options options = preview_options();
@@ -281,7 +281,7 @@ static int32_t stop_at(void *user, const char *stage, double fraction) {
     return fraction >= *(const double *)user;
 }
 
-static void limits_and_cancelling_have_their_codes(void **state) {
+TEST(limits_and_cancelling_have_their_codes) {
     vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
     vsh_query *query = query_of(occluders_of(field), lights, LIGHTS, NULL);
     float *const visibility[LIGHTS] = {values[0], NULL};
@@ -309,7 +309,7 @@ static void limits_and_cancelling_have_their_codes(void **state) {
     vsh_field_free(field);
 }
 
-static void bad_arguments_are_refused_by_name(void **state) {
+TEST(bad_arguments_are_refused_by_name) {
     vsh_field *field = field_of(truth_seeds(), 0.2, 1.0);
     vsh_query *query = NULL;
     const vsh_light none[LIGHTS] = {lights[0], lamp(truth_seeds_sun, -1.0)};
@@ -352,16 +352,5 @@ static void bad_arguments_are_refused_by_name(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(values_and_deviations_are_those_of_the_shade_calls),
-        cmocka_unit_test(values_follow_points_that_are_shuffled_on_any_number_of_threads),
-        cmocka_unit_test(points_without_texels_are_told_apart_by_their_numbers_in_any_order),
-        cmocka_unit_test(points_that_are_invalid_are_nan_and_leave_the_others_alone),
-        cmocka_unit_test(one_point_has_the_value_that_it_has_among_many),
-        cmocka_unit_test(what_is_not_asked_for_is_not_marched),
-        cmocka_unit_test(a_handle_is_shared_by_threads),
-        cmocka_unit_test(limits_and_cancelling_have_their_codes),
-        cmocka_unit_test(bad_arguments_are_refused_by_name),
-    };
-    return cmocka_run_group_tests(tests, fill_points, NULL);
+    return run_all_tests(fill_points, NULL);
 }

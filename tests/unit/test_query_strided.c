@@ -71,7 +71,7 @@ static void ask(const vsh_query *query, size_t count, const double *at, const vs
     expect_ok(vsh_query_points(query, &points, NULL, NULL, output, NULL, &failure));
 }
 
-static void strides_floats_and_gaps_give_the_bits_of_packed_arrays(void **state) {
+TEST(strides_floats_and_gaps_give_the_bits_of_packed_arrays) {
     vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     fill_points();
@@ -129,7 +129,7 @@ static void strides_floats_and_gaps_give_the_bits_of_packed_arrays(void **state)
     vsh_field_free(field);
 }
 
-static void distance_is_the_fields_and_near_the_truth(void **state) {
+TEST(distance_is_the_fields_and_near_the_truth) {
     const double voxel = 0.04;
     vsh_field *field = field_of(truth_seeds(), voxel, 0.0);
     fill_points();
@@ -152,7 +152,7 @@ static void distance_is_the_fields_and_near_the_truth(void **state) {
     vsh_field_free(field);
 }
 
-static void gradients_are_unit_and_point_away_from_the_sphere(void **state) {
+TEST(gradients_are_unit_and_point_away_from_the_sphere) {
     const truth_solid ball = {.shape = TRUTH_SPHERE, .center = {0.3, -0.2, 0.1}, .radius = 1.0};
     const truth_scene scene = {&ball, 1};
     const double voxel = 0.05;
@@ -197,7 +197,7 @@ static void gradients_are_unit_and_point_away_from_the_sphere(void **state) {
     vsh_field_free(field);
 }
 
-static void there_is_no_gradient_beyond_the_reach_nor_where_nothing_is(void **state) {
+TEST(there_is_no_gradient_beyond_the_reach_nor_where_nothing_is) {
     const truth_solid ball = {.shape = TRUTH_SPHERE, .radius = 1.0};
     vsh_field *field = field_of((truth_scene){&ball, 1}, 0.05, 1.0);
     vsh_query *query = query_of(field, NULL, VSH_SHADOW_CONE);
@@ -218,7 +218,7 @@ static void there_is_no_gradient_beyond_the_reach_nor_where_nothing_is(void **st
     vsh_field_free(field);
 }
 
-static void calls_for_a_batch_each_give_the_bits_of_one_call(void **state) {
+TEST(calls_for_a_batch_each_give_the_bits_of_one_call) {
     enum { ALL = VSH_QUERY_BATCH + 40000 };
     vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.1);
@@ -263,7 +263,7 @@ static void calls_for_a_batch_each_give_the_bits_of_one_call(void **state) {
     vsh_field_free(field);
 }
 
-static void strides_that_are_none_are_refused_by_name(void **state) {
+TEST(strides_that_are_none_are_refused_by_name) {
     const truth_solid ball = {.shape = TRUTH_SPHERE, .radius = 1.0};
     vsh_field *field = field_of((truth_scene){&ball, 1}, 0.1, 1.0);
     vsh_query *query = query_of(field, NULL, VSH_SHADOW_CONE);
@@ -305,13 +305,5 @@ static void strides_that_are_none_are_refused_by_name(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(strides_floats_and_gaps_give_the_bits_of_packed_arrays),
-        cmocka_unit_test(distance_is_the_fields_and_near_the_truth),
-        cmocka_unit_test(gradients_are_unit_and_point_away_from_the_sphere),
-        cmocka_unit_test(there_is_no_gradient_beyond_the_reach_nor_where_nothing_is),
-        cmocka_unit_test(calls_for_a_batch_each_give_the_bits_of_one_call),
-        cmocka_unit_test(strides_that_are_none_are_refused_by_name),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

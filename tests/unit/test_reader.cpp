@@ -6,6 +6,8 @@
 #include <openvdb/tools/LevelSetSphere.h>
 #include <sys/resource.h>
 
+#include "tests.h"
+
 namespace {
 
 const std::string ASSETS = VSH_ASSETS;
@@ -43,7 +45,7 @@ template <typename Info> void assert_same_info(const Info &here, const Info &the
     assert_memory_equal(&here, &there, sizeof here);
 }
 
-void grids_are_the_same_for_every_kind_of_transform(void **) {
+TEST(grids_are_the_same_for_every_kind_of_transform) {
     using namespace openvdb::math;
     Mat4d turned = Mat4d::identity();
     turned.setToRotation(openvdb::Vec3d(1.0, 2.0, -0.5), 0.7);
@@ -78,7 +80,7 @@ void grids_are_the_same_for_every_kind_of_transform(void **) {
     }
 }
 
-void mended_grids_and_doubles_and_tiles_are_the_same(void **) {
+TEST(mended_grids_and_doubles_and_tiles_are_the_same) {
     const FloatGrid::Ptr narrow = ball<FloatGrid>(RADIUS, 2.0f);
     const FloatGrid::Ptr tiled = sphere();
     tiled->tree().addTile(3, openvdb::Coord(1 << 13, 0, 0), tiled->background(), false);
@@ -104,7 +106,7 @@ template <typename Value> void assert_same_array(const Value *a, const Value *b,
     }
 }
 
-void models_are_the_same(void **) {
+TEST(models_are_the_same) {
     for (const char *name : {"/cloister.glb", "/cloister.obj", "/thin.glb", "/seeds_floor.obj"}) {
         const Both<vsh_model> read(vsh_model_free, [&](const vsh_run *run, vsh_model **model) {
             return vsh_model_read((ASSETS + name).c_str(), run, model, &failure);
@@ -128,7 +130,7 @@ void models_are_the_same(void **) {
     }
 }
 
-void images_are_the_same(void **) {
+TEST(images_are_the_same) {
     const std::string png = ASSETS + "/terrain.png", exr = in_folder("image.exr"),
                       tif = in_folder("image.tif");
     for (const std::string &path : {png, exr, tif}) {
@@ -157,7 +159,7 @@ void images_are_the_same(void **) {
     }
 }
 
-void lists_voxels_and_texts_are_the_same(void **) {
+TEST(lists_voxels_and_texts_are_the_same) {
     const std::string path = ball_file();
     vsh_vdb_entry entries[2][2] = {};
     size_t counts[2];
@@ -193,7 +195,7 @@ void lists_voxels_and_texts_are_the_same(void **) {
     assert_same_array(outline.here->points, outline.there->points, outline.here->starts[contours]);
 }
 
-void errors_are_the_same(void **) {
+TEST(errors_are_the_same) {
     const std::string text = in_folder("text.vdb"), obj = in_folder("bad.obj");
     put(text, "v 0 0 0\n");
     put(obj, "v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n");
@@ -230,7 +232,7 @@ void assert_no_child() {
     assert_int_equal(errno, ECHILD);
 }
 
-void a_reader_that_fails_is_an_error_with_its_reason(void **) {
+TEST(a_reader_that_fails_is_an_error_with_its_reason) {
     const struct {
         const char *how;
         double seconds;
@@ -269,7 +271,7 @@ void a_reader_that_fails_is_an_error_with_its_reason(void **) {
     misbehave(nullptr);
 }
 
-void a_program_that_names_itself_and_does_not_serve_starts_once(void **) {
+TEST(a_program_that_names_itself_and_does_not_serve_starts_once) {
     const std::string path = ball_file(), starts = in_folder("starts.txt");
     put(starts, "");
     setenv(STARTS, starts.c_str(), 1);
@@ -288,7 +290,7 @@ void a_program_that_names_itself_and_does_not_serve_starts_once(void **) {
     assert_no_child();
 }
 
-void a_program_that_is_missing_or_no_reader_is_an_argument(void **) {
+TEST(a_program_that_is_missing_or_no_reader_is_an_argument) {
     const std::string path = ball_file();
     vsh_run run = with_reader();
     vsh_grid *grid = nullptr;
@@ -303,7 +305,7 @@ void a_program_that_is_missing_or_no_reader_is_an_argument(void **) {
     assert_int_equal(vsh_grid_read(path.c_str(), nullptr, &run, &grid, &failure), VSH_ERROR_ARGUMENT);
 }
 
-void cancelling_kills_the_reader(void **) {
+TEST(cancelling_kills_the_reader) {
     misbehave("hang");
     const std::string path = ball_file();
     static int calls;
@@ -326,7 +328,7 @@ void cancelling_kills_the_reader(void **) {
     misbehave(nullptr);
 }
 
-void a_host_may_ignore_its_children_and_have_threads(void **) {
+TEST(a_host_may_ignore_its_children_and_have_threads) {
     const std::string path = ball_file();
     const vsh_run run = with_reader();
     void (*const before)(int) = signal(SIGCHLD, SIG_IGN);
@@ -347,7 +349,7 @@ void a_host_may_ignore_its_children_and_have_threads(void **) {
     assert_int_equal(good.load(), 4);
 }
 
-void an_older_program_reads_in_its_own_process(void **) {
+TEST(an_older_program_reads_in_its_own_process) {
     misbehave("crash");
     vsh_run run = with_reader();
     run.struct_size = offsetof(vsh_run, reader); // what it does not know is not looked at
@@ -358,7 +360,7 @@ void an_older_program_reads_in_its_own_process(void **) {
     misbehave(nullptr);
 }
 
-void the_memory_limit_holds_whatever_the_file_says_of_itself(void **) {
+TEST(the_memory_limit_holds_whatever_the_file_says_of_itself) {
     const std::string path = save("large.vdb", {ball<FloatGrid>(5.0, 3.0f)});
     std::string bytes = content(path);
     const size_t at = bytes.find("file_mem_bytes");
@@ -378,7 +380,7 @@ void the_memory_limit_holds_whatever_the_file_says_of_itself(void **) {
 }
 
 // Leaves far from each other take nodes of 300 kB each, of which hardly anything stands in the file.
-void what_a_reader_takes_is_held_to_the_memory_limit(void **) {
+TEST(what_a_reader_takes_is_held_to_the_memory_limit) {
     if (VSHI_SANITIZED) { // whose readers have no limit
         skip();
     }
@@ -422,21 +424,5 @@ int main(int argc, char **argv) {
     if (served >= 0) {
         _exit(served);
     }
-    const CMUnitTest tests[] = {
-        cmocka_unit_test(grids_are_the_same_for_every_kind_of_transform),
-        cmocka_unit_test(mended_grids_and_doubles_and_tiles_are_the_same),
-        cmocka_unit_test(models_are_the_same),
-        cmocka_unit_test(images_are_the_same),
-        cmocka_unit_test(lists_voxels_and_texts_are_the_same),
-        cmocka_unit_test(errors_are_the_same),
-        cmocka_unit_test(a_reader_that_fails_is_an_error_with_its_reason),
-        cmocka_unit_test(a_program_that_names_itself_and_does_not_serve_starts_once),
-        cmocka_unit_test(a_program_that_is_missing_or_no_reader_is_an_argument),
-        cmocka_unit_test(cancelling_kills_the_reader),
-        cmocka_unit_test(a_host_may_ignore_its_children_and_have_threads),
-        cmocka_unit_test(an_older_program_reads_in_its_own_process),
-        cmocka_unit_test(the_memory_limit_holds_whatever_the_file_says_of_itself),
-        cmocka_unit_test(what_a_reader_takes_is_held_to_the_memory_limit),
-    };
-    return make_folder() ? cmocka_run_group_tests(tests, nullptr, remove_folder) : 1;
+    return make_folder() ? run_all_tests(nullptr, remove_folder) : 1;
 }

@@ -11,6 +11,8 @@ extern "C" {
 #include <sys/ptrace.h>
 #include <sys/socket.h>
 
+#include "tests.h"
+
 namespace {
 
 constexpr int DAMAGES = 4000;
@@ -22,7 +24,7 @@ template <typename Body> void counted(int &refused, Body &&body) {
     refused += result != VSH_OK;
 }
 
-void damaged_level_sets_are_refused_or_are_trees(void **) {
+TEST(damaged_level_sets_are_refused_or_are_trees) {
     const std::string path = save("ball.vdb", {sphere()});
     const std::vector<unsigned char> whole = payload_of(vshi_serve_grid, path, [](vshi_encoder *encoder) {
         vshi_encode_text(encoder, nullptr);
@@ -44,7 +46,7 @@ void damaged_level_sets_are_refused_or_are_trees(void **) {
     assert_in_range(refused, DAMAGES / 8, DAMAGES - 1);
 }
 
-void damaged_voxels_are_refused_or_sorted(void **) {
+TEST(damaged_voxels_are_refused_or_sorted) {
     const std::string path = save("ball.vdb", {sphere()});
     const std::vector<unsigned char> whole = payload_of(
         vshi_serve_voxels, path, [](vshi_encoder *encoder) { vshi_encode_text(encoder, nullptr); });
@@ -64,7 +66,7 @@ void damaged_voxels_are_refused_or_sorted(void **) {
     assert_in_range(refused, DAMAGES / 8, DAMAGES - 1);
 }
 
-void damaged_models_are_refused_or_sound(void **) {
+TEST(damaged_models_are_refused_or_sound) {
     const std::vector<unsigned char> whole =
         payload_of(vshi_serve_model, std::string(VSH_ASSETS) + "/thin.glb", [](vshi_encoder *) {});
     int refused = 0;
@@ -85,7 +87,7 @@ void damaged_models_are_refused_or_sound(void **) {
     assert_in_range(refused, DAMAGES / 8, DAMAGES - 1);
 }
 
-void damaged_decompressed_vertices_are_refused_or_sound(void **) {
+TEST(damaged_decompressed_vertices_are_refused_or_sound) {
     constexpr size_t PRIMITIVES = 3;
     const std::vector<unsigned char> whole =
         payload_of(vshi_serve_draco, std::string(VSH_MODELS) + "/scene_draco.glb", [](vshi_encoder *) {});
@@ -114,7 +116,7 @@ void damaged_decompressed_vertices_are_refused_or_sound(void **) {
     assert_in_range(refused, DAMAGES / 64, DAMAGES - 1);
 }
 
-void damaged_images_and_contours_are_refused_or_sound(void **) {
+TEST(damaged_images_and_contours_are_refused_or_sound) {
     const char *font = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
     std::vector<unsigned char> whole =
         payload_of(vshi_serve_image, std::string(VSH_ASSETS) + "/emblem.png", [](vshi_encoder *request) {
@@ -155,7 +157,7 @@ void damaged_images_and_contours_are_refused_or_sound(void **) {
     assert_in_range(refused, DAMAGES / 8, DAMAGES - 1);
 }
 
-void a_message_is_not_read_past_its_end(void **) {
+TEST(a_message_is_not_read_past_its_end) {
     alignas(8) const uint64_t words[] = {16, 0x4242424242424242, 0x0042424242424242, UINT64_MAX, 5, 0};
     const auto *bytes = reinterpret_cast<const unsigned char *>(words);
     vshi_decoder decoder = {bytes, bytes + 24, false};
@@ -178,7 +180,7 @@ void a_message_is_not_read_past_its_end(void **) {
 }
 
 // An answer is memory, too: it ends where the heap leaves it no room, whatever each may come to alone.
-void an_answer_and_the_heap_share_their_room(void **) {
+TEST(an_answer_and_the_heap_share_their_room) {
     if (VSHI_SANITIZED) {
         skip(); // its heap is not libc's, which tells what it holds
     }
@@ -224,7 +226,7 @@ int forbidden_things() {
     return memory != MAP_FAILED ? 127 : 200 + done;
 }
 
-void a_confined_process_reads_and_nothing_else(void **) {
+TEST(a_confined_process_reads_and_nothing_else) {
     if (VSHI_SANITIZED) {
         skip();
     }
@@ -250,15 +252,5 @@ int main(int argc, char **argv) {
     if (served >= 0) {
         _exit(served);
     }
-    const CMUnitTest tests[] = {
-        cmocka_unit_test(a_message_is_not_read_past_its_end),
-        cmocka_unit_test(damaged_level_sets_are_refused_or_are_trees),
-        cmocka_unit_test(damaged_voxels_are_refused_or_sorted),
-        cmocka_unit_test(damaged_models_are_refused_or_sound),
-        cmocka_unit_test(damaged_decompressed_vertices_are_refused_or_sound),
-        cmocka_unit_test(damaged_images_and_contours_are_refused_or_sound),
-        cmocka_unit_test(an_answer_and_the_heap_share_their_room),
-        cmocka_unit_test(a_confined_process_reads_and_nothing_else),
-    };
-    return make_folder() ? cmocka_run_group_tests(tests, nullptr, remove_folder) : 1;
+    return make_folder() ? run_all_tests(nullptr, remove_folder) : 1;
 }

@@ -1,11 +1,12 @@
 /* Where receivers can be and what normals they can have: deep inside, far outside, on lattice planes; of any
  * length, zero, not finite. Of every method; docs/numerics.md has the bounds. */
 #include "methods.h"
+#include "tests.h"
 
 static const float UP[3] = {0.0f, 1.0f, 0.0f};
 static const double NOWHERE[3] = {0.0, 0.0, 0.0};
 
-static void receivers_deep_inside_are_dark_and_far_outside_are_lit(void **state) {
+TEST(receivers_deep_inside_are_dark_and_far_outside_are_lit) {
     const truth_solid block = {TRUTH_BOX, {0.0, 0.0, 0.0}, {2.0, 2.0, 2.0}, 0.0, 0.0};
     caster c = caster_of((truth_scene){&block, 1}, 0.05, 0.0);
     uint64_t counter = 12;
@@ -39,7 +40,7 @@ static void receivers_deep_inside_are_dark_and_far_outside_are_lit(void **state)
 }
 
 /* As far as doubles go, in every direction from the casters, towards them and away, by every method. */
-static void receivers_at_any_distance_are_lit(void **state) {
+TEST(receivers_at_any_distance_are_lit) {
     const truth_solid block = {TRUTH_BOX, {0.0, 0.0, 0.0}, {2.0, 2.0, 2.0}, 0.0, 0.0};
     const double scales[] = {1e-10, 1e-6, 1.0, 1e10};
     uint64_t counter = 5;
@@ -77,7 +78,7 @@ static void receivers_at_any_distance_are_lit(void **state) {
 
 /* Exactly on the planes, edges and corners of cells, bricks and levels, and beside them by less than a float
  * tells: the same to what a float tells; a ray of 64 may come to lie on the other side of an edge. */
-static void receivers_on_voxel_planes_see_what_their_neighbours_see(void **state) {
+TEST(receivers_on_voxel_planes_see_what_their_neighbours_see) {
     enum { PLACES = 4000, SIDES = 6, ALL = PLACES * (SIDES + 1) };
     static double at[3 * ALL];
     static float ns[3 * ALL], values[ALL];
@@ -131,7 +132,7 @@ static void receivers_on_voxel_planes_see_what_their_neighbours_see(void **state
     caster_free(&c);
 }
 
-static void normals_of_any_length_are_directions(void **state) {
+TEST(normals_of_any_length_are_directions) {
     caster c = caster_of(truth_seeds(), 0.0625, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     const int exponents[] = {-149, -126, -60, -1, 1, 60, 127};
@@ -150,7 +151,7 @@ static void normals_of_any_length_are_directions(void **state) {
 
 /* NaN and counted, in every method; the points beside them are as they are without them. The last place is a
  * double, but no place in field space. */
-static void points_that_are_none_are_nan_and_counted(void **state) {
+TEST(points_that_are_none_are_nan_and_counted) {
     enum { PLACES = 9, BAD = 7 };
     caster c = caster_of_moved(truth_seeds(), 0.0625, 1e-9, NOWHERE, 8e-9);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
@@ -178,12 +179,5 @@ static void points_that_are_none_are_nan_and_counted(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(receivers_deep_inside_are_dark_and_far_outside_are_lit),
-        cmocka_unit_test(receivers_at_any_distance_are_lit),
-        cmocka_unit_test(receivers_on_voxel_planes_see_what_their_neighbours_see),
-        cmocka_unit_test(normals_of_any_length_are_directions),
-        cmocka_unit_test(points_that_are_none_are_nan_and_counted),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

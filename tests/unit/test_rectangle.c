@@ -11,7 +11,7 @@ static void find_truth(const vsh_light *light, double truth[COUNT]) {
 
 /* Rays on the field see edges as it rounds them off, which a narrow light shows most: half as much with
  * voxels half as large. What exact says of its error holds. */
-static void rays_of_every_kind_see_what_brute_force_sees(void **state) {
+TEST(rays_of_every_kind_see_what_brute_force_sees) {
     const caster *c = *state;
     static const int32_t METHODS[] = {VSH_SHADOW_RAYS, VSH_SHADOW_ADAPTIVE, VSH_SHADOW_EXACT};
     static const double MOST[3][LIGHTS] = {
@@ -54,7 +54,7 @@ static void rays_of_every_kind_see_what_brute_force_sees(void **state) {
 }
 
 /* As near as one disc can be to two thirds as high as wide, and one edge to a table's corners. */
-static void one_march_takes_the_disc_of_equal_solid_angle(void **state) {
+TEST(one_march_takes_the_disc_of_equal_solid_angle) {
     const caster *c = *state;
     double truth[COUNT];
     float values[COUNT];
@@ -92,7 +92,7 @@ static void one_march_takes_the_disc_of_equal_solid_angle(void **state) {
     }
 }
 
-static void a_tiny_rectangle_is_a_point(void **state) {
+TEST(a_tiny_rectangle_is_a_point) {
     const caster *c = *state;
     const double centre[3] = {0.37, 2.1, -0.23}, u[3] = {1e-9, 0.0, 0.0}, v[3] = {0.0, 0.0, 2e-9};
     const vsh_light tiny = panel(centre, u, v), point = lamp(centre, 0.0);
@@ -110,7 +110,7 @@ static void a_tiny_rectangle_is_a_point(void **state) {
     }
 }
 
-static void behind_a_one_sided_one_is_nothing_and_two_sides_are_alike(void **state) {
+TEST(behind_a_one_sided_one_is_nothing_and_two_sides_are_alike) {
     const caster *c = *state;
     float front[COUNT], values[COUNT];
     for (int32_t method = VSH_SHADOW_HARD; method < shadow_methods(); ++method) {
@@ -155,7 +155,7 @@ static void behind_a_one_sided_one_is_nothing_and_two_sides_are_alike(void **sta
 }
 
 /* In the plane of the rectangle: beside it, and within it. */
-static void edge_on_is_a_share_all_the_same(void **state) {
+TEST(edge_on_is_a_share_all_the_same) {
     const caster *c = *state;
     const double places[][3] = {{-2.0, 1.5, 0.0}, {2.0, 1.5, 2.0}, {0.8, 1.5, 0.0},
                                 {0.1, 1.5, 0.1},  {0.0, 1.5, 0.0}, {0.8, 1.5, 0.4}};
@@ -180,12 +180,5 @@ static void edge_on_is_a_share_all_the_same(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rays_of_every_kind_see_what_brute_force_sees),
-        cmocka_unit_test(one_march_takes_the_disc_of_equal_solid_angle),
-        cmocka_unit_test(a_tiny_rectangle_is_a_point),
-        cmocka_unit_test(behind_a_one_sided_one_is_nothing_and_two_sides_are_alike),
-        cmocka_unit_test(edge_on_is_a_share_all_the_same),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    return run_all_tests(set_up, tear_down);
 }

@@ -5,7 +5,7 @@
 
 #include <stdio.h>
 
-static void the_horizon_cuts_it_by_solid_angle(void **state) {
+TEST(the_horizon_cuts_it_by_solid_angle) {
     vsh_field *nothing = NULL;
     assert_int_equal(vshi_field_create_empty(0.1, &nothing, NULL), VSH_OK);
     vsh_layer layer = vsh_layer_default();
@@ -36,7 +36,7 @@ static void the_horizon_cuts_it_by_solid_angle(void **state) {
     vsh_field_free(nothing);
 }
 
-static void layers_know_it(void **state) {
+TEST(layers_know_it) {
     const caster *c = *state;
     vsh_field *nothing = NULL;
     assert_int_equal(vshi_field_create_empty(0.1, &nothing, NULL), VSH_OK);
@@ -64,7 +64,7 @@ static void layers_know_it(void **state) {
     vsh_field_free(nothing);
 }
 
-static void threads_and_instruction_sets_give_the_same_bits(void **state) {
+TEST(threads_and_instruction_sets_give_the_same_bits) {
     const caster *c = *state;
     const vsh_points points = {COUNT, positions, normals, NULL};
     float values[COUNT], others[COUNT];
@@ -94,7 +94,7 @@ static float red_at(const vsh_light *light, const double *at) {
     return rgb[0];
 }
 
-static void irradiance_has_the_cosine_at_which_it_shines(void **state) {
+TEST(irradiance_has_the_cosine_at_which_it_shines) {
     const double centre[3] = {0.0, 2.0, 0.0}, u[3] = {1.0, 0.0, 0.0}, v[3] = {0.0, 0.0, 0.6};
     vsh_light light = panel(centre, u, v);
     for (double x = 0.0; x < 6.0; x += 0.7) {
@@ -119,7 +119,7 @@ static void irradiance_has_the_cosine_at_which_it_shines(void **state) {
     assert_true(isfinite(red_at(&light, here)));
 }
 
-static void what_is_no_rectangle_is_refused(void **state) {
+TEST(what_is_no_rectangle_is_refused) {
     vsh_light light;
     const struct {
         double *field, value;
@@ -155,12 +155,5 @@ static void what_is_no_rectangle_is_refused(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_horizon_cuts_it_by_solid_angle),
-        cmocka_unit_test(layers_know_it),
-        cmocka_unit_test(threads_and_instruction_sets_give_the_same_bits),
-        cmocka_unit_test(irradiance_has_the_cosine_at_which_it_shines),
-        cmocka_unit_test(what_is_no_rectangle_is_refused),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    return run_all_tests(set_up, tear_down);
 }

@@ -117,7 +117,7 @@ static void assert_same_field(const vsh_field *a, const vsh_field *b) {
 }
 
 /* From 1e-10 to 1e10 of the voxel: the field's values are voxels, and only they are shaded. */
-static void scaled_by_a_power_of_two_every_bit_stays(void **state) {
+TEST(scaled_by_a_power_of_two_every_bit_stays) {
     static values still, scaled;
     fill_points();
     caster c = caster_of_moved(truth_seeds(), 0.03125, 1.0, NOWHERE, 8.0);
@@ -196,7 +196,7 @@ static vsh_grid *grid_of_union(double scale) {
     return both;
 }
 
-static void meshes_and_unions_scaled_by_a_power_of_two_keep_every_bit(void **state) {
+TEST(meshes_and_unions_scaled_by_a_power_of_two_keep_every_bit) {
     static const struct {
         double half_width; /* of meshes; 0: a union */
         bool open;
@@ -254,7 +254,7 @@ static apart apart_when_moved(const double voxels[3]) {
     return all;
 }
 
-static void moved_by_whole_voxels_every_bit_stays(void **state) {
+TEST(moved_by_whole_voxels_every_bit_stays) {
     const double voxels[][3] = {{1, 0, 0}, {-3, 5, 7}, {8, 16, -24}, {1001, -2003, 4007}, {32e6, -16e6, 8e6}};
     for (size_t s = 0; s < sizeof voxels / sizeof voxels[0]; ++s) {
         assert_true(apart_when_moved(voxels[s]).worst == 0.0);
@@ -281,7 +281,7 @@ static caster caster_of_turned(const motion *m, double voxel) {
     return caster_of((truth_scene){solids, scene.count}, voxel, 8.0);
 }
 
-static void turned_by_right_angles_and_mirrored_values_stay_within_a_bound(void **state) {
+TEST(turned_by_right_angles_and_mirrored_values_stay_within_a_bound) {
     static values still, there;
     static const int orders[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
     fill_points();
@@ -321,11 +321,5 @@ static void turned_by_right_angles_and_mirrored_values_stay_within_a_bound(void 
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(scaled_by_a_power_of_two_every_bit_stays),
-        cmocka_unit_test(meshes_and_unions_scaled_by_a_power_of_two_keep_every_bit),
-        cmocka_unit_test(moved_by_whole_voxels_every_bit_stays),
-        cmocka_unit_test(turned_by_right_angles_and_mirrored_values_stay_within_a_bound),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

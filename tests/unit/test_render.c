@@ -2,7 +2,7 @@
 #include "expect.h"
 #include "pictures.h"
 
-static void a_sphere_is_where_it_is_with_its_normals(void **state) {
+TEST(a_sphere_is_where_it_is_with_its_normals) {
     enum { VOXELS = 50 };
     const double centre[3] = {0.1, -0.2, 0.3}, voxel = 1.0 / VOXELS;
     vsh_field *field = ball(centre[0], centre[1], centre[2], 1.0, voxel);
@@ -42,7 +42,7 @@ static void a_sphere_is_where_it_is_with_its_normals(void **state) {
     vsh_field_free(field);
 }
 
-static void a_silhouette_has_its_area_and_soft_edges(void **state) {
+TEST(a_silhouette_has_its_area_and_soft_edges) {
     vsh_field *field = ball(0.0, 0.0, 0.0, 1.0, 0.02);
     const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
     for (int32_t samples = 1; samples <= 4; samples += 3) {
@@ -85,7 +85,7 @@ static void assert_rays_end(const vsh_field *field, vsh_camera camera, double ha
 }
 
 /* A floor seen from low over it, with what stands on it; a sheet two voxels thick, seen from many sides. */
-static void no_ray_misses_a_floor_or_a_thin_sheet(void **state) {
+TEST(no_ray_misses_a_floor_or_a_thin_sheet) {
     vsh_field *seeds = field_of(truth_seeds(), 0.05, 0.0);
     for (double height = 0.002; height < 0.2; height *= 1.7) {
         assert_rays_end(seeds, camera_at(-2.4, height, 2.9, 2.9, height, 2.6, 20.0), 2.9, -0.002, INFINITY,
@@ -159,7 +159,7 @@ static void check_floor(const vsh_field *field, const vsh_light *light, vsh_rend
     }
 }
 
-static void a_floor_has_the_shadow_and_the_ao_of_its_points(void **state) {
+TEST(a_floor_has_the_shadow_and_the_ao_of_its_points) {
     vsh_field *field = field_of(truth_seeds(), 0.03, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
     vsh_render_options o = small(camera_at(1.0, 5.0, 3.0, 0.0, 0.0, 0.0, 40.0), 1);
@@ -174,7 +174,7 @@ static void a_floor_has_the_shadow_and_the_ao_of_its_points(void **state) {
     vsh_field_free(field);
 }
 
-static void the_nearest_surface_has_its_own_color(void **state) {
+TEST(the_nearest_surface_has_its_own_color) {
     vsh_field *front = ball(0.0, 0.0, 1.0, 0.5, 0.05), *back = ball(0.4, 0.0, -1.0, 0.8, 0.05);
     const vsh_surface surfaces[2] = {{back, {0.9, 0.1, 0.2}}, {front, {0.1, 0.8, 0.3}}};
     vsh_render_options o = small(camera_at(0.0, 0.0, 6.0, 0.0, 0.0, 0.0, 25.0), 2);
@@ -193,7 +193,7 @@ static void the_nearest_surface_has_its_own_color(void **state) {
     vsh_field_free(back);
 }
 
-static void who_looks_from_within_sees_out(void **state) {
+TEST(who_looks_from_within_sees_out) {
     vsh_field *within = ball(0.0, 0.0, 0.0, 1.0, 0.05), *beyond = ball(4.0, 0.0, 0.0, 1.0, 0.05);
     const vsh_surface surfaces[2] = {{within, {0.5, 0.5, 0.5}}, {beyond, {0.5, 0.5, 0.5}}};
     const vsh_render_options o = small(camera_at(0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 20.0), 1);
@@ -205,7 +205,7 @@ static void who_looks_from_within_sees_out(void **state) {
 
 /* --- what holds for all */
 
-static void threads_and_instruction_sets_change_no_bit(void **state) {
+TEST(threads_and_instruction_sets_change_no_bit) {
     static float first[3 * PIXELS];
     vsh_field *field = field_of(truth_seeds(), 0.05, 0.0);
     const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
@@ -235,7 +235,7 @@ static int32_t stop(void *user, const char *stage, double fraction) {
     return fraction > 0.3;
 }
 
-static void what_is_out_of_range_cancelled_or_limited_is_refused(void **state) {
+TEST(what_is_out_of_range_cancelled_or_limited_is_refused) {
     vsh_field *field = ball(0.0, 0.0, 0.0, 1.0, 0.1);
     const vsh_occluders *casters = occluders_of(field);
     const vsh_surface surface = {field, {0.5, 0.5, 0.5}}, bright = {field, {0.5, 1.5, 0.5}},
@@ -279,15 +279,5 @@ static void what_is_out_of_range_cancelled_or_limited_is_refused(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_sphere_is_where_it_is_with_its_normals),
-        cmocka_unit_test(a_silhouette_has_its_area_and_soft_edges),
-        cmocka_unit_test(no_ray_misses_a_floor_or_a_thin_sheet),
-        cmocka_unit_test(a_floor_has_the_shadow_and_the_ao_of_its_points),
-        cmocka_unit_test(the_nearest_surface_has_its_own_color),
-        cmocka_unit_test(who_looks_from_within_sees_out),
-        cmocka_unit_test(threads_and_instruction_sets_change_no_bit),
-        cmocka_unit_test(what_is_out_of_range_cancelled_or_limited_is_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -5,7 +5,7 @@
 /* --- fog */
 
 /* The box around the sphere has a diagonal of 2 √3, and the fog a quarter of that around it. */
-static void fog_in_the_sun_shines_and_in_shadow_does_not(void **state) {
+TEST(fog_in_the_sun_shines_and_in_shadow_does_not) {
     vsh_field *field = ball(0.0, 0.0, 0.0, 1.0, 0.02);
     const vsh_surface surface = {field, {0.0, 0.0, 0.0}};
     const double x[3] = {1.0, 0.0, 0.0};
@@ -43,7 +43,7 @@ static vsh_mesh quad(void) {
 }
 
 /* Texel centres at (i + ½) / N, row 0 at v = 1. */
-static void a_lightmap_is_looked_up_where_it_was_baked(void **state) {
+TEST(a_lightmap_is_looked_up_where_it_was_baked) {
     enum { N = 4 };
     float ao[N * N], shadow[N * N];
     for (int i = 0; i < N * N; ++i) {
@@ -102,7 +102,7 @@ static void a_lightmap_is_looked_up_where_it_was_baked(void **state) {
     vsh_field_free(field);
 }
 
-static void irradiance_comes_before_shadows(void **state) {
+TEST(irradiance_comes_before_shadows) {
     const float red[1] = {0.2f}, green[1] = {0.4f}, blue[1] = {0.6f}, dark[1] = {0.0f};
     const char *const names[] = {"irradiance.B", "irradiance.G", "irradiance.R", "shadow.sun"};
     const float *const planes[] = {blue, green, red, dark};
@@ -122,7 +122,7 @@ static void irradiance_comes_before_shadows(void **state) {
     vsh_field_free(field);
 }
 
-static void gradients_are_dithered_to_srgb(void **state) {
+TEST(gradients_are_dithered_to_srgb) {
     static float planes[4][PIXELS];
     float *const rgb[3] = {planes[0], planes[1], planes[2]};
     for (int i = 0; i < PIXELS; ++i) {
@@ -147,11 +147,5 @@ static void gradients_are_dithered_to_srgb(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(fog_in_the_sun_shines_and_in_shadow_does_not),
-        cmocka_unit_test(a_lightmap_is_looked_up_where_it_was_baked),
-        cmocka_unit_test(irradiance_comes_before_shadows),
-        cmocka_unit_test(gradients_are_dithered_to_srgb),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

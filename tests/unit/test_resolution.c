@@ -45,7 +45,7 @@ static void skip_without_embree(void) {
 
 /* --- casters without voxels */
 
-static void triangles_alone_give_shadows_within_the_error_of_the_truth(void **state) {
+TEST(triangles_alone_give_shadows_within_the_error_of_the_truth) {
     skip_without_embree();
     vsh_occluders *made = plate_of(0);
     vsh_occluders_info info;
@@ -83,7 +83,7 @@ static void triangles_alone_give_shadows_within_the_error_of_the_truth(void **st
     vsh_occluders_free(made);
 }
 
-static void ao_by_rays_has_the_bits_that_it_has_with_voxels(void **state) {
+TEST(ao_by_rays_has_the_bits_that_it_has_with_voxels) {
     skip_without_embree();
     double positions[POINTS][3];
     float normals[POINTS][3], ao[2][POINTS];
@@ -97,7 +97,7 @@ static void ao_by_rays_has_the_bits_that_it_has_with_voxels(void **state) {
     assert_memory_equal(ao[0], ao[1], sizeof ao[0]);
 }
 
-static void what_needs_voxels_is_refused_without_them(void **state) {
+TEST(what_needs_voxels_is_refused_without_them) {
     skip_without_embree();
     vsh_occluders *made = plate_of(0);
     const double at[3] = {0.0, 0.0, 0.0};
@@ -134,7 +134,7 @@ static void what_needs_voxels_is_refused_without_them(void **state) {
     vsh_occluders_free(made);
 }
 
-static void parts_of_triangles_alone_cast(void **state) {
+TEST(parts_of_triangles_alone_cast) {
     skip_without_embree();
     const vsh_mesh mesh = plate();
     vsh_triangles *triangles = NULL;
@@ -187,7 +187,7 @@ static uint64_t shade_scene(bool layered, float lit[POINTS], float truth[POINTS]
     return info.field_bytes;
 }
 
-static void scenes_and_layers_without_voxels_cast_as_the_truth_says(void **state) {
+TEST(scenes_and_layers_without_voxels_cast_as_the_truth_says) {
     skip_without_embree();
     for (int layered = 0; layered < 2; ++layered) {
         float lit[POINTS], truth[POINTS];
@@ -226,7 +226,7 @@ static int32_t chosen(const char *more, const char *casters, double points) {
 #define MARCHED ", \"method\": \"adaptive\""
 #define MARCHED_AO ", \"ao\": {\"distance\": 0.6, \"method\": \"adaptive\"}"
 
-static void traced_casters_get_voxels_only_where_shadows_pay_for_them(void **state) {
+TEST(traced_casters_get_voxels_only_where_shadows_pay_for_them) {
     skip_without_embree();
     assert_int_equal(chosen(AO, MESH, 1e9), 0);
     assert_int_equal(chosen(SUN AO, MESH, 0.0), 0);
@@ -241,7 +241,7 @@ static void traced_casters_get_voxels_only_where_shadows_pay_for_them(void **sta
     assert_true(last >= 96);
 }
 
-static void marched_shapes_get_as_many_as_their_error_asks_for(void **state) {
+TEST(marched_shapes_get_as_many_as_their_error_asks_for) {
     skip_without_embree();
     assert_int_equal(chosen(SUN AO, BALL, 1e6), 0); /* traced */
     assert_int_equal(chosen(SUN MARCHED, BALL, 1e6), 200);
@@ -252,7 +252,7 @@ static void marched_shapes_get_as_many_as_their_error_asks_for(void **state) {
     assert_int_equal(chosen(SUN ", \"method\": \"cone\"", BALL, 1e6), 256);
 }
 
-static void what_is_named_stays_as_it_is(void **state) {
+TEST(what_is_named_stays_as_it_is) {
     assert_int_equal(chosen(SUN ", \"resolution\": 64", MESH, 1.0), VSH_RESOLUTION_NAMED);
     assert_int_equal(chosen(SUN ", \"resolution\": 256", MESH, 1.0), VSH_RESOLUTION_NAMED);
     assert_int_equal(chosen(SUN ", \"voxel_size\": 0.5", BALL, 1.0), VSH_RESOLUTION_NAMED);
@@ -261,15 +261,5 @@ static void what_is_named_stays_as_it_is(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(triangles_alone_give_shadows_within_the_error_of_the_truth),
-        cmocka_unit_test(ao_by_rays_has_the_bits_that_it_has_with_voxels),
-        cmocka_unit_test(what_needs_voxels_is_refused_without_them),
-        cmocka_unit_test(parts_of_triangles_alone_cast),
-        cmocka_unit_test(scenes_and_layers_without_voxels_cast_as_the_truth_says),
-        cmocka_unit_test(traced_casters_get_voxels_only_where_shadows_pay_for_them),
-        cmocka_unit_test(marched_shapes_get_as_many_as_their_error_asks_for),
-        cmocka_unit_test(what_is_named_stays_as_it_is),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

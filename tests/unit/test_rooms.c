@@ -7,7 +7,7 @@
 static const double ORIGIN[3] = {0, 0, 0};
 static const double LOW[3] = {-1, -1, -1}, HIGH[3] = {1, 1, 1};
 
-static void rooms_and_domes_are_walls_around_air(void **state) {
+TEST(rooms_and_domes_are_walls_around_air) {
     shape *s = shape_new();
     shape_box(s, LOW, HIGH, ALL_SIDES);
     shape_turn(s, 0);
@@ -70,7 +70,7 @@ static void assert_cuts_of(shape *s, const char *what, const char *kinds, const 
     free(s);
 }
 
-static void rooms_are_cut_out_of_what_they_lie_in(void **state) {
+TEST(rooms_are_cut_out_of_what_they_lie_in) {
     shape *s = shape_new(), *room = shape_new(), *table = shape_new();
     build_house(s, s, s);
     assert_kinds_of(s, "house in one mesh", "SRS");
@@ -106,7 +106,7 @@ static void rooms_are_cut_out_of_what_they_lie_in(void **state) {
     assert_cuts_of(s, "pillar", "SRS", "0<1 ");
 }
 
-static void rooms_of_separate_quads_are_sheets_and_never_nothing(void **state) {
+TEST(rooms_of_separate_quads_are_sheets_and_never_nothing) {
     shape *s[6];
     vsh_mesh meshes[6];
     for (int i = 0; i < 6; ++i) {
@@ -135,7 +135,7 @@ static void rooms_of_separate_quads_are_sheets_and_never_nothing(void **state) {
     }
 }
 
-static void an_open_room_in_an_open_house_closes_neither(void **state) {
+TEST(an_open_room_in_an_open_house_closes_neither) {
     shape *s = shape_new();
     const double wide_low[3] = {-1.2, -1.2, -1.2}, wide_high[3] = {1.2, 1.2, 1.2};
     shape_ball(s, ORIGIN, 1.3, -1.0, 0.95, 48);
@@ -187,7 +187,7 @@ static void assert_all_see(const vsh_mesh *mesh, double voxel, const double towa
  * And points on the sun's side of a sheet, nearer than half of the thickness that it has as a shell in the
  * voxels.
  */
-static void no_ray_is_proved_hidden_through_two_holes_or_by_the_thickness_of_a_sheet(void **state) {
+TEST(no_ray_is_proved_hidden_through_two_holes_or_by_the_thickness_of_a_sheet) {
     if (!vsh_triangles_available()) {
         skip();
     }
@@ -211,7 +211,7 @@ static void no_ray_is_proved_hidden_through_two_holes_or_by_the_thickness_of_a_s
 }
 
 /* A room whose faces look inwards, and the floor of it. */
-static void the_floor_of_an_inward_room_has_the_ao_of_a_room(void **state) {
+TEST(the_floor_of_an_inward_room_has_the_ao_of_a_room) {
     shape *s = shape_new();
     shape_box(s, LOW, HIGH, ALL_SIDES);
     shape_turn(s, 0);
@@ -237,13 +237,5 @@ static void the_floor_of_an_inward_room_has_the_ao_of_a_room(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rooms_and_domes_are_walls_around_air),
-        cmocka_unit_test(rooms_are_cut_out_of_what_they_lie_in),
-        cmocka_unit_test(rooms_of_separate_quads_are_sheets_and_never_nothing),
-        cmocka_unit_test(an_open_room_in_an_open_house_closes_neither),
-        cmocka_unit_test(no_ray_is_proved_hidden_through_two_holes_or_by_the_thickness_of_a_sheet),
-        cmocka_unit_test(the_floor_of_an_inward_room_has_the_ao_of_a_room),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }
