@@ -9,14 +9,20 @@ enum { FLAT_TEXELS = 64 };
 /* Of the package fonts-dejavu-core. */
 #define FONT "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf"
 
+OWNER(vsh_flat_scene)
+OWNER(vsh_outline)
+
+static void free_image(vsh_image_file **file) {
+    vsh_image_free(*file);
+}
+
 vsh_result bake_lightmap(const vsh_run *run, vsh_error *error) {
-    vsh_model *model = NULL;
-    vsh_grid *grid = NULL;
-    vsh_occluders *occluders = NULL;
-    vsh_charts *charts = NULL, *fine = NULL;
-    vsh_texels *texels = NULL;
+    OWNED(vsh_model) *model = NULL;
+    OWNED(vsh_grid) *grid = NULL;
+    OWNED(vsh_occluders) *occluders = NULL;
+    OWNED(vsh_charts) *charts = NULL, *fine = NULL;
+    OWNED(vsh_texels) *texels = NULL;
     float planes[8][3 * SIDE * SIDE];
-    vsh_result result;
     MAKE(model, vsh_model_read("box.obj", run, &model, error));
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     TRY(parts_occluders(run, &grid, &occluders, error));
@@ -53,47 +59,32 @@ vsh_result bake_lightmap(const vsh_run *run, vsh_error *error) {
     creases.max_angle = 180.0; /* a box has no other seams */
     TRY(vsh_lightmap_stitch(fine, &all, 2, &creases, run, NULL, error));
     TRY(vsh_bake_lightmap(occluders, fine, lights, 2, NULL, run, &some, NULL, error));
-end:
-    vsh_texels_free(texels);
-    vsh_charts_free(fine);
-    vsh_charts_free(charts);
-    vsh_occluders_free(occluders);
-    vsh_grid_free(grid);
-    vsh_model_free(model);
-    return result;
+    return VSH_OK;
 }
 
 vsh_result bake_volume(const vsh_run *run, vsh_error *error) {
-    vsh_grid *grid = NULL;
-    vsh_occluders *occluders = NULL;
-    vsh_voxels *band = NULL, *box = NULL;
-    vsh_volume *on_band = NULL, *in_box = NULL;
+    OWNED(vsh_grid) *grid = NULL;
+    OWNED(vsh_occluders) *occluders = NULL;
+    OWNED(vsh_voxels) *band = NULL, *box = NULL;
+    OWNED(vsh_volume) *on_band = NULL, *in_box = NULL;
     const double least[] = {-1, -1, -1}, most[] = {2, 2, 2};
     const vsh_light light = vsh_light_default();
     vsh_volume_options options = preview_volume_options();
     options.ao = 1;
     options.shade.ao_cones = 4;
-    vsh_result result;
     TRY(parts_occluders(run, &grid, &occluders, error));
     MAKE(band, vsh_voxels_from_grid(grid, 2.0, run, &band, error));
     MAKE(on_band, vsh_bake_volume(occluders, band, &light, 1, &options, run, &on_band, NULL, error));
     MAKE(box, vsh_voxels_from_box(least, most, 0.4, run, &box, error));
     MAKE(in_box, vsh_bake_volume(occluders, box, &light, 1, &options, run, &in_box, NULL, error));
     TRY(vsh_volume_write(in_box, "out.vdb", 1, NULL, 0, error));
-end:
-    vsh_volume_free(in_box);
-    vsh_volume_free(on_band);
-    vsh_voxels_free(box);
-    vsh_voxels_free(band);
-    vsh_occluders_free(occluders);
-    vsh_grid_free(grid);
-    return result;
+    return VSH_OK;
 }
 
 vsh_result draw(const vsh_run *run, vsh_error *error) {
-    vsh_model *model = NULL;
-    vsh_grid *grid = NULL;
-    vsh_occluders *occluders = NULL;
+    OWNED(vsh_model) *model = NULL;
+    OWNED(vsh_grid) *grid = NULL;
+    OWNED(vsh_occluders) *occluders = NULL;
     float planes[4][3 * SIDE * SIDE], light_plane[SIDE * SIDE];
     parts_fill(light_plane, SIDE * SIDE);
     static const char *const name = "shadow.sun";
@@ -105,7 +96,6 @@ vsh_result draw(const vsh_run *run, vsh_error *error) {
     options.samples = 1;
     options.ao = 1;
     options.shafts = 0.5;
-    vsh_result result;
     MAKE(model, vsh_model_read("box.obj", run, &model, error));
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     TRY(parts_occluders(run, &grid, &occluders, error));
@@ -121,19 +111,14 @@ vsh_result draw(const vsh_run *run, vsh_error *error) {
     TRY(vsh_render(&surface, 1, occluders, &light, 1, &options, run, &picture, NULL, error));
     float *const rgb[] = {planes[1], planes[2], planes[3]};
     TRY(vsh_picture_encode(&picture, SIDE, SIDE, 0.0, rgb, NULL, error));
-end:
-    vsh_occluders_free(occluders);
-    vsh_grid_free(grid);
-    vsh_model_free(model);
-    return result;
+    return VSH_OK;
 }
 
 vsh_result bake_flat(const vsh_run *run, vsh_error *error) {
-    vsh_outline *outline = NULL, *text = NULL, *both = NULL, *crossed = NULL;
-    vsh_flat_scene *scene = NULL;
-    vsh_grid *grid = NULL;
+    OWNED(vsh_outline) *outline = NULL, *text = NULL, *both = NULL, *crossed = NULL;
+    OWNED(vsh_flat_scene) *scene = NULL;
+    OWNED(vsh_grid) *grid = NULL;
     static float planes[4][FLAT_TEXELS];
-    vsh_result result;
     MAKE(scene, vsh_flat_scene_read("flat.json", NULL, &scene, error));
     MAKE(outline, vsh_flat_scene_casters(scene, run, &outline, error));
     MAKE(text, vsh_outline_from_text("A8", FONT, NULL, run, &text, error));
@@ -152,14 +137,7 @@ vsh_result bake_flat(const vsh_run *run, vsh_error *error) {
     TRY(vsh_flat_bake(both, scene->lights, 1, &options, run, &map, error));
     options.method = VSH_FLAT_CLASSIC;
     TRY(vsh_flat_bake(both, scene->lights, 1, &options, run, &map, error));
-end:
-    vsh_grid_free(grid);
-    vsh_outline_free(both);
-    vsh_outline_free(crossed);
-    vsh_outline_free(text);
-    vsh_outline_free(outline);
-    vsh_flat_scene_free(scene);
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result write_image(const char *name, vsh_error *error) {
@@ -174,29 +152,21 @@ static vsh_result write_image(const char *name, vsh_error *error) {
 }
 
 vsh_result write_exr(const vsh_run *run, vsh_error *error) {
-    (void)run;
     return write_image("out.exr", error);
 }
 
 vsh_result write_png(const vsh_run *run, vsh_error *error) {
-    (void)run;
     return write_image("out.png", error);
 }
 
 vsh_result write_tif(const vsh_run *run, vsh_error *error) {
-    (void)run;
     return write_image("out.tif", error);
 }
 
 vsh_result read_images(const vsh_run *run, vsh_error *error) {
-    vsh_image_file *file = NULL;
-    vsh_result result = VSH_OK;
     for (size_t i = 0; i < IMAGES; ++i) {
+        FREED_BY(free_image) vsh_image_file *file = NULL;
         MAKE(file, vsh_image_read(images[i], run, &file, error));
-        vsh_image_free(file);
-        file = NULL;
     }
-end:
-    vsh_image_free(file);
-    return result;
+    return VSH_OK;
 }

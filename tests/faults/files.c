@@ -143,7 +143,6 @@ int scenarios_untouched(void) {
 static char folder[256];
 
 int scenarios_begin(void **state) {
-    (void)state;
     const char *place = getenv("TMPDIR");
     snprintf(folder, sizeof folder, "%s/vdbshade-faults-XXXXXX", place != NULL ? place : "/tmp");
     if (mkdtemp(folder) == NULL || chdir(folder) != 0) {
@@ -154,7 +153,6 @@ int scenarios_begin(void **state) {
 }
 
 int scenarios_end(void **state) {
-    (void)state;
     remove_files();
     return chdir("/") != 0 || rmdir(folder) != 0;
 }

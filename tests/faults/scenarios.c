@@ -4,6 +4,14 @@
 #include <math.h>
 #include <stdbool.h>
 
+OWNER(vsh_assets)
+OWNER(vsh_flat_scene)
+OWNER(vsh_provenance)
+
+static void free_list(double **list) {
+    vsh_spheres_list_free(*list);
+}
+
 /* --- what several of them need */
 
 void parts_fill(float *values, size_t count) {
@@ -24,11 +32,9 @@ vsh_result parts_occluders(const vsh_run *run, vsh_grid **grid, vsh_occluders **
     wide.reach = 1.0;
     *grid = NULL;
     *occluders = NULL;
-    vsh_result result;
     MAKE(*grid, vsh_grid_from_meshes(&mesh, 1, &options, run, grid, error));
     MAKE(*occluders, vsh_occluders_from_grid(*grid, &wide, run, occluders, error));
-end:
-    return result;
+    return VSH_OK;
 }
 
 void parts_place(double positions[3 * POINTS], float normals[3 * POINTS]) {
@@ -44,72 +50,50 @@ void parts_place(double positions[3 * POINTS], float normals[3 * POINTS]) {
 /* --- the scenarios */
 
 static vsh_result read_scenes(const vsh_run *run, vsh_error *error) {
-    (void)run;
-    vsh_scene *scene = NULL;
-    vsh_flat_scene *flat = NULL;
-    vsh_result result;
+    OWNED(vsh_scene) *scene = NULL;
+    OWNED(vsh_flat_scene) *flat = NULL;
     MAKE(scene, vsh_scene_read("scene.json", NULL, &scene, error));
     MAKE(flat, vsh_flat_scene_read("flat.json", NULL, &flat, error));
-end:
-    vsh_scene_free(scene);
-    vsh_flat_scene_free(flat);
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result read_models(const vsh_run *run, vsh_error *error) {
     static const char *const names[] = {"box.obj", "triangle.ply", "triangle.stl"};
-    vsh_result result = VSH_OK;
-    vsh_model *model = NULL;
     for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
+        OWNED(vsh_model) *model = NULL;
         MAKE(model, vsh_model_read(names[i], run, &model, error));
         const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
         vsh_mesh_report report;
         TRY(vsh_mesh_check(&mesh, &report, error));
-        vsh_model_free(model);
-        model = NULL;
     }
-end:
-    vsh_model_free(model);
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result load_scene(const vsh_run *run, vsh_error *error) {
-    vsh_scene *scene = NULL;
-    vsh_assets *assets = NULL;
-    vsh_grid *grid = NULL, *layer = NULL;
-    vsh_triangles *triangles = NULL;
-    vsh_occluders *occluders = NULL;
+    OWNED(vsh_scene) *scene = NULL;
+    OWNED(vsh_assets) *assets = NULL;
+    OWNED(vsh_grid) *grid = NULL, *layer = NULL;
+    OWNED(vsh_triangles) *triangles = NULL;
+    OWNED(vsh_occluders) *occluders = NULL;
     vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
     options.truth = 1;
-    vsh_result result;
     MAKE(scene, vsh_scene_read("scene.json", NULL, &scene, error));
     MAKE(assets, vsh_assets_load(scene, run, &assets, error));
     MAKE(grid, vsh_scene_casters(scene, assets, run, &grid, error));
     MAKE(layer, vsh_scene_layer_casters(scene, assets, &scene->layers[0], run, &layer, error));
     MAKE(triangles, vsh_scene_triangles(scene, assets, &scene->layers[0], run, &triangles, error));
     MAKE(occluders, vsh_scene_occluders(scene, assets, &options, run, &occluders, error));
-end:
-    vsh_occluders_free(occluders);
-    vsh_triangles_free(triangles);
-    vsh_grid_free(layer);
-    vsh_grid_free(grid);
-    vsh_assets_free(assets);
-    vsh_scene_free(scene);
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result bake_scene(const vsh_run *run, vsh_error *error) {
-    vsh_scene *scene = NULL;
-    vsh_result result;
+    OWNED(vsh_scene) *scene = NULL;
     MAKE(scene, vsh_scene_read("scene.json", NULL, &scene, error));
     TRY(vsh_bake_scene(scene, NULL, run, NULL, error));
-end:
-    vsh_scene_free(scene);
-    return result;
+    return VSH_OK;
 }
 
 static double ball(void *user, const double p[3]) {
-    (void)user;
     return 2.0 * (sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - 1.0);
 }
 
@@ -120,34 +104,25 @@ static vsh_result make_grids(const vsh_run *run, vsh_error *error) {
     options.resolution = 10;
     const vsh_distance distance = {ball, NULL, 2.0, 0, {-1, -1, -1}, {1, 1, 1}};
     const double moved[12] = {1, 0, 0, 0.53, 0, 1, 0, 0.1, 0, 0, 1, 0};
-    vsh_grid *from_sdf = NULL, *from_distance = NULL, *united = NULL;
-    vsh_result result;
+    OWNED(vsh_grid) *from_sdf = NULL, *from_distance = NULL, *united = NULL;
     MAKE(from_sdf, vsh_grid_from_sdf(&sdf, &options, run, &from_sdf, error));
     MAKE(from_distance, vsh_grid_from_distance(&distance, &options, run, &from_distance, error));
     const vsh_grid_instance instances[] = {{from_sdf, NULL}, {from_distance, moved}};
     MAKE(united, vsh_grid_unite(instances, 2, &options, run, &united, error));
-end:
-    vsh_grid_free(united);
-    vsh_grid_free(from_distance);
-    vsh_grid_free(from_sdf);
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result write_grid(const vsh_run *run, vsh_error *error) {
-    vsh_grid *grid = NULL;
-    vsh_occluders *occluders = NULL;
-    vsh_result result;
+    OWNED(vsh_grid) *grid = NULL;
+    OWNED(vsh_occluders) *occluders = NULL;
     TRY(parts_occluders(run, &grid, &occluders, error));
     TRY(vsh_grid_write(grid, "out.vdb", NULL, NULL, 0, error));
-end:
-    vsh_occluders_free(occluders);
-    vsh_grid_free(grid);
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result shade_points(const vsh_run *run, vsh_error *error) {
-    vsh_grid *grid = NULL;
-    vsh_occluders *occluders = NULL;
+    OWNED(vsh_grid) *grid = NULL;
+    OWNED(vsh_occluders) *occluders = NULL;
     double positions[3 * POINTS];
     float normals[3 * POINTS], values[POINTS], deviation[POINTS], bent[3 * POINTS];
     parts_place(positions, normals);
@@ -156,7 +131,6 @@ static vsh_result shade_points(const vsh_run *run, vsh_error *error) {
     light.angle = 0.3;
     vsh_shade_options options = preview_options();
     options.rays = 16;
-    vsh_result result;
     TRY(parts_occluders(run, &grid, &occluders, error));
     for (options.method = VSH_SHADOW_HARD; options.method < VSH_SHADOW_EXACT; ++options.method) {
         TRY(vsh_shade_shadow(occluders, &points, &light, &options, run, values, deviation, NULL, error));
@@ -167,28 +141,24 @@ static vsh_result shade_points(const vsh_run *run, vsh_error *error) {
     }
     options.ao_method = VSH_AO_CONES;
     TRY(vsh_shade_ao(occluders, &points, &options, run, values, NULL, bent, NULL, error));
-end:
-    vsh_occluders_free(occluders);
-    vsh_grid_free(grid);
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result ask(const vsh_run *run, vsh_error *error) {
-    vsh_grid *grid = NULL;
-    vsh_occluders *occluders = NULL, *layered = NULL;
-    vsh_heights *heights = NULL;
-    vsh_model *model = NULL;
-    vsh_spheres *spheres = NULL;
-    double *list = NULL;
+    OWNED(vsh_grid) *grid = NULL;
+    OWNED(vsh_occluders) *occluders = NULL, *layered = NULL;
+    OWNED(vsh_heights) *heights = NULL;
+    OWNED(vsh_model) *model = NULL;
+    OWNED(vsh_spheres) *spheres = NULL;
+    FREED_BY(free_list) double *list = NULL;
     size_t count = 0;
-    vsh_query *query = NULL;
+    OWNED(vsh_query) *query = NULL;
     double positions[3 * POINTS];
     float normals[3 * POINTS], values[2][POINTS], gradient[3 * POINTS], samples[SIDE * SIDE];
     parts_place(positions, normals);
     parts_fill(samples, SIDE * SIDE);
     const vsh_heights_source source = {
         .columns = SIDE, .rows = SIDE, .values = samples, .size = {4, 4}, .height = 0.5};
-    vsh_result result;
     TRY(parts_occluders(run, &grid, &occluders, error));
     MAKE(heights, vsh_heights_create(&source, run, &heights, error));
     MAKE(model, vsh_model_from_heights(&source, VSH_HEIGHTS_SURFACE, run, &model, error));
@@ -221,23 +191,14 @@ static vsh_result ask(const vsh_run *run, vsh_error *error) {
     output.gradient = gradient;
     const vsh_points points = {POINTS, positions, normals, NULL};
     TRY(vsh_query_points(query, &points, NULL, run, &output, NULL, error));
-end:
-    vsh_query_free(query);
-    vsh_spheres_free(spheres);
-    vsh_spheres_list_free(list);
-    vsh_model_free(model);
-    vsh_heights_free(heights);
-    vsh_occluders_free(layered);
-    vsh_occluders_free(occluders);
-    vsh_grid_free(grid);
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result trace(const vsh_run *run, vsh_error *error) {
-    vsh_model *model = NULL;
-    vsh_triangles *triangles = NULL;
-    vsh_solids *solids = NULL;
-    vsh_occluders *occluders = NULL;
+    OWNED(vsh_model) *model = NULL;
+    OWNED(vsh_triangles) *triangles = NULL;
+    OWNED(vsh_solids) *solids = NULL;
+    OWNED(vsh_occluders) *occluders = NULL;
     vsh_occluders_options few = vsh_occluders_options_default();
     few.grid.resolution = 10;
     double positions[3 * POINTS];
@@ -246,7 +207,6 @@ static vsh_result trace(const vsh_run *run, vsh_error *error) {
     const vsh_light light = vsh_light_default();
     const vsh_sdf_node node = vsh_sdf_node_default();
     const vsh_sdf sdf = {&node, 1};
-    vsh_result result;
     MAKE(model, vsh_model_read("box.obj", run, &model, error));
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     MAKE(occluders, vsh_occluders_create(&mesh, 1, &few, run, &occluders, error));
@@ -256,19 +216,13 @@ static vsh_result trace(const vsh_run *run, vsh_error *error) {
     }
     TRY(vsh_trace_shadow(triangles, solids, POINTS, positions, normals, 0.01, &light, 8, run, values, error));
     TRY(vsh_trace_ao(triangles, solids, POINTS, positions, normals, 0.01, 1.0, 8, run, values, error));
-end:
-    vsh_occluders_free(occluders);
-    vsh_solids_free(solids);
-    vsh_triangles_free(triangles);
-    vsh_model_free(model);
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result tell_origin(const vsh_run *run, vsh_error *error) {
-    vsh_scene *scene = NULL;
-    vsh_provenance *provenance = NULL;
+    OWNED(vsh_scene) *scene = NULL;
+    OWNED(vsh_provenance) *provenance = NULL;
     static const char *const file = "scene.json";
-    vsh_result result;
     MAKE(scene, vsh_scene_read(file, NULL, &scene, error));
     vsh_provenance_source source = vsh_provenance_source_default();
     source.scene = scene;
@@ -277,10 +231,7 @@ static vsh_result tell_origin(const vsh_run *run, vsh_error *error) {
     source.command = "bake scene.json";
     source.voxel_size = 0.1;
     MAKE(provenance, vsh_provenance_create(&source, run, &provenance, error));
-end:
-    vsh_provenance_free(provenance);
-    vsh_scene_free(scene);
-    return result;
+    return VSH_OK;
 }
 
 /* Meshes of two triangles, whose vertices are split and on two pages; NULL: by their own UVs. */
@@ -305,13 +256,10 @@ static vsh_result light_asset(const char *name, bool split_them, const vsh_run *
     options.image_count = 2;
     options.chart_pages = charts;
     options.chart_count = 2;
-    vsh_model *model = NULL;
-    vsh_result result;
+    OWNED(vsh_model) *model = NULL;
     MAKE(model, vsh_model_read(name, run, &model, error));
     TRY(vsh_lit_write(name, model, split_them ? meshes : NULL, &options, "out.glb", run, error));
-end:
-    vsh_model_free(model);
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result light_document(const vsh_run *run, vsh_error *error) {
@@ -353,8 +301,7 @@ static vsh_result unwrap(const vsh_run *run, vsh_error *error) {
     options.width = options.height = 64;
     options.max_pages = 2;
     options.keep_uvs = VSH_UNWRAP_KEEP;
-    vsh_atlas *atlas = NULL, *again = NULL;
-    vsh_result result;
+    OWNED(vsh_atlas) *atlas = NULL, *again = NULL;
     MAKE(atlas, vsh_unwrap(meshes, 2, &options, run, &atlas, error));
     const vsh_atlas_mesh placed = vsh_atlas_mesh_view(atlas, 0);
     static float corners[3 * TRIANGLES][3];
@@ -370,10 +317,7 @@ static vsh_result unwrap(const vsh_run *run, vsh_error *error) {
                           .triangle_count = placed.triangle_count};
     options.max_pages = 1;
     MAKE(again, vsh_unwrap(&own, 1, &options, run, &again, error));
-end:
-    vsh_atlas_free(again);
-    vsh_atlas_free(atlas);
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result compare(const vsh_run *run, vsh_error *error) {

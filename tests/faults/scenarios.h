@@ -2,9 +2,10 @@
 #ifndef FAULTS_SCENARIOS_H
 #define FAULTS_SCENARIOS_H
 
+#include "../unit/testing.h"
+
 #include <stdio.h>
 #include <stdlib.h>
-#include <vdbshade/vdbshade.h>
 
 /* Runs to its end or to the first failure, whose code and error it returns, and frees what it made. Calls
  * that fail must leave NULL for their handles, else it aborts. */
@@ -32,24 +33,22 @@ int scenarios_untouched(void);
 /* Runs a call; ends the scenario where it fails, and the test where it then left a handle. */
 #define TRY(call)                                                                                            \
     do {                                                                                                     \
-        result = (call);                                                                                     \
-        if (result != VSH_OK) {                                                                              \
-            goto end;                                                                                        \
+        const vsh_result tried = (call);                                                                     \
+        if (tried != VSH_OK) {                                                                               \
+            return tried;                                                                                    \
         }                                                                                                    \
     } while (0)
 
-#define MAKE(handle, call)                                                                                   \
-    do {                                                                                                     \
-        result = (call);                                                                                     \
-        if ((result == VSH_OK) != ((handle) != NULL)) {                                                      \
-            fprintf(stderr, "%s: %s with%s a handle\n", #handle, vsh_result_name(result),                    \
-                    (handle) != NULL ? "" : "out");                                                          \
-            abort();                                                                                         \
-        }                                                                                                    \
-        if (result != VSH_OK) {                                                                              \
-            goto end;                                                                                        \
-        }                                                                                                    \
-    } while (0)
+#define MAKE(handle, call) TRY(check_handle(#handle, call, (const void *const *)&(handle)))
+
+static inline vsh_result check_handle(const char *name, vsh_result result, const void *const *handle) {
+    if ((result == VSH_OK) != (*handle != NULL)) {
+        fprintf(stderr, "%s: %s with%s a handle\n", name, vsh_result_name(result),
+                *handle != NULL ? "" : "out");
+        abort();
+    }
+    return result;
+}
 
 enum { SIDE = 12, POINTS = 80, IMAGES = 3 };
 

@@ -1,20 +1,10 @@
 /* Every allocation of our C code fails in turn, alone or with all that follow it: each time the call says so,
  * leaks nothing, leaves outputs as they were, and works when it is asked again. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "faults.h"
 #include "scenarios.h"
 
 #include <inttypes.h>
 #include <jansson.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
 enum { MOST = 20000, STEP = 5 };
@@ -62,7 +52,6 @@ static uint64_t fail_each(const scenario *s, int all, uint64_t step) {
 }
 
 static void every_allocation_may_fail(void **state) {
-    (void)state;
     const vsh_run run = one_thread();
     uint64_t sum = 0;
     for (size_t i = 0; i < scenario_count; ++i) {

@@ -1,21 +1,11 @@
 /* Cancelling from the callback, in every stage of every scenario at 0, a tenth, a half and nearly all of it:
  * the call says so, leaks nothing, leaves outputs as they were, and works when it is asked again. How soon it
  * answers is measured by bench/cancel.c. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "faults.h"
 #include "scenarios.h"
 
 #include <inttypes.h>
 #include <pthread.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
 enum { MOST_STAGES = 256 };
@@ -46,7 +36,7 @@ static int32_t progress(void *user, const char *stage, double fraction) {
     return w->asked > 0;
 }
 
-static vsh_result run_watched(const scenario *s, int32_t threads, watch *w, vsh_error *error) {
+static vsh_result run_scenario(const scenario *s, int32_t threads, watch *w, vsh_error *error) {
     vsh_run run = vsh_run_default();
     run.threads = threads;
     run.progress = progress;
@@ -59,7 +49,7 @@ static void stop_at(const scenario *s, int32_t threads, int stage, double fracti
     const uint64_t before = faults_live();
     watch w = {.stage = -1, .stop_stage = stage, .stop_at = fraction};
     vsh_error error;
-    const vsh_result result = run_watched(s, threads, &w, &error);
+    const vsh_result result = run_scenario(s, threads, &w, &error);
     if (w.asked == 0 || (result == VSH_OK && w.asked_at >= 1.0)) {
         scenarios_untouched(); /* no: the stage's work, the call's last, was done */
         return;
@@ -84,14 +74,13 @@ static void stop_at(const scenario *s, int32_t threads, int stage, double fracti
 }
 
 static void every_stage_can_be_cancelled(void **state) {
-    (void)state;
     static const double fractions[] = {0.0, 0.1, 0.5, 0.99};
     uint64_t stopped = 0;
     for (size_t i = 0; i < scenario_count; ++i) {
         const scenario *s = &scenarios[i];
         watch all = {.stage = -1, .stop_stage = -1};
         vsh_error error;
-        assert_int_equal(run_watched(s, 1, &all, &error), VSH_OK);
+        assert_int_equal(run_scenario(s, 1, &all, &error), VSH_OK);
         const int stages = all.stage + 1;
         assert_true(stages <= MOST_STAGES);
         scenarios_untouched(); /* no: it has written */
@@ -106,7 +95,7 @@ static void every_stage_can_be_cancelled(void **state) {
             }
             stopped += here;
         }
-        if (run_watched(s, 2, &all, &error) != VSH_OK) {
+        if (run_scenario(s, 2, &all, &error) != VSH_OK) {
             fail_msg("%s afterwards: %s", s->name, error.message);
         }
         scenarios_untouched();

@@ -1,13 +1,6 @@
 /* Every system call of writing fails in turn, or the process is killed in its place: the old file is intact,
  * no temporary stays (after a kill: none after the next run), and the error says why. All work is done in
  * children, as a process that has begun threads cannot be forked. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "base/file.h"
 #include "faults.h"
 #include "scenarios.h"
@@ -17,9 +10,6 @@
 #include <inttypes.h>
 #include <signal.h>
 #include <stdbool.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -54,7 +44,6 @@ static int run_failing(const scenario *s, uint64_t n) {
 }
 
 static int run_short(const scenario *s, uint64_t n) {
-    (void)n;
     const vsh_run run = vsh_run_default();
     vsh_error error = {-1, ""};
     writes_begin(1, WRITES_SHORT);
@@ -72,7 +61,6 @@ static int run_killed(const scenario *s, uint64_t n) {
 }
 
 static int run_well(const scenario *s, uint64_t n) {
-    (void)n;
     const vsh_run run = vsh_run_default();
     return s->run(&run, NULL) == VSH_OK ? FINE : BAD;
 }
@@ -108,7 +96,6 @@ static size_t temporaries(void) {
 }
 
 static void every_write_may_fail(void **state) {
-    (void)state;
     uint64_t sum = 0;
     for (size_t i = 0; i < scenario_count; ++i) {
         const scenario *s = &scenarios[i];
@@ -130,7 +117,6 @@ static void every_write_may_fail(void **state) {
 }
 
 static void short_and_interrupted_writes_are_gone_on_with(void **state) {
-    (void)state;
     for (size_t i = 0; i < scenario_count; ++i) {
         if (writes(&scenarios[i])) {
             assert_int_equal(in_child(run_short, &scenarios[i], 0), FINE);
@@ -141,7 +127,6 @@ static void short_and_interrupted_writes_are_gone_on_with(void **state) {
 }
 
 static void a_kill_at_every_write_leaves_the_old_file_and_the_next_run_tidies_up(void **state) {
-    (void)state;
     for (size_t i = 0; i < scenario_count; ++i) {
         const scenario *s = &scenarios[i];
         size_t left = 0;
@@ -174,7 +159,6 @@ static void touch(const char *name) {
 }
 
 static void what_a_process_still_writes_and_other_files_stay(void **state) {
-    (void)state;
     static const char *const others[] = {".out.7.tmp.png",     ".out.tmp.exr",   ".out.x.tmp.exr",
                                          ".out.7.tmp.exr.bak", "out.7.tmp.exr",  ".out2.7.tmp.exr",
                                          ".out.7.exr",         ".out.7-.tmp.exr"};

@@ -33,17 +33,20 @@ vsh_run fuzz_run(void);
 /* True once that time is over; fuzz_run() starts it. */
 int fuzz_is_late(void);
 
-/* An error filled with what no call leaves in it. */
-vsh_error *fuzz_error(vsh_error *error);
+/* The error of the next call, filled with what no call leaves in it. */
+vsh_error *fuzz_error(void);
 
 /* Aborts where a call's result, its error and its handle do not fit together. */
-void fuzz_ended(vsh_result result, const vsh_error *error, const void *handle);
+void fuzz_ended(vsh_result result, const void *handle);
 
-/* Makes a handle by a call that is given fuzz_error(&error), and looks at all three once it has ended. */
+/* The same for a call without a handle. */
+void fuzz_ended_plain(vsh_result result);
+
+/* Makes a handle by a call that is given fuzz_error(), and looks at all three once it has ended. */
 #define FUZZ_MAKE(handle, call)                                                                              \
     do {                                                                                                     \
         const vsh_result fuzz_result = (call);                                                               \
-        fuzz_ended(fuzz_result, &error, handle);                                                             \
+        fuzz_ended(fuzz_result, handle);                                                                     \
     } while (0)
 
 #endif

@@ -17,7 +17,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { MOST_WORDS = 24, MOST_TEXT = 40, RUNS_A_CLEANING = 256 };
+enum { VALUES = 63, MOST_WORDS = 24, MOST_TEXT = 40, RUNS_A_CLEANING = 256 };
 
 int vdbshade_main(int argc, char **argv);
 
@@ -37,38 +37,13 @@ long __wrap_sysconf(int name) {
 static const cli_command *const commands[] = {&cli_bake,  &cli_voxelize, &cli_info, &cli_trade,
                                               &cli_query, &cli_volume,   &cli_flat, &cli_render};
 
-static const char *const values[] = {"a.obj",      "scene.json",
-                                     "flat.json",  "points.csv",
-                                     "out.exr",    "out.png",
-                                     "out.vdb",    "out.csv",
-                                     "out.ply",    "out.json",
-                                     "out.html",   "out.tif",
-                                     "none",       "-",
-                                     "0",          "1",
-                                     "2",          "4",
-                                     "8",          "16",
-                                     "-1",         "0.5",
-                                     "1e-3",       "0,1,0",
-                                     "1,1,1",      "-1,-1,-1,2,2,2",
-                                     "8x8",        "16",
-                                     "4x",         "",
-                                     "nan",        "1e300",
-                                     "hard",       "classic",
-                                     "improved",   "cone",
-                                     "rays",       "adaptive",
-                                     "exact",      "smooth",
-                                     "taps",       "cones",
-                                     "sobol",      "blue",
-                                     "yes",        "no",
-                                     "csv",        "ply",
-                                     "raw",        "1M",
-                                     "20MiB",      "R=ao,A=1",
-                                     "world",      "tangent",
-                                     "base",       "avx2",
-                                     "best",       "sphere",
-                                     "multiply",   "quadratic",
-                                     "1,1.2,1.5",  "out",
-                                     "scene2.json"};
+/* Likely values; "" is the empty one. */
+static const char values[] =
+    "a.obj scene.json flat.json points.csv out.exr out.png out.vdb out.csv out.ply out.json out.html "
+    "out.tif none - 0 1 2 4 8 16 -1 0.5 1e-3 0,1,0 1,1,1 -1,-1,-1,2,2,2 8x8 16 4x \"\" nan 1e300 "
+    "hard classic improved cone rays adaptive exact smooth taps cones sobol blue yes no csv ply raw "
+    "1M 20MiB R=ao,A=1 world tangent base avx2 best sphere multiply quadratic 1,1.2,1.5 out "
+    "scene2.json";
 
 static const struct {
     const char *name, *text;
@@ -119,11 +94,15 @@ static void take_text(fuzz_input *input, char text[MOST_TEXT]) {
 
 static void take_value(fuzz_input *input, char text[MOST_TEXT]) {
     const uint8_t which = fuzz_byte(input);
-    if (which < 192) {
-        snprintf(text, MOST_TEXT, "%s", values[which % (sizeof values / sizeof values[0])]);
-    } else {
+    if (which >= 192) {
         take_text(input, text);
+        return;
     }
+    const char *word = values;
+    for (int i = which % VALUES; i > 0; --i) {
+        word += strcspn(word, " ") + 1;
+    }
+    snprintf(text, MOST_TEXT, "%.*s", *word == '"' ? 0 : (int)strcspn(word, " "), word);
 }
 
 static int take_words(fuzz_input *input, char text[MOST_WORDS][MOST_TEXT]) {

@@ -8,7 +8,6 @@
 
 static void use(const vsh_image *image, const char *path) {
     vsh_run run = fuzz_run();
-    vsh_error error;
     const vsh_heights_source source = {.name = path,
                                        .columns = image->width,
                                        .rows = image->height,
@@ -16,14 +15,14 @@ static void use(const vsh_image *image, const char *path) {
                                        .size = {1.0, 2.0},
                                        .height = 0.5};
     vsh_heights *heights;
-    FUZZ_MAKE(heights, vsh_heights_create(&source, &run, &heights, fuzz_error(&error)));
+    FUZZ_MAKE(heights, vsh_heights_create(&source, &run, &heights, fuzz_error()));
     vsh_heights_free(heights);
     vsh_model *model;
-    FUZZ_MAKE(model, vsh_model_from_heights(&source, image->width % 2, &run, &model, fuzz_error(&error)));
+    FUZZ_MAKE(model, vsh_model_from_heights(&source, image->width % 2, &run, &model, fuzz_error()));
     vsh_model_free(model);
     run = fuzz_run();
     vsh_outline *outline;
-    FUZZ_MAKE(outline, vsh_outline_from_image(path, NULL, &run, &outline, fuzz_error(&error)));
+    FUZZ_MAKE(outline, vsh_outline_from_image(path, NULL, &run, &outline, fuzz_error()));
     vsh_outline_free(outline);
 }
 
@@ -32,10 +31,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         return -1; /* not of the corpus: these go to OpenImageIO, see fuzz_picture */
     }
     const char *path = fuzz_file("a.png", data, size);
-    vsh_error error;
     vsh_image_file *file;
-    const vsh_result result = vsh_image_read(path, NULL, &file, fuzz_error(&error));
-    fuzz_ended(result, &error, file);
+    const vsh_result result = vsh_image_read(path, NULL, &file, fuzz_error());
+    fuzz_ended(result, file);
     if (result == VSH_OK) {
         const vsh_image image = vsh_image_view(file);
         if ((int64_t)image.width * image.height <= 1 << 16) {

@@ -31,17 +31,15 @@ static void check_outline(const vsh_outline *outline) {
 }
 
 static void make_outline(const char *path, const vsh_mask_options *options, const vsh_run *run) {
-    vsh_error error;
     vsh_outline *outline;
-    const vsh_result result = vsh_outline_from_image(path, options, run, &outline, fuzz_error(&error));
-    fuzz_ended(result, &error, outline);
+    const vsh_result result = vsh_outline_from_image(path, options, run, &outline, fuzz_error());
+    fuzz_ended(result, outline);
     if (result == VSH_OK) {
         check_outline(outline);
         vsh_grid_options grid_options = vsh_grid_options_default();
         grid_options.resolution = 8;
         vsh_grid *grid;
-        FUZZ_MAKE(grid,
-                  vsh_grid_from_outline(outline, 0.5, NULL, &grid_options, run, &grid, fuzz_error(&error)));
+        FUZZ_MAKE(grid, vsh_grid_from_outline(outline, 0.5, NULL, &grid_options, run, &grid, fuzz_error()));
         vsh_grid_free(grid);
     }
     vsh_outline_free(outline);
@@ -70,8 +68,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     const float *plane = pixels;
     const vsh_image image = {width, height, 1, &name, &plane, NULL};
     const char *path = fuzz_file("a.exr", "", 0);
-    vsh_error error;
-    if (vsh_image_write(path, &image, NULL, fuzz_error(&error)) != VSH_OK) {
+    if (vsh_image_write(path, &image, NULL, fuzz_error()) != VSH_OK) {
         abort();
     }
     const vsh_run run = fuzz_run();
@@ -79,7 +76,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     const vsh_heights_source source = {
         .name = path, .columns = width, .rows = height, .values = pixels, .size = {1.0, 1.0}, .height = 1.0};
     vsh_heights *heights;
-    FUZZ_MAKE(heights, vsh_heights_create(&source, &run, &heights, fuzz_error(&error)));
+    FUZZ_MAKE(heights, vsh_heights_create(&source, &run, &heights, fuzz_error()));
     vsh_heights_free(heights);
     return 0;
 }

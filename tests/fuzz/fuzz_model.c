@@ -13,9 +13,8 @@ static void check(const vsh_model *model) {
     for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
         const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
         vsh_mesh_report report;
-        vsh_error error;
-        const vsh_result result = vsh_mesh_check(&mesh, &report, fuzz_error(&error));
-        fuzz_ended(result, &error, result == VSH_OK ? &report : NULL);
+        const vsh_result result = vsh_mesh_check(&mesh, &report, fuzz_error());
+        fuzz_ended_plain(result);
         if (result != VSH_OK || mesh.triangle_count == 0) {
             abort();
         }
@@ -51,9 +50,8 @@ static void light(const char *path, const vsh_model *model, const vsh_run *run) 
     vsh_lit_options options = vsh_lit_options_default();
     options.chart_pages = pages;
     options.chart_count = 2;
-    vsh_error error;
-    const vsh_result result = vsh_lit_write(path, model, meshes, &options, output, run, fuzz_error(&error));
-    fuzz_ended(result, &error, result == VSH_OK ? output : NULL);
+    const vsh_result result = vsh_lit_write(path, model, meshes, &options, output, run, fuzz_error());
+    fuzz_ended_plain(result);
     if ((unlink(output) == 0) != (result == VSH_OK)) {
         abort();
     }
@@ -72,9 +70,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     const char *path = fuzz_file(name, data + 1, size - 1);
     const vsh_run run = fuzz_run();
     vsh_model *model;
-    vsh_error error;
-    const vsh_result result = vsh_model_read(path, &run, &model, fuzz_error(&error));
-    fuzz_ended(result, &error, model);
+    const vsh_result result = vsh_model_read(path, &run, &model, fuzz_error());
+    fuzz_ended(result, model);
     if (result == VSH_OK) {
         check(model);
         light(path, model, &run);

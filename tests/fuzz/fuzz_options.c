@@ -20,14 +20,13 @@ static void grid(fuzz_input *input) {
     mesh.positions = positions;
     mesh.indices = corners_of;
     mesh.transform = fuzz_byte(input) & 1 ? transform : NULL;
-    vsh_error error;
     vsh_grid *result;
-    FUZZ_MAKE(result, vsh_grid_from_meshes(&mesh, 1, &options, &run, &result, fuzz_error(&error)));
+    FUZZ_MAKE(result, vsh_grid_from_meshes(&mesh, 1, &options, &run, &result, fuzz_error()));
     if (result != NULL) {
         vsh_field_options wide = vsh_field_options_default();
         fuzz_take(input, &wide, sizeof wide);
         vsh_field *field;
-        FUZZ_MAKE(field, vsh_field_create(result, &wide, &run, &field, fuzz_error(&error)));
+        FUZZ_MAKE(field, vsh_field_create(result, &wide, &run, &field, fuzz_error()));
         vsh_field_free(field);
     }
     vsh_grid_free(result);
@@ -40,12 +39,11 @@ static void unite(fuzz_input *input) {
     double transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     fuzz_take(input, transform, sizeof transform);
     const vsh_grid_instance instances[] = {{fuzz_made()->grid, NULL}, {fuzz_made()->grid, transform}};
-    vsh_error error;
     vsh_grid *result;
-    FUZZ_MAKE(result, vsh_grid_unite(instances, 2, &options, &run, &result, fuzz_error(&error)));
+    FUZZ_MAKE(result, vsh_grid_unite(instances, 2, &options, &run, &result, fuzz_error()));
     vsh_grid_free(result);
     FUZZ_MAKE(result, vsh_grid_from_outline(fuzz_made()->outline, transform[3], transform, &options, &run,
-                                            &result, fuzz_error(&error)));
+                                            &result, fuzz_error()));
     vsh_grid_free(result);
 }
 
@@ -64,14 +62,13 @@ static void sdf(fuzz_input *input) {
     options.resolution = 8;
     fuzz_take(input, &options, sizeof options);
     const vsh_run run = fuzz_take_run(input);
-    vsh_error error;
     vsh_grid *result;
-    FUZZ_MAKE(result, vsh_grid_from_sdf(&tree, &options, &run, &result, fuzz_error(&error)));
+    FUZZ_MAKE(result, vsh_grid_from_sdf(&tree, &options, &run, &result, fuzz_error()));
     vsh_grid_free(result);
     vsh_solids *solids;
     double transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     fuzz_take(input, transform, sizeof transform);
-    FUZZ_MAKE(solids, vsh_solids_create(&tree, transform, 1, &solids, fuzz_error(&error)));
+    FUZZ_MAKE(solids, vsh_solids_create(&tree, transform, 1, &solids, fuzz_error()));
     if (solids != NULL) {
         double position[3] = {1, 1, 1}, lift = 0.01;
         float normal[3] = {0, 1, 0}, value;
@@ -82,8 +79,7 @@ static void sdf(fuzz_input *input) {
         int32_t rays = 4;
         fuzz_take(input, &rays, sizeof rays);
         fuzz_ended_plain(vsh_trace_shadow(NULL, solids, 1, position, normal, lift, &light, rays, &run, &value,
-                                          fuzz_error(&error)),
-                         &error);
+                                          fuzz_error()));
         vsh_solids_distance(solids, position);
     }
     vsh_solids_free(solids);
@@ -105,19 +101,18 @@ static void heights(fuzz_input *input) {
         source.columns = FUZZ_SIDE; /* the array's length is the caller's promise */
         source.rows = FUZZ_SIDE;
     }
-    vsh_error error;
     vsh_heights *result;
-    FUZZ_MAKE(result, vsh_heights_create(&source, &run, &result, fuzz_error(&error)));
+    FUZZ_MAKE(result, vsh_heights_create(&source, &run, &result, fuzz_error()));
     vsh_heights_free(result);
     int32_t what = 0;
     fuzz_take(input, &what, sizeof what);
     vsh_model *model;
-    FUZZ_MAKE(model, vsh_model_from_heights(&source, what, &run, &model, fuzz_error(&error)));
+    FUZZ_MAKE(model, vsh_model_from_heights(&source, what, &run, &model, fuzz_error()));
     vsh_model_free(model);
     double balls[8] = {0, 0, 0, 1, 2, 0, 0, 1};
     fuzz_take(input, balls, sizeof balls);
     vsh_spheres *spheres;
-    FUZZ_MAKE(spheres, vsh_spheres_create(balls, 2, transform, &run, &spheres, fuzz_error(&error)));
+    FUZZ_MAKE(spheres, vsh_spheres_create(balls, 2, transform, &run, &spheres, fuzz_error()));
     vsh_spheres_free(spheres);
 }
 
@@ -160,12 +155,11 @@ static void image(fuzz_input *input) {
     if (name[0] != '\0') {
         strcpy(path, fuzz_file(name, "", 0));
     }
-    vsh_error error;
-    fuzz_ended_plain(vsh_image_check(path, &what, &options, fuzz_error(&error)), &error);
+    fuzz_ended_plain(vsh_image_check(path, &what, &options, fuzz_error()));
     vsh_image_writer_bytes(path, &what, &options);
     const int64_t pixels_in = (int64_t)what.width * what.height;
     if (what.width <= 16 && pixels_in <= 16) {
-        fuzz_ended_plain(vsh_image_write(path, &what, &options, fuzz_error(&error)), &error);
+        fuzz_ended_plain(vsh_image_write(path, &what, &options, fuzz_error()));
     }
 }
 
@@ -185,15 +179,14 @@ static void mask(fuzz_input *input) {
     fuzz_take(input, channel, sizeof channel - 1);
     options.channel = fuzz_byte(input) & 1 ? channel : NULL;
     const vsh_run run = fuzz_take_run(input);
-    vsh_error error;
     vsh_outline *outline;
-    FUZZ_MAKE(outline, vsh_outline_from_image(path, &options, &run, &outline, fuzz_error(&error)));
+    FUZZ_MAKE(outline, vsh_outline_from_image(path, &options, &run, &outline, fuzz_error()));
     vsh_outline_free(outline);
     vsh_text_options letters = vsh_text_options_default();
     fuzz_take(input, &letters, sizeof letters);
     char text[24] = "text";
     fuzz_take(input, text, sizeof text - 1);
-    FUZZ_MAKE(outline, vsh_outline_from_text(text, path, &letters, &run, &outline, fuzz_error(&error)));
+    FUZZ_MAKE(outline, vsh_outline_from_text(text, path, &letters, &run, &outline, fuzz_error()));
     vsh_outline_free(outline);
 }
 
@@ -218,9 +211,8 @@ static void compare(fuzz_input *input) {
         return; /* the arrays' length is the caller's promise */
     }
     vsh_measures measures;
-    vsh_error error;
-    const vsh_result result = vsh_compare(&compared, &options, &run, &measures, fuzz_error(&error));
-    fuzz_ended_plain(result, &error);
+    const vsh_result result = vsh_compare(&compared, &options, &run, &measures, fuzz_error());
+    fuzz_ended_plain(result);
     if (result == VSH_OK) {
         vsh_limits limits = vsh_limits_default();
         fuzz_take(input, &limits, sizeof limits);

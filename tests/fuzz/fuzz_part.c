@@ -165,7 +165,6 @@ static part make_part(fuzz_input *input, const source *s, int shard) {
 
 static vsh_result count_rows(void *user, const vsh_scene_lightmap *lightmap, const vsh_image *image,
                              int32_t first, int32_t count, const float *const *planes, vsh_error *error) {
-    (void)error;
     int32_t *rows = user;
     if (lightmap->width != WIDTH || image->width != WIDTH || image->height != HEIGHT || planes[0] == NULL ||
         first + count > HEIGHT) {
@@ -182,9 +181,8 @@ static void merge_lightmaps(const source *s) {
     options.rows = count_rows;
     options.user = &rows;
     options.parts = s->name;
-    vsh_error error;
-    const vsh_result result = vsh_merge_scene(s->scene, &options, &run, NULL, fuzz_error(&error));
-    fuzz_ended(result, &error, result == VSH_OK ? &rows : NULL);
+    const vsh_result result = vsh_merge_scene(s->scene, &options, &run, NULL, fuzz_error());
+    fuzz_ended_plain(result);
     if (result == VSH_OK && rows != HEIGHT) {
         abort();
     }
@@ -194,9 +192,8 @@ static void read_words(const source *s) {
     const vsh_run run = fuzz_run();
     char **words = NULL;
     size_t count = 0;
-    vsh_error error;
-    const vsh_result result = vsh_part_words(s->name, 0, &run, &words, &count, fuzz_error(&error));
-    fuzz_ended(result, &error, words);
+    const vsh_result result = vsh_part_words(s->name, 0, &run, &words, &count, fuzz_error());
+    fuzz_ended(result, words);
     if (words != NULL && words[count] != NULL) {
         abort();
     }

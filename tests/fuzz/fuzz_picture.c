@@ -11,9 +11,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     }
     const char *path = fuzz_file(names[data[0] % (sizeof names / sizeof names[0])], data + 1, size - 1);
     const vsh_run run = fuzz_run();
-    vsh_error error;
     vsh_image_file *file;
-    FUZZ_MAKE(file, vsh_image_read(path, &run, &file, fuzz_error(&error)));
+    FUZZ_MAKE(file, vsh_image_read(path, &run, &file, fuzz_error()));
     vsh_image_free(file);
     return 0;
 }

@@ -31,16 +31,12 @@ static void shade(fuzz_input *input) {
     const vsh_points points = {POINTS, positions, how & 1 ? normals : NULL, how & 2 ? texels : NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
     fuzz_take(input, &stats, sizeof stats.struct_size);
-    vsh_error error;
     fuzz_ended_plain(vsh_shade_shadow(occluders, &points, &light, &options, &run, values,
-                                      how & 4 ? deviation : NULL, &stats, fuzz_error(&error)),
-                     &error);
+                                      how & 4 ? deviation : NULL, &stats, fuzz_error()));
     fuzz_ended_plain(vsh_shade_ao(occluders, &points, &options, &run, values, how & 4 ? deviation : NULL,
-                                  NULL, &stats, fuzz_error(&error)),
-                     &error);
+                                  NULL, &stats, fuzz_error()));
     fuzz_ended_plain(vsh_shade_ao(occluders, &points, &options, &run, ao, how & 4 ? deviation : NULL, values,
-                                  &stats, fuzz_error(&error)),
-                     &error);
+                                  &stats, fuzz_error()));
     fuzz_free_occluders(occluders);
 }
 
@@ -51,8 +47,7 @@ static void query(fuzz_input *input) {
     const vsh_run run = fuzz_take_run(input);
     const vsh_light light = fuzz_take_light(input);
     vsh_query *made_query;
-    vsh_error error;
-    FUZZ_MAKE(made_query, vsh_query_create(occluders, &light, 1, &options, &made_query, fuzz_error(&error)));
+    FUZZ_MAKE(made_query, vsh_query_create(occluders, &light, 1, &options, &made_query, fuzz_error()));
     if (made_query == NULL) {
         fuzz_free_occluders(occluders);
         return;
@@ -83,8 +78,7 @@ static void query(fuzz_input *input) {
     output.gradient = how & 128 ? gradient : NULL;
     fuzz_fill(input, positions, 3 * POINTS * sizeof *positions);
     fuzz_fill(input, normals, 3 * POINTS * sizeof *normals);
-    fuzz_ended_plain(vsh_query_points(made_query, &points, &layout, &run, &output, NULL, fuzz_error(&error)),
-                     &error);
+    fuzz_ended_plain(vsh_query_points(made_query, &points, &layout, &run, &output, NULL, fuzz_error()));
 done:
     vsh_query_free(made_query);
     fuzz_free_occluders(occluders);
@@ -101,12 +95,11 @@ static void lightmap(fuzz_input *input) {
     vsh_mesh mesh = fuzz_made()->mesh;
     mesh.uvs = places;
     mesh.normals = fuzz_byte(input) & 1 ? fuzz_corners : NULL;
-    vsh_error error;
     vsh_charts *charts;
-    FUZZ_MAKE(charts, vsh_charts_create(&mesh, 1, &options, &run, NULL, &charts, fuzz_error(&error)));
+    FUZZ_MAKE(charts, vsh_charts_create(&mesh, 1, &options, &run, NULL, &charts, fuzz_error()));
     if (charts != NULL) {
         vsh_texels *texels;
-        FUZZ_MAKE(texels, vsh_texels_create(charts, &run, &texels, fuzz_error(&error)));
+        FUZZ_MAKE(texels, vsh_texels_create(charts, &run, &texels, fuzz_error()));
         vsh_texels_free(texels);
     }
     if (charts != NULL && FITS(options)) {
@@ -132,8 +125,7 @@ static void lightmap(fuzz_input *input) {
         map.tint = how & 16 ? tint : NULL;
         map.ambient = how & 32 ? ambient : NULL;
         fuzz_ended_plain(
-            vsh_bake_lightmap(occluders, charts, &light, 1, &shading, &run, &map, NULL, fuzz_error(&error)),
-            &error);
+            vsh_bake_lightmap(occluders, charts, &light, 1, &shading, &run, &map, NULL, fuzz_error()));
         fuzz_free_occluders(occluders);
     }
     vsh_charts_free(charts);
@@ -146,20 +138,19 @@ static void volume(fuzz_input *input) {
     vsh_occluders *occluders = fuzz_take_occluders(input);
     const vsh_run run = fuzz_take_run(input);
     const vsh_light light = fuzz_take_light(input);
-    vsh_error error;
     double box[6] = {-1, -1, -1, 1, 1, 1}, size = 0.5;
     fuzz_take(input, box, sizeof box);
     fuzz_take(input, &size, sizeof size);
     vsh_voxels *voxels;
-    FUZZ_MAKE(voxels, vsh_voxels_from_box(box, box + 3, size, &run, &voxels, fuzz_error(&error)));
+    FUZZ_MAKE(voxels, vsh_voxels_from_box(box, box + 3, size, &run, &voxels, fuzz_error()));
     vsh_volume *baked;
     FUZZ_MAKE(baked, vsh_bake_volume(occluders, voxels != NULL ? voxels : fuzz_made()->voxels, &light, 1,
-                                     &options, &run, &baked, NULL, fuzz_error(&error)));
+                                     &options, &run, &baked, NULL, fuzz_error()));
     vsh_volume_free(baked);
     fuzz_free_occluders(occluders);
     vsh_voxels_free(voxels);
     fuzz_take(input, &size, sizeof size);
-    FUZZ_MAKE(voxels, vsh_voxels_from_grid(fuzz_made()->grid, size, &run, &voxels, fuzz_error(&error)));
+    FUZZ_MAKE(voxels, vsh_voxels_from_grid(fuzz_made()->grid, size, &run, &voxels, fuzz_error()));
     vsh_voxels_free(voxels);
 }
 
@@ -176,7 +167,6 @@ static void render(fuzz_input *input) {
     fuzz_take(input, surface.color, sizeof surface.color);
     static float planes[4][3 * MOST_TEXELS];
     const vsh_picture picture = {planes[0], planes[1], planes[2], planes[3]};
-    vsh_error error;
     double bounds[6] = {-1, -1, -1, 1, 1, 1}, angles[3] = {0.5, 0.5, 1.0};
     fuzz_take(input, bounds, sizeof bounds);
     fuzz_take(input, angles, sizeof angles);
@@ -196,10 +186,10 @@ static void render(fuzz_input *input) {
     }
     if (how & 1) {
         vsh_camera camera = options.camera;
-        fuzz_ended_plain(vsh_camera_frame(&camera, bounds, bounds + 3, angles[0], angles[1], angles[2],
-                                          fuzz_error(&error)),
-                         &error);
-        if (error.code == -1) {
+        const vsh_result framed =
+            vsh_camera_frame(&camera, bounds, bounds + 3, angles[0], angles[1], angles[2], fuzz_error());
+        fuzz_ended_plain(framed);
+        if (framed == VSH_OK) {
             vsh_camera_orbit(&camera, angles[0]);
             options.camera = camera;
         }
@@ -207,12 +197,10 @@ static void render(fuzz_input *input) {
     const int fits = FITS(options);
     const vsh_picture none = {NULL, NULL, NULL, NULL};
     fuzz_ended_plain(vsh_render(&surface, 1, occluders, &light, 1, &options, &run, fits ? &picture : &none,
-                                NULL, fuzz_error(&error)),
-                     &error);
+                                NULL, fuzz_error()));
     fuzz_free_occluders(occluders);
     float *const rgb[] = {planes[1], planes[2], planes[3]};
-    fuzz_ended_plain(
-        vsh_picture_encode(&picture, FUZZ_SIDE, FUZZ_SIDE, angles[2], rgb, NULL, fuzz_error(&error)), &error);
+    fuzz_ended_plain(vsh_picture_encode(&picture, FUZZ_SIDE, FUZZ_SIDE, angles[2], rgb, NULL, fuzz_error()));
 }
 
 static void flat(fuzz_input *input) {
@@ -227,20 +215,19 @@ static void flat(fuzz_input *input) {
     float *const shadow[] = {planes[0], planes[1]}, *const irradiance[] = {planes[2], planes[3], planes[4]};
     const int fits = FITS(options);
     const vsh_flat_map map = {fits ? shadow : NULL, fits ? irradiance : NULL, fits ? planes[5] : NULL};
-    vsh_error error;
     double points[24] = {-1, -1, 1,  -1, 1,   1,   -1, 1,   -2, -2, 0,   -2,
                          0,  0,  -2, 0,  0.5, 0.5, 2,  0.5, 2,  2,  0.5, 2};
     fuzz_take(input, points, sizeof points);
     const size_t counts[] = {3, 5, 4};
     vsh_outline *outline;
     FUZZ_MAKE(outline, vsh_outline_from_polygons(points, counts, 1 + fuzz_byte(input) % 3, &run, &outline,
-                                                 fuzz_error(&error)));
-    fuzz_ended_plain(vsh_flat_bake(outline, lights, 2, &options, &run, &map, fuzz_error(&error)), &error);
+                                                 fuzz_error()));
+    fuzz_ended_plain(vsh_flat_bake(outline, lights, 2, &options, &run, &map, fuzz_error()));
     vsh_outline_free(outline);
     double matrix[6] = {1, 0, 0, 0, 1, 0};
     fuzz_take(input, matrix, sizeof matrix);
     const vsh_outline_instance instances[] = {{fuzz_made()->outline, matrix}, {fuzz_made()->outline, NULL}};
-    FUZZ_MAKE(outline, vsh_outline_unite(instances, 2, &run, &outline, fuzz_error(&error)));
+    FUZZ_MAKE(outline, vsh_outline_unite(instances, 2, &run, &outline, fuzz_error()));
     vsh_outline_free(outline);
 }
 

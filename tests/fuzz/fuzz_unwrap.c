@@ -104,8 +104,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     }
     const vsh_run run = fuzz_run();
     vsh_atlas *atlas;
-    vsh_error error;
-    FUZZ_MAKE(atlas, vsh_unwrap(meshes, count, &options, &run, &atlas, fuzz_error(&error)));
+    FUZZ_MAKE(atlas, vsh_unwrap(meshes, count, &options, &run, &atlas, fuzz_error()));
     for (size_t i = 0; atlas != NULL && i < count; ++i) {
         check_mesh(atlas, &meshes[i], i);
     }

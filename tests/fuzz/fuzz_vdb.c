@@ -6,24 +6,21 @@
 #include <vdbshade/volume.h>
 
 static void list(const char *path, const vsh_run *run) {
-    vsh_error error;
     vsh_vdb_entry entries[4];
     size_t count;
-    const vsh_result result = vsh_vdb_list(path, run, entries, 4, &count, fuzz_error(&error));
-    fuzz_ended(result, &error, result == VSH_OK ? &count : NULL);
+    const vsh_result result = vsh_vdb_list(path, run, entries, 4, &count, fuzz_error());
+    fuzz_ended_plain(result);
 }
 
 static void read_grid(const char *path, const vsh_run *run) {
-    vsh_error error;
     vsh_grid *grid;
-    FUZZ_MAKE(grid, vsh_grid_read(path, NULL, run, &grid, fuzz_error(&error)));
+    FUZZ_MAKE(grid, vsh_grid_read(path, NULL, run, &grid, fuzz_error()));
     vsh_grid_free(grid);
 }
 
 static void read_voxels(const char *path, const vsh_run *run) {
-    vsh_error error;
     vsh_voxels *voxels;
-    FUZZ_MAKE(voxels, vsh_voxels_from_vdb(path, NULL, run, &voxels, fuzz_error(&error)));
+    FUZZ_MAKE(voxels, vsh_voxels_from_vdb(path, NULL, run, &voxels, fuzz_error()));
     vsh_voxels_free(voxels);
 }
 

@@ -118,9 +118,8 @@ vsh_occluders *fuzz_take_occluders(fuzz_input *input) {
         parts.layers = &layer;
         parts.layer_count = 1;
     }
-    vsh_error error;
     vsh_occluders *occluders;
-    FUZZ_MAKE(occluders, vsh_occluders_from_parts(&parts, &occluders, fuzz_error(&error)));
+    FUZZ_MAKE(occluders, vsh_occluders_from_parts(&parts, &occluders, fuzz_error()));
     return occluders != NULL ? occluders : made.occluders;
 }
 
@@ -137,10 +136,6 @@ vsh_light fuzz_take_light(fuzz_input *input) {
     light.position[0] = 3.0;
     fuzz_take(input, &light, sizeof light);
     return light;
-}
-
-void fuzz_ended_plain(vsh_result result, const vsh_error *error) {
-    fuzz_ended(result, error, result == VSH_OK ? error : NULL);
 }
 
 void fuzz_choose(const uint8_t *data, size_t size, fuzz_call *const *calls, size_t count) {

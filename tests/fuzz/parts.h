@@ -39,9 +39,6 @@ vsh_occluders *fuzz_take_occluders(fuzz_input *input);
 void fuzz_free_occluders(vsh_occluders *occluders);
 vsh_light fuzz_take_light(fuzz_input *input);
 
-/* fuzz_ended() for a call without a handle. */
-void fuzz_ended_plain(vsh_result result, const vsh_error *error);
-
 typedef void fuzz_call(fuzz_input *input);
 
 /* The call that the input's first byte chooses. */

@@ -14,6 +14,4 @@ void cli_signals_tell(void) {}
 
 void cli_signals_watch(void) {}
 
-void cli_signals_end(int code) {
-    (void)code;
-}
+void cli_signals_end(int code) {}

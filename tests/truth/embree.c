@@ -153,81 +153,45 @@ void truth_mesh_free(truth_mesh *truth) {
     free(truth);
 }
 
-typedef enum question { LIGHT, AO, BACKS } question;
-
+/* Whether rays of a point meet the backs of triangles. */
 typedef struct work {
     const truth_mesh *truth;
-    question question;
-    size_t count;
     const double *origins;
     const float *normals;
-    const double *towards; /* LIGHT */
-    double w;
-    double limit;
     size_t rays;
-    float *result;
-    double *locals; /* [rays][3], directions in a frame's axes: the same for all points */
+    float *backs;
 } work;
-
-static struct RTCRay ray_from(const work *job, size_t point, const double direction[3]) {
-    struct RTCRay ray = {0};
-    const double *origin = &job->origins[3 * point];
-    const double *center = job->truth->center;
-    ray.org_x = (float)(origin[0] - center[0]);
-    ray.org_y = (float)(origin[1] - center[1]);
-    ray.org_z = (float)(origin[2] - center[2]);
-    ray.dir_x = (float)direction[0];
-    ray.dir_y = (float)direction[1];
-    ray.dir_z = (float)direction[2];
-    ray.tnear = 0.0F;
-    ray.tfar = (float)job->limit;
-    ray.mask = 0xffffffffU;
-    return ray;
-}
-
-static bool is_free(const work *job, size_t point, const double direction[3]) {
-    struct RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    struct RTCRay ray = ray_from(job, point, direction);
-    rtcOccluded1(job->truth->scene, &context, &ray);
-    return ray.tfar >= 0.0F; /* a hit sets it to -∞ */
-}
 
 static bool meets_back(const work *job, size_t point, const double direction[3]) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    struct RTCRayHit hit = {0};
-    hit.ray = ray_from(job, point, direction);
-    hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    const double *origin = &job->origins[3 * point], *center = job->truth->center;
+    struct RTCRayHit hit = {.ray = {.org_x = (float)(origin[0] - center[0]),
+                                    .org_y = (float)(origin[1] - center[1]),
+                                    .org_z = (float)(origin[2] - center[2]),
+                                    .dir_x = (float)direction[0],
+                                    .dir_y = (float)direction[1],
+                                    .dir_z = (float)direction[2],
+                                    .tfar = INFINITY,
+                                    .mask = 0xffffffffU},
+                            .hit.geomID = RTC_INVALID_GEOMETRY_ID};
     rtcIntersect1(job->truth->scene, &context, &hit);
     return hit.hit.geomID != RTC_INVALID_GEOMETRY_ID &&
            hit.hit.Ng_x * hit.ray.dir_x + hit.hit.Ng_y * hit.ray.dir_y + hit.hit.Ng_z * hit.ray.dir_z > 0.0F;
 }
 
-static float answer(const work *job, size_t point) {
-    const float *normal = job->normals != NULL ? &job->normals[3 * point] : NULL;
-    const truth_frame frame = job->question == LIGHT
-                                  ? truth_frame_around(job->towards)
-                                  : truth_frame_around((double[]){normal[0], normal[1], normal[2]});
-    size_t yes = 0;
-    for (size_t i = 0; i < job->rays; i++) {
-        double direction[3];
-        truth_to_world(&frame, &job->locals[3 * i], direction);
-        if (job->question == LIGHT && normal != NULL &&
-            direction[0] * normal[0] + direction[1] * normal[1] + direction[2] * normal[2] <= 0.0) {
-            continue;
-        }
-        const bool counts =
-            job->question == BACKS ? meets_back(job, point, direction) : is_free(job, point, direction);
-        yes += counts ? 1 : 0;
-    }
-    return (float)((double)yes / (double)job->rays);
-}
-
-static void answer_all(void *user, size_t begin, size_t end) {
-    work *job = user;
+static void count_backs(void *user, size_t begin, size_t end) {
+    const work *job = user;
     for (size_t point = begin; point < end; point++) {
-        job->result[point] = answer(job, point);
+        const float *n = &job->normals[3 * point];
+        const truth_frame frame = truth_frame_around((double[]){n[0], n[1], n[2]});
+        size_t backs = 0;
+        for (size_t i = 0; i < job->rays; i++) {
+            double direction[3];
+            truth_cosine_direction(&frame, i, job->rays, direction);
+            backs += meets_back(job, point, direction);
+        }
+        job->backs[point] = (float)((double)backs / (double)job->rays);
     }
 }
 
@@ -267,63 +231,24 @@ int truth_in_pieces(size_t count, int threads, void (*body)(void *user, size_t b
     return started == wanted - 1 ? 0 : -1;
 }
 
-static int run_all(work *job, int threads) {
-    static const truth_frame axes = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
-    job->locals = calloc(job->rays, 3 * sizeof *job->locals);
-    if (job->locals == NULL) {
-        return -1;
-    }
-    for (size_t i = 0; i < job->rays; i++) {
-        if (job->question == LIGHT) {
-            truth_light_direction(&axes, job->w, i, job->rays, &job->locals[3 * i]);
-        } else {
-            truth_cosine_direction(&axes, i, job->rays, &job->locals[3 * i]);
-        }
-    }
-    const int result = truth_in_pieces(job->count, threads, answer_all, job);
-    free(job->locals);
-    return result;
-}
-
 int truth_mesh_light(const truth_mesh *truth, size_t count, const double *origins, const float *normals,
                      const double towards[3], double w, size_t rays, int threads, float *visible) {
-    work job = {.truth = truth,
-                .question = LIGHT,
-                .count = count,
-                .origins = origins,
-                .normals = normals,
-                .towards = towards,
-                .w = w,
-                .limit = INFINITY,
-                .rays = rays,
-                .result = visible};
-    return run_all(&job, threads);
+    const truth_question question = {
+        .count = count, .origins = origins, .normals = normals, .towards = towards, .w = w, .rays = rays};
+    return truth_mesh_packets(truth, TRUTH_LONE_RAYS, &question, threads, visible);
 }
 
 int truth_mesh_ao(const truth_mesh *truth, size_t count, const double *origins, const float *normals,
                   double distance, size_t rays, int threads, float *open) {
-    work job = {.truth = truth,
-                .question = AO,
-                .count = count,
-                .origins = origins,
-                .normals = normals,
-                .limit = distance,
-                .rays = rays,
-                .result = open};
-    return run_all(&job, threads);
+    const truth_question question = {
+        .count = count, .origins = origins, .normals = normals, .distance = distance, .rays = rays};
+    return truth_mesh_packets(truth, TRUTH_LONE_RAYS, &question, threads, open);
 }
 
 int truth_mesh_backs(const truth_mesh *truth, size_t count, const double *origins, const float *normals,
                      size_t rays, int threads, float *backs) {
-    work job = {.truth = truth,
-                .question = BACKS,
-                .count = count,
-                .origins = origins,
-                .normals = normals,
-                .limit = INFINITY,
-                .rays = rays,
-                .result = backs};
-    return run_all(&job, threads);
+    work job = {truth, origins, normals, rays, backs};
+    return truth_in_pieces(count, threads, count_backs, &job);
 }
 
 #endif

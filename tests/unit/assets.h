@@ -2,8 +2,8 @@
 #ifndef TESTS_ASSETS_H
 #define TESTS_ASSETS_H
 
-#include "expect.h"
 #include "models.h"
+#include "testing.h"
 
 #include "base/uri.h"
 #include "model/model.h"
@@ -307,13 +307,13 @@ static inline void keep_file(const char *path) {
 
 static inline vsh_model *read_model(const char *path) {
     vsh_model *model = NULL;
-    expect_ok(vsh_model_read(path, NULL, &model, &failure));
+    assert_ok(vsh_model_read(path, NULL, &model, &failure));
     return model;
 }
 
 static inline void write_lit(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
                              const vsh_lit_options *options, const char *output) {
-    expect_ok(vsh_lit_write(path, model, meshes, options, output, NULL, &failure));
+    assert_ok(vsh_lit_write(path, model, meshes, options, output, NULL, &failure));
     keep_file(output);
 }
 

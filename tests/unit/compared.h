@@ -2,20 +2,7 @@
 #ifndef TESTS_COMPARED_H
 #define TESTS_COMPARED_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-#include <vdbshade/compare.h>
-
-#include <math.h>
-#include <stdbool.h>
+#include "testing.h"
 
 #define PI 3.14159265358979323846
 
@@ -57,10 +44,17 @@ static inline vsh_compared pair_of(const plane *golden, const plane *values, con
 static inline vsh_measures measure(const plane *golden, const plane *values, const uint8_t *mask) {
     const vsh_compared c = pair_of(golden, values, mask);
     vsh_measures m;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_compare(&c, NULL, NULL, &m, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_compare(&c, NULL, NULL, &m, &failure));
+    return m;
+}
+
+/* Measures of two pictures by one function, of what it is given. */
+static inline vsh_measures measure_as(int32_t width, int32_t height, int32_t depth, plane_fn *fn,
+                                      const void *golden, const void *values) {
+    plane a = make_plane(width, height, depth, fn, golden), b = make_plane(width, height, depth, fn, values);
+    const vsh_measures m = measure(&a, &b, NULL);
+    free(a.values);
+    free(b.values);
     return m;
 }
 
@@ -71,12 +65,6 @@ static inline double noise(uint32_t counter) {
     x *= 2246822519u;
     x ^= x >> 13;
     return (double)x / 2147483647.5 - 1.0;
-}
-
-static inline void assert_near(double value, double expected, double off) {
-    if (!(fabs(value - expected) <= off)) {
-        fail_msg("%.9g is not within %g of %.9g", value, off, expected);
-    }
 }
 
 #endif

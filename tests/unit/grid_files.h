@@ -21,21 +21,12 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-#include <unistd.h>
-#include <vdbshade/shade.h>
 #include <vector>
 
 #include "levelset/leaves.h"
 
 // Last: it has macros named as OpenVDB's members are.
-#include <csetjmp>
-#include <cstdarg>
-#include <cstddef>
-#include <cstdint>
-
-extern "C" {
-#include <cmocka.h>
-}
+#include "testing.h"
 
 using openvdb::FloatGrid;
 
@@ -53,8 +44,6 @@ inline std::string content(const std::string &path) {
 inline void put(const std::string &path, const std::string &bytes) {
     std::ofstream(path, std::ios::binary) << bytes;
 }
-
-inline vsh_error failure;
 
 inline void assert_said(vsh_result result, vsh_result expected, std::initializer_list<const char *> parts) {
     if (result != expected) {

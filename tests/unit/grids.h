@@ -2,19 +2,9 @@
 #ifndef TESTS_GRIDS_H
 #define TESTS_GRIDS_H
 
-#include <float.h>
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
+#include "testing.h"
+
 #include <stdatomic.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-#include <vdbshade/grid.h>
 
 #include "levelset/leaves.h"
 
@@ -116,21 +106,6 @@ static inline void assert_same_leaves(const vsh_grid *a, const vsh_grid *b, floa
     }
     free(left.leaf);
     free(right.leaf);
-}
-
-static vsh_error failure;
-
-static inline void assert_fails(vsh_result result, vsh_result expected, const char *part) {
-    if (result != expected || strstr(failure.message, part) == NULL) {
-        fail_msg("%s '%s': expected %s '%s'", vsh_result_name(result), failure.message,
-                 vsh_result_name(expected), part);
-    }
-}
-
-static inline vsh_grid_options with_voxel(double size) {
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = size;
-    return options;
 }
 
 typedef struct sphere {

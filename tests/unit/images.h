@@ -66,12 +66,6 @@ static inline void unmake(sample *s) {
 
 static const char *const LIGHTMAP[] = {"shadow.sun", "ao", "A"};
 
-static inline void assert_ok(vsh_result result, const vsh_error *error) {
-    if (result != VSH_OK) {
-        fail_msg("%s: %s", vsh_result_name(result), error->message);
-    }
-}
-
 static inline size_t read_all(const char *path, unsigned char **bytes) {
     FILE *file = fopen(path, "rb");
     assert_non_null(file);

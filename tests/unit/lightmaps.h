@@ -3,8 +3,8 @@
 #define TESTS_LIGHTMAPS_H
 
 #include "casts.h"
-#include "expect.h"
 #include "previews.h"
+#include "testing.h"
 #include <math.h>
 #include <stdlib.h>
 
@@ -54,8 +54,8 @@ static inline vsh_field *floor_field(int wall) {
     options.voxel_size = VOXEL;
     vsh_grid *grid = NULL;
     vsh_field *field = NULL;
-    expect_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
-    expect_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
+    assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
+    assert_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
     vsh_grid_free(grid);
     return field;
 }
@@ -65,8 +65,8 @@ static inline vsh_field *field_of_mesh(const vsh_mesh *mesh, double voxel) {
     options.voxel_size = voxel;
     vsh_grid *grid = NULL;
     vsh_field *field = NULL;
-    expect_ok(vsh_grid_from_meshes(mesh, 1, &options, NULL, &grid, &failure));
-    expect_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
+    assert_ok(vsh_grid_from_meshes(mesh, 1, &options, NULL, &grid, &failure));
+    assert_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
     vsh_grid_free(grid);
     return field;
 }
@@ -78,7 +78,7 @@ static inline vsh_charts *make_texels(const vsh_mesh *meshes, size_t count, int3
     options.supersample = supersample;
     options.padding = padding;
     vsh_charts *charts = NULL;
-    expect_ok(vsh_charts_create(meshes, count, &options, NULL, NULL, &charts, &failure));
+    assert_ok(vsh_charts_create(meshes, count, &options, NULL, NULL, &charts, &failure));
     return charts;
 }
 
@@ -111,7 +111,7 @@ static inline void bake(const vsh_field *field, const vsh_charts *charts, const 
                         const vsh_lightmap *lightmap, vsh_bake_stats *stats, int32_t threads) {
     vsh_run run = vsh_run_default();
     run.threads = threads;
-    expect_ok(vsh_bake_lightmap(occluders_of(field), charts, light, light != NULL ? 1 : 0, NULL, &run,
+    assert_ok(vsh_bake_lightmap(occluders_of(field), charts, light, light != NULL ? 1 : 0, NULL, &run,
                                 lightmap, stats, &failure));
 }
 

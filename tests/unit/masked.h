@@ -2,10 +2,9 @@
 #ifndef TESTS_MASKED_H
 #define TESTS_MASKED_H
 
-#include "shading.h"
+#include "testing.h"
 
-#include <stdlib.h>
-#include <vdbshade/trace.h>
+#include "shading.h"
 
 /* A disc of this radius in a square of side 2, as an alpha of this many texels: a ramp that is a half at the
  * disc's edge, and some texels wide. */

@@ -25,13 +25,14 @@ static inline const char *name_of(int kind) {
     return name;
 }
 
-static inline vsh_shade_stats cast_kind(const caster *c, int kind, const vsh_light *light, double ao_distance,
-                                        size_t count, const double *at, const float *facing, float *values) {
+static inline vsh_shade_stats cast_kind(const casting *c, int kind, const vsh_light *light,
+                                        double ao_distance, size_t count, const double *at,
+                                        const float *facing, float *values) {
     return is_ao(kind) ? cast_ao(c, kind - SHADOWS, ao_distance, count, at, facing, values)
                        : cast_shadows(c, light, kind, count, at, facing, values);
 }
 
-static inline float cast_kind_at(const caster *c, int kind, const vsh_light *light, double ao_distance,
+static inline float cast_kind_at(const casting *c, int kind, const vsh_light *light, double ao_distance,
                                  const double *at, const float *facing) {
     float value = -1.0f;
     cast_kind(c, kind, light, ao_distance, 1, at, facing, &value);
@@ -39,7 +40,7 @@ static inline float cast_kind_at(const caster *c, int kind, const vsh_light *lig
 }
 
 /* With options of the test's own, but for the method. */
-static inline void shade_kind(const caster *c, int kind, const vsh_light *light, vsh_shade_options options,
+static inline void shade_kind(const casting *c, int kind, const vsh_light *light, vsh_shade_options options,
                               const vsh_points *points, float *values) {
     *(is_ao(kind) ? &options.ao_method : &options.method) = is_ao(kind) ? kind - SHADOWS : kind;
     assert_int_equal(is_ao(kind) ? vsh_shade_ao(occluders_of_caster(c), points, &options, NULL, values, NULL,

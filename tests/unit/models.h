@@ -2,19 +2,9 @@
 #ifndef TESTS_MODELS_H
 #define TESTS_MODELS_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "testing.h"
 
 #include "mesh/mesh.h"
-
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 
 /* Assimp 5.2 loses what its FBX and glTF readers had taken when a file is cut: its leaks, by name. */
 const char *__lsan_default_suppressions(void);

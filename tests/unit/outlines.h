@@ -2,40 +2,12 @@
 #ifndef TESTS_OUTLINES_H
 #define TESTS_OUTLINES_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
-#include <math.h>
-#include <stdbool.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <vdbshade/flat.h>
+#include "testing.h"
 
 #define PI 3.14159265358979323846
 
 /* Of the package fonts-dejavu-core. */
 #define FONT "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf"
-
-static vsh_error failure;
-
-static inline void assert_ok(vsh_result result) {
-    if (result != VSH_OK) {
-        fail_msg("%s: %s", vsh_result_name(result), failure.message);
-    }
-}
-
-static inline void assert_fails(vsh_result result, vsh_result expected, const char *part) {
-    if (result != expected || strstr(failure.message, part) == NULL) {
-        fail_msg("%s '%s': expected %s '%s'", vsh_result_name(result), failure.message,
-                 vsh_result_name(expected), part);
-    }
-}
 
 static inline vsh_outline *polygon(const double *points, size_t count) {
     vsh_outline *outline = NULL;

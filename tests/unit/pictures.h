@@ -2,12 +2,10 @@
 #ifndef TESTS_PICTURES_H
 #define TESTS_PICTURES_H
 
+#include "testing.h"
+
 #include "previews.h"
 #include "shading.h"
-
-#include <vdbshade/render.h>
-
-#include <stdlib.h>
 
 enum { WIDE = 64, HIGH = 48, PIXELS = WIDE * HIGH };
 

@@ -122,7 +122,7 @@ static inline void shade_by(const vsh_occluders *occluders, const vsh_light *lig
     }
 }
 
-static inline void shade(const caster *c, const vsh_light *light, const vsh_shade_options *options,
+static inline void shade(const casting *c, const vsh_light *light, const vsh_shade_options *options,
                          float *values, float *deviation) {
     shade_by(occluders_of_caster(c), light, options, values, deviation);
 }
@@ -144,7 +144,7 @@ static inline difference compare(const float *values, const double *truth) {
 }
 
 static inline int set_up(void **state) {
-    static caster c;
+    static casting c;
     place_receivers();
     c = caster_of(SCENE, VOXEL, 3.0);
     *state = &c;

@@ -3,12 +3,13 @@
 #ifndef TESTS_SERVED_H
 #define TESTS_SERVED_H
 
+#include "testing.h"
+
 #include "models.h"
 
 #include "model/model.h"
 
 #include <sys/mman.h>
-#include <vdbshade/reader.h>
 
 /* A glTF, read here or by a reader; its warnings are kept. */
 static inline vsh_model *read_gltf_by(bool reader, const char *json) {
@@ -51,6 +52,22 @@ static inline vsh_result decode(const unsigned char *bytes, size_t size, const c
     run.memory_limit = limit;
     return vshi_model_decode(&decoder, path_of(name).text, &run, model, error);
 }
+
+/* Small counts and numbers of arrays, doubles that are none or out of range, and two letters of a path. */
+enum { WRONG_WORDS = 13 };
+static const uint64_t wrong_words[WRONG_WORDS] = {0,
+                                                  1,
+                                                  2,
+                                                  3,
+                                                  9,
+                                                  64,
+                                                  UINT64_MAX,
+                                                  UINT64_C(0x7ff) << 52,
+                                                  UINT64_C(0xbff) << 52,
+                                                  UINT64_C(0x3ff) << 52,
+                                                  UINT64_C(0x7ff8) << 48,
+                                                  UINT64_C(0x7fe) << 52,
+                                                  UINT64_C(0x6374652f2e2e2f2e)};
 
 /* Each word of a file's telling in turn wrong, or perhaps: refused in a line that names the file, or a model
  * for `look`. So many refused and sound ones are expected at least. */

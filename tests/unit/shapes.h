@@ -2,18 +2,7 @@
 #ifndef SHAPES_H
 #define SHAPES_H
 
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-#include <vdbshade/vdbshade.h>
+#include "testing.h"
 
 enum { SHAPE_VERTICES = 40000, SHAPE_TRIANGLES = 80000 };
 

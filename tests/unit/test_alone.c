@@ -1,8 +1,7 @@
 /* What a point gets does not depend on the other points of a call, by no bit. */
 #include "previews.h"
 #include "shading.h"
-
-#include <vdbshade/query.h>
+#include "testing.h"
 
 enum { SIDE = 448, MANY = SIDE * SIDE, SOME = 1 << 14, SOLIDS = 14 };
 
@@ -60,20 +59,14 @@ static void ask(const vsh_query *query, bool ao, size_t count, size_t batch, flo
         vsh_query_output output = vsh_query_output_default();
         output.visibility = ao ? NULL : visibility;
         output.ao = ao ? values + i : NULL;
-        vsh_error error = {VSH_OK, ""};
-        if (vsh_query_points(query, &points, NULL, NULL, &output, NULL, &error) != VSH_OK) {
-            fail_msg("%s", error.message);
-        }
+        assert_ok(vsh_query_points(query, &points, NULL, NULL, &output, NULL, &failure));
     }
 }
 
 static void compare(const vsh_field *field, const vsh_light *light, const vsh_shade_options *options,
                     size_t count) {
     vsh_query *query = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_query_create(occluders_of(field), light, light != NULL, options, &query, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_query_create(occluders_of(field), light, light != NULL, options, &query, &failure));
     ask(query, light == NULL, count, count, among);
     const size_t batches[] = {1, 1000};
     for (size_t b = 0; b < sizeof batches / sizeof batches[0]; ++b) {
@@ -102,8 +95,7 @@ static void compare_shadows(const vsh_field *field, const vsh_light *light, int3
     }
 }
 
-static void a_sun_that_the_horizon_cuts_is_as_bright_for_one_point_as_for_many(void **state) {
-    (void)state;
+TEST(a_sun_that_the_horizon_cuts_is_as_bright_for_one_point_as_for_many) {
     uint64_t counter = 7919;
     vsh_field *field = field_of(crowd(&counter, true), 0.04, 0.0);
     place_points(true);
@@ -114,8 +106,7 @@ static void a_sun_that_the_horizon_cuts_is_as_bright_for_one_point_as_for_many(v
 }
 
 /* Deep in an umbra, where a march may miss the deepest place of what hides the sun. */
-static void a_sun_behind_walls_is_as_dark_for_one_point_as_for_many(void **state) {
-    (void)state;
+TEST(a_sun_behind_walls_is_as_dark_for_one_point_as_for_many) {
     static truth_solid walls[] = {
         {.shape = TRUTH_BOX, .center = {0.0, -0.1, 0.0}, .half = {2.5, 0.1, 2.5}},
         {.shape = TRUTH_BOX,
@@ -135,8 +126,7 @@ static void a_sun_behind_walls_is_as_dark_for_one_point_as_for_many(void **state
 
 /* Lamps of which single points saw more, or less, than blocks of them before: by up to 0.2 with `cone`, by
  * all of it with `hard`. */
-static void lamps_among_solids_are_as_bright_for_one_point_as_for_many(void **state) {
-    (void)state;
+TEST(lamps_among_solids_are_as_bright_for_one_point_as_for_many) {
     static const struct {
         uint64_t scene;
         double voxel, place[3], radius;
@@ -162,8 +152,7 @@ static void lamps_among_solids_are_as_bright_for_one_point_as_for_many(void **st
     }
 }
 
-static void ao_and_steps_of_chance_are_those_of_the_point(void **state) {
-    (void)state;
+TEST(ao_and_steps_of_chance_are_those_of_the_point) {
     uint64_t counter = 5;
     vsh_field *field = field_of(crowd(&counter, false), 0.05, 0.0);
     place_points(true);
@@ -182,11 +171,5 @@ static void ao_and_steps_of_chance_are_those_of_the_point(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_sun_that_the_horizon_cuts_is_as_bright_for_one_point_as_for_many),
-        cmocka_unit_test(a_sun_behind_walls_is_as_dark_for_one_point_as_for_many),
-        cmocka_unit_test(lamps_among_solids_are_as_bright_for_one_point_as_for_many),
-        cmocka_unit_test(ao_and_steps_of_chance_are_those_of_the_point),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,5 +1,6 @@
 /* Meshes that a texture cuts out: what rays meet of them. */
 #include "masked.h"
+#include "testing.h"
 
 #include "trace/embree.h"
 
@@ -16,8 +17,7 @@ static bool blocked(const vsh_triangles *triangles, const double from[3], const 
 
 /* --- shadows and AO */
 
-static void a_masked_card_casts_the_shadow_of_its_disc(void **state) {
-    (void)state;
+TEST(a_masked_card_casts_the_shadow_of_its_disc) {
     card *c = malloc(sizeof *c);
     make_card(c, 1.0f);
     vsh_triangles *triangles = traced_of(&c->mesh, 1);
@@ -42,8 +42,7 @@ static void a_masked_card_casts_the_shadow_of_its_disc(void **state) {
     free(c);
 }
 
-static void soft_shadows_and_ao_are_those_of_the_disc_as_triangles(void **state) {
-    (void)state;
+TEST(soft_shadows_and_ao_are_those_of_the_disc_as_triangles) {
     enum { POINTS = 200, RAYS = 1024 };
     card *c = malloc(sizeof *c);
     fan *f = malloc(sizeof *f);
@@ -69,7 +68,7 @@ static void soft_shadows_and_ao_are_those_of_the_disc_as_triangles(void **state)
                                                         RAYS, NULL, value[k], NULL)
                                          : vsh_trace_shadow(all[k], NULL, POINTS, positions, normals, 0.0,
                                                             &light, RAYS, NULL, value[k], NULL);
-            assert_int_equal(result, VSH_OK);
+            assert_ok(result);
         }
         double worst = 0.0, other = 0.0;
         for (size_t i = 0; i < POINTS; ++i) {
@@ -88,8 +87,7 @@ static void soft_shadows_and_ao_are_those_of_the_disc_as_triangles(void **state)
 
 /* --- lookups */
 
-static void rays_see_wraps_transforms_cutoff_and_base_factor(void **state) {
-    (void)state;
+TEST(rays_see_wraps_transforms_cutoff_and_base_factor) {
     uint32_t seed = 1;
     int through = 0, met = 0;
     for (int i = 0; i < 18; ++i) {
@@ -120,8 +118,7 @@ static void rays_see_wraps_transforms_cutoff_and_base_factor(void **state) {
 
 /* --- packets */
 
-static void a_ray_sees_the_same_alone_and_in_any_packet(void **state) {
-    (void)state;
+TEST(a_ray_sees_the_same_alone_and_in_any_packet) {
     enum { RAYS = 4096 };
     card *c = malloc(sizeof *c);
     make_card(c, 1.0f);
@@ -159,8 +156,7 @@ static void a_ray_sees_the_same_alone_and_in_any_packet(void **state) {
 
 /* --- what else is made of triangles */
 
-static void no_beam_is_cut_by_what_is_masked_or_one_sided(void **state) {
-    (void)state;
+TEST(no_beam_is_cut_by_what_is_masked_or_one_sided) {
     /* over both triangles, and within one */
     const vshi_sheet_beam beams[2] = {{{0.02, 0.0, 0.01}, {0.0, 1.0, 0.0}, 0.05, 0.05, INFINITY},
                                       {{0.5, 0.0, 0.3}, {0.0, 1.0, 0.0}, 0.05, 0.05, INFINITY}};
@@ -180,21 +176,14 @@ static void no_beam_is_cut_by_what_is_masked_or_one_sided(void **state) {
     free(c);
 }
 
-/* A box from -1 to 1. */
-static vsh_mesh box_mesh(void) {
-    static const float corners[8][3] = {{-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}, {1, 1, -1},
-                                        {-1, -1, 1},  {1, -1, 1},  {-1, 1, 1},  {1, 1, 1}};
-    static const uint32_t sides[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
-                                       2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
-    return (vsh_mesh){.positions = corners[0], .indices = sides, .vertex_count = 8, .triangle_count = 12};
-}
+static const double BOX_LOW[3] = {-1, -1, -1}, BOX_HIGH[3] = {1, 1, 1};
 
-static void a_masked_box_holds_nothing(void **state) {
-    (void)state;
+TEST(a_masked_box_holds_nothing) {
     static const float uvs[16];
     const uint8_t half[2] = {255, 0};
     const vsh_alpha_mask mask = mask_of(half, 2, 1);
-    vsh_mesh box = box_mesh();
+    float corners[24];
+    vsh_mesh box = box_mesh(corners, BOX_LOW, BOX_HIGH);
     for (int masked = 0; masked < 2; ++masked) {
         box.mask = masked ? &mask : NULL;
         box.mask_uvs = uvs;
@@ -205,9 +194,9 @@ static void a_masked_box_holds_nothing(void **state) {
     }
 }
 
-static void a_one_sided_box_is_as_solid_as_any(void **state) {
-    (void)state;
-    vsh_mesh box = box_mesh();
+TEST(a_one_sided_box_is_as_solid_as_any) {
+    float corners[24];
+    vsh_mesh box = box_mesh(corners, BOX_LOW, BOX_HIGH);
     box.one_sided = 1;
     vsh_triangles *triangles = traced_of(&box, 1);
     assert_true(vshi_triangles_have_solids(triangles));
@@ -224,8 +213,7 @@ static void a_one_sided_box_is_as_solid_as_any(void **state) {
     vsh_triangles_free(triangles);
 }
 
-static void light_on_the_back_of_a_one_sided_face_comes_through(void **state) {
-    (void)state;
+TEST(light_on_the_back_of_a_one_sided_face_comes_through) {
     card *c = malloc(sizeof *c);
     make_card(c, 1.0f);
     for (int i = 0; i < 8; ++i) {
@@ -249,57 +237,31 @@ static void light_on_the_back_of_a_one_sided_face_comes_through(void **state) {
 
 /* --- what is refused */
 
-static void masks_that_are_none_are_refused(void **state) {
-    (void)state;
+TEST(masks_that_are_none_are_refused) {
     card *c = malloc(sizeof *c);
+    make_card(c, 0.0f);
+    vsh_alpha_mask bad[8];
     for (int i = 0; i < 8; ++i) {
-        make_card(c, 0.0f);
-        switch (i) {
-        case 0:
-            c->mask.alpha = NULL;
-            break;
-        case 1:
-            c->mask.width = 0;
-            break;
-        case 2:
-            c->mask.height = 1 << 16;
-            break;
-        case 3:
-            c->mask.wrap[1] = 3;
-            break;
-        case 4:
-            c->mask.uv_transform[5] = NAN;
-            break;
-        case 5:
-            c->mask.alpha_cutoff = -0.1;
-            break;
-        case 6:
-            c->mask.base_alpha = 1.5;
-            break;
-        default:
-            c->mesh.mask_uvs = NULL;
-            break;
-        }
+        bad[i] = c->mask;
+    }
+    bad[0].alpha = NULL;
+    bad[1].width = 0;
+    bad[2].height = 1 << 16;
+    bad[3].wrap[1] = 3;
+    bad[4].uv_transform[5] = NAN;
+    bad[5].alpha_cutoff = -0.1;
+    bad[6].base_alpha = 1.5;
+    for (int i = 0; i < 8; ++i) {
+        c->mesh.mask = &bad[i];
+        c->mesh.mask_uvs = i < 7 ? c->uvs : NULL;
         vsh_triangles *triangles = NULL;
-        vsh_error error = {VSH_OK, ""};
-        assert_int_equal(vsh_triangles_create(&c->mesh, 1, NULL, &triangles, &error), VSH_ERROR_ARGUMENT);
-        assert_non_null(strstr(error.message, "'card'"));
+        assert_fails(vsh_triangles_create(&c->mesh, 1, NULL, &triangles, &failure), VSH_ERROR_ARGUMENT,
+                     "'card'");
         assert_null(triangles);
     }
     free(c);
 }
 
 int main(void) {
-    const struct CMUnitTest traced[] = {
-        cmocka_unit_test(a_masked_card_casts_the_shadow_of_its_disc),
-        cmocka_unit_test(soft_shadows_and_ao_are_those_of_the_disc_as_triangles),
-        cmocka_unit_test(rays_see_wraps_transforms_cutoff_and_base_factor),
-        cmocka_unit_test(a_ray_sees_the_same_alone_and_in_any_packet),
-        cmocka_unit_test(no_beam_is_cut_by_what_is_masked_or_one_sided),
-        cmocka_unit_test(a_masked_box_holds_nothing),
-        cmocka_unit_test(a_one_sided_box_is_as_solid_as_any),
-        cmocka_unit_test(light_on_the_back_of_a_one_sided_face_comes_through),
-        cmocka_unit_test(masks_that_are_none_are_refused),
-    };
-    return vsh_triangles_available() ? cmocka_run_group_tests(traced, NULL, NULL) : 0;
+    return vsh_triangles_available() ? run_all_tests(NULL, NULL) : 0;
 }

@@ -1,13 +1,10 @@
 /* What is known of a texture's holes over a triangle, and the pieces that voxels are made of. */
 #include "masked.h"
+#include "testing.h"
 
 #include "mesh/alpha_mask.h"
 
-#include <vdbshade/field.h>
-#include <vdbshade/occluders.h>
-
-static void what_is_said_of_a_triangle_holds_all_over_it(void **state) {
-    (void)state;
+TEST(what_is_said_of_a_triangle_holds_all_over_it) {
     uint32_t seed = 7;
     int told[3] = {0};
     for (int i = 0; i < 18 * 40; ++i) {
@@ -18,7 +15,7 @@ static void what_is_said_of_a_triangle_holds_all_over_it(void **state) {
             alpha[k] = k % 4 == 0 ? alpha[k] : i % 2 == 0 ? 255 : 0;
         }
         vshi_mask_table table;
-        assert_int_equal(vshi_mask_table_create(&mask, NULL, &table, NULL), VSH_OK);
+        assert_ok(vshi_mask_table_create(&mask, NULL, &table, &failure));
         for (int k = 0; k < 20; ++k) {
             float uvs[3][2];
             vshi_mask_place places[3];
@@ -47,8 +44,7 @@ static void what_is_said_of_a_triangle_holds_all_over_it(void **state) {
     assert_true(told[VSHI_MASK_CLEAR] > 200 && told[VSHI_MASK_OPAQUE] > 200 && told[VSHI_MASK_MIXED] > 1000);
 }
 
-static void what_lies_beyond_numbers_is_opaque(void **state) {
-    (void)state;
+TEST(what_lies_beyond_numbers_is_opaque) {
     const uint8_t clear[1] = {0};
     const float values[] = {NAN, INFINITY, -INFINITY, 3e38f, -3e38f, 1e20f};
     for (int wrapped = VSH_WRAP_REPEAT; wrapped <= VSH_WRAP_CLAMP; ++wrapped) {
@@ -59,22 +55,21 @@ static void what_lies_beyond_numbers_is_opaque(void **state) {
             assert_int_equal(vshi_alpha_mask_opaque(&mask, at), !isfinite(values[i]));
             const vshi_mask_place corners[3] = {at, {0.0, 0.0}, {1.0, 0.0}};
             vshi_mask_table table;
-            assert_int_equal(vshi_mask_table_create(&mask, NULL, &table, NULL), VSH_OK);
+            assert_ok(vshi_mask_table_create(&mask, NULL, &table, &failure));
             assert_true(vshi_mask_table_cover(&table, corners) != VSHI_MASK_CLEAR || isfinite(values[i]));
             vshi_mask_table_free(&table);
         }
     }
 }
 
-static void pieces_are_the_opaque_part_to_within_their_size(void **state) {
-    (void)state;
+TEST(pieces_are_the_opaque_part_to_within_their_size) {
     card *c = malloc(sizeof *c);
     make_card(c, 1.0f);
     const vsh_run run = vsh_run_default();
     double before = 0.0;
     for (double size = 0.2; size > 0.01; size *= 0.5) {
         vshi_mask_pieces pieces;
-        assert_int_equal(vshi_mask_pieces_cut(&c->mesh, size, &run, &pieces, NULL), VSH_OK);
+        assert_ok(vshi_mask_pieces_cut(&c->mesh, size, &run, &pieces, &failure));
         double area = 0.0, farthest = 0.0;
         for (size_t i = 0; i < pieces.count; ++i) {
             vshi_vec p[3];
@@ -95,22 +90,18 @@ static void pieces_are_the_opaque_part_to_within_their_size(void **state) {
     free(c);
 }
 
-static void pieces_keep_to_the_memory_limit(void **state) {
-    (void)state;
+TEST(pieces_keep_to_the_memory_limit) {
     card *c = malloc(sizeof *c);
     make_card(c, 1.0f);
     vsh_run run = vsh_run_default();
     run.memory_limit = 1 << 20;
     vshi_mask_pieces pieces;
-    vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vshi_mask_pieces_cut(&c->mesh, 1e-9, &run, &pieces, &error), VSH_ERROR_LIMIT);
-    assert_non_null(strstr(error.message, "'card'"));
+    assert_fails(vshi_mask_pieces_cut(&c->mesh, 1e-9, &run, &pieces, &failure), VSH_ERROR_LIMIT, "'card'");
     vshi_mask_pieces_free(&pieces);
     free(c);
 }
 
-static void voxels_hold_the_disc_and_not_the_card(void **state) {
-    (void)state;
+TEST(voxels_hold_the_disc_and_not_the_card) {
     card *c = malloc(sizeof *c);
     fan *f = malloc(sizeof *f);
     make_card(c, 0.0f);
@@ -120,12 +111,8 @@ static void voxels_hold_the_disc_and_not_the_card(void **state) {
     vsh_occluders_options options = vsh_occluders_options_default();
     options.triangles = 0;
     options.grid.voxel_size = voxel;
-    vsh_error error = {VSH_OK, ""};
     for (int i = 0; i < 2; ++i) {
-        if (vsh_occluders_create(i == 0 ? &c->mesh : &f->mesh, 1, &options, NULL, &made[i], &error) !=
-            VSH_OK) {
-            fail_msg("%s", error.message);
-        }
+        assert_ok(vsh_occluders_create(i == 0 ? &c->mesh : &f->mesh, 1, &options, NULL, &made[i], &failure));
     }
     vsh_occluder_parts cut, disc;
     vsh_occluders_get_parts(made[0], &cut);
@@ -156,12 +143,5 @@ static void voxels_hold_the_disc_and_not_the_card(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_said_of_a_triangle_holds_all_over_it),
-        cmocka_unit_test(what_lies_beyond_numbers_is_opaque),
-        cmocka_unit_test(pieces_are_the_opaque_part_to_within_their_size),
-        cmocka_unit_test(pieces_keep_to_the_memory_limit),
-        cmocka_unit_test(voxels_hold_the_disc_and_not_the_card),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

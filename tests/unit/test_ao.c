@@ -1,9 +1,7 @@
 /* Ambient occlusion against closed forms and ray-traced truth. */
 #include "previews.h"
 #include "shading.h"
-
-#include <stdio.h>
-#include <stdlib.h>
+#include "testing.h"
 
 static const float UP[3] = {0.0f, 1.0f, 0.0f};
 
@@ -15,11 +13,7 @@ static vsh_shade_stats ao_of(const vsh_field *field, int32_t method, int32_t con
     options.ao_distance = distance;
     const vsh_points points = {count, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_ao(occluders_of(field), &points, &options, NULL, ao, NULL, NULL, &stats, &error) !=
-        VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_shade_ao(occluders_of(field), &points, &options, NULL, ao, NULL, NULL, &stats, &failure));
     return stats;
 }
 
@@ -30,8 +24,7 @@ static float ao_at(const vsh_field *field, int32_t method, int32_t cones, double
     return ao;
 }
 
-static void an_open_plate_is_exactly_1(void **state) {
-    (void)state;
+TEST(an_open_plate_is_exactly_1) {
     const truth_solid plate = {TRUTH_BOX, {0.0, -0.517, 0.0}, {4.0, 0.517, 4.0}, 0.0, 0.0};
     vsh_field *field = field_of((truth_scene){&plate, 1}, 0.04, 0.0);
     uint64_t counter = 1;
@@ -55,8 +48,7 @@ static void an_open_plate_is_exactly_1(void **state) {
     vsh_field_free(field);
 }
 
-static void a_wall_hides_half_of_the_sky_from_its_foot(void **state) {
-    (void)state;
+TEST(a_wall_hides_half_of_the_sky_from_its_foot) {
     const truth_solid solids[] = {{TRUTH_BOX, {0.0, -0.5, 0.0}, {3.0, 0.5, 3.0}, 0.0, 0.0},
                                   {TRUTH_BOX, {-1.0, 1.0, 0.0}, {1.0, 2.0, 3.0}, 0.0, 0.0}};
     vsh_field *field = field_of((truth_scene){solids, 2}, 0.02, 0.0);
@@ -72,8 +64,7 @@ static void a_wall_hides_half_of_the_sky_from_its_foot(void **state) {
 }
 
 /* Mean and largest error over points around a sphere that rests on a plate, or hovers over it. */
-static void under_a_sphere_ao_is_near_the_truth(void **state) {
-    (void)state;
+TEST(under_a_sphere_ao_is_near_the_truth) {
     const double heights[] = {0.5, 0.8, 1.2};
     for (int i = 0; i < 3; ++i) {
         const truth_solid solids[] = {{TRUTH_BOX, {0.0, -0.25, 0.0}, {3.0, 0.25, 3.0}, 0.0, 0.0},
@@ -106,8 +97,7 @@ static void under_a_sphere_ao_is_near_the_truth(void **state) {
 
 /* A cone's ball at its end reaches farther than its centre by the sine of its half angle; the taps ask for
  * twice the distance along the normal. */
-static void what_is_beyond_the_distance_hides_nothing(void **state) {
-    (void)state;
+TEST(what_is_beyond_the_distance_hides_nothing) {
     const truth_solid solids[] = {{TRUTH_BOX, {0.0, -0.25, 0.0}, {3.0, 0.25, 3.0}, 0.0, 0.0},
                                   {TRUTH_BOX, {0.0, 1.5, 0.0}, {3.0, 0.5, 3.0}, 0.0, 0.0}};
     vsh_field *field = field_of((truth_scene){solids, 2}, 0.04, 0.0); /* a ceiling, 1 over the floor */
@@ -122,8 +112,7 @@ static void what_is_beyond_the_distance_hides_nothing(void **state) {
     vsh_field_free(field);
 }
 
-static void a_closed_cavity_is_dark(void **state) {
-    (void)state;
+TEST(a_closed_cavity_is_dark) {
     vsh_field *field = hollow_box(0.04, 2.0);
     uint64_t counter = 2;
     float brightest[2] = {0.0f, 0.0f};
@@ -141,8 +130,7 @@ static void a_closed_cavity_is_dark(void **state) {
 }
 
 /* No cone finds a wall deep that is thinner than it is wide, but none finds it open either. */
-static void a_room_of_thin_walls_is_dark(void **state) {
-    (void)state;
+TEST(a_room_of_thin_walls_is_dark) {
     const double walls[] = {0.1, 0.2, 0.5};
     const double bounds[3][2] = {{0.12, 0.03}, {0.02, 0.001}, {0.001, 0.001}};
     for (int w = 0; w < 3; ++w) {
@@ -162,8 +150,7 @@ static void a_room_of_thin_walls_is_dark(void **state) {
 }
 
 /* None of these scenes took part in the fit of the cones' table. */
-static void on_the_seeds_floor_cones_are_near_the_truth(void **state) {
-    (void)state;
+TEST(on_the_seeds_floor_cones_are_near_the_truth) {
     enum { COUNT = 1500 };
     const double normal[3] = {0.0, 1.0, 0.0}, voxel = 0.02;
     const int32_t cones[] = {4, 8, 16, 64};
@@ -196,8 +183,7 @@ static void on_the_seeds_floor_cones_are_near_the_truth(void **state) {
     vsh_field_free(field);
 }
 
-static void farther_distances_hide_more(void **state) {
-    (void)state;
+TEST(farther_distances_hide_more) {
     vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
     uint64_t counter = 3;
     float rise = 0.0f;
@@ -215,8 +201,7 @@ static void farther_distances_hide_more(void **state) {
     vsh_field_free(field);
 }
 
-static void bad_points_are_nan_and_counted_and_others_are_not_touched(void **state) {
-    (void)state;
+TEST(bad_points_are_nan_and_counted_and_others_are_not_touched) {
     vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
     enum { COUNT = 7 };
     const double nan = (double)NAN, inf = (double)INFINITY;
@@ -237,84 +222,38 @@ static void bad_points_are_nan_and_counted_and_others_are_not_touched(void **sta
     vsh_field_free(field);
 }
 
-static void threads_and_the_order_of_points_do_not_show(void **state) {
-    (void)state;
-    enum { COUNT = 48 * 48 };
-    const size_t size = 64;
-    static double positions[3 * 4096];
-    static float normals[3 * 4096], first[4096], other[4096];
-    floor_texels(size, positions, normals);
-    vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
-    for (int32_t method = VSH_AO_TAPS; method <= VSH_AO_CONES; ++method) {
-        vsh_shade_options options = preview_options();
-        options.ao_method = method;
-        options.ao_cones = 7; /* pieces of the kernel's lanes end in the middle of points */
-        const vsh_points points = {4096, positions, normals, NULL};
-        const int32_t threads[] = {1, 2, 5};
-        vsh_shade_stats stats[3];
-        for (int i = 0; i < 3; ++i) {
-            vsh_run run = vsh_run_default();
-            run.threads = threads[i];
-            stats[i] = vsh_shade_stats_zero();
-            assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &options, &run,
-                                          i == 0 ? first : other, NULL, NULL, &stats[i], NULL),
-                             VSH_OK);
-            if (i > 0) {
-                assert_memory_equal(first, other, sizeof first);
-                assert_memory_equal(&stats[0], &stats[i], sizeof stats[0]);
-            }
-        }
-        for (size_t i = 0; i < COUNT; i += 97) { /* one at a time */
-            const vsh_points one = {1, positions + 3 * i, normals + 3 * i, NULL};
-            float ao = -1.0f;
-            assert_int_equal(
-                vsh_shade_ao(occluders_of(field), &one, &options, NULL, &ao, NULL, NULL, NULL, NULL), VSH_OK);
-            assert_int_equal(bits_of(ao), bits_of(first[i]));
-        }
-    }
-    vsh_field_free(field);
-}
-
-static void options_out_of_range_are_named(void **state) {
-    (void)state;
+TEST(options_out_of_range_are_named) {
     vsh_field *field = field_of(truth_seeds(), 0.2, 1.0);
     const double p[3] = {0.0, 0.001, 2.0};
     const vsh_points points = {1, p, UP, NULL}, bare = {1, p, NULL, NULL};
     float ao = -1.0f;
-    vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vsh_shade_ao(occluders_of(field), &bare, NULL, NULL, &ao, NULL, NULL, NULL, &error),
-                     VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "normals"));
+    assert_fails(vsh_shade_ao(occluders_of(field), &bare, NULL, NULL, &ao, NULL, NULL, NULL, &failure),
+                 VSH_ERROR_ARGUMENT, "normals");
     const int32_t counts[] = {0, -1, 257};
     for (int i = 0; i < 3; ++i) {
         vsh_shade_options options = preview_options();
         options.ao_cones = counts[i];
-        assert_int_equal(
-            vsh_shade_ao(occluders_of(field), &points, &options, NULL, &ao, NULL, NULL, NULL, &error),
-            VSH_ERROR_ARGUMENT);
-        assert_non_null(strstr(error.message, "ao_cones"));
+        assert_fails(
+            vsh_shade_ao(occluders_of(field), &points, &options, NULL, &ao, NULL, NULL, NULL, &failure),
+            VSH_ERROR_ARGUMENT, "ao_cones");
     }
     const double distances[] = {0.0, -1.0, (double)NAN, (double)INFINITY};
     for (int i = 0; i < 4; ++i) {
         vsh_shade_options options = preview_options();
         options.ao_distance = distances[i];
-        assert_int_equal(
-            vsh_shade_ao(occluders_of(field), &points, &options, NULL, &ao, NULL, NULL, NULL, &error),
-            VSH_ERROR_ARGUMENT);
-        assert_non_null(strstr(error.message, "ao_distance"));
+        assert_fails(
+            vsh_shade_ao(occluders_of(field), &points, &options, NULL, &ao, NULL, NULL, NULL, &failure),
+            VSH_ERROR_ARGUMENT, "ao_distance");
     }
     vsh_shade_options options = preview_options();
     options.ao_method = VSH_AO_AUTO + 1;
-    assert_int_equal(
-        vsh_shade_ao(occluders_of(field), &points, &options, NULL, &ao, NULL, NULL, NULL, &error),
-        VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "ao_method"));
+    assert_fails(vsh_shade_ao(occluders_of(field), &points, &options, NULL, &ao, NULL, NULL, NULL, &failure),
+                 VSH_ERROR_ARGUMENT, "ao_method");
     assert_true(ao == -1.0f);
     vsh_field_free(field);
 }
 
-static void no_points_need_no_normals(void **state) {
-    (void)state;
+TEST(no_points_need_no_normals) {
     const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
     vsh_field *field = field_of((truth_scene){&ball, 1}, 0.2, 0.0);
     const double position[3] = {0.0, 2.0, 0.0};
@@ -331,19 +270,5 @@ static void no_points_need_no_normals(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(an_open_plate_is_exactly_1),
-        cmocka_unit_test(no_points_need_no_normals),
-        cmocka_unit_test(a_wall_hides_half_of_the_sky_from_its_foot),
-        cmocka_unit_test(under_a_sphere_ao_is_near_the_truth),
-        cmocka_unit_test(what_is_beyond_the_distance_hides_nothing),
-        cmocka_unit_test(a_closed_cavity_is_dark),
-        cmocka_unit_test(a_room_of_thin_walls_is_dark),
-        cmocka_unit_test(on_the_seeds_floor_cones_are_near_the_truth),
-        cmocka_unit_test(farther_distances_hide_more),
-        cmocka_unit_test(bad_points_are_nan_and_counted_and_others_are_not_touched),
-        cmocka_unit_test(threads_and_the_order_of_points_do_not_show),
-        cmocka_unit_test(options_out_of_range_are_named),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -2,9 +2,7 @@
  * nothing to test. */
 #include "previews.h"
 #include "shading.h"
-
-#include <vdbshade/grid.h>
-#include <vdbshade/trace.h>
+#include "testing.h"
 
 enum { SOLIDS = 5, TEXELS = 1000 };
 
@@ -18,45 +16,24 @@ static const truth_solid SCENE[SOLIDS] = {{TRUTH_BOX, {0.0, -0.5, 0.0}, {3.0, 0.
                                           {TRUTH_BOX, {0.5, 1.0, 1.0}, {0.04, 1.0, 0.04}, 0.0, 0.0},
                                           {TRUTH_BOX, {1.4, 0.3, -0.6}, {0.3, 0.3, 0.5}, 0.0, 0.0}};
 
-typedef struct box_mesh {
-    float positions[24];
-    uint32_t indices[36];
-} box_mesh;
-
-static vsh_mesh mesh_of(const truth_solid *box, box_mesh *mesh) {
-    static const uint32_t indices[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
-                                         2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
-    memcpy(mesh->indices, indices, sizeof indices);
-    for (int corner = 0; corner < 8; ++corner) {
-        for (int axis = 0; axis < 3; ++axis) {
-            const double side = (corner >> axis & 1) != 0 ? box->half[axis] : -box->half[axis];
-            mesh->positions[3 * corner + axis] = (float)(box->center[axis] + side);
-        }
-    }
-    return (vsh_mesh){
-        .positions = mesh->positions, .indices = mesh->indices, .vertex_count = 8, .triangle_count = 12};
-}
-
 typedef struct traced_scene {
     vsh_field *field;
     vsh_triangles *triangles;
 } traced_scene;
 
 static traced_scene scene_of(size_t solids) {
-    static box_mesh boxes[SOLIDS];
+    static float corners[SOLIDS][24];
     vsh_mesh meshes[SOLIDS];
     for (size_t i = 0; i < solids; ++i) {
-        meshes[i] = mesh_of(&SCENE[i], &boxes[i]);
+        const double *c = SCENE[i].center, *h = SCENE[i].half;
+        meshes[i] = box_mesh(corners[i], (double[]){c[0] - h[0], c[1] - h[1], c[2] - h[2]},
+                             (double[]){c[0] + h[0], c[1] + h[1], c[2] + h[2]});
     }
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = 0.04;
+    const vsh_grid_options options = with_voxel(0.04);
     vsh_grid *grid = NULL;
-    vsh_error error = {VSH_OK, ""};
     traced_scene scene = {NULL, NULL};
-    if (vsh_grid_from_meshes(meshes, solids, &options, NULL, &grid, &error) != VSH_OK ||
-        vsh_triangles_create(meshes, solids, NULL, &scene.triangles, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_grid_from_meshes(meshes, solids, &options, NULL, &grid, &failure));
+    assert_ok(vsh_triangles_create(meshes, solids, NULL, &scene.triangles, &failure));
     scene.field = field_of_grid(grid, 0.0);
     return scene;
 }
@@ -88,25 +65,22 @@ static void place(size_t solids, double *positions, float *normals) {
     }
 }
 
-static void an_open_plate_is_exactly_1(void **state) {
-    (void)state;
+TEST(an_open_plate_is_exactly_1) {
     traced_scene scene = scene_of(1);
     static double positions[3 * TEXELS];
     static float normals[3 * TEXELS], ao[TEXELS];
     place(1, positions, normals);
     const vsh_points points = {TEXELS, positions, normals, NULL};
     const vsh_shade_options options = options_of(0.05);
-    assert_int_equal(vsh_shade_ao(occluders_traced(scene.field, scene.triangles), &points, &options, NULL, ao,
-                                  NULL, NULL, NULL, NULL),
-                     VSH_OK);
+    assert_ok(vsh_shade_ao(occluders_traced(scene.field, scene.triangles), &points, &options, NULL, ao, NULL,
+                           NULL, NULL, &failure));
     for (size_t i = 0; i < TEXELS; ++i) {
         assert_true(ao[i] == 1.0f);
     }
     free_scene(&scene);
 }
 
-static void the_error_left_is_what_was_asked_for_and_said(void **state) {
-    (void)state;
+TEST(the_error_left_is_what_was_asked_for_and_said) {
     traced_scene scene = scene_of(SOLIDS);
     static double positions[3 * TEXELS];
     static float normals[3 * TEXELS], ao[TEXELS], deviation[TEXELS], other[TEXELS];
@@ -121,9 +95,8 @@ static void the_error_left_is_what_was_asked_for_and_said(void **state) {
     for (int e = 0; e < 3; ++e) {
         const vsh_shade_options options = options_of(errors[e]);
         vsh_shade_stats stats = vsh_shade_stats_zero();
-        assert_int_equal(vsh_shade_ao(occluders_traced(scene.field, scene.triangles), &points, &options, NULL,
-                                      ao, deviation, NULL, &stats, NULL),
-                         VSH_OK);
+        assert_ok(vsh_shade_ao(occluders_traced(scene.field, scene.triangles), &points, &options, NULL, ao,
+                               deviation, NULL, &stats, &failure));
         double squares = 0.0, bias = 0.0, said = 0.0;
         for (size_t i = 0; i < TEXELS; ++i) {
             const double error = (double)ao[i] - truth[i];
@@ -139,37 +112,27 @@ static void the_error_left_is_what_was_asked_for_and_said(void **state) {
         assert_int_equal(stats.marches, 0);
         const int32_t threads[] = {2, 5};
         for (int t = 0; t < 2; ++t) {
-            vsh_run run = vsh_run_default();
-            run.threads = threads[t];
-            assert_int_equal(vsh_shade_ao(occluders_traced(scene.field, scene.triangles), &points, &options,
-                                          &run, other, NULL, NULL, NULL, NULL),
-                             VSH_OK);
+            const vsh_run run = run_on(threads[t]);
+            assert_ok(vsh_shade_ao(occluders_traced(scene.field, scene.triangles), &points, &options, &run,
+                                   other, NULL, NULL, NULL, &failure));
             assert_memory_equal(ao, other, sizeof ao);
         }
     }
     free_scene(&scene);
 }
 
-static void it_needs_triangles(void **state) {
-    (void)state;
+TEST(it_needs_triangles) {
     traced_scene scene = scene_of(1);
     vsh_shade_options options = options_of(0.05);
     const double at[3] = {0.0, 0.0, 0.0};
     const vsh_points points = {1, at, UP, NULL};
     float ao = -1.0f;
-    vsh_error error = {VSH_OK, ""};
-    assert_int_equal(
-        vsh_shade_ao(occluders_of(scene.field), &points, &options, NULL, &ao, NULL, NULL, NULL, &error),
-        VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "triangles"));
+    assert_fails(
+        vsh_shade_ao(occluders_of(scene.field), &points, &options, NULL, &ao, NULL, NULL, NULL, &failure),
+        VSH_ERROR_ARGUMENT, "triangles");
     free_scene(&scene);
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(an_open_plate_is_exactly_1),
-        cmocka_unit_test(the_error_left_is_what_was_asked_for_and_said),
-        cmocka_unit_test(it_needs_triangles),
-    };
-    return vsh_triangles_available() ? cmocka_run_group_tests(tests, NULL, NULL) : 0;
+    return vsh_triangles_available() ? run_all_tests(NULL, NULL) : 0;
 }

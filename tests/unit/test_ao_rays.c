@@ -1,10 +1,8 @@
 /* Ambient occlusion by rays: fixed numbers of them, and until an error is reached. */
 #include "previews.h"
 #include "shading.h"
+#include "testing.h"
 #include "truth/metrics.h"
-
-#include <stdio.h>
-#include <stdlib.h>
 
 enum { TEXELS = 1500 };
 
@@ -22,11 +20,8 @@ static vsh_shade_stats shade(const vsh_field *field, const vsh_shade_options *op
                              const double *positions, const float *normals, float *ao, float *deviation) {
     const vsh_points points = {count, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_ao(occluders_of(field), &points, options, NULL, ao, deviation, NULL, &stats, &error) !=
-        VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(
+        vsh_shade_ao(occluders_of(field), &points, options, NULL, ao, deviation, NULL, &stats, &failure));
     return stats;
 }
 
@@ -74,8 +69,7 @@ static double rmse(const float *values, const float *truth, double *bias) {
     return sqrt(squares / TEXELS);
 }
 
-static void an_open_plate_is_exactly_1(void **state) {
-    (void)state;
+TEST(an_open_plate_is_exactly_1) {
     const truth_solid plate = {TRUTH_BOX, {0.0, -0.517, 0.0}, {4.0, 0.517, 4.0}, 0.0, 0.0};
     vsh_field *field = field_of((truth_scene){&plate, 1}, 0.04, 0.0);
     uint64_t counter = 1;
@@ -105,8 +99,7 @@ static void an_open_plate_is_exactly_1(void **state) {
     vsh_field_free(field);
 }
 
-static void a_closed_room_is_dark_however_thin_its_walls(void **state) {
-    (void)state;
+TEST(a_closed_room_is_dark_however_thin_its_walls) {
     const double walls[] = {0.1, 0.5};
     for (int w = 0; w < 2; ++w) {
         vsh_field *field = hollow_box(0.04, walls[w]);
@@ -124,8 +117,7 @@ static void a_closed_room_is_dark_however_thin_its_walls(void **state) {
     }
 }
 
-static void more_rays_come_nearer_to_the_truth(void **state) {
-    (void)state;
+TEST(more_rays_come_nearer_to_the_truth) {
     const floor_points *p = seeds();
     const double bounds[3][3] = {{0.045, 0.018, 0.0085}, {0.066, 0.033, 0.017}, {0.052, 0.022, 0.011}};
     for (int32_t sampler = VSH_SAMPLER_SOBOL; sampler <= VSH_SAMPLER_BLUE; ++sampler) {
@@ -146,8 +138,7 @@ static void more_rays_come_nearer_to_the_truth(void **state) {
 }
 
 /* Frames are independent: the mean of four of them is nearer than each. */
-static void frames_may_be_averaged(void **state) {
-    (void)state;
+TEST(frames_may_be_averaged) {
     const floor_points *p = seeds();
     for (int32_t sampler = VSH_SAMPLER_SOBOL; sampler <= VSH_SAMPLER_BLUE; ++sampler) {
         static float ao[TEXELS], mean[TEXELS];
@@ -171,8 +162,7 @@ static void frames_may_be_averaged(void **state) {
     }
 }
 
-static void rays_that_agree_early_end_a_point(void **state) {
-    (void)state;
+TEST(rays_that_agree_early_end_a_point) {
     const floor_points *p = seeds();
     static float all[TEXELS], early[TEXELS];
     vsh_shade_options options = options_of(VSH_AO_RAYS, 64, DISTANCE);
@@ -191,8 +181,7 @@ static void rays_that_agree_early_end_a_point(void **state) {
 }
 
 /* Against many rays on the same field. */
-static void the_error_left_is_what_was_asked_for_and_said(void **state) {
-    (void)state;
+TEST(the_error_left_is_what_was_asked_for_and_said) {
     const floor_points *p = seeds();
     static float truth[TEXELS], ao[TEXELS], deviation[TEXELS];
     const vsh_shade_options many = options_of(VSH_AO_RAYS, 4096, DISTANCE);
@@ -224,8 +213,7 @@ static void the_error_left_is_what_was_asked_for_and_said(void **state) {
     }
 }
 
-static void rays_end_the_refinement_where_the_error_does_not(void **state) {
-    (void)state;
+TEST(rays_end_the_refinement_where_the_error_does_not) {
     const floor_points *p = seeds();
     static float ao[TEXELS], same[TEXELS], deviation[TEXELS];
     vsh_shade_options options = options_of(VSH_AO_ADAPTIVE, 24, DISTANCE);
@@ -240,28 +228,26 @@ static void rays_end_the_refinement_where_the_error_does_not(void **state) {
     }
 }
 
-static void threads_and_the_order_of_points_do_not_show(void **state) {
-    (void)state;
+TEST(threads_and_the_order_of_points_do_not_show) {
     const floor_points *p = seeds();
     static float first[TEXELS], other[TEXELS];
     static uint32_t texels[TEXELS];
     for (uint32_t i = 0; i < TEXELS; ++i) {
         texels[i] = (i / 40) << 16 | i % 40;
     }
-    for (int32_t method = VSH_AO_RAYS; method <= VSH_AO_ADAPTIVE; ++method) {
+    for (int32_t method = VSH_AO_TAPS; method <= VSH_AO_ADAPTIVE; ++method) {
         for (int32_t sampler = VSH_SAMPLER_SOBOL; sampler <= VSH_SAMPLER_BLUE; ++sampler) {
             vsh_shade_options options = options_of(method, 60, DISTANCE);
+            options.ao_cones = 7; /* pieces of the kernel's lanes end in the middle of points */
             options.sampler = sampler;
             const vsh_points points = {TEXELS, p->positions, p->normals, texels};
             const int32_t threads[] = {1, 2, 5};
             vsh_shade_stats stats[3];
             for (int i = 0; i < 3; ++i) {
-                vsh_run run = vsh_run_default();
-                run.threads = threads[i];
+                const vsh_run run = run_on(threads[i]);
                 stats[i] = vsh_shade_stats_zero();
-                assert_int_equal(vsh_shade_ao(occluders_of(p->field), &points, &options, &run,
-                                              i == 0 ? first : other, NULL, NULL, &stats[i], NULL),
-                                 VSH_OK);
+                assert_ok(vsh_shade_ao(occluders_of(p->field), &points, &options, &run,
+                                       i == 0 ? first : other, NULL, NULL, &stats[i], &failure));
                 if (i > 0) {
                     assert_memory_equal(first, other, sizeof first);
                     assert_memory_equal(&stats[0], &stats[i], sizeof stats[0]);
@@ -270,17 +256,15 @@ static void threads_and_the_order_of_points_do_not_show(void **state) {
             for (size_t i = 0; i < TEXELS; i += 97) { /* one at a time: the texel tells points apart */
                 const vsh_points one = {1, p->positions + 3 * i, p->normals + 3 * i, &texels[i]};
                 float ao = -1.0f;
-                assert_int_equal(
-                    vsh_shade_ao(occluders_of(p->field), &one, &options, NULL, &ao, NULL, NULL, NULL, NULL),
-                    VSH_OK);
+                assert_ok(
+                    vsh_shade_ao(occluders_of(p->field), &one, &options, NULL, &ao, NULL, NULL, NULL, NULL));
                 assert_int_equal(bits_of(ao), bits_of(first[i]));
             }
         }
     }
 }
 
-static void bad_points_are_nan_with_nan_deviation(void **state) {
-    (void)state;
+TEST(bad_points_are_nan_with_nan_deviation) {
     const floor_points *p = seeds();
     const double positions[9] = {0.0, 0.001, 2.0, (double)NAN, 0.0, 0.0, 0.0, 0.001, 2.0};
     const float normals[9] = {0.0f, 1.0f, 0.0f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 0.0f};
@@ -297,8 +281,7 @@ static void bad_points_are_nan_with_nan_deviation(void **state) {
 
 /* A slatted roof over a floor: nothing but convex edges, which trilinear samples cut. What rays are to see
  * through it they see to a hundredth. */
-static void edges_hide_as_much_as_their_casters(void **state) {
-    (void)state;
+TEST(edges_hide_as_much_as_their_casters) {
     enum { SLATS = 7, COUNT = 40 };
     truth_solid slats[SLATS];
     for (int i = 0; i < SLATS; ++i) {
@@ -321,8 +304,7 @@ static void edges_hide_as_much_as_their_casters(void **state) {
     options.rays = 1024;
     options.ao_distance = 1.0;
     const vsh_points points = {COUNT, places, ups, NULL};
-    assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &options, NULL, open, NULL, NULL, NULL, NULL),
-                     VSH_OK);
+    assert_ok(vsh_shade_ao(occluders_of(field), &points, &options, NULL, open, NULL, NULL, NULL, &failure));
     const truth_metrics m = truth_compare(COUNT, open, expected, NULL);
     print_message("slats of 3.3 voxels: rmse %.4f, bias %+.4f\n", m.rmse, m.bias);
     assert_true(fabs(m.bias) < 0.01);
@@ -330,17 +312,5 @@ static void edges_hide_as_much_as_their_casters(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(edges_hide_as_much_as_their_casters),
-        cmocka_unit_test(an_open_plate_is_exactly_1),
-        cmocka_unit_test(a_closed_room_is_dark_however_thin_its_walls),
-        cmocka_unit_test(more_rays_come_nearer_to_the_truth),
-        cmocka_unit_test(frames_may_be_averaged),
-        cmocka_unit_test(rays_that_agree_early_end_a_point),
-        cmocka_unit_test(the_error_left_is_what_was_asked_for_and_said),
-        cmocka_unit_test(rays_end_the_refinement_where_the_error_does_not),
-        cmocka_unit_test(threads_and_the_order_of_points_do_not_show),
-        cmocka_unit_test(bad_points_are_nan_with_nan_deviation),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,5 +1,6 @@
 /* AO of a lightmap's texels by rays that they share, against rays that each shoots alone. Without Embree
  * there is nothing to test. */
+#include "testing.h"
 #include "texels_of.h"
 #include "traced.h"
 
@@ -19,7 +20,7 @@ typedef struct stage {
     quad floor, wall, patch;
     sphere ball;
     vsh_mesh receivers[RECEIVERS];
-    caster casters;
+    casting casters;
 } stage;
 
 static void set_vertex(quad *q, size_t v, double x, double y, double z, double s, double t) {
@@ -128,14 +129,10 @@ static baked *bake(const stage *s, how h) {
     baked *b = begin_baked(h.planes);
     vsh_charts *charts = create(s->receivers, receivers, options, NULL);
     const vsh_lightmap lightmap = planes_of(b);
-    vsh_run run = vsh_run_default();
-    run.threads = h.threads;
+    const vsh_run run = run_on(h.threads);
     vsh_bake_stats stats = vsh_bake_stats_zero();
-    vsh_error error = {0};
-    if (vsh_bake_lightmap(occluders_of_caster(&s->casters), charts, NULL, 0, &options.shade, &run, &lightmap,
-                          &stats, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_bake_lightmap(occluders_of_caster(&s->casters), charts, NULL, 0, &options.shade, &run,
+                                &lightmap, &stats, &failure));
     b->stats = stats.shade;
     vsh_charts_free(charts);
     return b;
@@ -166,7 +163,7 @@ static void assert_same(const baked *a, const baked *b) {
     assert_memory_equal(&a->stats, &b->stats, sizeof a->stats);
 }
 
-static void threads_change_no_bit(void **state) {
+TEST(threads_change_no_bit) {
     baked *one = bake(*state, (how){.spacing = 4, .max_error = 0.02, .padding = 2, .threads = 1});
     for (int32_t threads = 2; threads <= 8; ++threads) {
         baked *more = bake(*state, (how){.spacing = 4, .max_error = 0.02, .padding = 2, .threads = threads});
@@ -213,7 +210,7 @@ static judged judge(const baked *b, const baked *truth) {
 /* What a window's plane does not follow is in no deviation: here, where a texel is a twentieth of the AO
  * distance, errors are up to twice what is said of them; with texels a third as large, up to 1.5 times.
  */
-static void errors_are_below_those_asked_for_with_few_rays(void **state) {
+TEST(errors_are_below_those_asked_for_with_few_rays) {
     static const double errors[] = {0.05, 0.02, 0.01}, angles[] = {2.6, 1.8, 1.35};
     /* with 8 rays at first, whatever the error, RMSE is 0.0103 at 0.02 and 0.0068 at 0.01 */
     static const double most[] = {0.016, 0.0092, 0.0062};
@@ -246,7 +243,7 @@ static void errors_are_below_those_asked_for_with_few_rays(void **state) {
 }
 
 /* Compared with rays on the same field that no texels share. */
-static void marched_rays_are_shared_too(void **state) {
+TEST(marched_rays_are_shared_too) {
     baked *truth = bake(*state, (how){.spacing = 1, .max_error = 0.004, .marched = true}),
           *shared = bake(*state, (how){.spacing = 4, .max_error = 0.02, .marched = true}),
           *alone = bake(*state, (how){.spacing = 1, .max_error = 0.02, .marched = true});
@@ -262,7 +259,7 @@ static void marched_rays_are_shared_too(void **state) {
 }
 
 /* The wall's chart lies within reach of windows of the floor's, and has texels in the same tiles. */
-static void charts_take_nothing_from_each_other(void **state) {
+TEST(charts_take_nothing_from_each_other) {
     baked *all = bake(*state, (how){.spacing = 4, .max_error = 0.02}),
           *floor = bake(*state, (how){.spacing = 4, .max_error = 0.02, .receivers = 1});
     size_t near = 0;
@@ -281,8 +278,7 @@ static void charts_take_nothing_from_each_other(void **state) {
 }
 
 /* Windows on what is curved: under an open sky all is as it would be alone. */
-static void a_lone_ball_sees_along_its_normals(void **state) {
-    (void)state;
+TEST(a_lone_ball_sees_along_its_normals) {
     const truth_solid *ball = &SOLIDS[3];
     stage s = *(stage *)*state;
     s.receivers[0] = s.ball.mesh;
@@ -309,7 +305,7 @@ static void a_lone_ball_sees_along_its_normals(void **state) {
 }
 
 /* Its chart spans several blocks of tiles, which leave no seams: off the edges all is known equally well. */
-static void an_open_plate_is_exactly_1_and_has_no_seams(void **state) {
+TEST(an_open_plate_is_exactly_1_and_has_no_seams) {
     enum { EDGE = 12 };
     const truth_solid plate = {.shape = TRUTH_BOX, .half = {1.5, 0.25, 1.5}, .center = {0.0, -0.25, 0.0}};
     stage s = *(stage *)*state;
@@ -341,7 +337,7 @@ static void an_open_plate_is_exactly_1_and_has_no_seams(void **state) {
 }
 
 /* A piece of floor by the post and the ball, 400 texels to the AO distance. */
-static void fine_texels_take_few_rays(void **state) {
+TEST(fine_texels_take_few_rays) {
     stage s = *(stage *)*state;
     for (size_t v = 0; v < 4; ++v) {
         const double x = v == 1 || v == 2 ? 1.0 : 0.0, y = v >= 2 ? 1.0 : 0.0;
@@ -368,28 +364,15 @@ static void bake_board(int32_t rows, int32_t spacing, double max_error, float *a
     enum { SIDE = 256 };
     quad floor;
     make_quad(&floor, 0.0f, 0.0f, 1.0f, 1.0f);
-    const float y[2] = {3.0f * (1.0f - (float)rows / SIDE), 3.5f}, z[2] = {0.0004f, 0.05f};
-    float corners[8][3];
-    for (size_t k = 0; k < 8; ++k) {
-        corners[k][0] = (k & 1) != 0 ? 2.5f : -0.5f;
-        corners[k][1] = y[k >> 1 & 1];
-        corners[k][2] = z[k >> 2];
-    }
-    static const uint32_t faces[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
-                                       2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
-    const vsh_mesh meshes[2] = {floor.mesh,
-                                {.name = "board",
-                                 .positions = corners[0],
-                                 .indices = faces,
-                                 .vertex_count = 8,
-                                 .triangle_count = 12}};
-    vsh_error error = {0};
+    float corners[24];
+    const double low[3] = {-0.5, 3.0 * (1.0 - (double)rows / SIDE), 0.0004}, high[3] = {2.5, 3.5, 0.05};
+    const vsh_mesh meshes[2] = {floor.mesh, box_mesh(corners, low, high)};
     vsh_triangles *triangles = NULL;
     vsh_occluders *occluders = NULL;
-    assert_int_equal(vsh_triangles_create(meshes, 2, NULL, &triangles, &error), VSH_OK);
+    assert_ok(vsh_triangles_create(meshes, 2, NULL, &triangles, &failure));
     vsh_occluder_parts parts = vsh_occluder_parts_default();
     parts.triangles = triangles;
-    assert_int_equal(vsh_occluders_from_parts(&parts, &occluders, &error), VSH_OK);
+    assert_ok(vsh_occluders_from_parts(&parts, &occluders, &failure));
     vsh_lightmap_options options = size_of(SIDE, SIDE, 1);
     options.ao_spacing = spacing;
     options.shade.ao_method = VSH_AO_EXACT;
@@ -397,16 +380,14 @@ static void bake_board(int32_t rows, int32_t spacing, double max_error, float *a
     options.shade.max_error = max_error;
     vsh_charts *charts = create(&floor.mesh, 1, options, NULL);
     const vsh_lightmap lightmap = {.ao = ao};
-    assert_int_equal(vsh_bake_lightmap(occluders, charts, NULL, 0, NULL, NULL, &lightmap, NULL, &error),
-                     VSH_OK);
+    assert_ok(vsh_bake_lightmap(occluders, charts, NULL, 0, NULL, NULL, &lightmap, NULL, &failure));
     vsh_charts_free(charts);
     vsh_occluders_free(occluders);
     vsh_triangles_free(triangles);
 }
 
 /* Texels between a lattice's last ones in a square and the next square are told by one side alone. */
-static void what_ends_beside_a_square_darkens_no_texel_of_the_next_row(void **state) {
-    (void)state;
+TEST(what_ends_beside_a_square_darkens_no_texel_of_the_next_row) {
     enum { SIDE = 256 };
     static float ao[SIDE * SIDE], exact[SIDE * SIDE];
     for (int32_t rows = 125; rows <= 130; ++rows) {
@@ -426,15 +407,5 @@ static void what_ends_beside_a_square_darkens_no_texel_of_the_next_row(void **st
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(threads_change_no_bit),
-        cmocka_unit_test(errors_are_below_those_asked_for_with_few_rays),
-        cmocka_unit_test(marched_rays_are_shared_too),
-        cmocka_unit_test(charts_take_nothing_from_each_other),
-        cmocka_unit_test(fine_texels_take_few_rays),
-        cmocka_unit_test(what_ends_beside_a_square_darkens_no_texel_of_the_next_row),
-        cmocka_unit_test(a_lone_ball_sees_along_its_normals),
-        cmocka_unit_test(an_open_plate_is_exactly_1_and_has_no_seams),
-    };
-    return vsh_triangles_available() ? cmocka_run_group_tests(tests, set_up, tear_down) : 0;
+    return vsh_triangles_available() ? run_all_tests(set_up, tear_down) : 0;
 }

@@ -1,8 +1,6 @@
 /* What is baked where no method is named: the error that was asked for, whatever the voxels. */
+#include "testing.h"
 #include "traced.h"
-
-#include <stdio.h>
-#include <vdbshade/bake.h>
 
 enum { MOST = 64, SIDE = 48, COUNT = SIDE * SIDE };
 
@@ -41,16 +39,12 @@ static void add_box(shape *s, double x0, double y0, double z0, double x1, double
     }
 }
 
-static caster make(const vsh_mesh *meshes, size_t count, double voxel) {
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = voxel;
+static casting make(const vsh_mesh *meshes, size_t count, double voxel) {
+    const vsh_grid_options options = with_voxel(voxel);
     vsh_grid *grid = NULL;
-    caster c = {NULL, NULL};
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_grid_from_meshes(meshes, count, &options, NULL, &grid, &error) != VSH_OK ||
-        vsh_triangles_create(meshes, count, NULL, &c.triangles, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    casting c = {NULL, NULL};
+    assert_ok(vsh_grid_from_meshes(meshes, count, &options, NULL, &grid, &failure));
+    assert_ok(vsh_triangles_create(meshes, count, NULL, &c.triangles, &failure));
     c.field = field_of_grid(grid, 4.0);
     return c;
 }
@@ -78,24 +72,20 @@ static vsh_shade_stats shade_by(const vsh_occluders *casters, const vsh_points *
                                 const vsh_shade_options *options, float *into) {
     const vsh_light light = sun(UP, RADIANS(6.0));
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_shadow(casters, points, &light, options, NULL, into, NULL, &stats, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_shade_shadow(casters, points, &light, options, NULL, into, NULL, &stats, &failure));
     return stats;
 }
 
-static vsh_shade_stats shade(const caster *c, const vsh_points *points, const vsh_shade_options *options,
+static vsh_shade_stats shade(const casting *c, const vsh_points *points, const vsh_shade_options *options,
                              float *into) {
     return shade_by(occluders_of_caster(c), points, options, into);
 }
 
-static double rmse_to_truth(const caster *c, const vsh_points *points, const vsh_shade_options *options) {
+static double rmse_to_truth(const casting *c, const vsh_points *points, const vsh_shade_options *options) {
     const vsh_light light = sun(UP, RADIANS(6.0));
     double sum = 0.0;
-    assert_int_equal(vsh_trace_shadow(c->triangles, NULL, points->count, points->positions, points->normals,
-                                      1e-5, &light, 4096, NULL, truth, NULL),
-                     VSH_OK);
+    assert_ok(vsh_trace_shadow(c->triangles, NULL, points->count, points->positions, points->normals, 1e-5,
+                               &light, 4096, NULL, truth, &failure));
     shade(c, points, options, values);
     for (size_t i = 0; i < points->count; ++i) {
         sum += ((double)values[i] - (double)truth[i]) * ((double)values[i] - (double)truth[i]);
@@ -103,27 +93,24 @@ static double rmse_to_truth(const caster *c, const vsh_points *points, const vsh
     return sqrt(sum / (double)points->count);
 }
 
-static void the_default_is_exact_with_triangles_and_adaptive_without(void **state) {
-    (void)state;
+TEST(the_default_is_exact_with_triangles_and_adaptive_without) {
     static shape s;
     s = (shape){.mesh = {.vertex_count = 0}};
     add_box(&s, -0.3, 0.2, -0.3, 0.3, 0.8, 0.3);
-    caster c = make(&s.mesh, 1, 0.05);
+    casting c = make(&s.mesh, 1, 0.05);
     const vsh_points points = board(1.0, 0.0);
     for (int traced = 0; traced < 2; ++traced) {
         vsh_shade_options options = vsh_shade_options_default(), named = options;
-        const caster given = {c.field, traced ? c.triangles : NULL};
+        const casting given = {c.field, traced ? c.triangles : NULL};
         named.method = traced ? VSH_SHADOW_EXACT : VSH_SHADOW_ADAPTIVE;
         named.ao_method = traced ? VSH_AO_EXACT : VSH_AO_ADAPTIVE;
         shade(&given, &points, &options, values);
         shade(&given, &points, &named, other);
         assert_memory_equal(values, other, sizeof values);
-        assert_int_equal(vsh_shade_ao(occluders_of_caster(&given), &points, &options, NULL, values, NULL,
-                                      NULL, NULL, NULL),
-                         VSH_OK);
-        assert_int_equal(
-            vsh_shade_ao(occluders_of_caster(&given), &points, &named, NULL, other, NULL, NULL, NULL, NULL),
-            VSH_OK);
+        assert_ok(vsh_shade_ao(occluders_of_caster(&given), &points, &options, NULL, values, NULL, NULL, NULL,
+                               &failure));
+        assert_ok(
+            vsh_shade_ao(occluders_of_caster(&given), &points, &named, NULL, other, NULL, NULL, NULL, NULL));
         assert_memory_equal(values, other, sizeof values);
         assert_int_equal(vsh_shadow_method_resolve(VSH_SHADOW_AUTO, traced), named.method);
         assert_int_equal(vsh_ao_method_resolve(VSH_AO_AUTO, traced), named.ao_method);
@@ -131,12 +118,11 @@ static void the_default_is_exact_with_triangles_and_adaptive_without(void **stat
     caster_free(&c);
 }
 
-static void a_layer_takes_the_method_that_its_own_triangles_allow(void **state) {
-    (void)state;
+TEST(a_layer_takes_the_method_that_its_own_triangles_allow) {
     static shape s;
     s = (shape){.mesh = {.vertex_count = 0}};
     add_box(&s, -0.3, 0.2, -0.3, 0.3, 0.8, 0.3);
-    caster c = make(&s.mesh, 1, 0.05);
+    casting c = make(&s.mesh, 1, 0.05);
     const vsh_points points = board(1.0, 0.0);
     vsh_layer layer = vsh_layer_default();
     layer.field = c.field; /* no triangles */
@@ -147,18 +133,17 @@ static void a_layer_takes_the_method_that_its_own_triangles_allow(void **state) 
     layer.method = VSH_SHADOW_ADAPTIVE;
     shade_by(&casters, &points, &options, other);
     assert_memory_equal(values, other, sizeof values);
-    assert_int_equal(vsh_shade_ao(&casters, &points, &options, NULL, values, NULL, NULL, NULL, NULL), VSH_OK);
+    assert_ok(vsh_shade_ao(&casters, &points, &options, NULL, values, NULL, NULL, NULL, &failure));
     caster_free(&c);
 }
 
-static void rays_follow_from_the_error_unless_they_are_limited(void **state) {
-    (void)state;
+TEST(rays_follow_from_the_error_unless_they_are_limited) {
     static shape s;
     s = (shape){.mesh = {.vertex_count = 0}};
     for (int i = 0; i < 10; ++i) {
         add_box(&s, -1.0 + 0.2 * i, 0.5, -1.0, -0.92 + 0.2 * i, 0.55, 1.0);
     }
-    caster c = make(&s.mesh, 1, 0.03);
+    casting c = make(&s.mesh, 1, 0.03);
     const vsh_points points = board(1.0, 0.0);
     vsh_shade_options options = vsh_shade_options_default();
     options.max_error = 0.003;
@@ -174,8 +159,7 @@ static void rays_follow_from_the_error_unless_they_are_limited(void **state) {
     caster_free(&c);
 }
 
-static void parts_thinner_than_voxels_are_found_lost(void **state) {
-    (void)state;
+TEST(parts_thinner_than_voxels_are_found_lost) {
     static shape fence, block;
     fence = block = (shape){.mesh = {.vertex_count = 0}};
     for (int i = 0; i < 10; ++i) {
@@ -185,9 +169,9 @@ static void parts_thinner_than_voxels_are_found_lost(void **state) {
     const vsh_mesh meshes[2] = {fence.mesh, block.mesh};
     const double voxels[3] = {0.12, 0.05, 0.012};
     for (int v = 0; v < 3; ++v) {
-        caster c = make(meshes, 2, voxels[v]);
+        casting c = make(meshes, 2, voxels[v]);
         vsh_lost lost[2];
-        assert_int_equal(vsh_field_find_lost(c.field, meshes, 2, c.triangles, lost, NULL), VSH_OK);
+        assert_ok(vsh_field_find_lost(c.field, meshes, 2, c.triangles, lost, &failure));
         print_message("voxel %g: %.3f of the fence, %.3f of the block; thin %.4f\n", voxels[v], lost[0].share,
                       lost[1].share, lost[0].thickness);
         assert_true(lost[1].share < 0.005);
@@ -201,8 +185,7 @@ static void parts_thinner_than_voxels_are_found_lost(void **state) {
     }
 }
 
-static void voxels_coarser_than_casters_cost_exact_no_error(void **state) {
-    (void)state;
+TEST(voxels_coarser_than_casters_cost_exact_no_error) {
     static shape slats, cards;
     slats = cards = (shape){.mesh = {.vertex_count = 0}};
     for (int i = 0; i < 10; ++i) {
@@ -222,7 +205,7 @@ static void voxels_coarser_than_casters_cost_exact_no_error(void **state) {
     const shape *const shapes[2] = {&slats, &cards};
     for (int which = 0; which < 2; ++which) {
         for (double voxel = 0.2; voxel > 0.02; voxel *= 0.5) {
-            caster c = make(&shapes[which]->mesh, 1, voxel);
+            casting c = make(&shapes[which]->mesh, 1, voxel);
             vsh_shade_options options = vsh_shade_options_default();
             const double rmse = rmse_to_truth(&c, &points, &options);
             print_message("%s, voxels of %g: %.4f\n", which ? "cards" : "slats", voxel, rmse);
@@ -233,8 +216,7 @@ static void voxels_coarser_than_casters_cost_exact_no_error(void **state) {
 }
 
 /* A board whose AO is interpolated between texels, with low slats on it. */
-static void ao_between_texels_keeps_the_error_beside_what_is_low(void **state) {
-    (void)state;
+TEST(ao_between_texels_keeps_the_error_beside_what_is_low) {
     enum { SIZE = 96, TEXELS = SIZE * SIZE };
     static const double VOXEL = 0.05, LIFT = 0.05 / 64; /* what AO's own rays begin at */
     static float plane[TEXELS], covered[TEXELS];
@@ -250,24 +232,22 @@ static void ao_between_texels_keeps_the_error_beside_what_is_low(void **state) {
         add_box(&low, x, -0.005, -0.9, x + 0.03, 0.012, 0.9);
     }
     const vsh_mesh meshes[2] = {ground.mesh, low.mesh};
-    caster c = make(meshes, 2, VOXEL);
+    casting c = make(meshes, 2, VOXEL);
     vsh_lightmap_options size = vsh_lightmap_options_default();
     size.width = size.height = SIZE;
     vsh_charts *charts = NULL;
     vsh_texels *of = NULL;
-    assert_int_equal(vsh_charts_create(&ground.mesh, 1, &size, NULL, NULL, &charts, NULL), VSH_OK);
-    assert_int_equal(vsh_texels_create(charts, NULL, &of, NULL), VSH_OK);
+    assert_ok(vsh_charts_create(&ground.mesh, 1, &size, NULL, NULL, &charts, &failure));
+    assert_ok(vsh_texels_create(charts, NULL, &of, &failure));
     const vsh_texel_samples samples = vsh_texels_samples(of);
     float *open = malloc(samples.count * sizeof *open);
-    assert_int_equal(vsh_trace_ao(c.triangles, NULL, samples.count, samples.positions, samples.normals, LIFT,
-                                  0.5, 1024, NULL, open, NULL),
-                     VSH_OK);
+    assert_ok(vsh_trace_ao(c.triangles, NULL, samples.count, samples.positions, samples.normals, LIFT, 0.5,
+                           1024, NULL, open, &failure));
     vsh_shade_options options = vsh_shade_options_default();
     options.ao_distance = 0.5;
     const vsh_lightmap lightmap = {.ao = plane, .coverage = covered};
-    assert_int_equal(
-        vsh_bake_lightmap(occluders_of_caster(&c), charts, NULL, 0, &options, NULL, &lightmap, NULL, NULL),
-        VSH_OK);
+    assert_ok(
+        vsh_bake_lightmap(occluders_of_caster(&c), charts, NULL, 0, &options, NULL, &lightmap, NULL, NULL));
     double sum = 0.0, count = 0.0;
     for (size_t i = 0; i < samples.count; ++i) {
         const size_t at = vsh_texel_place(samples.texels[i], SIZE);
@@ -288,13 +268,5 @@ int main(void) {
         puts("no Embree: nothing to trace");
         return 0;
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_default_is_exact_with_triangles_and_adaptive_without),
-        cmocka_unit_test(a_layer_takes_the_method_that_its_own_triangles_allow),
-        cmocka_unit_test(rays_follow_from_the_error_unless_they_are_limited),
-        cmocka_unit_test(parts_thinner_than_voxels_are_found_lost),
-        cmocka_unit_test(voxels_coarser_than_casters_cost_exact_no_error),
-        cmocka_unit_test(ao_between_texels_keeps_the_error_beside_what_is_low),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,5 +1,6 @@
 /* A scene's lightmaps, from its files to its rows. */
 #include "floor_under_ball.h"
+#include "testing.h"
 
 /* Rows come 64 at a time. */
 enum { SIZE = 384, LIMIT = 4 << 20 };
@@ -47,26 +48,24 @@ static vsh_result bake_into(const case_scene *c, const char *scratch, const vsh_
     return vsh_bake_scene(&c->scene, &options, run, NULL, error);
 }
 
-static void rows_of_a_callback_are_those_of_the_file(void **state) {
-    (void)state;
+TEST(rows_of_a_callback_are_those_of_the_file) {
     static const char *const names[] = {"shadow.sun",   "ao",           "irradiance.R",
                                         "irradiance.G", "irradiance.B", "A"};
     case_scene c;
     fill(&c, SIZE, 1.0);
-    vsh_error error;
     vsh_bake_error errors[3];
     vsh_bake_report report = {.errors = errors};
-    assert_ok(vsh_bake_scene(&c.scene, NULL, NULL, &report, &error), &error);
+    assert_ok(vsh_bake_scene(&c.scene, NULL, NULL, &report, &failure));
     assert_int_equal(report.texels, SIZE * SIZE);
     assert_int_equal(report.lightmap_count, 1);
     assert_ptr_equal(report.errors, errors);
     assert_true(report.occluders.active_voxels > 0 && report.shade.marches > 0);
     received t = {.fail_at = 0};
-    assert_ok(bake_into(&c, NULL, NULL, &t, &error), &error);
+    assert_ok(bake_into(&c, NULL, NULL, &t, &failure));
     assert_int_equal(t.rows, SIZE);
     assert_int_equal(t.channels, 6);
     vsh_image_file *file;
-    assert_ok(vsh_image_read(c.output, NULL, &file, &error), &error);
+    assert_ok(vsh_image_read(c.output, NULL, &file, &failure));
     const vsh_image image = vsh_image_view(file);
     for (int32_t k = 0; k < t.channels; ++k) {
         assert_string_equal(t.names[k], names[k]);
@@ -89,8 +88,7 @@ static void rows_of_a_callback_are_those_of_the_file(void **state) {
 }
 
 /* The ball stands in the floor, so that some texels are invalid, over several tiles. */
-static void threads_and_memory_limits_change_no_bit(void **state) {
-    (void)state;
+TEST(threads_and_memory_limits_change_no_bit) {
     static const struct {
         int32_t method, ao_method, supersample;
     } cases[] = {{VSH_SHADOW_CONE, VSH_AO_CONES, 1},
@@ -104,35 +102,32 @@ static void threads_and_memory_limits_change_no_bit(void **state) {
         c.scene.shade.method = cases[i].method;
         c.scene.shade.ao_method = cases[i].ao_method;
         c.scene.shade.rays = 32;
-        vsh_error error;
         vsh_run run = vsh_run_default();
         received one = {.fail_at = 0}, more = {.fail_at = 0}, limited = {.fail_at = 0}, none = {.fail_at = 0};
         run.threads = 1;
-        assert_ok(bake_into(&c, NULL, &run, &one, &error), &error);
+        assert_ok(bake_into(&c, NULL, &run, &one, &failure));
         run.threads = 4;
-        assert_ok(bake_into(&c, NULL, &run, &more, &error), &error);
+        assert_ok(bake_into(&c, NULL, &run, &more, &failure));
         run.threads = 2;
         run.memory_limit = LIMIT;
-        assert_ok(bake_into(&c, at("."), &run, &limited, &error), &error);
+        assert_ok(bake_into(&c, at("."), &run, &limited, &failure));
         const size_t bytes = (size_t)one.channels * SIZE * SIZE * sizeof(float);
         assert_memory_equal(one.values, more.values, bytes);
         assert_memory_equal(one.values, limited.values, bytes);
         /* the folder is needed */
-        assert_int_equal(bake_into(&c, at("missing"), &run, &none, &error), VSH_ERROR_WRITE);
+        assert_int_equal(bake_into(&c, at("missing"), &run, &none, &failure), VSH_ERROR_WRITE);
         free(one.values);
         free(more.values);
         free(limited.values);
     }
 }
 
-static void an_error_of_the_callback_ends_the_bake(void **state) {
-    (void)state;
+TEST(an_error_of_the_callback_ends_the_bake) {
     case_scene c;
     fill(&c, SIZE, 1.0);
-    vsh_error error;
     received t = {.fail_at = 2};
-    assert_int_equal(bake_into(&c, NULL, NULL, &t, &error), VSH_ERROR_WRITE);
-    assert_string_equal(error.message, "the disk is full");
+    assert_int_equal(bake_into(&c, NULL, NULL, &t, &failure), VSH_ERROR_WRITE);
+    assert_string_equal(failure.message, "the disk is full");
     assert_int_equal(t.calls, 2);
     free(t.values);
 }
@@ -158,46 +153,39 @@ static vsh_result note_loaded(void *user, const vsh_scene_lightmap *lightmaps, s
     return VSH_OK;
 }
 
-static void lightmaps_are_known_before_anything_is_baked(void **state) {
-    (void)state;
+TEST(lightmaps_are_known_before_anything_is_baked) {
     case_scene c;
     fill(&c, SIZE, 1.0);
     unlink(c.output);
-    vsh_error error;
     loading l = {.refuses = 1};
     vsh_bake_options options = vsh_bake_options_default();
     options.loaded = note_loaded;
     options.user = &l;
-    assert_int_equal(vsh_bake_scene(&c.scene, &options, NULL, NULL, &error), VSH_ERROR_INPUT);
-    assert_string_equal(error.message, "no");
+    assert_int_equal(vsh_bake_scene(&c.scene, &options, NULL, NULL, &failure), VSH_ERROR_INPUT);
+    assert_string_equal(failure.message, "no");
     assert_int_equal(l.count, 1);
     assert_int_equal(l.covered, 0);
     assert_string_equal(l.output, c.output);
     assert_int_equal(access(c.output, F_OK), -1);
 }
 
-static void what_cannot_be_is_refused_before_a_file_is_read(void **state) {
-    (void)state;
+TEST(what_cannot_be_is_refused_before_a_file_is_read) {
     case_scene c;
     fill(&c, SIZE, 1.0);
     unlink(c.mesh);
-    vsh_error error;
     c.receiver.output = "floor.xyz";
-    assert_int_equal(vsh_bake_scene(&c.scene, NULL, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "floor.xyz"));
+    assert_fails(vsh_bake_scene(&c.scene, NULL, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "floor.xyz");
     c.receiver.output = c.output;
-    assert_int_equal(vsh_bake_scene(&c.scene, NULL, NULL, NULL, &error), VSH_ERROR_READ);
+    assert_int_equal(vsh_bake_scene(&c.scene, NULL, NULL, NULL, &failure), VSH_ERROR_READ);
     c.scene.receiver_count = 0;
-    assert_int_equal(vsh_bake_scene(&c.scene, NULL, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_receiver_check(&c.scene, 0, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_bake_scene(&c.scene, NULL, NULL, NULL, &failure), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_receiver_check(&c.scene, 0, &failure), VSH_ERROR_ARGUMENT);
 }
 
-static void lightmaps_of_objects_have_their_names(void **state) {
-    (void)state;
+TEST(lightmaps_of_objects_have_their_names) {
     case_scene c;
     fill(&c, SIZE, 1.0);
     c.receiver.atlas = VSH_ATLAS_OBJECTS;
-    vsh_error error;
     loading l = {.refuses = 1};
     vsh_bake_options options = vsh_bake_options_default();
     options.loaded = note_loaded;
@@ -208,20 +196,12 @@ static void lightmaps_of_objects_have_their_names(void **state) {
         char output[300];
         snprintf(output, sizeof output, "%s", at(outputs[i]));
         c.receiver.output = output;
-        assert_int_equal(vsh_bake_scene(&c.scene, &options, NULL, NULL, &error), VSH_ERROR_INPUT);
+        assert_int_equal(vsh_bake_scene(&c.scene, &options, NULL, NULL, &failure), VSH_ERROR_INPUT);
         assert_int_equal(l.count, 1);
         assert_string_equal(l.output, at(named[i]));
     }
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rows_of_a_callback_are_those_of_the_file),
-        cmocka_unit_test(threads_and_memory_limits_change_no_bit),
-        cmocka_unit_test(an_error_of_the_callback_ends_the_bake),
-        cmocka_unit_test(lightmaps_are_known_before_anything_is_baked),
-        cmocka_unit_test(what_cannot_be_is_refused_before_a_file_is_read),
-        cmocka_unit_test(lightmaps_of_objects_have_their_names),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

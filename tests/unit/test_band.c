@@ -1,5 +1,6 @@
 /* The band of a mesh, voxel by voxel: distances against every triangle, sides against counted crossings. */
 #include "grids.h"
+#include "testing.h"
 
 #include "shapes.h"
 
@@ -124,9 +125,7 @@ static vsh_grid *grid_of(const shape *s, const vsh_grid_options *options, const 
     vsh_mesh mesh = shape_mesh(s, "mesh");
     mesh.solidity = VSH_SOLIDITY_SOLID;
     vsh_grid *grid = NULL;
-    if (vsh_grid_from_meshes(&mesh, 1, options, run, &grid, &failure) != VSH_OK) {
-        fail_msg("%s", failure.message);
-    }
+    assert_ok(vsh_grid_from_meshes(&mesh, 1, options, run, &grid, &failure));
     return grid;
 }
 
@@ -154,8 +153,7 @@ static void compare(const shape *s, const vsh_grid *grid, size_t count) {
     free(all.leaf);
 }
 
-static void distances_are_to_the_nearest_triangle_and_sides_by_crossings(void **state) {
-    (void)state;
+TEST(distances_are_to_the_nearest_triangle_and_sides_by_crossings) {
     const struct {
         int rows;
         double amplitude, voxel, half_width;
@@ -207,8 +205,7 @@ static double unit_box(const double p[3]) {
     return sqrt(a * a + b * b + c * c) + fmin(fmax(x, fmax(y, z)), 0.0);
 }
 
-static void needles_are_as_exact_as_others(void **state) {
-    (void)state;
+TEST(needles_are_as_exact_as_others) {
     shape *s = needles();
     const double voxels[] = {0.031, 0.11, 0.007};
     for (size_t i = 0; i < sizeof voxels / sizeof voxels[0]; ++i) {
@@ -223,8 +220,7 @@ static void needles_are_as_exact_as_others(void **state) {
 }
 
 /* Needles alone in space, as sheets, along the voxels' middles: beyond their ends is nothing. */
-static void a_lone_needle_ends_where_it_ends(void **state) {
-    (void)state;
+TEST(a_lone_needle_ends_where_it_ends) {
     const double heights[] = {1e-1, 1e-3, 1e-5, 1e-6}; /* voxels */
     const double voxel = 1.0 / 128.0;
     for (size_t k = 0; k < sizeof heights / sizeof heights[0]; ++k) {
@@ -236,7 +232,7 @@ static void a_lone_needle_ends_where_it_ends(void **state) {
         vsh_mesh mesh = shape_mesh(s, "needle");
         mesh.solidity = VSH_SOLIDITY_SHELL;
         vsh_grid *grid = NULL;
-        assert_int_equal(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure), VSH_OK);
+        assert_ok(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure));
         leaves all = leaves_of(grid);
         const double background = all.info.half_width * voxel, half = 0.5 * all.info.shell_thickness;
         double worst = 0.0;
@@ -301,8 +297,7 @@ static double to_faces(const double p[3], const box *b, const box *other, double
 
 /* Depth in a union is to its own surface, wherever its parts have theirs; within two voxels of where those
  * cross, it may be less. */
-static void depth_is_to_the_surface_of_the_union(void **state) {
-    (void)state;
+TEST(depth_is_to_the_surface_of_the_union) {
     const box boxes[2] = {{{-1.03, -0.5, -0.5}, {1.01, 0.52, 0.5}},
                           {{-0.4, -0.31, -0.33}, {0.42, 1.23, 0.3}}};
     const double voxel = 0.05, step = 0.01;
@@ -339,8 +334,7 @@ static void depth_is_to_the_surface_of_the_union(void **state) {
     free(s);
 }
 
-static void threads_and_instruction_sets_change_no_bit(void **state) {
-    (void)state;
+TEST(threads_and_instruction_sets_change_no_bit) {
     shape *s = bumpy(40, 0.08);
     const vsh_grid_options options = with_voxel(0.04);
     float *first = NULL;
@@ -361,7 +355,7 @@ static void threads_and_instruction_sets_change_no_bit(void **state) {
             }
             float *values = malloc(count * sizeof *values);
             assert_non_null(values);
-            assert_int_equal(vsh_grid_copy(grid, info.index_min, size, values, &failure), VSH_OK);
+            assert_ok(vsh_grid_copy(grid, info.index_min, size, values, &failure));
             vsh_grid_free(grid);
             if (first == NULL) {
                 first = values;
@@ -378,12 +372,5 @@ static void threads_and_instruction_sets_change_no_bit(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(distances_are_to_the_nearest_triangle_and_sides_by_crossings),
-        cmocka_unit_test(needles_are_as_exact_as_others),
-        cmocka_unit_test(a_lone_needle_ends_where_it_ends),
-        cmocka_unit_test(depth_is_to_the_surface_of_the_union),
-        cmocka_unit_test(threads_and_instruction_sets_change_no_bit),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

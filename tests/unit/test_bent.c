@@ -1,9 +1,7 @@
 /* Bent normals, tinted penumbrae, ambient light: what a bake can give beside shadow and AO. */
 #include "previews.h"
 #include "shading.h"
-
-#include <stdlib.h>
-#include <vdbshade/bake.h>
+#include "testing.h"
 
 enum { SIZE = 32, TEXELS = SIZE * SIZE };
 
@@ -46,7 +44,7 @@ static vsh_result bake(const vsh_field *field, const asked *ask, baked *into, vs
     options.width = options.height = SIZE;
     options.tangents = ask->tangents;
     vsh_charts *texels = NULL;
-    assert_int_equal(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &texels, NULL), VSH_OK);
+    assert_ok(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &texels, &failure));
     vsh_shade_options shade = preview_options();
     shade.ao_method = ask->ao_method;
     shade.ao_cones = 64;
@@ -72,10 +70,7 @@ static vsh_result bake(const vsh_field *field, const asked *ask, baked *into, vs
 }
 
 static void bake_well(const vsh_field *field, const asked *ask, baked *into) {
-    vsh_error error = {VSH_OK, ""};
-    if (bake(field, ask, into, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(bake(field, ask, into, &failure));
 }
 
 static double degrees_between(const float *a, const double b[3]) {
@@ -92,8 +87,7 @@ static const int32_t METHODS[] = {VSH_AO_CONES, VSH_AO_RAYS, VSH_AO_ADAPTIVE};
 enum { METHOD_COUNT = 3 };
 
 /* Under an open sky nothing bends, and every direction is unit. */
-static void test_open(void **state) {
-    (void)state;
+TEST(test_open) {
     vsh_field *field = floor_field(false);
     baked *b = malloc(sizeof *b);
     const double up[3] = {0.0, 1.0, 0.0}, out[3] = {0.0, 0.0, 1.0};
@@ -114,8 +108,7 @@ static void test_open(void **state) {
 
 /* At the foot of a high and long wall half of the sky is open. Of a cosine-weighted hemisphere the half
  * towards +x has the mean (2 / (3 π), 1 / 3) along x and up. */
-static void test_wall(void **state) {
-    (void)state;
+TEST(test_wall) {
     vsh_field *field = floor_field(true);
     const double position[3] = {-0.42, 0.001, 0.0};
     const float normal[3] = {0.0f, 1.0f, 0.0f};
@@ -128,15 +121,13 @@ static void test_wall(void **state) {
         shade.rays = 1024;
         shade.ao_distance = 2.0;
         float ao, deviation, bent[3];
-        assert_int_equal(
-            vsh_shade_ao(occluders_of(field), &points, &shade, NULL, &ao, &deviation, bent, NULL, NULL),
-            VSH_OK);
+        assert_ok(
+            vsh_shade_ao(occluders_of(field), &points, &shade, NULL, &ao, &deviation, bent, NULL, NULL));
         assert_float_equal(ao, 0.5, 0.05);
         assert_true(degrees_between(bent, truth) < 3.0);
         float alone, its_deviation;
-        assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &shade, NULL, &alone, &its_deviation,
-                                      NULL, NULL, NULL),
-                         VSH_OK);
+        assert_ok(vsh_shade_ao(occluders_of(field), &points, &shade, NULL, &alone, &its_deviation, NULL, NULL,
+                               &failure));
         assert_int_equal(bits_of(alone), bits_of(ao));
         assert_int_equal(bits_of(its_deviation), bits_of(deviation));
     }
@@ -144,8 +135,7 @@ static void test_wall(void **state) {
 }
 
 /* The same directions in both spaces; a chart that is mirrored mirrors x, and keeps y along growing v. */
-static void test_spaces(void **state) {
-    (void)state;
+TEST(test_spaces) {
     vsh_field *field = floor_field(true);
     baked *world = malloc(sizeof *world), *tangent = malloc(sizeof *tangent);
     const float *const uvs[2] = {UVS, MIRRORED};
@@ -171,8 +161,7 @@ static void test_spaces(void **state) {
 }
 
 /* A wall in a layer bends as one in the field does: what it hides is behind nothing else. */
-static void test_layer(void **state) {
-    (void)state;
+TEST(test_layer) {
     vsh_field *united = floor_field(true), *ground = floor_field(false);
     vsh_field *wall = field_of((truth_scene){&WALL, 1}, 0.04, 4.0);
     vsh_layer layer = vsh_layer_default();
@@ -196,8 +185,7 @@ static void test_layer(void **state) {
     vsh_field_free(wall);
 }
 
-static void test_tint_and_ambient(void **state) {
-    (void)state;
+TEST(test_tint_and_ambient) {
     vsh_field *field = floor_field(true);
     baked *plain = malloc(sizeof *plain), *b = malloc(sizeof *b);
     const double ambient[3] = {0.25, 0.5, 1.0};
@@ -236,11 +224,9 @@ static void test_tint_and_ambient(void **state) {
     vsh_field_free(field);
 }
 
-static void test_refused(void **state) {
-    (void)state;
+TEST(test_refused) {
     vsh_field *field = floor_field(false);
     baked *b = malloc(sizeof *b);
-    vsh_error error;
     const double dark[3] = {0.0, -1.0, 0.0};
     const struct {
         asked ask;
@@ -259,21 +245,13 @@ static void test_refused(void **state) {
          "ambient[1] -1: expected a finite number, at least 0"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-        assert_int_equal(bake(field, &cases[i].ask, b, &error), VSH_ERROR_ARGUMENT);
-        assert_string_equal(error.message, cases[i].message);
+        assert_int_equal(bake(field, &cases[i].ask, b, &failure), VSH_ERROR_ARGUMENT);
+        assert_string_equal(failure.message, cases[i].message);
     }
     free(b);
     vsh_field_free(field);
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_open),
-        cmocka_unit_test(test_wall),
-        cmocka_unit_test(test_spaces),
-        cmocka_unit_test(test_layer),
-        cmocka_unit_test(test_tint_and_ambient),
-        cmocka_unit_test(test_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,5 +1,6 @@
 /* What other languages call in place of callbacks that would be slow there. */
 #include "fields.h"
+#include "testing.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
@@ -19,8 +20,7 @@ static int32_t listen(void *user, const char *stage, double fraction) {
     return h->answer;
 }
 
-static void progress_is_handed_on_at_both_ends_and_seldom_between(void **state) {
-    (void)state;
+TEST(progress_is_handed_on_at_both_ends_and_seldom_between) {
     heard h = {0, 0, 0.0, pthread_self()};
     vsh_progress_filter filter = vsh_progress_filter_default();
     filter.progress = listen;
@@ -39,8 +39,7 @@ static void progress_is_handed_on_at_both_ends_and_seldom_between(void **state) 
     assert_int_equal(vsh_progress_seldom(NULL, "stage", 0.5), 0);
 }
 
-static void an_answer_stays(void **state) {
-    (void)state;
+TEST(an_answer_stays) {
     heard h = {0, 7, 0.0, pthread_self()};
     vsh_progress_filter filter = vsh_progress_filter_default();
     filter.progress = listen;
@@ -57,8 +56,7 @@ static void *tell(void *filter) {
     return NULL;
 }
 
-static void one_thread_alone_hands_on(void **state) {
-    (void)state;
+TEST(one_thread_alone_hands_on) {
     heard h = {0, 0, 0.0, pthread_self()};
     vsh_progress_filter filter = vsh_progress_filter_default();
     filter.progress = listen;
@@ -90,46 +88,35 @@ static void rings(void *user, size_t count, const double *positions, double *dis
 }
 
 /* Every distance of a box around it, bit by bit. */
-static void many_positions_at_once_give_the_same_level_set(void **state) {
-    (void)state;
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = 0.05;
+TEST(many_positions_at_once_give_the_same_level_set) {
+    const vsh_grid_options options = with_voxel(0.05);
     for (int exact = 0; exact < 2; ++exact) {
         atomic_int largest = 0;
         vsh_distance field = {ring, &largest, 1.0, exact, {-1, -0.3, -1}, {1, 0.3, 1}};
         vsh_grid *grids[2];
-        assert_int_equal(vsh_grid_from_distance(&field, &options, NULL, &grids[0], NULL), VSH_OK);
+        assert_ok(vsh_grid_from_distance(&field, &options, NULL, &grids[0], &failure));
         field.distance = NULL;
-        assert_int_equal(vsh_grid_from_distances(&field, rings, &options, NULL, &grids[1], NULL), VSH_OK);
+        assert_ok(vsh_grid_from_distances(&field, rings, &options, NULL, &grids[1], &failure));
         assert_int_equal(atomic_load(&largest), 64);
         const int32_t from[3] = {-24, -10, -24}, size[3] = {48, 20, 48};
         static float values[2][48 * 20 * 48];
         for (int i = 0; i < 2; ++i) {
-            assert_int_equal(vsh_grid_copy(grids[i], from, size, values[i], NULL), VSH_OK);
+            assert_ok(vsh_grid_copy(grids[i], from, size, values[i], &failure));
             vsh_grid_free(grids[i]);
         }
         assert_memory_equal(values[0], values[1], sizeof values[0]);
     }
 }
 
-static void without_a_callback_there_is_none(void **state) {
-    (void)state;
-    vsh_error error;
+TEST(without_a_callback_there_is_none) {
     const vsh_distance field = {NULL, NULL, 1.0, 1, {-1, -1, -1}, {1, 1, 1}};
-    vsh_grid *grid = (vsh_grid *)&error;
-    assert_int_equal(vsh_grid_from_distances(&field, NULL, NULL, NULL, &grid, &error), VSH_ERROR_ARGUMENT);
+    vsh_grid *grid = (vsh_grid *)&failure;
+    assert_int_equal(vsh_grid_from_distances(&field, NULL, NULL, NULL, &grid, &failure), VSH_ERROR_ARGUMENT);
     assert_null(grid);
-    assert_int_equal(vsh_grid_from_distances(NULL, rings, NULL, NULL, &grid, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_grid_from_distances(&field, rings, NULL, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_grid_from_distances(NULL, rings, NULL, NULL, &grid, &failure), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_grid_from_distances(&field, rings, NULL, NULL, NULL, &failure), VSH_ERROR_ARGUMENT);
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(progress_is_handed_on_at_both_ends_and_seldom_between),
-        cmocka_unit_test(an_answer_stays),
-        cmocka_unit_test(one_thread_alone_hands_on),
-        cmocka_unit_test(many_positions_at_once_give_the_same_level_set),
-        cmocka_unit_test(without_a_callback_there_is_none),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -169,7 +169,7 @@ void print(const Sample &sample, const Tally &t) {
     }
 }
 
-void changed_bits_never_reach_the_caller_and_are_told_where_they_can_be(void **) {
+TEST(changed_bits_never_reach_the_caller_and_are_told_where_they_can_be) {
     int stopped = 0, same = 0;
     for (size_t i = 0; i < sizeof samples / sizeof samples[0]; ++i) {
         const Tally tally = run_sample(samples[i], TRIED, 1000000 * i);
@@ -206,8 +206,5 @@ int main(int argc, char **argv) {
         remove_folder(nullptr);
         return steep != 0;
     }
-    const CMUnitTest tests[] = {
-        cmocka_unit_test(changed_bits_never_reach_the_caller_and_are_told_where_they_can_be),
-    };
-    return cmocka_run_group_tests(tests, nullptr, remove_folder);
+    return run_all_tests(nullptr, remove_folder);
 }

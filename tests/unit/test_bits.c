@@ -3,11 +3,119 @@
  * libraries is apart: a mesh's level set on OpenVDB, what is traced on Embree (docs/reliability.md). A change
  * of a method changes its hash: VSH_BITS=print prints the table, VSH_BITS=once checks it for one thread and
  * the base set. */
-#include "baked.h"
+#include "base/hash.h"
 #include "casts.h"
 #include "field/field.h"
+#include "grids.h"
 #include "previews.h"
-#include "stitched.h"
+#include "testing.h"
+
+/* --- hashing */
+
+typedef struct bits {
+    uint64_t hash;
+    size_t values;  /* floats that were hashed */
+    size_t changes; /* of them unlike the one before */
+} bits;
+
+static void add_floats(bits *b, const float *values, size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+        uint32_t word;
+        memcpy(&word, &values[i], sizeof word);
+        b->hash = vshi_mix(b->hash + word + 0x9e3779b97f4a7c15u);
+        b->changes += i > 0 && values[i] != values[i - 1];
+    }
+    b->values += count;
+}
+
+/* --- what is baked */
+
+enum { SIDE = 40, POINTS = SIDE * SIDE };
+
+static double positions[3 * POINTS];
+static float normals[3 * POINTS];
+static uint32_t texels[POINTS];
+
+static double random_unit(uint64_t *counter) {
+    return (double)(vshi_mix(++*counter * 0x9e3779b97f4a7c15u) >> 11) * 0x1p-53;
+}
+
+/* Rows over the floor, every third point anywhere with a normal to any side. */
+static void place_points(void) {
+    uint64_t counter = 1;
+    for (size_t i = 0; i < POINTS; ++i) {
+        double *p = positions + 3 * i;
+        float *n = normals + 3 * i;
+        p[0] = -2.0 + 4.0 * ((double)(i % SIDE) + 0.5) / SIDE;
+        p[1] = 0.001;
+        p[2] = -2.0 + 4.0 * ((double)(i / SIDE) + 0.5) / SIDE;
+        n[0] = n[2] = 0.0f;
+        n[1] = 1.0f;
+        texels[i] = (uint32_t)(i % SIDE + 65536 * (i / SIDE));
+        for (int axis = 0; axis < 3 && i % 3 == 0; ++axis) {
+            p[axis] = -2.0 + 4.0 * random_unit(&counter) + (axis == 1);
+            n[axis] = (float)(random_unit(&counter) - 0.4);
+        }
+    }
+}
+
+static vsh_grid *solids(const vsh_run *run) {
+    vsh_sdf_node nodes[5];
+    for (int i = 0; i < 5; ++i) {
+        nodes[i] = vsh_sdf_node_default();
+    }
+    nodes[0].shape = VSH_SDF_PLANE;
+    nodes[0].size[0] = nodes[0].size[2] = 2.5;
+    nodes[0].size[1] = 0.25;
+    nodes[1].radius = 0.5;
+    nodes[1].translation[1] = 0.875;
+    nodes[2].shape = VSH_SDF_UNION;
+    nodes[2].left = 0;
+    nodes[2].right = 1;
+    nodes[3].shape = VSH_SDF_TORUS;
+    nodes[3].radius = 0.5;
+    nodes[3].minor_radius = 0.125;
+    nodes[3].rotation[0] = 0.25;
+    nodes[3].translation[0] = 1.0;
+    nodes[3].translation[1] = 0.75;
+    nodes[4].shape = VSH_SDF_UNION;
+    nodes[4].left = 2;
+    nodes[4].right = 3;
+    const vsh_sdf sdf = {nodes, 5};
+    const vsh_grid_options options = with_voxel(0.0625);
+    vsh_grid *grid = NULL;
+    assert_ok(vsh_grid_from_sdf(&sdf, &options, run, &grid, &failure));
+    return grid;
+}
+
+static vsh_light sun(void) {
+    vsh_light light = vsh_light_default();
+    light.direction[0] = 0.5;
+    light.direction[2] = 0.25;
+    light.angle = 0.25;
+    return light;
+}
+
+static vsh_light spot(void) {
+    vsh_light light = vsh_light_default();
+    light.type = VSH_LIGHT_SPOT;
+    light.falloff = VSH_FALLOFF_INVERSE_SQUARE;
+    light.axis[1] = -1.0;
+    light.position[0] = 0.75;
+    light.position[1] = 2.5;
+    light.position[2] = -0.5;
+    light.radius = 0.25;
+    strcpy(light.name, "spot");
+    return light;
+}
+
+static void add_leaves(bits *b, const vsh_grid *grid) {
+    leaves all = leaves_of(grid);
+    for (size_t i = 0; i < all.count; ++i) {
+        add_floats(b, all.leaf[i].values, 512);
+    }
+    free(all.leaf);
+}
 
 /* --- the parts */
 
@@ -42,11 +150,10 @@ static uint64_t shade_by(const context *c, const vsh_light *light, const vsh_sha
     vsh_shade_stats stats = vsh_shade_stats_zero();
     const vsh_occluders casters = {
         .field = c->field, .triangles = c->triangles, .layers = c->layer, .layer_count = c->layer != NULL};
-    vsh_error error;
-    check(light != NULL
-              ? vsh_shade_shadow(&casters, &points, light, options, &c->run, value, deviation, &stats, &error)
-              : vsh_shade_ao(&casters, &points, options, &c->run, value, deviation, NULL, &stats, &error),
-          &error);
+    assert_ok(
+        light != NULL
+            ? vsh_shade_shadow(&casters, &points, light, options, &c->run, value, deviation, &stats, &failure)
+            : vsh_shade_ao(&casters, &points, options, &c->run, value, deviation, NULL, &stats, &failure));
     add_floats(b, value, POINTS);
     for (size_t i = 0; i < POINTS; ++i) { /* NaN has many bits */
         deviation[i] = deviation[i] == deviation[i] ? deviation[i] : -1.0f;
@@ -115,9 +222,8 @@ static void bent_normals(const context *c, int32_t method, bits *b) {
     vsh_shade_options options = preview_options();
     options.ao_method = method;
     options.rays = 16;
-    vsh_error error;
-    check(vsh_shade_ao(occluders_of(c->field), &points, &options, &c->run, value, NULL, bent, NULL, &error),
-          &error);
+    assert_ok(
+        vsh_shade_ao(occluders_of(c->field), &points, &options, &c->run, value, NULL, bent, NULL, &failure));
     add_floats(b, value, POINTS);
     add_floats(b, bent, sizeof bent / sizeof bent[0]);
 }
@@ -128,11 +234,9 @@ static void irradiance_and_tint(const context *c, int32_t unused, bits *b) {
     const vsh_points points = {POINTS, positions, normals, texels};
     const vsh_light light = spot();
     const vsh_tint tint = {VSH_TINT_POWER, {1.0, 1.25, 1.5}};
-    vsh_error error;
     const vsh_shade_options options = preview_options();
-    check(vsh_shade_shadow(occluders_of(c->field), &points, &light, &options, &c->run, value, NULL, NULL,
-                           &error),
-          &error);
+    assert_ok(vsh_shade_shadow(occluders_of(c->field), &points, &light, &options, &c->run, value, NULL, NULL,
+                               &failure));
     vsh_shade_irradiance(&points, NULL, &light, value, rgb);
     vsh_shade_tint(POINTS, value, &tint, tinted);
     add_floats(b, rgb, sizeof rgb / sizeof rgb[0]);
@@ -156,11 +260,9 @@ static void lightmap(const context *c, int32_t method, bits *b) {
     vsh_lightmap map = {.shadow = planes, .ao = ao_plane, .irradiance = rgb, .coverage = coverage};
     vsh_charts *made = NULL;
     const vsh_light light = sun();
-    vsh_error error;
-    check(vsh_charts_create(&floor, 1, &options, &c->run, NULL, &made, &error), &error);
-    check(vsh_bake_lightmap(occluders_of(c->field), made, &light, 1, &options.shade, &c->run, &map, NULL,
-                            &error),
-          &error);
+    assert_ok(vsh_charts_create(&floor, 1, &options, &c->run, NULL, &made, &failure));
+    assert_ok(vsh_bake_lightmap(occluders_of(c->field), made, &light, 1, &options.shade, &c->run, &map, NULL,
+                                &failure));
     vsh_charts_free(made);
     add_floats(b, shadow_plane, TEXELS);
     add_floats(b, ao_plane, TEXELS);
@@ -168,9 +270,33 @@ static void lightmap(const context *c, int32_t method, bits *b) {
     add_floats(b, coverage, TEXELS);
 }
 
+/* Noise on a square in two charts, one of them turned, in an image of 48 × 48. */
 static void seams(const context *c, int32_t unused, bits *b) {
     (void)unused;
-    add_stitched(&c->run, b);
+    const vsh_run *run = &c->run;
+    static const float corners[24] = {0, 0, 0, 1, 0, 0, 1, 2, 0, 0, 2, 0, 1, 0, 0, 2, 0, 0, 2, 2, 0, 1, 2, 0};
+    static const float uvs[16] = {0.05f, 0.07f, 0.37f, 0.07f, 0.37f, 0.81f, 0.05f, 0.81f,
+                                  0.50f, 0.20f, 0.67f, 0.06f, 0.96f, 0.63f, 0.79f, 0.77f};
+    static const uint32_t indices[12] = {0, 1, 2, 0, 2, 3, 4, 5, 6, 4, 6, 7};
+    const vsh_mesh mesh = {
+        .positions = corners, .uvs = uvs, .indices = indices, .vertex_count = 8, .triangle_count = 4};
+    enum { STITCHED = 48, STITCHED_TEXELS = STITCHED * STITCHED };
+    static float open[STITCHED_TEXELS], light[3 * STITCHED_TEXELS];
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = STITCHED;
+    uint32_t random = 1;
+    for (size_t i = 0; i < 3 * STITCHED_TEXELS; ++i) {
+        random = random * 1664525u + 1013904223u;
+        light[i] = (float)(random >> 8) * 0x1p-24f;
+        open[i / 3] = light[i];
+    }
+    const vsh_lightmap map = {.ao = open, .irradiance = light};
+    vsh_charts *charts = NULL;
+    assert_ok(vsh_charts_create(&mesh, 1, &options, run, NULL, &charts, &failure));
+    assert_ok(vsh_lightmap_stitch(charts, &map, 0, NULL, run, NULL, &failure));
+    vsh_charts_free(charts);
+    add_floats(b, open, STITCHED_TEXELS);
+    add_floats(b, light, 3 * STITCHED_TEXELS);
 }
 
 static void volume_of_band(const context *c, int32_t unused, bits *b) {
@@ -181,16 +307,14 @@ static void volume_of_band(const context *c, int32_t unused, bits *b) {
     options.ao = 1;
     options.shade.ao_distance = 0.75;
     const vsh_light light = sun();
-    vsh_error error;
-    check(vsh_voxels_from_grid(c->grid, 0.0, &c->run, &voxels, &error), &error);
-    check(
-        vsh_bake_volume(occluders_of(c->field), voxels, &light, 1, &options, &c->run, &volume, NULL, &error),
-        &error);
+    assert_ok(vsh_voxels_from_grid(c->grid, 0.0, &c->run, &voxels, &failure));
+    assert_ok(vsh_bake_volume(occluders_of(c->field), voxels, &light, 1, &options, &c->run, &volume, NULL,
+                              &failure));
     float *values = malloc(48 * 48 * 48 * sizeof *values);
     assert_non_null(values);
     const int32_t low[3] = {-24, -8, -24}, size[3] = {48, 48, 48};
     for (size_t grid = 0; grid < 2; ++grid) {
-        check(vsh_volume_copy(volume, grid, low, size, values, &error), &error);
+        assert_ok(vsh_volume_copy(volume, grid, low, size, values, &failure));
         for (size_t row = 0; row < 48 * 48; ++row) { /* along z, in the order that the hashes were made in */
             float along[48];
             for (size_t z = 0; z < 48; ++z) {
@@ -207,8 +331,7 @@ static void volume_of_band(const context *c, int32_t unused, bits *b) {
 /* Casters without voxels, as the one layer beside an empty field. */
 static void shade_layer(const context *c, const vsh_heights *heights, const vsh_spheres *spheres, bits *b) {
     vsh_field *empty = NULL;
-    vsh_error error;
-    check(vshi_field_create_empty(0.0625, &empty, &error), &error);
+    assert_ok(vshi_field_create_empty(0.0625, &empty, &failure));
     vsh_layer layer = vsh_layer_default();
     layer.heights = heights;
     layer.spheres = spheres;
@@ -239,8 +362,7 @@ static void heightfield(const context *c, int32_t unused, bits *b) {
     (void)unused;
     const vsh_heights_source source = hills();
     vsh_heights *heights = NULL;
-    vsh_error error;
-    check(vsh_heights_create(&source, &c->run, &heights, &error), &error);
+    assert_ok(vsh_heights_create(&source, &c->run, &heights, &failure));
     shade_layer(c, heights, NULL, b);
     vsh_heights_free(heights);
 }
@@ -253,8 +375,7 @@ static void spheres(const context *c, int32_t unused, bits *b) {
         list[i] = i % 4 == 3 ? 0.05 + 0.2 * random_unit(&counter) : -2.0 + 4.0 * random_unit(&counter);
     }
     vsh_spheres *made = NULL;
-    vsh_error error;
-    check(vsh_spheres_create(list, 60, NULL, &c->run, &made, &error), &error);
+    assert_ok(vsh_spheres_create(list, 60, NULL, &c->run, &made, &failure));
     shade_layer(c, NULL, made, b);
     vsh_spheres_free(made);
 }
@@ -265,8 +386,7 @@ static void flat_map(const context *c, int32_t method, bits *b) {
     static const size_t counts[] = {3, 3};
     static float planes[5][TEXELS];
     vsh_outline *outline = NULL;
-    vsh_error error;
-    check(vsh_outline_from_polygons(points, counts, 2, &c->run, &outline, &error), &error);
+    assert_ok(vsh_outline_from_polygons(points, counts, 2, &c->run, &outline, &failure));
     vsh_flat_options options = vsh_flat_options_default();
     options.width = options.height = SIZE;
     options.method = method;
@@ -276,7 +396,7 @@ static void flat_map(const context *c, int32_t method, bits *b) {
     light.position[1] = 0.75;
     float *const shadows[] = {planes[0]}, *const rgb[] = {planes[1], planes[2], planes[3]};
     const vsh_flat_map map = {shadows, rgb, planes[4]};
-    check(vsh_flat_bake(outline, &light, 1, &options, &c->run, &map, &error), &error);
+    assert_ok(vsh_flat_bake(outline, &light, 1, &options, &c->run, &map, &failure));
     add_floats(b, planes[0], 5 * TEXELS);
     vsh_outline_free(outline);
 }
@@ -295,12 +415,11 @@ static void picture(const context *c, int32_t unused, bits *b) {
     options.ao = 1;
     const double low[3] = {-2.0, 0.0, -2.0}, high[3] = {2.0, 1.5, 2.0};
     const vsh_light light = spot();
-    vsh_error error;
-    check(vsh_camera_frame(&options.camera, low, high, 0.5, 0.5, 1.5, &error), &error);
-    check(vsh_render(&surface, 1, occluders_of(c->field), &light, 1, &options, &c->run, &made, NULL, &error),
-          &error);
+    assert_ok(vsh_camera_frame(&options.camera, low, high, 0.5, 0.5, 1.5, &failure));
+    assert_ok(
+        vsh_render(&surface, 1, occluders_of(c->field), &light, 1, &options, &c->run, &made, NULL, &failure));
     float *const planes[3] = {encoded[0], encoded[1], encoded[2]};
-    check(vsh_picture_encode(&made, WIDE, HIGH, 0.5, planes, NULL, &error), &error);
+    assert_ok(vsh_picture_encode(&made, WIDE, HIGH, 0.5, planes, NULL, &failure));
     add_floats(b, color, 3 * PIXELS);
     add_floats(b, normal, 3 * PIXELS);
     add_floats(b, encoded[0], 3 * PIXELS);
@@ -308,27 +427,28 @@ static void picture(const context *c, int32_t unused, bits *b) {
 
 /* --- what depends on libraries */
 
-static vsh_model *cloister(const vsh_run *run) {
+enum { MOST_MESHES = 64 };
+
+static vsh_model *cloister(const vsh_run *run, vsh_mesh meshes[MOST_MESHES], size_t *count) {
     vsh_model *model = NULL;
-    vsh_error error;
-    check(vsh_model_read(VSH_ASSETS "/cloister.glb", run, &model, &error), &error);
+    assert_ok(vsh_model_read(VSH_ASSETS "/cloister.glb", run, &model, &failure));
+    *count = vsh_model_mesh_count(model);
+    assert_in_range(*count, 1, MOST_MESHES);
+    for (size_t i = 0; i < *count; ++i) {
+        meshes[i] = vsh_model_mesh(model, i, -1);
+    }
     return model;
 }
 
 static void level_set_of_a_mesh(const context *c, int32_t unused, bits *b) {
     (void)unused;
-    vsh_model *model = cloister(&c->run);
-    vsh_mesh meshes[64];
-    const size_t count = vsh_model_mesh_count(model);
-    assert_in_range(count, 1, 64);
-    for (size_t i = 0; i < count; ++i) {
-        meshes[i] = vsh_model_mesh(model, i, -1);
-    }
+    vsh_mesh meshes[MOST_MESHES];
+    size_t count;
+    vsh_model *model = cloister(&c->run, meshes, &count);
     vsh_grid_options options = vsh_grid_options_default();
     options.resolution = 96;
     vsh_grid *grid = NULL;
-    vsh_error error;
-    check(vsh_grid_from_meshes(meshes, count, &options, &c->run, &grid, &error), &error);
+    assert_ok(vsh_grid_from_meshes(meshes, count, &options, &c->run, &grid, &failure));
     add_leaves(b, grid);
     vsh_grid_free(grid);
     vsh_model_free(model);
@@ -337,19 +457,14 @@ static void level_set_of_a_mesh(const context *c, int32_t unused, bits *b) {
 /* Charts of the asset: of no library, but for the file. */
 static void atlas_of_a_mesh(const context *c, int32_t unused, bits *b) {
     (void)unused;
-    vsh_model *model = cloister(&c->run);
-    vsh_mesh meshes[64];
-    const size_t count = vsh_model_mesh_count(model);
-    assert_in_range(count, 1, 64);
-    for (size_t i = 0; i < count; ++i) {
-        meshes[i] = vsh_model_mesh(model, i, -1);
-    }
+    vsh_mesh meshes[MOST_MESHES];
+    size_t count;
+    vsh_model *model = cloister(&c->run, meshes, &count);
     vsh_unwrap_options options = vsh_unwrap_options_default();
     options.width = options.height = 512;
     options.padding = 2;
     vsh_atlas *atlas = NULL;
-    vsh_error error;
-    check(vsh_unwrap(meshes, count, &options, &c->run, &atlas, &error), &error);
+    assert_ok(vsh_unwrap(meshes, count, &options, &c->run, &atlas, &failure));
     for (size_t i = 0; i < count; ++i) {
         const vsh_atlas_mesh mesh = vsh_atlas_mesh_view(atlas, i);
         add_floats(b, mesh.uvs, 2 * mesh.vertex_count);
@@ -392,17 +507,16 @@ static void exact(const context *c, int32_t what, bits *b) {
     vsh_grid *grid = NULL;
     vsh_triangles *triangles = NULL;
     context here = {.run = c->run};
-    vsh_error error;
-    check(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, &c->run, &model, &error), &error);
+    assert_ok(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, &c->run, &model, &failure));
     vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     if ((what & CUT_OUT) != 0) {
         cut_out(&mesh, &mask, &uvs);
     }
     vsh_grid_options options = vsh_grid_options_default();
     options.resolution = (what & CUT_OUT) != 0 ? 16 : 64;
-    check(vsh_grid_from_meshes(&mesh, 1, &options, &c->run, &grid, &error), &error);
-    check(vsh_field_create(grid, NULL, &c->run, &here.field, &error), &error);
-    check(vsh_triangles_create(&mesh, 1, &c->run, &triangles, &error), &error);
+    assert_ok(vsh_grid_from_meshes(&mesh, 1, &options, &c->run, &grid, &failure));
+    assert_ok(vsh_field_create(grid, NULL, &c->run, &here.field, &failure));
+    assert_ok(vsh_triangles_create(&mesh, 1, &c->run, &triangles, &failure));
     vsh_shade_options shading = preview_options();
     shading.method = VSH_SHADOW_EXACT;
     shading.ao_method = VSH_AO_EXACT;
@@ -431,8 +545,7 @@ static const part parts[] = {
 
 static void bake_part(const part *p, const vsh_run *run, bits *b) {
     context c = {.run = *run, .grid = solids(run)};
-    vsh_error error;
-    check(vsh_field_create(c.grid, NULL, run, &c.field, &error), &error);
+    assert_ok(vsh_field_create(c.grid, NULL, run, &c.field, &failure));
     *b = (bits){0, 0, 0};
     p->bake(&c, p->what, b);
     vsh_field_free(c.field);
@@ -448,14 +561,12 @@ static void print_table(void) {
     }
 }
 
-static void every_part_has_its_bits_for_any_threads_and_instruction_set(void **state) {
-    (void)state;
+TEST(every_part_has_its_bits_for_any_threads_and_instruction_set) {
     bool wrong = false;
     const bool once = getenv("VSH_BITS") != NULL;
     for (int32_t isa = VSH_ISA_BASE; isa <= (once ? VSH_ISA_BASE : VSH_ISA_AVX512); ++isa) {
         for (int32_t threads = 1; threads <= (once ? 1 : 5) && vsh_isa_available(isa); threads += 4) {
-            vsh_run run = vsh_run_default();
-            run.threads = threads;
+            vsh_run run = run_on(threads);
             run.isa = isa;
             for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
                 bits b;
@@ -473,8 +584,7 @@ static void every_part_has_its_bits_for_any_threads_and_instruction_set(void **s
     assert_false(wrong);
 }
 
-static void parts_have_bits_of_their_own(void **state) {
-    (void)state;
+TEST(parts_have_bits_of_their_own) {
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
         for (size_t j = 0; j < i; ++j) {
             if (parts[i].hash == parts[j].hash) {
@@ -491,9 +601,5 @@ int main(void) {
         print_table();
         return 0;
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_part_has_its_bits_for_any_threads_and_instruction_set),
-        cmocka_unit_test(parts_have_bits_of_their_own),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,5 +1,6 @@
 /* Points that follow each other share proofs: that saves work, shows in no value, and proves nothing wrong.
  */
+#include "testing.h"
 #include "traced.h"
 
 #include "previews.h"
@@ -35,7 +36,7 @@ static void place_points(void) {
     }
 }
 
-static vsh_shade_stats shade(const caster *made, const vsh_light *light, int32_t method,
+static vsh_shade_stats shade(const casting *made, const vsh_light *light, int32_t method,
                              const double *positions, float *values) {
     vsh_shade_options options = preview_options();
     options.method = method;
@@ -43,11 +44,8 @@ static vsh_shade_stats shade(const caster *made, const vsh_light *light, int32_t
     options.max_error = 1.0; /* only what is proved has no error left */
     const vsh_points points = {POINTS, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_shadow(occluders_of_caster(made), &points, light, &options, NULL, values, deviation, &stats,
-                         &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_shade_shadow(occluders_of_caster(made), &points, light, &options, NULL, values, deviation,
+                               &stats, &failure));
     return stats;
 }
 
@@ -60,10 +58,9 @@ static int lights_of(vsh_light lights[4]) {
     return 4;
 }
 
-static void blocks_save_samples_and_change_no_value(void **state) {
-    (void)state;
+TEST(blocks_save_samples_and_change_no_value) {
     place_points();
-    caster made = caster_of(truth_seeds(), 0.02, 0.0);
+    casting made = caster_of(truth_seeds(), 0.02, 0.0);
     vsh_light lights[4];
     const int light_count = lights_of(lights);
     for (int l = 0; l < light_count; ++l) {
@@ -85,10 +82,9 @@ static void blocks_save_samples_and_change_no_value(void **state) {
     caster_free(&made);
 }
 
-static void no_block_is_proved_wrong(void **state) {
-    (void)state;
+TEST(no_block_is_proved_wrong) {
     place_points();
-    caster made = caster_of(truth_seeds(), 0.02, 0.0);
+    casting made = caster_of(truth_seeds(), 0.02, 0.0);
     vsh_light lights[4];
     const int light_count = lights_of(lights);
     const double up[3] = {0.0, 1.0, 0.0};
@@ -126,9 +122,5 @@ static void no_block_is_proved_wrong(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(blocks_save_samples_and_change_no_value),
-        cmocka_unit_test(no_block_is_proved_wrong),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,37 +1,31 @@
 /* Cameras: which are refused, which box they frame, how they turn. */
 #include "pictures.h"
+#include "testing.h"
 
-static void cameras_that_see_nothing_are_refused(void **state) {
-    (void)state;
-    vsh_error error;
+TEST(cameras_that_see_nothing_are_refused) {
     vsh_camera camera = camera_at(1.0, 2.0, 3.0, 1.0, 2.0, 3.0, 30.0);
-    assert_int_equal(vsh_camera_check(&camera, &error), VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "position and target"));
+    assert_fails(vsh_camera_check(&camera, &failure), VSH_ERROR_ARGUMENT, "position and target");
     camera = camera_at(0.0, 5.0, 0.0, 0.0, 0.0, 0.0, 30.0);
-    assert_int_equal(vsh_camera_check(&camera, &error), VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "up"));
+    assert_fails(vsh_camera_check(&camera, &failure), VSH_ERROR_ARGUMENT, "up");
     camera = camera_at(0.0, NAN, 0.0, 0.0, 0.0, 0.0, 30.0);
-    assert_int_equal(vsh_camera_check(&camera, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_camera_check(&camera, &failure), VSH_ERROR_ARGUMENT);
     camera = camera_at(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0);
-    assert_int_equal(vsh_camera_check(&camera, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_camera_check(&camera, &failure), VSH_ERROR_ARGUMENT);
     camera = vsh_camera_default();
-    assert_int_equal(vsh_camera_check(&camera, &error), VSH_OK);
+    assert_ok(vsh_camera_check(&camera, &failure));
     camera.struct_size = 4;
-    assert_int_equal(vsh_camera_check(&camera, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_camera_check(&camera, &failure), VSH_ERROR_ARGUMENT);
 }
 
-static void a_framed_box_fills_the_picture(void **state) {
-    (void)state;
+TEST(a_framed_box_fills_the_picture) {
     const double low[3] = {-3.0, 0.0, 1.0}, high[3] = {2.0, 1.0, 4.0};
     const double ups[3][3] = {{0.0, 1.0, 0.0}, {0.0, 0.0, 2.0}, {0.3, 0.5, -0.2}};
     for (int u = 0; u < 3; ++u) {
         for (double azimuth = 0.0; azimuth < 6.0; azimuth += 0.7) {
             vsh_camera camera = vsh_camera_default();
-            vsh_error error;
             memcpy(camera.up, ups[u], sizeof camera.up);
-            assert_int_equal(vsh_camera_frame(&camera, low, high, azimuth, 0.4, (double)WIDE / HIGH, &error),
-                             VSH_OK);
-            assert_int_equal(vsh_camera_check(&camera, &error), VSH_OK);
+            assert_ok(vsh_camera_frame(&camera, low, high, azimuth, 0.4, (double)WIDE / HIGH, &failure));
+            assert_ok(vsh_camera_check(&camera, &failure));
             const pinhole p = pinhole_of(&camera);
             double most = 0.0;
             for (int corner = 0; corner < 8; ++corner) {
@@ -50,8 +44,7 @@ static void a_framed_box_fills_the_picture(void **state) {
 }
 
 /* Points in a ball: the nearest place from which all are seen, one at an edge of each pair at least. */
-static void framed_points_fill_the_picture(void **state) {
-    (void)state;
+TEST(framed_points_fill_the_picture) {
     enum { COUNT = 50 };
     double points[COUNT][3];
     for (int i = 0; i < COUNT; ++i) {
@@ -61,11 +54,9 @@ static void framed_points_fill_the_picture(void **state) {
     }
     for (double azimuth = 0.0; azimuth < 6.0; azimuth += 0.7) {
         vsh_camera camera = vsh_camera_default();
-        vsh_error error;
-        assert_int_equal(
-            vsh_camera_frame_points(&camera, COUNT, &points[0][0], azimuth, 0.4, (double)WIDE / HIGH, &error),
-            VSH_OK);
-        assert_int_equal(vsh_camera_check(&camera, &error), VSH_OK);
+        assert_ok(vsh_camera_frame_points(&camera, COUNT, &points[0][0], azimuth, 0.4, (double)WIDE / HIGH,
+                                          &failure));
+        assert_ok(vsh_camera_check(&camera, &failure));
         const pinhole p = pinhole_of(&camera);
         double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9};
         for (int i = 0; i < COUNT; ++i) {
@@ -86,19 +77,16 @@ static void framed_points_fill_the_picture(void **state) {
     }
 }
 
-static void points_that_cannot_be_framed_are_refused(void **state) {
-    (void)state;
+TEST(points_that_cannot_be_framed_are_refused) {
     vsh_camera camera = vsh_camera_default();
-    vsh_error error;
     const double same[6] = {1.0, 2.0, 3.0, 1.0, 2.0, 3.0}, bad[6] = {0.0, 0.0, 0.0, NAN, 1.0, 1.0};
-    assert_int_equal(vsh_camera_frame_points(&camera, 2, same, 0.0, 0.0, 1.0, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_camera_frame_points(&camera, 2, bad, 0.0, 0.0, 1.0, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_camera_frame_points(&camera, 0, bad, 0.0, 0.0, 1.0, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_camera_frame_points(&camera, 2, NULL, 0.0, 0.0, 1.0, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_camera_frame_points(&camera, 2, same, 0.0, 0.0, 1.0, &failure), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_camera_frame_points(&camera, 2, bad, 0.0, 0.0, 1.0, &failure), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_camera_frame_points(&camera, 0, bad, 0.0, 0.0, 1.0, &failure), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_camera_frame_points(&camera, 2, NULL, 0.0, 0.0, 1.0, &failure), VSH_ERROR_ARGUMENT);
 }
 
-static void an_orbit_turns_around_the_target(void **state) {
-    (void)state;
+TEST(an_orbit_turns_around_the_target) {
     vsh_camera camera = camera_at(1.0, 2.0, 7.0, 1.0, 1.0, 3.0, 30.0);
     vsh_camera_orbit(&camera, 0.5 * PI);
     const double expected[3] = {5.0, 2.0, 3.0};
@@ -112,12 +100,5 @@ static void an_orbit_turns_around_the_target(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cameras_that_see_nothing_are_refused),
-        cmocka_unit_test(a_framed_box_fills_the_picture),
-        cmocka_unit_test(framed_points_fill_the_picture),
-        cmocka_unit_test(points_that_cannot_be_framed_are_refused),
-        cmocka_unit_test(an_orbit_turns_around_the_target),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

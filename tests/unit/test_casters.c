@@ -1,6 +1,7 @@
 /* Terrains and spheres through the public calls: as layers of a field, and from scene files to lightmaps. */
 #include "field/field.h"
 #include "terrain.h"
+#include "testing.h"
 #include "truth/analytic.h"
 #include "truth/directions.h"
 
@@ -8,14 +9,11 @@
 #include "previews.h"
 #include "scene/scene.h"
 
-#include <stdio.h>
-#include <vdbshade/vdbshade.h>
-
 enum { SIDE = 65, POINTS = 1000 };
 
 static vsh_field *empty_field(void) {
     vsh_field *field = NULL;
-    assert_int_equal(vshi_field_create_empty(1e-5, &field, NULL), VSH_OK);
+    assert_ok(vshi_field_create_empty(1e-5, &field, &failure));
     return field;
 }
 
@@ -38,8 +36,7 @@ static void points_on(const vsh_mesh *mesh, double *positions, float *normals) {
     }
 }
 
-static void a_layer_of_heights_is_marched_by_hard_and_classic_and_by_no_other_method(void **state) {
-    (void)state;
+TEST(a_layer_of_heights_is_marched_by_hard_and_classic_and_by_no_other_method) {
     static double positions[3 * POINTS];
     static float normals[3 * POINTS], values[POINTS], other[POINTS];
     float *heights = hills(SIDE, SIDE);
@@ -56,42 +53,36 @@ static void a_layer_of_heights_is_marched_by_hard_and_classic_and_by_no_other_me
     const vsh_light light = sun(towards, RADIANS(30.0));
     for (int32_t method = 0; method <= VSH_SHADOW_AUTO; ++method) {
         const bool marched = method == VSH_SHADOW_HARD || method == VSH_SHADOW_CLASSIC;
-        vsh_error error = {VSH_OK, ""};
         layer.method = method;
         assert_int_equal(vsh_shade_shadow(occluders_with(empty, &layer, 1), &points, &light, &options, NULL,
-                                          values, NULL, NULL, &error),
+                                          values, NULL, NULL, &failure),
                          marched ? VSH_OK : VSH_ERROR_ARGUMENT);
         assert_true(marched ||
-                    strstr(error.message,
+                    strstr(failure.message,
                            "layer 0: heights and spheres are shaded by the methods hard and classic") !=
                         NULL);
     }
     /* a light of no size is hard */
     layer.softness = 0.0;
     layer.method = VSH_SHADOW_CLASSIC;
-    assert_int_equal(vsh_shade_shadow(occluders_with(empty, &layer, 1), &points, &light, &options, NULL,
-                                      values, NULL, NULL, NULL),
-                     VSH_OK);
+    assert_ok(vsh_shade_shadow(occluders_with(empty, &layer, 1), &points, &light, &options, NULL, values,
+                               NULL, NULL, &failure));
     layer.softness = 1.0;
     layer.method = VSH_SHADOW_HARD;
-    assert_int_equal(vsh_shade_shadow(occluders_with(empty, &layer, 1), &points, &light, &options, NULL,
-                                      other, NULL, NULL, NULL),
-                     VSH_OK);
+    assert_ok(vsh_shade_shadow(occluders_with(empty, &layer, 1), &points, &light, &options, NULL, other, NULL,
+                               NULL, &failure));
     assert_memory_equal(values, other, sizeof values);
     /* another light's layer casts nothing, and heights have no AO by themselves */
     static const char *const lamp_name[] = {"lamp"};
     layer.lights = lamp_name;
     layer.light_count = 1;
-    assert_int_equal(vsh_shade_shadow(occluders_with(empty, &layer, 1), &points, &light, &options, NULL,
-                                      values, NULL, NULL, NULL),
-                     VSH_OK);
-    assert_int_equal(
-        vsh_shade_shadow(occluders_of(empty), &points, &light, &options, NULL, other, NULL, NULL, NULL),
-        VSH_OK);
+    assert_ok(vsh_shade_shadow(occluders_with(empty, &layer, 1), &points, &light, &options, NULL, values,
+                               NULL, NULL, &failure));
+    assert_ok(
+        vsh_shade_shadow(occluders_of(empty), &points, &light, &options, NULL, other, NULL, NULL, NULL));
     assert_memory_equal(values, other, sizeof values);
-    assert_int_equal(vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &options, NULL, values, NULL,
-                                  NULL, NULL, NULL),
-                     VSH_OK);
+    assert_ok(vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &options, NULL, values, NULL, NULL,
+                           NULL, &failure));
     for (size_t i = 0; i < POINTS; ++i) {
         assert_true(values[i] == 1.0f);
     }
@@ -111,11 +102,9 @@ static void bake_floor(const char *casters, float *shadow, float *coverage, int3
              casters);
     vsh_scene *scene = NULL;
     vsh_assets *assets = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vshi_scene_parse(VSH_ASSETS "/scene.json", text, strlen(text), NULL, &scene, &error) != VSH_OK ||
-        vsh_assets_load(scene, NULL, &assets, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vshi_scene_parse(VSH_ASSETS "/scene.json", text, strlen(text), NULL, &scene, &failure) !=
+                  VSH_OK ||
+              vsh_assets_load(scene, NULL, &assets, &failure));
     vsh_layer layer = vsh_layer_default();
     layer.heights = vsh_assets_heights(assets, 0);
     layer.spheres = vsh_assets_spheres(assets, 0);
@@ -127,24 +116,21 @@ static void bake_floor(const char *casters, float *shadow, float *coverage, int3
     size_t count = 0;
     const vsh_mesh *meshes = vsh_assets_receiver(assets, 0, &count);
     vsh_charts *texels = NULL;
-    assert_int_equal(vsh_charts_create(meshes, count, &options, NULL, NULL, &texels, &error), VSH_OK);
+    assert_ok(vsh_charts_create(meshes, count, &options, NULL, NULL, &texels, &failure));
     static const double high[3] = {0.0, 1.0, 0.0};
     const vsh_light light = sun(high, 0.1);
     float *const planes[1] = {shadow};
     vsh_lightmap lightmap = {.shadow = planes, .coverage = coverage};
     vsh_field *empty = empty_field();
-    if (vsh_bake_lightmap(occluders_with(empty, &layer, 1), texels, &light, 1, &shade, NULL, &lightmap, NULL,
-                          &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_bake_lightmap(occluders_with(empty, &layer, 1), texels, &light, 1, &shade, NULL, &lightmap,
+                                NULL, &failure));
     vsh_field_free(empty);
     vsh_charts_free(texels);
     vsh_assets_free(assets);
     vsh_scene_free(scene);
 }
 
-static void texels_within_a_sphere_or_a_terrain_are_not_valid(void **state) {
-    (void)state;
+TEST(texels_within_a_sphere_or_a_terrain_are_not_valid) {
     enum { TEXELS = 64 };
     static float shadow[TEXELS * TEXELS], coverage[TEXELS * TEXELS];
     /* a ball through the floor: its section is a disc of radius 1 of the floor's 5 × 5 */
@@ -171,9 +157,5 @@ static void texels_within_a_sphere_or_a_terrain_are_not_valid(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_layer_of_heights_is_marched_by_hard_and_classic_and_by_no_other_method),
-        cmocka_unit_test(texels_within_a_sphere_or_a_terrain_are_not_valid),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,7 +1,201 @@
 /* What is said of the error of shadow and AO holds against closed forms, and what is asked is kept: edges,
  * corners, slits and discs, by every sampler, in lightmaps and of points on their own. VSH_CLAIMS=1 takes
  * larger ones, and prints all. */
-#include "claimed.h"
+#include "shading.h"
+#include "testing.h"
+#include "texels_of.h"
+#include "truth/directions.h"
+
+/* --- what casts in closed form, of shadow and of AO, and how much is seen beside it */
+
+enum { EDGE, CORNER, SLIT, DISC, SHAPES };
+static const char *const NAMES[SHAPES] = {"edge", "corner", "slit", "disc"};
+
+enum { ROUND = 1024 };
+
+/* Half angle of the sun as a tangent, */
+static double WIDE = 0.25;
+/* height and thickness of what casts, AO distance. */
+static const double HEIGHT = 1.0, THICK = 0.5, DISTANCE = 1.0;
+/* Half the slit, the disc's radius. */
+static const double GAP = 0.125, RADIUS = 0.15;
+
+typedef struct stage {
+    int shape;
+    bool ao;
+    float positions[3][3 * (ROUND + 1)];
+    uint32_t indices[3 * ROUND];
+    vsh_mesh meshes[2];
+    size_t mesh_count;
+    vsh_field *field;
+    vsh_triangles *triangles;
+} stage;
+
+static void add_box(stage *s, const double low[3], const double high[3]) {
+    s->meshes[s->mesh_count] = box_mesh(s->positions[s->mesh_count], low, high);
+    ++s->mesh_count;
+}
+
+/* A flat disc, a fan of as large an area as the circle's. */
+static void make_disc(stage *s, double height, double radius) {
+    float *p = s->positions[0];
+    const double a = 2.0 * PI / ROUND, out = radius * sqrt(a / sin(a));
+    p[0] = p[2] = 0.0f;
+    p[1] = (float)height;
+    for (uint32_t k = 0; k < ROUND; ++k) {
+        p[3 * k + 3] = (float)(out * cos(a * k));
+        p[3 * k + 4] = (float)height;
+        p[3 * k + 5] = (float)(out * sin(a * k));
+        s->indices[3 * k] = 0;
+        s->indices[3 * k + 1] = k + 1;
+        s->indices[3 * k + 2] = (k + 1) % ROUND + 1;
+    }
+    s->meshes[s->mesh_count++] = (vsh_mesh){.name = "disc",
+                                            .positions = p,
+                                            .indices = s->indices,
+                                            .vertex_count = ROUND + 1,
+                                            .triangle_count = ROUND};
+}
+
+/* Boxes whose faces lie on planes of the lattice, where a field of them is exact; shadows fall on y = 0.
+ * Walls for AO stand in it. */
+static stage *make_stage(int shape, bool ao, double voxel) {
+    stage *s = calloc(1, sizeof *s);
+    assert_non_null(s);
+    s->shape = shape;
+    s->ao = ao;
+    const double y0 = ao ? -0.5 : HEIGHT, y1 = ao ? 1.5 : HEIGHT + THICK, far = 2.0;
+    const double all[2][3] = {{-far, y0, -far}, {far, y1, far}};
+    if (shape == DISC) {
+        make_disc(s, HEIGHT, ao ? 4.0 * RADIUS : RADIUS);
+    } else if (shape == CORNER && !ao) {
+        add_box(s, (double[]){0.0, y0, 0.0}, all[1]);
+    } else {
+        add_box(s, (double[]){shape == SLIT && !ao ? GAP : 0.0, y0, -far}, all[1]);
+        if (shape == SLIT) {
+            add_box(s, all[0], (double[]){ao ? -1.5 : -GAP, y1, far});
+        }
+        if (shape == CORNER) {
+            add_box(s, (double[]){-far, y0, 0.0}, all[1]);
+        }
+    }
+    const vsh_grid_options options = with_voxel(voxel);
+    vsh_grid *grid = NULL;
+    assert_ok(vsh_grid_from_meshes(s->meshes, s->mesh_count, &options, NULL, &grid, &failure));
+    assert_ok(vsh_field_create(grid, NULL, NULL, &s->field, &failure));
+    if (vsh_triangles_available()) {
+        assert_ok(vsh_triangles_create(s->meshes, s->mesh_count, NULL, &s->triangles, &failure));
+    }
+    vsh_grid_free(grid);
+    return s;
+}
+
+static void free_stage(stage *s) {
+    vsh_triangles_free(s->triangles);
+    vsh_field_free(s->field);
+    free(s);
+}
+
+/* --- closed forms: shares of a unit disc */
+
+/* Where x < a and y < b. */
+static double below_both(double a, double b) {
+    if (a <= -1.0 || b <= -1.0) {
+        return 0.0;
+    }
+    if (a >= 1.0 || b >= 1.0) {
+        return a >= 1.0 ? b >= 1.0 ? 1.0 : truth_disc_share(b) : truth_disc_share(a);
+    }
+    if (a * a + b * b >= 1.0) { /* the corner is outside the disc */
+        return a > 0.0 && b > 0.0 ? truth_disc_share(a) + truth_disc_share(b) - 1.0
+               : a > 0.0          ? truth_disc_share(b)
+               : b > 0.0          ? truth_disc_share(a)
+                                  : 0.0;
+    }
+    /* half of each part that the lines through the corner cut off, and the rest by the corner's rectangle:
+     * d²/da db of the share is 1 / π in the disc */
+    return 0.5 * (truth_disc_share(a) + truth_disc_share(b)) - 0.25 + a * b / PI;
+}
+
+/* Where circles of radius 1 and r, so far apart, overlap. */
+static double overlap(double r, double apart) {
+    if (apart >= 1.0 + r) {
+        return 0.0;
+    }
+    if (apart <= fabs(1.0 - r)) {
+        return r < 1.0 ? r * r : 1.0;
+    }
+    const double x = (apart * apart + 1.0 - r * r) / (2.0 * apart), y = apart - x;
+    const double h = sqrt(fmax(0.0, 1.0 - x * x));
+    return (acos(x) - x * h + r * r * acos(fmin(1.0, fmax(-1.0, y / r))) - y * h) / PI;
+}
+
+/* How far a face at `off` hides the light, in radii of its disc: by its upper edge where it stands beside the
+ * receiver, by its lower one where it is above it. */
+static double limit(double off) {
+    return off / (off > 0.0 ? HEIGHT + THICK : HEIGHT) / WIDE;
+}
+
+/* The corner's edges, seen from beside one and under the other, hide what lies between their ends: the part
+ * of each line of the disc is known. */
+static double beside_corner(double x, double z) {
+    enum { LINES = 4000 };
+    double hidden = 0.0;
+    for (int k = 0; k < LINES; ++k) {
+        const double angle = PI * ((k + 0.5) / LINES - 0.5), v = sin(angle), half = cos(angle);
+        /* heights at which the line is behind the corner's edge along x */
+        const double rise = WIDE * v;
+        double low = HEIGHT, high = HEIGHT + THICK;
+        if (z + low * rise <= 0.0 && z + high * rise <= 0.0) {
+            continue;
+        }
+        if (z + low * rise <= 0.0) {
+            low = -z / rise;
+        } else if (z + high * rise <= 0.0) {
+            high = -z / rise;
+        }
+        const double least = fmin(-x / low, -x / high) / WIDE;
+        const double from = fmax(least, -half);
+        hidden += from < half ? (half - from) * half : 0.0;
+    }
+    return 1.0 - hidden / LINES;
+}
+
+static double shadow_truth(const stage *s, double x, double z) {
+    switch (s->shape) {
+    case EDGE:
+        return truth_disc_share(fmin(1.0, fmax(-1.0, limit(-x))));
+    case SLIT:
+        return fmax(0.0, truth_disc_share(fmin(1.0, fmax(-1.0, limit(GAP - x)))) +
+                             truth_disc_share(fmin(1.0, fmax(-1.0, limit(GAP + x)))) - 1.0);
+    case CORNER:
+        return beside_corner(x, z);
+    default:
+        return 1.0 - overlap(RADIUS / HEIGHT / WIDE, hypot(x, z) / HEIGHT / WIDE);
+    }
+}
+
+/* Malley's: directions are even over the disc below them, and walls hide where they are nearer than the
+ * distance. */
+static double ao_truth(const stage *s, double x, double z) {
+    switch (s->shape) {
+    case EDGE:
+        return truth_disc_share(fmin(1.0, -x / DISTANCE));
+    case SLIT:
+        return truth_disc_share(fmin(1.0, -x / DISTANCE)) +
+               truth_disc_share(fmin(1.0, (1.5 + x) / DISTANCE)) - 1.0;
+    case CORNER:
+        return below_both(-x / DISTANCE, -z / DISTANCE);
+    default: { /* a parallel disc: Hottel's configuration factor */
+        const double h = HEIGHT / (4.0 * RADIUS), r = hypot(x, z) / (4.0 * RADIUS), sum = 1.0 + h * h + r * r;
+        return 1.0 - 0.5 * (1.0 - (h * h + r * r - 1.0) / sqrt(sum * sum - 4.0 * r * r));
+    }
+    }
+}
+
+static double truth_at(const stage *s, double x, double z) {
+    return s->ao ? ao_truth(s, x, z) : shadow_truth(s, x, z);
+}
 
 enum { MOST_TEXELS = 1 << 13 };
 
@@ -65,7 +259,6 @@ static outcome try(const stage *s, const trial *t) {
     vsh_texels *texels = rasterize(charts);
     const vsh_texel_samples all = vsh_texels_samples(texels);
     outcome o = {0};
-    vsh_error error = {0};
     vsh_result result = VSH_OK;
     if (t->lightmap) {
         vsh_bake_error errors[2] = {{0}};
@@ -76,7 +269,7 @@ static outcome try(const stage *s, const trial *t) {
         const vsh_occluders casters = {
             .field = s->field, .triangles = s->triangles, .true_triangles = t->held ? s->triangles : NULL};
         result = vsh_bake_lightmap(&casters, charts, s->ao ? NULL : &light, s->ao ? 0 : 1, &options.shade,
-                                   NULL, &lightmap, &stats, &error);
+                                   NULL, &lightmap, &stats, &failure);
         o.claimed = vsh_bake_error_rmse(&errors[0]);
         o.rays = (double)stats.shade.rays;
     } else {
@@ -88,18 +281,16 @@ static outcome try(const stage *s, const trial *t) {
         }
         const vsh_points points = {all.count, places, normals, NULL};
         result = s->ao ? vsh_shade_ao(occluders_traced(s->field, s->triangles), &points, &options.shade, NULL,
-                                      values, deviations, NULL, &stats, &error)
+                                      values, deviations, NULL, &stats, &failure)
                        : vsh_shade_shadow(occluders_traced(s->field, s->triangles), &points, &light,
-                                          &options.shade, NULL, values, deviations, &stats, &error);
+                                          &options.shade, NULL, values, deviations, &stats, &failure);
         for (size_t i = 0; i < all.count; ++i) {
             o.claimed += (double)deviations[i] * (double)deviations[i] / (double)all.count;
         }
         o.claimed = sqrt(o.claimed);
         o.rays = (double)stats.rays;
     }
-    if (result != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(result);
     double sum = 0.0, within = 0.0, inside = 0.0;
     for (size_t i = 0; i < all.count; ++i) {
         const double *p = t->lightmap ? all.positions + 3 * i : places + 3 * i;
@@ -197,21 +388,18 @@ static void need_triangles(void) {
     }
 }
 
-static void shadows_of_exact_claim_their_error_and_keep_what_is_asked(void **state) {
-    (void)state;
+TEST(shadows_of_exact_claim_their_error_and_keep_what_is_asked) {
     need_triangles();
     assert_int_equal(claims(false, true, VSH_SAMPLER_SOBOL, 0, 5), 0);
 }
 
-static void ao_of_exact_claims_its_error_and_keeps_what_is_asked(void **state) {
-    (void)state;
+TEST(ao_of_exact_claims_its_error_and_keeps_what_is_asked) {
     need_triangles();
     assert_int_equal(claims(true, true, VSH_SAMPLER_SOBOL, 0, 5), 0);
 }
 
 /* Blue noise is Sobol's sequence where 0.01 or less is asked. */
-static void white_and_blue_noise_claim_theirs(void **state) {
-    (void)state;
+TEST(white_and_blue_noise_claim_theirs) {
     need_triangles();
     for (int ao = 0; ao < 2; ++ao) {
         assert_int_equal(claims(ao, true, VSH_SAMPLER_WHITE, 0, everything ? 4 : 3), 0);
@@ -227,8 +415,7 @@ static void white_and_blue_noise_claim_theirs(void **state) {
     free_stage(s);
 }
 
-static void adaptive_on_a_field_of_flat_faces_does_too(void **state) {
-    (void)state;
+TEST(adaptive_on_a_field_of_flat_faces_does_too) {
     need_triangles();
     for (int ao = 0; ao < 2; ++ao) {
         assert_int_equal(claims(ao, false, VSH_SAMPLER_SOBOL, 0, 4), 0);
@@ -236,8 +423,7 @@ static void adaptive_on_a_field_of_flat_faces_does_too(void **state) {
 }
 
 /* All of a point's first rays may miss what hides a small part of a wide sun. */
-static void what_few_rays_miss_is_claimed(void **state) {
-    (void)state;
+TEST(what_few_rays_miss_is_claimed) {
     need_triangles();
     const double before = WIDE;
     WIDE = 0.45;
@@ -257,8 +443,7 @@ static void what_few_rays_miss_is_claimed(void **state) {
 }
 
 /* At the ends of a penumbra nearly all rays agree: there the light's last hundredth was lost. */
-static void ends_of_penumbrae_do_not_collapse(void **state) {
-    (void)state;
+TEST(ends_of_penumbrae_do_not_collapse) {
     need_triangles();
     stage *s = make_stage(EDGE, false, 0.0625);
     const trial t = {
@@ -271,8 +456,7 @@ static void ends_of_penumbrae_do_not_collapse(void **state) {
 }
 
 /* The forms themselves, by rays. */
-static void closed_forms_are_what_many_rays_see(void **state) {
-    (void)state;
+TEST(closed_forms_are_what_many_rays_see) {
     need_triangles();
     const double at[][2] = {{0.1, 0.05},  {-0.2, 0.1}, {0.03, -0.11},
                             {-0.3, -0.2}, {0.2, -0.3}, {-0.05, 0.31}};
@@ -285,11 +469,10 @@ static void closed_forms_are_what_many_rays_see(void **state) {
             const float up[3] = {0.0f, 1.0f, 0.0f};
             const vsh_light light = sun((double[]){0.0, 1.0, 0.0}, 2.0 * atan(WIDE));
             float seen = -1.0f;
-            assert_int_equal(
-                s->ao ? vsh_trace_ao(s->triangles, NULL, 1, p, up, 0.0, s->shape == DISC ? 100.0 : DISTANCE,
-                                     65536, NULL, &seen, NULL)
-                      : vsh_trace_shadow(s->triangles, NULL, 1, p, up, 0.0, &light, 65536, NULL, &seen, NULL),
-                VSH_OK);
+            assert_ok(s->ao ? vsh_trace_ao(s->triangles, NULL, 1, p, up, 0.0,
+                                           s->shape == DISC ? 100.0 : DISTANCE, 65536, NULL, &seen, NULL)
+                            : vsh_trace_shadow(s->triangles, NULL, 1, p, up, 0.0, &light, 65536, NULL, &seen,
+                                               NULL));
             assert_true(fabs((double)seen - truth_at(s, x, z)) < 5e-4);
         }
         free_stage(s);
@@ -299,14 +482,5 @@ static void closed_forms_are_what_many_rays_see(void **state) {
 int main(void) {
     const char *all = getenv("VSH_CLAIMS");
     everything = all != NULL && strcmp(all, "1") == 0;
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(closed_forms_are_what_many_rays_see),
-        cmocka_unit_test(shadows_of_exact_claim_their_error_and_keep_what_is_asked),
-        cmocka_unit_test(ao_of_exact_claims_its_error_and_keeps_what_is_asked),
-        cmocka_unit_test(white_and_blue_noise_claim_theirs),
-        cmocka_unit_test(adaptive_on_a_field_of_flat_faces_does_too),
-        cmocka_unit_test(what_few_rays_miss_is_claimed),
-        cmocka_unit_test(ends_of_penumbrae_do_not_collapse),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,7 +1,6 @@
 /* Charts that are too close: what is found is what looking at all borders finds. */
 #include "fields.h"
-
-#include <vdbshade/vdbshade.h>
+#include "testing.h"
 
 enum { CHARTS = 60, WIDTH = 96, HEIGHT = 64 };
 
@@ -80,8 +79,7 @@ static double nearest_of(const charts *c, int chart) {
     return nearest;
 }
 
-static void the_least_gap_is_that_of_all_borders(void **state) {
-    (void)state;
+TEST(the_least_gap_is_that_of_all_borders) {
     static charts c;
     int apart = 0, close = 0;
     for (uint64_t seed = 1; seed <= 60; ++seed) {
@@ -92,10 +90,7 @@ static void the_least_gap_is_that_of_all_borders(void **state) {
             truth = fmin(truth, nearest_of(&c, i));
         }
         vsh_closeness found;
-        vsh_error why;
-        if (vsh_charts_closeness(&mesh, 1, WIDTH, HEIGHT, NULL, &found, &why) != VSH_OK) {
-            fail_msg("%s", why.message);
-        }
+        assert_ok(vsh_charts_closeness(&mesh, 1, WIDTH, HEIGHT, NULL, &found, &failure));
         assert_float_equal(found.gap, truth, 1e-4);
         assert_true((found.texels > 0) == (truth < 1.0));
         close += truth < 1.0;
@@ -106,6 +101,5 @@ static void the_least_gap_is_that_of_all_borders(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(the_least_gap_is_that_of_all_borders)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

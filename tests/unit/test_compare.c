@@ -1,5 +1,6 @@
 /* Comparing values: what the formulas say, what is refused, and what never passes. */
 #include "compared.h"
+#include "testing.h"
 
 enum { WIDTH = 40, HEIGHT = 25, COUNT = WIDTH * HEIGHT };
 
@@ -9,8 +10,7 @@ static double wavy(const void *user, double x, double y, double z) {
     return 0.5 + 0.3 * sin(0.4 * x) * cos(0.3 * y) + 0.1 * noise((uint32_t)(y * WIDTH + x));
 }
 
-static void differences_are_summed_as_their_formulas_say(void **unused) {
-    (void)unused;
+TEST(differences_are_summed_as_their_formulas_say) {
     const double half = 0.5;
     plane golden = make_plane(WIDTH, HEIGHT, 1, flat, &half),
           values = make_plane(WIDTH, HEIGHT, 1, flat, &half);
@@ -33,8 +33,7 @@ static void differences_are_summed_as_their_formulas_say(void **unused) {
     free(values.values);
 }
 
-static void masked_values_count_for_nothing(void **unused) {
-    (void)unused;
+TEST(masked_values_count_for_nothing) {
     plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL),
           values = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
     uint8_t mask[COUNT];
@@ -52,8 +51,7 @@ static void masked_values_count_for_nothing(void **unused) {
     free(values.values);
 }
 
-static void values_past_one_are_taken_by_the_largest_golden_one(void **unused) {
-    (void)unused;
+TEST(values_past_one_are_taken_by_the_largest_golden_one) {
     plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL),
           values = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
     for (size_t i = 0; i < COUNT; ++i) {
@@ -74,8 +72,7 @@ static void values_past_one_are_taken_by_the_largest_golden_one(void **unused) {
 
 /* --- what never passes */
 
-static void a_value_that_is_not_finite_never_passes(void **unused) {
-    (void)unused;
+TEST(a_value_that_is_not_finite_never_passes) {
     vsh_limits limits = vsh_limits_default();
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
         limits.value[i] = INFINITY;
@@ -101,8 +98,7 @@ static void a_value_that_is_not_finite_never_passes(void **unused) {
     }
 }
 
-static void nothing_compared_is_nothing_held(void **unused) {
-    (void)unused;
+TEST(nothing_compared_is_nothing_held) {
     plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
     uint8_t mask[COUNT] = {0};
     const vsh_measures m = measure(&golden, &golden, mask);
@@ -112,8 +108,7 @@ static void nothing_compared_is_nothing_held(void **unused) {
     free(golden.values);
 }
 
-static void each_measure_is_held_to_its_own_limit(void **unused) {
-    (void)unused;
+TEST(each_measure_is_held_to_its_own_limit) {
     const vsh_limits limits = vsh_limits_default();
     vsh_measures m = {.count = 1};
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
@@ -135,8 +130,7 @@ static void each_measure_is_held_to_its_own_limit(void **unused) {
 
 /* --- coverage */
 
-static void coverage_is_counted_and_becomes_a_mask(void **unused) {
-    (void)unused;
+TEST(coverage_is_counted_and_becomes_a_mask) {
     const float golden[6] = {1, 1, 1, 0, 0, 0.5f}, values[6] = {1, 0, 1, 1, 0, 0.75f};
     uint8_t mask[6];
     vsh_coverage c;
@@ -154,8 +148,7 @@ static void coverage_is_counted_and_becomes_a_mask(void **unused) {
 
 /* --- calls */
 
-static void the_same_bits_for_any_number_of_threads(void **unused) {
-    (void)unused;
+TEST(the_same_bits_for_any_number_of_threads) {
     plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL),
           values = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
     for (uint32_t i = 0; i < COUNT; ++i) {
@@ -164,12 +157,11 @@ static void the_same_bits_for_any_number_of_threads(void **unused) {
     const vsh_compared c = pair_of(&golden, &values, NULL);
     vsh_measures first, other;
     memset(&first, 0, sizeof first);
-    vsh_run run = vsh_run_default();
-    run.threads = 1;
-    assert_int_equal(vsh_compare(&c, NULL, &run, &first, NULL), VSH_OK);
+    vsh_run run = run_on(1);
+    assert_ok(vsh_compare(&c, NULL, &run, &first, &failure));
     for (run.threads = 2; run.threads <= 8; run.threads *= 2) {
         memset(&other, 0, sizeof other);
-        assert_int_equal(vsh_compare(&c, NULL, &run, &other, NULL), VSH_OK);
+        assert_ok(vsh_compare(&c, NULL, &run, &other, &failure));
         assert_memory_equal(&first, &other, sizeof first);
     }
     free(golden.values);
@@ -182,12 +174,10 @@ static int32_t stop(void *user, const char *stage, double fraction) {
     return 1;
 }
 
-static void bad_calls_are_refused_by_name(void **unused) {
-    (void)unused;
+TEST(bad_calls_are_refused_by_name) {
     plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
     const vsh_compared good = pair_of(&golden, &golden, NULL);
     vsh_measures m;
-    vsh_error error;
     const struct {
         double step;
         int32_t reach, side;
@@ -204,19 +194,18 @@ static void bad_calls_are_refused_by_name(void **unused) {
         vsh_compare_options options = vsh_compare_options_default();
         options.step = cases[i].step;
         options.reach = cases[i].reach;
-        assert_int_equal(vsh_compare(&c, &options, NULL, &m, &error), VSH_ERROR_ARGUMENT);
-        assert_non_null(strstr(error.message, cases[i].word));
+        assert_fails(vsh_compare(&c, &options, NULL, &m, &failure), VSH_ERROR_ARGUMENT, cases[i].word);
     }
     assert_int_equal(vsh_compare(NULL, NULL, NULL, &m, NULL), VSH_ERROR_ARGUMENT);
     assert_int_equal(vsh_compare(&good, NULL, NULL, NULL, NULL), VSH_ERROR_ARGUMENT);
     vsh_run run = vsh_run_default();
     run.memory_limit = COUNT * 20;
-    assert_int_equal(vsh_compare(&good, NULL, &run, &m, &error), VSH_ERROR_LIMIT);
+    assert_int_equal(vsh_compare(&good, NULL, &run, &m, &failure), VSH_ERROR_LIMIT);
     int asked = 0;
     run = vsh_run_default();
     run.progress = stop;
     run.user = &asked;
-    assert_int_equal(vsh_compare(&good, NULL, &run, &m, &error), VSH_ERROR_CANCELLED);
+    assert_int_equal(vsh_compare(&good, NULL, &run, &m, &failure), VSH_ERROR_CANCELLED);
     assert_int_equal(asked, 1);
     free(golden.values);
 }
@@ -226,11 +215,7 @@ static void bad_calls_are_refused_by_name(void **unused) {
 enum { SIDE = 96 };
 
 static vsh_measures compare(plane_fn *fn, const void *golden, const void *values) {
-    plane a = make_plane(SIDE, SIDE, 1, fn, golden), b = make_plane(SIDE, SIDE, 1, fn, values);
-    const vsh_measures m = measure(&a, &b, NULL);
-    free(a.values);
-    free(b.values);
-    return m;
+    return measure_as(SIDE, SIDE, 1, fn, golden, values);
 }
 
 /* A straight edge of a width and a slope, moved along y. */
@@ -245,8 +230,7 @@ static double straight_at(const void *user, double x, double y, double z) {
     return fmin(1.0, fmax(0.0, 0.5 + up / sqrt(1.0 + e->slope * e->slope) / e->width));
 }
 
-static void an_edge_moves_across_itself_alone(void **unused) {
-    (void)unused;
+TEST(an_edge_moves_across_itself_alone) {
     const double slopes[] = {0.0175, 0.1, 0.3, -0.5, 0.8, 1.4}, widths[] = {1e-6, 0.5, 1.0, 3.0, 8.0},
                  lengths[] = {0.02, 0.3};
     for (size_t i = 0; i < 6 * 5 * 2; ++i) {
@@ -270,17 +254,13 @@ static double planes_at(const void *user, double x, double y, double z) {
     return 0.5 + 0.5 * tanh(fmin(a, b) / 1.2);
 }
 
-static void what_planes_in_space_do_not_tell_is_no_displacement(void **unused) {
-    (void)unused;
+TEST(what_planes_in_space_do_not_tell_is_no_displacement) {
     for (int second = 0; second < 2; ++second) {
         const double still[] = {0.0, 0.0, 0.0, second}, moved[] = {0.0, 0.4, 0.7, second};
-        plane a = make_plane(24, 20, 16, planes_at, still), b = make_plane(24, 20, 16, planes_at, moved);
-        const vsh_measures m = measure(&a, &b, NULL);
+        const vsh_measures m = measure_as(24, 20, 16, planes_at, still, moved);
         assert_near(m.shift[0], second ? 0.0 : -0.1 * 0.26 / 1.05, 0.01);
         assert_near(m.shift[1], second ? 0.25 : 0.26 / 1.05, 0.01);
         assert_near(m.shift[2], second ? -0.05 : -0.2 * 0.26 / 1.05, 0.005);
-        free(a.values);
-        free(b.values);
     }
 }
 
@@ -293,8 +273,7 @@ static double tall_at(const void *user, double x, double y, double z) {
     return 0.5 + 0.5 * tanh((fabs(x - middle) - 10.1) / width);
 }
 
-static void a_sun_that_hardly_moved_is_alike(void **unused) {
-    (void)unused;
+TEST(a_sun_that_hardly_moved_is_alike) {
     const vsh_limits limits = vsh_limits_default();
     const double none = 0.0;
     for (double lean = 2e-5; lean < 5e-4; lean *= 2.0) {
@@ -311,8 +290,7 @@ static double long_at(const void *user, double x, double y, double z) {
     return 0.5 + 0.5 * tanh(fmax(fabs(x - 48.0 - moved) - 30.0, fabs(y - 44.0) - 5.0) / 1.5);
 }
 
-static void a_shadow_six_times_as_long_as_wide_is_seen_to_move_along_itself(void **unused) {
-    (void)unused;
+TEST(a_shadow_six_times_as_long_as_wide_is_seen_to_move_along_itself) {
     const double still = 0.0, moved = 0.7;
     const vsh_measures m = compare(long_at, &still, &moved);
     assert_near(m.shift[0], 0.7, 0.02);
@@ -327,8 +305,7 @@ static double border_at(const void *user, double x, double y, double z) {
     return 0.5 + 0.5 * tanh((at - 60.0) / 6.0) - 0.5 * fmax(0.0, (8.0 - at) / 8.0);
 }
 
-static void what_comes_from_outside_is_not_explained(void **unused) {
-    (void)unused;
+TEST(what_comes_from_outside_is_not_explained) {
     const double still = 0.0, moved = -3.0;
     const vsh_measures m = compare(border_at, &still, &moved);
     double inside = 0.0,
@@ -344,21 +321,5 @@ static void what_comes_from_outside_is_not_explained(void **unused) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(differences_are_summed_as_their_formulas_say),
-        cmocka_unit_test(masked_values_count_for_nothing),
-        cmocka_unit_test(values_past_one_are_taken_by_the_largest_golden_one),
-        cmocka_unit_test(a_value_that_is_not_finite_never_passes),
-        cmocka_unit_test(nothing_compared_is_nothing_held),
-        cmocka_unit_test(each_measure_is_held_to_its_own_limit),
-        cmocka_unit_test(coverage_is_counted_and_becomes_a_mask),
-        cmocka_unit_test(the_same_bits_for_any_number_of_threads),
-        cmocka_unit_test(bad_calls_are_refused_by_name),
-        cmocka_unit_test(an_edge_moves_across_itself_alone),
-        cmocka_unit_test(what_planes_in_space_do_not_tell_is_no_displacement),
-        cmocka_unit_test(a_sun_that_hardly_moved_is_alike),
-        cmocka_unit_test(a_shadow_six_times_as_long_as_wide_is_seen_to_move_along_itself),
-        cmocka_unit_test(what_comes_from_outside_is_not_explained),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,20 +1,7 @@
 /* Files compared: what tolerances say is put over the defaults, what they must not say is refused, and what
  * two images come to. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
-#include <cmocka.h>
-
-#include <vdbshade/compare.h>
-
-#include <math.h>
-#include <unistd.h>
-
+#include "testing.h"
 static char path[64];
 
 static int make_file(void **state) {
@@ -39,18 +26,14 @@ static vsh_result read_text(const char *text, vsh_tolerances **tolerances, vsh_e
 
 static vsh_limits limits_of(const char *text, const char *channel, double *coverage) {
     vsh_tolerances *tolerances = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (read_text(text, &tolerances, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(read_text(text, &tolerances, &failure));
     vsh_limits limits = vsh_limits_default();
     vsh_tolerances_apply(tolerances, channel, &limits, coverage);
     vsh_tolerances_free(tolerances);
     return limits;
 }
 
-static void what_a_file_does_not_say_stays(void **unused) {
-    (void)unused;
+TEST(what_a_file_does_not_say_stays) {
     const vsh_limits defaults = vsh_limits_default(), limits = limits_of("{}", "ao", NULL);
     assert_memory_equal(&limits, &defaults, sizeof limits);
     vsh_limits same = defaults;
@@ -58,8 +41,7 @@ static void what_a_file_does_not_say_stays(void **unused) {
     assert_memory_equal(&same, &defaults, sizeof same);
 }
 
-static void every_measure_but_one_has_a_key_of_its_name(void **unused) {
-    (void)unused;
+TEST(every_measure_but_one_has_a_key_of_its_name) {
     const vsh_limits defaults = vsh_limits_default();
     for (int i = 1; i < VSH_MEASURE_COUNT; ++i) {
         char text[64];
@@ -73,8 +55,7 @@ static void every_measure_but_one_has_a_key_of_its_name(void **unused) {
     assert_true(isinf(off.value[VSH_MEASURE_MAX]));
 }
 
-static void channels_come_over_the_rest_in_their_order(void **unused) {
-    (void)unused;
+TEST(channels_come_over_the_rest_in_their_order) {
     static const char text[] = "{\"rmse\": 0.5, \"coverage\": 0.25, \"step\": 0.125, \"channels\": {"
                                "\"shadow.*\": {\"rmse\": 0.25, \"reach\": 4},"
                                "\"shadow.sun\": {\"rmse\": 0.0625, \"step\": 0.5}, \"*\": {\"max\": 0.5}}}";
@@ -91,8 +72,7 @@ static void channels_come_over_the_rest_in_their_order(void **unused) {
     assert_true(ao.value[VSH_MEASURE_MAX] == 0.5 && sun.value[VSH_MEASURE_MAX] == 0.5);
 }
 
-static void bad_files_are_refused_with_the_place(void **unused) {
-    (void)unused;
+TEST(bad_files_are_refused_with_the_place) {
     static const struct {
         const char *text, *words[2];
     } cases[] = {
@@ -111,12 +91,11 @@ static void bad_files_are_refused_with_the_place(void **unused) {
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
         vsh_tolerances *tolerances = NULL;
-        vsh_error error = {VSH_OK, ""};
-        assert_int_equal(read_text(cases[i].text, &tolerances, &error), VSH_ERROR_INPUT);
+        assert_int_equal(read_text(cases[i].text, &tolerances, &failure), VSH_ERROR_INPUT);
         assert_null(tolerances);
         for (int k = 0; k < 2; ++k) {
-            if (strstr(error.message, cases[i].words[k]) == NULL) {
-                fail_msg("'%s' is not in '%s'", cases[i].words[k], error.message);
+            if (strstr(failure.message, cases[i].words[k]) == NULL) {
+                fail_msg("'%s' is not in '%s'", cases[i].words[k], failure.message);
             }
         }
     }
@@ -141,7 +120,7 @@ static void write_image(const char *image, int32_t width, float spot, int32_t ch
     const char *const names[] = {"ao", "A"};
     const float *const planes[] = {ao, covered};
     const vsh_image view = {width, COUNT / width, channels, names, planes, NULL};
-    assert_int_equal(vsh_image_write(image, &view, NULL, NULL), VSH_OK);
+    assert_ok(vsh_image_write(image, &view, NULL, &failure));
 }
 
 static int32_t seen;
@@ -155,17 +134,15 @@ static int32_t look(void *user, size_t index, const vsh_channel_comparison *chan
     return user != NULL;
 }
 
-static void two_files_are_compared_channel_by_channel(void **state) {
-    (void)state;
+TEST(two_files_are_compared_channel_by_channel) {
     char golden[80], fresh[80];
     snprintf(golden, sizeof golden, "%s.golden.exr", path);
     snprintf(fresh, sizeof fresh, "%s.new.exr", path);
     vsh_compare_files_options options = vsh_compare_files_options_default();
     vsh_comparison *c = NULL;
-    vsh_error error;
     write_image(golden, SIDE, 0.0f, 2);
     write_image(fresh, SIDE, 0.0f, 2);
-    assert_int_equal(vsh_compare_files(golden, fresh, NULL, NULL, &c, &error), VSH_OK);
+    assert_ok(vsh_compare_files(golden, fresh, NULL, NULL, &c, &failure));
     assert_int_equal(vsh_comparison_alike(c), 1);
     assert_null(vsh_comparison_problem(c, 0));
     assert_int_equal(vsh_comparison_channel(c, 0)->is_coverage, 1);
@@ -176,7 +153,7 @@ static void two_files_are_compared_channel_by_channel(void **state) {
 
     write_image(fresh, SIDE, 0.4f, 2);
     options.look = look;
-    assert_int_equal(vsh_compare_files(golden, fresh, &options, NULL, &c, &error), VSH_OK);
+    assert_ok(vsh_compare_files(golden, fresh, &options, NULL, &c, &failure));
     assert_int_equal(seen, 1);
     assert_int_equal(vsh_comparison_alike(c), 0);
     const vsh_channel_comparison *ao = vsh_comparison_channel(c, 1);
@@ -186,15 +163,15 @@ static void two_files_are_compared_channel_by_channel(void **state) {
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
         options.limits[i] = 1e9;
     }
-    assert_int_equal(vsh_compare_files(golden, fresh, &options, NULL, &c, &error), VSH_OK);
+    assert_ok(vsh_compare_files(golden, fresh, &options, NULL, &c, &failure));
     assert_int_equal(vsh_comparison_alike(c), 1);
     vsh_comparison_free(c);
     options.user = &options;
-    assert_int_equal(vsh_compare_files(golden, fresh, &options, NULL, &c, &error), VSH_ERROR_CANCELLED);
+    assert_int_equal(vsh_compare_files(golden, fresh, &options, NULL, &c, &failure), VSH_ERROR_CANCELLED);
     assert_null(c);
 
     write_image(fresh, 2 * SIDE, 0.0f, 1);
-    assert_int_equal(vsh_compare_files(golden, fresh, NULL, NULL, &c, &error), VSH_OK);
+    assert_ok(vsh_compare_files(golden, fresh, NULL, NULL, &c, &failure));
     assert_int_equal(vsh_comparison_alike(c), 0);
     assert_string_equal(vsh_comparison_problem(c, 0), "channel 'A': in golden alone");
     assert_string_equal(vsh_comparison_problem(c, 1), "size: golden is 16 × 16, new is 32 × 8");
@@ -202,17 +179,10 @@ static void two_files_are_compared_channel_by_channel(void **state) {
     vsh_comparison_free(c);
 
     assert_int_equal(unlink(fresh), 0);
-    assert_int_equal(vsh_compare_files(golden, fresh, NULL, NULL, &c, &error), VSH_ERROR_READ);
+    assert_int_equal(vsh_compare_files(golden, fresh, NULL, NULL, &c, &failure), VSH_ERROR_READ);
     assert_int_equal(unlink(golden), 0);
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_a_file_does_not_say_stays),
-        cmocka_unit_test(every_measure_but_one_has_a_key_of_its_name),
-        cmocka_unit_test(channels_come_over_the_rest_in_their_order),
-        cmocka_unit_test(bad_files_are_refused_with_the_place),
-        cmocka_unit_test(two_files_are_compared_channel_by_channel),
-    };
-    return cmocka_run_group_tests(tests, make_file, remove_file);
+    return run_all_tests(make_file, remove_file);
 }

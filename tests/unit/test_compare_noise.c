@@ -1,5 +1,6 @@
 /* Comparing estimates: noise that is known of is no fault, and hides none that is larger. */
 #include "compared.h"
+#include "testing.h"
 
 enum { SIDE = 128, COUNT = SIDE * SIDE };
 
@@ -38,10 +39,7 @@ static uint32_t judge(plane golden, plane values, double allowed, vsh_measures *
     vsh_limits limits = vsh_limits_default();
     vsh_limits_allow_noise(&limits, allowed);
     const vsh_compared c = pair_of(&golden, &values, NULL);
-    vsh_error told = {VSH_OK, ""};
-    if (vsh_compare(&c, &limits.options, NULL, m, &told) != VSH_OK) {
-        fail_msg("%s", told.message);
-    }
+    assert_ok(vsh_compare(&c, &limits.options, NULL, m, &failure));
     free(golden.values);
     free(values.values);
     return vsh_compare_judge(m, &limits);
@@ -64,8 +62,7 @@ static bool has(uint32_t failed, int measure) {
     return (failed >> measure & 1) != 0;
 }
 
-static void estimates_are_alike_within_their_errors_and_not_beyond(void **unused) {
-    (void)unused;
+TEST(estimates_are_alike_within_their_errors_and_not_beyond) {
     assert_int_equal(failures(usual, error, error), 0);
     assert_int_equal(failures(usual, 0.0, 0.0), 0);
     const uint32_t strict = failures(usual, error, 0.0), twice = failures(usual, 2.0 * error, error);
@@ -73,8 +70,7 @@ static void estimates_are_alike_within_their_errors_and_not_beyond(void **unused
     assert_true(has(twice, VSH_MEASURE_RMSE) && has(twice, VSH_MEASURE_P99));
 }
 
-static void faults_are_told_through_the_noise(void **unused) {
-    (void)unused;
+TEST(faults_are_told_through_the_noise) {
     picture moved = usual, softer = usual, lost = usual;
     moved.shift = 1.0;
     softer.soft *= 1.1;
@@ -88,8 +84,7 @@ static void faults_are_told_through_the_noise(void **unused) {
 static const uint32_t shapes =
     1u << VSH_MEASURE_PENUMBRA | 1u << VSH_MEASURE_SHIFT | 1u << VSH_MEASURE_LOST | 1u << VSH_MEASURE_GAINED;
 
-static void noise_that_is_not_allowed_is_no_change_of_a_shadow(void **unused) {
-    (void)unused;
+TEST(noise_that_is_not_allowed_is_no_change_of_a_shadow) {
     const double softs[] = {2.5, 5.0, 12.0, 30.0};
     for (int s = 0; s < 4; ++s) {
         for (int where = 0; where < 3; ++where) { /* everywhere, cut off at 0.1 and 0.9, in penumbrae alone */
@@ -126,8 +121,7 @@ static uint32_t toned(double gamma, double gain, int shadows, double soft, vsh_m
     return judge(golden, values, 0.0, m);
 }
 
-static void a_curve_over_the_values_is_no_change_of_a_shadow(void **unused) {
-    (void)unused;
+TEST(a_curve_over_the_values_is_no_change_of_a_shadow) {
     const double tones[][2] = {{2.2, 1.0}, {1.0 / 2.2, 1.0}, {1.1, 1.0}, {1.0, 0.8}, {1.0, 1.1}};
     for (size_t i = 0; i < sizeof tones / sizeof tones[0]; ++i) {
         for (double soft = 2.5; soft < 25.0; soft *= 2.0) {
@@ -159,20 +153,17 @@ static double lost_by(double off, double allowed) {
     options.noise = allowed;
     const vsh_compared c = pair_of(&golden, &values, NULL);
     vsh_measures m;
-    vsh_error told = {VSH_OK, ""};
-    assert_int_equal(vsh_compare(&c, &options, NULL, &m, &told), VSH_OK);
+    assert_ok(vsh_compare(&c, &options, NULL, &m, &failure));
     free(golden.values);
     free(values.values);
     return m.value[VSH_MEASURE_LOST];
 }
 
-static void what_noise_makes_is_no_lost_caster(void **unused) {
-    (void)unused;
+TEST(what_noise_makes_is_no_lost_caster) {
     assert_true(lost_by(0.15, 0.0) == 9.0 && lost_by(0.15, error) == 0.0 && lost_by(0.16, error) == 9.0);
 }
 
-static void limits_are_widened_as_documented(void **unused) {
-    (void)unused;
+TEST(limits_are_widened_as_documented) {
     const vsh_limits before = vsh_limits_default();
     vsh_limits limits = before;
     vsh_limits_allow_noise(&limits, 0.0);
@@ -189,8 +180,7 @@ static void limits_are_widened_as_documented(void **unused) {
     }
 }
 
-static void noise_is_a_share_of_the_range(void **unused) {
-    (void)unused;
+TEST(noise_is_a_share_of_the_range) {
     plane golden = make_plane(SIDE, SIDE, 1, picture_at, &usual);
     const vsh_compared c = pair_of(&golden, &golden, NULL);
     const double wrong[] = {-1e-9, 1.001, NAN, INFINITY};
@@ -198,9 +188,7 @@ static void noise_is_a_share_of_the_range(void **unused) {
         vsh_compare_options options = vsh_compare_options_default();
         options.noise = wrong[i];
         vsh_measures m;
-        vsh_error told = {VSH_OK, ""};
-        assert_int_equal(vsh_compare(&c, &options, NULL, &m, &told), VSH_ERROR_ARGUMENT);
-        assert_non_null(strstr(told.message, "noise of"));
+        assert_fails(vsh_compare(&c, &options, NULL, &m, &failure), VSH_ERROR_ARGUMENT, "noise of");
     }
     free(golden.values);
 }
@@ -227,8 +215,7 @@ static vsh_measures compare_steps(step golden, step values) {
     return m;
 }
 
-static void a_width_that_hangs_on_the_mark_is_not_measured(void **unused) {
-    (void)unused;
+TEST(a_width_that_hangs_on_the_mark_is_not_measured) {
     const step crawls = {0.9, 0.01}, jumps = {0.95, 0.0};
     const vsh_measures m = compare_steps(crawls, crawls), sharp = compare_steps(jumps, jumps);
     assert_int_equal(m.pairs, 2 * SIDE); /* not the one from 19 to 60 */
@@ -236,15 +223,5 @@ static void a_width_that_hangs_on_the_mark_is_not_measured(void **unused) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(estimates_are_alike_within_their_errors_and_not_beyond),
-        cmocka_unit_test(faults_are_told_through_the_noise),
-        cmocka_unit_test(noise_that_is_not_allowed_is_no_change_of_a_shadow),
-        cmocka_unit_test(a_curve_over_the_values_is_no_change_of_a_shadow),
-        cmocka_unit_test(what_noise_makes_is_no_lost_caster),
-        cmocka_unit_test(limits_are_widened_as_documented),
-        cmocka_unit_test(noise_is_a_share_of_the_range),
-        cmocka_unit_test(a_width_that_hangs_on_the_mark_is_not_measured),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,5 +1,6 @@
 /* Comparing shapes: penumbrae of known width, displacements of known length, shadows that are gone. */
 #include "compared.h"
+#include "testing.h"
 #include "truth/metrics.h"
 
 enum { SIDE = 96 };
@@ -19,18 +20,13 @@ static double ramp_at(const void *user, double x, double y, double z) {
 }
 
 static vsh_measures compare_ramps(ramp golden, ramp values) {
-    plane a = make_plane(SIDE, SIDE, 1, ramp_at, &golden), b = make_plane(SIDE, SIDE, 1, ramp_at, &values);
-    const vsh_measures m = measure(&a, &b, NULL);
-    free(a.values);
-    free(b.values);
-    return m;
+    return measure_as(SIDE, SIDE, 1, ramp_at, &golden, &values);
 }
 
 static const double angles[] = {0.0, 0.3, PI / 4.0, 1.1, PI / 2.0, 2.5, PI, 4.0, 5.7};
 enum { ANGLES = sizeof angles / sizeof angles[0] };
 
-static void a_ramp_is_as_wide_as_it_is_in_every_direction(void **unused) {
-    (void)unused;
+TEST(a_ramp_is_as_wide_as_it_is_in_every_direction) {
     for (size_t i = 0; i < ANGLES; ++i) {
         for (double width = 6.0; width <= 24.0; width *= 2.0) {
             const vsh_measures m =
@@ -43,8 +39,7 @@ static void a_ramp_is_as_wide_as_it_is_in_every_direction(void **unused) {
     }
 }
 
-static void wider_and_narrower_penumbrae_are_told_by_how_much(void **unused) {
-    (void)unused;
+TEST(wider_and_narrower_penumbrae_are_told_by_how_much) {
     const double factors[] = {0.5, 0.9, 1.1, 2.0};
     for (size_t i = 0; i < ANGLES; ++i) {
         for (size_t k = 0; k < sizeof factors / sizeof factors[0]; ++k) {
@@ -59,8 +54,7 @@ static void wider_and_narrower_penumbrae_are_told_by_how_much(void **unused) {
 }
 
 /* Of three planes together, by the tests' own formulas over all their values in a row. */
-static void accuracy_is_what_the_tests_measure_by(void **unused) {
-    (void)unused;
+TEST(accuracy_is_what_the_tests_measure_by) {
     enum { PLANES = 3, WIDTH = 40, HEIGHT = 25, COUNT = WIDTH * HEIGHT, ALL = PLANES * COUNT };
     static float truth[ALL], values[ALL], masked[ALL];
     static uint8_t mask[ALL];
@@ -76,8 +70,7 @@ static void accuracy_is_what_the_tests_measure_by(void **unused) {
             (vsh_compared){{WIDTH, HEIGHT, 1}, truth + k * COUNT, values + k * COUNT, mask + k * COUNT};
     }
     vsh_accuracy a;
-    vsh_error error;
-    assert_int_equal(vsh_compare_accuracy(planes, PLANES, NULL, &a, &error), VSH_OK);
+    assert_ok(vsh_compare_accuracy(planes, PLANES, NULL, &a, &failure));
     const truth_metrics expected = truth_compare(ALL, values, truth, masked);
     assert_int_equal(a.count, expected.count);
     assert_int_equal(a.penumbra, expected.penumbra);
@@ -89,37 +82,34 @@ static void accuracy_is_what_the_tests_measure_by(void **unused) {
     assert_near(a.p99, expected.p99, 1e-7);
     assert_near(a.max, expected.max, 1e-12);
     const vsh_run tight = {.struct_size = sizeof tight, .memory_limit = 10 * ALL - 1};
-    assert_int_equal(vsh_compare_accuracy(planes, PLANES, &tight, &a, &error), VSH_ERROR_LIMIT);
+    assert_int_equal(vsh_compare_accuracy(planes, PLANES, &tight, &a, &failure), VSH_ERROR_LIMIT);
     values[1] = NAN;
-    assert_int_equal(vsh_compare_accuracy(planes, 1, NULL, &a, &error), VSH_OK);
+    assert_ok(vsh_compare_accuracy(planes, 1, NULL, &a, &failure));
     assert_int_equal(a.count, COUNT - (COUNT + 6) / 7 - 1);
-    assert_int_equal(vsh_compare_accuracy(planes, 0, NULL, &a, &error), VSH_OK);
+    assert_ok(vsh_compare_accuracy(planes, 0, NULL, &a, &failure));
     assert_true(a.count == 0 && a.rmse == 0.0 && isnan(a.width_error));
 }
 
 /* A penumbra of 30 texels from 0 to 1: 24 of them between 0.1 and 0.9. */
-static void a_penumbra_that_is_gone_is_off_by_all_of_its_width(void **unused) {
-    (void)unused;
+TEST(a_penumbra_that_is_gone_is_off_by_all_of_its_width) {
     const ramp r = {30.0, 0.0, 0.0};
     const double lit = 1.0, factors[] = {1.0, 0.5, 1.2};
     const plane truth = make_plane(SIDE, SIDE, 1, ramp_at, &r);
     vsh_accuracy a;
-    vsh_error error;
     for (size_t i = 0; i <= sizeof factors / sizeof factors[0]; ++i) {
         const bool gone = i == sizeof factors / sizeof factors[0];
         const ramp other = {30.0 * (gone ? 1.0 : factors[i]), 0.0, 0.0};
         const plane values =
             gone ? make_plane(SIDE, SIDE, 1, flat, &lit) : make_plane(SIDE, SIDE, 1, ramp_at, &other);
         const vsh_compared compared = pair_of(&truth, &values, NULL);
-        assert_int_equal(vsh_compare_accuracy(&compared, 1, NULL, &a, &error), VSH_OK);
+        assert_ok(vsh_compare_accuracy(&compared, 1, NULL, &a, &failure));
         assert_near(a.width_error, gone ? 1.0 : fabs(factors[i] - 1.0), 1e-4);
         free(values.values);
     }
     free(truth.values);
 }
 
-static void noise_does_not_change_a_penumbras_width(void **unused) {
-    (void)unused;
+TEST(noise_does_not_change_a_penumbras_width) {
     for (size_t i = 0; i < ANGLES; ++i) {
         const vsh_measures m = compare_ramps((ramp){12.0, angles[i], 0.0}, (ramp){12.0, angles[i], 0.04});
         assert_near(m.value[VSH_MEASURE_PENUMBRA], 0.0, 0.03);
@@ -127,8 +117,7 @@ static void noise_does_not_change_a_penumbras_width(void **unused) {
     }
 }
 
-static void an_edge_that_is_cut_off_is_no_edge(void **unused) {
-    (void)unused;
+TEST(an_edge_that_is_cut_off_is_no_edge) {
     const ramp r = {30.0, 0.0, 0.0};
     plane golden = make_plane(SIDE, SIDE, 1, ramp_at, &r), values = make_plane(SIDE, SIDE, 1, ramp_at, &r);
     uint8_t mask[SIDE * SIDE];
@@ -156,58 +145,42 @@ static double ball_at(const void *user, double x, double y, double z) {
     return 0.5 + 0.5 * tanh((off - b->radius) / b->soft);
 }
 
-static void a_displacement_is_found_with_its_direction(void **unused) {
-    (void)unused;
+TEST(a_displacement_is_found_with_its_direction) {
     const double shifts[][2] = {{1.0, 0.0}, {0.0, -1.0}, {0.3, -0.7}, {0.1, 0.05}, {-2.0, 1.5}};
     for (size_t i = 0; i < sizeof shifts / sizeof shifts[0]; ++i) {
         const ball golden = {{40.0, 45.0, 0.0}, 18.0, 2.5};
         const ball moved = {{40.0 + shifts[i][0], 45.0 + shifts[i][1], 0.0}, 18.0, 2.5};
-        plane a = make_plane(SIDE, SIDE, 1, ball_at, &golden), b = make_plane(SIDE, SIDE, 1, ball_at, &moved);
-        const vsh_measures m = measure(&a, &b, NULL);
+        const vsh_measures m = measure_as(SIDE, SIDE, 1, ball_at, &golden, &moved);
         assert_near(m.shift[0], shifts[i][0], 0.02);
         assert_near(m.shift[1], shifts[i][1], 0.02);
         assert_true(m.shift[2] == 0.0);
         assert_near(m.value[VSH_MEASURE_SHIFT], hypot(shifts[i][0], shifts[i][1]), 0.03);
         assert_true(m.explained > 0.95);
         assert_near(m.value[VSH_MEASURE_PENUMBRA], 0.0, 0.02);
-        free(a.values);
-        free(b.values);
     }
 }
 
-static void a_displacement_is_found_in_space(void **unused) {
-    (void)unused;
+TEST(a_displacement_is_found_in_space) {
     const ball golden = {{15.0, 14.0, 12.0}, 7.0, 2.0}, moved = {{15.5, 13.0, 12.25}, 7.0, 2.0};
-    plane a = make_plane(32, 28, 24, ball_at, &golden), b = make_plane(32, 28, 24, ball_at, &moved);
-    const vsh_measures m = measure(&a, &b, NULL);
+    const vsh_measures m = measure_as(32, 28, 24, ball_at, &golden, &moved);
     assert_near(m.shift[0], 0.5, 0.02);
     assert_near(m.shift[1], -1.0, 0.02);
     assert_near(m.shift[2], 0.25, 0.02);
-    free(a.values);
-    free(b.values);
 }
 
-static void hard_edges_are_found_to_have_moved_by_a_texel(void **unused) {
-    (void)unused;
+TEST(hard_edges_are_found_to_have_moved_by_a_texel) {
     const ball golden = {{40.0, 45.0, 0.0}, 18.0, 0.01}, moved = {{41.0, 45.0, 0.0}, 18.0, 0.01};
-    plane a = make_plane(SIDE, SIDE, 1, ball_at, &golden), b = make_plane(SIDE, SIDE, 1, ball_at, &moved);
-    const vsh_measures m = measure(&a, &b, NULL);
+    const vsh_measures m = measure_as(SIDE, SIDE, 1, ball_at, &golden, &moved);
     assert_near(m.shift[0], 1.0, 0.1);
     assert_near(m.shift[1], 0.0, 0.05);
     assert_true(m.lost.count == 0 && m.gained.count == 0);
-    free(a.values);
-    free(b.values);
 }
 
-static void a_larger_shadow_is_no_displacement(void **unused) {
-    (void)unused;
+TEST(a_larger_shadow_is_no_displacement) {
     const ball golden = {{40.0, 45.0, 0.0}, 18.0, 2.5}, larger = {{40.0, 45.0, 0.0}, 18.6, 2.5};
-    plane a = make_plane(SIDE, SIDE, 1, ball_at, &golden), b = make_plane(SIDE, SIDE, 1, ball_at, &larger);
-    const vsh_measures m = measure(&a, &b, NULL);
+    const vsh_measures m = measure_as(SIDE, SIDE, 1, ball_at, &golden, &larger);
     assert_true(m.value[VSH_MEASURE_RMSE] > 0.01);
     assert_near(m.value[VSH_MEASURE_SHIFT], 0.0, 0.05);
-    free(a.values);
-    free(b.values);
 }
 
 /* --- rounding */
@@ -219,8 +192,7 @@ static float as_half(float value) {
     return (float)ldexp(nearbyint(ldexp(mantissa, 11)), exponent - 11);
 }
 
-static void bakes_that_differ_by_rounding_are_alike(void **unused) {
-    (void)unused;
+TEST(bakes_that_differ_by_rounding_are_alike) {
     const vsh_limits limits = vsh_limits_default();
     for (double soft = 0.01; soft < 10.0; soft *= 4.0) { /* from hard edges to wide ones */
         const ball golden = {{40.0, 45.0, 0.0}, 18.0, soft};
@@ -258,11 +230,7 @@ static double bar_at(const void *user, double x, double y, double z) {
 }
 
 static vsh_measures compare_bars(bar golden, bar values) {
-    plane a = make_plane(SIDE, SIDE, 1, bar_at, &golden), b = make_plane(SIDE, SIDE, 1, bar_at, &values);
-    const vsh_measures m = measure(&a, &b, NULL);
-    free(a.values);
-    free(b.values);
-    return m;
+    return measure_as(SIDE, SIDE, 1, bar_at, &golden, &values);
 }
 
 static void check_region(const vsh_region *region, int wide, double by) {
@@ -273,8 +241,7 @@ static void check_region(const vsh_region *region, int wide, double by) {
     assert_near(region->by, by, 1e-6);
 }
 
-static void a_lost_bar_is_a_lost_region_of_its_size_however_thin(void **unused) {
-    (void)unused;
+TEST(a_lost_bar_is_a_lost_region_of_its_size_however_thin) {
     for (int wide = 1; wide <= 12; ++wide) {
         const bar there = {wide, 0.25, 0.0}, gone = {0.0, 0.25, 0.0};
         const vsh_measures lost = compare_bars(there, gone), gained = compare_bars(gone, there);
@@ -287,8 +254,7 @@ static void a_lost_bar_is_a_lost_region_of_its_size_however_thin(void **unused) 
     }
 }
 
-static void what_moved_within_reach_is_not_lost(void **unused) {
-    (void)unused;
+TEST(what_moved_within_reach_is_not_lost) {
     for (double moved = 0.0; moved <= 4.0; moved += 1.0) {
         const vsh_measures m = compare_bars((bar){2.0, 0.0, 0.0}, (bar){2.0, 0.0, moved});
         const double far = moved > 2.0 ? moved < 4.0 ? moved - 2.0 : 2.0 : 0.0; /* columns past the reach */
@@ -297,15 +263,13 @@ static void what_moved_within_reach_is_not_lost(void **unused) {
     }
 }
 
-static void a_shadow_below_the_step_is_not_seen(void **unused) {
-    (void)unused;
+TEST(a_shadow_below_the_step_is_not_seen) {
     const bar gone = {0.0, 1.0, 0.0};
     assert_int_equal(compare_bars((bar){3.0, 0.92, 0.0}, gone).lost.count, 0);
     assert_int_equal(compare_bars((bar){3.0, 0.88, 0.0}, gone).lost.count, 60);
 }
 
-static void faults_of_the_promised_size_fail(void **unused) {
-    (void)unused;
+TEST(faults_of_the_promised_size_fail) {
     const vsh_limits limits = vsh_limits_default();
     const ball still = {{40.0, 45.0, 0.0}, 18.0, 2.5}, shifted = {{40.25, 45.0, 0.0}, 18.0, 2.5};
     const ball wider = {{40.0, 45.0, 0.0}, 18.0, 2.75};
@@ -330,8 +294,7 @@ static double ball_in_a_corner(const void *user, double x, double y, double z) {
     return x * x + y * y + z * z < 16.0 ? 0.0 : 1.0;
 }
 
-static void a_region_in_space_is_counted_in_voxels(void **unused) {
-    (void)unused;
+TEST(a_region_in_space_is_counted_in_voxels) {
     const double lit = 1.0;
     plane a = make_plane(12, 11, 10, ball_in_a_corner, NULL), b = make_plane(12, 11, 10, flat, &lit);
     const vsh_measures m = measure(&a, &b, NULL);
@@ -346,23 +309,5 @@ static void a_region_in_space_is_counted_in_voxels(void **unused) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_ramp_is_as_wide_as_it_is_in_every_direction),
-        cmocka_unit_test(wider_and_narrower_penumbrae_are_told_by_how_much),
-        cmocka_unit_test(accuracy_is_what_the_tests_measure_by),
-        cmocka_unit_test(a_penumbra_that_is_gone_is_off_by_all_of_its_width),
-        cmocka_unit_test(noise_does_not_change_a_penumbras_width),
-        cmocka_unit_test(an_edge_that_is_cut_off_is_no_edge),
-        cmocka_unit_test(a_displacement_is_found_with_its_direction),
-        cmocka_unit_test(a_displacement_is_found_in_space),
-        cmocka_unit_test(hard_edges_are_found_to_have_moved_by_a_texel),
-        cmocka_unit_test(a_larger_shadow_is_no_displacement),
-        cmocka_unit_test(bakes_that_differ_by_rounding_are_alike),
-        cmocka_unit_test(a_lost_bar_is_a_lost_region_of_its_size_however_thin),
-        cmocka_unit_test(what_moved_within_reach_is_not_lost),
-        cmocka_unit_test(a_shadow_below_the_step_is_not_seen),
-        cmocka_unit_test(faults_of_the_promised_size_fail),
-        cmocka_unit_test(a_region_in_space_is_counted_in_voxels),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

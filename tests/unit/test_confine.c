@@ -4,20 +4,11 @@
 #include "sandbox/landlock.h"
 #include "sandbox/reader.h"
 #include "sandbox/tasks.h"
+#include "testing.h"
 
 #include <pthread.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-#include <unistd.h>
-
-#include <cmocka.h>
-
-#include <vdbshade/vdbshade.h>
 
 static char folder[] = "/tmp/vdbshade-test-XXXXXX";
 
@@ -33,15 +24,13 @@ static vsh_run with_reader(const char *reader) {
     return run;
 }
 
-static void a_program_is_its_own_reader_and_confined_wholly_though_it_has_threads(void **state) {
-    (void)state;
+TEST(a_program_is_its_own_reader_and_confined_wholly_though_it_has_threads) {
     if (VSHI_SANITIZED) {
         skip();
     }
     const vsh_run run = with_reader("/proc/self/exe");
     uint32_t confined = 0;
-    vsh_error error;
-    assert_int_equal(vsh_reader_confinement(&run, &confined, &error), VSH_OK);
+    assert_ok(vsh_reader_confinement(&run, &confined, &failure));
     assert_int_equal(confined & (VSH_CONFINED_LIMITS | VSH_CONFINED_CALLS),
                      VSH_CONFINED_LIMITS | VSH_CONFINED_CALLS);
     assert_int_equal((confined & VSH_CONFINED_FILES) != 0, vshi_landlock_version() > 0);
@@ -77,8 +66,7 @@ static int confine_among_ending_threads(void) {
     return loose;
 }
 
-static void a_task_that_ends_meanwhile_is_not_loose(void **state) {
-    (void)state;
+TEST(a_task_that_ends_meanwhile_is_not_loose) {
     if (VSHI_SANITIZED) {
         skip();
     }
@@ -93,32 +81,28 @@ static void a_task_that_ends_meanwhile_is_not_loose(void **state) {
     assert_int_equal(WEXITSTATUS(status), 0);
 }
 
-static void what_cannot_be_asked_is_an_argument(void **state) {
-    (void)state;
+TEST(what_cannot_be_asked_is_an_argument) {
     uint32_t confined = 7;
-    vsh_error error;
     vsh_run run = vsh_run_default();
-    assert_int_equal(vsh_reader_confinement(&run, &confined, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_reader_confinement(NULL, &confined, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_reader_confinement(&run, NULL, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_reader_confinement(&run, &confined, &failure), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_reader_confinement(NULL, &confined, &failure), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_reader_confinement(&run, NULL, &failure), VSH_ERROR_ARGUMENT);
     run.confined = 1;
     vsh_model *model;
-    assert_int_equal(vsh_model_read(VSH_ASSETS "/thin.glb", &run, &model, &error), VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "confined: needs a reader"));
+    assert_fails(vsh_model_read(VSH_ASSETS "/thin.glb", &run, &model, &failure), VSH_ERROR_ARGUMENT,
+                 "confined: needs a reader");
 }
 
 /* This program does not lie where the library's reader is looked for. */
-static void a_missing_reader_is_an_error_that_says_how_to_do_without(void **state) {
-    (void)state;
+TEST(a_missing_reader_is_an_error_that_says_how_to_do_without) {
     if (VSHI_SANITIZED) {
         skip();
     }
     const vsh_run run = with_reader(VSH_READER);
     vsh_model *model;
-    vsh_error error;
-    assert_int_equal(vsh_model_read(VSH_ASSETS "/thin.glb", &run, &model, &error), VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "vdbshade-reader"));
-    assert_non_null(strstr(error.message, "--sandbox off"));
+    assert_int_equal(vsh_model_read(VSH_ASSETS "/thin.glb", &run, &model, &failure), VSH_ERROR_ARGUMENT);
+    assert_non_null(strstr(failure.message, "vdbshade-reader"));
+    assert_non_null(strstr(failure.message, "--sandbox off"));
 }
 
 /* --- what is read in this process */
@@ -130,8 +114,7 @@ static int32_t cancel_later(void *user, const char *stage, double fraction) {
     return fraction > 0.2;
 }
 
-static void spheres_are_cancelled_within_a_file_of_any_size(void **state) {
-    (void)state;
+TEST(spheres_are_cancelled_within_a_file_of_any_size) {
     FILE *file = fopen(at("spheres.csv"), "wb");
     for (int i = 0; i < 100000; ++i) {
         fputs(i < 50000 ? "1,2,3,0.5\n" : "# said", file); /* a line of no end, too */
@@ -139,11 +122,10 @@ static void spheres_are_cancelled_within_a_file_of_any_size(void **state) {
     assert_int_equal(fclose(file), 0);
     double seen = 0.0, *spheres;
     size_t count;
-    vsh_error error;
     vsh_run run = vsh_run_default();
     run.progress = cancel_later;
     run.user = &seen;
-    assert_int_equal(vsh_spheres_read(at("spheres.csv"), &run, &spheres, &count, &error),
+    assert_int_equal(vsh_spheres_read(at("spheres.csv"), &run, &spheres, &count, &failure),
                      VSH_ERROR_CANCELLED);
     assert_null(spheres);
     assert_true(seen > 0.2 && seen < 0.5);
@@ -156,33 +138,28 @@ static int32_t cancel_soon(void *user, const char *stage, double fraction) {
     return ++*calls > 10;
 }
 
-static void a_line_of_no_end_is_refused(void **state) {
-    (void)state;
+TEST(a_line_of_no_end_is_refused) {
     FILE *file = fopen(at("zeros.csv"), "wb");
     assert_int_equal(ftruncate(fileno(file), (off_t)1 << 34), 0); /* takes many seconds to read */
     assert_int_equal(fclose(file), 0);
     double *spheres;
     size_t count;
-    vsh_error error;
-    assert_int_equal(vsh_spheres_read(at("zeros.csv"), NULL, &spheres, &count, &error), VSH_ERROR_INPUT);
+    assert_int_equal(vsh_spheres_read(at("zeros.csv"), NULL, &spheres, &count, &failure), VSH_ERROR_INPUT);
     assert_null(spheres);
-    assert_non_null(strstr(error.message, "zeros.csv: a row of more than "));
+    assert_non_null(strstr(failure.message, "zeros.csv: a row of more than "));
 }
 
-static void a_file_of_spheres_past_every_measure_is_a_limit(void **state) {
-    (void)state;
+TEST(a_file_of_spheres_past_every_measure_is_a_limit) {
     FILE *file = fopen(at("sparse.csv"), "wb");
     assert_int_equal(ftruncate(fileno(file), ((off_t)1 << 34) + 1), 0);
     assert_int_equal(fclose(file), 0);
     double *spheres;
     size_t count;
-    vsh_error error;
-    assert_int_equal(vsh_spheres_read(at("sparse.csv"), NULL, &spheres, &count, &error), VSH_ERROR_LIMIT);
-    assert_non_null(strstr(error.message, "17179869184"));
+    assert_fails(vsh_spheres_read(at("sparse.csv"), NULL, &spheres, &count, &failure), VSH_ERROR_LIMIT,
+                 "17179869184");
 }
 
-static void hashing_is_cancelled_within_a_file(void **state) {
-    (void)state;
+TEST(hashing_is_cancelled_within_a_file) {
     FILE *file = fopen(at("large.bin"), "wb");
     assert_int_equal(ftruncate(fileno(file), (off_t)1 << 36), 0); /* takes minutes to hash */
     assert_int_equal(fclose(file), 0);
@@ -197,12 +174,11 @@ static void hashing_is_cancelled_within_a_file(void **state) {
     run.progress = cancel_soon;
     run.user = &calls;
     vsh_provenance *made;
-    vsh_error error;
-    assert_int_equal(vsh_provenance_create(&source, &run, &made, &error), VSH_ERROR_CANCELLED);
+    assert_int_equal(vsh_provenance_create(&source, &run, &made, &failure), VSH_ERROR_CANCELLED);
     assert_null(made);
     calls = 0;
     char digest[VSH_DIGEST_TEXT];
-    assert_int_equal(vsh_file_digest(path, &run, digest, &error), VSH_ERROR_CANCELLED);
+    assert_int_equal(vsh_file_digest(path, &run, digest, &failure), VSH_ERROR_CANCELLED);
     assert_int_equal(calls, 11);
 }
 
@@ -225,15 +201,5 @@ int main(int argc, char **argv) {
     if (served >= 0) {
         _exit(served);
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_program_is_its_own_reader_and_confined_wholly_though_it_has_threads),
-        cmocka_unit_test(a_task_that_ends_meanwhile_is_not_loose),
-        cmocka_unit_test(what_cannot_be_asked_is_an_argument),
-        cmocka_unit_test(a_missing_reader_is_an_error_that_says_how_to_do_without),
-        cmocka_unit_test(spheres_are_cancelled_within_a_file_of_any_size),
-        cmocka_unit_test(a_line_of_no_end_is_refused),
-        cmocka_unit_test(a_file_of_spheres_past_every_measure_is_a_limit),
-        cmocka_unit_test(hashing_is_cancelled_within_a_file),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

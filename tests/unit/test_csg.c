@@ -2,6 +2,7 @@
  * what they become is compared with the distances to the same solids in closed form, near convex and concave
  * corners, wherever they lie on the lattice. docs/numerics.md has the bounds. */
 #include "fields.h"
+#include "testing.h"
 
 #include "field/field.h"
 
@@ -88,27 +89,24 @@ static vsh_field *field_of_tree(const pair *p) {
     nodes[2].left = 0;
     nodes[2].right = 1;
     const vsh_sdf sdf = {nodes, 3};
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = VOXEL;
+    const vsh_grid_options options = with_voxel(VOXEL);
     vsh_grid *grid = NULL;
-    assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, NULL), VSH_OK);
+    assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
     return field_of_grid(grid, 0.0);
 }
 
 static vsh_field *field_of_distances(pair *p, int exact) {
     const vsh_distance distance = {distance_to, p, 1.0, exact, {-0.8, -0.8, -0.8}, {1.6, 1.6, 1.6}};
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = VOXEL;
+    const vsh_grid_options options = with_voxel(VOXEL);
     vsh_grid *grid = NULL;
-    assert_int_equal(vsh_grid_from_distance(&distance, &options, NULL, &grid, NULL), VSH_OK);
+    assert_ok(vsh_grid_from_distance(&distance, &options, NULL, &grid, &failure));
     return field_of_grid(grid, 0.0);
 }
 
 /* A lattice of the distances themselves interpolates edges and corners with an error of its own; one that is
  * measured anew from the zero of a bound is within 0.02 voxels of that: the
  * points of its mesh may be off by 0.002, and a distance is measured from several. */
-static void bounds_become_distances_up_to_their_corners(void **state) {
-    (void)state;
+TEST(bounds_become_distances_up_to_their_corners) {
     const double phases[] = {0.0, 0.25, 0.5, 0.61};
     for (int kind = 0; kind < KINDS; ++kind) {
         double worst[3] = {0.0, 0.0, 0.0};
@@ -129,8 +127,5 @@ static void bounds_become_distances_up_to_their_corners(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(bounds_become_distances_up_to_their_corners),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

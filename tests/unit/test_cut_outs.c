@@ -1,55 +1,165 @@
 /* Files whose materials cut out what casts: from glTF and its textures to what rays meet, in the process
  * itself and by a reader, which is this test. */
-#include "leaf_files.h"
+#include "models.h"
+#include "testing.h"
 
 #include "base/vec.h"
 #include "trace/embree.h"
 
-#include <vdbshade/reader.h>
-#include <vdbshade/scene.h>
-#include <vdbshade/settings.h>
+/* A card of CELLS × CELLS quads in the plane y = 1, from -1 to 1, the image's top at z = -1; on it a disc. */
+enum { CELLS = 8, CORNERS = (CELLS + 1) * (CELLS + 1), TRIANGLES = 2 * CELLS * CELLS, TEXELS = 160 };
+static const double CENTRE[2] = {-0.4, -0.3}, RADIUS = 0.4;
 
-static vsh_result load(bool reader, const vsh_scene *scene, vsh_assets **assets, vsh_error *error) {
+typedef struct bytes {
+    unsigned char *at;
+    size_t size;
+} bytes;
+
+static bytes read_file(const char *path) {
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    bytes b = {malloc(1 << 20), 0};
+    b.size = fread(b.at, 1, 1 << 20, file);
+    fclose(file);
+    assert_true(b.size > 0 && b.size < 1 << 20);
+    return b;
+}
+
+/* The disc in the alpha of an image: 1 in it, `outside` out of it. */
+static bytes disc_image(float outside) {
+    static float alpha[TEXELS * TEXELS], grey[TEXELS * TEXELS];
+    for (int y = 0; y < TEXELS; ++y) {
+        for (int x = 0; x < TEXELS; ++x) {
+            const double off =
+                hypot(2.0 * (x + 0.5) / TEXELS - 1.0 - CENTRE[0], 2.0 * (y + 0.5) / TEXELS - 1.0 - CENTRE[1]);
+            const double share = fmin(1.0, fmax(0.0, 0.5 + 20.0 * (RADIUS - off)));
+            alpha[y * TEXELS + x] = outside + (1.0f - outside) * (float)share;
+            grey[y * TEXELS + x] = 0.25f;
+        }
+    }
+    const char *const names[] = {"R", "G", "B", "A"};
+    const float *const planes[] = {grey, grey, grey, alpha};
+    const vsh_image image = {TEXELS, TEXELS, 4, names, planes, NULL};
+    vsh_image_options options = vsh_image_options_default();
+    options.bits = 8;
+    options.pack = "R=R,G=G,B=B,A=A";
+    const file_path path = path_of("disc.png");
+    assert_ok(vsh_image_write(path.text, &image, &options, &failure));
+    const bytes b = read_file(path.text);
+    assert_int_equal(unlink(path.text), 0);
+    return b;
+}
+
+static char *data_uri(bytes b) {
+    char *text = malloc(2 * b.size + 64);
+    strcpy(text, "data:image/png;base64,");
+    base64(b.at, b.size, text + strlen(text));
+    return text;
+}
+
+/* a.gltf, with the card under material 0; its UVs times `scale`. */
+static void write_card(const char *materials, const char *sampler, const char *image_uri, float scale) {
+    static float positions[3 * CORNERS], uvs[2 * CORNERS];
+    static uint16_t indices[3 * TRIANGLES];
+    size_t at = 0;
+    for (size_t i = 0; i < CORNERS; ++i) {
+        const float x = (float)(i % (CELLS + 1)) / CELLS, z = (float)(i / (CELLS + 1)) / CELLS;
+        const float place[3] = {2.0f * x - 1.0f, 1.0f, 2.0f * z - 1.0f};
+        memcpy(positions + 3 * i, place, sizeof place);
+        uvs[2 * i] = scale * x;
+        uvs[2 * i + 1] = scale * z;
+    }
+    for (uint16_t cell = 0; cell < CELLS * CELLS; ++cell) {
+        const uint16_t a = (uint16_t)(cell / CELLS * (CELLS + 1) + cell % CELLS);
+        const uint16_t b = (uint16_t)(a + CELLS + 1);
+        const uint16_t corners[6] = {a, b, (uint16_t)(b + 1), a, (uint16_t)(b + 1), (uint16_t)(a + 1)};
+        memcpy(indices + at, corners, sizeof corners);
+        at += 6;
+    }
+    enum { BODY = sizeof positions + sizeof uvs + sizeof indices };
+    static unsigned char body[BODY];
+    memcpy(body, positions, sizeof positions);
+    memcpy(body + sizeof positions, uvs, sizeof uvs);
+    memcpy(body + sizeof positions + sizeof uvs, indices, sizeof indices);
+    const size_t room = 2 * BODY + strlen(image_uri) + 4096;
+    char *json = malloc(room), *buffer = malloc(2 * BODY + 8);
+    base64(body, BODY, buffer);
+    const int size = snprintf(
+        json, room,
+        "{\"asset\":{\"version\":\"2.0\"},\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0,\"name\":"
+        "\"card\"}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"TEXCOORD_0\":1},"
+        "\"indices\":2,\"material\":0}]}],\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":"
+        "%d,\"type\":\"VEC3\"},{\"bufferView\":1,\"componentType\":5126,\"count\":%d,\"type\":\"VEC2\"},{"
+        "\"bufferView\":2,\"componentType\":5123,\"count\":%d,\"type\":\"SCALAR\"}],\"bufferViews\":[{"
+        "\"buffer\":0,\"byteLength\":%zu},{\"buffer\":0,\"byteOffset\":%zu,\"byteLength\":%zu},{\"buffer\":0,"
+        "\"byteOffset\":%zu,\"byteLength\":%zu}],\"materials\":[%s],\"textures\":[{\"source\":0,\"sampler\":"
+        "0}],\"samplers\":[%s],\"images\":[{\"uri\":\"%s\"}],\"buffers\":[{\"byteLength\":%d,\"uri\":\"data:;"
+        "base64,%s\"}]}",
+        CORNERS, CORNERS, 3 * TRIANGLES, sizeof positions, sizeof positions, sizeof uvs,
+        sizeof positions + sizeof uvs, sizeof indices, materials, sampler, image_uri, BODY, buffer);
+    assert_in_range(size, 1, room - 1);
+    write_bytes("a.gltf", json, (size_t)size);
+    free(buffer);
+    free(json);
+}
+
+#define MASKED(more)                                                                                         \
+    "{\"name\":\"leaf\",\"alphaMode\":\"MASK\",\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0"  \
+    "}" more "}}"
+
+/* A card's file and how it is loaded; what is 0 or NULL is as most tests need it. */
+typedef struct card {
+    const char *material; /* masked by the disc */
+    const char *sampler;  /* repeats */
+    const char *uri;      /* the image itself */
+    float outside;        /* alpha out of the disc */
+    float scale;          /* of UVs; 1 */
+    bool reader, cast_blended;
+    uint64_t memory_limit;
+    const char *const *one_sided, *const *except; /* a pattern */
+} card;
+
+static vsh_result load(card c, vsh_assets **assets) {
+    const bytes png = disc_image(c.outside);
+    char *own = data_uri(png);
+    write_card(c.material != NULL ? c.material : MASKED(""), c.sampler != NULL ? c.sampler : "{}",
+               c.uri != NULL ? c.uri : own, c.scale > 0.0f ? c.scale : 1.0f);
+    const file_path path = path_of("a.gltf");
+    vsh_caster caster = {.type = VSH_CASTER_MESH,
+                         .path = path.text,
+                         .transform = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
+                         .one_sided = c.one_sided,
+                         .one_sided_count = c.one_sided != NULL,
+                         .objects = {.except = c.except, .except_count = c.except != NULL}};
+    vsh_scene scene = vsh_scene_default();
+    scene.casters = &caster;
+    scene.caster_count = 1;
+    scene.cast_blended = c.cast_blended;
     vsh_run run = vsh_run_default();
     run.warning = keep_warning;
     run.notes = 1;
-    run.reader = reader ? "/proc/self/exe" : NULL;
-    run.reader_seconds = reader ? 120.0 : 0.0;
+    run.memory_limit = c.memory_limit;
+    run.reader = c.reader ? "/proc/self/exe" : NULL;
+    run.reader_seconds = c.reader ? 120.0 : 0.0;
     warnings[0] = '\0';
-    return vsh_assets_load(scene, &run, assets, error);
+    const vsh_result result = vsh_assets_load(&scene, &run, assets, &failure);
+    assert_int_equal(unlink(path.text), 0);
+    free(own);
+    free(png.at);
+    return result;
 }
 
-typedef struct casting {
-    file_path path;
-    vsh_caster caster;
-    vsh_scene scene;
-} casting;
-
-static vsh_scene *cast_of(casting *c) {
-    *c = (casting){.path = path_of("a.gltf")};
-    c->scene = vsh_scene_default();
-    c->caster = (vsh_caster){.type = VSH_CASTER_MESH, .path = c->path.text};
-    for (int k = 0; k < 12; k += 5) {
-        c->caster.transform[k] = 1.0;
-    }
-    c->scene.casters = &c->caster;
-    c->scene.caster_count = 1;
-    return &c->scene;
-}
-
-/* What of places all over the card stops a ray upwards: each is asked of `expected` (1: it does, -1: too near
- * to an edge to say). */
-static void expect_shadow(const vsh_assets *assets, int (*expected)(double x, double z)) {
+/* Rays upwards from all over the card: `expected` says which are blocked (1; -1: too near to an edge to say).
+ * Frees the assets. */
+static void expect_shadow(vsh_assets *assets, int (*expected)(double x, double z)) {
     size_t count = 0;
     const vsh_mesh *meshes = vsh_assets_caster(assets, 0, &count);
     if (!vsh_triangles_available()) {
+        vsh_assets_free(assets);
         return;
     }
     vsh_triangles *triangles = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_triangles_create(meshes, count, NULL, &triangles, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_triangles_create(meshes, count, NULL, &triangles, &failure));
     int met = 0, asked = 0;
     for (int i = 0; i < 79 * 79; ++i) {
         const double x = -0.98 + 0.025 * (i % 79), z = -0.98 + 0.025 * (i / 79);
@@ -67,6 +177,7 @@ static void expect_shadow(const vsh_assets *assets, int (*expected)(double x, do
     }
     assert_true(asked > 5000 && met > 150);
     vsh_triangles_free(triangles);
+    vsh_assets_free(assets);
 }
 
 static int by_disc(double x, double z) {
@@ -79,45 +190,33 @@ static int everywhere(double x, double z) {
     return 1;
 }
 
-#define MASKED(more)                                                                                         \
-    "{\"name\":\"leaf\",\"alphaMode\":\"MASK\",\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0"  \
-    "}" more "}}"
+static void assert_casts(card c, int (*expected)(double x, double z)) {
+    vsh_assets *assets = NULL;
+    assert_ok(load(c, &assets));
+    expect_shadow(assets, expected);
+}
 
-static void a_card_casts_the_disc_in_its_textures_alpha(void **state) {
-    (void)state;
-    const bytes png = disc_image("disc.png", 0.0f);
-    char *uri = data_uri(png);
+static void assert_casts_nothing(card c, const char *why) {
+    vsh_assets *assets = NULL;
+    assert_fails(load(c, &assets), VSH_ERROR_INPUT, why);
+    vsh_assets_free(assets);
+}
+
+TEST(a_card_casts_the_disc_in_its_textures_alpha) {
+    const bytes png = disc_image(0.0f);
+    write_bytes("leaf.png", png.at, png.size);
     for (int i = 0; i < 4; ++i) {
-        const bool reader = (i & 1) != 0, beside = (i & 2) != 0;
-        write_card(MASKED(""), "{}", beside ? "leaf.png" : uri, 1.0f, 0.0f);
-        if (beside) {
-            write_bytes("leaf.png", png.at, png.size);
-        }
-        casting c;
-        vsh_assets *assets = NULL;
-        vsh_error error = {VSH_OK, ""};
-        if (load(reader, cast_of(&c), &assets, &error) != VSH_OK) {
-            fail_msg("%s", error.message);
-        }
+        assert_casts((card){.reader = (i & 1) != 0, .uri = (i & 2) != 0 ? "leaf.png" : NULL}, by_disc);
         assert_string_equal(warnings, "");
-        expect_shadow(assets, by_disc);
-        vsh_assets_free(assets);
-        assert_int_equal(unlink(c.path.text), 0);
-        assert_int_equal(beside ? unlink(path_of("leaf.png").text) : 0, 0);
     }
-    free(uri);
+    assert_int_equal(unlink(path_of("leaf.png").text), 0);
     free(png.at);
 }
 
 /* What is whole is as any other mesh, and what is clear is not there. */
-static void only_what_an_edge_crosses_is_asked_of_the_mask(void **state) {
-    (void)state;
-    const bytes png = disc_image("disc.png", 0.0f);
-    char *uri = data_uri(png);
-    write_card(MASKED(""), "{}", uri, 1.0f, 0.0f);
-    casting c;
+TEST(only_what_an_edge_crosses_is_asked_of_the_mask) {
     vsh_assets *assets = NULL;
-    assert_int_equal(load(false, cast_of(&c), &assets, NULL), VSH_OK);
+    assert_ok(load((card){0}, &assets));
     size_t count = 0;
     const vsh_mesh *meshes = vsh_assets_caster(assets, 0, &count);
     assert_int_equal(count, 2);
@@ -125,13 +224,9 @@ static void only_what_an_edge_crosses_is_asked_of_the_mask(void **state) {
     assert_non_null(meshes[1].mask);
     assert_int_equal(meshes[1].solidity, VSH_SOLIDITY_SHELL);
     assert_string_equal(meshes[1].material_name, "leaf");
-    const size_t opaque = meshes[0].triangle_count, mixed = meshes[1].triangle_count;
-    assert_in_range(opaque, 1, 20);
-    assert_in_range(mixed, 20, 60);
+    assert_in_range(meshes[0].triangle_count, 1, 20);
+    assert_in_range(meshes[1].triangle_count, 20, 60);
     vsh_assets_free(assets);
-    assert_int_equal(unlink(c.path.text), 0);
-    free(uri);
-    free(png.at);
 }
 
 /* Twice across the card: clamped, the texture's own edge goes on beyond it; mirrored, the second disc lies
@@ -153,8 +248,7 @@ static int turned(double x, double z) {
     return by_disc(-x, -z);
 }
 
-static void wraps_and_texture_transforms_are_those_of_the_file(void **state) {
-    (void)state;
+TEST(wraps_and_texture_transforms_are_those_of_the_file) {
     static const char transformed[] =
         "{\"alphaMode\":\"MASK\",\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0,\"extensions\":"
         "{\"KHR_texture_transform\":{\"offset\":[1,1],\"scale\":[-1,-1]}}}}}";
@@ -162,28 +256,19 @@ static void wraps_and_texture_transforms_are_those_of_the_file(void **state) {
         const char *sampler, *material;
         float scale;
         int (*expected)(double x, double z);
-    } cases[] = {{"{\"wrapS\":33071,\"wrapT\":33071}", MASKED(""), 2.0f, clamped},
-                 {"{}", MASKED(""), 2.0f, repeated},
-                 {"{\"wrapS\":33648,\"wrapT\":33648}", MASKED(""), 2.0f, mirrored},
-                 {"{}", transformed, 1.0f, turned}};
-    const bytes png = disc_image("disc.png", 0.0f);
-    char *uri = data_uri(png);
+    } cases[] = {{"{\"wrapS\":33071,\"wrapT\":33071}", NULL, 2.0f, clamped},
+                 {NULL, NULL, 2.0f, repeated},
+                 {"{\"wrapS\":33648,\"wrapT\":33648}", NULL, 2.0f, mirrored},
+                 {NULL, transformed, 1.0f, turned}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-        write_card(cases[i].material, cases[i].sampler, uri, cases[i].scale, 0.0f);
-        casting c;
-        vsh_assets *assets = NULL;
-        assert_int_equal(load(false, cast_of(&c), &assets, NULL), VSH_OK);
-        expect_shadow(assets, cases[i].expected);
-        vsh_assets_free(assets);
-        assert_int_equal(unlink(c.path.text), 0);
+        assert_casts(
+            (card){.material = cases[i].material, .sampler = cases[i].sampler, .scale = cases[i].scale},
+            cases[i].expected);
     }
-    free(uri);
-    free(png.at);
 }
 
 /* Alpha is 0.4 out of the disc and 1 in it. */
-static void cutoff_and_base_factor_decide(void **state) {
-    (void)state;
+TEST(cutoff_and_base_factor_decide) {
     static const struct {
         const char *material;
         int (*expected)(double x, double z); /* NULL: nothing casts */
@@ -200,31 +285,17 @@ static void cutoff_and_base_factor_decide(void **state) {
         {"{\"alphaMode\":\"MASK\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.4]}}", NULL},
         {"{\"alphaMode\":\"MASK\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.6]}}", everywhere},
         {"{\"alphaMode\":\"MASK\",\"alphaCutoff\":0}", everywhere}};
-    const bytes png = disc_image("disc.png", 0.4f);
-    char *uri = data_uri(png);
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-        write_card(cases[i].material, "{}", uri, 1.0f, 0.0f);
-        casting c;
-        vsh_assets *assets = NULL;
-        vsh_error error = {VSH_OK, ""};
-        const vsh_result result = load(false, cast_of(&c), &assets, &error);
-        assert_int_equal(result, cases[i].expected != NULL ? VSH_OK : VSH_ERROR_INPUT);
-        if (result == VSH_OK && i != 1) {
-            expect_shadow(assets, cases[i].expected);
-        } else if (result == VSH_OK) { /* 0.5 × alpha is 0.35 where the ramp is at a half of it */
-            expect_shadow(assets, by_disc);
+        const card c = {.material = cases[i].material, .outside = 0.4f};
+        if (cases[i].expected != NULL) {
+            assert_casts(c, cases[i].expected);
         } else {
-            assert_non_null(strstr(error.message, "leave nothing"));
+            assert_casts_nothing(c, "leave nothing");
         }
-        vsh_assets_free(assets);
-        assert_int_equal(unlink(c.path.text), 0);
     }
-    free(uri);
-    free(png.at);
 }
 
-static void blended_cards_cast_where_they_are_cut_out_and_glass_does_not(void **state) {
-    (void)state;
+TEST(blended_cards_cast_where_they_are_cut_out_and_glass_does_not) {
     static const char leaf[] = "{\"name\":\"leaf\",\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{"
                                "\"baseColorTexture\":{\"index\":0}}}";
     static const char glass[] = "{\"name\":\"glass\",\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{"
@@ -240,147 +311,80 @@ static void blended_cards_cast_where_they_are_cut_out_and_glass_does_not(void **
     } cases[] = {{leaf, 0.0f, false, by_disc}, {leaf, 0.3f, false, NULL},  {glass, 0.0f, false, NULL},
                  {glass, 0.0f, true, by_disc}, {plain, 0.0f, false, NULL}, {plain, 0.0f, true, everywhere}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-        const bytes png = disc_image("disc.png", cases[i].outside);
-        char *uri = data_uri(png);
-        write_card(cases[i].material, "{}", uri, 1.0f, 0.0f);
-        casting c;
-        vsh_assets *assets = NULL;
-        vsh_error error = {VSH_OK, ""};
-        cast_of(&c)->cast_blended = cases[i].cast_blended;
-        const vsh_result result = load(false, &c.scene, &assets, &error);
-        assert_int_equal(result, cases[i].expected != NULL ? VSH_OK : VSH_ERROR_INPUT);
-        if (result == VSH_OK) {
-            expect_shadow(assets, cases[i].expected);
+        const card c = {.material = cases[i].material,
+                        .outside = cases[i].outside,
+                        .cast_blended = cases[i].cast_blended};
+        if (cases[i].expected != NULL) {
+            assert_casts(c, cases[i].expected);
             assert_int_equal(strstr(warnings, "at least half") != NULL, !cases[i].cast_blended);
         } else {
-            assert_non_null(strstr(error.message, "blended"));
+            assert_casts_nothing(c, "blended");
         }
-        vsh_assets_free(assets);
-        assert_int_equal(unlink(c.path.text), 0);
-        free(uri);
-        free(png.at);
     }
 }
 
-static void textures_that_cannot_be_had_leave_the_card_whole(void **state) {
-    (void)state;
-    const bytes png = disc_image("disc.png", 0.0f);
-    const bytes cut = {png.at, png.size / 2};
+TEST(textures_that_cannot_be_had_leave_the_card_whole) {
+    const bytes png = disc_image(0.0f);
     unsigned char damaged[512];
     memcpy(damaged, png.at, sizeof damaged);
     memset(damaged + 40, 0x55, sizeof damaged - 40);
-    const bytes none[] = {cut,
+    const bytes none[] = {{png.at, png.size / 2},
                           {damaged, sizeof damaged},
                           {(unsigned char *)(uintptr_t) "no image", 8},
                           {(unsigned char *)(uintptr_t) "\xff\xd8\xff\xe0 nor this", 14},
                           {(unsigned char *)(uintptr_t) "RIFF\1\0\0\0WEBPVP8 ", 16}};
     for (size_t i = 0; i < 2 * (sizeof none / sizeof none[0] + 1); ++i) {
-        const bool reader = i % 2 != 0, missing = i / 2 == sizeof none / sizeof none[0];
+        const bool missing = i / 2 == sizeof none / sizeof none[0];
         char *uri = missing ? strdup("gone.png") : data_uri(none[i / 2]);
-        write_card(MASKED(""), "{}", uri, 1.0f, 0.0f);
-        casting c;
-        vsh_assets *assets = NULL;
-        vsh_error error = {VSH_OK, ""};
-        if (load(reader, cast_of(&c), &assets, &error) != VSH_OK) {
-            fail_msg("%s", error.message);
-        }
+        assert_casts((card){.reader = i % 2 != 0, .uri = uri}, everywhere);
         assert_non_null(strstr(warnings, "material 'leaf' casts whole"));
         assert_null(strchr(warnings, '\n'));
-        expect_shadow(assets, everywhere);
-        vsh_assets_free(assets);
-        assert_int_equal(unlink(c.path.text), 0);
         free(uri);
     }
     free(png.at);
 }
 
-static void cards_without_uvs_are_whole(void **state) {
-    (void)state;
-    const bytes png = disc_image("disc.png", 0.0f);
-    char *uri = data_uri(png);
-    write_card("{\"name\":\"leaf\",\"alphaMode\":\"MASK\",\"pbrMetallicRoughness\":{\"baseColorTexture\":{"
-               "\"index\":0,\"texCoord\":2}}}",
-               "{}", uri, 1.0f, 0.0f);
-    casting c;
-    vsh_assets *assets = NULL;
-    assert_int_equal(load(false, cast_of(&c), &assets, NULL), VSH_OK);
+TEST(cards_without_uvs_are_whole) {
+    assert_casts((card){.material = "{\"name\":\"leaf\",\"alphaMode\":\"MASK\",\"pbrMetallicRoughness\":{"
+                                    "\"baseColorTexture\":{\"index\":0,\"texCoord\":2}}}"},
+                 everywhere);
     assert_non_null(strstr(warnings, "no UV set 2"));
-    expect_shadow(assets, everywhere);
-    vsh_assets_free(assets);
-    assert_int_equal(unlink(c.path.text), 0);
-    free(uri);
-    free(png.at);
 }
 
-static void a_texture_past_the_memory_limit_is_an_error(void **state) {
-    (void)state;
-    const bytes png = disc_image("disc.png", 0.0f);
-    char *uri = data_uri(png);
-    write_card(MASKED(""), "{}", uri, 1.0f, 0.0f);
-    casting c;
-    vsh_run run = vsh_run_default();
-    vsh_error error = {VSH_OK, ""};
+TEST(a_texture_past_the_memory_limit_is_an_error) {
     vsh_assets *assets = NULL;
-    run.memory_limit = 4 * TEXELS * TEXELS * sizeof(float) - 1;
-    assert_int_equal(vsh_assets_load(cast_of(&c), &run, &assets, &error), VSH_ERROR_LIMIT);
-    assert_non_null(strstr(error.message, "material 'leaf'"));
+    assert_fails(load((card){.memory_limit = 4 * TEXELS * TEXELS * sizeof(float) - 1}, &assets),
+                 VSH_ERROR_LIMIT, "material 'leaf'");
     assert_null(assets);
-    assert_int_equal(unlink(c.path.text), 0);
-    free(uri);
-    free(png.at);
 }
 
-static void patterns_mean_materials_where_no_object_is_called_so(void **state) {
-    (void)state;
+TEST(patterns_mean_materials_where_no_object_is_called_so) {
     static const struct {
         const char *pattern;
         bool matches;
     } cases[] = {{"leaf", true},           {"l*f", true},          {"material:leaf", true}, {"card", true},
                  {"material:card", false}, {"material:l?", false}, {"leav", false}};
-    write_card("{\"name\":\"leaf\"}", "{}", "x.png", 1.0f, 0.0f);
-    for (size_t i = 0; i < 2 * sizeof cases / sizeof cases[0]; ++i) {
-        casting c;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        static const char unknown[] = "there are 'card', and materials 'leaf'";
+        const char *const pattern[] = {cases[i].pattern};
+        const card one_sided = {.material = "{\"name\":\"leaf\"}", .uri = "x.png", .one_sided = pattern};
+        const card except = {.material = "{\"name\":\"leaf\"}", .uri = "x.png", .except = pattern};
+        assert_casts_nothing(except, cases[i].matches ? "no object is left" : unknown);
+        if (!cases[i].matches) {
+            assert_casts_nothing(one_sided, unknown);
+            continue;
+        }
         vsh_assets *assets = NULL;
-        vsh_error error = {VSH_OK, ""};
-        const char *const patterns[] = {cases[i / 2].pattern};
-        cast_of(&c);
-        if (i % 2 == 0) {
-            c.caster.one_sided = patterns;
-            c.caster.one_sided_count = 1;
-        } else {
-            c.caster.objects = (vsh_selection){.except = patterns, .except_count = 1};
-        }
-        const vsh_result result = load(false, &c.scene, &assets, &error);
-        assert_int_equal(result, i % 2 == 0 && cases[i / 2].matches ? VSH_OK : VSH_ERROR_INPUT);
-        if (result == VSH_OK) {
-            size_t count = 0;
-            assert_int_equal(vsh_assets_caster(assets, 0, &count)[0].one_sided, 1);
-        } else {
-            const char *part =
-                cases[i / 2].matches ? "no object is left" : "there are 'card', and materials 'leaf'";
-            if (strstr(error.message, part) == NULL) {
-                fail_msg("'%s': no '%s'", error.message, part);
-            }
-        }
+        size_t count = 0;
+        assert_ok(load(one_sided, &assets));
+        assert_int_equal(vsh_assets_caster(assets, 0, &count)[0].one_sided, 1);
         vsh_assets_free(assets);
     }
-    assert_int_equal(unlink(path_of("a.gltf").text), 0);
 }
 
 int main(int argc, char **argv) {
     if (argc > 1 && strcmp(argv[1], VSH_READER_ARGUMENT) == 0) {
         return vsh_reader_serve(argc, argv);
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_card_casts_the_disc_in_its_textures_alpha),
-        cmocka_unit_test(only_what_an_edge_crosses_is_asked_of_the_mask),
-        cmocka_unit_test(wraps_and_texture_transforms_are_those_of_the_file),
-        cmocka_unit_test(cutoff_and_base_factor_decide),
-        cmocka_unit_test(blended_cards_cast_where_they_are_cut_out_and_glass_does_not),
-        cmocka_unit_test(textures_that_cannot_be_had_leave_the_card_whole),
-        cmocka_unit_test(cards_without_uvs_are_whole),
-        cmocka_unit_test(a_texture_past_the_memory_limit_is_an_error),
-        cmocka_unit_test(patterns_mean_materials_where_no_object_is_called_so),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

@@ -1,15 +1,6 @@
 /* Numbers of points' text against the C library's: the same bits in, the same bits back. */
 #include "base/decimal.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "testing.h"
 
 static uint64_t counter;
 
@@ -31,41 +22,24 @@ static void expect_as_strtod(const char *text) {
     }
 }
 
-static void numbers_are_read_as_strtod_reads_them(void **state) {
-    (void)state;
-    static const char *const texts[] = {"0",
-                                        "-0",
-                                        "+1",
-                                        "1.",
-                                        ".5",
-                                        "-.5e1",
-                                        "1e5",
-                                        "1E+5",
-                                        "1e-5",
-                                        "00012.500",
-                                        "0.1",
-                                        "9007199254740993",
-                                        "9007199254740992.5",
-                                        "9007199254740993e3",
-                                        "123456789012345678901234567890",
-                                        "18446744073709551615",
-                                        "9999999999999999999",
-                                        "0.00000000000000000000000000001",
-                                        "1e-400",
-                                        "1e400",
-                                        "4.9e-324",
-                                        "1e22",
-                                        "1e23",
-                                        "2.2250738585072011e-308",
-                                        "8.41e21",
-                                        "0e99999",
-                                        "3.518437208883201171875e13",
-                                        "1.00000000000000011102230246251565404236316680908203125",
-                                        "179769313486231580793e289",
-                                        "0.000000000000000000000000000000000000000000000000001e51"};
-    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; ++i) {
-        expect_as_strtod(texts[i]);
+/* Expects each word of a text, which spaces separate. */
+static void expect_words(const char *words, void (*expect)(const char *word)) {
+    char word[64];
+    for (int size; sscanf(words, "%63s%n", word, &size) == 1; words += size) {
+        expect(word);
     }
+}
+
+TEST(numbers_are_read_as_strtod_reads_them) {
+    expect_words("0 -0 +1 1. .5 -.5e1 1e5 1E+5 1e-5 00012.500 0.1 9007199254740993 "
+                 "9007199254740992.5 9007199254740993e3 123456789012345678901234567890 "
+                 "18446744073709551615 9999999999999999999 0.00000000000000000000000000001 "
+                 "1e-400 1e400 4.9e-324 1e22 1e23 2.2250738585072011e-308 8.41e21 0e99999 "
+                 "3.518437208883201171875e13 "
+                 "1.00000000000000011102230246251565404236316680908203125 "
+                 "179769313486231580793e289 "
+                 "0.000000000000000000000000000000000000000000000000001e51",
+                 expect_as_strtod);
     for (int i = 0; i < 300000; ++i) {
         char text[64];
         const uint64_t bits = draw();
@@ -94,8 +68,7 @@ static void numbers_are_read_as_strtod_reads_them(void **state) {
     }
 }
 
-static void what_is_no_decimal_number_is_refused(void **state) {
-    (void)state;
+TEST(what_is_no_decimal_number_is_refused) {
     static const char *const texts[] = {"",     "-",   "+",     ".",       "e5",   "1e", "1e+",
                                         "0x10", "1,5", "1 2",   "1.2.3",   "abc",  "1f", "nanx",
                                         "in",   "--1", "1e5.0", "infinit", "1_000"};
@@ -112,16 +85,14 @@ static void what_is_no_decimal_number_is_refused(void **state) {
     assert_true(vshi_decimal_read(low, low + 9, &value) && isinf(value) && value < 0.0);
 }
 
-static void only_the_given_characters_are_read(void **state) {
-    (void)state;
+TEST(only_the_given_characters_are_read) {
     const char *text = "12.5678";
     double value;
     assert_true(vshi_decimal_read(text, text + 4, &value));
     assert_true(value == 12.5);
 }
 
-static void floats_come_back_with_the_same_bits(void **state) {
-    (void)state;
+TEST(floats_come_back_with_the_same_bits) {
     for (int i = 0; i < 600000; ++i) {
         uint32_t bits = (uint32_t)draw();
         if (i % 2 != 0) { /* visibilities */
@@ -153,8 +124,7 @@ static void floats_come_back_with_the_same_bits(void **state) {
     }
 }
 
-static void doubles_come_back_with_the_same_bits(void **state) {
-    (void)state;
+TEST(doubles_come_back_with_the_same_bits) {
     for (int i = 0; i < 200000; ++i) {
         const uint64_t bits = draw();
         double value;
@@ -186,29 +156,12 @@ static void expect_as_strtof(const char *number) {
 }
 
 /* Short and long, also in the middle between two floats and next to it, subnormal and too large. */
-static void floats_are_read_as_strtof_reads_them(void **state) {
-    (void)state;
-    static const char *const texts[] = {"0",
-                                        "-0",
-                                        "1.",
-                                        "-.5",
-                                        "+1e5",
-                                        "1e-46",
-                                        "1e-45",
-                                        "7.006492321624085e-46",
-                                        "3.4028235e38",
-                                        "3.4028235677973366e38",
-                                        "3.5e38",
-                                        "1e999999999999",
-                                        "16777217",
-                                        "16777217.000000000000000000001",
-                                        "16777219",
-                                        "1.1754943e-38",
-                                        "0.1e22",
-                                        "123456789012345678901234567890"};
-    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; ++i) {
-        expect_as_strtof(texts[i]);
-    }
+TEST(floats_are_read_as_strtof_reads_them) {
+    expect_words("0 -0 1. -.5 +1e5 1e-46 1e-45 7.006492321624085e-46 3.4028235e38 "
+                 "3.4028235677973366e38 3.5e38 1e999999999999 16777217 "
+                 "16777217.000000000000000000001 16777219 1.1754943e-38 0.1e22 "
+                 "123456789012345678901234567890",
+                 expect_as_strtof);
     counter = 2;
     for (int i = 0; i < 300000; ++i) {
         char text[64];
@@ -237,13 +190,5 @@ static void floats_are_read_as_strtof_reads_them(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(numbers_are_read_as_strtod_reads_them),
-        cmocka_unit_test(what_is_no_decimal_number_is_refused),
-        cmocka_unit_test(only_the_given_characters_are_read),
-        cmocka_unit_test(floats_come_back_with_the_same_bits),
-        cmocka_unit_test(doubles_come_back_with_the_same_bits),
-        cmocka_unit_test(floats_are_read_as_strtof_reads_them),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

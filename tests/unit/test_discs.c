@@ -1,17 +1,7 @@
 /* Packets of rays over discs and domes (src/trace/embree_discs.c), held against the same rays one by one. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
 
-#include <cmocka.h>
-
+#include "testing.h"
 #include "trace/embree.h"
-
-#include <vdbshade/vdbshade.h>
 
 enum { MOST = 256, POINTS = 203 };
 
@@ -92,8 +82,7 @@ static void compare(bool domes, double far, uint32_t count, int32_t first, int32
     assert_true(count < 16 || (all > 0 && all < (int32_t)count * (last - first)));
 }
 
-static void packets_count_what_lone_rays_do(void **state) {
-    (void)state;
+TEST(packets_count_what_lone_rays_do) {
     static const uint32_t counts[] = {1, 2, 3, 5, 16, 17, POINTS};
     static const int32_t blocks[][2] = {{0, 4}, {0, 8}, {4, 8}, {8, 16}, {0, 64}, {16, 32}, {64, 256}};
     for (size_t c = 0; c < sizeof counts / sizeof counts[0]; ++c) {
@@ -107,8 +96,7 @@ static void packets_count_what_lone_rays_do(void **state) {
     compare(true, INFINITY, POINTS, 0, 64);
 }
 
-static void what_is_no_blocks_is_told(void **state) {
-    (void)state;
+TEST(what_is_no_blocks_is_told) {
     static const int32_t none[][2] = {{0, 2}, {0, 12}, {4, 12}, {4, 4}, {2, 4}, {64, 100}, {12, 16}};
     for (size_t b = 0; b < sizeof none / sizeof none[0]; ++b) {
         assert_false(vshi_sampler_is_blocks(none[b][0], none[b][1]));
@@ -117,8 +105,7 @@ static void what_is_no_blocks_is_told(void **state) {
 
 /* What is left of the disc is bounded by half a circle and half an ellipse. It has closed forms for the means
  * of the distance along the lean, of its square, and of the square across it. */
-static void places_fill_the_dome_above_a_plane_evenly(void **state) {
-    (void)state;
+TEST(places_fill_the_dome_above_a_plane_evenly) {
     enum { SIDE = 400 };
     static const double PI = 3.14159265358979323846;
     const vshi_vec axes[3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
@@ -150,9 +137,8 @@ int main(void) {
     if (!vsh_triangles_available()) {
         return 0;
     }
-    vsh_error error;
     vsh_model *model = NULL;
-    if (vsh_model_read(VSH_ASSETS "/cloister.glb", NULL, &model, &error) != VSH_OK) {
+    if (vsh_model_read(VSH_ASSETS "/cloister.glb", NULL, &model, &failure) != VSH_OK) {
         return 1;
     }
     const size_t count = vsh_model_mesh_count(model);
@@ -161,15 +147,10 @@ int main(void) {
         meshes[i] = vsh_model_mesh(model, i, -1);
     }
     sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, MOST, 0);
-    if (sampler == NULL || vsh_triangles_create(meshes, count, NULL, &triangles, &error) != VSH_OK) {
+    if (sampler == NULL || vsh_triangles_create(meshes, count, NULL, &triangles, &failure) != VSH_OK) {
         return 1;
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(places_fill_the_dome_above_a_plane_evenly),
-        cmocka_unit_test(packets_count_what_lone_rays_do),
-        cmocka_unit_test(what_is_no_blocks_is_told),
-    };
-    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    const int failed = run_all_tests(NULL, NULL);
     vsh_triangles_free(triangles);
     vshi_sampler_free(sampler);
     free(meshes);

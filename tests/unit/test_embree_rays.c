@@ -1,14 +1,7 @@
 /* The rays that whole bakes are held against (bench/embree_rays.c): closed forms, and the sampler's own rays.
  */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
 
-#include <cmocka.h>
-
+#include "testing.h"
 #ifndef VSH_EMBREE
 int main(void) {
     return 0; /* nothing to hold against */
@@ -17,9 +10,6 @@ int main(void) {
 
 #include "../bench/embree_rays.c"
 #include "truth/directions.h"
-
-#include <string.h>
-#include <vdbshade/bake.h>
 
 enum { POINTS = 400 };
 
@@ -38,8 +28,7 @@ static vsh_triangles *wall(const float corner[3], const float a[3], const float 
     }
     vsh_mesh mesh = {.positions = positions, .vertex_count = 4, .indices = indices, .triangle_count = 2};
     vsh_triangles *triangles = NULL;
-    vsh_error error;
-    assert_int_equal(vsh_triangles_create(&mesh, 1, NULL, &triangles, &error), VSH_OK);
+    assert_ok(vsh_triangles_create(&mesh, 1, NULL, &triangles, &failure));
     return triangles;
 }
 
@@ -78,8 +67,7 @@ static vsh_triangles *half_plane(void) {
                 (float[]){0.0f, 0.0f, (float)(2.0 * NEAR)});
 }
 
-static void a_half_plane_hides_what_its_closed_form_says(void **state) {
-    (void)state;
+TEST(a_half_plane_hides_what_its_closed_form_says) {
     static points p;
     vsh_triangles *triangles = half_plane();
     const vshi_light_place light = sun(0.2);
@@ -97,8 +85,7 @@ static void a_half_plane_hides_what_its_closed_form_says(void **state) {
     vsh_triangles_free(triangles);
 }
 
-static void a_wall_hides_of_the_hemisphere_what_its_closed_form_says(void **state) {
-    (void)state;
+TEST(a_wall_hides_of_the_hemisphere_what_its_closed_form_says) {
     static points p;
     vsh_triangles *triangles = wall((float[]){0.0f, 0.0f, (float)-FAR}, (float[]){0.0f, 1.0f, 0.0f},
                                     (float[]){0.0f, 0.0f, (float)(2.0 * FAR)});
@@ -112,8 +99,7 @@ static void a_wall_hides_of_the_hemisphere_what_its_closed_form_says(void **stat
 }
 
 /* Also where they are no power of two, and so in no cells. */
-static void the_rays_are_the_samplers(void **state) {
-    (void)state;
+TEST(the_rays_are_the_samplers) {
     static points p;
     vsh_triangles *triangles = half_plane();
     const vshi_light_place light = sun(0.2);
@@ -138,12 +124,7 @@ static void the_rays_are_the_samplers(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_half_plane_hides_what_its_closed_form_says),
-        cmocka_unit_test(a_wall_hides_of_the_hemisphere_what_its_closed_form_says),
-        cmocka_unit_test(the_rays_are_the_samplers),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }
 
 #endif

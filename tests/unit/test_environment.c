@@ -1,4 +1,5 @@
 /* The host's floating-point environment: no setting of it shows in a result, every setting is given back. */
+#include "testing.h"
 #include "traced.h"
 
 #include "base/floats.h"
@@ -60,15 +61,13 @@ static double ring(void *user, const double p[3]) {
 static void run_all(int s, int32_t threads, outcome *o) {
     const vshi_floats setting = SETTINGS[s];
 
-    vsh_run run = vsh_run_default();
-    run.threads = threads;
+    vsh_run run = run_on(threads);
     run.progress = look;
     run.user = &o->strange;
     o->strange = 0;
     o->stats = vsh_shade_stats_zero();
     const vsh_distance field = {ring, NULL, 1.0, 0, {-1.4, -0.4, -1.4}, {1.4, 0.4, 1.4}};
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = 0.047;
+    const vsh_grid_options options = with_voxel(0.047);
     vsh_field_options field_options = vsh_field_options_default();
     field_options.reach = 3.3;
     vsh_sdf_node node = vsh_sdf_node_default();
@@ -80,7 +79,6 @@ static void run_all(int s, int32_t threads, outcome *o) {
     const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_grid *grid = NULL;
     vsh_field *f = NULL;
-    vsh_error error = {VSH_OK, ""};
     vsh_result results[2 + SHADOWS + AOS + 3] = {VSH_OK};
     size_t calls = 2;
     vsh_triangles *triangles = NULL;
@@ -92,12 +90,13 @@ static void run_all(int s, int32_t threads, outcome *o) {
     memset(o->traced, 0, sizeof o->traced);
 
     vshi_floats_set(setting);
-    results[0] = vsh_grid_from_distance(&field, &options, &run, &grid, &error);
-    results[1] = results[0] == VSH_OK ? vsh_field_create(grid, &field_options, &run, &f, &error) : results[0];
+    results[0] = vsh_grid_from_distance(&field, &options, &run, &grid, &failure);
+    results[1] =
+        results[0] == VSH_OK ? vsh_field_create(grid, &field_options, &run, &f, &failure) : results[0];
     if (results[1] == VSH_OK) {
         vshi_floats_set(setting);
         if (vsh_triangles_available()) {
-            results[calls++] = vsh_triangles_create(&mesh, 1, &run, &triangles, &error);
+            results[calls++] = vsh_triangles_create(&mesh, 1, &run, &triangles, &failure);
             vshi_floats_set(setting);
         }
         for (int32_t i = 0; i <= shadow_methods(); ++i) { /* once more the cone, of the lamp */
@@ -105,21 +104,21 @@ static void run_all(int s, int32_t threads, outcome *o) {
             how.method = i < shadow_methods() ? i : VSH_SHADOW_CONE;
             results[calls++] = vsh_shade_shadow(occluders_traced(f, triangles), &points,
                                                 &lights[i == 1 || i >= VSH_SHADOW_EXACT], &how, &run,
-                                                o->visible[i], NULL, &o->stats, &error);
+                                                o->visible[i], NULL, &o->stats, &failure);
         }
         for (int32_t i = 0; i < ao_methods(); ++i) {
             vsh_shade_options how = preview_options();
             how.ao_method = i;
             results[calls++] = vsh_shade_ao(occluders_traced(f, triangles), &points, &how, &run, o->open[i],
-                                            NULL, NULL, &o->stats, &error);
+                                            NULL, NULL, &o->stats, &failure);
         }
         if (triangles != NULL) {
             vshi_floats_set(setting);
             results[calls++] = vsh_trace_shadow(triangles, NULL, COUNT, positions, normals, 1e-5, &lights[1],
-                                                32, &run, o->traced[0], &error);
+                                                32, &run, o->traced[0], &failure);
             vshi_floats_set(setting);
             results[calls++] = vsh_trace_ao(triangles, NULL, COUNT, positions, normals, 1e-5, 1.0, 32, &run,
-                                            o->traced[1], &error);
+                                            o->traced[1], &failure);
         }
         vshi_floats_set(setting);
         vsh_shade_irradiance(&points, NULL, &lights[1], o->visible[1], o->light);
@@ -131,11 +130,9 @@ static void run_all(int s, int32_t threads, outcome *o) {
     const vshi_floats after = vshi_floats_get();
     vshi_floats_set(VSHI_FLOATS_DEFAULT);
 
-    if (results[1] != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(results[1]);
     for (size_t i = 0; i < calls; ++i) {
-        assert_int_equal(results[i], VSH_OK);
+        assert_ok(results[i]);
     }
     /* flags that say what has happened may be added where the host's setting is the default one */
     assert_true((after & ~(vshi_floats)VSHI_FLOATS_FLAGS) == (setting & ~(vshi_floats)VSHI_FLOATS_FLAGS));
@@ -147,8 +144,7 @@ static void run_all(int s, int32_t threads, outcome *o) {
     free((void *)(uintptr_t)mesh.indices);
 }
 
-static void no_setting_of_the_host_shows_and_all_are_given_back(void **state) {
-    (void)state;
+TEST(no_setting_of_the_host_shows_and_all_are_given_back) {
     static outcome expected, other;
     uint64_t counter = 3;
     floor_texels(SIDE, positions, normals);
@@ -173,9 +169,8 @@ static void no_setting_of_the_host_shows_and_all_are_given_back(void **state) {
 }
 
 /* Lengths that are denormal numbers, and scenes that have them, are what they are. */
-static void denormals_are_numbers(void **state) {
-    (void)state;
-    caster c = caster_of(truth_seeds(), 0.1, 2.0);
+TEST(denormals_are_numbers) {
+    casting c = caster_of(truth_seeds(), 0.1, 2.0);
     const double p[3] = {0.3, 1e-310, 0.2}, zero[3] = {0.3, 0.0, 0.2};
     const float tiny[3] = {0.0f, 1e-41f, 1e-44f}, up[3] = {0.0f, 1.0f, 0.0f};
     const double towards[3] = {5e-324, 1e-310, 0.0};
@@ -201,9 +196,5 @@ static void denormals_are_numbers(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_setting_of_the_host_shows_and_all_are_given_back),
-        cmocka_unit_test(denormals_are_numbers),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,6 +1,7 @@
 /* One scene in every format that is read, as Blender 3.4 writes it (tools/export_models.py): the same
  * triangles in the same places. */
 #include "models.h"
+#include "testing.h"
 
 typedef struct sums {
     size_t triangles;
@@ -30,10 +31,7 @@ static sums sums_of(const char *name, double unit) {
     char path[512];
     snprintf(path, sizeof path, "%s/%s", VSH_MODELS, name);
     vsh_model *model = NULL;
-    vsh_error error = {0};
-    if (vsh_model_read(path, NULL, &model, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_model_read(path, NULL, &model, &failure));
     if (fabs(vsh_model_unit(model) - unit) > 1e-12) {
         fail_msg("%s: a unit of %g m, expected %g", name, vsh_model_unit(model), unit);
     }
@@ -64,8 +62,7 @@ static void expect(const char *name, const char *what, double value, double expe
 }
 
 /* Of the scene: 12 triangles of the box and 4 of the L, and no area over the L's void. */
-static void one_scene_is_the_same_in_every_format(void **state) {
-    (void)state;
+TEST(one_scene_is_the_same_in_every_format) {
     static const struct {
         const char *name;
         double unit;
@@ -107,8 +104,7 @@ static void one_scene_is_the_same_in_every_format(void **state) {
 }
 
 /* A bar on two bones, the upper bent by a right angle: Blender's own vertices of the tip. */
-static void a_figure_stands_as_its_bones_do(void **state) {
-    (void)state;
+TEST(a_figure_stands_as_its_bones_do) {
     static const char *const names[] = {"figure.glb", "figure.fbx"};
     for (size_t i = 0; i < 2; ++i) {
         const sums s = sums_of(names[i], i == 0 ? 1.0 : 0.01);
@@ -122,9 +118,5 @@ static void a_figure_stands_as_its_bones_do(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(one_scene_is_the_same_in_every_format),
-        cmocka_unit_test(a_figure_stands_as_its_bones_do),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

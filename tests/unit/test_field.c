@@ -1,10 +1,9 @@
 /* The pyramid: distances of the seeds' scene against closed forms, level by level. */
 #include "fields.h"
+#include "testing.h"
 
 #include "field/field.h"
 #include "levelset/leaves.h"
-
-#include <stdlib.h>
 
 #define VOXEL 0.04
 
@@ -68,8 +67,7 @@ static level_errors measure(const vsh_field *field, int32_t level, truth_scene s
     return e;
 }
 
-static void each_level_is_within_a_cell_of_the_truth_in_its_band(void **state) {
-    (void)state;
+TEST(each_level_is_within_a_cell_of_the_truth_in_its_band) {
     vsh_field *field = seeds_field(5.0);
     const double center[3] = {0.0, 0.75, 0.0};
     assert_int_equal(field->level_count, 6);
@@ -88,8 +86,7 @@ static void each_level_is_within_a_cell_of_the_truth_in_its_band(void **state) {
     vsh_field_free(field);
 }
 
-static void thin_parts_are_as_right_as_the_rest(void **state) {
-    (void)state;
+TEST(thin_parts_are_as_right_as_the_rest) {
     vsh_field *field = seeds_field(5.0);
     const truth_scene scene = truth_seeds();
     const double parts[2][3] = {{1.2, 0.6, -0.3}, {0.3, 1.4, 1.5}};
@@ -124,8 +121,7 @@ static double resolved_distance(const vsh_field *field, const double p[3]) {
     return (double)vshi_field_distance(field, f) * field->voxel_size;
 }
 
-static void sampled_distances_are_within_a_voxel_of_the_level_that_resolves_them(void **state) {
-    (void)state;
+TEST(sampled_distances_are_within_a_voxel_of_the_level_that_resolves_them) {
     const truth_scene scene = truth_seeds();
     vsh_field *field = seeds_field(5.0);
     uint64_t counter = 7;
@@ -149,8 +145,7 @@ static void sampled_distances_are_within_a_voxel_of_the_level_that_resolves_them
 }
 
 /* Callers march by these distances. */
-static void beyond_the_finest_band_distances_are_lower_bounds(void **state) {
-    (void)state;
+TEST(beyond_the_finest_band_distances_are_lower_bounds) {
     const truth_solid solids[] = {{TRUTH_SPHERE, {0.01, 0.02, 0.03}, {0.0, 0.0, 0.0}, 1.0, 0.0},
                                   {TRUTH_TORUS, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.4},
                                   {TRUTH_BOX, {0.0, 0.0, 0.0}, {0.7, 0.4, 1.1}, 0.0, 0.0}};
@@ -186,8 +181,7 @@ static void beyond_the_finest_band_distances_are_lower_bounds(void **state) {
     }
 }
 
-static void beyond_the_reach_distances_are_lower_bounds(void **state) {
-    (void)state;
+TEST(beyond_the_reach_distances_are_lower_bounds) {
     const truth_scene scene = truth_seeds();
     vsh_field *field = seeds_field(0.5);
     const vshi_level *top = &field->levels[field->level_count - 1];
@@ -210,8 +204,7 @@ static void beyond_the_reach_distances_are_lower_bounds(void **state) {
     vsh_field_free(field);
 }
 
-static void a_field_has_only_the_levels_that_the_reach_needs(void **state) {
-    (void)state;
+TEST(a_field_has_only_the_levels_that_the_reach_needs) {
     vsh_grid *grid = grid_of(truth_seeds(), VOXEL);
     /* bands: 3 voxels of the grid, then 6 of each coarser level */
     const struct {
@@ -226,7 +219,7 @@ static void a_field_has_only_the_levels_that_the_reach_needs(void **state) {
         vsh_field_options options = vsh_field_options_default();
         options.reach = cases[i].reach;
         vsh_field *field = NULL;
-        assert_int_equal(vsh_field_create(grid, &options, NULL, &field, NULL), VSH_OK);
+        assert_ok(vsh_field_create(grid, &options, NULL, &field, &failure));
         vsh_field_info info;
         vsh_field_get_info(field, &info);
         assert_int_equal(info.levels, cases[i].levels);
@@ -236,8 +229,7 @@ static void a_field_has_only_the_levels_that_the_reach_needs(void **state) {
     vsh_grid_free(grid);
 }
 
-static void without_a_wish_the_reach_is_four_diagonals(void **state) {
-    (void)state;
+TEST(without_a_wish_the_reach_is_four_diagonals) {
     const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
     vsh_field *field = field_of((truth_scene){&ball, 1}, 0.1, 0.0);
     vsh_field_info info;
@@ -246,8 +238,7 @@ static void without_a_wish_the_reach_is_four_diagonals(void **state) {
     vsh_field_free(field);
 }
 
-static void coarse_levels_take_a_fraction_of_the_finest_ones_memory(void **state) {
-    (void)state;
+TEST(coarse_levels_take_a_fraction_of_the_finest_ones_memory) {
     const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
     vsh_field *one = field_of((truth_scene){&ball, 1}, 0.01, 0.01);
     vsh_field *many = field_of((truth_scene){&ball, 1}, 0.01, 0.0);
@@ -262,8 +253,7 @@ static void coarse_levels_take_a_fraction_of_the_finest_ones_memory(void **state
     vsh_field_free(many);
 }
 
-static void signs_hold_deep_inside_big_solids_and_far_outside(void **state) {
-    (void)state;
+TEST(signs_hold_deep_inside_big_solids_and_far_outside) {
     const truth_solid solids[] = {{TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 2.0, 0.0},
                                   {TRUTH_BOX, {6.0, 0.0, 0.0}, {1.5, 2.5, 3.5}, 0.0, 0.0},
                                   {TRUTH_BOX, {0.0, -4.0, 0.0}, {4.0, 0.04, 4.0}, 0.0, 0.0}};
@@ -293,8 +283,7 @@ static void signs_hold_deep_inside_big_solids_and_far_outside(void **state) {
     }
 }
 
-static void a_turned_box_far_away_is_within_what_a_trilinear_sample_errs(void **state) {
-    (void)state;
+TEST(a_turned_box_far_away_is_within_what_a_trilinear_sample_errs) {
     /* a box turned by 50° about (1, 2, 3), far from the origin; voxels of 0.04 at 1000 units */
     const double half = 25.0 / 180.0 * 3.14159265358979323846, norm = sqrt(14.0);
     vsh_sdf_node node = vsh_sdf_node_default();
@@ -310,10 +299,9 @@ static void a_turned_box_far_away_is_within_what_a_trilinear_sample_errs(void **
     node.translation[1] = -500.0;
     node.translation[2] = 0.123;
     const vsh_sdf sdf = {&node, 1};
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = VOXEL;
+    const vsh_grid_options options = with_voxel(VOXEL);
     vsh_grid *grid = NULL;
-    assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, NULL), VSH_OK);
+    assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
     vsh_field *field = field_of_grid(grid, 2.0);
 
     const truth_solid box = {TRUTH_BOX, {0.0, 0.0, 0.0}, {0.8, 0.5, 0.3}, 0.0, 0.0};
@@ -345,8 +333,7 @@ static void a_turned_box_far_away_is_within_what_a_trilinear_sample_errs(void **
     vsh_field_free(field);
 }
 
-static void positions_that_are_not_finite_give_nan_and_far_ones_do_not(void **state) {
-    (void)state;
+TEST(positions_that_are_not_finite_give_nan_and_far_ones_do_not) {
     vsh_field *field = seeds_field(1.0);
     for (int axis = 0; axis < 3; ++axis) {
         const double bad[] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
@@ -373,8 +360,7 @@ static void positions_that_are_not_finite_give_nan_and_far_ones_do_not(void **st
     vsh_field_free(field);
 }
 
-static void info_tells_the_solids_box_and_voxel(void **state) {
-    (void)state;
+TEST(info_tells_the_solids_box_and_voxel) {
     vsh_field *field = seeds_field(1.0);
     vsh_field_info info;
     vsh_field_get_info(field, &info);
@@ -389,20 +375,18 @@ static void info_tells_the_solids_box_and_voxel(void **state) {
 }
 
 /* Against the grid's own floats, which it was made from. */
-static void values_are_rounded_by_no_more_than_half_a_quantum(void **state) {
-    (void)state;
+TEST(values_are_rounded_by_no_more_than_half_a_quantum) {
     const double half_widths[] = {3.0, 4.7, 6.0, 20.0};
     for (int h = 0; h < 4; ++h) {
         vsh_sdf_node node = vsh_sdf_node_default();
         node.radius = 1.0;
         const vsh_sdf sdf = {&node, 1};
-        vsh_grid_options options = vsh_grid_options_default();
-        options.voxel_size = VOXEL;
+        vsh_grid_options options = with_voxel(VOXEL);
         options.half_width = half_widths[h];
         vsh_grid *grid = NULL;
-        assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, NULL), VSH_OK);
+        assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
         vsh_field *field = NULL;
-        assert_int_equal(vsh_field_create(grid, NULL, NULL, &field, NULL), VSH_OK);
+        assert_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
         const size_t count = vshi_grid_leaves(grid, NULL, 0);
         vshi_leaf *leaves = malloc(count * sizeof *leaves);
         assert_non_null(leaves);
@@ -434,8 +418,7 @@ static void values_are_rounded_by_no_more_than_half_a_quantum(void **state) {
     }
 }
 
-static void a_voxel_takes_no_more_than_eighteen_bytes(void **state) {
-    (void)state;
+TEST(a_voxel_takes_no_more_than_eighteen_bytes) {
     const double voxels[] = {0.04, 0.02, 0.01};
     for (int i = 0; i < 3; ++i) {
         vsh_field *field = field_of(truth_seeds(), voxels[i], 0.0);
@@ -450,21 +433,5 @@ static void a_voxel_takes_no_more_than_eighteen_bytes(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_level_is_within_a_cell_of_the_truth_in_its_band),
-        cmocka_unit_test(thin_parts_are_as_right_as_the_rest),
-        cmocka_unit_test(sampled_distances_are_within_a_voxel_of_the_level_that_resolves_them),
-        cmocka_unit_test(beyond_the_finest_band_distances_are_lower_bounds),
-        cmocka_unit_test(beyond_the_reach_distances_are_lower_bounds),
-        cmocka_unit_test(a_field_has_only_the_levels_that_the_reach_needs),
-        cmocka_unit_test(without_a_wish_the_reach_is_four_diagonals),
-        cmocka_unit_test(coarse_levels_take_a_fraction_of_the_finest_ones_memory),
-        cmocka_unit_test(signs_hold_deep_inside_big_solids_and_far_outside),
-        cmocka_unit_test(a_turned_box_far_away_is_within_what_a_trilinear_sample_errs),
-        cmocka_unit_test(positions_that_are_not_finite_give_nan_and_far_ones_do_not),
-        cmocka_unit_test(info_tells_the_solids_box_and_voxel),
-        cmocka_unit_test(values_are_rounded_by_no_more_than_half_a_quantum),
-        cmocka_unit_test(a_voxel_takes_no_more_than_eighteen_bytes),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,9 +1,8 @@
 /* How fields are made: the same bits for any number of threads, limits, progress, bad input. */
 #include "fields.h"
+#include "testing.h"
 
 #include "field/field.h"
-
-#include <stdlib.h>
 
 #define VOXEL 0.04
 
@@ -35,15 +34,13 @@ static void assert_same_fields(const vsh_field *a, const vsh_field *b) {
     assert_memory_equal(a->bounds_max, b->bounds_max, sizeof a->bounds_max);
 }
 
-static void any_number_of_threads_makes_the_same_bits(void **state) {
-    (void)state;
+TEST(any_number_of_threads_makes_the_same_bits) {
     vsh_grid *grid = grid_of(truth_seeds(), VOXEL);
     const int32_t threads[] = {1, 2, 5};
     vsh_field *fields[3];
     for (int i = 0; i < 3; ++i) {
-        vsh_run run = vsh_run_default();
-        run.threads = threads[i];
-        assert_int_equal(vsh_field_create(grid, NULL, &run, &fields[i], NULL), VSH_OK);
+        const vsh_run run = run_on(threads[i]);
+        assert_ok(vsh_field_create(grid, NULL, &run, &fields[i], &failure));
         assert_same_fields(fields[0], fields[i]);
     }
     enum { COUNT = 100000 };
@@ -67,12 +64,10 @@ static void any_number_of_threads_makes_the_same_bits(void **state) {
     vsh_grid_free(grid);
 }
 
-static void the_memory_limit_covers_every_level(void **state) {
-    (void)state;
+TEST(the_memory_limit_covers_every_level) {
     vsh_grid *grid = grid_of(truth_seeds(), VOXEL);
     vsh_field *field = NULL;
-    vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vsh_field_create(grid, NULL, NULL, &field, &error), VSH_OK);
+    assert_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
     vsh_field_info info;
     vsh_field_get_info(field, &info);
     vsh_field_free(field);
@@ -81,16 +76,16 @@ static void the_memory_limit_covers_every_level(void **state) {
     vsh_grid_info from;
     vsh_grid_get_info(grid, &from);
     run.memory_limit = from.bytes + info.bytes - 1; /* what is given and what comes of it would pass it */
-    assert_int_equal(vsh_field_create(grid, NULL, &run, &field, &error), VSH_ERROR_LIMIT);
+    assert_int_equal(vsh_field_create(grid, NULL, &run, &field, &failure), VSH_ERROR_LIMIT);
     assert_null(field);
-    assert_int_equal(error.code, VSH_ERROR_LIMIT);
-    assert_non_null(strstr(error.message, "memory limit"));
-    assert_null(strchr(error.message, '\n'));
+    assert_int_equal(failure.code, VSH_ERROR_LIMIT);
+    assert_non_null(strstr(failure.message, "memory limit"));
+    assert_null(strchr(failure.message, '\n'));
     run.memory_limit = 1000;
     assert_int_equal(vsh_field_create(grid, NULL, &run, &field, NULL), VSH_ERROR_LIMIT);
     assert_null(field);
     run.memory_limit = 1u << 30;
-    assert_int_equal(vsh_field_create(grid, NULL, &run, &field, NULL), VSH_OK);
+    assert_ok(vsh_field_create(grid, NULL, &run, &field, &failure));
     vsh_field_free(field);
     vsh_grid_free(grid);
 }
@@ -113,8 +108,7 @@ static int32_t watch(void *user, const char *stage, double fraction) {
     return log->stopped;
 }
 
-static void progress_rises_from_0_to_1_and_can_cancel_anywhere(void **state) {
-    (void)state;
+TEST(progress_rises_from_0_to_1_and_can_cancel_anywhere) {
     vsh_grid *grid = grid_of(truth_seeds(), VOXEL);
     vsh_run run = vsh_run_default();
     run.progress = watch;
@@ -123,21 +117,20 @@ static void progress_rises_from_0_to_1_and_can_cancel_anywhere(void **state) {
         for (int32_t threads = 1; threads <= 5; threads += 4) {
             progress_log log = {.limit = limits[i], .last = 0.0};
             vsh_field *field = NULL;
-            vsh_error error = {VSH_OK, ""};
             run.user = &log;
             run.threads = threads;
-            const vsh_result result = vsh_field_create(grid, NULL, &run, &field, &error);
+            const vsh_result result = vsh_field_create(grid, NULL, &run, &field, &failure);
             assert_false(log.falls);
             assert_false(log.misnamed);
             assert_int_equal(log.after_stop, 0);
             if (limits[i] > 1.0) {
-                assert_int_equal(result, VSH_OK);
+                assert_ok(result);
                 assert_non_null(field);
                 assert_true(log.last >= 1.0);
                 assert_true(log.calls > 3);
             } else {
                 assert_int_equal(result, VSH_ERROR_CANCELLED);
-                assert_int_equal(error.code, VSH_ERROR_CANCELLED);
+                assert_int_equal(failure.code, VSH_ERROR_CANCELLED);
                 assert_null(field);
             }
             vsh_field_free(field);
@@ -154,13 +147,11 @@ static void progress_rises_from_0_to_1_and_can_cancel_anywhere(void **state) {
     vsh_grid_free(grid);
 }
 
-static void options_and_runs_are_checked(void **state) {
-    (void)state;
+TEST(options_and_runs_are_checked) {
     const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
     vsh_grid *grid = grid_of((truth_scene){&ball, 1}, 0.1);
     vsh_field *field = NULL;
-    vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vsh_field_create(grid, NULL, NULL, &field, NULL), VSH_OK);
+    assert_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
     assert_non_null(field);
     vsh_field_free(field);
 
@@ -168,9 +159,9 @@ static void options_and_runs_are_checked(void **state) {
     for (int i = 0; i < 4; ++i) {
         vsh_field_options options = vsh_field_options_default();
         options.reach = reaches[i];
-        assert_int_equal(vsh_field_create(grid, &options, NULL, &field, &error), VSH_ERROR_ARGUMENT);
+        assert_int_equal(vsh_field_create(grid, &options, NULL, &field, &failure), VSH_ERROR_ARGUMENT);
         assert_null(field);
-        assert_non_null(strstr(error.message, "reach"));
+        assert_non_null(strstr(failure.message, "reach"));
         assert_int_equal(vsh_field_create(grid, &options, NULL, &field, NULL), VSH_ERROR_ARGUMENT);
     }
     /* the last ends within a member: half a pointer would be called */
@@ -179,25 +170,22 @@ static void options_and_runs_are_checked(void **state) {
     for (int i = 0; i < 5; ++i) {
         vsh_field_options options = vsh_field_options_default();
         options.struct_size = sizes[i];
-        assert_int_equal(vsh_field_create(grid, &options, NULL, &field, &error), VSH_ERROR_ARGUMENT);
-        assert_non_null(strstr(error.message, "vsh_field_options"));
+        assert_fails(vsh_field_create(grid, &options, NULL, &field, &failure), VSH_ERROR_ARGUMENT,
+                     "vsh_field_options");
         vsh_run run = vsh_run_default();
         run.struct_size = i == 2 ? sizeof run + 8 : sizes[i];
-        assert_int_equal(vsh_field_create(grid, NULL, &run, &field, &error), VSH_ERROR_ARGUMENT);
-        assert_non_null(strstr(error.message, "vsh_run"));
+        assert_fails(vsh_field_create(grid, NULL, &run, &field, &failure), VSH_ERROR_ARGUMENT, "vsh_run");
     }
-    vsh_run run = vsh_run_default();
-    run.threads = -1;
-    assert_int_equal(vsh_field_create(grid, NULL, &run, &field, &error), VSH_ERROR_ARGUMENT);
+    vsh_run run = run_on(-1);
+    assert_int_equal(vsh_field_create(grid, NULL, &run, &field, &failure), VSH_ERROR_ARGUMENT);
     run.threads = 1025;
-    assert_int_equal(vsh_field_create(grid, NULL, &run, &field, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_field_create(grid, NULL, &run, &field, &failure), VSH_ERROR_ARGUMENT);
     vsh_field_free(NULL);
     vsh_grid_free(grid);
 }
 
 /* A reach beyond anything must not make levels without end. */
-static void a_huge_reach_is_refused_or_met(void **state) {
-    (void)state;
+TEST(a_huge_reach_is_refused_or_met) {
     const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
     vsh_grid *grid = grid_of((truth_scene){&ball, 1}, 0.1);
     const double reaches[] = {1e3, 1e6, 1e12, 1e300};
@@ -228,12 +216,5 @@ static void a_huge_reach_is_refused_or_met(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(any_number_of_threads_makes_the_same_bits),
-        cmocka_unit_test(the_memory_limit_covers_every_level),
-        cmocka_unit_test(progress_rises_from_0_to_1_and_can_cancel_anywhere),
-        cmocka_unit_test(options_and_runs_are_checked),
-        cmocka_unit_test(a_huge_reach_is_refused_or_met),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

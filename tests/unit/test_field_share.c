@@ -1,8 +1,7 @@
 /* What a bake says of its error holds against rays to the casters, the field's own share included. */
 #include "casts.h"
+#include "testing.h"
 #include "texels_of.h"
-
-#include <vdbshade/trace.h>
 
 enum { WIDTH = 96, HEIGHT = 88, TEXELS = WIDTH * HEIGHT, BARS = 8, CHANNELS = 2 };
 
@@ -19,20 +18,9 @@ typedef struct stage {
 static const double VOXEL = 0.08;
 
 static void make_bar(stage *s, int i) {
-    static const uint32_t SIDES[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
-                                       2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
-    const double half[3] = {i == 0 ? 0.2 : 0.02, i == 0 ? 0.2 : 0.02, 0.7};
-    for (size_t v = 0; v < 8; ++v) {
-        const double x = -0.9 + 0.24 * i;
-        s->positions[i][3 * v] = (float)(x + (v & 1 ? 1 : -1) * half[0]);
-        s->positions[i][3 * v + 1] = (float)(0.5 + (v & 2 ? 1 : -1) * half[1]);
-        s->positions[i][3 * v + 2] = (float)((v & 4 ? 1 : -1) * half[2]);
-    }
-    s->bars[i] = (vsh_mesh){.name = "bar",
-                            .positions = s->positions[i],
-                            .indices = SIDES,
-                            .vertex_count = 8,
-                            .triangle_count = 12};
+    const double x = -0.9 + 0.24 * i, half = i == 0 ? 0.2 : 0.02;
+    s->bars[i] = box_mesh(s->positions[i], (double[]){x - half, 0.5 - half, -0.7},
+                          (double[]){x + half, 0.5 + half, 0.7});
 }
 
 static int set_up(void **state) {
@@ -47,17 +35,13 @@ static int set_up(void **state) {
     for (int i = 0; i < BARS; ++i) {
         make_bar(s, i);
     }
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = VOXEL;
+    const vsh_grid_options options = with_voxel(VOXEL);
     vsh_grid *grid = NULL;
-    vsh_error error = {0};
-    if (vsh_grid_from_meshes(s->bars, BARS, &options, NULL, &grid, &error) != VSH_OK ||
-        vsh_field_create(grid, NULL, NULL, &s->field, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_grid_from_meshes(s->bars, BARS, &options, NULL, &grid, &failure));
+    assert_ok(vsh_field_create(grid, NULL, NULL, &s->field, &failure));
     vsh_grid_free(grid);
     if (vsh_triangles_available()) {
-        assert_int_equal(vsh_triangles_create(s->bars, BARS, NULL, &s->triangles, &error), VSH_OK);
+        assert_ok(vsh_triangles_create(s->bars, BARS, NULL, &s->triangles, &failure));
     }
     return 0;
 }
@@ -100,17 +84,13 @@ static baked *bake_whole(const stage *s, vsh_lightmap_options options, int32_t t
     const vsh_light light = sun();
     float *const shadow = b->shadow;
     const vsh_lightmap lightmap = {.shadow = &shadow, .ao = b->ao, .coverage = b->coverage};
-    vsh_run run = vsh_run_default();
-    run.threads = threads;
+    const vsh_run run = run_on(threads);
     vsh_bake_stats stats = vsh_bake_stats_zero();
     stats.errors = b->errors;
     const int exact = options.shade.method == VSH_SHADOW_EXACT;
     const vsh_occluders casters = {
         .field = s->field, .triangles = exact ? s->triangles : NULL, .true_triangles = truth};
-    vsh_error error = {0};
-    if (vsh_bake_lightmap(&casters, charts, &light, 1, NULL, &run, &lightmap, &stats, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_bake_lightmap(&casters, charts, &light, 1, NULL, &run, &lightmap, &stats, &failure));
     vsh_charts_free(charts);
     return b;
 }
@@ -129,7 +109,7 @@ static void measure(const stage *s, const baked *b, double rmse[CHANNELS]) {
                                                          all.normals, 1e-5, &light, RAYS, NULL, truth, NULL)
                                       : vsh_trace_ao(s->triangles, NULL, all.count, all.positions,
                                                      all.normals, 1e-5, 1.0, RAYS, NULL, truth, NULL);
-        assert_int_equal(result, VSH_OK);
+        assert_ok(result);
         double sum = 0.0, valid = 0.0;
         for (size_t i = 0; i < all.count; ++i) {
             const size_t place = vsh_texel_place(all.texels[i], WIDTH);
@@ -144,7 +124,7 @@ static void measure(const stage *s, const baked *b, double rmse[CHANNELS]) {
     vsh_charts_free(charts);
 }
 
-static void what_voxels_lose_is_in_the_estimate(void **state) {
+TEST(what_voxels_lose_is_in_the_estimate) {
     const stage *s = *state;
     if (s->triangles == NULL) {
         skip();
@@ -166,7 +146,7 @@ static void what_voxels_lose_is_in_the_estimate(void **state) {
     free(b);
 }
 
-static void exact_values_are_held_against_rays_too(void **state) {
+TEST(exact_values_are_held_against_rays_too) {
     const stage *s = *state;
     if (s->triangles == NULL) {
         skip();
@@ -182,7 +162,7 @@ static void exact_values_are_held_against_rays_too(void **state) {
     free(b);
 }
 
-static void without_the_casters_only_rays_are_known(void **state) {
+TEST(without_the_casters_only_rays_are_known) {
     const stage *s = *state;
     baked *b = bake_whole(s, options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_CONES), 0, NULL);
     assert_true(b->errors[0].held == 0.0 && isnan(vsh_bake_error_field(&b->errors[0])));
@@ -191,7 +171,7 @@ static void without_the_casters_only_rays_are_known(void **state) {
     free(b);
 }
 
-static void to_be_measured_changes_no_value(void **state) {
+TEST(to_be_measured_changes_no_value) {
     const stage *s = *state;
     const vsh_lightmap_options options = options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE);
     baked *plain = bake_whole(s, options, 0, NULL), *held = bake_whole(s, options, 0, s->triangles);
@@ -201,7 +181,7 @@ static void to_be_measured_changes_no_value(void **state) {
     free(plain);
 }
 
-static void any_number_of_threads_finds_the_same(void **state) {
+TEST(any_number_of_threads_finds_the_same) {
     const stage *s = *state;
     const vsh_lightmap_options options = options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE);
     baked *one = bake_whole(s, options, 1, s->triangles), *four = bake_whole(s, options, 4, s->triangles);
@@ -212,29 +192,19 @@ static void any_number_of_threads_finds_the_same(void **state) {
 
 /* A box just over the floor: large voxels make the texels under it invalid. They are filled from lit texels
  * beside them, and the estimate leaves them out. */
-static void filled_texels_are_not_in_the_estimate(void **state) {
+TEST(filled_texels_are_not_in_the_estimate) {
     const stage *s = *state;
     if (s->triangles == NULL) {
         skip();
     }
     stage low = *s;
-    for (size_t v = 0; v < 8; ++v) {
-        const double at[3] = {(v & 1 ? 0.7 : -0.7), (v & 2 ? 0.85 : 0.05), (v & 4 ? 0.7 : -0.7)};
-        for (size_t axis = 0; axis < 3; ++axis) {
-            low.positions[0][3 * v + axis] = (float)at[axis];
-        }
-    }
-    low.bars[0].positions = low.positions[0];
+    low.bars[0] = box_mesh(low.positions[0], (double[]){-0.7, 0.05, -0.7}, (double[]){0.7, 0.85, 0.7});
     low.triangles = NULL;
-    vsh_grid_options voxels = vsh_grid_options_default();
-    voxels.voxel_size = 0.2;
+    const vsh_grid_options voxels = with_voxel(0.2);
     vsh_grid *grid = NULL;
-    vsh_error error = {0};
-    if (vsh_grid_from_meshes(low.bars, 1, &voxels, NULL, &grid, &error) != VSH_OK ||
-        vsh_field_create(grid, NULL, NULL, &low.field, &error) != VSH_OK ||
-        vsh_triangles_create(low.bars, 1, NULL, &low.triangles, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_grid_from_meshes(low.bars, 1, &voxels, NULL, &grid, &failure));
+    assert_ok(vsh_field_create(grid, NULL, NULL, &low.field, &failure));
+    assert_ok(vsh_triangles_create(low.bars, 1, NULL, &low.triangles, &failure));
     vsh_grid_free(grid);
     baked *b = bake_whole(&low, options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE), 0, low.triangles);
     double measured[CHANNELS];
@@ -256,13 +226,5 @@ static void filled_texels_are_not_in_the_estimate(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_voxels_lose_is_in_the_estimate),
-        cmocka_unit_test(exact_values_are_held_against_rays_too),
-        cmocka_unit_test(without_the_casters_only_rays_are_known),
-        cmocka_unit_test(to_be_measured_changes_no_value),
-        cmocka_unit_test(any_number_of_threads_finds_the_same),
-        cmocka_unit_test(filled_texels_are_not_in_the_estimate),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    return run_all_tests(set_up, tear_down);
 }

@@ -1,9 +1,9 @@
 /* Flat light maps against closed forms and against rays that meet every segment of the outline in turn. */
 #include "outlines.h"
+#include "testing.h"
 
 /* A half plane's edge: of the angles -a … a around the light those below b are hidden. */
-static void an_edge_hides_its_share_of_the_angle(void **state) {
-    (void)state;
+TEST(an_edge_hides_its_share_of_the_angle) {
     vsh_outline *wall =
         box(-1e6, 1.0, 0.0, 2.0); /* seen from y = 0 its edge is the corner farther to the left */
     for (int i = 0; i <= 200; ++i) {
@@ -43,8 +43,7 @@ static void compare_with_rays(const vsh_outline *outline, const vsh_light *light
     assert_true(between > points / 200);
 }
 
-static void text_is_as_rays_see_it(void **state) {
-    (void)state;
+TEST(text_is_as_rays_see_it) {
     vsh_outline *letters = text("vdb", 1.0);
     const vsh_light lights[] = {lamp(0.3, 2.0, 0.3),  lamp(-0.5, 0.2, 0.5),    lamp(-0.5, -0.3, 0.05),
                                 lamp(5.0, -3.0, 1.0), flat_sun(1.0, 0.3, 0.2), flat_sun(-0.2, -1.0, 2.5)};
@@ -66,8 +65,7 @@ static vsh_outline *star(uint64_t seed) {
     return polygon(points, COUNT);
 }
 
-static void stars_are_as_rays_see_them(void **state) {
-    (void)state;
+TEST(stars_are_as_rays_see_them) {
     for (uint64_t s = 0; s < 6; ++s) {
         vsh_outline *outline = star(100 * s);
         const vsh_light lights[] = {lamp(0.6, 0.6, 0.5), lamp(1.2, 0.0, 0.4)}; /* spikes reach into them */
@@ -78,8 +76,7 @@ static void stars_are_as_rays_see_them(void **state) {
     }
 }
 
-static void a_disc_around_a_whole_star_is_seen_by_all(void **state) {
-    (void)state;
+TEST(a_disc_around_a_whole_star_is_seen_by_all) {
     vsh_outline *outline = star(300);
     const vsh_light light = lamp(0.1, 0.0, 1.5);
     for (uint64_t i = 0; i < 300; ++i) {
@@ -91,8 +88,7 @@ static void a_disc_around_a_whole_star_is_seen_by_all(void **state) {
 }
 
 /* More gaps in one cone than the intervals that are kept. */
-static void a_comb_of_a_thousand_teeth(void **state) {
-    (void)state;
+TEST(a_comb_of_a_thousand_teeth) {
     enum { TEETH = 1000 };
     double *points = calloc(8 * TEETH, sizeof *points);
     size_t counts[TEETH];
@@ -123,8 +119,7 @@ static void a_comb_of_a_thousand_teeth(void **state) {
     free(points);
 }
 
-static void a_light_of_no_size_is_seen_or_not(void **state) {
-    (void)state;
+TEST(a_light_of_no_size_is_seen_or_not) {
     vsh_outline *letters = text("vdb", 1.0);
     const vsh_light lights[] = {lamp(0.3, 2.0, 0.0), flat_sun(1.0, 0.3, 0.0)};
     int dark = 0, lit = 0;
@@ -141,8 +136,7 @@ static void a_light_of_no_size_is_seen_or_not(void **state) {
     vsh_outline_free(letters);
 }
 
-static void points_in_the_light_and_without_casters_are_lit(void **state) {
-    (void)state;
+TEST(points_in_the_light_and_without_casters_are_lit) {
     vsh_outline *wall = box(-0.1, -0.1, 0.1, 0.1);
     const vsh_light light = lamp(0.5, 0.0, 0.3);
     assert_true(vsh_flat_visibility(wall, &light, (const double[]){0.6, 0.1}) == 1.0);
@@ -182,8 +176,7 @@ static void texel_point(size_t i, double p[2]) {
     p[1] = 2.0 - 4.0 * ((double)(i / SIZE) + 0.5) / SIZE;
 }
 
-static void a_map_holds_what_its_texels_see(void **state) {
-    (void)state;
+TEST(a_map_holds_what_its_texels_see) {
     static map m;
     vsh_outline *letters = text("flat", 1.0);
     vsh_light lights[2] = {lamp(0.3, 1.5, 0.2), flat_sun(1.0, 0.5, 0.3)};
@@ -225,16 +218,14 @@ static void a_map_holds_what_its_texels_see(void **state) {
     vsh_outline_free(letters);
 }
 
-static void no_number_of_threads_shows(void **state) {
-    (void)state;
+TEST(no_number_of_threads_shows) {
     static map one, more;
     vsh_outline *letters = text("flat", 1.0);
     const vsh_light lights[2] = {lamp(0.3, 1.5, 0.2), flat_sun(1.0, 0.5, 0.3)};
     for (int32_t method = 0; vsh_get_name(VSH_NAMES_FLAT, method) != NULL; ++method) {
         vsh_flat_options options = options_of(method);
         options.padding = 3;
-        vsh_run run = vsh_run_default();
-        run.threads = 1;
+        vsh_run run = run_on(1);
         bake(letters, lights, 2, &options, &run, &one);
         for (int32_t threads = 2; threads <= 7; threads += 5) {
             run.threads = threads;
@@ -247,8 +238,7 @@ static void no_number_of_threads_shows(void **state) {
 
 /* Its outer half is the estimate's own: h/t over the sine of half the angle, at an edge that is b beyond the
  * light's centre sin b / sin a; the inner half is dark. */
-static void classic_knows_the_outer_half_of_a_penumbra(void **state) {
-    (void)state;
+TEST(classic_knows_the_outer_half_of_a_penumbra) {
     static map m;
     vsh_outline *wall = box(-1.9, 0.5, 0.0, 0.7);
     const vsh_light sun = flat_sun(0.0, 1.0, 0.5);
@@ -271,8 +261,7 @@ static void classic_knows_the_outer_half_of_a_penumbra(void **state) {
     vsh_outline_free(wall);
 }
 
-static void a_scene_of_twice_the_size_is_the_same(void **state) {
-    (void)state;
+TEST(a_scene_of_twice_the_size_is_the_same) {
     static map a, b;
     vsh_outline *letters = text("flat", 1.0), *larger = NULL;
     const double twice[6] = {2.0, 0.0, 0.0, 0.0, 2.0, 0.0};
@@ -291,8 +280,7 @@ static void a_scene_of_twice_the_size_is_the_same(void **state) {
     vsh_outline_free(letters);
 }
 
-static void supersampling_averages_what_is_outside(void **state) {
-    (void)state;
+TEST(supersampling_averages_what_is_outside) {
     static map m;
     vsh_outline *wall = box(-0.999, -1.0, 0.013, 0.5);
     const vsh_light light = lamp(0.3, 1.5, 0.2);
@@ -321,8 +309,7 @@ static void supersampling_averages_what_is_outside(void **state) {
     vsh_outline_free(wall);
 }
 
-static void padding_grows_values_and_not_coverage(void **state) {
-    (void)state;
+TEST(padding_grows_values_and_not_coverage) {
     static map m, padded;
     vsh_outline *wall = box(-1.0, -1.0, 0.0, 0.5);
     const vsh_light light = lamp(0.3, 1.5, 0.2);
@@ -355,8 +342,7 @@ static int32_t follow(void *user, const char *stage, double fraction) {
     return fraction >= w->stop;
 }
 
-static void bad_options_are_refused(void **state) {
-    (void)state;
+TEST(bad_options_are_refused) {
     static map m;
     vsh_outline *wall = box(-1.0, -1.0, 0.0, 0.5);
     float *shadow[1] = {m.shadow[0]};
@@ -392,8 +378,7 @@ static void bad_options_are_refused(void **state) {
     vsh_outline_free(wall);
 }
 
-static void limits_and_cancelling(void **state) {
-    (void)state;
+TEST(limits_and_cancelling) {
     static map m;
     vsh_outline *wall = box(-1.0, -1.0, 0.0, 0.5);
     float *shadow[1] = {m.shadow[0]};
@@ -420,8 +405,7 @@ static void limits_and_cancelling(void **state) {
     vsh_outline_free(wall);
 }
 
-static void tiny_lights_are_seen_or_not_and_wide_ones_as_their_neighbours(void **state) {
-    (void)state;
+TEST(tiny_lights_are_seen_or_not_and_wide_ones_as_their_neighbours) {
     static const double SIZES[] = {5e-324, 1e-300, 1e-160, 1e-50, 1e-20, 1e-10, 1e-7};
     vsh_outline *letters = text("vdb", 1.0);
     for (uint64_t i = 0; i < 300; ++i) {
@@ -445,23 +429,5 @@ static void tiny_lights_are_seen_or_not_and_wide_ones_as_their_neighbours(void *
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(an_edge_hides_its_share_of_the_angle),
-        cmocka_unit_test(text_is_as_rays_see_it),
-        cmocka_unit_test(stars_are_as_rays_see_them),
-        cmocka_unit_test(a_disc_around_a_whole_star_is_seen_by_all),
-        cmocka_unit_test(a_comb_of_a_thousand_teeth),
-        cmocka_unit_test(a_light_of_no_size_is_seen_or_not),
-        cmocka_unit_test(tiny_lights_are_seen_or_not_and_wide_ones_as_their_neighbours),
-        cmocka_unit_test(points_in_the_light_and_without_casters_are_lit),
-        cmocka_unit_test(a_map_holds_what_its_texels_see),
-        cmocka_unit_test(no_number_of_threads_shows),
-        cmocka_unit_test(classic_knows_the_outer_half_of_a_penumbra),
-        cmocka_unit_test(a_scene_of_twice_the_size_is_the_same),
-        cmocka_unit_test(supersampling_averages_what_is_outside),
-        cmocka_unit_test(padding_grows_values_and_not_coverage),
-        cmocka_unit_test(bad_options_are_refused),
-        cmocka_unit_test(limits_and_cancelling),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,7 +1,6 @@
 /* Files of flat scenes: what they say, what is wrong with them, and the outline that they make. */
 #include "outlines.h"
-
-#include <unistd.h>
+#include "testing.h"
 
 static char path[] = "vsh-flat-XXXXXX.json";
 
@@ -23,8 +22,7 @@ static vsh_flat_scene *read_scene(const char *text) {
 #define LAMP "{\"name\":\"a\",\"type\":\"disc\",\"position\":[1,2]}"
 #define LIGHTS "\"lights\":[" LAMP "]"
 
-static void every_key_lands_in_its_field(void **state) {
-    (void)state;
+TEST(every_key_lands_in_its_field) {
     vsh_flat_scene *scene = read_scene(
         "{" REGION
         ",\"size\":[300,200],\"method\":\"classic\",\"supersample\":3,\"padding\":7,\"max_steps\":99,"
@@ -139,8 +137,7 @@ static const struct {
      "casters[0].scale: expected a number, found an array"},
 };
 
-static void errors_tell_their_place(void **state) {
-    (void)state;
+TEST(errors_tell_their_place) {
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
         char text[1024], expected[1024];
         const char *at = strchr(bad[i].text, '@');
@@ -161,8 +158,7 @@ static void errors_tell_their_place(void **state) {
 }
 
 /* Cut anywhere, a scene's file is no scene, and no crash. */
-static void a_cut_file_is_an_error(void **state) {
-    (void)state;
+TEST(a_cut_file_is_an_error) {
     static const char whole[] = WITH("{\"shape\":\"polygon\",\"points\":[[0,0],[1,0],[0,1]]}");
     for (size_t size = 0; size + 1 < sizeof whole - 1; ++size) {
         char text[sizeof whole] = "";
@@ -173,8 +169,7 @@ static void a_cut_file_is_an_error(void **state) {
     }
 }
 
-static void casters_become_one_outline(void **state) {
-    (void)state;
+TEST(casters_become_one_outline) {
     vsh_flat_scene *scene =
         read_scene(WITH("{\"shape\":\"circle\",\"radius\":2,\"translate\":[5,0],\"scale\":0.5},"
                         "{\"shape\":\"box\",\"half_size\":[1,2],\"rotate_deg\":90},"
@@ -218,11 +213,5 @@ static int remove_file(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_key_lands_in_its_field),
-        cmocka_unit_test(errors_tell_their_place),
-        cmocka_unit_test(a_cut_file_is_an_error),
-        cmocka_unit_test(casters_become_one_outline),
-    };
-    return cmocka_run_group_tests(tests, name_file, remove_file);
+    return run_all_tests(name_file, remove_file);
 }

@@ -1,11 +1,6 @@
 /* glTF by the text of its specification: accessors of every kind, extensions, poses, and what is refused. */
 #include "models.h"
-
-static void assert_near(double value, double expected, double tolerance) {
-    if (!(fabs(value - expected) <= tolerance)) {
-        fail_msg("%.17g, expected %.17g within %g", value, expected, tolerance);
-    }
-}
+#include "testing.h"
 
 /* A whole file: `rest` is its JSON behind the buffer, in which {B} stands for the buffer's length. */
 static const char *gltf_of(const char *rest, const void *buffer, size_t size) {
@@ -49,8 +44,7 @@ static void assert_at(vshi_vec p, double x, double y, double z) {
 
 /* KHR_mesh_quantization: every type, as it is and normalized, with a stride that is no multiple of the type.
  */
-static void quantized_positions_stand_for_their_numbers(void **state) {
-    (void)state;
+TEST(quantized_positions_stand_for_their_numbers) {
     static const struct {
         int type, size;
         double most;
@@ -81,11 +75,12 @@ static void quantized_positions_stand_for_their_numbers(void **state) {
                 ",\"scale\":[2,2,2]", "", "", types[t].type, normalized ? "true" : "false");
             vsh_model *model = read_gltf(rest, buffer, sizeof buffer);
             const double unit = normalized ? 2.0 / types[t].most : 2.0;
+            const double tolerance = normalized ? 1e-6 : 1e-6 * types[t].most;
             for (int i = 0; i < 3; ++i) {
                 const vshi_vec p = corner_of(model, 0, i);
-                assert_near(p.x, unit * (double)at[i][0], 1e-6 * types[t].most);
-                assert_near(p.y, unit * (double)at[i][1], 1e-6 * types[t].most);
-                assert_near(p.z, unit * (double)at[i][2], 1e-6 * types[t].most);
+                assert_near(p.x, unit * (double)at[i][0], tolerance);
+                assert_near(p.y, unit * (double)at[i][1], tolerance);
+                assert_near(p.z, unit * (double)at[i][2], tolerance);
             }
             vsh_model_free(model);
         }
@@ -98,8 +93,7 @@ static const float corners[4][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
     "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"%s}%s],"           \
     "\"bufferViews\":[{\"buffer\":0,\"byteLength\":48}%s]"
 
-static void sparse_accessors_replace_elements(void **state) {
-    (void)state;
+TEST(sparse_accessors_replace_elements) {
     unsigned char buffer[48 + 4 + 24];
     const float moved[2][3] = {{5, 0, 0}, {0, 7, 0}};
     memcpy(buffer, corners, 48);
@@ -126,8 +120,7 @@ static void sparse_accessors_replace_elements(void **state) {
 
 /* KHR_mesh_quantization as gltfpack writes it: normals of bytes, UVs of unsigned shorts, indices of every
  * type. */
-static void quantized_normals_uvs_and_indices_stand_for_their_numbers(void **state) {
-    (void)state;
+TEST(quantized_normals_uvs_and_indices_stand_for_their_numbers) {
     for (int type = 5121; type <= 5125; type += 2) {
         unsigned char buffer[48 + 16 + 16 + 24] = {0};
         memcpy(buffer, corners, 48);
@@ -171,8 +164,7 @@ static void quantized_normals_uvs_and_indices_stand_for_their_numbers(void **sta
 }
 
 /* Indices of every type, in no order; the last of those that agree counts. */
-static void sparse_indices_may_be_of_any_unsigned_type(void **state) {
-    (void)state;
+TEST(sparse_indices_may_be_of_any_unsigned_type) {
     static const float moved[3][3] = {{9, 9, 9}, {0, 7, 0}, {5, 0, 0}};
     static const struct {
         int type;
@@ -208,8 +200,7 @@ static void sparse_indices_may_be_of_any_unsigned_type(void **state) {
     }
 }
 
-static void strips_and_fans_become_triangles_of_one_winding(void **state) {
-    (void)state;
+TEST(strips_and_fans_become_triangles_of_one_winding) {
     static const float zigzag[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
     for (int mode = 5; mode <= 6; ++mode) {
         char rest[1024], of[32];
@@ -225,8 +216,7 @@ static void strips_and_fans_become_triangles_of_one_winding(void **state) {
     }
 }
 
-static void required_extensions_that_are_not_known_are_refused_by_name(void **state) {
-    (void)state;
+TEST(required_extensions_that_are_not_known_are_refused_by_name) {
     static const struct {
         const char *name, *advice;
     } unknown[] = {{"KHR_made_up", "export it without"}, {"KHR_node_visibility", "to be seen"}};
@@ -245,8 +235,7 @@ static void required_extensions_that_are_not_known_are_refused_by_name(void **st
     }
 }
 
-static void instances_stand_behind_their_node(void **state) {
-    (void)state;
+TEST(instances_stand_behind_their_node) {
     unsigned char buffer[48 + 24];
     const float moves[2][3] = {{0, 0, 0}, {3, 0, 0}};
     memcpy(buffer, corners, 48);
@@ -267,8 +256,7 @@ static void instances_stand_behind_their_node(void **state) {
 }
 
 /* Two joints with a matrix each; the node's own transform is none of the skin's business. */
-static void skins_are_at_rest_and_leave_their_node_out(void **state) {
-    (void)state;
+TEST(skins_are_at_rest_and_leave_their_node_out) {
     unsigned char buffer[48 + 16 + 64 + 128] = {0};
     memcpy(buffer, corners, 48);
     for (size_t v = 0; v < 4; ++v) {
@@ -301,23 +289,7 @@ static void skins_are_at_rest_and_leave_their_node_out(void **state) {
     refused_gltf(rest, buffer, sizeof buffer, VSH_ERROR_INPUT, "vertex 0 uses joint 2", "only 2");
 }
 
-static void morph_targets_have_their_default_weights(void **state) {
-    (void)state;
-    char rest[2048];
-    for (int own = 0; own < 2; ++own) {
-        snprintf(rest, sizeof rest,
-                 "\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0%s}],\"meshes\":[{\"weights\":[0.5],"
-                 "\"primitives\":[{\"attributes\":{\"POSITION\":0},\"targets\":[{\"POSITION\":0}]}]}]"
-                 "," FOUR_CORNERS,
-                 own ? ",\"weights\":[2]" : "", "", "", "");
-        vsh_model *model = read_gltf(rest, corners, 48);
-        assert_at(corner_of(model, 0, 1), own ? 3 : 1.5, 0, 0);
-        vsh_model_free(model);
-    }
-}
-
-static void alpha_comes_with_the_mesh(void **state) {
-    (void)state;
+TEST(alpha_comes_with_the_mesh) {
     static const char *const modes[] = {"OPAQUE", "MASK", "BLEND"};
     for (int32_t i = 0; i < 3; ++i) {
         char rest[1024];
@@ -332,8 +304,7 @@ static void alpha_comes_with_the_mesh(void **state) {
     vsh_model_free(model);
 }
 
-static void a_buffer_that_is_not_there_is_named(void **state) {
-    (void)state;
+TEST(a_buffer_that_is_not_there_is_named) {
 #define BESIDE(uri)                                                                                          \
     "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":48,\"uri\":\"" uri "\"}],\"scenes\":[{"   \
     "\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}" \
@@ -351,8 +322,7 @@ static void a_buffer_that_is_not_there_is_named(void **state) {
 #undef BESIDE
 }
 
-static void what_is_out_of_range_is_refused(void **state) {
-    (void)state;
+TEST(what_is_out_of_range_is_refused) {
     static const struct {
         const char *node, *primitive, *accessor, *part;
     } bad[] = {
@@ -380,8 +350,7 @@ static void what_is_out_of_range_is_refused(void **state) {
     refused("a.gltf", "[]", VSH_ERROR_INPUT, "is no glTF", "");
 }
 
-static void nodes_deeper_than_the_limit_are_refused(void **state) {
-    (void)state;
+TEST(nodes_deeper_than_the_limit_are_refused) {
     enum { NODES = 1100 };
     static char rest[1 << 15];
     size_t used = (size_t)snprintf(rest, sizeof rest, "\"scenes\":[{\"nodes\":[0]}],\"nodes\":[");
@@ -394,8 +363,7 @@ static void nodes_deeper_than_the_limit_are_refused(void **state) {
 }
 
 /* What an accessor claims is held against the limit before memory is taken. */
-static void claims_of_memory_are_checked(void **state) {
-    (void)state;
+TEST(claims_of_memory_are_checked) {
     write_bytes("a.gltf", "", 0);
     char rest[1024];
     snprintf(rest, sizeof rest,
@@ -406,27 +374,10 @@ static void claims_of_memory_are_checked(void **state) {
     vsh_run run = vsh_run_default();
     run.memory_limit = 100000000;
     vsh_model *model;
-    vsh_error error = {0};
-    assert_int_equal(vsh_model_read(path_of("a.gltf").text, &run, &model, &error), VSH_ERROR_LIMIT);
+    assert_int_equal(vsh_model_read(path_of("a.gltf").text, &run, &model, &failure), VSH_ERROR_LIMIT);
     assert_int_equal(unlink(path_of("a.gltf").text), 0);
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(quantized_positions_stand_for_their_numbers),
-        cmocka_unit_test(sparse_accessors_replace_elements),
-        cmocka_unit_test(quantized_normals_uvs_and_indices_stand_for_their_numbers),
-        cmocka_unit_test(sparse_indices_may_be_of_any_unsigned_type),
-        cmocka_unit_test(strips_and_fans_become_triangles_of_one_winding),
-        cmocka_unit_test(required_extensions_that_are_not_known_are_refused_by_name),
-        cmocka_unit_test(instances_stand_behind_their_node),
-        cmocka_unit_test(skins_are_at_rest_and_leave_their_node_out),
-        cmocka_unit_test(morph_targets_have_their_default_weights),
-        cmocka_unit_test(alpha_comes_with_the_mesh),
-        cmocka_unit_test(a_buffer_that_is_not_there_is_named),
-        cmocka_unit_test(what_is_out_of_range_is_refused),
-        cmocka_unit_test(nodes_deeper_than_the_limit_are_refused),
-        cmocka_unit_test(claims_of_memory_are_checked),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

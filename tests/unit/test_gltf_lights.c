@@ -3,9 +3,7 @@
 #define _GNU_SOURCE
 
 #include "served.h"
-
-#include <math.h>
-#include <vdbshade/scene.h>
+#include "testing.h"
 
 #define TRIANGLE                                                                                             \
     "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],\"accessors\":[{\"bufferView\":0,"    \
@@ -48,8 +46,7 @@ static void assert_vector(const double *given, double x, double y, double z) {
     }
 }
 
-static void lights_stand_where_their_nodes_do(void **state) {
-    (void)state;
+TEST(lights_stand_where_their_nodes_do) {
     for (int reader = 0; reader < 2; ++reader) {
         vsh_model *model = read_gltf_by(reader != 0, lit_json(nodes, lights));
         assert_int_equal(vsh_model_light_count(model), 3);
@@ -78,9 +75,7 @@ static void lights_stand_where_their_nodes_do(void **state) {
     vsh_model_free(model);
 }
 
-static void as_a_scenes_they_have_names_sizes_and_falloff(void **state) {
-    (void)state;
-    vsh_error error = {0};
+TEST(as_a_scenes_they_have_names_sizes_and_falloff) {
     vsh_light *made = NULL;
     size_t count = 0;
     vsh_model *model = read_gltf_by(
@@ -88,7 +83,7 @@ static void as_a_scenes_they_have_names_sizes_and_falloff(void **state) {
                             "0") "},"
                                  "{\"name\":\"Key_light\"," CARRIES("1") "},{" CARRIES("2") "}",
                         lights));
-    assert_int_equal(vsh_lights_from_model(model, 0.25, 0.5, 0.01, &made, &count, &error), VSH_OK);
+    assert_ok(vsh_lights_from_model(model, 0.25, 0.5, 0.01, &made, &count, &failure));
     assert_int_equal(count, 3);
     assert_string_equal(made[0].name, "Key_light");
     assert_string_equal(made[1].name, "Key_light_2");
@@ -104,16 +99,18 @@ static void as_a_scenes_they_have_names_sizes_and_falloff(void **state) {
     assert_vector(made[2].axis, 0, 0, -1);
     assert_true(made[2].inner_angle == 0.125 && made[2].outer_angle == 0.5);
     vsh_lights_free(made);
-    assert_int_equal(vsh_lights_from_model(model, 4.0, 0.5, 0.0, &made, &count, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_lights_from_model(model, 4.0, 0.5, 0.0, &made, &count, &failure),
+                     VSH_ERROR_ARGUMENT);
     assert_null(made);
-    assert_int_equal(vsh_lights_from_model(model, 0.1, -1.0, 0.0, &made, &count, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_lights_from_model(model, 0.1, 0.0, -1.0, &made, &count, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_lights_from_model(NULL, 0.1, 0.0, 0.0, &made, &count, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_lights_from_model(model, 0.1, -1.0, 0.0, &made, &count, &failure),
+                     VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_lights_from_model(model, 0.1, 0.0, -1.0, &made, &count, &failure),
+                     VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_lights_from_model(NULL, 0.1, 0.0, 0.0, &made, &count, &failure), VSH_ERROR_ARGUMENT);
     vsh_model_free(model);
 }
 
-static void wrong_lights_are_refused_by_their_number(void **state) {
-    (void)state;
+TEST(wrong_lights_are_refused_by_their_number) {
     static const struct {
         const char *light, *part;
     } bad[] = {
@@ -137,8 +134,7 @@ static void wrong_lights_are_refused_by_their_number(void **state) {
     refused("a.gltf", lit_json("{" CARRIES("{}") "}", lights), VSH_ERROR_INPUT, "none of the 3", "nodes[1]");
 }
 
-static void what_points_nowhere_or_is_not_known_is_left_out_with_a_warning(void **state) {
-    (void)state;
+TEST(what_points_nowhere_or_is_not_known_is_left_out_with_a_warning) {
     vsh_model *model = read_text("a.gltf", lit_json("{\"scale\":[1,1,0]," CARRIES("0") "}", lights));
     assert_int_equal(vsh_model_light_count(model), 0);
     assert_non_null(strstr(warnings, "the light of nodes[1] is left out"));
@@ -156,34 +152,21 @@ static void what_points_nowhere_or_is_not_known_is_left_out_with_a_warning(void 
 static void look_at_lights(const vsh_model *model) {
     vsh_light *made = NULL;
     size_t count;
-    vsh_error error;
     for (size_t i = 0; i < vsh_model_light_count(model); ++i) {
         const vsh_model_light light = vsh_model_get_light(model, i);
         assert_in_range(light.type, 0, VSH_MODEL_LIGHT_SPOT);
         assert_true(light.inner_angle <= light.outer_angle && light.outer_angle <= 1.5708);
         assert_true(light.intensity >= 0.0 && isfinite(light.intensity) && light.range >= 0.0);
     }
-    if (vsh_lights_from_model(model, 0.1, 0.1, 0.0, &made, &count, &error) == VSH_OK) {
+    if (vsh_lights_from_model(model, 0.1, 0.1, 0.0, &made, &count, &failure) == VSH_OK) {
         vsh_lights_free(made);
     }
 }
 
-static void what_a_reader_tells_of_lights_is_refused_or_in_range(void **state) {
-    (void)state;
-    static const uint64_t values[] = {0,
-                                      1,
-                                      2,
-                                      3,
-                                      64,
-                                      UINT64_MAX,
-                                      0x7ff0000000000000,
-                                      0xbff0000000000000,
-                                      0x3ff0000000000000,
-                                      0x7ff8000000000000,
-                                      0x7fe0000000000000};
+TEST(what_a_reader_tells_of_lights_is_refused_or_in_range) {
     const char *json = lit_json(nodes, lights);
     write_bytes("a.gltf", json, strlen(json));
-    tell_wrong("a.gltf", values, sizeof values / sizeof values[0], look_at_lights, 200, 20);
+    tell_wrong("a.gltf", wrong_words, WRONG_WORDS, look_at_lights, 200, 20);
     assert_int_equal(unlink(path_of("a.gltf").text), 0);
 }
 
@@ -191,12 +174,5 @@ int main(int argc, char **argv) {
     if (argc > 1 && strcmp(argv[1], VSH_READER_ARGUMENT) == 0) {
         return vsh_reader_serve(argc, argv);
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lights_stand_where_their_nodes_do),
-        cmocka_unit_test(as_a_scenes_they_have_names_sizes_and_falloff),
-        cmocka_unit_test(wrong_lights_are_refused_by_their_number),
-        cmocka_unit_test(what_points_nowhere_or_is_not_known_is_left_out_with_a_warning),
-        cmocka_unit_test(what_a_reader_tells_of_lights_is_refused_or_in_range),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

@@ -1,8 +1,8 @@
 /* Buffer views under EXT_meshopt_compression: what meshoptimizer packed comes out again, through filters as
  * near as their bits, and what is damaged is refused. */
 #include "models.h"
+#include "testing.h"
 
-#include <math.h>
 #include <meshoptimizer.h>
 
 enum { SIDE = 24, VERTICES = SIDE * SIDE, CORNERS = 6 * (SIDE - 1) * (SIDE - 1), PACKED = 1 << 16 };
@@ -91,8 +91,7 @@ static const char *packed_json(void) {
     return json;
 }
 
-static void what_was_packed_comes_out_again(void **state) {
-    (void)state;
+TEST(what_was_packed_comes_out_again) {
     make_sheet();
     for (int k = 0; k < 4; ++k) {
         pack_sheet(k % 2 == 0, k < 2 ? 2 : 4);
@@ -125,8 +124,7 @@ static void direction(size_t v, float d[4]) {
  * where its middle is stretched to the sphere; and the result is half a step off. */
 static const double octahedral_steps = 1.7321 + 0.5 + 0.01;
 
-static void directions_on_an_octahedron_come_out_again(void **state) {
-    (void)state;
+TEST(directions_on_an_octahedron_come_out_again) {
     static float given[VERTICES][4];
     static unsigned char folded[8 * VERTICES], kept[8 * VERTICES];
     make_sheet();
@@ -160,8 +158,7 @@ static void directions_on_an_octahedron_come_out_again(void **state) {
     }
 }
 
-static void floats_with_an_exponent_come_out_again(void **state) {
-    (void)state;
+TEST(floats_with_an_exponent_come_out_again) {
     static uint32_t folded[VERTICES][3];
     make_sheet();
     pack_sheet(true, 2);
@@ -192,8 +189,7 @@ static void floats_with_an_exponent_come_out_again(void **state) {
 }
 
 /* The meshes of instances, each turned. */
-static void quaternions_come_out_again(void **state) {
-    (void)state;
+TEST(quaternions_come_out_again) {
     static float given[VERTICES][4];
     static int16_t folded[VERTICES][4];
     static char json[1 << 15], text[1 << 14];
@@ -241,8 +237,7 @@ static void refused_with(vsh_result code, const char *part) {
     refused("a.gltf", packed_json(), code, part, "bufferViews[");
 }
 
-static void what_compression_cannot_be_is_refused(void **state) {
-    (void)state;
+TEST(what_compression_cannot_be_is_refused) {
     make_sheet();
     pack_sheet(true, 2);
     views[0].mode = "MESHLETS";
@@ -284,8 +279,7 @@ static void what_compression_cannot_be_is_refused(void **state) {
 }
 
 /* Each byte of it turned in one bit or all, and cut there: an error of a line, or a mesh. */
-static void damaged_data_are_refused_or_a_mesh(void **state) {
-    (void)state;
+TEST(damaged_data_are_refused_or_a_mesh) {
     int refused_count = 0, read = 0;
     make_sheet();
     for (int which = 0; which < 3; which += 2) {
@@ -297,11 +291,10 @@ static void damaged_data_are_refused_or_a_mesh(void **state) {
                 views[which].size = k == 2 ? at : whole.size;
                 views[which].bytes[at] ^= k == 0 ? 0x10 : 0xff;
                 vsh_model *model = NULL;
-                vsh_error error = {0};
                 const char *json = packed_json();
-                if (read_bytes("a.gltf", json, strlen(json), &model, &error) != VSH_OK) {
-                    assert_null(strchr(error.message, '\n'));
-                    assert_non_null(strstr(error.message, "a.gltf: "));
+                if (read_bytes("a.gltf", json, strlen(json), &model, &failure) != VSH_OK) {
+                    assert_null(strchr(failure.message, '\n'));
+                    assert_non_null(strstr(failure.message, "a.gltf: "));
                     ++refused_count;
                     continue;
                 }
@@ -315,8 +308,7 @@ static void damaged_data_are_refused_or_a_mesh(void **state) {
     assert_in_range(read, 10, 100000);
 }
 
-static void what_is_unpacked_is_held_against_the_limit(void **state) {
-    (void)state;
+TEST(what_is_unpacked_is_held_against_the_limit) {
     make_sheet();
     memset(positions, 0, sizeof positions); /* packed 60 times as small */
     pack_sheet(true, 2);
@@ -325,20 +317,10 @@ static void what_is_unpacked_is_held_against_the_limit(void **state) {
     vsh_run run = vsh_run_default();
     run.memory_limit = 6 * strlen(json) + 1000;
     vsh_model *model;
-    vsh_error error = {0};
-    assert_int_equal(vsh_model_read(path_of("a.gltf").text, &run, &model, &error), VSH_ERROR_LIMIT);
+    assert_int_equal(vsh_model_read(path_of("a.gltf").text, &run, &model, &failure), VSH_ERROR_LIMIT);
     assert_int_equal(unlink(path_of("a.gltf").text), 0);
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_was_packed_comes_out_again),
-        cmocka_unit_test(directions_on_an_octahedron_come_out_again),
-        cmocka_unit_test(floats_with_an_exponent_come_out_again),
-        cmocka_unit_test(quaternions_come_out_again),
-        cmocka_unit_test(what_compression_cannot_be_is_refused),
-        cmocka_unit_test(damaged_data_are_refused_or_a_mesh),
-        cmocka_unit_test(what_is_unpacked_is_held_against_the_limit),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

@@ -3,6 +3,7 @@
 #define _GNU_SOURCE
 
 #include "served.h"
+#include "testing.h"
 
 enum {
     SIDE = 80,
@@ -103,13 +104,10 @@ static void assert_same(const vsh_model *a, const vsh_model *b) {
 /* `raw`: whether they are expected to be left in the file. */
 static void assert_alike(const sheet *s, const char *position, const char *node, bool raw, size_t vertices) {
     vsh_model *model[2];
-    vsh_error error = {0};
     char said[sizeof warnings];
     write_sheet("a.glb", s, position, node);
     for (int reader = 0; reader < 2; ++reader) {
-        if (read_by(reader != 0, "a.glb", &model[reader], &error) != VSH_OK) {
-            fail_msg("%s", error.message);
-        }
+        assert_ok(read_by(reader != 0, "a.glb", &model[reader], &failure));
         if (reader == 0) {
             memcpy(said, warnings, sizeof said);
         }
@@ -123,8 +121,7 @@ static void assert_alike(const sheet *s, const char *position, const char *node,
     vsh_model_free(model[1]);
 }
 
-static void arrays_left_in_the_file_are_those_read_here(void **state) {
-    (void)state;
+TEST(arrays_left_in_the_file_are_those_read_here) {
     sheet *s = make_sheet();
     assert_alike(s, "", "", true, VERTICES - 1); /* without the vertex that nobody uses */
     assert_alike(s, "", ",\"translation\":[1,2,3],\"weights\":[0]", true, VERTICES - 1);
@@ -136,8 +133,7 @@ static void arrays_left_in_the_file_are_those_read_here(void **state) {
     free(s);
 }
 
-static void what_moves_or_is_replaced_is_not_left_in_the_file(void **state) {
-    (void)state;
+TEST(what_moves_or_is_replaced_is_not_left_in_the_file) {
     sheet *s = make_sheet();
     assert_alike(s, "", ",\"weights\":[0.5]", false, VERTICES - 1);
     assert_alike(s,
@@ -159,8 +155,7 @@ static void assert_refused_alike(const sheet *s, const char *position, const cha
     assert_int_equal(unlink(path_of("a.glb").text), 0);
 }
 
-static void wrong_arrays_are_refused_in_the_same_words(void **state) {
-    (void)state;
+TEST(wrong_arrays_are_refused_in_the_same_words) {
     sheet *s = make_sheet();
     for (int i = 0; i < 3; ++i) {
         const uint32_t bad[3] = {VERTICES, UINT32_C(1) << 31, UINT32_MAX};
@@ -179,13 +174,11 @@ static void wrong_arrays_are_refused_in_the_same_words(void **state) {
 
 static void look_at_mesh(const vsh_model *model) {
     vsh_mesh_report report;
-    vsh_error error = {0};
     const vsh_mesh mesh = vsh_model_mesh(model, 0, 0);
-    assert_int_not_equal(vsh_mesh_check(&mesh, &report, &error), VSH_ERROR_ARGUMENT);
+    assert_int_not_equal(vsh_mesh_check(&mesh, &report, &failure), VSH_ERROR_ARGUMENT);
 }
 
-static void what_a_reader_tells_is_refused_or_sound(void **state) {
-    (void)state;
+TEST(what_a_reader_tells_is_refused_or_sound) {
     static const uint64_t values[] = {0,
                                       1,
                                       2,
@@ -194,8 +187,8 @@ static void what_a_reader_tells_is_refused_or_sound(void **state) {
                                       UINT32_MAX,
                                       UINT64_MAX,
                                       VERTICES + 1,
-                                      (uint64_t)1 << 63,
-                                      (uint64_t)1 << 40,
+                                      UINT64_C(1) << 63,
+                                      UINT64_C(1) << 40,
                                       BODY,
                                       UINT64_MAX / 12 + 2,
                                       64};
@@ -206,23 +199,21 @@ static void what_a_reader_tells_is_refused_or_sound(void **state) {
     assert_int_equal(unlink(path_of("a.glb").text), 0);
 }
 
-static void a_file_that_changed_since_is_refused(void **state) {
-    (void)state;
+TEST(a_file_that_changed_since_is_refused) {
     static _Alignas(8) unsigned char whole[4096];
-    vsh_error error = {0};
     vsh_model *model = NULL;
     sheet *s = make_sheet();
     write_sheet("a.glb", s, "", "");
     const size_t size = payload_of("a.glb", whole, sizeof whole);
-    assert_int_equal(decode(whole, size, "a.glb", 0, &model, &error), VSH_OK);
+    assert_ok(decode(whole, size, "a.glb", 0, &model, &failure));
     vsh_model_free(model);
-    assert_int_equal(decode(whole, size, "a.glb", 100000, &model, &error), VSH_ERROR_LIMIT);
+    assert_int_equal(decode(whole, size, "a.glb", 100000, &model, &failure), VSH_ERROR_LIMIT);
     write_sheet("b.glb", s, "", "");
     assert_int_equal(rename(path_of("b.glb").text, path_of("a.glb").text), 0);
-    assert_int_equal(decode(whole, size, "a.glb", 0, &model, &error), VSH_ERROR_READ);
-    assert_non_null(strstr(error.message, "a.glb: changed while it was read"));
+    assert_fails(decode(whole, size, "a.glb", 0, &model, &failure), VSH_ERROR_READ,
+                 "a.glb: changed while it was read");
     assert_int_equal(unlink(path_of("a.glb").text), 0);
-    assert_int_equal(decode(whole, size, "a.glb", 0, &model, &error), VSH_ERROR_READ);
+    assert_int_equal(decode(whole, size, "a.glb", 0, &model, &failure), VSH_ERROR_READ);
     free(s);
 }
 
@@ -230,12 +221,5 @@ int main(int argc, char **argv) {
     if (argc > 1 && strcmp(argv[1], VSH_READER_ARGUMENT) == 0) {
         return vsh_reader_serve(argc, argv);
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(arrays_left_in_the_file_are_those_read_here),
-        cmocka_unit_test(what_moves_or_is_replaced_is_not_left_in_the_file),
-        cmocka_unit_test(wrong_arrays_are_refused_in_the_same_words),
-        cmocka_unit_test(what_a_reader_tells_is_refused_or_sound),
-        cmocka_unit_test(a_file_that_changed_since_is_refused),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

@@ -1,8 +1,7 @@
 /* What values of a glTF come to in the model: offsets, sparse parts, poses and transforms, each where a
  * reader that is off by a little would give something else. */
 #include "models.h"
-
-#include <stdbool.h>
+#include "testing.h"
 
 enum { FLOATS = 5126, BYTES = 5120, UBYTES = 5121, USHORTS = 5123 };
 
@@ -91,8 +90,7 @@ static void assert_normal(const vsh_model *model, size_t vertex, double x, doubl
     }
 }
 
-static void offsets_of_views_and_accessors_add_up(void **state) {
-    (void)state;
+TEST(offsets_of_views_and_accessors_add_up) {
     vsh_model *model = read_made(begin(), ALONE MESH("\"POSITION\":0,\"NORMAL\":1", ""));
     assert_corner(model, 0, 1, 1, 0, 0);
     assert_corner(model, 0, 2, 1, 1, 0);
@@ -112,30 +110,12 @@ static void offsets_of_views_and_accessors_add_up(void **state) {
     refuse_made(m, ALONE MESH("\"POSITION\":2", ""), "bufferViews[0]");
 }
 
-static void normalized_integers_reach_one_and_no_further(void **state) {
-    (void)state;
-    maker *m = begin();
-    static const int8_t low[3][4] = {{-128, -127, 127, 0}, {0, 127, 0, 0}, {127, 0, 0, 0}};
-    static const uint16_t high[3][4] = {{65535, 0, 0, 0}, {0, 65535, 0, 0}, {0, 0, 32768, 0}};
-    add(m, low, sizeof low, ",\"byteStride\":4", BYTES, 3, "VEC3", ",\"normalized\":true");
-    add(m, high, sizeof high, ",\"byteStride\":8", USHORTS, 3, "VEC3", ",\"normalized\":true");
-    vsh_model *model =
-        read_made(m, "\"scenes\":[{\"nodes\":[0,1]}],\"nodes\":[{\"mesh\":0},{\"mesh\":1}],\"meshes\":[{"
-                     "\"primitives\":[{\"attributes\":{\"POSITION\":2}}]},{\"primitives\":[{\"attributes\":{"
-                     "\"POSITION\":3}}]}]");
-    assert_corner(model, 0, 0, -1, -1, 1);
-    assert_corner(model, 1, 0, 1, 0, 0);
-    assert_corner(model, 1, 2, 0, 0, 32768.0 / 65535.0);
-    vsh_model_free(model);
-}
-
 #define SPARSE(count, type, values)                                                                          \
     ",\"sparse\":{\"count\":" count                                                                          \
     ",\"indices\":{\"bufferView\":2,\"byteOffset\":4,\"componentType\":" type                                \
     "},\"values\":{\"bufferView\":" values ",\"byteOffset\":4}}"
 
-static void sparse_parts_have_offsets_and_types_of_their_own(void **state) {
-    (void)state;
+TEST(sparse_parts_have_offsets_and_types_of_their_own) {
     static const uint16_t which[2] = {1, 2};
     static const float moved[2][3] = {{5, 0, 0}, {0, 7, 0}};
     static const uint16_t order[6] = {0, 1, 2, 0, 0, 0}, corners[2] = {3, 2};
@@ -160,8 +140,7 @@ static void sparse_parts_have_offsets_and_types_of_their_own(void **state) {
     }
 }
 
-static void morph_targets_move_normals_too(void **state) {
-    (void)state;
+TEST(morph_targets_move_normals_too) {
     static const float moves[4][3] = {{0, 0, 0}, {0, 0, 2}, {0, 0, 0}, {0, 0, 0}};
     static const float turns[4][3] = {{0, 0, 0}, {0.8F, 0, -0.8F}, {0, 0, 0}, {0, 0, 0}};
     maker *m = begin();
@@ -186,8 +165,7 @@ static const char *skinned(const char *joints, const char *scene) {
     return rest;
 }
 
-static void skins_scale_weights_add_sets_and_turn_normals(void **state) {
-    (void)state;
+TEST(skins_scale_weights_add_sets_and_turn_normals) {
     static const float sideways[4][3] = {{1, 0, 0}, {1, 0, 0}, {1, 0, 0}, {1, 0, 0}};
     static const uint8_t first[4][8] = {{0}, {0}, {0}, {0}}, second[4][8] = {{1}, {1}, {1}, {1}};
     static const float half[4][4] = {{0.5F}, {0.5F}, {0.5F}, {0}};
@@ -222,8 +200,7 @@ static void skins_scale_weights_add_sets_and_turn_normals(void **state) {
         "2 joints, but 1 matrices");
 }
 
-static void strips_leave_out_what_has_no_area_and_lists_what_is_over(void **state) {
-    (void)state;
+TEST(strips_leave_out_what_has_no_area_and_lists_what_is_over) {
     static const uint16_t strip[6] = {0, 1, 2, 2, 2, 3};
     for (int mode = 4; mode <= 5; ++mode) {
         maker *m = begin();
@@ -236,8 +213,7 @@ static void strips_leave_out_what_has_no_area_and_lists_what_is_over(void **stat
     }
 }
 
-static void attributes_of_another_length_or_type_are_refused(void **state) {
-    (void)state;
+TEST(attributes_of_another_length_or_type_are_refused) {
     maker *m = begin();
     add(m, QUAD, sizeof QUAD, "", FLOATS, 3, "VEC3", "");
     refuse_made(m, ALONE MESH("\"POSITION\":2,\"NORMAL\":1", ""), "NORMAL has 4 elements for 3");
@@ -246,8 +222,7 @@ static void attributes_of_another_length_or_type_are_refused(void **state) {
     refuse_made(m, ALONE MESH("\"POSITION\":2", ""), "POSITION has 4 components");
 }
 
-static void vertices_that_are_not_used_take_nothing_of_others_with_them(void **state) {
-    (void)state;
+TEST(vertices_that_are_not_used_take_nothing_of_others_with_them) {
     static const uint16_t order[4] = {1, 2, 3, 0};
     static const float normals[4][3] = {{0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {0, 0, -1}};
     static const float uvs[4][2] = {{0.9F, 0.9F}, {0.1F, 0}, {0.2F, 0}, {0.3F, 0.25F}};
@@ -270,8 +245,7 @@ static void vertices_that_are_not_used_take_nothing_of_others_with_them(void **s
     vsh_model_free(model);
 }
 
-static void nodes_stand_by_rotation_matrix_and_scene(void **state) {
-    (void)state;
+TEST(nodes_stand_by_rotation_matrix_and_scene) {
     static const struct {
         const char *rest;
         double second[3], third[3]; /* corners */
@@ -307,8 +281,7 @@ static void nodes_stand_by_rotation_matrix_and_scene(void **state) {
     }
 }
 
-static void nodes_share_a_mesh_but_not_its_pose(void **state) {
-    (void)state;
+TEST(nodes_share_a_mesh_but_not_its_pose) {
     for (int order = 0; order < 2; ++order) {
         char rest[1024];
         snprintf(
@@ -332,8 +305,7 @@ static void nodes_share_a_mesh_but_not_its_pose(void **state) {
     }
 }
 
-static void instances_turn_by_four_numbers_and_have_equally_many_of_each(void **state) {
-    (void)state;
+TEST(instances_turn_by_four_numbers_and_have_equally_many_of_each) {
     static const float moves[3][3] = {{0, 0, 0}, {4, 0, 0}, {0, 0, 0}};
     static const float turns[2][4] = {{0, 0, 0, 1}, {0, 0, 0.70710678F, 0.70710678F}};
     for (int wrong = 0; wrong < 2; ++wrong) {
@@ -356,18 +328,5 @@ static void instances_turn_by_four_numbers_and_have_equally_many_of_each(void **
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(offsets_of_views_and_accessors_add_up),
-        cmocka_unit_test(normalized_integers_reach_one_and_no_further),
-        cmocka_unit_test(sparse_parts_have_offsets_and_types_of_their_own),
-        cmocka_unit_test(morph_targets_move_normals_too),
-        cmocka_unit_test(skins_scale_weights_add_sets_and_turn_normals),
-        cmocka_unit_test(strips_leave_out_what_has_no_area_and_lists_what_is_over),
-        cmocka_unit_test(attributes_of_another_length_or_type_are_refused),
-        cmocka_unit_test(vertices_that_are_not_used_take_nothing_of_others_with_them),
-        cmocka_unit_test(nodes_stand_by_rotation_matrix_and_scene),
-        cmocka_unit_test(nodes_share_a_mesh_but_not_its_pose),
-        cmocka_unit_test(instances_turn_by_four_numbers_and_have_equally_many_of_each),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

@@ -4,7 +4,7 @@
 
 namespace {
 
-void a_written_grid_comes_back_bit_for_bit(void **) {
+TEST(a_written_grid_comes_back_bit_for_bit) {
     vsh_grid *grid = own_sphere(), *back = nullptr;
     const std::string path = in_folder("round.vdb"), again = in_folder("again.vdb");
     assert_int_equal(vsh_grid_write(grid, path.c_str(), nullptr, nullptr, 0, &failure), VSH_OK);
@@ -18,7 +18,7 @@ void a_written_grid_comes_back_bit_for_bit(void **) {
     vsh_grid_free(grid);
 }
 
-void openvdb_reads_what_is_written(void **) {
+TEST(openvdb_reads_what_is_written) {
     vsh_grid *grid = own_sphere();
     const std::string path = in_folder("own.vdb");
     assert_int_equal(vsh_grid_write(grid, path.c_str(), "hull", nullptr, 0, &failure), VSH_OK);
@@ -33,7 +33,7 @@ void openvdb_reads_what_is_written(void **) {
     vsh_grid_free(grid);
 }
 
-void grids_are_listed_and_found_by_name(void **) {
+TEST(grids_are_listed_and_found_by_name) {
     const FloatGrid::Ptr fog = FloatGrid::create(0.0f), ball = sphere();
     fog->setName("density");
     fog->setGridClass(openvdb::GRID_FOG_VOLUME);
@@ -85,7 +85,7 @@ std::string several(const char *file, bool streamed) {
     return in_folder(file);
 }
 
-void the_first_level_set_that_can_cast_is_taken_and_the_others_are_named(void **) {
+TEST(the_first_level_set_that_can_cast_is_taken_and_the_others_are_named) {
     for (const bool streamed : {false, true}) {
         const std::string path = several("several.vdb", streamed);
         Warnings warnings;
@@ -107,7 +107,7 @@ void the_first_level_set_that_can_cast_is_taken_and_the_others_are_named(void **
     }
 }
 
-void where_no_level_set_can_cast_the_first_ones_reason_is_given(void **) {
+TEST(where_no_level_set_can_cast_the_first_ones_reason_is_given) {
     const FloatGrid::Ptr one = FloatGrid::create(0.15f), other = FloatGrid::create(0.15f);
     one->setGridClass(openvdb::GRID_LEVEL_SET);
     one->setName("one");
@@ -118,7 +118,7 @@ void where_no_level_set_can_cast_the_first_ones_reason_is_given(void **) {
                 {"grid 'one'", "it is empty"});
 }
 
-void what_is_no_vdb_file_is_not_read(void **) {
+TEST(what_is_no_vdb_file_is_not_read) {
     vsh_grid *grid = nullptr;
     const std::string path = in_folder("not.vdb");
     const auto read = [&](const std::string &at, const char *part) {
@@ -138,7 +138,7 @@ void what_is_no_vdb_file_is_not_read(void **) {
     read(path, "cut short");
 }
 
-void a_cut_file_is_an_error_at_every_length(void **) {
+TEST(a_cut_file_is_an_error_at_every_length) {
     const std::string whole_path = in_folder("plain.vdb"), path = in_folder("cut.vdb");
     openvdb::io::File file(whole_path);
     file.setCompression(openvdb::io::COMPRESS_NONE);
@@ -152,7 +152,7 @@ void a_cut_file_is_an_error_at_every_length(void **) {
     }
 }
 
-void what_casts_no_shadows_is_refused(void **) {
+TEST(what_casts_no_shadows_is_refused) {
     FloatGrid::Ptr grid = sphere();
     grid->setGridClass(openvdb::GRID_FOG_VOLUME);
     refused("fog.vdb", grid, {"fog volume", "level set"});
@@ -175,7 +175,7 @@ void what_casts_no_shadows_is_refused(void **) {
     refused("inverted.vdb", grid, {"outside is negative"});
 }
 
-void voxels_too_small_for_openvdb_are_refused_and_the_least_come_back(void **) {
+TEST(voxels_too_small_for_openvdb_are_refused_and_the_least_come_back) {
     for (const double voxel : {1e-12, 1.44e-5, 1.46e-5, 1e12}) {
         vsh_sdf_node node = vsh_sdf_node_default();
         node.radius = RADIUS;
@@ -201,7 +201,7 @@ void voxels_too_small_for_openvdb_are_refused_and_the_least_come_back(void **) {
     }
 }
 
-void the_memory_limit_holds_for_reading(void **) {
+TEST(the_memory_limit_holds_for_reading) {
     const std::string path = save("limit.vdb", {sphere()});
     vsh_run run = vsh_run_default();
     run.memory_limit = 100000;
@@ -209,7 +209,7 @@ void the_memory_limit_holds_for_reading(void **) {
     assert_said(vsh_grid_read(path.c_str(), nullptr, &run, &read, &failure), VSH_ERROR_LIMIT, {path.c_str()});
 }
 
-void grids_over_the_limit_are_listed_by_what_the_file_says(void **) {
+TEST(grids_over_the_limit_are_listed_by_what_the_file_says) {
     const FloatGrid::Ptr small = narrow_sphere("small", 0.3f), large = narrow_sphere("large", 4.0f);
     const FloatGrid::Ptr fog = large->deepCopy();
     fog->setName("fog");
@@ -248,7 +248,7 @@ void grids_over_the_limit_are_listed_by_what_the_file_says(void **) {
     assert_int_equal(count, 2);
 }
 
-void listing_can_be_cancelled(void **) {
+TEST(listing_can_be_cancelled) {
     const std::string path = save("stop.vdb", {sphere()});
     vsh_run run = vsh_run_default();
     run.progress = [](void *, const char *, double) { return int32_t(1); };
@@ -258,7 +258,7 @@ void listing_can_be_cancelled(void **) {
     assert_int_equal(count, 0);
 }
 
-void a_full_disk_leaves_the_old_file(void **) {
+TEST(a_full_disk_leaves_the_old_file) {
     vsh_grid *grid = own_sphere();
     const std::string path = in_folder("full.vdb");
     put(path, "old");
@@ -284,20 +284,5 @@ int main() {
     if (!make_folder()) {
         return 1;
     }
-    const CMUnitTest tests[] = {
-        cmocka_unit_test(a_cut_file_is_an_error_at_every_length), // first: it forks, before there are threads
-        cmocka_unit_test(a_written_grid_comes_back_bit_for_bit),
-        cmocka_unit_test(openvdb_reads_what_is_written),
-        cmocka_unit_test(grids_are_listed_and_found_by_name),
-        cmocka_unit_test(the_first_level_set_that_can_cast_is_taken_and_the_others_are_named),
-        cmocka_unit_test(where_no_level_set_can_cast_the_first_ones_reason_is_given),
-        cmocka_unit_test(what_is_no_vdb_file_is_not_read),
-        cmocka_unit_test(what_casts_no_shadows_is_refused),
-        cmocka_unit_test(voxels_too_small_for_openvdb_are_refused_and_the_least_come_back),
-        cmocka_unit_test(the_memory_limit_holds_for_reading),
-        cmocka_unit_test(grids_over_the_limit_are_listed_by_what_the_file_says),
-        cmocka_unit_test(listing_can_be_cancelled),
-        cmocka_unit_test(a_full_disk_leaves_the_old_file),
-    };
-    return cmocka_run_group_tests(tests, nullptr, remove_folder);
+    return run_all_tests(nullptr, remove_folder);
 }

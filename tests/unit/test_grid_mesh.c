@@ -1,5 +1,6 @@
 /* Grids of meshes. */
 #include "grids.h"
+#include "testing.h"
 
 typedef struct model {
     float *positions;
@@ -64,9 +65,7 @@ static void free_model(model *m) {
 static vsh_grid *grid_of(const vsh_mesh *meshes, size_t count, double voxel, const vsh_run *run) {
     const vsh_grid_options options = with_voxel(voxel);
     vsh_grid *grid = NULL;
-    if (vsh_grid_from_meshes(meshes, count, &options, run, &grid, &failure) != VSH_OK) {
-        fail_msg("%s", failure.message);
-    }
+    assert_ok(vsh_grid_from_meshes(meshes, count, &options, run, &grid, &failure));
     return grid;
 }
 
@@ -77,8 +76,7 @@ static void keep_warning(void *user, const char *message) {
     snprintf(last_warning, sizeof last_warning, "%s", message);
 }
 
-static void a_fine_mesh_of_a_sphere_is_the_sphere(void **state) {
-    (void)state;
+TEST(a_fine_mesh_of_a_sphere_is_the_sphere) {
     for (int inverted = 0; inverted < 2; ++inverted) {
         model ball = make_sphere(150, 1.0, inverted);
         ball.mesh.solidity = inverted ? VSH_SOLIDITY_SOLID : VSH_SOLIDITY_AUTO;
@@ -110,16 +108,14 @@ static const vsh_mesh cube = {.name = "cube",
                               .vertex_count = 8,
                               .triangle_count = 12};
 
-static void few_large_triangles_are_exact(void **state) {
-    (void)state;
+TEST(few_large_triangles_are_exact) {
     vsh_grid *grid = grid_of(&cube, 1, 0.03, NULL);
     assert_true(worst_error(grid, unit_cube, 2.95, 2.95) < 0.02);
     assert_int_equal(wrong_blocks(grid, unit_cube, 8), 0);
     vsh_grid_free(grid);
 }
 
-static void a_mesh_far_away_and_mirrored_is_the_same(void **state) {
-    (void)state;
+TEST(a_mesh_far_away_and_mirrored_is_the_same) {
     const double far_away[12] = {-1, 0, 0, 1e7, 0, 1, 0, 0, 0, 0, 1, -4e6};
     vsh_mesh moved = cube;
     moved.transform = far_away;
@@ -134,8 +130,7 @@ static double sheet(const double p[3]) {
     return fabs(p[2]) - 0.04;
 }
 
-static void an_open_quad_becomes_a_shell_with_a_warning(void **state) {
-    (void)state;
+TEST(an_open_quad_becomes_a_shell_with_a_warning) {
     static const float positions[12] = {-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0};
     static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
     const vsh_mesh quad = {
@@ -148,7 +143,7 @@ static void an_open_quad_becomes_a_shell_with_a_warning(void **state) {
     vsh_grid *grid = NULL;
     vsh_grid_options options = with_voxel(0.02);
     options.shell_thickness = 4.0;
-    assert_int_equal(vsh_grid_from_meshes(&quad, 1, &options, &run, &grid, &failure), VSH_OK);
+    assert_ok(vsh_grid_from_meshes(&quad, 1, &options, &run, &grid, &failure));
     assert_int_equal(warnings, 1);
     assert_non_null(
         strstr(last_warning, "note: mesh 'sail' (1 of 1): 4 open edges: baked as a shell 4 voxels"));
@@ -168,8 +163,7 @@ static void an_open_quad_becomes_a_shell_with_a_warning(void **state) {
     vsh_grid_free(grid);
 }
 
-static void a_crack_is_closed_and_told(void **state) {
-    (void)state;
+TEST(a_crack_is_closed_and_told) {
     model ball = make_sphere(200, 1.0, 0);
     --ball.mesh.triangle_count;
     int warnings = 0;
@@ -196,8 +190,7 @@ static double two_balls(const double p[3]) {
     return fmin(unit_sphere(p), unit_sphere(q));
 }
 
-static void overlapping_meshes_are_one_solid(void **state) {
-    (void)state;
+TEST(overlapping_meshes_are_one_solid) {
     model ball = make_sphere(100, 1.0, 0);
     static const double aside[12] = {1, 0, 0, 0.8, 0, 1, 0, 0, 0, 0, 1, 0};
     vsh_mesh both[2] = {ball.mesh, ball.mesh};
@@ -226,8 +219,7 @@ static void overlapping_meshes_are_one_solid(void **state) {
     free_model(&ball);
 }
 
-static void a_room_in_a_mesh_stays_open_and_keeps_its_furniture(void **state) {
-    (void)state;
+TEST(a_room_in_a_mesh_stays_open_and_keeps_its_furniture) {
     /* One mesh of three shells: a ball, a room in it that faces inward, and a ball in the room. */
     model shells[3] = {make_sphere(100, 1.0, 0), make_sphere(100, 0.6, 1), make_sphere(40, 0.2, 0)};
     for (int turned = 0; turned < 2; ++turned) {
@@ -261,33 +253,7 @@ static void a_room_in_a_mesh_stays_open_and_keeps_its_furniture(void **state) {
     }
 }
 
-static void threads_do_not_show_in_meshes(void **state) {
-    (void)state;
-    model fine = make_sphere(100, 0.7, 0);
-    model coarse = make_sphere(5, 1.0, 0);
-    const vsh_mesh sets[2][2] = {{fine.mesh, coarse.mesh}, {coarse.mesh, cube}};
-    const int32_t threads[5] = {1, 2, 5, 0, 2};
-    for (int set = 0; set < 2; ++set) {
-        vsh_grid *first = NULL;
-        for (int i = 0; i < 5; ++i) {
-            vsh_run run = vsh_run_default();
-            run.threads = threads[i];
-            vsh_grid *grid = grid_of(sets[set], 2, 0.03, &run);
-            if (first == NULL) {
-                first = grid;
-            } else {
-                assert_same_leaves(first, grid, 0.0f);
-                vsh_grid_free(grid);
-            }
-        }
-        vsh_grid_free(first);
-    }
-    free_model(&fine);
-    free_model(&coarse);
-}
-
-static void bad_meshes_are_refused_with_the_reason(void **state) {
-    (void)state;
+TEST(bad_meshes_are_refused_with_the_reason) {
     vsh_grid *grid = NULL;
     float positions[24];
     uint32_t indices[36];
@@ -319,14 +285,12 @@ static void bad_meshes_are_refused_with_the_reason(void **state) {
     assert_null(grid);
 }
 
-static void meshes_can_be_cancelled(void **state) {
-    (void)state;
+TEST(meshes_can_be_cancelled) {
     model ball = make_sphere(100, 1.0, 0);
     const double stops[] = {0.0, 0.1, 0.5, 0.9};
     for (size_t i = 0; i < sizeof stops / sizeof stops[0]; ++i) {
         watch w = {0.0, stops[i], 0};
-        vsh_run run = vsh_run_default();
-        run.threads = 2;
+        vsh_run run = run_on(2);
         run.progress = watch_progress;
         run.user = &w;
         vsh_grid *grid = NULL;
@@ -345,8 +309,7 @@ static int32_t count_down(void *left, const char *stage, double fraction) {
 }
 
 /* Sorting triangles, filling from outside and cutting where solids overlap all ask. */
-static void solids_that_overlap_can_be_cancelled_whenever_progress_is_told(void **state) {
-    (void)state;
+TEST(solids_that_overlap_can_be_cancelled_whenever_progress_is_told) {
     model ball = make_sphere(100, 1.0, 0);
     const vsh_mesh meshes[] = {ball.mesh, cube};
     const vsh_grid_options options = with_voxel(0.2);
@@ -354,8 +317,7 @@ static void solids_that_overlap_can_be_cancelled_whenever_progress_is_told(void 
     int32_t all = INT32_MAX;
     for (int i = 0; i <= LAST; i += i < 2 ? 1 : 5) {
         int32_t left = i == 0 ? INT32_MAX : all - i;
-        vsh_run run = vsh_run_default();
-        run.threads = 1;
+        vsh_run run = run_on(1);
         run.progress = count_down;
         run.user = &left;
         vsh_grid *grid = NULL;
@@ -375,18 +337,5 @@ static void solids_that_overlap_can_be_cancelled_whenever_progress_is_told(void 
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_fine_mesh_of_a_sphere_is_the_sphere),
-        cmocka_unit_test(few_large_triangles_are_exact),
-        cmocka_unit_test(a_mesh_far_away_and_mirrored_is_the_same),
-        cmocka_unit_test(an_open_quad_becomes_a_shell_with_a_warning),
-        cmocka_unit_test(a_crack_is_closed_and_told),
-        cmocka_unit_test(overlapping_meshes_are_one_solid),
-        cmocka_unit_test(a_room_in_a_mesh_stays_open_and_keeps_its_furniture),
-        cmocka_unit_test(threads_do_not_show_in_meshes),
-        cmocka_unit_test(bad_meshes_are_refused_with_the_reason),
-        cmocka_unit_test(meshes_can_be_cancelled),
-        cmocka_unit_test(solids_that_overlap_can_be_cancelled_whenever_progress_is_told),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

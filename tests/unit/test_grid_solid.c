@@ -1,21 +1,16 @@
 /* Level sets of meshes that are not one closed solid, against closed forms. */
 #include "grids.h"
 #include "shapes.h"
-
-#include <stdbool.h>
+#include "testing.h"
 
 static const double VOXEL = 0.05;
 static const double ORIGIN[3] = {0, 0, 0};
 static const double LOW[3] = {-1, -1, -1}, HIGH[3] = {1, 1, 1};
 
 static vsh_grid *grid_of(const vsh_mesh *meshes, size_t count, double voxel) {
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = voxel;
+    const vsh_grid_options options = with_voxel(voxel);
     vsh_grid *grid = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_grid_from_meshes(meshes, count, &options, NULL, &grid, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_grid_from_meshes(meshes, count, &options, NULL, &grid, &failure));
     return grid;
 }
 
@@ -59,8 +54,7 @@ static double dome_and_cube(const double p[3]) {
     return fmin(fmax(-d, d - 2.0 * VOXEL), box(p, 1.0));
 }
 
-static void a_sky_dome_leaves_what_it_holds(void **state) {
-    (void)state;
+TEST(a_sky_dome_leaves_what_it_holds) {
     shape *s = shape_new();
     shape_ball(s, ORIGIN, 3.0, -1.0, 1.0, 128);
     shape_turn(s, 0);
@@ -75,8 +69,7 @@ static double house(const double p[3]) {
     return fmin(fmax(box(p, 2.0), -box(p, 1.0)), box(p, 0.5));
 }
 
-static void houses_have_rooms_with_furniture_in_one_mesh_or_many(void **state) {
-    (void)state;
+TEST(houses_have_rooms_with_furniture_in_one_mesh_or_many) {
     shape *s[3];
     vsh_mesh meshes[3];
     for (int split = 0; split < 2; ++split) {
@@ -106,8 +99,7 @@ static double crossing(const double p[3]) {
 }
 
 /* Signs are the union's half a voxel off its surface; distances inside may be to faces that lie within. */
-static void boxes_that_cross_in_one_mesh_are_their_union(void **state) {
-    (void)state;
+TEST(boxes_that_cross_in_one_mesh_are_their_union) {
     shape *s = shape_new();
     const double low[3] = {0.013, 0.013, 0.013}, high[3] = {2.013, 2.013, 2.013};
     shape_box(s, LOW, HIGH, ALL_SIDES);
@@ -138,8 +130,7 @@ static double capped_ball(const double p[3]) { /* without what is above 0.9 */
     return fmax(d, p[2] - 0.9);
 }
 
-static void a_solid_with_holes_is_as_deep_as_without(void **state) {
-    (void)state;
+TEST(a_solid_with_holes_is_as_deep_as_without) {
     shape *s = shape_new();
     shape_ball(s, ORIGIN, 1.0, -1.0, 1.0, 128);
     for (int i = 0; i < 4; ++i) { /* a hole of four triangles, and one of one */
@@ -163,8 +154,7 @@ static double room_with_door(const double p[3]) {
     return fmax(-d, d - 2.0 * VOXEL);
 }
 
-static void the_door_of_a_room_stays_open(void **state) {
-    (void)state;
+TEST(the_door_of_a_room_stays_open) {
     shape *s = shape_new();
     shape_box(s, LOW, HIGH, ALL_SIDES & ~FRONT);
     shape_turn(s, 0);
@@ -205,8 +195,7 @@ static double mixed(const double p[3]) {
     return fmin(box(p, 1.0), card);
 }
 
-static void a_card_in_a_solid_s_mesh_leaves_it_solid(void **state) {
-    (void)state;
+TEST(a_card_in_a_solid_s_mesh_leaves_it_solid) {
     shape *s = shape_new();
     const double low[3] = {3, -1, -1}, high[3] = {5, 1, 1};
     shape_box(s, LOW, HIGH, ALL_SIDES);
@@ -217,8 +206,7 @@ static void a_card_in_a_solid_s_mesh_leaves_it_solid(void **state) {
     free(s);
 }
 
-static void a_face_turned_over_changes_nothing(void **state) {
-    (void)state;
+TEST(a_face_turned_over_changes_nothing) {
     shape *s = shape_new();
     shape_ball(s, ORIGIN, 1.0, -1.0, 1.0, 128);
     shape_turn(s, s->triangles - 2000);
@@ -230,8 +218,7 @@ static double room_of_sheets(const double p[3]) {
     return fabs(box(p, 1.0)) - VOXEL;
 }
 
-static void rooms_of_separate_walls_hold_air(void **state) {
-    (void)state;
+TEST(rooms_of_separate_walls_hold_air) {
     shape *s[6];
     vsh_mesh meshes[6];
     for (int i = 0; i < 6; ++i) {
@@ -255,8 +242,7 @@ static double dome_of_sheets(const double p[3]) {
     return fmin(fabs(ball(p, 3.0)) - VOXEL, box(p, 1.0));
 }
 
-static void a_dome_that_looks_outwards_holds_air(void **state) {
-    (void)state;
+TEST(a_dome_that_looks_outwards_holds_air) {
     shape *s = shape_new();
     shape_ball(s, ORIGIN, 3.0, -1.0, 1.0, 128);
     shape_box(s, LOW, HIGH, ALL_SIDES);
@@ -265,16 +251,5 @@ static void a_dome_that_looks_outwards_holds_air(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_sky_dome_leaves_what_it_holds),
-        cmocka_unit_test(houses_have_rooms_with_furniture_in_one_mesh_or_many),
-        cmocka_unit_test(boxes_that_cross_in_one_mesh_are_their_union),
-        cmocka_unit_test(a_solid_with_holes_is_as_deep_as_without),
-        cmocka_unit_test(the_door_of_a_room_stays_open),
-        cmocka_unit_test(a_card_in_a_solid_s_mesh_leaves_it_solid),
-        cmocka_unit_test(a_face_turned_over_changes_nothing),
-        cmocka_unit_test(rooms_of_separate_walls_hold_air),
-        cmocka_unit_test(a_dome_that_looks_outwards_holds_air),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

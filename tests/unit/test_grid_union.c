@@ -1,21 +1,21 @@
 /* Grids that are unions of grids. */
 #include "grids.h"
+#include "testing.h"
 
 static vsh_grid *ball_grid(double x, double radius, double voxel) {
     sphere s = {{x, 0, 0}, radius, 0};
     const vsh_distance field = sphere_field(&s);
     const vsh_grid_options options = with_voxel(voxel);
     vsh_grid *grid = NULL;
-    assert_int_equal(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure), VSH_OK);
+    assert_ok(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure));
     return grid;
 }
 
-static void one_grid_alone_is_shared_as_it_is(void **state) {
-    (void)state;
+TEST(one_grid_alone_is_shared_as_it_is) {
     vsh_grid *ball = ball_grid(0.0, 1.0, 0.03);
     const vsh_grid_instance instance = {ball, NULL};
     vsh_grid *same = NULL;
-    assert_int_equal(vsh_grid_unite(&instance, 1, NULL, NULL, &same, &failure), VSH_OK);
+    assert_ok(vsh_grid_unite(&instance, 1, NULL, NULL, &same, &failure));
     vsh_grid *const given = ball;
     assert_same_leaves(given, same, 0.0f);
     vsh_grid_free(given);
@@ -24,13 +24,12 @@ static void one_grid_alone_is_shared_as_it_is(void **state) {
 }
 
 /* Shifts by whole voxels that are no whole leaves: the values are those of the closed form. */
-static void grids_on_one_lattice_are_shifted_and_keep_their_values(void **state) {
-    (void)state;
+TEST(grids_on_one_lattice_are_shifted_and_keep_their_values) {
     vsh_grid *ball = ball_grid(0.0, 1.0, 0.03);
     const double aside[12] = {1, 0, 0, 27 * 0.03, 0, 1, 0, 0, 0, 0, 1, 0};
     const vsh_grid_instance instances[2] = {{ball, NULL}, {ball, aside}};
     vsh_grid *both = NULL;
-    assert_int_equal(vsh_grid_unite(instances, 2, NULL, NULL, &both, &failure), VSH_OK);
+    assert_ok(vsh_grid_unite(instances, 2, NULL, NULL, &both, &failure));
     leaves all = leaves_of(both);
     for (size_t i = 0; i < all.count; ++i) {
         for (int v = 0; v < 512; ++v) {
@@ -51,8 +50,7 @@ static double moved_sphere(const double p[3]) { /* twice as large, its middle at
     return 2.0 * unit_sphere(q);
 }
 
-static void a_turned_mirrored_scaled_grid_is_measured_anew(void **state) {
-    (void)state;
+TEST(a_turned_mirrored_scaled_grid_is_measured_anew) {
     vsh_grid *ball = ball_grid(0.0, 1.0, 0.03);
     const double c = 2.0 * cos(0.5), s = 2.0 * sin(0.5);
     const double turned[12] = {-c, s, 0, 1, s, c, 0, 2, 0, 0, 2, 3};
@@ -61,7 +59,7 @@ static void a_turned_mirrored_scaled_grid_is_measured_anew(void **state) {
     for (int i = 0; i < 3; ++i) {
         vsh_grid *moved = NULL;
         const vsh_grid_options options = with_voxel(voxels[i]);
-        assert_int_equal(vsh_grid_unite(&instance, 1, &options, NULL, &moved, &failure), VSH_OK);
+        assert_ok(vsh_grid_unite(&instance, 1, &options, NULL, &moved, &failure));
         vsh_grid_info info;
         vsh_grid_get_info(moved, &info);
         assert_float_equal(info.voxel_size, i == 0 ? 0.06 : voxels[i], 1e-9);
@@ -74,17 +72,16 @@ static void a_turned_mirrored_scaled_grid_is_measured_anew(void **state) {
     vsh_grid_free(ball);
 }
 
-static void rooms_stay_open_in_a_union_of_different_lattices(void **state) {
-    (void)state;
+TEST(rooms_stay_open_in_a_union_of_different_lattices) {
     const vsh_sdf sdf = hollow_sphere();
     const vsh_grid_options options = with_voxel(0.03);
     vsh_grid *room = NULL;
-    assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &room, &failure), VSH_OK);
+    assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &room, &failure));
     vsh_grid *ball = ball_grid(0.0, 1.0, 0.05);
     const double turned[12] = {0.12, -0.16, 0, 0, 0.16, 0.12, 0, 0, 0, 0, 0.2, 0};
     const vsh_grid_instance instances[2] = {{ball, turned}, {room, NULL}};
     vsh_grid *both = NULL;
-    assert_int_equal(vsh_grid_unite(instances, 2, &options, NULL, &both, &failure), VSH_OK);
+    assert_ok(vsh_grid_unite(instances, 2, &options, NULL, &both, &failure));
     assert_true(worst_error(both, room_with_a_ball, 2.9, 2.9) < 0.15);
     assert_int_equal(wrong_blocks(both, room_with_a_ball, 8), 0);
     vsh_grid_free(both);
@@ -92,18 +89,16 @@ static void rooms_stay_open_in_a_union_of_different_lattices(void **state) {
     vsh_grid_free(ball);
 }
 
-static void threads_do_not_show_in_unions(void **state) {
-    (void)state;
+TEST(threads_do_not_show_in_unions) {
     vsh_grid *ball = ball_grid(0.0, 1.0, 0.05);
     const double turned[12] = {0.6, -0.8, 0, 0.5, 0.8, 0.6, 0, 0, 0, 0, 1, 0.1};
     const vsh_grid_instance instances[2] = {{ball, NULL}, {ball, turned}};
     vsh_grid *first = NULL;
     const int32_t threads[3] = {1, 2, 5};
     for (int i = 0; i < 3; ++i) {
-        vsh_run run = vsh_run_default();
-        run.threads = threads[i];
+        const vsh_run run = run_on(threads[i]);
         vsh_grid *both = NULL;
-        assert_int_equal(vsh_grid_unite(instances, 2, NULL, &run, &both, &failure), VSH_OK);
+        assert_ok(vsh_grid_unite(instances, 2, NULL, &run, &both, &failure));
         if (first != NULL) {
             assert_same_leaves(first, both, 0.0f);
             vsh_grid_free(both);
@@ -115,8 +110,7 @@ static void threads_do_not_show_in_unions(void **state) {
     vsh_grid_free(ball);
 }
 
-static void bad_unions_are_refused_with_the_reason(void **state) {
-    (void)state;
+TEST(bad_unions_are_refused_with_the_reason) {
     vsh_grid *ball = ball_grid(0.0, 1.0, 0.05);
     const double uneven[12] = {1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0};
     const double sheared[12] = {1, 0.3, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
@@ -146,13 +140,5 @@ static void bad_unions_are_refused_with_the_reason(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(one_grid_alone_is_shared_as_it_is),
-        cmocka_unit_test(grids_on_one_lattice_are_shifted_and_keep_their_values),
-        cmocka_unit_test(a_turned_mirrored_scaled_grid_is_measured_anew),
-        cmocka_unit_test(rooms_stay_open_in_a_union_of_different_lattices),
-        cmocka_unit_test(threads_do_not_show_in_unions),
-        cmocka_unit_test(bad_unions_are_refused_with_the_reason),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -4,7 +4,7 @@
 
 namespace {
 
-void turned_and_mirrored_grids_stay_where_they_are(void **) {
+TEST(turned_and_mirrored_grids_stay_where_they_are) {
     const FloatGrid::Ptr grid = sphere();
     grid->transform().postRotate(0.7, openvdb::math::Y_AXIS);
     grid->transform().postScale(openvdb::Vec3d(-2.0, 2.0, 2.0));
@@ -26,7 +26,7 @@ void turned_and_mirrored_grids_stay_where_they_are(void **) {
     vsh_grid_free(read);
 }
 
-void doubles_are_read(void **) {
+TEST(doubles_are_read) {
     const auto grid = ball<openvdb::DoubleGrid>(RADIUS, 4.0f);
     const std::string path = save("double.vdb", {grid});
     vsh_grid *read = nullptr;
@@ -35,7 +35,7 @@ void doubles_are_read(void **) {
     vsh_grid_free(read);
 }
 
-void values_that_are_no_distances_are_made_so(void **) {
+TEST(values_that_are_no_distances_are_made_so) {
     const FloatGrid::Ptr scaled = sphere(), turned = sphere(2.0f), wide = sphere();
     for (auto value = scaled->beginValueAll(); value; ++value) {
         value.setValue(0.3f * *value); // the background stays
@@ -68,7 +68,7 @@ void values_that_are_no_distances_are_made_so(void **) {
 }
 
 // Walls of 0.6 to 1.5 voxels, wherever they stand between the voxels: their distances are right, and stay.
-void thin_walls_hold_distances(void **) {
+TEST(thin_walls_hold_distances) {
     for (const double half : {0.3, 0.45, 0.6, 0.75}) {
         for (const double offset : {0.0, 0.14, 0.27}) {
             const FloatGrid::Ptr grid = FloatGrid::create(float(3.0 * VOXEL));
@@ -115,7 +115,7 @@ std::vector<float> shadows_of(const vsh_grid *grid) {
 
 // Bands of other widths too: narrower ones than 3 voxels are made anew.
 // Distances in all voxels of a box, as arrays become grids: beyond the background, too.
-void dense_distances_are_no_damage(void **) {
+TEST(dense_distances_are_no_damage) {
     const FloatGrid::Ptr grid = FloatGrid::create(float(3.0 * VOXEL));
     grid->setGridClass(openvdb::GRID_LEVEL_SET);
     grid->setTransform(openvdb::math::Transform::createLinearTransform(VOXEL));
@@ -142,7 +142,7 @@ void dense_distances_are_no_damage(void **) {
     vsh_grid_free(read);
 }
 
-void scaled_values_and_narrow_bands_cast_the_same_shadows(void **) {
+TEST(scaled_values_and_narrow_bands_cast_the_same_shadows) {
     vsh_grid *own = own_sphere();
     const std::vector<float> expected = shadows_of(own);
     vsh_grid_free(own);
@@ -174,7 +174,7 @@ void scaled_values_and_narrow_bands_cast_the_same_shadows(void **) {
     }
 }
 
-void what_is_all_inside_is_refused(void **) {
+TEST(what_is_all_inside_is_refused) {
     const FloatGrid::Ptr grid = sphere(), inside = sphere();
     for (auto value = grid->beginValueAll(); value; ++value) {
         value.setValue(-std::fabs(*value));
@@ -187,7 +187,7 @@ void what_is_all_inside_is_refused(void **) {
     refused("inside.vdb", inside, {"outside must be positive"});
 }
 
-void making_distances_anew_names_the_file_and_the_grid(void **) {
+TEST(making_distances_anew_names_the_file_and_the_grid) {
     const FloatGrid::Ptr narrow = narrow_sphere("hull", 3.0f), wide = sphere();
     const std::string path = save("narrow.vdb", {narrow});
     vsh_run run = vsh_run_default();
@@ -219,15 +219,5 @@ int main() {
     if (!make_folder()) {
         return 1;
     }
-    const CMUnitTest tests[] = {
-        cmocka_unit_test(turned_and_mirrored_grids_stay_where_they_are),
-        cmocka_unit_test(doubles_are_read),
-        cmocka_unit_test(values_that_are_no_distances_are_made_so),
-        cmocka_unit_test(thin_walls_hold_distances),
-        cmocka_unit_test(dense_distances_are_no_damage),
-        cmocka_unit_test(scaled_values_and_narrow_bands_cast_the_same_shadows),
-        cmocka_unit_test(what_is_all_inside_is_refused),
-        cmocka_unit_test(making_distances_anew_names_the_file_and_the_grid),
-    };
-    return cmocka_run_group_tests(tests, nullptr, remove_folder);
+    return run_all_tests(nullptr, remove_folder);
 }

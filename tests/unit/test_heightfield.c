@@ -1,7 +1,7 @@
 /* Heightfields as meshes and as images, and what is wrong with some. */
-#include "expect.h"
 #include "images.h"
 #include "terrain.h"
+#include "testing.h"
 
 #include "base/isa.h"
 #include "base/vec.h"
@@ -124,7 +124,7 @@ TEST(a_band_that_would_take_minutes_is_refused_and_the_one_it_names_is_not) {
     options.resolution = 24;
     options.half_width = 100.0;
     vsh_grid *grid = NULL;
-    expect_error(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT, "");
+    assert_fails(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT, "");
     const char *most = strstr(failure.message, "use at most ");
     assert_non_null(strstr(failure.message, "half_width 100"));
     assert_non_null(most);
@@ -132,10 +132,10 @@ TEST(a_band_that_would_take_minutes_is_refused_and_the_one_it_names_is_not) {
     options.half_width = atof(most + strlen("use at most "));
     vsh_run run = vsh_run_default();
     run.progress = stop_at_once;
-    expect_error(vsh_grid_from_meshes(&mesh, 1, &options, &run, &grid, &failure), VSH_ERROR_CANCELLED, "");
+    assert_fails(vsh_grid_from_meshes(&mesh, 1, &options, &run, &grid, &failure), VSH_ERROR_CANCELLED, "");
     options.half_width = 12.0;
     run.progress = NULL;
-    expect_ok(vsh_grid_from_meshes(&mesh, 1, &options, &run, &grid, &failure));
+    assert_ok(vsh_grid_from_meshes(&mesh, 1, &options, &run, &grid, &failure));
     vsh_grid_free(grid);
     vsh_model_free(model);
     free(values);
@@ -155,7 +155,7 @@ TEST(the_field_of_a_heightfield_holds_distances_not_gaps) {
     options.voxel_size = 0.05;
     options.half_width = 8.0;
     vsh_grid *grid = NULL;
-    expect_ok(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure));
+    assert_ok(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure));
     vsh_field *field = field_of_grid(grid, 0.0);
     for (int i = 0; i < 40; ++i) {
         const double gap = -0.6 + 1.2 * i / 39.0, x = -1.0 + i * 0.05;
@@ -406,7 +406,7 @@ TEST(no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_default) {
         const vsh_image image = {SIDE, SIDE, 1, names, views, NULL};
         vsh_image_options write = vsh_image_options_default();
         write.bits = 32;
-        expect_ok(vsh_image_write(at("hill.exr"), &image, &write, &failure));
+        assert_ok(vsh_image_write(at("hill.exr"), &image, &write, &failure));
         const vsh_heights_source source = source_of(values, SIDE, SIDE, 10.0, 2.0);
         vsh_model *model = model_of(&source, VSH_HEIGHTS_SOLID);
         const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
@@ -428,11 +428,11 @@ TEST(no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_default) {
             scene.shade.ao_distance = 1.0;
             vsh_assets *assets = NULL;
             vsh_occluders *occluders = NULL;
-            expect_ok(vsh_assets_load(&scene, NULL, &assets, &failure));
-            expect_ok(vsh_scene_occluders(&scene, assets, NULL, NULL, &occluders, &failure));
-            expect_ok(vsh_shade_shadow(occluders, &points, &light, &scene.shade, NULL, shadow, NULL, NULL,
+            assert_ok(vsh_assets_load(&scene, NULL, &assets, &failure));
+            assert_ok(vsh_scene_occluders(&scene, assets, NULL, NULL, &occluders, &failure));
+            assert_ok(vsh_shade_shadow(occluders, &points, &light, &scene.shade, NULL, shadow, NULL, NULL,
                                        &failure));
-            expect_ok(vsh_shade_ao(occluders, &points, &scene.shade, NULL, ao, NULL, NULL, NULL, &failure));
+            assert_ok(vsh_shade_ao(occluders, &points, &scene.shade, NULL, ao, NULL, NULL, NULL, &failure));
             truth_mesh_light(rays, points.count, positions, normals, towards, tan(RADIANS(2.0)), RAYS, 0,
                              truth[0]);
             truth_mesh_ao(rays, points.count, positions, normals, 1.0, RAYS, 0, truth[1]);
@@ -478,9 +478,9 @@ TEST(images_of_8_16_and_32_bits_are_read) {
         vsh_image_options options = vsh_image_options_default();
         options.bits = cases[k].bits;
         options.pack = color || strstr(cases[k].name, ".exr") != NULL ? NULL : "R=Y,G=Y,B=Y";
-        expect_ok(vsh_image_write(at(cases[k].name), &image, &options, &failure));
+        assert_ok(vsh_image_write(at(cases[k].name), &image, &options, &failure));
         vsh_assets *assets = NULL;
-        expect_ok(load(at(cases[k].name), &assets, &failure));
+        assert_ok(load(at(cases[k].name), &assets, &failure));
         size_t count = 0;
         const vsh_mesh *mesh = vsh_assets_caster(assets, 0, &count);
         assert_int_equal(count, 1);
@@ -507,11 +507,11 @@ TEST(bad_images_are_refused_with_their_place) {
         static const char *const names[] = {"Y"};
         const float values[12] = {[7] = cases[i].value}, *const views[1] = {values};
         const vsh_image image = {4, cases[i].height, 1, names, views, NULL};
-        expect_ok(vsh_image_write(at(cases[i].name), &image, NULL, &failure));
-        expect_error(load(at(cases[i].name), &assets, &failure), VSH_ERROR_INPUT, cases[i].part);
+        assert_ok(vsh_image_write(at(cases[i].name), &image, NULL, &failure));
+        assert_fails(load(at(cases[i].name), &assets, &failure), VSH_ERROR_INPUT, cases[i].part);
         assert_null(assets);
     }
-    expect_error(load(at("none.png"), &assets, &failure), VSH_ERROR_READ, "");
+    assert_fails(load(at("none.png"), &assets, &failure), VSH_ERROR_READ, "");
 }
 
 TEST(bad_sources_are_refused) {
@@ -548,10 +548,10 @@ TEST(bad_sources_are_refused) {
                                            .transform = cases[i].transform};
         vsh_heights *heights = NULL;
         vsh_model *model = NULL;
-        expect_error(vsh_heights_create(&source, NULL, &heights, &failure), cases[i].code, cases[i].message);
+        assert_fails(vsh_heights_create(&source, NULL, &heights, &failure), cases[i].code, cases[i].message);
         assert_null(heights);
         if (cases[i].transform == NULL) { /* a mesh may be sheared */
-            expect_error(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, NULL, &model, &failure),
+            assert_fails(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, NULL, &model, &failure),
                          cases[i].code, "");
             assert_null(model);
         }
@@ -565,11 +565,11 @@ TEST(memory_limits_hold_before_memory_is_taken) {
     run.memory_limit = 3 * SIDE * SIDE;
     vsh_heights *heights = NULL;
     vsh_model *model = NULL;
-    expect_error(vsh_heights_create(&source, &run, &heights, &failure), VSH_ERROR_LIMIT, "");
-    expect_error(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, &run, &model, &failure), VSH_ERROR_LIMIT,
+    assert_fails(vsh_heights_create(&source, &run, &heights, &failure), VSH_ERROR_LIMIT, "");
+    assert_fails(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, &run, &model, &failure), VSH_ERROR_LIMIT,
                  "");
     run.memory_limit = 5 * SIDE * SIDE;
-    expect_ok(vsh_heights_create(&source, &run, &heights, &failure));
+    assert_ok(vsh_heights_create(&source, &run, &heights, &failure));
     vsh_heights_info info;
     vsh_heights_get_info(heights, &info);
     assert_true(info.bytes <= run.memory_limit);

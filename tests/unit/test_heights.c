@@ -1,6 +1,6 @@
 /* Heightfields that are marched as they are: the methods hard and classic. */
 #include "terrain.h"
-#include "tests.h"
+#include "testing.h"
 
 #include "base/vec.h"
 #include "heightfield/heights.h"

@@ -1,6 +1,6 @@
 /* What is hidden where surfaces touch: vsh_lightmap_fill_hidden(), and the tree that it asks. */
-#include "expect.h"
 #include "seams.h"
+#include "testing.h"
 
 #include "bake/places.h"
 
@@ -104,7 +104,7 @@ static stage begin_with(charts_mesh *mesh, int32_t padding, bool half) {
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = SIDE;
     options.padding = padding;
-    expect_ok(vsh_charts_create(&mesh->mesh, 1, &options, NULL, NULL, &s.charts, &failure));
+    assert_ok(vsh_charts_create(&mesh->mesh, 1, &options, NULL, NULL, &s.charts, &failure));
     for (size_t i = 0; i < TEXELS; ++i) {
         int column, row;
         const int chart = chart_at(i, &column, &row);
@@ -133,7 +133,7 @@ static uint64_t fill(const stage *s, int32_t threads) {
     vsh_run run = vsh_run_default();
     uint64_t filled = UINT64_MAX;
     run.threads = threads;
-    expect_ok(vsh_lightmap_fill_hidden(s->charts, &map, 0, &run, &filled, &failure));
+    assert_ok(vsh_lightmap_fill_hidden(s->charts, &map, 0, &run, &filled, &failure));
     return filled;
 }
 
@@ -250,14 +250,14 @@ TEST(threads_change_nothing_nor_do_calls_that_fail) {
     vsh_run limited = vsh_run_default(), stopped = vsh_run_default();
     limited.memory_limit = 1000;
     stopped.progress = stop;
-    expect_error(vsh_lightmap_fill_hidden(other.charts, &map, 0, &limited, NULL, &failure), VSH_ERROR_LIMIT,
+    assert_fails(vsh_lightmap_fill_hidden(other.charts, &map, 0, &limited, NULL, &failure), VSH_ERROR_LIMIT,
                  "hidden charts");
-    expect_error(vsh_lightmap_fill_hidden(other.charts, &map, 0, &stopped, NULL, &failure),
+    assert_fails(vsh_lightmap_fill_hidden(other.charts, &map, 0, &stopped, NULL, &failure),
                  VSH_ERROR_CANCELLED, "");
-    expect_error(vsh_lightmap_fill_hidden(other.charts, &none, 0, NULL, NULL, &failure), VSH_ERROR_ARGUMENT,
+    assert_fails(vsh_lightmap_fill_hidden(other.charts, &none, 0, NULL, NULL, &failure), VSH_ERROR_ARGUMENT,
                  "");
-    expect_error(vsh_lightmap_fill_hidden(NULL, &map, 0, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
-    expect_error(vsh_lightmap_fill_hidden(other.charts, NULL, 0, NULL, NULL, &failure), VSH_ERROR_ARGUMENT,
+    assert_fails(vsh_lightmap_fill_hidden(NULL, &map, 0, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vsh_lightmap_fill_hidden(other.charts, NULL, 0, NULL, NULL, &failure), VSH_ERROR_ARGUMENT,
                  "");
     fill(&other, 4);
     assert_memory_equal(s.ao, other.ao, TEXELS * sizeof *s.ao);

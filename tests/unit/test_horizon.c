@@ -1,5 +1,5 @@
 /* AO of what is over a horizon: the share of those directions that is free. */
-#include "expect.h"
+#include "testing.h"
 #include "traced.h"
 
 #include "truth/directions.h"
@@ -15,7 +15,7 @@ static const truth_solid SCENE[SOLIDS] = {{TRUTH_BOX, {0.0, -0.5, 0.0}, {3.0, 0.
 static const double FAR = 20.0;
 
 typedef struct stage {
-    caster c;
+    casting c;
     double positions[3 * POINTS];
     float normals[3 * POINTS];
     float values[POINTS], truth[POINTS];
@@ -89,7 +89,7 @@ TEST(shares_of_what_is_over_a_horizon_are_the_rays) {
     for (int u = 0; u < 2; ++u) {
         find_truth(s, ups[u]);
         for (int m = 0; m < (s->c.triangles != NULL ? 3 : 2); ++m) {
-            expect_ok(shade(s, methods[m], ups[u], s->values));
+            assert_ok(shade(s, methods[m], ups[u], s->values));
             double square = 0.0, mean = 0.0;
             for (size_t i = 0; i < POINTS; ++i) {
                 const double off =
@@ -110,7 +110,7 @@ TEST(what_knows_no_horizon_says_so) {
     stage *s = set_up();
     static const int32_t methods[] = {VSH_AO_TAPS, VSH_AO_CONES};
     for (int m = 0; m < 2; ++m) {
-        expect_error(shade(s, methods[m], up, s->values), VSH_ERROR_ARGUMENT, "over a horizon");
+        assert_fails(shade(s, methods[m], up, s->values), VSH_ERROR_ARGUMENT, "over a horizon");
     }
     vsh_shade_options options = vsh_shade_options_default();
     options.ao_method = VSH_AO_ADAPTIVE;

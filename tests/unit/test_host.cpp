@@ -20,7 +20,7 @@
 #include <unistd.h>
 #include <vdbshade/vdbshade.h>
 
-#include "tests.h"
+#include "testing.h"
 
 // A host that exports its own Embree (tests/CMakeLists.txt).
 extern "C" {

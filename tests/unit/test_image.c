@@ -1,6 +1,6 @@
 /* Images: what formats keep. test_image_errors.c has what is refused, and damaged files. */
-#include "expect.h"
 #include "images.h"
+#include "testing.h"
 
 static int32_t channel_of(const vsh_image *image, const char *name) {
     for (int32_t c = 0; c < image->channel_count; ++c) {
@@ -17,10 +17,10 @@ static vsh_image_file *write_and_read(const char *path, const vsh_image *image, 
     vsh_image_options options = vsh_image_options_default();
     options.bits = bits;
     options.pack = pack;
-    expect_ok(vsh_image_check(path, image, &options, &failure));
-    expect_ok(vsh_image_write(path, image, &options, &failure));
+    assert_ok(vsh_image_check(path, image, &options, &failure));
+    assert_ok(vsh_image_write(path, image, &options, &failure));
     vsh_image_file *file = NULL;
-    expect_ok(vsh_image_read(path, NULL, &file, &failure));
+    assert_ok(vsh_image_read(path, NULL, &file, &failure));
     return file;
 }
 
@@ -237,14 +237,14 @@ static void unpack_iff_tile(const unsigned char *from, size_t size, size_t pixel
 static vsh_image_file *write_and_read_iff(const char *path, const vsh_image *image, const char *pack) {
     vsh_image_options options = vsh_image_options_default();
     options.pack = pack;
-    expect_ok(vsh_image_write(path, image, &options, &failure));
+    assert_ok(vsh_image_write(path, image, &options, &failure));
     unsigned char *bytes, *tile = malloc(4 * 64 * 64);
     const size_t size = read_all(path, &bytes);
     assert_memory_equal(bytes, "FOR4", 4);
     assert_int_equal(big_endian(bytes + 4, 4), size - 8);
     assert_memory_equal(bytes + 8, "CIMGTBHD", 8);
     vsh_image_file *file;
-    expect_ok(vshi_image_file_new(path, NULL, big_endian(bytes + 20, 4), big_endian(bytes + 24, 4), 4, &file,
+    assert_ok(vshi_image_file_new(path, NULL, big_endian(bytes + 20, 4), big_endian(bytes + 24, 4), 4, &file,
                                   &failure));
     const size_t header = 20 + big_endian(bytes + 16, 4), tiles = big_endian(bytes + 38, 2);
     assert_memory_equal(bytes + header, "FOR4", 4);
@@ -342,7 +342,7 @@ TEST(icons_of_fewer_bits_are_not_given_to_their_reader) {
     const size_t size = read_all(at("icon.ico"), &bytes);
     bytes[22 + 14] = 24;
     write_all(at("icon.ico"), bytes, size);
-    expect_error(vsh_image_read(at("icon.ico"), NULL, &t.file, &failure), VSH_ERROR_UNSUPPORTED, "32 bits");
+    assert_fails(vsh_image_read(at("icon.ico"), NULL, &t.file, &failure), VSH_ERROR_UNSUPPORTED, "32 bits");
     free(bytes);
 }
 

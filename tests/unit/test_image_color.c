@@ -1,6 +1,6 @@
 /* Colour spaces of files: which values go through the sRGB curve, what the file says, what is cut. */
-#include "expect.h"
 #include "images.h"
+#include "testing.h"
 
 static const char *const IRRADIANCE[] = {"shadow.sun", "irradiance.R", "irradiance.G", "irradiance.B", "A"};
 static const int32_t HOLDS[] = {VSH_CHANNEL_DATA, VSH_CHANNEL_LIGHT, VSH_CHANNEL_LIGHT, VSH_CHANNEL_LIGHT,
@@ -12,9 +12,9 @@ static vsh_image_file *write_as(const char *path, const vsh_image *image, int32_
     options.bits = bits;
     options.pack = pack;
     options.color_space = space;
-    expect_ok(vsh_image_write(path, image, &options, &failure));
+    assert_ok(vsh_image_write(path, image, &options, &failure));
     vsh_image_file *file = NULL;
-    expect_ok(vsh_image_read(path, NULL, &file, &failure));
+    assert_ok(vsh_image_read(path, NULL, &file, &failure));
     return file;
 }
 
@@ -113,13 +113,13 @@ TEST(floats_are_linear_and_bad_spaces_are_refused) {
     vsh_image_free(file);
     vsh_image_options options = vsh_image_options_default();
     options.color_space = VSH_COLOR_SRGB;
-    expect_error(vsh_image_check(at("x.exr"), &s.image, &options, &failure), VSH_ERROR_ARGUMENT,
+    assert_fails(vsh_image_check(at("x.exr"), &s.image, &options, &failure), VSH_ERROR_ARGUMENT,
                  "floats are linear");
     options.color_space = 7;
-    expect_error(vsh_image_check(at("x.png"), &s.image, &options, &failure), VSH_ERROR_ARGUMENT,
+    assert_fails(vsh_image_check(at("x.png"), &s.image, &options, &failure), VSH_ERROR_ARGUMENT,
                  "color_space 7");
     s.image.holds = none;
-    expect_error(vsh_image_check(at("n.png"), &s.image, NULL, &failure), VSH_ERROR_ARGUMENT,
+    assert_fails(vsh_image_check(at("n.png"), &s.image, NULL, &failure), VSH_ERROR_ARGUMENT,
                  "channel 'irradiance.G' holds 3, expected 0 … 2");
     unmake(&s);
 }
@@ -128,11 +128,11 @@ static vsh_image_clipping clipping_of(const char *path, const vsh_image *image, 
     vsh_image_options options = vsh_image_options_default();
     options.pack = pack;
     vsh_image_writer *writer = NULL;
-    expect_ok(vsh_image_writer_create(path, image, &options, &writer, &failure));
-    expect_ok(vsh_image_writer_add(writer, image->height, image->planes, &failure));
+    assert_ok(vsh_image_writer_create(path, image, &options, &writer, &failure));
+    assert_ok(vsh_image_writer_add(writer, image->height, image->planes, &failure));
     vsh_image_clipping clipping;
-    expect_ok(vsh_image_writer_get_clipping(writer, &clipping, &failure));
-    expect_ok(vsh_image_writer_finish(writer, &failure));
+    assert_ok(vsh_image_writer_get_clipping(writer, &clipping, &failure));
+    assert_ok(vsh_image_writer_finish(writer, &failure));
     return clipping;
 }
 

@@ -1,7 +1,7 @@
 /* Images that cannot be written or read: what is refused, what is left behind, damaged files; files that are
  * put in place together, or not at all. */
-#include "expect.h"
 #include "images.h"
+#include "testing.h"
 
 static void refused(const char *path, const vsh_image *image, int32_t bits, const char *pack, vsh_result code,
                     const char *named) {
@@ -98,7 +98,7 @@ TEST(bad_images_are_refused) {
     bad.width = 1 << 20;
     bad.height = 1 << 20;
     refused(at("x.tif"), &bad, 0, NULL, VSH_ERROR_LIMIT, "2^31");
-    expect_error(vsh_image_write(at("x.exr"), &bad, NULL, &failure), VSH_ERROR_LIMIT,
+    assert_fails(vsh_image_write(at("x.exr"), &bad, NULL, &failure), VSH_ERROR_LIMIT,
                  ""); /* not row by row */
     assert_non_null(strstr(failure.message, "2^31"));
     bad = s.image;
@@ -118,9 +118,9 @@ TEST(bad_images_are_refused) {
     refused(at("x.exr"), &s.image, 0, NULL, VSH_ERROR_ARGUMENT, "127");
     s.names[1] = "ao";
     s.planes[1] = NULL;
-    expect_error(vsh_image_write(at("x.exr"), &s.image, NULL, &failure), VSH_ERROR_ARGUMENT, "'ao'");
+    assert_fails(vsh_image_write(at("x.exr"), &s.image, NULL, &failure), VSH_ERROR_ARGUMENT, "'ao'");
     s.image.planes = NULL; /* enough for a check before the bake */
-    expect_ok(vsh_image_check(at("x.exr"), &s.image, NULL, &failure));
+    assert_ok(vsh_image_check(at("x.exr"), &s.image, NULL, &failure));
     unmake(&s);
 }
 
@@ -144,7 +144,7 @@ TEST(cut_files_are_errors) {
     make(&s, 33, 40, 3, LIGHTMAP);
     for (size_t n = 0; n < sizeof names / sizeof names[0]; ++n) {
         const char *path = at(names[n]);
-        expect_ok(vsh_image_write(path, &s.image, NULL, &failure));
+        assert_ok(vsh_image_write(path, &s.image, NULL, &failure));
         unsigned char *bytes;
         const size_t size = read_all(path, &bytes);
         /* what stands behind the pixels may be missing: PNG's last chunk, TGA's footer */
@@ -181,7 +181,7 @@ TEST(damaged_files_do_no_harm) {
     uint32_t seed = 1;
     for (size_t n = 0; n < sizeof names / sizeof names[0]; ++n) {
         const char *path = at(names[n]);
-        expect_ok(vsh_image_write(path, &s.image, NULL, &failure));
+        assert_ok(vsh_image_write(path, &s.image, NULL, &failure));
         unsigned char *bytes;
         const size_t size = read_all(path, &bytes);
         for (int trial = 0; trial < 150; ++trial) {
@@ -219,7 +219,7 @@ TEST(unreadable_paths_are_read_errors) {
         if (cases[i].text != NULL) {
             write_all(at(cases[i].name), (const unsigned char *)cases[i].text, strlen(cases[i].text));
         }
-        expect_error(vsh_image_read(at(cases[i].name), NULL, &file, &failure), cases[i].code, cases[i].part);
+        assert_fails(vsh_image_read(at(cases[i].name), NULL, &file, &failure), cases[i].code, cases[i].part);
         assert_null(file);
     }
     vsh_image_free(NULL);
@@ -230,17 +230,17 @@ TEST(the_memory_limit_holds_without_a_reader) {
     sample s;
     make(&s, 33, 40, 3, LIGHTMAP);
     for (size_t n = 0; n < sizeof names / sizeof names[0]; ++n) {
-        expect_ok(vsh_image_write(at(names[n]), &s.image, NULL, &failure));
+        assert_ok(vsh_image_write(at(names[n]), &s.image, NULL, &failure));
         vsh_run run = vsh_run_default();
         vsh_image_file *file = NULL;
-        expect_ok(vsh_image_read(at(names[n]), &run, &file, &failure));
+        assert_ok(vsh_image_read(at(names[n]), &run, &file, &failure));
         const vsh_image image = vsh_image_view(file);
         run.memory_limit = (uint64_t)(image.width * image.height * image.channel_count) * sizeof(float);
         vsh_image_free(file);
-        expect_ok(vsh_image_read(at(names[n]), &run, &file, &failure));
+        assert_ok(vsh_image_read(at(names[n]), &run, &file, &failure));
         vsh_image_free(file);
         --run.memory_limit;
-        expect_error(vsh_image_read(at(names[n]), &run, &file, &failure), VSH_ERROR_LIMIT, "");
+        assert_fails(vsh_image_read(at(names[n]), &run, &file, &failure), VSH_ERROR_LIMIT, "");
         assert_null(file);
         assert_non_null(strstr(failure.message, names[n]));
     }
@@ -269,22 +269,22 @@ TEST(outputs_are_made_beside_the_target_and_keep_its_ending) {
     vshi_output first;
     vshi_output second;
     const char *path = at("grid.v1.vdb");
-    expect_ok(vshi_output_begin(&first, path, &failure));
-    expect_ok(vshi_output_begin(&second, path, &failure));
+    assert_ok(vshi_output_begin(&first, path, &failure));
+    assert_ok(vshi_output_begin(&second, path, &failure));
     assert_string_not_equal(first.temporary, second.temporary);
     assert_memory_equal(first.temporary, folder, strlen(folder));
     assert_string_equal(vshi_path_ending(first.temporary), "vdb");
     assert_int_equal(access(path, F_OK), -1);
     vshi_output_abandon(&second);
     assert_null(second.temporary);
-    expect_ok(vshi_output_commit(&first, &failure));
+    assert_ok(vshi_output_commit(&first, &failure));
     assert_int_equal(access(path, F_OK), 0);
     vshi_output_abandon(&first); /* nothing is left to do */
     char name[256];
     memset(name, 'n', 255);
     memcpy(name + 251, ".exr", 5);
-    expect_ok(vshi_output_begin(&first, at(name), &failure)); /* the longest name there is */
-    expect_ok(vshi_output_commit(&first, &failure));
+    assert_ok(vshi_output_begin(&first, at(name), &failure)); /* the longest name there is */
+    assert_ok(vshi_output_commit(&first, &failure));
     assert_string_equal(vshi_path_ending("a.b/c"), "");
     assert_string_equal(vshi_path_ending(".exr"), "");
     assert_string_equal(vshi_path_ending("a/b.c.EXR"), "EXR");
@@ -335,7 +335,7 @@ static size_t entries(void) {
 
 static void begin(vshi_output *outputs, vshi_output **list) {
     for (size_t i = 0; i < COUNT; ++i) {
-        expect_ok(vshi_output_begin(&outputs[i], at(together[i]), &failure));
+        assert_ok(vshi_output_begin(&outputs[i], at(together[i]), &failure));
         put_text(outputs[i].temporary, "new");
         list[i] = &outputs[i];
     }
@@ -346,7 +346,7 @@ TEST(all_are_in_place_in_the_end) {
     const size_t before = entries();
     put_text(at(together[1]), "old");
     begin(outputs, list);
-    expect_ok(vshi_outputs_commit(list, COUNT, &failure));
+    assert_ok(vshi_outputs_commit(list, COUNT, &failure));
     for (size_t i = 0; i < COUNT; ++i) {
         expect_text(together[i], "new");
     }
@@ -367,7 +367,7 @@ TEST(one_that_fails_leaves_all_as_they_were) {
         }
         begin(outputs, list);
         assert_int_equal(mkdir(at(together[failing]), 0777), 0);
-        expect_error(vshi_outputs_commit(list, COUNT, &failure), VSH_ERROR_WRITE, "");
+        assert_fails(vshi_outputs_commit(list, COUNT, &failure), VSH_ERROR_WRITE, "");
         assert_non_null(strstr(failure.message, together[failing]));
         assert_non_null(strstr(failure.message, "could not be put in place"));
         assert_int_equal(rmdir(at(together[failing])), 0);

@@ -9,7 +9,7 @@
 
 #include <OpenImageIO/imageio.h>
 
-#include "tests.h"
+#include "testing.h"
 
 namespace {
 

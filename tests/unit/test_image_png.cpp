@@ -13,7 +13,7 @@
 
 #include <OpenImageIO/imageio.h>
 
-#include "tests.h"
+#include "testing.h"
 
 namespace {
 

@@ -1,6 +1,6 @@
 /* Images in pieces: written as their rows come they are those that are written whole; tiles are read. */
-#include "expect.h"
 #include "images.h"
+#include "testing.h"
 
 #include <fcntl.h>
 #include <openexr.h>
@@ -30,7 +30,7 @@ static vsh_image_writer *begin(const char *path, const sample *s) {
     vsh_image_writer *writer = NULL;
     vsh_image shape = s->image;
     shape.planes = NULL;
-    expect_ok(vsh_image_writer_create(path, &shape, NULL, &writer, &failure));
+    assert_ok(vsh_image_writer_create(path, &shape, NULL, &writer, &failure));
     return writer;
 }
 
@@ -65,7 +65,7 @@ TEST(the_same_image_is_the_same_bytes_later_elsewhere) {
             char names[2][16];
             snprintf(names[0], sizeof names[0], "t.%s", ENDINGS[e]);
             snprintf(names[1], sizeof names[1], "other.%s", ENDINGS[e]);
-            expect_ok(vsh_image_write(names[pass], &s.image, NULL, &failure));
+            assert_ok(vsh_image_write(names[pass], &s.image, NULL, &failure));
             if (pass == 1) {
                 assert_same_file(names[0], names[1]);
             }
@@ -91,8 +91,8 @@ TEST(rows_make_the_bytes_of_the_whole_image) {
             char whole[16], pieces[16];
             snprintf(whole, sizeof whole, "whole.%s", ENDINGS[e]);
             snprintf(pieces, sizeof pieces, "pieces.%s", ENDINGS[e]);
-            expect_ok(vsh_image_write(at(whole), &s.image, NULL, &failure));
-            expect_ok(write_in_pieces(begin(at(pieces), &s), &s, cases[k].step));
+            assert_ok(vsh_image_write(at(whole), &s.image, NULL, &failure));
+            assert_ok(write_in_pieces(begin(at(pieces), &s), &s, cases[k].step));
             assert_same_file(at(whole), at(pieces));
             unlink(at(whole));
             unlink(at(pieces));
@@ -132,14 +132,14 @@ TEST(what_is_given_up_or_short_of_rows_leaves_the_old_file) {
         const int entries = entries_in_folder();
         for (int32_t rows = 0; rows <= 150; rows += 50) {
             vsh_image_writer *writer = begin(at(name), &s);
-            expect_ok(add_rows(writer, &s, 150, rows));
+            assert_ok(add_rows(writer, &s, 150, rows));
             assert_int_equal(entries_in_folder(), entries + 1);
             vsh_image_writer_abandon(writer);
             assert_untouched(at(name), entries);
         }
         vsh_image_writer *writer = begin(at(name), &s);
-        expect_ok(add_rows(writer, &s, 150, 149));
-        expect_error(vsh_image_writer_finish(writer, &failure), VSH_ERROR_ARGUMENT, "149 of 150");
+        assert_ok(add_rows(writer, &s, 150, 149));
+        assert_fails(vsh_image_writer_finish(writer, &failure), VSH_ERROR_ARGUMENT, "149 of 150");
         assert_untouched(at(name), entries);
     }
     unmake(&s);
@@ -149,13 +149,13 @@ TEST(rows_that_are_none_of_it_are_refused) {
     sample s;
     make(&s, 20, 10, 3, LIGHTMAP);
     vsh_image_writer *writer = begin(at("refused.exr"), &s);
-    expect_error(vsh_image_writer_add(writer, 0, s.planes, &failure), VSH_ERROR_ARGUMENT, "");
-    expect_error(vsh_image_writer_add(writer, 11, s.planes, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vsh_image_writer_add(writer, 0, s.planes, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vsh_image_writer_add(writer, 11, s.planes, &failure), VSH_ERROR_ARGUMENT, "");
     s.planes[1] = NULL;
-    expect_error(vsh_image_writer_add(writer, 10, s.planes, &failure), VSH_ERROR_ARGUMENT, "'ao'");
+    assert_fails(vsh_image_writer_add(writer, 10, s.planes, &failure), VSH_ERROR_ARGUMENT, "'ao'");
     vsh_image_writer_abandon(writer);
     vsh_image_writer_abandon(NULL);
-    expect_error(vsh_image_writer_create(at("x.exr"), NULL, NULL, &writer, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vsh_image_writer_create(at("x.exr"), NULL, NULL, &writer, &failure), VSH_ERROR_ARGUMENT, "");
     assert_null(writer);
     unmake(&s);
 }
@@ -171,7 +171,7 @@ TEST(a_full_disk_leaves_the_old_file_and_nothing_else) {
     for (size_t e = 0; e < ENDING_COUNT; ++e) {
         char name[16];
         snprintf(name, sizeof name, "full.%s", ENDINGS[e]);
-        expect_ok(vsh_image_write(at(name), &s.image, NULL, &failure));
+        assert_ok(vsh_image_write(at(name), &s.image, NULL, &failure));
         struct stat status;
         assert_int_equal(stat(at(name), &status), 0);
         const rlim_t half = (rlim_t)status.st_size / 2,
@@ -275,7 +275,7 @@ TEST(the_finest_level_is_read_to_the_bit) {
         make(&s, t->width, t->height, CHANNELS, NAMES);
         write_tiles(at("tiles.exr"), t, &s);
         vsh_image_file *file = NULL;
-        expect_ok(vsh_image_read(at("tiles.exr"), NULL, &file, &failure));
+        assert_ok(vsh_image_read(at("tiles.exr"), NULL, &file, &failure));
         const vsh_image view = vsh_image_view(file);
         assert_int_equal(view.width, t->width);
         assert_int_equal(view.height, t->height);
@@ -303,7 +303,7 @@ TEST(reading_can_be_cancelled_between_rows_of_tiles) {
     vsh_run run = vsh_run_default();
     run.progress = stop_at_half;
     vsh_image_file *file = NULL;
-    expect_error(vsh_image_read(at("cancelled.exr"), &run, &file, &failure), VSH_ERROR_CANCELLED, "");
+    assert_fails(vsh_image_read(at("cancelled.exr"), &run, &file, &failure), VSH_ERROR_CANCELLED, "");
     assert_null(file);
     unmake(&s);
 }

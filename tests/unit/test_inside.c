@@ -5,8 +5,8 @@
 #include <stdlib.h>
 
 #include "bake/texels.h"
-#include "expect.h"
 #include "shade/inside.h"
+#include "testing.h"
 
 #include <vdbshade/vdbshade.h>
 

@@ -1,6 +1,6 @@
 /* Irradiance: visibility × colour × falloff × cosine, each against its closed form. */
 #include "shading.h"
-#include "tests.h"
+#include "testing.h"
 
 static const double ORIGIN[3] = {0.0, 0.0, 0.0};
 static const float UP[3] = {0.0f, 1.0f, 0.0f};

@@ -1,5 +1,5 @@
 /* Instruction sets: each that this machine has gives the same bits, the others are refused by name. */
-#include "expect.h"
+#include "testing.h"
 #include "traced.h"
 
 #include "base/isa.h"
@@ -126,7 +126,7 @@ static size_t sets_here(int32_t sets[VSHI_ISA_COUNT]) {
         if (vsh_isa_available(isa)) {
             sets[count++] = isa;
         } else {
-            expect_error(vshi_isa_check(isa, &failure), VSH_ERROR_ARGUMENT, "");
+            assert_fails(vshi_isa_check(isa, &failure), VSH_ERROR_ARGUMENT, "");
             print_message("skipped: %s\n", failure.message);
         }
     }
@@ -140,7 +140,7 @@ typedef struct outcome {
 } outcome;
 
 /* Light NULL: AO. */
-static void shade_with(const caster *c, const vsh_light *light, int32_t method, int32_t isa, outcome *o) {
+static void shade_with(const casting *c, const vsh_light *light, int32_t method, int32_t isa, outcome *o) {
     vsh_shade_options options = preview_options();
     options.method = light != NULL ? method : VSH_SHADOW_CONE;
     options.ao_method = light == NULL ? method : VSH_AO_CONES;
@@ -151,7 +151,7 @@ static void shade_with(const caster *c, const vsh_light *light, int32_t method, 
     const vsh_points points = {COUNT, positions, normals, NULL};
     memset(o, 0, sizeof *o);
     o->stats = vsh_shade_stats_zero();
-    expect_ok(light != NULL ? vsh_shade_shadow(occluders_of_caster(c), &points, light, &options, &run,
+    assert_ok(light != NULL ? vsh_shade_shadow(occluders_of_caster(c), &points, light, &options, &run,
                                                o->value, o->deviation, &o->stats, &failure)
                             : vsh_shade_ao(occluders_of_caster(c), &points, &options, &run, o->value,
                                            o->deviation, NULL, &o->stats, &failure));
@@ -162,7 +162,7 @@ TEST(every_method_gives_the_same_bits_on_every_instruction_set) {
     int32_t sets[VSHI_ISA_COUNT];
     const size_t count = sets_here(sets);
     fill_points();
-    caster c = caster_of(truth_seeds(), 0.04, 0.0);
+    casting c = caster_of(truth_seeds(), 0.04, 0.0);
     vsh_field_info info;
     vsh_field_get_info(c.field, &info);
     assert_true(info.levels >= 3);
@@ -210,7 +210,7 @@ TEST(an_instruction_set_that_is_missing_or_unknown_is_refused_by_name) {
     /* a run from before it had an instruction set */
     run.isa = -1;
     run.struct_size = offsetof(vsh_run, isa);
-    expect_ok(
+    assert_ok(
         vsh_shade_shadow(occluders_of(field), &points, &light, NULL, &run, &value, NULL, NULL, &failure));
     vsh_field_free(field);
 }

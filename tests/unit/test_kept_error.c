@@ -1,10 +1,10 @@
 /* Scenes of procedural shapes and level sets keep the error that is asked for, against rays in closed form.
  */
 #include "analytic.h"
-#include "expect.h"
 #include "images.h"
 #include "metrics.h"
 #include "scenes.h"
+#include "testing.h"
 
 #include <vdbshade/vdbshade.h>
 
@@ -105,12 +105,12 @@ static void bake(const char *casters, double max_error, int size, baked *b) {
     vsh_scene *scene = parse(at("scene.json"), text);
     vsh_bake_error errors[3];
     vsh_bake_report report = {.errors = errors};
-    expect_ok(vsh_bake_scene(scene, NULL, NULL, &report, &failure));
+    assert_ok(vsh_bake_scene(scene, NULL, NULL, &report, &failure));
     b->shadow_error = vsh_bake_error_rmse(&errors[0]);
     b->ao_error = vsh_bake_error_rmse(&errors[1]);
     vsh_scene_free(scene);
     vsh_image_file *file;
-    expect_ok(vsh_image_read(at("out.exr"), NULL, &file, &failure));
+    assert_ok(vsh_image_read(at("out.exr"), NULL, &file, &failure));
     const vsh_image image = vsh_image_view(file);
     take_plane(&image, "shadow.sun", size, b->shadow);
     take_plane(&image, "ao", size, b->ao);
@@ -180,8 +180,8 @@ TEST(a_level_set_keeps_its_voxels_beside_a_large_plane) {
     vsh_grid_options options = vsh_grid_options_default();
     options.voxel_size = 0.0117;
     vsh_grid *grid;
-    expect_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
-    expect_ok(vsh_grid_write(grid, at("shape.vdb"), NULL, NULL, 0, &failure));
+    assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
+    assert_ok(vsh_grid_write(grid, at("shape.vdb"), NULL, NULL, 0, &failure));
     vsh_grid_free(grid);
     snprintf(text, sizeof text, "{\"vdb\": \"%s\"}", at("shape.vdb"));
     bake(text, 0.005, SIZE, &alone);

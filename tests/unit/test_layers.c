@@ -1,8 +1,8 @@
 /* Layers beside the field: what they hide, and how it is combined. */
-#include "expect.h"
 #include "field/field.h"
 #include "previews.h"
 #include "shading.h"
+#include "testing.h"
 
 #include <stdlib.h>
 #include <vdbshade/bake.h>
@@ -34,7 +34,7 @@ static void shade(const vsh_occluders *occluders, const vsh_light *light, int32_
     const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_shade_options options = preview_options();
     options.method = method;
-    expect_ok(vsh_shade_shadow(occluders, &points, light, &options, NULL, values, deviation, NULL, &failure));
+    assert_ok(vsh_shade_shadow(occluders, &points, light, &options, NULL, values, deviation, NULL, &failure));
 }
 
 /* By one cone a point. */
@@ -45,7 +45,7 @@ static void shade_plainly(const vsh_occluders *occluders, const vsh_light *light
 static void shade_ao(const vsh_occluders *occluders, float *values) {
     const vsh_points points = {COUNT, positions, normals, NULL};
     const vsh_shade_options options = preview_options();
-    expect_ok(vsh_shade_ao(occluders, &points, &options, NULL, values, NULL, NULL, NULL, &failure));
+    assert_ok(vsh_shade_ao(occluders, &points, &options, NULL, values, NULL, NULL, NULL, &failure));
 }
 
 static void assert_all(const float *values, double expected, double tolerance) {
@@ -260,7 +260,7 @@ static void bake_floor(const vsh_field *field, const vsh_layer *layers, size_t l
     float *planes[1] = {baked->shadow};
     const vsh_lightmap lightmap = {.shadow = planes, .ao = baked->ao};
     baked->stats = vsh_bake_stats_zero();
-    expect_ok(vsh_bake_lightmap(occluders_with(field, layers, layer_count), texels, &light, 1, &shade, NULL,
+    assert_ok(vsh_bake_lightmap(occluders_with(field, layers, layer_count), texels, &light, 1, &shade, NULL,
                                 &lightmap, &baked->stats, &failure));
     vsh_charts_free(texels);
 }

@@ -3,7 +3,7 @@
 #include "bake/origins.h"
 #include "bake/texels.h"
 #include "casts.h"
-#include "expect.h"
+#include "testing.h"
 #include "texels_of.h"
 
 #include <stdbool.h>
@@ -48,9 +48,9 @@ static void open_scene(scene *s, const box *other) {
     vsh_grid_options grid_options = vsh_grid_options_default();
     grid_options.resolution = 64;
     vsh_grid *grid = NULL;
-    expect_ok(vsh_grid_from_meshes(casters, count, &grid_options, NULL, &grid, &failure));
-    expect_ok(vsh_field_create(grid, NULL, NULL, &s->field, &failure));
-    expect_ok(vsh_triangles_create(casters, count, NULL, &s->triangles, &failure));
+    assert_ok(vsh_grid_from_meshes(casters, count, &grid_options, NULL, &grid, &failure));
+    assert_ok(vsh_field_create(grid, NULL, NULL, &s->field, &failure));
+    assert_ok(vsh_triangles_create(casters, count, NULL, &s->triangles, &failure));
     vsh_grid_free(grid);
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = WIDTH;
@@ -93,7 +93,7 @@ static void close_scene(scene *s) {
 }
 
 static void bake(const scene *s, const vsh_light *lights, size_t light_count, const vsh_lightmap *planes) {
-    expect_ok(vsh_bake_lightmap(occluders_traced(s->field, s->triangles), s->charts, lights, light_count,
+    assert_ok(vsh_bake_lightmap(occluders_traced(s->field, s->triangles), s->charts, lights, light_count,
                                 NULL, NULL, planes, NULL, &failure));
 }
 
@@ -137,7 +137,7 @@ TEST(rays_to_a_light_well_above_a_facet_begin_on_it) {
     lights[1].radius = 0.02;
     for (int l = 0; l < 2; ++l) {
         bake(&s, &lights[l], 1, &(vsh_lightmap){.shadow = planes});
-        expect_ok(vsh_trace_shadow(s.triangles, NULL, s.flat.count, s.flat.positions,
+        assert_ok(vsh_trace_shadow(s.triangles, NULL, s.flat.count, s.flat.positions,
                                    s.flat.geometric_normals, HAIR, &lights[l], 64, NULL, truth, &failure));
         size_t hidden = 0, off = 0;
         for (size_t i = 0; i < s.flat.count; ++i) {
@@ -202,7 +202,7 @@ TEST(pictures_show_no_facets_where_light_grazes_a_smooth_sphere) {
     options.shade.method = VSH_SHADOW_EXACT;
     options.lit = &lit;
     options.lit_count = 1;
-    expect_ok(vsh_render(NULL, 0, occluders_traced(s.field, s.triangles), &light, 1, &options, NULL,
+    assert_ok(vsh_render(NULL, 0, occluders_traced(s.field, s.triangles), &light, 1, &options, NULL,
                          &(vsh_picture){color, alpha, depth, normal}, NULL, &failure));
     size_t near = 0, dark = 0;
     for (size_t i = 0; i < SIZE * SIZE; ++i) {
@@ -245,7 +245,7 @@ TEST(ao_close_to_a_wall_is_that_of_the_facets) {
     scene s;
     open_beside_wall(&s, &wall, FACE);
     bake(&s, NULL, 0, &(vsh_lightmap){.ao = ao});
-    expect_ok(vsh_trace_ao(s.triangles, NULL, s.flat.count, s.flat.positions, s.lifted.normals, HAIR, 0.1,
+    assert_ok(vsh_trace_ao(s.triangles, NULL, s.flat.count, s.flat.positions, s.lifted.normals, HAIR, 0.1,
                            256, NULL, truth, &failure));
     size_t under = 0;
     for (size_t i = 0; i < s.flat.count; ++i) {
@@ -276,7 +276,7 @@ TEST(queries_take_the_normals_of_faces_for_ao) {
     options.ao_method = VSH_AO_EXACT;
     options.ao_distance = 0.1;
     vsh_query *query = NULL;
-    expect_ok(vsh_query_create(occluders_traced(s.field, s.triangles), NULL, 0, &options, &query, &failure));
+    assert_ok(vsh_query_create(occluders_traced(s.field, s.triangles), NULL, 0, &options, &query, &failure));
     float *ao = calloc(s.flat.count, sizeof *ao);
     vsh_query_output output = vsh_query_output_default();
     output.ao = ao;
@@ -287,7 +287,7 @@ TEST(queries_take_the_normals_of_faces_for_ao) {
         for (int faces = 0; faces < 2; ++faces) {
             const vsh_points points = {counts[k], s.flat.positions, s.lifted.normals, NULL};
             layout.face_normals = faces ? s.flat.geometric_normals : NULL;
-            expect_ok(vsh_query_points(query, &points, &layout, NULL, &output, NULL, &failure));
+            assert_ok(vsh_query_points(query, &points, &layout, NULL, &output, NULL, &failure));
             for (size_t i = 0; i < counts[k]; ++i) {
                 dark[faces] += ao[i] < 1.0f;
             }
@@ -310,11 +310,11 @@ static double mean_ao_between_walls(const float *normals) {
     make_box(&walls[1], (double[]){0.2, 0.0, -0.1}, (double[]){0.3, 3.0, 0.1});
     const vsh_mesh casters[3] = {strip.mesh, walls[0].mesh, walls[1].mesh};
     vsh_triangles *triangles = NULL;
-    expect_ok(vsh_triangles_create(casters, 3, NULL, &triangles, &failure));
+    assert_ok(vsh_triangles_create(casters, 3, NULL, &triangles, &failure));
     vsh_occluder_parts parts = vsh_occluder_parts_default();
     parts.triangles = triangles;
     vsh_occluders *occluders = NULL;
-    expect_ok(vsh_occluders_from_parts(&parts, &occluders, &failure));
+    assert_ok(vsh_occluders_from_parts(&parts, &occluders, &failure));
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = 128;
     options.padding = 0;
@@ -324,7 +324,7 @@ static double mean_ao_between_walls(const float *normals) {
     vsh_charts *charts = create(&strip.mesh, 1, options, NULL);
     static float ao[128 * 128], coverage[128 * 128];
     const vsh_lightmap planes = {.ao = ao, .coverage = coverage};
-    expect_ok(vsh_bake_lightmap(occluders, charts, NULL, 0, NULL, NULL, &planes, NULL, &failure));
+    assert_ok(vsh_bake_lightmap(occluders, charts, NULL, 0, NULL, NULL, &planes, NULL, &failure));
     double sum = 0.0, count = 0.0;
     for (size_t i = 0; i < 128 * 128; ++i) {
         sum += coverage[i] > 0.0f ? (double)ao[i] : 0.0;

@@ -1,5 +1,5 @@
 /* vsh_light_check() and names of constants. */
-#include "expect.h"
+#include "testing.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -34,7 +34,7 @@ static vsh_light fading(void) {
 
 static void accepts(const vsh_light *light) {
     failure.message[0] = '\0';
-    expect_ok(vsh_light_check(light, &failure));
+    assert_ok(vsh_light_check(light, &failure));
     assert_string_equal(failure.message, "");
 }
 
@@ -44,7 +44,7 @@ static void refuses(const vsh_light *light, const char *message) {
     snprintf(whole, sizeof whole, "light '%s': ", light != NULL ? light->name : "");
     strcat(whole, message);
     const char *expected = strncmp(message, "light", 5) == 0 ? message : whole;
-    expect_error(vsh_light_check(light, &failure), VSH_ERROR_ARGUMENT, expected);
+    assert_fails(vsh_light_check(light, &failure), VSH_ERROR_ARGUMENT, expected);
     assert_int_equal(failure.code, VSH_ERROR_ARGUMENT);
     assert_string_equal(failure.message, expected);
     assert_int_equal(vsh_light_check(light, NULL), VSH_ERROR_ARGUMENT);

@@ -4,13 +4,13 @@
 #include "field/field.h"
 #include "methods.h"
 #include "terrain.h"
-#include "tests.h"
+#include "testing.h"
 
 #include <vdbshade/spheres.h>
 
 static const float UP[3] = {0.0f, 1.0f, 0.0f};
 
-static caster plate(double voxel) {
+static casting plate(double voxel) {
     const truth_solid solid = {TRUTH_BOX, {0.0, -0.5, 0.0}, {3.0, 0.5, 3.0}, 0.0, 0.0};
     return caster_of((truth_scene){&solid, 1}, voxel, 0.0);
 }
@@ -20,7 +20,7 @@ static caster plate(double voxel) {
 TEST(lights_of_0_to_179_degrees_stay_in_range_and_near_the_truth) {
     const truth_solid ball = {TRUTH_SPHERE, {0.0, 2.0, 0.0}, {0.0, 0.0, 0.0}, 0.7, 0.0};
     const truth_scene scene = {&ball, 1};
-    caster c = caster_of(scene, 0.04, 0.0), open = plate(0.06);
+    casting c = caster_of(scene, 0.04, 0.0), open = plate(0.06);
     const double up[3] = {0.0, 1.0, 0.0},
                  angles[] = {0.0, 1e-6, 1e-3, 0.5, 5, 20, 60, 90, 120, 150, 170, 179};
     for (size_t a = 0; a < sizeof angles / sizeof angles[0]; ++a) {
@@ -60,7 +60,7 @@ TEST(lights_of_0_to_179_degrees_stay_in_range_and_near_the_truth) {
 
 /* A lamp over a plate, with nothing between them, and one under it; radii and distances of 1e-6 … 1e6. */
 TEST(lamps_of_1e_6_to_1e6_units_are_seen_from_above_and_not_through_the_plate) {
-    caster c = plate(0.06);
+    casting c = plate(0.06);
     for (double away = 1e-6; away < 2e6; away *= 10.0) {
         for (double radius = 1e-6; radius < 2e6; radius *= 10.0) {
             const double p[3] = {0.31, 0.0, -0.17}, over[3] = {0.31, away, -0.17};
@@ -83,7 +83,7 @@ TEST(lamps_of_1e_6_to_1e6_units_are_seen_from_above_and_not_through_the_plate) {
 
 TEST(lamps_on_a_surface_light_its_own_side) {
     const double voxel = 0.05;
-    caster c = plate(voxel);
+    casting c = plate(voxel);
     uint64_t counter = 6;
     for (int i = 0; i < 300; ++i) {
         const double p[3] = {between(&counter, -2.5, 2.5), i % 2 ? 0.4 : -1.4, between(&counter, -2.5, 2.5)};
@@ -107,7 +107,7 @@ TEST(lamps_in_casters_light_nothing_outside) {
     const truth_solid solids[2] = {{TRUTH_SPHERE, {-1.2, 0.0, 0.0}, {0, 0, 0}, 0.7, 0.0},
                                    {TRUTH_BOX, {1.2, 0.1, 0.0}, {0.6, 0.5, 0.7}, 0.0, 0.0}};
     const truth_scene scene = {solids, 2};
-    caster c = caster_of(scene, 0.05, 0.0);
+    casting c = caster_of(scene, 0.05, 0.0);
     uint64_t counter = 14;
     for (int i = 0; i < 400;) {
         const double p[3] = {between(&counter, -3.0, 3.0), between(&counter, -2.0, 2.0),
@@ -134,7 +134,7 @@ TEST(lamps_in_casters_light_nothing_outside) {
  * not sink under the place that rays begin at. */
 TEST(lamps_at_the_receiver_are_cut_by_its_horizon_only) {
     const double voxel = 0.06;
-    caster c = plate(voxel);
+    casting c = plate(voxel);
     const double parts[] = {0.0, 1e-6, 0.01, 0.1, 0.2, 0.25, 0.3, 0.5, 1.0, 2.0}; /* of a voxel */
     const double elevations[] = {90.0, 60.0, 30.0};
     for (size_t d = 0; d < sizeof parts / sizeof parts[0]; ++d) {
@@ -172,7 +172,7 @@ TEST(exact_of_a_light_without_size_is_one_traced_ray) {
         skip();
     }
     floor_texels(SIDE, positions, normals);
-    caster c = caster_of(truth_seeds(), 0.04, 0.0);
+    casting c = caster_of(truth_seeds(), 0.04, 0.0);
     const double place[3] = {0.4, 2.5, 0.3};
     const vsh_light lights[2] = {sun(truth_seeds_sun, 0.0), lamp(place, 0.0)};
     for (int l = 0; l < 2; ++l) {
@@ -240,7 +240,7 @@ TEST(grazing_light_reaches_an_open_plate) {
         options.voxel_size = 0.04;
         vsh_grid *grid = NULL;
         assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, NULL), VSH_OK);
-        caster c = {field_of_grid(grid, 0.0), triangles_of_turned(&node, turn, 2.0 * half)};
+        casting c = {field_of_grid(grid, 0.0), triangles_of_turned(&node, turn, 2.0 * half)};
         double dark = 0.0, least = 1.0;
         size_t count = 0, steps = 0;
         uint64_t counter = 5;
@@ -288,7 +288,7 @@ static vsh_light light_of_size(int32_t type, double size) {
 /* The casters: the seeds as voxels and triangles; a ball as a layer without voxels. */
 typedef struct ranges_stage {
     enum { FIELD, BALL, STAGES } kind;
-    caster seeds;
+    casting seeds;
     vsh_field *empty;
     vsh_spheres *ball;
 } ranges_stage;

@@ -1,7 +1,7 @@
 /* What a lightmap holds: a wall that stands on a floor, a coarse smooth sphere, an open sheet. */
-#include "expect.h"
 #include "lightmaps.h"
 #include "previews.h"
+#include "testing.h"
 
 /* What most tests bake: a field, the charts of a mesh, planes. */
 typedef struct stage {
@@ -162,7 +162,7 @@ TEST(a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne) {
     bake_stage(&s, &light);
     assert_int_equal(s.stats.invalid_texels, 0);
     vsh_texels *texels = NULL;
-    expect_ok(vsh_texels_create(s.charts, NULL, &texels, &failure));
+    assert_ok(vsh_texels_create(s.charts, NULL, &texels, &failure));
     const vsh_texel_samples samples = vsh_texels_samples(texels);
     for (size_t k = 0; k < samples.count; ++k) {
         const float *n = samples.normals + 3 * k;
@@ -272,7 +272,7 @@ TEST(bad_options_limits_and_cancelling_are_reported) {
         vsh_run run = vsh_run_default();
         run.memory_limit = cases[i].memory_limit;
         run.progress = cases[i].progress;
-        expect_error(vsh_bake_lightmap(occluders_of(s.field), s.charts, &light, 1, &options, &run, &s.p->all,
+        assert_fails(vsh_bake_lightmap(occluders_of(s.field), s.charts, &light, 1, &options, &run, &s.p->all,
                                        NULL, &failure),
                      cases[i].code, cases[i].part);
     }
@@ -291,7 +291,7 @@ static vsh_bake_stats bake_errors(int32_t method, float *shadow, float *shadow_e
     const vsh_lightmap lightmap = {
         .shadow = shadow != NULL ? shadows : NULL, .shadow_error = errors, .ao_error = ao_error};
     vsh_bake_stats stats = vsh_bake_stats_zero();
-    expect_ok(
+    assert_ok(
         vsh_bake_lightmap(occluders_of(field), charts, &light, 1, &shade, NULL, &lightmap, &stats, &failure));
     vsh_charts_free(charts);
     vsh_field_free(field);

@@ -1,6 +1,6 @@
 /* Which neighbouring texels hang together: charts as an atlas may lay them out, whose surfaces are known. */
 #include "shade/links.h"
-#include "tests.h"
+#include "testing.h"
 
 #include <math.h>
 #include <stdbool.h>

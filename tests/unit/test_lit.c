@@ -1,6 +1,6 @@
 /* A lit asset is the asset with its light: all else comes back byte by byte. */
-#include "expect.h"
 #include "rich_asset.h"
+#include "testing.h"
 
 /* What becomes of the only node that shows instances has a test of its own. */
 static void forget_instances(lighting *l) {
@@ -220,7 +220,7 @@ TEST(replaced_vertices_are_dropped_where_nobody_else_can_use_them) {
         const vsh_lit_image image = white_image(VSH_LIT_OCCLUSION, 0);
         const vsh_lit_options options = options_of(&image, 1);
         /* not by light_white(), which keeps it for validators: the image is none */
-        expect_ok(vsh_lit_write(path_of("in.glb").text, l.model, l.lit, &options, path_of("out.glb").text,
+        assert_ok(vsh_lit_write(path_of("in.glb").text, l.model, l.lit, &options, path_of("out.glb").text,
                                 NULL, &failure));
         l.out = load_asset(path_of("out.glb").text);
         assert_shows(path_of("out.glb").text, l.model, l.lit);

@@ -1,6 +1,6 @@
 /* Assets that are lit again: what a bake put in goes once another takes its place, and nothing else does. */
 #include "assets.h"
-#include "expect.h"
+#include "testing.h"
 
 enum { LIGHTMAP = 1 << VSH_LIT_LIGHTMAP, OCCLUSION = 1 << VSH_LIT_OCCLUSION, LISTS = 6 };
 
@@ -46,7 +46,7 @@ static void light_file(const char *in, int purposes, uint32_t pages, int32_t pla
     }
     vsh_lit_options options = options_of(images, count);
     options.image_place = place;
-    expect_ok(vsh_lit_write(path_of(in).text, model, lit, &options, path_of(out).text, run, &failure));
+    assert_ok(vsh_lit_write(path_of(in).text, model, lit, &options, path_of(out).text, run, &failure));
     keep_file(path_of(out).text);
     free_lit(lit, vsh_model_mesh_count(model));
     vsh_model_free(model);

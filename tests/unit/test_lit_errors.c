@@ -1,7 +1,7 @@
 /* What a lit asset is refused for: damaged documents, atlases that do not fit, limits. The old output stays.
  */
-#include "expect.h"
 #include "rich_asset.h"
+#include "testing.h"
 
 #include "base/hash.h"
 
@@ -242,8 +242,8 @@ TEST(images_out_of_range_are_refused) {
         assert_int_equal(vsh_lit_check_uvs(path_of("in.glb").text, l.model, l.lit, &options, NULL, &failure),
                          i < 2 ? VSH_ERROR_ARGUMENT : VSH_OK);
     }
-    expect_error(vsh_lit_check_uvs(NULL, l.model, NULL, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
-    expect_error(vsh_lit_check_uvs(NULL, NULL, l.lit, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vsh_lit_check_uvs(NULL, l.model, NULL, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vsh_lit_check_uvs(NULL, NULL, l.lit, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
     end_lighting(&l);
 }
 
@@ -255,7 +255,7 @@ TEST(outputs_that_are_inputs_are_refused) {
     } cases[] = {
         {"in.glb", VSH_ERROR_ARGUMENT}, {"out.ply", VSH_ERROR_ARGUMENT}, {"none/out.glb", VSH_ERROR_WRITE}};
     for (size_t i = 0; i < 3; ++i) {
-        expect_error(vsh_lit_write(path_of("in.glb").text, l.model, l.lit, NULL,
+        assert_fails(vsh_lit_write(path_of("in.glb").text, l.model, l.lit, NULL,
                                    path_of(cases[i].output).text, NULL, &failure),
                      cases[i].code, "");
     }
@@ -268,7 +268,7 @@ TEST(files_of_the_input_are_not_replaced_but_others_named) {
     write_bytes("all.bin", l.in.bytes, l.in.size);
     set_at(&l.in, "buffers/0", "uri", json_string("all.bin"));
     write_glb(&l.in, "in.glb");
-    expect_ok(vsh_lit_write(path_of("in.glb").text, l.model, l.lit, NULL, path_of("all.gltf").text, NULL,
+    assert_ok(vsh_lit_write(path_of("in.glb").text, l.model, l.lit, NULL, path_of("all.gltf").text, NULL,
                             &failure));
     asset out = load_asset(path_of("all.gltf").text);
     assert_string_equal(text_at(&out, "buffers/0/uri"), "all.1.bin");
@@ -292,14 +292,14 @@ TEST(limits_and_cancelling_leave_the_old_file) {
     lighting l = begin_sound();
     vsh_run run = vsh_run_default();
     for (run.memory_limit = 1000; run.memory_limit < 100000; run.memory_limit *= 3) {
-        expect_error(write_in(&l, &run), VSH_ERROR_LIMIT, "");
+        assert_fails(write_in(&l, &run), VSH_ERROR_LIMIT, "");
         assert_refused(failure.code, "");
     }
     run.memory_limit = 0;
     run.progress = stop;
     for (double fraction = 0.0; fraction < 0.9; fraction += 0.2) {
         run.user = &fraction;
-        expect_error(write_in(&l, &run), VSH_ERROR_CANCELLED, "");
+        assert_fails(write_in(&l, &run), VSH_ERROR_CANCELLED, "");
         assert_refused(failure.code, "");
     }
     end_lighting(&l);

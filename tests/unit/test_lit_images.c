@@ -1,6 +1,6 @@
 /* Images and materials of a lit asset: what they hold, where they go, and who shares them. */
-#include "expect.h"
 #include "rich_asset.h"
+#include "testing.h"
 
 #include "base/srgb.h"
 #include "sandbox/reader.h"
@@ -19,7 +19,7 @@ static vsh_image_file *image_of(const asset *out, size_t texture) {
     write_bytes("image.png", bytes_of_view(out, view),
                 number_of(item_of(out, "bufferViews", view), "byteLength"));
     vsh_image_file *file = NULL;
-    expect_ok(vsh_image_read(path_of("image.png").text, NULL, &file, &failure));
+    assert_ok(vsh_image_read(path_of("image.png").text, NULL, &file, &failure));
     remove_file("image.png");
     return file;
 }
@@ -211,7 +211,7 @@ TEST(images_come_along_into_another_folder) {
     vsh_run run = vsh_run_default();
     run.warning = keep_warning;
     warnings[0] = '\0';
-    expect_ok(vsh_lit_write(path_of("in.glb").text, l.model, NULL, NULL, path_of("other/out.glb").text, &run,
+    assert_ok(vsh_lit_write(path_of("in.glb").text, l.model, NULL, NULL, path_of("other/out.glb").text, &run,
                             &failure));
     l.out = load_asset(path_of("other/out.glb").text);
     assert_null(text_at(&l.out, "images/0/uri"));
@@ -239,7 +239,7 @@ TEST(draco_is_decoded_by_a_reader_to_the_same_bytes) {
     for (int i = 0; i < 2; ++i) {
         vsh_run run = vsh_run_default();
         run.reader = i == 1 ? "/proc/self/exe" : NULL;
-        expect_ok(vsh_lit_write(path, model, lit, NULL, path_of("out.glb").text, &run, &failure));
+        assert_ok(vsh_lit_write(path, model, lit, NULL, path_of("out.glb").text, &run, &failure));
         out[i] = load_asset(path_of("out.glb").text);
     }
     assert_same_asset(&out[0], &out[1]);

@@ -2,8 +2,8 @@
  * is either a closed form, or what it is in the middle of the range, or refused by name. docs/numerics.md has
  * the bounds; test_light_ranges.c has lights, test_receivers.c points and normals, test_field_run.c reaches.
  */
-#include "expect.h"
 #include "methods.h"
+#include "testing.h"
 
 #include "field/field.h"
 #include "shade/kernel/march.h"
@@ -31,7 +31,7 @@ static void bake_floor(double scale, const double offset[3], picture *p) {
     for (size_t i = 0; i < 3 * COUNT; ++i) {
         places[i] = scale * (positions[i] + offset[i % 3]);
     }
-    caster c = caster_of_moved(truth_seeds(), 0.04, scale, offset, 8.0 * scale);
+    casting c = caster_of_moved(truth_seeds(), 0.04, scale, offset, 8.0 * scale);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     for (int kind = 0; kind < KINDS; ++kind) {
         if (is_available(kind)) {
@@ -80,7 +80,7 @@ TEST(voxels_beyond_the_ends_are_refused_by_size) {
         vsh_grid_options options = vsh_grid_options_default();
         options.voxel_size = voxels[v];
         vsh_grid *grid = NULL;
-        expect_error(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT, "1e-12");
+        assert_fails(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT, "1e-12");
         assert_null(grid);
     }
 }
@@ -120,11 +120,11 @@ static vsh_field *field_of_half_width(double half_width) {
     options.half_width = half_width;
     vsh_grid *grid = NULL;
     if (half_width < 3.0 || half_width > 100.0) {
-        expect_error(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure), VSH_ERROR_ARGUMENT,
+        assert_fails(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure), VSH_ERROR_ARGUMENT,
                      "half_width");
         return NULL;
     }
-    expect_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
+    assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
     return field_of_grid(grid, 0.0);
 }
 
@@ -144,7 +144,7 @@ TEST(half_widths_from_6_to_100_give_the_same_picture_and_3_one_as_near_the_truth
         truth[1][i] = (float)truth_ao(scene, positions + 3 * i, up, 0.75, 256);
         outside[i] = truth_distance(scene, positions + 3 * i) > 0.0 ? 1.0f : 0.0f;
     }
-    caster c = {NULL, triangles_of_moved(scene, 1.0, NOWHERE)};
+    casting c = {NULL, triangles_of_moved(scene, 1.0, NOWHERE)};
     const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
     const double half_widths[] = {1.0, 2.0, 2.999, 6.0, 3.0, 4.0, 10.0, 30.0, 100.0, 101.0};
     for (size_t h = 0; h < sizeof half_widths / sizeof half_widths[0]; ++h) {
@@ -178,7 +178,7 @@ TEST(ao_distances_below_a_voxel_and_above_the_scene_are_what_they_say) {
     const truth_solid solids[2] = {{TRUTH_BOX, {0.0, -0.5, 0.0}, {2.0, 0.5, 2.0}, 0.0, 0.0},
                                    {TRUTH_BOX, {-1.5, 1.0, 0.0}, {0.5, 1.0, 2.0}, 0.0, 0.0}};
     const truth_scene scene = {solids, 2};
-    caster c = caster_of(scene, 0.04, 0.0);
+    casting c = caster_of(scene, 0.04, 0.0);
     const double distances[] = {0x1p-1000, 1e-300, 1e-12, 1e-3, 0.01,  0.04,
                                 4.0,       40.0,   1e6,   1e12, 1e300, 0x1p1000};
     enum { PLACES = 24 };

@@ -1,6 +1,6 @@
 /* vsh_mesh_check() against solids whose edges, area and bounds are known. */
-#include "expect.h"
 #include "mesh/mesh.h"
+#include "testing.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -25,14 +25,8 @@ static vsh_mesh cube(void) {
 
 static vsh_mesh_report check(const vsh_mesh *mesh) {
     vsh_mesh_report report;
-    expect_ok(vsh_mesh_check(mesh, &report, &failure));
+    assert_ok(vsh_mesh_check(mesh, &report, &failure));
     return report;
-}
-
-static void assert_near(double value, double expected, double tolerance) {
-    if (!(fabs(value - expected) <= tolerance)) {
-        fail_msg("%.17g, expected %.17g within %g", value, expected, tolerance);
-    }
 }
 
 enum { MOST = 36 };
@@ -273,7 +267,7 @@ TEST(a_million_triangles_take_about_a_second) {
     const vsh_heights_source source = {
         .columns = SIDE, .rows = SIDE, .values = heights, .size = {N, N}, .height = 1, .base = 1};
     vsh_model *model = NULL;
-    expect_ok(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, NULL, &model, &failure));
+    assert_ok(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, NULL, &model, &failure));
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     const clock_t start = clock();
     const vsh_mesh_report report = check(&mesh);

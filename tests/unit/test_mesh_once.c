@@ -1,7 +1,7 @@
 /* A bake looks each mesh over once and welds it once, in however many rooms it is used. The linker sends the
  * calls that do so through here. */
-#include "expect.h"
 #include "images.h"
+#include "testing.h"
 
 #include "mesh/mesh.h"
 
@@ -75,9 +75,9 @@ static void bake(const char *method) {
     write_text("floor.obj", floor_of_two);
     write_text("scene.json", scene_text);
     vsh_scene *scene = NULL;
-    expect_ok(vsh_scene_read(at("scene.json"), NULL, &scene, &failure));
+    assert_ok(vsh_scene_read(at("scene.json"), NULL, &scene, &failure));
     validated = looked_over = welded = edges_counted = 0;
-    expect_ok(vsh_bake_scene(scene, NULL, NULL, NULL, &failure));
+    assert_ok(vsh_bake_scene(scene, NULL, NULL, NULL, &failure));
     vsh_scene_free(scene);
     assert_int_equal(looked_over, MESHES);
     assert_int_equal(welded, MESHES);
@@ -103,7 +103,7 @@ TEST(occluders_of_arrays_are_checked_and_welded_once) {
     options.grid.resolution = 16;
     validated = looked_over = welded = 0;
     vsh_occluders *occluders = NULL;
-    expect_ok(vsh_occluders_create(&mesh, 1, &options, NULL, &occluders, &failure));
+    assert_ok(vsh_occluders_create(&mesh, 1, &options, NULL, &occluders, &failure));
     vsh_occluders_free(occluders);
     assert_int_equal(validated, 1);
     assert_int_equal(looked_over, 1);

@@ -1,12 +1,6 @@
 /* Models: what files of every format become, and what is refused. */
-#include "expect.h"
 #include "models.h"
-
-static void assert_near(double value, double expected, double tolerance) {
-    if (!(fabs(value - expected) <= tolerance)) {
-        fail_msg("%.17g, expected %.17g within %g", value, expected, tolerance);
-    }
-}
+#include "testing.h"
 
 /* The UV at the corner of the quad that lies at (x, y) in local space. */
 static const float *uv_at(const vsh_mesh *mesh, float x, float y) {
@@ -252,7 +246,7 @@ TEST(bad_ply_and_stl_are_refused) {
     const float bad[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, NAN, 0}};
     unsigned char bytes[84 + 50];
     vsh_model *model = NULL;
-    expect_error(read_bytes("b.stl", bytes, binary_stl(bytes, bad, 1), &model, &failure), VSH_ERROR_INPUT,
+    assert_fails(read_bytes("b.stl", bytes, binary_stl(bytes, bad, 1), &model, &failure), VSH_ERROR_INPUT,
                  "nan");
 }
 
@@ -274,9 +268,9 @@ TEST(alembic_and_usd_are_refused_by_name) {
     zip[26] = 6;
     memcpy(zip + 30, "a.usdc", 6);
     vsh_model *model = NULL;
-    expect_error(read_bytes("b.obj", zip, sizeof zip, &model, &failure), VSH_ERROR_INPUT, "is a USD file");
+    assert_fails(read_bytes("b.obj", zip, sizeof zip, &model, &failure), VSH_ERROR_INPUT, "is a USD file");
     memcpy(zip + 30, "a.text", 6); /* any other Zip file is what its ending says */
-    expect_error(read_bytes("b.obj", zip, sizeof zip, &model, &failure), VSH_ERROR_INPUT, "");
+    assert_fails(read_bytes("b.obj", zip, sizeof zip, &model, &failure), VSH_ERROR_INPUT, "");
     assert_null(strstr(failure.message, "USD"));
 }
 
@@ -299,7 +293,7 @@ TEST(bad_gltf_is_refused) {
 
 TEST(files_that_cannot_be_read_say_why) {
     vsh_model *model;
-    expect_error(vsh_model_read(path_of("missing.obj").text, NULL, &model, &failure), VSH_ERROR_READ,
+    assert_fails(vsh_model_read(path_of("missing.obj").text, NULL, &model, &failure), VSH_ERROR_READ,
                  "missing.obj: No such file");
     assert_null(model);
     char as_folder[512];
@@ -312,8 +306,8 @@ TEST(files_that_cannot_be_read_say_why) {
     refused("other.3ds", quad_obj, VSH_ERROR_INPUT, ".3ds", "OBJ, glTF, GLB, PLY, STL, FBX or DAE");
     refused("none", quad_obj, VSH_ERROR_INPUT, "no ending", "");
     refused("text.fbx", "hello, world", VSH_ERROR_READ, "damaged or cut short", "");
-    expect_error(vsh_model_read(NULL, NULL, &model, &failure), VSH_ERROR_ARGUMENT, "");
-    expect_error(vsh_model_read("x.obj", NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vsh_model_read(NULL, NULL, &model, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vsh_model_read("x.obj", NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
     vsh_model_free(NULL);
 }
 
@@ -322,10 +316,10 @@ TEST(the_memory_limit_is_checked) {
     vsh_run run = vsh_run_default();
     vsh_model *model;
     run.memory_limit = 100;
-    expect_error(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure), VSH_ERROR_LIMIT,
+    assert_fails(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure), VSH_ERROR_LIMIT,
                  "limit.obj");
     run.memory_limit = 1 << 20;
-    expect_ok(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure));
+    assert_ok(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure));
     vsh_model_free(model);
     unlink(path_of("limit.obj").text);
 }

@@ -2,7 +2,7 @@
  * no less (but for noise), and a lamp that goes away becomes a sun. Of every method; docs/numerics.md has the
  * bounds. test_shadow.c has balls that grow and lights of size 0. */
 #include "methods.h"
-#include "tests.h"
+#include "testing.h"
 #include "truth/metrics.h"
 
 enum { SIDE = 64, COUNT = SIDE * SIDE };
@@ -43,7 +43,7 @@ static double rmse[CASES][VOXELS];
 static int measure_all_voxels(void **state) {
     place_floor();
     for (int v = 0; v < VOXELS; ++v) {
-        caster c = caster_of(truth_seeds(), voxels[v], 0.0);
+        casting c = caster_of(truth_seeds(), voxels[v], 0.0);
         for (int k = 0; k < CASES; ++k) {
             const bool ao = k >= WIDTHS * SHADOWS;
             const int w = k / SHADOWS, kind = ao ? k - WIDTHS * SHADOWS + SHADOWS : k % SHADOWS;
@@ -98,7 +98,7 @@ TEST(finer_voxels_are_never_farther_from_the_truth) {
 /* Rays, or the error that is asked for: four times the rays, or half of the error. */
 TEST(more_rays_are_never_farther_from_the_truth) {
     place_floor();
-    caster c = caster_of(truth_seeds(), 0.02, 0.0);
+    casting c = caster_of(truth_seeds(), 0.02, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(0.1));
     const vsh_points points = {COUNT, positions, normals, NULL};
     true_shadows(0.1);
@@ -155,7 +155,7 @@ TEST(a_growing_slab_hides_more) {
     bool begun = false;
     for (double half = 0.05; half < 1.2; half += 0.3 * voxel) {
         const truth_solid slab = {TRUTH_BOX, {0.0, 0.2, 0.0}, {half, 0.2, half}, 0.0, 0.0};
-        caster c = caster_of((truth_scene){&slab, 1}, voxel, 0.0);
+        casting c = caster_of((truth_scene){&slab, 1}, voxel, 0.0);
         for (int kind = 0; kind < KINDS; ++kind) {
             if (!is_available(kind)) {
                 continue;
@@ -187,7 +187,7 @@ TEST(a_growing_slab_hides_more) {
 TEST(a_far_lamp_is_a_sun) {
     static float far[COUNT];
     place_floor();
-    caster c = caster_of(truth_seeds(), 0.04, 0.0);
+    casting c = caster_of(truth_seeds(), 0.04, 0.0);
     const double half = atan(truth_seeds_w), away = 1e6;
     const double length =
         sqrt(truth_seeds_sun[0] * truth_seeds_sun[0] + truth_seeds_sun[1] * truth_seeds_sun[1] +

@@ -1,6 +1,6 @@
 /* Every call that returns a code refuses NULL where it needs something else, says so, and leaves NULL in the
  * place of a handle. */
-#include "tests.h"
+#include "testing.h"
 
 #include <vdbshade/vdbshade.h>
 

@@ -1,7 +1,7 @@
 /* OBJ: what its statements become, where its file is read piece by piece, and what strangers may write into
  * it. */
-#include "expect.h"
 #include "models.h"
+#include "testing.h"
 
 #include <math.h>
 
@@ -99,7 +99,7 @@ TEST(files_of_any_length_are_read_piece_by_piece) {
     vsh_model_free(model);
     to += sprintf(to, "f 1 2 x\n");
     vsh_model *none = NULL;
-    expect_error(read_bytes("long.obj", text, (size_t)(to - text), &none, &failure), VSH_ERROR_INPUT, "");
+    assert_fails(read_bytes("long.obj", text, (size_t)(to - text), &none, &failure), VSH_ERROR_INPUT, "");
     char line[32];
     snprintf(line, sizeof line, "line %d:", COUNT + COUNT - 2 + (COUNT - 2) / 3 + 2);
     assert_non_null(strstr(failure.message, line));
@@ -165,7 +165,7 @@ TEST(materials_beside_the_file_say_what_is_blended) {
     }
     write_bytes("own.mtl", "newmtl a\nd x\n", 13);
     vsh_model *none = NULL;
-    expect_error(read_bytes("own.obj", "mtllib own.mtl\n", 15, &none, &failure), VSH_ERROR_INPUT,
+    assert_fails(read_bytes("own.obj", "mtllib own.mtl\n", 15, &none, &failure), VSH_ERROR_INPUT,
                  "own.mtl: line 2: 'd' is 'x'");
     assert_int_equal(unlink(path_of("own.mtl").text), 0);
 }
@@ -184,10 +184,10 @@ TEST(memory_is_held_against_the_limit) {
     vsh_run run = vsh_run_default();
     vsh_model *model = NULL;
     run.memory_limit = 1000000;
-    expect_error(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure), VSH_ERROR_LIMIT, "");
+    assert_fails(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure), VSH_ERROR_LIMIT, "");
     assert_null(model);
     run.memory_limit = 3000000;
-    expect_ok(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure));
+    assert_ok(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure));
     vsh_model_free(model);
     assert_int_equal(unlink(path_of("limit.obj").text), 0);
 }

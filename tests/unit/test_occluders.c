@@ -1,8 +1,8 @@
 /* What casts as one handle: from meshes, from parts and from a scene. */
-#include "expect.h"
 #include "fields.h"
 #include "scenes.h"
 #include "shading.h"
+#include "testing.h"
 
 #include <vdbshade/vdbshade.h>
 
@@ -21,9 +21,9 @@ TEST(meshes_make_the_field_and_triangles_that_their_parts_make) {
     options.grid.resolution = 64;
     options.reach = 2.0;
     vsh_occluders *made = NULL;
-    expect_ok(vsh_occluders_create(&mesh, 1, &options, NULL, &made, &failure));
+    assert_ok(vsh_occluders_create(&mesh, 1, &options, NULL, &made, &failure));
     vsh_grid *grid = NULL;
-    expect_ok(vsh_grid_from_meshes(&mesh, 1, &options.grid, NULL, &grid, &failure));
+    assert_ok(vsh_grid_from_meshes(&mesh, 1, &options.grid, NULL, &grid, &failure));
     vsh_field *field = field_of_grid(grid, options.reach);
     vsh_occluder_parts parts;
     vsh_occluders_get_parts(made, &parts);
@@ -50,7 +50,7 @@ TEST(meshes_make_the_field_and_triangles_that_their_parts_make) {
     vsh_occluders_free(made);
 
     options.triangles = 0;
-    expect_ok(vsh_occluders_create(&mesh, 1, &options, NULL, &made, &failure));
+    assert_ok(vsh_occluders_create(&mesh, 1, &options, NULL, &made, &failure));
     vsh_occluders_get_info(made, &info);
     assert_true(info.has_triangles == 0 && info.triangles_bytes == 0);
     vsh_occluders_free(made);
@@ -76,7 +76,7 @@ TEST(bad_meshes_and_options_are_refused_with_nothing_made) {
         vsh_mesh mesh = plate();
         mesh.vertex_count = cases[i].vertex_count;
         vsh_occluders *made = (vsh_occluders *)&failure;
-        expect_error(
+        assert_fails(
             vsh_occluders_create(&mesh, cases[i].count, cases[i].options, cases[i].run, &made, &failure),
             cases[i].code, "");
         assert_null(made);
@@ -85,14 +85,14 @@ TEST(bad_meshes_and_options_are_refused_with_nothing_made) {
 
 static void expect_refused(const vsh_occluder_parts *parts, const char *text) {
     vsh_occluders *made = (vsh_occluders *)&failure;
-    expect_error(vsh_occluders_from_parts(parts, &made, &failure), VSH_ERROR_ARGUMENT, text);
+    assert_fails(vsh_occluders_from_parts(parts, &made, &failure), VSH_ERROR_ARGUMENT, text);
     assert_null(made);
 }
 
 TEST(parts_that_are_none_are_refused_by_name) {
     const double ball[] = {0, 0, 0, 1};
     vsh_spheres *spheres = NULL;
-    expect_ok(vsh_spheres_create(ball, 1, NULL, NULL, &spheres, &failure));
+    assert_ok(vsh_spheres_create(ball, 1, NULL, NULL, &spheres, &failure));
     vsh_occluder_parts parts = vsh_occluder_parts_default();
     expect_refused(&parts, "neither a field nor triangles nor layers");
     parts.voxel_size = -1.0;
@@ -116,7 +116,7 @@ TEST(parts_that_are_none_are_refused_by_name) {
 TEST(layers_alone_say_what_offsets_are_measured_in) {
     const double ball[] = {0, 0, 0, 1};
     vsh_spheres *spheres = NULL;
-    expect_ok(vsh_spheres_create(ball, 1, NULL, NULL, &spheres, &failure));
+    assert_ok(vsh_spheres_create(ball, 1, NULL, NULL, &spheres, &failure));
     const truth_solid solid = {.shape = TRUTH_SPHERE, .radius = 0.5};
     vsh_field *field = field_of((truth_scene){&solid, 1}, 0.125, 1.0);
     vsh_layer layers[2] = {vsh_layer_default(), vsh_layer_default()};
@@ -132,7 +132,7 @@ TEST(layers_alone_say_what_offsets_are_measured_in) {
         parts.layer_count = cases[i].layers;
         parts.voxel_size = cases[i].given;
         vsh_occluders *made = NULL;
-        expect_ok(vsh_occluders_from_parts(&parts, &made, &failure));
+        assert_ok(vsh_occluders_from_parts(&parts, &made, &failure));
         vsh_occluder_parts views;
         vsh_occluders_get_parts(made, &views);
         assert_int_equal(views.layer_count, cases[i].layers);
@@ -155,10 +155,10 @@ TEST(a_level_set_makes_the_field_that_vsh_field_create_makes) {
     vsh_field_options options = vsh_field_options_default();
     options.reach = -1.0;
     vsh_occluders *made = (vsh_occluders *)&failure;
-    expect_error(vsh_occluders_from_grid(grid, &options, NULL, &made, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vsh_occluders_from_grid(grid, &options, NULL, &made, &failure), VSH_ERROR_ARGUMENT, "");
     assert_null(made);
     options.reach = 3.0;
-    expect_ok(vsh_occluders_from_grid(grid, &options, NULL, &made, &failure));
+    assert_ok(vsh_occluders_from_grid(grid, &options, NULL, &made, &failure));
     vsh_occluder_parts parts;
     vsh_occluders_get_parts(made, &parts);
     assert_true(parts.triangles == NULL && parts.layer_count == 0);
@@ -196,7 +196,7 @@ TEST(auto_is_exact_where_triangles_are_kept_and_adaptive_where_not) {
         options.grid.resolution = 16;
         options.triangles = kept;
         vsh_occluders *made = NULL;
-        expect_ok(vsh_occluders_create(&mesh, 1, &options, NULL, &made, &failure));
+        assert_ok(vsh_occluders_create(&mesh, 1, &options, NULL, &made, &failure));
         const int32_t method = kept ? VSH_SHADOW_EXACT : VSH_SHADOW_ADAPTIVE;
         const float lit = lit_under(made, VSH_SHADOW_AUTO, VSH_OK);
         assert_true(lit > 0.3f && lit < 0.7f);
@@ -214,7 +214,7 @@ static vsh_occluders *of_scene(const char *text, const vsh_scene_occluders_optio
     vsh_scene *scene = parse("/scene.json", text);
     vsh_assets *assets = NULL;
     vsh_occluders *made = NULL;
-    expect_ok(vsh_assets_load(scene, NULL, &assets, &failure));
+    assert_ok(vsh_assets_load(scene, NULL, &assets, &failure));
     assert_int_equal(vsh_scene_occluders(scene, assets, options, NULL, &made, &failure), expected);
     vsh_occluders_info info;
     if (made != NULL) { /* no layer of these scenes refers to scene or assets */
@@ -272,7 +272,7 @@ TEST(more_layers_than_can_be_are_refused) {
         scene.caster_count = VSH_MAX_LAYERS + more;
         vsh_assets *assets = NULL;
         vsh_occluders *made = NULL;
-        expect_ok(vsh_assets_load(&scene, NULL, &assets, &failure));
+        assert_ok(vsh_assets_load(&scene, NULL, &assets, &failure));
         const vsh_result result = vsh_scene_occluders(&scene, assets, NULL, NULL, &made, &failure);
         assert_int_equal(result, more ? VSH_ERROR_INPUT : VSH_OK);
         vsh_occluders_free(made);
@@ -293,7 +293,7 @@ TEST(a_default_caster_stands_where_its_file_says_and_a_zeroed_transform_is_named
                              .grid = vsh_grid_options_default()};
     receiver.path = casters[0].path = casters[1].path = VSH_ASSETS "/thin.glb";
     vsh_assets *assets = NULL;
-    expect_ok(vsh_assets_load(&scene, NULL, &assets, &failure));
+    assert_ok(vsh_assets_load(&scene, NULL, &assets, &failure));
     vsh_assets_free(assets);
     const struct {
         double *at, value;
@@ -338,7 +338,7 @@ TEST(what_voxels_lose_is_told_where_they_decide_unless_they_are_a_trial) {
                        .shade = vsh_shade_options_default()};
     scene.grid.resolution = 32;
     vsh_assets *assets = NULL;
-    expect_ok(vsh_assets_load(&scene, NULL, &assets, &failure));
+    assert_ok(vsh_assets_load(&scene, NULL, &assets, &failure));
     for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
         int told = 0;
         vsh_run run = vsh_run_default();
@@ -351,7 +351,7 @@ TEST(what_voxels_lose_is_told_where_they_decide_unless_they_are_a_trial) {
         if (cases[i].method == VSH_SHADOW_EXACT && !vsh_triangles_available()) {
             continue;
         }
-        expect_ok(vsh_scene_occluders(&scene, assets, &options, &run, &made, &failure));
+        assert_ok(vsh_scene_occluders(&scene, assets, &options, &run, &made, &failure));
         assert_int_equal(told > 0, cases[i].told);
         vsh_occluders_free(made);
     }

@@ -1,6 +1,6 @@
 /* Points that see only the inner sides of solids that lack a side are hidden. */
-#include "expect.h"
 #include "kinds.h"
+#include "testing.h"
 
 #include "shade/inside.h"
 #include "trace/embree.h"
@@ -11,7 +11,7 @@ static const double CUP[][2] = {{0, 0}, {1, 0}, {1, 2}};
 /* Whether points that look up are hidden among the triangles of a mesh. */
 static void assert_mesh_hides(const vsh_mesh *mesh, const double at[][3], size_t count, bool hidden) {
     vsh_triangles *triangles = NULL;
-    expect_ok(vsh_triangles_create(mesh, 1, NULL, &triangles, &failure));
+    assert_ok(vsh_triangles_create(mesh, 1, NULL, &triangles, &failure));
     for (size_t i = 0; i < count; ++i) {
         uint8_t where;
         vshi_inside(triangles, 1, at[i], (const float[]){0, 0, 1}, NULL, NULL, NULL, &where);

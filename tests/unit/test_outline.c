@@ -1,6 +1,6 @@
 /* Outlines of polygons and of text against closed forms. */
 #include "outlines.h"
-#include "tests.h"
+#include "testing.h"
 
 TEST(a_square_s_distance) {
     vsh_outline *square = box(-1.0, -1.0, 1.0, 1.0);

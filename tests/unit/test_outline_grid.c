@@ -1,6 +1,6 @@
 /* Outlines extruded to solids: level sets against closed forms and against every segment. */
-#include "expect.h"
 #include "grids.h"
+#include "testing.h"
 
 #include <vdbshade/outline.h>
 
@@ -8,7 +8,7 @@ static vsh_outline *box(double x, double y) {
     const double points[8] = {-x, -y, x, -y, x, y, -x, y};
     const size_t count = 4;
     vsh_outline *outline = NULL;
-    expect_ok(vsh_outline_from_polygons(points, &count, 1, NULL, &outline, &failure));
+    assert_ok(vsh_outline_from_polygons(points, &count, 1, NULL, &outline, &failure));
     return outline;
 }
 
@@ -23,7 +23,7 @@ TEST(a_box_is_a_box) {
     vsh_outline *outline = box(1.0, 0.5);
     vsh_grid *grid = NULL;
     const vsh_grid_options options = with_voxel(0.02);
-    expect_ok(vsh_grid_from_outline(outline, 0.6, NULL, &options, NULL, &grid, &failure));
+    assert_ok(vsh_grid_from_outline(outline, 0.6, NULL, &options, NULL, &grid, &failure));
     const double worst = worst_error(grid, box_distance, 2.9, 2.9);
     print_message("box: %.2g voxels\n", worst);
     assert_true(worst < 1e-5);
@@ -43,7 +43,7 @@ TEST(a_transform_moves_the_solid) {
     vsh_outline *outline = box(1.0, 0.5);
     vsh_grid *grid = NULL;
     const vsh_grid_options options = with_voxel(0.05);
-    expect_ok(vsh_grid_from_outline(outline, 0.6, placed, &options, NULL, &grid, &failure));
+    assert_ok(vsh_grid_from_outline(outline, 0.6, placed, &options, NULL, &grid, &failure));
     assert_true(worst_error(grid, placed_distance, 2.9, 2.9) < 1e-5);
     vsh_grid_free(grid);
     vsh_outline_free(outline);
@@ -74,17 +74,17 @@ static double letters_distance(const double p[3]) {
 }
 
 TEST(text_is_extruded_with_its_distance) {
-    expect_ok(vsh_outline_from_text("d&", "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf", NULL, NULL,
+    assert_ok(vsh_outline_from_text("d&", "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf", NULL, NULL,
                                     &letters, &failure));
     vsh_grid *grid = NULL, *again = NULL;
     vsh_run run = vsh_run_default();
     const vsh_grid_options options = with_voxel(0.03);
-    expect_ok(vsh_grid_from_outline(letters, 0.2, NULL, &options, &run, &grid, &failure));
+    assert_ok(vsh_grid_from_outline(letters, 0.2, NULL, &options, &run, &grid, &failure));
     const double worst = worst_error(grid, letters_distance, 2.9, 2.9);
     print_message("text: %.2g voxels\n", worst);
     assert_true(worst < 1e-5);
     run.threads = 1;
-    expect_ok(vsh_grid_from_outline(letters, 0.2, NULL, &options, &run, &again, &failure));
+    assert_ok(vsh_grid_from_outline(letters, 0.2, NULL, &options, &run, &again, &failure));
     assert_same_leaves(grid, again, 0.0f);
     vsh_grid_free(again);
     vsh_grid_free(grid);

@@ -1,6 +1,6 @@
 /* Outlines of images against closed forms. */
 #include "outlines.h"
-#include "tests.h"
+#include "testing.h"
 
 #include <unistd.h>
 

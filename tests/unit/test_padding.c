@@ -4,7 +4,7 @@
 
 #include "bake/nearest_valid.h"
 #include "bake/padding.h"
-#include "expect.h"
+#include "testing.h"
 #include <stdbool.h>
 
 static const float HOLE = -7.0f; /* what an unfilled texel holds; no valid texel does */
@@ -137,7 +137,7 @@ static map spread_over(size_t width, const char *letters) {
     }
     vshi_spread spread;
     vshi_store store = {.run = NULL};
-    expect_ok(vshi_spread_find(&store, width, count / width, m.mesh, m.state, &spread, &failure));
+    assert_ok(vshi_spread_find(&store, width, count / width, m.mesh, m.state, &spread, &failure));
     for (size_t i = 0; i < spread.count; ++i) {
         assert_int_equal(m.state[spread.texel[i]], VSHI_TEXEL_INVALID);
         assert_int_equal(m.from[spread.texel[i]], NOWHERE);

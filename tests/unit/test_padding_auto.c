@@ -5,8 +5,8 @@
 #include <string.h>
 
 #include "bake/pull_push.h"
-#include "expect.h"
 #include "lightmaps.h"
+#include "testing.h"
 
 static const float HOLE = -1000.0f;
 
@@ -151,7 +151,7 @@ TEST(no_other_padding_is_below_0) {
     vsh_lightmap_options options = vsh_lightmap_options_default();
     vsh_charts *charts = NULL;
     options.padding = -2;
-    expect_error(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &charts, &failure), VSH_ERROR_ARGUMENT,
+    assert_fails(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &charts, &failure), VSH_ERROR_ARGUMENT,
                  "padding -2");
 }
 

@@ -1,8 +1,8 @@
 /* Parts of lightmaps, by the library: what merging takes, which parts have rows, and that no file makes
  * merging do worse than fail. */
 #include "bake_scene/parts.h"
-#include "expect.h"
 #include "floor_under_ball.h"
+#include "testing.h"
 
 enum { SIZE = 80, SHARDS = 2, CHANNELS = 12 };
 
@@ -40,7 +40,7 @@ static void bake_parts(const case_scene *c) {
         options.shard_count = SHARDS;
         options.words = words;
         options.word_count = 3;
-        expect_ok(vsh_bake_scene(&c->scene, &options, NULL, NULL, &failure));
+        assert_ok(vsh_bake_scene(&c->scene, &options, NULL, NULL, &failure));
     }
 }
 
@@ -72,7 +72,7 @@ static void fill_traced(case_scene *c, char wall[300], bool made) {
 
 static void bake_whole(const case_scene *c, taken *rows, vsh_bake_report *report) {
     const vsh_bake_options options = options_of(rows);
-    expect_ok(vsh_bake_scene(&c->scene, &options, NULL, report, &failure));
+    assert_ok(vsh_bake_scene(&c->scene, &options, NULL, report, &failure));
 }
 
 TEST(merged_rows_are_those_of_one_bake_and_words_come_back) {
@@ -84,13 +84,13 @@ TEST(merged_rows_are_those_of_one_bake_and_words_come_back) {
     bake_whole(&c, one, &report);
     assert_true(report.invalid_texels > 20 && report.invalid_texels < SIZE * SIZE / 2);
     bake_parts(&c);
-    expect_ok(merge(&c, all, NULL));
+    assert_ok(merge(&c, all, NULL));
     assert_int_equal(all->rows, SIZE);
     assert_int_equal(all->channels, 6);
     assert_memory_equal(one->values, all->values, sizeof one->values);
     char **words;
     size_t count;
-    expect_ok(vsh_part_words(c.output, 0, NULL, &words, &count, &failure));
+    assert_ok(vsh_part_words(c.output, 0, NULL, &words, &count, &failure));
     assert_int_equal(count, 3);
     assert_string_equal(words[0], "one");
     assert_string_equal(words[1], "");
@@ -115,7 +115,7 @@ TEST(what_parts_leave_of_ao_is_as_of_one_bake) {
         assert_non_null(one);
         bake_whole(&c, one, NULL);
         bake_parts(&c);
-        expect_ok(merge(&c, all, NULL));
+        assert_ok(merge(&c, all, NULL));
         assert_int_equal(all->channels, made > 0 ? CHANNELS : 5);
         assert_memory_equal(one, all, sizeof *one);
         free(one);
@@ -132,7 +132,7 @@ TEST(options_that_a_part_cannot_have_are_refused) {
         options.shard = i < 5 ? wrong[i][0] : 1;
         options.shard_count = i < 5 ? wrong[i][1] : 2;
         options.word_count = i == 6;
-        expect_error(vsh_bake_scene(&c.scene, &options, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
+        assert_fails(vsh_bake_scene(&c.scene, &options, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
     }
 }
 
@@ -193,7 +193,7 @@ static void try_all(const char *path, bake_case *one, size_t least_refused) {
     assert_true(refused > least_refused && taken_all_the_same > 10);
     memcpy(bad.at, good.at, good.size);
     write_file(path, &bad);
-    expect_ok(merge(one->scene, one->rows, &one->run));
+    assert_ok(merge(one->scene, one->rows, &one->run));
     free(bad.at);
     free(good.at);
 }

@@ -1,6 +1,6 @@
 /* PLY files whose triangles are strips. */
-#include "expect.h"
 #include "models.h"
+#include "testing.h"
 
 #include <vdbshade/scene.h>
 
@@ -88,7 +88,7 @@ TEST(strips_are_read_in_binary_of_either_order_and_every_size) {
             const size_t size = (size_t)(to - bytes);
             assert_shape(read_good("b.ply", bytes, size), 2.0, 4);
             vsh_model *model = NULL;
-            expect_error(read_bytes("b.ply", bytes, size - 1, &model, &failure), VSH_ERROR_READ, "cut short");
+            assert_fails(read_bytes("b.ply", bytes, size - 1, &model, &failure), VSH_ERROR_READ, "cut short");
         }
     }
 }
@@ -131,7 +131,7 @@ TEST(a_limit_of_memory_holds_for_what_strips_unfold_to) {
     vsh_run run = vsh_run_default();
     run.memory_limit = 1000000;
     vsh_model *model = NULL;
-    expect_error(vsh_model_read(path_of("c.ply").text, &run, &model, &failure), VSH_ERROR_LIMIT, "");
+    assert_fails(vsh_model_read(path_of("c.ply").text, &run, &model, &failure), VSH_ERROR_LIMIT, "");
     assert_int_equal(unlink(path_of("c.ply").text), 0);
 }
 

@@ -1,6 +1,6 @@
 /* Polygons cut into triangles: their area is that of the polygon, and none is flipped. */
 #include "model/polygon.h"
-#include "tests.h"
+#include "testing.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,8 +1,8 @@
 /* What outputs tell of where they come from, and the files that carry it. */
 #include "casts.h"
-#include "expect.h"
 #include "images.h"
 #include "previews.h"
+#include "testing.h"
 
 #include <vdbshade/provenance.h>
 #include <vdbshade/volume.h>
@@ -36,19 +36,19 @@ TEST(digests_are_those_of_the_standard) {
         }
         assert_int_equal(fclose(file), 0);
         char digest[VSH_DIGEST_TEXT];
-        expect_ok(vsh_file_digest(at("digest.bin"), NULL, digest, &failure));
+        assert_ok(vsh_file_digest(at("digest.bin"), NULL, digest, &failure));
         assert_string_equal(digest, cases[i].digest);
     }
 }
 
 TEST(digests_of_what_is_no_file_are_refused) {
     char digest[VSH_DIGEST_TEXT];
-    expect_error(vsh_file_digest(at("nothing"), NULL, digest, &failure), VSH_ERROR_READ,
+    assert_fails(vsh_file_digest(at("nothing"), NULL, digest, &failure), VSH_ERROR_READ,
                  "nothing: cannot be read: No such file");
-    expect_error(vsh_file_digest(folder, NULL, digest, &failure), VSH_ERROR_READ, "it is a folder");
+    assert_fails(vsh_file_digest(folder, NULL, digest, &failure), VSH_ERROR_READ, "it is a folder");
     assert_int_equal(mkfifo(at("pipe"), 0600), 0);
-    expect_error(vsh_file_digest(at("pipe"), NULL, digest, &failure), VSH_ERROR_READ, "");
-    expect_error(vsh_file_digest(NULL, NULL, digest, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vsh_file_digest(at("pipe"), NULL, digest, &failure), VSH_ERROR_READ, "");
+    assert_fails(vsh_file_digest(NULL, NULL, digest, &failure), VSH_ERROR_ARGUMENT, "");
 }
 
 static const char *value_of(const vsh_attribute *list, size_t count, const char *name) {
@@ -99,7 +99,7 @@ TEST(settings_and_inputs_are_told_in_order_and_once) {
     source.attributes = &own;
     source.attribute_count = 1;
     vsh_provenance *made = NULL;
-    expect_ok(vsh_provenance_create(&source, NULL, &made, &failure));
+    assert_ok(vsh_provenance_create(&source, NULL, &made, &failure));
     size_t count = 0;
     const vsh_attribute *list = vsh_provenance_attributes(made, &count);
     static const char *const expected[][2] = {
@@ -128,7 +128,7 @@ TEST(settings_and_inputs_are_told_in_order_and_once) {
     vsh_provenance_free(made);
 
     assert_int_equal(unlink(at("one.bin")), 0);
-    expect_error(vsh_provenance_create(&source, NULL, &made, &failure), VSH_ERROR_READ, "");
+    assert_fails(vsh_provenance_create(&source, NULL, &made, &failure), VSH_ERROR_READ, "");
     assert_null(made);
     assert_non_null(strstr(failure.message, "one.bin: cannot be read"));
 }
@@ -168,8 +168,8 @@ TEST(images_carry_them_and_give_them_back) {
         options.attributes = told;
         options.attribute_count = 2;
         vsh_image_file *file = NULL;
-        expect_ok(vsh_image_write(at(files[f]), &s.image, &options, &failure));
-        expect_ok(vsh_image_read(at(files[f]), NULL, &file, &failure));
+        assert_ok(vsh_image_write(at(files[f]), &s.image, &options, &failure));
+        assert_ok(vsh_image_read(at(files[f]), NULL, &file, &failure));
         size_t count = 0;
         const vsh_attribute *list = vsh_image_attributes(file, &count);
         for (size_t i = 0; i < 2; ++i) {
@@ -194,17 +194,17 @@ TEST(level_sets_and_volumes_carry_them) {
     vsh_volume *volume = NULL;
     const vsh_light sun = vsh_light_default();
     const vsh_attribute told = {"vdbshade_command", "voxelize ball"};
-    expect_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
-    expect_ok(vsh_grid_write(grid, at("told.vdb"), NULL, &told, 1, &failure));
-    expect_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
-    expect_ok(vsh_voxels_from_grid(grid, 0.0, NULL, &voxels, &failure));
-    expect_ok(vsh_bake_volume(occluders_of(field), voxels, &sun, 1, NULL, NULL, &volume, NULL, &failure));
-    expect_ok(vsh_volume_write(volume, at("volume.vdb"), 0, &told, 1, &failure));
+    assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
+    assert_ok(vsh_grid_write(grid, at("told.vdb"), NULL, &told, 1, &failure));
+    assert_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
+    assert_ok(vsh_voxels_from_grid(grid, 0.0, NULL, &voxels, &failure));
+    assert_ok(vsh_bake_volume(occluders_of(field), voxels, &sun, 1, NULL, NULL, &volume, NULL, &failure));
+    assert_ok(vsh_volume_write(volume, at("volume.vdb"), 0, &told, 1, &failure));
     static const char *const files[] = {"told.vdb", "volume.vdb"};
     for (size_t f = 0; f < 2; ++f) {
         vsh_vdb_entry entry;
         size_t count = 0;
-        expect_ok(vsh_vdb_list(at(files[f]), NULL, &entry, 1, &count, &failure));
+        assert_ok(vsh_vdb_list(at(files[f]), NULL, &entry, 1, &count, &failure));
         assert_int_equal(count, 1);
         assert_non_null(strstr(entry.attributes, "vdbshade_command: voxelize ball\n"));
     }
@@ -237,7 +237,7 @@ TEST(attributes_that_no_file_could_hold_are_refused) {
         vsh_image_options options = vsh_image_options_default();
         options.attributes = cases[i].list;
         options.attribute_count = cases[i].count;
-        expect_error(vsh_image_write(at("refused.exr"), &s.image, &options, &failure), VSH_ERROR_ARGUMENT,
+        assert_fails(vsh_image_write(at("refused.exr"), &s.image, &options, &failure), VSH_ERROR_ARGUMENT,
                      "");
         assert_non_null(strstr(failure.message, cases[i].message));
         assert_int_not_equal(access(at("refused.exr"), F_OK), 0);

@@ -1,7 +1,7 @@
 /* Points asked for by a handle: the values of vsh_shade_shadow() and vsh_shade_ao(), whatever their order and
  * number. */
-#include "expect.h"
 #include "previews.h"
+#include "testing.h"
 #include "traced.h"
 
 #include <vdbshade/query.h>
@@ -48,7 +48,7 @@ static int fill_points(void **state) {
 static vsh_query *query_of(const vsh_occluders *occluders, const vsh_light *given, size_t count,
                            const vsh_shade_options *options) {
     vsh_query *query = NULL;
-    expect_ok(vsh_query_create(occluders, given, count, options, &query, &failure));
+    assert_ok(vsh_query_create(occluders, given, count, options, &query, &failure));
     return query;
 }
 
@@ -64,20 +64,20 @@ static vsh_shade_stats ask(const vsh_query *query, const vsh_points *points, int
     vsh_run run = vsh_run_default();
     run.threads = threads;
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    expect_ok(vsh_query_points(query, points, NULL, &run, &output, &stats, &failure));
+    assert_ok(vsh_query_points(query, points, NULL, &run, &output, &stats, &failure));
     return stats;
 }
 
 /* What vsh_shade_…() give for light l, or AO. */
-static void expect(const caster *c, const vsh_points *points, int l, const vsh_shade_options *options) {
-    expect_ok(l < LIGHTS ? vsh_shade_shadow(occluders_of_caster(c), points, &lights[l], options, NULL,
+static void expect(const casting *c, const vsh_points *points, int l, const vsh_shade_options *options) {
+    assert_ok(l < LIGHTS ? vsh_shade_shadow(occluders_of_caster(c), points, &lights[l], options, NULL,
                                             expected, expected_deviation, NULL, &failure)
                          : vsh_shade_ao(occluders_of_caster(c), points, options, NULL, expected,
                                         expected_deviation, NULL, NULL, &failure));
 }
 
 TEST(values_and_deviations_are_those_of_the_shade_calls) {
-    caster c = caster_of(truth_seeds(), 0.04, 0.0);
+    casting c = caster_of(truth_seeds(), 0.04, 0.0);
     const int32_t methods = shadow_methods() > ao_methods() ? shadow_methods() : ao_methods();
     for (int32_t method = 0; method < methods; ++method) {
         vsh_shade_options options = preview_options();
@@ -101,7 +101,7 @@ TEST(values_and_deviations_are_those_of_the_shade_calls) {
 }
 
 TEST(values_follow_points_that_are_shuffled_on_any_number_of_threads) {
-    caster c = caster_of(truth_seeds(), 0.04, 0.0);
+    casting c = caster_of(truth_seeds(), 0.04, 0.0);
     const int32_t methods[] = {VSH_SHADOW_HARD, VSH_SHADOW_CONE, VSH_SHADOW_RAYS};
     for (size_t m = 0; m < sizeof methods / sizeof methods[0]; ++m) {
         vsh_shade_options options = preview_options();
@@ -130,7 +130,7 @@ TEST(values_follow_points_that_are_shuffled_on_any_number_of_threads) {
 
 /* The order tells its samplers the points' numbers, where there are no texels. */
 TEST(points_without_texels_are_told_apart_by_their_numbers_in_any_order) {
-    caster c = caster_of(truth_seeds(), 0.1, 0.0);
+    casting c = caster_of(truth_seeds(), 0.1, 0.0);
     vsh_shade_options options = preview_options();
     options.method = VSH_SHADOW_RAYS;
     options.ao_method = VSH_AO_RAYS;
@@ -292,17 +292,17 @@ TEST(limits_and_cancelling_have_their_codes) {
     vsh_field_get_info(field, &info);
     vsh_run run = vsh_run_default();
     run.memory_limit = info.bytes + 16 * MANY - 4096;
-    expect_error(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &failure), VSH_ERROR_LIMIT,
+    assert_fails(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &failure), VSH_ERROR_LIMIT,
                  "query");
     run.memory_limit = info.bytes + 16 * MANY + 4096;
-    expect_ok(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &failure));
+    assert_ok(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &failure));
     run.memory_limit = 0;
     const double stops[] = {0.0, 0.1, 0.5};
     for (int i = 0; i < 3; ++i) {
         double stop = stops[i];
         run.progress = stop_at;
         run.user = &stop;
-        expect_error(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &failure),
+        assert_fails(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &failure),
                      VSH_ERROR_CANCELLED, "");
     }
     vsh_query_free(query);
@@ -313,40 +313,40 @@ TEST(bad_arguments_are_refused_by_name) {
     vsh_field *field = field_of(truth_seeds(), 0.2, 1.0);
     vsh_query *query = NULL;
     const vsh_light none[LIGHTS] = {lights[0], lamp(truth_seeds_sun, -1.0)};
-    expect_error(vsh_query_create(occluders_of(field), none, LIGHTS, NULL, &query, &failure),
+    assert_fails(vsh_query_create(occluders_of(field), none, LIGHTS, NULL, &query, &failure),
                  VSH_ERROR_ARGUMENT, "light 1");
     assert_null(query);
     vsh_shade_options options = preview_options();
     options.method = VSH_SHADOW_EXACT;
-    expect_error(vsh_query_create(occluders_of(field), lights, LIGHTS, &options, &query, &failure),
+    assert_fails(vsh_query_create(occluders_of(field), lights, LIGHTS, &options, &query, &failure),
                  VSH_ERROR_ARGUMENT, "triangles");
     vsh_query_free(query_of(occluders_of(field), NULL, 0, &options)); /* of no light's shadow */
     options.ao_method = VSH_AO_EXACT;
-    expect_error(vsh_query_create(occluders_of(field), NULL, 0, &options, &query, &failure),
+    assert_fails(vsh_query_create(occluders_of(field), NULL, 0, &options, &query, &failure),
                  VSH_ERROR_ARGUMENT, "");
     options = preview_options();
     options.rays = 4097;
-    expect_error(vsh_query_create(occluders_of(field), NULL, 0, &options, &query, &failure),
+    assert_fails(vsh_query_create(occluders_of(field), NULL, 0, &options, &query, &failure),
                  VSH_ERROR_ARGUMENT, "rays");
 
     query = query_of(occluders_of(field), lights, LIGHTS, NULL);
     const vsh_points bare = {FEW, positions, NULL, NULL};
     vsh_query_output output = vsh_query_output_default();
     output.ao = values[0];
-    expect_error(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &failure), VSH_ERROR_ARGUMENT,
+    assert_fails(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &failure), VSH_ERROR_ARGUMENT,
                  "normals");
     output.ao = NULL;
     output.ao_deviation = values[0];
-    expect_error(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &failure), VSH_ERROR_ARGUMENT,
+    assert_fails(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &failure), VSH_ERROR_ARGUMENT,
                  "ao_deviation");
     float *const deviation[LIGHTS] = {NULL, values[0]};
     output = vsh_query_output_default();
     output.deviation = deviation;
-    expect_error(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &failure), VSH_ERROR_ARGUMENT,
+    assert_fails(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &failure), VSH_ERROR_ARGUMENT,
                  "light 1");
     output = vsh_query_output_default();
     output.struct_size = 0;
-    expect_error(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &failure), VSH_ERROR_ARGUMENT, "");
     vsh_query_free(query);
     vsh_field_free(field);
 }

@@ -1,6 +1,6 @@
 /* Points with strides, in floats, and answers with gaps; distance and gradient; batches. */
-#include "expect.h"
 #include "previews.h"
+#include "testing.h"
 #include "traced.h"
 
 #include <vdbshade/query.h>
@@ -49,7 +49,7 @@ static vsh_query *query_of(const vsh_field *field, const vsh_light *light, int32
     options.method = method;
     options.ao_method = VSH_AO_TAPS;
     options.rays = method == VSH_SHADOW_ADAPTIVE ? 64 : 8;
-    expect_ok(
+    assert_ok(
         vsh_query_create(occluders_of(field), light, light != NULL ? 1 : 0, &options, &query, &failure));
     return query;
 }
@@ -68,7 +68,7 @@ static vsh_query_output packed_output(void) {
 static void ask(const vsh_query *query, size_t count, const double *at, const vsh_query_output *output) {
     const bool all = output->ao != NULL; /* distances need neither normals nor texels */
     const vsh_points points = {count, at, all ? normals : NULL, all ? texels : NULL};
-    expect_ok(vsh_query_points(query, &points, NULL, NULL, output, NULL, &failure));
+    assert_ok(vsh_query_points(query, &points, NULL, NULL, output, NULL, &failure));
 }
 
 TEST(strides_floats_and_gaps_give_the_bits_of_packed_arrays) {
@@ -123,7 +123,7 @@ TEST(strides_floats_and_gaps_give_the_bits_of_packed_arrays) {
     ask(query, 1000, positions, &packed);
     memcpy(kept, visibility, sizeof kept);
     memset(visibility, 0, sizeof kept);
-    expect_ok(vsh_query_points(query, &points, &layout, NULL, &packed, NULL, &failure));
+    assert_ok(vsh_query_points(query, &points, &layout, NULL, &packed, NULL, &failure));
     assert_memory_equal(kept, visibility, sizeof kept);
     vsh_query_free(query);
     vsh_field_free(field);
@@ -288,17 +288,17 @@ TEST(strides_that_are_none_are_refused_by_name) {
         layout.struct_size = sizeof layout;
         output.stride = cases[i].stride;
         output.gradient = cases[i].stride == 8 ? gradient : NULL;
-        expect_error(vsh_query_points(query, &good, &layout, NULL, &output, NULL, &failure),
+        assert_fails(vsh_query_points(query, &good, &layout, NULL, &output, NULL, &failure),
                      VSH_ERROR_ARGUMENT, cases[i].word);
     }
     output = vsh_query_output_default();
     output.distance = distance;
     vsh_point_layout layout = vsh_point_layout_default();
     const vsh_points nowhere = {2, NULL, normals, texels};
-    expect_error(vsh_query_points(query, &nowhere, &layout, NULL, &output, NULL, &failure),
+    assert_fails(vsh_query_points(query, &nowhere, &layout, NULL, &output, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "float_positions");
     layout.struct_size = 0;
-    expect_error(vsh_query_points(query, &good, &layout, NULL, &output, NULL, &failure), VSH_ERROR_ARGUMENT,
+    assert_fails(vsh_query_points(query, &good, &layout, NULL, &output, NULL, &failure), VSH_ERROR_ARGUMENT,
                  "vsh_point_layout");
     vsh_query_free(query);
     vsh_field_free(field);

@@ -6,7 +6,7 @@
 #include <openvdb/tools/LevelSetSphere.h>
 #include <sys/resource.h>
 
-#include "tests.h"
+#include "testing.h"
 
 namespace {
 

@@ -11,7 +11,7 @@ extern "C" {
 #include <sys/ptrace.h>
 #include <sys/socket.h>
 
-#include "tests.h"
+#include "testing.h"
 
 namespace {
 

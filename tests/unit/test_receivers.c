@@ -1,14 +1,14 @@
 /* Where receivers can be and what normals they can have: deep inside, far outside, on lattice planes; of any
  * length, zero, not finite. Of every method; docs/numerics.md has the bounds. */
 #include "methods.h"
-#include "tests.h"
+#include "testing.h"
 
 static const float UP[3] = {0.0f, 1.0f, 0.0f};
 static const double NOWHERE[3] = {0.0, 0.0, 0.0};
 
 TEST(receivers_deep_inside_are_dark_and_far_outside_are_lit) {
     const truth_solid block = {TRUTH_BOX, {0.0, 0.0, 0.0}, {2.0, 2.0, 2.0}, 0.0, 0.0};
-    caster c = caster_of((truth_scene){&block, 1}, 0.05, 0.0);
+    casting c = caster_of((truth_scene){&block, 1}, 0.05, 0.0);
     uint64_t counter = 12;
     for (int i = 0; i < 400; ++i) {
         double d[3], out[3];
@@ -45,7 +45,7 @@ TEST(receivers_at_any_distance_are_lit) {
     const double scales[] = {1e-10, 1e-6, 1.0, 1e10};
     uint64_t counter = 5;
     for (int s = 0; s < 4; ++s) {
-        caster c = caster_of_moved((truth_scene){&block, 1}, 0.2, scales[s], NOWHERE, 0.0);
+        casting c = caster_of_moved((truth_scene){&block, 1}, 0.2, scales[s], NOWHERE, 0.0);
         for (double away = 1e6; away < 1e280; away *= away < 1e24 ? 10.0 : 1e16) {
             double out[3], other[3];
             random_direction(&counter, out);
@@ -83,7 +83,7 @@ TEST(receivers_on_voxel_planes_see_what_their_neighbours_see) {
     static double at[3 * ALL];
     static float ns[3 * ALL], values[ALL];
     static uint32_t texels[ALL]; /* neighbours take the same rays */
-    caster c = caster_of(truth_seeds(), 0.0625, 0.0);
+    casting c = caster_of(truth_seeds(), 0.0625, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     uint64_t counter = 8;
     for (uint32_t i = 0; i < PLACES; ++i) {
@@ -133,7 +133,7 @@ TEST(receivers_on_voxel_planes_see_what_their_neighbours_see) {
 }
 
 TEST(normals_of_any_length_are_directions) {
-    caster c = caster_of(truth_seeds(), 0.0625, 0.0);
+    casting c = caster_of(truth_seeds(), 0.0625, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     const int exponents[] = {-149, -126, -60, -1, 1, 60, 127};
     for (int i = 0; i < 60; ++i) {
@@ -153,7 +153,7 @@ TEST(normals_of_any_length_are_directions) {
  * double, but no place in field space. */
 TEST(points_that_are_none_are_nan_and_counted) {
     enum { PLACES = 9, BAD = 7 };
-    caster c = caster_of_moved(truth_seeds(), 0.0625, 1e-9, NOWHERE, 8e-9);
+    casting c = caster_of_moved(truth_seeds(), 0.0625, 1e-9, NOWHERE, 8e-9);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     const float nan = (float)NAN, inf = (float)INFINITY;
     const double at[3 * PLACES] = {

@@ -1,7 +1,7 @@
 /* Rectangular area lights against brute force: every part of the rectangle, weighed by the solid angle that
  * it is seen under, and segments to it against boxes in closed form. Shares no code with the library. */
-#include "expect.h"
 #include "rectangles.h"
+#include "testing.h"
 
 static void find_truth(const vsh_light *light, double truth[COUNT]) {
     for (size_t i = 0; i < COUNT; ++i) {
@@ -12,7 +12,7 @@ static void find_truth(const vsh_light *light, double truth[COUNT]) {
 /* Rays on the field see edges as it rounds them off, which a narrow light shows most: half as much with
  * voxels half as large. What exact says of its error holds. */
 TEST(rays_of_every_kind_see_what_brute_force_sees) {
-    const caster *c = *state;
+    const casting *c = *state;
     static const int32_t METHODS[] = {VSH_SHADOW_RAYS, VSH_SHADOW_ADAPTIVE, VSH_SHADOW_EXACT};
     static const double MOST[3][LIGHTS] = {
         {0.01, 0.01, 0.035, 0.01, 0.02}, {0.012, 0.012, 0.035, 0.012, 0.02}, {0.01, 0.01, 0.01, 0.01, 0.01}};
@@ -43,7 +43,7 @@ TEST(rays_of_every_kind_see_what_brute_force_sees) {
             }
         }
         if (c->triangles != NULL) {
-            expect_ok(vsh_trace_shadow(c->triangles, NULL, COUNT, positions, normals, 0.0, &light, 4096, NULL,
+            assert_ok(vsh_trace_shadow(c->triangles, NULL, COUNT, positions, normals, 0.0, &light, 4096, NULL,
                                        values, &failure));
             const difference d = compare(values, truth);
             if (!(d.root_mean_square < 0.003 && d.largest < 0.02)) {
@@ -55,7 +55,7 @@ TEST(rays_of_every_kind_see_what_brute_force_sees) {
 
 /* As near as one disc can be to two thirds as high as wide, and one edge to a table's corners. */
 TEST(one_march_takes_the_disc_of_equal_solid_angle) {
-    const caster *c = *state;
+    const casting *c = *state;
     double truth[COUNT];
     float values[COUNT];
     for (int l = 0; l < 2; ++l) {
@@ -93,7 +93,7 @@ TEST(one_march_takes_the_disc_of_equal_solid_angle) {
 }
 
 TEST(a_tiny_rectangle_is_a_point) {
-    const caster *c = *state;
+    const casting *c = *state;
     const double centre[3] = {0.37, 2.1, -0.23}, u[3] = {1e-9, 0.0, 0.0}, v[3] = {0.0, 0.0, 2e-9};
     const vsh_light tiny = panel(centre, u, v), point = lamp(centre, 0.0);
     float values[COUNT], of_point[COUNT];
@@ -111,7 +111,7 @@ TEST(a_tiny_rectangle_is_a_point) {
 }
 
 TEST(behind_a_one_sided_one_is_nothing_and_two_sides_are_alike) {
-    const caster *c = *state;
+    const casting *c = *state;
     float front[COUNT], values[COUNT];
     for (int32_t method = VSH_SHADOW_HARD; method < shadow_methods(); ++method) {
         const vsh_shade_options options = options_of(method);
@@ -156,7 +156,7 @@ TEST(behind_a_one_sided_one_is_nothing_and_two_sides_are_alike) {
 
 /* In the plane of the rectangle: beside it, and within it. */
 TEST(edge_on_is_a_share_all_the_same) {
-    const caster *c = *state;
+    const casting *c = *state;
     const double places[][3] = {{-2.0, 1.5, 0.0}, {2.0, 1.5, 2.0}, {0.8, 1.5, 0.0},
                                 {0.1, 1.5, 0.1},  {0.0, 1.5, 0.0}, {0.8, 1.5, 0.4}};
     const double centre[3] = {0.0, 1.5, 0.0}, u[3] = {1.6, 0.0, 0.0}, v[3] = {0.0, 0.0, 0.8};

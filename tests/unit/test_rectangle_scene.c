@@ -1,7 +1,7 @@
 /* Rectangular area lights among horizons, layers, casters without voxels, threads and irradiance; and what is
  * no rectangle. */
-#include "expect.h"
 #include "rectangles.h"
+#include "testing.h"
 
 #include <stdio.h>
 
@@ -37,7 +37,7 @@ TEST(the_horizon_cuts_it_by_solid_angle) {
 }
 
 TEST(layers_know_it) {
-    const caster *c = *state;
+    const casting *c = *state;
     vsh_field *nothing = NULL;
     assert_int_equal(vshi_field_create_empty(0.1, &nothing, NULL), VSH_OK);
     const vsh_light light = light_of(0);
@@ -65,7 +65,7 @@ TEST(layers_know_it) {
 }
 
 TEST(threads_and_instruction_sets_give_the_same_bits) {
-    const caster *c = *state;
+    const casting *c = *state;
     const vsh_points points = {COUNT, positions, normals, NULL};
     float values[COUNT], others[COUNT];
     for (int32_t method = VSH_SHADOW_HARD; method < shadow_methods(); ++method) {
@@ -142,12 +142,12 @@ TEST(what_is_no_rectangle_is_refused) {
         light.falloff = VSH_FALLOFF_QUADRATIC;
         *cases[i].field = cases[i].value;
         snprintf(text, sizeof text, "light 'panel': %s", cases[i].message);
-        expect_error(vsh_light_check(&light, &failure), VSH_ERROR_ARGUMENT, "");
+        assert_fails(vsh_light_check(&light, &failure), VSH_ERROR_ARGUMENT, "");
         assert_string_equal(failure.message, text);
     }
     light = light_of(0);
     light.two_sided = 2;
-    expect_error(vsh_light_check(&light, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vsh_light_check(&light, &failure), VSH_ERROR_ARGUMENT, "");
     assert_string_equal(failure.message, "light 'panel': two_sided 2 is out of range 0 … 1");
     light = light_of(0);
     vsh_light_text(&light, text, sizeof text);

@@ -1,8 +1,8 @@
 /* What must hold between two bakes where no truth is needed: scaled, moved, turned and mirrored scenes, of
  * every method. docs/numerics.md has the bounds. test_monotone.c has more of the voxels, of the rays and of
  * the casters; test_shadow_run.c and test_field_run.c: threads do not show. */
-#include "expect.h"
 #include "methods.h"
+#include "testing.h"
 
 #include "field/field.h"
 #include "levelset/leaves.h"
@@ -62,7 +62,7 @@ static int kind_of(int k) {
     return k < SHADOWS ? k : k - SHADOWS;
 }
 
-static void shade_all(const caster *c, const motion *m, values *all) {
+static void shade_all(const casting *c, const motion *m, values *all) {
     static double places[3 * COUNT];
     static float ns[3 * COUNT];
     for (size_t i = 0; i < COUNT; ++i) {
@@ -120,7 +120,7 @@ static void assert_same_field(const vsh_field *a, const vsh_field *b) {
 TEST(scaled_by_a_power_of_two_every_bit_stays) {
     static values still, scaled;
     fill_points();
-    caster c = caster_of_moved(truth_seeds(), 0.03125, 1.0, NOWHERE, 8.0);
+    casting c = caster_of_moved(truth_seeds(), 0.03125, 1.0, NOWHERE, 8.0);
     shade_all(&c, &STILL, &still);
     const int exponents[] = {-34, -20, -10, 3, 20, 40, 44};
     for (size_t e = 0; e < sizeof exponents / sizeof exponents[0]; ++e) {
@@ -129,7 +129,7 @@ TEST(scaled_by_a_power_of_two_every_bit_stays) {
         if (0.03125 * m.scale > 1e12) {
             continue;
         }
-        caster other = caster_of_moved(truth_seeds(), 0.03125, m.scale, NOWHERE, 8.0 * m.scale);
+        casting other = caster_of_moved(truth_seeds(), 0.03125, m.scale, NOWHERE, 8.0 * m.scale);
         assert_same_field(c.field, other.field);
         shade_all(&other, &m, &scaled);
         for (int k = 0; k < VALUES; ++k) {
@@ -232,7 +232,7 @@ static apart apart_when_moved(const double voxels[3]) {
     for (size_t i = 0; i < 3 * COUNT; ++i) {
         positions[i] = ldexp(round(ldexp(positions[i], 20)), -20);
     }
-    caster c = caster_of_moved(truth_seeds(), 0.03125, 1.0, NOWHERE, 8.0);
+    casting c = caster_of_moved(truth_seeds(), 0.03125, 1.0, NOWHERE, 8.0);
     shade_all(&c, &STILL, &still);
     caster_free(&c);
     motion m = STILL;
@@ -263,7 +263,7 @@ TEST(moved_by_whole_voxels_every_bit_stays) {
 
 /* The seeds' solids turned by a signed permutation of the axes: their boxes go along, their torus around y
  * only where y stays y, so the ring is a ball here. */
-static caster caster_of_turned(const motion *m, double voxel) {
+static casting caster_of_turned(const motion *m, double voxel) {
     truth_solid solids[MAX_SOLIDS];
     const truth_scene scene = truth_seeds();
     for (size_t i = 0; i < scene.count; ++i) {
@@ -285,7 +285,7 @@ TEST(turned_by_right_angles_and_mirrored_values_stay_within_a_bound) {
     static values still, there;
     static const int orders[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
     fill_points();
-    caster c = caster_of_turned(&STILL, 0.04);
+    casting c = caster_of_turned(&STILL, 0.04);
     shade_all(&c, &STILL, &still);
     apart worst[VALUES] = {{0.0, 0.0, 0}};
     for (int turn = 1; turn < 48; turn += 2 + turn % 3) {
@@ -296,7 +296,7 @@ TEST(turned_by_right_angles_and_mirrored_values_stay_within_a_bound) {
                     orders[turn / 8][row] == column ? ((turn >> row & 1) ? -1.0 : 1.0) : 0.0;
             }
         }
-        caster other = caster_of_turned(&m, 0.04);
+        casting other = caster_of_turned(&m, 0.04);
         shade_all(&other, &m, &there);
         caster_free(&other);
         for (int k = 0; k < VALUES; ++k) {

@@ -1,6 +1,6 @@
 /* Pictures against closed forms: what a pinhole sees of spheres and planes, and the light there. */
-#include "expect.h"
 #include "pictures.h"
+#include "testing.h"
 
 TEST(a_sphere_is_where_it_is_with_its_normals) {
     enum { VOXELS = 50 };
@@ -254,26 +254,26 @@ TEST(what_is_out_of_range_cancelled_or_limited_is_refused) {
     bad[6].shaft_steps = 65;
     bad[7].camera.fov = 4.0;
     for (int i = 0; i < 8; ++i) {
-        expect_error(vsh_render(&surface, 1, casters, NULL, 0, &bad[i], NULL, &picture, NULL, &failure),
+        assert_fails(vsh_render(&surface, 1, casters, NULL, 0, &bad[i], NULL, &picture, NULL, &failure),
                      VSH_ERROR_ARGUMENT, parts[i]);
     }
-    expect_error(vsh_render(&bright, 1, casters, NULL, 0, &good, NULL, &picture, NULL, &failure),
+    assert_fails(vsh_render(&bright, 1, casters, NULL, 0, &good, NULL, &picture, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "");
-    expect_error(vsh_render(&none, 1, casters, NULL, 0, &good, NULL, &picture, NULL, &failure),
+    assert_fails(vsh_render(&none, 1, casters, NULL, 0, &good, NULL, &picture, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "");
-    expect_error(vsh_render(&surface, 1, casters, NULL, 1, &good, NULL, &picture, NULL, &failure),
+    assert_fails(vsh_render(&surface, 1, casters, NULL, 1, &good, NULL, &picture, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "");
-    expect_error(vsh_render(&surface, 1, NULL, NULL, 0, &good, NULL, &picture, NULL, &failure),
+    assert_fails(vsh_render(&surface, 1, NULL, NULL, 0, &good, NULL, &picture, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "");
     vsh_run run = vsh_run_default();
     double seen = 0.0;
     run.progress = stop;
     run.user = &seen;
-    expect_error(vsh_render(&surface, 1, casters, NULL, 0, &good, &run, &picture, NULL, &failure),
+    assert_fails(vsh_render(&surface, 1, casters, NULL, 0, &good, &run, &picture, NULL, &failure),
                  VSH_ERROR_CANCELLED, "");
     run = vsh_run_default();
     run.memory_limit = 100000;
-    expect_error(vsh_render(&surface, 1, casters, NULL, 0, &good, &run, &picture, NULL, &failure),
+    assert_fails(vsh_render(&surface, 1, casters, NULL, 0, &good, &run, &picture, NULL, &failure),
                  VSH_ERROR_LIMIT, "");
     vsh_field_free(field);
 }

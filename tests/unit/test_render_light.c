@@ -1,6 +1,6 @@
 /* Fog and lightmaps in pictures, against closed forms; pictures of 8 bits. */
-#include "expect.h"
 #include "pictures.h"
+#include "testing.h"
 
 /* --- fog */
 
@@ -89,14 +89,14 @@ TEST(a_lightmap_is_looked_up_where_it_was_baked) {
     const vsh_image missing = {N, N, 2, others, planes, NULL};
     vsh_lit_meshes wrong = {&mesh, 1, &missing, {0.5, 0.5, 0.5}, 0};
     o.lit = &wrong;
-    expect_error(vsh_render(&surface, 1, occluders_of(field), &light, 1, &o, NULL, &picture, NULL, &failure),
+    assert_fails(vsh_render(&surface, 1, occluders_of(field), &light, 1, &o, NULL, &picture, NULL, &failure),
                  VSH_ERROR_INPUT, "shadow.sun");
     wrong.meshes = NULL;
-    expect_error(vsh_render(&surface, 1, occluders_of(field), &light, 1, &o, NULL, &picture, NULL, &failure),
+    assert_fails(vsh_render(&surface, 1, occluders_of(field), &light, 1, &o, NULL, &picture, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "");
     assert_string_equal(failure.message, "lit meshes 0: no lightmap, or no meshes");
     o.lit = NULL;
-    expect_error(vsh_render(&surface, 1, occluders_of(field), &light, 1, &o, NULL, &picture, NULL, &failure),
+    assert_fails(vsh_render(&surface, 1, occluders_of(field), &light, 1, &o, NULL, &picture, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "");
     assert_string_equal(failure.message, "lit is NULL with a lit_count of 1");
     vsh_field_free(field);
@@ -131,7 +131,7 @@ TEST(gradients_are_dithered_to_srgb) {
         color[3 * i + 2] = 1.0f;
         alpha[i] = 0.5f;
     }
-    expect_ok(vsh_picture_encode(&picture, WIDE, HIGH, 1.0, rgb, NULL, &failure));
+    assert_ok(vsh_picture_encode(&picture, WIDE, HIGH, 1.0, rgb, NULL, &failure));
     double mean = 0.0;
     for (int i = 0; i < PIXELS; ++i) {
         const double steps = 255.0 * (double)planes[0][i];
@@ -140,10 +140,10 @@ TEST(gradients_are_dithered_to_srgb) {
         mean += steps / PIXELS;
     }
     assert_true(fabs(mean - 187.516) < 0.05); /* of 0.5: 0.735357 */
-    expect_ok(vsh_picture_encode(&picture, WIDE, HIGH, 0.0, rgb, planes[3], &failure));
+    assert_ok(vsh_picture_encode(&picture, WIDE, HIGH, 0.0, rgb, planes[3], &failure));
     assert_true(fabs(255.0 * (double)planes[0][7] - 187.516) < 1.0); /* 0.25 over half of a pixel */
     assert_true(fabs((double)planes[3][7] - 128.0 / 255.0) < 1e-6);
-    expect_error(vsh_picture_encode(&picture, WIDE, HIGH, NAN, rgb, NULL, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vsh_picture_encode(&picture, WIDE, HIGH, NAN, rgb, NULL, &failure), VSH_ERROR_ARGUMENT, "");
 }
 
 int main(void) {

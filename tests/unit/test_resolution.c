@@ -1,7 +1,7 @@
 /* Voxels that nobody named: how many are made of what, and what casts without any. */
-#include "expect.h"
 #include "fields.h"
 #include "scenes.h"
+#include "testing.h"
 
 #include <vdbshade/vdbshade.h>
 
@@ -21,7 +21,7 @@ static vsh_occluders *plate_of(int32_t resolution) {
     vsh_occluders_options options = vsh_occluders_options_default();
     options.grid.resolution = resolution;
     vsh_occluders *made = NULL;
-    expect_ok(vsh_occluders_create(&mesh, 1, resolution > 0 ? &options : NULL, NULL, &made, &failure));
+    assert_ok(vsh_occluders_create(&mesh, 1, resolution > 0 ? &options : NULL, NULL, &made, &failure));
     return made;
 }
 
@@ -67,9 +67,9 @@ TEST(triangles_alone_give_shadows_within_the_error_of_the_truth) {
         }
         vsh_shade_options options = vsh_shade_options_default();
         vsh_shade_stats stats = vsh_shade_stats_zero();
-        expect_ok(vsh_shade_shadow(made, &points, &light, &options, NULL, lit, NULL, &stats, &failure));
+        assert_ok(vsh_shade_shadow(made, &points, &light, &options, NULL, lit, NULL, &stats, &failure));
         assert_true(stats.samples == 0 && stats.marches == 0 && stats.rays > 0);
-        expect_ok(vsh_trace_shadow(parts.triangles, NULL, POINTS, positions[0], normals[0], 1e-6, &light,
+        assert_ok(vsh_trace_shadow(parts.triangles, NULL, POINTS, positions[0], normals[0], 1e-6, &light,
                                    4096, NULL, truth, &failure));
         double square = 0.0;
         int between_both = 0;
@@ -91,7 +91,7 @@ TEST(ao_by_rays_has_the_bits_that_it_has_with_voxels) {
     const vsh_points points = {POINTS, positions[0], normals[0], NULL};
     for (int voxels = 0; voxels < 2; ++voxels) {
         vsh_occluders *made = plate_of(voxels ? 64 : 0);
-        expect_ok(vsh_shade_ao(made, &points, NULL, NULL, ao[voxels], NULL, NULL, NULL, &failure));
+        assert_ok(vsh_shade_ao(made, &points, NULL, NULL, ao[voxels], NULL, NULL, NULL, &failure));
         vsh_occluders_free(made);
     }
     assert_memory_equal(ao[0], ao[1], sizeof ao[0]);
@@ -125,7 +125,7 @@ TEST(what_needs_voxels_is_refused_without_them) {
     vsh_field_sample(parts.field, 1, at, &value);
     assert_true(isnan(value));
     vsh_query *query = NULL;
-    expect_ok(vsh_query_create(made, &light, 1, NULL, &query, &failure));
+    assert_ok(vsh_query_create(made, &light, 1, NULL, &query, &failure));
     vsh_query_output output = vsh_query_output_default();
     output.distance = &value;
     assert_int_equal(vsh_query_points(query, &points, NULL, NULL, &output, NULL, &failure),
@@ -138,16 +138,16 @@ TEST(parts_of_triangles_alone_cast) {
     skip_without_embree();
     const vsh_mesh mesh = plate();
     vsh_triangles *triangles = NULL;
-    expect_ok(vsh_triangles_create(&mesh, 1, NULL, &triangles, &failure));
+    assert_ok(vsh_triangles_create(&mesh, 1, NULL, &triangles, &failure));
     vsh_occluder_parts parts = vsh_occluder_parts_default();
     parts.triangles = triangles;
     vsh_occluders *made = NULL;
-    expect_ok(vsh_occluders_from_parts(&parts, &made, &failure));
+    assert_ok(vsh_occluders_from_parts(&parts, &made, &failure));
     const double at[2][3] = {{0.0, 0.0, 0.0}, {3.0, 0.0, 0.0}};
     const vsh_points points = {2, at[0], NULL, NULL};
     const vsh_light light = vsh_light_default();
     float lit[2];
-    expect_ok(vsh_shade_shadow(made, &points, &light, NULL, NULL, lit, NULL, NULL, &failure));
+    assert_ok(vsh_shade_shadow(made, &points, &light, NULL, NULL, lit, NULL, NULL, &failure));
     assert_true(lit[0] == 0.0f && lit[1] == 1.0f);
     vsh_occluders_free(made);
     vsh_triangles_free(triangles);
@@ -165,8 +165,8 @@ static uint64_t shade_scene(bool layered, float lit[POINTS], float truth[POINTS]
     vsh_scene *scene = parse("/scene.json", text);
     vsh_assets *assets = NULL;
     vsh_occluders *made = NULL;
-    expect_ok(vsh_assets_load(scene, NULL, &assets, &failure));
-    expect_ok(vsh_scene_occluders(scene, assets, NULL, NULL, &made, &failure));
+    assert_ok(vsh_assets_load(scene, NULL, &assets, &failure));
+    assert_ok(vsh_scene_occluders(scene, assets, NULL, NULL, &made, &failure));
     vsh_occluders_info info;
     vsh_occluders_get_info(made, &info);
     assert_int_equal(info.layer_count, layered ? 1 : 0);
@@ -174,11 +174,11 @@ static uint64_t shade_scene(bool layered, float lit[POINTS], float truth[POINTS]
     float normals[POINTS][3];
     scatter(positions, normals);
     const vsh_points points = {POINTS, positions[0], normals[0], NULL};
-    expect_ok(vsh_shade_shadow(made, &points, &scene->lights[0], NULL, NULL, lit, NULL, NULL, &failure));
+    assert_ok(vsh_shade_shadow(made, &points, &scene->lights[0], NULL, NULL, lit, NULL, NULL, &failure));
     vsh_triangles *triangles = NULL;
     vsh_solids *solids = NULL;
-    expect_ok(vsh_scene_truth(scene, assets, NULL, &triangles, &solids, &failure));
-    expect_ok(vsh_trace_shadow(triangles, solids, POINTS, positions[0], normals[0], 1e-6, &scene->lights[0],
+    assert_ok(vsh_scene_truth(scene, assets, NULL, &triangles, &solids, &failure));
+    assert_ok(vsh_trace_shadow(triangles, solids, POINTS, positions[0], normals[0], 1e-6, &scene->lights[0],
                                1024, NULL, truth, &failure));
     vsh_triangles_free(triangles);
     vsh_occluders_free(made);
@@ -210,7 +210,7 @@ static int32_t chosen(const char *more, const char *casters, double points) {
     snprintf(text, sizeof text, "{\"casters\": [%s], \"receivers\": []%s}", casters, more);
     vsh_scene *scene = parse("/scene.json", text);
     vsh_assets *assets = NULL;
-    expect_ok(vsh_assets_load(scene, NULL, &assets, &failure));
+    assert_ok(vsh_assets_load(scene, NULL, &assets, &failure));
     const int32_t resolution = vsh_scene_resolution(scene, assets, NULL, points);
     vsh_assets_free(assets);
     vsh_scene_free(scene);

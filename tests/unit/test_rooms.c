@@ -1,7 +1,7 @@
 /* What is taken for a room, and what it is cut out of; walls, and what is a sheet because neither fits. */
-#include "expect.h"
 #include "kinds.h"
 #include "shapes.h"
+#include "testing.h"
 #include "traced.h"
 
 static const double ORIGIN[3] = {0, 0, 0};
@@ -151,22 +151,22 @@ TEST(an_open_room_in_an_open_house_closes_neither) {
 
 /* --- Shadow and AO where solids are closed over holes, and in rooms. */
 
-static caster caster_of_mesh(const vsh_mesh *mesh, double voxel) {
+static casting caster_of_mesh(const vsh_mesh *mesh, double voxel) {
     vsh_grid_options options = vsh_grid_options_default();
     options.voxel_size = voxel;
     vsh_grid *grid = NULL;
     vsh_triangles *triangles = NULL;
-    expect_ok(vsh_grid_from_meshes(mesh, 1, &options, NULL, &grid, &failure));
+    assert_ok(vsh_grid_from_meshes(mesh, 1, &options, NULL, &grid, &failure));
     if (vsh_triangles_available()) {
-        expect_ok(vsh_triangles_create(mesh, 1, NULL, &triangles, &failure));
+        assert_ok(vsh_triangles_create(mesh, 1, NULL, &triangles, &failure));
     }
-    return (caster){field_of_grid(grid, 0.0), triangles};
+    return (casting){field_of_grid(grid, 0.0), triangles};
 }
 
 /* From 8 × 8 places `step` apart that look along z, which are proved together. */
 static void assert_all_see(const vsh_mesh *mesh, double voxel, const double towards[3], const double first[3],
                            const double step[2]) {
-    caster c = caster_of_mesh(mesh, voxel);
+    casting c = caster_of_mesh(mesh, voxel);
     const vsh_light narrow = sun(towards, RADIANS(1.0));
     double at[3 * 64];
     float up[3 * 64] = {0.0f}, seen[64];
@@ -196,7 +196,7 @@ TEST(no_ray_is_proved_hidden_through_two_holes_or_by_the_thickness_of_a_sheet) {
     shape_turned(s, ORIGIN, rings, 2, 64);
     const vsh_mesh tube = shape_mesh(s, "tube");
     vsh_solidity_report report;
-    expect_ok(vsh_mesh_solidity(&tube, 1, NULL, &report, &failure));
+    assert_ok(vsh_mesh_solidity(&tube, 1, NULL, &report, &failure));
     assert_true(report.solids == 1 && report.closed_over == 1 && report.holes == 2);
     assert_int_equal(report.open_edges, 128);
     assert_all_see(&tube, 0.02, (const double[]){0, 0, 1}, (const double[]){-0.07, -0.07, -5.0},
@@ -216,7 +216,7 @@ TEST(the_floor_of_an_inward_room_has_the_ao_of_a_room) {
     shape_box(s, LOW, HIGH, ALL_SIDES);
     shape_turn(s, 0);
     const vsh_mesh mesh = shape_mesh(s, "room");
-    caster c = caster_of_mesh(&mesh, 0.02);
+    casting c = caster_of_mesh(&mesh, 0.02);
     const double at[6] = {0.013, 0.021, -1.0, 0.9, 0.0, -1.0};
     const float up[6] = {0, 0, 1, 0, 0, 1};
     for (int32_t method = 0; method < ao_methods(); ++method) {

@@ -1,25 +1,15 @@
 /* Procedural shapes: their distances against surfaces found by brute force, and the promises of the tree. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdbool.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "fields.h"
+#include "testing.h"
 
 #include "sdf/sdf.h"
 
-static uint64_t random_state = 1;
+static uint64_t counter = 1;
 
-/* Uniform in low … high, from a counted generator (Steele and others, "SplitMix", 2014). */
-static double uniform(double low, double high) {
-    uint64_t z = (random_state += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return low + (high - low) * (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
+static void random_point(double reach, double p[3]) {
+    for (int i = 0; i < 3; ++i) {
+        p[i] = between(&counter, -reach, reach);
+    }
 }
 
 static double norm(double x, double y, double z) {
@@ -80,13 +70,13 @@ static double brute_force(const vsh_sdf_node *n, const double p[3], double pitch
 }
 
 static void every_shape_gives_the_distance_to_its_surface(void **state) {
-    (void)state;
     const double pitch = 0.03;
     for (int32_t shape = VSH_SDF_SPHERE; shape <= VSH_SDF_CONE; ++shape) {
         const vsh_sdf_node node = shape_of(shape);
         const vsh_sdf sdf = {&node, 1};
         for (int i = 0; i < 30; ++i) {
-            const double p[3] = {uniform(-1.2, 1.2), uniform(-1.2, 1.2), uniform(-1.2, 1.2)};
+            double p[3];
+            random_point(1.2, p);
             const double d = vsh_sdf_distance(&sdf, p);
             const double truth = brute_force(&node, p, pitch);
             if (fabs(d) > fabs(truth) + 1e-9 || fabs(d) < fabs(truth) - 1.8 * pitch ||
@@ -98,7 +88,6 @@ static void every_shape_gives_the_distance_to_its_surface(void **state) {
 }
 
 static void closed_forms_hold(void **state) {
-    (void)state;
     vsh_sdf_node node = shape_of(VSH_SDF_BOX);
     const vsh_sdf sdf = {&node, 1};
     const double corner[3] = {1.0, 0.8, 1.3};
@@ -121,12 +110,12 @@ static void closed_forms_hold(void **state) {
 
 static void turn_somehow(vsh_sdf_node *node) {
     for (int i = 0; i < 4; ++i) {
-        node->rotation[i] = uniform(-1.0, 1.0);
+        node->rotation[i] = between(&counter, -1.0, 1.0);
     }
     for (int i = 0; i < 3; ++i) {
-        node->translation[i] = uniform(-0.5, 0.5);
+        node->translation[i] = between(&counter, -0.5, 0.5);
     }
-    node->scale = uniform(0.5, 2.0);
+    node->scale = between(&counter, 0.5, 2.0);
 }
 
 /* An operation over two shapes, all turned. */
@@ -144,19 +133,18 @@ static void make_tree(vsh_sdf_node nodes[3], int32_t a, int32_t b, int32_t opera
 }
 
 static void no_tree_changes_by_more_than_one_per_unit(void **state) {
-    (void)state;
     for (int32_t operation = VSH_SDF_UNION; operation <= VSH_SDF_SMOOTH_UNION; ++operation) {
         for (int32_t pair = 0; pair < 49; ++pair) {
             vsh_sdf_node nodes[3];
             make_tree(nodes, pair / 7, pair % 7, operation);
             const vsh_sdf sdf = {nodes, 3};
-            assert_int_equal(vsh_sdf_check(&sdf, NULL), VSH_OK);
+            assert_ok(vsh_sdf_check(&sdf, &failure));
             for (int i = 0; i < 200; ++i) {
                 const double reach = i % 2 == 0 ? 3.0 : 0.01;
                 double a[3], b[3];
                 for (int j = 0; j < 3; ++j) {
-                    a[j] = uniform(-2.0, 2.0);
-                    b[j] = a[j] + uniform(-reach, reach);
+                    a[j] = between(&counter, -2.0, 2.0);
+                    b[j] = a[j] + between(&counter, -reach, reach);
                 }
                 const double change = fabs(vsh_sdf_distance(&sdf, a) - vsh_sdf_distance(&sdf, b));
                 assert_true(change <= norm(a[0] - b[0], a[1] - b[1], a[2] - b[2]) + 1e-12);
@@ -166,7 +154,6 @@ static void no_tree_changes_by_more_than_one_per_unit(void **state) {
 }
 
 static void the_box_holds_the_surface_and_touches_it_for_shapes(void **state) {
-    (void)state;
     for (int round = 0; round < 60; ++round) {
         vsh_sdf_node nodes[3];
         const int32_t operation = VSH_SDF_UNION + round % 4;
@@ -175,7 +162,8 @@ static void the_box_holds_the_surface_and_touches_it_for_shapes(void **state) {
         double low[3], high[3];
         vsh_sdf_bounds(&sdf, low, high);
         for (int i = 0; i < 2000; ++i) {
-            const double p[3] = {uniform(-4.0, 4.0), uniform(-4.0, 4.0), uniform(-4.0, 4.0)};
+            double p[3];
+            random_point(4.0, p);
             if (vsh_sdf_distance(&sdf, p) < 0.0) {
                 for (int j = 0; j < 3; ++j) {
                     assert_true(p[j] >= low[j] && p[j] <= high[j]);
@@ -200,7 +188,6 @@ static void the_box_holds_the_surface_and_touches_it_for_shapes(void **state) {
 }
 
 static void operations_are_the_sets_operations(void **state) {
-    (void)state;
     for (int round = 0; round < 49; ++round) {
         vsh_sdf_node nodes[3];
         make_tree(nodes, round / 7, round % 7, VSH_SDF_UNION);
@@ -212,7 +199,8 @@ static void operations_are_the_sets_operations(void **state) {
         memcpy(nodes[2].rotation, straight, sizeof straight);
         const vsh_sdf left = {&plain[0], 1}, right = {&plain[1], 1};
         for (int i = 0; i < 300; ++i) {
-            const double p[3] = {uniform(-2.0, 2.0), uniform(-2.0, 2.0), uniform(-2.0, 2.0)};
+            double p[3];
+            random_point(2.0, p);
             const int a = vsh_sdf_distance(&left, p) < 0.0, b = vsh_sdf_distance(&right, p) < 0.0;
             nodes[2].shape = VSH_SDF_UNION;
             const double united = vsh_sdf_distance(&both, p);
@@ -229,7 +217,6 @@ static void operations_are_the_sets_operations(void **state) {
 }
 
 static void a_turned_scaled_shape_is_the_shape_seen_from_elsewhere(void **state) {
-    (void)state;
     vsh_sdf_node node = shape_of(VSH_SDF_BOX);
     const vsh_sdf sdf = {&node, 1};
     const double h = sqrt(0.5);
@@ -248,15 +235,13 @@ static void a_turned_scaled_shape_is_the_shape_seen_from_elsewhere(void **state)
 
 static void refused(const vsh_sdf_node *nodes, size_t count, const char *part) {
     const vsh_sdf sdf = {nodes, count};
-    vsh_error error = {0};
-    assert_int_equal(vsh_sdf_check(&sdf, &error), VSH_ERROR_INPUT);
-    if (strstr(error.message, part) == NULL) {
-        fail_msg("'%s' does not hold '%s'", error.message, part);
+    assert_int_equal(vsh_sdf_check(&sdf, &failure), VSH_ERROR_INPUT);
+    if (strstr(failure.message, part) == NULL) {
+        fail_msg("'%s' does not hold '%s'", failure.message, part);
     }
 }
 
 static void bad_nodes_are_refused_by_name(void **state) {
-    (void)state;
     vsh_sdf_node nodes[3];
     make_tree(nodes, VSH_SDF_SPHERE, VSH_SDF_CONE, VSH_SDF_SMOOTH_UNION);
     refused(nodes, 0, "0 nodes");
@@ -293,9 +278,8 @@ static void bad_nodes_are_refused_by_name(void **state) {
 }
 
 static void a_tree_too_deep_to_recurse_is_refused_and_a_deep_one_works(void **state) {
-    (void)state;
     enum { SHAPES = 3000 };
-    vsh_sdf_node *nodes = malloc((2 * SHAPES - 1) * sizeof *nodes);
+    FREED vsh_sdf_node *nodes = malloc((2 * SHAPES - 1) * sizeof *nodes);
     assert_non_null(nodes);
     size_t count = 0;
     for (int i = 0; i < SHAPES; ++i) {
@@ -310,11 +294,10 @@ static void a_tree_too_deep_to_recurse_is_refused_and_a_deep_one_works(void **st
         }
     }
     const vsh_sdf deep = {nodes, 2 * 2000 - 1};
-    assert_int_equal(vsh_sdf_check(&deep, NULL), VSH_OK);
+    assert_ok(vsh_sdf_check(&deep, &failure));
     const double p[3] = {1500.0, 3.0, 0.0};
     assert_float_equal(vsh_sdf_distance(&deep, p), 2.0, 1e-12);
     refused(nodes, count, "deep");
-    free(nodes);
 }
 
 /* A tree over `count` shapes of all kinds, turned, scaled, and joined by any operations. */
@@ -322,24 +305,25 @@ static size_t random_tree(vsh_sdf_node *nodes, int count, bool unions) {
     size_t used = 0;
     int32_t last = -1;
     for (int i = 0; i < count; ++i) {
-        vsh_sdf_node node = shape_of((int32_t)uniform(VSH_SDF_SPHERE, VSH_SDF_CONE + 0.999));
+        vsh_sdf_node node = shape_of((int32_t)between(&counter, VSH_SDF_SPHERE, VSH_SDF_CONE + 0.999));
         for (int axis = 0; axis < 3; ++axis) {
-            node.translation[axis] = uniform(-4.0, 4.0);
-            node.rotation[axis] = uniform(-1.0, 1.0);
+            node.translation[axis] = between(&counter, -4.0, 4.0);
+            node.rotation[axis] = between(&counter, -1.0, 1.0);
         }
-        node.scale = uniform(0.5, 2.0);
+        node.scale = between(&counter, 0.5, 2.0);
         nodes[used] = node;
         const int32_t here = (int32_t)used++;
         if (last >= 0) {
             vsh_sdf_node operation = vsh_sdf_node_default();
-            operation.shape =
-                unions ? VSH_SDF_UNION : (int32_t)uniform(VSH_SDF_UNION, VSH_SDF_SMOOTH_UNION + 0.999);
+            operation.shape = unions
+                                  ? VSH_SDF_UNION
+                                  : (int32_t)between(&counter, VSH_SDF_UNION, VSH_SDF_SMOOTH_UNION + 0.999);
             operation.left = i % 2 == 0 ? last : here;
             operation.right = i % 2 == 0 ? here : last;
             operation.smoothing = 0.3;
-            operation.translation[i % 3] = uniform(-0.2, 0.2);
-            operation.rotation[1] = uniform(-0.2, 0.2);
-            operation.scale = uniform(0.9, 1.1);
+            operation.translation[i % 3] = between(&counter, -0.2, 0.2);
+            operation.rotation[1] = between(&counter, -0.2, 0.2);
+            operation.scale = between(&counter, 0.9, 1.1);
             nodes[used++] = operation;
         }
         last = (int32_t)used - 1;
@@ -348,17 +332,17 @@ static size_t random_tree(vsh_sdf_node *nodes, int count, bool unions) {
 }
 
 static void a_tree_narrowed_to_a_ball_has_the_same_bits_in_it(void **state) {
-    (void)state;
     enum { SHAPES = 12, TREES = 200, PLACES = 20, POINTS = 70 };
     vsh_sdf_node nodes[2 * SHAPES];
     uint8_t keep[2 * SHAPES];
     size_t left_out = 0, operations = 0;
     for (int t = 0; t < TREES; ++t) {
         const vsh_sdf sdf = {nodes, random_tree(nodes, SHAPES, t % 2 == 0)};
-        assert_int_equal(vsh_sdf_check(&sdf, NULL), VSH_OK);
+        assert_ok(vsh_sdf_check(&sdf, &failure));
         for (int i = 0; i < PLACES; ++i) {
-            const double radius = pow(10.0, uniform(-3.0, 0.5));
-            const double middle[3] = {uniform(-6.0, 6.0), uniform(-6.0, 6.0), uniform(-6.0, 6.0)};
+            const double radius = pow(10.0, between(&counter, -3.0, 0.5));
+            double middle[3];
+            random_point(6.0, middle);
             vshi_sdf_narrow(&sdf, middle, radius, keep);
             for (size_t n = 0; n < sdf.node_count; ++n) {
                 operations += nodes[n].shape >= VSH_SDF_UNION;
@@ -366,9 +350,10 @@ static void a_tree_narrowed_to_a_ball_has_the_same_bits_in_it(void **state) {
             }
             double p[POINTS][3], less[POINTS];
             for (int k = 0; k < POINTS; ++k) { /* on the ball's surface, where they change most, and in it */
-                const double way[3] = {uniform(-1.0, 1.0), uniform(-1.0, 1.0), uniform(-1.0, 1.0)};
+                double way[3];
+                random_point(1.0, way);
                 const double length = norm(way[0], way[1], way[2]);
-                const double far = (k % 2 == 0 ? radius : uniform(0.0, radius)) / length;
+                const double far = (k % 2 == 0 ? radius : between(&counter, 0.0, radius)) / length;
                 for (int axis = 0; axis < 3; ++axis) {
                     p[k][axis] = middle[axis] + far * way[axis];
                 }
@@ -384,7 +369,6 @@ static void a_tree_narrowed_to_a_ball_has_the_same_bits_in_it(void **state) {
 }
 
 static void many_places_at_once_are_as_one_by_one_in_deep_trees_too(void **state) {
-    (void)state;
     enum { SHAPES = 100, POINTS = 70 };
     vsh_sdf_node nodes[2 * SHAPES];
     const uint8_t keep[2 * SHAPES] = {0};
@@ -392,9 +376,7 @@ static void many_places_at_once_are_as_one_by_one_in_deep_trees_too(void **state
     for (int way = 0; way < 2; ++way) {
         const vsh_sdf sdf = {nodes, random_tree(nodes, SHAPES, way == 0)};
         for (int k = 0; k < POINTS; ++k) {
-            for (int axis = 0; axis < 3; ++axis) {
-                p[k][axis] = uniform(-6.0, 6.0);
-            }
+            random_point(6.0, p[k]);
         }
         p[3][1] = INFINITY;
         p[POINTS - 1][2] = NAN;

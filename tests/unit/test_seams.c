@@ -1,34 +1,43 @@
 /* vsh_lightmap_stitch(): values on both sides of charts' borders agree, and nothing else moves. */
 #include "seams.h"
+#include "testing.h"
 
 static const double E = 0.02;
 static const double UNSEEN = 0.5 / 255.0; /* half a step of what is shown */
 
+/* One side of a border at x = 1, 40 units long: quads whose edges along it end at these places, their chart a
+ * strip of 5 texels whose border is the column `column`. */
+static void add_strip(charts_mesh *m, int side, const double *places, int count, double column) {
+    for (int i = 0; i + 1 < count; ++i) {
+        const double low = places[i], high = places[i + 1], x = side == 0 ? column - 5.0 : column;
+        const double corner[4][3] = {
+            {side, low, 0}, {side + 1.0, low, 0}, {side + 1.0, high, 0}, {side, high, 0}};
+        const double texel[4][2] = {
+            {x, 50.0 - low}, {x + 5.0, 50.0 - low}, {x + 5.0, 50.0 - high}, {x, 50.0 - high}};
+        add_quad(m, corner, texel);
+    }
+}
+
 /* Two strips whose borders pass through centres of texels, cut into pieces along them. */
 static charts_mesh *two_strips(int pieces, double left, double right) {
+    double places[101];
     charts_mesh *m = new_mesh();
-    for (int side = 0; side < 2; ++side) {
-        for (int i = 0; i < pieces; ++i) {
-            const double low = 40.0 * i / pieces, high = 40.0 * (i + 1) / pieces;
-            const double x = side == 0 ? left - 5.0 : right, from = 50.0 - low, to = 50.0 - high;
-            const double corner[4][3] = {
-                {side, low, 0}, {side + 1.0, low, 0}, {side + 1.0, high, 0}, {side, high, 0}};
-            const double texel[4][2] = {{x, from}, {x + 5.0, from}, {x + 5.0, to}, {x, to}};
-            add_quad(m, corner, texel);
-        }
+    for (int i = 0; i <= pieces; ++i) {
+        places[i] = 40.0 * i / pieces;
     }
+    add_strip(m, 0, places, pieces + 1, left);
+    add_strip(m, 1, places, pieces + 1, right);
     return m;
 }
 
 /* A column of each side is read: (a, b) go to the minimum of 2 (d + a - b)² + keep (a² + b²), as two places
  * fall to a texel, however many edges the border has. */
 static void two_columns_meet_where_the_closed_form_says(void **state) {
-    (void)state;
     const int pieces[] = {1, 7, 100};
     for (size_t i = 0; i < 2 * sizeof pieces / sizeof pieces[0]; ++i) {
-        charts_mesh *m = two_strips(pieces[i / 2], 10.5, 20.5);
-        vsh_charts *charts = charts_of(&m->mesh, 1);
-        float *plane = new_plane(0.5f);
+        FREED charts_mesh *m = two_strips(pieces[i / 2], 10.5, 20.5);
+        OWNED(vsh_charts) *charts = charts_of(&m->mesh, 1);
+        FREED float *plane = new_plane(0.5f);
         for (size_t t = 0; t < TEXELS; ++t) {
             plane[t] = t % SIDE < 15 ? 0.5f : 0.53f;
         }
@@ -36,7 +45,7 @@ static void two_columns_meet_where_the_closed_form_says(void **state) {
         vsh_stitch_options options = vsh_stitch_options_default();
         options.keep = i % 2 == 0 ? options.keep : 1.0;
         vsh_stitch_report report;
-        assert_int_equal(vsh_lightmap_stitch(charts, &map, 0, &options, NULL, &report, NULL), VSH_OK);
+        assert_ok(vsh_lightmap_stitch(charts, &map, 0, &options, NULL, &report, &failure));
         assert_int_equal(report.seams, pieces[i / 2]);
         assert_int_equal(report.crowded, 0);
         assert_true(pieces[i / 2] > 1 || report.places == 81);
@@ -48,17 +57,13 @@ static void two_columns_meet_where_the_closed_form_says(void **state) {
         }
         assert_true(fabs(report.before - 0.03) < 1e-6 &&
                     report.after < 0.08 * 0.03 * sqrt(options.keep * 100.0));
-        free(plane);
-        vsh_charts_free(charts);
-        free(m);
     }
 }
 
 /* a² + b² / 10 is what it costs, so b goes ten times as far. */
 static void what_is_guessed_gives_way_to_what_was_baked(void **state) {
-    (void)state;
-    charts_mesh *m = two_strips(1, 10.5, 20.5);
-    float *plane = new_plane(0.5f), *coverage = new_plane(1.0f);
+    FREED charts_mesh *m = two_strips(1, 10.5, 20.5);
+    FREED float *plane = new_plane(0.5f), *coverage = new_plane(1.0f);
     for (size_t t = 0; t < TEXELS; ++t) {
         plane[t] = t % SIDE < 15 ? 0.5f : 0.53f;
         coverage[t] = t % SIDE == 20 ? 0.0f : 1.0f;
@@ -70,16 +75,12 @@ static void what_is_guessed_gives_way_to_what_was_baked(void **state) {
         assert_true(fabs((double)plane[row * SIDE + 10] - 0.5 - move) < 1e-4);
         assert_true(fabs((double)plane[row * SIDE + 20] - 0.53 + 10.0 * move) < 1e-4);
     }
-    free(coverage);
-    free(plane);
-    free(m);
 }
 
 /* What lies beyond the image is its edge again, for lookups. */
 static void borders_at_the_edge_of_the_image_read_the_edge(void **state) {
-    (void)state;
-    charts_mesh *m = two_strips(1, SIDE, 0.0);
-    float *plane = new_plane(0.5f), *before = new_plane(0.5f);
+    FREED charts_mesh *m = two_strips(1, SIDE, 0.0);
+    FREED float *plane = new_plane(0.5f), *before = new_plane(0.5f);
     for (size_t t = 0; t < TEXELS; ++t) {
         plane[t] = before[t] = t % SIDE > 32 ? 0.5f : 0.53f;
     }
@@ -92,16 +93,12 @@ static void borders_at_the_edge_of_the_image_read_the_edge(void **state) {
         const bool read = t % SIDE == 0 || t % SIDE == SIDE - 1;
         assert_true(read || plane[t] == before[t]);
     }
-    free(before);
-    free(plane);
-    free(m);
 }
 
 /* One chart that meets itself: the ramp ends 0.03 higher than it began. */
 static void a_cylinder_with_a_ramp_around_it_has_no_jump_at_its_seam(void **state) {
-    (void)state;
     enum { AROUND = 48 };
-    charts_mesh *m = new_mesh();
+    FREED charts_mesh *m = new_mesh();
     m->mesh.normals = m->normals;
     for (int i = 0; i < AROUND; ++i) {
         double corner[4][3], texel[4][2];
@@ -118,7 +115,7 @@ static void a_cylinder_with_a_ramp_around_it_has_no_jump_at_its_seam(void **stat
         }
         add_quad(m, (const double(*)[3])corner, (const double(*)[2])texel);
     }
-    float *plane = new_plane(0.0f), *before = new_plane(0.0f);
+    FREED float *plane = new_plane(0.0f), *before = new_plane(0.0f);
     for (size_t i = 0; i < TEXELS; ++i) {
         const double x = fmin(fmax((double)(i % SIDE) + 0.5, 8.7), 55.3);
         plane[i] = before[i] = (float)(0.4 + 0.03 * (x - 8.7) / 46.6);
@@ -133,17 +130,13 @@ static void a_cylinder_with_a_ramp_around_it_has_no_jump_at_its_seam(void **stat
         const bool near = i % SIDE < 10 || i % SIDE > 53;
         assert_true(near || plane[i] == before[i]);
     }
-    free(before);
-    free(plane);
-    free(m);
 }
 
 static void charts_that_are_turned_or_mirrored_agree_along_their_border(void **state) {
-    (void)state;
     const double turns[] = {0.0, 90.0, 37.0, 180.0, -61.5};
     for (size_t t = 0; t < 2 * sizeof turns / sizeof turns[0]; ++t) {
-        charts_mesh *m = two_squares(turns[t / 2], t % 2 == 0 ? 1.0 : -1.0);
-        float *plane = new_plane(0.5f);
+        FREED charts_mesh *m = two_squares(turns[t / 2], t % 2 == 0 ? 1.0 : -1.0);
+        FREED float *plane = new_plane(0.5f);
         for (size_t i = 0; i < TEXELS;
              ++i) { /* a ramp along the border of the first, another value in the second */
             plane[i] = is_first(i) ? 0.5f + 0.01f * (float)(i / SIDE) / SIDE : 0.52f;
@@ -153,17 +146,14 @@ static void charts_that_are_turned_or_mirrored_agree_along_their_border(void **s
         const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 0, E);
         assert_int_equal(report.seams, 1);
         assert_true(across(m, plane, 1, 2, 4, 7) < UNSEEN);
-        free(plane);
-        free(m);
     }
 }
 
 /* What it costs to move is what is left: without it nothing is. */
 static void the_less_moving_costs_the_less_is_left(void **state) {
-    (void)state;
-    charts_mesh *m = two_squares(37.0, 1.0);
-    vsh_charts *charts = charts_of(&m->mesh, 1);
-    float *plane = new_plane(0.5f);
+    FREED charts_mesh *m = two_squares(37.0, 1.0);
+    OWNED(vsh_charts) *charts = charts_of(&m->mesh, 1);
+    FREED float *plane = new_plane(0.5f);
     double last = INFINITY;
     for (double keep = 1.0; keep > 1e-3 / 2; keep /= 10.0) {
         for (size_t i = 0; i < TEXELS; ++i) {
@@ -174,41 +164,33 @@ static void the_less_moving_costs_the_less_is_left(void **state) {
         options.keep = keep;
         options.max_change = 1.0;
         vsh_stitch_report report;
-        assert_int_equal(vsh_lightmap_stitch(charts, &map, 0, &options, NULL, &report, NULL), VSH_OK);
+        assert_ok(vsh_lightmap_stitch(charts, &map, 0, &options, NULL, &report, &failure));
         assert_true(fabs(report.before - 0.02) < 1e-6 && report.after < 0.5 * last);
         last = report.after;
     }
     assert_true(last < 1e-4);
-    free(plane);
-    vsh_charts_free(charts);
-    free(m);
 }
 
 static void charts_of_equal_values_stay_to_the_bit(void **state) {
-    (void)state;
     const float values[] = {0.3f, 1.0f / 3.0f, 0.0f, 1.0f, 0.7654321f};
     for (size_t v = 0; v < sizeof values / sizeof values[0]; ++v) {
-        charts_mesh *m = two_squares(23.0 + 31.0 * (double)v, 1.0);
-        float *plane = new_plane(values[v]), *before = new_plane(values[v]);
+        FREED charts_mesh *m = two_squares(23.0 + 31.0 * (double)v, 1.0);
+        FREED float *plane = new_plane(values[v]), *before = new_plane(values[v]);
         const vsh_lightmap map = {.ao = plane};
         const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 0, E);
         assert_true(report.places > 30 && report.before == 0.0 && report.after == 0.0);
         assert_memory_equal(plane, before, TEXELS * sizeof *plane);
-        free(before);
-        free(plane);
-        free(m);
     }
 }
 
 /* Noise, which asks for far more than the limit. */
 static void no_value_moves_by_more_than_the_limit_or_out_of_its_range(void **state) {
-    (void)state;
     const double limits[] = {0.0, 0.003, 0.02, 1.0};
     for (size_t l = 0; l < sizeof limits / sizeof limits[0]; ++l) {
-        charts_mesh *m = two_squares(37.0, 1.0);
-        float *plane = new_plane(0.0f), *light = malloc(3 * TEXELS * sizeof *light),
-              *coverage = new_plane(0.0f);
-        float *before = new_plane(0.0f), *light_before = malloc(3 * TEXELS * sizeof *light);
+        FREED charts_mesh *m = two_squares(37.0, 1.0);
+        FREED float *plane = new_plane(0.0f), *light = malloc(3 * TEXELS * sizeof *light),
+                    *coverage = new_plane(0.0f);
+        FREED float *before = new_plane(0.0f), *light_before = malloc(3 * TEXELS * sizeof *light);
         uint32_t seed = 7;
         float brightest = 0.0f;
         for (size_t i = 0; i < TEXELS; ++i) {
@@ -242,31 +224,24 @@ static void no_value_moves_by_more_than_the_limit_or_out_of_its_range(void **sta
         assert_true(moved > 40);
         assert_true(limits[l] == 0.0 || limits[l] == 1.0 || at_limit > 20);
         assert_true(limits[l] == 1.0 || guesses_beyond > 5);
-        free(light_before);
-        free(before);
-        free(coverage);
-        free(light);
-        free(plane);
-        free(m);
     }
 }
 
 /* Two pairs of squares, which are two islands. */
 static void without_coverage_charts_tell_what_is_a_guess(void **state) {
-    (void)state;
-    charts_mesh *m = new_mesh();
+    FREED charts_mesh *m = new_mesh();
     for (int i = 0; i < 4; ++i) { /* the charts of a pair lie far from each other, in other orders */
         const double places[4][2] = {{3.4, 50.6}, {36.2, 22.3}, {40.7, 55.9}, {5.1, 20.8}};
         add_square(m, 5.0 * (i / 2) + i % 2, places[i], 11.0 + i, 0.0, 1.0);
     }
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = SIDE;
-    vsh_charts *charts = NULL;
-    assert_int_equal(vsh_charts_create(&m->mesh, 1, &options, NULL, NULL, &charts, NULL), VSH_OK);
-    vsh_texels *texels = NULL;
-    assert_int_equal(vsh_texels_create(charts, NULL, &texels, NULL), VSH_OK);
+    OWNED(vsh_charts) *charts = NULL;
+    assert_ok(vsh_charts_create(&m->mesh, 1, &options, NULL, NULL, &charts, &failure));
+    OWNED(vsh_texels) *texels = NULL;
+    assert_ok(vsh_texels_create(charts, NULL, &texels, &failure));
     const vsh_texel_samples samples = vsh_texels_samples(texels);
-    float *plane = new_plane(0.0f), *before = new_plane(0.0f), *covered = new_plane(0.0f);
+    FREED float *plane = new_plane(0.0f), *before = new_plane(0.0f), *covered = new_plane(0.0f);
     for (size_t i = 0; i < samples.count; ++i) {
         covered[vsh_texel_place(samples.texels[i], SIDE)] = 1.0f;
     }
@@ -285,12 +260,6 @@ static void without_coverage_charts_tell_what_is_a_guess(void **state) {
         beyond += by > E;
     }
     assert_true(moved > 80 && beyond > 20);
-    free(covered);
-    free(before);
-    free(plane);
-    vsh_texels_free(texels);
-    vsh_charts_free(charts);
-    free(m);
 }
 
 /* Two flat squares that meet at an angle. */
@@ -304,20 +273,19 @@ static charts_mesh *bent_squares(double degrees) {
 }
 
 static void creases_are_left_and_smooth_normals_make_none(void **state) {
-    (void)state;
     const struct {
         double degrees;
         bool smooth, stitched;
     } cases[] = {{0.0, false, true},  {4.9, false, true},    {-4.9, false, true},
                  {5.1, false, false}, {-90.0, false, false}, {90.0, true, true}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-        charts_mesh *m = bent_squares(cases[i].degrees);
+        FREED charts_mesh *m = bent_squares(cases[i].degrees);
         for (size_t v = 0; cases[i].smooth && v < 8; ++v) {
             const float up[3] = {v == 1 || v == 2 || v == 4 || v == 7 ? -1.0f : 0.0f, 0.0f, 1.0f};
             memcpy(m->normals + 3 * v, up, sizeof up);
             m->mesh.normals = m->normals;
         }
-        float *plane = new_plane(0.5f), *before = new_plane(0.5f);
+        FREED float *plane = new_plane(0.5f), *before = new_plane(0.5f);
         for (size_t t = 0; t < TEXELS; ++t) {
             plane[t] = before[t] = is_first(t) ? 0.5f : 0.52f;
         }
@@ -325,24 +293,20 @@ static void creases_are_left_and_smooth_normals_make_none(void **state) {
         const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 0, E);
         assert_int_equal(report.seams, cases[i].stitched);
         assert_true((memcmp(plane, before, TEXELS * sizeof *plane) != 0) == cases[i].stitched);
-        free(before);
-        free(plane);
-        free(m);
     }
 }
 
 /* Squares as two meshes of which one has a transform: ends are compared in the world, and in which order they
  * come. */
 static void meshes_meet_in_the_world(void **state) {
-    (void)state;
-    charts_mesh *a = new_mesh(), *b = new_mesh();
+    FREED charts_mesh *a = new_mesh(), *b = new_mesh();
     add_square(a, 0.0, (const double[]){4.3, 25.6}, 18.0, 0.0, 1.0);
     add_square(b, 0.0, SECOND, 14.0, 37.0, 1.0);
     const double farther[12] = {1, 0, 0, 1.001, 0, 1, 0, 0, 0, 0, 1, 0};
     const double beside[12] = {-1, 0, 0, 2, 0, -1,
                                0,  1, 0, 0, 1, 0}; /* half a turn: its corners 2 and 1 meet a's 1 and 2 */
     vsh_mesh meshes[2] = {a->mesh, b->mesh};
-    float *plane = new_plane(0.5f);
+    FREED float *plane = new_plane(0.5f);
     for (size_t i = 0; i < TEXELS; ++i) {
         plane[i] = is_first(i) ? 0.4f + 0.01f * (float)(i / SIDE) : 0.55f;
     }
@@ -355,18 +319,14 @@ static void meshes_meet_in_the_world(void **state) {
     assert_int_equal(joined.seams, 1);
     assert_true(joined.after < 0.02 * joined.before);
     assert_true(between(plane, a, 1, 2, b, 2, 1) < 4.0 * UNSEEN);
-    free(plane);
-    free(b);
-    free(a);
 }
 
 /* A third chart lies 0.1 texels beside the border, along half of its length. */
 static void a_chart_nearby_is_neither_read_nor_moved(void **state) {
-    (void)state;
-    charts_mesh *m = two_squares(0.0, 1.0);
+    FREED charts_mesh *m = two_squares(0.0, 1.0);
     add_quad(m, (const double[][3]){{7, 0, 0}, {8, 0, 0}, {8, 1, 0}, {7, 1, 0}},
              (const double[][2]){{22.4, 16.6}, {29.9, 16.6}, {29.9, 3.1}, {22.4, 3.1}});
-    float *plane = new_plane(0.5f), *before = new_plane(0.0f);
+    FREED float *plane = new_plane(0.5f), *before = new_plane(0.0f);
     for (size_t i = 0; i < TEXELS; ++i) {
         const size_t x = i % SIDE, y = i / SIDE;
         plane[i] = x >= 22 && x < 30 && y < 17 ? 0.9f : is_first(i) ? 0.5f : 0.52f;
@@ -379,16 +339,12 @@ static void a_chart_nearby_is_neither_read_nor_moved(void **state) {
     for (size_t i = 0; i < TEXELS; ++i) {
         assert_true(before[i] != 0.9f || plane[i] == before[i]);
     }
-    free(before);
-    free(plane);
-    free(m);
 }
 
 /* Zero area in the world and in the lightmap, one triangle again and again, corners in one place, UVs far
  * outside. */
 static void degenerate_edges_change_nothing(void **state) {
-    (void)state;
-    charts_mesh *m = two_squares(90.0, 1.0);
+    FREED charts_mesh *m = two_squares(90.0, 1.0);
     float *plane[2] = {new_plane(0.5f), new_plane(0.5f)};
     for (size_t round = 0; round < 2; ++round) {
         for (size_t i = 0; i < TEXELS; ++i) {
@@ -419,7 +375,369 @@ static void degenerate_edges_change_nothing(void **state) {
     assert_true(report.seams > 60 && report.seams < 4000);
     free(plane[1]);
     free(plane[0]);
-    free(m);
+}
+
+/* --- edges that meet parts of others (T-junctions), and borders between lightmaps */
+
+static const double WHOLE[2] = {0, 40}, HALVES[3] = {0, 20, 40}, THIRDS[4] = {0, 13, 27, 40},
+                    PART[2] = {10, 30}, MANY[9] = {0, 3, 8, 10, 17, 20, 29, 31.5, 40};
+
+/* What a border's two sides are cut at, and how many seams they have in common, over how much of it. */
+static const struct {
+    const double *left, *right;
+    int left_count, right_count;
+    uint64_t seams;
+    int begin, end;
+} cases[] = {{WHOLE, HALVES, 2, 3, 2, 0, 40},  {HALVES, WHOLE, 3, 2, 2, 0, 40},
+             {HALVES, THIRDS, 3, 4, 4, 0, 40}, {WHOLE, MANY, 2, 9, 8, 0, 40},
+             {THIRDS, MANY, 4, 9, 10, 0, 40},  {WHOLE, PART, 2, 2, 1, 10, 30},
+             {HALVES, PART, 3, 2, 2, 10, 30},  {MANY, MANY, 9, 9, 8, 0, 40}};
+
+/* A turn by no right angle. */
+static const double TURNED[12] = {0.36, 0.48, -0.8, 70.7, -0.8, 0.6, 0.0, 11.1, 0.48, 0.64, 0.6, -33.3};
+
+/* (a, b) go to the minimum of 2 (d + a - b)² + keep (a² + b²), as along a border of equal edges. */
+static void parts_of_edges_meet_as_whole_ones_do(void **state) {
+    for (size_t i = 0; i < 3 * sizeof cases / sizeof cases[0]; ++i) {
+        const size_t c = i / 3;
+        FREED charts_mesh *m = new_mesh();
+        add_strip(m, 0, cases[c].left, cases[c].left_count, 10.5);
+        add_strip(m, 1, cases[c].right, cases[c].right_count, 20.5);
+        m->mesh.transform = i % 3 == 1 ? TURNED : NULL;
+        for (size_t v = 0; i % 3 == 2 && v < m->mesh.vertex_count; ++v) { /* rounded to 32 bits */
+            float *p = m->positions + 3 * v, from[3] = {p[0], p[1], p[2]};
+            for (int k = 0; k < 3; ++k) {
+                const double *row = TURNED + 4 * k;
+                p[k] = (float)(row[0] * (double)from[0] + row[1] * (double)from[1] +
+                               row[2] * (double)from[2] + row[3]);
+            }
+        }
+        FREED float *plane = new_plane(0.5f);
+        for (size_t t = 0; t < TEXELS; ++t) {
+            plane[t] = t % SIDE < 15 ? 0.5f : 0.53f;
+        }
+        const vsh_lightmap map = {.ao = plane};
+        const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 0, E);
+        if (report.seams != cases[c].seams) {
+            fail_msg("case %zu: %d seams, expected %d", i, (int)report.seams, (int)cases[c].seams);
+        }
+        const double move = 2.0 * 0.03 / (4.0 + 0.01);
+        for (int row = 12; row < 48; ++row) { /* y = 50 - row - 0.5 in the world */
+            const int inside = 49.5 - row > cases[c].begin + 2 && 49.5 - row < cases[c].end - 2;
+            const int outside = 49.5 - row < cases[c].begin - 2 || 49.5 - row > cases[c].end + 2;
+            const double left = (double)plane[row * SIDE + 10], right = (double)plane[row * SIDE + 20];
+            if ((inside && (fabs(left - 0.5 - move) > 2e-4 || fabs(right - 0.53 + move) > 2e-4)) ||
+                (outside && (left != (double)0.5f || right != (double)0.53f))) {
+                fail_msg("case %zu, row %d: %g and %g", i, row, left, right);
+            }
+        }
+    }
+}
+
+static void an_end_beside_an_edge_or_over_a_crease_cuts_nothing(void **state) {
+    for (int kind = 0; kind < 3; ++kind) {
+        FREED charts_mesh *m = new_mesh();
+        add_strip(m, 0, WHOLE, 2, 10.5);
+        add_strip(m, 1, HALVES, 3, 20.5);
+        for (size_t v = 4; v < m->mesh.vertex_count; ++v) {
+            float *p = m->positions + 3 * v;
+            p[0] += kind == 1 && p[1] == 20 ? 0.001F : 0.0F; /* in the plane */
+            p[2] += kind == 2 ? 0.2F * (p[0] - 1.0F) : 0.0F; /* 11 degrees */
+        }
+        FREED float *plane = new_plane(0.5f);
+        const vsh_lightmap map = {.ao = plane};
+        const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 0, E);
+        assert_int_equal(report.seams, kind == 0 ? 2 : 0);
+    }
+}
+
+/* A T within one chart is none of its borders: what is on both sides is the same. */
+static void a_junction_within_a_chart_is_no_seam(void **state) {
+    FREED charts_mesh *m = new_mesh();
+    add_strip(m, 0, WHOLE, 2, 15.5);
+    add_strip(m, 1, HALVES, 3, 15.5);
+    FREED float *plane = new_plane(0.5f), *before = new_plane(0.5f);
+    uint32_t seed = 3;
+    for (size_t t = 0; t < TEXELS; ++t) {
+        plane[t] = before[t] = random_value(&seed);
+    }
+    const vsh_lightmap map = {.ao = plane};
+    const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 0, E);
+    assert_int_equal(report.seams, 0);
+    assert_memory_equal(plane, before, TEXELS * sizeof *plane);
+}
+
+/* --- several lightmaps */
+
+typedef struct two_pages {
+    charts_mesh *m[2];
+    vsh_charts *charts[2];
+    float *ao[2];
+    vsh_lightmap maps[2];
+    vsh_stitch_page pages[2];
+} two_pages;
+
+/* Both have their chart at the same texels. */
+static void make_pages(two_pages *p, const double *left, int left_count) {
+    for (int k = 0; k < 2; ++k) {
+        p->m[k] = new_mesh();
+        if (k == 0) {
+            add_strip(p->m[k], 0, left, left_count, 20.5);
+        } else {
+            add_strip(p->m[k], 1, WHOLE, 2, 20.5);
+        }
+        p->charts[k] = charts_of(&p->m[k]->mesh, 1);
+        p->ao[k] = new_plane(k == 0 ? 0.5f : 0.53f);
+        p->maps[k] = (vsh_lightmap){.ao = p->ao[k]};
+        p->pages[k] = (vsh_stitch_page){p->charts[k], &p->maps[k]};
+    }
+}
+
+static void free_pages(two_pages *p) {
+    for (int k = 0; k < 2; ++k) {
+        free(p->ao[k]);
+        vsh_charts_free(p->charts[k]);
+        free(p->m[k]);
+    }
+}
+
+static void borders_between_lightmaps_agree(void **state) {
+    two_pages p;
+    for (int cut = 0; cut < 2; ++cut) {
+        make_pages(&p, cut ? THIRDS : WHOLE, cut ? 4 : 2);
+        vsh_stitch_report report;
+        assert_ok(vsh_lightmap_stitch(p.charts[0], &p.maps[0], 0, NULL, NULL, &report, &failure));
+        assert_int_equal(report.seams, 0);
+        assert_ok(vsh_lightmaps_stitch(p.pages, 2, 0, NULL, NULL, &report, &failure));
+        assert_int_equal(report.seams, cut ? 3 : 1);
+        const double move = 2.0 * 0.03 / (4.0 + 0.01);
+        for (size_t t = 0; t < TEXELS; ++t) {
+            const size_t row = t / SIDE, column = t % SIDE;
+            if (column != 20) {
+                assert_true(p.ao[0][t] == 0.5f && p.ao[1][t] == 0.53f);
+            } else if (row > 13 && row < 47) {
+                assert_true(fabs((double)p.ao[0][t] - 0.5 - move) < 2e-4);
+                assert_true(fabs((double)p.ao[1][t] - 0.53 + move) < 2e-4);
+            }
+            assert_true(fabs((double)p.ao[0][t] - 0.5) <= E && fabs((double)p.ao[1][t] - 0.53) <= E + 1e-7);
+        }
+        free_pages(&p);
+    }
+}
+
+/* A page that meets none of the others. */
+static void one_of_several_changes_as_it_does_alone(void **state) {
+    static const double away[12] = {1, 0, 0, 100, 0, 1, 0, 0, 0, 0, 1, 0};
+    FREED charts_mesh *m = two_squares(37.0, 1.0);
+    m->mesh.transform = away;
+    OWNED(vsh_charts) *charts = charts_of(&m->mesh, 1);
+    FREED float *alone = new_plane(0.5f), *among = new_plane(0.5f);
+    for (int32_t threads = 0; threads <= 4; ++threads) {
+        FREED_BY(free_pages) two_pages p;
+        make_pages(&p, WHOLE, 2);
+        uint32_t seed = 9;
+        for (size_t t = 0; t < TEXELS; ++t) {
+            *(threads == 0 ? &alone[t] : &among[t]) = random_value(&seed);
+        }
+        const vsh_lightmap map = {.ao = threads == 0 ? alone : among};
+        const vsh_stitch_page pages[3] = {p.pages[0], {charts, &map}, p.pages[1]};
+        const vsh_run run = run_on(threads);
+        assert_int_equal(threads == 0 ? vsh_lightmap_stitch(charts, &map, 0, NULL, NULL, NULL, NULL)
+                                      : vsh_lightmaps_stitch(pages, 3, 0, NULL, &run, NULL, NULL),
+                         VSH_OK);
+        assert_true(threads == 0 || memcmp(alone, among, TEXELS * sizeof *alone) == 0);
+    }
+}
+
+static void pages_of_other_planes_are_refused(void **state) {
+    FREED_BY(free_pages) two_pages p;
+    make_pages(&p, WHOLE, 2);
+    const vsh_lightmap none = {.coverage = p.ao[0]};
+    const vsh_stitch_page bad[3][2] = {{p.pages[0], {p.charts[1], &none}},
+                                       {p.pages[0], {NULL, &p.maps[1]}},
+                                       {{p.charts[0], NULL}, p.pages[1]}};
+    for (int i = 0; i < 3; ++i) {
+        assert_int_equal(vsh_lightmaps_stitch(bad[i], 2, 0, NULL, NULL, NULL, &failure), VSH_ERROR_ARGUMENT);
+    }
+    assert_int_equal(vsh_lightmaps_stitch(NULL, 2, 0, NULL, NULL, NULL, &failure), VSH_ERROR_ARGUMENT);
+    assert_ok(vsh_lightmaps_stitch(NULL, 0, 0, NULL, NULL, NULL, &failure));
+}
+
+/* --- threads, memory, cancelling, options, and which planes change */
+
+static vsh_result stitch_noise(const charts_mesh *m, const vsh_run *run, float *ao, float *light,
+                               vsh_error *error) {
+    uint32_t seed = 11;
+    for (size_t i = 0; i < TEXELS; ++i) {
+        ao[i] = random_value(&seed);
+        for (size_t c = 0; c < 3; ++c) {
+            light[3 * i + c] = random_value(&seed);
+        }
+    }
+    OWNED(vsh_charts) *charts = charts_of(&m->mesh, 1);
+    const vsh_lightmap map = {.ao = ao, .irradiance = light};
+    const vsh_result result = vsh_lightmap_stitch(charts, &map, 0, NULL, run, NULL, error);
+    return result;
+}
+
+static void any_number_of_threads_gives_the_same_bits(void **state) {
+    FREED charts_mesh *m = two_squares(37.0, 1.0);
+    float *ao[2] = {new_plane(0.0f), new_plane(0.0f)}, *light[2];
+    for (int32_t threads = 1; threads <= 8; ++threads) {
+        const int own = threads > 1;
+        vsh_run run = run_on(threads);
+        light[own] = threads <= 2 ? malloc(3 * TEXELS * sizeof **light) : light[own];
+        assert_int_equal(stitch_noise(m, &run, ao[own], light[own], NULL), VSH_OK);
+        assert_memory_equal(ao[own], ao[0], TEXELS * sizeof **ao);
+        assert_memory_equal(light[own], light[0], 3 * TEXELS * sizeof **light);
+    }
+    for (int i = 0; i < 2; ++i) {
+        free(light[i]);
+        free(ao[i]);
+    }
+}
+
+static void the_memory_limit_is_held_before_anything_moves(void **state) {
+    FREED charts_mesh *m = two_squares(37.0, 1.0);
+    FREED float *ao = new_plane(0.0f), *light = malloc(3 * TEXELS * sizeof *light), *before = new_plane(0.0f);
+    FREED float *other = malloc(3 * TEXELS * sizeof *other);
+    vsh_run run = run_on(1);
+    uint64_t refused = 0, most = 0;
+    for (run.memory_limit = 64; most == 0; run.memory_limit *= 2) {
+        const vsh_result result = stitch_noise(m, &run, ao, light, &failure);
+        most = result == VSH_OK ? run.memory_limit : 0;
+        assert_true(result == VSH_OK || result == VSH_ERROR_LIMIT);
+        refused += result == VSH_ERROR_LIMIT;
+        uint32_t seed = 11;
+        for (size_t i = 0; result != VSH_OK && i < TEXELS; ++i) {
+            assert_true(ao[i] == random_value(&seed));
+            for (size_t c = 0; c < 3; ++c) {
+                assert_true(light[3 * i + c] == random_value(&seed));
+            }
+        }
+    }
+    vsh_run four = run_on(4);
+    for (four.memory_limit = most / 2; stitch_noise(m, &four, ao, light, &failure) != VSH_OK;) {
+        four.memory_limit += most / 64; /* vectors of four channels are larger than all else */
+    }
+    assert_true(four.memory_limit > most + most / 4);
+    assert_true(refused > 4 && most < 1000000); /* charts, marks, unknowns, vectors: each is looked at */
+    assert_non_null(strstr(failure.message, "seams"));
+    charts_mesh *many = new_mesh(); /* what edges are found by is most where there are no seams */
+    for (int i = 0; i < MOST_VERTICES / 4; ++i) {
+        add_square(many, 2.0 * i, (const double[]){1.0 + 3.5 * (i % 16), 4.0 + 3.5 * (i / 16)}, 2.5, 0.0,
+                   1.0);
+    }
+    run.memory_limit = 20000;
+    assert_int_equal(stitch_noise(many, &run, before, other, &failure), VSH_ERROR_LIMIT);
+    free(many);
+    run.memory_limit = most;
+    run.memory_held = most;
+    assert_int_equal(stitch_noise(m, &run, before, other, &failure), VSH_ERROR_LIMIT);
+}
+
+typedef struct stopping {
+    double at;
+    double last;
+    int calls;
+} stopping;
+
+static int stop_at(void *user, const char *stage, double fraction) {
+    stopping *s = user;
+    assert_string_equal(stage, "seams");
+    assert_true(fraction >= s->last && fraction <= 1.0);
+    s->last = fraction;
+    ++s->calls;
+    return fraction >= s->at;
+}
+
+/* The same differences, as AO and as light. */
+static void differences_of_light_are_told_in_parts_of_the_brightest(void **state) {
+    FREED charts_mesh *m = two_squares(37.0, 1.0);
+    FREED float *ao = new_plane(0.0f), *light = malloc(3 * TEXELS * sizeof *light);
+    for (size_t i = 0; i < TEXELS; ++i) {
+        ao[i] = is_first(i) ? 0.98f : 1.0f;
+        light[3 * i] = light[3 * i + 1] = light[3 * i + 2] = 50.0f * ao[i];
+    }
+    const vsh_lightmap dim = {.ao = ao}, bright = {.irradiance = light};
+    const vsh_stitch_report of_ao = stitch(&m->mesh, 1, &dim, 0, 0.02);
+    const vsh_stitch_report of_light = stitch(&m->mesh, 1, &bright, 0, 0.02);
+    assert_true(fabs(of_ao.before - 0.02) < 1e-6 && fabs(of_light.before - 0.02) < 1e-6);
+    assert_true(of_ao.after < 0.0004 && of_light.after < 0.0004);
+    assert_true(of_light.places == of_ao.places && of_light.texels == of_ao.texels);
+}
+
+static void it_is_cancelled_wherever_it_is_and_tells_how_far_it_is(void **state) {
+    FREED charts_mesh *m = two_squares(37.0, 1.0);
+    FREED float *ao = new_plane(0.0f), *light = malloc(3 * TEXELS * sizeof *light);
+    const double at[] = {0.0, 0.2, 0.5, 2.0};
+    for (size_t i = 0; i < sizeof at / sizeof at[0]; ++i) {
+        stopping s = {at[i], 0.0, 0};
+        vsh_run run = run_watched(stop_at, &s);
+        run.threads = 1;
+        const vsh_result result = stitch_noise(m, &run, ao, light, &failure);
+        assert_int_equal(result, at[i] > 1.0 ? VSH_OK : VSH_ERROR_CANCELLED);
+        assert_true(s.calls > 0 && (at[i] < 1.0 || s.last == 1.0));
+    }
+}
+
+static void options_out_of_range_are_refused(void **state) {
+    FREED charts_mesh *m = two_squares(0.0, 1.0);
+    OWNED(vsh_charts) *charts = charts_of(&m->mesh, 1);
+    FREED float *ao = new_plane(0.5f);
+    const vsh_lightmap map = {.ao = ao};
+    for (int i = 0; i < 8; ++i) {
+        vsh_stitch_options options = vsh_stitch_options_default();
+        double *const members[] = {&options.max_change, &options.max_angle, &options.keep,
+                                   &options.max_change};
+        const double values[] = {-1e-9, -1.0, 0.0, 1.001, NAN, 181.0, 1.5, INFINITY};
+        *members[i % 4] = values[i];
+        assert_fails(vsh_lightmap_stitch(charts, &map, 0, &options, NULL, NULL, &failure), VSH_ERROR_ARGUMENT,
+                     "vsh_stitch_options.");
+    }
+}
+
+static void what_is_no_value_of_light_is_left(void **state) {
+    FREED charts_mesh *m = two_squares(37.0, 1.0);
+    FREED float *ao = new_plane(0.5f), *bent = malloc(3 * TEXELS * sizeof *bent), *error = new_plane(0.0f);
+    FREED float *invalid = new_plane(0.0f), *coverage = new_plane(1.0f), *shadow = new_plane(0.0f),
+                *tint = malloc(3 * TEXELS * sizeof *tint);
+    FREED float *copy = malloc(3 * TEXELS * sizeof *copy);
+    uint32_t seed = 3;
+    for (size_t i = 0; i < TEXELS; ++i) {
+        error[i] = shadow[i] = random_value(&seed);
+        invalid[i] = error[i] < 0.5f ? 0.0f : 1.0f;
+        ao[i] = is_first(i) ? 0.5f : NAN; /* of which nothing is known */
+        for (size_t c = 0; c < 3; ++c) {
+            bent[3 * i + c] = tint[3 * i + c] = random_value(&seed);
+        }
+    }
+    memcpy(copy, bent, 3 * TEXELS * sizeof *bent);
+    float *const shadows[] = {shadow, NULL}, *const errors[] = {error, error}, *const tints[] = {NULL, tint};
+    const vsh_lightmap map = {.shadow = shadows,
+                              .ao = ao,
+                              .bent = bent,
+                              .shadow_error = errors,
+                              .ao_error = error,
+                              .tint = tints,
+                              .invalid = invalid,
+                              .coverage = coverage};
+    const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 2, 0.02);
+    assert_true(report.after < report.before);
+    assert_memory_equal(bent, copy, 3 * TEXELS * sizeof *bent);
+    assert_memory_not_equal(tint, copy, 3 * TEXELS * sizeof *tint);
+    seed = 3;
+    size_t moved = 0;
+    for (size_t i = 0; i < TEXELS; ++i) {
+        const float first = random_value(&seed);
+        assert_true(error[i] == first && invalid[i] == (first < 0.5f ? 0.0f : 1.0f) && coverage[i] == 1.0f);
+        assert_true(is_first(i) ? ao[i] == 0.5f : isnan(ao[i]) != 0);
+        moved += shadow[i] != first;
+        for (size_t c = 0; c < 3; ++c) {
+            random_value(&seed);
+        }
+    }
+    assert_true(moved > 20);
 }
 
 int main(void) {
@@ -437,6 +755,18 @@ int main(void) {
         cmocka_unit_test(meshes_meet_in_the_world),
         cmocka_unit_test(a_chart_nearby_is_neither_read_nor_moved),
         cmocka_unit_test(degenerate_edges_change_nothing),
+        cmocka_unit_test(parts_of_edges_meet_as_whole_ones_do),
+        cmocka_unit_test(an_end_beside_an_edge_or_over_a_crease_cuts_nothing),
+        cmocka_unit_test(a_junction_within_a_chart_is_no_seam),
+        cmocka_unit_test(borders_between_lightmaps_agree),
+        cmocka_unit_test(one_of_several_changes_as_it_does_alone),
+        cmocka_unit_test(pages_of_other_planes_are_refused),
+        cmocka_unit_test(any_number_of_threads_gives_the_same_bits),
+        cmocka_unit_test(the_memory_limit_is_held_before_anything_moves),
+        cmocka_unit_test(differences_of_light_are_told_in_parts_of_the_brightest),
+        cmocka_unit_test(what_is_no_value_of_light_is_left),
+        cmocka_unit_test(it_is_cancelled_wherever_it_is_and_tells_how_far_it_is),
+        cmocka_unit_test(options_out_of_range_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

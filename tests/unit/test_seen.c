@@ -1,8 +1,11 @@
 /* Lightmaps as a viewer sees them: bilinear lookups on the surface, which read borders and padding too. */
+#include "testing.h"
 #include "validity.h"
 
 #include "directions.h"
 #include "embree.h"
+
+OWNER(truth_mesh)
 
 /* 250: some charts then end in texels whose centres lie outside. */
 enum { TEXELS = 250, POINTS = 5000, RAYS = 1024 };
@@ -77,34 +80,30 @@ static double look_up(const float *plane, const double uv[2]) {
 }
 
 static void trace_points(const vsh_mesh *mesh, points *p) {
-    truth_mesh *truth = truth_mesh_create(mesh, 1);
+    OWNED(truth_mesh) *truth = truth_mesh_create(mesh, 1);
     const double w = tan(0.5 * SUN_ANGLE);
     assert_non_null(truth);
     assert_int_equal(truth_mesh_backs(truth, POINTS, p->at, p->normal, 96, 0, p->backs), 0);
     assert_int_equal(truth_mesh_ao(truth, POINTS, p->at, p->normal, AO_DISTANCE, RAYS, 0, p->ao), 0);
     assert_int_equal(truth_mesh_light(truth, POINTS, p->at, p->normal, SUN, w, RAYS, 0, p->shadow), 0);
-    truth_mesh_free(truth);
 }
 
 static void bake_planes(const vsh_mesh *mesh, float *ao, float *shadow) {
-    vsh_error error = {VSH_OK, ""};
-    vsh_occluders *occluders = NULL;
-    vsh_charts *charts = NULL;
-    check(vsh_occluders_create(mesh, 1, NULL, NULL, &occluders, &error), &error);
+    OWNED(vsh_occluders) *occluders = NULL;
+    OWNED(vsh_charts) *charts = NULL;
+    assert_ok(vsh_occluders_create(mesh, 1, NULL, NULL, &occluders, &failure));
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = TEXELS;
     options.shade.ao_distance = AO_DISTANCE;
     options.shade.max_error = 0.005;
     options.shade.rays = 1024;
-    check(vsh_charts_create(mesh, 1, &options, NULL, NULL, &charts, &error), &error);
+    assert_ok(vsh_charts_create(mesh, 1, &options, NULL, NULL, &charts, &failure));
     vsh_light sun = vsh_light_default();
     memcpy(sun.direction, SUN, sizeof SUN);
     sun.angle = SUN_ANGLE;
     float *const shadows[1] = {shadow};
     const vsh_lightmap lightmap = {.ao = ao, .shadow = shadows};
-    check(vsh_bake_lightmap(occluders, charts, &sun, 1, NULL, NULL, &lightmap, NULL, &error), &error);
-    vsh_charts_free(charts);
-    vsh_occluders_free(occluders);
+    assert_ok(vsh_bake_lightmap(occluders, charts, &sun, 1, NULL, NULL, &lightmap, NULL, &failure));
 }
 
 static void compare_seen(const points *p, const char *what, const float *plane, const float *truth) {
@@ -127,7 +126,6 @@ static void compare_seen(const points *p, const char *what, const float *plane, 
 }
 
 static void rooms_are_not_seen_darker_along_corners(void **state) {
-    (void)state;
     static const box ROOM = {{-2, 0, -2}, {2, 3, 2}};
     /* Its lower sides pass through centres of the floor's texels. */
     static const box CHEST = {{-0.46, 0, -0.46}, {0.46, 0.83, 0.39}};
@@ -135,8 +133,8 @@ static void rooms_are_not_seen_darker_along_corners(void **state) {
         skip();
     }
     for (int open = 0; open < 2; ++open) {
-        shape *s = calloc(1, sizeof *s);
-        float *planes = calloc(2 * TEXELS * TEXELS, sizeof *planes);
+        FREED shape *s = calloc(1, sizeof *s);
+        FREED float *planes = calloc(2 * TEXELS * TEXELS, sizeof *planes);
         assert_true(s != NULL && planes != NULL);
         add_faces(s, CHEST, false);
         add_faces(s, ROOM, true);
@@ -145,14 +143,11 @@ static void rooms_are_not_seen_darker_along_corners(void **state) {
             --s->quads;
         }
         const vsh_mesh mesh = mesh_of(s);
-        points *p = place_points(s);
+        FREED points *p = place_points(s);
         trace_points(&mesh, p);
         bake_planes(&mesh, planes, planes + TEXELS * TEXELS);
         compare_seen(p, open ? "AO under the sky" : "AO", planes, p->ao);
         compare_seen(p, open ? "sun" : "sun outside", planes + TEXELS * TEXELS, p->shadow);
-        free(p);
-        free(planes);
-        free(s);
     }
 }
 

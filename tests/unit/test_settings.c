@@ -1,29 +1,18 @@
 /* Settings: one table for files, programs and the command line, and docs/scene.md and docs/flat.md say the
  * same. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+#include "testing.h"
 
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <vdbshade/image.h>
 #include <vdbshade/settings.h>
 
-static vsh_error error;
-
 static void takes(vsh_scene *scene, const char *name, const char *text) {
-    if (vsh_scene_set(scene, name, text, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_scene_set(scene, name, text, &failure));
 }
 
 static void a_setting_goes_where_the_file_would_put_it(void **state) {
-    (void)state;
     vsh_scene scene = vsh_scene_default();
     takes(&scene, "rays", "17");
     takes(&scene, "--max-error", "5e-3");
@@ -46,16 +35,15 @@ static void a_setting_goes_where_the_file_would_put_it(void **state) {
     assert_false(scene.irradiance);
 
     vsh_receiver receiver = vsh_receiver_default();
-    assert_int_equal(vsh_receiver_set(&receiver, "--size", "64x32", &error), VSH_OK);
+    assert_ok(vsh_receiver_set(&receiver, "--size", "64x32", &failure));
     assert_true(receiver.width == 64 && receiver.height == 32);
-    assert_int_equal(vsh_receiver_set(&receiver, "receivers.size", "16", &error), VSH_OK);
+    assert_ok(vsh_receiver_set(&receiver, "receivers.size", "16", &failure));
     assert_true(receiver.width == 16 && receiver.height == 16);
-    assert_int_equal(vsh_receiver_set(&receiver, "--pack", "R=ao", &error), VSH_OK);
+    assert_ok(vsh_receiver_set(&receiver, "--pack", "R=ao", &failure));
     assert_string_equal(receiver.pack, "R=ao");
 }
 
 static void a_resolution_and_a_voxel_size_take_each_others_place(void **state) {
-    (void)state;
     vsh_scene scene = vsh_scene_default();
     assert_false(scene.voxels_named);
     takes(&scene, "voxel_size", "0.25");
@@ -65,7 +53,6 @@ static void a_resolution_and_a_voxel_size_take_each_others_place(void **state) {
 }
 
 static void what_is_refused_is_told_and_changes_nothing(void **state) {
-    (void)state;
     static const struct {
         const char *name, *text, *says;
         vsh_result result;
@@ -93,26 +80,25 @@ static void what_is_refused_is_told_and_changes_nothing(void **state) {
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
         const vsh_scene before = vsh_scene_default();
         vsh_scene scene = before;
-        const vsh_result result = vsh_scene_set(&scene, cases[i].name, cases[i].text, &error);
-        if (result != cases[i].result || strstr(error.message, cases[i].says) == NULL) {
-            fail_msg("%s %s: %s: %s", cases[i].name, cases[i].text, vsh_result_name(result), error.message);
+        const vsh_result result = vsh_scene_set(&scene, cases[i].name, cases[i].text, &failure);
+        if (result != cases[i].result || strstr(failure.message, cases[i].says) == NULL) {
+            fail_msg("%s %s: %s: %s", cases[i].name, cases[i].text, vsh_result_name(result), failure.message);
         }
         assert_memory_equal(&scene, &before, sizeof scene);
     }
     vsh_scene scene = vsh_scene_default();
-    assert_int_equal(vsh_scene_set(NULL, "rays", "1", &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_scene_set(&scene, NULL, "1", &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_receiver_set(NULL, "--size", "1", &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_scene_set(NULL, "rays", "1", &failure), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_scene_set(&scene, NULL, "1", &failure), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_receiver_set(NULL, "--size", "1", &failure), VSH_ERROR_ARGUMENT);
 }
 
 static void settings_of_a_flat_scene_are_its_own(void **state) {
-    (void)state;
     vsh_flat_scene flat = vsh_flat_scene_default();
     static const char *const given[][2] = {
         {"--size", "64x32"}, {"method", "classic"}, {"supersample", "3"},      {"--padding", "7"},
         {"max_steps", "99"}, {"--bits", "16"},      {"--color-space", "srgb"}, {"pack", "R=shadow.a"}};
     for (size_t i = 0; i < sizeof given / sizeof given[0]; ++i) {
-        assert_int_equal(vsh_flat_scene_set(&flat, given[i][0], given[i][1], &error), VSH_OK);
+        assert_ok(vsh_flat_scene_set(&flat, given[i][0], given[i][1], &failure));
     }
     const vsh_flat_options *o = &flat.options;
     assert_true(o->width == 64 && o->height == 32 && o->method == VSH_FLAT_CLASSIC && o->supersample == 3);
@@ -121,15 +107,15 @@ static void settings_of_a_flat_scene_are_its_own(void **state) {
     assert_string_equal(flat.pack, "R=shadow.a");
 
     const vsh_flat_scene before = flat;
-    assert_int_equal(vsh_flat_scene_set(&flat, "--method", "adaptive", &error), VSH_ERROR_INPUT);
-    assert_non_null(strstr(error.message, "expected one of hard, classic, exact"));
-    assert_int_equal(vsh_flat_scene_set(&flat, "--rays", "4", &error), VSH_ERROR_ARGUMENT);
-    assert_non_null(strstr(error.message, "no such setting of a flat scene"));
+    assert_fails(vsh_flat_scene_set(&flat, "--method", "adaptive", &failure), VSH_ERROR_INPUT,
+                 "expected one of hard, classic, exact");
+    assert_fails(vsh_flat_scene_set(&flat, "--rays", "4", &failure), VSH_ERROR_ARGUMENT,
+                 "no such setting of a flat scene");
     assert_memory_equal(&flat, &before, sizeof flat);
     vsh_scene scene = vsh_scene_default();
-    assert_int_equal(vsh_scene_set(&scene, "supersample", "3", &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_flat_scene_set(NULL, "--size", "1", &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_flat_scene_set(&flat, NULL, "1", &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_scene_set(&scene, "supersample", "3", &failure), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_flat_scene_set(NULL, "--size", "1", &failure), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_flat_scene_set(&flat, NULL, "1", &failure), VSH_ERROR_ARGUMENT);
 }
 
 /* --- docs/scene.md, docs/flat.md */
@@ -186,7 +172,6 @@ static void expect_numbers(const vsh_setting *setting, const char *words, const 
 }
 
 static void the_document_has_every_key_with_its_range_and_default(void **state) {
-    (void)state;
     vsh_setting setting;
     size_t count = 0, ranges = 0, defaults = 0;
     for (; vsh_setting_get(count, &setting) != 0; ++count) {
@@ -215,7 +200,6 @@ static void the_document_has_every_key_with_its_range_and_default(void **state) 
 }
 
 static void settings_end(void **state) {
-    (void)state;
     vsh_setting setting = {.group = 77};
     assert_int_equal(vsh_setting_get(100000, &setting), 0);
     assert_int_equal(setting.group, 77);

@@ -1,5 +1,6 @@
 /* Solids that touch, lie in each other or share faces, and values that are no distances. docs/numerics.md has
  * the bounds; test_csg.c has bounds that become distances. */
+#include "testing.h"
 #include "traced.h"
 
 #include "field/field.h"
@@ -7,49 +8,26 @@
 
 static const double VOXEL = 0.0625;
 
-typedef struct box_mesh {
-    float positions[24];
-    vsh_mesh mesh;
-} box_mesh;
-
-static const uint32_t SIDES[12][3] = {{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}, {0, 1, 5}, {0, 5, 4},
-                                      {3, 6, 2}, {3, 7, 6}, {0, 4, 7}, {0, 7, 3}, {1, 2, 6}, {1, 6, 5}};
-
-static void make_box(box_mesh *box, const double low[3], const double high[3]) {
-    static const int corners[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
-                                      {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
-    for (int i = 0; i < 24; ++i) {
-        box->positions[i] = (float)(corners[i / 3][i % 3] ? high[i % 3] : low[i % 3]);
-    }
-    box->mesh = (vsh_mesh){.name = "box",
-                           .positions = box->positions,
-                           .indices = &SIDES[0][0],
-                           .vertex_count = 8,
-                           .triangle_count = 12};
-}
-
-static caster caster_of_boxes(const double (*corners)[2][3], int count, double voxel) {
-    box_mesh boxes[4];
+static casting caster_of_boxes(const double (*corners)[2][3], int count, double voxel) {
+    float places[4][24];
     vsh_mesh meshes[4];
     for (int i = 0; i < count; ++i) {
-        make_box(&boxes[i], corners[i][0], corners[i][1]);
-        meshes[i] = boxes[i].mesh;
+        meshes[i] = box_mesh(places[i], corners[i][0], corners[i][1]);
     }
     vsh_grid_options options = vsh_grid_options_default();
     options.voxel_size = voxel;
     vsh_grid *grid = NULL;
     vsh_triangles *triangles = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_grid_from_meshes(meshes, (size_t)count, &options, NULL, &grid, &error) != VSH_OK ||
+    if (vsh_grid_from_meshes(meshes, (size_t)count, &options, NULL, &grid, &failure) != VSH_OK ||
         (vsh_triangles_available() &&
-         vsh_triangles_create(meshes, (size_t)count, NULL, &triangles, &error) != VSH_OK)) {
-        fail_msg("%s", error.message);
+         vsh_triangles_create(meshes, (size_t)count, NULL, &triangles, &failure) != VSH_OK)) {
+        fail_msg("%s", failure.message);
     }
-    return (caster){field_of_grid(grid, 0.0), triangles};
+    return (casting){field_of_grid(grid, 0.0), triangles};
 }
 
 /* The lightest value in the umbra of the boxes, straight under them. */
-static double lightest_umbra(const caster *c, double angle, double depth, double x, int32_t method) {
+static double lightest_umbra(const casting *c, double angle, double depth, double x, int32_t method) {
     const double up[3] = {0.0, 1.0, 0.0};
     const vsh_light light = sun(up, angle);
     double most = 0.0;
@@ -71,7 +49,7 @@ static bool here(int kind) {
     return kind < SHADOWS ? kind < shadow_methods() : kind - SHADOWS < ao_methods();
 }
 
-static void shade_row(const caster *c, row *r) {
+static void shade_row(const casting *c, row *r) {
     const double towards[3] = {0.2, 1.0, 0.1};
     const vsh_light light = sun(towards, RADIANS(8.0));
     double at[3 * ACROSS];
@@ -92,7 +70,6 @@ static void shade_row(const caster *c, row *r) {
 }
 
 static void meshes_that_touch_nest_or_coincide_are_one_solid(void **state) {
-    (void)state;
     const struct {
         const char *what;
         int count;
@@ -116,7 +93,7 @@ static void meshes_that_touch_nest_or_coincide_are_one_solid(void **state) {
     };
     static row one, other;
     for (size_t c = 0; c < sizeof cases / sizeof cases[0]; ++c) {
-        caster made = caster_of_boxes(cases[c].corners, cases[c].count, VOXEL);
+        FREED_BY(caster_free) casting made = caster_of_boxes(cases[c].corners, cases[c].count, VOXEL);
         /* signs are those of the union */
         const truth_solid box = {TRUTH_BOX, {0, 0, 0}, {1, 1, 1}, 0.0, 0.0};
         uint64_t counter = 1;
@@ -129,7 +106,6 @@ static void meshes_that_touch_nest_or_coincide_are_one_solid(void **state) {
             const double truth = truth_solid_distance(&box, p);
             wrong += fabs(truth) > 0.5 * VOXEL && (h > 0.0f) != (truth > 0.0);
         }
-        print_message("%s: %zu of 100000 signs wrong\n", cases[c].what, wrong);
         assert_int_equal(wrong, 0);
         for (int32_t method = 0; method < shadow_methods(); ++method) {
             const double hard = lightest_umbra(&made, 0.0, 1.5, 0.9, method);
@@ -145,15 +121,9 @@ static void meshes_that_touch_nest_or_coincide_are_one_solid(void **state) {
         for (int kind = 0; c > 0 && kind < KINDS; ++kind) {
             if (here(kind)) {
                 const truth_metrics m = truth_compare(ACROSS, other.v[kind], one.v[kind], NULL);
-                print_message("%s, %s %s: rms %.2g, worst %.2g from the one box\n", cases[c].what,
-                              kind < SHADOWS ? "shadow" : "AO",
-                              kind < SHADOWS ? vsh_get_name(VSH_NAMES_SHADOW, kind)
-                                             : vsh_get_name(VSH_NAMES_AO, kind - SHADOWS),
-                              m.rmse, m.max);
-                assert_true(m.rmse < 0.01);
+                assert_less(m.rmse, 0.01);
             }
         }
-        caster_free(&made);
     }
 }
 
@@ -167,7 +137,6 @@ static double stretched_ball(void *user, const double p[3]) {
 }
 
 static void fields_that_are_not_1_lipschitz_are_right_where_they_say_so(void **state) {
-    (void)state;
     enum { COUNT = 41 };
     const truth_solid ball = {TRUTH_SPHERE, {0, 0, 0}, {0, 0, 0}, 0.7, 0.0};
     const double up[3] = {0.0, 1.0, 0.0}, w = 0.1;
@@ -182,7 +151,7 @@ static void fields_that_are_not_1_lipschitz_are_right_where_they_say_so(void **s
         truth_open[i] = (float)truth_ao((truth_scene){&ball, 1}, p, up, 3.0, 4096);
     }
     const double nowhere[3] = {0.0, 0.0, 0.0};
-    vsh_triangles *triangles = triangles_of_moved((truth_scene){&ball, 1}, 1.0, nowhere);
+    OWNED(vsh_triangles) *triangles = triangles_of_moved((truth_scene){&ball, 1}, 1.0, nowhere);
     assert_int_equal(
         truth_lights((truth_scene){&ball, 1}, COUNT, positions, NULL, up, w, (double)INFINITY, 4096, truth),
         0);
@@ -195,16 +164,14 @@ static void fields_that_are_not_1_lipschitz_are_right_where_they_say_so(void **s
             vsh_grid_options options = vsh_grid_options_default();
             options.voxel_size = 0.04;
             vsh_grid *grid = NULL;
-            assert_int_equal(vsh_grid_from_distance(&field, &options, NULL, &grid, NULL), VSH_OK);
-            const caster made = {field_of_grid(grid, 0.0), triangles};
+            assert_ok(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure));
+            const casting made = {field_of_grid(grid, 0.0), triangles};
             for (int32_t method = 0; method < shadow_methods(); ++method) {
                 const vsh_shade_stats stats =
                     cast_shadows(&made, &light, method, COUNT, positions, NULL, visible);
                 assert_int_equal(stats.unfinished, 0);
                 const truth_metrics m = truth_compare(COUNT, visible, truth, NULL);
                 if (method == VSH_SHADOW_CONE) {
-                    print_message("values times %g, %s: rmse %.4f, worst %.3f\n", factors[f],
-                                  exact ? "taken as distances" : "made distances", m.rmse, m.max);
                     /* who says that values are distances, and they are not, is only kept from a crash */
                     assert_true((exact && f > 0) || m.rmse < 0.015);
                 }
@@ -215,9 +182,6 @@ static void fields_that_are_not_1_lipschitz_are_right_where_they_say_so(void **s
             for (int32_t method = 0; method < ao_methods(); ++method) {
                 cast_ao(&made, method, 3.0, COUNT, positions, normals, open);
                 const truth_metrics m = truth_compare(COUNT, open, truth_open, NULL);
-                print_message("values times %g, %s: AO %s, rmse %.4f\n", factors[f],
-                              exact ? "taken as distances" : "made distances",
-                              vsh_get_name(VSH_NAMES_AO, method), m.rmse);
                 /* cones' own bias, and the error that rays keep, twice */
                 assert_true(exact || method == VSH_AO_TAPS || m.rmse < 0.04);
                 for (int i = 0; i < COUNT; ++i) {
@@ -227,7 +191,6 @@ static void fields_that_are_not_1_lipschitz_are_right_where_they_say_so(void **s
             vsh_field_free(made.field);
         }
     }
-    vsh_triangles_free(triangles);
 }
 
 int main(void) {

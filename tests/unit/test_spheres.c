@@ -1,5 +1,6 @@
 /* Spheres that cast by themselves, against analytic rays. */
 #include "shading.h"
+#include "testing.h"
 #include "truth/analytic.h"
 #include "truth/directions.h"
 #include "truth/metrics.h"
@@ -24,10 +25,7 @@ typedef struct stage {
 
 static vsh_spheres *spheres_of(const double *list, size_t count, const double *transform) {
     vsh_spheres *made = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_spheres_create(list, count, transform, NULL, &made, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_spheres_create(list, count, transform, NULL, &made, &failure));
     return made;
 }
 
@@ -68,10 +66,18 @@ static void shadow(const stage *s, const vsh_light *light, int32_t method, bool 
     assert_true(stats.samples > 0);
 }
 
+static float shadow_at_point(const vsh_spheres *made, const vsh_light *light, int32_t method,
+                             const double *position, const float *normal) {
+    const vsh_points points = {1, position, normal, NULL};
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    float value = -1.0f;
+    vshi_spheres_shadow(made, light, method, &points, 0, 1, &value, &stats);
+    return value;
+}
+
 static const double TOWARDS[3] = {-0.5, 0.6, -0.6};
 
 static void hard_shadows_are_the_rays(void **state) {
-    (void)state;
     stage *s = set_up(MOST, 0.05, 0.15, 2.0);
     static float values[POINTS], truth[POINTS];
     const vsh_light light = sun(TOWARDS, RADIANS(5.0));
@@ -88,7 +94,6 @@ static void hard_shadows_are_the_rays(void **state) {
 }
 
 static void the_classic_method_is_the_nearest_miss(void **state) {
-    (void)state;
     stage *s = set_up(30, 0.05, 0.3, 2.0);
     static float values[POINTS];
     const double w = 0.1, length = sqrt(0.97);
@@ -115,32 +120,26 @@ static void the_classic_method_is_the_nearest_miss(void **state) {
 
 /* Half of a sphere is below its own tangent plane, and does not shade it. */
 static void a_sphere_leaves_its_own_surface_open(void **state) {
-    (void)state;
     const double sphere[4] = {1.0, 2.0, 3.0, 0.7};
-    vsh_spheres *made = spheres_of(sphere, 1, NULL);
+    OWNED(vsh_spheres) *made = spheres_of(sphere, 1, NULL);
     uint64_t counter = 4;
     for (int i = 0; i < 200; ++i) {
         double n[3], towards[3], position[3];
-        float normal[3], value = -1.0f;
+        float normal[3];
         random_direction(&counter, n);
         random_direction(&counter, towards);
         for (int axis = 0; axis < 3; ++axis) {
             normal[axis] = (float)n[axis];
             position[axis] = (double)(float)(sphere[axis] + 0.7 * n[axis]);
         }
-        const vsh_points points = {1, position, normal, NULL};
         const vsh_light light = sun(towards, 0.3);
-        vsh_shade_stats stats = vsh_shade_stats_zero();
-        vshi_spheres_shadow(made, &light, VSH_SHADOW_CLASSIC, &points, 0, 1, &value, &stats);
-        assert_true(value == 1.0f);
+        assert_true(shadow_at_point(made, &light, VSH_SHADOW_CLASSIC, position, normal) == 1.0f);
     }
-    vsh_spheres_free(made);
 }
 
 static void bounds_lose_no_sphere_of_many(void **state) {
-    (void)state;
     enum { MANY = 20000 };
-    double *list = malloc(4 * MANY * sizeof *list);
+    FREED double *list = malloc(4 * MANY * sizeof *list);
     assert_non_null(list);
     uint64_t counter = 8;
     for (size_t i = 0; i < MANY; ++i) {
@@ -151,7 +150,7 @@ static void bounds_lose_no_sphere_of_many(void **state) {
         list[4 * i + 3] = between(&counter, 0.01, 0.3);
     }
     static const double moved[12] = {0, -2, 0, 7, 0, 0, 2, -3, -2, 0, 0, 1};
-    vsh_spheres *made = spheres_of(list, MANY, moved);
+    OWNED(vsh_spheres) *made = spheres_of(list, MANY, moved);
     vsh_spheres_info info;
     vsh_spheres_get_info(made, &info);
     assert_int_equal(info.count, MANY);
@@ -172,21 +171,15 @@ static void bounds_lose_no_sphere_of_many(void **state) {
             hidden = hidden || square < 4.0 * s[3] * s[3] ||
                      (along > 0.0 && square - along * along < 4.0 * s[3] * s[3]);
         }
-        const vsh_points points = {1, position, NULL, NULL};
         const vsh_light light = sun(towards, 0.1);
-        vsh_shade_stats stats = vsh_shade_stats_zero();
-        float value = -1.0f;
-        vshi_spheres_shadow(made, &light, VSH_SHADOW_HARD, &points, 0, 1, &value, &stats);
+        const float value = shadow_at_point(made, &light, VSH_SHADOW_HARD, position, NULL);
         assert_true(value == (hidden ? 0.0f : 1.0f));
     }
-    vsh_spheres_free(made);
-    free(list);
 }
 
 static void points_that_are_no_points_are_nan_and_inner_ones_dark(void **state) {
-    (void)state;
     const double sphere[4] = {0, 0, 0, 1};
-    vsh_spheres *made = spheres_of(sphere, 1, NULL);
+    OWNED(vsh_spheres) *made = spheres_of(sphere, 1, NULL);
     const double positions[12] = {NAN, 0, 0, 0, 5, 0, 0, 0.3, 0, 0, 5, 0};
     const float normals[12] = {0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0};
     static const double up[3] = {0, 1, 0};
@@ -200,34 +193,30 @@ static void points_that_are_no_points_are_nan_and_inner_ones_dark(void **state) 
         assert_true(values[2 - begin] == 0.0f);
         assert_true(begin == 0 ? isnan(values[0]) : values[2] == 1.0f);
     }
-    vsh_spheres_free(made);
 }
 
 static void bad_spheres_are_refused_by_number(void **state) {
-    (void)state;
-    static const double shear[12] = {1, 1, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    static const double shear[12] = {1, 1, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
+                        bad[] = {0.0, -1.0, INFINITY, NAN, 1e16};
     double list[8] = {0, 0, 0, 1, 1, 1, 1, 1};
     vsh_spheres *made = NULL;
-    vsh_error error = {VSH_OK, ""};
-    static const double bad[] = {0.0, -1.0, INFINITY, NAN, 1e16};
     for (size_t i = 0; i < 5; ++i) {
         list[7] = bad[i];
-        assert_int_equal(vsh_spheres_create(list, 2, NULL, NULL, &made, &error), VSH_ERROR_INPUT);
-        assert_non_null(strstr(error.message, "sphere 1: radius"));
+        assert_fails(vsh_spheres_create(list, 2, NULL, NULL, &made, &failure), VSH_ERROR_INPUT,
+                     "sphere 1: radius");
         assert_null(made);
     }
     list[7] = 1.0;
     list[1] = NAN;
-    assert_int_equal(vsh_spheres_create(list, 2, NULL, NULL, &made, &error), VSH_ERROR_INPUT);
-    assert_non_null(strstr(error.message, "sphere 0: y nan"));
+    assert_fails(vsh_spheres_create(list, 2, NULL, NULL, &made, &failure), VSH_ERROR_INPUT,
+                 "sphere 0: y nan");
     list[1] = 0.0;
-    assert_int_equal(vsh_spheres_create(list, 2, shear, NULL, &made, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_spheres_create(list, 0, NULL, NULL, &made, &error), VSH_ERROR_INPUT);
-    assert_int_equal(vsh_spheres_create(NULL, 2, NULL, NULL, &made, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_spheres_create(list, (size_t)1 << 31, NULL, NULL, &made, &error), VSH_ERROR_LIMIT);
-    vsh_run run = vsh_run_default();
-    run.memory_limit = 150;
-    assert_int_equal(vsh_spheres_create(list, 2, NULL, &run, &made, &error), VSH_ERROR_LIMIT);
+    const vsh_run run = run_within(150);
+    assert_fails(vsh_spheres_create(list, 2, shear, NULL, &made, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vsh_spheres_create(list, 0, NULL, NULL, &made, &failure), VSH_ERROR_INPUT, "");
+    assert_fails(vsh_spheres_create(NULL, 2, NULL, NULL, &made, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vsh_spheres_create(list, (size_t)1 << 31, NULL, NULL, &made, &failure), VSH_ERROR_LIMIT, "");
+    assert_fails(vsh_spheres_create(list, 2, NULL, &run, &made, &failure), VSH_ERROR_LIMIT, "");
 }
 
 static vsh_result read_text(const char *text, double **spheres, size_t *count, vsh_error *error) {
@@ -242,14 +231,12 @@ static vsh_result read_text(const char *text, double **spheres, size_t *count, v
 }
 
 static void rows_of_a_file_are_read_or_refused_by_number(void **state) {
-    (void)state;
     double *spheres = NULL;
     size_t count = 0;
-    vsh_error error = {VSH_OK, ""};
     static const double expected[16] = {1, -2.5, 3e2, 0.5, 4, 5, 6, 7, 8, 9, 10, 11, 0.25, 0, 1, 2};
     assert_int_equal(
         read_text("x,y,z,radius\r\n1,-2.5,3e2,0.5\r\n\n# none\n4; 5; 6; 7\n\"8\",9,\"10\" 11\n.25 0\t1 2",
-                  &spheres, &count, &error),
+                  &spheres, &count, &failure),
         VSH_OK);
     assert_int_equal(count, 4);
     assert_memory_equal(spheres, expected, sizeof expected);
@@ -270,14 +257,14 @@ static void rows_of_a_file_are_read_or_refused_by_number(void **state) {
         {"", ": no spheres"},
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
-        assert_int_equal(read_text(bad[i].text, &spheres, &count, &error), VSH_ERROR_INPUT);
-        if (strstr(error.message, bad[i].message) == NULL) {
-            fail_msg("%s: %s", bad[i].message, error.message);
+        assert_int_equal(read_text(bad[i].text, &spheres, &count, &failure), VSH_ERROR_INPUT);
+        if (strstr(failure.message, bad[i].message) == NULL) {
+            fail_msg("%s: %s", bad[i].message, failure.message);
         }
         assert_null(spheres);
     }
-    assert_int_equal(vsh_spheres_read("no such file.csv", NULL, &spheres, &count, &error), VSH_ERROR_READ);
-    assert_int_equal(vsh_spheres_read(".", NULL, &spheres, &count, &error), VSH_ERROR_READ);
+    assert_int_equal(vsh_spheres_read("no such file.csv", NULL, &spheres, &count, &failure), VSH_ERROR_READ);
+    assert_int_equal(vsh_spheres_read(".", NULL, &spheres, &count, &failure), VSH_ERROR_READ);
 }
 
 int main(void) {

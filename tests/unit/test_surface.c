@@ -1,5 +1,6 @@
 /* The surface of a field's finest level: against closed forms, and rays against what the cells read. */
 #include "shading.h"
+#include "testing.h"
 
 #include "field/surface.h"
 #include "trace/embree.h"
@@ -18,13 +19,13 @@ static quads quads_of(const vsh_field *field, double height) {
     const vsh_run run = vsh_run_default();
     vshi_job *job = vshi_job_begin(&run, "surface", 1);
     vshi_surface s;
-    assert_int_equal(vshi_surface_find(field, height, (vshi_budget){&run, 0.0}, job, &s, NULL), VSH_OK);
+    assert_ok(vshi_surface_find(field, height, (vshi_budget){&run, 0.0}, job, &s, &failure));
     quads q = {s.corners[s.brick_count], s.quads[s.brick_count], NULL, NULL};
     q.corners = calloc(3 * q.corner_count, sizeof(float));
     q.quads = calloc(4 * q.quad_count, sizeof(uint32_t));
     assert_true(q.corners != NULL && q.quads != NULL && q.quad_count > 0);
     const double nowhere[3] = {0.0, 0.0, 0.0};
-    assert_int_equal(vshi_surface_write(&s, nowhere, 1.0, job, q.corners, q.quads, NULL), VSH_OK);
+    assert_ok(vshi_surface_write(&s, nowhere, 1.0, job, q.corners, q.quads, &failure));
     vshi_surface_free(&s);
     vshi_job_end(job);
     return q;
@@ -108,33 +109,27 @@ static vsh_field *rubble(void) {
 }
 
 static void surface_is_closed(void **state) {
-    (void)state;
     const double heights[] = {0.0, GROWN, -1.0};
-    vsh_field *seeds = field_of(truth_seeds(), VOXEL, 1.0);
-    vsh_field *hollow = hollow_box(VOXEL, 1.1 * VOXEL), *stones = rubble();
+    OWNED(vsh_field) *seeds = field_of(truth_seeds(), VOXEL, 1.0);
+    OWNED(vsh_field) *hollow = hollow_box(VOXEL, 1.1 * VOXEL), *stones = rubble();
     for (size_t i = 0; i < sizeof heights / sizeof heights[0]; ++i) {
-        quads q = quads_of(seeds, heights[i]);
+        FREED_BY(quads_free) quads q = quads_of(seeds, heights[i]);
         assert_int_equal(count_open_edges(&q), 0);
         quads_free(&q);
         q = quads_of(stones, heights[i]);
         assert_int_equal(count_open_edges(&q), 0);
-        quads_free(&q);
     }
     for (size_t i = 0; i < 2; ++i) { /* its walls are thinner than the third */
         quads q = quads_of(hollow, heights[i]);
         assert_int_equal(count_open_edges(&q), 0);
         quads_free(&q);
     }
-    vsh_field_free(stones);
-    vsh_field_free(hollow);
-    vsh_field_free(seeds);
 }
 
 static void corners_lie_on_the_sphere(void **state) {
-    (void)state;
     const truth_solid ball = {.shape = TRUTH_SPHERE, .center = {0.1, 0.2, 0.3}, .radius = 0.5};
-    vsh_field *field = field_of((truth_scene){&ball, 1}, VOXEL, 1.0);
-    quads q = quads_of(field, GROWN);
+    OWNED(vsh_field) *field = field_of((truth_scene){&ball, 1}, VOXEL, 1.0);
+    FREED_BY(quads_free) quads q = quads_of(field, GROWN);
     double worst = 0.0;
     for (size_t i = 0; i < q.corner_count; ++i) {
         const float *c = q.corners + 3 * i;
@@ -142,10 +137,7 @@ static void corners_lie_on_the_sphere(void **state) {
         const double off = truth_solid_distance(&ball, (double[]){p.x, p.y, p.z}) / VOXEL - GROWN;
         worst = fmax(worst, fabs(off));
     }
-    print_message("corners are within %.4f voxels of the sphere\n", worst);
-    assert_true(worst < 0.02); /* an edge's chord: 1/8 voxel² over the radius of 12.5 */
-    quads_free(&q);
-    vsh_field_free(field);
+    assert_less(worst, 0.02); /* an edge's chord: 1/8 voxel² over the radius of 12.5 */
 }
 
 /* The least that the finest level reads along a ray, voxels, by steps of a fiftieth. */
@@ -185,23 +177,20 @@ static void hold_rays(const vsh_field *field, size_t tries, double reach, double
         ++looked;
         blocked_count += blocked;
     }
-    print_message("%zu of %zu rays are blocked; the surface is off by at most %.3f voxels\n", blocked_count,
-                  looked, worst);
     assert_true(looked > tries / 50 && blocked_count > looked / 20);
-    assert_true(worst < chord);
+    assert_less(worst, chord);
 }
 
 /* The same with a surface; frees it. */
 static vsh_field *with_surface(vsh_field *field) {
     const vsh_run run = vsh_run_default();
     vshi_job *job = vshi_job_begin(&run, "surface", 1);
-    assert_int_equal(vshi_field_add_surface(field, (vshi_budget){&run, 0.0}, job, NULL), VSH_OK);
+    assert_ok(vshi_field_add_surface(field, (vshi_budget){&run, 0.0}, job, &failure));
     vshi_job_end(job);
     return field;
 }
 
 static void rays_meet_what_the_cells_read(void **state) {
-    (void)state;
     if (!vsh_triangles_available()) {
         skip();
     }
@@ -227,8 +216,8 @@ static vsh_result make(const vsh_grid *grid, const vsh_run *run, vsh_field **fie
 /* Shadow and AO of the floor by adaptive. */
 static void shade_floor(const vsh_field *field, int32_t threads, size_t size, float *shadow, float *ao) {
     const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
-    double *positions = calloc(3 * size * size, sizeof *positions);
-    float *normals = calloc(3 * size * size, sizeof *normals);
+    FREED double *positions = calloc(3 * size * size, sizeof *positions);
+    FREED float *normals = calloc(3 * size * size, sizeof *normals);
     assert_true(positions != NULL && normals != NULL);
     floor_texels(size, positions, normals);
     const vsh_points points = {size * size, positions, normals, NULL};
@@ -237,15 +226,10 @@ static void shade_floor(const vsh_field *field, int32_t threads, size_t size, fl
     options.ao_distance = 0.6;
     options.method = VSH_SHADOW_ADAPTIVE;
     options.ao_method = VSH_AO_ADAPTIVE;
-    vsh_run run = vsh_run_default();
-    run.threads = threads;
-    assert_int_equal(
-        vsh_shade_shadow(occluders_of(field), &points, &light, &options, &run, shadow, NULL, NULL, NULL),
-        VSH_OK);
-    assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &options, &run, ao, NULL, NULL, NULL, NULL),
-                     VSH_OK);
-    free(normals);
-    free(positions);
+    const vsh_run run = run_on(threads);
+    assert_ok(
+        vsh_shade_shadow(occluders_of(field), &points, &light, &options, &run, shadow, NULL, NULL, &failure));
+    assert_ok(vsh_shade_ao(occluders_of(field), &points, &options, &run, ao, NULL, NULL, NULL, &failure));
 }
 
 static double rms_of(const float *a, const float *b, size_t count) {
@@ -257,16 +241,15 @@ static double rms_of(const float *a, const float *b, size_t count) {
 }
 
 static void traced_values_are_near_those_of_marched_rays(void **state) {
-    (void)state;
     if (!vsh_triangles_available()) {
         skip();
     }
     enum { SIZE = 64, COUNT = SIZE * SIZE };
     static float shadow[3][COUNT], ao[3][COUNT];
     vsh_grid *grid = grid_of(truth_seeds(), VOXEL);
-    vsh_field *traced = NULL;
+    OWNED(vsh_field) *traced = NULL;
     assert_int_equal(make(grid, NULL, &traced, NULL), VSH_OK);
-    vsh_field *marched = field_of_grid(grid, 1.0);
+    OWNED(vsh_field) *marched = field_of_grid(grid, 1.0);
     assert_true(traced->surface != NULL && marched->surface == NULL);
     shade_floor(marched, 1, SIZE, shadow[0], ao[0]);
     shade_floor(traced, 1, SIZE, shadow[1], ao[1]);
@@ -280,62 +263,50 @@ static void traced_values_are_near_those_of_marched_rays(void **state) {
                                   INFINITY, 256, truth),
                      0);
     const double marched_off = rms_of(shadow[0], truth, COUNT), traced_off = rms_of(shadow[1], truth, COUNT);
-    print_message("shadow is %.4f from the truth marched, %.4f traced\n", marched_off, traced_off);
-    assert_true(traced_off < 1.25 * marched_off);
+    assert_less(traced_off, 1.25 * marched_off);
     const double shadow_off = rms_of(shadow[0], shadow[1], COUNT), ao_off = rms_of(ao[0], ao[1], COUNT);
-    print_message("traced and marched are %.4f apart in shadow, %.4f in AO\n", shadow_off, ao_off);
     assert_true(shadow_off < 0.015 && ao_off < 0.01); /* shadow: casters are grown by 0.15 voxels */
     assert_memory_equal(shadow[1], shadow[2], sizeof shadow[1]);
     assert_memory_equal(ao[1], ao[2], sizeof ao[1]);
-    vsh_field_free(marched);
-    vsh_field_free(traced);
 }
 
 /* Between two lattice planes, which read half a voxel. */
 static void plate_that_voxels_lose_has_no_surface(void **state) {
-    (void)state;
     const truth_solid plate = {.shape = TRUTH_BOX,
                                .center = {0.0, 0.5 * VOXEL, 0.0},
                                .half = {10.0 * VOXEL, 0.05 * VOXEL, 10.0 * VOXEL}};
-    vsh_grid *grid = grid_of((truth_scene){&plate, 1}, VOXEL);
-    vsh_field *field = NULL;
+    OWNED(vsh_grid) *grid = grid_of((truth_scene){&plate, 1}, VOXEL);
+    OWNED(vsh_field) *field = NULL;
     assert_int_equal(make(grid, NULL, &field, NULL), VSH_OK);
     assert_null(field->surface);
-    vsh_field_free(field);
-    vsh_grid_free(grid);
 }
 
 static int32_t cancel_surface(void *user, const char *stage, double fraction) {
-    (void)stage;
     return fraction > *(const double *)user;
 }
 
 static void surface_keeps_the_limit_and_ends_when_asked(void **state) {
-    (void)state;
     if (!vsh_triangles_available()) {
         skip();
     }
-    vsh_grid *grid = grid_of(truth_seeds(), VOXEL);
+    OWNED(vsh_grid) *grid = grid_of(truth_seeds(), VOXEL);
     vsh_field *field = NULL;
-    vsh_error error = {VSH_OK, ""};
     vsh_run run = vsh_run_default();
-    vsh_field *plain = field_of(truth_seeds(), VOXEL, 1.0);
+    OWNED(vsh_field) *plain = field_of(truth_seeds(), VOXEL, 1.0);
     vsh_field_info info;
     vsh_grid_info voxels;
     vsh_field_get_info(plain, &info);
     vsh_grid_get_info(grid, &voxels);
     run.memory_limit = 2 * (info.bytes + voxels.bytes);
-    assert_int_equal(make(grid, &run, &field, &error), VSH_ERROR_LIMIT);
-    assert_non_null(strstr(error.message, "surface"));
+    assert_int_equal(make(grid, &run, &field, &failure), VSH_ERROR_LIMIT);
+    assert_non_null(strstr(failure.message, "surface"));
     assert_null(field);
     run.memory_limit = 0;
     run.progress = cancel_surface;
     double most = 0.5;
     run.user = &most;
-    assert_int_equal(make(grid, &run, &field, &error), VSH_ERROR_CANCELLED);
+    assert_int_equal(make(grid, &run, &field, &failure), VSH_ERROR_CANCELLED);
     assert_null(field);
-    vsh_field_free(plain);
-    vsh_grid_free(grid);
 }
 
 int main(void) {

@@ -1,42 +1,47 @@
-/* Texels: places in UV space, coverage, what is refused and counted. test_texels_smooth.c has what normals
- * do. */
+/* Texels: places in UV space, coverage, what is refused and counted, and what normals do. */
+#include "bake/texels.h"
+#include "testing.h"
 #include "texels_of.h"
 
-static void assert_fails(const vsh_mesh *mesh, vsh_lightmap_options options, vsh_result code,
-                         const char *words[], size_t word_count) {
-    vsh_charts *charts = NULL;
-    vsh_error error = {0};
-    assert_int_equal(vsh_charts_create(mesh, 1, &options, NULL, NULL, &charts, &error), code);
-    assert_null(charts);
-    assert_int_equal(error.code, code);
-    for (size_t i = 0; i < word_count; ++i) {
-        if (strstr(error.message, words[i]) == NULL) {
-            fail_msg("'%s' is not in: %s", words[i], error.message);
-        }
-    }
+/* The charts of meshes, their texels and samples. */
+typedef struct sampled {
+    vsh_charts *charts;
+    vsh_charts_info info;
+    vsh_texels *texels;
+    vsh_texel_samples samples;
+} sampled;
+
+static sampled sample(const vsh_mesh *meshes, size_t count, vsh_lightmap_options options,
+                      vsh_uv_report *reports) {
+    sampled s = {.charts = create(meshes, count, options, reports)};
+    vsh_charts_get_info(s.charts, &s.info);
+    s.texels = rasterize(s.charts);
+    s.samples = vsh_texels_samples(s.texels);
+    return s;
+}
+
+static void free_sampled(sampled *s) {
+    vsh_texels_free(s->texels);
+    vsh_charts_free(s->charts);
 }
 
 static void a_quad_over_the_unit_square_puts_every_texel_at_its_analytic_place(void **state) {
-    (void)state;
     quad q;
     make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
     const int32_t sizes[][3] = {{16, 16, 1}, {37, 11, 1}, {1, 1, 1}, {8, 24, 2}, {13, 9, 3}, {3, 2, 16}};
     for (size_t s = 0; s < sizeof sizes / sizeof sizes[0]; ++s) {
         const int32_t w = sizes[s][0], h = sizes[s][1], n = sizes[s][2];
         vsh_uv_report report;
-        vsh_charts *charts = create(&q.mesh, 1, size_of(w, h, n), &report);
-        vsh_charts_info info;
-        vsh_charts_get_info(charts, &info);
-        assert_int_equal(info.covered, w * h);
-        assert_int_equal(info.samples, w * h * n * n);
+        FREED_BY(free_sampled) sampled made = sample(&q.mesh, 1, size_of(w, h, n), &report);
+        assert_int_equal(made.info.covered, w * h);
+        assert_int_equal(made.info.samples, w * h * n * n);
         assert_int_equal(report.overlap_texels, 0);
         assert_int_equal(report.overlap_triangles, 0);
         assert_int_equal(report.outside_triangles, 0);
         assert_int_equal(report.degenerate_triangles, 0);
-        vsh_texels *texels = rasterize(charts);
-        const vsh_texel_samples samples = vsh_texels_samples(texels);
-        double *sum = calloc((size_t)(w * h), 2 * sizeof *sum);
-        int *count = calloc((size_t)(w * h), sizeof *count);
+        const vsh_texel_samples samples = made.samples;
+        FREED double *sum = calloc((size_t)(w * h), 2 * sizeof *sum);
+        FREED int *count = calloc((size_t)(w * h), sizeof *count);
         for (size_t i = 0; i < samples.count; ++i) {
             const size_t texel = vsh_texel_place(samples.texels[i], w);
             const double *p = samples.positions + 3 * i;
@@ -56,31 +61,22 @@ static void a_quad_over_the_unit_square_puts_every_texel_at_its_analytic_place(v
             /* Row 0 lies at v = 1. */
             assert_true(fabs(sum[2 * texel + 1] / (n * n) - 3.0 * (1.0 - (texel / w + 0.5) / h)) < 1e-12);
         }
-        free(count);
-        free(sum);
-        vsh_texels_free(texels);
-        vsh_charts_free(charts);
     }
 }
 
 static void neighbouring_samples_come_cell_by_cell(void **state) {
-    (void)state;
     quad q;
     make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
-    vsh_charts *charts = create(&q.mesh, 1, size_of(24, 16, 1), NULL);
-    vsh_texels *texels = rasterize(charts);
-    const vsh_texel_samples samples = vsh_texels_samples(texels);
+    FREED_BY(free_sampled) sampled made = sample(&q.mesh, 1, size_of(24, 16, 1), NULL);
+    const vsh_texel_samples samples = made.samples;
     for (size_t i = 0; i < samples.count; ++i) {
         const size_t column = vsh_texel_column(samples.texels[i]), row = vsh_texel_row(samples.texels[i]);
         assert_int_equal(row / 8 * 3 + column / 8, i / 64);
     }
-    vsh_texels_free(texels);
-    vsh_charts_free(charts);
 }
 
 /* A fan around a point that lies on a texel centre, and many that do not. */
 static void triangles_that_share_edges_and_corners_leave_no_gap_and_no_overlap(void **state) {
-    (void)state;
     enum { SPOKES = 17 };
     for (int variant = 0; variant < 8; ++variant) {
         float positions[3 * (SPOKES + 1)] = {0}, uvs[2 * (SPOKES + 1)];
@@ -107,41 +103,27 @@ static void triangles_that_share_edges_and_corners_leave_no_gap_and_no_overlap(v
                                .vertex_count = SPOKES + 1,
                                .triangle_count = SPOKES};
         vsh_uv_report report;
-        vsh_charts *charts = create(&mesh, 1, size_of(16, 16, 3), &report);
-        vsh_charts_info info;
-        vsh_charts_get_info(charts, &info);
-        assert_int_equal(info.samples, 16 * 16 * 9);
+        FREED_BY(free_sampled) sampled made = sample(&mesh, 1, size_of(16, 16, 3), &report);
+        assert_int_equal(made.info.samples, 16 * 16 * 9);
         assert_int_equal(report.overlap_texels, 0);
         assert_int_equal(report.overlap_triangles, 0);
         assert_int_equal(report.outside_triangles, SPOKES);
-        vsh_charts_free(charts);
     }
 }
 
-static void a_chart_that_fits_the_texels_has_no_border_texels(void **state) {
-    (void)state;
-    quad q;
-    make_quad(&q, 4.0f / 16.0f, 4.0f / 16.0f, 12.0f / 16.0f, 12.0f / 16.0f);
-    vsh_charts *charts = create(&q.mesh, 1, size_of(16, 16, 1), NULL);
-    vsh_charts_info info;
-    vsh_charts_get_info(charts, &info);
-    assert_int_equal(info.covered, 64);
-    vsh_charts_free(charts);
-}
-
 static void a_chart_that_does_not_fit_has_border_texels_near_and_inside_it(void **state) {
-    (void)state;
     const int32_t supersample[] = {1, 2};
     quad q;
+    make_quad(&q, 4.0f / 16.0f, 4.0f / 16.0f, 12.0f / 16.0f, 12.0f / 16.0f);
+    sampled fits = sample(&q.mesh, 1, size_of(16, 16, 1), NULL);
+    assert_int_equal(fits.info.covered, 64);
+    free_sampled(&fits);
     /* From 4.8 to 11.2 of 16: the texels 4 and 11 are touched, their centres and samples (n = 2) are not. */
     make_quad(&q, 0.3f, 0.3f, 0.7f, 0.7f);
     for (size_t s = 0; s < 2; ++s) {
-        vsh_charts *charts = create(&q.mesh, 1, size_of(16, 16, supersample[s]), NULL);
-        vsh_texels *texels = rasterize(charts);
-        const vsh_texel_samples samples = vsh_texels_samples(texels);
-        vsh_charts_info info;
-        vsh_charts_get_info(charts, &info);
-        assert_int_equal(info.covered, 64);
+        FREED_BY(free_sampled) sampled made = sample(&q.mesh, 1, size_of(16, 16, supersample[s]), NULL);
+        const vsh_texel_samples samples = made.samples;
+        assert_int_equal(made.info.covered, 64);
         int border = 0;
         for (size_t i = 0; i < samples.count; ++i) {
             const double low = (double)0.3f, high = (double)0.7f;
@@ -166,38 +148,31 @@ static void a_chart_that_does_not_fit_has_border_texels_near_and_inside_it(void 
             assert_true(samples.positions[3 * i] >= 2.0 * (double)0.3f - 1e-7);
             assert_true(samples.positions[3 * i] <= 2.0 * (double)0.7f + 1e-7);
         }
-        vsh_texels_free(texels);
-        vsh_charts_free(charts);
     }
 }
 
 static void a_triangle_smaller_than_a_texel_still_has_one(void **state) {
-    (void)state;
     const float positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
     const float uvs[] = {0.51f, 0.51f, 0.512f, 0.51f, 0.51f, 0.512f};
     const uint32_t indices[] = {0, 1, 2};
     const vsh_mesh mesh = {
         .positions = positions, .uvs = uvs, .indices = indices, .vertex_count = 3, .triangle_count = 1};
-    vsh_charts *charts = create(&mesh, 1, size_of(8, 8, 1), NULL);
-    vsh_texels *texels = rasterize(charts);
-    const vsh_texel_samples samples = vsh_texels_samples(texels);
+    FREED_BY(free_sampled) sampled made = sample(&mesh, 1, size_of(8, 8, 1), NULL);
+    const vsh_texel_samples samples = made.samples;
     assert_int_equal(samples.count, 1);
     assert_int_equal(samples.texels[0], vsh_texel(4, 3));
     const double *p = samples.positions;
     assert_true(p[0] >= 0.0 && p[1] >= 0.0 && p[0] + p[1] <= 1.0 + 1e-12);
-    vsh_texels_free(texels);
-    vsh_charts_free(charts);
 }
 
 static void overlaps_are_counted_where_two_meshes_share_texels(void **state) {
-    (void)state;
     quad q[3];
     make_quad(&q[0], 0.0f, 0.0f, 0.5f, 1.0f);
     make_quad(&q[1], 0.5f, 0.0f, 1.0f, 1.0f); /* shares an edge with the first: no overlap */
     make_quad(&q[2], 0.25f, 0.25f, 0.5f, 0.5f);
     const vsh_mesh meshes[] = {q[0].mesh, q[1].mesh, q[2].mesh};
     vsh_uv_report reports[3];
-    vsh_charts *charts = create(meshes, 3, size_of(32, 32, 1), reports);
+    OWNED(vsh_charts) *charts = create(meshes, 3, size_of(32, 32, 1), reports);
     assert_int_equal(reports[0].overlap_texels, 0);
     assert_int_equal(reports[1].overlap_texels, 0);
     assert_int_equal(reports[2].overlap_texels, 8 * 8);
@@ -206,11 +181,9 @@ static void overlaps_are_counted_where_two_meshes_share_texels(void **state) {
     vsh_charts_info info;
     vsh_charts_get_info(charts, &info);
     assert_int_equal(info.samples, 32 * 32);
-    vsh_charts_free(charts);
 }
 
 static void the_first_triangle_keeps_a_texel_that_two_cover(void **state) {
-    (void)state;
     quad q[2];
     make_quad(&q[0], 0.0f, 0.0f, 1.0f, 1.0f);
     make_quad(&q[1], 0.0f, 0.0f, 1.0f, 1.0f);
@@ -219,20 +192,16 @@ static void the_first_triangle_keeps_a_texel_that_two_cover(void **state) {
     }
     for (int first = 0; first < 2; ++first) {
         const vsh_mesh meshes[] = {q[first].mesh, q[1 - first].mesh};
-        vsh_charts *charts = create(meshes, 2, size_of(9, 9, 1), NULL);
-        vsh_texels *texels = rasterize(charts);
-        const vsh_texel_samples samples = vsh_texels_samples(texels);
+        FREED_BY(free_sampled) sampled made = sample(meshes, 2, size_of(9, 9, 1), NULL);
+        const vsh_texel_samples samples = made.samples;
         assert_int_equal(samples.count, 81);
         for (size_t i = 0; i < samples.count; ++i) {
             assert_true(samples.positions[3 * i + 2] == (first == 0 ? 0.0 : 7.0));
         }
-        vsh_texels_free(texels);
-        vsh_charts_free(charts);
     }
 }
 
 static void any_number_of_threads_gives_the_same_bits(void **state) {
-    (void)state;
     sphere s[2];
     make_sphere(&s[0], 40, 1.0);
     make_sphere(&s[1], 13, 1.0); /* the same chart: everything overlaps */
@@ -242,12 +211,11 @@ static void any_number_of_threads_gives_the_same_bits(void **state) {
     vsh_texels *texels[3];
     vsh_uv_report reports[3][2];
     for (int t = 0; t < 3; ++t) {
-        vsh_run run = vsh_run_default();
-        run.threads = threads[t];
+        const vsh_run run = run_on(threads[t]);
         const vsh_lightmap_options options = size_of(301, 203, 2);
         memset(reports[t], 0, sizeof reports[t]);
-        assert_int_equal(vsh_charts_create(meshes, 2, &options, &run, reports[t], &charts[t], NULL), VSH_OK);
-        assert_int_equal(vsh_texels_create(charts[t], &run, &texels[t], NULL), VSH_OK);
+        assert_ok(vsh_charts_create(meshes, 2, &options, &run, reports[t], &charts[t], &failure));
+        assert_ok(vsh_texels_create(charts[t], &run, &texels[t], &failure));
     }
     const vsh_texel_samples a = vsh_texels_samples(texels[0]);
     for (int t = 1; t < 3; ++t) {
@@ -269,7 +237,6 @@ static void any_number_of_threads_gives_the_same_bits(void **state) {
 }
 
 static void huge_uvs_are_clipped_and_counted(void **state) {
-    (void)state;
     const float huge[] = {1e30f, 3e38f, 1e10f, 1e6f, 300.0f, 1.1f};
     for (size_t k = 0; k < sizeof huge / sizeof huge[0]; ++k) {
         const float positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
@@ -278,23 +245,19 @@ static void huge_uvs_are_clipped_and_counted(void **state) {
         const vsh_mesh mesh = {
             .positions = positions, .uvs = uvs, .indices = indices, .vertex_count = 3, .triangle_count = 1};
         vsh_uv_report report;
-        vsh_charts *charts = create(&mesh, 1, size_of(64, 32, 2), &report);
+        FREED_BY(free_sampled) sampled made = sample(&mesh, 1, size_of(64, 32, 2), &report);
         assert_int_equal(report.outside_triangles, 1);
-        vsh_texels *texels = rasterize(charts);
-        const vsh_texel_samples samples = vsh_texels_samples(texels);
+        const vsh_texel_samples samples = made.samples;
         assert_true(samples.count > 0 && samples.count <= 64 * 32 * 4);
         for (size_t i = 0; i < samples.count; ++i) {
             const double *p = samples.positions + 3 * i;
             assert_true(vsh_texel_column(samples.texels[i]) < 64 && vsh_texel_row(samples.texels[i]) < 32);
             assert_true(p[0] >= 0.0 && p[1] >= 0.0 && p[0] + p[1] <= 1.0 + 1e-9 && p[2] == 0.0);
         }
-        vsh_texels_free(texels);
-        vsh_charts_free(charts);
     }
 }
 
 static void triangles_without_area_are_skipped_and_those_of_uv_space_counted(void **state) {
-    (void)state;
     const float positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 2, 0, 0};
     const float uvs[] = {0, 0, 1, 0, 0, 1, 0.5f, 0.5f};
     /* A good one; no area in the world; no area in UV space (corners 1, 2 and 3 lie on a line there). */
@@ -302,54 +265,57 @@ static void triangles_without_area_are_skipped_and_those_of_uv_space_counted(voi
     const vsh_mesh mesh = {
         .positions = positions, .uvs = uvs, .indices = indices, .vertex_count = 4, .triangle_count = 4};
     vsh_uv_report report;
-    vsh_charts *charts = create(&mesh, 1, size_of(8, 8, 1), &report);
+    FREED_BY(free_sampled) sampled made = sample(&mesh, 1, size_of(8, 8, 1), &report);
     assert_int_equal(report.degenerate_triangles, 1);
     assert_int_equal(report.overlap_texels, 0);
-    vsh_charts_free(charts);
+}
+
+/* The message has both words. */
+static void assert_refused(const vsh_mesh *mesh, vsh_lightmap_options options, vsh_result code,
+                           const char *value, const char *limit) {
+    vsh_charts *charts = NULL;
+    assert_fails(vsh_charts_create(mesh, 1, &options, NULL, NULL, &charts, &failure), code, value);
+    assert_null(charts);
+    assert_int_equal(failure.code, code);
+    assert_non_null(strstr(failure.message, limit));
 }
 
 static void bad_sizes_and_uvs_are_refused_with_the_value_and_the_limit(void **state) {
-    (void)state;
     quad q;
     make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
-    assert_fails(&q.mesh, size_of(0, 8, 1), VSH_ERROR_ARGUMENT, (const char *[]){"width 0", "65536"}, 2);
-    assert_fails(&q.mesh, size_of(8, 1000000, 1), VSH_ERROR_ARGUMENT,
-                 (const char *[]){"height 1000000", "65536"}, 2);
-    assert_fails(&q.mesh, size_of(8, -1, 1), VSH_ERROR_ARGUMENT, (const char *[]){"height -1"}, 1);
-    assert_fails(&q.mesh, size_of(8, 8, 17), VSH_ERROR_ARGUMENT, (const char *[]){"supersample 17", "16"}, 2);
-    vsh_lightmap_options padded = size_of(8, 8, 1);
+    vsh_lightmap_options good = size_of(8, 8, 1), padded = good;
     padded.padding = 4097;
-    assert_fails(&q.mesh, padded, VSH_ERROR_ARGUMENT, (const char *[]){"padding 4097", "4096"}, 2);
+    assert_refused(&q.mesh, size_of(0, 8, 1), VSH_ERROR_ARGUMENT, "width 0", "65536");
+    assert_refused(&q.mesh, size_of(8, 1000000, 1), VSH_ERROR_ARGUMENT, "height 1000000", "65536");
+    assert_refused(&q.mesh, size_of(8, -1, 1), VSH_ERROR_ARGUMENT, "height -1", "");
+    assert_refused(&q.mesh, size_of(8, 8, 17), VSH_ERROR_ARGUMENT, "supersample 17", "16");
+    assert_refused(&q.mesh, padded, VSH_ERROR_ARGUMENT, "padding 4097", "4096");
     q.uvs[5] = NAN;
-    assert_fails(&q.mesh, size_of(8, 8, 1), VSH_ERROR_INPUT, (const char *[]){"mesh 'quad'", "vertex 2"}, 2);
+    assert_refused(&q.mesh, good, VSH_ERROR_INPUT, "mesh 'quad'", "vertex 2");
     q.uvs[5] = -INFINITY;
-    assert_fails(&q.mesh, size_of(8, 8, 1), VSH_ERROR_INPUT, (const char *[]){"mesh 'quad'", "vertex 2"}, 2);
+    assert_refused(&q.mesh, good, VSH_ERROR_INPUT, "mesh 'quad'", "vertex 2");
     q.mesh.uvs = NULL;
-    assert_fails(&q.mesh, size_of(8, 8, 1), VSH_ERROR_INPUT,
-                 (const char *[]){"mesh 'quad'", "no lightmap UVs"}, 2);
+    assert_refused(&q.mesh, good, VSH_ERROR_INPUT, "mesh 'quad'", "no lightmap UVs");
 }
 
 static void the_memory_limit_is_passed_by_no_lightmap(void **state) {
-    (void)state;
     quad q;
     make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
     vsh_run run = vsh_run_default();
     vsh_charts *charts = NULL;
-    vsh_error error = {0};
     const vsh_lightmap_options small = size_of(64, 64, 1), large = size_of(65536, 65536, 16);
     run.memory_limit = 1000000;
-    assert_int_equal(vsh_charts_create(&q.mesh, 1, &small, &run, NULL, &charts, &error), VSH_OK);
+    assert_ok(vsh_charts_create(&q.mesh, 1, &small, &run, NULL, &charts, &failure));
     vsh_charts_info info;
     vsh_charts_get_info(charts, &info);
     assert_true(info.bytes <= run.memory_limit);
     vsh_charts_free(charts);
-    assert_int_equal(vsh_charts_create(&q.mesh, 1, &large, &run, NULL, &charts, &error), VSH_ERROR_LIMIT);
+    assert_int_equal(vsh_charts_create(&q.mesh, 1, &large, &run, NULL, &charts, &failure), VSH_ERROR_LIMIT);
     assert_null(charts);
-    assert_non_null(strstr(error.message, "limit"));
+    assert_non_null(strstr(failure.message, "limit"));
 }
 
 static int32_t stop_at_half(void *user, const char *stage, double fraction) {
-    (void)stage;
     double *last = user;
     assert_true(fraction >= *last && fraction <= 1.0);
     *last = fraction;
@@ -357,8 +323,7 @@ static int32_t stop_at_half(void *user, const char *stage, double fraction) {
 }
 
 static void progress_rises_and_cancels(void **state) {
-    (void)state;
-    sphere s;
+    FREED_BY(free_sphere) sphere s;
     make_sphere(&s, 20, 1.0);
     vsh_run run = vsh_run_default();
     double last = 0.0;
@@ -369,7 +334,6 @@ static void progress_rises_and_cancels(void **state) {
     assert_int_equal(vsh_charts_create(&s.mesh, 1, &options, &run, NULL, &charts, NULL), VSH_ERROR_CANCELLED);
     assert_null(charts);
     assert_true(last >= 0.5 && last < 1.0);
-    free_sphere(&s);
 }
 
 static void count_warning(void *user, const char *message) {
@@ -378,7 +342,6 @@ static void count_warning(void *user, const char *message) {
 }
 
 static void overlaps_tell_own_charts_from_those_of_other_objects_and_name_the_worst_pair(void **state) {
-    (void)state;
     enum { COUNT = 5 };
     quad q[COUNT];
     make_quad(&q[0], 0.0f, 0.0f, 0.5f, 0.5f);
@@ -398,7 +361,7 @@ static void overlaps_tell_own_charts_from_those_of_other_objects_and_name_the_wo
         options.supersample = n;
         vsh_uv_report reports[COUNT];
         vsh_charts *charts = NULL;
-        assert_int_equal(vsh_charts_create(meshes, COUNT, &options, NULL, reports, &charts, NULL), VSH_OK);
+        assert_ok(vsh_charts_create(meshes, COUNT, &options, NULL, reports, &charts, &failure));
         vsh_charts_free(charts);
         assert_int_equal(reports[1].overlap_texels, 32 * 16);
         assert_int_equal(reports[1].other_texels, 0);
@@ -412,7 +375,6 @@ static void overlaps_tell_own_charts_from_those_of_other_objects_and_name_the_wo
 }
 
 static void overlaps_are_warned_of_by_mesh(void **state) {
-    (void)state;
     quad q[2];
     make_quad(&q[0], 0.0f, 0.0f, 1.0f, 1.0f);
     make_quad(&q[1], 0.0f, 0.0f, 2.0f, 1.0f);
@@ -421,11 +383,183 @@ static void overlaps_are_warned_of_by_mesh(void **state) {
     vsh_run run = vsh_run_default();
     run.warning = count_warning;
     run.user = &warnings;
-    vsh_charts *charts = NULL;
+    OWNED(vsh_charts) *charts = NULL;
     const vsh_lightmap_options options = size_of(16, 16, 1);
-    assert_int_equal(vsh_charts_create(meshes, 2, &options, &run, NULL, &charts, NULL), VSH_OK);
+    assert_ok(vsh_charts_create(meshes, 2, &options, &run, NULL, &charts, &failure));
     assert_int_equal(warnings, 2); /* overlap and outside, both of the second mesh */
-    vsh_charts_free(charts);
+}
+
+/* --- smooth normals and mirrors: where samples are lifted to, and which way they face */
+
+static double length_of(const double p[3]) {
+    return sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+}
+
+/* Samples of a sphere with and without its smooth normals. */
+static void sample_both(sphere *s, int32_t size, sampled both[2]) {
+    vsh_mesh flat = s->mesh;
+    flat.normals = NULL;
+    both[0] = sample(&s->mesh, 1, size_of(size, size / 2, 1), NULL);
+    both[1] = sample(&flat, 1, size_of(size, size / 2, 1), NULL);
+    assert_int_equal(both[0].samples.count, both[1].samples.count);
+}
+
+static void samples_of_a_coarse_smooth_sphere_are_lifted_to_within_its_sag(void **state) {
+    const double radius = 2.0;
+    FREED_BY(free_sphere) sphere s;
+    sampled both[2];
+    make_sphere(&s, 6, radius);
+    sample_both(&s, 64, both);
+    const vsh_texel_samples a = both[0].samples, b = both[1].samples;
+    /* A facet is deepest below the middle of its cell's diagonal. */
+    double sag = 0.0, worst = 0.0, before = 0.0;
+    for (size_t i = 0; i < a.count; ++i) {
+        const double *p = a.positions + 3 * i, *q = b.positions + 3 * i;
+        const float *n = a.normals + 3 * i, *g = b.normals + 3 * i;
+        double height = 0.0, cosine = 0.0, unit = 0.0;
+        for (int k = 0; k < 3; ++k) {
+            height += (p[k] - q[k]) * (double)g[k];
+            cosine += (double)n[k] * p[k] / length_of(p);
+            unit += (double)n[k] * (double)n[k];
+        }
+        assert_true(height > -1e-6);
+        assert_true(cosine > 0.98);
+        assert_near(unit, 1.0, 1e-6);
+        sag = fmax(sag, radius - length_of(q));
+        worst = fmax(worst, fabs(length_of(p) - radius));
+        before += radius - length_of(q);
+    }
+    assert_true(before > 0.0);
+    assert_true(worst <= sag * 1.05);
+    free_sampled(&both[0]);
+    free_sampled(&both[1]);
+}
+
+static void the_inside_of_a_smooth_sphere_is_not_lifted(void **state) {
+    FREED_BY(free_sphere) sphere s;
+    sampled both[2];
+    make_sphere(&s, 6, 1.0);
+    for (size_t i = 0; i < s.mesh.triangle_count; ++i) {
+        const uint32_t first = s.indices[3 * i];
+        s.indices[3 * i] = s.indices[3 * i + 1];
+        s.indices[3 * i + 1] = first;
+    }
+    for (size_t v = 0; v < 3 * s.mesh.vertex_count; ++v) {
+        s.normals[v] = -s.normals[v];
+    }
+    sample_both(&s, 32, both);
+    for (size_t i = 0; i < 3 * both[0].samples.count; ++i) {
+        assert_near(both[0].samples.positions[i], both[1].samples.positions[i], 1e-6);
+    }
+    free_sampled(&both[0]);
+    free_sampled(&both[1]);
+}
+
+static void normals_that_are_flat_or_broken_lift_nothing(void **state) {
+    const float normals[][3] = {{0, 0, 1}, {0, 0, 5},        {0, 0, 0},        {NAN, 0, 1},   {0, 0, -1},
+                                {1, 0, 0}, {1e-5f, 0, 1.0f}, {INFINITY, 0, 1}, {0, 0, 1e-38f}};
+    for (size_t c = 0; c < sizeof normals / sizeof normals[0]; ++c) {
+        quad q;
+        make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
+        float all[12];
+        for (int k = 0; k < 4; ++k) {
+            memcpy(all + 3 * k, normals[c], sizeof normals[c]);
+        }
+        q.mesh.normals = all;
+        FREED_BY(free_sampled) sampled made = sample(&q.mesh, 1, size_of(8, 8, 1), NULL);
+        const vsh_texel_samples samples = made.samples;
+        assert_int_equal(samples.count, 64);
+        for (size_t i = 0; i < samples.count; ++i) {
+            assert_true(samples.positions[3 * i + 2] == 0.0);
+            assert_true(samples.normals[3 * i + 2] == 1.0f);
+        }
+    }
+}
+
+static void a_cube_with_averaged_normals_is_shaded_smooth_but_stays_in_its_place(void **state) {
+    const float positions[] = {-1, -1, 1, 1, -1, 1, 1, 1, 1, -1, 1, 1}; /* one face; normals of the corners */
+    const float uvs[] = {0, 0, 1, 0, 1, 1, 0, 1};
+    const vsh_mesh mesh = {.positions = positions,
+                           .normals = positions,
+                           .uvs = uvs,
+                           .indices = QUAD_INDICES,
+                           .vertex_count = 4,
+                           .triangle_count = 2};
+    FREED_BY(free_sampled) sampled made = sample(&mesh, 1, size_of(16, 16, 1), NULL);
+    const vsh_texel_samples samples = made.samples;
+    for (size_t i = 0; i < samples.count; ++i) {
+        assert_true(samples.positions[3 * i + 2] == 1.0);
+        assert_true(samples.normals[3 * i + 2] > 0.5f);
+    }
+}
+
+static void a_mirrored_transform_keeps_normals_outward(void **state) {
+    const double transforms[][12] = {{-1, 0, 0, 5, 0, 1, 0, 0, 0, 0, 1, 0},
+                                     {2, 0, 0, 5, 0, 0, 3, 0, 0, 1, 0, 0},
+                                     {0.5, 0.25, 0, 5, 0, 2, 0, 0, 0, 0, 3, 0},
+                                     {-1, 0, 0, 5, 0, -2, 0, 0, 0, 0, -1, 0}};
+    for (size_t t = 0; t < 4; ++t) {
+        for (int smooth = 0; smooth < 2; ++smooth) {
+            FREED_BY(free_sphere) sphere s;
+            make_sphere(&s, 8, 1.0);
+            s.mesh.transform = transforms[t];
+            if (!smooth) {
+                s.mesh.normals = NULL;
+            }
+            FREED_BY(free_sampled) sampled made = sample(&s.mesh, 1, size_of(32, 16, 1), NULL);
+            const vsh_texel_samples samples = made.samples;
+            assert_true(samples.count >= 512 - 32);
+            for (size_t i = 0; i < samples.count; ++i) {
+                double geometric = 0.0, deciding = 0.0;
+                for (size_t k = 0; k < 3; ++k) {
+                    const double outward = samples.positions[3 * i + k] - (k == 0 ? 5.0 : 0.0);
+                    geometric += outward * (double)samples.geometric_normals[3 * i + k];
+                    deciding +=
+                        (double)samples.normals[3 * i + k] * (double)samples.geometric_normals[3 * i + k];
+                }
+                assert_true(geometric > 0.0);
+                assert_true(deciding > 0.0);
+            }
+        }
+    }
+}
+
+static void a_mirrored_transform_keeps_uvs_on_their_corners(void **state) {
+    const double mirror[12] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    quad q;
+    make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
+    q.mesh.transform = mirror;
+    FREED_BY(free_sampled) sampled made = sample(&q.mesh, 1, size_of(8, 8, 1), NULL);
+    const vsh_texel_samples samples = made.samples;
+    for (size_t i = 0; i < samples.count; ++i) {
+        assert_true(fabs(samples.positions[3 * i] + 2.0 * (vsh_texel_column(samples.texels[i]) + 0.5) / 8) <
+                    1e-12);
+        assert_true(fabs(samples.positions[3 * i + 1] -
+                         3.0 * (1.0 - (vsh_texel_row(samples.texels[i]) + 0.5) / 8)) < 1e-12);
+    }
+}
+
+/* Some tiles are looked at first: they have no samples, some, or all. */
+static void bounds_of_charts_are_those_of_their_texels(void **state) {
+    FREED_BY(free_sphere) sphere s;
+    make_sphere(&s, 12, 1.0);
+    static const int32_t sizes[][2] = {{8, 8}, {256, 128}, {64, 1024}, {1024, 1016}};
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; ++i) {
+        for (int32_t samples = 1; samples <= 2; ++samples) {
+            FREED_BY(free_sampled)
+            sampled made = sample(&s.mesh, 1, size_of(sizes[i][0], sizes[i][1], samples), NULL);
+            const vsh_texel_samples all = made.samples;
+            double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+            double found_low[3], found_high[3];
+            for (size_t k = 0; k < 3 * all.count; ++k) {
+                low[k % 3] = fmin(low[k % 3], all.positions[k]);
+                high[k % 3] = fmax(high[k % 3], all.positions[k]);
+            }
+            assert_ok(vsh_charts_bounds(made.charts, NULL, found_low, found_high, &failure));
+            assert_memory_equal(found_low, low, sizeof low);
+            assert_memory_equal(found_high, high, sizeof high);
+        }
+    }
 }
 
 int main(void) {
@@ -433,7 +567,6 @@ int main(void) {
         cmocka_unit_test(a_quad_over_the_unit_square_puts_every_texel_at_its_analytic_place),
         cmocka_unit_test(neighbouring_samples_come_cell_by_cell),
         cmocka_unit_test(triangles_that_share_edges_and_corners_leave_no_gap_and_no_overlap),
-        cmocka_unit_test(a_chart_that_fits_the_texels_has_no_border_texels),
         cmocka_unit_test(a_chart_that_does_not_fit_has_border_texels_near_and_inside_it),
         cmocka_unit_test(a_triangle_smaller_than_a_texel_still_has_one),
         cmocka_unit_test(overlaps_are_counted_where_two_meshes_share_texels),
@@ -446,6 +579,13 @@ int main(void) {
         cmocka_unit_test(progress_rises_and_cancels),
         cmocka_unit_test(overlaps_tell_own_charts_from_those_of_other_objects_and_name_the_worst_pair),
         cmocka_unit_test(overlaps_are_warned_of_by_mesh),
+        cmocka_unit_test(samples_of_a_coarse_smooth_sphere_are_lifted_to_within_its_sag),
+        cmocka_unit_test(the_inside_of_a_smooth_sphere_is_not_lifted),
+        cmocka_unit_test(normals_that_are_flat_or_broken_lift_nothing),
+        cmocka_unit_test(a_cube_with_averaged_normals_is_shaded_smooth_but_stays_in_its_place),
+        cmocka_unit_test(a_mirrored_transform_keeps_normals_outward),
+        cmocka_unit_test(a_mirrored_transform_keeps_uvs_on_their_corners),
+        cmocka_unit_test(bounds_of_charts_are_those_of_their_texels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,6 +1,7 @@
 /* What a lattice holds badly or not at all: walls, gaps and needles of a voxel or less, and seams of boxes
  * that touch. On the field by one ray and by rays and cones of a narrow light; on the triangles however thin.
  * docs/numerics.md has the bounds; test_shells.c has meshes in each other. */
+#include "testing.h"
 #include "traced.h"
 
 enum { PHASES = 8, RAYS = 40 };
@@ -53,7 +54,7 @@ static vsh_triangles *triangles_of_blocks(const block *blocks, int count, double
         }
         meshes[i].transform = transforms[i];
     }
-    assert_int_equal(vsh_triangles_create(meshes, (size_t)count, NULL, &triangles, NULL), VSH_OK);
+    assert_ok(vsh_triangles_create(meshes, (size_t)count, NULL, &triangles, &failure));
     for (int i = 0; i < count; ++i) {
         free((void *)(uintptr_t)meshes[i].positions);
         free((void *)(uintptr_t)meshes[i].indices);
@@ -63,7 +64,7 @@ static vsh_triangles *triangles_of_blocks(const block *blocks, int count, double
 
 /* The union of boxes, turned about (1, 2, 3) by `turn` radians and then moved. No field where there is
  * no surface. */
-static caster caster_of_blocks(const block *blocks, int count, double turn, const double by[3]) {
+static casting caster_of_blocks(const block *blocks, int count, double turn, const double by[3]) {
     vsh_sdf_node nodes[16];
     int last = 0;
     for (int i = 0; i < count; ++i) {
@@ -94,18 +95,16 @@ static caster caster_of_blocks(const block *blocks, int count, double turn, cons
     const vsh_sdf sdf = {nodes, (size_t)last + 1};
     vsh_grid_options options = vsh_grid_options_default();
     options.voxel_size = VOXEL;
-    vsh_grid *grid = NULL;
-    caster made = {NULL, triangles_of_blocks(blocks, count, turn, by)};
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &error) == VSH_OK) {
+    OWNED(vsh_grid) *grid = NULL;
+    casting made = {NULL, triangles_of_blocks(blocks, count, turn, by)};
+    if (vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure) == VSH_OK) {
         vsh_field_options near = vsh_field_options_default();
         near.reach = 8.0 * VOXEL;
-        const vsh_result result = vsh_field_create(grid, &near, NULL, &made.field, &error);
+        const vsh_result result = vsh_field_create(grid, &near, NULL, &made.field, &failure);
         assert_true(result == VSH_OK || result == VSH_ERROR_INPUT);
     } else {
-        assert_int_equal(error.code, VSH_ERROR_INPUT);
+        assert_int_equal(failure.code, VSH_ERROR_INPUT);
     }
-    vsh_grid_free(grid);
     return made;
 }
 
@@ -130,7 +129,7 @@ static passage pass(const block *blocks, int count, const double low[3], const d
         for (int phase = 0; phase < PHASES; ++phase) {
             const double by[3] = {VOXEL * phase / PHASES, VOXEL * (3 * phase % PHASES) / PHASES,
                                   VOXEL * (5 * phase % PHASES) / PHASES};
-            caster c = caster_of_blocks(blocks, count, turn, by);
+            FREED_BY(caster_free) casting c = caster_of_blocks(blocks, count, turn, by);
             if (c.field == NULL) {
                 ++result.unmade;
                 vsh_triangles_free(c.triangles);
@@ -156,7 +155,6 @@ static passage pass(const block *blocks, int count, const double low[3], const d
                 }
                 ++all;
             }
-            caster_free(&c);
         }
         result.through[t] = all > 0 ? (double)through / (double)all : 1.0;
     }
@@ -166,11 +164,6 @@ static passage pass(const block *blocks, int count, const double low[3], const d
 /* On the field from `least` voxels on, by methods from `first` on; on the triangles always. */
 static void assert_passage(const passage *p, const char *what, double voxels, double least, int32_t first,
                            int expected) {
-    print_message("%s of %g voxels: %.3f through upright, %.3f turned, %d of %d not there; other than that: "
-                  "smooth %zu, cone %zu, rays %zu, adaptive %zu, exact %zu\n",
-                  what, voxels, p->through[0], p->through[1], p->unmade, 2 * PHASES,
-                  p->other[VSH_SHADOW_SMOOTH], p->other[VSH_SHADOW_CONE], p->other[VSH_SHADOW_RAYS],
-                  p->other[VSH_SHADOW_ADAPTIVE], p->other[VSH_SHADOW_EXACT]);
     assert_int_equal(p->other[VSH_SHADOW_EXACT], 0);
     if (voxels >= least) {
         const double share = expected == FREE ? 1.0 : 0.0;
@@ -181,42 +174,25 @@ static void assert_passage(const passage *p, const char *what, double voxels, do
     }
 }
 
-static void walls_over_a_voxel_block_every_ray(void **state) {
-    (void)state;
+static void walls_gaps_and_needles_over_a_voxel_are_what_they_are(void **state) {
+    const double low[3][3] = {{-0.6, -0.6, -0.6}, {0.0, -0.6, -0.8}, {0.0, -0.6, -1.2}};
+    const double high[3][3] = {{0.6, -0.4, 0.6}, {0.0, -0.4, 0.8}, {0.0, -0.4, 1.2}};
     for (int i = 0; i < THICKNESS_COUNT; ++i) {
-        const block wall = {{0, 0, 0}, {1.2, 0.5 * THICKNESSES[i] * VOXEL, 1.2}};
-        const double low[3] = {-0.6, -0.6, -0.6}, high[3] = {0.6, -0.4, 0.6};
-        const passage p = pass(&wall, 1, low, high, 0.5, BLOCKED);
-        assert_passage(&p, "wall", THICKNESSES[i], 1.25, VSH_SHADOW_SMOOTH, BLOCKED);
-    }
-}
-
-static void gaps_over_a_voxel_let_their_middle_through(void **state) {
-    (void)state;
-    for (int i = 0; i < THICKNESS_COUNT; ++i) {
-        const double g = 0.5 * THICKNESSES[i] * VOXEL;
-        const block sides[2] = {{{0.6 + g, 0, 0}, {0.6, 0.2, 1.0}}, {{-0.6 - g, 0, 0}, {0.6, 0.2, 1.0}}};
-        const double low[3] = {0.0, -0.6, -0.8}, high[3] = {0.0, -0.4, 0.8};
-        const passage p = pass(sides, 2, low, high, 0.0, FREE);
-        assert_passage(&p, "gap", THICKNESSES[i], 1.25, VSH_SHADOW_SMOOTH, FREE);
-    }
-}
-
-static void needles_over_a_voxel_block_their_axis(void **state) {
-    (void)state;
-    for (int i = 0; i < THICKNESS_COUNT; ++i) {
-        const double h = 0.5 * THICKNESSES[i] * VOXEL;
-        const block needle = {{0, 0, 0}, {h, h, 1.5}};
-        const double low[3] = {0.0, -0.6, -1.2}, high[3] = {0.0, -0.4, 1.2};
-        const passage p = pass(&needle, 1, low, high, 0.0, BLOCKED);
-        assert_passage(&p, "needle", THICKNESSES[i], 1.5, VSH_SHADOW_SMOOTH, BLOCKED);
+        const double voxels = THICKNESSES[i], h = 0.5 * voxels * VOXEL;
+        const block wall = {{0, 0, 0}, {1.2, h, 1.2}}, needle = {{0, 0, 0}, {h, h, 1.5}};
+        const block sides[2] = {{{0.6 + h, 0, 0}, {0.6, 0.2, 1.0}}, {{-0.6 - h, 0, 0}, {0.6, 0.2, 1.0}}};
+        const passage all[3] = {pass(&wall, 1, low[0], high[0], 0.5, BLOCKED),
+                                pass(sides, 2, low[1], high[1], 0.0, FREE),       /* through the middle */
+                                pass(&needle, 1, low[2], high[2], 0.0, BLOCKED)}; /* along the axis */
+        assert_passage(&all[0], "wall", voxels, 1.25, VSH_SHADOW_SMOOTH, BLOCKED);
+        assert_passage(&all[1], "gap", voxels, 1.25, VSH_SHADOW_SMOOTH, FREE);
+        assert_passage(&all[2], "needle", voxels, 1.5, VSH_SHADOW_SMOOTH, BLOCKED);
     }
 }
 
 /* Along the very plane in which two boxes meet, and beside it. By rays: a union is as deep there as its boxes
  * are, not at all, so that cones along it read an edge. */
 static void no_light_comes_through_the_seam_of_boxes_that_touch(void **state) {
-    (void)state;
     const block boxes[2] = {{{0.6, 0, 0}, {0.6, 0.5, 1.0}}, {{-0.6, 0, 0}, {0.6, 0.5, 1.0}}};
     const double low[3] = {0.0, -1.1, -0.8}, high[3] = {0.0, -0.9, 0.8};
     const double beside_low[3] = {-0.5 * VOXEL, -1.1, -0.8}, beside_high[3] = {0.5 * VOXEL, -0.9, 0.8};
@@ -229,7 +205,6 @@ static void no_light_comes_through_the_seam_of_boxes_that_touch(void **state) {
 /* Six boxes around a room: by rays nothing is seen from its floor, by walls from 1.25 voxels on, or however
  * thin where they are triangles. */
 static void rooms_are_dark(void **state) {
-    (void)state;
     const float up[3] = {0.0f, 1.0f, 0.0f};
     const double nowhere[3] = {0.0, 0.0, 0.0};
     for (int i = 0; i < THICKNESS_COUNT; ++i) {
@@ -237,7 +212,7 @@ static void rooms_are_dark(void **state) {
         const block walls[6] = {{{out, 0, 0}, {h, wide, wide}}, {{-out, 0, 0}, {h, wide, wide}},
                                 {{0, out, 0}, {wide, h, wide}}, {{0, -out, 0}, {wide, h, wide}},
                                 {{0, 0, out}, {wide, wide, h}}, {{0, 0, -out}, {wide, wide, h}}};
-        caster c = caster_of_blocks(walls, 6, 0.0, nowhere);
+        FREED_BY(caster_free) casting c = caster_of_blocks(walls, 6, 0.0, nowhere);
         uint64_t counter = 2;
         double lightest[VSH_AO_EXACT + 1] = {0.0};
         for (int k = 0; c.field != NULL && k < 40; ++k) {
@@ -246,22 +221,16 @@ static void rooms_are_dark(void **state) {
                 lightest[method] = fmax(lightest[method], (double)cast_ao_at(&c, method, 10.0, p, up));
             }
         }
-        print_message(
-            "room of walls of %g voxels: lightest cones %.3f, rays %.3f, adaptive %.3f, exact %.3f\n",
-            THICKNESSES[i], lightest[VSH_AO_CONES], lightest[VSH_AO_RAYS], lightest[VSH_AO_ADAPTIVE],
-            lightest[VSH_AO_EXACT]);
         assert_true(lightest[VSH_AO_EXACT] == 0.0);
         if (THICKNESSES[i] >= 1.25) {
             assert_true(c.field != NULL && lightest[VSH_AO_RAYS] == 0.0 && lightest[VSH_AO_ADAPTIVE] == 0.0);
         }
-        caster_free(&c);
     }
 }
 
 /* A floor, and on it a wall that stands less than half a voxel beside the receivers, between them and a low
  * sun: thin ones look like the floor's own height to a cone, which must not certify what it passes. */
 static void no_wall_beside_a_receiver_is_taken_for_its_floor(void **state) {
-    (void)state;
     const float up[3] = {0.0f, 1.0f, 0.0f};
     size_t wrong = 0, all = 0;
     if (!vsh_triangles_available()) {
@@ -273,7 +242,7 @@ static void no_wall_beside_a_receiver_is_taken_for_its_floor(void **state) {
                                   VOXEL * (5 * phase % PHASES) / PHASES};
             const double h = 0.5 * THICKNESSES[i] * VOXEL;
             const block blocks[2] = {{{0.0, -0.3, 0.0}, {1.0, 0.3, 1.0}}, {{h, 0.2, 0.0}, {h, 0.2, 0.9}}};
-            caster c = caster_of_blocks(blocks, 2, 0.0, by);
+            FREED_BY(caster_free) casting c = caster_of_blocks(blocks, 2, 0.0, by);
             assert_non_null(c.field);
             uint64_t counter = 3;
             for (int k = 0; k < 60; ++k) {
@@ -286,18 +255,14 @@ static void no_wall_beside_a_receiver_is_taken_for_its_floor(void **state) {
                 wrong += cast_shadow_at(&c, &light, VSH_SHADOW_EXACT, p, up) != 0.0f;
                 ++all;
             }
-            caster_free(&c);
         }
     }
-    print_message("%zu of %zu receivers beside walls are lit\n", wrong, all);
     assert_int_equal(wrong, 0);
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(walls_over_a_voxel_block_every_ray),
-        cmocka_unit_test(gaps_over_a_voxel_let_their_middle_through),
-        cmocka_unit_test(needles_over_a_voxel_block_their_axis),
+        cmocka_unit_test(walls_gaps_and_needles_over_a_voxel_are_what_they_are),
         cmocka_unit_test(no_light_comes_through_the_seam_of_boxes_that_touch),
         cmocka_unit_test(rooms_are_dark),
         cmocka_unit_test(no_wall_beside_a_receiver_is_taken_for_its_floor),

@@ -1,5 +1,7 @@
-/* Rays against triangles: closed forms, the same scene elsewhere and in another size, bad input. */
+/* Rays against triangles and against procedural solids: closed forms, the same scene elsewhere and in another
+ * size, bad input. */
 #include "shading.h"
+#include "testing.h"
 
 #include "trace/embree.h"
 #include "truth/directions.h"
@@ -8,195 +10,342 @@
 #include <stdlib.h>
 #include <vdbshade/trace.h>
 
-#define NEAR(value, expected, tolerance)                                                                     \
-    do {                                                                                                     \
-        const double value_ = (value), expected_ = (expected);                                               \
-        if (!(fabs(value_ - expected_) <= (tolerance))) {                                                    \
-            fail_msg("%s: %.9g is not within %g of %.9g", #value, value_, (double)(tolerance), expected_);   \
-        }                                                                                                    \
-    } while (0)
-
 static const float UP[3] = {0.0f, 1.0f, 0.0f};
-static const double ORIGIN[3] = {0.0, 0.0, 0.0};
+static const double ORIGIN[3] = {0.0, 0.0, 0.0}, OVERHEAD[3] = {0.0, 1.0, 0.0};
 
-static vsh_triangles *triangles_of(const vsh_mesh *meshes, size_t count) {
-    vsh_triangles *triangles = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_triangles_create(meshes, count, NULL, &triangles, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
-    return triangles;
+/* Triangles, solids or both: NULL where there are none. */
+typedef struct casters {
+    vsh_triangles *triangles;
+    vsh_solids *solids;
+} casters;
+
+static void free_casters(casters *c) {
+    vsh_triangles_free(c->triangles);
+    vsh_solids_free(c->solids);
 }
 
-static float seen(const vsh_triangles *triangles, const double *position, const float *normal,
-                  const vsh_light *light, int32_t rays) {
+static casters casters_of_mesh(const vsh_mesh *meshes, size_t count) {
+    casters c = {NULL, NULL};
+    assert_ok(vsh_triangles_create(meshes, count, NULL, &c.triangles, &failure));
+    return c;
+}
+
+/* Solids of one tree under a transform (NULL: none). */
+static casters casters_of_tree(const vsh_sdf_node *nodes, size_t count, const double *transform) {
+    const vsh_sdf sdf = {nodes, count};
+    casters c = {NULL, NULL};
+    assert_ok(vsh_solids_create(&sdf, transform, 1, &c.solids, &failure));
+    return c;
+}
+
+static double seen(casters c, const double *position, const float *normal, const vsh_light *light,
+                   int32_t rays) {
     float value = -1.0f;
-    assert_int_equal(
-        vsh_trace_shadow(triangles, NULL, 1, position, normal, 0.0, light, rays, NULL, &value, NULL), VSH_OK);
-    return value;
+    assert_ok(vsh_trace_shadow(c.triangles, c.solids, 1, position, normal, 0.0, light, rays, NULL, &value,
+                               &failure));
+    return (double)value;
+}
+
+static double open_at(casters c, const double *position, double distance, int32_t rays) {
+    float value = -1.0f;
+    assert_ok(
+        vsh_trace_ao(c.triangles, c.solids, 1, position, UP, 0.0, distance, rays, NULL, &value, &failure));
+    return (double)value;
 }
 
 /* A plate of x from `edge` to 1000, `height` above the origin. */
-static vsh_mesh plate(float edge, float height, float positions[12]) {
+static casters plate(float edge, float height) {
     static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
-    const float made[12] = {edge,    height, -1000.0f, 1000.0f, height, -1000.0f,
-                            1000.0f, height, 1000.0f,  edge,    height, 1000.0f};
-    memcpy(positions, made, sizeof made);
-    return (vsh_mesh){.positions = positions, .indices = indices, .vertex_count = 4, .triangle_count = 2};
+    const float positions[12] = {edge,    height, -1000.0f, 1000.0f, height, -1000.0f,
+                                 1000.0f, height, 1000.0f,  edge,    height, 1000.0f};
+    const vsh_mesh mesh = {
+        .positions = positions, .indices = indices, .vertex_count = 4, .triangle_count = 2};
+    return casters_of_mesh(&mesh, 1);
 }
 
-enum { RINGS = 128, SECTORS = 256, BALL_TRIANGLES = 2 * RINGS * SECTORS };
-
-/* A ball of latitudes and longitudes around `centre`. */
-static vsh_mesh ball(const double centre[3], double radius) {
+/* A ball of radius 1, of latitudes and longitudes. */
+static vsh_mesh ball(double x, double y, double z) {
+    enum { RINGS = 128, SECTORS = 256 };
     static float positions[3 * (RINGS + 1) * SECTORS];
-    static uint32_t indices[3 * BALL_TRIANGLES];
-    for (size_t ring = 0; ring <= RINGS; ++ring) {
-        for (size_t sector = 0; sector < SECTORS; ++sector) {
-            double d[3];
-            direction_at(PI * ((double)ring / RINGS - 0.5), 2.0 * PI * (double)sector / SECTORS, d);
-            for (size_t axis = 0; axis < 3; ++axis) {
-                positions[3 * (ring * SECTORS + sector) + axis] = (float)(centre[axis] + radius * d[axis]);
-            }
+    static uint32_t indices[6 * RINGS * SECTORS];
+    const double centre[3] = {x, y, z};
+    for (size_t v = 0; v < (RINGS + 1) * SECTORS; ++v) {
+        double d[3];
+        direction_at(PI * ((double)(v / SECTORS) / RINGS - 0.5), 2.0 * PI * (double)(v % SECTORS) / SECTORS,
+                     d);
+        for (size_t axis = 0; axis < 3; ++axis) {
+            positions[3 * v + axis] = (float)(centre[axis] + d[axis]);
         }
     }
-    size_t at = 0;
-    for (uint32_t ring = 0; ring < RINGS; ++ring) {
-        for (uint32_t sector = 0; sector < SECTORS; ++sector) {
-            const uint32_t a = ring * SECTORS + sector, b = ring * SECTORS + (sector + 1) % SECTORS;
-            const uint32_t corners[6] = {a, b, a + SECTORS, b, b + SECTORS, a + SECTORS};
-            memcpy(indices + at, corners, sizeof corners);
-            at += 6;
-        }
+    for (uint32_t a = 0; a < RINGS * SECTORS; ++a) {
+        const uint32_t b = a / SECTORS * SECTORS + (a + 1) % SECTORS;
+        const uint32_t corners[6] = {a, b, a + SECTORS, b, b + SECTORS, a + SECTORS};
+        memcpy(indices + 6 * a, corners, sizeof corners);
     }
     return (vsh_mesh){.positions = positions,
                       .indices = indices,
                       .vertex_count = (RINGS + 1) * SECTORS,
-                      .triangle_count = BALL_TRIANGLES};
+                      .triangle_count = 2 * RINGS * SECTORS};
 }
 
+static casters casters_of_ball(double x, double y, double z) {
+    const vsh_mesh mesh = ball(x, y, z);
+    return casters_of_mesh(&mesh, 1);
+}
+
+static vsh_sdf_node shape_at(int32_t shape, double x, double y, double z) {
+    vsh_sdf_node node = vsh_sdf_node_default();
+    node.shape = shape;
+    memcpy(node.translation, (const double[]){x, y, z}, sizeof node.translation);
+    return node;
+}
+
+static vsh_sdf_node box_at(double x, double y, double z, double a, double b, double c) {
+    vsh_sdf_node node = shape_at(VSH_SDF_BOX, x, y, z);
+    memcpy(node.size, (const double[]){a, b, c}, sizeof node.size);
+    return node;
+}
+
+static vsh_sdf_node operation(int32_t shape) {
+    vsh_sdf_node node = shape_at(shape, 0.0, 0.0, 0.0);
+    node.left = 0;
+    node.right = 1;
+    return node;
+}
+
+/* --- closed forms */
+
 static void a_straight_edge_leaves_the_circular_segment(void **state) {
-    (void)state;
-    const double x[] = {-1.01, -0.7, -0.3, 0.0, 0.25, 0.8, 1.01};
+    const double x[] = {-1.01, -0.7, -0.3, 0.0, 0.25, 0.8, 1.01}, half = 0.2;
+    const double place[3] = {0.0, 20.0, 0.0};
+    vsh_light lights[3] = {sun(OVERHEAD, 2.0 * half), lamp(place, 20.0 * sin(half)),
+                           lamp(place, 20.0 * sin(half))};
+    lights[2].type = VSH_LIGHT_SPOT;
+    lights[2].axis[0] = 1.0; /* where it shines to does not matter */
     for (size_t i = 0; i < sizeof x / sizeof x[0]; ++i) {
-        const double half = 0.2;
-        float positions[12];
-        const vsh_mesh mesh = plate((float)(x[i] * tan(half) * 5.0), 5.0f, positions);
-        vsh_triangles *triangles = triangles_of(&mesh, 1);
-        const double overhead[3] = {0.0, 1.0, 0.0}, place[3] = {0.0, 20.0, 0.0};
-        const vsh_light lights[2] = {sun(overhead, 2.0 * half), lamp(place, 20.0 * sin(half))};
-        for (int l = 0; l < 2; ++l) {
-            NEAR(seen(triangles, ORIGIN, UP, &lights[l], 8192), truth_disc_share(x[i]), 0.003);
+        const double edge = x[i] * tan(half) * 5.0;
+        /* a sheet of a millionth whose lower edge decides */
+        const vsh_sdf_node sheet = box_at(edge + 50.0, 5.0, 0.0, 50.0, 1e-6, 50.0);
+        casters both[2] = {plate((float)edge, 5.0f), casters_of_tree(&sheet, 1, NULL)};
+        for (int k = 0; k < 6; ++k) {
+            assert_near(seen(both[k / 3], ORIGIN, UP, &lights[k % 3], 8192), truth_disc_share(x[i]), 0.003);
         }
-        vsh_light spot = lights[1];
-        spot.type = VSH_LIGHT_SPOT;
-        spot.axis[0] = 1.0; /* where it shines to does not matter */
-        NEAR(seen(triangles, ORIGIN, UP, &spot, 8192), truth_disc_share(x[i]), 0.003);
-        vsh_triangles_free(triangles);
+        free_casters(&both[0]);
+        free_casters(&both[1]);
     }
 }
 
 static void the_receivers_own_horizon_is_an_edge(void **state) {
-    (void)state;
-    vsh_triangles *triangles = triangles_of(NULL, 0);
+    FREED_BY(free_casters) casters none = casters_of_mesh(NULL, 0);
     const double low[3] = {1.0, 0.0, 0.0};
     const vsh_light light = sun(low, 0.5);
-    NEAR(seen(triangles, ORIGIN, UP, &light, 4096), 0.5, 0.002);
-    NEAR(seen(triangles, ORIGIN, NULL, &light, 4096), 1.0, 0.0);
-    vsh_triangles_free(triangles);
+    assert_near(seen(none, ORIGIN, UP, &light, 4096), 0.5, 0.002);
+    assert_near(seen(none, ORIGIN, NULL, &light, 4096), 1.0, 0.0);
 }
 
 static void a_sphere_hides_what_rays_against_the_solid_say(void **state) {
-    (void)state;
-    const double centre[3] = {0.3, 3.0, 0.1}, towards[3] = {0.2, 1.0, 0.1};
-    const vsh_mesh mesh = ball(centre, 1.0);
+    const double towards[3] = {0.2, 1.0, 0.1};
     const truth_solid solid = {TRUTH_SPHERE, {0.3, 3.0, 0.1}, {0.0, 0.0, 0.0}, 1.0, 0.0};
     const vsh_light light = sun(towards, 0.4);
-    vsh_triangles *triangles = triangles_of(&mesh, 1);
+    FREED_BY(free_casters) casters c = casters_of_ball(0.3, 3.0, 0.1);
     int penumbra = 0;
     for (int i = 0; i < 400; ++i) {
         const double point[3] = {-3.0 + 0.3 * (i % 20), 0.0, -3.0 + 0.3 * (i / 20)};
-        const double up[3] = {0.0, 1.0, 0.0};
         const double truth =
-            truth_light((truth_scene){&solid, 1}, point, up, towards, tan(0.2), INFINITY, 1024);
-        NEAR(seen(triangles, point, UP, &light, 1024), truth, 0.01);
+            truth_light((truth_scene){&solid, 1}, point, OVERHEAD, towards, tan(0.2), INFINITY, 1024);
+        assert_near(seen(c, point, UP, &light, 1024), truth, 0.01);
         penumbra += truth > 0.02 && truth < 0.98;
     }
     assert_true(penumbra > 30);
-    vsh_triangles_free(triangles);
+}
+
+static void a_hole_in_a_slab_lets_its_share_of_the_disc_through(void **state) {
+    vsh_sdf_node nodes[3] = {box_at(0.0, 3.0, 0.0, 20.0, 0.5, 20.0),
+                             shape_at(VSH_SDF_CYLINDER, 0.0, 3.0, 0.0), operation(VSH_SDF_SUBTRACTION)};
+    nodes[1].size[1] = 2.0;
+    nodes[1].radius = 0.35;
+    FREED_BY(free_casters) casters c = casters_of_tree(nodes, 3, NULL);
+    /* the hole's upper rim is the narrower one: 0.35 at a height of 3.5, a tangent of 0.1 */
+    const double tangents[] = {0.05, 0.099, 0.15, 0.2, 0.4};
+    for (size_t i = 0; i < sizeof tangents / sizeof tangents[0]; ++i) {
+        const double w = tangents[i];
+        const vsh_light light = sun(OVERHEAD, 2.0 * atan(w));
+        assert_near(seen(c, ORIGIN, UP, &light, 8192), fmin(1.0, 0.01 / (w * w)), 0.002);
+    }
 }
 
 static void ambient_occlusion_of_a_sphere_is_its_share_of_the_cosine(void **state) {
-    (void)state;
-    const double centre[3] = {0.0, 2.0, 0.0};
-    const vsh_mesh mesh = ball(centre, 1.0);
-    vsh_triangles *triangles = triangles_of(&mesh, 1);
-    float ao = -1.0f;
-    /* a cap of half angle 30° around the normal holds sin² of it */
-    assert_int_equal(vsh_trace_ao(triangles, NULL, 1, ORIGIN, UP, 0.0, 10.0, 8192, NULL, &ao, NULL), VSH_OK);
-    NEAR(ao, 0.75, 0.003);
-    /* and nothing is as near as 0.9 */
-    assert_int_equal(vsh_trace_ao(triangles, NULL, 1, ORIGIN, UP, 0.0, 0.9, 1024, NULL, &ao, NULL), VSH_OK);
-    NEAR(ao, 1.0, 0.0);
-    vsh_triangles_free(triangles);
+    const vsh_sdf_node sphere = shape_at(VSH_SDF_SPHERE, 0.0, 2.0, 0.0);
+    casters both[2] = {casters_of_ball(0.0, 2.0, 0.0), casters_of_tree(&sphere, 1, NULL)};
+    for (int k = 0; k < 2; ++k) {
+        /* a cap of half angle 30° around the normal holds sin² of it */
+        assert_near(open_at(both[k], ORIGIN, 10.0, 8192), 0.75, 0.003);
+        /* rays of 1.2 meet the ball where 2 cos a - √(4 cos² a - 3) ≤ 1.2, that is cos a ≥ 4.44 / 4.8 */
+        assert_near(open_at(both[k], ORIGIN, 1.2, 8192), 4.44 / 4.8 * 4.44 / 4.8, 0.003);
+        assert_near(open_at(both[k], ORIGIN, 0.9, 1024), 1.0, 0.0);
+        free_casters(&both[k]);
+    }
+}
+
+/* The seeds' scene as trees of one shape each. */
+static casters seeds(void) {
+    vsh_sdf_node nodes[5] = {shape_at(VSH_SDF_PLANE, 0.0, 0.0, 0.0), shape_at(VSH_SDF_SPHERE, 0.0, 0.8, 0.0),
+                             box_at(-1.2, 0.7, 0.5, 0.3, 0.3, 0.3), shape_at(VSH_SDF_TORUS, 1.2, 0.6, -0.3),
+                             box_at(0.3, 1.0, 1.5, 0.05, 1.0, 0.05)};
+    nodes[0].size[0] = nodes[0].size[2] = 3.0;
+    nodes[0].size[1] = 0.5;
+    nodes[1].radius = 0.5;
+    nodes[2].rounding = 0.05;
+    nodes[3].radius = 0.4;
+    nodes[3].minor_radius = 0.08;
+    vsh_sdf sdfs[5];
+    for (size_t i = 0; i < 5; ++i) {
+        sdfs[i] = (vsh_sdf){&nodes[i], 1};
+    }
+    casters c = {NULL, NULL};
+    assert_ok(vsh_solids_create(sdfs, NULL, 5, &c.solids, &failure));
+    return c;
+}
+
+enum { SIZE = 64, COUNT = SIZE * SIZE };
+static double positions[3 * COUNT];
+static float normals[3 * COUNT], first[COUNT], other[COUNT];
+
+static void every_floor_texel_sees_what_rays_against_the_solids_say(void **state) {
+    enum { RAYS = 128 };
+    static float truth[COUNT];
+    floor_texels(SIZE, positions, normals);
+    FREED_BY(free_casters) casters c = seeds();
+    vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
+    assert_ok(vsh_trace_shadow(NULL, c.solids, COUNT, positions, normals, 0.0, &light, RAYS, NULL, first,
+                               &failure));
+    truth_lights(truth_seeds(), COUNT, positions, NULL, truth_seeds_sun, truth_seeds_w, INFINITY, RAYS,
+                 truth);
+    int penumbra = 0, dark = 0;
+    for (int i = 0; i < COUNT; ++i) {
+        /* the spiral may be turned: a ray or two on the edge */
+        const bool whole = truth[i] == 0.0f || truth[i] == 1.0f;
+        assert_near((double)first[i], (double)truth[i], whole ? 2.0 / RAYS : 0.05);
+        penumbra += truth[i] > 0.02f && truth[i] < 0.98f;
+        dark += truth[i] == 0.0f;
+    }
+    assert_in_range(penumbra, 200, COUNT);
+    assert_in_range(dark, 100, COUNT);
+    /* and a lamp among them, its rays ending at its near side */
+    const double place[3] = {0.6, 2.0, 0.4};
+    light = lamp(place, 0.3);
+    for (int i = 0; i < COUNT; i += 7) {
+        const double *p = positions + 3 * (size_t)i;
+        const double to[3] = {place[0] - p[0], place[1] - p[1], place[2] - p[2]};
+        const double far = sqrt(to[0] * to[0] + to[1] * to[1] + to[2] * to[2]), w = tan(asin(0.3 / far));
+        const double expected = truth_light(truth_seeds(), p, NULL, to, w, far - 0.3, RAYS);
+        assert_near(seen(c, p, NULL, &light, RAYS), expected, 0.05);
+    }
 }
 
 static void rays_stop_at_the_light_and_both_sides_block(void **state) {
-    (void)state;
-    float positions[12];
-    const vsh_mesh mesh = plate(-1000.0f, 5.0f, positions);
-    vsh_triangles *triangles = triangles_of(&mesh, 1);
-    const double below[3] = {0.0, 4.0, 0.0}, above[3] = {0.0, 7.0, 0.0}, under[3] = {0.0, 10.0, 0.0};
-    const vsh_light near = lamp(below, 0.5), far = lamp(above, 0.5);
+    const vsh_sdf_node slab = box_at(0.0, 6.0, 0.0, 20.0, 1.0, 20.0);
+    FREED_BY(free_casters) casters thin = plate(-1000.0f, 5.0f), solid = casters_of_tree(&slab, 1, NULL);
+    const double below[3] = {0.0, 4.0, 0.0}, within[3] = {0.0, 5.5, 0.0}, above[3] = {0.0, 7.0, 0.0},
+                 over[3] = {0.0, 10.0, 0.0};
+    const vsh_light near = lamp(below, 0.9), inside = lamp(within, 0.3), far = lamp(above, 0.5);
     const float down[3] = {0.0f, -1.0f, 0.0f};
-    NEAR(seen(triangles, ORIGIN, UP, &near, 64), 1.0, 0.0);
-    NEAR(seen(triangles, ORIGIN, UP, &far, 64), 0.0, 0.0);
-    NEAR(seen(triangles, under, down, &near, 64), 0.0, 0.0);
-    NEAR(seen(triangles, below, UP, &near, 64), 1.0, 0.0); /* within the light */
-    vsh_triangles_free(triangles);
+    assert_near(seen(thin, ORIGIN, UP, &near, 256), 1.0, 0.0);
+    assert_near(seen(thin, ORIGIN, UP, &far, 256), 0.0, 0.0);
+    assert_near(seen(thin, over, down, &near, 256), 0.0, 0.0);
+    assert_near(seen(thin, below, UP, &near, 256), 1.0, 0.0); /* within the light */
+    assert_near(seen(solid, ORIGIN, UP, &near, 256), 1.0, 0.0);
+    assert_near(seen(solid, ORIGIN, UP, &inside, 256), 0.0, 0.0);
+    assert_near(seen(solid, within, UP, &near, 256), 0.0, 0.0); /* from inside nothing is seen */
 }
 
-/* The ball's scene, moved and scaled; values of a row of points under it. */
-static void scene_values(double scale, double shift, float values[40]) {
-    const double centre[3] = {0.25, 3.0, 0.125}, towards[3] = {0.25, 1.0, 0.125};
-    const double transform[12] = {scale, 0.0, 0.0, shift, 0.0, scale, 0.0, shift, 0.0, 0.0, scale, shift};
-    vsh_mesh mesh = ball(centre, 1.0);
-    mesh.transform = transform;
-    vsh_triangles *triangles = triangles_of(&mesh, 1);
-    const vsh_light light = sun(towards, 0.4);
-    for (int i = 0; i < 40; ++i) {
-        const double point[3] = {scale * (-2.5 + 0.125 * i) + shift, shift, shift};
-        values[i] = seen(triangles, point, UP, &light, 256);
+/* A triangle plate over x > 0.1, a solid one over x < -0.1: a slit of the light is left. */
+static void a_ray_is_hidden_that_meets_either_solids_or_triangles(void **state) {
+    const vsh_sdf_node sheet = box_at(-50.1, 5.0, 0.0, 50.0, 1e-6, 50.0);
+    casters one = plate(0.1f, 5.0f), both = {one.triangles, casters_of_tree(&sheet, 1, NULL).solids};
+    const double half = 0.1, share = truth_disc_share(0.1 / (5.0 * tan(half)));
+    const vsh_light light = sun(OVERHEAD, 2.0 * half);
+    assert_near(seen(one, ORIGIN, UP, &light, 8192), share, 0.003);
+    assert_near(seen(both, ORIGIN, UP, &light, 8192), 2.0 * share - 1.0, 0.003);
+    free_casters(&both);
+}
+
+/* --- the same elsewhere, and in another size */
+
+static casters box_and(int32_t shape, int32_t how, const double *transform) {
+    vsh_sdf_node nodes[3] = {box_at(0.3, 2.0, 0.1, 0.5, 0.2, 0.4), shape_at(shape, -0.5, 2.5, 0.3),
+                             operation(how)};
+    nodes[2].smoothing = 0.3;
+    nodes[2].rotation[1] = how == VSH_SDF_UNION ? 0.5 : 0.0;
+    return casters_of_tree(nodes, 3, transform);
+}
+
+static void transforms_move_what_rays_meet(void **state) {
+    /* mirrored in x, turned by a right angle about y, four times as large, and far away */
+    const double m[12] = {0.0, 0.0, 4.0, 1000.0, 0.0, 4.0, 0.0, -200.0, 4.0, 0.0, 0.0, 30.0};
+    FREED_BY(free_casters) casters plain = box_and(VSH_SDF_TORUS, VSH_SDF_SMOOTH_UNION, NULL);
+    FREED_BY(free_casters) casters moved = box_and(VSH_SDF_TORUS, VSH_SDF_SMOOTH_UNION, m);
+    const double towards[3] = {0.2, 1.0, 0.1}, turned[3] = {0.1, 1.0, 0.2};
+    const vsh_light here = sun(towards, 0.3), there = sun(turned, 0.3);
+    int between_both = 0;
+    for (int i = 0; i < 200; ++i) {
+        const double p[3] = {-2.0 + 0.2 * (i % 20), 0.0, -1.0 + 0.2 * (i / 20)};
+        const double q[3] = {4.0 * p[2] + 1000.0, 4.0 * p[1] - 200.0, 4.0 * p[0] + 30.0};
+        const double value = seen(plain, p, UP, &here, 1024);
+        assert_near(seen(moved, q, UP, &there, 1024), value, 0.01);
+        assert_near(vsh_solids_distance(moved.solids, q), 4.0 * vsh_solids_distance(plain.solids, p), 1e-9);
+        between_both += value > 0.02 && value < 0.98;
     }
-    vsh_triangles_free(triangles);
+    assert_in_range(between_both, 20, 200);
+}
+
+enum { PLACES = 64 };
+
+/* A ball of triangles, or a cone beside a box, scaled and moved; values of a square of points below it. */
+static void scene_values(bool solid, double scale, double shift, double values[PLACES]) {
+    const double m[12] = {scale, 0.0, 0.0, shift, 0.0, scale, 0.0, shift, 0.0, 0.0, scale, shift};
+    vsh_mesh mesh = ball(0.25, 3.0, 0.125);
+    mesh.transform = m;
+    FREED_BY(free_casters)
+    casters c = solid ? box_and(VSH_SDF_CONE, VSH_SDF_UNION, m) : casters_of_mesh(&mesh, 1);
+    const vsh_light light = sun((const double[]){0.25, 1.0, 0.125}, 0.4);
+    for (int i = 0; i < PLACES; ++i) {
+        const double point[3] = {scale * (-1.5 + 0.4 * (i % 8)) + shift, shift,
+                                 scale * (-1.5 + 0.4 * (i / 8)) + shift};
+        values[i] = seen(c, point, UP, &light, 256);
+    }
 }
 
 static void neither_place_nor_size_of_the_scene_shows(void **state) {
-    (void)state;
-    float here[40], other[40];
-    scene_values(1.0, 0.0, here);
     const double scales[] = {0x1p-100, 0x1p-20, 0x1p20, 0x1p100};
-    for (size_t s = 0; s < sizeof scales / sizeof scales[0]; ++s) {
-        scene_values(scales[s], 0.0, other);
-        assert_memory_equal(here, other, sizeof here);
-    }
-    scene_values(1.0, 0x1p24, other); /* 16.7 million units away */
-    for (int i = 0; i < 40; ++i) {
-        NEAR(other[i], here[i], 0.01);
+    double here[PLACES], there[PLACES];
+    for (int solid = vsh_triangles_available() ? 0 : 1; solid < 2; ++solid) {
+        scene_values(solid, 1.0, 0.0, here);
+        int between_both = 0;
+        for (int i = 0; i < PLACES; ++i) {
+            between_both += here[i] > 0.0 && here[i] < 1.0;
+        }
+        assert_in_range(between_both, 10, PLACES);
+        for (size_t s = 0; s < sizeof scales / sizeof scales[0]; ++s) {
+            scene_values(solid, scales[s], 0.0, there);
+            assert_memory_equal(here, there, sizeof here);
+        }
+        if (!solid) {
+            scene_values(solid, 1.0, 0x1p24, there); /* 16.7 million units away */
+            for (int i = 0; i < PLACES; ++i) {
+                assert_near(there[i], here[i], 0.01);
+            }
+        }
     }
 }
 
 static void points_far_from_the_casters_keep_their_precision(void **state) {
-    (void)state;
-    const double centre[3] = {0.0, 0.0, 0.0}, up[3] = {0.0, 1.0, 0.0};
-    const vsh_mesh mesh = ball(centre, 1.0);
-    vsh_triangles *triangles = triangles_of(&mesh, 1);
-    const vsh_light hard = sun(up, 0.0);
+    FREED_BY(free_casters) casters c = casters_of_ball(0.0, 0.0, 0.0);
+    const vsh_light hard = sun(OVERHEAD, 0.0);
     const double inside[3] = {0.99, -1e8, 0.0}, outside[3] = {1.01, -1e8, 0.0}, beyond[3] = {0.0, 1e8, 0.0};
-    NEAR(seen(triangles, inside, UP, &hard, 1), 0.0, 0.0);
-    NEAR(seen(triangles, outside, UP, &hard, 1), 1.0, 0.0);
-    NEAR(seen(triangles, beyond, UP, &hard, 1), 1.0, 0.0);
-    vsh_triangles_free(triangles);
+    assert_near(seen(c, inside, UP, &hard, 1), 0.0, 0.0);
+    assert_near(seen(c, outside, UP, &hard, 1), 1.0, 0.0);
+    assert_near(seen(c, beyond, UP, &hard, 1), 1.0, 0.0);
 }
 
 /* A box of half side 1, scaled, seen from `distance` half sides away: straight below it, beside that, and
@@ -214,38 +363,28 @@ static void see_from_afar(double scale, double distance) {
                            .vertex_count = 8,
                            .triangle_count = 12,
                            .transform = transform};
-    vsh_triangles *triangles = triangles_of(&mesh, 1);
-    const double far = scale * distance, overhead[3] = {0.0, 1.0, 0.0}, slanted[3] = {0.6, 0.48, 0.64};
-    const double below[3] = {0.25 * scale, -far, 0.25 * scale}, above[3] = {0.25 * scale, far, 0.0};
-    const double beside[3] = {far, -far, 0.25 * scale}, everywhere[3] = {-far, -far, far};
-    const vsh_light hard = sun(overhead, 0.0), soft = sun(slanted, 0.1), near = lamp(ORIGIN, 0.5 * scale);
-    const vsh_light behind = lamp(above, 0.0);
-    NEAR(seen(triangles, below, UP, &hard, 1), 0.0, 0.0);
-    NEAR(seen(triangles, above, UP, &hard, 1), 1.0, 0.0);
-    NEAR(seen(triangles, beside, UP, &hard, 1), 1.0, 0.0);
-    NEAR(seen(triangles, everywhere, UP, &hard, 1), 1.0, 0.0);
-    NEAR(seen(triangles, below, NULL, &soft, 64), 1.0, 0.0);
-    NEAR(seen(triangles, everywhere, NULL, &soft, 64), 1.0, 0.0);
-    NEAR(seen(triangles, below, UP, &behind, 1), 0.0, 0.0);
-    if (distance < 1e6) { /* beyond, doubles do not tell which ray meets it */
-        NEAR(seen(triangles, below, NULL, &near, 64), 0.0, 0.0);
-        NEAR(seen(triangles, everywhere, NULL, &near, 64), 0.0, 0.0);
-    } else {
-        assert_in_range(64.0 * (double)seen(triangles, everywhere, NULL, &near, 64), 0, 64);
-    }
-    const double *from[] = {below, above, beside, everywhere};
+    FREED_BY(free_casters) casters c = casters_of_mesh(&mesh, 1);
+    const double far = scale * distance, slanted[3] = {0.6, 0.48, 0.64};
+    const double from[4][3] = {{0.25 * scale, -far, 0.25 * scale}, /* below */
+                               {0.25 * scale, far, 0.0},           /* above */
+                               {far, -far, 0.25 * scale},          /* beside */
+                               {-far, -far, far}};                 /* all of that */
+    const vsh_light hard = sun(OVERHEAD, 0.0), soft = sun(slanted, 0.1), near = lamp(ORIGIN, 0.5 * scale),
+                    behind = lamp(from[1], 0.0);
     for (int i = 0; i < 4; ++i) {
-        float ao = -1.0f;
-        assert_int_equal(vsh_trace_ao(triangles, NULL, 1, from[i], UP, 0.0, 2.0 * far, 64, NULL, &ao, NULL),
-                         VSH_OK);
-        NEAR(ao, 1.0, distance < 1e3 ? 0.25 : 0.0);
+        assert_near(seen(c, from[i], UP, &hard, 1), i == 0 ? 0.0 : 1.0, 0.0);
+        assert_near(open_at(c, from[i], 2.0 * far, 64), 1.0, distance < 1e3 ? 0.25 : 0.0);
     }
-    vsh_triangles_free(triangles);
+    assert_near(seen(c, from[0], UP, &behind, 1), 0.0, 0.0);
+    for (int i = 0; i < 4; i += 3) {
+        assert_near(seen(c, from[i], NULL, &soft, 64), 1.0, 0.0);
+        /* beyond 1e6, doubles do not tell which ray meets it */
+        assert_in_range(64.0 * seen(c, from[i], NULL, &near, 64), 0, distance < 1e6 ? 0 : 64);
+    }
 }
 
 /* Embree itself ends the process at a coordinate beyond 1.8e18 of its own. */
 static void no_distance_is_too_far_for_rays(void **state) {
-    (void)state;
     for (double scale = 1e-30; scale < 1e31; scale *= 1e5) {
         for (double distance = 10.0; distance < 1e61; distance *= distance < 1e5 ? 10.0 : 1e3) {
             see_from_afar(scale, distance);
@@ -256,7 +395,8 @@ static void no_distance_is_too_far_for_rays(void **state) {
     }
 }
 
-/* Who called back, and in which environment. */
+/* --- threads and packets */
+
 typedef struct witness {
     pthread_t thread;
     size_t calls, others;
@@ -264,8 +404,6 @@ typedef struct witness {
 
 static int32_t note_thread(void *user, const char *stage, double fraction) {
     witness *w = user;
-    (void)stage;
-    (void)fraction;
     ++w->calls;
     w->others += !pthread_equal(w->thread, pthread_self());
     return 0;
@@ -273,147 +411,163 @@ static int32_t note_thread(void *user, const char *stage, double fraction) {
 
 /* A tree is made by many threads, or by the caller's alone. */
 static void trees_are_made_by_the_threads_that_were_given(void **state) {
-    (void)state;
-    const double centre[3] = {0.0, 0.0, 0.0};
-    const vsh_mesh mesh = ball(centre, 1.0);
+    const vsh_mesh mesh = ball(0.0, 0.0, 0.0);
     for (int i = 0; i < 5; ++i) {
         witness w = {pthread_self(), 0, 0};
-        vsh_run run = vsh_run_default();
+        vsh_run run = run_watched(note_thread, &w);
         run.threads = 1;
-        run.progress = note_thread;
-        run.user = &w;
         vsh_triangles *triangles = NULL;
-        assert_int_equal(vsh_triangles_create(&mesh, 1, &run, &triangles, NULL), VSH_OK);
+        assert_ok(vsh_triangles_create(&mesh, 1, &run, &triangles, &failure));
         vsh_triangles_free(triangles);
         assert_true(w.calls > 2); /* from within the making too */
         assert_int_equal(w.others, 0);
     }
 }
 
-static void threads_and_packets_change_no_bit(void **state) {
-    (void)state;
-    enum { COUNT = 4096 };
-    static double positions[3 * COUNT];
-    static float normals[3 * COUNT], first[COUNT], other[COUNT];
-    floor_texels(64, positions, normals);
-    const double centre[3] = {0.3, 1.2, 0.1}, place[3] = {0.0, 4.0, 0.0};
-    const vsh_mesh mesh = ball(centre, 1.0);
-    vsh_triangles *triangles = triangles_of(&mesh, 1);
-    const vsh_light light = lamp(place, 0.7);
-    for (int32_t threads = 1; threads <= 5; threads += 2) {
-        vsh_run run = vsh_run_default();
-        run.threads = threads;
-        float *values = threads == 1 ? first : other;
-        assert_int_equal(vsh_trace_shadow(triangles, NULL, COUNT, positions, normals, 0.001, &light, 13, &run,
-                                          values, NULL),
-                         VSH_OK);
-        assert_true(threads == 1 || memcmp(first, other, sizeof first) == 0);
+static void threads_change_no_bit(void **state) {
+    floor_texels(SIZE, positions, normals);
+    FREED_BY(free_casters) casters mesh = casters_of_ball(0.3, 1.2, 0.1), solids = seeds();
+    const vsh_light light = lamp((const double[]){0.0, 4.0, 0.0}, 0.7);
+    for (int ao = 0; ao < 2; ++ao) {
+        for (int32_t threads = 1; threads <= 5; threads += 2) {
+            const vsh_run run = run_on(threads);
+            float *values = threads == 1 ? first : other;
+            assert_ok(ao ? vsh_trace_ao(NULL, solids.solids, COUNT, positions, normals, 0.0, 0.6, 16, &run,
+                                        values, &failure)
+                         : vsh_trace_shadow(mesh.triangles, NULL, COUNT, positions, normals, 0.001, &light,
+                                            13, &run, values, &failure));
+            assert_true(threads == 1 || memcmp(first, other, sizeof first) == 0);
+        }
     }
-    vshi_segment_ray rays[100];
-    bool together[100], alone;
+}
+
+static void packets_change_no_bit(void **state) {
+    enum { RAYS = 100 };
+    FREED_BY(free_casters) casters c = casters_of_ball(0.3, 1.2, 0.1);
+    vshi_segment_ray rays[RAYS] = {0};
+    bool together[RAYS], alone;
     uint64_t counter = 5;
-    for (int i = 0; i < 100; ++i) {
+    for (int i = 0; i < RAYS; ++i) {
         rays[i].far = 10.0;
         random_direction(&counter, rays[i].direction);
-        memset(rays[i].origin, 0, sizeof rays[i].origin);
     }
-    vshi_triangles_blocked(triangles, rays, 100, together);
+    vshi_triangles_blocked(c.triangles, rays, RAYS, together);
     int hits = 0;
-    for (int i = 0; i < 100; ++i) {
-        vshi_triangles_blocked(triangles, &rays[i], 1, &alone);
+    for (int i = 0; i < RAYS; ++i) {
+        vshi_triangles_blocked(c.triangles, &rays[i], 1, &alone);
         assert_int_equal(alone, together[i]);
         hits += alone;
     }
     assert_in_range(hits, 10, 90);
-    vsh_triangles_free(triangles);
 }
 
-static void points_that_are_no_points_are_nan(void **state) {
-    (void)state;
-    vsh_triangles *triangles = triangles_of(NULL, 0);
+/* --- bad input */
+
+static void points_that_are_no_points_are_nan_and_no_casters_hide_nothing(void **state) {
+    casters none[2] = {casters_of_mesh(NULL, 0), {NULL, NULL}};
+    assert_ok(vsh_solids_create(NULL, NULL, 0, &none[1].solids, &failure));
     const double nowhere[3] = {NAN, 0.0, 0.0};
-    const float none[3] = {0.0f, 0.0f, 0.0f};
-    const vsh_light light = vsh_light_default();
-    assert_true(isnan(seen(triangles, nowhere, UP, &light, 4)));
-    assert_true(isnan(seen(triangles, ORIGIN, none, &light, 4)));
-    vsh_triangles_free(triangles);
+    const float no_normal[3] = {0.0f, 0.0f, 0.0f};
+    const vsh_light light = sun(OVERHEAD, 0.5);
+    for (int k = 0; k < 2; ++k) {
+        assert_true(isnan(seen(none[k], nowhere, UP, &light, 4)));
+        assert_true(isnan(seen(none[k], ORIGIN, no_normal, &light, 4)));
+        assert_near(seen(none[k], ORIGIN, UP, &light, 64), 1.0, 0.0);
+    }
+    assert_true(isinf(vsh_solids_distance(none[1].solids, ORIGIN)));
+    assert_true(isnan(vsh_solids_distance(none[1].solids, nowhere)));
+    free_casters(&none[0]);
+    free_casters(&none[1]);
+    vsh_solids_free(NULL);
 }
 
 static int32_t cancel(void *user, const char *stage, double fraction) {
-    (void)stage, (void)fraction;
     return ++*(int *)user > 1;
 }
 
-static void bad_input_is_refused(void **state) {
-    (void)state;
-    const double centre[3] = {0.0, 0.0, 0.0};
-    vsh_mesh mesh = ball(centre, 1.0);
-    vsh_triangles *triangles = (vsh_triangles *)&mesh;
-    vsh_error error;
-    assert_int_equal(vsh_triangles_create(NULL, 1, NULL, &triangles, &error), VSH_ERROR_ARGUMENT);
+static void bad_triangles_and_calls_are_refused(void **state) {
+    const vsh_mesh mesh = ball(0.0, 0.0, 0.0);
+    vsh_triangles *triangles = (vsh_triangles *)(uintptr_t)&mesh;
+    assert_fails(vsh_triangles_create(NULL, 1, NULL, &triangles, &failure), VSH_ERROR_ARGUMENT, "");
     assert_null(triangles);
-    vsh_run run = vsh_run_default();
-    run.memory_limit = 1 << 20;
-    assert_int_equal(vsh_triangles_create(&mesh, 1, &run, &triangles, &error), VSH_ERROR_LIMIT);
     int calls = 0;
-    run = vsh_run_default();
-    run.progress = cancel;
-    run.user = &calls;
-    assert_int_equal(vsh_triangles_create(&mesh, 1, &run, &triangles, &error), VSH_ERROR_CANCELLED);
-    uint32_t wrong[3] = {0, 1, 99};
-    float corners[9] = {0.0f, 0.0f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f, 0.0f};
+    vsh_run small = vsh_run_default(), cancelled = vsh_run_default();
+    small.memory_limit = 1 << 20;
+    cancelled.progress = cancel;
+    cancelled.user = &calls;
+    assert_fails(vsh_triangles_create(&mesh, 1, &small, &triangles, &failure), VSH_ERROR_LIMIT, "");
+    assert_fails(vsh_triangles_create(&mesh, 1, &cancelled, &triangles, &failure), VSH_ERROR_CANCELLED, "");
+    const uint32_t wrong[3] = {0, 1, 99};
+    const float corners[9] = {0.0f, 0.0f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f, 0.0f};
     const vsh_mesh bad = {.positions = corners, .indices = wrong, .vertex_count = 3, .triangle_count = 1};
-    assert_int_equal(vsh_triangles_create(&bad, 1, NULL, &triangles, &error), VSH_ERROR_INPUT);
+    assert_fails(vsh_triangles_create(&bad, 1, NULL, &triangles, &failure), VSH_ERROR_INPUT, "");
     assert_null(triangles);
 
-    triangles = triangles_of(&mesh, 1);
+    FREED_BY(free_casters) casters c = casters_of_mesh(&mesh, 1);
     float value = 0.0f;
-    vsh_light light = vsh_light_default();
     const struct {
-        double lift;
+        const float *normal;
+        double lift, distance;
         int32_t rays;
-        double distance;
-    } cases[] = {{-1.0, 4, 1.0}, {NAN, 4, 1.0}, {0.0, 0, 1.0}, {0.0, 65537, 1.0}, {0.0, 4, 0.0}};
+    } cases[] = {{UP, -1.0, 1.0, 4},    {UP, NAN, 1.0, 4}, {UP, 0.0, 1.0, 0},
+                 {UP, 0.0, 1.0, 65537}, {UP, 0.0, 0.0, 4}, {NULL, 0.0, 1.0, 4}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-        assert_int_equal(vsh_trace_ao(triangles, NULL, 1, ORIGIN, UP, cases[i].lift, cases[i].distance,
-                                      cases[i].rays, NULL, &value, &error),
-                         VSH_ERROR_ARGUMENT);
+        assert_fails(vsh_trace_ao(c.triangles, NULL, 1, ORIGIN, cases[i].normal, cases[i].lift,
+                                  cases[i].distance, cases[i].rays, NULL, &value, &failure),
+                     VSH_ERROR_ARGUMENT, "");
     }
-    assert_int_equal(vsh_trace_ao(triangles, NULL, 1, ORIGIN, NULL, 0.0, 1.0, 4, NULL, &value, &error),
-                     VSH_ERROR_ARGUMENT);
+    vsh_light light = vsh_light_default();
+    assert_fails(vsh_trace_shadow(NULL, NULL, 1, ORIGIN, UP, 0.0, &light, 4, NULL, &value, &failure),
+                 VSH_ERROR_ARGUMENT, "solids");
     light.angle = -1.0;
-    assert_int_equal(vsh_trace_shadow(triangles, NULL, 1, ORIGIN, UP, 0.0, &light, 4, NULL, &value, &error),
-                     VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_trace_shadow(NULL, NULL, 1, ORIGIN, UP, 0.0, &light, 4, NULL, &value, &error),
-                     VSH_ERROR_ARGUMENT);
-    vsh_triangles_free(triangles);
+    assert_fails(vsh_trace_shadow(c.triangles, NULL, 1, ORIGIN, UP, 0.0, &light, 4, NULL, &value, &failure),
+                 VSH_ERROR_ARGUMENT, "");
+}
+
+static void bad_solids_are_refused(void **state) {
+    const double uneven[12] = {1.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0};
+    vsh_sdf_node sphere = vsh_sdf_node_default();
+    const vsh_sdf sdf = {&sphere, 1};
+    vsh_solids *solids = (vsh_solids *)&sphere;
+    assert_fails(vsh_solids_create(NULL, NULL, 1, &solids, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_null(solids);
+    assert_fails(vsh_solids_create(&sdf, NULL, 1, NULL, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vsh_solids_create(&sdf, uneven, 1, &solids, &failure), VSH_ERROR_INPUT, "unevenly");
+    sphere.radius = -1.0;
+    assert_fails(vsh_solids_create(&sdf, NULL, 1, &solids, &failure), VSH_ERROR_INPUT, "radius");
 }
 
 static void without_embree_triangles_are_unsupported(void **state) {
-    (void)state;
     vsh_triangles *triangles = NULL;
-    vsh_error error;
-    assert_int_equal(vsh_triangles_create(NULL, 0, NULL, &triangles, &error), VSH_ERROR_UNSUPPORTED);
+    assert_fails(vsh_triangles_create(NULL, 0, NULL, &triangles, &failure), VSH_ERROR_UNSUPPORTED, "Embree");
     assert_null(triangles);
-    assert_non_null(strstr(error.message, "Embree"));
 }
 
 int main(void) {
+    const struct CMUnitTest solids[] = {
+        cmocka_unit_test(a_hole_in_a_slab_lets_its_share_of_the_disc_through),
+        cmocka_unit_test(every_floor_texel_sees_what_rays_against_the_solids_say),
+        cmocka_unit_test(transforms_move_what_rays_meet),
+        cmocka_unit_test(neither_place_nor_size_of_the_scene_shows),
+        cmocka_unit_test(bad_solids_are_refused),
+    };
     const struct CMUnitTest without[] = {cmocka_unit_test(without_embree_triangles_are_unsupported)};
-    const struct CMUnitTest tests[] = {
+    const struct CMUnitTest triangles[] = {
         cmocka_unit_test(a_straight_edge_leaves_the_circular_segment),
         cmocka_unit_test(the_receivers_own_horizon_is_an_edge),
         cmocka_unit_test(a_sphere_hides_what_rays_against_the_solid_say),
         cmocka_unit_test(ambient_occlusion_of_a_sphere_is_its_share_of_the_cosine),
         cmocka_unit_test(rays_stop_at_the_light_and_both_sides_block),
-        cmocka_unit_test(neither_place_nor_size_of_the_scene_shows),
+        cmocka_unit_test(a_ray_is_hidden_that_meets_either_solids_or_triangles),
         cmocka_unit_test(points_far_from_the_casters_keep_their_precision),
         cmocka_unit_test(no_distance_is_too_far_for_rays),
         cmocka_unit_test(trees_are_made_by_the_threads_that_were_given),
-        cmocka_unit_test(threads_and_packets_change_no_bit),
-        cmocka_unit_test(points_that_are_no_points_are_nan),
-        cmocka_unit_test(bad_input_is_refused),
+        cmocka_unit_test(threads_change_no_bit),
+        cmocka_unit_test(packets_change_no_bit),
+        cmocka_unit_test(points_that_are_no_points_are_nan_and_no_casters_hide_nothing),
+        cmocka_unit_test(bad_triangles_and_calls_are_refused),
     };
-    return vsh_triangles_available() ? cmocka_run_group_tests(tests, NULL, NULL)
-                                     : cmocka_run_group_tests(without, NULL, NULL);
+    const int failed = cmocka_run_group_tests(solids, NULL, NULL);
+    return failed + (vsh_triangles_available() ? cmocka_run_group_tests(triangles, NULL, NULL)
+                                               : cmocka_run_group_tests(without, NULL, NULL));
 }

@@ -1,5 +1,6 @@
-/* Runs of the unwrapper: threads, pages, densities, instances, UVs that are kept, cancelling, limits, bad
- * input. */
+/* Runs of the unwrapper: threads, pages, densities, instances, objects, UVs that are kept, cancelling,
+ * limits, bad input. */
+#include "testing.h"
 #include "unwraps.h"
 
 static const double ORIGIN[3] = {0, 0, 0};
@@ -19,38 +20,44 @@ static shape *lump(uint32_t around) {
     return s;
 }
 
-static void same_atlases(const vsh_atlas *a, const vsh_atlas *b) {
-    assert_int_equal(vsh_atlas_chart_count(a), vsh_atlas_chart_count(b));
-    assert_memory_equal(vsh_atlas_charts(a), vsh_atlas_charts(b),
-                        vsh_atlas_chart_count(a) * sizeof(vsh_atlas_chart));
-    for (size_t m = 0; m < vsh_atlas_mesh_count(a); ++m) {
-        const vsh_atlas_mesh x = vsh_atlas_mesh_view(a, m), y = vsh_atlas_mesh_view(b, m);
-        assert_int_equal(x.vertex_count, y.vertex_count);
-        assert_memory_equal(x.uvs, y.uvs, x.vertex_count * 2 * sizeof *x.uvs);
-        assert_memory_equal(x.indices, y.indices, x.triangle_count * 3 * sizeof *x.indices);
-        assert_memory_equal(x.charts, y.charts, x.triangle_count * sizeof *x.charts);
+static void assert_same_uvs(const vsh_atlas *a, size_t m, const vsh_atlas *b, size_t n) {
+    const vsh_atlas_mesh x = vsh_atlas_mesh_view(a, m), y = vsh_atlas_mesh_view(b, n);
+    assert_int_equal(x.vertex_count, y.vertex_count);
+    assert_memory_equal(x.uvs, y.uvs, x.vertex_count * 2 * sizeof *x.uvs);
+    assert_memory_equal(x.indices, y.indices, x.triangle_count * 3 * sizeof *x.indices);
+}
+
+/* Unwraps with one to eight threads; returns the atlas. */
+static vsh_atlas *assert_same_bits(const vsh_mesh *meshes, size_t count, const vsh_unwrap_options *o) {
+    vsh_run run = vsh_run_default();
+    vsh_atlas *first = NULL, *atlas = NULL;
+    run.threads = 1;
+    assert_ok(vsh_unwrap(meshes, count, o, &run, &first, &failure));
+    for (run.threads = 2; run.threads <= 8; ++run.threads) {
+        assert_ok(vsh_unwrap(meshes, count, o, &run, &atlas, &failure));
+        assert_int_equal(vsh_atlas_chart_count(first), vsh_atlas_chart_count(atlas));
+        assert_memory_equal(vsh_atlas_charts(first), vsh_atlas_charts(atlas),
+                            vsh_atlas_chart_count(first) * sizeof(vsh_atlas_chart));
+        assert_int_equal(vsh_atlas_page_count(first), vsh_atlas_page_count(atlas));
+        for (size_t page = 0; page < vsh_atlas_page_count(first); ++page) {
+            const vsh_atlas_page a = vsh_atlas_page_view(first, page), b = vsh_atlas_page_view(atlas, page);
+            assert_true(a.width == b.width && a.height == b.height && a.covered == b.covered);
+        }
+        for (size_t m = 0; m < count; ++m) {
+            const vsh_atlas_mesh x = vsh_atlas_mesh_view(first, m), y = vsh_atlas_mesh_view(atlas, m);
+            assert_same_uvs(first, m, atlas, m);
+            assert_memory_equal(x.charts, y.charts, x.triangle_count * sizeof *x.charts);
+        }
+        vsh_atlas_free(atlas);
     }
+    return first;
 }
 
 static void the_same_bits_for_any_number_of_threads(void **state) {
-    (void)state;
     shape *s[2] = {lump(40), lump(64)};
     const vsh_mesh meshes[2] = {shape_mesh(s[0], "one"), shape_mesh(s[1], "two")};
     const vsh_unwrap_options o = unwrap_into(256);
-    vsh_run run = vsh_run_default();
-    vsh_atlas *first = NULL;
-    for (int32_t threads = 1; threads <= 8; ++threads) {
-        vsh_atlas *atlas = NULL;
-        run.threads = threads;
-        assert_int_equal(vsh_unwrap(meshes, 2, &o, &run, &atlas, NULL), VSH_OK);
-        if (first == NULL) {
-            first = atlas;
-            continue;
-        }
-        same_atlases(first, atlas);
-        vsh_atlas_free(atlas);
-    }
-    vsh_atlas_free(first);
+    vsh_atlas_free(assert_same_bits(meshes, 2, &o));
     free(s[0]);
     free(s[1]);
 }
@@ -73,7 +80,6 @@ static void free_boxes(shape *s[BOXES]) {
 }
 
 static void each_mesh_is_on_one_page_where_it_fits(void **state) {
-    (void)state;
     shape *s[BOXES];
     vsh_mesh meshes[BOXES];
     make_boxes(s, meshes);
@@ -107,26 +113,22 @@ static void each_mesh_is_on_one_page_where_it_fits(void **state) {
 }
 
 static void a_density_that_does_not_fit_is_refused_and_one_named_that_does(void **state) {
-    (void)state;
     shape *s[BOXES];
     vsh_mesh meshes[BOXES];
     make_boxes(s, meshes);
     vsh_unwrap_options o = unwrap_into(128);
     vsh_atlas *atlas = NULL;
-    vsh_error error = {0};
     o.texels_per_unit = 1000;
-    assert_int_equal(vsh_unwrap(meshes, BOXES, &o, NULL, &atlas, &error), VSH_ERROR_LIMIT);
+    assert_fails(vsh_unwrap(meshes, BOXES, &o, NULL, &atlas, &failure), VSH_ERROR_LIMIT, "1000");
     assert_null(atlas);
-    const char *named = strstr(error.message, "texels a unit: ");
+    const char *named = strstr(failure.message, "texels a unit: ");
     assert_non_null(named);
-    assert_non_null(strstr(error.message, "1000"));
     o.texels_per_unit = atof(named + strlen("texels a unit: ")) * 0.999; /* of four digits */
     assert_true(o.texels_per_unit > 5 && o.texels_per_unit < 100);
     unwrap_well(meshes, BOXES, &o, NULL);
     /* more charts than texels */
     o = unwrap_into(8);
-    assert_int_equal(vsh_unwrap(meshes, BOXES, &o, NULL, &atlas, &error), VSH_ERROR_LIMIT);
-    assert_non_null(strstr(error.message, "at any density"));
+    assert_fails(vsh_unwrap(meshes, BOXES, &o, NULL, &atlas, &failure), VSH_ERROR_LIMIT, "at any density");
     free_boxes(s);
 }
 
@@ -144,7 +146,6 @@ static double texels_of(const vsh_atlas *atlas, size_t mesh) {
 }
 
 static void density_is_as_asked_and_by_mesh(void **state) {
-    (void)state;
     shape *s[2] = {lump(32), lump(32)};
     const vsh_mesh meshes[2] = {shape_mesh(s[0], "one"), shape_mesh(s[1], "two")};
     const double factors[2] = {1.0, 0.5};
@@ -154,7 +155,7 @@ static void density_is_as_asked_and_by_mesh(void **state) {
     vsh_atlas *atlas = NULL;
     vsh_mesh_report report;
     unwrap_well(meshes, 2, &o, &atlas);
-    assert_int_equal(vsh_mesh_check(&meshes[0], &report, NULL), VSH_OK);
+    assert_ok(vsh_mesh_check(&meshes[0], &report, &failure));
     assert_true(fabs(texels_of(atlas, 0) / (900 * report.area) - 1) < 0.01);
     assert_true(fabs(texels_of(atlas, 1) / (225 * report.area) - 1) < 0.01);
     vsh_atlas_free(atlas);
@@ -165,8 +166,7 @@ static void density_is_as_asked_and_by_mesh(void **state) {
 /* Turned, moved, mirrored and doubled: one layout, places of their own. One that is scaled unevenly is a
  * shape of its own. */
 static void instances_share_their_charts(void **state) {
-    (void)state;
-    shape *s = lump(32);
+    FREED shape *s = lump(32);
     static const double transforms[4][12] = {{0, -1, 0, 5, 1, 0, 0, 0, 0, 0, 1, 0},
                                              {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 9},
                                              {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
@@ -178,7 +178,7 @@ static void instances_share_their_charts(void **state) {
     }
     vsh_unwrap_options o = unwrap_into(512);
     o.texels_per_unit = 20;
-    vsh_atlas *atlas = NULL;
+    OWNED(vsh_atlas) *atlas = NULL;
     const vsh_atlas_info info = unwrap_well(meshes, 5, &o, &atlas);
     assert_int_equal(info.shared, 3);
     const vsh_atlas_mesh first = vsh_atlas_mesh_view(atlas, 0), turned = vsh_atlas_mesh_view(atlas, 1);
@@ -187,8 +187,187 @@ static void instances_share_their_charts(void **state) {
     assert_true(fabs(texels_of(atlas, 1) / texels_of(atlas, 0) - 1) < 1e-3);
     assert_true(fabs(texels_of(atlas, 2) / texels_of(atlas, 0) - 4) < 1e-2);
     assert_true(fabs(texels_of(atlas, 3) / texels_of(atlas, 0) - 1) < 1e-3);
+}
+
+/* --- pages of objects */
+
+enum { MESHES = 5, OBJECTS = 4 };
+
+/* Four objects, the second of two meshes; the last is without a number, as all were one by one. */
+typedef struct level {
+    shape *shapes[MESHES];
+    vsh_mesh meshes[MESHES];
+} level;
+
+static const uint32_t object_of[MESHES] = {0, 1, 1, 2, 3};
+
+static void make_level(level *l) {
+    static const double sides[MESHES][3] = {{1, 1, 1}, {2, 1, 0.5}, {0.3, 0.4, 3}, {0, 0, 0}, {6, 1, 5}};
+    static const char *const names[MESHES] = {"crate", "door", "handle", "ball", "wall"};
+    for (int i = 0; i < MESHES; ++i) {
+        l->shapes[i] = shape_new();
+        if (i == 3) {
+            shape_ball(l->shapes[i], ORIGIN, 1.0, -1.0, 1.0, 20);
+        } else {
+            shape_box(l->shapes[i], ORIGIN, sides[i], ALL_SIDES);
+        }
+        l->meshes[i] = shape_mesh(l->shapes[i], names[i]);
+    }
+    l->meshes[1].object = l->meshes[2].object = 7;
+    l->meshes[1].object_name = l->meshes[2].object_name = "door with handle";
+}
+
+static void free_level(level *l) {
+    for (int i = 0; i < MESHES; ++i) {
+        free(l->shapes[i]);
+    }
+}
+
+static vsh_unwrap_options of_objects(int32_t size) {
+    vsh_unwrap_options o = unwrap_into(size);
+    o.atlas = VSH_ATLAS_OBJECTS;
+    return o;
+}
+
+static void each_object_is_packed_as_if_it_were_alone(void **state) {
+    FREED_BY(free_level) level l;
+    make_level(&l);
+    const vsh_unwrap_options o = of_objects(128), alone = unwrap_into(128);
+    vsh_atlas *atlas = NULL, *one = NULL;
+    const vsh_atlas_info info = unwrap_well(l.meshes, MESHES, &o, &atlas);
+    assert_int_equal(info.pages, OBJECTS);
+    for (size_t c = 0; c < info.charts; ++c) {
+        const vsh_atlas_chart chart = vsh_atlas_chart_view(atlas, c);
+        assert_int_equal(chart.page, object_of[chart.mesh]);
+    }
+    for (size_t m = 0, count; m < MESHES; m += count) {
+        count = m == 1 ? 2 : 1;
+        const vsh_atlas_info own = unwrap_well(l.meshes + m, count, &alone, &one);
+        const vsh_atlas_page page = vsh_atlas_page_view(atlas, object_of[m]);
+        assert_int_equal(page.first_mesh, m);
+        assert_true(page.texels_per_unit == own.texels_per_unit);
+        assert_true(info.texels_per_unit <= own.texels_per_unit);
+        for (size_t k = 0; k < count; ++k) {
+            assert_same_uvs(atlas, m + k, one, k);
+        }
+        vsh_atlas_free(one);
+    }
     vsh_atlas_free(atlas);
-    free(s);
+}
+
+static void objects_that_are_instances_are_packed_alike(void **state) {
+    FREED shape *s = shape_new();
+    shape_ball(s, ORIGIN, 1.0, -1.0, 1.0, 24);
+    /* as it is, turned and moved, mirrored and twice as large, pressed */
+    static const double transforms[4][12] = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
+                                             {0, 0, 1, 5, 0, 1, 0, 0, -1, 0, 0, 2},
+                                             {-2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 9},
+                                             {1, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 1, 0}};
+    vsh_mesh meshes[4];
+    for (int i = 0; i < 4; ++i) {
+        meshes[i] = shape_mesh(s, "ball");
+        meshes[i].transform = transforms[i];
+    }
+    vsh_unwrap_options o = of_objects(128);
+    OWNED(vsh_atlas) *atlas = NULL;
+    assert_int_equal(unwrap_well(meshes, 4, &o, &atlas).pages, 4);
+    assert_same_uvs(atlas, 0, atlas, 1);
+    assert_same_uvs(atlas, 0, atlas, 2);
+    const double first = vsh_atlas_page_view(atlas, 0).texels_per_unit,
+                 large = vsh_atlas_page_view(atlas, 2).texels_per_unit;
+    assert_true(fabs(first - 2 * large) < 1e-9 * first);
+    vsh_atlas_free(atlas);
+    /* at one density the larger one takes more texels */
+    o.texels_per_unit = 10;
+    unwrap_well(meshes, 4, &o, &atlas);
+    assert_same_uvs(atlas, 0, atlas, 1);
+    assert_true(vsh_atlas_page_view(atlas, 2).covered > 3 * vsh_atlas_page_view(atlas, 0).covered);
+    assert_true(vsh_atlas_page_view(atlas, 2).texels_per_unit == 10);
+}
+
+static int is_power(int32_t x) {
+    return (x & (x - 1)) == 0;
+}
+
+/* Whether meshes fit one page of a size at a density. */
+static int fits(const vsh_mesh *meshes, size_t count, double density, int32_t width, int32_t height) {
+    vsh_unwrap_options o = unwrap_into(width);
+    vsh_atlas *atlas = NULL;
+    o.height = height;
+    o.texels_per_unit = density;
+    const vsh_result result = vsh_unwrap(meshes, count, &o, NULL, &atlas, NULL);
+    vsh_atlas_free(atlas);
+    assert_true(result == VSH_OK || result == VSH_ERROR_LIMIT);
+    return result == VSH_OK;
+}
+
+static void pages_are_the_smallest_that_the_density_fits(void **state) {
+    FREED_BY(free_level) level l;
+    make_level(&l);
+    vsh_unwrap_options o = of_objects(256);
+    o.texels_per_unit = 12;
+    o.fit_pages = 1;
+    vsh_atlas *atlas = NULL;
+    assert_int_equal(unwrap_well(l.meshes, MESHES, &o, &atlas).pages, OBJECTS);
+    int32_t least = 256, most = 0;
+    for (size_t m = 0, count; m < MESHES; m += count) {
+        count = m == 1 ? 2 : 1;
+        const vsh_atlas_page page = vsh_atlas_page_view(atlas, object_of[m]);
+        const int32_t w = page.width, h = page.height;
+        assert_true(is_power(w) && is_power(h) && w <= 2 * h && h <= 2 * w);
+        assert_true(page.texels_per_unit == 12);
+        assert_true(fits(l.meshes + m, count, 12, w, h));
+        assert_false(fits(l.meshes + m, count, 12, w > h ? w / 2 : w, w > h ? h : h / 2));
+        assert_false(fits(l.meshes + m, count, 12, w / 2, h));
+        least = w < least ? w : least;
+        most = w > most ? w : most;
+    }
+    assert_true(most > least);
+    vsh_atlas_free(atlas);
+    /* the last page of a shared atlas is smaller than the others */
+    o.atlas = VSH_ATLAS_SHARED;
+    o.width = o.height = 64;
+    o.max_pages = 20;
+    o.texels_per_unit = 8;
+    const vsh_atlas_info info = unwrap_well(l.meshes, MESHES, &o, &atlas);
+    assert_in_range(info.pages, 2, 20);
+    assert_true(info.width == 64 && info.height == 64);
+    const vsh_atlas_page last = vsh_atlas_page_view(atlas, info.pages - 1);
+    assert_true(last.width * last.height < 64 * 64);
+    vsh_atlas_free(atlas);
+    /* and a single one is not wider than it has to be */
+    o.width = 1000;
+    o.height = 700;
+    const vsh_atlas_info single = unwrap_well(l.meshes, MESHES, &o, NULL);
+    assert_int_equal(single.pages, 1);
+    assert_true(is_power(single.width) && is_power(single.height) && single.width <= 256);
+}
+
+static void an_object_that_does_not_fit_is_named(void **state) {
+    FREED_BY(free_level) level l;
+    make_level(&l);
+    vsh_unwrap_options o = of_objects(64);
+    vsh_atlas *atlas = NULL;
+    o.texels_per_unit = 9;
+    assert_fails(vsh_unwrap(l.meshes, MESHES, &o, NULL, &atlas, &failure), VSH_ERROR_LIMIT, "'wall'");
+    assert_non_null(strstr(failure.message, "would fit"));
+    o.texels_per_unit = 15;
+    assert_fails(vsh_unwrap(l.meshes, 3, &o, NULL, &atlas, &failure), VSH_ERROR_LIMIT, "'door with handle'");
+    o = of_objects(64);
+    o.max_pages = 2;
+    assert_fails(vsh_unwrap(l.meshes, MESHES, &o, NULL, &atlas, &failure), VSH_ERROR_ARGUMENT, "max_pages");
+}
+
+static void objects_without_area_have_no_page_for_any_threads(void **state) {
+    FREED_BY(free_level) level l;
+    make_level(&l);
+    memset(l.shapes[0]->indices, 0, l.meshes[0].triangle_count * 3 * sizeof(uint32_t));
+    vsh_unwrap_options o = of_objects(256);
+    o.texels_per_unit = 12;
+    o.fit_pages = 1;
+    OWNED(vsh_atlas) *atlas = assert_same_bits(l.meshes, MESHES, &o);
+    assert_int_equal(vsh_atlas_page_count(atlas), OBJECTS - 1);
+    assert_int_equal(vsh_atlas_page_view(atlas, 0).first_mesh, 1);
 }
 
 /* The mesh with the UVs of an atlas; free both arrays. */
@@ -210,8 +389,7 @@ static vsh_mesh with_uvs(const vsh_mesh *mesh, const vsh_atlas *atlas, float **p
 }
 
 static void uvs_that_can_serve_are_kept(void **state) {
-    (void)state;
-    shape *s = lump(48);
+    FREED shape *s = lump(48);
     const vsh_mesh mesh = shape_mesh(s, "lump");
     vsh_unwrap_options o = unwrap_into(256);
     vsh_atlas *atlas = NULL, *again = NULL;
@@ -219,7 +397,7 @@ static void uvs_that_can_serve_are_kept(void **state) {
     float *positions, *uvs;
     vsh_mesh own = with_uvs(&mesh, atlas, &positions, &uvs);
     int32_t usable = 0;
-    assert_int_equal(vsh_uvs_usable(&own, NULL, &usable, NULL), VSH_OK);
+    assert_ok(vsh_uvs_usable(&own, NULL, &usable, &failure));
     assert_int_equal(usable, 1);
     o.keep_uvs = VSH_UNWRAP_KEEP;
     o.width = o.height = 200;
@@ -254,7 +432,7 @@ static void uvs_that_can_serve_are_kept(void **state) {
     for (int i = 0; i < 4; ++i) {
         uvs[0] = i == 0 ? NAN : i == 1 ? 1.5F : i == 2 ? -0.1F : uvs[2 * far];
         uvs[1] = i == 3 ? uvs[2 * far + 1] : first[1];
-        assert_int_equal(vsh_uvs_usable(&own, NULL, &usable, NULL), VSH_OK);
+        assert_ok(vsh_uvs_usable(&own, NULL, &usable, &failure));
         assert_int_equal(usable, 0);
         assert_int_equal(unwrap_well(&own, 1, &o, NULL).kept, 0);
         uvs[0] = first[0];
@@ -263,12 +441,11 @@ static void uvs_that_can_serve_are_kept(void **state) {
     for (size_t v = 0; v < own.vertex_count; ++v) { /* two halves over each other */
         uvs[2 * v] = uvs[2 * v] > 0.5F ? uvs[2 * v] - 0.5F : uvs[2 * v];
     }
-    assert_int_equal(vsh_uvs_usable(&own, NULL, &usable, NULL), VSH_OK);
+    assert_ok(vsh_uvs_usable(&own, NULL, &usable, &failure));
     assert_int_equal(usable, 0);
     free(uvs);
     free(positions);
     vsh_atlas_free(atlas);
-    free(s);
 }
 
 typedef struct stopper {
@@ -288,69 +465,56 @@ static int32_t stop(void *user, const char *stage, double fraction) {
     return s->stopped;
 }
 
-static void it_stops_where_it_is_told(void **state) {
-    (void)state;
-    shape *s = lump(64);
+static void it_can_be_cancelled_in_every_stage(void **state) {
+    FREED shape *s = lump(64);
     const vsh_mesh mesh = shape_mesh(s, "lump");
     const vsh_unwrap_options o = unwrap_into(256);
-    static const stopper where[] = {
-        {"unwrap", 0.0, 0.0, 0}, {"unwrap", 0.3, 0.0, 0}, {"unwrap", 0.7, 0.0, 0}, {"pack", 0.0, 0.0, 0}};
+    stopper where[] = {{"unwrap", 0.0, 0.0, 0},
+                       {"unwrap", 0.3, 0.0, 0},
+                       {"unwrap", 0.7, 0.0, 0},
+                       {"pack", 0.0, 0.0, 0},
+                       {"pack", 2.0, 0.0, 0}};
     for (size_t i = 0; i < sizeof where / sizeof where[0]; ++i) {
-        stopper stopping = where[i];
         vsh_run run = vsh_run_default();
-        vsh_atlas *atlas = (void *)&run;
-        vsh_error error = {0};
+        OWNED(vsh_atlas) *atlas = (void *)&run;
         run.progress = stop;
-        run.user = &stopping;
-        assert_int_equal(vsh_unwrap(&mesh, 1, &o, &run, &atlas, &error), VSH_ERROR_CANCELLED);
-        assert_null(atlas);
-        if (strstr(error.message, where[i].stage) == NULL) {
-            fail_msg("%s at %g: '%s'", where[i].stage, where[i].at, error.message);
+        run.user = &where[i];
+        const vsh_result result = vsh_unwrap(&mesh, 1, &o, &run, &atlas, &failure);
+        if (where[i].at > 1) {
+            assert_int_equal(result, VSH_OK);
+            assert_true(where[i].last == 1.0);
+        } else {
+            assert_int_equal(result, VSH_ERROR_CANCELLED);
+            assert_non_null(strstr(failure.message, where[i].stage));
+            assert_null(atlas);
         }
     }
-    stopper never = {"pack", 2.0, 0.0, 0};
-    vsh_run run = vsh_run_default();
-    vsh_atlas *atlas = NULL;
-    run.progress = stop;
-    run.user = &never;
-    assert_int_equal(vsh_unwrap(&mesh, 1, &o, &run, &atlas, NULL), VSH_OK);
-    assert_true(never.last == 1.0);
-    vsh_atlas_free(atlas);
-    free(s);
 }
 
 static void memory_is_kept_within_its_limit(void **state) {
-    (void)state;
-    shape *s = lump(64);
+    FREED shape *s = lump(64);
     const vsh_mesh mesh = shape_mesh(s, "lump");
     vsh_unwrap_options o = unwrap_into(256);
     vsh_run run = vsh_run_default();
     vsh_atlas *atlas = NULL;
-    vsh_error error = {0};
     run.memory_limit = 100000;
-    assert_int_equal(vsh_unwrap(&mesh, 1, &o, &run, &atlas, &error), VSH_ERROR_LIMIT);
+    assert_fails(vsh_unwrap(&mesh, 1, &o, &run, &atlas, &failure), VSH_ERROR_LIMIT, "");
     run.memory_limit = 100000000;
-    assert_int_equal(vsh_unwrap(&mesh, 1, &o, &run, &atlas, &error), VSH_OK);
+    assert_ok(vsh_unwrap(&mesh, 1, &o, &run, &atlas, &failure));
     vsh_atlas_free(atlas);
     o.width = o.height = VSH_MAX_PAGE_SIZE; /* half a gigabyte of bits */
-    assert_int_equal(vsh_unwrap(&mesh, 1, &o, &run, &atlas, &error), VSH_ERROR_LIMIT);
-    free(s);
+    assert_fails(vsh_unwrap(&mesh, 1, &o, &run, &atlas, &failure), VSH_ERROR_LIMIT, "");
 }
 
 static void refused(const vsh_mesh *mesh, size_t count, const vsh_unwrap_options *o, vsh_result code,
                     const char *word) {
     vsh_atlas *atlas = (void *)&code;
-    vsh_error error = {0};
-    const vsh_result result = vsh_unwrap(mesh, count, o, NULL, &atlas, &error);
-    if (result != code || strstr(error.message, word) == NULL || atlas != NULL) {
-        fail_msg("%s '%s', expected %s with '%s'", vsh_result_name(result), error.message,
-                 vsh_result_name(code), word);
-    }
+    assert_fails(vsh_unwrap(mesh, count, o, NULL, &atlas, &failure), code, word);
+    assert_null(atlas);
 }
 
 static void bad_options_are_refused_by_name(void **state) {
-    (void)state;
-    shape *s = shape_new();
+    FREED shape *s = shape_new();
     shape_box(s, ORIGIN, (double[3]){1, 1, 1}, ALL_SIDES);
     const vsh_mesh mesh = shape_mesh(s, "box");
     const double bad[5] = {0, -1, NAN, INFINITY, 0};
@@ -380,12 +544,10 @@ static void bad_options_are_refused_by_name(void **state) {
     o = unwrap_into(64);
     refused(&mesh, 0, &o, VSH_ERROR_ARGUMENT, "meshes");
     refused(NULL, 1, &o, VSH_ERROR_ARGUMENT, "meshes");
-    free(s);
 }
 
 static void bad_meshes_are_refused(void **state) {
-    (void)state;
-    shape *s = shape_new();
+    FREED shape *s = shape_new();
     shape_box(s, ORIGIN, (double[3]){1, 1, 1}, ALL_SIDES);
     vsh_mesh mesh = shape_mesh(s, "box");
     const vsh_unwrap_options o = unwrap_into(64);
@@ -404,13 +566,11 @@ static void bad_meshes_are_refused(void **state) {
     mesh.triangle_count = 3;
     memset(s->indices, 0, 9 * sizeof(uint32_t));
     refused(&mesh, 1, &o, VSH_ERROR_INPUT, "has area");
-    free(s);
 }
 
 /* A million units in one direction and one in the others; corners of floats' whole range. */
 static void wild_numbers_do_no_harm(void **state) {
-    (void)state;
-    shape *s = shape_new();
+    FREED shape *s = shape_new();
     uint64_t seed = 11;
     for (int i = 0; i < 60; ++i) {
         shape_vertex(s, pow(10, 60 * next_number(&seed) - 30), pow(10, 20 * next_number(&seed) - 10),
@@ -422,17 +582,13 @@ static void wild_numbers_do_no_harm(void **state) {
     }
     const vsh_mesh mesh = shape_mesh(s, "wild");
     const vsh_unwrap_options o = unwrap_into(256);
-    vsh_atlas *atlas = NULL;
-    vsh_error error = {0};
-    const vsh_result result = vsh_unwrap(&mesh, 1, &o, NULL, &atlas, &error);
+    OWNED(vsh_atlas) *atlas = NULL;
+    const vsh_result result = vsh_unwrap(&mesh, 1, &o, NULL, &atlas, &failure);
     assert_true(result == VSH_OK || result == VSH_ERROR_LIMIT);
-    vsh_atlas_free(atlas);
-    free(s);
 }
 
 /* A rectangle of 1 × 2 units that fills the square: along v a texel is twice as long as along u. */
 static void density_and_stretch_of_uvs_are_those_of_their_derivatives(void **state) {
-    (void)state;
     static const float positions[4][3] = {{0, 0, 0}, {1, 0, 0}, {1, 2, 0}, {0, 2, 0}};
     static const float uvs[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
     static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
@@ -443,13 +599,13 @@ static void density_and_stretch_of_uvs_are_those_of_their_derivatives(void **sta
                      .vertex_count = 4,
                      .triangle_count = 2};
     vsh_uvs_measures measures;
-    assert_int_equal(vsh_uvs_measure(&mesh, 64, 64, &measures, NULL), VSH_OK);
+    assert_ok(vsh_uvs_measure(&mesh, 64, 64, &measures, &failure));
     assert_true(fabs(measures.texels_per_unit - 64.0 / sqrt(2.0)) < 1e-9);
     assert_true(fabs(measures.stretch - sqrt(1.25)) < 1e-9);
-    assert_int_equal(vsh_uvs_measure(&mesh, 64, 128, &measures, NULL), VSH_OK);
+    assert_ok(vsh_uvs_measure(&mesh, 64, 128, &measures, &failure));
     assert_true(fabs(measures.texels_per_unit - 64.0) < 1e-9 && fabs(measures.stretch - 1.0) < 1e-9);
     mesh.uvs = NULL;
-    assert_int_equal(vsh_uvs_measure(&mesh, 64, 64, &measures, NULL), VSH_OK);
+    assert_ok(vsh_uvs_measure(&mesh, 64, 64, &measures, &failure));
     assert_true(measures.texels_per_unit == 0.0 && measures.stretch == 0.0);
     assert_int_equal(vsh_uvs_measure(&mesh, 0, 64, &measures, NULL), VSH_ERROR_ARGUMENT);
 }
@@ -462,8 +618,13 @@ int main(void) {
         cmocka_unit_test(a_density_that_does_not_fit_is_refused_and_one_named_that_does),
         cmocka_unit_test(density_is_as_asked_and_by_mesh),
         cmocka_unit_test(instances_share_their_charts),
+        cmocka_unit_test(each_object_is_packed_as_if_it_were_alone),
+        cmocka_unit_test(objects_that_are_instances_are_packed_alike),
+        cmocka_unit_test(pages_are_the_smallest_that_the_density_fits),
+        cmocka_unit_test(an_object_that_does_not_fit_is_named),
+        cmocka_unit_test(objects_without_area_have_no_page_for_any_threads),
         cmocka_unit_test(uvs_that_can_serve_are_kept),
-        cmocka_unit_test(it_stops_where_it_is_told),
+        cmocka_unit_test(it_can_be_cancelled_in_every_stage),
         cmocka_unit_test(memory_is_kept_within_its_limit),
         cmocka_unit_test(bad_options_are_refused_by_name),
         cmocka_unit_test(bad_meshes_are_refused),

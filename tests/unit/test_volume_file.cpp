@@ -91,6 +91,18 @@ vsh_volume *bake(const vsh_occluders *occluders, const vsh_voxels *voxels, bool 
     return volume;
 }
 
+// A volume of the ball's shadow in a box of so many units to each side.
+vsh_volume *bake_box(double half, bool ao) {
+    const double low[3] = {-half, -half, -half}, high[3] = {half, half, half};
+    vsh_occluders *occluders = ball();
+    vsh_voxels *voxels = nullptr;
+    assert_int_equal(vsh_voxels_from_box(low, high, 0.1, nullptr, &voxels, &failure), VSH_OK);
+    vsh_volume *volume = bake(occluders, voxels, ao);
+    vsh_voxels_free(voxels);
+    vsh_occluders_free(occluders);
+    return volume;
+}
+
 // The first grid of a written volume, by OpenVDB's own reader.
 FloatGrid::Ptr written(const vsh_volume *volume, const char *name, const char *grid, bool as_half) {
     const std::string path = in_folder(name);
@@ -254,11 +266,7 @@ void what_has_no_voxels_is_refused(void **) {
 }
 
 void other_programs_read_names_class_metadata_and_halves(void **) {
-    vsh_occluders *occluders = ball();
-    const double low[3] = {-2, -2, -2}, high[3] = {2, 2, 2};
-    vsh_voxels *voxels = nullptr;
-    assert_int_equal(vsh_voxels_from_box(low, high, 0.1, nullptr, &voxels, &failure), VSH_OK);
-    vsh_volume *volume = bake(occluders, voxels, true);
+    vsh_volume *volume = bake_box(2.0, true);
     const FloatGrid::Ptr full = written(volume, "full.vdb", "shadow.sun", false);
     const FloatGrid::Ptr rounded = written(volume, "half.vdb", "shadow.sun", true);
     assert_true(!full->saveFloatAsHalf() && rounded->saveFloatAsHalf());
@@ -306,16 +314,10 @@ void other_programs_read_names_class_metadata_and_halves(void **) {
         assert_true(values[i] == full->tree().getValue(Coord(n % 40, n / 40 % 40, n / 1600)));
     }
     vsh_volume_free(volume);
-    vsh_voxels_free(voxels);
-    vsh_occluders_free(occluders);
 }
 
 void a_failed_write_leaves_the_old_file(void **) {
-    vsh_occluders *occluders = ball();
-    const double low[3] = {-1.5, -1.5, -1.5}, high[3] = {1.5, 1.5, 1.5};
-    vsh_voxels *voxels = nullptr;
-    assert_int_equal(vsh_voxels_from_box(low, high, 0.1, nullptr, &voxels, &failure), VSH_OK);
-    vsh_volume *volume = bake(occluders, voxels, false);
+    vsh_volume *volume = bake_box(1.5, false);
     const std::string inner = in_folder("closed"), path = inner + "/out.vdb";
     assert_int_equal(std::system(("mkdir '" + inner + "'").c_str()), 0);
     assert_int_equal(vsh_volume_write(volume, inner.c_str(), 0, nullptr, 0, &failure),
@@ -329,8 +331,6 @@ void a_failed_write_leaves_the_old_file(void **) {
     assert_int_equal(vsh_volume_write(volume, path.c_str(), 0, nullptr, 0, &failure), VSH_OK);
     assert_true(content(path) != "old");
     vsh_volume_free(volume);
-    vsh_voxels_free(voxels);
-    vsh_occluders_free(occluders);
 }
 
 int remove_folder(void **) {

@@ -13,7 +13,7 @@
 typedef struct caster {
     vsh_field *field;
     vsh_triangles *triangles; /* NULL without Embree */
-} caster;
+} casting;
 
 #define occluders_of_caster(c) occluders_traced((c)->field, (c)->triangles)
 
@@ -130,36 +130,36 @@ static inline vsh_triangles *triangles_of_moved(truth_scene scene, double scale,
     return triangles;
 }
 
-static inline caster caster_of_moved(truth_scene scene, double voxel, double scale, const double offset[3],
-                                     double reach) {
-    return (caster){field_of_grid(grid_of_moved(scene, voxel, scale, offset), reach),
-                    triangles_of_moved(scene, scale, offset)};
+static inline casting caster_of_moved(truth_scene scene, double voxel, double scale, const double offset[3],
+                                      double reach) {
+    return (casting){field_of_grid(grid_of_moved(scene, voxel, scale, offset), reach),
+                     triangles_of_moved(scene, scale, offset)};
 }
 
-static inline caster caster_of(truth_scene scene, double voxel, double reach) {
+static inline casting caster_of(truth_scene scene, double voxel, double reach) {
     const double nowhere[3] = {0.0, 0.0, 0.0};
     return caster_of_moved(scene, voxel, 1.0, nowhere, reach);
 }
 
-static inline void caster_free(caster *c) {
+static inline void caster_free(casting *c) {
     vsh_triangles_free(c->triangles);
     vsh_field_free(c->field);
 }
 
-static inline vsh_shade_stats cast_shadows(const caster *c, const vsh_light *light, int32_t method,
+static inline vsh_shade_stats cast_shadows(const casting *c, const vsh_light *light, int32_t method,
                                            size_t count, const double *positions, const float *normals,
                                            float *visible) {
     return shadows_by(occluders_of_caster(c), light, method, count, positions, normals, visible);
 }
 
-static inline float cast_shadow_at(const caster *c, const vsh_light *light, int32_t method,
+static inline float cast_shadow_at(const casting *c, const vsh_light *light, int32_t method,
                                    const double *position, const float *normal) {
     float visible = -1.0f;
     cast_shadows(c, light, method, 1, position, normal, &visible);
     return visible;
 }
 
-static inline vsh_shade_stats cast_ao(const caster *c, int32_t method, double distance, size_t count,
+static inline vsh_shade_stats cast_ao(const casting *c, int32_t method, double distance, size_t count,
                                       const double *positions, const float *normals, float *open) {
     vsh_shade_options options = preview_options();
     options.ao_method = method;
@@ -174,7 +174,7 @@ static inline vsh_shade_stats cast_ao(const caster *c, int32_t method, double di
     return stats;
 }
 
-static inline float cast_ao_at(const caster *c, int32_t method, double distance, const double *position,
+static inline float cast_ao_at(const casting *c, int32_t method, double distance, const double *position,
                                const float *normal) {
     float open = -1.0f;
     cast_ao(c, method, distance, 1, position, normal, &open);

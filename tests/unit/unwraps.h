@@ -4,6 +4,7 @@
 #define TESTS_UNWRAPS_H
 
 #include "shapes.h"
+#include "testing.h"
 
 /* Texels: UVs are 32-bit, and a border that is rounded over a texel's edge by so much does not touch it. */
 static const double ROUNDING = 1e-3;
@@ -98,6 +99,14 @@ static inline void place_of(const vsh_mesh *mesh, uint32_t v, double at[3]) {
     }
 }
 
+/* Normal of a triangle, as long as twice its area. */
+static inline void normal_of(double p[3][3], double n[3]) {
+    for (int i = 0; i < 3; ++i) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        n[i] = (p[1][j] - p[0][j]) * (p[2][k] - p[0][k]) - (p[1][k] - p[0][k]) * (p[2][j] - p[0][j]);
+    }
+}
+
 /* Twice a triangle's area in the world, and the larger and the smaller singular value of the map from its
  * UVs. */
 static inline double stretch_of(const vsh_mesh *mesh, const corner_uvs *c, const uint32_t *corner,
@@ -121,10 +130,7 @@ static inline double stretch_of(const vsh_mesh *mesh, const corner_uvs *c, const
     const double root = sqrt((a - d) * (a - d) + 4 * b * b);
     *larger = sqrt(0.5 * (a + d + root));
     *smaller = sqrt(fmax(0.0, 0.5 * (a + d - root)));
-    for (int i = 0; i < 3; ++i) {
-        const int j = (i + 1) % 3, k = (i + 2) % 3;
-        n[i] = (p[1][j] - p[0][j]) * (p[2][k] - p[0][k]) - (p[1][k] - p[0][k]) * (p[2][j] - p[0][j]);
-    }
+    normal_of(p, n);
     return sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
 }
 
@@ -136,10 +142,7 @@ static inline int is_flat(const vsh_mesh *mesh, size_t triangle) {
             p[k][i] = (double)mesh->positions[3 * (size_t)v[k] + (size_t)i];
         }
     }
-    for (int i = 0; i < 3; ++i) {
-        const int j = (i + 1) % 3, k = (i + 2) % 3;
-        n[i] = (p[1][j] - p[0][j]) * (p[2][k] - p[0][k]) - (p[1][k] - p[0][k]) * (p[2][j] - p[0][j]);
-    }
+    normal_of(p, n);
     return n[0] == 0 && n[1] == 0 && n[2] == 0;
 }
 
@@ -310,11 +313,8 @@ static inline vsh_unwrap_options unwrap_into(int32_t size) {
 static inline vsh_atlas_info unwrap_well(const vsh_mesh *meshes, size_t count, const vsh_unwrap_options *o,
                                          vsh_atlas **kept) {
     vsh_atlas *atlas = NULL;
-    vsh_error error = {0};
     vsh_atlas_info info;
-    if (vsh_unwrap(meshes, count, o, NULL, &atlas, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_unwrap(meshes, count, o, NULL, &atlas, &failure));
     look_at_atlas(meshes, count, o, atlas);
     vsh_atlas_get_info(atlas, &info);
     if (kept != NULL) {

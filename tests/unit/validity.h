@@ -3,18 +3,9 @@
 #define TESTS_VALIDITY_H
 
 #include "casts.h"
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
+#include "testing.h"
+
 #include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-#include <vdbshade/vdbshade.h>
 
 enum { MOST_QUADS = 4096, MOST_BOXES = 64, SIZE = 256 };
 
@@ -97,15 +88,8 @@ typedef struct baked {
     uint64_t invalid;
 } baked;
 
-static inline void check(vsh_result result, const vsh_error *error) {
-    if (result != VSH_OK) {
-        fail_msg("%s", error->message);
-    }
-}
-
 static inline baked bake(const vsh_mesh *mesh, int32_t resolution, int32_t threads, double distance) {
     baked b = {.stats = vsh_bake_stats_zero()};
-    vsh_error error = {VSH_OK, ""};
     vsh_run run = vsh_run_default();
     run.threads = threads;
     vsh_grid_options grid_options = vsh_grid_options_default();
@@ -113,9 +97,9 @@ static inline baked bake(const vsh_mesh *mesh, int32_t resolution, int32_t threa
     vsh_grid *grid = NULL;
     vsh_field *field = NULL;
     vsh_triangles *triangles = NULL;
-    check(vsh_grid_from_meshes(mesh, 1, &grid_options, &run, &grid, &error), &error);
-    check(vsh_field_create(grid, NULL, &run, &field, &error), &error);
-    check(vsh_triangles_create(mesh, 1, &run, &triangles, &error), &error);
+    assert_ok(vsh_grid_from_meshes(mesh, 1, &grid_options, &run, &grid, &failure));
+    assert_ok(vsh_field_create(grid, NULL, &run, &field, &failure));
+    assert_ok(vsh_triangles_create(mesh, 1, &run, &triangles, &failure));
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = SIZE;
     options.ao_spacing = 1;
@@ -123,16 +107,15 @@ static inline baked bake(const vsh_mesh *mesh, int32_t resolution, int32_t threa
     options.shade.ao_method = VSH_AO_EXACT;
     options.shade.ao_distance = distance;
     options.shade.rays = 16;
-    check(vsh_charts_create(mesh, 1, &options, &run, NULL, &b.charts, &error), &error);
-    check(vsh_texels_create(b.charts, &run, &b.texels, &error), &error);
+    assert_ok(vsh_charts_create(mesh, 1, &options, &run, NULL, &b.charts, &failure));
+    assert_ok(vsh_texels_create(b.charts, &run, &b.texels, &failure));
     b.samples = vsh_texels_samples(b.texels);
     b.ao = calloc(SIZE * SIZE, sizeof *b.ao);
     b.coverage = calloc(SIZE * SIZE, sizeof *b.coverage);
     b.stats.invalid_by_mesh = &b.invalid;
     const vsh_lightmap lightmap = {.ao = b.ao, .coverage = b.coverage};
-    check(vsh_bake_lightmap(occluders_traced(field, triangles), b.charts, NULL, 0, NULL, &run, &lightmap,
-                            &b.stats, &error),
-          &error);
+    assert_ok(vsh_bake_lightmap(occluders_traced(field, triangles), b.charts, NULL, 0, NULL, &run, &lightmap,
+                                &b.stats, &failure));
     vsh_triangles_free(triangles);
     vsh_field_free(field);
     vsh_grid_free(grid);

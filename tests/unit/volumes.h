@@ -64,6 +64,10 @@ static inline dense copy_of(const vsh_volume *volume, size_t grid, const vsh_vox
     return d;
 }
 
+static inline void free_dense(dense *d) {
+    free(d->values);
+}
+
 /* Index of the i-th value. */
 static inline void index_of(const dense *d, size_t i, int32_t index[3]) {
     const size_t row = (size_t)d->size[0], plane = row * (size_t)d->size[1];
