@@ -1,14 +1,99 @@
-#include "lit/images.h"
+#include "lit/work.h"
 
+#include "base/file.h"
+#include "base/input.h"
 #include "base/memory.h"
 #include "base/srgb.h"
+#include "base/uri.h"
 #include "image/png.h"
-#include "lit/own_textures.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+
+/* --- names of what stands beside the output */
+
+char *vshi_lit_beside_path(const char *output, const char *name) {
+    const char *slash = strrchr(output, '/');
+    const size_t folder = slash != NULL ? (size_t)(slash - output) + 1 : 0;
+    char *path = malloc(folder + strlen(name) + 1);
+    if (path != NULL) {
+        memcpy(path, output, folder);
+        strcpy(path + folder, name);
+    }
+    return path;
+}
+
+static bool is_same_file(const char *a, const char *b) {
+    struct stat one, other;
+    return stat(a, &one) == 0 && stat(b, &other) == 0 && one.st_dev == other.st_dev &&
+           one.st_ino == other.st_ino;
+}
+
+vsh_result vshi_lit_check_replaced(const vshi_lit_document *document, const char *path, vsh_error *error) {
+    static const char *const lists[] = {"buffers", "images"};
+    json_t *const own[] = {json_object_get(document->gltf.root, "buffers"), document->own_images};
+    for (size_t k = 0; k < sizeof lists / sizeof lists[0] && document->text != NULL; ++k) {
+        size_t i;
+        const json_t *item;
+        json_array_foreach(own[k], i, item) {
+            const char *uri = json_string_value(json_object_get(item, "uri"));
+            if (uri == NULL || vshi_uri_is_data(uri) || vshi_uri_is_remote(uri)) {
+                continue;
+            }
+            char *given = vshi_uri_path(document->gltf.path, uri);
+            if (given == NULL) {
+                return vshi_lit_no_memory(document, error);
+            }
+            const bool same = is_same_file(given, path);
+            free(given);
+            if (same) {
+                return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: would replace %s[%zu] of %s", path, lists[k],
+                                 i, document->gltf.path);
+            }
+        }
+    }
+    return VSH_OK;
+}
+
+/* With a number, unless that is 0. */
+static char *make_name(const char *output, const char *mark, const char *ending, unsigned number) {
+    const char *slash = strrchr(output, '/');
+    const char *name = slash != NULL ? slash + 1 : output;
+    const char *own = vshi_path_ending(output);
+    const size_t stem = own[0] != '\0' ? (size_t)(own - name) - 1 : strlen(name);
+    const size_t size = stem + strlen(mark) + strlen(ending) + 16;
+    char *made = malloc(size);
+    if (made != NULL && number > 0) {
+        snprintf(made, size, "%.*s%s.%u.%s", (int)stem, name, mark, number, ending);
+    } else if (made != NULL) {
+        snprintf(made, size, "%.*s%s.%s", (int)stem, name, mark, ending);
+    }
+    return made;
+}
+
+vsh_result vshi_lit_beside_name(const vshi_lit_work *work, const char *mark, const char *ending, char **name,
+                                vsh_error *error) {
+    enum { MOST = 100 };
+    for (unsigned number = 0;; ++number) {
+        *name = make_name(work->output, mark, ending, number);
+        char *path = *name != NULL ? vshi_lit_beside_path(work->output, *name) : NULL;
+        if (path == NULL) {
+            free(*name);
+            *name = NULL;
+            return vshi_lit_no_memory(&work->document, error);
+        }
+        const vsh_result result = vshi_lit_check_replaced(&work->document, path, error);
+        free(path);
+        if (result != VSH_ERROR_ARGUMENT || number == MOST) {
+            return result;
+        }
+        free(*name);
+    }
+}
 
 enum { MARK_BYTES = VSHI_LIT_NAME_BYTES + 64 }; /* of a purpose and a page's name */
 
@@ -201,6 +286,92 @@ vsh_result vshi_lit_images_add(vshi_lit_work *work, bool embed, vshi_lit_besides
             free(beside.owned);
         }
         VSHI_TRY(result);
+    }
+    return VSH_OK;
+}
+
+/* --- images that a glTF names beside it, where it moves to another folder */
+
+/* By its first bytes, else by its name. */
+static const char *type_of(const unsigned char *bytes, size_t size, const char *path) {
+    static const struct {
+        const char *ending, *type, *magic;
+        size_t length;
+    } types[] = {{"png", "image/png", "\x89PNG", 4},     {"jpg", "image/jpeg", "\xff\xd8\xff", 3},
+                 {"webp", "image/webp", "RIFF", 4},      {"ktx2", "image/ktx2", "\xabKTX 20\xbb", 8},
+                 {"dds", "image/vnd-ms.dds", "DDS ", 4}, {"avif", "image/avif", NULL, 0}};
+    const char *dot = strrchr(path, '.');
+    for (size_t i = 0; i < sizeof types / sizeof types[0]; ++i) {
+        const bool begins = types[i].magic != NULL && size >= types[i].length &&
+                            memcmp(bytes, types[i].magic, types[i].length) == 0;
+        if (begins || (types[i].magic == NULL && dot != NULL && strcasecmp(dot + 1, types[i].ending) == 0)) {
+            return types[i].type;
+        }
+    }
+    return NULL;
+}
+
+/* The bytes of an image, or why there are none. */
+static vsh_result read_image(vshi_lit_work *work, const char *path, unsigned char **bytes, size_t *size,
+                             vsh_error *error) {
+    vshi_gltf *gltf = &work->document.gltf;
+    FILE *file;
+    uint64_t told;
+    if (!gltf->run->allow_outside && !vshi_input_is_beside(gltf->path, path)) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "it lies outside of the model's folder");
+    }
+    VSHI_TRY(vshi_input_open(path, path, UINT32_MAX, &file, &told, error));
+    *size = (size_t)told;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_gltf_take(gltf, (void **)bytes, *size + 1, 1, error));
+    if (fread(*bytes, 1, *size, file) != *size) {
+        result = vshi_fail(error, VSH_ERROR_READ, "%s: became shorter while it was read", path);
+    }
+done:
+    fclose(file);
+    return result;
+}
+
+static vsh_result bring(vshi_lit_work *work, json_t *image, const char *uri, vsh_error *error) {
+    vshi_lit_document *document = &work->document;
+    unsigned char *bytes = NULL;
+    size_t size = 0, view;
+    vsh_error why;
+    char *path = vshi_uri_path(document->gltf.path, uri);
+    if (path == NULL) {
+        return vshi_lit_no_memory(document, error);
+    }
+    vsh_result result = read_image(work, path, &bytes, &size, &why);
+    const char *type = result == VSH_OK ? type_of(bytes, size, path) : NULL;
+    if (result == VSH_ERROR_LIMIT || result == VSH_ERROR_MEMORY) {
+        result = vshi_fail(error, result, "%s", why.message);
+    } else if (type == NULL) {
+        vshi_warn(document->gltf.run, "%s: image '%s' keeps its path, where '%s' will not find it: %s",
+                  document->gltf.path, uri, work->output,
+                  result == VSH_OK ? "it is of no type that is known" : why.message);
+        result = VSH_OK;
+    } else {
+        VSHI_TRY_DONE(vshi_lit_add_view(document, bytes, size, 0, 0, &view, NULL, error));
+        VSHI_TRY_DONE(vshi_lit_set(document, image, "bufferView", json_integer((json_int_t)view), error));
+        VSHI_TRY_DONE(vshi_lit_set(document, image, "mimeType", json_string(type), error));
+        json_object_del(image, "uri");
+    }
+done:
+    free(bytes);
+    free(path);
+    return result;
+}
+
+vsh_result vshi_lit_images_bring(vshi_lit_work *work, vsh_error *error) {
+    size_t i;
+    json_t *image;
+    const json_t *images = json_object_get(work->document.gltf.root, "images");
+    json_array_foreach(work->document.own_images, i, image) {
+        const char *uri = json_string_value(json_object_get(image, "uri"));
+        const bool stays = json_array_get(images, i) == image;
+        if (stays && uri != NULL && !vshi_uri_is_data(uri) && !vshi_uri_is_remote(uri)) {
+            VSHI_TRY(bring(work, image, uri, error));
+        }
     }
     return VSH_OK;
 }

@@ -1,4 +1,4 @@
-#include "lit/obj.h"
+#include "lit/work.h"
 
 #include "base/file.h"
 #include "base/numbers.h"

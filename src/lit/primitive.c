@@ -5,6 +5,300 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* --- primitives on several pages */
+
+/* The only page of a mesh, or VSH_LIT_NO_CHART. */
+static uint32_t find_only_page(const vshi_lit_work *work, const vsh_lit_mesh *mesh) {
+    uint32_t only = VSH_LIT_NO_CHART;
+    for (size_t t = 0; mesh->charts != NULL && t < mesh->triangle_count; ++t) {
+        const uint32_t page = vshi_lit_page(work, mesh, t);
+        if (page != VSH_LIT_NO_CHART && only != VSH_LIT_NO_CHART && page != only) {
+            return VSH_LIT_NO_CHART;
+        }
+        only = page != VSH_LIT_NO_CHART ? page : only;
+    }
+    /* one that has no place anywhere is dark on all */
+    return mesh->charts == NULL ? mesh->page : only == VSH_LIT_NO_CHART ? 0 : only;
+}
+
+static vsh_result add_copy(vshi_lit_work *work, const json_t *made, size_t indices, uint32_t page, size_t set,
+                           json_t *list, vsh_error *error) {
+    vshi_lit_document *document = &work->document;
+    json_t *primitive = vshi_gltf_copy(made);
+    if (primitive == NULL || json_array_append_new(list, primitive) != 0) {
+        return vshi_lit_no_memory(document, error);
+    }
+    VSHI_TRY(vshi_lit_set(document, primitive, "indices", json_integer((json_int_t)indices), error));
+    return vshi_lit_mark_primitive(work, primitive, page, set, NULL, error);
+}
+
+/* Triangles of a page, and (on the first) those that have none: corners of them into chosen[]. */
+static size_t choose_corners(const vshi_lit_work *work, const vsh_lit_mesh *mesh, const uint32_t *corners,
+                             uint32_t page, bool first, uint32_t *chosen) {
+    size_t count = 0;
+    for (size_t t = 0; t < mesh->triangle_count; ++t) {
+        const uint32_t own = vshi_lit_page(work, mesh, t);
+        if (own == page || (first && own == VSH_LIT_NO_CHART)) {
+            for (size_t k = 0; k < 3; ++k) {
+                chosen[count++] = corners[3 * t + k];
+            }
+        }
+    }
+    return count;
+}
+
+static vsh_result split_pages(vshi_lit_work *work, const json_t *made, const vsh_lit_mesh *mesh,
+                              const uint32_t *corners, size_t vertex_count, size_t set, bool *used,
+                              uint32_t *chosen, json_t *list, vsh_error *error) {
+    for (size_t t = 0; t < mesh->triangle_count; ++t) {
+        const uint32_t page = vshi_lit_page(work, mesh, t);
+        if (page != VSH_LIT_NO_CHART) {
+            used[page] = true;
+        }
+    }
+    bool first = true;
+    for (size_t page = 0; page < work->page_count; ++page) {
+        if (!used[page]) {
+            continue;
+        }
+        const size_t count = choose_corners(work, mesh, corners, (uint32_t)page, first, chosen);
+        size_t indices;
+        first = false;
+        VSHI_TRY(vshi_lit_add_indices(&work->document, chosen, count, vertex_count, &indices, error));
+        VSHI_TRY(add_copy(work, made, indices, (uint32_t)page, set, list, error));
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_lit_pages_make(vshi_lit_work *work, const json_t *made, const vsh_lit_mesh *mesh,
+                               const uint32_t *corners, size_t vertex_count, size_t set, size_t *whole,
+                               json_t *list, vsh_error *error) {
+    vshi_lit_document *document = &work->document;
+    const uint32_t only = find_only_page(work, mesh);
+    if (only != VSH_LIT_NO_CHART) {
+        if (*whole == SIZE_MAX) {
+            VSHI_TRY(vshi_lit_add_indices(document, corners, 3 * mesh->triangle_count, vertex_count, whole,
+                                          error));
+        }
+        return add_copy(work, made, *whole, only, set, list, error);
+    }
+    uint32_t *chosen = NULL;
+    bool *used = NULL;
+    vsh_result result;
+    const double held = document->gltf.bytes_held;
+    VSHI_TRY_DONE(vshi_gltf_allocate(&document->gltf, (void **)&used, work->page_count, sizeof *used, error));
+    VSHI_TRY_DONE(
+        vshi_gltf_take(&document->gltf, (void **)&chosen, mesh->triangle_count, 3 * sizeof *chosen, error));
+    document->gltf.bytes_held = held;
+    VSHI_TRY_DONE(split_pages(work, made, mesh, corners, vertex_count, set, used, chosen, list, error));
+done:
+    free(chosen);
+    free(used);
+    return result;
+}
+
+/* Chooses the set of a primitive that new UVs become. They replace the file's lightmap set, or a set of an
+ * earlier bake, which the extras of a primitive list ("vdbshade_uv_sets": [1]). */
+
+static const char sets_key[] = "vdbshade_uv_sets";
+
+/* Of the images of a page, as bits 1 << VSH_LIT_…. */
+static uint32_t purposes_of(const vshi_lit_work *work, uint32_t page) {
+    uint32_t purposes = 0;
+    for (size_t i = 0; i < work->options->image_count; ++i) {
+        const vsh_lit_image *image = &work->options->images[i];
+        purposes |= image->page == page ? 1U << image->purpose : 0;
+    }
+    return purposes;
+}
+
+/* Those that all pages of a mesh have. */
+static uint32_t purposes_of_mesh(const vshi_lit_work *work, const vsh_lit_mesh *mesh) {
+    const uint32_t only = find_only_page(work, mesh);
+    if (only != VSH_LIT_NO_CHART) {
+        return purposes_of(work, only);
+    }
+    uint32_t purposes = UINT32_MAX, before = VSH_LIT_NO_CHART;
+    for (size_t t = 0; t < mesh->triangle_count; ++t) {
+        const uint32_t page = vshi_lit_page(work, mesh, t);
+        if (page != VSH_LIT_NO_CHART && page != before) {
+            purposes &= purposes_of(work, page);
+            before = page;
+        }
+    }
+    return purposes;
+}
+
+/* --- who else uses a set */
+
+static bool is_texture_of(const json_t *info, size_t set) {
+    size_t own = 0, moved = 0;
+    const json_t *transform = vshi_gltf_extension(info, "KHR_texture_transform");
+    if (json_object_get(info, "index") == NULL && json_object_get(info, "texCoord") == NULL) {
+        return false;
+    }
+    return !vshi_gltf_count(info, "texCoord", 0, &own) ||
+           !vshi_gltf_count(transform, "texCoord", own, &moved) || moved == set;
+}
+
+/* Whether any texture at or below `value`, but `without`, is in the set. */
+static bool has_texture(json_t *value, size_t set, const json_t *const without[VSH_LIT_PURPOSES]) {
+    for (int i = 0; i < VSH_LIT_PURPOSES; ++i) {
+        if (value == without[i]) {
+            return false;
+        }
+    }
+    size_t i;
+    const char *name;
+    json_t *member;
+    if (json_is_array(value)) {
+        json_array_foreach(value, i, member) {
+            if (has_texture(member, set, without)) {
+                return true;
+            }
+        }
+    }
+    if (is_texture_of(value, set)) {
+        return true;
+    }
+    json_object_foreach(value, name, member) {
+        if (has_texture(member, set, without)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Whether the material of a primitive, or of a variant of it, shows something in the set that stays. */
+static bool is_shown(const vshi_lit_work *work, const json_t *owner, size_t set, uint32_t purposes) {
+    const json_t *number = json_object_get(owner, "material");
+    const json_t *materials = json_object_get(work->document.gltf.root, "materials");
+    json_t *material = json_is_integer(number) && json_integer_value(number) >= 0
+                           ? json_array_get(materials, (size_t)json_integer_value(number))
+                           : NULL;
+    const json_t *base = json_object_get(material, "pbrMetallicRoughness");
+    const json_t *without[VSH_LIT_PURPOSES] = {
+        [VSH_LIT_OCCLUSION] = json_object_get(material, "occlusionTexture"),
+        [VSH_LIT_LIGHTMAP] = vshi_gltf_extension(material, "MOZ_lightmap"),
+        [VSH_LIT_PREVIEW] =
+            vshi_lit_is_cut_by_texture(material) ? NULL : json_object_get(base, "baseColorTexture"),
+    };
+    for (int i = 0; i < VSH_LIT_PURPOSES; ++i) {
+        without[i] = (purposes >> i & 1) != 0 ? without[i] : NULL;
+    }
+    return material != NULL && has_texture(material, set, without);
+}
+
+static void name_of(size_t set, char *name, size_t size) {
+    snprintf(name, size, "TEXCOORD_%zu", set);
+}
+
+/* Whether a set exists, no morph target moves it, and new textures replace all that use it. */
+static bool is_replaceable(const vshi_lit_work *work, const json_t *primitive, size_t set,
+                           uint32_t purposes) {
+    char name[40];
+    size_t i;
+    json_t *each;
+    name_of(set, name, sizeof name);
+    if (json_object_get(json_object_get(primitive, "attributes"), name) == NULL) {
+        return false;
+    }
+    json_array_foreach(json_object_get(primitive, "targets"), i, each) {
+        if (json_object_get(each, name) != NULL) {
+            return false;
+        }
+    }
+    json_array_foreach(json_object_get(vshi_gltf_extension(primitive, "KHR_materials_variants"), "mappings"),
+                       i, each) {
+        if (is_shown(work, each, set, purposes)) {
+            return false;
+        }
+    }
+    return !is_shown(work, primitive, set, purposes);
+}
+
+/* --- sets that were made */
+
+static const json_t *made_sets(const json_t *primitive) {
+    return json_object_get(json_object_get(primitive, "extras"), sets_key);
+}
+
+/* Whether the file says that a set was made. */
+static bool is_made(const json_t *primitive, size_t set) {
+    size_t i;
+    json_t *number;
+    json_array_foreach(made_sets(primitive), i, number) {
+        if (json_is_integer(number) && json_integer_value(number) == (json_int_t)set) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* As many as are looked at. */
+static size_t count_sets(const json_t *attributes) {
+    char name[40];
+    size_t set = 0;
+    do {
+        name_of(set, name, sizeof name);
+    } while (json_object_get(attributes, name) != NULL && ++set < VSH_MAX_UV_SETS);
+    return set;
+}
+
+static void drop_set(json_t *primitive, size_t set) {
+    char name[40];
+    name_of(set, name, sizeof name);
+    json_object_del(json_object_get(primitive, "attributes"), name);
+}
+
+vsh_result vshi_lit_tell_set(const vshi_lit_document *document, json_t *primitive, size_t set,
+                             vsh_error *error) {
+    json_t *extras = json_object_get(primitive, "extras");
+    if (extras != NULL && !json_is_object(extras)) {
+        return VSH_OK; /* somebody's own, of another kind */
+    }
+    VSHI_TRY(vshi_lit_object(document, primitive, "extras", &extras, error));
+    json_t *list = json_array();
+    bool good = list != NULL;
+    const size_t count = count_sets(json_object_get(primitive, "attributes"));
+    for (size_t i = 0; i <= count || i <= set; ++i) {
+        if (i == set || (i < count && is_made(primitive, i))) {
+            good = good && json_array_append_new(list, json_integer((json_int_t)i)) == 0;
+        }
+    }
+    if (!good) {
+        json_decref(list);
+        return vshi_lit_no_memory(document, error);
+    }
+    return vshi_lit_set(document, extras, sets_key, list, error);
+}
+
+vsh_result vshi_lit_choose_set(const vshi_lit_work *work, json_t *primitive, const vsh_lit_mesh *mesh,
+                               const char *where, size_t *set, vsh_error *error) {
+    const uint32_t purposes = purposes_of_mesh(work, mesh);
+    size_t count = count_sets(json_object_get(primitive, "attributes"));
+    *set = 0;
+    while (*set < count && !((*set == VSHI_LIT_SET || is_made(primitive, *set)) &&
+                             is_replaceable(work, primitive, *set, purposes))) {
+        ++*set;
+    }
+    /* sets are numbered without gaps: of others that were made the last can go */
+    while (count > *set + 1 && count < VSH_MAX_UV_SETS && is_made(primitive, count - 1) &&
+           is_replaceable(work, primitive, count - 1, purposes)) {
+        drop_set(primitive, --count);
+    }
+    if (*set < count) {
+        drop_set(primitive, *set);
+    }
+    if (*set < VSH_MAX_UV_SETS) {
+        return VSH_OK;
+    }
+    return vshi_fail(error, VSH_ERROR_LIMIT,
+                     "%s: %s has %zu sets of UVs, and textures that stay use those that the lightmap could "
+                     "take: no more than %d can be read",
+                     work->document.gltf.path, where, *set, VSH_MAX_UV_SETS);
+}
+
 static const char draco_name[] = "KHR_draco_mesh_compression";
 
 /* --- shapes */
@@ -106,7 +400,7 @@ static vsh_result find_vertices(vshi_lit_work *work, const vshi_lit_topology *to
         v->uvs[i][1] = 1.0F - mesh->uvs[2 * i + 1]; /* v points down in glTF */
     }
     VSHI_TRY(find_split(work, topology, mesh, v, error));
-    if (!v->split && vshi_lit_only_page(work, mesh) == VSH_LIT_NO_CHART) {
+    if (!v->split && find_only_page(work, mesh) == VSH_LIT_NO_CHART) {
         VSHI_TRY(
             vshi_gltf_take(gltf, (void **)&v->corners, mesh->triangle_count, 3 * sizeof *v->corners, error));
         for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
@@ -220,7 +514,7 @@ static vsh_result make(vshi_lit_work *work, vshi_lit_shape *shape, const json_t 
                                       error));
     }
     VSHI_TRY(set_uvs(work, made, uvs, set, error));
-    const uint32_t only = vshi_lit_only_page(work, mesh);
+    const uint32_t only = find_only_page(work, mesh);
     if (!v->split && only != VSH_LIT_NO_CHART) { /* its indices stay, strips too */
         VSHI_TRY(vshi_lit_mark_primitive(work, made, only, set, NULL, error));
         return json_array_append(list, made) == 0 ? VSH_OK : vshi_lit_no_memory(document, error);

@@ -1,10 +1,243 @@
-#include "lit/prune.h"
-
-#include "lit/own_textures.h"
-#include "lit/places.h"
+/* Textures, accessors, buffer views and bytes that nothing refers to any more. New items of a list take the
+ * places of those that go, so that no index of what stays changes. */
+#include "lit/work.h"
 
 #include <stdlib.h>
 #include <string.h>
+
+/* Where the items first … count - 1, which are new, go. */
+typedef struct placing {
+    size_t *moved;            /* [count - first] */
+    size_t first, count, end; /* end: items that are left */
+} placing;
+
+/* New ones take the places gone[first] in their order, what is over goes behind the old ones; places that are
+ * left and that nothing stands behind are cut off. Free `moved` after a failure too. Errors:
+ * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+static vsh_result find_places(vshi_lit_document *document, const bool *gone, size_t first, size_t count,
+                              placing *places, vsh_error *error) {
+    const size_t more = count - first;
+    size_t done = 0, behind = 0; /* behind: the places that are taken */
+    *places = (placing){.first = first, .count = count};
+    VSHI_TRY(
+        vshi_gltf_allocate(&document->gltf, (void **)&places->moved, more, sizeof *places->moved, error));
+    for (size_t i = 0; i < first && done < more; ++i) {
+        if (gone[i]) {
+            places->moved[done++] = i;
+            behind = i + 1;
+        }
+    }
+    places->end = first + more - done;
+    for (size_t i = first; done < more; ++i) {
+        places->moved[done++] = i;
+    }
+    while (places->end <= first && places->end > behind && gone[places->end - 1]) {
+        --places->end;
+    }
+    return VSH_OK;
+}
+
+/* Marks old places that are taken or cut off: taken[first]. */
+static void mark_places(const placing *places, bool *taken) {
+    for (size_t i = 0; i < places->count - places->first && places->moved[i] < places->first; ++i) {
+        taken[places->moved[i]] = true;
+    }
+    for (size_t i = places->end; i < places->first; ++i) {
+        taken[i] = true;
+    }
+}
+
+/* Sets a number that is a new item's to its new place. Errors: VSH_ERROR_MEMORY. */
+static vsh_result rename_index(const vshi_lit_document *document, const placing *places, json_t *object,
+                               const char *key, vsh_error *error) {
+    size_t index;
+    if (!vshi_gltf_count(object, key, SIZE_MAX, &index) || index < places->first || index >= places->count) {
+        return VSH_OK;
+    }
+    const size_t moved = places->moved[index - places->first];
+    return json_object_set_new_nocheck(object, key, json_integer((json_int_t)moved)) == 0
+               ? VSH_OK
+               : vshi_lit_no_memory(document, error);
+}
+
+/* Moves the items of the root's list. Errors: VSH_ERROR_MEMORY. */
+static vsh_result move_items(vshi_lit_document *document, const char *name, const placing *places,
+                             vsh_error *error) {
+    json_t *list = json_object_get(document->gltf.root, name);
+    for (size_t i = places->first; i < places->count; ++i) {
+        const size_t to = places->moved[i - places->first]; /* never behind i */
+        if (to != i && json_array_set(list, to, json_array_get(list, i)) != 0) {
+            return vshi_lit_no_memory(document, error);
+        }
+    }
+    while (json_array_size(list) > places->end) {
+        json_array_remove(list, json_array_size(list) - 1);
+    }
+    if (places->end == 0 && places->count > 0) { /* glTF has no empty lists */
+        json_object_del(document->gltf.root, name);
+    }
+    return VSH_OK;
+}
+
+static const char texture_key[] = "vdbshade_texture";
+
+json_t *vshi_lit_texture_mark(const char *purpose) {
+    return json_pack("{s:s}", texture_key, purpose);
+}
+
+static bool is_made(const json_t *texture) {
+    return json_object_get(json_object_get(texture, "extras"), texture_key) != NULL;
+}
+
+static size_t count_of(const vshi_lit_document *document, const char *list) {
+    return json_array_size(json_object_get(document->gltf.root, list));
+}
+
+/* --- who refers to what */
+
+static void note_index(const json_t *object, const char *name, bool *used, size_t count) {
+    size_t index;
+    if (vshi_gltf_count(object, name, SIZE_MAX, &index) && index < count) {
+        used[index] = true;
+    }
+}
+
+/* Textures at or below `value`, of a material: whatever has an index, as those of extensions have. */
+static void note_textures(json_t *value, bool *shown, size_t count) {
+    size_t i;
+    const char *name;
+    json_t *member;
+    note_index(value, "index", shown, count);
+    json_array_foreach(value, i, member) {
+        note_textures(member, shown, count);
+    }
+    json_object_foreach(value, name, member) {
+        note_textures(member, shown, count);
+    }
+}
+
+static vsh_result find_textures(vshi_lit_document *document, vshi_lit_texture_uses *uses, vsh_error *error) {
+    *uses = (vshi_lit_texture_uses){.texture_count = count_of(document, "textures"),
+                                    .image_count = count_of(document, "images"),
+                                    .sampler_count = count_of(document, "samplers")};
+    VSHI_TRY(
+        vshi_gltf_allocate(&document->gltf, (void **)&uses->shown, uses->texture_count, sizeof(bool), error));
+    note_textures(json_object_get(document->gltf.root, "materials"), uses->shown, uses->texture_count);
+    return VSH_OK;
+}
+
+/* Finds them. Free after a failure too. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+static void free_textures(vshi_lit_texture_uses *uses) {
+    free(uses->shown);
+    *uses = (vshi_lit_texture_uses){.shown = NULL};
+}
+
+/* What a texture is made of: its own image, and those of other formats (KHR_texture_basisu,
+ * EXT_texture_webp). */
+static void note_parts(json_t *texture, bool *images, size_t image_count, bool *samplers,
+                       size_t sampler_count) {
+    const char *name;
+    json_t *extension;
+    note_index(texture, "sampler", samplers, sampler_count);
+    note_index(texture, "source", images, image_count);
+    json_object_foreach(json_object_get(texture, "extensions"), name, extension) {
+        note_index(extension, "source", images, image_count);
+    }
+}
+
+/* --- taking out */
+
+typedef struct pruning {
+    const vshi_lit_texture_uses *before;
+    bool *textures; /* [before->texture_count], those that go, and so on */
+    bool *images, *samplers;
+    bool *kept_images, *kept_samplers; /* that the others are made of */
+    placing texture_places, image_places, sampler_places;
+} pruning;
+
+static vsh_result find_gone(vshi_lit_document *document, const vshi_lit_texture_uses *after, pruning *p,
+                            vsh_error *error) {
+    vshi_gltf *gltf = &document->gltf;
+    const vshi_lit_texture_uses *before = p->before;
+    const size_t images = before->image_count, samplers = before->sampler_count;
+    size_t i;
+    json_t *texture;
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&p->textures, before->texture_count, sizeof(bool), error));
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&p->images, images, sizeof(bool), error));
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&p->kept_images, images, sizeof(bool), error));
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&p->samplers, samplers, sizeof(bool), error));
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&p->kept_samplers, samplers, sizeof(bool), error));
+    json_array_foreach(json_object_get(gltf->root, "textures"), i, texture) {
+        const bool gone =
+            i < before->texture_count && before->shown[i] && !after->shown[i] && is_made(texture);
+        if (gone) {
+            p->textures[i] = true;
+        }
+        note_parts(texture, gone ? p->images : p->kept_images, images, gone ? p->samplers : p->kept_samplers,
+                   samplers);
+    }
+    for (i = 0; i < images; ++i) {
+        p->images[i] = p->images[i] && !p->kept_images[i];
+    }
+    for (i = 0; i < samplers; ++i) {
+        p->samplers[i] = p->samplers[i] && !p->kept_samplers[i];
+    }
+    return VSH_OK;
+}
+
+/* Where a bake puts its textures, and nowhere else: there may be other numbers in extensions. */
+static vsh_result rename_shown(vshi_lit_document *document, const placing *textures, vsh_error *error) {
+    size_t i;
+    json_t *material;
+    json_array_foreach(json_object_get(document->gltf.root, "materials"), i, material) {
+        json_t *const infos[] = {
+            json_object_get(material, "occlusionTexture"),
+            json_object_get(json_object_get(material, "extensions"), "MOZ_lightmap"),
+            json_object_get(json_object_get(material, "pbrMetallicRoughness"), "baseColorTexture")};
+        for (size_t k = 0; k < sizeof infos / sizeof infos[0]; ++k) {
+            VSHI_TRY(rename_index(document, textures, infos[k], "index", error));
+        }
+    }
+    return VSH_OK;
+}
+
+static vsh_result take_out(vshi_lit_document *document, pruning *p, vsh_error *error) {
+    const vshi_lit_texture_uses *before = p->before;
+    const size_t count = count_of(document, "textures");
+    VSHI_TRY(find_places(document, p->textures, before->texture_count, count, &p->texture_places, error));
+    VSHI_TRY(find_places(document, p->images, before->image_count, count_of(document, "images"),
+                         &p->image_places, error));
+    VSHI_TRY(find_places(document, p->samplers, before->sampler_count, count_of(document, "samplers"),
+                         &p->sampler_places, error));
+    json_t *textures = json_object_get(document->gltf.root, "textures");
+    for (size_t i = before->texture_count; i < count; ++i) {
+        json_t *texture = json_array_get(textures, i);
+        VSHI_TRY(rename_index(document, &p->image_places, texture, "source", error));
+        VSHI_TRY(rename_index(document, &p->sampler_places, texture, "sampler", error));
+    }
+    VSHI_TRY(rename_shown(document, &p->texture_places, error));
+    VSHI_TRY(move_items(document, "textures", &p->texture_places, error));
+    VSHI_TRY(move_items(document, "images", &p->image_places, error));
+    return move_items(document, "samplers", &p->sampler_places, error);
+}
+
+/* Takes those out that were made, were shown before, and are not any more, and what only they referred to;
+ * new ones take their places. All extensions are known. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+static vsh_result prune_textures(vshi_lit_document *document, const vshi_lit_texture_uses *before,
+                                 const vshi_lit_texture_uses *after, vsh_error *error) {
+    pruning p = {.before = before};
+    vsh_result result = find_gone(document, after, &p, error);
+    result = result == VSH_OK ? take_out(document, &p, error) : result;
+    free(p.sampler_places.moved);
+    free(p.image_places.moved);
+    free(p.texture_places.moved);
+    free(p.kept_samplers);
+    free(p.kept_images);
+    free(p.samplers);
+    free(p.images);
+    free(p.textures);
+    return result;
+}
 
 /* --- who refers to what */
 
@@ -90,12 +323,12 @@ vsh_result vshi_lit_uses_find(vshi_lit_document *document, vshi_lit_uses *uses, 
                             .view_count = json_array_size(json_object_get(gltf->root, "bufferViews"))};
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&uses->accessors, uses->accessor_count, sizeof(bool), error));
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&uses->views, uses->view_count, sizeof(bool), error));
-    VSHI_TRY(vshi_lit_textures_find(document, &uses->textures, error));
+    VSHI_TRY(find_textures(document, &uses->textures, error));
     return walk(document, note, uses, error);
 }
 
 void vshi_lit_uses_free(vshi_lit_uses *uses) {
-    vshi_lit_textures_free(&uses->textures);
+    free_textures(&uses->textures);
     free(uses->accessors);
     free(uses->views);
     *uses = (vshi_lit_uses){.accessors = NULL};
@@ -159,13 +392,13 @@ static bool knows_all(json_t *value) {
 /* --- new ones into old places */
 
 typedef struct moving {
-    vshi_lit_places accessors, views;
+    placing accessors, views;
 } moving;
 
 static vsh_result rename_one(vshi_lit_document *document, json_t *object, const char *key, bool view,
                              void *user, vsh_error *error) {
     const moving *m = user;
-    return vshi_lit_places_rename(document, view ? &m->views : &m->accessors, object, key, error);
+    return rename_index(document, view ? &m->views : &m->accessors, object, key, error);
 }
 
 /* before[count] becomes what was used then and is not any more. */
@@ -274,23 +507,22 @@ done:
 
 static vsh_result prune(vshi_lit_document *document, vshi_lit_uses *before, vshi_lit_uses *after, moving *m,
                         bool *replaced, vsh_error *error) {
-    VSHI_TRY(vshi_lit_textures_prune(document, &before->textures, &after->textures, error));
+    VSHI_TRY(prune_textures(document, &before->textures, &after->textures, error));
     /* views of accessors that are no longer used are not either */
     keep_gone(before->accessors, after->accessors, before->accessor_count);
-    VSHI_TRY(vshi_lit_places_find(document, before->accessors, before->accessor_count, after->accessor_count,
-                                  &m->accessors, error));
+    VSHI_TRY(find_places(document, before->accessors, before->accessor_count, after->accessor_count,
+                         &m->accessors, error));
     VSHI_TRY(walk(document, rename_one, m, error)); /* views are not moved yet */
-    VSHI_TRY(vshi_lit_places_move(document, "accessors", &m->accessors, error));
+    VSHI_TRY(move_items(document, "accessors", &m->accessors, error));
     vshi_lit_uses_free(after);
     VSHI_TRY(vshi_lit_uses_find(document, after, error));
     keep_gone(before->views, after->views, before->view_count);
-    VSHI_TRY(vshi_lit_places_find(document, before->views, before->view_count, after->view_count, &m->views,
-                                  error));
-    vshi_lit_places_mark(&m->views, replaced);
+    VSHI_TRY(find_places(document, before->views, before->view_count, after->view_count, &m->views, error));
+    mark_places(&m->views, replaced);
     VSHI_TRY(drop_bytes(document, replaced, error)); /* while they still say which */
     m->accessors.first = m->accessors.count;         /* they have been moved */
     VSHI_TRY(walk(document, rename_one, m, error));
-    VSHI_TRY(vshi_lit_places_move(document, "bufferViews", &m->views, error));
+    VSHI_TRY(move_items(document, "bufferViews", &m->views, error));
     document->replaced = replaced;
     return VSH_OK;
 }

@@ -2,8 +2,70 @@
 #ifndef VSHI_LIT_WORK_H
 #define VSHI_LIT_WORK_H
 
-#include "lit/gather.h"
-#include "lit/uv_pool.h"
+#include "lit/document.h"
+#include "lit/draco.h"
+
+/* --- vertices (vertices.c) */
+
+enum { VSHI_LIT_TRIANGLES = 4, VSHI_LIT_STRIP = 5, VSHI_LIT_FAN = 6 };
+
+/* A primitive of the document: which elements of its accessors are the vertices of the model's mesh. */
+typedef struct vshi_lit_topology {
+    size_t mode;                 /* VSHI_LIT_… */
+    size_t element_count;        /* of each attribute's accessor */
+    size_t vertex_count;         /* of the model's mesh */
+    uint32_t *elements;          /* [vertex_count] of each vertex, increasing */
+    const vshi_lit_draco *draco; /* NULL: its vertices are not compressed */
+} vshi_lit_topology;
+
+/* Finds that of `primitive`, which messages call `where`, and holds it against the model's mesh. `draco` is
+ * its decoded data, NULL where it has none. Free with vshi_lit_topology_free(), after a failure too. Errors:
+ * VSH_ERROR_INPUT (not well formed; not what the model was made of), VSH_ERROR_READ, VSH_ERROR_LIMIT,
+ * VSH_ERROR_MEMORY. */
+vsh_result vshi_lit_topology_find(vshi_lit_document *document, const json_t *primitive, const char *where,
+                                  const vshi_lit_draco *draco, const vsh_mesh *mesh,
+                                  vshi_lit_topology *topology, vsh_error *error);
+void vshi_lit_topology_free(vshi_lit_topology *topology);
+
+/* What was gathered by one list of elements: each accessor once, whatever uses it. */
+typedef struct vshi_lit_gathered {
+    size_t *from, *to; /* [count] */
+    size_t count, capacity;
+} vshi_lit_gathered;
+
+void vshi_lit_gathered_free(vshi_lit_gathered *gathered);
+
+/* A new accessor of the elements elements[count] of accessor `index`, in *gathered or from there. `draco`:
+ * its values, else NULL. `element_count` is what it must have; `bounds`: with its least and largest values
+ * whether or not it has had them. Sparse ones become dense. Errors: VSH_ERROR_INPUT, VSH_ERROR_READ,
+ * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+vsh_result vshi_lit_gather(vshi_lit_document *document, size_t index, size_t element_count,
+                           const vshi_lit_draco_attribute *draco, const uint32_t *elements, size_t count,
+                           bool bounds, const char *where, vshi_lit_gathered *gathered, size_t *accessor,
+                           vsh_error *error);
+
+/* A new UV set of primitives that keep their vertices. Primitives that use parts of the same accessors share
+ * one accessor of UVs as far as they agree: each of its own would be as long as all of them. */
+typedef struct vshi_lit_uvs {
+    size_t positions; /* accessor of the vertices' positions */
+    size_t count;     /* elements */
+    size_t accessor;
+    size_t offset; /* of its values in the document's added bytes */
+    bool *set;     /* [count] */
+} vshi_lit_uvs;
+
+typedef struct vshi_lit_uv_pool {
+    vshi_lit_uvs *list;
+    size_t count, capacity;
+} vshi_lit_uv_pool;
+
+void vshi_lit_uv_pool_free(vshi_lit_uv_pool *pool);
+
+/* An accessor in which elements[i] (< count of elements) has values[i], v down. Elements may come twice, with
+ * the same values. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+vsh_result vshi_lit_uv_pool_put(vshi_lit_document *document, vshi_lit_uv_pool *pool, size_t positions,
+                                size_t element_count, const uint32_t *elements, const float (*values)[2],
+                                size_t count, size_t *accessor, vsh_error *error);
 
 /* --- materials (materials.c) */
 
@@ -68,10 +130,6 @@ static inline uint32_t vshi_lit_page(const vshi_lit_work *work, const vsh_lit_me
 
 enum { VSHI_LIT_NAME_BYTES = 200 }; /* of a page, in names of files */
 
-/* Checks what the caller gives for the model's mesh `index`. Errors: VSH_ERROR_ARGUMENT. (check.c) */
-vsh_result vshi_lit_check_mesh(const vshi_lit_work *work, size_t index, vsh_error *error);
-vsh_result vshi_lit_check_images(const vsh_lit_options *options, vsh_error *error);
-
 /* Checks that no primitive names a material that is not there: marks are told from these. Errors:
  * VSH_ERROR_INPUT. */
 vsh_result vshi_lit_materials_check(vshi_lit_work *work, vsh_error *error);
@@ -100,7 +158,7 @@ enum { VSHI_LIT_SET = 1 };
 
 /* Removes the sets of a primitive that new UVs of `mesh` replace, and finds the set that they become. That is
  * the first that is VSHI_LIT_SET or of an earlier bake, if no remaining texture uses it; else one more set.
- * Errors: VSH_ERROR_LIMIT (VSH_MAX_UV_SETS). (own_sets.c) */
+ * Errors: VSH_ERROR_LIMIT (VSH_MAX_UV_SETS). */
 vsh_result vshi_lit_choose_set(const vshi_lit_work *work, json_t *primitive, const vsh_lit_mesh *mesh,
                                const char *where, size_t *set, vsh_error *error);
 
@@ -110,21 +168,117 @@ vsh_result vshi_lit_tell_set(const vshi_lit_document *document, json_t *primitiv
 
 /* Appends to `list` a primitive for each page of `mesh`, copies of `made`, whose indices are set: those of
  * triangle t are corners[t]. `whole`: an accessor of all of them, used where there is one page; SIZE_MAX: a
- * new one. Marks them. (pages.c) */
+ * new one. Marks them. */
 vsh_result vshi_lit_pages_make(vshi_lit_work *work, const json_t *made, const vsh_lit_mesh *mesh,
                                const uint32_t *corners, size_t vertex_count, size_t set, size_t *whole,
                                json_t *list, vsh_error *error);
-
-/* The options' attributes into the extras of the asset. (origin.c) */
-vsh_result vshi_lit_tell_origin(vshi_lit_work *work, vsh_error *error);
-
-/* The only page of a mesh, or VSH_LIT_NO_CHART. */
-uint32_t vshi_lit_only_page(const vshi_lit_work *work, const vsh_lit_mesh *mesh);
 
 /* Gives nodes the meshes that they show lit. (nodes.c) */
 vsh_result vshi_lit_nodes_make(vshi_lit_work *work, vsh_error *error);
 
 /* Fills the document with what the model holds, lit. (from_model.c) */
 vsh_result vshi_lit_from_model(vshi_lit_work *work, vsh_error *error);
+
+/* --- images: baked ones, and those that the file names (images.c) */
+
+/* A file that stands beside the document. */
+typedef struct vshi_lit_beside {
+    char *name;        /* without a folder: in the document's */
+    const void *bytes; /* [size] */
+    size_t size;
+    unsigned char *owned; /* NULL: they are the caller's */
+} vshi_lit_beside;
+
+typedef struct vshi_lit_besides {
+    vshi_lit_beside *list; /* [count] */
+    size_t count;
+} vshi_lit_besides;
+
+void vshi_lit_besides_free(vshi_lit_besides *besides);
+
+/* Adds an image and a texture for each image that was baked, into the buffer or (embed false) to `besides`,
+ * which is freed after a failure too. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_lit_images_add(vshi_lit_work *work, bool embed, vshi_lit_besides *besides, vsh_error *error);
+
+/* Takes the file's own images that stay and that it names beside it into the buffer, where the document moves
+ * to another folder. Those that cannot be read stay named, with a warning. Errors: VSH_ERROR_LIMIT,
+ * VSH_ERROR_MEMORY. */
+vsh_result vshi_lit_images_bring(vshi_lit_work *work, vsh_error *error);
+
+/* A file's name as a URI; NULL where memory is short. */
+json_t *vshi_lit_uri(const char *name);
+
+/* Name of a file beside the output: its own without its ending, `mark`, `ending`; where a file that the input
+ * is made of, and that others may use, has that name, with a number before the ending. Free it with free().
+ * Errors: VSH_ERROR_MEMORY, VSH_ERROR_ARGUMENT. */
+vsh_result vshi_lit_beside_name(const vshi_lit_work *work, const char *mark, const char *ending, char **name,
+                                vsh_error *error);
+
+/* The path of a file in the output's folder; NULL where memory is short. */
+char *vshi_lit_beside_path(const char *output, const char *name);
+
+/* Fails where a path is one of a file that the input is made of. Errors: VSH_ERROR_ARGUMENT,
+ * VSH_ERROR_MEMORY.
+ */
+vsh_result vshi_lit_check_replaced(const vshi_lit_document *document, const char *path, vsh_error *error);
+
+/* --- files (write.c) */
+
+/* Writes the document and what stands beside it, all under temporary names first. The document is of no use
+ * afterwards. Errors: as vsh_lit_write(). */
+vsh_result vshi_lit_write_files(vshi_lit_work *work, const vshi_lit_besides *besides, vsh_error *error);
+
+/* --- OBJ, with its materials in a file beside it (obj.c) */
+
+/* Takes bytes of a file that is being written. */
+typedef void vshi_lit_put(void *file, const void *bytes, size_t size);
+
+bool vshi_lit_is_obj(const char *path);
+
+/* What an OBJ cannot show. Errors: VSH_ERROR_ARGUMENT. */
+vsh_result vshi_lit_obj_check(const vshi_lit_work *work, vsh_error *error);
+
+/* The model's meshes in the world, a "usemtl page_N" for each page where there are images or several pages;
+ * of the file `mtl`, unless that is NULL. Errors: VSH_ERROR_CANCELLED. */
+vsh_result vshi_lit_put_obj(const vshi_lit_work *work, const char *mtl, vshi_lit_put *put, void *file,
+                            vsh_error *error);
+
+/* Its materials: one a page, white, shown by its image. */
+void vshi_lit_put_mtl(const vshi_lit_work *work, const vshi_lit_besides *besides, vshi_lit_put *put,
+                      void *file);
+
+/* Fails where a file of materials is there that is not ours: others may use it. */
+vsh_result vshi_lit_mtl_check(const char *path, vsh_error *error);
+
+/* --- what is used, and goes when it is not (prune.c) */
+
+/* Which textures the materials show. The extras of a texture that a bake made say so ("vdbshade_texture":
+ * "lightmap"). It goes with its image and sampler once no material shows it; the file's own textures stay. */
+typedef struct vshi_lit_texture_uses {
+    bool *shown; /* [texture_count] */
+    size_t texture_count, image_count, sampler_count;
+} vshi_lit_texture_uses;
+
+/* Tells of a texture that it was made for light, for the next time. NULL where memory is short. */
+json_t *vshi_lit_texture_mark(const char *purpose);
+
+/* What something refers to. */
+typedef struct vshi_lit_uses {
+    bool *accessors; /* [accessor_count] */
+    bool *views;     /* [view_count] */
+    size_t accessor_count, view_count;
+    vshi_lit_texture_uses textures;
+} vshi_lit_uses;
+
+/* Finds them. Free after a failure too. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+vsh_result vshi_lit_uses_find(vshi_lit_document *document, vshi_lit_uses *uses, vsh_error *error);
+void vshi_lit_uses_free(vshi_lit_uses *uses);
+
+/* Puts new accessors, buffer views, textures, images and samplers in the places of those that were used
+ * before and are not any more, and cuts off such at the end of a list, so that no index of what stays
+ * changes; lists the bytes that only those had (document->dropped). Of textures only those that were made go
+ * by a bake. Does nothing where an extension that is not known may refer to them. `before` is used
+ * up. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+vsh_result vshi_lit_prune(vshi_lit_document *document, vshi_lit_uses *before, vsh_error *error);
 
 #endif

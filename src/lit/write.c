@@ -1,13 +1,304 @@
-#include "lit/write.h"
-
+/* A lit document into its files. */
+#include "base/decimal.h"
 #include "base/file.h"
-#include "lit/buffers.h"
-#include "lit/json_text.h"
-#include "lit/obj.h"
+#include "lit/work.h"
 
+#include <inttypes.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+
+/* Where the bytes of each buffer lie in the one that is written. */
+typedef struct layout {
+    size_t *offsets; /* [buffer_count]; SIZE_MAX: has no bytes (EXT_meshopt_compression's fallback) */
+    size_t *numbers; /* [buffer_count]: of each in the new list */
+    size_t added;    /* where what was added begins */
+    size_t size;     /* of all */
+} layout;
+
+typedef struct writer {
+    vshi_lit_bytes *text;
+    bool lines, failed;
+    int depth;
+} writer;
+
+static void put_text(writer *w, const char *bytes, size_t size) {
+    vshi_lit_bytes *text = w->text;
+    if (!w->failed && size > text->capacity - text->size) {
+        const size_t capacity = 2 * text->capacity + size + 4096;
+        unsigned char *grown = realloc(text->at, capacity);
+        w->failed = grown == NULL;
+        text->at = grown != NULL ? grown : text->at;
+        text->capacity = grown != NULL ? capacity : text->capacity;
+    }
+    if (!w->failed) {
+        memcpy(text->at + text->size, bytes, size);
+        text->size += size;
+    }
+}
+
+static void put_string(writer *w, const char *string, size_t size) {
+    size_t plain = 0; /* bytes that are not written yet */
+    put_text(w, "\"", 1);
+    for (size_t i = 0; i < size; ++i) {
+        const unsigned char byte = (unsigned char)string[i];
+        if (byte >= 0x20 && byte != '"' && byte != '\\') {
+            continue;
+        }
+        char escape[8];
+        const int length = byte >= 0x20 ? snprintf(escape, sizeof escape, "\\%c", byte)
+                                        : snprintf(escape, sizeof escape, "\\u%04x", byte);
+        put_text(w, string + plain, i - plain);
+        put_text(w, escape, (size_t)length);
+        plain = i + 1;
+    }
+    put_text(w, string + plain, size - plain);
+    put_text(w, "\"", 1);
+}
+
+static void put_line(writer *w) {
+    put_text(w, "\n", w->lines ? 1 : 0);
+    for (int i = 0; i < w->depth && w->lines; ++i) {
+        put_text(w, "  ", 2);
+    }
+}
+
+static void put_value(writer *w, const json_t *value);
+
+static void put_object(writer *w, const json_t *object) {
+    const char *name;
+    json_t *member;
+    bool first = true;
+    put_text(w, "{", 1);
+    ++w->depth;
+    json_object_foreach((json_t *)(uintptr_t)object, name, member) {
+        put_text(w, ",", first ? 0 : 1);
+        first = false;
+        put_line(w);
+        put_string(w, name, strlen(name));
+        put_text(w, ": ", w->lines ? 2 : 1);
+        put_value(w, member);
+    }
+    --w->depth;
+    if (!first) {
+        put_line(w);
+    }
+    put_text(w, "}", 1);
+}
+
+/* Lists of numbers stay in one line. */
+static void put_array(writer *w, const json_t *array) {
+    size_t i;
+    const json_t *item;
+    const bool short_one =
+        !json_is_object(json_array_get(array, 0)) && !json_is_array(json_array_get(array, 0));
+    put_text(w, "[", 1);
+    ++w->depth;
+    json_array_foreach(array, i, item) {
+        put_text(w, ", ", i == 0 ? 0 : w->lines && short_one ? 2 : 1);
+        if (!short_one) {
+            put_line(w);
+        }
+        put_value(w, item);
+    }
+    --w->depth;
+    if (!short_one) {
+        put_line(w);
+    }
+    put_text(w, "]", 1);
+}
+
+static void put_value(writer *w, const json_t *value) {
+    char number[VSHI_DECIMAL_ROOM];
+    switch (json_typeof(value)) {
+    case JSON_OBJECT:
+        put_object(w, value);
+        break;
+    case JSON_ARRAY:
+        put_array(w, value);
+        break;
+    case JSON_STRING:
+        put_string(w, json_string_value(value), json_string_length(value));
+        break;
+    case JSON_INTEGER:
+        put_text(w, number,
+                 (size_t)snprintf(number, sizeof number, "%" JSON_INTEGER_FORMAT, json_integer_value(value)));
+        break;
+    case JSON_REAL:
+        put_text(w, number, (size_t)(vshi_decimal_write_double(number, json_real_value(value)) - number));
+        break;
+    default:
+        put_text(w,
+                 json_is_true(value)    ? "true"
+                 : json_is_false(value) ? "false"
+                                        : "null",
+                 json_is_false(value) ? 5 : 4);
+        break;
+    }
+}
+
+/* The text of a value into `text`, which is empty; of a document's file one with lines and indents (`lines`).
+ * Errors: VSH_ERROR_MEMORY. Free text->at with free(), after a failure too. */
+static vsh_result write_json(const json_t *value, bool lines, const char *what, vshi_lit_bytes *text,
+                             vsh_error *error) {
+    writer w = {.text = text, .lines = lines};
+    put_value(&w, value);
+    return w.failed ? vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what) : VSH_OK;
+}
+
+static bool has_bytes(const vshi_lit_document *document, size_t index) {
+    const bool chunk = index == 0 && document->gltf.binary;
+    return chunk || json_object_get(vshi_gltf_element(&document->gltf, "buffers", index), "uri") != NULL;
+}
+
+/* Bytes of a buffer in front of `offset` that are not written. */
+static size_t dropped_before(const vshi_lit_document *document, size_t buffer, size_t offset) {
+    size_t sum = 0;
+    for (size_t i = 0; i < document->dropped_count; ++i) {
+        const vshi_lit_range *range = &document->dropped[i];
+        const size_t end = range->end < offset ? range->end : offset;
+        sum += range->buffer == buffer && end > range->begin ? end - range->begin : 0;
+    }
+    return sum;
+}
+
+static vsh_result lay_out(vshi_lit_document *document, layout *l, vsh_error *error) {
+    enum { ALIGNMENT = 8 };
+    vshi_gltf *gltf = &document->gltf;
+    VSHI_TRY(
+        vshi_gltf_allocate(gltf, (void **)&l->offsets, gltf->buffer_count + 1, sizeof *l->offsets, error));
+    VSHI_TRY(
+        vshi_gltf_allocate(gltf, (void **)&l->numbers, gltf->buffer_count + 1, sizeof *l->numbers, error));
+    for (size_t i = 0; i < gltf->buffer_count; ++i) {
+        l->offsets[i] = SIZE_MAX;
+        if (has_bytes(document, i)) {
+            VSHI_TRY(vshi_gltf_load(gltf, i, error));
+            l->offsets[i] = l->size;
+            const size_t size = gltf->buffers[i].bytes.size;
+            l->size += (size - dropped_before(document, i, size) + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+        }
+    }
+    l->added = l->size;
+    l->size += document->added.size;
+    return VSH_OK;
+}
+
+static bool lies_in_added(const vshi_lit_document *document, size_t view) {
+    return view >= document->first_view || (document->replaced != NULL && document->replaced[view]);
+}
+
+/* Whether a buffer without bytes is referred to still: not where all its views have been replaced. */
+static bool is_needed(const vshi_lit_document *document, size_t buffer) {
+    size_t i, of;
+    const json_t *view;
+    json_array_foreach(json_object_get(document->gltf.root, "bufferViews"), i, view) {
+        if (!lies_in_added(document, i) && vshi_gltf_count(view, "buffer", SIZE_MAX, &of) && of == buffer) {
+            return true;
+        }
+    }
+    return document->dropped_count == 0;
+}
+
+/* The new list: one buffer of all bytes, which is the first that had any, and behind it those without. */
+static vsh_result list_buffers(vshi_lit_document *document, layout *l, json_t **one, vsh_error *error) {
+    vshi_gltf *gltf = &document->gltf;
+    json_t *list = json_array(), *old = json_object_get(gltf->root, "buffers");
+    *one = NULL;
+    for (size_t i = 0; i < gltf->buffer_count && *one == NULL; ++i) {
+        *one = l->offsets[i] != SIZE_MAX ? json_incref(json_array_get(old, i)) : NULL;
+    }
+    *one = *one == NULL && l->size > 0 ? json_object() : *one;
+    bool good = list != NULL && (l->size == 0 || *one != NULL);
+    good = (*one == NULL || json_array_append_new(list, *one) == 0) && good;
+    for (size_t i = 0; i < gltf->buffer_count; ++i) {
+        l->numbers[i] = l->offsets[i] != SIZE_MAX ? 0 : json_array_size(list);
+        if (l->offsets[i] == SIZE_MAX && is_needed(document, i)) {
+            good = good && json_array_append(list, json_array_get(old, i)) == 0;
+        }
+    }
+    if (json_array_size(list) == 0) {
+        json_object_del(gltf->root, "buffers");
+        json_decref(list);
+        return good ? VSH_OK : vshi_lit_no_memory(document, error);
+    }
+    const vsh_result result = vshi_lit_set(document, gltf->root, "buffers", list, error);
+    return good ? result : vshi_lit_no_memory(document, error);
+}
+
+/* Moves what a view (or an extension of it that names a buffer of its own) refers to. */
+static vsh_result move_view(const vshi_lit_document *document, const layout *l, json_t *view,
+                            vsh_error *error) {
+    size_t buffer, offset;
+    if (!vshi_gltf_count(view, "buffer", SIZE_MAX, &buffer) || buffer >= document->gltf.buffer_count ||
+        !vshi_gltf_count(view, "byteOffset", 0, &offset)) {
+        return vshi_gltf_fail(&document->gltf, error, "a buffer view refers to no buffer");
+    }
+    VSHI_TRY(vshi_lit_set(document, view, "buffer", json_integer((json_int_t)l->numbers[buffer]), error));
+    const size_t base = l->offsets[buffer] != SIZE_MAX ? l->offsets[buffer] : 0;
+    const size_t moved = base + offset - dropped_before(document, buffer, offset);
+    return moved != offset
+               ? vshi_lit_set(document, view, "byteOffset", json_integer((json_int_t)moved), error)
+               : VSH_OK;
+}
+
+static vsh_result move_views(vshi_lit_document *document, const layout *l, vsh_error *error) {
+    size_t i;
+    json_t *view;
+    json_array_foreach(json_object_get(document->gltf.root, "bufferViews"), i, view) {
+        if (lies_in_added(document, i)) {
+            const size_t at = (size_t)json_integer_value(json_object_get(view, "byteOffset"));
+            VSHI_TRY(vshi_lit_set(document, view, "buffer", json_integer(0), error));
+            VSHI_TRY(
+                vshi_lit_set(document, view, "byteOffset", json_integer((json_int_t)(at + l->added)), error));
+            continue;
+        }
+        VSHI_TRY(move_view(document, l, view, error));
+        const char *name;
+        json_t *extension;
+        json_object_foreach(json_object_get(view, "extensions"), name, extension) {
+            if (json_object_get(extension, "buffer") != NULL) {
+                VSHI_TRY(move_view(document, l, extension, error));
+            }
+        }
+    }
+    return VSH_OK;
+}
+
+/* Extensions by which no view is compressed any more. */
+static void drop_compression(vshi_lit_document *document) {
+    static const char *const names[] = {"EXT_meshopt_compression", "KHR_meshopt_compression"};
+    static const char *const lists[] = {"bufferViews", "buffers"};
+    for (size_t n = 0; n < sizeof names / sizeof names[0] && document->dropped_count > 0; ++n) {
+        bool any = false;
+        for (size_t k = 0; k < sizeof lists / sizeof lists[0]; ++k) {
+            size_t i;
+            const json_t *item;
+            json_array_foreach(json_object_get(document->gltf.root, lists[k]), i, item) {
+                any = any || vshi_gltf_extension(item, names[n]) != NULL;
+            }
+        }
+        if (!any) {
+            vshi_lit_drop_extension(document, names[n]);
+        }
+    }
+}
+
+/* Gives the document its new list of buffers, and its views their new places. *one is the buffer of all
+ * bytes, which the list holds; NULL: there are none. */
+static vsh_result join_buffers(vshi_lit_document *document, layout *l, json_t **one, vsh_error *error) {
+    VSHI_TRY(list_buffers(document, l, one, error));
+    VSHI_TRY(move_views(document, l, error));
+    drop_compression(document);
+    return VSH_OK;
+}
+
+/* Finds the places, and reads the buffers that have not been. Free after a failure too. Errors: as
+ * vsh_model_read(). */
+static void free_layout(layout *l) {
+    free(l->numbers);
+    free(l->offsets);
+}
 
 /* --- writing */
 
@@ -52,7 +343,7 @@ static void put_buffer(output_file *file, const vshi_lit_document *document, siz
     put(file, bytes.at + at, bytes.size - at);
 }
 
-static void put_buffers(output_file *file, const vshi_lit_document *document, const vshi_lit_layout *l) {
+static void put_buffers(output_file *file, const vshi_lit_document *document, const layout *l) {
     const uint64_t begin = file->at;
     for (size_t i = 0; i < document->gltf.buffer_count; ++i) {
         if (l->offsets[i] != SIZE_MAX) {
@@ -84,7 +375,7 @@ static void find_rest(const vshi_lit_document *document, const unsigned char **r
 }
 
 /* glTF 2.0, 4.4. */
-static vsh_result put_binary(output_file *file, const vshi_lit_document *document, const vshi_lit_layout *l,
+static vsh_result put_binary(output_file *file, const vshi_lit_document *document, const layout *l,
                              const vshi_lit_bytes *json, const char *path, vsh_error *error) {
     enum { HEADER = 12, CHUNK = 8, JSON_CHUNK = 0x4e4f534a, BINARY_CHUNK = 0x004e4942 };
     const uint64_t text = ((uint64_t)json->size + 3) & ~UINT64_C(3),
@@ -171,11 +462,11 @@ static void end_files(files *all) {
     free(all->list);
 }
 
-static vsh_result write_document(const vshi_lit_work *work, output_file *file, const vshi_lit_layout *l,
-                                 bool binary, vsh_error *error) {
+static vsh_result write_document(const vshi_lit_work *work, output_file *file, const layout *l, bool binary,
+                                 vsh_error *error) {
     const vshi_lit_document *document = &work->document;
     vshi_lit_bytes json = {NULL, 0, 0};
-    vsh_result result = vshi_lit_json_text(document->gltf.root, !binary, work->output, &json, error);
+    vsh_result result = write_json(document->gltf.root, !binary, work->output, &json, error);
     if (result == VSH_OK && binary) {
         result = put_binary(file, document, l, &json, work->output, error);
     } else if (result == VSH_OK) {
@@ -200,7 +491,7 @@ static vsh_result commit(files *all, vsh_error *error) {
 }
 
 /* The one that is named `bin`. */
-static void write_named(const vshi_lit_work *work, const vshi_lit_besides *besides, const vshi_lit_layout *l,
+static void write_named(const vshi_lit_work *work, const vshi_lit_besides *besides, const layout *l,
                         output_file *file) {
     if (vshi_lit_is_obj(work->output)) {
         vshi_lit_put_mtl(work, besides, put_into, file);
@@ -209,8 +500,8 @@ static void write_named(const vshi_lit_work *work, const vshi_lit_besides *besid
     }
 }
 
-static vsh_result write_all(const vshi_lit_work *work, const vshi_lit_besides *besides,
-                            const vshi_lit_layout *l, const char *bin, files *all, vsh_error *error) {
+static vsh_result write_all(const vshi_lit_work *work, const vshi_lit_besides *besides, const layout *l,
+                            const char *bin, files *all, vsh_error *error) {
     for (size_t i = 0; i <= all->named; ++i) {
         output_file *file = &all->list[i];
         VSHI_TRY(begin_file(file, all->paths[i], error));
@@ -235,16 +526,16 @@ static vsh_result write_all(const vshi_lit_work *work, const vshi_lit_besides *b
 }
 
 /* The document's buffers as one, in a file of the name *bin or (NULL) in the document. */
-static vsh_result join(vshi_lit_work *work, const vshi_lit_besides *besides, vshi_lit_layout *l, char **bin,
+static vsh_result join(vshi_lit_work *work, const vshi_lit_besides *besides, layout *l, char **bin,
                        files *all, vsh_error *error) {
     vshi_lit_document *document = &work->document;
     json_t *one = NULL;
-    VSHI_TRY(vshi_lit_lay_out(document, l, error));
+    VSHI_TRY(lay_out(document, l, error));
     if (strcasecmp(vshi_path_ending(work->output), "glb") != 0 && l->size > 0) {
         VSHI_TRY(vshi_lit_beside_name(work, "", "bin", bin, error));
     }
     VSHI_TRY(name_files(work, besides, *bin, all, error)); /* by the names that the input has */
-    VSHI_TRY(vshi_lit_join_buffers(document, l, &one, error));
+    VSHI_TRY(join_buffers(document, l, &one, error));
     if (one != NULL) {
         VSHI_TRY(vshi_lit_set(document, one, "byteLength", json_integer((json_int_t)l->size), error));
         json_object_del(one, "uri");
@@ -262,7 +553,7 @@ static vsh_result name_obj(const vshi_lit_work *work, const vshi_lit_besides *be
 }
 
 vsh_result vshi_lit_write_files(vshi_lit_work *work, const vshi_lit_besides *besides, vsh_error *error) {
-    vshi_lit_layout l = {.size = 0};
+    layout l = {.size = 0};
     char *bin = NULL;
     files all = {.count = 0};
     vsh_result result;
@@ -272,6 +563,6 @@ vsh_result vshi_lit_write_files(vshi_lit_work *work, const vshi_lit_besides *bes
 done:
     end_files(&all);
     free(bin);
-    vshi_lit_layout_free(&l);
+    free_layout(&l);
     return result;
 }

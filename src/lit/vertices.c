@@ -1,0 +1,400 @@
+/* The vertices of a lit primitive: which elements of its accessors they are, copies of these, and new
+ * sets of UVs. */
+#include "base/memory.h"
+#include "lit/work.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* The elements that a primitive draws, in its order, in new memory. */
+static vsh_result read_order(vshi_lit_document *document, const json_t *primitive, size_t element_count,
+                             const char *where, uint32_t **order, size_t *count, vsh_error *error) {
+    vshi_gltf *gltf = &document->gltf;
+    vshi_gltf_accessor accessor = {.count = element_count};
+    size_t index;
+    VSHI_TRY(vshi_gltf_index(gltf, primitive, "indices", "accessors", where, &index, error));
+    if (index != SIZE_MAX) {
+        VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
+        if (accessor.components != 1 ||
+            (accessor.type != VSHI_GLTF_UBYTE && accessor.type != VSHI_GLTF_USHORT &&
+             accessor.type != VSHI_GLTF_UINT)) {
+            return vshi_gltf_fail(gltf, error, "%s: its indices are no unsigned numbers", where);
+        }
+    }
+    *count = accessor.count;
+    VSHI_TRY(vshi_gltf_take(gltf, (void **)order, accessor.count, sizeof **order, error));
+    if (index != SIZE_MAX) {
+        vshi_gltf_accessor_integers(&accessor, *order);
+    }
+    for (size_t i = 0; i < accessor.count; ++i) {
+        (*order)[i] = index == SIZE_MAX ? (uint32_t)i : (*order)[i];
+        if ((*order)[i] >= element_count) {
+            return vshi_gltf_fail(gltf, error, "%s: index %zu is %u, but there are only %zu vertices", where,
+                                  i, (*order)[i], element_count);
+        }
+    }
+    return VSH_OK;
+}
+
+/* Triangle i (glTF 2.0, 3.7.2.1). */
+static void pick(size_t mode, const uint32_t *order, size_t i, uint32_t corner[3]) {
+    if (mode == VSHI_LIT_STRIP) {
+        corner[0] = order[i];
+        corner[1] = order[i + 1 + i % 2];
+        corner[2] = order[i + 2 - i % 2];
+    } else if (mode == VSHI_LIT_FAN) {
+        corner[0] = order[i + 1];
+        corner[1] = order[i + 2];
+        corner[2] = order[0];
+    } else {
+        memcpy(corner, order + 3 * i, 3 * sizeof *corner);
+    }
+}
+
+/* The triangles that the order draws, as corners[*count][3], over the order itself: those of strips that have
+ * fewer than three vertices are left out, as the model leaves them out. */
+static vsh_result list_triangles(vshi_lit_document *document, size_t mode, size_t drawn, uint32_t **order,
+                                 size_t *count, vsh_error *error) {
+    if (mode == VSHI_LIT_TRIANGLES) {
+        *count = drawn / 3;
+        return VSH_OK;
+    }
+    const size_t most = drawn >= 3 ? drawn - 2 : 0;
+    uint32_t *corners = NULL;
+    *count = 0;
+    VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)&corners, most + 1, 3 * sizeof *corners, error));
+    for (size_t i = 0; i < most; ++i) {
+        uint32_t corner[3];
+        pick(mode, *order, i, corner);
+        if (corner[0] != corner[1] && corner[1] != corner[2] && corner[2] != corner[0]) {
+            memcpy(corners + 3 * (*count)++, corner, sizeof corner);
+        }
+    }
+    free(*order);
+    *order = corners;
+    return VSH_OK;
+}
+
+static vsh_result fail_other(const vshi_lit_document *document, const char *where, vsh_error *error) {
+    return vshi_gltf_fail(&document->gltf, error,
+                          "%s: is not what the model was made of: the file has changed since", where);
+}
+
+/* Vertices of the model are the elements that triangles use, in their order: the others are not kept. */
+static vsh_result match(vshi_lit_document *document, const uint32_t *corners, size_t count, const char *where,
+                        const vsh_mesh *mesh, vshi_lit_topology *topology, vsh_error *error) {
+    vshi_gltf *gltf = &document->gltf;
+    if (count != mesh->triangle_count || mesh->vertex_count > topology->element_count) {
+        return fail_other(document, where, error);
+    }
+    bool *used = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_gltf_allocate(gltf, (void **)&used, topology->element_count, sizeof *used, error));
+    VSHI_TRY_DONE(vshi_gltf_take(gltf, (void **)&topology->elements, mesh->vertex_count,
+                                 sizeof *topology->elements, error));
+    for (size_t i = 0; i < 3 * count; ++i) {
+        used[corners[i]] = true;
+    }
+    size_t vertices = 0;
+    for (size_t e = 0; e < topology->element_count; ++e) {
+        if (used[e] && vertices < mesh->vertex_count) {
+            topology->elements[vertices] = (uint32_t)e;
+        }
+        vertices += used[e];
+    }
+    bool equal = vertices == mesh->vertex_count;
+    for (size_t i = 0; equal && i < 3 * count; ++i) {
+        equal = mesh->indices[i] < vertices && topology->elements[mesh->indices[i]] == corners[i];
+    }
+    topology->vertex_count = vertices;
+    result = equal ? VSH_OK : fail_other(document, where, error);
+done:
+    free(used);
+    return result;
+}
+
+static vsh_result find_plain(vshi_lit_document *document, const json_t *primitive, const char *where,
+                             const vsh_mesh *mesh, vshi_lit_topology *topology, vsh_error *error) {
+    vshi_gltf *gltf = &document->gltf;
+    size_t index, drawn = 0, count = 0;
+    vshi_gltf_accessor positions;
+    VSHI_TRY(vshi_gltf_index(gltf, json_object_get(primitive, "attributes"), "POSITION", "accessors", where,
+                             &index, error));
+    if (index == SIZE_MAX) {
+        return fail_other(document, where, error);
+    }
+    VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &positions, error));
+    topology->element_count = positions.count;
+    uint32_t *order = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(read_order(document, primitive, positions.count, where, &order, &drawn, error));
+    VSHI_TRY_DONE(list_triangles(document, topology->mode, drawn, &order, &count, error));
+    VSHI_TRY_DONE(match(document, order, count, where, mesh, topology, error));
+done:
+    free(order);
+    return result;
+}
+
+vsh_result vshi_lit_topology_find(vshi_lit_document *document, const json_t *primitive, const char *where,
+                                  const vshi_lit_draco *draco, const vsh_mesh *mesh,
+                                  vshi_lit_topology *topology, vsh_error *error) {
+    *topology = (vshi_lit_topology){.draco = draco};
+    if (!vshi_gltf_count(primitive, "mode", VSHI_LIT_TRIANGLES, &topology->mode) ||
+        topology->mode < VSHI_LIT_TRIANGLES || topology->mode > VSHI_LIT_FAN) {
+        return fail_other(document, where, error);
+    }
+    if (draco == NULL) {
+        return find_plain(document, primitive, where, mesh, topology, error);
+    }
+    topology->mode = VSHI_LIT_TRIANGLES; /* whatever the primitive says: Draco's are lists */
+    topology->element_count = draco->vertex_count;
+    return match(document, draco->indices, draco->triangle_count, where, mesh, topology, error);
+}
+
+void vshi_lit_topology_free(vshi_lit_topology *topology) {
+    free(topology->elements);
+    topology->elements = NULL;
+}
+
+void vshi_lit_gathered_free(vshi_lit_gathered *gathered) {
+    free(gathered->from);
+    free(gathered->to);
+    *gathered = (vshi_lit_gathered){.from = NULL};
+}
+
+/* --- where elements lie */
+
+typedef struct element_array {
+    const unsigned char *at; /* NULL: all are zeros */
+    size_t stride, size;     /* bytes; of an element */
+    int components, type;
+    unsigned char *owned; /* of a sparse one: made dense; may be NULL */
+} element_array;
+
+static vsh_result make_dense(vshi_lit_document *document, const vshi_gltf_accessor *accessor,
+                             element_array *made, vsh_error *error) {
+    VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)&made->owned, accessor->count, made->size, error));
+    for (size_t i = 0; i < accessor->count && accessor->at != NULL; ++i) {
+        memcpy(made->owned + i * made->size, accessor->at + i * accessor->stride, made->size);
+    }
+    const size_t index_size = vshi_gltf_component_size(accessor->sparse_type);
+    for (size_t i = 0; i < accessor->sparse_count; ++i) {
+        const size_t index =
+            vshi_gltf_integer_at(accessor->sparse_at + i * index_size, accessor->sparse_type);
+        memcpy(made->owned + index * made->size, accessor->sparse_values + i * made->size, made->size);
+    }
+    made->at = made->owned;
+    made->stride = made->size;
+    return VSH_OK;
+}
+
+static vsh_result find_elements(vshi_lit_document *document, size_t index, size_t element_count,
+                                const vshi_lit_draco_attribute *draco, const char *where,
+                                element_array *found, vsh_error *error) {
+    vshi_gltf_accessor accessor;
+    *found = (element_array){.at = NULL};
+    VSHI_TRY(vshi_gltf_accessor_open(&document->gltf, index, &accessor, error));
+    if (draco != NULL) {
+        const size_t size = (size_t)draco->components * vshi_gltf_component_size(draco->type);
+        if (draco->type != accessor.type || draco->components != accessor.components) {
+            return vshi_gltf_fail(&document->gltf, error, "%s: accessors[%zu] is not what was decompressed",
+                                  where, index);
+        }
+        *found = (element_array){draco->values, size, size, draco->components, draco->type, NULL};
+        return VSH_OK;
+    }
+    if (accessor.count != element_count) {
+        return vshi_gltf_fail(&document->gltf, error, "%s: accessors[%zu] has %zu elements for %zu vertices",
+                              where, index, accessor.count, element_count);
+    }
+    const size_t size = (size_t)accessor.components * vshi_gltf_component_size(accessor.type);
+    *found = (element_array){accessor.at, accessor.stride, size, accessor.components, accessor.type, NULL};
+    return accessor.sparse_count > 0 ? make_dense(document, &accessor, found, error) : VSH_OK;
+}
+
+/* --- least and largest values, as they stand in the buffer */
+
+static double component_at(const unsigned char *at, int type) {
+    int16_t two;
+    float number;
+    switch (type) {
+    case VSHI_GLTF_BYTE:
+        return (double)(int8_t)*at;
+    case VSHI_GLTF_SHORT:
+        memcpy(&two, at, sizeof two);
+        return (double)two;
+    case VSHI_GLTF_FLOAT:
+        memcpy(&number, at, sizeof number);
+        return (double)number;
+    default:
+        return (double)vshi_gltf_integer_at(at, type);
+    }
+}
+
+static json_t *number(double value, int type) {
+    return type == VSHI_GLTF_FLOAT ? json_real(value) : json_integer((json_int_t)value);
+}
+
+static vsh_result set_bounds(const vshi_lit_document *document, json_t *accessor, const unsigned char *at,
+                             size_t stride, size_t count, const element_array *from, vsh_error *error) {
+    json_t *low = json_array(), *high = json_array();
+    const size_t each = vshi_gltf_component_size(from->type);
+    bool good = low != NULL && high != NULL;
+    for (int c = 0; good && c < from->components; ++c) {
+        const size_t offset = (size_t)c * each;
+        double least = component_at(at + offset, from->type), most = least;
+        for (size_t i = 1; i < count; ++i) {
+            const double value = component_at(at + i * stride + offset, from->type);
+            least = value < least ? value : least;
+            most = value > most ? value : most;
+        }
+        good = json_array_append_new(low, number(least, from->type)) == 0 &&
+               json_array_append_new(high, number(most, from->type)) == 0;
+    }
+    const bool first = json_object_set_new(accessor, "min", low) == 0;
+    const bool second = json_object_set_new(accessor, "max", high) == 0;
+    return good && first && second ? VSH_OK : vshi_lit_no_memory(document, error);
+}
+
+/* --- gathering */
+
+static vsh_result describe(vshi_lit_document *document, size_t index, size_t view, size_t count,
+                           json_t **made, vsh_error *error) {
+    *made = vshi_gltf_copy(vshi_gltf_element(&document->gltf, "accessors", index));
+    if (*made == NULL) {
+        return vshi_lit_no_memory(document, error);
+    }
+    json_object_del(*made, "byteOffset");
+    json_object_del(*made, "sparse");
+    VSHI_TRY(vshi_lit_set(document, *made, "bufferView", json_integer((json_int_t)view), error));
+    return vshi_lit_set(document, *made, "count", json_integer((json_int_t)count), error);
+}
+
+static vsh_result copy(vshi_lit_document *document, size_t index, const element_array *from,
+                       const uint32_t *chosen, size_t count, bool bounds, size_t *accessor,
+                       vsh_error *error) {
+    const size_t stride = (from->size + 3) & ~(size_t)3; /* of vertex attributes: a multiple of 4 */
+    size_t bytes, view, offset;
+    if (__builtin_mul_overflow(count, stride, &bytes)) {
+        return vshi_lit_no_memory(document, error);
+    }
+    VSHI_TRY(vshi_lit_add_view(document, NULL, bytes, VSHI_LIT_VERTICES, stride != from->size ? stride : 0,
+                               &view, &offset, error));
+    unsigned char *to = document->added.at + offset;
+    for (size_t i = 0; i < count && from->at != NULL; ++i) {
+        memcpy(to + i * stride, from->at + chosen[i] * from->stride, from->size);
+    }
+    json_t *made = NULL;
+    vsh_result result = describe(document, index, view, count, &made, error);
+    const bool had = json_object_get(made, "min") != NULL || json_object_get(made, "max") != NULL;
+    if (result == VSH_OK && (bounds || had) && count > 0) {
+        result = set_bounds(document, made, to, stride, count, from, error);
+    }
+    if (result != VSH_OK) {
+        json_decref(made);
+        return result;
+    }
+    return vshi_lit_append(document, "accessors", made, accessor, error);
+}
+
+static vsh_result remember(const vshi_lit_document *document, size_t from, size_t to,
+                           vshi_lit_gathered *gathered, vsh_error *error) {
+    if (gathered->count == gathered->capacity) {
+        const size_t capacity = 2 * gathered->capacity + 8;
+        size_t *list = realloc(gathered->from, capacity * sizeof *list);
+        gathered->from = list != NULL ? list : gathered->from;
+        size_t *other = list != NULL ? realloc(gathered->to, capacity * sizeof *other) : NULL;
+        if (other == NULL) {
+            return vshi_lit_no_memory(document, error);
+        }
+        gathered->to = other;
+        gathered->capacity = capacity;
+    }
+    gathered->from[gathered->count] = from;
+    gathered->to[gathered->count++] = to;
+    return VSH_OK;
+}
+
+vsh_result vshi_lit_gather(vshi_lit_document *document, size_t index, size_t element_count,
+                           const vshi_lit_draco_attribute *draco, const uint32_t *chosen, size_t count,
+                           bool bounds, const char *where, vshi_lit_gathered *gathered, size_t *accessor,
+                           vsh_error *error) {
+    for (size_t i = 0; i < gathered->count; ++i) {
+        if (gathered->from[i] == index) {
+            *accessor = gathered->to[i];
+            return VSH_OK;
+        }
+    }
+    element_array from;
+    vsh_result result;
+    VSHI_TRY_DONE(find_elements(document, index, element_count, draco, where, &from, error));
+    VSHI_TRY_DONE(copy(document, index, &from, chosen, count, bounds, accessor, error));
+    VSHI_TRY_DONE(remember(document, index, *accessor, gathered, error));
+done:
+    free(from.owned);
+    return result;
+}
+
+void vshi_lit_uv_pool_free(vshi_lit_uv_pool *pool) {
+    for (size_t i = 0; i < pool->count; ++i) {
+        free(pool->list[i].set);
+    }
+    free(pool->list);
+    *pool = (vshi_lit_uv_pool){.list = NULL};
+}
+
+static unsigned char *place(const vshi_lit_document *document, const vshi_lit_uvs *uvs, uint32_t element) {
+    return document->added.at + uvs->offset + (size_t)element * sizeof(float[2]);
+}
+
+static bool fits(const vshi_lit_document *document, const vshi_lit_uvs *uvs, const uint32_t *elements,
+                 const float (*values)[2], size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+        if (uvs->set[elements[i]] &&
+            memcmp(place(document, uvs, elements[i]), values[i], sizeof values[i]) != 0) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static vsh_result add(vshi_lit_document *document, vshi_lit_uv_pool *pool, size_t positions,
+                      size_t element_count, vsh_error *error) {
+    if (pool->count == pool->capacity) {
+        const size_t capacity = 2 * pool->capacity + 8;
+        vshi_lit_uvs *list = realloc(pool->list, capacity * sizeof *list);
+        if (list == NULL) {
+            return vshi_lit_no_memory(document, error);
+        }
+        pool->list = list;
+        pool->capacity = capacity;
+    }
+    vshi_lit_uvs *made = &pool->list[pool->count];
+    *made = (vshi_lit_uvs){.positions = positions, .count = element_count};
+    VSHI_TRY(
+        vshi_gltf_allocate(&document->gltf, (void **)&made->set, element_count, sizeof *made->set, error));
+    ++pool->count;
+    return vshi_lit_add_floats(document, NULL, element_count, 2, false, &made->accessor, &made->offset,
+                               error);
+}
+
+vsh_result vshi_lit_uv_pool_put(vshi_lit_document *document, vshi_lit_uv_pool *pool, size_t positions,
+                                size_t element_count, const uint32_t *elements, const float (*values)[2],
+                                size_t count, size_t *accessor, vsh_error *error) {
+    size_t found = 0;
+    while (found < pool->count &&
+           (pool->list[found].positions != positions || pool->list[found].count != element_count ||
+            !fits(document, &pool->list[found], elements, values, count))) {
+        ++found;
+    }
+    if (found == pool->count) {
+        VSHI_TRY(add(document, pool, positions, element_count, error));
+    }
+    const vshi_lit_uvs *uvs = &pool->list[found];
+    for (size_t i = 0; i < count; ++i) {
+        memcpy(place(document, uvs, elements[i]), values[i], sizeof values[i]);
+        uvs->set[elements[i]] = true;
+    }
+    *accessor = uvs->accessor;
+    return VSH_OK;
+}
