@@ -126,6 +126,11 @@ vsh_result vshi_lit_set(const vshi_lit_document *document, json_t *object, const
     return json_object_set_new(object, key, value) == 0 ? VSH_OK : vshi_lit_no_memory(document, error);
 }
 
+vsh_result vshi_lit_set_number(const vshi_lit_document *document, json_t *object, const char *key,
+                               size_t number, vsh_error *error) {
+    return vshi_lit_set(document, object, key, json_integer((json_int_t)number), error);
+}
+
 vsh_result vshi_lit_object(const vshi_lit_document *document, json_t *object, const char *key,
                            json_t **member, vsh_error *error) {
     *member = json_object_get(object, key);
@@ -181,6 +186,23 @@ void vshi_lit_drop_extension(vshi_lit_document *document, const char *name) {
             json_object_del(document->gltf.root, lists[i]);
         }
     }
+}
+
+vsh_result vshi_lit_grow(const vshi_lit_document *document, void *list, size_t count, size_t *capacity,
+                         size_t size, vsh_error *error) {
+    if (count < *capacity) {
+        return VSH_OK;
+    }
+    void *grown;
+    const size_t more = 2 * *capacity + 8;
+    memcpy(&grown, list, sizeof grown);
+    grown = realloc(grown, more * size);
+    if (grown == NULL) {
+        return vshi_lit_no_memory(document, error);
+    }
+    memcpy(list, &grown, sizeof grown);
+    *capacity = more;
+    return VSH_OK;
 }
 
 /* --- bytes */

@@ -53,6 +53,9 @@ vsh_result vshi_lit_append(vshi_lit_document *document, const char *array, json_
 vsh_result vshi_lit_set(const vshi_lit_document *document, json_t *object, const char *key, json_t *value,
                         vsh_error *error);
 
+vsh_result vshi_lit_set_number(const vshi_lit_document *document, json_t *object, const char *key,
+                               size_t number, vsh_error *error);
+
 /* Member `key` of an object, which is made where there is none. Errors: VSH_ERROR_INPUT, VSH_ERROR_MEMORY. */
 vsh_result vshi_lit_object(const vshi_lit_document *document, json_t *object, const char *key,
                            json_t **member, vsh_error *error);
@@ -62,6 +65,10 @@ vsh_result vshi_lit_use_extension(vshi_lit_document *document, const char *name,
 
 /* Takes a name out of extensionsUsed and extensionsRequired, and either away where that was its last. */
 void vshi_lit_drop_extension(vshi_lit_document *document, const char *name);
+
+/* Gives *list (a pointer to a pointer) room for one element more than `count`. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_lit_grow(const vshi_lit_document *document, void *list, size_t count, size_t *capacity,
+                         size_t size, vsh_error *error);
 
 /* --- bytes */
 

@@ -75,8 +75,7 @@ static vsh_result add_positions(maker *m, const vsh_mesh *mesh, const vsh_lit_me
         }
     }
     VSHI_TRY(vshi_lit_add_floats(&m->work->document, values, count, 3, true, &accessor, NULL, error));
-    return vshi_lit_set(&m->work->document, attributes, "POSITION", json_integer((json_int_t)accessor),
-                        error);
+    return vshi_lit_set_number(&m->work->document, attributes, "POSITION", accessor, error);
 }
 
 /* Where a normal is none, that of the triangles around it, which is what it is shaded by here. */
@@ -114,7 +113,7 @@ static vsh_result add_normals(maker *m, const vsh_mesh *mesh, const vsh_lit_mesh
         memcpy(values + 3 * v, unit, sizeof unit);
     }
     VSHI_TRY_DONE(vshi_lit_add_floats(document, values, count, 3, false, &accessor, NULL, error));
-    result = vshi_lit_set(document, attributes, "NORMAL", json_integer((json_int_t)accessor), error);
+    result = vshi_lit_set_number(document, attributes, "NORMAL", accessor, error);
 done:
     free(normals);
     return result;
@@ -132,7 +131,7 @@ static vsh_result add_set(maker *m, const float *uvs, const vsh_lit_mesh *lit, s
     }
     snprintf(name, sizeof name, "TEXCOORD_%zu", number);
     VSHI_TRY(vshi_lit_add_floats(&m->work->document, values, count, 2, false, &accessor, NULL, error));
-    return vshi_lit_set(&m->work->document, attributes, name, json_integer((json_int_t)accessor), error);
+    return vshi_lit_set_number(&m->work->document, attributes, name, accessor, error);
 }
 
 static vsh_result fill(maker *m, size_t entry, const double *world, arrays *a, vsh_error *error) {
@@ -219,7 +218,7 @@ static vsh_result put_primitive(maker *m, size_t entry, arrays *a, json_t *made,
             VSHI_TRY(
                 vshi_lit_add_indices(document, corners, 3 * mesh->triangle_count, count, &a->indices, error));
         }
-        VSHI_TRY(vshi_lit_set(document, made, "indices", json_integer((json_int_t)a->indices), error));
+        VSHI_TRY(vshi_lit_set_number(document, made, "indices", a->indices, error));
         return json_array_append(list, made) == 0 ? VSH_OK : vshi_lit_no_memory(document, error);
     }
     vsh_lit_mesh shown = *lit;
@@ -305,7 +304,7 @@ vsh_result vshi_lit_from_model(vshi_lit_work *work, vsh_error *error) {
     for (size_t i = 0; i < m.count; ++i) {
         m.meshes[i] = vsh_model_mesh(work->model, i, 0);
     }
-    VSHI_TRY_DONE(vshi_lit_set(document, document->gltf.root, "scene", json_integer(0), error));
+    VSHI_TRY_DONE(vshi_lit_set_number(document, document->gltf.root, "scene", 0, error));
     VSHI_TRY_DONE(vshi_lit_append(document, "scenes", json_pack("{s:O}", "nodes", nodes), &scene, error));
     VSHI_TRY_DONE(add_all(&m, nodes, error));
 done:

@@ -27,7 +27,7 @@ char *vshi_lit_beside_path(const char *output, const char *name) {
     return path;
 }
 
-static bool is_same_file(const char *a, const char *b) {
+bool vshi_lit_is_same_file(const char *a, const char *b) {
     struct stat one, other;
     return stat(a, &one) == 0 && stat(b, &other) == 0 && one.st_dev == other.st_dev &&
            one.st_ino == other.st_ino;
@@ -48,7 +48,7 @@ vsh_result vshi_lit_check_replaced(const vshi_lit_document *document, const char
             if (given == NULL) {
                 return vshi_lit_no_memory(document, error);
             }
-            const bool same = is_same_file(given, path);
+            const bool same = vshi_lit_is_same_file(given, path);
             free(given);
             if (same) {
                 return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: would replace %s[%zu] of %s", path, lists[k],
@@ -178,7 +178,7 @@ static vsh_result embed_bytes(vshi_lit_work *work, const void *bytes, size_t siz
                               const char *type, vsh_error *error) {
     size_t view;
     VSHI_TRY(vshi_lit_add_view(&work->document, bytes, size, 0, 0, &view, NULL, error));
-    VSHI_TRY(vshi_lit_set(&work->document, image, "bufferView", json_integer((json_int_t)view), error));
+    VSHI_TRY(vshi_lit_set_number(&work->document, image, "bufferView", view, error));
     return vshi_lit_set(&work->document, image, "mimeType", json_string(type), error);
 }
 
@@ -352,7 +352,7 @@ static vsh_result bring(vshi_lit_work *work, json_t *image, const char *uri, vsh
         result = VSH_OK;
     } else {
         VSHI_TRY_DONE(vshi_lit_add_view(document, bytes, size, 0, 0, &view, NULL, error));
-        VSHI_TRY_DONE(vshi_lit_set(document, image, "bufferView", json_integer((json_int_t)view), error));
+        VSHI_TRY_DONE(vshi_lit_set_number(document, image, "bufferView", view, error));
         VSHI_TRY_DONE(vshi_lit_set(document, image, "mimeType", json_string(type), error));
         json_object_del(image, "uri");
     }

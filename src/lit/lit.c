@@ -12,7 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
 
 /* --- what callers give */
 
@@ -274,12 +273,6 @@ static vsh_result check(vshi_lit_work *work, vsh_error *error) {
     return VSH_OK;
 }
 
-static bool is_same(const char *a, const char *b) {
-    struct stat one, other;
-    return stat(a, &one) == 0 && stat(b, &other) == 0 && one.st_dev == other.st_dev &&
-           one.st_ino == other.st_ino;
-}
-
 /* --- the document */
 
 static vsh_result allocate_pages(vshi_lit_work *work, vsh_error *error) {
@@ -318,7 +311,7 @@ static vsh_result bring_images(vshi_lit_work *work, vsh_error *error) {
         return VSH_OK;
     }
     char *one = folder_of(work->path), *other = folder_of(work->output);
-    const bool known = one != NULL && other != NULL, beside = known && is_same(one, other);
+    const bool known = one != NULL && other != NULL, beside = known && vshi_lit_is_same_file(one, other);
     free(one);
     free(other);
     return !known   ? vshi_lit_no_memory(&work->document, error)
@@ -329,7 +322,7 @@ static vsh_result bring_images(vshi_lit_work *work, vsh_error *error) {
 static vsh_result make_document(vshi_lit_work *work, vshi_lit_uses *uses, vsh_error *error) {
     const char *path = work->path;
     const bool obj = vshi_lit_is_obj(work->output);
-    if (path != NULL && is_same(path, work->output)) {
+    if (path != NULL && vshi_lit_is_same_file(path, work->output)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: the output is the input", work->output);
     }
     if (path == NULL || !is_gltf(path) || obj) {

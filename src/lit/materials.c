@@ -24,15 +24,8 @@ static vsh_result find_look(vshi_lit_work *work, const vshi_lit_look *wanted, si
             return VSH_OK;
         }
     }
-    if (looks->count == looks->capacity) {
-        const size_t capacity = 2 * looks->capacity + 16;
-        vshi_lit_look *list = realloc(looks->list, capacity * sizeof *list);
-        if (list == NULL) {
-            return vshi_lit_no_memory(&work->document, error);
-        }
-        looks->list = list;
-        looks->capacity = capacity;
-    }
+    VSHI_TRY(vshi_lit_grow(&work->document, &looks->list, looks->count, &looks->capacity, sizeof *looks->list,
+                           error));
     looks->list[looks->count++] = *wanted;
     json_incref(wanted->transform);
     return VSH_OK;
@@ -191,7 +184,7 @@ static vsh_result put(vshi_lit_work *work, json_t *owner, void *user, vsh_error 
         json_object_del(owner, "material"); /* it had none */
         return VSH_OK;
     }
-    return vshi_lit_set(&work->document, owner, "material", json_integer((json_int_t)made), error);
+    return vshi_lit_set_number(&work->document, owner, "material", made, error);
 }
 
 static vsh_result check(vshi_lit_work *work, json_t *owner, void *user, vsh_error *error) {

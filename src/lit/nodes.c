@@ -7,6 +7,11 @@
 
 static const char instancing_name[] = "EXT_mesh_gpu_instancing";
 
+static const struct {
+    const char *attribute, *key;
+    int components;
+} parts[3] = {{"TRANSLATION", "translation", 3}, {"ROTATION", "rotation", 4}, {"SCALE", "scale", 3}};
+
 /* A mesh as one node (or one instance) shows it: entries of the model, which are its primitives. */
 typedef struct use {
     size_t node, mesh;
@@ -92,7 +97,6 @@ static vsh_result list_uses(vshi_lit_work *work, bool *seen, uses *all, vsh_erro
 
 /* How many instances a node has: the length of any of its accessors, which the model found alike. */
 static vsh_result count_instances(vshi_lit_work *work, size_t node, size_t *count, vsh_error *error) {
-    static const char *const parts[] = {"TRANSLATION", "ROTATION", "SCALE"};
     vshi_gltf *gltf = &work->document.gltf;
     const json_t *attributes = json_object_get(
         vshi_gltf_extension(vshi_gltf_element(gltf, "nodes", node), instancing_name), "attributes");
@@ -100,7 +104,8 @@ static vsh_result count_instances(vshi_lit_work *work, size_t node, size_t *coun
     for (size_t k = 0; k < sizeof parts / sizeof parts[0] && *count == 0; ++k) {
         size_t index;
         vshi_gltf_accessor accessor;
-        VSHI_TRY(vshi_gltf_index(gltf, attributes, parts[k], "accessors", instancing_name, &index, error));
+        VSHI_TRY(vshi_gltf_index(gltf, attributes, parts[k].attribute, "accessors", instancing_name, &index,
+                                 error));
         if (index != SIZE_MAX) {
             VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
             *count = accessor.count;
@@ -201,23 +206,6 @@ static vsh_result make_mesh(vshi_lit_work *work, uses *all, use *u, vsh_error *e
 
 /* --- instances */
 
-static const struct {
-    const char *attribute, *key;
-    int components;
-} parts[3] = {{"TRANSLATION", "translation", 3}, {"ROTATION", "rotation", 4}, {"SCALE", "scale", 3}};
-
-static vsh_result read_part(vshi_lit_work *work, const json_t *attributes, int part, size_t count,
-                            float **values, vsh_error *error) {
-    size_t index;
-    vshi_gltf *gltf = &work->document.gltf;
-    VSHI_TRY(vshi_gltf_index(gltf, attributes, parts[part].attribute, "accessors", instancing_name, &index,
-                             error));
-    return index == SIZE_MAX
-               ? VSH_OK
-               : vshi_gltf_read_attribute(gltf, attributes, parts[part].attribute, parts[part].components,
-                                          count, instancing_name, values, error);
-}
-
 static json_t *numbers(const float *values, int part) {
     enum { ROTATION = 1 };
     static const double unit_slack = 1e-5;
@@ -282,7 +270,8 @@ static vsh_result add_instances(vshi_lit_work *work, const uses *all, size_t fir
     float *values[3] = {NULL, NULL, NULL};
     vsh_result result = VSH_OK;
     for (int k = 0; result == VSH_OK && k < 3; ++k) {
-        result = read_part(work, attributes, k, count, &values[k], error);
+        result = vshi_gltf_read_attribute(gltf, attributes, parts[k].attribute, parts[k].components, count,
+                                          instancing_name, &values[k], error);
     }
     for (size_t i = 0, next = first; result == VSH_OK && i < count; ++i) {
         const bool has = next < end && all->list[next].instance == i;
@@ -339,7 +328,7 @@ static vsh_result give(vshi_lit_work *work, const uses *all, size_t first, size_
         return expand(work, all, first, end, error);
     }
     json_t *node = json_array_get(json_object_get(document->gltf.root, "nodes"), of->node);
-    return vshi_lit_set(document, node, "mesh", json_integer((json_int_t)of->made), error);
+    return vshi_lit_set_number(document, node, "mesh", of->made, error);
 }
 
 static vsh_result make_all(vshi_lit_work *work, uses *all, vsh_error *error) {

@@ -28,7 +28,7 @@ static vsh_result add_copy(vshi_lit_work *work, const json_t *made, size_t indic
     if (primitive == NULL || json_array_append_new(list, primitive) != 0) {
         return vshi_lit_no_memory(document, error);
     }
-    VSHI_TRY(vshi_lit_set(document, primitive, "indices", json_integer((json_int_t)indices), error));
+    VSHI_TRY(vshi_lit_set_number(document, primitive, "indices", indices, error));
     return vshi_lit_mark_primitive(work, primitive, page, set, NULL, error);
 }
 
@@ -303,21 +303,6 @@ static const char draco_name[] = "KHR_draco_mesh_compression";
 
 /* --- shapes */
 
-static vsh_result grow(const vshi_lit_document *document, void **list, size_t count, size_t *capacity,
-                       size_t size, vsh_error *error) {
-    if (count < *capacity) {
-        return VSH_OK;
-    }
-    const size_t more = 2 * *capacity + 8;
-    void *grown = realloc(*list, more * size);
-    if (grown == NULL) {
-        return vshi_lit_no_memory(document, error);
-    }
-    *list = grown;
-    *capacity = more;
-    return VSH_OK;
-}
-
 static bool is_before(const vshi_lit_shape *shape, size_t mesh, size_t primitive) {
     return shape->mesh != mesh ? shape->mesh < mesh : shape->primitive < primitive;
 }
@@ -336,8 +321,8 @@ static vsh_result find_shape(vshi_lit_work *work, size_t mesh, size_t primitive,
     }
     if (low == work->shape_count || work->shapes[low].mesh != mesh ||
         work->shapes[low].primitive != primitive) {
-        VSHI_TRY(grow(&work->document, (void **)&work->shapes, work->shape_count, &work->shape_capacity,
-                      sizeof *work->shapes, error));
+        VSHI_TRY(vshi_lit_grow(&work->document, &work->shapes, work->shape_count, &work->shape_capacity,
+                               sizeof *work->shapes, error));
         memmove(work->shapes + low + 1, work->shapes + low, (work->shape_count - low) * sizeof *work->shapes);
         ++work->shape_count;
         work->shapes[low] = (vshi_lit_shape){.mesh = mesh, .primitive = primitive};
@@ -428,8 +413,8 @@ static vsh_result take_split(vshi_lit_work *work, vshi_lit_shape *shape, const v
             return VSH_OK;
         }
     }
-    VSHI_TRY(grow(&work->document, (void **)&shape->splits, shape->split_count, &shape->split_capacity,
-                  sizeof *shape->splits, error));
+    VSHI_TRY(vshi_lit_grow(&work->document, &shape->splits, shape->split_count, &shape->split_capacity,
+                           sizeof *shape->splits, error));
     *split = &shape->splits[shape->split_count++];
     **split = (vshi_lit_split){.mesh = mesh, .indices = SIZE_MAX};
     return VSH_OK;
@@ -450,9 +435,7 @@ static vsh_result gather(vshi_lit_work *work, const vshi_lit_topology *topology,
         VSHI_TRY(vshi_lit_gather(&work->document, index, topology->element_count, draco, v->elements,
                                  mesh->vertex_count, strcmp(name, "POSITION") == 0, where, &split->gathered,
                                  &accessor, error));
-        if (json_object_set_new_nocheck(attributes, name, json_integer((json_int_t)accessor)) != 0) {
-            return vshi_lit_no_memory(&work->document, error);
-        }
+        VSHI_TRY(vshi_lit_set_number(&work->document, attributes, name, accessor, error));
     }
     return VSH_OK;
 }
@@ -486,8 +469,8 @@ static vsh_result set_uvs(const vshi_lit_work *work, json_t *primitive, size_t a
                           vsh_error *error) {
     char name[40];
     snprintf(name, sizeof name, "TEXCOORD_%zu", set);
-    VSHI_TRY(vshi_lit_set(&work->document, json_object_get(primitive, "attributes"), name,
-                          json_integer((json_int_t)accessor), error));
+    VSHI_TRY(vshi_lit_set_number(&work->document, json_object_get(primitive, "attributes"), name, accessor,
+                                 error));
     return vshi_lit_tell_set(&work->document, primitive, set, error);
 }
 

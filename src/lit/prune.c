@@ -54,10 +54,7 @@ static vsh_result rename_index(const vshi_lit_document *document, const placing 
     if (!vshi_gltf_count(object, key, SIZE_MAX, &index) || index < places->first || index >= places->count) {
         return VSH_OK;
     }
-    const size_t moved = places->moved[index - places->first];
-    return json_object_set_new_nocheck(object, key, json_integer((json_int_t)moved)) == 0
-               ? VSH_OK
-               : vshi_lit_no_memory(document, error);
+    return vshi_lit_set_number(document, object, key, places->moved[index - places->first], error);
 }
 
 /* Moves the items of the root's list. Errors: VSH_ERROR_MEMORY. */

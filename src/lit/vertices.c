@@ -157,9 +157,8 @@ void vshi_lit_topology_free(vshi_lit_topology *topology) {
 }
 
 void vshi_lit_gathered_free(vshi_lit_gathered *gathered) {
-    free(gathered->from);
-    free(gathered->to);
-    *gathered = (vshi_lit_gathered){.from = NULL};
+    free(gathered->list);
+    *gathered = (vshi_lit_gathered){.list = NULL};
 }
 
 /* --- where elements lie */
@@ -266,8 +265,8 @@ static vsh_result describe(vshi_lit_document *document, size_t index, size_t vie
     }
     json_object_del(*made, "byteOffset");
     json_object_del(*made, "sparse");
-    VSHI_TRY(vshi_lit_set(document, *made, "bufferView", json_integer((json_int_t)view), error));
-    return vshi_lit_set(document, *made, "count", json_integer((json_int_t)count), error);
+    VSHI_TRY(vshi_lit_set_number(document, *made, "bufferView", view, error));
+    return vshi_lit_set_number(document, *made, "count", count, error);
 }
 
 static vsh_result copy(vshi_lit_document *document, size_t index, const element_array *from,
@@ -297,31 +296,13 @@ static vsh_result copy(vshi_lit_document *document, size_t index, const element_
     return vshi_lit_append(document, "accessors", made, accessor, error);
 }
 
-static vsh_result remember(const vshi_lit_document *document, size_t from, size_t to,
-                           vshi_lit_gathered *gathered, vsh_error *error) {
-    if (gathered->count == gathered->capacity) {
-        const size_t capacity = 2 * gathered->capacity + 8;
-        size_t *list = realloc(gathered->from, capacity * sizeof *list);
-        gathered->from = list != NULL ? list : gathered->from;
-        size_t *other = list != NULL ? realloc(gathered->to, capacity * sizeof *other) : NULL;
-        if (other == NULL) {
-            return vshi_lit_no_memory(document, error);
-        }
-        gathered->to = other;
-        gathered->capacity = capacity;
-    }
-    gathered->from[gathered->count] = from;
-    gathered->to[gathered->count++] = to;
-    return VSH_OK;
-}
-
 vsh_result vshi_lit_gather(vshi_lit_document *document, size_t index, size_t element_count,
                            const vshi_lit_draco_attribute *draco, const uint32_t *chosen, size_t count,
                            bool bounds, const char *where, vshi_lit_gathered *gathered, size_t *accessor,
                            vsh_error *error) {
     for (size_t i = 0; i < gathered->count; ++i) {
-        if (gathered->from[i] == index) {
-            *accessor = gathered->to[i];
+        if (gathered->list[i].from == index) {
+            *accessor = gathered->list[i].to;
             return VSH_OK;
         }
     }
@@ -329,7 +310,9 @@ vsh_result vshi_lit_gather(vshi_lit_document *document, size_t index, size_t ele
     vsh_result result;
     VSHI_TRY_DONE(find_elements(document, index, element_count, draco, where, &from, error));
     VSHI_TRY_DONE(copy(document, index, &from, chosen, count, bounds, accessor, error));
-    VSHI_TRY_DONE(remember(document, index, *accessor, gathered, error));
+    VSHI_TRY_DONE(vshi_lit_grow(document, &gathered->list, gathered->count, &gathered->capacity,
+                                sizeof *gathered->list, error));
+    gathered->list[gathered->count++] = (vshi_lit_copy){index, *accessor};
 done:
     free(from.owned);
     return result;
@@ -360,15 +343,7 @@ static bool fits(const vshi_lit_document *document, const vshi_lit_uvs *uvs, con
 
 static vsh_result add(vshi_lit_document *document, vshi_lit_uv_pool *pool, size_t positions,
                       size_t element_count, vsh_error *error) {
-    if (pool->count == pool->capacity) {
-        const size_t capacity = 2 * pool->capacity + 8;
-        vshi_lit_uvs *list = realloc(pool->list, capacity * sizeof *list);
-        if (list == NULL) {
-            return vshi_lit_no_memory(document, error);
-        }
-        pool->list = list;
-        pool->capacity = capacity;
-    }
+    VSHI_TRY(vshi_lit_grow(document, &pool->list, pool->count, &pool->capacity, sizeof *pool->list, error));
     vshi_lit_uvs *made = &pool->list[pool->count];
     *made = (vshi_lit_uvs){.positions = positions, .count = element_count};
     VSHI_TRY(

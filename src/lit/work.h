@@ -27,9 +27,14 @@ vsh_result vshi_lit_topology_find(vshi_lit_document *document, const json_t *pri
                                   vshi_lit_topology *topology, vsh_error *error);
 void vshi_lit_topology_free(vshi_lit_topology *topology);
 
-/* What was gathered by one list of elements: each accessor once, whatever uses it. */
+/* An accessor, and the one that some of its elements were copied to. */
+typedef struct vshi_lit_copy {
+    size_t from, to;
+} vshi_lit_copy;
+
+/* Copies of the same elements: each accessor once, whatever uses it. */
 typedef struct vshi_lit_gathered {
-    size_t *from, *to; /* [count] */
+    vshi_lit_copy *list; /* [count] */
     size_t count, capacity;
 } vshi_lit_gathered;
 
@@ -216,6 +221,8 @@ vsh_result vshi_lit_beside_name(const vshi_lit_work *work, const char *mark, con
 
 /* The path of a file in the output's folder; NULL where memory is short. */
 char *vshi_lit_beside_path(const char *output, const char *name);
+
+bool vshi_lit_is_same_file(const char *a, const char *b);
 
 /* Fails where a path is one of a file that the input is made of. Errors: VSH_ERROR_ARGUMENT,
  * VSH_ERROR_MEMORY.

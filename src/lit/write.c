@@ -234,12 +234,10 @@ static vsh_result move_view(const vshi_lit_document *document, const layout *l, 
         !vshi_gltf_count(view, "byteOffset", 0, &offset)) {
         return vshi_gltf_fail(&document->gltf, error, "a buffer view refers to no buffer");
     }
-    VSHI_TRY(vshi_lit_set(document, view, "buffer", json_integer((json_int_t)l->numbers[buffer]), error));
+    VSHI_TRY(vshi_lit_set_number(document, view, "buffer", l->numbers[buffer], error));
     const size_t base = l->offsets[buffer] != SIZE_MAX ? l->offsets[buffer] : 0;
     const size_t moved = base + offset - dropped_before(document, buffer, offset);
-    return moved != offset
-               ? vshi_lit_set(document, view, "byteOffset", json_integer((json_int_t)moved), error)
-               : VSH_OK;
+    return moved != offset ? vshi_lit_set_number(document, view, "byteOffset", moved, error) : VSH_OK;
 }
 
 static vsh_result move_views(vshi_lit_document *document, const layout *l, vsh_error *error) {
@@ -248,9 +246,8 @@ static vsh_result move_views(vshi_lit_document *document, const layout *l, vsh_e
     json_array_foreach(json_object_get(document->gltf.root, "bufferViews"), i, view) {
         if (lies_in_added(document, i)) {
             const size_t at = (size_t)json_integer_value(json_object_get(view, "byteOffset"));
-            VSHI_TRY(vshi_lit_set(document, view, "buffer", json_integer(0), error));
-            VSHI_TRY(
-                vshi_lit_set(document, view, "byteOffset", json_integer((json_int_t)(at + l->added)), error));
+            VSHI_TRY(vshi_lit_set_number(document, view, "buffer", 0, error));
+            VSHI_TRY(vshi_lit_set_number(document, view, "byteOffset", (at + l->added), error));
             continue;
         }
         VSHI_TRY(move_view(document, l, view, error));
@@ -537,7 +534,7 @@ static vsh_result join(vshi_lit_work *work, const vshi_lit_besides *besides, lay
     VSHI_TRY(name_files(work, besides, *bin, all, error)); /* by the names that the input has */
     VSHI_TRY(join_buffers(document, l, &one, error));
     if (one != NULL) {
-        VSHI_TRY(vshi_lit_set(document, one, "byteLength", json_integer((json_int_t)l->size), error));
+        VSHI_TRY(vshi_lit_set_number(document, one, "byteLength", l->size, error));
         json_object_del(one, "uri");
     }
     return *bin != NULL ? vshi_lit_set(document, one, "uri", vshi_lit_uri(*bin), error) : VSH_OK;
