@@ -1,5 +1,6 @@
 #include "lit/document.h"
 
+#include "base/bytes.h"
 #include "base/input.h"
 #include "base/json_bytes.h"
 #include "base/memory.h"
@@ -9,28 +10,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Where the JSON of a GLB lies, as far as its header can be believed: vshi_gltf_open() checks it. */
-static void find_json(const char *text, size_t size, size_t *begin, size_t *length) {
+/* Bytes that the JSON takes in memory, as far as the header of a GLB can be believed: vshi_gltf_open() checks
+ * it. */
+static double estimate_json_bytes(const char *text, size_t size) {
     enum { HEADER = 20, LENGTH = 12 };
-    uint32_t told = 0;
-    *begin = 0;
-    *length = size;
-    if (size >= HEADER && memcmp(text, "glTF", 4) == 0) {
-        memcpy(&told, text + LENGTH, sizeof told);
-        *begin = HEADER;
-        *length = told < size - HEADER ? told : size - HEADER;
+    if (size < HEADER || memcmp(text, "glTF", 4) != 0) {
+        return vshi_json_bytes(text, size);
     }
-}
-
-/* Bytes of a GLB that was opened, whatever stands behind it. */
-static size_t told_size(const char *text, size_t size) {
-    enum { HEADER = 12, LENGTH = 8 };
-    uint32_t told = 0;
-    if (size >= HEADER && memcmp(text, "glTF", 4) == 0) {
-        memcpy(&told, text + LENGTH, sizeof told);
-        return told < size ? told : size;
-    }
-    return size;
+    const size_t told = (size_t)vshi_bytes_number(text + LENGTH, 4, false);
+    return vshi_json_bytes(text + HEADER, told < size - HEADER ? told : size - HEADER);
 }
 
 static vsh_result read_text(vshi_lit_document *document, size_t *size, vsh_error *error) {
@@ -76,12 +64,10 @@ vsh_result vshi_lit_open(vshi_lit_document *document, const char *path, const vs
                          vsh_error *error) {
     *document = (vshi_lit_document){.gltf = {.path = path, .run = run, .job = job}};
     vshi_gltf *gltf = &document->gltf;
-    size_t size, begin, length;
+    size_t size;
     VSHI_TRY(read_text(document, &size, error));
-    find_json(document->text, size, &begin, &length);
-    VSHI_TRY(vshi_gltf_hold(gltf, vshi_json_bytes(document->text + begin, length), error));
+    VSHI_TRY(vshi_gltf_hold(gltf, estimate_json_bytes(document->text, size), error));
     VSHI_TRY(vshi_gltf_open(gltf, document->text, size, error));
-    document->text_size = told_size(document->text, size);
     VSHI_TRY(check_lists(gltf, error));
     document->first_view = json_array_size(json_object_get(gltf->root, "bufferViews"));
     json_t *images = json_object_get(gltf->root, "images");
@@ -263,19 +249,42 @@ static const char *type_name(int components) {
     return components >= 1 && components <= 4 ? names[components - 1] : "MAT4";
 }
 
-static vsh_result add_bounds(const vshi_lit_document *document, json_t *accessor, const float *values,
-                             size_t count, size_t components, vsh_error *error) {
+static double component_at(const unsigned char *at, int type) {
+    int16_t two;
+    float number;
+    switch (type) {
+    case VSHI_GLTF_BYTE:
+        return (double)(int8_t)*at;
+    case VSHI_GLTF_SHORT:
+        memcpy(&two, at, sizeof two);
+        return (double)two;
+    case VSHI_GLTF_FLOAT:
+        memcpy(&number, at, sizeof number);
+        return (double)number;
+    default:
+        return (double)vshi_gltf_integer_at(at, type);
+    }
+}
+
+static json_t *number(double value, int type) {
+    return type == VSHI_GLTF_FLOAT ? json_real(value) : json_integer((json_int_t)value);
+}
+
+vsh_result vshi_lit_set_bounds(const vshi_lit_document *document, json_t *accessor,
+                               const vshi_gltf_accessor *values, vsh_error *error) {
     json_t *low = json_array(), *high = json_array();
+    const size_t each = vshi_gltf_component_size(values->type);
     bool good = low != NULL && high != NULL;
-    for (size_t c = 0; good && c < components; ++c) {
-        float least = values[c], most = values[c];
-        for (size_t i = 1; i < count; ++i) {
-            const float value = values[components * i + c];
+    for (int c = 0; good && c < values->components; ++c) {
+        const unsigned char *at = values->at + (size_t)c * each;
+        double least = component_at(at, values->type), most = least;
+        for (size_t i = 1; i < values->count; ++i) {
+            const double value = component_at(at + i * values->stride, values->type);
             least = value < least ? value : least;
             most = value > most ? value : most;
         }
-        good = json_array_append_new(low, json_real((double)least)) == 0 &&
-               json_array_append_new(high, json_real((double)most)) == 0;
+        good = json_array_append_new(low, number(least, values->type)) == 0 &&
+               json_array_append_new(high, number(most, values->type)) == 0;
     }
     const bool first = json_object_set_new(accessor, "min", low) == 0;
     const bool second = json_object_set_new(accessor, "max", high) == 0;
@@ -295,7 +304,12 @@ vsh_result vshi_lit_add_floats(vshi_lit_document *document, const float *values,
         return vshi_lit_no_memory(document, error);
     }
     if (bounds && count > 0) {
-        const vsh_result result = add_bounds(document, made, values, count, (size_t)components, error);
+        const vshi_gltf_accessor added = {.count = count,
+                                          .components = components,
+                                          .type = VSHI_GLTF_FLOAT,
+                                          .at = (const unsigned char *)values,
+                                          .stride = (size_t)components * sizeof *values};
+        const vsh_result result = vshi_lit_set_bounds(document, made, &added, error);
         if (result != VSH_OK) {
             json_decref(made);
             return result;

@@ -23,7 +23,6 @@ typedef struct vshi_lit_document {
     vshi_gltf
         gltf;   /* path, root, buffers: as they were read; arrays of the root only grow until it is written */
     char *text; /* of the file: the binary chunk lies in it. NULL: made of a model */
-    size_t text_size; /* as far as a GLB says */
     vshi_lit_bytes added;
     size_t first_view;       /* buffer views from this one on lie in `added` */
     bool *replaced;          /* [first_view]: views in front of it that do too; NULL: none */
@@ -84,6 +83,10 @@ enum { VSHI_LIT_VERTICES = 34962, VSHI_LIT_INDICES = 34963 };
  */
 vsh_result vshi_lit_add_floats(vshi_lit_document *document, const float *values, size_t count, int components,
                                bool bounds, size_t *accessor, size_t *offset, vsh_error *error);
+
+/* Sets an accessor's least and largest values. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_lit_set_bounds(const vshi_lit_document *document, json_t *accessor,
+                               const vshi_gltf_accessor *values, vsh_error *error);
 
 /* Adds indices below `vertex_count`, as shorts where that lets. */
 vsh_result vshi_lit_add_indices(vshi_lit_document *document, const uint32_t *indices, size_t count,

@@ -502,7 +502,7 @@ static vsh_result make(vshi_lit_work *work, vshi_lit_shape *shape, const json_t 
         VSHI_TRY(vshi_lit_mark_primitive(work, made, only, set, NULL, error));
         return json_array_append(list, made) == 0 ? VSH_OK : vshi_lit_no_memory(document, error);
     }
-    if (shape->topology.mode != VSHI_LIT_TRIANGLES || shape->topology.draco != NULL) {
+    if (shape->topology.mode != VSHI_GLTF_TRIANGLES || shape->topology.draco != NULL) {
         json_object_del(made, "mode");
     }
     return v->split ? vshi_lit_pages_make(work, made, mesh, mesh->indices, mesh->vertex_count, set,

@@ -6,75 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The elements that a primitive draws, in its order, in new memory. */
-static vsh_result read_order(vshi_lit_document *document, const json_t *primitive, size_t element_count,
-                             const char *where, uint32_t **order, size_t *count, vsh_error *error) {
-    vshi_gltf *gltf = &document->gltf;
-    vshi_gltf_accessor accessor = {.count = element_count};
-    size_t index;
-    VSHI_TRY(vshi_gltf_index(gltf, primitive, "indices", "accessors", where, &index, error));
-    if (index != SIZE_MAX) {
-        VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
-        if (accessor.components != 1 ||
-            (accessor.type != VSHI_GLTF_UBYTE && accessor.type != VSHI_GLTF_USHORT &&
-             accessor.type != VSHI_GLTF_UINT)) {
-            return vshi_gltf_fail(gltf, error, "%s: its indices are no unsigned numbers", where);
-        }
-    }
-    *count = accessor.count;
-    VSHI_TRY(vshi_gltf_take(gltf, (void **)order, accessor.count, sizeof **order, error));
-    if (index != SIZE_MAX) {
-        vshi_gltf_accessor_integers(&accessor, *order);
-    }
-    for (size_t i = 0; i < accessor.count; ++i) {
-        (*order)[i] = index == SIZE_MAX ? (uint32_t)i : (*order)[i];
-        if ((*order)[i] >= element_count) {
-            return vshi_gltf_fail(gltf, error, "%s: index %zu is %u, but there are only %zu vertices", where,
-                                  i, (*order)[i], element_count);
-        }
-    }
-    return VSH_OK;
-}
-
-/* Triangle i (glTF 2.0, 3.7.2.1). */
-static void pick(size_t mode, const uint32_t *order, size_t i, uint32_t corner[3]) {
-    if (mode == VSHI_LIT_STRIP) {
-        corner[0] = order[i];
-        corner[1] = order[i + 1 + i % 2];
-        corner[2] = order[i + 2 - i % 2];
-    } else if (mode == VSHI_LIT_FAN) {
-        corner[0] = order[i + 1];
-        corner[1] = order[i + 2];
-        corner[2] = order[0];
-    } else {
-        memcpy(corner, order + 3 * i, 3 * sizeof *corner);
-    }
-}
-
-/* The triangles that the order draws, as corners[*count][3], over the order itself: those of strips that have
- * fewer than three vertices are left out, as the model leaves them out. */
-static vsh_result list_triangles(vshi_lit_document *document, size_t mode, size_t drawn, uint32_t **order,
-                                 size_t *count, vsh_error *error) {
-    if (mode == VSHI_LIT_TRIANGLES) {
-        *count = drawn / 3;
-        return VSH_OK;
-    }
-    const size_t most = drawn >= 3 ? drawn - 2 : 0;
-    uint32_t *corners = NULL;
-    *count = 0;
-    VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)&corners, most + 1, 3 * sizeof *corners, error));
-    for (size_t i = 0; i < most; ++i) {
-        uint32_t corner[3];
-        pick(mode, *order, i, corner);
-        if (corner[0] != corner[1] && corner[1] != corner[2] && corner[2] != corner[0]) {
-            memcpy(corners + 3 * (*count)++, corner, sizeof corner);
-        }
-    }
-    free(*order);
-    *order = corners;
-    return VSH_OK;
-}
-
 static vsh_result fail_other(const vshi_lit_document *document, const char *where, vsh_error *error) {
     return vshi_gltf_fail(&document->gltf, error,
                           "%s: is not what the model was made of: the file has changed since", where);
@@ -116,7 +47,7 @@ done:
 static vsh_result find_plain(vshi_lit_document *document, const json_t *primitive, const char *where,
                              const vsh_mesh *mesh, vshi_lit_topology *topology, vsh_error *error) {
     vshi_gltf *gltf = &document->gltf;
-    size_t index, drawn = 0, count = 0;
+    size_t index, count = 0;
     vshi_gltf_accessor positions;
     VSHI_TRY(vshi_gltf_index(gltf, json_object_get(primitive, "attributes"), "POSITION", "accessors", where,
                              &index, error));
@@ -125,13 +56,13 @@ static vsh_result find_plain(vshi_lit_document *document, const json_t *primitiv
     }
     VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &positions, error));
     topology->element_count = positions.count;
-    uint32_t *order = NULL;
+    uint32_t *corners = NULL;
     vsh_result result;
-    VSHI_TRY_DONE(read_order(document, primitive, positions.count, where, &order, &drawn, error));
-    VSHI_TRY_DONE(list_triangles(document, topology->mode, drawn, &order, &count, error));
-    VSHI_TRY_DONE(match(document, order, count, where, mesh, topology, error));
+    VSHI_TRY_DONE(vshi_gltf_read_triangles(gltf, primitive, topology->mode, positions.count, where, &corners,
+                                           &count, error));
+    VSHI_TRY_DONE(match(document, corners, count, where, mesh, topology, error));
 done:
-    free(order);
+    free(corners);
     return result;
 }
 
@@ -139,14 +70,14 @@ vsh_result vshi_lit_topology_find(vshi_lit_document *document, const json_t *pri
                                   const vshi_lit_draco *draco, const vsh_mesh *mesh,
                                   vshi_lit_topology *topology, vsh_error *error) {
     *topology = (vshi_lit_topology){.draco = draco};
-    if (!vshi_gltf_count(primitive, "mode", VSHI_LIT_TRIANGLES, &topology->mode) ||
-        topology->mode < VSHI_LIT_TRIANGLES || topology->mode > VSHI_LIT_FAN) {
+    if (!vshi_gltf_count(primitive, "mode", VSHI_GLTF_TRIANGLES, &topology->mode) ||
+        topology->mode < VSHI_GLTF_TRIANGLES || topology->mode > VSHI_GLTF_FAN) {
         return fail_other(document, where, error);
     }
     if (draco == NULL) {
         return find_plain(document, primitive, where, mesh, topology, error);
     }
-    topology->mode = VSHI_LIT_TRIANGLES; /* whatever the primitive says: Draco's are lists */
+    topology->mode = VSHI_GLTF_TRIANGLES; /* whatever the primitive says: Draco's are lists */
     topology->element_count = draco->vertex_count;
     return match(document, draco->indices, draco->triangle_count, where, mesh, topology, error);
 }
@@ -161,101 +92,43 @@ void vshi_lit_gathered_free(vshi_lit_gathered *gathered) {
     *gathered = (vshi_lit_gathered){.list = NULL};
 }
 
-/* --- where elements lie */
-
-typedef struct element_array {
-    const unsigned char *at; /* NULL: all are zeros */
-    size_t stride, size;     /* bytes; of an element */
-    int components, type;
-    unsigned char *owned; /* of a sparse one: made dense; may be NULL */
-} element_array;
-
-static vsh_result make_dense(vshi_lit_document *document, const vshi_gltf_accessor *accessor,
-                             element_array *made, vsh_error *error) {
-    VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)&made->owned, accessor->count, made->size, error));
+/* A sparse accessor becomes dense, in new memory. */
+static vsh_result make_dense(vshi_lit_document *document, vshi_gltf_accessor *accessor, size_t size,
+                             unsigned char **dense, vsh_error *error) {
+    VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)dense, accessor->count, size, error));
     for (size_t i = 0; i < accessor->count && accessor->at != NULL; ++i) {
-        memcpy(made->owned + i * made->size, accessor->at + i * accessor->stride, made->size);
+        memcpy(*dense + i * size, accessor->at + i * accessor->stride, size);
     }
     const size_t index_size = vshi_gltf_component_size(accessor->sparse_type);
     for (size_t i = 0; i < accessor->sparse_count; ++i) {
         const size_t index =
             vshi_gltf_integer_at(accessor->sparse_at + i * index_size, accessor->sparse_type);
-        memcpy(made->owned + index * made->size, accessor->sparse_values + i * made->size, made->size);
+        memcpy(*dense + index * size, accessor->sparse_values + i * size, size);
     }
-    made->at = made->owned;
-    made->stride = made->size;
+    accessor->at = *dense;
+    accessor->stride = size;
     return VSH_OK;
 }
 
 static vsh_result find_elements(vshi_lit_document *document, size_t index, size_t element_count,
                                 const vshi_lit_draco_attribute *draco, const char *where,
-                                element_array *found, vsh_error *error) {
-    vshi_gltf_accessor accessor;
-    *found = (element_array){.at = NULL};
-    VSHI_TRY(vshi_gltf_accessor_open(&document->gltf, index, &accessor, error));
+                                vshi_gltf_accessor *found, unsigned char **dense, vsh_error *error) {
+    VSHI_TRY(vshi_gltf_accessor_open(&document->gltf, index, found, error));
+    const size_t size = (size_t)found->components * vshi_gltf_component_size(found->type);
     if (draco != NULL) {
-        const size_t size = (size_t)draco->components * vshi_gltf_component_size(draco->type);
-        if (draco->type != accessor.type || draco->components != accessor.components) {
-            return vshi_gltf_fail(&document->gltf, error, "%s: accessors[%zu] is not what was decompressed",
-                                  where, index);
-        }
-        *found = (element_array){draco->values, size, size, draco->components, draco->type, NULL};
-        return VSH_OK;
+        found->at = draco->values;
+        found->stride = size;
+        return draco->type == found->type && draco->components == found->components
+                   ? VSH_OK
+                   : vshi_gltf_fail(&document->gltf, error, "%s: accessors[%zu] is not what was decompressed",
+                                    where, index);
     }
-    if (accessor.count != element_count) {
+    if (found->count != element_count) {
         return vshi_gltf_fail(&document->gltf, error, "%s: accessors[%zu] has %zu elements for %zu vertices",
-                              where, index, accessor.count, element_count);
+                              where, index, found->count, element_count);
     }
-    const size_t size = (size_t)accessor.components * vshi_gltf_component_size(accessor.type);
-    *found = (element_array){accessor.at, accessor.stride, size, accessor.components, accessor.type, NULL};
-    return accessor.sparse_count > 0 ? make_dense(document, &accessor, found, error) : VSH_OK;
+    return found->sparse_count > 0 ? make_dense(document, found, size, dense, error) : VSH_OK;
 }
-
-/* --- least and largest values, as they stand in the buffer */
-
-static double component_at(const unsigned char *at, int type) {
-    int16_t two;
-    float number;
-    switch (type) {
-    case VSHI_GLTF_BYTE:
-        return (double)(int8_t)*at;
-    case VSHI_GLTF_SHORT:
-        memcpy(&two, at, sizeof two);
-        return (double)two;
-    case VSHI_GLTF_FLOAT:
-        memcpy(&number, at, sizeof number);
-        return (double)number;
-    default:
-        return (double)vshi_gltf_integer_at(at, type);
-    }
-}
-
-static json_t *number(double value, int type) {
-    return type == VSHI_GLTF_FLOAT ? json_real(value) : json_integer((json_int_t)value);
-}
-
-static vsh_result set_bounds(const vshi_lit_document *document, json_t *accessor, const unsigned char *at,
-                             size_t stride, size_t count, const element_array *from, vsh_error *error) {
-    json_t *low = json_array(), *high = json_array();
-    const size_t each = vshi_gltf_component_size(from->type);
-    bool good = low != NULL && high != NULL;
-    for (int c = 0; good && c < from->components; ++c) {
-        const size_t offset = (size_t)c * each;
-        double least = component_at(at + offset, from->type), most = least;
-        for (size_t i = 1; i < count; ++i) {
-            const double value = component_at(at + i * stride + offset, from->type);
-            least = value < least ? value : least;
-            most = value > most ? value : most;
-        }
-        good = json_array_append_new(low, number(least, from->type)) == 0 &&
-               json_array_append_new(high, number(most, from->type)) == 0;
-    }
-    const bool first = json_object_set_new(accessor, "min", low) == 0;
-    const bool second = json_object_set_new(accessor, "max", high) == 0;
-    return good && first && second ? VSH_OK : vshi_lit_no_memory(document, error);
-}
-
-/* --- gathering */
 
 static vsh_result describe(vshi_lit_document *document, size_t index, size_t view, size_t count,
                            json_t **made, vsh_error *error) {
@@ -269,25 +142,28 @@ static vsh_result describe(vshi_lit_document *document, size_t index, size_t vie
     return vshi_lit_set_number(document, *made, "count", count, error);
 }
 
-static vsh_result copy(vshi_lit_document *document, size_t index, const element_array *from,
+static vsh_result copy(vshi_lit_document *document, size_t index, const vshi_gltf_accessor *from,
                        const uint32_t *chosen, size_t count, bool bounds, size_t *accessor,
                        vsh_error *error) {
-    const size_t stride = (from->size + 3) & ~(size_t)3; /* of vertex attributes: a multiple of 4 */
+    const size_t size = (size_t)from->components * vshi_gltf_component_size(from->type);
+    const size_t stride = (size + 3) & ~(size_t)3; /* of vertex attributes: a multiple of 4 */
     size_t bytes, view, offset;
     if (__builtin_mul_overflow(count, stride, &bytes)) {
         return vshi_lit_no_memory(document, error);
     }
-    VSHI_TRY(vshi_lit_add_view(document, NULL, bytes, VSHI_LIT_VERTICES, stride != from->size ? stride : 0,
-                               &view, &offset, error));
+    VSHI_TRY(vshi_lit_add_view(document, NULL, bytes, VSHI_LIT_VERTICES, stride != size ? stride : 0, &view,
+                               &offset, error));
     unsigned char *to = document->added.at + offset;
     for (size_t i = 0; i < count && from->at != NULL; ++i) {
-        memcpy(to + i * stride, from->at + chosen[i] * from->stride, from->size);
+        memcpy(to + i * stride, from->at + chosen[i] * from->stride, size);
     }
     json_t *made = NULL;
     vsh_result result = describe(document, index, view, count, &made, error);
     const bool had = json_object_get(made, "min") != NULL || json_object_get(made, "max") != NULL;
     if (result == VSH_OK && (bounds || had) && count > 0) {
-        result = set_bounds(document, made, to, stride, count, from, error);
+        const vshi_gltf_accessor copied = {
+            .count = count, .components = from->components, .type = from->type, .at = to, .stride = stride};
+        result = vshi_lit_set_bounds(document, made, &copied, error);
     }
     if (result != VSH_OK) {
         json_decref(made);
@@ -306,15 +182,16 @@ vsh_result vshi_lit_gather(vshi_lit_document *document, size_t index, size_t ele
             return VSH_OK;
         }
     }
-    element_array from;
+    vshi_gltf_accessor from;
+    unsigned char *dense = NULL;
     vsh_result result;
-    VSHI_TRY_DONE(find_elements(document, index, element_count, draco, where, &from, error));
+    VSHI_TRY_DONE(find_elements(document, index, element_count, draco, where, &from, &dense, error));
     VSHI_TRY_DONE(copy(document, index, &from, chosen, count, bounds, accessor, error));
     VSHI_TRY_DONE(vshi_lit_grow(document, &gathered->list, gathered->count, &gathered->capacity,
                                 sizeof *gathered->list, error));
     gathered->list[gathered->count++] = (vshi_lit_copy){index, *accessor};
 done:
-    free(from.owned);
+    free(dense);
     return result;
 }
 

@@ -7,11 +7,9 @@
 
 /* --- vertices (vertices.c) */
 
-enum { VSHI_LIT_TRIANGLES = 4, VSHI_LIT_STRIP = 5, VSHI_LIT_FAN = 6 };
-
 /* A primitive of the document: which elements of its accessors are the vertices of the model's mesh. */
 typedef struct vshi_lit_topology {
-    size_t mode;                 /* VSHI_LIT_… */
+    size_t mode;                 /* VSHI_GLTF_TRIANGLES … */
     size_t element_count;        /* of each attribute's accessor */
     size_t vertex_count;         /* of the model's mesh */
     uint32_t *elements;          /* [vertex_count] of each vertex, increasing */

@@ -1,4 +1,5 @@
 /* A lit document into its files. */
+#include "base/bytes.h"
 #include "base/decimal.h"
 #include "base/file.h"
 #include "lit/work.h"
@@ -354,14 +355,15 @@ static void put_buffers(output_file *file, const vshi_lit_document *document, co
 
 /* Chunks behind the first two, of whatever kind, as they stand in the input. */
 static void find_rest(const vshi_lit_document *document, const unsigned char **rest, uint64_t *size) {
-    enum { CHUNK = 8 };
+    enum { LENGTH = 8, CHUNK = 8 };
     const vshi_gltf_bytes *chunk = &document->gltf.chunk;
     *rest = NULL;
     *size = 0;
     if (!document->gltf.binary || document->text == NULL) { // of an OBJ there is none
         return;
     }
-    const unsigned char *end = (const unsigned char *)document->text + document->text_size;
+    const unsigned char *end =
+        (const unsigned char *)document->text + vshi_bytes_number(document->text + LENGTH, 4, false);
     if (end < chunk->at) {
         return;
     }

@@ -164,6 +164,16 @@ typedef struct vshi_gltf_pose {
 vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
                                     const char *where, vshi_model_shape *shape, vsh_error *error);
 
+/* Modes of primitives that are triangles. */
+enum { VSHI_GLTF_TRIANGLES = 4, VSHI_GLTF_STRIP = 5, VSHI_GLTF_FAN = 6 };
+
+/* Reads the corners of a primitive's triangles, each < `vertex_count`, into new memory; *corners is to be
+ * freed after a failure too. Strips and fans become lists, without the triangles of fewer than three vertices
+ * that join strips. */
+vsh_result vshi_gltf_read_triangles(vshi_gltf *gltf, const json_t *primitive, size_t mode,
+                                    size_t vertex_count, const char *where, uint32_t **corners,
+                                    size_t *triangle_count, vsh_error *error);
+
 /* Reads an attribute of `components` floats that has an element a vertex, into new memory. */
 vsh_result vshi_gltf_read_attribute(vshi_gltf *gltf, const json_t *attributes, const char *name,
                                     int components, size_t vertex_count, const char *where, float **values,

@@ -7,8 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MODE_TRIANGLES = 4, MODE_STRIP = 5, MODE_FAN = 6 };
-
 vsh_result vshi_gltf_read_attribute(vshi_gltf *gltf, const json_t *attributes, const char *name,
                                     int components, size_t vertex_count, const char *where, float **values,
                                     vsh_error *error) {
@@ -131,7 +129,7 @@ static vsh_result read_order(vshi_gltf *gltf, const json_t *primitive, size_t ve
 
 /* Triangle i of a strip or a fan (glTF 2.0, 3.7.2.1). */
 static void pick(size_t mode, const uint32_t *order, size_t i, uint32_t corner[3]) {
-    if (mode == MODE_STRIP) {
+    if (mode == VSHI_GLTF_STRIP) {
         corner[0] = order[i];
         corner[1] = order[i + 1 + i % 2];
         corner[2] = order[i + 2 - i % 2];
@@ -142,21 +140,26 @@ static void pick(size_t mode, const uint32_t *order, size_t i, uint32_t corner[3
     }
 }
 
-/* Strips and fans, whose `count` indices become those of triangles; triangles of fewer than three vertices,
- * by which strips are joined, are left out. */
-static vsh_result unroll(vshi_gltf *gltf, size_t mode, size_t count, vshi_model_shape *shape,
-                         vsh_error *error) {
+vsh_result vshi_gltf_read_triangles(vshi_gltf *gltf, const json_t *primitive, size_t mode,
+                                    size_t vertex_count, const char *where, uint32_t **corners,
+                                    size_t *triangle_count, vsh_error *error) {
+    size_t count = 0;
     uint32_t *triangles;
+    VSHI_TRY(read_order(gltf, primitive, vertex_count, where, corners, &count, error));
+    *triangle_count = mode == VSHI_GLTF_TRIANGLES ? count / 3 : 0;
+    if (mode == VSHI_GLTF_TRIANGLES || count < 3) {
+        return VSH_OK;
+    }
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&triangles, count, sizeof(uint32_t[3]), error));
     for (size_t i = 0; i + 2 < count; ++i) {
         uint32_t corner[3];
-        pick(mode, shape->indices, i, corner);
+        pick(mode, *corners, i, corner);
         if (corner[0] != corner[1] && corner[1] != corner[2] && corner[2] != corner[0]) {
-            memcpy(triangles + 3 * shape->triangle_count++, corner, sizeof corner);
+            memcpy(triangles + 3 * (*triangle_count)++, corner, sizeof corner);
         }
     }
-    free(shape->indices);
-    shape->indices = triangles;
+    free(*corners);
+    *corners = triangles;
     return VSH_OK;
 }
 
@@ -164,7 +167,6 @@ static vsh_result read_plain(vshi_gltf *gltf, const json_t *primitive, size_t mo
                              vshi_model_shape *shape, vsh_error *error) {
     size_t index;
     vshi_gltf_accessor accessor;
-    size_t count = 0;
     VSHI_TRY(vshi_gltf_index(gltf, json_object_get(primitive, "attributes"), "POSITION", "accessors", where,
                              &index, error));
     if (index == SIZE_MAX) {
@@ -172,12 +174,8 @@ static vsh_result read_plain(vshi_gltf *gltf, const json_t *primitive, size_t mo
     }
     VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
     shape->vertex_count = accessor.count;
-    VSHI_TRY(read_order(gltf, primitive, accessor.count, where, &shape->indices, &count, error));
-    if (mode == MODE_TRIANGLES) {
-        shape->triangle_count = count / 3;
-    } else if (count >= 3) {
-        VSHI_TRY(unroll(gltf, mode, count, shape, error));
-    }
+    VSHI_TRY(vshi_gltf_read_triangles(gltf, primitive, mode, accessor.count, where, &shape->indices,
+                                      &shape->triangle_count, error));
     return shape->triangle_count > 0 ? read_vertices(gltf, primitive, where, shape, error) : VSH_OK;
 }
 
@@ -311,14 +309,14 @@ static void set_material(const vshi_gltf *gltf, const json_t *primitive, vshi_mo
 vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
                                     const char *where, vshi_model_shape *shape, vsh_error *error) {
     size_t mode;
-    if (!vshi_gltf_count(primitive, "mode", MODE_TRIANGLES, &mode) || mode > MODE_FAN) {
+    if (!vshi_gltf_count(primitive, "mode", VSHI_GLTF_TRIANGLES, &mode) || mode > VSHI_GLTF_FAN) {
         return vshi_gltf_fail(gltf, error, "%s: its mode is none", where);
     }
-    if (mode < MODE_TRIANGLES) {
+    if (mode < VSHI_GLTF_TRIANGLES) {
         return VSH_OK; /* points or lines */
     }
     const json_t *draco = vshi_gltf_extension(primitive, "KHR_draco_mesh_compression");
-    if (draco == NULL && mode == MODE_TRIANGLES) {
+    if (draco == NULL && mode == VSHI_GLTF_TRIANGLES) {
         VSHI_TRY(leave_raw(gltf, primitive, pose, where, shape, error));
     }
     if (shape->raw == NULL) {
