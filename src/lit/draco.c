@@ -1,7 +1,6 @@
 #include "lit/draco.h"
 
 #include "base/memory.h"
-#include "extern/importers.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -75,28 +74,12 @@ static vsh_result take_attribute(vshi_lit_document *document, const vshi_draco *
                                 where, id, accessor.components);
 }
 
-static vsh_result take_indices(vshi_lit_document *document, const vshi_draco *mesh, const char *where,
-                               vshi_lit_draco *draco, vsh_error *error) {
-    draco->vertex_count = mesh->vertex_count;
-    draco->triangle_count = mesh->triangle_count;
-    VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)&draco->indices, draco->triangle_count,
-                                sizeof(uint32_t[3]), error));
-    if (draco->triangle_count > 0) {
-        vshi_importers()->draco_indices(mesh, draco->indices);
-    }
-    for (size_t i = 0; i < 3 * draco->triangle_count; ++i) {
-        if (draco->indices[i] >= draco->vertex_count) {
-            return vshi_gltf_fail(&document->gltf, error, "%s: its Draco data uses vertex %u of %zu", where,
-                                  draco->indices[i], draco->vertex_count);
-        }
-    }
-    return VSH_OK;
-}
-
 static vsh_result take(vshi_lit_document *document, const vshi_draco *mesh, json_t *primitive,
                        const char *where, vshi_lit_draco *draco, vsh_error *error) {
     json_t *names = json_object_get(vshi_gltf_extension(primitive, extension_name), "attributes");
-    VSHI_TRY(take_indices(document, mesh, where, draco, error));
+    draco->vertex_count = mesh->vertex_count;
+    draco->triangle_count = mesh->triangle_count;
+    VSHI_TRY(vshi_gltf_draco_indices(&document->gltf, mesh, where, &draco->indices, error));
     VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)&draco->attributes, json_object_size(names),
                                 sizeof *draco->attributes, error));
     const char *name;
@@ -110,20 +93,11 @@ static vsh_result take(vshi_lit_document *document, const vshi_draco *mesh, json
 
 static vsh_result decode(vshi_lit_document *document, json_t *primitive, vshi_lit_draco *draco,
                          vsh_error *error) {
-    vshi_gltf *gltf = &document->gltf;
     char where[96];
     snprintf(where, sizeof where, "meshes[%zu].primitives[%zu]", draco->mesh, draco->primitive);
-    vshi_gltf_bytes bytes;
-    size_t view, stride;
-    VSHI_TRY(vshi_gltf_index(gltf, vshi_gltf_extension(primitive, extension_name), "bufferView",
-                             "bufferViews", where, &view, error));
-    if (view == SIZE_MAX) {
-        return vshi_gltf_fail(gltf, error, "%s: its Draco data has no buffer view", where);
-    }
-    VSHI_TRY(vshi_gltf_view(gltf, view, &bytes, &stride, error));
     vshi_draco *mesh = NULL;
-    VSHI_TRY(vshi_importers_load(error));
-    VSHI_TRY(vshi_importers()->draco_decode(bytes.at, bytes.size, gltf->path, &mesh, error));
+    VSHI_TRY(vshi_gltf_decode_draco(&document->gltf, vshi_gltf_extension(primitive, extension_name), where,
+                                    &mesh, error));
     const vsh_result result = take(document, mesh, primitive, where, draco, error);
     vshi_importers()->draco_free(mesh);
     return result;

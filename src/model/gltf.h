@@ -5,6 +5,7 @@
 #define VSHI_CASTER_GLTF_H
 
 #include "base/try.h"
+#include "extern/importers.h"
 #include "model/model.h"
 
 #include <jansson.h>
@@ -182,6 +183,14 @@ vsh_result vshi_gltf_read_attribute(vshi_gltf *gltf, const json_t *attributes, c
 /* Moves positions (and normals) to where the pose has them. */
 vsh_result vshi_gltf_apply_pose(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
                                 const char *where, vshi_model_shape *shape, vsh_error *error);
+
+/* Decodes the data of KHR_draco_mesh_compression, for vshi_importers()->draco_free(). */
+vsh_result vshi_gltf_decode_draco(vshi_gltf *gltf, const json_t *extension, const char *where,
+                                  vshi_draco **mesh, vsh_error *error);
+
+/* Copies the corners of the decoded triangles, each < vertex_count, into new memory. */
+vsh_result vshi_gltf_draco_indices(vshi_gltf *gltf, const vshi_draco *mesh, const char *where,
+                                   uint32_t **indices, vsh_error *error);
 
 /* The same of a primitive under KHR_draco_mesh_compression: fills positions, normals, UVs and indices. */
 vsh_result vshi_gltf_read_draco(vshi_gltf *gltf, const json_t *extension, const char *where,

@@ -2,7 +2,6 @@
 #include "model/gltf.h"
 
 #include "base/memory.h"
-#include "extern/importers.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,18 +26,19 @@ static vsh_result take_attribute(vshi_gltf *gltf, const vshi_draco *mesh, const 
     return VSH_OK;
 }
 
-static vsh_result take_indices(vshi_gltf *gltf, const vshi_draco *mesh, const char *where,
-                               vshi_model_shape *shape, vsh_error *error) {
+vsh_result vshi_gltf_draco_indices(vshi_gltf *gltf, const vshi_draco *mesh, const char *where,
+                                   uint32_t **indices, vsh_error *error) {
     const size_t count = mesh->triangle_count;
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&shape->indices, count, sizeof(uint32_t[3]), error));
-    vshi_importers()->draco_indices(mesh, shape->indices);
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)indices, count, sizeof(uint32_t[3]), error));
+    if (count > 0) {
+        vshi_importers()->draco_indices(mesh, *indices);
+    }
     for (size_t i = 0; i < 3 * count; ++i) {
-        if (shape->indices[i] >= shape->vertex_count) {
+        if ((*indices)[i] >= mesh->vertex_count) {
             return vshi_gltf_fail(gltf, error, "%s: its Draco data uses vertex %u of %zu", where,
-                                  shape->indices[i], shape->vertex_count);
+                                  (*indices)[i], mesh->vertex_count);
         }
     }
-    shape->triangle_count = count;
     return VSH_OK;
 }
 
@@ -56,13 +56,12 @@ static vsh_result take_mesh(vshi_gltf *gltf, const vshi_draco *mesh, const json_
         VSHI_TRY(take_attribute(gltf, mesh, attributes, name, 2, where, &shape->uvs[set], error));
         shape->uv_sets = shape->uvs[set] != NULL ? set + 1 : shape->uv_sets;
     }
-    return take_indices(gltf, mesh, where, shape, error);
+    shape->triangle_count = mesh->triangle_count;
+    return vshi_gltf_draco_indices(gltf, mesh, where, &shape->indices, error);
 }
 
-vsh_result vshi_gltf_read_draco(vshi_gltf *gltf, const json_t *extension, const char *where,
-                                vshi_model_shape *shape, vsh_error *error) {
-    const json_t *attributes = json_object_get(extension, "attributes");
-    vshi_draco *mesh = NULL;
+vsh_result vshi_gltf_decode_draco(vshi_gltf *gltf, const json_t *extension, const char *where,
+                                  vshi_draco **mesh, vsh_error *error) {
     vshi_gltf_bytes bytes;
     size_t view, stride;
     VSHI_TRY(vshi_gltf_index(gltf, extension, "bufferView", "bufferViews", where, &view, error));
@@ -71,8 +70,15 @@ vsh_result vshi_gltf_read_draco(vshi_gltf *gltf, const json_t *extension, const 
     }
     VSHI_TRY(vshi_gltf_view(gltf, view, &bytes, &stride, error));
     VSHI_TRY(vshi_importers_load(error));
-    VSHI_TRY(vshi_importers()->draco_decode(bytes.at, bytes.size, gltf->path, &mesh, error));
-    const vsh_result result = take_mesh(gltf, mesh, attributes, where, shape, error);
+    return vshi_importers()->draco_decode(bytes.at, bytes.size, gltf->path, mesh, error);
+}
+
+vsh_result vshi_gltf_read_draco(vshi_gltf *gltf, const json_t *extension, const char *where,
+                                vshi_model_shape *shape, vsh_error *error) {
+    vshi_draco *mesh = NULL;
+    VSHI_TRY(vshi_gltf_decode_draco(gltf, extension, where, &mesh, error));
+    const vsh_result result =
+        take_mesh(gltf, mesh, json_object_get(extension, "attributes"), where, shape, error);
     vshi_importers()->draco_free(mesh);
     return result;
 }

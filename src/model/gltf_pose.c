@@ -3,11 +3,9 @@
 #include "model/gltf.h"
 
 #include "base/memory.h"
-#include "base/vec.h"
 
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 static vsh_result add_target(vshi_gltf *gltf, const json_t *target, const char *name, double weight,
                              const char *where, size_t vertex_count, float *values, vsh_error *error) {
@@ -38,13 +36,9 @@ static vsh_result morph(vshi_gltf *gltf, const json_t *primitive, const vshi_glt
     return VSH_OK;
 }
 
-/* The sums of each vertex's joint matrices, and of its weights. */
-typedef struct blend {
-    double matrix[12], sum;
-} blend;
-
 static vsh_result add_joints(vshi_gltf *gltf, const vshi_gltf_pose *pose, size_t index, const float *weights,
-                             const char *where, size_t vertex_count, blend *blends, vsh_error *error) {
+                             const char *where, size_t vertex_count, vshi_model_blend *blends,
+                             vsh_error *error) {
     vshi_gltf_accessor accessor;
     VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
     if (accessor.components != 4 || (accessor.type != VSHI_GLTF_UBYTE && accessor.type != VSHI_GLTF_USHORT) ||
@@ -67,10 +61,7 @@ static vsh_result add_joints(vshi_gltf *gltf, const vshi_gltf_pose *pose, size_t
                                     where, i / 4, joints[i], pose->joint_count);
             goto done;
         }
-        blends[i / 4].sum += weight;
-        for (int k = 0; k < 12; ++k) {
-            blends[i / 4].matrix[k] += weight * pose->joints[joints[i]][k];
-        }
+        vshi_model_blend_add(&blends[i / 4], weight, pose->joints[joints[i]]);
     }
 done:
     free(joints);
@@ -78,7 +69,8 @@ done:
 }
 
 static vsh_result add_sets(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
-                           const char *where, size_t vertex_count, blend *blends, vsh_error *error) {
+                           const char *where, size_t vertex_count, vshi_model_blend *blends,
+                           vsh_error *error) {
     const json_t *attributes = json_object_get(primitive, "attributes");
     for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
         char name[32];
@@ -101,38 +93,14 @@ static vsh_result add_sets(vshi_gltf *gltf, const json_t *primitive, const vshi_
     return VSH_OK;
 }
 
-/* Weights that do not add up to 1 are scaled; a vertex without any follows the first joint. */
-static void finish(const vshi_gltf_pose *pose, blend *b) {
-    if (!(b->sum > 0.0)) {
-        memcpy(b->matrix, pose->joints[0], sizeof b->matrix);
-        return;
-    }
-    for (int k = 0; k < 12; ++k) {
-        b->matrix[k] /= b->sum;
-    }
-}
-
-static void store(vshi_vec v, float *to) {
-    to[0] = (float)v.x;
-    to[1] = (float)v.y;
-    to[2] = (float)v.z;
-}
-
+/* A vertex without weights follows the first joint. */
 static vsh_result skin(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
                        const char *where, vshi_model_shape *shape, vsh_error *error) {
-    blend *blends = NULL;
+    vshi_model_blend *blends = NULL;
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&blends, shape->vertex_count, sizeof *blends, error));
     vsh_result result;
     VSHI_TRY_DONE(add_sets(gltf, primitive, pose, where, shape->vertex_count, blends, error));
-    for (size_t v = 0; v < shape->vertex_count; ++v) {
-        finish(pose, &blends[v]);
-        const double *m = blends[v].matrix;
-        store(vshi_transform_point(m, vshi_vec_off(shape->positions + 3 * v)), shape->positions + 3 * v);
-        if (shape->normals != NULL) {
-            store(vshi_unit(vshi_transform_normal(m, vshi_vec_off(shape->normals + 3 * v))),
-                  shape->normals + 3 * v);
-        }
-    }
+    vshi_model_blend_move(shape, blends, pose->joints[0]);
 done:
     free(blends);
     return result;

@@ -147,6 +147,16 @@ vsh_result vshi_model_finish(const char *path, const vsh_run *run, const char *w
 vsh_result vshi_model_check_indices(const char *path, const char *where, const uint32_t *indices,
                                     size_t count, size_t vertex_count, vsh_error *error);
 
+/* A vertex's sums of weights, and of the weighted matrices that move it. */
+typedef struct vshi_model_blend {
+    double matrix[12], sum;
+} vshi_model_blend;
+
+void vshi_model_blend_add(vshi_model_blend *blend, double weight, const double matrix[12]);
+
+/* Moves each vertex v by blends[v], divided by its sum of weights; a vertex without any by `rest`. */
+void vshi_model_blend_move(vshi_model_shape *shape, const vshi_model_blend *blends, const double rest[12]);
+
 /* world = parent × own. */
 void vshi_model_compose(const double parent[12], const double own[12], double world[12]);
 

@@ -1,6 +1,7 @@
 /* Entries of a model: what stands where, and under which name. */
 #include "base/memory.h"
 #include "base/try.h"
+#include "base/vec.h"
 #include "mesh/mesh.h"
 #include "model/model.h"
 
@@ -53,6 +54,34 @@ void vshi_model_compose(const double parent[12], const double own[12], double wo
                 sum += parent[4 * row + k] * own[4 * k + column];
             }
             world[4 * row + column] = sum;
+        }
+    }
+}
+
+void vshi_model_blend_add(vshi_model_blend *blend, double weight, const double matrix[12]) {
+    blend->sum += weight;
+    for (int k = 0; k < 12; ++k) {
+        blend->matrix[k] += weight * matrix[k];
+    }
+}
+
+static void store(vshi_vec v, float *to) {
+    to[0] = (float)v.x;
+    to[1] = (float)v.y;
+    to[2] = (float)v.z;
+}
+
+void vshi_model_blend_move(vshi_model_shape *shape, const vshi_model_blend *blends, const double rest[12]) {
+    for (size_t v = 0; v < shape->vertex_count; ++v) {
+        double m[12];
+        for (int k = 0; k < 12; ++k) {
+            m[k] = blends[v].sum > 0.0 ? blends[v].matrix[k] / blends[v].sum : rest[k];
+        }
+        float *p = shape->positions + 3 * v;
+        store(vshi_transform_point(m, vshi_vec_off(p)), p);
+        if (shape->normals != NULL) {
+            float *n = shape->normals + 3 * v;
+            store(vshi_unit(vshi_transform_normal(m, vshi_vec_off(n))), n);
         }
     }
 }

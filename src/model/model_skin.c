@@ -65,13 +65,8 @@ static vsh_result find_nodes(vshi_skins *skins, vsh_error *error) {
     return VSH_OK;
 }
 
-/* The sums of a vertex's matrices, and of its weights. */
-typedef struct blend {
-    double matrix[12], sum;
-} blend;
-
 static vsh_result add_bone(const vshi_skins *skins, const struct aiBone *bone, size_t vertex_count,
-                           blend *blends, vsh_error *error) {
+                           vshi_model_blend *blends, vsh_error *error) {
     const char *path = skins->source->path;
     const skin_node wanted = {.name = bone->mName.data};
     const skin_node *node = bsearch(&wanted, skins->nodes, skins->node_count, sizeof *skins->nodes, by_name);
@@ -87,37 +82,17 @@ static vsh_result add_bone(const vshi_skins *skins, const struct aiBone *bone, s
             return vshi_fail(error, VSH_ERROR_INPUT, "%s: bone '%s': weight %u is %g of vertex %u of %zu",
                              path, bone->mName.data, i, (double)given.mWeight, given.mVertexId, vertex_count);
         }
-        blend *b = &blends[given.mVertexId];
-        b->sum += (double)given.mWeight;
-        for (int k = 0; k < 12; ++k) {
-            b->matrix[k] += (double)given.mWeight * moved[k];
-        }
+        vshi_model_blend_add(&blends[given.mVertexId], (double)given.mWeight, moved);
     }
     return VSH_OK;
 }
 
-static void store(vshi_vec v, float *to) {
-    to[0] = (float)v.x;
-    to[1] = (float)v.y;
-    to[2] = (float)v.z;
-}
-
-static vsh_result move(const vshi_skins *skins, vshi_model_shape *shape, const double world[12],
-                       blend *blends, vsh_error *error) {
+static vsh_result check_positions(const vshi_skins *skins, const vshi_model_shape *shape, vsh_error *error) {
     for (size_t v = 0; v < shape->vertex_count; ++v) {
-        blend *b = &blends[v];
-        for (int k = 0; k < 12; ++k) {
-            b->matrix[k] = b->sum > 0.0 ? b->matrix[k] / b->sum : world[k];
-        }
-        float *p = shape->positions + 3 * v;
-        store(vshi_transform_point(b->matrix, vshi_vec_off(p)), p);
+        const float *p = shape->positions + 3 * v;
         if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2])) {
             return vshi_fail(error, VSH_ERROR_INPUT, "%s: bones move vertex %zu of %zu beyond every number",
                              skins->source->path, v, shape->vertex_count);
-        }
-        if (shape->normals != NULL) {
-            float *n = shape->normals + 3 * v;
-            store(vshi_unit(vshi_transform_normal(b->matrix, vshi_vec_off(n))), n);
         }
     }
     return VSH_OK;
@@ -133,14 +108,15 @@ vsh_result vshi_skins_apply(vshi_skins *skins, size_t mesh, vshi_model_shape *sh
         return VSH_OK;
     }
     skins->done[mesh] = true;
-    blend *blends;
+    vshi_model_blend *blends;
     vsh_result result;
     VSHI_TRY(
         vshi_allocate((void **)&blends, shape->vertex_count, sizeof *blends, skins->source->path, error));
     for (unsigned i = 0; i < given->mNumBones; ++i) {
         VSHI_TRY_DONE(add_bone(skins, given->mBones[i], shape->vertex_count, blends, error));
     }
-    VSHI_TRY_DONE(move(skins, shape, world, blends, error));
+    vshi_model_blend_move(shape, blends, world);
+    result = check_positions(skins, shape, error);
 done:
     free(blends);
     return result;
