@@ -6,8 +6,166 @@
 #include "model/scan.h"
 
 #include <errno.h>
+#include <float.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* --- looking things up in the JSON of a glTF */
+
+vsh_result vshi_gltf_fail(const vshi_gltf *gltf, vsh_error *error, const char *format, ...) {
+    char text[768];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    return vshi_fail(error, VSH_ERROR_INPUT, "%s: %s", gltf->path, text);
+}
+
+json_t *vshi_gltf_copy(const json_t *json) {
+    return vshi_gltf_check_copy(json_deep_copy(json), json);
+}
+
+json_t *vshi_gltf_check_copy(json_t *copy, const json_t *json) {
+    if (copy != NULL && !json_equal(copy, json)) {
+        json_decref(copy);
+        return NULL;
+    }
+    return copy;
+}
+
+const json_t *vshi_gltf_element(const vshi_gltf *gltf, const char *array, size_t index) {
+    return json_array_get(json_object_get(gltf->root, array), index);
+}
+
+bool vshi_gltf_count(const json_t *object, const char *key, size_t fallback, size_t *value) {
+    static const double most = 9007199254740992.0; /* whole numbers of a double */
+    const json_t *given = json_object_get(object, key);
+    *value = fallback;
+    if (given == NULL) {
+        return true;
+    }
+    const double number = json_number_value(given);
+    if (!json_is_number(given) || !(number >= 0.0 && number <= most) || number != floor(number)) {
+        return false;
+    }
+    *value = (size_t)number;
+    return true;
+}
+
+vsh_result vshi_gltf_index(const vshi_gltf *gltf, const json_t *object, const char *key, const char *array,
+                           const char *where, size_t *index, vsh_error *error) {
+    if (!vshi_gltf_count(object, key, SIZE_MAX, index)) {
+        return vshi_gltf_fail(gltf, error, "%s: '%s' is no index", where, key);
+    }
+    const size_t count = json_array_size(json_object_get(gltf->root, array));
+    if (*index != SIZE_MAX && *index >= count) {
+        return vshi_gltf_fail(gltf, error, "%s: '%s' is %zu, but there are only %zu %s", where, key, *index,
+                              count, array);
+    }
+    return VSH_OK;
+}
+
+bool vshi_gltf_numbers(const json_t *object, const char *key, size_t count, double *values) {
+    const json_t *given = json_object_get(object, key);
+    if (given == NULL) {
+        return true;
+    }
+    if (!json_is_array(given)) {
+        return false;
+    }
+    for (size_t i = 0; i < count && i < json_array_size(given); ++i) {
+        const json_t *number = json_array_get(given, i);
+        if (!json_is_number(number)) {
+            return false;
+        }
+        values[i] = json_number_value(number);
+    }
+    return true;
+}
+
+const json_t *vshi_gltf_extension(const json_t *object, const char *name) {
+    return json_object_get(json_object_get(object, "extensions"), name);
+}
+
+vsh_result vshi_gltf_hold(vshi_gltf *gltf, double bytes, vsh_error *error) {
+    gltf->bytes_held += bytes;
+    return vshi_check_limit(gltf->run, gltf->bytes_held, gltf->path, error);
+}
+
+vsh_result vshi_gltf_allocate(vshi_gltf *gltf, void **memory, size_t count, size_t size, vsh_error *error) {
+    VSHI_TRY(vshi_gltf_hold(gltf, (double)count * (double)size, error));
+    return vshi_allocate(memory, count, size, gltf->path, error);
+}
+
+vsh_result vshi_gltf_take(vshi_gltf *gltf, void **memory, size_t count, size_t size, vsh_error *error) {
+    size_t bytes;
+    VSHI_TRY(vshi_gltf_hold(gltf, (double)count * (double)size, error));
+    *memory = __builtin_mul_overflow(count, size, &bytes) ? NULL : malloc(bytes);
+    return *memory != NULL ? VSH_OK
+                           : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu × %zu bytes",
+                                       gltf->path, count, size);
+}
+
+/* --- what a glTF says that nobody can read it without */
+
+/* Extensions that are read, or that leave the geometry as it is. */
+static const char *const understood[] = {
+    "KHR_mesh_quantization",   "KHR_draco_mesh_compression",
+    "EXT_mesh_gpu_instancing", "EXT_meshopt_compression",
+    "KHR_meshopt_compression", /* */
+    "KHR_texture_transform",   "KHR_texture_basisu",
+    "EXT_texture_webp",        "EXT_texture_avif",
+    "MSFT_texture_dds",        "KHR_lights_punctual",
+    "EXT_lights_image_based",  "EXT_lights_ies",
+    "KHR_animation_pointer",   "KHR_xmp",
+    "KHR_xmp_json_ld",         "MOZ_lightmap",
+    "KHR_audio_emitter",
+};
+
+/* Materials change no geometry, whatever they are called. */
+static const char material[] = "KHR_materials_";
+
+static const struct {
+    const char *name, *advice;
+} advices[] = {
+    {"KHR_node_visibility", "export it with only those nodes that are to be seen"},
+    {"KHR_gaussian_splatting", "it holds no triangles"},
+};
+
+static bool understands(const char *name) {
+    for (size_t i = 0; i < sizeof understood / sizeof understood[0]; ++i) {
+        if (strcmp(name, understood[i]) == 0) {
+            return true;
+        }
+    }
+    return strncmp(name, material, sizeof material - 1) == 0;
+}
+
+/* Errors: VSH_ERROR_UNSUPPORTED, naming the extension and what could be done. */
+static vsh_result check_extensions(const vshi_gltf *gltf, vsh_error *error) {
+    size_t i;
+    const json_t *item;
+    json_array_foreach(json_object_get(gltf->root, "extensionsRequired"), i, item) {
+        const char *name = json_string_value(item);
+        if (name == NULL) {
+            return vshi_gltf_fail(gltf, error, "extensionsRequired[%zu] is no name", i);
+        }
+        if (understands(name)) {
+            continue;
+        }
+        const char *advice = "export it without that extension";
+        for (size_t k = 0; k < sizeof advices / sizeof advices[0]; ++k) {
+            advice = strcmp(name, advices[k].name) == 0 ? advices[k].advice : advice;
+        }
+        return vshi_fail(error, VSH_ERROR_UNSUPPORTED,
+                         "%s: cannot be read without the glTF extension '%s', which is not known here: %s",
+                         gltf->path, name, advice);
+    }
+    return VSH_OK;
+}
 
 /* Memory that Jansson takes for a byte of JSON: 25 measured on a list of nodes, 1 on buffers in base64. It is
  * part of what a file's size is taken for beforehand (PEAK_BYTES_A_BYTE); this is what passes that. */
@@ -130,7 +288,7 @@ vsh_result vshi_gltf_open(vshi_gltf *gltf, const char *text, size_t size, vsh_er
     const bool expected = length >= 4 && (gltf->path[length - 1] == 'b' || gltf->path[length - 1] == 'B');
     VSHI_TRY(binary || expected ? open_binary(gltf, text, size, error) : parse(gltf, text, size, error));
     VSHI_TRY(check_version(gltf, error));
-    return vshi_gltf_check_extensions(gltf, error);
+    return check_extensions(gltf, error);
 }
 
 vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, bool mapped, const vsh_run *run,

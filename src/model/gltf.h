@@ -46,7 +46,7 @@ typedef struct vshi_gltf {
     size_t node_count;
 } vshi_gltf;
 
-/* --- looking up (gltf_json.c) */
+/* --- looking up (gltf.c) */
 
 /* An element of an array of the root, NULL where there is none. */
 const json_t *vshi_gltf_element(const vshi_gltf *gltf, const char *array, size_t index);
@@ -85,11 +85,6 @@ vsh_result vshi_gltf_allocate(vshi_gltf *gltf, void **memory, size_t count, size
 /* The same without zeroing, of at least one element. */
 vsh_result vshi_gltf_take(vshi_gltf *gltf, void **memory, size_t count, size_t size, vsh_error *error);
 
-/* --- extensions that a file cannot be read without (gltf_extensions.c) */
-
-/* Errors: VSH_ERROR_UNSUPPORTED, naming the extension and what could be done. */
-vsh_result vshi_gltf_check_extensions(const vshi_gltf *gltf, vsh_error *error);
-
 /* --- bytes (gltf_buffer.c) */
 
 /* The bytes of buffer view `index`, and its stride (0: none). Reads the buffer where that is the first time.
@@ -99,17 +94,10 @@ vsh_result vshi_gltf_view(vshi_gltf *gltf, size_t index, vshi_gltf_bytes *bytes,
 
 /* Reads all of buffer `index`, where it has not been. */
 vsh_result vshi_gltf_load(vshi_gltf *gltf, size_t index, vsh_error *error);
-/* The bytes that `buffer`, `byteOffset` and `byteLength` of an object name. */
-vsh_result vshi_gltf_part(vshi_gltf *gltf, const json_t *object, const char *where, vshi_gltf_bytes *bytes,
-                          vsh_error *error);
-
-/* Unpacks what EXT_meshopt_compression names, into new memory (gltf_meshopt.c). */
-vsh_result vshi_gltf_read_meshopt(vshi_gltf *gltf, const json_t *extension, const char *where,
-                                  unsigned char **made, size_t *size, vsh_error *error);
 
 void vshi_gltf_free_buffers(vshi_gltf *gltf);
 
-/* --- accessors (gltf_accessor.c) */
+/* --- accessors (gltf_buffer.c) */
 
 enum {
     VSHI_GLTF_BYTE = 5120,
@@ -151,7 +139,7 @@ void vshi_gltf_accessor_floats(const vshi_gltf_accessor *accessor, float *values
 /* Its elements as unsigned integers; the type is one. */
 void vshi_gltf_accessor_integers(const vshi_gltf_accessor *accessor, uint32_t *values);
 
-/* --- meshes (gltf_primitive.c, gltf_draco.c, gltf_pose.c) */
+/* --- meshes (gltf_primitive.c) */
 
 /* What moves the vertices of a mesh that a node uses. All 0: nothing. */
 typedef struct vshi_gltf_pose {
@@ -180,10 +168,6 @@ vsh_result vshi_gltf_read_attribute(vshi_gltf *gltf, const json_t *attributes, c
                                     int components, size_t vertex_count, const char *where, float **values,
                                     vsh_error *error);
 
-/* Moves positions (and normals) to where the pose has them. */
-vsh_result vshi_gltf_apply_pose(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
-                                const char *where, vshi_model_shape *shape, vsh_error *error);
-
 /* Decodes the data of KHR_draco_mesh_compression, for vshi_importers()->draco_free(). */
 vsh_result vshi_gltf_decode_draco(vshi_gltf *gltf, const json_t *extension, const char *where,
                                   vshi_draco **mesh, vsh_error *error);
@@ -191,10 +175,6 @@ vsh_result vshi_gltf_decode_draco(vshi_gltf *gltf, const json_t *extension, cons
 /* Copies the corners of the decoded triangles, each < vertex_count, into new memory. */
 vsh_result vshi_gltf_draco_indices(vshi_gltf *gltf, const vshi_draco *mesh, const char *where,
                                    uint32_t **indices, vsh_error *error);
-
-/* The same of a primitive under KHR_draco_mesh_compression: fills positions, normals, UVs and indices. */
-vsh_result vshi_gltf_read_draco(vshi_gltf *gltf, const json_t *extension, const char *where,
-                                vshi_model_shape *shape, vsh_error *error);
 
 /* --- nodes (gltf_nodes.c) */
 
@@ -224,9 +204,6 @@ vshi_gltf_unpacking vshi_gltf_find_unpacking(const vshi_gltf *gltf, size_t mater
 /* The image that a material which is not opaque has its alpha of; SIZE_MAX: none. Errors: VSH_ERROR_INPUT. */
 vsh_result vshi_gltf_mask_image(const vshi_gltf *gltf, const json_t *material, size_t *image,
                                 vsh_error *error);
-
-/* Adds the light that a node of the scene carries (gltf_lights.c). */
-vsh_result vshi_gltf_add_light(vshi_gltf *gltf, size_t node, vsh_error *error);
 
 /* --- the file (gltf.c) */
 

@@ -6,6 +6,8 @@
 #include "base/uri.h"
 
 #include <errno.h>
+#include <math.h>
+#include <meshoptimizer.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -91,8 +93,9 @@ static vsh_result load(vshi_gltf *gltf, size_t index, vsh_error *error) {
     return VSH_OK;
 }
 
-vsh_result vshi_gltf_part(vshi_gltf *gltf, const json_t *object, const char *where, vshi_gltf_bytes *bytes,
-                          vsh_error *error) {
+/* The bytes that `buffer`, `byteOffset` and `byteLength` of an object name. */
+static vsh_result find_part(vshi_gltf *gltf, const json_t *object, const char *where, vshi_gltf_bytes *bytes,
+                            vsh_error *error) {
     size_t buffer, offset, length;
     VSHI_TRY(vshi_gltf_index(gltf, object, "buffer", "buffers", where, &buffer, error));
     if (buffer == SIZE_MAX || !vshi_gltf_count(object, "byteOffset", 0, &offset) ||
@@ -115,12 +118,221 @@ vsh_result vshi_gltf_load(vshi_gltf *gltf, size_t index, vsh_error *error) {
     return gltf->buffers[index].loaded ? VSH_OK : load(gltf, index, error);
 }
 
+/* Buffer views that are compressed by EXT_meshopt_compression (Khronos, "EXT_meshopt_compression", 2021), and
+ * KHR_meshopt_compression where its data are of the same version. meshoptimizer unpacks them; what its
+ * filters make of them is computed here by the text of the extension, as the library's own take approximate
+ * reciprocals of roots, which differ between processors. */
+
+enum { ATTRIBUTES, TRIANGLES, INDICES, MODES };
+
+/* Data begin with a byte whose lower half is their version. */
+static const struct {
+    const char *name;
+    unsigned char header, versions; /* highest that is read */
+} modes[MODES] = {{"ATTRIBUTES", 0xa0, 0}, {"TRIANGLES", 0xe0, 1}, {"INDICES", 0xd0, 1}};
+
+typedef struct packed {
+    vshi_gltf_bytes bytes;
+    size_t count, stride;
+    int mode, filter;
+    const char *where;
+} packed;
+
+/* --- filters */
+
+static float rounded_to(float value, float most) {
+    const float whole = (float)(int32_t)(value >= 0.0F ? value + 0.5F : value - 0.5F);
+    return whole > most ? most : whole < -most ? -most : whole;
+}
+
+/* A direction from its place on an octahedron whose corners are `one` away; of none where that is not
+ * positive.
+ */
+static void unfold(const float given[3], float most, float made[3]) {
+    memset(made, 0, sizeof(float[3]));
+    if (!(given[2] > 0.0F)) {
+        return;
+    }
+    float x = given[0] / given[2], y = given[1] / given[2];
+    const float z = 1.0F - fabsf(x) - fabsf(y), over = z < 0.0F ? -z : 0.0F;
+    x -= x >= 0.0F ? over : -over;
+    y -= y >= 0.0F ? over : -over;
+    const float scale = most / sqrtf(x * x + y * y + z * z);
+    made[0] = rounded_to(x * scale, most);
+    made[1] = rounded_to(y * scale, most);
+    made[2] = rounded_to(z * scale, most);
+}
+
+static void decode_octahedral(unsigned char *at, size_t stride) {
+    float given[3], made[3];
+    for (int k = 0; k < 3; ++k) {
+        int16_t two = (int8_t)at[k];
+        if (stride == 8) {
+            memcpy(&two, at + 2 * k, sizeof two);
+        }
+        given[k] = (float)two;
+    }
+    unfold(given, stride == 4 ? 127.0F : 32767.0F, made);
+    for (int k = 0; k < 3; ++k) {
+        const int16_t two = (int16_t)made[k];
+        if (stride == 4) {
+            at[k] = (unsigned char)(int8_t)two;
+        } else {
+            memcpy(at + 2 * k, &two, sizeof two);
+        }
+    }
+}
+
+/* Three components of a unit quaternion, and which one is left out as the largest. */
+static void decode_quaternion(unsigned char *at, size_t stride) {
+    static const float range = 0.70710678118654752F, most = 32767.0F;
+    int16_t given[4], made[4];
+    (void)stride;
+    memcpy(given, at, sizeof given);
+    const int largest = given[3] & 3;
+    const float one = (float)(given[3] | 3);
+    float square = 1.0F;
+    for (int k = 0; k < 3; ++k) {
+        const float value = (float)given[k] / one * range;
+        square -= value * value;
+        made[(largest + 1 + k) % 4] = (int16_t)rounded_to(value * most, most);
+    }
+    made[largest] = (int16_t)rounded_to(square > 0.0F ? sqrtf(square) * most : 0.0F, most);
+    memcpy(at, made, sizeof made);
+}
+
+/* Floats of 8 bits of exponent and 24 of mantissa, both signed. */
+static void decode_exponential(unsigned char *at, size_t stride) {
+    for (size_t k = 0; k < stride; k += 4) {
+        uint32_t bits;
+        memcpy(&bits, at + k, sizeof bits);
+        const int exponent = (int8_t)(bits >> 24);
+        const int32_t mantissa = (int32_t)(bits << 8) >> 8;
+        const uint64_t scale_bits = (uint64_t)(exponent + 1023) << 52;
+        double scale;
+        memcpy(&scale, &scale_bits, sizeof scale);
+        const float value = (float)(scale * (double)mantissa);
+        memcpy(at + k, &value, sizeof value);
+    }
+}
+
+static const struct {
+    const char *name;
+    size_t least, most; /* bytes of an element */
+    void (*decode)(unsigned char *at, size_t stride);
+} filters[] = {{"NONE", 1, 256, NULL},
+               {"OCTAHEDRAL", 4, 8, decode_octahedral},
+               {"QUATERNION", 8, 8, decode_quaternion},
+               {"EXPONENTIAL", 4, 256, decode_exponential}};
+
+/* --- what a view says of itself */
+
+static int index_of_mode(const char *name) {
+    for (int i = 0; name != NULL && i < MODES; ++i) {
+        if (strcmp(name, modes[i].name) == 0) {
+            return i;
+        }
+    }
+    return -1;
+}
+
+static int index_of_filter(const char *name) {
+    for (int i = 0; i < (int)(sizeof filters / sizeof filters[0]); ++i) {
+        if (name == NULL || strcmp(name, filters[i].name) == 0) {
+            return i;
+        }
+    }
+    return -1;
+}
+
+static bool stride_holds(const packed *p) {
+    if (p->mode != ATTRIBUTES) {
+        return (p->stride == 2 || p->stride == 4) && filters[p->filter].decode == NULL &&
+               (p->mode == INDICES || p->count % 3 == 0);
+    }
+    return p->stride % 4 == 0 && p->stride >= filters[p->filter].least &&
+           p->stride <= filters[p->filter].most;
+}
+
+/* Whether so few bytes can hold so many elements: 2 bits stand for 16 bytes of attributes, a byte for a
+ * triangle or an index. */
+static bool may_hold(const packed *p) {
+    enum { DENSEST = 64, TAIL = 256 * 256 /* of elements that fill no block */ };
+    const size_t size = p->bytes.size;
+    return p->mode == ATTRIBUTES ? (double)p->count * (double)p->stride <= DENSEST * (double)size + TAIL
+                                 : (p->mode == TRIANGLES ? p->count / 3 : p->count) <= size;
+}
+
+static vsh_result read_packed(vshi_gltf *gltf, const json_t *extension, packed *p, vsh_error *error) {
+    const char *mode = json_string_value(json_object_get(extension, "mode"));
+    const char *filter = json_string_value(json_object_get(extension, "filter"));
+    p->mode = index_of_mode(mode);
+    p->filter = index_of_filter(filter);
+    if (p->mode < 0 || p->filter < 0) {
+        return vshi_fail(error, VSH_ERROR_UNSUPPORTED,
+                         "%s: %s: its compression has mode '%.40s' and filter '%.40s', which are not known",
+                         gltf->path, p->where, mode != NULL ? mode : "", filter != NULL ? filter : "NONE");
+    }
+    if (!vshi_gltf_count(extension, "count", 0, &p->count) || p->count == 0 || p->count > UINT32_MAX ||
+        !vshi_gltf_count(extension, "byteStride", 0, &p->stride) || !stride_holds(p)) {
+        return vshi_gltf_fail(gltf, error,
+                              "%s: its compression has count %zu and byteStride %zu, which %s with filter %s "
+                              "cannot have",
+                              p->where, p->count, p->stride, modes[p->mode].name, filters[p->filter].name);
+    }
+    VSHI_TRY(find_part(gltf, extension, p->where, &p->bytes, error));
+    const unsigned char first = p->bytes.size > 0 ? p->bytes.at[0] : 0;
+    if ((first & 0xf0) == modes[p->mode].header && (first & 0x0f) > modes[p->mode].versions) {
+        return vshi_fail(
+            error, VSH_ERROR_UNSUPPORTED,
+            "%s: %s: its compressed %s are of version %d; up to version %d is read: 'gltfpack -i "
+            "IN.glb -o OUT.glb' without -c writes them as they are",
+            gltf->path, p->where, modes[p->mode].name, first & 0x0f, modes[p->mode].versions);
+    }
+    return may_hold(p) ? VSH_OK
+                       : vshi_gltf_fail(gltf, error,
+                                        "%s: its %zu compressed bytes cannot hold %zu elements of %zu bytes",
+                                        p->where, p->bytes.size, p->count, p->stride);
+}
+
+/* --- unpacking */
+
+static int decode_packed(const packed *p, unsigned char *to) {
+    const unsigned char *from = p->bytes.at;
+    const size_t size = p->bytes.size;
+    return p->mode == ATTRIBUTES  ? meshopt_decodeVertexBuffer(to, p->count, p->stride, from, size)
+           : p->mode == TRIANGLES ? meshopt_decodeIndexBuffer(to, p->count, p->stride, from, size)
+                                  : meshopt_decodeIndexSequence(to, p->count, p->stride, from, size);
+}
+
+/* Unpacks what EXT_meshopt_compression names, into new memory. */
+static vsh_result read_meshopt(vshi_gltf *gltf, const json_t *extension, const char *where,
+                               unsigned char **made, size_t *size, vsh_error *error) {
+    packed p = {.where = where};
+    VSHI_TRY(read_packed(gltf, extension, &p, error));
+    *size = p.count * p.stride; /* may_hold() */
+    VSHI_TRY(vshi_gltf_take(gltf, (void **)made, p.count, p.stride, error));
+    if (vshi_job_cancelled(gltf->job)) {
+        return vshi_job_fail_cancelled(gltf->job, error);
+    }
+    if (decode_packed(&p, *made) != 0) {
+        return vshi_gltf_fail(gltf, error,
+                              "%s: its compressed %s are damaged: %zu bytes that are to hold %zu elements of "
+                              "%zu bytes",
+                              where, modes[p.mode].name, p.bytes.size, p.count, p.stride);
+    }
+    for (size_t i = 0; filters[p.filter].decode != NULL && i < p.count; ++i) {
+        filters[p.filter].decode(*made + i * p.stride, p.stride);
+    }
+    return VSH_OK;
+}
+
 /* What a compressed view unpacks to, once. Its own buffer may have no data. */
 static vsh_result unpack(vshi_gltf *gltf, size_t index, const json_t *extension, const char *where,
                          size_t length, vshi_gltf_bytes *bytes, vsh_error *error) {
     vshi_gltf_buffer *view = &gltf->views[index];
     if (!view->loaded) {
-        VSHI_TRY(vshi_gltf_read_meshopt(gltf, extension, where, &view->owned, &view->bytes.size, error));
+        VSHI_TRY(read_meshopt(gltf, extension, where, &view->owned, &view->bytes.size, error));
         view->bytes.at = view->owned;
         view->loaded = true;
     }
@@ -137,15 +349,15 @@ vsh_result vshi_gltf_view(vshi_gltf *gltf, size_t index, vshi_gltf_bytes *bytes,
     char where[64];
     snprintf(where, sizeof where, "bufferViews[%zu]", index);
     const json_t *view = vshi_gltf_element(gltf, "bufferViews", index);
-    const json_t *packed = vshi_gltf_extension(view, "EXT_meshopt_compression");
-    packed = packed != NULL ? packed : vshi_gltf_extension(view, "KHR_meshopt_compression");
+    const json_t *compressed = vshi_gltf_extension(view, "EXT_meshopt_compression");
+    compressed = compressed != NULL ? compressed : vshi_gltf_extension(view, "KHR_meshopt_compression");
     size_t length;
     if (!vshi_gltf_count(view, "byteStride", 0, stride) ||
         !vshi_gltf_count(view, "byteLength", SIZE_MAX, &length)) {
         return vshi_gltf_fail(gltf, error, "%s: its byteLength or byteStride is wrong", where);
     }
-    return packed != NULL ? unpack(gltf, index, packed, where, length, bytes, error)
-                          : vshi_gltf_part(gltf, view, where, bytes, error);
+    return compressed != NULL ? unpack(gltf, index, compressed, where, length, bytes, error)
+                              : find_part(gltf, view, where, bytes, error);
 }
 
 void vshi_gltf_free_buffers(vshi_gltf *gltf) {
@@ -157,4 +369,226 @@ void vshi_gltf_free_buffers(vshi_gltf *gltf) {
         free(gltf->views[i].owned);
     }
     free(gltf->views);
+}
+
+/* Accessors: typed elements of a buffer view, with those that a sparse accessor replaces (glTF 2.0, 3.6.2),
+ * and integers as the numbers that they stand for (3.11, KHR_mesh_quantization). */
+
+size_t vshi_gltf_component_size(int type) {
+    switch (type) {
+    case VSHI_GLTF_BYTE:
+    case VSHI_GLTF_UBYTE:
+        return 1;
+    case VSHI_GLTF_SHORT:
+    case VSHI_GLTF_USHORT:
+        return 2;
+    case VSHI_GLTF_UINT:
+    case VSHI_GLTF_FLOAT:
+        return 4;
+    default:
+        return 0;
+    }
+}
+
+static int component_count(const char *type) {
+    static const struct {
+        const char *name;
+        int count;
+    } types[] = {{"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}, {"MAT4", 16}};
+    for (size_t i = 0; type != NULL && i < sizeof types / sizeof types[0]; ++i) {
+        if (strcmp(type, types[i].name) == 0) {
+            return types[i].count;
+        }
+    }
+    return 0;
+}
+
+/* `count` elements of `size` bytes from `offset` on in a view. */
+static vsh_result place(vshi_gltf *gltf, const char *where, size_t view, size_t offset, size_t count,
+                        size_t size, const unsigned char **at, size_t *stride, vsh_error *error) {
+    vshi_gltf_bytes bytes;
+    size_t given;
+    VSHI_TRY(vshi_gltf_view(gltf, view, &bytes, &given, error));
+    *stride = given > 0 ? given : size;
+    size_t span, end;
+    if (*stride < size || __builtin_mul_overflow(count - 1, *stride, &span) ||
+        __builtin_add_overflow(span, size, &span) || __builtin_add_overflow(span, offset, &end) ||
+        end > bytes.size) {
+        return vshi_gltf_fail(gltf, error,
+                              "%s: %zu elements of %zu bytes, %zu apart, from %zu on pass the %zu bytes of "
+                              "bufferViews[%zu]",
+                              where, count, size, *stride, offset, bytes.size, view);
+    }
+    *at = bytes.at + offset;
+    return VSH_OK;
+}
+
+size_t vshi_gltf_integer_at(const unsigned char *at, int type) {
+    uint16_t two;
+    uint32_t four;
+    switch (type) {
+    case VSHI_GLTF_UBYTE:
+        return *at;
+    case VSHI_GLTF_USHORT:
+        memcpy(&two, at, sizeof two);
+        return two;
+    default:
+        memcpy(&four, at, sizeof four);
+        return four;
+    }
+}
+
+static bool is_unsigned(size_t type) {
+    return type == VSHI_GLTF_UBYTE || type == VSHI_GLTF_USHORT || type == VSHI_GLTF_UINT;
+}
+
+static vsh_result open_sparse(vshi_gltf *gltf, const json_t *sparse, const char *where,
+                              vshi_gltf_accessor *accessor, vsh_error *error) {
+    const json_t *indices = json_object_get(sparse, "indices"), *values = json_object_get(sparse, "values");
+    size_t count, type, index_view, index_offset, value_view, value_offset, stride;
+    if (!vshi_gltf_count(sparse, "count", 0, &count) || count > accessor->count ||
+        !vshi_gltf_count(indices, "componentType", 0, &type) || !is_unsigned(type) ||
+        !vshi_gltf_count(indices, "byteOffset", 0, &index_offset) ||
+        !vshi_gltf_count(values, "byteOffset", 0, &value_offset)) {
+        return vshi_gltf_fail(gltf, error, "%s: its sparse part is wrong", where);
+    }
+    if (count == 0) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_gltf_index(gltf, indices, "bufferView", "bufferViews", where, &index_view, error));
+    VSHI_TRY(vshi_gltf_index(gltf, values, "bufferView", "bufferViews", where, &value_view, error));
+    if (index_view == SIZE_MAX || value_view == SIZE_MAX) {
+        return vshi_gltf_fail(gltf, error, "%s: its sparse part has no buffer view", where);
+    }
+    const size_t index_size = vshi_gltf_component_size((int)type);
+    const size_t value_size = (size_t)accessor->components * vshi_gltf_component_size(accessor->type);
+    VSHI_TRY(place(gltf, where, index_view, index_offset, count, index_size, &accessor->sparse_at, &stride,
+                   error));
+    VSHI_TRY(place(gltf, where, value_view, value_offset, count, value_size, &accessor->sparse_values,
+                   &stride, error));
+    for (size_t i = 0; i < count; ++i) {
+        const size_t index = vshi_gltf_integer_at(accessor->sparse_at + i * index_size, (int)type);
+        if (index >= accessor->count) {
+            return vshi_gltf_fail(gltf, error, "%s: sparse index %zu of %zu is %zu, but it has %zu elements",
+                                  where, i, count, index, accessor->count);
+        }
+    }
+    accessor->sparse_count = count;
+    accessor->sparse_type = (int)type;
+    return VSH_OK;
+}
+
+vsh_result vshi_gltf_accessor_open(vshi_gltf *gltf, size_t index, vshi_gltf_accessor *accessor,
+                                   vsh_error *error) {
+    char where[64];
+    snprintf(where, sizeof where, "accessors[%zu]", index);
+    const json_t *given = vshi_gltf_element(gltf, "accessors", index);
+    size_t type, view, offset;
+    *accessor = (vshi_gltf_accessor){.normalized = json_is_true(json_object_get(given, "normalized"))};
+    accessor->components = component_count(json_string_value(json_object_get(given, "type")));
+    if (!vshi_gltf_count(given, "componentType", 0, &type) || type > VSHI_GLTF_FLOAT ||
+        vshi_gltf_component_size((int)type) == 0 || accessor->components == 0) {
+        return vshi_gltf_fail(gltf, error, "%s: its type or componentType is wrong", where);
+    }
+    accessor->type = (int)type;
+    if (!vshi_gltf_count(given, "count", 0, &accessor->count) || accessor->count == 0 ||
+        accessor->count > UINT32_MAX || !vshi_gltf_count(given, "byteOffset", 0, &offset)) {
+        return vshi_gltf_fail(gltf, error, "%s: its count or byteOffset is wrong", where);
+    }
+    VSHI_TRY(vshi_gltf_index(gltf, given, "bufferView", "bufferViews", where, &view, error));
+    if (view != SIZE_MAX) {
+        const size_t size = (size_t)accessor->components * vshi_gltf_component_size(accessor->type);
+        VSHI_TRY(
+            place(gltf, where, view, offset, accessor->count, size, &accessor->at, &accessor->stride, error));
+    }
+    const json_t *sparse = json_object_get(given, "sparse");
+    return sparse != NULL ? open_sparse(gltf, sparse, where, accessor, error) : VSH_OK;
+}
+
+static float signed_unit(int value, float most, bool normalized) {
+    const float given = (float)value;
+    return normalized ? (given / most < -1.0F ? -1.0F : given / most) : given;
+}
+
+static float component(const unsigned char *at, int type, bool normalized) {
+    float number;
+    int16_t two;
+    uint16_t pair;
+    uint32_t four;
+    switch (type) {
+    case VSHI_GLTF_BYTE:
+        return signed_unit((int8_t)*at, 127.0F, normalized);
+    case VSHI_GLTF_UBYTE:
+        return normalized ? (float)*at / 255.0F : (float)*at;
+    case VSHI_GLTF_SHORT:
+        memcpy(&two, at, sizeof two);
+        return signed_unit(two, 32767.0F, normalized);
+    case VSHI_GLTF_USHORT:
+        memcpy(&pair, at, sizeof pair);
+        return normalized ? (float)pair / 65535.0F : (float)pair;
+    case VSHI_GLTF_UINT:
+        memcpy(&four, at, sizeof four);
+        return (float)four;
+    default:
+        memcpy(&number, at, sizeof number);
+        return number;
+    }
+}
+
+static void element(const vshi_gltf_accessor *a, const unsigned char *at, float *to) {
+    if (a->type == VSHI_GLTF_FLOAT) {
+        memcpy(to, at, (size_t)a->components * sizeof *to);
+        return;
+    }
+    const size_t size = vshi_gltf_component_size(a->type);
+    for (int k = 0; k < a->components; ++k) {
+        to[k] = component(at + (size_t)k * size, a->type, a->normalized);
+    }
+}
+
+bool vshi_gltf_accessor_plain(const vshi_gltf_accessor *a, int components, int type) {
+    return a->at != NULL && a->sparse_count == 0 && a->type == type && a->components == components &&
+           a->stride == (size_t)components * 4;
+}
+
+void vshi_gltf_accessor_floats(const vshi_gltf_accessor *a, float *values) {
+    const size_t n = (size_t)a->components;
+    const bool plain = a->at != NULL && a->type == VSHI_GLTF_FLOAT && a->stride == n * sizeof *values;
+    if (plain) {
+        memcpy(values, a->at, a->count * a->stride);
+    }
+    for (size_t i = 0; !plain && i < a->count && a->at != NULL; ++i) {
+        element(a, a->at + i * a->stride, values + n * i);
+    }
+    if (a->at == NULL) {
+        memset(values, 0, a->count * n * sizeof *values);
+    }
+    const size_t index_size = vshi_gltf_component_size(a->sparse_type);
+    const size_t value_size = n * vshi_gltf_component_size(a->type);
+    for (size_t i = 0; i < a->sparse_count; ++i) {
+        const size_t index = vshi_gltf_integer_at(a->sparse_at + i * index_size, a->sparse_type);
+        element(a, a->sparse_values + i * value_size, values + n * index);
+    }
+}
+
+void vshi_gltf_accessor_integers(const vshi_gltf_accessor *a, uint32_t *values) {
+    const size_t n = (size_t)a->components, size = vshi_gltf_component_size(a->type);
+    const bool plain = a->at != NULL && a->type == VSHI_GLTF_UINT && a->stride == n * size;
+    if (plain) {
+        memcpy(values, a->at, a->count * a->stride);
+    }
+    for (size_t i = 0; !plain && i < a->count; ++i) {
+        for (size_t k = 0; k < n; ++k) {
+            values[n * i + k] =
+                a->at != NULL ? (uint32_t)vshi_gltf_integer_at(a->at + i * a->stride + k * size, a->type) : 0;
+        }
+    }
+    const size_t index_size = vshi_gltf_component_size(a->sparse_type);
+    for (size_t i = 0; i < a->sparse_count; ++i) {
+        const size_t index = vshi_gltf_integer_at(a->sparse_at + i * index_size, a->sparse_type);
+        for (size_t k = 0; k < n; ++k) {
+            values[n * index + k] =
+                (uint32_t)vshi_gltf_integer_at(a->sparse_values + (n * i + k) * size, a->type);
+        }
+    }
 }

@@ -7,6 +7,196 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* --- primitives whose vertices are compressed by Draco */
+
+static vsh_result take_attribute(vshi_gltf *gltf, const vshi_draco *mesh, const json_t *attributes,
+                                 const char *name, int components, const char *where, float **values,
+                                 vsh_error *error) {
+    size_t id;
+    if (!vshi_gltf_count(attributes, name, SIZE_MAX, &id)) {
+        return vshi_gltf_fail(gltf, error, "%s: its compressed %s is no index", where, name);
+    }
+    if (id == SIZE_MAX) {
+        return VSH_OK;
+    }
+    const size_t count = mesh->vertex_count, size = (size_t)components * sizeof **values;
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)values, count, size, error));
+    if (id > UINT32_MAX ||
+        !vshi_importers()->draco_elements(mesh, (uint32_t)id, VSHI_DRACO_FLOAT, components, *values)) {
+        return vshi_gltf_fail(gltf, error, "%s: its Draco data has no attribute %zu of %d components", where,
+                              id, components);
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_gltf_draco_indices(vshi_gltf *gltf, const vshi_draco *mesh, const char *where,
+                                   uint32_t **indices, vsh_error *error) {
+    const size_t count = mesh->triangle_count;
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)indices, count, sizeof(uint32_t[3]), error));
+    if (count > 0) {
+        vshi_importers()->draco_indices(mesh, *indices);
+    }
+    for (size_t i = 0; i < 3 * count; ++i) {
+        if ((*indices)[i] >= mesh->vertex_count) {
+            return vshi_gltf_fail(gltf, error, "%s: its Draco data uses vertex %u of %zu", where,
+                                  (*indices)[i], mesh->vertex_count);
+        }
+    }
+    return VSH_OK;
+}
+
+static vsh_result take_mesh(vshi_gltf *gltf, const vshi_draco *mesh, const json_t *attributes,
+                            const char *where, vshi_model_shape *shape, vsh_error *error) {
+    shape->vertex_count = mesh->vertex_count;
+    VSHI_TRY(take_attribute(gltf, mesh, attributes, "POSITION", 3, where, &shape->positions, error));
+    if (shape->positions == NULL) {
+        return vshi_gltf_fail(gltf, error, "%s: its Draco data has no positions", where);
+    }
+    VSHI_TRY(take_attribute(gltf, mesh, attributes, "NORMAL", 3, where, &shape->normals, error));
+    for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
+        char name[32];
+        snprintf(name, sizeof name, "TEXCOORD_%d", set);
+        VSHI_TRY(take_attribute(gltf, mesh, attributes, name, 2, where, &shape->uvs[set], error));
+        shape->uv_sets = shape->uvs[set] != NULL ? set + 1 : shape->uv_sets;
+    }
+    shape->triangle_count = mesh->triangle_count;
+    return vshi_gltf_draco_indices(gltf, mesh, where, &shape->indices, error);
+}
+
+vsh_result vshi_gltf_decode_draco(vshi_gltf *gltf, const json_t *extension, const char *where,
+                                  vshi_draco **mesh, vsh_error *error) {
+    vshi_gltf_bytes bytes;
+    size_t view, stride;
+    VSHI_TRY(vshi_gltf_index(gltf, extension, "bufferView", "bufferViews", where, &view, error));
+    if (view == SIZE_MAX) {
+        return vshi_gltf_fail(gltf, error, "%s: its Draco data has no buffer view", where);
+    }
+    VSHI_TRY(vshi_gltf_view(gltf, view, &bytes, &stride, error));
+    VSHI_TRY(vshi_importers_load(error));
+    return vshi_importers()->draco_decode(bytes.at, bytes.size, gltf->path, mesh, error);
+}
+
+/* The same of a primitive under KHR_draco_mesh_compression: fills positions, normals, UVs and indices. */
+static vsh_result read_draco(vshi_gltf *gltf, const json_t *extension, const char *where,
+                             vshi_model_shape *shape, vsh_error *error) {
+    vshi_draco *mesh = NULL;
+    VSHI_TRY(vshi_gltf_decode_draco(gltf, extension, where, &mesh, error));
+    const vsh_result result =
+        take_mesh(gltf, mesh, json_object_get(extension, "attributes"), where, shape, error);
+    vshi_importers()->draco_free(mesh);
+    return result;
+}
+
+/* The rest pose: morph targets at their default weights (glTF 2.0, 3.7.2.2), then skins, which move vertices
+ * by their joints and leave the node's own transform out (3.7.3.3). */
+
+static vsh_result add_target(vshi_gltf *gltf, const json_t *target, const char *name, double weight,
+                             const char *where, size_t vertex_count, float *values, vsh_error *error) {
+    float *moves = NULL;
+    VSHI_TRY(vshi_gltf_read_attribute(gltf, target, name, 3, vertex_count, where, &moves, error));
+    for (size_t i = 0; moves != NULL && i < 3 * vertex_count; ++i) {
+        values[i] = (float)((double)values[i] + weight * (double)moves[i]);
+    }
+    free(moves);
+    return VSH_OK;
+}
+
+static vsh_result morph(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
+                        const char *where, vshi_model_shape *shape, vsh_error *error) {
+    const json_t *targets = json_object_get(primitive, "targets");
+    const size_t count = shape->vertex_count;
+    for (size_t i = 0; i < json_array_size(targets) && i < pose->weight_count; ++i) {
+        const json_t *target = json_array_get(targets, i);
+        const double weight = pose->weights[i];
+        if (weight == 0.0) {
+            continue;
+        }
+        VSHI_TRY(add_target(gltf, target, "POSITION", weight, where, count, shape->positions, error));
+        if (shape->normals != NULL) {
+            VSHI_TRY(add_target(gltf, target, "NORMAL", weight, where, count, shape->normals, error));
+        }
+    }
+    return VSH_OK;
+}
+
+static vsh_result add_joints(vshi_gltf *gltf, const vshi_gltf_pose *pose, size_t index, const float *weights,
+                             const char *where, size_t vertex_count, vshi_model_blend *blends,
+                             vsh_error *error) {
+    vshi_gltf_accessor accessor;
+    VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
+    if (accessor.components != 4 || (accessor.type != VSHI_GLTF_UBYTE && accessor.type != VSHI_GLTF_USHORT) ||
+        accessor.count != vertex_count) {
+        return vshi_gltf_fail(gltf, error,
+                              "%s: its joints are no four bytes or shorts for each of %zu vertices", where,
+                              vertex_count);
+    }
+    uint32_t *joints = NULL;
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&joints, vertex_count, sizeof(uint32_t[4]), error));
+    vshi_gltf_accessor_integers(&accessor, joints);
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; i < 4 * vertex_count; ++i) {
+        const double weight = (double)weights[i];
+        if (weight == 0.0) {
+            continue;
+        }
+        if (joints[i] >= pose->joint_count) {
+            result = vshi_gltf_fail(gltf, error, "%s: vertex %zu uses joint %u, but its skin has only %zu",
+                                    where, i / 4, joints[i], pose->joint_count);
+            goto done;
+        }
+        vshi_model_blend_add(&blends[i / 4], weight, pose->joints[joints[i]]);
+    }
+done:
+    free(joints);
+    return result;
+}
+
+static vsh_result add_sets(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
+                           const char *where, size_t vertex_count, vshi_model_blend *blends,
+                           vsh_error *error) {
+    const json_t *attributes = json_object_get(primitive, "attributes");
+    for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
+        char name[32];
+        size_t index;
+        float *weights;
+        snprintf(name, sizeof name, "JOINTS_%d", set);
+        VSHI_TRY(vshi_gltf_index(gltf, attributes, name, "accessors", where, &index, error));
+        if (index == SIZE_MAX) {
+            break;
+        }
+        snprintf(name, sizeof name, "WEIGHTS_%d", set);
+        VSHI_TRY(vshi_gltf_read_attribute(gltf, attributes, name, 4, vertex_count, where, &weights, error));
+        if (weights == NULL) {
+            continue;
+        }
+        const vsh_result result = add_joints(gltf, pose, index, weights, where, vertex_count, blends, error);
+        free(weights);
+        VSHI_TRY(result);
+    }
+    return VSH_OK;
+}
+
+/* A vertex without weights follows the first joint. */
+static vsh_result skin(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
+                       const char *where, vshi_model_shape *shape, vsh_error *error) {
+    vshi_model_blend *blends = NULL;
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&blends, shape->vertex_count, sizeof *blends, error));
+    vsh_result result;
+    VSHI_TRY_DONE(add_sets(gltf, primitive, pose, where, shape->vertex_count, blends, error));
+    vshi_model_blend_move(shape, blends, pose->joints[0]);
+done:
+    free(blends);
+    return result;
+}
+
+/* Moves positions (and normals) to where the pose has them. */
+static vsh_result apply_pose(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
+                             const char *where, vshi_model_shape *shape, vsh_error *error) {
+    VSHI_TRY(morph(gltf, primitive, pose, where, shape, error));
+    return pose->joints != NULL && pose->joint_count > 0 ? skin(gltf, primitive, pose, where, shape, error)
+                                                         : VSH_OK;
+}
+
 vsh_result vshi_gltf_read_attribute(vshi_gltf *gltf, const json_t *attributes, const char *name,
                                     int components, size_t vertex_count, const char *where, float **values,
                                     vsh_error *error) {
@@ -320,7 +510,7 @@ vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *primitive, co
         VSHI_TRY(leave_raw(gltf, primitive, pose, where, shape, error));
     }
     if (shape->raw == NULL) {
-        VSHI_TRY(draco != NULL ? vshi_gltf_read_draco(gltf, draco, where, shape, error)
+        VSHI_TRY(draco != NULL ? read_draco(gltf, draco, where, shape, error)
                                : read_plain(gltf, primitive, mode, where, shape, error));
     }
     if (shape->triangle_count == 0) {
@@ -331,6 +521,6 @@ vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *primitive, co
         return VSH_OK;
     }
     unpack_uvs(gltf, primitive, shape);
-    VSHI_TRY(vshi_gltf_apply_pose(gltf, primitive, pose, where, shape, error));
+    VSHI_TRY(apply_pose(gltf, primitive, pose, where, shape, error));
     return vshi_model_finish(gltf->path, gltf->run, where, shape, error);
 }
