@@ -187,7 +187,7 @@ static json_t *text_of(const char *value) {
     return made;
 }
 
-/* The options' attributes into the extras of the asset. (origin.c) */
+/* The options' attributes into the extras of the asset. */
 static vsh_result add_origin(vshi_lit_work *work, vsh_error *error) {
     vshi_lit_document *document = &work->document;
     const vsh_lit_options *options = work->options;

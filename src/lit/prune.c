@@ -334,7 +334,7 @@ void vshi_lit_uses_free(vshi_lit_uses *uses) {
 /* --- extensions */
 
 /* Those that refer to no accessor and no buffer view but by what is walked through above, and to textures,
- * images and samplers as lit/own_textures.c says. */
+ * images and samplers as the functions above say. */
 static bool is_known(const char *name) {
     static const char *const names[] = {"KHR_draco_mesh_compression",
                                         "EXT_mesh_gpu_instancing",

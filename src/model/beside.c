@@ -1,5 +1,5 @@
 #define _GNU_SOURCE
-#include "model/beside.h"
+#include "model/model_file.h"
 
 #include "base/bytes.h"
 #include "base/file.h"

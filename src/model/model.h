@@ -56,7 +56,7 @@ typedef struct vshi_model_material {
 enum { VSHI_FILE_IDENTITY = 5 };
 
 /* A file that a reader has mapped, and that arrays of its model are left in: what takes them up reads them
- * from there, without a copy in between (model_raw.c). */
+ * from there, without a copy in between (model_message.c). */
 typedef struct vshi_model_file {
     void *map; /* NULL: none */
     size_t size;
@@ -128,11 +128,9 @@ vsh_result vshi_model_add(vsh_model *model, const char *path, const vsh_run *run
 /* Adds a light, whose name is copied on one line; it may be NULL. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_model_add_light(vsh_model *model, const vsh_model_light *light, const char *name,
                                 vsh_error *error);
-void vshi_model_free_lights(vsh_model *model);
 
 /* A copy of a text on one line. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_model_copy_line(const char *text, char **copy, vsh_error *error);
-void vshi_model_free_materials(vsh_model *model);
 
 /* The number of an object that is yet to be added. */
 uint32_t vshi_model_next_object(const vsh_model *model);
@@ -180,52 +178,13 @@ vsh_result vshi_serve_model(const char *path, struct vshi_decoder *request, cons
 vsh_result vshi_model_decode(struct vshi_decoder *decoder, const char *path, const vsh_run *run,
                              vsh_model **model, vsh_error *error);
 
-/* Its lights; what is taken is checked (model_light.c). */
-void vshi_model_put_lights(struct vshi_encoder *encoder, const vsh_model *model);
-vsh_result vshi_model_take_lights(struct vshi_decoder *decoder, vsh_model *model, const char *path,
-                                  vsh_error *error);
-
 /* Takes `count` materials, opaque and without names. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_model_take_plain_materials(vsh_model *model, size_t count, vsh_error *error);
 
-/* Its materials and images, which stay where they lie in the answer (model_material.c). */
-void vshi_model_put_materials(struct vshi_encoder *encoder, const vsh_model *model);
-vsh_result vshi_model_take_materials(struct vshi_decoder *decoder, vsh_model *model, const char *path,
-                                     const vsh_run *run, vsh_error *error);
-
-/* --- arrays that are left in the file (model_raw.c) */
+/* --- arrays that are left in the file (model_message.c) */
 
 /* What of it tells whether it is the same one, unchanged. False where the system does not say. */
 bool vshi_file_identity(int file, uint64_t identity[VSHI_FILE_IDENTITY]);
-
-/* What a model's arrays in the file take, each at a multiple of 64 bytes. */
-uint64_t vshi_raw_bytes(const vsh_model *model);
-
-/* Tells where the arrays of a shape with `raw` lie. */
-void vshi_raw_put(struct vshi_encoder *encoder, const vshi_model_file *file, const vshi_model_shape *shape);
-
-/* A file that arrays are read from, into one block of memory. */
-typedef struct vshi_raw {
-    const char *path;
-    const vsh_run *run;
-    FILE *file;
-    uint64_t size; /* of the file */
-    unsigned char *block;
-    size_t used, bytes; /* of the block */
-} vshi_raw;
-
-/* Opens the file, which must be the one that the reader had, and takes `bytes` of memory, no more than the
- * places that `message` more bytes of its answer may tell: *block is the caller's. Of a `raw` with a path and
- * a run; close with vshi_raw_close(), after an error too. Errors: VSH_ERROR_READ, VSH_ERROR_LIMIT,
- * VSH_ERROR_MEMORY. */
-vsh_result vshi_raw_open(vshi_raw *raw, const uint64_t identity[VSHI_FILE_IDENTITY], uint64_t bytes,
-                         size_t message, void **block, vsh_error *error);
-void vshi_raw_close(vshi_raw *raw);
-
-/* Reads and finishes the arrays of a shape whose counts are known. Errors: as vshi_model_finish(), and
- * VSH_ERROR_READ. */
-vsh_result vshi_raw_take(vshi_raw *raw, struct vshi_decoder *decoder, vshi_model_shape *shape,
-                         vsh_error *error);
 
 #ifdef __cplusplus
 }

@@ -1,11 +1,11 @@
 /* From Assimp's scene to a model: arrays, polygons cut into triangles, skins at rest, places. */
 #include "base/memory.h"
 #include "base/try.h"
+#include "base/vec.h"
 #include "extern/importers.h"
 #include "mesh/mesh.h"
 #include "model/faces.h"
 #include "model/model.h"
-#include "model/model_skin.h"
 
 #include <assimp/material.h>
 #include <assimp/scene.h>
@@ -13,6 +13,137 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+typedef struct skin_node {
+    const char *name;
+    double world[12];
+} skin_node;
+
+/* The nodes and meshes of a scene. Begin with `source`, the rest 0. */
+typedef struct scene_skins {
+    const vshi_model_source *source;
+    double root[12];  /* in front of the scene's own root */
+    skin_node *nodes; /* by their names; NULL: not yet looked for */
+    size_t node_count;
+    bool *done; /* of each mesh */
+} scene_skins;
+
+/* Assimp stores rows one after the other. */
+static void rows_of(const struct aiMatrix4x4 *m, double rows[12]) {
+    const double own[12] = {m->a1, m->a2, m->a3, m->a4, m->b1, m->b2,
+                            m->b3, m->b4, m->c1, m->c2, m->c3, m->c4};
+    memcpy(rows, own, sizeof own);
+}
+
+/* parent × the node's own transform. */
+static void find_node_world(const double parent[12], const struct aiNode *node, double world[12]) {
+    double own[12];
+    rows_of(&node->mTransformation, own);
+    vshi_model_compose(parent, own, world);
+}
+
+static size_t count_nodes(const struct aiNode *node, int depth) {
+    enum { DEEPEST = 1024 };
+    size_t count = 1;
+    for (unsigned i = 0; depth < DEEPEST && i < node->mNumChildren; ++i) {
+        count += count_nodes(node->mChildren[i], depth + 1);
+    }
+    return count;
+}
+
+static void gather(scene_skins *skins, size_t room, const struct aiNode *node, const double parent[12]) {
+    if (skins->node_count == room) {
+        return;
+    }
+    skin_node *to = &skins->nodes[skins->node_count++];
+    to->name = node->mName.data;
+    find_node_world(parent, node, to->world);
+    double world[12];
+    memcpy(world, to->world, sizeof world);
+    for (unsigned i = 0; i < node->mNumChildren; ++i) {
+        gather(skins, room, node->mChildren[i], world);
+    }
+}
+
+static int by_name(const void *a, const void *b) {
+    return strcmp(((const skin_node *)a)->name, ((const skin_node *)b)->name);
+}
+
+static vsh_result find_nodes(scene_skins *skins, vsh_error *error) {
+    const vshi_model_source *source = skins->source;
+    const size_t count = count_nodes(source->scene->mRootNode, 0);
+    VSHI_TRY(vshi_allocate((void **)&skins->done, source->scene->mNumMeshes, sizeof *skins->done,
+                           source->path, error));
+    VSHI_TRY(vshi_allocate((void **)&skins->nodes, count, sizeof *skins->nodes, source->path, error));
+    gather(skins, count, source->scene->mRootNode, skins->root);
+    qsort(skins->nodes, skins->node_count, sizeof *skins->nodes, by_name);
+    return VSH_OK;
+}
+
+static vsh_result add_bone(const scene_skins *skins, const struct aiBone *bone, size_t vertex_count,
+                           vshi_model_blend *blends, vsh_error *error) {
+    const char *path = skins->source->path;
+    const skin_node wanted = {.name = bone->mName.data};
+    const skin_node *node = bsearch(&wanted, skins->nodes, skins->node_count, sizeof *skins->nodes, by_name);
+    if (node == NULL) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: bone '%s' is no node", path, bone->mName.data);
+    }
+    double offset[12], moved[12];
+    rows_of(&bone->mOffsetMatrix, offset);
+    vshi_model_compose(node->world, offset, moved);
+    for (unsigned i = 0; i < bone->mNumWeights; ++i) {
+        const struct aiVertexWeight given = bone->mWeights[i];
+        if (given.mVertexId >= vertex_count || !isfinite(given.mWeight)) {
+            return vshi_fail(error, VSH_ERROR_INPUT, "%s: bone '%s': weight %u is %g of vertex %u of %zu",
+                             path, bone->mName.data, i, (double)given.mWeight, given.mVertexId, vertex_count);
+        }
+        vshi_model_blend_add(&blends[given.mVertexId], (double)given.mWeight, moved);
+    }
+    return VSH_OK;
+}
+
+static vsh_result check_positions(const scene_skins *skins, const vshi_model_shape *shape, vsh_error *error) {
+    for (size_t v = 0; v < shape->vertex_count; ++v) {
+        const float *p = shape->positions + 3 * v;
+        if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2])) {
+            return vshi_fail(error, VSH_ERROR_INPUT, "%s: bones move vertex %zu of %zu beyond every number",
+                             skins->source->path, v, shape->vertex_count);
+        }
+    }
+    return VSH_OK;
+}
+
+/* Moves the vertices of mesh `mesh` into the world: Σ weight × bone's node × offset matrix; vertices without
+ * a bone stay under `world`. Does so once, whatever nodes use the mesh. Errors: VSH_ERROR_INPUT (a bone
+ * without a node, a vertex out of range, a weight that is not finite), VSH_ERROR_MEMORY. */
+static vsh_result apply_skin(scene_skins *skins, size_t mesh, vshi_model_shape *shape, const double world[12],
+                             vsh_error *error) {
+    const struct aiMesh *given = skins->source->scene->mMeshes[mesh];
+    if (skins->nodes == NULL) {
+        VSHI_TRY(find_nodes(skins, error));
+    }
+    if (skins->done[mesh]) {
+        return VSH_OK;
+    }
+    skins->done[mesh] = true;
+    vshi_model_blend *blends;
+    vsh_result result;
+    VSHI_TRY(
+        vshi_allocate((void **)&blends, shape->vertex_count, sizeof *blends, skins->source->path, error));
+    for (unsigned i = 0; i < given->mNumBones; ++i) {
+        VSHI_TRY_DONE(add_bone(skins, given->mBones[i], shape->vertex_count, blends, error));
+    }
+    vshi_model_blend_move(shape, blends, world);
+    result = check_positions(skins, shape, error);
+done:
+    free(blends);
+    return result;
+}
+
+static void free_skins(scene_skins *skins) {
+    free(skins->nodes);
+    free(skins->done);
+}
 
 /* Most triangles that a mesh's faces make. */
 static size_t count_triangles(const struct aiMesh *mesh) {
@@ -34,7 +165,7 @@ static vsh_result check_size(const vshi_model_source *source, vsh_error *error) 
         for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
             vertex += mesh->mTextureCoords[set] != NULL ? sizeof(float[2]) + sizeof(struct aiVector3D) : 0;
         }
-        vertex += mesh->mNumBones > 0 ? VSHI_SKIN_BYTES_A_VERTEX : 0;
+        vertex += mesh->mNumBones > 0 ? sizeof(vshi_model_blend) : 0;
         /* Each of Assimp's faces has an array of its own, of 32 bytes with malloc's header. */
         bytes += vertex * mesh->mNumVertices + (sizeof(struct aiFace) + 32.0) * mesh->mNumFaces +
                  (double)sizeof(uint32_t[3]) * (double)count_triangles(mesh);
@@ -124,7 +255,7 @@ static vsh_result copy_shape(const vshi_model_source *source, const struct aiMes
     return copy_faces(source, mesh, shape, error);
 }
 
-static vsh_result add_nodes(const vshi_model_source *source, vsh_model *model, vshi_skins *skins,
+static vsh_result add_nodes(const vshi_model_source *source, vsh_model *model, scene_skins *skins,
                             const struct aiNode *node, const double parent[12], int depth, vsh_error *error) {
     enum { DEEPEST = 1024 };
     static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
@@ -136,7 +267,7 @@ static vsh_result add_nodes(const vshi_model_source *source, vsh_model *model, v
         return vshi_job_fail_cancelled(source->job, error);
     }
     double world[12];
-    vshi_node_world(parent, node, world);
+    find_node_world(parent, node, world);
     const uint32_t object = vshi_model_next_object(model);
     for (unsigned i = 0; i < node->mNumMeshes; ++i) {
         const unsigned shape = node->mMeshes[i];
@@ -146,7 +277,7 @@ static vsh_result add_nodes(const vshi_model_source *source, vsh_model *model, v
         const struct aiMesh *mesh = source->scene->mMeshes[shape];
         const bool skinned = mesh->mNumBones > 0;
         if (skinned) {
-            VSHI_TRY(vshi_skins_apply(skins, shape, &model->shapes[shape], world, error));
+            VSHI_TRY(apply_skin(skins, shape, &model->shapes[shape], world, error));
         }
         const vshi_model_place place = {.node = node->mName.data,
                                         .mesh = mesh->mName.data,
@@ -182,7 +313,7 @@ static vsh_result copy_materials(const vshi_model_source *source, vsh_model *mod
 
 vsh_result vshi_model_build(const vshi_model_source *source, vsh_model **out, vsh_error *error) {
     vsh_model *model = NULL;
-    vshi_skins skins = {.source = source};
+    scene_skins skins = {.source = source};
     const struct aiScene *scene = source->scene;
     vsh_result result;
     VSHI_TRY(check_size(source, error));
@@ -211,7 +342,7 @@ vsh_result vshi_model_build(const vshi_model_source *source, vsh_model **out, vs
     *out = model;
     model = NULL;
 done:
-    vshi_skins_free(&skins);
+    free_skins(&skins);
     vsh_model_free(model);
     return result;
 }

@@ -6,7 +6,7 @@
 #include "base/job.h"
 #include "base/threads.h"
 #include "base/try.h"
-#include "model/unsupported.h"
+#include "model/model_file.h"
 #include "json/json.h"
 
 #include <stdlib.h>

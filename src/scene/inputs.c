@@ -2,7 +2,7 @@
 
 #include "base/floats.h"
 #include "base/try.h"
-#include "model/beside.h"
+#include "model/model_file.h"
 
 #include <stdlib.h>
 #include <string.h>
