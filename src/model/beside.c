@@ -7,7 +7,6 @@
 #include "base/memory.h"
 #include "base/uri.h"
 #include "model/gltf.h"
-#include "model/mtl_map.h"
 #include "model/obj.h"
 #include "model/scan.h"
 

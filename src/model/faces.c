@@ -3,8 +3,357 @@
 #include "base/memory.h"
 #include "base/try.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* Triangulation by ears (Meisters, "Polygons have ears", 1975), with exact orientations: coordinates are
+ * floats, so that products of two are exact in double, and the sign of their sum is found by expansions
+ * (Shewchuk, "Adaptive precision floating-point arithmetic and fast robust geometric predicates", 1997).
+ *
+ * The polygon is looked at along the axis that its normal (Newell's) is nearest to, which keeps coordinates
+ * as they are: a rotation into its plane would round them. Ears are looked for in the order of Assimp 5.2, so
+ * that convex polygons become the fans that they have always become. An ear is cut where no other corner lies
+ * in it or on its border; a border that is touched, and a corner that is left with no angle, are put up with
+ * only where nothing else is left. Time: corners that can lie in an ear are sorted along the polygon's longer
+ * side. */
+
+typedef struct vshi_polygon_corner {
+    float x, y; /* in the plane that is looked at */
+    uint32_t next, previous;
+    bool gone;
+} corner;
+
+/* --- exact orientation */
+
+/* Adds b to an expansion of n components that do not overlap, smallest first, which then has n + 1. */
+static void grow_expansion(double *e, int n, double b) {
+    double q = b;
+    for (int i = 0; i < n; ++i) {
+        const double sum = q + e[i];
+        const double virtual_b = sum - q;
+        e[i] = (q - (sum - virtual_b)) + (e[i] - virtual_b);
+        q = sum;
+    }
+    e[n] = q;
+}
+
+/* > 0: a, b, c turn to the left; 0: they lie on a line. Exact. */
+static double orient(const corner *a, const corner *b, const corner *c) {
+    const double ax = (double)a->x, ay = (double)a->y, bx = (double)b->x, by = (double)b->y;
+    const double cx = (double)c->x, cy = (double)c->y;
+    const double left = (ax - cx) * (by - cy), right = (ay - cy) * (bx - cx);
+    const double rough = left - right;
+    /* Each difference is off by 2^-53 of itself, the products and their difference likewise. */
+    static const double margin = 8.0 / 9007199254740992.0;
+    if (fabs(rough) > margin * (fabs(left) + fabs(right))) {
+        return rough;
+    }
+    double e[6];
+    const double terms[6] = {ax * by, -ay * bx, bx * cy, -by * cx, cx * ay, -cy * ax};
+    for (int i = 0; i < 6; ++i) {
+        grow_expansion(e, i, terms[i]);
+    }
+    int last = 5;
+    while (last > 0 && e[last] == 0.0) {
+        --last;
+    }
+    return e[last];
+}
+
+static bool same_place(const corner *a, const corner *b) {
+    return a->x == b->x && a->y == b->y;
+}
+
+/* --- the polygon */
+
+typedef struct cut {
+    corner *c;
+    uint32_t *reflex;
+    size_t count, reflex_count;
+    size_t left;  /* corners not yet cut */
+    bool along_y; /* what reflex corners are sorted by */
+    vshi_job *job;
+    size_t looked; /* ears tried */
+    const uint32_t *vertices;
+    uint32_t *triangles;
+    size_t made;
+    bool simple;
+} cut;
+
+/* Newell's normal (Sutherland, Sproull, Schumacker 1974), about the first corner. */
+static void newell(const float *positions, const uint32_t *vertices, size_t count, double normal[3]) {
+    const float *origin = positions + 3 * (size_t)vertices[0];
+    normal[0] = normal[1] = normal[2] = 0.0;
+    for (size_t i = 0; i < count; ++i) {
+        const float *p = positions + 3 * (size_t)vertices[i];
+        const float *q = positions + 3 * (size_t)vertices[i + 1 < count ? i + 1 : 0];
+        for (int k = 0; k < 3; ++k) {
+            const int u = (k + 1) % 3, v = (k + 2) % 3;
+            const double pu = (double)p[u] - (double)origin[u], pv = (double)p[v] - (double)origin[v];
+            const double qu = (double)q[u] - (double)origin[u], qv = (double)q[v] - (double)origin[v];
+            normal[k] += pu * qv - pv * qu;
+        }
+    }
+}
+
+/* Lays the corners into a plane in which the polygon goes round to the left. False: it has no area. */
+static bool lay_out(cut *p, const float *positions) {
+    double normal[3];
+    newell(positions, p->vertices, p->count, normal);
+    int axis = fabs(normal[1]) > fabs(normal[0]) ? 1 : 0;
+    axis = fabs(normal[2]) > fabs(normal[axis]) ? 2 : axis;
+    if (!(fabs(normal[axis]) > 0.0)) {
+        return false;
+    }
+    const int u = (axis + (normal[axis] > 0.0 ? 1 : 2)) % 3, v = (axis + (normal[axis] > 0.0 ? 2 : 1)) % 3;
+    float low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+    for (size_t i = 0; i < p->count; ++i) {
+        const float *at = positions + 3 * (size_t)p->vertices[i];
+        p->c[i] = (corner){.x = at[u],
+                           .y = at[v],
+                           .next = (uint32_t)(i + 1 < p->count ? i + 1 : 0),
+                           .previous = (uint32_t)(i > 0 ? i - 1 : p->count - 1)};
+        low[0] = fminf(low[0], at[u]);
+        low[1] = fminf(low[1], at[v]);
+        high[0] = fmaxf(high[0], at[u]);
+        high[1] = fmaxf(high[1], at[v]);
+    }
+    p->along_y = high[1] - low[1] > high[0] - low[0];
+    return true;
+}
+
+static float key_of(const cut *p, uint32_t i) {
+    return p->along_y ? p->c[i].y : p->c[i].x;
+}
+
+/* Heap sort: in place, and never slow. */
+static void sift(const cut *p, size_t root, size_t end) {
+    for (size_t child = 2 * root + 1; child < end; child = 2 * root + 1) {
+        child += child + 1 < end && key_of(p, p->reflex[child]) < key_of(p, p->reflex[child + 1]);
+        if (!(key_of(p, p->reflex[root]) < key_of(p, p->reflex[child]))) {
+            return;
+        }
+        const uint32_t swapped = p->reflex[root];
+        p->reflex[root] = p->reflex[child];
+        p->reflex[child] = swapped;
+        root = child;
+    }
+}
+
+/* Corners that are not convex: only they can be the nearest in an ear's way. Cutting makes none. */
+static void find_reflex(cut *p) {
+    p->reflex_count = 0;
+    for (uint32_t i = 0; i < p->count; ++i) {
+        if (!(orient(&p->c[p->c[i].previous], &p->c[i], &p->c[p->c[i].next]) > 0.0)) {
+            p->reflex[p->reflex_count++] = i;
+        }
+    }
+    for (size_t i = p->reflex_count / 2; i-- > 0;) {
+        sift(p, i, p->reflex_count);
+    }
+    for (size_t end = p->reflex_count; end-- > 1;) {
+        const uint32_t swapped = p->reflex[0];
+        p->reflex[0] = p->reflex[end];
+        p->reflex[end] = swapped;
+        sift(p, 0, end);
+    }
+}
+
+/* What is asked of an ear, less and less. */
+enum { CLEAN, FOLDING, TOUCHED, FLAT, ANY_CONVEX, ANY, DEMANDS };
+
+/* Whether a corner lies in the triangle, or (closed) on its border; at one of its corners does not count. */
+static bool in_way(const cut *p, const corner *a, const corner *b, const corner *c, bool closed) {
+    const float least = p->along_y ? fminf(a->y, fminf(b->y, c->y)) : fminf(a->x, fminf(b->x, c->x));
+    const float most = p->along_y ? fmaxf(a->y, fmaxf(b->y, c->y)) : fmaxf(a->x, fmaxf(b->x, c->x));
+    size_t low = 0, high = p->reflex_count;
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        if (key_of(p, p->reflex[middle]) < least) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    for (size_t i = low; i < p->reflex_count && key_of(p, p->reflex[i]) <= most; ++i) {
+        const corner *q = &p->c[p->reflex[i]];
+        if (q->gone || same_place(q, a) || same_place(q, b) || same_place(q, c)) {
+            continue;
+        }
+        const double ab = orient(a, b, q), bc = orient(b, c, q), ca = orient(c, a, q);
+        if (closed ? ab >= 0.0 && bc >= 0.0 && ca >= 0.0 : ab > 0.0 && bc > 0.0 && ca > 0.0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Whether the border turns back on itself at b. */
+static bool folds(const corner *a, const corner *b, const corner *c) {
+    if (orient(a, b, c) != 0.0) {
+        return false;
+    }
+    const double ux = (double)a->x - (double)b->x, uy = (double)a->y - (double)b->y;
+    const double vx = (double)c->x - (double)b->x, vy = (double)c->y - (double)b->y;
+    return ux * vx + uy * vy >= 0.0;
+}
+
+static bool is_ear(cut *p, uint32_t ear, int demand) {
+    const corner *b = &p->c[ear], *a = &p->c[b->previous], *c = &p->c[b->next];
+    const double turn = orient(a, b, c);
+    ++p->looked;
+    if (demand == ANY) {
+        return true;
+    }
+    if (demand == FLAT) {
+        return turn == 0.0;
+    }
+    if (!(turn > 0.0)) {
+        return false;
+    }
+    if (demand == CLEAN && p->left > 3 && (folds(&p->c[a->previous], a, c) || folds(a, c, &p->c[c->next]))) {
+        return false;
+    }
+    return demand == ANY_CONVEX || !in_way(p, a, b, c, demand != TOUCHED);
+}
+
+static void emit(cut *p, uint32_t a, uint32_t b, uint32_t c) {
+    uint32_t *to = p->triangles + 3 * p->made++;
+    to[0] = p->vertices[a];
+    to[1] = p->vertices[b];
+    to[2] = p->vertices[c];
+}
+
+static void cut_ear(cut *p, uint32_t ear, int demand) {
+    corner *b = &p->c[ear];
+    if (demand != FLAT) {
+        emit(p, b->previous, ear, b->next);
+    }
+    p->simple = p->simple && demand < ANY_CONVEX;
+    p->c[b->previous].next = b->next;
+    p->c[b->next].previous = b->previous;
+    b->gone = true;
+    --p->left;
+}
+
+/* The three corners that are left, in their first order. */
+static void cut_last(cut *p) {
+    uint32_t rest[3];
+    size_t found = 0;
+    for (uint32_t i = 0; i < p->count && found < 3; ++i) {
+        if (!p->c[i].gone) {
+            rest[found++] = i;
+        }
+    }
+    const double turn = orient(&p->c[rest[0]], &p->c[rest[1]], &p->c[rest[2]]);
+    if (turn != 0.0) {
+        emit(p, rest[0], rest[1], rest[2]);
+    }
+    p->simple = p->simple && turn >= 0.0;
+}
+
+static vsh_result cut_ears(cut *p, vsh_error *error) {
+    enum { LOOKS_A_POLL = 8192 };
+    size_t next_poll = LOOKS_A_POLL;
+    uint32_t ear = 0;
+    p->left = p->count;
+    while (p->left > 3) {
+        int demand = CLEAN;
+        for (size_t passed = 0; !is_ear(p, ear, demand); ear = p->c[ear].next) {
+            if (++passed == p->left) {
+                passed = 0;
+                ++demand;
+            }
+            if (p->looked >= next_poll) {
+                next_poll = p->looked + LOOKS_A_POLL;
+                if (vshi_job_cancelled(p->job)) {
+                    return vshi_job_fail_cancelled(p->job, error);
+                }
+            }
+        }
+        const uint32_t next = p->c[ear].next;
+        cut_ear(p, ear, demand);
+        ear = next;
+    }
+    cut_last(p);
+    return VSH_OK;
+}
+
+/* Four corners: by the diagonal from the first, or from the one that is not convex, where that gives two
+ * triangles. */
+static bool cut_quad(cut *p) {
+    const corner *c = p->c;
+    uint32_t start = 0;
+    for (uint32_t i = 0; i < 4; ++i) {
+        start = orient(&c[(i + 3) % 4], &c[i], &c[(i + 1) % 4]) > 0.0 ? start : i;
+    }
+    const uint32_t second = (start + 1) % 4, third = (start + 2) % 4, fourth = (start + 3) % 4;
+    if (!(orient(&c[start], &c[second], &c[third]) > 0.0 && orient(&c[start], &c[third], &c[fourth]) > 0.0)) {
+        return false;
+    }
+    emit(p, start, second, third);
+    emit(p, start, third, fourth);
+    return true;
+}
+
+static void cut_fan(cut *p, const float *positions) {
+    for (uint32_t i = 1; i + 1 < p->count; ++i) {
+        double normal[3];
+        const uint32_t three[3] = {p->vertices[0], p->vertices[i], p->vertices[i + 1]};
+        newell(positions, three, 3, normal);
+        p->simple = p->simple && normal[0] == 0.0 && normal[1] == 0.0 && normal[2] == 0.0;
+        emit(p, 0, i, i + 1);
+    }
+}
+
+static vsh_result reserve(vshi_polygon_cutter *cutter, size_t count, vsh_error *error) {
+    if (count <= cutter->capacity) {
+        return VSH_OK;
+    }
+    vshi_polygon_free(cutter);
+    const size_t capacity = count + count / 2;
+    VSHI_TRY(vshi_allocate((void **)&cutter->corners, capacity, sizeof *cutter->corners, "polygon", error));
+    VSHI_TRY(vshi_allocate((void **)&cutter->reflex, capacity, sizeof *cutter->reflex, "polygon", error));
+    cutter->capacity = capacity;
+    return VSH_OK;
+}
+
+vsh_result vshi_polygon_cut(vshi_polygon_cutter *cutter, const float *positions, const uint32_t *vertices,
+                            size_t count, vshi_job *job, uint32_t *triangles, size_t *made, bool *simple,
+                            vsh_error *error) {
+    *made = 0;
+    *simple = true;
+    if (count == 3) {
+        memcpy(triangles, vertices, sizeof(uint32_t[3]));
+        *made = 1;
+        return VSH_OK;
+    }
+    VSHI_TRY(reserve(cutter, count, error));
+    cut p = {.c = cutter->corners,
+             .reflex = cutter->reflex,
+             .count = count,
+             .job = job,
+             .vertices = vertices,
+             .triangles = triangles,
+             .simple = true};
+    vsh_result result = VSH_OK;
+    if (!lay_out(&p, positions)) {
+        cut_fan(&p, positions);
+    } else if (count != 4 || !cut_quad(&p)) {
+        find_reflex(&p);
+        result = cut_ears(&p, error);
+    }
+    *made = p.made;
+    *simple = p.simple;
+    return result;
+}
+
+void vshi_polygon_free(vshi_polygon_cutter *cutter) {
+    free(cutter->reflex);
+    free(cutter->corners);
+    *cutter = (vshi_polygon_cutter){0};
+}
 
 /* Polygons that shared their first corner with the face before have always begun at another one (Assimp's
  * encoding of polygons as fans), and so bakes keep their bits. */
@@ -22,8 +371,8 @@ static void turn_fan(vshi_face_cutter *cutter, uint32_t *triangles, size_t count
     cutter->begun = true;
 }
 
-static vsh_result cut(vshi_face_cutter *cutter, const float *positions, const uint32_t *corners, size_t count,
-                      uint32_t *triangles, size_t *made, vsh_error *error) {
+static vsh_result cut_face(vshi_face_cutter *cutter, const float *positions, const uint32_t *corners,
+                           size_t count, uint32_t *triangles, size_t *made, vsh_error *error) {
     bool simple;
     VSHI_TRY(vshi_polygon_cut(&cutter->polygon, positions, corners, count, cutter->job, triangles, made,
                               &simple, error));
@@ -55,7 +404,7 @@ static vsh_result cut_apart(vshi_face_cutter *cutter, const uint32_t *corners, s
         cutter->own_corners[i] = (uint32_t)i;
     }
     cutter->begun = false;
-    VSHI_TRY(cut(cutter, cutter->own_positions, cutter->own_corners, count, triangles, made, error));
+    VSHI_TRY(cut_face(cutter, cutter->own_positions, cutter->own_corners, count, triangles, made, error));
     for (size_t i = 0; i < 3 * *made; ++i) {
         triangles[i] = corners[triangles[i]];
     }
@@ -75,7 +424,7 @@ vsh_result vshi_face_cut(vshi_face_cutter *cutter, const uint32_t *corners, size
     if (cutter->apart && count > 3) {
         return cut_apart(cutter, corners, count, triangles, made, error);
     }
-    return cut(cutter, cutter->positions, corners, count, triangles, made, error);
+    return cut_face(cutter, cutter->positions, corners, count, triangles, made, error);
 }
 
 void vshi_face_cutter_end(vshi_face_cutter *cutter, const vsh_run *run, const char *path, const char *name) {

@@ -6,7 +6,6 @@
 #include "base/try.h"
 #include "model/gltf.h"
 #include "model/obj.h"
-#include "model/ply.h"
 #include "model/scan.h"
 
 #include <assimp/scene.h>

@@ -17,6 +17,10 @@ enum { VSHI_MODEL_FILE_UNITS = 900 }; /* of the job */
 vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *job, bool alone,
                                 vshi_import **import, vsh_model **model, double *unit, vsh_error *error);
 
+/* Reads a PLY, for `units` of the job. Errors: as vsh_model_read(). */
+vsh_result vshi_ply_read(const char *path, const vsh_run *run, vshi_job *job, size_t units, vsh_model **model,
+                         vsh_error *error);
+
 /* --- scene formats that are not read, told by name so that nobody looks for the fault in his file */
 
 /* What is said to whoever gives another. */

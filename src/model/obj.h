@@ -5,8 +5,10 @@
 
 #include "model/faces.h"
 #include "model/model.h"
+#include "model/scan.h"
 #include "model/stream.h"
-#include "model/words.h"
+
+#include <stdbool.h>
 
 enum { VSHI_OBJ_POSITION, VSHI_OBJ_TEXTURE, VSHI_OBJ_NORMAL, VSHI_OBJ_KINDS };
 
@@ -81,13 +83,7 @@ vsh_result vshi_obj_read(const char *path, const vsh_run *run, vshi_job *job, si
 
 /* --- parts: objects, groups, materials */
 
-/* Faces, lines or points follow: there is a mesh for them. */
-vsh_result vshi_obj_need_mesh(vshi_obj *obj, vsh_error *error);
-
 /* The statements o, g, usemtl and mtllib with what stands behind them. */
-vsh_result vshi_obj_set_object(vshi_obj *obj, const char *text, size_t size, vsh_error *error);
-vsh_result vshi_obj_set_group(vshi_obj *obj, const char *text, size_t size, vsh_error *error);
-vsh_result vshi_obj_set_material(vshi_obj *obj, const char *text, size_t size, vsh_error *error);
 vsh_result vshi_obj_read_materials(vshi_obj *obj, const char *text, size_t size, vsh_error *error);
 
 /* Where the material library is that an OBJ at `path` (".obj") names, in new memory: first the file of that
@@ -101,6 +97,24 @@ vsh_result vshi_obj_material(vshi_obj *obj, const char *name, size_t size, size_
 
 /* --- what it becomes */
 
-vsh_result vshi_obj_build(vshi_obj *obj, vsh_model *model, vsh_error *error);
+/* The texture that a statement of an MTL names (Wavefront, "MTL material format", 1995): "map_d -clamp on
+ * -imfchan r my leaf.png". */
+
+typedef struct vshi_mtl_map {
+    vshi_token name;  /* of the file, all that follows the options; text NULL: there is none */
+    int32_t channel;  /* VSH_MASK_CHANNEL_…: -imfchan */
+    bool clamp;       /* -clamp on */
+    double offset[2]; /* -o: looked up at scale × uv + offset */
+    double scale[2];  /* -s */
+    vshi_token other; /* an option that changes values or places, and is not taken; text NULL: none */
+} vshi_mtl_map;
+
+/* Reads what stands behind the keyword, up to `end`. False where an option, `other`, is unknown or lacks its
+ * value. */
+bool vshi_mtl_map_read(const char *at, const char *end, vshi_mtl_map *map);
+
+/* The file of that name beside the MTL at `path`, in new memory; where none is called so, and a name has '\'
+ * in it, those are '/'. NULL: memory is short. */
+char *vshi_mtl_map_path(const char *path, vshi_token name);
 
 #endif

@@ -1,10 +1,63 @@
-#include "model/ply.h"
-
+/* PLY (G. Turk, "The PLY polygon file format", 1994): vertices, and faces or the strips (element tristrips)
+ * of Stanford's scans. */
+#include "table/ply.h"
+#include "base/bytes.h"
+#include "base/decimal.h"
 #include "base/try.h"
+#include "model/faces.h"
+#include "model/model.h"
+#include "model/model_file.h"
+#include "model/scan.h"
+#include "model/stream.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
+
+/* What a property is to us. Of a vertex: a number that it is made of. */
+enum {
+    VSHI_PLY_X,
+    VSHI_PLY_NX = 3,
+    VSHI_PLY_U = 6,
+    VSHI_PLY_NUMBERS = 8,
+    VSHI_PLY_CORNERS = VSHI_PLY_NUMBERS, /* lists */
+    VSHI_PLY_TEXCOORDS,
+    VSHI_PLY_STRIP,
+    VSHI_PLY_NOTHING
+};
+
+enum { VSHI_PLY_MOST_TEXCOORDS = 8 }; /* of one face that are kept: two for each corner */
+
+typedef struct row_property {
+    int8_t type, count_type; /* as in the header */
+    int8_t role;
+    int8_t size, count_size; /* bytes in a binary file */
+} row_property;
+
+typedef struct ply_reader {
+    const char *path;
+    const vsh_run *run;
+    vshi_job *job;
+    vshi_budget budget;
+    vshi_stream stream;
+    vshi_ply_header head;
+    row_property property[VSHI_PLY_PROPERTIES];
+    const vshi_ply_element *element;
+    uint64_t row;
+    uint64_t vertices; /* that the header names */
+    bool has_normals, has_uvs;
+    float *positions, *normals, *uvs;
+    size_t position_capacity, normal_capacity, uv_capacity, vertex_count;
+    vshi_faces faces;
+    /* of the row */
+    float number[VSHI_PLY_NUMBERS];
+    size_t corners; /* of the face; of a strip, triangles' */
+    float texcoord[VSHI_PLY_MOST_TEXCOORDS];
+    size_t texcoords;
+    vsh_result failed;
+} ply_reader;
 
 /* --- the header */
 
@@ -39,7 +92,7 @@ static int role_of(const char *element, const vshi_ply_property *property) {
 }
 
 /* Strips take the place of faces: there can be no others, and nothing but vertices in their rows. */
-static vsh_result check_strips(const vshi_ply_reader *r, const vshi_ply_element *strips, vsh_error *error) {
+static vsh_result check_strips(const ply_reader *r, const vshi_ply_element *strips, vsh_error *error) {
     const vshi_ply_property *list = &r->head.property[strips->first];
     bool others = false;
     for (int e = 0; e < r->head.elements; ++e) {
@@ -56,12 +109,12 @@ static vsh_result check_strips(const vshi_ply_reader *r, const vshi_ply_element 
                      r->path);
 }
 
-static vsh_result describe(vshi_ply_reader *r, const vshi_ply_element *element, vsh_error *error) {
+static vsh_result describe(ply_reader *r, const vshi_ply_element *element, vsh_error *error) {
     const bool vertex = strcmp(element->name, "vertex") == 0, again = vertex && r->vertices > 0;
     for (int p = element->first; p < element->end; ++p) {
         const vshi_ply_property *from = &r->head.property[p];
         const bool list = from->count_type >= 0;
-        r->property[p] = (vshi_ply_row_property){
+        r->property[p] = (row_property){
             .type = from->type,
             .count_type = from->count_type,
             .role = (int8_t)(again ? VSHI_PLY_NOTHING : role_of(element->name, from)),
@@ -82,7 +135,7 @@ static vsh_result describe(vshi_ply_reader *r, const vshi_ply_element *element, 
                                                                            : VSH_OK;
 }
 
-static vsh_result read_header(vshi_ply_reader *r, vsh_error *error) {
+static vsh_result read_header(ply_reader *r, vsh_error *error) {
     vshi_ply_header *head = &r->head;
     while (!head->ended) {
         const char *at = r->stream.at;
@@ -104,7 +157,8 @@ static vsh_result read_header(vshi_ply_reader *r, vsh_error *error) {
 
 /* --- rows */
 
-vsh_result vshi_ply_keep_vertex(vshi_ply_reader *r, vsh_error *error) {
+/* Keeps the vertex that was read. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+static vsh_result keep_vertex(ply_reader *r, vsh_error *error) {
     const size_t v = r->vertex_count, next = v + 1;
     VSHI_TRY(vshi_grow(&r->budget, &r->positions, &r->position_capacity, next, sizeof(float[3]), error));
     memcpy(r->positions + 3 * v, r->number + VSHI_PLY_X, sizeof(float[3]));
@@ -121,7 +175,368 @@ vsh_result vshi_ply_keep_vertex(vshi_ply_reader *r, vsh_error *error) {
 }
 
 /* Texture coordinates of a face's corners are those of its vertices: the last face's count. */
-static vsh_result keep_texcoords(vshi_ply_reader *r, const uint32_t *corners, vsh_error *error) {
+
+/* Rows of a PLY as nearly all files have them: vertices of numbers only, and faces that are one list of
+ * indices. What is not so, or is wrong, is left to the reader of single rows. */
+
+enum { MOST_CORNERS = 8 };
+
+/* The number of bytes that a row of an element without lists takes in a binary file; 0: it has lists. */
+static size_t row_bytes(const ply_reader *r) {
+    size_t bytes = 0;
+    for (int p = r->element->first; p < r->element->end; ++p) {
+        if (r->property[p].count_type >= 0) {
+            return 0;
+        }
+        bytes += (size_t)r->property[p].size;
+    }
+    return bytes;
+}
+
+static void binary_vertex(ply_reader *r, const char *at) {
+    for (int p = r->element->first; p < r->element->end; at += r->property[p++].size) {
+        const row_property *property = &r->property[p];
+        if (property->role < VSHI_PLY_NUMBERS) {
+            r->number[property->role] = (float)vshi_ply_number(at, property->type, r->head.big_endian);
+        }
+    }
+}
+
+static inline const char *skip_space(const char *c, const char *end) {
+    while (c < end && (*c == ' ' || (*c >= '\t' && *c <= '\r'))) {
+        ++c;
+    }
+    return c;
+}
+
+/* Behind the row; NULL: it is not plain. `end` is far enough from the window's for all tokens of a plain row.
+ */
+static const char *text_vertex(ply_reader *r, const char *at) {
+    for (int p = r->element->first; p < r->element->end; ++p) {
+        float number;
+        at = skip_space(at, r->stream.end);
+        const char *next = vshi_decimal_float(at, &number);
+        if (next == NULL || (*next != ' ' && *next != '\n' && *next != '\r') || !isfinite(number)) {
+            return NULL;
+        }
+        at = next;
+        if (r->property[p].role < VSHI_PLY_NUMBERS) {
+            r->number[r->property[p].role] = number;
+        }
+    }
+    return at;
+}
+
+/* The end of the last line in the window: rows of text before it are whole, and end there. */
+static const char *safe_end(const ply_reader *r) {
+    const char *c = r->stream.end;
+    while (c > r->stream.at && c[-1] != '\n') {
+        --c;
+    }
+    return c;
+}
+
+static vsh_result read_plain_vertices(ply_reader *r, vsh_error *error) {
+    const size_t bytes = row_bytes(r);
+    const char *const end = r->head.ascii ? safe_end(r) : r->stream.end;
+    while (bytes > 0 && r->row < r->element->count) {
+        const char *next = r->stream.at + bytes;
+        if (!r->head.ascii && (size_t)(end - r->stream.at) >= bytes) {
+            binary_vertex(r, r->stream.at);
+        } else {
+            next = r->head.ascii && r->stream.at < end ? text_vertex(r, r->stream.at) : NULL;
+        }
+        if (next == NULL || next > end) {
+            break;
+        }
+        VSHI_TRY(keep_vertex(r, error));
+        r->stream.at = next;
+        ++r->row;
+    }
+    return VSH_OK;
+}
+
+/* The corners of a face; behind it, or NULL. */
+static const char *binary_face(const ply_reader *r, const char *at, const char *end, uint32_t *corners,
+                               size_t *count) {
+    if (at == end) {
+        return NULL;
+    }
+    *count = (unsigned char)*at++;
+    if (*count > MOST_CORNERS || (size_t)(end - at) < 4 * *count) {
+        return NULL;
+    }
+    for (size_t i = 0; i < *count; ++i, at += 4) {
+        corners[i] = vshi_ply_word(at, r->head.big_endian);
+    }
+    return at;
+}
+
+static const char *text_face(const char *at, const char *end, uint32_t *corners, size_t *count) {
+    enum { MOST_DIGITS = 9 };
+    at = skip_space(at, end);
+    for (size_t i = 0; i == 0 || i <= *count; ++i) {
+        const char *first = at;
+        uint32_t number = 0;
+        for (; (unsigned char)(*at - '0') < 10; ++at) {
+            number = 10 * number + (unsigned char)(*at - '0');
+        }
+        if (at == first || at - first > MOST_DIGITS || (*at != ' ' && *at != '\n' && *at != '\r')) {
+            return NULL;
+        }
+        if (i > 0) {
+            corners[i - 1] = number;
+        } else if (number > MOST_CORNERS) {
+            return NULL;
+        } else {
+            *count = number;
+        }
+        at += *at == ' ' && i < *count;
+    }
+    return at;
+}
+
+static bool in_range(const ply_reader *r, const uint32_t *corners, size_t count) {
+    uint32_t most = 0;
+    for (size_t i = 0; i < count; ++i) {
+        most = corners[i] > most ? corners[i] : most;
+    }
+    return most < r->vertices;
+}
+
+static vsh_result read_plain_faces(ply_reader *r, vsh_error *error) {
+    const row_property *list = &r->property[r->element->first];
+    vshi_faces *faces = &r->faces;
+    if (r->element->end != r->element->first + 1 || r->vertices == 0 ||
+        (!r->head.ascii && (list->count_size != 1 || list->size != 4 || list->type >= VSHI_PLY_FLOAT))) {
+        return VSH_OK;
+    }
+    const char *const end = r->head.ascii ? safe_end(r) : r->stream.end;
+    while (r->row < r->element->count && r->stream.at < end) {
+        size_t count = 0;
+        VSHI_TRY(vshi_grow(&r->budget, &faces->corners, &faces->capacity, faces->count + MOST_CORNERS,
+                           sizeof *faces->corners, error));
+        uint32_t *corners = faces->corners + faces->count;
+        const char *next = r->head.ascii ? text_face(r->stream.at, end, corners, &count)
+                                         : binary_face(r, r->stream.at, end, corners, &count);
+        if (next == NULL || next > end || !in_range(r, corners, count)) {
+            break;
+        }
+        faces->count += count;
+        VSHI_TRY(vshi_faces_end_face(faces, &r->budget, 0, count, error));
+        r->stream.at = next;
+        ++r->row;
+    }
+    return VSH_OK;
+}
+
+/* Reads rows from the window on while they are as nearly all files have them, as many as are there whole, and
+ * moves stream.at and row: whatever else follows, and every error, is read_row()'s. Errors:
+ * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+static vsh_result read_plain_rows(ply_reader *reader, int role, vsh_error *error) {
+    return role < VSHI_PLY_NUMBERS    ? read_plain_vertices(reader, error)
+           : role == VSHI_PLY_CORNERS ? read_plain_faces(reader, error)
+                                      : VSH_OK;
+}
+
+/* --- one row of a PLY, in text or binary */
+
+/* A row on its way. */
+typedef struct ply_cursor {
+    ply_reader *reader;
+    const char *at, *end;
+    vsh_error *error;
+    int64_t last[2]; /* indices of the strip, of which `length` have been read */
+    size_t length;
+} ply_cursor;
+
+static bool fail(ply_cursor *c, vsh_result result) {
+    c->reader->failed = result;
+    return false;
+}
+
+/* The window ends: what it lacks may be there yet. */
+static bool want_more(ply_cursor *c) {
+    ply_reader *r = c->reader;
+    return vshi_stream_ended(&r->stream) ? fail(c, vshi_ply_fail_short(r->path, r->element, r->row, c->error))
+                                         : false;
+}
+
+static bool fail_value(ply_cursor *c, vshi_token token, const char *expected) {
+    const ply_reader *r = c->reader;
+    return fail(c, vshi_fail(c->error, VSH_ERROR_INPUT, "%s: %s %" PRIu64 " holds '%.*s', expected %s",
+                             r->path, r->element->name, r->row, VSHI_TOKEN_ARGS(token), expected));
+}
+
+static bool push_corner(ply_cursor *c, uint32_t corner) {
+    ply_reader *r = c->reader;
+    vshi_faces *faces = &r->faces;
+    const size_t at = faces->count + r->corners;
+    if (at == faces->capacity) {
+        const vsh_result result = vshi_grow(&r->budget, &faces->corners, &faces->capacity, at + 1,
+                                            sizeof *faces->corners, c->error);
+        if (result != VSH_OK) {
+            return fail(c, result);
+        }
+    }
+    faces->corners[at] = corner;
+    ++r->corners;
+    return true;
+}
+
+static bool check_index(ply_cursor *c, int64_t index) {
+    const ply_reader *r = c->reader;
+    return index >= 0 && (uint64_t)index < r->vertices
+               ? true
+               : fail(c, vshi_fail(c->error, VSH_ERROR_INPUT,
+                                   "%s: %s %" PRIu64 " uses vertex %" PRId64 ", but there are only %" PRIu64,
+                                   r->path, r->element->name, r->row, index, r->vertices));
+}
+
+/* The next index of a strip; -1 begins another. Every second triangle of a strip runs the other way around;
+ * those of fewer than three vertices, by which strips are joined, are left out. */
+static bool push_strip(ply_cursor *c, int64_t index) {
+    if (index == -1) {
+        c->length = 0;
+        return true;
+    }
+    if (!check_index(c, index)) {
+        return false;
+    }
+    const int64_t a = c->last[0], b = c->last[1];
+    c->last[0] = b;
+    c->last[1] = index;
+    if (c->length++ < 2 || a == b || b == index || a == index) {
+        return true;
+    }
+    const bool odd = c->length % 2 == 0;
+    return push_corner(c, (uint32_t)(odd ? b : a)) && push_corner(c, (uint32_t)(odd ? a : b)) &&
+           push_corner(c, (uint32_t)index);
+}
+
+static bool push_index(ply_cursor *c, int role, int64_t index) {
+    return role == VSHI_PLY_STRIP ? push_strip(c, index)
+                                  : check_index(c, index) && push_corner(c, (uint32_t)index);
+}
+
+static void push_number(ply_cursor *c, int role, float number) {
+    ply_reader *r = c->reader;
+    if (role < VSHI_PLY_NUMBERS) {
+        r->number[role] = number;
+    } else if (role == VSHI_PLY_TEXCOORDS) {
+        if (r->texcoords < VSHI_PLY_MOST_TEXCOORDS) {
+            r->texcoord[r->texcoords] = number;
+        }
+        ++r->texcoords;
+    }
+}
+
+/* --- text */
+
+/* The next token; one that the window's end may have cut is none yet. */
+static bool next_token(ply_cursor *c, vshi_token *token) {
+    *token = vshi_scan_token(&c->at, c->end);
+    return token->text != NULL && (c->at < c->end || vshi_stream_ended(&c->reader->stream)) ? true
+                                                                                            : want_more(c);
+}
+
+static bool take_text(ply_cursor *c, int role) {
+    static const char finite[] = "a finite number";
+    vshi_token token;
+    if (!next_token(c, &token)) {
+        return false;
+    }
+    if (role == VSHI_PLY_CORNERS || role == VSHI_PLY_STRIP) {
+        int64_t index;
+        return vshi_token_integer(token, &index) && (index >= 0 || role == VSHI_PLY_STRIP)
+                   ? push_index(c, role, index)
+                   : fail_value(c, token, "an index of a vertex");
+    }
+    float number;
+    if (vshi_decimal_float(token.text, &number) != token.text + token.size) {
+        /* no place is there, but other things may be so */
+        if (vshi_token_number(token) != VSHI_NUMBER_NOT_FINITE || role < VSHI_PLY_NX) {
+            return fail_value(c, token, finite);
+        }
+        number = NAN;
+    } else if (role < VSHI_PLY_NX && !isfinite(number)) {
+        return fail_value(c, token, finite);
+    }
+    push_number(c, role, number);
+    return true;
+}
+
+static bool take_text_property(ply_cursor *c, const row_property *property) {
+    int64_t values = 1;
+    if (property->count_type >= 0) {
+        vshi_token token;
+        if (!next_token(c, &token)) {
+            return false;
+        }
+        if (!vshi_token_integer(token, &values) || values < 0) {
+            return fail_value(c, token, "a list's length");
+        }
+    }
+    for (int64_t i = 0; i < values; ++i) {
+        if (!take_text(c, property->role)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* --- binary */
+
+/* Indices that are floats (nobody writes them so) are whole, or none. */
+static int64_t index_at(const char *at, int type, bool big_endian) {
+    if (type < VSHI_PLY_FLOAT) {
+        return vshi_bytes_integer(at, 1 << type / 2, type % 2 == 0, big_endian);
+    }
+    const float number = (float)vshi_ply_number(at, type, big_endian);
+    return number >= 0.0F && number <= 16777216.0F && floorf(number) == number ? (int64_t)number : -2;
+}
+
+static bool take_binary_property(ply_cursor *c, const row_property *property) {
+    const bool big = c->reader->head.big_endian;
+    uint64_t values = 1;
+    if (property->count_type >= 0) {
+        if (c->end - c->at < property->count_size) {
+            return want_more(c);
+        }
+        values = vshi_bytes_number(c->at, property->count_size, big);
+        c->at += property->count_size;
+    }
+    if (values > (uint64_t)(c->end - c->at) / (uint64_t)property->size) {
+        return want_more(c);
+    }
+    const char *at = c->at;
+    c->at += values * (uint64_t)property->size;
+    for (; property->role != VSHI_PLY_NOTHING && at < c->at; at += property->size) {
+        if (property->role != VSHI_PLY_CORNERS && property->role != VSHI_PLY_STRIP) {
+            push_number(c, property->role, (float)vshi_ply_number(at, property->type, big));
+        } else if (!push_index(c, property->role, index_at(at, property->type, big))) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Reads the row at `at` into the reader's members, and its corners behind those of `faces`. Returns behind
+ * it; NULL: it failed, or (reader->failed is VSH_OK) the window ends within it. */
+static const char *read_row(ply_reader *reader, const char *at, vsh_error *error) {
+    ply_cursor c = {.reader = reader, .at = at, .end = reader->stream.end, .error = error};
+    const bool ascii = reader->head.ascii;
+    reader->corners = reader->texcoords = 0;
+    for (int p = reader->element->first; p < reader->element->end; ++p) {
+        const row_property *property = &reader->property[p];
+        if (!(ascii ? take_text_property(&c, property) : take_binary_property(&c, property))) {
+            return NULL;
+        }
+    }
+    return c.at;
+}
+
+static vsh_result keep_texcoords(ply_reader *r, const uint32_t *corners, vsh_error *error) {
     enum { LEAST = 6 };
     if (r->texcoords < LEAST || r->texcoords > VSHI_PLY_MOST_TEXCOORDS || r->corners < r->texcoords / 2) {
         return VSH_OK;
@@ -137,11 +552,11 @@ static vsh_result keep_texcoords(vshi_ply_reader *r, const uint32_t *corners, vs
     return VSH_OK;
 }
 
-static vsh_result keep_row(vshi_ply_reader *r, int role, vsh_error *error) {
+static vsh_result keep_row(ply_reader *r, int role, vsh_error *error) {
     vshi_faces *faces = &r->faces;
     const uint32_t *corners = faces->corners != NULL ? faces->corners + faces->count : NULL;
     if (role < VSHI_PLY_NUMBERS) {
-        return vshi_ply_keep_vertex(r, error);
+        return keep_vertex(r, error);
     }
     if (role == VSHI_PLY_STRIP) {
         for (size_t i = 0; i < r->corners; i += 3) {
@@ -159,7 +574,7 @@ static vsh_result keep_row(vshi_ply_reader *r, int role, vsh_error *error) {
 }
 
 /* What an element's rows are: of vertices, faces or strips, or of nothing that is kept. */
-static int role_of_rows(const vshi_ply_reader *r) {
+static int role_of_rows(const ply_reader *r) {
     int role = VSHI_PLY_NOTHING;
     for (int p = r->element->first; p < r->element->end; ++p) {
         role = r->property[p].role < role ? r->property[p].role : role;
@@ -167,15 +582,15 @@ static int role_of_rows(const vshi_ply_reader *r) {
     return role;
 }
 
-static vsh_result read_element(vshi_ply_reader *r, vsh_error *error) {
+static vsh_result read_element(ply_reader *r, vsh_error *error) {
     const int role = role_of_rows(r);
     memset(r->number, 0, sizeof r->number);
     for (r->row = 0; r->row < r->element->count;) {
-        VSHI_TRY(vshi_ply_read_plain_rows(r, role, error));
+        VSHI_TRY(read_plain_rows(r, role, error));
         if (r->row == r->element->count) {
             break;
         }
-        const char *next = vshi_ply_read_row(r, r->stream.at, error);
+        const char *next = read_row(r, r->stream.at, error);
         if (next != NULL) {
             VSHI_TRY(keep_row(r, role, error));
             r->stream.at = next;
@@ -191,7 +606,7 @@ static vsh_result read_element(vshi_ply_reader *r, vsh_error *error) {
 
 /* --- what it becomes */
 
-static vsh_result check_vertices(const vshi_ply_reader *r, vsh_error *error) {
+static vsh_result check_vertices(const ply_reader *r, vsh_error *error) {
     size_t bad = 0;
     if (r->vertex_count != r->vertices) { /* faces were held against what the header names */
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: its vertices have no x, y or z", r->path);
@@ -217,7 +632,7 @@ static vsh_result check_vertices(const vshi_ply_reader *r, vsh_error *error) {
     return VSH_OK;
 }
 
-static vsh_result make_triangles(vshi_ply_reader *r, vshi_model_shape *shape, vsh_error *error) {
+static vsh_result make_triangles(ply_reader *r, vshi_model_shape *shape, vsh_error *error) {
     bool plain;
     size_t capacity = 0;
     vshi_faces *faces = &r->faces;
@@ -236,7 +651,7 @@ static vsh_result make_triangles(vshi_ply_reader *r, vshi_model_shape *shape, vs
     return result;
 }
 
-static vsh_result build(vshi_ply_reader *r, vsh_model *model, vsh_error *error) {
+static vsh_result build(ply_reader *r, vsh_model *model, vsh_error *error) {
     static const double world[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     size_t capacity = 0;
     VSHI_TRY(check_vertices(r, error));
@@ -258,7 +673,7 @@ static vsh_result build(vshi_ply_reader *r, vsh_model *model, vsh_error *error) 
 
 vsh_result vshi_ply_read(const char *path, const vsh_run *run, vshi_job *job, size_t units, vsh_model **model,
                          vsh_error *error) {
-    vshi_ply_reader r = {.path = path, .run = run, .job = job, .budget = {path, run, 0.0}};
+    ply_reader r = {.path = path, .run = run, .job = job, .budget = {path, run, 0.0}};
     vsh_model *made = NULL;
     vsh_result result;
     VSHI_TRY_DONE(vshi_stream_open(&r.stream, path, &r.budget, job, units, error));

@@ -21,12 +21,6 @@ typedef struct vshi_scan {
  * VSH_ERROR_READ where it ends early, VSH_ERROR_INPUT where its content is bad, VSH_ERROR_CANCELLED. */
 vsh_result vshi_scan_file(vshi_scan *scan, const char *ending, vsh_error *error);
 
-vsh_result vshi_scan_stl(vshi_scan *scan, vsh_error *error);
-vsh_result vshi_scan_dae(vshi_scan *scan, vsh_error *error);
-
-/* Tells the job that the file has been looked at up to `at`; true where it is cancelled. */
-bool vshi_scan_poll(vshi_scan *scan, const char *at);
-
 /* A run of characters that are no white space, within one file. */
 typedef struct vshi_token {
     const char *text; /* NULL: there is none */

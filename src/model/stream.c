@@ -1,7 +1,9 @@
 #define _GNU_SOURCE
 #include "model/stream.h"
 
+#include "base/hash.h"
 #include "base/input.h"
+#include "base/memory.h"
 #include "base/try.h"
 
 #include <errno.h>
@@ -9,7 +11,113 @@
 #include <string.h>
 #include <unistd.h>
 
+vsh_result vshi_reserve(vshi_budget *budget, void *memory, size_t *capacity, size_t needed, size_t size,
+                        vsh_error *error) {
+    void *array;
+    size_t bytes;
+    if (needed <= *capacity) {
+        return VSH_OK;
+    }
+    if (__builtin_mul_overflow(needed, size, &bytes)) {
+        return vshi_fail(error, VSH_ERROR_MEMORY,
+                         "%s: %zu × %zu bytes are more than this machine can address", budget->path, needed,
+                         size);
+    }
+    /* while it moves there are two of it */
+    VSHI_TRY(vshi_check_limit(budget->run, budget->bytes + (double)bytes, budget->path, error));
+    memcpy(&array, memory, sizeof array);
+    array = realloc(array, bytes);
+    if (array == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", budget->path, bytes);
+    }
+    memcpy(memory, &array, sizeof array);
+    budget->bytes += (double)(needed - *capacity) * (double)size;
+    *capacity = needed;
+    return VSH_OK;
+}
+
+vsh_result vshi_grow(vshi_budget *budget, void *memory, size_t *capacity, size_t needed, size_t size,
+                     vsh_error *error) {
+    enum { LEAST = 16 };
+    return needed <= *capacity
+               ? VSH_OK
+               : vshi_reserve(budget, memory, capacity, needed + needed / 2 + LEAST, size, error);
+}
+
+enum { LONGEST = 1023 };
+
+static uint64_t hash_of(const char *name, size_t size) {
+    uint64_t hash = size;
+    for (size_t i = 0; i < size; ++i) {
+        hash = vshi_mix(hash ^ (unsigned char)name[i]);
+    }
+    return hash;
+}
+
+/* The slot of a name, or the empty one where it would be. There is always an empty one. */
+static uint32_t *slot_of(const vshi_words *words, const char *name, size_t size) {
+    const size_t mask = words->slot_count - 1;
+    size_t at = hash_of(name, size) & mask;
+    for (; words->slots[at] != 0; at = (at + 1) & mask) {
+        const char *known = vshi_words_at(words, words->slots[at] - 1);
+        if (strncmp(known, name, size) == 0 && known[size] == '\0') {
+            break;
+        }
+    }
+    return &words->slots[at];
+}
+
+static vsh_result grow_slots(vshi_words *words, vshi_budget *budget, vsh_error *error) {
+    enum { FIRST = 64 };
+    if (words->count < words->slot_count / 2) {
+        return VSH_OK;
+    }
+    const size_t slots = words->slot_count > 0 ? 2 * words->slot_count : FIRST;
+    VSHI_TRY(vshi_reserve(budget, &words->slots, &words->slot_capacity, slots, sizeof *words->slots, error));
+    words->slot_count = slots;
+    memset(words->slots, 0, slots * sizeof *words->slots);
+    for (size_t i = 0; i < words->count; ++i) {
+        const char *name = vshi_words_at(words, i);
+        *slot_of(words, name, strlen(name)) = (uint32_t)i + 1;
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_words_number(vshi_words *words, vshi_budget *budget, const char *name, size_t size,
+                             size_t *number, bool *is_new, vsh_error *error) {
+    size = size > 0 ? strnlen(name, size < LONGEST ? size : LONGEST) : 0;
+    VSHI_TRY(grow_slots(words, budget, error));
+    uint32_t *slot = slot_of(words, name, size);
+    *is_new = *slot == 0;
+    if (*is_new) {
+        VSHI_TRY(vshi_grow(budget, &words->text, &words->text_capacity, words->used + size + 1, 1, error));
+        VSHI_TRY(vshi_grow(budget, &words->begins, &words->capacity, words->count + 1, sizeof *words->begins,
+                           error));
+        memcpy(words->text + words->used, name, size);
+        words->text[words->used + size] = '\0';
+        words->begins[words->count++] = words->used;
+        words->used += size + 1;
+        *slot = (uint32_t)words->count;
+    }
+    *number = *slot - 1;
+    return VSH_OK;
+}
+
+void vshi_words_free(vshi_words *words) {
+    free(words->slots);
+    free(words->begins);
+    free(words->text);
+    *words = (vshi_words){0};
+}
+
 enum { PIECE = 1 << 18 }; /* bytes: half of a second-level cache */
+
+bool vshi_advance_to(vshi_job *job, double fraction, size_t units, size_t *units_done) {
+    const size_t reached = (size_t)(fraction * (double)units);
+    const size_t more = reached > *units_done ? reached - *units_done : 0;
+    *units_done += more;
+    return vshi_job_advance(job, more);
+}
 
 vsh_result vshi_stream_open(vshi_stream *stream, const char *path, vshi_budget *budget, vshi_job *job,
                             size_t units, vsh_error *error) {
@@ -48,14 +156,6 @@ static vsh_result make_room(vshi_stream *stream, vsh_error *error) {
     return VSH_OK;
 }
 
-static vsh_result tell_job(vshi_stream *stream, vsh_error *error) {
-    const double fraction = (double)stream->read / (double)stream->size;
-    const size_t reached = (size_t)(fraction * (double)stream->units);
-    const size_t more = reached > stream->units_done ? reached - stream->units_done : 0;
-    stream->units_done += more;
-    return vshi_job_advance(stream->job, more) ? vshi_job_fail_cancelled(stream->job, error) : VSH_OK;
-}
-
 vsh_result vshi_stream_fill(vshi_stream *stream, vsh_error *error) {
     if (vshi_stream_ended(stream)) {
         return VSH_OK;
@@ -75,7 +175,10 @@ vsh_result vshi_stream_fill(vshi_stream *stream, vsh_error *error) {
     stream->read += (uint64_t)got;
     stream->end += got;
     memset(stream->buffer + used + got, '\n', VSHI_STREAM_PADDING);
-    return tell_job(stream, error);
+    return vshi_advance_to(stream->job, (double)stream->read / (double)stream->size, stream->units,
+                           &stream->units_done)
+               ? vshi_job_fail_cancelled(stream->job, error)
+               : VSH_OK;
 }
 
 /* Behind the last line that does not go on in the next; NULL: there is none. */

@@ -4,10 +4,35 @@
 #define VSHI_STREAM_H
 
 #include "base/job.h"
-#include "model/growing.h"
 
+#include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
+
+/* --- arrays that grow as a file is read, within the memory limit */
+
+/* What is held of a file that is being read, and by whose order. */
+typedef struct vshi_budget {
+    const char *path;
+    const vsh_run *run;
+    double bytes; /* of all arrays that were grown */
+} vshi_budget;
+
+/* Gives the array at *memory (a pointer to a pointer; NULL at first) room for `needed` elements of `size`
+ * bytes and half as many more; *capacity is what it has. Free with free(). Errors: VSH_ERROR_LIMIT, before
+ * memory is taken, VSH_ERROR_MEMORY. */
+vsh_result vshi_grow(vshi_budget *budget, void *memory, size_t *capacity, size_t needed, size_t size,
+                     vsh_error *error);
+
+/* The same for `needed` elements and no more. */
+vsh_result vshi_reserve(vshi_budget *budget, void *memory, size_t *capacity, size_t needed, size_t size,
+                        vsh_error *error);
+
+/* --- the file */
+
+/* Advances a job to `fraction` of `units`, of which *units_done are told; true where it is cancelled. */
+bool vshi_advance_to(vshi_job *job, double fraction, size_t units, size_t *units_done);
 
 /* A window over the file; zeros before it is opened. */
 typedef struct vshi_stream {
@@ -41,5 +66,28 @@ vsh_result vshi_stream_fill(vshi_stream *stream, vsh_error *error);
 /* Reads on until at … *stop - 1 is whole lines, that end in no '\' (which goes on in the next), or the rest
  * of the file; at == *stop: it is over. */
 vsh_result vshi_stream_lines(vshi_stream *stream, const char **stop, vsh_error *error);
+
+/* --- names of a file, each kept once and found by its text */
+
+/* Zeros before the first. */
+typedef struct vshi_words {
+    char *text; /* one behind the other, with their ends */
+    size_t used, text_capacity;
+    size_t *begins; /* [count]: in the text */
+    size_t count, capacity;
+    uint32_t *slots; /* a hash table: number + 1; 0: empty */
+    size_t slot_count, slot_capacity;
+} vshi_words;
+
+/* The number of a name, from 0 in order of their coming; *is_new: it was not there before. Names are cut to
+ * 1023 bytes. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+vsh_result vshi_words_number(vshi_words *words, vshi_budget *budget, const char *name, size_t size,
+                             size_t *number, bool *is_new, vsh_error *error);
+
+static inline const char *vshi_words_at(const vshi_words *words, size_t number) {
+    return words->text + words->begins[number];
+}
+
+void vshi_words_free(vshi_words *words);
 
 #endif
