@@ -230,18 +230,14 @@ vsh_result vshi_lit_add_view(vshi_lit_document *document, const void *bytes, siz
     }
     json_t *made =
         json_pack("{s:i,s:I,s:I}", "buffer", 0, "byteOffset", (json_int_t)at, "byteLength", (json_int_t)size);
-    bool good = made != NULL;
-    good = good &&
-           (stride == 0 || json_object_set_new(made, "byteStride", json_integer((json_int_t)stride)) == 0);
-    good = good && (target == 0 || json_object_set_new(made, "target", json_integer(target)) == 0);
+    VSHI_TRY(vshi_lit_append(document, "bufferViews", made, view, error));
     if (offset != NULL) {
         *offset = at;
     }
-    if (!good) {
-        json_decref(made);
-        return vshi_lit_no_memory(document, error);
+    if (stride != 0) {
+        VSHI_TRY(vshi_lit_set_number(document, made, "byteStride", stride, error));
     }
-    return vshi_lit_append(document, "bufferViews", made, view, error);
+    return target != 0 ? vshi_lit_set_number(document, made, "target", (size_t)target, error) : VSH_OK;
 }
 
 static const char *type_name(int components) {
@@ -300,22 +296,13 @@ vsh_result vshi_lit_add_floats(vshi_lit_document *document, const float *values,
     VSHI_TRY(vshi_lit_add_view(document, values, size, VSHI_LIT_VERTICES, 0, &view, offset, error));
     json_t *made = json_pack("{s:I,s:i,s:I,s:s}", "bufferView", (json_int_t)view, "componentType",
                              VSHI_GLTF_FLOAT, "count", (json_int_t)count, "type", type_name(components));
-    if (made == NULL) {
-        return vshi_lit_no_memory(document, error);
-    }
-    if (bounds && count > 0) {
-        const vshi_gltf_accessor added = {.count = count,
-                                          .components = components,
-                                          .type = VSHI_GLTF_FLOAT,
-                                          .at = (const unsigned char *)values,
-                                          .stride = (size_t)components * sizeof *values};
-        const vsh_result result = vshi_lit_set_bounds(document, made, &added, error);
-        if (result != VSH_OK) {
-            json_decref(made);
-            return result;
-        }
-    }
-    return vshi_lit_append(document, "accessors", made, accessor, error);
+    VSHI_TRY(vshi_lit_append(document, "accessors", made, accessor, error));
+    const vshi_gltf_accessor added = {.count = count,
+                                      .components = components,
+                                      .type = VSHI_GLTF_FLOAT,
+                                      .at = (const unsigned char *)values,
+                                      .stride = (size_t)components * sizeof *values};
+    return bounds && count > 0 ? vshi_lit_set_bounds(document, made, &added, error) : VSH_OK;
 }
 
 vsh_result vshi_lit_add_indices(vshi_lit_document *document, const uint32_t *indices, size_t count,

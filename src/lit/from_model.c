@@ -258,21 +258,16 @@ static vsh_result add_node(maker *m, size_t first, size_t end, json_t *nodes, vs
     size_t mesh, node;
     VSHI_TRY(vshi_lit_append(document, "meshes", json_pack("{s:o}", "primitives", list), &mesh, error));
     json_t *made = json_pack("{s:I}", "mesh", (json_int_t)mesh);
+    VSHI_TRY(vshi_lit_append(document, "nodes", made, &node, error));
     errno = 0;
     json_t *label = name != NULL ? json_string(name) : NULL; /* one that is no UTF-8 has no place there */
     if ((label == NULL && errno == ENOMEM) ||
         (label != NULL && json_object_set_new(made, "name", label) != 0)) {
-        json_decref(made);
         return vshi_lit_no_memory(document, error);
     }
     if (!sheared && memcmp(of->transform, identity, sizeof identity) != 0) {
-        result = vshi_lit_set(document, made, "matrix", matrix_of(of->transform), error);
+        VSHI_TRY(vshi_lit_set(document, made, "matrix", matrix_of(of->transform), error));
     }
-    if (result != VSH_OK) {
-        json_decref(made);
-        return result;
-    }
-    VSHI_TRY(vshi_lit_append(document, "nodes", made, &node, error));
     return json_array_append_new(nodes, json_integer((json_int_t)node)) == 0
                ? VSH_OK
                : vshi_lit_no_memory(document, error);

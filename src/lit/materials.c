@@ -81,16 +81,10 @@ static vsh_result set_lightmap(vshi_lit_work *work, json_t *material, const vshi
                                vsh_error *error) {
     vshi_lit_document *document = &work->document;
     json_t *extensions;
+    VSHI_TRY(vshi_lit_object(document, material, "extensions", &extensions, error));
     json_t *info = texture_info(work, VSH_LIT_LIGHTMAP, look);
-    vsh_result result = vshi_lit_object(document, material, "extensions", &extensions, error);
-    if (result == VSH_OK) {
-        result = vshi_lit_set(document, info, "intensity", json_real(work->intensities[look->page]), error);
-    }
-    if (result != VSH_OK) {
-        json_decref(info);
-        return result;
-    }
     VSHI_TRY(vshi_lit_set(document, extensions, "MOZ_lightmap", info, error));
+    VSHI_TRY(vshi_lit_set(document, info, "intensity", json_real(work->intensities[look->page]), error));
     return vshi_lit_use_extension(document, "MOZ_lightmap", error);
 }
 

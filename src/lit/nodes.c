@@ -239,22 +239,17 @@ static vsh_result add_instance(vshi_lit_work *work, const json_t *node, size_t n
     json_t *name = given != NULL && given[0] != '\0' ? json_sprintf("%s[%zu]", given, instance)
                                                      : json_sprintf("nodes[%zu][%zu]", node_index, instance);
     json_t *made = json_pack("{s:o,s:I}", "name", name, "mesh", (json_int_t)mesh);
-    vsh_result result = made != NULL ? VSH_OK : vshi_lit_no_memory(document, error);
-    for (int k = 0; result == VSH_OK && k < 3; ++k) {
+    VSHI_TRY(vshi_lit_append(document, "nodes", made, &index, error));
+    for (int k = 0; k < 3; ++k) {
         if (values[k] != NULL) {
             const float *own = values[k] + (size_t)parts[k].components * instance;
-            result = vshi_lit_set(document, made, parts[k].key, numbers(own, k), error);
+            VSHI_TRY(vshi_lit_set(document, made, parts[k].key, numbers(own, k), error));
         }
     }
     const json_t *weights = json_object_get(node, "weights");
-    if (result == VSH_OK && weights != NULL) {
-        result = vshi_lit_set(document, made, "weights", vshi_gltf_copy(weights), error);
+    if (weights != NULL) {
+        VSHI_TRY(vshi_lit_set(document, made, "weights", vshi_gltf_copy(weights), error));
     }
-    if (result != VSH_OK) {
-        json_decref(made);
-        return result;
-    }
-    VSHI_TRY(vshi_lit_append(document, "nodes", made, &index, error));
     return json_array_append_new(children, json_integer((json_int_t)index)) == 0
                ? VSH_OK
                : vshi_lit_no_memory(document, error);

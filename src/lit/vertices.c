@@ -130,18 +130,6 @@ static vsh_result find_elements(vshi_lit_document *document, size_t index, size_
     return found->sparse_count > 0 ? make_dense(document, found, size, dense, error) : VSH_OK;
 }
 
-static vsh_result describe(vshi_lit_document *document, size_t index, size_t view, size_t count,
-                           json_t **made, vsh_error *error) {
-    *made = vshi_gltf_copy(vshi_gltf_element(&document->gltf, "accessors", index));
-    if (*made == NULL) {
-        return vshi_lit_no_memory(document, error);
-    }
-    json_object_del(*made, "byteOffset");
-    json_object_del(*made, "sparse");
-    VSHI_TRY(vshi_lit_set_number(document, *made, "bufferView", view, error));
-    return vshi_lit_set_number(document, *made, "count", count, error);
-}
-
 static vsh_result copy(vshi_lit_document *document, size_t index, const vshi_gltf_accessor *from,
                        const uint32_t *chosen, size_t count, bool bounds, size_t *accessor,
                        vsh_error *error) {
@@ -157,19 +145,16 @@ static vsh_result copy(vshi_lit_document *document, size_t index, const vshi_glt
     for (size_t i = 0; i < count && from->at != NULL; ++i) {
         memcpy(to + i * stride, from->at + chosen[i] * from->stride, size);
     }
-    json_t *made = NULL;
-    vsh_result result = describe(document, index, view, count, &made, error);
+    json_t *made = vshi_gltf_copy(vshi_gltf_element(&document->gltf, "accessors", index));
+    VSHI_TRY(vshi_lit_append(document, "accessors", made, accessor, error));
+    json_object_del(made, "byteOffset");
+    json_object_del(made, "sparse");
+    VSHI_TRY(vshi_lit_set_number(document, made, "bufferView", view, error));
+    VSHI_TRY(vshi_lit_set_number(document, made, "count", count, error));
     const bool had = json_object_get(made, "min") != NULL || json_object_get(made, "max") != NULL;
-    if (result == VSH_OK && (bounds || had) && count > 0) {
-        const vshi_gltf_accessor copied = {
-            .count = count, .components = from->components, .type = from->type, .at = to, .stride = stride};
-        result = vshi_lit_set_bounds(document, made, &copied, error);
-    }
-    if (result != VSH_OK) {
-        json_decref(made);
-        return result;
-    }
-    return vshi_lit_append(document, "accessors", made, accessor, error);
+    const vshi_gltf_accessor copied = {
+        .count = count, .components = from->components, .type = from->type, .at = to, .stride = stride};
+    return (bounds || had) && count > 0 ? vshi_lit_set_bounds(document, made, &copied, error) : VSH_OK;
 }
 
 vsh_result vshi_lit_gather(vshi_lit_document *document, size_t index, size_t element_count,

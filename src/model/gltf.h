@@ -92,6 +92,10 @@ vsh_result vshi_gltf_take(vshi_gltf *gltf, void **memory, size_t count, size_t s
 vsh_result vshi_gltf_view(vshi_gltf *gltf, size_t index, vshi_gltf_bytes *bytes, size_t *stride,
                           vsh_error *error);
 
+/* Decodes a data URI into new memory. */
+vsh_result vshi_gltf_read_data(vshi_gltf *gltf, const char *where, const char *uri, unsigned char **bytes,
+                               size_t *size, vsh_error *error);
+
 /* Reads all of buffer `index`, where it has not been. */
 vsh_result vshi_gltf_load(vshi_gltf *gltf, size_t index, vsh_error *error);
 

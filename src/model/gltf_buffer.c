@@ -12,15 +12,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-static vsh_result load_data(vshi_gltf *gltf, size_t index, const char *uri, vshi_gltf_buffer *buffer,
-                            vsh_error *error) {
+vsh_result vshi_gltf_read_data(vshi_gltf *gltf, const char *where, const char *uri, unsigned char **bytes,
+                               size_t *size, vsh_error *error) {
     VSHI_TRY(vshi_gltf_hold(gltf, 0.75 * (double)strlen(uri), error));
-    if (!vshi_uri_data(uri, &buffer->owned, &buffer->bytes.size)) {
-        return buffer->bytes.size > 0
-                   ? vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", gltf->path)
-                   : vshi_gltf_fail(gltf, error, "buffers[%zu]: its data URI is no base64", index);
+    if (vshi_uri_data(uri, bytes, size)) {
+        return VSH_OK;
     }
-    return VSH_OK;
+    const bool damaged = *size == 0;
+    *size = 0;
+    return damaged ? vshi_gltf_fail(gltf, error, "%s: its data URI is no base64", where)
+                   : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", gltf->path);
 }
 
 static vsh_result read_file(vshi_gltf *gltf, size_t index, const char *path, vshi_gltf_buffer *buffer,
@@ -79,7 +80,10 @@ static vsh_result load(vshi_gltf *gltf, size_t index, vsh_error *error) {
         return vshi_gltf_fail(gltf, error, "buffers[%zu]: has no data: neither a URI nor a binary chunk",
                               index);
     } else if (vshi_uri_is_data(json_string_value(uri))) {
-        VSHI_TRY(load_data(gltf, index, json_string_value(uri), buffer, error));
+        char where[32];
+        snprintf(where, sizeof where, "buffers[%zu]", index);
+        VSHI_TRY(vshi_gltf_read_data(gltf, where, json_string_value(uri), &buffer->owned, &buffer->bytes.size,
+                                     error));
     } else {
         VSHI_TRY(load_beside(gltf, index, json_string_value(uri), buffer, error));
     }

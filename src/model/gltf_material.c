@@ -165,18 +165,6 @@ static vsh_result take_path(const vshi_gltf *gltf, const char *where, const char
     return result;
 }
 
-static vsh_result take_data(vshi_gltf *gltf, const char *where, const char *uri, vshi_model_image *image,
-                            vsh_error *error) {
-    VSHI_TRY(vshi_gltf_hold(gltf, 0.75 * (double)strlen(uri), error));
-    if (vshi_uri_data(uri, &image->owned, &image->size)) {
-        return VSH_OK;
-    }
-    const bool damaged = image->size == 0;
-    image->size = 0;
-    return damaged ? vshi_gltf_fail(gltf, error, "%s: its data URI is no base64", where)
-                   : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", gltf->path);
-}
-
 static vsh_result take_view(vshi_gltf *gltf, const char *where, size_t view, vshi_model_image *image,
                             vsh_error *error) {
     vshi_gltf_bytes bytes;
@@ -205,8 +193,9 @@ static vsh_result read_image(vshi_gltf *gltf, size_t index, vsh_error *error) {
     VSHI_TRY(vshi_gltf_index(gltf, given, "bufferView", "bufferViews", where, &view, error));
     VSHI_TRY(view != SIZE_MAX ? take_view(gltf, where, view, image, error)
              : uri == NULL    ? vshi_gltf_fail(gltf, error, "%s has neither a URI nor a buffer view", where)
-             : vshi_uri_is_data(uri) ? take_data(gltf, where, uri, image, error)
-                                     : take_path(gltf, where, uri, image, error));
+             : vshi_uri_is_data(uri)
+                 ? vshi_gltf_read_data(gltf, where, uri, &image->owned, &image->size, error)
+                 : take_path(gltf, where, uri, image, error));
     image->bytes = image->owned;
     return VSH_OK;
 }
