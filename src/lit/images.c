@@ -14,7 +14,7 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-/* --- names of what stands beside the output */
+/* --- names of files beside the output */
 
 char *vshi_lit_beside_path(const char *output, const char *name) {
     const char *slash = strrchr(output, '/');
@@ -161,7 +161,7 @@ static vsh_result encode(vshi_lit_work *work, const vsh_lit_image *image, double
     return vshi_png_encode(&source, work->output, bytes, size, error);
 }
 
-/* --- adding */
+/* --- adding baked images */
 
 static vsh_result add_sampler(vshi_lit_work *work, size_t *sampler, vsh_error *error) {
     enum { LINEAR = 9729, CLAMP = 33071 };
@@ -290,7 +290,7 @@ vsh_result vshi_lit_images_add(vshi_lit_work *work, bool embed, vshi_lit_besides
     return VSH_OK;
 }
 
-/* --- images that a glTF names beside it, where it moves to another folder */
+/* --- images of a glTF that moves to another folder */
 
 /* By its first bytes, else by its name. */
 static const char *type_of(const unsigned char *bytes, size_t size, const char *path) {

@@ -13,7 +13,7 @@
 #include <string.h>
 #include <strings.h>
 
-/* --- what callers give */
+/* --- checking arguments */
 
 static vsh_result fail_mesh(size_t index, const char *what, size_t place, size_t value, size_t limit,
                             vsh_error *error) {
@@ -159,7 +159,7 @@ static vsh_result check_images(const vsh_lit_options *options, vsh_error *error)
     return VSH_OK;
 }
 
-/* --- where a lit document comes from: extras of its asset, as images have attributes */
+/* --- provenance in the extras of the asset */
 
 static const char OURS[] = "vdbshade_";
 
@@ -218,7 +218,7 @@ int32_t vsh_lit_is_output(const char *path) {
     return path != NULL && (is_gltf(path) || vshi_lit_is_obj(path)) ? 1 : 0;
 }
 
-/* --- what is asked for */
+/* --- resolving options */
 
 /* The set that vsh_model_mesh() takes for -1, of each mesh, on page 0. */
 static vsh_result default_meshes(const vsh_model *model, vsh_lit_mesh **meshes, vsh_error *error) {

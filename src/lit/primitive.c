@@ -129,7 +129,7 @@ static uint32_t purposes_of_mesh(const vshi_lit_work *work, const vsh_lit_mesh *
     return purposes;
 }
 
-/* --- who else uses a set */
+/* --- textures that use a set */
 
 static bool is_texture_of(const json_t *info, size_t set) {
     size_t own = 0, moved = 0;
@@ -217,7 +217,7 @@ static bool is_replaceable(const vshi_lit_work *work, const json_t *primitive, s
     return !is_shown(work, primitive, set, purposes);
 }
 
-/* --- sets that were made */
+/* --- sets of earlier bakes */
 
 static const json_t *made_sets(const json_t *primitive) {
     return json_object_get(json_object_get(primitive, "extras"), sets_key);

@@ -90,7 +90,7 @@ static size_t count_of(const vshi_lit_document *document, const char *list) {
     return json_array_size(json_object_get(document->gltf.root, list));
 }
 
-/* --- who refers to what */
+/* --- textures that materials show */
 
 static void note_index(const json_t *object, const char *name, bool *used, size_t count) {
     size_t index;
@@ -142,7 +142,7 @@ static void note_parts(json_t *texture, bool *images, size_t image_count, bool *
     }
 }
 
-/* --- taking out */
+/* --- removing textures */
 
 typedef struct pruning {
     const vshi_lit_texture_uses *before;
@@ -236,7 +236,7 @@ static vsh_result prune_textures(vshi_lit_document *document, const vshi_lit_tex
     return result;
 }
 
-/* --- who refers to what */
+/* --- accessors and buffer views in use */
 
 /* Called for every accessor or buffer view that `object` refers to by `key`. */
 typedef vsh_result refer_fn(vshi_lit_document *document, json_t *object, const char *key, bool view,
@@ -386,7 +386,7 @@ static bool knows_all(json_t *value) {
     return true;
 }
 
-/* --- new ones into old places */
+/* --- moving new items */
 
 typedef struct moving {
     placing accessors, views;

@@ -1,4 +1,4 @@
-/* A lit document under way: what is made of each primitive, mesh, node and material. */
+/* The state of a lit document while it is made. */
 #ifndef VSHI_LIT_WORK_H
 #define VSHI_LIT_WORK_H
 
@@ -235,12 +235,12 @@ vsh_result vshi_lit_write_files(vshi_lit_work *work, const vshi_lit_besides *bes
 
 /* --- OBJ, with its materials in a file beside it (obj.c) */
 
-/* Takes bytes of a file that is being written. */
+/* Writes bytes to a file. */
 typedef void vshi_lit_put(void *file, const void *bytes, size_t size);
 
 bool vshi_lit_is_obj(const char *path);
 
-/* What an OBJ cannot show. Errors: VSH_ERROR_ARGUMENT. */
+/* Refuses options that an OBJ cannot show. Errors: VSH_ERROR_ARGUMENT. */
 vsh_result vshi_lit_obj_check(const vshi_lit_work *work, vsh_error *error);
 
 /* The model's meshes in the world, a "usemtl page_N" for each page where there are images or several pages;
@@ -252,10 +252,10 @@ vsh_result vshi_lit_put_obj(const vshi_lit_work *work, const char *mtl, vshi_lit
 void vshi_lit_put_mtl(const vshi_lit_work *work, const vshi_lit_besides *besides, vshi_lit_put *put,
                       void *file);
 
-/* Fails where a file of materials is there that is not ours: others may use it. */
+/* Fails if the file exists and vdbshade did not write it. */
 vsh_result vshi_lit_mtl_check(const char *path, vsh_error *error);
 
-/* --- what is used, and goes when it is not (prune.c) */
+/* --- removing unused items (prune.c) */
 
 /* Which textures the materials show. The extras of a texture that a bake made say so ("vdbshade_texture":
  * "lightmap"). It goes with its image and sampler once no material shows it; the file's own textures stay. */
@@ -267,7 +267,7 @@ typedef struct vshi_lit_texture_uses {
 /* Tells of a texture that it was made for light, for the next time. NULL where memory is short. */
 json_t *vshi_lit_texture_mark(const char *purpose);
 
-/* What something refers to. */
+/* The accessors, buffer views and textures that something refers to. */
 typedef struct vshi_lit_uses {
     bool *accessors; /* [accessor_count] */
     bool *views;     /* [view_count] */

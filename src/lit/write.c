@@ -18,6 +18,8 @@ typedef struct layout {
     size_t size;     /* of all */
 } layout;
 
+/* --- JSON: members in their order, numbers as short as they can be read back */
+
 typedef struct writer {
     vshi_lit_bytes *text;
     bool lines, failed;
@@ -147,6 +149,8 @@ static vsh_result write_json(const json_t *value, bool lines, const char *what, 
     put_value(&w, value);
     return w.failed ? vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what) : VSH_OK;
 }
+
+/* --- the buffers become one */
 
 static bool has_bytes(const vshi_lit_document *document, size_t index) {
     const bool chunk = index == 0 && document->gltf.binary;

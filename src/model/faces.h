@@ -5,7 +5,7 @@
 #include "base/job.h"
 #include "model/stream.h"
 
-/* Memory that is used again from polygon to polygon. Begin with all 0. */
+/* Memory that polygons share one after the other. Begin with all 0. */
 typedef struct vshi_polygon_cutter {
     size_t capacity;
     struct vshi_polygon_corner *corners;
@@ -45,10 +45,10 @@ typedef struct vshi_face_cutter {
 vsh_result vshi_face_cut(vshi_face_cutter *cutter, const uint32_t *corners, size_t count, uint32_t *triangles,
                          size_t *made, vsh_error *error);
 
-/* Frees what it holds, and warns of polygons that cross in mesh `name`. */
+/* Frees the cutter, and warns if edges of polygons cross in mesh `name`. */
 void vshi_face_cutter_end(vshi_face_cutter *cutter, const vsh_run *run, const char *path, const char *name);
 
-/* Faces one behind the other that have as many corners. */
+/* Consecutive faces with the same number of corners. */
 typedef struct vshi_face_run {
     size_t faces, size;
 } vshi_face_run;

@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* --- looking things up in the JSON of a glTF */
+/* --- JSON */
 
 vsh_result vshi_gltf_fail(const vshi_gltf *gltf, vsh_error *error, const char *format, ...) {
     char text[768];
@@ -109,7 +109,7 @@ vsh_result vshi_gltf_take(vshi_gltf *gltf, void **memory, size_t count, size_t s
                                        gltf->path, count, size);
 }
 
-/* --- what a glTF says that nobody can read it without */
+/* --- required extensions */
 
 /* Extensions that are read, or that leave the geometry as it is. */
 static const char *const understood[] = {

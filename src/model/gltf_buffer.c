@@ -229,7 +229,7 @@ static const struct {
                {"QUATERNION", 8, 8, decode_quaternion},
                {"EXPONENTIAL", 4, 256, decode_exponential}};
 
-/* --- what a view says of itself */
+/* --- properties of a compressed view */
 
 static int index_of_mode(const char *name) {
     for (int i = 0; name != NULL && i < MODES; ++i) {

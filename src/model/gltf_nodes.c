@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* --- the lights that a glTF's nodes carry: KHR_lights_punctual (Khronos, ratified 2019) */
+/* --- lights: KHR_lights_punctual (Khronos, ratified 2019) */
 
 static const char extension[] = "KHR_lights_punctual";
 

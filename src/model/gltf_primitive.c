@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* --- primitives whose vertices are compressed by Draco */
+/* --- Draco */
 
 static vsh_result take_attribute(vshi_gltf *gltf, const vshi_draco *mesh, const json_t *attributes,
                                  const char *name, int components, const char *where, float **values,

@@ -19,7 +19,7 @@
 #include <string.h>
 #include <sys/mman.h>
 
-/* --- materials of a model, and the images that those with holes have */
+/* --- materials and images */
 
 size_t vsh_model_material_count(const vsh_model *model) {
     return model->material_count;
@@ -75,7 +75,7 @@ static void free_materials(vsh_model *model) {
     free(model->materials);
 }
 
-/* --- lights of a model: those of its file's nodes, in the world */
+/* --- lights, in the world */
 
 /* Gives *list (a pointer to a pointer) room for one element more than `count`. */
 static vsh_result grow(void *list, size_t count, size_t *capacity, size_t size, const char *what,
@@ -124,7 +124,7 @@ static void free_lights(vsh_model *model) {
     free(model->lights);
 }
 
-/* --- entries of a model: what stands where, and under which name */
+/* --- entries: places and names of meshes */
 
 static void make_line(char *text) {
     for (char *c = text; *c != '\0'; ++c) {

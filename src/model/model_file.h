@@ -1,4 +1,4 @@
-/* A mesh file on the way in: told by its ending, and handed to who reads it. */
+/* Reading a mesh file: its ending chooses the reader. */
 #ifndef VSHI_CASTER_MODEL_FILE_H
 #define VSHI_CASTER_MODEL_FILE_H
 
@@ -21,9 +21,9 @@ vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *
 vsh_result vshi_ply_read(const char *path, const vsh_run *run, vshi_job *job, size_t units, vsh_model **model,
                          vsh_error *error);
 
-/* --- scene formats that are not read, told by name so that nobody looks for the fault in his file */
+/* --- scene formats that are refused by name */
 
-/* What is said to whoever gives another. */
+/* The advice of errors about other formats. */
 #define VSHI_FORMATS                                                                                         \
     "give a mesh as OBJ, glTF, GLB, PLY, STL, FBX or DAE, a level set as .vdb, or a scene as .json"
 
@@ -31,9 +31,9 @@ vsh_result vshi_ply_read(const char *path, const vsh_run *run, vshi_job *job, si
  * or its first bytes. A file that cannot be read is told apart by its ending only. Thread safe. */
 vsh_result vshi_unsupported_check(const char *path, vsh_error *error);
 
-/* --- files beside a model that decide what it is and where light comes through (beside.c) */
+/* --- files that a model is read with (beside.c) */
 
-/* Gets the path of such a file, which it has to free; also where it fails. */
+/* Receives the path of such a file and frees it, after an error too. */
 typedef vsh_result vshi_beside_fn(void *user, char *path, vsh_error *error);
 
 /* Tells of the files that a model names and that are read with it, each perhaps more than once: the buffers

@@ -44,7 +44,7 @@ bool vshi_file_identity(int file, uint64_t identity[VSHI_FILE_IDENTITY]) {
     return true;
 }
 
-/* --- the reader */
+/* --- arrays left in the file: the reader */
 
 static uint64_t rounded(uint64_t bytes) {
     return (bytes + ALIGNED - 1) / ALIGNED * ALIGNED;
@@ -86,7 +86,7 @@ static void put_raw(vshi_encoder *encoder, const vshi_model_file *file, const vs
     }
 }
 
-/* --- the caller */
+/* --- arrays left in the file: the caller */
 
 static vsh_result fail_changed(const char *path, vsh_error *error) {
     return vshi_fail(error, VSH_ERROR_READ, "%s: changed while it was read", path);
@@ -183,7 +183,7 @@ static vsh_result take_raw(raw_file *raw, vshi_decoder *decoder, vshi_model_shap
     return vshi_model_finish(raw->path, raw->run, where, shape, error);
 }
 
-/* --- lights between a reader and its caller */
+/* --- lights */
 
 enum { LIGHT_VALUES = 13 };
 
@@ -242,7 +242,7 @@ static vsh_result take_lights(vshi_decoder *decoder, vsh_model *model, const cha
     return decoder->bad ? vshi_answer_fail(path, "its lights", error) : VSH_OK;
 }
 
-/* --- materials between a reader and its caller */
+/* --- materials */
 
 enum { MATERIAL_VALUES = 8 };
 
@@ -348,6 +348,8 @@ static vsh_result take_materials(vshi_decoder *decoder, vsh_model *model, const 
     }
     return decoder->bad ? vshi_answer_fail(path, "its materials", error) : VSH_OK;
 }
+
+/* --- meshes */
 
 static void put_shape(vshi_encoder *encoder, const vshi_model_file *file, const vshi_model_shape *shape) {
     vshi_encode_count(encoder, shape->triangle_count);

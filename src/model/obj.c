@@ -133,7 +133,7 @@ static vsh_result set_material(vshi_obj *obj, const char *text, size_t size, vsh
     return VSH_OK;
 }
 
-/* --- from what an OBJ says to a model. All meshes of the file share four arrays */
+/* --- the model: all meshes of the file share four arrays */
 
 enum { POSITIONS, INDICES, UVS, NORMALS };
 

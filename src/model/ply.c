@@ -176,7 +176,7 @@ static vsh_result keep_vertex(ply_reader *r, vsh_error *error) {
 
 /* Texture coordinates of a face's corners are those of its vertices: the last face's count. */
 
-/* --- one row of a PLY, in text or binary */
+/* --- parsing rows */
 
 /* A row on its way. */
 typedef struct ply_cursor {

@@ -1,5 +1,5 @@
-/* A file that is read piece by piece: what of it is in memory stays in the processor's cache, and takes no
- * more of it than its longest line or row. */
+/* Reads a file piece by piece. The piece in memory fits the processor's cache, and is no larger than the
+ * longest line or row needs. */
 #ifndef VSHI_STREAM_H
 #define VSHI_STREAM_H
 
@@ -12,20 +12,20 @@
 
 /* --- arrays that grow as a file is read, within the memory limit */
 
-/* What is held of a file that is being read, and by whose order. */
+/* The memory that a file takes while it is read. */
 typedef struct vshi_budget {
     const char *path;
     const vsh_run *run;
-    double bytes; /* of all arrays that were grown */
+    double bytes; /* of all arrays that vshi_grow() and vshi_reserve() hold */
 } vshi_budget;
 
-/* Gives the array at *memory (a pointer to a pointer; NULL at first) room for `needed` elements of `size`
- * bytes and half as many more; *capacity is what it has. Free with free(). Errors: VSH_ERROR_LIMIT, before
+/* Grows the array at *memory (a pointer to a pointer; NULL at first) to `needed` elements of `size` bytes and
+ * half as many more, and sets *capacity. Free with free(). Errors: VSH_ERROR_LIMIT, before
  * memory is taken, VSH_ERROR_MEMORY. */
 vsh_result vshi_grow(vshi_budget *budget, void *memory, size_t *capacity, size_t needed, size_t size,
                      vsh_error *error);
 
-/* The same for `needed` elements and no more. */
+/* Does the same for exactly `needed` elements. */
 vsh_result vshi_reserve(vshi_budget *budget, void *memory, size_t *capacity, size_t needed, size_t size,
                         vsh_error *error);
 
@@ -67,7 +67,7 @@ vsh_result vshi_stream_fill(vshi_stream *stream, vsh_error *error);
  * of the file; at == *stop: it is over. */
 vsh_result vshi_stream_lines(vshi_stream *stream, const char **stop, vsh_error *error);
 
-/* --- names of a file, each kept once and found by its text */
+/* --- names, each stored once */
 
 /* Zeros before the first. */
 typedef struct vshi_words {
@@ -79,8 +79,8 @@ typedef struct vshi_words {
     size_t slot_count, slot_capacity;
 } vshi_words;
 
-/* The number of a name, from 0 in order of their coming; *is_new: it was not there before. Names are cut to
- * 1023 bytes. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+/* Finds the number of a name, or adds the name (*is_new) with the next number. Names are cut to 1023 bytes.
+ * Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
 vsh_result vshi_words_number(vshi_words *words, vshi_budget *budget, const char *name, size_t size,
                              size_t *number, bool *is_new, vsh_error *error);
 
