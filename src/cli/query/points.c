@@ -180,7 +180,7 @@ void cli_points_take_faces(const char *path, const vsh_run *run, cli_points_read
         return;
     }
     if (strcmp(path, "-") == 0) {
-        snprintf(error->message, sizeof error->message, "those of its faces need a file, not a pipe");
+        snprintf(error->message, sizeof error->message, "normals of faces need a file, not a pipe");
         return;
     }
     vsh_model *model = NULL;
