@@ -8,9 +8,9 @@
  * percent. "wide" means the points on charts that are at least four texels wide. --list prints each point
  * that is off by more than a quarter.
  *
- * Points that see the backs of solids, or lie on a face turned the other way, are left out. A baker may smooth
- * shadow terminators. So shadows leave out points of bent faces where the horizon of the face or of the smooth
- * normal cuts the sun's disc, or where they disagree. */
+ * Points that see the backs of solids, or lie on a face turned the other way, are left out. A baker may
+ * smooth shadow terminators. So shadows leave out points of bent faces where the horizon of the face or of
+ * the smooth normal cuts the sun's disc, or where they disagree. */
 #include "directions.h"
 #include "embree_scene.h"
 #include "judge.h"

@@ -371,7 +371,8 @@ vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, c
     vsh_result result = VSH_OK;
     VSHI_TRY_DONE(vshi_allocate((void **)&taken, scene->caster_count, sizeof *taken, "casters", error));
     if (take(scene, true, NULL, taken) == 0) {
-        VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_INPUT, "scene: its methods shade all casters without voxels"));
+        VSHI_TRY_DONE(
+            vshi_fail(error, VSH_ERROR_INPUT, "scene: its methods shade all casters without voxels"));
     }
     const vsh_grid_options options =
         scene->layer_count == 0 ? vshi_scene_grid_options(scene, NULL) : scene->grid;
