@@ -3,6 +3,7 @@
  * of UVs points up in every format. */
 #include "model/model.h"
 
+#include "base/file.h"
 #include "base/floats.h"
 #include "base/input.h"
 #include "base/memory.h"
@@ -17,6 +18,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/mman.h>
 
 /* --- materials and images */
@@ -320,8 +322,7 @@ vsh_mesh vsh_model_mesh(const vsh_model *model, size_t index, int32_t uv_set) {
 
 /* STL's normals are those of its facets, often zero or wrong: the triangles know better. */
 static bool wants_normals(const char *path) {
-    const char *dot = strrchr(path, '.');
-    return dot == NULL || (strcmp(dot, ".stl") != 0 && strcmp(dot, ".STL") != 0);
+    return strcasecmp(vshi_path_ending(path), "stl") != 0;
 }
 
 typedef struct reading {

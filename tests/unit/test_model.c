@@ -175,8 +175,9 @@ TEST(a_cube_in_stl_is_closed) {
     assert_near(report.area, 6.0, 1e-12);
     assert_null(vsh_model_mesh(model, 0, -1).normals);
     vsh_model_free(model);
-    model = read_good("lid.stl", bytes, binary_stl(bytes, positions, 10));
+    model = read_good("lid.Stl", bytes, binary_stl(bytes, positions, 10));
     assert_int_equal(check(model, 0).open_edges, 4);
+    assert_null(vsh_model_mesh(model, 0, -1).normals);
     vsh_model_free(model);
     model = read_text("ascii.stl", triangle_stl);
     assert_int_equal(vsh_model_mesh(model, 0, -1).triangle_count, 1);
