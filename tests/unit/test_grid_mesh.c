@@ -253,6 +253,29 @@ TEST(a_room_in_a_mesh_stays_open_and_keeps_its_furniture) {
     }
 }
 
+TEST(threads_do_not_show_in_meshes) {
+    model fine = make_sphere(100, 0.7, 0);
+    model coarse = make_sphere(5, 1.0, 0);
+    const vsh_mesh sets[2][2] = {{fine.mesh, coarse.mesh}, {coarse.mesh, cube}};
+    const int32_t threads[4] = {1, 2, 5, 0};
+    for (int set = 0; set < 2; ++set) {
+        vsh_grid *first = NULL;
+        for (int i = 0; i < 4; ++i) {
+            const vsh_run run = run_on(threads[i]);
+            vsh_grid *grid = grid_of(sets[set], 2, 0.03, &run);
+            if (first == NULL) {
+                first = grid;
+            } else {
+                assert_same_leaves(first, grid, 0.0f);
+                vsh_grid_free(grid);
+            }
+        }
+        vsh_grid_free(first);
+    }
+    free_model(&fine);
+    free_model(&coarse);
+}
+
 TEST(bad_meshes_are_refused_with_the_reason) {
     vsh_grid *grid = NULL;
     float positions[24];

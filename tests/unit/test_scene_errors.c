@@ -182,6 +182,7 @@ static const struct {
     /* spheres */
     {&caster, "{'spheres':@7}", ".spheres: expected a file's name or an array of [x, y, z, radius]"},
     {&caster, "{'spheres':@''}", ".spheres: is empty"},
+    {&caster, "{'spheres':@[]}", ".spheres: is empty"},
     {&caster, "{'spheres':[[1,2,3,4],@[1,2,3]]}", ".spheres[1]: expected 4 numbers, found 3"},
     {&caster, "{'spheres':[[1,2,3,@-4]]}", ".spheres[0][3]: -4 is out of range 0 (excluded) … 1e+15"},
     {&caster, "{'spheres':[[1,2,@1e16,4]]}", ".spheres[0][2]: 1e+16 is out of range -1e+15 … 1e+15"},
@@ -328,6 +329,7 @@ static void trees_nest_64_levels_and_have_65536_nodes(void **state) {
         {nest, "{\"op\":\"union\",\"of\":[" SPHERE ",", "]}", "}]}", 63, 2 * 63 + 1, NULL},
         {nest, "{\"op\":\"union\",\"of\":[" SPHERE ",", "]}", "}]}", 64, 0, ""},
         {nest, "{\"op\":\"union\",\"of\":[" SPHERE ",", "]}", "}]}", 200, 0, ""},
+        {nest, "{\"op\":\"union\",\"of\":[" SPHERE ",", "]}", "}]}", 1000, 0, ""},
         {nest, "{\"op\":\"union\",\"of\":[" SPHERE ",", "]}", "}]}", 5000, 0, ""},
         /* n leaves make 2 n - 1 nodes */
         {list, SPHERE ",", "", "]}}]}", 32767, 65535, NULL},

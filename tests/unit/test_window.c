@@ -179,6 +179,24 @@ static void edges_stay_sharp(void **state) {
     }
 }
 
+/* Beside what is half hidden, texels whose rays are all free keep their value. */
+static void open_texels_beside_an_edge_stay_open(void **state) {
+    table *t = make_table(EDGE, EDGE, 64);
+    uint64_t counter = 4;
+    for (int32_t i = 0; i < TEXELS; ++i) {
+        t->texels[i].value = i % EDGE < 43 ? 1.0f : draw(&counter, 64, 0.5);
+    }
+    vshi_windows_sum(&t->windows);
+    double most = 0.0;
+    for (int32_t i = 0; i < TEXELS; ++i) {
+        if (i % EDGE < 43) {
+            most = fmax(most, 1.0 - estimate_at(t, i % EDGE, i / EDGE).value);
+        }
+    }
+    assert_true(most < 0.01);
+    free(t);
+}
+
 /* Areas with steep, slanted and winding edges, 1 … 3; 0 here and there. */
 static void draw_areas(uint8_t *area) {
     uint64_t counter = 8;
@@ -339,6 +357,7 @@ int main(void) {
         cmocka_unit_test(planes_without_noise_are_exact_up_to_corners),
         cmocka_unit_test(noise_that_is_left_is_what_is_said),
         cmocka_unit_test(edges_stay_sharp),
+        cmocka_unit_test(open_texels_beside_an_edge_stay_open),
         cmocka_unit_test(nothing_comes_over_a_cut),
         cmocka_unit_test(windows_hold_no_cut_and_no_hole),
         cmocka_unit_test(bits_do_not_depend_on_where_a_table_begins),
