@@ -1,7 +1,6 @@
 /* Where rays go: uniform over the disc, different from texel to texel and frame to frame, and as good as
  * promised. */
 #include "testing.h"
-#include <stdlib.h>
 
 #include "shade/rays.h"
 #include "trace/sampler.h"
@@ -44,7 +43,7 @@ static double error_over_estimate(int32_t kind, int32_t n, double *bias) {
     return sqrt(square / estimate);
 }
 
-static void estimates_of_the_error_are_true(void **state) {
+TEST(estimates_of_the_error_are_true) {
     for (size_t k = 0; k < 3; ++k) {
         for (int32_t n = 16; n <= MOST; n *= 2) {
             double bias;
@@ -55,7 +54,7 @@ static void estimates_of_the_error_are_true(void **state) {
     }
 }
 
-static void low_discrepancy_beats_blue_beats_white_noise(void **state) {
+TEST(low_discrepancy_beats_blue_beats_white_noise) {
     double errors[3];
     for (size_t k = 0; k < 3; ++k) {
         double bias;
@@ -65,7 +64,7 @@ static void low_discrepancy_beats_blue_beats_white_noise(void **state) {
     assert_true(errors[2] < 0.8 * errors[1]);
 }
 
-static void texels_purposes_and_frames_have_sequences_of_their_own(void **state) {
+TEST(texels_purposes_and_frames_have_sequences_of_their_own) {
     for (size_t k = 0; k < 3; ++k) {
         OWNED(vshi_sampler) *first = vshi_sampler_create(KINDS[k], 16, 0),
                             *second = vshi_sampler_create(KINDS[k], 16, 1);
@@ -85,7 +84,7 @@ static void texels_purposes_and_frames_have_sequences_of_their_own(void **state)
 
 /* Blue noise: one ray a texel, at an edge across the disc; the mean over 4 × 4 texels is nearer than white
  * noise's. */
-static void the_blue_mask_spreads_the_error_over_neighbours(void **state) {
+TEST(the_blue_mask_spreads_the_error_over_neighbours) {
     double error[3] = {0.0};
     for (size_t k = 0; k < 3; ++k) {
         OWNED(vshi_sampler) *sampler = make_sampler(KINDS[k], 1, 0);
@@ -164,7 +163,7 @@ static void to_unit(const uint32_t digits[2], const uint32_t shift[2], double sq
 }
 
 /* What packets of rays are made by: see vshi_sampler_cells(). */
-static void a_block_has_one_point_in_each_cell_and_a_shift_moves_cells_whole(void **state) {
+TEST(a_block_has_one_point_in_each_cell_and_a_shift_moves_cells_whole) {
     OWNED(vshi_sampler) *sampler = make_sampler(VSH_SAMPLER_SOBOL, MOST, 2);
     for (uint32_t texel = 0; texel < 64; ++texel) {
         uint32_t shift[2];
@@ -197,7 +196,7 @@ static void a_block_has_one_point_in_each_cell_and_a_shift_moves_cells_whole(voi
     }
 }
 
-static void points_of_a_texel_are_nets(void **state) {
+TEST(points_of_a_texel_are_nets) {
     OWNED(vshi_sampler) *sampler = make_sampler(VSH_SAMPLER_SOBOL, MOST, 0);
     static double points[MOST][2];
     for (uint32_t texel = 0; texel < 64; ++texel) {
@@ -208,7 +207,7 @@ static void points_of_a_texel_are_nets(void **state) {
     }
 }
 
-static void points_asked_for_in_parts_are_the_same(void **state) {
+TEST(points_asked_for_in_parts_are_the_same) {
     static const int32_t cuts[] = {0, 8, 16, 21, 22, 64, 71, 200, MOST};
     for (size_t k = 0; k < 3; ++k) {
         OWNED(vshi_sampler) *sampler = make_sampler(KINDS[k], MOST, 0);
@@ -224,14 +223,5 @@ static void points_asked_for_in_parts_are_the_same(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(estimates_of_the_error_are_true),
-        cmocka_unit_test(low_discrepancy_beats_blue_beats_white_noise),
-        cmocka_unit_test(texels_purposes_and_frames_have_sequences_of_their_own),
-        cmocka_unit_test(the_blue_mask_spreads_the_error_over_neighbours),
-        cmocka_unit_test(a_block_has_one_point_in_each_cell_and_a_shift_moves_cells_whole),
-        cmocka_unit_test(points_of_a_texel_are_nets),
-        cmocka_unit_test(points_asked_for_in_parts_are_the_same),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

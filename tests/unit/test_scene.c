@@ -5,12 +5,6 @@
 #include "testing.h"
 #include <jansson.h>
 #include <malloc.h>
-#include <stdbool.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <unistd.h>
-#include <vdbshade/flat.h>
-#include <vdbshade/scene.h>
 
 static const double PI = 3.14159265358979323846;
 
@@ -30,7 +24,7 @@ static void assert_point(const double *m, const double *p, double x, double y, d
 }
 
 /* By distances on both sides of its surfaces. */
-static void the_seeds_scene_is_the_one_of_the_techniques(void **state) {
+TEST(the_seeds_scene_is_the_one_of_the_techniques) {
     OWNED(vsh_scene) *scene = NULL;
     assert_ok(vsh_scene_read(seeds_path, NULL, &scene, &failure));
     assert_int_equal(scene->caster_count, 1);
@@ -57,7 +51,7 @@ static void the_seeds_scene_is_the_one_of_the_techniques(void **state) {
     assert_true(scene->receivers[0].width == 512 && scene->receivers[0].height == 512);
 }
 
-static void every_key_lands_in_its_field(void **state) {
+TEST(every_key_lands_in_its_field) {
     OWNED(vsh_scene) *scene = parse("dir/x/scene.json", full_scene);
     const double unit[3] = {1.0, 1.0, 1.0};
     /* `at` is where the caster's transform puts (1, 1, 1) */
@@ -145,7 +139,7 @@ static void every_key_lands_in_its_field(void **state) {
     assert_true(r[0].padding == 8 && r[0].bits == 16);
 }
 
-static void missing_keys_have_the_defaults_of_the_headers(void **state) {
+TEST(missing_keys_have_the_defaults_of_the_headers) {
     OWNED(vsh_scene) *scene =
         parse("scene.json", "{\"casters\": [{\"mesh\": \"a.obj\"}],"
                             "\"receivers\": [{\"mesh\": \"a.obj\", \"output\": \"a.exr\"}]}");
@@ -162,7 +156,7 @@ static void missing_keys_have_the_defaults_of_the_headers(void **state) {
     assert_true(r->supersample == lightmap.supersample && r->padding == lightmap.padding);
 }
 
-static void rotations_turn_about_x_then_y_then_z(void **state) {
+TEST(rotations_turn_about_x_then_y_then_z) {
     OWNED(vsh_scene) *scene =
         parse("s", "{\"casters\": [{\"mesh\": \"a\", \"transform\": {\"rotate_deg\": [90, 90, 0]}},"
                    "{\"mesh\": \"a\", \"transform\": {\"rotate_deg\": [0, 90, 90]}},"
@@ -176,7 +170,7 @@ static void rotations_turn_about_x_then_y_then_z(void **state) {
     }
 }
 
-static void a_rectangle_has_its_sides(void **state) {
+TEST(a_rectangle_has_its_sides) {
     OWNED(vsh_scene) *scene =
         parse("a.json", "{\"casters\":[{\"sdf\":{\"shape\":\"sphere\",\"radius\":1}}],\"lights\":["
                         "{\"name\":\"a\",\"type\":\"rectangle\",\"position\":[1,2,3],"
@@ -191,7 +185,7 @@ static void a_rectangle_has_its_sides(void **state) {
     assert_true(l[0].two_sided == 1 && l[1].two_sided == 0);
 }
 
-static void every_example_of_the_reference_is_a_scene(void **state) {
+TEST(every_example_of_the_reference_is_a_scene) {
     static const char start[] = "```json\n", end[] = "\n```";
     size_t size;
     FREED char *text = read_text(VSH_ASSETS "/../docs/scene.md", &size);
@@ -257,7 +251,7 @@ static size_t least_limit(void) {
     return high;
 }
 
-static void reading_takes_less_than_the_least_limit_that_it_passes(void **state) {
+TEST(reading_takes_less_than_the_least_limit_that_it_passes) {
     if (VSHI_SANITIZED) {
         skip(); /* whose allocator takes more, and does not tell */
     }
@@ -288,7 +282,7 @@ static void reading_takes_less_than_the_least_limit_that_it_passes(void **state)
     }
 }
 
-static void a_bomb_is_refused_before_it_is_read(void **state) {
+TEST(a_bomb_is_refused_before_it_is_read) {
     free(write_scene("{}", 300000));
     const size_t before = taken();
     assert_false(passes((size_t)50 << 20));
@@ -307,15 +301,5 @@ static int remove_folder(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_seeds_scene_is_the_one_of_the_techniques),
-        cmocka_unit_test(every_key_lands_in_its_field),
-        cmocka_unit_test(missing_keys_have_the_defaults_of_the_headers),
-        cmocka_unit_test(rotations_turn_about_x_then_y_then_z),
-        cmocka_unit_test(a_rectangle_has_its_sides),
-        cmocka_unit_test(every_example_of_the_reference_is_a_scene),
-        cmocka_unit_test(reading_takes_less_than_the_least_limit_that_it_passes),
-        cmocka_unit_test(a_bomb_is_refused_before_it_is_read),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return run_all_tests(make_folder, remove_folder);
 }

@@ -6,10 +6,6 @@
 #include "scene/parts.h"
 #include "shade/shade.h"
 
-#include <vdbshade/settings.h>
-
-#include <unistd.h>
-
 /* A scene around a part, and the part's place in it. */
 static const struct frame {
     const char *before, *after, *place;
@@ -229,7 +225,7 @@ static void take_mark(char *text, const char *message, char *expected, size_t si
     }
 }
 
-static void errors_name_line_column_and_key(void **state) {
+TEST(errors_name_line_column_and_key) {
     size_t wrong = 0;
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
         const struct frame *f = bad[i].around;
@@ -262,12 +258,12 @@ static void assert_refused(const char *text, size_t size, const char *message) {
 }
 
 /* Jansson ends a number at a byte of 0, and reads on behind it. */
-static void bytes_of_zero_are_refused_with_their_place(void **state) {
+TEST(bytes_of_zero_are_refused_with_their_place) {
     static const char text[] = "{\"casters\": [],\n \"resolution\": 6\0, \"ck\": 0}";
     assert_refused(text, sizeof text - 1, "s:2:17: a byte of 0, expected text");
 }
 
-static void a_seeds_scene_cut_anywhere_is_an_error(void **state) {
+TEST(a_seeds_scene_cut_anywhere_is_an_error) {
     size_t size;
     FREED char *text = read_text(seeds_path, &size);
     const size_t end = (size_t)(strrchr(text, '}') - text);
@@ -280,7 +276,7 @@ static void a_seeds_scene_cut_anywhere_is_an_error(void **state) {
     }
 }
 
-static void a_scene_with_any_byte_changed_is_read_or_refused(void **state) {
+TEST(a_scene_with_any_byte_changed_is_read_or_refused) {
     static const char bytes[] = "{}[]\",:0-\\ \n\xff"
                                 "e9";
     char text[sizeof full_scene];
@@ -318,7 +314,7 @@ static char *repeated(const char *head, const char *open, const char *close, siz
 }
 
 /* Each tree has the node count that is expected; 0: it is refused with the message. */
-static void trees_nest_64_levels_and_have_65536_nodes(void **state) {
+TEST(trees_nest_64_levels_and_have_65536_nodes) {
     static const char nest[] = "{\"casters\":[{\"sdf\":",
                       list[] = "{\"casters\":[{\"sdf\":{\"op\":\"union\",\"of\":[";
     static const struct {
@@ -348,7 +344,7 @@ static void trees_nest_64_levels_and_have_65536_nodes(void **state) {
     }
 }
 
-static void scales_of_nested_nodes_have_a_limit_together(void **state) {
+TEST(scales_of_nested_nodes_have_a_limit_together) {
     static const char text[] =
         "{\"casters\":[{\"sdf\":{\"op\":\"union\",\"scale\":1e6,\"of\":[{\"op\":\"union\",\"scale\":1e6,"
         "\"of\":["
@@ -356,12 +352,12 @@ static void scales_of_nested_nodes_have_a_limit_together(void **state) {
     assert_refused(text, sizeof text - 1, "casters[0].sdf.of[0].of[0]: the scales of all levels make 1e+18");
 }
 
-static void byte_order_marks_and_escapes_are_read(void **state) {
+TEST(byte_order_marks_and_escapes_are_read) {
     OWNED(vsh_scene) *made = parse("s", "\xef\xbb\xbf{\"c\\u0061sters\":[{\"mesh\":\"\\\"\\\\\\u00e9\"}]}");
     assert_string_equal(made->casters[0].path, "\"\\é");
 }
 
-static void messages_stay_one_line_for_any_key(void **state) {
+TEST(messages_stay_one_line_for_any_key) {
     char text[4096], key[2048];
     memset(key, 'k', sizeof key - 1);
     key[sizeof key - 1] = '\0';
@@ -371,7 +367,7 @@ static void messages_stay_one_line_for_any_key(void **state) {
 }
 
 /* Otherwise the library would refuse a number of a scene file later, without line and key. */
-static void the_library_accepts_what_a_table_of_keys_accepts(void **state) {
+TEST(the_library_accepts_what_a_table_of_keys_accepts) {
     const vshi_table tables[] = {vshi_scene_table, vshi_ao_table};
     size_t tried = 0;
     for (size_t t = 0; t < 2; ++t) {
@@ -397,12 +393,12 @@ static void the_library_accepts_what_a_table_of_keys_accepts(void **state) {
     assert_true(tried >= 20);
 }
 
-static void bytes_that_are_no_text_do_not_reach_messages(void **state) {
+TEST(bytes_that_are_no_text_do_not_reach_messages) {
     vshi_fail(&failure, VSH_ERROR_INPUT, "%s: type '%s' × %.4s", "caf\xe9.json", "\xff\xc0\x80 é", "abc…");
     assert_string_equal(failure.message, "caf?.json: type '??? é' × abc?");
 }
 
-static void files_that_cannot_be_read_are_refused(void **state) {
+TEST(files_that_cannot_be_read_are_refused) {
     char large[] = "scene-XXXXXX";
     const int file = mkstemp(large);
     assert_true(file >= 0 && ftruncate(file, (off_t)1 << 36) == 0);
@@ -430,18 +426,5 @@ static void files_that_cannot_be_read_are_refused(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(errors_name_line_column_and_key),
-        cmocka_unit_test(bytes_of_zero_are_refused_with_their_place),
-        cmocka_unit_test(a_seeds_scene_cut_anywhere_is_an_error),
-        cmocka_unit_test(a_scene_with_any_byte_changed_is_read_or_refused),
-        cmocka_unit_test(trees_nest_64_levels_and_have_65536_nodes),
-        cmocka_unit_test(scales_of_nested_nodes_have_a_limit_together),
-        cmocka_unit_test(byte_order_marks_and_escapes_are_read),
-        cmocka_unit_test(messages_stay_one_line_for_any_key),
-        cmocka_unit_test(the_library_accepts_what_a_table_of_keys_accepts),
-        cmocka_unit_test(bytes_that_are_no_text_do_not_reach_messages),
-        cmocka_unit_test(files_that_cannot_be_read_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -69,7 +69,7 @@ static double brute_force(const vsh_sdf_node *n, const double p[3], double pitch
     return inside ? -nearest : nearest;
 }
 
-static void every_shape_gives_the_distance_to_its_surface(void **state) {
+TEST(every_shape_gives_the_distance_to_its_surface) {
     const double pitch = 0.03;
     for (int32_t shape = VSH_SDF_SPHERE; shape <= VSH_SDF_CONE; ++shape) {
         const vsh_sdf_node node = shape_of(shape);
@@ -87,7 +87,7 @@ static void every_shape_gives_the_distance_to_its_surface(void **state) {
     }
 }
 
-static void closed_forms_hold(void **state) {
+TEST(closed_forms_hold) {
     vsh_sdf_node node = shape_of(VSH_SDF_BOX);
     const vsh_sdf sdf = {&node, 1};
     const double corner[3] = {1.0, 0.8, 1.3};
@@ -132,7 +132,7 @@ static void make_tree(vsh_sdf_node nodes[3], int32_t a, int32_t b, int32_t opera
     }
 }
 
-static void no_tree_changes_by_more_than_one_per_unit(void **state) {
+TEST(no_tree_changes_by_more_than_one_per_unit) {
     for (int32_t operation = VSH_SDF_UNION; operation <= VSH_SDF_SMOOTH_UNION; ++operation) {
         for (int32_t pair = 0; pair < 49; ++pair) {
             vsh_sdf_node nodes[3];
@@ -153,7 +153,7 @@ static void no_tree_changes_by_more_than_one_per_unit(void **state) {
     }
 }
 
-static void the_box_holds_the_surface_and_touches_it_for_shapes(void **state) {
+TEST(the_box_holds_the_surface_and_touches_it_for_shapes) {
     for (int round = 0; round < 60; ++round) {
         vsh_sdf_node nodes[3];
         const int32_t operation = VSH_SDF_UNION + round % 4;
@@ -187,7 +187,7 @@ static void the_box_holds_the_surface_and_touches_it_for_shapes(void **state) {
     }
 }
 
-static void operations_are_the_sets_operations(void **state) {
+TEST(operations_are_the_sets_operations) {
     for (int round = 0; round < 49; ++round) {
         vsh_sdf_node nodes[3];
         make_tree(nodes, round / 7, round % 7, VSH_SDF_UNION);
@@ -216,7 +216,7 @@ static void operations_are_the_sets_operations(void **state) {
     }
 }
 
-static void a_turned_scaled_shape_is_the_shape_seen_from_elsewhere(void **state) {
+TEST(a_turned_scaled_shape_is_the_shape_seen_from_elsewhere) {
     vsh_sdf_node node = shape_of(VSH_SDF_BOX);
     const vsh_sdf sdf = {&node, 1};
     const double h = sqrt(0.5);
@@ -241,7 +241,7 @@ static void refused(const vsh_sdf_node *nodes, size_t count, const char *part) {
     }
 }
 
-static void bad_nodes_are_refused_by_name(void **state) {
+TEST(bad_nodes_are_refused_by_name) {
     vsh_sdf_node nodes[3];
     make_tree(nodes, VSH_SDF_SPHERE, VSH_SDF_CONE, VSH_SDF_SMOOTH_UNION);
     refused(nodes, 0, "0 nodes");
@@ -277,7 +277,7 @@ static void bad_nodes_are_refused_by_name(void **state) {
     refused(nodes, 3, "node 2: shape 11");
 }
 
-static void a_tree_too_deep_to_recurse_is_refused_and_a_deep_one_works(void **state) {
+TEST(a_tree_too_deep_to_recurse_is_refused_and_a_deep_one_works) {
     enum { SHAPES = 3000 };
     FREED vsh_sdf_node *nodes = malloc((2 * SHAPES - 1) * sizeof *nodes);
     assert_non_null(nodes);
@@ -331,7 +331,7 @@ static size_t random_tree(vsh_sdf_node *nodes, int count, bool unions) {
     return used;
 }
 
-static void a_tree_narrowed_to_a_ball_has_the_same_bits_in_it(void **state) {
+TEST(a_tree_narrowed_to_a_ball_has_the_same_bits_in_it) {
     enum { SHAPES = 12, TREES = 200, PLACES = 20, POINTS = 70 };
     vsh_sdf_node nodes[2 * SHAPES];
     uint8_t keep[2 * SHAPES];
@@ -368,7 +368,7 @@ static void a_tree_narrowed_to_a_ball_has_the_same_bits_in_it(void **state) {
     assert_true(left_out > operations / 2); /* else it does not narrow */
 }
 
-static void many_places_at_once_are_as_one_by_one_in_deep_trees_too(void **state) {
+TEST(many_places_at_once_are_as_one_by_one_in_deep_trees_too) {
     enum { SHAPES = 100, POINTS = 70 };
     vsh_sdf_node nodes[2 * SHAPES];
     const uint8_t keep[2 * SHAPES] = {0};
@@ -391,17 +391,5 @@ static void many_places_at_once_are_as_one_by_one_in_deep_trees_too(void **state
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_shape_gives_the_distance_to_its_surface),
-        cmocka_unit_test(closed_forms_hold),
-        cmocka_unit_test(no_tree_changes_by_more_than_one_per_unit),
-        cmocka_unit_test(the_box_holds_the_surface_and_touches_it_for_shapes),
-        cmocka_unit_test(operations_are_the_sets_operations),
-        cmocka_unit_test(a_turned_scaled_shape_is_the_shape_seen_from_elsewhere),
-        cmocka_unit_test(bad_nodes_are_refused_by_name),
-        cmocka_unit_test(a_tree_narrowed_to_a_ball_has_the_same_bits_in_it),
-        cmocka_unit_test(many_places_at_once_are_as_one_by_one_in_deep_trees_too),
-        cmocka_unit_test(a_tree_too_deep_to_recurse_is_refused_and_a_deep_one_works),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

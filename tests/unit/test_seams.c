@@ -32,7 +32,7 @@ static charts_mesh *two_strips(int pieces, double left, double right) {
 
 /* A column of each side is read: (a, b) go to the minimum of 2 (d + a - b)² + keep (a² + b²), as two places
  * fall to a texel, however many edges the border has. */
-static void two_columns_meet_where_the_closed_form_says(void **state) {
+TEST(two_columns_meet_where_the_closed_form_says) {
     const int pieces[] = {1, 7, 100};
     for (size_t i = 0; i < 2 * sizeof pieces / sizeof pieces[0]; ++i) {
         FREED charts_mesh *m = two_strips(pieces[i / 2], 10.5, 20.5);
@@ -61,7 +61,7 @@ static void two_columns_meet_where_the_closed_form_says(void **state) {
 }
 
 /* a² + b² / 10 is what it costs, so b goes ten times as far. */
-static void what_is_guessed_gives_way_to_what_was_baked(void **state) {
+TEST(what_is_guessed_gives_way_to_what_was_baked) {
     FREED charts_mesh *m = two_strips(1, 10.5, 20.5);
     FREED float *plane = new_plane(0.5f), *coverage = new_plane(1.0f);
     for (size_t t = 0; t < TEXELS; ++t) {
@@ -78,7 +78,7 @@ static void what_is_guessed_gives_way_to_what_was_baked(void **state) {
 }
 
 /* What lies beyond the image is its edge again, for lookups. */
-static void borders_at_the_edge_of_the_image_read_the_edge(void **state) {
+TEST(borders_at_the_edge_of_the_image_read_the_edge) {
     FREED charts_mesh *m = two_strips(1, SIDE, 0.0);
     FREED float *plane = new_plane(0.5f), *before = new_plane(0.5f);
     for (size_t t = 0; t < TEXELS; ++t) {
@@ -96,7 +96,7 @@ static void borders_at_the_edge_of_the_image_read_the_edge(void **state) {
 }
 
 /* One chart that meets itself: the ramp ends 0.03 higher than it began. */
-static void a_cylinder_with_a_ramp_around_it_has_no_jump_at_its_seam(void **state) {
+TEST(a_cylinder_with_a_ramp_around_it_has_no_jump_at_its_seam) {
     enum { AROUND = 48 };
     FREED charts_mesh *m = new_mesh();
     m->mesh.normals = m->normals;
@@ -132,7 +132,7 @@ static void a_cylinder_with_a_ramp_around_it_has_no_jump_at_its_seam(void **stat
     }
 }
 
-static void charts_that_are_turned_or_mirrored_agree_along_their_border(void **state) {
+TEST(charts_that_are_turned_or_mirrored_agree_along_their_border) {
     const double turns[] = {0.0, 90.0, 37.0, 180.0, -61.5};
     for (size_t t = 0; t < 2 * sizeof turns / sizeof turns[0]; ++t) {
         FREED charts_mesh *m = two_squares(turns[t / 2], t % 2 == 0 ? 1.0 : -1.0);
@@ -150,7 +150,7 @@ static void charts_that_are_turned_or_mirrored_agree_along_their_border(void **s
 }
 
 /* What it costs to move is what is left: without it nothing is. */
-static void the_less_moving_costs_the_less_is_left(void **state) {
+TEST(the_less_moving_costs_the_less_is_left) {
     FREED charts_mesh *m = two_squares(37.0, 1.0);
     OWNED(vsh_charts) *charts = charts_of(&m->mesh, 1);
     FREED float *plane = new_plane(0.5f);
@@ -171,7 +171,7 @@ static void the_less_moving_costs_the_less_is_left(void **state) {
     assert_true(last < 1e-4);
 }
 
-static void charts_of_equal_values_stay_to_the_bit(void **state) {
+TEST(charts_of_equal_values_stay_to_the_bit) {
     const float values[] = {0.3f, 1.0f / 3.0f, 0.0f, 1.0f, 0.7654321f};
     for (size_t v = 0; v < sizeof values / sizeof values[0]; ++v) {
         FREED charts_mesh *m = two_squares(23.0 + 31.0 * (double)v, 1.0);
@@ -184,7 +184,7 @@ static void charts_of_equal_values_stay_to_the_bit(void **state) {
 }
 
 /* Noise, which asks for far more than the limit. */
-static void no_value_moves_by_more_than_the_limit_or_out_of_its_range(void **state) {
+TEST(no_value_moves_by_more_than_the_limit_or_out_of_its_range) {
     const double limits[] = {0.0, 0.003, 0.02, 1.0};
     for (size_t l = 0; l < sizeof limits / sizeof limits[0]; ++l) {
         FREED charts_mesh *m = two_squares(37.0, 1.0);
@@ -228,7 +228,7 @@ static void no_value_moves_by_more_than_the_limit_or_out_of_its_range(void **sta
 }
 
 /* Two pairs of squares, which are two islands. */
-static void without_coverage_charts_tell_what_is_a_guess(void **state) {
+TEST(without_coverage_charts_tell_what_is_a_guess) {
     FREED charts_mesh *m = new_mesh();
     for (int i = 0; i < 4; ++i) { /* the charts of a pair lie far from each other, in other orders */
         const double places[4][2] = {{3.4, 50.6}, {36.2, 22.3}, {40.7, 55.9}, {5.1, 20.8}};
@@ -272,7 +272,7 @@ static charts_mesh *bent_squares(double degrees) {
     return m;
 }
 
-static void creases_are_left_and_smooth_normals_make_none(void **state) {
+TEST(creases_are_left_and_smooth_normals_make_none) {
     const struct {
         double degrees;
         bool smooth, stitched;
@@ -298,7 +298,7 @@ static void creases_are_left_and_smooth_normals_make_none(void **state) {
 
 /* Squares as two meshes of which one has a transform: ends are compared in the world, and in which order they
  * come. */
-static void meshes_meet_in_the_world(void **state) {
+TEST(meshes_meet_in_the_world) {
     FREED charts_mesh *a = new_mesh(), *b = new_mesh();
     add_square(a, 0.0, (const double[]){4.3, 25.6}, 18.0, 0.0, 1.0);
     add_square(b, 0.0, SECOND, 14.0, 37.0, 1.0);
@@ -322,7 +322,7 @@ static void meshes_meet_in_the_world(void **state) {
 }
 
 /* A third chart lies 0.1 texels beside the border, along half of its length. */
-static void a_chart_nearby_is_neither_read_nor_moved(void **state) {
+TEST(a_chart_nearby_is_neither_read_nor_moved) {
     FREED charts_mesh *m = two_squares(0.0, 1.0);
     add_quad(m, (const double[][3]){{7, 0, 0}, {8, 0, 0}, {8, 1, 0}, {7, 1, 0}},
              (const double[][2]){{22.4, 16.6}, {29.9, 16.6}, {29.9, 3.1}, {22.4, 3.1}});
@@ -343,7 +343,7 @@ static void a_chart_nearby_is_neither_read_nor_moved(void **state) {
 
 /* Zero area in the world and in the lightmap, one triangle again and again, corners in one place, UVs far
  * outside. */
-static void degenerate_edges_change_nothing(void **state) {
+TEST(degenerate_edges_change_nothing) {
     FREED charts_mesh *m = two_squares(90.0, 1.0);
     float *plane[2] = {new_plane(0.5f), new_plane(0.5f)};
     for (size_t round = 0; round < 2; ++round) {
@@ -397,7 +397,7 @@ static const struct {
 static const double TURNED[12] = {0.36, 0.48, -0.8, 70.7, -0.8, 0.6, 0.0, 11.1, 0.48, 0.64, 0.6, -33.3};
 
 /* (a, b) go to the minimum of 2 (d + a - b)² + keep (a² + b²), as along a border of equal edges. */
-static void parts_of_edges_meet_as_whole_ones_do(void **state) {
+TEST(parts_of_edges_meet_as_whole_ones_do) {
     for (size_t i = 0; i < 3 * sizeof cases / sizeof cases[0]; ++i) {
         const size_t c = i / 3;
         FREED charts_mesh *m = new_mesh();
@@ -434,7 +434,7 @@ static void parts_of_edges_meet_as_whole_ones_do(void **state) {
     }
 }
 
-static void an_end_beside_an_edge_or_over_a_crease_cuts_nothing(void **state) {
+TEST(an_end_beside_an_edge_or_over_a_crease_cuts_nothing) {
     for (int kind = 0; kind < 3; ++kind) {
         FREED charts_mesh *m = new_mesh();
         add_strip(m, 0, WHOLE, 2, 10.5);
@@ -452,7 +452,7 @@ static void an_end_beside_an_edge_or_over_a_crease_cuts_nothing(void **state) {
 }
 
 /* A T within one chart is none of its borders: what is on both sides is the same. */
-static void a_junction_within_a_chart_is_no_seam(void **state) {
+TEST(a_junction_within_a_chart_is_no_seam) {
     FREED charts_mesh *m = new_mesh();
     add_strip(m, 0, WHOLE, 2, 15.5);
     add_strip(m, 1, HALVES, 3, 15.5);
@@ -501,7 +501,7 @@ static void free_pages(two_pages *p) {
     }
 }
 
-static void borders_between_lightmaps_agree(void **state) {
+TEST(borders_between_lightmaps_agree) {
     two_pages p;
     for (int cut = 0; cut < 2; ++cut) {
         make_pages(&p, cut ? THIRDS : WHOLE, cut ? 4 : 2);
@@ -526,7 +526,7 @@ static void borders_between_lightmaps_agree(void **state) {
 }
 
 /* A page that meets none of the others. */
-static void one_of_several_changes_as_it_does_alone(void **state) {
+TEST(one_of_several_changes_as_it_does_alone) {
     static const double away[12] = {1, 0, 0, 100, 0, 1, 0, 0, 0, 0, 1, 0};
     FREED charts_mesh *m = two_squares(37.0, 1.0);
     m->mesh.transform = away;
@@ -549,7 +549,7 @@ static void one_of_several_changes_as_it_does_alone(void **state) {
     }
 }
 
-static void pages_of_other_planes_are_refused(void **state) {
+TEST(pages_of_other_planes_are_refused) {
     FREED_BY(free_pages) two_pages p;
     make_pages(&p, WHOLE, 2);
     const vsh_lightmap none = {.coverage = p.ao[0]};
@@ -580,7 +580,7 @@ static vsh_result stitch_noise(const charts_mesh *m, const vsh_run *run, float *
     return result;
 }
 
-static void any_number_of_threads_gives_the_same_bits(void **state) {
+TEST(any_number_of_threads_gives_the_same_bits) {
     FREED charts_mesh *m = two_squares(37.0, 1.0);
     float *ao[2] = {new_plane(0.0f), new_plane(0.0f)}, *light[2];
     for (int32_t threads = 1; threads <= 8; ++threads) {
@@ -597,7 +597,7 @@ static void any_number_of_threads_gives_the_same_bits(void **state) {
     }
 }
 
-static void the_memory_limit_is_held_before_anything_moves(void **state) {
+TEST(the_memory_limit_is_held_before_anything_moves) {
     FREED charts_mesh *m = two_squares(37.0, 1.0);
     FREED float *ao = new_plane(0.0f), *light = malloc(3 * TEXELS * sizeof *light), *before = new_plane(0.0f);
     FREED float *other = malloc(3 * TEXELS * sizeof *other);
@@ -652,7 +652,7 @@ static int stop_at(void *user, const char *stage, double fraction) {
 }
 
 /* The same differences, as AO and as light. */
-static void differences_of_light_are_told_in_parts_of_the_brightest(void **state) {
+TEST(differences_of_light_are_told_in_parts_of_the_brightest) {
     FREED charts_mesh *m = two_squares(37.0, 1.0);
     FREED float *ao = new_plane(0.0f), *light = malloc(3 * TEXELS * sizeof *light);
     for (size_t i = 0; i < TEXELS; ++i) {
@@ -667,7 +667,7 @@ static void differences_of_light_are_told_in_parts_of_the_brightest(void **state
     assert_true(of_light.places == of_ao.places && of_light.texels == of_ao.texels);
 }
 
-static void it_is_cancelled_wherever_it_is_and_tells_how_far_it_is(void **state) {
+TEST(it_is_cancelled_wherever_it_is_and_tells_how_far_it_is) {
     FREED charts_mesh *m = two_squares(37.0, 1.0);
     FREED float *ao = new_plane(0.0f), *light = malloc(3 * TEXELS * sizeof *light);
     const double at[] = {0.0, 0.2, 0.5, 2.0};
@@ -681,7 +681,7 @@ static void it_is_cancelled_wherever_it_is_and_tells_how_far_it_is(void **state)
     }
 }
 
-static void options_out_of_range_are_refused(void **state) {
+TEST(options_out_of_range_are_refused) {
     FREED charts_mesh *m = two_squares(0.0, 1.0);
     OWNED(vsh_charts) *charts = charts_of(&m->mesh, 1);
     FREED float *ao = new_plane(0.5f);
@@ -697,7 +697,7 @@ static void options_out_of_range_are_refused(void **state) {
     }
 }
 
-static void what_is_no_value_of_light_is_left(void **state) {
+TEST(what_is_no_value_of_light_is_left) {
     FREED charts_mesh *m = two_squares(37.0, 1.0);
     FREED float *ao = new_plane(0.5f), *bent = malloc(3 * TEXELS * sizeof *bent), *error = new_plane(0.0f);
     FREED float *invalid = new_plane(0.0f), *coverage = new_plane(1.0f), *shadow = new_plane(0.0f),
@@ -741,32 +741,5 @@ static void what_is_no_value_of_light_is_left(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(two_columns_meet_where_the_closed_form_says),
-        cmocka_unit_test(what_is_guessed_gives_way_to_what_was_baked),
-        cmocka_unit_test(borders_at_the_edge_of_the_image_read_the_edge),
-        cmocka_unit_test(a_cylinder_with_a_ramp_around_it_has_no_jump_at_its_seam),
-        cmocka_unit_test(charts_that_are_turned_or_mirrored_agree_along_their_border),
-        cmocka_unit_test(the_less_moving_costs_the_less_is_left),
-        cmocka_unit_test(charts_of_equal_values_stay_to_the_bit),
-        cmocka_unit_test(no_value_moves_by_more_than_the_limit_or_out_of_its_range),
-        cmocka_unit_test(without_coverage_charts_tell_what_is_a_guess),
-        cmocka_unit_test(creases_are_left_and_smooth_normals_make_none),
-        cmocka_unit_test(meshes_meet_in_the_world),
-        cmocka_unit_test(a_chart_nearby_is_neither_read_nor_moved),
-        cmocka_unit_test(degenerate_edges_change_nothing),
-        cmocka_unit_test(parts_of_edges_meet_as_whole_ones_do),
-        cmocka_unit_test(an_end_beside_an_edge_or_over_a_crease_cuts_nothing),
-        cmocka_unit_test(a_junction_within_a_chart_is_no_seam),
-        cmocka_unit_test(borders_between_lightmaps_agree),
-        cmocka_unit_test(one_of_several_changes_as_it_does_alone),
-        cmocka_unit_test(pages_of_other_planes_are_refused),
-        cmocka_unit_test(any_number_of_threads_gives_the_same_bits),
-        cmocka_unit_test(the_memory_limit_is_held_before_anything_moves),
-        cmocka_unit_test(differences_of_light_are_told_in_parts_of_the_brightest),
-        cmocka_unit_test(what_is_no_value_of_light_is_left),
-        cmocka_unit_test(it_is_cancelled_wherever_it_is_and_tells_how_far_it_is),
-        cmocka_unit_test(options_out_of_range_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -1,7 +1,5 @@
 /* Least squares within limits: what is found meets the conditions of a minimum (Karush, Kuhn and Tucker). */
 #include "testing.h"
-#include <stdbool.h>
-#include <stdlib.h>
 
 #include "bake/seams.h"
 
@@ -73,7 +71,7 @@ static void gradient_at(const system_of_rows *s, double *gradient) {
     }
 }
 
-static void what_is_found_is_the_minimum_within_the_limits(void **state) {
+TEST(what_is_found_is_the_minimum_within_the_limits) {
     const double limits[] = {0.0, 0.01, 0.1, 0.4, 10.0};
     vshi_job *job = vshi_job_begin(NULL, "seams", 1);
     for (size_t l = 0; l < sizeof limits / sizeof limits[0]; ++l) {
@@ -100,7 +98,7 @@ static void what_is_found_is_the_minimum_within_the_limits(void **state) {
 }
 
 /* Plain gradient steps take thousands. */
-static void a_stiff_system_takes_some_hundred_steps(void **state) {
+TEST(a_stiff_system_takes_some_hundred_steps) {
     vshi_job *job = vshi_job_begin(NULL, "seams", 1);
     for (uint32_t seed = 0; seed < 8; ++seed) {
         FREED system_of_rows *s = new_system(seed, 1e6, 1e-3, job);
@@ -115,9 +113,5 @@ static void a_stiff_system_takes_some_hundred_steps(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_found_is_the_minimum_within_the_limits),
-        cmocka_unit_test(a_stiff_system_takes_some_hundred_steps),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

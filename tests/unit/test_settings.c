@@ -2,17 +2,11 @@
  * same. */
 #include "testing.h"
 
-#include <stdbool.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <vdbshade/image.h>
-#include <vdbshade/settings.h>
-
 static void takes(vsh_scene *scene, const char *name, const char *text) {
     assert_ok(vsh_scene_set(scene, name, text, &failure));
 }
 
-static void a_setting_goes_where_the_file_would_put_it(void **state) {
+TEST(a_setting_goes_where_the_file_would_put_it) {
     vsh_scene scene = vsh_scene_default();
     takes(&scene, "rays", "17");
     takes(&scene, "--max-error", "5e-3");
@@ -43,7 +37,7 @@ static void a_setting_goes_where_the_file_would_put_it(void **state) {
     assert_string_equal(receiver.pack, "R=ao");
 }
 
-static void a_resolution_and_a_voxel_size_take_each_others_place(void **state) {
+TEST(a_resolution_and_a_voxel_size_take_each_others_place) {
     vsh_scene scene = vsh_scene_default();
     assert_false(scene.voxels_named);
     takes(&scene, "voxel_size", "0.25");
@@ -52,7 +46,7 @@ static void a_resolution_and_a_voxel_size_take_each_others_place(void **state) {
     assert_true(scene.grid.resolution == 64 && scene.grid.voxel_size == 0.0);
 }
 
-static void what_is_refused_is_told_and_changes_nothing(void **state) {
+TEST(what_is_refused_is_told_and_changes_nothing) {
     static const struct {
         const char *name, *text, *says;
         vsh_result result;
@@ -92,7 +86,7 @@ static void what_is_refused_is_told_and_changes_nothing(void **state) {
     assert_int_equal(vsh_receiver_set(NULL, "--size", "1", &failure), VSH_ERROR_ARGUMENT);
 }
 
-static void settings_of_a_flat_scene_are_its_own(void **state) {
+TEST(settings_of_a_flat_scene_are_its_own) {
     vsh_flat_scene flat = vsh_flat_scene_default();
     static const char *const given[][2] = {
         {"--size", "64x32"}, {"method", "classic"}, {"supersample", "3"},      {"--padding", "7"},
@@ -171,7 +165,7 @@ static void expect_numbers(const vsh_setting *setting, const char *words, const 
     }
 }
 
-static void the_document_has_every_key_with_its_range_and_default(void **state) {
+TEST(the_document_has_every_key_with_its_range_and_default) {
     vsh_setting setting;
     size_t count = 0, ranges = 0, defaults = 0;
     for (; vsh_setting_get(count, &setting) != 0; ++count) {
@@ -199,20 +193,12 @@ static void the_document_has_every_key_with_its_range_and_default(void **state) 
     assert_true(count >= 33 && ranges >= 19 && defaults >= 12);
 }
 
-static void settings_end(void **state) {
+TEST(settings_end) {
     vsh_setting setting = {.group = 77};
     assert_int_equal(vsh_setting_get(100000, &setting), 0);
     assert_int_equal(setting.group, 77);
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_setting_goes_where_the_file_would_put_it),
-        cmocka_unit_test(a_resolution_and_a_voxel_size_take_each_others_place),
-        cmocka_unit_test(what_is_refused_is_told_and_changes_nothing),
-        cmocka_unit_test(settings_of_a_flat_scene_are_its_own),
-        cmocka_unit_test(the_document_has_every_key_with_its_range_and_default),
-        cmocka_unit_test(settings_end),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -6,12 +6,9 @@
 #include "truth/directions.h"
 #include "truth/metrics.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-
 static const float UP[3] = {0.0f, 1.0f, 0.0f};
 
-static void the_seeds_floor_is_as_near_to_the_truth_as_promised(void **state) {
+TEST(the_seeds_floor_is_as_near_to_the_truth_as_promised) {
     enum { EDGE = 256, COUNT = EDGE * EDGE };
     static double positions[3 * COUNT];
     static float normals[3 * COUNT], truth[COUNT], visible[COUNT];
@@ -42,7 +39,7 @@ static void the_seeds_floor_is_as_near_to_the_truth_as_promised(void **state) {
 static const double ANGLES[] = {0.0, 0.5, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0};
 enum { ANGLE_COUNT = sizeof ANGLES / sizeof ANGLES[0] };
 
-static void open_sky_is_exactly_1_at_any_distance_and_size_of_light(void **state) {
+TEST(open_sky_is_exactly_1_at_any_distance_and_size_of_light) {
     const truth_solid solids[] = {{TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0},
                                   {TRUTH_BOX, {0.0, 0.0, 0.0}, {0.9, 0.02, 0.05}, 0.0, 0.0}};
     const double sizes[] = {1.0, 0.90161}; /* radii of the balls around them */
@@ -87,7 +84,7 @@ static void open_sky_is_exactly_1_at_any_distance_and_size_of_light(void **state
     }
 }
 
-static void a_plane_is_fully_lit_while_the_whole_light_is_over_its_horizon(void **state) {
+TEST(a_plane_is_fully_lit_while_the_whole_light_is_over_its_horizon) {
     const truth_solid plate = {TRUTH_BOX, {0.0, -0.517, 0.0}, {4.0, 0.517, 4.0}, 0.0, 0.0};
     OWNED(vsh_field) *field = field_of((truth_scene){&plate, 1}, 0.04, 0.0);
     uint64_t counter = 2;
@@ -113,7 +110,7 @@ static void a_plane_is_fully_lit_while_the_whole_light_is_over_its_horizon(void 
     }
 }
 
-static void the_middle_of_a_wide_umbra_is_exactly_0_at_any_depth(void **state) {
+TEST(the_middle_of_a_wide_umbra_is_exactly_0_at_any_depth) {
     const double half = 2.0, voxel = 0.05;
     const truth_solid block = {TRUTH_BOX, {0.0, 0.0, 0.0}, {half, half, half}, 0.0, 0.0};
     OWNED(vsh_field) *field = field_of((truth_scene){&block, 1}, voxel, 0.0);
@@ -170,7 +167,7 @@ static double worst_across_edge(double thick, double depth, double w, double vox
     return worst;
 }
 
-static void a_straight_edge_casts_the_penumbra_of_a_disc(void **state) {
+TEST(a_straight_edge_casts_the_penumbra_of_a_disc) {
     /* A depth h shows h behind the edge, so x becomes x / (1 + w x) in the umbra's half. That is 0.011 for
      * the wider light. The lattice rounds the edge, which is the rest. README has the bounds for lights of
      * degrees. */
@@ -237,7 +234,7 @@ static edge_errors errors_across_an_edge(int32_t method, double tilt) {
 }
 
 /* Both methods read a caster's depth for the distance to its edge. The segment of `cone` is steeper there. */
-static void cone_has_no_more_bands_than_smooth_and_a_third_more_error(void **state) {
+TEST(cone_has_no_more_bands_than_smooth_and_a_third_more_error) {
     const double tilts[] = {0.25, 0.5, 0.7854, 1.1};
     for (size_t t = 0; t < sizeof tilts / sizeof tilts[0]; ++t) {
         const edge_errors smooth = errors_across_an_edge(VSH_SHADOW_SMOOTH, tilts[t]);
@@ -247,7 +244,7 @@ static void cone_has_no_more_bands_than_smooth_and_a_third_more_error(void **sta
     }
 }
 
-static void a_point_near_the_shadow_sees_less_of_larger_lights(void **state) {
+TEST(a_point_near_the_shadow_sees_less_of_larger_lights) {
     const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.5, 0.0};
     OWNED(vsh_field) *field = field_of((truth_scene){&ball, 1}, 0.02, 0.0);
     const double up[3] = {0.0, 1.0, 0.0};
@@ -270,7 +267,7 @@ static void a_point_near_the_shadow_sees_less_of_larger_lights(void **state) {
     }
 }
 
-static void a_larger_occluder_hides_more(void **state) {
+TEST(a_larger_occluder_hides_more) {
     const double up[3] = {0.0, 1.0, 0.0};
     const vsh_light light = sun(up, RADIANS(20.0));
     float last[VSH_SHADOW_CONE + 1][8];
@@ -295,7 +292,7 @@ static void a_larger_occluder_hides_more(void **state) {
 }
 
 /* practical is classic through a smoothstep, but for what its march no longer looks at. */
-static void practical_is_classic_smoothed(void **state) {
+TEST(practical_is_classic_smoothed) {
     enum { COUNT = 64 * 64 };
     static double positions[3 * COUNT];
     static float normals[3 * COUNT], classic[COUNT], practical[COUNT];
@@ -317,7 +314,7 @@ static void practical_is_classic_smoothed(void **state) {
 
 /* Shorter steps find what lies between the samples of whole ones: values change from texel to texel, by a
  * part that another frame changes again, and never for a worse error. */
-static void jittered_steps_leave_grain(void **state) {
+TEST(jittered_steps_leave_grain) {
     enum { COUNT = 128 * 128 };
     static double positions[3 * COUNT];
     static float normals[3 * COUNT], truth[COUNT], plain[COUNT], jittered[COUNT], again[COUNT], other[COUNT];
@@ -360,7 +357,7 @@ static void jittered_steps_leave_grain(void **state) {
 
 /* --- where the light, and where it stands, decide */
 
-static void a_light_without_size_is_hard_in_every_method(void **state) {
+TEST(a_light_without_size_is_hard_in_every_method) {
     enum { COUNT = 64 * 64 };
     static double positions[3 * COUNT];
     static float normals[3 * COUNT], hard[COUNT], soft[COUNT];
@@ -394,7 +391,7 @@ static void a_light_without_size_is_hard_in_every_method(void **state) {
     }
 }
 
-static void a_far_sphere_light_is_a_directional_one(void **state) {
+TEST(a_far_sphere_light_is_a_directional_one) {
     enum { COUNT = 64 * 64 };
     static double positions[3 * COUNT];
     static float normals[3 * COUNT], far[COUNT], directional[COUNT];
@@ -416,7 +413,7 @@ static void a_far_sphere_light_is_a_directional_one(void **state) {
     }
 }
 
-static void a_light_inside_a_caster_lights_nothing(void **state) {
+TEST(a_light_inside_a_caster_lights_nothing) {
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.04, 0.0);
     const double places[2][3] = {{0.0, 0.8, 0.0}, {-1.2, 0.7, 0.5}}; /* in the sphere, in the rounded box */
     uint64_t counter = 4;
@@ -433,7 +430,7 @@ static void a_light_inside_a_caster_lights_nothing(void **state) {
     }
 }
 
-static void a_point_inside_a_sphere_light_sees_all_of_it(void **state) {
+TEST(a_point_inside_a_sphere_light_sees_all_of_it) {
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.04, 0.0);
     const double place[3] = {1.0, 1.2, 1.0};
     const vsh_light light = lamp(place, 0.5);
@@ -445,7 +442,7 @@ static void a_point_inside_a_sphere_light_sees_all_of_it(void **state) {
     }
 }
 
-static void the_horizon_cuts_the_light_like_a_straight_edge(void **state) {
+TEST(the_horizon_cuts_the_light_like_a_straight_edge) {
     const truth_solid plate = {TRUTH_BOX, {0.0, -0.5, 0.0}, {3.0, 0.5, 3.0}, 0.0, 0.0};
     OWNED(vsh_field) *field = field_of((truth_scene){&plate, 1}, 0.04, 0.0);
     const double ws[] = {0.01, 0.1, 0.5};
@@ -473,22 +470,5 @@ static void the_horizon_cuts_the_light_like_a_straight_edge(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_seeds_floor_is_as_near_to_the_truth_as_promised),
-        cmocka_unit_test(open_sky_is_exactly_1_at_any_distance_and_size_of_light),
-        cmocka_unit_test(a_plane_is_fully_lit_while_the_whole_light_is_over_its_horizon),
-        cmocka_unit_test(the_middle_of_a_wide_umbra_is_exactly_0_at_any_depth),
-        cmocka_unit_test(a_straight_edge_casts_the_penumbra_of_a_disc),
-        cmocka_unit_test(cone_has_no_more_bands_than_smooth_and_a_third_more_error),
-        cmocka_unit_test(a_point_near_the_shadow_sees_less_of_larger_lights),
-        cmocka_unit_test(a_larger_occluder_hides_more),
-        cmocka_unit_test(practical_is_classic_smoothed),
-        cmocka_unit_test(jittered_steps_leave_grain),
-        cmocka_unit_test(a_light_without_size_is_hard_in_every_method),
-        cmocka_unit_test(a_far_sphere_light_is_a_directional_one),
-        cmocka_unit_test(a_light_inside_a_caster_lights_nothing),
-        cmocka_unit_test(a_point_inside_a_sphere_light_sees_all_of_it),
-        cmocka_unit_test(the_horizon_cuts_the_light_like_a_straight_edge),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -5,8 +5,6 @@
 #include "previews.h"
 #include "truth/metrics.h"
 
-#include <stdlib.h>
-
 static const float UP[3] = {0.0f, 1.0f, 0.0f};
 
 enum { SIDE = 128, TEXELS = SIDE * SIDE };
@@ -38,7 +36,7 @@ static vsh_shade_options options_of(int32_t method, int32_t rays, double max_err
     return options;
 }
 
-static void rays_close_in_on_the_truth(void **state) {
+TEST(rays_close_in_on_the_truth) {
     const double normal[3] = {0.0, 1.0, 0.0};
     place_floor();
     assert_int_equal(truth_lights(truth_seeds(), TEXELS, positions, normal, truth_seeds_sun, truth_seeds_w,
@@ -59,7 +57,7 @@ static void rays_close_in_on_the_truth(void **state) {
     }
 }
 
-static void adaptive_keeps_the_error_asked_for_and_says_what_it_kept(void **state) {
+TEST(adaptive_keeps_the_error_asked_for_and_says_what_it_kept) {
     floor_texels(SIDE, positions, normals);
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.02, 0.0);
     const double place[3] = {-0.5, 2.5, -0.8};
@@ -85,7 +83,7 @@ static void adaptive_keeps_the_error_asked_for_and_says_what_it_kept(void **stat
 }
 
 /* What a cone proved is so of the casters themselves, not only of the field. */
-static void no_proof_is_wrong(void **state) {
+TEST(no_proof_is_wrong) {
     const double normal[3] = {0.0, 1.0, 0.0};
     place_floor();
     const double widths[] = {0.01, 0.1, 0.4};
@@ -132,7 +130,7 @@ static truth_metrics compare_across(truth_scene scene, double w, double from, do
 
 /* A sheet above the floor, a quarter as thick as the cone is wide there: one cone looks at one of its edges
  * and is off where it sees two. */
-static void a_sheet_thinner_than_the_cone_is_dark(void **state) {
+TEST(a_sheet_thinner_than_the_cone_is_dark) {
     const double height = 2.0, w = 0.1, thickness = 0.25 * 2.0 * w * height;
     const truth_solid sheet = {TRUTH_BOX, {0.0, height, 0.0}, {1.5, 0.5 * thickness, 1.5}, 0.0, 0.0};
     const truth_scene scene = {&sheet, 1};
@@ -148,7 +146,7 @@ static void a_sheet_thinner_than_the_cone_is_dark(void **state) {
 }
 
 /* Slats that share the disc: the nearest is not all that hides. */
-static void several_casters_share_the_disc(void **state) {
+TEST(several_casters_share_the_disc) {
     truth_solid slats[8];
     for (int i = 0; i < 8; ++i) {
         slats[i] = (truth_solid){TRUTH_BOX, {-0.7 + 0.2 * i, 2.0, 0.0}, {0.05, 0.05, 1.5}, 0.0, 0.0};
@@ -160,7 +158,7 @@ static void several_casters_share_the_disc(void **state) {
 
 /* Where the first rays agree, the rest are taken to: cheaper by far, and a thin shadow is sometimes missed.
  */
-static void early_ends_save_rays_and_cost_little(void **state) {
+TEST(early_ends_save_rays_and_cost_little) {
     floor_texels(SIDE, positions, normals);
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.04, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
@@ -175,7 +173,7 @@ static void early_ends_save_rays_and_cost_little(void **state) {
     assert_less(fabs(m.bias), 0.001);
 }
 
-static void threads_and_order_do_not_show(void **state) {
+TEST(threads_and_order_do_not_show) {
     floor_texels(64, positions, normals);
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.04, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.3);
@@ -216,14 +214,5 @@ static void threads_and_order_do_not_show(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rays_close_in_on_the_truth),
-        cmocka_unit_test(adaptive_keeps_the_error_asked_for_and_says_what_it_kept),
-        cmocka_unit_test(no_proof_is_wrong),
-        cmocka_unit_test(a_sheet_thinner_than_the_cone_is_dark),
-        cmocka_unit_test(several_casters_share_the_disc),
-        cmocka_unit_test(early_ends_save_rays_and_cost_little),
-        cmocka_unit_test(threads_and_order_do_not_show),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

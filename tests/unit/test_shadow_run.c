@@ -3,8 +3,6 @@
 #include "shading.h"
 #include "testing.h"
 
-#include <stdlib.h>
-
 enum { SIDE = 64, COUNT = SIDE * SIDE, METHODS = 5 };
 
 static const float UP[3] = {0.0f, 1.0f, 0.0f};
@@ -31,7 +29,7 @@ static vsh_result shade(const vsh_field *field, const vsh_light *light, const vs
     return vsh_shade_shadow(occluders_of(field), &points, light, options, run, values, NULL, stats, &failure);
 }
 
-static void neither_threads_nor_neighbours_show_in_the_bits(void **state) {
+TEST(neither_threads_nor_neighbours_show_in_the_bits) {
     static float first[COUNT], other[COUNT];
     fill_points();
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.04, 0.0);
@@ -60,7 +58,7 @@ static void neither_threads_nor_neighbours_show_in_the_bits(void **state) {
     }
 }
 
-static void a_scene_scaled_by_a_power_of_two_has_the_same_bits(void **state) {
+TEST(a_scene_scaled_by_a_power_of_two_has_the_same_bits) {
     static float visible[3][COUNT];
     static double scaled[3 * COUNT];
     fill_points();
@@ -87,7 +85,7 @@ static void a_scene_scaled_by_a_power_of_two_has_the_same_bits(void **state) {
     }
 }
 
-static void every_point_is_marched_skipped_certified_or_invalid(void **state) {
+TEST(every_point_is_marched_skipped_certified_or_invalid) {
     static float visible[COUNT];
     fill_points();
     positions[0] = (double)NAN;
@@ -126,7 +124,7 @@ static void every_point_is_marched_skipped_certified_or_invalid(void **state) {
     assert_int_equal(sum.certified, 2 * once.certified);
 }
 
-static void points_turned_away_are_0_and_skipped_not_marched(void **state) {
+TEST(points_turned_away_are_0_and_skipped_not_marched) {
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.04, 0.0);
     const double p[3] = {0.0, 5.0, 0.0};
     const vsh_light light = sun(truth_seeds_sun, 0.2);
@@ -141,7 +139,7 @@ static void points_turned_away_are_0_and_skipped_not_marched(void **state) {
     }
 }
 
-static void points_without_place_or_normal_are_nan_and_counted(void **state) {
+TEST(points_without_place_or_normal_are_nan_and_counted) {
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.1, 0.0);
     const double nan = (double)NAN, inf = (double)INFINITY;
     const double p[6][3] = {{nan, 0.0, 0.0}, {0.0, inf, 0.0}, {0.0, 0.0, -inf},
@@ -165,7 +163,7 @@ static void points_without_place_or_normal_are_nan_and_counted(void **state) {
     }
 }
 
-static void running_out_of_steps_is_counted_and_stays_in_range(void **state) {
+TEST(running_out_of_steps_is_counted_and_stays_in_range) {
     static float visible[COUNT];
     floor_texels(SIDE, positions, normals);
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.02, 0.0);
@@ -185,7 +183,7 @@ static void running_out_of_steps_is_counted_and_stays_in_range(void **state) {
     assert_int_equal(many.unfinished, 0);
 }
 
-static void cones_wider_than_the_reach_are_counted(void **state) {
+TEST(cones_wider_than_the_reach_are_counted) {
     static float visible[COUNT];
     floor_texels(SIDE, positions, normals);
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.04, 0.2);
@@ -201,7 +199,7 @@ static int32_t stop_at(void *user, const char *stage, double fraction) {
     return fraction >= *(const double *)user;
 }
 
-static void options_lights_and_cancelling_have_their_codes(void **state) {
+TEST(options_lights_and_cancelling_have_their_codes) {
     static float visible[COUNT];
     floor_texels(SIDE, positions, normals);
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.2, 1.0);
@@ -232,15 +230,5 @@ static void options_lights_and_cancelling_have_their_codes(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(neither_threads_nor_neighbours_show_in_the_bits),
-        cmocka_unit_test(a_scene_scaled_by_a_power_of_two_has_the_same_bits),
-        cmocka_unit_test(every_point_is_marched_skipped_certified_or_invalid),
-        cmocka_unit_test(points_turned_away_are_0_and_skipped_not_marched),
-        cmocka_unit_test(points_without_place_or_normal_are_nan_and_counted),
-        cmocka_unit_test(running_out_of_steps_is_counted_and_stays_in_range),
-        cmocka_unit_test(cones_wider_than_the_reach_are_counted),
-        cmocka_unit_test(options_lights_and_cancelling_have_their_codes),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -6,8 +6,6 @@
 #include "previews.h"
 #include "truth/metrics.h"
 
-#include <stdlib.h>
-
 enum { SQUARE = 8, POINTS = SQUARE * SQUARE };
 
 static double positions[3 * POINTS];
@@ -105,7 +103,7 @@ static double line(double column, double row) {
 }
 
 /* Shared values are as near to the light as their deviation says. Edges, lines and spots stay open. */
-static void only_light_that_anchors_foretell_is_shared(void **state) {
+TEST(only_light_that_anchors_foretell_is_shared) {
     static const struct {
         const char *name;
         light_fn *light;
@@ -146,7 +144,7 @@ static void only_light_that_anchors_foretell_is_shared(void **state) {
     known_within = 0.01f;
 }
 
-static void what_is_bent_or_missing_is_not_shared(void **state) {
+TEST(what_is_bent_or_missing_is_not_shared) {
     static vshi_interpolation share;
     int wanted[VSHI_INTERPOLATION_LEVELS];
     lay_square(&share);
@@ -227,13 +225,13 @@ static void keep_the_error(const char *what, const vsh_field *field, double most
     }
 }
 
-static void rays_are_saved_and_the_error_is_as_said(void **state) {
+TEST(rays_are_saved_and_the_error_is_as_said) {
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.02, 0.0);
     keep_the_error("seeds", field, 0.7);
 }
 
 /* Rails close over the floor, whose shadows are a texel or two wide and pass between anchors. */
-static void narrow_shadows_are_not_lost(void **state) {
+TEST(narrow_shadows_are_not_lost) {
     enum { RAILS = 16 };
     truth_solid rails[RAILS];
     for (int i = 0; i < RAILS; ++i) {
@@ -245,11 +243,5 @@ static void narrow_shadows_are_not_lost(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(only_light_that_anchors_foretell_is_shared),
-        cmocka_unit_test(what_is_bent_or_missing_is_not_shared),
-        cmocka_unit_test(rays_are_saved_and_the_error_is_as_said),
-        cmocka_unit_test(narrow_shadows_are_not_lost),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

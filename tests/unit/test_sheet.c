@@ -5,8 +5,6 @@
 
 #include "mesh/sheet.h"
 
-#include <stdlib.h>
-
 enum { EDGE = 25, CELLS = EDGE - 1 };
 
 /* Numbers of [0, 1) that are the same everywhere. */
@@ -94,7 +92,7 @@ static void choose_ray(const vshi_sheet_beam *beam, uint64_t *state, vshi_vec *o
         vshi_add(beam->axis, vshi_add(vshi_scale(u, out * cos(angle)), vshi_scale(v, out * sin(angle)))));
 }
 
-static void what_is_cut_lets_no_ray_through(void **state) {
+TEST(what_is_cut_lets_no_ray_through) {
     uint64_t numbers = 5;
     size_t cut = 0, open = 0;
     for (int s = 0; s < 12; ++s) {
@@ -124,7 +122,7 @@ static void what_is_cut_lets_no_ray_through(void **state) {
     assert_true(cut > 500 && open > 500);
 }
 
-static void whole_sheets_cut_what_is_within_their_borders(void **state) {
+TEST(whole_sheets_cut_what_is_within_their_borders) {
     FREED_BY(vshi_sheet_free) vshi_sheet sheet = bumpy(0.3, 0.0, 3);
     uint64_t numbers = 8;
     for (int b = 0; b < 200; ++b) {
@@ -163,7 +161,7 @@ static vshi_sheet slab(void) {
     return sheet;
 }
 
-static void solids_cut_beams_that_they_are_wider_than(void **state) {
+TEST(solids_cut_beams_that_they_are_wider_than) {
     FREED_BY(vshi_sheet_free) vshi_sheet sheet = slab();
     for (size_t i = 0; i < 36; ++i) {
         assert_true(sheet.neighbours[i] < 12);
@@ -196,7 +194,7 @@ static uint32_t beyond(const vshi_sheet *sheet, size_t edge) {
     return count == 1 && a != b ? found : VSHI_SHEET_BORDER;
 }
 
-static void neighbours_are_those_of_exactly_two_triangles(void **state) {
+TEST(neighbours_are_those_of_exactly_two_triangles) {
     enum { TRIANGLES = 60 };
     uint64_t seed = 9;
     size_t joined = 0;
@@ -217,11 +215,5 @@ static void neighbours_are_those_of_exactly_two_triangles(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_cut_lets_no_ray_through),
-        cmocka_unit_test(whole_sheets_cut_what_is_within_their_borders),
-        cmocka_unit_test(solids_cut_beams_that_they_are_wider_than),
-        cmocka_unit_test(neighbours_are_those_of_exactly_two_triangles),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -69,7 +69,7 @@ static void shade_row(const casting *c, row *r) {
     }
 }
 
-static void meshes_that_touch_nest_or_coincide_are_one_solid(void **state) {
+TEST(meshes_that_touch_nest_or_coincide_are_one_solid) {
     const struct {
         const char *what;
         int count;
@@ -136,7 +136,7 @@ static double stretched_ball(void *user, const double p[3]) {
     return s->factor * (sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - 0.7);
 }
 
-static void fields_that_are_not_1_lipschitz_are_right_where_they_say_so(void **state) {
+TEST(fields_that_are_not_1_lipschitz_are_right_where_they_say_so) {
     enum { COUNT = 41 };
     const truth_solid ball = {TRUTH_SPHERE, {0, 0, 0}, {0, 0, 0}, 0.7, 0.0};
     const double up[3] = {0.0, 1.0, 0.0}, w = 0.1;
@@ -194,9 +194,5 @@ static void fields_that_are_not_1_lipschitz_are_right_where_they_say_so(void **s
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(meshes_that_touch_nest_or_coincide_are_one_solid),
-        cmocka_unit_test(fields_that_are_not_1_lipschitz_are_right_where_they_say_so),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -2,10 +2,6 @@
 #include "shading.h"
 #include "testing.h"
 
-#include <stdlib.h>
-#include <vdbshade/bake.h>
-#include <vdbshade/trace.h>
-
 enum { BOXES = 5, SIDE = 48, COUNT = SIDE * SIDE };
 
 /* A floor at y = 0 between four walls of a height: a well, or a trench where they are far apart along z. */
@@ -157,13 +153,13 @@ static void check_floor(double half_x, double half_z, int32_t spacing, double bi
     tear_down(s);
 }
 
-static void the_bottom_of_wells_and_trenches_sees_their_opening(void **state) {
+TEST(the_bottom_of_wells_and_trenches_sees_their_opening) {
     check_floor(1.0, 1.0, 4, 0.007, "well");
     check_floor(0.5, 6.0, 4, 0.007, "trench");
     check_floor(1.0, 1.0, 1, 0.001, "well, no rays shared");
 }
 
-static void open_floors_walls_and_ceilings_see_one_half_and_nothing(void **state) {
+TEST(open_floors_walls_and_ceilings_see_one_half_and_nothing) {
     static const int32_t methods[] = {VSH_AO_EXACT, VSH_AO_ADAPTIVE, VSH_AO_RAYS};
     static const struct {
         int32_t up;
@@ -181,7 +177,7 @@ static void open_floors_walls_and_ceilings_see_one_half_and_nothing(void **state
     tear_down(s);
 }
 
-static void a_sky_without_an_axis_or_rays_is_refused(void **state) {
+TEST(a_sky_without_an_axis_or_rays_is_refused) {
     stage *s = set_up(1.0, 1.0, 1.0, 1);
     assert_int_equal(bake_sky(s, VSH_AO_ADAPTIVE, 0, &failure), VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(failure.message, "asked.sky 0"));
@@ -192,10 +188,5 @@ static void a_sky_without_an_axis_or_rays_is_refused(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_bottom_of_wells_and_trenches_sees_their_opening),
-        cmocka_unit_test(open_floors_walls_and_ceilings_see_one_half_and_nothing),
-        cmocka_unit_test(a_sky_without_an_axis_or_rays_is_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -18,7 +18,7 @@ static const vshi_component *only_component(const vshi_solidity *s) {
     return c;
 }
 
-static void closed_surfaces_that_look_outwards_are_solid(void **state) {
+TEST(closed_surfaces_that_look_outwards_are_solid) {
     FREED shape *s = shape_new();
     shape_box(s, LOW, HIGH, ALL_SIDES);
     const vsh_mesh box = shape_mesh(s, "box");
@@ -32,7 +32,7 @@ static void closed_surfaces_that_look_outwards_are_solid(void **state) {
 
 /* An edge of three triangles, of which others are given again and again: what goes on in what, and what is
  * open, is as if they were not. */
-static void triangles_given_thrice_at_an_edge_of_three_change_nothing(void **state) {
+TEST(triangles_given_thrice_at_an_edge_of_three_change_nothing) {
     static const float corners[] = {0, 0, 0, 0, 0, 1, 1, 0, 0, -1, 0.5f, 0, -1, -0.5f, 0};
     static const uint32_t fan[] = {0, 1, 2, 0, 1, 3, 1, 0, 4, 0, 1, 2, 0, 1,
                                    2, 0, 1, 3, 1, 0, 4, 1, 0, 4, 1, 0, 4};
@@ -57,7 +57,7 @@ static void triangles_given_thrice_at_an_edge_of_three_change_nothing(void **sta
     vshi_components_free(&again);
 }
 
-static void a_mirrored_mesh_looks_the_same_way(void **state) {
+TEST(a_mirrored_mesh_looks_the_same_way) {
     FREED shape *s = shape_new();
     static const double mirror[12] = {-2, 0, 0, 5, 0, 1, 0, 0, 0, 0, 1, 0};
     shape_box(s, LOW, HIGH, ALL_SIDES);
@@ -70,7 +70,7 @@ static void a_mirrored_mesh_looks_the_same_way(void **state) {
     assert_sides(found, 0, &box, VSHI_SIDE_BEHIND);
 }
 
-static void faces_that_look_the_wrong_way_are_turned(void **state) {
+TEST(faces_that_look_the_wrong_way_are_turned) {
     FREED shape *s = shape_new();
     shape_ball(s, ORIGIN, 1.0, -1.0, 1.0, 24);
     for (size_t i = 0; i < s->triangles; i += 5) {
@@ -89,7 +89,7 @@ static void faces_that_look_the_wrong_way_are_turned(void **state) {
     }
 }
 
-static void small_holes_do_not_make_a_solid_hollow(void **state) {
+TEST(small_holes_do_not_make_a_solid_hollow) {
     FREED shape *s = shape_new();
     shape_ball(s, ORIGIN, 1.0, -1.0, 1.0, 48);
     s->indices[700][1] = s->indices[700][0]; /* three holes */
@@ -115,7 +115,7 @@ static void small_holes_do_not_make_a_solid_hollow(void **state) {
 
 /* Of many meshes, on any number of threads, each is found to be what it is alone, and is closed by its own
  * caps. */
-static void meshes_with_holes_are_each_what_they_are_alone(void **state) {
+TEST(meshes_with_holes_are_each_what_they_are_alone) {
     enum { MESHES = 9 };
     shape *shapes[MESHES];
     vsh_mesh meshes[MESHES];
@@ -151,7 +151,7 @@ static void meshes_with_holes_are_each_what_they_are_alone(void **state) {
     }
 }
 
-static void vessels_cloth_and_cards_are_sheets(void **state) {
+TEST(vessels_cloth_and_cards_are_sheets) {
     FREED shape *s = shape_new();
     shape_box(s, LOW, HIGH, ALL_SIDES & ~TOP);
     assert_kinds_of(s, "box without its lid", "-");
@@ -185,7 +185,7 @@ static void vessels_cloth_and_cards_are_sheets(void **state) {
     assert_kinds_of(s, "curtain", "-");
 }
 
-static void boxes_that_share_an_edge_or_a_face_are_boxes(void **state) {
+TEST(boxes_that_share_an_edge_or_a_face_are_boxes) {
     FREED shape *s = shape_new();
     const double low[3] = {1, 1, -1}, high[3] = {3, 3, 1}, beside_low[3] = {1, -1, -1},
                  beside_high[3] = {3, 1, 1};
@@ -204,7 +204,7 @@ static void boxes_that_share_an_edge_or_a_face_are_boxes(void **state) {
     assert_kinds_of(s, "a box with a fin", "S-");
 }
 
-static void what_is_asked_overrules_what_is_found(void **state) {
+TEST(what_is_asked_overrules_what_is_found) {
     FREED shape *s = shape_new();
     shape_box(s, LOW, HIGH, ALL_SIDES & ~TOP);
     vsh_mesh mesh = shape_mesh(s, "crate");
@@ -260,7 +260,7 @@ static double winding(const vsh_mesh *mesh, const double p[3]) {
 
 /* What a surface lacks of enclosing is told from its caps; truth is how far the winding number just behind
  * its faces is from a whole one. */
-static void enclosing_is_the_winding_number_behind_the_faces(void **state) {
+TEST(enclosing_is_the_winding_number_behind_the_faces) {
     FREED shape *s = shape_new();
     for (int kind = 0; kind < 6; ++kind) {
         s->vertices = s->triangles = 0;
@@ -323,7 +323,7 @@ static void enclosing_is_the_winding_number_behind_the_faces(void **state) {
 
 /* Moebius strips, nothing, faces without area, edges of hundreds of triangles: never a crash, and the same
  * twice. */
-static void odd_meshes_are_something(void **state) {
+TEST(odd_meshes_are_something) {
     FREED shape *s = shape_new();
     uint32_t v[17][2];
     for (int i = 0; i < 16; ++i) {
@@ -358,18 +358,5 @@ static void odd_meshes_are_something(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(closed_surfaces_that_look_outwards_are_solid),
-        cmocka_unit_test(triangles_given_thrice_at_an_edge_of_three_change_nothing),
-        cmocka_unit_test(a_mirrored_mesh_looks_the_same_way),
-        cmocka_unit_test(faces_that_look_the_wrong_way_are_turned),
-        cmocka_unit_test(small_holes_do_not_make_a_solid_hollow),
-        cmocka_unit_test(meshes_with_holes_are_each_what_they_are_alone),
-        cmocka_unit_test(vessels_cloth_and_cards_are_sheets),
-        cmocka_unit_test(boxes_that_share_an_edge_or_a_face_are_boxes),
-        cmocka_unit_test(what_is_asked_overrules_what_is_found),
-        cmocka_unit_test(enclosing_is_the_winding_number_behind_the_faces),
-        cmocka_unit_test(odd_meshes_are_something),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -7,11 +7,6 @@
 
 #include "spheres/spheres.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <unistd.h>
-#include <vdbshade/spheres.h>
-
 enum { POINTS = 400, RAYS = 1024, MOST = 400 };
 
 typedef struct stage {
@@ -77,7 +72,7 @@ static float shadow_at_point(const vsh_spheres *made, const vsh_light *light, in
 
 static const double TOWARDS[3] = {-0.5, 0.6, -0.6};
 
-static void hard_shadows_are_the_rays(void **state) {
+TEST(hard_shadows_are_the_rays) {
     stage *s = set_up(MOST, 0.05, 0.15, 2.0);
     static float values[POINTS], truth[POINTS];
     const vsh_light light = sun(TOWARDS, RADIANS(5.0));
@@ -93,7 +88,7 @@ static void hard_shadows_are_the_rays(void **state) {
     tear_down(s);
 }
 
-static void the_classic_method_is_the_nearest_miss(void **state) {
+TEST(the_classic_method_is_the_nearest_miss) {
     stage *s = set_up(30, 0.05, 0.3, 2.0);
     static float values[POINTS];
     const double w = 0.1, length = sqrt(0.97);
@@ -119,7 +114,7 @@ static void the_classic_method_is_the_nearest_miss(void **state) {
 }
 
 /* Half of a sphere is below its own tangent plane, and does not shade it. */
-static void a_sphere_leaves_its_own_surface_open(void **state) {
+TEST(a_sphere_leaves_its_own_surface_open) {
     const double sphere[4] = {1.0, 2.0, 3.0, 0.7};
     OWNED(vsh_spheres) *made = spheres_of(sphere, 1, NULL);
     uint64_t counter = 4;
@@ -137,7 +132,7 @@ static void a_sphere_leaves_its_own_surface_open(void **state) {
     }
 }
 
-static void bounds_lose_no_sphere_of_many(void **state) {
+TEST(bounds_lose_no_sphere_of_many) {
     enum { MANY = 20000 };
     FREED double *list = malloc(4 * MANY * sizeof *list);
     assert_non_null(list);
@@ -177,7 +172,7 @@ static void bounds_lose_no_sphere_of_many(void **state) {
     }
 }
 
-static void points_that_are_no_points_are_nan_and_inner_ones_dark(void **state) {
+TEST(points_that_are_no_points_are_nan_and_inner_ones_dark) {
     const double sphere[4] = {0, 0, 0, 1};
     OWNED(vsh_spheres) *made = spheres_of(sphere, 1, NULL);
     const double positions[12] = {NAN, 0, 0, 0, 5, 0, 0, 0.3, 0, 0, 5, 0};
@@ -195,7 +190,7 @@ static void points_that_are_no_points_are_nan_and_inner_ones_dark(void **state) 
     }
 }
 
-static void bad_spheres_are_refused_by_number(void **state) {
+TEST(bad_spheres_are_refused_by_number) {
     static const double shear[12] = {1, 1, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
                         bad[] = {0.0, -1.0, INFINITY, NAN, 1e16};
     double list[8] = {0, 0, 0, 1, 1, 1, 1, 1};
@@ -230,7 +225,7 @@ static vsh_result read_text(const char *text, double **spheres, size_t *count, v
     return result;
 }
 
-static void rows_of_a_file_are_read_or_refused_by_number(void **state) {
+TEST(rows_of_a_file_are_read_or_refused_by_number) {
     double *spheres = NULL;
     size_t count = 0;
     static const double expected[16] = {1, -2.5, 3e2, 0.5, 4, 5, 6, 7, 8, 9, 10, 11, 0.25, 0, 1, 2};
@@ -268,14 +263,5 @@ static void rows_of_a_file_are_read_or_refused_by_number(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(hard_shadows_are_the_rays),
-        cmocka_unit_test(the_classic_method_is_the_nearest_miss),
-        cmocka_unit_test(a_sphere_leaves_its_own_surface_open),
-        cmocka_unit_test(bounds_lose_no_sphere_of_many),
-        cmocka_unit_test(points_that_are_no_points_are_nan_and_inner_ones_dark),
-        cmocka_unit_test(bad_spheres_are_refused_by_number),
-        cmocka_unit_test(rows_of_a_file_are_read_or_refused_by_number),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

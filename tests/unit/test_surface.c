@@ -5,8 +5,6 @@
 #include "field/surface.h"
 #include "trace/embree.h"
 
-#include <stdlib.h>
-
 #define VOXEL 0.04
 
 typedef struct quads {
@@ -108,7 +106,7 @@ static vsh_field *rubble(void) {
     return field_of((truth_scene){solids, MAX_SOLIDS}, VOXEL, 1.0);
 }
 
-static void surface_is_closed(void **state) {
+TEST(surface_is_closed) {
     const double heights[] = {0.0, GROWN, -1.0};
     OWNED(vsh_field) *seeds = field_of(truth_seeds(), VOXEL, 1.0);
     OWNED(vsh_field) *hollow = hollow_box(VOXEL, 1.1 * VOXEL), *stones = rubble();
@@ -126,7 +124,7 @@ static void surface_is_closed(void **state) {
     }
 }
 
-static void corners_lie_on_the_sphere(void **state) {
+TEST(corners_lie_on_the_sphere) {
     const truth_solid ball = {.shape = TRUTH_SPHERE, .center = {0.1, 0.2, 0.3}, .radius = 0.5};
     OWNED(vsh_field) *field = field_of((truth_scene){&ball, 1}, VOXEL, 1.0);
     FREED_BY(quads_free) quads q = quads_of(field, GROWN);
@@ -190,7 +188,7 @@ static vsh_field *with_surface(vsh_field *field) {
     return field;
 }
 
-static void rays_meet_what_the_cells_read(void **state) {
+TEST(rays_meet_what_the_cells_read) {
     if (!vsh_triangles_available()) {
         skip();
     }
@@ -240,7 +238,7 @@ static double rms_of(const float *a, const float *b, size_t count) {
     return sqrt(sum / (double)count);
 }
 
-static void traced_values_are_near_those_of_marched_rays(void **state) {
+TEST(traced_values_are_near_those_of_marched_rays) {
     if (!vsh_triangles_available()) {
         skip();
     }
@@ -271,7 +269,7 @@ static void traced_values_are_near_those_of_marched_rays(void **state) {
 }
 
 /* Between two lattice planes, which read half a voxel. */
-static void plate_that_voxels_lose_has_no_surface(void **state) {
+TEST(plate_that_voxels_lose_has_no_surface) {
     const truth_solid plate = {.shape = TRUTH_BOX,
                                .center = {0.0, 0.5 * VOXEL, 0.0},
                                .half = {10.0 * VOXEL, 0.05 * VOXEL, 10.0 * VOXEL}};
@@ -285,7 +283,7 @@ static int32_t cancel_surface(void *user, const char *stage, double fraction) {
     return fraction > *(const double *)user;
 }
 
-static void surface_keeps_the_limit_and_ends_when_asked(void **state) {
+TEST(surface_keeps_the_limit_and_ends_when_asked) {
     if (!vsh_triangles_available()) {
         skip();
     }
@@ -310,13 +308,5 @@ static void surface_keeps_the_limit_and_ends_when_asked(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(surface_is_closed),
-        cmocka_unit_test(corners_lie_on_the_sphere),
-        cmocka_unit_test(rays_meet_what_the_cells_read),
-        cmocka_unit_test(traced_values_are_near_those_of_marched_rays),
-        cmocka_unit_test(plate_that_voxels_lose_has_no_surface),
-        cmocka_unit_test(surface_keeps_the_limit_and_ends_when_asked),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

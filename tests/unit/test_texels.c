@@ -25,7 +25,7 @@ static void free_sampled(sampled *s) {
     vsh_charts_free(s->charts);
 }
 
-static void a_quad_over_the_unit_square_puts_every_texel_at_its_analytic_place(void **state) {
+TEST(a_quad_over_the_unit_square_puts_every_texel_at_its_analytic_place) {
     quad q;
     make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
     const int32_t sizes[][3] = {{16, 16, 1}, {37, 11, 1}, {1, 1, 1}, {8, 24, 2}, {13, 9, 3}, {3, 2, 16}};
@@ -64,7 +64,7 @@ static void a_quad_over_the_unit_square_puts_every_texel_at_its_analytic_place(v
     }
 }
 
-static void neighbouring_samples_come_cell_by_cell(void **state) {
+TEST(neighbouring_samples_come_cell_by_cell) {
     quad q;
     make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
     FREED_BY(free_sampled) sampled made = sample(&q.mesh, 1, size_of(24, 16, 1), NULL);
@@ -76,7 +76,7 @@ static void neighbouring_samples_come_cell_by_cell(void **state) {
 }
 
 /* A fan around a point that lies on a texel centre, and many that do not. */
-static void triangles_that_share_edges_and_corners_leave_no_gap_and_no_overlap(void **state) {
+TEST(triangles_that_share_edges_and_corners_leave_no_gap_and_no_overlap) {
     enum { SPOKES = 17 };
     for (int variant = 0; variant < 8; ++variant) {
         float positions[3 * (SPOKES + 1)] = {0}, uvs[2 * (SPOKES + 1)];
@@ -111,7 +111,7 @@ static void triangles_that_share_edges_and_corners_leave_no_gap_and_no_overlap(v
     }
 }
 
-static void a_chart_that_does_not_fit_has_border_texels_near_and_inside_it(void **state) {
+TEST(a_chart_that_does_not_fit_has_border_texels_near_and_inside_it) {
     const int32_t supersample[] = {1, 2};
     quad q;
     make_quad(&q, 4.0f / 16.0f, 4.0f / 16.0f, 12.0f / 16.0f, 12.0f / 16.0f);
@@ -151,7 +151,7 @@ static void a_chart_that_does_not_fit_has_border_texels_near_and_inside_it(void 
     }
 }
 
-static void a_triangle_smaller_than_a_texel_still_has_one(void **state) {
+TEST(a_triangle_smaller_than_a_texel_still_has_one) {
     const float positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
     const float uvs[] = {0.51f, 0.51f, 0.512f, 0.51f, 0.51f, 0.512f};
     const uint32_t indices[] = {0, 1, 2};
@@ -165,7 +165,7 @@ static void a_triangle_smaller_than_a_texel_still_has_one(void **state) {
     assert_true(p[0] >= 0.0 && p[1] >= 0.0 && p[0] + p[1] <= 1.0 + 1e-12);
 }
 
-static void overlaps_are_counted_where_two_meshes_share_texels(void **state) {
+TEST(overlaps_are_counted_where_two_meshes_share_texels) {
     quad q[3];
     make_quad(&q[0], 0.0f, 0.0f, 0.5f, 1.0f);
     make_quad(&q[1], 0.5f, 0.0f, 1.0f, 1.0f); /* shares an edge with the first: no overlap */
@@ -183,7 +183,7 @@ static void overlaps_are_counted_where_two_meshes_share_texels(void **state) {
     assert_int_equal(info.samples, 32 * 32);
 }
 
-static void the_first_triangle_keeps_a_texel_that_two_cover(void **state) {
+TEST(the_first_triangle_keeps_a_texel_that_two_cover) {
     quad q[2];
     make_quad(&q[0], 0.0f, 0.0f, 1.0f, 1.0f);
     make_quad(&q[1], 0.0f, 0.0f, 1.0f, 1.0f);
@@ -201,7 +201,7 @@ static void the_first_triangle_keeps_a_texel_that_two_cover(void **state) {
     }
 }
 
-static void any_number_of_threads_gives_the_same_bits(void **state) {
+TEST(any_number_of_threads_gives_the_same_bits) {
     sphere s[2];
     make_sphere(&s[0], 40, 1.0);
     make_sphere(&s[1], 13, 1.0); /* the same chart: everything overlaps */
@@ -236,7 +236,7 @@ static void any_number_of_threads_gives_the_same_bits(void **state) {
     free_sphere(&s[0]);
 }
 
-static void huge_uvs_are_clipped_and_counted(void **state) {
+TEST(huge_uvs_are_clipped_and_counted) {
     const float huge[] = {1e30f, 3e38f, 1e10f, 1e6f, 300.0f, 1.1f};
     for (size_t k = 0; k < sizeof huge / sizeof huge[0]; ++k) {
         const float positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
@@ -257,7 +257,7 @@ static void huge_uvs_are_clipped_and_counted(void **state) {
     }
 }
 
-static void triangles_without_area_are_skipped_and_those_of_uv_space_counted(void **state) {
+TEST(triangles_without_area_are_skipped_and_those_of_uv_space_counted) {
     const float positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 2, 0, 0};
     const float uvs[] = {0, 0, 1, 0, 0, 1, 0.5f, 0.5f};
     /* A good one; no area in the world; no area in UV space (corners 1, 2 and 3 lie on a line there). */
@@ -280,7 +280,7 @@ static void assert_refused(const vsh_mesh *mesh, vsh_lightmap_options options, v
     assert_non_null(strstr(failure.message, limit));
 }
 
-static void bad_sizes_and_uvs_are_refused_with_the_value_and_the_limit(void **state) {
+TEST(bad_sizes_and_uvs_are_refused_with_the_value_and_the_limit) {
     quad q;
     make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
     vsh_lightmap_options good = size_of(8, 8, 1), padded = good;
@@ -298,7 +298,7 @@ static void bad_sizes_and_uvs_are_refused_with_the_value_and_the_limit(void **st
     assert_refused(&q.mesh, good, VSH_ERROR_INPUT, "mesh 'quad'", "no lightmap UVs");
 }
 
-static void the_memory_limit_is_passed_by_no_lightmap(void **state) {
+TEST(the_memory_limit_is_passed_by_no_lightmap) {
     quad q;
     make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
     vsh_run run = vsh_run_default();
@@ -322,7 +322,7 @@ static int32_t stop_at_half(void *user, const char *stage, double fraction) {
     return fraction >= 0.5;
 }
 
-static void progress_rises_and_cancels(void **state) {
+TEST(progress_rises_and_cancels) {
     FREED_BY(free_sphere) sphere s;
     make_sphere(&s, 20, 1.0);
     vsh_run run = vsh_run_default();
@@ -341,7 +341,7 @@ static void count_warning(void *user, const char *message) {
     ++*(int *)user;
 }
 
-static void overlaps_tell_own_charts_from_those_of_other_objects_and_name_the_worst_pair(void **state) {
+TEST(overlaps_tell_own_charts_from_those_of_other_objects_and_name_the_worst_pair) {
     enum { COUNT = 5 };
     quad q[COUNT];
     make_quad(&q[0], 0.0f, 0.0f, 0.5f, 0.5f);
@@ -374,7 +374,7 @@ static void overlaps_tell_own_charts_from_those_of_other_objects_and_name_the_wo
     }
 }
 
-static void overlaps_are_warned_of_by_mesh(void **state) {
+TEST(overlaps_are_warned_of_by_mesh) {
     quad q[2];
     make_quad(&q[0], 0.0f, 0.0f, 1.0f, 1.0f);
     make_quad(&q[1], 0.0f, 0.0f, 2.0f, 1.0f);
@@ -404,7 +404,7 @@ static void sample_both(sphere *s, int32_t size, sampled both[2]) {
     assert_int_equal(both[0].samples.count, both[1].samples.count);
 }
 
-static void samples_of_a_coarse_smooth_sphere_are_lifted_to_within_its_sag(void **state) {
+TEST(samples_of_a_coarse_smooth_sphere_are_lifted_to_within_its_sag) {
     const double radius = 2.0;
     FREED_BY(free_sphere) sphere s;
     sampled both[2];
@@ -435,7 +435,7 @@ static void samples_of_a_coarse_smooth_sphere_are_lifted_to_within_its_sag(void 
     free_sampled(&both[1]);
 }
 
-static void the_inside_of_a_smooth_sphere_is_not_lifted(void **state) {
+TEST(the_inside_of_a_smooth_sphere_is_not_lifted) {
     FREED_BY(free_sphere) sphere s;
     sampled both[2];
     make_sphere(&s, 6, 1.0);
@@ -455,7 +455,7 @@ static void the_inside_of_a_smooth_sphere_is_not_lifted(void **state) {
     free_sampled(&both[1]);
 }
 
-static void normals_that_are_flat_or_broken_lift_nothing(void **state) {
+TEST(normals_that_are_flat_or_broken_lift_nothing) {
     const float normals[][3] = {{0, 0, 1}, {0, 0, 5},        {0, 0, 0},        {NAN, 0, 1},   {0, 0, -1},
                                 {1, 0, 0}, {1e-5f, 0, 1.0f}, {INFINITY, 0, 1}, {0, 0, 1e-38f}};
     for (size_t c = 0; c < sizeof normals / sizeof normals[0]; ++c) {
@@ -476,7 +476,7 @@ static void normals_that_are_flat_or_broken_lift_nothing(void **state) {
     }
 }
 
-static void a_cube_with_averaged_normals_is_shaded_smooth_but_stays_in_its_place(void **state) {
+TEST(a_cube_with_averaged_normals_is_shaded_smooth_but_stays_in_its_place) {
     const float positions[] = {-1, -1, 1, 1, -1, 1, 1, 1, 1, -1, 1, 1}; /* one face; normals of the corners */
     const float uvs[] = {0, 0, 1, 0, 1, 1, 0, 1};
     const vsh_mesh mesh = {.positions = positions,
@@ -493,7 +493,7 @@ static void a_cube_with_averaged_normals_is_shaded_smooth_but_stays_in_its_place
     }
 }
 
-static void a_mirrored_transform_keeps_normals_outward(void **state) {
+TEST(a_mirrored_transform_keeps_normals_outward) {
     const double transforms[][12] = {{-1, 0, 0, 5, 0, 1, 0, 0, 0, 0, 1, 0},
                                      {2, 0, 0, 5, 0, 0, 3, 0, 0, 1, 0, 0},
                                      {0.5, 0.25, 0, 5, 0, 2, 0, 0, 0, 0, 3, 0},
@@ -524,7 +524,7 @@ static void a_mirrored_transform_keeps_normals_outward(void **state) {
     }
 }
 
-static void a_mirrored_transform_keeps_uvs_on_their_corners(void **state) {
+TEST(a_mirrored_transform_keeps_uvs_on_their_corners) {
     const double mirror[12] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     quad q;
     make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
@@ -540,7 +540,7 @@ static void a_mirrored_transform_keeps_uvs_on_their_corners(void **state) {
 }
 
 /* Some tiles are looked at first: they have no samples, some, or all. */
-static void bounds_of_charts_are_those_of_their_texels(void **state) {
+TEST(bounds_of_charts_are_those_of_their_texels) {
     FREED_BY(free_sphere) sphere s;
     make_sphere(&s, 12, 1.0);
     static const int32_t sizes[][2] = {{8, 8}, {256, 128}, {64, 1024}, {1024, 1016}};
@@ -563,29 +563,5 @@ static void bounds_of_charts_are_those_of_their_texels(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_quad_over_the_unit_square_puts_every_texel_at_its_analytic_place),
-        cmocka_unit_test(neighbouring_samples_come_cell_by_cell),
-        cmocka_unit_test(triangles_that_share_edges_and_corners_leave_no_gap_and_no_overlap),
-        cmocka_unit_test(a_chart_that_does_not_fit_has_border_texels_near_and_inside_it),
-        cmocka_unit_test(a_triangle_smaller_than_a_texel_still_has_one),
-        cmocka_unit_test(overlaps_are_counted_where_two_meshes_share_texels),
-        cmocka_unit_test(the_first_triangle_keeps_a_texel_that_two_cover),
-        cmocka_unit_test(any_number_of_threads_gives_the_same_bits),
-        cmocka_unit_test(huge_uvs_are_clipped_and_counted),
-        cmocka_unit_test(triangles_without_area_are_skipped_and_those_of_uv_space_counted),
-        cmocka_unit_test(bad_sizes_and_uvs_are_refused_with_the_value_and_the_limit),
-        cmocka_unit_test(the_memory_limit_is_passed_by_no_lightmap),
-        cmocka_unit_test(progress_rises_and_cancels),
-        cmocka_unit_test(overlaps_tell_own_charts_from_those_of_other_objects_and_name_the_worst_pair),
-        cmocka_unit_test(overlaps_are_warned_of_by_mesh),
-        cmocka_unit_test(samples_of_a_coarse_smooth_sphere_are_lifted_to_within_its_sag),
-        cmocka_unit_test(the_inside_of_a_smooth_sphere_is_not_lifted),
-        cmocka_unit_test(normals_that_are_flat_or_broken_lift_nothing),
-        cmocka_unit_test(a_cube_with_averaged_normals_is_shaded_smooth_but_stays_in_its_place),
-        cmocka_unit_test(a_mirrored_transform_keeps_normals_outward),
-        cmocka_unit_test(a_mirrored_transform_keeps_uvs_on_their_corners),
-        cmocka_unit_test(bounds_of_charts_are_those_of_their_texels),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -174,7 +174,7 @@ static void assert_passage(const passage *p, const char *what, double voxels, do
     }
 }
 
-static void walls_gaps_and_needles_over_a_voxel_are_what_they_are(void **state) {
+TEST(walls_gaps_and_needles_over_a_voxel_are_what_they_are) {
     const double low[3][3] = {{-0.6, -0.6, -0.6}, {0.0, -0.6, -0.8}, {0.0, -0.6, -1.2}};
     const double high[3][3] = {{0.6, -0.4, 0.6}, {0.0, -0.4, 0.8}, {0.0, -0.4, 1.2}};
     for (int i = 0; i < THICKNESS_COUNT; ++i) {
@@ -192,7 +192,7 @@ static void walls_gaps_and_needles_over_a_voxel_are_what_they_are(void **state) 
 
 /* Along the very plane in which two boxes meet, and beside it. By rays: a union is as deep there as its boxes
  * are, not at all, so that cones along it read an edge. */
-static void no_light_comes_through_the_seam_of_boxes_that_touch(void **state) {
+TEST(no_light_comes_through_the_seam_of_boxes_that_touch) {
     const block boxes[2] = {{{0.6, 0, 0}, {0.6, 0.5, 1.0}}, {{-0.6, 0, 0}, {0.6, 0.5, 1.0}}};
     const double low[3] = {0.0, -1.1, -0.8}, high[3] = {0.0, -0.9, 0.8};
     const double beside_low[3] = {-0.5 * VOXEL, -1.1, -0.8}, beside_high[3] = {0.5 * VOXEL, -0.9, 0.8};
@@ -204,7 +204,7 @@ static void no_light_comes_through_the_seam_of_boxes_that_touch(void **state) {
 
 /* Six boxes around a room: by rays nothing is seen from its floor, by walls from 1.25 voxels on, or however
  * thin where they are triangles. */
-static void rooms_are_dark(void **state) {
+TEST(rooms_are_dark) {
     const float up[3] = {0.0f, 1.0f, 0.0f};
     const double nowhere[3] = {0.0, 0.0, 0.0};
     for (int i = 0; i < THICKNESS_COUNT; ++i) {
@@ -230,7 +230,7 @@ static void rooms_are_dark(void **state) {
 
 /* A floor, and on it a wall that stands less than half a voxel beside the receivers, between them and a low
  * sun: thin ones look like the floor's own height to a cone, which must not certify what it passes. */
-static void no_wall_beside_a_receiver_is_taken_for_its_floor(void **state) {
+TEST(no_wall_beside_a_receiver_is_taken_for_its_floor) {
     const float up[3] = {0.0f, 1.0f, 0.0f};
     size_t wrong = 0, all = 0;
     if (!vsh_triangles_available()) {
@@ -261,11 +261,5 @@ static void no_wall_beside_a_receiver_is_taken_for_its_floor(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(walls_gaps_and_needles_over_a_voxel_are_what_they_are),
-        cmocka_unit_test(no_light_comes_through_the_seam_of_boxes_that_touch),
-        cmocka_unit_test(rooms_are_dark),
-        cmocka_unit_test(no_wall_beside_a_receiver_is_taken_for_its_floor),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -5,9 +5,6 @@
 #include "metrics.h"
 #include "testing.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-
 OWNER(truth_mesh)
 
 static const double pi = 3.14159265358979323846;
@@ -44,13 +41,13 @@ static double number(size_t i, double irrational) {
     return fmod((double)(i + 1) * irrational, 1.0);
 }
 
-static void a_light_under_open_sky_is_seen_whole(void **state) {
+TEST(a_light_under_open_sky_is_seen_whole) {
     const double point[3] = {2.9, 0.001, -2.9};
     const double away[3] = {0.5, 0.6, -0.6};
     near_value(truth_light(truth_seeds(), point, up, away, 0.1, INFINITY, 256), 1.0, 0.0, "sky");
 }
 
-static void a_sphere_in_front_of_a_disc_leaves_one_less_the_lens(void **state) {
+TEST(a_sphere_in_front_of_a_disc_leaves_one_less_the_lens) {
     /* Small angles, so that the sphere's outline on the disc's plane is a circle to 1e-4. */
     const double w = 0.02;
     for (int i = 0; i <= 10; i++) {
@@ -69,7 +66,7 @@ static void a_sphere_in_front_of_a_disc_leaves_one_less_the_lens(void **state) {
     }
 }
 
-static void a_straight_edge_leaves_the_circular_segment(void **state) {
+TEST(a_straight_edge_leaves_the_circular_segment) {
     const double w = 0.3;
     for (int i = -5; i <= 5; i++) {
         const double x = i / 5.0;
@@ -84,7 +81,7 @@ static void a_straight_edge_leaves_the_circular_segment(void **state) {
     near_value(truth_disc_share(-1.0), 0.0, 1e-15, "none");
 }
 
-static void a_torus_seen_along_its_axis_hides_a_ring(void **state) {
+TEST(a_torus_seen_along_its_axis_hides_a_ring) {
     const double depth = 3.0;
     const double ring = 0.5;
     const double tube = 0.1;
@@ -119,7 +116,7 @@ static double least_distance(const truth_solid *solid, const double from[3], con
     return best;
 }
 
-static void rays_hit_exactly_where_the_distance_along_them_falls_below_zero(void **state) {
+TEST(rays_hit_exactly_where_the_distance_along_them_falls_below_zero) {
     const truth_scene scene = truth_seeds();
     size_t hits = 0;
     size_t misses = 0;
@@ -154,7 +151,7 @@ static void rays_hit_exactly_where_the_distance_along_them_falls_below_zero(void
 }
 
 /* Tangents just under and just over every rounded corner, edge and face of a box. */
-static void a_rounded_box_is_as_round_as_it_says_everywhere(void **state) {
+TEST(a_rounded_box_is_as_round_as_it_says_everywhere) {
     const truth_solid box = {TRUTH_BOX, {0.1, 0.2, 0.3}, {0.4, 0.3, 0.5}, 0.25, 0.0};
     for (int side = 0; side < 27; side++) {
         const int sign[3] = {side % 3 - 1, side / 3 % 3 - 1, side / 9 - 1};
@@ -180,7 +177,7 @@ static void a_rounded_box_is_as_round_as_it_says_everywhere(void **state) {
     }
 }
 
-static void rays_end_at_their_limit_and_begin_at_their_origin(void **state) {
+TEST(rays_end_at_their_limit_and_begin_at_their_origin) {
     const truth_solid solids[] = {
         {TRUTH_SPHERE, {0.0, 2.0, 0.0}, {0.0, 0.0, 0.0}, 0.5, 0.0},
         {TRUTH_BOX, {0.0, 2.0, 0.0}, {0.5, 0.5, 0.5}, 0.0, 0.0},
@@ -198,7 +195,7 @@ static void rays_end_at_their_limit_and_begin_at_their_origin(void **state) {
     }
 }
 
-static void distances_of_the_seeds_are_right_by_hand(void **state) {
+TEST(distances_of_the_seeds_are_right_by_hand) {
     static const struct {
         const char *what;
         double at[3], distance;
@@ -212,7 +209,7 @@ static void distances_of_the_seeds_are_right_by_hand(void **state) {
     }
 }
 
-static void ao_beside_a_wall_is_a_half_and_fades_with_distance(void **state) {
+TEST(ao_beside_a_wall_is_a_half_and_fades_with_distance) {
     const truth_solid wall = {TRUTH_BOX, {51.0, 0.0, 0.0}, {50.0, 1000.0, 1000.0}, 0.0, 0.0};
     near_value(truth_ao(one(&wall), (double[]){1.0, 0.0, 0.0}, up, 2.0, 4096), 0.5, 2e-3, "in the corner");
     /* Rays reach the wall, 1 away, within D where their share along x is above 1 / D: a disc's segment. */
@@ -223,7 +220,7 @@ static void ao_beside_a_wall_is_a_half_and_fades_with_distance(void **state) {
     }
 }
 
-static void ao_under_a_sphere_is_one_less_its_form_factor(void **state) {
+TEST(ao_under_a_sphere_is_one_less_its_form_factor) {
     const truth_solid sphere = {TRUTH_SPHERE, {0.0, 2.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
     near_value(truth_ao(one(&sphere), origin, up, INFINITY, 4096), 0.75, 1e-3, "sphere overhead");
     const double tilted[3] = {sin(0.4), cos(0.4), 0.0}; /* the form factor of a sphere: cos × (r / d)² */
@@ -231,14 +228,14 @@ static void ao_under_a_sphere_is_one_less_its_form_factor(void **state) {
                "sphere aside");
 }
 
-static void what_lies_below_the_horizon_is_hidden(void **state) {
+TEST(what_lies_below_the_horizon_is_hidden) {
     const truth_scene empty = {NULL, 0};
     const double level[3] = {1.0, 0.0, 0.0};
     near_value(truth_light(empty, origin, up, level, 0.1, INFINITY, 4096), 0.5, 2e-3, "half set");
     near_value(truth_light(empty, origin, NULL, level, 0.1, INFINITY, 4096), 1.0, 0.0, "no horizon");
 }
 
-static void culling_changes_nothing(void **state) {
+TEST(culling_changes_nothing) {
     const truth_scene scene = truth_seeds();
     const truth_frame frame = truth_frame_around(truth_seeds_sun);
     double penumbra = 0.0;
@@ -292,7 +289,7 @@ static void place(receivers *points, const double shift[3]) {
 }
 
 /* Boxes at one place in three ways: as they are, mirrored, and a million units away. */
-static void mesh_and_analytic_truth_agree_on_a_box(void **state) {
+TEST(mesh_and_analytic_truth_agree_on_a_box) {
     static receivers points;
     static float light[POINTS], ao[POINTS], backs[POINTS], light_truth[POINTS], ao_truth[POINTS];
     for (int variant = 0; variant < 3; variant++) {
@@ -334,7 +331,7 @@ static void mesh_and_analytic_truth_agree_on_a_box(void **state) {
 }
 
 /* A yardstick that traced other rays, or fewer, would be no yardstick. */
-static void packets_answer_as_lone_rays_do_for_any_threads(void **state) {
+TEST(packets_answer_as_lone_rays_do_for_any_threads) {
     enum { FEW = 37 }; /* no multiple of a packet */
     static receivers points;
     static float lone[POINTS], values[POINTS];
@@ -366,7 +363,7 @@ static void packets_answer_as_lone_rays_do_for_any_threads(void **state) {
     }
 }
 
-static void metrics_are_right_by_hand(void **state) {
+TEST(metrics_are_right_by_hand) {
     float values[100], truth[100], mask[100];
     for (int i = 0; i < 100; i++) {
         truth[i] = i < 20 ? 0.5F : 1.0F;
@@ -394,22 +391,5 @@ static void metrics_are_right_by_hand(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_light_under_open_sky_is_seen_whole),
-        cmocka_unit_test(a_sphere_in_front_of_a_disc_leaves_one_less_the_lens),
-        cmocka_unit_test(a_straight_edge_leaves_the_circular_segment),
-        cmocka_unit_test(a_torus_seen_along_its_axis_hides_a_ring),
-        cmocka_unit_test(rays_hit_exactly_where_the_distance_along_them_falls_below_zero),
-        cmocka_unit_test(a_rounded_box_is_as_round_as_it_says_everywhere),
-        cmocka_unit_test(rays_end_at_their_limit_and_begin_at_their_origin),
-        cmocka_unit_test(distances_of_the_seeds_are_right_by_hand),
-        cmocka_unit_test(ao_beside_a_wall_is_a_half_and_fades_with_distance),
-        cmocka_unit_test(ao_under_a_sphere_is_one_less_its_form_factor),
-        cmocka_unit_test(what_lies_below_the_horizon_is_hidden),
-        cmocka_unit_test(culling_changes_nothing),
-        cmocka_unit_test(mesh_and_analytic_truth_agree_on_a_box),
-        cmocka_unit_test(packets_answer_as_lone_rays_do_for_any_threads),
-        cmocka_unit_test(metrics_are_right_by_hand),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

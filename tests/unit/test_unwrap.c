@@ -80,7 +80,7 @@ static void triangle(shape *s) {
     shape_triangle(s, shape_vertex(s, 0, 0, 0), shape_vertex(s, 1, 0, 0), shape_vertex(s, 0, 1, 0));
 }
 
-static void shapes_have_few_charts_of_little_stretch(void **state) {
+TEST(shapes_have_few_charts_of_little_stretch) {
     static const struct {
         const char *name;
         void (*make)(shape *s);
@@ -115,7 +115,7 @@ static void shapes_have_few_charts_of_little_stretch(void **state) {
 
 /* Bars of few sides without ends: what shading rounds is one chart, what it does not is cut along its edges.
  */
-static void bars_are_cut_along_edges_that_shading_shows(void **state) {
+TEST(bars_are_cut_along_edges_that_shading_shows) {
     for (uint32_t sides = 3; sides <= 6; ++sides) {
         for (int rounded = 0; rounded < 3; ++rounded) {
             FREED shape *s = shape_new();
@@ -149,7 +149,7 @@ static void bars_are_cut_along_edges_that_shading_shows(void **state) {
 }
 
 /* Two leaves of a hinge that is nearly shut, whatever its shading says. */
-static void what_is_folded_onto_itself_is_cut(void **state) {
+TEST(what_is_folded_onto_itself_is_cut) {
     for (int shut = 0; shut < 2; ++shut) {
         FREED shape *s = shape_new();
         const double angle = shut ? 2.6 : 2.0, c = -cos(angle), d = sin(angle); /* normals are so far apart */
@@ -168,7 +168,7 @@ static void what_is_folded_onto_itself_is_cut(void **state) {
 }
 
 /* One vertex with all of a wavy cone's triangles: eliminated too early, it would fill the equations. */
-static void a_tip_of_thousands_of_triangles_takes_no_time(void **state) {
+TEST(a_tip_of_thousands_of_triangles_takes_no_time) {
     enum { AROUND = 30000 };
     FREED shape *s = shape_new();
     const uint32_t tip = shape_vertex(s, 0, 0, 1);
@@ -187,7 +187,7 @@ static void a_tip_of_thousands_of_triangles_takes_no_time(void **state) {
     assert_in_range(vsh_atlas_chart_count(atlas), 1, 16);
 }
 
-static void a_soup_of_random_triangles_has_places(void **state) {
+TEST(a_soup_of_random_triangles_has_places) {
     FREED shape *s = shape_new();
     uint64_t seed = 5;
     for (uint32_t i = 0; i < 120; ++i) { /* few vertices, so that they meet in every way */
@@ -205,7 +205,7 @@ static void a_soup_of_random_triangles_has_places(void **state) {
 }
 
 /* So rough that many an edge is a crease that ends within a chart: a slit that must not open inside out. */
-static void rough_balls_lie_over_themselves_nowhere(void **state) {
+TEST(rough_balls_lie_over_themselves_nowhere) {
     for (uint64_t seed = 1; seed <= 6; ++seed) {
         uint64_t random = seed;
         FREED shape *s = shape_new();
@@ -222,7 +222,7 @@ static void rough_balls_lie_over_themselves_nowhere(void **state) {
 }
 
 /* Points, lines, slivers of a millionth of their length, and a triangle among them. */
-static void triangles_without_area_have_no_chart_and_slivers_have_one(void **state) {
+TEST(triangles_without_area_have_no_chart_and_slivers_have_one) {
     FREED shape *s = shape_new();
     const uint32_t a = shape_vertex(s, 0, 0, 0), b = shape_vertex(s, 1, 0, 0), c = shape_vertex(s, 0, 1, 0),
                    middle = shape_vertex(s, 0.5, 0, 0), thin = shape_vertex(s, 0.3, 1e-6, 0);
@@ -237,7 +237,7 @@ static void triangles_without_area_have_no_chart_and_slivers_have_one(void **sta
 }
 
 /* Sizes from 1e-30 to 1e30 units, and far from the origin. */
-static void units_do_not_matter(void **state) {
+TEST(units_do_not_matter) {
     for (int i = 0; i < 5; ++i) {
         static const double sizes[5] = {1e-30, 1e-3, 1, 1e6, 1e30};
         const double k = sizes[i], transform[12] = {k, 0, 0, 5 * k, 0, k, 0, 0, 0, 0, k, -7 * k};
@@ -271,7 +271,7 @@ static size_t count_parted_quads(const shape *s) {
 
 /* Modellers often write faces with vertices of their own. A bend below a crease never splits a quad,
  * whichever diagonal it has. */
-static void triangles_of_a_quad_stay_together(void **state) {
+TEST(triangles_of_a_quad_stay_together) {
     FREED shape *s = shape_new(), *faces = shape_new();
     uint64_t random = 3;
     shape_grid(s, torus_at, 40, 24, 1, 1, 0);
@@ -295,7 +295,7 @@ static void triangles_of_a_quad_stay_together(void **state) {
 
 /* A rectangle's borders are a tenth of a texel beyond centres of texels: what is read within it is nearly all
  * of its own texels, and no texel's centre is on an edge of the surface. */
-static void borders_of_rectangles_are_just_beyond_centres_of_texels(void **state) {
+TEST(borders_of_rectangles_are_just_beyond_centres_of_texels) {
     FREED shape *s = shape_new();
     shape_box(s, (double[3]){0, 0, 0}, (double[3]){1, 2, 3.3}, ALL_SIDES);
     const vsh_mesh mesh = shape_mesh(s, "box");
@@ -353,7 +353,7 @@ static int spiral_overlaps(double turns, double out) {
     return overlaps(uv, 2 * STEPS + 2, corner, 2 * STEPS);
 }
 
-static void ends_that_lie_over_each_other_are_overlap(void **state) {
+TEST(ends_that_lie_over_each_other_are_overlap) {
     assert_false(spiral_overlaps(0.9, 0.0));
     assert_false(spiral_overlaps(1.2, 0.4));
     assert_true(spiral_overlaps(1.2, 0.05));    /* borders cross */
@@ -361,7 +361,7 @@ static void ends_that_lie_over_each_other_are_overlap(void **state) {
     assert_true(spiral_overlaps(1.25, 0.0)); /* they lie along each other, and cross nowhere but at corners */
 }
 
-static void the_sample_assets_unwrap(void **state) {
+TEST(the_sample_assets_unwrap) {
     static const struct {
         const char *name;
         int32_t size;
@@ -390,19 +390,5 @@ static void the_sample_assets_unwrap(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(shapes_have_few_charts_of_little_stretch),
-        cmocka_unit_test(bars_are_cut_along_edges_that_shading_shows),
-        cmocka_unit_test(what_is_folded_onto_itself_is_cut),
-        cmocka_unit_test(a_tip_of_thousands_of_triangles_takes_no_time),
-        cmocka_unit_test(a_soup_of_random_triangles_has_places),
-        cmocka_unit_test(rough_balls_lie_over_themselves_nowhere),
-        cmocka_unit_test(triangles_without_area_have_no_chart_and_slivers_have_one),
-        cmocka_unit_test(units_do_not_matter),
-        cmocka_unit_test(triangles_of_a_quad_stay_together),
-        cmocka_unit_test(borders_of_rectangles_are_just_beyond_centres_of_texels),
-        cmocka_unit_test(ends_that_lie_over_each_other_are_overlap),
-        cmocka_unit_test(the_sample_assets_unwrap),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -53,7 +53,7 @@ static vsh_atlas *assert_same_bits(const vsh_mesh *meshes, size_t count, const v
     return first;
 }
 
-static void the_same_bits_for_any_number_of_threads(void **state) {
+TEST(the_same_bits_for_any_number_of_threads) {
     shape *s[2] = {lump(40), lump(64)};
     const vsh_mesh meshes[2] = {shape_mesh(s[0], "one"), shape_mesh(s[1], "two")};
     const vsh_unwrap_options o = unwrap_into(256);
@@ -79,7 +79,7 @@ static void free_boxes(shape *s[BOXES]) {
     }
 }
 
-static void each_mesh_is_on_one_page_where_it_fits(void **state) {
+TEST(each_mesh_is_on_one_page_where_it_fits) {
     shape *s[BOXES];
     vsh_mesh meshes[BOXES];
     make_boxes(s, meshes);
@@ -112,7 +112,7 @@ static void each_mesh_is_on_one_page_where_it_fits(void **state) {
     free_boxes(s);
 }
 
-static void a_density_that_does_not_fit_is_refused_and_one_named_that_does(void **state) {
+TEST(a_density_that_does_not_fit_is_refused_and_one_named_that_does) {
     shape *s[BOXES];
     vsh_mesh meshes[BOXES];
     make_boxes(s, meshes);
@@ -145,7 +145,7 @@ static double texels_of(const vsh_atlas *atlas, size_t mesh) {
     return sum;
 }
 
-static void density_is_as_asked_and_by_mesh(void **state) {
+TEST(density_is_as_asked_and_by_mesh) {
     shape *s[2] = {lump(32), lump(32)};
     const vsh_mesh meshes[2] = {shape_mesh(s[0], "one"), shape_mesh(s[1], "two")};
     const double factors[2] = {1.0, 0.5};
@@ -165,7 +165,7 @@ static void density_is_as_asked_and_by_mesh(void **state) {
 
 /* Turned, moved, mirrored and doubled: one layout, places of their own. One that is scaled unevenly is a
  * shape of its own. */
-static void instances_share_their_charts(void **state) {
+TEST(instances_share_their_charts) {
     FREED shape *s = lump(32);
     static const double transforms[4][12] = {{0, -1, 0, 5, 1, 0, 0, 0, 0, 0, 1, 0},
                                              {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 9},
@@ -229,7 +229,7 @@ static vsh_unwrap_options of_objects(int32_t size) {
     return o;
 }
 
-static void each_object_is_packed_as_if_it_were_alone(void **state) {
+TEST(each_object_is_packed_as_if_it_were_alone) {
     FREED_BY(free_level) level l;
     make_level(&l);
     const vsh_unwrap_options o = of_objects(128), alone = unwrap_into(128);
@@ -255,7 +255,7 @@ static void each_object_is_packed_as_if_it_were_alone(void **state) {
     vsh_atlas_free(atlas);
 }
 
-static void objects_that_are_instances_are_packed_alike(void **state) {
+TEST(objects_that_are_instances_are_packed_alike) {
     FREED shape *s = shape_new();
     shape_ball(s, ORIGIN, 1.0, -1.0, 1.0, 24);
     /* as it is, turned and moved, mirrored and twice as large, pressed */
@@ -301,7 +301,7 @@ static int fits(const vsh_mesh *meshes, size_t count, double density, int32_t wi
     return result == VSH_OK;
 }
 
-static void pages_are_the_smallest_that_the_density_fits(void **state) {
+TEST(pages_are_the_smallest_that_the_density_fits) {
     FREED_BY(free_level) level l;
     make_level(&l);
     vsh_unwrap_options o = of_objects(256);
@@ -343,7 +343,7 @@ static void pages_are_the_smallest_that_the_density_fits(void **state) {
     assert_true(is_power(single.width) && is_power(single.height) && single.width <= 256);
 }
 
-static void an_object_that_does_not_fit_is_named(void **state) {
+TEST(an_object_that_does_not_fit_is_named) {
     FREED_BY(free_level) level l;
     make_level(&l);
     vsh_unwrap_options o = of_objects(64);
@@ -358,7 +358,7 @@ static void an_object_that_does_not_fit_is_named(void **state) {
     assert_fails(vsh_unwrap(l.meshes, MESHES, &o, NULL, &atlas, &failure), VSH_ERROR_ARGUMENT, "max_pages");
 }
 
-static void objects_without_area_have_no_page_for_any_threads(void **state) {
+TEST(objects_without_area_have_no_page_for_any_threads) {
     FREED_BY(free_level) level l;
     make_level(&l);
     memset(l.shapes[0]->indices, 0, l.meshes[0].triangle_count * 3 * sizeof(uint32_t));
@@ -388,7 +388,7 @@ static vsh_mesh with_uvs(const vsh_mesh *mesh, const vsh_atlas *atlas, float **p
                       .triangle_count = m.triangle_count};
 }
 
-static void uvs_that_can_serve_are_kept(void **state) {
+TEST(uvs_that_can_serve_are_kept) {
     FREED shape *s = lump(48);
     const vsh_mesh mesh = shape_mesh(s, "lump");
     vsh_unwrap_options o = unwrap_into(256);
@@ -465,7 +465,7 @@ static int32_t stop(void *user, const char *stage, double fraction) {
     return s->stopped;
 }
 
-static void it_can_be_cancelled_in_every_stage(void **state) {
+TEST(it_can_be_cancelled_in_every_stage) {
     FREED shape *s = lump(64);
     const vsh_mesh mesh = shape_mesh(s, "lump");
     const vsh_unwrap_options o = unwrap_into(256);
@@ -491,7 +491,7 @@ static void it_can_be_cancelled_in_every_stage(void **state) {
     }
 }
 
-static void memory_is_kept_within_its_limit(void **state) {
+TEST(memory_is_kept_within_its_limit) {
     FREED shape *s = lump(64);
     const vsh_mesh mesh = shape_mesh(s, "lump");
     vsh_unwrap_options o = unwrap_into(256);
@@ -513,7 +513,7 @@ static void refused(const vsh_mesh *mesh, size_t count, const vsh_unwrap_options
     assert_null(atlas);
 }
 
-static void bad_options_are_refused_by_name(void **state) {
+TEST(bad_options_are_refused_by_name) {
     FREED shape *s = shape_new();
     shape_box(s, ORIGIN, (double[3]){1, 1, 1}, ALL_SIDES);
     const vsh_mesh mesh = shape_mesh(s, "box");
@@ -546,7 +546,7 @@ static void bad_options_are_refused_by_name(void **state) {
     refused(NULL, 1, &o, VSH_ERROR_ARGUMENT, "meshes");
 }
 
-static void bad_meshes_are_refused(void **state) {
+TEST(bad_meshes_are_refused) {
     FREED shape *s = shape_new();
     shape_box(s, ORIGIN, (double[3]){1, 1, 1}, ALL_SIDES);
     vsh_mesh mesh = shape_mesh(s, "box");
@@ -569,7 +569,7 @@ static void bad_meshes_are_refused(void **state) {
 }
 
 /* A million units in one direction and one in the others; corners of floats' whole range. */
-static void wild_numbers_do_no_harm(void **state) {
+TEST(wild_numbers_do_no_harm) {
     FREED shape *s = shape_new();
     uint64_t seed = 11;
     for (int i = 0; i < 60; ++i) {
@@ -588,7 +588,7 @@ static void wild_numbers_do_no_harm(void **state) {
 }
 
 /* A rectangle of 1 × 2 units that fills the square: along v a texel is twice as long as along u. */
-static void density_and_stretch_of_uvs_are_those_of_their_derivatives(void **state) {
+TEST(density_and_stretch_of_uvs_are_those_of_their_derivatives) {
     static const float positions[4][3] = {{0, 0, 0}, {1, 0, 0}, {1, 2, 0}, {0, 2, 0}};
     static const float uvs[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
     static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
@@ -611,24 +611,5 @@ static void density_and_stretch_of_uvs_are_those_of_their_derivatives(void **sta
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_same_bits_for_any_number_of_threads),
-        cmocka_unit_test(density_and_stretch_of_uvs_are_those_of_their_derivatives),
-        cmocka_unit_test(each_mesh_is_on_one_page_where_it_fits),
-        cmocka_unit_test(a_density_that_does_not_fit_is_refused_and_one_named_that_does),
-        cmocka_unit_test(density_is_as_asked_and_by_mesh),
-        cmocka_unit_test(instances_share_their_charts),
-        cmocka_unit_test(each_object_is_packed_as_if_it_were_alone),
-        cmocka_unit_test(objects_that_are_instances_are_packed_alike),
-        cmocka_unit_test(pages_are_the_smallest_that_the_density_fits),
-        cmocka_unit_test(an_object_that_does_not_fit_is_named),
-        cmocka_unit_test(objects_without_area_have_no_page_for_any_threads),
-        cmocka_unit_test(uvs_that_can_serve_are_kept),
-        cmocka_unit_test(it_can_be_cancelled_in_every_stage),
-        cmocka_unit_test(memory_is_kept_within_its_limit),
-        cmocka_unit_test(bad_options_are_refused_by_name),
-        cmocka_unit_test(bad_meshes_are_refused),
-        cmocka_unit_test(wild_numbers_do_no_harm),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -64,7 +64,7 @@ static shape *new_yard(void) {
     return s;
 }
 
-static void samples_in_solids_are_invalid_and_no_others_at_every_voxel_size(void **state) {
+TEST(samples_in_solids_are_invalid_and_no_others_at_every_voxel_size) {
     FREED shape *yard = new_yard();
     static const int32_t RESOLUTIONS[3] = {32, 64, 256};
     uint64_t invalid[3];
@@ -78,7 +78,7 @@ static void samples_in_solids_are_invalid_and_no_others_at_every_voxel_size(void
     assert_int_equal(invalid[0], invalid[2]);
 }
 
-static void lightmaps_are_the_same_for_any_threads(void **state) {
+TEST(lightmaps_are_the_same_for_any_threads) {
     FREED shape *yard = new_yard();
     const vsh_mesh mesh = mesh_of(yard);
     FREED_BY(free_baked) baked one = bake(&mesh, 32, 1, 1.0), five = bake(&mesh, 32, 5, 1.0);
@@ -86,7 +86,7 @@ static void lightmaps_are_the_same_for_any_threads(void **state) {
     assert_memory_equal(one.ao, five.ao, SIZE * SIZE * sizeof(float));
 }
 
-static void a_room_of_inward_faces_is_valid_but_where_things_stand(void **state) {
+TEST(a_room_of_inward_faces_is_valid_but_where_things_stand) {
     FREED shape *s = calloc(1, sizeof *s);
     add_faces(s, (box){{-3.0, 0.0, -3.0}, {3.0, 2.5, 3.0}}, true);
     add_box(s, (box){{-1.0, 0.0, -1.0}, {0.5, 0.8, 0.5}});
@@ -109,7 +109,7 @@ static void quad_at(shape *s, double y, double low, double high) {
     add_quad(s, corners);
 }
 
-static void decals_a_hair_off_a_floor_and_what_lies_under_cloth_are_valid(void **state) {
+TEST(decals_a_hair_off_a_floor_and_what_lies_under_cloth_are_valid) {
     FREED shape *s = calloc(1, sizeof *s);
     add_box(s, (box){{-4.0, -0.5, -4.0}, {4.0, 0.0, 4.0}});
     quad_at(s, 1e-4, -1.0, 0.0); /* the decal */
@@ -150,7 +150,7 @@ static void add_sphere(shape *s, double radius, double z, double hole) {
     }
 }
 
-static void an_eye_in_a_head_with_a_hole_is_valid_where_it_is_seen(void **state) {
+TEST(an_eye_in_a_head_with_a_hole_is_valid_where_it_is_seen) {
     FREED shape *s = calloc(1, sizeof *s);
     add_sphere(s, 1.0, 0.0, 0.35);
     add_sphere(s, 0.4, 0.5, 0.0);
@@ -175,7 +175,7 @@ static void an_eye_in_a_head_with_a_hole_is_valid_where_it_is_seen(void **state)
     }
 }
 
-static void flipped_faces_invalidate_no_others(void **state) {
+TEST(flipped_faces_invalidate_no_others) {
     FREED shape *s = calloc(1, sizeof *s);
     add_box(s, (box){{-1.0, -1.0, -1.0}, {1.0, 1.0, 1.0}});
     add_box(s, (box){{1.5, -1.0, -1.0}, {2.5, 1.0, 1.0}});
@@ -190,7 +190,7 @@ static void flipped_faces_invalidate_no_others(void **state) {
     }
 }
 
-static void points_deep_in_a_box_see_no_sky_though_its_triangles_are_far(void **state) {
+TEST(points_deep_in_a_box_see_no_sky_though_its_triangles_are_far) {
     FREED shape *s = calloc(1, sizeof *s);
     add_box(s, (box){{-4.0, -4.0, -4.0}, {4.0, 4.0, 4.0}});
     add_box(s, (box){{-0.01, 4.0, -0.01}, {0.01, 5.0, 0.01}}); /* less than a voxel thick */
@@ -218,7 +218,7 @@ static void points_deep_in_a_box_see_no_sky_though_its_triangles_are_far(void **
 }
 
 /* A floor of one chart with a box on it, as wide as `half`: its texels under the box. */
-static void invalid_texels_take_the_nearest_value_of_their_chart(void **state) {
+TEST(invalid_texels_take_the_nearest_value_of_their_chart) {
     FREED shape *s = calloc(1, sizeof *s);
     quad_at(s, 0.0, -4.0, 4.0);
     add_box(s, (box){{-1.5, -0.2, -1.5}, {1.5, 1.0, 1.5}});
@@ -248,7 +248,7 @@ static void invalid_texels_take_the_nearest_value_of_their_chart(void **state) {
 
 /* Two boxes, the upper one a millionth and a half of the scene's size over the lower: more than the roundings
  * of floats, less than rays are lifted by. */
-static void a_gap_that_is_narrower_than_the_lift_of_rays_is_no_solid(void **state) {
+TEST(a_gap_that_is_narrower_than_the_lift_of_rays_is_no_solid) {
     static const double GAPS[2] = {6e-6, 0.0};
     for (int k = 0; k < 2; ++k) {
         FREED shape *s = calloc(1, sizeof *s);
@@ -270,7 +270,7 @@ static void a_gap_that_is_narrower_than_the_lift_of_rays_is_no_solid(void **stat
 
 /* A quarter of a bent pipe, open at both ends, whose faces look inwards; one end a little over a floor. Some
  * rays from beside it go into it, most do not. */
-static void a_floor_beside_the_mouth_of_an_inward_pipe_is_valid(void **state) {
+TEST(a_floor_beside_the_mouth_of_an_inward_pipe_is_valid) {
     enum { AROUND = 24, ALONG = 16, TOP = 3 };
     static const double PI = 3.14159265358979323846, BEND = 0.6, RADIUS = 0.15;
     FREED shape *s = calloc(1, sizeof *s);
@@ -329,7 +329,7 @@ static double find_centre(const baked *b, double x) {
     return nearest;
 }
 
-static void texels_on_the_side_of_a_box_are_filled_from_the_open(void **state) {
+TEST(texels_on_the_side_of_a_box_are_filled_from_the_open) {
     FREED shape *s = malloc(sizeof *s);
     put_box_on_floor(s, -1.0, 1.0);
     FREED_BY(free_baked) baked any = bake_shape(s, 64, 1.0);
@@ -350,7 +350,7 @@ static void texels_on_the_side_of_a_box_are_filled_from_the_open(void **state) {
 }
 
 /* The room's floor is a wall with air behind it, so nothing is met from beneath it. */
-static void what_stands_on_a_floor_with_air_beneath_it_is_invalid_there(void **state) {
+TEST(what_stands_on_a_floor_with_air_beneath_it_is_invalid_there) {
     for (int kind = 0; kind < 3; ++kind) { /* on a plane, in a room, in a mirrored room */
         shape *s = calloc(1, sizeof *s);
         if (kind > 0) {
@@ -388,19 +388,5 @@ int main(void) {
     if (!vsh_triangles_available()) {
         return 0;
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(samples_in_solids_are_invalid_and_no_others_at_every_voxel_size),
-        cmocka_unit_test(lightmaps_are_the_same_for_any_threads),
-        cmocka_unit_test(a_room_of_inward_faces_is_valid_but_where_things_stand),
-        cmocka_unit_test(decals_a_hair_off_a_floor_and_what_lies_under_cloth_are_valid),
-        cmocka_unit_test(an_eye_in_a_head_with_a_hole_is_valid_where_it_is_seen),
-        cmocka_unit_test(flipped_faces_invalidate_no_others),
-        cmocka_unit_test(points_deep_in_a_box_see_no_sky_though_its_triangles_are_far),
-        cmocka_unit_test(invalid_texels_take_the_nearest_value_of_their_chart),
-        cmocka_unit_test(a_gap_that_is_narrower_than_the_lift_of_rays_is_no_solid),
-        cmocka_unit_test(texels_on_the_side_of_a_box_are_filled_from_the_open),
-        cmocka_unit_test(what_stands_on_a_floor_with_air_beneath_it_is_invalid_there),
-        cmocka_unit_test(a_floor_beside_the_mouth_of_an_inward_pipe_is_valid),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -25,7 +25,7 @@ static double clearance(const double p[3]) {
     return acos(fmax(-1.0, fmin(1.0, cosine))) - asin(fmin(1.0, 1.0 / far));
 }
 
-static void a_box_around_a_ball_holds_its_umbra_its_penumbra_and_light(void **state) {
+TEST(a_box_around_a_ball_holds_its_umbra_its_penumbra_and_light) {
     const double angle = RADIANS(12.0), voxel = 0.05;
     OWNED(vsh_field) *field = field_of(ball(), voxel, 4.0);
     OWNED(vsh_voxels) *voxels = cube_of(3.0, 0.1);
@@ -57,7 +57,7 @@ static void a_box_around_a_ball_holds_its_umbra_its_penumbra_and_light(void **st
     assert_true(sqrt(square / (double)penumbra) < 0.03);
 }
 
-static void ao_of_free_space_is_the_free_share_of_all_directions(void **state) {
+TEST(ao_of_free_space_is_the_free_share_of_all_directions) {
     OWNED(vsh_field) *field = field_of(ball(), 0.05, 8.0);
     OWNED(vsh_voxels) *voxels = cube_of(2.4, 0.2);
     static const struct {
@@ -160,7 +160,7 @@ static size_t compare(const vsh_field *field, const vsh_voxels *voxels, const vs
     return count;
 }
 
-static void values_are_those_of_queries_at_the_voxels_centres(void **state) {
+TEST(values_are_those_of_queries_at_the_voxels_centres) {
     const double low[3] = {-3.0, -0.4, -3.0}, high[3] = {3.0, 4.0, 3.0};
     vsh_grid *grid = grid_of(truth_seeds(), 0.05);
     OWNED(vsh_voxels) *band = band_of(grid, 0.0), *fine = box_of(low, high, 0.06),
@@ -190,7 +190,7 @@ static void values_are_those_of_queries_at_the_voxels_centres(void **state) {
 
 /* The proofs that go before a block's voxels: what they call AO 1 is 1 for a bake of single blocks, whose
  * neighbours never decide anything. */
-static void blocks_that_are_proved_open_are_open(void **state) {
+TEST(blocks_that_are_proved_open_are_open) {
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.05, 4.0);
     const double low[3] = {-4.0, -1.0, -4.0}, high[3] = {4.0, 5.0, 4.0};
     OWNED(vsh_voxels) *voxels = box_of(low, high, 0.25);
@@ -227,7 +227,7 @@ static float *query_shadow(const vsh_occluders *occluders, const vsh_light *ligh
 }
 
 /* A ball in the field and a slab in a layer: both hide the light, and both are solid. */
-static void layers_hide_light_and_are_solid(void **state) {
+TEST(layers_hide_light_and_are_solid) {
     static const truth_solid slab = {
         .shape = TRUTH_BOX, .center = {0.0, 1.8, 0.0}, .half = {0.5, 0.25, 0.5}, .radius = 0.0};
     OWNED(vsh_field) *field = field_of(ball(), 0.05, 4.0);
@@ -268,7 +268,7 @@ enum { SIDE = 64, TEXELS = SIDE * SIDE };
 /* The seeds' floor is at y = 0, a plane of the lattice: a receiver there whose texels' centres are its
  * voxels' centres. The stated bound, docs/volume.md: 0.01 where the floor is the nearest surface by two
  * voxels, and an RMSE of 0.01 over all of it. */
-static void a_lightmap_and_a_band_agree_where_texel_and_voxel_meet(void **state) {
+TEST(a_lightmap_and_a_band_agree_where_texel_and_voxel_meet) {
     const double voxel = 0.0625, half = 0.5 * SIDE * voxel;
     vsh_grid *grid = grid_of(truth_seeds(), voxel);
     OWNED(vsh_voxels) *voxels = band_of(grid, 0.0);
@@ -331,7 +331,7 @@ static void a_lightmap_and_a_band_agree_where_texel_and_voxel_meet(void **state)
 
 /* A sphere and a terrain beside the field, neither in voxels: values are those of queries, what is within
  * them is inside, and free space has no AO that they would know of. */
-static void casters_without_voxels_hide_light_and_are_solid(void **state) {
+TEST(casters_without_voxels_hide_light_and_are_solid) {
     static const double high_ball[4] = {1.6, 1.6, 0.0, 0.4},
                         down[12] = {1, 0, 0, 0, 0, 1, 0, -2.0, 0, 0, 1, 0};
     static const float values[9] = {0.0f, 0.2f, 0.0f, 0.3f, 1.0f, 0.1f, 0.0f, 0.4f, 0.0f};
@@ -383,14 +383,5 @@ static void casters_without_voxels_hide_light_and_are_solid(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_box_around_a_ball_holds_its_umbra_its_penumbra_and_light),
-        cmocka_unit_test(ao_of_free_space_is_the_free_share_of_all_directions),
-        cmocka_unit_test(values_are_those_of_queries_at_the_voxels_centres),
-        cmocka_unit_test(layers_hide_light_and_are_solid),
-        cmocka_unit_test(casters_without_voxels_hide_light_and_are_solid),
-        cmocka_unit_test(blocks_that_are_proved_open_are_open),
-        cmocka_unit_test(a_lightmap_and_a_band_agree_where_texel_and_voxel_meet),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }

@@ -3,10 +3,7 @@
 #include "testing.h"
 #include "volumes.h"
 
-#include <float.h>
-#include <stdio.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 static const double UP[3] = {0.0, 1.0, 0.0};
 static const double LOW[3] = {-3.0, -0.4, -3.0}, HIGH[3] = {3.0, 4.0, 3.0};
@@ -32,7 +29,7 @@ static truth_scene ball(void) {
 
 /* On the lit side of a ball a renderer that interpolates between voxels sees what the surface's own points
  * see; it does not where inside voxels are dark. */
-static void interpolating_at_the_surface_darkens_nothing(void **state) {
+TEST(interpolating_at_the_surface_darkens_nothing) {
     vsh_grid *grid = grid_of(ball(), 0.05);
     OWNED(vsh_voxels) *voxels = band_of(grid, 0.0);
     OWNED(vsh_field) *field = field_of_grid(grid, 1.0);
@@ -57,7 +54,7 @@ static void interpolating_at_the_surface_darkens_nothing(void **state) {
 }
 
 /* By looking at every voxel within five: what a filled one holds is held by one of the nearest outside. */
-static void inside_voxels_take_the_nearest_outside_value_or_are_off(void **state) {
+TEST(inside_voxels_take_the_nearest_outside_value_or_are_off) {
     const double low[3] = {-1.4, -1.4, -1.4}, high[3] = {1.4, 1.4, 1.4};
     vsh_grid *grid = grid_of(ball(), 0.05);
     vsh_voxels *all[2] = {band_of(grid, 0.0), box_of(low, high, 0.07)};
@@ -117,7 +114,7 @@ static void inside_voxels_take_the_nearest_outside_value_or_are_off(void **state
     vsh_voxels_free(all[0]);
 }
 
-static void a_narrower_band_holds_only_voxels_so_near(void **state) {
+TEST(a_narrower_band_holds_only_voxels_so_near) {
     vsh_grid *grid = grid_of(ball(), 0.05);
     OWNED(vsh_voxels) *whole = band_of(grid, 0.0), *narrow = band_of(grid, 1.0), *widest = band_of(grid, 3.0);
     vsh_voxels_info info[3];
@@ -141,7 +138,7 @@ static void a_narrower_band_holds_only_voxels_so_near(void **state) {
 
 /* --- sparse, and the same */
 
-static void uniform_regions_are_tiles(void **state) {
+TEST(uniform_regions_are_tiles) {
     const double low[3] = {-6.4, -6.4, -6.4}, high[3] = {6.4, 6.4, 6.4};
     OWNED(vsh_field) *field = field_of(ball(), 0.05, 4.0);
     OWNED(vsh_voxels) *voxels = box_of(low, high, 0.1);
@@ -172,7 +169,7 @@ static long size_of_file(unsigned char **bytes) {
     return size;
 }
 
-static void the_same_file_for_any_number_of_threads_and_instruction_set(void **state) {
+TEST(the_same_file_for_any_number_of_threads_and_instruction_set) {
     vsh_grid *grid = grid_of(truth_seeds(), 0.08);
     vsh_voxels *all[2] = {band_of(grid, 0.0), box_of(LOW, HIGH, 0.1)};
     OWNED(vsh_field) *field = field_of_grid(grid, 4.0);
@@ -218,7 +215,7 @@ static void the_same_file_for_any_number_of_threads_and_instruction_set(void **s
 
 /* --- values read back */
 
-static void samples_are_interpolated_between_voxels(void **state) {
+TEST(samples_are_interpolated_between_voxels) {
     OWNED(vsh_field) *field = field_of(ball(), 0.1, 4.0);
     OWNED(vsh_voxels) *voxels = cube_of(2.0, 0.25);
     const vsh_light light = sun(UP, RADIANS(40.0));
@@ -270,7 +267,7 @@ static int32_t watch_progress(void *user, const char *stage, double fraction) {
     return fraction >= w->stop;
 }
 
-static void progress_goes_to_one_and_cancels_anywhere(void **state) {
+TEST(progress_goes_to_one_and_cancels_anywhere) {
     OWNED(vsh_field) *field = field_of(ball(), 0.1, 4.0);
     OWNED(vsh_voxels) *voxels = cube_of(2.0, 0.05);
     const vsh_light light = sun(UP, 0.1);
@@ -294,7 +291,7 @@ static void progress_goes_to_one_and_cancels_anywhere(void **state) {
     }
 }
 
-static void memory_is_estimated_before_it_is_taken(void **state) {
+TEST(memory_is_estimated_before_it_is_taken) {
     vsh_grid *grid = grid_of(ball(), 0.1);
     vsh_run run = run_within(1000000);
     OWNED(vsh_voxels) *voxels = NULL;
@@ -323,7 +320,7 @@ static void memory_is_estimated_before_it_is_taken(void **state) {
     assert_null(none);
 }
 
-static void bad_boxes_bands_and_options_are_refused(void **state) {
+TEST(bad_boxes_bands_and_options_are_refused) {
     static const struct {
         double low[3], high[3], voxel;
         vsh_result code;
@@ -403,7 +400,7 @@ static void write_ball(double voxel) {
     assert_ok(vsh_grid_write(grid, vdb_path, NULL, NULL, 0, &failure));
 }
 
-static void a_balls_distances_are_where_they_belong_and_active_within_the_band(void **unused) {
+TEST(a_balls_distances_are_where_they_belong_and_active_within_the_band) {
     const double voxel = 0.125, half = 3.0 * voxel;
     write_ball(voxel);
     const int32_t low[3] = {-12, -11, -13}, size[3] = {25, 21, 27}; /* not the same along any two axes */
@@ -433,7 +430,7 @@ static void a_balls_distances_are_where_they_belong_and_active_within_the_band(v
     assert_true(one == 1.0f);
 }
 
-static void bad_copies_are_refused(void **unused) {
+TEST(bad_copies_are_refused) {
     write_ball(0.25);
     const int32_t low[3] = {0, 0, 0}, one[3] = {1, 1, 1}, none[3] = {1, 0, 1}, most[3] = {65536, 65536, 2};
     const int32_t far[3] = {INT32_MAX, 0, 0}, two[3] = {2, 1, 1};
@@ -453,18 +450,5 @@ static void bad_copies_are_refused(void **unused) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(interpolating_at_the_surface_darkens_nothing),
-        cmocka_unit_test(inside_voxels_take_the_nearest_outside_value_or_are_off),
-        cmocka_unit_test(a_narrower_band_holds_only_voxels_so_near),
-        cmocka_unit_test(uniform_regions_are_tiles),
-        cmocka_unit_test(the_same_file_for_any_number_of_threads_and_instruction_set),
-        cmocka_unit_test(samples_are_interpolated_between_voxels),
-        cmocka_unit_test(progress_goes_to_one_and_cancels_anywhere),
-        cmocka_unit_test(memory_is_estimated_before_it_is_taken),
-        cmocka_unit_test(bad_boxes_bands_and_options_are_refused),
-        cmocka_unit_test(a_balls_distances_are_where_they_belong_and_active_within_the_band),
-        cmocka_unit_test(bad_copies_are_refused),
-    };
-    return cmocka_run_group_tests(tests, make_file, remove_file);
+    return run_all_tests(make_file, remove_file);
 }

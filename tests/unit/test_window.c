@@ -5,9 +5,6 @@
 
 #include "shade/window.h"
 
-#include <stdbool.h>
-#include <stdlib.h>
-
 enum { EDGE = 96, TEXELS = EDGE * EDGE };
 
 static const double MAX_ERROR = 0.02;
@@ -64,7 +61,7 @@ static void cut(table *t, const uint8_t *area) {
     }
 }
 
-static void planes_without_noise_are_exact_up_to_corners(void **state) {
+TEST(planes_without_noise_are_exact_up_to_corners) {
     static const int32_t sizes[][2] = {{40, 30}, {8, 8}, {64, 1}, {1, 64}, {3, 50}, {50, 5}, {2, 2}, {1, 1}};
     static const double slopes[][2] = {{0.0, 0.0}, {0.004, 0.0}, {-0.003, 0.006}, {0.009, 0.005}};
     for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; ++k) {
@@ -139,7 +136,7 @@ static errors errors_of(const table *t, share_fn *share) {
     return (errors){sqrt(sum.is / count), sqrt(sum.said / count), sqrt(sum.own / count), sum.specks / count};
 }
 
-static void noise_that_is_left_is_what_is_said(void **state) {
+TEST(noise_that_is_left_is_what_is_said) {
     share_fn *const shares[] = {even, ramp, open};
     for (size_t s = 0; s < 3; ++s) {
         for (int32_t rays = 8; rays <= 128; rays *= 4) {
@@ -154,7 +151,7 @@ static void noise_that_is_left_is_what_is_said(void **state) {
 
 /* Two halves that hang together, of 0.25 and 0.75; a texel's own error is 0.038. A mean over the edge would
  * be off by up to 0.25. */
-static void edges_stay_sharp(void **state) {
+TEST(edges_stay_sharp) {
     enum { RAYS = 128, AT = 43, SEEDS = 8, COUNT = 2 * EDGE * SEEDS };
     for (int32_t turned = 0; turned < 2; ++turned) {
         FREED table *t = make_table(EDGE, EDGE, RAYS);
@@ -180,7 +177,7 @@ static void edges_stay_sharp(void **state) {
 }
 
 /* Beside what is half hidden, texels whose rays are all free keep their value. */
-static void open_texels_beside_an_edge_stay_open(void **state) {
+TEST(open_texels_beside_an_edge_stay_open) {
     table *t = make_table(EDGE, EDGE, 64);
     uint64_t counter = 4;
     for (int32_t i = 0; i < TEXELS; ++i) {
@@ -217,7 +214,7 @@ static bool is_same(vshi_window_estimate a, vshi_window_estimate b) {
     return memcmp(&a, &b, sizeof a) == 0;
 }
 
-static void nothing_comes_over_a_cut(void **state) {
+TEST(nothing_comes_over_a_cut) {
     static uint8_t area[TEXELS];
     draw_areas(area);
     FREED table *t = make_table(EDGE, EDGE, 32), *other = make_table(EDGE, EDGE, 32);
@@ -251,7 +248,7 @@ static void nothing_comes_over_a_cut(void **state) {
 }
 
 /* Slits that windows could go around: all links within a window are whole, and all its texels have rays. */
-static void windows_hold_no_cut_and_no_hole(void **state) {
+TEST(windows_hold_no_cut_and_no_hole) {
     FREED table *t = make_table(EDGE, EDGE, 16);
     uint64_t counter = 3;
     static uint8_t area[TEXELS];
@@ -287,7 +284,7 @@ static void windows_hold_no_cut_and_no_hole(void **state) {
 
 /* Texels of a tile, say, laid out in a whole strip, with others around that do not hang together with them.
  */
-static void bits_do_not_depend_on_where_a_table_begins(void **state) {
+TEST(bits_do_not_depend_on_where_a_table_begins) {
     enum { WIDTH = 37, HEIGHT = 21 };
     static const int32_t offsets[][2] = {{0, 0}, {59, 0}, {0, 75}, {59, 75}, {8, 16}, {13, 7}};
     FREED table *t = make_table(WIDTH, HEIGHT, 16);
@@ -318,7 +315,7 @@ static void bits_do_not_depend_on_where_a_table_begins(void **state) {
 }
 
 /* Eight rays that are all free do not mean that all would be. */
-static void no_value_is_without_error(void **state) {
+TEST(no_value_is_without_error) {
     table *alone = make_table(1, 1, 8);
     for (int32_t shared = 0; shared < 2; ++shared) {
         alone->texels[0].value = (float)shared;
@@ -341,7 +338,7 @@ static void no_value_is_without_error(void **state) {
 }
 
 /* A texel in two has all of its eight rays free where p is 0.93. */
-static void few_rays_leave_few_specks(void **state) {
+TEST(few_rays_leave_few_specks) {
     FREED table *t = make_table(EDGE, EDGE, 8);
     fill(t, open, 21);
     const errors e = errors_of(t, open);
@@ -353,16 +350,5 @@ static void few_rays_leave_few_specks(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(planes_without_noise_are_exact_up_to_corners),
-        cmocka_unit_test(noise_that_is_left_is_what_is_said),
-        cmocka_unit_test(edges_stay_sharp),
-        cmocka_unit_test(open_texels_beside_an_edge_stay_open),
-        cmocka_unit_test(nothing_comes_over_a_cut),
-        cmocka_unit_test(windows_hold_no_cut_and_no_hole),
-        cmocka_unit_test(bits_do_not_depend_on_where_a_table_begins),
-        cmocka_unit_test(no_value_is_without_error),
-        cmocka_unit_test(few_rays_leave_few_specks),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return run_all_tests(NULL, NULL);
 }
