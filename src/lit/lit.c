@@ -163,7 +163,7 @@ static vsh_result check_images(const vsh_lit_options *options, vsh_error *error)
 
 static const char OURS[] = "vdbshade_";
 
-/* What an earlier bake told of itself. */
+/* Removes the notes of an earlier bake. */
 static void forget(json_t *extras) {
     const char *key;
     json_t *value;

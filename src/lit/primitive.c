@@ -112,7 +112,7 @@ static uint32_t purposes_of(const vshi_lit_work *work, uint32_t page) {
     return purposes;
 }
 
-/* Those that all pages of a mesh have. */
+/* The purposes that all pages of a mesh have. */
 static uint32_t purposes_of_mesh(const vshi_lit_work *work, const vsh_lit_mesh *mesh) {
     const uint32_t only = find_only_page(work, mesh);
     if (only != VSH_LIT_NO_CHART) {
@@ -235,7 +235,7 @@ static bool is_made(const json_t *primitive, size_t set) {
     return false;
 }
 
-/* As many as are looked at. */
+/* Counts UV sets, up to the most that are used. */
 static size_t count_sets(const json_t *attributes) {
     char name[40];
     size_t set = 0;

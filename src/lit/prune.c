@@ -1,5 +1,5 @@
 /* Textures, accessors, buffer views and bytes that nothing refers to any more. New items of a list take the
- * places of those that go, so that no index of what stays changes. */
+ * places of those that go, so other items keep their numbers. */
 #include "lit/work.h"
 
 #include <stdlib.h>
@@ -129,8 +129,7 @@ static void free_textures(vshi_lit_texture_uses *uses) {
     *uses = (vshi_lit_texture_uses){.shown = NULL};
 }
 
-/* What a texture is made of: its own image, and those of other formats (KHR_texture_basisu,
- * EXT_texture_webp). */
+/* Notes a texture's sampler and images, those of other formats too (KHR_texture_basisu, EXT_texture_webp). */
 static void note_parts(json_t *texture, bool *images, size_t image_count, bool *samplers,
                        size_t sampler_count) {
     const char *name;

@@ -77,7 +77,8 @@ vsh_result vshi_lit_topology_find(vshi_lit_document *document, const json_t *pri
     if (draco == NULL) {
         return find_plain(document, primitive, where, mesh, topology, error);
     }
-    topology->mode = VSHI_GLTF_TRIANGLES; /* whatever the primitive says: Draco's are lists */
+    topology->mode =
+        VSHI_GLTF_TRIANGLES; /* Draco's triangles are lists, even if the primitive has another mode */
     topology->element_count = draco->vertex_count;
     return match(document, draco->indices, draco->triangle_count, where, mesh, topology, error);
 }

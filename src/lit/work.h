@@ -10,7 +10,7 @@
 /* A primitive of the document: which elements of its accessors are the vertices of the model's mesh. */
 typedef struct vshi_lit_topology {
     size_t mode;                 /* VSHI_GLTF_TRIANGLES … */
-    size_t element_count;        /* of each attribute's accessor */
+    size_t element_count;        /* elements that each attribute's accessor has */
     size_t vertex_count;         /* of the model's mesh */
     uint32_t *elements;          /* [vertex_count] of each vertex, increasing */
     const vshi_lit_draco *draco; /* NULL: its vertices are not compressed */
@@ -47,13 +47,13 @@ vsh_result vshi_lit_gather(vshi_lit_document *document, size_t index, size_t ele
                            bool bounds, const char *where, vshi_lit_gathered *gathered, size_t *accessor,
                            vsh_error *error);
 
-/* A new UV set of primitives that keep their vertices. Primitives that use parts of the same accessors share
- * one accessor of UVs as far as they agree: each of its own would be as long as all of them. */
+/* A new UV set of primitives that keep their vertices. Primitives with the same accessor of positions share
+ * one of UVs where their UVs agree, because each needs the accessor's full length. */
 typedef struct vshi_lit_uvs {
     size_t positions; /* accessor of the vertices' positions */
     size_t count;     /* elements */
     size_t accessor;
-    size_t offset; /* of its values in the document's added bytes */
+    size_t offset; /* where its values begin in the added bytes */
     bool *set;     /* [count] */
 } vshi_lit_uvs;
 
@@ -204,16 +204,16 @@ void vshi_lit_besides_free(vshi_lit_besides *besides);
 vsh_result vshi_lit_images_add(vshi_lit_work *work, bool embed, vshi_lit_besides *besides, vsh_error *error);
 
 /* Takes the file's own images that stay and that it names beside it into the buffer, where the document moves
- * to another folder. Those that cannot be read stay named, with a warning. Errors: VSH_ERROR_LIMIT,
+ * to another folder. An image that cannot be read keeps its name, with a warning. Errors: VSH_ERROR_LIMIT,
  * VSH_ERROR_MEMORY. */
 vsh_result vshi_lit_images_bring(vshi_lit_work *work, vsh_error *error);
 
 /* A file's name as a URI; NULL where memory is short. */
 json_t *vshi_lit_uri(const char *name);
 
-/* Name of a file beside the output: its own without its ending, `mark`, `ending`; where a file that the input
- * is made of, and that others may use, has that name, with a number before the ending. Free it with free().
- * Errors: VSH_ERROR_MEMORY, VSH_ERROR_ARGUMENT. */
+/* Name of a file beside the output: the output's without its ending, then `mark` and `ending`. If an input
+ * file has that name, a number stands before the ending. Free it with free(). Errors: VSH_ERROR_MEMORY,
+ * VSH_ERROR_ARGUMENT. */
 vsh_result vshi_lit_beside_name(const vshi_lit_work *work, const char *mark, const char *ending, char **name,
                                 vsh_error *error);
 
@@ -243,8 +243,8 @@ bool vshi_lit_is_obj(const char *path);
 /* Refuses options that an OBJ cannot show. Errors: VSH_ERROR_ARGUMENT. */
 vsh_result vshi_lit_obj_check(const vshi_lit_work *work, vsh_error *error);
 
-/* The model's meshes in the world, a "usemtl page_N" for each page where there are images or several pages;
- * of the file `mtl`, unless that is NULL. Errors: VSH_ERROR_CANCELLED. */
+/* Writes the model's meshes in the world. With images or several pages, each page gets a "usemtl page_N".
+ * `mtl`: name of the MTL file, or NULL. Errors: VSH_ERROR_CANCELLED. */
 vsh_result vshi_lit_put_obj(const vshi_lit_work *work, const char *mtl, vshi_lit_put *put, void *file,
                             vsh_error *error);
 
@@ -279,11 +279,11 @@ typedef struct vshi_lit_uses {
 vsh_result vshi_lit_uses_find(vshi_lit_document *document, vshi_lit_uses *uses, vsh_error *error);
 void vshi_lit_uses_free(vshi_lit_uses *uses);
 
-/* Puts new accessors, buffer views, textures, images and samplers in the places of those that were used
- * before and are not any more, and cuts off such at the end of a list, so that no index of what stays
- * changes; lists the bytes that only those had (document->dropped). Of textures only those that were made go
- * by a bake. Does nothing where an extension that is not known may refer to them. `before` is used
- * up. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+/* Puts new accessors, buffer views, textures, images and samplers in the places of unused ones, and cuts
+ * unused ones off the end of a list. Other items keep their numbers. Lists the bytes that only unused ones
+ * had (document->dropped). Of textures only those that were made go by a bake. Does nothing where an
+ * extension that is not known may refer to them. `before` is used up. Errors: VSH_ERROR_LIMIT,
+ * VSH_ERROR_MEMORY. */
 vsh_result vshi_lit_prune(vshi_lit_document *document, vshi_lit_uses *before, vsh_error *error);
 
 #endif

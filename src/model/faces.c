@@ -7,14 +7,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Triangulation by ears (Meisters, "Polygons have ears", 1975), with exact orientations: coordinates are
- * floats, so that products of two are exact in double, and the sign of their sum is found by expansions
- * (Shewchuk, "Adaptive precision floating-point arithmetic and fast robust geometric predicates", 1997).
+/* Triangulation by ears (Meisters, "Polygons have ears", 1975), with exact orientations. Coordinates are
+ * floats, so products of two are exact in double. Expansions give the sign of their sum (Shewchuk, "Adaptive
+ * precision floating-point arithmetic and fast robust geometric predicates", 1997).
  *
- * The polygon is looked at along the axis that its normal (Newell's) is nearest to, which keeps coordinates
- * as they are: a rotation into its plane would round them. Ears are looked for in the order of Assimp 5.2, so
- * that convex polygons become the fans that they have always become. An ear is cut where no other corner lies
- * in it or on its border; a border that is touched, and a corner that is left with no angle, are put up with
+ * The polygon is projected along the axis nearest to its normal (Newell's). That keeps coordinates as they
+ * are; a rotation into its plane would round them. Ears are looked for in the order of Assimp 5.2, so that
+ * convex polygons become the fans that they have always become. An ear is cut where no other corner lies in
+ * it or on its border; a border that is touched, and a corner that is left with no angle, are put up with
  * only where nothing else is left. Time: corners that can lie in an ear are sorted along the polygon's longer
  * side. */
 
@@ -72,7 +72,7 @@ typedef struct cut {
     uint32_t *reflex;
     size_t count, reflex_count;
     size_t left;  /* corners not yet cut */
-    bool along_y; /* what reflex corners are sorted by */
+    bool along_y; /* reflex corners are sorted by y, else by x */
     vshi_job *job;
     size_t looked; /* ears tried */
     const uint32_t *vertices;
@@ -160,7 +160,7 @@ static void find_reflex(cut *p) {
     }
 }
 
-/* What is asked of an ear, less and less. */
+/* Demands on an ear, from the strictest on. */
 enum { CLEAN, FOLDING, TOUCHED, FLAT, ANY_CONVEX, ANY, DEMANDS };
 
 /* Whether a corner lies in the triangle, or (closed) on its border; at one of its corners does not count. */

@@ -16,7 +16,7 @@ typedef struct vshi_polygon_cutter {
  * winding, at most count - 2: *made of them, three vertices each, in `triangles`. The corners should lie in
  * one plane, nearly. Every simple polygon is covered exactly, also one whose holes are joined to its outline
  * by bridges, one with corners on a line or twice at a place; no triangle is flipped, and none without area
- * is made. Of a polygon without area a fan is made, which has none either. *simple: whether all this held;
+ * is made. A polygon without area becomes a fan without area. *simple: whether all this held;
  * where edges cross, some triangles are made. Positions are finite. Errors: VSH_ERROR_MEMORY,
  * VSH_ERROR_CANCELLED. */
 vsh_result vshi_polygon_cut(vshi_polygon_cutter *cutter, const float *positions, const uint32_t *vertices,

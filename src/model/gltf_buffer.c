@@ -122,10 +122,9 @@ vsh_result vshi_gltf_load(vshi_gltf *gltf, size_t index, vsh_error *error) {
     return gltf->buffers[index].loaded ? VSH_OK : load(gltf, index, error);
 }
 
-/* Buffer views that are compressed by EXT_meshopt_compression (Khronos, "EXT_meshopt_compression", 2021), and
- * KHR_meshopt_compression where its data are of the same version. meshoptimizer unpacks them; what its
- * filters make of them is computed here by the text of the extension, as the library's own take approximate
- * reciprocals of roots, which differ between processors. */
+/* Compressed buffer views: EXT_meshopt_compression (Khronos, 2021), and KHR_meshopt_compression of the same
+ * version. meshoptimizer unpacks them. Filters are ours: the library's take approximate reciprocals of roots,
+ * which differ between processors. */
 
 enum { ATTRIBUTES, TRIANGLES, INDICES, MODES };
 

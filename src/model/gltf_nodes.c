@@ -42,7 +42,7 @@ static vsh_result number(const vshi_gltf *gltf, const json_t *object, const char
 static vsh_result read_values(const vshi_gltf *gltf, const json_t *given, const char *where,
                               vsh_model_light *light, vsh_error *error) {
     static const double eighth = 0.78539816339744828, quarter = 1.5707963267948966; /* turns, radians */
-    /* a quarter turn that was written with the digits of a float, or few of them, is meant so */
+    /* a quarter turn, as written with few digits */
     static const double widest = 1.5708;
     for (int i = 0; i < 3; ++i) {
         light->color[i] = 1.0;
@@ -86,7 +86,7 @@ static bool place(const double world[12], vsh_model_light *light) {
         return false;
     }
     const vshi_vec unit = vshi_unit(away);
-    light->direction[0] = unit.x + 0.0; /* no -0, which would be told */
+    light->direction[0] = unit.x + 0.0; /* no -0 */
     light->direction[1] = unit.y + 0.0;
     light->direction[2] = unit.z + 0.0;
     return true;

@@ -57,7 +57,7 @@ static const char *by_content(const char *path) {
     unsigned char head[HEAD];
     FILE *file;
     uint64_t whole;
-    vsh_error ignored; /* whoever reads the file finds out, too */
+    vsh_error ignored; /* reading the file fails with it again */
     vshi_input_open(path, path, UINT64_MAX, &file, &whole, &ignored);
     const size_t size = file != NULL ? fread(head, 1, sizeof head, file) : 0;
     if (file != NULL) {

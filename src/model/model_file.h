@@ -28,7 +28,7 @@ vsh_result vshi_ply_read(const char *path, const vsh_run *run, vshi_job *job, si
     "give a mesh as OBJ, glTF, GLB, PLY, STL, FBX or DAE, a level set as .vdb, or a scene as .json"
 
 /* VSH_ERROR_INPUT, with the formats that are read, where a file is of Blender, Alembic or USD by its ending
- * or its first bytes. A file that cannot be read is told apart by its ending only. Thread safe. */
+ * or its first bytes. Of a file that cannot be read only the ending is checked. Thread safe. */
 vsh_result vshi_unsupported_check(const char *path, vsh_error *error);
 
 /* --- files that a model is read with (beside.c) */
@@ -36,12 +36,11 @@ vsh_result vshi_unsupported_check(const char *path, vsh_error *error);
 /* Receives the path of such a file and frees it, after an error too. */
 typedef vsh_result vshi_beside_fn(void *user, char *path, vsh_error *error);
 
-/* Tells of the files that a model names and that are read with it, each perhaps more than once: the buffers
- * of a glTF, whether they are there or not, and where they can be opened those of a GLB, the textures of
- * materials that are not opaque, the material libraries of an OBJ and what cuts its materials out. What lies
- * outside of the model's folder is read, and told of, only with run->allow_outside. A model that cannot be
- * read as what its name says has none. Of the job, which may cancel it, it takes nothing. Errors:
- * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED, and what `take` returns. */
+/* Lists the files that are read with a model, some more than once: buffers of a glTF, also missing ones;
+ * textures of materials that are not opaque; material libraries of an OBJ and their masks. Files outside of
+ * the model's folder are listed only with run->allow_outside. A file that is no model of its ending names
+ * none. The job may cancel this; its units are not advanced. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY,
+ * VSH_ERROR_CANCELLED, and what `take` returns. */
 vsh_result vshi_model_beside(const char *path, const vsh_run *run, vshi_job *job, vshi_beside_fn *take,
                              void *user, vsh_error *error);
 

@@ -14,10 +14,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* Arrays of a GLB that are as a model has them stay in the file: the reader tells where, and its caller reads
- * them from there into memory of its own, and only then looks at them. One copy, where a reader's own arrays
- * are written into its answer and that is mapped. What lies in the file may change at any time, what has been
- * read of it may not. */
+/* Arrays of a GLB that need no conversion stay in the file. The reader says where they are, and its caller
+ * copies them into its own memory before it checks them, because the file may change at any time. */
 
 enum { ALIGNED = 64 };
 
@@ -50,7 +48,7 @@ static uint64_t rounded(uint64_t bytes) {
     return (bytes + ALIGNED - 1) / ALIGNED * ALIGNED;
 }
 
-/* What a model's arrays in the file take, each at a multiple of 64 bytes. */
+/* Bytes of a model's arrays in the file, each rounded up to a multiple of 64. */
 static uint64_t count_raw_bytes(const vsh_model *model) {
     uint64_t sum = 0;
     for (size_t i = 0; i < model->shape_count; ++i) {
@@ -272,8 +270,7 @@ static void put_materials(vshi_encoder *encoder, const vsh_model *model) {
     }
 }
 
-/* A path that a reader tells is opened by its caller, if at all: it is held to the model's folder here, too.
- */
+/* The caller opens a path that the reader names, so it checks again that it is in the model's folder. */
 static vsh_result take_image(vshi_decoder *decoder, vshi_model_image *image, const char *path,
                              const vsh_run *run, vsh_error *error) {
     const char *told = vshi_decode_text(decoder, false);

@@ -253,7 +253,7 @@ static void make_material(const vshi_obj_alpha *from, vshi_model_material *mater
     }
 }
 
-/* What cuts them out. */
+/* Takes the materials' masks. */
 static vsh_result make_images(vshi_obj *obj, vsh_model *model, vsh_error *error) {
     const size_t count = obj->images.count;
     const double bytes = (double)count * sizeof *model->images + (double)obj->images.used;

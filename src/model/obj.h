@@ -113,8 +113,8 @@ typedef struct vshi_mtl_map {
  * value. */
 bool vshi_mtl_map_read(const char *at, const char *end, vshi_mtl_map *map);
 
-/* The file of that name beside the MTL at `path`, in new memory; where none is called so, and a name has '\'
- * in it, those are '/'. NULL: memory is short. */
+/* Path of the file of that name beside the MTL at `path`, in new memory. If there is none, each '\' of the
+ * name becomes '/'. NULL: memory is short. */
 char *vshi_mtl_map_path(const char *path, vshi_token name);
 
 #endif

@@ -16,7 +16,7 @@
 #include <string.h>
 #include <strings.h>
 
-/* What a property is to us. Of a vertex: a number that it is made of. */
+/* Meanings of properties. Those below VSHI_PLY_NUMBERS are numbers of a vertex. */
 enum {
     VSHI_PLY_X,
     VSHI_PLY_NX = 3,

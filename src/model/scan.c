@@ -169,7 +169,7 @@ static vsh_result scan_stl(vshi_scan *scan, vsh_error *error) {
 /* Collada: the unit that its asset names ("<unit meter="0.01"/>"), by which Assimp multiplies and of which it
  * tells nothing. */
 
-/* Whatever number of white space stands around an read_metres's "=", which XML allows. */
+/* Skips white space, which XML allows around an attribute's "=". */
 static const char *skip_blanks(const char *at, const char *end) {
     while (at < end && is_space(*at)) {
         ++at;
