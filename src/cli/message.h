@@ -48,4 +48,24 @@ void cli_plain(char *text, size_t size);
 /* From here on standard output is text, and goes through cli_plain(). */
 void cli_plain_output(void);
 
+/* --- early returns of functions that return an exit code, as in base/try.h */
+
+/* Returns what a call came to, unless that is CLI_OK. */
+#define CLI_TRY(call)                                                                                        \
+    do {                                                                                                     \
+        const int tried = (call);                                                                            \
+        if (tried != CLI_OK) {                                                                               \
+            return tried;                                                                                    \
+        }                                                                                                    \
+    } while (0)
+
+/* Puts what a call came to into `code` and, unless that is CLI_OK, goes to the label `done`. */
+#define CLI_TRY_DONE(call)                                                                                   \
+    do {                                                                                                     \
+        code = (call);                                                                                       \
+        if (code != CLI_OK) {                                                                                \
+            goto done;                                                                                       \
+        }                                                                                                    \
+    } while (0)
+
 #endif

@@ -385,3 +385,53 @@ void cli_print_help(const cli_command *command) {
         }
     }
 }
+
+int cli_density_take(cli_densities *densities, const char *name, const char *value) {
+    const char *sign = strrchr(value, '='); /* names may have one, numbers have none */
+    if (sign == NULL || sign == value) {
+        return cli_usage("%s '%s': expected PATTERN=X", name, value);
+    }
+    if (densities->count == CLI_MOST_DENSITIES) {
+        return cli_usage("%s: more than %d of them", name, CLI_MOST_DENSITIES);
+    }
+    vsh_density_rule *rule = &densities->list[densities->count];
+    CLI_TRY(cli_parse_positive(name, sign + 1, &rule->factor));
+    char *own = strndup(value, (size_t)(sign - value));
+    if (own == NULL) {
+        return cli_out_of_memory(name);
+    }
+    rule->pattern = densities->own[densities->count++] = own;
+    return CLI_OK;
+}
+
+void cli_densities_free(cli_densities *densities) {
+    for (size_t i = 0; i < densities->count; ++i) {
+        free(densities->own[i]);
+    }
+    densities->count = 0;
+}
+
+int cli_provenance_make(const vsh_scene *scene, const char *const *files, size_t file_count,
+                        const vsh_occluders_info *casters, const vsh_run *run, cli_provenance *origin) {
+    *origin = (cli_provenance){NULL, NULL, 0};
+    vsh_provenance_source source = vsh_provenance_source_default();
+    source.scene = scene;
+    source.command = cli_parsed_command();
+    if (casters != NULL) {
+        source.voxel_size = casters->voxel_size;
+        source.has_triangles = casters->has_triangles;
+    }
+    source.files = files;
+    source.file_count = file_count;
+    vsh_error error;
+    if (vsh_provenance_create(&source, run, &origin->made, &error) != VSH_OK) {
+        return cli_fail(&error);
+    }
+    origin->attributes = vsh_provenance_attributes(origin->made, &origin->count);
+    return CLI_OK;
+}
+
+void cli_provenance_free(cli_provenance *origin) {
+    vsh_provenance_free(origin->made);
+    *origin = (cli_provenance){NULL, NULL, 0};
+}

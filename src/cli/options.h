@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <vdbshade/scene.h>
 #include <vdbshade/vdbshade.h>
 
 /* An option, or (key 0) a heading of the help, or CLI_SETTINGS. Keys below 256 are also short options. */
@@ -160,5 +161,34 @@ enum {
 
 /* Takes an option of the tables above; *taken tells whether it was one of them. */
 int cli_common_parse(cli_common *common, int key, const char *name, const char *value, bool *taken);
+
+/* --- --density PATTERN=X: factors of the density by objects' names */
+
+enum { CLI_MOST_DENSITIES = 256 };
+
+typedef struct cli_densities {
+    vsh_density_rule list[CLI_MOST_DENSITIES];
+    char *own[CLI_MOST_DENSITIES]; /* the rules' patterns */
+    size_t count;
+} cli_densities;
+
+/* Takes one more. CLI_OK or an exit code, having said why. */
+int cli_density_take(cli_densities *densities, const char *name, const char *value);
+void cli_densities_free(cli_densities *densities);
+
+/* --- what outputs tell of where they come from */
+
+typedef struct cli_provenance {
+    vsh_provenance *made;
+    const vsh_attribute *attributes; /* [count] */
+    size_t count;
+} cli_provenance;
+
+/* Of the parsed command, of a scene (NULL: there is none) and of further files[file_count], the command's
+ * operand first; those that are NULL or named by the scene add nothing. `casters` tell of voxels and
+ * triangles; NULL: there are none. CLI_OK or an exit code, having said why; free also after a failure. */
+int cli_provenance_make(const vsh_scene *scene, const char *const *files, size_t file_count,
+                        const vsh_occluders_info *casters, const vsh_run *run, cli_provenance *origin);
+void cli_provenance_free(cli_provenance *origin);
 
 #endif

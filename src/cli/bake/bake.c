@@ -7,7 +7,6 @@
 #include "cli/signals.h"
 #include "cli/stats.h"
 #include "cli/temporary.h"
-#include "cli/try.h"
 #include "cli/warnings.h"
 #include "options.h"
 

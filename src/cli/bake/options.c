@@ -1,7 +1,6 @@
 #include "options.h"
 
 #include "cli/message.h"
-#include "cli/try.h"
 
 #include <stdio.h>
 #include <string.h>

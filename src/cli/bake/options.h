@@ -3,7 +3,7 @@
 #define CLI_BAKE_OPTIONS_H
 
 #include "cli/commands.h"
-#include "cli/density.h"
+#include "cli/options.h"
 #include "cli/patch.h"
 
 enum { CLI_MAX_EXTRA_CASTERS = 256, CLI_MAX_PATTERNS = 256 };

@@ -2,7 +2,6 @@
 #include "bake.h"
 #include "cli/message.h"
 #include "cli/paths.h"
-#include "cli/try.h"
 #include "options.h"
 
 #include <stdio.h>

@@ -3,7 +3,6 @@
 #include "cli/message.h"
 #include "cli/paths.h"
 #include "cli/temporary.h"
-#include "cli/try.h"
 
 int cli_bake_check_view(const cli_bake_settings *settings, const vsh_scene *scene) {
     const char *page = settings->view;

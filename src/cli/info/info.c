@@ -1,11 +1,11 @@
 /* vdbshade info: what a file holds, and what is wrong with it. */
 #include "base/bytes.h"
 #include "cli/commands.h"
+#include "cli/message.h"
 #include "cli/patch.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
-#include "cli/try.h"
 
 #include <inttypes.h>
 #include <math.h>

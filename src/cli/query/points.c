@@ -1,9 +1,9 @@
 /* Points as rows of files and pipes: read and checked a batch at a time, and written with their answers. */
 #include "points.h"
 #include "base/decimal.h"
+#include "cli/message.h"
 #include "cli/paths.h"
 #include "cli/signals.h"
-#include "cli/try.h"
 
 #include <errno.h>
 #include <float.h>

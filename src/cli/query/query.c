@@ -2,11 +2,11 @@
 #include "base/bytes.h"
 #include "base/clock.h"
 #include "cli/bake/options.h"
+#include "cli/message.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
 #include "cli/stats.h"
-#include "cli/try.h"
 #include "cli/warnings.h"
 #include "points.h"
 

@@ -4,7 +4,6 @@
 #include "cli/paths.h"
 #include "cli/regress/regress.h"
 #include "cli/temporary.h"
-#include "cli/try.h"
 
 #include <dirent.h>
 #include <errno.h>

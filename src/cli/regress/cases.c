@@ -7,7 +7,6 @@
 #include "cli/message.h"
 #include "cli/paths.h"
 #include "cli/regress/regress.h"
-#include "cli/try.h"
 
 #include <dirent.h>
 #include <errno.h>

@@ -4,7 +4,6 @@
 #include "cli/message.h"
 #include "cli/regress/regress.h"
 #include "cli/temporary.h"
-#include "cli/try.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -9,7 +9,6 @@
 #include "cli/progress.h"
 #include "cli/signals.h"
 #include "cli/temporary.h"
-#include "cli/try.h"
 
 #include <dlfcn.h>
 #include <stdlib.h>

@@ -2,13 +2,13 @@
 #include "render.h"
 #include "base/bytes.h"
 #include "base/clock.h"
+#include "cli/message.h"
+#include "cli/options.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
-#include "cli/provenance.h"
 #include "cli/signals.h"
 #include "cli/stats.h"
 #include "cli/temporary.h"
-#include "cli/try.h"
 #include "cli/warnings.h"
 
 #include <inttypes.h>

@@ -4,7 +4,7 @@
  * one field, which knows no casters. If they differ in colour, or some have triangles, each colour gets a
  * field of its own, for camera rays alone. */
 #include "cli/casters.h"
-#include "cli/try.h"
+#include "cli/message.h"
 #include "render.h"
 
 #include <math.h>

@@ -3,8 +3,8 @@
  * Every voxel size finds other texels valid (neither inside a solid nor behind a wall). Runs are compared
  * over the texels that all sizes find valid, and each run over its own valid texels too. */
 #include "base/clock.h"
+#include "cli/message.h"
 #include "cli/progress.h"
-#include "cli/try.h"
 #include "trade.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* The page: error against time as a plot and as tables, with nothing beside it; and the CSV. */
 #include "cli/document.h"
-#include "cli/try.h"
+#include "cli/message.h"
 #include "trade.h"
 
 #include <inttypes.h>

@@ -2,11 +2,11 @@
 #include "trade.h"
 #include "base/clock.h"
 #include "cli/casters.h"
+#include "cli/message.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
 #include "cli/temporary.h"
-#include "cli/try.h"
 
 #include <stdlib.h>
 #include <string.h>

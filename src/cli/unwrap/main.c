@@ -1,13 +1,12 @@
 /* vdbshade unwrap: a mesh file's meshes get lightmap UVs. */
 #include "base/clock.h"
 #include "cli/commands.h"
-#include "cli/density.h"
 #include "cli/message.h"
+#include "cli/options.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
 #include "cli/temporary.h"
-#include "cli/try.h"
 #include "unwrap.h"
 
 #include <inttypes.h>

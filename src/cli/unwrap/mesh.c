@@ -1,6 +1,6 @@
 /* The mesh file that is written. */
 #include "base/utf8.h"
-#include "cli/try.h"
+#include "cli/message.h"
 #include "unwrap.h"
 
 #include <stdlib.h>

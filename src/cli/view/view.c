@@ -6,7 +6,6 @@
 #include "cli/progress.h"
 #include "cli/signals.h"
 #include "cli/temporary.h"
-#include "cli/try.h"
 
 #include <string.h>
 

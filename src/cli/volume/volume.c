@@ -4,13 +4,12 @@
 #include "base/memory.h"
 #include "cli/bake/options.h"
 #include "cli/message.h"
+#include "cli/options.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
-#include "cli/provenance.h"
 #include "cli/signals.h"
 #include "cli/stats.h"
 #include "cli/temporary.h"
-#include "cli/try.h"
 
 #include <inttypes.h>
 #include <stdio.h>

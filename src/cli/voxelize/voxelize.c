@@ -3,13 +3,12 @@
 #include "base/clock.h"
 #include "cli/commands.h"
 #include "cli/message.h"
+#include "cli/options.h"
 #include "cli/patch.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
-#include "cli/provenance.h"
 #include "cli/signals.h"
 #include "cli/temporary.h"
-#include "cli/try.h"
 
 #include <inttypes.h>
 #include <stdio.h>
