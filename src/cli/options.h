@@ -176,7 +176,7 @@ typedef struct cli_densities {
 int cli_density_take(cli_densities *densities, const char *name, const char *value);
 void cli_densities_free(cli_densities *densities);
 
-/* --- what outputs tell of where they come from */
+/* --- provenance: notes of an output's inputs and options */
 
 typedef struct cli_provenance {
     vsh_provenance *made;
@@ -184,9 +184,9 @@ typedef struct cli_provenance {
     size_t count;
 } cli_provenance;
 
-/* Of the parsed command, of a scene (NULL: there is none) and of further files[file_count], the command's
- * operand first; those that are NULL or named by the scene add nothing. `casters` tell of voxels and
- * triangles; NULL: there are none. CLI_OK or an exit code, having said why; free also after a failure. */
+/* Makes the provenance of the parsed command, a scene and further files [file_count], the command's operand
+ * first. The scene and files may be NULL; files that the scene names add nothing. `casters` gives voxels and
+ * triangles, or is NULL. Returns CLI_OK, or an exit code after a message. Free also after a failure. */
 int cli_provenance_make(const vsh_scene *scene, const char *const *files, size_t file_count,
                         const vsh_occluders_info *casters, const vsh_run *run, cli_provenance *origin);
 void cli_provenance_free(cli_provenance *origin);

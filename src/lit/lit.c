@@ -49,6 +49,7 @@ static vsh_result check_charts(const vshi_lit_work *work, const vsh_lit_mesh *li
     return VSH_OK;
 }
 
+/* Checks the caller's arrays for the model's mesh `index`. Errors: VSH_ERROR_ARGUMENT. */
 static vsh_result check_mesh(const vshi_lit_work *work, size_t index, vsh_error *error) {
     const vsh_lit_mesh *lit = &work->meshes[index];
     const vsh_mesh mesh = vsh_model_mesh(work->model, index, 0);
@@ -122,7 +123,6 @@ static bool is_file_name(const char *name) {
     return good;
 }
 
-/* Checks what the caller gives for the model's mesh `index`. Errors: VSH_ERROR_ARGUMENT. (check.c) */
 static vsh_result check_images(const vsh_lit_options *options, vsh_error *error) {
     VSHI_NEEDS_OF(options->image_count, options->images);
     VSHI_NEEDS_OF(options->chart_count, options->chart_pages);

@@ -11,8 +11,8 @@ typedef struct placing {
     size_t first, count, end; /* end: items that are left */
 } placing;
 
-/* New ones take the places gone[first] in their order, what is over goes behind the old ones; places that are
- * left and that nothing stands behind are cut off. Free `moved` after a failure too. Errors:
+/* Finds places for the items first … count - 1, which are new: those that are gone, in order, then places
+ * behind the old items. Places left at the end are cut off. Free `moved` after a failure, too. Errors:
  * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
 static vsh_result find_places(vshi_lit_document *document, const bool *gone, size_t first, size_t count,
                               placing *places, vsh_error *error) {
@@ -113,6 +113,8 @@ static void note_textures(json_t *value, bool *shown, size_t count) {
     }
 }
 
+/* Finds the textures that materials show. Free them after a failure, too. Errors: VSH_ERROR_LIMIT,
+ * VSH_ERROR_MEMORY. */
 static vsh_result find_textures(vshi_lit_document *document, vshi_lit_texture_uses *uses, vsh_error *error) {
     *uses = (vshi_lit_texture_uses){.texture_count = count_of(document, "textures"),
                                     .image_count = count_of(document, "images"),
@@ -123,7 +125,6 @@ static vsh_result find_textures(vshi_lit_document *document, vshi_lit_texture_us
     return VSH_OK;
 }
 
-/* Finds them. Free after a failure too. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
 static void free_textures(vshi_lit_texture_uses *uses) {
     free(uses->shown);
     *uses = (vshi_lit_texture_uses){.shown = NULL};

@@ -168,6 +168,8 @@ static size_t dropped_before(const vshi_lit_document *document, size_t buffer, s
     return sum;
 }
 
+/* Finds the buffers' places, and reads those that have not been read. Free after a failure, too. Errors: as
+ * vsh_model_read(). */
 static vsh_result lay_out(vshi_lit_document *document, layout *l, vsh_error *error) {
     enum { ALIGNMENT = 8 };
     vshi_gltf *gltf = &document->gltf;
@@ -295,8 +297,6 @@ static vsh_result join_buffers(vshi_lit_document *document, layout *l, json_t **
     return VSH_OK;
 }
 
-/* Finds the places, and reads the buffers that have not been. Free after a failure too. Errors: as
- * vsh_model_read(). */
 static void free_layout(layout *l) {
     free(l->numbers);
     free(l->offsets);
@@ -493,7 +493,7 @@ static vsh_result commit(files *all, vsh_error *error) {
     return result;
 }
 
-/* The one that is named `bin`. */
+/* Writes the file that the output names: its MTL or its buffer. */
 static void write_named(const vshi_lit_work *work, const vshi_lit_besides *besides, const layout *l,
                         output_file *file) {
     if (vshi_lit_is_obj(work->output)) {

@@ -28,7 +28,7 @@ vsh_result vshi_ply_read(const char *path, const vsh_run *run, vshi_job *job, si
     "give a mesh as OBJ, glTF, GLB, PLY, STL, FBX or DAE, a level set as .vdb, or a scene as .json"
 
 /* VSH_ERROR_INPUT, with the formats that are read, where a file is of Blender, Alembic or USD by its ending
- * or its first bytes. Of a file that cannot be read only the ending is checked. Thread safe. */
+ * or its first bytes. If a file cannot be read, its ending decides. Thread safe. */
 vsh_result vshi_unsupported_check(const char *path, vsh_error *error);
 
 /* --- files that a model is read with (beside.c) */

@@ -90,6 +90,10 @@ static vsh_result fail_changed(const char *path, vsh_error *error) {
     return vshi_fail(error, VSH_ERROR_READ, "%s: changed while it was read", path);
 }
 
+/* Opens the file of a `raw` that has a path and a run, and takes *block of `bytes` for its arrays; the caller
+ * owns it. The file must be the one that the reader had. An answer of `message` more bytes can only name so
+ * many arrays. Call close_raw() after an error, too. Errors: VSH_ERROR_READ, VSH_ERROR_LIMIT,
+ * VSH_ERROR_MEMORY. */
 static vsh_result open_raw(raw_file *raw, const uint64_t identity[VSHI_FILE_IDENTITY], uint64_t bytes,
                            size_t message, void **block, vsh_error *error) {
     enum { PLACE = 16 /* bytes of a message that tell where an array lies */ };
@@ -110,10 +114,6 @@ static vsh_result open_raw(raw_file *raw, const uint64_t identity[VSHI_FILE_IDEN
     return VSH_OK;
 }
 
-/* Opens the file, which must be the one that the reader had, and takes `bytes` of memory, no more than the
- * places that `message` more bytes of its answer may tell: *block is the caller's. Of a `raw` with a path and
- * a run; close with close_raw(), after an error too. Errors: VSH_ERROR_READ, VSH_ERROR_LIMIT,
- * VSH_ERROR_MEMORY. */
 static void close_raw(raw_file *raw) {
     if (raw->file != NULL) {
         fclose(raw->file);

@@ -16,7 +16,7 @@
 #include <string.h>
 #include <strings.h>
 
-/* Meanings of properties. Those below VSHI_PLY_NUMBERS are numbers of a vertex. */
+/* Meanings of properties. Vertices have numbers, which are below VSHI_PLY_NUMBERS. */
 enum {
     VSHI_PLY_X,
     VSHI_PLY_NX = 3,

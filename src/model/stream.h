@@ -16,7 +16,7 @@
 typedef struct vshi_budget {
     const char *path;
     const vsh_run *run;
-    double bytes; /* of all arrays that vshi_grow() and vshi_reserve() hold */
+    double bytes; /* size of all arrays of vshi_grow() and vshi_reserve() */
 } vshi_budget;
 
 /* Grows the array at *memory (a pointer to a pointer; NULL at first) to `needed` elements of `size` bytes and
@@ -31,7 +31,8 @@ vsh_result vshi_reserve(vshi_budget *budget, void *memory, size_t *capacity, siz
 
 /* --- the file */
 
-/* Advances a job to `fraction` of `units`, of which *units_done are told; true where it is cancelled. */
+/* Advances a job to `fraction` of `units`; *units_done counts those it has advanced. Returns whether it is
+ * cancelled. */
 bool vshi_advance_to(vshi_job *job, double fraction, size_t units, size_t *units_done);
 
 /* A window over the file; zeros before it is opened. */

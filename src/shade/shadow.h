@@ -86,7 +86,7 @@ typedef struct vshi_facing {
 } vshi_facing;
 
 /* Gathers points begin … end - 1, at most VSHI_PIECE, without those that are settled already: invalid, within
- * the light, turned away. What blocks of them share is proved (blocks.h). */
+ * the light, turned away. What blocks of them share is proved (blocks.c). */
 void vshi_shadow_gather(const vshi_shadow_task *task, size_t begin, size_t end, vshi_facing *facing,
                         vshi_chunk *chunk, vsh_shade_stats *stats);
 

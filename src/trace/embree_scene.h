@@ -58,7 +58,7 @@ enum { VSHI_SOLID_HOLED = 4 };
 /* Added to it for the faces of an open solid (vshi_component.vessel). */
 enum { VSHI_SOLID_VESSEL = 8 };
 
-struct vshi_sieve; /* embree_mask.h */
+struct vshi_sieve; /* below */
 
 /* A mesh that is a terrain. Its sides and bottom are triangles like others, its top is a geometry of its own.
  */

@@ -1,5 +1,5 @@
 /* A block of 8³ voxels is a leaf of the grids. Its voxels are listed along a curve that fills it, so that
- * those that follow each other share proofs (shade/blocks.h); in free space a beam around all of a block's
+ * those that follow each other share proofs (shade/blocks.c); in free space a beam around all of a block's
  * cones comes first, and where it proves them free or hidden the block is one tile and no voxel is looked at.
  */
 #include "volume/volume_blocks.h"

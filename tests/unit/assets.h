@@ -26,7 +26,7 @@ static inline void free_asset(asset *a) {
     *a = (asset){NULL, NULL, 0};
 }
 
-/* What "buffers/0/uri" leads to; NULL if nothing. */
+/* Finds a value by a path such as "buffers/0/uri"; NULL if there is none. */
 static inline json_t *json_at(json_t *value, const char *path) {
     char part[64];
     while (value != NULL && *path != '\0') {

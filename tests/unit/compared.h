@@ -48,7 +48,7 @@ static inline vsh_measures measure(const plane *golden, const plane *values, con
     return m;
 }
 
-/* Measures of two pictures by one function, of what it is given. */
+/* Compares two pictures that one function draws from `golden` and `values`. */
 static inline vsh_measures measure_as(int32_t width, int32_t height, int32_t depth, plane_fn *fn,
                                       const void *golden, const void *values) {
     plane a = make_plane(width, height, depth, fn, golden), b = make_plane(width, height, depth, fn, values);

@@ -6,7 +6,7 @@
 #include "texels_of.h"
 #include "truth/directions.h"
 
-/* --- what casts in closed form, of shadow and of AO, and how much is seen beside it */
+/* --- casters with shadow and AO in closed form */
 
 enum { EDGE, CORNER, SLIT, DISC, SHAPES };
 static const char *const NAMES[SHAPES] = {"edge", "corner", "slit", "disc"};
@@ -15,7 +15,7 @@ enum { ROUND = 1024 };
 
 /* Half angle of the sun as a tangent, */
 static double WIDE = 0.25;
-/* height and thickness of what casts, AO distance. */
+/* height and thickness of the casters, AO distance. */
 static const double HEIGHT = 1.0, THICK = 0.5, DISTANCE = 1.0;
 /* Half the slit, the disc's radius. */
 static const double GAP = 0.125, RADIUS = 0.15;
@@ -130,8 +130,8 @@ static double overlap(double r, double apart) {
     return (acos(x) - x * h + r * r * acos(fmin(1.0, fmax(-1.0, y / r))) - y * h) / PI;
 }
 
-/* How far a face at `off` hides the light, in radii of its disc: by its upper edge where it stands beside the
- * receiver, by its lower one where it is above it. */
+/* Where a face at `off` ends the light, in radii of its disc. Its upper edge counts if it stands beside the
+ * receiver, its lower edge if it is above. */
 static double limit(double off) {
     return off / (off > 0.0 ? HEIGHT + THICK : HEIGHT) / WIDE;
 }

@@ -1,5 +1,5 @@
-/* Arrays of a GLB that a reader leaves in the file (src/model/model_message.c): the same as those that are
- * read in the process itself, held against all that may be wrong with them. The test is its own reader. */
+/* A reader leaves arrays of a GLB in the file (src/model/model_message.c). They equal arrays that are read in
+ * the process itself, and damaged ones are refused. The test is its own reader. */
 #define _GNU_SOURCE
 
 #include "served.h"

@@ -197,7 +197,8 @@ TEST(a_chart_in_part_hidden_keeps_its_own_values_near_what_is_seen) {
     fill(&s, 1);
     for (size_t i = 0; i < TEXELS; ++i) {
         if (chart_at(i, &column, &row) == HIDDEN_CHART && column >= 3) {
-            /* the way to what is across (12 - column) is less than half of that to its own (column - 2) */
+            /* the seen texel across (12 - column away) is less than half as far as its own chart's (column -
+             * 2) */
             const bool across = 2 * (12 - column) < column - 2;
             assert_value(&s, i, across ? value_of(ACROSS, 0, row) : value_of(HIDDEN_CHART, 2, row));
         }

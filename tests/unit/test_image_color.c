@@ -55,7 +55,7 @@ static double half_and_half(double x) { /* vectors */
     return 0.5 + 0.5 * x;
 }
 
-/* What channels hold, not their names, says how integers hold them; alpha is linear. */
+/* The kind of a channel, not its name, decides how integers are coded; alpha is linear. */
 TEST(light_is_srgb_and_all_else_linear_unless_a_space_is_named) {
     static const int32_t vectors[] = {2, 2, 2, 2, 0};
     static const struct {

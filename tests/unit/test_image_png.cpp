@@ -165,7 +165,7 @@ TEST(values_are_those_that_were_given) {
     }
 }
 
-// Beside data, a gamma chunk, or one of colours, would have them undone.
+// Programs would undo a gamma chunk, or one of colours, in data.
 TEST(light_has_the_srgb_curve_and_says_so_and_data_has_none) {
     for (const int32_t bits : {8, 16}) {
         const Seen seen = write_and_see(irradiance(bits, VSH_COLOR_AUTO));

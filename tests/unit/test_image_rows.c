@@ -70,7 +70,7 @@ TEST(the_same_image_is_the_same_bytes_later_elsewhere) {
                 assert_same_file(names[0], names[1]);
             }
         }
-        sleep(pass == 0); /* what some formats note by the second */
+        sleep(pass == 0); /* some formats note the second */
     }
     assert_int_equal(fchdir(back), 0);
     close(back);

@@ -78,7 +78,7 @@ static void open_beside_wall(scene *s, box *wall, double face) {
     open_scene(s, wall);
 }
 
-/* What was baked at a sample. */
+/* The value that was baked at a sample. */
 static float value_at(const scene *s, const float *plane, size_t sample) {
     return plane[vsh_texel_place(s->lifted.texels[sample], WIDTH)];
 }

@@ -3,7 +3,7 @@
 #include "previews.h"
 #include "testing.h"
 
-/* What most tests bake: a field, the charts of a mesh, planes. */
+/* Most tests bake these: a field, the charts of a mesh, planes. */
 typedef struct stage {
     vsh_field *field;
     vsh_charts *charts;

@@ -170,7 +170,7 @@ TEST(texels_of_one_surface_hang_together_and_those_of_two_do_not) {
         {pieces, {5.0, 1.0}, on_one_side_of_rows},
         {pieces, {-5.0, 1.0}, on_one_side_of_rows},
         {pieces, {-300.0, 1.0}, on_one_side_of_rows},
-        {pieces, {2.0, 0.0}, always}, /* what is left out of one surface is no border */
+        {pieces, {2.0, 0.0}, always}, /* a texel that is left out of one surface makes no border */
         {sizes, {0.0, 0.0}, on_one_side},
         {sizes, {1.0, 0.0}, on_one_side},
         {sizes, {0.0, 1.0}, on_one_side_of_rows},

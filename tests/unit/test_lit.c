@@ -2,7 +2,7 @@
 #include "rich_asset.h"
 #include "testing.h"
 
-/* What becomes of the only node that shows instances has a test of its own. */
+/* Another test looks at the only node that shows instances. */
 static void forget_instances(lighting *l) {
     enum { MANY = 7 };
     json_t *const nodes[] = {json_array_get(list_of(&l->in, "nodes"), MANY),

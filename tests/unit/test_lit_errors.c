@@ -100,7 +100,7 @@ TEST(damaged_documents_are_refused) {
 
 TEST(damaged_buffers_are_refused) {
     lighting l = begin_sound();
-    /* as many triangles of as many vertices, one of which is turned over */
+    /* one triangle is turned over, the counts stay */
     unsigned char *indices =
         l.in.bytes + (element_of(&l.in, number_of(primitive_of(&l.in, 1, 0), "indices"), 0, 2) - l.in.bytes);
     const unsigned char second = indices[2];

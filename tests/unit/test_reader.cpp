@@ -18,7 +18,7 @@ std::string ball_file() {
 
 // --- the same bits
 
-// What is read in this process and by a reader.
+// A handle read in this process, and one by a reader.
 template <typename Handle> struct Both {
     Handle *here = nullptr, *there = nullptr;
     void (*const release)(Handle *);

@@ -123,7 +123,7 @@ TEST(receivers_on_voxel_planes_see_what_their_neighbours_see) {
                 changed += apart > 1e-4;
             }
         }
-        print_message("beside lattice planes, %s: %.3g apart at most, %zu of %d beyond 1e-4\n", name_of(kind),
+        print_message("%s beside lattice planes: %.3g apart at most, %zu of %d beyond 1e-4\n", name_of(kind),
                       worst, changed, PLACES * SIDES);
         const bool rays =
             is_ao(kind) ? kind >= SHADOWS + VSH_AO_RAYS : kind >= VSH_SHADOW_RAYS || kind == VSH_SHADOW_HARD;

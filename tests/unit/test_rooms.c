@@ -97,7 +97,7 @@ TEST(rooms_are_cut_out_of_what_they_lie_in) {
         }
     }
     assert_cuts_of(s, "house with a safe", "SRSRS", "0<1 0<3 2<3 ");
-    /* what reaches into a room is not cut */
+    /* solids that reach into a room are not cut */
     s = shape_new();
     build_house(s, s, s);
     s->triangles -= 12;

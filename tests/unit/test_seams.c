@@ -382,7 +382,7 @@ TEST(degenerate_edges_change_nothing) {
 static const double WHOLE[2] = {0, 40}, HALVES[3] = {0, 20, 40}, THIRDS[4] = {0, 13, 27, 40},
                     PART[2] = {10, 30}, MANY[9] = {0, 3, 8, 10, 17, 20, 29, 31.5, 40};
 
-/* What a border's two sides are cut at, and how many seams they have in common, over how much of it. */
+/* Cuts of a border's two sides, and the seams that they have in common, with their length. */
 static const struct {
     const double *left, *right;
     int left_count, right_count;
@@ -623,7 +623,7 @@ TEST(the_memory_limit_is_held_before_anything_moves) {
     assert_true(four.memory_limit > most + most / 4);
     assert_true(refused > 4 && most < 1000000); /* charts, marks, unknowns, vectors: each is looked at */
     assert_non_null(strstr(failure.message, "seams"));
-    charts_mesh *many = new_mesh(); /* what edges are found by is most where there are no seams */
+    charts_mesh *many = new_mesh(); /* without seams, finding edges takes most */
     for (int i = 0; i < MOST_VERTICES / 4; ++i) {
         add_square(many, 2.0 * i, (const double[]){1.0 + 3.5 * (i % 16), 4.0 + 3.5 * (i / 16)}, 2.5, 0.0,
                    1.0);
@@ -707,7 +707,7 @@ TEST(what_is_no_value_of_light_is_left) {
     for (size_t i = 0; i < TEXELS; ++i) {
         error[i] = shadow[i] = random_value(&seed);
         invalid[i] = error[i] < 0.5f ? 0.0f : 1.0f;
-        ao[i] = is_first(i) ? 0.5f : NAN; /* of which nothing is known */
+        ao[i] = is_first(i) ? 0.5f : NAN; /* nothing is known of it */
         for (size_t c = 0; c < 3; ++c) {
             bent[3 * i + c] = tint[3 * i + c] = random_value(&seed);
         }

@@ -1,5 +1,5 @@
-/* What every test needs: the C library, the public headers, tests that list themselves, checks of results and
- * numbers, and variables that free what they hold. A test is TEST(claim) { … }; main() returns
+/* Every test includes this: the C library, the public headers, and checks of results and numbers. Tests list
+ * themselves, and variables free their memory. A test is TEST(claim) { … }; main() returns
  * run_all_tests(). */
 #ifndef TESTS_TESTING_H
 #define TESTS_TESTING_H
