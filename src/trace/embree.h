@@ -117,7 +117,7 @@ enum {
 void vshi_triangles_meet(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
                          uint8_t *meets);
 
-/* Whether a ray meets the inner side of a solid or of a vessel before any other side of a solid. */
+/* Whether the first side of a solid or of a vessel that a ray meets is an inner one. */
 bool vshi_triangles_meet_inner(const vsh_triangles *triangles, const vshi_segment_ray *ray);
 
 /* How many solids hold the origin of a ray, by what it crosses on its way: the most that it leaves before it

@@ -68,7 +68,7 @@ typedef struct crossing {
 typedef struct looking {
     struct RTCIntersectContext context; /* first: the filter is given this */
     const vsh_triangles *triangles;
-    bool vessels; /* their inner sides are met, too */
+    bool vessels; /* they are met, too */
     size_t count;
     crossing *crossings; /* NULL: the first is looked for */
 } looking;
@@ -106,7 +106,7 @@ static void filter(const struct RTCFilterFunctionNArguments *args) {
         const vshi_vec normal = vector_of((const float *)args->hit, HIT_NORMAL, n, i);
         const int8_t out = crosses(solid, normal, vector_of(ray, RAY_DIRECTION, n, i));
         const bool vessel = (solid & VSHI_SOLID_VESSEL) != 0;
-        const bool sheet = vessel ? !look->vessels || out < 0 : solid == VSHI_AIR_AROUND;
+        const bool sheet = vessel ? !look->vessels : solid == VSHI_AIR_AROUND;
         if (sheet || look->crossings != NULL) {
             args->valid[i] = 0;
         }
