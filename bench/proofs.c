@@ -176,10 +176,6 @@ static tally check(FILE *csv, const char *scene, int32_t resolution, const light
 }
 
 void bench_proofs(FILE *csv) {
-    if (!vsh_triangles_available()) {
-        puts("proofs: no Embree");
-        return;
-    }
     points p = {
         room(POINTS, 3 * sizeof(double)), room(POINTS, 3 * sizeof(double)), room(POINTS, 3 * sizeof(float)),
         room(POINTS, 3 * sizeof(float)),  room(POINTS, sizeof(float)),      room(POINTS, sizeof(float)),

@@ -35,11 +35,7 @@ vsh_find(half Imath/half.h Imath-3_1)
 find_path(VSH_three_FOLDER three.min.js PATHS /usr/share/javascript/three)
 mark_as_advanced(VSH_three_FOLDER)
 
-# Rays against triangles: optional, and what needs it says where it is missing.
-option(VSH_EMBREE "Trace rays against triangles with Embree, where it is found" ON)
-if(VSH_EMBREE)
-  find_package(embree 3 CONFIG QUIET)
-endif()
+find_package(embree 3 CONFIG REQUIRED)
 
 find_package_handle_standard_args(vdbshade_dependencies REQUIRED_VARS VSH_openvdb_LIBRARY VSH_openimageio_LIBRARY
                                   VSH_openimageio_util_LIBRARY VSH_png_LIBRARY
@@ -55,12 +51,10 @@ if(NOT TARGET vsh::openexr)
   target_link_libraries(vsh::dependencies INTERFACE TBB::tbb vsh::half vsh::openexr vsh::png vsh::meshoptimizer vsh::jansson
                                                     vsh::md vsh::sleef vsh::seccomp Freetype::Freetype ZLIB::ZLIB
                                                     ${CMAKE_DL_LIBS} m)
-  if(TARGET embree)
-    # Its headers, and the name that src/trace/embree_load.c loads it by.
-    get_target_property(config embree IMPORTED_CONFIGURATIONS)
-    list(GET config 0 config)
-    get_target_property(soname embree IMPORTED_SONAME_${config})
-    target_include_directories(vsh::dependencies INTERFACE $<TARGET_PROPERTY:embree,INTERFACE_INCLUDE_DIRECTORIES>)
-    target_compile_definitions(vsh::dependencies INTERFACE VSH_EMBREE="${soname}")
-  endif()
+  # Its headers, and the name that src/trace/embree_load.c loads it by.
+  get_target_property(config embree IMPORTED_CONFIGURATIONS)
+  list(GET config 0 config)
+  get_target_property(soname embree IMPORTED_SONAME_${config})
+  target_include_directories(vsh::dependencies INTERFACE $<TARGET_PROPERTY:embree,INTERFACE_INCLUDE_DIRECTORIES>)
+  target_compile_definitions(vsh::dependencies INTERFACE VSH_EMBREE="${soname}")
 endif()

@@ -398,14 +398,11 @@ VSH_API vsh_result vsh_scene_occluders(const vsh_scene *scene, const vsh_assets 
                                        vsh_occluders **occluders, vsh_error *error);
 
 /* A scene's casters as rays meet them, whatever their layers: the triangles of meshes and heightfields, and
- * procedural ones as they are, for vsh_trace_shadow() and vsh_trace_ao(). Each is NULL where there are none,
- * the triangles also without Embree. Free them with vsh_triangles_free() and vsh_solids_free(). Errors:
+ * procedural ones as they are, for vsh_trace_shadow() and vsh_trace_ao(). Each is NULL where there are none.
+ * Free them with vsh_triangles_free() and vsh_solids_free(). Errors:
  * VSH_ERROR_ARGUMENT (a pointer NULL, run); as vsh_triangles_create() and vsh_solids_create(). */
 VSH_API vsh_result vsh_scene_truth(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                                    vsh_triangles **triangles, vsh_solids **solids, vsh_error *error);
-
-/* 1 where these are all of the scene's casters: meshes and heightfields, with Embree, and procedural ones. */
-VSH_API int32_t vsh_scene_has_truth(const vsh_scene *scene);
 
 /* Reach, world units > 0, that a field of `grid` needs for the scene's lights and AO at receivers within a
  * world box: see vsh_field_options. Directional lights count up to a half angle of 60°. */

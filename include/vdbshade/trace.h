@@ -28,13 +28,10 @@ VSH_API double vsh_solids_distance(const vsh_solids *solids, const double positi
 /* The triangles of some meshes in world space, in a tree for rays. Immutable; may be shared by threads. */
 typedef struct vsh_triangles vsh_triangles;
 
-/* 1 where the library was built with Embree and can load it, else 0: vsh_triangles_create() then returns
- * VSH_ERROR_UNSUPPORTED. Embree is loaded by the first call that needs it and stays loaded. */
-VSH_API int vsh_triangles_available(void);
-
-/* Copies the meshes' triangles, transforms applied; both sides of a triangle block. Errors:
- * VSH_ERROR_UNSUPPORTED (no Embree), VSH_ERROR_INPUT (as vsh_mesh_check()), VSH_ERROR_LIMIT,
- * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free the result with vsh_triangles_free(). */
+/* Copies the meshes' triangles, transforms applied; both sides of a triangle block. The first call loads
+ * Embree, which stays loaded. Errors: VSH_ERROR_UNSUPPORTED (Embree cannot be loaded), VSH_ERROR_INPUT (as
+ * vsh_mesh_check()), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free the result with
+ * vsh_triangles_free(). */
 VSH_API vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
                                         vsh_triangles **triangles, vsh_error *error);
 

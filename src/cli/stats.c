@@ -123,7 +123,7 @@ static void say_help(const cli_stats *stats, const vsh_scene *scene, int kind, c
         snprintf(text, size, "values between rays are interpolated; --max-error %.1g keeps it",
                  0.5 * stats->max_error);
     } else {
-        const bool can = vsh_scene_traceable(scene, NULL) && vsh_triangles_available();
+        const bool can = vsh_scene_traceable(scene, NULL);
         snprintf(text, size, "%.3g of it comes from voxels of %.3g; %s%ssmaller ones leave less",
                  vsh_bake_error_field(&known), stats->casters.voxel_size, can ? kinds[kind].option : "",
                  can ? " exact has none, " : "");

@@ -141,7 +141,7 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     }
     vshi_job_advance(job, 40);
     VSHI_TRY_DONE(derive_levels(f, find_reach(f, o.reach), (double)info.bytes, &r, job, &below, error));
-    if (o.surface != 0 && vsh_triangles_available()) {
+    if (o.surface != 0) {
         const vshi_budget budget = {&r, (double)info.bytes + vshi_field_bytes(f)};
         VSHI_TRY_DONE(vshi_field_add_surface(f, budget, job, error));
     }

@@ -30,7 +30,8 @@ vsh_result vshi_surface_write(vshi_surface *surface, const double centre[3], dou
                               float *corners, uint32_t *quads, vsh_error *error);
 
 /* Finds the surface and makes it field->surface, for rays; NULL where the field reads nothing so low.
- * `budget` counts all that is held but it. Errors: also VSH_ERROR_UNSUPPORTED without Embree. */
+ * `budget` counts all that is held but it. Errors: also VSH_ERROR_UNSUPPORTED where Embree cannot be loaded.
+ */
 vsh_result vshi_field_add_surface(vsh_field *field, vshi_budget budget, vshi_job *job, vsh_error *error);
 
 /* The quads of the surface where the finest level reads 0. Their corners may go around either way. */

@@ -33,7 +33,7 @@ static vsh_result find(const vsh_mesh *meshes, size_t count, const vsh_field *fi
     for (size_t m = 0; m < count; ++m) {
         any = any || lost[m].share >= TOLD;
     }
-    if (!any || !vsh_triangles_available()) {
+    if (!any) {
         return VSH_OK;
     }
     vsh_triangles *triangles = NULL;

@@ -168,14 +168,6 @@ static vsh_result make_triangles(making *m, const vsh_scene_layer *layer, vsh_tr
     return VSH_OK;
 }
 
-/* Whether auto would have been exact. */
-static bool misses_embree(const vsh_scene *scene) {
-    const bool asked =
-        (scene->light_count > 0 && scene->shade.method == VSH_SHADOW_AUTO) ||
-        ((scene->ao || vsh_planes_shaded(&scene->planes) > 0) && scene->shade.ao_method == VSH_AO_AUTO);
-    return asked && !vsh_triangles_available() && vsh_scene_traceable(scene, NULL) != 0;
-}
-
 /* What values are held against: nothing where memory is short, as baking needs none of it. */
 static vsh_result make_truth(making *m, vsh_error *error) {
     if (m->options.truth == 0 || !vshi_scene_wants_truth(m->scene)) {
@@ -273,11 +265,6 @@ static vsh_result make_layers(making *m, vsh_error *error) {
 static vsh_result make(making *m, vsh_error *error) {
     const double start = vshi_seconds();
     VSHI_TRY(make_triangles(m, NULL, &m->own.triangles, error));
-    if (m->options.triangles != 0 && misses_embree(m->scene)) {
-        vshi_warn(&m->run,
-                  "this build has no Embree, so adaptive replaces exact, with the error of its voxels; "
-                  "use finer voxels, or a build with Embree");
-    }
     VSHI_TRY(make_truth(m, error));
     m->own.triangles_s = vshi_seconds() - start;
     VSHI_TRY(make_field_of(m, NULL, m->own.triangles, &m->own.field, error));

@@ -60,14 +60,13 @@ bool vshi_caster_is_direct(const vsh_scene *scene, const vsh_caster *caster) {
         layer = strcmp(scene->layers[i].name, caster->layer) == 0 ? &scene->layers[i] : layer;
     }
     const int32_t method = method_of(scene, layer);
-    const bool traced =
-        vsh_triangles_available() != 0 && vsh_ao_method_resolve(scene->shade.ao_method, 1) == VSH_AO_EXACT;
+    const bool traced = vsh_ao_method_resolve(scene->shade.ao_method, 1) == VSH_AO_EXACT;
     return scene->light_count > 0 && (method == VSH_SHADOW_HARD || method == VSH_SHADOW_CLASSIC) &&
            (traced || !casts_ao(scene, layer));
 }
 
 bool vshi_scene_method_is(const vsh_scene *scene, const vsh_scene_layer *layer, uint32_t traits, bool has) {
-    const int32_t can = vsh_scene_traceable(scene, layer) && vsh_triangles_available();
+    const int32_t can = vsh_scene_traceable(scene, layer);
     const uint32_t shadow = vsh_shadow_method_traits(vsh_shadow_method_resolve(method_of(scene, layer), can));
     const uint32_t ao = vsh_ao_method_traits(vsh_ao_method_resolve(scene->shade.ao_method, can));
     return (scene->light_count > 0 && ((shadow & traits) == traits) == has) ||
@@ -77,7 +76,7 @@ bool vshi_scene_method_is(const vsh_scene *scene, const vsh_scene_layer *layer, 
 double vshi_scene_field_rays(const vsh_scene *scene, const vsh_scene_layer *layer) {
     /* over max_error, of all points; measured on the cloister, 0.6 units of AO and a sun of 5° */
     static const double OF_LIGHT = 0.14, OF_AO = 0.6;
-    const int32_t can = vsh_scene_traceable(scene, layer) && vsh_triangles_available();
+    const int32_t can = vsh_scene_traceable(scene, layer);
     const int32_t method = vsh_shadow_method_resolve(method_of(scene, layer), can);
     double rays = method == VSH_SHADOW_ADAPTIVE ? OF_LIGHT * (double)scene->light_count : 0.0;
     if (casts_ao(scene, layer) && vsh_ao_method_resolve(scene->shade.ao_method, can) == VSH_AO_ADAPTIVE) {
@@ -252,7 +251,7 @@ done:
     return result;
 }
 
-/* The casters as estimates measure errors against them. Procedural solids alone need no Embree. */
+/* The casters as estimates measure errors against them. */
 vsh_result vsh_scene_truth(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                            vsh_triangles **triangles, vsh_solids **solids, vsh_error *error) {
     VSHI_NEEDS(triangles);
@@ -269,7 +268,7 @@ vsh_result vsh_scene_truth(const vsh_scene *scene, const vsh_assets *assets, con
     for (size_t i = 0; i < scene->caster_count; ++i) {
         VSHI_TRY_DONE(add_caster(scene, assets, NULL, i, &full, &t, error));
     }
-    if (t.mesh_count > 0 && vsh_triangles_available()) {
+    if (t.mesh_count > 0) {
         VSHI_TRY_DONE(vsh_triangles_create(t.meshes, t.mesh_count, run, triangles, error));
     }
     if (t.sdf_count > 0) {
@@ -284,19 +283,9 @@ done:
     return result;
 }
 
-int32_t vsh_scene_has_truth(const vsh_scene *scene) {
-    for (size_t i = 0; scene != NULL && i < scene->caster_count; ++i) {
-        const vsh_caster *caster = &scene->casters[i];
-        if (!has_solids(caster) && !vsh_triangles_available()) {
-            return 0;
-        }
-    }
-    return scene != NULL;
-}
-
 bool vshi_scene_wants_truth(const vsh_scene *scene) {
-    bool measured = scene->layer_count == 0 && vsh_scene_has_truth(scene) &&
-                    vshi_scene_method_is(scene, NULL, VSH_METHOD_KEEPS_ERROR, true);
+    bool measured =
+        scene->layer_count == 0 && vshi_scene_method_is(scene, NULL, VSH_METHOD_KEEPS_ERROR, true);
     for (size_t i = 0; i < scene->caster_count; ++i) { /* of these voxels are the definition, or as good */
         const vsh_caster *caster = &scene->casters[i];
         measured = measured && (has_triangles(caster) || has_solids(caster)) &&

@@ -80,7 +80,7 @@ vsh_result vsh_occluders_create(const vsh_mesh *meshes, size_t mesh_count,
         VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_INPUT, "occluders: no triangle of any area"));
     }
     const bool voxels = full.grid.resolution != 0 || full.grid.voxel_size != 0.0;
-    const bool traced = full.triangles != 0 && vsh_triangles_available();
+    const bool traced = full.triangles != 0;
     if (!voxels) {
         full.grid.resolution = vsh_grid_options_default().resolution;
     }

@@ -13,54 +13,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#ifndef VSH_EMBREE
-
-struct vsh_triangles {
-    int none;
-};
-
-int vsh_triangles_available(void) {
-    return 0;
-}
-
-vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
-                                vsh_triangles **triangles, vsh_error *error) {
-    return vsh_triangles_create_beside(meshes, mesh_count, NULL, run, triangles, error);
-}
-
-vsh_result vsh_triangles_create_beside(const vsh_mesh *meshes, size_t mesh_count, const vsh_solids *solids,
-                                       const vsh_run *run, vsh_triangles **triangles, vsh_error *error) {
-    (void)meshes, (void)mesh_count, (void)solids, (void)run;
-    if (triangles != NULL) {
-        *triangles = NULL;
-    }
-    return vshi_fail(
-        error, VSH_ERROR_UNSUPPORTED,
-        "triangles: exact methods trace rays with Embree; this library was built without Embree");
-}
-
-vsh_result vshi_triangles_of_quads(const vshi_quads *quads, const vsh_run *run, double held, vshi_job *job,
-                                   vsh_triangles **triangles, vsh_error *error) {
-    (void)quads, (void)run, (void)held, (void)job;
-    *triangles = NULL;
-    return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "surface: this library was built without Embree");
-}
-
-void vshi_triangles_own_solids(vsh_triangles *triangles) {
-    (void)triangles;
-}
-
-void vsh_triangles_free(vsh_triangles *triangles) {
-    (void)triangles;
-}
-
-uint64_t vsh_triangles_bytes(const vsh_triangles *triangles) {
-    (void)triangles;
-    return 0;
-}
-
-#else
-
 /* A triangle's share of buffers and tree, bytes: 180 to 230 measured, more while the tree is made. */
 static const double TRIANGLE_BYTES = 300.0;
 /* A tree over a terrain of fewer triangles takes at most 200 MB, and up to a third less time a ray. */
@@ -69,11 +21,6 @@ enum { LEAST_TERRAIN = 1 << 19 };
 static const double SAMPLE_BYTES = 5.4;
 /* A quad's, likewise: 97 measured. */
 static const double QUAD_BYTES = 160.0;
-
-int vsh_triangles_available(void) {
-    const vshi_embree *embree;
-    return vshi_embree_load(&embree, NULL) == VSH_OK;
-}
 
 static bool watch_memory(void *user, ssize_t bytes, bool post) {
     (void)post;
@@ -563,5 +510,3 @@ uint64_t vsh_triangles_bytes(const vsh_triangles *triangles) {
            sheet->triangle_count +
            (uint64_t)vshi_sheet_bytes((double)sheet->vertex_count, (double)sheet->triangle_count);
 }
-
-#endif

@@ -1,4 +1,4 @@
-/* Rays against triangles. Without Embree (VSH_EMBREE not defined) no vsh_triangles ever exists. */
+/* Rays against triangles. */
 #ifndef VSHI_EMBREE_H
 #define VSHI_EMBREE_H
 

@@ -7,20 +7,6 @@
  */
 #include "trace/embree_scene.h"
 
-#ifndef VSH_EMBREE
-
-bool vshi_triangles_sees(const vsh_triangles *triangles, const double origin[3]) {
-    (void)triangles, (void)origin;
-    return false;
-}
-
-void vshi_triangles_discs(const vsh_triangles *triangles, const vshi_sampler *sampler, bool domes,
-                          const vshi_disc *discs, size_t count, int32_t first, int32_t last, int32_t *lit) {
-    (void)triangles, (void)sampler, (void)domes, (void)discs, (void)count, (void)first, (void)last, (void)lit;
-}
-
-#else
-
 #include <float.h>
 #include <string.h>
 
@@ -197,5 +183,3 @@ void vshi_triangles_discs(const vsh_triangles *triangles, const vshi_sampler *sa
         }
     }
 }
-
-#endif

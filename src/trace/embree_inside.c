@@ -3,56 +3,6 @@
 
 #include <string.h>
 
-#ifndef VSH_EMBREE
-
-void vshi_triangles_meet(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
-                         uint8_t *meets) {
-    (void)triangles, (void)rays, (void)count, (void)meets;
-}
-
-bool vshi_triangles_meet_inner(const vsh_triangles *triangles, const vshi_segment_ray *ray) {
-    (void)triangles, (void)ray;
-    return false;
-}
-
-int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray *ray) {
-    (void)triangles, (void)ray;
-    return 0;
-}
-
-double vshi_triangles_distance(const vsh_triangles *triangles, const vshi_segment_ray *ray) {
-    (void)triangles;
-    return ray->far;
-}
-
-bool vshi_triangles_have_solids(const vsh_triangles *triangles) {
-    (void)triangles;
-    return false;
-}
-
-bool vshi_triangles_have_holes(const vsh_triangles *triangles) {
-    (void)triangles;
-    return false;
-}
-
-bool vshi_triangles_have_vessels(const vsh_triangles *triangles) {
-    (void)triangles;
-    return false;
-}
-
-void vshi_triangles_bounds(const vsh_triangles *triangles, double low[3], double high[3]) {
-    (void)triangles;
-    low[0] = low[1] = low[2] = 1.0;
-    high[0] = high[1] = high[2] = 0.0;
-}
-
-double vshi_triangles_lift(const vsh_triangles *triangles) {
-    (void)triangles;
-    return 0.0;
-}
-
-#else
-
 /* Of the casters' size: 64 times what a float's rounding moves a point of theirs. */
 static const double LIFT = 0x1p-18;
 
@@ -247,5 +197,3 @@ void vshi_triangles_bounds(const vsh_triangles *triangles, double low[3], double
 double vshi_triangles_lift(const vsh_triangles *triangles) {
     return LIFT * triangles->size;
 }
-
-#endif

@@ -2,8 +2,6 @@
  * functions of the same names (a static Embree, Embree 4) nor ours can take each other's place. */
 #include "trace/embree_scene.h"
 
-#ifdef VSH_EMBREE
-
 #include "base/error.h"
 
 #include <dlfcn.h>
@@ -52,5 +50,3 @@ vsh_result vshi_embree_load(const vshi_embree **embree, vsh_error *error) {
     }
     return result;
 }
-
-#endif

@@ -1,7 +1,5 @@
 #include "trace/embree_scene.h"
 
-#ifdef VSH_EMBREE
-
 #include "base/memory.h"
 #include "base/try.h"
 #include "mesh/mesh.h"
@@ -162,5 +160,3 @@ void vshi_sieve_attach(const vsh_triangles *triangles, size_t mesh, RTCGeometry 
         triangles->embree->rtcSetGeometryOccludedFilterFunction(geometry, filter);
     }
 }
-
-#endif

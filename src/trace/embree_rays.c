@@ -1,25 +1,6 @@
 /* Rays against the triangles of a vsh_triangles: whether they meet any. */
 #include "trace/embree_scene.h"
 
-#ifndef VSH_EMBREE
-
-void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
-                            bool *blocked) {
-    (void)triangles, (void)rays, (void)count, (void)blocked;
-}
-
-void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *beams, size_t count, int most,
-                        bool *cut) {
-    (void)triangles, (void)beams, (void)count, (void)most, (void)cut;
-}
-
-void vshi_triangles_meet_backs(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
-                               bool *met) {
-    vshi_triangles_blocked(triangles, rays, count, met);
-}
-
-#else
-
 #include <float.h>
 #include <string.h>
 
@@ -216,5 +197,3 @@ void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *b
         }
     }
 }
-
-#endif

@@ -7,8 +7,6 @@
 
 #include <stdint.h>
 
-#ifdef VSH_EMBREE
-
 #include <embree3/rtcore.h>
 #include <stdatomic.h>
 
@@ -149,11 +147,7 @@ void vshi_triangles_occlude(const vsh_triangles *triangles, const int *valid,
 /* Whether rays go much the same way. */
 bool vshi_rays_together(const vshi_segment_ray *rays, int count);
 
-#endif
-
 /* Triangles let rays through where a mask cuts them out, and from behind if they are one-sided. */
-
-#ifdef VSH_EMBREE
 
 #include "mesh/alpha_mask.h"
 
@@ -180,7 +174,5 @@ static inline bool vshi_sieve_is(const vsh_triangles *triangles, size_t mesh) {
     return triangles->sieves != NULL &&
            (triangles->sieves[mesh].places != NULL || triangles->sieves[mesh].one_sided);
 }
-
-#endif
 
 #endif

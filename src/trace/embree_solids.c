@@ -2,8 +2,6 @@
  * Rays meet them by sphere tracing, at world coordinates in double precision. */
 #include "trace/embree_scene.h"
 
-#ifdef VSH_EMBREE
-
 #include "base/floats.h"
 #include "trace/solids.h"
 
@@ -86,5 +84,3 @@ bool vshi_triangles_attach_solids(vsh_triangles *triangles) {
     embree->rtcReleaseGeometry(geometry);
     return true;
 }
-
-#endif

@@ -3,8 +3,6 @@
  * times the time. */
 #include "trace/embree_scene.h"
 
-#ifdef VSH_EMBREE
-
 #include <float.h>
 
 enum { LANES = VSHI_TERRAIN_LANES };
@@ -179,5 +177,3 @@ bool vshi_terrain_attach(const vsh_triangles *triangles, size_t number) {
     embree->rtcReleaseGeometry(geometry);
     return true;
 }
-
-#endif

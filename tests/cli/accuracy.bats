@@ -6,12 +6,6 @@ setup() {
     write_box box.obj
 }
 
-# Builds without Embree have no exact methods.
-needs_embree() {
-    shade bake box.obj "${SMALL[@]}" --method exact --quiet -o probe.exr
-    [[ $stderr != *"without Embree"* ]] || skip "built without Embree"
-}
-
 # by_rays METHOD: a lone box by the method is lit, dark and open, and the file names the method's rays.
 by_rays() {
     write_scene box.json box.obj '"sampler": "blue", "frame": 1'
@@ -33,12 +27,10 @@ by_rays() {
 }
 
 @test "exact bakes where there is Embree, and names its rays" {
-    needs_embree
     by_rays exact
 }
 
 @test "exact traces shapes and level sets as well as meshes" {
-    needs_embree
     printf '{"casters": [{"sdf": {"shape": "torus", "radius": 0.6, "tube_radius": 0.2, "translate": [0, 2, 0]}}]}' >ring.json
     "$VDBSHADE" voxelize ring.json --resolution 48 --quiet -o ring.vdb
     cat >mixed.json <<'JSON'

@@ -35,13 +35,7 @@ is_at_most() {
     awk "BEGIN {exit !($1 <= $2)}" || fail "$1 > $2"
 }
 
-needs_embree() {
-    shade bake box.obj "${SMALL[@]}" --method exact --quiet -o probe.exr
-    [[ $stderr != *"without Embree"* ]] || skip "built without Embree"
-}
-
 @test "with nothing said meshes are baked by exact, and it is said" {
-    needs_embree
     shade bake box.obj "${SMALL[@]}" --ao 0.5 --stats s.json -o a.exr
     done_well
     [[ $stderr == *"shadow exact, AO exact, max error 0.02"* ]] || fail "$stderr"
@@ -73,7 +67,6 @@ JSON
 }
 
 @test "an error that a limit of rays does not keep is told" {
-    needs_embree
     shade bake fence.obj --size 64 --resolution 32 --sun 0.3,1,0.5 --sun-angle 20 --max-error 0.003 --rays 8 \
         --stats s.json -o a.exr
     done_well
@@ -87,7 +80,6 @@ JSON
 }
 
 @test "what voxels leave of an error is measured, told, and by exact not there" {
-    needs_embree
     shade bake fence.obj --size 96 --resolution 32 --sun 0.3,1,0.5 --sun-angle 2 --method adaptive --max-error 0.01 \
         --stats s.json -o a.exr
     done_well
@@ -115,7 +107,6 @@ JSON
     shade bake fence.obj --size 32 --resolution 32 --sun 0.3,1,0.5 --method cone -o a.exr
     done_well
     [[ $stderr == *"pickets"*"thinner than 1.25 voxels"*"casts nothing"* ]] || fail "$stderr"
-    needs_embree
     shade bake fence.obj --size 32 --resolution 32 --sun 0.3,1,0.5 -o a.exr
     done_well
     [[ $stderr != *"casts nothing"* ]] || fail "$stderr"

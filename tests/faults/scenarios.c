@@ -211,9 +211,7 @@ static vsh_result trace(const vsh_run *run, vsh_error *error) {
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     MAKE(occluders, vsh_occluders_create(&mesh, 1, &few, run, &occluders, error));
     MAKE(solids, vsh_solids_create(&sdf, NULL, 1, &solids, error));
-    if (vsh_triangles_available()) {
-        MAKE(triangles, vsh_triangles_create(&mesh, 1, run, &triangles, error));
-    }
+    MAKE(triangles, vsh_triangles_create(&mesh, 1, run, &triangles, error));
     TRY(vsh_trace_shadow(triangles, solids, POINTS, positions, normals, 0.01, &light, 8, run, values, error));
     TRY(vsh_trace_ao(triangles, solids, POINTS, positions, normals, 0.01, 1.0, 8, run, values, error));
     return VSH_OK;

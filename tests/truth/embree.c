@@ -1,39 +1,5 @@
 #include "embree.h"
 
-#ifndef VSH_TRUTH_EMBREE
-
-truth_mesh *truth_mesh_create(const vsh_mesh *meshes, size_t mesh_count) {
-    (void)meshes;
-    (void)mesh_count;
-    return NULL;
-}
-
-void truth_mesh_free(truth_mesh *truth) {
-    (void)truth;
-}
-
-int truth_mesh_light(const truth_mesh *truth, size_t count, const double *origins, const float *normals,
-                     const double towards[3], double w, size_t rays, int threads, float *visible) {
-    (void)truth, (void)count, (void)origins, (void)normals, (void)towards, (void)w, (void)rays, (void)threads;
-    (void)visible;
-    return -1;
-}
-
-int truth_mesh_ao(const truth_mesh *truth, size_t count, const double *origins, const float *normals,
-                  double distance, size_t rays, int threads, float *open) {
-    (void)truth, (void)count, (void)origins, (void)normals, (void)distance, (void)rays, (void)threads;
-    (void)open;
-    return -1;
-}
-
-int truth_mesh_backs(const truth_mesh *truth, size_t count, const double *origins, const float *normals,
-                     size_t rays, int threads, float *backs) {
-    (void)truth, (void)count, (void)origins, (void)normals, (void)rays, (void)threads, (void)backs;
-    return -1;
-}
-
-#else
-
 #include "directions.h"
 #include "embree_scene.h"
 
@@ -250,5 +216,3 @@ int truth_mesh_backs(const truth_mesh *truth, size_t count, const double *origin
     work job = {truth, origins, normals, rays, backs};
     return truth_in_pieces(count, threads, count_backs, &job);
 }
-
-#endif

@@ -1,5 +1,4 @@
-/* Ray-traced truth on triangles: Embree 3, against vsh_mesh views. Without Embree (VSH_TRUTH_EMBREE not
- * defined) truth_mesh_create() returns NULL. Shares no code with the library. */
+/* Ray-traced truth on triangles: Embree 3, against vsh_mesh views. Shares no code with the library. */
 #ifndef TRUTH_EMBREE_H
 #define TRUTH_EMBREE_H
 
@@ -10,7 +9,7 @@
 typedef struct truth_mesh truth_mesh;
 
 /* Copies the meshes, with their transforms applied in double; both sides of a triangle block. NULL where
- * Embree is missing, or refuses. Free it with truth_mesh_free(). */
+ * Embree refuses. Free it with truth_mesh_free(). */
 truth_mesh *truth_mesh_create(const vsh_mesh *meshes, size_t mesh_count);
 void truth_mesh_free(truth_mesh *truth);
 

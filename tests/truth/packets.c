@@ -9,16 +9,6 @@ const char *truth_packing_name(int packing) {
     return names[packing];
 }
 
-#ifndef VSH_TRUTH_EMBREE
-
-int truth_mesh_packets(const truth_mesh *truth, int packing, const truth_question *question, int threads,
-                       float *values) {
-    (void)truth, (void)packing, (void)question, (void)threads, (void)values;
-    return -1;
-}
-
-#else
-
 #include "directions.h"
 #include "embree_scene.h"
 
@@ -201,5 +191,3 @@ int truth_mesh_packets(const truth_mesh *truth, int packing, const truth_questio
     free(job.locals);
     return result;
 }
-
-#endif

@@ -7,15 +7,10 @@
 #include <stdio.h>
 
 /* Shadow methods by their numbers, then those of AO. */
-enum { SHADOWS = VSH_SHADOW_EXACT + 1, KINDS = SHADOWS + VSH_AO_EXACT + 1 };
+enum { SHADOWS = SHADOW_METHODS, KINDS = SHADOWS + AO_METHODS };
 
 static inline bool is_ao(int kind) {
     return kind >= SHADOWS;
-}
-
-/* Whether this build can trace what the kind asks for. */
-static inline bool is_available(int kind) {
-    return is_ao(kind) ? kind - SHADOWS < ao_methods() : kind < shadow_methods();
 }
 
 static inline const char *name_of(int kind) {

@@ -102,7 +102,7 @@ TEST(no_block_is_proved_wrong) {
             truth[i] = (float)truth_light(truth_seeds(), morton + 3 * i, up, far ? light->direction : towards,
                                           w, far ? (double)INFINITY : sqrt(square) - light->radius, 64);
         }
-        for (int32_t method = VSH_SHADOW_ADAPTIVE; method < shadow_methods(); ++method) {
+        for (int32_t method = VSH_SHADOW_ADAPTIVE; method < SHADOW_METHODS; ++method) {
             const vsh_shade_stats stats = shade(&made, light, method, morton, of_morton);
             size_t proved = 0, decided = 0;
             for (size_t i = 0; i < POINTS; ++i) {

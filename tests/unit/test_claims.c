@@ -83,9 +83,7 @@ static stage *make_stage(int shape, bool ao, double voxel) {
     vsh_grid *grid = NULL;
     assert_ok(vsh_grid_from_meshes(s->meshes, s->mesh_count, &options, NULL, &grid, &failure));
     assert_ok(vsh_field_create(grid, NULL, NULL, &s->field, &failure));
-    if (vsh_triangles_available()) {
-        assert_ok(vsh_triangles_create(s->meshes, s->mesh_count, NULL, &s->triangles, &failure));
-    }
+    assert_ok(vsh_triangles_create(s->meshes, s->mesh_count, NULL, &s->triangles, &failure));
     vsh_grid_free(grid);
     return s;
 }
@@ -382,25 +380,16 @@ static int claims(bool ao, bool exact, int32_t sampler, int first, int last) {
     return wrong;
 }
 
-static void need_triangles(void) {
-    if (!vsh_triangles_available()) {
-        skip();
-    }
-}
-
 TEST(shadows_of_exact_claim_their_error_and_keep_what_is_asked) {
-    need_triangles();
     assert_int_equal(claims(false, true, VSH_SAMPLER_SOBOL, 0, 5), 0);
 }
 
 TEST(ao_of_exact_claims_its_error_and_keeps_what_is_asked) {
-    need_triangles();
     assert_int_equal(claims(true, true, VSH_SAMPLER_SOBOL, 0, 5), 0);
 }
 
 /* Blue noise is Sobol's sequence where 0.01 or less is asked. */
 TEST(white_and_blue_noise_claim_theirs) {
-    need_triangles();
     for (int ao = 0; ao < 2; ++ao) {
         assert_int_equal(claims(ao, true, VSH_SAMPLER_WHITE, 0, everything ? 4 : 3), 0);
         assert_int_equal(claims(ao, true, VSH_SAMPLER_BLUE, 0, everything ? 5 : 1), 0);
@@ -416,7 +405,6 @@ TEST(white_and_blue_noise_claim_theirs) {
 }
 
 TEST(adaptive_on_a_field_of_flat_faces_does_too) {
-    need_triangles();
     for (int ao = 0; ao < 2; ++ao) {
         assert_int_equal(claims(ao, false, VSH_SAMPLER_SOBOL, 0, 4), 0);
     }
@@ -424,7 +412,6 @@ TEST(adaptive_on_a_field_of_flat_faces_does_too) {
 
 /* All of a point's first rays may miss what hides a small part of a wide sun. */
 TEST(what_few_rays_miss_is_claimed) {
-    need_triangles();
     const double before = WIDE;
     WIDE = 0.45;
     int wrong = 0;
@@ -444,7 +431,6 @@ TEST(what_few_rays_miss_is_claimed) {
 
 /* At the ends of a penumbra nearly all rays agree: there the light's last hundredth was lost. */
 TEST(ends_of_penumbrae_do_not_collapse) {
-    need_triangles();
     stage *s = make_stage(EDGE, false, 0.0625);
     const trial t = {
         .method = VSH_SHADOW_EXACT, .max_error = 0.005, .width = 256, .height = 32, .lightmap = true};
@@ -457,7 +443,6 @@ TEST(ends_of_penumbrae_do_not_collapse) {
 
 /* The forms themselves, by rays. */
 TEST(closed_forms_are_what_many_rays_see) {
-    need_triangles();
     const double at[][2] = {{0.1, 0.05},  {-0.2, 0.1}, {0.03, -0.11},
                             {-0.3, -0.2}, {0.2, -0.3}, {-0.05, 0.31}};
     for (int k = 0; k < 2 * SHAPES; ++k) {

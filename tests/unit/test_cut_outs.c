@@ -154,10 +154,6 @@ static vsh_result load(card c, vsh_assets **assets) {
 static void expect_shadow(vsh_assets *assets, int (*expected)(double x, double z)) {
     size_t count = 0;
     const vsh_mesh *meshes = vsh_assets_caster(assets, 0, &count);
-    if (!vsh_triangles_available()) {
-        vsh_assets_free(assets);
-        return;
-    }
     vsh_triangles *triangles = NULL;
     assert_ok(vsh_triangles_create(meshes, count, NULL, &triangles, &failure));
     int met = 0, asked = 0;

@@ -134,9 +134,6 @@ TEST(places_fill_the_dome_above_a_plane_evenly) {
 }
 
 int main(void) {
-    if (!vsh_triangles_available()) {
-        return 0;
-    }
     vsh_model *model = NULL;
     if (vsh_model_read(VSH_ASSETS "/cloister.glb", NULL, &model, &failure) != VSH_OK) {
         return 1;

@@ -2,11 +2,6 @@
  */
 
 #include "testing.h"
-#ifndef VSH_EMBREE
-int main(void) {
-    return 0; /* nothing to hold against */
-}
-#else
 
 #include "../bench/embree_rays.c"
 #include "truth/directions.h"
@@ -126,5 +121,3 @@ TEST(the_rays_are_the_samplers) {
 int main(void) {
     return run_all_tests(NULL, NULL);
 }
-
-#endif

@@ -95,18 +95,16 @@ static void run_all(int s, int32_t threads, outcome *o) {
         results[0] == VSH_OK ? vsh_field_create(grid, &field_options, &run, &f, &failure) : results[0];
     if (results[1] == VSH_OK) {
         vshi_floats_set(setting);
-        if (vsh_triangles_available()) {
-            results[calls++] = vsh_triangles_create(&mesh, 1, &run, &triangles, &failure);
-            vshi_floats_set(setting);
-        }
-        for (int32_t i = 0; i <= shadow_methods(); ++i) { /* once more the cone, of the lamp */
+        results[calls++] = vsh_triangles_create(&mesh, 1, &run, &triangles, &failure);
+        vshi_floats_set(setting);
+        for (int32_t i = 0; i <= SHADOW_METHODS; ++i) { /* once more the cone, of the lamp */
             vsh_shade_options how = preview_options();
-            how.method = i < shadow_methods() ? i : VSH_SHADOW_CONE;
+            how.method = i < SHADOW_METHODS ? i : VSH_SHADOW_CONE;
             results[calls++] = vsh_shade_shadow(occluders_traced(f, triangles), &points,
                                                 &lights[i == 1 || i >= VSH_SHADOW_EXACT], &how, &run,
                                                 o->visible[i], NULL, &o->stats, &failure);
         }
-        for (int32_t i = 0; i < ao_methods(); ++i) {
+        for (int32_t i = 0; i < AO_METHODS; ++i) {
             vsh_shade_options how = preview_options();
             how.ao_method = i;
             results[calls++] = vsh_shade_ao(occluders_traced(f, triangles), &points, &how, &run, o->open[i],
@@ -176,14 +174,14 @@ TEST(denormals_are_numbers) {
     const double towards[3] = {5e-324, 1e-310, 0.0};
     const vsh_light light = sun(towards, 1e-310), straight = sun((const double[]){0.0, 1.0, 0.0}, 0.0);
     for (int s = 0; s < SETTING_COUNT; ++s) {
-        for (int32_t method = 0; method < shadow_methods(); ++method) {
+        for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
             vshi_floats_set(SETTINGS[s]);
             const float a = cast_shadow_at(&c, &light, method, p, tiny);
             const float b = cast_shadow_at(&c, &straight, method, zero, up);
             vshi_floats_set(VSHI_FLOATS_DEFAULT);
             assert_int_equal(bits_of(a), bits_of(b));
         }
-        for (int32_t method = 0; method < ao_methods(); ++method) {
+        for (int32_t method = 0; method < AO_METHODS; ++method) {
             vshi_floats_set(SETTINGS[s]);
             const float a = cast_ao_at(&c, method, 1.0, p, tiny), b = cast_ao_at(&c, method, 1.0, zero, up);
             vshi_floats_set(VSHI_FLOATS_DEFAULT);

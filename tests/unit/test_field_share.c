@@ -40,9 +40,7 @@ static int set_up(void **state) {
     assert_ok(vsh_grid_from_meshes(s->bars, BARS, &options, NULL, &grid, &failure));
     assert_ok(vsh_field_create(grid, NULL, NULL, &s->field, &failure));
     vsh_grid_free(grid);
-    if (vsh_triangles_available()) {
-        assert_ok(vsh_triangles_create(s->bars, BARS, NULL, &s->triangles, &failure));
-    }
+    assert_ok(vsh_triangles_create(s->bars, BARS, NULL, &s->triangles, &failure));
     return 0;
 }
 

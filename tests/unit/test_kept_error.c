@@ -235,8 +235,5 @@ TEST(penumbrae_rise_smoothly_at_their_ends) {
 }
 
 int main(void) {
-    if (!vsh_triangles_available()) {
-        return 0;
-    }
     return run_all_tests(make_folder, remove_folder);
 }

@@ -30,14 +30,14 @@ TEST(lights_of_0_to_179_degrees_stay_in_range_and_near_the_truth) {
         for (int i = 0; i < 24; ++i) {
             const double p[3] = {0.13 * i, 0.0, 0.01 * i};
             const double truth = truth_light(scene, p, NULL, up, w, (double)INFINITY, 4096);
-            for (int32_t method = 0; method < shadow_methods(); ++method) {
+            for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
                 const float v = cast_shadow_at(&c, &light, method, p, NULL);
                 assert_true(v >= 0.0f && v <= 1.0f);
                 worst[method] = fmax(worst[method], fabs((double)v - truth));
             }
             /* the open plate sees all of a light that is over its horizon */
             const double q[3] = {0.1 * i - 1.2, 0.0, 0.03 * i};
-            for (int32_t method = 0; method < shadow_methods(); ++method) {
+            for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
                 const float v = cast_shadow_at(&open, &light, method, q, UP);
                 if (v != 1.0f) {
                     fail_msg("%g degrees over an open plate, %s: %.9g", angles[a], name_of(method),
@@ -65,7 +65,7 @@ TEST(lamps_of_1e_6_to_1e6_units_are_seen_from_above_and_not_through_the_plate) {
         for (double radius = 1e-6; radius < 2e6; radius *= 10.0) {
             const double p[3] = {0.31, 0.0, -0.17}, over[3] = {0.31, away, -0.17};
             const double under[3] = {0.31, -1.0 - away - radius, -0.17};
-            for (int32_t method = 0; method < shadow_methods(); ++method) {
+            for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
                 vsh_light light = lamp(over, radius);
                 const float lit = cast_shadow_at(&c, &light, method, p, UP);
                 light = lamp(under, radius);
@@ -89,7 +89,7 @@ TEST(lamps_on_a_surface_light_its_own_side) {
         const double p[3] = {between(&counter, -2.5, 2.5), i % 2 ? 0.4 : -1.4, between(&counter, -2.5, 2.5)};
         const double x = between(&counter, -2.5, 2.5), z = between(&counter, -2.5, 2.5);
         const double at[3] = {x, 0.0, z}, off[3] = {x, voxel, z}, in[3] = {x, -voxel, z};
-        for (int32_t method = 0; method < shadow_methods(); ++method) {
+        for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
             for (int size = 0; size < 2; ++size) {
                 const vsh_light on = lamp(at, size * 0.1), above = lamp(off, 0.0), below = lamp(in, 0.0);
                 const float v = cast_shadow_at(&c, &on, method, p, NULL);
@@ -118,7 +118,7 @@ TEST(lamps_in_casters_light_nothing_outside) {
         const double radii[] = {0.0, 1e-6, 0.2};
         const double at[3] = {i % 2 ? 1.2 : -1.2, between(&counter, -0.2, 0.2), between(&counter, -0.2, 0.2)};
         const vsh_light light = lamp(at, radii[i % 3]);
-        for (int32_t method = 0; method < shadow_methods(); ++method) {
+        for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
             const float v = cast_shadow_at(&c, &light, method, p, NULL);
             if (v != 0.0f) {
                 fail_msg("%s: %.9g from (%g, %g, %g)", name_of(method), (double)v, p[0], p[1], p[2]);
@@ -150,7 +150,7 @@ TEST(lamps_at_the_receiver_are_cut_by_its_horizon_only) {
                 const vsh_light light = lamp(at, radii[r]);
                 const double sine = away > 0.0 ? radii[r] / away : 2.0;
                 const bool whole = sine >= 1.0 || sine <= way[1];
-                for (int32_t method = 0; method < shadow_methods(); ++method) {
+                for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
                     const float v = cast_shadow_at(&c, &light, method, p, UP);
                     if (whole ? v != 1.0f : !(v >= 0.4f && v <= 1.0f)) {
                         fail_msg("%g voxels away at %g degrees, radius %g, %s: %.9g", parts[d], elevations[e],
@@ -168,9 +168,6 @@ TEST(exact_of_a_light_without_size_is_one_traced_ray) {
     enum { SIDE = 64, COUNT = SIDE * SIDE };
     static double positions[3 * COUNT];
     static float normals[3 * COUNT], exact[COUNT], ray[COUNT];
-    if (!vsh_triangles_available()) {
-        skip();
-    }
     floor_texels(SIDE, positions, normals);
     casting c = caster_of(truth_seeds(), 0.04, 0.0);
     const double place[3] = {0.4, 2.5, 0.3};
@@ -201,7 +198,7 @@ static void turn_about(int axis, double angle, double v[3]) {
     v[j] = sin(angle) * a + cos(angle) * b;
 }
 
-/* The plate of grazing_light_reaches_an_open_plate() as triangles. NULL without Embree. */
+/* The plate of grazing_light_reaches_an_open_plate() as triangles. */
 static vsh_triangles *triangles_of_turned(const vsh_sdf_node *node, int axis, double angle) {
     truth_solid box = {TRUTH_BOX, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.0, 0.0};
     memcpy(box.half, node->size, sizeof box.half);
@@ -216,9 +213,7 @@ static vsh_triangles *triangles_of_turned(const vsh_sdf_node *node, int axis, do
     }
     mesh.transform = transform;
     vsh_triangles *triangles = NULL;
-    if (vsh_triangles_available()) {
-        assert_int_equal(vsh_triangles_create(&mesh, 1, NULL, &triangles, NULL), VSH_OK);
-    }
+    assert_int_equal(vsh_triangles_create(&mesh, 1, NULL, &triangles, NULL), VSH_OK);
     free((void *)(uintptr_t)mesh.positions);
     free((void *)(uintptr_t)mesh.indices);
     return triangles;
@@ -253,7 +248,7 @@ TEST(grazing_light_reaches_an_open_plate) {
                 double up[3] = {0.0, 1.0, 0.0};
                 turn_about(turn, 2.0 * half, up);
                 const float n[3] = {(float)up[0], (float)up[1], (float)up[2]};
-                for (int32_t method = 0; method < shadow_methods(); ++method) {
+                for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
                     const vsh_light light = sun(d, method == VSH_SHADOW_HARD ? 0.0 : sine);
                     float v = -1.0f;
                     const vsh_shade_stats stats = cast_shadows(&c, &light, method, 1, q, n, &v);
@@ -309,7 +304,7 @@ static ranges_stage set_up(void) {
 
 /* Spheres are shaded by `hard` and `classic` alone. */
 static int32_t methods_of(const ranges_stage *s) {
-    return s->kind == FIELD ? shadow_methods() : VSH_SHADOW_CLASSIC + 1;
+    return s->kind == FIELD ? SHADOW_METHODS : VSH_SHADOW_CLASSIC + 1;
 }
 
 static void tear_down(ranges_stage *s) {

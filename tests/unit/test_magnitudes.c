@@ -34,12 +34,10 @@ static void bake_floor(double scale, const double offset[3], picture *p) {
     casting c = caster_of_moved(truth_seeds(), 0.04, scale, offset, 8.0 * scale);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     for (int kind = 0; kind < KINDS; ++kind) {
-        if (is_available(kind)) {
-            const vsh_shade_stats stats =
-                cast_kind(&c, kind, &light, 0.75 * scale, COUNT, places, normals, p->v[kind]);
-            assert_int_equal(stats.invalid, 0);
-            assert_int_equal(stats.unfinished, 0);
-        }
+        const vsh_shade_stats stats =
+            cast_kind(&c, kind, &light, 0.75 * scale, COUNT, places, normals, p->v[kind]);
+        assert_int_equal(stats.invalid, 0);
+        assert_int_equal(stats.unfinished, 0);
     }
     caster_free(&c);
 }
@@ -50,12 +48,10 @@ static void bake_floor(double scale, const double offset[3], picture *p) {
 static void assert_alike(const char *where, double at, const picture *a, const picture *b, double rms,
                          double worst, double rays) {
     for (int kind = 0; kind < KINDS; ++kind) {
-        if (is_available(kind)) {
-            const truth_metrics m = truth_compare(COUNT, a->v[kind], b->v[kind], NULL);
-            print_message("%s %g, %s: rms %.2g, worst %.2g\n", where, at, name_of(kind), m.rmse, m.max);
-            assert_true(m.rmse < (kind == VSH_SHADOW_HARD ? 0.016 : by_rays(kind) ? rays : rms));
-            assert_true(kind == VSH_SHADOW_HARD || by_rays(kind) || m.max < worst);
-        }
+        const truth_metrics m = truth_compare(COUNT, a->v[kind], b->v[kind], NULL);
+        print_message("%s %g, %s: rms %.2g, worst %.2g\n", where, at, name_of(kind), m.rmse, m.max);
+        assert_true(m.rmse < (kind == VSH_SHADOW_HARD ? 0.016 : by_rays(kind) ? rays : rms));
+        assert_true(kind == VSH_SHADOW_HARD || by_rays(kind) || m.max < worst);
     }
 }
 
@@ -150,9 +146,6 @@ TEST(half_widths_from_6_to_100_give_the_same_picture_and_3_one_as_near_the_truth
     for (size_t h = 0; h < sizeof half_widths / sizeof half_widths[0]; ++h) {
         c.field = field_of_half_width(half_widths[h]);
         for (int kind = 0; kind < KINDS && c.field != NULL; ++kind) {
-            if (!is_available(kind)) {
-                continue;
-            }
             picture *p = half_widths[h] == 6.0 ? &at_6 : &there;
             cast_kind(&c, kind, &light, 0.75, COUNT, positions, normals, p->v[kind]);
             const truth_metrics m = truth_compare(COUNT, p->v[kind], truth[is_ao(kind)], outside);
@@ -191,7 +184,7 @@ TEST(ao_distances_below_a_voxel_and_above_the_scene_are_what_they_say) {
         memcpy(ns + 3 * i, UP, sizeof UP);
         truth[i] = truth_ao(scene, lifted, up, 100.0, 4096);
     }
-    for (int32_t method = 0; method < ao_methods(); ++method) {
+    for (int32_t method = 0; method < AO_METHODS; ++method) {
         for (size_t d = 0; d < sizeof distances / sizeof distances[0]; ++d) {
             cast_ao(&c, method, distances[d], PLACES, at, ns, v);
             double worst = 0.0;

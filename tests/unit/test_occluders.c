@@ -28,7 +28,7 @@ TEST(meshes_make_the_field_and_triangles_that_their_parts_make) {
     vsh_occluder_parts parts;
     vsh_occluders_get_parts(made, &parts);
     assert_int_equal(parts.struct_size, sizeof parts);
-    assert_int_equal(parts.triangles != NULL, vsh_triangles_available());
+    assert_non_null(parts.triangles);
     assert_ptr_equal(parts.triangles, parts.true_triangles);
     uint64_t counter = 7;
     for (int i = 0; i < 200; ++i) {
@@ -45,7 +45,7 @@ TEST(meshes_make_the_field_and_triangles_that_their_parts_make) {
     assert_true(info.field_bytes == of_field.bytes && info.bricks == of_field.bricks);
     assert_true(info.voxel_size == of_field.voxel_size && info.levels == of_field.levels);
     assert_true(info.grid_bytes > 0 && info.voxelize_s > 0.0 && info.field_s > 0.0);
-    assert_int_equal(info.has_triangles, vsh_triangles_available());
+    assert_true(info.has_triangles);
     vsh_field_free(field);
     vsh_occluders_free(made);
 
@@ -187,9 +187,6 @@ static float lit_under(const vsh_occluders *occluders, int32_t method, vsh_resul
 }
 
 TEST(auto_is_exact_where_triangles_are_kept_and_adaptive_where_not) {
-    if (!vsh_triangles_available()) {
-        skip();
-    }
     const vsh_mesh mesh = plate();
     for (int32_t kept = 0; kept < 2; ++kept) {
         vsh_occluders_options options = vsh_occluders_options_default();
@@ -348,9 +345,6 @@ TEST(what_voxels_lose_is_told_where_they_decide_unless_they_are_a_trial) {
         vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
         options.silent_voxels = cases[i].silent;
         vsh_occluders *made = NULL;
-        if (cases[i].method == VSH_SHADOW_EXACT && !vsh_triangles_available()) {
-            continue;
-        }
         assert_ok(vsh_scene_occluders(&scene, assets, &options, &run, &made, &failure));
         assert_int_equal(told > 0, cases[i].told);
         vsh_occluders_free(made);

@@ -103,9 +103,6 @@ TEST(merged_rows_are_those_of_one_bake_and_words_come_back) {
 TEST(what_parts_leave_of_ao_is_as_of_one_bake) {
     case_scene c;
     char wall[300];
-    if (!vsh_triangles_available()) {
-        return;
-    }
     for (int32_t made = 0; made < 3; ++made) {
         fill_traced(&c, wall, made > 0);
         c.scene.has_ambient = made == 2;
@@ -199,7 +196,7 @@ static void try_all(const char *path, bake_case *one, size_t least_refused) {
 }
 
 TEST(no_part_does_worse_than_fail) {
-    for (int traced = 0; traced < (vsh_triangles_available() ? 2 : 1); ++traced) { /* which leave AO */
+    for (int traced = 0; traced < 2; ++traced) { /* which leave AO */
         case_scene c;
         char wall[300];
         if (traced) {

@@ -78,11 +78,11 @@ static void expect(const casting *c, const vsh_points *points, int l, const vsh_
 
 TEST(values_and_deviations_are_those_of_the_shade_calls) {
     casting c = caster_of(truth_seeds(), 0.04, 0.0);
-    const int32_t methods = shadow_methods() > ao_methods() ? shadow_methods() : ao_methods();
+    const int32_t methods = SHADOW_METHODS > AO_METHODS ? SHADOW_METHODS : AO_METHODS;
     for (int32_t method = 0; method < methods; ++method) {
         vsh_shade_options options = preview_options();
-        options.method = method < shadow_methods() ? method : VSH_SHADOW_CONE;
-        options.ao_method = method < ao_methods() ? method : VSH_AO_TAPS;
+        options.method = method < SHADOW_METHODS ? method : VSH_SHADOW_CONE;
+        options.ao_method = method < AO_METHODS ? method : VSH_AO_TAPS;
         options.rays = 16;
         vsh_query *query = query_of(occluders_of_caster(&c), lights, LIGHTS, &options);
         const size_t counts[] = {1, 2, 64, 65, FEW};

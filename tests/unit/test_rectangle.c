@@ -97,7 +97,7 @@ TEST(a_tiny_rectangle_is_a_point) {
     const double centre[3] = {0.37, 2.1, -0.23}, u[3] = {1e-9, 0.0, 0.0}, v[3] = {0.0, 0.0, 2e-9};
     const vsh_light tiny = panel(centre, u, v), point = lamp(centre, 0.0);
     float values[COUNT], of_point[COUNT];
-    for (int32_t method = VSH_SHADOW_HARD; method < shadow_methods(); ++method) {
+    for (int32_t method = VSH_SHADOW_HARD; method < SHADOW_METHODS; ++method) {
         const vsh_shade_options options = options_of(method);
         shade(c, &tiny, &options, values, NULL);
         shade(c, &point, &options, of_point, NULL);
@@ -113,7 +113,7 @@ TEST(a_tiny_rectangle_is_a_point) {
 TEST(behind_a_one_sided_one_is_nothing_and_two_sides_are_alike) {
     const casting *c = *state;
     float front[COUNT], values[COUNT];
-    for (int32_t method = VSH_SHADOW_HARD; method < shadow_methods(); ++method) {
+    for (int32_t method = VSH_SHADOW_HARD; method < SHADOW_METHODS; ++method) {
         const vsh_shade_options options = options_of(method);
         vsh_light light = light_of(0);
         light.two_sided = 0;
@@ -161,7 +161,7 @@ TEST(edge_on_is_a_share_all_the_same) {
                                 {0.1, 1.5, 0.1},  {0.0, 1.5, 0.0}, {0.8, 1.5, 0.4}};
     const double centre[3] = {0.0, 1.5, 0.0}, u[3] = {1.6, 0.0, 0.0}, v[3] = {0.0, 0.0, 0.8};
     const float up[3] = {0.0f, 1.0f, 0.0f}, aside[3] = {1.0f, 0.0f, 0.0f};
-    for (int32_t method = VSH_SHADOW_HARD; method < shadow_methods(); ++method) {
+    for (int32_t method = VSH_SHADOW_HARD; method < SHADOW_METHODS; ++method) {
         for (size_t p = 0; p < sizeof places / sizeof places[0]; ++p) {
             for (int lifted = -2; lifted <= 2; ++lifted) {
                 const double at[3] = {places[p][0], places[p][1] + 1e-7 * lifted, places[p][2]};

@@ -68,7 +68,7 @@ TEST(threads_and_instruction_sets_give_the_same_bits) {
     const casting *c = *state;
     const vsh_points points = {COUNT, positions, normals, NULL};
     float values[COUNT], others[COUNT];
-    for (int32_t method = VSH_SHADOW_HARD; method < shadow_methods(); ++method) {
+    for (int32_t method = VSH_SHADOW_HARD; method < SHADOW_METHODS; ++method) {
         const vsh_light light = light_of(method % LIGHTS);
         const vsh_shade_options options = options_of(method);
         vsh_run run = vsh_run_default();

@@ -80,9 +80,7 @@ static void shade_all(const casting *c, const motion *m, values *all) {
     const vsh_light lights[2] = {sun(towards, 0.2), lamp(place, 0.25 * m->scale)};
     memset(all, 0, sizeof *all);
     for (int k = 0; k < VALUES; ++k) {
-        if (is_available(kind_of(k))) {
-            cast_kind(c, kind_of(k), &lights[k >= SHADOWS], 0.75 * m->scale, COUNT, places, ns, all->v[k]);
-        }
+        cast_kind(c, kind_of(k), &lights[k >= SHADOWS], 0.75 * m->scale, COUNT, places, ns, all->v[k]);
     }
 }
 

@@ -37,16 +37,9 @@ static void scatter(double positions[POINTS][3], float normals[POINTS][3]) {
     }
 }
 
-static void skip_without_embree(void) {
-    if (!vsh_triangles_available()) {
-        skip();
-    }
-}
-
 /* --- casters without voxels */
 
 TEST(triangles_alone_give_shadows_within_the_error_of_the_truth) {
-    skip_without_embree();
     vsh_occluders *made = plate_of(0);
     vsh_occluders_info info;
     vsh_occluders_get_info(made, &info);
@@ -84,7 +77,6 @@ TEST(triangles_alone_give_shadows_within_the_error_of_the_truth) {
 }
 
 TEST(ao_by_rays_has_the_bits_that_it_has_with_voxels) {
-    skip_without_embree();
     double positions[POINTS][3];
     float normals[POINTS][3], ao[2][POINTS];
     scatter(positions, normals);
@@ -98,7 +90,6 @@ TEST(ao_by_rays_has_the_bits_that_it_has_with_voxels) {
 }
 
 TEST(what_needs_voxels_is_refused_without_them) {
-    skip_without_embree();
     vsh_occluders *made = plate_of(0);
     const double at[3] = {0.0, 0.0, 0.0};
     const float up[3] = {0.0f, 1.0f, 0.0f};
@@ -135,7 +126,6 @@ TEST(what_needs_voxels_is_refused_without_them) {
 }
 
 TEST(parts_of_triangles_alone_cast) {
-    skip_without_embree();
     const vsh_mesh mesh = plate();
     vsh_triangles *triangles = NULL;
     assert_ok(vsh_triangles_create(&mesh, 1, NULL, &triangles, &failure));
@@ -188,7 +178,6 @@ static uint64_t shade_scene(bool layered, float lit[POINTS], float truth[POINTS]
 }
 
 TEST(scenes_and_layers_without_voxels_cast_as_the_truth_says) {
-    skip_without_embree();
     for (int layered = 0; layered < 2; ++layered) {
         float lit[POINTS], truth[POINTS];
         assert_true(shade_scene(layered != 0, lit, truth) == 0);
@@ -227,7 +216,6 @@ static int32_t chosen(const char *more, const char *casters, double points) {
 #define MARCHED_AO ", \"ao\": {\"distance\": 0.6, \"method\": \"adaptive\"}"
 
 TEST(traced_casters_get_voxels_only_where_shadows_pay_for_them) {
-    skip_without_embree();
     assert_int_equal(chosen(AO, MESH, 1e9), 0);
     assert_int_equal(chosen(SUN AO, MESH, 0.0), 0);
     assert_int_equal(chosen(SUN AO, MESH, 64.0 * 64.0), 0);
@@ -242,7 +230,6 @@ TEST(traced_casters_get_voxels_only_where_shadows_pay_for_them) {
 }
 
 TEST(marched_shapes_get_as_many_as_their_error_asks_for) {
-    skip_without_embree();
     assert_int_equal(chosen(SUN AO, BALL, 1e6), 0); /* traced */
     assert_int_equal(chosen(SUN MARCHED, BALL, 1e6), 200);
     assert_int_equal(chosen(SUN MARCHED ", \"max_error\": 0.01", BALL, 1e6), 400);

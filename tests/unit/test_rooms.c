@@ -157,9 +157,7 @@ static casting caster_of_mesh(const vsh_mesh *mesh, double voxel) {
     vsh_grid *grid = NULL;
     vsh_triangles *triangles = NULL;
     assert_ok(vsh_grid_from_meshes(mesh, 1, &options, NULL, &grid, &failure));
-    if (vsh_triangles_available()) {
-        assert_ok(vsh_triangles_create(mesh, 1, NULL, &triangles, &failure));
-    }
+    assert_ok(vsh_triangles_create(mesh, 1, NULL, &triangles, &failure));
     return (casting){field_of_grid(grid, 0.0), triangles};
 }
 
@@ -188,9 +186,6 @@ static void assert_all_see(const vsh_mesh *mesh, double voxel, const double towa
  * voxels.
  */
 TEST(no_ray_is_proved_hidden_through_two_holes_or_by_the_thickness_of_a_sheet) {
-    if (!vsh_triangles_available()) {
-        skip();
-    }
     const double rings[][2] = {{0.25, -4}, {0.25, 4}};
     shape *s = shape_new();
     shape_turned(s, ORIGIN, rings, 2, 64);
@@ -219,7 +214,7 @@ TEST(the_floor_of_an_inward_room_has_the_ao_of_a_room) {
     casting c = caster_of_mesh(&mesh, 0.02);
     const double at[6] = {0.013, 0.021, -1.0, 0.9, 0.0, -1.0};
     const float up[6] = {0, 0, 1, 0, 0, 1};
-    for (int32_t method = 0; method < ao_methods(); ++method) {
+    for (int32_t method = 0; method < AO_METHODS; ++method) {
         float near[2], far[2];
         cast_ao(&c, method, 0.5, 2, at, up, near);
         cast_ao(&c, method, 6.0, 2, at, up, far);

@@ -19,8 +19,7 @@ static casting caster_of_boxes(const double (*corners)[2][3], int count, double 
     vsh_grid *grid = NULL;
     vsh_triangles *triangles = NULL;
     if (vsh_grid_from_meshes(meshes, (size_t)count, &options, NULL, &grid, &failure) != VSH_OK ||
-        (vsh_triangles_available() &&
-         vsh_triangles_create(meshes, (size_t)count, NULL, &triangles, &failure) != VSH_OK)) {
+        vsh_triangles_create(meshes, (size_t)count, NULL, &triangles, &failure) != VSH_OK) {
         fail_msg("%s", failure.message);
     }
     return (casting){field_of_grid(grid, 0.0), triangles};
@@ -39,15 +38,11 @@ static double lightest_umbra(const casting *c, double angle, double depth, doubl
 }
 
 /* Shadow and AO by every method, across the penumbra and up to a side. */
-enum { ACROSS = 64, SHADOWS = VSH_SHADOW_EXACT + 1, KINDS = SHADOWS + VSH_AO_EXACT + 1 };
+enum { ACROSS = 64, SHADOWS = SHADOW_METHODS, KINDS = SHADOWS + AO_METHODS };
 
 typedef struct row {
     float v[KINDS][ACROSS];
 } row;
-
-static bool here(int kind) {
-    return kind < SHADOWS ? kind < shadow_methods() : kind - SHADOWS < ao_methods();
-}
 
 static void shade_row(const casting *c, row *r) {
     const double towards[3] = {0.2, 1.0, 0.1};
@@ -61,11 +56,10 @@ static void shade_row(const casting *c, row *r) {
         memcpy(ns + 3 * i, n, sizeof n);
     }
     for (int kind = 0; kind < KINDS; ++kind) {
-        if (here(kind) && kind < SHADOWS) {
+        if (kind < SHADOWS) {
             cast_shadows(c, &light, kind, ACROSS, at, ns, r->v[kind]);
-        } else if (here(kind)) {
+        } else
             cast_ao(c, kind - SHADOWS, 2.0, ACROSS, at, ns, r->v[kind]);
-        }
     }
 }
 
@@ -107,7 +101,7 @@ TEST(meshes_that_touch_nest_or_coincide_are_one_solid) {
             wrong += fabs(truth) > 0.5 * VOXEL && (h > 0.0f) != (truth > 0.0);
         }
         assert_int_equal(wrong, 0);
-        for (int32_t method = 0; method < shadow_methods(); ++method) {
+        for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
             const double hard = lightest_umbra(&made, 0.0, 1.5, 0.9, method);
             const double narrow = lightest_umbra(&made, RADIANS(0.5), 1.5, 0.9, method);
             const double wide = lightest_umbra(&made, RADIANS(20.0), 1.5, 0.3, method);
@@ -119,10 +113,8 @@ TEST(meshes_that_touch_nest_or_coincide_are_one_solid) {
         /* and beside the umbra as of the one box: its field's values differ by roundings of the mesh's */
         shade_row(&made, c == 0 ? &one : &other);
         for (int kind = 0; c > 0 && kind < KINDS; ++kind) {
-            if (here(kind)) {
-                const truth_metrics m = truth_compare(ACROSS, other.v[kind], one.v[kind], NULL);
-                assert_less(m.rmse, 0.01);
-            }
+            const truth_metrics m = truth_compare(ACROSS, other.v[kind], one.v[kind], NULL);
+            assert_less(m.rmse, 0.01);
         }
     }
 }
@@ -166,7 +158,7 @@ TEST(fields_that_are_not_1_lipschitz_are_right_where_they_say_so) {
             vsh_grid *grid = NULL;
             assert_ok(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure));
             const casting made = {field_of_grid(grid, 0.0), triangles};
-            for (int32_t method = 0; method < shadow_methods(); ++method) {
+            for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
                 const vsh_shade_stats stats =
                     cast_shadows(&made, &light, method, COUNT, positions, NULL, visible);
                 assert_int_equal(stats.unfinished, 0);
@@ -179,7 +171,7 @@ TEST(fields_that_are_not_1_lipschitz_are_right_where_they_say_so) {
                     assert_true(visible[i] >= 0.0f && visible[i] <= 1.0f);
                 }
             }
-            for (int32_t method = 0; method < ao_methods(); ++method) {
+            for (int32_t method = 0; method < AO_METHODS; ++method) {
                 cast_ao(&made, method, 3.0, COUNT, positions, normals, open);
                 const truth_metrics m = truth_compare(COUNT, open, truth_open, NULL);
                 /* cones' own bias, and the error that rays keep, twice */

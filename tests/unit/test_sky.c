@@ -30,9 +30,7 @@ static void make_triangles(stage *s, size_t count) {
         meshes[i] =
             (vsh_mesh){.positions = corners[i], .indices = indices, .vertex_count = 8, .triangle_count = 12};
     }
-    if (vsh_triangles_available()) {
-        assert_ok(vsh_triangles_create(meshes, count, NULL, &s->triangles, &failure));
-    }
+    assert_ok(vsh_triangles_create(meshes, count, NULL, &s->triangles, &failure));
 }
 
 static const float FLAT[8] = {0, 0, 1, 0, 1, 1, 0, 1};

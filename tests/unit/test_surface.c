@@ -189,9 +189,6 @@ static vsh_field *with_surface(vsh_field *field) {
 }
 
 TEST(rays_meet_what_the_cells_read) {
-    if (!vsh_triangles_available()) {
-        skip();
-    }
     const struct {
         vsh_field *field;
         double chord;
@@ -239,9 +236,6 @@ static double rms_of(const float *a, const float *b, size_t count) {
 }
 
 TEST(traced_values_are_near_those_of_marched_rays) {
-    if (!vsh_triangles_available()) {
-        skip();
-    }
     enum { SIZE = 64, COUNT = SIZE * SIZE };
     static float shadow[3][COUNT], ao[3][COUNT];
     vsh_grid *grid = grid_of(truth_seeds(), VOXEL);
@@ -284,9 +278,6 @@ static int32_t cancel_surface(void *user, const char *stage, double fraction) {
 }
 
 TEST(surface_keeps_the_limit_and_ends_when_asked) {
-    if (!vsh_triangles_available()) {
-        skip();
-    }
     OWNED(vsh_grid) *grid = grid_of(truth_seeds(), VOXEL);
     vsh_field *field = NULL;
     vsh_run run = vsh_run_default();

@@ -29,14 +29,11 @@ static void turn_by(double turn, const double v[3], double out[3]) {
     }
 }
 
-/* The same as triangles. NULL without Embree. */
+/* The same as triangles. */
 static vsh_triangles *triangles_of_blocks(const block *blocks, int count, double turn, const double by[3]) {
     vsh_mesh meshes[8];
     double transforms[8][12];
     vsh_triangles *triangles = NULL;
-    if (!vsh_triangles_available()) {
-        return NULL;
-    }
     for (int i = 0; i < count; ++i) {
         truth_solid box = {TRUTH_BOX, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.0, 0.0};
         double centre[3];
@@ -149,7 +146,7 @@ static passage pass(const block *blocks, int count, const double low[3], const d
                 }
                 const vsh_light point = sun(d, 0.0), narrow = sun(d, NARROW * VOXEL);
                 through += cast_shadow_at(&c, &point, VSH_SHADOW_HARD, q, NULL) == 1.0f;
-                for (int32_t method = VSH_SHADOW_SMOOTH; method < shadow_methods(); ++method) {
+                for (int32_t method = VSH_SHADOW_SMOOTH; method < SHADOW_METHODS; ++method) {
                     result.other[method] +=
                         cast_shadow_at(&c, &narrow, method, q, NULL) != (expected == FREE ? 1.0f : 0.0f);
                 }
@@ -217,7 +214,7 @@ TEST(rooms_are_dark) {
         double lightest[VSH_AO_EXACT + 1] = {0.0};
         for (int k = 0; c.field != NULL && k < 40; ++k) {
             const double p[3] = {between(&counter, -0.9, 0.9), -0.999, between(&counter, -0.9, 0.9)};
-            for (int32_t method = VSH_AO_CONES; method < ao_methods(); ++method) {
+            for (int32_t method = VSH_AO_CONES; method < AO_METHODS; ++method) {
                 lightest[method] = fmax(lightest[method], (double)cast_ao_at(&c, method, 10.0, p, up));
             }
         }
@@ -233,9 +230,6 @@ TEST(rooms_are_dark) {
 TEST(no_wall_beside_a_receiver_is_taken_for_its_floor) {
     const float up[3] = {0.0f, 1.0f, 0.0f};
     size_t wrong = 0, all = 0;
-    if (!vsh_triangles_available()) {
-        skip();
-    }
     for (int i = 0; i < 4; ++i) {
         for (int phase = 0; phase < PHASES; ++phase) {
             const double by[3] = {VOXEL * phase / PHASES, VOXEL * (3 * phase % PHASES) / PHASES,

@@ -319,7 +319,7 @@ static void scene_values(bool solid, double scale, double shift, double values[P
 static void neither_place_nor_size_of_the_scene_shows(void **state) {
     const double scales[] = {0x1p-100, 0x1p-20, 0x1p20, 0x1p100};
     double here[PLACES], there[PLACES];
-    for (int solid = vsh_triangles_available() ? 0 : 1; solid < 2; ++solid) {
+    for (int solid = 0; solid < 2; ++solid) {
         scene_values(solid, 1.0, 0.0, here);
         int between_both = 0;
         for (int i = 0; i < PLACES; ++i) {
@@ -537,12 +537,6 @@ static void bad_solids_are_refused(void **state) {
     assert_fails(vsh_solids_create(&sdf, NULL, 1, &solids, &failure), VSH_ERROR_INPUT, "radius");
 }
 
-static void without_embree_triangles_are_unsupported(void **state) {
-    vsh_triangles *triangles = NULL;
-    assert_fails(vsh_triangles_create(NULL, 0, NULL, &triangles, &failure), VSH_ERROR_UNSUPPORTED, "Embree");
-    assert_null(triangles);
-}
-
 int main(void) {
     const struct CMUnitTest solids[] = {
         cmocka_unit_test(a_hole_in_a_slab_lets_its_share_of_the_disc_through),
@@ -551,7 +545,6 @@ int main(void) {
         cmocka_unit_test(neither_place_nor_size_of_the_scene_shows),
         cmocka_unit_test(bad_solids_are_refused),
     };
-    const struct CMUnitTest without[] = {cmocka_unit_test(without_embree_triangles_are_unsupported)};
     const struct CMUnitTest triangles[] = {
         cmocka_unit_test(a_straight_edge_leaves_the_circular_segment),
         cmocka_unit_test(the_receivers_own_horizon_is_an_edge),
@@ -567,7 +560,5 @@ int main(void) {
         cmocka_unit_test(points_that_are_no_points_are_nan_and_no_casters_hide_nothing),
         cmocka_unit_test(bad_triangles_and_calls_are_refused),
     };
-    const int failed = cmocka_run_group_tests(solids, NULL, NULL);
-    return failed + (vsh_triangles_available() ? cmocka_run_group_tests(triangles, NULL, NULL)
-                                               : cmocka_run_group_tests(without, NULL, NULL));
+    return cmocka_run_group_tests(solids, NULL, NULL) + cmocka_run_group_tests(triangles, NULL, NULL);
 }

@@ -1,6 +1,5 @@
 /* Casters that are marched and traced: a field, and the same solids as triangles, so that a test can ask
- * every method for the same thing. Without Embree there are no triangles, and the exact methods are left out.
- */
+ * every method for the same thing. */
 #ifndef TESTS_TRACED_H
 #define TESTS_TRACED_H
 
@@ -12,19 +11,13 @@
 
 typedef struct caster {
     vsh_field *field;
-    vsh_triangles *triangles; /* NULL without Embree */
+    vsh_triangles *triangles;
 } casting;
 
 #define occluders_of_caster(c) occluders_traced((c)->field, (c)->triangles)
 
-/* Numbers of methods that can be asked for here: the exact ones are the last. */
-static inline int32_t shadow_methods(void) {
-    return vsh_triangles_available() ? VSH_SHADOW_EXACT + 1 : VSH_SHADOW_EXACT;
-}
-
-static inline int32_t ao_methods(void) {
-    return vsh_triangles_available() ? VSH_AO_EXACT + 1 : VSH_AO_EXACT;
-}
+/* Numbers of methods that can be asked for. */
+enum { SHADOW_METHODS = VSH_SHADOW_EXACT + 1, AO_METHODS = VSH_AO_EXACT + 1 };
 
 /* A solid's surface: SOLID_SECTORS columns of SOLID_RINGS + 1 places. Its chords are within 3e-4 of a radius.
  */
@@ -102,15 +95,12 @@ static inline vsh_mesh mesh_of_solid(const truth_solid *solid) {
         .positions = positions, .indices = indices, .vertex_count = vertices, .triangle_count = triangles};
 }
 
-/* The scene's triangles moved by `offset`, then scaled. NULL without Embree. */
+/* The scene's triangles moved by `offset`, then scaled. */
 static inline vsh_triangles *triangles_of_moved(truth_scene scene, double scale, const double offset[3]) {
-    vsh_mesh meshes[MAX_SOLIDS];
+    vsh_mesh meshes[MAX_SOLIDS] = {{0}};
     double transforms[MAX_SOLIDS][12];
     vsh_triangles *triangles = NULL;
     vsh_error error = {VSH_OK, ""};
-    if (!vsh_triangles_available()) {
-        return NULL;
-    }
     for (size_t i = 0; i < scene.count; ++i) {
         meshes[i] = mesh_of_solid(&scene.solids[i]);
         memset(transforms[i], 0, sizeof transforms[i]);

@@ -25,9 +25,6 @@ enum { SURFACE_STEPS = 16 };
 enum { REPEATS = 3 };
 static const double SHORT_SECONDS = 0.3;
 
-/* Most voxels along a side, and most rays a texel that `bake` marches. */
-enum { MOST_TRUTH_RESOLUTION = 65536, MOST_MARCHED_RAYS = 4096 };
-
 /* Embree's curve ends at so many rays, or at half of the truth's. */
 enum { CURVE_RAYS = 256 };
 
@@ -47,17 +44,15 @@ static int load_receiver(trade_work *work, size_t index) {
     trade_receiver *receiver = &work->receivers[index];
     size_t mesh_count;
     const vsh_mesh *meshes = vsh_assets_receiver(work->assets, index, &mesh_count);
-    double low[3], high[3];
     vsh_error error;
     CLI_TRY(cli_check_result(
         vsh_receiver_charts(work->scene, index, meshes, mesh_count, &work->run, &receiver->charts, &error),
         &error));
     ++work->receiver_count;
-    CLI_TRY(cli_check_result(vsh_charts_bounds(receiver->charts, &work->run, low, high, &error), &error));
     vsh_charts_get_info(receiver->charts, &receiver->info);
     for (int k = 0; k < 3 && receiver->info.samples > 0; ++k) {
-        work->low[k] = fmin(work->low[k], low[k]);
-        work->high[k] = fmax(work->high[k], high[k]);
+        work->low[k] = fmin(work->low[k], receiver->info.bounds_min[k]);
+        work->high[k] = fmax(work->high[k], receiver->info.bounds_max[k]);
     }
     receiver->path = work->scene->receivers[index].path;
     receiver->first = work->texels;
@@ -86,7 +81,7 @@ static int load(trade_work *work) {
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         CLI_TRY(load_receiver(work, i));
     }
-    work->meshes = vsh_triangles_available() != 0;
+    work->meshes = true;
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const int32_t type = scene->casters[i].type;
         work->meshes = work->meshes && (type == VSH_CASTER_MESH || type == VSH_CASTER_HEIGHTFIELD);
@@ -318,35 +313,12 @@ static int trace(const trade_work *work, const trade_subject *subject, int32_t r
     return cli_check_result(result, &error);
 }
 
-static int march_truth(trade_work *work) {
-    const int32_t finest = work->fields[0].resolution;
-    work->truth_resolution = finest <= MOST_TRUTH_RESOLUTION / 2 ? 2 * finest : finest;
-    work->truth_rays = work->truth_rays < MOST_MARCHED_RAYS ? work->truth_rays : MOST_MARCHED_RAYS;
-    vsh_occluders *occluders = NULL;
-    double seconds;
-    int code = make_voxels(work, work->truth_resolution, &occluders, &seconds);
-    vsh_shade_options shade = work->scene->shade;
-    shade.method = VSH_SHADOW_RAYS;
-    shade.ao_method = VSH_AO_RAYS;
-    shade.rays = work->truth_rays;
-    shade.early_rays = 0;
-    for (size_t s = 0; s < work->subject_count && code == CLI_OK; ++s) {
-        code = bake(work, &work->subjects[s], occluders, &shade, work->subjects[s].truth);
-    }
-    vsh_occluders_free(occluders);
-    return code;
-}
-
 static int make_truth(trade_work *work) {
     const double start = read_clock(work);
     work->truth_rays = work->settings->truth_rays;
-    if (vsh_scene_has_truth(work->scene)) {
-        for (size_t s = 0; s < work->subject_count; ++s) {
-            double seconds;
-            CLI_TRY(trace(work, &work->subjects[s], work->truth_rays, work->subjects[s].truth, &seconds));
-        }
-    } else {
-        CLI_TRY(march_truth(work));
+    for (size_t s = 0; s < work->subject_count; ++s) {
+        double seconds;
+        CLI_TRY(trace(work, &work->subjects[s], work->truth_rays, work->subjects[s].truth, &seconds));
     }
     work->truth_s = read_clock(work) - start;
     return CLI_OK;

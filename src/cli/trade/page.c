@@ -327,18 +327,13 @@ static void write_receivers(FILE *out, const trade_work *work) {
 }
 
 static void write_truth(FILE *out, const trade_work *work) {
-    if (work->truth_resolution == 0) {
-        fprintf(out,
-                "<dt>Truth</dt><dd>%d rays a texel, from just above it, against the casters themselves%s%s",
-                work->truth_rays, work->triangles != NULL ? "; triangles by Embree" : "",
-                work->solids != NULL ? "; procedural shapes by sphere tracing in double precision" : "");
-    } else {
-        fprintf(out, "<dt>Truth</dt><dd>%d rays a texel in a field of %d voxels along the longest side: %s",
-                work->truth_rays, work->truth_resolution,
-                vsh_triangles_available() ? "a caster is neither a mesh nor procedural"
-                                          : "this build has no Embree");
-    }
-    fprintf(out, "; it took %.1f s.</dd>\n", work->truth_s);
+    fprintf(
+        out,
+        "<dt>Truth</dt><dd>%d rays a texel, from just above it, against the casters themselves%s%s; it took "
+        "%.1f s.</dd>\n",
+        work->truth_rays, work->triangles != NULL ? "; triangles by Embree" : "",
+        work->solids != NULL ? "; procedural shapes by sphere tracing in double precision" : "",
+        work->truth_s);
 }
 
 static void write_conditions(FILE *out, const trade_work *work) {

@@ -71,7 +71,7 @@ typedef struct trade_work {
     double samples;
     size_t texels;            /* of all lightmaps */
     size_t covered;           /* by charts */
-    vsh_triangles *triangles; /* of the mesh casters; NULL without any or without Embree */
+    vsh_triangles *triangles; /* of the mesh casters; NULL without any */
     vsh_solids *solids;       /* of the procedural casters; NULL without any */
     bool meshes;              /* all casters are triangles, and Embree is there */
     double triangles_s;
@@ -91,8 +91,7 @@ typedef struct trade_work {
     size_t skipped;   /* runs that did not fit into the budget */
     double measuring; /* when the budget began, seconds */
     double truth_s;
-    int32_t truth_rays;       /* a texel */
-    int32_t truth_resolution; /* of the field that they are marched in; 0: they meet the casters themselves */
+    int32_t truth_rays; /* a texel */
 } trade_work;
 
 /* Loads the scene, makes its truth and measures all runs. CLI_OK or an exit code, having said why. */

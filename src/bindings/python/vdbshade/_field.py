@@ -33,11 +33,6 @@ class Triangles(Handle):
         """In memory."""
         return lib.vsh_triangles_bytes(self.handle)
 
-    @staticmethod
-    def available() -> bool:
-        """Whether the library was built with Embree."""
-        return bool(lib.vsh_triangles_available())
-
 
 class Field(Handle):
     """The pyramid of narrow bands that shadow marching samples, of a grid.

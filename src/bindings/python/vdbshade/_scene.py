@@ -222,10 +222,6 @@ class Scene:
         """Whether a method knows its casters by their voxels alone."""
         return bool(lib.vsh_scene_marches(self.struct, self._layer(layer)))
 
-    def has_truth(self) -> bool:
-        """Whether truth() gives all of its casters."""
-        return bool(lib.vsh_scene_has_truth(self.struct))
-
     def check_outputs(self, outputs: "Sequence[str | os.PathLike[str]]", *, run: Optional[Run] = None) -> None:
         """ArgumentError where one of these files is there already and is read with the scene: a texture, say."""
         names = [ffi.new("char[]", path_of(o, "outputs")) for o in outputs]
