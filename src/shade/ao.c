@@ -182,6 +182,10 @@ vsh_result vshi_ao_open(const vsh_occluders *occluders, const vsh_shade_options 
         full->sampler = vshi_ao_tile_sampler(full->sampler);
     }
     VSHI_TRY(vshi_ao_prepare(occluders, full, &shader->cones, &shader->task, error));
+    if (shading.sphere) {
+        VSHI_TRY(vshi_ao_prepare_sphere(&shader->cones, &shader->task, error));
+        VSHI_TRY(vshi_layers_prepare_sphere(shader->layers, error));
+    }
     if (vshi_ao_has_rays(full)) {
         VSHI_TRY(vshi_shade_sampler(full, vshi_ao_most_rays(full), "ao", &shader->sampler, error));
     }

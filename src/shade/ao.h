@@ -76,6 +76,7 @@ typedef struct vshi_ao_shading {
     bool shared;  /* texels share their rays */
     bool bent;    /* bent normals are asked for, too */
     bool outside; /* the points are known to lie in no solid */
+    bool sphere;  /* the points are in free space: all directions count alike, and normals are not used */
 } vshi_ao_shading;
 
 /* AO, prepared for points that come later. It must not be moved, and what it was made of must outlive it. */

@@ -1,4 +1,4 @@
-/* Points asked for by a handle: few as they are, many in the order of a curve. */
+/* Shades points in pieces: few as they come, many in the order of a curve. */
 #include <vdbshade/query.h>
 
 #include "base/floats.h"
@@ -16,7 +16,6 @@ enum { FEW = 64 };
 
 typedef struct query_call {
     const vsh_query *query;
-    const vsh_points *points; /* where they, and the output, are packed; else NULL */
     vshi_view view;
     const float *faces; /* [points][3] or NULL, as of vshi_ao_task */
     const vsh_query_output *output;
@@ -29,31 +28,10 @@ static inline float *array_of(float *const *arrays, size_t light) {
     return arrays != NULL ? arrays[light] : NULL;
 }
 
-static void shade_light(const query_call *call, size_t light, const vsh_points *points, size_t begin,
-                        size_t end, float *visibility, float *deviation, vsh_shade_stats *stats) {
-    vshi_shadow_task task = call->query->shadow[light];
-    task.kernel = call->kernel;
-    task.points = points;
-    task.visibility = visibility;
-    task.deviation = deviation;
-    vshi_shadow_shade(&task, begin, end, stats);
-}
-
-static void shade_sky(const query_call *call, const vsh_points *points, const float *faces, size_t begin,
-                      size_t end, float *ao, float *deviation, vsh_shade_stats *stats) {
-    vshi_ao_task task = call->query->ao;
-    task.faces = faces;
-    task.kernel = call->kernel;
-    task.points = points;
-    task.ao = ao;
-    task.deviation = deviation;
-    vshi_ao_shade(&task, begin, end, stats);
-}
-
 /* Distances and, where not NULL, gradients of positions [count][3]. */
 static void measure(const query_call *call, size_t count, const double *positions, float *distances,
                     float *gradients) {
-    const vsh_field *field = call->query->ao.field;
+    const vsh_field *field = call->query->ao.task.field;
     for (size_t i = 0; i < count; ++i) {
         const vshi_vec p = vshi_to_field(field, positions + 3 * i);
         const bool finite = vshi_finite(p);
@@ -70,28 +48,6 @@ static void measure(const query_call *call, size_t count, const double *position
             gradients[3 * i + 1] = (float)g.y;
             gradients[3 * i + 2] = (float)g.z;
         }
-    }
-}
-
-/* Points begin … end - 1 from `first` on, at most VSHI_PIECE of them, as they stand. */
-static void shade_in_place(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
-    const query_call *call = user;
-    const vsh_query_output *output = call->output;
-    begin += call->first;
-    end += call->first;
-    for (size_t l = 0; output->visibility != NULL && l < call->query->light_count; ++l) {
-        if (output->visibility[l] != NULL) {
-            shade_light(call, l, call->points, begin, end, output->visibility[l],
-                        array_of(output->deviation, l), stats);
-        }
-    }
-    if (output->ao != NULL) {
-        shade_sky(call, call->points, call->faces, begin, end, output->ao, output->ao_deviation, stats);
-    }
-    if (output->distance != NULL || output->gradient != NULL) {
-        measure(call, end - begin, call->points->positions + 3 * begin,
-                output->distance != NULL ? output->distance + begin : NULL,
-                output->gradient != NULL ? output->gradient + 3 * begin : NULL);
     }
 }
 
@@ -145,8 +101,8 @@ static void gather(const piece *p, gathered *g) {
     }
 }
 
-/* The same of points in an order, or apart in memory. */
-static void shade_gathered(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
+/* Shades a piece: gathers its points, then scatters the values. */
+static void shade_piece(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
     const query_call *call = user;
     const vsh_query_output *output = call->output;
     const piece p = {call, begin, end - begin, output->stride};
@@ -157,15 +113,25 @@ static void shade_gathered(const void *user, size_t begin, size_t end, vsh_shade
     for (size_t l = 0; output->visibility != NULL && l < call->query->light_count; ++l) {
         if (output->visibility[l] != NULL) {
             float *deviation = array_of(output->deviation, l);
-            shade_light(call, l, &points, 0, p.count, g.values, deviation != NULL ? g.deviations : NULL,
-                        stats);
+            vshi_shadow_task task = call->query->shadow[l].task;
+            task.kernel = call->kernel;
+            task.points = &points;
+            task.scattered = call->view.texels == NULL;
+            task.visibility = g.values;
+            task.deviation = deviation != NULL ? g.deviations : NULL;
+            vshi_shadow_shade(&task, 0, p.count, stats);
             scatter(&p, 1, g.values, output->visibility[l]);
             scatter(&p, 1, g.deviations, deviation);
         }
     }
     if (output->ao != NULL) {
-        shade_sky(call, &points, call->faces != NULL ? &g.faces[0][0] : NULL, 0, p.count, g.values,
-                  output->ao_deviation != NULL ? g.deviations : NULL, stats);
+        vshi_ao_task task = call->query->ao.task;
+        task.kernel = call->kernel;
+        task.points = &points;
+        task.faces = call->faces != NULL ? &g.faces[0][0] : NULL;
+        task.ao = g.values;
+        task.deviation = output->ao_deviation != NULL ? g.deviations : NULL;
+        vshi_ao_shade(&task, 0, p.count, stats);
         scatter(&p, 1, g.values, output->ao);
         scatter(&p, 1, g.deviations, output->ao_deviation);
     }
@@ -180,7 +146,7 @@ static void shade_gathered(const void *user, size_t begin, size_t end, vsh_shade
 /* VSH_QUERY_BATCH points at a time, so that calls for so many each give the same bits. */
 static vsh_result shade_many(query_call *call, const vsh_run *run, vshi_job *job, vsh_shade_stats *stats,
                              vsh_error *error) {
-    const vsh_field *field = call->query->ao.field;
+    const vsh_field *field = call->query->ao.task.field;
     const size_t count = call->view.count;
     const size_t most = count < VSH_QUERY_BATCH ? count : VSH_QUERY_BATCH;
     uint64_t *order = NULL;
@@ -199,9 +165,7 @@ static vsh_result shade_many(query_call *call, const vsh_run *run, vshi_job *job
             VSHI_TRY_DONE(vshi_order_points(job, field, &call->view, call->first, now, order, error));
             call->order = order;
         }
-        VSHI_TRY_DONE(vshi_shade_pieces(job, now, VSHI_PIECE,
-                                        ordered || call->points == NULL ? shade_gathered : shade_in_place,
-                                        call, stats, error));
+        VSHI_TRY_DONE(vshi_shade_pieces(job, now, VSHI_PIECE, shade_piece, call, stats, error));
     }
 done:
     free(order);
@@ -223,7 +187,7 @@ static vsh_result check_output(const vsh_query *query, const vshi_view *view, co
     if (output->ao == NULL && output->ao_deviation != NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "output: ao_deviation without ao");
     }
-    if ((output->distance != NULL || output->gradient != NULL) && query->ao.field->unknown) {
+    if ((output->distance != NULL || output->gradient != NULL) && query->ao.task.field->unknown) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "output: distance or gradient, of occluders without voxels, which have them");
     }
@@ -232,7 +196,7 @@ static vsh_result check_output(const vsh_query *query, const vshi_view *view, co
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "output: stride %zu: expected 0 or bytes, %zu, %zu …",
                          output->stride, least, least + sizeof(float));
     }
-    return output->ao != NULL && view->normals == NULL && !query->ao.sphere
+    return output->ao != NULL && view->normals == NULL && !query->ao.task.sphere
                ? vshi_ao_check_points(&(vsh_points){.count = view->count}, error)
                : VSH_OK;
 }
@@ -248,10 +212,9 @@ static vsh_result resolve_stride(const char *name, size_t unit, size_t packed, s
     return VSH_OK;
 }
 
-/* Points as they stand in memory; *packed tells whether that is as vsh_points says. Errors:
- * VSH_ERROR_ARGUMENT. */
+/* Points as they stand in memory. Errors: VSH_ERROR_ARGUMENT. */
 static vsh_result view_points(const vsh_points *points, const vsh_point_layout *layout, vshi_view *view,
-                              const float **faces, bool *packed, vsh_error *error) {
+                              const float **faces, vsh_error *error) {
     vsh_point_layout l = vsh_point_layout_default();
     VSHI_TRY(vshi_options_resolve(layout, &l, sizeof l, "vsh_point_layout", error));
     const bool floats = l.float_positions != NULL;
@@ -271,9 +234,6 @@ static vsh_result view_points(const vsh_points *points, const vsh_point_layout *
                         l.texel_stride,
                         floats};
     *faces = l.face_normals;
-    *packed = !floats && l.position_stride == 3 * sizeof(double) &&
-              (points->normals == NULL || l.normal_stride == 3 * sizeof(float)) &&
-              (points->texels == NULL || l.texel_stride == sizeof(uint32_t));
     return VSH_OK;
 }
 
@@ -288,8 +248,8 @@ vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, co
     vsh_query_output full = vsh_query_output_default();
     vshi_view view;
     const float *faces = NULL;
-    bool packed = false, any = false;
-    VSHI_TRY(view_points(points, layout, &view, &faces, &packed, error));
+    bool any = false;
+    VSHI_TRY(view_points(points, layout, &view, &faces, error));
     VSHI_TRY(vshi_run_resolve(run, &full_run, error));
     VSHI_TRY(vshi_options_resolve(output, &full, sizeof full, "vsh_query_output", error));
     VSHI_TRY(check_output(query, &view, &full, &any, error));
@@ -297,15 +257,13 @@ vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, co
         return VSH_OK;
     }
     query_call call = {.query = query,
-                       .points = packed && full.stride == 0 ? points : NULL,
                        .view = view,
                        .faces = faces,
                        .output = &full,
                        .kernel = vshi_kernel_of(full_run.isa)};
     if (view.count <= FEW) {
         vsh_shade_stats own = vsh_shade_stats_zero();
-        vshi_shade_fn *shade = call.points != NULL ? shade_in_place : shade_gathered;
-        shade(&call, 0, view.count, stats != NULL ? stats : &own);
+        shade_piece(&call, 0, view.count, stats != NULL ? stats : &own);
         return VSH_OK;
     }
     vshi_job *job = vshi_job_begin(&full_run, "query", view.count);
@@ -315,4 +273,81 @@ vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, co
     const vsh_result result = shade_many(&call, &full_run, job, stats, error);
     vshi_job_end(job);
     return result;
+}
+
+/* --- the handle */
+
+void vsh_query_free(vsh_query *query) {
+    if (query == NULL) {
+        return;
+    }
+    for (size_t l = 0; query->shadow != NULL && l < query->light_count; ++l) {
+        vshi_shadow_close(&query->shadow[l]);
+    }
+    vshi_ao_close(&query->ao);
+    free(query->shadow);
+    free(query->lights);
+    free(query);
+}
+
+static vsh_result prepare(vsh_query *q, const vsh_occluders *occluders, const vsh_light *lights,
+                          const vsh_shade_options *options, bool sphere, vsh_error *error) {
+    static const char what[] = "lights of a query";
+    VSHI_TRY(vshi_allocate((void **)&q->lights, q->light_count, sizeof *q->lights, what, error));
+    VSHI_TRY(vshi_allocate((void **)&q->shadow, q->light_count, sizeof *q->shadow, what, error));
+    for (size_t l = 0; l < q->light_count; ++l) {
+        vsh_error why;
+        q->lights[l] = lights[l];
+        const vsh_result result =
+            vshi_shadow_open(occluders, &q->lights[l], options, VSH_ISA_BEST, &q->shadow[l], &why);
+        if (result != VSH_OK) {
+            return vshi_fail(error, result, "light %zu: %s", l, why.message);
+        }
+    }
+    return vshi_ao_open(occluders, options, (vshi_ao_shading){.sphere = sphere}, VSH_ISA_BEST, &q->ao, error);
+}
+
+vsh_result vsh_query_create(const vsh_occluders *occluders, const vsh_light *lights, size_t light_count,
+                            const vsh_shade_options *options, vsh_query **query, vsh_error *error) {
+    VSHI_NEEDS(query);
+    *query = NULL;
+    VSHI_NEEDS(occluders);
+    VSHI_NEEDS_OF(light_count, lights);
+    return vshi_query_create(occluders, lights, light_count, options, false, query, error);
+}
+
+vsh_result vshi_query_create(const vsh_occluders *occluders, const vsh_light *lights, size_t light_count,
+                             const vsh_shade_options *options, bool sphere, vsh_query **query,
+                             vsh_error *error) {
+    VSHI_FLOATS;
+    vsh_query *q = NULL;
+    vsh_shade_options full;
+    *query = NULL;
+    VSHI_TRY(vshi_shade_options_resolve(options, &full, error));
+    VSHI_TRY(vshi_allocate((void **)&q, 1, sizeof *q, "query", error));
+    q->light_count = light_count;
+    const vsh_result result = prepare(q, occluders, lights, &full, sphere, error);
+    if (result != VSH_OK) {
+        vsh_query_free(q);
+        return result;
+    }
+    *query = q;
+    return VSH_OK;
+}
+
+void vshi_query_prove(const vsh_query *query, int32_t isa, size_t light, size_t count,
+                      const double (*centre)[3], const double *radius, int8_t *proof,
+                      vsh_shade_stats *stats) {
+    vshi_shadow_task task = query->shadow[light].task;
+    task.kernel = vshi_kernel_of(isa);
+    vshi_vec at[VSHI_QUERY_BALLS];
+    double voxels[VSHI_QUERY_BALLS];
+    for (size_t i = 0; i < count; ++i) {
+        at[i] = vshi_to_field(task.field, centre[i]);
+        voxels[i] = radius[i] / task.field->voxel_size;
+    }
+    vshi_blocks_prove_balls(&task, count, at, voxels, proof, stats);
+    for (size_t i = 0; i < count && task.layers != NULL; ++i) {
+        proof[i] = proof[i] == VSHI_PROVED_FREE ? VSHI_UNPROVED : proof[i]; /* layers may hide the light */
+    }
 }

@@ -1,4 +1,4 @@
-/* Queries of points in free space. */
+/* Shadow, AO and distances at points, by a handle that is made once for a field, lights and options. */
 #ifndef VSHI_QUERY_H
 #define VSHI_QUERY_H
 
@@ -13,14 +13,10 @@
 #include <vdbshade/query.h>
 
 struct vsh_query {
-    vsh_shade_options options;
     size_t light_count;
-    vsh_light *lights;        /* [light_count] */
-    vshi_shadow_task *shadow; /* [light_count] */
-    vshi_layers **layers;     /* [light_count + 1]: of the lights, then of AO */
-    vshi_ao_task ao;
-    vshi_ao_cones cones;
-    vshi_sampler *sampler; /* NULL where no method takes one */
+    vsh_light *lights;          /* [light_count] */
+    vshi_shadow_shader *shadow; /* [light_count] */
+    vshi_ao_shader ao;
 };
 
 /* vsh_query_create(), or (sphere) a query whose AO is the free share of all directions around a point, each

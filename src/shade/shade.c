@@ -6,8 +6,7 @@
 #include "field/surface.h"
 
 #include <math.h>
-#include <stdatomic.h>
-#include <stdlib.h>
+#include <pthread.h>
 
 vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shade_options *full,
                                       vsh_error *error) {
@@ -92,51 +91,36 @@ void vshi_shade_stats_add(vsh_shade_stats *stats, const vsh_shade_stats *more) {
     stats->worst_error = fmax(stats->worst_error, more->worst_error);
 }
 
+/* Pieces of points at work. Squared errors are added up in whole units of VSHI_SQUARE_UNIT, so that the order
+ * of threads changes no bit. */
 typedef struct shade_run {
     vshi_shade_fn *fn;
     const void *task;
-    _Atomic uint64_t marches, samples, skipped, certified, unfinished, invalid, beyond_reach, rays, refined;
-    _Atomic uint64_t square_error,
-        ao_square_error; /* in units of VSHI_SQUARE_UNIT, so that the order of threads changes no bit */
-    _Atomic double worst_error;
+    pthread_mutex_t lock; /* of the following */
+    vsh_shade_stats stats;
+    uint64_t square_error, ao_square_error;
 } shade_run;
 
 static void run_piece(void *user, size_t begin, size_t end) {
     shade_run *run = user;
     vsh_shade_stats stats = vsh_shade_stats_zero();
     run->fn(run->task, begin, end, &stats);
-    atomic_fetch_add(&run->marches, stats.marches);
-    atomic_fetch_add(&run->samples, stats.samples);
-    atomic_fetch_add(&run->skipped, stats.skipped);
-    atomic_fetch_add(&run->certified, stats.certified);
-    atomic_fetch_add(&run->unfinished, stats.unfinished);
-    atomic_fetch_add(&run->invalid, stats.invalid);
-    atomic_fetch_add(&run->beyond_reach, stats.beyond_reach);
-    atomic_fetch_add(&run->rays, stats.rays);
-    atomic_fetch_add(&run->refined, stats.refined);
-    atomic_fetch_add(&run->square_error, (uint64_t)(stats.square_error / VSHI_SQUARE_UNIT));
-    atomic_fetch_add(&run->ao_square_error, (uint64_t)(stats.ao_square_error / VSHI_SQUARE_UNIT));
-    vshi_raise(&run->worst_error, stats.worst_error);
+    pthread_mutex_lock(&run->lock);
+    run->square_error += (uint64_t)(stats.square_error / VSHI_SQUARE_UNIT);
+    run->ao_square_error += (uint64_t)(stats.ao_square_error / VSHI_SQUARE_UNIT);
+    vshi_shade_stats_add(&run->stats, &stats);
+    pthread_mutex_unlock(&run->lock);
 }
 
 vsh_result vshi_shade_pieces(vshi_job *job, size_t count, size_t grain, vshi_shade_fn *fn, const void *task,
                              vsh_shade_stats *stats, vsh_error *error) {
-    shade_run pieces = {.fn = fn, .task = task};
-    const vsh_result result = vshi_parallel_for(job, count, grain, 1, run_piece, &pieces, error);
+    shade_run run = {
+        .fn = fn, .task = task, .lock = PTHREAD_MUTEX_INITIALIZER, .stats = vsh_shade_stats_zero()};
+    const vsh_result result = vshi_parallel_for(job, count, grain, 1, run_piece, &run, error);
     if (stats != NULL) {
-        const vsh_shade_stats done = {.marches = pieces.marches,
-                                      .samples = pieces.samples,
-                                      .skipped = pieces.skipped,
-                                      .certified = pieces.certified,
-                                      .unfinished = pieces.unfinished,
-                                      .invalid = pieces.invalid,
-                                      .beyond_reach = pieces.beyond_reach,
-                                      .rays = pieces.rays,
-                                      .refined = pieces.refined,
-                                      .square_error = (double)pieces.square_error * VSHI_SQUARE_UNIT,
-                                      .ao_square_error = (double)pieces.ao_square_error * VSHI_SQUARE_UNIT,
-                                      .worst_error = pieces.worst_error};
-        vshi_shade_stats_add(stats, &done);
+        run.stats.square_error = (double)run.square_error * VSHI_SQUARE_UNIT;
+        run.stats.ao_square_error = (double)run.ao_square_error * VSHI_SQUARE_UNIT;
+        vshi_shade_stats_add(stats, &run.stats);
     }
     return result;
 }

@@ -7,8 +7,6 @@
 #include "shade/rays.h"
 #include "trace/sampler.h"
 
-#include <stdatomic.h>
-
 /* Resolves and checks options. Errors: VSH_ERROR_ARGUMENT, naming field, value and limit. */
 vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shade_options *full,
                                       vsh_error *error);
@@ -50,13 +48,6 @@ vsh_result vshi_shade_pieces(vshi_job *job, size_t count, size_t grain, vshi_sha
 static inline void vshi_stats_add_error(vsh_shade_stats *stats, double error) {
     stats->square_error += error * error;
     stats->worst_error = error > stats->worst_error ? error : stats->worst_error;
-}
-
-/* *most becomes `value` where that is larger. */
-static inline void vshi_raise(_Atomic double *most, double value) {
-    double now = *most;
-    while (value > now && !atomic_compare_exchange_weak(most, &now, value)) {
-    }
 }
 
 /* The same as a job of its own, under progress stage `stage`. `run` is a resolved one. */

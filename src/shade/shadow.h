@@ -22,6 +22,7 @@ typedef struct vshi_shadow_task {
     uint32_t purpose; /* of the sampler: lights of other names have other sequences */
     const vshi_kernel *kernel;
     const vsh_points *points;
+    bool scattered; /* the points' texels are only numbers: points share no rays */
     float *visibility;
     float *deviation; /* or NULL */
 } vshi_shadow_task;

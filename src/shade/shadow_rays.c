@@ -264,7 +264,7 @@ void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_s
     }
     batch.shared = task->options->method != VSH_SHADOW_RAYS &&
                    vshi_shadow_most_rays(task->options) > vshi_interpolation_rays(task->options->max_error) &&
-                   !vshi_shadow_is_hard(task) && vshi_interpolation_can(task->points);
+                   !vshi_shadow_is_hard(task) && !task->scattered && vshi_interpolation_can(task->points);
     if (batch.shared) {
         count = cast_shared(&batch, begin, end, some);
     }
