@@ -88,15 +88,11 @@ typedef struct vsh_charts_info {
     uint64_t covered; /* texels with at least one sample */
     uint64_t samples; /* evaluated positions, supersampling counted */
     uint64_t bytes;   /* in memory */
+    double bounds_min[3], bounds_max[3]; /* world box of the meshes' vertices, for vsh_scene_reach() */
 } vsh_charts_info;
 
 /* Cannot fail. */
 VSH_API void vsh_charts_get_info(const vsh_charts *charts, vsh_charts_info *info);
-
-/* World box of all samples, zeros where there are none; vsh_scene_reach() makes a field's reach of it.
- * Errors: VSH_ERROR_ARGUMENT (run), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, double bounds_min[3],
-                                     double bounds_max[3], vsh_error *error);
 
 /* The samples of all texels. The charts are not needed any more. */
 typedef struct vsh_texels vsh_texels;

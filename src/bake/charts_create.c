@@ -188,7 +188,7 @@ static vsh_result find_sheets(vsh_charts *charts, vshi_mesh_set *set, vshi_job *
     return VSH_OK;
 }
 
-static void find_centre(vsh_charts *charts) {
+static void find_bounds(vsh_charts *charts) {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (size_t m = 0; m < charts->sorted.mesh_count; ++m) {
         const vsh_mesh *mesh = &charts->sorted.meshes[m];
@@ -201,8 +201,10 @@ static void find_centre(vsh_charts *charts) {
             }
         }
     }
-    for (int k = 0; k < 3; ++k) {
-        charts->centre[k] = low[k] <= high[k] ? 0.5 * (low[k] + high[k]) : 0.0;
+    for (int k = 0; k < 3 && low[0] <= high[0]; ++k) {
+        charts->centre[k] = 0.5 * (low[k] + high[k]);
+        charts->info.bounds_min[k] = low[k];
+        charts->info.bounds_max[k] = high[k];
     }
 }
 
@@ -217,7 +219,7 @@ static vsh_result make(const vsh_mesh *meshes, size_t mesh_count, const vsh_ligh
     VSHI_TRY_DONE(vshi_mesh_set_create(meshes, mesh_count, &set, error));
     VSHI_TRY_DONE(vshi_charts_create(meshes, mesh_count, raster, run, job, reports, sorted, error));
     VSHI_TRY_DONE(find_sheets(charts, &set, job, run, error));
-    find_centre(charts);
+    find_bounds(charts);
     const size_t tiles = vshi_charts_tiles(sorted);
     VSHI_TRY_DONE(vshi_allocate((void **)&charts->samples, tiles, sizeof *charts->samples, "texels", error));
     charts->info.bytes =

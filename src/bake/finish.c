@@ -1,8 +1,7 @@
 /* Finishes a page whose tiles are all traced: AO between texels, fills, padding, statistics. */
-#include "bake/nearest_valid.h"
+#include "bake/padding.h"
 #include "bake/page.h"
 #include "bake/planes.h"
-#include "bake/pull_push.h"
 #include "base/try.h"
 
 #include <math.h>

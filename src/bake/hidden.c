@@ -2,7 +2,7 @@
  * value, and no one sees them. But lines of their borders show through where surfaces meet, and smaller
  * levels of the image have a part of them. So each texel takes the value of the texel that is nearest in the
  * world, of those at the edges of what is seen. */
-#include "bake/nearest_valid.h"
+#include "bake/padding.h"
 #include "bake/page.h"
 #include "bake/places.h"
 #include "bake/planes.h"
@@ -82,25 +82,15 @@ static void read_tiles(void *user, size_t begin, size_t end) {
     }
 }
 
-/* Where the first samples of texels are that have a place. */
-static vsh_result place_tile(const hiding *h, size_t number, vshi_tile *tile, vshi_samples *samples) {
-    const vsh_charts *charts = h->charts;
-    const size_t n = (size_t)charts->sorted.raster.supersample;
-    VSHI_TRY(vshi_tile_open(&charts->sorted, number, tile, NULL));
-    VSHI_TRY(vshi_samples_allocate(samples, (size_t)VSHI_TILE * VSHI_CELL * n * n, charts->tangents, NULL));
-    vshi_sample_writer writer = {.charts = charts, .tile = tile, .samples = samples};
-    for (int32_t row = 0; row < VSHI_TILE_CELLS; ++row) {
-        samples->count = 0;
-        vshi_samples_write_rows(&writer, tile, row, row + 1);
-        for (size_t i = samples->count; i-- > 0;) {
-            const uint32_t place = h->mesh[vsh_texel_place(samples->texel[i], (int32_t)h->width)];
-            for (size_t k = 0; place > 0 && k < 3; ++k) {
-                h->at[3 * (size_t)(place - 1) + k] =
-                    (float)(samples->position[3 * i + k] - charts->centre[k]);
-            }
+/* Notes where the first samples of texels are that have a place. */
+static void note_places(void *user, const vshi_samples *samples) {
+    const hiding *h = user;
+    for (size_t i = samples->count; i-- > 0;) {
+        const uint32_t place = h->mesh[vsh_texel_place(samples->texel[i], (int32_t)h->width)];
+        for (size_t k = 0; place > 0 && k < 3; ++k) {
+            h->at[3 * (size_t)(place - 1) + k] = (float)(samples->position[3 * i + k] - h->charts->centre[k]);
         }
     }
-    return VSH_OK;
 }
 
 static bool has_places(const hiding *h, size_t number) {
@@ -119,14 +109,11 @@ static bool has_places(const hiding *h, size_t number) {
 static void place_tiles(void *user, size_t begin, size_t end) {
     hiding *h = user;
     for (size_t number = begin; number < end; ++number) {
-        vshi_tile tile = {.count = 0};
-        vshi_samples samples = {.count = 0};
-        const vsh_result result = has_places(h, number) ? place_tile(h, number, &tile, &samples) : VSH_OK;
+        const vsh_result result =
+            has_places(h, number) ? vshi_tile_visit(h->charts, number, false, note_places, h, NULL) : VSH_OK;
         if (result != VSH_OK) {
             atomic_store(&h->result, result);
         }
-        vshi_samples_free(&samples);
-        vshi_tile_close(&tile);
     }
 }
 

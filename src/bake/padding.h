@@ -1,4 +1,6 @@
-/* Texels without a value of their own take their nearest neighbour's. */
+/* Texels without a value of their own: invalid ones take that of the nearest valid texel of their chart,
+ * those around charts that of the nearest valid texel, and all others means, so that no mip level reads
+ * background. */
 #ifndef VSHI_BAKE_PADDING_H
 #define VSHI_BAKE_PADDING_H
 
@@ -25,7 +27,7 @@ typedef struct vshi_plane {
     size_t channels;
 } vshi_plane;
 
-/* Invalid texels of charts that have nothing to give (see bake/nearest_valid.h) are filled at least this far,
+/* Invalid texels of charts that have nothing to give are filled at least this far,
  * texels, since filtering reads across them. */
 enum { VSHI_LEAST_INVALID_RADIUS = 8 };
 
@@ -36,5 +38,33 @@ enum { VSHI_LEAST_INVALID_RADIUS = 8 };
 vsh_result vshi_padding_fill(vshi_store *store, const vsh_run *run, int32_t width, int32_t height,
                              const uint8_t *state, const int32_t radius[VSHI_TEXEL_KINDS],
                              const vshi_plane *planes, size_t plane_count, uint8_t *filled, vsh_error *error);
+
+/* Reach in texels along the chart: six levels of a mip map. */
+enum { VSHI_SPREAD_REACH = 64 };
+
+typedef struct vshi_spread {
+    size_t count;
+    uint32_t *texel;  /* [count]: places of invalid texels */
+    uint32_t *source; /* [count]: the valid texel that each takes its value from */
+} vshi_spread;
+
+/* Finds them: over texels of the same mesh that touch, at edges or corners, at most VSHI_SPREAD_REACH steps.
+ * `mesh` and `state`, VSHI_TEXEL_…, are [height][width], 2^32 - 3 texels at most. Takes 4 bytes a texel
+ * meanwhile. Free with vshi_spread_free(). Errors: as vshi_store_take(), which leave what was taken to the
+ * store. */
+vsh_result vshi_spread_find(vshi_store *store, size_t width, size_t height, const uint32_t *mesh,
+                            const uint8_t *state, vshi_spread *spread, vsh_error *error);
+void vshi_spread_free(vshi_store *store, vshi_spread *spread);
+
+/* Copies the values, and says so in the state, where the source has one. */
+void vshi_spread_copy(const vshi_spread *spread, uint8_t *state, const vshi_plane *planes,
+                      size_t plane_count);
+
+/* Gives every texel whose `filled` is 0 the mean of the texels that hold a value among the 2, 4, 8 … on a
+ * side that it is one of in the first mip level where there are any: a mip level that is made of means of 2 ×
+ * 2 texels holds the means of values alone. Planes where no texel holds a value are left. Errors:
+ * as vshi_store_take(); VSH_ERROR_CANCELLED. */
+vsh_result vshi_pull_push(vshi_store *store, const vsh_run *run, int32_t width, int32_t height,
+                          uint8_t *filled, const vshi_plane *planes, size_t plane_count, vsh_error *error);
 
 #endif

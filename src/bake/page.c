@@ -134,36 +134,20 @@ void vshi_page_note(vshi_page *page, const vshi_samples *samples, size_t i) {
     }
 }
 
-/* Of texels with a level where AO is shared, what vshi_trace_tiles() sets. */
-static void note_sample(vshi_page *page, const vshi_samples *samples, size_t i) {
-    const size_t place = vshi_page_place(page, samples->texel[i]);
-    page->mesh[place] = vshi_sample_mesh(samples, i) + 1;
-    const bool shot = (page->ao.level != NULL && page->ao.level[place] != 0) ||
-                      (page->sky.level != NULL && page->sky.level[place] != 0);
-    if (shot) {
-        vshi_page_note(page, samples, i);
+/* Sets what vshi_trace_tiles() sets: the meshes of texels, and of those that shot rays of shared AO places
+ * and normals. A texel is its first sample's. */
+static void note_samples(void *user, const vshi_samples *samples) {
+    vshi_page *page = user;
+    for (size_t i = samples->count; i-- > 0;) {
+        const size_t place = vshi_page_place(page, samples->texel[i]);
+        page->mesh[place] = vshi_sample_mesh(samples, i) + 1;
+        if ((page->ao.level != NULL && page->ao.level[place] != 0) ||
+            (page->sky.level != NULL && page->sky.level[place] != 0)) {
+            vshi_page_note(page, samples, i);
+        }
     }
 }
 
 vsh_result vshi_page_rasterize(vshi_page *page, size_t number, vsh_error *error) {
-    const vsh_charts *charts = page->charts;
-    const size_t n = (size_t)charts->sorted.raster.supersample;
-    vshi_tile tile;
-    vshi_samples samples = {.count = 0};
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_tile_open(&charts->sorted, number, &tile, error));
-    VSHI_TRY_DONE(
-        vshi_samples_allocate(&samples, (size_t)VSHI_TILE * VSHI_CELL * n * n, charts->tangents, error));
-    vshi_sample_writer writer = {.charts = charts, .tile = &tile, .samples = &samples};
-    for (int32_t row = 0; row < VSHI_TILE_CELLS; ++row) {
-        samples.count = 0;
-        vshi_samples_write_rows(&writer, &tile, row, row + 1);
-        for (size_t i = samples.count; i > 0; --i) { /* a texel is its first sample's */
-            note_sample(page, &samples, i - 1);
-        }
-    }
-done:
-    vshi_samples_free(&samples);
-    vshi_tile_close(&tile);
-    return result;
+    return vshi_tile_visit(page->charts, number, page->charts->tangents, note_samples, page, error);
 }

@@ -322,3 +322,23 @@ void vshi_samples_write_frame(vshi_sample_writer *w, vshi_tile *tile) {
         }
     }
 }
+
+vsh_result vshi_tile_visit(const vsh_charts *charts, size_t number, bool tangents, vshi_samples_fn *visit,
+                           void *user, vsh_error *error) {
+    const size_t n = (size_t)charts->sorted.raster.supersample;
+    vshi_tile tile;
+    vshi_samples samples = {.count = 0};
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_tile_open(&charts->sorted, number, &tile, error));
+    VSHI_TRY_DONE(vshi_samples_allocate(&samples, (size_t)VSHI_TILE * VSHI_CELL * n * n, tangents, error));
+    vshi_sample_writer writer = {.charts = charts, .tile = &tile, .samples = &samples};
+    for (int32_t row = 0; row < VSHI_TILE_CELLS; ++row) {
+        samples.count = 0;
+        vshi_samples_write_rows(&writer, &tile, row, row + 1);
+        visit(user, &samples);
+    }
+done:
+    vshi_samples_free(&samples);
+    vshi_tile_close(&tile);
+    return result;
+}

@@ -109,4 +109,10 @@ void vshi_samples_write_rows(vshi_sample_writer *writer, vshi_tile *tile, int32_
 /* Appends those of the texels that touch the tile from outside. */
 void vshi_samples_write_frame(vshi_sample_writer *writer, vshi_tile *tile);
 
+/* Rasterises tile `number` and calls visit() with its samples, one row of cells after the other. Errors:
+ * VSH_ERROR_MEMORY. */
+typedef void vshi_samples_fn(void *user, const vshi_samples *samples);
+vsh_result vshi_tile_visit(const vsh_charts *charts, size_t number, bool tangents, vshi_samples_fn *visit,
+                           void *user, vsh_error *error);
+
 #endif

@@ -219,36 +219,7 @@ vsh_result vsh_receiver_charts(const vsh_scene *scene, size_t index, const vsh_m
     return create_charts(scene, &target, true, &full, charts, error);
 }
 
-/* Samples of all lightmaps; an upper bound for those after `counted`, whose charts are not counted yet. */
-static double count_points(const vshi_scene_bake *bake, size_t counted) {
-    double points = 0.0;
-    for (size_t i = 0; i < bake->targets.count; ++i) {
-        const vsh_receiver *receiver = &bake->targets.list[i].receiver;
-        const double texels = (double)receiver->width * receiver->height;
-        points += i < counted ? (double)bake->lightmaps[i].samples
-                              : texels * receiver->supersample * receiver->supersample;
-    }
-    return points;
-}
-
-/* Whether a field may be made, whose reach depends on where the samples are. A field is made if enough points
- * gain by it; so if none is made for more points, none is made for these. */
-static bool may_make_field(const vshi_scene_bake *bake, double points) {
-    const vsh_scene *scene = &bake->scene;
-    bool may = vsh_scene_resolution(scene, bake->assets, NULL, points) != 0;
-    for (size_t i = 0; i < scene->layer_count; ++i) {
-        may = may || vsh_scene_resolution(scene, bake->assets, &scene->layers[i], points) != 0;
-    }
-    for (size_t i = 0; i < scene->caster_count; ++i) { /* casters without triangles need one */
-        size_t count = 0;
-        vsh_assets_caster(bake->assets, i, &count);
-        may = may || count == 0;
-    }
-    return may;
-}
-
-static vsh_result count_lightmap(vshi_scene_bake *bake, size_t index, bool warns, bool merges,
-                                 vsh_error *error) {
+static vsh_result count_lightmap(vshi_scene_bake *bake, size_t index, bool warns, vsh_error *error) {
     vsh_scene_lightmap *lightmap = &bake->lightmaps[index];
     VSHI_TRY(create_charts(&bake->scene, &bake->targets.list[index], warns, &bake->run, &bake->charts[index],
                            error));
@@ -257,19 +228,14 @@ static vsh_result count_lightmap(vshi_scene_bake *bake, size_t index, bool warns
     lightmap->covered = info.covered;
     lightmap->samples = info.samples;
     bake->report.samples += info.samples;
-    if (merges || info.samples == 0 || !may_make_field(bake, count_points(bake, index + 1))) {
-        return VSH_OK;
-    }
-    double low[3], high[3];
-    VSHI_TRY(vsh_charts_bounds(bake->charts[index], &bake->run, low, high, error));
-    for (int axis = 0; axis < 3; ++axis) {
-        bake->receivers[0][axis] = fmin(bake->receivers[0][axis], low[axis]);
-        bake->receivers[1][axis] = fmax(bake->receivers[1][axis], high[axis]);
+    for (int axis = 0; axis < 3 && info.samples > 0; ++axis) {
+        bake->receivers[0][axis] = fmin(bake->receivers[0][axis], info.bounds_min[axis]);
+        bake->receivers[1][axis] = fmax(bake->receivers[1][axis], info.bounds_max[axis]);
     }
     return VSH_OK;
 }
 
-static vsh_result count_lightmaps(vshi_scene_bake *bake, bool warns, bool merges, vsh_error *error) {
+static vsh_result count_lightmaps(vshi_scene_bake *bake, bool warns, vsh_error *error) {
     const double start = vshi_seconds();
     for (int axis = 0; axis < 3; ++axis) {
         bake->receivers[0][axis] = INFINITY;
@@ -278,7 +244,7 @@ static vsh_result count_lightmaps(vshi_scene_bake *bake, bool warns, bool merges
     VSHI_TRY(vshi_allocate((void **)&bake->charts, bake->targets.count + 1, sizeof *bake->charts, "lightmaps",
                            error));
     for (size_t i = 0; i < bake->targets.count; ++i) {
-        VSHI_TRY(count_lightmap(bake, i, warns, merges, error));
+        VSHI_TRY(count_lightmap(bake, i, warns, error));
     }
     bake->report.bake_s += vshi_seconds() - start;
     return VSH_OK;
@@ -290,7 +256,7 @@ static vsh_scene_occluders_options choose_occluders(const vshi_scene_bake *bake)
     vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
     options.receivers_min = bake->receivers[0];
     options.receivers_max = bake->receivers[1];
-    options.points = count_points(bake, bake->targets.count);
+    options.points = (double)bake->report.samples;
     return options;
 }
 
@@ -362,7 +328,7 @@ vsh_result vsh_bake_scene(const vsh_scene *scene, const vsh_bake_options *option
     vshi_scene_bake bake;
     vsh_result result;
     VSHI_TRY_DONE(load(&bake, scene, options, run, false, error));
-    VSHI_TRY_DONE(count_lightmaps(&bake, bake.options.shard <= 1, false, error)); /* one shard warns of UVs */
+    VSHI_TRY_DONE(count_lightmaps(&bake, bake.options.shard <= 1, error)); /* one shard warns of UVs */
     VSHI_TRY_DONE(make_occluders(&bake, error));
     VSHI_TRY_DONE(bake.options.shard > 0 ? vshi_bake_part(&bake, error) : vshi_bake_pages(&bake, error));
     fill_report(&bake, report);
@@ -379,7 +345,7 @@ vsh_result vsh_merge_scene(const vsh_scene *scene, const vsh_bake_options *optio
     vsh_result result;
     VSHI_TRY_DONE(load(&bake, scene, options, run, false, error));
     VSHI_TRY_DONE(vshi_parts_find(&bake, &count, error)); /* before what takes a while */
-    VSHI_TRY_DONE(count_lightmaps(&bake, false, true, error));
+    VSHI_TRY_DONE(count_lightmaps(&bake, false, error));
     VSHI_TRY_DONE(vshi_parts_open(&bake, count, error));
     VSHI_TRY_DONE(vshi_bake_pages(&bake, error));
     fill_report(&bake, report);
@@ -458,7 +424,7 @@ vsh_result vsh_forecast_scene(const vsh_scene *scene, const vsh_bake_options *op
     vsh_bake_forecast f = {.lightmap_count = 0};
     vsh_result result;
     VSHI_TRY_DONE(load(&bake, scene, options, run, true, error));
-    VSHI_TRY_DONE(count_lightmaps(&bake, false, false, error));
+    VSHI_TRY_DONE(count_lightmaps(&bake, false, error));
     VSHI_TRY_DONE(try_few_voxels(&bake, &f, error));
     f.lightmap_count = bake.targets.count;
     f.samples = bake.report.samples;

@@ -75,37 +75,6 @@ void vshi_surface_at(const vshi_surface *surface, const double weight[3], vshi_v
     *normal = unit;
 }
 
-/* A corner's plane lifts by b (1 - b) times how far the others are below it at most, b being its weight. */
-bool vshi_surface_is_within(const vsh_mesh *mesh, size_t triangle, const double low[3],
-                            const double high[3]) {
-    static const double ROUNDING = 1e-9; /* of the coordinates */
-    vshi_surface s;
-    if (!vshi_surface_set(mesh, triangle, &s)) {
-        return false;
-    }
-    vshi_vec less = {0.0, 0.0, 0.0}, more = less;
-    for (int k = 0; k < 3; ++k) {
-        const vshi_vec n = s.normal[k];
-        const double below = fmin(vshi_dot(vshi_sub(s.corner[(k + 1) % 3], s.corner[k]), n),
-                                  vshi_dot(vshi_sub(s.corner[(k + 2) % 3], s.corner[k]), n));
-        const double lift = s.smooth && s.lifts[k] && below < 0.0 ? -0.25 * below : 0.0;
-        less = vshi_add(less, vshi_vec_of((double[]){fmin(lift * n.x, 0.0), fmin(lift * n.y, 0.0),
-                                                     fmin(lift * n.z, 0.0)}));
-        more = vshi_add(more, vshi_vec_of((double[]){fmax(lift * n.x, 0.0), fmax(lift * n.y, 0.0),
-                                                     fmax(lift * n.z, 0.0)}));
-    }
-    bool within = true;
-    for (int k = 0; k < 3; ++k) {
-        const vshi_vec least = vshi_add(s.corner[k], less), most = vshi_add(s.corner[k], more);
-        const double from[3] = {least.x, least.y, least.z}, to[3] = {most.x, most.y, most.z};
-        for (int axis = 0; axis < 3; ++axis) {
-            within = within && from[axis] - ROUNDING * fabs(from[axis]) > low[axis] &&
-                     to[axis] + ROUNDING * fabs(to[axis]) < high[axis];
-        }
-    }
-    return within;
-}
-
 vshi_vec vshi_surface_tangent(const vsh_mesh *mesh, size_t triangle, double *handedness) {
     vshi_vec corner[3];
     uint32_t vertex[3];

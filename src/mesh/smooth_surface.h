@@ -24,9 +24,6 @@ bool vshi_surface_set(const vsh_mesh *mesh, size_t triangle, vshi_surface *surfa
 void vshi_surface_at(const vshi_surface *surface, const double weight[3], vshi_vec *position,
                      vshi_vec *normal, vshi_vec *lift);
 
-/* Whether all samples of a triangle lie within a box, as far as its corners and their normals tell. */
-bool vshi_surface_is_within(const vsh_mesh *mesh, size_t triangle, const double low[3], const double high[3]);
-
 /* The direction in which a triangle's u grows, unit, and 1 or -1: the side of normal × tangent on which v
  * grows. A zero vector where the UVs have no area. */
 vshi_vec vshi_surface_tangent(const vsh_mesh *mesh, size_t triangle, double *handedness);

@@ -53,8 +53,6 @@ vsh_result bake_lightmap(const vsh_run *run, vsh_error *error) {
     TRY(vsh_bake_lightmap(occluders, charts, lights, 2, &adaptive, run, &some, NULL, error));
     options.supersample = 2;
     MAKE(fine, vsh_charts_create(&mesh, 1, &options, run, NULL, &fine, error));
-    double box[6];
-    TRY(vsh_charts_bounds(fine, run, box, box + 3, error));
     vsh_stitch_options creases = vsh_stitch_options_default();
     creases.max_angle = 180.0; /* a box has no other seams */
     TRY(vsh_lightmap_stitch(fine, &all, 2, &creases, run, NULL, error));

@@ -116,7 +116,7 @@ class Reach(Case):
         v.trace_shadow(positions, normals, lamp, triangles=triangles), v.trace_ao(positions, normals, 1.0, solids=solids)
         # lightmaps
         charts = v.Charts(floor(), width=16, height=16)
-        charts.info, charts.bounds(), charts.texels().samples, v.charts_closeness(floor(), 16, 16)
+        charts.info, charts.texels().samples, v.charts_closeness(floor(), 16, 16)
         lightmap = v.bake_lightmap(occluders, charts, lamp, ao=True)
         v.lightmap_stitch(charts, lightmap)
         lightmap.write(here / "a.exr")

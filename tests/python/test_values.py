@@ -133,11 +133,6 @@ class Values(Case):
         backwards = query.points(positions[::-1], normals[::-1])["shadow"]
         self.assertSame(numpy.ascontiguousarray(backwards[:, ::-1]), want["shadow"])
 
-    def test_bounds_of_charts_are_those_of_their_samples(self):
-        charts = vdbshade.Charts(floor(), width=64, height=64)
-        positions = charts.texels().samples["positions"]
-        self.assertEqual(charts.bounds(), (tuple(positions.min(0)), tuple(positions.max(0))))
-
     def test_threads_that_call_at_once_get_the_same(self):
         query = vdbshade.Query(vdbshade.Occluders(box(), resolution=64), sun(), method="cone")
         positions, normals = points_on_floor(20000)

@@ -232,13 +232,11 @@ TEST(nothing_is_baked_without_what_it_takes) {
     vsh_flat_options plane = vsh_flat_options_default();
     plane.width = plane.height = SIDE;
     float values[COUNT];
-    double bounds[3];
     const vsh_mesh mesh = {.name = "none", .vertex_count = 3, .triangle_count = 1};
     assert_int_equal(vsh_voxels_from_box(low, high, 0.5, NULL, &voxels, &error), VSH_OK);
     assert_int_equal(vsh_bake_volume(casters, voxels, &light, 1, NULL, NULL, &volume, NULL, &error), VSH_OK);
     MAKES_NONE(vsh_charts_create(NULL, 1, NULL, NULL, NULL, PLACE, &error));
     REFUSED(vsh_charts_create(&mesh, 1, NULL, NULL, NULL, NULL, &error));
-    REFUSED(vsh_charts_bounds(NULL, NULL, bounds, bounds, &error));
     MAKES_NONE(vsh_texels_create(NULL, NULL, PLACE, &error));
     REFUSED(vsh_bake_lightmap(casters, NULL, &light, 1, NULL, NULL, &lightmap, NULL, &error));
     REFUSED(vsh_bake_lightmap(NULL, NULL, &light, 1, NULL, NULL, &lightmap, NULL, &error));

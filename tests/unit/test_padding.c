@@ -2,7 +2,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bake/nearest_valid.h"
 #include "bake/padding.h"
 #include "testing.h"
 #include <stdbool.h>

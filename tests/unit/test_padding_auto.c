@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bake/pull_push.h"
+#include "bake/padding.h"
 #include "lightmaps.h"
 #include "testing.h"
 

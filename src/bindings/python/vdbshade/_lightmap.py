@@ -84,12 +84,6 @@ class Charts(Handle):
     def info(self) -> types.ChartsInfo:
         return info(lib.vsh_charts_get_info, "vsh_charts_info", self.handle)
 
-    def bounds(self, *, run: Optional[Run] = None) -> Tuple[Tuple[float, ...], Tuple[float, ...]]:
-        """World box of all samples."""
-        low, high = ffi.new("double[3]"), ffi.new("double[3]")
-        call(lib.vsh_charts_bounds, self.handle, RUN, low, high, run=run)
-        return tuple(low), tuple(high)
-
     def texels(self, *, run: Optional[Run] = None) -> Texels:
         """Where each texel lies in the world."""
         return Texels(make(lib.vsh_texels_free, lib.vsh_texels_create, self.handle, RUN, place("vsh_texels"), run=run))
