@@ -200,27 +200,6 @@ size_t vshi_solidity_mesh_count(const vshi_solidity *s) {
     return s->mesh_count;
 }
 
-vsh_result vshi_solidity_weld(const vshi_solidity *s, const vsh_mesh *meshes, size_t mesh, uint32_t *weld,
-                              vsh_error *error) {
-    const size_t w = whole_of(s, mesh), count = meshes[mesh].vertex_count;
-    const uint32_t *of_whole = s->found[w].weld; /* NULL where it has no triangles */
-    uint32_t begin = 0;
-    for (size_t m = s->wholes.first[w]; m < mesh; ++m) {
-        begin += (uint32_t)meshes[m].vertex_count;
-    }
-    uint32_t *lowest = NULL; /* of this mesh, at the place of a vertex of the meshes before; 0: none */
-    VSHI_TRY(vshi_allocate((void **)&lowest, begin, sizeof *lowest, "welded vertices", error));
-    for (size_t v = 0; v < count; ++v) {
-        const uint32_t at = of_whole != NULL ? of_whole[begin + v] : begin + (uint32_t)v;
-        if (at < begin && lowest[at] == 0) {
-            lowest[at] = begin + (uint32_t)v;
-        }
-        weld[v] = (at < begin ? lowest[at] : at) - begin;
-    }
-    free(lowest);
-    return VSH_OK;
-}
-
 const uint8_t *vshi_solidity_sides(const vshi_solidity *s, size_t mesh) {
     return s->sides + s->first_side[mesh];
 }

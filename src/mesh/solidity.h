@@ -91,11 +91,6 @@ const uint8_t *vshi_solidity_holed(const vshi_solidity *solidity, size_t mesh);
 /* The number of meshes that were looked at. */
 size_t vshi_solidity_mesh_count(const vshi_solidity *solidity);
 
-/* weld[v] = the lowest vertex of one of the meshes at the very position of v, as was found for its whole.
- * Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_solidity_weld(const vshi_solidity *solidity, const vsh_mesh *meshes, size_t mesh,
-                              uint32_t *weld, vsh_error *error);
-
 /* The objects, put together from the meshes. */
 VSHI_SHARED const vshi_wholes *vshi_solidity_wholes(const vshi_solidity *solidity);
 

@@ -10,22 +10,15 @@
  * neighbours are clear of the surface. */
 #include "shade/shadow.h"
 
-#include "trace/embree.h"
-
 #include <math.h>
 
 enum { SIZES = 3, SMALLEST = 4 };
-static const struct {
-    size_t points;
-    int triangles; /* to look at for whether they cut its beam */
-} SIZE[SIZES] = {{64, 96}, {16, 32}, {SMALLEST, 12}};
+static const size_t SIZE[SIZES] = {64, 16, SMALLEST}; /* points of a block */
 
 /* Beams that are wider than this at their points hold too much for anything to be proved, voxels. */
 static const double WIDEST = 24.0;
 /* Cones that are left this long are worth a look at smaller blocks, voxels. */
 static const double SHORT = 48.0;
-/* What is so near to a block's points may be their own surface, voxels: no triangles are looked at for it. */
-static const double NEAR = 8.0;
 /* Radius of the ball above a point, voxels: as much as the finest level's band holds. What it may lack of the
  * height of its centre, so that its rays enter it by then. */
 static const double NEAR_HEIGHT = 1.95, NEAR_LACK = 0.05;
@@ -92,7 +85,6 @@ typedef struct block {
     double distance; /* to a lamp's middle; of suns 0 */
     double ends;     /* of one march a point: where the first of the cones ends, along the beam */
     double tilt;     /* sine of the most that an axis of its cones is off the beam's */
-    bool near;       /* what is open of it is about its points */
 } block;
 
 static inline double least(double a, double b) {
@@ -255,44 +247,6 @@ static void hide(const vshi_shadow_task *task, vshi_facing *facing, const block 
     stats->certified += b->count;
 }
 
-/* Hides the blocks whose beams are cut by triangles. */
-static void hide_cut(const vshi_shadow_task *task, vshi_facing *facing, const block *blocks, size_t count,
-                     int triangles, vsh_shade_stats *stats) {
-    vshi_sheet_beam beams[VSHI_PIECE / SMALLEST];
-    bool cut[VSHI_PIECE / SMALLEST];
-    size_t number[VSHI_PIECE / SMALLEST], tried = 0;
-    const vsh_field *field = task->field;
-    for (size_t i = 0; i < count; ++i) {
-        const block *b = &blocks[i];
-        if (b->near) {
-            continue;
-        }
-        const bool parallel = task->place.parallel;
-        const double wide = (b->beam.wide + below(task)) * field->voxel_size;
-        vshi_sheet_beam *beam = &beams[tried];
-        *beam = (vshi_sheet_beam){.origin = vshi_to_world(field, b->beam.origin),
-                                  .axis = vshi_direction_to_world(field, b->beam.direction),
-                                  .wide = wide,
-                                  .tangent = b->beam.sine / sqrt(1.0 - b->beam.sine * b->beam.sine),
-                                  .end = INFINITY};
-        if (!parallel) {
-            const double radius = task->world.radius;
-            const double distance = vshi_length(vshi_sub(task->world.centre, beam->origin));
-            beam->end = distance - radius;
-            beam->tangent = (radius + wide) / beam->end;
-        }
-        if (beam->end > 4.0 * wide) {
-            number[tried++] = i;
-        }
-    }
-    vshi_triangles_cut(task->triangles, beams, tried, triangles, cut);
-    for (size_t t = 0; t < tried; ++t) {
-        if (cut[t]) {
-            hide(task, facing, &blocks[number[t]], stats);
-        }
-    }
-}
-
 /* Whether every cone of a block comes to a solid ball around its beam's `t` before it ends. */
 static bool is_met(const vshi_shadow_task *task, const block *b, double t) {
     const double beyond = DEEPER * fmax(1.0, b->beam.sine * t);
@@ -305,7 +259,7 @@ static bool is_met(const vshi_shadow_task *task, const block *b, double t) {
 
 static void prove_size(const vshi_shadow_task *task, vshi_facing *facing, int s, vshi_chunk *chunk,
                        vsh_shade_stats *stats) {
-    const size_t size = SIZE[s].points;
+    const size_t size = SIZE[s];
     block blocks[VSHI_PIECE / SMALLEST];
     size_t count = 0;
     vshi_chunk_clear(chunk);
@@ -329,18 +283,13 @@ static void prove_size(const vshi_shadow_task *task, vshi_facing *facing, int s,
         if (chunk->rays.proof[r] == VSHI_PROVED_FULL) {
             if (!task->leaky && is_met(task, b, clear)) {
                 hide(task, facing, b, stats);
-                b->near = true;
             }
         } else if (clear < (double)chunk->rays.end[r]) {
             shorten(task, facing, b, clear > (double)chunk->rays.begin[r] ? clear : b->beam.begin);
-            b->near = clear < b->beam.begin + NEAR + 3.0 * b->beam.wide;
         }
         for (size_t i = b->first; i < b->first + b->count; ++i) {
             facing->gathered[i] = true;
         }
-    }
-    if (task->options->method == VSH_SHADOW_EXACT) {
-        hide_cut(task, facing, blocks, count, SIZE[s].triangles, stats);
     }
 }
 
@@ -366,7 +315,7 @@ static void keep_open(vshi_facing *facing) {
 void vshi_blocks_prove(const vshi_shadow_task *task, vshi_facing *facing, vshi_chunk *chunk,
                        vsh_shade_stats *stats) {
     for (int s = 0; s < SIZES; ++s) {
-        if (2 * facing->count > SIZE[s].points) {
+        if (2 * facing->count > SIZE[s]) {
             prove_size(task, facing, s, chunk, stats);
             keep_open(facing);
         }

@@ -155,22 +155,39 @@ static vsh_result make_reliefs(vsh_triangles *triangles, const vshi_mesh_set *se
     return VSH_OK;
 }
 
-/* Vertices and triangles of a mesh in the sheet: of a terrain those of its sides and bottom. */
-static size_t sheet_vertices(const vsh_triangles *triangles, const vsh_mesh *mesh, size_t m) {
+/* Vertices and triangles of a mesh's geometry: of a terrain those of its sides and bottom. */
+static size_t count_vertices(const vsh_triangles *triangles, const vsh_mesh *mesh, size_t m) {
     const vshi_terrain_part *part = terrain_of(triangles, m);
     return part == NULL ? mesh->vertex_count : 2 * vshi_terrain_edge_length(part->grid) + 1;
 }
 
-static size_t sheet_triangles(const vsh_triangles *triangles, const vshi_mesh_set *set, size_t m) {
+static size_t count_triangles(const vsh_triangles *triangles, const vshi_mesh_set *set, size_t m) {
     const vshi_terrain_part *part = terrain_of(triangles, m);
     return part != NULL ? 3 * vshi_terrain_edge_length(part->grid)
                         : set->meshes[m].triangle_count - set->checked[m].report.degenerate_triangles;
 }
 
-/* The sides and the bottom of a terrain, from these vertices and triangles of the sheet on. */
-static void put_sides(vsh_triangles *triangles, const vsh_mesh *mesh, vshi_terrain grid, size_t vertex,
-                      size_t triangle) {
-    vshi_sheet *sheet = &triangles->sheet;
+/* Numbers the triangles of all geometries. */
+static vsh_result number_triangles(vsh_triangles *triangles, const vshi_mesh_set *set, vsh_error *error) {
+    size_t count = 0;
+    VSHI_TRY(vshi_allocate((void **)&triangles->first, set->count, sizeof(uint32_t), "triangles", error));
+    for (size_t m = 0; m < set->count; ++m) {
+        const size_t vertices = count_vertices(triangles, &set->meshes[m], m);
+        triangles->first[m] = (uint32_t)count;
+        count += count_triangles(triangles, set, m);
+        if (vertices > UINT32_MAX || count > UINT32_MAX) {
+            return vshi_fail(error, VSH_ERROR_LIMIT,
+                             "triangles: %zu vertices of a mesh and %zu triangles, at most %u of each",
+                             vertices, count, UINT32_MAX);
+        }
+    }
+    triangles->count = count;
+    return vshi_allocate((void **)&triangles->solid, count, 1, "triangles", error);
+}
+
+/* Writes the sides and the bottom of a terrain. */
+static void write_sides(vsh_triangles *triangles, const vsh_mesh *mesh, vshi_terrain grid, uint8_t *solid,
+                        float *vertices, uint32_t *corners) {
     const size_t edge = vshi_terrain_edge_length(grid), samples = grid.columns * grid.rows;
     const size_t first = 2 * (grid.columns - 1) * (grid.rows - 1);
     const bool mirrored = vshi_transform_determinant(mesh->transform) < 0.0;
@@ -183,85 +200,44 @@ static void put_sides(vsh_triangles *triangles, const vsh_mesh *mesh, vshi_terra
                                  : i % 3 == 0 && k == 1 ? next
                                                         : i / 3;
             const vshi_vec local = vshi_vec_off(mesh->positions + 3 * (size_t)of[k]);
-            put(triangles, vshi_transform_point(mesh->transform, local),
-                sheet->vertices + 3 * (vertex + place));
-            sheet->corners[3 * (triangle + i) + k] = (uint32_t)(vertex + place);
+            put(triangles, vshi_transform_point(mesh->transform, local), vertices + 3 * place);
+            corners[3 * i + k] = (uint32_t)place;
         }
-        triangles->solid[triangle + i] = mirrored ? VSHI_SOLID_BEFORE : VSHI_SOLID_BEHIND;
+        solid[i] = mirrored ? VSHI_SOLID_BEFORE : VSHI_SOLID_BEHIND;
     }
     triangles->has_solids = true;
 }
 
-/* The sheet of all meshes: their vertices, welded, and the triangles that are not degenerate. */
-static vsh_result make_sheet(vsh_triangles *triangles, const vshi_mesh_set *set, vsh_error *error) {
-    const vsh_mesh *meshes = set->meshes;
-    const size_t mesh_count = set->count;
-    size_t vertex_count = 0, triangle_count = 0, most = 0;
-    for (size_t m = 0; m < mesh_count; ++m) {
-        const size_t vertices = sheet_vertices(triangles, &meshes[m], m);
-        vertex_count += vertices;
-        most = vertices > most ? vertices : most;
-        triangle_count += sheet_triangles(triangles, set, m);
+/* Writes the vertices of a mesh, and its triangles that are not degenerate. */
+static void write_mesh(vsh_triangles *triangles, const vshi_mesh_set *set, size_t m, uint8_t *solid,
+                       float *vertices, uint32_t *corners) {
+    const vsh_mesh *mesh = &set->meshes[m];
+    const uint8_t *sides = vshi_solidity_sides(set->solidity, m);
+    const uint8_t *holed = vshi_solidity_holed(set->solidity, m);
+    for (size_t v = 0; v < mesh->vertex_count; ++v) {
+        const vshi_vec local = vshi_vec_off(mesh->positions + 3 * v);
+        put(triangles, vshi_transform_point(mesh->transform, local), vertices + 3 * v);
     }
-    if (vertex_count > UINT32_MAX || triangle_count > VSHI_SHEET_TRIANGLES) {
-        return vshi_fail(error, VSH_ERROR_LIMIT,
-                         "triangles: %zu vertices and %zu triangles, at most %u and %u", vertex_count,
-                         triangle_count, UINT32_MAX, VSHI_SHEET_TRIANGLES);
-    }
-    vshi_sheet *sheet = &triangles->sheet;
-    uint32_t *weld = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_sheet_allocate(sheet, vertex_count, triangle_count, error));
-    VSHI_TRY_DONE(
-        vshi_allocate((void **)&triangles->first, mesh_count, sizeof(uint32_t), "triangles", error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&weld, most, sizeof *weld, "welded vertices", error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&triangles->solid, triangle_count, 1, "triangles", error));
-    size_t vertex = 0, triangle = 0;
-    for (size_t m = 0; m < mesh_count; ++m) {
-        const vsh_mesh *mesh = &meshes[m];
-        const uint8_t *sides = vshi_solidity_sides(set->solidity, m);
-        const uint8_t *holed = vshi_solidity_holed(set->solidity, m);
-        triangles->first[m] = (uint32_t)triangle;
-        const vshi_terrain_part *part = terrain_of(triangles, m);
-        if (part != NULL) {
-            put_sides(triangles, mesh, part->grid, vertex, triangle);
-            vertex += sheet_vertices(triangles, mesh, m);
-            triangle += sheet_triangles(triangles, set, m);
+    for (size_t i = 0; i < mesh->triangle_count; ++i) {
+        if (vshi_mesh_degenerate(mesh, i)) {
             continue;
         }
-        VSHI_TRY_DONE(vshi_solidity_weld(set->solidity, meshes, m, weld, error));
-        for (size_t i = 0; i < mesh->triangle_count; ++i) {
-            if (vshi_mesh_degenerate(mesh, i)) {
-                continue;
-            }
-            for (size_t k = 0; k < 3; ++k) {
-                sheet->corners[3 * triangle + k] = (uint32_t)vertex + weld[mesh->indices[3 * i + k]];
-            }
-            const uint8_t solid = find_solid(mesh, sides, holed, i);
-            triangles->solid[triangle++] = solid;
-            triangles->has_solids = triangles->has_solids || solid != VSHI_AIR_AROUND;
-            triangles->has_holes = triangles->has_holes || (solid & VSHI_SOLID_HOLED) != 0;
-            triangles->has_vessels = triangles->has_vessels || (solid & VSHI_SOLID_VESSEL) != 0;
-        }
-        for (size_t v = 0; v < mesh->vertex_count; ++v) {
-            const vshi_vec local = vshi_vec_off(mesh->positions + 3 * v);
-            put(triangles, vshi_transform_point(mesh->transform, local), sheet->vertices + 3 * vertex++);
-        }
+        memcpy(corners, mesh->indices + 3 * i, 3 * sizeof *corners);
+        corners += 3;
+        *solid = find_solid(mesh, sides, holed, i);
+        triangles->has_solids = triangles->has_solids || *solid != VSHI_AIR_AROUND;
+        triangles->has_holes = triangles->has_holes || (*solid & VSHI_SOLID_HOLED) != 0;
+        triangles->has_vessels = triangles->has_vessels || (*solid & VSHI_SOLID_VESSEL) != 0;
+        ++solid;
     }
-    result = vshi_sheet_join(sheet, error);
-done:
-    free(weld);
-    return result;
 }
 
-/* Geometry `mesh`, with that number; false where Embree refuses: its error says why. */
-static bool attach(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count, size_t mesh,
-                   size_t first_vertex) {
-    const vshi_sheet *sheet = &triangles->sheet;
-    const size_t begin = triangles->first[mesh];
-    const size_t end = mesh + 1 < mesh_count ? triangles->first[mesh + 1] : sheet->triangle_count;
-    const size_t vertex_count = sheet_vertices(triangles, &meshes[mesh], mesh);
-    if (begin == end) {
+/* Geometry `m`, with that number; false where Embree refuses: its error says why. */
+static bool attach(vsh_triangles *triangles, const vshi_mesh_set *set, size_t m) {
+    const vsh_mesh *mesh = &set->meshes[m];
+    const size_t vertex_count = count_vertices(triangles, mesh, m),
+                 count = count_triangles(triangles, set, m);
+    if (count == 0) {
         return true;
     }
     const RTCGeometry geometry =
@@ -271,19 +247,22 @@ static bool attach(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh
     }
     float *vertices = triangles->embree->rtcSetNewGeometryBuffer(
         geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertex_count);
-    uint32_t *indices = triangles->embree->rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), end - begin);
-    vshi_sieve_attach(triangles, mesh, geometry);
-    if (vertices != NULL && indices != NULL) {
-        memcpy(vertices, sheet->vertices + 3 * first_vertex, vertex_count * 3 * sizeof(float));
-        for (size_t i = 0; i < 3 * (end - begin); ++i) {
-            indices[i] = sheet->corners[3 * begin + i] - (uint32_t)first_vertex;
+    uint32_t *corners = triangles->embree->rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), count);
+    if (vertices != NULL && corners != NULL) {
+        uint8_t *solid = triangles->solid + triangles->first[m];
+        const vshi_terrain_part *part = terrain_of(triangles, m);
+        if (part != NULL) {
+            write_sides(triangles, mesh, part->grid, solid, vertices, corners);
+        } else {
+            write_mesh(triangles, set, m, solid, vertices, corners);
         }
+        vshi_sieve_attach(triangles, m, geometry, vertices, corners);
         triangles->embree->rtcCommitGeometry(geometry);
-        triangles->embree->rtcAttachGeometryByID(triangles->scene, geometry, (unsigned)mesh);
+        triangles->embree->rtcAttachGeometryByID(triangles->scene, geometry, (unsigned)m);
     }
     triangles->embree->rtcReleaseGeometry(geometry);
-    return vertices != NULL && indices != NULL;
+    return vertices != NULL && corners != NULL;
 }
 
 static vsh_result refuse(const vsh_triangles *triangles, vshi_job *job, vsh_error *error) {
@@ -351,13 +330,11 @@ static vsh_result finish(vsh_triangles *triangles, vshi_job *job, vsh_error *err
 
 static vsh_result build(vsh_triangles *triangles, const vshi_mesh_set *set, vshi_job *job, vsh_error *error) {
     VSHI_TRY(begin(triangles, job, error));
-    VSHI_TRY(make_sheet(triangles, set, error));
-    size_t vertex = 0;
+    VSHI_TRY(number_triangles(triangles, set, error));
     for (size_t m = 0; m < set->count; ++m) {
-        if (!attach(triangles, set->meshes, set->count, m, vertex)) {
+        if (!attach(triangles, set, m)) {
             return refuse(triangles, job, error);
         }
-        vertex += sheet_vertices(triangles, &set->meshes[m], m);
         if (vshi_job_advance(job, 0)) {
             return vshi_job_fail_cancelled(job, error);
         }
@@ -442,10 +419,10 @@ vsh_result vsh_triangles_create_beside(const vsh_mesh *meshes, size_t mesh_count
     VSHI_TRY_DONE(find_terrains(made, &set, error));
     double bytes = 0.0;
     for (size_t m = 0; m < mesh_count; ++m) {
-        const double vertices = (double)sheet_vertices(made, &set.meshes[m], m);
-        const double faces = (double)sheet_triangles(made, &set, m);
+        const double vertices = (double)count_vertices(made, &set.meshes[m], m);
+        const double faces = (double)count_triangles(made, &set, m);
         const vshi_terrain_part *part = terrain_of(made, m);
-        bytes += 12.0 * vertices + TRIANGLE_BYTES * faces + vshi_sheet_bytes(vertices, faces) +
+        bytes += 12.0 * vertices + TRIANGLE_BYTES * faces +
                  (part != NULL ? SAMPLE_BYTES * (double)meshes[m].vertex_count : 0.0);
     }
     VSHI_TRY_DONE(vshi_check_limit(&full, bytes, "triangles", error));
@@ -489,7 +466,6 @@ void vsh_triangles_free(vsh_triangles *triangles) {
         triangles->embree->rtcReleaseDevice(triangles->device);
     }
     vshi_sieves_free(triangles);
-    vshi_sheet_free(&triangles->sheet);
     for (size_t k = 0; k < triangles->terrain_count; ++k) {
         vshi_relief_free(&triangles->terrains[k].relief);
     }
@@ -501,12 +477,10 @@ void vsh_triangles_free(vsh_triangles *triangles) {
 
 uint64_t vsh_triangles_bytes(const vsh_triangles *triangles) {
     const long long bytes = atomic_load(&triangles->bytes);
-    const vshi_sheet *sheet = &triangles->sheet;
     size_t reliefs = 0;
     for (size_t k = 0; k < triangles->terrain_count; ++k) {
         reliefs += triangles->terrains[k].relief.bytes;
     }
     return sizeof *triangles + triangles->sieve_bytes + reliefs + (bytes > 0 ? (uint64_t)bytes : 0) +
-           sheet->triangle_count +
-           (uint64_t)vshi_sheet_bytes((double)sheet->vertex_count, (double)sheet->triangle_count);
+           triangles->count;
 }

@@ -5,7 +5,6 @@
 #include "base/job.h"
 #include "base/segment.h"
 #include "base/vec.h"
-#include "mesh/sheet.h"
 #include "trace/sampler.h"
 
 #include <math.h>
@@ -100,11 +99,6 @@ bool vshi_triangles_sees(const vsh_triangles *triangles, const double origin[3])
  * best near each other. Thread safe. */
 void vshi_triangles_discs(const vsh_triangles *triangles, const vshi_sampler *sampler, bool domes,
                           const vshi_disc *discs, size_t count, int32_t first, int32_t last, int32_t *lit);
-
-/* Whether every ray of each of `count` beams, in world space, meets a triangle; false also where that cannot
- * be told from `most` triangles that hang together. Thread safe. */
-void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *beams, size_t count, int most,
-                        bool *cut);
 
 /* What a ray meets first that is no sheet: those have air on both sides. */
 enum {

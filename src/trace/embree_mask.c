@@ -9,10 +9,10 @@
 #include <string.h>
 
 /* Rows of N values that rays and hits are made of; Embree has names for them in C++ only. */
-enum { RAY_ORIGIN = 0, RAY_DIRECTION = 4, HIT_TRIANGLE = 5, HIT_MESH = 6 };
+enum { RAY_ORIGIN = 0, RAY_DIRECTION = 4, HIT_TRIANGLE = 5 };
 
-static vshi_vec vertex(const vsh_triangles *triangles, uint32_t number) {
-    return vshi_vec_off(triangles->sheet.vertices + 3 * (size_t)number);
+static vshi_vec vertex(const vshi_sieve *sieve, uint32_t number) {
+    return vshi_vec_off(sieve->vertices + 3 * (size_t)number);
 }
 
 static vshi_vec row(const float *ray, size_t first, size_t n, size_t i) {
@@ -23,13 +23,11 @@ static vshi_vec row(const float *ray, size_t first, size_t n, size_t i) {
 /* Whether a ray passes through a triangle that it meets. By the ray and the triangle alone, in double: where
  * on it Embree's own numbers put the hit depends on how many rays it has traced at once (Möller and Trumbore,
  * "Fast, minimum storage ray-triangle intersection", 1997). */
-static bool passes(const vsh_triangles *triangles, const vshi_sieve *sieve, size_t mesh, uint32_t local,
-                   vshi_vec origin, vshi_vec direction) {
-    const size_t triangle = (size_t)triangles->first[mesh] + local;
-    const uint32_t *corners = triangles->sheet.corners + 3 * triangle;
-    const vshi_vec a = vertex(triangles, corners[0]);
-    const vshi_vec ab = vshi_sub(vertex(triangles, corners[1]), a);
-    const vshi_vec ac = vshi_sub(vertex(triangles, corners[2]), a);
+static bool passes(const vshi_sieve *sieve, uint32_t triangle, vshi_vec origin, vshi_vec direction) {
+    const uint32_t *corners = sieve->corners + 3 * (size_t)triangle;
+    const vshi_vec a = vertex(sieve, corners[0]);
+    const vshi_vec ab = vshi_sub(vertex(sieve, corners[1]), a);
+    const vshi_vec ac = vshi_sub(vertex(sieve, corners[2]), a);
     if (sieve->one_sided) {
         /* the ray goes to where the light is from */
         const double along = vshi_dot(vshi_cross(ab, ac), direction);
@@ -47,14 +45,14 @@ static bool passes(const vsh_triangles *triangles, const vshi_sieve *sieve, size
     }
     const double u = vshi_dot(off, across) / determinant;
     const double v = vshi_dot(direction, vshi_cross(off, ab)) / determinant, w = 1.0 - u - v;
-    const vshi_mask_place *p = sieve->places + 3 * (size_t)local;
+    const vshi_mask_place *p = sieve->places + 3 * (size_t)triangle;
     const vshi_mask_place at = {w * p[0].x + u * p[1].x + v * p[2].x, w * p[0].y + u * p[1].y + v * p[2].y};
     return !vshi_alpha_mask_opaque(&sieve->mask, at);
 }
 
 /* Rays that look for solids have a filter of their own, and meet triangles as they are. */
 static void filter(const struct RTCFilterFunctionNArguments *args) {
-    const vsh_triangles *triangles = args->geometryUserPtr;
+    const vshi_sieve *sieve = args->geometryUserPtr;
     if (args->context->filter != NULL) {
         return;
     }
@@ -65,8 +63,7 @@ static void filter(const struct RTCFilterFunctionNArguments *args) {
         if (args->valid[i] != -1) {
             continue;
         }
-        const unsigned mesh = hit[HIT_MESH * n + i], local = hit[HIT_TRIANGLE * n + i];
-        if (passes(triangles, &triangles->sieves[mesh], mesh, local, row(ray, RAY_ORIGIN, n, i),
+        if (passes(sieve, hit[HIT_TRIANGLE * n + i], row(ray, RAY_ORIGIN, n, i),
                    row(ray, RAY_DIRECTION, n, i))) {
             args->valid[i] = 0;
         }
@@ -153,9 +150,13 @@ void vshi_sieves_free(vsh_triangles *triangles) {
     free(triangles->sieves);
 }
 
-void vshi_sieve_attach(const vsh_triangles *triangles, size_t mesh, RTCGeometry geometry) {
-    if (vshi_sieve_is(triangles, mesh)) {
-        triangles->embree->rtcSetGeometryUserData(geometry, (void *)(uintptr_t)triangles);
+void vshi_sieve_attach(const vsh_triangles *triangles, size_t mesh, RTCGeometry geometry,
+                       const float *vertices, const uint32_t *corners) {
+    vshi_sieve *sieve = triangles->sieves != NULL ? &triangles->sieves[mesh] : NULL;
+    if (sieve != NULL && (sieve->places != NULL || sieve->one_sided)) {
+        sieve->vertices = vertices;
+        sieve->corners = corners;
+        triangles->embree->rtcSetGeometryUserData(geometry, sieve);
         triangles->embree->rtcSetGeometryIntersectFilterFunction(geometry, filter);
         triangles->embree->rtcSetGeometryOccludedFilterFunction(geometry, filter);
     }

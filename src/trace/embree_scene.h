@@ -49,7 +49,7 @@ typedef struct vshi_embree {
 /* Loads Embree once, for as long as the process lives. Errors: VSH_ERROR_UNSUPPORTED (it is not there). */
 vsh_result vshi_embree_load(const vshi_embree **embree, vsh_error *error);
 
-/* Where a triangle's solid lies, as its corners in the sheet turn. */
+/* Where a triangle's solid lies, as its corners turn. */
 enum { VSHI_AIR_AROUND, VSHI_SOLID_BEHIND, VSHI_SOLID_BEFORE, VSHI_SOLID_SIDE = 3 };
 /* Added to it where the solid is closed over holes: rays from inside may leave by them. */
 enum { VSHI_SOLID_HOLED = 4 };
@@ -80,9 +80,9 @@ struct vsh_triangles {
     const vshi_embree *embree;
     RTCDevice device;
     RTCScene scene;
-    vshi_sheet sheet;            /* of all geometries one after the other, in the scene's units */
-    uint32_t *first;             /* triangle of the sheet that each geometry begins with */
-    uint8_t *solid;              /* [of the sheet]: where each one's solid lies */
+    size_t count;                /* triangles of all geometries, numbered one after the other */
+    uint32_t *first;             /* number of each geometry's first triangle */
+    uint8_t *solid;              /* [count]: where each one's solid lies */
     vshi_terrain_part *terrains; /* [terrain_count] */
     size_t terrain_count;
     unsigned first_terrain; /* geometries from here on are the tops of terrains */
@@ -100,7 +100,7 @@ struct vsh_triangles {
     size_t sieve_count, texture_count, sieve_bytes;
     vshi_texture *textures;
     const vsh_solids *solids; /* beside the triangles; may be NULL. Geometries after those of the meshes have
-                               * no triangles in the sheet */
+                               * no triangles */
     bool owns_solids;
     uint64_t limit; /* bytes that Embree may hold; 0: no limit */
     atomic_llong bytes;
@@ -156,7 +156,9 @@ typedef struct vshi_sieve {
     vsh_alpha_mask mask;     /* its texels belong to the triangles */
     vshi_mask_place *places; /* [triangles][3]: of the corners, in the mask; NULL: it has none */
     bool one_sided;
-    bool mirrored; /* its faces look where their corners run clockwise */
+    bool mirrored;           /* its faces look where their corners run clockwise */
+    const float *vertices;   /* [vertices][3], in the scene's units */
+    const uint32_t *corners; /* [triangles][3] */
 } vshi_sieve;
 
 /* Copies what the meshes let through: triangles->sieves stays NULL where that is nothing. `held`: bytes that
@@ -165,14 +167,9 @@ vsh_result vshi_sieves_create(vsh_triangles *triangles, const vsh_mesh *meshes, 
                               const vsh_run *run, double held, vsh_error *error);
 void vshi_sieves_free(vsh_triangles *triangles);
 
-/* Lets rays pass through the geometry of a mesh where its mask and its sides allow. */
-void vshi_sieve_attach(const vsh_triangles *triangles, size_t mesh, RTCGeometry geometry);
-
-/* Whether a geometry lets anything through; no beam is cut by one that does, nor together with another, as
- * triangles of two meshes are no neighbours in the sheet. */
-static inline bool vshi_sieve_is(const vsh_triangles *triangles, size_t mesh) {
-    return triangles->sieves != NULL &&
-           (triangles->sieves[mesh].places != NULL || triangles->sieves[mesh].one_sided);
-}
+/* Lets rays pass through the geometry of a mesh where its mask and its sides allow. Vertices and corners are
+ * Embree's buffers of it. */
+void vshi_sieve_attach(const vsh_triangles *triangles, size_t mesh, RTCGeometry geometry,
+                       const float *vertices, const uint32_t *corners);
 
 #endif

@@ -156,26 +156,6 @@ TEST(a_ray_sees_the_same_alone_and_in_any_packet) {
 
 /* --- what else is made of triangles */
 
-TEST(no_beam_is_cut_by_what_is_masked_or_one_sided) {
-    /* over both triangles, and within one */
-    const vshi_sheet_beam beams[2] = {{{0.02, 0.0, 0.01}, {0.0, 1.0, 0.0}, 0.05, 0.05, INFINITY},
-                                      {{0.5, 0.0, 0.3}, {0.0, 1.0, 0.0}, 0.05, 0.05, INFINITY}};
-    card *c = malloc(sizeof *c);
-    make_card(c, 1.0f);
-    for (int kind = 0; kind < 3; ++kind) {
-        vsh_mesh mesh = c->mesh;
-        mesh.mask = kind == 1 ? mesh.mask : NULL;
-        mesh.one_sided = kind == 2;
-        vsh_triangles *triangles = traced_of(&mesh, 1);
-        bool cut[2] = {false, false};
-        vshi_triangles_cut(triangles, beams, 2, 32, cut);
-        assert_int_equal(cut[0], kind == 0);
-        assert_int_equal(cut[1], kind == 0);
-        vsh_triangles_free(triangles);
-    }
-    free(c);
-}
-
 static const double BOX_LOW[3] = {-1, -1, -1}, BOX_HIGH[3] = {1, 1, 1};
 
 TEST(a_masked_box_holds_nothing) {
