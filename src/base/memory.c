@@ -1,6 +1,8 @@
 #define _DEFAULT_SOURCE
 #include "base/memory.h"
 
+#include "base/try.h"
+
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -24,6 +26,30 @@ vsh_result vshi_allocate(void **memory, size_t count, size_t size, const char *w
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", what, bytes);
     }
     memset(*memory, 0, bytes);
+    return VSH_OK;
+}
+
+vsh_result vshi_allocate_all(const vshi_array *arrays, size_t count, const char *what, vsh_error *error) {
+    for (size_t i = 0; i < count; ++i) {
+        VSHI_TRY(vshi_allocate(arrays[i].memory, arrays[i].count, arrays[i].size, what, error));
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_make_room(void **array, size_t count, size_t *capacity, size_t size, const char *what,
+                          vsh_error *error) {
+    if (count < *capacity) {
+        return VSH_OK;
+    }
+    const size_t more = *capacity > 0 ? 2 * *capacity : 4;
+    void *grown;
+    VSHI_TRY(vshi_allocate(&grown, more, size, what, error));
+    if (count > 0) {
+        memcpy(grown, *array, count * size);
+    }
+    free(*array);
+    *array = grown;
+    *capacity = more;
     return VSH_OK;
 }
 

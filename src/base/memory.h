@@ -16,6 +16,23 @@ extern "C" {
  * Errors: VSH_ERROR_MEMORY, naming `what`. */
 vsh_result vshi_allocate(void **memory, size_t count, size_t size, const char *what, vsh_error *error);
 
+/* An array to be allocated, and what allocates a list of them: VSHI_ALLOCATE_ALL(arrays, what, error). Those
+ * behind one that is refused stay as they are. */
+typedef struct vshi_array {
+    void **memory;
+    size_t count, size;
+} vshi_array;
+vsh_result vshi_allocate_all(const vshi_array *arrays, size_t count, const char *what, vsh_error *error);
+#define VSHI_ARRAY(pointer, count)                                                                           \
+    { (void **)&(pointer), (count), sizeof *(pointer) }
+#define VSHI_ALLOCATE_ALL(arrays, what, error)                                                               \
+    vshi_allocate_all(arrays, sizeof(arrays) / sizeof *(arrays), what, error)
+
+/* Gives an array of `count` elements of `size` bytes room for one more: doubles it where it is full. Errors:
+ * VSH_ERROR_MEMORY, naming `what`; the array is then as it was. */
+vsh_result vshi_make_room(void **array, size_t count, size_t *capacity, size_t size, const char *what,
+                          vsh_error *error);
+
 /* As many bytes, not zeroed, in pages as large as the system has them where that pays: for arrays that are
  * written at once. Free with free(). Errors: VSH_ERROR_MEMORY, naming `what`. */
 vsh_result vshi_take_pages(void **memory, size_t bytes, const char *what, vsh_error *error);

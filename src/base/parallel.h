@@ -25,6 +25,14 @@ int32_t vshi_parallel_most(int32_t threads);
 vsh_result vshi_parallel_for(vshi_job *job, size_t count, size_t grain, size_t units, vshi_range_fn *fn,
                              void *user, vsh_error *error);
 
+/* Handles one element, and may fail. May run on any thread. */
+typedef vsh_result vshi_element_fn(void *user, size_t index, vsh_error *error);
+
+/* The same for elements that may fail, `grain` of them at a time: all are handled, and the error is that of
+ * the lowest that failed. Errors: of vshi_parallel_for() and of fn. */
+vsh_result vshi_parallel_each(vshi_job *job, size_t count, size_t grain, size_t units, vshi_element_fn *fn,
+                              void *user, vsh_error *error);
+
 /* Calls fn(user) once, where what a library in it hands to the pool itself runs on no more than the job's
  * threads. Errors: VSH_ERROR_MEMORY, VSH_ERROR_INTERNAL. */
 vsh_result vshi_parallel_call(const vshi_job *job, void (*fn)(void *user), void *user, vsh_error *error);

@@ -184,7 +184,7 @@ vsh_result vshi_components_find(const vsh_mesh *mesh, size_t index, vshi_compone
     walking w = {.mesh = mesh, .mirrored = vshi_transform_determinant(mesh->transform) < 0.0, .found = found};
     const size_t count = mesh->triangle_count;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_edges_find(mesh, index, NULL, 1, &w.edges, error));
+    VSHI_TRY_DONE(vshi_edges_find(mesh, index, false, &w.edges, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&found->turned, count, 1, "components", error));
     VSHI_TRY_DONE(vshi_allocate((void **)&w.of, count, sizeof *w.of, "components", error));
     VSHI_TRY_DONE(vshi_allocate((void **)&w.queue, count, sizeof *w.queue, "components", error));

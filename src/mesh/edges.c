@@ -11,6 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { MOST_LAYERS = 16 }; /* of copies; triangles beyond them hang together with none */
+
 /* A side at the edge that is looked at. */
 typedef struct use {
     uint32_t side;
@@ -22,8 +24,8 @@ typedef struct finding {
     const vsh_mesh *mesh;
     bool mirrored;
     vshi_edges *edges;
-    const uint8_t *flat;  /* [triangle_count]: of no area */
-    const uint8_t *layer; /* [triangle_count]; NULL: there is one */
+    uint8_t *flat;  /* [triangle_count]: of no area */
+    uint8_t *layer; /* [triangle_count] */
     int layers;
     uint32_t *corners; /* [triangle_count][3]: welded, in the world's order */
     vshi_sorted_sides sides;
@@ -145,7 +147,7 @@ static size_t list_uses(finding *f, size_t begin, size_t end, int layer) {
     size_t count = 0, kept = 0;
     for (size_t i = begin; i < end; ++i) {
         const uint32_t side = f->sides.sorted[i], *v = f->corners + side / 3 * (size_t)3;
-        if (!edges->skipped[side / 3] && (f->layer == NULL || f->layer[side / 3] == layer)) {
+        if (!edges->skipped[side / 3] && f->layer[side / 3] == layer) {
             f->uses[count++] = (use){side, v[(side + 2) % 3], v[side % 3] > v[(side + 1) % 3]};
         }
     }
@@ -278,23 +280,33 @@ static vsh_result join_edges(finding *f, bool with_flat, vsh_error *error) {
     return VSH_OK;
 }
 
-static vsh_result take(const vsh_mesh *mesh, vshi_edges *edges, finding *f, uint8_t **flat,
-                       vsh_error *error) {
-    const struct {
-        void **memory;
-        size_t count, size;
-    } wanted[] = {{(void **)&edges->weld, mesh->vertex_count, sizeof *edges->weld},
-                  {(void **)&edges->skipped, mesh->triangle_count, 1},
-                  {(void **)&edges->first, mesh->triangle_count, sizeof *edges->first},
-                  {(void **)&edges->doubled, mesh->triangle_count, 1},
-                  {(void **)&edges->partner, 3 * mesh->triangle_count, sizeof *edges->partner},
-                  {(void **)flat, mesh->triangle_count, 1},
-                  {(void **)&f->corners, mesh->triangle_count, 3 * sizeof *f->corners}};
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; ++i) {
-        VSHI_TRY(
-            vshi_allocate(wanted[i].memory, wanted[i].count, wanted[i].size, "edges of triangles", error));
+/* A triangle's corners, whichever way it looks. */
+static void key_of_corners(const void *user, size_t triangle, uint64_t key[VSHI_KEY_WORDS]) {
+    const uint32_t *v = (const uint32_t *)user + 3 * triangle;
+    const uint32_t low = v[0] < v[1] ? v[0] : v[1], high = v[0] < v[1] ? v[1] : v[0];
+    key[0] = v[2] < low ? v[2] : low;
+    key[1] = v[2] < low ? low : v[2] > high ? high : v[2];
+    key[2] = v[2] > high ? v[2] : high;
+}
+
+/* A triangle's layer is how many before it have the same corners. */
+static vsh_result find_layers(finding *f, vsh_error *error) {
+    const size_t count = f->mesh->triangle_count;
+    uint32_t *original = NULL, *copies = NULL;
+    const vshi_array arrays[] = {VSHI_ARRAY(original, count), VSHI_ARRAY(copies, count)};
+    vsh_result result;
+    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "copies of triangles", error));
+    VSHI_TRY_DONE(vshi_weld(count, key_of_corners, f->corners, original, error));
+    for (size_t i = 0; i < count; ++i) {
+        uint32_t *layer = &copies[original[i]];
+        f->layer[i] = (uint8_t)*layer;
+        *layer += *layer < MOST_LAYERS;
+        f->layers = (int)*layer > f->layers ? (int)*layer : f->layers;
     }
-    return VSH_OK;
+done:
+    free(copies);
+    free(original);
+    return result;
 }
 
 static vsh_result sort_sides(finding *f, vsh_error *error) {
@@ -319,29 +331,38 @@ vsh_result vshi_edges_check(const vsh_mesh *mesh, size_t index, vsh_error *error
                            vshi_mesh_label(mesh, index).text, mesh->triangle_count, UINT32_MAX / 3);
 }
 
-vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, const uint8_t *layer, int layers,
-                           vshi_edges *edges, vsh_error *error) {
+vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, bool copies_apart, vshi_edges *edges,
+                           vsh_error *error) {
     *edges = (vshi_edges){0};
     VSHI_TRY(vshi_edges_check(mesh, index, error));
-    if (mesh->triangle_count == 0) {
+    const size_t count = mesh->triangle_count;
+    if (count == 0) {
         return VSH_OK;
     }
     finding f = {.mesh = mesh,
                  .mirrored = vshi_transform_determinant(mesh->transform) < 0.0,
                  .edges = edges,
-                 .layer = layer,
-                 .layers = layer != NULL ? layers : 1};
-    uint8_t *flat = NULL;
+                 .layers = 1};
+    const vshi_array arrays[] = {VSHI_ARRAY(edges->weld, mesh->vertex_count),
+                                 VSHI_ARRAY(edges->skipped, count),
+                                 VSHI_ARRAY(edges->first, count),
+                                 VSHI_ARRAY(edges->doubled, count),
+                                 VSHI_ARRAY(edges->partner, 3 * count),
+                                 VSHI_ARRAY(f.flat, count),
+                                 VSHI_ARRAY(f.layer, count),
+                                 VSHI_ARRAY(f.corners, 3 * count)};
     size_t flats = 0;
     vsh_result result;
-    VSHI_TRY_DONE(take(mesh, edges, &f, &flat, error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "edges of triangles", error));
     VSHI_TRY_DONE(vshi_mesh_weld(mesh, edges->weld, error));
     VSHI_TRY_DONE(sort_sides(&f, error));
-    for (size_t i = 0; i < mesh->triangle_count; ++i) {
-        flat[i] = vshi_mesh_degenerate(mesh, i);
-        flats += flat[i];
+    if (copies_apart) {
+        VSHI_TRY_DONE(find_layers(&f, error));
     }
-    f.flat = flat;
+    for (size_t i = 0; i < count; ++i) {
+        f.flat[i] = vshi_mesh_degenerate(mesh, i);
+        flats += f.flat[i];
+    }
     VSHI_TRY_DONE(join_edges(&f, false, error));
     const size_t open = edges->open;
     if (flats > 0 && open > 0) { /* closed with them or without them is closed */
@@ -354,7 +375,8 @@ done:
     free(f.uses);
     free(f.sides.sorted);
     free(f.corners);
-    free(flat);
+    free(f.layer);
+    free(f.flat);
     return result;
 }
 

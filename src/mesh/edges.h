@@ -21,20 +21,20 @@ typedef struct vshi_edges {
 /* VSH_ERROR_LIMIT where a mesh has more triangles than edges can be numbered of. */
 vsh_result vshi_edges_check(const vsh_mesh *mesh, size_t index, vsh_error *error);
 
-/* Finds partners within each of `layers` layers of triangles by themselves; layer NULL: there is one. Errors:
- * of vshi_edges_check(), VSH_ERROR_MEMORY. Free with vshi_edges_free(), after a failure too. */
-vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, const uint8_t *layer, int layers,
-                           vshi_edges *edges, vsh_error *error);
+/* Finds partners. Where `copies_apart`, triangles with the same corners, whichever way they look, are in
+ * different layers, and partners of one layer: copies, and faces that look both ways, do not mix. Errors: of
+ * vshi_edges_check(), VSH_ERROR_MEMORY. Free with vshi_edges_free(), after a failure too. */
+vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, bool copies_apart, vshi_edges *edges,
+                           vsh_error *error);
 void vshi_edges_free(vshi_edges *edges);
 
-/* The welded vertices of triangle i in the world's order; false where two are one. */
-static inline bool vshi_edges_corners(const vsh_mesh *mesh, const uint32_t *weld, bool mirrored, size_t i,
+/* The welded vertices of triangle i in the world's order. */
+static inline void vshi_edges_corners(const vsh_mesh *mesh, const uint32_t *weld, bool mirrored, size_t i,
                                       uint32_t v[3]) {
     const uint32_t *given = mesh->indices + 3 * i;
     v[0] = weld[given[0]];
     v[1] = weld[given[mirrored ? 2 : 1]];
     v[2] = weld[given[mirrored ? 1 : 2]];
-    return v[0] != v[1] && v[1] != v[2] && v[2] != v[0];
 }
 
 #endif

@@ -36,6 +36,22 @@ vsh_result vshi_weld(size_t count, vshi_key_fn *key_of, const void *user, uint32
     return VSH_OK;
 }
 
+void vshi_list_groups(const uint32_t *group, size_t count, uint32_t groups, uint32_t *begin, uint32_t *list) {
+    for (size_t i = 0; i < count; ++i) {
+        if (group[i] != UINT32_MAX) {
+            ++begin[group[i] + (size_t)2];
+        }
+    }
+    for (size_t g = 0; g < groups; ++g) {
+        begin[g + 2] += begin[g + 1];
+    }
+    for (size_t i = 0; i < count; ++i) {
+        if (group[i] != UINT32_MAX) {
+            list[begin[group[i] + (size_t)1]++] = (uint32_t)i;
+        }
+    }
+}
+
 /* Sorts sides by one of their ends, and leaves those alike in order; `from` NULL: as they are numbered.
  * Vertices near each other in a mesh mostly have numbers near each other, so that memory is gone through in
  * order, which a hash table's is not. */

@@ -2,6 +2,8 @@
 
 #include "base/memory.h"
 #include "base/try.h"
+#include "mesh/edges.h"
+#include "mesh/weld.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -16,7 +18,7 @@ static const double QUAD = 0.9;        /* 26°: halves of a quad that is not fla
 static const double SEAM = 0.985;      /* 10° between shading normals of a vertex: modelled as an edge */
 
 double vshi_cut_mesh_bytes(const vsh_mesh *mesh) {
-    /* edges.c and sides.c take 130 bytes a triangle while they look, and give them back */
+    /* mesh/edges.c takes 130 bytes a triangle while it looks, and gives them back */
     return 170.0 * (double)mesh->triangle_count + 40.0 * (double)mesh->vertex_count;
 }
 
@@ -63,11 +65,13 @@ static bool same_normal(const float *normals, uint32_t a, uint32_t b) {
                     vshi_unit(vshi_vec_off(normals + 3 * (size_t)b))) > SEAM;
 }
 
-static void cut_sides(vshi_cut_mesh *s, int cut) {
+/* Fills `partner` and `soft`: edges are of the mesh's own order, also where it is mirrored. */
+static void cut_sides(vshi_cut_mesh *s, const vshi_edges *edges, int cut) {
     const vsh_mesh *mesh = s->mesh;
     for (uint32_t side = 0; side < 3 * (uint32_t)s->count; ++side) {
-        const uint32_t other = s->partner[side];
-        if (other == VSHI_NONE) {
+        const uint32_t other = edges->partner[side];
+        s->partner[side] = VSHI_NONE;
+        if (other == VSHI_NO_PARTNER) {
             continue;
         }
         const uint32_t a = mesh->indices[side], b = mesh->indices[vshi_next_side(side)],
@@ -75,13 +79,13 @@ static void cut_sides(vshi_cut_mesh *s, int cut) {
         const bool one_uv = same_uv(mesh->uvs, a, c) && same_uv(mesh->uvs, b, d);
         const bool one_normal = same_normal(mesh->normals, a, c) && same_normal(mesh->normals, b, d);
         const double crease = mesh->normals != NULL && one_normal ? SMOOTH : CREASE;
+        const bool opposite = edges->weld[a] == edges->weld[c] && edges->weld[b] == edges->weld[d];
         const bool through =
             cut == VSHI_CUT_UVS ? one_uv : vshi_dot(s->normal[side / 3], s->normal[other / 3]) >= crease;
-        if (!through || s->area[side / 3] == 0.0 || s->area[other / 3] == 0.0) {
-            s->partner[side] = VSHI_NONE;
-            continue;
+        if (opposite && through && s->area[side / 3] > 0.0 && s->area[other / 3] > 0.0) {
+            s->partner[side] = other;
+            s->soft[side] = one_uv && one_normal;
         }
-        s->soft[side] = one_uv && one_normal;
     }
 }
 
@@ -131,17 +135,12 @@ static uint32_t gather_plane(vshi_cut_mesh *s, uint32_t first, uint32_t unit, ui
     return waiting;
 }
 
-static double side_length(const vshi_cut_mesh *s, uint32_t side) {
-    return vshi_length(
-        vshi_sub(s->place[s->mesh->indices[side]], s->place[s->mesh->indices[vshi_next_side(side)]]));
-}
-
 /* The side of a triangle that is a quad's diagonal if it is half of one: the longest. */
 static uint32_t longest_side(const vshi_cut_mesh *s, uint32_t triangle) {
     uint32_t best = 3 * triangle;
     double most = -1.0;
     for (uint32_t side = 3 * triangle; side < 3 * triangle + 3; ++side) {
-        const double length = side_length(s, side);
+        const double length = vshi_side_length(s, side);
         if (length > most) {
             most = length;
             best = side;
@@ -206,61 +205,31 @@ done:
     return result;
 }
 
-static void list_units(vshi_cut_mesh *s) {
-    for (size_t i = 0; i < s->count; ++i) {
-        if (s->unit[i] != VSHI_NONE) {
-            ++s->unit_begin[s->unit[i] + (size_t)1];
-        }
-    }
-    for (uint32_t u = 0; u < s->unit_count; ++u) {
-        s->unit_begin[u + 1] += s->unit_begin[u];
-    }
-    for (size_t i = s->count;
-         i-- > 0;) { /* from behind: begins end as begins of the next, and are moved back */
-        if (s->unit[i] != VSHI_NONE) {
-            s->unit_list[--s->unit_begin[s->unit[i] + (size_t)1]] = (uint32_t)i;
-        }
-    }
-    for (uint32_t u = 0; u < s->unit_count; ++u) {
-        s->unit_begin[u] = s->unit_begin[u + 1];
-    }
-    size_t placed = 0;
-    for (size_t i = 0; i < s->count; ++i) {
-        placed += s->unit[i] != VSHI_NONE;
-    }
-    s->unit_begin[s->unit_count] = (uint32_t)placed;
-}
-
 vsh_result vshi_cut_mesh_make(const vsh_mesh *mesh, size_t index, int cut, vshi_cut_mesh *s,
                               vsh_error *error) {
     *s = (vshi_cut_mesh){.mesh = mesh, .count = mesh->triangle_count};
-    if (mesh->triangle_count > UINT32_MAX / 3) {
-        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu triangles, %u at most",
-                         vshi_mesh_label(mesh, index).text, mesh->triangle_count, UINT32_MAX / 3);
-    }
-    const struct {
-        void **memory;
-        size_t count, size;
-    } wanted[] = {{(void **)&s->place, mesh->vertex_count, sizeof *s->place},
-                  {(void **)&s->area, s->count, sizeof *s->area},
-                  {(void **)&s->normal, s->count, sizeof *s->normal},
-                  {(void **)&s->partner, 3 * s->count, sizeof *s->partner},
-                  {(void **)&s->soft, 3 * s->count, 1},
-                  {(void **)&s->unit, s->count, sizeof *s->unit},
-                  {(void **)&s->unit_begin, s->count + 1, sizeof *s->unit_begin},
-                  {(void **)&s->unit_list, s->count, sizeof *s->unit_list}};
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; ++i) {
-        VSHI_TRY(vshi_allocate(wanted[i].memory, wanted[i].count, wanted[i].size, "a mesh's charts", error));
-    }
+    VSHI_TRY(vshi_edges_check(mesh, index, error));
+    const vshi_array arrays[] = {
+        VSHI_ARRAY(s->place, mesh->vertex_count), VSHI_ARRAY(s->area, s->count),
+        VSHI_ARRAY(s->normal, s->count),          VSHI_ARRAY(s->partner, 3 * s->count),
+        VSHI_ARRAY(s->soft, 3 * s->count),        VSHI_ARRAY(s->unit, s->count),
+        VSHI_ARRAY(s->unit_begin, s->count + 2),  VSHI_ARRAY(s->unit_list, s->count)};
+    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, "a mesh's charts", error));
     if (s->count == 0) {
         return VSH_OK;
     }
     measure(s);
-    VSHI_TRY(vshi_sides_find(mesh, index, s->partner, error));
-    cut_sides(s, cut);
-    VSHI_TRY(gather_units(s, error));
-    list_units(s);
-    return VSH_OK;
+    vsh_mesh local = *mesh;
+    vshi_edges edges;
+    vsh_result result;
+    local.transform = NULL;
+    VSHI_TRY_DONE(vshi_edges_find(&local, index, true, &edges, error));
+    cut_sides(s, &edges, cut);
+    VSHI_TRY_DONE(gather_units(s, error));
+    vshi_list_groups(s->unit, s->count, s->unit_count, s->unit_begin, s->unit_list);
+done:
+    vshi_edges_free(&edges);
+    return result;
 }
 
 void vshi_cut_mesh_free(vshi_cut_mesh *s) {

@@ -3,6 +3,7 @@
 #ifndef VSHI_UNWRAP_CUT_MESH_H
 #define VSHI_UNWRAP_CUT_MESH_H
 
+#include "base/job.h"
 #include "base/vec.h"
 #include "mesh/mesh.h"
 
@@ -24,7 +25,7 @@ typedef struct vshi_cut_mesh {
         *partner;   /* [3 count]: the side beyond, running the other way; VSHI_NONE: a border or a crease */
     uint8_t *soft;  /* [3 count]: no seam of shading normals or UVs runs along the side */
     uint32_t *unit; /* [count]: triangles that stay together: parts of a plane, a quad */
-    uint32_t *unit_begin; /* [unit_count + 1] in `unit_list` */
+    uint32_t *unit_begin; /* [unit_count + 2] in `unit_list` */
     uint32_t *unit_list;  /* triangles by unit, ascending */
     uint32_t unit_count;  /* without those of triangles that have no area */
 } vshi_cut_mesh;
@@ -44,6 +45,12 @@ vsh_result vshi_cut_mesh_make(const vsh_mesh *mesh, size_t index, int cut, vshi_
                               vsh_error *error);
 void vshi_cut_mesh_free(vshi_cut_mesh *surface);
 
+/* Gives each unit the number of its chart, owner[unit_count], and tells how many there are. A chart hangs
+ * together, and its normals are within some 60° of their mean. The job tells whether to stop. Errors:
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_grow_charts(const vshi_cut_mesh *surface, vshi_job *job, uint32_t *owner,
+                            uint32_t *chart_count, vsh_error *error);
+
 static inline void vshi_cut_mesh_corners(const vshi_cut_mesh *surface, size_t i, vshi_vec corner[3]) {
     for (int k = 0; k < 3; ++k) {
         corner[k] = surface->place[surface->mesh->indices[3 * i + (size_t)k]];
@@ -54,12 +61,9 @@ static inline uint32_t vshi_next_side(uint32_t side) {
     return side % 3 == 2 ? side - 2 : side + 1;
 }
 
-/* --- which sides of a mesh's triangles a chart may be grown across */
-
-/* Fills partner[3 triangle_count] with the side beyond each that runs the other way between vertices at the
- * same places, or UINT32_MAX. Triangles with the same corners are in different layers. Sides are
- * paired within a layer, so copies, and faces that look both ways, do not mix. Errors: VSH_ERROR_LIMIT,
- * VSH_ERROR_MEMORY. */
-vsh_result vshi_sides_find(const vsh_mesh *mesh, size_t index, uint32_t *partner, vsh_error *error);
+static inline double vshi_side_length(const vshi_cut_mesh *s, uint32_t side) {
+    return vshi_length(
+        vshi_sub(s->place[s->mesh->indices[side]], s->place[s->mesh->indices[vshi_next_side(side)]]));
+}
 
 #endif

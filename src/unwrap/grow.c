@@ -3,7 +3,7 @@
  * a first partition grows one chart after the other, from the largest unit that is left, as far as normals
  * allow; then all charts are grown again at once, from the unit in the middle of each, which evens them out.
  */
-#include "unwrap/units.h"
+#include "unwrap/cut_mesh.h"
 
 #include "base/memory.h"
 #include "base/try.h"
@@ -11,6 +11,8 @@
 
 #include <stdlib.h>
 #include <string.h>
+
+static const char what[] = "growing charts";
 
 /* Cosine of the angle between a unit's normal and its chart's: a spherical cap of 60° has an L2 stretch
  * of 1.05 once it is flat. */
@@ -22,11 +24,19 @@ static const double WIDEST = 0.5;
 static const double NORMAL = 2.0, STRAIGHT = 1.0, SEAM = 2.0, FAR = 0.5;
 
 enum {
-    ROUNDS = 3,      /* of growing all charts again */
-    SMOOTHINGS = 8,  /* of borders */
+    NORMAL_SMOOTHINGS = 2,
+    ROUNDS = 3, /* of growing all charts again */
+    BORDER_SMOOTHINGS = 8,
     MOST_SIDES = 48, /* of a unit that are looked at for straightness */
     CHUNK = 4096     /* units between two looks at whether to stop */
 };
+
+typedef struct unit {
+    vshi_vec normal; /* unit, of the unit and what is around it: noise of a scan stays out */
+    vshi_vec centre;
+    double area;
+    uint32_t number;
+} unit;
 
 typedef struct chart {
     vshi_vec axis;   /* unit */
@@ -38,30 +48,115 @@ typedef struct chart {
 } chart;
 
 typedef struct growing {
-    const vshi_units *g;
+    const vshi_cut_mesh *surface;
     vshi_job *job;
-    uint32_t *owner;
-    chart *charts; /* [units]: as many as there may be */
+    uint32_t count;
+    unit *units;     /* [count] */
+    uint32_t *begin; /* [count + 1] in `sides` */
+    uint32_t *sides; /* that lead to another unit, by unit */
+    unit *by_area;   /* [count]: the units, the largest first */
+    uint32_t *owner; /* [count]: each unit's chart */
+    chart *charts;   /* [count]: as many as there may be */
     uint32_t chart_count;
     vshi_heap heap;
     double radius; /* of a chart of mean area */
     uint32_t taken;
 } growing;
 
-static double cost(const growing *w, uint32_t unit, uint32_t by) {
-    const vshi_units *g = w->g;
-    const vshi_unit_shape *u = &g->units[unit];
+/* --- units */
+
+static int compare_areas(const void *a, const void *b) {
+    const unit *x = a, *y = b;
+    if (x->area != y->area) {
+        return x->area > y->area ? -1 : 1;
+    }
+    return (x->number > y->number) - (x->number < y->number);
+}
+
+static void measure_units(growing *w) {
+    const vshi_cut_mesh *s = w->surface;
+    double total = 0.0;
+    for (uint32_t u = 0; u < w->count; ++u) {
+        unit *own = &w->units[u];
+        vshi_vec normal = {0, 0, 0}, centre = {0, 0, 0};
+        own->number = u;
+        for (uint32_t i = s->unit_begin[u]; i < s->unit_begin[u + 1]; ++i) {
+            const uint32_t triangle = s->unit_list[i];
+            const double area = s->area[triangle];
+            vshi_vec p[3];
+            vshi_cut_mesh_corners(s, triangle, p);
+            normal = vshi_add(normal, vshi_scale(s->normal[triangle], area));
+            centre = vshi_add(centre, vshi_scale(vshi_add(p[0], vshi_add(p[1], p[2])), area / 3.0));
+            own->area += area;
+        }
+        own->normal = vshi_unit(normal);
+        own->centre = vshi_scale(centre, 1.0 / own->area);
+        total += own->area;
+    }
+    memcpy(w->by_area, w->units, w->count * sizeof *w->units);
+    qsort(w->by_area, w->count, sizeof *w->by_area, compare_areas);
+    w->radius = 0.2 * sqrt(total);
+}
+
+static void list_sides(growing *w) {
+    const vshi_cut_mesh *s = w->surface;
+    uint32_t count = 0;
+    for (uint32_t u = 0; u < w->count; ++u) {
+        for (uint32_t i = s->unit_begin[u]; i < s->unit_begin[u + 1]; ++i) {
+            for (uint32_t side = 3 * s->unit_list[i]; side < 3 * s->unit_list[i] + 3; ++side) {
+                if (s->partner[side] != VSHI_NONE && s->unit[s->partner[side] / 3] != u) {
+                    w->sides[count++] = side;
+                }
+            }
+        }
+        w->begin[u + 1] = count;
+    }
+}
+
+/* The unit beyond side growing.sides[i]. */
+static uint32_t unit_beyond(const growing *w, uint32_t i) {
+    return w->surface->unit[w->surface->partner[w->sides[i]] / 3];
+}
+
+static vsh_result smooth_normals(growing *w, vsh_error *error) {
+    vshi_vec *before = NULL;
+    VSHI_TRY(vshi_allocate((void **)&before, w->count, sizeof *before, what, error));
+    for (int round = 0; round < NORMAL_SMOOTHINGS; ++round) {
+        for (uint32_t u = 0; u < w->count; ++u) {
+            before[u] = w->units[u].normal;
+        }
+        for (uint32_t u = 0; u < w->count; ++u) {
+            vshi_vec sum = vshi_scale(before[u], w->units[u].area);
+            for (uint32_t i = w->begin[u]; i < w->begin[u + 1]; ++i) {
+                const uint32_t other = unit_beyond(w, i);
+                /* a large unit beside a small one tells no more than its surroundings would */
+                sum = vshi_add(sum, vshi_scale(before[other], fmin(w->units[other].area, w->units[u].area)));
+            }
+            const vshi_vec normal = vshi_unit(sum);
+            if (vshi_dot(normal, normal) > 0.0) {
+                w->units[u].normal = normal;
+            }
+        }
+    }
+    free(before);
+    return VSH_OK;
+}
+
+/* --- charts */
+
+static double cost(const growing *w, uint32_t number, uint32_t by) {
+    const unit *u = &w->units[number];
     const chart *c = &w->charts[by];
     double shared = 0.0, seam = 0.0, looked = 0.0;
-    const uint32_t begin = g->begin[unit];
-    uint32_t end = g->begin[unit + 1];
+    const uint32_t begin = w->begin[number];
+    uint32_t end = w->begin[number + 1];
     end = end > begin + MOST_SIDES ? begin + MOST_SIDES : end;
     for (uint32_t i = begin; i < end; ++i) {
-        const double length = vshi_side_length(g->surface, g->sides[i]);
+        const double length = vshi_side_length(w->surface, w->sides[i]);
         looked += length;
-        if (w->owner[vshi_units_beyond(g, g->sides[i])] == by) {
+        if (w->owner[unit_beyond(w, i)] == by) {
             shared += length;
-            seam += g->surface->soft[g->sides[i]] ? 0.0 : length;
+            seam += w->surface->soft[w->sides[i]] ? 0.0 : length;
         }
     }
     const double straight = looked > 0.0 ? (looked - 2.0 * shared) / looked : 0.0;
@@ -70,31 +165,23 @@ static double cost(const growing *w, uint32_t unit, uint32_t by) {
            (shared > 0.0 ? SEAM * seam / shared : 0.0) + FAR * far;
 }
 
-static vsh_result push_around(growing *w, uint32_t unit, uint32_t by, vsh_error *error) {
-    const vshi_units *g = w->g;
-    for (uint32_t i = g->begin[unit]; i < g->begin[unit + 1]; ++i) {
-        const uint32_t other = vshi_units_beyond(g, g->sides[i]);
-        if (w->owner[other] == VSHI_NONE && vshi_dot(g->units[other].normal, w->charts[by].axis) > WIDEST) {
+static vsh_result push_around(growing *w, uint32_t number, uint32_t by, vsh_error *error) {
+    for (uint32_t i = w->begin[number]; i < w->begin[number + 1]; ++i) {
+        const uint32_t other = unit_beyond(w, i);
+        if (w->owner[other] == VSHI_NONE && vshi_dot(w->units[other].normal, w->charts[by].axis) > WIDEST) {
             VSHI_TRY(vshi_heap_push(&w->heap, cost(w, other, by), other, by, error));
         }
     }
     return VSH_OK;
 }
 
-static void take(growing *w, uint32_t unit, uint32_t by) {
-    const vshi_unit_shape *u = &w->g->units[unit];
+static void take(growing *w, uint32_t number, uint32_t by) {
+    const unit *u = &w->units[number];
     chart *c = &w->charts[by];
-    w->owner[unit] = by;
+    w->owner[number] = by;
     c->sum = vshi_add(c->sum, vshi_scale(u->normal, u->area));
     c->centre = vshi_add(c->centre, vshi_scale(u->centre, u->area));
     c->area += u->area;
-}
-
-static uint32_t begin_chart(growing *w, uint32_t seed) {
-    const vshi_unit_shape *u = &w->g->units[seed];
-    w->charts[w->chart_count] = (chart){.axis = u->normal, .middle = u->centre, .seed = seed};
-    take(w, seed, w->chart_count);
-    return w->chart_count++;
 }
 
 /* Grows what is in the heap until nothing fits. Axes follow what charts have where `follow`. */
@@ -105,7 +192,7 @@ static vsh_result grow(growing *w, bool follow, vsh_error *error) {
             continue;
         }
         chart *c = &w->charts[next.by];
-        if (follow && vshi_dot(w->g->units[next.what].normal, c->axis) <= WIDEST) {
+        if (follow && vshi_dot(w->units[next.what].normal, c->axis) <= WIDEST) {
             continue;
         }
         take(w, next.what, next.by);
@@ -120,12 +207,15 @@ static vsh_result grow(growing *w, bool follow, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Charts for what no chart has, one after the other in `order`. */
-static vsh_result grow_rest(growing *w, const uint32_t *order, vsh_error *error) {
-    for (uint32_t i = 0; i < w->g->count; ++i) {
-        if (w->owner[order[i]] == VSHI_NONE) {
-            const uint32_t by = begin_chart(w, order[i]);
-            VSHI_TRY(push_around(w, order[i], by, error));
+/* Charts for what no chart has, one after the other, from the largest unit on. */
+static vsh_result grow_rest(growing *w, vsh_error *error) {
+    for (uint32_t i = 0; i < w->count; ++i) {
+        const uint32_t seed = w->by_area[i].number, by = w->chart_count;
+        if (w->owner[seed] == VSHI_NONE) {
+            w->charts[w->chart_count++] =
+                (chart){.axis = w->units[seed].normal, .middle = w->units[seed].centre, .seed = seed};
+            take(w, seed, by);
+            VSHI_TRY(push_around(w, seed, by, error));
             VSHI_TRY(grow(w, true, error));
         }
     }
@@ -143,11 +233,11 @@ static void find_seeds(growing *w) {
         total += one->area;
     }
     w->radius = sqrt(total / w->chart_count / 3.0);
-    for (uint32_t u = 0; u < w->g->count; ++u) {
+    for (uint32_t u = 0; u < w->count; ++u) {
         chart *one = &w->charts[w->owner[u]];
-        const vshi_unit_shape *unit = &w->g->units[u];
-        const double far = 1.0 - vshi_dot(unit->normal, one->axis) +
-                           0.3 * vshi_length(vshi_sub(unit->centre, one->middle)) / w->radius;
+        const unit *own = &w->units[u];
+        const double far = 1.0 - vshi_dot(own->normal, one->axis) +
+                           0.3 * vshi_length(vshi_sub(own->centre, one->middle)) / w->radius;
         if (one->seed == VSHI_NONE || far < one->sum.x) {
             one->seed = u;
             one->sum.x = far; /* the least so far: the sum is not needed any more */
@@ -155,9 +245,9 @@ static void find_seeds(growing *w) {
     }
 }
 
-static vsh_result grow_again(growing *w, const uint32_t *order, vsh_error *error) {
+static vsh_result grow_again(growing *w, vsh_error *error) {
     find_seeds(w);
-    memset(w->owner, 0xff, w->g->count * sizeof *w->owner);
+    memset(w->owner, 0xff, w->count * sizeof *w->owner);
     for (uint32_t c = 0; c < w->chart_count; ++c) {
         chart *one = &w->charts[c];
         one->sum = one->centre = (vshi_vec){0, 0, 0};
@@ -168,35 +258,34 @@ static vsh_result grow_again(growing *w, const uint32_t *order, vsh_error *error
         VSHI_TRY(push_around(w, w->charts[c].seed, c, error));
     }
     VSHI_TRY(grow(w, false, error));
-    return grow_rest(w, order, error);
+    return grow_rest(w, error);
 }
 
 /* Moves teeth of borders to the chart around them: units that hang on their own chart by one other unit, and
  * share more of their border with another. No chart falls apart by that. */
 static uint32_t move_teeth(growing *w) {
-    const vshi_units *g = w->g;
     uint32_t moved = 0;
-    for (uint32_t u = 0; u < g->count; ++u) {
-        const uint32_t own = w->owner[u], begin = g->begin[u], end = g->begin[u + 1];
+    for (uint32_t u = 0; u < w->count; ++u) {
+        const uint32_t own = w->owner[u], begin = w->begin[u], end = w->begin[u + 1];
         uint32_t mate = VSHI_NONE, other = VSHI_NONE;
         bool loose = end - begin <= MOST_SIDES;
         double inside = 0.0, outside = 0.0;
         for (uint32_t i = begin; i < end && loose; ++i) {
-            const uint32_t beyond = vshi_units_beyond(g, g->sides[i]);
-            const double length = vshi_side_length(g->surface, g->sides[i]);
+            const uint32_t beyond = unit_beyond(w, i);
+            const double length = vshi_side_length(w->surface, w->sides[i]);
             if (w->owner[beyond] == own) {
                 loose = mate == VSHI_NONE || mate == beyond;
                 mate = beyond;
                 inside += length;
             } else if (other == VSHI_NONE || w->owner[beyond] == other) {
                 other = w->owner[beyond];
-                outside += g->surface->soft[g->sides[i]] ? length : 0.0;
+                outside += w->surface->soft[w->sides[i]] ? length : 0.0;
             } else {
                 loose = false; /* three charts meet here */
             }
         }
         if (loose && mate != VSHI_NONE && other != VSHI_NONE && outside > inside &&
-            vshi_dot(g->units[u].normal, w->charts[other].axis) > WIDEST) {
+            vshi_dot(w->units[u].normal, w->charts[other].axis) > WIDEST) {
             w->owner[u] = other;
             ++moved;
         }
@@ -204,60 +293,35 @@ static uint32_t move_teeth(growing *w) {
     return moved;
 }
 
-typedef struct by_area {
-    double area;
-    uint32_t unit;
-} by_area;
-
-static int compare_areas(const void *a, const void *b) {
-    const by_area *x = a, *y = b;
-    if (x->area != y->area) {
-        return x->area > y->area ? -1 : 1;
-    }
-    return (x->unit > y->unit) - (x->unit < y->unit);
-}
-
-static vsh_result order_units(const vshi_units *g, uint32_t *order, double *total, vsh_error *error) {
-    by_area *sorted = NULL;
-    VSHI_TRY(vshi_allocate((void **)&sorted, g->count, sizeof *sorted, "growing charts", error));
-    *total = 0.0;
-    for (uint32_t u = 0; u < g->count; ++u) {
-        sorted[u] = (by_area){g->units[u].area, u};
-        *total += g->units[u].area;
-    }
-    qsort(sorted, g->count, sizeof *sorted, compare_areas);
-    for (uint32_t u = 0; u < g->count; ++u) {
-        order[u] = sorted[u].unit;
-    }
-    free(sorted);
-    return VSH_OK;
-}
-
-vsh_result vshi_grow_charts(const vshi_units *g, vshi_job *job, uint32_t *owner, uint32_t *chart_count,
-                            vsh_error *error) {
+vsh_result vshi_grow_charts(const vshi_cut_mesh *surface, vshi_job *job, uint32_t *owner,
+                            uint32_t *chart_count, vsh_error *error) {
+    growing w = {.surface = surface, .job = job, .count = surface->unit_count, .owner = owner};
+    const vshi_array arrays[] = {VSHI_ARRAY(w.units, w.count), VSHI_ARRAY(w.begin, (size_t)w.count + 1),
+                                 VSHI_ARRAY(w.sides, 3 * surface->count), VSHI_ARRAY(w.by_area, w.count),
+                                 VSHI_ARRAY(w.charts, w.count)};
+    vsh_result result;
     *chart_count = 0;
-    if (g->count == 0) {
+    if (w.count == 0) {
         return VSH_OK;
     }
-    growing w = {.g = g, .job = job, .owner = owner};
-    uint32_t *order = NULL;
-    double total = 0.0;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&order, g->count, sizeof *order, "growing charts", error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&w.charts, g->count, sizeof *w.charts, "growing charts", error));
-    VSHI_TRY_DONE(order_units(g, order, &total, error));
-    memset(owner, 0xff, g->count * sizeof *owner);
-    w.radius = 0.2 * sqrt(total);
-    VSHI_TRY_DONE(grow_rest(&w, order, error));
-    for (int round = 0; round < ROUNDS && w.chart_count < g->count; ++round) {
-        VSHI_TRY_DONE(grow_again(&w, order, error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
+    measure_units(&w);
+    list_sides(&w);
+    VSHI_TRY_DONE(smooth_normals(&w, error));
+    memset(owner, 0xff, w.count * sizeof *owner);
+    VSHI_TRY_DONE(grow_rest(&w, error));
+    for (int round = 0; round < ROUNDS && w.chart_count < w.count; ++round) {
+        VSHI_TRY_DONE(grow_again(&w, error));
     }
-    for (int round = 0; round < SMOOTHINGS && move_teeth(&w) > 0; ++round) {
+    for (int round = 0; round < BORDER_SMOOTHINGS && move_teeth(&w) > 0; ++round) {
     }
     *chart_count = w.chart_count;
 done:
     free(w.heap.entries);
     free(w.charts);
-    free(order);
+    free(w.by_area);
+    free(w.sides);
+    free(w.begin);
+    free(w.units);
     return result;
 }

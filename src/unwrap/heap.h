@@ -28,17 +28,8 @@ static inline bool vshi_heap_before(const vshi_heap_entry *a, const vshi_heap_en
 /* Errors: VSH_ERROR_MEMORY. */
 static inline vsh_result vshi_heap_push(vshi_heap *heap, double key, uint32_t what, uint32_t by,
                                         vsh_error *error) {
-    if (heap->count == heap->capacity) {
-        vshi_heap_entry *more;
-        const size_t capacity = heap->capacity > 0 ? 2 * heap->capacity : 64;
-        VSHI_TRY(vshi_allocate((void **)&more, capacity, sizeof *more, "growing charts", error));
-        if (heap->count > 0) {
-            memcpy(more, heap->entries, heap->count * sizeof *more);
-        }
-        free(heap->entries);
-        heap->entries = more;
-        heap->capacity = capacity;
-    }
+    VSHI_TRY(vshi_make_room((void **)&heap->entries, heap->count, &heap->capacity, sizeof *heap->entries,
+                            "growing charts", error));
     const vshi_heap_entry entry = {key, what, by};
     size_t at = heap->count++;
     for (size_t above; at > 0 && vshi_heap_before(&entry, &heap->entries[above = (at - 1) / 2]); at = above) {

@@ -8,8 +8,65 @@
 
 static const char what[] = "texels of a chart";
 
+static const double BOX = 0.9;      /* share of its box that a chart fills at least to be fitted to texels */
+static const double MOST_FIT = 1.3; /* factor by which that may change a side */
+/* Texels by which the borders of such a chart lie beyond the centres of its outermost texels: rays that began
+ * on the very border would begin on what stands there. */
+static const double BEYOND = 0.1;
+static const double SLACK = 1e-9; /* texels: a border that is so near to a texel's is on it */
+
+enum { FARTHEST = 1 << 24 }; /* texels: no page is so large */
+
 static const double ROOM =
     1e-4; /* texels: what is so near to a texel's border is on it; 32-bit UVs know no better */
+
+/* --- bits */
+
+void vshi_bits_set(uint64_t *row, int32_t begin, int32_t end) {
+    for (int32_t x = begin; x < end;) {
+        const int32_t until = (x / 64 + 1) * 64 < end ? (x / 64 + 1) * 64 : end;
+        row[x / 64] |= until - x == 64 ? ~(uint64_t)0 : (((uint64_t)1 << (until - x)) - 1) << (x % 64);
+        x = until;
+    }
+}
+
+int32_t vshi_bits_next(const uint64_t *row, int32_t x, int32_t width, bool value) {
+    while (x < width) {
+        const uint64_t word = (value ? row[x / 64] : ~row[x / 64]) >> (x % 64);
+        if (word != 0) {
+            x += __builtin_ctzll(word);
+            return x < width ? x : width;
+        }
+        x = (x / 64 + 1) * 64;
+    }
+    return width;
+}
+
+/* Fills a mask by its bits, of `words` to a row. */
+static vsh_result list_runs(const uint64_t *bits, size_t words, vshi_mask *mask, vsh_error *error) {
+    VSHI_TRY(vshi_allocate((void **)&mask->row, (size_t)mask->height + 1, sizeof *mask->row, what, error));
+    for (int pass = 0; pass < 2; ++pass) {
+        uint32_t at = 0;
+        for (int32_t y = 0; y < mask->height; ++y) {
+            const uint64_t *row = bits + words * (size_t)y;
+            for (int32_t begin = vshi_bits_next(row, 0, mask->width, true), end; begin < mask->width;
+                 begin = vshi_bits_next(row, end, mask->width, true), ++at) {
+                end = vshi_bits_next(row, begin, mask->width, false);
+                if (pass == 1) {
+                    mask->runs[at] = (vshi_run){begin, end};
+                    mask->touched += (uint64_t)(end - begin);
+                }
+            }
+            mask->row[y + 1] = at;
+        }
+        if (pass == 0) {
+            VSHI_TRY(vshi_allocate((void **)&mask->runs, at, sizeof *mask->runs, what, error));
+        }
+    }
+    return VSH_OK;
+}
+
+/* --- patches drawn */
 
 static int32_t clamp(double x, int32_t most) {
     return x < 0.0 ? 0 : x > most ? most : (int32_t)x;
@@ -62,88 +119,22 @@ static void place_side(const vshi_patch *p, const vshi_fit *fit, uint32_t side, 
     at[2][1] = at[1][1];
 }
 
-/* Sets bits begin … end - 1. */
-static void set_bits(uint64_t *row, int32_t begin, int32_t end) {
-    for (int32_t x = begin; x < end;) {
-        const int32_t until = (x / 64 + 1) * 64 < end ? (x / 64 + 1) * 64 : end;
-        row[x / 64] |= until - x == 64 ? ~(uint64_t)0 : (((uint64_t)1 << (until - x)) - 1) << (x % 64);
-        x = until;
-    }
-}
-
-/* The first bit from x on that is `value`; `width` where there is none. */
-static int32_t next_bit(const uint64_t *row, int32_t x, int32_t width, bool value) {
-    while (x < width) {
-        const uint64_t word = (value ? row[x / 64] : ~row[x / 64]) >> (x % 64);
-        if (word != 0) {
-            x += __builtin_ctzll(word);
-            return x < width ? x : width;
-        }
-        x = (x / 64 + 1) * 64;
-    }
-    return width;
-}
-
-/* Counts the runs of each row of bits, or lists them. */
-static void read_runs(const uint64_t *bits, size_t words, vshi_mask *mask, bool list) {
-    uint32_t at = 0;
-    for (int32_t y = 0; y < mask->height; ++y) {
-        const uint64_t *row = bits + words * (size_t)y;
-        mask->row[y] = at;
-        for (int32_t begin = next_bit(row, 0, mask->width, true), end; begin < mask->width;
-             begin = next_bit(row, end, mask->width, true), ++at) {
-            end = next_bit(row, begin, mask->width, false);
-            if (list) {
-                mask->runs[at] = (vshi_run){begin, end};
-                mask->touched += (uint64_t)(end - begin);
-            }
-        }
-    }
-    mask->row[mask->height] = at;
-}
-
-/* Where borders cross the middle lines of rows. */
-typedef struct crossings {
-    uint32_t *row; /* [height + 1] in `at` */
-    double *at;
-} crossings;
-
-static int compare_crossings(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* Counts, or lists, the rows whose middle a side crosses: from one end's on, to before the other's. */
-static void cross(crossings *c, const double at[3][2], int32_t height, bool list) {
+/* Marks where a side crosses the middle lines of rows, from one end's row on to before the other's: what lies
+ * between two marks of a row is within the patch. */
+static void mark_crossings(const double at[3][2], const vshi_mask *mask, size_t words, uint64_t *marks) {
     const double *low = at[0][1] < at[1][1] ? at[0] : at[1], *high = at[0][1] < at[1][1] ? at[1] : at[0];
-    const int32_t first = clamp(ceil(low[1] - 0.5), height), end = clamp(ceil(high[1] - 0.5), height);
+    const int32_t first = clamp(ceil(low[1] - 0.5), mask->height),
+                  end = clamp(ceil(high[1] - 0.5), mask->height);
     for (int32_t y = first; y < end; ++y) {
-        if (list) {
-            c->at[c->row[y]++] = low[0] + (high[0] - low[0]) * ((y + 0.5 - low[1]) / (high[1] - low[1]));
-        } else {
-            ++c->row[y + 1];
-        }
+        const double x = low[0] + (high[0] - low[0]) * ((y + 0.5 - low[1]) / (high[1] - low[1]));
+        const int32_t column = clamp(floor(x + ROOM), mask->width);
+        marks[words * (size_t)y + (size_t)column / 64] ^= (uint64_t)1 << (column % 64);
     }
 }
 
-/* Sets what lies between borders. */
-static void fill_between(crossings *c, uint64_t *bits, size_t words, const vshi_mask *mask) {
-    for (int32_t y = 0; y < mask->height; ++y) {
-        const uint32_t begin = y > 0 ? c->row[y - 1] : 0, end = c->row[y]; /* begins have become ends */
-        if (end > begin) {
-            qsort(c->at + begin, end - begin, sizeof *c->at, compare_crossings);
-        }
-        for (uint32_t i = begin; i + 1 < end; i += 2) {
-            const int32_t from = clamp(floor(c->at[i] + ROOM), mask->width),
-                          until = clamp(ceil(c->at[i + 1] - ROOM), mask->width);
-            set_bits(bits + words * (size_t)y, from, until);
-        }
-    }
-}
-
-/* Sets the texels that borders touch, and counts where they cross the rows. */
-static void draw_borders(const vshi_patch *p, const vshi_fit *fit, const vshi_mask *mask, uint64_t *bits,
-                         size_t words, crossings *c) {
+/* Sets the texels that borders touch. */
+static void draw_borders(const vshi_patch *p, const vshi_fit *fit, const vshi_mask *mask, size_t words,
+                         uint64_t *bits, uint64_t *marks) {
     for (uint32_t side = 0; side < 3 * p->count; ++side) {
         if (p->beyond[side] != VSHI_NONE) {
             continue;
@@ -154,43 +145,33 @@ static void draw_borders(const vshi_patch *p, const vshi_fit *fit, const vshi_ma
         rows_of(at, mask->height, &first, &last);
         for (int32_t y = first; y <= last; ++y) {
             const vshi_run run = touched_in(at, y, mask->width);
-            set_bits(bits + words * (size_t)y, run.begin, run.end);
+            vshi_bits_set(bits + words * (size_t)y, run.begin, run.end);
         }
-        cross(c, at, mask->height, false);
+        mark_crossings((const double(*)[2])at, mask, words, marks);
     }
 }
 
 vsh_result vshi_mask_make(const vshi_patch *p, const vshi_fit *fit, vshi_mask *mask, vsh_error *error) {
     *mask = (vshi_mask){.width = fit->width, .height = fit->height};
-    const size_t words = ((size_t)mask->width + 63) / 64;
-    uint64_t *bits = NULL;
-    crossings c = {NULL, NULL};
+    const size_t words = (size_t)mask->width / 64 + 1, count = words * (size_t)mask->height;
+    uint64_t *bits = NULL, *marks = NULL;
     vsh_result result;
-    VSHI_TRY_DONE(
-        vshi_allocate((void **)&mask->row, (size_t)mask->height + 1, sizeof *mask->row, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&c.row, (size_t)mask->height + 1, sizeof *c.row, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&bits, words * (size_t)mask->height, sizeof *bits, what, error));
-    draw_borders(p, fit, mask, bits, words, &c);
-    for (int32_t y = 0; y < mask->height; ++y) {
-        c.row[y + 1] += c.row[y];
-    }
-    VSHI_TRY_DONE(vshi_allocate((void **)&c.at, c.row[mask->height], sizeof *c.at, what, error));
-    for (uint32_t side = 0; side < 3 * p->count; ++side) {
-        if (p->beyond[side] == VSHI_NONE) {
-            double at[3][2];
-            place_side(p, fit, side, at);
-            cross(&c, at, mask->height, true);
+    VSHI_TRY_DONE(vshi_allocate((void **)&bits, count, sizeof *bits, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&marks, count, sizeof *marks, what, error));
+    draw_borders(p, fit, mask, words, bits, marks);
+    for (size_t i = 0, within = 0; i < count; ++i) { /* an even number of marks ends each row outside */
+        uint64_t inside = marks[i];
+        for (int shift = 1; shift < 64; shift *= 2) {
+            inside ^= inside << shift;
         }
+        inside = within != 0 ? ~inside : inside;
+        within = inside >> 63;
+        bits[i] |= inside;
     }
-    fill_between(&c, bits, words, mask);
-    read_runs(bits, words, mask, false);
-    VSHI_TRY_DONE(
-        vshi_allocate((void **)&mask->runs, mask->row[mask->height], sizeof *mask->runs, what, error));
-    read_runs(bits, words, mask, true);
+    result = list_runs(bits, words, mask, error);
 done:
+    free(marks);
     free(bits);
-    free(c.at);
-    free(c.row);
     return result;
 }
 
@@ -202,95 +183,32 @@ void vshi_mask_free(vshi_mask *mask) {
 
 /* --- quarter turns */
 
-static vsh_result copy_runs(const vshi_mask *mask, vshi_mask *to, vsh_error *error) {
-    *to = (vshi_mask){.width = mask->width, .height = mask->height, .touched = mask->touched};
-    VSHI_TRY(vshi_allocate((void **)&to->row, (size_t)to->height + 1, sizeof *to->row, what, error));
-    VSHI_TRY(vshi_allocate((void **)&to->runs, mask->row[mask->height], sizeof *to->runs, what, error));
-    return VSH_OK;
-}
-
-static vsh_result half_turn(const vshi_mask *mask, vshi_mask *to, vsh_error *error) {
-    VSHI_TRY(copy_runs(mask, to, error));
-    uint32_t at = 0;
+/* Anticlockwise, (x, y) goes to (height - 1 - y, x); clockwise to (y, width - 1 - x): rows or columns are
+ * turned back, and exchanged. Half a turn turns both back. */
+vsh_result vshi_mask_turn(const vshi_mask *mask, int quarters, vshi_mask *to, vsh_error *error) {
+    const bool exchanged = quarters != 2;
+    *to = (vshi_mask){.width = exchanged ? mask->height : mask->width,
+                      .height = exchanged ? mask->width : mask->height};
+    const size_t words = ((size_t)to->width + 63) / 64;
+    uint64_t *bits = NULL;
+    VSHI_TRY(vshi_allocate((void **)&bits, words * (size_t)to->height, sizeof *bits, what, error));
     for (int32_t y = 0; y < mask->height; ++y) {
-        const int32_t from = mask->height - 1 - y;
-        to->row[y] = at;
-        for (uint32_t i = mask->row[from + 1]; i-- > mask->row[from];) {
-            to->runs[at++] = (vshi_run){mask->width - mask->runs[i].end, mask->width - mask->runs[i].begin};
-        }
-    }
-    to->row[mask->height] = at;
-    return VSH_OK;
-}
-
-/* Swaps bit y of word x and bit x of word y, block by block (Warren, "Hacker's Delight", 2002). */
-static void transpose(uint64_t words[64]) {
-    uint64_t pick = UINT64_C(0x00000000ffffffff);
-    for (int width = 32; width > 0; width /= 2, pick ^= pick << width) {
-        for (int i = 0; i < 64; i = (i + width + 1) & ~width) {
-            const uint64_t swap = (words[i] >> width ^ words[i + width]) & pick;
-            words[i] ^= swap << width;
-            words[i + width] ^= swap;
-        }
-    }
-}
-
-/* Texel (x, y) goes to (y, x). */
-static void transpose_bits(const uint64_t *from, size_t from_words, int32_t height, uint64_t *to,
-                           size_t to_words, int32_t width) {
-    for (int32_t by = 0; by < height; by += 64) {
-        for (int32_t bx = 0; bx < width; bx += 64) {
-            uint64_t block[64];
-            for (int32_t i = 0; i < 64; ++i) {
-                block[i] = by + i < height ? from[from_words * (size_t)(by + i) + (size_t)bx / 64] : 0;
+        const int32_t row = quarters <= 2 ? mask->height - 1 - y : y;
+        for (uint32_t i = mask->row[y]; i < mask->row[y + 1]; ++i) {
+            const vshi_run run = mask->runs[i];
+            const int32_t begin = quarters >= 2 ? mask->width - run.end : run.begin,
+                          end = quarters >= 2 ? mask->width - run.begin : run.end;
+            if (!exchanged) {
+                vshi_bits_set(bits + words * (size_t)row, begin, end);
             }
-            transpose(block);
-            for (int32_t i = 0; i < 64 && bx + i < width; ++i) {
-                to[to_words * (size_t)(bx + i) + (size_t)by / 64] = block[i];
+            for (int32_t x = begin; exchanged && x < end; ++x) {
+                bits[words * (size_t)x + (size_t)row / 64] |= (uint64_t)1 << (row % 64);
             }
         }
     }
-}
-
-/* Anticlockwise, (x, y) goes to (height - 1 - y, x); clockwise to (y, width - 1 - x). Both are (y, x) with
- * its rows or its columns the other way. */
-static vsh_result quarter_turn(const vshi_mask *mask, bool clockwise, vshi_mask *to, vsh_error *error) {
-    *to = (vshi_mask){.width = mask->height, .height = mask->width};
-    const size_t from_words = ((size_t)mask->width + 63) / 64, to_words = ((size_t)mask->height + 63) / 64;
-    uint64_t *from = NULL, *bits = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&to->row, (size_t)to->height + 1, sizeof *to->row, what, error));
-    VSHI_TRY_DONE(
-        vshi_allocate((void **)&from, from_words * (size_t)mask->height, sizeof *from, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&bits, to_words * (size_t)to->height, sizeof *bits, what, error));
-    for (int32_t y = 0; y < mask->height; ++y) {
-        const int32_t row = clockwise ? y : mask->height - 1 - y;
-        for (uint32_t i = mask->row[row]; i < mask->row[row + 1]; ++i) {
-            vshi_run run = mask->runs[i];
-            if (clockwise) {
-                run = (vshi_run){mask->width - run.end, mask->width - run.begin};
-            }
-            set_bits(from + from_words * (size_t)y, run.begin, run.end);
-        }
-    }
-    transpose_bits(from, from_words, mask->height, bits, to_words, mask->width);
-    read_runs(bits, to_words, to, false);
-    VSHI_TRY_DONE(vshi_allocate((void **)&to->runs, to->row[to->height], sizeof *to->runs, what, error));
-    read_runs(bits, to_words, to, true);
-done:
+    const vsh_result result = list_runs(bits, words, to, error);
     free(bits);
-    free(from);
     return result;
-}
-
-vsh_result vshi_mask_turn(const vshi_mask *mask, int quarters, vshi_mask *turned, vsh_error *error) {
-    if (quarters == 0) {
-        VSHI_TRY(copy_runs(mask, turned, error));
-        memcpy(turned->row, mask->row, ((size_t)mask->height + 1) * sizeof *mask->row);
-        memcpy(turned->runs, mask->runs, mask->row[mask->height] * sizeof *mask->runs);
-        return VSH_OK;
-    }
-    return quarters == 2 ? half_turn(mask, turned, error) : quarter_turn(mask, quarters == 3, turned, error);
 }
 
 void vshi_fit_turn(const vshi_fit *fit, int quarters, const double uv[2], double at[2]) {
@@ -300,4 +218,187 @@ void vshi_fit_turn(const vshi_fit *fit, int quarters, const double uv[2], double
         {x, y}, {fit->height - y, x}, {fit->width - x, fit->height - y}, {y, fit->width - x}};
     at[0] = turned[quarters][0];
     at[1] = turned[quarters][1];
+}
+
+/* --- the least box around a chart: one of its sides runs along the convex hull (Freeman and Shapira,
+ * "Determining the minimum-area encasing rectangle for an arbitrary closed curve", 1975) */
+
+typedef struct point {
+    double x, y;
+} point;
+
+static int compare_points(const void *a, const void *b) {
+    const point *p = a, *q = b;
+    if (p->x != q->x) {
+        return p->x < q->x ? -1 : 1;
+    }
+    return p->y != q->y ? (p->y < q->y ? -1 : 1) : 0;
+}
+
+static double left_turn(point a, point b, point c) {
+    return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+}
+
+/* Convex hull of sorted points, anticlockwise (Andrew, 1979); `hull` has room for 2 count. */
+static size_t find_hull(const point *points, size_t count, point *hull) {
+    size_t size = 0;
+    for (int half = 0; half < 2; ++half) {
+        const size_t first = size;
+        for (size_t i = 0; i < count; ++i) {
+            const point p = half == 0 ? points[i] : points[count - 1 - i];
+            while (size >= first + 2 && left_turn(hull[size - 2], hull[size - 1], p) <= 0.0) {
+                --size;
+            }
+            hull[size++] = p;
+        }
+        --size; /* begins the other half */
+    }
+    return size;
+}
+
+static double dot_along(point p, double x, double y) {
+    return p.x * x + p.y * y;
+}
+
+/* Direction of the least box's lower side: rotating calipers (Toussaint, 1983). */
+static point find_direction(const point *hull, size_t count) {
+    point best = {1.0, 0.0};
+    double least = INFINITY;
+    size_t right = 0, top = 0, left = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const point a = hull[i], b = hull[(i + 1) % count];
+        const double length = sqrt((b.x - a.x) * (b.x - a.x) + (b.y - a.y) * (b.y - a.y));
+        if (!(length > 0.0)) {
+            continue;
+        }
+        const double x = (b.x - a.x) / length, y = (b.y - a.y) / length;
+        right = right < i + 1 ? i + 1 : right;
+        while (right < i + count &&
+               dot_along(hull[(right + 1) % count], x, y) > dot_along(hull[right % count], x, y)) {
+            ++right;
+        }
+        top = top < right ? right : top;
+        while (top < i + count &&
+               dot_along(hull[(top + 1) % count], -y, x) > dot_along(hull[top % count], -y, x)) {
+            ++top;
+        }
+        left = left < top ? top : left;
+        while (left < i + count &&
+               dot_along(hull[(left + 1) % count], x, y) < dot_along(hull[left % count], x, y)) {
+            ++left;
+        }
+        const double width = dot_along(hull[right % count], x, y) - dot_along(hull[left % count], x, y);
+        const double height = dot_along(hull[top % count], -y, x) - dot_along(a, -y, x);
+        if (width * height <
+            least * 0.9999) { /* of boxes that are alike, the first: rounding tells nothing */
+            least = width * height;
+            best = (point){x, y};
+        }
+    }
+    return best;
+}
+
+static void turn(vshi_patch *p, point along, double size[2]) {
+    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+    for (uint32_t v = 0; v < p->vertex_count; ++v) {
+        const point at = {p->uv[v][0], p->uv[v][1]};
+        p->uv[v][0] = dot_along(at, along.x, along.y);
+        p->uv[v][1] = dot_along(at, -along.y, along.x);
+        for (int k = 0; k < 2; ++k) {
+            low[k] = p->uv[v][k] < low[k] ? p->uv[v][k] : low[k];
+            high[k] = p->uv[v][k] > high[k] ? p->uv[v][k] : high[k];
+        }
+    }
+    for (uint32_t v = 0; v < p->vertex_count; ++v) {
+        p->uv[v][0] -= low[0];
+        p->uv[v][1] -= low[1];
+    }
+    size[0] = high[0] - low[0];
+    size[1] = high[1] - low[1];
+}
+
+/* Cosines and sines of the angles. */
+static const double TURNS[VSHI_ANGLES][2] = {{1.0, 0.0},
+                                             {0.98078528040323043, 0.19509032201612828},
+                                             {0.92387953251128676, 0.38268343236508977},
+                                             {0.83146961230254524, 0.55557023301960218},
+                                             {0.70710678118654752, 0.70710678118654752},
+                                             {0.55557023301960218, 0.83146961230254524},
+                                             {0.38268343236508977, 0.92387953251128676},
+                                             {0.19509032201612828, 0.98078528040323043}};
+
+static void measure_boxes(const vshi_patch *p, vshi_boxes *boxes) {
+    for (int a = 0; a < VSHI_ANGLES; ++a) {
+        double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+        for (uint32_t v = 0; v < p->vertex_count; ++v) {
+            const double *uv = p->uv[v];
+            const double at[2] = {TURNS[a][0] * uv[0] - TURNS[a][1] * uv[1],
+                                  TURNS[a][1] * uv[0] + TURNS[a][0] * uv[1]};
+            for (int k = 0; k < 2; ++k) {
+                low[k] = at[k] < low[k] ? at[k] : low[k];
+                high[k] = at[k] > high[k] ? at[k] : high[k];
+            }
+        }
+        for (int k = 0; k < 2; ++k) {
+            boxes->low[a][k] = low[k];
+            boxes->size[a][k] = high[k] - low[k];
+        }
+    }
+}
+
+vsh_result vshi_patch_straighten(vshi_patch *p, vshi_boxes *boxes, vsh_error *error) {
+    point *points = NULL, *hull = NULL;
+    double size[2];
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&points, p->vertex_count, sizeof *points, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&hull, 2 * (size_t)p->vertex_count + 2, sizeof *hull, what, error));
+    for (uint32_t v = 0; v < p->vertex_count; ++v) {
+        points[v] = (point){p->uv[v][0], p->uv[v][1]};
+    }
+    qsort(points, p->vertex_count, sizeof *points, compare_points);
+    turn(p, find_direction(hull, find_hull(points, p->vertex_count, hull)), size);
+    if (size[1] > size[0]) {
+        turn(p, (point){0.0, 1.0}, size);
+    }
+    measure_boxes(p, boxes);
+done:
+    free(hull);
+    free(points);
+    return result;
+}
+
+/* --- fits to texels */
+
+static int32_t whole(double x) {
+    return x < 1.0 ? 1 : x > FARTHEST ? FARTHEST : (int32_t)x;
+}
+
+bool vshi_patch_is_box(const vshi_patch *p, const vshi_boxes *boxes) {
+    return p->area > BOX * boxes->size[0][0] * boxes->size[0][1];
+}
+
+vshi_fit vshi_mask_fit(const vshi_patch *p, const vshi_boxes *boxes, int angle, double density,
+                       double max_stretch) {
+    vshi_fit fit = {.uneven = 1.0};
+    double factor[2];
+    int32_t texels[2];
+    bool fits = angle == 0 && !p->kept && vshi_patch_is_box(p, boxes);
+    for (int k = 0; k < 2; ++k) {
+        const double length = boxes->size[angle][k] * density;
+        texels[k] = whole(floor(length + 0.5));
+        factor[k] = (texels[k] + 2.0 * BEYOND) / length;
+        fits = fits && factor[k] < MOST_FIT && factor[k] > 1.0 / MOST_FIT;
+    }
+    const double uneven = factor[0] / factor[1]; /* isometric but for this it stretches by the root of … */
+    fits = fits && p->stretch * sqrt(0.5 * (uneven + 1.0 / uneven)) < max_stretch;
+    fit.uneven = fits ? uneven : 1.0;
+    int32_t *sides[2] = {&fit.width, &fit.height};
+    for (int k = 0; k < 2; ++k) {
+        const double length = boxes->size[angle][k] * density, scale = fits ? density * factor[k] : density;
+        *sides[k] = fits ? texels[k] + 1 : whole(ceil(length - SLACK));
+        fit.offset[k] = (fits ? 0.5 - BEYOND : 0.5 * (*sides[k] - length)) - scale * boxes->low[angle][k];
+        fit.matrix[k][0] = scale * TURNS[angle][k];
+        fit.matrix[k][1] = scale * (k == 0 ? -TURNS[angle][1] : TURNS[angle][0]);
+    }
+    return fit;
 }

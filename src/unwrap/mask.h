@@ -55,8 +55,14 @@ static inline bool vshi_mask_is_box(const vshi_mask *mask) {
     return mask->touched == (uint64_t)mask->width * (uint64_t)mask->height;
 }
 
-/* The mask turned by quarter turns anticlockwise. Errors: VSH_ERROR_MEMORY. */
+/* The mask turned by 1 to 3 quarter turns anticlockwise. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_mask_turn(const vshi_mask *mask, int quarters, vshi_mask *turned, vsh_error *error);
+
+/* Sets bits begin … end - 1 of a row. */
+void vshi_bits_set(uint64_t *row, int32_t begin, int32_t end);
+
+/* The first bit from x on that is `value`; `width` where there is none. */
+int32_t vshi_bits_next(const uint64_t *row, int32_t x, int32_t width, bool value);
 
 /* A point of the fit in the mask turned so: texels from its corner. */
 void vshi_fit_turn(const vshi_fit *fit, int quarters, const double uv[2], double at[2]);

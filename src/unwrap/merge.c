@@ -3,7 +3,6 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "unwrap/patch.h"
-#include "unwrap/units.h"
 
 #include <stdlib.h>
 

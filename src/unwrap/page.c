@@ -216,43 +216,15 @@ bool vshi_page_find(vshi_page *page, const vshi_mask *mask, int32_t row, int32_t
     return false;
 }
 
-static void take(uint64_t *row, int32_t begin, int32_t end) {
-    for (int32_t x = begin; x < end;) {
-        const int32_t until = (x / 64 + 1) * 64 < end ? (x / 64 + 1) * 64 : end;
-        const uint64_t bits = until - x == 64 ? ~(uint64_t)0 : (((uint64_t)1 << (until - x)) - 1) << (x % 64);
-        row[x / 64] |= bits;
-        x = until;
-    }
-}
-
 static int32_t find_free_run(const vshi_page *page, int32_t y) {
     const uint64_t *row = page->taken + page->words * (size_t)y;
-    int32_t longest = 0, run = 0;
-    for (size_t i = 0; i < page->words; ++i) {
-        uint64_t rest = row[i];
-        if (rest == 0) {
-            run += 64;
-            continue;
-        }
-        int32_t left = 64;
-        while (left > 0) {
-            const int32_t free = rest == 0 ? left : __builtin_ctzll(rest);
-            run += free < left ? free : left;
-            if (rest == 0) {
-                break;
-            }
-            longest = run > longest ? run : longest;
-            run = 0;
-            rest >>= free;
-            const int32_t taken = ~rest == 0 ? 64 : __builtin_ctzll(~rest);
-            left -= free + taken;
-            rest = taken < 64 ? rest >> taken : 0;
-            if (left <= 0) {
-                break;
-            }
-        }
+    int32_t longest = 0;
+    for (int32_t begin = 0, end; (begin = vshi_bits_next(row, begin, page->width, false)) < page->width;
+         begin = end) {
+        end = vshi_bits_next(row, begin, page->width, true);
+        longest = end - begin > longest ? end - begin : longest;
     }
-    return run > longest ? run : longest;
+    return longest;
 }
 
 void vshi_atlas_page_put(vshi_page *page, const vshi_mask *mask, int32_t x, int32_t y) {
@@ -266,8 +238,8 @@ void vshi_atlas_page_put(vshi_page *page, const vshi_mask *mask, int32_t x, int3
             const int32_t begin = x + mask->runs[i].begin - page->padding,
                           end = x + mask->runs[i].end + page->padding;
             for (int32_t to = from; to <= until; ++to) {
-                take(page->taken + page->words * (size_t)to, begin > 0 ? begin : 0,
-                     end < page->width ? end : page->width);
+                vshi_bits_set(page->taken + page->words * (size_t)to, begin > 0 ? begin : 0,
+                              end < page->width ? end : page->width);
             }
         }
     }

@@ -7,7 +7,6 @@
 #include "base/try.h"
 #include "mesh/mesh.h"
 #include "unwrap/patch.h"
-#include "unwrap/units.h"
 
 #include <stdlib.h>
 
@@ -21,7 +20,6 @@ static const double LARGEST = 0.35;
 
 static void end_making(vshi_shape *shape) {
     vshi_merging_free(&shape->merging);
-    vshi_units_free(&shape->units);
     free(shape->owner);
     shape->owner = NULL;
 }
@@ -83,12 +81,9 @@ static vsh_result grow(const making *m, vshi_shape *shape) {
         }
     }
     VSHI_TRY(vshi_cut_mesh_make(shape->mesh, shape->index, VSHI_CUT_CREASES, &shape->surface, &shape->error));
-    VSHI_TRY(vshi_units_make(&shape->surface, &shape->units, &shape->error));
-    VSHI_TRY(
-        vshi_allocate((void **)&shape->owner, shape->units.count, sizeof *shape->owner, what, &shape->error));
-    VSHI_TRY(vshi_grow_charts(&shape->units, m->job, shape->owner, &shape->chart_count, &shape->error));
-    vshi_units_free(&shape->units);
-    return VSH_OK;
+    VSHI_TRY(vshi_allocate((void **)&shape->owner, shape->surface.unit_count, sizeof *shape->owner, what,
+                           &shape->error));
+    return vshi_grow_charts(&shape->surface, m->job, shape->owner, &shape->chart_count, &shape->error);
 }
 
 static void grow_shapes(void *user, size_t begin, size_t end) {

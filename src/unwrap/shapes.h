@@ -5,7 +5,6 @@
 #include "base/job.h"
 #include "unwrap/mask.h"
 #include "unwrap/merge.h"
-#include "unwrap/units.h"
 
 #include <vdbshade/unwrap.h>
 
@@ -17,7 +16,6 @@ typedef struct vshi_shape {
     vshi_boxes *boxes; /* [patches.count] */
     bool kept;         /* patches are those of the mesh's UVs */
     /* while charts are made */
-    vshi_units units;
     vshi_merging merging;
     uint32_t *owner;
     uint32_t chart_count;

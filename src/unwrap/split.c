@@ -6,7 +6,6 @@
 #include "base/try.h"
 #include "unwrap/heap.h"
 #include "unwrap/patch.h"
-#include "unwrap/units.h"
 
 #include <stdlib.h>
 

@@ -42,7 +42,7 @@ TEST(triangles_given_thrice_at_an_edge_of_three_change_nothing) {
     assert_int_equal(once.rim_count, 7); /* six outer edges, and what ends at the one of three */
     mesh.triangle_count = sizeof fan / sizeof *fan / 3;
     vshi_edges edges;
-    assert_ok(vshi_edges_find(&mesh, 0, NULL, 1, &edges, &failure));
+    assert_ok(vshi_edges_find(&mesh, 0, false, &edges, &failure));
     for (uint32_t side = 0; side < 9; ++side) {
         const uint32_t partner = edges.partner[side];
         assert_true(partner == VSHI_NO_PARTNER || (partner != side && edges.partner[partner] == side));
