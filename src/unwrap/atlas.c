@@ -111,12 +111,12 @@ static vsh_result place_vertices(struct vsh_atlas *a, size_t m, const vshi_shape
     size_t vertex = 0;
     for (size_t c = 0; c < made->chart_count; ++c) {
         const vshi_patch *p = &shape->patches.list[c];
-        const vsh_atlas_page *page = &a->pages[items[c].page];
+        const vsh_atlas_page *page = &a->pages[items[c].at.page];
         for (uint32_t v = 0; v < p->vertex_count; ++v) {
             double at[2];
-            vshi_fit_turn(&items[c].fit, items[c].quarters, p->uv[v], at);
-            placed[v][0] = (float)((items[c].x + at[0]) / page->width);
-            placed[v][1] = (float)((items[c].y + at[1]) / page->height);
+            vshi_fit_turn(&items[c].at.fit, items[c].at.quarters, p->uv[v], at);
+            placed[v][0] = (float)((items[c].at.x + at[0]) / page->width);
+            placed[v][1] = (float)((items[c].at.y + at[1]) / page->height);
         }
         VSHI_TRY_DONE(vshi_settle(p, placed, error));
         for (; vertex < made->chart_vertices && made->vertex_chart[vertex] == c; ++vertex) {
@@ -149,25 +149,25 @@ static vsh_result mesh_make(struct vsh_atlas *a, size_t m, const vshi_shape *sha
 
 /* Stretch of a chart as it was fitted to texels: L2 of the patch, times that of its sides' factors. */
 static double fitted_stretch(const vshi_item *item) {
-    const double uneven = item->fit.uneven;
+    const double uneven = item->at.fit.uneven;
     return item->patch->stretch * sqrt(0.5 * (uneven + 1.0 / uneven));
 }
 
 static void chart_make(struct vsh_atlas *a, const vshi_item *item, double scale, uint32_t chart) {
-    const bool sideways = item->quarters % 2 != 0;
+    const bool sideways = item->at.quarters % 2 != 0;
     const double stretch = fitted_stretch(item);
     a->charts[chart] = (vsh_atlas_chart){
-        .page = item->page,
+        .page = item->at.page,
         .mesh = item->mesh,
         .stretch = (float)stretch,
         .area = item->patch->area * scale * scale,
-        .min = {item->x, item->y},
-        .max = {item->x + (sideways ? item->fit.height : item->fit.width),
-                item->y + (sideways ? item->fit.width : item->fit.height)},
+        .min = {item->at.x, item->at.y},
+        .max = {item->at.x + (sideways ? item->at.fit.height : item->at.fit.width),
+                item->at.y + (sideways ? item->at.fit.width : item->at.fit.height)},
     };
-    vsh_atlas_page *page = &a->pages[item->page];
+    vsh_atlas_page *page = &a->pages[item->at.page];
     page->first_mesh = item->mesh < page->first_mesh ? item->mesh : page->first_mesh;
-    page->covered += (double)item->touched;
+    page->covered += (double)item->at.touched;
 }
 
 /* What pages have in all, and shares of texels that were counted. */

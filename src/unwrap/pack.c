@@ -5,7 +5,6 @@
 #include "base/hash.h"
 #include "base/memory.h"
 #include "base/try.h"
-#include "unwrap/place.h"
 
 #include <stdlib.h>
 
@@ -33,24 +32,18 @@ enum {
 };
 
 double vshi_pack_bytes(const vshi_packing *packing, size_t count) {
-    return vshi_page_bytes(packing->width, packing->height) +
+    const double page =
+        ((packing->width / 64.0 + 2.0) * 8.0) * (packing->height + 2.0) + 4.0 * packing->height;
+    return page +
            (double)count * (VSHI_QUARTERS * sizeof(vshi_mask) + VSHI_ANGLES * sizeof(vshi_fit) + 400.0);
 }
-
-/* Places of the best attempt. */
-typedef struct kept {
-    uint32_t page;
-    int32_t x, y, angle, quarters;
-    vshi_fit fit;
-    uint64_t touched;
-} kept;
 
 typedef struct search {
     vshi_packing *packing;
     vshi_item *items;
     size_t count;
     vshi_placing placing;
-    kept *best;
+    vshi_place *best;    /* [count] */
     double best_density; /* 0: none yet */
     uint32_t best_pages;
     vshi_job *job;
@@ -61,9 +54,7 @@ typedef struct search {
 
 static void keep(search *s, double density, uint32_t pages) {
     for (size_t i = 0; i < s->count; ++i) {
-        const vshi_item *item = &s->items[i];
-        s->best[i] =
-            (kept){item->page, item->x, item->y, item->angle, item->quarters, item->fit, item->touched};
+        s->best[i] = s->items[i].at;
     }
     s->best_density = density;
     s->best_pages = pages;
@@ -71,14 +62,7 @@ static void keep(search *s, double density, uint32_t pages) {
 
 static void give(search *s) {
     for (size_t i = 0; i < s->count; ++i) {
-        vshi_item *item = &s->items[i];
-        item->page = s->best[i].page;
-        item->x = s->best[i].x;
-        item->y = s->best[i].y;
-        item->angle = s->best[i].angle;
-        item->quarters = s->best[i].quarters;
-        item->fit = s->best[i].fit;
-        item->touched = s->best[i].touched;
+        s->items[i].at = s->best[i];
     }
     s->packing->density = s->best_density;
     s->packing->pages = s->best_pages;
@@ -99,7 +83,7 @@ static vsh_result rehearse(rehearsal *r, double *result_rows, vsh_error *error) 
     vshi_placing *p = &r->placing;
     VSHI_TRY(vshi_placing_one_page(p, &rows, error));
     for (size_t i = 0; i < p->count; ++i) {
-        ends += p->items[i].y;
+        ends += p->items[i].at.y;
     }
     *result_rows = rows + ends / ((double)p->count * p->page.height + 1.0);
     return VSH_OK;

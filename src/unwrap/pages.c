@@ -120,7 +120,7 @@ static vsh_result add_pages(work *w, group *g, const vshi_packing *packing, vsh_
                                                              .first_mesh = UINT32_MAX};
     }
     for (size_t i = 0; i < g->count; ++i) {
-        w->items[g->first + i].page += (uint32_t)g->page;
+        w->items[g->first + i].at.page += (uint32_t)g->page;
     }
     return VSH_OK;
 }
@@ -148,13 +148,8 @@ static vsh_result pack_alike(work *w, group *g, vsh_error *error) {
                                   .density = page->texels_per_unit * w->items[as->first].factor /
                                              w->items[g->first].factor};
     for (size_t i = 0; i < g->count; ++i) {
-        vshi_item *item = &w->items[g->first + i];
-        const uint32_t mesh = item->mesh;
-        const double factor = item->factor;
-        *item = w->items[as->first + i];
-        item->mesh = mesh;
-        item->factor = factor;
-        item->page -= (uint32_t)as->page;
+        w->items[g->first + i].at = w->items[as->first + i].at;
+        w->items[g->first + i].at.page -= (uint32_t)as->page;
     }
     return vshi_job_advance(w->job, UNITS) ? vshi_job_fail_cancelled(w->job, error)
                                            : add_pages(w, g, &packing, error);
@@ -211,9 +206,9 @@ static vsh_result fit_page(work *w, const group *g, size_t number, vshi_item *ow
     size_t count = 0;
     uint64_t touched = 0;
     for (size_t i = g->first; i < g->first + g->count; ++i) {
-        if (w->items[i].page == number) {
+        if (w->items[i].at.page == number) {
             own[count++] = w->items[i];
-            touched += w->items[i].touched;
+            touched += w->items[i].at.touched;
         }
     }
     bool fits = false;
@@ -230,9 +225,9 @@ static vsh_result fit_page(work *w, const group *g, size_t number, vshi_item *ow
         page->height = fits ? packing.height : page->height;
     }
     for (size_t i = g->first, k = 0; i < g->first + g->count && fits; ++i) {
-        if (w->items[i].page == number) {
+        if (w->items[i].at.page == number) {
             w->items[i] = own[k++];
-            w->items[i].page = (uint32_t)number;
+            w->items[i].at.page = (uint32_t)number;
         }
     }
     return VSH_OK;
