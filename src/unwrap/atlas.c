@@ -2,6 +2,7 @@
 
 #include "base/memory.h"
 #include "base/try.h"
+#include "mesh/weld.h"
 #include "unwrap/patch.h"
 
 #include <stdlib.h>
@@ -96,6 +97,99 @@ done:
     return result;
 }
 
+/* --- places in 32-bit UVs */
+
+static const double LEAST_STEP = 0x1p-24; /* half of a last place just below 1 */
+
+enum {
+    PASSES = 6,
+    STEPS = 7,        /* each twice as long as the one before */
+    MOST_AROUND = 256 /* triangles of a corner that is moved */
+};
+
+typedef struct settling {
+    const vshi_patch *patch;
+    float (*uvs)[2];
+    uint32_t *begin, *around; /* around[begin[v] …]: corners at vertex v */
+} settling;
+
+/* Not positive: flipped, or without area. Exact but for the last rounding, which keeps the sign: differences
+ * and products of floats of one range are doubles. */
+static bool is_bad(const vshi_patch *p, float (*const uvs)[2], uint32_t i) {
+    const float *a = uvs[p->corner[i][0]], *b = uvs[p->corner[i][1]], *c = uvs[p->corner[i][2]];
+    return !(((double)b[0] - (double)a[0]) * ((double)c[1] - (double)a[1]) -
+                 ((double)b[1] - (double)a[1]) * ((double)c[0] - (double)a[0]) >
+             0.0);
+}
+
+/* Bad triangles around a vertex. */
+static uint32_t count_bad(const settling *s, uint32_t v) {
+    uint32_t bad = 0;
+    for (uint32_t i = s->begin[v]; i < s->begin[v + 1]; ++i) {
+        bad += is_bad(s->patch, s->uvs, s->around[i] / 3);
+    }
+    return bad;
+}
+
+/* Moves a vertex to where fewer triangles around it are bad, if it finds such a place. */
+static void move(settling *s, uint32_t v) {
+    static const int ways[8][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {-1, -1}, {1, -1}, {-1, 1}};
+    if (s->begin[v + 1] - s->begin[v] > MOST_AROUND) {
+        return;
+    }
+    float *uv = s->uvs[v], best[2] = {uv[0], uv[1]};
+    const float from[2] = {uv[0], uv[1]};
+    uint32_t least = count_bad(s, v);
+    double step = LEAST_STEP;
+    for (int length = 0; length < STEPS && least > 0; ++length, step *= 2.0) {
+        for (int way = 0; way < 8 && least > 0; ++way) {
+            for (int d = 0; d < 2; ++d) {
+                const float to = (float)((double)from[d] + step * ways[way][d]);
+                uv[d] = to < 0.0F ? 0.0F : to > 1.0F ? 1.0F : to;
+            }
+            const uint32_t bad = count_bad(s, v);
+            if (bad < least) {
+                least = bad;
+                best[0] = uv[0];
+                best[1] = uv[1];
+            }
+        }
+    }
+    uv[0] = best[0];
+    uv[1] = best[1];
+}
+
+/* Triangles that rounding has flipped or flattened, slivers all of them, are turned right by moving a corner
+ * by some last places: uvs[vertex_count] of the patch, 0 … 1. Some may stay. */
+static vsh_result settle(const vshi_patch *p, float (*uvs)[2], vsh_error *error) {
+    settling s = {.patch = p, .uvs = uvs};
+    const vshi_array arrays[] = {VSHI_ARRAY(s.begin, (size_t)p->vertex_count + 2),
+                                 VSHI_ARRAY(s.around, 3 * (size_t)p->count)};
+    vsh_result result;
+    uint32_t bad = 0;
+    for (uint32_t i = 0; i < p->count; ++i) {
+        bad += is_bad(p, uvs, i);
+    }
+    if (bad == 0) {
+        return VSH_OK;
+    }
+    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
+    vshi_list_groups(p->corner[0], 3 * (size_t)p->count, p->vertex_count, s.begin, s.around);
+    for (int pass = 0; pass < PASSES && bad > 0; ++pass) {
+        bad = 0;
+        for (uint32_t i = 0; i < p->count; ++i) {
+            for (int k = 0; k < 3 && is_bad(p, uvs, i); ++k) {
+                move(&s, p->corner[i][k]);
+            }
+            bad += is_bad(p, uvs, i);
+        }
+    }
+done:
+    free(s.around);
+    free(s.begin);
+    return result;
+}
+
 /* --- meshes */
 
 /* UVs of a mesh's vertices, chart by chart. */
@@ -118,7 +212,7 @@ static vsh_result place_vertices(struct vsh_atlas *a, size_t m, const vshi_shape
             placed[v][0] = (float)((items[c].at.x + at[0]) / page->width);
             placed[v][1] = (float)((items[c].at.y + at[1]) / page->height);
         }
-        VSHI_TRY_DONE(vshi_settle(p, placed, error));
+        VSHI_TRY_DONE(settle(p, placed, error));
         for (; vertex < made->chart_vertices && made->vertex_chart[vertex] == c; ++vertex) {
             memcpy(a->uvs[m] + 2 * vertex, placed[made->patch_vertex[vertex]], sizeof *placed);
         }

@@ -2,7 +2,6 @@
 
 #include "base/memory.h"
 #include "base/try.h"
-#include "unwrap/overlap.h"
 #include "unwrap/sparse.h"
 
 #include <stdlib.h>
@@ -261,9 +260,9 @@ static void lay_rigid(laying *l) {
 
 static vsh_result lay(laying *l, vsh_error *error) {
     vshi_patch *p = l->patch;
-    VSHI_TRY(vshi_allocate((void **)&l->flat, p->count, sizeof *l->flat, what, error));
-    VSHI_TRY(vshi_allocate((void **)&l->x, p->vertex_count, sizeof *l->x, what, error));
-    VSHI_TRY(vshi_allocate((void **)&l->best, p->vertex_count, sizeof *l->best, what, error));
+    const vshi_array arrays[] = {VSHI_ARRAY(l->flat, p->count), VSHI_ARRAY(l->x, p->vertex_count),
+                                 VSHI_ARRAY(l->best, p->vertex_count)};
+    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, what, error));
     VSHI_TRY(vshi_sparse_make((const uint32_t(*)[3])p->corner, p->count, p->place, p->vertex_count,
                               &l->system, error));
     flatten_triangles(l);

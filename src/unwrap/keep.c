@@ -1,7 +1,7 @@
 
 #include "base/memory.h"
 #include "base/try.h"
-#include "unwrap/overlap.h"
+#include "mesh/weld.h"
 #include "unwrap/patch.h"
 
 #include <stdlib.h>
@@ -48,30 +48,24 @@ static double flat_area(const vshi_patch *p) {
     return sum;
 }
 
-/* Numbers the parts of a patch that hang together: part[count]. */
-static vsh_result find_parts(const vshi_patch *p, uint32_t *part, uint32_t *parts, vsh_error *error) {
-    uint32_t *queue = NULL;
-    VSHI_TRY(vshi_allocate((void **)&queue, p->count, sizeof *queue, what, error));
-    memset(part, 0xff, p->count * sizeof *part);
-    *parts = 0;
+/* Numbers the parts of a patch that hang together, by their first triangles: part[count]. */
+static uint32_t find_parts(const vshi_patch *p, uint32_t *part) {
+    uint32_t parts = 0;
     for (uint32_t i = 0; i < p->count; ++i) {
-        uint32_t waiting = 0;
-        if (part[i] == VSHI_NONE) {
-            part[i] = *parts;
-            queue[waiting++] = i;
-            ++*parts;
-        }
-        for (uint32_t at = 0; at < waiting; ++at) {
-            for (uint32_t side = 3 * queue[at]; side < 3 * queue[at] + 3; ++side) {
-                if (p->beyond[side] != VSHI_NONE && part[p->beyond[side] / 3] == VSHI_NONE) {
-                    part[p->beyond[side] / 3] = part[i];
-                    queue[waiting++] = p->beyond[side] / 3;
-                }
-            }
+        part[i] = i;
+    }
+    for (uint32_t side = 0; side < 3 * p->count; ++side) {
+        if (p->beyond[side] != VSHI_NONE) {
+            vshi_set_join(part, side / 3, p->beyond[side] / 3);
         }
     }
-    free(queue);
-    return VSH_OK;
+    for (uint32_t i = 0; i < p->count; ++i) {
+        part[i] = vshi_set_of(part, i);
+    }
+    for (uint32_t i = 0; i < p->count; ++i) { /* the first of a part stands before the others */
+        part[i] = part[i] == i ? parts++ : part[part[i]];
+    }
+    return parts;
 }
 
 static vsh_result add_parts(const vshi_patch *whole, bool mirrored, vshi_patches *patches, vsh_error *error) {
@@ -79,24 +73,18 @@ static vsh_result add_parts(const vshi_patch *whole, bool mirrored, vshi_patches
     const double scale = sqrt(whole->area / flat_area(whole));
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&part, whole->count, sizeof *part, what, error));
-    VSHI_TRY_DONE(find_parts(whole, part, &parts, error));
+    parts = find_parts(whole, part);
     VSHI_TRY_DONE(vshi_allocate((void **)&begin, (size_t)parts + 2, sizeof *begin, what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&list, whole->count, sizeof *list, what, error));
-    for (uint32_t i = 0; i < whole->count; ++i) {
-        ++begin[part[i] + 2];
-    }
-    for (uint32_t k = 0; k < parts; ++k) {
-        begin[k + 2] += begin[k + 1];
-    }
-    for (uint32_t i = 0; i < whole->count; ++i) {
-        list[begin[part[i] + 1]++] = whole->triangles[i];
-    }
+    vshi_list_groups(part, whole->count, parts, begin, list);
     for (uint32_t k = 0; k < parts; ++k) {
         const uint32_t count = begin[k + 1] - begin[k];
         uint32_t *triangles = NULL;
         vshi_patch patch;
         VSHI_TRY_DONE(vshi_allocate((void **)&triangles, count, sizeof *triangles, what, error));
-        memcpy(triangles, list + begin[k], count * sizeof *triangles);
+        for (uint32_t i = 0; i < count; ++i) {
+            triangles[i] = whole->triangles[list[begin[k] + i]];
+        }
         result = vshi_patch_make(whole->surface, triangles, count, &patch, error);
         if (result != VSH_OK) {
             vshi_patch_free(&patch);

@@ -2,7 +2,7 @@
  * that cross are found by a grid of cells over them: where no triangle flips, a chart that lies over itself
  * has such borders, unless they meet only in corners and along each other, as those of regular grids do. A
  * raster, about as fine as the triangles, sees these: each of its points is of one triangle at most. */
-#include "unwrap/overlap.h"
+#include "unwrap/patch.h"
 
 #include "base/memory.h"
 #include "base/try.h"

@@ -17,6 +17,7 @@ typedef struct vshi_patch {
     double area;           /* surface units² */
     double stretch;        /* L2, see vsh_atlas_chart */
     bool kept;             /* uv are the mesh's own, and of any area */
+    uint32_t depth;        /* how often it was cut out of another */
 } vshi_patch;
 
 /* Takes over `triangles`, also where it fails; uv is 0. Errors: VSH_ERROR_MEMORY. Free with
@@ -48,12 +49,9 @@ vsh_result vshi_flatten(vshi_patch *patch, double max_stretch, int *came_to, vsh
 /* Scales uv to the patch's area and measures its stretch; false where a triangle flips or has no area. */
 bool vshi_flatten_measure(vshi_patch *patch);
 
-/* --- places in 32-bit UVs */
-
-/* Triangles that rounding has flipped or flattened, slivers all of them, are turned right by moving a corner
- * by some last places: uvs[vertex_count] of the patch, 0 … 1. Some may stay. Errors:
- * VSH_ERROR_MEMORY. */
-vsh_result vshi_settle(const vshi_patch *patch, float (*uvs)[2], vsh_error *error);
+/* Whether the patch lies over itself. None of its triangles flips. Borders that touch are none that cross.
+ * Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_patch_overlaps(const vshi_patch *patch, bool *overlaps, vsh_error *error);
 
 /* --- charts in parts that can be laid out */
 
@@ -63,8 +61,8 @@ typedef struct vshi_patches {
     size_t count, capacity;
 } vshi_patches;
 
-/* Takes over the patch, also where it fails. Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_patches_add(vshi_patches *patches, const vshi_patch *patch, vsh_error *error);
+/* Takes over the patch, also where it fails, and leaves it empty. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_patches_add(vshi_patches *patches, vshi_patch *patch, vsh_error *error);
 void vshi_patches_free(vshi_patches *patches);
 
 /* Lays triangles (ascending, taken over) out as one chart, or as many as it takes so that none folds or

@@ -168,8 +168,7 @@ static vsh_result lay_out_all(const making *m, vsh_error *error) {
         }
         for (size_t k = 0; k < charts[i].patches.count; ++k) {
             vshi_patch *patch = &charts[i].patches.list[k];
-            result = vshi_patches_add(&charts[i].shape->patches, patch, error);
-            *patch = (vshi_patch){0}; /* it is theirs, or freed */
+            VSHI_TRY_DONE(vshi_patches_add(&charts[i].shape->patches, patch, error));
             VSHI_TRY_DONE(result);
         }
     }

@@ -67,12 +67,4 @@ bool vshi_sparse_factor(vshi_sparse *system);
 /* Solves for one right side [count], by vertex, in place. */
 void vshi_sparse_solve(const vshi_sparse *system, vshi_complex *right);
 
-/* --- the order of elimination */
-
-/* Nested dissection (George, "Nested dissection of a regular finite element mesh", 1973) by planes through
- * space: order[v] is the row of vertex v. neighbours[begin[v] … begin[v + 1]] are the vertices beside v.
- * Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_dissect(const uint32_t *begin, const uint32_t *neighbours, const vshi_vec *place,
-                        uint32_t count, uint32_t *order, vsh_error *error);
-
 #endif

@@ -3,7 +3,7 @@
 #include "testing.h"
 #include "unwraps.h"
 
-#include "unwrap/overlap.h"
+#include "unwrap/patch.h"
 
 static const double ORIGIN[3] = {0, 0, 0};
 
