@@ -30,7 +30,7 @@ typedef struct vshi_cut_mesh {
     uint32_t unit_count;  /* without those of triangles that have no area */
 } vshi_cut_mesh;
 
-/* Bytes that a mesh's surface takes, with what making it takes, at most. */
+/* Bytes that a mesh's surface takes, with what making it and its charts takes, at most. */
 double vshi_cut_mesh_bytes(const vsh_mesh *mesh);
 
 /* What charts are cut along. */
@@ -45,10 +45,10 @@ vsh_result vshi_cut_mesh_make(const vsh_mesh *mesh, size_t index, int cut, vshi_
                               vsh_error *error);
 void vshi_cut_mesh_free(vshi_cut_mesh *surface);
 
-/* Gives each unit the number of its chart, owner[unit_count], and tells how many there are. A chart hangs
- * together, and its normals are within some 60° of their mean. The job tells whether to stop. Errors:
- * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-vsh_result vshi_grow_charts(const vshi_cut_mesh *surface, vshi_job *job, uint32_t *owner,
+/* Gives each triangle the number of its chart, chart_of[count], or VSHI_NONE, and tells how many there are. A
+ * chart is of whole units, hangs together, and its normals are within some 60° of their mean. The job tells
+ * whether to stop. Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_grow_charts(const vshi_cut_mesh *surface, vshi_job *job, uint32_t *chart_of,
                             uint32_t *chart_count, vsh_error *error);
 
 static inline void vshi_cut_mesh_corners(const vshi_cut_mesh *surface, size_t i, vshi_vec corner[3]) {

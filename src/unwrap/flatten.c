@@ -143,6 +143,14 @@ static void find_pins(const vshi_patch *p, uint32_t pins[2]) {
     }
 }
 
+static void solve(laying *l) {
+    vshi_sparse_solve(&l->system, l->x);
+    for (uint32_t v = 0; v < l->patch->vertex_count; ++v) {
+        l->patch->uv[v][0] = l->x[v].re;
+        l->patch->uv[v][1] = l->x[v].im;
+    }
+}
+
 static bool lay_conformal(laying *l) {
     vshi_patch *p = l->patch;
     uint32_t pins[2] = {0, 0};
@@ -151,20 +159,14 @@ static bool lay_conformal(laying *l) {
     for (uint32_t i = 0; i < p->count; ++i) {
         add_conformal(l, i);
     }
-    for (uint32_t v = 0; v < p->vertex_count; ++v) {
-        l->x[v] = (vshi_complex){0.0, 0.0};
-    }
+    memset(l->x, 0, p->vertex_count * sizeof *l->x);
     vshi_sparse_pin(&l->system, pins[0], (vshi_complex){0.0, 0.0}, l->x);
     vshi_sparse_pin(&l->system, pins[1],
                     (vshi_complex){vshi_length(vshi_sub(p->place[pins[1]], p->place[pins[0]])), 0.0}, l->x);
     if (!vshi_sparse_factor(&l->system)) {
         return false;
     }
-    vshi_sparse_solve(&l->system, l->x);
-    for (uint32_t v = 0; v < p->vertex_count; ++v) {
-        p->uv[v][0] = l->x[v].re;
-        p->uv[v][1] = l->x[v].im;
-    }
+    solve(l);
     return true;
 }
 
@@ -190,18 +192,14 @@ static bool prepare_rigid(laying *l) {
             vshi_sparse_add(&l->system, b, c, (vshi_complex){-weight, 0.0});
         }
     }
-    for (uint32_t v = 0; v < p->vertex_count; ++v) {
-        l->x[v] = (vshi_complex){0.0, 0.0};
-    }
+    memset(l->x, 0, p->vertex_count * sizeof *l->x);
     vshi_sparse_pin(&l->system, 0, (vshi_complex){0.0, 0.0}, l->x); /* where it lies changes nothing */
     return vshi_sparse_factor(&l->system);
 }
 
 static void step_rigid(laying *l) {
     vshi_patch *p = l->patch;
-    for (uint32_t v = 0; v < p->vertex_count; ++v) {
-        l->x[v] = (vshi_complex){0.0, 0.0};
-    }
+    memset(l->x, 0, p->vertex_count * sizeof *l->x);
     for (uint32_t i = 0; i < p->count; ++i) {
         const vshi_complex *at = l->flat[i];
         vshi_complex turn = {0.0, 0.0}, edge[3];
@@ -224,11 +222,7 @@ static void step_rigid(laying *l) {
         }
     }
     l->x[0] = (vshi_complex){0.0, 0.0};
-    vshi_sparse_solve(&l->system, l->x);
-    for (uint32_t v = 0; v < p->vertex_count; ++v) {
-        p->uv[v][0] = l->x[v].re;
-        p->uv[v][1] = l->x[v].im;
-    }
+    solve(l);
 }
 
 static void keep_best(laying *l) {

@@ -93,8 +93,10 @@ static void measure_units(growing *w) {
         own->centre = vshi_scale(centre, 1.0 / own->area);
         total += own->area;
     }
-    memcpy(w->by_area, w->units, w->count * sizeof *w->units);
-    qsort(w->by_area, w->count, sizeof *w->by_area, compare_areas);
+    if (w->count > 0) {
+        memcpy(w->by_area, w->units, w->count * sizeof *w->units);
+        qsort(w->by_area, w->count, sizeof *w->by_area, compare_areas);
+    }
     w->radius = 0.2 * sqrt(total);
 }
 
@@ -293,32 +295,37 @@ static uint32_t move_teeth(growing *w) {
     return moved;
 }
 
-vsh_result vshi_grow_charts(const vshi_cut_mesh *surface, vshi_job *job, uint32_t *owner,
+vsh_result vshi_grow_charts(const vshi_cut_mesh *surface, vshi_job *job, uint32_t *chart_of,
                             uint32_t *chart_count, vsh_error *error) {
-    growing w = {.surface = surface, .job = job, .count = surface->unit_count, .owner = owner};
-    const vshi_array arrays[] = {VSHI_ARRAY(w.units, w.count), VSHI_ARRAY(w.begin, (size_t)w.count + 1),
-                                 VSHI_ARRAY(w.sides, 3 * surface->count), VSHI_ARRAY(w.by_area, w.count),
+    growing w = {.surface = surface, .job = job, .count = surface->unit_count};
+    const vshi_array arrays[] = {VSHI_ARRAY(w.units, w.count),
+                                 VSHI_ARRAY(w.begin, (size_t)w.count + 1),
+                                 VSHI_ARRAY(w.sides, 3 * surface->count),
+                                 VSHI_ARRAY(w.by_area, w.count),
+                                 VSHI_ARRAY(w.owner, w.count),
                                  VSHI_ARRAY(w.charts, w.count)};
     vsh_result result;
-    *chart_count = 0;
-    if (w.count == 0) {
-        return VSH_OK;
-    }
     VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
     measure_units(&w);
     list_sides(&w);
     VSHI_TRY_DONE(smooth_normals(&w, error));
-    memset(owner, 0xff, w.count * sizeof *owner);
+    for (uint32_t u = 0; u < w.count; ++u) {
+        w.owner[u] = VSHI_NONE;
+    }
     VSHI_TRY_DONE(grow_rest(&w, error));
     for (int round = 0; round < ROUNDS && w.chart_count < w.count; ++round) {
         VSHI_TRY_DONE(grow_again(&w, error));
     }
     for (int round = 0; round < BORDER_SMOOTHINGS && move_teeth(&w) > 0; ++round) {
     }
+    for (size_t i = 0; i < surface->count; ++i) {
+        chart_of[i] = surface->unit[i] != VSHI_NONE ? w.owner[surface->unit[i]] : VSHI_NONE;
+    }
     *chart_count = w.chart_count;
 done:
     free(w.heap.entries);
     free(w.charts);
+    free(w.owner);
     free(w.by_area);
     free(w.sides);
     free(w.begin);

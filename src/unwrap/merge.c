@@ -1,8 +1,7 @@
-#include "unwrap/merge.h"
+#include "unwrap/shapes.h"
 
 #include "base/memory.h"
 #include "base/try.h"
-#include "unwrap/patch.h"
 
 #include <stdlib.h>
 
@@ -19,18 +18,19 @@ static const double HARD = 0.3;          /* what a length of seam counts as shar
  * 1. Charts beyond that are joined only where they become no worse. */
 static const double ROUND = 28.0, NO_WORSE = 1.1;
 
-static vsh_result measure(vshi_merging *m, vsh_error *error) {
-    const vshi_cut_mesh *s = m->surface;
-    const size_t count = m->patches->count;
-    VSHI_TRY(vshi_allocate((void **)&m->owner, s->count, sizeof *m->owner, what, error));
-    VSHI_TRY(vshi_allocate((void **)&m->perimeter, count, sizeof *m->perimeter, what, error));
-    VSHI_TRY(vshi_allocate((void **)&m->version, count, sizeof *m->version, what, error));
-    VSHI_TRY(vshi_allocate((void **)&m->trials, count / 2 + 1, sizeof *m->trials, what, error));
-    if (s->count > 0) {
-        memset(m->owner, 0xff, s->count * sizeof *m->owner);
-    }
+vsh_result vshi_merging_begin(const vshi_cut_mesh *s, vshi_patches *patches, double max_stretch,
+                              double max_area, vshi_merging *m, vsh_error *error) {
+    const size_t count = patches->count;
+    *m = (vshi_merging){.surface = s,
+                        .patches = patches,
+                        .max_area = max_area,
+                        .max_stretch = fmin(max_stretch, MOST_STRETCH)};
+    const vshi_array arrays[] = {VSHI_ARRAY(m->owner, s->count), VSHI_ARRAY(m->perimeter, count),
+                                 VSHI_ARRAY(m->version, count), VSHI_ARRAY(m->trials, count / 2 + 1)};
+    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, what, error));
+    memset(m->owner, 0xff, s->count * sizeof *m->owner);
     for (uint32_t c = 0; c < count; ++c) {
-        const vshi_patch *p = &m->patches->list[c];
+        const vshi_patch *p = &patches->list[c];
         m->version[c] = m->versions++;
         for (uint32_t i = 0; i < p->count; ++i) {
             m->owner[p->triangles[i]] = c;
@@ -42,15 +42,6 @@ static vsh_result measure(vshi_merging *m, vsh_error *error) {
         }
     }
     return VSH_OK;
-}
-
-vsh_result vshi_merging_begin(const vshi_cut_mesh *surface, vshi_patches *patches, double max_stretch,
-                              double max_area, vshi_merging *m, vsh_error *error) {
-    *m = (vshi_merging){.surface = surface,
-                        .patches = patches,
-                        .max_area = max_area,
-                        .max_stretch = max_stretch < MOST_STRETCH ? max_stretch : MOST_STRETCH};
-    return measure(m, error);
 }
 
 static void drop_trials(vshi_merging *m) {
@@ -124,25 +115,16 @@ static bool promising(const vshi_merging *m, const border *pair) {
 /* Borders by pairs of charts. */
 static vsh_result find_pairs(const vshi_merging *m, border **pairs, size_t *count, vsh_error *error) {
     const vshi_cut_mesh *s = m->surface;
-    size_t sides = 0;
-    for (int pass = 0; pass < 2; ++pass) {
-        size_t at = 0;
-        for (uint32_t side = 0; side < 3 * (uint32_t)s->count; ++side) {
-            const uint32_t other = s->partner[side], a = m->owner[side / 3],
-                           b = other != VSHI_NONE ? m->owner[other / 3] : a;
-            if (a == VSHI_NONE || b == VSHI_NONE || a >= b) {
-                continue;
-            }
-            if (pass == 1) {
-                const double length = vshi_side_length(s, side);
-                (*pairs)[at] = (border){a, b, side, length, s->soft[side] ? length : HARD * length};
-            }
-            ++at;
+    size_t sides = 0, room = 0;
+    for (uint32_t side = 0; side < 3 * (uint32_t)s->count; ++side) {
+        const uint32_t other = s->partner[side], a = m->owner[side / 3],
+                       b = other != VSHI_NONE ? m->owner[other / 3] : a;
+        if (a == VSHI_NONE || b == VSHI_NONE || a >= b) {
+            continue;
         }
-        sides = at;
-        if (pass == 0) {
-            VSHI_TRY(vshi_allocate((void **)pairs, sides, sizeof **pairs, what, error));
-        }
+        const double length = vshi_side_length(s, side);
+        VSHI_TRY(vshi_make_room((void **)pairs, sides, &room, sizeof **pairs, what, error));
+        (*pairs)[sides++] = (border){a, b, side, length, s->soft[side] ? length : HARD * length};
     }
     if (sides > 0) {
         qsort(*pairs, sides, sizeof **pairs, compare_borders);
@@ -184,7 +166,8 @@ vsh_result vshi_merging_plan(vshi_merging *m, vsh_error *error) {
         if (!taken[pair->a] && !taken[pair->b]) {
             taken[pair->a] = taken[pair->b] = 1;
             m->trials[m->trial_count++] =
-                (vshi_trial){.a = pair->a,
+                (vshi_trial){.merging = m,
+                             .a = pair->a,
                              .b = pair->b,
                              .perimeter = m->perimeter[pair->a] + m->perimeter[pair->b] - 2.0 * pair->length};
         }
@@ -195,8 +178,8 @@ done:
     return result;
 }
 
-vsh_result vshi_merging_try(vshi_merging *m, uint32_t index, vsh_error *error) {
-    vshi_trial *trial = &m->trials[index];
+vsh_result vshi_merging_try(vshi_trial *trial, vsh_error *error) {
+    const vshi_merging *m = trial->merging;
     const vshi_patch *a = &m->patches->list[trial->a], *b = &m->patches->list[trial->b];
     uint32_t *triangles = NULL;
     int came_to = VSHI_FOLDED;
@@ -216,22 +199,6 @@ vsh_result vshi_merging_try(vshi_merging *m, uint32_t index, vsh_error *error) {
     if (!trial->good) {
         vshi_patch_free(&trial->patch);
     }
-    return VSH_OK;
-}
-
-static vsh_result note_failure(vshi_merging *m, uint64_t key, vsh_error *error) {
-    if (m->failed_count == m->failed_capacity) {
-        uint64_t *more;
-        const size_t capacity = m->failed_capacity > 0 ? 2 * m->failed_capacity : 64;
-        VSHI_TRY(vshi_allocate((void **)&more, capacity, sizeof *more, what, error));
-        if (m->failed_count > 0) {
-            memcpy(more, m->failed, m->failed_count * sizeof *more);
-        }
-        free(m->failed);
-        m->failed = more;
-        m->failed_capacity = capacity;
-    }
-    m->failed[m->failed_count++] = key;
     return VSH_OK;
 }
 
@@ -259,7 +226,9 @@ vsh_result vshi_merging_apply(vshi_merging *m, vsh_error *error) {
     for (uint32_t i = 0; i < m->trial_count; ++i) {
         vshi_trial *trial = &m->trials[i];
         if (!trial->good) {
-            VSHI_TRY(note_failure(m, key_of(m, trial->a, trial->b), error));
+            VSHI_TRY(vshi_make_room((void **)&m->failed, m->failed_count, &m->failed_capacity,
+                                    sizeof *m->failed, what, error));
+            m->failed[m->failed_count++] = key_of(m, trial->a, trial->b);
             continue;
         }
         vshi_patch_free(&m->patches->list[trial->a]);

@@ -4,12 +4,21 @@
 
 #include "base/memory.h"
 #include "base/try.h"
+#include "mesh/weld.h"
 
 #include <stdlib.h>
 
 static const char what[] = "a chart's equations";
 
 #define NONE UINT32_MAX
+
+/* The vertices beside vertex v: others[2 first[v]] … others[end[v] - 1], ascending, each once. */
+typedef struct adjacency {
+    uint32_t *first;   /* [vertex_count + 2] in `corners` */
+    uint32_t *corners; /* [3 triangles], by vertex */
+    uint32_t *end;     /* [vertex_count] */
+    uint32_t *others;  /* [6 triangles] */
+} adjacency;
 
 /* --- the order of elimination: nested dissection (George, "Nested dissection of a regular finite element
  * mesh", 1973) by planes through space */
@@ -22,7 +31,7 @@ typedef struct part {
 } part;
 
 typedef struct dissecting {
-    const uint32_t *begin, *neighbours;
+    const adjacency *neighbours;
     const vshi_vec *place;
     uint32_t *list; /* vertices */
     uint32_t *side; /* [count]: the part that a vertex is in, times two, and whether it is beyond the plane */
@@ -74,12 +83,13 @@ static bool cut(dissecting *d, const part *p, uint32_t tag, bool turned, part ha
         const uint32_t v = d->list[i];
         d->side[v] = 2 * tag + ((along(d->place[v], axis) > middle) != turned);
     }
+    const adjacency *a = d->neighbours;
     uint32_t near = p->begin, beyond = 0, between = p->end;
     for (uint32_t i = p->begin; i < p->end; ++i) {
         const uint32_t v = d->list[i];
         bool touches = false;
-        for (uint32_t n = d->begin[v]; d->side[v] == 2 * tag && n < d->begin[v + 1] && !touches; ++n) {
-            touches = d->side[d->neighbours[n]] == 2 * tag + 1;
+        for (uint32_t n = 2 * a->first[v]; d->side[v] == 2 * tag && n < a->end[v] && !touches; ++n) {
+            touches = d->side[a->others[n]] == 2 * tag + 1;
         }
         if (touches) {
             d->other[--between] = v;
@@ -116,10 +126,10 @@ static bool cut(dissecting *d, const part *p, uint32_t tag, bool turned, part ha
     return true;
 }
 
-/* order[v] is the row of vertex v. neighbours[begin[v] … begin[v + 1]] are the vertices beside v. */
-static vsh_result dissect(const uint32_t *begin, const uint32_t *neighbours, const vshi_vec *place,
-                          uint32_t count, uint32_t *order, vsh_error *error) {
-    dissecting d = {.begin = begin, .neighbours = neighbours, .place = place, .order = order};
+/* order[v] is the row of vertex v. */
+static vsh_result dissect(const adjacency *neighbours, const vshi_vec *place, uint32_t count, uint32_t *order,
+                          vsh_error *error) {
+    dissecting d = {.neighbours = neighbours, .place = place, .order = order};
     const vshi_array arrays[] = {VSHI_ARRAY(d.list, count), VSHI_ARRAY(d.side, count),
                                  VSHI_ARRAY(d.other, count)};
     part stack[DEEPEST + 2];
@@ -151,65 +161,36 @@ done:
 
 /* --- the system */
 
-/* neighbours[begin[v] …]: the other ends of each vertex's edges, ascending, each once. They are listed by
- * both ends and turned about, so that no vertex of many edges makes sorting slow. */
-static vsh_result list_neighbours(const uint32_t (*triangles)[3], uint32_t count, uint32_t vertex_count,
-                                  uint32_t **begin, uint32_t **neighbours, vsh_error *error) {
-    uint32_t *found = NULL, *end = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)begin, (size_t)vertex_count + 1, sizeof **begin, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&end, vertex_count, sizeof *end, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&found, count, 6 * sizeof *found, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)neighbours, count, 6 * sizeof **neighbours, what, error));
-    for (uint32_t i = 0; i < count; ++i) {
-        for (int k = 0; k < 3; ++k) {
-            (*begin)[triangles[i][k] + 1] += 2;
-        }
+/* Each vertex is listed at those beside it, in its turn: so lists ascend, and no vertex of many edges makes
+ * sorting slow. */
+static vsh_result find_neighbours(const uint32_t (*triangles)[3], uint32_t count, uint32_t vertex_count,
+                                  adjacency *a, vsh_error *error) {
+    const size_t corners = 3 * (size_t)count;
+    const vshi_array arrays[] = {VSHI_ARRAY(a->first, (size_t)vertex_count + 2),
+                                 VSHI_ARRAY(a->corners, corners), VSHI_ARRAY(a->end, vertex_count),
+                                 VSHI_ARRAY(a->others, 2 * corners)};
+    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, what, error));
+    vshi_list_groups(triangles[0], corners, vertex_count, a->first, a->corners);
+    for (uint32_t v = 0; v < vertex_count; ++v) {
+        a->end[v] = 2 * a->first[v];
     }
     for (uint32_t v = 0; v < vertex_count; ++v) {
-        end[v] = (*begin)[v];
-        (*begin)[v + 1] += (*begin)[v];
-    }
-    for (uint32_t i = 0; i < count; ++i) {
-        for (int k = 0; k < 3; ++k) {
-            found[end[triangles[i][k]]++] = triangles[i][(k + 1) % 3];
-            found[end[triangles[i][k]]++] = triangles[i][(k + 2) % 3];
-        }
-    }
-    for (uint32_t v = 0; v < vertex_count; ++v) {
-        end[v] = (*begin)[v];
-    }
-    for (uint32_t v = 0; v < vertex_count; ++v) {
-        for (uint32_t i = (*begin)[v]; i < (*begin)[v + 1]; ++i) {
-            const uint32_t w = found[i];
-            if (end[w] == (*begin)[w] || (*neighbours)[end[w] - 1] != v) {
-                (*neighbours)[end[w]++] = v;
+        for (uint32_t i = 2 * a->first[v]; i < 2 * a->first[v + 1]; ++i) {
+            const uint32_t corner = a->corners[i / 2], w = triangles[corner / 3][(corner + 1 + i % 2) % 3];
+            if (a->end[w] == 2 * a->first[w] || a->others[a->end[w] - 1] != v) {
+                a->others[a->end[w]++] = v;
             }
         }
     }
-    for (uint32_t v = 0, kept = 0; v < vertex_count; ++v) { /* close up */
-        const uint32_t first = (*begin)[v];
-        (*begin)[v] = kept;
-        for (uint32_t i = first; i < end[v]; ++i) {
-            (*neighbours)[kept++] = (*neighbours)[i];
-        }
-        if (v + 1 == vertex_count) {
-            (*begin)[vertex_count] = kept;
-        }
-    }
-done:
-    free(found);
-    free(end);
-    return result;
+    return VSH_OK;
 }
 
-static vsh_result fill_rows(vshi_sparse *m, const uint32_t *begin, const uint32_t *neighbours,
-                            vsh_error *error) {
+static vsh_result fill_rows(vshi_sparse *m, const adjacency *a, vsh_error *error) {
     uint32_t *vertex = m->marks, *end = m->filled; /* which are not needed yet */
     for (uint32_t v = 0; v < m->count; ++v) {
         vertex[m->order[v]] = v;
-        for (uint32_t i = begin[v]; i < begin[v + 1]; ++i) {
-            m->begin[m->order[v] + 1] += m->order[neighbours[i]] < m->order[v];
+        for (uint32_t i = 2 * a->first[v]; i < a->end[v]; ++i) {
+            m->begin[m->order[v] + 1] += m->order[a->others[i]] < m->order[v];
         }
     }
     for (uint32_t r = 0; r < m->count; ++r) {
@@ -221,8 +202,8 @@ static vsh_result fill_rows(vshi_sparse *m, const uint32_t *begin, const uint32_
     VSHI_TRY(vshi_allocate((void **)&m->value, entries, sizeof *m->value, what, error));
     for (uint32_t column = 0; column < m->count; ++column) {
         const uint32_t v = vertex[column];
-        for (uint32_t i = begin[v]; i < begin[v + 1]; ++i) {
-            const uint32_t row = m->order[neighbours[i]];
+        for (uint32_t i = 2 * a->first[v]; i < a->end[v]; ++i) {
+            const uint32_t row = m->order[a->others[i]];
             if (row > column) {
                 m->column[end[row]++] = column;
             }
@@ -261,7 +242,7 @@ static vsh_result plan_factor(vshi_sparse *m, vsh_error *error) {
 vsh_result vshi_sparse_make(const uint32_t (*triangles)[3], uint32_t count, const vshi_vec *place,
                             uint32_t vertex_count, vshi_sparse *m, vsh_error *error) {
     *m = (vshi_sparse){.count = vertex_count};
-    uint32_t *begin = NULL, *neighbours = NULL;
+    adjacency a = {NULL, NULL, NULL, NULL};
     vsh_result result;
     const vshi_array arrays[] = {VSHI_ARRAY(m->order, vertex_count),
                                  VSHI_ARRAY(m->begin, (size_t)vertex_count + 1),
@@ -274,13 +255,15 @@ vsh_result vshi_sparse_make(const uint32_t (*triangles)[3], uint32_t count, cons
                                  VSHI_ARRAY(m->stack, vertex_count),
                                  VSHI_ARRAY(m->filled, vertex_count)};
     VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
-    VSHI_TRY_DONE(list_neighbours(triangles, count, vertex_count, &begin, &neighbours, error));
-    VSHI_TRY_DONE(dissect(begin, neighbours, place, vertex_count, m->order, error));
-    VSHI_TRY_DONE(fill_rows(m, begin, neighbours, error));
+    VSHI_TRY_DONE(find_neighbours(triangles, count, vertex_count, &a, error));
+    VSHI_TRY_DONE(dissect(&a, place, vertex_count, m->order, error));
+    VSHI_TRY_DONE(fill_rows(m, &a, error));
     VSHI_TRY_DONE(plan_factor(m, error));
 done:
-    free(neighbours);
-    free(begin);
+    free(a.others);
+    free(a.end);
+    free(a.corners);
+    free(a.first);
     return result;
 }
 

@@ -7,8 +7,6 @@
 #include <stdlib.h>
 
 static const double LEAST_STRETCH = 1.01; /* of max_stretch: below, rounding and texels decide */
-static const double STEPS_BYTES =
-    420.0; /* a triangle, while charts are made: patches, trials and their equations */
 
 enum { MOST_PADDING = 4096 };
 
@@ -70,8 +68,7 @@ static vsh_result check_memory(const vsh_mesh *meshes, size_t mesh_count, const 
     double bytes = (double)mesh_count * 128.0;
     for (size_t i = 0; i < shapes->count; ++i) {
         const vsh_mesh *mesh = shapes->list[i].mesh;
-        bytes += vshi_cut_mesh_bytes(mesh) + STEPS_BYTES * (double)mesh->triangle_count +
-                 vshi_atlas_shape_bytes(mesh->triangle_count);
+        bytes += vshi_cut_mesh_bytes(mesh) + vshi_atlas_shape_bytes(mesh->triangle_count);
     }
     for (size_t m = 0; m < mesh_count; ++m) {
         bytes += vshi_atlas_mesh_bytes(meshes[m].triangle_count);
@@ -109,21 +106,6 @@ static vsh_result make_items(const vshi_shapes *shapes, size_t mesh_count, const
     return VSH_OK;
 }
 
-static vsh_result lay_out(vshi_shapes *shapes, const vsh_mesh *meshes, size_t mesh_count,
-                          const vsh_unwrap_options *options, const vsh_run *run, vsh_error *error) {
-    size_t triangles = 0;
-    for (size_t i = 0; i < shapes->count; ++i) {
-        triangles += shapes->list[i].mesh->triangle_count;
-    }
-    vshi_job *job = vshi_job_begin(run, "unwrap", VSHI_SHAPE_STEPS * triangles);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "unwrap: the system refused memory");
-    }
-    const vsh_result result = vshi_shapes_lay_out(shapes, meshes, mesh_count, options, job, error);
-    vshi_job_end(job);
-    return result;
-}
-
 vsh_result vsh_unwrap(const vsh_mesh *meshes, size_t mesh_count, const vsh_unwrap_options *options,
                       const vsh_run *run, vsh_atlas **atlas, vsh_error *error) {
     VSHI_FLOATS;
@@ -143,7 +125,7 @@ vsh_result vsh_unwrap(const vsh_mesh *meshes, size_t mesh_count, const vsh_unwra
     vsh_result result;
     VSHI_TRY_DONE(vshi_shapes_find(meshes, mesh_count, &shapes, error));
     VSHI_TRY_DONE(check_memory(meshes, mesh_count, &shapes, &o, &full, error));
-    VSHI_TRY_DONE(lay_out(&shapes, meshes, mesh_count, &o, &full, error));
+    VSHI_TRY_DONE(vshi_shapes_lay_out(&shapes, &o, &full, error));
     VSHI_TRY_DONE(make_items(&shapes, mesh_count, o.density, &items, &count, error));
     VSHI_TRY_DONE(vshi_pages_pack(&o, meshes, mesh_count, &shapes, items, count, &full, &pages, error));
     VSHI_TRY_DONE(vshi_atlas_make(mesh_count, &shapes, &pages, items, count, atlas, error));
@@ -151,29 +133,5 @@ done:
     free(pages.list);
     free(items);
     vshi_shapes_free(&shapes);
-    return result;
-}
-
-vsh_result vsh_uvs_usable(const vsh_mesh *mesh, const vsh_run *run, int32_t *usable, vsh_error *error) {
-    VSHI_FLOATS;
-    VSHI_NEEDS(mesh);
-    VSHI_NEEDS(usable);
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    VSHI_TRY(vshi_mesh_check_data(mesh, VSHI_MESH_ALONE, error));
-    VSHI_TRY(vshi_check_limit(&full, vshi_cut_mesh_bytes(mesh) + STEPS_BYTES * (double)mesh->triangle_count,
-                              "looking at UVs", error));
-    vshi_cut_mesh surface;
-    bool found = false;
-    vsh_result result = VSH_OK;
-    *usable = 0;
-    if (mesh->uvs == NULL) {
-        return VSH_OK;
-    }
-    VSHI_TRY_DONE(vshi_cut_mesh_make(mesh, VSHI_MESH_ALONE, VSHI_CUT_UVS, &surface, error));
-    VSHI_TRY_DONE(vshi_keep_charts(&surface, NULL, &found, error));
-    *usable = found;
-done:
-    vshi_cut_mesh_free(&surface);
     return result;
 }
