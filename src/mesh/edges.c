@@ -45,10 +45,6 @@ static int compare_uses(const void *a, const void *b) {
     return (x->side > y->side) - (x->side < y->side);
 }
 
-static vshi_vec place_of(const finding *f, uint32_t vertex) {
-    return vshi_transform_point(f->mesh->transform, vshi_vec_off(f->mesh->positions + 3 * (size_t)vertex));
-}
-
 static void join(vshi_edges *edges, uint32_t a, uint32_t b) {
     edges->partner[a] = b;
     edges->partner[b] = a;
@@ -127,12 +123,12 @@ static vsh_result join_many(finding *f, size_t count, vsh_error *error) {
     spoke *spokes = NULL;
     VSHI_TRY(vshi_allocate((void **)&spokes, count, sizeof *spokes, "triangles of an edge", error));
     vshi_side_ends(f->corners, uses[0].side, ends);
-    const vshi_vec origin = place_of(f, ends[0]);
-    const vshi_vec axis = vshi_unit(vshi_sub(place_of(f, ends[1]), origin));
+    const vshi_vec origin = vshi_mesh_place(f->mesh, ends[0]);
+    const vshi_vec axis = vshi_unit(vshi_sub(vshi_mesh_place(f->mesh, ends[1]), origin));
     vshi_vec u, v;
     vshi_frame(axis, &u, &v);
     for (size_t i = 0; i < count; ++i) {
-        const vshi_vec to = vshi_sub(place_of(f, uses[i].third), origin);
+        const vshi_vec to = vshi_sub(vshi_mesh_place(f->mesh, uses[i].third), origin);
         spokes[i] = (spoke){vshi_atan2(vshi_dot(to, v), vshi_dot(to, u)), uses[i].side, uses[i].downwards,
                             f->frayed != NULL && f->frayed[uses[i].side / 3], false};
     }

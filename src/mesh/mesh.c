@@ -49,32 +49,6 @@ vsh_result vshi_mesh_check_transform(const vsh_mesh *mesh, size_t index, vsh_err
     return VSH_OK;
 }
 
-/* Whether all positions are finite, and stay so in the world: by the largest, without a branch. */
-static bool positions_hold(const vsh_mesh *mesh) {
-    uint32_t most = 0;
-    for (size_t i = 0; i < 3 * mesh->vertex_count; ++i) {
-        uint32_t bits;
-        memcpy(&bits, &mesh->positions[i], sizeof bits);
-        bits &= 0x7fffffff; /* without the sign: they are in order of what they stand for */
-        most = bits > most ? bits : most;
-    }
-    float farthest;
-    memcpy(&farthest, &most, sizeof farthest);
-    double sum = (double)farthest;
-    for (int i = 0; mesh->transform != NULL && i < 12; ++i) {
-        sum += fabs(mesh->transform[i]) * (i % 4 == 3 ? 1.0 : (double)farthest);
-    }
-    return isfinite(sum);
-}
-
-static bool indices_hold(const vsh_mesh *mesh) {
-    uint32_t most = 0;
-    for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
-        most = mesh->indices[i] > most ? mesh->indices[i] : most;
-    }
-    return mesh->triangle_count == 0 || most < mesh->vertex_count;
-}
-
 vsh_result vshi_mesh_validate(const vsh_mesh *mesh, size_t index, vsh_error *error) {
     if ((mesh->positions == NULL && mesh->vertex_count > 0) ||
         (mesh->indices == NULL && mesh->triangle_count > 0)) {
@@ -88,11 +62,9 @@ vsh_result vshi_mesh_validate(const vsh_mesh *mesh, size_t index, vsh_error *err
                          UINT32_MAX, SIZE_MAX / 64);
     }
     VSHI_TRY(vshi_mesh_check_transform(mesh, index, error));
-    const bool positions_held = positions_hold(mesh), indices_held = indices_hold(mesh);
-    for (size_t v = 0; !positions_held && v < mesh->vertex_count; ++v) {
-        const float *p = mesh->positions + 3 * v;
-        const vshi_vec local = vshi_vec_off(p);
-        if (!vshi_finite(local) || !vshi_finite(vshi_transform_point(mesh->transform, local))) {
+    for (size_t v = 0; v < mesh->vertex_count; ++v) {
+        const vshi_vec local = vshi_vec_off(mesh->positions + 3 * v);
+        if (!vshi_finite(local) || !vshi_finite(vshi_mesh_place(mesh, v))) {
             return vshi_fail(error, VSH_ERROR_INPUT, "%s: vertex %zu of %zu lies at (%g, %g, %g)%s",
                              vshi_mesh_label(mesh, index).text, v, mesh->vertex_count, local.x, local.y,
                              local.z,
@@ -100,7 +72,7 @@ vsh_result vshi_mesh_validate(const vsh_mesh *mesh, size_t index, vsh_error *err
                                                 : ", expected finite numbers");
         }
     }
-    for (size_t i = 0; !indices_held && i < 3 * mesh->triangle_count; ++i) {
+    for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
         if (mesh->indices[i] >= mesh->vertex_count) {
             return vshi_fail(error, VSH_ERROR_INPUT,
                              "%s: triangle %zu uses vertex %u, but there are only %zu",
@@ -190,16 +162,14 @@ static vshi_terrain guess_terrain(const vsh_mesh *mesh) {
         return (vshi_terrain){0};
     }
     const size_t columns = (size_t)mesh->indices[1] - 1, vertices = mesh->vertex_count;
-    vshi_terrain t = {columns, vertices / columns, false};
-    if (t.rows >= 2 && vshi_terrain_vertex_count(t) == vertices &&
-        vshi_terrain_triangle_count(t) == mesh->triangle_count) {
-        return t;
-    }
-    t = (vshi_terrain){columns, vertices + 3 > 2 * columns ? (vertices + 3 - 2 * columns) / (columns + 2) : 0,
-                       true};
-    if (t.rows >= 2 && vshi_terrain_vertex_count(t) == vertices &&
-        vshi_terrain_triangle_count(t) == mesh->triangle_count) {
-        return t;
+    const vshi_terrain guesses[2] = {
+        {columns, vertices / columns, false},
+        {columns, vertices + 3 > 2 * columns ? (vertices + 3 - 2 * columns) / (columns + 2) : 0, true}};
+    for (int i = 0; i < 2; ++i) {
+        if (guesses[i].rows >= 2 && vshi_terrain_vertex_count(guesses[i]) == vertices &&
+            vshi_terrain_triangle_count(guesses[i]) == mesh->triangle_count) {
+            return guesses[i];
+        }
     }
     return (vshi_terrain){0};
 }
@@ -217,4 +187,103 @@ bool vshi_mesh_is_terrain(const vsh_mesh *mesh, vshi_terrain *terrain) {
         }
     }
     return lie_apart(mesh->positions, *terrain);
+}
+
+/* --- meshes chosen by their names, as a shell matches those of files. Not fnmatch(3): that depends on the
+ * locale, and takes exponential time for some patterns. */
+
+/* Behind the UTF-8 character at `text`. */
+static const char *next_character(const char *text) {
+    for (++text; ((unsigned char)*text & 0xc0) == 0x80; ++text) {
+    }
+    return text;
+}
+
+/* Behind the "]" of the set that `pattern` is in, with whether the byte is one of it; NULL: no set, as
+ * nothing closes it. "[!…]" is one of all others, "[a-z]" one of a range. */
+static const char *match_set(const char *pattern, char byte, bool *found) {
+    const unsigned char c = (unsigned char)byte;
+    const bool others = *pattern == '!' || *pattern == '^';
+    bool in = false;
+    const char *at = pattern + others;
+    for (const char *first = at; *at != ']' || at == first; ++at) {
+        if (*at == '\0') {
+            return NULL;
+        }
+        const unsigned char low = (unsigned char)*at;
+        if (at[1] == '-' && at[2] != ']' && at[2] != '\0') {
+            at += 2;
+        }
+        in = in || (low <= c && c <= (unsigned char)*at);
+    }
+    *found = in != others;
+    return at + 1;
+}
+
+/* One step that is no "*": moves both on, or tells that they differ. */
+static bool match_one(const char **pattern, const char **text) {
+    const char *p = *pattern;
+    bool found = false;
+    const char *end = *p == '[' ? match_set(p + 1, **text, &found) : NULL;
+    if (end != NULL) {
+        *pattern = end;
+        *text += 1;
+        return found;
+    }
+    if (*p == '?') {
+        *pattern = p + 1;
+        *text = next_character(*text);
+        return true;
+    }
+    p += *p == '\\' && p[1] != '\0';
+    *pattern = p + 1;
+    return *p == *(*text)++;
+}
+
+/* Only the last "*" is ever gone back to: what the ones before it took is as good as any (Krauss, "Matching
+ * wildcards", 2008). */
+static bool glob(const char *pattern, const char *text) {
+    const char *star = NULL, *resume = NULL;
+    while (*text != '\0') {
+        if (*pattern == '*') {
+            star = ++pattern;
+            resume = text;
+        } else if (*pattern == '\0' || !match_one(&pattern, &text)) {
+            if (star == NULL) {
+                return false;
+            }
+            pattern = star;
+            text = ++resume;
+        }
+    }
+    while (*pattern == '*') {
+        ++pattern;
+    }
+    return *pattern == '\0';
+}
+
+/* A name with brackets in it is to be found by itself, too. */
+static bool matches(const char *name, const char *pattern) {
+    return strcmp(name, pattern) == 0 || glob(pattern, name);
+}
+
+int32_t vsh_mesh_matches(const vsh_mesh *mesh, const char *pattern) {
+    if (mesh == NULL || pattern == NULL) {
+        return 0;
+    }
+    static const char of_material[] = "material:";
+    enum { OF_MATERIAL = sizeof of_material - 1 };
+    if (strncmp(pattern, of_material, OF_MATERIAL) == 0) {
+        return mesh->material_name != NULL && matches(mesh->material_name, pattern + OF_MATERIAL);
+    }
+    const char *name = mesh->name, *object = mesh->object_name;
+    if (name == NULL && object == NULL) {
+        return matches("", pattern); /* as messages call it */
+    }
+    if ((name != NULL && matches(name, pattern)) || (object != NULL && matches(object, pattern))) {
+        return 1;
+    }
+    const size_t length = object != NULL ? strlen(object) : 0;
+    return name != NULL && length > 0 && strncmp(name, object, length) == 0 && name[length] == '/' &&
+           matches(name + length + 1, pattern);
 }

@@ -49,6 +49,11 @@ vsh_result vshi_mesh_check_transform(const vsh_mesh *mesh, size_t index, vsh_err
 /* NULL, the identity, is like itself only. */
 bool vshi_mesh_same_transform(const double *a, const double *b);
 
+/* World place of a vertex. */
+static inline vshi_vec vshi_mesh_place(const vsh_mesh *mesh, size_t vertex) {
+    return vshi_transform_point(mesh->transform, vshi_vec_off(mesh->positions + 3 * vertex));
+}
+
 /* World corners of triangle i, anticlockwise from outside also where the transform mirrors. The mesh has
  * passed vshi_mesh_check_data(). Returns the vertices behind them in `vertex` (may be NULL), in the same
  * order. */
@@ -58,8 +63,7 @@ static inline void vshi_mesh_triangle_of(const vsh_mesh *mesh, size_t i, vshi_ve
     const bool mirrored = vshi_transform_determinant(mesh->transform) < 0.0;
     const uint32_t order[3] = {given[0], given[mirrored ? 2 : 1], given[mirrored ? 1 : 2]};
     for (int k = 0; k < 3; ++k) {
-        corner[k] =
-            vshi_transform_point(mesh->transform, vshi_vec_off(mesh->positions + 3 * (size_t)order[k]));
+        corner[k] = vshi_mesh_place(mesh, order[k]);
         if (vertex != NULL) {
             vertex[k] = order[k];
         }

@@ -1,10 +1,14 @@
 #include "mesh/mesh_set.h"
 
+#include "base/floats.h"
+#include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
 #include "mesh/alpha_mask.h"
 
+#include <stdio.h>
 #include <stdlib.h>
+#include <vdbshade/solidity.h>
 
 const struct vsh_checked_mesh *vshi_mesh_known(const vsh_mesh *mesh) {
     const struct vsh_checked_mesh *known = mesh->checked;
@@ -93,5 +97,118 @@ vsh_result vshi_mesh_set_solve(vshi_mesh_set *set, const vsh_run *run, vsh_error
             set->checked[m].place = m;
         }
     }
+    return VSH_OK;
+}
+
+/* --- what is told of a set */
+
+/* Adds a component to its object's report. */
+static void add_component(const vshi_component *c, vsh_solidity_report *report) {
+    size_t *const counts[] = {[VSHI_KIND_SHEET] = &report->sheets,
+                              [VSHI_KIND_SOLID] = &report->solids,
+                              [VSHI_KIND_ROOM] = &report->rooms,
+                              [VSHI_KIND_WALL] = &report->walls};
+    ++*(c->vessel ? &report->open_solids : counts[c->kind]);
+    report->turned_triangles += c->turned;
+    if (c->open_edges > 0 && (c->kind == VSHI_KIND_SOLID || c->kind == VSHI_KIND_ROOM)) {
+        ++report->closed_over;
+        report->holes += c->holes;
+        report->open_edges += c->open_edges;
+    }
+}
+
+vsh_result vsh_mesh_solidity(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
+                             vsh_solidity_report *reports, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS_OF(mesh_count, meshes);
+    VSHI_NEEDS_OF(mesh_count, reports);
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    vshi_mesh_set set;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_mesh_set_create(meshes, mesh_count, &set, error));
+    VSHI_TRY_DONE(vshi_mesh_set_solve(&set, &full, error));
+    const vshi_wholes *wholes = vshi_solidity_wholes(set.solidity);
+    for (size_t w = 0; w < wholes->count; ++w) {
+        vsh_solidity_report report = {0};
+        size_t count;
+        const vshi_component *components = vshi_solidity_of_whole(set.solidity, w, &count);
+        for (size_t i = 0; i < count; ++i) {
+            add_component(&components[i], &report);
+        }
+        for (size_t m = wholes->first[w]; m < wholes->first[w + 1]; ++m) {
+            reports[m] = report;
+        }
+    }
+done:
+    vshi_mesh_set_free(&set);
+    return result;
+}
+
+static const char *plural(size_t count) {
+    return count == 1 ? "" : "s";
+}
+
+void vshi_mesh_set_note(const vshi_mesh_set *set, double shell, double voxel, const vsh_run *run) {
+    const vshi_wholes *wholes = vshi_solidity_wholes(set->solidity);
+    char as[96] = "a sheet, with air on both sides";
+    if (shell > 0.0) {
+        snprintf(as, sizeof as, "a shell %g voxels (%g units) thick", shell, shell * voxel);
+    }
+    for (size_t w = 0; vshi_wants_notes(run) && w < wholes->count; ++w) {
+        size_t count = 0;
+        const vshi_component *components = vshi_solidity_of_whole(set->solidity, w, &count);
+        const vsh_mesh *whole = &wholes->meshes[w];
+        if (whole->alpha == VSH_ALPHA_MASKED && whole->solidity == VSH_SOLIDITY_SHELL) {
+            continue; /* what a mask cuts out is meant so */
+        }
+        const size_t first = wholes->first[w];
+        vsh_solidity_report t = {0};
+        size_t sheet_edges = 0;
+        bool around_all = false;
+        for (size_t i = 0; i < count; ++i) {
+            add_component(&components[i], &t);
+            sheet_edges += components[i].kind == VSHI_KIND_SHEET ? components[i].open_edges : 0;
+            around_all = around_all || components[i].around_all;
+        }
+        const vshi_mesh_name name = vshi_mesh_label(&set->meshes[first], first);
+        if (around_all) {
+            vshi_note(run,
+                      "%s (%zu of %zu): everything else lies within it: baked as a shell with air on both "
+                      "sides",
+                      name.text, first + 1, set->count);
+        }
+        if (t.sheets + t.open_solids > 0 && sheet_edges == 0 && !around_all) {
+            vshi_note(run, "%s (%zu of %zu): no volume between its faces: baked as %s", name.text, first + 1,
+                      set->count, as);
+        }
+        if (sheet_edges > 0) {
+            vshi_note(run, "%s (%zu of %zu): %zu open edge%s: baked as %s", name.text, first + 1, set->count,
+                      sheet_edges, plural(sheet_edges), as);
+        }
+        if (t.closed_over > 0) {
+            vshi_note(run,
+                      "%s (%zu of %zu): %zu open edge%s around %zu hole%s in %zu of %zu component%s that "
+                      "enclose nearly all behind them: taken for solid, closed over the holes",
+                      name.text, first + 1, set->count, t.open_edges, plural(t.open_edges), t.holes,
+                      plural(t.holes), t.closed_over, count, plural(count));
+        }
+        if (t.turned_triangles > 0) {
+            vshi_note(run,
+                      "%s (%zu of %zu): %zu triangle%s that face the other way than those around: taken as "
+                      "if they were turned over",
+                      name.text, first + 1, set->count, t.turned_triangles, plural(t.turned_triangles));
+        }
+    }
+}
+
+vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(mesh);
+    VSHI_NEEDS(report);
+    vsh_mesh_report found;
+    VSHI_TRY(vshi_mesh_look_over(mesh, VSHI_MESH_ALONE, &found, error));
+    VSHI_TRY(vshi_mesh_count_edges(mesh, &found, error));
+    *report = found;
     return VSH_OK;
 }

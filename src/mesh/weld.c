@@ -3,6 +3,7 @@
 #include "base/hash.h"
 #include "base/memory.h"
 #include "base/try.h"
+#include "mesh/mesh.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -34,6 +35,16 @@ vsh_result vshi_weld(size_t count, vshi_key_fn *key_of, const void *user, uint32
     }
     free(slots);
     return VSH_OK;
+}
+
+static void key_of_place(const void *user, size_t vertex, uint64_t key[VSHI_KEY_WORDS]) {
+    const float *p = (const float *)user + 3 * vertex;
+    const float place[2 * VSHI_KEY_WORDS] = {p[0] + 0.0f, p[1] + 0.0f, p[2] + 0.0f}; /* -0 is 0 */
+    memcpy(key, place, sizeof place);
+}
+
+vsh_result vshi_mesh_weld(const vsh_mesh *mesh, uint32_t *weld, vsh_error *error) {
+    return vshi_weld(mesh->vertex_count, key_of_place, mesh->positions, weld, error);
 }
 
 void vshi_list_groups(const uint32_t *group, size_t count, uint32_t groups, uint32_t *begin, uint32_t *list) {
