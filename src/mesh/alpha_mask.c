@@ -246,11 +246,7 @@ static corner middle(const corner *a, const corner *b) {
 /* Squared length of the side from corner k on, world units. */
 static double side(const cutting *c, const piece *p, int k) {
     const vshi_vec off = vshi_sub(p->corners[(k + 1) % 3].at, p->corners[k].at);
-    const double *m = c->mesh->transform;
-    const vshi_vec world = m == NULL ? off
-                                     : (vshi_vec){m[0] * off.x + m[1] * off.y + m[2] * off.z,
-                                                  m[4] * off.x + m[5] * off.y + m[6] * off.z,
-                                                  m[8] * off.x + m[9] * off.y + m[10] * off.z};
+    const vshi_vec world = vshi_transform_vector(c->mesh->transform, off);
     return vshi_dot(world, world);
 }
 

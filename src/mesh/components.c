@@ -1,12 +1,15 @@
-#include "mesh/components.h"
+#include "mesh/solidity_parts.h"
 
 #include "base/memory.h"
 #include "base/try.h"
 #include "mesh/edges.h"
+#include "mesh/weld.h"
 
 #include <stdlib.h>
 
 #define NO_COMPONENT UINT32_MAX
+
+static const char what[] = "components";
 
 typedef struct walking {
     const vsh_mesh *mesh;
@@ -25,9 +28,10 @@ static bool upwards(const walking *w, uint32_t side) {
 }
 
 /* Numbers and turns all that hangs together with triangle `seed`. */
-static void walk(walking *w, uint32_t seed, uint8_t *twisted) {
+static void walk(walking *w, uint32_t seed) {
     vshi_components *c = w->found;
     const uint32_t number = (uint32_t)c->count++;
+    uint8_t *twisted = &c->twisted[number];
     size_t waiting = 1;
     w->queue[0] = seed;
     w->of[seed] = number;
@@ -54,18 +58,15 @@ static void walk(walking *w, uint32_t seed, uint8_t *twisted) {
     }
 }
 
-static vsh_result walk_all(walking *w, vsh_error *error) {
+static void walk_all(walking *w) {
     vshi_components *c = w->found;
     const size_t count = w->mesh->triangle_count;
-    uint8_t *twisted = NULL; /* as many as there may be */
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&twisted, count, 1, "components", error));
     for (size_t i = 0; i < count; ++i) {
         w->of[i] = NO_COMPONENT;
     }
     for (size_t i = 0; i < count; ++i) {
         if (w->of[i] == NO_COMPONENT && !w->edges.skipped[i]) {
-            walk(w, (uint32_t)i, &twisted[c->count]);
+            walk(w, (uint32_t)i);
         }
     }
     for (size_t i = 0; i < count; ++i) {
@@ -76,35 +77,6 @@ static vsh_result walk_all(walking *w, vsh_error *error) {
             c->doubled[i] = c->doubled[first];
         }
     }
-    VSHI_TRY_DONE(vshi_allocate((void **)&c->twisted, c->count, 1, "components", error));
-    for (size_t i = 0; i < c->count; ++i) {
-        c->twisted[i] = twisted[i];
-    }
-done:
-    free(twisted);
-    return result;
-}
-
-/* Lists triangles by component. */
-static vsh_result list(walking *w, vsh_error *error) {
-    vshi_components *c = w->found;
-    const size_t count = w->mesh->triangle_count;
-    VSHI_TRY(vshi_allocate((void **)&c->begin, c->count + 2, sizeof *c->begin, "components", error));
-    VSHI_TRY(vshi_allocate((void **)&c->list, count, sizeof *c->list, "components", error));
-    for (size_t i = 0; i < count; ++i) {
-        if (w->of[i] != NO_COMPONENT) {
-            ++c->begin[w->of[i] + (size_t)2];
-        }
-    }
-    for (size_t i = 2; i < c->count + 2; ++i) {
-        c->begin[i] += c->begin[i - 1];
-    }
-    for (size_t i = 0; i < count; ++i) {
-        if (w->of[i] != NO_COMPONENT) {
-            c->list[c->begin[w->of[i] + (size_t)1]++] = (uint32_t)i;
-        }
-    }
-    return VSH_OK;
 }
 
 static vsh_result list_rims(walking *w, vsh_error *error) {
@@ -154,14 +126,11 @@ static vsh_result list_terrain_rims(const vsh_mesh *mesh, vshi_terrain t, vshi_c
 
 /* The one component of a terrain: the order of its triangles says how they hang together. */
 static vsh_result list_terrain(const vsh_mesh *mesh, vshi_terrain t, vshi_components *c, vsh_error *error) {
-    static const char *const name = "components";
     const size_t count = mesh->triangle_count, vertices = mesh->vertex_count;
-    VSHI_TRY(vshi_allocate((void **)&c->weld, vertices, sizeof *c->weld, name, error));
-    VSHI_TRY(vshi_allocate((void **)&c->turned, count, 1, name, error));
-    VSHI_TRY(vshi_allocate((void **)&c->doubled, count, 1, name, error));
-    VSHI_TRY(vshi_allocate((void **)&c->twisted, 1, 1, name, error));
-    VSHI_TRY(vshi_allocate((void **)&c->begin, 2, sizeof *c->begin, name, error));
-    VSHI_TRY(vshi_allocate((void **)&c->list, count, sizeof *c->list, name, error));
+    const vshi_array arrays[] = {VSHI_ARRAY(c->weld, vertices), VSHI_ARRAY(c->turned, count),
+                                 VSHI_ARRAY(c->doubled, count), VSHI_ARRAY(c->twisted, 1),
+                                 VSHI_ARRAY(c->begin, 3),       VSHI_ARRAY(c->list, count)};
+    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, what, error));
     for (size_t v = 0; v < vertices; ++v) {
         c->weld[v] = (uint32_t)v;
     }
@@ -177,21 +146,24 @@ static vsh_result list_terrain(const vsh_mesh *mesh, vshi_terrain t, vshi_compon
 vsh_result vshi_components_find(const vsh_mesh *mesh, size_t index, vshi_components *found,
                                 vsh_error *error) {
     *found = (vshi_components){0};
+    VSHI_TRY(vshi_edges_check(mesh, index, error));
     vshi_terrain terrain;
     if (vshi_mesh_is_terrain(mesh, &terrain)) {
         return list_terrain(mesh, terrain, found, error);
     }
     walking w = {.mesh = mesh, .mirrored = vshi_transform_determinant(mesh->transform) < 0.0, .found = found};
     const size_t count = mesh->triangle_count;
+    const vshi_array arrays[] = {VSHI_ARRAY(found->turned, count), VSHI_ARRAY(found->twisted, count),
+                                 VSHI_ARRAY(found->list, count), VSHI_ARRAY(w.of, count),
+                                 VSHI_ARRAY(w.queue, count)};
     vsh_result result;
     VSHI_TRY_DONE(vshi_edges_find(mesh, index, false, &w.edges, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&found->turned, count, 1, "components", error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&w.of, count, sizeof *w.of, "components", error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&w.queue, count, sizeof *w.queue, "components", error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
     found->doubled = w.edges.doubled;
     w.edges.doubled = NULL;
-    VSHI_TRY_DONE(walk_all(&w, error));
-    VSHI_TRY_DONE(list(&w, error));
+    walk_all(&w);
+    VSHI_TRY_DONE(vshi_allocate((void **)&found->begin, found->count + 2, sizeof *found->begin, what, error));
+    vshi_list_groups(w.of, count, (uint32_t)found->count, found->begin, found->list);
     VSHI_TRY_DONE(list_rims(&w, error));
     found->weld = w.edges.weld;
     w.edges.weld = NULL;

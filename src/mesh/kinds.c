@@ -1,10 +1,11 @@
 /* What each component is for itself. */
+#include "base/elementary.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/try.h"
 #include "mesh/solidity_parts.h"
+#include "mesh/weld.h"
 
-#include <stdatomic.h>
 #include <stdlib.h>
 
 /* Of one that looks inwards: nothing is filled behind its faces but a thin wall, so that a room may lack a
@@ -16,6 +17,107 @@ static const double INWARD_SHARE = 2.0 / 3.0;
 static const double LEAST_VOLUME = 1e-6;
 /* Of the area that is given once more facing the other way: such faces are double-sided sheets. */
 static const double DOUBLED_SHARE = 0.5;
+
+/* --- generalized winding numbers (A. Jacobson, L. Kavan, O. Sorkine-Hornung, "Robust inside-outside
+ * segmentation using generalized winding numbers", 2013): the sum of the triangles' solid angles over the
+ * whole sphere's */
+
+static const double PI = 3.14159265358979323846;
+
+/* Points of a surface that its enclosing is told from; fewer where it has many open edges, so that no more
+ * solid angles are summed than this. */
+enum { MOST_SAMPLES = 128, FEWEST_SAMPLES = 16, MOST_ANGLES = 1 << 21 };
+
+void vshi_part_corners(const vshi_surface_part *part, size_t at, vshi_vec corner[3]) {
+    const uint32_t i = part->list[at];
+    vshi_mesh_triangle(part->mesh, i, corner);
+    if (part->turned[i]) {
+        const vshi_vec swapped = corner[1];
+        corner[1] = corner[2];
+        corner[2] = swapped;
+    }
+}
+
+/* Solid angle of a triangle seen from a point, -2π … 2π: positive from behind it. A. van Oosterom and J.
+ * Strackee, "The solid angle of a plane triangle", 1983. */
+static double solid_angle(const vshi_vec corner[3], vshi_vec point) {
+    const vshi_vec a = vshi_sub(corner[0], point), b = vshi_sub(corner[1], point),
+                   c = vshi_sub(corner[2], point);
+    const double la = vshi_length(a), lb = vshi_length(b), lc = vshi_length(c);
+    const double over = vshi_dot(a, vshi_cross(b, c));
+    if (over == 0.0) { /* in its plane: on it, half of the sphere on either side */
+        return 0.0;
+    }
+    return 2.0 *
+           vshi_atan2(over, la * lb * lc + vshi_dot(a, b) * lc + vshi_dot(b, c) * la + vshi_dot(c, a) * lb);
+}
+
+double vshi_winding(const vshi_surface_part *part, vshi_vec point) {
+    double sum = 0.0;
+    for (size_t at = 0; at < part->count; ++at) {
+        vshi_vec corner[3];
+        vshi_part_corners(part, at, corner);
+        sum += solid_angle(corner, point);
+    }
+    return sum / (4.0 * PI);
+}
+
+/* The fractions of the additive sequence of the plastic number (M. Roberts, 2018). */
+vshi_vec vshi_point_in(const vshi_vec corner[3], size_t number) {
+    double u = 0.5 + 0.7548776662466927 * (double)number, v = 0.5 + 0.5698402909980532 * (double)number;
+    u -= floor(u);
+    v -= floor(v);
+    if (u + v > 1.0) {
+        u = 1.0 - u;
+        v = 1.0 - v;
+    }
+    return vshi_add(corner[0], vshi_add(vshi_scale(vshi_sub(corner[1], corner[0]), u),
+                                        vshi_scale(vshi_sub(corner[2], corner[0]), v)));
+}
+
+void vshi_part_samples(const vshi_surface_part *part, double area, size_t count, vshi_vec *samples) {
+    double reached = 0.0;
+    size_t next = 0;
+    vshi_vec corner[3] = {{0.0, 0.0, 0.0}};
+    for (size_t at = 0; at < part->count && next < count; ++at) {
+        vshi_part_corners(part, at, corner);
+        reached +=
+            0.5 * vshi_length(vshi_cross(vshi_sub(corner[1], corner[0]), vshi_sub(corner[2], corner[0])));
+        while (next < count && reached >= area * ((double)next + 0.5) / (double)count) {
+            samples[next] = vshi_point_in(corner, next);
+            ++next;
+        }
+    }
+    for (; next < count; ++next) { /* rounding */
+        samples[next] = vshi_point_in(corner, next);
+    }
+}
+
+/* The share of one of its sides that a part encloses: 1 if it is closed, 1/2 for a plane. `caps` are
+ * triangles over its holes. A surface and what closes it go around a point a whole number of times, so that
+ * what the surface itself lacks of one is what its caps go around it: only those need to be summed. */
+static double part_encloses(const vshi_surface_part *part, double area, const vshi_vec (*caps)[3],
+                            size_t cap_count) {
+    if (cap_count == 0) {
+        return 1.0;
+    }
+    vshi_vec samples[MOST_SAMPLES];
+    size_t count = MOST_ANGLES / cap_count;
+    count = count < FEWEST_SAMPLES ? FEWEST_SAMPLES : count > MOST_SAMPLES ? MOST_SAMPLES : count;
+    vshi_part_samples(part, area, count, samples);
+    double lacking = 0.0;
+    for (size_t i = 0; i < count; ++i) {
+        double sum = 0.0;
+        for (size_t k = 0; k < cap_count; ++k) {
+            sum += solid_angle(caps[k], samples[i]);
+        }
+        sum /= 4.0 * PI;
+        lacking += fabs(sum - floor(sum + 0.5));
+    }
+    return 1.0 - lacking / (double)count;
+}
+
+/* --- measures */
 
 /* What is known of a component before its kind. */
 typedef struct measure {
@@ -68,7 +170,8 @@ static measure measure_component(const vshi_solidity *s, vshi_component *c) {
     return m;
 }
 
-void vshi_component_turn(vshi_solidity *s, vshi_component *c) {
+/* Turns what encloses something to face the other way. */
+static void turn_component(vshi_solidity *s, vshi_component *c) {
     uint8_t *turned = vshi_solidity_turned(s, c);
     for (size_t at = 0; at < c->triangles; ++at) {
         turned[c->list[at]] ^= 1;
@@ -95,18 +198,6 @@ typedef struct closing {
     hole *holes;      /* as many as there are open edges */
 } closing;
 
-static uint32_t root_of(uint32_t *parent, uint32_t v) {
-    while (parent[v] != v) {
-        parent[v] = parent[parent[v]];
-        v = parent[v];
-    }
-    return v;
-}
-
-static vshi_vec place_of(const vsh_mesh *mesh, uint32_t vertex) {
-    return vshi_transform_point(mesh->transform, vshi_vec_off(mesh->positions + 3 * (size_t)vertex));
-}
-
 static size_t close_holes(closing *k, const vshi_rim *rims, size_t count, vshi_vec (*caps)[3]) {
     size_t holes = 0;
     for (size_t i = 0; i < count; ++i) {
@@ -115,25 +206,24 @@ static size_t close_holes(closing *k, const vshi_rim *rims, size_t count, vshi_v
         k->number[rims[i].a] = k->number[rims[i].b] = UINT32_MAX;
     }
     for (size_t i = 0; i < count; ++i) {
-        const uint32_t a = root_of(k->parent, rims[i].a), b = root_of(k->parent, rims[i].b);
-        k->parent[a < b ? b : a] = a < b ? a : b;
+        vshi_set_join(k->parent, rims[i].a, rims[i].b);
     }
     for (size_t i = 0; i < count; ++i) {
-        uint32_t *number = &k->number[root_of(k->parent, rims[i].a)];
+        uint32_t *number = &k->number[vshi_set_of(k->parent, rims[i].a)];
         if (*number == UINT32_MAX) {
             *number = (uint32_t)holes;
             k->holes[holes++] = (hole){{0.0, 0.0, 0.0}, 0.0};
         }
         hole *h = &k->holes[*number];
-        const vshi_vec a = place_of(k->mesh, rims[i].a), b = place_of(k->mesh, rims[i].b);
+        const vshi_vec a = vshi_mesh_place(k->mesh, rims[i].a), b = vshi_mesh_place(k->mesh, rims[i].b);
         const double length = vshi_length(vshi_sub(a, b));
         h->sum = vshi_add(h->sum, vshi_scale(vshi_add(a, b), 0.5 * length));
         h->length += length;
     }
     for (size_t i = 0; i < count; ++i) {
-        const hole *h = &k->holes[k->number[root_of(k->parent, rims[i].a)]];
-        caps[i][0] = place_of(k->mesh, rims[i].b);
-        caps[i][1] = place_of(k->mesh, rims[i].a);
+        const hole *h = &k->holes[k->number[vshi_set_of(k->parent, rims[i].a)]];
+        caps[i][0] = vshi_mesh_place(k->mesh, rims[i].b);
+        caps[i][1] = vshi_mesh_place(k->mesh, rims[i].a);
         caps[i][2] = h->length > 0.0 ? vshi_scale(h->sum, 1.0 / h->length) : caps[i][0];
     }
     return holes;
@@ -147,7 +237,7 @@ static void decide(vshi_solidity *s, vshi_component *c, const measure *m) {
     const bool twisted = found->twisted[(size_t)(c - s->components) - s->first[c->whole]] != 0;
     double turned_area = m->turned_area;
     if (turned_area > 0.5 * c->area) { /* most are right */
-        vshi_component_turn(s, c);
+        turn_component(s, c);
         turned_area = c->area - turned_area;
         c->volume = -c->volume;
     }
@@ -162,11 +252,11 @@ static void decide(vshi_solidity *s, vshi_component *c, const measure *m) {
     const bool inward = asked == VSH_SOLIDITY_INWARD ||
                         (asked != VSH_SOLIDITY_SOLID && c->volume < 0.0 && agreed && !twisted);
     if (inward != (c->volume < 0.0) && !twisted) {
-        vshi_component_turn(s, c);
+        turn_component(s, c);
     }
     c->volume = fabs(c->volume);
     const vshi_surface_part part = vshi_component_part(s, c);
-    c->enclosed = vshi_part_encloses(&part, c->area, c->cap, c->open_edges);
+    c->enclosed = part_encloses(&part, c->area, c->cap, c->open_edges);
     const bool single = m->doubled_area < DOUBLED_SHARE * c->area;
     const bool encloses = c->enclosed >= (inward ? WALL_ENCLOSES : VSHI_SOLID_ENCLOSES) && single;
     if (asked != VSH_SOLIDITY_SHELL && (encloses || asked != VSH_SOLIDITY_AUTO)) {
@@ -177,14 +267,24 @@ static void decide(vshi_solidity *s, vshi_component *c, const measure *m) {
                 agreed && single;
 }
 
-static vsh_result find_of_whole(vshi_solidity *s, size_t whole, size_t caps, vsh_error *error) {
+/* Wholes that are looked at, each for itself. */
+typedef struct telling {
+    vshi_solidity *s;
+    size_t *first_cap; /* [wholes] */
+} telling;
+
+/* A vshi_element_fn over wholes. */
+static vsh_result find_of_whole(void *user, size_t whole, vsh_error *error) {
+    const telling *t = user;
+    vshi_solidity *s = t->s;
+    size_t caps = t->first_cap[whole];
     const vshi_components *found = &s->found[whole];
     closing k = {.mesh = &s->wholes.meshes[whole]};
     const size_t vertices = found->rim_count > 0 ? k.mesh->vertex_count : 0;
+    const vshi_array arrays[] = {VSHI_ARRAY(k.parent, vertices), VSHI_ARRAY(k.number, vertices),
+                                 VSHI_ARRAY(k.holes, found->rim_count)};
     vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&k.parent, vertices, sizeof *k.parent, "holes", error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&k.number, vertices, sizeof *k.number, "holes", error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&k.holes, found->rim_count, sizeof *k.holes, "holes", error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "holes", error));
     for (size_t i = 0, rim = 0; i < found->count; ++i) {
         vshi_component *c = &s->components[s->first[whole] + i];
         *c = (vshi_component){.whole = (uint32_t)whole,
@@ -209,33 +309,13 @@ done:
     return result;
 }
 
-/* Wholes that are looked at, each for itself. */
-typedef struct telling {
-    vshi_solidity *s;
-    size_t *first_cap;      /* [wholes] */
-    _Atomic size_t refused; /* wholes whose memory was */
-} telling;
-
-/* A vshi_range_fn over wholes. */
-static void find_of_wholes(void *user, size_t begin, size_t end) {
-    telling *t = user;
-    for (size_t w = begin; w < end; ++w) {
-        if (find_of_whole(t->s, w, t->first_cap[w], NULL) != VSH_OK) {
-            atomic_fetch_add(&t->refused, 1);
-        }
-    }
-}
-
 vsh_result vshi_kinds_find(vshi_solidity *s, vshi_job *job, vsh_error *error) {
     telling t = {.s = s};
     VSHI_TRY(vshi_allocate((void **)&t.first_cap, s->wholes.count + 1, sizeof *t.first_cap, "holes", error));
     for (size_t w = 0; w < s->wholes.count; ++w) {
         t.first_cap[w + 1] = t.first_cap[w] + s->found[w].rim_count;
     }
-    vsh_result result = vshi_parallel_for(job, s->wholes.count, 1, 0, find_of_wholes, &t, error);
-    if (result == VSH_OK && t.refused > 0) {
-        result = vshi_fail(error, VSH_ERROR_MEMORY, "holes: the system refused memory");
-    }
+    const vsh_result result = vshi_parallel_each(job, s->wholes.count, 1, 0, find_of_whole, &t, error);
     free(t.first_cap);
     return result;
 }

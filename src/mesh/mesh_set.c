@@ -5,6 +5,7 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "mesh/alpha_mask.h"
+#include "mesh/solidity_parts.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -69,7 +70,7 @@ void vshi_mesh_set_free(vshi_mesh_set *set) {
 /* What is solid among just these meshes, in this order; NULL where nobody looked at them together. */
 static const vshi_solidity *known_together(const vshi_mesh_set *set) {
     const vshi_solidity *solidity = set->count > 0 ? set->checked[0].solidity : NULL;
-    if (solidity == NULL || vshi_solidity_mesh_count(solidity) != set->count) {
+    if (solidity == NULL || solidity->mesh_count != set->count) {
         return NULL;
     }
     for (size_t m = 0; m < set->count; ++m) {

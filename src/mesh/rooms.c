@@ -27,18 +27,8 @@ static bool in_box(const vshi_component *c, vshi_vec p) {
 }
 
 static vsh_result add_cut(vshi_solidity *s, size_t room, size_t solid, vsh_error *error) {
-    if (s->cut_count == s->cut_room) {
-        const size_t more = 2 * s->cut_room + 16;
-        void *memory = NULL;
-        VSHI_TRY(vshi_allocate(&memory, more, sizeof *s->cuts, "rooms", error));
-        vshi_cut *cuts = memory;
-        for (size_t i = 0; i < s->cut_count; ++i) {
-            cuts[i] = s->cuts[i];
-        }
-        free(s->cuts);
-        s->cuts = cuts;
-        s->cut_room = more;
-    }
+    VSHI_TRY(
+        vshi_make_room((void **)&s->cuts, s->cut_count, &s->cut_capacity, sizeof *s->cuts, "rooms", error));
     s->cuts[s->cut_count++] = (vshi_cut){(uint32_t)room, (uint32_t)solid};
     return VSH_OK;
 }

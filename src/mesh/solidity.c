@@ -5,11 +5,9 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/try.h"
-#include "mesh/edges.h"
 #include "mesh/mesh_set.h"
 #include "mesh/solidity_parts.h"
 
-#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -18,6 +16,78 @@ static const double BYTES_PER_TRIANGLE = 120.0, BYTES_PER_VERTEX = 24.0;
 /* The same of terrains, whose edges are known. */
 static const double TERRAIN_BYTES_PER_TRIANGLE = 9.0, TERRAIN_BYTES_PER_VERTEX = 4.0;
 
+/* --- objects put together from their parts */
+
+static bool one_object(const vsh_mesh *a, const vsh_mesh *b) {
+    return a->object != 0 && a->object == b->object && a->solidity == b->solidity &&
+           vshi_mesh_same_transform(a->transform, b->transform);
+}
+
+static vsh_result put_together(const vsh_mesh *parts, size_t count, vshi_wholes *w, vsh_error *error) {
+    vsh_mesh *whole = &w->meshes[w->count];
+    *whole = parts[0];
+    for (size_t i = 1; i < count; ++i) {
+        whole->vertex_count += parts[i].vertex_count;
+        whole->triangle_count += parts[i].triangle_count;
+    }
+    if (count == 1) {
+        return VSH_OK;
+    }
+    whole->normals = whole->uvs = NULL;
+    VSHI_TRY(vshi_allocate((void **)&w->positions[w->count], whole->vertex_count, 3 * sizeof(float),
+                           "parts of an object", error));
+    VSHI_TRY(vshi_allocate((void **)&w->indices[w->count], whole->triangle_count, 3 * sizeof(uint32_t),
+                           "parts of an object", error));
+    float *position = w->positions[w->count];
+    uint32_t *index = w->indices[w->count], before = 0;
+    whole->positions = position;
+    whole->indices = index;
+    for (size_t i = 0; i < count; ++i) {
+        if (parts[i].vertex_count > 0) {
+            memcpy(position, parts[i].positions, parts[i].vertex_count * 3 * sizeof *position);
+        }
+        position += 3 * parts[i].vertex_count;
+        for (size_t k = 0; k < 3 * parts[i].triangle_count; ++k) {
+            *index++ = before + parts[i].indices[k];
+        }
+        before += (uint32_t)parts[i].vertex_count;
+    }
+    return VSH_OK;
+}
+
+static vsh_result wholes_make(const vsh_mesh *meshes, size_t mesh_count, vshi_wholes *w, vsh_error *error) {
+    *w = (vshi_wholes){0};
+    const vshi_array arrays[] = {VSHI_ARRAY(w->meshes, mesh_count), VSHI_ARRAY(w->first, mesh_count + 1),
+                                 VSHI_ARRAY(w->positions, mesh_count), VSHI_ARRAY(w->indices, mesh_count)};
+    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, "objects", error));
+    for (size_t m = 0, next; m < mesh_count; m = next) {
+        size_t vertices = meshes[m].vertex_count;
+        for (next = m + 1; next < mesh_count && one_object(&meshes[m], &meshes[next]) &&
+                           vertices + meshes[next].vertex_count <= UINT32_MAX;
+             ++next) {
+            vertices += meshes[next].vertex_count;
+        }
+        const vsh_result result = put_together(meshes + m, next - m, w, error);
+        w->first[++w->count] = next; /* what it has is freed with it */
+        VSHI_TRY(result);
+    }
+    return VSH_OK;
+}
+
+static void wholes_free(vshi_wholes *w) {
+    for (size_t i = 0; i < w->count; ++i) {
+        free(w->positions[i]);
+        free(w->indices[i]);
+    }
+    free(w->indices);
+    free(w->positions);
+    free(w->first);
+    free(w->meshes);
+    *w = (vshi_wholes){0};
+}
+
+/* --- what is solid */
+
 static vsh_result allocate(vshi_solidity *s, const vsh_mesh *meshes, vsh_error *error) {
     VSHI_TRY(vshi_allocate((void **)&s->first_side, s->mesh_count + 1, sizeof *s->first_side, "what is solid",
                            error));
@@ -25,19 +95,11 @@ static vsh_result allocate(vshi_solidity *s, const vsh_mesh *meshes, vsh_error *
         s->first_side[m + 1] = s->first_side[m] + meshes[m].triangle_count;
     }
     const size_t triangles = s->first_side[s->mesh_count];
-    const struct {
-        void **memory;
-        size_t count, size;
-    } wanted[] = {{(void **)&s->found, s->wholes.count, sizeof *s->found},
-                  {(void **)&s->lent, s->wholes.count, sizeof *s->lent},
-                  {(void **)&s->first, s->wholes.count + 1, sizeof *s->first},
-                  {(void **)&s->turned, triangles, 1},
-                  {(void **)&s->sides, triangles, 1},
-                  {(void **)&s->holed, triangles, 1}};
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; ++i) {
-        VSHI_TRY(vshi_allocate(wanted[i].memory, wanted[i].count, wanted[i].size, "what is solid", error));
-    }
-    return VSH_OK;
+    const vshi_array arrays[] = {
+        VSHI_ARRAY(s->found, s->wholes.count),     VSHI_ARRAY(s->lent, s->wholes.count),
+        VSHI_ARRAY(s->first, s->wholes.count + 1), VSHI_ARRAY(s->turned, triangles),
+        VSHI_ARRAY(s->sides, triangles),           VSHI_ARRAY(s->holed, triangles)};
+    return VSHI_ALLOCATE_ALL(arrays, "what is solid", error);
 }
 
 static void set_sides(vshi_solidity *s) {
@@ -91,38 +153,29 @@ static const vshi_components *find_known(const vsh_mesh *meshes, const vshi_whol
 typedef struct finding {
     vshi_solidity *s;
     const vsh_mesh *meshes;
-    _Atomic size_t refused; /* wholes whose memory was */
 } finding;
 
-/* A vshi_range_fn over wholes. */
-static void find_wholes(void *user, size_t begin, size_t end) {
-    finding *f = user;
+/* A vshi_element_fn over wholes. */
+static vsh_result find_whole(void *user, size_t w, vsh_error *error) {
+    const finding *f = user;
     vshi_solidity *s = f->s;
-    for (size_t w = begin; w < end; ++w) {
-        const vshi_components *known = find_known(f->meshes, &s->wholes, w);
-        if (known != NULL) {
-            s->found[w] = *known;
-            s->lent[w] = true;
-        } else if (vshi_components_find(&s->wholes.meshes[w], w, &s->found[w], NULL) != VSH_OK) {
-            atomic_fetch_add(&f->refused, 1);
-            continue;
-        }
-        const size_t triangles = s->wholes.meshes[w].triangle_count;
-        if (triangles > 0) {
-            memcpy(s->turned + s->first_side[s->wholes.first[w]], s->found[w].turned, triangles);
-        }
+    const vshi_components *known = find_known(f->meshes, &s->wholes, w);
+    if (known != NULL) {
+        s->found[w] = *known;
+        s->lent[w] = true;
+    } else {
+        VSHI_TRY(vshi_components_find(&s->wholes.meshes[w], w, &s->found[w], error));
     }
+    const size_t triangles = s->wholes.meshes[w].triangle_count;
+    if (triangles > 0) {
+        memcpy(s->turned + s->first_side[s->wholes.first[w]], s->found[w].turned, triangles);
+    }
+    return VSH_OK;
 }
 
 static vsh_result find_components(vshi_solidity *s, const vsh_mesh *meshes, vshi_job *job, vsh_error *error) {
-    finding f = {.s = s, .meshes = meshes};
-    for (size_t w = 0; w < s->wholes.count; ++w) {
-        VSHI_TRY(vshi_edges_check(&s->wholes.meshes[w], w, error));
-    }
-    VSHI_TRY(vshi_parallel_for(job, s->wholes.count, 1, 1, find_wholes, &f, error));
-    if (f.refused > 0) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "what is solid: the system refused memory");
-    }
+    finding f = {s, meshes};
+    VSHI_TRY(vshi_parallel_each(job, s->wholes.count, 1, 1, find_whole, &f, error));
     for (size_t w = 0; w < s->wholes.count; ++w) {
         s->first[w + 1] = s->first[w] + s->found[w].count;
         s->cap_count += s->found[w].rim_count;
@@ -158,7 +211,7 @@ vsh_result vshi_solidity_create(const vsh_mesh *meshes, size_t mesh_count, const
     s->mesh_count = mesh_count;
     vshi_job *job = NULL;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_wholes_make(meshes, mesh_count, &s->wholes, error));
+    VSHI_TRY_DONE(wholes_make(meshes, mesh_count, &s->wholes, error));
     VSHI_TRY_DONE(allocate(s, meshes, error));
     job = vshi_job_begin(run, "solids", s->wholes.count);
     result = job == NULL ? vshi_fail(error, VSH_ERROR_MEMORY, "what is solid: the system refused memory")
@@ -192,12 +245,8 @@ void vshi_solidity_free(vshi_solidity *s) {
     free(s->first);
     free(s->lent);
     free(s->found);
-    vshi_wholes_free(&s->wholes);
+    wholes_free(&s->wholes);
     free(s);
-}
-
-size_t vshi_solidity_mesh_count(const vshi_solidity *s) {
-    return s->mesh_count;
 }
 
 const uint8_t *vshi_solidity_sides(const vshi_solidity *s, size_t mesh) {

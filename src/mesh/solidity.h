@@ -1,6 +1,6 @@
 /* What is solid: which side of every triangle of some meshes is air, and which is not.
  *
- * Meshes fall apart into components, pieces that hang together by their edges (mesh/components.h); each is
+ * Meshes fall apart into components, pieces that hang together by their edges (mesh/components.c); each is
  * one of four kinds. All meshes of a scene are looked at together, because a room is a room in the walls of
  * another mesh too, and the parts of an object (vshi_wholes) as one mesh. */
 #ifndef VSHI_SOLIDITY_H
@@ -20,7 +20,8 @@ extern "C" {
 #endif
 
 /* Objects put together from the meshes that are their parts, one for each material: by itself such a part is
- * open where the next begins. */
+ * open where the next begins. Meshes that follow each other, of one object, transform and solidity, become
+ * one whole; its triangles are theirs in their order. */
 typedef struct vshi_wholes {
     vsh_mesh *meshes; /* [count]; a view of the one part where there is only one */
     size_t *first;    /* [count + 1]: the parts that a whole is made of follow each other in the list */
@@ -28,11 +29,6 @@ typedef struct vshi_wholes {
     float **positions;  /* [count]; NULL: the part's */
     uint32_t **indices; /* [count]; NULL: the part's */
 } vshi_wholes;
-
-/* Meshes that follow each other, of one object, transform and solidity, become one whole; its triangles are
- * theirs in their order. Errors: VSH_ERROR_MEMORY. Free with vshi_wholes_free(), after a failure too. */
-vsh_result vshi_wholes_make(const vsh_mesh *meshes, size_t mesh_count, vshi_wholes *wholes, vsh_error *error);
-void vshi_wholes_free(vshi_wholes *wholes);
 
 /* What lies on the two sides of a triangle. Its front is where its corners run anticlockwise as
  * vshi_mesh_triangle() gives them. */
@@ -52,20 +48,21 @@ typedef enum vshi_kind {
 
 typedef struct vshi_component {
     vshi_kind kind;
-    bool inward;       /* its faces look at what it encloses */
-    bool vessel;       /* a sheet that would be solid if its holes were closed: a cup, a house without a
-                          floor. Points that see only its inner sides are hidden (shade/inside.h) */
-    bool around_all;   /* a sheet, because as a solid it would bury everything else */
-    uint32_t whole;    /* of vshi_solidity_wholes() */
-    size_t triangles;  /* with some area, and those given twice */
-    size_t turned;     /* of them: VSHI_SIDE_BEFORE */
-    size_t open_edges; /* 0: closed */
-    size_t holes;      /* groups of open edges that hang together */
-    double area;       /* world units² */
-    double enclosed; /* 1: it encloses all that lies behind its faces, 1/2: a plane (vshi_part_encloses()) */
-    double volume;   /* world units³; 0 if it has no inside */
-    vshi_vec low, high;       /* box, world */
-    const uint32_t *list;     /* its triangles [triangles], ascending */
+    bool inward;          /* its faces look at what it encloses */
+    bool vessel;          /* a sheet that would be solid if its holes were closed: a cup, a house without a
+                             floor. Points that see only its inner sides are hidden (shade/inside.h) */
+    bool around_all;      /* a sheet, because as a solid it would bury everything else */
+    uint32_t whole;       /* of vshi_solidity_wholes() */
+    size_t triangles;     /* with some area, and those given twice */
+    size_t turned;        /* of them: VSHI_SIDE_BEFORE */
+    size_t open_edges;    /* 0: closed */
+    size_t holes;         /* groups of open edges that hang together */
+    double area;          /* world units² */
+    double enclosed;      /* 1: it encloses all that lies behind its faces, 1/2: a plane (part_encloses() in
+                             mesh/kinds.c) */
+    double volume;        /* world units³; 0 if it has no inside */
+    vshi_vec low, high;   /* box, world */
+    const uint32_t *list; /* its triangles [triangles], ascending */
     const vshi_vec (*cap)[3]; /* triangles that close its holes [open_edges], world, facing as its faces */
 } vshi_component;
 
@@ -87,9 +84,6 @@ const uint8_t *vshi_solidity_sides(const vshi_solidity *solidity, size_t mesh);
  * solid, a room, a wall or a vessel: rays may enter it by one hole and leave by another. VSHI_SIDE_SHEET for
  * all others. */
 const uint8_t *vshi_solidity_holed(const vshi_solidity *solidity, size_t mesh);
-
-/* The number of meshes that were looked at. */
-size_t vshi_solidity_mesh_count(const vshi_solidity *solidity);
 
 /* The objects, put together from the meshes. */
 VSHI_SHARED const vshi_wholes *vshi_solidity_wholes(const vshi_solidity *solidity);

@@ -3,8 +3,8 @@
 #include "kinds.h"
 #include "testing.h"
 
-#include "mesh/components.h"
 #include "mesh/edges.h"
+#include "mesh/solidity_parts.h"
 
 OWNER(vshi_solidity)
 
