@@ -18,9 +18,9 @@ enum { ITERATIONS = 10 };
 
 typedef struct laying {
     vshi_patch *patch;
-    vshi_complex (*flat)[3]; /* [count]: corners of each triangle in its own plane, the first at 0 */
+    double complex (*flat)[3]; /* [count]: corners of each triangle in its own plane, the first at 0 */
     vshi_sparse system;
-    vshi_complex *x;   /* [vertex_count] */
+    double complex *x; /* [vertex_count] */
     double (*best)[2]; /* [vertex_count]: the least stretched so far */
     double best_stretch;
     bool have_best;
@@ -96,25 +96,28 @@ static void flatten_triangles(laying *l) {
         const vshi_vec a = p->place[p->corner[i][0]], ab = vshi_sub(p->place[p->corner[i][1]], a),
                        ac = vshi_sub(p->place[p->corner[i][2]], a);
         const double length = vshi_length(ab);
-        l->flat[i][0] = (vshi_complex){0.0, 0.0};
-        l->flat[i][1] = (vshi_complex){length, 0.0};
-        l->flat[i][2] = (vshi_complex){vshi_dot(ab, ac) / length, vshi_length(vshi_cross(ab, ac)) / length};
+        l->flat[i][0] = 0.0;
+        l->flat[i][1] = length;
+        l->flat[i][2] = CMPLX(vshi_dot(ab, ac) / length, vshi_length(vshi_cross(ab, ac)) / length);
     }
+}
+
+static double scalar_product(double complex a, double complex b) {
+    return creal(a) * creal(b) + cimag(a) * cimag(b);
 }
 
 static void add_conformal(laying *l, uint32_t i) {
     const uint32_t *corner = l->patch->corner[i];
-    const vshi_complex *at = l->flat[i];
-    const double doubled = at[1].re * at[2].im;
-    vshi_complex w[3];
+    const double complex *at = l->flat[i];
+    const double doubled = creal(at[1]) * cimag(at[2]);
+    double complex w[3];
     for (int k = 0; k < 3; ++k) {
-        w[k] = vshi_complex_sub(at[(k + 2) % 3], at[(k + 1) % 3]);
+        w[k] = at[(k + 2) % 3] - at[(k + 1) % 3];
     }
     for (int j = 0; j < 3; ++j) {
         const int k = (j + 1) % 3;
-        vshi_sparse_add_diagonal(&l->system, corner[j], (w[j].re * w[j].re + w[j].im * w[j].im) / doubled);
-        vshi_sparse_add(&l->system, corner[j], corner[k],
-                        vshi_complex_scaled(vshi_complex_times(vshi_conjugate(w[j]), w[k]), 1.0 / doubled));
+        vshi_sparse_add_diagonal(&l->system, corner[j], scalar_product(w[j], w[j]) / doubled);
+        vshi_sparse_add(&l->system, corner[j], corner[k], vshi_times(conj(w[j]), w[k]) * (1.0 / doubled));
     }
 }
 
@@ -146,8 +149,8 @@ static void find_pins(const vshi_patch *p, uint32_t pins[2]) {
 static void solve(laying *l) {
     vshi_sparse_solve(&l->system, l->x);
     for (uint32_t v = 0; v < l->patch->vertex_count; ++v) {
-        l->patch->uv[v][0] = l->x[v].re;
-        l->patch->uv[v][1] = l->x[v].im;
+        l->patch->uv[v][0] = creal(l->x[v]);
+        l->patch->uv[v][1] = cimag(l->x[v]);
     }
 }
 
@@ -160,9 +163,8 @@ static bool lay_conformal(laying *l) {
         add_conformal(l, i);
     }
     memset(l->x, 0, p->vertex_count * sizeof *l->x);
-    vshi_sparse_pin(&l->system, pins[0], (vshi_complex){0.0, 0.0}, l->x);
-    vshi_sparse_pin(&l->system, pins[1],
-                    (vshi_complex){vshi_length(vshi_sub(p->place[pins[1]], p->place[pins[0]])), 0.0}, l->x);
+    vshi_sparse_pin(&l->system, pins[0], 0.0, l->x);
+    vshi_sparse_pin(&l->system, pins[1], vshi_length(vshi_sub(p->place[pins[1]], p->place[pins[0]])), l->x);
     if (!vshi_sparse_factor(&l->system)) {
         return false;
     }
@@ -173,10 +175,9 @@ static bool lay_conformal(laying *l) {
 /* --- as rigid as possible */
 
 /* Cotangent of a triangle's angle at corner k. */
-static double cotangent(const vshi_complex at[3], int k) {
-    const vshi_complex b = vshi_complex_sub(at[(k + 1) % 3], at[k]),
-                       c = vshi_complex_sub(at[(k + 2) % 3], at[k]);
-    const double value = (b.re * c.re + b.im * c.im) / (at[1].re * at[2].im);
+static double cotangent(const double complex at[3], int k) {
+    const double value =
+        scalar_product(at[(k + 1) % 3] - at[k], at[(k + 2) % 3] - at[k]) / (creal(at[1]) * cimag(at[2]));
     return value > LEAST_COTANGENT ? value : LEAST_COTANGENT;
 }
 
@@ -189,11 +190,11 @@ static bool prepare_rigid(laying *l) {
             const double weight = cotangent(l->flat[i], k);
             vshi_sparse_add_diagonal(&l->system, b, weight);
             vshi_sparse_add_diagonal(&l->system, c, weight);
-            vshi_sparse_add(&l->system, b, c, (vshi_complex){-weight, 0.0});
+            vshi_sparse_add(&l->system, b, c, -weight);
         }
     }
     memset(l->x, 0, p->vertex_count * sizeof *l->x);
-    vshi_sparse_pin(&l->system, 0, (vshi_complex){0.0, 0.0}, l->x); /* where it lies changes nothing */
+    vshi_sparse_pin(&l->system, 0, 0.0, l->x); /* where it lies changes nothing */
     return vshi_sparse_factor(&l->system);
 }
 
@@ -201,27 +202,26 @@ static void step_rigid(laying *l) {
     vshi_patch *p = l->patch;
     memset(l->x, 0, p->vertex_count * sizeof *l->x);
     for (uint32_t i = 0; i < p->count; ++i) {
-        const vshi_complex *at = l->flat[i];
-        vshi_complex turn = {0.0, 0.0}, edge[3];
+        const double complex *at = l->flat[i];
+        double complex turn = 0.0, edge[3];
         double weight[3];
         for (int k = 0; k < 3; ++k) {
             const double *b = p->uv[p->corner[i][(k + 1) % 3]], *c = p->uv[p->corner[i][(k + 2) % 3]];
             weight[k] = cotangent(at, k);
-            edge[k] = vshi_complex_sub(at[(k + 2) % 3], at[(k + 1) % 3]);
-            const vshi_complex now = {c[0] - b[0], c[1] - b[1]};
-            turn = vshi_complex_add(
-                turn, vshi_complex_scaled(vshi_complex_times(now, vshi_conjugate(edge[k])), weight[k]));
+            edge[k] = at[(k + 2) % 3] - at[(k + 1) % 3];
+            const double complex now = CMPLX(c[0] - b[0], c[1] - b[1]);
+            turn += vshi_times(now, conj(edge[k])) * weight[k];
         }
-        const double length = sqrt(turn.re * turn.re + turn.im * turn.im);
-        turn = length > 0.0 ? vshi_complex_scaled(turn, 1.0 / length) : (vshi_complex){1.0, 0.0};
+        const double length = sqrt(scalar_product(turn, turn));
+        turn = length > 0.0 ? turn * (1.0 / length) : 1.0;
         for (int k = 0; k < 3; ++k) {
             const uint32_t b = p->corner[i][(k + 1) % 3], c = p->corner[i][(k + 2) % 3];
-            const vshi_complex to = vshi_complex_scaled(vshi_complex_times(turn, edge[k]), weight[k]);
-            l->x[b] = vshi_complex_sub(l->x[b], to);
-            l->x[c] = vshi_complex_add(l->x[c], to);
+            const double complex to = vshi_times(turn, edge[k]) * weight[k];
+            l->x[b] -= to;
+            l->x[c] += to;
         }
     }
-    l->x[0] = (vshi_complex){0.0, 0.0};
+    l->x[0] = 0.0;
     solve(l);
 }
 

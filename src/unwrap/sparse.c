@@ -292,13 +292,13 @@ void vshi_sparse_clear(vshi_sparse *m) {
     }
 }
 
-void vshi_sparse_add(vshi_sparse *m, uint32_t a, uint32_t b, vshi_complex value) {
+void vshi_sparse_add(vshi_sparse *m, uint32_t a, uint32_t b, double complex value) {
     uint32_t row = m->order[a], column = m->order[b];
     if (row < column) {
         const uint32_t kept = row;
         row = column;
         column = kept;
-        value = vshi_conjugate(value);
+        value = conj(value);
     }
     uint32_t at = m->begin[row], end = m->begin[row + 1];
     while (m->column[at] != column) { /* it is there */
@@ -309,28 +309,27 @@ void vshi_sparse_add(vshi_sparse *m, uint32_t a, uint32_t b, vshi_complex value)
             end = middle;
         }
     }
-    m->value[at] = vshi_complex_add(m->value[at], value);
+    m->value[at] += value;
 }
 
 void vshi_sparse_add_diagonal(vshi_sparse *m, uint32_t vertex, double value) {
     m->diagonal[m->order[vertex]] += value;
 }
 
-void vshi_sparse_pin(vshi_sparse *m, uint32_t vertex, vshi_complex value, vshi_complex *right) {
+void vshi_sparse_pin(vshi_sparse *m, uint32_t vertex, double complex value, double complex *right) {
     const uint32_t pinned = m->order[vertex];
     for (uint32_t v = 0; v < m->count; ++v) { /* `work` holds the right side by rows for a while */
         m->work[m->order[v]] = right[v];
     }
     for (uint32_t i = m->begin[pinned]; i < m->begin[pinned + 1]; ++i) {
-        vshi_complex *x = &m->work[m->column[i]];
-        *x = vshi_complex_sub(*x, vshi_complex_times(vshi_conjugate(m->value[i]), value));
-        m->value[i] = (vshi_complex){0.0, 0.0};
+        m->work[m->column[i]] -= vshi_times(conj(m->value[i]), value);
+        m->value[i] = 0.0;
     }
     for (uint32_t row = pinned + 1; row < m->count; ++row) {
         for (uint32_t i = m->begin[row]; i < m->begin[row + 1]; ++i) {
             if (m->column[i] == pinned) {
-                m->work[row] = vshi_complex_sub(m->work[row], vshi_complex_times(m->value[i], value));
-                m->value[i] = (vshi_complex){0.0, 0.0};
+                m->work[row] -= vshi_times(m->value[i], value);
+                m->value[i] = 0.0;
             }
         }
     }
@@ -362,28 +361,25 @@ static uint32_t row_pattern(vshi_sparse *m, uint32_t row) {
 bool vshi_sparse_factor(vshi_sparse *m) {
     static const double LEAST = 1e-13; /* of a pivot, against what the diagonal was */
     for (uint32_t row = 0; row < m->count; ++row) {
-        m->work[row] = (vshi_complex){0.0, 0.0};
+        m->work[row] = 0.0;
         m->marks[row] = NONE;
         m->filled[row] = 0;
     }
     for (uint32_t row = 0; row < m->count; ++row) {
         const uint32_t top = row_pattern(m, row);
         for (uint32_t i = m->begin[row]; i < m->begin[row + 1]; ++i) {
-            m->work[m->column[i]] = vshi_conjugate(m->value[i]);
+            m->work[m->column[i]] = conj(m->value[i]);
         }
         double pivot = m->diagonal[row];
         for (uint32_t s = top; s < m->count; ++s) {
             const uint32_t c = m->stack[s], begin = m->factor_begin[c], end = begin + m->filled[c];
-            const vshi_complex y = m->work[c];
-            m->work[c] = (vshi_complex){0.0, 0.0};
+            const double complex y = m->work[c];
+            m->work[c] = 0.0;
             for (uint32_t i = begin; i < end; ++i) {
-                vshi_complex *to = &m->work[m->factor_row[i]];
-                const vshi_complex l = m->factor[i];
-                to->re -= l.re * y.re - l.im * y.im;
-                to->im -= l.re * y.im + l.im * y.re;
+                m->work[m->factor_row[i]] -= vshi_times(m->factor[i], y);
             }
-            const vshi_complex l = {y.re / m->pivot[c], -y.im / m->pivot[c]};
-            pivot -= y.re * l.re - y.im * l.im;
+            const double complex l = conj(y) / m->pivot[c];
+            pivot -= creal(vshi_times(y, l));
             m->factor_row[end] = row;
             m->factor[end] = l;
             ++m->filled[c];
@@ -396,26 +392,21 @@ bool vshi_sparse_factor(vshi_sparse *m) {
     return true;
 }
 
-void vshi_sparse_solve(const vshi_sparse *m, vshi_complex *right) {
-    vshi_complex *x = m->work;
+void vshi_sparse_solve(const vshi_sparse *m, double complex *right) {
+    double complex *x = m->work;
     for (uint32_t v = 0; v < m->count; ++v) {
         x[m->order[v]] = right[v];
     }
     for (uint32_t c = 0; c < m->count; ++c) {
-        const vshi_complex y = x[c];
+        const double complex y = x[c];
         for (uint32_t i = m->factor_begin[c]; i < m->factor_begin[c + 1]; ++i) {
-            vshi_complex *to = &x[m->factor_row[i]];
-            const vshi_complex l = m->factor[i];
-            to->re -= l.re * y.re - l.im * y.im;
-            to->im -= l.re * y.im + l.im * y.re;
+            x[m->factor_row[i]] -= vshi_times(m->factor[i], y);
         }
     }
     for (uint32_t c = m->count; c-- > 0;) {
-        vshi_complex y = vshi_complex_scaled(x[c], 1.0 / m->pivot[c]);
+        double complex y = x[c] * (1.0 / m->pivot[c]);
         for (uint32_t i = m->factor_begin[c]; i < m->factor_begin[c + 1]; ++i) {
-            const vshi_complex l = m->factor[i], z = x[m->factor_row[i]];
-            y.re -= l.re * z.re + l.im * z.im; /* conjugate of l */
-            y.im -= l.re * z.im - l.im * z.re;
+            y -= vshi_times(conj(m->factor[i]), x[m->factor_row[i]]);
         }
         x[c] = y;
     }

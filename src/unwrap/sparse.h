@@ -5,26 +5,12 @@
 #include "base/error.h"
 #include "base/vec.h"
 
+#include <complex.h>
 #include <stdint.h>
 
-typedef struct vshi_complex {
-    double re, im;
-} vshi_complex;
-
-static inline vshi_complex vshi_complex_add(vshi_complex a, vshi_complex b) {
-    return (vshi_complex){a.re + b.re, a.im + b.im};
-}
-static inline vshi_complex vshi_complex_sub(vshi_complex a, vshi_complex b) {
-    return (vshi_complex){a.re - b.re, a.im - b.im};
-}
-static inline vshi_complex vshi_complex_times(vshi_complex a, vshi_complex b) {
-    return (vshi_complex){a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
-}
-static inline vshi_complex vshi_complex_scaled(vshi_complex a, double s) {
-    return (vshi_complex){a.re * s, a.im * s};
-}
-static inline vshi_complex vshi_conjugate(vshi_complex a) {
-    return (vshi_complex){a.re, -a.im};
+/* The product: that of the language looks for numbers that are none. */
+static inline double complex vshi_times(double complex a, double complex b) {
+    return CMPLX(creal(a) * creal(b) - cimag(a) * cimag(b), creal(a) * cimag(b) + cimag(a) * creal(b));
 }
 
 /* Rows and columns stand in the order in which they are eliminated. */
@@ -33,14 +19,14 @@ typedef struct vshi_sparse {
     uint32_t *order;  /* [count]: the row of each vertex */
     uint32_t *begin;  /* [count + 1] in `column`: entries of each row left of the diagonal */
     uint32_t *column; /* ascending in each row */
-    vshi_complex *value;
+    double complex *value;
     double *diagonal;
     uint32_t *parent;       /* of the elimination tree */
     uint32_t *factor_begin; /* [count + 1] in `factor_row`: entries of each column of the factor */
     uint32_t *factor_row;
-    vshi_complex *factor;
+    double complex *factor;
     double *pivot;
-    vshi_complex *work;
+    double complex *work;
     uint32_t *marks, *stack, *filled;
 } vshi_sparse;
 
@@ -54,17 +40,17 @@ void vshi_sparse_clear(vshi_sparse *system);
 
 /* Adds to the entry of row a, column b, and the conjugate to its mirror image; a and b are an edge's
  * vertices. */
-void vshi_sparse_add(vshi_sparse *system, uint32_t a, uint32_t b, vshi_complex value);
+void vshi_sparse_add(vshi_sparse *system, uint32_t a, uint32_t b, double complex value);
 void vshi_sparse_add_diagonal(vshi_sparse *system, uint32_t vertex, double value);
 
 /* Fixes a vertex at a value: its row becomes that of the identity, and what others have of it goes to their
  * right sides. Before the factoring. */
-void vshi_sparse_pin(vshi_sparse *system, uint32_t vertex, vshi_complex value, vshi_complex *right);
+void vshi_sparse_pin(vshi_sparse *system, uint32_t vertex, double complex value, double complex *right);
 
 /* False where the matrix is not positive definite, as far as doubles tell. */
 bool vshi_sparse_factor(vshi_sparse *system);
 
 /* Solves for one right side [count], by vertex, in place. */
-void vshi_sparse_solve(const vshi_sparse *system, vshi_complex *right);
+void vshi_sparse_solve(const vshi_sparse *system, double complex *right);
 
 #endif
