@@ -1,13 +1,24 @@
-#include "unwrap/atlas.h"
+/* Vertices and UVs of meshes whose charts have their places. */
+#include "unwrap/pack.h"
 
 #include "base/memory.h"
 #include "base/try.h"
 #include "mesh/weld.h"
-#include "unwrap/patch.h"
 
 #include <stdlib.h>
 
 static const char what[] = "an atlas";
+
+struct vsh_atlas {
+    uint32_t *sources, *indices; /* [3 triangles of all shapes]: instances share them */
+    float (*uvs)[2];             /* of the vertices of all meshes */
+    uint32_t *mesh_charts;       /* [triangles of all meshes] */
+    vsh_atlas_mesh *meshes;      /* [mesh_count]: parts of these arrays */
+    size_t mesh_count;
+    vsh_atlas_chart *charts; /* [info.charts] */
+    vsh_atlas_page *pages;   /* [info.pages] */
+    vsh_atlas_info info;
+};
 
 double vshi_atlas_shape_bytes(size_t triangle_count) {
     return 64.0 * (double)triangle_count;
@@ -19,82 +30,92 @@ double vshi_atlas_mesh_bytes(size_t triangle_count) {
 
 /* --- vertices of a shape */
 
-/* What vertices are made of while they are numbered: those of a patch's vertex, one for each vertex of the
- * mesh that its corners have. */
-typedef struct numbering {
-    const vshi_shape *shape;
-    vshi_atlas_shape *made;
-    uint32_t *last;   /* [most vertices of a patch]: the last that was made of each, + 1; 0: none */
-    uint32_t *before; /* [3 triangles]: the one that was made before each, + 1 */
-} numbering;
+/* Vertices of charts come first, chart by chart; then those of triangles without area. */
+typedef struct vertices {
+    uint32_t *sources, *indices; /* the atlas's */
+    uint32_t *chart;             /* [chart_vertices]: of the shape, from 0 */
+    uint32_t *patch_vertex;      /* [chart_vertices] */
+    size_t count, chart_vertices;
+} vertices;
 
-static uint32_t vertex_of(numbering *n, uint32_t chart, uint32_t vertex, uint32_t source) {
-    vshi_atlas_shape *made = n->made;
-    for (uint32_t v = n->last[vertex]; v != 0; v = n->before[v - 1]) {
+typedef struct making {
+    struct vsh_atlas *atlas;
+    const vshi_shapes *shapes;
+    vertices *vertices;             /* [shapes] */
+    uint32_t *chart, *patch_vertex; /* [3 triangles of all shapes] */
+    uint32_t *last;     /* [most vertices of a patch]: the last that was made of each, + 1; 0: none */
+    uint32_t *before;   /* [3 triangles]: the one that was made before each, + 1 */
+    float (*placed)[2]; /* [most vertices of a patch] */
+} making;
+
+/* The vertex that a patch's vertex is made into: one for each vertex of the mesh that its corners have. */
+static uint32_t vertex_of(const making *m, vertices *made, uint32_t chart, uint32_t vertex, uint32_t source) {
+    for (uint32_t v = m->last[vertex]; v != 0; v = m->before[v - 1]) {
         if (made->sources[v - 1] == source) {
             return v - 1;
         }
     }
-    const uint32_t own = (uint32_t)made->vertex_count++;
+    const uint32_t own = (uint32_t)made->count++;
     made->sources[own] = source;
-    made->vertex_chart[own] = chart;
+    made->chart[own] = chart;
     made->patch_vertex[own] = vertex;
-    n->before[own] = n->last[vertex];
-    n->last[vertex] = own + 1;
+    m->before[own] = m->last[vertex];
+    m->last[vertex] = own + 1;
     return own;
 }
 
-static void number_vertices(numbering *n) {
-    vshi_atlas_shape *made = n->made;
-    const vsh_mesh *mesh = n->shape->mesh;
-    for (uint32_t c = 0; c < made->chart_count; ++c) {
-        const vshi_patch *p = &n->shape->patches.list[c];
-        memset(n->last, 0, p->vertex_count * sizeof *n->last);
-        for (uint32_t i = 0; i < p->count; ++i) {
-            const size_t triangle = p->triangles[i];
-            made->charts[triangle] = c;
-            for (size_t k = 0; k < 3; ++k) {
-                made->indices[3 * triangle + k] =
-                    vertex_of(n, c, p->corner[i][k], mesh->indices[3 * triangle + k]);
-            }
+static void number_vertices(const making *m, const vshi_shape *shape, vertices *made) {
+    const uint32_t *given = shape->mesh->indices;
+    const size_t corners = 3 * shape->mesh->triangle_count;
+    for (size_t i = 0; i < corners; ++i) {
+        made->indices[i] = UINT32_MAX;
+    }
+    for (uint32_t c = 0; c < shape->patches.count; ++c) {
+        const vshi_patch *p = &shape->patches.list[c];
+        memset(m->last, 0, p->vertex_count * sizeof *m->last);
+        for (uint32_t i = 0; i < 3 * p->count; ++i) {
+            const size_t corner = 3 * (size_t)p->triangles[i / 3] + i % 3;
+            made->indices[corner] = vertex_of(m, made, c, p->corner[i / 3][i % 3], given[corner]);
         }
     }
-    made->chart_vertices = made->vertex_count;
-    for (size_t i = 0; i < made->triangle_count; ++i) {
-        for (size_t k = 0; k < 3 && made->charts[i] == VSH_NO_CHART; ++k) {
-            made->sources[made->vertex_count] = mesh->indices[3 * i + k];
-            made->indices[3 * i + k] = (uint32_t)made->vertex_count++;
+    made->chart_vertices = made->count;
+    for (size_t i = 0; i < corners; ++i) {
+        if (made->indices[i] == UINT32_MAX) {
+            made->sources[made->count] = given[i];
+            made->indices[i] = (uint32_t)made->count++;
         }
     }
 }
 
-static vsh_result shape_make(const vshi_shape *shape, vshi_atlas_shape *made, vsh_error *error) {
-    numbering n = {.shape = shape, .made = made};
-    const size_t count = shape->mesh->triangle_count;
+static vsh_result number_all(making *m, vsh_error *error) {
+    size_t triangles = 0;
     uint32_t most = 0;
-    vsh_result result;
-    made->triangle_count = count;
-    made->chart_count = shape->patches.count;
-    for (size_t c = 0; c < made->chart_count; ++c) {
-        most = shape->patches.list[c].vertex_count > most ? shape->patches.list[c].vertex_count : most;
+    for (size_t i = 0; i < m->shapes->count; ++i) {
+        const vshi_shape *shape = &m->shapes->list[i];
+        triangles += shape->mesh->triangle_count;
+        for (size_t c = 0; c < shape->patches.count; ++c) {
+            most = shape->patches.list[c].vertex_count > most ? shape->patches.list[c].vertex_count : most;
+        }
     }
-    VSHI_TRY_DONE(vshi_allocate((void **)&made->sources, 3 * count, sizeof *made->sources, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&made->indices, 3 * count, sizeof *made->indices, what, error));
-    VSHI_TRY_DONE(
-        vshi_allocate((void **)&made->vertex_chart, 3 * count, sizeof *made->vertex_chart, what, error));
-    VSHI_TRY_DONE(
-        vshi_allocate((void **)&made->patch_vertex, 3 * count, sizeof *made->patch_vertex, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&made->charts, count, sizeof *made->charts, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&n.last, most, sizeof *n.last, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&n.before, 3 * count, sizeof *n.before, what, error));
-    if (count > 0) {
-        memset(made->charts, 0xff, count * sizeof *made->charts);
+    const vshi_array arrays[] = {VSHI_ARRAY(m->vertices, m->shapes->count),
+                                 VSHI_ARRAY(m->last, most),
+                                 VSHI_ARRAY(m->placed, most),
+                                 VSHI_ARRAY(m->chart, 3 * triangles),
+                                 VSHI_ARRAY(m->patch_vertex, 3 * triangles),
+                                 VSHI_ARRAY(m->before, 3 * triangles),
+                                 VSHI_ARRAY(m->atlas->sources, 3 * triangles),
+                                 VSHI_ARRAY(m->atlas->indices, 3 * triangles)};
+    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, what, error));
+    for (size_t i = 0, at = 0; i < m->shapes->count; ++i) {
+        const vshi_shape *shape = &m->shapes->list[i];
+        m->vertices[i] = (vertices){.sources = m->atlas->sources + at,
+                                    .indices = m->atlas->indices + at,
+                                    .chart = m->chart + at,
+                                    .patch_vertex = m->patch_vertex + at};
+        number_vertices(m, shape, &m->vertices[i]);
+        at += 3 * shape->mesh->triangle_count;
     }
-    number_vertices(&n);
-done:
-    free(n.before);
-    free(n.last);
-    return result;
+    return VSH_OK;
 }
 
 /* --- places in 32-bit UVs */
@@ -192,52 +213,59 @@ done:
 
 /* --- meshes */
 
-/* UVs of a mesh's vertices, chart by chart. */
-static vsh_result place_vertices(struct vsh_atlas *a, size_t m, const vshi_shape *shape,
-                                 const vshi_atlas_shape *made, const vshi_item *items, vsh_error *error) {
-    float(*placed)[2] = NULL; /* of a patch */
-    uint32_t most = 0;
-    vsh_result result;
-    for (size_t c = 0; c < made->chart_count; ++c) {
-        most = shape->patches.list[c].vertex_count > most ? shape->patches.list[c].vertex_count : most;
-    }
-    VSHI_TRY_DONE(vshi_allocate((void **)&placed, most, sizeof *placed, what, error));
+/* UVs of a mesh's vertices, chart by chart, and the charts of its triangles. */
+static vsh_result place_vertices(const making *m, const vshi_shape *shape, const vertices *made,
+                                 const vshi_item *items, uint32_t first_chart, float (*uvs)[2],
+                                 uint32_t *mesh_charts, vsh_error *error) {
     size_t vertex = 0;
-    for (size_t c = 0; c < made->chart_count; ++c) {
+    for (uint32_t c = 0; c < shape->patches.count; ++c) {
         const vshi_patch *p = &shape->patches.list[c];
-        const vsh_atlas_page *page = &a->pages[items[c].at.page];
+        const vshi_place *place = &items[c].at;
+        const vsh_atlas_page *page = &m->atlas->pages[place->page];
         for (uint32_t v = 0; v < p->vertex_count; ++v) {
             double at[2];
-            vshi_fit_turn(&items[c].at.fit, items[c].at.quarters, p->uv[v], at);
-            placed[v][0] = (float)((items[c].at.x + at[0]) / page->width);
-            placed[v][1] = (float)((items[c].at.y + at[1]) / page->height);
+            vshi_fit_turn(&place->fit, place->quarters, p->uv[v], at);
+            m->placed[v][0] = (float)((place->x + at[0]) / page->width);
+            m->placed[v][1] = (float)((place->y + at[1]) / page->height);
         }
-        VSHI_TRY_DONE(settle(p, placed, error));
-        for (; vertex < made->chart_vertices && made->vertex_chart[vertex] == c; ++vertex) {
-            memcpy(a->uvs[m] + 2 * vertex, placed[made->patch_vertex[vertex]], sizeof *placed);
+        VSHI_TRY(settle(p, m->placed, error));
+        for (; vertex < made->chart_vertices && made->chart[vertex] == c; ++vertex) {
+            memcpy(uvs[vertex], m->placed[made->patch_vertex[vertex]], sizeof *uvs);
+        }
+        for (uint32_t i = 0; i < p->count; ++i) {
+            mesh_charts[p->triangles[i]] = first_chart + c;
         }
     }
-done:
-    free(placed);
-    return result;
+    return VSH_OK;
 }
 
-static vsh_result mesh_make(struct vsh_atlas *a, size_t m, const vshi_shape *shape,
-                            const vshi_atlas_shape *made, const vshi_item *items, uint32_t first_chart,
-                            vsh_error *error) {
-    VSHI_TRY(vshi_allocate((void **)&a->uvs[m], made->vertex_count, 2 * sizeof(float), what, error));
-    VSHI_TRY(vshi_allocate((void **)&a->mesh_charts[m], made->triangle_count, sizeof(uint32_t), what, error));
-    VSHI_TRY(place_vertices(a, m, shape, made, items, error));
-    for (size_t i = 0; i < made->triangle_count; ++i) {
-        a->mesh_charts[m][i] = made->charts[i] != VSH_NO_CHART ? first_chart + made->charts[i] : VSH_NO_CHART;
-        a->info.flat_triangles += made->charts[i] == VSH_NO_CHART;
+static vsh_result place_all(const making *m, const vshi_item *items, vsh_error *error) {
+    struct vsh_atlas *a = m->atlas;
+    const vshi_shapes *shapes = m->shapes;
+    size_t vertex_count = 0, triangle_count = 0;
+    for (size_t i = 0; i < a->mesh_count; ++i) {
+        vertex_count += m->vertices[shapes->instances[i].shape].count;
+        triangle_count += shapes->meshes[i].triangle_count;
     }
-    a->meshes[m] = (vsh_atlas_mesh){.uvs = a->uvs[m],
-                                    .sources = made->sources,
-                                    .indices = made->indices,
-                                    .charts = a->mesh_charts[m],
-                                    .vertex_count = made->vertex_count,
-                                    .triangle_count = made->triangle_count};
+    VSHI_TRY(vshi_allocate((void **)&a->uvs, vertex_count, sizeof *a->uvs, what, error));
+    VSHI_TRY(vshi_allocate((void **)&a->mesh_charts, triangle_count, sizeof *a->mesh_charts, what, error));
+    for (size_t i = 0; i < triangle_count; ++i) {
+        a->mesh_charts[i] = VSH_NO_CHART;
+    }
+    float(*uvs)[2] = a->uvs;
+    uint32_t *charts = a->mesh_charts, chart = 0;
+    for (size_t i = 0; i < a->mesh_count; ++i) {
+        const vshi_shape *shape = &shapes->list[shapes->instances[i].shape];
+        const vertices *made = &m->vertices[shapes->instances[i].shape];
+        const size_t triangles = shape->mesh->triangle_count;
+        VSHI_TRY(place_vertices(m, shape, made, items + chart, chart, uvs, charts, error));
+        a->meshes[i] = (vsh_atlas_mesh){uvs[0], made->sources, made->indices, charts, made->count, triangles};
+        a->info.flat_triangles += (made->count - made->chart_vertices) / 3;
+        a->info.kept += shape->kept;
+        uvs += made->count;
+        charts += triangles;
+        chart += (uint32_t)shape->patches.count;
+    }
     return VSH_OK;
 }
 
@@ -281,75 +309,56 @@ static void sum_pages(struct vsh_atlas *a) {
     a->info.covered = touched / texels;
 }
 
-vsh_result vshi_atlas_make(size_t mesh_count, const vshi_shapes *shapes, vshi_pages *pages,
-                           const vshi_item *items, size_t item_count, vsh_atlas **atlas, vsh_error *error) {
-    struct vsh_atlas *a = NULL;
+vsh_result vshi_atlas_make(const vshi_shapes *shapes, vshi_pages *pages, const vshi_item *items,
+                           size_t item_count, vsh_atlas **atlas, vsh_error *error) {
+    making m = {.shapes = shapes};
     double area = 0.0, stretch = 0.0;
     vsh_result result;
-    VSHI_TRY(vshi_allocate((void **)&a, 1, sizeof *a, what, error));
-    a->shape_count = shapes->count;
-    a->mesh_count = mesh_count;
+    VSHI_TRY(vshi_allocate((void **)&m.atlas, 1, sizeof *m.atlas, what, error));
+    struct vsh_atlas *a = m.atlas;
+    a->mesh_count = shapes->mesh_count;
     a->info = (vsh_atlas_info){
-        .charts = item_count, .pages = (uint32_t)pages->count, .shared = mesh_count - shapes->count};
+        .charts = item_count, .pages = (uint32_t)pages->count, .shared = shapes->mesh_count - shapes->count};
     a->pages = pages->list;
     *pages = (vshi_pages){NULL, 0};
-    VSHI_TRY_DONE(vshi_allocate((void **)&a->shapes, shapes->count, sizeof *a->shapes, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&a->meshes, mesh_count, sizeof *a->meshes, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&a->uvs, mesh_count, sizeof *a->uvs, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&a->mesh_charts, mesh_count, sizeof *a->mesh_charts, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&a->meshes, a->mesh_count, sizeof *a->meshes, what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&a->charts, item_count, sizeof *a->charts, what, error));
-    for (size_t i = 0; i < shapes->count; ++i) {
-        VSHI_TRY_DONE(shape_make(&shapes->list[i], &a->shapes[i], error));
-    }
-    uint32_t chart = 0;
-    for (size_t m = 0; m < mesh_count; ++m) {
-        const vshi_instance *instance = &shapes->instances[m];
-        const vshi_shape *shape = &shapes->list[instance->shape];
-        a->info.kept += shape->kept;
-        VSHI_TRY_DONE(mesh_make(a, m, shape, &a->shapes[instance->shape], items + chart, chart, error));
-        for (size_t c = 0; c < shape->patches.count; ++c, ++chart) {
-            chart_make(a, &items[chart], shape->surface.scale * instance->scale, chart);
-            area += a->charts[chart].area;
-            stretch += a->charts[chart].area * (double)a->charts[chart].stretch;
-            a->info.worst_stretch = fmax(a->info.worst_stretch, (double)a->charts[chart].stretch);
-        }
+    VSHI_TRY_DONE(number_all(&m, error));
+    VSHI_TRY_DONE(place_all(&m, items, error));
+    for (uint32_t i = 0; i < item_count; ++i) {
+        const vshi_instance *instance = &shapes->instances[items[i].mesh];
+        chart_make(a, &items[i], shapes->list[instance->shape].surface.scale * instance->scale, i);
+        area += a->charts[i].area;
+        stretch += a->charts[i].area * (double)a->charts[i].stretch;
+        a->info.worst_stretch = fmax(a->info.worst_stretch, (double)a->charts[i].stretch);
     }
     sum_pages(a);
     a->info.stretch = area > 0.0 ? stretch / area : 1.0;
 done:
+    free(m.placed);
+    free(m.before);
+    free(m.last);
+    free(m.patch_vertex);
+    free(m.chart);
+    free(m.vertices);
+    *atlas = result == VSH_OK ? a : NULL;
     if (result != VSH_OK) {
         vsh_atlas_free(a);
-        return result;
     }
-    *atlas = a;
-    return VSH_OK;
+    return result;
 }
 
 void vsh_atlas_free(vsh_atlas *a) {
     if (a == NULL) {
         return;
     }
-    for (size_t m = 0; m < a->mesh_count; ++m) {
-        if (a->uvs != NULL) {
-            free(a->uvs[m]);
-        }
-        if (a->mesh_charts != NULL) {
-            free(a->mesh_charts[m]);
-        }
-    }
-    for (size_t i = 0; a->shapes != NULL && i < a->shape_count; ++i) {
-        free(a->shapes[i].charts);
-        free(a->shapes[i].patch_vertex);
-        free(a->shapes[i].vertex_chart);
-        free(a->shapes[i].indices);
-        free(a->shapes[i].sources);
-    }
     free(a->pages);
     free(a->charts);
+    free(a->meshes);
     free(a->mesh_charts);
     free(a->uvs);
-    free(a->meshes);
-    free(a->shapes);
+    free(a->indices);
+    free(a->sources);
     free(a);
 }
 

@@ -3,7 +3,7 @@
 #define VSHI_UNWRAP_PACK_H
 
 #include "base/job.h"
-#include "unwrap/mask.h"
+#include "unwrap/shapes.h"
 
 typedef struct vshi_place {
     uint32_t page;
@@ -96,5 +96,30 @@ vsh_result vshi_placing_one_page(vshi_placing *placing, int32_t *rows, vsh_error
 
 /* Places them on as many pages as it takes, or max_pages + 1 where they do not fit. Errors: as the last. */
 vsh_result vshi_placing_pages(vshi_placing *placing, uint32_t *pages, vsh_error *error);
+
+/* --- the pages of an atlas: what lies on each, and how large each is */
+
+typedef struct vshi_pages {
+    vsh_atlas_page *list; /* [count]: without what is counted of charts; to be freed */
+    size_t count;
+} vshi_pages;
+
+/* Gives each item its place, as the options have it: items are those of the meshes in their order, which are
+ * instances of shapes. The stage is "pack". Errors: as vshi_pack(), with the object's name where it has a
+ * page of its own; VSH_ERROR_LIMIT (run->memory_limit). */
+vsh_result vshi_pages_pack(const vsh_unwrap_options *options, const vshi_shapes *shapes, vshi_item *items,
+                           size_t item_count, const vsh_run *run, vshi_pages *pages, vsh_error *error);
+
+/* --- the atlas */
+
+/* Bytes that a shape's part and each of its instances' take, at most. */
+double vshi_atlas_shape_bytes(size_t triangle_count);
+double vshi_atlas_mesh_bytes(size_t triangle_count);
+
+/* Makes an atlas of charts that have their places: `items` [item_count] are those of the meshes in their
+ * order, and of each mesh of its shape's patches in theirs. The atlas takes the pages' list. Errors:
+ * VSH_ERROR_MEMORY. */
+vsh_result vshi_atlas_make(const vshi_shapes *shapes, vshi_pages *pages, const vshi_item *items,
+                           size_t item_count, vsh_atlas **atlas, vsh_error *error);
 
 #endif

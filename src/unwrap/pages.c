@@ -1,6 +1,6 @@
 /* All charts go onto pages together, or those of each object onto one of its own; then pages are made as
  * small as what lies on them allows. */
-#include "unwrap/atlas.h"
+#include "unwrap/pack.h"
 
 #include "base/memory.h"
 #include "base/try.h"
@@ -25,18 +25,19 @@ enum {
 typedef struct group {
     size_t first, count; /* items */
     size_t mesh;         /* the first of its object */
+    size_t before;       /* the last group before whose first mesh is of the same shape, + 1; 0: none */
     size_t alike;        /* an earlier group that it is packed as, + 1; 0: none */
     size_t page, pages;  /* its first page, and how many */
 } group;
 
 typedef struct work {
     const vsh_unwrap_options *options;
-    const vsh_mesh *meshes;
+    const vshi_shapes *shapes;
     vshi_item *items;
     size_t item_count;
     group *groups; /* [group_count] */
     size_t group_count;
-    size_t *latest, *before; /* [shape count], [mesh count]: groups whose first mesh is of a shape, + 1 */
+    size_t *latest; /* [shape count]: the last group whose first mesh is of a shape, + 1; 0: none */
     vshi_job *job;
     vshi_pages *pages;
     size_t room; /* of the pages' list */
@@ -69,26 +70,26 @@ static bool are_alike(const work *w, const group *a, const group *b) {
     return alike;
 }
 
-static void add_object(work *w, const vshi_shapes *shapes, size_t mesh, size_t first, size_t count) {
+static void add_object(work *w, size_t mesh, size_t first, size_t count) {
     group *made = &w->groups[w->group_count];
-    *made = (group){.first = first, .count = count, .mesh = mesh};
-    size_t *latest = &w->latest[shapes->instances[w->items[first].mesh].shape];
-    for (size_t g = *latest; g > 0 && made->alike == 0; g = w->before[g - 1]) {
+    size_t *latest = &w->latest[w->shapes->instances[w->items[first].mesh].shape];
+    *made = (group){.first = first, .count = count, .mesh = mesh, .before = *latest};
+    for (size_t g = *latest; g > 0 && made->alike == 0; g = w->groups[g - 1].before) {
         const group *other = &w->groups[g - 1];
         made->alike = other->alike == 0 && are_alike(w, made, other) ? g : 0;
     }
-    w->before[w->group_count++] = *latest;
-    *latest = w->group_count;
+    *latest = ++w->group_count;
 }
 
-static void find_objects(work *w, size_t mesh_count, const vshi_shapes *shapes) {
-    for (size_t m = 0, item = 0; m < mesh_count;) {
-        const size_t end = m + vshi_mesh_object_size(w->meshes, m, mesh_count), first = item;
+static void find_objects(work *w) {
+    const vshi_shapes *s = w->shapes;
+    for (size_t m = 0, item = 0; m < s->mesh_count;) {
+        const size_t end = m + vshi_mesh_object_size(s->meshes, m, s->mesh_count), first = item;
         while (item < w->item_count && w->items[item].mesh < end) {
             ++item;
         }
         if (item > first) {
-            add_object(w, shapes, m, first, item - first);
+            add_object(w, m, first, item - first);
         }
         m = end;
     }
@@ -96,24 +97,12 @@ static void find_objects(work *w, size_t mesh_count, const vshi_shapes *shapes) 
 
 /* --- pages */
 
-static vsh_result make_room(work *w, size_t more, vsh_error *error) {
-    if (w->pages->count + more <= w->room) {
-        return VSH_OK;
-    }
-    w->room = 2 * (w->pages->count + more);
-    vsh_atlas_page *list = realloc(w->pages->list, w->room * sizeof *list);
-    if (list == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
-    }
-    w->pages->list = list;
-    return VSH_OK;
-}
-
 static vsh_result add_pages(work *w, group *g, const vshi_packing *packing, vsh_error *error) {
     g->page = w->pages->count;
     g->pages = packing->pages;
-    VSHI_TRY(make_room(w, g->pages, error));
     for (size_t i = 0; i < g->pages; ++i) {
+        VSHI_TRY(vshi_make_room((void **)&w->pages->list, w->pages->count, &w->room, sizeof *w->pages->list,
+                                what, error));
         w->pages->list[w->pages->count++] = (vsh_atlas_page){.width = packing->width,
                                                              .height = packing->height,
                                                              .texels_per_unit = packing->density,
@@ -132,7 +121,7 @@ static vsh_result pack(work *w, group *g, vsh_error *error) {
     if (result == VSH_OK) {
         return add_pages(w, g, &packing, error);
     }
-    vsh_mesh named = w->meshes[g->mesh];
+    vsh_mesh named = w->shapes->meshes[g->mesh];
     named.name = named.object_name != NULL ? named.object_name : named.name;
     const bool own = result == VSH_ERROR_LIMIT && w->options->atlas == VSH_ATLAS_OBJECTS;
     return vshi_fail(error, result, "%s%s%s", own ? vshi_mesh_label(&named, g->mesh).text : "",
@@ -262,19 +251,18 @@ static vsh_result pack_groups(work *w, vsh_error *error) {
     return VSH_OK;
 }
 
-vsh_result vshi_pages_pack(const vsh_unwrap_options *options, const vsh_mesh *meshes, size_t mesh_count,
-                           const vshi_shapes *shapes, vshi_item *items, size_t item_count, const vsh_run *run,
-                           vshi_pages *pages, vsh_error *error) {
-    work w = {.options = options, .meshes = meshes, .items = items, .item_count = item_count, .pages = pages};
+vsh_result vshi_pages_pack(const vsh_unwrap_options *options, const vshi_shapes *shapes, vshi_item *items,
+                           size_t item_count, const vsh_run *run, vshi_pages *pages, vsh_error *error) {
+    const size_t mesh_count = shapes->mesh_count;
+    work w = {.options = options, .shapes = shapes, .items = items, .item_count = item_count, .pages = pages};
     const vshi_packing packing = packing_of(options);
+    const vshi_array arrays[] = {VSHI_ARRAY(w.groups, mesh_count), VSHI_ARRAY(w.latest, shapes->count)};
     vsh_result result;
     *pages = (vshi_pages){NULL, 0};
     VSHI_TRY_DONE(vshi_check_limit(run, vshi_pack_bytes(&packing, item_count), "packing charts", error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&w.groups, mesh_count, sizeof *w.groups, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&w.latest, shapes->count, sizeof *w.latest, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&w.before, mesh_count, sizeof *w.before, what, error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
     if (options->atlas == VSH_ATLAS_OBJECTS) {
-        find_objects(&w, mesh_count, shapes);
+        find_objects(&w);
     } else {
         w.groups[w.group_count++] = (group){.count = item_count};
     }
@@ -286,7 +274,6 @@ vsh_result vshi_pages_pack(const vsh_unwrap_options *options, const vsh_mesh *me
     result = pack_groups(&w, error);
 done:
     vshi_job_end(w.job);
-    free(w.before);
     free(w.latest);
     free(w.groups);
     return result;

@@ -1,8 +1,7 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/try.h"
-#include "unwrap/atlas.h"
-#include "unwrap/patch.h"
+#include "unwrap/pack.h"
 
 #include <stdlib.h>
 
@@ -127,8 +126,8 @@ vsh_result vsh_unwrap(const vsh_mesh *meshes, size_t mesh_count, const vsh_unwra
     VSHI_TRY_DONE(check_memory(meshes, mesh_count, &shapes, &o, &full, error));
     VSHI_TRY_DONE(vshi_shapes_lay_out(&shapes, &o, &full, error));
     VSHI_TRY_DONE(make_items(&shapes, mesh_count, o.density, &items, &count, error));
-    VSHI_TRY_DONE(vshi_pages_pack(&o, meshes, mesh_count, &shapes, items, count, &full, &pages, error));
-    VSHI_TRY_DONE(vshi_atlas_make(mesh_count, &shapes, &pages, items, count, atlas, error));
+    VSHI_TRY_DONE(vshi_pages_pack(&o, &shapes, items, count, &full, &pages, error));
+    VSHI_TRY_DONE(vshi_atlas_make(&shapes, &pages, items, count, atlas, error));
 done:
     free(pages.list);
     free(items);
