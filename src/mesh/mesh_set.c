@@ -172,33 +172,32 @@ void vshi_mesh_set_note(const vshi_mesh_set *set, double shell, double voxel, co
             sheet_edges += components[i].kind == VSHI_KIND_SHEET ? components[i].open_edges : 0;
             around_all = around_all || components[i].around_all;
         }
-        const vshi_mesh_name name = vshi_mesh_label(&set->meshes[first], first);
+        char name[220];
+        snprintf(name, sizeof name, "%s (%zu of %zu)", vshi_mesh_label(&set->meshes[first], first).text,
+                 first + 1, set->count);
         if (around_all) {
-            vshi_note(run,
-                      "%s (%zu of %zu): everything else lies within it: baked as a shell with air on both "
-                      "sides",
-                      name.text, first + 1, set->count);
+            vshi_note(run, "%s: everything else lies within it: baked as a shell with air on both sides",
+                      name);
         }
         if (t.sheets + t.open_solids > 0 && sheet_edges == 0 && !around_all) {
-            vshi_note(run, "%s (%zu of %zu): no volume between its faces: baked as %s", name.text, first + 1,
-                      set->count, as);
+            vshi_note(run, "%s: no volume between its faces: baked as %s", name, as);
         }
         if (sheet_edges > 0) {
-            vshi_note(run, "%s (%zu of %zu): %zu open edge%s: baked as %s", name.text, first + 1, set->count,
-                      sheet_edges, plural(sheet_edges), as);
+            vshi_note(run, "%s: %zu open edge%s: baked as %s", name, sheet_edges, plural(sheet_edges), as);
         }
         if (t.closed_over > 0) {
-            vshi_note(run,
-                      "%s (%zu of %zu): %zu open edge%s around %zu hole%s in %zu of %zu component%s that "
-                      "enclose nearly all behind them: taken for solid, closed over the holes",
-                      name.text, first + 1, set->count, t.open_edges, plural(t.open_edges), t.holes,
-                      plural(t.holes), t.closed_over, count, plural(count));
+            vshi_note(
+                run,
+                "%s: %zu open edge%s around %zu hole%s in %zu of %zu component%s that enclose nearly all "
+                "behind them: taken for solid, closed over the holes",
+                name, t.open_edges, plural(t.open_edges), t.holes, plural(t.holes), t.closed_over, count,
+                plural(count));
         }
         if (t.turned_triangles > 0) {
             vshi_note(run,
-                      "%s (%zu of %zu): %zu triangle%s that face the other way than those around: taken as "
-                      "if they were turned over",
-                      name.text, first + 1, set->count, t.turned_triangles, plural(t.turned_triangles));
+                      "%s: %zu triangle%s that face the other way than those around: taken as if they were "
+                      "turned over",
+                      name, t.turned_triangles, plural(t.turned_triangles));
         }
     }
 }

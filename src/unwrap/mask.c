@@ -299,16 +299,13 @@ static point find_direction(const point *hull, size_t count) {
 }
 
 static void turn(vshi_patch *p, point along, double size[2]) {
-    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+    double low[2], high[2];
     for (uint32_t v = 0; v < p->vertex_count; ++v) {
         const point at = {p->uv[v][0], p->uv[v][1]};
         p->uv[v][0] = dot_along(at, along.x, along.y);
         p->uv[v][1] = dot_along(at, -along.y, along.x);
-        for (int k = 0; k < 2; ++k) {
-            low[k] = p->uv[v][k] < low[k] ? p->uv[v][k] : low[k];
-            high[k] = p->uv[v][k] > high[k] ? p->uv[v][k] : high[k];
-        }
     }
+    vshi_patch_box(p, low, high);
     for (uint32_t v = 0; v < p->vertex_count; ++v) {
         p->uv[v][0] -= low[0];
         p->uv[v][1] -= low[1];

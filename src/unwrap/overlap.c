@@ -21,21 +21,6 @@ typedef struct frame {
     double low[2], size;
 } frame;
 
-static frame frame_of(const vshi_patch *p) {
-    double high[2];
-    frame f;
-    for (int k = 0; k < 2; ++k) {
-        f.low[k] = INFINITY;
-        high[k] = -INFINITY;
-        for (uint32_t v = 0; v < p->vertex_count; ++v) {
-            f.low[k] = p->uv[v][k] < f.low[k] ? p->uv[v][k] : f.low[k];
-            high[k] = p->uv[v][k] > high[k] ? p->uv[v][k] : high[k];
-        }
-    }
-    f.size = high[0] - f.low[0] > high[1] - f.low[1] ? high[0] - f.low[0] : high[1] - f.low[1];
-    return f;
-}
-
 /* --- the raster */
 
 /* Where the edge crosses a row; the same for both triangles beside it. */
@@ -256,7 +241,10 @@ done:
 
 vsh_result vshi_patch_overlaps(const vshi_patch *p, bool *overlaps, vsh_error *error) {
     *overlaps = false;
-    const frame f = frame_of(p);
+    frame f;
+    double high[2];
+    vshi_patch_box(p, f.low, high);
+    f.size = high[0] - f.low[0] > high[1] - f.low[1] ? high[0] - f.low[0] : high[1] - f.low[1];
     if (!(f.size > 0.0) || !isfinite(f.size)) {
         return VSH_OK;
     }

@@ -70,17 +70,10 @@ static void give(search *s) {
 
 /* --- an order found by rehearsals on a small page */
 
-typedef struct rehearsal {
-    vshi_placing placing;
-    uint32_t *order; /* [count]: the best so far */
-    double best;
-} rehearsal;
-
 /* Rows that the order takes, and less than one for how low its charts end: the lower, the better. */
-static vsh_result rehearse(rehearsal *r, double *result_rows, vsh_error *error) {
+static vsh_result rehearse(vshi_placing *p, double *result_rows, vsh_error *error) {
     int32_t rows = 0;
     double ends = 0.0;
-    vshi_placing *p = &r->placing;
     VSHI_TRY(vshi_placing_one_page(p, &rows, error));
     for (size_t i = 0; i < p->count; ++i) {
         ends += p->items[i].at.y;
@@ -110,23 +103,6 @@ static void move_one(uint32_t *order, size_t count, uint64_t *state) {
     order[to] = moved;
 }
 
-static vsh_result climb(rehearsal *r, int tries, vsh_error *error) {
-    uint64_t state = r->placing.count;
-    for (int i = 0; i < tries; ++i) {
-        memcpy(r->placing.order, r->order, r->placing.count * sizeof *r->order);
-        for (uint64_t moves = 1 + next_random(&state) % 3; moves > 0; --moves) {
-            move_one(r->placing.order, r->placing.count, &state);
-        }
-        double rows = 0.0;
-        VSHI_TRY(rehearse(r, &rows, error));
-        if (rows <= r->best) {
-            r->best = rows;
-            memcpy(r->order, r->placing.order, r->placing.count * sizeof *r->order);
-        }
-    }
-    return VSH_OK;
-}
-
 /* Fills s->order: charts in the order in which some hundred attempts on a page of a quarter of the size went
  * best. */
 static vsh_result find_order(search *s, double density, int tries, vsh_error *error) {
@@ -134,28 +110,35 @@ static vsh_result find_order(search *s, double density, int tries, vsh_error *er
     small.width = (small.width + SMALLER - 1) / SMALLER;
     small.height = (small.height + SMALLER - 1) / SMALLER;
     small.padding = (small.padding + SMALLER - 1) / SMALLER;
-    rehearsal r = {.order = s->order, .best = INFINITY};
-    bool possible = false;
+    vshi_placing p;
+    const size_t bytes = s->count * sizeof *s->order;
+    uint64_t state = s->count;
+    double best = INFINITY, rows = 0.0;
     vsh_result result;
-    VSHI_TRY_DONE(
-        vshi_placing_begin(&small, 2 * small.height, s->items, s->count, s->job, &r.placing, error));
-    r.placing.least_turned = (r.placing.least_turned + SMALLER - 1) / SMALLER;
-    VSHI_TRY_DONE(vshi_placing_set(&r.placing, density / SMALLER, &possible, error));
-    for (int by = 0; by < VSHI_ORDERS && possible; ++by) {
-        double rows = 0.0;
-        VSHI_TRY_DONE(vshi_placing_sort(&r.placing, by, error));
-        VSHI_TRY_DONE(rehearse(&r, &rows, error));
-        if (rows < r.best) {
-            r.best = rows;
-            memcpy(s->order, r.placing.order, s->count * sizeof *s->order);
+    VSHI_TRY_DONE(vshi_placing_begin(&small, 2 * small.height, s->items, s->count, s->job, &p, error));
+    p.least_turned = (p.least_turned + SMALLER - 1) / SMALLER;
+    VSHI_TRY_DONE(vshi_placing_set(&p, density / SMALLER, &s->has_order, error));
+    for (int by = 0; by < VSHI_ORDERS && s->has_order; ++by) {
+        VSHI_TRY_DONE(vshi_placing_sort(&p, by, error));
+        VSHI_TRY_DONE(rehearse(&p, &rows, error));
+        if (rows < best) {
+            best = rows;
+            memcpy(s->order, p.order, bytes);
         }
     }
-    if (possible) {
-        VSHI_TRY_DONE(climb(&r, tries, error));
-        s->has_order = true;
+    for (int i = 0; i < tries && s->has_order; ++i) {
+        memcpy(p.order, s->order, bytes);
+        for (uint64_t moves = 1 + next_random(&state) % 3; moves > 0; --moves) {
+            move_one(p.order, s->count, &state);
+        }
+        VSHI_TRY_DONE(rehearse(&p, &rows, error));
+        if (rows <= best) {
+            best = rows;
+            memcpy(s->order, p.order, bytes);
+        }
     }
 done:
-    vshi_placing_free(&r.placing);
+    vshi_placing_free(&p);
     return result;
 }
 
@@ -169,42 +152,31 @@ static void tell_attempt(search *s) {
     }
 }
 
-/* One attempt at the density that was set. *over: what it takes of the room there is; above 1 it does not
- * fit. */
-static vsh_result attempt(search *s, double density, int by, double *over, vsh_error *error) {
-    uint32_t pages = 1;
-    if (by == REHEARSED) {
-        memcpy(s->placing.order, s->order, s->count * sizeof *s->order);
-    } else {
-        VSHI_TRY(vshi_placing_sort(&s->placing, by, error));
-    }
-    if (s->packing->max_pages == 1) {
-        int32_t rows = 0;
-        VSHI_TRY(vshi_placing_one_page(&s->placing, &rows, error));
-        *over = (double)rows / s->packing->height;
-    } else {
-        VSHI_TRY(vshi_placing_pages(&s->placing, &pages, error));
-        *over = pages <= s->packing->max_pages ? 1.0 : OVER;
-    }
-    tell_attempt(s);
-    if (*over <= 1.0 && density > s->best_density) {
-        keep(s, density, pages);
-    }
-    return VSH_OK;
-}
-
-/* Attempts in the first `orders` orders, until one fits; *over and *by are the best of them. */
-static vsh_result attempt_orders(search *s, double density, int orders, double *over, int *by,
-                                 vsh_error *error) {
+/* Attempts at a density in the first `orders` orders, until one fits. *over is the least that one takes of
+ * the room there is; above 1 none fits. */
+static vsh_result attempt(search *s, double density, int orders, double *over, vsh_error *error) {
+    vshi_placing *p = &s->placing;
     bool possible = false;
     *over = INFINITY;
-    VSHI_TRY(vshi_placing_set(&s->placing, density, &possible, error));
+    VSHI_TRY(vshi_placing_set(p, density, &possible, error));
     for (int order = s->has_order ? REHEARSED : 0; order < orders && possible && *over > 1.0; ++order) {
-        double own = 0.0;
-        VSHI_TRY(attempt(s, density, order, &own, error));
-        if (own < *over) {
-            *over = own;
-            *by = order;
+        int32_t rows = 0;
+        uint32_t pages = 1;
+        if (order == REHEARSED) {
+            memcpy(p->order, s->order, s->count * sizeof *s->order);
+        } else {
+            VSHI_TRY(vshi_placing_sort(p, order, error));
+        }
+        if (s->packing->max_pages == 1) {
+            VSHI_TRY(vshi_placing_one_page(p, &rows, error));
+            *over = fmin(*over, (double)rows / s->packing->height);
+        } else {
+            VSHI_TRY(vshi_placing_pages(p, &pages, error));
+            *over = fmin(*over, pages <= s->packing->max_pages ? 1.0 : OVER);
+        }
+        tell_attempt(s);
+        if (*over <= 1.0 && density > s->best_density) {
+            keep(s, density, pages);
         }
     }
     return VSH_OK;
@@ -248,14 +220,6 @@ static double first_guess(const search *s) {
     return low > 0.0 ? low : high;
 }
 
-static vsh_result fail_at_any(const search *s, vsh_error *error) {
-    return vshi_fail(
-        error, VSH_ERROR_LIMIT,
-        "%zu charts do not fit into %u page%s of %d × %d texels at any density, with %d texels of padding",
-        s->count, s->packing->max_pages, s->packing->max_pages == 1 ? "" : "s", s->packing->width,
-        s->packing->height, s->packing->padding);
-}
-
 static size_t count_triangles(const search *s) {
     size_t triangles = 0;
     for (size_t i = 0; i < s->count; ++i) {
@@ -276,14 +240,13 @@ static int rehearsals(const search *s) {
 /* The greatest density that fits, as far as some attempts find it. */
 static vsh_result find_density(search *s, int orders, int climbs, vsh_error *error) {
     double density = first_guess(s), over = INFINITY, shrink = SHRINK;
-    int by = 0;
     const int tries = rehearsals(s);
     if (tries > 0) {
         VSHI_TRY(find_order(s, density, tries, error));
         orders = 1;
     }
     for (int i = 0; i < MOST_STEPS && s->best_density == 0.0; ++i) {
-        VSHI_TRY(attempt_orders(s, density, orders, &over, &by, error));
+        VSHI_TRY(attempt(s, density, orders, &over, error));
         if (s->best_density > 0.0) {
             break;
         }
@@ -295,7 +258,12 @@ static vsh_result find_density(search *s, int orders, int climbs, vsh_error *err
         }
     }
     if (s->best_density == 0.0) {
-        return fail_at_any(s, error);
+        return vshi_fail(
+            error, VSH_ERROR_LIMIT,
+            "%zu charts do not fit into %u page%s of %d × %d texels at any density, with %d texels "
+            "of padding",
+            s->count, s->packing->max_pages, s->packing->max_pages == 1 ? "" : "s", s->packing->width,
+            s->packing->height, s->packing->padding);
     }
     double failed = INFINITY;
     for (int i = 0; i < climbs; ++i) {
@@ -305,7 +273,7 @@ static vsh_result find_density(search *s, int orders, int climbs, vsh_error *err
         if (density < s->best_density * LEAST_CLIMB) {
             break;
         }
-        VSHI_TRY(attempt_orders(s, density, orders, &over, &by, error));
+        VSHI_TRY(attempt(s, density, orders, &over, error));
         failed = over > 1.0 ? density : failed;
     }
     return VSH_OK;
@@ -315,13 +283,12 @@ vsh_result vshi_pack_one(vshi_packing *packing, vshi_item *items, size_t count, 
                          vsh_error *error) {
     search s = {.packing = packing, .items = items, .count = count, .job = job};
     double over = INFINITY;
-    int by = 0;
     vsh_result result;
     *fits = false;
     VSHI_TRY_DONE(vshi_allocate((void **)&s.best, count, sizeof *s.best, "packing charts", error));
     keep(&s, 0.0, 1);
     VSHI_TRY_DONE(vshi_placing_begin(packing, packing->height, items, count, job, &s.placing, error));
-    VSHI_TRY_DONE(attempt_orders(&s, packing->density, VSHI_ORDERS, &over, &by, error));
+    VSHI_TRY_DONE(attempt(&s, packing->density, VSHI_ORDERS, &over, error));
     *fits = over <= 1.0;
     s.best_density = packing->density;
     give(&s);
@@ -347,8 +314,7 @@ vsh_result vshi_pack(vshi_packing *packing, vshi_item *items, size_t count, vshi
     VSHI_TRY_DONE(vshi_placing_begin(packing, height, items, count, job, &s.placing, error));
     if (asked > 0.0) {
         double over = INFINITY;
-        int by = 0;
-        VSHI_TRY_DONE(attempt_orders(&s, asked, VSHI_ORDERS, &over, &by, error));
+        VSHI_TRY_DONE(attempt(&s, asked, VSHI_ORDERS, &over, error));
         if (over > 1.0) {
             VSHI_TRY_DONE(find_density(&s, 1, 1, error));
             result = vshi_fail(

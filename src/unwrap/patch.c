@@ -92,6 +92,17 @@ void vshi_patch_free(vshi_patch *p) {
     *p = (vshi_patch){0};
 }
 
+void vshi_patch_box(const vshi_patch *p, double low[2], double high[2]) {
+    for (int k = 0; k < 2; ++k) {
+        low[k] = INFINITY;
+        high[k] = -INFINITY;
+        for (uint32_t v = 0; v < p->vertex_count; ++v) {
+            low[k] = p->uv[v][k] < low[k] ? p->uv[v][k] : low[k];
+            high[k] = p->uv[v][k] > high[k] ? p->uv[v][k] : high[k];
+        }
+    }
+}
+
 vsh_result vshi_patches_add(vshi_patches *patches, vshi_patch *patch, vsh_error *error) {
     const vsh_result result = vshi_make_room((void **)&patches->list, patches->count, &patches->capacity,
                                              sizeof *patches->list, "charts", error);
@@ -112,6 +123,27 @@ void vshi_patches_free(vshi_patches *patches) {
 }
 
 /* --- charts in parts */
+
+vsh_result vshi_patches_split(const vshi_patch *p, const uint32_t *part, uint32_t parts, vshi_patches *to,
+                              vsh_error *error) {
+    uint32_t *begin = NULL, *list = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&begin, (size_t)parts + 2, sizeof *begin, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&list, p->count, sizeof *list, what, error));
+    vshi_list_groups(part, p->count, parts, begin, list);
+    for (uint32_t k = parts; k-- > 0;) {
+        vshi_patch own = {.count = begin[k + 1] - begin[k], .depth = p->depth + 1};
+        VSHI_TRY_DONE(vshi_allocate((void **)&own.triangles, own.count, sizeof *own.triangles, what, error));
+        for (uint32_t i = 0; i < own.count; ++i) {
+            own.triangles[i] = p->triangles[list[begin[k] + i]];
+        }
+        VSHI_TRY_DONE(vshi_patches_add(to, &own, error));
+    }
+done:
+    free(list);
+    free(begin);
+    return result;
+}
 
 typedef struct splitting {
     const vshi_patch *patch;
@@ -202,9 +234,7 @@ static vsh_result halve(splitting *s, bool *halved, vsh_error *error) {
 /* Adds the parts that a chart is cut into to those that wait to be laid out. */
 static vsh_result cut(const vshi_patch *p, vshi_patches *waiting, vsh_error *error) {
     splitting s = {.patch = p, .whole_units = true};
-    uint32_t *begin = NULL, *list = NULL;
-    const vshi_array arrays[] = {VSHI_ARRAY(s.far, p->count), VSHI_ARRAY(s.owner, p->count),
-                                 VSHI_ARRAY(begin, (size_t)p->count + 2), VSHI_ARRAY(list, p->count)};
+    const vshi_array arrays[] = {VSHI_ARRAY(s.far, p->count), VSHI_ARRAY(s.owner, p->count)};
     bool halved = false;
     vsh_result result;
     VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
@@ -218,20 +248,8 @@ static vsh_result cut(const vshi_patch *p, vshi_patches *waiting, vsh_error *err
     for (uint32_t i = 0; i < p->count && !halved; ++i) {
         s.owner[i] = i;
     }
-    const uint32_t parts = halved ? 2 : p->count;
-    vshi_list_groups(s.owner, p->count, parts, begin, list);
-    for (uint32_t k = parts; k-- > 0;) {
-        vshi_patch part = {.count = begin[k + 1] - begin[k], .depth = p->depth + 1};
-        VSHI_TRY_DONE(
-            vshi_allocate((void **)&part.triangles, part.count, sizeof *part.triangles, what, error));
-        for (uint32_t i = 0; i < part.count; ++i) {
-            part.triangles[i] = p->triangles[list[begin[k] + i]];
-        }
-        VSHI_TRY_DONE(vshi_patches_add(waiting, &part, error));
-    }
+    result = vshi_patches_split(p, s.owner, halved ? 2 : p->count, waiting, error);
 done:
-    free(list);
-    free(begin);
     free(s.owner);
     free(s.far);
     free(s.heap.entries);
@@ -240,7 +258,7 @@ done:
 
 vsh_result vshi_lay_out(const vshi_cut_mesh *surface, uint32_t *triangles, uint32_t count, double max_stretch,
                         vshi_patches *patches, vsh_error *error) {
-    vshi_patches waiting = {0}; /* they have triangles and a depth alone */
+    vshi_patches waiting = {0};
     vshi_patch first = {.triangles = triangles, .count = count}, p = {0};
     vsh_result result;
     VSHI_TRY_DONE(vshi_patches_add(&waiting, &first, error));

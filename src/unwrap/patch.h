@@ -26,6 +26,9 @@ vsh_result vshi_patch_make(const vshi_cut_mesh *surface, uint32_t *triangles, ui
                            vshi_patch *patch, vsh_error *error);
 void vshi_patch_free(vshi_patch *patch);
 
+/* The box around its uv. */
+void vshi_patch_box(const vshi_patch *patch, double low[2], double high[2]);
+
 /* Twice the area of a patch's triangle in UVs, positive where it runs anticlockwise. */
 static inline double vshi_patch_doubled_area(const vshi_patch *p, uint32_t i) {
     const double *a = p->uv[p->corner[i][0]], *b = p->uv[p->corner[i][1]], *c = p->uv[p->corner[i][2]];
@@ -64,6 +67,11 @@ typedef struct vshi_patches {
 /* Takes over the patch, also where it fails, and leaves it empty. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_patches_add(vshi_patches *patches, vshi_patch *patch, vsh_error *error);
 void vshi_patches_free(vshi_patches *patches);
+
+/* Adds a patch for each part of a patch, the last part first, which has triangles and a depth and nothing
+ * else: part[count] is the number of each triangle's part. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_patches_split(const vshi_patch *patch, const uint32_t *part, uint32_t parts, vshi_patches *to,
+                              vsh_error *error);
 
 /* Lays triangles (ascending, taken over) out as one chart, or as many as it takes so that none folds or
  * stretches beyond the limit; adds them to `patches`. Errors: VSH_ERROR_MEMORY. */

@@ -71,27 +71,16 @@ static uint32_t find_parts(const vshi_patch *p, uint32_t *part) {
 }
 
 static vsh_result add_parts(const vshi_patch *whole, bool mirrored, vshi_patches *patches, vsh_error *error) {
-    uint32_t *part = NULL, *begin = NULL, *list = NULL, parts = 0;
+    uint32_t *part = NULL;
+    vshi_patches parts = {0};
+    vshi_patch patch = {0};
     const double scale = sqrt(whole->area / flat_area(whole));
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&part, whole->count, sizeof *part, what, error));
-    parts = find_parts(whole, part);
-    VSHI_TRY_DONE(vshi_allocate((void **)&begin, (size_t)parts + 2, sizeof *begin, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&list, whole->count, sizeof *list, what, error));
-    vshi_list_groups(part, whole->count, parts, begin, list);
-    for (uint32_t k = 0; k < parts; ++k) {
-        const uint32_t count = begin[k + 1] - begin[k];
-        uint32_t *triangles = NULL;
-        vshi_patch patch;
-        VSHI_TRY_DONE(vshi_allocate((void **)&triangles, count, sizeof *triangles, what, error));
-        for (uint32_t i = 0; i < count; ++i) {
-            triangles[i] = whole->triangles[list[begin[k] + i]];
-        }
-        result = vshi_patch_make(whole->surface, triangles, count, &patch, error);
-        if (result != VSH_OK) {
-            vshi_patch_free(&patch);
-            goto done;
-        }
+    VSHI_TRY_DONE(vshi_patches_split(whole, part, find_parts(whole, part), &parts, error));
+    while (parts.count > 0) {
+        const vshi_patch next = parts.list[--parts.count];
+        VSHI_TRY_DONE(vshi_patch_make(whole->surface, next.triangles, next.count, &patch, error));
         take_uvs(&patch, mirrored, 1.0);
         vshi_flatten_measure(&patch); /* its stretch, which its size is no part of */
         take_uvs(&patch, mirrored, scale);
@@ -99,8 +88,8 @@ static vsh_result add_parts(const vshi_patch *whole, bool mirrored, vshi_patches
         VSHI_TRY_DONE(vshi_patches_add(patches, &patch, error));
     }
 done:
-    free(list);
-    free(begin);
+    vshi_patch_free(&patch);
+    vshi_patches_free(&parts);
     free(part);
     return result;
 }
