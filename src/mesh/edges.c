@@ -20,6 +20,15 @@ typedef struct use {
     uint32_t downwards; /* it runs from the higher to the lower vertex */
 } use;
 
+/* A use by its angle around the edge. */
+typedef struct spoke {
+    double angle;
+    uint32_t side;
+    uint32_t downwards;
+    bool frayed; /* its triangle hangs together with one at an edge that has no other */
+    bool taken;
+} spoke;
+
 typedef struct finding {
     const vsh_mesh *mesh;
     bool mirrored;
@@ -29,9 +38,11 @@ typedef struct finding {
     int layers;
     uint32_t *corners; /* [triangle_count][3]: welded, in the world's order */
     vshi_sorted_sides sides;
-    use *uses;             /* [most sides of an edge] */
-    size_t odd;            /* edges of three triangles, five, … */
-    const uint8_t *frayed; /* [triangle_count]; NULL: not known */
+    use *uses;       /* [most sides of an edge] */
+    spoke *spokes;   /* the same */
+    size_t odd;      /* edges of three triangles, five, … */
+    uint8_t *frayed; /* [triangle_count]; none before find_frayed() */
+    uint32_t *queue; /* [triangle_count] */
 } finding;
 
 static int compare_uses(const void *a, const void *b) {
@@ -49,15 +60,6 @@ static void join(vshi_edges *edges, uint32_t a, uint32_t b) {
     edges->partner[a] = b;
     edges->partner[b] = a;
 }
-
-/* A use by its angle around the edge. */
-typedef struct spoke {
-    double angle;
-    uint32_t side;
-    uint32_t downwards;
-    bool frayed; /* its triangle hangs together with one at an edge that has no other */
-    bool taken;
-} spoke;
 
 static int compare_spokes(const void *a, const void *b) {
     const spoke *x = a, *y = b;
@@ -117,11 +119,9 @@ static void join_spokes(vshi_edges *edges, spoke *s, size_t count) {
 }
 
 /* Joins more than two sides of an edge. */
-static vsh_result join_many(finding *f, size_t count, vsh_error *error) {
+static void join_many(finding *f, size_t count) {
     const use *uses = f->uses;
     uint32_t ends[2];
-    spoke *spokes = NULL;
-    VSHI_TRY(vshi_allocate((void **)&spokes, count, sizeof *spokes, "triangles of an edge", error));
     vshi_side_ends(f->corners, uses[0].side, ends);
     const vshi_vec origin = vshi_mesh_place(f->mesh, ends[0]);
     const vshi_vec axis = vshi_unit(vshi_sub(vshi_mesh_place(f->mesh, ends[1]), origin));
@@ -129,12 +129,10 @@ static vsh_result join_many(finding *f, size_t count, vsh_error *error) {
     vshi_frame(axis, &u, &v);
     for (size_t i = 0; i < count; ++i) {
         const vshi_vec to = vshi_sub(vshi_mesh_place(f->mesh, uses[i].third), origin);
-        spokes[i] = (spoke){vshi_atan2(vshi_dot(to, v), vshi_dot(to, u)), uses[i].side, uses[i].downwards,
-                            f->frayed != NULL && f->frayed[uses[i].side / 3], false};
+        f->spokes[i] = (spoke){vshi_atan2(vshi_dot(to, v), vshi_dot(to, u)), uses[i].side, uses[i].downwards,
+                               f->frayed[uses[i].side / 3], false};
     }
-    join_spokes(f->edges, spokes, count);
-    free(spokes);
-    return VSH_OK;
+    join_spokes(f->edges, f->spokes, count);
 }
 
 /* Lists the sides of an edge that count: of triangles of a layer that are not skipped, nor given before. */
@@ -186,94 +184,64 @@ static bool next_uses(finding *f, cursor *at, size_t *count) {
     return true;
 }
 
-/* Joins the sides of each edge that has two, four, …; those of others wait until it is known what is frayed.
- */
-static vsh_result join_even(finding *f, vsh_error *error) {
+/* Joins the sides of each edge that has two, four, … (`parity` 0) or three, five, … (1), and counts the
+ * others of more than two. */
+static void join_sides(finding *f, size_t parity) {
     size_t count;
+    f->odd = 0;
     for (cursor at = {0, 0, 0}; next_uses(f, &at, &count);) {
-        if (count == 2) {
+        if (count == 2 && parity == 0) {
             join(f->edges, f->uses[0].side, f->uses[1].side);
-        } else if (count > 2 && count % 2 == 0) {
-            VSHI_TRY(join_many(f, count, error));
-        } else if (count > 2) {
-            ++f->odd;
+        } else if (count > 2 && count % 2 == parity) {
+            join_many(f, count);
+        } else {
+            f->odd += count > 2;
         }
     }
-    return VSH_OK;
 }
 
 /* Marks the triangles that hang together with one at an edge of its own. */
-static vsh_result find_frayed(finding *f, uint8_t *frayed, vsh_error *error) {
+static void find_frayed(finding *f) {
     const vshi_edges *edges = f->edges;
-    uint32_t *queue = NULL;
-    size_t waiting = 0;
-    VSHI_TRY(
-        vshi_allocate((void **)&queue, f->mesh->triangle_count, sizeof *queue, "edges of triangles", error));
-    size_t count;
+    size_t waiting = 0, count;
     for (cursor c = {0, 0, 0}; next_uses(f, &c, &count);) {
-        if (count == 1 && !frayed[f->uses[0].side / 3]) {
-            frayed[f->uses[0].side / 3] = 1;
-            queue[waiting++] = f->uses[0].side / 3;
+        if (count == 1 && !f->frayed[f->uses[0].side / 3]) {
+            f->frayed[f->uses[0].side / 3] = 1;
+            f->queue[waiting++] = f->uses[0].side / 3;
         }
     }
     for (size_t at = 0; at < waiting; ++at) {
-        for (uint32_t side = 3 * queue[at]; side < 3 * queue[at] + 3; ++side) {
+        for (uint32_t side = 3 * f->queue[at]; side < 3 * f->queue[at] + 3; ++side) {
             const uint32_t other = edges->partner[side] / 3;
-            if (edges->partner[side] != VSHI_NO_PARTNER && !frayed[other]) {
-                frayed[other] = 1;
-                queue[waiting++] = other;
+            if (edges->partner[side] != VSHI_NO_PARTNER && !f->frayed[other]) {
+                f->frayed[other] = 1;
+                f->queue[waiting++] = other;
             }
         }
     }
-    free(queue);
-    return VSH_OK;
-}
-
-/* Joins what goes on at edges of odd numbers of triangles. */
-static vsh_result join_odd(finding *f, vsh_error *error) {
-    uint8_t *frayed = NULL;
-    vsh_result result;
-    VSHI_TRY(vshi_allocate((void **)&frayed, f->mesh->triangle_count, 1, "edges of triangles", error));
-    VSHI_TRY_DONE(find_frayed(f, frayed, error));
-    f->frayed = frayed;
-    size_t count;
-    for (cursor at = {0, 0, 0}; next_uses(f, &at, &count);) {
-        if (count > 2 && count % 2 != 0) {
-            VSHI_TRY_DONE(join_many(f, count, error));
-        }
-    }
-done:
-    f->frayed = NULL;
-    free(frayed);
-    return result;
-}
-
-static size_t count_open(const vsh_mesh *mesh, const vshi_edges *edges) {
-    size_t open = 0;
-    for (size_t side = 0; side < 3 * mesh->triangle_count; ++side) {
-        open += !edges->skipped[side / 3] && edges->partner[side] == VSHI_NO_PARTNER;
-    }
-    return open;
 }
 
 /* Fills partner, skipped, first, doubled and open. Flat triangles may be what joins two long edges to one. */
-static vsh_result join_edges(finding *f, bool with_flat, vsh_error *error) {
-    const vsh_mesh *mesh = f->mesh;
+static void join_edges(finding *f, bool with_flat) {
+    const size_t count = f->mesh->triangle_count;
     vshi_edges *edges = f->edges;
-    memset(edges->partner, 0xff, 3 * mesh->triangle_count * sizeof *edges->partner);
-    for (size_t i = 0; i < mesh->triangle_count; ++i) {
+    memset(edges->partner, 0xff, 3 * count * sizeof *edges->partner);
+    memset(edges->doubled, 0, count);
+    memset(f->frayed, 0, count);
+    for (size_t i = 0; i < count; ++i) {
         const uint32_t *v = f->corners + 3 * i;
         edges->first[i] = (uint32_t)i;
-        edges->doubled[i] = 0;
         edges->skipped[i] = v[0] == v[1] || v[1] == v[2] || v[2] == v[0] || (!with_flat && f->flat[i]);
     }
-    f->odd = 0;
-    VSHI_TRY(join_even(f, error));
-    if (f->odd > 0) {
-        VSHI_TRY(join_odd(f, error));
+    join_sides(f, 0);
+    if (f->odd > 0) { /* which wait until it is known what is frayed */
+        find_frayed(f);
+        join_sides(f, 1);
     }
-    edges->open = count_open(mesh, edges);
-    return VSH_OK;
+    edges->open = 0;
+    for (size_t side = 0; side < 3 * count; ++side) {
+        edges->open += !edges->skipped[side / 3] && edges->partner[side] == VSHI_NO_PARTNER;
+    }
 }
 
 /* A triangle's corners, whichever way it looks. */
@@ -317,6 +285,7 @@ static vsh_result sort_sides(finding *f, vsh_error *error) {
         end = vshi_next_edge(&f->sides, i);
         most = end - i > most ? end - i : most;
     }
+    VSHI_TRY(vshi_allocate((void **)&f->spokes, most, sizeof *f->spokes, "edges of triangles", error));
     return vshi_allocate((void **)&f->uses, most, sizeof *f->uses, "edges of triangles", error);
 }
 
@@ -346,7 +315,9 @@ vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, bool copies_apart
                                  VSHI_ARRAY(edges->partner, 3 * count),
                                  VSHI_ARRAY(f.flat, count),
                                  VSHI_ARRAY(f.layer, count),
-                                 VSHI_ARRAY(f.corners, 3 * count)};
+                                 VSHI_ARRAY(f.corners, 3 * count),
+                                 VSHI_ARRAY(f.frayed, count),
+                                 VSHI_ARRAY(f.queue, count)};
     size_t flats = 0;
     vsh_result result;
     VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "edges of triangles", error));
@@ -359,16 +330,19 @@ vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, bool copies_apart
         f.flat[i] = vshi_mesh_degenerate(mesh, i);
         flats += f.flat[i];
     }
-    VSHI_TRY_DONE(join_edges(&f, false, error));
+    join_edges(&f, false);
     const size_t open = edges->open;
     if (flats > 0 && open > 0) { /* closed with them or without them is closed */
-        VSHI_TRY_DONE(join_edges(&f, true, error));
+        join_edges(&f, true);
         if (edges->open >= open) {
-            VSHI_TRY_DONE(join_edges(&f, false, error));
+            join_edges(&f, false);
         }
     }
 done:
     free(f.uses);
+    free(f.spokes);
+    free(f.queue);
+    free(f.frayed);
     free(f.sides.sorted);
     free(f.corners);
     free(f.layer);
