@@ -150,9 +150,6 @@ VSH_API void vsh_atlas_get_info(const vsh_atlas *atlas, vsh_atlas_info *info);
 /* A view of mesh `mesh` (< mesh count). */
 VSH_API vsh_atlas_mesh vsh_atlas_mesh_view(const vsh_atlas *atlas, size_t mesh);
 
-/* Chart `chart` (< chart count). */
-VSH_API vsh_atlas_chart vsh_atlas_chart_view(const vsh_atlas *atlas, size_t chart);
-
 /* Page `page` (< page count). */
 VSH_API vsh_atlas_page vsh_atlas_page_view(const vsh_atlas *atlas, size_t page);
 

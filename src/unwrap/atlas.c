@@ -382,10 +382,6 @@ vsh_atlas_mesh vsh_atlas_mesh_view(const vsh_atlas *atlas, size_t mesh) {
     return atlas->meshes[mesh];
 }
 
-vsh_atlas_chart vsh_atlas_chart_view(const vsh_atlas *atlas, size_t chart) {
-    return atlas->charts[chart];
-}
-
 vsh_atlas_page vsh_atlas_page_view(const vsh_atlas *atlas, size_t page) {
     return atlas->pages[page];
 }

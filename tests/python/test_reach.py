@@ -33,7 +33,6 @@ LEFT_OUT = {
     "vsh_lit_check_uvs": "what lit_write() refuses, for bakes that begin long before it; bake_scene() asks it",
     "vsh_triangles_create_beside": "procedural solids beside meshes: scenes trace them so",
     "vsh_planes_shaded": "what a plane costs, for progress of several bakes together",
-    "vsh_atlas_chart_view": "one chart of those that Atlas.charts lists",
 }
 # Words are looked up in tables of the headers' constants.
 LEFT_OUT.update({name: "words" for name in ("vsh_find_name",)})

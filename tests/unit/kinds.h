@@ -6,18 +6,17 @@
 
 #include "mesh/solidity.h"
 
+OWNER(vshi_solidity)
+
 static inline vshi_solidity *solidity_of(const vsh_mesh *meshes, size_t count) {
     vshi_solidity *made = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vshi_solidity_create(meshes, count, NULL, &made, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vshi_solidity_create(meshes, count, NULL, &made, &failure));
     return made;
 }
 
 /* The kinds of all components in their order: "S" solid, "R" room, "W" wall, "-" sheet. */
 static inline void assert_kinds(const vsh_mesh *meshes, size_t count, const char *kinds) {
-    vshi_solidity *s = solidity_of(meshes, count);
+    OWNED(vshi_solidity) *s = solidity_of(meshes, count);
     size_t all;
     const vshi_component *c = vshi_solidity_components(s, &all);
     char found[32] = "";
@@ -27,7 +26,6 @@ static inline void assert_kinds(const vsh_mesh *meshes, size_t count, const char
     if (strcmp(found, kinds) != 0) {
         fail_msg("%s: %s, expected %s (encloses %g)", meshes->name, found, kinds, c[0].enclosed);
     }
-    vshi_solidity_free(s);
 }
 
 static inline void assert_kinds_of(shape *s, const char *what, const char *kinds) {

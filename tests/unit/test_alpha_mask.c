@@ -18,9 +18,8 @@ static bool blocked(const vsh_triangles *triangles, const double from[3], const 
 /* --- shadows and AO */
 
 TEST(a_masked_card_casts_the_shadow_of_its_disc) {
-    card *c = malloc(sizeof *c);
-    make_card(c, 1.0f);
-    vsh_triangles *triangles = traced_of(&c->mesh, 1);
+    FREED card *c = card_at(1.0f);
+    OWNED(vsh_triangles) *triangles = traced_of(&c->mesh, 1);
     const double directions[3][3] = {{0.0, 1.0, 0.0}, {0.6, 0.8, 0.0}, {-0.48, 0.6, 0.64}};
     int dark = 0, lit = 0;
     for (int i = 0; i < 3 * 41 * 41; ++i) {
@@ -38,20 +37,17 @@ TEST(a_masked_card_casts_the_shadow_of_its_disc) {
     /* and from above */
     assert_true(blocked(triangles, (const double[]){0, 2, 0}, (const double[]){0, -1, 0}));
     assert_false(blocked(triangles, (const double[]){0.9, 2, 0.9}, (const double[]){0, -1, 0}));
-    vsh_triangles_free(triangles);
-    free(c);
 }
 
 TEST(soft_shadows_and_ao_are_those_of_the_disc_as_triangles) {
     enum { POINTS = 200, RAYS = 1024 };
-    card *c = malloc(sizeof *c);
-    fan *f = malloc(sizeof *f);
-    make_card(c, 0.7f);
-    make_fan(f, 0.7f);
+    FREED card *c = card_at(0.7f);
+    FREED fan *f = fan_at(0.7f);
     vsh_mesh whole = c->mesh;
     whole.mask = NULL;
-    vsh_triangles *cut = traced_of(&c->mesh, 1), *disc = traced_of(&f->mesh, 1),
-                  *square = traced_of(&whole, 1);
+    OWNED(vsh_triangles) *cut = traced_of(&c->mesh, 1);
+    OWNED(vsh_triangles) *disc = traced_of(&f->mesh, 1);
+    OWNED(vsh_triangles) *square = traced_of(&whole, 1);
     double positions[3 * POINTS];
     float normals[3 * POINTS], value[3][POINTS];
     for (size_t i = 0; i < POINTS; ++i) {
@@ -78,11 +74,6 @@ TEST(soft_shadows_and_ao_are_those_of_the_disc_as_triangles) {
         assert_true(worst <= 3.0 / RAYS); /* rays on the very edge */
         assert_true(other > 0.05);
     }
-    vsh_triangles_free(cut);
-    vsh_triangles_free(disc);
-    vsh_triangles_free(square);
-    free(c);
-    free(f);
 }
 
 /* --- lookups */
@@ -91,14 +82,13 @@ TEST(rays_see_wraps_transforms_cutoff_and_base_factor) {
     uint32_t seed = 1;
     int through = 0, met = 0;
     for (int i = 0; i < 18; ++i) {
-        card *c = malloc(sizeof *c);
+        FREED card *c = card_at(1.0f);
         uint8_t alpha[WIDE * HIGH];
-        make_card(c, 1.0f);
         c->mask = random_mask(alpha, i, &seed);
         for (size_t k = 0; k < 8; ++k) {
             c->uvs[k] = 5.0f * c->uvs[k] - 2.25f; /* u: x from -1 to 1 is -2.25 to 2.75 */
         }
-        vsh_triangles *triangles = traced_of(&c->mesh, 1);
+        OWNED(vsh_triangles) *triangles = traced_of(&c->mesh, 1);
         for (int k = 0; k < 400; ++k) {
             const double x = 1.9 * next_of(&seed) - 0.95, z = 1.9 * next_of(&seed) - 0.95;
             const double u = 2.5 * (x + 1.0) - 2.25, v = 2.5 * (1.0 - z) - 2.25;
@@ -110,8 +100,6 @@ TEST(rays_see_wraps_transforms_cutoff_and_base_factor) {
                 met += is;
             }
         }
-        vsh_triangles_free(triangles);
-        free(c);
     }
     assert_true(through > 1000 && met > 1000);
 }
@@ -120,12 +108,11 @@ TEST(rays_see_wraps_transforms_cutoff_and_base_factor) {
 
 TEST(a_ray_sees_the_same_alone_and_in_any_packet) {
     enum { RAYS = 4096 };
-    card *c = malloc(sizeof *c);
-    make_card(c, 1.0f);
+    FREED card *c = card_at(1.0f);
     for (size_t k = 0; k < 8; ++k) {
         c->uvs[k] *= 37.0f; /* many small discs */
     }
-    vsh_triangles *triangles = traced_of(&c->mesh, 1);
+    OWNED(vsh_triangles) *triangles = traced_of(&c->mesh, 1);
     static vshi_segment_ray rays[RAYS];
     static bool together[RAYS], turned[RAYS];
     uint32_t seed = 3;
@@ -150,8 +137,6 @@ TEST(a_ray_sees_the_same_alone_and_in_any_packet) {
     for (size_t i = 0; i < RAYS; ++i) {
         assert_int_equal(turned[RAYS - 1 - i], together[i]);
     }
-    vsh_triangles_free(triangles);
-    free(c);
 }
 
 /* --- what else is made of triangles */
@@ -168,9 +153,8 @@ TEST(a_masked_box_holds_nothing) {
         box.mask = masked ? &mask : NULL;
         box.mask_uvs = uvs;
         box.solidity = masked ? VSH_SOLIDITY_SOLID : VSH_SOLIDITY_AUTO;
-        vsh_triangles *triangles = traced_of(&box, 1);
+        OWNED(vsh_triangles) *triangles = traced_of(&box, 1);
         assert_int_equal(vshi_triangles_have_solids(triangles), !masked);
-        vsh_triangles_free(triangles);
     }
 }
 
@@ -178,7 +162,7 @@ TEST(a_one_sided_box_is_as_solid_as_any) {
     float corners[24];
     vsh_mesh box = box_mesh(corners, BOX_LOW, BOX_HIGH);
     box.one_sided = 1;
-    vsh_triangles *triangles = traced_of(&box, 1);
+    OWNED(vsh_triangles) *triangles = traced_of(&box, 1);
     assert_true(vshi_triangles_have_solids(triangles));
     for (int i = 0; i < 3; ++i) {
         const vshi_segment_ray ray = {{-3.0 + 3.0 * i, 0.1, 0.2}, {1.0, 0.0, 0.0}, INFINITY};
@@ -190,12 +174,10 @@ TEST(a_one_sided_box_is_as_solid_as_any) {
         /* and casts the same */
         assert_int_equal(blocked(triangles, ray.origin, ray.direction), i < 2);
     }
-    vsh_triangles_free(triangles);
 }
 
 TEST(light_on_the_back_of_a_one_sided_face_comes_through) {
-    card *c = malloc(sizeof *c);
-    make_card(c, 1.0f);
+    FREED card *c = card_at(1.0f);
     for (int i = 0; i < 8; ++i) {
         const bool one_sided = (i & 1) != 0, mirrored = (i & 2) != 0, masked = (i & 4) != 0;
         const double transform[12] = {mirrored ? -1.0 : 1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
@@ -203,23 +185,20 @@ TEST(light_on_the_back_of_a_one_sided_face_comes_through) {
         mesh.one_sided = one_sided;
         mesh.transform = transform;
         mesh.mask = masked ? mesh.mask : NULL;
-        vsh_triangles *triangles = traced_of(&mesh, 1);
+        OWNED(vsh_triangles) *triangles = traced_of(&mesh, 1);
         const double under[3] = {0.1, 0.0, 0.2}, over[3] = {0.1, 2.0, 0.2};
         /* its front is up: a light above shines on it */
         assert_true(blocked(triangles, under, (const double[]){0, 1, 0}));
         assert_int_equal(blocked(triangles, over, (const double[]){0, -1, 0}), !one_sided);
         assert_int_equal(blocked(triangles, (const double[]){0.95, 0.0, 0.95}, (const double[]){0, 1, 0}),
                          !masked);
-        vsh_triangles_free(triangles);
     }
-    free(c);
 }
 
 /* --- what is refused */
 
 TEST(masks_that_are_none_are_refused) {
-    card *c = malloc(sizeof *c);
-    make_card(c, 0.0f);
+    FREED card *c = card_at(0.0f);
     vsh_alpha_mask bad[8];
     for (int i = 0; i < 8; ++i) {
         bad[i] = c->mask;
@@ -239,7 +218,6 @@ TEST(masks_that_are_none_are_refused) {
                      "'card'");
         assert_null(triangles);
     }
-    free(c);
 }
 
 int main(void) {

@@ -63,8 +63,7 @@ TEST(what_lies_beyond_numbers_is_opaque) {
 }
 
 TEST(pieces_are_the_opaque_part_to_within_their_size) {
-    card *c = malloc(sizeof *c);
-    make_card(c, 1.0f);
+    FREED card *c = card_at(1.0f);
     const vsh_run run = vsh_run_default();
     double before = 0.0;
     for (double size = 0.2; size > 0.01; size *= 0.5) {
@@ -87,25 +86,19 @@ TEST(pieces_are_the_opaque_part_to_within_their_size) {
         before = area;
         vshi_mask_pieces_free(&pieces);
     }
-    free(c);
 }
 
 TEST(pieces_keep_to_the_memory_limit) {
-    card *c = malloc(sizeof *c);
-    make_card(c, 1.0f);
-    vsh_run run = vsh_run_default();
-    run.memory_limit = 1 << 20;
+    FREED card *c = card_at(1.0f);
+    const vsh_run run = run_within(1 << 20);
     vshi_mask_pieces pieces;
     assert_fails(vshi_mask_pieces_cut(&c->mesh, 1e-9, &run, &pieces, &failure), VSH_ERROR_LIMIT, "'card'");
     vshi_mask_pieces_free(&pieces);
-    free(c);
 }
 
 TEST(voxels_hold_the_disc_and_not_the_card) {
-    card *c = malloc(sizeof *c);
-    fan *f = malloc(sizeof *f);
-    make_card(c, 0.0f);
-    make_fan(f, 0.0f);
+    FREED card *c = card_at(0.0f);
+    FREED fan *f = fan_at(0.0f);
     const double voxel = 0.05;
     vsh_occluders *made[2];
     vsh_occluders_options options = vsh_occluders_options_default();
@@ -138,8 +131,6 @@ TEST(voxels_hold_the_disc_and_not_the_card) {
     assert_true(inside > 50 && between > 100);
     vsh_occluders_free(made[0]);
     vsh_occluders_free(made[1]);
-    free(c);
-    free(f);
 }
 
 int main(void) {

@@ -10,7 +10,7 @@ static const double CUP[][2] = {{0, 0}, {1, 0}, {1, 2}};
 
 /* Whether points that look up are hidden among the triangles of a mesh. */
 static void assert_mesh_hides(const vsh_mesh *mesh, const double at[][3], size_t count, bool hidden) {
-    vsh_triangles *triangles = NULL;
+    OWNED(vsh_triangles) *triangles = NULL;
     assert_ok(vsh_triangles_create(mesh, 1, NULL, &triangles, &failure));
     for (size_t i = 0; i < count; ++i) {
         uint8_t where;
@@ -20,7 +20,6 @@ static void assert_mesh_hides(const vsh_mesh *mesh, const double at[][3], size_t
                      hidden ? "not hidden" : "hidden");
         }
     }
-    vsh_triangles_free(triangles);
 }
 
 /* Among those of a shape, which is emptied. */
@@ -53,7 +52,7 @@ enum { POINTS_BELOW = 5, POINTS_BESIDE = 4 };
 
 TEST(floors_below_houses_without_floors_are_hidden) {
     static const double THICKNESS[] = {0.0, 0.004, 0.01, 0.05, 0.1, 1.0}, SUNK[] = {0.0, 0.01, 0.3};
-    shape *s = shape_new();
+    FREED shape *s = shape_new();
     for (size_t i = 0; i < sizeof THICKNESS / sizeof *THICKNESS; ++i) {
         for (size_t k = 0; k < sizeof SUNK / sizeof *SUNK; ++k) {
             char what[80];
@@ -69,13 +68,12 @@ TEST(floors_below_houses_without_floors_are_hidden) {
     vsh_mesh mesh = shape_mesh(s, "mirrored house");
     mesh.transform = mirror;
     assert_mesh_hides(&mesh, BELOW, POINTS_BELOW, true);
-    free(s);
 }
 
 /* Ground in a house that lacks a wall sees out by that side. */
 TEST(walls_below_a_roof_hide_the_floor_and_a_pen_or_three_walls_do_not) {
     const double low[3] = {-1.5, -1.5, 1.8}, high[3] = {1.5, 1.5, 2.0};
-    shape *s = shape_new();
+    FREED shape *s = shape_new();
     add_ground(s, 0.0);
     add_box(s, -0.3, 2.0, ALL_SIDES & ~BOTTOM & ~TOP);
     shape_box(s, low, high, ALL_SIDES & ~BOTTOM);
@@ -86,7 +84,6 @@ TEST(walls_below_a_roof_hide_the_floor_and_a_pen_or_three_walls_do_not) {
     add_ground(s, 0.0);
     add_box(s, -0.3, 2.0, ALL_SIDES & ~BOTTOM & ~FRONT);
     assert_hidden(s, "a house without a front", BELOW, POINTS_BELOW, false);
-    free(s);
 }
 
 TEST(contents_of_cups_are_seen) {
@@ -95,7 +92,7 @@ TEST(contents_of_cups_are_seen) {
     static const double surface[][3] = {{0, 0, 1.5}, {0.7, 0.2, 1.5}},
                         bottom[][3] = {{0, 0, 0.01}, {0.5, 0, 0.01}};
     static const double over[][2] = {{1, 0}, {1, 2}, {0, 2}}, on_table[][3] = {{0, 0, 0}, {0.9, 0, 0}};
-    shape *s = shape_new();
+    FREED shape *s = shape_new();
     shape_turned(s, ORIGIN, CUP, 3, 32);
     shape_ball(s, fruit, 0.6, -1.0, 1.0, 16);
     assert_hidden(s, "fruit in a cup", top, 1, false);
@@ -107,21 +104,18 @@ TEST(contents_of_cups_are_seen) {
     add_ground(s, 0.1);
     shape_turned(s, ORIGIN, over, 3, 32);
     assert_hidden(s, "a table below a cup upside down", on_table, 2, true);
-    free(s);
 }
 
 TEST(sheets_by_name_hide_nothing) {
-    shape *s = shape_new();
+    FREED shape *s = shape_new();
     add_house(s, 0.0, 0.3);
     vsh_mesh mesh = shape_mesh(s, "house");
     mesh.solidity = VSH_SOLIDITY_SHELL;
-    vshi_solidity *found = solidity_of(&mesh, 1);
+    OWNED(vshi_solidity) *found = solidity_of(&mesh, 1);
     const uint8_t *holed = vshi_solidity_holed(found, 0);
     for (size_t i = 0; i < mesh.triangle_count; ++i) {
         assert_int_equal(holed[i], VSHI_SIDE_SHEET);
     }
-    vshi_solidity_free(found);
-    free(s);
 }
 
 int main(void) {

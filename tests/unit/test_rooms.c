@@ -1,6 +1,5 @@
 /* What is taken for a room, and what it is cut out of; walls, and what is a sheet because neither fits. */
 #include "kinds.h"
-#include "shapes.h"
 #include "testing.h"
 #include "traced.h"
 
@@ -8,7 +7,7 @@ static const double ORIGIN[3] = {0, 0, 0};
 static const double LOW[3] = {-1, -1, -1}, HIGH[3] = {1, 1, 1};
 
 TEST(rooms_and_domes_are_walls_around_air) {
-    shape *s = shape_new();
+    FREED shape *s = shape_new();
     shape_box(s, LOW, HIGH, ALL_SIDES);
     shape_turn(s, 0);
     assert_kinds_of(s, "room", "W");
@@ -35,7 +34,6 @@ TEST(rooms_and_domes_are_walls_around_air) {
     }
     shape_turn(s, 0);
     assert_kinds_of(s, "room with a door, its lintel apart", "W-");
-    free(s);
 }
 
 /* A house of 6 with a room of 2 in it and a table of 1 in that. */
@@ -64,30 +62,25 @@ static void assert_cuts(const vshi_solidity *solidity, const char *expected) {
 static void assert_cuts_of(shape *s, const char *what, const char *kinds, const char *cuts) {
     const vsh_mesh mesh = shape_mesh(s, what);
     assert_kinds(&mesh, 1, kinds);
-    vshi_solidity *found = solidity_of(&mesh, 1);
+    OWNED(vshi_solidity) *found = solidity_of(&mesh, 1);
     assert_cuts(found, cuts);
-    vshi_solidity_free(found);
-    free(s);
+    s->vertices = s->triangles = 0;
 }
 
 TEST(rooms_are_cut_out_of_what_they_lie_in) {
-    shape *s = shape_new(), *room = shape_new(), *table = shape_new();
+    FREED shape *s = shape_new(), *room = shape_new(), *table = shape_new();
     build_house(s, s, s);
     assert_kinds_of(s, "house in one mesh", "SRS");
     build_house(s, room, table);
     const vsh_mesh meshes[3] = {shape_mesh(table, "table"), shape_mesh(room, "room"), shape_mesh(s, "house")};
     assert_kinds(meshes, 3, "SRS");
-    vshi_solidity *found = solidity_of(meshes, 3);
+    OWNED(vshi_solidity) *found = solidity_of(meshes, 3);
     assert_cuts(found, "2<1 ");
     for (size_t m = 0; m < 3; ++m) {
         assert_sides(found, m, &meshes[m], VSHI_SIDE_BEHIND);
     }
-    vshi_solidity_free(found);
-    free(table);
-    free(room);
-    free(s);
+    s->vertices = s->triangles = 0;
     /* house, room, safe, room in it, gold; out of the house both: the outer one holds the inner */
-    s = shape_new();
     for (int i = 0; i < 5; ++i) {
         const double half = 5.0 - i, low[3] = {-half, -half, -half}, high[3] = {half, half, half};
         const size_t first = s->triangles;
@@ -98,7 +91,6 @@ TEST(rooms_are_cut_out_of_what_they_lie_in) {
     }
     assert_cuts_of(s, "house with a safe", "SRSRS", "0<1 0<3 2<3 ");
     /* solids that reach into a room are not cut */
-    s = shape_new();
     build_house(s, s, s);
     s->triangles -= 12;
     const double low[3] = {-0.1, -0.1, -2.9}, high[3] = {0.1, 0.1, 0.0};
@@ -125,18 +117,17 @@ TEST(rooms_of_separate_quads_are_sheets_and_never_nothing) {
         meshes[i].object = 7;
     }
     assert_kinds(meshes, 6, "S");
-    vshi_solidity *found = solidity_of(meshes, 6);
+    OWNED(vshi_solidity) *found = solidity_of(meshes, 6);
     for (size_t i = 0; i < 6; ++i) {
         assert_sides(found, i, &meshes[i], VSHI_SIDE_BEHIND);
     }
-    vshi_solidity_free(found);
     for (int i = 0; i < 6; ++i) {
         free(s[i]);
     }
 }
 
 TEST(an_open_room_in_an_open_house_closes_neither) {
-    shape *s = shape_new();
+    FREED shape *s = shape_new();
     const double wide_low[3] = {-1.2, -1.2, -1.2}, wide_high[3] = {1.2, 1.2, 1.2};
     shape_ball(s, ORIGIN, 1.3, -1.0, 0.95, 48);
     shape_ball(s, ORIGIN, 1.0, -1.0, 0.95, 48);
@@ -146,14 +137,12 @@ TEST(an_open_room_in_an_open_house_closes_neither) {
     shape_ball(s, ORIGIN, 1.0, -1.0, 0.95, 48);
     shape_turn(s, 12);
     assert_kinds_of(s, "open room in a closed house", "SR");
-    free(s);
 }
 
 /* --- Shadow and AO where solids are closed over holes, and in rooms. */
 
 static casting caster_of_mesh(const vsh_mesh *mesh, double voxel) {
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = voxel;
+    const vsh_grid_options options = with_voxel(voxel);
     vsh_grid *grid = NULL;
     vsh_triangles *triangles = NULL;
     assert_ok(vsh_grid_from_meshes(mesh, 1, &options, NULL, &grid, &failure));
@@ -164,7 +153,7 @@ static casting caster_of_mesh(const vsh_mesh *mesh, double voxel) {
 /* From 8 × 8 places `step` apart that look along z, which are proved together. */
 static void assert_all_see(const vsh_mesh *mesh, double voxel, const double towards[3], const double first[3],
                            const double step[2]) {
-    casting c = caster_of_mesh(mesh, voxel);
+    FREED_BY(caster_free) casting c = caster_of_mesh(mesh, voxel);
     const vsh_light narrow = sun(towards, RADIANS(1.0));
     double at[3 * 64];
     float up[3 * 64] = {0.0f}, seen[64];
@@ -178,7 +167,6 @@ static void assert_all_see(const vsh_mesh *mesh, double voxel, const double towa
     for (int i = 0; i < 64; ++i) {
         assert_true(seen[i] == 1.0f);
     }
-    caster_free(&c);
 }
 
 /* A tube of 8, open at both ends, through whose length the sun is seen; within 0.11 of the axis all of it.
@@ -187,7 +175,7 @@ static void assert_all_see(const vsh_mesh *mesh, double voxel, const double towa
  */
 TEST(no_ray_is_proved_hidden_through_two_holes_or_by_the_thickness_of_a_sheet) {
     const double rings[][2] = {{0.25, -4}, {0.25, 4}};
-    shape *s = shape_new();
+    FREED shape *s = shape_new();
     shape_turned(s, ORIGIN, rings, 2, 64);
     const vsh_mesh tube = shape_mesh(s, "tube");
     vsh_solidity_report report;
@@ -196,7 +184,6 @@ TEST(no_ray_is_proved_hidden_through_two_holes_or_by_the_thickness_of_a_sheet) {
     assert_int_equal(report.open_edges, 128);
     assert_all_see(&tube, 0.02, (const double[]){0, 0, 1}, (const double[]){-0.07, -0.07, -5.0},
                    (const double[]){0.02, 0.02});
-    free(s);
     const float corners[12] = {0, -2, -2, 0, 2, -2, 0, 2, 2, 0, -2, 2};
     const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
     const vsh_mesh sheet = {
@@ -207,11 +194,11 @@ TEST(no_ray_is_proved_hidden_through_two_holes_or_by_the_thickness_of_a_sheet) {
 
 /* A room whose faces look inwards, and the floor of it. */
 TEST(the_floor_of_an_inward_room_has_the_ao_of_a_room) {
-    shape *s = shape_new();
+    FREED shape *s = shape_new();
     shape_box(s, LOW, HIGH, ALL_SIDES);
     shape_turn(s, 0);
     const vsh_mesh mesh = shape_mesh(s, "room");
-    casting c = caster_of_mesh(&mesh, 0.02);
+    FREED_BY(caster_free) casting c = caster_of_mesh(&mesh, 0.02);
     const double at[6] = {0.013, 0.021, -1.0, 0.9, 0.0, -1.0};
     const float up[6] = {0, 0, 1, 0, 0, 1};
     for (int32_t method = 0; method < AO_METHODS; ++method) {
@@ -227,8 +214,6 @@ TEST(the_floor_of_an_inward_room_has_the_ao_of_a_room) {
         /* cones see past thin walls */
         assert_true(method < VSH_AO_RAYS || (far[0] < 0.02f && far[1] < 0.02f));
     }
-    caster_free(&c);
-    free(s);
 }
 
 int main(void) {

@@ -14,8 +14,7 @@ static casting caster_of_boxes(const double (*corners)[2][3], int count, double 
     for (int i = 0; i < count; ++i) {
         meshes[i] = box_mesh(places[i], corners[i][0], corners[i][1]);
     }
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = voxel;
+    const vsh_grid_options options = with_voxel(voxel);
     vsh_grid *grid = NULL;
     vsh_triangles *triangles = NULL;
     if (vsh_grid_from_meshes(meshes, (size_t)count, &options, NULL, &grid, &failure) != VSH_OK ||
@@ -119,13 +118,9 @@ TEST(meshes_that_touch_nest_or_coincide_are_one_solid) {
     }
 }
 
-typedef struct stretched {
-    double factor;
-} stretched;
-
 static double stretched_ball(void *user, const double p[3]) {
-    const stretched *s = user;
-    return s->factor * (sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - 0.7);
+    const double *factor = user;
+    return *factor * (sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - 0.7);
 }
 
 TEST(fields_that_are_not_1_lipschitz_are_right_where_they_say_so) {
@@ -147,14 +142,12 @@ TEST(fields_that_are_not_1_lipschitz_are_right_where_they_say_so) {
     assert_int_equal(
         truth_lights((truth_scene){&ball, 1}, COUNT, positions, NULL, up, w, (double)INFINITY, 4096, truth),
         0);
-    const double factors[] = {1.0, 2.0, 0.5, 20.0, 0.05};
+    double factors[] = {1.0, 2.0, 0.5, 20.0, 0.05};
     for (int exact = 0; exact < 2; ++exact) {
         for (int f = 0; f < 5; ++f) {
-            stretched s = {factors[f]};
-            const vsh_distance field = {stretched_ball, &s, factors[f], exact, {-0.8, -0.8, -0.8},
-                                        {0.8, 0.8, 0.8}};
-            vsh_grid_options options = vsh_grid_options_default();
-            options.voxel_size = 0.04;
+            const vsh_distance field = {stretched_ball, &factors[f],        factors[f],
+                                        exact,          {-0.8, -0.8, -0.8}, {0.8, 0.8, 0.8}};
+            const vsh_grid_options options = with_voxel(0.04);
             vsh_grid *grid = NULL;
             assert_ok(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure));
             const casting made = {field_of_grid(grid, 0.0), triangles};

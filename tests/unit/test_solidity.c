@@ -6,8 +6,6 @@
 #include "mesh/edges.h"
 #include "mesh/solidity_parts.h"
 
-OWNER(vshi_solidity)
-
 static const double ORIGIN[3] = {0, 0, 0};
 static const double LOW[3] = {-1, -1, -1}, HIGH[3] = {1, 1, 1};
 
@@ -96,11 +94,10 @@ TEST(small_holes_do_not_make_a_solid_hollow) {
     s->indices[300][1] = s->indices[300][0];
     s->indices[301][1] = s->indices[301][0];
     const vsh_mesh ball = shape_mesh(s, "ball with holes");
-    vshi_solidity *found = solidity_of(&ball, 1);
+    OWNED(vshi_solidity) *found = solidity_of(&ball, 1);
     const vshi_component *c = only_component(found);
     assert_true(c->kind == VSHI_KIND_SOLID && c->enclosed > 0.99);
     assert_true(c->holes == 2 && c->open_edges == 7);
-    vshi_solidity_free(found);
     shape_turn(s, 0);
     assert_kinds_of(s, "the same inwards", "W");
     shape_ball(s, ORIGIN, 1.0, -0.9, 0.9, 48);
@@ -219,41 +216,34 @@ TEST(what_is_asked_overrules_what_is_found) {
         mesh.solidity = cases[i].asked;
         assert_kinds(&mesh, 1, cases[i].kinds);
     }
-    vshi_solidity *found = solidity_of(&mesh, 1); /* inward, though its faces look outwards */
-    assert_sides(found, 0, &mesh, VSHI_SIDE_BEFORE);
-    vshi_solidity_free(found);
+    OWNED(vshi_solidity) *inward = solidity_of(&mesh, 1); /* though its faces look outwards */
+    assert_sides(inward, 0, &mesh, VSHI_SIDE_BEFORE);
     s->vertices = s->triangles = 0;
     shape_box(s, LOW, HIGH, ALL_SIDES);
     shape_turn(s, 0);
     mesh = shape_mesh(s, "inside out");
     mesh.solidity = VSH_SOLIDITY_SOLID;
     assert_kinds(&mesh, 1, "S");
-    found = solidity_of(&mesh, 1);
-    assert_sides(found, 0, &mesh, VSHI_SIDE_BEFORE);
-    vshi_solidity_free(found);
+    OWNED(vshi_solidity) *solid = solidity_of(&mesh, 1);
+    assert_sides(solid, 0, &mesh, VSHI_SIDE_BEFORE);
 }
 
 /* Solid angle by Oosterom and Strackee, over the whole sphere's. */
-static double winding(const vsh_mesh *mesh, const double p[3]) {
+static double winding(const vsh_mesh *mesh, vshi_vec p) {
     double sum = 0.0;
     for (size_t i = 0; i < mesh->triangle_count; ++i) {
-        double v[3][3], l[3];
+        vshi_vec v[3];
+        double l[3];
+        vshi_mesh_triangle(mesh, i, v);
         for (int k = 0; k < 3; ++k) {
-            const float *at = mesh->positions + 3 * (size_t)mesh->indices[3 * i + (size_t)k];
-            for (int axis = 0; axis < 3; ++axis) {
-                v[k][axis] = (double)at[axis] - p[axis];
-            }
-            l[k] = sqrt(v[k][0] * v[k][0] + v[k][1] * v[k][1] + v[k][2] * v[k][2]);
+            v[k] = vshi_sub(v[k], p);
+            l[k] = vshi_length(v[k]);
         }
-        const double over = v[0][0] * (v[1][1] * v[2][2] - v[1][2] * v[2][1]) +
-                            v[0][1] * (v[1][2] * v[2][0] - v[1][0] * v[2][2]) +
-                            v[0][2] * (v[1][0] * v[2][1] - v[1][1] * v[2][0]);
         double under = l[0] * l[1] * l[2];
         for (int k = 0; k < 3; ++k) {
-            const int a = (k + 1) % 3, b = (k + 2) % 3;
-            under += (v[a][0] * v[b][0] + v[a][1] * v[b][1] + v[a][2] * v[b][2]) * l[k];
+            under += vshi_dot(v[(k + 1) % 3], v[(k + 2) % 3]) * l[k];
         }
-        sum += 2.0 * atan2(over, under);
+        sum += 2.0 * atan2(vshi_dot(v[0], vshi_cross(v[1], v[2])), under);
     }
     return sum / 12.566370614359172;
 }
@@ -265,59 +255,36 @@ TEST(enclosing_is_the_winding_number_behind_the_faces) {
     for (int kind = 0; kind < 6; ++kind) {
         s->vertices = s->triangles = 0;
         const double tube[][2] = {{1, 0}, {1, 3}}, vase[][2] = {{0, 0}, {1, 0}, {1.5, 1}, {0.4, 3}};
-        switch (kind) {
-        case 0:
-            shape_ball(s, ORIGIN, 1.0, -0.9, 1.0, 40);
-            break;
-        case 1:
-            shape_ball(s, ORIGIN, 1.0, -0.2, 1.0, 40);
-            break;
-        case 2:
-            shape_turned(s, ORIGIN, tube, 2, 40);
-            break;
-        case 3:
-            shape_turned(s, ORIGIN, vase, 4, 40);
-            break;
-        case 4:
-            shape_box(s, LOW, HIGH, ALL_SIDES & ~TOP);
-            break;
-        default:
-            shape_box(s, LOW, HIGH, LEFT | TOP | FRONT);
-            break;
+        if (kind < 2) {
+            shape_ball(s, ORIGIN, 1.0, kind == 0 ? -0.9 : -0.2, 1.0, 40);
+        } else if (kind < 4) {
+            shape_turned(s, ORIGIN, kind == 2 ? tube : vase, kind == 2 ? 2 : 4, 40);
+        } else {
+            shape_box(s, LOW, HIGH, kind == 4 ? ALL_SIDES & ~TOP : LEFT | TOP | FRONT);
         }
         const vsh_mesh mesh = shape_mesh(s, "open");
         OWNED(vshi_solidity) *found = solidity_of(&mesh, 1);
         const vshi_component *c = only_component(found);
         double mean = 0.0, area = 0.0;
         for (size_t i = 0; i < mesh.triangle_count; ++i) {
-            double corner[3][3], e[2][3], n[3], own = 0.0;
-            for (int k = 0; k < 9; ++k) {
-                corner[k / 3][k % 3] =
-                    (double)mesh.positions[3 * mesh.indices[3 * i + (size_t)(k / 3)] + (uint32_t)(k % 3)];
-            }
-            for (int k = 0; k < 6; ++k) {
-                e[k / 3][k % 3] = corner[1 + k / 3][k % 3] - corner[0][k % 3];
-            }
-            for (int k = 0; k < 3; ++k) {
-                n[k] = e[0][(k + 1) % 3] * e[1][(k + 2) % 3] - e[0][(k + 2) % 3] * e[1][(k + 1) % 3];
-                own += n[k] * n[k];
-            }
-            own = 0.5 * sqrt(own);
+            vshi_vec corner[3];
+            vshi_mesh_triangle(&mesh, i, corner);
+            const vshi_vec e = vshi_sub(corner[1], corner[0]), f = vshi_sub(corner[2], corner[0]),
+                           n = vshi_cross(e, f);
+            const vshi_vec behind = vshi_sub(corner[0], vshi_scale(vshi_unit(n), 1e-7));
             const int steps = kind >= 4 ? 24 : 3; /* over large triangles */
             for (int a = 0; a < steps; ++a) {
                 for (int b = 0; b < steps - a; ++b) {
                     const double u = (a + 0.33) / steps, v = (b + 0.33) / steps;
-                    double p[3];
-                    for (int k = 0; k < 3; ++k) {
-                        p[k] = corner[0][k] + u * e[0][k] + v * e[1][k] - 1e-7 * n[k] / (2.0 * own);
-                    }
-                    const double w = winding(&mesh, p), share = own / (0.5 * steps * (steps + 1));
+                    const double w =
+                        winding(&mesh, vshi_add(behind, vshi_add(vshi_scale(e, u), vshi_scale(f, v))));
+                    const double share = vshi_length(n) / (steps * (steps + 1));
                     mean += share * fabs(w - floor(w + 0.5));
                     area += share;
                 }
             }
         }
-        assert_float_equal(c->enclosed, 1.0 - mean / area, 0.01);
+        assert_near(c->enclosed, 1.0 - mean / area, 0.01);
     }
 }
 
@@ -344,10 +311,8 @@ TEST(odd_meshes_are_something) {
         shape_triangle(s, i % 2 ? a : b, i % 2 ? b : a, shape_vertex(s, cos(0.1 * i), sin(0.1 * i), 0.5));
     }
     const vsh_mesh fan = shape_mesh(s, "fan");
-    vshi_solidity *one = solidity_of(&fan, 1), *other = solidity_of(&fan, 1);
+    OWNED(vshi_solidity) *one = solidity_of(&fan, 1), *other = solidity_of(&fan, 1);
     assert_memory_equal(vshi_solidity_sides(one, 0), vshi_solidity_sides(other, 0), fan.triangle_count);
-    vshi_solidity_free(one);
-    vshi_solidity_free(other);
     s->vertices = s->triangles = 0;
     shape_vertex(s, 0, 0, 0);
     shape_triangle(s, 0, 0, 0);

@@ -29,11 +29,11 @@ static void assert_same_uvs(const vsh_atlas *a, size_t m, const vsh_atlas *b, si
 
 /* Unwraps with one to eight threads; returns the atlas. */
 static vsh_atlas *assert_same_bits(const vsh_mesh *meshes, size_t count, const vsh_unwrap_options *o) {
-    vsh_run run = vsh_run_default();
-    vsh_atlas *first = NULL, *atlas = NULL;
-    run.threads = 1;
+    vsh_run run = run_on(1);
+    vsh_atlas *first = NULL;
     assert_ok(vsh_unwrap(meshes, count, o, &run, &first, &failure));
     for (run.threads = 2; run.threads <= 8; ++run.threads) {
+        OWNED(vsh_atlas) *atlas = NULL;
         assert_ok(vsh_unwrap(meshes, count, o, &run, &atlas, &failure));
         assert_int_equal(vsh_atlas_chart_count(first), vsh_atlas_chart_count(atlas));
         assert_memory_equal(vsh_atlas_charts(first), vsh_atlas_charts(atlas),
@@ -48,88 +48,89 @@ static vsh_atlas *assert_same_bits(const vsh_mesh *meshes, size_t count, const v
             assert_same_uvs(first, m, atlas, m);
             assert_memory_equal(x.charts, y.charts, x.triangle_count * sizeof *x.charts);
         }
-        vsh_atlas_free(atlas);
     }
     return first;
 }
 
 TEST(the_same_bits_for_any_number_of_threads) {
-    shape *s[2] = {lump(40), lump(64)};
-    const vsh_mesh meshes[2] = {shape_mesh(s[0], "one"), shape_mesh(s[1], "two")};
+    FREED shape *one = lump(40), *two = lump(64);
+    const vsh_mesh meshes[2] = {shape_mesh(one, "one"), shape_mesh(two, "two")};
     const vsh_unwrap_options o = unwrap_into(256);
     vsh_atlas_free(assert_same_bits(meshes, 2, &o));
-    free(s[0]);
-    free(s[1]);
 }
 
-/* Twelve boxes of several sizes. */
-enum { BOXES = 12 };
+enum { BOXES = 12, MESHES = 5, OBJECTS = 4 };
 
-static void make_boxes(shape *s[BOXES], vsh_mesh meshes[BOXES]) {
+/* Meshes of several sizes. */
+typedef struct level {
+    shape *shapes[BOXES];
+    vsh_mesh meshes[BOXES];
+} level;
+
+static void free_level(level *l) {
     for (int i = 0; i < BOXES; ++i) {
-        s[i] = shape_new();
-        shape_box(s[i], ORIGIN, (double[3]){1 + 0.1 * i, 2 - 0.1 * i, 1}, ALL_SIDES);
-        meshes[i] = shape_mesh(s[i], "box");
+        free(l->shapes[i]);
     }
 }
 
-static void free_boxes(shape *s[BOXES]) {
+static void add_box(level *l, int i, const double size[3], const char *name) {
+    l->shapes[i] = shape_new();
+    shape_box(l->shapes[i], ORIGIN, size, ALL_SIDES);
+    l->meshes[i] = shape_mesh(l->shapes[i], name);
+}
+
+static level make_boxes(void) {
+    level l = {.shapes = {NULL}};
     for (int i = 0; i < BOXES; ++i) {
-        free(s[i]);
+        add_box(&l, i, (double[3]){1 + 0.1 * i, 2 - 0.1 * i, 1}, "box");
     }
+    return l;
 }
 
 TEST(each_mesh_is_on_one_page_where_it_fits) {
-    shape *s[BOXES];
-    vsh_mesh meshes[BOXES];
-    make_boxes(s, meshes);
+    FREED_BY(free_level) level l = make_boxes();
     vsh_unwrap_options o = unwrap_into(128);
     o.max_pages = 6;
     o.texels_per_unit = 20;
-    vsh_atlas *atlas = NULL;
-    const vsh_atlas_info info = unwrap_well(meshes, BOXES, &o, &atlas);
+    OWNED(vsh_atlas) *atlas = NULL;
+    const vsh_atlas_info info = unwrap_well(l.meshes, BOXES, &o, &atlas);
     assert_in_range(info.pages, 2, 6);
     assert_true(info.texels_per_unit == 20);
     uint32_t page[BOXES];
     memset(page, 0xff, sizeof page);
     for (size_t c = 0; c < info.charts; ++c) {
-        const vsh_atlas_chart chart = vsh_atlas_chart_view(atlas, c);
+        const vsh_atlas_chart chart = vsh_atlas_charts(atlas)[c];
         assert_true(page[chart.mesh] == UINT32_MAX || page[chart.mesh] == chart.page);
         page[chart.mesh] = chart.page;
     }
-    vsh_atlas_free(atlas);
     /* a mesh that is larger than a page is spread over several */
     o.texels_per_unit = 55;
     o.max_pages = 3;
-    assert_in_range(unwrap_well(meshes, 1, &o, NULL).pages, 2, 3);
+    assert_in_range(unwrap_well(l.meshes, 1, &o, NULL).pages, 2, 3);
     /* the greatest density for all pages is greater than that for one */
     o.texels_per_unit = 0;
     o.max_pages = 1;
-    const double one = unwrap_well(meshes, BOXES, &o, NULL).texels_per_unit;
+    const double one = unwrap_well(l.meshes, BOXES, &o, NULL).texels_per_unit;
     o.max_pages = 4;
-    const double four = unwrap_well(meshes, BOXES, &o, NULL).texels_per_unit;
+    const double four = unwrap_well(l.meshes, BOXES, &o, NULL).texels_per_unit;
     assert_true(four > 1.7 * one);
-    free_boxes(s);
 }
 
 TEST(a_density_that_does_not_fit_is_refused_and_one_named_that_does) {
-    shape *s[BOXES];
-    vsh_mesh meshes[BOXES];
-    make_boxes(s, meshes);
+    FREED_BY(free_level) level l = make_boxes();
     vsh_unwrap_options o = unwrap_into(128);
     vsh_atlas *atlas = NULL;
     o.texels_per_unit = 1000;
-    assert_fails(vsh_unwrap(meshes, BOXES, &o, NULL, &atlas, &failure), VSH_ERROR_LIMIT, "1000");
+    assert_fails(vsh_unwrap(l.meshes, BOXES, &o, NULL, &atlas, &failure), VSH_ERROR_LIMIT, "1000");
     assert_null(atlas);
     const char *named = strstr(failure.message, "texels a unit: ");
     assert_non_null(named);
     o.texels_per_unit = atof(named + strlen("texels a unit: ")) * 0.999; /* of four digits */
     assert_true(o.texels_per_unit > 5 && o.texels_per_unit < 100);
-    unwrap_well(meshes, BOXES, &o, NULL);
+    unwrap_well(l.meshes, BOXES, &o, NULL);
     /* more charts than texels */
     o = unwrap_into(8);
-    assert_fails(vsh_unwrap(meshes, BOXES, &o, NULL, &atlas, &failure), VSH_ERROR_LIMIT, "at any density");
-    free_boxes(s);
+    assert_fails(vsh_unwrap(l.meshes, BOXES, &o, NULL, &atlas, &failure), VSH_ERROR_LIMIT, "at any density");
 }
 
 /* Area of a mesh in texels. */
@@ -146,21 +147,18 @@ static double texels_of(const vsh_atlas *atlas, size_t mesh) {
 }
 
 TEST(density_is_as_asked_and_by_mesh) {
-    shape *s[2] = {lump(32), lump(32)};
-    const vsh_mesh meshes[2] = {shape_mesh(s[0], "one"), shape_mesh(s[1], "two")};
+    FREED shape *one = lump(32), *two = lump(32);
+    const vsh_mesh meshes[2] = {shape_mesh(one, "one"), shape_mesh(two, "two")};
     const double factors[2] = {1.0, 0.5};
     vsh_unwrap_options o = unwrap_into(256);
     o.density = factors;
     o.texels_per_unit = 30;
-    vsh_atlas *atlas = NULL;
+    OWNED(vsh_atlas) *atlas = NULL;
     vsh_mesh_report report;
     unwrap_well(meshes, 2, &o, &atlas);
     assert_ok(vsh_mesh_check(&meshes[0], &report, &failure));
     assert_true(fabs(texels_of(atlas, 0) / (900 * report.area) - 1) < 0.01);
     assert_true(fabs(texels_of(atlas, 1) / (225 * report.area) - 1) < 0.01);
-    vsh_atlas_free(atlas);
-    free(s[0]);
-    free(s[1]);
 }
 
 /* Turned, moved, mirrored and doubled: one layout, places of their own. One that is scaled unevenly is a
@@ -191,36 +189,22 @@ TEST(instances_share_their_charts) {
 
 /* --- pages of objects */
 
-enum { MESHES = 5, OBJECTS = 4 };
-
-/* Four objects, the second of two meshes; the last is without a number, as all were one by one. */
-typedef struct level {
-    shape *shapes[MESHES];
-    vsh_mesh meshes[MESHES];
-} level;
-
 static const uint32_t object_of[MESHES] = {0, 1, 1, 2, 3};
 
-static void make_level(level *l) {
+/* Four objects, the second of two meshes; the last is without a number, as all were one by one. */
+static level make_level(void) {
     static const double sides[MESHES][3] = {{1, 1, 1}, {2, 1, 0.5}, {0.3, 0.4, 3}, {0, 0, 0}, {6, 1, 5}};
     static const char *const names[MESHES] = {"crate", "door", "handle", "ball", "wall"};
+    level l = {.shapes = {NULL}};
     for (int i = 0; i < MESHES; ++i) {
-        l->shapes[i] = shape_new();
-        if (i == 3) {
-            shape_ball(l->shapes[i], ORIGIN, 1.0, -1.0, 1.0, 20);
-        } else {
-            shape_box(l->shapes[i], ORIGIN, sides[i], ALL_SIDES);
-        }
-        l->meshes[i] = shape_mesh(l->shapes[i], names[i]);
+        add_box(&l, i, sides[i], names[i]);
     }
-    l->meshes[1].object = l->meshes[2].object = 7;
-    l->meshes[1].object_name = l->meshes[2].object_name = "door with handle";
-}
-
-static void free_level(level *l) {
-    for (int i = 0; i < MESHES; ++i) {
-        free(l->shapes[i]);
-    }
+    l.shapes[3]->vertices = l.shapes[3]->triangles = 0;
+    shape_ball(l.shapes[3], ORIGIN, 1.0, -1.0, 1.0, 20);
+    l.meshes[3] = shape_mesh(l.shapes[3], names[3]);
+    l.meshes[1].object = l.meshes[2].object = 7;
+    l.meshes[1].object_name = l.meshes[2].object_name = "door with handle";
+    return l;
 }
 
 static vsh_unwrap_options of_objects(int32_t size) {
@@ -230,18 +214,18 @@ static vsh_unwrap_options of_objects(int32_t size) {
 }
 
 TEST(each_object_is_packed_as_if_it_were_alone) {
-    FREED_BY(free_level) level l;
-    make_level(&l);
+    FREED_BY(free_level) level l = make_level();
     const vsh_unwrap_options o = of_objects(128), alone = unwrap_into(128);
-    vsh_atlas *atlas = NULL, *one = NULL;
+    OWNED(vsh_atlas) *atlas = NULL;
     const vsh_atlas_info info = unwrap_well(l.meshes, MESHES, &o, &atlas);
     assert_int_equal(info.pages, OBJECTS);
     for (size_t c = 0; c < info.charts; ++c) {
-        const vsh_atlas_chart chart = vsh_atlas_chart_view(atlas, c);
+        const vsh_atlas_chart chart = vsh_atlas_charts(atlas)[c];
         assert_int_equal(chart.page, object_of[chart.mesh]);
     }
     for (size_t m = 0, count; m < MESHES; m += count) {
         count = m == 1 ? 2 : 1;
+        OWNED(vsh_atlas) *one = NULL;
         const vsh_atlas_info own = unwrap_well(l.meshes + m, count, &alone, &one);
         const vsh_atlas_page page = vsh_atlas_page_view(atlas, object_of[m]);
         assert_int_equal(page.first_mesh, m);
@@ -250,9 +234,7 @@ TEST(each_object_is_packed_as_if_it_were_alone) {
         for (size_t k = 0; k < count; ++k) {
             assert_same_uvs(atlas, m + k, one, k);
         }
-        vsh_atlas_free(one);
     }
-    vsh_atlas_free(atlas);
 }
 
 TEST(objects_that_are_instances_are_packed_alike) {
@@ -292,22 +274,20 @@ static int is_power(int32_t x) {
 /* Whether meshes fit one page of a size at a density. */
 static int fits(const vsh_mesh *meshes, size_t count, double density, int32_t width, int32_t height) {
     vsh_unwrap_options o = unwrap_into(width);
-    vsh_atlas *atlas = NULL;
+    OWNED(vsh_atlas) *atlas = NULL;
     o.height = height;
     o.texels_per_unit = density;
     const vsh_result result = vsh_unwrap(meshes, count, &o, NULL, &atlas, NULL);
-    vsh_atlas_free(atlas);
     assert_true(result == VSH_OK || result == VSH_ERROR_LIMIT);
     return result == VSH_OK;
 }
 
 TEST(pages_are_the_smallest_that_the_density_fits) {
-    FREED_BY(free_level) level l;
-    make_level(&l);
+    FREED_BY(free_level) level l = make_level();
     vsh_unwrap_options o = of_objects(256);
     o.texels_per_unit = 12;
     o.fit_pages = 1;
-    vsh_atlas *atlas = NULL;
+    OWNED(vsh_atlas) *atlas = NULL;
     assert_int_equal(unwrap_well(l.meshes, MESHES, &o, &atlas).pages, OBJECTS);
     int32_t least = 256, most = 0;
     for (size_t m = 0, count; m < MESHES; m += count) {
@@ -334,7 +314,6 @@ TEST(pages_are_the_smallest_that_the_density_fits) {
     assert_true(info.width == 64 && info.height == 64);
     const vsh_atlas_page last = vsh_atlas_page_view(atlas, info.pages - 1);
     assert_true(last.width * last.height < 64 * 64);
-    vsh_atlas_free(atlas);
     /* and a single one is not wider than it has to be */
     o.width = 1000;
     o.height = 700;
@@ -344,8 +323,7 @@ TEST(pages_are_the_smallest_that_the_density_fits) {
 }
 
 TEST(an_object_that_does_not_fit_is_named) {
-    FREED_BY(free_level) level l;
-    make_level(&l);
+    FREED_BY(free_level) level l = make_level();
     vsh_unwrap_options o = of_objects(64);
     vsh_atlas *atlas = NULL;
     o.texels_per_unit = 9;
@@ -359,8 +337,7 @@ TEST(an_object_that_does_not_fit_is_named) {
 }
 
 TEST(objects_without_area_have_no_page_for_any_threads) {
-    FREED_BY(free_level) level l;
-    make_level(&l);
+    FREED_BY(free_level) level l = make_level();
     memset(l.shapes[0]->indices, 0, l.meshes[0].triangle_count * 3 * sizeof(uint32_t));
     vsh_unwrap_options o = of_objects(256);
     o.texels_per_unit = 12;
@@ -388,17 +365,21 @@ static vsh_mesh with_uvs(const vsh_mesh *mesh, const vsh_atlas *atlas, float **p
                       .triangle_count = m.triangle_count};
 }
 
+static int32_t can_serve(const vsh_mesh *mesh) {
+    int32_t usable = -1;
+    assert_ok(vsh_uvs_usable(mesh, NULL, &usable, &failure));
+    return usable;
+}
+
 TEST(uvs_that_can_serve_are_kept) {
     FREED shape *s = lump(48);
     const vsh_mesh mesh = shape_mesh(s, "lump");
     vsh_unwrap_options o = unwrap_into(256);
-    vsh_atlas *atlas = NULL, *again = NULL;
+    OWNED(vsh_atlas) *atlas = NULL, *again = NULL;
     const vsh_atlas_info info = unwrap_well(&mesh, 1, &o, &atlas);
-    float *positions, *uvs;
+    FREED float *positions = NULL, *uvs = NULL;
     vsh_mesh own = with_uvs(&mesh, atlas, &positions, &uvs);
-    int32_t usable = 0;
-    assert_ok(vsh_uvs_usable(&own, NULL, &usable, &failure));
-    assert_int_equal(usable, 1);
+    assert_true(can_serve(&own));
     o.keep_uvs = VSH_UNWRAP_KEEP;
     o.width = o.height = 200;
     const vsh_atlas_info kept = unwrap_well(&own, 1, &o, &again);
@@ -424,7 +405,6 @@ TEST(uvs_that_can_serve_are_kept) {
         }
     }
     assert_true(most / least < 1.001);
-    vsh_atlas_free(again);
 
     /* and none of these can */
     const float first[2] = {uvs[0], uvs[1]};
@@ -432,8 +412,7 @@ TEST(uvs_that_can_serve_are_kept) {
     for (int i = 0; i < 4; ++i) {
         uvs[0] = i == 0 ? NAN : i == 1 ? 1.5F : i == 2 ? -0.1F : uvs[2 * far];
         uvs[1] = i == 3 ? uvs[2 * far + 1] : first[1];
-        assert_ok(vsh_uvs_usable(&own, NULL, &usable, &failure));
-        assert_int_equal(usable, 0);
+        assert_false(can_serve(&own));
         assert_int_equal(unwrap_well(&own, 1, &o, NULL).kept, 0);
         uvs[0] = first[0];
         uvs[1] = first[1];
@@ -441,11 +420,7 @@ TEST(uvs_that_can_serve_are_kept) {
     for (size_t v = 0; v < own.vertex_count; ++v) { /* two halves over each other */
         uvs[2 * v] = uvs[2 * v] > 0.5F ? uvs[2 * v] - 0.5F : uvs[2 * v];
     }
-    assert_ok(vsh_uvs_usable(&own, NULL, &usable, &failure));
-    assert_int_equal(usable, 0);
-    free(uvs);
-    free(positions);
-    vsh_atlas_free(atlas);
+    assert_false(can_serve(&own));
 }
 
 typedef struct stopper {
@@ -475,10 +450,8 @@ TEST(it_can_be_cancelled_in_every_stage) {
                        {"pack", 0.0, 0.0, 0},
                        {"pack", 2.0, 0.0, 0}};
     for (size_t i = 0; i < sizeof where / sizeof where[0]; ++i) {
-        vsh_run run = vsh_run_default();
-        OWNED(vsh_atlas) *atlas = (void *)&run;
-        run.progress = stop;
-        run.user = &where[i];
+        const vsh_run run = run_watched(stop, &where[i]);
+        OWNED(vsh_atlas) *atlas = (void *)&o;
         const vsh_result result = vsh_unwrap(&mesh, 1, &o, &run, &atlas, &failure);
         if (where[i].at > 1) {
             assert_int_equal(result, VSH_OK);
@@ -495,13 +468,11 @@ TEST(memory_is_kept_within_its_limit) {
     FREED shape *s = lump(64);
     const vsh_mesh mesh = shape_mesh(s, "lump");
     vsh_unwrap_options o = unwrap_into(256);
-    vsh_run run = vsh_run_default();
-    vsh_atlas *atlas = NULL;
-    run.memory_limit = 100000;
-    assert_fails(vsh_unwrap(&mesh, 1, &o, &run, &atlas, &failure), VSH_ERROR_LIMIT, "");
-    run.memory_limit = 100000000;
+    const vsh_run little = run_within(100000), run = run_within(100000000);
+    OWNED(vsh_atlas) *atlas = NULL;
     assert_ok(vsh_unwrap(&mesh, 1, &o, &run, &atlas, &failure));
     vsh_atlas_free(atlas);
+    assert_fails(vsh_unwrap(&mesh, 1, &o, &little, &atlas, &failure), VSH_ERROR_LIMIT, "");
     o.width = o.height = VSH_MAX_PAGE_SIZE; /* half a gigabyte of bits */
     assert_fails(vsh_unwrap(&mesh, 1, &o, &run, &atlas, &failure), VSH_ERROR_LIMIT, "");
 }

@@ -180,7 +180,7 @@ static inline void look_at_mesh(const vsh_mesh *mesh, size_t index, const vsh_at
         }
         const uint32_t chart = m.charts[i];
         assert_true(chart < vsh_atlas_chart_count(atlas));
-        const vsh_atlas_chart view = vsh_atlas_chart_view(atlas, chart);
+        const vsh_atlas_chart view = vsh_atlas_charts(atlas)[chart];
         assert_int_equal(view.mesh, index);
         assert_true(view.page < info->pages);
         const vsh_atlas_info page = info_of_page(atlas, info, view.page);
@@ -280,7 +280,7 @@ static inline void look_at_atlas(const vsh_mesh *meshes, size_t count, const vsh
         claimed += claims[i] != 0;
     }
     for (uint32_t c = 0; c < info.charts; ++c) {
-        const vsh_atlas_chart view = vsh_atlas_chart_view(atlas, c);
+        const vsh_atlas_chart view = vsh_atlas_charts(atlas)[c];
         const double own = sqrt(sums[c].squares * sums[c].flat) / sums[c].world;
         if (sums[c].flat > 0.1) { /* texels: below, 32-bit UVs tell no more of the shape */
             if (fabs(own - (double)view.stretch) > 5e-3 * own ||
