@@ -58,7 +58,8 @@ static vsh_result put_together(const vsh_mesh *parts, size_t count, vshi_wholes 
 static vsh_result wholes_make(const vsh_mesh *meshes, size_t mesh_count, vshi_wholes *w, vsh_error *error) {
     *w = (vshi_wholes){0};
     const vshi_array arrays[] = {VSHI_ARRAY(w->meshes, mesh_count), VSHI_ARRAY(w->first, mesh_count + 1),
-                                 VSHI_ARRAY(w->positions, mesh_count), VSHI_ARRAY(w->indices, mesh_count)};
+                                 VSHI_ARRAY(w->of, mesh_count), VSHI_ARRAY(w->positions, mesh_count),
+                                 VSHI_ARRAY(w->indices, mesh_count)};
     VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, "objects", error));
     for (size_t m = 0, next; m < mesh_count; m = next) {
         size_t vertices = meshes[m].vertex_count;
@@ -68,6 +69,9 @@ static vsh_result wholes_make(const vsh_mesh *meshes, size_t mesh_count, vshi_wh
             vertices += meshes[next].vertex_count;
         }
         const vsh_result result = put_together(meshes + m, next - m, w, error);
+        for (size_t part = m; part < next; ++part) {
+            w->of[part] = w->count;
+        }
         w->first[++w->count] = next; /* what it has is freed with it */
         VSHI_TRY(result);
     }
@@ -81,6 +85,7 @@ static void wholes_free(vshi_wholes *w) {
     }
     free(w->indices);
     free(w->positions);
+    free(w->of);
     free(w->first);
     free(w->meshes);
     *w = (vshi_wholes){0};
@@ -118,20 +123,6 @@ static void set_sides(vshi_solidity *s) {
     }
 }
 
-/* The whole that a mesh is a part of. */
-static size_t whole_of(const vshi_solidity *s, size_t mesh) {
-    size_t low = 0, high = s->wholes.count;
-    while (high - low > 1) {
-        const size_t middle = low + (high - low) / 2;
-        if (s->wholes.first[middle] <= mesh) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    return low;
-}
-
 /* The components of a whole of these meshes, where another solidity found them; else NULL. */
 static const vshi_components *find_known(const vsh_mesh *meshes, const vshi_wholes *wholes, size_t whole) {
     const size_t first = wholes->first[whole], count = wholes->first[whole + 1] - first;
@@ -143,7 +134,7 @@ static const vshi_components *find_known(const vsh_mesh *meshes, const vshi_whol
             return NULL;
         }
     }
-    const size_t place = whole_of(s, known->place);
+    const size_t place = s->wholes.of[known->place];
     return s->wholes.first[place] == known->place && s->wholes.first[place + 1] == known->place + count
                ? &s->found[place]
                : NULL;

@@ -26,6 +26,7 @@ typedef struct vshi_wholes {
     vsh_mesh *meshes; /* [count]; a view of the one part where there is only one */
     size_t *first;    /* [count + 1]: the parts that a whole is made of follow each other in the list */
     size_t count;
+    size_t *of;         /* [meshes]: the whole that each is a part of */
     float **positions;  /* [count]; NULL: the part's */
     uint32_t **indices; /* [count]; NULL: the part's */
 } vshi_wholes;

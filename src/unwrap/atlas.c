@@ -20,14 +20,6 @@ struct vsh_atlas {
     vsh_atlas_info info;
 };
 
-double vshi_atlas_shape_bytes(size_t triangle_count) {
-    return 64.0 * (double)triangle_count;
-}
-
-double vshi_atlas_mesh_bytes(size_t triangle_count) {
-    return 28.0 * (double)triangle_count + 256.0;
-}
-
 /* --- vertices of a shape */
 
 /* Vertices of charts come first, chart by chart; then those of triangles without area. */

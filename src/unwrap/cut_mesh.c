@@ -66,7 +66,7 @@ static bool same_normal(const float *normals, uint32_t a, uint32_t b) {
 }
 
 /* Fills `partner` and `soft`: edges are of the mesh's own order, also where it is mirrored. */
-static void cut_sides(vshi_cut_mesh *s, const vshi_edges *edges, int cut) {
+static void cut_sides(vshi_cut_mesh *s, const vshi_edges *edges, bool by_uvs) {
     const vsh_mesh *mesh = s->mesh;
     for (uint32_t side = 0; side < 3 * (uint32_t)s->count; ++side) {
         const uint32_t other = edges->partner[side];
@@ -80,8 +80,7 @@ static void cut_sides(vshi_cut_mesh *s, const vshi_edges *edges, int cut) {
         const bool one_normal = same_normal(mesh->normals, a, c) && same_normal(mesh->normals, b, d);
         const double crease = mesh->normals != NULL && one_normal ? SMOOTH : CREASE;
         const bool opposite = edges->weld[a] == edges->weld[c] && edges->weld[b] == edges->weld[d];
-        const bool through =
-            cut == VSHI_CUT_UVS ? one_uv : vshi_dot(s->normal[side / 3], s->normal[other / 3]) >= crease;
+        const bool through = by_uvs ? one_uv : vshi_dot(s->normal[side / 3], s->normal[other / 3]) >= crease;
         if (opposite && through && s->area[side / 3] > 0.0 && s->area[other / 3] > 0.0) {
             s->partner[side] = other;
             s->soft[side] = one_uv && one_normal;
@@ -205,7 +204,7 @@ done:
     return result;
 }
 
-vsh_result vshi_cut_mesh_make(const vsh_mesh *mesh, size_t index, int cut, vshi_cut_mesh *s,
+vsh_result vshi_cut_mesh_make(const vsh_mesh *mesh, size_t index, bool by_uvs, vshi_cut_mesh *s,
                               vsh_error *error) {
     *s = (vshi_cut_mesh){.mesh = mesh, .count = mesh->triangle_count};
     VSHI_TRY(vshi_edges_check(mesh, index, error));
@@ -224,7 +223,7 @@ vsh_result vshi_cut_mesh_make(const vsh_mesh *mesh, size_t index, int cut, vshi_
     vsh_result result;
     local.transform = NULL;
     VSHI_TRY_DONE(vshi_edges_find(&local, index, true, &edges, error));
-    cut_sides(s, &edges, cut);
+    cut_sides(s, &edges, by_uvs);
     VSHI_TRY_DONE(gather_units(s, error));
     vshi_list_groups(s->unit, s->count, s->unit_count, s->unit_begin, s->unit_list);
 done:

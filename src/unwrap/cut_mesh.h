@@ -33,15 +33,10 @@ typedef struct vshi_cut_mesh {
 /* Bytes that a mesh's surface takes, with what making it and its charts takes, at most. */
 double vshi_cut_mesh_bytes(const vsh_mesh *mesh);
 
-/* What charts are cut along. */
-enum {
-    VSHI_CUT_CREASES = 0,
-    VSHI_CUT_UVS = 1 /* where the mesh's UVs are not the same on both sides, and nowhere else */
-};
-
-/* The mesh has passed vshi_mesh_check_data(), and lives on. Errors: VSH_ERROR_LIMIT (2^32 / 3 triangles),
- * VSH_ERROR_MEMORY. Free with vshi_cut_mesh_free(), after a failure too. */
-vsh_result vshi_cut_mesh_make(const vsh_mesh *mesh, size_t index, int cut, vshi_cut_mesh *surface,
+/* Charts are cut along creases, or `by_uvs` where the mesh's UVs are not the same on both sides, and nowhere
+ * else. The mesh has passed vshi_mesh_check_data(), and lives on. Errors: VSH_ERROR_LIMIT (2^32 / 3
+ * triangles), VSH_ERROR_MEMORY. Free with vshi_cut_mesh_free(), after a failure too. */
+vsh_result vshi_cut_mesh_make(const vsh_mesh *mesh, size_t index, bool by_uvs, vshi_cut_mesh *surface,
                               vsh_error *error);
 void vshi_cut_mesh_free(vshi_cut_mesh *surface);
 

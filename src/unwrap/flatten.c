@@ -20,10 +20,9 @@ typedef struct laying {
     vshi_patch *patch;
     double complex (*flat)[3]; /* [count]: corners of each triangle in its own plane, the first at 0 */
     vshi_sparse system;
-    double complex *x; /* [vertex_count] */
-    double (*best)[2]; /* [vertex_count]: the least stretched so far */
-    double best_stretch;
-    bool have_best;
+    double complex *x;   /* [vertex_count] */
+    double (*best)[2];   /* [vertex_count]: the least stretched so far */
+    double best_stretch; /* INFINITY: all were folded */
 } laying;
 
 /* --- planes */
@@ -226,10 +225,9 @@ static void step_rigid(laying *l) {
 }
 
 static void keep_best(laying *l) {
-    if (!l->have_best || l->patch->stretch < l->best_stretch) {
+    if (l->patch->stretch < l->best_stretch) {
         memcpy(l->best, l->patch->uv, l->patch->vertex_count * sizeof *l->best);
         l->best_stretch = l->patch->stretch;
-        l->have_best = true;
     }
 }
 
@@ -264,27 +262,26 @@ static vsh_result lay(laying *l, vsh_error *error) {
     if (laid && vshi_flatten_measure(p)) {
         keep_best(l);
     }
-    if (laid && (!l->have_best || l->best_stretch > GOOD)) {
+    if (laid && l->best_stretch > GOOD) {
         lay_rigid(l);
     }
     return VSH_OK;
 }
 
-vsh_result vshi_flatten(vshi_patch *p, double max_stretch, int *came_to, vsh_error *error) {
-    bool overlaps = false;
-    *came_to = VSHI_FOLDED;
+vsh_result vshi_flatten(vshi_patch *p, double max_stretch, bool *flat, vsh_error *error) {
+    *flat = false;
     if (project(p)) {
         if (!vshi_flatten_measure(p)) {
             return VSH_OK;
         }
     } else {
-        laying l = {.patch = p};
+        laying l = {.patch = p, .best_stretch = INFINITY};
         const vsh_result result = lay(&l, error);
-        if (l.have_best) {
+        const bool unfolded = isfinite(l.best_stretch);
+        if (unfolded) {
             memcpy(p->uv, l.best, p->vertex_count * sizeof *l.best);
             p->stretch = l.best_stretch;
         }
-        const bool unfolded = l.have_best;
         vshi_sparse_free(&l.system);
         free(l.best);
         free(l.x);
@@ -294,9 +291,10 @@ vsh_result vshi_flatten(vshi_patch *p, double max_stretch, int *came_to, vsh_err
             return VSH_OK;
         }
     }
+    bool overlaps = false;
     if (p->count > 2) {
         VSHI_TRY(vshi_patch_overlaps(p, &overlaps, error));
     }
-    *came_to = overlaps ? VSHI_FOLDED : p->stretch > max_stretch ? VSHI_STRETCHED : VSHI_FLAT;
+    *flat = !overlaps && !(p->stretch > max_stretch);
     return VSH_OK;
 }

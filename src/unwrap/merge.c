@@ -182,7 +182,6 @@ vsh_result vshi_merging_try(vshi_trial *trial, vsh_error *error) {
     const vshi_merging *m = trial->merging;
     const vshi_patch *a = &m->patches->list[trial->a], *b = &m->patches->list[trial->b];
     uint32_t *triangles = NULL;
-    int came_to = VSHI_FOLDED;
     VSHI_TRY(vshi_allocate((void **)&triangles, (size_t)a->count + b->count, sizeof *triangles, what, error));
     for (uint32_t i = 0, k = 0; i + k < a->count + b->count;) {
         if (k == b->count || (i < a->count && a->triangles[i] < b->triangles[k])) {
@@ -194,8 +193,7 @@ vsh_result vshi_merging_try(vshi_trial *trial, vsh_error *error) {
         }
     }
     VSHI_TRY(vshi_patch_make(m->surface, triangles, a->count + b->count, &trial->patch, error));
-    VSHI_TRY(vshi_flatten(&trial->patch, m->max_stretch, &came_to, error));
-    trial->good = came_to == VSHI_FLAT;
+    VSHI_TRY(vshi_flatten(&trial->patch, m->max_stretch, &trial->good, error));
     if (!trial->good) {
         vshi_patch_free(&trial->patch);
     }

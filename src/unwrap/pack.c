@@ -72,9 +72,10 @@ static void give(search *s) {
 
 /* Rows that the order takes, and less than one for how low its charts end: the lower, the better. */
 static vsh_result rehearse(vshi_placing *p, double *result_rows, vsh_error *error) {
+    uint32_t pages = 0;
     int32_t rows = 0;
     double ends = 0.0;
-    VSHI_TRY(vshi_placing_one_page(p, &rows, error));
+    VSHI_TRY(vshi_placing_place(p, &pages, &rows, error));
     for (size_t i = 0; i < p->count; ++i) {
         ends += p->items[i].at.y;
     }
@@ -160,20 +161,17 @@ static vsh_result attempt(search *s, double density, int orders, double *over, v
     *over = INFINITY;
     VSHI_TRY(vshi_placing_set(p, density, &possible, error));
     for (int order = s->has_order ? REHEARSED : 0; order < orders && possible && *over > 1.0; ++order) {
+        uint32_t pages = 0;
         int32_t rows = 0;
-        uint32_t pages = 1;
         if (order == REHEARSED) {
             memcpy(p->order, s->order, s->count * sizeof *s->order);
         } else {
             VSHI_TRY(vshi_placing_sort(p, order, error));
         }
-        if (s->packing->max_pages == 1) {
-            VSHI_TRY(vshi_placing_one_page(p, &rows, error));
-            *over = fmin(*over, (double)rows / s->packing->height);
-        } else {
-            VSHI_TRY(vshi_placing_pages(p, &pages, error));
-            *over = fmin(*over, pages <= s->packing->max_pages ? 1.0 : OVER);
-        }
+        VSHI_TRY(vshi_placing_place(p, &pages, &rows, error));
+        *over = fmin(*over, s->packing->max_pages == 1       ? (double)rows / s->packing->height
+                            : pages <= s->packing->max_pages ? 1.0
+                                                             : OVER);
         tell_attempt(s);
         if (*over <= 1.0 && density > s->best_density) {
             keep(s, density, pages);

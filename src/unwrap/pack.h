@@ -90,12 +90,10 @@ vsh_result vshi_placing_set(vshi_placing *placing, double density, bool *possibl
 /* Sorts them. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_placing_sort(vshi_placing *placing, int by, vsh_error *error);
 
-/* Places all items on one page; *rows is how many rows they take, or more than the page has. Errors:
- * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-vsh_result vshi_placing_one_page(vshi_placing *placing, int32_t *rows, vsh_error *error);
-
-/* Places them on as many pages as it takes, or max_pages + 1 where they do not fit. Errors: as the last. */
-vsh_result vshi_placing_pages(vshi_placing *placing, uint32_t *pages, vsh_error *error);
+/* Places all items on one page or, where that has no room, on as many as it takes: max_pages + 1 where they
+ * do not fit. *rows is how many rows they take of one page, or more than it has. Errors: VSH_ERROR_MEMORY,
+ * VSH_ERROR_CANCELLED. */
+vsh_result vshi_placing_place(vshi_placing *placing, uint32_t *pages, int32_t *rows, vsh_error *error);
 
 /* --- the pages of an atlas: what lies on each, and how large each is */
 
@@ -111,10 +109,6 @@ vsh_result vshi_pages_pack(const vsh_unwrap_options *options, const vshi_shapes 
                            size_t item_count, const vsh_run *run, vshi_pages *pages, vsh_error *error);
 
 /* --- the atlas */
-
-/* Bytes that a shape's part and each of its instances' take, at most. */
-double vshi_atlas_shape_bytes(size_t triangle_count);
-double vshi_atlas_mesh_bytes(size_t triangle_count);
 
 /* Makes an atlas of charts that have their places: `items` [item_count] are those of the meshes in their
  * order, and of each mesh of its shape's patches in theirs. The atlas takes the pages' list. Errors:

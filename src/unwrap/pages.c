@@ -35,7 +35,8 @@ typedef struct work {
     const vshi_shapes *shapes;
     vshi_item *items;
     size_t item_count;
-    group *groups; /* [group_count] */
+    vshi_item *own; /* [item_count]: those of a page that is made to fit */
+    group *groups;  /* [group_count] */
     size_t group_count;
     size_t *latest; /* [shape count]: the last group whose first mesh is of a shape, + 1; 0: none */
     vshi_job *job;
@@ -188,7 +189,8 @@ static int list_sizes(const vsh_unwrap_options *o, page_size sizes[MOST_SIZES]) 
 }
 
 /* Packs what lies on a page into the smallest in which it has room. */
-static vsh_result fit_page(work *w, const group *g, size_t number, vshi_item *own, vsh_error *error) {
+static vsh_result fit_page(work *w, const group *g, size_t number, vsh_error *error) {
+    vshi_item *own = w->own;
     vsh_atlas_page *page = &w->pages->list[number];
     page_size sizes[MOST_SIZES];
     const int size_count = list_sizes(w->options, sizes);
@@ -222,18 +224,6 @@ static vsh_result fit_page(work *w, const group *g, size_t number, vshi_item *ow
     return VSH_OK;
 }
 
-static vsh_result fit_pages(work *w, const group *g, vsh_error *error) {
-    vshi_item *own = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&own, g->count, sizeof *own, what, error));
-    for (size_t page = g->page; page < g->page + g->pages; ++page) {
-        VSHI_TRY_DONE(fit_page(w, g, page, own, error));
-    }
-done:
-    free(own);
-    return result;
-}
-
 /* --- all */
 
 static vsh_result pack_groups(work *w, vsh_error *error) {
@@ -244,8 +234,8 @@ static vsh_result pack_groups(work *w, vsh_error *error) {
             continue;
         }
         VSHI_TRY(pack(w, g, error));
-        if (w->options->fit_pages != 0) {
-            VSHI_TRY(fit_pages(w, g, error));
+        for (size_t page = g->page; page < g->page + g->pages && w->options->fit_pages != 0; ++page) {
+            VSHI_TRY(fit_page(w, g, page, error));
         }
     }
     return VSH_OK;
@@ -256,7 +246,8 @@ vsh_result vshi_pages_pack(const vsh_unwrap_options *options, const vshi_shapes 
     const size_t mesh_count = shapes->mesh_count;
     work w = {.options = options, .shapes = shapes, .items = items, .item_count = item_count, .pages = pages};
     const vshi_packing packing = packing_of(options);
-    const vshi_array arrays[] = {VSHI_ARRAY(w.groups, mesh_count), VSHI_ARRAY(w.latest, shapes->count)};
+    const vshi_array arrays[] = {VSHI_ARRAY(w.own, options->fit_pages != 0 ? item_count : 0),
+                                 VSHI_ARRAY(w.groups, mesh_count), VSHI_ARRAY(w.latest, shapes->count)};
     vsh_result result;
     *pages = (vshi_pages){NULL, 0};
     VSHI_TRY_DONE(vshi_check_limit(run, vshi_pack_bytes(&packing, item_count), "packing charts", error));
@@ -274,6 +265,7 @@ vsh_result vshi_pages_pack(const vsh_unwrap_options *options, const vshi_shapes 
     result = pack_groups(&w, error);
 done:
     vshi_job_end(w.job);
+    free(w.own);
     free(w.latest);
     free(w.groups);
     return result;

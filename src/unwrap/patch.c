@@ -264,10 +264,10 @@ vsh_result vshi_lay_out(const vshi_cut_mesh *surface, uint32_t *triangles, uint3
     VSHI_TRY_DONE(vshi_patches_add(&waiting, &first, error));
     while (waiting.count > 0) {
         const vshi_patch next = waiting.list[--waiting.count];
-        int came_to = VSHI_FOLDED;
+        bool flat = false;
         VSHI_TRY_DONE(vshi_patch_make(surface, next.triangles, next.count, &p, error));
-        VSHI_TRY_DONE(vshi_flatten(&p, max_stretch, &came_to, error));
-        if (came_to == VSHI_FLAT || p.count == 1) {
+        VSHI_TRY_DONE(vshi_flatten(&p, max_stretch, &flat, error));
+        if (flat || p.count == 1) {
             VSHI_TRY_DONE(vshi_patches_add(patches, &p, error));
         } else {
             p.depth = next.depth;

@@ -528,21 +528,14 @@ static vsh_result fill_with_meshes(vshi_placing *p, pool *o, uint32_t page, vsh_
     }
 }
 
-vsh_result vshi_placing_one_page(vshi_placing *p, int32_t *rows, vsh_error *error) {
-    uint32_t failed = VSHI_NONE;
-    take_back(p, VSHI_NONE);
-    VSHI_TRY(fill_page(p, NULL, 0, true, &failed, error));
-    *rows = failed == VSHI_NONE ? p->page.used : p->page.height + 1;
-    return VSH_OK;
-}
-
-vsh_result vshi_placing_pages(vshi_placing *p, uint32_t *pages, vsh_error *error) {
+vsh_result vshi_placing_place(vshi_placing *p, uint32_t *pages, int32_t *rows, vsh_error *error) {
     const uint32_t most = p->packing->max_pages;
     uint32_t failed = VSHI_NONE;
     *pages = 1;
     take_back(p, VSHI_NONE);
     VSHI_TRY(fill_page(p, NULL, 0, true, &failed, error));
-    if (failed == VSHI_NONE) {
+    *rows = failed == VSHI_NONE ? p->page.used : p->page.height + 1;
+    if (failed == VSHI_NONE || most == 1) {
         return VSH_OK;
     }
     *pages = most + 1;

@@ -193,12 +193,12 @@ static vsh_result grow_shape(void *user, size_t i, vsh_error *error) {
     vshi_shape *shape = &m->shapes->list[i];
     const size_t index = (size_t)(shape->mesh - m->shapes->meshes);
     if (m->options->keep_uvs == VSH_UNWRAP_KEEP && shape->mesh->uvs != NULL) {
-        VSHI_TRY(vshi_cut_mesh_make(shape->mesh, index, VSHI_CUT_UVS, &shape->surface, error));
+        VSHI_TRY(vshi_cut_mesh_make(shape->mesh, index, true, &shape->surface, error));
         VSHI_TRY(vshi_keep_charts(&shape->surface, &shape->patches, &shape->kept, error));
     }
     if (!shape->kept) {
         vshi_cut_mesh_free(&shape->surface);
-        VSHI_TRY(vshi_cut_mesh_make(shape->mesh, index, VSHI_CUT_CREASES, &shape->surface, error));
+        VSHI_TRY(vshi_cut_mesh_make(shape->mesh, index, false, &shape->surface, error));
         VSHI_TRY(grow_charts(m, shape, error));
     }
     vshi_job_advance(m->job, 2 * shape->mesh->triangle_count);

@@ -64,13 +64,13 @@ static vsh_result check_meshes(const vsh_mesh *meshes, size_t mesh_count, vsh_er
 
 static vsh_result check_memory(const vsh_mesh *meshes, size_t mesh_count, const vshi_shapes *shapes,
                                const vsh_unwrap_options *options, const vsh_run *run, vsh_error *error) {
-    double bytes = (double)mesh_count * 128.0;
-    for (size_t i = 0; i < shapes->count; ++i) {
+    double bytes = (double)mesh_count * 384.0;
+    for (size_t i = 0; i < shapes->count; ++i) { /* with a shape's part of the atlas */
         const vsh_mesh *mesh = shapes->list[i].mesh;
-        bytes += vshi_cut_mesh_bytes(mesh) + vshi_atlas_shape_bytes(mesh->triangle_count);
+        bytes += vshi_cut_mesh_bytes(mesh) + 64.0 * (double)mesh->triangle_count;
     }
-    for (size_t m = 0; m < mesh_count; ++m) {
-        bytes += vshi_atlas_mesh_bytes(meshes[m].triangle_count);
+    for (size_t m = 0; m < mesh_count; ++m) { /* and those of its instances */
+        bytes += 28.0 * (double)meshes[m].triangle_count;
     }
     const vshi_packing packing = {.width = options->width, .height = options->height};
     return vshi_check_limit(run, bytes + vshi_pack_bytes(&packing, 0), "unwrapping", error);

@@ -153,7 +153,7 @@ vsh_result vsh_uvs_usable(const vsh_mesh *mesh, const vsh_run *run, int32_t *usa
     if (mesh->uvs == NULL) {
         return VSH_OK;
     }
-    VSHI_TRY_DONE(vshi_cut_mesh_make(mesh, VSHI_MESH_ALONE, VSHI_CUT_UVS, &surface, error));
+    VSHI_TRY_DONE(vshi_cut_mesh_make(mesh, VSHI_MESH_ALONE, true, &surface, error));
     VSHI_TRY_DONE(vshi_keep_charts(&surface, NULL, &found, error));
     *usable = found;
 done:
