@@ -16,8 +16,8 @@ extern "C" {
  * Errors: VSH_ERROR_MEMORY, naming `what`. */
 vsh_result vshi_allocate(void **memory, size_t count, size_t size, const char *what, vsh_error *error);
 
-/* An array to be allocated, and what allocates a list of them: VSHI_ALLOCATE_ALL(arrays, what, error). Those
- * behind one that is refused stay as they are. */
+/* An array to be allocated. VSHI_ALLOCATE_ALL(arrays, what, error) allocates a list of them, as
+ * vshi_allocate() does each, up to the first that the system refuses. The caller frees them. */
 typedef struct vshi_array {
     void **memory;
     size_t count, size;

@@ -24,8 +24,8 @@ static const double DOUBLED_SHARE = 0.5;
 
 static const double PI = 3.14159265358979323846;
 
-/* Points of a surface that its enclosing is told from; fewer where it has many open edges, so that no more
- * solid angles are summed than this. */
+/* Points of a surface from which part_encloses() looks. It takes fewer where the surface has many open edges,
+ * to sum no more solid angles than this. */
 enum { MOST_SAMPLES = 128, FEWEST_SAMPLES = 16, MOST_ANGLES = 1 << 21 };
 
 void vshi_part_corners(const vshi_surface_part *part, size_t at, vshi_vec corner[3]) {

@@ -1,4 +1,4 @@
-/* What is found where a mesh is looked over. An edge that an odd number of triangles meets at is a border;
+/* Checks of a mesh's triangles and edges. An edge that an odd number of triangles meets at is a border;
  * one whose triangles run along it more often one way than the other joins triangles that disagree about the
  * outside. */
 #include "base/memory.h"

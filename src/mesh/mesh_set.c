@@ -101,7 +101,7 @@ vsh_result vshi_mesh_set_solve(vshi_mesh_set *set, const vsh_run *run, vsh_error
     return VSH_OK;
 }
 
-/* --- what is told of a set */
+/* --- reports and notes */
 
 /* Adds a component to its object's report. */
 static void add_component(const vshi_component *c, vsh_solidity_report *report) {
@@ -161,7 +161,7 @@ void vshi_mesh_set_note(const vshi_mesh_set *set, double shell, double voxel, co
         const vshi_component *components = vshi_solidity_of_whole(set->solidity, w, &count);
         const vsh_mesh *whole = &wholes->meshes[w];
         if (whole->alpha == VSH_ALPHA_MASKED && whole->solidity == VSH_SOLIDITY_SHELL) {
-            continue; /* what a mask cuts out is meant so */
+            continue; /* masked meshes are sheets on purpose */
         }
         const size_t first = wholes->first[w];
         vsh_solidity_report t = {0};

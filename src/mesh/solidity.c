@@ -72,7 +72,7 @@ static vsh_result wholes_make(const vsh_mesh *meshes, size_t mesh_count, vshi_wh
         for (size_t part = m; part < next; ++part) {
             w->of[part] = w->count;
         }
-        w->first[++w->count] = next; /* what it has is freed with it */
+        w->first[++w->count] = next; /* wholes_free() frees it after a failure too */
         VSHI_TRY(result);
     }
     return VSH_OK;

@@ -15,8 +15,8 @@ typedef void vshi_key_fn(const void *user, size_t vertex, uint64_t key[VSHI_KEY_
 /* weld[v] = the lowest vertex with the key of v, of `count`. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_weld(size_t count, vshi_key_fn *key_of, const void *user, uint32_t *weld, vsh_error *error);
 
-/* Lists 0 … count - 1 by their groups, each group in ascending order: that of g is list[begin[g]] …
- * list[begin[g + 1] - 1]. What is of group UINT32_MAX is left out. begin[groups + 2] must be 0. */
+/* Lists 0 … count - 1 by their groups, each group in ascending order: group g is list[begin[g]] …
+ * list[begin[g + 1] - 1]. Group UINT32_MAX is left out. begin[groups + 2] must be 0 before. */
 void vshi_list_groups(const uint32_t *group, size_t count, uint32_t groups, uint32_t *begin, uint32_t *list);
 
 /* Side 3 i + k runs from corner k to corner k + 1 of triangle i. */

@@ -19,7 +19,7 @@ typedef struct vshi_item {
     const vshi_patch *patch; /* straightened */
     const vshi_boxes *boxes;
     double factor; /* texels to a unit of the patch at a density of 1 */
-    uint32_t mesh; /* whose chart it is */
+    uint32_t mesh; /* that has the chart */
     vshi_place at;
 } vshi_item;
 

@@ -12,8 +12,8 @@
 
 static const char what[] = "a chart";
 
-/* What a turn of the normal adds to the way between two triangles, in sizes of the chart for a radian or so:
- * cuts run where surfaces bend. */
+/* Cuts run where surfaces bend: a way between two triangles is longer by so many sizes of the chart for each
+ * radian or so between their normals. */
 static const double BEND = 1.0;
 
 /* After so many triangles that were alone in their half, a chart is cut into all its triangles: what behaves

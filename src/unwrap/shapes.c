@@ -12,8 +12,8 @@
 
 static const char what[] = "charts of meshes";
 
-/* Of a transform's products of axes, against their sum: transforms made of 32-bit quaternions differ by 1e-7
- * or so. */
+/* Two transforms are alike if the products of their axes, over their sum, differ by no more. Those made of
+ * 32-bit quaternions differ by 1e-7 or so. */
 static const double ALIKE = 1e-5;
 
 /* Share of all charts' area that charts are joined to: larger ones leave gaps between them that nothing
@@ -67,7 +67,7 @@ static bool are_alike(const double *a, const double *b) {
     return true;
 }
 
-/* What meshes of the same arrays have in common. */
+/* Meshes of the same arrays have the same `arrays`. */
 typedef struct array_set {
     uintptr_t arrays[6];
     size_t index; /* of the mesh */

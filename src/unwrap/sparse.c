@@ -96,7 +96,7 @@ static bool cut(dissecting *d, const part *p, uint32_t tag, bool turned, part ha
         } else if (d->side[v] == 2 * tag) {
             d->other[near++] = v;
         } else {
-            d->list[p->begin + beyond++] = v; /* no further than what was read */
+            d->list[p->begin + beyond++] = v; /* at or before the vertex that was read */
         }
     }
     if (near == p->begin || beyond == 0) {

@@ -171,7 +171,7 @@ typedef struct sums {
 } sums;
 
 /* Squared L2 stretch of a triangle (Sander and others, "Texture mapping progressive meshes", 2001): half the
- * sum of the squared lengths of what a unit along u and along v becomes. */
+ * sum of the squared lengths on the surface of a unit along u and of one along v. */
 static double square_stretch(const vshi_vec p[3], const double uv[3][2], double doubled) {
     vshi_vec along[2];
     for (int k = 0; k < 2; ++k) { /* derivatives by texel */
