@@ -26,9 +26,9 @@ typedef struct vshi_wholes {
     vsh_mesh *meshes; /* [count]; a view of the one part where there is only one */
     size_t *first;    /* [count + 1]: the parts that a whole is made of follow each other in the list */
     size_t count;
-    size_t *of;         /* [meshes]: the whole that each is a part of */
     float **positions;  /* [count]; NULL: the part's */
     uint32_t **indices; /* [count]; NULL: the part's */
+    size_t *of;         /* [meshes]: the whole that each is a part of */
 } vshi_wholes;
 
 /* What lies on the two sides of a triangle. Its front is where its corners run anticlockwise as

@@ -451,7 +451,7 @@ TEST(it_can_be_cancelled_in_every_stage) {
                        {"pack", 2.0, 0.0, 0}};
     for (size_t i = 0; i < sizeof where / sizeof where[0]; ++i) {
         const vsh_run run = run_watched(stop, &where[i]);
-        OWNED(vsh_atlas) *atlas = (void *)&o;
+        OWNED(vsh_atlas) *atlas = (void *)&where[i];
         const vsh_result result = vsh_unwrap(&mesh, 1, &o, &run, &atlas, &failure);
         if (where[i].at > 1) {
             assert_int_equal(result, VSH_OK);
