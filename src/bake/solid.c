@@ -3,7 +3,7 @@
 #include "field/field.h"
 #include "heightfield/heights.h"
 #include "shade/occluders.h"
-#include "spheres/sphere_tree.h"
+#include "spheres/spheres.h"
 
 #include <math.h>
 

@@ -7,7 +7,6 @@
 #include "base/memory.h"
 #include "base/similarity.h"
 #include "base/try.h"
-#include "heightfield/heights_check.h"
 #include "light/view.h"
 
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-/* Shadows of a heightfield that is marched as it is, for layers. */
+/* Heightfields: checked sources, heights of images, and the march of layers that cast as they are. */
 #ifndef VSHI_HEIGHTS_H
 #define VSHI_HEIGHTS_H
 
@@ -10,6 +10,8 @@
 #include <vdbshade/light.h>
 #include <vdbshade/method.h>
 #include <vdbshade/points.h>
+
+/* --- the march (heights.c) */
 
 /* Marches from points begin … end - 1 to a light that was checked before. Writes its visible share into
  * visibility[end - begin]: for VSH_SHADOW_HARD 0 or 1, for any other method that of VSH_SHADOW_CLASSIC.
@@ -25,7 +27,26 @@ double vshi_heights_lift(const vsh_heights *heights, double start_offset);
 /* Whether a world position is within the solid, deeper than receivers may be off. */
 bool vshi_heights_hold(const vsh_heights *heights, const double position[3]);
 
-/* --- heights read from an image */
+/* --- models and images (heights_model.c) */
+
+/* A source whose numbers are in range. */
+typedef struct vshi_checked_heights {
+    const vsh_heights_source *source;
+    const char *name;
+    size_t samples;
+    double lowest, highest; /* local units */
+    double bottom;
+} vshi_checked_heights;
+
+/* Checks sizes and values. Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_INPUT. `call` names the public function. */
+vsh_result vshi_heights_check(const vsh_heights_source *source, const char *call,
+                              vshi_checked_heights *terrain, vsh_error *error);
+
+/* Does what vsh_model_from_heights() does. `texels` are the columns and rows of a lightmap's samples, or
+ * NULL. A surface then leaves out the rows and columns of heights that lie beside none of these samples. A
+ * coarse lightmap takes less memory, and its values stay the same. */
+vsh_result vshi_model_of_heights(const vsh_heights_source *source, int32_t what, const size_t *texels,
+                                 const vsh_run *run, vsh_model **model, vsh_error *error);
 
 typedef struct vshi_height_image {
     int32_t columns, rows;

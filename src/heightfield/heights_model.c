@@ -1,14 +1,69 @@
-/* A heightfield as triangles: the closed solid that is voxelised, and its top as a receiver. */
+/* Heightfields from images, and as triangles: the closed solid that is voxelised, and its top as a receiver.
+ */
+#include "heightfield/heights.h"
+
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/try.h"
-#include "heightfield/heights_check.h"
 #include "mesh/mesh.h"
 #include "model/model.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <vdbshade/image.h>
+
+/* --- checked sources */
+
+static const double LEAST = 1e-12, LARGEST = 1e12;
+static const double DEFAULT_BASE = 0.05; /* of the longer side */
+
+static vsh_result check_numbers(const vsh_heights_source *s, const char *name, vsh_error *error) {
+    const struct {
+        const char *what;
+        double value, low, high;
+    } fields[] = {
+        {"columns", s->columns, 2, VSH_MAX_HEIGHTS_SIDE}, {"rows", s->rows, 2, VSH_MAX_HEIGHTS_SIDE},
+        {"size[0]", s->size[0], LEAST, LARGEST},          {"size[1]", s->size[1], LEAST, LARGEST},
+        {"height", s->height, -LARGEST, LARGEST},         {"base", s->base, 0.0, LARGEST},
+    };
+    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; ++i) {
+        if (!(fields[i].value >= fields[i].low && fields[i].value <= fields[i].high)) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %s %g is out of range %g … %g", name,
+                             fields[i].what, fields[i].value, fields[i].low, fields[i].high);
+        }
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_heights_check(const vsh_heights_source *source, const char *call,
+                              vshi_checked_heights *terrain, vsh_error *error) {
+    if (source == NULL || source->values == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %s is NULL", call,
+                         source == NULL ? "source" : "values");
+    }
+    const char *name = source->name != NULL ? source->name : "heights";
+    VSHI_TRY(check_numbers(source, name, error));
+    const size_t columns = (size_t)source->columns, samples = columns * (size_t)source->rows;
+    double lowest = INFINITY, highest = -INFINITY;
+    for (size_t i = 0; i < samples; ++i) {
+        const double y = source->height * (double)source->values[i];
+        if (!isfinite((float)y)) {
+            return vshi_fail(error, VSH_ERROR_INPUT,
+                             "%s: row %zu, column %zu: value %g is no height: it must be finite, and also "
+                             "times %g",
+                             name, i / columns, i % columns, (double)source->values[i], source->height);
+        }
+        lowest = y < lowest ? y : lowest;
+        highest = y > highest ? y : highest;
+    }
+    const double base =
+        source->base > 0.0 ? source->base : DEFAULT_BASE * fmax(source->size[0], source->size[1]);
+    *terrain = (vshi_checked_heights){source, name, samples, lowest, highest, lowest - base};
+    return VSH_OK;
+}
+
+/* --- triangles */
 
 /* Rounding of UVs moves a texel's middle by at most this part of a cell. */
 static const double NEAR = 0.01;
@@ -187,4 +242,52 @@ vsh_result vsh_model_from_heights(const vsh_heights_source *source, int32_t what
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     return vshi_model_of_heights(source, what, NULL, &full, model, error);
+}
+
+/* --- images */
+
+static const float *channel(const vsh_image *image, const char *name) {
+    for (int32_t c = 0; c < image->channel_count; ++c) {
+        if (strcmp(image->names[c], name) == 0) {
+            return image->planes[c];
+        }
+    }
+    return NULL;
+}
+
+static void take_values(const vsh_image *image, size_t count, float *values) {
+    const float *r = channel(image, "R"), *g = channel(image, "G"), *b = channel(image, "B");
+    if (r == NULL || g == NULL || b == NULL) {
+        memcpy(values, image->planes[0], count * sizeof *values);
+        return;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        /* in this form grey stays what it is, to the bit */
+        values[i] = g[i] + 0.2126f * (r[i] - g[i]) + 0.0722f * (b[i] - g[i]);
+    }
+}
+
+vsh_result vshi_height_image_read(const char *path, const vsh_run *run, vshi_height_image *map,
+                                  vsh_error *error) {
+    *map = (vshi_height_image){0, 0, NULL};
+    vsh_image_file *file = NULL;
+    VSHI_TRY(vsh_image_read(path, run, &file, error));
+    const vsh_image image = vsh_image_view(file);
+    const size_t count = (size_t)image.width * (size_t)image.height;
+    void *values = NULL;
+    vsh_result result;
+    if (image.width < 2 || image.height < 2 || image.width > VSH_MAX_HEIGHTS_SIDE ||
+        image.height > VSH_MAX_HEIGHTS_SIDE) {
+        result = vshi_fail(error, VSH_ERROR_INPUT,
+                           "%s: %d × %d pixels are no heightfield: expected 2 … %d along each side", path,
+                           image.width, image.height, VSH_MAX_HEIGHTS_SIDE);
+        goto done;
+    }
+    VSHI_TRY_DONE(vshi_check_limit(run, (double)count * 4.0 * (1.0 + image.channel_count), path, error));
+    VSHI_TRY_DONE(vshi_allocate(&values, count, sizeof(float), path, error));
+    take_values(&image, count, values);
+    *map = (vshi_height_image){image.width, image.height, values};
+done:
+    vsh_image_free(file);
+    return result;
 }

@@ -4,7 +4,7 @@
 #include "mesh/mesh_set.h"
 #include "scene/assets.h"
 #include "scene/occluders.h"
-#include "spheres/sphere_tree.h"
+#include "spheres/spheres.h"
 
 #include "base/job.h"
 #include "base/memory.h"

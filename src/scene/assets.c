@@ -8,7 +8,7 @@
 #include "base/similarity.h"
 #include "base/try.h"
 #include "base/vec.h"
-#include "heightfield/heights_check.h"
+#include "heightfield/heights.h"
 #include "model/model.h"
 #include "scene/asset_files.h"
 #include "scene/asset_place.h"

@@ -7,7 +7,7 @@
 #include "scene/assets.h"
 #include "scene/occluders.h"
 #include "shade/resolution.h"
-#include "spheres/sphere_tree.h"
+#include "spheres/spheres.h"
 #include "trace/embree.h"
 
 #include <math.h>

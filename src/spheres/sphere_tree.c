@@ -1,7 +1,6 @@
 /* Making a hierarchy of bounding spheres, and searching it with cones. Spheres are halved at the median along
  * the longest side of their centres' box until eight parts, or parts of no more than eight, are left for a
  * block. */
-#include "spheres/sphere_tree.h"
 #include "spheres/spheres.h"
 
 #include "base/floats.h"

@@ -5,7 +5,7 @@
 
 #include "base/isa.h"
 #include "base/vec.h"
-#include "heightfield/heights_check.h"
+#include "heightfield/heights.h"
 #include "mesh/solidity.h"
 #include "previews.h"
 #include "trace/embree.h"
