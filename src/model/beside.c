@@ -1,5 +1,5 @@
 #define _GNU_SOURCE
-#include "model/model_file.h"
+#include "model/model.h"
 
 #include "base/bytes.h"
 #include "base/file.h"
@@ -8,7 +8,6 @@
 #include "base/uri.h"
 #include "model/gltf.h"
 #include "model/obj.h"
-#include "model/scan.h"
 
 #include <stdlib.h>
 #include <string.h>

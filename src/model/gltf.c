@@ -3,7 +3,6 @@
 
 #include "base/bytes.h"
 #include "base/memory.h"
-#include "model/scan.h"
 
 #include <errno.h>
 #include <float.h>
@@ -291,12 +290,9 @@ vsh_result vshi_gltf_open(vshi_gltf *gltf, const char *text, size_t size, vsh_er
     return check_extensions(gltf, error);
 }
 
-vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, bool mapped, const vsh_run *run,
-                          vshi_job *job, vsh_model **model, vsh_error *error) {
+vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, const vsh_run *run, vshi_job *job,
+                          vsh_model **model, vsh_error *error) {
     vshi_gltf gltf = {.path = path, .run = run, .job = job, .bytes_held = (double)size};
-    if (mapped) {
-        gltf.mapped = (vshi_gltf_bytes){(const unsigned char *)text, size};
-    }
     vsh_result result;
     VSHI_TRY_DONE(vshi_gltf_open(&gltf, text, size, error));
     VSHI_TRY_DONE(allocate(&gltf, error));

@@ -30,7 +30,6 @@ typedef struct vshi_gltf {
     json_t *root;
     vshi_gltf_bytes chunk; /* the binary one of a GLB */
     bool binary;
-    vshi_gltf_bytes mapped; /* the file, where arrays may be left in it (vshi_model_file); else NULL */
     vshi_gltf_buffer *buffers;
     size_t buffer_count;
     vshi_gltf_buffer *views; /* what compressed ones unpack to */
@@ -134,9 +133,6 @@ typedef struct vshi_gltf_accessor {
 vsh_result vshi_gltf_accessor_open(vshi_gltf *gltf, size_t index, vshi_gltf_accessor *accessor,
                                    vsh_error *error);
 
-/* Whether its elements lie as in an array of `components` of `type`, 4 bytes each. */
-bool vshi_gltf_accessor_plain(const vshi_gltf_accessor *accessor, int components, int type);
-
 /* Its elements as floats, `components` each; what is normalized is 0 … 1 or -1 … 1. */
 void vshi_gltf_accessor_floats(const vshi_gltf_accessor *accessor, float *values);
 
@@ -220,10 +216,8 @@ json_t *vshi_gltf_parse_json(const char *text, size_t size, json_error_t *where,
  * vsh_model_read(). */
 vsh_result vshi_gltf_open(vshi_gltf *gltf, const char *text, size_t size, vsh_error *error);
 
-/* Reads a glTF or GLB of `size` bytes that lie at `text`. `mapped`: they are pages of the file that outlive
- * the model, and shapes that are there as they should be stay where they are (vshi_model_shape.raw). Errors:
- * as vsh_model_read(). */
-vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, bool mapped, const vsh_run *run,
-                          vshi_job *job, vsh_model **model, vsh_error *error);
+/* Reads a glTF or GLB of `size` bytes that lie at `text`. Errors: as vsh_model_read(). */
+vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, const vsh_run *run, vshi_job *job,
+                          vsh_model **model, vsh_error *error);
 
 #endif

@@ -549,11 +549,6 @@ static void element(const vshi_gltf_accessor *a, const unsigned char *at, float 
     }
 }
 
-bool vshi_gltf_accessor_plain(const vshi_gltf_accessor *a, int components, int type) {
-    return a->at != NULL && a->sparse_count == 0 && a->type == type && a->components == components &&
-           a->stride == (size_t)components * 4;
-}
-
 void vshi_gltf_accessor_floats(const vshi_gltf_accessor *a, float *values) {
     const size_t n = (size_t)a->components;
     const bool plain = a->at != NULL && a->type == VSHI_GLTF_FLOAT && a->stride == n * sizeof *values;

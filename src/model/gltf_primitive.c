@@ -3,9 +3,122 @@
 
 #include "base/memory.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* --- checks of arrays, once they are as the file has them */
+
+enum { BLOCK = 4096 /* indices that are looked at twice while they are near */ };
+
+/* Whether each is less than `end`: by a bit that none of them may set, without a branch. */
+static bool all_below(const uint32_t *indices, size_t count, size_t end) {
+    static const uint32_t half = UINT32_C(1) << 31;
+    uint32_t seen = 0, highest = 0;
+    if (end == 0 || end > half) {
+        for (size_t i = 0; i < count; ++i) {
+            highest = indices[i] > highest ? indices[i] : highest;
+        }
+        return count == 0 || highest < end;
+    }
+    const uint32_t last = (uint32_t)end - 1;
+    for (size_t i = 0; i < count; ++i) {
+        seen |= indices[i] | (last - indices[i]);
+    }
+    return seen < half;
+}
+
+static vsh_result check_indices(const char *path, const char *where, const uint32_t *indices, size_t count,
+                                size_t vertex_count, vsh_error *error) {
+    if (all_below(indices, count, vertex_count)) {
+        return VSH_OK;
+    }
+    size_t i = 0;
+    while (indices[i] < vertex_count) {
+        ++i;
+    }
+    return vshi_fail(error, VSH_ERROR_INPUT,
+                     "%s: %s: index %zu of %zu is %u, but there are only %zu vertices", path, where, i, count,
+                     indices[i], vertex_count);
+}
+
+/* Sets used[v] of each vertex that a triangle has. */
+static vsh_result mark_used(const char *path, const char *where, const vshi_model_shape *shape,
+                            unsigned char *restrict used, vsh_error *error) {
+    const size_t count = 3 * shape->triangle_count;
+    const uint32_t *restrict indices = shape->indices; /* which no byte of `used` is a part of */
+    for (size_t begin = 0; begin < count; begin += BLOCK) {
+        const size_t end = count - begin > BLOCK ? begin + BLOCK : count;
+        if (!all_below(indices + begin, end - begin, shape->vertex_count)) {
+            return check_indices(path, where, indices, count, shape->vertex_count, error);
+        }
+        for (size_t i = begin; i < end; ++i) {
+            used[indices[i]] = 1;
+        }
+    }
+    return VSH_OK;
+}
+
+/* The vertices that are used move together. */
+static vsh_result renumber(const char *path, const unsigned char *used, vshi_model_shape *shape,
+                           vsh_error *error) {
+    uint32_t *place = NULL, next = 0;
+    VSHI_TRY(vshi_allocate((void **)&place, shape->vertex_count, sizeof *place, path, error));
+    for (size_t v = 0; v < shape->vertex_count; ++v) {
+        place[v] = next;
+        next += used[v];
+    }
+    for (size_t i = 0; i < 3 * shape->triangle_count; ++i) {
+        shape->indices[i] = place[shape->indices[i]];
+    }
+    for (int k = 0; k < VSHI_MODEL_ARRAYS; ++k) {
+        const vshi_model_array array = vshi_model_array_of(shape, k);
+        char *values = *array.at;
+        for (size_t v = 0; v < array.count && values != NULL && k != VSHI_MODEL_INDICES; ++v) {
+            if (used[v] != 0) {
+                memmove(values + array.size * place[v], values + array.size * v, array.size);
+            }
+        }
+    }
+    free(place);
+    shape->vertex_count = next;
+    return VSH_OK;
+}
+
+/* Many primitives may share one large accessor, of which each uses a part: only that is kept. */
+static vsh_result drop_unused(const char *path, const char *where, vshi_model_shape *shape,
+                              vsh_error *error) {
+    unsigned char *used = NULL;
+    VSHI_TRY(vshi_allocate((void **)&used, shape->vertex_count, 1, path, error));
+    vsh_result result;
+    VSHI_TRY_DONE(mark_used(path, where, shape, used, error));
+    size_t count = 0;
+    for (size_t v = 0; v < shape->vertex_count; ++v) {
+        count += used[v];
+    }
+    if (count < shape->vertex_count) {
+        VSHI_TRY_DONE(renumber(path, used, shape, error));
+    }
+done:
+    free(used);
+    return result;
+}
+
+/* Checks the arrays, leaves out vertices that no triangle has, and turns v of UVs up. */
+static vsh_result finish(const char *path, const vsh_run *run, const char *where, vshi_model_shape *shape,
+                         vsh_error *error) {
+    VSHI_TRY(drop_unused(path, where, shape, error));
+    VSHI_TRY(vshi_model_check_positions(path, where, shape->positions, shape->vertex_count, error));
+    vshi_model_check_normals(path, run, where, shape);
+    for (int set = 0; set < shape->uv_sets; ++set) {
+        float *uvs = shape->uvs[set];
+        for (size_t v = 0; v < shape->vertex_count && uvs != NULL; ++v) {
+            uvs[2 * v + 1] = 1.0F - uvs[2 * v + 1]; /* v points down in glTF */
+        }
+    }
+    return VSH_OK;
+}
 
 /* --- Draco */
 
@@ -45,24 +158,6 @@ vsh_result vshi_gltf_draco_indices(vshi_gltf *gltf, const vshi_draco *mesh, cons
     return VSH_OK;
 }
 
-static vsh_result take_mesh(vshi_gltf *gltf, const vshi_draco *mesh, const json_t *attributes,
-                            const char *where, vshi_model_shape *shape, vsh_error *error) {
-    shape->vertex_count = mesh->vertex_count;
-    VSHI_TRY(take_attribute(gltf, mesh, attributes, "POSITION", 3, where, &shape->positions, error));
-    if (shape->positions == NULL) {
-        return vshi_gltf_fail(gltf, error, "%s: its Draco data has no positions", where);
-    }
-    VSHI_TRY(take_attribute(gltf, mesh, attributes, "NORMAL", 3, where, &shape->normals, error));
-    for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
-        char name[32];
-        snprintf(name, sizeof name, "TEXCOORD_%d", set);
-        VSHI_TRY(take_attribute(gltf, mesh, attributes, name, 2, where, &shape->uvs[set], error));
-        shape->uv_sets = shape->uvs[set] != NULL ? set + 1 : shape->uv_sets;
-    }
-    shape->triangle_count = mesh->triangle_count;
-    return vshi_gltf_draco_indices(gltf, mesh, where, &shape->indices, error);
-}
-
 vsh_result vshi_gltf_decode_draco(vshi_gltf *gltf, const json_t *extension, const char *where,
                                   vshi_draco **mesh, vsh_error *error) {
     vshi_gltf_bytes bytes;
@@ -74,17 +169,6 @@ vsh_result vshi_gltf_decode_draco(vshi_gltf *gltf, const json_t *extension, cons
     VSHI_TRY(vshi_gltf_view(gltf, view, &bytes, &stride, error));
     VSHI_TRY(vshi_importers_load(error));
     return vshi_importers()->draco_decode(bytes.at, bytes.size, gltf->path, mesh, error);
-}
-
-/* The same of a primitive under KHR_draco_mesh_compression: fills positions, normals, UVs and indices. */
-static vsh_result read_draco(vshi_gltf *gltf, const json_t *extension, const char *where,
-                             vshi_model_shape *shape, vsh_error *error) {
-    vshi_draco *mesh = NULL;
-    VSHI_TRY(vshi_gltf_decode_draco(gltf, extension, where, &mesh, error));
-    const vsh_result result =
-        take_mesh(gltf, mesh, json_object_get(extension, "attributes"), where, shape, error);
-    vshi_importers()->draco_free(mesh);
-    return result;
 }
 
 /* The rest pose: morph targets at their default weights (glTF 2.0, 3.7.2.2), then skins, which move vertices
@@ -273,22 +357,6 @@ static vsh_result read_alphas(vshi_gltf *gltf, const json_t *primitive, const ch
     return VSH_OK;
 }
 
-static vsh_result read_vertices(vshi_gltf *gltf, const json_t *primitive, const char *where,
-                                vshi_model_shape *shape, vsh_error *error) {
-    const json_t *attributes = json_object_get(primitive, "attributes");
-    const size_t count = shape->vertex_count;
-    VSHI_TRY(
-        vshi_gltf_read_attribute(gltf, attributes, "POSITION", 3, count, where, &shape->positions, error));
-    VSHI_TRY(vshi_gltf_read_attribute(gltf, attributes, "NORMAL", 3, count, where, &shape->normals, error));
-    for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
-        char name[32];
-        snprintf(name, sizeof name, "TEXCOORD_%d", set);
-        VSHI_TRY(vshi_gltf_read_attribute(gltf, attributes, name, 2, count, where, &shape->uvs[set], error));
-        shape->uv_sets = shape->uvs[set] != NULL ? set + 1 : shape->uv_sets;
-    }
-    return read_alphas(gltf, primitive, where, shape, error);
-}
-
 /* The vertices in the order that a primitive draws them in: *order, *count of them. */
 static vsh_result read_order(vshi_gltf *gltf, const json_t *primitive, size_t vertex_count, const char *where,
                              uint32_t **order, size_t *count, vsh_error *error) {
@@ -314,7 +382,7 @@ static vsh_result read_order(vshi_gltf *gltf, const json_t *primitive, size_t ve
     for (size_t i = 0; i < accessor.count && index == SIZE_MAX; ++i) {
         (*order)[i] = (uint32_t)i;
     }
-    return vshi_model_check_indices(gltf->path, where, *order, accessor.count, vertex_count, error);
+    return check_indices(gltf->path, where, *order, accessor.count, vertex_count, error);
 }
 
 /* Triangle i of a strip or a fan (glTF 2.0, 3.7.2.1). */
@@ -353,6 +421,61 @@ vsh_result vshi_gltf_read_triangles(vshi_gltf *gltf, const json_t *primitive, si
     return VSH_OK;
 }
 
+/* Finds the transform of a packed set. NULL: the set is not packed. */
+static const vshi_gltf_unpacking *find_unpacking(const vshi_gltf *gltf, const json_t *primitive, int set) {
+    size_t material;
+    if (gltf->unpackings == NULL || !vshi_gltf_count(primitive, "material", SIZE_MAX, &material) ||
+        material >= gltf->model->material_count) {
+        return NULL;
+    }
+    const vshi_gltf_unpacking *u = &gltf->unpackings[material * VSH_MAX_UV_SETS + (size_t)set];
+    return u->uvs != VSHI_GLTF_UVS_PLAIN ? u : NULL;
+}
+
+/* `draco`: where the vertices come from; NULL: accessors. */
+static vsh_result read_array(vshi_gltf *gltf, const json_t *attributes, const vshi_draco *draco,
+                             const char *name, int components, const char *where, size_t count, float **array,
+                             vsh_error *error) {
+    return draco != NULL
+               ? take_attribute(gltf, draco, attributes, name, components, where, array, error)
+               : vshi_gltf_read_attribute(gltf, attributes, name, components, count, where, array, error);
+}
+
+/* Positions, normals and sets of UVs. */
+static vsh_result read_vertices(vshi_gltf *gltf, const json_t *attributes, const vshi_draco *draco,
+                                const char *where, vshi_model_shape *shape, vsh_error *error) {
+    const size_t count = shape->vertex_count;
+    VSHI_TRY(read_array(gltf, attributes, draco, "POSITION", 3, where, count, &shape->positions, error));
+    VSHI_TRY(read_array(gltf, attributes, draco, "NORMAL", 3, where, count, &shape->normals, error));
+    for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
+        char name[32];
+        snprintf(name, sizeof name, "TEXCOORD_%d", set);
+        VSHI_TRY(read_array(gltf, attributes, draco, name, 2, where, count, &shape->uvs[set], error));
+        shape->uv_sets = shape->uvs[set] != NULL ? set + 1 : shape->uv_sets;
+    }
+    return VSH_OK;
+}
+
+/* --- primitives */
+
+/* Fills positions, normals, UVs and indices of one under KHR_draco_mesh_compression. */
+static vsh_result read_draco(vshi_gltf *gltf, const json_t *extension, const char *where,
+                             vshi_model_shape *shape, vsh_error *error) {
+    vshi_draco *mesh = NULL;
+    vsh_result result;
+    VSHI_TRY(vshi_gltf_decode_draco(gltf, extension, where, &mesh, error));
+    shape->vertex_count = mesh->vertex_count;
+    VSHI_TRY_DONE(read_vertices(gltf, json_object_get(extension, "attributes"), mesh, where, shape, error));
+    if (shape->positions == NULL) {
+        VSHI_TRY_DONE(vshi_gltf_fail(gltf, error, "%s: its Draco data has no positions", where));
+    }
+    shape->triangle_count = mesh->triangle_count;
+    result = vshi_gltf_draco_indices(gltf, mesh, where, &shape->indices, error);
+done:
+    vshi_importers()->draco_free(mesh);
+    return result;
+}
+
 static vsh_result read_plain(vshi_gltf *gltf, const json_t *primitive, size_t mode, const char *where,
                              vshi_model_shape *shape, vsh_error *error) {
     size_t index;
@@ -366,106 +489,11 @@ static vsh_result read_plain(vshi_gltf *gltf, const json_t *primitive, size_t mo
     shape->vertex_count = accessor.count;
     VSHI_TRY(vshi_gltf_read_triangles(gltf, primitive, mode, accessor.count, where, &shape->indices,
                                       &shape->triangle_count, error));
-    return shape->triangle_count > 0 ? read_vertices(gltf, primitive, where, shape, error) : VSH_OK;
-}
-
-/* Finds the transform of a packed set. NULL: the set is not packed. */
-static const vshi_gltf_unpacking *find_unpacking(const vshi_gltf *gltf, const json_t *primitive, int set) {
-    size_t material;
-    if (gltf->unpackings == NULL || !vshi_gltf_count(primitive, "material", SIZE_MAX, &material) ||
-        material >= gltf->model->material_count) {
-        return NULL;
-    }
-    const vshi_gltf_unpacking *u = &gltf->unpackings[material * VSH_MAX_UV_SETS + (size_t)set];
-    return u->uvs != VSHI_GLTF_UVS_PLAIN ? u : NULL;
-}
-
-/* --- shapes that are left in the file */
-
-/* Whether a pose moves anything of a primitive. */
-static bool is_posed(const json_t *primitive, const vshi_gltf_pose *pose) {
-    bool moved = pose->joints != NULL && pose->joint_count > 0;
-    const size_t targets = json_array_size(json_object_get(primitive, "targets"));
-    for (size_t i = 0; i < targets && i < pose->weight_count; ++i) {
-        moved = moved || pose->weights[i] != 0.0;
-    }
-    return moved;
-}
-
-/* Where an accessor's elements lie in the mapped file, plain; NULL where there is no such accessor, or *plain
- * becomes false where they do not. */
-static vsh_result find_plain(vshi_gltf *gltf, const json_t *object, const char *key, int components, int type,
-                             const char *where, size_t *count, void *array, bool *plain, vsh_error *error) {
-    size_t index;
-    vshi_gltf_accessor accessor;
-    VSHI_TRY(vshi_gltf_index(gltf, object, key, "accessors", where, &index, error));
-    if (index == SIZE_MAX) {
+    if (shape->triangle_count == 0) {
         return VSH_OK;
     }
-    VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
-    const uintptr_t at = (uintptr_t)accessor.at, file = (uintptr_t)gltf->mapped.at;
-    if (!vshi_gltf_accessor_plain(&accessor, components, type) || at < file ||
-        at - file >= gltf->mapped.size || at % 4 != 0 || (*count != SIZE_MAX && *count != accessor.count)) {
-        *plain = false;
-        return VSH_OK;
-    }
-    *count = accessor.count;
-    memcpy(array, &accessor.at, sizeof accessor.at);
-    return vshi_gltf_hold(gltf, (double)accessor.count * 4.0 * components, error);
-}
-
-static vsh_result find_vertices(vshi_gltf *gltf, const json_t *primitive, const char *where,
-                                vshi_model_shape *shape, bool *plain, vsh_error *error) {
-    const json_t *attributes = json_object_get(primitive, "attributes");
-    size_t count = SIZE_MAX;
-    VSHI_TRY(find_plain(gltf, attributes, "POSITION", 3, VSHI_GLTF_FLOAT, where, &count, &shape->positions,
-                        plain, error));
-    VSHI_TRY(find_plain(gltf, attributes, "NORMAL", 3, VSHI_GLTF_FLOAT, where, &count, &shape->normals, plain,
-                        error));
-    for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
-        char name[32];
-        snprintf(name, sizeof name, "TEXCOORD_%d", set);
-        VSHI_TRY(find_plain(gltf, attributes, name, 2, VSHI_GLTF_FLOAT, where, &count, &shape->uvs[set],
-                            plain, error));
-        shape->uv_sets = shape->uvs[set] != NULL ? set + 1 : shape->uv_sets;
-        *plain = *plain && (shape->uvs[set] == NULL || find_unpacking(gltf, primitive, set) == NULL);
-    }
-    shape->vertex_count = count;
-    return VSH_OK;
-}
-
-/* Where all of a list of triangles lies in the mapped file as a model has it, and is not moved, it stays
- * there, and nothing of it is looked at here; else the shape stays all 0. */
-static vsh_result leave_raw(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
-                            const char *where, vshi_model_shape *shape, vsh_error *error) {
-    enum { LEAST = 1 << 14 /* corners; what a shape of fewer takes is not its copy */ };
-    vshi_model_shape found = {.raw = NULL};
-    size_t corners = SIZE_MAX;
-    const double held = gltf->bytes_held;
-    bool plain = gltf->mapped.at != NULL && !is_posed(primitive, pose), colored = false;
-    if (plain) {
-        VSHI_TRY(has_alpha(gltf, primitive, where, &colored, error));
-        plain = !colored;
-    }
-    if (plain) {
-        VSHI_TRY(find_plain(gltf, primitive, "indices", 1, VSHI_GLTF_UINT, where, &corners, &found.indices,
-                            &plain, error));
-    }
-    if (!plain || found.indices == NULL || corners < LEAST || corners % 3 != 0) {
-        gltf->bytes_held = held;
-        return VSH_OK;
-    }
-    VSHI_TRY(find_vertices(gltf, primitive, where, &found, &plain, error));
-    if (!plain || found.positions == NULL) {
-        gltf->bytes_held = held;
-        return VSH_OK;
-    }
-    found.triangle_count = corners / 3;
-    const size_t size = strlen(where) + 1;
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&found.raw, size, 1, error));
-    memcpy(found.raw, where, size);
-    *shape = found;
-    return VSH_OK;
+    VSHI_TRY(read_vertices(gltf, json_object_get(primitive, "attributes"), NULL, where, shape, error));
+    return read_alphas(gltf, primitive, where, shape, error);
 }
 
 /* Turns a packer's integers into UVs. */
@@ -506,21 +534,13 @@ vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *primitive, co
         return VSH_OK; /* points or lines */
     }
     const json_t *draco = vshi_gltf_extension(primitive, "KHR_draco_mesh_compression");
-    if (draco == NULL && mode == VSHI_GLTF_TRIANGLES) {
-        VSHI_TRY(leave_raw(gltf, primitive, pose, where, shape, error));
-    }
-    if (shape->raw == NULL) {
-        VSHI_TRY(draco != NULL ? read_draco(gltf, draco, where, shape, error)
-                               : read_plain(gltf, primitive, mode, where, shape, error));
-    }
+    VSHI_TRY(draco != NULL ? read_draco(gltf, draco, where, shape, error)
+                           : read_plain(gltf, primitive, mode, where, shape, error));
     if (shape->triangle_count == 0) {
         return VSH_OK;
     }
     set_material(gltf, primitive, shape);
-    if (shape->raw != NULL) {
-        return VSH_OK;
-    }
     unpack_uvs(gltf, primitive, shape);
     VSHI_TRY(apply_pose(gltf, primitive, pose, where, shape, error));
-    return vshi_model_finish(gltf->path, gltf->run, where, shape, error);
+    return finish(gltf->path, gltf->run, where, shape, error);
 }

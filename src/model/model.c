@@ -1,25 +1,18 @@
 /* A model: the arrays of each mesh of a file once, and an entry for every node that uses them. OBJ, PLY
- * and glTF are read by obj*.c, ply*.c and gltf*.c, other formats by Assimp (model_file.c, model_build.c). v
- * of UVs points up in every format. */
+ * and glTF are read by obj.c, ply.c and gltf*.c, other formats by Assimp (assimp.c). v of UVs points up in
+ * every format. */
 #include "model/model.h"
 
-#include "base/file.h"
-#include "base/floats.h"
-#include "base/input.h"
 #include "base/memory.h"
-#include "base/threads.h"
 #include "base/try.h"
 #include "base/vec.h"
 #include "mesh/mesh.h"
-#include "model/model_file.h"
 
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
-#include <sys/mman.h>
 
 /* --- materials and images */
 
@@ -44,13 +37,17 @@ int32_t vsh_model_mesh_material(const vsh_model *model, size_t index) {
     return model->shapes[model->entries[index].shape].material - 1;
 }
 
+static void make_line(char *text) {
+    for (char *c = text; *c != '\0'; ++c) {
+        *c = (unsigned char)*c < 0x20 || *c == 0x7f ? '?' : *c;
+    }
+}
+
 vsh_result vshi_model_copy_line(const char *text, char **copy, vsh_error *error) {
     const size_t size = strlen(text) + 1;
     VSHI_TRY(vshi_allocate((void **)copy, size, 1, "a name", error));
     memcpy(*copy, text, size);
-    for (char *c = *copy; *c != '\0'; ++c) {
-        *c = (unsigned char)*c < 0x20 || *c == 0x7f ? '?' : *c;
-    }
+    make_line(*copy);
     return VSH_OK;
 }
 
@@ -63,18 +60,6 @@ vsh_result vshi_model_take_plain_materials(vsh_model *model, size_t count, vsh_e
         memcpy(model->materials[i].told.uv_transform, as_they_are, sizeof as_they_are);
     }
     return VSH_OK;
-}
-
-static void free_materials(vsh_model *model) {
-    for (size_t i = 0; i < model->material_count; ++i) {
-        free(model->materials[i].name);
-    }
-    for (size_t i = 0; i < model->image_count; ++i) {
-        free(model->images[i].path);
-        free(model->images[i].owned);
-    }
-    free(model->images);
-    free(model->materials);
 }
 
 /* --- lights, in the world */
@@ -119,20 +104,7 @@ vsh_result vshi_model_add_light(vsh_model *model, const vsh_model_light *light, 
     return VSH_OK;
 }
 
-static void free_lights(vsh_model *model) {
-    for (size_t i = 0; i < model->light_count; ++i) {
-        free((char *)(uintptr_t)model->lights[i].name);
-    }
-    free(model->lights);
-}
-
 /* --- entries: places and names of meshes */
-
-static void make_line(char *text) {
-    for (char *c = text; *c != '\0'; ++c) {
-        *c = (unsigned char)*c < 0x20 || *c == 0x7f ? '?' : *c;
-    }
-}
 
 /* "node/mesh", or whichever has a name, or NULL; on one line. */
 static vsh_result make_name(const char *first, const char *second, char **name, vsh_error *error) {
@@ -233,6 +205,22 @@ vsh_result vshi_model_add(vsh_model *model, const char *path, const vsh_run *run
     return VSH_OK;
 }
 
+vshi_model_array vshi_model_array_of(vshi_model_shape *shape, int number) {
+    switch (number) {
+    case VSHI_MODEL_POSITIONS:
+        return (vshi_model_array){(void **)&shape->positions, shape->vertex_count, sizeof(float[3])};
+    case VSHI_MODEL_INDICES:
+        return (vshi_model_array){(void **)&shape->indices, shape->triangle_count, sizeof(uint32_t[3])};
+    case VSHI_MODEL_NORMALS:
+        return (vshi_model_array){(void **)&shape->normals, shape->vertex_count, sizeof(float[3])};
+    case VSHI_MODEL_ALPHAS:
+        return (vshi_model_array){(void **)&shape->alphas, shape->vertex_count, sizeof(float)};
+    default:
+        return (vshi_model_array){(void **)&shape->uvs[number - VSHI_MODEL_UVS], shape->vertex_count,
+                                  sizeof(float[2])};
+    }
+}
+
 void vsh_model_free(vsh_model *model) {
     if (model == NULL) {
         return;
@@ -241,36 +229,31 @@ void vsh_model_free(vsh_model *model) {
         free(model->entries[i].object_name);
         free(model->entries[i].name);
     }
-    free(model->entries);
     for (size_t i = 0; !model->borrowed && i < model->shape_count; ++i) {
-        vshi_model_shape *shape = &model->shapes[i];
-        if (shape->raw != NULL) {
-            free(shape->raw);
-            continue;
+        for (int k = 0; k < VSHI_MODEL_ARRAYS; ++k) {
+            free(*vshi_model_array_of(&model->shapes[i], k).at);
         }
-        free(shape->indices);
-        for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
-            free(shape->uvs[set]);
-        }
-        free(shape->alphas);
-        free(shape->normals);
-        free(shape->positions);
     }
+    for (size_t i = 0; i < model->light_count; ++i) {
+        free((char *)(uintptr_t)model->lights[i].name);
+    }
+    for (size_t i = 0; i < model->material_count; ++i) {
+        free(model->materials[i].name);
+    }
+    for (size_t i = 0; i < model->image_count; ++i) {
+        free(model->images[i].path);
+        free(model->images[i].owned);
+    }
+    free(model->entries);
     free(model->shapes);
-    free_lights(model);
-    free_materials(model);
+    free(model->lights);
+    free(model->images);
+    free(model->materials);
     for (int i = 0; i < VSHI_MODEL_BLOCKS; ++i) {
         free(model->blocks[i]);
     }
     vshi_answer_free(&model->answer);
-    if (model->file.map != NULL) {
-        munmap(model->file.map, model->file.size);
-    }
     free(model);
-}
-
-vsh_result vshi_model_create(const char *path, vsh_model **model, vsh_error *error) {
-    return vshi_allocate((void **)model, 1, sizeof **model, path, error);
 }
 
 size_t vsh_model_mesh_count(const vsh_model *model) {
@@ -320,67 +303,47 @@ vsh_mesh vsh_model_mesh(const vsh_model *model, size_t index, int32_t uv_set) {
     };
 }
 
-/* STL's normals are those of its facets, often zero or wrong: the triangles know better. */
-static bool wants_normals(const char *path) {
-    return strcasecmp(vshi_path_ending(path), "stl") != 0;
+/* --- checks */
+
+/* Whether no exponent is that of infinities, without a branch. */
+static bool all_finite(const float *values, size_t count) {
+    static const uint32_t exponent = 0x7f800000;
+    uint32_t seen = 0;
+    for (size_t i = 0; i < count; ++i) {
+        uint32_t bits;
+        memcpy(&bits, &values[i], sizeof bits);
+        seen |= (uint32_t)((bits & exponent) == exponent);
+    }
+    return seen == 0;
 }
 
-typedef struct reading {
-    const char *path;
-    const vsh_run *run;
-    vshi_job *job;
-    bool alone;
-    vsh_model **model;
-} reading;
-
-static vsh_result read_file(void *user, vsh_error *error) {
-    const reading *r = user;
-    vshi_import *import = NULL;
-    double unit = 0.0;
-    VSHI_TRY(vshi_model_file_read(r->path, r->run, r->job, r->alone, &import, r->model, &unit, error));
-    if (import == NULL) {
+vsh_result vshi_model_check_positions(const char *path, const char *where, const float *positions,
+                                      size_t count, vsh_error *error) {
+    if (all_finite(positions, 3 * count)) {
         return VSH_OK;
     }
-    const vshi_model_source source = {.path = r->path,
-                                      .run = r->run,
-                                      .job = r->job,
-                                      .scene = import->scene,
-                                      .keep_normals = wants_normals(r->path),
-                                      .unit = unit > 0.0 ? unit : import->unit,
-                                      .in_metres = unit > 0.0};
-    const vsh_result result = vshi_model_build(&source, r->model, error);
-    vshi_importers()->free(import);
-    return result;
+    const float *p = positions;
+    while (isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2])) {
+        p += 3;
+    }
+    return vshi_fail(error, VSH_ERROR_INPUT,
+                     "%s: %s%svertex %zu of %zu lies at (%g, %g, %g), expected finite numbers", path, where,
+                     where[0] != '\0' ? ": " : "", (size_t)(p - positions) / 3, count, (double)p[0],
+                     (double)p[1], (double)p[2]);
 }
 
-vsh_result vshi_model_read(const char *path, const vsh_run *run, bool alone, vsh_model **model,
-                           vsh_error *error) {
-    VSHI_FLOATS;
-    enum { BUILD_UNITS = 100 };
-    VSHI_NEEDS(model);
-    *model = NULL;
-    VSHI_NEEDS(path);
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    vshi_job *job = vshi_job_begin(&full, "load", VSHI_MODEL_FILE_UNITS + BUILD_UNITS);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+void vshi_model_check_normals(const char *path, const vsh_run *run, const char *where,
+                              const vshi_model_shape *shape) {
+    size_t bad = 0;
+    if (shape->normals == NULL || all_finite(shape->normals, 3 * shape->vertex_count)) {
+        return;
     }
-    reading r = {path, &full, job, alone, model};
-    vsh_result result;
-    VSHI_TRY_DONE(full.reader != NULL
-                      ? vshi_model_from_reader(path, &full, job, VSHI_MODEL_FILE_UNITS, model, error)
-                      : vshi_on_stack(read_file, &r, error));
-    if (vshi_job_advance(job, BUILD_UNITS)) {
-        vsh_model_free(*model);
-        *model = NULL;
-        result = vshi_job_fail_cancelled(job, error);
+    for (size_t v = 0; v < shape->vertex_count; ++v) {
+        float *n = shape->normals + 3 * v;
+        if (!isfinite(n[0]) || !isfinite(n[1]) || !isfinite(n[2])) {
+            memset(n, 0, sizeof(float[3]));
+            ++bad;
+        }
     }
-done:
-    vshi_job_end(job);
-    return result;
-}
-
-vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **model, vsh_error *error) {
-    return vshi_model_read(path, run, false, model, error);
+    vshi_warn(run, "%s: %s: %zu normals are not finite; those faces are flat", path, where, bad);
 }

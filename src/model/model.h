@@ -29,9 +29,24 @@ typedef struct vshi_model_shape {
                          integers */
     int32_t alpha;    /* VSH_ALPHA_… */
     int32_t material; /* number of it + 1; 0: none */
-    char *raw;        /* its arrays lie in the model's file, as they are there: what to call it where
-                         vshi_model_finish() is still to be done. NULL: they are its own, and done */
 } vshi_model_shape;
+
+/* The arrays of a shape, by numbers: all of them can be freed, packed and sent alike. */
+enum {
+    VSHI_MODEL_POSITIONS,
+    VSHI_MODEL_INDICES,
+    VSHI_MODEL_NORMALS,
+    VSHI_MODEL_ALPHAS,
+    VSHI_MODEL_UVS, /* of set 0, and the others behind it */
+    VSHI_MODEL_ARRAYS = VSHI_MODEL_UVS + VSH_MAX_UV_SETS
+};
+
+typedef struct vshi_model_array {
+    void **at;          /* where the shape points to it; *at NULL: it has none */
+    size_t count, size; /* vertices or triangles, and bytes of each */
+} vshi_model_array;
+
+vshi_model_array vshi_model_array_of(vshi_model_shape *shape, int number);
 
 /* What of a glTF an entry is: its node, the node's mesh, the mesh's primitive and, where the node is drawn
  * many times (EXT_mesh_gpu_instancing), which of them. Each is 1 + its index in the file; 0: none, as in
@@ -39,6 +54,7 @@ typedef struct vshi_model_shape {
 typedef struct vshi_model_origin {
     uint32_t node, mesh, primitive, instance;
 } vshi_model_origin;
+
 /* An image file: bytes, or a path. */
 typedef struct vshi_model_image {
     const unsigned char *bytes; /* what is `owned`, or of the reader's answer */
@@ -52,17 +68,6 @@ typedef struct vshi_model_material {
     char *name;
     size_t image; /* number of it + 1; 0: none */
 } vshi_model_material;
-
-enum { VSHI_FILE_IDENTITY = 5 };
-
-/* A file that a reader has mapped, and that arrays of its model are left in: what takes them up reads them
- * from there, without a copy in between (model_message.c). */
-typedef struct vshi_model_file {
-    void *map; /* NULL: none */
-    size_t size;
-    uint64_t identity[VSHI_FILE_IDENTITY]; /* device, number, bytes, seconds and nanoseconds of its last
-                                              change */
-} vshi_model_file;
 
 typedef struct vshi_model_entry {
     char *name;        /* NULL where neither node nor mesh has one */
@@ -81,7 +86,6 @@ struct vsh_model {
     bool borrowed;                   /* the shapes' arrays lie in what follows, else each is its own */
     void *blocks[VSHI_MODEL_BLOCKS]; /* from malloc; may be NULL */
     vshi_answer answer;              /* of a reader; its map may be NULL */
-    vshi_model_file file;
     vshi_model_entry *entries;
     size_t entry_count, entry_capacity;
     vsh_model_light *lights; /* whose names are the model's */
@@ -93,17 +97,6 @@ struct vsh_model {
     double unit; /* metres in one of the file's; 0: not known */
 };
 
-/* What a model is built from, and by whose order. */
-typedef struct vshi_model_source {
-    const char *path;
-    const vsh_run *run;
-    vshi_job *job;
-    const struct aiScene *scene;
-    bool keep_normals;
-    double unit;    /* metres in a unit of the file; 0: it has none */
-    bool in_metres; /* whether positions are in metres already */
-} vshi_model_source;
-
 /* Where a shape stands. */
 typedef struct vshi_model_place {
     const char *node, *mesh; /* names; may be "" */
@@ -112,13 +105,6 @@ typedef struct vshi_model_place {
     const double *world; /* [12] */
     vshi_model_origin origin;
 } vshi_model_place;
-
-/* An empty one. Free with vsh_model_free(). Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_model_create(const char *path, vsh_model **model, vsh_error *error);
-
-/* vsh_model_read(); `alone`: in a process of its own, which may end where the file does not hold still. */
-vsh_result vshi_model_read(const char *path, const vsh_run *run, bool alone, vsh_model **model,
-                           vsh_error *error);
 
 /* Adds an entry; a transform that flattens it is left out, with a warning. Errors: VSH_ERROR_INPUT (a
  * transform that is not finite in 32 bits), VSH_ERROR_MEMORY. */
@@ -135,15 +121,13 @@ vsh_result vshi_model_copy_line(const char *text, char **copy, vsh_error *error)
 /* The number of an object that is yet to be added. */
 uint32_t vshi_model_next_object(const vsh_model *model);
 
-/* The shape's triangles are held against its vertices, vertices that none of them uses are left out,
- * positions are finite, normals that are not become 0 with a warning, and v of UVs points up. Errors:
- * VSH_ERROR_INPUT, naming `where`; VSH_ERROR_MEMORY. */
-vsh_result vshi_model_finish(const char *path, const vsh_run *run, const char *where, vshi_model_shape *shape,
-                             vsh_error *error);
+/* Whether positions are finite. Errors: VSH_ERROR_INPUT, naming `where`, which may be "". */
+vsh_result vshi_model_check_positions(const char *path, const char *where, const float *positions,
+                                      size_t count, vsh_error *error);
 
-/* Whether `count` indices are of `vertex_count` vertices. Errors: VSH_ERROR_INPUT, naming the first. */
-vsh_result vshi_model_check_indices(const char *path, const char *where, const uint32_t *indices,
-                                    size_t count, size_t vertex_count, vsh_error *error);
+/* Normals that are not finite become 0, which is no direction: faces are flat there. Warns of them. */
+void vshi_model_check_normals(const char *path, const vsh_run *run, const char *where,
+                              const vshi_model_shape *shape);
 
 /* A vertex's sums of weights, and of the weighted matrices that move it. */
 typedef struct vshi_model_blend {
@@ -158,33 +142,70 @@ void vshi_model_blend_move(vshi_model_shape *shape, const vshi_model_blend *blen
 /* world = parent × own. */
 void vshi_model_compose(const double parent[12], const double own[12], double world[12]);
 
-/* Builds the model of a scene that vshi_model_file_read() has passed. */
-vsh_result vshi_model_build(const vshi_model_source *source, vsh_model **model, vsh_error *error);
-
 /* Has run->reader read the file, for `units` of the job. Errors: as vsh_model_read() with a reader. */
 vsh_result vshi_model_from_reader(const char *path, const vsh_run *run, vshi_job *job, size_t units,
                                   vsh_model **model, vsh_error *error);
 
-struct vshi_decoder;
-struct vshi_encoder;
-
 /* Parses in a reader, and puts what is handed over. */
-vsh_result vshi_serve_model(const char *path, struct vshi_decoder *request, const vsh_run *run,
-                            struct vshi_encoder *payload, vsh_error *error);
+vsh_result vshi_serve_model(const char *path, vshi_decoder *request, const vsh_run *run,
+                            vshi_encoder *payload, vsh_error *error);
 
 /* What a reader has handed over; everything in it is checked. The model's arrays are those of the message,
- * which must outlive it, or are read from the file at `path` where they were left there. Errors:
- * VSH_ERROR_READ where it does not hold, and as for what was made in this process. */
-vsh_result vshi_model_decode(struct vshi_decoder *decoder, const char *path, const vsh_run *run,
-                             vsh_model **model, vsh_error *error);
+ * which must outlive it. Errors: VSH_ERROR_READ, VSH_ERROR_MEMORY. */
+vsh_result vshi_model_decode(vshi_decoder *decoder, const char *path, const vsh_run *run, vsh_model **model,
+                             vsh_error *error);
 
 /* Takes `count` materials, opaque and without names. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_model_take_plain_materials(vsh_model *model, size_t count, vsh_error *error);
 
-/* --- arrays that are left in the file (model_message.c) */
+/* --- files (model_file.c) */
 
-/* What of it tells whether it is the same one, unchanged. False where the system does not say. */
-bool vshi_file_identity(int file, uint64_t identity[VSHI_FILE_IDENTITY]);
+/* A file of a format that Assimp reads. Path, run, job and units (of the first call) are given. */
+typedef struct vshi_assimp {
+    const char *path;
+    const vsh_run *run;
+    vshi_job *job;
+    size_t units, units_done; /* of the job: for the first call, and told so far */
+    const char *text;         /* the whole file, during the first call */
+    size_t size;
+    size_t faces; /* polygons of three corners or more that Assimp must find at least; 0: not known */
+    double unit;  /* metres in a unit of a Collada file, by which Assimp multiplies; 0: of another */
+    const struct aiScene *scene;
+} vshi_assimp;
+
+/* Looks for what Assimp hides in the file's own bytes. Errors: VSH_ERROR_READ where it ends early,
+ * VSH_ERROR_INPUT where its content is bad, VSH_ERROR_CANCELLED. */
+vsh_result vshi_assimp_look(vshi_assimp *file, const char *text, size_t size, vsh_error *error);
+
+/* Reads the file, for `units` of the job. Errors: as vsh_model_read(). */
+vsh_result vshi_assimp_read(vshi_assimp *file, size_t units, vsh_model **model, vsh_error *error);
+
+/* Reads a PLY, for `units` of the job. Errors: as vsh_model_read(). */
+vsh_result vshi_ply_read(const char *path, const vsh_run *run, vshi_job *job, size_t units, vsh_model **model,
+                         vsh_error *error);
+
+/* --- formats that are refused by name */
+
+/* The advice of errors about other formats. */
+#define VSHI_FORMATS                                                                                         \
+    "give a mesh as OBJ, glTF, GLB, PLY, STL, FBX or DAE, a level set as .vdb, or a scene as .json"
+
+/* VSH_ERROR_INPUT, with the formats that are read, where a file is of Blender, Alembic or USD by its ending
+ * or its first bytes. If a file cannot be read, its ending decides. Thread safe. */
+vsh_result vshi_unsupported_check(const char *path, vsh_error *error);
+
+/* --- files that a model is read with (beside.c) */
+
+/* Receives the path of such a file and frees it, after an error too. */
+typedef vsh_result vshi_beside_fn(void *user, char *path, vsh_error *error);
+
+/* Lists the files that are read with a model, some more than once: buffers of a glTF, also missing ones;
+ * textures of materials that are not opaque; material libraries of an OBJ and their masks. Files outside of
+ * the model's folder are listed only with run->allow_outside. A file that is no model of its ending names
+ * none. The job may cancel this; its units are not advanced. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY,
+ * VSH_ERROR_CANCELLED, and what `take` returns. */
+vsh_result vshi_model_beside(const char *path, const vsh_run *run, vshi_job *job, vshi_beside_fn *take,
+                             void *user, vsh_error *error);
 
 #ifdef __cplusplus
 }

@@ -1,21 +1,18 @@
-#include "model/model_file.h"
-
+/* Reading a mesh file: its ending chooses the reader. */
 #include "base/file.h"
+#include "base/floats.h"
 #include "base/input.h"
 #include "base/memory.h"
+#include "base/threads.h"
 #include "base/try.h"
 #include "model/gltf.h"
 #include "model/obj.h"
-#include "model/scan.h"
 
-#include <assimp/scene.h>
 #include <errno.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/mman.h>
 #include <sys/stat.h>
 
 enum { HEAD = 512 };
@@ -88,12 +85,7 @@ vsh_result vshi_unsupported_check(const char *path, vsh_error *error) {
  */
 static const double PEAK_BYTES_A_BYTE = 6.0;
 
-enum {
-    SCAN_UNITS = 150,
-    IMPORT_UNITS = 600,
-    READ_UNITS = SCAN_UNITS + IMPORT_UNITS,
-    CHECK_UNITS = VSHI_MODEL_FILE_UNITS - READ_UNITS
-};
+enum { SCAN_UNITS = 150, IMPORT_UNITS = 600, READ_UNITS = SCAN_UNITS + IMPORT_UNITS, REST_UNITS = 250 };
 
 /* Formats that are read, each tested with what Blender writes (tests/models). Assimp reads more, and some of
  * them wrongly. */
@@ -120,176 +112,91 @@ static bool is_gltf(const char *ending) {
     return strcasecmp(ending, "gltf") == 0 || strcasecmp(ending, "glb") == 0;
 }
 
-/* A file in memory. */
-typedef struct file_text {
-    char *text;
-    size_t size;
-    bool mapped; /* it is the file's own pages, else a copy */
-    uint64_t identity[VSHI_FILE_IDENTITY];
-} file_text;
-
-static void free_text(file_text *text) {
-    if (text->mapped) {
-        munmap(text->text, text->size);
-    } else {
-        free(text->text);
-    }
-    *text = (file_text){.text = NULL};
-}
-
-/* A file that becomes shorter while its pages are looked at ends the process, which may be the reader's. */
-static bool map_text(FILE *file, file_text *text) {
-    if (!vshi_file_identity(fileno(file), text->identity)) {
-        return false;
-    }
-    void *map = mmap(NULL, text->size, PROT_READ, MAP_PRIVATE, fileno(file), 0);
-    text->mapped = map != MAP_FAILED;
-    text->text = text->mapped ? map : NULL;
-    return text->mapped;
-}
-
-static vsh_result copy_text(const char *path, FILE *file, file_text *text, vsh_error *error) {
-    text->text = malloc(text->size);
-    if (text->text == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, text->size);
-    }
-    return fread(text->text, 1, text->size, file) == text->size
-               ? VSH_OK
-               : vshi_fail(error, VSH_ERROR_READ, "%s: %s", path,
-                           ferror(file) ? strerror(errno) : "became shorter while it was read");
-}
-
-/* The whole file, for free_text(), after an error too. */
-static vsh_result load_file(const char *path, const vsh_run *run, bool alone, file_text *text,
+/* The whole file in new memory, to be freed after an error too. */
+static vsh_result load_file(const char *path, const vsh_run *run, char **text, size_t *size,
                             vsh_error *error) {
     FILE *file;
     uint64_t bytes;
     vsh_result result;
     VSHI_TRY(vshi_input_open(path, path, SIZE_MAX / 2, &file, &bytes, error));
-    text->size = (size_t)bytes;
+    *size = (size_t)bytes;
     VSHI_TRY_DONE(bytes > 0 ? vshi_check_limit(run, PEAK_BYTES_A_BYTE * (double)bytes, path, error)
                             : vshi_fail(error, VSH_ERROR_READ, "%s: is empty", path));
-    VSHI_TRY_DONE(alone && map_text(file, text) ? VSH_OK : copy_text(path, file, text, error));
+    VSHI_TRY_DONE(vshi_take_pages((void **)text, *size, path, error));
+    if (fread(*text, 1, *size, file) != *size) {
+        result = vshi_fail(error, VSH_ERROR_READ, "%s: %s", path,
+                           ferror(file) ? strerror(errno) : "became shorter while it was read");
+    }
 done:
     fclose(file);
     return result;
 }
 
-static vsh_result scan_file(vshi_scan *scan, const char *ending, const vsh_run *run, bool alone,
-                            vsh_model **model, vsh_error *error) {
-    file_text text = {.text = NULL};
+typedef struct reading {
+    const char *path;
+    const vsh_run *run;
+    vshi_job *job;
+    vsh_model **model;
+} reading;
+
+/* What is looked at as a whole: a glTF is read, and of others vshi_assimp_look() is done. */
+static vsh_result read_text(const reading *r, const char *ending, vshi_assimp *assimp, vsh_error *error) {
+    char *text = NULL;
+    size_t size;
     vsh_result result;
-    VSHI_TRY_DONE(load_file(scan->path, run, alone, &text, error));
-    scan->text = text.text;
-    scan->size = text.size;
-    VSHI_TRY_DONE(is_gltf(ending) ? vshi_gltf_read(scan->path, scan->text, scan->size, text.mapped, run,
-                                                   scan->job, model, error)
-                                  : vshi_scan_file(scan, ending, error));
-    if (*model != NULL && text.mapped) { /* whose arrays may lie there */
-        (*model)->file = (vshi_model_file){.map = text.text, .size = text.size};
-        memcpy((*model)->file.identity, text.identity, sizeof text.identity);
-        text = (file_text){.text = NULL};
-    }
-    if (vshi_job_advance(scan->job, SCAN_UNITS - scan->units_done)) {
-        result = vshi_job_fail_cancelled(scan->job, error);
+    VSHI_TRY_DONE(load_file(r->path, r->run, &text, &size, error));
+    VSHI_TRY_DONE(is_gltf(ending) ? vshi_gltf_read(r->path, text, size, r->run, r->job, r->model, error)
+                                  : vshi_assimp_look(assimp, text, size, error));
+    if (vshi_job_advance(r->job, SCAN_UNITS - assimp->units_done)) {
+        result = vshi_job_fail_cancelled(r->job, error);
     }
 done:
-    free_text(&text);
-    scan->text = NULL;
+    free(text);
     return result;
 }
 
-static vsh_result check_mesh(const char *path, const struct aiMesh *mesh, unsigned place, vsh_error *error) {
-    for (unsigned v = 0; v < mesh->mNumVertices; ++v) {
-        const struct aiVector3D p = mesh->mVertices[v];
-        if (!isfinite(p.x) || !isfinite(p.y) || !isfinite(p.z)) {
-            return vshi_fail(
-                error, VSH_ERROR_INPUT,
-                "%s: mesh %u '%s': vertex %u of %u lies at (%g, %g, %g), expected finite numbers", path,
-                place, mesh->mName.data, v, mesh->mNumVertices, (double)p.x, (double)p.y, (double)p.z);
-        }
-    }
-    for (unsigned f = 0; f < mesh->mNumFaces; ++f) {
-        const struct aiFace *face = &mesh->mFaces[f];
-        for (unsigned k = 0; k < face->mNumIndices; ++k) {
-            if (face->mIndices[k] >= mesh->mNumVertices) {
-                return vshi_fail(error, VSH_ERROR_INPUT,
-                                 "%s: mesh %u '%s': face %u uses vertex %u, but there are only %u", path,
-                                 place, mesh->mName.data, f, face->mIndices[k], mesh->mNumVertices);
-            }
-        }
-    }
-    return VSH_OK;
-}
-
-/* How many faces have three corners or more, and how many triangles those make. */
-static void count_faces(const struct aiScene *scene, size_t *faces, size_t *triangles) {
-    *faces = *triangles = 0;
-    for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
-        const struct aiMesh *mesh = scene->mMeshes[m];
-        for (unsigned f = 0; f < mesh->mNumFaces; ++f) {
-            const unsigned corners = mesh->mFaces[f].mNumIndices;
-            *faces += corners >= 3;
-            *triangles += corners >= 3 ? corners - 2 : 0;
-        }
-    }
-}
-
-/* Everything that what follows takes for granted, and that nothing was lost on the way here. */
-static vsh_result check_scene(const char *path, const struct aiScene *scene, size_t expected, vshi_job *job,
-                              vsh_error *error) {
-    for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
-        if (vshi_job_cancelled(job)) {
-            return vshi_job_fail_cancelled(job, error);
-        }
-        VSHI_TRY(check_mesh(path, scene->mMeshes[m], m, error));
-    }
-    size_t faces, triangles;
-    count_faces(scene, &faces, &triangles);
-    if (faces < expected) {
-        return vshi_fail(error, VSH_ERROR_INPUT,
-                         "%s: only %zu of its %zu faces can be read: the others use vertices out of range",
-                         path, faces, expected);
-    }
-    if (triangles == 0) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles", path);
-    }
-    return VSH_OK;
-}
-
-vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *job, bool alone,
-                                vshi_import **import, vsh_model **model, double *unit, vsh_error *error) {
-    *import = NULL;
-    *model = NULL;
+static vsh_result read_file(void *user, vsh_error *error) {
+    const reading *r = user;
     const char *ending = NULL;
-    vshi_scan scan = {.path = path, .job = job, .units = SCAN_UNITS};
+    vshi_assimp assimp = {.path = r->path, .run = r->run, .job = r->job, .units = SCAN_UNITS};
     struct stat status;
     /* A missing file is that first, whatever its ending. */
-    if (stat(path, &status) != 0) {
-        return vshi_fail(error, VSH_ERROR_READ, "%s: %s", path, strerror(errno));
+    if (stat(r->path, &status) != 0) {
+        return vshi_fail(error, VSH_ERROR_READ, "%s: %s", r->path, strerror(errno));
     }
-    VSHI_TRY(vshi_unsupported_check(path, error));
-    VSHI_TRY(check_ending(path, &ending, error));
+    VSHI_TRY(vshi_unsupported_check(r->path, error));
+    VSHI_TRY(check_ending(r->path, &ending, error));
+    if (strcasecmp(ending, "obj") == 0) {
+        return vshi_obj_read(r->path, r->run, r->job, READ_UNITS, r->model, error);
+    }
+    if (strcasecmp(ending, "ply") == 0) {
+        return vshi_ply_read(r->path, r->run, r->job, READ_UNITS, r->model, error);
+    }
+    VSHI_TRY(read_text(r, ending, &assimp, error));
+    return *r->model != NULL ? VSH_OK : vshi_assimp_read(&assimp, IMPORT_UNITS, r->model, error);
+}
+
+vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **model, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(model);
+    *model = NULL;
+    VSHI_NEEDS(path);
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    vshi_job *job = vshi_job_begin(&full, "load", READ_UNITS + REST_UNITS);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+    }
+    reading r = {path, &full, job, model};
     vsh_result result;
-    VSHI_TRY_DONE(strcasecmp(ending, "obj") == 0   ? vshi_obj_read(path, run, job, READ_UNITS, model, error)
-                  : strcasecmp(ending, "ply") == 0 ? vshi_ply_read(path, run, job, READ_UNITS, model, error)
-                                                   : scan_file(&scan, ending, run, alone, model, error));
-    *unit = scan.unit;
-    if (*model == NULL) {
-        VSHI_TRY_DONE(vshi_importers_load(error));
-        VSHI_TRY_DONE(
-            vshi_importers()->read(path, run->allow_outside != 0, job, IMPORT_UNITS, import, error));
-        VSHI_TRY_DONE(check_scene(path, (*import)->scene, scan.faces, job, error));
-    }
-    if (vshi_job_advance(job, CHECK_UNITS + (*import == NULL ? IMPORT_UNITS : 0))) {
+    VSHI_TRY_DONE(full.reader != NULL ? vshi_model_from_reader(path, &full, job, READ_UNITS, model, error)
+                                      : vshi_on_stack(read_file, &r, error));
+    if (vshi_job_advance(job, REST_UNITS)) {
         result = vshi_job_fail_cancelled(job, error);
     }
 done:
+    vshi_job_end(job);
     if (result != VSH_OK) {
-        if (*import != NULL) {
-            vshi_importers()->free(*import);
-            *import = NULL;
-        }
         vsh_model_free(*model);
         *model = NULL;
     }

@@ -5,7 +5,6 @@
 #include "base/decimal.h"
 #include "base/memory.h"
 #include "base/try.h"
-#include "model/scan.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -675,7 +674,7 @@ vsh_result vshi_obj_read(const char *path, const vsh_run *run, vshi_job *job, si
     VSHI_TRY_DONE(read_statements(&obj, error));
     VSHI_TRY_DONE(check_indices(&obj, error));
     vshi_stream_close(&obj.stream);
-    VSHI_TRY_DONE(vshi_model_create(path, &made, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, path, error));
     VSHI_TRY_DONE(build_model(&obj, made, error));
     *model = made;
     made = NULL;

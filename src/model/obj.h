@@ -5,7 +5,6 @@
 
 #include "model/faces.h"
 #include "model/model.h"
-#include "model/scan.h"
 #include "model/stream.h"
 
 #include <stdbool.h>

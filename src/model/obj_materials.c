@@ -5,7 +5,6 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "model/obj.h"
-#include "model/scan.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -3,11 +3,10 @@
 #include "table/ply.h"
 #include "base/bytes.h"
 #include "base/decimal.h"
+#include "base/memory.h"
 #include "base/try.h"
 #include "model/faces.h"
 #include "model/model.h"
-#include "model/model_file.h"
-#include "model/scan.h"
 #include "model/stream.h"
 
 #include <inttypes.h>
@@ -439,32 +438,6 @@ static vsh_result read_element(ply_reader *r, vsh_error *error) {
 
 /* --- what it becomes */
 
-static vsh_result check_vertices(const ply_reader *r, vsh_error *error) {
-    size_t bad = 0;
-    if (r->vertex_count != r->vertices) { /* faces were held against what the header names */
-        return vshi_fail(error, VSH_ERROR_INPUT, "%s: its vertices have no x, y or z", r->path);
-    }
-    for (size_t v = 0; v < r->vertex_count; ++v) {
-        const float *p = r->positions + 3 * v;
-        if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2])) {
-            return vshi_fail(error, VSH_ERROR_INPUT,
-                             "%s: vertex %zu of %zu lies at (%g, %g, %g), expected finite numbers", r->path,
-                             v, r->vertex_count, (double)p[0], (double)p[1], (double)p[2]);
-        }
-    }
-    for (size_t v = 0; r->normals != NULL && v < r->vertex_count; ++v) {
-        float *n = r->normals + 3 * v;
-        if (!isfinite(n[0]) || !isfinite(n[1]) || !isfinite(n[2])) {
-            memset(n, 0, sizeof(float[3])); /* which no direction is: flat there */
-            ++bad;
-        }
-    }
-    if (bad > 0) {
-        vshi_warn(r->run, "%s: mesh '': %zu normals are not finite; those faces are flat", r->path, bad);
-    }
-    return VSH_OK;
-}
-
 static vsh_result make_triangles(ply_reader *r, vshi_model_shape *shape, vsh_error *error) {
     bool plain;
     size_t capacity = 0;
@@ -487,7 +460,10 @@ static vsh_result make_triangles(ply_reader *r, vshi_model_shape *shape, vsh_err
 static vsh_result build(ply_reader *r, vsh_model *model, vsh_error *error) {
     static const double world[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     size_t capacity = 0;
-    VSHI_TRY(check_vertices(r, error));
+    if (r->vertex_count != r->vertices) { /* faces were held against what the header names */
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: its vertices have no x, y or z", r->path);
+    }
+    VSHI_TRY(vshi_model_check_positions(r->path, "", r->positions, r->vertex_count, error));
     VSHI_TRY(vshi_reserve(&r->budget, &model->shapes, &capacity, 1, sizeof *model->shapes, error));
     vshi_model_shape *shape = model->shapes;
     *shape = (vshi_model_shape){.positions = r->positions,
@@ -498,6 +474,7 @@ static vsh_result build(ply_reader *r, vsh_model *model, vsh_error *error) {
                                 .alpha = VSH_ALPHA_OPAQUE};
     r->positions = r->normals = r->uvs = NULL;
     model->shape_count = 1;
+    vshi_model_check_normals(r->path, r->run, "mesh ''", shape);
     VSHI_TRY(make_triangles(r, shape, error));
     const vshi_model_place place = {"", "", 1, 0, world, {0, 0, 0, 0}};
     return shape->triangle_count > 0 ? vshi_model_add(model, r->path, r->run, &place, error)
@@ -516,7 +493,7 @@ vsh_result vshi_ply_read(const char *path, const vsh_run *run, vshi_job *job, si
         VSHI_TRY_DONE(r.element->first < r.element->end ? read_element(&r, error) : VSH_OK);
     }
     vshi_stream_close(&r.stream);
-    VSHI_TRY_DONE(vshi_model_create(path, &made, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, path, error));
     VSHI_TRY_DONE(build(&r, made, error));
     *model = made;
     made = NULL;

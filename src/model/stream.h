@@ -91,4 +91,32 @@ static inline const char *vshi_words_at(const vshi_words *words, size_t number) 
 
 void vshi_words_free(vshi_words *words);
 
+/* --- tokens */
+
+/* A run of characters that are no white space, within one file. */
+typedef struct vshi_token {
+    const char *text; /* NULL: there is none */
+    size_t size;
+} vshi_token;
+
+/* The next token at *at, which moves behind it; stops at `end`. */
+vshi_token vshi_scan_token(const char **at, const char *end);
+
+/* All that is left of a line, without white space around it. */
+vshi_token vshi_scan_rest(const char *at, const char *end);
+
+bool vshi_token_is(vshi_token token, const char *text);
+
+/* How messages show a token: "%.*s" with these two. Long ones are cut. */
+#define VSHI_TOKEN_ARGS(token) ((token).size < 32 ? (int)(token).size : 32), (token).text
+
+typedef enum vshi_number { VSHI_NUMBER_NONE, VSHI_NUMBER_FINITE, VSHI_NUMBER_NOT_FINITE } vshi_number;
+
+/* Whether a token is a decimal number as mesh files write it, or "nan" and "inf" in their spellings. Does not
+ * depend on the locale. */
+vshi_number vshi_token_number(vshi_token token);
+
+/* A whole number of at most 18 digits, perhaps with a sign; false where the token is none. */
+bool vshi_token_integer(vshi_token token, int64_t *value);
+
 #endif

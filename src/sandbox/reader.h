@@ -96,7 +96,7 @@ enum {
 #define VSHI_ANSWER_MAGIC UINT64_C(0x726577736e61)
 
 /* Of the messages' form; goes up with every change of one. */
-enum { VSHI_READER_PROTOCOL = 7 };
+enum { VSHI_READER_PROTOCOL = 8 };
 
 /* An answer begins with this. It is written twice: with code VSHI_ANSWER_BEGUN before anything is parsed,
  * and at the end. */

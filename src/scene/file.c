@@ -6,7 +6,7 @@
 #include "base/job.h"
 #include "base/threads.h"
 #include "base/try.h"
-#include "model/model_file.h"
+#include "model/model.h"
 #include "json/json.h"
 
 #include <stdlib.h>

@@ -2,7 +2,7 @@
 
 #include "base/floats.h"
 #include "base/try.h"
-#include "model/model_file.h"
+#include "model/model.h"
 
 #include <stdlib.h>
 #include <string.h>

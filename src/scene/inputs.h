@@ -12,7 +12,7 @@ typedef struct vshi_inputs {
 } vshi_inputs;
 
 /* `files`, then what casters, receivers and lights name, then what is read with the models among them
- * (model/model_file.h); each path once. `scene` may be NULL. Files that cannot be read are listed all the
+ * (model/model.h); each path once. `scene` may be NULL. Files that cannot be read are listed all the
  * same. To be freed also where it fails. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 vsh_result vshi_inputs_find(const vsh_scene *scene, const char *const *files, size_t file_count,
                             const vsh_run *run, vshi_job *job, vshi_inputs *inputs, vsh_error *error);

@@ -1,4 +1,10 @@
-/* From Assimp's scene to a model: arrays, polygons cut into triangles, skins at rest, places. */
+/* Formats that Assimp reads: STL, Collada and FBX. What Assimp 5.2 hides is looked for in the file's own
+ * bytes first: files that end early, coordinates that are no finite numbers. Assimp drops or repeats faces,
+ * or replaces numbers, where it finds such things, and reports a mesh that is not the one in the file. Then
+ * comes its scene: arrays, polygons cut into triangles, skins at rest, places. */
+#define _GNU_SOURCE
+#include "base/bytes.h"
+#include "base/file.h"
 #include "base/memory.h"
 #include "base/try.h"
 #include "base/vec.h"
@@ -6,6 +12,7 @@
 #include "mesh/mesh.h"
 #include "model/faces.h"
 #include "model/model.h"
+#include "model/stream.h"
 
 #include <assimp/material.h>
 #include <assimp/scene.h>
@@ -13,6 +20,118 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
+
+_Static_assert(sizeof(struct aiVector3D) == sizeof(float[3]), "Assimp's vectors are three floats");
+
+/* --- the file's bytes */
+
+/* STL: binary files are as long as their number of triangles says, ASCII ones end in "endsolid" and hold
+ * numbers. Assimp 5.2 reads an ASCII file that ends between two facets as a smaller mesh. */
+
+enum { HEADER = 84, FACET = 50, FACETS_A_POLL = 4096 };
+
+static vsh_result scan_ascii(vshi_assimp *scan, vsh_error *error) {
+    const char *at = scan->text, *end = scan->text + scan->size;
+    size_t vertices = 0;
+    bool ended = false;
+    for (;;) {
+        const vshi_token token = vshi_scan_token(&at, end);
+        if (token.text == NULL) {
+            break;
+        }
+        if (vshi_token_is(token, "solid") || vshi_token_is(token, "endsolid")) {
+            ended = token.text[0] == 'e';
+            const char *stop = memchr(at, '\n', (size_t)(end - at)); /* a name may follow, of any words */
+            at = stop != NULL ? stop : end;
+        } else if (vshi_token_is(token, "endfacet")) {
+            ++scan->faces;
+            if (scan->faces % FACETS_A_POLL == 0 &&
+                vshi_advance_to(scan->job, (double)(at - scan->text) / (double)scan->size, scan->units,
+                                &scan->units_done)) {
+                return vshi_job_fail_cancelled(scan->job, error);
+            }
+        } else if (vshi_token_is(token, "vertex")) {
+            for (int k = 0; k < 3; ++k) {
+                const vshi_token number = vshi_scan_token(&at, end);
+                if (number.text != NULL && vshi_token_number(number) != VSHI_NUMBER_FINITE) {
+                    return vshi_fail(error, VSH_ERROR_INPUT,
+                                     "%s: vertex %zu of facet %zu holds '%.*s', expected a finite number",
+                                     scan->path, vertices % 3, vertices / 3, VSHI_TOKEN_ARGS(number));
+                }
+            }
+            ++vertices;
+        }
+    }
+    if (!ended) {
+        return vshi_fail(error, VSH_ERROR_READ, "%s: cut short: no 'endsolid' after %zu facets", scan->path,
+                         scan->faces);
+    }
+    return VSH_OK;
+}
+
+static vsh_result scan_stl(vshi_assimp *scan, vsh_error *error) {
+    const size_t facets = scan->size >= HEADER ? (size_t)vshi_bytes_number(scan->text + 80, 4, false) : 0;
+    const uint64_t expected = HEADER + FACET * (uint64_t)facets;
+    const char *at = scan->text;
+    const bool solid = vshi_token_is(vshi_scan_token(&at, scan->text + scan->size), "solid");
+    if (scan->size >= HEADER && expected == scan->size) {
+        scan->faces = facets;
+        return VSH_OK;
+    }
+    if (solid && memchr(scan->text, '\0', scan->size < HEADER ? scan->size : HEADER) == NULL) {
+        return scan_ascii(scan, error);
+    }
+    if (scan->size < HEADER || expected > scan->size) {
+        return vshi_fail(error, VSH_ERROR_READ, "%s: cut short: %zu bytes of %llu", scan->path, scan->size,
+                         (unsigned long long)(scan->size < HEADER ? HEADER : expected));
+    }
+    scan->faces = facets;
+    return VSH_OK;
+}
+
+/* Collada: the unit that its asset names ("<unit meter="0.01"/>"), by which Assimp multiplies and of which it
+ * tells nothing. */
+
+static double read_metres(const char *tag, const char *end) {
+    static const char name[] = "meter";
+    const char *at = memmem(tag, (size_t)(end - tag), name, sizeof name - 1);
+    at = at != NULL ? vshi_scan_rest(at + sizeof name - 1, end).text : end; /* XML allows blanks around "=" */
+    at = at < end && *at == '=' ? vshi_scan_rest(at + 1, end).text : end;
+    if (at == end || (*at != '"' && *at != '\'')) {
+        return 0.0;
+    }
+    char text[64];
+    const char *stop = memchr(at + 1, *at, (size_t)(end - at - 1));
+    const size_t size = stop != NULL ? (size_t)(stop - at - 1) : sizeof text;
+    if (size >= sizeof text || vshi_token_number((vshi_token){at + 1, size}) != VSHI_NUMBER_FINITE) {
+        return 0.0;
+    }
+    memcpy(text, at + 1, size);
+    text[size] = '\0';
+    return strtod(text, NULL);
+}
+
+static vsh_result scan_dae(vshi_assimp *scan) {
+    static const char open[] = "<unit";
+    const char *end = scan->text + scan->size;
+    const char *tag = memmem(scan->text, scan->size, open, sizeof open - 1);
+    const char *stop = tag != NULL ? memchr(tag, '>', (size_t)(end - tag)) : NULL;
+    const double metres = stop != NULL ? read_metres(tag, stop) : 1.0;
+    scan->unit = metres > 0.0 && metres < 1e12 ? metres : 1.0; /* the format's own: a metre */
+    return VSH_OK;
+}
+
+vsh_result vshi_assimp_look(vshi_assimp *scan, const char *text, size_t size, vsh_error *error) {
+    const char *ending = vshi_path_ending(scan->path);
+    scan->text = text;
+    scan->size = size;
+    return strcasecmp(ending, "stl") == 0   ? scan_stl(scan, error)
+           : strcasecmp(ending, "dae") == 0 ? scan_dae(scan)
+                                            : VSH_OK;
+}
+
+/* --- its scene */
 
 typedef struct skin_node {
     const char *name;
@@ -21,7 +140,7 @@ typedef struct skin_node {
 
 /* The nodes and meshes of a scene. Begin with `source`, the rest 0. */
 typedef struct scene_skins {
-    const vshi_model_source *source;
+    const vshi_assimp *source;
     double root[12];  /* in front of the scene's own root */
     skin_node *nodes; /* by their names; NULL: not yet looked for */
     size_t node_count;
@@ -70,7 +189,7 @@ static int by_name(const void *a, const void *b) {
 }
 
 static vsh_result find_nodes(scene_skins *skins, vsh_error *error) {
-    const vshi_model_source *source = skins->source;
+    const vshi_assimp *source = skins->source;
     const size_t count = count_nodes(source->scene->mRootNode, 0);
     VSHI_TRY(vshi_allocate((void **)&skins->done, source->scene->mNumMeshes, sizeof *skins->done,
                            source->path, error));
@@ -102,10 +221,9 @@ static vsh_result add_bone(const scene_skins *skins, const struct aiBone *bone, 
     return VSH_OK;
 }
 
-static vsh_result check_positions(const scene_skins *skins, const vshi_model_shape *shape, vsh_error *error) {
+static vsh_result check_moved(const scene_skins *skins, const vshi_model_shape *shape, vsh_error *error) {
     for (size_t v = 0; v < shape->vertex_count; ++v) {
-        const float *p = shape->positions + 3 * v;
-        if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2])) {
+        if (!vshi_finite(vshi_vec_off(shape->positions + 3 * v))) {
             return vshi_fail(error, VSH_ERROR_INPUT, "%s: bones move vertex %zu of %zu beyond every number",
                              skins->source->path, v, shape->vertex_count);
         }
@@ -134,15 +252,10 @@ static vsh_result apply_skin(scene_skins *skins, size_t mesh, vshi_model_shape *
         VSHI_TRY_DONE(add_bone(skins, given->mBones[i], shape->vertex_count, blends, error));
     }
     vshi_model_blend_move(shape, blends, world);
-    result = check_positions(skins, shape, error);
+    result = check_moved(skins, shape, error);
 done:
     free(blends);
     return result;
-}
-
-static void free_skins(scene_skins *skins) {
-    free(skins->nodes);
-    free(skins->done);
 }
 
 /* Most triangles that a mesh's faces make. */
@@ -155,7 +268,7 @@ static size_t count_triangles(const struct aiMesh *mesh) {
     return count;
 }
 
-static vsh_result check_size(const vshi_model_source *source, vsh_error *error) {
+static vsh_result check_size(const vshi_assimp *source, vsh_error *error) {
     double bytes = 0.0;
     for (unsigned m = 0; m < source->scene->mNumMeshes; ++m) {
         const struct aiMesh *mesh = source->scene->mMeshes[m];
@@ -173,22 +286,8 @@ static vsh_result check_size(const vshi_model_source *source, vsh_error *error) 
     return vshi_check_limit(source->run, bytes, source->path, error);
 }
 
-/* Vectors that are not finite become zero, which no direction is: flat there. Returns how many. */
-static size_t copy_normals(float *to, const struct aiVector3D *from, size_t count) {
-    size_t bad = 0;
-    for (size_t v = 0; v < count; ++v) {
-        const vshi_vec n = {from[v].x, from[v].y, from[v].z};
-        const bool good = vshi_finite(n);
-        to[3 * v] = good ? from[v].x : 0.0F;
-        to[3 * v + 1] = good ? from[v].y : 0.0F;
-        to[3 * v + 2] = good ? from[v].z : 0.0F;
-        bad += !good;
-    }
-    return bad;
-}
-
-static vsh_result copy_faces(const vshi_model_source *source, const struct aiMesh *mesh,
-                             vshi_model_shape *shape, vsh_error *error) {
+static vsh_result copy_faces(const vshi_assimp *source, const struct aiMesh *mesh, vshi_model_shape *shape,
+                             vsh_error *error) {
     vshi_face_cutter cutter = {
         .positions = shape->positions, .job = source->job, .turns = shape->triangle_count > mesh->mNumFaces};
     vsh_result result = VSH_OK;
@@ -211,8 +310,13 @@ static int32_t alpha_of(const struct aiScene *scene, const struct aiMesh *mesh) 
                : VSH_ALPHA_OPAQUE;
 }
 
-static vsh_result copy_shape(const vshi_model_source *source, const struct aiMesh *mesh,
-                             vshi_model_shape *shape, vsh_error *error) {
+/* STL's normals are those of its facets, often zero or wrong: the triangles know better. */
+static bool wants_normals(const char *path) {
+    return strcasecmp(vshi_path_ending(path), "stl") != 0;
+}
+
+static vsh_result copy_shape(const vshi_assimp *source, const struct aiMesh *mesh, vshi_model_shape *shape,
+                             vsh_error *error) {
     const char *what = source->path;
     const size_t count = mesh->mNumVertices;
     shape->vertex_count = count;
@@ -226,7 +330,7 @@ static vsh_result copy_shape(const vshi_model_source *source, const struct aiMes
     VSHI_TRY(vshi_allocate((void **)&shape->positions, count, sizeof(float[3]), what, error));
     VSHI_TRY(
         vshi_allocate((void **)&shape->indices, shape->triangle_count, sizeof(uint32_t[3]), what, error));
-    if (mesh->mNormals != NULL && source->keep_normals) {
+    if (mesh->mNormals != NULL && wants_normals(source->path)) {
         VSHI_TRY(vshi_allocate((void **)&shape->normals, count, sizeof(float[3]), what, error));
     }
     for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
@@ -235,27 +339,23 @@ static vsh_result copy_shape(const vshi_model_source *source, const struct aiMes
             VSHI_TRY(vshi_allocate((void **)&shape->uvs[set], count, sizeof(float[2]), what, error));
         }
     }
-    for (size_t v = 0; v < count; ++v) {
-        const struct aiVector3D p = mesh->mVertices[v];
-        memcpy(shape->positions + 3 * v, (float[3]){p.x, p.y, p.z}, sizeof(float[3]));
-    }
+    memcpy(shape->positions, mesh->mVertices, count * sizeof(float[3]));
     for (int set = 0; set < shape->uv_sets; ++set) {
         const struct aiVector3D *uv = mesh->mTextureCoords[set];
         for (size_t v = 0; v < count && uv != NULL; ++v) {
-            memcpy(shape->uvs[set] + 2 * v, (float[2]){uv[v].x, uv[v].y}, sizeof(float[2]));
+            memcpy(shape->uvs[set] + 2 * v, &uv[v], sizeof(float[2]));
         }
     }
     if (shape->normals != NULL) {
-        const size_t bad = copy_normals(shape->normals, mesh->mNormals, count);
-        if (bad > 0) {
-            vshi_warn(source->run, "%s: mesh '%s': %zu normals are not finite; those faces are flat", what,
-                      mesh->mName.data, bad);
-        }
+        char where[MAXLEN + 16];
+        snprintf(where, sizeof where, "mesh '%s'", mesh->mName.data);
+        memcpy(shape->normals, mesh->mNormals, count * sizeof(float[3]));
+        vshi_model_check_normals(what, source->run, where, shape);
     }
     return copy_faces(source, mesh, shape, error);
 }
 
-static vsh_result add_nodes(const vshi_model_source *source, vsh_model *model, scene_skins *skins,
+static vsh_result add_nodes(const vshi_assimp *source, vsh_model *model, scene_skins *skins,
                             const struct aiNode *node, const double parent[12], int depth, vsh_error *error) {
     enum { DEEPEST = 1024 };
     static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
@@ -293,7 +393,7 @@ static vsh_result add_nodes(const vshi_model_source *source, vsh_model *model, s
 }
 
 /* Their names; what is blended is known of each mesh. */
-static vsh_result copy_materials(const vshi_model_source *source, vsh_model *model, vsh_error *error) {
+static vsh_result copy_materials(const vshi_assimp *source, vsh_model *model, vsh_error *error) {
     const struct aiScene *scene = source->scene;
     VSHI_TRY(vshi_model_take_plain_materials(model, scene->mNumMaterials, error));
     for (size_t m = 0; m < model->shape_count; ++m) {
@@ -311,17 +411,72 @@ static vsh_result copy_materials(const vshi_model_source *source, vsh_model *mod
     return VSH_OK;
 }
 
-vsh_result vshi_model_build(const vshi_model_source *source, vsh_model **out, vsh_error *error) {
+static vsh_result check_mesh(const char *path, const struct aiMesh *mesh, unsigned place, vsh_error *error) {
+    char where[MAXLEN + 32];
+    snprintf(where, sizeof where, "mesh %u '%s'", place, mesh->mName.data);
+    VSHI_TRY(
+        vshi_model_check_positions(path, where, (const float *)mesh->mVertices, mesh->mNumVertices, error));
+    for (unsigned f = 0; f < mesh->mNumFaces; ++f) {
+        const struct aiFace *face = &mesh->mFaces[f];
+        for (unsigned k = 0; k < face->mNumIndices; ++k) {
+            if (face->mIndices[k] >= mesh->mNumVertices) {
+                return vshi_fail(error, VSH_ERROR_INPUT,
+                                 "%s: mesh %u '%s': face %u uses vertex %u, but there are only %u", path,
+                                 place, mesh->mName.data, f, face->mIndices[k], mesh->mNumVertices);
+            }
+        }
+    }
+    return VSH_OK;
+}
+
+/* How many faces have three corners or more, and how many triangles those make. */
+static void count_faces(const struct aiScene *scene, size_t *faces, size_t *triangles) {
+    *faces = *triangles = 0;
+    for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
+        const struct aiMesh *mesh = scene->mMeshes[m];
+        for (unsigned f = 0; f < mesh->mNumFaces; ++f) {
+            const unsigned corners = mesh->mFaces[f].mNumIndices;
+            *faces += corners >= 3;
+            *triangles += corners >= 3 ? corners - 2 : 0;
+        }
+    }
+}
+
+/* Everything that what follows takes for granted, and that nothing was lost on the way here. */
+static vsh_result check_scene(const char *path, const struct aiScene *scene, size_t expected, vshi_job *job,
+                              vsh_error *error) {
+    for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
+        if (vshi_job_cancelled(job)) {
+            return vshi_job_fail_cancelled(job, error);
+        }
+        VSHI_TRY(check_mesh(path, scene->mMeshes[m], m, error));
+    }
+    size_t faces, triangles;
+    count_faces(scene, &faces, &triangles);
+    if (faces < expected) {
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "%s: only %zu of its %zu faces can be read: the others use vertices out of range",
+                         path, faces, expected);
+    }
+    if (triangles == 0) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles", path);
+    }
+    return VSH_OK;
+}
+
+static vsh_result build(const vshi_assimp *source, double unit, vsh_model **out, vsh_error *error) {
     vsh_model *model = NULL;
     scene_skins skins = {.source = source};
     const struct aiScene *scene = source->scene;
+    const double metres = source->unit > 0.0 || !(unit > 0.0) ? 1.0 : unit; /* Assimp has done it */
+    const double root[12] = {metres, 0, 0, 0, 0, metres, 0, 0, 0, 0, metres, 0};
     vsh_result result;
     VSHI_TRY(check_size(source, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&model, 1, sizeof *model, source->path, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&model->shapes, scene->mNumMeshes, sizeof *model->shapes,
                                 source->path, error));
     model->shape_count = scene->mNumMeshes;
-    model->unit = source->unit;
+    model->unit = source->unit > 0.0 ? source->unit : unit;
     for (size_t m = 0; m < model->shape_count; ++m) {
         VSHI_TRY_DONE(vshi_job_cancelled(source->job)
                           ? vshi_job_fail_cancelled(source->job, error)
@@ -329,8 +484,6 @@ vsh_result vshi_model_build(const vshi_model_source *source, vsh_model **out, vs
     }
     VSHI_TRY_DONE(copy_materials(source, model, error));
     if (scene->mRootNode != NULL) {
-        const double metres = model->unit > 0.0 && !source->in_metres ? model->unit : 1.0;
-        const double root[12] = {metres, 0, 0, 0, 0, metres, 0, 0, 0, 0, metres, 0};
         memcpy(skins.root, root, sizeof root);
         VSHI_TRY_DONE(add_nodes(source, model, &skins, scene->mRootNode, root, 0, error));
     }
@@ -342,7 +495,22 @@ vsh_result vshi_model_build(const vshi_model_source *source, vsh_model **out, vs
     *out = model;
     model = NULL;
 done:
-    free_skins(&skins);
+    free(skins.nodes);
+    free(skins.done);
     vsh_model_free(model);
+    return result;
+}
+
+vsh_result vshi_assimp_read(vshi_assimp *source, size_t units, vsh_model **model, vsh_error *error) {
+    vshi_import *import = NULL;
+    vsh_result result;
+    VSHI_TRY(vshi_importers_load(error));
+    VSHI_TRY(vshi_importers()->read(source->path, source->run->allow_outside != 0, source->job, units,
+                                    &import, error));
+    source->scene = import->scene;
+    VSHI_TRY_DONE(check_scene(source->path, source->scene, source->faces, source->job, error));
+    VSHI_TRY_DONE(build(source, import->unit, model, error));
+done:
+    vshi_importers()->free(import);
     return result;
 }
