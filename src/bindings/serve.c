@@ -1,7 +1,7 @@
 /* vsh_reader_serve(): who parses each kind of file. */
 #include "levelset/serve.h"
 #include "image/planes.h"
-#include "lit/draco.h"
+#include "lit/work.h"
 #include "model/model.h"
 #include "outline/outline.h"
 

@@ -1,11 +1,9 @@
 #include "lit/document.h"
 
 #include "base/bytes.h"
-#include "base/input.h"
 #include "base/json_bytes.h"
 #include "base/memory.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,24 +17,6 @@ static double estimate_json_bytes(const char *text, size_t size) {
     }
     const size_t told = (size_t)vshi_bytes_number(text + LENGTH, 4, false);
     return vshi_json_bytes(text + HEADER, told < size - HEADER ? told : size - HEADER);
-}
-
-static vsh_result read_text(vshi_lit_document *document, size_t *size, vsh_error *error) {
-    const char *path = document->gltf.path;
-    FILE *file;
-    uint64_t bytes;
-    VSHI_TRY(vshi_input_open(path, path, SIZE_MAX / 2, &file, &bytes, error));
-    *size = (size_t)bytes;
-    vsh_result result;
-    VSHI_TRY_DONE(bytes > 0 ? vshi_gltf_take(&document->gltf, (void **)&document->text, *size, 1, error)
-                            : vshi_fail(error, VSH_ERROR_READ, "%s: is empty", path));
-    if (fread(document->text, 1, *size, file) != *size) {
-        result = vshi_fail(error, VSH_ERROR_READ, "%s: %s", path,
-                           ferror(file) ? strerror(errno) : "became shorter while it was read");
-    }
-done:
-    fclose(file);
-    return result;
 }
 
 /* Lists that are appended to, or looked through, are lists. */
@@ -65,14 +45,18 @@ vsh_result vshi_lit_open(vshi_lit_document *document, const char *path, const vs
     *document = (vshi_lit_document){.gltf = {.path = path, .run = run, .job = job}};
     vshi_gltf *gltf = &document->gltf;
     size_t size;
-    VSHI_TRY(read_text(document, &size, error));
+    VSHI_TRY(
+        vshi_gltf_read_file(gltf, path, path, SIZE_MAX / 2, (unsigned char **)&document->text, &size, error));
+    if (size == 0) {
+        return vshi_fail(error, VSH_ERROR_READ, "%s: is empty", path);
+    }
     VSHI_TRY(vshi_gltf_hold(gltf, estimate_json_bytes(document->text, size), error));
     VSHI_TRY(vshi_gltf_open(gltf, document->text, size, error));
     VSHI_TRY(check_lists(gltf, error));
     document->first_view = json_array_size(json_object_get(gltf->root, "bufferViews"));
-    json_t *images = json_object_get(gltf->root, "images");
-    document->own_images = vshi_gltf_check_copy(json_copy(images), images);
-    if (document->own_images == NULL && json_object_get(gltf->root, "images") != NULL) {
+    const json_t *images = json_object_get(gltf->root, "images");
+    document->own_images = images != NULL ? json_array() : NULL;
+    if (images != NULL && json_array_extend(document->own_images, (json_t *)(uintptr_t)images) != 0) {
         return vshi_lit_no_memory(document, error);
     }
     const size_t buffers = json_array_size(json_object_get(gltf->root, "buffers"));
@@ -107,40 +91,55 @@ vsh_result vshi_lit_no_memory(const vshi_lit_document *document, vsh_error *erro
 
 /* --- JSON */
 
-vsh_result vshi_lit_set(const vshi_lit_document *document, json_t *object, const char *key, json_t *value,
-                        vsh_error *error) {
-    return json_object_set_new(object, key, value) == 0 ? VSH_OK : vshi_lit_no_memory(document, error);
+/* Jansson frees values that it does not take, and does nothing where what it is given is NULL. */
+
+void vshi_lit_set(vshi_lit_document *document, json_t *object, const char *key, json_t *value) {
+    document->refused |= json_object_set_new(object, key, value) != 0;
 }
 
-vsh_result vshi_lit_set_number(const vshi_lit_document *document, json_t *object, const char *key,
-                               size_t number, vsh_error *error) {
-    return vshi_lit_set(document, object, key, json_integer((json_int_t)number), error);
+void vshi_lit_set_number(vshi_lit_document *document, json_t *object, const char *key, size_t number) {
+    vshi_lit_set(document, object, key, json_integer((json_int_t)number));
 }
 
-vsh_result vshi_lit_object(const vshi_lit_document *document, json_t *object, const char *key,
-                           json_t **member, vsh_error *error) {
+void vshi_lit_push(vshi_lit_document *document, json_t *list, json_t *value) {
+    document->refused |= json_array_append_new(list, value) != 0;
+}
+
+json_t *vshi_lit_numbers(vshi_lit_document *document, const double *values, size_t count) {
+    json_t *list = json_array();
+    for (size_t i = 0; i < count; ++i) {
+        vshi_lit_push(document, list, json_real(values[i]));
+    }
+    return list;
+}
+
+json_t *vshi_lit_copy_json(vshi_lit_document *document, const json_t *json) {
+    json_t *copy = json_deep_copy(json);
+    document->refused |= json != NULL && (copy == NULL || !json_equal(copy, json));
+    return copy;
+}
+
+vsh_result vshi_lit_object(vshi_lit_document *document, json_t *object, const char *key, json_t **member,
+                           vsh_error *error) {
     *member = json_object_get(object, key);
     if (*member == NULL) {
-        VSHI_TRY(vshi_lit_set(document, object, key, json_object(), error));
-        *member = json_object_get(object, key);
+        *member = json_object();
+        vshi_lit_set(document, object, key, *member);
     }
-    return json_is_object(*member) ? VSH_OK
-                                   : vshi_gltf_fail(&document->gltf, error, "a '%s' is no object", key);
+    return *member == NULL || document->refused ? vshi_lit_no_memory(document, error)
+           : json_is_object(*member)            ? VSH_OK
+                                     : vshi_gltf_fail(&document->gltf, error, "a '%s' is no object", key);
 }
 
-vsh_result vshi_lit_append(vshi_lit_document *document, const char *array, json_t *value, size_t *index,
-                           vsh_error *error) {
+size_t vshi_lit_append(vshi_lit_document *document, const char *array, json_t *value) {
     json_t *list = json_object_get(document->gltf.root, array);
     if (list == NULL) {
-        const vsh_result result = vshi_lit_set(document, document->gltf.root, array, json_array(), error);
-        if (result != VSH_OK) {
-            json_decref(value);
-            return result;
-        }
+        list = json_array();
+        vshi_lit_set(document, document->gltf.root, array, list);
         list = json_object_get(document->gltf.root, array);
     }
-    *index = json_array_size(list);
-    return json_array_append_new(list, value) == 0 ? VSH_OK : vshi_lit_no_memory(document, error);
+    vshi_lit_push(document, list, value);
+    return json_array_size(list) - 1;
 }
 
 static size_t find_name(const json_t *list, const char *name) {
@@ -154,11 +153,10 @@ static size_t find_name(const json_t *list, const char *name) {
     return SIZE_MAX;
 }
 
-vsh_result vshi_lit_use_extension(vshi_lit_document *document, const char *name, vsh_error *error) {
-    size_t index;
-    return find_name(json_object_get(document->gltf.root, "extensionsUsed"), name) != SIZE_MAX
-               ? VSH_OK
-               : vshi_lit_append(document, "extensionsUsed", json_string(name), &index, error);
+void vshi_lit_use_extension(vshi_lit_document *document, const char *name) {
+    if (find_name(json_object_get(document->gltf.root, "extensionsUsed"), name) == SIZE_MAX) {
+        vshi_lit_append(document, "extensionsUsed", json_string(name));
+    }
 }
 
 void vshi_lit_drop_extension(vshi_lit_document *document, const char *name) {
@@ -172,23 +170,6 @@ void vshi_lit_drop_extension(vshi_lit_document *document, const char *name) {
             json_object_del(document->gltf.root, lists[i]);
         }
     }
-}
-
-vsh_result vshi_lit_grow(const vshi_lit_document *document, void *list, size_t count, size_t *capacity,
-                         size_t size, vsh_error *error) {
-    if (count < *capacity) {
-        return VSH_OK;
-    }
-    void *grown;
-    const size_t more = 2 * *capacity + 8;
-    memcpy(&grown, list, sizeof grown);
-    grown = realloc(grown, more * size);
-    if (grown == NULL) {
-        return vshi_lit_no_memory(document, error);
-    }
-    memcpy(list, &grown, sizeof grown);
-    *capacity = more;
-    return VSH_OK;
 }
 
 /* --- bytes */
@@ -230,14 +211,17 @@ vsh_result vshi_lit_add_view(vshi_lit_document *document, const void *bytes, siz
     }
     json_t *made =
         json_pack("{s:i,s:I,s:I}", "buffer", 0, "byteOffset", (json_int_t)at, "byteLength", (json_int_t)size);
-    VSHI_TRY(vshi_lit_append(document, "bufferViews", made, view, error));
+    *view = vshi_lit_append(document, "bufferViews", made);
     if (offset != NULL) {
         *offset = at;
     }
     if (stride != 0) {
-        VSHI_TRY(vshi_lit_set_number(document, made, "byteStride", stride, error));
+        vshi_lit_set_number(document, made, "byteStride", stride);
     }
-    return target != 0 ? vshi_lit_set_number(document, made, "target", (size_t)target, error) : VSH_OK;
+    if (target != 0) {
+        vshi_lit_set_number(document, made, "target", (size_t)target);
+    }
+    return document->refused ? vshi_lit_no_memory(document, error) : VSH_OK;
 }
 
 static const char *type_name(int components) {
@@ -266,12 +250,10 @@ static json_t *number(double value, int type) {
     return type == VSHI_GLTF_FLOAT ? json_real(value) : json_integer((json_int_t)value);
 }
 
-vsh_result vshi_lit_set_bounds(const vshi_lit_document *document, json_t *accessor,
-                               const vshi_gltf_accessor *values, vsh_error *error) {
+void vshi_lit_set_bounds(vshi_lit_document *document, json_t *accessor, const vshi_gltf_accessor *values) {
     json_t *low = json_array(), *high = json_array();
     const size_t each = vshi_gltf_component_size(values->type);
-    bool good = low != NULL && high != NULL;
-    for (int c = 0; good && c < values->components; ++c) {
+    for (int c = 0; c < values->components; ++c) {
         const unsigned char *at = values->at + (size_t)c * each;
         double least = component_at(at, values->type), most = least;
         for (size_t i = 1; i < values->count; ++i) {
@@ -279,12 +261,11 @@ vsh_result vshi_lit_set_bounds(const vshi_lit_document *document, json_t *access
             least = value < least ? value : least;
             most = value > most ? value : most;
         }
-        good = json_array_append_new(low, number(least, values->type)) == 0 &&
-               json_array_append_new(high, number(most, values->type)) == 0;
+        vshi_lit_push(document, low, number(least, values->type));
+        vshi_lit_push(document, high, number(most, values->type));
     }
-    const bool first = json_object_set_new(accessor, "min", low) == 0;
-    const bool second = json_object_set_new(accessor, "max", high) == 0;
-    return good && first && second ? VSH_OK : vshi_lit_no_memory(document, error);
+    vshi_lit_set(document, accessor, "min", low);
+    vshi_lit_set(document, accessor, "max", high);
 }
 
 vsh_result vshi_lit_add_floats(vshi_lit_document *document, const float *values, size_t count, int components,
@@ -296,13 +277,16 @@ vsh_result vshi_lit_add_floats(vshi_lit_document *document, const float *values,
     VSHI_TRY(vshi_lit_add_view(document, values, size, VSHI_LIT_VERTICES, 0, &view, offset, error));
     json_t *made = json_pack("{s:I,s:i,s:I,s:s}", "bufferView", (json_int_t)view, "componentType",
                              VSHI_GLTF_FLOAT, "count", (json_int_t)count, "type", type_name(components));
-    VSHI_TRY(vshi_lit_append(document, "accessors", made, accessor, error));
+    *accessor = vshi_lit_append(document, "accessors", made);
     const vshi_gltf_accessor added = {.count = count,
                                       .components = components,
                                       .type = VSHI_GLTF_FLOAT,
                                       .at = (const unsigned char *)values,
                                       .stride = (size_t)components * sizeof *values};
-    return bounds && count > 0 ? vshi_lit_set_bounds(document, made, &added, error) : VSH_OK;
+    if (bounds && count > 0) {
+        vshi_lit_set_bounds(document, made, &added);
+    }
+    return VSH_OK;
 }
 
 vsh_result vshi_lit_add_indices(vshi_lit_document *document, const uint32_t *indices, size_t count,
@@ -323,5 +307,6 @@ vsh_result vshi_lit_add_indices(vshi_lit_document *document, const uint32_t *ind
     json_t *made =
         json_pack("{s:I,s:i,s:I,s:s}", "bufferView", (json_int_t)view, "componentType",
                   shorts ? VSHI_GLTF_USHORT : VSHI_GLTF_UINT, "count", (json_int_t)count, "type", "SCALAR");
-    return vshi_lit_append(document, "accessors", made, accessor, error);
+    *accessor = vshi_lit_append(document, "accessors", made);
+    return VSH_OK;
 }

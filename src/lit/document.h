@@ -29,6 +29,7 @@ typedef struct vshi_lit_document {
     vshi_lit_range *dropped; /* [dropped_count], sorted: bytes of buffers that nothing needs any more */
     size_t dropped_count;
     json_t *own_images; /* the file's own, in their places; NULL: none */
+    bool refused;       /* memory was refused to its JSON, which lacks something: it is not to be written */
 } vshi_lit_document;
 
 /* Reads a glTF or GLB without its buffers. Close after a failure too. Errors: as vsh_model_read(). */
@@ -43,31 +44,33 @@ void vshi_lit_close(vshi_lit_document *document);
 /* VSH_ERROR_MEMORY. */
 vsh_result vshi_lit_no_memory(const vshi_lit_document *document, vsh_error *error);
 
-/* --- JSON; what is handed to them belongs to them, and may be NULL where memory is short */
+/* --- JSON. Where memory is short these set document->refused, and go on: the caller asks once. Values that
+ * are handed to them belong to them. Those and what they are put into may be NULL then. */
 
-/* Appends to an array of the root, which is made where there is none; *index is its place. Errors:
- * VSH_ERROR_INPUT (the root has something else there), VSH_ERROR_MEMORY. */
-vsh_result vshi_lit_append(vshi_lit_document *document, const char *array, json_t *value, size_t *index,
-                           vsh_error *error);
-vsh_result vshi_lit_set(const vshi_lit_document *document, json_t *object, const char *key, json_t *value,
-                        vsh_error *error);
+void vshi_lit_set(vshi_lit_document *document, json_t *object, const char *key, json_t *value);
+void vshi_lit_set_number(vshi_lit_document *document, json_t *object, const char *key, size_t number);
 
-vsh_result vshi_lit_set_number(const vshi_lit_document *document, json_t *object, const char *key,
-                               size_t number, vsh_error *error);
+/* Appends to a list. */
+void vshi_lit_push(vshi_lit_document *document, json_t *list, json_t *value);
 
-/* Member `key` of an object, which is made where there is none. Errors: VSH_ERROR_INPUT, VSH_ERROR_MEMORY. */
-vsh_result vshi_lit_object(const vshi_lit_document *document, json_t *object, const char *key,
-                           json_t **member, vsh_error *error);
+/* Appends to an array of the root, which is made where there is none. Returns the place there. */
+size_t vshi_lit_append(vshi_lit_document *document, const char *array, json_t *value);
+
+/* A new list of numbers. */
+json_t *vshi_lit_numbers(vshi_lit_document *document, const double *values, size_t count);
+
+/* A deep copy of what is not NULL. */
+json_t *vshi_lit_copy_json(vshi_lit_document *document, const json_t *json);
 
 /* Adds a name to extensionsUsed, where it is not in it. */
-vsh_result vshi_lit_use_extension(vshi_lit_document *document, const char *name, vsh_error *error);
+void vshi_lit_use_extension(vshi_lit_document *document, const char *name);
+
+/* Member `key` of an object, which is made where there is none. Errors: VSH_ERROR_INPUT, VSH_ERROR_MEMORY. */
+vsh_result vshi_lit_object(vshi_lit_document *document, json_t *object, const char *key, json_t **member,
+                           vsh_error *error);
 
 /* Takes a name out of extensionsUsed and extensionsRequired, and either away where that was its last. */
 void vshi_lit_drop_extension(vshi_lit_document *document, const char *name);
-
-/* Gives *list (a pointer to a pointer) room for one element more than `count`. Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_lit_grow(const vshi_lit_document *document, void *list, size_t count, size_t *capacity,
-                         size_t size, vsh_error *error);
 
 /* --- bytes */
 
@@ -84,9 +87,8 @@ enum { VSHI_LIT_VERTICES = 34962, VSHI_LIT_INDICES = 34963 };
 vsh_result vshi_lit_add_floats(vshi_lit_document *document, const float *values, size_t count, int components,
                                bool bounds, size_t *accessor, size_t *offset, vsh_error *error);
 
-/* Sets an accessor's least and largest values. Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_lit_set_bounds(const vshi_lit_document *document, json_t *accessor,
-                               const vshi_gltf_accessor *values, vsh_error *error);
+/* Sets an accessor's least and largest values. */
+void vshi_lit_set_bounds(vshi_lit_document *document, json_t *accessor, const vshi_gltf_accessor *values);
 
 /* Adds indices below `vertex_count`, as shorts where that lets. */
 vsh_result vshi_lit_add_indices(vshi_lit_document *document, const uint32_t *indices, size_t count,

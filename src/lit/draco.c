@@ -1,4 +1,4 @@
-#include "lit/draco.h"
+#include "lit/work.h"
 
 #include "base/memory.h"
 

@@ -44,18 +44,6 @@ static bool shears(const double m[12]) {
     return false;
 }
 
-static json_t *matrix_of(const double m[12]) {
-    json_t *list = json_array();
-    for (int i = 0; i < 16 && list != NULL; ++i) { /* by columns */
-        const double value = i % 4 < 3 ? m[4 * (i % 4) + i / 4] : i == 15 ? 1.0 : 0.0;
-        if (json_array_append_new(list, json_real(value)) != 0) {
-            json_decref(list);
-            list = NULL;
-        }
-    }
-    return list;
-}
-
 /* --- vertices */
 
 static size_t source_of(const vsh_lit_mesh *lit, size_t v) {
@@ -75,7 +63,8 @@ static vsh_result add_positions(maker *m, const vsh_mesh *mesh, const vsh_lit_me
         }
     }
     VSHI_TRY(vshi_lit_add_floats(&m->work->document, values, count, 3, true, &accessor, NULL, error));
-    return vshi_lit_set_number(&m->work->document, attributes, "POSITION", accessor, error);
+    vshi_lit_set_number(&m->work->document, attributes, "POSITION", accessor);
+    return VSH_OK;
 }
 
 /* Where a normal is none, that of the triangles around it, which is what it is shaded by here. */
@@ -113,7 +102,7 @@ static vsh_result add_normals(maker *m, const vsh_mesh *mesh, const vsh_lit_mesh
         memcpy(values + 3 * v, unit, sizeof unit);
     }
     VSHI_TRY_DONE(vshi_lit_add_floats(document, values, count, 3, false, &accessor, NULL, error));
-    result = vshi_lit_set_number(document, attributes, "NORMAL", accessor, error);
+    vshi_lit_set_number(document, attributes, "NORMAL", accessor);
 done:
     free(normals);
     return result;
@@ -131,7 +120,8 @@ static vsh_result add_set(maker *m, const float *uvs, const vsh_lit_mesh *lit, s
     }
     snprintf(name, sizeof name, "TEXCOORD_%zu", number);
     VSHI_TRY(vshi_lit_add_floats(&m->work->document, values, count, 2, false, &accessor, NULL, error));
-    return vshi_lit_set_number(&m->work->document, attributes, name, accessor, error);
+    vshi_lit_set_number(&m->work->document, attributes, name, accessor);
+    return VSH_OK;
 }
 
 static vsh_result fill(maker *m, size_t entry, const double *world, arrays *a, vsh_error *error) {
@@ -189,8 +179,7 @@ static vsh_result take_arrays(maker *m, size_t entry, const double *world, array
     *found = &m->list[m->list_count++];
     **found = (arrays){
         .mesh = world == NULL ? mesh : NULL, .lit = lit, .attributes = json_object(), .indices = SIZE_MAX};
-    return (*found)->attributes != NULL ? fill(m, entry, world, *found, error)
-                                        : vshi_lit_no_memory(&m->work->document, error);
+    return fill(m, entry, world, *found, error);
 }
 
 static vsh_result put_primitive(maker *m, size_t entry, arrays *a, json_t *made, json_t *list,
@@ -218,8 +207,9 @@ static vsh_result put_primitive(maker *m, size_t entry, arrays *a, json_t *made,
             VSHI_TRY(
                 vshi_lit_add_indices(document, corners, 3 * mesh->triangle_count, count, &a->indices, error));
         }
-        VSHI_TRY(vshi_lit_set_number(document, made, "indices", a->indices, error));
-        return json_array_append(list, made) == 0 ? VSH_OK : vshi_lit_no_memory(document, error);
+        vshi_lit_set_number(document, made, "indices", a->indices);
+        vshi_lit_push(document, list, json_incref(made));
+        return VSH_OK;
     }
     vsh_lit_mesh shown = *lit;
     shown.triangle_count = mesh->triangle_count;
@@ -229,11 +219,7 @@ static vsh_result put_primitive(maker *m, size_t entry, arrays *a, json_t *made,
 static vsh_result add_primitive(maker *m, size_t entry, const double *world, json_t *list, vsh_error *error) {
     arrays *a;
     VSHI_TRY(take_arrays(m, entry, world, &a, error));
-    json_t *made =
-        json_pack("{s:o}", "attributes", vshi_gltf_check_copy(json_copy(a->attributes), a->attributes));
-    if (made == NULL) {
-        return vshi_lit_no_memory(&m->work->document, error);
-    }
+    json_t *made = json_pack("{s:o}", "attributes", vshi_lit_copy_json(&m->work->document, a->attributes));
     const vsh_result result = put_primitive(m, entry, a, made, list, error);
     json_decref(made);
     return result;
@@ -246,31 +232,27 @@ static vsh_result add_node(maker *m, size_t first, size_t end, json_t *nodes, vs
     const vsh_mesh *of = &m->meshes[first];
     const char *name = of->object_name != NULL ? of->object_name : of->name;
     const bool sheared = shears(of->transform);
-    json_t *list = json_array();
-    vsh_result result = list != NULL ? VSH_OK : vshi_lit_no_memory(document, error);
+    json_t *list = json_array(), *made = json_object();
+    vsh_result result = VSH_OK;
     for (size_t i = first; i < end && result == VSH_OK; ++i) {
         result = add_primitive(m, i, sheared ? of->transform : NULL, list, error);
     }
-    if (result != VSH_OK) {
-        json_decref(list);
-        return result;
-    }
-    size_t mesh, node;
-    VSHI_TRY(vshi_lit_append(document, "meshes", json_pack("{s:o}", "primitives", list), &mesh, error));
-    json_t *made = json_pack("{s:I}", "mesh", (json_int_t)mesh);
-    VSHI_TRY(vshi_lit_append(document, "nodes", made, &node, error));
+    const size_t mesh = vshi_lit_append(document, "meshes", json_pack("{s:o}", "primitives", list));
+    vshi_lit_push(document, nodes, json_integer((json_int_t)vshi_lit_append(document, "nodes", made)));
+    vshi_lit_set_number(document, made, "mesh", mesh);
     errno = 0;
     json_t *label = name != NULL ? json_string(name) : NULL; /* one that is no UTF-8 has no place there */
-    if ((label == NULL && errno == ENOMEM) ||
-        (label != NULL && json_object_set_new(made, "name", label) != 0)) {
-        return vshi_lit_no_memory(document, error);
+    if (label != NULL || errno == ENOMEM) {
+        vshi_lit_set(document, made, "name", label);
     }
     if (!sheared && memcmp(of->transform, identity, sizeof identity) != 0) {
-        VSHI_TRY(vshi_lit_set(document, made, "matrix", matrix_of(of->transform), error));
+        double columns[16] = {[15] = 1.0};
+        for (int i = 0; i < 16; ++i) {
+            columns[i] = i % 4 < 3 ? of->transform[4 * (i % 4) + i / 4] : columns[i];
+        }
+        vshi_lit_set(document, made, "matrix", vshi_lit_numbers(document, columns, 16));
     }
-    return json_array_append_new(nodes, json_integer((json_int_t)node)) == 0
-               ? VSH_OK
-               : vshi_lit_no_memory(document, error);
+    return result;
 }
 
 static vsh_result add_all(maker *m, json_t *nodes, vsh_error *error) {
@@ -291,16 +273,14 @@ vsh_result vshi_lit_from_model(vshi_lit_work *work, vsh_error *error) {
     vshi_lit_document *document = &work->document;
     maker m = {.work = work, .count = vsh_model_mesh_count(work->model)};
     json_t *nodes = json_array();
-    size_t scene;
     vsh_result result;
-    VSHI_TRY_DONE(nodes != NULL ? VSH_OK : vshi_lit_no_memory(document, error));
     VSHI_TRY_DONE(vshi_gltf_allocate(&document->gltf, (void **)&m.meshes, m.count, sizeof *m.meshes, error));
     VSHI_TRY_DONE(vshi_gltf_allocate(&document->gltf, (void **)&m.list, m.count, sizeof *m.list, error));
     for (size_t i = 0; i < m.count; ++i) {
         m.meshes[i] = vsh_model_mesh(work->model, i, 0);
     }
-    VSHI_TRY_DONE(vshi_lit_set_number(document, document->gltf.root, "scene", 0, error));
-    VSHI_TRY_DONE(vshi_lit_append(document, "scenes", json_pack("{s:O}", "nodes", nodes), &scene, error));
+    vshi_lit_set_number(document, document->gltf.root, "scene", 0);
+    vshi_lit_append(document, "scenes", json_pack("{s:O}", "nodes", nodes));
     VSHI_TRY_DONE(add_all(&m, nodes, error));
 done:
     for (size_t i = 0; i < m.list_count; ++i) {

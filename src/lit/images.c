@@ -163,23 +163,22 @@ static vsh_result encode(vshi_lit_work *work, const vsh_lit_image *image, double
 
 /* --- adding baked images */
 
-static vsh_result add_sampler(vshi_lit_work *work, size_t *sampler, vsh_error *error) {
+static void add_sampler(vshi_lit_work *work, size_t *sampler) {
     enum { LINEAR = 9729, CLAMP = 33071 };
-    /* without smaller levels: in those, charts of all kinds flow together */
-    return *sampler != SIZE_MAX
-               ? VSH_OK
-               : vshi_lit_append(&work->document, "samplers",
-                                 json_pack("{s:i,s:i,s:i,s:i}", "magFilter", LINEAR, "minFilter", LINEAR,
-                                           "wrapS", CLAMP, "wrapT", CLAMP),
-                                 sampler, error);
+    if (*sampler == SIZE_MAX) { /* without smaller levels: in those, charts of all kinds flow together */
+        *sampler = vshi_lit_append(&work->document, "samplers",
+                                   json_pack("{s:i,s:i,s:i,s:i}", "magFilter", LINEAR, "minFilter", LINEAR,
+                                             "wrapS", CLAMP, "wrapT", CLAMP));
+    }
 }
 
 static vsh_result embed_bytes(vshi_lit_work *work, const void *bytes, size_t size, json_t *image,
                               const char *type, vsh_error *error) {
     size_t view;
     VSHI_TRY(vshi_lit_add_view(&work->document, bytes, size, 0, 0, &view, NULL, error));
-    VSHI_TRY(vshi_lit_set_number(&work->document, image, "bufferView", view, error));
-    return vshi_lit_set(&work->document, image, "mimeType", json_string(type), error);
+    vshi_lit_set_number(&work->document, image, "bufferView", view);
+    vshi_lit_set(&work->document, image, "mimeType", json_string(type));
+    return VSH_OK;
 }
 
 /* The characters that a URI has as they are (RFC 3986), the others by their numbers. */
@@ -224,19 +223,8 @@ static vsh_result put_beside(vshi_lit_work *work, const vsh_lit_image *image, vs
         snprintf(mark, sizeof mark, ".%s", purpose_names[image->purpose]);
     }
     VSHI_TRY(vshi_lit_beside_name(work, mark, "png", &beside->name, error));
-    return vshi_lit_set(&work->document, made, "uri", vshi_lit_uri(beside->name), error);
-}
-
-static vsh_result add_texture(vshi_lit_work *work, const vsh_lit_image *image, json_t *made, size_t *sampler,
-                              vsh_error *error) {
-    vshi_lit_document *document = &work->document;
-    size_t index;
-    VSHI_TRY(vshi_lit_append(document, "images", json_incref(made), &index, error));
-    VSHI_TRY(add_sampler(work, sampler, error));
-    json_t *texture = json_pack("{s:I,s:I,s:o}", "sampler", (json_int_t)*sampler, "source", (json_int_t)index,
-                                "extras", vshi_lit_texture_mark(purpose_names[image->purpose]));
-    return vshi_lit_append(document, "textures", texture, &work->textures[image->purpose][image->page],
-                           error);
+    vshi_lit_set(&work->document, made, "uri", vshi_lit_uri(beside->name));
+    return VSH_OK;
 }
 
 static vsh_result add(vshi_lit_work *work, const vsh_lit_image *image, bool embed, size_t *sampler,
@@ -256,15 +244,14 @@ static vsh_result add(vshi_lit_work *work, const vsh_lit_image *image, bool embe
     snprintf(called, sizeof called, "%s%s%s", purpose_names[image->purpose], name != NULL ? " of " : "",
              name != NULL ? name : "");
     json_t *made = json_pack("{s:s}", "name", called);
-    vsh_result result = made != NULL ? VSH_OK : vshi_lit_no_memory(&work->document, error);
-    if (result == VSH_OK) {
-        result = embed ? embed_bytes(work, beside->bytes, beside->size, made, "image/png", error)
-                       : put_beside(work, image, beside, made, error);
-    }
-    if (result == VSH_OK) {
-        result = add_texture(work, image, made, sampler, error);
-    }
-    json_decref(made);
+    const vsh_result result = embed ? embed_bytes(work, beside->bytes, beside->size, made, "image/png", error)
+                                    : put_beside(work, image, beside, made, error);
+    const size_t index = vshi_lit_append(&work->document, "images", made);
+    add_sampler(work, sampler);
+    work->textures[image->purpose][image->page] = vshi_lit_append(
+        &work->document, "textures",
+        json_pack("{s:I,s:I,s:o}", "sampler", (json_int_t)*sampler, "source", (json_int_t)index, "extras",
+                  vshi_lit_texture_mark(purpose_names[image->purpose])));
     return result;
 }
 
@@ -315,27 +302,15 @@ static const char *type_of(const unsigned char *bytes, size_t size, const char *
 static vsh_result read_image(vshi_lit_work *work, const char *path, unsigned char **bytes, size_t *size,
                              vsh_error *error) {
     vshi_gltf *gltf = &work->document.gltf;
-    FILE *file;
-    uint64_t told;
-    if (!gltf->run->allow_outside && !vshi_input_is_beside(gltf->path, path)) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "it lies outside of the model's folder");
-    }
-    VSHI_TRY(vshi_input_open(path, path, UINT32_MAX, &file, &told, error));
-    *size = (size_t)told;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_gltf_take(gltf, (void **)bytes, *size + 1, 1, error));
-    if (fread(*bytes, 1, *size, file) != *size) {
-        result = vshi_fail(error, VSH_ERROR_READ, "%s: became shorter while it was read", path);
-    }
-done:
-    fclose(file);
-    return result;
+    return gltf->run->allow_outside || vshi_input_is_beside(gltf->path, path)
+               ? vshi_gltf_read_file(gltf, path, path, UINT32_MAX, bytes, size, error)
+               : vshi_fail(error, VSH_ERROR_INPUT, "it lies outside of the model's folder");
 }
 
 static vsh_result bring(vshi_lit_work *work, json_t *image, const char *uri, vsh_error *error) {
     vshi_lit_document *document = &work->document;
     unsigned char *bytes = NULL;
-    size_t size = 0, view;
+    size_t size = 0;
     vsh_error why;
     char *path = vshi_uri_path(document->gltf.path, uri);
     if (path == NULL) {
@@ -351,9 +326,7 @@ static vsh_result bring(vshi_lit_work *work, json_t *image, const char *uri, vsh
                   result == VSH_OK ? "it is of no type that is known" : why.message);
         result = VSH_OK;
     } else {
-        VSHI_TRY_DONE(vshi_lit_add_view(document, bytes, size, 0, 0, &view, NULL, error));
-        VSHI_TRY_DONE(vshi_lit_set_number(document, image, "bufferView", view, error));
-        VSHI_TRY_DONE(vshi_lit_set(document, image, "mimeType", json_string(type), error));
+        VSHI_TRY_DONE(embed_bytes(work, bytes, size, image, type, error));
         json_object_del(image, "uri");
     }
 done:

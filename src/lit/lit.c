@@ -204,7 +204,7 @@ static vsh_result add_origin(vshi_lit_work *work, vsh_error *error) {
     forget(extras);
     for (size_t i = 0; i < options->attribute_count; ++i) {
         const vsh_attribute *one = &options->attributes[i];
-        VSHI_TRY(vshi_lit_set(document, extras, one->name, text_of(one->value), error));
+        vshi_lit_set(document, extras, one->name, text_of(one->value));
     }
     return VSH_OK;
 }
@@ -344,7 +344,7 @@ static vsh_result make_document(vshi_lit_work *work, vshi_lit_uses *uses, vsh_er
 static vsh_result make(void *user, vsh_error *error) {
     vshi_lit_work *work = user;
     vshi_lit_besides besides = {NULL, 0};
-    vshi_lit_uses uses = {.accessors = NULL};
+    vshi_lit_uses uses = {.count = {0}};
     const int32_t place = work->options->image_place;
     const bool glb = strcasecmp(vshi_path_ending(work->output), "glb") == 0;
     const bool embed = place == VSH_LIT_IMAGES_EMBED || (place == VSH_LIT_IMAGES_AUTO && glb);
@@ -357,7 +357,8 @@ static vsh_result make(void *user, vsh_error *error) {
         VSHI_TRY_DONE(bring_images(work, error)); /* there may be fewer now */
         VSHI_TRY_DONE(add_origin(work, error));
     }
-    VSHI_TRY_DONE(vshi_lit_write_files(work, &besides, error));
+    VSHI_TRY_DONE(work->document.refused ? vshi_lit_no_memory(&work->document, error)
+                                         : vshi_lit_write_files(work, &besides, error));
 done:
     vshi_lit_uses_free(&uses);
     vshi_lit_besides_free(&besides);
@@ -365,19 +366,11 @@ done:
 }
 
 static void free_work(vshi_lit_work *work) {
-    for (size_t i = 0; i < work->shape_count; ++i) {
-        for (size_t k = 0; k < work->shapes[i].split_count; ++k) {
-            vshi_lit_gathered_free(&work->shapes[i].splits[k].gathered);
-        }
-        free(work->shapes[i].splits);
-        vshi_lit_topology_free(&work->shapes[i].topology);
-    }
-    free(work->shapes);
+    vshi_lit_shapes_free(work);
     for (size_t i = 0; i < work->looks.count; ++i) {
         json_decref(work->looks.list[i].transform);
     }
     free(work->looks.list);
-    vshi_lit_uv_pool_free(&work->pool);
     vshi_lit_dracos_free(&work->dracos);
     for (int purpose = 0; purpose < VSH_LIT_PURPOSES; ++purpose) {
         free(work->textures[purpose]);
@@ -392,16 +385,14 @@ static vsh_result try_mesh(vshi_lit_work *work, size_t entry, vsh_error *error) 
     const vshi_model_origin *origin = &work->model->entries[entry].origin;
     const size_t mesh = (size_t)origin->mesh - 1, primitive = (size_t)origin->primitive - 1;
     const json_t *of = vshi_gltf_element(&work->document.gltf, "meshes", mesh);
-    json_t *copy = vshi_gltf_copy(json_array_get(json_object_get(of, "primitives"), primitive));
+    json_t *copy =
+        vshi_lit_copy_json(&work->document, json_array_get(json_object_get(of, "primitives"), primitive));
     char where[96];
     size_t set;
     snprintf(where, sizeof where, "meshes[%zu].primitives[%zu]", mesh, primitive);
-    if (copy == NULL) {
-        return vshi_lit_no_memory(&work->document, error);
-    }
     const vsh_result result = vshi_lit_choose_set(work, copy, &work->meshes[entry], where, &set, error);
     json_decref(copy);
-    return result;
+    return work->document.refused ? vshi_lit_no_memory(&work->document, error) : result;
 }
 
 static vsh_result try_all(void *user, vsh_error *error) {

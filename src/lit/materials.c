@@ -24,8 +24,8 @@ static vsh_result find_look(vshi_lit_work *work, const vshi_lit_look *wanted, si
             return VSH_OK;
         }
     }
-    VSHI_TRY(vshi_lit_grow(&work->document, &looks->list, looks->count, &looks->capacity, sizeof *looks->list,
-                           error));
+    VSHI_TRY(vshi_model_grow(&looks->list, looks->count, &looks->capacity, sizeof *looks->list,
+                             work->document.gltf.path, error));
     looks->list[looks->count++] = *wanted;
     json_incref(wanted->transform);
     return VSH_OK;
@@ -38,7 +38,8 @@ static vsh_result mark(vshi_lit_work *work, json_t *owner, uint32_t page, size_t
     VSHI_TRY(vshi_gltf_index(&work->document.gltf, owner, "material", "materials", "a primitive",
                              &look.material, error));
     VSHI_TRY(find_look(work, &look, &index, error));
-    return vshi_lit_set(&work->document, owner, "material", json_integer(-1 - (json_int_t)index), error);
+    vshi_lit_set(&work->document, owner, "material", json_integer(-1 - (json_int_t)index));
+    return VSH_OK;
 }
 
 vsh_result vshi_lit_mark_primitive(vshi_lit_work *work, json_t *primitive, uint32_t page, size_t set,
@@ -71,57 +72,52 @@ static json_t *texture_info(const vshi_lit_work *work, int purpose, const vshi_l
                                                "extensions", transform_name, look->transform);
 }
 
-static vsh_result set_occlusion(vshi_lit_work *work, json_t *material, const vshi_lit_look *look,
-                                vsh_error *error) {
-    return vshi_lit_set(&work->document, material, "occlusionTexture",
-                        texture_info(work, VSH_LIT_OCCLUSION, look), error);
-}
-
-static vsh_result set_lightmap(vshi_lit_work *work, json_t *material, const vshi_lit_look *look,
-                               vsh_error *error) {
-    vshi_lit_document *document = &work->document;
-    json_t *extensions;
-    VSHI_TRY(vshi_lit_object(document, material, "extensions", &extensions, error));
-    json_t *info = texture_info(work, VSH_LIT_LIGHTMAP, look);
-    VSHI_TRY(vshi_lit_set(document, extensions, "MOZ_lightmap", info, error));
-    VSHI_TRY(vshi_lit_set(document, info, "intensity", json_real(work->intensities[look->page]), error));
-    return vshi_lit_use_extension(document, "MOZ_lightmap", error);
-}
-
 bool vshi_lit_is_cut_by_texture(const json_t *material) {
     const char *mode = json_string_value(json_object_get(material, "alphaMode"));
     return mode != NULL && strcmp(mode, "OPAQUE") != 0 &&
            json_object_get(json_object_get(material, "pbrMetallicRoughness"), "baseColorTexture") != NULL;
 }
 
+static vsh_result set_lightmap(vshi_lit_work *work, json_t *material, const vshi_lit_look *look,
+                               vsh_error *error) {
+    json_t *extensions;
+    VSHI_TRY(vshi_lit_object(&work->document, material, "extensions", &extensions, error));
+    json_t *info = texture_info(work, VSH_LIT_LIGHTMAP, look);
+    vshi_lit_set(&work->document, info, "intensity", json_real(work->intensities[look->page]));
+    vshi_lit_set(&work->document, extensions, "MOZ_lightmap", info);
+    vshi_lit_use_extension(&work->document, "MOZ_lightmap");
+    return VSH_OK;
+}
+
 static vsh_result set_preview(vshi_lit_work *work, json_t *material, const vshi_lit_look *look,
                               vsh_error *error) {
-    vshi_lit_document *document = &work->document;
     json_t *base, *extensions;
     if (vshi_lit_is_cut_by_texture(material)) {
         return VSH_OK;
     }
-    VSHI_TRY(vshi_lit_object(document, material, "pbrMetallicRoughness", &base, error));
-    VSHI_TRY(vshi_lit_object(document, material, "extensions", &extensions, error));
-    VSHI_TRY(
-        vshi_lit_set(document, base, "baseColorTexture", texture_info(work, VSH_LIT_PREVIEW, look), error));
-    VSHI_TRY(vshi_lit_set(document, extensions, "KHR_materials_unlit", json_object(), error));
-    return vshi_lit_use_extension(document, "KHR_materials_unlit", error);
+    VSHI_TRY(vshi_lit_object(&work->document, material, "pbrMetallicRoughness", &base, error));
+    VSHI_TRY(vshi_lit_object(&work->document, material, "extensions", &extensions, error));
+    vshi_lit_set(&work->document, base, "baseColorTexture", texture_info(work, VSH_LIT_PREVIEW, look));
+    vshi_lit_set(&work->document, extensions, "KHR_materials_unlit", json_object());
+    vshi_lit_use_extension(&work->document, "KHR_materials_unlit");
+    return VSH_OK;
 }
 
 static vsh_result dress(vshi_lit_work *work, json_t *material, const vshi_lit_look *look, vsh_error *error) {
-    static vsh_result (*const purposes[VSH_LIT_PURPOSES])(vshi_lit_work *, json_t *, const vshi_lit_look *,
-                                                          vsh_error *) = {
-        [VSH_LIT_OCCLUSION] = set_occlusion,
-        [VSH_LIT_LIGHTMAP] = set_lightmap,
-        [VSH_LIT_PREVIEW] = set_preview,
-    };
-    for (int purpose = 0; purpose < VSH_LIT_PURPOSES; ++purpose) {
-        if (work->textures[purpose][look->page] != SIZE_MAX) {
-            VSHI_TRY(purposes[purpose](work, material, look, error));
-        }
+    if (work->textures[VSH_LIT_OCCLUSION][look->page] != SIZE_MAX) {
+        vshi_lit_set(&work->document, material, "occlusionTexture",
+                     texture_info(work, VSH_LIT_OCCLUSION, look));
     }
-    return look->transform != NULL ? vshi_lit_use_extension(&work->document, transform_name, error) : VSH_OK;
+    if (work->textures[VSH_LIT_LIGHTMAP][look->page] != SIZE_MAX) {
+        VSHI_TRY(set_lightmap(work, material, look, error));
+    }
+    if (work->textures[VSH_LIT_PREVIEW][look->page] != SIZE_MAX) {
+        VSHI_TRY(set_preview(work, material, look, error));
+    }
+    if (look->transform != NULL) {
+        vshi_lit_use_extension(&work->document, transform_name);
+    }
+    return VSH_OK;
 }
 
 /* --- who shows them */
@@ -169,6 +165,7 @@ static vsh_result find_unlit(vshi_lit_work *work, json_t *owner, void *user, vsh
 
 static vsh_result put(vshi_lit_work *work, json_t *owner, void *user, vsh_error *error) {
     (void)user;
+    (void)error;
     const size_t look = look_of(work, owner);
     if (look == SIZE_MAX) {
         return VSH_OK;
@@ -176,9 +173,10 @@ static vsh_result put(vshi_lit_work *work, json_t *owner, void *user, vsh_error 
     const size_t made = work->looks.list[look].made;
     if (made == SIZE_MAX) {
         json_object_del(owner, "material"); /* it had none */
-        return VSH_OK;
+    } else {
+        vshi_lit_set_number(&work->document, owner, "material", made);
     }
-    return vshi_lit_set_number(&work->document, owner, "material", made, error);
+    return VSH_OK;
 }
 
 static vsh_result check(vshi_lit_work *work, json_t *owner, void *user, vsh_error *error) {
@@ -197,27 +195,26 @@ vsh_result vshi_lit_materials_check(vshi_lit_work *work, vsh_error *error) {
 static vsh_result make(vshi_lit_work *work, vshi_lit_look *look, bool *taken, json_t **dressed,
                        vsh_error *error) {
     vshi_lit_document *document = &work->document;
-    json_t *material = look->material != SIZE_MAX
-                           ? vshi_gltf_copy(vshi_gltf_element(&document->gltf, "materials", look->material))
-                           : json_object();
-    if (material == NULL) {
-        return vshi_lit_no_memory(document, error);
-    }
+    json_t *material =
+        look->material != SIZE_MAX
+            ? vshi_lit_copy_json(document, vshi_gltf_element(&document->gltf, "materials", look->material))
+            : json_object();
     const vsh_result result =
         json_is_object(material)
             ? dress(work, material, look, error)
             : vshi_gltf_fail(&document->gltf, error, "materials[%zu] is no object", look->material);
     if (result != VSH_OK) {
         json_decref(material);
-        return result;
+        return document->refused || material == NULL ? vshi_lit_no_memory(document, error) : result;
     }
     if (look->material != SIZE_MAX && !taken[look->material]) {
         taken[look->material] = true;
         dressed[look->material] = material; /* not before all have been copied from what was there */
         look->made = look->material;
-        return VSH_OK;
+    } else {
+        look->made = vshi_lit_append(document, "materials", material);
     }
-    return vshi_lit_append(document, "materials", material, &look->made, error);
+    return VSH_OK;
 }
 
 static vsh_result make_all(vshi_lit_work *work, size_t count, bool *taken, json_t **dressed,
@@ -240,9 +237,7 @@ static vsh_result make_all(vshi_lit_work *work, size_t count, bool *taken, json_
     }
     json_t *materials = json_object_get(work->document.gltf.root, "materials");
     for (size_t m = 0; m < count; ++m) {
-        if (dressed[m] != NULL && json_array_set(materials, m, dressed[m]) != 0) {
-            return vshi_lit_no_memory(&work->document, error);
-        }
+        work->document.refused |= dressed[m] != NULL && json_array_set(materials, m, dressed[m]) != 0;
     }
     return visit_all(work, put, NULL, error);
 }

@@ -7,11 +7,6 @@
 
 static const char instancing_name[] = "EXT_mesh_gpu_instancing";
 
-static const struct {
-    const char *attribute, *key;
-    int components;
-} parts[3] = {{"TRANSLATION", "translation", 3}, {"ROTATION", "rotation", 4}, {"SCALE", "scale", 3}};
-
 /* A mesh as one node (or one instance) shows it: entries of the model, which are its primitives. */
 typedef struct use {
     size_t node, mesh;
@@ -101,11 +96,11 @@ static vsh_result count_instances(vshi_lit_work *work, size_t node, size_t *coun
     const json_t *attributes = json_object_get(
         vshi_gltf_extension(vshi_gltf_element(gltf, "nodes", node), instancing_name), "attributes");
     *count = 0;
-    for (size_t k = 0; k < sizeof parts / sizeof parts[0] && *count == 0; ++k) {
+    for (int k = 0; k < VSHI_GLTF_PARTS && *count == 0; ++k) {
         size_t index;
         vshi_gltf_accessor accessor;
-        VSHI_TRY(vshi_gltf_index(gltf, attributes, parts[k].attribute, "accessors", instancing_name, &index,
-                                 error));
+        VSHI_TRY(vshi_gltf_index(gltf, attributes, vshi_gltf_parts[k].attribute, "accessors", instancing_name,
+                                 &index, error));
         if (index != SIZE_MAX) {
             VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
             *count = accessor.count;
@@ -167,8 +162,9 @@ static vsh_result make_primitives(vshi_lit_work *work, const use *u, json_t *lis
         if (next < u->first + u->count && work->model->entries[next].origin.primitive == p + 1) {
             VSHI_TRY(vshi_lit_primitive_make(work, u->mesh, p, next, list, error));
             ++next;
-        } else if (json_array_append_new(list, vshi_gltf_copy(json_array_get(primitives, p))) != 0) {
-            return vshi_lit_no_memory(&work->document, error);
+        } else {
+            vshi_lit_push(&work->document, list,
+                          vshi_lit_copy_json(&work->document, json_array_get(primitives, p)));
         }
     }
     return VSH_OK;
@@ -181,17 +177,10 @@ static vsh_result make_mesh(vshi_lit_work *work, uses *all, use *u, vsh_error *e
         u->made = alike->made;
         return VSH_OK;
     }
-    json_t *old = json_array_get(json_object_get(document->gltf.root, "meshes"), u->mesh);
-    json_t *mesh = vshi_gltf_check_copy(json_copy(old), old);
+    json_t *mesh = vshi_lit_copy_json(document, vshi_gltf_element(&document->gltf, "meshes", u->mesh));
     json_t *list = json_array();
-    vsh_result result = mesh != NULL && list != NULL ? VSH_OK : vshi_lit_no_memory(document, error);
-    if (result == VSH_OK) {
-        result = make_primitives(work, u, list, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_lit_set(document, mesh, "primitives", json_incref(list), error);
-    }
-    json_decref(list);
+    const vsh_result result = make_primitives(work, u, list, error);
+    vshi_lit_set(document, mesh, "primitives", list);
     if (result != VSH_OK) {
         json_decref(mesh);
         return result;
@@ -199,60 +188,52 @@ static vsh_result make_mesh(vshi_lit_work *work, uses *all, use *u, vsh_error *e
     if (all->unlit[u->mesh] == 0 && all->changed[u->mesh] == NULL) {
         all->changed[u->mesh] = mesh; /* put there when all have been made of what it was */
         u->made = u->mesh;
-        return VSH_OK;
+    } else {
+        u->made = vshi_lit_append(document, "meshes", mesh);
     }
-    return vshi_lit_append(document, "meshes", mesh, &u->made, error);
+    return VSH_OK;
 }
 
 /* --- instances */
 
-static json_t *numbers(const float *values, int part) {
+static json_t *numbers(vshi_lit_document *document, const float *values, int part) {
     enum { ROTATION = 1 };
     static const double unit_slack = 1e-5;
-    json_t *list = json_array();
-    double scale = 1.0;
+    double scale = 1.0, scaled[4];
     if (part == ROTATION) { /* integers are not quite of unit length, and viewers want that */
         double square = 0.0;
         for (int c = 0; c < 4; ++c) {
             square += (double)values[c] * (double)values[c];
         }
         if (!(square > 0.0)) {
-            json_decref(list);
             return json_pack("[i,i,i,i]", 0, 0, 0, 1);
         }
         scale = fabs(square - 1.0) < unit_slack ? 1.0 : 1.0 / sqrt(square);
     }
-    for (int c = 0; c < parts[part].components && list != NULL; ++c) {
-        if (json_array_append_new(list, json_real((double)values[c] * scale)) != 0) {
-            json_decref(list);
-            list = NULL;
-        }
+    for (int c = 0; c < vshi_gltf_parts[part].components; ++c) {
+        scaled[c] = (double)values[c] * scale;
     }
-    return list;
+    return vshi_lit_numbers(document, scaled, (size_t)vshi_gltf_parts[part].components);
 }
 
-static vsh_result add_instance(vshi_lit_work *work, const json_t *node, size_t node_index, size_t instance,
-                               size_t mesh, float *const values[3], json_t *children, vsh_error *error) {
+static void add_instance(vshi_lit_work *work, const json_t *node, size_t node_index, size_t instance,
+                         size_t mesh, float *const values[VSHI_GLTF_PARTS], json_t *children) {
     vshi_lit_document *document = &work->document;
     const char *given = json_string_value(json_object_get(node, "name"));
-    size_t index;
     json_t *name = given != NULL && given[0] != '\0' ? json_sprintf("%s[%zu]", given, instance)
                                                      : json_sprintf("nodes[%zu][%zu]", node_index, instance);
     json_t *made = json_pack("{s:o,s:I}", "name", name, "mesh", (json_int_t)mesh);
-    VSHI_TRY(vshi_lit_append(document, "nodes", made, &index, error));
-    for (int k = 0; k < 3; ++k) {
+    vshi_lit_push(document, children, json_integer((json_int_t)vshi_lit_append(document, "nodes", made)));
+    for (int k = 0; k < VSHI_GLTF_PARTS; ++k) {
         if (values[k] != NULL) {
-            const float *own = values[k] + (size_t)parts[k].components * instance;
-            VSHI_TRY(vshi_lit_set(document, made, parts[k].key, numbers(own, k), error));
+            const float *own = values[k] + (size_t)vshi_gltf_parts[k].components * instance;
+            vshi_lit_set(document, made, vshi_gltf_parts[k].key, numbers(document, own, k));
         }
     }
     const json_t *weights = json_object_get(node, "weights");
     if (weights != NULL) {
-        VSHI_TRY(vshi_lit_set(document, made, "weights", vshi_gltf_copy(weights), error));
+        vshi_lit_set(document, made, "weights", vshi_lit_copy_json(document, weights));
     }
-    return json_array_append_new(children, json_integer((json_int_t)index)) == 0
-               ? VSH_OK
-               : vshi_lit_no_memory(document, error);
 }
 
 /* Instances become children of their node; `first` … `end` - 1 are those that the model has. */
@@ -261,22 +242,17 @@ static vsh_result add_instances(vshi_lit_work *work, const uses *all, size_t fir
     vshi_gltf *gltf = &work->document.gltf;
     const use *of = &all->list[first];
     const json_t *node = vshi_gltf_element(gltf, "nodes", of->node);
-    const json_t *attributes = json_object_get(vshi_gltf_extension(node, instancing_name), "attributes");
-    float *values[3] = {NULL, NULL, NULL};
-    vsh_result result = VSH_OK;
-    for (int k = 0; result == VSH_OK && k < 3; ++k) {
-        result = vshi_gltf_read_attribute(gltf, attributes, parts[k].attribute, parts[k].components, count,
-                                          instancing_name, &values[k], error);
-    }
+    float *values[VSHI_GLTF_PARTS] = {NULL};
+    vsh_result result = vshi_gltf_read_instances(gltf, vshi_gltf_extension(node, instancing_name),
+                                                 instancing_name, values, &count, error);
     for (size_t i = 0, next = first; result == VSH_OK && i < count; ++i) {
         const bool has = next < end && all->list[next].instance == i;
         const size_t mesh = has && all->list[next].lit ? all->list[next].made : of->mesh;
         next += has;
-        result = vshi_job_cancelled(gltf->job)
-                     ? vshi_job_fail_cancelled(gltf->job, error)
-                     : add_instance(work, node, of->node, i, mesh, values, children, error);
+        add_instance(work, node, of->node, i, mesh, values, children);
+        result = vshi_job_cancelled(gltf->job) ? vshi_job_fail_cancelled(gltf->job, error) : VSH_OK;
     }
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < VSHI_GLTF_PARTS; ++k) {
         free(values[k]);
     }
     return result;
@@ -289,8 +265,8 @@ static vsh_result expand(vshi_lit_work *work, const uses *all, size_t first, siz
     size_t count;
     VSHI_TRY(count_instances(work, all->list[first].node, &count, error));
     if (children == NULL) {
-        VSHI_TRY(vshi_lit_set(document, node, "children", json_array(), error));
-        children = json_object_get(node, "children");
+        children = json_array();
+        vshi_lit_set(document, node, "children", children);
     }
     VSHI_TRY(add_instances(work, all, first, end, count, children, error));
     json_t *extensions = json_object_get(node, "extensions");
@@ -323,7 +299,8 @@ static vsh_result give(vshi_lit_work *work, const uses *all, size_t first, size_
         return expand(work, all, first, end, error);
     }
     json_t *node = json_array_get(json_object_get(document->gltf.root, "nodes"), of->node);
-    return vshi_lit_set_number(document, node, "mesh", of->made, error);
+    vshi_lit_set_number(document, node, "mesh", of->made);
+    return VSH_OK;
 }
 
 static vsh_result make_all(vshi_lit_work *work, uses *all, vsh_error *error) {
@@ -344,9 +321,7 @@ static vsh_result make_all(vshi_lit_work *work, uses *all, vsh_error *error) {
     }
     json_t *meshes = json_object_get(gltf->root, "meshes");
     for (size_t m = 0; m < all->mesh_count; ++m) {
-        if (all->changed[m] != NULL && json_array_set(meshes, m, all->changed[m]) != 0) {
-            return vshi_lit_no_memory(&work->document, error);
-        }
+        work->document.refused |= all->changed[m] != NULL && json_array_set(meshes, m, all->changed[m]) != 0;
     }
     return VSH_OK;
 }

@@ -5,7 +5,6 @@
 #include "base/vec.h"
 
 #include <inttypes.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
@@ -34,65 +33,24 @@ vsh_result vshi_lit_obj_check(const vshi_lit_work *work, vsh_error *error) {
 
 /* --- text */
 
-typedef struct text {
-    vshi_lit_put *put;
-    void *file;
-    size_t used;
-    char buffer[1 << 14];
-} text;
-
-enum { LONGEST = 512 /* bytes that one call of say() comes to at most */ };
-
-static void flush(text *t) {
-    t->put(t->file, t->buffer, t->used);
-    t->used = 0;
-}
-
-__attribute__((format(printf, 2, 3))) static void say(text *t, const char *format, ...) {
-    if (sizeof t->buffer - t->used < LONGEST) {
-        flush(t);
-    }
-    va_list values;
-    va_start(values, format);
-    t->used += (size_t)vsnprintf(t->buffer + t->used, LONGEST, format, values);
-    va_end(values);
-}
-
-/* A line of words that may be long, as they are; NULL behind the last. */
-static void say_words(text *t, const char *const *words) {
-    for (; *words != NULL; ++words) {
-        for (const char *c = *words; *c != '\0'; ++c) {
-            say(t, "%c", *c);
-        }
-    }
-    say(t, "\n");
-}
-
 /* A name as OBJ has them: no blanks, no control characters. */
-static void say_name(text *t, const char *keyword, const char *name) {
-    say(t, "%s ", keyword);
+static void put_name(FILE *to, const char *keyword, const char *name) {
+    fprintf(to, "%s ", keyword);
     for (; *name != '\0'; ++name) {
-        say(t, "%c", (unsigned char)*name <= ' ' || *name == 0x7f ? '_' : *name);
+        fputc((unsigned char)*name <= ' ' || *name == 0x7f ? '_' : *name, to);
     }
-    say(t, "\n");
+    fputc('\n', to);
 }
 
 /* The material of a page: it has the page's name, or its number. */
-static void say_page(text *t, const vshi_lit_work *work, const char *keyword, size_t page) {
+static void put_page(FILE *to, const vshi_lit_work *work, const char *keyword, size_t page) {
     const vsh_lit_options *options = work->options;
     const char *name = page < options->page_count ? options->page_names[page] : NULL;
     if (name != NULL) {
-        say_name(t, keyword, name);
+        put_name(to, keyword, name);
     } else {
-        say(t, "%s page_%zu\n", keyword, page);
+        fprintf(to, "%s page_%zu\n", keyword, page);
     }
-}
-
-static void begin(text *t, vshi_lit_put *put, void *file) {
-    t->put = put;
-    t->file = file;
-    t->used = 0;
-    say(t, "%s%s\n", FIRST_LINE, VSHI_VERSION);
 }
 
 /* --- meshes */
@@ -121,136 +79,131 @@ static placed place(const vshi_lit_work *work, size_t index) {
     return p;
 }
 
-static void put_names(text *t, const vsh_mesh *mesh, const vsh_mesh *before, size_t index) {
+static void put_names(FILE *to, const vsh_mesh *mesh, const vsh_mesh *before, size_t index) {
     const char *name = mesh->name != NULL && mesh->name[0] != '\0' ? mesh->name : NULL;
     const char *object = mesh->object_name != NULL && mesh->object_name[0] != '\0' ? mesh->object_name : name;
     const bool again = before != NULL && mesh->object != 0 && before->object == mesh->object;
     if (object == NULL) {
-        say(t, "o mesh_%zu\n", index);
+        fprintf(to, "o mesh_%zu\n", index);
         return;
     }
     if (!again) {
-        say_name(t, "o", object);
+        put_name(to, "o", object);
     }
     if (name != NULL && strcmp(name, object) != 0) {
-        say_name(t, "g", name);
+        put_name(to, "g", name);
     }
 }
 
-static void put_vertices(text *t, const placed *p) {
+static void put_vertices(FILE *to, const placed *p) {
     const vsh_mesh *mesh = &p->mesh;
     for (size_t v = 0; v < mesh->vertex_count; ++v) {
         const vshi_vec at = vshi_transform_point(mesh->transform, vshi_vec_off(mesh->positions + 3 * v));
-        say(t, "v %.9g %.9g %.9g\n", at.x, at.y, at.z);
+        fprintf(to, "v %.9g %.9g %.9g\n", at.x, at.y, at.z);
     }
     for (size_t v = 0; v < p->vertex_count; ++v) {
-        say(t, "vt %.9g %.9g\n", (double)p->uvs[2 * v], (double)p->uvs[2 * v + 1]);
+        fprintf(to, "vt %.9g %.9g\n", (double)p->uvs[2 * v], (double)p->uvs[2 * v + 1]);
     }
     for (size_t v = 0; mesh->normals != NULL && v < mesh->vertex_count; ++v) {
         const vshi_vec n =
             vshi_unit(vshi_transform_normal(mesh->transform, vshi_vec_off(mesh->normals + 3 * v)));
-        say(t, "vn %.6g %.6g %.6g\n", n.x, n.y, n.z);
+        fprintf(to, "vn %.6g %.6g %.6g\n", n.x, n.y, n.z);
     }
 }
 
-static void put_face(text *t, const placed *p, size_t triangle, const counts *before) {
+static void put_face(FILE *to, const placed *p, size_t triangle, const counts *before) {
     const bool mirrored =
         vshi_transform_determinant(p->mesh.transform) < 0.0; /* faces look outwards in the world */
-    say(t, "f");
+    fprintf(to, "f");
     for (size_t i = 0; i < 3; ++i) {
         const uint32_t v = p->indices[3 * triangle + (mirrored ? 2 - i : i)];
         const uint64_t source = p->sources != NULL ? p->sources[v] : v;
-        say(t, " %" PRIu64, before->positions + source + 1);
+        fprintf(to, " %" PRIu64, before->positions + source + 1);
         if (p->uvs != NULL) {
-            say(t, "/%" PRIu64, before->uvs + v + 1);
+            fprintf(to, "/%" PRIu64, before->uvs + v + 1);
         }
         if (p->mesh.normals != NULL) {
-            say(t, p->uvs != NULL ? "/%" PRIu64 : "//%" PRIu64, before->normals + source + 1);
+            fprintf(to, p->uvs != NULL ? "/%" PRIu64 : "//%" PRIu64, before->normals + source + 1);
         }
     }
-    say(t, "\n");
+    fprintf(to, "\n");
 }
 
 /* A material where it changes; what has no place shows the first page. */
-static void put_faces(text *t, const vshi_lit_work *work, const placed *p, bool paged, const counts *before) {
+static void put_faces(FILE *to, const vshi_lit_work *work, const placed *p, bool paged,
+                      const counts *before) {
     const bool shown = p->uvs != NULL;
     uint32_t page = UINT32_MAX;
     if (paged && !shown) {
-        say(t, "usemtl unlit\n");
+        fprintf(to, "usemtl unlit\n");
     }
     for (size_t i = 0; i < p->mesh.triangle_count; ++i) {
         const uint32_t found = shown ? vshi_lit_page(work, p->lit, i) : 0;
         const uint32_t own = found != VSH_LIT_NO_CHART ? found : 0;
         if (paged && shown && own != page) {
-            say_page(t, work, "usemtl", own);
+            put_page(to, work, "usemtl", own);
             page = own;
         }
-        put_face(t, p, i, before);
+        put_face(to, p, i, before);
     }
 }
 
-vsh_result vshi_lit_put_obj(const vshi_lit_work *work, const char *mtl, vshi_lit_put *put, void *file,
-                            vsh_error *error) {
+vsh_result vshi_lit_put_obj(const vshi_lit_work *work, const char *mtl, FILE *to, vsh_error *error) {
     VSHI_NUMBERS;
-    text t;
     counts before = {0, 0, 0};
     placed last = {.lit = NULL};
-    begin(&t, put, file);
+    fprintf(to, "%s%s\n", FIRST_LINE, VSHI_VERSION);
     for (size_t i = 0; i < work->options->attribute_count; ++i) {
         const vsh_attribute *one = &work->options->attributes[i];
-        say_words(&t, (const char *[]){"# ", one->name, ": ", one->value, NULL});
+        fprintf(to, "# %s: %s\n", one->name, one->value);
     }
     if (mtl != NULL) {
-        say_words(&t, (const char *[]){"mtllib ", mtl, NULL});
+        fprintf(to, "mtllib %s\n", mtl);
     }
     for (size_t i = 0; i < vsh_model_mesh_count(work->model); ++i) {
         if (vshi_job_advance(work->document.gltf.job, 1)) {
             return vshi_job_fail_cancelled(work->document.gltf.job, error);
         }
         const placed p = place(work, i);
-        put_names(&t, &p.mesh, i > 0 ? &last.mesh : NULL, i);
-        put_vertices(&t, &p);
-        put_faces(&t, work, &p, mtl != NULL || work->page_count > 1, &before);
+        put_names(to, &p.mesh, i > 0 ? &last.mesh : NULL, i);
+        put_vertices(to, &p);
+        put_faces(to, work, &p, mtl != NULL || work->page_count > 1, &before);
         before.positions += p.mesh.vertex_count;
         before.uvs += p.vertex_count;
         before.normals += p.mesh.normals != NULL ? p.mesh.vertex_count : 0;
         last = p;
     }
-    flush(&t);
     return VSH_OK;
 }
 
 /* --- materials */
 
-static void put_material(text *t, const char *image) {
-    say(t, "Ka 1 1 1\nKd 1 1 1\nKs 0 0 0\nillum 1\n");
+static void put_material(FILE *to, const char *image) {
+    fprintf(to, "Ka 1 1 1\nKd 1 1 1\nKs 0 0 0\nillum 1\n");
     static const char *const maps[] = {"map_Ka", "map_Kd"};
     for (size_t k = 0; k < sizeof maps / sizeof maps[0] && image != NULL; ++k) {
-        say_words(t, (const char *[]){maps[k], " ", image, NULL});
+        fprintf(to, "%s %s\n", maps[k], image);
     }
 }
 
-void vshi_lit_put_mtl(const vshi_lit_work *work, const vshi_lit_besides *besides, vshi_lit_put *put,
-                      void *file) {
-    text t;
-    begin(&t, put, file);
+void vshi_lit_put_mtl(const vshi_lit_work *work, const vshi_lit_besides *besides, FILE *to) {
+    fprintf(to, "%s%s\n", FIRST_LINE, VSHI_VERSION);
     for (size_t page = 0; page < work->page_count; ++page) {
         const char *image = NULL;
         for (size_t i = 0; i < besides->count; ++i) { /* in the order of the images that were given */
             image = work->options->images[i].page == page ? besides->list[i].name : image;
         }
-        say_page(&t, work, "newmtl", page);
-        put_material(&t, image);
+        put_page(to, work, "newmtl", page);
+        put_material(to, image);
     }
     bool unlit = false;
     for (size_t i = 0; i < vsh_model_mesh_count(work->model) && !unlit; ++i) {
         unlit = work->meshes[i].uvs == NULL && work->meshes[i].uv_set < 0;
     }
     if (unlit) {
-        say(&t, "newmtl unlit\n");
-        put_material(&t, NULL);
+        fprintf(to, "newmtl unlit\n");
+        put_material(to, NULL);
     }
-    flush(&t);
 }
 
 vsh_result vshi_lit_mtl_check(const char *path, vsh_error *error) {

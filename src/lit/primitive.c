@@ -1,9 +1,227 @@
 /* What becomes of a primitive: its new set of UVs, and where the atlas asks for it, vertices of its own. */
 #include "lit/work.h"
 
+#include "base/memory.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* --- vertices: which elements of a primitive's accessors they are, copies of these, and new sets of UVs */
+
+static vsh_result fail_other(const vshi_lit_document *document, const char *where, vsh_error *error) {
+    return vshi_gltf_fail(&document->gltf, error,
+                          "%s: is not what the model was made of: the file has changed since", where);
+}
+
+/* Vertices of the model are the elements that triangles use, in their order: the others are not kept. */
+static vsh_result match(vshi_lit_document *document, const uint32_t *corners, size_t count, const char *where,
+                        const vsh_mesh *mesh, vshi_lit_topology *topology, vsh_error *error) {
+    vshi_gltf *gltf = &document->gltf;
+    if (count != mesh->triangle_count || mesh->vertex_count > topology->element_count) {
+        return fail_other(document, where, error);
+    }
+    bool *used = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_gltf_allocate(gltf, (void **)&used, topology->element_count, sizeof *used, error));
+    VSHI_TRY_DONE(vshi_gltf_take(gltf, (void **)&topology->elements, mesh->vertex_count,
+                                 sizeof *topology->elements, error));
+    for (size_t i = 0; i < 3 * count; ++i) {
+        used[corners[i]] = true;
+    }
+    size_t vertices = 0;
+    for (size_t e = 0; e < topology->element_count; ++e) {
+        if (used[e] && vertices < mesh->vertex_count) {
+            topology->elements[vertices] = (uint32_t)e;
+        }
+        vertices += used[e];
+    }
+    bool equal = vertices == mesh->vertex_count;
+    for (size_t i = 0; equal && i < 3 * count; ++i) {
+        equal = mesh->indices[i] < vertices && topology->elements[mesh->indices[i]] == corners[i];
+    }
+    topology->vertex_count = vertices;
+    result = equal ? VSH_OK : fail_other(document, where, error);
+done:
+    free(used);
+    return result;
+}
+
+static vsh_result find_plain(vshi_lit_document *document, const json_t *primitive, const char *where,
+                             const vsh_mesh *mesh, vshi_lit_topology *topology, vsh_error *error) {
+    vshi_gltf *gltf = &document->gltf;
+    size_t index, count = 0;
+    vshi_gltf_accessor positions;
+    VSHI_TRY(vshi_gltf_index(gltf, json_object_get(primitive, "attributes"), "POSITION", "accessors", where,
+                             &index, error));
+    if (index == SIZE_MAX) {
+        return fail_other(document, where, error);
+    }
+    VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &positions, error));
+    topology->element_count = positions.count;
+    uint32_t *corners = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_gltf_read_triangles(gltf, primitive, topology->mode, positions.count, where, &corners,
+                                           &count, error));
+    VSHI_TRY_DONE(match(document, corners, count, where, mesh, topology, error));
+done:
+    free(corners);
+    return result;
+}
+
+/* Finds that of `primitive`, which messages call `where`, and holds it against the model's mesh. `draco` is
+ * its decoded data, NULL where it has none. Errors: VSH_ERROR_INPUT (not well formed; not what the model was
+ * made of), VSH_ERROR_READ, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+static vsh_result find_topology(vshi_lit_document *document, const json_t *primitive, const char *where,
+                                const vshi_lit_draco *draco, const vsh_mesh *mesh,
+                                vshi_lit_topology *topology, vsh_error *error) {
+    *topology = (vshi_lit_topology){.draco = draco};
+    if (!vshi_gltf_count(primitive, "mode", VSHI_GLTF_TRIANGLES, &topology->mode) ||
+        topology->mode < VSHI_GLTF_TRIANGLES || topology->mode > VSHI_GLTF_FAN) {
+        return fail_other(document, where, error);
+    }
+    if (draco == NULL) {
+        return find_plain(document, primitive, where, mesh, topology, error);
+    }
+    topology->mode =
+        VSHI_GLTF_TRIANGLES; /* Draco's triangles are lists, even if the primitive has another mode */
+    topology->element_count = draco->vertex_count;
+    return match(document, draco->indices, draco->triangle_count, where, mesh, topology, error);
+}
+
+static vsh_result find_elements(vshi_lit_document *document, size_t index, size_t element_count,
+                                const vshi_lit_draco_attribute *draco, const char *where,
+                                vshi_gltf_accessor *found, unsigned char **dense, vsh_error *error) {
+    VSHI_TRY(vshi_gltf_accessor_open(&document->gltf, index, found, error));
+    const size_t size = (size_t)found->components * vshi_gltf_component_size(found->type);
+    if (draco != NULL) {
+        found->at = draco->values;
+        found->stride = size;
+        return draco->type == found->type && draco->components == found->components
+                   ? VSH_OK
+                   : vshi_gltf_fail(&document->gltf, error, "%s: accessors[%zu] is not what was decompressed",
+                                    where, index);
+    }
+    if (found->count != element_count) {
+        return vshi_gltf_fail(&document->gltf, error, "%s: accessors[%zu] has %zu elements for %zu vertices",
+                              where, index, found->count, element_count);
+    }
+    if (found->sparse_count > 0) { /* which becomes dense */
+        VSHI_TRY(vshi_gltf_take(&document->gltf, (void **)dense, found->count, size, error));
+        vshi_gltf_accessor_bytes(found, *dense);
+        found->at = *dense;
+        found->stride = size;
+    }
+    return VSH_OK;
+}
+
+static vsh_result copy(vshi_lit_document *document, size_t index, const vshi_gltf_accessor *from,
+                       const uint32_t *chosen, size_t count, bool bounds, size_t *accessor,
+                       vsh_error *error) {
+    const size_t size = (size_t)from->components * vshi_gltf_component_size(from->type);
+    const size_t stride = (size + 3) & ~(size_t)3; /* of vertex attributes: a multiple of 4 */
+    size_t bytes, view, offset;
+    if (__builtin_mul_overflow(count, stride, &bytes)) {
+        return vshi_lit_no_memory(document, error);
+    }
+    VSHI_TRY(vshi_lit_add_view(document, NULL, bytes, VSHI_LIT_VERTICES, stride != size ? stride : 0, &view,
+                               &offset, error));
+    unsigned char *to = document->added.at + offset;
+    for (size_t i = 0; i < count && from->at != NULL; ++i) {
+        memcpy(to + i * stride, from->at + chosen[i] * from->stride, size);
+    }
+    json_t *made = vshi_lit_copy_json(document, vshi_gltf_element(&document->gltf, "accessors", index));
+    *accessor = vshi_lit_append(document, "accessors", made);
+    json_object_del(made, "byteOffset");
+    json_object_del(made, "sparse");
+    vshi_lit_set_number(document, made, "bufferView", view);
+    vshi_lit_set_number(document, made, "count", count);
+    const bool had = json_object_get(made, "min") != NULL || json_object_get(made, "max") != NULL;
+    const vshi_gltf_accessor copied = {
+        .count = count, .components = from->components, .type = from->type, .at = to, .stride = stride};
+    if ((bounds || had) && count > 0) {
+        vshi_lit_set_bounds(document, made, &copied);
+    }
+    return VSH_OK;
+}
+
+/* A new accessor of the elements chosen[count] of accessor `index`, in *gathered or from there. `draco`: its
+ * values, else NULL. `element_count` is what it must have; `bounds`: with its least and largest values
+ * whether or not it has had them. Sparse ones become dense. Errors: VSH_ERROR_INPUT, VSH_ERROR_READ,
+ * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+static vsh_result gather_elements(vshi_lit_document *document, size_t index, size_t element_count,
+                                  const vshi_lit_draco_attribute *draco, const uint32_t *chosen, size_t count,
+                                  bool bounds, const char *where, vshi_lit_gathered *gathered,
+                                  size_t *accessor, vsh_error *error) {
+    for (size_t i = 0; i < gathered->count; ++i) {
+        if (gathered->list[i].from == index) {
+            *accessor = gathered->list[i].to;
+            return VSH_OK;
+        }
+    }
+    vshi_gltf_accessor from;
+    unsigned char *dense = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(find_elements(document, index, element_count, draco, where, &from, &dense, error));
+    VSHI_TRY_DONE(copy(document, index, &from, chosen, count, bounds, accessor, error));
+    VSHI_TRY_DONE(vshi_model_grow(&gathered->list, gathered->count, &gathered->capacity,
+                                  sizeof *gathered->list, document->gltf.path, error));
+    gathered->list[gathered->count++] = (vshi_lit_copy){index, *accessor};
+done:
+    free(dense);
+    return result;
+}
+
+static unsigned char *place(const vshi_lit_document *document, const vshi_lit_uvs *uvs, uint32_t element) {
+    return document->added.at + uvs->offset + (size_t)element * sizeof(float[2]);
+}
+
+static bool fits(const vshi_lit_document *document, const vshi_lit_uvs *uvs, const uint32_t *elements,
+                 const float (*values)[2], size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+        if (uvs->set[elements[i]] &&
+            memcmp(place(document, uvs, elements[i]), values[i], sizeof values[i]) != 0) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static vsh_result add(vshi_lit_document *document, vshi_lit_uv_pool *pool, size_t positions,
+                      size_t element_count, vsh_error *error) {
+    VSHI_TRY(vshi_model_grow(&pool->list, pool->count, &pool->capacity, sizeof *pool->list,
+                             document->gltf.path, error));
+    vshi_lit_uvs *made = &pool->list[pool->count];
+    *made = (vshi_lit_uvs){.positions = positions, .count = element_count};
+    VSHI_TRY(
+        vshi_gltf_allocate(&document->gltf, (void **)&made->set, element_count, sizeof *made->set, error));
+    ++pool->count;
+    return vshi_lit_add_floats(document, NULL, element_count, 2, false, &made->accessor, &made->offset,
+                               error);
+}
+
+/* An accessor in which elements[i] (< count of elements) has values[i], v down. Elements may come twice, with
+ * the same values. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+static vsh_result put_uvs(vshi_lit_document *document, vshi_lit_uv_pool *pool, size_t positions,
+                          size_t element_count, const uint32_t *elements, const float (*values)[2],
+                          size_t count, size_t *accessor, vsh_error *error) {
+    size_t found = 0;
+    while (found < pool->count &&
+           (pool->list[found].positions != positions || pool->list[found].count != element_count ||
+            !fits(document, &pool->list[found], elements, values, count))) {
+        ++found;
+    }
+    if (found == pool->count) {
+        VSHI_TRY(add(document, pool, positions, element_count, error));
+    }
+    const vshi_lit_uvs *uvs = &pool->list[found];
+    for (size_t i = 0; i < count; ++i) {
+        memcpy(place(document, uvs, elements[i]), values[i], sizeof values[i]);
+        uvs->set[elements[i]] = true;
+    }
+    *accessor = uvs->accessor;
+    return VSH_OK;
+}
 
 /* --- primitives on several pages */
 
@@ -23,12 +241,9 @@ static uint32_t find_only_page(const vshi_lit_work *work, const vsh_lit_mesh *me
 
 static vsh_result add_copy(vshi_lit_work *work, const json_t *made, size_t indices, uint32_t page, size_t set,
                            json_t *list, vsh_error *error) {
-    vshi_lit_document *document = &work->document;
-    json_t *primitive = vshi_gltf_copy(made);
-    if (primitive == NULL || json_array_append_new(list, primitive) != 0) {
-        return vshi_lit_no_memory(document, error);
-    }
-    VSHI_TRY(vshi_lit_set_number(document, primitive, "indices", indices, error));
+    json_t *primitive = vshi_lit_copy_json(&work->document, made);
+    vshi_lit_push(&work->document, list, primitive);
+    vshi_lit_set_number(&work->document, primitive, "indices", indices);
     return vshi_lit_mark_primitive(work, primitive, page, set, NULL, error);
 }
 
@@ -251,26 +466,21 @@ static void drop_set(json_t *primitive, size_t set) {
     json_object_del(json_object_get(primitive, "attributes"), name);
 }
 
-vsh_result vshi_lit_tell_set(const vshi_lit_document *document, json_t *primitive, size_t set,
-                             vsh_error *error) {
+vsh_result vshi_lit_tell_set(vshi_lit_document *document, json_t *primitive, size_t set, vsh_error *error) {
     json_t *extras = json_object_get(primitive, "extras");
     if (extras != NULL && !json_is_object(extras)) {
         return VSH_OK; /* somebody's own, of another kind */
     }
     VSHI_TRY(vshi_lit_object(document, primitive, "extras", &extras, error));
     json_t *list = json_array();
-    bool good = list != NULL;
     const size_t count = count_sets(json_object_get(primitive, "attributes"));
     for (size_t i = 0; i <= count || i <= set; ++i) {
         if (i == set || (i < count && is_made(primitive, i))) {
-            good = good && json_array_append_new(list, json_integer((json_int_t)i)) == 0;
+            vshi_lit_push(document, list, json_integer((json_int_t)i));
         }
     }
-    if (!good) {
-        json_decref(list);
-        return vshi_lit_no_memory(document, error);
-    }
-    return vshi_lit_set(document, extras, sets_key, list, error);
+    vshi_lit_set(document, extras, sets_key, list);
+    return VSH_OK;
 }
 
 vsh_result vshi_lit_choose_set(const vshi_lit_work *work, json_t *primitive, const vsh_lit_mesh *mesh,
@@ -321,15 +531,15 @@ static vsh_result find_shape(vshi_lit_work *work, size_t mesh, size_t primitive,
     }
     if (low == work->shape_count || work->shapes[low].mesh != mesh ||
         work->shapes[low].primitive != primitive) {
-        VSHI_TRY(vshi_lit_grow(&work->document, &work->shapes, work->shape_count, &work->shape_capacity,
-                               sizeof *work->shapes, error));
+        VSHI_TRY(vshi_model_grow(&work->shapes, work->shape_count, &work->shape_capacity,
+                                 sizeof *work->shapes, work->document.gltf.path, error));
         memmove(work->shapes + low + 1, work->shapes + low, (work->shape_count - low) * sizeof *work->shapes);
         ++work->shape_count;
         work->shapes[low] = (vshi_lit_shape){.mesh = mesh, .primitive = primitive};
         const vsh_mesh view = vsh_model_mesh(work->model, entry, 0);
-        VSHI_TRY(vshi_lit_topology_find(&work->document, given, where,
-                                        vshi_lit_draco_of(&work->dracos, mesh, primitive), &view,
-                                        &work->shapes[low].topology, error));
+        VSHI_TRY(find_topology(&work->document, given, where,
+                               vshi_lit_draco_of(&work->dracos, mesh, primitive), &view,
+                               &work->shapes[low].topology, error));
     }
     *shape = &work->shapes[low];
     return vsh_model_mesh(work->model, entry, 0).vertex_count == (*shape)->topology.vertex_count
@@ -413,8 +623,8 @@ static vsh_result take_split(vshi_lit_work *work, vshi_lit_shape *shape, const v
             return VSH_OK;
         }
     }
-    VSHI_TRY(vshi_lit_grow(&work->document, &shape->splits, shape->split_count, &shape->split_capacity,
-                           sizeof *shape->splits, error));
+    VSHI_TRY(vshi_model_grow(&shape->splits, shape->split_count, &shape->split_capacity,
+                             sizeof *shape->splits, work->document.gltf.path, error));
     *split = &shape->splits[shape->split_count++];
     **split = (vshi_lit_split){.mesh = mesh, .indices = SIZE_MAX};
     return VSH_OK;
@@ -427,15 +637,15 @@ static vsh_result gather(vshi_lit_work *work, const vshi_lit_topology *topology,
     const char *name;
     json_t *value;
     json_object_foreach(attributes, name, value) {
-        size_t index, accessor;
+        size_t index, accessor = SIZE_MAX;
         VSHI_TRY(vshi_gltf_index(&work->document.gltf, attributes, name, "accessors", where, &index, error));
         const vshi_lit_draco_attribute *draco =
             topology->draco != NULL && !target ? vshi_lit_draco_attribute_of(topology->draco, primitive, name)
                                                : NULL;
-        VSHI_TRY(vshi_lit_gather(&work->document, index, topology->element_count, draco, v->elements,
+        VSHI_TRY(gather_elements(&work->document, index, topology->element_count, draco, v->elements,
                                  mesh->vertex_count, strcmp(name, "POSITION") == 0, where, &split->gathered,
                                  &accessor, error));
-        VSHI_TRY(vshi_lit_set_number(&work->document, attributes, name, accessor, error));
+        vshi_lit_set_number(&work->document, attributes, name, accessor);
     }
     return VSH_OK;
 }
@@ -465,12 +675,11 @@ static vsh_result make_split(vshi_lit_work *work, vshi_lit_shape *shape, const j
     return vshi_lit_add_floats(document, v->uvs[0], mesh->vertex_count, 2, false, uvs, NULL, error);
 }
 
-static vsh_result set_uvs(const vshi_lit_work *work, json_t *primitive, size_t accessor, size_t set,
+static vsh_result set_uvs(vshi_lit_work *work, json_t *primitive, size_t accessor, size_t set,
                           vsh_error *error) {
     char name[40];
     snprintf(name, sizeof name, "TEXCOORD_%zu", set);
-    VSHI_TRY(vshi_lit_set_number(&work->document, json_object_get(primitive, "attributes"), name, accessor,
-                                 error));
+    vshi_lit_set_number(&work->document, json_object_get(primitive, "attributes"), name, accessor);
     return vshi_lit_tell_set(&work->document, primitive, set, error);
 }
 
@@ -492,15 +701,14 @@ static vsh_result make(vshi_lit_work *work, vshi_lit_shape *shape, const json_t 
     } else {
         VSHI_TRY(vshi_gltf_index(&document->gltf, json_object_get(given, "attributes"), "POSITION",
                                  "accessors", where, &positions, error));
-        VSHI_TRY(vshi_lit_uv_pool_put(document, &work->pool, positions, shape->topology.element_count,
-                                      v->elements, (const float(*)[2])v->uvs, mesh->vertex_count, &uvs,
-                                      error));
+        VSHI_TRY(put_uvs(document, &work->pool, positions, shape->topology.element_count, v->elements,
+                         (const float(*)[2])v->uvs, mesh->vertex_count, &uvs, error));
     }
     VSHI_TRY(set_uvs(work, made, uvs, set, error));
     const uint32_t only = find_only_page(work, mesh);
     if (!v->split && only != VSH_LIT_NO_CHART) { /* its indices stay, strips too */
-        VSHI_TRY(vshi_lit_mark_primitive(work, made, only, set, NULL, error));
-        return json_array_append(list, made) == 0 ? VSH_OK : vshi_lit_no_memory(document, error);
+        vshi_lit_push(document, list, json_incref(made));
+        return vshi_lit_mark_primitive(work, made, only, set, NULL, error);
     }
     if (shape->topology.mode != VSHI_GLTF_TRIANGLES || shape->topology.draco != NULL) {
         json_object_del(made, "mode");
@@ -511,22 +719,17 @@ static vsh_result make(vshi_lit_work *work, vshi_lit_shape *shape, const json_t 
                                           &whole, list, error);
 }
 
-/* Copies the transform from the file's set to the model's UVs. *transform is in new memory; NULL: there is
- * none. */
-static vsh_result copy_transform(vshi_lit_work *work, size_t entry, const json_t *primitive, size_t set,
-                                 json_t **transform, vsh_error *error) {
+/* A copy of the transform from the file's set to the model's UVs; NULL: there is none. */
+static json_t *copy_transform(vshi_lit_work *work, size_t entry, const json_t *primitive, size_t set) {
     const vshi_model_shape *shape = &work->model->shapes[work->model->entries[entry].shape];
     size_t material;
     if ((shape->packed >> set & 1) == 0 || !vshi_gltf_count(primitive, "material", SIZE_MAX, &material)) {
-        return VSH_OK;
+        return NULL;
     }
     const vshi_gltf_unpacking u = vshi_gltf_find_unpacking(&work->document.gltf, material, set);
-    if (u.uvs != VSHI_GLTF_UVS_PACKED || u.told == NULL) {
-        return VSH_OK;
-    }
-    *transform = vshi_gltf_copy(u.told);
-    json_object_del(*transform, "texCoord"); /* the material names the set */
-    return *transform != NULL ? VSH_OK : vshi_lit_no_memory(&work->document, error);
+    json_t *transform = u.uvs == VSHI_GLTF_UVS_PACKED ? vshi_lit_copy_json(&work->document, u.told) : NULL;
+    json_object_del(transform, "texCoord"); /* the material names the set */
+    return transform;
 }
 
 /* The set is the file's own. */
@@ -540,13 +743,13 @@ static vsh_result make_kept(vshi_lit_work *work, size_t entry, const char *where
     }
     if (mesh->uv_set >= 0) {
         const size_t set = (size_t)mesh->uv_set;
-        json_t *transform = NULL;
-        VSHI_TRY(copy_transform(work, entry, made, set, &transform, error));
+        json_t *transform = copy_transform(work, entry, made, set);
         const vsh_result result = vshi_lit_mark_primitive(work, made, mesh->page, set, transform, error);
         json_decref(transform);
         VSHI_TRY(result);
     }
-    return json_array_append(list, made) == 0 ? VSH_OK : vshi_lit_no_memory(&work->document, error);
+    vshi_lit_push(&work->document, list, json_incref(made));
+    return VSH_OK;
 }
 
 vsh_result vshi_lit_primitive_make(vshi_lit_work *work, size_t mesh, size_t primitive, size_t entry,
@@ -558,13 +761,13 @@ vsh_result vshi_lit_primitive_make(vshi_lit_work *work, size_t mesh, size_t prim
     const vsh_lit_mesh *lit = &work->meshes[entry];
     vertices v = {.elements = NULL};
     vshi_lit_shape *shape = NULL;
-    json_t *made = vshi_gltf_copy(given);
-    vsh_result result = made != NULL ? VSH_OK : vshi_lit_no_memory(&work->document, error);
-    if (result == VSH_OK && lit->uvs == NULL) {
+    json_t *made = vshi_lit_copy_json(&work->document, given);
+    vsh_result result;
+    VSHI_TRY_DONE(work->document.refused ? vshi_lit_no_memory(&work->document, error) : VSH_OK);
+    if (lit->uvs == NULL) {
         result = make_kept(work, entry, where, made, list, error);
         goto done;
     }
-    VSHI_TRY_DONE(result);
     VSHI_TRY_DONE(find_shape(work, mesh, primitive, entry, given, where, &shape, error));
     VSHI_TRY_DONE(find_vertices(work, &shape->topology, lit, &v, error));
     VSHI_TRY_DONE(make(work, shape, given, lit, &v, where, made, list, error));
@@ -572,4 +775,19 @@ done:
     free_vertices(&v);
     json_decref(made);
     return result;
+}
+
+void vshi_lit_shapes_free(vshi_lit_work *work) {
+    for (size_t i = 0; i < work->shape_count; ++i) {
+        for (size_t k = 0; k < work->shapes[i].split_count; ++k) {
+            free(work->shapes[i].splits[k].gathered.list);
+        }
+        free(work->shapes[i].splits);
+        free(work->shapes[i].topology.elements);
+    }
+    free(work->shapes);
+    for (size_t i = 0; i < work->pool.count; ++i) {
+        free(work->pool.list[i].set);
+    }
+    free(work->pool.list);
 }

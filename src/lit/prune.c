@@ -5,75 +5,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Where the items first … count - 1, which are new, go. */
-typedef struct placing {
-    size_t *moved;            /* [count - first] */
-    size_t first, count, end; /* end: items that are left */
-} placing;
+/* Lists of the root, by numbers of vshi_lit_uses. */
+enum { ACCESSORS, VIEWS, TEXTURES, IMAGES, SAMPLERS };
 
-/* Finds places for the items first … count - 1, which are new: those that are gone, in order, then places
- * behind the old items. Places left at the end are cut off. Free `moved` after a failure, too. Errors:
- * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
-static vsh_result find_places(vshi_lit_document *document, const bool *gone, size_t first, size_t count,
-                              placing *places, vsh_error *error) {
-    const size_t more = count - first;
-    size_t done = 0, behind = 0; /* behind: the places that are taken */
-    *places = (placing){.first = first, .count = count};
-    VSHI_TRY(
-        vshi_gltf_allocate(&document->gltf, (void **)&places->moved, more, sizeof *places->moved, error));
-    for (size_t i = 0; i < first && done < more; ++i) {
-        if (gone[i]) {
-            places->moved[done++] = i;
-            behind = i + 1;
-        }
-    }
-    places->end = first + more - done;
-    for (size_t i = first; done < more; ++i) {
-        places->moved[done++] = i;
-    }
-    while (places->end <= first && places->end > behind && gone[places->end - 1]) {
-        --places->end;
-    }
-    return VSH_OK;
+static const char *const lists[VSHI_LIT_KINDS] = {"accessors", "bufferViews", "textures", "images",
+                                                  "samplers"};
+
+static size_t count_of(const vshi_lit_document *document, int kind) {
+    return json_array_size(json_object_get(document->gltf.root, lists[kind]));
 }
 
-/* Marks old places that are taken or cut off: taken[first]. */
-static void mark_places(const placing *places, bool *taken) {
-    for (size_t i = 0; i < places->count - places->first && places->moved[i] < places->first; ++i) {
-        taken[places->moved[i]] = true;
-    }
-    for (size_t i = places->end; i < places->first; ++i) {
-        taken[i] = true;
-    }
-}
-
-/* Sets a number that is a new item's to its new place. Errors: VSH_ERROR_MEMORY. */
-static vsh_result rename_index(const vshi_lit_document *document, const placing *places, json_t *object,
-                               const char *key, vsh_error *error) {
-    size_t index;
-    if (!vshi_gltf_count(object, key, SIZE_MAX, &index) || index < places->first || index >= places->count) {
-        return VSH_OK;
-    }
-    return vshi_lit_set_number(document, object, key, places->moved[index - places->first], error);
-}
-
-/* Moves the items of the root's list. Errors: VSH_ERROR_MEMORY. */
-static vsh_result move_items(vshi_lit_document *document, const char *name, const placing *places,
-                             vsh_error *error) {
-    json_t *list = json_object_get(document->gltf.root, name);
-    for (size_t i = places->first; i < places->count; ++i) {
-        const size_t to = places->moved[i - places->first]; /* never behind i */
-        if (to != i && json_array_set(list, to, json_array_get(list, i)) != 0) {
-            return vshi_lit_no_memory(document, error);
-        }
-    }
-    while (json_array_size(list) > places->end) {
-        json_array_remove(list, json_array_size(list) - 1);
-    }
-    if (places->end == 0 && places->count > 0) { /* glTF has no empty lists */
-        json_object_del(document->gltf.root, name);
-    }
-    return VSH_OK;
+static json_t *member(json_t *object, const char *first, const char *second) {
+    return json_object_get(json_object_get(object, first), second);
 }
 
 static const char texture_key[] = "vdbshade_texture";
@@ -82,261 +25,153 @@ json_t *vshi_lit_texture_mark(const char *purpose) {
     return json_pack("{s:s}", texture_key, purpose);
 }
 
-static bool is_made(const json_t *texture) {
-    return json_object_get(json_object_get(texture, "extras"), texture_key) != NULL;
-}
+/* --- references */
 
-static size_t count_of(const vshi_lit_document *document, const char *list) {
-    return json_array_size(json_object_get(document->gltf.root, list));
-}
+/* Called for every item of a list that `object` refers to by `key`. */
+typedef void refer_fn(vshi_lit_document *document, json_t *object, const char *key, int kind, void *user);
 
-/* --- textures that materials show */
-
-static void note_index(const json_t *object, const char *name, bool *used, size_t count) {
-    size_t index;
-    if (vshi_gltf_count(object, name, SIZE_MAX, &index) && index < count) {
-        used[index] = true;
-    }
-}
-
-/* Textures at or below `value`, of a material: whatever has an index, as those of extensions have. */
-static void note_textures(json_t *value, bool *shown, size_t count) {
-    size_t i;
-    const char *name;
-    json_t *member;
-    note_index(value, "index", shown, count);
-    json_array_foreach(value, i, member) {
-        note_textures(member, shown, count);
-    }
-    json_object_foreach(value, name, member) {
-        note_textures(member, shown, count);
-    }
-}
-
-/* Finds the textures that materials show. Free them after a failure, too. Errors: VSH_ERROR_LIMIT,
- * VSH_ERROR_MEMORY. */
-static vsh_result find_textures(vshi_lit_document *document, vshi_lit_texture_uses *uses, vsh_error *error) {
-    *uses = (vshi_lit_texture_uses){.texture_count = count_of(document, "textures"),
-                                    .image_count = count_of(document, "images"),
-                                    .sampler_count = count_of(document, "samplers")};
-    VSHI_TRY(
-        vshi_gltf_allocate(&document->gltf, (void **)&uses->shown, uses->texture_count, sizeof(bool), error));
-    note_textures(json_object_get(document->gltf.root, "materials"), uses->shown, uses->texture_count);
-    return VSH_OK;
-}
-
-static void free_textures(vshi_lit_texture_uses *uses) {
-    free(uses->shown);
-    *uses = (vshi_lit_texture_uses){.shown = NULL};
-}
-
-/* Notes a texture's sampler and images, those of other formats too (KHR_texture_basisu, EXT_texture_webp). */
-static void note_parts(json_t *texture, bool *images, size_t image_count, bool *samplers,
-                       size_t sampler_count) {
-    const char *name;
-    json_t *extension;
-    note_index(texture, "sampler", samplers, sampler_count);
-    note_index(texture, "source", images, image_count);
-    json_object_foreach(json_object_get(texture, "extensions"), name, extension) {
-        note_index(extension, "source", images, image_count);
-    }
-}
-
-/* --- removing textures */
-
-typedef struct pruning {
-    const vshi_lit_texture_uses *before;
-    bool *textures; /* [before->texture_count], those that go, and so on */
-    bool *images, *samplers;
-    bool *kept_images, *kept_samplers; /* that the others are made of */
-    placing texture_places, image_places, sampler_places;
-} pruning;
-
-static vsh_result find_gone(vshi_lit_document *document, const vshi_lit_texture_uses *after, pruning *p,
-                            vsh_error *error) {
-    vshi_gltf *gltf = &document->gltf;
-    const vshi_lit_texture_uses *before = p->before;
-    const size_t images = before->image_count, samplers = before->sampler_count;
-    size_t i;
-    json_t *texture;
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&p->textures, before->texture_count, sizeof(bool), error));
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&p->images, images, sizeof(bool), error));
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&p->kept_images, images, sizeof(bool), error));
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&p->samplers, samplers, sizeof(bool), error));
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&p->kept_samplers, samplers, sizeof(bool), error));
-    json_array_foreach(json_object_get(gltf->root, "textures"), i, texture) {
-        const bool gone =
-            i < before->texture_count && before->shown[i] && !after->shown[i] && is_made(texture);
-        if (gone) {
-            p->textures[i] = true;
-        }
-        note_parts(texture, gone ? p->images : p->kept_images, images, gone ? p->samplers : p->kept_samplers,
-                   samplers);
-    }
-    for (i = 0; i < images; ++i) {
-        p->images[i] = p->images[i] && !p->kept_images[i];
-    }
-    for (i = 0; i < samplers; ++i) {
-        p->samplers[i] = p->samplers[i] && !p->kept_samplers[i];
-    }
-    return VSH_OK;
-}
-
-/* Where a bake puts its textures, and nowhere else: there may be other numbers in extensions. */
-static vsh_result rename_shown(vshi_lit_document *document, const placing *textures, vsh_error *error) {
-    size_t i;
-    json_t *material;
-    json_array_foreach(json_object_get(document->gltf.root, "materials"), i, material) {
-        json_t *const infos[] = {
-            json_object_get(material, "occlusionTexture"),
-            json_object_get(json_object_get(material, "extensions"), "MOZ_lightmap"),
-            json_object_get(json_object_get(material, "pbrMetallicRoughness"), "baseColorTexture")};
-        for (size_t k = 0; k < sizeof infos / sizeof infos[0]; ++k) {
-            VSHI_TRY(rename_index(document, textures, infos[k], "index", error));
-        }
-    }
-    return VSH_OK;
-}
-
-static vsh_result take_out(vshi_lit_document *document, pruning *p, vsh_error *error) {
-    const vshi_lit_texture_uses *before = p->before;
-    const size_t count = count_of(document, "textures");
-    VSHI_TRY(find_places(document, p->textures, before->texture_count, count, &p->texture_places, error));
-    VSHI_TRY(find_places(document, p->images, before->image_count, count_of(document, "images"),
-                         &p->image_places, error));
-    VSHI_TRY(find_places(document, p->samplers, before->sampler_count, count_of(document, "samplers"),
-                         &p->sampler_places, error));
-    json_t *textures = json_object_get(document->gltf.root, "textures");
-    for (size_t i = before->texture_count; i < count; ++i) {
-        json_t *texture = json_array_get(textures, i);
-        VSHI_TRY(rename_index(document, &p->image_places, texture, "source", error));
-        VSHI_TRY(rename_index(document, &p->sampler_places, texture, "sampler", error));
-    }
-    VSHI_TRY(rename_shown(document, &p->texture_places, error));
-    VSHI_TRY(move_items(document, "textures", &p->texture_places, error));
-    VSHI_TRY(move_items(document, "images", &p->image_places, error));
-    return move_items(document, "samplers", &p->sampler_places, error);
-}
-
-/* Takes those out that were made, were shown before, and are not any more, and what only they referred to;
- * new ones take their places. All extensions are known. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
-static vsh_result prune_textures(vshi_lit_document *document, const vshi_lit_texture_uses *before,
-                                 const vshi_lit_texture_uses *after, vsh_error *error) {
-    pruning p = {.before = before};
-    vsh_result result = find_gone(document, after, &p, error);
-    result = result == VSH_OK ? take_out(document, &p, error) : result;
-    free(p.sampler_places.moved);
-    free(p.image_places.moved);
-    free(p.texture_places.moved);
-    free(p.kept_samplers);
-    free(p.kept_images);
-    free(p.samplers);
-    free(p.images);
-    free(p.textures);
-    return result;
-}
-
-/* --- accessors and buffer views in use */
-
-/* Called for every accessor or buffer view that `object` refers to by `key`. */
-typedef vsh_result refer_fn(vshi_lit_document *document, json_t *object, const char *key, bool view,
-                            void *user, vsh_error *error);
-
-static vsh_result walk_all_of(vshi_lit_document *document, json_t *object, refer_fn *refer, void *user,
-                              vsh_error *error) {
+static void walk_accessors(vshi_lit_document *document, json_t *object, refer_fn *refer, void *user) {
     const char *name;
     json_t *value;
     json_object_foreach(object, name, value) {
-        VSHI_TRY(refer(document, object, name, false, user, error));
+        refer(document, object, name, ACCESSORS, user);
     }
-    return VSH_OK;
 }
 
-static json_t *member(json_t *object, const char *first, const char *second) {
-    return json_object_get(json_object_get(object, first), second);
-}
-
-static vsh_result walk_meshes(vshi_lit_document *document, refer_fn *refer, void *user, vsh_error *error) {
+static void walk_meshes(vshi_lit_document *document, refer_fn *refer, void *user) {
     size_t m, p, t;
     json_t *mesh, *primitive, *target;
     json_array_foreach(json_object_get(document->gltf.root, "meshes"), m, mesh) {
         json_array_foreach(json_object_get(mesh, "primitives"), p, primitive) {
-            json_t *draco = member(primitive, "extensions", "KHR_draco_mesh_compression");
-            VSHI_TRY(walk_all_of(document, json_object_get(primitive, "attributes"), refer, user, error));
-            VSHI_TRY(refer(document, primitive, "indices", false, user, error));
-            VSHI_TRY(refer(document, draco, "bufferView", true, user, error));
+            walk_accessors(document, json_object_get(primitive, "attributes"), refer, user);
+            refer(document, primitive, "indices", ACCESSORS, user);
+            refer(document, member(primitive, "extensions", "KHR_draco_mesh_compression"), "bufferView",
+                  VIEWS, user);
             json_array_foreach(json_object_get(primitive, "targets"), t, target) {
-                VSHI_TRY(walk_all_of(document, target, refer, user, error));
+                walk_accessors(document, target, refer, user);
             }
         }
     }
-    return VSH_OK;
 }
 
-static vsh_result walk(vshi_lit_document *document, refer_fn *refer, void *user, vsh_error *error) {
+/* Of textures and of what they are made of only the references of new ones: where a bake puts its textures,
+ * and nowhere else, as there may be other numbers in extensions. */
+static void walk(vshi_lit_document *document, refer_fn *refer, void *user) {
     size_t i, k;
     json_t *item, *sampler, *root = document->gltf.root;
-    VSHI_TRY(walk_meshes(document, refer, user, error));
+    walk_meshes(document, refer, user);
     json_array_foreach(json_object_get(root, "nodes"), i, item) {
         json_t *instancing = member(item, "extensions", "EXT_mesh_gpu_instancing");
-        VSHI_TRY(walk_all_of(document, json_object_get(instancing, "attributes"), refer, user, error));
+        walk_accessors(document, json_object_get(instancing, "attributes"), refer, user);
     }
     json_array_foreach(json_object_get(root, "skins"), i, item) {
-        VSHI_TRY(refer(document, item, "inverseBindMatrices", false, user, error));
+        refer(document, item, "inverseBindMatrices", ACCESSORS, user);
     }
     json_array_foreach(json_object_get(root, "animations"), i, item) {
         json_array_foreach(json_object_get(item, "samplers"), k, sampler) {
-            VSHI_TRY(refer(document, sampler, "input", false, user, error));
-            VSHI_TRY(refer(document, sampler, "output", false, user, error));
+            refer(document, sampler, "input", ACCESSORS, user);
+            refer(document, sampler, "output", ACCESSORS, user);
         }
     }
     json_array_foreach(json_object_get(root, "accessors"), i, item) {
-        VSHI_TRY(refer(document, item, "bufferView", true, user, error));
-        VSHI_TRY(refer(document, member(item, "sparse", "indices"), "bufferView", true, user, error));
-        VSHI_TRY(refer(document, member(item, "sparse", "values"), "bufferView", true, user, error));
+        refer(document, item, "bufferView", VIEWS, user);
+        refer(document, member(item, "sparse", "indices"), "bufferView", VIEWS, user);
+        refer(document, member(item, "sparse", "values"), "bufferView", VIEWS, user);
     }
     json_array_foreach(json_object_get(root, "images"), i, item) {
-        VSHI_TRY(refer(document, item, "bufferView", true, user, error));
+        refer(document, item, "bufferView", VIEWS, user);
     }
-    return VSH_OK;
+    json_array_foreach(json_object_get(root, "textures"), i, item) {
+        refer(document, item, "source", IMAGES, user);
+        refer(document, item, "sampler", SAMPLERS, user);
+    }
+    json_array_foreach(json_object_get(root, "materials"), i, item) {
+        refer(document, json_object_get(item, "occlusionTexture"), "index", TEXTURES, user);
+        refer(document, member(item, "extensions", "MOZ_lightmap"), "index", TEXTURES, user);
+        refer(document, member(item, "pbrMetallicRoughness", "baseColorTexture"), "index", TEXTURES, user);
+    }
 }
 
-static vsh_result note(vshi_lit_document *document, json_t *object, const char *key, bool view, void *user,
-                       vsh_error *error) {
-    vshi_lit_uses *uses = user;
+/* --- items in use */
+
+static void note(const vshi_lit_uses *uses, const json_t *object, const char *key, int kind) {
     size_t index;
-    (void)document;
-    (void)error;
-    if (vshi_gltf_count(object, key, SIZE_MAX, &index) &&
-        index < (view ? uses->view_count : uses->accessor_count)) {
-        (view ? uses->views : uses->accessors)[index] = true;
+    if (vshi_gltf_count(object, key, SIZE_MAX, &index) && index < uses->count[kind]) {
+        uses->used[kind][index] = true;
     }
+}
+
+static void note_array(vshi_lit_document *document, json_t *object, const char *key, int kind, void *user) {
+    (void)document;
+    if (kind == ACCESSORS || kind == VIEWS) {
+        note(user, object, key, kind);
+    }
+}
+
+/* Textures at or below `value`, of a material: whatever has an index, as those of extensions have. */
+static void note_textures(const vshi_lit_uses *uses, json_t *value) {
+    size_t i;
+    const char *name;
+    json_t *inner;
+    note(uses, value, "index", TEXTURES);
+    json_array_foreach(value, i, inner) {
+        note_textures(uses, inner);
+    }
+    json_object_foreach(value, name, inner) {
+        note_textures(uses, inner);
+    }
+}
+
+/* Samplers and images of textures that stay, those of other formats too (KHR_texture_basisu). */
+static void note_parts(const vshi_lit_uses *uses, const vshi_lit_document *document, const bool *gone,
+                       size_t gone_count) {
+    size_t i;
+    const char *name;
+    json_t *texture, *extension;
+    json_array_foreach(json_object_get(document->gltf.root, "textures"), i, texture) {
+        if (i < gone_count && gone[i]) {
+            continue;
+        }
+        note(uses, texture, "sampler", SAMPLERS);
+        note(uses, texture, "source", IMAGES);
+        json_object_foreach(json_object_get(texture, "extensions"), name, extension) {
+            note(uses, extension, "source", IMAGES);
+        }
+    }
+}
+
+/* Finds those of accessors, views and textures. */
+static vsh_result find(vshi_lit_document *document, vshi_lit_uses *uses, vsh_error *error) {
+    *uses = (vshi_lit_uses){.count = {0}};
+    for (int kind = 0; kind < VSHI_LIT_KINDS; ++kind) {
+        const size_t count = count_of(document, kind);
+        VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)&uses->used[kind], count, sizeof(bool), error));
+        uses->count[kind] = count;
+    }
+    walk(document, note_array, uses);
+    note_textures(uses, json_object_get(document->gltf.root, "materials"));
     return VSH_OK;
 }
 
 vsh_result vshi_lit_uses_find(vshi_lit_document *document, vshi_lit_uses *uses, vsh_error *error) {
-    vshi_gltf *gltf = &document->gltf;
-    *uses = (vshi_lit_uses){.accessor_count = json_array_size(json_object_get(gltf->root, "accessors")),
-                            .view_count = json_array_size(json_object_get(gltf->root, "bufferViews"))};
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&uses->accessors, uses->accessor_count, sizeof(bool), error));
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&uses->views, uses->view_count, sizeof(bool), error));
-    VSHI_TRY(find_textures(document, &uses->textures, error));
-    return walk(document, note, uses, error);
+    VSHI_TRY(find(document, uses, error));
+    note_parts(uses, document, NULL, 0);
+    return VSH_OK;
 }
 
 void vshi_lit_uses_free(vshi_lit_uses *uses) {
-    free_textures(&uses->textures);
-    free(uses->accessors);
-    free(uses->views);
-    *uses = (vshi_lit_uses){.accessors = NULL};
+    for (int kind = 0; kind < VSHI_LIT_KINDS; ++kind) {
+        free(uses->used[kind]);
+    }
+    *uses = (vshi_lit_uses){.count = {0}};
 }
 
 /* --- extensions */
 
 /* Those that refer to no accessor and no buffer view but by what is walked through above, and to textures,
- * images and samplers as the functions above say. */
+ * images and samplers as the functions above say. "_" at the end: whatever begins so. */
 static bool is_known(const char *name) {
-    static const char *const names[] = {"KHR_draco_mesh_compression",
+    static const char *const known[] = {"KHR_draco_mesh_compression",
                                         "EXT_mesh_gpu_instancing",
                                         "KHR_mesh_quantization",
                                         "EXT_meshopt_compression",
@@ -345,16 +180,14 @@ static bool is_known(const char *name) {
                                         "KHR_animation_pointer",
                                         "KHR_node_visibility",
                                         "KHR_xmp_json_ld",
-                                        "MOZ_lightmap"};
-    static const char *const beginnings[] = {"KHR_materials_", "KHR_texture_", "EXT_texture_",
-                                             "EXT_materials_"};
-    for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
-        if (strcmp(name, names[i]) == 0) {
-            return true;
-        }
-    }
-    for (size_t i = 0; i < sizeof beginnings / sizeof beginnings[0]; ++i) {
-        if (strncmp(name, beginnings[i], strlen(beginnings[i])) == 0) {
+                                        "MOZ_lightmap",
+                                        "KHR_materials_",
+                                        "KHR_texture_",
+                                        "EXT_texture_",
+                                        "EXT_materials_"};
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; ++i) {
+        const size_t length = strlen(known[i]);
+        if (strncmp(name, known[i], length) == 0 && (known[i][length - 1] == '_' || name[length] == '\0')) {
             return true;
         }
     }
@@ -366,43 +199,17 @@ static bool knows_all(json_t *value) {
     const char *name, *extension;
     json_t *item, *inner;
     size_t i;
+    bool known = true;
     json_array_foreach(value, i, item) {
-        if (!knows_all(item)) {
-            return false;
-        }
+        known = known && knows_all(item);
     }
     json_object_foreach(value, name, item) {
-        if (strcmp(name, "extensions") == 0) {
-            json_object_foreach(item, extension, inner) {
-                if (!is_known(extension)) {
-                    return false;
-                }
-            }
+        json_object_foreach(strcmp(name, "extensions") == 0 ? item : NULL, extension, inner) {
+            known = known && is_known(extension);
         }
-        if (!knows_all(item)) {
-            return false;
-        }
+        known = known && knows_all(item);
     }
-    return true;
-}
-
-/* --- moving new items */
-
-typedef struct moving {
-    placing accessors, views;
-} moving;
-
-static vsh_result rename_one(vshi_lit_document *document, json_t *object, const char *key, bool view,
-                             void *user, vsh_error *error) {
-    const moving *m = user;
-    return rename_index(document, view ? &m->views : &m->accessors, object, key, error);
-}
-
-/* before[count] becomes what was used then and is not any more. */
-static void keep_gone(bool *before, const bool *after, size_t count) {
-    for (size_t i = 0; i < count; ++i) {
-        before[i] = before[i] && !after[i];
-    }
+    return known;
 }
 
 /* --- bytes */
@@ -502,46 +309,127 @@ done:
     return result;
 }
 
-static vsh_result prune(vshi_lit_document *document, vshi_lit_uses *before, vshi_lit_uses *after, moving *m,
-                        bool *replaced, vsh_error *error) {
-    VSHI_TRY(prune_textures(document, &before->textures, &after->textures, error));
+/* --- places */
+
+/* Where the items first … count - 1 of a list, which are new, go. */
+typedef struct placing {
+    int kind;
+    size_t *moved; /* [count - first] */
+    size_t first, count;
+} placing;
+
+static void rename_item(vshi_lit_document *document, json_t *object, const char *key, int kind, void *user) {
+    const placing *places = user;
+    size_t index;
+    if (kind == places->kind && vshi_gltf_count(object, key, SIZE_MAX, &index) && index >= places->first &&
+        index < places->count) {
+        vshi_lit_set_number(document, object, key, places->moved[index - places->first]);
+    }
+}
+
+/* Finds places for the new items: those that are gone, in order, then places behind the old items. Places
+ * left at the end are cut off. Returns how many items are left. */
+static size_t find_places(const placing *places, const bool *gone) {
+    const size_t first = places->first, more = places->count - first;
+    size_t done = 0, behind = 0; /* behind: the places that are taken */
+    for (size_t i = 0; i < first && done < more; ++i) {
+        if (gone[i]) {
+            places->moved[done++] = i;
+            behind = i + 1;
+        }
+    }
+    size_t end = first + more - done;
+    for (size_t i = first; done < more; ++i) {
+        places->moved[done++] = i;
+    }
+    while (end <= first && end > behind && gone[end - 1]) {
+        --end;
+    }
+    return end;
+}
+
+/* Marks views whose places are taken or cut off, and drops bytes that only they had. */
+static vsh_result replace_views(vshi_lit_document *document, const placing *places, size_t end,
+                                vsh_error *error) {
+    VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)&document->replaced, places->first, sizeof(bool),
+                                error));
+    for (size_t i = 0; i < places->count - places->first && places->moved[i] < places->first; ++i) {
+        document->replaced[places->moved[i]] = true;
+    }
+    for (size_t i = end; i < places->first; ++i) {
+        document->replaced[i] = true;
+    }
+    return drop_bytes(document, document->replaced, error);
+}
+
+/* Moves the new items of a list. gone[before->count[kind]]: old ones that go. */
+static vsh_result replace(vshi_lit_document *document, const vshi_lit_uses *before, int kind,
+                          vsh_error *error) {
+    json_t *list = json_object_get(document->gltf.root, lists[kind]);
+    placing places = {.kind = kind, .first = before->count[kind], .count = json_array_size(list)};
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_gltf_allocate(&document->gltf, (void **)&places.moved, places.count - places.first,
+                                     sizeof *places.moved, error));
+    const size_t end = find_places(&places, before->used[kind]);
+    if (kind == VIEWS) { /* while they still say which */
+        VSHI_TRY_DONE(replace_views(document, &places, end, error));
+    }
+    walk(document, rename_item, &places);
+    for (size_t i = places.first; i < places.count; ++i) {
+        const size_t to = places.moved[i - places.first]; /* never behind i */
+        document->refused |= to != i && json_array_set(list, to, json_array_get(list, i)) != 0;
+    }
+    while (json_array_size(list) > end) {
+        json_array_remove(list, json_array_size(list) - 1);
+    }
+    if (end == 0 && places.count > 0) { /* glTF has no empty lists */
+        json_object_del(document->gltf.root, lists[kind]);
+    }
+done:
+    free(places.moved);
+    return result;
+}
+
+/* What was used before becomes what is not any more. */
+static void keep_gone(const vshi_lit_uses *before, const vshi_lit_uses *after, int kind) {
+    for (size_t i = 0; i < before->count[kind]; ++i) {
+        before->used[kind][i] = before->used[kind][i] && !after->used[kind][i];
+    }
+}
+
+static vsh_result prune(vshi_lit_document *document, vshi_lit_uses *before, vshi_lit_uses *after,
+                        vsh_error *error) {
+    size_t i;
+    const json_t *texture;
+    VSHI_TRY(find(document, after, error));
+    keep_gone(before, after, ACCESSORS);
+    keep_gone(before, after, TEXTURES);
+    json_array_foreach(json_object_get(document->gltf.root, "textures"), i, texture) {
+        if (i < before->count[TEXTURES] &&
+            json_object_get(json_object_get(texture, "extras"), texture_key) == NULL) {
+            before->used[TEXTURES][i] = false; /* the file's own stay */
+        }
+    }
+    note_parts(after, document, before->used[TEXTURES], before->count[TEXTURES]);
+    keep_gone(before, after, IMAGES);
+    keep_gone(before, after, SAMPLERS);
+    VSHI_TRY(replace(document, before, TEXTURES, error));
+    VSHI_TRY(replace(document, before, IMAGES, error));
+    VSHI_TRY(replace(document, before, SAMPLERS, error));
+    VSHI_TRY(replace(document, before, ACCESSORS, error));
     /* views of accessors that are no longer used are not either */
-    keep_gone(before->accessors, after->accessors, before->accessor_count);
-    VSHI_TRY(find_places(document, before->accessors, before->accessor_count, after->accessor_count,
-                         &m->accessors, error));
-    VSHI_TRY(walk(document, rename_one, m, error)); /* views are not moved yet */
-    VSHI_TRY(move_items(document, "accessors", &m->accessors, error));
     vshi_lit_uses_free(after);
-    VSHI_TRY(vshi_lit_uses_find(document, after, error));
-    keep_gone(before->views, after->views, before->view_count);
-    VSHI_TRY(find_places(document, before->views, before->view_count, after->view_count, &m->views, error));
-    mark_places(&m->views, replaced);
-    VSHI_TRY(drop_bytes(document, replaced, error)); /* while they still say which */
-    m->accessors.first = m->accessors.count;         /* they have been moved */
-    VSHI_TRY(walk(document, rename_one, m, error));
-    VSHI_TRY(move_items(document, "bufferViews", &m->views, error));
-    document->replaced = replaced;
-    return VSH_OK;
+    VSHI_TRY(find(document, after, error));
+    keep_gone(before, after, VIEWS);
+    return replace(document, before, VIEWS, error);
 }
 
 vsh_result vshi_lit_prune(vshi_lit_document *document, vshi_lit_uses *before, vsh_error *error) {
+    vshi_lit_uses after = {.count = {0}};
     if (!knows_all(document->gltf.root)) {
         return VSH_OK;
     }
-    vshi_lit_uses after = {.accessors = NULL};
-    moving m = {.accessors = {.moved = NULL}};
-    bool *replaced = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_lit_uses_find(document, &after, error));
-    VSHI_TRY_DONE(
-        vshi_gltf_allocate(&document->gltf, (void **)&replaced, before->view_count, sizeof *replaced, error));
-    VSHI_TRY_DONE(prune(document, before, &after, &m, replaced, error));
-done:
-    if (document->replaced == NULL) {
-        free(replaced);
-    }
-    free(m.views.moved);
-    free(m.accessors.moved);
+    const vsh_result result = prune(document, before, &after, error);
     vshi_lit_uses_free(&after);
     return result;
 }

@@ -3,9 +3,58 @@
 #define VSHI_LIT_WORK_H
 
 #include "lit/document.h"
-#include "lit/draco.h"
+#include "sandbox/reader.h"
 
-/* --- vertices (vertices.c) */
+#include <stdio.h>
+
+/* --- primitives under KHR_draco_mesh_compression (draco.c): decoded whole, every attribute in the type of
+ * its accessor. By the reader's process, where there is one: Draco is a large decoder of strangers' bytes. */
+
+typedef struct vshi_lit_draco_attribute {
+    uint64_t id; /* as the extension names it */
+    int type;    /* VSHI_GLTF_… */
+    int components;
+    unsigned char *values; /* [vertex_count][components] */
+} vshi_lit_draco_attribute;
+
+typedef struct vshi_lit_draco {
+    size_t mesh, primitive;
+    size_t vertex_count, triangle_count;
+    uint32_t *indices; /* [triangle_count][3], each < vertex_count */
+    vshi_lit_draco_attribute *attributes;
+    size_t attribute_count;
+} vshi_lit_draco;
+
+/* All of a document's. */
+typedef struct vshi_lit_dracos {
+    vshi_lit_draco *list;
+    size_t count;
+    bool borrowed;      /* arrays lie in `answer`, else each is its own */
+    vshi_answer answer; /* of a reader; its map may be NULL */
+} vshi_lit_dracos;
+
+/* Decodes them; none where the document has none. Free after a failure too. Errors: VSH_ERROR_INPUT,
+ * VSH_ERROR_READ, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_lit_dracos_read(vshi_lit_document *document, vshi_lit_dracos *dracos, vsh_error *error);
+void vshi_lit_dracos_free(vshi_lit_dracos *dracos);
+
+/* That of a primitive, or NULL. */
+const vshi_lit_draco *vshi_lit_draco_of(const vshi_lit_dracos *dracos, size_t mesh, size_t primitive);
+
+/* The attribute that the extension of `primitive` has under `name`, or NULL. */
+const vshi_lit_draco_attribute *vshi_lit_draco_attribute_of(const vshi_lit_draco *draco,
+                                                            const json_t *primitive, const char *name);
+
+/* What a reader has handed over for dracos->list[count], whose places are known; everything in it is checked.
+ * The arrays are those of the message, which must outlive them. Errors: VSH_ERROR_READ, VSH_ERROR_MEMORY. */
+vsh_result vshi_lit_dracos_decode(vshi_decoder *decoder, const char *path, vshi_lit_dracos *dracos,
+                                  vsh_error *error);
+
+/* Decodes in a reader, and puts what is handed over. */
+vsh_result vshi_serve_draco(const char *path, vshi_decoder *request, const vsh_run *run,
+                            vshi_encoder *payload, vsh_error *error);
+
+/* --- vertices of primitives */
 
 /* A primitive of the document: which elements of its accessors are the vertices of the model's mesh. */
 typedef struct vshi_lit_topology {
@@ -15,15 +64,6 @@ typedef struct vshi_lit_topology {
     uint32_t *elements;          /* [vertex_count] of each vertex, increasing */
     const vshi_lit_draco *draco; /* NULL: its vertices are not compressed */
 } vshi_lit_topology;
-
-/* Finds that of `primitive`, which messages call `where`, and holds it against the model's mesh. `draco` is
- * its decoded data, NULL where it has none. Free with vshi_lit_topology_free(), after a failure too. Errors:
- * VSH_ERROR_INPUT (not well formed; not what the model was made of), VSH_ERROR_READ, VSH_ERROR_LIMIT,
- * VSH_ERROR_MEMORY. */
-vsh_result vshi_lit_topology_find(vshi_lit_document *document, const json_t *primitive, const char *where,
-                                  const vshi_lit_draco *draco, const vsh_mesh *mesh,
-                                  vshi_lit_topology *topology, vsh_error *error);
-void vshi_lit_topology_free(vshi_lit_topology *topology);
 
 /* An accessor, and the one that some of its elements were copied to. */
 typedef struct vshi_lit_copy {
@@ -35,17 +75,6 @@ typedef struct vshi_lit_gathered {
     vshi_lit_copy *list; /* [count] */
     size_t count, capacity;
 } vshi_lit_gathered;
-
-void vshi_lit_gathered_free(vshi_lit_gathered *gathered);
-
-/* A new accessor of the elements elements[count] of accessor `index`, in *gathered or from there. `draco`:
- * its values, else NULL. `element_count` is what it must have; `bounds`: with its least and largest values
- * whether or not it has had them. Sparse ones become dense. Errors: VSH_ERROR_INPUT, VSH_ERROR_READ,
- * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
-vsh_result vshi_lit_gather(vshi_lit_document *document, size_t index, size_t element_count,
-                           const vshi_lit_draco_attribute *draco, const uint32_t *elements, size_t count,
-                           bool bounds, const char *where, vshi_lit_gathered *gathered, size_t *accessor,
-                           vsh_error *error);
 
 /* A new UV set of primitives that keep their vertices. Primitives with the same accessor of positions share
  * one of UVs where their UVs agree, because each needs the accessor's full length. */
@@ -61,14 +90,6 @@ typedef struct vshi_lit_uv_pool {
     vshi_lit_uvs *list;
     size_t count, capacity;
 } vshi_lit_uv_pool;
-
-void vshi_lit_uv_pool_free(vshi_lit_uv_pool *pool);
-
-/* An accessor in which elements[i] (< count of elements) has values[i], v down. Elements may come twice, with
- * the same values. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
-vsh_result vshi_lit_uv_pool_put(vshi_lit_document *document, vshi_lit_uv_pool *pool, size_t positions,
-                                size_t element_count, const uint32_t *elements, const float (*values)[2],
-                                size_t count, size_t *accessor, vsh_error *error);
 
 /* --- materials (materials.c) */
 
@@ -156,6 +177,8 @@ vsh_result vshi_lit_materials_apply(vshi_lit_work *work, vsh_error *error);
 vsh_result vshi_lit_primitive_make(vshi_lit_work *work, size_t mesh, size_t primitive, size_t entry,
                                    json_t *list, vsh_error *error);
 
+void vshi_lit_shapes_free(vshi_lit_work *work);
+
 /* The set of UVs that engines use for lightmaps. */
 enum { VSHI_LIT_SET = 1 };
 
@@ -166,8 +189,7 @@ vsh_result vshi_lit_choose_set(const vshi_lit_work *work, json_t *primitive, con
                                const char *where, size_t *set, vsh_error *error);
 
 /* Notes in a primitive's extras that a set was made, for the next time. */
-vsh_result vshi_lit_tell_set(const vshi_lit_document *document, json_t *primitive, size_t set,
-                             vsh_error *error);
+vsh_result vshi_lit_tell_set(vshi_lit_document *document, json_t *primitive, size_t set, vsh_error *error);
 
 /* Appends to `list` a primitive for each page of `mesh`, copies of `made`, whose indices are set: those of
  * triangle t are corners[t]. `whole`: an accessor of all of them, used where there is one page; SIZE_MAX: a
@@ -235,9 +257,6 @@ vsh_result vshi_lit_write_files(vshi_lit_work *work, const vshi_lit_besides *bes
 
 /* --- OBJ, with its materials in a file beside it (obj.c) */
 
-/* Writes bytes to a file. */
-typedef void vshi_lit_put(void *file, const void *bytes, size_t size);
-
 bool vshi_lit_is_obj(const char *path);
 
 /* Refuses options that an OBJ cannot show. Errors: VSH_ERROR_ARGUMENT. */
@@ -245,34 +264,26 @@ vsh_result vshi_lit_obj_check(const vshi_lit_work *work, vsh_error *error);
 
 /* Writes the model's meshes in the world. With images or several pages, each page gets a "usemtl page_N".
  * `mtl`: name of the MTL file, or NULL. Errors: VSH_ERROR_CANCELLED. */
-vsh_result vshi_lit_put_obj(const vshi_lit_work *work, const char *mtl, vshi_lit_put *put, void *file,
-                            vsh_error *error);
+vsh_result vshi_lit_put_obj(const vshi_lit_work *work, const char *mtl, FILE *to, vsh_error *error);
 
 /* Its materials: one a page, white, shown by its image. */
-void vshi_lit_put_mtl(const vshi_lit_work *work, const vshi_lit_besides *besides, vshi_lit_put *put,
-                      void *file);
+void vshi_lit_put_mtl(const vshi_lit_work *work, const vshi_lit_besides *besides, FILE *to);
 
 /* Fails if the file exists and vdbshade did not write it. */
 vsh_result vshi_lit_mtl_check(const char *path, vsh_error *error);
 
 /* --- removing unused items (prune.c) */
 
-/* Which textures the materials show. The extras of a texture that a bake made say so ("vdbshade_texture":
- * "lightmap"). It goes with its image and sampler once no material shows it; the file's own textures stay. */
-typedef struct vshi_lit_texture_uses {
-    bool *shown; /* [texture_count] */
-    size_t texture_count, image_count, sampler_count;
-} vshi_lit_texture_uses;
-
-/* Tells of a texture that it was made for light, for the next time. NULL where memory is short. */
+/* Tells of a texture that it was made for light, for the next time: its extras say "vdbshade_texture". It
+ * goes with its image and sampler once no material shows it; the file's own textures stay. NULL where memory
+ * is short. */
 json_t *vshi_lit_texture_mark(const char *purpose);
 
-/* The accessors, buffer views and textures that something refers to. */
+/* Which accessors, buffer views, textures, images and samplers something refers to. */
+enum { VSHI_LIT_KINDS = 5 };
 typedef struct vshi_lit_uses {
-    bool *accessors; /* [accessor_count] */
-    bool *views;     /* [view_count] */
-    size_t accessor_count, view_count;
-    vshi_lit_texture_uses textures;
+    bool *used[VSHI_LIT_KINDS]; /* [count] each */
+    size_t count[VSHI_LIT_KINDS];
 } vshi_lit_uses;
 
 /* Finds them. Free after a failure too. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
@@ -281,7 +292,7 @@ void vshi_lit_uses_free(vshi_lit_uses *uses);
 
 /* Puts new accessors, buffer views, textures, images and samplers in the places of unused ones, and cuts
  * unused ones off the end of a list. Other items keep their numbers. Lists the bytes that only unused ones
- * had (document->dropped). Of textures only those that were made go by a bake. Does nothing where an
+ * had (document->dropped). Of textures only those go that a bake made. Does nothing where an
  * extension that is not known may refer to them. `before` is used up. Errors: VSH_ERROR_LIMIT,
  * VSH_ERROR_MEMORY. */
 vsh_result vshi_lit_prune(vshi_lit_document *document, vshi_lit_uses *before, vsh_error *error);

@@ -1,4 +1,5 @@
 /* A lit document into its files. */
+#define _GNU_SOURCE /* fopencookie */
 #include "base/bytes.h"
 #include "base/decimal.h"
 #include "base/file.h"
@@ -21,49 +22,29 @@ typedef struct layout {
 /* --- JSON: members in their order, numbers as short as they can be read back */
 
 typedef struct writer {
-    vshi_lit_bytes *text;
-    bool lines, failed;
+    FILE *to;
+    bool lines;
     int depth;
 } writer;
 
-static void put_text(writer *w, const char *bytes, size_t size) {
-    vshi_lit_bytes *text = w->text;
-    if (!w->failed && size > text->capacity - text->size) {
-        const size_t capacity = 2 * text->capacity + size + 4096;
-        unsigned char *grown = realloc(text->at, capacity);
-        w->failed = grown == NULL;
-        text->at = grown != NULL ? grown : text->at;
-        text->capacity = grown != NULL ? capacity : text->capacity;
-    }
-    if (!w->failed) {
-        memcpy(text->at + text->size, bytes, size);
-        text->size += size;
-    }
-}
-
-static void put_string(writer *w, const char *string, size_t size) {
+static void put_string(const writer *w, const char *string, size_t size) {
     size_t plain = 0; /* bytes that are not written yet */
-    put_text(w, "\"", 1);
+    fputc('"', w->to);
     for (size_t i = 0; i < size; ++i) {
         const unsigned char byte = (unsigned char)string[i];
-        if (byte >= 0x20 && byte != '"' && byte != '\\') {
-            continue;
+        if (byte < 0x20 || byte == '"' || byte == '\\') {
+            fwrite(string + plain, 1, i - plain, w->to);
+            fprintf(w->to, byte >= 0x20 ? "\\%c" : "\\u%04x", byte);
+            plain = i + 1;
         }
-        char escape[8];
-        const int length = byte >= 0x20 ? snprintf(escape, sizeof escape, "\\%c", byte)
-                                        : snprintf(escape, sizeof escape, "\\u%04x", byte);
-        put_text(w, string + plain, i - plain);
-        put_text(w, escape, (size_t)length);
-        plain = i + 1;
     }
-    put_text(w, string + plain, size - plain);
-    put_text(w, "\"", 1);
+    fwrite(string + plain, 1, size - plain, w->to);
+    fputc('"', w->to);
 }
 
-static void put_line(writer *w) {
-    put_text(w, "\n", w->lines ? 1 : 0);
-    for (int i = 0; i < w->depth && w->lines; ++i) {
-        put_text(w, "  ", 2);
+static void put_line(const writer *w) {
+    if (w->lines) {
+        fprintf(w->to, "\n%*s", 2 * w->depth, "");
     }
 }
 
@@ -73,21 +54,21 @@ static void put_object(writer *w, const json_t *object) {
     const char *name;
     json_t *member;
     bool first = true;
-    put_text(w, "{", 1);
+    fputc('{', w->to);
     ++w->depth;
     json_object_foreach((json_t *)(uintptr_t)object, name, member) {
-        put_text(w, ",", first ? 0 : 1);
+        fputs(first ? "" : ",", w->to);
         first = false;
         put_line(w);
         put_string(w, name, strlen(name));
-        put_text(w, ": ", w->lines ? 2 : 1);
+        fputs(w->lines ? ": " : ":", w->to);
         put_value(w, member);
     }
     --w->depth;
     if (!first) {
         put_line(w);
     }
-    put_text(w, "}", 1);
+    fputc('}', w->to);
 }
 
 /* Lists of numbers stay in one line. */
@@ -96,10 +77,10 @@ static void put_array(writer *w, const json_t *array) {
     const json_t *item;
     const bool short_one =
         !json_is_object(json_array_get(array, 0)) && !json_is_array(json_array_get(array, 0));
-    put_text(w, "[", 1);
+    fputc('[', w->to);
     ++w->depth;
     json_array_foreach(array, i, item) {
-        put_text(w, ", ", i == 0 ? 0 : w->lines && short_one ? 2 : 1);
+        fputs(i == 0 ? "" : w->lines && short_one ? ", " : ",", w->to);
         if (!short_one) {
             put_line(w);
         }
@@ -109,7 +90,7 @@ static void put_array(writer *w, const json_t *array) {
     if (!short_one) {
         put_line(w);
     }
-    put_text(w, "]", 1);
+    fputc(']', w->to);
 }
 
 static void put_value(writer *w, const json_t *value) {
@@ -125,29 +106,16 @@ static void put_value(writer *w, const json_t *value) {
         put_string(w, json_string_value(value), json_string_length(value));
         break;
     case JSON_INTEGER:
-        put_text(w, number,
-                 (size_t)snprintf(number, sizeof number, "%" JSON_INTEGER_FORMAT, json_integer_value(value)));
+        fprintf(w->to, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
         break;
     case JSON_REAL:
-        put_text(w, number, (size_t)(vshi_decimal_write_double(number, json_real_value(value)) - number));
+        fwrite(number, 1, (size_t)(vshi_decimal_write_double(number, json_real_value(value)) - number),
+               w->to);
         break;
     default:
-        put_text(w,
-                 json_is_true(value)    ? "true"
-                 : json_is_false(value) ? "false"
-                                        : "null",
-                 json_is_false(value) ? 5 : 4);
+        fputs(json_is_true(value) ? "true" : json_is_false(value) ? "false" : "null", w->to);
         break;
     }
-}
-
-/* The text of a value into `text`, which is empty; of a document's file one with lines and indents (`lines`).
- * Errors: VSH_ERROR_MEMORY. Free text->at with free(), after a failure too. */
-static vsh_result write_json(const json_t *value, bool lines, const char *what, vshi_lit_bytes *text,
-                             vsh_error *error) {
-    writer w = {.text = text, .lines = lines};
-    put_value(&w, value);
-    return w.failed ? vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what) : VSH_OK;
 }
 
 /* --- the buffers become one */
@@ -207,44 +175,47 @@ static bool is_needed(const vshi_lit_document *document, size_t buffer) {
     return document->dropped_count == 0;
 }
 
-/* The new list: one buffer of all bytes, which is the first that had any, and behind it those without. */
-static vsh_result list_buffers(vshi_lit_document *document, layout *l, json_t **one, vsh_error *error) {
+/* The new list: one buffer of all bytes, which is the first that had any, and behind it those without.
+ * Returns that one; NULL: there are no bytes. */
+static json_t *list_buffers(vshi_lit_document *document, layout *l) {
     vshi_gltf *gltf = &document->gltf;
-    json_t *list = json_array(), *old = json_object_get(gltf->root, "buffers");
-    *one = NULL;
-    for (size_t i = 0; i < gltf->buffer_count && *one == NULL; ++i) {
-        *one = l->offsets[i] != SIZE_MAX ? json_incref(json_array_get(old, i)) : NULL;
+    json_t *list = json_array(), *old = json_object_get(gltf->root, "buffers"), *one = NULL;
+    for (size_t i = 0; i < gltf->buffer_count && one == NULL; ++i) {
+        one = l->offsets[i] != SIZE_MAX ? json_incref(json_array_get(old, i)) : NULL;
     }
-    *one = *one == NULL && l->size > 0 ? json_object() : *one;
-    bool good = list != NULL && (l->size == 0 || *one != NULL);
-    good = (*one == NULL || json_array_append_new(list, *one) == 0) && good;
+    if (one != NULL || l->size > 0) {
+        one = one != NULL ? one : json_object();
+        vshi_lit_push(document, list, one);
+    }
     for (size_t i = 0; i < gltf->buffer_count; ++i) {
         l->numbers[i] = l->offsets[i] != SIZE_MAX ? 0 : json_array_size(list);
         if (l->offsets[i] == SIZE_MAX && is_needed(document, i)) {
-            good = good && json_array_append(list, json_array_get(old, i)) == 0;
+            vshi_lit_push(document, list, json_incref(json_array_get(old, i)));
         }
     }
-    if (json_array_size(list) == 0) {
+    if (json_array_size(list) > 0) {
+        vshi_lit_set(document, gltf->root, "buffers", list);
+    } else {
         json_object_del(gltf->root, "buffers");
         json_decref(list);
-        return good ? VSH_OK : vshi_lit_no_memory(document, error);
     }
-    const vsh_result result = vshi_lit_set(document, gltf->root, "buffers", list, error);
-    return good ? result : vshi_lit_no_memory(document, error);
+    return one;
 }
 
 /* Moves what a view (or an extension of it that names a buffer of its own) refers to. */
-static vsh_result move_view(const vshi_lit_document *document, const layout *l, json_t *view,
-                            vsh_error *error) {
+static vsh_result move_view(vshi_lit_document *document, const layout *l, json_t *view, vsh_error *error) {
     size_t buffer, offset;
     if (!vshi_gltf_count(view, "buffer", SIZE_MAX, &buffer) || buffer >= document->gltf.buffer_count ||
         !vshi_gltf_count(view, "byteOffset", 0, &offset)) {
         return vshi_gltf_fail(&document->gltf, error, "a buffer view refers to no buffer");
     }
-    VSHI_TRY(vshi_lit_set_number(document, view, "buffer", l->numbers[buffer], error));
+    vshi_lit_set_number(document, view, "buffer", l->numbers[buffer]);
     const size_t base = l->offsets[buffer] != SIZE_MAX ? l->offsets[buffer] : 0;
     const size_t moved = base + offset - dropped_before(document, buffer, offset);
-    return moved != offset ? vshi_lit_set_number(document, view, "byteOffset", moved, error) : VSH_OK;
+    if (moved != offset) {
+        vshi_lit_set_number(document, view, "byteOffset", moved);
+    }
+    return VSH_OK;
 }
 
 static vsh_result move_views(vshi_lit_document *document, const layout *l, vsh_error *error) {
@@ -253,8 +224,8 @@ static vsh_result move_views(vshi_lit_document *document, const layout *l, vsh_e
     json_array_foreach(json_object_get(document->gltf.root, "bufferViews"), i, view) {
         if (lies_in_added(document, i)) {
             const size_t at = (size_t)json_integer_value(json_object_get(view, "byteOffset"));
-            VSHI_TRY(vshi_lit_set_number(document, view, "buffer", 0, error));
-            VSHI_TRY(vshi_lit_set_number(document, view, "byteOffset", (at + l->added), error));
+            vshi_lit_set_number(document, view, "buffer", 0);
+            vshi_lit_set_number(document, view, "byteOffset", at + l->added);
             continue;
         }
         VSHI_TRY(move_view(document, l, view, error));
@@ -288,35 +259,28 @@ static void drop_compression(vshi_lit_document *document) {
     }
 }
 
-/* Gives the document its new list of buffers, and its views their new places. *one is the buffer of all
- * bytes, which the list holds; NULL: there are none. */
-static vsh_result join_buffers(vshi_lit_document *document, layout *l, json_t **one, vsh_error *error) {
-    VSHI_TRY(list_buffers(document, l, one, error));
-    VSHI_TRY(move_views(document, l, error));
-    drop_compression(document);
-    return VSH_OK;
-}
-
-static void free_layout(layout *l) {
-    free(l->numbers);
-    free(l->offsets);
-}
-
 /* --- writing */
 
+/* A file under way. Its stream keeps no failure to itself: the sink does. */
 typedef struct output_file {
+    char *path;
     vshi_output output;
     vshi_sink sink;
-    uint64_t at;
+    uint64_t written; /* to the sink */
+    uint64_t at;      /* of what put() has written */
+    FILE *to;
 } output_file;
 
-static void put(output_file *file, const void *bytes, size_t size) {
-    vshi_sink_write(&file->sink, bytes, size, file->at);
-    file->at += size;
+static ssize_t write_to_sink(void *user, const char *bytes, size_t size) {
+    output_file *file = user;
+    vshi_sink_write(&file->sink, bytes, size, file->written);
+    file->written += size;
+    return (ssize_t)size;
 }
 
-static void put_into(void *file, const void *bytes, size_t size) {
-    put(file, bytes, size);
+static void put(output_file *file, const void *bytes, size_t size) {
+    fwrite(bytes, 1, size, file->to);
+    file->at += size;
 }
 
 static void put_number(output_file *file, uint64_t number) {
@@ -379,9 +343,9 @@ static void find_rest(const vshi_lit_document *document, const unsigned char **r
 
 /* glTF 2.0, 4.4. */
 static vsh_result put_binary(output_file *file, const vshi_lit_document *document, const layout *l,
-                             const vshi_lit_bytes *json, const char *path, vsh_error *error) {
+                             const char *json, size_t json_size, vsh_error *error) {
     enum { HEADER = 12, CHUNK = 8, JSON_CHUNK = 0x4e4f534a, BINARY_CHUNK = 0x004e4942 };
-    const uint64_t text = ((uint64_t)json->size + 3) & ~UINT64_C(3),
+    const uint64_t text = ((uint64_t)json_size + 3) & ~UINT64_C(3),
                    bytes = ((uint64_t)l->size + 3) & ~UINT64_C(3);
     const unsigned char *rest;
     uint64_t more;
@@ -389,7 +353,7 @@ static vsh_result put_binary(output_file *file, const vshi_lit_document *documen
     const uint64_t all = HEADER + CHUNK + text + (bytes > 0 ? CHUNK + bytes : 0) + more;
     if (all > UINT32_MAX) {
         return vshi_fail(error, VSH_ERROR_LIMIT,
-                         "%s: %llu bytes, but a GLB can have %u; a .gltf can have more", path,
+                         "%s: %llu bytes, but a GLB can have %u; a .gltf can have more", file->path,
                          (unsigned long long)all, UINT32_MAX);
     }
     put(file, "glTF", 4);
@@ -397,7 +361,7 @@ static vsh_result put_binary(output_file *file, const vshi_lit_document *documen
     put_number(file, all);
     put_number(file, text);
     put_number(file, JSON_CHUNK);
-    put(file, json->at, json->size);
+    put(file, json, json_size);
     put_padding(file, HEADER + CHUNK + text, ' ');
     if (bytes > 0) {
         put_number(file, bytes);
@@ -409,81 +373,72 @@ static vsh_result put_binary(output_file *file, const vshi_lit_document *documen
     return VSH_OK;
 }
 
-static vsh_result begin_file(output_file *file, const char *path, vsh_error *error) {
-    VSHI_TRY(vshi_output_begin(&file->output, path, error));
-    file->sink = vshi_sink_open(file->output.temporary);
-    file->at = 0;
-    return VSH_OK;
-}
-
-static vsh_result end_file(output_file *file, const char *path, vsh_error *error) {
-    const int reason = vshi_sink_close(&file->sink);
-    return reason == 0
-               ? VSH_OK
-               : vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", path, strerror(reason));
+/* The JSON, of a glTF with lines and indents; of a GLB it is in memory first, as its size stands in front. */
+static vsh_result put_document(const vshi_lit_work *work, output_file *file, const layout *l, bool binary,
+                               vsh_error *error) {
+    char *json = NULL;
+    size_t size = 0;
+    writer w = {.to = binary ? open_memstream(&json, &size) : file->to, .lines = !binary};
+    if (w.to == NULL) {
+        return vshi_lit_no_memory(&work->document, error);
+    }
+    put_value(&w, work->document.gltf.root);
+    if (!binary) {
+        fputc('\n', file->to);
+        return VSH_OK;
+    }
+    const bool failed = ferror(w.to) != 0;
+    const vsh_result result = fclose(w.to) != 0 || failed
+                                  ? vshi_lit_no_memory(&work->document, error)
+                                  : put_binary(file, &work->document, l, json, size, error);
+    free(json);
+    return result;
 }
 
 /* --- files */
 
 typedef struct files {
-    output_file *list; /* [count]: the document's is the last */
-    char **paths;      /* [named + 1] */
-    size_t count, named;
+    output_file *list; /* [named + 1]: what stands beside the document, and the document */
+    size_t named;
 } files;
 
 /* The paths of all; `bin`: the name of the file of the buffer, or of an OBJ's materials; NULL: none. */
 static vsh_result name_files(const vshi_lit_work *work, const vshi_lit_besides *besides, const char *bin,
                              files *all, vsh_error *error) {
-    all->named = besides->count + (bin != NULL);
-    all->list = calloc(all->named + 1, sizeof *all->list);
-    all->paths = calloc(all->named + 1, sizeof *all->paths);
-    if (all->list == NULL || all->paths == NULL) {
+    const size_t named = besides->count + (bin != NULL);
+    all->list = calloc(named + 1, sizeof *all->list);
+    if (all->list == NULL) {
         return vshi_lit_no_memory(&work->document, error);
     }
-    for (size_t i = 0; i <= all->named; ++i) {
+    all->named = named;
+    for (size_t i = 0; i <= named; ++i) {
         const char *name = i < besides->count ? besides->list[i].name : bin;
-        all->paths[i] = i < all->named ? vshi_lit_beside_path(work->output, name) : strdup(work->output);
-        if (all->paths[i] == NULL) {
+        char **path = &all->list[i].path;
+        *path = i < named ? vshi_lit_beside_path(work->output, name) : strdup(work->output);
+        if (*path == NULL) {
             return vshi_lit_no_memory(&work->document, error);
         }
-        VSHI_TRY(vshi_lit_check_replaced(&work->document, all->paths[i], error));
-        if (i == besides->count && i < all->named && vshi_lit_is_obj(work->output)) {
-            VSHI_TRY(vshi_lit_mtl_check(all->paths[i], error));
+        VSHI_TRY(vshi_lit_check_replaced(&work->document, *path, error));
+        if (i == besides->count && i < named && vshi_lit_is_obj(work->output)) {
+            VSHI_TRY(vshi_lit_mtl_check(*path, error));
         }
     }
     return VSH_OK;
 }
 
 static void end_files(files *all) {
-    for (size_t i = 0; i <= all->named; ++i) {
-        if (i < all->count) {
-            vshi_output_abandon(&all->list[i].output);
-        }
-        free(all->paths != NULL ? all->paths[i] : NULL);
+    for (size_t i = 0; all->list != NULL && i <= all->named; ++i) {
+        vshi_output_abandon(&all->list[i].output);
+        free(all->list[i].path);
     }
-    free(all->paths);
     free(all->list);
-}
-
-static vsh_result write_document(const vshi_lit_work *work, output_file *file, const layout *l, bool binary,
-                                 vsh_error *error) {
-    const vshi_lit_document *document = &work->document;
-    vshi_lit_bytes json = {NULL, 0, 0};
-    vsh_result result = write_json(document->gltf.root, !binary, work->output, &json, error);
-    if (result == VSH_OK && binary) {
-        result = put_binary(file, document, l, &json, work->output, error);
-    } else if (result == VSH_OK) {
-        put(file, json.at, json.size);
-        put(file, "\n", 1);
-    }
-    free(json.at);
-    return result;
 }
 
 static vsh_result commit(files *all, vsh_error *error) {
     vshi_output **outputs = calloc(all->named + 1, sizeof *outputs);
     if (outputs == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", all->paths[all->named]);
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory",
+                         all->list[all->named].path);
     }
     for (size_t i = 0; i <= all->named; ++i) {
         outputs[i] = &all->list[i].output;
@@ -493,57 +448,60 @@ static vsh_result commit(files *all, vsh_error *error) {
     return result;
 }
 
-/* Writes the file that the output names: its MTL or its buffer. */
-static void write_named(const vshi_lit_work *work, const vshi_lit_besides *besides, const layout *l,
-                        output_file *file) {
-    if (vshi_lit_is_obj(work->output)) {
-        vshi_lit_put_mtl(work, besides, put_into, file);
-    } else {
+/* Writes file i: what stands beside the document, the MTL or the buffer (`bin`), or the document itself. */
+static vsh_result put_file(const vshi_lit_work *work, const vshi_lit_besides *besides, const layout *l,
+                           const char *bin, size_t i, output_file *file, vsh_error *error) {
+    const bool obj = vshi_lit_is_obj(work->output);
+    if (i < besides->count) {
+        put(file, besides->list[i].bytes, besides->list[i].size);
+    } else if (i == besides->count && bin != NULL && obj) {
+        vshi_lit_put_mtl(work, besides, file->to);
+    } else if (i == besides->count && bin != NULL) {
         put_buffers(file, &work->document, l);
+    } else {
+        return obj ? vshi_lit_put_obj(work, bin, file->to, error)
+                   : put_document(work, file, l, bin == NULL, error);
     }
+    return VSH_OK;
 }
 
-static vsh_result write_all(const vshi_lit_work *work, const vshi_lit_besides *besides, const layout *l,
-                            const char *bin, files *all, vsh_error *error) {
-    for (size_t i = 0; i <= all->named; ++i) {
-        output_file *file = &all->list[i];
-        VSHI_TRY(begin_file(file, all->paths[i], error));
-        ++all->count;
-        vsh_result result = VSH_OK;
-        if (i < besides->count) {
-            put(file, besides->list[i].bytes, besides->list[i].size);
-        } else if (i < all->named) {
-            write_named(work, besides, l, file);
-        } else if (vshi_lit_is_obj(work->output)) {
-            result = vshi_lit_put_obj(work, bin, put_into, file, error);
-        } else {
-            result = write_document(work, file, l, all->named == besides->count, error);
-        }
-        const vsh_result ended = end_file(file, all->paths[i], result == VSH_OK ? error : NULL);
-        VSHI_TRY(result != VSH_OK ? result : ended);
+static vsh_result write_file(const vshi_lit_work *work, const vshi_lit_besides *besides, const layout *l,
+                             const char *bin, size_t i, output_file *file, vsh_error *error) {
+    static const cookie_io_functions_t functions = {.write = write_to_sink};
+    VSHI_TRY(vshi_output_begin(&file->output, file->path, error));
+    file->sink = vshi_sink_open(file->output.temporary);
+    file->to = fopencookie(file, "w", functions);
+    vsh_result result = file->to != NULL ? put_file(work, besides, l, bin, i, file, error)
+                                         : vshi_lit_no_memory(&work->document, error);
+    if (file->to != NULL) {
+        fclose(file->to);
     }
-    if (vshi_job_cancelled(work->document.gltf.job)) {
-        return vshi_job_fail_cancelled(work->document.gltf.job, error);
-    }
-    return commit(all, error);
+    const int reason = vshi_sink_close(&file->sink);
+    return result != VSH_OK || reason == 0 ? result
+                                           : vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s",
+                                                       file->path, strerror(reason));
 }
 
 /* The document's buffers as one, in a file of the name *bin or (NULL) in the document. */
 static vsh_result join(vshi_lit_work *work, const vshi_lit_besides *besides, layout *l, char **bin,
                        files *all, vsh_error *error) {
     vshi_lit_document *document = &work->document;
-    json_t *one = NULL;
     VSHI_TRY(lay_out(document, l, error));
     if (strcasecmp(vshi_path_ending(work->output), "glb") != 0 && l->size > 0) {
         VSHI_TRY(vshi_lit_beside_name(work, "", "bin", bin, error));
     }
     VSHI_TRY(name_files(work, besides, *bin, all, error)); /* by the names that the input has */
-    VSHI_TRY(join_buffers(document, l, &one, error));
+    json_t *one = list_buffers(document, l);
+    VSHI_TRY(move_views(document, l, error));
+    drop_compression(document);
     if (one != NULL) {
-        VSHI_TRY(vshi_lit_set_number(document, one, "byteLength", l->size, error));
+        vshi_lit_set_number(document, one, "byteLength", l->size);
         json_object_del(one, "uri");
     }
-    return *bin != NULL ? vshi_lit_set(document, one, "uri", vshi_lit_uri(*bin), error) : VSH_OK;
+    if (*bin != NULL) {
+        vshi_lit_set(document, one, "uri", vshi_lit_uri(*bin));
+    }
+    return document->refused ? vshi_lit_no_memory(document, error) : VSH_OK;
 }
 
 /* The files of an OBJ: *mtl is the name of that of its materials; NULL: it has none. */
@@ -558,14 +516,19 @@ static vsh_result name_obj(const vshi_lit_work *work, const vshi_lit_besides *be
 vsh_result vshi_lit_write_files(vshi_lit_work *work, const vshi_lit_besides *besides, vsh_error *error) {
     layout l = {.size = 0};
     char *bin = NULL;
-    files all = {.count = 0};
+    files all = {.list = NULL};
     vsh_result result;
     VSHI_TRY_DONE(vshi_lit_is_obj(work->output) ? name_obj(work, besides, &bin, &all, error)
                                                 : join(work, besides, &l, &bin, &all, error));
-    VSHI_TRY_DONE(write_all(work, besides, &l, bin, &all, error));
+    for (size_t i = 0; i <= all.named; ++i) {
+        VSHI_TRY_DONE(write_file(work, besides, &l, bin, i, &all.list[i], error));
+    }
+    VSHI_TRY_DONE(vshi_job_cancelled(work->job) ? vshi_job_fail_cancelled(work->job, error)
+                                                : commit(&all, error));
 done:
     end_files(&all);
     free(bin);
-    free_layout(&l);
+    free(l.numbers);
+    free(l.offsets);
     return result;
 }

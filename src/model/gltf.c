@@ -23,18 +23,6 @@ vsh_result vshi_gltf_fail(const vshi_gltf *gltf, vsh_error *error, const char *f
     return vshi_fail(error, VSH_ERROR_INPUT, "%s: %s", gltf->path, text);
 }
 
-json_t *vshi_gltf_copy(const json_t *json) {
-    return vshi_gltf_check_copy(json_deep_copy(json), json);
-}
-
-json_t *vshi_gltf_check_copy(json_t *copy, const json_t *json) {
-    if (copy != NULL && !json_equal(copy, json)) {
-        json_decref(copy);
-        return NULL;
-    }
-    return copy;
-}
-
 const json_t *vshi_gltf_element(const vshi_gltf *gltf, const char *array, size_t index) {
     return json_array_get(json_object_get(gltf->root, array), index);
 }

@@ -50,13 +50,6 @@ typedef struct vshi_gltf {
 /* An element of an array of the root, NULL where there is none. */
 const json_t *vshi_gltf_element(const vshi_gltf *gltf, const char *array, size_t index);
 
-/* A deep copy; NULL if memory is refused or `json` is NULL. */
-json_t *vshi_gltf_copy(const json_t *json);
-
-/* Returns `copy`, by json_copy() or json_deep_copy(), or frees it and returns NULL if it lacks something:
- * they leave out what they have no memory for. */
-json_t *vshi_gltf_check_copy(json_t *copy, const json_t *json);
-
 /* A whole number of at least 0; `fallback` where the key is absent; false where the value is anything else.
  */
 bool vshi_gltf_count(const json_t *object, const char *key, size_t fallback, size_t *value);
@@ -90,6 +83,11 @@ vsh_result vshi_gltf_take(vshi_gltf *gltf, void **memory, size_t count, size_t s
  */
 vsh_result vshi_gltf_view(vshi_gltf *gltf, size_t index, vshi_gltf_bytes *bytes, size_t *stride,
                           vsh_error *error);
+
+/* Reads a file of at most `most` bytes into new memory, to be freed after an error too. Messages begin with
+ * `name`. */
+vsh_result vshi_gltf_read_file(vshi_gltf *gltf, const char *path, const char *name, uint64_t most,
+                               unsigned char **bytes, size_t *size, vsh_error *error);
 
 /* Decodes a data URI into new memory. */
 vsh_result vshi_gltf_read_data(vshi_gltf *gltf, const char *where, const char *uri, unsigned char **bytes,
@@ -139,6 +137,9 @@ void vshi_gltf_accessor_floats(const vshi_gltf_accessor *accessor, float *values
 /* Its elements as unsigned integers; the type is one. */
 void vshi_gltf_accessor_integers(const vshi_gltf_accessor *accessor, uint32_t *values);
 
+/* Its elements as they are, one behind the other. */
+void vshi_gltf_accessor_bytes(const vshi_gltf_accessor *accessor, unsigned char *bytes);
+
 /* --- meshes (gltf_primitive.c) */
 
 /* What moves the vertices of a mesh that a node uses. All 0: nothing. */
@@ -180,6 +181,19 @@ vsh_result vshi_gltf_draco_indices(vshi_gltf *gltf, const vshi_draco *mesh, cons
 
 /* Adds what the file's scene shows to the model. */
 vsh_result vshi_gltf_add_scene(vshi_gltf *gltf, vsh_error *error);
+
+/* The parts of a transform, as keys of a node and as accessors of EXT_mesh_gpu_instancing. */
+enum { VSHI_GLTF_PARTS = 3 };
+typedef struct vshi_gltf_part {
+    const char *attribute, *key;
+    int components;
+} vshi_gltf_part;
+extern const vshi_gltf_part vshi_gltf_parts[VSHI_GLTF_PARTS];
+
+/* Reads the values of the extension, in new memory each, also after an error; NULL where a part is not given.
+ * Errors: VSH_ERROR_INPUT (none is given, or they differ in length), VSH_ERROR_MEMORY. */
+vsh_result vshi_gltf_read_instances(vshi_gltf *gltf, const json_t *instancing, const char *where,
+                                    float *values[VSHI_GLTF_PARTS], size_t *count, vsh_error *error);
 
 /* Reads all materials, and the images of masked ones (gltf_material.c). */
 vsh_result vshi_gltf_read_materials(vshi_gltf *gltf, vsh_error *error);

@@ -24,8 +24,25 @@ vsh_result vshi_gltf_read_data(vshi_gltf *gltf, const char *where, const char *u
                    : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", gltf->path);
 }
 
-static vsh_result read_file(vshi_gltf *gltf, size_t index, const char *path, vshi_gltf_buffer *buffer,
-                            vsh_error *error) {
+vsh_result vshi_gltf_read_file(vshi_gltf *gltf, const char *path, const char *name, uint64_t most,
+                               unsigned char **bytes, size_t *size, vsh_error *error) {
+    FILE *file;
+    uint64_t told;
+    VSHI_TRY(vshi_input_open(path, name, most, &file, &told, error));
+    *size = (size_t)told;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_gltf_take(gltf, (void **)bytes, *size > 0 ? *size : 1, 1, error));
+    if (fread(*bytes, 1, *size, file) != *size) {
+        result = vshi_fail(error, VSH_ERROR_READ, "%s: %s", name,
+                           ferror(file) ? strerror(errno) : "became shorter while it was read");
+    }
+done:
+    fclose(file);
+    return result;
+}
+
+static vsh_result read_buffer(vshi_gltf *gltf, size_t index, const char *path, vshi_gltf_buffer *buffer,
+                              vsh_error *error) {
     if (!gltf->run->allow_outside && !vshi_input_is_beside(gltf->path, path)) {
         return vshi_fail(error, VSH_ERROR_INPUT,
                          "%s: buffers[%zu], which holds its vertices, is '%s', outside of its folder, where "
@@ -35,20 +52,7 @@ static vsh_result read_file(vshi_gltf *gltf, size_t index, const char *path, vsh
     char name[1024];
     snprintf(name, sizeof name, "%.400s: buffers[%zu], which holds its vertices, is the file '%.400s'",
              gltf->path, index, path);
-    FILE *file;
-    uint64_t bytes;
-    VSHI_TRY(vshi_input_open(path, name, SIZE_MAX, &file, &bytes, error));
-    const size_t size = (size_t)bytes;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_gltf_allocate(gltf, (void **)&buffer->owned, size, 1, error));
-    if (fread(buffer->owned, 1, size, file) != size) {
-        result = vshi_fail(error, VSH_ERROR_READ, "%s: '%s': %s", gltf->path, path,
-                           ferror(file) ? strerror(errno) : "became shorter while it was read");
-    }
-    buffer->bytes.size = size;
-done:
-    fclose(file);
-    return result;
+    return vshi_gltf_read_file(gltf, path, name, SIZE_MAX, &buffer->owned, &buffer->bytes.size, error);
 }
 
 static vsh_result load_beside(vshi_gltf *gltf, size_t index, const char *uri, vshi_gltf_buffer *buffer,
@@ -61,7 +65,7 @@ static vsh_result load_beside(vshi_gltf *gltf, size_t index, const char *uri, vs
     if (path == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", gltf->path);
     }
-    const vsh_result result = read_file(gltf, index, path, buffer, error);
+    const vsh_result result = read_buffer(gltf, index, path, buffer, error);
     free(path);
     return result;
 }
@@ -538,55 +542,52 @@ static float component(const unsigned char *at, int type, bool normalized) {
     }
 }
 
-static void element(const vshi_gltf_accessor *a, const unsigned char *at, float *to) {
-    if (a->type == VSHI_GLTF_FLOAT) {
-        memcpy(to, at, (size_t)a->components * sizeof *to);
-        return;
+/* Takes the element at `at` as element i of `to`. */
+typedef void take_fn(const vshi_gltf_accessor *a, const unsigned char *at, size_t i, void *to);
+
+/* All elements, of `size` bytes in `to`: zeros or those of the view, and those that replace some. */
+static inline void take_elements(const vshi_gltf_accessor *a, take_fn *take, void *to, size_t size) {
+    const size_t index_size = vshi_gltf_component_size(a->sparse_type);
+    const size_t value_size = (size_t)a->components * vshi_gltf_component_size(a->type);
+    if (a->at == NULL) {
+        memset(to, 0, a->count * size);
     }
-    const size_t size = vshi_gltf_component_size(a->type);
-    for (int k = 0; k < a->components; ++k) {
-        to[k] = component(at + (size_t)k * size, a->type, a->normalized);
+    for (size_t i = 0; i < a->count && a->at != NULL; ++i) {
+        take(a, a->at + i * a->stride, i, to);
+    }
+    for (size_t i = 0; i < a->sparse_count; ++i) {
+        const size_t index = vshi_gltf_integer_at(a->sparse_at + i * index_size, a->sparse_type);
+        take(a, a->sparse_values + i * value_size, index, to);
+    }
+}
+
+static void take_floats(const vshi_gltf_accessor *a, const unsigned char *at, size_t i, void *to) {
+    const size_t n = (size_t)a->components, size = vshi_gltf_component_size(a->type);
+    for (size_t k = 0; k < n; ++k) {
+        ((float *)to)[n * i + k] = component(at + k * size, a->type, a->normalized);
     }
 }
 
 void vshi_gltf_accessor_floats(const vshi_gltf_accessor *a, float *values) {
-    const size_t n = (size_t)a->components;
-    const bool plain = a->at != NULL && a->type == VSHI_GLTF_FLOAT && a->stride == n * sizeof *values;
-    if (plain) {
-        memcpy(values, a->at, a->count * a->stride);
-    }
-    for (size_t i = 0; !plain && i < a->count && a->at != NULL; ++i) {
-        element(a, a->at + i * a->stride, values + n * i);
-    }
-    if (a->at == NULL) {
-        memset(values, 0, a->count * n * sizeof *values);
-    }
-    const size_t index_size = vshi_gltf_component_size(a->sparse_type);
-    const size_t value_size = n * vshi_gltf_component_size(a->type);
-    for (size_t i = 0; i < a->sparse_count; ++i) {
-        const size_t index = vshi_gltf_integer_at(a->sparse_at + i * index_size, a->sparse_type);
-        element(a, a->sparse_values + i * value_size, values + n * index);
+    take_elements(a, take_floats, values, (size_t)a->components * sizeof *values);
+}
+
+static void take_integers(const vshi_gltf_accessor *a, const unsigned char *at, size_t i, void *to) {
+    const size_t n = (size_t)a->components, size = vshi_gltf_component_size(a->type);
+    for (size_t k = 0; k < n; ++k) {
+        ((uint32_t *)to)[n * i + k] = (uint32_t)vshi_gltf_integer_at(at + k * size, a->type);
     }
 }
 
 void vshi_gltf_accessor_integers(const vshi_gltf_accessor *a, uint32_t *values) {
-    const size_t n = (size_t)a->components, size = vshi_gltf_component_size(a->type);
-    const bool plain = a->at != NULL && a->type == VSHI_GLTF_UINT && a->stride == n * size;
-    if (plain) {
-        memcpy(values, a->at, a->count * a->stride);
-    }
-    for (size_t i = 0; !plain && i < a->count; ++i) {
-        for (size_t k = 0; k < n; ++k) {
-            values[n * i + k] =
-                a->at != NULL ? (uint32_t)vshi_gltf_integer_at(a->at + i * a->stride + k * size, a->type) : 0;
-        }
-    }
-    const size_t index_size = vshi_gltf_component_size(a->sparse_type);
-    for (size_t i = 0; i < a->sparse_count; ++i) {
-        const size_t index = vshi_gltf_integer_at(a->sparse_at + i * index_size, a->sparse_type);
-        for (size_t k = 0; k < n; ++k) {
-            values[n * index + k] =
-                (uint32_t)vshi_gltf_integer_at(a->sparse_values + (n * i + k) * size, a->type);
-        }
-    }
+    take_elements(a, take_integers, values, (size_t)a->components * sizeof *values);
+}
+
+static void take_bytes(const vshi_gltf_accessor *a, const unsigned char *at, size_t i, void *to) {
+    const size_t size = (size_t)a->components * vshi_gltf_component_size(a->type);
+    memcpy((unsigned char *)to + i * size, at, size);
+}
+
+void vshi_gltf_accessor_bytes(const vshi_gltf_accessor *a, unsigned char *bytes) {
+    take_elements(a, take_bytes, bytes, (size_t)a->components * vshi_gltf_component_size(a->type));
 }

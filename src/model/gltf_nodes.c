@@ -181,23 +181,6 @@ static void name_of(const char *array, size_t index, const json_t *item, char *t
 
 /* --- shapes */
 
-static vsh_result grow_shapes(vshi_gltf *gltf, size_t more, vsh_error *error) {
-    vsh_model *model = gltf->model;
-    if (more <= gltf->shape_capacity - model->shape_count) {
-        return VSH_OK;
-    }
-    const size_t capacity = 2 * gltf->shape_capacity + more;
-    vshi_model_shape *shapes = NULL;
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&shapes, capacity, sizeof *shapes, error));
-    if (model->shape_count > 0) {
-        memcpy(shapes, model->shapes, model->shape_count * sizeof *shapes);
-    }
-    free(model->shapes);
-    model->shapes = shapes;
-    gltf->shape_capacity = capacity;
-    return VSH_OK;
-}
-
 /* A shape for each primitive of a mesh, from *first on. */
 static vsh_result read_mesh(vshi_gltf *gltf, size_t mesh, const vshi_gltf_pose *pose, size_t *first,
                             vsh_error *error) {
@@ -205,12 +188,15 @@ static vsh_result read_mesh(vshi_gltf *gltf, size_t mesh, const vshi_gltf_pose *
     const json_t *primitives = json_object_get(given, "primitives");
     const size_t count = json_array_size(primitives);
     const char *name = json_string_value(json_object_get(given, "name"));
-    *first = gltf->model->shape_count;
-    VSHI_TRY(grow_shapes(gltf, count, error));
+    vsh_model *model = gltf->model;
+    *first = model->shape_count;
+    VSHI_TRY(vshi_gltf_hold(gltf, 2.0 * (double)count * sizeof *model->shapes, error));
     for (size_t i = 0; i < count; ++i) {
         char where[256];
         snprintf(where, sizeof where, "mesh %zu '%.150s': primitive %zu", mesh, name != NULL ? name : "", i);
-        vshi_model_shape *shape = &gltf->model->shapes[gltf->model->shape_count++];
+        VSHI_TRY(vshi_model_grow(&model->shapes, model->shape_count, &gltf->shape_capacity,
+                                 sizeof *model->shapes, gltf->path, error));
+        vshi_model_shape *shape = &model->shapes[model->shape_count++];
         if (vshi_job_cancelled(gltf->job)) {
             return vshi_job_fail_cancelled(gltf->job, error);
         }
@@ -348,19 +334,15 @@ static vsh_result add_entries(vshi_gltf *gltf, size_t node, size_t mesh, size_t 
     return VSH_OK;
 }
 
-/* The accessors of EXT_mesh_gpu_instancing. */
-static const struct {
-    const char *name;
-    int components;
-} instance_parts[3] = {{"TRANSLATION", 3}, {"ROTATION", 4}, {"SCALE", 3}};
+const vshi_gltf_part vshi_gltf_parts[VSHI_GLTF_PARTS] = {
+    {"TRANSLATION", "translation", 3}, {"ROTATION", "rotation", 4}, {"SCALE", "scale", 3}};
 
-/* Their values, in new memory each; NULL where a part is not given. */
-static vsh_result read_instances(vshi_gltf *gltf, const json_t *instancing, const char *where,
-                                 float *values[3], size_t *count, vsh_error *error) {
+vsh_result vshi_gltf_read_instances(vshi_gltf *gltf, const json_t *instancing, const char *where,
+                                    float *values[VSHI_GLTF_PARTS], size_t *count, vsh_error *error) {
     const json_t *attributes = json_object_get(instancing, "attributes");
     *count = SIZE_MAX;
-    for (int k = 0; k < 3; ++k) {
-        const char *name = instance_parts[k].name;
+    for (int k = 0; k < VSHI_GLTF_PARTS; ++k) {
+        const char *name = vshi_gltf_parts[k].attribute;
         size_t index;
         vshi_gltf_accessor accessor;
         VSHI_TRY(vshi_gltf_index(gltf, attributes, name, "accessors", where, &index, error));
@@ -369,8 +351,8 @@ static vsh_result read_instances(vshi_gltf *gltf, const json_t *instancing, cons
         }
         VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
         *count = *count == SIZE_MAX ? accessor.count : *count;
-        VSHI_TRY(vshi_gltf_read_attribute(gltf, attributes, name, instance_parts[k].components, *count, where,
-                                          &values[k], error));
+        VSHI_TRY(vshi_gltf_read_attribute(gltf, attributes, name, vshi_gltf_parts[k].components, *count,
+                                          where, &values[k], error));
     }
     return *count < SIZE_MAX
                ? VSH_OK
@@ -381,17 +363,17 @@ static vsh_result read_instances(vshi_gltf *gltf, const json_t *instancing, cons
  * node's. */
 static vsh_result add_instances(vshi_gltf *gltf, size_t node, size_t mesh, size_t first,
                                 const json_t *instancing, vsh_error *error) {
-    float *values[3] = {NULL, NULL, NULL};
+    float *values[VSHI_GLTF_PARTS] = {NULL};
     size_t count;
     char where[64];
     snprintf(where, sizeof where, "nodes[%zu]: EXT_mesh_gpu_instancing", node);
     vsh_result result;
-    VSHI_TRY_DONE(read_instances(gltf, instancing, where, values, &count, error));
+    VSHI_TRY_DONE(vshi_gltf_read_instances(gltf, instancing, where, values, &count, error));
     for (size_t i = 0; i < count; ++i) {
         double t[3] = {0, 0, 0}, r[4] = {0, 0, 0, 1}, s[3] = {1, 1, 1}, own[12], world[12];
         double *const given[3] = {t, r, s};
         for (int k = 0; k < 3; ++k) {
-            const int components = instance_parts[k].components;
+            const int components = vshi_gltf_parts[k].components;
             for (int c = 0; c < components && values[k] != NULL; ++c) {
                 given[k][c] = (double)values[k][(size_t)components * i + (size_t)c];
             }

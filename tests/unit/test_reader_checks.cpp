@@ -3,7 +3,7 @@
 #include "readers.h"
 
 extern "C" {
-#include "lit/draco.h"
+#include "lit/work.h"
 }
 
 #include <fcntl.h>
