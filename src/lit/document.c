@@ -59,12 +59,6 @@ vsh_result vshi_lit_open(vshi_lit_document *document, const char *path, const vs
     if (images != NULL && json_array_extend(document->own_images, (json_t *)(uintptr_t)images) != 0) {
         return vshi_lit_no_memory(document, error);
     }
-    const size_t buffers = json_array_size(json_object_get(gltf->root, "buffers"));
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&gltf->buffers, buffers, sizeof *gltf->buffers, error));
-    gltf->buffer_count = buffers;
-    VSHI_TRY(
-        vshi_gltf_allocate(gltf, (void **)&gltf->views, document->first_view, sizeof *gltf->views, error));
-    gltf->view_count = document->first_view;
     return VSH_OK;
 }
 
@@ -159,9 +153,24 @@ void vshi_lit_use_extension(vshi_lit_document *document, const char *name) {
     }
 }
 
+/* Whether something at or below `value` has the extension. */
+static bool has_extension(json_t *value, const char *name) {
+    size_t i;
+    const char *key;
+    json_t *item;
+    bool has = vshi_gltf_extension(value, name) != NULL;
+    json_array_foreach(value, i, item) {
+        has = has || has_extension(item, name);
+    }
+    json_object_foreach(value, key, item) {
+        has = has || has_extension(item, name);
+    }
+    return has;
+}
+
 void vshi_lit_drop_extension(vshi_lit_document *document, const char *name) {
     static const char *const lists[] = {"extensionsUsed", "extensionsRequired"};
-    for (size_t i = 0; i < sizeof lists / sizeof lists[0]; ++i) {
+    for (size_t i = 0; i < 2 && !has_extension(document->gltf.root, name); ++i) {
         json_t *list = json_object_get(document->gltf.root, lists[i]);
         for (size_t at = find_name(list, name); at != SIZE_MAX; at = find_name(list, name)) {
             json_array_remove(list, at);

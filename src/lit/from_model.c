@@ -131,7 +131,7 @@ static vsh_result fill(maker *m, size_t entry, const double *world, arrays *a, v
     const double held = document->gltf.bytes_held;
     float *values = NULL;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_gltf_take(&document->gltf, (void **)&values, count, sizeof(float[3]), error));
+    VSHI_TRY_DONE(vshi_gltf_allocate(&document->gltf, (void **)&values, count, sizeof(float[3]), error));
     document->gltf.bytes_held = held;
     VSHI_TRY_DONE(add_positions(m, mesh, a->lit, count, world, values, a->attributes, error));
     if (mesh->normals != NULL) {
@@ -160,10 +160,7 @@ static bool is_same(const arrays *a, const vsh_mesh *mesh, const vsh_lit_mesh *l
         (a->lit == NULL) != (lit == NULL)) {
         return false;
     }
-    return lit == NULL ||
-           (a->lit->vertex_count == lit->vertex_count &&
-            memcmp(a->lit->sources, lit->sources, lit->vertex_count * sizeof *lit->sources) == 0 &&
-            memcmp(a->lit->indices, lit->indices, 3 * lit->triangle_count * sizeof *lit->indices) == 0);
+    return lit == NULL || vshi_lit_is_split_alike(a->lit, lit);
 }
 
 /* Arrays of an earlier mesh, or new ones; those in the world are for one mesh only. */
@@ -193,7 +190,7 @@ static vsh_result put_primitive(maker *m, size_t entry, arrays *a, json_t *made,
     size_t set = a->set_count < VSHI_LIT_SET ? a->set_count : VSHI_LIT_SET;
     if (lit->uvs != NULL) {
         float *values = NULL;
-        VSHI_TRY(vshi_gltf_take(&document->gltf, (void **)&values, count, sizeof(float[2]), error));
+        VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)&values, count, sizeof(float[2]), error));
         const vsh_result result =
             add_set(m, lit->uvs, NULL, count, values, set, json_object_get(made, "attributes"), error);
         free(values);

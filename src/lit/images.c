@@ -16,17 +16,6 @@
 
 /* --- names of files beside the output */
 
-char *vshi_lit_beside_path(const char *output, const char *name) {
-    const char *slash = strrchr(output, '/');
-    const size_t folder = slash != NULL ? (size_t)(slash - output) + 1 : 0;
-    char *path = malloc(folder + strlen(name) + 1);
-    if (path != NULL) {
-        memcpy(path, output, folder);
-        strcpy(path + folder, name);
-    }
-    return path;
-}
-
 bool vshi_lit_is_same_file(const char *a, const char *b) {
     struct stat one, other;
     return stat(a, &one) == 0 && stat(b, &other) == 0 && one.st_dev == other.st_dev &&
@@ -80,7 +69,7 @@ vsh_result vshi_lit_beside_name(const vshi_lit_work *work, const char *mark, con
     enum { MOST = 100 };
     for (unsigned number = 0;; ++number) {
         *name = make_name(work->output, mark, ending, number);
-        char *path = *name != NULL ? vshi_lit_beside_path(work->output, *name) : NULL;
+        char *path = *name != NULL ? vshi_path_beside(work->output, *name, strlen(*name)) : NULL;
         if (path == NULL) {
             free(*name);
             *name = NULL;

@@ -254,7 +254,7 @@ static vsh_result count_pages(vshi_lit_work *work, vsh_error *error) {
     return VSH_OK;
 }
 
-static vsh_result check(vshi_lit_work *work, vsh_error *error) {
+static vsh_result check_output(const vshi_lit_work *work, vsh_error *error) {
     if (!vsh_lit_is_output(work->output)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: expected a name that ends in .glb, .gltf or .obj",
                          work->output);
@@ -264,13 +264,8 @@ static vsh_result check(vshi_lit_work *work, vsh_error *error) {
     }
     VSHI_TRY(vshi_output_check(work->output, error));
     VSHI_TRY(check_images(work->options, error));
-    VSHI_TRY(vshi_attributes_check(work->output, work->options->attributes, work->options->attribute_count,
-                                   error));
-    VSHI_TRY(count_pages(work, error));
-    for (size_t i = 0; i < vsh_model_mesh_count(work->model); ++i) {
-        VSHI_TRY(check_mesh(work, i, error));
-    }
-    return VSH_OK;
+    return vshi_attributes_check(work->output, work->options->attributes, work->options->attribute_count,
+                                 error);
 }
 
 /* --- the document */
@@ -299,18 +294,12 @@ static bool has_new_uvs(const vshi_lit_work *work) {
     return false;
 }
 
-/* The folder of a file, in new memory. */
-static char *folder_of(const char *path) {
-    const char *slash = strrchr(path, '/');
-    return slash != NULL ? strndup(path, (size_t)(slash - path) + 1) : strdup(".");
-}
-
 /* Images that the input names stay named where the output stands beside it. */
 static vsh_result bring_images(vshi_lit_work *work, vsh_error *error) {
     if (work->document.own_images == NULL) {
         return VSH_OK;
     }
-    char *one = folder_of(work->path), *other = folder_of(work->output);
+    char *one = vshi_path_beside(work->path, ".", 1), *other = vshi_path_beside(work->output, ".", 1);
     const bool known = one != NULL && other != NULL, beside = known && vshi_lit_is_same_file(one, other);
     free(one);
     free(other);
@@ -366,7 +355,12 @@ done:
 }
 
 static void free_work(vshi_lit_work *work) {
-    vshi_lit_shapes_free(work);
+    for (size_t i = 0; i < work->uv_count; ++i) {
+        free(work->uvs[i].set);
+    }
+    free(work->uvs);
+    free(work->splits);
+    free(work->copies);
     for (size_t i = 0; i < work->looks.count; ++i) {
         json_decref(work->looks.list[i].transform);
     }
@@ -412,51 +406,27 @@ static vsh_result try_all(void *user, vsh_error *error) {
     return VSH_OK;
 }
 
-static vsh_result do_work(vshi_stack_fn *fn, vshi_lit_work *work, size_t steps, vsh_error *error) {
-    work->job = vshi_job_begin(work->run, "lit", steps);
-    return work->job != NULL ? vshi_on_stack(fn, work, error)
-                             : vshi_fail(error, VSH_ERROR_MEMORY, "a lit model: the system refused memory");
-}
-
-vsh_result vsh_lit_check_uvs(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
-                             const vsh_lit_options *options, const vsh_run *run, vsh_error *error) {
-    VSHI_FLOATS;
-    VSHI_NEEDS(model);
-    VSHI_NEEDS(meshes);
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    vsh_lit_options own = vsh_lit_options_default();
-    VSHI_TRY(vshi_options_resolve(options, &own, sizeof own, "vsh_lit_options", error));
-    for (size_t i = 0; i < own.image_count; ++i) {
-        if (own.images[i].purpose < 0 || own.images[i].purpose >= VSH_LIT_PURPOSES) {
+/* Images need not be there where it is only looked for UVs. */
+static vsh_result check_purposes(const vsh_lit_options *options, vsh_error *error) {
+    for (size_t i = 0; i < options->image_count; ++i) {
+        if (options->images[i].purpose < 0 || options->images[i].purpose >= VSH_LIT_PURPOSES) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_lit_options.images[%zu].purpose is %d", i,
-                             own.images[i].purpose);
+                             options->images[i].purpose);
         }
     }
-    vshi_lit_work work = {.model = model, .meshes = meshes, .options = &own, .path = path, .run = &full};
-    vsh_result result;
-    VSHI_TRY_DONE(count_pages(&work, error));
-    for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
-        VSHI_TRY_DONE(check_mesh(&work, i, error));
-    }
-    result = do_work(try_all, &work, 1, error);
-done:
-    vshi_job_end(work.job);
-    free_work(&work);
-    return result;
+    return VSH_OK;
 }
 
-vsh_result vsh_lit_write(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
-                         const vsh_lit_options *options, const char *output, const vsh_run *run,
-                         vsh_error *error) {
-    VSHI_FLOATS;
-    VSHI_NEEDS(model);
-    VSHI_NEEDS(output);
+/* Writes the lit model, or (`output` NULL) looks whether its new UVs have room. */
+static vsh_result process(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
+                          const vsh_lit_options *options, const char *output, const vsh_run *run,
+                          vsh_error *error) {
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     vsh_lit_options own = vsh_lit_options_default();
     VSHI_TRY(vshi_options_resolve(options, &own, sizeof own, "vsh_lit_options", error));
     vsh_lit_mesh *made = NULL;
+    const size_t count = vsh_model_mesh_count(model);
     if (meshes == NULL) {
         VSHI_TRY(default_meshes(model, &made, error));
     }
@@ -467,9 +437,17 @@ vsh_result vsh_lit_write(const char *path, const vsh_model *model, const vsh_lit
                           .path = path,
                           .run = &full};
     vsh_result result;
-    VSHI_TRY_DONE(check(&work, error));
-    result = do_work(make, &work, vsh_model_mesh_count(model) + 1, error);
-    if (result == VSH_OK) {
+    VSHI_TRY_DONE(output != NULL ? check_output(&work, error) : check_purposes(&own, error));
+    VSHI_TRY_DONE(count_pages(&work, error));
+    for (size_t i = 0; i < count; ++i) {
+        VSHI_TRY_DONE(check_mesh(&work, i, error));
+    }
+    work.job = vshi_job_begin(&full, "lit", output != NULL ? count + 1 : 1);
+    if (work.job == NULL) {
+        VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_MEMORY, "a lit model: the system refused memory"));
+    }
+    VSHI_TRY_DONE(vshi_on_stack(output != NULL ? make : try_all, &work, error));
+    if (output != NULL) {
         vshi_job_advance(work.job, 1); /* all is written: too late to stop */
     }
 done:
@@ -477,4 +455,21 @@ done:
     free_work(&work);
     free(made);
     return result;
+}
+
+vsh_result vsh_lit_check_uvs(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
+                             const vsh_lit_options *options, const vsh_run *run, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(model);
+    VSHI_NEEDS(meshes);
+    return process(path, model, meshes, options, NULL, run, error);
+}
+
+vsh_result vsh_lit_write(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
+                         const vsh_lit_options *options, const char *output, const vsh_run *run,
+                         vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(model);
+    VSHI_NEEDS(output);
+    return process(path, model, meshes, options, output, run, error);
 }

@@ -149,7 +149,7 @@ static size_t look_of(const vshi_lit_work *work, const json_t *owner) {
     return number < 0 && -1 - number < (json_int_t)work->looks.count ? (size_t)(-1 - number) : SIZE_MAX;
 }
 
-/* Materials that are shown without light too. */
+/* Materials that are shown without light too; `user` NULL: all are only checked. */
 static vsh_result find_unlit(vshi_lit_work *work, json_t *owner, void *user, vsh_error *error) {
     bool *unlit = user;
     size_t material = SIZE_MAX;
@@ -157,7 +157,7 @@ static vsh_result find_unlit(vshi_lit_work *work, json_t *owner, void *user, vsh
         VSHI_TRY(vshi_gltf_index(&work->document.gltf, owner, "material", "materials", "a primitive",
                                  &material, error));
     }
-    if (material != SIZE_MAX) {
+    if (material != SIZE_MAX && unlit != NULL) {
         unlit[material] = true;
     }
     return VSH_OK;
@@ -179,15 +179,8 @@ static vsh_result put(vshi_lit_work *work, json_t *owner, void *user, vsh_error 
     return VSH_OK;
 }
 
-static vsh_result check(vshi_lit_work *work, json_t *owner, void *user, vsh_error *error) {
-    size_t material;
-    (void)user;
-    return vshi_gltf_index(&work->document.gltf, owner, "material", "materials", "a primitive", &material,
-                           error);
-}
-
 vsh_result vshi_lit_materials_check(vshi_lit_work *work, vsh_error *error) {
-    return visit_all(work, check, NULL, error);
+    return visit_all(work, find_unlit, NULL, error); /* no look is there yet */
 }
 
 /* --- all of them */

@@ -97,14 +97,10 @@ static vsh_result count_instances(vshi_lit_work *work, size_t node, size_t *coun
         vshi_gltf_extension(vshi_gltf_element(gltf, "nodes", node), instancing_name), "attributes");
     *count = 0;
     for (int k = 0; k < VSHI_GLTF_PARTS && *count == 0; ++k) {
-        size_t index;
         vshi_gltf_accessor accessor;
-        VSHI_TRY(vshi_gltf_index(gltf, attributes, vshi_gltf_parts[k].attribute, "accessors", instancing_name,
-                                 &index, error));
-        if (index != SIZE_MAX) {
-            VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
-            *count = accessor.count;
-        }
+        VSHI_TRY(vshi_gltf_accessor_find(gltf, attributes, vshi_gltf_parts[k].attribute, instancing_name,
+                                         &accessor, error));
+        *count = accessor.count;
     }
     return VSH_OK;
 }
@@ -326,27 +322,6 @@ static vsh_result make_all(vshi_lit_work *work, uses *all, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Extensions that only what has changed has needed. */
-static void drop_extensions(vshi_lit_work *work) {
-    size_t i, k;
-    const json_t *item, *primitive;
-    bool instancing = false, draco = false;
-    json_array_foreach(json_object_get(work->document.gltf.root, "nodes"), i, item) {
-        instancing = instancing || vshi_gltf_extension(item, instancing_name) != NULL;
-    }
-    json_array_foreach(json_object_get(work->document.gltf.root, "meshes"), i, item) {
-        json_array_foreach(json_object_get(item, "primitives"), k, primitive) {
-            draco = draco || vshi_gltf_extension(primitive, "KHR_draco_mesh_compression") != NULL;
-        }
-    }
-    if (!instancing) {
-        vshi_lit_drop_extension(&work->document, instancing_name);
-    }
-    if (!draco) {
-        vshi_lit_drop_extension(&work->document, "KHR_draco_mesh_compression");
-    }
-}
-
 vsh_result vshi_lit_nodes_make(vshi_lit_work *work, vsh_error *error) {
     vshi_gltf *gltf = &work->document.gltf;
     const size_t nodes = json_array_size(json_object_get(gltf->root, "nodes"));
@@ -367,7 +342,8 @@ vsh_result vshi_lit_nodes_make(vshi_lit_work *work, vsh_error *error) {
     VSHI_TRY_DONE(list_uses(work, seen, &all, error));
     VSHI_TRY_DONE(count_unlit(work, &all, error));
     VSHI_TRY_DONE(make_all(work, &all, error));
-    drop_extensions(work);
+    vshi_lit_drop_extension(&work->document, instancing_name);
+    vshi_lit_drop_extension(&work->document, "KHR_draco_mesh_compression");
 done:
     for (size_t m = 0; all.changed != NULL && m < all.mesh_count; ++m) {
         json_decref(all.changed[m]);

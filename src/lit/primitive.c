@@ -7,222 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* --- vertices: which elements of a primitive's accessors they are, copies of these, and new sets of UVs */
-
-static vsh_result fail_other(const vshi_lit_document *document, const char *where, vsh_error *error) {
-    return vshi_gltf_fail(&document->gltf, error,
-                          "%s: is not what the model was made of: the file has changed since", where);
-}
-
-/* Vertices of the model are the elements that triangles use, in their order: the others are not kept. */
-static vsh_result match(vshi_lit_document *document, const uint32_t *corners, size_t count, const char *where,
-                        const vsh_mesh *mesh, vshi_lit_topology *topology, vsh_error *error) {
-    vshi_gltf *gltf = &document->gltf;
-    if (count != mesh->triangle_count || mesh->vertex_count > topology->element_count) {
-        return fail_other(document, where, error);
-    }
-    bool *used = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_gltf_allocate(gltf, (void **)&used, topology->element_count, sizeof *used, error));
-    VSHI_TRY_DONE(vshi_gltf_take(gltf, (void **)&topology->elements, mesh->vertex_count,
-                                 sizeof *topology->elements, error));
-    for (size_t i = 0; i < 3 * count; ++i) {
-        used[corners[i]] = true;
-    }
-    size_t vertices = 0;
-    for (size_t e = 0; e < topology->element_count; ++e) {
-        if (used[e] && vertices < mesh->vertex_count) {
-            topology->elements[vertices] = (uint32_t)e;
-        }
-        vertices += used[e];
-    }
-    bool equal = vertices == mesh->vertex_count;
-    for (size_t i = 0; equal && i < 3 * count; ++i) {
-        equal = mesh->indices[i] < vertices && topology->elements[mesh->indices[i]] == corners[i];
-    }
-    topology->vertex_count = vertices;
-    result = equal ? VSH_OK : fail_other(document, where, error);
-done:
-    free(used);
-    return result;
-}
-
-static vsh_result find_plain(vshi_lit_document *document, const json_t *primitive, const char *where,
-                             const vsh_mesh *mesh, vshi_lit_topology *topology, vsh_error *error) {
-    vshi_gltf *gltf = &document->gltf;
-    size_t index, count = 0;
-    vshi_gltf_accessor positions;
-    VSHI_TRY(vshi_gltf_index(gltf, json_object_get(primitive, "attributes"), "POSITION", "accessors", where,
-                             &index, error));
-    if (index == SIZE_MAX) {
-        return fail_other(document, where, error);
-    }
-    VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &positions, error));
-    topology->element_count = positions.count;
-    uint32_t *corners = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_gltf_read_triangles(gltf, primitive, topology->mode, positions.count, where, &corners,
-                                           &count, error));
-    VSHI_TRY_DONE(match(document, corners, count, where, mesh, topology, error));
-done:
-    free(corners);
-    return result;
-}
-
-/* Finds that of `primitive`, which messages call `where`, and holds it against the model's mesh. `draco` is
- * its decoded data, NULL where it has none. Errors: VSH_ERROR_INPUT (not well formed; not what the model was
- * made of), VSH_ERROR_READ, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
-static vsh_result find_topology(vshi_lit_document *document, const json_t *primitive, const char *where,
-                                const vshi_lit_draco *draco, const vsh_mesh *mesh,
-                                vshi_lit_topology *topology, vsh_error *error) {
-    *topology = (vshi_lit_topology){.draco = draco};
-    if (!vshi_gltf_count(primitive, "mode", VSHI_GLTF_TRIANGLES, &topology->mode) ||
-        topology->mode < VSHI_GLTF_TRIANGLES || topology->mode > VSHI_GLTF_FAN) {
-        return fail_other(document, where, error);
-    }
-    if (draco == NULL) {
-        return find_plain(document, primitive, where, mesh, topology, error);
-    }
-    topology->mode =
-        VSHI_GLTF_TRIANGLES; /* Draco's triangles are lists, even if the primitive has another mode */
-    topology->element_count = draco->vertex_count;
-    return match(document, draco->indices, draco->triangle_count, where, mesh, topology, error);
-}
-
-static vsh_result find_elements(vshi_lit_document *document, size_t index, size_t element_count,
-                                const vshi_lit_draco_attribute *draco, const char *where,
-                                vshi_gltf_accessor *found, unsigned char **dense, vsh_error *error) {
-    VSHI_TRY(vshi_gltf_accessor_open(&document->gltf, index, found, error));
-    const size_t size = (size_t)found->components * vshi_gltf_component_size(found->type);
-    if (draco != NULL) {
-        found->at = draco->values;
-        found->stride = size;
-        return draco->type == found->type && draco->components == found->components
-                   ? VSH_OK
-                   : vshi_gltf_fail(&document->gltf, error, "%s: accessors[%zu] is not what was decompressed",
-                                    where, index);
-    }
-    if (found->count != element_count) {
-        return vshi_gltf_fail(&document->gltf, error, "%s: accessors[%zu] has %zu elements for %zu vertices",
-                              where, index, found->count, element_count);
-    }
-    if (found->sparse_count > 0) { /* which becomes dense */
-        VSHI_TRY(vshi_gltf_take(&document->gltf, (void **)dense, found->count, size, error));
-        vshi_gltf_accessor_bytes(found, *dense);
-        found->at = *dense;
-        found->stride = size;
-    }
-    return VSH_OK;
-}
-
-static vsh_result copy(vshi_lit_document *document, size_t index, const vshi_gltf_accessor *from,
-                       const uint32_t *chosen, size_t count, bool bounds, size_t *accessor,
-                       vsh_error *error) {
-    const size_t size = (size_t)from->components * vshi_gltf_component_size(from->type);
-    const size_t stride = (size + 3) & ~(size_t)3; /* of vertex attributes: a multiple of 4 */
-    size_t bytes, view, offset;
-    if (__builtin_mul_overflow(count, stride, &bytes)) {
-        return vshi_lit_no_memory(document, error);
-    }
-    VSHI_TRY(vshi_lit_add_view(document, NULL, bytes, VSHI_LIT_VERTICES, stride != size ? stride : 0, &view,
-                               &offset, error));
-    unsigned char *to = document->added.at + offset;
-    for (size_t i = 0; i < count && from->at != NULL; ++i) {
-        memcpy(to + i * stride, from->at + chosen[i] * from->stride, size);
-    }
-    json_t *made = vshi_lit_copy_json(document, vshi_gltf_element(&document->gltf, "accessors", index));
-    *accessor = vshi_lit_append(document, "accessors", made);
-    json_object_del(made, "byteOffset");
-    json_object_del(made, "sparse");
-    vshi_lit_set_number(document, made, "bufferView", view);
-    vshi_lit_set_number(document, made, "count", count);
-    const bool had = json_object_get(made, "min") != NULL || json_object_get(made, "max") != NULL;
-    const vshi_gltf_accessor copied = {
-        .count = count, .components = from->components, .type = from->type, .at = to, .stride = stride};
-    if ((bounds || had) && count > 0) {
-        vshi_lit_set_bounds(document, made, &copied);
-    }
-    return VSH_OK;
-}
-
-/* A new accessor of the elements chosen[count] of accessor `index`, in *gathered or from there. `draco`: its
- * values, else NULL. `element_count` is what it must have; `bounds`: with its least and largest values
- * whether or not it has had them. Sparse ones become dense. Errors: VSH_ERROR_INPUT, VSH_ERROR_READ,
- * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
-static vsh_result gather_elements(vshi_lit_document *document, size_t index, size_t element_count,
-                                  const vshi_lit_draco_attribute *draco, const uint32_t *chosen, size_t count,
-                                  bool bounds, const char *where, vshi_lit_gathered *gathered,
-                                  size_t *accessor, vsh_error *error) {
-    for (size_t i = 0; i < gathered->count; ++i) {
-        if (gathered->list[i].from == index) {
-            *accessor = gathered->list[i].to;
-            return VSH_OK;
-        }
-    }
-    vshi_gltf_accessor from;
-    unsigned char *dense = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(find_elements(document, index, element_count, draco, where, &from, &dense, error));
-    VSHI_TRY_DONE(copy(document, index, &from, chosen, count, bounds, accessor, error));
-    VSHI_TRY_DONE(vshi_model_grow(&gathered->list, gathered->count, &gathered->capacity,
-                                  sizeof *gathered->list, document->gltf.path, error));
-    gathered->list[gathered->count++] = (vshi_lit_copy){index, *accessor};
-done:
-    free(dense);
-    return result;
-}
-
-static unsigned char *place(const vshi_lit_document *document, const vshi_lit_uvs *uvs, uint32_t element) {
-    return document->added.at + uvs->offset + (size_t)element * sizeof(float[2]);
-}
-
-static bool fits(const vshi_lit_document *document, const vshi_lit_uvs *uvs, const uint32_t *elements,
-                 const float (*values)[2], size_t count) {
-    for (size_t i = 0; i < count; ++i) {
-        if (uvs->set[elements[i]] &&
-            memcmp(place(document, uvs, elements[i]), values[i], sizeof values[i]) != 0) {
-            return false;
-        }
-    }
-    return true;
-}
-
-static vsh_result add(vshi_lit_document *document, vshi_lit_uv_pool *pool, size_t positions,
-                      size_t element_count, vsh_error *error) {
-    VSHI_TRY(vshi_model_grow(&pool->list, pool->count, &pool->capacity, sizeof *pool->list,
-                             document->gltf.path, error));
-    vshi_lit_uvs *made = &pool->list[pool->count];
-    *made = (vshi_lit_uvs){.positions = positions, .count = element_count};
-    VSHI_TRY(
-        vshi_gltf_allocate(&document->gltf, (void **)&made->set, element_count, sizeof *made->set, error));
-    ++pool->count;
-    return vshi_lit_add_floats(document, NULL, element_count, 2, false, &made->accessor, &made->offset,
-                               error);
-}
-
-/* An accessor in which elements[i] (< count of elements) has values[i], v down. Elements may come twice, with
- * the same values. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
-static vsh_result put_uvs(vshi_lit_document *document, vshi_lit_uv_pool *pool, size_t positions,
-                          size_t element_count, const uint32_t *elements, const float (*values)[2],
-                          size_t count, size_t *accessor, vsh_error *error) {
-    size_t found = 0;
-    while (found < pool->count &&
-           (pool->list[found].positions != positions || pool->list[found].count != element_count ||
-            !fits(document, &pool->list[found], elements, values, count))) {
-        ++found;
-    }
-    if (found == pool->count) {
-        VSHI_TRY(add(document, pool, positions, element_count, error));
-    }
-    const vshi_lit_uvs *uvs = &pool->list[found];
-    for (size_t i = 0; i < count; ++i) {
-        memcpy(place(document, uvs, elements[i]), values[i], sizeof values[i]);
-        uvs->set[elements[i]] = true;
-    }
-    *accessor = uvs->accessor;
-    return VSH_OK;
-}
-
 /* --- primitives on several pages */
 
 /* The only page of a mesh, or VSH_LIT_NO_CHART. */
@@ -302,8 +86,8 @@ vsh_result vshi_lit_pages_make(vshi_lit_work *work, const json_t *made, const vs
     vsh_result result;
     const double held = document->gltf.bytes_held;
     VSHI_TRY_DONE(vshi_gltf_allocate(&document->gltf, (void **)&used, work->page_count, sizeof *used, error));
-    VSHI_TRY_DONE(
-        vshi_gltf_take(&document->gltf, (void **)&chosen, mesh->triangle_count, 3 * sizeof *chosen, error));
+    VSHI_TRY_DONE(vshi_gltf_allocate(&document->gltf, (void **)&chosen, mesh->triangle_count,
+                                     3 * sizeof *chosen, error));
     document->gltf.bytes_held = held;
     VSHI_TRY_DONE(split_pages(work, made, mesh, corners, vertex_count, set, used, chosen, list, error));
 done:
@@ -509,285 +293,409 @@ vsh_result vshi_lit_choose_set(const vshi_lit_work *work, json_t *primitive, con
                      work->document.gltf.path, where, *set, VSH_MAX_UV_SETS);
 }
 
-static const char draco_name[] = "KHR_draco_mesh_compression";
+/* --- elements: what vertices are in a primitive's accessors */
 
-/* --- shapes */
+/* A primitive on its way. */
+typedef struct primitive {
+    vshi_lit_work *work;
+    size_t mesh, index; /* in the file */
+    size_t entry;       /* of the model */
+    char where[96];     /* what messages call it */
+    const json_t *given;
+    json_t *made;
+    const vsh_lit_mesh *lit;
+    size_t mode;                 /* VSHI_GLTF_TRIANGLES … */
+    size_t element_count;        /* elements that each attribute's accessor has */
+    uint32_t *elements;          /* of the vertices of the model's mesh, increasing */
+    const vshi_lit_draco *draco; /* NULL: its vertices are not compressed */
+    /* the vertices of the atlas, lit->vertex_count of them */
+    uint32_t *chosen;  /* elements */
+    float (*uvs)[2];   /* v down */
+    uint32_t *corners; /* [triangle_count][3]: elements; NULL: those of the atlas itself */
+    bool split;        /* an element has two places, or is compressed */
+} primitive;
 
-static bool is_before(const vshi_lit_shape *shape, size_t mesh, size_t primitive) {
-    return shape->mesh != mesh ? shape->mesh < mesh : shape->primitive < primitive;
+static vsh_result fail_other(const primitive *p, vsh_error *error) {
+    return vshi_gltf_fail(&p->work->document.gltf, error,
+                          "%s: is not what the model was made of: the file has changed since", p->where);
 }
 
-static vsh_result find_shape(vshi_lit_work *work, size_t mesh, size_t primitive, size_t entry,
-                             const json_t *given, const char *where, vshi_lit_shape **shape,
-                             vsh_error *error) {
-    size_t low = 0, high = work->shape_count;
-    while (low < high) {
-        const size_t middle = low + (high - low) / 2;
-        if (is_before(&work->shapes[middle], mesh, primitive)) {
-            low = middle + 1;
-        } else {
-            high = middle;
+/* Vertices of the model are the elements that triangles use, in their order: the others are not kept. */
+static vsh_result match(primitive *p, const uint32_t *corners, size_t count, vsh_error *error) {
+    vshi_gltf *gltf = &p->work->document.gltf;
+    const vsh_mesh mesh = vsh_model_mesh(p->work->model, p->entry, 0);
+    if (count != mesh.triangle_count || mesh.vertex_count > p->element_count) {
+        return fail_other(p, error);
+    }
+    bool *used = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_gltf_allocate(gltf, (void **)&used, p->element_count, sizeof *used, error));
+    VSHI_TRY_DONE(
+        vshi_gltf_allocate(gltf, (void **)&p->elements, mesh.vertex_count, sizeof *p->elements, error));
+    for (size_t i = 0; i < 3 * count; ++i) {
+        used[corners[i]] = true;
+    }
+    size_t vertices = 0;
+    for (size_t e = 0; e < p->element_count; ++e) {
+        if (used[e] && vertices < mesh.vertex_count) {
+            p->elements[vertices] = (uint32_t)e;
         }
+        vertices += used[e];
     }
-    if (low == work->shape_count || work->shapes[low].mesh != mesh ||
-        work->shapes[low].primitive != primitive) {
-        VSHI_TRY(vshi_model_grow(&work->shapes, work->shape_count, &work->shape_capacity,
-                                 sizeof *work->shapes, work->document.gltf.path, error));
-        memmove(work->shapes + low + 1, work->shapes + low, (work->shape_count - low) * sizeof *work->shapes);
-        ++work->shape_count;
-        work->shapes[low] = (vshi_lit_shape){.mesh = mesh, .primitive = primitive};
-        const vsh_mesh view = vsh_model_mesh(work->model, entry, 0);
-        VSHI_TRY(find_topology(&work->document, given, where,
-                               vshi_lit_draco_of(&work->dracos, mesh, primitive), &view,
-                               &work->shapes[low].topology, error));
+    bool equal = vertices == mesh.vertex_count;
+    for (size_t i = 0; equal && i < 3 * count; ++i) {
+        equal = mesh.indices[i] < vertices && p->elements[mesh.indices[i]] == corners[i];
     }
-    *shape = &work->shapes[low];
-    return vsh_model_mesh(work->model, entry, 0).vertex_count == (*shape)->topology.vertex_count
-               ? VSH_OK
-               : vshi_gltf_fail(&work->document.gltf, error, "%s: two nodes show it with other vertices",
-                                where);
+    result = equal ? VSH_OK : fail_other(p, error);
+done:
+    free(used);
+    return result;
 }
 
-/* --- vertices */
-
-/* The vertices of one primitive in the atlas. */
-typedef struct vertices {
-    uint32_t *elements; /* [vertex_count] of the accessors */
-    float (*uvs)[2];    /* [vertex_count], v down */
-    uint32_t *corners;  /* [triangle_count][3]: elements; NULL: those of the atlas itself */
-    bool split;         /* an element has two places, or is compressed */
-} vertices;
-
-static void free_vertices(vertices *v) {
-    free(v->corners);
-    free(v->uvs);
-    free(v->elements);
+/* Finds the elements, and holds them against the model's mesh. Errors: VSH_ERROR_INPUT (not well formed; not
+ * what the model was made of), VSH_ERROR_READ, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+static vsh_result find_elements(primitive *p, vsh_error *error) {
+    vshi_gltf *gltf = &p->work->document.gltf;
+    if (!vshi_gltf_count(p->given, "mode", VSHI_GLTF_TRIANGLES, &p->mode) || p->mode < VSHI_GLTF_TRIANGLES ||
+        p->mode > VSHI_GLTF_FAN) {
+        return fail_other(p, error);
+    }
+    p->draco = vshi_lit_draco_of(&p->work->dracos, p->mesh, p->index);
+    if (p->draco != NULL) { /* whose triangles are lists, even if the primitive has another mode */
+        p->element_count = p->draco->vertex_count;
+        return match(p, p->draco->indices, p->draco->triangle_count, error);
+    }
+    vshi_gltf_accessor positions;
+    VSHI_TRY(vshi_gltf_accessor_find(gltf, json_object_get(p->given, "attributes"), "POSITION", p->where,
+                                     &positions, error));
+    if (positions.count == 0) {
+        return fail_other(p, error);
+    }
+    p->element_count = positions.count;
+    uint32_t *corners = NULL;
+    size_t count = 0;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_gltf_read_triangles(gltf, p->given, p->mode, positions.count, p->where, &corners,
+                                           &count, error));
+    result = match(p, corners, count, error);
+done:
+    free(corners);
+    return result;
 }
 
 /* Whether some vertex of the model has two places. */
-static vsh_result find_split(vshi_lit_work *work, const vshi_lit_topology *topology, const vsh_lit_mesh *mesh,
-                             vertices *v, vsh_error *error) {
+static vsh_result find_split(primitive *p, vsh_error *error) {
+    const vsh_lit_mesh *lit = p->lit;
+    const size_t count = vsh_model_mesh(p->work->model, p->entry, 0).vertex_count;
     uint32_t *first = NULL; /* 1 + the first vertex of the atlas that is this one; 0: none yet */
-    VSHI_TRY(vshi_gltf_allocate(&work->document.gltf, (void **)&first, topology->vertex_count, sizeof *first,
-                                error));
-    v->split = topology->draco != NULL;
-    for (size_t i = 0; i < mesh->vertex_count && !v->split; ++i) {
-        const uint32_t source = mesh->sources[i];
+    VSHI_TRY(vshi_gltf_allocate(&p->work->document.gltf, (void **)&first, count, sizeof *first, error));
+    p->split = p->draco != NULL;
+    for (size_t i = 0; i < lit->vertex_count && !p->split; ++i) {
+        const uint32_t source = lit->sources[i];
         if (first[source] == 0) {
             first[source] = (uint32_t)i + 1;
         } else {
-            v->split = memcmp(v->uvs[first[source] - 1], v->uvs[i], sizeof v->uvs[i]) != 0;
+            p->split = memcmp(p->uvs[first[source] - 1], p->uvs[i], sizeof p->uvs[i]) != 0;
         }
     }
     free(first);
     return VSH_OK;
 }
 
-static vsh_result find_vertices(vshi_lit_work *work, const vshi_lit_topology *topology,
-                                const vsh_lit_mesh *mesh, vertices *v, vsh_error *error) {
-    vshi_gltf *gltf = &work->document.gltf;
-    const double held = gltf->bytes_held;
-    VSHI_TRY(vshi_gltf_take(gltf, (void **)&v->elements, mesh->vertex_count, sizeof *v->elements, error));
-    VSHI_TRY(vshi_gltf_take(gltf, (void **)&v->uvs, mesh->vertex_count, sizeof *v->uvs, error));
-    for (size_t i = 0; i < mesh->vertex_count; ++i) {
-        v->elements[i] = topology->elements[mesh->sources[i]];
-        v->uvs[i][0] = mesh->uvs[2 * i];
-        v->uvs[i][1] = 1.0F - mesh->uvs[2 * i + 1]; /* v points down in glTF */
+static vsh_result find_vertices(primitive *p, vsh_error *error) {
+    vshi_gltf *gltf = &p->work->document.gltf;
+    const vsh_lit_mesh *lit = p->lit;
+    VSHI_TRY(find_elements(p, error));
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&p->chosen, lit->vertex_count, sizeof *p->chosen, error));
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&p->uvs, lit->vertex_count, sizeof *p->uvs, error));
+    for (size_t i = 0; i < lit->vertex_count; ++i) {
+        p->chosen[i] = p->elements[lit->sources[i]];
+        p->uvs[i][0] = lit->uvs[2 * i];
+        p->uvs[i][1] = 1.0F - lit->uvs[2 * i + 1]; /* v points down in glTF */
     }
-    VSHI_TRY(find_split(work, topology, mesh, v, error));
-    if (!v->split && find_only_page(work, mesh) == VSH_LIT_NO_CHART) {
-        VSHI_TRY(
-            vshi_gltf_take(gltf, (void **)&v->corners, mesh->triangle_count, 3 * sizeof *v->corners, error));
-        for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
-            v->corners[i] = v->elements[mesh->indices[i]];
+    VSHI_TRY(find_split(p, error));
+    if (!p->split && find_only_page(p->work, lit) == VSH_LIT_NO_CHART) {
+        VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&p->corners, lit->triangle_count, 3 * sizeof *p->corners,
+                                    error));
+        for (size_t i = 0; i < 3 * lit->triangle_count; ++i) {
+            p->corners[i] = p->chosen[lit->indices[i]];
         }
     }
-    gltf->bytes_held = held; /* they are freed with this primitive */
     return VSH_OK;
 }
 
-/* --- attributes */
+/* --- vertices of its own */
 
-static bool same(const vsh_lit_mesh *a, const vsh_lit_mesh *b) {
+/* The elements of accessor `index`; `draco`: its values, else NULL. Sparse ones become dense. */
+static vsh_result open_elements(const primitive *p, size_t index, const vshi_lit_draco_attribute *draco,
+                                vshi_gltf_accessor *found, unsigned char **dense, vsh_error *error) {
+    vshi_gltf *gltf = &p->work->document.gltf;
+    VSHI_TRY(vshi_gltf_accessor_open(gltf, index, found, error));
+    const size_t size = (size_t)found->components * vshi_gltf_component_size(found->type);
+    if (draco != NULL) {
+        found->at = draco->values;
+        found->stride = size;
+        return draco->type == found->type && draco->components == found->components
+                   ? VSH_OK
+                   : vshi_gltf_fail(gltf, error, "%s: accessors[%zu] is not what was decompressed", p->where,
+                                    index);
+    }
+    if (found->count != p->element_count) {
+        return vshi_gltf_fail(gltf, error, "%s: accessors[%zu] has %zu elements for %zu vertices", p->where,
+                              index, found->count, p->element_count);
+    }
+    if (found->sparse_count > 0) {
+        VSHI_TRY(vshi_gltf_allocate(gltf, (void **)dense, found->count, size, error));
+        vshi_gltf_accessor_bytes(found, *dense);
+        found->at = *dense;
+        found->stride = size;
+    }
+    return VSH_OK;
+}
+
+/* A new accessor of the chosen elements. `bounds`: with its least and largest values whether or not it has
+ * had them. */
+static vsh_result copy_elements(const primitive *p, size_t index, const vshi_gltf_accessor *from, bool bounds,
+                                size_t *accessor, vsh_error *error) {
+    vshi_lit_document *document = &p->work->document;
+    const size_t size = (size_t)from->components * vshi_gltf_component_size(from->type);
+    const size_t stride = (size + 3) & ~(size_t)3; /* of vertex attributes: a multiple of 4 */
+    const size_t count = p->lit->vertex_count;
+    size_t bytes, view, offset;
+    if (__builtin_mul_overflow(count, stride, &bytes)) {
+        return vshi_lit_no_memory(document, error);
+    }
+    VSHI_TRY(vshi_lit_add_view(document, NULL, bytes, VSHI_LIT_VERTICES, stride != size ? stride : 0, &view,
+                               &offset, error));
+    unsigned char *to = document->added.at + offset;
+    for (size_t i = 0; i < count && from->at != NULL; ++i) {
+        memcpy(to + i * stride, from->at + p->chosen[i] * from->stride, size);
+    }
+    json_t *made = vshi_lit_copy_json(document, vshi_gltf_element(&document->gltf, "accessors", index));
+    *accessor = vshi_lit_append(document, "accessors", made);
+    json_object_del(made, "byteOffset");
+    json_object_del(made, "sparse");
+    vshi_lit_set_number(document, made, "bufferView", view);
+    vshi_lit_set_number(document, made, "count", count);
+    const bool had = json_object_get(made, "min") != NULL || json_object_get(made, "max") != NULL;
+    const vshi_gltf_accessor copied = {
+        .count = count, .components = from->components, .type = from->type, .at = to, .stride = stride};
+    if ((bounds || had) && count > 0) {
+        vshi_lit_set_bounds(document, made, &copied);
+    }
+    return VSH_OK;
+}
+
+/* The copy of an accessor for a split, which each gets once. */
+static vsh_result gather(const primitive *p, size_t split, size_t index,
+                         const vshi_lit_draco_attribute *draco, bool bounds, size_t *accessor,
+                         vsh_error *error) {
+    vshi_lit_work *work = p->work;
+    for (size_t i = 0; i < work->copy_count; ++i) {
+        if (work->copies[i].split == split && work->copies[i].from == index) {
+            *accessor = work->copies[i].to;
+            return VSH_OK;
+        }
+    }
+    vshi_gltf_accessor from;
+    unsigned char *dense = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(open_elements(p, index, draco, &from, &dense, error));
+    VSHI_TRY_DONE(copy_elements(p, index, &from, bounds, accessor, error));
+    VSHI_TRY_DONE(vshi_model_grow(&work->copies, work->copy_count, &work->copy_capacity, sizeof *work->copies,
+                                  work->document.gltf.path, error));
+    work->copies[work->copy_count++] = (vshi_lit_copy){split, index, *accessor};
+done:
+    free(dense);
+    return result;
+}
+
+/* Replaces the accessors that `attributes` (of the primitive, or of a morph target) names. */
+static vsh_result gather_all(const primitive *p, size_t split, json_t *attributes, bool target,
+                             vsh_error *error) {
+    const char *name;
+    json_t *value;
+    json_object_foreach(attributes, name, value) {
+        size_t index, accessor = SIZE_MAX;
+        VSHI_TRY(
+            vshi_gltf_index(&p->work->document.gltf, attributes, name, "accessors", p->where, &index, error));
+        const vshi_lit_draco_attribute *draco =
+            p->draco != NULL && !target ? vshi_lit_draco_attribute_of(p->draco, p->given, name) : NULL;
+        VSHI_TRY(gather(p, split, index, draco, strcmp(name, "POSITION") == 0, &accessor, error));
+        vshi_lit_set_number(&p->work->document, attributes, name, accessor);
+    }
+    return VSH_OK;
+}
+
+bool vshi_lit_is_split_alike(const vsh_lit_mesh *a, const vsh_lit_mesh *b) {
     return a->vertex_count == b->vertex_count && a->triangle_count == b->triangle_count &&
            memcmp(a->sources, b->sources, a->vertex_count * sizeof *a->sources) == 0 &&
            memcmp(a->indices, b->indices, a->triangle_count * 3 * sizeof *a->indices) == 0;
 }
 
-/* That of an instance that is split alike, or a new one. */
-static vsh_result take_split(vshi_lit_work *work, vshi_lit_shape *shape, const vsh_lit_mesh *mesh,
-                             vshi_lit_split **split, vsh_error *error) {
-    for (size_t i = 0; i < shape->split_count; ++i) {
-        *split = &shape->splits[i];
-        if (same((*split)->mesh, mesh)) {
+/* Finds that of an instance that is split alike, or a new one. */
+static vsh_result find_alike(const primitive *p, size_t *split, vsh_error *error) {
+    vshi_lit_work *work = p->work;
+    for (*split = 0; *split < work->split_count; ++*split) {
+        const vshi_lit_split *other = &work->splits[*split];
+        if (other->mesh == p->mesh && other->primitive == p->index &&
+            vshi_lit_is_split_alike(other->lit, p->lit)) {
             return VSH_OK;
         }
     }
-    VSHI_TRY(vshi_model_grow(&shape->splits, shape->split_count, &shape->split_capacity,
-                             sizeof *shape->splits, work->document.gltf.path, error));
-    *split = &shape->splits[shape->split_count++];
-    **split = (vshi_lit_split){.mesh = mesh, .indices = SIZE_MAX};
+    VSHI_TRY(vshi_model_grow(&work->splits, work->split_count, &work->split_capacity, sizeof *work->splits,
+                             work->document.gltf.path, error));
+    work->splits[work->split_count++] = (vshi_lit_split){p->mesh, p->index, p->lit, SIZE_MAX};
     return VSH_OK;
 }
 
-/* Replaces the accessors that `attributes` (of the primitive, or of a morph target) names. */
-static vsh_result gather(vshi_lit_work *work, const vshi_lit_topology *topology, const json_t *primitive,
-                         json_t *attributes, bool target, const vsh_lit_mesh *mesh, const vertices *v,
-                         const char *where, vshi_lit_split *split, vsh_error *error) {
-    const char *name;
-    json_t *value;
-    json_object_foreach(attributes, name, value) {
-        size_t index, accessor = SIZE_MAX;
-        VSHI_TRY(vshi_gltf_index(&work->document.gltf, attributes, name, "accessors", where, &index, error));
-        const vshi_lit_draco_attribute *draco =
-            topology->draco != NULL && !target ? vshi_lit_draco_attribute_of(topology->draco, primitive, name)
-                                               : NULL;
-        VSHI_TRY(gather_elements(&work->document, index, topology->element_count, draco, v->elements,
-                                 mesh->vertex_count, strcmp(name, "POSITION") == 0, where, &split->gathered,
-                                 &accessor, error));
-        vshi_lit_set_number(&work->document, attributes, name, accessor);
-    }
-    return VSH_OK;
-}
-
-static void drop_draco(json_t *primitive) {
-    json_t *extensions = json_object_get(primitive, "extensions");
-    json_object_del(extensions, draco_name);
-    if (extensions != NULL && json_object_size(extensions) == 0) {
-        json_object_del(primitive, "extensions");
-    }
-}
-
-/* `made` with vertices of its own. */
-static vsh_result make_split(vshi_lit_work *work, vshi_lit_shape *shape, const json_t *given,
-                             const vsh_lit_mesh *mesh, const vertices *v, const char *where, json_t *made,
-                             size_t *uvs, vshi_lit_split **split, vsh_error *error) {
-    vshi_lit_document *document = &work->document;
-    VSHI_TRY(take_split(work, shape, mesh, split, error));
-    VSHI_TRY(gather(work, &shape->topology, given, json_object_get(made, "attributes"), false, mesh, v, where,
-                    *split, error));
+static vsh_result make_split(primitive *p, size_t *uvs, size_t *split, vsh_error *error) {
     size_t i;
     json_t *target;
-    json_array_foreach(json_object_get(made, "targets"), i, target) {
-        VSHI_TRY(gather(work, &shape->topology, given, target, true, mesh, v, where, *split, error));
+    VSHI_TRY(find_alike(p, split, error));
+    VSHI_TRY(gather_all(p, *split, json_object_get(p->made, "attributes"), false, error));
+    json_array_foreach(json_object_get(p->made, "targets"), i, target) {
+        VSHI_TRY(gather_all(p, *split, target, true, error));
     }
-    drop_draco(made);
-    return vshi_lit_add_floats(document, v->uvs[0], mesh->vertex_count, 2, false, uvs, NULL, error);
+    json_t *extensions = json_object_get(p->made, "extensions");
+    json_object_del(extensions, "KHR_draco_mesh_compression");
+    if (extensions != NULL && json_object_size(extensions) == 0) {
+        json_object_del(p->made, "extensions");
+    }
+    return vshi_lit_add_floats(&p->work->document, p->uvs[0], p->lit->vertex_count, 2, false, uvs, NULL,
+                               error);
 }
 
-static vsh_result set_uvs(vshi_lit_work *work, json_t *primitive, size_t accessor, size_t set,
-                          vsh_error *error) {
-    char name[40];
-    snprintf(name, sizeof name, "TEXCOORD_%zu", set);
-    vshi_lit_set_number(&work->document, json_object_get(primitive, "attributes"), name, accessor);
-    return vshi_lit_tell_set(&work->document, primitive, set, error);
+/* --- new UVs for vertices that stay */
+
+static unsigned char *place(const primitive *p, const vshi_lit_uvs *uvs, size_t vertex) {
+    return p->work->document.added.at + uvs->offset + (size_t)p->chosen[vertex] * sizeof(float[2]);
 }
 
-static vsh_result make(vshi_lit_work *work, vshi_lit_shape *shape, const json_t *given,
-                       const vsh_lit_mesh *mesh, const vertices *v, const char *where, json_t *made,
-                       json_t *list, vsh_error *error) {
+static bool fits(const primitive *p, const vshi_lit_uvs *uvs, size_t positions) {
+    bool good = uvs->positions == positions && uvs->count == p->element_count;
+    for (size_t i = 0; i < p->lit->vertex_count && good; ++i) {
+        good = !uvs->set[p->chosen[i]] || memcmp(place(p, uvs, i), p->uvs[i], sizeof p->uvs[i]) == 0;
+    }
+    return good;
+}
+
+/* An accessor in which the elements have their UVs. Elements may come twice, with the same UVs. */
+static vsh_result put_uvs(const primitive *p, size_t *accessor, vsh_error *error) {
+    vshi_lit_work *work = p->work;
     vshi_lit_document *document = &work->document;
-    vshi_lit_split *split = NULL;
-    size_t uvs, set, positions, whole = SIZE_MAX;
-    VSHI_TRY(vshi_lit_choose_set(work, made, mesh, where, &set, error));
+    size_t positions, found = 0;
+    VSHI_TRY(vshi_gltf_index(&document->gltf, json_object_get(p->given, "attributes"), "POSITION",
+                             "accessors", p->where, &positions, error));
+    while (found < work->uv_count && !fits(p, &work->uvs[found], positions)) {
+        ++found;
+    }
+    if (found == work->uv_count) {
+        VSHI_TRY(vshi_model_grow(&work->uvs, work->uv_count, &work->uv_capacity, sizeof *work->uvs,
+                                 document->gltf.path, error));
+        vshi_lit_uvs *made = &work->uvs[found];
+        *made = (vshi_lit_uvs){.positions = positions, .count = p->element_count};
+        VSHI_TRY(
+            vshi_gltf_allocate(&document->gltf, (void **)&made->set, made->count, sizeof *made->set, error));
+        ++work->uv_count;
+        VSHI_TRY(vshi_lit_add_floats(document, NULL, made->count, 2, false, &made->accessor, &made->offset,
+                                     error));
+    }
+    const vshi_lit_uvs *uvs = &work->uvs[found];
+    for (size_t i = 0; i < p->lit->vertex_count; ++i) {
+        memcpy(place(p, uvs, i), p->uvs[i], sizeof p->uvs[i]);
+        uvs->set[p->chosen[i]] = true;
+    }
+    *accessor = uvs->accessor;
+    return VSH_OK;
+}
+
+/* --- what it becomes */
+
+static vsh_result make(primitive *p, json_t *list, vsh_error *error) {
+    vshi_lit_work *work = p->work;
+    vshi_lit_document *document = &work->document;
+    char name[40];
+    size_t uvs, set, split = 0, whole = SIZE_MAX;
+    VSHI_TRY(vshi_lit_choose_set(work, p->made, p->lit, p->where, &set, error));
     if (set > VSHI_LIT_SET) {
         vshi_warn(document->gltf.run,
                   "%s: %s: textures that stay use TEXCOORD_%d, so the lightmap's UVs are TEXCOORD_%zu, which "
                   "Godot, Unity and Hubs do not read",
-                  document->gltf.path, where, VSHI_LIT_SET, set);
+                  document->gltf.path, p->where, VSHI_LIT_SET, set);
     }
-    if (v->split) {
-        VSHI_TRY(make_split(work, shape, given, mesh, v, where, made, &uvs, &split, error));
-    } else {
-        VSHI_TRY(vshi_gltf_index(&document->gltf, json_object_get(given, "attributes"), "POSITION",
-                                 "accessors", where, &positions, error));
-        VSHI_TRY(put_uvs(document, &work->pool, positions, shape->topology.element_count, v->elements,
-                         (const float(*)[2])v->uvs, mesh->vertex_count, &uvs, error));
+    VSHI_TRY(p->split ? make_split(p, &uvs, &split, error) : put_uvs(p, &uvs, error));
+    name_of(set, name, sizeof name);
+    vshi_lit_set_number(document, json_object_get(p->made, "attributes"), name, uvs);
+    VSHI_TRY(vshi_lit_tell_set(document, p->made, set, error));
+    const uint32_t only = find_only_page(work, p->lit);
+    if (!p->split && only != VSH_LIT_NO_CHART) { /* its indices stay, strips too */
+        vshi_lit_push(document, list, json_incref(p->made));
+        return vshi_lit_mark_primitive(work, p->made, only, set, NULL, error);
     }
-    VSHI_TRY(set_uvs(work, made, uvs, set, error));
-    const uint32_t only = find_only_page(work, mesh);
-    if (!v->split && only != VSH_LIT_NO_CHART) { /* its indices stay, strips too */
-        vshi_lit_push(document, list, json_incref(made));
-        return vshi_lit_mark_primitive(work, made, only, set, NULL, error);
+    if (p->mode != VSHI_GLTF_TRIANGLES || p->draco != NULL) {
+        json_object_del(p->made, "mode");
     }
-    if (shape->topology.mode != VSHI_GLTF_TRIANGLES || shape->topology.draco != NULL) {
-        json_object_del(made, "mode");
-    }
-    return v->split ? vshi_lit_pages_make(work, made, mesh, mesh->indices, mesh->vertex_count, set,
-                                          &split->indices, list, error)
-                    : vshi_lit_pages_make(work, made, mesh, v->corners, shape->topology.element_count, set,
-                                          &whole, list, error);
+    return p->split ? vshi_lit_pages_make(work, p->made, p->lit, p->lit->indices, p->lit->vertex_count, set,
+                                          &work->splits[split].indices, list, error)
+                    : vshi_lit_pages_make(work, p->made, p->lit, p->corners, p->element_count, set, &whole,
+                                          list, error);
 }
 
 /* A copy of the transform from the file's set to the model's UVs; NULL: there is none. */
-static json_t *copy_transform(vshi_lit_work *work, size_t entry, const json_t *primitive, size_t set) {
-    const vshi_model_shape *shape = &work->model->shapes[work->model->entries[entry].shape];
+static json_t *copy_transform(const primitive *p, size_t set) {
+    const vshi_model_shape *shape = &p->work->model->shapes[p->work->model->entries[p->entry].shape];
     size_t material;
-    if ((shape->packed >> set & 1) == 0 || !vshi_gltf_count(primitive, "material", SIZE_MAX, &material)) {
+    if ((shape->packed >> set & 1) == 0 || !vshi_gltf_count(p->made, "material", SIZE_MAX, &material)) {
         return NULL;
     }
-    const vshi_gltf_unpacking u = vshi_gltf_find_unpacking(&work->document.gltf, material, set);
-    json_t *transform = u.uvs == VSHI_GLTF_UVS_PACKED ? vshi_lit_copy_json(&work->document, u.told) : NULL;
+    const vshi_gltf_unpacking u = vshi_gltf_find_unpacking(&p->work->document.gltf, material, set);
+    json_t *transform = u.uvs == VSHI_GLTF_UVS_PACKED ? vshi_lit_copy_json(&p->work->document, u.told) : NULL;
     json_object_del(transform, "texCoord"); /* the material names the set */
     return transform;
 }
 
 /* The set is the file's own. */
-static vsh_result make_kept(vshi_lit_work *work, size_t entry, const char *where, json_t *made, json_t *list,
-                            vsh_error *error) {
-    const vsh_lit_mesh *mesh = &work->meshes[entry];
+static vsh_result make_kept(primitive *p, json_t *list, vsh_error *error) {
+    const int32_t set = p->lit->uv_set;
+    vsh_result result = VSH_OK;
     char name[40];
-    snprintf(name, sizeof name, "TEXCOORD_%d", mesh->uv_set);
-    if (mesh->uv_set >= 0 && json_object_get(json_object_get(made, "attributes"), name) == NULL) {
-        return vshi_gltf_fail(&work->document.gltf, error, "%s: has no %s to be lit by", where, name);
+    snprintf(name, sizeof name, "TEXCOORD_%d", set);
+    if (set >= 0 && json_object_get(json_object_get(p->made, "attributes"), name) == NULL) {
+        return vshi_gltf_fail(&p->work->document.gltf, error, "%s: has no %s to be lit by", p->where, name);
     }
-    if (mesh->uv_set >= 0) {
-        const size_t set = (size_t)mesh->uv_set;
-        json_t *transform = copy_transform(work, entry, made, set);
-        const vsh_result result = vshi_lit_mark_primitive(work, made, mesh->page, set, transform, error);
+    if (set >= 0) {
+        json_t *transform = copy_transform(p, (size_t)set);
+        result = vshi_lit_mark_primitive(p->work, p->made, p->lit->page, (size_t)set, transform, error);
         json_decref(transform);
-        VSHI_TRY(result);
     }
-    vshi_lit_push(&work->document, list, json_incref(made));
-    return VSH_OK;
-}
-
-vsh_result vshi_lit_primitive_make(vshi_lit_work *work, size_t mesh, size_t primitive, size_t entry,
-                                   json_t *list, vsh_error *error) {
-    char where[96];
-    snprintf(where, sizeof where, "meshes[%zu].primitives[%zu]", mesh, primitive);
-    const json_t *given = json_array_get(
-        json_object_get(vshi_gltf_element(&work->document.gltf, "meshes", mesh), "primitives"), primitive);
-    const vsh_lit_mesh *lit = &work->meshes[entry];
-    vertices v = {.elements = NULL};
-    vshi_lit_shape *shape = NULL;
-    json_t *made = vshi_lit_copy_json(&work->document, given);
-    vsh_result result;
-    VSHI_TRY_DONE(work->document.refused ? vshi_lit_no_memory(&work->document, error) : VSH_OK);
-    if (lit->uvs == NULL) {
-        result = make_kept(work, entry, where, made, list, error);
-        goto done;
-    }
-    VSHI_TRY_DONE(find_shape(work, mesh, primitive, entry, given, where, &shape, error));
-    VSHI_TRY_DONE(find_vertices(work, &shape->topology, lit, &v, error));
-    VSHI_TRY_DONE(make(work, shape, given, lit, &v, where, made, list, error));
-done:
-    free_vertices(&v);
-    json_decref(made);
+    vshi_lit_push(&p->work->document, list, json_incref(p->made));
     return result;
 }
 
-void vshi_lit_shapes_free(vshi_lit_work *work) {
-    for (size_t i = 0; i < work->shape_count; ++i) {
-        for (size_t k = 0; k < work->shapes[i].split_count; ++k) {
-            free(work->shapes[i].splits[k].gathered.list);
-        }
-        free(work->shapes[i].splits);
-        free(work->shapes[i].topology.elements);
+vsh_result vshi_lit_primitive_make(vshi_lit_work *work, size_t mesh, size_t index, size_t entry, json_t *list,
+                                   vsh_error *error) {
+    vshi_lit_document *document = &work->document;
+    const double held = document->gltf.bytes_held;
+    primitive p = {.work = work, .mesh = mesh, .index = index, .entry = entry, .lit = &work->meshes[entry]};
+    vsh_result result;
+    snprintf(p.where, sizeof p.where, "meshes[%zu].primitives[%zu]", mesh, index);
+    p.given = json_array_get(
+        json_object_get(vshi_gltf_element(&document->gltf, "meshes", mesh), "primitives"), index);
+    p.made = vshi_lit_copy_json(document, p.given);
+    VSHI_TRY_DONE(document->refused ? vshi_lit_no_memory(document, error) : VSH_OK);
+    if (p.lit->uvs == NULL) {
+        result = make_kept(&p, list, error);
+        goto done;
     }
-    free(work->shapes);
-    for (size_t i = 0; i < work->pool.count; ++i) {
-        free(work->pool.list[i].set);
-    }
-    free(work->pool.list);
+    VSHI_TRY_DONE(find_vertices(&p, error));
+    document->gltf.bytes_held = held; /* it is freed with this primitive */
+    VSHI_TRY_DONE(make(&p, list, error));
+done:
+    free(p.corners);
+    free(p.uvs);
+    free(p.chosen);
+    free(p.elements);
+    json_decref(p.made);
+    return result;
 }

@@ -54,43 +54,6 @@ vsh_result vshi_lit_dracos_decode(vshi_decoder *decoder, const char *path, vshi_
 vsh_result vshi_serve_draco(const char *path, vshi_decoder *request, const vsh_run *run,
                             vshi_encoder *payload, vsh_error *error);
 
-/* --- vertices of primitives */
-
-/* A primitive of the document: which elements of its accessors are the vertices of the model's mesh. */
-typedef struct vshi_lit_topology {
-    size_t mode;                 /* VSHI_GLTF_TRIANGLES … */
-    size_t element_count;        /* elements that each attribute's accessor has */
-    size_t vertex_count;         /* of the model's mesh */
-    uint32_t *elements;          /* [vertex_count] of each vertex, increasing */
-    const vshi_lit_draco *draco; /* NULL: its vertices are not compressed */
-} vshi_lit_topology;
-
-/* An accessor, and the one that some of its elements were copied to. */
-typedef struct vshi_lit_copy {
-    size_t from, to;
-} vshi_lit_copy;
-
-/* Copies of the same elements: each accessor once, whatever uses it. */
-typedef struct vshi_lit_gathered {
-    vshi_lit_copy *list; /* [count] */
-    size_t count, capacity;
-} vshi_lit_gathered;
-
-/* A new UV set of primitives that keep their vertices. Primitives with the same accessor of positions share
- * one of UVs where their UVs agree, because each needs the accessor's full length. */
-typedef struct vshi_lit_uvs {
-    size_t positions; /* accessor of the vertices' positions */
-    size_t count;     /* elements */
-    size_t accessor;
-    size_t offset; /* where its values begin in the added bytes */
-    bool *set;     /* [count] */
-} vshi_lit_uvs;
-
-typedef struct vshi_lit_uv_pool {
-    vshi_lit_uvs *list;
-    size_t count, capacity;
-} vshi_lit_uv_pool;
-
 /* --- materials (materials.c) */
 
 /* What a primitive is to be shown by: a material of the file with the images of a page, in a set of UVs. */
@@ -111,18 +74,25 @@ typedef struct vshi_lit_looks {
 
 /* Vertices of a primitive that an atlas has split, for its other instances. */
 typedef struct vshi_lit_split {
-    const vsh_lit_mesh *mesh;
-    vshi_lit_gathered gathered;
+    size_t mesh, primitive; /* of the file */
+    const vsh_lit_mesh *lit;
     size_t indices; /* accessor of all triangles; SIZE_MAX: not made */
 } vshi_lit_split;
 
-/* A primitive of the file, as all nodes that show it have it. */
-typedef struct vshi_lit_shape {
-    size_t mesh, primitive;
-    vshi_lit_topology topology;
-    vshi_lit_split *splits;
-    size_t split_count, split_capacity;
-} vshi_lit_shape;
+/* An accessor, and the one that its elements were copied to for a split: each once, whatever uses it. */
+typedef struct vshi_lit_copy {
+    size_t split, from, to;
+} vshi_lit_copy;
+
+/* A new UV set of primitives that keep their vertices. Primitives with the same accessor of positions share
+ * one of UVs where their UVs agree, because each needs the accessor's full length. */
+typedef struct vshi_lit_uvs {
+    size_t positions; /* accessor of the vertices' positions */
+    size_t count;     /* elements */
+    size_t accessor;
+    size_t offset; /* where its values begin in the added bytes */
+    bool *set;     /* [count] */
+} vshi_lit_uvs;
 
 /* --- all of it */
 
@@ -139,10 +109,11 @@ typedef struct vshi_lit_work {
     size_t *textures[VSH_LIT_PURPOSES]; /* [page_count]; SIZE_MAX: none */
     double *intensities;                /* [page_count]: of lightmaps */
     vshi_lit_dracos dracos;
-    vshi_lit_uv_pool pool;
     vshi_lit_looks looks;
-    vshi_lit_shape *shapes; /* sorted by mesh and primitive, as they came to be needed */
-    size_t shape_count, shape_capacity;
+    vshi_lit_uvs *uvs; /* [uv_count] */
+    vshi_lit_split *splits;
+    vshi_lit_copy *copies;
+    size_t uv_count, uv_capacity, split_count, split_capacity, copy_count, copy_capacity;
 } vshi_lit_work;
 
 /* The page of triangle t of a mesh; VSH_LIT_NO_CHART: any. */
@@ -177,7 +148,8 @@ vsh_result vshi_lit_materials_apply(vshi_lit_work *work, vsh_error *error);
 vsh_result vshi_lit_primitive_make(vshi_lit_work *work, size_t mesh, size_t primitive, size_t entry,
                                    json_t *list, vsh_error *error);
 
-void vshi_lit_shapes_free(vshi_lit_work *work);
+/* Whether two atlases have split a mesh into the same vertices and triangles. */
+bool vshi_lit_is_split_alike(const vsh_lit_mesh *a, const vsh_lit_mesh *b);
 
 /* The set of UVs that engines use for lightmaps. */
 enum { VSHI_LIT_SET = 1 };
@@ -238,9 +210,6 @@ json_t *vshi_lit_uri(const char *name);
  * VSH_ERROR_ARGUMENT. */
 vsh_result vshi_lit_beside_name(const vshi_lit_work *work, const char *mark, const char *ending, char **name,
                                 vsh_error *error);
-
-/* The path of a file in the output's folder; NULL where memory is short. */
-char *vshi_lit_beside_path(const char *output, const char *name);
 
 bool vshi_lit_is_same_file(const char *a, const char *b);
 

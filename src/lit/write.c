@@ -1,6 +1,5 @@
 /* A lit document into its files. */
 #define _GNU_SOURCE /* fopencookie */
-#include "base/bytes.h"
 #include "base/decimal.h"
 #include "base/file.h"
 #include "lit/work.h"
@@ -240,25 +239,6 @@ static vsh_result move_views(vshi_lit_document *document, const layout *l, vsh_e
     return VSH_OK;
 }
 
-/* Extensions by which no view is compressed any more. */
-static void drop_compression(vshi_lit_document *document) {
-    static const char *const names[] = {"EXT_meshopt_compression", "KHR_meshopt_compression"};
-    static const char *const lists[] = {"bufferViews", "buffers"};
-    for (size_t n = 0; n < sizeof names / sizeof names[0] && document->dropped_count > 0; ++n) {
-        bool any = false;
-        for (size_t k = 0; k < sizeof lists / sizeof lists[0]; ++k) {
-            size_t i;
-            const json_t *item;
-            json_array_foreach(json_object_get(document->gltf.root, lists[k]), i, item) {
-                any = any || vshi_gltf_extension(item, names[n]) != NULL;
-            }
-        }
-        if (!any) {
-            vshi_lit_drop_extension(document, names[n]);
-        }
-    }
-}
-
 /* --- writing */
 
 /* A file under way. Its stream keeps no failure to itself: the sink does. */
@@ -321,36 +301,13 @@ static void put_buffers(output_file *file, const vshi_lit_document *document, co
     put(file, document->added.at, document->added.size);
 }
 
-/* Chunks behind the first two, of whatever kind, as they stand in the input. */
-static void find_rest(const vshi_lit_document *document, const unsigned char **rest, uint64_t *size) {
-    enum { LENGTH = 8, CHUNK = 8 };
-    const vshi_gltf_bytes *chunk = &document->gltf.chunk;
-    *rest = NULL;
-    *size = 0;
-    if (!document->gltf.binary || document->text == NULL) { // of an OBJ there is none
-        return;
-    }
-    const unsigned char *end =
-        (const unsigned char *)document->text + vshi_bytes_number(document->text + LENGTH, 4, false);
-    if (end < chunk->at) {
-        return;
-    }
-    const size_t padded = (chunk->size + 3) & ~(size_t)3;
-    const size_t left = (size_t)(end - chunk->at);
-    *rest = padded < left && (left - padded) % 4 == 0 && left - padded >= CHUNK ? chunk->at + padded : NULL;
-    *size = *rest != NULL ? left - padded : 0;
-}
-
 /* glTF 2.0, 4.4. */
 static vsh_result put_binary(output_file *file, const vshi_lit_document *document, const layout *l,
                              const char *json, size_t json_size, vsh_error *error) {
     enum { HEADER = 12, CHUNK = 8, JSON_CHUNK = 0x4e4f534a, BINARY_CHUNK = 0x004e4942 };
     const uint64_t text = ((uint64_t)json_size + 3) & ~UINT64_C(3),
                    bytes = ((uint64_t)l->size + 3) & ~UINT64_C(3);
-    const unsigned char *rest;
-    uint64_t more;
-    find_rest(document, &rest, &more);
-    const uint64_t all = HEADER + CHUNK + text + (bytes > 0 ? CHUNK + bytes : 0) + more;
+    const uint64_t all = HEADER + CHUNK + text + (bytes > 0 ? CHUNK + bytes : 0);
     if (all > UINT32_MAX) {
         return vshi_fail(error, VSH_ERROR_LIMIT,
                          "%s: %llu bytes, but a GLB can have %u; a .gltf can have more", file->path,
@@ -367,9 +324,8 @@ static vsh_result put_binary(output_file *file, const vshi_lit_document *documen
         put_number(file, bytes);
         put_number(file, BINARY_CHUNK);
         put_buffers(file, document, l);
-        put_padding(file, all - more, '\0');
+        put_padding(file, all, '\0');
     }
-    put(file, rest, more);
     return VSH_OK;
 }
 
@@ -414,7 +370,7 @@ static vsh_result name_files(const vshi_lit_work *work, const vshi_lit_besides *
     for (size_t i = 0; i <= named; ++i) {
         const char *name = i < besides->count ? besides->list[i].name : bin;
         char **path = &all->list[i].path;
-        *path = i < named ? vshi_lit_beside_path(work->output, name) : strdup(work->output);
+        *path = i < named ? vshi_path_beside(work->output, name, strlen(name)) : strdup(work->output);
         if (*path == NULL) {
             return vshi_lit_no_memory(&work->document, error);
         }
@@ -493,7 +449,10 @@ static vsh_result join(vshi_lit_work *work, const vshi_lit_besides *besides, lay
     VSHI_TRY(name_files(work, besides, *bin, all, error)); /* by the names that the input has */
     json_t *one = list_buffers(document, l);
     VSHI_TRY(move_views(document, l, error));
-    drop_compression(document);
+    if (document->dropped_count > 0) { /* views of compressed bytes, perhaps the last */
+        vshi_lit_drop_extension(document, "EXT_meshopt_compression");
+        vshi_lit_drop_extension(document, "KHR_meshopt_compression");
+    }
     if (one != NULL) {
         vshi_lit_set_number(document, one, "byteLength", l->size);
         json_object_del(one, "uri");

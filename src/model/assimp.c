@@ -133,18 +133,13 @@ vsh_result vshi_assimp_look(vshi_assimp *scan, const char *text, size_t size, vs
 
 /* --- its scene */
 
-typedef struct skin_node {
-    const char *name;
-    double world[12];
-} skin_node;
+enum { DEEPEST = 1024 /* nodes under each other */ };
 
-/* The nodes and meshes of a scene. Begin with `source`, the rest 0. */
+/* The nodes and meshes of a scene. */
 typedef struct scene_skins {
     const vshi_assimp *source;
-    double root[12];  /* in front of the scene's own root */
-    skin_node *nodes; /* by their names; NULL: not yet looked for */
-    size_t node_count;
-    bool *done; /* of each mesh */
+    double root[12]; /* in front of the scene's own root */
+    bool *done;      /* of each mesh */
 } scene_skins;
 
 /* Assimp stores rows one after the other. */
@@ -161,55 +156,32 @@ static void find_node_world(const double parent[12], const struct aiNode *node, 
     vshi_model_compose(parent, own, world);
 }
 
-static size_t count_nodes(const struct aiNode *node, int depth) {
-    enum { DEEPEST = 1024 };
-    size_t count = 1;
+/* Finds the first node of a name at or below `node`, and where it stands. */
+static bool find_node(const struct aiNode *node, const char *name, const double parent[12], int depth,
+                      double world[12]) {
+    double own[12];
+    find_node_world(parent, node, own);
+    if (strcmp(node->mName.data, name) == 0) {
+        memcpy(world, own, sizeof own);
+        return true;
+    }
     for (unsigned i = 0; depth < DEEPEST && i < node->mNumChildren; ++i) {
-        count += count_nodes(node->mChildren[i], depth + 1);
+        if (find_node(node->mChildren[i], name, own, depth + 1, world)) {
+            return true;
+        }
     }
-    return count;
-}
-
-static void gather(scene_skins *skins, size_t room, const struct aiNode *node, const double parent[12]) {
-    if (skins->node_count == room) {
-        return;
-    }
-    skin_node *to = &skins->nodes[skins->node_count++];
-    to->name = node->mName.data;
-    find_node_world(parent, node, to->world);
-    double world[12];
-    memcpy(world, to->world, sizeof world);
-    for (unsigned i = 0; i < node->mNumChildren; ++i) {
-        gather(skins, room, node->mChildren[i], world);
-    }
-}
-
-static int by_name(const void *a, const void *b) {
-    return strcmp(((const skin_node *)a)->name, ((const skin_node *)b)->name);
-}
-
-static vsh_result find_nodes(scene_skins *skins, vsh_error *error) {
-    const vshi_assimp *source = skins->source;
-    const size_t count = count_nodes(source->scene->mRootNode, 0);
-    VSHI_TRY(vshi_allocate((void **)&skins->done, source->scene->mNumMeshes, sizeof *skins->done,
-                           source->path, error));
-    VSHI_TRY(vshi_allocate((void **)&skins->nodes, count, sizeof *skins->nodes, source->path, error));
-    gather(skins, count, source->scene->mRootNode, skins->root);
-    qsort(skins->nodes, skins->node_count, sizeof *skins->nodes, by_name);
-    return VSH_OK;
+    return false;
 }
 
 static vsh_result add_bone(const scene_skins *skins, const struct aiBone *bone, size_t vertex_count,
                            vshi_model_blend *blends, vsh_error *error) {
     const char *path = skins->source->path;
-    const skin_node wanted = {.name = bone->mName.data};
-    const skin_node *node = bsearch(&wanted, skins->nodes, skins->node_count, sizeof *skins->nodes, by_name);
-    if (node == NULL) {
+    double world[12], offset[12], moved[12];
+    if (!find_node(skins->source->scene->mRootNode, bone->mName.data, skins->root, 0, world)) {
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: bone '%s' is no node", path, bone->mName.data);
     }
-    double offset[12], moved[12];
     rows_of(&bone->mOffsetMatrix, offset);
-    vshi_model_compose(node->world, offset, moved);
+    vshi_model_compose(world, offset, moved);
     for (unsigned i = 0; i < bone->mNumWeights; ++i) {
         const struct aiVertexWeight given = bone->mWeights[i];
         if (given.mVertexId >= vertex_count || !isfinite(given.mWeight)) {
@@ -237,9 +209,6 @@ static vsh_result check_moved(const scene_skins *skins, const vshi_model_shape *
 static vsh_result apply_skin(scene_skins *skins, size_t mesh, vshi_model_shape *shape, const double world[12],
                              vsh_error *error) {
     const struct aiMesh *given = skins->source->scene->mMeshes[mesh];
-    if (skins->nodes == NULL) {
-        VSHI_TRY(find_nodes(skins, error));
-    }
     if (skins->done[mesh]) {
         return VSH_OK;
     }
@@ -357,7 +326,6 @@ static vsh_result copy_shape(const vshi_assimp *source, const struct aiMesh *mes
 
 static vsh_result add_nodes(const vshi_assimp *source, vsh_model *model, scene_skins *skins,
                             const struct aiNode *node, const double parent[12], int depth, vsh_error *error) {
-    enum { DEEPEST = 1024 };
     static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     if (depth > DEEPEST) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "%s: its nodes are nested deeper than %d", source->path,
@@ -429,19 +397,6 @@ static vsh_result check_mesh(const char *path, const struct aiMesh *mesh, unsign
     return VSH_OK;
 }
 
-/* How many faces have three corners or more, and how many triangles those make. */
-static void count_faces(const struct aiScene *scene, size_t *faces, size_t *triangles) {
-    *faces = *triangles = 0;
-    for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
-        const struct aiMesh *mesh = scene->mMeshes[m];
-        for (unsigned f = 0; f < mesh->mNumFaces; ++f) {
-            const unsigned corners = mesh->mFaces[f].mNumIndices;
-            *faces += corners >= 3;
-            *triangles += corners >= 3 ? corners - 2 : 0;
-        }
-    }
-}
-
 /* Everything that what follows takes for granted, and that nothing was lost on the way here. */
 static vsh_result check_scene(const char *path, const struct aiScene *scene, size_t expected, vshi_job *job,
                               vsh_error *error) {
@@ -451,14 +406,18 @@ static vsh_result check_scene(const char *path, const struct aiScene *scene, siz
         }
         VSHI_TRY(check_mesh(path, scene->mMeshes[m], m, error));
     }
-    size_t faces, triangles;
-    count_faces(scene, &faces, &triangles);
+    size_t faces = 0;
+    for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
+        for (unsigned f = 0; f < scene->mMeshes[m]->mNumFaces; ++f) {
+            faces += scene->mMeshes[m]->mFaces[f].mNumIndices >= 3;
+        }
+    }
     if (faces < expected) {
         return vshi_fail(error, VSH_ERROR_INPUT,
                          "%s: only %zu of its %zu faces can be read: the others use vertices out of range",
                          path, faces, expected);
     }
-    if (triangles == 0) {
+    if (faces == 0) {
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles", path);
     }
     return VSH_OK;
@@ -476,6 +435,8 @@ static vsh_result build(const vshi_assimp *source, double unit, vsh_model **out,
     VSHI_TRY_DONE(vshi_allocate((void **)&model->shapes, scene->mNumMeshes, sizeof *model->shapes,
                                 source->path, error));
     model->shape_count = scene->mNumMeshes;
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&skins.done, scene->mNumMeshes, sizeof *skins.done, source->path, error));
     model->unit = source->unit > 0.0 ? source->unit : unit;
     for (size_t m = 0; m < model->shape_count; ++m) {
         VSHI_TRY_DONE(vshi_job_cancelled(source->job)
@@ -495,7 +456,6 @@ static vsh_result build(const vshi_assimp *source, double unit, vsh_model **out,
     *out = model;
     model = NULL;
 done:
-    free(skins.nodes);
     free(skins.done);
     vsh_model_free(model);
     return result;

@@ -161,28 +161,14 @@ static vsh_result tell_library(const telling *t, const char *path, const char *a
             free(library);
             continue;
         }
-        if (library == NULL || is_outside(t, library)) {
+        const vsh_result result = library != NULL && !is_outside(t, library)
+                                      ? tell_lines(t, library, "map_d", tell_map, error)
+                                      : VSH_OK;
+        if (result == VSH_OK) {
             return tell(t, library, false, error);
         }
-        vsh_result result = tell_lines(t, library, "map_d", tell_map, error);
-        if (result != VSH_OK) {
-            free(library);
-            return result;
-        }
-        return tell(t, library, false, error);
-    }
-    return VSH_OK;
-}
-
-static vsh_result tell_window(const telling *t, const vshi_stream *stream, const char *stop, const char *word,
-                              tell_line_fn *line, vsh_error *error) {
-    const char *at = stream->at;
-    while ((at = memmem(at, (size_t)(stop - at), word, strlen(word))) != NULL) {
-        const char *begin = memrchr(stream->at, '\n', (size_t)(at - stream->at));
-        const char *end = memchr(at, '\n', (size_t)(stop - at));
-        end = end != NULL ? end : stop;
-        VSHI_TRY(line(t, stream->path, begin != NULL ? begin + 1 : stream->at, end, error));
-        at = end;
+        free(library);
+        return result;
     }
     return VSH_OK;
 }
@@ -196,7 +182,14 @@ static vsh_result tell_lines(const telling *t, const char *path, const char *wor
     vsh_result result = vshi_stream_open(&stream, path, &budget, t->job, 0, &why);
     while (result == VSH_OK && (result = vshi_stream_lines(&stream, &stop, &why)) == VSH_OK &&
            stream.at < stop) {
-        result = tell_window(t, &stream, stop, word, line, &why);
+        const char *at = stream.at, *end;
+        for (; result == VSH_OK && (at = memmem(at, (size_t)(stop - at), word, strlen(word))) != NULL;
+             at = end) {
+            const char *begin = memrchr(stream.at, '\n', (size_t)(at - stream.at));
+            end = memchr(at, '\n', (size_t)(stop - at));
+            end = end != NULL ? end : stop;
+            result = line(t, path, begin != NULL ? begin + 1 : stream.at, end, &why);
+        }
         stream.at = stop;
     }
     vshi_stream_close(&stream);

@@ -1,3 +1,4 @@
+#define _GNU_SOURCE /* qsort_r */
 #include "model/faces.h"
 
 #include "base/memory.h"
@@ -76,7 +77,7 @@ typedef struct cut {
     vshi_job *job;
     size_t looked; /* ears tried */
     const uint32_t *vertices;
-    uint32_t *triangles;
+    uint32_t *triangles; /* three numbers of corners each */
     size_t made;
     bool simple;
 } cut;
@@ -127,18 +128,9 @@ static float key_of(const cut *p, uint32_t i) {
     return p->along_y ? p->c[i].y : p->c[i].x;
 }
 
-/* Heap sort: in place, and never slow. */
-static void sift(const cut *p, size_t root, size_t end) {
-    for (size_t child = 2 * root + 1; child < end; child = 2 * root + 1) {
-        child += child + 1 < end && key_of(p, p->reflex[child]) < key_of(p, p->reflex[child + 1]);
-        if (!(key_of(p, p->reflex[root]) < key_of(p, p->reflex[child]))) {
-            return;
-        }
-        const uint32_t swapped = p->reflex[root];
-        p->reflex[root] = p->reflex[child];
-        p->reflex[child] = swapped;
-        root = child;
-    }
+static int compare_keys(const void *a, const void *b, void *user) {
+    const float one = key_of(user, *(const uint32_t *)a), other = key_of(user, *(const uint32_t *)b);
+    return one < other ? -1 : one > other;
 }
 
 /* Corners that are not convex: only they can be the nearest in an ear's way. Cutting makes none. */
@@ -149,15 +141,7 @@ static void find_reflex(cut *p) {
             p->reflex[p->reflex_count++] = i;
         }
     }
-    for (size_t i = p->reflex_count / 2; i-- > 0;) {
-        sift(p, i, p->reflex_count);
-    }
-    for (size_t end = p->reflex_count; end-- > 1;) {
-        const uint32_t swapped = p->reflex[0];
-        p->reflex[0] = p->reflex[end];
-        p->reflex[end] = swapped;
-        sift(p, 0, end);
-    }
+    qsort_r(p->reflex, p->reflex_count, sizeof *p->reflex, compare_keys, p);
 }
 
 /* Demands on an ear, from the strictest on. */
@@ -220,9 +204,9 @@ static bool is_ear(cut *p, uint32_t ear, int demand) {
 
 static void emit(cut *p, uint32_t a, uint32_t b, uint32_t c) {
     uint32_t *to = p->triangles + 3 * p->made++;
-    to[0] = p->vertices[a];
-    to[1] = p->vertices[b];
-    to[2] = p->vertices[c];
+    to[0] = a;
+    to[1] = b;
+    to[2] = c;
 }
 
 static void cut_ear(cut *p, uint32_t ear, int demand) {
@@ -307,11 +291,14 @@ static void cut_fan(cut *p, const float *positions) {
     }
 }
 
-static vsh_result reserve(vshi_polygon_cutter *cutter, size_t count, vsh_error *error) {
+static vsh_result reserve(vshi_face_cutter *cutter, size_t count, vsh_error *error) {
     if (count <= cutter->capacity) {
         return VSH_OK;
     }
-    vshi_polygon_free(cutter);
+    free(cutter->reflex);
+    free(cutter->corners);
+    cutter->reflex = NULL;
+    cutter->capacity = 0;
     const size_t capacity = count + count / 2;
     VSHI_TRY(vshi_allocate((void **)&cutter->corners, capacity, sizeof *cutter->corners, "polygon", error));
     VSHI_TRY(vshi_allocate((void **)&cutter->reflex, capacity, sizeof *cutter->reflex, "polygon", error));
@@ -319,40 +306,28 @@ static vsh_result reserve(vshi_polygon_cutter *cutter, size_t count, vsh_error *
     return VSH_OK;
 }
 
-vsh_result vshi_polygon_cut(vshi_polygon_cutter *cutter, const float *positions, const uint32_t *vertices,
-                            size_t count, vshi_job *job, uint32_t *triangles, size_t *made, bool *simple,
-                            vsh_error *error) {
-    *made = 0;
-    *simple = true;
-    if (count == 3) {
-        memcpy(triangles, vertices, sizeof(uint32_t[3]));
-        *made = 1;
-        return VSH_OK;
-    }
+static vsh_result cut_polygon(vshi_face_cutter *cutter, const uint32_t *vertices, size_t count,
+                              uint32_t *triangles, size_t *made, vsh_error *error) {
     VSHI_TRY(reserve(cutter, count, error));
     cut p = {.c = cutter->corners,
              .reflex = cutter->reflex,
              .count = count,
-             .job = job,
+             .job = cutter->job,
              .vertices = vertices,
              .triangles = triangles,
              .simple = true};
     vsh_result result = VSH_OK;
-    if (!lay_out(&p, positions)) {
-        cut_fan(&p, positions);
+    if (count == 3) {
+        emit(&p, 0, 1, 2);
+    } else if (!lay_out(&p, cutter->positions)) {
+        cut_fan(&p, cutter->positions);
     } else if (count != 4 || !cut_quad(&p)) {
         find_reflex(&p);
         result = cut_ears(&p, error);
     }
     *made = p.made;
-    *simple = p.simple;
+    cutter->crossing += !p.simple;
     return result;
-}
-
-void vshi_polygon_free(vshi_polygon_cutter *cutter) {
-    free(cutter->reflex);
-    free(cutter->corners);
-    *cutter = (vshi_polygon_cutter){0};
 }
 
 /* Polygons that shared their first corner with the face before have always begun at another one (Assimp's
@@ -371,49 +346,16 @@ static void turn_fan(vshi_face_cutter *cutter, uint32_t *triangles, size_t count
     cutter->begun = true;
 }
 
-static vsh_result cut_face(vshi_face_cutter *cutter, const float *positions, const uint32_t *corners,
-                           size_t count, uint32_t *triangles, size_t *made, vsh_error *error) {
-    bool simple;
-    VSHI_TRY(vshi_polygon_cut(&cutter->polygon, positions, corners, count, cutter->job, triangles, made,
-                              &simple, error));
-    cutter->crossing += !simple;
-    if (count <= 4 && cutter->turns && *made > 0) {
-        turn_fan(cutter, triangles, *made);
-    }
-    for (size_t i = 0; count > 4 && i < *made; ++i) {
-        turn_fan(cutter, triangles + 3 * i, 1);
-    }
-    return VSH_OK;
-}
-
-/* A polygon by the numbers of its corners, which then become vertices. */
-static vsh_result cut_apart(vshi_face_cutter *cutter, const uint32_t *corners, size_t count,
-                            uint32_t *triangles, size_t *made, vsh_error *error) {
-    if (count > cutter->own_capacity) {
-        free(cutter->own_positions);
-        free(cutter->own_corners);
-        cutter->own_capacity = 0;
-        const size_t capacity = count + count / 2;
-        VSHI_TRY(
-            vshi_allocate((void **)&cutter->own_positions, capacity, sizeof(float[3]), "polygon", error));
-        VSHI_TRY(vshi_allocate((void **)&cutter->own_corners, capacity, sizeof(uint32_t), "polygon", error));
-        cutter->own_capacity = capacity;
-    }
-    for (size_t i = 0; i < count; ++i) {
-        memcpy(cutter->own_positions + 3 * i, cutter->positions + 3 * (size_t)corners[i], sizeof(float[3]));
-        cutter->own_corners[i] = (uint32_t)i;
-    }
-    cutter->begun = false;
-    VSHI_TRY(cut_face(cutter, cutter->own_positions, cutter->own_corners, count, triangles, made, error));
-    for (size_t i = 0; i < 3 * *made; ++i) {
+static void name_vertices(const uint32_t *corners, uint32_t *triangles, size_t count) {
+    for (size_t i = 0; i < 3 * count; ++i) {
         triangles[i] = corners[triangles[i]];
     }
-    return VSH_OK;
 }
 
 vsh_result vshi_face_cut(vshi_face_cutter *cutter, const uint32_t *corners, size_t count, uint32_t *triangles,
                          size_t *made, vsh_error *error) {
     enum { FACES_A_POLL = 1 << 14 };
+    const bool apart = cutter->apart && count > 3;
     *made = 0;
     if (count < 3) {
         return VSH_OK;
@@ -421,16 +363,27 @@ vsh_result vshi_face_cut(vshi_face_cutter *cutter, const uint32_t *corners, size
     if (cutter->looked++ % FACES_A_POLL == 0 && vshi_job_cancelled(cutter->job)) {
         return vshi_job_fail_cancelled(cutter->job, error);
     }
-    if (cutter->apart && count > 3) {
-        return cut_apart(cutter, corners, count, triangles, made, error);
+    VSHI_TRY(cut_polygon(cutter, corners, count, triangles, made, error));
+    if (apart) {
+        cutter->begun = false;
+    } else {
+        name_vertices(corners, triangles, *made);
     }
-    return cut_face(cutter, cutter->positions, corners, count, triangles, made, error);
+    if (count <= 4 && cutter->turns && *made > 0) {
+        turn_fan(cutter, triangles, *made);
+    }
+    for (size_t i = 0; count > 4 && i < *made; ++i) {
+        turn_fan(cutter, triangles + 3 * i, 1);
+    }
+    if (apart) {
+        name_vertices(corners, triangles, *made);
+    }
+    return VSH_OK;
 }
 
 void vshi_face_cutter_end(vshi_face_cutter *cutter, const vsh_run *run, const char *path, const char *name) {
-    vshi_polygon_free(&cutter->polygon);
-    free(cutter->own_positions);
-    free(cutter->own_corners);
+    free(cutter->reflex);
+    free(cutter->corners);
     if (cutter->crossing > 0) {
         vshi_warn(run,
                   "%s: mesh '%s': edges of %zu polygons cross, so their triangles are guessed; triangulate "

@@ -5,27 +5,7 @@
 #include "base/job.h"
 #include "model/stream.h"
 
-/* Memory that polygons share one after the other. Begin with all 0. */
-typedef struct vshi_polygon_cutter {
-    size_t capacity;
-    struct vshi_polygon_corner *corners;
-    uint32_t *reflex; /* corners that others must stay clear of, along `axis` */
-} vshi_polygon_cutter;
-
-/* Cuts the polygon of `count` corners (at least 3), vertices of `positions`, into triangles with its own
- * winding, at most count - 2: *made of them, three vertices each, in `triangles`. The corners should lie in
- * one plane, nearly. Every simple polygon is covered exactly, also one whose holes are joined to its outline
- * by bridges, one with corners on a line or twice at a place; no triangle is flipped, and none without area
- * is made. A polygon without area becomes a fan without area. *simple: whether all this held;
- * where edges cross, some triangles are made. Positions are finite. Errors: VSH_ERROR_MEMORY,
- * VSH_ERROR_CANCELLED. */
-vsh_result vshi_polygon_cut(vshi_polygon_cutter *cutter, const float *positions, const uint32_t *vertices,
-                            size_t count, vshi_job *job, uint32_t *triangles, size_t *made, bool *simple,
-                            vsh_error *error);
-
-void vshi_polygon_free(vshi_polygon_cutter *cutter);
-
-/* Cuts one face after the other. Begin with positions and job, and all else 0. */
+/* Cuts one face after the other. Begin with positions (finite) and job, and all else 0. */
 typedef struct vshi_face_cutter {
     const float *positions;
     vshi_job *job;
@@ -35,13 +15,17 @@ typedef struct vshi_face_cutter {
     uint32_t last_first;
     size_t looked;
     size_t crossing; /* out: polygons whose edges cross */
-    vshi_polygon_cutter polygon;
-    float *own_positions; /* of one polygon's corners, and their numbers */
-    uint32_t *own_corners;
-    size_t own_capacity;
+    size_t capacity; /* memory that polygons share one after the other */
+    struct vshi_polygon_corner *corners;
+    uint32_t *reflex; /* corners that others must stay clear of, along `axis` */
 } vshi_face_cutter;
 
-/* Puts *made triangles of a face of any number of corners. Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+/* Cuts the face of `count` corners, vertices of the positions, into triangles with its own winding, at most
+ * count - 2: *made of them, three vertices each, in `triangles`. The corners should lie in one plane, nearly.
+ * Every simple polygon is covered exactly, also one whose holes are joined to its outline by bridges, one
+ * with corners on a line or twice at a place; no triangle is flipped, and none without area is made. A
+ * polygon without area becomes a fan without area. Where edges cross, some triangles are made. Errors:
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 vsh_result vshi_face_cut(vshi_face_cutter *cutter, const uint32_t *corners, size_t count, uint32_t *triangles,
                          size_t *made, vsh_error *error);
 

@@ -87,15 +87,6 @@ vsh_result vshi_gltf_allocate(vshi_gltf *gltf, void **memory, size_t count, size
     return vshi_allocate(memory, count, size, gltf->path, error);
 }
 
-vsh_result vshi_gltf_take(vshi_gltf *gltf, void **memory, size_t count, size_t size, vsh_error *error) {
-    size_t bytes;
-    VSHI_TRY(vshi_gltf_hold(gltf, (double)count * (double)size, error));
-    *memory = __builtin_mul_overflow(count, size, &bytes) ? NULL : malloc(bytes);
-    return *memory != NULL ? VSH_OK
-                           : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu × %zu bytes",
-                                       gltf->path, count, size);
-}
-
 /* --- required extensions */
 
 /* Extensions that are read, or that leave the geometry as it is. */
@@ -249,15 +240,11 @@ static vsh_result check_version(const vshi_gltf *gltf, vsh_error *error) {
 
 static vsh_result allocate(vshi_gltf *gltf, vsh_error *error) {
     const size_t meshes = json_array_size(json_object_get(gltf->root, "meshes"));
-    gltf->buffer_count = json_array_size(json_object_get(gltf->root, "buffers"));
-    gltf->view_count = json_array_size(json_object_get(gltf->root, "bufferViews"));
     gltf->node_count = json_array_size(json_object_get(gltf->root, "nodes"));
     const struct {
         void *memory;
         size_t count, size;
     } wanted[] = {
-        {&gltf->buffers, gltf->buffer_count, sizeof *gltf->buffers},
-        {&gltf->views, gltf->view_count, sizeof *gltf->views},
         {&gltf->mesh_shapes, meshes, sizeof *gltf->mesh_shapes},
         {&gltf->node_seen, gltf->node_count, sizeof *gltf->node_seen},
         {&gltf->node_world, gltf->node_count, sizeof *gltf->node_world},
@@ -275,7 +262,14 @@ vsh_result vshi_gltf_open(vshi_gltf *gltf, const char *text, size_t size, vsh_er
     const bool expected = length >= 4 && (gltf->path[length - 1] == 'b' || gltf->path[length - 1] == 'B');
     VSHI_TRY(binary || expected ? open_binary(gltf, text, size, error) : parse(gltf, text, size, error));
     VSHI_TRY(check_version(gltf, error));
-    return check_extensions(gltf, error);
+    VSHI_TRY(check_extensions(gltf, error));
+    const size_t buffers = json_array_size(json_object_get(gltf->root, "buffers"));
+    const size_t views = json_array_size(json_object_get(gltf->root, "bufferViews"));
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&gltf->buffers, buffers, sizeof *gltf->buffers, error));
+    gltf->buffer_count = buffers;
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&gltf->views, views, sizeof *gltf->views, error));
+    gltf->view_count = views;
+    return VSH_OK;
 }
 
 vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, const vsh_run *run, vshi_job *job,

@@ -74,9 +74,6 @@ vsh_result vshi_gltf_hold(vshi_gltf *gltf, double bytes, vsh_error *error);
 /* The same of count × size bytes, which it takes: as vshi_allocate(). */
 vsh_result vshi_gltf_allocate(vshi_gltf *gltf, void **memory, size_t count, size_t size, vsh_error *error);
 
-/* The same without zeroing, of at least one element. */
-vsh_result vshi_gltf_take(vshi_gltf *gltf, void **memory, size_t count, size_t size, vsh_error *error);
-
 /* --- bytes (gltf_buffer.c) */
 
 /* The bytes of buffer view `index`, and its stride (0: none). Reads the buffer where that is the first time.
@@ -131,6 +128,10 @@ typedef struct vshi_gltf_accessor {
 vsh_result vshi_gltf_accessor_open(vshi_gltf *gltf, size_t index, vshi_gltf_accessor *accessor,
                                    vsh_error *error);
 
+/* Opens the accessor that `key` of an object names; without one its count is 0. */
+vsh_result vshi_gltf_accessor_find(vshi_gltf *gltf, const json_t *object, const char *key, const char *where,
+                                   vshi_gltf_accessor *accessor, vsh_error *error);
+
 /* Its elements as floats, `components` each; what is normalized is 0 … 1 or -1 … 1. */
 void vshi_gltf_accessor_floats(const vshi_gltf_accessor *accessor, float *values);
 
@@ -153,6 +154,9 @@ typedef struct vshi_gltf_pose {
 /* Reads a primitive into a shape that is all 0; one that has no triangles stays so. `where` names it. */
 vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
                                     const char *where, vshi_model_shape *shape, vsh_error *error);
+
+/* The material of a primitive; SIZE_MAX: none, or one that is not there. */
+size_t vshi_gltf_material(const vshi_gltf *gltf, const json_t *primitive);
 
 /* Modes of primitives that are triangles. */
 enum { VSHI_GLTF_TRIANGLES = 4, VSHI_GLTF_STRIP = 5, VSHI_GLTF_FAN = 6 };
@@ -226,8 +230,8 @@ vsh_result vshi_gltf_mask_image(const vshi_gltf *gltf, const json_t *material, s
 json_t *vshi_gltf_parse_json(const char *text, size_t size, json_error_t *where, bool *early);
 
 /* Parses the JSON of a glTF or GLB of `size` bytes that lie at `text`, and finds its binary chunk; of `gltf`,
- * path, run and bytes_held are given. Free root with json_decref(), after a failure too. Errors: as
- * vsh_model_read(). */
+ * path, run and bytes_held are given. Free root with json_decref(), and buffers, after a failure too. Errors:
+ * as vsh_model_read(). */
 vsh_result vshi_gltf_open(vshi_gltf *gltf, const char *text, size_t size, vsh_error *error);
 
 /* Reads a glTF or GLB of `size` bytes that lie at `text`. Errors: as vsh_model_read(). */

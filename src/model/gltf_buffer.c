@@ -31,7 +31,7 @@ vsh_result vshi_gltf_read_file(vshi_gltf *gltf, const char *path, const char *na
     VSHI_TRY(vshi_input_open(path, name, most, &file, &told, error));
     *size = (size_t)told;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_gltf_take(gltf, (void **)bytes, *size > 0 ? *size : 1, 1, error));
+    VSHI_TRY_DONE(vshi_gltf_allocate(gltf, (void **)bytes, *size > 0 ? *size : 1, 1, error));
     if (fread(*bytes, 1, *size, file) != *size) {
         result = vshi_fail(error, VSH_ERROR_READ, "%s: %s", name,
                            ferror(file) ? strerror(errno) : "became shorter while it was read");
@@ -232,25 +232,9 @@ static const struct {
                {"QUATERNION", 8, 8, decode_quaternion},
                {"EXPONENTIAL", 4, 256, decode_exponential}};
 
+enum { FILTERS = sizeof filters / sizeof filters[0] };
+
 /* --- properties of a compressed view */
-
-static int index_of_mode(const char *name) {
-    for (int i = 0; name != NULL && i < MODES; ++i) {
-        if (strcmp(name, modes[i].name) == 0) {
-            return i;
-        }
-    }
-    return -1;
-}
-
-static int index_of_filter(const char *name) {
-    for (int i = 0; i < (int)(sizeof filters / sizeof filters[0]); ++i) {
-        if (name == NULL || strcmp(name, filters[i].name) == 0) {
-            return i;
-        }
-    }
-    return -1;
-}
 
 static bool stride_holds(const packed *p) {
     if (p->mode != ATTRIBUTES) {
@@ -273,9 +257,14 @@ static bool may_hold(const packed *p) {
 static vsh_result read_packed(vshi_gltf *gltf, const json_t *extension, packed *p, vsh_error *error) {
     const char *mode = json_string_value(json_object_get(extension, "mode"));
     const char *filter = json_string_value(json_object_get(extension, "filter"));
-    p->mode = index_of_mode(mode);
-    p->filter = index_of_filter(filter);
-    if (p->mode < 0 || p->filter < 0) {
+    p->mode = p->filter = 0;
+    while (p->mode < MODES && (mode == NULL || strcmp(mode, modes[p->mode].name) != 0)) {
+        ++p->mode;
+    }
+    while (p->filter < FILTERS && filter != NULL && strcmp(filter, filters[p->filter].name) != 0) {
+        ++p->filter;
+    }
+    if (p->mode == MODES || p->filter == FILTERS) {
         return vshi_fail(error, VSH_ERROR_UNSUPPORTED,
                          "%s: %s: its compression has mode '%.40s' and filter '%.40s', which are not known",
                          gltf->path, p->where, mode != NULL ? mode : "", filter != NULL ? filter : "NONE");
@@ -318,7 +307,7 @@ static vsh_result read_meshopt(vshi_gltf *gltf, const json_t *extension, const c
     packed p = {.where = where};
     VSHI_TRY(read_packed(gltf, extension, &p, error));
     *size = p.count * p.stride; /* may_hold() */
-    VSHI_TRY(vshi_gltf_take(gltf, (void **)made, p.count, p.stride, error));
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)made, p.count, p.stride, error));
     if (vshi_job_cancelled(gltf->job)) {
         return vshi_job_fail_cancelled(gltf->job, error);
     }
@@ -510,6 +499,14 @@ vsh_result vshi_gltf_accessor_open(vshi_gltf *gltf, size_t index, vshi_gltf_acce
     }
     const json_t *sparse = json_object_get(given, "sparse");
     return sparse != NULL ? open_sparse(gltf, sparse, where, accessor, error) : VSH_OK;
+}
+
+vsh_result vshi_gltf_accessor_find(vshi_gltf *gltf, const json_t *object, const char *key, const char *where,
+                                   vshi_gltf_accessor *accessor, vsh_error *error) {
+    size_t index;
+    *accessor = (vshi_gltf_accessor){.count = 0};
+    VSHI_TRY(vshi_gltf_index(gltf, object, key, "accessors", where, &index, error));
+    return index != SIZE_MAX ? vshi_gltf_accessor_open(gltf, index, accessor, error) : VSH_OK;
 }
 
 static float signed_unit(int value, float most, bool normalized) {

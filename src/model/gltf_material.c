@@ -110,9 +110,8 @@ static bool is_integer(const vshi_gltf *gltf, const json_t *attributes, int set)
 /* Finds the transform of each set that a primitive stores as integers. It applies to all primitives of the
  * material, so that their UVs fit the material's mask. */
 static vsh_result note_packed(vshi_gltf *gltf, const json_t *primitive, vsh_error *error) {
-    const size_t count = gltf->model->material_count;
-    size_t material;
-    if (!vshi_gltf_count(primitive, "material", SIZE_MAX, &material) || material >= count) {
+    const size_t count = gltf->model->material_count, material = vshi_gltf_material(gltf, primitive);
+    if (material == SIZE_MAX) {
         return VSH_OK;
     }
     for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
@@ -173,7 +172,7 @@ static vsh_result take_view(vshi_gltf *gltf, const char *where, size_t view, vsh
     if (bytes.size == 0) {
         return vshi_gltf_fail(gltf, error, "%s is empty", where);
     }
-    VSHI_TRY(vshi_gltf_take(gltf, (void **)&image->owned, bytes.size, 1, error));
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&image->owned, bytes.size, 1, error));
     memcpy(image->owned, bytes.at, bytes.size);
     image->size = bytes.size;
     return VSH_OK;

@@ -210,13 +210,11 @@ static vsh_result read_mesh(vshi_gltf *gltf, size_t mesh, const vshi_gltf_pose *
 /* The inverse bind matrices of a skin's `count` joints; stays NULL where all are the identity. */
 static vsh_result read_inverse(vshi_gltf *gltf, const json_t *skin, const char *where, size_t count,
                                float **inverse, vsh_error *error) {
-    size_t accessor;
     vshi_gltf_accessor opened;
-    VSHI_TRY(vshi_gltf_index(gltf, skin, "inverseBindMatrices", "accessors", where, &accessor, error));
-    if (accessor == SIZE_MAX) {
+    VSHI_TRY(vshi_gltf_accessor_find(gltf, skin, "inverseBindMatrices", where, &opened, error));
+    if (opened.count == 0) {
         return VSH_OK;
     }
-    VSHI_TRY(vshi_gltf_accessor_open(gltf, accessor, &opened, error));
     if (opened.count < count || opened.components != 16) {
         return vshi_gltf_fail(gltf, error, "%s: %zu joints, but %zu matrices of %d components", where, count,
                               opened.count, opened.components);
@@ -343,13 +341,11 @@ vsh_result vshi_gltf_read_instances(vshi_gltf *gltf, const json_t *instancing, c
     *count = SIZE_MAX;
     for (int k = 0; k < VSHI_GLTF_PARTS; ++k) {
         const char *name = vshi_gltf_parts[k].attribute;
-        size_t index;
         vshi_gltf_accessor accessor;
-        VSHI_TRY(vshi_gltf_index(gltf, attributes, name, "accessors", where, &index, error));
-        if (index == SIZE_MAX) {
+        VSHI_TRY(vshi_gltf_accessor_find(gltf, attributes, name, where, &accessor, error));
+        if (accessor.count == 0) {
             continue;
         }
-        VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
         *count = *count == SIZE_MAX ? accessor.count : *count;
         VSHI_TRY(vshi_gltf_read_attribute(gltf, attributes, name, vshi_gltf_parts[k].components, *count,
                                           where, &values[k], error));

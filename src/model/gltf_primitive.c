@@ -203,20 +203,19 @@ static vsh_result morph(vshi_gltf *gltf, const json_t *primitive, const vshi_glt
     return VSH_OK;
 }
 
-static vsh_result add_joints(vshi_gltf *gltf, const vshi_gltf_pose *pose, size_t index, const float *weights,
-                             const char *where, size_t vertex_count, vshi_model_blend *blends,
-                             vsh_error *error) {
-    vshi_gltf_accessor accessor;
-    VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
-    if (accessor.components != 4 || (accessor.type != VSHI_GLTF_UBYTE && accessor.type != VSHI_GLTF_USHORT) ||
-        accessor.count != vertex_count) {
+static vsh_result add_joints(vshi_gltf *gltf, const vshi_gltf_pose *pose, const vshi_gltf_accessor *accessor,
+                             const float *weights, const char *where, size_t vertex_count,
+                             vshi_model_blend *blends, vsh_error *error) {
+    if (accessor->components != 4 ||
+        (accessor->type != VSHI_GLTF_UBYTE && accessor->type != VSHI_GLTF_USHORT) ||
+        accessor->count != vertex_count) {
         return vshi_gltf_fail(gltf, error,
                               "%s: its joints are no four bytes or shorts for each of %zu vertices", where,
                               vertex_count);
     }
     uint32_t *joints = NULL;
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&joints, vertex_count, sizeof(uint32_t[4]), error));
-    vshi_gltf_accessor_integers(&accessor, joints);
+    vshi_gltf_accessor_integers(accessor, joints);
     vsh_result result = VSH_OK;
     for (size_t i = 0; i < 4 * vertex_count; ++i) {
         const double weight = (double)weights[i];
@@ -241,11 +240,11 @@ static vsh_result add_sets(vshi_gltf *gltf, const json_t *primitive, const vshi_
     const json_t *attributes = json_object_get(primitive, "attributes");
     for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
         char name[32];
-        size_t index;
+        vshi_gltf_accessor joints;
         float *weights;
         snprintf(name, sizeof name, "JOINTS_%d", set);
-        VSHI_TRY(vshi_gltf_index(gltf, attributes, name, "accessors", where, &index, error));
-        if (index == SIZE_MAX) {
+        VSHI_TRY(vshi_gltf_accessor_find(gltf, attributes, name, where, &joints, error));
+        if (joints.count == 0) {
             break;
         }
         snprintf(name, sizeof name, "WEIGHTS_%d", set);
@@ -253,7 +252,8 @@ static vsh_result add_sets(vshi_gltf *gltf, const json_t *primitive, const vshi_
         if (weights == NULL) {
             continue;
         }
-        const vsh_result result = add_joints(gltf, pose, index, weights, where, vertex_count, blends, error);
+        const vsh_result result =
+            add_joints(gltf, pose, &joints, weights, where, vertex_count, blends, error);
         free(weights);
         VSHI_TRY(result);
     }
@@ -284,14 +284,12 @@ static vsh_result apply_pose(vshi_gltf *gltf, const json_t *primitive, const vsh
 vsh_result vshi_gltf_read_attribute(vshi_gltf *gltf, const json_t *attributes, const char *name,
                                     int components, size_t vertex_count, const char *where, float **values,
                                     vsh_error *error) {
-    size_t index;
     vshi_gltf_accessor accessor;
     *values = NULL;
-    VSHI_TRY(vshi_gltf_index(gltf, attributes, name, "accessors", where, &index, error));
-    if (index == SIZE_MAX) {
+    VSHI_TRY(vshi_gltf_accessor_find(gltf, attributes, name, where, &accessor, error));
+    if (accessor.count == 0) {
         return VSH_OK;
     }
-    VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
     if (accessor.components != components || accessor.type == VSHI_GLTF_UINT) {
         return vshi_gltf_fail(gltf, error,
                               "%s: %s has %d components of type %d, expected %d of type 5120 to 5123 or 5126",
@@ -302,45 +300,25 @@ vsh_result vshi_gltf_read_attribute(vshi_gltf *gltf, const json_t *attributes, c
                               accessor.count, vertex_count);
     }
     const size_t size = (size_t)components * sizeof(float);
-    VSHI_TRY(vshi_gltf_take(gltf, (void **)values, accessor.count, size, error));
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)values, accessor.count, size, error));
     vshi_gltf_accessor_floats(&accessor, *values);
     return VSH_OK;
 }
 
-/* Whether its material lets light through, where that is told. */
-static bool is_opaque(const vshi_gltf *gltf, const json_t *primitive) {
-    size_t material;
-    return !vshi_gltf_count(primitive, "material", SIZE_MAX, &material) ||
-           material >= gltf->model->material_count ||
-           gltf->model->materials[material].told.alpha == VSH_ALPHA_OPAQUE;
-}
-
-/* Whether its vertices have colours with alpha (3.7.2.1: COLOR_0 multiplies the base colour). */
-static vsh_result has_alpha(vshi_gltf *gltf, const json_t *primitive, const char *where, bool *has,
-                            vsh_error *error) {
-    vshi_gltf_accessor accessor;
-    size_t index;
-    *has = false;
-    if (is_opaque(gltf, primitive)) {
-        return VSH_OK;
-    }
-    VSHI_TRY(vshi_gltf_index(gltf, json_object_get(primitive, "attributes"), "COLOR_0", "accessors", where,
-                             &index, error));
-    if (index != SIZE_MAX) {
-        VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
-        *has = accessor.components == 4;
-    }
-    return VSH_OK;
-}
-
+/* The alpha of its vertices' colours, where one of them is not whole (3.7.2.1: COLOR_0 multiplies the base
+ * colour). */
 static vsh_result read_alphas(vshi_gltf *gltf, const json_t *primitive, const char *where,
                               vshi_model_shape *shape, vsh_error *error) {
     const json_t *attributes = json_object_get(primitive, "attributes");
     const size_t count = shape->vertex_count;
+    vshi_gltf_accessor accessor;
     float *colors;
-    bool has, whole = true;
-    VSHI_TRY(has_alpha(gltf, primitive, where, &has, error));
-    if (!has) {
+    bool whole = true;
+    if (shape->alpha == VSH_ALPHA_OPAQUE) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_gltf_accessor_find(gltf, attributes, "COLOR_0", where, &accessor, error));
+    if (accessor.components != 4) {
         return VSH_OK;
     }
     VSHI_TRY(vshi_gltf_read_attribute(gltf, attributes, "COLOR_0", 4, count, where, &colors, error));
@@ -360,13 +338,10 @@ static vsh_result read_alphas(vshi_gltf *gltf, const json_t *primitive, const ch
 /* The vertices in the order that a primitive draws them in: *order, *count of them. */
 static vsh_result read_order(vshi_gltf *gltf, const json_t *primitive, size_t vertex_count, const char *where,
                              uint32_t **order, size_t *count, vsh_error *error) {
-    size_t index;
-    vshi_gltf_accessor accessor = {.count = vertex_count};
-    VSHI_TRY(vshi_gltf_index(gltf, primitive, "indices", "accessors", where, &index, error));
-    if (index != SIZE_MAX) {
-        VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
-    }
-    if (index != SIZE_MAX &&
+    vshi_gltf_accessor accessor;
+    VSHI_TRY(vshi_gltf_accessor_find(gltf, primitive, "indices", where, &accessor, error));
+    const bool given = accessor.count > 0;
+    if (given &&
         (accessor.components != 1 || (accessor.type != VSHI_GLTF_UBYTE && accessor.type != VSHI_GLTF_USHORT &&
                                       accessor.type != VSHI_GLTF_UINT))) {
         return vshi_gltf_fail(gltf, error,
@@ -374,15 +349,15 @@ static vsh_result read_order(vshi_gltf *gltf, const json_t *primitive, size_t ve
                               "type 5121, 5123 or 5125",
                               where, accessor.components, accessor.type);
     }
-    *count = accessor.count;
-    VSHI_TRY(vshi_gltf_take(gltf, (void **)order, accessor.count, sizeof **order, error));
-    if (index != SIZE_MAX) {
+    *count = given ? accessor.count : vertex_count;
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)order, *count, sizeof **order, error));
+    if (given) {
         vshi_gltf_accessor_integers(&accessor, *order);
     }
-    for (size_t i = 0; i < accessor.count && index == SIZE_MAX; ++i) {
+    for (size_t i = 0; i < *count && !given; ++i) {
         (*order)[i] = (uint32_t)i;
     }
-    return check_indices(gltf->path, where, *order, accessor.count, vertex_count, error);
+    return check_indices(gltf->path, where, *order, *count, vertex_count, error);
 }
 
 /* Triangle i of a strip or a fan (glTF 2.0, 3.7.2.1). */
@@ -419,17 +394,6 @@ vsh_result vshi_gltf_read_triangles(vshi_gltf *gltf, const json_t *primitive, si
     free(*corners);
     *corners = triangles;
     return VSH_OK;
-}
-
-/* Finds the transform of a packed set. NULL: the set is not packed. */
-static const vshi_gltf_unpacking *find_unpacking(const vshi_gltf *gltf, const json_t *primitive, int set) {
-    size_t material;
-    if (gltf->unpackings == NULL || !vshi_gltf_count(primitive, "material", SIZE_MAX, &material) ||
-        material >= gltf->model->material_count) {
-        return NULL;
-    }
-    const vshi_gltf_unpacking *u = &gltf->unpackings[material * VSH_MAX_UV_SETS + (size_t)set];
-    return u->uvs != VSHI_GLTF_UVS_PLAIN ? u : NULL;
 }
 
 /* `draco`: where the vertices come from; NULL: accessors. */
@@ -478,30 +442,29 @@ done:
 
 static vsh_result read_plain(vshi_gltf *gltf, const json_t *primitive, size_t mode, const char *where,
                              vshi_model_shape *shape, vsh_error *error) {
-    size_t index;
+    const json_t *attributes = json_object_get(primitive, "attributes");
     vshi_gltf_accessor accessor;
-    VSHI_TRY(vshi_gltf_index(gltf, json_object_get(primitive, "attributes"), "POSITION", "accessors", where,
-                             &index, error));
-    if (index == SIZE_MAX) {
+    VSHI_TRY(vshi_gltf_accessor_find(gltf, attributes, "POSITION", where, &accessor, error));
+    if (accessor.count == 0) {
         return VSH_OK; /* without positions there is nothing to see (3.7.2.1) */
     }
-    VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
     shape->vertex_count = accessor.count;
     VSHI_TRY(vshi_gltf_read_triangles(gltf, primitive, mode, accessor.count, where, &shape->indices,
                                       &shape->triangle_count, error));
     if (shape->triangle_count == 0) {
         return VSH_OK;
     }
-    VSHI_TRY(read_vertices(gltf, json_object_get(primitive, "attributes"), NULL, where, shape, error));
+    VSHI_TRY(read_vertices(gltf, attributes, NULL, where, shape, error));
     return read_alphas(gltf, primitive, where, shape, error);
 }
 
 /* Turns a packer's integers into UVs. */
-static void unpack_uvs(const vshi_gltf *gltf, const json_t *primitive, vshi_model_shape *shape) {
-    for (int set = 0; set < shape->uv_sets; ++set) {
-        const vshi_gltf_unpacking *u = find_unpacking(gltf, primitive, set);
+static void unpack_uvs(const vshi_gltf *gltf, vshi_model_shape *shape) {
+    for (int set = 0; set < shape->uv_sets && gltf->unpackings != NULL && shape->material > 0; ++set) {
+        const vshi_gltf_unpacking *u =
+            &gltf->unpackings[((size_t)shape->material - 1) * VSH_MAX_UV_SETS + (size_t)set];
         float *uvs = shape->uvs[set];
-        if (u == NULL || uvs == NULL) {
+        if (u->uvs == VSHI_GLTF_UVS_PLAIN || uvs == NULL) {
             continue;
         }
         shape->packed |= 1U << set;
@@ -514,14 +477,13 @@ static void unpack_uvs(const vshi_gltf *gltf, const json_t *primitive, vshi_mode
     }
 }
 
-/* One that is not there is none. */
-static void set_material(const vshi_gltf *gltf, const json_t *primitive, vshi_model_shape *shape) {
+size_t vshi_gltf_material(const vshi_gltf *gltf, const json_t *primitive) {
+    const size_t count = gltf->model->material_count;
     size_t material;
-    if (vshi_gltf_count(primitive, "material", SIZE_MAX, &material) &&
-        material < gltf->model->material_count && material < INT32_MAX) {
-        shape->material = (int32_t)material + 1;
-        shape->alpha = gltf->model->materials[material].told.alpha;
-    }
+    return vshi_gltf_count(primitive, "material", SIZE_MAX, &material) &&
+                   material < (count < INT32_MAX ? count : INT32_MAX)
+               ? material
+               : SIZE_MAX;
 }
 
 vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
@@ -534,13 +496,17 @@ vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *primitive, co
         return VSH_OK; /* points or lines */
     }
     const json_t *draco = vshi_gltf_extension(primitive, "KHR_draco_mesh_compression");
+    const size_t material = vshi_gltf_material(gltf, primitive);
+    if (material != SIZE_MAX) {
+        shape->material = (int32_t)material + 1;
+        shape->alpha = gltf->model->materials[material].told.alpha;
+    }
     VSHI_TRY(draco != NULL ? read_draco(gltf, draco, where, shape, error)
                            : read_plain(gltf, primitive, mode, where, shape, error));
     if (shape->triangle_count == 0) {
         return VSH_OK;
     }
-    set_material(gltf, primitive, shape);
-    unpack_uvs(gltf, primitive, shape);
+    unpack_uvs(gltf, shape);
     VSHI_TRY(apply_pose(gltf, primitive, pose, where, shape, error));
     return finish(gltf->path, gltf->run, where, shape, error);
 }

@@ -201,6 +201,9 @@ vsh_result vshi_unsupported_check(const char *path, vsh_error *error);
 
 /* --- files that a model is read with (beside.c) */
 
+/* The path of a file in the folder of `path`, in new memory; NULL where memory is short. */
+char *vshi_path_beside(const char *path, const char *name, size_t size);
+
 /* Receives the path of such a file and frees it, after an error too. */
 typedef vsh_result vshi_beside_fn(void *user, char *path, vsh_error *error);
 

@@ -172,7 +172,7 @@ static vsh_result cut_mesh(vshi_obj *obj, const vshi_obj_mesh *mesh, size_t runs
     const vsh_result result = vshi_faces_cut(&cutter, obj->faces.runs + mesh->first_run, runs,
                                              obj->faces.corners + mesh->first_corner, shape->indices,
                                              &shape->triangle_count, error);
-    vshi_face_cutter_end(&cutter, obj->run, obj->path, vshi_words_at(&obj->names, mesh->name));
+    vshi_face_cutter_end(&cutter, obj->run, obj->path, obj->names.names[mesh->name]);
     return result;
 }
 
@@ -261,7 +261,7 @@ static vsh_result make_images(vshi_obj *obj, vsh_model *model, vsh_error *error)
     model->image_count = count;
     obj->budget.bytes += bytes;
     for (size_t i = 0; i < count; ++i) {
-        model->images[i].path = strdup(vshi_words_at(&obj->images, i));
+        model->images[i].path = strdup(obj->images.names[i]);
         if (model->images[i].path == NULL) {
             return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", obj->path);
         }
@@ -281,7 +281,7 @@ static vsh_result make_materials(vshi_obj *obj, vsh_model *model, vsh_error *err
     VSHI_TRY(vshi_model_take_plain_materials(model, count, error));
     for (size_t i = 0; i < count; ++i) {
         make_material(&obj->alphas[i], &model->materials[i]);
-        VSHI_TRY(vshi_model_copy_line(vshi_words_at(&obj->materials, i), &model->materials[i].name, error));
+        VSHI_TRY(vshi_model_copy_line(obj->materials.names[i], &model->materials[i].name, error));
     }
     return VSH_OK;
 }
@@ -291,8 +291,8 @@ static vsh_result add_entries(const vshi_obj *obj, vsh_model *model, vsh_error *
     for (size_t o = 0; o < obj->object_count; ++o) {
         const uint32_t number = vshi_model_next_object(model);
         for (size_t m = obj->objects[o].first_mesh + 1; m > 0; m = obj->meshes[m - 1].next) {
-            const vshi_model_place place = {.node = vshi_words_at(&obj->names, obj->objects[o].name),
-                                            .mesh = vshi_words_at(&obj->names, obj->meshes[m - 1].name),
+            const vshi_model_place place = {.node = obj->names.names[obj->objects[o].name],
+                                            .mesh = obj->names.names[obj->meshes[m - 1].name],
                                             .object = number,
                                             .shape = m - 1,
                                             .world = world};

@@ -68,36 +68,35 @@ static bool take_option(vshi_token word, const char **at, const char *end, vshi_
     static const struct {
         const char *word;
         int values; /* -1: one to three numbers */
-        bool passed_over;
-    } others[] = {{"-blendu", 1, true}, {"-blendv", 1, true}, {"-cc", 1, true},
-                  {"-texres", 1, true}, {"-bm", 1, true},     {"-boost", 1, true},
-                  {"-type", 1, true},   {"-mm", 2, false},    {"-t", -1, false}};
+        bool taken; /* or passed over, without harm */
+    } options[] = {{"-clamp", 1, true},  {"-imfchan", 1, true}, {"-o", -1, true},   {"-s", -1, true},
+                   {"-blendu", 1, true}, {"-blendv", 1, true},  {"-cc", 1, true},   {"-texres", 1, true},
+                   {"-bm", 1, true},     {"-boost", 1, true},   {"-type", 1, true}, {"-mm", 2, false},
+                   {"-t", -1, false}};
+    size_t i = 0;
+    while (i < sizeof options / sizeof options[0] && !vshi_token_is(word, options[i].word)) {
+        ++i;
+    }
+    if (i == sizeof options / sizeof options[0]) {
+        return false;
+    }
+    double ignored[2];
+    double *numbers = strcmp(options[i].word, "-o") == 0   ? map->offset
+                      : strcmp(options[i].word, "-s") == 0 ? map->scale
+                                                           : ignored;
+    vshi_token value = {NULL, 0};
+    bool there = options[i].values > 0 || take_numbers(at, end, numbers), taken = options[i].taken;
+    for (int k = 0; k < options[i].values && there; ++k) {
+        value = vshi_scan_token(at, end);
+        there = value.text != NULL;
+    }
     if (vshi_token_is(word, "-clamp")) {
-        const vshi_token value = vshi_scan_token(at, end);
         map->clamp = vshi_token_is(value, "on");
-        return value.text != NULL;
+    } else if (vshi_token_is(word, "-imfchan")) {
+        taken = take_channel(value, &map->channel);
     }
-    if (vshi_token_is(word, "-imfchan")) {
-        const vshi_token value = vshi_scan_token(at, end);
-        map->other = take_channel(value, &map->channel) ? map->other : word;
-        return value.text != NULL;
-    }
-    if (vshi_token_is(word, "-o") || vshi_token_is(word, "-s")) {
-        return take_numbers(at, end, word.text[1] == 'o' ? map->offset : map->scale);
-    }
-    for (size_t i = 0; i < sizeof others / sizeof others[0]; ++i) {
-        if (!vshi_token_is(word, others[i].word)) {
-            continue;
-        }
-        double ignored[2];
-        bool there = others[i].values > 0 || take_numbers(at, end, ignored);
-        for (int k = 0; k < others[i].values && there; ++k) {
-            there = vshi_scan_token(at, end).text != NULL;
-        }
-        map->other = others[i].passed_over ? map->other : word;
-        return there;
-    }
-    return false;
+    map->other = taken ? map->other : word;
+    return there;
 }
 
 static bool is_option(vshi_token word) {
@@ -123,19 +122,23 @@ bool vshi_mtl_map_read(const char *at, const char *end, vshi_mtl_map *map) {
     return true;
 }
 
-char *vshi_mtl_map_path(const char *path, vshi_token name) {
+char *vshi_path_beside(const char *path, const char *name, size_t size) {
     const char *slash = strrchr(path, '/');
-    const size_t folder = slash != NULL && name.text[0] != '/' ? (size_t)(slash - path) + 1 : 0;
-    char *text = malloc(folder + name.size + 1);
-    struct stat status;
-    if (text == NULL) {
-        return NULL;
+    const size_t folder = slash != NULL ? (size_t)(slash - path) + 1 : 0;
+    char *text = malloc(folder + size + 1);
+    if (text != NULL) {
+        memcpy(text, path, folder);
+        memcpy(text + folder, name, size);
+        text[folder + size] = '\0';
     }
-    memcpy(text, path, folder);
-    memcpy(text + folder, name.text, name.size);
-    text[folder + name.size] = '\0';
-    if (stat(text, &status) != 0) {
-        for (char *c = text + folder; *c != '\0'; ++c) {
+    return text;
+}
+
+char *vshi_mtl_map_path(const char *path, vshi_token name) {
+    char *text = vshi_path_beside(name.text[0] == '/' ? "" : path, name.text, name.size);
+    struct stat status;
+    if (text != NULL && stat(text, &status) != 0) {
+        for (char *c = text + strlen(text) - strnlen(name.text, name.size); *c != '\0'; ++c) {
             *c = *c == '\\' ? '/' : *c;
         }
     }
@@ -257,19 +260,6 @@ static vsh_result take_lines(vshi_obj *obj, vshi_stream *stream, vsh_error *erro
     }
 }
 
-/* A file beside the OBJ, `name` behind its folder; NULL: memory is short. */
-static char *beside(const char *path, const char *name, size_t size) {
-    const char *slash = strrchr(path, '/');
-    const size_t folder = slash != NULL ? (size_t)(slash - path) + 1 : 0;
-    char *text = malloc(folder + size + 1);
-    if (text != NULL) {
-        memcpy(text, path, folder);
-        memcpy(text + folder, name, size);
-        text[folder + size] = '\0';
-    }
-    return text;
-}
-
 /* Reads one where it is a regular file, which *found tells. */
 static vsh_result read_file(vshi_obj *obj, const char *path, bool *found, vsh_error *error) {
     struct stat status;
@@ -297,10 +287,10 @@ static vsh_result read_file(vshi_obj *obj, const char *path, bool *found, vsh_er
 
 char *vshi_obj_library(const char *path, int choice, const char *name, size_t size) {
     if (choice == 0) {
-        return beside(path, name, size);
+        return vshi_path_beside(path, name, size);
     }
     const char *slash = strrchr(path, '/'), *own = slash != NULL ? slash + 1 : path;
-    char *library = beside(path, own, strlen(own));
+    char *library = vshi_path_beside(path, own, strlen(own));
     if (library != NULL) {
         memcpy(strrchr(library, '.') + 1, "mtl", sizeof "mtl");
     }

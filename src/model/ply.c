@@ -29,12 +29,6 @@ enum {
 
 enum { VSHI_PLY_MOST_TEXCOORDS = 8 }; /* of one face that are kept: two for each corner */
 
-typedef struct row_property {
-    int8_t type, count_type; /* as in the header */
-    int8_t role;
-    int8_t size, count_size; /* bytes in a binary file */
-} row_property;
-
 typedef struct ply_reader {
     const char *path;
     const vsh_run *run;
@@ -42,7 +36,7 @@ typedef struct ply_reader {
     vshi_budget budget;
     vshi_stream stream;
     vshi_ply_header head;
-    row_property property[VSHI_PLY_PROPERTIES];
+    int8_t roles[VSHI_PLY_PROPERTIES];
     const vshi_ply_element *element;
     uint64_t row;
     uint64_t vertices; /* that the header names */
@@ -50,7 +44,11 @@ typedef struct ply_reader {
     float *positions, *normals, *uvs;
     size_t position_capacity, normal_capacity, uv_capacity, vertex_count;
     vshi_faces faces;
-    /* of the row */
+    /* of the row that is read */
+    const char *at, *end;
+    vsh_error *error;
+    int64_t last[2]; /* indices of the strip, of which `length` have been read */
+    size_t length;
     float number[VSHI_PLY_NUMBERS];
     size_t corners; /* of the face; of a strip, triangles' */
     float texcoord[VSHI_PLY_MOST_TEXCOORDS];
@@ -111,16 +109,8 @@ static vsh_result check_strips(const ply_reader *r, const vshi_ply_element *stri
 static vsh_result describe(ply_reader *r, const vshi_ply_element *element, vsh_error *error) {
     const bool vertex = strcmp(element->name, "vertex") == 0, again = vertex && r->vertices > 0;
     for (int p = element->first; p < element->end; ++p) {
-        const vshi_ply_property *from = &r->head.property[p];
-        const bool list = from->count_type >= 0;
-        r->property[p] = (row_property){
-            .type = from->type,
-            .count_type = from->count_type,
-            .role = (int8_t)(again ? VSHI_PLY_NOTHING : role_of(element->name, from)),
-            .size = (int8_t)vshi_ply_size(from->type),
-            .count_size = (int8_t)(list ? vshi_ply_size(from->count_type) : 0),
-        };
-        const int role = r->property[p].role;
+        const int role = again ? VSHI_PLY_NOTHING : role_of(element->name, &r->head.property[p]);
+        r->roles[p] = (int8_t)role;
         r->has_normals = r->has_normals || (role >= VSHI_PLY_NX && role < VSHI_PLY_U);
         r->has_uvs = r->has_uvs || role == VSHI_PLY_U || role == VSHI_PLY_U + 1;
     }
@@ -173,46 +163,32 @@ static vsh_result keep_vertex(ply_reader *r, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Texture coordinates of a face's corners are those of its vertices: the last face's count. */
-
 /* --- parsing rows */
 
-/* A row on its way. */
-typedef struct ply_cursor {
-    ply_reader *reader;
-    const char *at, *end;
-    vsh_error *error;
-    int64_t last[2]; /* indices of the strip, of which `length` have been read */
-    size_t length;
-} ply_cursor;
-
-static bool fail(ply_cursor *c, vsh_result result) {
-    c->reader->failed = result;
+static bool fail(ply_reader *r, vsh_result result) {
+    r->failed = result;
     return false;
 }
 
 /* The window ends: what it lacks may be there yet. */
-static bool want_more(ply_cursor *c) {
-    ply_reader *r = c->reader;
-    return vshi_stream_ended(&r->stream) ? fail(c, vshi_ply_fail_short(r->path, r->element, r->row, c->error))
+static bool want_more(ply_reader *r) {
+    return vshi_stream_ended(&r->stream) ? fail(r, vshi_ply_fail_short(r->path, r->element, r->row, r->error))
                                          : false;
 }
 
-static bool fail_value(ply_cursor *c, vshi_token token, const char *expected) {
-    const ply_reader *r = c->reader;
-    return fail(c, vshi_fail(c->error, VSH_ERROR_INPUT, "%s: %s %" PRIu64 " holds '%.*s', expected %s",
+static bool fail_value(ply_reader *r, vshi_token token, const char *expected) {
+    return fail(r, vshi_fail(r->error, VSH_ERROR_INPUT, "%s: %s %" PRIu64 " holds '%.*s', expected %s",
                              r->path, r->element->name, r->row, VSHI_TOKEN_ARGS(token), expected));
 }
 
-static bool push_corner(ply_cursor *c, uint32_t corner) {
-    ply_reader *r = c->reader;
+static bool push_corner(ply_reader *r, uint32_t corner) {
     vshi_faces *faces = &r->faces;
     const size_t at = faces->count + r->corners;
     if (at == faces->capacity) {
         const vsh_result result = vshi_grow(&r->budget, &faces->corners, &faces->capacity, at + 1,
-                                            sizeof *faces->corners, c->error);
+                                            sizeof *faces->corners, r->error);
         if (result != VSH_OK) {
-            return fail(c, result);
+            return fail(r, result);
         }
     }
     faces->corners[at] = corner;
@@ -220,43 +196,41 @@ static bool push_corner(ply_cursor *c, uint32_t corner) {
     return true;
 }
 
-static bool check_index(ply_cursor *c, int64_t index) {
-    const ply_reader *r = c->reader;
+static bool check_index(ply_reader *r, int64_t index) {
     return index >= 0 && (uint64_t)index < r->vertices
                ? true
-               : fail(c, vshi_fail(c->error, VSH_ERROR_INPUT,
+               : fail(r, vshi_fail(r->error, VSH_ERROR_INPUT,
                                    "%s: %s %" PRIu64 " uses vertex %" PRId64 ", but there are only %" PRIu64,
                                    r->path, r->element->name, r->row, index, r->vertices));
 }
 
 /* The next index of a strip; -1 begins another. Every second triangle of a strip runs the other way around;
  * those of fewer than three vertices, by which strips are joined, are left out. */
-static bool push_strip(ply_cursor *c, int64_t index) {
+static bool push_strip(ply_reader *r, int64_t index) {
     if (index == -1) {
-        c->length = 0;
+        r->length = 0;
         return true;
     }
-    if (!check_index(c, index)) {
+    if (!check_index(r, index)) {
         return false;
     }
-    const int64_t a = c->last[0], b = c->last[1];
-    c->last[0] = b;
-    c->last[1] = index;
-    if (c->length++ < 2 || a == b || b == index || a == index) {
+    const int64_t a = r->last[0], b = r->last[1];
+    r->last[0] = b;
+    r->last[1] = index;
+    if (r->length++ < 2 || a == b || b == index || a == index) {
         return true;
     }
-    const bool odd = c->length % 2 == 0;
-    return push_corner(c, (uint32_t)(odd ? b : a)) && push_corner(c, (uint32_t)(odd ? a : b)) &&
-           push_corner(c, (uint32_t)index);
+    const bool odd = r->length % 2 == 0;
+    return push_corner(r, (uint32_t)(odd ? b : a)) && push_corner(r, (uint32_t)(odd ? a : b)) &&
+           push_corner(r, (uint32_t)index);
 }
 
-static bool push_index(ply_cursor *c, int role, int64_t index) {
-    return role == VSHI_PLY_STRIP ? push_strip(c, index)
-                                  : check_index(c, index) && push_corner(c, (uint32_t)index);
+static bool push_index(ply_reader *r, int role, int64_t index) {
+    return role == VSHI_PLY_STRIP ? push_strip(r, index)
+                                  : check_index(r, index) && push_corner(r, (uint32_t)index);
 }
 
-static void push_number(ply_cursor *c, int role, float number) {
-    ply_reader *r = c->reader;
+static void push_number(ply_reader *r, int role, float number) {
     if (role < VSHI_PLY_NUMBERS) {
         r->number[role] = number;
     } else if (role == VSHI_PLY_TEXCOORDS) {
@@ -270,51 +244,50 @@ static void push_number(ply_cursor *c, int role, float number) {
 /* --- text */
 
 /* The next token; one that the window's end may have cut is none yet. */
-static bool next_token(ply_cursor *c, vshi_token *token) {
-    *token = vshi_scan_token(&c->at, c->end);
-    return token->text != NULL && (c->at < c->end || vshi_stream_ended(&c->reader->stream)) ? true
-                                                                                            : want_more(c);
+static bool next_token(ply_reader *r, vshi_token *token) {
+    *token = vshi_scan_token(&r->at, r->end);
+    return token->text != NULL && (r->at < r->end || vshi_stream_ended(&r->stream)) ? true : want_more(r);
 }
 
-static bool take_text(ply_cursor *c, int role) {
+static bool take_text(ply_reader *r, int role) {
     static const char finite[] = "a finite number";
     vshi_token token;
-    if (!next_token(c, &token)) {
+    if (!next_token(r, &token)) {
         return false;
     }
     if (role == VSHI_PLY_CORNERS || role == VSHI_PLY_STRIP) {
         int64_t index;
         return vshi_token_integer(token, &index) && (index >= 0 || role == VSHI_PLY_STRIP)
-                   ? push_index(c, role, index)
-                   : fail_value(c, token, "an index of a vertex");
+                   ? push_index(r, role, index)
+                   : fail_value(r, token, "an index of a vertex");
     }
     float number;
     if (vshi_decimal_float(token.text, &number) != token.text + token.size) {
         /* no place is there, but other things may be so */
         if (vshi_token_number(token) != VSHI_NUMBER_NOT_FINITE || role < VSHI_PLY_NX) {
-            return fail_value(c, token, finite);
+            return fail_value(r, token, finite);
         }
         number = NAN;
     } else if (role < VSHI_PLY_NX && !isfinite(number)) {
-        return fail_value(c, token, finite);
+        return fail_value(r, token, finite);
     }
-    push_number(c, role, number);
+    push_number(r, role, number);
     return true;
 }
 
-static bool take_text_property(ply_cursor *c, const row_property *property) {
+static bool take_text_property(ply_reader *r, const vshi_ply_property *property, int role) {
     int64_t values = 1;
     if (property->count_type >= 0) {
         vshi_token token;
-        if (!next_token(c, &token)) {
+        if (!next_token(r, &token)) {
             return false;
         }
         if (!vshi_token_integer(token, &values) || values < 0) {
-            return fail_value(c, token, "a list's length");
+            return fail_value(r, token, "a list's length");
         }
     }
     for (int64_t i = 0; i < values; ++i) {
-        if (!take_text(c, property->role)) {
+        if (!take_text(r, role)) {
             return false;
         }
     }
@@ -332,25 +305,27 @@ static int64_t index_at(const char *at, int type, bool big_endian) {
     return number >= 0.0F && number <= 16777216.0F && floorf(number) == number ? (int64_t)number : -2;
 }
 
-static bool take_binary_property(ply_cursor *c, const row_property *property) {
-    const bool big = c->reader->head.big_endian;
+static bool take_binary_property(ply_reader *r, const vshi_ply_property *property, int role) {
+    const bool big = r->head.big_endian;
+    const int size = vshi_ply_size(property->type);
     uint64_t values = 1;
     if (property->count_type >= 0) {
-        if (c->end - c->at < property->count_size) {
-            return want_more(c);
+        const int count_size = vshi_ply_size(property->count_type);
+        if (r->end - r->at < count_size) {
+            return want_more(r);
         }
-        values = vshi_bytes_number(c->at, property->count_size, big);
-        c->at += property->count_size;
+        values = vshi_bytes_number(r->at, count_size, big);
+        r->at += count_size;
     }
-    if (values > (uint64_t)(c->end - c->at) / (uint64_t)property->size) {
-        return want_more(c);
+    if (values > (uint64_t)(r->end - r->at) / (uint64_t)size) {
+        return want_more(r);
     }
-    const char *at = c->at;
-    c->at += values * (uint64_t)property->size;
-    for (; property->role != VSHI_PLY_NOTHING && at < c->at; at += property->size) {
-        if (property->role != VSHI_PLY_CORNERS && property->role != VSHI_PLY_STRIP) {
-            push_number(c, property->role, (float)vshi_ply_number(at, property->type, big));
-        } else if (!push_index(c, property->role, index_at(at, property->type, big))) {
+    const char *at = r->at;
+    r->at += values * (uint64_t)size;
+    for (; role != VSHI_PLY_NOTHING && at < r->at; at += size) {
+        if (role != VSHI_PLY_CORNERS && role != VSHI_PLY_STRIP) {
+            push_number(r, role, (float)vshi_ply_number(at, property->type, big));
+        } else if (!push_index(r, role, index_at(at, property->type, big))) {
             return false;
         }
     }
@@ -359,19 +334,22 @@ static bool take_binary_property(ply_cursor *c, const row_property *property) {
 
 /* Reads the row at `at` into the reader's members, and its corners behind those of `faces`. Returns behind
  * it; NULL: it failed, or (reader->failed is VSH_OK) the window ends within it. */
-static const char *read_row(ply_reader *reader, const char *at, vsh_error *error) {
-    ply_cursor c = {.reader = reader, .at = at, .end = reader->stream.end, .error = error};
-    const bool ascii = reader->head.ascii;
-    reader->corners = reader->texcoords = 0;
-    for (int p = reader->element->first; p < reader->element->end; ++p) {
-        const row_property *property = &reader->property[p];
-        if (!(ascii ? take_text_property(&c, property) : take_binary_property(&c, property))) {
+static const char *read_row(ply_reader *r, const char *at, vsh_error *error) {
+    r->at = at;
+    r->end = r->stream.end;
+    r->error = error;
+    r->corners = r->texcoords = r->length = 0;
+    for (int p = r->element->first; p < r->element->end; ++p) {
+        const vshi_ply_property *property = &r->head.property[p];
+        if (!(r->head.ascii ? take_text_property(r, property, r->roles[p])
+                            : take_binary_property(r, property, r->roles[p]))) {
             return NULL;
         }
     }
-    return c.at;
+    return r->at;
 }
 
+/* Texture coordinates of a face's corners are those of its vertices: the last face's count. */
 static vsh_result keep_texcoords(ply_reader *r, const uint32_t *corners, vsh_error *error) {
     enum { LEAST = 6 };
     if (r->texcoords < LEAST || r->texcoords > VSHI_PLY_MOST_TEXCOORDS || r->corners < r->texcoords / 2) {
@@ -413,7 +391,7 @@ static vsh_result keep_row(ply_reader *r, int role, vsh_error *error) {
 static int role_of_rows(const ply_reader *r) {
     int role = VSHI_PLY_NOTHING;
     for (int p = r->element->first; p < r->element->end; ++p) {
-        role = r->property[p].role < role ? r->property[p].role : role;
+        role = r->roles[p] < role ? r->roles[p] : role;
     }
     return role;
 }

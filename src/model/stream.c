@@ -1,7 +1,7 @@
 #define _GNU_SOURCE
 #include "model/stream.h"
 
-#include "base/hash.h"
+#include "base/decimal.h"
 #include "base/input.h"
 #include "base/memory.h"
 #include "base/try.h"
@@ -45,69 +45,35 @@ vsh_result vshi_grow(vshi_budget *budget, void *memory, size_t *capacity, size_t
                : vshi_reserve(budget, memory, capacity, needed + needed / 2 + LEAST, size, error);
 }
 
-enum { LONGEST = 1023 };
-
-static uint64_t hash_of(const char *name, size_t size) {
-    uint64_t hash = size;
-    for (size_t i = 0; i < size; ++i) {
-        hash = vshi_mix(hash ^ (unsigned char)name[i]);
-    }
-    return hash;
-}
-
-/* The slot of a name, or the empty one where it would be. There is always an empty one. */
-static uint32_t *slot_of(const vshi_words *words, const char *name, size_t size) {
-    const size_t mask = words->slot_count - 1;
-    size_t at = hash_of(name, size) & mask;
-    for (; words->slots[at] != 0; at = (at + 1) & mask) {
-        const char *known = vshi_words_at(words, words->slots[at] - 1);
-        if (strncmp(known, name, size) == 0 && known[size] == '\0') {
-            break;
-        }
-    }
-    return &words->slots[at];
-}
-
-static vsh_result grow_slots(vshi_words *words, vshi_budget *budget, vsh_error *error) {
-    enum { FIRST = 64 };
-    if (words->count < words->slot_count / 2) {
-        return VSH_OK;
-    }
-    const size_t slots = words->slot_count > 0 ? 2 * words->slot_count : FIRST;
-    VSHI_TRY(vshi_reserve(budget, &words->slots, &words->slot_capacity, slots, sizeof *words->slots, error));
-    words->slot_count = slots;
-    memset(words->slots, 0, slots * sizeof *words->slots);
-    for (size_t i = 0; i < words->count; ++i) {
-        const char *name = vshi_words_at(words, i);
-        *slot_of(words, name, strlen(name)) = (uint32_t)i + 1;
-    }
-    return VSH_OK;
-}
-
 vsh_result vshi_words_number(vshi_words *words, vshi_budget *budget, const char *name, size_t size,
                              size_t *number, bool *is_new, vsh_error *error) {
+    enum { LONGEST = 1023, NODE = 192 /* bytes that Jansson takes for a member and its number, at most */ };
+    char text[LONGEST + 1];
     size = size > 0 ? strnlen(name, size < LONGEST ? size : LONGEST) : 0;
-    VSHI_TRY(grow_slots(words, budget, error));
-    uint32_t *slot = slot_of(words, name, size);
-    *is_new = *slot == 0;
-    if (*is_new) {
-        VSHI_TRY(vshi_grow(budget, &words->text, &words->text_capacity, words->used + size + 1, 1, error));
-        VSHI_TRY(vshi_grow(budget, &words->begins, &words->capacity, words->count + 1, sizeof *words->begins,
-                           error));
-        memcpy(words->text + words->used, name, size);
-        words->text[words->used + size] = '\0';
-        words->begins[words->count++] = words->used;
-        words->used += size + 1;
-        *slot = (uint32_t)words->count;
+    memcpy(text, size > 0 ? name : "", size);
+    text[size] = '\0';
+    const json_t *known = json_object_get(words->numbers, text);
+    *number = known != NULL ? (size_t)json_integer_value(known) : words->count;
+    *is_new = known == NULL;
+    if (known != NULL) {
+        return VSH_OK;
     }
-    *number = *slot - 1;
+    words->used += size + 1;
+    budget->bytes += (double)(size + NODE);
+    VSHI_TRY(vshi_check_limit(budget->run, budget->bytes, budget->path, error));
+    VSHI_TRY(
+        vshi_grow(budget, &words->names, &words->capacity, words->count + 1, sizeof *words->names, error));
+    words->numbers = words->numbers != NULL ? words->numbers : json_object();
+    if (json_object_set_new_nocheck(words->numbers, text, json_integer((json_int_t)words->count)) != 0) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", budget->path);
+    }
+    words->names[words->count++] = json_object_iter_key(json_object_iter_at(words->numbers, text));
     return VSH_OK;
 }
 
 void vshi_words_free(vshi_words *words) {
-    free(words->slots);
-    free(words->begins);
-    free(words->text);
+    json_decref(words->numbers);
+    free(words->names);
     *words = (vshi_words){0};
 }
 
@@ -214,10 +180,6 @@ static bool is_space(char c) {
     return c == ' ' || (c >= '\t' && c <= '\r');
 }
 
-static bool is_digit(char c) {
-    return c >= '0' && c <= '9';
-}
-
 vshi_token vshi_scan_token(const char **at, const char *end) {
     const char *c = *at;
     while (c < end && is_space(*c)) {
@@ -246,60 +208,29 @@ bool vshi_token_is(vshi_token token, const char *text) {
     return token.size == strlen(text) && token.size > 0 && memcmp(token.text, text, token.size) == 0;
 }
 
-static const char *skip_digits(const char *c, const char *end) {
-    while (c < end && is_digit(*c)) {
-        ++c;
-    }
-    return c;
-}
-
 vshi_number vshi_token_number(vshi_token token) {
     if (token.size == 0) {
         return VSHI_NUMBER_NONE;
     }
     const char *c = token.text, *end = c + token.size;
+    double ignored;
     c += *c == '-' || *c == '+';
     if (end - c >= 3 && (strncasecmp(c, "nan", 3) == 0 || strncasecmp(c, "inf", 3) == 0)) {
-        return VSHI_NUMBER_NOT_FINITE;
+        return VSHI_NUMBER_NOT_FINITE; /* "-nan(ind)", too */
     }
-    const char *digits = c;
-    c = skip_digits(c, end);
-    ptrdiff_t count = c - digits;
-    if (c < end && *c == '.') {
-        const char *fraction = ++c;
-        c = skip_digits(c, end);
-        count += c - fraction;
-    }
-    if (count == 0) {
-        return VSHI_NUMBER_NONE;
-    }
-    if (c < end && (*c == 'e' || *c == 'E')) {
-        ++c;
-        c += c < end && (*c == '-' || *c == '+');
-        const char *exponent = c;
-        c = skip_digits(c, end);
-        if (c == exponent) {
-            return VSHI_NUMBER_NONE;
-        }
-    }
-    return c == end ? VSHI_NUMBER_FINITE : VSHI_NUMBER_NONE;
+    return vshi_decimal_read(token.text, end, &ignored) ? VSHI_NUMBER_FINITE : VSHI_NUMBER_NONE;
 }
 
 bool vshi_token_integer(vshi_token token, int64_t *value) {
     enum { DIGITS = 18 }; /* what fits int64_t whatever the digits */
-    if (token.size == 0) {
-        return false;
-    }
-    const char *c = token.text, *end = c + token.size;
-    const bool negative = *c == '-';
-    c += *c == '-' || *c == '+';
-    if (c == end || end - c > DIGITS || skip_digits(c, end) != end) {
-        return false;
-    }
+    const size_t sign = token.size > 0 && (*token.text == '-' || *token.text == '+') ? 1 : 0;
     *value = 0;
-    for (; c < end; ++c) {
-        *value = 10 * *value + (*c - '0');
+    for (size_t i = sign; i < token.size; ++i) {
+        if (i - sign >= DIGITS || token.text[i] < '0' || token.text[i] > '9') {
+            return false;
+        }
+        *value = 10 * *value + (token.text[i] - '0');
     }
-    *value = negative ? -*value : *value;
-    return true;
+    *value = sign > 0 && *token.text == '-' ? -*value : *value;
+    return token.size > sign;
 }

@@ -5,6 +5,7 @@
 
 #include "base/job.h"
 
+#include <jansson.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -72,22 +73,16 @@ vsh_result vshi_stream_lines(vshi_stream *stream, const char **stop, vsh_error *
 
 /* Zeros before the first. */
 typedef struct vshi_words {
-    char *text; /* one behind the other, with their ends */
-    size_t used, text_capacity;
-    size_t *begins; /* [count]: in the text */
+    json_t *numbers;    /* by name: Jansson keeps them in a hash table */
+    const char **names; /* [count]: its keys */
     size_t count, capacity;
-    uint32_t *slots; /* a hash table: number + 1; 0: empty */
-    size_t slot_count, slot_capacity;
+    size_t used; /* bytes of all names, with their ends */
 } vshi_words;
 
 /* Finds the number of a name, or adds the name (*is_new) with the next number. Names are cut to 1023 bytes.
  * Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
 vsh_result vshi_words_number(vshi_words *words, vshi_budget *budget, const char *name, size_t size,
                              size_t *number, bool *is_new, vsh_error *error);
-
-static inline const char *vshi_words_at(const vshi_words *words, size_t number) {
-    return words->text + words->begins[number];
-}
 
 void vshi_words_free(vshi_words *words);
 
