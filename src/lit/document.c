@@ -238,23 +238,6 @@ static const char *type_name(int components) {
     return components >= 1 && components <= 4 ? names[components - 1] : "MAT4";
 }
 
-static double component_at(const unsigned char *at, int type) {
-    int16_t two;
-    float number;
-    switch (type) {
-    case VSHI_GLTF_BYTE:
-        return (double)(int8_t)*at;
-    case VSHI_GLTF_SHORT:
-        memcpy(&two, at, sizeof two);
-        return (double)two;
-    case VSHI_GLTF_FLOAT:
-        memcpy(&number, at, sizeof number);
-        return (double)number;
-    default:
-        return (double)vshi_gltf_integer_at(at, type);
-    }
-}
-
 static json_t *number(double value, int type) {
     return type == VSHI_GLTF_FLOAT ? json_real(value) : json_integer((json_int_t)value);
 }
@@ -264,9 +247,9 @@ void vshi_lit_set_bounds(vshi_lit_document *document, json_t *accessor, const vs
     const size_t each = vshi_gltf_component_size(values->type);
     for (int c = 0; c < values->components; ++c) {
         const unsigned char *at = values->at + (size_t)c * each;
-        double least = component_at(at, values->type), most = least;
+        double least = vshi_gltf_component(at, values->type), most = least;
         for (size_t i = 1; i < values->count; ++i) {
-            const double value = component_at(at + i * values->stride, values->type);
+            const double value = vshi_gltf_component(at + i * values->stride, values->type);
             least = value < least ? value : least;
             most = value > most ? value : most;
         }

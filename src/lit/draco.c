@@ -105,18 +105,13 @@ static vsh_result decode(vshi_lit_document *document, json_t *primitive, vshi_li
 
 /* All primitives under Draco, listed by their places. */
 static vsh_result list(vshi_lit_document *document, vshi_lit_dracos *dracos, vsh_error *error) {
-    size_t m, p, count = 0;
+    size_t m, p, capacity = 0;
     const json_t *mesh, *primitive;
-    const json_t *meshes = json_object_get(document->gltf.root, "meshes");
-    json_array_foreach(meshes, m, mesh) {
-        json_array_foreach(json_object_get(mesh, "primitives"), p, primitive) {
-            count += vshi_gltf_extension(primitive, extension_name) != NULL;
-        }
-    }
-    VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)&dracos->list, count, sizeof *dracos->list, error));
-    json_array_foreach(meshes, m, mesh) {
+    json_array_foreach(json_object_get(document->gltf.root, "meshes"), m, mesh) {
         json_array_foreach(json_object_get(mesh, "primitives"), p, primitive) {
             if (vshi_gltf_extension(primitive, extension_name) != NULL) {
+                VSHI_TRY(vshi_model_grow(&dracos->list, dracos->count, &capacity, sizeof *dracos->list,
+                                         document->gltf.path, error));
                 dracos->list[dracos->count++] = (vshi_lit_draco){.mesh = m, .primitive = p};
             }
         }

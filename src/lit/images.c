@@ -202,15 +202,13 @@ static const char *name_of(const vshi_lit_work *work, const vsh_lit_image *image
 
 static vsh_result put_beside(vshi_lit_work *work, const vsh_lit_image *image, vshi_lit_beside *beside,
                              json_t *made, vsh_error *error) {
-    char mark[MARK_BYTES];
+    char mark[MARK_BYTES], number[16] = "";
     const char *name = name_of(work, image);
-    if (name != NULL) {
-        snprintf(mark, sizeof mark, ".%s.%s", purpose_names[image->purpose], name);
-    } else if (work->page_count > 1) {
-        snprintf(mark, sizeof mark, ".%s.%u", purpose_names[image->purpose], image->page);
-    } else {
-        snprintf(mark, sizeof mark, ".%s", purpose_names[image->purpose]);
+    if (name == NULL && work->page_count > 1) {
+        snprintf(number, sizeof number, "%u", image->page);
     }
+    name = name != NULL ? name : number;
+    snprintf(mark, sizeof mark, ".%s%s%s", purpose_names[image->purpose], name[0] != '\0' ? "." : "", name);
     VSHI_TRY(vshi_lit_beside_name(work, mark, "png", &beside->name, error));
     vshi_lit_set(&work->document, made, "uri", vshi_lit_uri(beside->name));
     return VSH_OK;

@@ -209,13 +209,8 @@ static vsh_result add_origin(vshi_lit_work *work, vsh_error *error) {
     return VSH_OK;
 }
 
-static bool is_gltf(const char *path) {
-    const char *ending = vshi_path_ending(path);
-    return strcasecmp(ending, "glb") == 0 || strcasecmp(ending, "gltf") == 0;
-}
-
 int32_t vsh_lit_is_output(const char *path) {
-    return path != NULL && (is_gltf(path) || vshi_lit_is_obj(path)) ? 1 : 0;
+    return path != NULL && (vshi_is_gltf(path) || vshi_lit_is_obj(path)) ? 1 : 0;
 }
 
 /* --- resolving options */
@@ -314,7 +309,7 @@ static vsh_result make_document(vshi_lit_work *work, vshi_lit_uses *uses, vsh_er
     if (path != NULL && vshi_lit_is_same_file(path, work->output)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: the output is the input", work->output);
     }
-    if (path == NULL || !is_gltf(path) || obj) {
+    if (path == NULL || !vshi_is_gltf(path) || obj) {
         VSHI_TRY(
             vshi_lit_begin(&work->document, path != NULL ? path : work->output, work->run, work->job, error));
         VSHI_TRY(allocate_pages(work, error));
@@ -393,7 +388,7 @@ static vsh_result try_all(void *user, vsh_error *error) {
     vshi_lit_work *work = user;
     const char *path = work->path;
     bool opened = false;
-    for (size_t i = 0; path != NULL && is_gltf(path) && i < vsh_model_mesh_count(work->model); ++i) {
+    for (size_t i = 0; path != NULL && vshi_is_gltf(path) && i < vsh_model_mesh_count(work->model); ++i) {
         if (work->meshes[i].uvs == NULL || vsh_model_uv_sets(work->model, i) < VSH_MAX_UV_SETS) {
             continue;
         }

@@ -135,13 +135,6 @@ vsh_result vshi_assimp_look(vshi_assimp *scan, const char *text, size_t size, vs
 
 enum { DEEPEST = 1024 /* nodes under each other */ };
 
-/* The nodes and meshes of a scene. */
-typedef struct scene_skins {
-    const vshi_assimp *source;
-    double root[12]; /* in front of the scene's own root */
-    bool *done;      /* of each mesh */
-} scene_skins;
-
 /* Assimp stores rows one after the other. */
 static void rows_of(const struct aiMatrix4x4 *m, double rows[12]) {
     const double own[12] = {m->a1, m->a2, m->a3, m->a4, m->b1, m->b2,
@@ -173,11 +166,11 @@ static bool find_node(const struct aiNode *node, const char *name, const double 
     return false;
 }
 
-static vsh_result add_bone(const scene_skins *skins, const struct aiBone *bone, size_t vertex_count,
+static vsh_result add_bone(const vshi_assimp *source, const struct aiBone *bone, size_t vertex_count,
                            vshi_model_blend *blends, vsh_error *error) {
-    const char *path = skins->source->path;
+    const char *path = source->path;
     double world[12], offset[12], moved[12];
-    if (!find_node(skins->source->scene->mRootNode, bone->mName.data, skins->root, 0, world)) {
+    if (!find_node(source->scene->mRootNode, bone->mName.data, source->root, 0, world)) {
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: bone '%s' is no node", path, bone->mName.data);
     }
     rows_of(&bone->mOffsetMatrix, offset);
@@ -193,11 +186,11 @@ static vsh_result add_bone(const scene_skins *skins, const struct aiBone *bone, 
     return VSH_OK;
 }
 
-static vsh_result check_moved(const scene_skins *skins, const vshi_model_shape *shape, vsh_error *error) {
+static vsh_result check_moved(const vshi_assimp *source, const vshi_model_shape *shape, vsh_error *error) {
     for (size_t v = 0; v < shape->vertex_count; ++v) {
         if (!vshi_finite(vshi_vec_off(shape->positions + 3 * v))) {
             return vshi_fail(error, VSH_ERROR_INPUT, "%s: bones move vertex %zu of %zu beyond every number",
-                             skins->source->path, v, shape->vertex_count);
+                             source->path, v, shape->vertex_count);
         }
     }
     return VSH_OK;
@@ -206,22 +199,21 @@ static vsh_result check_moved(const scene_skins *skins, const vshi_model_shape *
 /* Moves the vertices of mesh `mesh` into the world: Σ weight × bone's node × offset matrix; vertices without
  * a bone stay under `world`. Does so once, whatever nodes use the mesh. Errors: VSH_ERROR_INPUT (a bone
  * without a node, a vertex out of range, a weight that is not finite), VSH_ERROR_MEMORY. */
-static vsh_result apply_skin(scene_skins *skins, size_t mesh, vshi_model_shape *shape, const double world[12],
-                             vsh_error *error) {
-    const struct aiMesh *given = skins->source->scene->mMeshes[mesh];
-    if (skins->done[mesh]) {
+static vsh_result apply_skin(vshi_assimp *source, size_t mesh, vshi_model_shape *shape,
+                             const double world[12], vsh_error *error) {
+    const struct aiMesh *given = source->scene->mMeshes[mesh];
+    if (source->skinned[mesh]) {
         return VSH_OK;
     }
-    skins->done[mesh] = true;
+    source->skinned[mesh] = true;
     vshi_model_blend *blends;
     vsh_result result;
-    VSHI_TRY(
-        vshi_allocate((void **)&blends, shape->vertex_count, sizeof *blends, skins->source->path, error));
+    VSHI_TRY(vshi_allocate((void **)&blends, shape->vertex_count, sizeof *blends, source->path, error));
     for (unsigned i = 0; i < given->mNumBones; ++i) {
-        VSHI_TRY_DONE(add_bone(skins, given->mBones[i], shape->vertex_count, blends, error));
+        VSHI_TRY_DONE(add_bone(source, given->mBones[i], shape->vertex_count, blends, error));
     }
     vshi_model_blend_move(shape, blends, world);
-    result = check_moved(skins, shape, error);
+    result = check_moved(source, shape, error);
 done:
     free(blends);
     return result;
@@ -324,8 +316,8 @@ static vsh_result copy_shape(const vshi_assimp *source, const struct aiMesh *mes
     return copy_faces(source, mesh, shape, error);
 }
 
-static vsh_result add_nodes(const vshi_assimp *source, vsh_model *model, scene_skins *skins,
-                            const struct aiNode *node, const double parent[12], int depth, vsh_error *error) {
+static vsh_result add_nodes(vshi_assimp *source, vsh_model *model, const struct aiNode *node,
+                            const double parent[12], int depth, vsh_error *error) {
     static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     if (depth > DEEPEST) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "%s: its nodes are nested deeper than %d", source->path,
@@ -345,7 +337,7 @@ static vsh_result add_nodes(const vshi_assimp *source, vsh_model *model, scene_s
         const struct aiMesh *mesh = source->scene->mMeshes[shape];
         const bool skinned = mesh->mNumBones > 0;
         if (skinned) {
-            VSHI_TRY(apply_skin(skins, shape, &model->shapes[shape], world, error));
+            VSHI_TRY(apply_skin(source, shape, &model->shapes[shape], world, error));
         }
         const vshi_model_place place = {.node = node->mName.data,
                                         .mesh = mesh->mName.data,
@@ -355,7 +347,7 @@ static vsh_result add_nodes(const vshi_assimp *source, vsh_model *model, scene_s
         VSHI_TRY(vshi_model_add(model, source->path, source->run, &place, error));
     }
     for (unsigned i = 0; i < node->mNumChildren; ++i) {
-        VSHI_TRY(add_nodes(source, model, skins, node->mChildren[i], world, depth + 1, error));
+        VSHI_TRY(add_nodes(source, model, node->mChildren[i], world, depth + 1, error));
     }
     return VSH_OK;
 }
@@ -423,20 +415,18 @@ static vsh_result check_scene(const char *path, const struct aiScene *scene, siz
     return VSH_OK;
 }
 
-static vsh_result build(const vshi_assimp *source, double unit, vsh_model **out, vsh_error *error) {
+static vsh_result build(vshi_assimp *source, double unit, vsh_model **out, vsh_error *error) {
     vsh_model *model = NULL;
-    scene_skins skins = {.source = source};
     const struct aiScene *scene = source->scene;
     const double metres = source->unit > 0.0 || !(unit > 0.0) ? 1.0 : unit; /* Assimp has done it */
-    const double root[12] = {metres, 0, 0, 0, 0, metres, 0, 0, 0, 0, metres, 0};
     vsh_result result;
     VSHI_TRY(check_size(source, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&model, 1, sizeof *model, source->path, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&model->shapes, scene->mNumMeshes, sizeof *model->shapes,
                                 source->path, error));
     model->shape_count = scene->mNumMeshes;
-    VSHI_TRY_DONE(
-        vshi_allocate((void **)&skins.done, scene->mNumMeshes, sizeof *skins.done, source->path, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&source->skinned, scene->mNumMeshes, sizeof *source->skinned,
+                                source->path, error));
     model->unit = source->unit > 0.0 ? source->unit : unit;
     for (size_t m = 0; m < model->shape_count; ++m) {
         VSHI_TRY_DONE(vshi_job_cancelled(source->job)
@@ -445,8 +435,8 @@ static vsh_result build(const vshi_assimp *source, double unit, vsh_model **out,
     }
     VSHI_TRY_DONE(copy_materials(source, model, error));
     if (scene->mRootNode != NULL) {
-        memcpy(skins.root, root, sizeof root);
-        VSHI_TRY_DONE(add_nodes(source, model, &skins, scene->mRootNode, root, 0, error));
+        source->root[0] = source->root[5] = source->root[10] = metres;
+        VSHI_TRY_DONE(add_nodes(source, model, scene->mRootNode, source->root, 0, error));
     }
     if (model->entry_count == 0) {
         result = vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles: no node uses its meshes",
@@ -456,7 +446,7 @@ static vsh_result build(const vshi_assimp *source, double unit, vsh_model **out,
     *out = model;
     model = NULL;
 done:
-    free(skins.done);
+    free(source->skinned);
     vsh_model_free(model);
     return result;
 }

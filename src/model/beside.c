@@ -1,10 +1,8 @@
 #define _GNU_SOURCE
 #include "model/model.h"
 
-#include "base/bytes.h"
 #include "base/file.h"
 #include "base/input.h"
-#include "base/memory.h"
 #include "base/uri.h"
 #include "model/gltf.h"
 #include "model/obj.h"
@@ -13,12 +11,9 @@
 #include <string.h>
 #include <strings.h>
 
-/* Bytes of JSON that are looked through. */
-static const uint64_t MOST_JSON = (uint64_t)1 << 30;
-
-/* Of the text and what Jansson makes of it, for one of the text: as when the model is read (PEAK_BYTES_A_BYTE
- * in model_file.c). */
-static const double BYTES_A_BYTE = 6.0;
+/* What Jansson makes of a text, for one byte of it: as when the model is read (PEAK_BYTES_A_BYTE in
+ * model_file.c). */
+static const double JSON_BYTES = 5.0;
 
 typedef struct telling {
     const char *path;
@@ -67,32 +62,6 @@ static vsh_result tell_uri(const telling *t, const char *uri, bool anyhow, vsh_e
                : tell(t, vshi_uri_path(t->path, uri), anyhow, error);
 }
 
-/* The JSON of a glTF or GLB, and which of the two; root NULL: it has none that can be read. */
-static vsh_result load_json(const telling *t, FILE *file, uint64_t size, vshi_gltf *gltf, vsh_error *error) {
-    enum { HEADER = 12, CHUNK = 8 };
-    char head[HEADER + CHUNK];
-    char *text = NULL;
-    if (fread(head, 1, sizeof head, file) == sizeof head && memcmp(head, "glTF", 4) == 0) {
-        const uint64_t chunk = vshi_bytes_number(head + HEADER, 4, false);
-        gltf->binary = true;
-        size = chunk <= size - sizeof head ? chunk : 0;
-    } else {
-        rewind(file);
-    }
-    if (size == 0 || size > MOST_JSON) {
-        return VSH_OK;
-    }
-    VSHI_TRY(vshi_check_limit(t->run, BYTES_A_BYTE * (double)size, t->path, error));
-    VSHI_TRY(vshi_allocate((void **)&text, (size_t)size, 1, t->path, error));
-    if (fread(text, 1, (size_t)size, file) == size) {
-        json_error_t where;
-        bool early;
-        gltf->root = vshi_gltf_parse_json(text, (size_t)size, &where, &early);
-    }
-    free(text);
-    return VSH_OK;
-}
-
 static vsh_result tell_texture(const telling *t, const vshi_gltf *gltf, const json_t *material,
                                vsh_error *error) {
     vsh_error ignored;
@@ -104,18 +73,23 @@ static vsh_result tell_texture(const telling *t, const vshi_gltf *gltf, const js
                : VSH_OK;
 }
 
+/* A file that cannot be read, or is no glTF, names nothing. */
 static vsh_result beside_gltf(const telling *t, vsh_error *error) {
-    vshi_gltf gltf = {.path = t->path, .run = t->run};
-    FILE *file;
-    uint64_t size;
-    vsh_error ignored;
-    if (vshi_input_open(t->path, t->path, UINT64_MAX, &file, &size, &ignored) != VSH_OK) {
-        return VSH_OK;
-    }
-    vsh_result result = load_json(t, file, size, &gltf, error);
-    fclose(file);
-    size_t i;
+    vshi_gltf gltf = {.path = t->path, .run = t->run, .job = t->job};
+    unsigned char *text = NULL;
+    size_t size, i;
     json_t *given;
+    vsh_error why;
+    vsh_result result = vshi_gltf_read_file(&gltf, t->path, t->path, SIZE_MAX / 2, &text, &size, &why);
+    if (result == VSH_OK && (result = vshi_gltf_hold(&gltf, JSON_BYTES * (double)size, &why)) == VSH_OK) {
+        result = vshi_gltf_open(&gltf, (const char *)text, size, &why);
+    }
+    if (result != VSH_OK) {
+        result = result == VSH_ERROR_LIMIT || result == VSH_ERROR_MEMORY
+                     ? vshi_fail(error, result, "%s", why.message)
+                     : VSH_OK;
+        goto done;
+    }
     json_array_foreach(json_object_get(gltf.root, "buffers"), i, given) {
         VSHI_TRY_DONE(tell_uri(t, json_string_value(json_object_get(given, "uri")), !gltf.binary, error));
     }
@@ -123,7 +97,9 @@ static vsh_result beside_gltf(const telling *t, vsh_error *error) {
         VSHI_TRY_DONE(tell_texture(t, &gltf, given, error));
     }
 done:
+    vshi_gltf_free_buffers(&gltf);
     json_decref(gltf.root);
+    free(text);
     return result;
 }
 
@@ -197,21 +173,11 @@ static vsh_result tell_lines(const telling *t, const char *path, const char *wor
                                                         : vshi_fail(error, result, "%s", why.message);
 }
 
-static vsh_result beside_obj(const telling *t, vsh_error *error) {
-    return tell_lines(t, t->path, "mtllib", tell_library, error);
-}
-
 vsh_result vshi_model_beside(const char *path, const vsh_run *run, vshi_job *job, vshi_beside_fn *take,
                              void *user, vsh_error *error) {
-    static const struct {
-        const char *ending;
-        vsh_result (*tell)(const telling *t, vsh_error *error);
-    } formats[] = {{"gltf", beside_gltf}, {"glb", beside_gltf}, {"obj", beside_obj}};
     const telling t = {path, run, job, take, user};
-    for (size_t i = 0; i < sizeof formats / sizeof formats[0]; ++i) {
-        if (strcasecmp(vshi_path_ending(path), formats[i].ending) == 0) {
-            return formats[i].tell(&t, error);
-        }
-    }
-    return VSH_OK;
+    return vshi_is_gltf(path) ? beside_gltf(&t, error)
+           : strcasecmp(vshi_path_ending(path), "obj") == 0
+               ? tell_lines(&t, path, "mtllib", tell_library, error)
+               : VSH_OK;
 }

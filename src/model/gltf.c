@@ -145,10 +145,12 @@ static vsh_result check_extensions(const vshi_gltf *gltf, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Memory that Jansson takes for a byte of JSON: 25 measured on a list of nodes, 1 on buffers in base64. It is
- * part of what a file's size is taken for beforehand (PEAK_BYTES_A_BYTE); this is what passes that. */
-json_t *vshi_gltf_parse_json(const char *text, size_t size, json_error_t *where, bool *early) {
+/* Parses the JSON itself, perhaps with a mark before it and zeros behind. Memory that Jansson takes for a
+ * byte of it: 25 measured on a list of nodes, 1 on buffers in base64. It is part of what a file's size is
+ * taken for beforehand (PEAK_BYTES_A_BYTE). */
+static vsh_result parse(vshi_gltf *gltf, const char *text, size_t size, vsh_error *error) {
     static const char mark[3] = {'\xef', '\xbb', '\xbf'};
+    json_error_t where;
     if (size >= sizeof mark && memcmp(text, mark, sizeof mark) == 0) {
         text += sizeof mark;
         size -= sizeof mark;
@@ -157,29 +159,17 @@ json_t *vshi_gltf_parse_json(const char *text, size_t size, json_error_t *where,
         --size; /* padding of chunks by some exporters */
     }
     errno = 0;
-    json_t *root = json_loadb(text, size, JSON_ALLOW_NUL, where);
+    gltf->root = json_loadb(text, size, JSON_ALLOW_NUL, &where);
     if (errno == ENOMEM) { /* Jansson calls it a syntax error, or cuts numbers and words short */
-        json_decref(root);
-        root = NULL;
-    }
-    *early = root == NULL && (json_error_code(where) == json_error_premature_end_of_input ||
-                              where->position < 0 || (size_t)where->position >= size);
-    return root;
-}
-
-static vsh_result parse(vshi_gltf *gltf, const char *text, size_t size, vsh_error *error) {
-    json_error_t where;
-    bool early;
-    gltf->root = vshi_gltf_parse_json(text, size, &where, &early);
-    if (gltf->root == NULL && errno == ENOMEM) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", gltf->path);
     }
-    if (gltf->root == NULL) {
-        return vshi_fail(error, early ? VSH_ERROR_READ : VSH_ERROR_INPUT, "%s: %s: line %d column %d: %s",
-                         gltf->path, early ? "cut short" : "its JSON is damaged", where.line, where.column,
-                         where.text);
-    }
-    return VSH_OK;
+    const bool early = json_error_code(&where) == json_error_premature_end_of_input || where.position < 0 ||
+                       (size_t)where.position >= size;
+    return gltf->root != NULL
+               ? VSH_OK
+               : vshi_fail(error, early ? VSH_ERROR_READ : VSH_ERROR_INPUT, "%s: %s: line %d column %d: %s",
+                           gltf->path, early ? "cut short" : "its JSON is damaged", where.line, where.column,
+                           where.text);
 }
 
 static vsh_result fail_version(const vshi_gltf *gltf, const char *version, vsh_error *error) {
@@ -248,6 +238,7 @@ static vsh_result allocate(vshi_gltf *gltf, vsh_error *error) {
         {&gltf->mesh_shapes, meshes, sizeof *gltf->mesh_shapes},
         {&gltf->node_seen, gltf->node_count, sizeof *gltf->node_seen},
         {&gltf->node_world, gltf->node_count, sizeof *gltf->node_world},
+        {&gltf->visited, gltf->node_count, sizeof *gltf->visited},
         {&gltf->model, 1, sizeof *gltf->model},
     };
     for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; ++i) {
@@ -285,6 +276,7 @@ vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, const
     gltf.model = NULL;
 done:
     vsh_model_free(gltf.model);
+    free(gltf.visited);
     free(gltf.node_world);
     free(gltf.node_seen);
     free(gltf.unpackings);

@@ -43,6 +43,8 @@ typedef struct vshi_gltf {
     bool *node_seen;
     double (*node_world)[12]; /* of every node of the scene that has been visited */
     size_t node_count;
+    size_t *visited; /* [visited_count] of these nodes, parents before children */
+    size_t visited_count;
 } vshi_gltf;
 
 /* --- looking up (gltf.c) */
@@ -109,8 +111,8 @@ enum {
 /* Bytes of a component of a type VSHI_GLTF_…; 0 of every other. */
 size_t vshi_gltf_component_size(int type);
 
-/* The component at `at`, of an unsigned type. */
-size_t vshi_gltf_integer_at(const unsigned char *at, int type);
+/* The component at `at`, as it is. */
+double vshi_gltf_component(const unsigned char *at, int type);
 
 typedef struct vshi_gltf_accessor {
     size_t count;
@@ -212,7 +214,7 @@ typedef enum vshi_gltf_uvs {
 /* The transform that turns a packer's integers back into UVs (KHR_texture_transform). */
 typedef struct vshi_gltf_unpacking {
     vshi_gltf_uvs uvs;
-    bool looked;         /* is to be found */
+    bool looked;         /* it has been found */
     double transform[6]; /* of PACKED: rows (a, b, c), (d, e, f), v down */
     const json_t *told;  /* the extension that holds it */
 } vshi_gltf_unpacking;
@@ -225,9 +227,8 @@ vsh_result vshi_gltf_mask_image(const vshi_gltf *gltf, const json_t *material, s
 
 /* --- the file (gltf.c) */
 
-/* Parses the JSON itself, perhaps with a mark before it and zeros behind. NULL: *where says why, and *early
- * whether it is cut short. */
-json_t *vshi_gltf_parse_json(const char *text, size_t size, json_error_t *where, bool *early);
+/* Whether a file is one by its ending (model_file.c). */
+bool vshi_is_gltf(const char *path);
 
 /* Parses the JSON of a glTF or GLB of `size` bytes that lie at `text`, and finds its binary chunk; of `gltf`,
  * path, run and bytes_held are given. Free root with json_decref(), and buffers, after a failure too. Errors:

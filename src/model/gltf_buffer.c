@@ -419,18 +419,28 @@ static vsh_result place(vshi_gltf *gltf, const char *where, size_t view, size_t 
     return VSH_OK;
 }
 
-size_t vshi_gltf_integer_at(const unsigned char *at, int type) {
-    uint16_t two;
+double vshi_gltf_component(const unsigned char *at, int type) {
+    int16_t two;
+    uint16_t pair;
     uint32_t four;
+    float number;
     switch (type) {
+    case VSHI_GLTF_BYTE:
+        return (double)(int8_t)*at;
     case VSHI_GLTF_UBYTE:
-        return *at;
-    case VSHI_GLTF_USHORT:
+        return (double)*at;
+    case VSHI_GLTF_SHORT:
         memcpy(&two, at, sizeof two);
-        return two;
-    default:
+        return (double)two;
+    case VSHI_GLTF_USHORT:
+        memcpy(&pair, at, sizeof pair);
+        return (double)pair;
+    case VSHI_GLTF_UINT:
         memcpy(&four, at, sizeof four);
-        return four;
+        return (double)four;
+    default:
+        memcpy(&number, at, sizeof number);
+        return (double)number;
     }
 }
 
@@ -463,7 +473,7 @@ static vsh_result open_sparse(vshi_gltf *gltf, const json_t *sparse, const char 
     VSHI_TRY(place(gltf, where, value_view, value_offset, count, value_size, &accessor->sparse_values,
                    &stride, error));
     for (size_t i = 0; i < count; ++i) {
-        const size_t index = vshi_gltf_integer_at(accessor->sparse_at + i * index_size, (int)type);
+        const size_t index = (size_t)vshi_gltf_component(accessor->sparse_at + i * index_size, (int)type);
         if (index >= accessor->count) {
             return vshi_gltf_fail(gltf, error, "%s: sparse index %zu of %zu is %zu, but it has %zu elements",
                                   where, i, count, index, accessor->count);
@@ -509,33 +519,19 @@ vsh_result vshi_gltf_accessor_find(vshi_gltf *gltf, const json_t *object, const 
     return index != SIZE_MAX ? vshi_gltf_accessor_open(gltf, index, accessor, error) : VSH_OK;
 }
 
-static float signed_unit(int value, float most, bool normalized) {
-    const float given = (float)value;
-    return normalized ? (given / most < -1.0F ? -1.0F : given / most) : given;
-}
-
-static float component(const unsigned char *at, int type, bool normalized) {
-    float number;
-    int16_t two;
-    uint16_t pair;
-    uint32_t four;
+/* What is normalized is 0 … 1 or -1 … 1. */
+static float normalize(float given, int type) {
     switch (type) {
     case VSHI_GLTF_BYTE:
-        return signed_unit((int8_t)*at, 127.0F, normalized);
+        return given / 127.0F < -1.0F ? -1.0F : given / 127.0F;
     case VSHI_GLTF_UBYTE:
-        return normalized ? (float)*at / 255.0F : (float)*at;
+        return given / 255.0F;
     case VSHI_GLTF_SHORT:
-        memcpy(&two, at, sizeof two);
-        return signed_unit(two, 32767.0F, normalized);
+        return given / 32767.0F < -1.0F ? -1.0F : given / 32767.0F;
     case VSHI_GLTF_USHORT:
-        memcpy(&pair, at, sizeof pair);
-        return normalized ? (float)pair / 65535.0F : (float)pair;
-    case VSHI_GLTF_UINT:
-        memcpy(&four, at, sizeof four);
-        return (float)four;
+        return given / 65535.0F;
     default:
-        memcpy(&number, at, sizeof number);
-        return number;
+        return given;
     }
 }
 
@@ -553,7 +549,7 @@ static inline void take_elements(const vshi_gltf_accessor *a, take_fn *take, voi
         take(a, a->at + i * a->stride, i, to);
     }
     for (size_t i = 0; i < a->sparse_count; ++i) {
-        const size_t index = vshi_gltf_integer_at(a->sparse_at + i * index_size, a->sparse_type);
+        const size_t index = (size_t)vshi_gltf_component(a->sparse_at + i * index_size, a->sparse_type);
         take(a, a->sparse_values + i * value_size, index, to);
     }
 }
@@ -561,7 +557,8 @@ static inline void take_elements(const vshi_gltf_accessor *a, take_fn *take, voi
 static void take_floats(const vshi_gltf_accessor *a, const unsigned char *at, size_t i, void *to) {
     const size_t n = (size_t)a->components, size = vshi_gltf_component_size(a->type);
     for (size_t k = 0; k < n; ++k) {
-        ((float *)to)[n * i + k] = component(at + k * size, a->type, a->normalized);
+        const float given = (float)vshi_gltf_component(at + k * size, a->type);
+        ((float *)to)[n * i + k] = a->normalized ? normalize(given, a->type) : given;
     }
 }
 
@@ -572,7 +569,7 @@ void vshi_gltf_accessor_floats(const vshi_gltf_accessor *a, float *values) {
 static void take_integers(const vshi_gltf_accessor *a, const unsigned char *at, size_t i, void *to) {
     const size_t n = (size_t)a->components, size = vshi_gltf_component_size(a->type);
     for (size_t k = 0; k < n; ++k) {
-        ((uint32_t *)to)[n * i + k] = (uint32_t)vshi_gltf_integer_at(at + k * size, a->type);
+        ((uint32_t *)to)[n * i + k] = (uint32_t)vshi_gltf_component(at + k * size, a->type);
     }
 }
 

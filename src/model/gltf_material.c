@@ -91,7 +91,7 @@ static void add_textures(json_t *value, size_t set, vshi_gltf_unpacking *u, bool
 }
 
 vshi_gltf_unpacking vshi_gltf_find_unpacking(const vshi_gltf *gltf, size_t material, size_t set) {
-    vshi_gltf_unpacking u = {.uvs = VSHI_GLTF_UVS_PLAIN};
+    vshi_gltf_unpacking u = {.uvs = VSHI_GLTF_UVS_PLAIN, .looked = true};
     bool any = false;
     add_textures(json_array_get(json_object_get(gltf->root, "materials"), material), set, &u, &any);
     return u;
@@ -122,7 +122,8 @@ static vsh_result note_packed(vshi_gltf *gltf, const json_t *primitive, vsh_erro
             VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&gltf->unpackings, count,
                                         sizeof(vshi_gltf_unpacking[VSH_MAX_UV_SETS]), error));
         }
-        gltf->unpackings[material * VSH_MAX_UV_SETS + (size_t)set].looked = true;
+        vshi_gltf_unpacking *u = &gltf->unpackings[material * VSH_MAX_UV_SETS + (size_t)set];
+        *u = u->looked ? *u : vshi_gltf_find_unpacking(gltf, material, (size_t)set);
     }
     return VSH_OK;
 }
@@ -133,11 +134,6 @@ static vsh_result find_packed(vshi_gltf *gltf, vsh_error *error) {
     json_array_foreach(json_object_get(gltf->root, "meshes"), m, mesh) {
         json_array_foreach(json_object_get(mesh, "primitives"), p, primitive) {
             VSHI_TRY(note_packed(gltf, primitive, error));
-        }
-    }
-    for (size_t i = 0; gltf->unpackings != NULL && i < gltf->model->material_count * VSH_MAX_UV_SETS; ++i) {
-        if (gltf->unpackings[i].looked) {
-            gltf->unpackings[i] = vshi_gltf_find_unpacking(gltf, i / VSH_MAX_UV_SETS, i % VSH_MAX_UV_SETS);
         }
     }
     return VSH_OK;

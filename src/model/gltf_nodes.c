@@ -197,6 +197,7 @@ static vsh_result read_mesh(vshi_gltf *gltf, size_t mesh, const vshi_gltf_pose *
         VSHI_TRY(vshi_model_grow(&model->shapes, model->shape_count, &gltf->shape_capacity,
                                  sizeof *model->shapes, gltf->path, error));
         vshi_model_shape *shape = &model->shapes[model->shape_count++];
+        *shape = (vshi_model_shape){.positions = NULL};
         if (vshi_job_cancelled(gltf->job)) {
             return vshi_job_fail_cancelled(gltf->job, error);
         }
@@ -409,13 +410,8 @@ static vsh_result add_node(vshi_gltf *gltf, size_t node, vsh_error *error) {
 
 /* --- the tree */
 
-typedef struct walk {
-    size_t *order; /* of the nodes that have been visited, parents before children */
-    size_t count;
-} walk;
-
 static vsh_result visit(vshi_gltf *gltf, const json_t *nodes, const double parent[12], int depth,
-                        walk *walked, vsh_error *error) {
+                        vsh_error *error) {
     enum { DEEPEST = 1024 };
     size_t i;
     const json_t *item;
@@ -436,13 +432,12 @@ static vsh_result visit(vshi_gltf *gltf, const json_t *nodes, const double paren
             return vshi_gltf_fail(gltf, error, "nodes[%zu] is its own descendant, or has two parents", node);
         }
         gltf->node_seen[node] = true;
-        walked->order[walked->count++] = node;
+        gltf->visited[gltf->visited_count++] = node;
         if (!own_transform(given, own)) {
             return vshi_gltf_fail(gltf, error, "nodes[%zu]: its transform holds what is no number", node);
         }
         vshi_model_compose(parent, own, gltf->node_world[node]);
-        VSHI_TRY(visit(gltf, json_object_get(given, "children"), gltf->node_world[node], depth + 1, walked,
-                       error));
+        VSHI_TRY(visit(gltf, json_object_get(given, "children"), gltf->node_world[node], depth + 1, error));
     }
     return VSH_OK;
 }
@@ -470,34 +465,25 @@ static json_t *find_roots(const vshi_gltf *gltf) {
     return roots;
 }
 
-static vsh_result visit_scene(vshi_gltf *gltf, walk *walked, vsh_error *error) {
+static vsh_result visit_scene(vshi_gltf *gltf, vsh_error *error) {
     size_t index;
     const json_t *scenes = json_object_get(gltf->root, "scenes");
     VSHI_TRY(vshi_gltf_index(gltf, gltf->root, "scene", "scenes", "glTF", &index, error));
     if (json_array_size(scenes) > 0) { /* the first where none is named */
         const json_t *scene = json_array_get(scenes, index == SIZE_MAX ? 0 : index);
-        return visit(gltf, json_object_get(scene, "nodes"), identity, 0, walked, error);
+        return visit(gltf, json_object_get(scene, "nodes"), identity, 0, error);
     }
     json_t *roots = find_roots(gltf);
-    const vsh_result result = visit(gltf, roots, identity, 0, walked, error);
+    const vsh_result result = visit(gltf, roots, identity, 0, error);
     json_decref(roots);
     return result;
 }
 
 vsh_result vshi_gltf_add_scene(vshi_gltf *gltf, vsh_error *error) {
-    walk walked = {NULL, 0};
-    vsh_result result;
-    VSHI_TRY_DONE(
-        vshi_allocate((void **)&walked.order, gltf->node_count, sizeof *walked.order, gltf->path, error));
-    VSHI_TRY_DONE(visit_scene(gltf, &walked, error));
-    for (size_t i = 0; i < walked.count; ++i) {
-        VSHI_TRY_DONE(add_node(gltf, walked.order[i], error));
-        VSHI_TRY_DONE(add_node_light(gltf, walked.order[i], error));
+    VSHI_TRY(visit_scene(gltf, error));
+    for (size_t i = 0; i < gltf->visited_count; ++i) {
+        VSHI_TRY(add_node(gltf, gltf->visited[i], error));
+        VSHI_TRY(add_node_light(gltf, gltf->visited[i], error));
     }
-    if (gltf->model->entry_count == 0) {
-        result = vshi_gltf_fail(gltf, error, "holds no triangles");
-    }
-done:
-    free(walked.order);
-    return result;
+    return gltf->model->entry_count > 0 ? VSH_OK : vshi_gltf_fail(gltf, error, "holds no triangles");
 }

@@ -10,51 +10,13 @@
 
 /* --- checks of arrays, once they are as the file has them */
 
-enum { BLOCK = 4096 /* indices that are looked at twice while they are near */ };
-
-/* Whether each is less than `end`: by a bit that none of them may set, without a branch. */
-static bool all_below(const uint32_t *indices, size_t count, size_t end) {
-    static const uint32_t half = UINT32_C(1) << 31;
-    uint32_t seen = 0, highest = 0;
-    if (end == 0 || end > half) {
-        for (size_t i = 0; i < count; ++i) {
-            highest = indices[i] > highest ? indices[i] : highest;
-        }
-        return count == 0 || highest < end;
-    }
-    const uint32_t last = (uint32_t)end - 1;
-    for (size_t i = 0; i < count; ++i) {
-        seen |= indices[i] | (last - indices[i]);
-    }
-    return seen < half;
-}
-
 static vsh_result check_indices(const char *path, const char *where, const uint32_t *indices, size_t count,
                                 size_t vertex_count, vsh_error *error) {
-    if (all_below(indices, count, vertex_count)) {
-        return VSH_OK;
-    }
-    size_t i = 0;
-    while (indices[i] < vertex_count) {
-        ++i;
-    }
-    return vshi_fail(error, VSH_ERROR_INPUT,
-                     "%s: %s: index %zu of %zu is %u, but there are only %zu vertices", path, where, i, count,
-                     indices[i], vertex_count);
-}
-
-/* Sets used[v] of each vertex that a triangle has. */
-static vsh_result mark_used(const char *path, const char *where, const vshi_model_shape *shape,
-                            unsigned char *restrict used, vsh_error *error) {
-    const size_t count = 3 * shape->triangle_count;
-    const uint32_t *restrict indices = shape->indices; /* which no byte of `used` is a part of */
-    for (size_t begin = 0; begin < count; begin += BLOCK) {
-        const size_t end = count - begin > BLOCK ? begin + BLOCK : count;
-        if (!all_below(indices + begin, end - begin, shape->vertex_count)) {
-            return check_indices(path, where, indices, count, shape->vertex_count, error);
-        }
-        for (size_t i = begin; i < end; ++i) {
-            used[indices[i]] = 1;
+    for (size_t i = 0; i < count; ++i) {
+        if (indices[i] >= vertex_count) {
+            return vshi_fail(error, VSH_ERROR_INPUT,
+                             "%s: %s: index %zu of %zu is %u, but there are only %zu vertices", path, where,
+                             i, count, indices[i], vertex_count);
         }
     }
     return VSH_OK;
@@ -87,20 +49,20 @@ static vsh_result renumber(const char *path, const unsigned char *used, vshi_mod
 }
 
 /* Many primitives may share one large accessor, of which each uses a part: only that is kept. */
-static vsh_result drop_unused(const char *path, const char *where, vshi_model_shape *shape,
-                              vsh_error *error) {
+static vsh_result drop_unused(const char *path, vshi_model_shape *shape, vsh_error *error) {
     unsigned char *used = NULL;
-    VSHI_TRY(vshi_allocate((void **)&used, shape->vertex_count, 1, path, error));
-    vsh_result result;
-    VSHI_TRY_DONE(mark_used(path, where, shape, used, error));
     size_t count = 0;
+    vsh_result result = VSH_OK;
+    VSHI_TRY(vshi_allocate((void **)&used, shape->vertex_count, 1, path, error));
+    for (size_t i = 0; i < 3 * shape->triangle_count; ++i) {
+        used[shape->indices[i]] = 1;
+    }
     for (size_t v = 0; v < shape->vertex_count; ++v) {
         count += used[v];
     }
     if (count < shape->vertex_count) {
-        VSHI_TRY_DONE(renumber(path, used, shape, error));
+        result = renumber(path, used, shape, error);
     }
-done:
     free(used);
     return result;
 }
@@ -108,7 +70,7 @@ done:
 /* Checks the arrays, leaves out vertices that no triangle has, and turns v of UVs up. */
 static vsh_result finish(const char *path, const vsh_run *run, const char *where, vshi_model_shape *shape,
                          vsh_error *error) {
-    VSHI_TRY(drop_unused(path, where, shape, error));
+    VSHI_TRY(drop_unused(path, shape, error));
     VSHI_TRY(vshi_model_check_positions(path, where, shape->positions, shape->vertex_count, error));
     vshi_model_check_normals(path, run, where, shape);
     for (int set = 0; set < shape->uv_sets; ++set) {

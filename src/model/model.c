@@ -7,6 +7,7 @@
 #include "base/try.h"
 #include "base/vec.h"
 #include "mesh/mesh.h"
+#include "model/stream.h"
 
 #include <float.h>
 #include <math.h>
@@ -66,19 +67,8 @@ vsh_result vshi_model_take_plain_materials(vsh_model *model, size_t count, vsh_e
 
 vsh_result vshi_model_grow(void *list, size_t count, size_t *capacity, size_t size, const char *what,
                            vsh_error *error) {
-    void *old, *grown = NULL;
-    if (count < *capacity) {
-        return VSH_OK;
-    }
-    VSHI_TRY(vshi_allocate(&grown, 2 * *capacity + 8, size, what, error));
-    memcpy(&old, list, sizeof old);
-    if (count > 0) {
-        memcpy(grown, old, count * size);
-    }
-    free(old);
-    memcpy(list, &grown, sizeof grown);
-    *capacity = 2 * *capacity + 8;
-    return VSH_OK;
+    vshi_budget unlimited = {.path = what};
+    return vshi_grow(&unlimited, list, capacity, count + 1, size, error);
 }
 
 size_t vsh_model_light_count(const vsh_model *model) {
@@ -304,45 +294,31 @@ vsh_mesh vsh_model_mesh(const vsh_model *model, size_t index, int32_t uv_set) {
 
 /* --- checks */
 
-/* Whether no exponent is that of infinities, without a branch. */
-static bool all_finite(const float *values, size_t count) {
-    static const uint32_t exponent = 0x7f800000;
-    uint32_t seen = 0;
-    for (size_t i = 0; i < count; ++i) {
-        uint32_t bits;
-        memcpy(&bits, &values[i], sizeof bits);
-        seen |= (uint32_t)((bits & exponent) == exponent);
-    }
-    return seen == 0;
-}
-
 vsh_result vshi_model_check_positions(const char *path, const char *where, const float *positions,
                                       size_t count, vsh_error *error) {
-    if (all_finite(positions, 3 * count)) {
-        return VSH_OK;
+    for (size_t v = 0; v < count; ++v) {
+        const float *p = positions + 3 * v;
+        if (!vshi_finite(vshi_vec_off(p))) {
+            return vshi_fail(error, VSH_ERROR_INPUT,
+                             "%s: %s%svertex %zu of %zu lies at (%g, %g, %g), expected finite numbers", path,
+                             where, where[0] != '\0' ? ": " : "", v, count, (double)p[0], (double)p[1],
+                             (double)p[2]);
+        }
     }
-    const float *p = positions;
-    while (isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2])) {
-        p += 3;
-    }
-    return vshi_fail(error, VSH_ERROR_INPUT,
-                     "%s: %s%svertex %zu of %zu lies at (%g, %g, %g), expected finite numbers", path, where,
-                     where[0] != '\0' ? ": " : "", (size_t)(p - positions) / 3, count, (double)p[0],
-                     (double)p[1], (double)p[2]);
+    return VSH_OK;
 }
 
 void vshi_model_check_normals(const char *path, const vsh_run *run, const char *where,
                               const vshi_model_shape *shape) {
     size_t bad = 0;
-    if (shape->normals == NULL || all_finite(shape->normals, 3 * shape->vertex_count)) {
-        return;
-    }
-    for (size_t v = 0; v < shape->vertex_count; ++v) {
+    for (size_t v = 0; v < shape->vertex_count && shape->normals != NULL; ++v) {
         float *n = shape->normals + 3 * v;
-        if (!isfinite(n[0]) || !isfinite(n[1]) || !isfinite(n[2])) {
+        if (!vshi_finite(vshi_vec_off(n))) {
             memset(n, 0, sizeof(float[3]));
             ++bad;
         }
     }
-    vshi_warn(run, "%s: %s: %zu normals are not finite; those faces are flat", path, where, bad);
+    if (bad > 0) {
+        vshi_warn(run, "%s: %s: %zu normals are not finite; those faces are flat", path, where, bad);
+    }
 }

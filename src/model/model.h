@@ -106,8 +106,8 @@ typedef struct vshi_model_place {
     vshi_model_origin origin;
 } vshi_model_place;
 
-/* Gives *list (a pointer to a pointer, from vshi_allocate()) room for one zeroed element more than `count`.
- * Errors: VSH_ERROR_MEMORY, naming `what`. */
+/* Gives *list (a pointer to a pointer; NULL at first) room for one element more than `count`. Errors:
+ * VSH_ERROR_MEMORY, naming `what`. */
 vsh_result vshi_model_grow(void *list, size_t count, size_t *capacity, size_t size, const char *what,
                            vsh_error *error);
 
@@ -176,6 +176,8 @@ typedef struct vshi_assimp {
     size_t faces; /* polygons of three corners or more that Assimp must find at least; 0: not known */
     double unit;  /* metres in a unit of a Collada file, by which Assimp multiplies; 0: of another */
     const struct aiScene *scene;
+    double root[12]; /* in front of the scene's own root */
+    bool *skinned;   /* of each mesh of the scene: it has been moved by its bones */
 } vshi_assimp;
 
 /* Looks for what Assimp hides in the file's own bytes. Errors: VSH_ERROR_READ where it ends early,

@@ -92,13 +92,11 @@ enum { SCAN_UNITS = 150, IMPORT_UNITS = 600, READ_UNITS = SCAN_UNITS + IMPORT_UN
 static const char *const endings[] = {"obj", "gltf", "glb", "ply", "stl", "fbx", "dae"};
 
 static vsh_result check_ending(const char *path, const char **ending, vsh_error *error) {
-    const char *slash = strrchr(path, '/');
-    const char *dot = strrchr(slash != NULL ? slash : path, '.');
-    if (dot == NULL || dot[1] == '\0') {
+    *ending = vshi_path_ending(path);
+    if (**ending == '\0') {
         return vshi_fail(error, VSH_ERROR_INPUT,
                          "%s: has no ending to tell its format by (.obj, .glb, .ply …)", path);
     }
-    *ending = dot + 1;
     for (size_t i = 0; i < sizeof endings / sizeof endings[0]; ++i) {
         if (strcasecmp(*ending, endings[i]) == 0) {
             return VSH_OK;
@@ -108,7 +106,8 @@ static vsh_result check_ending(const char *path, const char **ending, vsh_error 
                      *ending);
 }
 
-static bool is_gltf(const char *ending) {
+bool vshi_is_gltf(const char *path) {
+    const char *ending = vshi_path_ending(path);
     return strcasecmp(ending, "gltf") == 0 || strcasecmp(ending, "glb") == 0;
 }
 
@@ -140,13 +139,13 @@ typedef struct reading {
 } reading;
 
 /* What is looked at as a whole: a glTF is read, and of others vshi_assimp_look() is done. */
-static vsh_result read_text(const reading *r, const char *ending, vshi_assimp *assimp, vsh_error *error) {
+static vsh_result read_text(const reading *r, vshi_assimp *assimp, vsh_error *error) {
     char *text = NULL;
     size_t size;
     vsh_result result;
     VSHI_TRY_DONE(load_file(r->path, r->run, &text, &size, error));
-    VSHI_TRY_DONE(is_gltf(ending) ? vshi_gltf_read(r->path, text, size, r->run, r->job, r->model, error)
-                                  : vshi_assimp_look(assimp, text, size, error));
+    VSHI_TRY_DONE(vshi_is_gltf(r->path) ? vshi_gltf_read(r->path, text, size, r->run, r->job, r->model, error)
+                                        : vshi_assimp_look(assimp, text, size, error));
     if (vshi_job_advance(r->job, SCAN_UNITS - assimp->units_done)) {
         result = vshi_job_fail_cancelled(r->job, error);
     }
@@ -172,7 +171,7 @@ static vsh_result read_file(void *user, vsh_error *error) {
     if (strcasecmp(ending, "ply") == 0) {
         return vshi_ply_read(r->path, r->run, r->job, READ_UNITS, r->model, error);
     }
-    VSHI_TRY(read_text(r, ending, &assimp, error));
+    VSHI_TRY(read_text(r, &assimp, error));
     return *r->model != NULL ? VSH_OK : vshi_assimp_read(&assimp, IMPORT_UNITS, r->model, error);
 }
 
