@@ -1,6 +1,6 @@
-/* Making a hierarchy of bounding spheres, and searching it with cones. Spheres are sorted along a Morton
- * curve through their centres (G. M. Morton, 1966). Eight in a row share a block, as do eight blocks in a row
- * of the level above (C. Lauterbach et al., "Fast BVH construction on GPUs", 2009). */
+/* Making a hierarchy of bounding spheres, and searching it with cones. Spheres are halved at the median along
+ * the longest side of their centres' box until eight parts, or parts of no more than eight, are left for a
+ * block. */
 #include "spheres/spheres.h"
 
 #include "base/floats.h"
@@ -17,59 +17,94 @@ static const size_t MOST = (size_t)1 << 30;
 /* Of a float's rounding of a centre, and of the squares that are made of it, with room. */
 static const double ROUNDING = 1e-6;
 
-/* A sphere's place along the curve. */
-typedef struct keyed {
-    uint64_t key;
-    size_t index;
-} keyed;
+typedef struct builder {
+    vsh_spheres *made;
+    size_t capacity; /* blocks */
+    double rounding; /* world units */
+    vsh_error *error;
+} builder;
 
-static int compare_keys(const void *a, const void *b) {
-    const keyed *one = a, *other = b;
-    return one->key != other->key ? (one->key < other->key ? -1 : 1)
-                                  : (one->index > other->index) - (one->index < other->index);
-}
+typedef struct part {
+    size_t begin, end;
+} part;
 
-/* 21 bits, two zeros between each and the next. */
-static uint64_t spread(uint64_t bits) {
-    bits = (bits | bits << 32) & UINT64_C(0x001f00000000ffff);
-    bits = (bits | bits << 16) & UINT64_C(0x001f0000ff0000ff);
-    bits = (bits | bits << 8) & UINT64_C(0x100f00f00f00f00f);
-    bits = (bits | bits << 4) & UINT64_C(0x10c30c30c30c30c3);
-    return (bits | bits << 2) & UINT64_C(0x1249249249249249);
-}
-
-static vsh_result sort(vsh_spheres *made, double extent, vsh_error *error) {
-    static const double most = 2097151.0; /* 21 bits */
-    keyed *order = NULL;
-    double(*sorted)[4] = NULL;
-    const size_t count = made->info.count;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&order, count, sizeof *order, "spheres", error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&sorted, count, sizeof *sorted, "spheres", error));
-    for (size_t i = 0; i < count; ++i) {
-        order[i].index = i;
+static int longest_axis(double (*sphere)[4], part p) {
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t i = p.begin; i < p.end; ++i) {
         for (int axis = 0; axis < 3; ++axis) {
-            const double from = made->sphere[i][axis] - made->info.bounds_min[axis];
-            order[i].key |= spread((uint64_t)(from / extent * most)) << axis;
+            low[axis] = fmin(low[axis], sphere[i][axis]);
+            high[axis] = fmax(high[axis], sphere[i][axis]);
         }
     }
-    qsort(order, count, sizeof *order, compare_keys);
-    for (size_t i = 0; i < count; ++i) {
-        memcpy(sorted[i], made->sphere[order[i].index], sizeof *sorted);
+    int longest = 0;
+    for (int axis = 1; axis < 3; ++axis) {
+        longest = high[axis] - low[axis] > high[longest] - low[longest] ? axis : longest;
     }
-    free(made->sphere);
-    made->sphere = sorted;
-done:
-    free(order);
-    return result;
+    return longest;
 }
 
-/* A sphere around the spheres begin … end - 1, around the middle of their box, from the set's middle. */
-static void bound(const vsh_spheres *made, size_t begin, size_t end, double rounding, vshi_ball_block *block,
-                  int lane) {
-    double(*sphere)[4] = made->sphere;
+static void swap(double *a, double *b) {
+    double kept[4];
+    memcpy(kept, a, sizeof kept);
+    memcpy(a, b, sizeof kept);
+    memcpy(b, kept, sizeof kept);
+}
+
+/* Puts the spheres that come first along the axis before `nth` (C. A. R. Hoare, "Find", 1961). */
+static void part_at(double (*sphere)[4], part p, size_t nth, int axis) {
+    ptrdiff_t low = (ptrdiff_t)p.begin, high = (ptrdiff_t)p.end - 1, at = (ptrdiff_t)nth;
+    while (low < high) {
+        const double pivot = sphere[low + (high - low) / 2][axis];
+        ptrdiff_t i = low, j = high;
+        while (i <= j) {
+            for (; sphere[i][axis] < pivot; ++i) {
+            }
+            for (; sphere[j][axis] > pivot; --j) {
+            }
+            if (i <= j) {
+                swap(sphere[i++], sphere[j--]);
+            }
+        }
+        low = at > j ? i : low;
+        high = at < i ? j : high;
+    }
+}
+
+/* Cuts a range into at most VSHI_BALLS parts; returns their number. */
+static size_t cut(double (*sphere)[4], part all, part parts[VSHI_BALLS]) {
+    size_t count = 1;
+    parts[0] = all;
+    if (all.end - all.begin <= VSHI_BALLS) {
+        for (size_t i = all.begin; i < all.end; ++i) {
+            parts[i - all.begin] = (part){i, i + 1};
+        }
+        return all.end - all.begin;
+    }
+    while (count < VSHI_BALLS) {
+        size_t largest = 0;
+        for (size_t i = 1; i < count; ++i) {
+            largest = parts[i].end - parts[i].begin > parts[largest].end - parts[largest].begin ? i : largest;
+        }
+        const part p = parts[largest];
+        const size_t size = p.end - p.begin;
+        if (size <= VSHI_BALLS) {
+            break;
+        }
+        /* whole blocks to the left, so that hardly any is half empty */
+        const size_t left =
+            size <= 2 * VSHI_BALLS ? VSHI_BALLS : (size / 2 + VSHI_BALLS - 1) / VSHI_BALLS * VSHI_BALLS;
+        part_at(sphere, p, p.begin + left, longest_axis(sphere, p));
+        parts[largest] = (part){p.begin, p.begin + left};
+        parts[count++] = (part){p.begin + left, p.end};
+    }
+    return count;
+}
+
+/* A sphere around a part's spheres, around the middle of their box, from the set's middle. */
+static void bound(const builder *b, part p, vshi_ball_block *block, size_t lane) {
+    double(*sphere)[4] = b->made->sphere;
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t i = begin; i < end; ++i) {
+    for (size_t i = p.begin; i < p.end; ++i) {
         for (int axis = 0; axis < 3; ++axis) {
             low[axis] = fmin(low[axis], sphere[i][axis] - sphere[i][3]);
             high[axis] = fmax(high[axis], sphere[i][axis] + sphere[i][3]);
@@ -77,39 +112,48 @@ static void bound(const vsh_spheres *made, size_t begin, size_t end, double roun
     }
     const vshi_vec centre = {0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])};
     double radius = 0.0;
-    for (size_t i = begin; i < end; ++i) {
+    for (size_t i = p.begin; i < p.end; ++i) {
         radius = fmax(radius, vshi_length(vshi_sub(vshi_vec_of(sphere[i]), centre)) + sphere[i][3]);
     }
-    block->x[lane] = (float)(centre.x - made->middle[0]);
-    block->y[lane] = (float)(centre.y - made->middle[1]);
-    block->z[lane] = (float)(centre.z - made->middle[2]);
-    block->radius[lane] = (float)(radius * (1.0 + ROUNDING) + rounding);
+    block->x[lane] = (float)(centre.x - b->made->middle[0]);
+    block->y[lane] = (float)(centre.y - b->made->middle[1]);
+    block->z[lane] = (float)(centre.z - b->made->middle[2]);
+    block->radius[lane] = (float)(radius * (1.0 + ROUNDING) + b->rounding);
 }
 
-/* Level 0 has blocks of spheres, each level above blocks of blocks, and the last a single one, which is [0].
- */
-static vsh_result build(vsh_spheres *made, double rounding, vsh_error *error) {
-    size_t sizes[VSHI_BALL_DEPTH] = {(made->info.count + VSHI_BALLS - 1) / VSHI_BALLS}, spheres = 1, first;
-    int top = 0;
-    for (made->block_count = sizes[0]; sizes[top] > 1; made->block_count += sizes[++top]) {
-        sizes[top + 1] = (sizes[top] + VSHI_BALLS - 1) / VSHI_BALLS;
+static vsh_result add_block(builder *b, size_t *index) {
+    vsh_spheres *made = b->made;
+    if (made->block_count == b->capacity) {
+        const size_t capacity = 2 * b->capacity;
+        void *grown = NULL;
+        VSHI_TRY(vshi_allocate(&grown, capacity, sizeof *made->block, "spheres", b->error));
+        memcpy(grown, made->block, made->block_count * sizeof *made->block);
+        free(made->block);
+        made->block = grown;
+        b->capacity = capacity;
     }
-    VSHI_TRY(vshi_allocate((void **)&made->block, made->block_count, sizeof *made->block, "spheres", error));
-    first = made->block_count;
-    for (int level = 0; level <= top; ++level, spheres *= VSHI_BALLS) { /* that a lane of it holds */
-        const size_t below = first;
-        first -= sizes[level];
-        for (size_t i = 0; i < sizes[level] * VSHI_BALLS; ++i) {
-            const size_t begin = i * spheres, left = made->info.count - begin;
-            const int lane = (int)(i % VSHI_BALLS);
-            vshi_ball_block *block = &made->block[first + i / VSHI_BALLS];
-            if (begin >= made->info.count) {
-                block->radius[lane] = -INFINITY;
-                continue;
-            }
-            bound(made, begin, begin + (left < spheres ? left : spheres), rounding, block, lane);
-            block->below[lane] = level == 0 ? ~(int32_t)begin : (int32_t)(below + i);
+    *index = made->block_count++;
+    return VSH_OK;
+}
+
+/* Depth is log8 of the count. */
+static vsh_result build(builder *b, part p, size_t *index) {
+    part parts[VSHI_BALLS];
+    const size_t count = cut(b->made->sphere, p, parts);
+    VSHI_TRY(add_block(b, index));
+    for (size_t lane = 0; lane < VSHI_BALLS; ++lane) {
+        if (lane >= count) {
+            b->made->block[*index].radius[lane] = -INFINITY;
+            continue;
         }
+        bound(b, parts[lane], &b->made->block[*index], lane);
+        int32_t below = ~(int32_t)parts[lane].begin;
+        if (parts[lane].end - parts[lane].begin > 1) {
+            size_t child = 0;
+            VSHI_TRY(build(b, parts[lane], &child));
+            below = (int32_t)child;
+        }
+        b->made->block[*index].below[lane] = below;
     }
     return VSH_OK;
 }
@@ -175,16 +219,19 @@ static void place(vsh_spheres *made, const double *spheres, const double *transf
 
 static vsh_result make(vsh_spheres *made, const double *spheres, const double *transform, double scale,
                        vsh_error *error) {
+    const size_t capacity = made->info.count / 5 + 4;
     VSHI_TRY(vshi_allocate((void **)&made->sphere, made->info.count, sizeof *made->sphere, "spheres", error));
+    VSHI_TRY(vshi_allocate((void **)&made->block, capacity, sizeof *made->block, "spheres", error));
     place(made, spheres, transform, scale);
     double extent = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
         extent = fmax(extent, made->info.bounds_max[axis] - made->info.bounds_min[axis]);
     }
-    VSHI_TRY(sort(made, extent, error));
-    VSHI_TRY(build(made, ROUNDING * extent, error));
+    builder b = {made, capacity, ROUNDING * extent, error};
+    size_t top = 0;
+    VSHI_TRY(build(&b, (part){0, made->info.count}, &top));
     made->info.bytes =
-        sizeof *made + made->info.count * sizeof *made->sphere + made->block_count * sizeof *made->block;
+        sizeof *made + made->info.count * sizeof *made->sphere + b.capacity * sizeof *made->block;
     return VSH_OK;
 }
 
