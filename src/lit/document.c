@@ -153,6 +153,14 @@ void vshi_lit_use_extension(vshi_lit_document *document, const char *name) {
     }
 }
 
+void vshi_lit_remove_extension(json_t *object, const char *name) {
+    json_t *extensions = json_object_get(object, "extensions");
+    json_object_del(extensions, name);
+    if (extensions != NULL && json_object_size(extensions) == 0) {
+        json_object_del(object, "extensions");
+    }
+}
+
 /* Whether something at or below `value` has the extension. */
 static bool has_extension(json_t *value, const char *name) {
     size_t i;

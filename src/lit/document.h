@@ -69,6 +69,9 @@ void vshi_lit_use_extension(vshi_lit_document *document, const char *name);
 vsh_result vshi_lit_object(vshi_lit_document *document, json_t *object, const char *key, json_t **member,
                            vsh_error *error);
 
+/* Takes an extension out of an object, and its member "extensions" where that was the last. */
+void vshi_lit_remove_extension(json_t *object, const char *name);
+
 /* Takes the name of an extension that nothing has any more out of extensionsUsed and extensionsRequired, and
  * either away where that was its last. */
 void vshi_lit_drop_extension(vshi_lit_document *document, const char *name);

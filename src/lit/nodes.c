@@ -90,12 +90,13 @@ static vsh_result list_uses(vshi_lit_work *work, bool *seen, uses *all, vsh_erro
     return VSH_OK;
 }
 
-/* How many instances a node has: the length of any of its accessors, which the model found alike. */
-static vsh_result count_instances(vshi_lit_work *work, size_t node, size_t *count, vsh_error *error) {
+/* How often a node shows its mesh: once, or for all instances. That is the length of any of its accessors,
+ * which the model found alike. */
+static vsh_result count_instances(vshi_lit_work *work, const use *u, size_t *count, vsh_error *error) {
     vshi_gltf *gltf = &work->document.gltf;
     const json_t *attributes = json_object_get(
-        vshi_gltf_extension(vshi_gltf_element(gltf, "nodes", node), instancing_name), "attributes");
-    *count = 0;
+        vshi_gltf_extension(vshi_gltf_element(gltf, "nodes", u->node), instancing_name), "attributes");
+    *count = u->instance == SIZE_MAX ? 1 : 0;
     for (int k = 0; k < VSHI_GLTF_PARTS && *count == 0; ++k) {
         vshi_gltf_accessor accessor;
         VSHI_TRY(vshi_gltf_accessor_find(gltf, attributes, vshi_gltf_parts[k].attribute, instancing_name,
@@ -119,13 +120,11 @@ static vsh_result count_unlit(vshi_lit_work *work, uses *all, vsh_error *error) 
     }
     for (size_t i = 0; i < all->count;) {
         const size_t first = i, of = all->list[i].node;
-        size_t lit = 0, wanted = 1;
+        size_t lit = 0, wanted;
         for (; i < all->count && all->list[i].node == of; ++i) {
             lit += all->list[i].lit;
         }
-        if (all->list[first].instance != SIZE_MAX) {
-            VSHI_TRY(count_instances(work, of, &wanted, error));
-        }
+        VSHI_TRY(count_instances(work, &all->list[first], &wanted, error));
         all->unlit[all->list[first].mesh] -= lit == wanted;
     }
     return VSH_OK;
@@ -233,12 +232,13 @@ static void add_instance(vshi_lit_work *work, const json_t *node, size_t node_in
 }
 
 /* Instances become children of their node; `first` … `end` - 1 are those that the model has. */
-static vsh_result add_instances(vshi_lit_work *work, const uses *all, size_t first, size_t end, size_t count,
+static vsh_result add_instances(vshi_lit_work *work, const uses *all, size_t first, size_t end,
                                 json_t *children, vsh_error *error) {
     vshi_gltf *gltf = &work->document.gltf;
     const use *of = &all->list[first];
     const json_t *node = vshi_gltf_element(gltf, "nodes", of->node);
     float *values[VSHI_GLTF_PARTS] = {NULL};
+    size_t count;
     vsh_result result = vshi_gltf_read_instances(gltf, vshi_gltf_extension(node, instancing_name),
                                                  instancing_name, values, &count, error);
     for (size_t i = 0, next = first; result == VSH_OK && i < count; ++i) {
@@ -258,18 +258,12 @@ static vsh_result expand(vshi_lit_work *work, const uses *all, size_t first, siz
     vshi_lit_document *document = &work->document;
     json_t *node = json_array_get(json_object_get(document->gltf.root, "nodes"), all->list[first].node);
     json_t *children = json_object_get(node, "children");
-    size_t count;
-    VSHI_TRY(count_instances(work, all->list[first].node, &count, error));
     if (children == NULL) {
         children = json_array();
         vshi_lit_set(document, node, "children", children);
     }
-    VSHI_TRY(add_instances(work, all, first, end, count, children, error));
-    json_t *extensions = json_object_get(node, "extensions");
-    json_object_del(extensions, instancing_name);
-    if (json_object_size(extensions) == 0) {
-        json_object_del(node, "extensions");
-    }
+    VSHI_TRY(add_instances(work, all, first, end, children, error));
+    vshi_lit_remove_extension(node, instancing_name);
     json_object_del(node, "mesh");
     json_object_del(node, "weights");
     return VSH_OK;
@@ -280,7 +274,7 @@ static vsh_result give(vshi_lit_work *work, const uses *all, size_t first, size_
     vshi_lit_document *document = &work->document;
     const use *of = &all->list[first];
     bool any = false, same = true;
-    size_t wanted = 1;
+    size_t wanted;
     for (size_t i = first; i < end; ++i) {
         any = any || all->list[i].lit;
         same = same && all->list[i].lit && all->list[i].made == of->made;
@@ -288,9 +282,7 @@ static vsh_result give(vshi_lit_work *work, const uses *all, size_t first, size_
     if (!any) {
         return VSH_OK;
     }
-    if (of->instance != SIZE_MAX) {
-        VSHI_TRY(count_instances(work, of->node, &wanted, error));
-    }
+    VSHI_TRY(count_instances(work, of, &wanted, error));
     if (!same || end - first != wanted) {
         return expand(work, all, first, end, error);
     }

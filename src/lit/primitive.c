@@ -557,11 +557,7 @@ static vsh_result make_split(primitive *p, size_t *uvs, size_t *split, vsh_error
     json_array_foreach(json_object_get(p->made, "targets"), i, target) {
         VSHI_TRY(gather_all(p, *split, target, true, error));
     }
-    json_t *extensions = json_object_get(p->made, "extensions");
-    json_object_del(extensions, "KHR_draco_mesh_compression");
-    if (extensions != NULL && json_object_size(extensions) == 0) {
-        json_object_del(p->made, "extensions");
-    }
+    vshi_lit_remove_extension(p->made, "KHR_draco_mesh_compression");
     return vshi_lit_add_floats(&p->work->document, p->uvs[0], p->lit->vertex_count, 2, false, uvs, NULL,
                                error);
 }

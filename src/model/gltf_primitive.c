@@ -3,245 +3,11 @@
 
 #include "base/memory.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* --- checks of arrays, once they are as the file has them */
-
-static vsh_result check_indices(const char *path, const char *where, const uint32_t *indices, size_t count,
-                                size_t vertex_count, vsh_error *error) {
-    for (size_t i = 0; i < count; ++i) {
-        if (indices[i] >= vertex_count) {
-            return vshi_fail(error, VSH_ERROR_INPUT,
-                             "%s: %s: index %zu of %zu is %u, but there are only %zu vertices", path, where,
-                             i, count, indices[i], vertex_count);
-        }
-    }
-    return VSH_OK;
-}
-
-/* The vertices that are used move together. */
-static vsh_result renumber(const char *path, const unsigned char *used, vshi_model_shape *shape,
-                           vsh_error *error) {
-    uint32_t *place = NULL, next = 0;
-    VSHI_TRY(vshi_allocate((void **)&place, shape->vertex_count, sizeof *place, path, error));
-    for (size_t v = 0; v < shape->vertex_count; ++v) {
-        place[v] = next;
-        next += used[v];
-    }
-    for (size_t i = 0; i < 3 * shape->triangle_count; ++i) {
-        shape->indices[i] = place[shape->indices[i]];
-    }
-    for (int k = 0; k < VSHI_MODEL_ARRAYS; ++k) {
-        const vshi_model_array array = vshi_model_array_of(shape, k);
-        char *values = *array.at;
-        for (size_t v = 0; v < array.count && values != NULL && k != VSHI_MODEL_INDICES; ++v) {
-            if (used[v] != 0) {
-                memmove(values + array.size * place[v], values + array.size * v, array.size);
-            }
-        }
-    }
-    free(place);
-    shape->vertex_count = next;
-    return VSH_OK;
-}
-
-/* Many primitives may share one large accessor, of which each uses a part: only that is kept. */
-static vsh_result drop_unused(const char *path, vshi_model_shape *shape, vsh_error *error) {
-    unsigned char *used = NULL;
-    size_t count = 0;
-    vsh_result result = VSH_OK;
-    VSHI_TRY(vshi_allocate((void **)&used, shape->vertex_count, 1, path, error));
-    for (size_t i = 0; i < 3 * shape->triangle_count; ++i) {
-        used[shape->indices[i]] = 1;
-    }
-    for (size_t v = 0; v < shape->vertex_count; ++v) {
-        count += used[v];
-    }
-    if (count < shape->vertex_count) {
-        result = renumber(path, used, shape, error);
-    }
-    free(used);
-    return result;
-}
-
-/* Checks the arrays, leaves out vertices that no triangle has, and turns v of UVs up. */
-static vsh_result finish(const char *path, const vsh_run *run, const char *where, vshi_model_shape *shape,
-                         vsh_error *error) {
-    VSHI_TRY(drop_unused(path, shape, error));
-    VSHI_TRY(vshi_model_check_positions(path, where, shape->positions, shape->vertex_count, error));
-    vshi_model_check_normals(path, run, where, shape);
-    for (int set = 0; set < shape->uv_sets; ++set) {
-        float *uvs = shape->uvs[set];
-        for (size_t v = 0; v < shape->vertex_count && uvs != NULL; ++v) {
-            uvs[2 * v + 1] = 1.0F - uvs[2 * v + 1]; /* v points down in glTF */
-        }
-    }
-    return VSH_OK;
-}
-
-/* --- Draco */
-
-static vsh_result take_attribute(vshi_gltf *gltf, const vshi_draco *mesh, const json_t *attributes,
-                                 const char *name, int components, const char *where, float **values,
-                                 vsh_error *error) {
-    size_t id;
-    if (!vshi_gltf_count(attributes, name, SIZE_MAX, &id)) {
-        return vshi_gltf_fail(gltf, error, "%s: its compressed %s is no index", where, name);
-    }
-    if (id == SIZE_MAX) {
-        return VSH_OK;
-    }
-    const size_t count = mesh->vertex_count, size = (size_t)components * sizeof **values;
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)values, count, size, error));
-    if (id > UINT32_MAX ||
-        !vshi_importers()->draco_elements(mesh, (uint32_t)id, VSHI_DRACO_FLOAT, components, *values)) {
-        return vshi_gltf_fail(gltf, error, "%s: its Draco data has no attribute %zu of %d components", where,
-                              id, components);
-    }
-    return VSH_OK;
-}
-
-vsh_result vshi_gltf_draco_indices(vshi_gltf *gltf, const vshi_draco *mesh, const char *where,
-                                   uint32_t **indices, vsh_error *error) {
-    const size_t count = mesh->triangle_count;
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)indices, count, sizeof(uint32_t[3]), error));
-    if (count > 0) {
-        vshi_importers()->draco_indices(mesh, *indices);
-    }
-    for (size_t i = 0; i < 3 * count; ++i) {
-        if ((*indices)[i] >= mesh->vertex_count) {
-            return vshi_gltf_fail(gltf, error, "%s: its Draco data uses vertex %u of %zu", where,
-                                  (*indices)[i], mesh->vertex_count);
-        }
-    }
-    return VSH_OK;
-}
-
-vsh_result vshi_gltf_decode_draco(vshi_gltf *gltf, const json_t *extension, const char *where,
-                                  vshi_draco **mesh, vsh_error *error) {
-    vshi_gltf_bytes bytes;
-    size_t view, stride;
-    VSHI_TRY(vshi_gltf_index(gltf, extension, "bufferView", "bufferViews", where, &view, error));
-    if (view == SIZE_MAX) {
-        return vshi_gltf_fail(gltf, error, "%s: its Draco data has no buffer view", where);
-    }
-    VSHI_TRY(vshi_gltf_view(gltf, view, &bytes, &stride, error));
-    VSHI_TRY(vshi_importers_load(error));
-    return vshi_importers()->draco_decode(bytes.at, bytes.size, gltf->path, mesh, error);
-}
-
-/* The rest pose: morph targets at their default weights (glTF 2.0, 3.7.2.2), then skins, which move vertices
- * by their joints and leave the node's own transform out (3.7.3.3). */
-
-static vsh_result add_target(vshi_gltf *gltf, const json_t *target, const char *name, double weight,
-                             const char *where, size_t vertex_count, float *values, vsh_error *error) {
-    float *moves = NULL;
-    VSHI_TRY(vshi_gltf_read_attribute(gltf, target, name, 3, vertex_count, where, &moves, error));
-    for (size_t i = 0; moves != NULL && i < 3 * vertex_count; ++i) {
-        values[i] = (float)((double)values[i] + weight * (double)moves[i]);
-    }
-    free(moves);
-    return VSH_OK;
-}
-
-static vsh_result morph(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
-                        const char *where, vshi_model_shape *shape, vsh_error *error) {
-    const json_t *targets = json_object_get(primitive, "targets");
-    const size_t count = shape->vertex_count;
-    for (size_t i = 0; i < json_array_size(targets) && i < pose->weight_count; ++i) {
-        const json_t *target = json_array_get(targets, i);
-        const double weight = pose->weights[i];
-        if (weight == 0.0) {
-            continue;
-        }
-        VSHI_TRY(add_target(gltf, target, "POSITION", weight, where, count, shape->positions, error));
-        if (shape->normals != NULL) {
-            VSHI_TRY(add_target(gltf, target, "NORMAL", weight, where, count, shape->normals, error));
-        }
-    }
-    return VSH_OK;
-}
-
-static vsh_result add_joints(vshi_gltf *gltf, const vshi_gltf_pose *pose, const vshi_gltf_accessor *accessor,
-                             const float *weights, const char *where, size_t vertex_count,
-                             vshi_model_blend *blends, vsh_error *error) {
-    if (accessor->components != 4 ||
-        (accessor->type != VSHI_GLTF_UBYTE && accessor->type != VSHI_GLTF_USHORT) ||
-        accessor->count != vertex_count) {
-        return vshi_gltf_fail(gltf, error,
-                              "%s: its joints are no four bytes or shorts for each of %zu vertices", where,
-                              vertex_count);
-    }
-    uint32_t *joints = NULL;
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&joints, vertex_count, sizeof(uint32_t[4]), error));
-    vshi_gltf_accessor_integers(accessor, joints);
-    vsh_result result = VSH_OK;
-    for (size_t i = 0; i < 4 * vertex_count; ++i) {
-        const double weight = (double)weights[i];
-        if (weight == 0.0) {
-            continue;
-        }
-        if (joints[i] >= pose->joint_count) {
-            result = vshi_gltf_fail(gltf, error, "%s: vertex %zu uses joint %u, but its skin has only %zu",
-                                    where, i / 4, joints[i], pose->joint_count);
-            goto done;
-        }
-        vshi_model_blend_add(&blends[i / 4], weight, pose->joints[joints[i]]);
-    }
-done:
-    free(joints);
-    return result;
-}
-
-static vsh_result add_sets(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
-                           const char *where, size_t vertex_count, vshi_model_blend *blends,
-                           vsh_error *error) {
-    const json_t *attributes = json_object_get(primitive, "attributes");
-    for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
-        char name[32];
-        vshi_gltf_accessor joints;
-        float *weights;
-        snprintf(name, sizeof name, "JOINTS_%d", set);
-        VSHI_TRY(vshi_gltf_accessor_find(gltf, attributes, name, where, &joints, error));
-        if (joints.count == 0) {
-            break;
-        }
-        snprintf(name, sizeof name, "WEIGHTS_%d", set);
-        VSHI_TRY(vshi_gltf_read_attribute(gltf, attributes, name, 4, vertex_count, where, &weights, error));
-        if (weights == NULL) {
-            continue;
-        }
-        const vsh_result result =
-            add_joints(gltf, pose, &joints, weights, where, vertex_count, blends, error);
-        free(weights);
-        VSHI_TRY(result);
-    }
-    return VSH_OK;
-}
-
-/* A vertex without weights follows the first joint. */
-static vsh_result skin(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
-                       const char *where, vshi_model_shape *shape, vsh_error *error) {
-    vshi_model_blend *blends = NULL;
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&blends, shape->vertex_count, sizeof *blends, error));
-    vsh_result result;
-    VSHI_TRY_DONE(add_sets(gltf, primitive, pose, where, shape->vertex_count, blends, error));
-    vshi_model_blend_move(shape, blends, pose->joints[0]);
-done:
-    free(blends);
-    return result;
-}
-
-/* Moves positions (and normals) to where the pose has them. */
-static vsh_result apply_pose(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
-                             const char *where, vshi_model_shape *shape, vsh_error *error) {
-    VSHI_TRY(morph(gltf, primitive, pose, where, shape, error));
-    return pose->joints != NULL && pose->joint_count > 0 ? skin(gltf, primitive, pose, where, shape, error)
-                                                         : VSH_OK;
-}
+/* --- accessors of a primitive */
 
 vsh_result vshi_gltf_read_attribute(vshi_gltf *gltf, const json_t *attributes, const char *name,
                                     int components, size_t vertex_count, const char *where, float **values,
@@ -267,33 +33,15 @@ vsh_result vshi_gltf_read_attribute(vshi_gltf *gltf, const json_t *attributes, c
     return VSH_OK;
 }
 
-/* The alpha of its vertices' colours, where one of them is not whole (3.7.2.1: COLOR_0 multiplies the base
- * colour). */
-static vsh_result read_alphas(vshi_gltf *gltf, const json_t *primitive, const char *where,
-                              vshi_model_shape *shape, vsh_error *error) {
-    const json_t *attributes = json_object_get(primitive, "attributes");
-    const size_t count = shape->vertex_count;
-    vshi_gltf_accessor accessor;
-    float *colors;
-    bool whole = true;
-    if (shape->alpha == VSH_ALPHA_OPAQUE) {
-        return VSH_OK;
+static vsh_result check_indices(const char *path, const char *where, const uint32_t *indices, size_t count,
+                                size_t vertex_count, vsh_error *error) {
+    for (size_t i = 0; i < count; ++i) {
+        if (indices[i] >= vertex_count) {
+            return vshi_fail(error, VSH_ERROR_INPUT,
+                             "%s: %s: index %zu of %zu is %u, but there are only %zu vertices", path, where,
+                             i, count, indices[i], vertex_count);
+        }
     }
-    VSHI_TRY(vshi_gltf_accessor_find(gltf, attributes, "COLOR_0", where, &accessor, error));
-    if (accessor.components != 4) {
-        return VSH_OK;
-    }
-    VSHI_TRY(vshi_gltf_read_attribute(gltf, attributes, "COLOR_0", 4, count, where, &colors, error));
-    for (size_t v = 0; v < count; ++v) {
-        colors[v] = colors[4 * v + 3];
-        whole = whole && colors[v] >= 1.0F;
-    }
-    if (whole) {
-        free(colors);
-        return VSH_OK;
-    }
-    float *alphas = realloc(colors, count * sizeof *colors);
-    shape->alphas = alphas != NULL ? alphas : colors;
     return VSH_OK;
 }
 
@@ -358,117 +106,352 @@ vsh_result vshi_gltf_read_triangles(vshi_gltf *gltf, const json_t *primitive, si
     return VSH_OK;
 }
 
-/* `draco`: where the vertices come from; NULL: accessors. */
-static vsh_result read_array(vshi_gltf *gltf, const json_t *attributes, const vshi_draco *draco,
-                             const char *name, int components, const char *where, size_t count, float **array,
+/* --- Draco */
+
+vsh_result vshi_gltf_draco_indices(vshi_gltf *gltf, const vshi_draco *mesh, const char *where,
+                                   uint32_t **indices, vsh_error *error) {
+    const size_t count = mesh->triangle_count;
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)indices, count, sizeof(uint32_t[3]), error));
+    if (count > 0) {
+        vshi_importers()->draco_indices(mesh, *indices);
+    }
+    for (size_t i = 0; i < 3 * count; ++i) {
+        if ((*indices)[i] >= mesh->vertex_count) {
+            return vshi_gltf_fail(gltf, error, "%s: its Draco data uses vertex %u of %zu", where,
+                                  (*indices)[i], mesh->vertex_count);
+        }
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_gltf_decode_draco(vshi_gltf *gltf, const json_t *extension, const char *where,
+                                  vshi_draco **mesh, vsh_error *error) {
+    vshi_gltf_bytes bytes;
+    size_t view, stride;
+    VSHI_TRY(vshi_gltf_index(gltf, extension, "bufferView", "bufferViews", where, &view, error));
+    if (view == SIZE_MAX) {
+        return vshi_gltf_fail(gltf, error, "%s: its Draco data has no buffer view", where);
+    }
+    VSHI_TRY(vshi_gltf_view(gltf, view, &bytes, &stride, error));
+    VSHI_TRY(vshi_importers_load(error));
+    return vshi_importers()->draco_decode(bytes.at, bytes.size, gltf->path, mesh, error);
+}
+
+/* --- vertices */
+
+/* A primitive that becomes a shape. */
+typedef struct primitive {
+    vshi_gltf *gltf;
+    const json_t *given, *attributes;
+    const vshi_draco *draco; /* where vertices come from; NULL: accessors */
+    const vshi_gltf_pose *pose;
+    const char *where;
+    vshi_model_shape *shape;
+} primitive;
+
+static vsh_result read_array(const primitive *p, const char *name, int components, float **array,
                              vsh_error *error) {
-    return draco != NULL
-               ? take_attribute(gltf, draco, attributes, name, components, where, array, error)
-               : vshi_gltf_read_attribute(gltf, attributes, name, components, count, where, array, error);
+    const size_t count = p->shape->vertex_count;
+    size_t id;
+    if (p->draco == NULL) {
+        return vshi_gltf_read_attribute(p->gltf, p->attributes, name, components, count, p->where, array,
+                                        error);
+    }
+    if (!vshi_gltf_count(p->attributes, name, SIZE_MAX, &id)) {
+        return vshi_gltf_fail(p->gltf, error, "%s: its compressed %s is no index", p->where, name);
+    }
+    if (id == SIZE_MAX) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_gltf_allocate(p->gltf, (void **)array, count, (size_t)components * sizeof **array, error));
+    return id <= UINT32_MAX && vshi_importers()->draco_elements(p->draco, (uint32_t)id, VSHI_DRACO_FLOAT,
+                                                                components, *array)
+               ? VSH_OK
+               : vshi_gltf_fail(p->gltf, error, "%s: its Draco data has no attribute %zu of %d components",
+                                p->where, id, components);
 }
 
 /* Positions, normals and sets of UVs. */
-static vsh_result read_vertices(vshi_gltf *gltf, const json_t *attributes, const vshi_draco *draco,
-                                const char *where, vshi_model_shape *shape, vsh_error *error) {
-    const size_t count = shape->vertex_count;
-    VSHI_TRY(read_array(gltf, attributes, draco, "POSITION", 3, where, count, &shape->positions, error));
-    VSHI_TRY(read_array(gltf, attributes, draco, "NORMAL", 3, where, count, &shape->normals, error));
+static vsh_result read_vertices(const primitive *p, vsh_error *error) {
+    vshi_model_shape *shape = p->shape;
+    VSHI_TRY(read_array(p, "POSITION", 3, &shape->positions, error));
+    VSHI_TRY(read_array(p, "NORMAL", 3, &shape->normals, error));
     for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
         char name[32];
         snprintf(name, sizeof name, "TEXCOORD_%d", set);
-        VSHI_TRY(read_array(gltf, attributes, draco, name, 2, where, count, &shape->uvs[set], error));
+        VSHI_TRY(read_array(p, name, 2, &shape->uvs[set], error));
         shape->uv_sets = shape->uvs[set] != NULL ? set + 1 : shape->uv_sets;
     }
     return VSH_OK;
 }
 
-/* --- primitives */
+/* The alpha of its vertices' colours, where one of them is not whole (3.7.2.1: COLOR_0 multiplies the base
+ * colour). */
+static vsh_result read_alphas(const primitive *p, vsh_error *error) {
+    const size_t count = p->shape->vertex_count;
+    vshi_gltf_accessor accessor;
+    float *colors = NULL;
+    bool whole = true;
+    if (p->shape->alpha == VSH_ALPHA_OPAQUE) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_gltf_accessor_find(p->gltf, p->attributes, "COLOR_0", p->where, &accessor, error));
+    if (accessor.components != 4) {
+        return VSH_OK;
+    }
+    VSHI_TRY(read_array(p, "COLOR_0", 4, &colors, error));
+    for (size_t v = 0; v < count; ++v) {
+        colors[v] = colors[4 * v + 3];
+        whole = whole && colors[v] >= 1.0F;
+    }
+    if (whole) {
+        free(colors);
+        return VSH_OK;
+    }
+    float *alphas = realloc(colors, count * sizeof *colors);
+    p->shape->alphas = alphas != NULL ? alphas : colors;
+    return VSH_OK;
+}
 
 /* Fills positions, normals, UVs and indices of one under KHR_draco_mesh_compression. */
-static vsh_result read_draco(vshi_gltf *gltf, const json_t *extension, const char *where,
-                             vshi_model_shape *shape, vsh_error *error) {
+static vsh_result read_draco(primitive *p, const json_t *extension, vsh_error *error) {
     vshi_draco *mesh = NULL;
     vsh_result result;
-    VSHI_TRY(vshi_gltf_decode_draco(gltf, extension, where, &mesh, error));
-    shape->vertex_count = mesh->vertex_count;
-    VSHI_TRY_DONE(read_vertices(gltf, json_object_get(extension, "attributes"), mesh, where, shape, error));
-    if (shape->positions == NULL) {
-        VSHI_TRY_DONE(vshi_gltf_fail(gltf, error, "%s: its Draco data has no positions", where));
+    VSHI_TRY(vshi_gltf_decode_draco(p->gltf, extension, p->where, &mesh, error));
+    p->draco = mesh;
+    p->attributes = json_object_get(extension, "attributes");
+    p->shape->vertex_count = mesh->vertex_count;
+    VSHI_TRY_DONE(read_vertices(p, error));
+    if (p->shape->positions == NULL) {
+        VSHI_TRY_DONE(vshi_gltf_fail(p->gltf, error, "%s: its Draco data has no positions", p->where));
     }
-    shape->triangle_count = mesh->triangle_count;
-    result = vshi_gltf_draco_indices(gltf, mesh, where, &shape->indices, error);
+    p->shape->triangle_count = mesh->triangle_count;
+    result = vshi_gltf_draco_indices(p->gltf, mesh, p->where, &p->shape->indices, error);
 done:
     vshi_importers()->draco_free(mesh);
     return result;
 }
 
-static vsh_result read_plain(vshi_gltf *gltf, const json_t *primitive, size_t mode, const char *where,
-                             vshi_model_shape *shape, vsh_error *error) {
-    const json_t *attributes = json_object_get(primitive, "attributes");
+static vsh_result read_plain(const primitive *p, size_t mode, vsh_error *error) {
+    vshi_model_shape *shape = p->shape;
     vshi_gltf_accessor accessor;
-    VSHI_TRY(vshi_gltf_accessor_find(gltf, attributes, "POSITION", where, &accessor, error));
+    VSHI_TRY(vshi_gltf_accessor_find(p->gltf, p->attributes, "POSITION", p->where, &accessor, error));
     if (accessor.count == 0) {
         return VSH_OK; /* without positions there is nothing to see (3.7.2.1) */
     }
     shape->vertex_count = accessor.count;
-    VSHI_TRY(vshi_gltf_read_triangles(gltf, primitive, mode, accessor.count, where, &shape->indices,
+    VSHI_TRY(vshi_gltf_read_triangles(p->gltf, p->given, mode, accessor.count, p->where, &shape->indices,
                                       &shape->triangle_count, error));
     if (shape->triangle_count == 0) {
         return VSH_OK;
     }
-    VSHI_TRY(read_vertices(gltf, attributes, NULL, where, shape, error));
-    return read_alphas(gltf, primitive, where, shape, error);
+    VSHI_TRY(read_vertices(p, error));
+    return read_alphas(p, error);
 }
 
-/* Turns a packer's integers into UVs. */
-static void unpack_uvs(const vshi_gltf *gltf, vshi_model_shape *shape) {
-    for (int set = 0; set < shape->uv_sets && gltf->unpackings != NULL && shape->material > 0; ++set) {
-        const vshi_gltf_unpacking *u =
-            &gltf->unpackings[((size_t)shape->material - 1) * VSH_MAX_UV_SETS + (size_t)set];
-        float *uvs = shape->uvs[set];
-        if (u->uvs == VSHI_GLTF_UVS_PLAIN || uvs == NULL) {
-            continue;
+/* --- the rest pose: morph targets at their default weights (glTF 2.0, 3.7.2.2), then skins, which move
+ * vertices by their joints and leave the node's own transform out (3.7.3.3) */
+
+static vsh_result add_target(const primitive *p, const json_t *target, const char *name, double weight,
+                             float *values, vsh_error *error) {
+    const size_t count = p->shape->vertex_count;
+    float *moves = NULL;
+    if (values == NULL) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_gltf_read_attribute(p->gltf, target, name, 3, count, p->where, &moves, error));
+    for (size_t i = 0; moves != NULL && i < 3 * count; ++i) {
+        values[i] = (float)((double)values[i] + weight * (double)moves[i]);
+    }
+    free(moves);
+    return VSH_OK;
+}
+
+static vsh_result morph(const primitive *p, vsh_error *error) {
+    const json_t *targets = json_object_get(p->given, "targets");
+    for (size_t i = 0; i < json_array_size(targets) && i < p->pose->weight_count; ++i) {
+        const json_t *target = json_array_get(targets, i);
+        const double weight = p->pose->weights[i];
+        if (weight != 0.0) {
+            VSHI_TRY(add_target(p, target, "POSITION", weight, p->shape->positions, error));
+            VSHI_TRY(add_target(p, target, "NORMAL", weight, p->shape->normals, error));
         }
-        shape->packed |= 1U << set;
+    }
+    return VSH_OK;
+}
+
+static vsh_result add_joints(const primitive *p, const vshi_gltf_accessor *accessor, const float *weights,
+                             vshi_model_blend *blends, vsh_error *error) {
+    const size_t count = p->shape->vertex_count;
+    if (accessor->components != 4 ||
+        (accessor->type != VSHI_GLTF_UBYTE && accessor->type != VSHI_GLTF_USHORT) ||
+        accessor->count != count) {
+        return vshi_gltf_fail(p->gltf, error,
+                              "%s: its joints are no four bytes or shorts for each of %zu vertices", p->where,
+                              count);
+    }
+    uint32_t *joints = NULL;
+    VSHI_TRY(vshi_gltf_allocate(p->gltf, (void **)&joints, count, sizeof(uint32_t[4]), error));
+    vshi_gltf_accessor_integers(accessor, joints);
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; i < 4 * count && result == VSH_OK; ++i) {
+        const double weight = (double)weights[i];
+        if (weight != 0.0 && joints[i] < p->pose->joint_count) {
+            vshi_model_blend_add(&blends[i / 4], weight, p->pose->joints[joints[i]]);
+        } else if (weight != 0.0) {
+            result = vshi_gltf_fail(p->gltf, error, "%s: vertex %zu uses joint %u, but its skin has only %zu",
+                                    p->where, i / 4, joints[i], p->pose->joint_count);
+        }
+    }
+    free(joints);
+    return result;
+}
+
+static vsh_result add_sets(const primitive *p, vshi_model_blend *blends, vsh_error *error) {
+    const json_t *attributes = json_object_get(p->given, "attributes");
+    for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
+        char name[32];
+        vshi_gltf_accessor joints;
+        float *weights;
+        snprintf(name, sizeof name, "JOINTS_%d", set);
+        VSHI_TRY(vshi_gltf_accessor_find(p->gltf, attributes, name, p->where, &joints, error));
+        if (joints.count == 0) {
+            break;
+        }
+        snprintf(name, sizeof name, "WEIGHTS_%d", set);
+        VSHI_TRY(vshi_gltf_read_attribute(p->gltf, attributes, name, 4, p->shape->vertex_count, p->where,
+                                          &weights, error));
+        const vsh_result result = weights != NULL ? add_joints(p, &joints, weights, blends, error) : VSH_OK;
+        free(weights);
+        VSHI_TRY(result);
+    }
+    return VSH_OK;
+}
+
+/* Moves positions (and normals) to where the pose has them. A vertex without weights follows the first joint.
+ */
+static vsh_result apply_pose(const primitive *p, vsh_error *error) {
+    VSHI_TRY(morph(p, error));
+    if (p->pose->joints == NULL || p->pose->joint_count == 0) {
+        return VSH_OK;
+    }
+    vshi_model_blend *blends = NULL;
+    VSHI_TRY(vshi_gltf_allocate(p->gltf, (void **)&blends, p->shape->vertex_count, sizeof *blends, error));
+    const vsh_result result = add_sets(p, blends, error);
+    if (result == VSH_OK) {
+        vshi_model_blend_move(p->shape, blends, p->pose->joints[0]);
+    }
+    free(blends);
+    return result;
+}
+
+/* --- what a model has of it */
+
+/* The vertices that are used move together. */
+static vsh_result renumber(const char *path, const unsigned char *used, vshi_model_shape *shape,
+                           vsh_error *error) {
+    uint32_t *place = NULL, next = 0;
+    VSHI_TRY(vshi_allocate((void **)&place, shape->vertex_count, sizeof *place, path, error));
+    for (size_t v = 0; v < shape->vertex_count; ++v) {
+        place[v] = next;
+        next += used[v];
+    }
+    for (size_t i = 0; i < 3 * shape->triangle_count; ++i) {
+        shape->indices[i] = place[shape->indices[i]];
+    }
+    for (int k = 0; k < VSHI_MODEL_ARRAYS; ++k) {
+        const vshi_model_array array = vshi_model_array_of(shape, k);
+        char *values = *array.at;
+        for (size_t v = 0; v < array.count && values != NULL && k != VSHI_MODEL_INDICES; ++v) {
+            if (used[v] != 0) {
+                memmove(values + array.size * place[v], values + array.size * v, array.size);
+            }
+        }
+    }
+    free(place);
+    shape->vertex_count = next;
+    return VSH_OK;
+}
+
+/* Many primitives may share one large accessor, of which each uses a part: only that is kept. */
+static vsh_result drop_unused(const char *path, vshi_model_shape *shape, vsh_error *error) {
+    unsigned char *used = NULL;
+    size_t count = 0;
+    vsh_result result = VSH_OK;
+    VSHI_TRY(vshi_allocate((void **)&used, shape->vertex_count, 1, path, error));
+    for (size_t i = 0; i < 3 * shape->triangle_count; ++i) {
+        used[shape->indices[i]] = 1;
+    }
+    for (size_t v = 0; v < shape->vertex_count; ++v) {
+        count += used[v];
+    }
+    if (count < shape->vertex_count) {
+        result = renumber(path, used, shape, error);
+    }
+    free(used);
+    return result;
+}
+
+/* Turns UVs that a packer stored as integers back, and v of all up, which points down in glTF. */
+static void turn_uvs(const vshi_gltf *gltf, vshi_model_shape *shape) {
+    static const vshi_gltf_unpacking none = {.uvs = VSHI_GLTF_UVS_PLAIN};
+    for (int set = 0; set < shape->uv_sets; ++set) {
+        const vshi_gltf_unpacking *u =
+            gltf->unpackings != NULL && shape->material > 0
+                ? &gltf->unpackings[((size_t)shape->material - 1) * VSH_MAX_UV_SETS + (size_t)set]
+                : &none;
+        float *uv = shape->uvs[set];
         const double *t = u->transform;
-        for (size_t v = 0; v < shape->vertex_count && u->uvs == VSHI_GLTF_UVS_PACKED; ++v) {
-            const double x = (double)uvs[2 * v], y = (double)uvs[2 * v + 1];
-            uvs[2 * v] = (float)(t[0] * x + t[1] * y + t[2]);
-            uvs[2 * v + 1] = (float)(t[3] * x + t[4] * y + t[5]);
+        shape->packed |= u->uvs != VSHI_GLTF_UVS_PLAIN && uv != NULL ? 1U << set : 0;
+        for (size_t v = 0; v < shape->vertex_count && uv != NULL; ++v, uv += 2) {
+            const double x = (double)uv[0], y = (double)uv[1];
+            if (u->uvs == VSHI_GLTF_UVS_PACKED) {
+                uv[0] = (float)(t[0] * x + t[1] * y + t[2]);
+                uv[1] = (float)(t[3] * x + t[4] * y + t[5]);
+            }
+            uv[1] = 1.0F - uv[1];
         }
     }
 }
 
-size_t vshi_gltf_material(const vshi_gltf *gltf, const json_t *primitive) {
+size_t vshi_gltf_material(const vshi_gltf *gltf, const json_t *given) {
     const size_t count = gltf->model->material_count;
     size_t material;
-    return vshi_gltf_count(primitive, "material", SIZE_MAX, &material) &&
+    return vshi_gltf_count(given, "material", SIZE_MAX, &material) &&
                    material < (count < INT32_MAX ? count : INT32_MAX)
                ? material
                : SIZE_MAX;
 }
 
-vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
+vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *given, const vshi_gltf_pose *pose,
                                     const char *where, vshi_model_shape *shape, vsh_error *error) {
+    primitive p = {.gltf = gltf,
+                   .given = given,
+                   .attributes = json_object_get(given, "attributes"),
+                   .pose = pose,
+                   .where = where,
+                   .shape = shape};
     size_t mode;
-    if (!vshi_gltf_count(primitive, "mode", VSHI_GLTF_TRIANGLES, &mode) || mode > VSHI_GLTF_FAN) {
+    if (!vshi_gltf_count(given, "mode", VSHI_GLTF_TRIANGLES, &mode) || mode > VSHI_GLTF_FAN) {
         return vshi_gltf_fail(gltf, error, "%s: its mode is none", where);
     }
     if (mode < VSHI_GLTF_TRIANGLES) {
         return VSH_OK; /* points or lines */
     }
-    const json_t *draco = vshi_gltf_extension(primitive, "KHR_draco_mesh_compression");
-    const size_t material = vshi_gltf_material(gltf, primitive);
+    const json_t *draco = vshi_gltf_extension(given, "KHR_draco_mesh_compression");
+    const size_t material = vshi_gltf_material(gltf, given);
     if (material != SIZE_MAX) {
         shape->material = (int32_t)material + 1;
         shape->alpha = gltf->model->materials[material].told.alpha;
     }
-    VSHI_TRY(draco != NULL ? read_draco(gltf, draco, where, shape, error)
-                           : read_plain(gltf, primitive, mode, where, shape, error));
+    VSHI_TRY(draco != NULL ? read_draco(&p, draco, error) : read_plain(&p, mode, error));
     if (shape->triangle_count == 0) {
         return VSH_OK;
     }
-    unpack_uvs(gltf, shape);
-    VSHI_TRY(apply_pose(gltf, primitive, pose, where, shape, error));
-    return finish(gltf->path, gltf->run, where, shape, error);
+    VSHI_TRY(apply_pose(&p, error));
+    VSHI_TRY(drop_unused(gltf->path, shape, error));
+    VSHI_TRY(vshi_model_check_positions(gltf->path, where, shape->positions, shape->vertex_count, error));
+    vshi_model_check_normals(gltf->path, gltf->run, where, shape);
+    turn_uvs(gltf, shape);
+    return VSH_OK;
 }

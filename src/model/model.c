@@ -238,9 +238,6 @@ void vsh_model_free(vsh_model *model) {
     free(model->lights);
     free(model->images);
     free(model->materials);
-    for (int i = 0; i < VSHI_MODEL_BLOCKS; ++i) {
-        free(model->blocks[i]);
-    }
     vshi_answer_free(&model->answer);
     free(model);
 }

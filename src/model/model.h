@@ -78,14 +78,11 @@ typedef struct vshi_model_entry {
     vshi_model_origin origin;
 } vshi_model_entry;
 
-enum { VSHI_MODEL_BLOCKS = 4 };
-
 struct vsh_model {
     vshi_model_shape *shapes;
     size_t shape_count;
-    bool borrowed;                   /* the shapes' arrays lie in what follows, else each is its own */
-    void *blocks[VSHI_MODEL_BLOCKS]; /* from malloc; may be NULL */
-    vshi_answer answer;              /* of a reader; its map may be NULL */
+    bool borrowed;      /* the shapes' arrays lie in the answer, else each is its own */
+    vshi_answer answer; /* of a reader; its map may be NULL */
     vshi_model_entry *entries;
     size_t entry_count, entry_capacity;
     vsh_model_light *lights; /* whose names are the model's */

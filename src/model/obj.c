@@ -132,9 +132,16 @@ static vsh_result set_material(vshi_obj *obj, const char *text, size_t size, vsh
     return VSH_OK;
 }
 
-/* --- the model: all meshes of the file share four arrays */
+static const struct {
+    const char *name;
+    int least, kept; /* numbers that there must be; that are kept */
+} kinds[VSHI_OBJ_KINDS] = {
+    {"vertex", 3, 3},
+    {"texture coordinate", 1, 2},
+    {"normal", 3, 3},
+};
 
-enum { POSITIONS, INDICES, UVS, NORMALS };
+/* --- the model */
 
 /* Where each mesh ends is where the next begins. */
 static size_t vertex_end(const vshi_obj *obj, size_t mesh) {
@@ -145,52 +152,57 @@ static size_t run_end(const vshi_obj *obj, size_t mesh) {
     return mesh + 1 < obj->mesh_count ? obj->meshes[mesh + 1].first_run : obj->faces.run_count;
 }
 
-/* The values of one kind of all vertices; zeros where a corner has none. */
-static vsh_result gather(vshi_obj *obj, int kind, size_t size, void **block, vsh_error *error) {
-    float *values = NULL;
-    size_t capacity = 0;
-    VSHI_TRY(vshi_reserve(&obj->budget, &values, &capacity, obj->vertex_count * size, sizeof *values, error));
-    *block = values;
-    for (size_t v = 0; v < obj->vertex_count; ++v) {
-        const uint32_t part = obj->vertices[v].part[kind];
-        if (part > 0) {
-            memcpy(values + size * v, obj->kinds[kind].values + size * (part - 1), size * sizeof *values);
-        } else {
-            memset(values + size * v, 0, size * sizeof *values);
+/* The values of one kind of all vertices, which are the array `number` of their shapes; zeros where a corner
+ * has none. */
+static vsh_result gather(vshi_obj *obj, int kind, int number, vsh_model *model, vsh_error *error) {
+    vshi_obj_values *values = &obj->kinds[kind];
+    for (size_t m = 0; m < obj->mesh_count; ++m) {
+        const vshi_model_array array = vshi_model_array_of(&model->shapes[m], number);
+        const vshi_obj_vertex *vertices = obj->vertices + obj->meshes[m].first_vertex;
+        size_t capacity = 0;
+        if (!obj->meshes[m].has[kind]) {
+            continue;
+        }
+        VSHI_TRY(vshi_reserve(&obj->budget, array.at, &capacity, array.count, array.size, error));
+        for (size_t v = 0; v < array.count; ++v) {
+            const uint32_t part = vertices[v].part[kind];
+            char *to = (char *)*array.at + array.size * v;
+            if (part > 0) {
+                memcpy(to, (const char *)values->values + array.size * (part - 1), array.size);
+            } else {
+                memset(to, 0, array.size);
+            }
         }
     }
-    free(obj->kinds[kind].values);
-    obj->budget.bytes -= (double)(obj->kinds[kind].capacity * size * sizeof *values);
-    obj->kinds[kind] = (vshi_obj_values){0};
+    free(values->values);
+    obj->budget.bytes -= (double)(values->capacity * (size_t)kinds[kind].kept * sizeof(float));
+    *values = (vshi_obj_values){0};
     return VSH_OK;
 }
 
 /* The faces' corners are what triangles are made of; where all are triangles, they are that. */
-static vsh_result cut_mesh(vshi_obj *obj, const vshi_obj_mesh *mesh, size_t runs, vshi_model_shape *shape,
-                           vsh_error *error) {
-    vshi_face_cutter cutter = {.positions = shape->positions, .job = obj->job, .apart = true};
-    const vsh_result result = vshi_faces_cut(&cutter, obj->faces.runs + mesh->first_run, runs,
-                                             obj->faces.corners + mesh->first_corner, shape->indices,
-                                             &shape->triangle_count, error);
-    vshi_face_cutter_end(&cutter, obj->run, obj->path, obj->names.names[mesh->name]);
-    return result;
-}
-
-static vsh_result make_indices(vshi_obj *obj, vsh_model *model, bool *triangles, vsh_error *error) {
-    uint32_t *indices = NULL;
+static vsh_result make_triangles(vshi_obj *obj, size_t m, vshi_model_shape *shape, vsh_error *error) {
+    const vshi_obj_mesh *mesh = &obj->meshes[m];
+    const vshi_face_run *runs = obj->faces.runs + mesh->first_run;
+    const size_t run_count = run_end(obj, m) - mesh->first_run;
     size_t capacity = 0;
-    const size_t most = vshi_faces_most(obj->faces.runs, obj->faces.run_count, triangles);
+    bool triangles;
+    const size_t most = vshi_faces_most(runs, run_count, &triangles);
+    VSHI_TRY(vshi_reserve(&obj->budget, &shape->indices, &capacity, most, sizeof(uint32_t[3]), error));
     if (most == 0) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles", obj->path);
-    }
-    if (*triangles) {
-        model->blocks[INDICES] = obj->faces.corners;
-        obj->faces.corners = NULL;
         return VSH_OK;
     }
-    VSHI_TRY(vshi_reserve(&obj->budget, &indices, &capacity, most, sizeof(uint32_t[3]), error));
-    model->blocks[INDICES] = indices;
-    return VSH_OK;
+    if (triangles) {
+        shape->triangle_count = most;
+        memcpy(shape->indices, obj->faces.corners + mesh->first_corner, most * sizeof(uint32_t[3]));
+        return VSH_OK;
+    }
+    vshi_face_cutter cutter = {.positions = shape->positions, .job = obj->job, .apart = true};
+    const vsh_result result =
+        vshi_faces_cut(&cutter, runs, run_count, obj->faces.corners + mesh->first_corner, shape->indices,
+                       &shape->triangle_count, error);
+    vshi_face_cutter_end(&cutter, obj->run, obj->path, obj->names.names[mesh->name]);
+    return result;
 }
 
 static int32_t alpha_of(const vshi_obj_alpha *alpha) {
@@ -198,42 +210,23 @@ static int32_t alpha_of(const vshi_obj_alpha *alpha) {
 }
 
 static vsh_result make_shapes(vshi_obj *obj, vsh_model *model, vsh_error *error) {
-    bool triangles;
-    size_t capacity = 0, made = 0;
-    model->borrowed = true;
-    VSHI_TRY(make_indices(obj, model, &triangles, error));
-    VSHI_TRY(gather(obj, VSHI_OBJ_POSITION, 3, &model->blocks[POSITIONS], error));
-    if (obj->kinds[VSHI_OBJ_TEXTURE].highest > 0) {
-        VSHI_TRY(gather(obj, VSHI_OBJ_TEXTURE, 2, &model->blocks[UVS], error));
-    }
-    if (obj->kinds[VSHI_OBJ_NORMAL].highest > 0) {
-        VSHI_TRY(gather(obj, VSHI_OBJ_NORMAL, 3, &model->blocks[NORMALS], error));
-    }
+    size_t capacity = 0;
     VSHI_TRY(
         vshi_reserve(&obj->budget, &model->shapes, &capacity, obj->mesh_count, sizeof *model->shapes, error));
-    float *positions = model->blocks[POSITIONS], *uvs = model->blocks[UVS], *normals = model->blocks[NORMALS];
-    for (size_t m = 0; m < obj->mesh_count; ++m) {
-        const vshi_obj_mesh *mesh = &obj->meshes[m];
-        const size_t first = mesh->first_vertex, runs = run_end(obj, m) - mesh->first_run;
-        vshi_model_shape *shape = &model->shapes[m];
-        *shape = (vshi_model_shape){
-            .positions = positions + 3 * first,
-            .indices = (uint32_t *)model->blocks[INDICES] + 3 * made,
-            .normals = mesh->has[VSHI_OBJ_NORMAL] ? normals + 3 * first : NULL,
-            .uvs = {mesh->has[VSHI_OBJ_TEXTURE] ? uvs + 2 * first : NULL},
+    for (; model->shape_count < obj->mesh_count; ++model->shape_count) {
+        const vshi_obj_mesh *mesh = &obj->meshes[model->shape_count];
+        model->shapes[model->shape_count] = (vshi_model_shape){
             .uv_sets = mesh->has[VSHI_OBJ_TEXTURE],
-            .vertex_count = vertex_end(obj, m) - first,
+            .vertex_count = vertex_end(obj, model->shape_count) - mesh->first_vertex,
             .alpha = mesh->material != SIZE_MAX ? alpha_of(&obj->alphas[mesh->material]) : VSH_ALPHA_OPAQUE,
             .material = mesh->material < obj->materials.count ? (int32_t)mesh->material + 1 : 0,
         };
-        model->shape_count = m + 1;
-        if (triangles) {
-            bool plain;
-            shape->triangle_count = vshi_faces_most(obj->faces.runs + mesh->first_run, runs, &plain);
-        } else {
-            VSHI_TRY(cut_mesh(obj, mesh, runs, shape, error));
-        }
-        made += shape->triangle_count;
+    }
+    VSHI_TRY(gather(obj, VSHI_OBJ_POSITION, VSHI_MODEL_POSITIONS, model, error));
+    VSHI_TRY(gather(obj, VSHI_OBJ_TEXTURE, VSHI_MODEL_UVS, model, error));
+    VSHI_TRY(gather(obj, VSHI_OBJ_NORMAL, VSHI_MODEL_NORMALS, model, error));
+    for (size_t m = 0; m < obj->mesh_count; ++m) {
+        VSHI_TRY(make_triangles(obj, m, &model->shapes[m], error));
     }
     return VSH_OK;
 }
@@ -252,14 +245,17 @@ static void make_material(const vshi_obj_alpha *from, vshi_model_material *mater
     }
 }
 
+static vsh_result hold(vshi_obj *obj, double bytes, vsh_error *error) {
+    obj->budget.bytes += bytes;
+    return vshi_check_limit(obj->run, obj->budget.bytes, obj->path, error);
+}
+
 /* Takes the materials' masks. */
 static vsh_result make_images(vshi_obj *obj, vsh_model *model, vsh_error *error) {
     const size_t count = obj->images.count;
-    const double bytes = (double)count * sizeof *model->images + (double)obj->images.used;
-    VSHI_TRY(vshi_check_limit(obj->run, obj->budget.bytes + bytes, obj->path, error));
+    VSHI_TRY(hold(obj, (double)count * sizeof *model->images + (double)obj->images.used, error));
     VSHI_TRY(vshi_allocate((void **)&model->images, count, sizeof *model->images, obj->path, error));
     model->image_count = count;
-    obj->budget.bytes += bytes;
     for (size_t i = 0; i < count; ++i) {
         model->images[i].path = strdup(obj->images.names[i]);
         if (model->images[i].path == NULL) {
@@ -276,8 +272,7 @@ static vsh_result make_materials(vshi_obj *obj, vsh_model *model, vsh_error *err
         return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu materials, at most %d", obj->path, count,
                          INT32_MAX - 1);
     }
-    const double bytes = (double)count * sizeof *model->materials + (double)obj->materials.used;
-    VSHI_TRY(vshi_check_limit(obj->run, obj->budget.bytes + bytes, obj->path, error));
+    VSHI_TRY(hold(obj, (double)count * sizeof *model->materials + (double)obj->materials.used, error));
     VSHI_TRY(vshi_model_take_plain_materials(model, count, error));
     for (size_t i = 0; i < count; ++i) {
         make_material(&obj->alphas[i], &model->materials[i]);
@@ -317,15 +312,6 @@ static vsh_result build_model(vshi_obj *obj, vsh_model *model, vsh_error *error)
 
 /* A place where more vertices than this differ in the rest (the pole of a sphere) gets some of them twice. */
 enum { LONGEST_CHAIN = 32 };
-
-static const struct {
-    const char *name;
-    int least, kept; /* numbers that there must be; that are kept */
-} kinds[VSHI_OBJ_KINDS] = {
-    {"vertex", 3, 3},
-    {"texture coordinate", 1, 2},
-    {"normal", 3, 3},
-};
 
 static bool is_blank(char c) {
     return c == ' ' || c == '\t' || c == '\v' || c == '\f';
