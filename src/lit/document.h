@@ -44,8 +44,8 @@ void vshi_lit_close(vshi_lit_document *document);
 /* VSH_ERROR_MEMORY. */
 vsh_result vshi_lit_no_memory(const vshi_lit_document *document, vsh_error *error);
 
-/* --- JSON. Where memory is short these set document->refused, and go on: the caller asks once. Values that
- * are handed to them belong to them. Those and what they are put into may be NULL then. */
+/* --- JSON. Where memory is short these functions set document->refused and go on; the caller asks once. They
+ * own the values that they get. Values, and what they are put into, may be NULL after a refusal. */
 
 void vshi_lit_set(vshi_lit_document *document, json_t *object, const char *key, json_t *value);
 void vshi_lit_set_number(vshi_lit_document *document, json_t *object, const char *key, size_t number);
@@ -59,7 +59,7 @@ size_t vshi_lit_append(vshi_lit_document *document, const char *array, json_t *v
 /* A new list of numbers. */
 json_t *vshi_lit_numbers(vshi_lit_document *document, const double *values, size_t count);
 
-/* A deep copy of what is not NULL. */
+/* A deep copy; NULL stays NULL. */
 json_t *vshi_lit_copy_json(vshi_lit_document *document, const json_t *json);
 
 /* Adds a name to extensionsUsed, where it is not in it. */

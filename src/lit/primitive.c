@@ -300,7 +300,7 @@ typedef struct primitive {
     vshi_lit_work *work;
     size_t mesh, index; /* in the file */
     size_t entry;       /* of the model */
-    char where[96];     /* what messages call it */
+    char where[96];     /* its name in messages */
     const json_t *given;
     json_t *made;
     const vsh_lit_mesh *lit;
@@ -361,7 +361,7 @@ static vsh_result find_elements(primitive *p, vsh_error *error) {
         return fail_other(p, error);
     }
     p->draco = vshi_lit_draco_of(&p->work->dracos, p->mesh, p->index);
-    if (p->draco != NULL) { /* whose triangles are lists, even if the primitive has another mode */
+    if (p->draco != NULL) { /* Draco's triangles are lists in every mode */
         p->element_count = p->draco->vertex_count;
         return match(p, p->draco->indices, p->draco->triangle_count, error);
     }

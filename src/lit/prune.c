@@ -54,8 +54,7 @@ static void walk_meshes(vshi_lit_document *document, refer_fn *refer, void *user
     }
 }
 
-/* Of textures and of what they are made of only the references of new ones: where a bake puts its textures,
- * and nowhere else, as there may be other numbers in extensions. */
+/* Textures are found only where a bake puts them: extensions may hold other numbers. */
 static void walk(vshi_lit_document *document, refer_fn *refer, void *user) {
     size_t i, k;
     json_t *item, *sampler, *root = document->gltf.root;
@@ -390,7 +389,7 @@ done:
     return result;
 }
 
-/* What was used before becomes what is not any more. */
+/* Leaves the items in `before` that were used then and are not used any more. */
 static void keep_gone(const vshi_lit_uses *before, const vshi_lit_uses *after, int kind) {
     for (size_t i = 0; i < before->count[kind]; ++i) {
         before->used[kind][i] = before->used[kind][i] && !after->used[kind][i];

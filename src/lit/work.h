@@ -30,7 +30,7 @@ typedef struct vshi_lit_dracos {
     vshi_lit_draco *list;
     size_t count;
     bool borrowed;      /* arrays lie in `answer`, else each is its own */
-    vshi_answer answer; /* of a reader; its map may be NULL */
+    vshi_answer answer; /* the reader's; its map may be NULL */
 } vshi_lit_dracos;
 
 /* Decodes them; none where the document has none. Free after a failure too. Errors: VSH_ERROR_INPUT,
@@ -45,7 +45,7 @@ const vshi_lit_draco *vshi_lit_draco_of(const vshi_lit_dracos *dracos, size_t me
 const vshi_lit_draco_attribute *vshi_lit_draco_attribute_of(const vshi_lit_draco *draco,
                                                             const json_t *primitive, const char *name);
 
-/* What a reader has handed over for dracos->list[count], whose places are known; everything in it is checked.
+/* Takes a reader's answer for dracos->list[count], whose places are known, and checks everything in it.
  * The arrays are those of the message, which must outlive them. Errors: VSH_ERROR_READ, VSH_ERROR_MEMORY. */
 vsh_result vshi_lit_dracos_decode(vshi_decoder *decoder, const char *path, vshi_lit_dracos *dracos,
                                   vsh_error *error);

@@ -247,7 +247,7 @@ typedef struct output_file {
     vshi_output output;
     vshi_sink sink;
     uint64_t written; /* to the sink */
-    uint64_t at;      /* of what put() has written */
+    uint64_t at;      /* bytes that put() has written */
     FILE *to;
 } output_file;
 

@@ -11,7 +11,7 @@
 #include <string.h>
 #include <strings.h>
 
-/* What Jansson makes of a text, for one byte of it: as when the model is read (PEAK_BYTES_A_BYTE in
+/* Bytes that Jansson takes for one byte of a text, as when the model is read (PEAK_BYTES_A_BYTE in
  * model_file.c). */
 static const double JSON_BYTES = 5.0;
 

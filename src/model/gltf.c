@@ -145,9 +145,9 @@ static vsh_result check_extensions(const vshi_gltf *gltf, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Parses the JSON itself, perhaps with a mark before it and zeros behind. Memory that Jansson takes for a
- * byte of it: 25 measured on a list of nodes, 1 on buffers in base64. It is part of what a file's size is
- * taken for beforehand (PEAK_BYTES_A_BYTE). */
+/* Parses the JSON itself, perhaps with a mark before it and zeros behind. Jansson takes 25 bytes for a byte
+ * of a list of nodes, and 1 for buffers in base64 (measured). PEAK_BYTES_A_BYTE in model_file.c allows for
+ * that. */
 static vsh_result parse(vshi_gltf *gltf, const char *text, size_t size, vsh_error *error) {
     static const char mark[3] = {'\xef', '\xbb', '\xbf'};
     json_error_t where;

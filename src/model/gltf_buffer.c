@@ -519,7 +519,7 @@ vsh_result vshi_gltf_accessor_find(vshi_gltf *gltf, const json_t *object, const 
     return index != SIZE_MAX ? vshi_gltf_accessor_open(gltf, index, accessor, error) : VSH_OK;
 }
 
-/* What is normalized is 0 … 1 or -1 … 1. */
+/* Turns a normalized integer into 0 … 1 or -1 … 1. */
 static float normalize(float given, int type) {
     switch (type) {
     case VSHI_GLTF_BYTE:

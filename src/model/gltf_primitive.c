@@ -345,7 +345,7 @@ static vsh_result apply_pose(const primitive *p, vsh_error *error) {
     return result;
 }
 
-/* --- what a model has of it */
+/* --- the finished shape */
 
 /* The vertices that are used move together. */
 static vsh_result renumber(const char *path, const unsigned char *used, vshi_model_shape *shape,

@@ -82,7 +82,7 @@ struct vsh_model {
     vshi_model_shape *shapes;
     size_t shape_count;
     bool borrowed;      /* the shapes' arrays lie in the answer, else each is its own */
-    vshi_answer answer; /* of a reader; its map may be NULL */
+    vshi_answer answer; /* the reader's; its map may be NULL */
     vshi_model_entry *entries;
     size_t entry_count, entry_capacity;
     vsh_model_light *lights; /* whose names are the model's */
@@ -174,7 +174,7 @@ typedef struct vshi_assimp {
     double unit;  /* metres in a unit of a Collada file, by which Assimp multiplies; 0: of another */
     const struct aiScene *scene;
     double root[12]; /* in front of the scene's own root */
-    bool *skinned;   /* of each mesh of the scene: it has been moved by its bones */
+    bool *skinned;   /* whether bones have moved a mesh of the scene */
 } vshi_assimp;
 
 /* Looks for what Assimp hides in the file's own bytes. Errors: VSH_ERROR_READ where it ends early,

@@ -138,7 +138,7 @@ typedef struct reading {
     vsh_model **model;
 } reading;
 
-/* What is looked at as a whole: a glTF is read, and of others vshi_assimp_look() is done. */
+/* Loads a file whole. Reads it if it is a glTF, else looks over it for Assimp. */
 static vsh_result read_text(const reading *r, vshi_assimp *assimp, vsh_error *error) {
     char *text = NULL;
     size_t size;

@@ -92,7 +92,7 @@ static vsh_result fail_answer(const taking *t, const char *what, vsh_error *erro
     return vshi_answer_fail(t->path, what, error);
 }
 
-/* How many elements follow; each takes `least` bytes of the message. They are allocated. */
+/* Allocates a list for the elements that follow. Each of them takes `least` bytes of the message. */
 static vsh_result take_list(taking *t, size_t least, size_t size, void *list, size_t *count,
                             vsh_error *error) {
     const uint64_t most = (uint64_t)(t->decoder->end - t->decoder->at) / least;

@@ -438,7 +438,7 @@ static vsh_result make_triangles(ply_reader *r, vshi_model_shape *shape, vsh_err
 static vsh_result build(ply_reader *r, vsh_model *model, vsh_error *error) {
     static const double world[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     size_t capacity = 0;
-    if (r->vertex_count != r->vertices) { /* faces were held against what the header names */
+    if (r->vertex_count != r->vertices) { /* faces have been checked against the header's number */
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: its vertices have no x, y or z", r->path);
     }
     VSHI_TRY(vshi_model_check_positions(r->path, "", r->positions, r->vertex_count, error));

@@ -222,7 +222,7 @@ vshi_number vshi_token_number(vshi_token token) {
 }
 
 bool vshi_token_integer(vshi_token token, int64_t *value) {
-    enum { DIGITS = 18 }; /* what fits int64_t whatever the digits */
+    enum { DIGITS = 18 }; /* any so many digits fit int64_t */
     const size_t sign = token.size > 0 && (*token.text == '-' || *token.text == '+') ? 1 : 0;
     *value = 0;
     for (size_t i = sign; i < token.size; ++i) {

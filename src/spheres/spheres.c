@@ -121,7 +121,7 @@ bool vshi_spheres_hold(const vsh_spheres *spheres, const double position[3]) {
 
 enum { SHOWN = 47 }; /* bytes of a bad line */
 
-/* Of a file, 16 GiB; what is read of it is held against the memory limit. */
+/* The largest file that is read: 16 GiB. The list of its spheres is checked against the memory limit. */
 static const uint64_t MOST_BYTES = (uint64_t)1 << 34;
 
 typedef struct list {

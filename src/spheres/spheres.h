@@ -1,5 +1,5 @@
-/* Spheres as they are sought: blocks of eight bounding spheres under each other; and their shadows in closed
- * form, as the methods hard and classic see them. */
+/* A tree of spheres in blocks of eight bounding spheres, and the shadows of spheres in closed form, by the
+ * methods hard and classic. */
 #ifndef VSHI_SPHERES_H
 #define VSHI_SPHERES_H
 
@@ -34,15 +34,15 @@ struct vsh_spheres {
 typedef struct vshi_ball_cone {
     double origin[3];
     double axis[3];      /* unit */
-    double sine, cosine; /* of its half angle, < 90°; a half angle of 90°: all above the plane */
+    double sine, cosine; /* its half angle is < 90°, or 90°: all above the plane */
     double far;
 } vshi_ball_cone;
 
 /* Told of a sphere (its numbers) that may be in the cone; false ends the search. */
 typedef bool vshi_ball_fn(void *user, const double sphere[4]);
 
-/* Every sphere that touches the cone is told of, and maybe some that pass close by; returns how many bounds
- * were looked at. */
+/* Calls fn() for every sphere that touches the cone, and maybe for some that pass close by. Returns how many
+ * bounds it looked at. */
 uint64_t vshi_sphere_tree_search(const vsh_spheres *spheres, const vshi_ball_cone *cone, vshi_ball_fn *fn,
                                  void *user);
 

@@ -195,7 +195,7 @@ bool vshi_line_is_empty(const char *line, size_t size) {
 
 /* --- the first line */
 
-/* What stands between fields: the first of these that the line holds. */
+/* The delimiter between fields is the first of these that the line holds. */
 static char delimiter_of(const char *line, size_t size) {
     static const char delimiters[] = {';', ',', '\t'};
     for (size_t i = 0; i < sizeof delimiters; ++i) {

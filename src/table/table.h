@@ -19,7 +19,7 @@ typedef struct vshi_source {
     char *buffer;
     size_t begin, end, room;
     uint64_t taken; /* bytes given out */
-    uint64_t size;  /* of a regular file; 0: not known */
+    uint64_t size;  /* bytes of a regular file; 0: not known */
 } vshi_source;
 
 /* Opens a regular file of at most `most` bytes, or (NULL) standard input. Errors: as of vshi_input_open().
