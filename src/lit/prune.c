@@ -185,8 +185,7 @@ static bool is_known(const char *name) {
                                         "EXT_texture_",
                                         "EXT_materials_"};
     for (size_t i = 0; i < sizeof known / sizeof known[0]; ++i) {
-        const size_t length = strlen(known[i]);
-        if (strncmp(name, known[i], length) == 0 && (known[i][length - 1] == '_' || name[length] == '\0')) {
+        if (vshi_gltf_is_named(name, known[i])) {
             return true;
         }
     }

@@ -1,7 +1,7 @@
 /* Formats that Assimp reads: STL, Collada and FBX. First the file's own bytes are searched for defects that
- * Assimp 5.2 hides: files that end early, coordinates that are no finite numbers. It drops or repeats faces, or
- * replaces numbers, and reports a mesh that is not the one in the file. Then comes its scene: arrays, polygons
- * cut into triangles, skins at rest, places. */
+ * Assimp 5.2 hides: files that end early, coordinates that are no finite numbers. It drops or repeats faces,
+ * or replaces numbers, and reports a mesh that is not the one in the file. Then comes its scene: arrays,
+ * polygons cut into triangles, skins at rest, places. */
 #define _GNU_SOURCE
 #include "base/bytes.h"
 #include "base/file.h"

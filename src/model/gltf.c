@@ -89,11 +89,17 @@ vsh_result vshi_gltf_allocate(vshi_gltf *gltf, void **memory, size_t count, size
 
 /* --- required extensions */
 
-/* Extensions that are read, or that leave the geometry as it is. */
+bool vshi_gltf_is_named(const char *name, const char *pattern) {
+    const size_t length = strlen(pattern);
+    return length > 0 && strncmp(name, pattern, length) == 0 &&
+           (pattern[length - 1] == '_' || name[length] == '\0');
+}
+
+/* Extensions that are read, or that leave the geometry as it is, as all of materials do. */
 static const char *const understood[] = {
     "KHR_mesh_quantization",   "KHR_draco_mesh_compression",
     "EXT_mesh_gpu_instancing", "EXT_meshopt_compression",
-    "KHR_meshopt_compression", /* */
+    "KHR_meshopt_compression", "KHR_materials_",
     "KHR_texture_transform",   "KHR_texture_basisu",
     "EXT_texture_webp",        "EXT_texture_avif",
     "MSFT_texture_dds",        "KHR_lights_punctual",
@@ -103,23 +109,12 @@ static const char *const understood[] = {
     "KHR_audio_emitter",
 };
 
-/* Materials change no geometry, whatever they are called. */
-static const char material[] = "KHR_materials_";
-
-static const struct {
-    const char *name, *advice;
-} advices[] = {
-    {"KHR_node_visibility", "export it with only those nodes that are to be seen"},
-    {"KHR_gaussian_splatting", "it holds no triangles"},
-};
-
 static bool understands(const char *name) {
+    bool known = false;
     for (size_t i = 0; i < sizeof understood / sizeof understood[0]; ++i) {
-        if (strcmp(name, understood[i]) == 0) {
-            return true;
-        }
+        known = known || vshi_gltf_is_named(name, understood[i]);
     }
-    return strncmp(name, material, sizeof material - 1) == 0;
+    return known;
 }
 
 /* Errors: VSH_ERROR_UNSUPPORTED, naming the extension and what could be done. */
@@ -134,10 +129,10 @@ static vsh_result check_extensions(const vshi_gltf *gltf, vsh_error *error) {
         if (understands(name)) {
             continue;
         }
-        const char *advice = "export it without that extension";
-        for (size_t k = 0; k < sizeof advices / sizeof advices[0]; ++k) {
-            advice = strcmp(name, advices[k].name) == 0 ? advices[k].advice : advice;
-        }
+        const char *advice =
+            strcmp(name, "KHR_node_visibility") == 0 ? "export it with only those nodes that are to be seen"
+            : strcmp(name, "KHR_gaussian_splatting") == 0 ? "it holds no triangles"
+                                                          : "export it without that extension";
         return vshi_fail(error, VSH_ERROR_UNSUPPORTED,
                          "%s: cannot be read without the glTF extension '%s', which is not known here: %s",
                          gltf->path, name, advice);

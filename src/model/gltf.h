@@ -67,6 +67,9 @@ bool vshi_gltf_numbers(const json_t *object, const char *key, size_t count, doub
 /* The object of an extension, or NULL. */
 const json_t *vshi_gltf_extension(const json_t *object, const char *name);
 
+/* Whether an extension's name is `pattern`, or begins so where that ends in "_". */
+bool vshi_gltf_is_named(const char *name, const char *pattern);
+
 vsh_result vshi_gltf_fail(const vshi_gltf *gltf, vsh_error *error, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 

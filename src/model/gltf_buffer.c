@@ -41,31 +41,28 @@ done:
     return result;
 }
 
-static vsh_result read_buffer(vshi_gltf *gltf, size_t index, const char *path, vshi_gltf_buffer *buffer,
-                              vsh_error *error) {
-    if (!gltf->run->allow_outside && !vshi_input_is_beside(gltf->path, path)) {
-        return vshi_fail(error, VSH_ERROR_INPUT,
-                         "%s: buffers[%zu], which holds its vertices, is '%s', outside of its folder, where "
-                         "nothing is read of a model; --allow-outside (vsh_run.allow_outside) reads it",
-                         gltf->path, index, path);
-    }
-    char name[1024];
-    snprintf(name, sizeof name, "%.400s: buffers[%zu], which holds its vertices, is the file '%.400s'",
-             gltf->path, index, path);
-    return vshi_gltf_read_file(gltf, path, name, SIZE_MAX, &buffer->owned, &buffer->bytes.size, error);
-}
-
 static vsh_result load_beside(vshi_gltf *gltf, size_t index, const char *uri, vshi_gltf_buffer *buffer,
                               vsh_error *error) {
     if (vshi_uri_is_remote(uri)) {
         return vshi_fail(error, VSH_ERROR_UNSUPPORTED,
                          "%s: buffers[%zu] is '%s': only files beside it are read", gltf->path, index, uri);
     }
-    char *path = vshi_uri_path(gltf->path, uri);
+    char *path = vshi_uri_path(gltf->path, uri), name[1024];
+    vsh_result result;
     if (path == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", gltf->path);
     }
-    const vsh_result result = read_buffer(gltf, index, path, buffer, error);
+    if (gltf->run->allow_outside || vshi_input_is_beside(gltf->path, path)) {
+        snprintf(name, sizeof name, "%.400s: buffers[%zu], which holds its vertices, is the file '%.400s'",
+                 gltf->path, index, path);
+        result = vshi_gltf_read_file(gltf, path, name, SIZE_MAX, &buffer->owned, &buffer->bytes.size, error);
+    } else {
+        result =
+            vshi_fail(error, VSH_ERROR_INPUT,
+                      "%s: buffers[%zu], which holds its vertices, is '%s', outside of its folder, where "
+                      "nothing is read of a model; --allow-outside (vsh_run.allow_outside) reads it",
+                      gltf->path, index, path);
+    }
     free(path);
     return result;
 }

@@ -292,8 +292,8 @@ vsh_result vshi_gltf_read_materials(vshi_gltf *gltf, vsh_error *error) {
     vsh_model *model = gltf->model;
     const size_t count = json_array_size(materials);
     const size_t images = json_array_size(json_object_get(gltf->root, "images"));
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&model->materials, count, sizeof *model->materials, error));
-    model->material_count = count;
+    VSHI_TRY(vshi_gltf_hold(gltf, (double)count * sizeof *model->materials, error));
+    VSHI_TRY(vshi_model_take_plain_materials(model, count, error));
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&model->images, images, sizeof *model->images, error));
     model->image_count = images;
     VSHI_TRY(find_packed(gltf, error));
@@ -302,10 +302,8 @@ vsh_result vshi_gltf_read_materials(vshi_gltf *gltf, vsh_error *error) {
         vshi_model_material *material = &model->materials[i];
         char where[32];
         snprintf(where, sizeof where, "materials[%zu]", i);
-        memcpy(material->told.uv_transform, as_they_are, sizeof as_they_are);
         material->told.alpha = alpha_of(given);
         material->told.double_sided = json_is_true(json_object_get(given, "doubleSided"));
-        material->told.base_alpha = 1.0;
         const char *name = json_string_value(json_object_get(given, "name"));
         if (name != NULL && name[0] != '\0') {
             VSHI_TRY(vshi_gltf_hold(gltf, (double)strlen(name), error));
