@@ -45,11 +45,7 @@ vsh_result vshi_lit_open(vshi_lit_document *document, const char *path, const vs
     *document = (vshi_lit_document){.gltf = {.path = path, .run = run, .job = job}};
     vshi_gltf *gltf = &document->gltf;
     size_t size;
-    VSHI_TRY(
-        vshi_gltf_read_file(gltf, path, path, SIZE_MAX / 2, (unsigned char **)&document->text, &size, error));
-    if (size == 0) {
-        return vshi_fail(error, VSH_ERROR_READ, "%s: is empty", path);
-    }
+    VSHI_TRY(vshi_gltf_read_file(gltf, path, path, (unsigned char **)&document->text, &size, error));
     VSHI_TRY(vshi_gltf_hold(gltf, estimate_json_bytes(document->text, size), error));
     VSHI_TRY(vshi_gltf_open(gltf, document->text, size, error));
     VSHI_TRY(check_lists(gltf, error));

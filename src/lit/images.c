@@ -218,11 +218,11 @@ static vsh_result add(vshi_lit_work *work, const vsh_lit_image *image, bool embe
                       vshi_lit_beside *beside, vsh_error *error) {
     *beside = (vshi_lit_beside){NULL, image->png, image->png_size, NULL};
     if (image->purpose == VSH_LIT_LIGHTMAP) {
-        work->intensities[image->page] = image->intensity > 0.0 ? image->intensity : 1.0;
+        work->pages[image->page].intensity = image->intensity > 0.0 ? image->intensity : 1.0;
     }
     if (image->png == NULL) {
         const double scale = image->purpose == VSH_LIT_LIGHTMAP ? largest(image) : 1.0;
-        work->intensities[image->page] *= scale;
+        work->pages[image->page].intensity *= scale;
         VSHI_TRY(encode(work, image, scale, &beside->owned, &beside->size, error));
         beside->bytes = beside->owned;
     }
@@ -235,10 +235,11 @@ static vsh_result add(vshi_lit_work *work, const vsh_lit_image *image, bool embe
                                     : put_beside(work, image, beside, made, error);
     const size_t index = vshi_lit_append(&work->document, "images", made);
     add_sampler(work, sampler);
-    work->textures[image->purpose][image->page] = vshi_lit_append(
-        &work->document, "textures",
-        json_pack("{s:I,s:I,s:o}", "sampler", (json_int_t)*sampler, "source", (json_int_t)index, "extras",
-                  vshi_lit_texture_mark(purpose_names[image->purpose])));
+    work->pages[image->page].textures[image->purpose] =
+        1 + vshi_lit_append(&work->document, "textures",
+                            json_pack("{s:I,s:I,s:o}", "sampler", (json_int_t)*sampler, "source",
+                                      (json_int_t)index, "extras",
+                                      vshi_lit_texture_mark(purpose_names[image->purpose])));
     return result;
 }
 
@@ -290,7 +291,7 @@ static vsh_result read_image(vshi_lit_work *work, const char *path, unsigned cha
                              vsh_error *error) {
     vshi_gltf *gltf = &work->document.gltf;
     return gltf->run->allow_outside || vshi_input_is_beside(gltf->path, path)
-               ? vshi_gltf_read_file(gltf, path, path, UINT32_MAX, bytes, size, error)
+               ? vshi_gltf_read_file(gltf, path, path, bytes, size, error)
                : vshi_fail(error, VSH_ERROR_INPUT, "it lies outside of the model's folder");
 }
 

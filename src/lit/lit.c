@@ -265,20 +265,6 @@ static vsh_result check_output(const vshi_lit_work *work, vsh_error *error) {
 
 /* --- the document */
 
-static vsh_result allocate_pages(vshi_lit_work *work, vsh_error *error) {
-    vshi_gltf *gltf = &work->document.gltf;
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&work->intensities, work->page_count,
-                                sizeof *work->intensities, error));
-    for (int purpose = 0; purpose < VSH_LIT_PURPOSES; ++purpose) {
-        VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&work->textures[purpose], work->page_count,
-                                    sizeof *work->textures[purpose], error));
-        for (size_t page = 0; page < work->page_count; ++page) {
-            work->textures[purpose][page] = SIZE_MAX;
-        }
-    }
-    return VSH_OK;
-}
-
 /* Draco's data is needed where a mesh gets new UVs. */
 static bool has_new_uvs(const vshi_lit_work *work) {
     for (size_t i = 0; i < vsh_model_mesh_count(work->model); ++i) {
@@ -312,11 +298,9 @@ static vsh_result make_document(vshi_lit_work *work, vshi_lit_uses *uses, vsh_er
     if (path == NULL || !vshi_is_gltf(path) || obj) {
         VSHI_TRY(
             vshi_lit_begin(&work->document, path != NULL ? path : work->output, work->run, work->job, error));
-        VSHI_TRY(allocate_pages(work, error));
         return obj ? VSH_OK : vshi_lit_from_model(work, error);
     }
     VSHI_TRY(vshi_lit_open(&work->document, path, work->run, work->job, error));
-    VSHI_TRY(allocate_pages(work, error));
     if (has_new_uvs(work)) {
         VSHI_TRY(vshi_lit_dracos_read(&work->document, &work->dracos, error));
     }
@@ -333,6 +317,10 @@ static vsh_result make(void *user, vsh_error *error) {
     const bool glb = strcasecmp(vshi_path_ending(work->output), "glb") == 0;
     const bool embed = place == VSH_LIT_IMAGES_EMBED || (place == VSH_LIT_IMAGES_AUTO && glb);
     vsh_result result;
+    VSHI_TRY_DONE(
+        vshi_check_limit(work->run, (double)work->page_count * sizeof *work->pages, work->output, error));
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&work->pages, work->page_count, sizeof *work->pages, "pages", error));
     VSHI_TRY_DONE(make_document(work, &uses, error));
     VSHI_TRY_DONE(vshi_lit_images_add(work, embed, &besides, error));
     if (!vshi_lit_is_obj(work->output)) {
@@ -361,10 +349,7 @@ static void free_work(vshi_lit_work *work) {
     }
     free(work->looks.list);
     vshi_lit_dracos_free(&work->dracos);
-    for (int purpose = 0; purpose < VSH_LIT_PURPOSES; ++purpose) {
-        free(work->textures[purpose]);
-    }
-    free(work->intensities);
+    free(work->pages);
     vshi_lit_close(&work->document);
 }
 

@@ -60,13 +60,14 @@ vsh_result vshi_lit_mark_primitive(vshi_lit_work *work, json_t *primitive, uint3
 static bool has_images(const vshi_lit_work *work, uint32_t page) {
     bool any = false;
     for (int purpose = 0; purpose < VSH_LIT_PURPOSES; ++purpose) {
-        any = any || work->textures[purpose][page] != SIZE_MAX;
+        any = any || work->pages[page].textures[purpose] > 0;
     }
     return any;
 }
 
 static json_t *texture_info(const vshi_lit_work *work, int purpose, const vshi_lit_look *look) {
-    const json_int_t texture = (json_int_t)work->textures[purpose][look->page], set = (json_int_t)look->set;
+    const json_int_t texture = (json_int_t)work->pages[look->page].textures[purpose] - 1,
+                     set = (json_int_t)look->set;
     return look->transform == NULL ? json_pack("{s:I,s:I}", "index", texture, "texCoord", set)
                                    : json_pack("{s:I,s:I,s:{s:O}}", "index", texture, "texCoord", set,
                                                "extensions", transform_name, look->transform);
@@ -83,7 +84,7 @@ static vsh_result set_lightmap(vshi_lit_work *work, json_t *material, const vshi
     json_t *extensions;
     VSHI_TRY(vshi_lit_object(&work->document, material, "extensions", &extensions, error));
     json_t *info = texture_info(work, VSH_LIT_LIGHTMAP, look);
-    vshi_lit_set(&work->document, info, "intensity", json_real(work->intensities[look->page]));
+    vshi_lit_set(&work->document, info, "intensity", json_real(work->pages[look->page].intensity));
     vshi_lit_set(&work->document, extensions, "MOZ_lightmap", info);
     vshi_lit_use_extension(&work->document, "MOZ_lightmap");
     return VSH_OK;
@@ -104,14 +105,14 @@ static vsh_result set_preview(vshi_lit_work *work, json_t *material, const vshi_
 }
 
 static vsh_result dress(vshi_lit_work *work, json_t *material, const vshi_lit_look *look, vsh_error *error) {
-    if (work->textures[VSH_LIT_OCCLUSION][look->page] != SIZE_MAX) {
+    if (work->pages[look->page].textures[VSH_LIT_OCCLUSION] > 0) {
         vshi_lit_set(&work->document, material, "occlusionTexture",
                      texture_info(work, VSH_LIT_OCCLUSION, look));
     }
-    if (work->textures[VSH_LIT_LIGHTMAP][look->page] != SIZE_MAX) {
+    if (work->pages[look->page].textures[VSH_LIT_LIGHTMAP] > 0) {
         VSHI_TRY(set_lightmap(work, material, look, error));
     }
-    if (work->textures[VSH_LIT_PREVIEW][look->page] != SIZE_MAX) {
+    if (work->pages[look->page].textures[VSH_LIT_PREVIEW] > 0) {
         VSHI_TRY(set_preview(work, material, look, error));
     }
     if (look->transform != NULL) {

@@ -96,6 +96,12 @@ typedef struct vshi_lit_uvs {
 
 /* --- all of it */
 
+/* The images of a page. */
+typedef struct vshi_lit_page_images {
+    size_t textures[VSH_LIT_PURPOSES]; /* 1 + the number of each; 0: none */
+    double intensity;                  /* of the lightmap */
+} vshi_lit_page_images;
+
 typedef struct vshi_lit_work {
     vshi_lit_document document;
     const vsh_model *model;
@@ -105,9 +111,8 @@ typedef struct vshi_lit_work {
     const char *path; /* of the model's file; NULL: none */
     const vsh_run *run;
     vshi_job *job;
-    size_t page_count;                  /* 1 + the highest page */
-    size_t *textures[VSH_LIT_PURPOSES]; /* [page_count]; SIZE_MAX: none */
-    double *intensities;                /* [page_count]: of lightmaps */
+    vshi_lit_page_images *pages; /* [page_count] */
+    size_t page_count;           /* 1 + the highest page */
     vshi_lit_dracos dracos;
     vshi_lit_looks looks;
     vshi_lit_uvs *uvs; /* [uv_count] */

@@ -12,7 +12,7 @@
 #include "mesh/mesh.h"
 #include "model/faces.h"
 #include "model/model.h"
-#include "model/stream.h"
+#include "model/text.h"
 
 #include <assimp/material.h>
 #include <assimp/scene.h>
@@ -29,10 +29,10 @@ _Static_assert(sizeof(struct aiVector3D) == sizeof(float[3]), "Assimp's vectors 
 /* STL: binary files are as long as their number of triangles says, ASCII ones end in "endsolid" and hold
  * numbers. Assimp 5.2 reads an ASCII file that ends between two facets as a smaller mesh. */
 
-enum { HEADER = 84, FACET = 50, FACETS_A_POLL = 4096 };
+enum { HEADER = 84, FACET = 50 };
 
-static vsh_result scan_ascii(vshi_assimp *scan, vsh_error *error) {
-    const char *at = scan->text, *end = scan->text + scan->size;
+static vsh_result scan_ascii(vshi_assimp *scan, vshi_text *text, vsh_error *error) {
+    const char *at = text->bytes, *end = text->bytes + text->size;
     size_t vertices = 0;
     bool ended = false;
     for (;;) {
@@ -46,11 +46,7 @@ static vsh_result scan_ascii(vshi_assimp *scan, vsh_error *error) {
             at = stop != NULL ? stop : end;
         } else if (vshi_token_is(token, "endfacet")) {
             ++scan->faces;
-            if (scan->faces % FACETS_A_POLL == 0 &&
-                vshi_advance_to(scan->job, (double)(at - scan->text) / (double)scan->size, scan->units,
-                                &scan->units_done)) {
-                return vshi_job_fail_cancelled(scan->job, error);
-            }
+            VSHI_TRY(vshi_text_poll(text, at, error));
         } else if (vshi_token_is(token, "vertex")) {
             for (int k = 0; k < 3; ++k) {
                 const vshi_token number = vshi_scan_token(&at, end);
@@ -70,21 +66,21 @@ static vsh_result scan_ascii(vshi_assimp *scan, vsh_error *error) {
     return VSH_OK;
 }
 
-static vsh_result scan_stl(vshi_assimp *scan, vsh_error *error) {
-    const size_t facets = scan->size >= HEADER ? (size_t)vshi_bytes_number(scan->text + 80, 4, false) : 0;
+static vsh_result scan_stl(vshi_assimp *scan, vshi_text *text, vsh_error *error) {
+    const size_t facets = text->size >= HEADER ? (size_t)vshi_bytes_number(text->bytes + 80, 4, false) : 0;
     const uint64_t expected = HEADER + FACET * (uint64_t)facets;
-    const char *at = scan->text;
-    const bool solid = vshi_token_is(vshi_scan_token(&at, scan->text + scan->size), "solid");
-    if (scan->size >= HEADER && expected == scan->size) {
+    const char *at = text->bytes;
+    const bool solid = vshi_token_is(vshi_scan_token(&at, text->bytes + text->size), "solid");
+    if (text->size >= HEADER && expected == text->size) {
         scan->faces = facets;
         return VSH_OK;
     }
-    if (solid && memchr(scan->text, '\0', scan->size < HEADER ? scan->size : HEADER) == NULL) {
-        return scan_ascii(scan, error);
+    if (solid && memchr(text->bytes, '\0', text->size < HEADER ? text->size : HEADER) == NULL) {
+        return scan_ascii(scan, text, error);
     }
-    if (scan->size < HEADER || expected > scan->size) {
-        return vshi_fail(error, VSH_ERROR_READ, "%s: cut short: %zu bytes of %llu", scan->path, scan->size,
-                         (unsigned long long)(scan->size < HEADER ? HEADER : expected));
+    if (text->size < HEADER || expected > text->size) {
+        return vshi_fail(error, VSH_ERROR_READ, "%s: cut short: %zu bytes of %llu", scan->path, text->size,
+                         (unsigned long long)(text->size < HEADER ? HEADER : expected));
     }
     scan->faces = facets;
     return VSH_OK;
@@ -112,22 +108,20 @@ static double read_metres(const char *tag, const char *end) {
     return strtod(text, NULL);
 }
 
-static vsh_result scan_dae(vshi_assimp *scan) {
+static vsh_result scan_dae(vshi_assimp *scan, const vshi_text *text) {
     static const char open[] = "<unit";
-    const char *end = scan->text + scan->size;
-    const char *tag = memmem(scan->text, scan->size, open, sizeof open - 1);
+    const char *end = text->bytes + text->size;
+    const char *tag = memmem(text->bytes, text->size, open, sizeof open - 1);
     const char *stop = tag != NULL ? memchr(tag, '>', (size_t)(end - tag)) : NULL;
     const double metres = stop != NULL ? read_metres(tag, stop) : 1.0;
     scan->unit = metres > 0.0 && metres < 1e12 ? metres : 1.0; /* the format's own: a metre */
     return VSH_OK;
 }
 
-vsh_result vshi_assimp_look(vshi_assimp *scan, const char *text, size_t size, vsh_error *error) {
+vsh_result vshi_assimp_look(vshi_assimp *scan, vshi_text *text, vsh_error *error) {
     const char *ending = vshi_path_ending(scan->path);
-    scan->text = text;
-    scan->size = size;
-    return strcasecmp(ending, "stl") == 0   ? scan_stl(scan, error)
-           : strcasecmp(ending, "dae") == 0 ? scan_dae(scan)
+    return strcasecmp(ending, "stl") == 0   ? scan_stl(scan, text, error)
+           : strcasecmp(ending, "dae") == 0 ? scan_dae(scan, text)
                                             : VSH_OK;
 }
 

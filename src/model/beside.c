@@ -80,7 +80,7 @@ static vsh_result beside_gltf(const telling *t, vsh_error *error) {
     size_t size, i;
     json_t *given;
     vsh_error why;
-    vsh_result result = vshi_gltf_read_file(&gltf, t->path, t->path, SIZE_MAX / 2, &text, &size, &why);
+    vsh_result result = vshi_gltf_read_file(&gltf, t->path, t->path, &text, &size, &why);
     if (result == VSH_OK && (result = vshi_gltf_hold(&gltf, JSON_BYTES * (double)size, &why)) == VSH_OK) {
         result = vshi_gltf_open(&gltf, (const char *)text, size, &why);
     }
@@ -152,23 +152,17 @@ static vsh_result tell_library(const telling *t, const char *path, const char *a
 static vsh_result tell_lines(const telling *t, const char *path, const char *word, tell_line_fn *line,
                              vsh_error *error) {
     vshi_budget budget = {.path = path, .run = t->run};
-    vshi_stream stream;
-    const char *stop;
+    vshi_text text;
     vsh_error why;
-    vsh_result result = vshi_stream_open(&stream, path, &budget, t->job, 0, &why);
-    while (result == VSH_OK && (result = vshi_stream_lines(&stream, &stop, &why)) == VSH_OK &&
-           stream.at < stop) {
-        const char *at = stream.at, *end;
-        for (; result == VSH_OK && (at = memmem(at, (size_t)(stop - at), word, strlen(word))) != NULL;
-             at = end) {
-            const char *begin = memrchr(stream.at, '\n', (size_t)(at - stream.at));
-            end = memchr(at, '\n', (size_t)(stop - at));
-            end = end != NULL ? end : stop;
-            result = line(t, path, begin != NULL ? begin + 1 : stream.at, end, &why);
-        }
-        stream.at = stop;
+    vsh_result result = vshi_text_read(&text, path, path, &budget, t->job, 0, &why);
+    const char *at = text.bytes, *stop = at + text.size, *end;
+    for (; result == VSH_OK && (at = memmem(at, (size_t)(stop - at), word, strlen(word))) != NULL; at = end) {
+        const char *begin = memrchr(text.bytes, '\n', (size_t)(at - text.bytes));
+        end = memchr(at, '\n', (size_t)(stop - at));
+        end = end != NULL ? end : stop;
+        result = line(t, path, begin != NULL ? begin + 1 : text.bytes, end, &why);
     }
-    vshi_stream_close(&stream);
+    vshi_text_free(&text);
     return result == VSH_OK || result == VSH_ERROR_READ ? VSH_OK
                                                         : vshi_fail(error, result, "%s", why.message);
 }

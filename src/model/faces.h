@@ -3,7 +3,7 @@
 #define VSHI_FACES_H
 
 #include "base/job.h"
-#include "model/stream.h"
+#include "model/text.h"
 
 /* Cuts one face after the other. Begin with positions (finite) and job, and all else 0. */
 typedef struct vshi_face_cutter {

@@ -86,10 +86,9 @@ vsh_result vshi_gltf_allocate(vshi_gltf *gltf, void **memory, size_t count, size
 vsh_result vshi_gltf_view(vshi_gltf *gltf, size_t index, vshi_gltf_bytes *bytes, size_t *stride,
                           vsh_error *error);
 
-/* Reads a file of at most `most` bytes into new memory, to be freed after an error too. Messages begin with
- * `name`. */
-vsh_result vshi_gltf_read_file(vshi_gltf *gltf, const char *path, const char *name, uint64_t most,
-                               unsigned char **bytes, size_t *size, vsh_error *error);
+/* Reads a file into new memory, to be freed after an error too. Messages begin with `name`. */
+vsh_result vshi_gltf_read_file(vshi_gltf *gltf, const char *path, const char *name, unsigned char **bytes,
+                               size_t *size, vsh_error *error);
 
 /* Decodes a data URI into new memory. */
 vsh_result vshi_gltf_read_data(vshi_gltf *gltf, const char *where, const char *uri, unsigned char **bytes,

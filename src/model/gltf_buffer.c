@@ -4,8 +4,8 @@
 #include "base/input.h"
 #include "base/memory.h"
 #include "base/uri.h"
+#include "model/text.h"
 
-#include <errno.h>
 #include <math.h>
 #include <meshoptimizer.h>
 #include <stdio.h>
@@ -24,20 +24,14 @@ vsh_result vshi_gltf_read_data(vshi_gltf *gltf, const char *where, const char *u
                    : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", gltf->path);
 }
 
-vsh_result vshi_gltf_read_file(vshi_gltf *gltf, const char *path, const char *name, uint64_t most,
-                               unsigned char **bytes, size_t *size, vsh_error *error) {
-    FILE *file;
-    uint64_t told;
-    VSHI_TRY(vshi_input_open(path, name, most, &file, &told, error));
-    *size = (size_t)told;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_gltf_allocate(gltf, (void **)bytes, *size > 0 ? *size : 1, 1, error));
-    if (fread(*bytes, 1, *size, file) != *size) {
-        result = vshi_fail(error, VSH_ERROR_READ, "%s: %s", name,
-                           ferror(file) ? strerror(errno) : "became shorter while it was read");
-    }
-done:
-    fclose(file);
+vsh_result vshi_gltf_read_file(vshi_gltf *gltf, const char *path, const char *name, unsigned char **bytes,
+                               size_t *size, vsh_error *error) {
+    vshi_budget budget = {gltf->path, gltf->run, gltf->bytes_held};
+    vshi_text text;
+    const vsh_result result = vshi_text_read(&text, path, name, &budget, gltf->job, 0, error);
+    *bytes = (unsigned char *)text.bytes;
+    *size = text.size;
+    gltf->bytes_held = budget.bytes;
     return result;
 }
 
@@ -55,7 +49,7 @@ static vsh_result load_beside(vshi_gltf *gltf, size_t index, const char *uri, vs
     if (gltf->run->allow_outside || vshi_input_is_beside(gltf->path, path)) {
         snprintf(name, sizeof name, "%.400s: buffers[%zu], which holds its vertices, is the file '%.400s'",
                  gltf->path, index, path);
-        result = vshi_gltf_read_file(gltf, path, name, SIZE_MAX, &buffer->owned, &buffer->bytes.size, error);
+        result = vshi_gltf_read_file(gltf, path, name, &buffer->owned, &buffer->bytes.size, error);
     } else {
         result =
             vshi_fail(error, VSH_ERROR_INPUT,

@@ -7,7 +7,7 @@
 #include "base/try.h"
 #include "base/vec.h"
 #include "mesh/mesh.h"
-#include "model/stream.h"
+#include "model/text.h"
 
 #include <float.h>
 #include <math.h>

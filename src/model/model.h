@@ -14,6 +14,7 @@ extern "C" {
 #endif
 
 struct aiScene;
+struct vshi_text;
 
 /* The arrays of one mesh of the file, shared by the nodes that use it. */
 typedef struct vshi_model_shape {
@@ -162,14 +163,11 @@ vsh_result vshi_model_take_plain_materials(vsh_model *model, size_t count, vsh_e
 
 /* --- files (model_file.c) */
 
-/* A file of a format that Assimp reads. Path, run, job and units (of the first call) are given. */
+/* A file of a format that Assimp reads. Path, run and job are given. */
 typedef struct vshi_assimp {
     const char *path;
     const vsh_run *run;
     vshi_job *job;
-    size_t units, units_done; /* of the job: for the first call, and told so far */
-    const char *text;         /* the whole file, during the first call */
-    size_t size;
     size_t faces; /* polygons of three corners or more that Assimp must find at least; 0: not known */
     double unit;  /* metres in a unit of a Collada file, by which Assimp multiplies; 0: of another */
     const struct aiScene *scene;
@@ -179,7 +177,7 @@ typedef struct vshi_assimp {
 
 /* Looks for what Assimp hides in the file's own bytes. Errors: VSH_ERROR_READ where it ends early,
  * VSH_ERROR_INPUT where its content is bad, VSH_ERROR_CANCELLED. */
-vsh_result vshi_assimp_look(vshi_assimp *file, const char *text, size_t size, vsh_error *error);
+vsh_result vshi_assimp_look(vshi_assimp *file, struct vshi_text *text, vsh_error *error);
 
 /* Reads the file, for `units` of the job. Errors: as vsh_model_read(). */
 vsh_result vshi_assimp_read(vshi_assimp *file, size_t units, vsh_model **model, vsh_error *error);

@@ -7,6 +7,7 @@
 #include "base/try.h"
 #include "model/gltf.h"
 #include "model/obj.h"
+#include "model/text.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -111,26 +112,6 @@ bool vshi_is_gltf(const char *path) {
     return strcasecmp(ending, "gltf") == 0 || strcasecmp(ending, "glb") == 0;
 }
 
-/* The whole file in new memory, to be freed after an error too. */
-static vsh_result load_file(const char *path, const vsh_run *run, char **text, size_t *size,
-                            vsh_error *error) {
-    FILE *file;
-    uint64_t bytes;
-    vsh_result result;
-    VSHI_TRY(vshi_input_open(path, path, SIZE_MAX / 2, &file, &bytes, error));
-    *size = (size_t)bytes;
-    VSHI_TRY_DONE(bytes > 0 ? vshi_check_limit(run, PEAK_BYTES_A_BYTE * (double)bytes, path, error)
-                            : vshi_fail(error, VSH_ERROR_READ, "%s: is empty", path));
-    VSHI_TRY_DONE(vshi_take_pages((void **)text, *size, path, error));
-    if (fread(*text, 1, *size, file) != *size) {
-        result = vshi_fail(error, VSH_ERROR_READ, "%s: %s", path,
-                           ferror(file) ? strerror(errno) : "became shorter while it was read");
-    }
-done:
-    fclose(file);
-    return result;
-}
-
 typedef struct reading {
     const char *path;
     const vsh_run *run;
@@ -140,24 +121,24 @@ typedef struct reading {
 
 /* Loads a file whole. Reads it if it is a glTF, else looks over it for Assimp. */
 static vsh_result read_text(const reading *r, vshi_assimp *assimp, vsh_error *error) {
-    char *text = NULL;
-    size_t size;
+    vshi_budget budget = {r->path, r->run, 0.0};
+    vshi_text text;
     vsh_result result;
-    VSHI_TRY_DONE(load_file(r->path, r->run, &text, &size, error));
-    VSHI_TRY_DONE(vshi_is_gltf(r->path) ? vshi_gltf_read(r->path, text, size, r->run, r->job, r->model, error)
-                                        : vshi_assimp_look(assimp, text, size, error));
-    if (vshi_job_advance(r->job, SCAN_UNITS - assimp->units_done)) {
-        result = vshi_job_fail_cancelled(r->job, error);
-    }
+    VSHI_TRY_DONE(vshi_text_read(&text, r->path, r->path, &budget, r->job, SCAN_UNITS, error));
+    VSHI_TRY_DONE(vshi_check_limit(r->run, PEAK_BYTES_A_BYTE * (double)text.size, r->path, error));
+    VSHI_TRY_DONE(vshi_is_gltf(r->path)
+                      ? vshi_gltf_read(r->path, text.bytes, text.size, r->run, r->job, r->model, error)
+                      : vshi_assimp_look(assimp, &text, error));
+    VSHI_TRY_DONE(vshi_text_poll(&text, text.bytes + text.size, error));
 done:
-    free(text);
+    vshi_text_free(&text);
     return result;
 }
 
 static vsh_result read_file(void *user, vsh_error *error) {
     const reading *r = user;
     const char *ending = NULL;
-    vshi_assimp assimp = {.path = r->path, .run = r->run, .job = r->job, .units = SCAN_UNITS};
+    vshi_assimp assimp = {.path = r->path, .run = r->run, .job = r->job};
     struct stat status;
     /* A missing file is that first, whatever its ending. */
     if (stat(r->path, &status) != 0) {

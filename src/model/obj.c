@@ -469,7 +469,7 @@ static inline vsh_result resolve(vshi_obj *obj, int kind, int64_t index, uint32_
  * found at its end. */
 static vsh_result reach_head(vshi_obj *obj, size_t place, bool *there, vsh_error *error) {
     enum { LEAST_BYTES = 7 }; /* of a vertex: "v 0 0 0" */
-    *there = place <= obj->stream.size / LEAST_BYTES && place < UINT32_MAX;
+    *there = place <= obj->text.size / LEAST_BYTES && place < UINT32_MAX;
     if (!*there || place <= obj->head_count) {
         return VSH_OK;
     }
@@ -611,24 +611,16 @@ static vsh_result read_statement(vshi_obj *obj, const char **at, vsh_error *erro
 
 static vsh_result read_statements(vshi_obj *obj, vsh_error *error) {
     static const char mark[3] = {'\xef', '\xbb', '\xbf'};
-    for (;;) {
-        const char *stop;
-        VSHI_TRY(vshi_stream_lines(&obj->stream, &stop, error));
-        const char *c = obj->stream.at;
-        if (c == stop) {
-            return VSH_OK;
-        }
-        if (obj->line == 1 && stop - c >= (ptrdiff_t)sizeof mark && memcmp(c, mark, sizeof mark) == 0) {
-            c += sizeof mark;
-        }
-        while (c < stop) {
-            obj->statement = obj->line;
-            c = skip_blanks(obj, c);
-            VSHI_TRY(read_statement(obj, &c, error));
-            c = skip_line(obj, c);
-        }
-        obj->stream.at = stop;
+    const char *c = obj->text.bytes, *end = c + obj->text.size;
+    c += memcmp(c, mark, sizeof mark) == 0 ? sizeof mark : 0;
+    while (c < end) {
+        VSHI_TRY(vshi_text_poll(&obj->text, c, error));
+        obj->statement = obj->line;
+        c = skip_blanks(obj, c);
+        VSHI_TRY(read_statement(obj, &c, error));
+        c = skip_line(obj, c);
     }
+    return vshi_text_poll(&obj->text, end, error);
 }
 
 static vsh_result check_indices(const vshi_obj *obj, vsh_error *error) {
@@ -656,17 +648,17 @@ vsh_result vshi_obj_read(const char *path, const vsh_run *run, vshi_job *job, si
                     .group = SIZE_MAX};
     vsh_model *made = NULL;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_stream_open(&obj.stream, path, &obj.budget, job, units, error));
+    VSHI_TRY_DONE(vshi_text_read(&obj.text, path, path, &obj.budget, job, units, error));
     VSHI_TRY_DONE(read_statements(&obj, error));
     VSHI_TRY_DONE(check_indices(&obj, error));
-    vshi_stream_close(&obj.stream);
+    vshi_text_free(&obj.text);
     VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, path, error));
     VSHI_TRY_DONE(build_model(&obj, made, error));
     *model = made;
     made = NULL;
 done:
     vsh_model_free(made);
-    vshi_stream_close(&obj.stream);
+    vshi_text_free(&obj.text);
     vshi_words_free(&obj.materials);
     vshi_words_free(&obj.names);
     vshi_faces_free(&obj.faces);

@@ -5,7 +5,7 @@
 
 #include "model/faces.h"
 #include "model/model.h"
-#include "model/stream.h"
+#include "model/text.h"
 
 #include <stdbool.h>
 
@@ -54,7 +54,7 @@ typedef struct vshi_obj {
     const vsh_run *run;
     vshi_job *job;
     vshi_budget budget;
-    vshi_stream stream;
+    vshi_text text;
     size_t line, statement; /* from 1: where the statement goes on, and begins */
     vshi_obj_values kinds[VSHI_OBJ_KINDS];
     uint32_t *heads; /* by place: the latest vertex there, + 1 */

@@ -146,7 +146,7 @@ char *vshi_mtl_map_path(const char *path, vshi_token name) {
 }
 
 /* `d` is the opacity, Tr what is missing of it. "d -halo 0.5" is less where it is seen from the side. */
-static vsh_result take_opacity(const vshi_stream *stream, size_t line, vshi_token keyword, const char *at,
+static vsh_result take_opacity(const char *mtl, size_t line, vshi_token keyword, const char *at,
                                const char *end, double *opacity, vsh_error *error) {
     vshi_token value = vshi_scan_token(&at, end);
     if (vshi_token_is(value, "-halo")) {
@@ -158,7 +158,7 @@ static vsh_result take_opacity(const vshi_stream *stream, size_t line, vshi_toke
     float number;
     if (vshi_decimal_float(value.text, &number) != value.text + value.size || !isfinite(number)) {
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: line %zu: '%.*s' is '%.*s', expected a finite number",
-                         stream->path, line, VSHI_TOKEN_ARGS(keyword), VSHI_TOKEN_ARGS(value));
+                         mtl, line, VSHI_TOKEN_ARGS(keyword), VSHI_TOKEN_ARGS(value));
     }
     number = keyword.text[0] == 'd' ? number : 1.0F - number;
     *opacity = number < 0.0F ? 0.0 : number < 1.0F ? (double)number : 1.0;
@@ -166,8 +166,8 @@ static vsh_result take_opacity(const vshi_stream *stream, size_t line, vshi_toke
 }
 
 /* What cannot be had of a texture leaves the material as it is without: the mesh is there all the same. */
-static vsh_result take_map(vshi_obj *obj, const vshi_stream *stream, size_t line, const char *at,
-                           const char *end, vsh_error *error) {
+static vsh_result take_map(vshi_obj *obj, const char *mtl, size_t line, const char *at, const char *end,
+                           vsh_error *error) {
     enum { LONGEST = 1023 };
     vshi_obj_alpha *alpha = &obj->alphas[obj->material];
     vshi_mtl_map map;
@@ -182,7 +182,7 @@ static vsh_result take_map(vshi_obj *obj, const vshi_stream *stream, size_t line
             obj->run,
             "%s: line %zu: 'map_d' has the option '%s', which is unknown or lacks its value; its mask is "
             "ignored",
-            stream->path, line, option);
+            mtl, line, option);
         return VSH_OK;
     }
     if (map.name.text == NULL) {
@@ -190,20 +190,20 @@ static vsh_result take_map(vshi_obj *obj, const vshi_stream *stream, size_t line
     }
     if (!taken) {
         vshi_warn(obj->run, "%s: line %zu: 'map_d' is read without its option '%s'; apply it to the image",
-                  stream->path, line, option);
+                  mtl, line, option);
     }
-    char *path = vshi_mtl_map_path(stream->path, map.name);
+    char *path = vshi_mtl_map_path(mtl, map.name);
     if (path == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stream->path);
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", mtl);
     }
     vsh_result result = VSH_OK;
     if (strlen(path) > LONGEST || memchr(map.name.text, '\0', map.name.size) != NULL) {
-        vshi_warn(obj->run, "%s: line %zu: 'map_d' names no file; its mask is ignored", stream->path, line);
+        vshi_warn(obj->run, "%s: line %zu: 'map_d' names no file; its mask is ignored", mtl, line);
     } else if (obj->run->allow_outside == 0 && !vshi_input_is_beside(obj->path, path)) {
         vshi_warn(obj->run,
                   "%s: line %zu: 'map_d' names '%.400s' outside of the model's folder; its mask is ignored; "
                   "--allow-outside reads it",
-                  stream->path, line, path);
+                  mtl, line, path);
     } else {
         result =
             vshi_words_number(&obj->images, &obj->budget, path, strlen(path), &alpha->image, &is_new, error);
@@ -217,8 +217,8 @@ static vsh_result take_map(vshi_obj *obj, const vshi_stream *stream, size_t line
     return result;
 }
 
-static vsh_result take_line(vshi_obj *obj, const vshi_stream *stream, size_t line, const char *at,
-                            const char *end, vsh_error *error) {
+static vsh_result take_line(vshi_obj *obj, const char *mtl, size_t line, const char *at, const char *end,
+                            vsh_error *error) {
     static const char unnamed[] = "DefaultMaterial";
     const vshi_token keyword = vshi_scan_token(&at, end);
     if (vshi_token_is(keyword, "newmtl")) {
@@ -236,28 +236,22 @@ static vsh_result take_line(vshi_obj *obj, const vshi_stream *stream, size_t lin
         return VSH_OK;
     }
     if (vshi_token_is(keyword, "map_d")) {
-        return take_map(obj, stream, line, at, end, error);
+        return take_map(obj, mtl, line, at, end, error);
     }
     return vshi_token_is(keyword, "d") || vshi_token_is(keyword, "Tr")
-               ? take_opacity(stream, line, keyword, at, end, &obj->alphas[obj->material].opacity, error)
+               ? take_opacity(mtl, line, keyword, at, end, &obj->alphas[obj->material].opacity, error)
                : VSH_OK;
 }
 
-static vsh_result take_lines(vshi_obj *obj, vshi_stream *stream, vsh_error *error) {
-    const char *stop;
-    size_t line = 0;
-    for (;;) {
-        VSHI_TRY(vshi_stream_lines(stream, &stop, error));
-        if (stream->at == stop) {
-            return VSH_OK;
-        }
-        while (stream->at < stop) {
-            const char *end = memchr(stream->at, '\n', (size_t)(stop - stream->at));
-            end = end != NULL ? end : stop;
-            VSHI_TRY(take_line(obj, stream, ++line, stream->at, end, error));
-            stream->at = end < stop ? end + 1 : stop;
-        }
+static vsh_result take_lines(vshi_obj *obj, vshi_text *text, vsh_error *error) {
+    const char *at = text->bytes, *stop = at + text->size, *end;
+    for (size_t line = 1; at < stop; ++line, at = end + 1) {
+        end = memchr(at, '\n', (size_t)(stop - at));
+        end = end != NULL ? end : stop;
+        VSHI_TRY(vshi_text_poll(text, at, error));
+        VSHI_TRY(take_line(obj, text->path, line, at, end, error));
     }
+    return VSH_OK;
 }
 
 /* Reads one where it is a regular file, which *found tells. */
@@ -273,15 +267,15 @@ static vsh_result read_file(vshi_obj *obj, const char *path, bool *found, vsh_er
     if (!*found || status.st_size == 0) {
         return VSH_OK;
     }
-    vshi_stream stream;
-    vsh_result result = vshi_stream_open(&stream, path, &obj->budget, obj->job, 0, error);
+    vshi_text text;
+    vsh_result result = vshi_text_read(&text, path, path, &obj->budget, obj->job, 0, error);
     if (result == VSH_OK) {
-        result = take_lines(obj, &stream, error);
+        result = take_lines(obj, &text, error);
     } else if (result == VSH_ERROR_READ) {
         *found = false; /* as if it were not there */
         result = VSH_OK;
     }
-    vshi_stream_close(&stream);
+    vshi_text_free(&text);
     return result;
 }
 

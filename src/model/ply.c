@@ -7,7 +7,7 @@
 #include "base/try.h"
 #include "model/faces.h"
 #include "model/model.h"
-#include "model/stream.h"
+#include "model/text.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -34,7 +34,7 @@ typedef struct ply_reader {
     const vsh_run *run;
     vshi_job *job;
     vshi_budget budget;
-    vshi_stream stream;
+    vshi_text text;
     vshi_ply_header head;
     int8_t roles[VSHI_PLY_PROPERTIES];
     const vshi_ply_element *element;
@@ -115,7 +115,7 @@ static vsh_result describe(ply_reader *r, const vshi_ply_element *element, vsh_e
         r->has_uvs = r->has_uvs || role == VSHI_PLY_U || role == VSHI_PLY_U + 1;
     }
     r->vertices = vertex && !again ? element->count : r->vertices;
-    if (r->vertices > UINT32_MAX && r->vertices > r->stream.size) {
+    if (r->vertices > UINT32_MAX && r->vertices > r->text.size) {
         return VSH_OK; /* the file is too short for them, which is found where it ends */
     }
     return r->vertices > UINT32_MAX
@@ -126,17 +126,15 @@ static vsh_result describe(ply_reader *r, const vshi_ply_element *element, vsh_e
 
 static vsh_result read_header(ply_reader *r, vsh_error *error) {
     vshi_ply_header *head = &r->head;
+    r->at = r->text.bytes;
+    r->end = r->at + r->text.size;
     while (!head->ended) {
-        const char *at = r->stream.at;
-        const char *stop = at < r->stream.end ? memchr(at, '\n', (size_t)(r->stream.end - at)) : NULL;
-        if (stop != NULL) {
-            VSHI_TRY(vshi_ply_header_line(head, r->path, at, (size_t)(stop - at), error));
-            r->stream.at = stop + 1;
-        } else if (vshi_stream_ended(&r->stream)) {
+        const char *stop = r->at < r->end ? memchr(r->at, '\n', (size_t)(r->end - r->at)) : NULL;
+        if (stop == NULL) {
             return vshi_ply_fail_header(r->path, error);
-        } else {
-            VSHI_TRY(vshi_stream_fill(&r->stream, error));
         }
+        VSHI_TRY(vshi_ply_header_line(head, r->path, r->at, (size_t)(stop - r->at), error));
+        r->at = stop + 1;
     }
     for (int e = 0; e < head->elements; ++e) {
         VSHI_TRY(describe(r, &head->element[e], error));
@@ -170,10 +168,8 @@ static bool fail(ply_reader *r, vsh_result result) {
     return false;
 }
 
-/* The window ends: what it lacks may be there yet. */
-static bool want_more(ply_reader *r) {
-    return vshi_stream_ended(&r->stream) ? fail(r, vshi_ply_fail_short(r->path, r->element, r->row, r->error))
-                                         : false;
+static bool fail_short(ply_reader *r) {
+    return fail(r, vshi_ply_fail_short(r->path, r->element, r->row, r->error));
 }
 
 static bool fail_value(ply_reader *r, vshi_token token, const char *expected) {
@@ -243,10 +239,9 @@ static void push_number(ply_reader *r, int role, float number) {
 
 /* --- text */
 
-/* The next token; one that the window's end may have cut is none yet. */
 static bool next_token(ply_reader *r, vshi_token *token) {
     *token = vshi_scan_token(&r->at, r->end);
-    return token->text != NULL && (r->at < r->end || vshi_stream_ended(&r->stream)) ? true : want_more(r);
+    return token->text != NULL ? true : fail_short(r);
 }
 
 static bool take_text(ply_reader *r, int role) {
@@ -312,13 +307,13 @@ static bool take_binary_property(ply_reader *r, const vshi_ply_property *propert
     if (property->count_type >= 0) {
         const int count_size = vshi_ply_size(property->count_type);
         if (r->end - r->at < count_size) {
-            return want_more(r);
+            return fail_short(r);
         }
         values = vshi_bytes_number(r->at, count_size, big);
         r->at += count_size;
     }
     if (values > (uint64_t)(r->end - r->at) / (uint64_t)size) {
-        return want_more(r);
+        return fail_short(r);
     }
     const char *at = r->at;
     r->at += values * (uint64_t)size;
@@ -332,21 +327,18 @@ static bool take_binary_property(ply_reader *r, const vshi_ply_property *propert
     return true;
 }
 
-/* Reads the row at `at` into the reader's members, and its corners behind those of `faces`. Returns behind
- * it; NULL: it failed, or (reader->failed is VSH_OK) the window ends within it. */
-static const char *read_row(ply_reader *r, const char *at, vsh_error *error) {
-    r->at = at;
-    r->end = r->stream.end;
+/* Reads a row into the reader's members, and its corners behind those of `faces`. */
+static vsh_result read_row(ply_reader *r, vsh_error *error) {
     r->error = error;
     r->corners = r->texcoords = r->length = 0;
     for (int p = r->element->first; p < r->element->end; ++p) {
         const vshi_ply_property *property = &r->head.property[p];
         if (!(r->head.ascii ? take_text_property(r, property, r->roles[p])
                             : take_binary_property(r, property, r->roles[p]))) {
-            return NULL;
+            return r->failed;
         }
     }
-    return r->at;
+    return VSH_OK;
 }
 
 /* Texture coordinates of a face's corners are those of its vertices: the last face's count. */
@@ -355,7 +347,7 @@ static vsh_result keep_texcoords(ply_reader *r, const uint32_t *corners, vsh_err
     if (r->texcoords < LEAST || r->texcoords > VSHI_PLY_MOST_TEXCOORDS || r->corners < r->texcoords / 2) {
         return VSH_OK;
     }
-    if (r->uvs == NULL && r->vertices <= r->stream.size) { /* else the file is too short for them */
+    if (r->uvs == NULL && r->vertices <= r->text.size) { /* else the file is too short for them */
         VSHI_TRY(
             vshi_reserve(&r->budget, &r->uvs, &r->uv_capacity, (size_t)r->vertices, sizeof(float[2]), error));
         memset(r->uvs, 0, r->uv_capacity * sizeof(float[2]));
@@ -399,17 +391,10 @@ static int role_of_rows(const ply_reader *r) {
 static vsh_result read_element(ply_reader *r, vsh_error *error) {
     const int role = role_of_rows(r);
     memset(r->number, 0, sizeof r->number);
-    for (r->row = 0; r->row < r->element->count;) {
-        const char *next = read_row(r, r->stream.at, error);
-        if (next != NULL) {
-            VSHI_TRY(keep_row(r, role, error));
-            r->stream.at = next;
-            ++r->row;
-        } else if (r->failed != VSH_OK) {
-            return r->failed;
-        } else {
-            VSHI_TRY(vshi_stream_fill(&r->stream, error));
-        }
+    for (r->row = 0; r->row < r->element->count; ++r->row) {
+        VSHI_TRY(vshi_text_poll(&r->text, r->at, error));
+        VSHI_TRY(read_row(r, error));
+        VSHI_TRY(keep_row(r, role, error));
     }
     return VSH_OK;
 }
@@ -464,20 +449,21 @@ vsh_result vshi_ply_read(const char *path, const vsh_run *run, vshi_job *job, si
     ply_reader r = {.path = path, .run = run, .job = job, .budget = {path, run, 0.0}};
     vsh_model *made = NULL;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_stream_open(&r.stream, path, &r.budget, job, units, error));
+    VSHI_TRY_DONE(vshi_text_read(&r.text, path, path, &r.budget, job, units, error));
     VSHI_TRY_DONE(read_header(&r, error));
     for (int e = 0; e < r.head.elements; ++e) {
         r.element = &r.head.element[e];
         VSHI_TRY_DONE(r.element->first < r.element->end ? read_element(&r, error) : VSH_OK);
     }
-    vshi_stream_close(&r.stream);
+    VSHI_TRY_DONE(vshi_text_poll(&r.text, r.end, error));
+    vshi_text_free(&r.text);
     VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, path, error));
     VSHI_TRY_DONE(build(&r, made, error));
     *model = made;
     made = NULL;
 done:
     vsh_model_free(made);
-    vshi_stream_close(&r.stream);
+    vshi_text_free(&r.text);
     vshi_faces_free(&r.faces);
     free(r.uvs);
     free(r.normals);

@@ -1,7 +1,6 @@
-/* Reads a file piece by piece. The piece in memory fits the processor's cache, and is no larger than the
- * longest line or row needs. */
-#ifndef VSHI_STREAM_H
-#define VSHI_STREAM_H
+/* A file of text: its bytes, memory that it takes, names and tokens in it. */
+#ifndef VSHI_TEXT_H
+#define VSHI_TEXT_H
 
 #include "base/job.h"
 
@@ -9,7 +8,6 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-#include <stdio.h>
 
 /* --- arrays that grow as a file is read, within the memory limit */
 
@@ -32,42 +30,26 @@ vsh_result vshi_reserve(vshi_budget *budget, void *memory, size_t *capacity, siz
 
 /* --- the file */
 
-/* Advances a job to `fraction` of `units`; *units_done counts those it has advanced. Returns whether it is
- * cancelled. */
-bool vshi_advance_to(vshi_job *job, double fraction, size_t units, size_t *units_done);
-
-/* A window over the file; zeros before it is opened. */
-typedef struct vshi_stream {
+/* A file in memory; zeros before it is read. */
+typedef struct vshi_text {
     const char *path;
     vshi_budget *budget;
     vshi_job *job;
-    size_t units, units_done; /* of the job: for the whole file; told so far */
-    FILE *file;
-    uint64_t size, read; /* bytes of the file; of them read */
-    char *buffer;
-    size_t capacity;
-    const char *at, *end; /* what is there, of which the caller moves `at`; line ends stand behind `end` */
-} vshi_stream;
+    size_t units, units_done; /* of the job: for the whole text; told so far */
+    char *bytes;              /* [size], and 16 line ends behind them, of which no file tells */
+    size_t size, capacity;
+    const char *next_poll;
+} vshi_text;
 
-enum { VSHI_STREAM_PADDING = 16 }; /* line ends, of which no file tells */
+/* Reads the file, which messages call `name`. `path`, budget and job outlive the text. Errors: VSH_ERROR_READ
+ * (also where it is empty), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Free after a failure too. */
+vsh_result vshi_text_read(vshi_text *text, const char *path, const char *name, vshi_budget *budget,
+                          vshi_job *job, size_t units, vsh_error *error);
+void vshi_text_free(vshi_text *text);
 
-/* `path`, budget and job outlive the stream. Errors: VSH_ERROR_READ (also where it is empty),
- * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Close after a failure too. */
-vsh_result vshi_stream_open(vshi_stream *stream, const char *path, vshi_budget *budget, vshi_job *job,
-                            size_t units, vsh_error *error);
-void vshi_stream_close(vshi_stream *stream);
-
-static inline bool vshi_stream_ended(const vshi_stream *stream) {
-    return stream->read == stream->size;
-}
-
-/* Reads on behind what is there; pointers into the window no longer hold. At the file's end it does nothing.
- * Errors: VSH_ERROR_READ, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-vsh_result vshi_stream_fill(vshi_stream *stream, vsh_error *error);
-
-/* Reads on until at … *stop - 1 is whole lines, that end in no '\' (which goes on in the next), or the rest
- * of the file; at == *stop: it is over. */
-vsh_result vshi_stream_lines(vshi_stream *stream, const char **stop, vsh_error *error);
+/* Tells the job, from time to time, that all in front of `at` has been parsed. Errors: VSH_ERROR_CANCELLED.
+ */
+vsh_result vshi_text_poll(vshi_text *text, const char *at, vsh_error *error);
 
 /* --- names, each stored once */
 

@@ -1,5 +1,5 @@
 #define _GNU_SOURCE
-#include "model/stream.h"
+#include "model/text.h"
 
 #include "base/decimal.h"
 #include "base/input.h"
@@ -7,10 +7,10 @@
 #include "base/try.h"
 
 #include <errno.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <unistd.h>
 
 vsh_result vshi_reserve(vshi_budget *budget, void *memory, size_t *capacity, size_t needed, size_t size,
                         vsh_error *error) {
@@ -77,101 +77,48 @@ void vshi_words_free(vshi_words *words) {
     *words = (vshi_words){0};
 }
 
-enum { PIECE = 1 << 18 }; /* bytes: half of a second-level cache */
-
-bool vshi_advance_to(vshi_job *job, double fraction, size_t units, size_t *units_done) {
-    const size_t reached = (size_t)(fraction * (double)units);
-    const size_t more = reached > *units_done ? reached - *units_done : 0;
-    *units_done += more;
-    return vshi_job_advance(job, more);
+vsh_result vshi_text_read(vshi_text *text, const char *path, const char *name, vshi_budget *budget,
+                          vshi_job *job, size_t units, vsh_error *error) {
+    enum { PADDING = 16 };
+    FILE *file;
+    uint64_t bytes;
+    vsh_result result;
+    *text = (vshi_text){.path = path, .budget = budget, .job = job, .units = units};
+    VSHI_TRY(vshi_input_open(path, name, SIZE_MAX / 4, &file, &bytes, error));
+    VSHI_TRY_DONE(bytes > 0
+                      ? vshi_reserve(budget, &text->bytes, &text->capacity, (size_t)bytes + PADDING, 1, error)
+                      : vshi_fail(error, VSH_ERROR_READ, "%s: is empty", name));
+    text->size = (size_t)bytes;
+    if (fread(text->bytes, 1, text->size, file) != text->size) {
+        result = vshi_fail(error, VSH_ERROR_READ, "%s: %s", name,
+                           ferror(file) ? strerror(errno) : "became shorter while it was read");
+    }
+    memset(text->bytes + text->size, '\n', PADDING);
+    text->next_poll = text->bytes;
+done:
+    fclose(file);
+    return result;
 }
 
-vsh_result vshi_stream_open(vshi_stream *stream, const char *path, vshi_budget *budget, vshi_job *job,
-                            size_t units, vsh_error *error) {
-    *stream = (vshi_stream){.path = path, .budget = budget, .job = job, .units = units};
-    VSHI_TRY(vshi_input_open(path, path, SIZE_MAX / 4, &stream->file, &stream->size, error));
-    if (stream->size == 0) {
-        return vshi_fail(error, VSH_ERROR_READ, "%s: is empty", path);
+void vshi_text_free(vshi_text *text) {
+    free(text->bytes);
+    if (text->budget != NULL) {
+        text->budget->bytes -= (double)text->capacity;
     }
-    const size_t bytes = stream->size < PIECE ? (size_t)stream->size : PIECE;
-    VSHI_TRY(vshi_reserve(budget, &stream->buffer, &stream->capacity, bytes + VSHI_STREAM_PADDING, 1, error));
-    stream->at = stream->end = stream->buffer;
-    return VSH_OK;
+    *text = (vshi_text){0};
 }
 
-void vshi_stream_close(vshi_stream *stream) {
-    if (stream->file != NULL) {
-        fclose(stream->file);
-    }
-    free(stream->buffer);
-    if (stream->budget != NULL) {
-        stream->budget->bytes -= (double)stream->capacity;
-    }
-    *stream = (vshi_stream){0};
-}
-
-/* Moves what is there to the front, and makes room behind it. */
-static vsh_result make_room(vshi_stream *stream, vsh_error *error) {
-    const size_t left = (size_t)(stream->end - stream->at), offset = (size_t)(stream->at - stream->buffer);
-    if (offset == 0 && stream->end != stream->buffer) { /* one line or row: it is longer than the window */
-        VSHI_TRY(
-            vshi_reserve(stream->budget, &stream->buffer, &stream->capacity, 2 * stream->capacity, 1, error));
-    }
-    memmove(stream->buffer, stream->buffer + offset, left);
-    stream->at = stream->buffer;
-    stream->end = stream->buffer + left;
-    return VSH_OK;
-}
-
-vsh_result vshi_stream_fill(vshi_stream *stream, vsh_error *error) {
-    if (vshi_stream_ended(stream)) {
+vsh_result vshi_text_poll(vshi_text *text, const char *at, vsh_error *error) {
+    enum { PIECE = 1 << 18 };
+    if (at < text->next_poll && at < text->bytes + text->size) {
         return VSH_OK;
     }
-    VSHI_TRY(make_room(stream, error));
-    const size_t used = (size_t)(stream->end - stream->buffer);
-    const size_t room = stream->capacity - VSHI_STREAM_PADDING - used;
-    const uint64_t rest = stream->size - stream->read;
-    ssize_t got;
-    do {
-        got = read(fileno(stream->file), stream->buffer + used, rest < room ? (size_t)rest : room);
-    } while (got < 0 && errno == EINTR);
-    if (got <= 0) {
-        return vshi_fail(error, VSH_ERROR_READ, "%s: %s", stream->path,
-                         got < 0 ? strerror(errno) : "became shorter while it was read");
-    }
-    stream->read += (uint64_t)got;
-    stream->end += got;
-    memset(stream->buffer + used + got, '\n', VSHI_STREAM_PADDING);
-    return vshi_advance_to(stream->job, (double)stream->read / (double)stream->size, stream->units,
-                           &stream->units_done)
-               ? vshi_job_fail_cancelled(stream->job, error)
-               : VSH_OK;
-}
-
-/* Behind the last line that does not go on in the next; NULL: there is none. */
-static const char *last_line(const char *begin, const char *end) {
-    while (end > begin) {
-        const char *stop = memrchr(begin, '\n', (size_t)(end - begin));
-        if (stop == NULL) {
-            return NULL;
-        }
-        const char *last = stop > begin && stop[-1] == '\r' ? stop - 1 : stop;
-        if (last == begin || last[-1] != '\\') {
-            return stop + 1;
-        }
-        end = stop;
-    }
-    return NULL;
-}
-
-vsh_result vshi_stream_lines(vshi_stream *stream, const char **stop, vsh_error *error) {
-    for (;;) {
-        *stop = vshi_stream_ended(stream) ? stream->end : last_line(stream->at, stream->end);
-        if (*stop != NULL) {
-            return VSH_OK;
-        }
-        VSHI_TRY(vshi_stream_fill(stream, error));
-    }
+    const double fraction = (double)(at - text->bytes) / (double)text->size;
+    const size_t reached = (size_t)(fraction * (double)text->units);
+    const size_t more = reached > text->units_done ? reached - text->units_done : 0;
+    text->next_poll = at + PIECE;
+    text->units_done += more;
+    return vshi_job_advance(text->job, more) ? vshi_job_fail_cancelled(text->job, error) : VSH_OK;
 }
 
 /* --- tokens */
