@@ -158,9 +158,7 @@ vsh_result vshi_serve_draco(const char *path, vshi_decoder *request, const vsh_r
         vshi_encode_count(payload, draco->attribute_count);
         for (size_t k = 0; k < draco->attribute_count; ++k) {
             const vshi_lit_draco_attribute *attribute = &draco->attributes[k];
-            vshi_encode_count(payload, attribute->id);
-            vshi_encode_count(payload, (uint64_t)attribute->type);
-            vshi_encode_count(payload, (uint64_t)attribute->components);
+            vshi_encode_array(payload, attribute, 1, sizeof *attribute);
             vshi_encode_array(payload, attribute->values, draco->vertex_count,
                               (size_t)attribute->components * vshi_gltf_component_size(attribute->type));
         }
@@ -193,10 +191,13 @@ static vsh_result take_decoded(vshi_decoder *decoder, const char *path, vshi_lit
     VSHI_TRY(vshi_allocate((void **)&draco->attributes, count, sizeof *draco->attributes, path, error));
     for (; draco->attribute_count < count; ++draco->attribute_count) {
         vshi_lit_draco_attribute *attribute = &draco->attributes[draco->attribute_count];
-        attribute->id = vshi_decode_count(decoder, UINT32_MAX);
-        attribute->type = (int)vshi_decode_count(decoder, VSHI_GLTF_FLOAT);
-        attribute->components = (int)vshi_decode_count(decoder, 4);
-        const size_t size = (size_t)attribute->components * vshi_gltf_component_size(attribute->type);
+        const vshi_lit_draco_attribute *given = vshi_decode_array(decoder, 1, sizeof *given);
+        if (given == NULL || given->components < 0 || given->components > 4) {
+            return vshi_answer_fail(path, "a decoded attribute", error);
+        }
+        *attribute = *given;
+        attribute->values = NULL;
+        const size_t size = (size_t)given->components * vshi_gltf_component_size(given->type);
         const void *values = size > 0 ? vshi_decode_array(decoder, draco->vertex_count, size) : NULL;
         if (decoder->bad || (values == NULL && draco->vertex_count > 0)) {
             return vshi_answer_fail(path, "a decoded attribute", error);

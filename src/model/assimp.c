@@ -258,18 +258,6 @@ static vsh_result copy_faces(const vshi_assimp *source, const struct aiMesh *mes
     return result;
 }
 
-static int32_t alpha_of(const struct aiScene *scene, const struct aiMesh *mesh) {
-    return mesh->mMaterialIndex < scene->mNumMaterials &&
-                   vshi_importers()->opacity(scene, mesh->mMaterialIndex) < 1.0F
-               ? VSH_ALPHA_BLENDED
-               : VSH_ALPHA_OPAQUE;
-}
-
-/* STL's normals are those of its facets, often zero or wrong: the triangles know better. */
-static bool wants_normals(const char *path) {
-    return strcasecmp(vshi_path_ending(path), "stl") != 0;
-}
-
 static vsh_result copy_shape(const vshi_assimp *source, const struct aiMesh *mesh, vshi_model_shape *shape,
                              vsh_error *error) {
     const char *what = source->path;
@@ -279,13 +267,16 @@ static vsh_result copy_shape(const vshi_assimp *source, const struct aiMesh *mes
     if (shape->triangle_count == 0) {
         return VSH_OK; /* points or lines */
     }
-    shape->alpha = alpha_of(source->scene, mesh);
-    shape->material =
-        mesh->mMaterialIndex < source->scene->mNumMaterials ? (int32_t)mesh->mMaterialIndex + 1 : 0;
+    if (mesh->mMaterialIndex < source->scene->mNumMaterials) {
+        const float opacity = vshi_importers()->opacity(source->scene, mesh->mMaterialIndex);
+        shape->alpha = opacity < 1.0F ? VSH_ALPHA_BLENDED : VSH_ALPHA_OPAQUE;
+        shape->material = (int32_t)mesh->mMaterialIndex + 1;
+    }
     VSHI_TRY(vshi_allocate((void **)&shape->positions, count, sizeof(float[3]), what, error));
     VSHI_TRY(
         vshi_allocate((void **)&shape->indices, shape->triangle_count, sizeof(uint32_t[3]), what, error));
-    if (mesh->mNormals != NULL && wants_normals(source->path)) {
+    /* STL's normals are those of its facets, often zero or wrong: the triangles know better */
+    if (mesh->mNormals != NULL && strcasecmp(vshi_path_ending(source->path), "stl") != 0) {
         VSHI_TRY(vshi_allocate((void **)&shape->normals, count, sizeof(float[3]), what, error));
     }
     for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {

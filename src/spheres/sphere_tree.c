@@ -28,15 +28,22 @@ typedef struct part {
     size_t begin, end;
 } part;
 
-static int longest_axis(double (*sphere)[4], part p) {
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t i = p.begin; i < p.end; ++i) {
-        for (int axis = 0; axis < 3; ++axis) {
-            low[axis] = fmin(low[axis], sphere[i][axis]);
-            high[axis] = fmax(high[axis], sphere[i][axis]);
+/* The box of a part's centres, with `radii` times their radii around them. */
+static void find_box(double (*sphere)[4], part p, double radii, double low[3], double high[3]) {
+    for (int axis = 0; axis < 3; ++axis) {
+        low[axis] = INFINITY;
+        high[axis] = -INFINITY;
+        for (size_t i = p.begin; i < p.end; ++i) {
+            low[axis] = fmin(low[axis], sphere[i][axis] - radii * sphere[i][3]);
+            high[axis] = fmax(high[axis], sphere[i][axis] + radii * sphere[i][3]);
         }
     }
+}
+
+static int longest_axis(double (*sphere)[4], part p) {
+    double low[3], high[3];
     int longest = 0;
+    find_box(sphere, p, 0.0, low, high);
     for (int axis = 1; axis < 3; ++axis) {
         longest = high[axis] - low[axis] > high[longest] - low[longest] ? axis : longest;
     }
@@ -103,13 +110,8 @@ static size_t cut(double (*sphere)[4], part all, part parts[VSHI_BALLS]) {
 /* A sphere around a part's spheres, around the middle of their box, from the set's middle. */
 static void bound(const builder *b, part p, vshi_ball_block *block, size_t lane) {
     double(*sphere)[4] = b->made->sphere;
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t i = p.begin; i < p.end; ++i) {
-        for (int axis = 0; axis < 3; ++axis) {
-            low[axis] = fmin(low[axis], sphere[i][axis] - sphere[i][3]);
-            high[axis] = fmax(high[axis], sphere[i][axis] + sphere[i][3]);
-        }
-    }
+    double low[3], high[3];
+    find_box(sphere, p, 1.0, low, high);
     const vshi_vec centre = {0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])};
     double radius = 0.0;
     for (size_t i = p.begin; i < p.end; ++i) {
@@ -196,10 +198,6 @@ static vsh_result check(const double *spheres, size_t count, const double *trans
 
 static void place(vsh_spheres *made, const double *spheres, const double *transform, double scale) {
     vsh_spheres_info *info = &made->info;
-    for (int axis = 0; axis < 3; ++axis) {
-        info->bounds_min[axis] = INFINITY;
-        info->bounds_max[axis] = -INFINITY;
-    }
     for (size_t i = 0; i < info->count; ++i) {
         double *s = made->sphere[i];
         const vshi_vec p = vshi_transform_point(transform, vshi_vec_of(spheres + 4 * i));
@@ -207,11 +205,8 @@ static void place(vsh_spheres *made, const double *spheres, const double *transf
         s[1] = p.y;
         s[2] = p.z;
         s[3] = scale * spheres[4 * i + 3];
-        for (int axis = 0; axis < 3; ++axis) {
-            info->bounds_min[axis] = fmin(info->bounds_min[axis], s[axis] - s[3]);
-            info->bounds_max[axis] = fmax(info->bounds_max[axis], s[axis] + s[3]);
-        }
     }
+    find_box(made->sphere, (part){0, info->count}, 1.0, info->bounds_min, info->bounds_max);
     for (int axis = 0; axis < 3; ++axis) {
         made->middle[axis] = 0.5 * (info->bounds_min[axis] + info->bounds_max[axis]);
     }

@@ -1,5 +1,4 @@
-/* OBJ: what its statements become, where its file is read piece by piece, and what strangers may write into
- * it. */
+/* OBJ: what its statements become, and what strangers may write into it. */
 #include "models.h"
 #include "testing.h"
 
@@ -66,9 +65,8 @@ TEST(unusual_statements_are_read) {
     vsh_model_free(model);
 }
 
-/* A strip of triangles, larger than the window over the file, with a line longer than it and one that goes
- * on. */
-TEST(files_of_any_length_are_read_piece_by_piece) {
+/* A long strip of triangles, with a very long line and lines that go on. */
+TEST(files_and_lines_of_any_length_are_read) {
     enum { COUNT = 60000, LONG = 700000 };
     char *text = malloc(COUNT * 64 + 2 * LONG), *to = text;
     assert_non_null(text);
