@@ -225,21 +225,12 @@ static vsh_result check_version(const vshi_gltf *gltf, vsh_error *error) {
 
 static vsh_result allocate(vshi_gltf *gltf, vsh_error *error) {
     const size_t meshes = json_array_size(json_object_get(gltf->root, "meshes"));
-    gltf->node_count = json_array_size(json_object_get(gltf->root, "nodes"));
-    const struct {
-        void *memory;
-        size_t count, size;
-    } wanted[] = {
-        {&gltf->mesh_shapes, meshes, sizeof *gltf->mesh_shapes},
-        {&gltf->node_seen, gltf->node_count, sizeof *gltf->node_seen},
-        {&gltf->node_world, gltf->node_count, sizeof *gltf->node_world},
-        {&gltf->visited, gltf->node_count, sizeof *gltf->visited},
-        {&gltf->model, 1, sizeof *gltf->model},
-    };
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; ++i) {
-        VSHI_TRY(vshi_gltf_allocate(gltf, (void **)wanted[i].memory, wanted[i].count, wanted[i].size, error));
-    }
-    return VSH_OK;
+    const size_t nodes = gltf->node_count = json_array_size(json_object_get(gltf->root, "nodes"));
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&gltf->model, 1, sizeof *gltf->model, error));
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&gltf->mesh_shapes, meshes, sizeof *gltf->mesh_shapes, error));
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&gltf->node_seen, nodes, sizeof *gltf->node_seen, error));
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&gltf->node_world, nodes, sizeof *gltf->node_world, error));
+    return vshi_gltf_allocate(gltf, (void **)&gltf->visited, nodes, sizeof *gltf->visited, error);
 }
 
 vsh_result vshi_gltf_open(vshi_gltf *gltf, const char *text, size_t size, vsh_error *error) {

@@ -302,24 +302,23 @@ static vsh_result add_entries(vshi_gltf *gltf, size_t node, size_t mesh, size_t 
                               const double world[12], vsh_error *error) {
     const json_t *given = vshi_gltf_element(gltf, "meshes", mesh);
     const size_t count = json_array_size(json_object_get(given, "primitives"));
-    char node_name[256], mesh_name[256], suffix[32] = "";
+    char node_name[256], mesh_name[256];
     const uint32_t object = vshi_model_next_object(gltf->model);
     name_of("nodes", node, vshi_gltf_element(gltf, "nodes", node), node_name, sizeof node_name);
     name_of("meshes", mesh, given, mesh_name, sizeof mesh_name);
-    if (instance > 0) {
-        snprintf(suffix, sizeof suffix, "[%zu]", instance - 1);
-    }
     for (size_t i = 0; i < count; ++i) {
         if (gltf->model->shapes[first + i].triangle_count == 0) {
             continue;
         }
-        char one[320], part[320];
-        snprintf(one, sizeof one, "%s%s", node_name, suffix);
-        if (count > 1) {
-            snprintf(part, sizeof part, "%s-%zu", mesh_name, i);
-        } else {
-            snprintf(part, sizeof part, "%s", mesh_name);
+        char one[320], part[320], index[32] = "", number[32] = "";
+        if (instance > 0) {
+            snprintf(index, sizeof index, "[%zu]", instance - 1);
         }
+        if (count > 1) {
+            snprintf(number, sizeof number, "-%zu", i);
+        }
+        snprintf(one, sizeof one, "%s%s", node_name, index);
+        snprintf(part, sizeof part, "%s%s", mesh_name, number);
         VSHI_TRY(vshi_gltf_hold(gltf, sizeof(vshi_model_entry) + (double)strlen(one), error));
         const vshi_model_place place = {
             .node = one,
