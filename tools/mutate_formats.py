@@ -182,7 +182,6 @@ FORMATS = [
     image("tif", B + [parts.tiff_entry] * 16, [], ["--bits", "32"], ["--bits", "8"]),
     image("jpg", B + [parts.JPEG] * 10),
     image("hdr", B + T), image("webp", B), image("gif", B), image("tga", B), image("bmp", B), image("dpx", B), image("ppm", B + T),
-    image("sgi", B), image("ico", B), image("rla", B),
     Format("scene", "json", J, SCENE, scenes, None, assets),
     Format("flat", "json", J, [["flat", "IN", "--size", "8", "--threads", "1", "-o", "out.exr"], ["info", "IN"]], flat_scenes, None, assets),
     Format("regress", "json", J, [["regress", "."], ["regress", ".", "--json"], ["regress", ".", "--update"]],

@@ -8,7 +8,7 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
-#include "image/write_plan.h"
+#include "image/planes.h"
 #include "shade/occluders.h"
 #include "shade/shade.h"
 

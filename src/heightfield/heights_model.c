@@ -1,6 +1,7 @@
 /* Heightfields from images, and as triangles: the closed solid that is voxelised, and its top as a receiver.
  */
 #include "heightfield/heights.h"
+#include "image/planes.h"
 
 #include "base/floats.h"
 #include "base/memory.h"
@@ -11,7 +12,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <vdbshade/image.h>
 
 /* --- checked sources */
 
@@ -246,17 +246,9 @@ vsh_result vsh_model_from_heights(const vsh_heights_source *source, int32_t what
 
 /* --- images */
 
-static const float *channel(const vsh_image *image, const char *name) {
-    for (int32_t c = 0; c < image->channel_count; ++c) {
-        if (strcmp(image->names[c], name) == 0) {
-            return image->planes[c];
-        }
-    }
-    return NULL;
-}
-
 static void take_values(const vsh_image *image, size_t count, float *values) {
-    const float *r = channel(image, "R"), *g = channel(image, "G"), *b = channel(image, "B");
+    const float *r = vshi_image_find_plane(image, "R"), *g = vshi_image_find_plane(image, "G"),
+                *b = vshi_image_find_plane(image, "B");
     if (r == NULL || g == NULL || b == NULL) {
         memcpy(values, image->planes[0], count * sizeof *values);
         return;

@@ -5,7 +5,7 @@
 #include "base/memory.h"
 #include "base/srgb.h"
 #include "base/uri.h"
-#include "image/png.h"
+#include "image/codec.h"
 
 #include <math.h>
 #include <stdio.h>

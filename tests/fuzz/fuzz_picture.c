@@ -5,7 +5,7 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static const char *const names[] = {"a.tif", "a.jpg", "a.tga", "a.bmp", "a.hdr", "a.ppm",
-                                        "a.dpx", "a.sgi", "a.rla", "a.ico", "a.gif", "a.psd"};
+                                        "a.dpx", "a.jp2", "a.webp", "a.dds", "a.gif", "a.psd"};
     if (size == 0) {
         return 0;
     }

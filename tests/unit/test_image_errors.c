@@ -58,8 +58,7 @@ TEST(what_a_format_lacks_is_refused) {
         {"x.exr", -1, NULL, "-1"},
         {"x.tif", 12, NULL, "12"},
         {"x.xyz", 0, NULL, "xyz"},
-        {"x.rla", 16, NULL, "rla has 32"},
-        {"x.iff", 16, NULL, "iff has 8"},
+        {"x.hdr", 16, NULL, "hdr has 32"},
         {"x.pgm", 0, "R=ao,G=A", "grey"},
         {"x.pgm", 0, "G=ao", "grey"},
         {"x.pgm", 0, "R=ao,A=1", "alpha"},
@@ -70,6 +69,7 @@ TEST(what_a_format_lacks_is_refused) {
         {"x.pbm", 0, NULL, "is not written: "},
         {"x.zfile", 0, NULL, "is not written: "},
         {"x.heics", 0, NULL, "is not written: "},
+        {"x.sgi", 0, NULL, "is not written: "},
         {"x.sxr", 0, NULL, "is not written: "},
         {"x.null", 0, NULL, "is not written: "},
         {"x.term", 0, NULL, "is not written: "},
@@ -85,7 +85,6 @@ TEST(what_a_format_lacks_is_refused) {
     s.image.width = 70000;
     s.image.height = 1;
     refused(at("x.jpg"), &s.image, 0, NULL, VSH_ERROR_ARGUMENT, "65500");
-    refused(at("x.ico"), &s.image, 0, NULL, VSH_ERROR_ARGUMENT, "255");
     unmake(&s);
 }
 
@@ -138,8 +137,8 @@ TEST(places_that_cannot_be_written_are_refused) {
 }
 
 TEST(cut_files_are_errors) {
-    static const char *const names[] = {"c.exr", "c.png", "c.tif", "c.tga", "c.bmp", "c.hdr",
-                                        "c.ppm", "c.dpx", "c.sgi", "c.rla", "c.ico"};
+    static const char *const names[] = {"c.exr", "c.png", "c.tif", "c.tga",
+                                        "c.bmp", "c.hdr", "c.ppm", "c.dpx"};
     sample s;
     make(&s, 33, 40, 3, LIGHTMAP);
     for (size_t n = 0; n < sizeof names / sizeof names[0]; ++n) {
@@ -174,8 +173,7 @@ TEST(cut_files_are_errors) {
 }
 
 TEST(damaged_files_do_no_harm) {
-    static const char *const names[] = {"b.exr", "b.png", "b.tif", "b.jpg", "b.tga",
-                                        "b.bmp", "b.sgi", "b.rla", "b.ico"};
+    static const char *const names[] = {"b.exr", "b.png", "b.tif", "b.jpg", "b.tga", "b.bmp"};
     sample s;
     make(&s, 33, 40, 3, LIGHTMAP);
     uint32_t seed = 1;

@@ -6,9 +6,9 @@
 #include <openexr.h>
 
 /* The first are written in long rows, too. */
-static const char *const ENDINGS[] = {"exr", "png", "tif",  "tga", "iff", "sgi", "rla", "jpg",  "bmp", "hdr",
-                                      "ppm", "pgm", "webp", "jp2", "dpx", "gif", "ico", "heic", "avif"};
-enum { LONG_COUNT = 8, ENDING_COUNT = sizeof ENDINGS / sizeof ENDINGS[0] };
+static const char *const ENDINGS[] = {"exr", "png", "tif",  "tga", "jpg", "bmp", "hdr",
+                                      "ppm", "pgm", "webp", "jp2", "dpx", "gif"};
+enum { LONG_COUNT = 5, ENDING_COUNT = sizeof ENDINGS / sizeof ENDINGS[0] };
 
 /* The sample's rows before `end`, in pieces of 1, 2, 3 … rows, or of `step`. */
 static vsh_result add_rows(vsh_image_writer *writer, const sample *s, int32_t step, int32_t end) {

@@ -25,9 +25,8 @@ static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
     {'o', "output", "OUT",
      "image to write: .exr with named channels, or\n"
-     ".png .tif .dpx .sgi .jp2 .tga .bmp .ico .iff .rla\n"
-     ".hdr .ppm .pgm .jpg .webp .heic .avif .gif; what each\n"
-     "can hold, and what is not written: docs/formats.md;\n"
+     ".png .tif .dpx .jp2 .tga .bmp .hdr .ppm .pgm .jpg\n"
+     ".webp .gif; what each can hold, and what is not\nwritten: docs/formats.md;\n"
      ".glb .gltf .obj: the input with its light in its\nmaterials (docs/lit.md)"},
     {KEY_OUTPUT_FOLDER, "output-folder", "FOLDER",
      "write there what a scene's file says is written, under\nthe same names; it is made where it is not "
