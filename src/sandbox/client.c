@@ -1,19 +1,20 @@
 /* The caller's side: starts a reader, waits for its end, and looks over what every answer has in common. */
 #define _GNU_SOURCE
 
+#include "base/clock.h"
 #include "base/memory.h"
 #include "base/try.h"
-#include "sandbox/reader.h"
-#include "sandbox/request.h"
-#include "sandbox/spawn.h"
+#include "sandbox/confine.h"
 
-#include <vdbshade/reader.h>
-
+#include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
+#include <link.h>
 #include <math.h>
 #include <poll.h>
 #include <signal.h>
+#include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,6 +37,9 @@ static const double seconds_at_least = 60.0, seconds_a_byte = 1e-6;
 /* How long a reader that has closed its descriptors may live on. */
 static const double seconds_to_end = 5.0;
 
+/* Set in the environment of every reader, which must not start a reader of its own. */
+#define IN_READER "VSH_IN_READER"
+
 /* A reader under way. Descriptors are -1 where there is none. */
 typedef struct reader_process {
     pid_t pid;
@@ -43,11 +47,195 @@ typedef struct reader_process {
     double begin;
 } reader_process;
 
-static double now_seconds(void) {
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+/* --- libraries */
+
+typedef struct folder_list {
+    char *folders[VSHI_MOST_FOLDERS];
+    size_t count;
+} folder_list;
+
+static int add_folder(struct dl_phdr_info *info, size_t size, void *user) {
+    (void)size;
+    folder_list *list = user;
+    const char *slash = strrchr(info->dlpi_name, '/');
+    if (slash == NULL || slash == info->dlpi_name) {
+        return 0;
+    }
+    const size_t length = (size_t)(slash - info->dlpi_name);
+    for (size_t i = 0; i < list->count; ++i) {
+        if (strncmp(list->folders[i], info->dlpi_name, length) == 0 && list->folders[i][length] == '\0') {
+            return 0;
+        }
+    }
+    char *folder = list->count < VSHI_MOST_FOLDERS ? strndup(info->dlpi_name, length) : NULL;
+    if (folder != NULL) {
+        list->folders[list->count++] = folder;
+    }
+    return 0;
 }
+
+/* Puts the folders that this process's libraries are loaded from: the reader loads the same. */
+static void encode_folders(vshi_encoder *encoder) {
+    folder_list list = {{NULL}, 0};
+    dl_iterate_phdr(add_folder, &list);
+    vshi_encode_count(encoder, list.count);
+    for (size_t i = 0; i < list.count; ++i) {
+        vshi_encode_text(encoder, list.folders[i]);
+        free(list.folders[i]);
+    }
+}
+
+/* --- the program */
+
+/* The folder of the file that holds this code: the library, or a program that is linked with its objects. */
+static bool own_folder(char folder[PATH_MAX]) {
+    static const char here; /* in this file */
+    Dl_info info;
+    const bool found = dladdr(&here, &info) != 0 && info.dli_fname != NULL;
+    char name[PATH_MAX];
+    /* a program's own name is what it was called by */
+    if (!found ||
+        realpath(strchr(info.dli_fname, '/') != NULL ? info.dli_fname : "/proc/self/exe", name) == NULL) {
+        return false;
+    }
+    char *slash = strrchr(name, '/');
+    *slash = '\0';
+    memcpy(folder, name, sizeof name);
+    return true;
+}
+
+/* VSH_READER: beside the library as it is built, in libexec as it is installed. */
+static bool find_own(char path[PATH_MAX]) {
+    static const char *const places[] = {".", VSHI_READER_FOLDER};
+    char folder[PATH_MAX];
+    if (!own_folder(folder)) {
+        return false;
+    }
+    for (size_t i = 0; i < sizeof places / sizeof places[0]; ++i) {
+        const bool whole = places[i][0] == '/';
+        const int length = snprintf(path, PATH_MAX, "%s%s%s/%s", whole ? "" : folder, whole ? "" : "/",
+                                    places[i], VSH_READER);
+        if (length > 0 && length < PATH_MAX && access(path, X_OK) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* --- its environment */
+
+/* Variables that a reader's libraries act on; what else a host has there (tokens, passwords) is none of a
+ * hostile file's business. */
+static bool is_passed(const char *variable) {
+    static const char *const beginnings[] = {"LD_",
+                                             "LC_",
+                                             "LANG",
+                                             "TZ=",
+                                             "MALLOC_",
+                                             "GLIBC_TUNABLES=",
+                                             "ASAN_",
+                                             "LSAN_",
+                                             "TSAN_",
+                                             "UBSAN_",
+                                             "LLVM_PROFILE_FILE=",
+                                             "GCOV_",
+                                             "VSH_TEST_"};
+    for (size_t i = 0; i < sizeof beginnings / sizeof beginnings[0]; ++i) {
+        if (strncmp(variable, beginnings[i], strlen(beginnings[i])) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Copies the variables that is_passed() keeps, and adds `mark`. */
+static char **make_environment(char *mark) {
+    size_t count = 0, passed = 0;
+    while (environ != NULL && environ[count] != NULL) {
+        ++count;
+    }
+    char **made = malloc((count + 2) * sizeof *made);
+    for (size_t i = 0; made != NULL && i < count; ++i) {
+        if (is_passed(environ[i])) {
+            made[passed++] = environ[i];
+        }
+    }
+    if (made != NULL) {
+        made[passed++] = mark;
+        made[passed] = NULL;
+    }
+    return made;
+}
+
+/* --- the process */
+
+static int give_files(posix_spawn_file_actions_t *files, const vshi_exchange *exchange, int answer,
+                      int progress) {
+    const struct {
+        int from, to;
+    } given[] = {{answer, VSHI_READER_ANSWER},
+                 {exchange->encoder.file, VSHI_READER_REQUEST},
+                 {progress, VSHI_READER_PROGRESS}};
+    int reason = posix_spawn_file_actions_addopen(files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    reason = reason != 0 ? reason
+                         : posix_spawn_file_actions_addopen(files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+    if (reason == 0 && !VSHI_SANITIZED) { /* sanitizers report there */
+        reason = posix_spawn_file_actions_addopen(files, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+    }
+    for (size_t i = 0; reason == 0 && i < sizeof given / sizeof given[0]; ++i) {
+        reason = posix_spawn_file_actions_adddup2(files, given[i].from, given[i].to);
+    }
+    return reason != 0 ? reason : posix_spawn_file_actions_addclosefrom_np(files, VSHI_READER_PROGRESS + 1);
+}
+
+/* The reader leaves our process group, so that an interrupt on the terminal reaches it through us. */
+static void set_attributes(posix_spawnattr_t *attributes) {
+    sigset_t none, all;
+    sigemptyset(&none);
+    sigfillset(&all);
+    posix_spawnattr_setsigmask(attributes, &none);
+    posix_spawnattr_setsigdefault(attributes, &all);
+    posix_spawnattr_setpgroup(attributes, 0);
+    posix_spawnattr_setflags(attributes,
+                             POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+}
+
+/* Starts exchange->run->reader with these descriptors. Returns 0 or what errno says. Nothing but
+ * posix_spawn(): between fork and exec none of our code runs, as it must not in a process that
+ * may have threads. */
+static int spawn_reader(const vshi_exchange *exchange, int answer, int progress, pid_t *pid) {
+    char own[PATH_MAX], name[] = VSH_READER, argument[] = VSH_READER_ARGUMENT, mark[] = IN_READER "=1";
+    char *const arguments[] = {name, argument, NULL};
+    const char *program = exchange->run->reader;
+    if (strcmp(program, VSH_READER) == 0) {
+        /* sanitized tests are linked with the objects, so they are their own readers */
+        program = find_own(own) ? own : VSHI_SANITIZED ? "/proc/self/exe" : NULL;
+    }
+    if (program == NULL) {
+        return ENOENT;
+    }
+    posix_spawn_file_actions_t files;
+    posix_spawnattr_t attributes;
+    char **environment = make_environment(mark);
+    int reason = environment != NULL ? posix_spawn_file_actions_init(&files) : ENOMEM;
+    if (reason != 0) {
+        free(environment);
+        return reason;
+    }
+    reason = posix_spawnattr_init(&attributes);
+    if (reason == 0) {
+        set_attributes(&attributes);
+        reason = give_files(&files, exchange, answer, progress);
+        reason =
+            reason != 0 ? reason : posix_spawnp(pid, program, &files, &attributes, arguments, environment);
+        posix_spawnattr_destroy(&attributes);
+    }
+    posix_spawn_file_actions_destroy(&files);
+    free(environment);
+    return reason;
+}
+
+/* --- the request */
 
 static double seconds_for(const char *path, const vsh_run *run) {
     struct stat status;
@@ -80,7 +268,7 @@ static int lift(int file) {
 
 vsh_result vshi_exchange_begin(vshi_exchange *exchange, int32_t kind, const char *path, const vsh_run *run,
                                vsh_error *error) {
-    if (vshi_in_reader()) {
+    if (getenv(IN_READER) != NULL) {
         /* otherwise a program that names itself as its reader would start itself forever */
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "%s: not read: this process is a reader itself; main has to call vsh_reader_serve() "
@@ -103,21 +291,19 @@ vsh_result vshi_exchange_begin(vshi_exchange *exchange, int32_t kind, const char
     vshi_encode_count(&exchange->encoder, run->confined != 0);
     vshi_encode_count(&exchange->encoder, run->allow_outside != 0);
     vshi_encode_text(&exchange->encoder, path);
-    vshi_encode_folders(&exchange->encoder);
+    encode_folders(&exchange->encoder);
     return VSH_OK;
 }
 
-/* --- starting */
-
 static vsh_result start(const vshi_exchange *exchange, reader_process *process, vsh_error *error) {
     int ends[2] = {-1, -1};
-    *process = (reader_process){-1, -1, -1, now_seconds()};
+    *process = (reader_process){-1, -1, -1, vshi_seconds()};
     process->answer = lift(memfd_create("vdbshade answer", MFD_CLOEXEC | MFD_ALLOW_SEALING));
     int reason = process->answer < 0 || pipe2(ends, O_CLOEXEC | O_NONBLOCK) != 0 ? errno : 0;
     process->progress = ends[0];
     if (reason == 0) {
         ends[1] = lift(ends[1]);
-        reason = ends[1] < 0 ? errno : vshi_spawn_reader(exchange, process->answer, ends[1], &process->pid);
+        reason = ends[1] < 0 ? errno : spawn_reader(exchange, process->answer, ends[1], &process->pid);
     }
     if (ends[1] >= 0) {
         close(ends[1]);
@@ -166,7 +352,7 @@ static vsh_result await(const vshi_exchange *exchange, reader_process *process, 
         } else {
             struct pollfd pipe_end = {process->progress, POLLIN, 0};
             poll(&pipe_end, 1, POLL_MS);
-            closed = take_progress(process->progress, &fraction) ? INFINITY : now_seconds();
+            closed = take_progress(process->progress, &fraction) ? INFINITY : vshi_seconds();
         }
         const pid_t ended = waitpid(process->pid, status, WNOHANG);
         if (ended == process->pid || (ended < 0 && errno == ECHILD)) {
@@ -174,7 +360,7 @@ static vsh_result await(const vshi_exchange *exchange, reader_process *process, 
             process->pid = -1;
             return VSH_OK;
         }
-        const double now = now_seconds();
+        const double now = vshi_seconds();
         if (poll_user(user, fraction)) {
             kill_reader(process, status);
             return vshi_fail(error, VSH_ERROR_CANCELLED, "%s: cancelled", exchange->path);
@@ -194,15 +380,13 @@ vsh_result vshi_answer_fail(const char *path, const char *what, vsh_error *error
 }
 
 static vsh_result fail_memory(const vshi_exchange *exchange, vsh_error *error) {
-    if (exchange->run->memory_limit == 0) {
-        return vshi_fail(error, VSH_ERROR_LIMIT,
-                         "%s: reading it takes more than this machine's memory: damaged, or very large",
-                         exchange->path);
+    char limit[80] = "this machine's memory";
+    if (exchange->run->memory_limit > 0) {
+        snprintf(limit, sizeof limit, "the memory limit of %.0f MB, or than the system gives",
+                 (double)exchange->run->memory_limit / 1e6);
     }
-    return vshi_fail(error, VSH_ERROR_LIMIT,
-                     "%s: reading it takes more than the memory limit of %.0f MB, or than the system gives: "
-                     "damaged, or very large",
-                     exchange->path, (double)exchange->run->memory_limit / 1e6);
+    return vshi_fail(error, VSH_ERROR_LIMIT, "%s: reading it takes more than %s: damaged, or very large",
+                     exchange->path, limit);
 }
 
 /* Why there is no answer. */
@@ -216,32 +400,31 @@ static vsh_result fail_end(const vshi_exchange *exchange, int status, bool begun
         return vshi_fail(error, VSH_ERROR_READ, "%s: damaged: the reader crashed (SIG%s), or memory ran out",
                          exchange->path, name != NULL ? name : "?");
     }
-    if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_OUT_OF_MEMORY) {
+    const int code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    const char *path = exchange->path, *reader = exchange->run->reader;
+    switch (code) {
+    case VSHI_READER_OUT_OF_MEMORY:
         return fail_memory(exchange, error);
-    }
-    if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_FILE_LIMIT) {
+    case VSHI_READER_FILE_LIMIT:
         return vshi_fail(error, VSH_ERROR_LIMIT,
                          "%s: what its reader sends is more than this process's limit on the size of files "
                          "(ulimit -f); raise it, or read without a reader",
-                         exchange->path);
-    }
-    if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_UNCONFINED) {
+                         path);
+    case VSHI_READER_UNCONFINED:
         return vshi_fail(error, VSH_ERROR_INTERNAL,
-                         "%s: not read: a thread of its reader is not confined as the others are",
-                         exchange->path);
-    }
-    if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_EMPTY) {
+                         "%s: not read: a thread of its reader is not confined as the others are", path);
+    case VSHI_READER_EMPTY:
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "%s: its reader, '%s', cannot load the library of vdbshade %s", exchange->path,
-                         exchange->run->reader, vsh_version());
+                         "%s: its reader, '%s', cannot load the library of vdbshade %s", path, reader,
+                         vsh_version());
+    default:
+        return begun ? vshi_fail(error, VSH_ERROR_READ,
+                                 "%s: damaged: the reader ended without an answer (%d)", path, code)
+                     : vshi_fail(error, VSH_ERROR_ARGUMENT,
+                                 "%s: '%s' is no reader of vdbshade %s: its main does not call "
+                                 "vsh_reader_serve()",
+                                 path, reader, vsh_version());
     }
-    if (!begun) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "%s: '%s' is no reader of vdbshade %s: its main does not call vsh_reader_serve()",
-                         exchange->path, exchange->run->reader, vsh_version());
-    }
-    return vshi_fail(error, VSH_ERROR_READ, "%s: damaged: the reader ended without an answer (%d)",
-                     exchange->path, WIFEXITED(status) ? WEXITSTATUS(status) : -1);
 }
 
 /* Maps what the reader has written once nobody can write there any more. */

@@ -1,18 +1,152 @@
+/* The reader's side before anything is parsed, or any library loaded that could: its request, and all of its
+ * confinement. */
 #define _GNU_SOURCE
 #include "sandbox/confine.h"
 
-#include "sandbox/reader.h"
-#include "sandbox/tasks.h"
-
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <math.h>
 #include <sched.h>
 #include <seccomp.h>
 #include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
 #include <unistd.h>
+
+/* --- the request */
+
+bool vshi_request_read(vshi_request *request) {
+    struct stat status;
+    if (fstat(VSHI_READER_REQUEST, &status) != 0 || status.st_size <= 0) {
+        return false;
+    }
+    const void *map = mmap(NULL, (size_t)status.st_size, PROT_READ, MAP_PRIVATE, VSHI_READER_REQUEST, 0);
+    if (map == MAP_FAILED) {
+        return false;
+    }
+    vshi_decoder decoder = {map, (const unsigned char *)map + status.st_size, false};
+    if (vshi_decode_count(&decoder, UINT64_MAX) != VSHI_REQUEST_MAGIC ||
+        vshi_decode_count(&decoder, UINT64_MAX) != VSHI_READER_PROTOCOL) {
+        return false;
+    }
+    *request = (vshi_request){.kind = vshi_decode_count(&decoder, VSHI_READ_KINDS - 1)};
+    request->parent = vshi_decode_count(&decoder, INT32_MAX);
+    request->memory = vshi_decode_count(&decoder, UINT64_MAX);
+    request->seconds = vshi_decode_number(&decoder);
+    request->demanded = vshi_decode_count(&decoder, 1) != 0;
+    request->outside = vshi_decode_count(&decoder, 1) != 0;
+    request->path = vshi_decode_text(&decoder, false);
+    request->folder_count = (size_t)vshi_decode_count(&decoder, VSHI_MOST_FOLDERS);
+    for (size_t i = 0; i < request->folder_count; ++i) {
+        request->folders[i] = vshi_decode_text(&decoder, false);
+        decoder.bad = decoder.bad || request->folders[i] == NULL;
+    }
+    request->rest = decoder;
+    return !decoder.bad && request->path != NULL;
+}
+
+const char *vshi_missing_text(uint64_t confined, char text[VSHI_MISSING_TEXT]) {
+    static const struct {
+        uint32_t bit;
+        const char *name;
+    } parts[] = {{VSH_CONFINED_LIMITS, "limits of resources"},
+                 {VSH_CONFINED_CALLS, "seccomp (system calls)"},
+                 {VSH_CONFINED_FILES, "Landlock (files)"}};
+    text[0] = '\0';
+    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
+        if ((confined & parts[i].bit) == 0) {
+            const size_t used = strlen(text);
+            snprintf(text + used, VSHI_MISSING_TEXT - used, "%s%s", used > 0 ? ", " : "", parts[i].name);
+        }
+    }
+    return text;
+}
+
+/* --- threads, as the kernel tells of them */
+
+enum { MODE_NONE = 0, MODE_FILTER = 2, STATUS_ROOM = 4096, PATH_ROOM = 64 };
+
+/* The number of filters on a kernel that does not count them. */
+enum { UNCOUNTED = -1 };
+
+typedef struct task_state {
+    int mode, filters;
+} task_state;
+
+static int field(const char *status, const char *name, int missing) {
+    const char *at = strstr(status, name);
+    return at != NULL ? atoi(at + strlen(name)) : missing;
+}
+
+/* False where it cannot be read, with errno: ENOENT or ESRCH of a task that has ended. */
+static bool read_state(const char *path, task_state *state) {
+    char status[STATUS_ROOM];
+    errno = 0;
+    const int file = open(path, O_RDONLY | O_CLOEXEC);
+    const ssize_t size = file >= 0 ? read(file, status, sizeof status - 1) : -1;
+    const int why = errno;
+    if (file >= 0) {
+        close(file);
+    }
+    if (size <= 0) {
+        errno = why;
+        return false;
+    }
+    status[size] = '\0';
+    *state =
+        (task_state){field(status, "\nSeccomp:", MODE_NONE), field(status, "\nSeccomp_filters:", UNCOUNTED)};
+    return true;
+}
+
+static const char own_status[] = "/proc/thread-self/status";
+
+/* Counts the filters of the calling thread. The host (a container, a sandbox) may have set some. */
+static int count_filters(void) {
+    task_state own = {MODE_NONE, 0};
+    return read_state(own_status, &own) ? own.filters : 0;
+}
+
+int vshi_task_count(void) {
+    DIR *tasks = opendir("/proc/self/task");
+    int count = 0;
+    for (const struct dirent *entry; tasks != NULL && (entry = readdir(tasks)) != NULL;) {
+        count += entry->d_name[0] != '.';
+    }
+    if (tasks != NULL) {
+        closedir(tasks);
+    }
+    return count;
+}
+
+int vshi_tasks_filtered(int before) {
+    task_state own = {MODE_NONE, 0};
+    DIR *tasks = read_state(own_status, &own) ? opendir("/proc/self/task") : NULL;
+    if (tasks == NULL) {
+        return VSHI_CALLS_FREE;
+    }
+    bool all = own.mode == MODE_FILTER && (own.filters == UNCOUNTED || own.filters > before);
+    for (const struct dirent *entry; all && (entry = readdir(tasks)) != NULL;) {
+        char path[PATH_ROOM];
+        task_state task = {MODE_NONE, 0};
+        if (entry->d_name[0] != '.') {
+            snprintf(path, sizeof path, "/proc/self/task/%.20s/status", entry->d_name);
+            all = read_state(path, &task) ? task.mode == MODE_FILTER && task.filters == own.filters
+                                          : errno == ENOENT || errno == ESRCH; /* ended meanwhile */
+        }
+    }
+    closedir(tasks);
+    return all ? VSHI_CALLS_CONFINED : VSHI_CALLS_IN_PART;
+}
+
+/* --- limits of resources */
 
 /* Address space beyond the memory limit: libraries, stacks of the thread pool, arenas of the allocator. */
 static const uint64_t address_space_slack = (uint64_t)2 << 30;
@@ -60,6 +194,8 @@ bool vshi_confine_resources(uint64_t memory, uint64_t beside, double seconds) {
     signal(SIGXFSZ, SIG_IGN); /* the write fails instead */
     return all && !VSHI_SANITIZED;
 }
+
+/* --- a filter of system calls */
 
 /* Calls that parsing needs, whatever their arguments. */
 static const int allowed[] = {
@@ -180,12 +316,246 @@ int vshi_confine_calls(void) {
     if (VSHI_SANITIZED) {
         return VSHI_CALLS_FREE;
     }
-    const int before = vshi_task_filters();
+    const int before = count_filters();
     if (!load_filter()) {
         return VSHI_CALLS_FREE;
     }
-    static const int outcomes[] = {[VSHI_TASKS_UNSEEN] = VSHI_CALLS_FREE,
-                                   [VSHI_TASKS_FILTERED] = VSHI_CALLS_CONFINED,
-                                   [VSHI_TASKS_LOOSE] = VSHI_CALLS_IN_PART};
-    return outcomes[vshi_tasks_filtered(before)];
+    return vshi_tasks_filtered(before);
+}
+
+/* --- files, by Landlock (Linux 5.13): by the numbers of its system calls, as the C library has no functions
+ * for them and headers of this age lack some of the rights (linux/landlock.h) */
+
+#ifndef SYS_landlock_create_ruleset
+#define SYS_landlock_create_ruleset 444
+#define SYS_landlock_add_rule 445
+#define SYS_landlock_restrict_self 446
+#endif
+
+enum { ASK_VERSION = 1, RULE_PATH_BENEATH = 1 };
+
+/* Rights of files, bits. */
+enum {
+    EXECUTE = 1 << 0,
+    READ_FILE = 1 << 2,
+    READ_FOLDER = 1 << 3,
+    ALL_OF_1 = (1 << 13) - 1, /* with writing, making, removing */
+    REFER = 1 << 13,          /* from version 2 */
+    TRUNCATE = 1 << 14,       /* from version 3 */
+    DEVICE_CALLS = 1 << 15    /* ioctl(), from version 5 */
+};
+
+enum { TCP = 3 /* bind and connect, from version 4 */, ALONE = 3 /* abstract sockets, signals; from 6 */ };
+
+struct ruleset {
+    uint64_t files, network, scopes;
+};
+
+struct __attribute__((packed)) rule {
+    uint64_t rights;
+    int32_t folder;
+};
+
+int vshi_landlock_version(void) {
+    const long version = syscall(SYS_landlock_create_ruleset, NULL, 0, ASK_VERSION);
+    return version > 0 ? (int)version : 0;
+}
+
+/* Ignores missing files. */
+static void allow(int ruleset, const char *path) {
+    const int file = open(path, O_PATH | O_CLOEXEC);
+    struct stat status;
+    if (file >= 0 && fstat(file, &status) == 0) {
+        const struct rule rule = {S_ISDIR(status.st_mode) ? READ_FILE | READ_FOLDER : READ_FILE, file};
+        syscall(SYS_landlock_add_rule, ruleset, RULE_PATH_BENEATH, &rule, 0);
+    }
+    if (file >= 0) {
+        close(file);
+    }
+}
+
+/* Each folder of a list as LD_LIBRARY_PATH is one. */
+static void allow_list(int ruleset, const char *list) {
+    while (list != NULL && *list != '\0') {
+        char path[PATH_MAX];
+        const size_t length = strcspn(list, ":;");
+        if (length > 0 && length < sizeof path) {
+            snprintf(path, sizeof path, "%.*s", (int)length, list);
+            allow(ruleset, path);
+        }
+        list += length + (list[length] != '\0');
+    }
+}
+
+static void allow_libraries(int ruleset, const vshi_request *request) {
+    static const char *const folders[] = {"/usr",           "/lib",
+                                          "/lib64",         "/etc/ld.so.cache",
+                                          "/etc/localtime", "/sys/devices/system",
+                                          "/proc/self/exe", "/proc/self/task",
+                                          "/proc/meminfo",  "/dev/null",
+                                          "/dev/urandom"};
+    for (size_t i = 0; i < sizeof folders / sizeof folders[0]; ++i) {
+        allow(ruleset, folders[i]);
+    }
+    for (size_t i = 0; i < request->folder_count; ++i) {
+        allow(ruleset, request->folders[i]);
+    }
+    allow_list(ruleset, getenv("LD_LIBRARY_PATH"));
+    allow_list(ruleset, getenv("LD_PRELOAD"));
+}
+
+/* A model names other files in its folder. All other kinds are one file. */
+static void allow_inputs(int ruleset, const vshi_request *request) {
+    char folder[PATH_MAX];
+    allow(ruleset, request->path);
+    if (request->kind != VSHI_READ_MODEL && request->kind != VSHI_READ_DRACO) {
+        return;
+    }
+    const char *slash = strrchr(request->path, '/');
+    const size_t length = slash != NULL ? (size_t)(slash - request->path) + 1 : 0;
+    if (request->outside) {
+        allow(ruleset, "/");
+    } else if (length < sizeof folder) {
+        snprintf(folder, sizeof folder, "%.*s", (int)length, request->path);
+        allow(ruleset, length > 0 ? folder : ".");
+        /* and where it is a link, as vshi_input_is_beside() has it */
+        if (realpath(request->path, folder) != NULL) {
+            *strrchr(folder, '/') = '\0';
+            allow(ruleset, folder[0] != '\0' ? folder : "/");
+        }
+    }
+}
+
+/* Confines the calling thread and the threads that it begins later. They can read the file of the request,
+ * the folders of libraries and, for a model, its folder (with `outside`, any file). They can write no file
+ * and open no TCP port. Where the kernel can forbid it, they cannot signal other processes or read their
+ * memory. They can start programs only if `start`. Returns false where the system refuses this. */
+static bool confine_files(const vshi_request *request, bool start) {
+    const int version = vshi_landlock_version();
+    struct ruleset all = {ALL_OF_1, 0, 0};
+    if (version < 1) {
+        return false;
+    }
+    all.files |= version >= 2 ? REFER : 0;
+    all.files |= version >= 3 ? TRUNCATE : 0;
+    all.files |= version >= 5 ? DEVICE_CALLS : 0;
+    all.files &= start ? ~(uint64_t)EXECUTE : UINT64_MAX;
+    all.network = version >= 4 ? TCP : 0;
+    all.scopes = version >= 6 ? ALONE : 0;
+    /* a kernel that knows less takes a longer struct whose rest is 0 */
+    const int ruleset = (int)syscall(SYS_landlock_create_ruleset, &all, sizeof all, 0);
+    if (ruleset < 0) {
+        return false;
+    }
+    allow_libraries(ruleset, request);
+    allow_inputs(ruleset, request);
+    const bool confined =
+        prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 && syscall(SYS_landlock_restrict_self, ruleset, 0) == 0;
+    close(ruleset);
+    return confined;
+}
+
+/* --- all of it */
+
+/* Words behind VSH_READER_ARGUMENT, of a reader to itself and to the library that it loads. */
+static const char again[] = "again";
+static const char held[] = VSHI_READER_HELD;
+
+/* The threads that libraries have begun before main are none of this thread's, which Landlock would hold for:
+ * where this program is started once more they come after it, and it holds for them, too. */
+static void start_again(char **argv, const vshi_request *request) {
+    char argument[] = VSH_READER_ARGUMENT, word[sizeof again];
+    memcpy(word, again, sizeof again);
+    char *const words[] = {argv[0], argument, word, NULL};
+    if (vshi_landlock_version() > 0 && confine_files(request, true)) {
+        execv("/proc/self/exe", words);
+    }
+}
+
+static bool files_are_limited(void) {
+    struct rlimit size;
+    return getrlimit(RLIMIT_FSIZE, &size) == 0 && size.rlim_cur != RLIM_INFINITY;
+}
+
+/* Data (heap, stacks, what libraries write to) that reading a small file takes, whatever it holds, and 50
+ * MiB: most of it is never touched. OpenImageIO brings the libraries of all its formats, and their threads.
+ */
+static uint64_t data_beside(const vshi_request *request) {
+    return (uint64_t)(request->kind == VSHI_READ_IMAGE ? 176 : 68) << 20;
+}
+
+static void confine(const vshi_request *request, bool files, vshi_reader_state *state) {
+    state->cramped = files_are_limited();
+    if (vshi_confine_resources(request->memory, data_beside(request), request->seconds)) {
+        state->confined |= VSH_CONFINED_LIMITS;
+    }
+    if ((uint64_t)getppid() != request->parent) {
+        state->code = VSHI_READER_CANNOT; /* it died before its death would have been ours */
+        return;
+    }
+    if (VSHI_SANITIZED) {
+        return;
+    }
+    if (confine_files(request, false) && files) {
+        state->confined |= VSH_CONFINED_FILES;
+    }
+    const int calls = vshi_confine_calls();
+    if (calls == VSHI_CALLS_CONFINED) {
+        state->confined |= VSH_CONFINED_CALLS;
+    } else if (calls == VSHI_CALLS_IN_PART) {
+        state->code = VSHI_READER_UNCONFINED;
+    }
+}
+
+/* Reads the word in which vdbshade-reader says how it is confined. */
+static vshi_reader_state take_held(const char *word) {
+    const int told = atoi(word);
+    vshi_reader_state state = {(uint32_t)told & VSH_CONFINED_ALL, (told & VSHI_HELD_FILE_LIMIT) != 0, -1};
+    if ((state.confined & VSH_CONFINED_CALLS) != 0 && vshi_tasks_filtered(0) != VSHI_CALLS_CONFINED) {
+        state.code = VSHI_READER_UNCONFINED;
+    }
+    return state;
+}
+
+vshi_answer_head vshi_reader_head(const vshi_reader_state *state, int32_t code) {
+    return (vshi_answer_head){.magic = VSHI_ANSWER_MAGIC,
+                              .protocol = VSHI_READER_PROTOCOL,
+                              .code = code,
+                              .confined = state->confined};
+}
+
+bool vshi_reader_answer(const vshi_answer_head *head) {
+    return pwrite(VSHI_READER_ANSWER, head, sizeof *head, 0) == (ssize_t)sizeof *head;
+}
+
+int vshi_reader_tell(const vshi_reader_state *state) {
+    const vshi_answer_head head = vshi_reader_head(state, VSH_OK);
+    return vshi_reader_answer(&head) ? 0 : VSHI_READER_CANNOT;
+}
+
+static void refuse(const vshi_request *request, vshi_reader_state *state) {
+    char missing[VSHI_MISSING_TEXT];
+    vshi_answer_head head = vshi_reader_head(state, VSH_ERROR_UNSUPPORTED);
+    snprintf(head.message, sizeof head.message,
+             "%s: not read: its reader is to be confined, and this system refuses it %s", request->path,
+             vshi_missing_text(state->confined, missing));
+    state->code = vshi_reader_answer(&head) ? 0 : VSHI_READER_CANNOT;
+}
+
+vshi_reader_state vshi_reader_begin(int argc, char **argv, const vshi_request *request) {
+    const char *word = argc > 2 ? argv[2] : "";
+    vshi_reader_state state = {0, false, -1};
+    if (strncmp(word, held, sizeof held - 1) == 0) {
+        return take_held(word + sizeof held - 1);
+    }
+    const bool started_again = strcmp(word, again) == 0;
+    const bool alone = vshi_task_count() == 1;
+    if (!alone && !started_again && !VSHI_SANITIZED) {
+        start_again(argv, request);
+    }
+    confine(request, alone || started_again, &state);
+    if (state.code < 0 && request->demanded && state.confined != VSH_CONFINED_ALL) {
+        refuse(request, &state);
+    }
+    return state;
 }

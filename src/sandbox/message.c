@@ -1,4 +1,4 @@
-#include "sandbox/message.h"
+#include "sandbox/reader.h"
 
 #include <errno.h>
 #include <malloc.h>

@@ -1,15 +1,11 @@
 /* The reader's side: takes the request, limits itself, parses, answers. */
+#include "base/clock.h"
 #include "sandbox/confine.h"
-#include "sandbox/reader.h"
-#include "sandbox/request.h"
-
-#include <vdbshade/reader.h>
 
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 enum { MOST_WARNINGS = 1 << 20 /* bytes of all that are passed on */ };
@@ -21,8 +17,7 @@ typedef struct serving {
     char *warnings; /* texts, one behind the other with their ends */
     size_t used, count;
     double reported;
-    uint64_t confined;
-    bool limited; /* the size of files, by the caller's own limit */
+    vshi_reader_state state;
 } serving;
 
 /* May come from any thread of the pool, one at a time. */
@@ -40,9 +35,7 @@ static void keep_warning(void *user, const char *message) {
 static int32_t report(void *user, const char *stage, double fraction) {
     serving *s = user;
     (void)stage;
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    const double seconds = (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+    const double seconds = vshi_seconds();
     if (seconds - s->reported >= report_interval) {
         s->reported = seconds;
         if (write(VSHI_READER_PROGRESS, &fraction, sizeof fraction) < 0) {
@@ -55,25 +48,12 @@ static int32_t report(void *user, const char *stage, double fraction) {
 /* Bytes of the heap that a reader of anything takes, and more. */
 static const uint64_t heap_slack = (uint64_t)16 << 20;
 
-static bool write_head(const vshi_answer_head *head) {
-    return pwrite(VSHI_READER_ANSWER, head, sizeof *head, 0) == (ssize_t)sizeof *head;
-}
-
-/* Why an answer could not be written: the size of files is the memory that the caller has room for, or less
- * where it has a limit of its own (ulimit -f), which holds for memory that is a file, too. */
-static int exit_code_of_write(const serving *s) {
-    return s->limited ? VSHI_READER_FILE_LIMIT : VSHI_READER_OUT_OF_MEMORY;
-}
-
 static int answer(serving *s, vshi_serve_fn *serve, const char *path, vshi_decoder *request,
                   const vsh_run *run) {
     static vshi_encoder encoder;
-    vshi_answer_head head = {.magic = VSHI_ANSWER_MAGIC,
-                             .protocol = VSHI_READER_PROTOCOL,
-                             .code = VSHI_ANSWER_BEGUN,
-                             .confined = s->confined};
-    if (!write_head(&head)) {
-        return s->limited ? VSHI_READER_FILE_LIMIT : VSHI_READER_CANNOT;
+    vshi_answer_head head = vshi_reader_head(&s->state, VSHI_ANSWER_BEGUN);
+    if (!vshi_reader_answer(&head)) {
+        return s->state.cramped ? VSHI_READER_FILE_LIMIT : VSHI_READER_CANNOT;
     }
     vsh_error error = {VSH_OK, ""};
     vshi_encoder_begin(&encoder, VSHI_READER_ANSWER, sizeof head);
@@ -86,12 +66,14 @@ static int answer(serving *s, vshi_serve_fn *serve, const char *path, vshi_decod
         text += strlen(text) + 1;
     }
     if (!vshi_encoder_flush(&encoder)) {
-        return encoder.error == ENOMEM ? VSHI_READER_OUT_OF_MEMORY : exit_code_of_write(s);
+        /* the limit of file sizes is the caller's memory limit; a lower one (ulimit -f) is the host's */
+        return encoder.error != ENOMEM && s->state.cramped ? VSHI_READER_FILE_LIMIT
+                                                           : VSHI_READER_OUT_OF_MEMORY;
     }
     head.code = result;
     head.warnings = s->count;
     snprintf(head.message, sizeof head.message, "%s", error.message);
-    return write_head(&head) ? 0 : VSHI_READER_CANNOT;
+    return vshi_reader_answer(&head) ? 0 : VSHI_READER_CANNOT;
 }
 
 static int32_t serve_request(serving *s, vshi_serve_fn *const *servers, int argc, char **argv) {
@@ -102,15 +84,13 @@ static int32_t serve_request(serving *s, vshi_serve_fn *const *servers, int argc
     if (s->warnings == NULL) {
         return VSHI_READER_OUT_OF_MEMORY;
     }
-    const vshi_reader_state state = vshi_reader_begin(argc, argv, &request);
-    if (state.code >= 0) {
-        return state.code;
+    s->state = vshi_reader_begin(argc, argv, &request);
+    if (s->state.code >= 0) {
+        return s->state.code;
     }
     if (request.kind == VSHI_READ_CONFINEMENT) {
-        return vshi_reader_tell(&state);
+        return vshi_reader_tell(&s->state);
     }
-    s->confined = state.confined;
-    s->limited = state.cramped;
     vsh_run run = vsh_run_default();
     run.threads = 1;
     run.memory_limit = request.memory;

@@ -1,10 +1,7 @@
 /* vdbshade-reader: confines itself, and only then loads the library, whose own libraries begin threads before
  * any main (liblog4cplus, which OpenVDB brings, begins four), and parse. */
 #include "base/memory.h"
-#include "sandbox/reader.h"
-#include "sandbox/request.h"
-
-#include <vdbshade/reader.h>
+#include "sandbox/confine.h"
 
 #include <dlfcn.h>
 #include <errno.h>
