@@ -27,7 +27,8 @@ static bool fails(vshi_contours *c, vsh_result result) {
     return result != VSH_OK;
 }
 
-static bool reserve(vshi_contours *c, void *array, size_t size, size_t count, size_t *capacity) {
+bool vshi_contours_reserve(vshi_contours *c, void *array, size_t size, size_t count, size_t *capacity,
+                           double bytes) {
     if (count < *capacity) {
         return true;
     }
@@ -36,7 +37,7 @@ static bool reserve(vshi_contours *c, void *array, size_t size, size_t count, si
         fails(c, vshi_fail(c->error, VSH_ERROR_LIMIT, "outline: more than %zu points", MAX_POINTS));
         return false;
     }
-    if (fails(c, vshi_check_limit(c->run, BYTES_PER_POINT * (double)grown, "outline", c->error))) {
+    if (fails(c, vshi_check_limit(c->run, bytes * (double)grown, "outline", c->error))) {
         return false;
     }
     void **place = array;
@@ -56,8 +57,8 @@ static size_t contour_begin(const vshi_contours *c) {
 }
 
 void vshi_contours_add(vshi_contours *c, double x, double y) {
-    if (c->result != VSH_OK ||
-        !reserve(c, &c->points, sizeof *c->points, c->point_count, &c->point_capacity)) {
+    if (c->result != VSH_OK || !vshi_contours_reserve(c, &c->points, sizeof *c->points, c->point_count,
+                                                      &c->point_capacity, BYTES_PER_POINT)) {
         return;
     }
     if (!(fabs(x) <= VSHI_OUTLINE_LARGEST && fabs(y) <= VSHI_OUTLINE_LARGEST)) {
@@ -89,8 +90,8 @@ void vshi_contours_close(vshi_contours *c) {
     if (!closed) {
         vshi_contours_add(c, start.x, start.y);
     }
-    if (c->result != VSH_OK ||
-        !reserve(c, &c->starts, sizeof *c->starts, c->contour_count + 1, &c->contour_capacity)) {
+    if (c->result != VSH_OK || !vshi_contours_reserve(c, &c->starts, sizeof *c->starts, c->contour_count + 1,
+                                                      &c->contour_capacity, BYTES_PER_POINT)) {
         return;
     }
     c->starts[0] = 0;

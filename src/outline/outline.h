@@ -68,6 +68,11 @@ void vshi_contours_free(vshi_contours *contours);
 /* The next point of the contour under way; one that equals its predecessor is left out. */
 void vshi_contours_add(vshi_contours *contours, double x, double y);
 
+/* Makes room for one more element of an array. The memory limit counts `bytes` for each element. Returns
+ * false, and sets contours->result, where there is no room. */
+bool vshi_contours_reserve(vshi_contours *contours, void *array, size_t size, size_t count, size_t *capacity,
+                           double bytes);
+
 /* Ends the contour; one of fewer than three points is left out. */
 void vshi_contours_close(vshi_contours *contours);
 
@@ -76,13 +81,6 @@ void vshi_contours_close(vshi_contours *contours);
  * `what` names it in messages. Errors: that of the contours; VSH_ERROR_INPUT where there is no area,
  * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
 vsh_result vshi_contours_finish(vshi_contours *contours, bool clean, const char *what, vsh_outline **outline);
-
-/* Draws a text (checked before) with a font, in this process or in run->reader. Errors: as
- * vsh_outline_from_text(); vshi_contours_free() also then. */
-vsh_result vshi_contours_draw(const char *text, const char *path, const vsh_text_options *options,
-                              const vsh_run *run, vshi_contours *contours, vsh_error *error);
-vsh_result vshi_contours_from_reader(const char *text, const char *path, const vsh_text_options *options,
-                                     const vsh_run *run, vshi_contours *contours, vsh_error *error);
 
 /* Cuts contours where they cross and keeps what has the area on one side only, area to the left, into
  * `result`. `outline` holds them, with its tree. False where rounding leaves ends that fit nothing: contours

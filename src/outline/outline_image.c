@@ -7,8 +7,7 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/try.h"
-
-#include <vdbshade/image.h>
+#include "image/planes.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -18,15 +17,6 @@
 static const double RED = 0.2126, GREEN = 0.7152, BLUE = 0.0722; /* Rec. 709 */
 
 /* --- the channel */
-
-static const float *find_channel(const vsh_image *image, const char *name) {
-    for (int32_t i = 0; i < image->channel_count; ++i) {
-        if (strcmp(image->names[i], name) == 0) {
-            return image->planes[i];
-        }
-    }
-    return NULL;
-}
 
 static bool varies(const float *plane, size_t count) {
     for (size_t i = 0; i < count; ++i) {
@@ -39,8 +29,8 @@ static bool varies(const float *plane, size_t count) {
 
 /* A colour by its name, of a grey image the grey. */
 static const float *colour(const vsh_image *image, const char *name) {
-    const float *plane = find_channel(image, name);
-    return plane != NULL ? plane : find_channel(image, "Y");
+    const float *plane = vshi_image_find_plane(image, name);
+    return plane != NULL ? plane : vshi_image_find_plane(image, "Y");
 }
 
 static vsh_result take_luminance(const vsh_image *image, const char *path, const vsh_run *run,
@@ -84,14 +74,14 @@ static vsh_result take_channel(const vsh_image *image, const char *path, const c
     const size_t count = (size_t)image->width * (size_t)image->height;
     *plane = NULL;
     if (channel == NULL) {
-        const float *alpha = find_channel(image, "A");
+        const float *alpha = vshi_image_find_plane(image, "A");
         if (alpha != NULL && varies(alpha, count)) {
             *plane = alpha;
             return VSH_OK;
         }
     } else if (strcmp(channel, "luminance") != 0) {
-        *plane = find_channel(image, channel);
-        *plane = *plane != NULL ? *plane : find_channel(image, own_name(channel));
+        *plane = vshi_image_find_plane(image, channel);
+        *plane = *plane != NULL ? *plane : vshi_image_find_plane(image, own_name(channel));
         if (*plane != NULL) {
             return VSH_OK;
         }
@@ -124,7 +114,6 @@ typedef struct border {
     double pixel[2]; /* size, world units */
     step *steps;
     size_t step_count;
-    size_t points; /* counted beforehand */
 } border;
 
 static int64_t clamp(int64_t i, int64_t least, int64_t most) {

@@ -3,8 +3,6 @@
 #include "base/elementary.h"
 #include "outline/outline.h"
 
-#include "base/memory.h"
-
 #include <math.h>
 #include <stdlib.h>
 
@@ -34,28 +32,6 @@ typedef struct work {
     vshi_contours *result;
 } work;
 
-static bool reserve(work *w, void *array, size_t size, size_t count, size_t *capacity) {
-    if (count < *capacity) {
-        return true;
-    }
-    void **place = array;
-    const size_t grown = *capacity == 0 ? 1024 : 2 * *capacity;
-    w->result->result =
-        vshi_check_limit(w->result->run, (double)grown * (double)size, "outline", w->result->error);
-    if (w->result->result != VSH_OK) {
-        return false;
-    }
-    void *memory = realloc(*place, grown * size);
-    if (memory == NULL) {
-        w->result->result = vshi_fail(w->result->error, VSH_ERROR_MEMORY,
-                                      "outline: the system refused %zu bytes", grown * size);
-        return false;
-    }
-    *place = memory;
-    *capacity = grown;
-    return true;
-}
-
 static bool same(vshi_point a, vshi_point b) {
     return a.x == b.x && a.y == b.y;
 }
@@ -76,7 +52,8 @@ static bool add_cut(work *w, uint32_t segment, vshi_point point) {
     if (same(point, a) || same(point, b)) {
         return true;
     }
-    if (!reserve(w, &w->cuts, sizeof *w->cuts, w->cut_count, &w->cut_capacity)) {
+    if (!vshi_contours_reserve(w->result, &w->cuts, sizeof *w->cuts, w->cut_count, &w->cut_capacity,
+                               sizeof *w->cuts)) {
         return false;
     }
     const double along = (point.x - a.x) * (b.x - a.x) + (point.y - a.y) * (b.y - a.y);
@@ -173,7 +150,8 @@ static bool add_piece(work *w, vshi_point a, vshi_point b) {
     if (in_left == in_right) {
         return true;
     }
-    if (!reserve(w, &w->pieces, sizeof *w->pieces, w->piece_count, &w->piece_capacity)) {
+    if (!vshi_contours_reserve(w->result, &w->pieces, sizeof *w->pieces, w->piece_count, &w->piece_capacity,
+                               sizeof *w->pieces)) {
         return false;
     }
     w->pieces[w->piece_count++] = in_left ? (piece){a, b, false} : (piece){b, a, false};

@@ -1,48 +1,46 @@
-/* The border of a text's letters: laid out in lines, curves cut into lines. */
-#include "base/elementary.h"
+/* The border of a text's letters: fonts read by FreeType, in this process or in a reader; laid out in lines,
+ * curves cut into lines. */
 #include "outline/outline.h"
 
+#include "base/elementary.h"
 #include "base/floats.h"
+#include "base/input.h"
 #include "base/try.h"
-#include "extern/freetype.h"
+#include "base/utf8.h"
+#include "sandbox/reader.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
+
+#include <ft2build.h>
+
+#include FT_FREETYPE_H
+#include FT_OUTLINE_H
 
 static const size_t MAX_BYTES = (size_t)1 << 20;
 /* How far lines may be from the curve that they stand for, em. */
 static const double TOLERANCE = 2e-5;
 enum { MAX_LINES = 1024 /* of a curve */ };
 
-/* --- UTF-8 */
-
 /* The character at *at, which moves behind it; UINT32_MAX where there is no UTF-8 (RFC 3629). */
 static uint32_t next_character(const char **at) {
     const unsigned char *c = (const unsigned char *)*at;
-    const int more = c[0] < 0x80 ? 0 : c[0] >= 0xc2 && c[0] < 0xe0 ? 1 : (c[0] & 0xf0) == 0xe0 ? 2 : 3;
-    if (more == 3 && (c[0] < 0xf0 || c[0] > 0xf4)) {
-        return UINT32_MAX;
-    }
-    static const unsigned char masks[4] = {0x7f, 0x1f, 0x0f, 0x07};
-    static const uint32_t least[4] = {0, 0x80, 0x800, 0x10000};
-    uint32_t character = c[0] & masks[more];
-    for (int i = 1; i <= more; ++i) {
-        if ((c[i] & 0xc0) != 0x80) { /* the text's end, too */
-            return UINT32_MAX;
-        }
+    const size_t length = vshi_utf8_length(*at);
+    uint32_t character = length > 1 ? c[0] & 0x7fu >> length : c[0];
+    for (size_t i = 1; i < length; ++i) {
         character = character << 6 | (c[i] & 0x3f);
     }
-    if (character < least[more] || character > 0x10ffff || (character >= 0xd800 && character < 0xe000)) {
-        return UINT32_MAX;
-    }
-    *at += more + 1;
-    return character;
+    *at += length;
+    return length > 0 ? character : UINT32_MAX;
 }
 
-/* --- letters */
+/* --- a font, and where its letters go */
 
 typedef struct layout {
-    vshi_font *font;
+    FT_Library library;
+    FT_Face face;
+    double unit; /* of the font, em */
     const char *path;
     double scale;
     double x, y;    /* origin of the letter, em */
@@ -50,19 +48,79 @@ typedef struct layout {
     vshi_contours *contours;
 } layout;
 
+static vsh_result fail(vsh_error *error, const char *path, FT_Error code) {
+    if (code == FT_Err_Out_Of_Memory) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+    }
+    if (code == FT_Err_Unknown_File_Format) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: is no font that FreeType reads", path);
+    }
+    return vshi_fail(error, VSH_ERROR_INPUT, "%s: a damaged font: FreeType's error %#x", path,
+                     (unsigned)code);
+}
+
+/* Opens the first face of a font file; FT_Done_FreeType() closes it, also where this fails. */
+static vsh_result open_font(layout *l, vsh_error *error) {
+    FILE *file;
+    uint64_t size;
+    /* FreeType's own errors do not tell a missing file from a bad one */
+    VSHI_TRY(vshi_input_open(l->path, l->path, UINT64_MAX, &file, &size, error));
+    fclose(file);
+    FT_Error code = FT_Init_FreeType(&l->library);
+    code = code == 0 ? FT_New_Face(l->library, l->path, 0, &l->face) : code;
+    if (code != 0) {
+        return fail(error, l->path, code);
+    }
+    if (!FT_IS_SCALABLE(l->face) || l->face->units_per_EM == 0) {
+        return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: a font of bitmaps: its letters have no outlines",
+                         l->path);
+    }
+    if (l->face->charmap == NULL) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: a font without a table of Unicode's characters",
+                         l->path);
+    }
+    l->unit = 1.0 / l->face->units_per_EM;
+    return VSH_OK;
+}
+
+/* From baseline to baseline, em. */
+static double line_height(const layout *l) {
+    const double height = l->face->height * l->unit;
+    return height > 0.0 ? height : 1.2;
+}
+
+/* The distance, em, by which `right` moves when it follows `left`. */
+static double kerning(const layout *l, uint32_t left, uint32_t right) {
+    FT_Vector by;
+    return FT_HAS_KERNING(l->face) && FT_Get_Kerning(l->face, left, right, FT_KERNING_UNSCALED, &by) == 0
+               ? (double)by.x * l->unit
+               : 0.0;
+}
+
+/* --- letters */
+
 static void put(layout *l, const double p[2]) {
     vshi_contours_add(l->contours, (l->x + p[0]) * l->scale, (l->y + p[1]) * l->scale);
     memcpy(l->last, p, sizeof l->last);
 }
 
-static void move_to(void *user, const double to[2]) {
-    layout *l = user;
-    vshi_contours_close(l->contours);
-    put(l, to);
+static void to_em(const layout *l, const FT_Vector *v, double p[2]) {
+    p[0] = (double)v->x * l->unit;
+    p[1] = (double)v->y * l->unit;
 }
 
-static void line_to(void *user, const double to[2]) {
-    put(user, to);
+static int line_to(const FT_Vector *to, void *user) {
+    layout *l = user;
+    double p[2];
+    to_em(l, to, p);
+    put(l, p);
+    return 0;
+}
+
+static int move_to(const FT_Vector *to, void *user) {
+    layout *l = user;
+    vshi_contours_close(l->contours);
+    return line_to(to, l);
 }
 
 /* How many lines keep a curve whose second derivative is at most `bend`: its distance from a chord over a
@@ -72,10 +130,13 @@ static int line_count(double bend) {
     return count < 1.0 ? 1 : count < MAX_LINES ? (int)count : MAX_LINES;
 }
 
-static void cubic_to(void *user, const double c1[2], const double c2[2], const double to[2]) {
+static int cubic_to(const FT_Vector *control1, const FT_Vector *control2, const FT_Vector *end, void *user) {
     layout *l = user;
     const double from[2] = {l->last[0], l->last[1]};
-    double bend = 0.0;
+    double c1[2], c2[2], to[2], bend = 0.0;
+    to_em(l, control1, c1);
+    to_em(l, control2, c2);
+    to_em(l, end, to);
     for (int i = 0; i < 2; ++i) {
         const double first = fabs(from[i] - 2.0 * c1[i] + c2[i]), second = fabs(c1[i] - 2.0 * c2[i] + to[i]);
         bend = vshi_hypot(bend, 6.0 * fmax(first, second));
@@ -91,11 +152,15 @@ static void cubic_to(void *user, const double c1[2], const double c2[2], const d
         put(l, p);
     }
     put(l, to);
+    return 0;
 }
 
-static void conic_to(void *user, const double control[2], const double to[2]) {
+static int conic_to(const FT_Vector *middle, const FT_Vector *end, void *user) {
     layout *l = user;
     const double from[2] = {l->last[0], l->last[1]};
+    double control[2], to[2];
+    to_em(l, middle, control);
+    to_em(l, end, to);
     const int count =
         line_count(2.0 * vshi_hypot(from[0] - 2.0 * control[0] + to[0], from[1] - 2.0 * control[1] + to[1]));
     for (int k = 1; k < count; ++k) {
@@ -107,43 +172,36 @@ static void conic_to(void *user, const double control[2], const double to[2]) {
         put(l, p);
     }
     put(l, to);
+    return 0;
 }
 
-static void no_point(void *user, const double to[2]) {
-    (void)user;
-    (void)to;
-}
-
-static void no_conic(void *user, const double control[2], const double to[2]) {
-    (void)user;
-    (void)control;
-    (void)to;
-}
-
-static void no_cubic(void *user, const double c1[2], const double c2[2], const double to[2]) {
-    (void)user;
-    (void)c1;
-    (void)c2;
-    (void)to;
-}
-
-/* Draws a line of text from `at` to `end` with a pen, from l->x on, which moves to its end. */
-static vsh_result draw_line(layout *l, const char *at, const char *end, const vshi_pen *pen,
-                            vsh_error *error) {
+/* Goes over a line of text from `at` to `end`, from l->x on, which moves to its end; draws it if `draw`. */
+static vsh_result go_over_line(layout *l, const char *at, const char *end, bool draw, vsh_error *error) {
+    static const FT_Outline_Funcs pen = {move_to, line_to, conic_to, cubic_to, 0, 0};
     uint32_t before = 0;
     while (at < end) {
         const uint32_t character = next_character(&at);
-        const uint32_t glyph = vshi_font_glyph(l->font, character);
+        const uint32_t glyph = FT_Get_Char_Index(l->face, character);
         if (glyph == 0) {
             return vshi_fail(error, VSH_ERROR_INPUT, "%s: the font has no letter for U+%04X", l->path,
                              character);
         }
-        l->x += before != 0 ? vshi_font_kerning(l->font, before, glyph) : 0.0;
-        double advance = 0.0;
-        VSHI_TRY(vshi_font_draw(l->font, glyph, pen, &advance, error));
+        l->x += before != 0 ? kerning(l, before, glyph) : 0.0;
+        const FT_Error code = FT_Load_Glyph(l->face, glyph, FT_LOAD_NO_SCALE | FT_LOAD_NO_BITMAP);
+        if (code != 0) {
+            return fail(error, l->path, code);
+        }
+        const FT_GlyphSlot slot = l->face->glyph;
+        if (slot->format != FT_GLYPH_FORMAT_OUTLINE) {
+            return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: letter %u has no outline", l->path, glyph);
+        }
+        const FT_Error drawn = draw ? FT_Outline_Decompose(&slot->outline, &pen, l) : 0;
+        if (drawn != 0) {
+            return fail(error, l->path, drawn);
+        }
         vshi_contours_close(l->contours);
         VSHI_TRY(l->contours->result);
-        l->x += advance;
+        l->x += (double)slot->metrics.horiAdvance * l->unit;
         before = glyph;
     }
     return VSH_OK;
@@ -151,8 +209,6 @@ static vsh_result draw_line(layout *l, const char *at, const char *end, const vs
 
 static vsh_result draw_text(layout *l, const char *text, const vsh_text_options *options, vshi_job *job,
                             vsh_error *error) {
-    const vshi_pen none = {l, no_point, no_point, no_conic, no_cubic};
-    const vshi_pen pen = {l, move_to, line_to, conic_to, cubic_to};
     const double share = options->align == VSH_ALIGN_LEFT     ? 0.0
                          : options->align == VSH_ALIGN_CENTER ? 0.5
                                                               : 1.0;
@@ -164,17 +220,101 @@ static vsh_result draw_text(layout *l, const char *text, const vsh_text_options 
         end -= end > line && end[-1] == '\r' && next != NULL;
         l->x = 0.0;
         if (share > 0.0) {
-            VSHI_TRY(draw_line(l, line, end, &none, error));
+            VSHI_TRY(go_over_line(l, line, end, false, error));
             l->x *= -share;
         }
-        VSHI_TRY(draw_line(l, line, end, &pen, error));
-        l->y -= options->line_spacing * vshi_font_line_height(l->font);
+        VSHI_TRY(go_over_line(l, line, end, true, error));
+        l->y -= options->line_spacing * line_height(l);
         if (vshi_job_advance(job, size)) {
             return vshi_job_fail_cancelled(job, error);
         }
         line = next;
     }
     return VSH_OK;
+}
+
+/* Draws a text (checked before) with a font. vshi_contours_free() also where it fails. */
+static vsh_result draw(const char *text, const char *path, const vsh_text_options *options,
+                       const vsh_run *run, vshi_contours *contours, vsh_error *error) {
+    layout l = {.path = path, .scale = options->height, .contours = contours};
+    vshi_job *job = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(open_font(&l, error));
+    job = vshi_job_begin(run, "outline", strlen(text));
+    result = job != NULL ? draw_text(&l, text, options, job, error)
+                         : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+done:
+    vshi_job_end(job);
+    FT_Done_FreeType(l.library); /* and the face; NULL is an error that does nothing */
+    return result;
+}
+
+/* --- in a reader process */
+
+vsh_result vshi_serve_text(const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,
+                           vsh_error *error) {
+    vsh_text_options options = vsh_text_options_default();
+    const char *text = vshi_decode_text(request, false);
+    options.height = vshi_decode_number(request);
+    options.line_spacing = vshi_decode_number(request);
+    options.align = (int32_t)vshi_decode_count(request, VSH_ALIGN_RIGHT);
+    if (text == NULL || !vshi_decoder_ends(request)) {
+        return vshi_fail(error, VSH_ERROR_INTERNAL, "%s: the request to its reader does not hold", path);
+    }
+    vshi_contours contours = {.run = run, .error = error};
+    vsh_result result;
+    VSHI_TRY_DONE(draw(text, path, &options, run, &contours, error));
+    VSHI_TRY_DONE(contours.result);
+    vshi_encode_count(payload, contours.contour_count);
+    for (size_t c = 0; c < contours.contour_count; ++c) {
+        const size_t begin = contours.starts[c], count = contours.starts[c + 1] - begin;
+        vshi_encode_count(payload, count);
+        vshi_encode_array(payload, contours.points + begin, count, sizeof *contours.points);
+    }
+done:
+    vshi_contours_free(&contours);
+    return result;
+}
+
+/* Each point goes through the checks of one that was drawn here. */
+vsh_result vshi_contours_decode(vshi_decoder *decoder, vshi_contours *contours, const char *path,
+                                vsh_error *error) {
+    const uint64_t count = vshi_decode_count(decoder, UINT32_MAX);
+    for (uint64_t c = 0; c < count && !decoder->bad; ++c) {
+        const uint64_t size = vshi_decode_count(decoder, UINT32_MAX);
+        const vshi_point *points = vshi_decode_array(decoder, size, sizeof *points);
+        for (uint64_t i = 0; points != NULL && i < size; ++i) {
+            vshi_contours_add(contours, points[i].x, points[i].y);
+        }
+        vshi_contours_close(contours);
+        VSHI_TRY(contours->result);
+    }
+    return vshi_decoder_ends(decoder) && contours->contour_count == count
+               ? VSH_OK
+               : vshi_answer_fail(path, "its contours", error);
+}
+
+static vsh_result draw_apart(const char *text, const char *path, const vsh_text_options *options,
+                             const vsh_run *run, vshi_contours *contours, vsh_error *error) {
+    enum { UNITS = 1000 };
+    vshi_exchange exchange;
+    vshi_answer answer;
+    vshi_job *job = vshi_job_begin(run, "outline", UNITS);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+    }
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_exchange_begin(&exchange, VSHI_READ_TEXT, path, run, error));
+    vshi_encode_text(&exchange.encoder, text);
+    vshi_encode_number(&exchange.encoder, options->height);
+    vshi_encode_number(&exchange.encoder, options->line_spacing);
+    vshi_encode_count(&exchange.encoder, (uint64_t)options->align);
+    VSHI_TRY_DONE(vshi_exchange_send_job(&exchange, job, UNITS, &answer, error));
+    result = vshi_contours_decode(&answer.payload, contours, path, error);
+    vshi_answer_free(&answer);
+done:
+    vshi_job_end(job);
+    return result;
 }
 
 /* --- from the outside */
@@ -220,19 +360,6 @@ static vsh_result check_options(const vsh_text_options *options, vsh_error *erro
     return VSH_OK;
 }
 
-vsh_result vshi_contours_draw(const char *text, const char *path, const vsh_text_options *options,
-                              const vsh_run *run, vshi_contours *contours, vsh_error *error) {
-    layout l = {.path = path, .scale = options->height, .contours = contours};
-    VSHI_TRY(vshi_font_open(path, &l.font, error));
-    vshi_job *job = vshi_job_begin(run, "outline", strlen(text));
-    const vsh_result result = job != NULL
-                                  ? draw_text(&l, text, options, job, error)
-                                  : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
-    vshi_job_end(job);
-    vshi_font_close(l.font);
-    return result;
-}
-
 vsh_result vsh_outline_from_text(const char *text, const char *font, const vsh_text_options *options,
                                  const vsh_run *run, vsh_outline **outline, vsh_error *error) {
     VSHI_FLOATS;
@@ -248,8 +375,8 @@ vsh_result vsh_outline_from_text(const char *text, const char *font, const vsh_t
     VSHI_TRY(check_text(text, error));
     vshi_contours contours = {.run = &full_run, .error = error};
     const vsh_result result = full_run.reader != NULL
-                                  ? vshi_contours_from_reader(text, font, &full, &full_run, &contours, error)
-                                  : vshi_contours_draw(text, font, &full, &full_run, &contours, error);
+                                  ? draw_apart(text, font, &full, &full_run, &contours, error)
+                                  : draw(text, font, &full, &full_run, &contours, error);
     if (result != VSH_OK) {
         vshi_contours_free(&contours);
         return result;

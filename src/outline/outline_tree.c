@@ -1,3 +1,4 @@
+#define _GNU_SOURCE /* qsort_r */
 #include "outline/outline.h"
 
 #include "base/memory.h"
@@ -12,24 +13,14 @@ enum { LEAF_SEGMENTS = 4 };
 
 /* A contour while the tree above the contours is made. */
 typedef struct item {
-    vshi_point middle;
+    double middle[2];
     uint32_t contour;
 } item;
 
-static int by_x(const void *a, const void *b) {
+static int by_middle(const void *a, const void *b, void *axis) {
     const item *p = a, *q = b;
-    if (p->middle.x != q->middle.x) {
-        return p->middle.x < q->middle.x ? -1 : 1;
-    }
-    return (p->contour > q->contour) - (p->contour < q->contour);
-}
-
-static int by_y(const void *a, const void *b) {
-    const item *p = a, *q = b;
-    if (p->middle.y != q->middle.y) {
-        return p->middle.y < q->middle.y ? -1 : 1;
-    }
-    return (p->contour > q->contour) - (p->contour < q->contour);
+    const double x = p->middle[*(const int *)axis], y = q->middle[*(const int *)axis];
+    return x != y ? (x < y ? -1 : 1) : (p->contour > q->contour) - (p->contour < q->contour);
 }
 
 static void grow_box(double low[2], double high[2], vshi_point p) {
@@ -77,9 +68,10 @@ static void grow_space(vsh_outline *o, size_t index, item *items, size_t count) 
     }
     double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
     for (size_t i = 0; i < count; ++i) {
-        grow_box(low, high, items[i].middle);
+        grow_box(low, high, (vshi_point){items[i].middle[0], items[i].middle[1]});
     }
-    qsort(items, count, sizeof *items, high[0] - low[0] >= high[1] - low[1] ? by_x : by_y);
+    int axis = high[0] - low[0] >= high[1] - low[1] ? 0 : 1;
+    qsort_r(items, count, sizeof *items, by_middle, &axis);
     vshi_outline_node *node = &o->nodes[index];
     node->first = node->count = 0;
     node->children = (uint32_t)o->node_count;
@@ -102,8 +94,7 @@ vsh_result vshi_outline_grow_tree(vsh_outline *o, vsh_error *error) {
         for (uint32_t i = o->starts[c]; i < o->starts[c + 1]; ++i) {
             grow_box(low, high, o->points[i]);
         }
-        items[c].middle = (vshi_point){0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])};
-        items[c].contour = (uint32_t)c;
+        items[c] = (item){{0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])}, (uint32_t)c};
     }
     o->node_count = 1;
     grow_space(o, 0, items, o->contour_count);
