@@ -1,12 +1,9 @@
-#include "render/grid.h"
-
 #include "base/elementary.h"
 #include "base/error.h"
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/try.h"
-
-#include <string.h>
+#include "render/render.h"
 
 static const double FOV_LEAST = 0.001, FOV_MOST = 3.0;
 /* Sine of the angle between view and up below which there is no telling what is up. */
@@ -100,6 +97,19 @@ static view_axes axes_of(const vsh_camera *camera, double azimuth, double elevat
     return axes;
 }
 
+static void set(double to[3], vshi_vec v) {
+    to[0] = v.x, to[1] = v.y, to[2] = v.z;
+}
+
+static vsh_result begin_frame(const vsh_camera *camera, double azimuth, double elevation, double aspect,
+                              vsh_camera *full, view_axes *axes, vsh_error *error) {
+    VSHI_TRY(resolve(camera, full, error));
+    VSHI_TRY(check_lens(full, error));
+    VSHI_TRY(check_view(azimuth, elevation, aspect, error));
+    *axes = axes_of(full, azimuth, elevation);
+    return VSH_OK;
+}
+
 /* A point is in the picture where across - eye's is within tangent × (eye's back - back) on both sides; so
  * the eye stands where the largest of across + tangent × back and of -across + tangent × back meet, and the
  * same of over: the nearest place from which all are seen. */
@@ -108,10 +118,8 @@ vsh_result vsh_camera_frame_points(vsh_camera *camera, size_t count, const doubl
     VSHI_FLOATS;
     VSHI_NEEDS(points);
     vsh_camera full;
-    VSHI_TRY(resolve(camera, &full, error));
-    VSHI_TRY(check_lens(&full, error));
-    VSHI_TRY(check_view(azimuth, elevation, aspect, error));
-    const view_axes axes = axes_of(&full, azimuth, elevation);
+    view_axes axes;
+    VSHI_TRY(begin_frame(camera, azimuth, elevation, aspect, &full, &axes, error));
     const double tangent[2] = {aspect * vshi_tan(0.5 * full.fov) / POINTS_MARGIN,
                                vshi_tan(0.5 * full.fov) / POINTS_MARGIN};
     double high[2] = {-INFINITY, -INFINITY}, low[2] = {-INFINITY, -INFINITY};
@@ -140,11 +148,8 @@ vsh_result vsh_camera_frame_points(vsh_camera *camera, size_t count, const doubl
              near + 0.01 * size);
     const vshi_vec middle = vshi_add(vshi_scale(axes.across, 0.5 * (high[0] - low[0])),
                                      vshi_scale(axes.over, 0.5 * (high[1] - low[1])));
-    const vshi_vec eye = vshi_add(middle, vshi_scale(axes.back, away));
-    const vshi_vec to = vshi_add(middle, vshi_scale(axes.back, 0.5 * (near + far)));
-    const double position[3] = {eye.x, eye.y, eye.z}, target[3] = {to.x, to.y, to.z};
-    memcpy(camera->position, position, sizeof position);
-    memcpy(camera->target, target, sizeof target);
+    set(camera->position, vshi_add(middle, vshi_scale(axes.back, away)));
+    set(camera->target, vshi_add(middle, vshi_scale(axes.back, 0.5 * (near + far))));
     return VSH_OK;
 }
 
@@ -154,8 +159,8 @@ vsh_result vsh_camera_frame(vsh_camera *camera, const double bounds_min[3], cons
     VSHI_NEEDS(bounds_min);
     VSHI_NEEDS(bounds_max);
     vsh_camera full;
-    VSHI_TRY(resolve(camera, &full, error));
-    VSHI_TRY(check_lens(&full, error));
+    view_axes axes;
+    VSHI_TRY(begin_frame(camera, azimuth, elevation, aspect, &full, &axes, error));
     const vshi_vec low = vshi_vec_of(bounds_min), high = vshi_vec_of(bounds_max);
     const vshi_vec size = vshi_sub(high, low);
     if (!vshi_finite(low) || !vshi_finite(high) || !vshi_finite(size) || size.x < 0.0 || size.y < 0.0 ||
@@ -164,22 +169,17 @@ vsh_result vsh_camera_frame(vsh_camera *camera, const double bounds_min[3], cons
                          "camera: the box from (%g, %g, %g) to (%g, %g, %g) is none", low.x, low.y, low.z,
                          high.x, high.y, high.z);
     }
-    VSHI_TRY(check_view(azimuth, elevation, aspect, error));
-    const view_axes axes = axes_of(&full, azimuth, elevation);
-    const vshi_vec back = axes.back, across = axes.across, over = axes.over;
     const double tangent = vshi_tan(0.5 * full.fov) / MARGIN;
     double away = 0.0;
     for (int corner = 0; corner < 8; ++corner) {
         const vshi_vec c = {(corner & 1 ? 0.5 : -0.5) * size.x, (corner & 2 ? 0.5 : -0.5) * size.y,
                             (corner & 4 ? 0.5 : -0.5) * size.z};
-        const double tall = fabs(vshi_dot(c, over)), wide = fabs(vshi_dot(c, across)) / aspect;
-        away = fmax(away, vshi_dot(c, back) + fmax(tall, wide) / tangent);
+        const double tall = fabs(vshi_dot(c, axes.over)), wide = fabs(vshi_dot(c, axes.across)) / aspect;
+        away = fmax(away, vshi_dot(c, axes.back) + fmax(tall, wide) / tangent);
     }
     const vshi_vec middle = vshi_add(low, vshi_scale(size, 0.5));
-    const vshi_vec eye = vshi_add(middle, vshi_scale(back, away));
-    const double position[3] = {eye.x, eye.y, eye.z}, target[3] = {middle.x, middle.y, middle.z};
-    memcpy(camera->position, position, sizeof position);
-    memcpy(camera->target, target, sizeof target);
+    set(camera->position, vshi_add(middle, vshi_scale(axes.back, away)));
+    set(camera->target, middle);
     return VSH_OK;
 }
 
@@ -191,9 +191,7 @@ void vsh_camera_orbit(vsh_camera *camera, double angle) {
     const double c = vshi_cos(angle), s = vshi_sin(angle);
     const vshi_vec turned = vshi_add(vshi_add(vshi_scale(arm, c), vshi_scale(vshi_cross(axis, arm), s)),
                                      vshi_scale(axis, vshi_dot(axis, arm) * (1.0 - c)));
-    const vshi_vec at = vshi_add(target, turned);
-    const double position[3] = {at.x, at.y, at.z};
-    memcpy(camera->position, position, sizeof position);
+    set(camera->position, vshi_add(target, turned));
 }
 
 vshi_view_frame vshi_camera_frame(const vsh_camera *camera, int32_t width, int32_t height) {

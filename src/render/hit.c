@@ -1,7 +1,7 @@
 /* Sphere tracing (J. C. Hart, "Sphere tracing", 1996) through the pyramid, on to where the sign changes. The
  * finest level's trilinear interpolant is the surface; a ray is looked at every tenth of a voxel next to it,
  * so that what it can miss is thinner than that. */
-#include "render/tile.h"
+#include "render/render.h"
 
 /* Of the distance to go at once on the finest level, whose samples can be wrong by most of a voxel at edges.
  */
@@ -57,23 +57,12 @@ static double distance(march *m, double t) {
 }
 
 /* The part of the ray within the bounds. */
-static bool clip(const march *m, double *begin, double *end) {
-    const double o[3] = {m->origin.x, m->origin.y, m->origin.z};
-    const double d[3] = {m->direction.x, m->direction.y, m->direction.z};
-    for (int axis = 0; axis < 3; ++axis) {
-        const double low = (double)m->field->bounds_min[axis] - BOUNDS_MARGIN - o[axis];
-        const double high = (double)m->field->bounds_max[axis] + BOUNDS_MARGIN - o[axis];
-        if (d[axis] == 0.0) {
-            if (low > 0.0 || high < 0.0) {
-                return false;
-            }
-            continue;
-        }
-        const double a = low / d[axis], b = high / d[axis];
-        *begin = fmax(*begin, fmin(a, b));
-        *end = fmin(*end, fmax(a, b));
-    }
-    return *begin < *end;
+static bool clip_to_bounds(const march *m, double *begin, double *end) {
+    const double M = BOUNDS_MARGIN;
+    const float *low = m->field->bounds_min, *high = m->field->bounds_max;
+    return vshi_clip(m->origin, m->direction,
+                     (vshi_vec){(double)low[0] - M, (double)low[1] - M, (double)low[2] - M},
+                     (vshi_vec){(double)high[0] + M, (double)high[1] + M, (double)high[2] + M}, begin, end);
 }
 
 /* Between a place outside and one inside: regula falsi, the end that stays halved (the Illinois algorithm).
@@ -116,7 +105,7 @@ double vshi_field_hit(const vsh_field *field, const vshi_eye_ray *ray, double en
                .direction = vshi_unit(vshi_transform_vector(field->to_field, ray->direction)),
                .level = field->level_count - 1};
     double t = 0.0, last = end / field->voxel_size, before = 0.0, h_before = 0.0;
-    bool outside = false, hit = false, over = !clip(&m, &t, &last);
+    bool outside = false, hit = false, over = !clip_to_bounds(&m, &t, &last);
     double least = LEAST_STEP;
     for (int i = 0; i < MOST_STEPS && !over && !hit; ++i) {
         const double h = distance(&m, t);

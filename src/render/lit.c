@@ -1,9 +1,9 @@
-#include "render/lit.h"
-
 #include "base/memory.h"
 #include "base/try.h"
+#include "image/planes.h"
 #include "mesh/mesh.h"
 #include "mesh/smooth_surface.h"
+#include "render/render.h"
 #include "shade/shade.h"
 
 #include <stdio.h>
@@ -60,24 +60,15 @@ void vshi_lit_free(vshi_lit *lit) {
 
 /* --- checks */
 
-static const float *plane_of(const vsh_image *image, const char *name) {
-    for (int32_t i = 0; i < image->channel_count; ++i) {
-        if (strcmp(image->names[i], name) == 0) {
-            return image->planes[i];
-        }
-    }
-    return NULL;
-}
-
 static vsh_result find_planes(const vshi_lit *lit, size_t index, lightmap *map, vsh_error *error) {
     static const char *const irradiance[] = {"irradiance.R", "irradiance.G", "irradiance.B"};
     const vsh_image *image = map->of->lightmap;
     size_t found = 0;
     for (int c = 0; c < 3; ++c) {
-        map->irradiance[c] = plane_of(image, irradiance[c]);
+        map->irradiance[c] = vshi_image_find_plane(image, irradiance[c]);
         found += map->irradiance[c] != NULL;
     }
-    map->ao = plane_of(image, "ao");
+    map->ao = vshi_image_find_plane(image, "ao");
     if (found == 3) {
         return VSH_OK;
     }
@@ -85,7 +76,7 @@ static vsh_result find_planes(const vshi_lit *lit, size_t index, lightmap *map, 
     for (size_t l = 0; l < lit->light_count; ++l) {
         char name[VSH_CHANNEL_NAME];
         snprintf(name, sizeof name, "shadow.%s", lit->lights[l].name);
-        map->shadow[l] = plane_of(image, name);
+        map->shadow[l] = vshi_image_find_plane(image, name);
         if (map->shadow[l] == NULL) {
             return vshi_fail(error, VSH_ERROR_INPUT,
                              "lightmap %zu: no channel %s, nor irradiance.R, .G and .B", index, name);

@@ -1,11 +1,12 @@
 /* Pictures: rows of samples, in tiles over threads, under the film's filter. */
+#include "render/render.h"
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/try.h"
 #include "field/level.h"
-#include "render/tile.h"
 #include "shade/layers.h"
+#include "shade/shade.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -105,21 +106,6 @@ static void raster_strips(void *user, size_t begin, size_t end) {
     }
 }
 
-static void add_stats(vsh_shade_stats *to, const vsh_shade_stats *from) {
-    to->marches += from->marches;
-    to->samples += from->samples;
-    to->skipped += from->skipped;
-    to->certified += from->certified;
-    to->unfinished += from->unfinished;
-    to->invalid += from->invalid;
-    to->beyond_reach += from->beyond_reach;
-    to->rays += from->rays;
-    to->refined += from->refined;
-    to->square_error += from->square_error;
-    to->ao_square_error += from->ao_square_error;
-    to->worst_error = fmax(to->worst_error, from->worst_error);
-}
-
 static int32_t rows_at_once(const vshi_sample_grid *grid) {
     const int32_t rows = BAND_SAMPLES / grid->columns / VSHI_TILE * VSHI_TILE;
     return rows > VSHI_TILE ? rows : VSHI_TILE;
@@ -168,7 +154,7 @@ static vsh_result render_rows(rendering *r, vshi_job *job, vsh_shade_stats *stat
         if (r->results[i] != VSH_OK) {
             return vshi_fail(error, r->results[i], "render: tile %zu", i);
         }
-        add_stats(stats, &r->stats[i]);
+        vshi_shade_stats_add(stats, &r->stats[i]);
     }
     return vshi_film_add(&r->film, r->rows.seen, r->rows.first, r->rows.count, job, error);
 }

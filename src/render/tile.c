@@ -1,6 +1,8 @@
-#include "render/tile.h"
-
+/* Traces the samples of a tile, and shades their hits. */
+#include "base/elementary.h"
 #include "base/try.h"
+#include "light/view.h"
+#include "render/render.h"
 #include "shade/shade.h"
 
 /* How much nearer than a lit mesh a surface of the same shape may be, its voxels. */
@@ -142,12 +144,90 @@ static vsh_result light_hits(const vshi_scenery *scenery, hits *h, vsh_shade_sta
     return VSH_OK;
 }
 
+/* --- fog */
+
+/* A ray of a tile, up to where it ends. */
+typedef struct fog_ray {
+    vshi_vec origin, direction; /* unit */
+    double end;                 /* world units, may be infinite */
+    uint32_t texel;             /* of the mask */
+} fog_ray;
+
+/* Points of the tile's rays at one step, and what each adds. */
+typedef struct step {
+    size_t count;
+    double positions[VSHI_TILE_SAMPLES][3];
+    float towards[VSHI_TILE_SAMPLES][3];
+    float visibility[VSHI_TILE_SAMPLES];
+    float light[VSHI_TILE_SAMPLES][3];
+    double share[VSHI_TILE_SAMPLES];
+} step;
+
+/* All the light that passes, whatever its direction: as if each point faced it. */
+static vsh_result light_step(const vshi_shafts *shafts, step *s, vsh_shade_stats *stats, vsh_error *error) {
+    const vsh_points points = {s->count, &s->positions[0][0], NULL, NULL};
+    for (size_t l = 0; l < shafts->light_count; ++l) {
+        const vsh_light *light = &shafts->lights[l];
+        float *visibility[VSHI_MOST_LIGHTS] = {NULL};
+        vsh_query_output output = vsh_query_output_default();
+        visibility[l] = s->visibility;
+        output.visibility = visibility;
+        VSHI_TRY(vsh_query_points(shafts->query, &points, NULL, shafts->run, &output, stats, error));
+        const vshi_light_place place = vshi_light_in_world(light);
+        for (size_t i = 0; i < s->count; ++i) {
+            vshi_vec to;
+            vshi_light_towards(&place, vshi_vec_of(s->positions[i]), &to);
+            s->towards[i][0] = (float)to.x, s->towards[i][1] = (float)to.y, s->towards[i][2] = (float)to.z;
+        }
+        vsh_shade_irradiance(&points, &s->towards[0][0], light, s->visibility, &s->light[0][0]);
+    }
+    return VSH_OK;
+}
+
+/* Puts the fog before what the rays of a tile brought back. Not inline: its frame would add to the tile's. */
+static __attribute__((noinline)) vsh_result add_fog(const vshi_shafts *shafts, size_t count,
+                                                    const fog_ray *rays, vshi_seen **seen,
+                                                    vsh_shade_stats *stats, vsh_error *error) {
+    double begin[VSHI_TILE_SAMPLES], length[VSHI_TILE_SAMPLES], jitter[VSHI_TILE_SAMPLES];
+    size_t in[VSHI_TILE_SAMPLES], passing = 0;
+    for (size_t i = 0; i < count; ++i) {
+        double end = rays[i].end;
+        begin[i] = 0.0;
+        if (vshi_clip(rays[i].origin, rays[i].direction, shafts->low, shafts->high, &begin[i], &end)) {
+            length[i] = end - begin[i];
+            jitter[i] = vshi_sampler_mask(shafts->sampler, rays[i].texel, 0);
+            in[passing++] = i;
+            const float left = (float)vshi_exp(-shafts->extinction * length[i]);
+            for (int c = 0; c < 3; ++c) {
+                seen[i]->color[c] *= left;
+            }
+        }
+    }
+    for (int32_t k = 0; k < shafts->steps && passing > 0; ++k) {
+        step s = {.count = passing};
+        for (size_t j = 0; j < passing; ++j) {
+            const size_t i = in[j];
+            const double stretch = length[i] / shafts->steps, along = (k + jitter[i]) * stretch;
+            const vshi_vec at = vshi_add(rays[i].origin, vshi_scale(rays[i].direction, begin[i] + along));
+            s.positions[j][0] = at.x, s.positions[j][1] = at.y, s.positions[j][2] = at.z;
+            s.share[j] = vshi_exp(-shafts->extinction * along) * shafts->extinction * stretch;
+        }
+        VSHI_TRY(light_step(shafts, &s, stats, error));
+        for (size_t j = 0; j < passing; ++j) {
+            for (int c = 0; c < 3; ++c) {
+                seen[in[j]]->color[c] += (float)(s.share[j] * (double)s.light[j][c]);
+            }
+        }
+    }
+    return VSH_OK;
+}
+
 vsh_result vshi_tile_render(const vshi_scenery *scenery, const vshi_rows *rows, int32_t column, int32_t row,
                             vsh_shade_stats *stats, vsh_error *error) {
     const vshi_sample_grid *grid = scenery->grid;
     const vsh_render_options *o = scenery->options;
     hits h = {.count = 0};
-    vshi_shaft_ray shafts[VSHI_TILE_SAMPLES];
+    fog_ray fog[VSHI_TILE_SAMPLES];
     vshi_seen *all[VSHI_TILE_SAMPLES];
     size_t count = 0;
     for (int32_t y = row; y < row + VSHI_TILE && y < rows->first + rows->count; ++y) {
@@ -175,14 +255,13 @@ vsh_result vshi_tile_render(const vshi_scenery *scenery, const vshi_rows *rows, 
             for (int c = 0; c < 3 && !(distance < INFINITY); ++c) {
                 seen->color[c] = (float)o->background[c];
             }
-            shafts[count] = (vshi_shaft_ray){ray.origin, ray.direction, distance, texel};
+            fog[count] = (fog_ray){ray.origin, ray.direction, distance, texel};
             all[count++] = seen;
         }
     }
     if (h.count > 0) {
         VSHI_TRY(light_hits(scenery, &h, stats, error));
     }
-    return scenery->shafts.extinction > 0.0
-               ? vshi_shafts_add(&scenery->shafts, count, shafts, all, stats, error)
-               : VSH_OK;
+    return scenery->shafts.extinction > 0.0 ? add_fog(&scenery->shafts, count, fog, all, stats, error)
+                                            : VSH_OK;
 }
