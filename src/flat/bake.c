@@ -5,7 +5,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/try.h"
-#include "flat/distances.h"
+#include "flat/visible.h"
 #include "light/light.h"
 #include "light/types.h"
 
@@ -15,6 +15,132 @@
 #include <stdlib.h>
 
 enum { MAX_SIZE = 65536, MAX_SUPERSAMPLE = 16, MAX_SAMPLES = MAX_SUPERSAMPLE * MAX_SUPERSAMPLE };
+
+/* --- the classic method, on a grid */
+
+/* Distances to the outline on a grid. */
+typedef struct grid {
+    double low[2], high[2]; /* world rectangle */
+    double cell;            /* world units */
+    size_t columns, rows;
+    float *values; /* [rows][columns], signed, world units */
+} grid;
+
+static const double MAX_VALUES = 0x1p31;
+/* In cells: the distance of a hit, and the shortest step, which moves rays on along walls. */
+static const double MET = 0.01;
+static const double SHORTEST_STEP = 0.1;
+
+static void size_of(const vsh_outline *outline, double margin, double cell, double sides[2]) {
+    const vshi_outline_node *root = &outline->nodes[0];
+    for (int axis = 0; axis < 2; ++axis) {
+        sides[axis] = ceil((root->high[axis] - root->low[axis] + 2.0 * margin) / cell) + 2.0;
+    }
+}
+
+/* Bytes that it takes for an outline's box grown by `margin`; more than 2^31 values are infinitely many. */
+static double grid_bytes(const vsh_outline *outline, double margin, double cell) {
+    double sides[2];
+    size_of(outline, margin, cell, sides);
+    const double values = sides[0] * sides[1];
+    return values <= MAX_VALUES ? values * sizeof(float) : INFINITY;
+}
+
+typedef struct filling {
+    const vsh_outline *outline;
+    grid *grid;
+} filling;
+
+static void fill_grid_rows(void *user, size_t begin, size_t end) {
+    const filling *f = user;
+    const grid *g = f->grid;
+    for (size_t row = begin; row < end; ++row) {
+        double bound = INFINITY; /* a neighbour's distance and a step bound the next one's */
+        for (size_t column = 0; column < g->columns; ++column) {
+            const vshi_point p = {g->low[0] + (double)column * g->cell, g->low[1] + (double)row * g->cell};
+            const double distance = sqrt(vshi_outline_square(f->outline, p, bound * bound));
+            bound = distance * (1.0 + 1e-9) + 1.001 * g->cell;
+            g->values[row * g->columns + column] =
+                (float)(vshi_outline_winding(f->outline, p) != 0 ? -distance : distance);
+        }
+    }
+}
+
+/* Free the values with free(). Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+static vsh_result make_grid(const vsh_outline *outline, double margin, double cell, const vsh_run *run,
+                            grid *made, vsh_error *error) {
+    double sides[2];
+    size_of(outline, margin, cell, sides);
+    *made = (grid){.cell = cell, .columns = (size_t)sides[0], .rows = (size_t)sides[1]};
+    for (int axis = 0; axis < 2; ++axis) {
+        made->low[axis] = outline->nodes[0].low[axis] - margin - 0.5 * cell;
+        made->high[axis] = made->low[axis] + (sides[axis] - 1.0) * cell;
+    }
+    void *memory = NULL;
+    vsh_result result = vshi_allocate(&memory, made->columns * made->rows, sizeof(float), "distances", error);
+    made->values = memory;
+    if (result != VSH_OK) {
+        return result;
+    }
+    vshi_job *job = vshi_job_begin(run, "field", made->rows);
+    filling f = {outline, made};
+    result = job != NULL ? vshi_parallel_for(job, made->rows, 1, 1, fill_grid_rows, &f, error)
+                         : vshi_fail(error, VSH_ERROR_MEMORY, "distances: the system refused memory");
+    vshi_job_end(job);
+    return result;
+}
+
+/* Bilinear, in the grid. */
+static double sample(const grid *g, vshi_point p) {
+    const double x = fmin(fmax((p.x - g->low[0]) / g->cell, 0.0), (double)(g->columns - 1));
+    const double y = fmin(fmax((p.y - g->low[1]) / g->cell, 0.0), (double)(g->rows - 1));
+    const size_t i = x < (double)(g->columns - 2) ? (size_t)x : g->columns - 2;
+    const size_t k = y < (double)(g->rows - 2) ? (size_t)y : g->rows - 2;
+    const double u = x - (double)i, v = y - (double)k;
+    const float *at = g->values + k * g->columns + i, *above = at + g->columns;
+    return (1.0 - v) * ((1.0 - u) * (double)at[0] + u * (double)at[1]) +
+           v * ((1.0 - u) * (double)above[0] + u * (double)above[1]);
+}
+
+/* The part of the ray in the grid's rectangle. */
+static bool clip_ray(const grid *g, const vshi_flat_view *v, double *from, double *to) {
+    const double origin[2] = {v->point.x, v->point.y}, direction[2] = {v->towards.x, v->towards.y};
+    for (int axis = 0; axis < 2; ++axis) {
+        if (direction[axis] == 0.0) {
+            if (origin[axis] < g->low[axis] || origin[axis] > g->high[axis]) {
+                return false;
+            }
+            continue;
+        }
+        const double a = (g->low[axis] - origin[axis]) / direction[axis];
+        const double b = (g->high[axis] - origin[axis]) / direction[axis];
+        *from = fmax(*from, fmin(a, b));
+        *to = fmin(*to, fmax(a, b));
+    }
+    return *from < *to;
+}
+
+/* Technique "soft shadows in raymarched SDFs" (Quilez, 2010) in the plane, as 2D lighting uses it (Kaplan):
+ * the least h/(s t) along the ray to the light's centre, 0 where it meets something. */
+static double find_classic(const grid *g, const vshi_flat_view *v, int32_t max_steps) {
+    double t = g->cell, end = v->distance;
+    if (!clip_ray(g, v, &t, &end)) {
+        return 1.0;
+    }
+    const double sine =
+        isinf(v->distance) ? v->slope / sqrt(1.0 + v->slope * v->slope) : v->radius / v->distance;
+    double least = 1.0;
+    for (int32_t step = 0; step < max_steps && t < end; ++step) {
+        const double h =
+            sample(g, (vshi_point){v->point.x + t * v->towards.x, v->point.y + t * v->towards.y});
+        if (h < MET * g->cell) {
+            return 0.0;
+        }
+        least = h < least * sine * t ? h / (sine * t) : least;
+        t += fmax(h, SHORTEST_STEP * g->cell);
+    }
+    return least;
+}
 
 /* --- what is asked for */
 
@@ -74,9 +200,9 @@ typedef struct bake {
     size_t light_count;
     vsh_flat_options options;
     const vsh_flat_map *map;
-    vshi_flat_grid grid; /* of the classic method */
-    double texel[2];     /* size, world units */
-    uint8_t *state;      /* [height][width], for padding; or NULL */
+    grid grid;       /* of the classic method */
+    double texel[2]; /* size, world units */
+    uint8_t *state;  /* [height][width], for padding; or NULL */
 } bake;
 
 static float *plane(float *const *planes, size_t index) {
@@ -107,7 +233,7 @@ static double see(const bake *b, const vsh_light *light, vshi_point p, double *g
         return vshi_flat_visible(b->casters, &view);
     }
     if (b->options.method == VSH_FLAT_CLASSIC && b->grid.values != NULL) {
-        return vshi_flat_classic(&b->grid, &view, b->options.max_steps);
+        return find_classic(&b->grid, &view, b->options.max_steps);
     }
     return vshi_flat_centre_visible(b->casters, &view) ? 1.0 : 0.0;
 }
@@ -219,15 +345,15 @@ static vsh_result prepare(bake *b, const vsh_run *run, vsh_error *error) {
         bytes += (double)info.bytes;
     }
     if (classic) {
-        const double grid = vshi_flat_grid_bytes(b->casters, margin_of(b), cell);
-        if (isinf(grid)) {
+        const double held = grid_bytes(b->casters, margin_of(b), cell);
+        if (isinf(held)) {
             return vshi_fail(
                 error, VSH_ERROR_LIMIT,
                 "flat: method classic: more than 2^31 distances: the outline and the lights' widths "
                 "are too large for texels of %g",
                 cell);
         }
-        bytes += grid;
+        bytes += held;
     }
     VSHI_TRY(vshi_check_limit(run, bytes, "flat", error));
     if (padded) {
@@ -236,7 +362,7 @@ static vsh_result prepare(bake *b, const vsh_run *run, vsh_error *error) {
         b->state = memory;
     }
     if (classic) {
-        VSHI_TRY(vshi_flat_grid_make(b->casters, margin_of(b), cell, run, &b->grid, error));
+        VSHI_TRY(make_grid(b->casters, margin_of(b), cell, run, &b->grid, error));
     }
     return VSH_OK;
 }

@@ -7,7 +7,7 @@
  * those halves whose box reaches beyond what is hidden already. That finds a contour's extremes in a time
  * with the logarithm of its length. What is left at the end are intervals, and the sum of their angles is
  * exact. */
-#include "flat/distances.h"
+#include "flat/visible.h"
 
 #include "base/elementary.h"
 #include "light/view.h"
