@@ -10,7 +10,7 @@ foreach(name data gltf materials scene shader charts bakes pick panels main)
   list(APPEND scripts ${PAGE}/${name}.js)
 endforeach()
 
-set(text "/* Made by cmake/embed.cmake. */\n#include \"view/embedded.h\"\n")
+set(text "/* Made by cmake/embed.cmake. */\n#include \"view/page.h\"\n")
 set(count 0)
 string(ASCII 13 return)
 function(embed file)

@@ -1,6 +1,6 @@
 /* Planes of a bake in a page: halves, their high bytes before their low ones, each less its left neighbour,
  * by deflate. */
-#include "view/parts.h"
+#include "view/page.h"
 
 #include "base/memory.h"
 #include "base/try.h"
@@ -44,7 +44,7 @@ static vsh_result put_deflated(vshi_view *view, const uint8_t *bytes, size_t cou
     if (deflateInit(&stream, Z_DEFAULT_COMPRESSION) != Z_OK) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", view->page->path);
     }
-    vshi_page_data_begin(view->page, VSHI_VIEW_BLOCK, view->blocks++);
+    vshi_page_data_begin(view->page);
     int state = Z_OK;
     while (state != Z_STREAM_END) {
         const size_t now = count < MOST ? count : MOST;
@@ -90,12 +90,11 @@ static bool is_picture(const char *name) {
 static vsh_result put_channel(vshi_view *view, const vsh_image *image, int32_t channel, bool srgb,
                               uint8_t *bytes, json_t *channels, vsh_error *error) {
     const size_t texels = (size_t)image->width * (size_t)image->height;
-    char block[32];
-    snprintf(block, sizeof block, VSHI_VIEW_BLOCK "%zu", view->blocks);
     split(image->planes[channel], image->width, image->height, srgb, bytes);
     VSHI_TRY(put_deflated(view, bytes, 2 * texels, error));
     return vshi_view_tell(
-        channels, NULL, json_pack("{s:o, s:s}", "name", vshi_view_text(image->names[channel]), "data", block),
+        channels, NULL,
+        json_pack("{s:o, s:s}", "name", vshi_view_text(image->names[channel]), "data", view->page->block),
         error);
 }
 

@@ -6,7 +6,7 @@
 #include "field/surface.h"
 #include "model/model.h"
 #include "shade/occluders.h"
-#include "view/parts.h"
+#include "view/page.h"
 
 #include <math.h>
 #include <stdlib.h>

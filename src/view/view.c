@@ -7,13 +7,119 @@
 #include "base/threads.h"
 #include "base/try.h"
 #include "base/utf8.h"
-#include "view/embedded.h"
-#include "view/parts.h"
+#include "view/page.h"
 
 #include <sha256.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* --- the file */
+
+/* Begins the file, of a page of zeros; end with commit_page(), also where something failed, or with
+ * abandon_page(). Errors: as vshi_output_begin(). */
+static vsh_result begin_page(vshi_page *page, const char *path, vsh_error *error) {
+    page->path = path;
+    page->sink.file = -1;
+    const vsh_result result = vshi_output_begin(&page->output, path, error);
+    if (result == VSH_OK) {
+        page->sink = vshi_sink_open(page->output.temporary);
+    }
+    return result;
+}
+
+static void flush(vshi_page *page) {
+    vshi_sink_write(&page->sink, page->buffer, page->used, page->written);
+    page->written += page->used;
+    page->used = 0;
+}
+
+void vshi_page_put(vshi_page *page, const void *bytes, size_t count) {
+    const char *from = bytes;
+    while (count > 0) {
+        const size_t room = sizeof page->buffer - page->used, now = count < room ? count : room;
+        memcpy(page->buffer + page->used, from, now);
+        page->used += now;
+        from += now;
+        count -= now;
+        if (page->used == sizeof page->buffer) {
+            flush(page);
+        }
+    }
+}
+
+void vshi_page_text(vshi_page *page, const char *text) {
+    vshi_page_put(page, text, strlen(text));
+}
+
+vsh_result vshi_page_check(const vshi_page *page, vsh_error *error) {
+    return page->sink.error == 0 ? VSH_OK
+                                 : vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s",
+                                             page->path, strerror(page->sink.error));
+}
+
+static vsh_result commit_page(vshi_page *page, vsh_error *error) {
+    flush(page);
+    vshi_sink_close(&page->sink);
+    const vsh_result result = vshi_page_check(page, error);
+    if (result != VSH_OK) {
+        vshi_output_abandon(&page->output);
+        return result;
+    }
+    return vshi_output_commit(&page->output, error);
+}
+
+static void abandon_page(vshi_page *page) {
+    if (page->sink.file >= 0) {
+        vshi_sink_close(&page->sink);
+    }
+    vshi_output_abandon(&page->output);
+}
+
+void vshi_page_data_begin(vshi_page *page) {
+    snprintf(page->block, sizeof page->block, "data%zu", page->blocks++);
+    vshi_page_text(page, "<script type=\"application/octet-stream\" id=\"");
+    vshi_page_text(page, page->block);
+    vshi_page_text(page, "\">");
+}
+
+static void put_group(vshi_page *page, const uint8_t *bytes, size_t count) {
+    char letters[VSHI_BASE64_LETTERS];
+    vshi_base64_group(bytes, count, letters);
+    vshi_page_put(page, letters, sizeof letters);
+}
+
+void vshi_page_data(vshi_page *page, const void *bytes, size_t count) {
+    const uint8_t *from = bytes;
+    if (page->grouped > 0) {
+        while (page->grouped < VSHI_BASE64_BYTES && count > 0) {
+            page->group[page->grouped++] = *from++;
+            --count;
+        }
+        if (page->grouped < VSHI_BASE64_BYTES) {
+            return;
+        }
+        put_group(page, page->group, VSHI_BASE64_BYTES);
+    }
+    for (; count >= VSHI_BASE64_BYTES; count -= VSHI_BASE64_BYTES) {
+        put_group(page, from, VSHI_BASE64_BYTES);
+        from += VSHI_BASE64_BYTES;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        page->group[i] = from[i];
+    }
+    page->grouped = count;
+}
+
+void vshi_page_data_end(vshi_page *page) {
+    if (page->grouped > 0) {
+        put_group(page, page->group, page->grouped);
+        page->grouped = 0;
+    }
+    vshi_page_text(page, "</script>\n");
+}
+
+/* --- helpers of the parts */
 
 const char *vshi_view_file_name(const char *path) {
     const char *slash = strrchr(path, '/');
@@ -138,37 +244,23 @@ static const char *name_of(const vsh_view_bake *bake) {
     return vshi_view_file_name(bake->model != NULL ? bake->model : bake->planes[0]);
 }
 
-static vsh_result put_bake(vshi_view *view, const vsh_view_bake *bake, vsh_error *error) {
+/* A bake, or the surface where that is not NULL. */
+static vsh_result put_bake(vshi_view *view, const vsh_view_bake *bake, const vshi_view_surface *surface,
+                           vsh_error *error) {
     json_t *about = json_object(), *pages = json_array();
+    const char *name = surface != NULL ? surface->name : name_of(bake);
     vsh_result result;
-    VSHI_TRY_DONE(vshi_view_tell(about, "name", vshi_view_text(name_of(bake)), error));
-    VSHI_TRY_DONE(vshi_view_tell(about, "uvSet", json_integer(bake->uv_set), error));
-    if (bake->model != NULL) {
+    VSHI_TRY_DONE(vshi_view_tell(about, "name", vshi_view_text(name), error));
+    VSHI_TRY_DONE(vshi_view_tell(about, "uvSet", json_integer(surface != NULL ? -1 : bake->uv_set), error));
+    if (surface != NULL) {
+        VSHI_TRY_DONE(vshi_view_put_arrays(view, name, surface->model, about, error));
+        VSHI_TRY_DONE(vshi_view_tell(about, "perVertex", json_true(), error));
+        VSHI_TRY_DONE(vshi_view_put_image(view, name, surface->image, pages, error));
+    } else if (bake->model != NULL) {
         VSHI_TRY_DONE(vshi_view_put_model(view, bake->model, about, error));
     }
-    for (size_t i = 0; i < bake->plane_count; ++i) {
+    for (size_t i = 0; surface == NULL && i < bake->plane_count; ++i) {
         VSHI_TRY_DONE(vshi_view_put_planes(view, bake->planes[i], pages, error));
-    }
-    VSHI_TRY_DONE(vshi_view_tell(about, "pages", json_incref(pages), error));
-    VSHI_TRY_DONE(vshi_view_tell(view->about, NULL, json_incref(about), error));
-done:
-    json_decref(pages);
-    json_decref(about);
-    return result;
-}
-
-static vsh_result put_surface(vshi_view *view, const vshi_view_surface *surface, vsh_error *error) {
-    json_t *about = json_object(), *pages = json_array();
-    char block[32];
-    vsh_result result;
-    snprintf(block, sizeof block, VSHI_VIEW_BLOCK "%zu", view->blocks);
-    VSHI_TRY_DONE(vshi_view_put_arrays(view, surface->name, surface->model, error));
-    VSHI_TRY_DONE(vshi_view_tell(about, "name", vshi_view_text(surface->name), error));
-    VSHI_TRY_DONE(vshi_view_tell(about, "uvSet", json_integer(-1), error));
-    VSHI_TRY_DONE(vshi_view_tell(about, "model", json_string(block), error));
-    VSHI_TRY_DONE(vshi_view_tell(about, "perVertex", json_true(), error));
-    if (surface->image != NULL) {
-        VSHI_TRY_DONE(vshi_view_put_image(view, surface->name, surface->image, pages, error));
     }
     VSHI_TRY_DONE(vshi_view_tell(about, "pages", json_incref(pages), error));
     VSHI_TRY_DONE(vshi_view_tell(view->about, NULL, json_incref(about), error));
@@ -210,10 +302,10 @@ typedef struct writing {
 static vsh_result put_page(vshi_view *view, const writing *w, vsh_error *error) {
     put_head(view->page);
     for (size_t i = 0; i < w->count; ++i) {
-        VSHI_TRY(put_bake(view, &w->bakes[i], error));
+        VSHI_TRY(put_bake(view, &w->bakes[i], NULL, error));
     }
     if (w->surface != NULL) {
-        VSHI_TRY(put_surface(view, w->surface, error));
+        VSHI_TRY(put_bake(view, NULL, w->surface, error));
     }
     VSHI_TRY(put_about(view, error));
     put_scripts(view->page);
@@ -222,28 +314,24 @@ static vsh_result put_page(vshi_view *view, const writing *w, vsh_error *error) 
 
 static vsh_result write_page(void *user, vsh_error *error) {
     const writing *w = user;
-    void *memory = NULL;
-    VSHI_TRY(vshi_allocate(&memory, 1, sizeof(vshi_page), "page", error));
-    vshi_page *page = memory;
-    vsh_result result = vshi_page_begin(page, w->path, error);
-    if (result != VSH_OK) {
-        free(page);
-        return result;
+    vshi_page *page;
+    vshi_view view = {.run = w->run};
+    vsh_result result;
+    VSHI_TRY(vshi_allocate((void **)&page, 1, sizeof *page, "page", error));
+    VSHI_TRY_DONE(begin_page(page, w->path, error));
+    view.page = page;
+    view.about = json_array();
+    result = view.about != NULL
+                 ? put_page(&view, w, error)
+                 : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", w->path);
+    if (result == VSH_OK) {
+        result = commit_page(page, error);
+    } else {
+        abandon_page(page);
     }
-    vshi_view view = {page, w->run, 0, json_array()};
-    if (view.about == NULL) {
-        result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", w->path);
-        goto done;
-    }
-    VSHI_TRY_DONE(put_page(&view, w, error));
-    result = vshi_page_commit(page, error);
-    page = NULL;
-done:
     json_decref(view.about);
-    if (page != NULL) {
-        vshi_page_abandon(page);
-    }
-    free(memory);
+done:
+    free(page);
     return result;
 }
 

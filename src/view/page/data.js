@@ -32,7 +32,7 @@ const VIEW = {};
         return new Uint8Array(await new Response(stream).arrayBuffer());
     };
 
-    /* A plane of halves: all high bytes, then all low ones, each less its left neighbour (view_planes.c). */
+    /* A plane of halves: all high bytes, then all low ones, each less its left neighbour (src/view/planes.c). */
     VIEW.plane = async function (id, width, height) {
         const texels = width * height, bytes = await VIEW.inflate(VIEW.block(id));
         if (bytes.length !== 2 * texels) {
