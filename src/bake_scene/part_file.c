@@ -1,6 +1,5 @@
 #include "bake_scene/part_file.h"
 
-#include "base/input.h"
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"

@@ -18,7 +18,6 @@ VSHI_SHARED vsh_result vshi_attributes_check(const char *path, const vsh_attribu
 /* A list that owns its texts; begins as zeros. */
 typedef struct vshi_attributes {
     vsh_attribute *list; /* [count] */
-    char *(*texts)[2];   /* name and value of each, to be freed */
     size_t count, capacity;
 } vshi_attributes;
 

@@ -1,12 +1,15 @@
+#define _GNU_SOURCE /* getdents64 */
 #include "base/file.h"
 
-#include "base/temporary.h"
-
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
-#include <stdio.h>
+#include <inttypes.h>
+#include <limits.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -20,6 +23,172 @@ const char *vshi_path_ending(const char *path) {
     const char *dot = strrchr(name, '.');
     return dot != NULL && dot != name ? dot + 1 : "";
 }
+
+/* --- temporary files beside their targets, and those that dead processes have left there */
+
+enum {
+    TEMPORARY_ROOM = 48,   /* bytes that the name adds to the target's: dots, process, number, "tmp" */
+    MAX_TEMPORARIES = 1000 /* of one target and process at a time */
+};
+
+/* What the names of a target's temporaries begin and end with, around process and number. */
+typedef struct naming {
+    const char *name; /* the target's last part */
+    int folder_length, stem_length;
+    const char *dot, *ending;
+} naming;
+
+static naming naming_of(const char *target) {
+    naming n = {.name = last_part(target), .ending = vshi_path_ending(target)};
+    n.folder_length = (int)(n.name - target);
+    n.dot = n.ending[0] != '\0' ? "." : "";
+    const size_t ending = strlen(n.ending);
+    const size_t stem = ending > 0 ? (size_t)(n.ending - n.name) - 1 : strlen(n.name);
+    const size_t room = ending + TEMPORARY_ROOM < NAME_MAX ? NAME_MAX - ending - TEMPORARY_ROOM : 0;
+    n.stem_length = (int)(stem < room ? stem : room);
+    return n;
+}
+
+/* Whether the lock is ours now. Where the file system has none, nobody else has it either. */
+static bool lock(int file) {
+    return flock(file, LOCK_EX | LOCK_NB) == 0 || (errno != EWOULDBLOCK && errno != EINTR);
+}
+
+/* Whether the path still leads to this file: one that was found without a lock may have been removed. */
+static bool is_at(int file, const char *path) {
+    struct stat held, there;
+    return fstat(file, &held) == 0 && stat(path, &there) == 0 && held.st_dev == there.st_dev &&
+           held.st_ino == there.st_ino;
+}
+
+/* Creates ".NAME.PID.tmp.ENDING" beside the target (with a number where that name is taken), empty, and
+ * returns its descriptor, or -1 with errno. `path` has room for the target and TEMPORARY_ROOM more. As
+ * long as the descriptor is open, it holds a lock on the file that says that its process lives. */
+static int create_temporary(const char *target, char *path, size_t capacity) {
+    const naming n = naming_of(target);
+    for (int number = 0; number < MAX_TEMPORARIES; ++number) {
+        char tag[TEMPORARY_ROOM];
+        if (number == 0) {
+            snprintf(tag, sizeof tag, "%ld", (long)getpid());
+        } else {
+            snprintf(tag, sizeof tag, "%ld-%d", (long)getpid(), number);
+        }
+        snprintf(path, capacity, "%.*s.%.*s.%s.tmp%s%s", n.folder_length, target, n.stem_length, n.name, tag,
+                 n.dot, n.ending);
+        const int file = open(path, O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
+        if (file < 0 && errno != EEXIST) {
+            return -1;
+        }
+        if (file >= 0 && lock(file) && is_at(file, path)) {
+            return file;
+        }
+        if (file >= 0) {
+            close(file); /* another run is removing it */
+        }
+    }
+    errno = EEXIST;
+    return -1;
+}
+
+/* The process that a name tells of; 0: it is no temporary of this target. */
+static long process_of(const naming *n, const char *entry) {
+    if (entry[0] != '.' || strncmp(entry + 1, n->name, (size_t)n->stem_length) != 0 ||
+        entry[1 + n->stem_length] != '.') {
+        return 0;
+    }
+    const char *at = entry + 2 + n->stem_length;
+    const size_t digits = strspn(at, "0123456789");
+    if (digits == 0 || digits > 10) {
+        return 0;
+    }
+    const long process = strtol(at, NULL, 10);
+    at += digits;
+    if (*at == '-') {
+        const size_t number = strspn(at + 1, "0123456789");
+        at += number > 0 ? 1 + number : 0;
+    }
+    const size_t tag = strlen(".tmp");
+    if (strncmp(at, ".tmp", tag) != 0) {
+        return 0;
+    }
+    at += tag;
+    const size_t dot = strlen(n->dot);
+    return strncmp(at, n->dot, dot) == 0 && strcmp(at + dot, n->ending) == 0 ? process : 0;
+}
+
+/* Whether nobody holds the file. The lock is kept until `file` is closed. */
+static bool is_left(int file, long process) {
+    if (flock(file, LOCK_EX | LOCK_NB) == 0) {
+        return true;
+    }
+    return errno != EWOULDBLOCK && errno != EINTR && kill((pid_t)process, 0) != 0 && errno == ESRCH;
+}
+
+/* Removes this target's temporaries that no process holds: what a run left that was killed. A lock tells,
+ * which every process on this machine sees, in whatever container, and through the usual network file systems
+ * other machines do; where a file system knows no locks, the process's number does. Others' files, and all
+ * that cannot be looked at, stay. */
+static void clean_temporaries(const char *target) {
+    const naming n = naming_of(target);
+    char folder[PATH_MAX];
+    if (n.folder_length >= PATH_MAX) {
+        return;
+    }
+    snprintf(folder, sizeof folder, "%.*s", n.folder_length > 0 ? n.folder_length : 1,
+             n.folder_length > 0 ? target : ".");
+    DIR *listing = opendir(folder);
+    if (listing == NULL) {
+        return;
+    }
+    for (const struct dirent *entry = readdir(listing); entry != NULL; entry = readdir(listing)) {
+        const long process = process_of(&n, entry->d_name);
+        if (process == 0) {
+            continue;
+        }
+        const int file =
+            openat(dirfd(listing), entry->d_name, O_WRONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+        struct stat status;
+        if (file >= 0) {
+            if (fstat(file, &status) == 0 && S_ISREG(status.st_mode) && status.st_uid == geteuid() &&
+                is_left(file, process)) {
+                unlinkat(dirfd(listing), entry->d_name, 0);
+            }
+            close(file);
+        }
+    }
+    closedir(listing);
+}
+
+static void remove_open(int folder, const char *descriptor) {
+    char path[PATH_MAX], only[TEMPORARY_ROOM], numbered[TEMPORARY_ROOM];
+    const ssize_t size = readlinkat(folder, descriptor, path, sizeof path - 1);
+    if (size <= 0) {
+        return;
+    }
+    path[size] = '\0';
+    snprintf(only, sizeof only, ".%ld.tmp", (long)getpid());
+    snprintf(numbered, sizeof numbered, ".%ld-", (long)getpid());
+    const char *slash = strrchr(path, '/');
+    if (slash != NULL && slash[1] == '.' &&
+        (strstr(slash, only) != NULL || (strstr(slash, numbered) != NULL && strstr(slash, ".tmp") != NULL))) {
+        unlink(path);
+    }
+}
+
+void vshi_temporary_remove_own(void) {
+    const int folder = open("/proc/self/fd", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    _Alignas(struct dirent64) char entries[2048];
+    for (ssize_t size; (size = getdents64(folder, entries, sizeof entries)) > 0;) {
+        const struct dirent64 *entry;
+        for (ssize_t at = 0; at < size; at += entry->d_reclen) {
+            entry = (const void *)(entries + at);
+            remove_open(folder, entry->d_name);
+        }
+    }
+    close(folder);
+}
+
+/* --- files that appear whole or not at all */
 
 /* The folder of the path, in new memory: "." where the path names none. */
 static char *folder_of(const char *path) {
@@ -84,15 +253,15 @@ vsh_result vshi_output_begin(vshi_output *output, const char *path, vsh_error *e
     struct stat old;
     const bool replaces = stat(path, &old) == 0;
     output->target = replaces ? realpath(path, NULL) : strdup(path);
-    const size_t capacity = output->target != NULL ? strlen(output->target) + VSHI_TEMPORARY_ROOM : 0;
+    const size_t capacity = output->target != NULL ? strlen(output->target) + TEMPORARY_ROOM : 0;
     output->temporary = output->target != NULL ? malloc(capacity) : NULL;
     if (output->temporary == NULL) {
         free(output->target);
         output->target = NULL;
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
     }
-    vshi_temporary_clean(output->target);
-    const int file = vshi_temporary_create(output->target, output->temporary, capacity);
+    clean_temporaries(output->target);
+    const int file = create_temporary(output->target, output->temporary, capacity);
     if (file < 0) {
         result = vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", path, strerror(errno));
         free(output->temporary);
@@ -131,38 +300,18 @@ static vsh_result put_in_place(const char *temporary, const char *target, vsh_er
 
 static vsh_result sync_file(const char *temporary, const char *target, vsh_error *error) {
     const int file = open(temporary, O_RDONLY | O_CLOEXEC);
-    if (file < 0) {
-        return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", target, strerror(errno));
-    }
-    const bool flushed = fsync(file) == 0 || errno == EINVAL; /* EINVAL: the file system cannot sync */
-    const int flush_error = errno;
-    const bool closed = close(file) == 0;
+    const bool flushed = file >= 0 && (fsync(file) == 0 || errno == EINVAL); /* the file system cannot sync */
+    const int why = errno;
+    const bool closed = file < 0 || close(file) == 0;
     return flushed && closed ? VSH_OK
                              : vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", target,
-                                         strerror(flushed ? errno : flush_error));
-}
-
-static void forget_temporary(vshi_output *output) {
-    free(output->temporary);
-    output->temporary = NULL;
-}
-
-vsh_result vshi_output_commit(vshi_output *output, vsh_error *error) {
-    vsh_result result = sync_file(output->temporary, output->target, error);
-    if (result == VSH_OK) {
-        result = put_in_place(output->temporary, output->target, error);
-    }
-    if (result == VSH_OK) {
-        forget_temporary(output);
-    }
-    vshi_output_abandon(output);
-    return result;
+                                         strerror(flushed ? errno : why));
 }
 
 /* Another name for what stands at a target, "" where nothing does or the file system has no such names. It
  * looks like a temporary file that a killed process has left, which the next run takes away. */
 static vsh_result keep_old(const char *target, char **kept, vsh_error *error) {
-    const size_t capacity = strlen(target) + VSHI_TEMPORARY_ROOM;
+    const size_t capacity = strlen(target) + TEMPORARY_ROOM;
     *kept = malloc(capacity);
     if (*kept == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", target);
@@ -171,7 +320,7 @@ static vsh_result keep_old(const char *target, char **kept, vsh_error *error) {
     if (access(target, F_OK) != 0) {
         return VSH_OK;
     }
-    const int file = vshi_temporary_create(target, *kept, capacity);
+    const int file = create_temporary(target, *kept, capacity);
     if (file < 0) {
         (*kept)[0] = '\0';
         return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", target, strerror(errno));
@@ -194,9 +343,6 @@ static void take_back(const char *target, const char *kept) {
 }
 
 vsh_result vshi_outputs_commit(vshi_output *const *outputs, size_t count, vsh_error *error) {
-    if (count == 1) {
-        return vshi_output_commit(outputs[0], error);
-    }
     char **kept = calloc(count + 1, sizeof *kept);
     vsh_result result =
         kept != NULL ? VSH_OK : vshi_fail(error, VSH_ERROR_MEMORY, "outputs: the system refused memory");
@@ -204,7 +350,7 @@ vsh_result vshi_outputs_commit(vshi_output *const *outputs, size_t count, vsh_er
     for (size_t i = 0; i < count && result == VSH_OK; ++i) {
         result = sync_file(outputs[i]->temporary, outputs[i]->target, error);
     }
-    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
+    for (size_t i = 0; i < count && count > 1 && result == VSH_OK; ++i) {
         result = keep_old(outputs[i]->target, &kept[i], error);
     }
     for (; placed < count && result == VSH_OK; placed += result == VSH_OK) {
@@ -217,7 +363,8 @@ vsh_result vshi_outputs_commit(vshi_output *const *outputs, size_t count, vsh_er
             unlink(kept[i]);
         }
         if (i < placed) {
-            forget_temporary(outputs[i]);
+            free(outputs[i]->temporary);
+            outputs[i]->temporary = NULL;
         }
         free(kept[i]);
     }
@@ -226,6 +373,10 @@ vsh_result vshi_outputs_commit(vshi_output *const *outputs, size_t count, vsh_er
     }
     free(kept);
     return result;
+}
+
+vsh_result vshi_output_commit(vshi_output *output, vsh_error *error) {
+    return vshi_outputs_commit(&output, 1, error);
 }
 
 void vshi_output_abandon(vshi_output *output) {
@@ -267,4 +418,78 @@ int vshi_sink_close(vshi_sink *sink) {
     }
     sink->file = -1;
     return sink->error;
+}
+
+/* --- opening a file that somebody else may have put there */
+
+static vsh_result fail_input(const char *name, const char *why, vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", name, why);
+}
+
+static vsh_result check_input(int file, const char *name, uint64_t most, uint64_t *size, vsh_error *error) {
+    struct stat status;
+    if (fstat(file, &status) != 0) {
+        return fail_input(name, strerror(errno), error);
+    }
+    if (!S_ISREG(status.st_mode)) {
+        return fail_input(name, S_ISDIR(status.st_mode) ? "it is a folder" : "it is no regular file", error);
+    }
+    *size = (uint64_t)status.st_size;
+    if (*size > most) {
+        return vshi_fail(error, VSH_ERROR_LIMIT,
+                         "%s: is larger than the %" PRIu64 " bytes that such a file may have", name, most);
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_input_open(const char *path, const char *name, uint64_t most, FILE **file, uint64_t *size,
+                           vsh_error *error) {
+    *file = NULL;
+    *size = 0;
+    const int opened = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+    if (opened < 0) {
+        return fail_input(name, strerror(errno), error);
+    }
+    vsh_result result = check_input(opened, name, most, size, error);
+    if (result == VSH_OK) {
+        *file = fdopen(opened, "rb");
+        result = *file != NULL ? VSH_OK
+                               : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", name);
+    }
+    if (result != VSH_OK) {
+        close(opened);
+    }
+    return result;
+}
+
+/* Cuts the last part off a whole path; "/" stays. */
+static void cut_last(char *path) {
+    char *slash = strrchr(path, '/');
+    slash[slash == path ? 1 : 0] = '\0';
+}
+
+static bool lies_in(const char *folder, const char *path) {
+    const size_t length = strlen(folder);
+    return strncmp(path, folder, length) == 0 && (folder[length - 1] == '/' || path[length] == '/');
+}
+
+bool vshi_input_is_beside(const char *model, const char *path) {
+    char file[PATH_MAX], folder[PATH_MAX], given[PATH_MAX];
+    if (realpath(path, file) == NULL) {
+        return errno == ENOENT;
+    }
+    if (realpath(model, folder) != NULL) {
+        cut_last(folder);
+        if (lies_in(folder, file)) {
+            return true;
+        }
+    }
+    const char *slash = strrchr(model, '/');
+    const size_t length = slash != NULL ? (size_t)(slash - model) + 1 : 0;
+    if (length >= sizeof given) {
+        return false;
+    }
+    memcpy(given, length > 0 ? model : ".", length > 0 ? length : 1);
+    given[length > 0 ? length : 1] = '\0';
+    return realpath(given, folder) != NULL && lies_in(folder, file);
 }

@@ -1,4 +1,4 @@
-/* Files that appear whole or not at all. */
+/* Files that appear whole or not at all, and files that somebody else may have put there. */
 #ifndef VSHI_FILE_H
 #define VSHI_FILE_H
 
@@ -6,6 +6,7 @@
 #include "base/shared.h"
 
 #include <stdbool.h>
+#include <stdio.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -43,6 +44,9 @@ vsh_result vshi_outputs_commit(vshi_output *const *outputs, size_t count, vsh_er
 /* Removes the temporary; the target is as it was. Does nothing where nothing is under way. */
 VSHI_SHARED void vshi_output_abandon(vshi_output *output);
 
+/* Removes the temporary files that this process holds open. Takes no memory and no lock. */
+VSHI_SHARED void vshi_temporary_remove_own(void);
+
 /* The bytes of a file under way, written at any place. For the libraries whose own writing hides failures, or
  * does worse after one: the first failure is kept, and what follows is left out. One thread at a time. */
 typedef struct vshi_sink {
@@ -53,6 +57,18 @@ typedef struct vshi_sink {
 VSHI_SHARED vshi_sink vshi_sink_open(const char *path); /* empties the file; a failure shows in `error` */
 VSHI_SHARED bool vshi_sink_write(vshi_sink *sink, const void *data, size_t size, uint64_t offset);
 VSHI_SHARED int vshi_sink_close(vshi_sink *sink); /* returns `error`, with what closing came to */
+
+/* --- reading */
+
+/* Opens a regular file for reading, without waiting: a pipe waits for its writer, a device has no end. *size
+ * is its bytes, at most `most`. Messages begin with `name`. Errors: VSH_ERROR_READ, VSH_ERROR_LIMIT (larger
+ * than `most`), VSH_ERROR_MEMORY. */
+VSHI_SHARED vsh_result vshi_input_open(const char *path, const char *name, uint64_t most, FILE **file,
+                                       uint64_t *size, vsh_error *error);
+
+/* Whether a file that `model` names lies in the model's folder or below, links followed; where the model is a
+ * link, the folder of what it leads to is as good. A file that is not there lies nowhere else: true. */
+VSHI_SHARED bool vshi_input_is_beside(const char *model, const char *path);
 
 #ifdef __cplusplus
 }

@@ -1,6 +1,6 @@
 #include "document.h"
 
-#include "base/base64.h"
+#include "base/uri.h"
 #include "base/utf8.h"
 #include "message.h"
 #include "temporary.h"

@@ -1,7 +1,7 @@
 #include "signals.h"
 
+#include "base/file.h"
 #include "base/memory.h"
-#include "base/temporary.h"
 #include "message.h"
 
 #include <errno.h>

@@ -2,7 +2,7 @@
 // because Assimp's C API keeps the last error in one global string, shows no progress and cannot be stopped.
 #include "extern/importers.h"
 
-#include "base/input.h"
+#include "base/file.h"
 #include "extern/guard.h"
 
 #include <assimp/commonMetaData.h>

@@ -17,7 +17,7 @@ static void keep_first(exr_result_t *status, exr_result_t next) {
 
 /* --- reading */
 
-/* What OpenEXR says of a failure: the first message of a call, because it is the most exact. */
+/* The first message of OpenEXR about a failure: it is the most exact. */
 typedef struct exr_log {
     char message[400];
 } exr_log;
@@ -227,7 +227,7 @@ done:
 /* --- writing */
 
 /* OpenEXR would print its messages; ours come from the sink and from its codes. It may hold its lock on the
- * context here, so the context must not be asked for anything. */
+ * context here, so nothing here may call OpenEXR. */
 static void say_nothing(exr_const_context_t context, exr_result_t code, const char *message) {
     (void)context;
     (void)code;
@@ -277,7 +277,7 @@ static void sort_by_name(const vshi_planes *planes, int32_t *order) {
     }
 }
 
-/* What follows a failure does no harm to a file that is thrown away. */
+/* Later calls run after a failure, too: the caller then deletes the file. */
 static exr_result_t write_header(exr_writer *writer, const vshi_planes *planes) {
     const exr_context_t file = writer->context;
     char software[64];

@@ -1,7 +1,6 @@
 /* Reading images: the file in memory, which reader a file is for, and what a reader process hands over. */
 #include "base/file.h"
 #include "base/floats.h"
-#include "base/input.h"
 #include "base/memory.h"
 #include "base/threads.h"
 #include "base/try.h"

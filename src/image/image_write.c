@@ -1,10 +1,10 @@
 /* Images that are written, whole or as their rows come: what may go into which file, and how. */
 #include "base/attributes.h"
+#include "base/elementary.h"
 #include "base/file.h"
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "base/srgb.h"
 #include "base/try.h"
 #include "image/codec.h"
 

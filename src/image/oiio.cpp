@@ -1,5 +1,5 @@
-// The module of image formats: every format but OpenEXR and PNG. OpenImageIO chooses nothing here: the table
-// is of what was found to keep data, with OpenImageIO 2.4. docs/formats.md shows it to users.
+// The module of image formats: every format but OpenEXR and PNG. A table, and not
+// OpenImageIO, chooses formats: those that keep data with OpenImageIO 2.4. docs/formats.md lists them.
 #include "image/codec.h"
 
 #include "base/file.h"
@@ -147,7 +147,7 @@ bool find_format(const char *path, vshi_format *format) {
 
 // --- reading
 
-// Of a data window: OpenImageIO counts rows by int, and up to 2^26 ahead.
+// The largest end of a data window: OpenImageIO counts rows by int, and up to 2^26 ahead.
 constexpr int64_t LARGEST_END = int64_t(1) << 30;
 
 // Rows of the file, interleaved, into the planes of the image.

@@ -1,6 +1,5 @@
 /* PNG files through libpng, whose messages and jumps stay within. */
 #include "base/file.h"
-#include "base/input.h"
 #include "base/memory.h"
 #include "base/try.h"
 #include "image/codec.h"
@@ -172,7 +171,7 @@ typedef struct png_writer {
     png_structp png;
     png_infop info;
     bool to_file;
-    vshi_sink sink;        /* of a file; it keeps its failure, which says more than libpng would */
+    vshi_sink sink;        /* of a file; its errno says more than libpng */
     unsigned char *bytes;  /* in memory */
     size_t size, capacity; /* written so far; of `bytes` */
     bool out_of_memory;
@@ -280,7 +279,7 @@ static bool write_row(png_writer *writer, const unsigned char *row) {
     return !writer->out_of_memory;
 }
 
-/* What stands behind the rows, all of which were given. */
+/* Ends the file after its last row. */
 static bool write_end(png_writer *writer) {
     if (setjmp(png_jmpbuf(writer->png)) != 0) {
         return false;
@@ -307,7 +306,7 @@ static vsh_result end_file(void *user, vsh_error *error) {
     if (writer == NULL) {
         return VSH_OK;
     }
-    /* of a file that is given up, libpng would miss the rows */
+    /* libpng would object to the missing rows of an abandoned file */
     const bool done = writer->row < writer->height || write_end(writer);
     vshi_sink_close(&writer->sink);
     const vsh_result result = result_of(writer, done, error);

@@ -1,7 +1,7 @@
 /* The text of a file of JSON, brought into memory within a limit. */
-#include "base/input.h"
+#include "base/bytes.h"
+#include "base/file.h"
 #include "base/job.h"
-#include "base/json_bytes.h"
 #include "base/memory.h"
 #include "base/try.h"
 #include "json/json.h"

@@ -1,8 +1,8 @@
 #include "light/light.h"
 
+#include "base/decimal.h"
 #include "base/error.h"
 #include "base/floats.h"
-#include "base/numbers.h"
 #include "base/try.h"
 #include "light/types.h"
 

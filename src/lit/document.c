@@ -1,7 +1,6 @@
 #include "lit/document.h"
 
 #include "base/bytes.h"
-#include "base/json_bytes.h"
 #include "base/memory.h"
 
 #include <stdio.h>

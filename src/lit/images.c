@@ -1,9 +1,8 @@
 #include "lit/work.h"
 
+#include "base/elementary.h"
 #include "base/file.h"
-#include "base/input.h"
 #include "base/memory.h"
-#include "base/srgb.h"
 #include "base/uri.h"
 #include "image/codec.h"
 

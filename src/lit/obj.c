@@ -1,7 +1,7 @@
 #include "lit/work.h"
 
+#include "base/decimal.h"
 #include "base/file.h"
-#include "base/numbers.h"
 #include "base/vec.h"
 
 #include <inttypes.h>

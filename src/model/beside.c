@@ -2,7 +2,6 @@
 #include "model/model.h"
 
 #include "base/file.h"
-#include "base/input.h"
 #include "base/uri.h"
 #include "model/gltf.h"
 #include "model/obj.h"

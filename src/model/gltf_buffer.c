@@ -1,7 +1,7 @@
 /* The bytes of a glTF: the binary chunk of a GLB, data in the JSON itself, files beside it. */
 #include "model/gltf.h"
 
-#include "base/input.h"
+#include "base/file.h"
 #include "base/memory.h"
 #include "base/uri.h"
 #include "model/text.h"

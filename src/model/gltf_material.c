@@ -3,7 +3,7 @@
 #include "model/gltf.h"
 
 #include "base/elementary.h"
-#include "base/input.h"
+#include "base/file.h"
 #include "base/memory.h"
 #include "base/uri.h"
 

@@ -1,7 +1,6 @@
 /* Reading a mesh file: its ending chooses the reader. */
 #include "base/file.h"
 #include "base/floats.h"
-#include "base/input.h"
 #include "base/memory.h"
 #include "base/threads.h"
 #include "base/try.h"

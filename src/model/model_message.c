@@ -1,5 +1,5 @@
 /* A model between a reader and its caller. */
-#include "base/input.h"
+#include "base/file.h"
 #include "base/memory.h"
 #include "base/try.h"
 #include "mesh/mesh.h"

@@ -1,7 +1,7 @@
 /* MTL, the materials of an OBJ: how much of them is there, and which textures cut them out. */
 #include "base/decimal.h"
 
-#include "base/input.h"
+#include "base/file.h"
 #include "base/memory.h"
 #include "base/try.h"
 #include "model/obj.h"

@@ -2,7 +2,7 @@
 #include "model/text.h"
 
 #include "base/decimal.h"
-#include "base/input.h"
+#include "base/file.h"
 #include "base/memory.h"
 #include "base/try.h"
 

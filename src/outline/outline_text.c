@@ -3,8 +3,8 @@
 #include "outline/outline.h"
 
 #include "base/elementary.h"
+#include "base/file.h"
 #include "base/floats.h"
-#include "base/input.h"
 #include "base/try.h"
 #include "base/utf8.h"
 #include "sandbox/reader.h"

@@ -4,7 +4,6 @@
 #include "base/elementary.h"
 #include "base/floats.h"
 #include "base/parallel.h"
-#include "base/srgb.h"
 #include "render/render.h"
 
 #include <string.h>

@@ -125,7 +125,7 @@ void vshi_lit_free(vshi_lit *lit); /* NULL does nothing */
 
 enum { VSHI_LIT_STRIP = 64 }; /* columns that one thread rasterises */
 
-/* What the samples of some rows see, [rows × columns]. */
+/* The nearest triangles at the samples of some rows, [rows × columns]. */
 typedef struct vshi_lit_band {
     int32_t first_row, rows;
     double *depth;      /* infinite: nothing */
@@ -135,7 +135,7 @@ typedef struct vshi_lit_band {
 /* Fills strip `strip` of a band. */
 void vshi_lit_raster(const vshi_lit *lit, const vshi_lit_band *band, size_t strip);
 
-/* Whether a triangle has no lightmap, so that what falls on it is to be asked for at its points. */
+/* Whether a triangle has no lightmap. Its light is then computed at each hit. */
 bool vshi_lit_is_bare(const vshi_lit *lit, uint32_t triangle);
 
 /* Where a ray meets a triangle. The normals point towards the eye. */
@@ -152,7 +152,7 @@ void vshi_lit_bounds(const vshi_lit *lit, vshi_vec *low, vshi_vec *high);
 /* Light that comes from a triangle with a lightmap along a ray, and its unit normal towards the eye. */
 void vshi_lit_shade(const vshi_lit *lit, uint32_t triangle, vshi_vec ray, float color[3], float normal[3]);
 
-/* --- tiles of samples: where their rays end, and in what light */
+/* --- tiles of samples */
 
 enum { VSHI_TILE = 8, VSHI_TILE_SAMPLES = VSHI_TILE * VSHI_TILE, VSHI_MOST_LIGHTS = 256 };
 
@@ -168,7 +168,7 @@ typedef struct vshi_shafts {
     int32_t steps;
 } vshi_shafts;
 
-/* What holds for a whole picture. */
+/* The scene of a picture. */
 typedef struct vshi_scenery {
     const vsh_render_options *options;
     const vshi_sample_grid *grid;

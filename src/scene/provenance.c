@@ -1,10 +1,10 @@
 /* What an output was made of, as lines of text: settings as they are in force, and hashes of all inputs. */
 #include "base/attributes.h"
+#include "base/decimal.h"
 #include "base/digest.h"
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "base/numbers.h"
 #include "base/try.h"
 #include "light/light.h"
 #include "scene/inputs.h"

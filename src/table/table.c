@@ -1,7 +1,7 @@
 #include "table/table.h"
 
 #include "base/decimal.h"
-#include "base/input.h"
+#include "base/file.h"
 #include "base/memory.h"
 #include "base/try.h"
 

@@ -1,7 +1,6 @@
 /* A model in a page: the file itself where the page's script reads it, else its arrays. */
 #include "view/page.h"
 
-#include "base/input.h"
 #include "base/memory.h"
 #include "base/try.h"
 #include "base/uri.h"

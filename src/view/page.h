@@ -2,9 +2,9 @@
 #ifndef VSHI_VIEW_PAGE_H
 #define VSHI_VIEW_PAGE_H
 
-#include "base/base64.h"
 #include "base/file.h"
 #include "base/job.h"
+#include "base/uri.h"
 
 #include <jansson.h>
 #include <vdbshade/mesh.h>

@@ -1,7 +1,7 @@
 /* Volumes: voxels are shaded block by block, then what is inside solids is filled. */
+#include "base/decimal.h"
 #include "base/floats.h"
 #include "base/memory.h"
-#include "base/numbers.h"
 #include "base/parallel.h"
 #include "base/try.h"
 #include "light/light.h"

@@ -2,7 +2,7 @@
 #include "rich_asset.h"
 #include "testing.h"
 
-#include "base/srgb.h"
+#include "base/elementary.h"
 #include "sandbox/reader.h"
 
 #include <vdbshade/image.h>

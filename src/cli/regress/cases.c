@@ -2,7 +2,7 @@
  * folder may be a stranger's that a CI runs as it came. So only the command line of `regress` itself may ask
  * to write files, or to parse them unconfined. */
 #define _GNU_SOURCE /* asprintf */
-#include "base/input.h"
+#include "base/file.h"
 #include "cli/commands.h"
 #include "cli/message.h"
 #include "cli/paths.h"
