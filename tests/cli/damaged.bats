@@ -28,18 +28,14 @@ setup() {
         shade info "other.$one"
         [ "$status" -eq 3 ] && [[ $stderr == *"other.$one: "* ]] || fail "empty other.$one"
     done
-    shade compare box.exr cut.exr
-    refused 3 cut.exr
+    refuses 3 cut.exr -- compare box.exr cut.exr
 }
 
 @test "what can be read and says what cannot be used ends with 2, and its place" {
     printf 'v 0 0 0\nv 1 0\n' >bad.obj
-    shade info bad.obj
-    refused 2 "bad.obj: line 2"
+    refuses 2 "bad.obj: line 2" -- info bad.obj
     printf '{"casters": 1}' >bad.json
-    shade info bad.json
-    refused 2 "bad.json:1:"
+    refuses 2 "bad.json:1:" -- info bad.json
     printf 'a,b,c\n0,0,0\n' >bad.csv
-    shade query box.obj --points bad.csv --sun 0,1,0 --sun-angle 5 --resolution 16 -o -
-    refused 2 "bad.csv: the header names no column x"
+    refuses 2 "bad.csv: the header names no column x" -- query box.obj --points bad.csv --sun 0,1,0 --sun-angle 5 --resolution 16 -o -
 }

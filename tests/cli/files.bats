@@ -27,8 +27,7 @@ setup() {
     done_well
     shade info a.vdb
     [[ $output == *"voxel size: 0.0014667"* ]] || fail "voxelize: $output"
-    shade info --unit yard "$models/scene.obj"
-    refused 2 "--unit 'yard'"
+    refuses 2 "--unit 'yard'" -- info --unit yard "$models/scene.obj"
 }
 
 @test "blended materials cast nothing unless asked, and one line says so" {
@@ -50,18 +49,14 @@ setup() {
 @test "what is not read is refused with what would help" {
     sed 's/"asset"/"extensionsRequired":["KHR_node_visibility"],"asset"/' "$models/scene.gltf" >packed.gltf
     cp "$models/scene.bin" .
-    shade info packed.gltf
-    refused 2 "KHR_node_visibility"
+    refuses 2 "KHR_node_visibility" -- info packed.gltf
     refused 2 "those nodes that are to be seen"
     cp "$models/scene.gltf" alone.gltf && rm scene.bin
-    shade info alone.gltf
-    refused 3 "scene.bin': cannot be read: No such file"
+    refuses 3 "scene.bin': cannot be read: No such file" -- info alone.gltf
     printf 'BLENDER-v304' >a.blend
-    shade info a.blend
-    refused 2 "export it as GLB"
+    refuses 2 "export it as GLB" -- info a.blend
     printf 'anything' >a.x3d
-    shade info a.x3d
-    refused 2 "GLB"
+    refuses 2 "GLB" -- info a.x3d
 }
 
 @test "a file with blanks in its name is read in every format" {

@@ -82,10 +82,8 @@ spoilt() {
 }
 
 @test "bad scenes" {
-    shade flat none.json -o out.exr
-    refused 3 none.json
-    shade flat wall.json
-    refused 2 wall.json 'no output'
+    refuses 3 none.json -- flat none.json -o out.exr
+    refuses 2 wall.json 'no output' -- flat wall.json
     spoilt '"size": 64' '"size": 0'
     refused 2 bad.json:1: size
     spoilt '"size": 64' '"size": 2147483648'
@@ -100,38 +98,27 @@ spoilt() {
     refused 3 none.png
     spoilt '"shape": "box", "half_size": \[1.5, 0.1\]' '"shape": "polygon", "points": [[0, 0], [1, 1], [2, 2]]'
     refused 2 'casters[0]' 'no outline'
-    shade flat "$ASSETS/seeds.json" -o out.exr
-    refused 2 seeds.json
-    shade bake wall.json -o out.exr
-    refused 2 wall.json region
+    refuses 2 seeds.json -- flat "$ASSETS/seeds.json" -o out.exr
+    refuses 2 wall.json region -- bake wall.json -o out.exr
     untouched out.exr
 }
 
 @test "bad options" {
-    shade flat wall.json -o out.exr --method cone
-    refused 2 --method hard
-    shade flat wall.json -o out.exr --size 70000
-    refused 2 --size
-    shade flat wall.json -o out.exr --supersample 0
-    refused 2 --supersample
-    shade flat wall.json -o out.txt
-    refused 2 out.txt
-    shade flat wall.json -o none/out.exr
-    refused 3 none/out.exr
-    shade flat wall.json -o wall.json
-    refused 2 wall.json
-    shade flat wall.json -o out.exr --size 8192 --memory-limit 64MiB
-    refused 4 out.exr
-    shade flat wall.json -o out.exr --method classic --size 2048x64 --memory-limit 2MiB
-    refused 4
+    refuses 2 --method hard -- flat wall.json -o out.exr --method cone
+    refuses 2 --size -- flat wall.json -o out.exr --size 70000
+    refuses 2 --supersample -- flat wall.json -o out.exr --supersample 0
+    refuses 2 out.txt -- flat wall.json -o out.txt
+    refuses 3 none/out.exr -- flat wall.json -o none/out.exr
+    refuses 2 wall.json -- flat wall.json -o wall.json
+    refuses 4 out.exr -- flat wall.json -o out.exr --size 8192 --memory-limit 64MiB
+    refuses 4 -- flat wall.json -o out.exr --method classic --size 2048x64 --memory-limit 2MiB
     untouched out.exr
 }
 
 @test "an output that is a caster's picture" {
     spoilt '"shape": "box", "half_size": \[1.5, 0.1\]' '"mask": "emblem.png", "size": 1'
     done_well
-    shade flat bad.json -o emblem.png
-    refused 2 emblem.png
+    refuses 2 emblem.png -- flat bad.json -o emblem.png
 }
 
 @test "interrupted, the old output stays" {

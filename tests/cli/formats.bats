@@ -31,8 +31,7 @@ endings_after() {
 @test "every format of the second table is refused with a reason" {
     local refusals=0 ending
     for ending in $(endings_after '| ending | why'); do
-        shade bake box.obj "${SMALL[@]}" -o "out.$ending"
-        refused 2 "out.$ending" "'$ending' is not written: "
+        refuses 2 "out.$ending" "'$ending' is not written: " -- bake box.obj "${SMALL[@]}" -o "out.$ending"
         refusals=$((refusals + 1))
     done
     [ "$refusals" -ge 8 ] || fail "only $refusals endings found"
@@ -61,8 +60,7 @@ endings_after() {
     shade bake linear.json "${rest[@]}" -o linear.png --quiet
     ! same_values light.png linear.png || fail "color_space changes nothing"
     write_scene srgb.json box.obj '' '"color_space": "srgb"'
-    shade bake srgb.json "${rest[@]}" -o x.tif --bits 32
-    refused 2 srgb
+    refuses 2 srgb -- bake srgb.json "${rest[@]}" -o x.tif --bits 32
     shade "${bake[@]}" -o light.png
     [[ $stderr != *"brighter than 1"* ]] || fail "nothing is"
     shade "${bake[@]}" --ambient 0.5,0.5,2.25 --ao 1 -o light.png

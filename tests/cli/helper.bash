@@ -128,6 +128,18 @@ refused() {
     done
 }
 
+# refuses CODE WORD … -- ARG …: runs the program with the ARGs, which it refuses as refused() says.
+refuses() {
+    local expected=()
+    while [ "$1" != -- ]; do
+        expected+=("$1")
+        shift
+    done
+    shift
+    shade "$@"
+    refused "${expected[@]}"
+}
+
 done_well() {
     [ "$status" -eq 0 ] || fail "expected success"
 }

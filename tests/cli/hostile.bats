@@ -23,8 +23,7 @@ solid() {
         sed "s/^v 1 1 1/v 1 $value 1/" box.obj >far.obj
         bake far.obj
         refused 4 'voxel size'
-        shade bake far.obj -o out.exr --ao 1 --size 32 --voxel-size 0.05
-        refused 4 'voxel size'
+        refuses 4 'voxel size' -- bake far.obj -o out.exr --ao 1 --size 32 --voxel-size 0.05
     done
     sed -E 's/^v ([01]) ([01]) ([01])/v \1e30 \2e30 \3e30/' box.obj >large.obj
     bake large.obj
@@ -90,14 +89,12 @@ solid() {
 
 @test "a pipe in place of an image is refused, not waited for" {
     mkfifo waits.png
-    shade info waits.png
-    refused 3 waits.png
+    refuses 3 waits.png -- info waits.png
     cat >scene.json <<'JSON'
 {"casters": [{"mask": "waits.png", "size": 1, "thickness": 0.2}], "ao": {"distance": 1},
  "receivers": [{"mesh": "box.obj", "size": 16, "output": "out.exr"}]}
 JSON
-    shade bake scene.json
-    refused 3 waits.png
+    refuses 3 waits.png -- bake scene.json
     untouched out.exr
 }
 

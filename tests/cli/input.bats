@@ -18,14 +18,10 @@ bake_bad() {
     refused 3 none.json
     bake_bad box.obj --caster none.obj
     refused 3 none.obj
-    shade bake none.glb
-    refused 3 none.glb 'cannot be opened'
-    shade bake none.glb -o out.exr
-    refused 3 none.glb 'cannot be opened'
-    shade render none.glb -o out.png
-    refused 3 none.glb 'cannot be opened'
-    shade volume none.glb -o out.vdb
-    refused 3 none.glb 'cannot be opened'
+    refuses 3 none.glb 'cannot be opened' -- bake none.glb
+    refuses 3 none.glb 'cannot be opened' -- bake none.glb -o out.exr
+    refuses 3 none.glb 'cannot be opened' -- render none.glb -o out.png
+    refuses 3 none.glb 'cannot be opened' -- volume none.glb -o out.vdb
     untouched out.exr
 }
 
@@ -103,18 +99,15 @@ bake_bad() {
 }
 
 @test "a voxel size so small that the memory limit would be passed" {
-    shade bake box.obj -o out.exr --ao 1 --size 32 --voxel-size 0.0001 --memory-limit 64MiB
-    refused 4
-    shade bake box.obj -o out.exr --ao 1 --size 32 --voxel-size 1e-12
-    refused 4
+    refuses 4 -- bake box.obj -o out.exr --ao 1 --size 32 --voxel-size 0.0001 --memory-limit 64MiB
+    refuses 4 -- bake box.obj -o out.exr --ao 1 --size 32 --voxel-size 1e-12
     shade bake box.obj -o out.exr --ao 1 --size 32 --voxel-size 1e-300
     [ "$status" -eq 4 ] || [ "$status" -eq 2 ] || fail "expected a limit"
     untouched out.exr
 }
 
 @test "a lightmap so large that its format would pass the memory limit" {
-    shade bake box.obj -o out.webp --ao 1 --size 8192 --resolution 24 --memory-limit 20M
-    refused 4 "out.webp: writing 8192 × 8192 texels takes" "write .exr"
+    refuses 4 "out.webp: writing 8192 × 8192 texels takes" "write .exr" -- bake box.obj -o out.webp --ao 1 --size 8192 --resolution 24 --memory-limit 20M
     [ ! -e out.webp ]
 }
 
@@ -124,12 +117,10 @@ bake_bad() {
     size=$(wc -c <whole.json)
     for part in 1 2 3 5 7; do
         head -c $((size * part / 8)) whole.json >cut.json
-        shade bake cut.json
-        refused 2 cut.json
+        refuses 2 cut.json -- bake cut.json
     done
     : >cut.json
-    shade bake cut.json
-    refused 2 cut.json
+    refuses 2 cut.json -- bake cut.json
     untouched out.exr
 }
 
@@ -165,10 +156,8 @@ JSON
  "receivers": [{"mesh": "box.obj", "size": 16, "output": "a.exr"},
                {"mesh": "box.obj", "size": 16, "output": "b.exr"}]}
 JSON
-    shade bake two.json -o out.exr
-    refused 2 two.json
-    shade bake two.json --sun 0,1,0
-    refused 2 --sun
+    refuses 2 two.json -- bake two.json -o out.exr
+    refuses 2 --sun -- bake two.json --sun 0,1,0
     untouched out.exr
     [ ! -e a.exr ]
     [ ! -e b.exr ]
@@ -179,18 +168,15 @@ JSON
     { printf '[{}'; yes ',{}' | head -n 1000000 | tr -d '\n'; printf ']'; } >bomb.json
     local command
     for command in "info bomb.json" "bake bomb.json --sun 0,1,0" "voxelize bomb.json -o out.vdb" "flat bomb.json -o out.exr"; do
-        shade $command --memory-limit 100MiB
-        refused 4 'bomb.json: about ' 'MB are needed, over the memory limit of 105 MB'
+        refuses 4 'bomb.json: about ' 'MB are needed, over the memory limit of 105 MB' -- $command --memory-limit 100MiB
     done
 }
 
 @test "two images that are compared count together" {
     write_box box.obj
     run -0 "$VDBSHADE" bake box.obj --sun 1,2,1 --size 512 --resolution 8 --method hard -o one.exr --quiet
-    shade compare one.exr one.exr --memory-limit 12M
-    refused 4 'one.exr: about 16 MB are needed, over the memory limit of 12 MB'
+    refuses 4 'one.exr: about 16 MB are needed, over the memory limit of 12 MB' -- compare one.exr one.exr --memory-limit 12M
     run -0 "$VDBSHADE" compare one.exr one.exr --memory-limit 18M
     run -0 "$VDBSHADE" info one.exr --memory-limit 11M
-    shade info one.exr --memory-limit 5M
-    refused 4 'one.exr: about ' 'over the memory limit of 5 MB'
+    refuses 4 'one.exr: about ' 'over the memory limit of 5 MB' -- info one.exr --memory-limit 5M
 }

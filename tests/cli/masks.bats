@@ -198,17 +198,13 @@ JSON
     printf 'Ogawa' >cache.abc
     local file
     for file in set.usda set.obj cache.abc; do
-        shade bake "$file" -o out.vdb.exr --ao 1
-        refused 2 "$file" 'which is not read' 'OBJ, glTF, GLB, PLY, STL, FBX or DAE'
-        shade voxelize "$file" -o out.vdb
-        refused 2 "$file" 'which is not read'
+        refuses 2 "$file" 'which is not read' 'OBJ, glTF, GLB, PLY, STL, FBX or DAE' -- bake "$file" -o out.vdb.exr --ao 1
+        refuses 2 "$file" 'which is not read' -- voxelize "$file" -o out.vdb
         bad "{\"mesh\": \"$file\"}"
         refused 2 "$file" 'which is not read'
-        shade info "$file"
-        refused 2 "$file" 'which is not read'
+        refuses 2 "$file" 'which is not read' -- info "$file"
     done
     cp set.usda scene.json
-    shade bake scene.json
-    refused 2 scene.json 'a USD file'
+    refuses 2 scene.json 'a USD file' -- bake scene.json
     untouched out.vdb
 }

@@ -45,8 +45,7 @@ bake_to() {
         bake_to "$out"
         refused 2 "expected one of exr, png," "glb, gltf, obj"
     done
-    shade render box.obj "${SMALL[@]}" -o out.fbx
-    refused 2 out.fbx
+    refuses 2 out.fbx -- render box.obj "${SMALL[@]}" -o out.fbx
     [[ $stderr != *glb* ]] || fail "render writes no asset"
 }
 
@@ -131,13 +130,9 @@ JSON
     shade bake two.json --output-folder no/where --quiet
     done_well
     [ -s no/where/one.exr ] || fail "the folder was not made"
-    shade bake two.json --output-folder box.obj/maps --quiet
-    refused 3 box.obj/maps 'cannot be made'
-    shade bake box.obj --ao 1 --resolution 16 -o missing/out.exr
-    refused 3 missing/out.exr "no folder 'missing'" "mkdir -p 'missing'"
-    shade bake box.obj --ao 1 --output-folder elsewhere -o out.exr
-    refused 2 --output-folder
+    refuses 3 box.obj/maps 'cannot be made' -- bake two.json --output-folder box.obj/maps --quiet
+    refuses 3 missing/out.exr "no folder 'missing'" "mkdir -p 'missing'" -- bake box.obj --ao 1 --resolution 16 -o missing/out.exr
+    refuses 2 --output-folder -- bake box.obj --ao 1 --output-folder elsewhere -o out.exr
     sed -i 's/two.png/one.exr/' two.json
-    shade bake two.json --output-folder elsewhere --quiet
-    refused 2 elsewhere/one.exr 'two receivers'
+    refuses 2 elsewhere/one.exr 'two receivers' -- bake two.json --output-folder elsewhere --quiet
 }

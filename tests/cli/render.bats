@@ -48,8 +48,7 @@ png_size() {
     [ "$(od -An -tu1 -j25 -N1 view.png | tr -d ' ')" = 6 ] || fail "no alpha"
     shade render box.obj "${SUN[@]}" "${QUICK[@]}" -o view.png --quiet
     [ "$(od -An -tu1 -j25 -N1 view.png | tr -d ' ')" = 2 ] || fail "alpha with a background"
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" -o x.png --background none --shafts 0.2
-    refused 2 --background --shafts
+    refuses 2 --background --shafts -- render box.obj "${SUN[@]}" "${QUICK[@]}" -o x.png --background none --shafts 0.2
 }
 
 @test "--orbit turns the camera around what it looks at, anticlockwise from above" {
@@ -62,44 +61,30 @@ png_size() {
 }
 
 @test "cameras that see nothing are refused" {
-    shade render box.obj "${SUN[@]}" --camera nan,0,0 -o view.png
-    refused 2 --camera
-    shade render box.obj "${SUN[@]}" --camera 1,2 -o view.png
-    refused 2 --camera
-    shade render box.obj "${SUN[@]}" --camera 1,2,3 --look-at 1,2,3 -o view.png
-    refused 2 'position and target'
-    shade render box.obj "${SUN[@]}" --camera 0,5,0 --look-at 0,0,0 -o view.png
-    refused 2 'along the view'
-    shade render box.obj "${SUN[@]}" --camera 0.5,5,0.5 --resolution 24 -o view.png --quiet
-    refused 2 'along the view'
-    shade render box.obj "${SUN[@]}" --up 0,0,0 -o view.png
-    refused 2 --up
-    shade render box.obj "${SUN[@]}" --fov 180 -o view.png
-    refused 2 --fov
-    shade render box.obj "${SUN[@]}" --look-at 0,0,0 -o view.png
-    refused 2 --look-at
+    refuses 2 --camera -- render box.obj "${SUN[@]}" --camera nan,0,0 -o view.png
+    refuses 2 --camera -- render box.obj "${SUN[@]}" --camera 1,2 -o view.png
+    refuses 2 'position and target' -- render box.obj "${SUN[@]}" --camera 1,2,3 --look-at 1,2,3 -o view.png
+    refuses 2 'along the view' -- render box.obj "${SUN[@]}" --camera 0,5,0 --look-at 0,0,0 -o view.png
+    refuses 2 'along the view' -- render box.obj "${SUN[@]}" --camera 0.5,5,0.5 --resolution 24 -o view.png --quiet
+    refuses 2 --up -- render box.obj "${SUN[@]}" --up 0,0,0 -o view.png
+    refuses 2 --fov -- render box.obj "${SUN[@]}" --fov 180 -o view.png
+    refuses 2 --look-at -- render box.obj "${SUN[@]}" --look-at 0,0,0 -o view.png
     [ ! -e view.png ] || fail "a picture all the same"
 }
 
 @test "outputs that cannot be written are refused before the work" {
-    shade render box.obj "${SUN[@]}" -o missing/view.png
-    refused 3 missing
-    shade render box.obj "${SUN[@]}" -o view.xyz
-    refused 2 view.xyz
+    refuses 3 missing -- render box.obj "${SUN[@]}" -o missing/view.png
+    refuses 2 view.xyz -- render box.obj "${SUN[@]}" -o view.xyz
     shade render box.obj "${SUN[@]}" -o box.obj
     [ "$status" -eq 2 ] || fail "the input would be replaced"
-    shade render box.obj "${SUN[@]}" -o view.png --stats view.png
-    refused 2 view.png
-    shade render box.obj "${SUN[@]}"
-    refused 2 'no output'
-    shade render box.obj -o view.png
-    refused 2 --sun
+    refuses 2 view.png -- render box.obj "${SUN[@]}" -o view.png --stats view.png
+    refuses 2 'no output' -- render box.obj "${SUN[@]}"
+    refuses 2 --sun -- render box.obj -o view.png
 }
 
 @test "a memory limit ends it with code 4, and the old picture stays" {
     old_output view.png
-    shade render box.obj "${SUN[@]}" --memory-limit 1M -o view.png
-    refused 4
+    refuses 4 -- render box.obj "${SUN[@]}" --memory-limit 1M -o view.png
     untouched view.png
 }
 
@@ -133,22 +118,17 @@ png_size() {
     shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.png --lightmap-pack R=shadow.sun -o lit.exr --quiet
     done_well
     for pack in shadow.sun RG=ao R= Q=ao; do
-        shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.png --lightmap-pack "$pack" -o x.png
-        refused 2 --lightmap-pack
+        refuses 2 --lightmap-pack -- render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.png --lightmap-pack "$pack" -o x.png
     done
 }
 
 @test "lightmaps that do not fit are refused" {
     shade bake box.obj --ao 0.5 --size 16 --resolution 24 -o ao.exr --quiet
     done_well
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap ao.exr -o view.png --quiet
-    refused 2 shadow.sun
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap gone.exr -o view.png --quiet
-    refused 3 gone.exr
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap ao.exr --lightmap ao.exr -o view.png --quiet
-    refused 2 receivers
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap ao.exr -o ao.exr --quiet
-    refused 2 lightmap
+    refuses 2 shadow.sun -- render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap ao.exr -o view.png --quiet
+    refuses 3 gone.exr -- render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap gone.exr -o view.png --quiet
+    refuses 2 receivers -- render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap ao.exr --lightmap ao.exr -o view.png --quiet
+    refuses 2 lightmap -- render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap ao.exr -o ao.exr --quiet
     # Without lights its AO is what there is to show.
     shade render box.obj "${QUICK[@]}" --lightmap ao.exr -o view.png --quiet
     done_well
@@ -299,14 +279,11 @@ pixel() {
 
 @test "a colour out of range is refused with its place" {
     scene ', "color": [0.5, 1.5, 0]'
-    shade render scene.json -o view.png
-    refused 2 scene.json:2: color 1.5
+    refuses 2 scene.json:2: color 1.5 -- render scene.json -o view.png
     scene ', "color": [0, 0, 0]'
-    shade render scene.json -o view.png
-    refused 2 color
+    refuses 2 color -- render scene.json -o view.png
     scene ', "colour": [0, 0, 0]'
-    shade render scene.json -o view.png
-    refused 2 'did you mean "color"?'
+    refuses 2 'did you mean "color"?' -- render scene.json -o view.png
 }
 
 @test "light shafts show, and are the same for any number of threads" {

@@ -256,19 +256,15 @@ C
         shade view seeds.json $option -o page.html
         refused 2 seeds.json 'takes no OTHER'
     done
-    shade view gone.json -o page.html
-    refused 3 gone.json
+    refuses 3 gone.json -- view gone.json -o page.html
     echo '{"casters": [{"mesh": "gone.obj"}], "ao": {"distance": 1}}' >other.json
-    shade view other.json -o page.html
-    refused 3 gone.obj
+    refuses 3 gone.obj -- view other.json -o page.html
     echo '{"casters": [], "ao": {"distance": 1}}' >other.json
-    shade view other.json -o page.html
-    refused 2 other.json 'casters'
+    refuses 2 other.json 'casters' -- view other.json -o page.html
     untouched page.html
     cp box.obj page.html
     echo '{"casters": [{"mesh": "page.html"}], "ao": {"distance": 1}}' >other.json
-    shade view other.json -o page.html
-    refused 2 page.html 'is also an input'
+    refuses 2 page.html 'is also an input' -- view other.json -o page.html
     cmp box.obj page.html
 }
 
@@ -289,48 +285,33 @@ JSON
 
 @test "bad usage" {
     old_output page.html
-    shade view box.obj --planes box.exr
-    refused 2 'give -o OUT.html'
-    shade view box.obj -o page.exr
-    refused 2 'page.exr' 'give -o OUT.html'
-    shade view -o page.html
-    refused 2 'no INPUT'
-    shade view box.obj box.obj box.obj -o page.html
-    refused 2 'box.obj'
+    refuses 2 'give -o OUT.html' -- view box.obj --planes box.exr
+    refuses 2 'page.exr' 'give -o OUT.html' -- view box.obj -o page.exr
+    refuses 2 'no INPUT' -- view -o page.html
+    refuses 2 'box.obj' -- view box.obj box.obj box.obj -o page.html
     cp box.obj in.html
-    shade view in.html -o in.html
-    refused 2 'the output is the input'
-    shade view box.obj --planes in.html -o in.html
-    refused 2 'also a file of planes'
+    refuses 2 'the output is the input' -- view in.html -o in.html
+    refuses 2 'also a file of planes' -- view box.obj --planes in.html -o in.html
     for set in -1 8 x; do
-        shade view box.obj --uv-set "$set" -o page.html
-        refused 2 uv-set
+        refuses 2 uv-set -- view box.obj --uv-set "$set" -o page.html
     done
     untouched page.html
 }
 
 @test "files that are not there, damaged, or too large" {
     old_output page.html
-    shade view gone.glb -o page.html
-    refused 3 gone.glb
-    shade view box.obj --planes gone.exr -o page.html
-    refused 3 gone.exr
-    shade view box.obj gone.obj -o page.html
-    refused 3 gone.obj
+    refuses 3 gone.glb -- view gone.glb -o page.html
+    refuses 3 gone.exr -- view box.obj --planes gone.exr -o page.html
+    refuses 3 gone.obj -- view box.obj gone.obj -o page.html
     head -c 3000 "$ASSETS/cloister.glb" >cut.glb
-    shade view cut.glb -o page.html
-    refused 3 cut.glb
+    refuses 3 cut.glb -- view cut.glb -o page.html
     head -c 300 box.exr >cut.exr
-    shade view box.obj --planes cut.exr -o page.html
-    refused 3 cut.exr
+    refuses 3 cut.exr -- view box.obj --planes cut.exr -o page.html
     printf 'glTF\2\0\0\0\24\0\0\0\377\377\377\377JSON' >lies.glb
-    shade view lies.glb -o page.html
-    refused 3 lies.glb
-    shade view box.obj -o nowhere/page.html
-    refused 3 nowhere
+    refuses 3 lies.glb -- view lies.glb -o page.html
+    refuses 3 nowhere -- view box.obj -o nowhere/page.html
     unless_sanitized "its shadow memory has no such limit"
-    shade view "$ASSETS/cloister.glb" --memory-limit 100k -o page.html
-    refused 4 cloister.glb
+    refuses 4 cloister.glb -- view "$ASSETS/cloister.glb" --memory-limit 100k -o page.html
     untouched page.html
 }
 
@@ -342,14 +323,10 @@ JSON
     cmp baked.html page.html || fail "another page"
     old_output page.html
     for wrong in page.exr again.exr; do
-        shade bake box.obj "${SMALL[@]}" -o again.exr --view $wrong
-        refused 2 "--view '$wrong'"
+        refuses 2 "--view '$wrong'" -- bake box.obj "${SMALL[@]}" -o again.exr --view $wrong
     done
-    shade bake box.obj "${SMALL[@]}" -o again.exr --view nowhere/page.html
-    refused 3 nowhere
-    shade bake box.obj "${SMALL[@]}" --per-object -o objects/ --view page.html
-    refused 2 'one lightmap of one mesh'
-    shade bake box.obj --ao 1 --unwrap always -o unwrapped.png --view page.html
-    refused 2 "--view 'page.html': an image does not hold the UVs that are made"
+    refuses 3 nowhere -- bake box.obj "${SMALL[@]}" -o again.exr --view nowhere/page.html
+    refuses 2 'one lightmap of one mesh' -- bake box.obj "${SMALL[@]}" --per-object -o objects/ --view page.html
+    refuses 2 "--view 'page.html': an image does not hold the UVs that are made" -- bake box.obj --ao 1 --unwrap always -o unwrapped.png --view page.html
     untouched page.html
 }
