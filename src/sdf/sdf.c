@@ -10,11 +10,116 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/try.h"
-#include "sdf/shapes.h"
+#include "base/vec.h"
 
 #include <stdlib.h>
 
 enum { MAX_NODES = 65536 };
+
+/* The operands of an operation that decide. */
+enum { KEEP_BOTH, KEEP_LEFT, KEEP_RIGHT };
+
+static inline bool is_operation(const vsh_sdf_node *node) {
+    return node->shape >= VSH_SDF_UNION;
+}
+
+/* v turned by the quaternion, or back. Shapes are mostly not turned at all, and that is free. */
+static inline vshi_vec rotate(const double q[4], double direction, vshi_vec v) {
+    if (q[0] == 0.0 && q[1] == 0.0 && q[2] == 0.0) {
+        return v;
+    }
+    const double scale = 1.0 / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    const vshi_vec axis = {q[0] * scale * direction, q[1] * scale * direction, q[2] * scale * direction};
+    const vshi_vec twice = vshi_scale(vshi_cross(axis, v), 2.0);
+    return vshi_add(vshi_add(v, vshi_scale(twice, q[3] * scale)), vshi_cross(axis, twice));
+}
+
+/* max, min and clamp as comparisons: fmin and fmax are calls where NaN must be minded, and these run for
+ * every voxel; a NaN position still gives NaN through the lengths. */
+static inline double larger(double a, double b) {
+    return a > b ? a : b;
+}
+static inline double smaller(double a, double b) {
+    return a < b ? a : b;
+}
+static inline double clamp(double value, double low, double high) {
+    return value < low ? low : value > high ? high : value;
+}
+
+static inline double box_distance(vshi_vec p, double x, double y, double z) {
+    const vshi_vec q = {fabs(p.x) - x, fabs(p.y) - y, fabs(p.z) - z};
+    const double deepest = larger(q.x, larger(q.y, q.z));
+    if (deepest <= 0.0) {
+        return deepest;
+    }
+    return vshi_length((vshi_vec){larger(q.x, 0.0), larger(q.y, 0.0), larger(q.z, 0.0)});
+}
+
+static inline double cone_distance(vshi_vec p, double half_height, double base, double top) {
+    const double r = sqrt(p.x * p.x + p.z * p.z);
+    const double cap_r = r - smaller(r, p.y < 0.0 ? base : top);
+    const double cap_y = fabs(p.y) - half_height;
+    const double slope_r = top - base;
+    const double slope_y = 2.0 * half_height;
+    const double along =
+        clamp(((top - r) * slope_r + (half_height - p.y) * slope_y) / (slope_r * slope_r + slope_y * slope_y),
+              0.0, 1.0);
+    const double side_r = r - top + slope_r * along;
+    const double side_y = p.y - half_height + slope_y * along;
+    const double squared = smaller(cap_r * cap_r + cap_y * cap_y, side_r * side_r + side_y * side_y);
+    return side_r < 0.0 && cap_y < 0.0 ? -sqrt(squared) : sqrt(squared);
+}
+
+static inline double shape_distance(int32_t shape, const vsh_sdf_node *node, vshi_vec p) {
+    switch (shape) {
+    case VSH_SDF_SPHERE:
+        return vshi_length(p) - node->radius;
+    case VSH_SDF_BOX:
+        return box_distance(p, node->size[0], node->size[1], node->size[2]) - node->rounding;
+    case VSH_SDF_TORUS: {
+        const double ring = sqrt(p.x * p.x + p.z * p.z) - node->radius;
+        return sqrt(ring * ring + p.y * p.y) - node->minor_radius;
+    }
+    case VSH_SDF_PLANE: {
+        const double half = 0.5 * node->size[1];
+        p.y += half;
+        return box_distance(p, node->size[0], half, node->size[2]);
+    }
+    case VSH_SDF_CAPSULE:
+        p.y -= clamp(p.y, -node->size[1], node->size[1]);
+        return vshi_length(p) - node->radius;
+    case VSH_SDF_CYLINDER: {
+        const double r = sqrt(p.x * p.x + p.z * p.z) - node->radius;
+        const double y = fabs(p.y) - node->size[1];
+        if (r <= 0.0 || y <= 0.0) {
+            return larger(r, y);
+        }
+        return sqrt(r * r + y * y);
+    }
+    default: /* VSH_SDF_CONE */
+        return cone_distance(p, node->size[1], node->radius, node->minor_radius);
+    }
+}
+
+static inline double combine(int32_t shape, const vsh_sdf_node *node, double a, double b) {
+    switch (shape) {
+    case VSH_SDF_INTERSECTION:
+        return larger(a, b);
+    case VSH_SDF_SUBTRACTION:
+        return larger(a, -b);
+    case VSH_SDF_SMOOTH_UNION: {
+        const double overlap = larger(node->smoothing - fabs(a - b), 0.0) / node->smoothing;
+        return smaller(a, b) - 0.25 * node->smoothing * overlap * overlap;
+    }
+    default: /* VSH_SDF_UNION */
+        return smaller(a, b);
+    }
+}
+
+static inline vshi_vec to_node(const vsh_sdf_node *node, vshi_vec p) {
+    p = rotate(node->rotation, -1.0, vshi_sub(p, vshi_vec_of(node->translation)));
+    return node->scale != 1.0 ? vshi_scale(p, 1.0 / node->scale) : p;
+}
 
 /* Which fields a shape reads, in the order of vsh_sdf_node. */
 enum {
@@ -98,7 +203,7 @@ static vsh_result check_placement(const vsh_sdf_node *node, size_t index, vsh_er
 /* Checks the operands of node `index`, and notes its depth; a depth of 0 marks a node that is used. */
 static vsh_result check_operands(const vsh_sdf *sdf, size_t index, int32_t *depth, vsh_error *error) {
     const vsh_sdf_node *node = &sdf->nodes[index];
-    if (!vshi_sdf_is_operation(node)) {
+    if (!is_operation(node)) {
         depth[index] = 1;
         return VSH_OK;
     }
@@ -168,18 +273,151 @@ vsh_result vsh_sdf_check(const vsh_sdf *sdf, vsh_error *error) {
     return result;
 }
 
-static double node_distance(const vsh_sdf_node *nodes, int32_t index, vshi_vec p) {
+/* `keep`: which operands decide; NULL: both. */
+static double node_distance(const vsh_sdf_node *nodes, const uint8_t *keep, int32_t index, vshi_vec p) {
     const vsh_sdf_node *node = &nodes[index];
-    p = vshi_sdf_to_node(node, p);
-    const double distance = !vshi_sdf_is_operation(node)
-                                ? vshi_sdf_shape_distance(node->shape, node, p)
-                                : vshi_sdf_combine(node->shape, node, node_distance(nodes, node->left, p),
-                                                   node_distance(nodes, node->right, p));
+    const int kept = keep != NULL ? keep[index] : KEEP_BOTH;
+    double distance;
+    p = to_node(node, p);
+    if (!is_operation(node)) {
+        distance = shape_distance(node->shape, node, p);
+    } else if (kept == KEEP_BOTH) {
+        distance = combine(node->shape, node, node_distance(nodes, keep, node->left, p),
+                           node_distance(nodes, keep, node->right, p));
+    } else {
+        distance = node_distance(nodes, keep, kept == KEEP_LEFT ? node->left : node->right, p);
+        distance = node->shape == VSH_SDF_SUBTRACTION && kept == KEEP_RIGHT ? -distance : distance;
+    }
     return distance * node->scale;
 }
 
 double vshi_sdf_distance_at(const vsh_sdf *sdf, vshi_vec position) {
-    return vshi_finite(position) ? node_distance(sdf->nodes, (int32_t)sdf->node_count - 1, position) : NAN;
+    return vshi_finite(position) ? node_distance(sdf->nodes, NULL, (int32_t)sdf->node_count - 1, position)
+                                 : NAN;
+}
+
+/* --- many positions at once: each node is asked for all of them, in loops that compilers make vectors of.
+ * The distances are the same, to the bit. */
+
+/* Positions at a time; nodes below each other whose places are held at once, 2 KB each: deeper ones are asked
+ * one position after the other. */
+enum { LANES = 64, DEEP = 32 };
+
+typedef struct places {
+    double x[LANES], y[LANES], z[LANES];
+} places;
+
+/* Whether a node has its places where its parent has them, as most operations do. */
+static bool is_in_place(const vsh_sdf_node *node) {
+    const double *q = node->rotation, *t = node->translation;
+    return q[0] == 0.0 && q[1] == 0.0 && q[2] == 0.0 && t[0] == 0.0 && t[1] == 0.0 && t[2] == 0.0 &&
+           !signbit(t[0]) && !signbit(t[1]) && !signbit(t[2]) && node->scale == 1.0;
+}
+
+static void place_all(const vsh_sdf_node *node, const places *from, size_t count, places *to) {
+    const vsh_sdf_node own = *node; /* which nothing below can change */
+    for (size_t i = 0; i < count; ++i) {
+        const vshi_vec p = to_node(&own, (vshi_vec){from->x[i], from->y[i], from->z[i]});
+        to->x[i] = p.x;
+        to->y[i] = p.y;
+        to->z[i] = p.z;
+    }
+}
+
+/* A loop for each shape, which is then a constant in it. */
+#define EACH_PLACE(name)                                                                                     \
+    case name:                                                                                               \
+        for (size_t i = 0; i < count; ++i) {                                                                 \
+            distances[i] = shape_distance(name, &own, (vshi_vec){at->x[i], at->y[i], at->z[i]});             \
+        }                                                                                                    \
+        break
+
+static void measure_all(const vsh_sdf_node *node, const places *at, size_t count, double *distances) {
+    const vsh_sdf_node own = *node;
+    switch (own.shape) {
+        EACH_PLACE(VSH_SDF_SPHERE);
+        EACH_PLACE(VSH_SDF_BOX);
+        EACH_PLACE(VSH_SDF_TORUS);
+        EACH_PLACE(VSH_SDF_PLANE);
+        EACH_PLACE(VSH_SDF_CAPSULE);
+        EACH_PLACE(VSH_SDF_CYLINDER);
+    default:
+        EACH_PLACE(VSH_SDF_CONE);
+    }
+}
+
+#define EACH_PAIR(name)                                                                                      \
+    case name:                                                                                               \
+        for (size_t i = 0; i < count; ++i) {                                                                 \
+            left[i] = combine(name, &own, left[i], right[i]);                                                \
+        }                                                                                                    \
+        break
+
+static void combine_all(const vsh_sdf_node *node, double *restrict left, const double *restrict right,
+                        size_t count) {
+    const vsh_sdf_node own = *node;
+    switch (own.shape) {
+        EACH_PAIR(VSH_SDF_INTERSECTION);
+        EACH_PAIR(VSH_SDF_SUBTRACTION);
+        EACH_PAIR(VSH_SDF_SMOOTH_UNION);
+    default:
+        EACH_PAIR(VSH_SDF_UNION);
+    }
+}
+
+static void ask_all(const vsh_sdf *sdf, const uint8_t *keep, int32_t index, const places *from, size_t count,
+                    int depth, double *distances) {
+    const vsh_sdf_node *node = &sdf->nodes[index];
+    if (depth == DEEP) {
+        for (size_t i = 0; i < count; ++i) {
+            distances[i] =
+                node_distance(sdf->nodes, keep, index, (vshi_vec){from->x[i], from->y[i], from->z[i]});
+        }
+        return;
+    }
+    places own;
+    const places *at = from;
+    if (!is_in_place(node)) {
+        place_all(node, from, count, &own);
+        at = &own;
+    }
+    if (!is_operation(node)) {
+        measure_all(node, at, count, distances);
+    } else if (keep[index] == KEEP_BOTH) {
+        double right[LANES];
+        ask_all(sdf, keep, node->left, at, count, depth + 1, distances);
+        ask_all(sdf, keep, node->right, at, count, depth + 1, right);
+        combine_all(node, distances, right, count);
+    } else {
+        const bool left = keep[index] == KEEP_LEFT;
+        ask_all(sdf, keep, left ? node->left : node->right, at, count, depth + 1, distances);
+        for (size_t i = 0; i < count && !left && node->shape == VSH_SDF_SUBTRACTION; ++i) {
+            distances[i] = -distances[i];
+        }
+    }
+    for (size_t i = 0; i < count; ++i) {
+        distances[i] *= node->scale;
+    }
+}
+
+void vshi_sdf_distances_within(const vsh_sdf *sdf, const uint8_t *keep, size_t count,
+                               const double (*positions)[3], double *distances) {
+    VSHI_FLOATS;
+    for (size_t first = 0; first < count; first += LANES) {
+        const size_t lanes = count - first < LANES ? count - first : LANES;
+        places world;
+        for (size_t i = 0; i < lanes; ++i) {
+            world.x[i] = positions[first + i][0];
+            world.y[i] = positions[first + i][1];
+            world.z[i] = positions[first + i][2];
+        }
+        ask_all(sdf, keep, (int32_t)sdf->node_count - 1, &world, lanes, 0, distances + first);
+        for (size_t i = 0; i < lanes; ++i) {
+            if (!vshi_finite(vshi_vec_of(positions[first + i]))) {
+                distances[first + i] = NAN;
+            }
+        }
+    }
 }
 
 double vsh_sdf_distance(const vsh_sdf *sdf, const double position[3]) {
@@ -200,26 +438,25 @@ static rounded narrow(const vsh_sdf_node *nodes, int32_t index, vshi_vec p, doub
     const double LARGEST = 1e100; /* whose squares are far from overflow */
     const vsh_sdf_node *node = &nodes[index];
     const double lengths = vshi_length(p) + vshi_length(vshi_vec_of(node->translation));
-    p = vshi_sdf_to_node(node, p);
+    p = to_node(node, p);
     radius /= node->scale;
     rounded here;
-    keep[index] = VSHI_SDF_KEEP_BOTH;
-    if (!vshi_sdf_is_operation(node)) {
-        here.distance = vshi_sdf_shape_distance(node->shape, node, p);
+    keep[index] = KEEP_BOTH;
+    if (!is_operation(node)) {
+        here.distance = shape_distance(node->shape, node, p);
         here.error = ROUNDED * (fabs(node->size[0]) + fabs(node->size[1]) + fabs(node->size[2]) +
                                 fabs(node->radius) + fabs(node->minor_radius) + fabs(node->rounding));
     } else {
         const rounded left = narrow(nodes, node->left, p, radius, keep);
         const rounded right = narrow(nodes, node->right, p, radius, keep);
-        here = (rounded){vshi_sdf_combine(node->shape, node, left.distance, right.distance),
-                         left.error + right.error};
+        here = (rounded){combine(node->shape, node, left.distance, right.distance), left.error + right.error};
         /* how much more the left one counts than the right one */
         const double more = node->shape == VSH_SDF_UNION          ? right.distance - left.distance
                             : node->shape == VSH_SDF_INTERSECTION ? left.distance - right.distance
                             : node->shape == VSH_SDF_SUBTRACTION  ? left.distance + right.distance
                                                                   : 0.0;
         if (fabs(more) > 2.0 * (radius * (1.0 + ROUNDED) + here.error) && fabs(more) < LARGEST) {
-            keep[index] = more > 0.0 ? VSHI_SDF_KEEP_LEFT : VSHI_SDF_KEEP_RIGHT;
+            keep[index] = more > 0.0 ? KEEP_LEFT : KEEP_RIGHT;
         }
     }
     here.error = node->scale * here.error + ROUNDED * (lengths + node->scale * fabs(here.distance));
@@ -234,7 +471,7 @@ void vshi_sdf_narrow(const vsh_sdf *sdf, const double position[3], double radius
 
 bool vshi_sdf_exact(const vsh_sdf *sdf) {
     for (size_t i = 0; i < sdf->node_count; ++i) {
-        if (vshi_sdf_is_operation(&sdf->nodes[i]) && sdf->nodes[i].shape != VSH_SDF_UNION) {
+        if (is_operation(&sdf->nodes[i]) && sdf->nodes[i].shape != VSH_SDF_UNION) {
             return false;
         }
     }
@@ -260,7 +497,7 @@ static placement place_node(const placement *parent, const vsh_sdf_node *node) {
     at.origin = place(parent, vshi_vec_of(node->translation));
     at.scale = parent->scale * node->scale;
     for (int i = 0; i < 3; ++i) { /* row · R = Rᵀ applied to the row */
-        at.axis[i] = vshi_sdf_rotate(node->rotation, -1.0, parent->axis[i]);
+        at.axis[i] = rotate(node->rotation, -1.0, parent->axis[i]);
     }
     return at;
 }
@@ -277,15 +514,15 @@ static double shape_extent(const vsh_sdf_node *node, vshi_vec along) {
     case VSH_SDF_TORUS:
         return across * node->radius + node->minor_radius;
     case VSH_SDF_PLANE:
-        return fabs(along.x) * node->size[0] + vshi_larger(-along.y, 0.0) * node->size[1] +
+        return fabs(along.x) * node->size[0] + larger(-along.y, 0.0) * node->size[1] +
                fabs(along.z) * node->size[2];
     case VSH_SDF_CAPSULE:
         return fabs(along.y) * node->size[1] + node->radius;
     case VSH_SDF_CYLINDER:
         return fabs(along.y) * node->size[1] + across * node->radius;
     default: /* VSH_SDF_CONE */
-        return vshi_larger(across * node->radius - along.y * node->size[1],
-                           across * node->minor_radius + along.y * node->size[1]);
+        return larger(across * node->radius - along.y * node->size[1],
+                      across * node->minor_radius + along.y * node->size[1]);
     }
 }
 
@@ -294,7 +531,7 @@ static void node_bounds(const vsh_sdf_node *nodes, int32_t index, const placemen
     const vsh_sdf_node *node = &nodes[index];
     const placement at = place_node(parent, node);
     const double origin[3] = {at.origin.x, at.origin.y, at.origin.z};
-    if (!vshi_sdf_is_operation(node)) {
+    if (!is_operation(node)) {
         for (int i = 0; i < 3; ++i) {
             low[i] = origin[i] - at.scale * shape_extent(node, vshi_scale(at.axis[i], -1.0));
             high[i] = origin[i] + at.scale * shape_extent(node, at.axis[i]);
@@ -311,12 +548,11 @@ static void node_bounds(const vsh_sdf_node *nodes, int32_t index, const placemen
     const double grown = node->shape == VSH_SDF_SMOOTH_UNION ? 0.25 * node->smoothing * at.scale : 0.0;
     for (int i = 0; i < 3; ++i) {
         if (node->shape == VSH_SDF_INTERSECTION) {
-            low[i] = vshi_larger(low[i], low2[i]);
-            high[i] = vshi_larger(
-                low[i], vshi_smaller(high[i], high2[i])); /* nothing in common: flat, not inverted */
+            low[i] = larger(low[i], low2[i]);
+            high[i] = larger(low[i], smaller(high[i], high2[i])); /* nothing in common: flat, not inverted */
         } else {
-            low[i] = vshi_smaller(low[i], low2[i]) - grown;
-            high[i] = vshi_larger(high[i], high2[i]) + grown;
+            low[i] = smaller(low[i], low2[i]) - grown;
+            high[i] = larger(high[i], high2[i]) + grown;
         }
     }
 }

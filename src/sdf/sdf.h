@@ -1,8 +1,9 @@
-/* What voxelising needs to know of a tree of shapes. */
+/* What voxelising and tracing need to know of a tree of shapes. */
 #ifndef VSHI_SDF_H
 #define VSHI_SDF_H
 
 #include "base/shared.h"
+#include "base/vec.h"
 
 #include <stdbool.h>
 #include <vdbshade/sdf.h>
@@ -21,6 +22,9 @@ VSHI_SHARED void vshi_sdf_narrow(const vsh_sdf *sdf, const double position[3], d
 /* vsh_sdf_distance(), to the bit, of positions [count] within that radius, without the other operands. */
 VSHI_SHARED void vshi_sdf_distances_within(const vsh_sdf *sdf, const uint8_t *keep, size_t count,
                                            const double (*positions)[3], double *distances);
+
+/* vsh_sdf_distance() within a call that has seen to the floating-point environment. */
+double vshi_sdf_distance_at(const vsh_sdf *sdf, vshi_vec position);
 
 /* True where the tree is a true distance outside: shapes and unions only. */
 VSHI_SHARED bool vshi_sdf_exact(const vsh_sdf *sdf);

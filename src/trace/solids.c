@@ -9,7 +9,7 @@
 #include "base/similarity.h"
 #include "base/try.h"
 #include "base/vec.h"
-#include "sdf/shapes.h"
+#include "sdf/sdf.h"
 
 #include <math.h>
 #include <stdlib.h>
