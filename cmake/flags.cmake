@@ -39,7 +39,7 @@ endfunction()
 # which run in vshi_on_stack() (src/base/threads.h).
 set(VSH_LARGEST_FRAME 24576)
 file(GLOB VSH_LARGE_FRAMES ${PROJECT_SOURCE_DIR}/src/shade/*.c)
-list(APPEND VSH_LARGE_FRAMES ${PROJECT_SOURCE_DIR}/src/volume/volume.c ${PROJECT_SOURCE_DIR}/src/field/reach_out.c
+list(APPEND VSH_LARGE_FRAMES ${PROJECT_SOURCE_DIR}/src/volume/volume.c ${PROJECT_SOURCE_DIR}/src/field/derive.c
      ${PROJECT_SOURCE_DIR}/src/bake/lift.c)
 set_source_files_properties(${VSH_LARGE_FRAMES} PROPERTIES COMPILE_OPTIONS -Wno-frame-larger-than)
 function(vsh_limit_frames target)
@@ -59,8 +59,7 @@ function(vsh_add_kernels target)
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
     list(APPEND kinds avx2 avx512)
   endif()
-  target_sources(${target} PRIVATE ${PROJECT_SOURCE_DIR}/src/shade/kernel/march.c ${PROJECT_SOURCE_DIR}/src/levelset/kernel/leaf.c
-                                   ${PROJECT_SOURCE_DIR}/src/field/kernel/feet.c)
+  target_sources(${target} PRIVATE ${PROJECT_SOURCE_DIR}/src/shade/kernel/march.c ${PROJECT_SOURCE_DIR}/src/levelset/kernel/leaf.c)
   foreach(kind ${kinds})
     set(flags ${VSH_KERNEL_${kind}})
     list(POP_FRONT flags lanes width)

@@ -2,13 +2,15 @@
  *
  * A lattice point of the new level is every second one of the level below, so where that one's band reaches,
  * values and signs are taken over as they are: signs of thin parts always come from the finest level. Farther
- * out the distance is that to the nearest point of the surface (its foot, reach_out.c). Feet that spread from
+ * out the distance is that to the nearest point of the surface (its foot). Feet that spread from
  * voxel to voxel (Danielsson, "Euclidean distance mapping", 1980) take several times as long and are no
  * nearer. Fast sweeping (Zhao 2005) was worse here: its first-order upwind differences leave distances 0.1
  * voxel too long, and too long is what makes a marcher step through a wall.
  */
-#include "field/derive.h"
+#include "field/kernel/feet.h"
+#include "field/level.h"
 
+#include "base/isa.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/try.h"
@@ -17,7 +19,85 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BLOCK = 512 };
+enum { EDGE = 8, BLOCK = 512 };
+
+/* One bit a voxel of a block: word x, bit y · 8 + z. */
+typedef uint64_t bits[8];
+
+/* A gradient shorter than this has no direction to follow: a crease of the medial axis. */
+static const float MIN_GRADIENT = 0.25f;
+/* A foot that ends farther off the finest level's zero, in its voxels, has slid off the surface. */
+static const float MAX_RESIDUE = 0.5f;
+
+/* A coarser level while it is derived. */
+typedef struct derivation {
+    const vsh_field *field;
+    const vshi_level *fine; /* the level below */
+    vshi_below below;       /* and what is kept of it */
+    vshi_blocks blocks;     /* of the new level */
+    int32_t *corners;       /* [count][3], lattice coordinates of each block's first voxel */
+    bits *core;             /* [count]: value taken from the level below */
+    bits *inside;           /* [count]: negative */
+    bits *rim;              /* [count]: core voxels that know their feet and touch others */
+    int16_t *feet;          /* [count][3][512], as vshi_below.feet */
+    vshi_nearest_fn *nearest;
+} derivation;
+
+/* Keeps the foot of a voxel of a block. Feet of core voxels, too, are within a band and a step of theirs. */
+static void keep_foot(const derivation *d, size_t block, int voxel, const float p[3], const float foot[3]) {
+    const float steps = VSHI_FOOT_STEPS / d->blocks.scale;
+    for (int axis = 0; axis < 3; ++axis) {
+        d->feet[(block * 3 + (size_t)axis) * BLOCK + (size_t)voxel] =
+            vshi_round((foot[axis] - p[axis]) * steps);
+    }
+}
+
+static float dot(const float a[3], const float b[3]) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static float distance_to(const float p[3], const float foot[3]) {
+    const float way[3] = {p[0] - foot[0], p[1] - foot[1], p[2] - foot[2]};
+    return sqrtf(dot(way, way));
+}
+
+/* Slides a foot along the finest level's surface until it faces p, in steps of at most `most`. Returns the
+ * finest level's value at the foot. */
+static float slide(const vsh_field *field, float most, const float p[3], float foot[3]) {
+    enum { SLIDES = 2 }; /* the second is for curved surfaces */
+    /* A slide that would bring a foot nearer by less than this, in voxels of its level, is not worth its
+     * samples: VSHI_NODE leaves room for 300 of them. */
+    const float LEAST_GAIN = 1.0f / 1024.0f;
+    float g[3], residue = vshi_level_sample(field, 0, foot, g);
+    for (int i = 0; i < SLIDES; ++i) {
+        const float v[3] = {p[0] - foot[0], p[1] - foot[1], p[2] - foot[2]}, square = dot(g, g);
+        float lateral[3], moved[3], moved_g[3];
+        for (int axis = 0; axis < 3; ++axis) {
+            lateral[axis] = v[axis] - dot(v, g) / square * g[axis];
+        }
+        const float length = sqrtf(dot(lateral, lateral)), before = sqrtf(dot(v, v));
+        /* a right-angled triangle's longer leg is about this much shorter than its hypotenuse */
+        if (square < MIN_GRADIENT * MIN_GRADIENT || length * length < 2.0f * LEAST_GAIN * most * before) {
+            break;
+        }
+        for (int axis = 0; axis < 3; ++axis) {
+            moved[axis] = foot[axis] + (length > most ? most / length : 1.0f) * lateral[axis];
+        }
+        const float off = vshi_level_sample(field, 0, moved, moved_g), moved_square = dot(moved_g, moved_g);
+        for (int axis = 0; axis < 3; ++axis) {
+            moved[axis] -= off * moved_g[axis] / moved_square;
+        }
+        const float moved_residue = vshi_level_sample(field, 0, moved, moved_g);
+        if (moved_square < MIN_GRADIENT * MIN_GRADIENT || fabsf(moved_residue) > MAX_RESIDUE ||
+            distance_to(p, moved) + fabsf(moved_residue) >= before + fabsf(residue)) {
+            break;
+        }
+        memcpy(foot, moved, sizeof moved);
+        memcpy(g, moved_g, sizeof moved_g);
+        residue = moved_residue;
+    }
+    return residue;
+}
 
 static int32_t floor_div(int32_t a, int32_t b) {
     return a / b - (a % b < 0);
@@ -30,7 +110,7 @@ typedef struct fine_block {
 } fine_block;
 
 /* By the lattice coordinates of one of its voxels. */
-static fine_block fine_block_at(const vshi_derivation *d, const int32_t at[3]) {
+static fine_block fine_block_at(const derivation *d, const int32_t at[3]) {
     const vshi_level *fine = d->fine;
     fine_block found = {NULL, NULL};
     int32_t v[3];
@@ -50,7 +130,7 @@ static fine_block fine_block_at(const vshi_derivation *d, const int32_t at[3]) {
     return found;
 }
 
-static float fine_value(const vshi_derivation *d, const int32_t at[3]) {
+static float fine_value(const derivation *d, const int32_t at[3]) {
     const int16_t *brick = fine_block_at(d, at).brick;
     return brick == NULL
                ? d->fine->band
@@ -58,49 +138,30 @@ static float fine_value(const vshi_derivation *d, const int32_t at[3]) {
                      (float)brick[(at[0] & 7) * VSHI_STRIDE_X + (at[1] & 7) * VSHI_STRIDE_Y + (at[2] & 7)];
 }
 
-/* Foot of a finest lattice point in a brick, of value h, by one step down the gradient, from central
- * differences. Coordinates are even, so that the next point lies in the brick. */
-static void first_foot(const vshi_derivation *d, const int32_t at[3], const int16_t *brick, float h,
-                       float foot[3]) {
-    static const int stride[3] = {VSHI_STRIDE_X, VSHI_STRIDE_Y, 1};
-    const int16_t *const here =
-        brick + (at[0] & 7) * VSHI_STRIDE_X + (at[1] & 7) * VSHI_STRIDE_Y + (at[2] & 7);
-    float g[3], length = 0.0f;
+/* Foot of a finest lattice point of value h, by one step down the gradient, from central differences. */
+static void first_foot(const derivation *d, const int32_t at[3], float h, float foot[3]) {
+    float g[3];
     for (int axis = 0; axis < 3; ++axis) {
-        int32_t before[3] = {at[0], at[1], at[2]};
+        int32_t before[3] = {at[0], at[1], at[2]}, after[3] = {at[0], at[1], at[2]};
         --before[axis];
-        const float low =
-            (at[axis] & 7) != 0 ? d->fine->quantum * (float)here[-stride[axis]] : fine_value(d, before);
-        g[axis] = 0.5f * (d->fine->quantum * (float)here[stride[axis]] - low);
-        length += g[axis] * g[axis];
+        ++after[axis];
+        g[axis] = 0.5f * (fine_value(d, after) - fine_value(d, before));
     }
-    length = sqrtf(length);
+    const float length = sqrtf(dot(g, g));
     for (int axis = 0; axis < 3; ++axis) {
-        foot[axis] = length >= VSHI_MIN_GRADIENT ? (float)at[axis] - h * g[axis] / length : NAN;
+        foot[axis] = length >= MIN_GRADIENT ? (float)at[axis] - h * g[axis] / length : NAN;
     }
 }
 
 /* One octant of a block: a block of the level below, every second voxel of it. Of a block all of whose feet
  * are unknown and whose bits are 0. */
-static void take_octant(vshi_derivation *d, size_t block, int octant, vshi_slides *slides) {
+static void take_octant(derivation *d, size_t block, int octant) {
     const int first[3] = {octant & 4, octant << 1 & 4, octant << 2 & 4};
     const int32_t *c = d->corners + 3 * block;
     const int32_t corner[3] = {2 * (c[0] + first[0]), 2 * (c[1] + first[1]), 2 * (c[2] + first[2])};
     const fine_block fine = fine_block_at(d, corner);
     const int16_t *const outside = d->field->values + d->fine->first_value;
     const int16_t *const brick = fine.brick == NULL ? outside : fine.brick;
-    if (brick == outside || brick == outside + VSHI_BRICK_VALUES) { /* far away on one side */
-        const bool inside = brick != outside;
-        for (int row = 0; row < 16; ++row) {
-            const int word = first[0] + row / 4, bit = (first[1] + row % 4) * 8 + first[2];
-            int16_t *const values = d->blocks.values + block * BLOCK + (size_t)(word * 64 + bit);
-            for (int z = 0; z < 4; ++z) {
-                values[z] = (int16_t)(inside ? -d->blocks.most : d->blocks.most);
-            }
-            d->inside[block][word] |= (uint64_t)(inside ? 0xf : 0) << bit;
-        }
-        return;
-    }
     const int32_t fine_most = (int32_t)(d->fine->band / d->fine->quantum);
     for (int n = 0; n < 64; ++n) {
         const int x = n >> 4, y = n >> 2 & 3, z = n & 3;
@@ -126,9 +187,9 @@ static void take_octant(vshi_derivation *d, size_t block, int octant, vshi_slide
             const int32_t at[3] = {corner[0] + 2 * x, corner[1] + 2 * y, corner[2] + 2 * z};
             const float p[3] = {(float)at[0], (float)at[1], (float)at[2]};
             float foot[3];
-            first_foot(d, at, brick, value, foot);
-            if (!isnan(foot[0])) {
-                vshi_slide_add(slides, p, foot, (int)v);
+            first_foot(d, at, value, foot);
+            if (!isnan(foot[0]) && fabsf(slide(d->field, 1.0f, p, foot)) <= MAX_RESIDUE) {
+                keep_foot(d, block, (int)v, p, foot);
             }
         }
     }
@@ -136,28 +197,181 @@ static void take_octant(vshi_derivation *d, size_t block, int octant, vshi_slide
 
 /* Takes over what the level below knows. */
 static void take_core(void *user, size_t begin, size_t end) {
-    vshi_derivation *d = user;
-    vshi_slides slides;
+    derivation *d = user;
+    for (size_t i = begin * 3 * BLOCK; i < end * 3 * BLOCK; ++i) {
+        d->feet[i] = VSHI_FOOT_UNKNOWN;
+    }
     for (size_t block = begin; block < end; ++block) {
-        slides.count = 0;
-        for (size_t i = 0; i < 3 * BLOCK; ++i) {
-            d->feet[block * 3 * BLOCK + i] = VSHI_FOOT_UNKNOWN;
-        }
         for (int octant = 0; octant < 8; ++octant) {
-            take_octant(d, block, octant, &slides);
-        }
-        d->kernel->slide(d->field, 1.0f, &slides);
-        for (size_t i = 0; i < slides.count; ++i) {
-            if (fabsf(slides.residue[i]) <= VSHI_MAX_RESIDUE) {
-                vshi_foot_keep(d, block, &slides, i);
-            }
+            take_octant(d, block, octant);
         }
     }
 }
 
+/* --- distances of voxels that the level below does not know */
+
+/* The line from a voxel to its foot passes the rim of the core, whose voxels know their feet. The nearest of
+ * these slides along the finest level's surface until it faces the voxel. That removes the error of the
+ * lattice's spacing. */
+
+/* The most that two slides of a voxel each bring a foot nearer that is a band away, voxels of its level: 2² /
+ * (2 · 6), and half a finest voxel of residue. */
+static const float SLIDE_GAIN = 0.6f;
+
+/* Numbers of a block and of the 26 around it; -1: none. */
+static void find_around(const derivation *d, size_t block, int32_t around[27]) {
+    const vshi_blocks *b = &d->blocks;
+    int32_t at[3];
+    for (int axis = 0; axis < 3; ++axis) {
+        at[axis] = (d->corners[3 * block + (size_t)axis] - b->origin[axis]) / EDGE;
+    }
+    for (int n = 0; n < 27; ++n) {
+        const int32_t x = at[0] + n / 9 - 1, y = at[1] + n / 3 % 3 - 1, z = at[2] + n % 3 - 1;
+        const bool there = x >= 0 && y >= 0 && z >= 0 && x < b->size[0] && y < b->size[1] && z < b->size[2];
+        around[n] =
+            there ? b->map[((size_t)x * (size_t)b->size[1] + (size_t)y) * (size_t)b->size[2] + (size_t)z]
+                  : -1;
+    }
+}
+
+/* A plane of voxels that are not of the core, with what touches them along z; `n` the first of three blocks
+ * along z. */
+static uint64_t open_row(const derivation *d, const int32_t around[27], int n, int x) {
+    uint64_t open[3];
+    for (int i = 0; i < 3; ++i) {
+        open[i] = around[n + i] < 0 ? 0 : ~d->core[around[n + i]][x];
+    }
+    static const uint64_t first_z = 0x0101010101010101u;
+    return open[1] | (open[1] << 1 & ~first_z) | (open[1] >> 1 & ~(first_z << 7)) | (open[0] >> 7 & first_z) |
+           (open[2] & first_z) << 7;
+}
+
+static void find_rim(void *user, size_t begin, size_t end) {
+    derivation *d = user;
+    for (size_t block = begin; block < end; ++block) {
+        int32_t around[27];
+        find_around(d, block, around);
+        uint64_t planes[EDGE + 2];
+        for (int i = 0; i < EDGE + 2; ++i) {
+            const int n = i == 0 ? 0 : i == EDGE + 1 ? 18 : 9, x = (i + 7) & 7;
+            const uint64_t own = open_row(d, around, n + 3, x);
+            planes[i] = own | own << 8 | own >> 8 | open_row(d, around, n, x) >> 56 |
+                        open_row(d, around, n + 6, x) << 56;
+        }
+        for (int x = 0; x < EDGE; ++x) {
+            uint64_t rim = d->core[block][x] & (planes[x] | planes[x + 1] | planes[x + 2]);
+            for (uint64_t left = rim; left != 0; left &= left - 1) {
+                const int n = __builtin_ctzll(left);
+                const bool unknown = d->feet[block * BLOCK * 3 + (size_t)(64 * x + n)] == VSHI_FOOT_UNKNOWN;
+                rim ^= (uint64_t)unknown << n;
+            }
+            d->rim[block][x] = rim;
+        }
+    }
+}
+
+/* The feet of the rim within reach of a block's voxels, on their side of the surface. */
+static void gather(const derivation *d, const int32_t around[27], bool inside, vshi_feet *points) {
+    /* a voxel's way to its foot enters the core where that ends: there the rim is a cell's diagonal away */
+    const float way = VSHI_COARSE_BAND + SLIDE_GAIN - d->fine->band / d->blocks.scale + 1.7321f;
+    const int32_t margin = way < VSHI_FEET_MARGIN ? (int32_t)ceilf(way) : VSHI_FEET_MARGIN;
+    points->count = 0;
+    for (int n = 0; n < 27; ++n) {
+        if (around[n] < 0) {
+            continue;
+        }
+        const int step[3] = {n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
+        int low[3], high[3];
+        for (int axis = 0; axis < 3; ++axis) {
+            low[axis] = step[axis] < 0 ? EDGE - margin : 0;
+            high[axis] = step[axis] > 0 ? margin - 1 : EDGE - 1;
+        }
+        const uint64_t along_z = (uint64_t)(0xff << low[2] & 0xff >> (7 - high[2])) * 0x0101010101010101u;
+        const uint64_t box = along_z & ~(uint64_t)0 << 8 * low[1] & ~(uint64_t)0 >> (56 - 8 * high[1]);
+        const int16_t *feet = d->feet + (size_t)around[n] * BLOCK * 3;
+        for (int x = low[0]; x <= high[0]; ++x) {
+            const uint64_t in = d->inside[around[n]][x];
+            uint64_t left = d->rim[around[n]][x] & box & (inside ? in : ~in);
+            for (; left != 0; left &= left - 1) {
+                const int bit = __builtin_ctzll(left), v = 64 * x + bit;
+                const size_t i = points->count++;
+                points->x[i] = (float)(EDGE * step[0] + x) * VSHI_FOOT_STEPS + feet[v];
+                points->y[i] = (float)(EDGE * step[1] + (bit >> 3)) * VSHI_FOOT_STEPS + feet[BLOCK + v];
+                points->z[i] = (float)(EDGE * step[2] + (bit & 7)) * VSHI_FOOT_STEPS + feet[2 * BLOCK + v];
+            }
+        }
+    }
+    for (size_t i = points->count; i % VSHI_FEET_LANES != 0; ++i) {
+        points->x[i] = points->y[i] = points->z[i] = 1e9f;
+    }
+}
+
+/* Distances of a block's voxels that know a foot within the band, and some more. */
+static void settle(derivation *d, size_t block, const bits open) {
+    const float scale = d->blocks.scale, step = scale / VSHI_FOOT_STEPS;
+    const int16_t *feet = d->feet + block * BLOCK * 3;
+    const int32_t *c = d->corners + 3 * block;
+    for (int x = 0; x < EDGE; ++x) {
+        for (uint64_t left = open[x]; left != 0; left &= left - 1) {
+            const int n = __builtin_ctzll(left), v = 64 * x + n;
+            if (feet[v] == VSHI_FOOT_UNKNOWN) {
+                continue;
+            }
+            const float p[3] = {(float)(c[0] + x) * scale, (float)(c[1] + (n >> 3)) * scale,
+                                (float)(c[2] + (n & 7)) * scale};
+            float foot[3] = {p[0] + (float)feet[v] * step, p[1] + (float)feet[BLOCK + v] * step,
+                             p[2] + (float)feet[2 * BLOCK + v] * step};
+            if (distance_to(p, foot) > d->blocks.band + SLIDE_GAIN * scale) {
+                continue;
+            }
+            int16_t *const value = d->blocks.values + block * BLOCK + v;
+            const float sign = *value < 0 ? -1.0f : 1.0f, residue = slide(d->field, scale, p, foot);
+            /* a foot just outside the surface is nearer to p than the surface by that, for p outside */
+            const float distance =
+                distance_to(p, foot) + sign * (fabsf(residue) < MAX_RESIDUE ? residue : 0.0f);
+            if (distance < d->blocks.band) {
+                /* the level below has said that it is at least its band away */
+                *value = vshi_blocks_value(&d->blocks, sign * fmaxf(distance, d->fine->band));
+            }
+            keep_foot(d, block, v, p, foot);
+        }
+    }
+}
+
+/* Finds the distances of voxels outside the core. */
+static void reach_out(void *user, size_t begin, size_t end) {
+    derivation *d = user;
+    vshi_feet points;
+    for (size_t block = begin; block < end; ++block) {
+        bits open;
+        int32_t around[27];
+        find_around(d, block, around);
+        for (int side = 0; side < 2; ++side) {
+            uint64_t any = 0;
+            for (int x = 0; x < EDGE; ++x) {
+                const uint64_t inside = d->inside[block][x];
+                open[x] = ~d->core[block][x] & (side != 0 ? inside : ~inside);
+                any |= open[x];
+            }
+            if (any != 0) {
+                gather(d, around, side != 0, &points);
+                /* feet that may slide into the band, and a step */
+                const float most = (VSHI_COARSE_BAND + SLIDE_GAIN) * VSHI_FOOT_STEPS + 1.0f;
+                d->nearest(&points, open, most, d->feet + block * BLOCK * 3);
+            }
+        }
+        for (int x = 0; x < EDGE; ++x) {
+            open[x] = ~d->core[block][x];
+        }
+        settle(d, block, open);
+    }
+}
+
+/* --- the level */
+
 /* Blocks of the new level that the band can reach: it grows by no more than its width from bricks below that
  * hold the surface itself. */
-static vsh_result place_blocks(vshi_derivation *d, vsh_error *error) {
+static vsh_result place_blocks(derivation *d, vsh_error *error) {
     const vshi_level *fine = d->fine;
     vshi_blocks *b = &d->blocks;
     b->scale = 2.0f * fine->scale;
@@ -214,7 +428,7 @@ static vsh_result place_blocks(vshi_derivation *d, vsh_error *error) {
 }
 
 /* Adds what it takes to the budget. */
-static vsh_result allocate_voxels(vshi_derivation *d, vshi_budget *budget, vsh_error *error) {
+static vsh_result allocate_voxels(derivation *d, vshi_budget *budget, vsh_error *error) {
     const size_t count = d->blocks.count;
     const struct {
         void **memory;
@@ -239,10 +453,10 @@ static vsh_result allocate_voxels(vshi_derivation *d, vshi_budget *budget, vsh_e
 
 vsh_result vshi_level_derive(vsh_field *field, vshi_below *below, vshi_budget budget, vshi_job *job,
                              vsh_error *error) {
-    vshi_derivation d = {.field = field,
-                         .fine = &field->levels[field->level_count - 1],
-                         .below = *below,
-                         .kernel = vshi_feet_kernel_of(budget.run->isa)};
+    derivation d = {.field = field,
+                    .fine = &field->levels[field->level_count - 1],
+                    .below = *below,
+                    .nearest = VSHI_KERNEL_OF(vshi_feet, budget.run->isa)};
     budget.held += (double)below->count * BLOCK * 3 * sizeof *below->feet +
                    (double)below->brick_count * (sizeof *below->bricks + 6);
     vshi_below next = {.bricks = NULL};
@@ -250,7 +464,8 @@ vsh_result vshi_level_derive(vsh_field *field, vshi_below *below, vshi_budget bu
     VSHI_TRY_DONE(place_blocks(&d, error));
     VSHI_TRY_DONE(allocate_voxels(&d, &budget, error));
     VSHI_TRY_DONE(vshi_parallel_for(job, d.blocks.count, 16, 0, take_core, &d, error));
-    VSHI_TRY_DONE(vshi_reach_out(&d, job, error));
+    VSHI_TRY_DONE(vshi_parallel_for(job, d.blocks.count, 64, 0, find_rim, &d, error));
+    VSHI_TRY_DONE(vshi_parallel_for(job, d.blocks.count, 16, 0, reach_out, &d, error));
     VSHI_TRY_DONE(vshi_level_append(field, &d.blocks, budget, job, &next, error));
     vshi_below_free(below);
     *below = next;

@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of an empty field's level, finest voxels. */
-#define EMPTY_SCALE 0x1p60f
+/* Voxel of a field of one value, finest voxels. */
+#define CONSTANT_SCALE 0x1p60f
 
 /* Without a wish for a reach: what a light of 60° can use at receivers several diagonals away. */
 static const double DEFAULT_REACH = 4.0; /* diagonals of the bounds */
@@ -132,7 +132,7 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     f->active_voxels = info.active_voxels;
     memcpy(f->world_min, info.bounds_min, sizeof f->world_min);
     memcpy(f->world_max, info.bounds_max, sizeof f->world_max);
-    invert(vshi_grid_transform(grid), info.voxel_size, f->to_field);
+    invert(info.transform, info.voxel_size, f->to_field);
 
     VSHI_TRY_DONE(read_finest(grid, &info, f, &r, job, &below, error));
     if (!find_bounds(f, &below)) {
@@ -154,43 +154,69 @@ done:
     return result;
 }
 
-/* A level of one block, all of whose values are a band wider than any scene. */
-static vsh_result append_emptiness(vsh_field *f, vsh_error *error) {
-    int32_t no_values = -1;
-    int8_t outside = 1;
-    vshi_blocks blocks = {.size = {1, 1, 1}, .map = &no_values, .signs = &outside, .scale = EMPTY_SCALE};
-    vshi_below below;
-    vshi_blocks_set_band(&blocks, VSHI_COARSE_BAND * EMPTY_SCALE);
-    const vsh_run run = vsh_run_default();
-    vshi_job *job = vshi_job_begin(&run, "field", 1);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "field: the system refused memory");
-    }
-    const vsh_result result = vshi_level_append(f, &blocks, (vshi_budget){&run, 0.0}, job, &below, error);
-    vshi_below_free(&below);
-    vshi_job_end(job);
-    return result;
-}
-
-vsh_result vshi_field_create_empty(double voxel_size, vsh_field **field, vsh_error *error) {
+/* A field of one level, whose voxels are wider than any scene: 2³ blocks around the origin, all of one brick
+ * whose values are the band or 0. */
+static vsh_result create_constant(double voxel_size, float band, bool free, vsh_field **field,
+                                  vsh_error *error) {
+    enum { BLOCKS = 8 };
     *field = NULL;
     if (!(voxel_size >= 1e-12 && voxel_size <= 1e12)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "voxel_size %g is out of range 1e-12 … 1e12", voxel_size);
     }
     vsh_field *f = NULL;
-    VSHI_TRY(vshi_allocate((void **)&f, 1, sizeof *f, "field", error));
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&f, 1, sizeof *f, "field", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&f->index, BLOCKS, sizeof *f->index, "field", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&f->values, VSHI_BRICK_VALUES, sizeof *f->values, "field", error));
+    vshi_blocks blocks = {.scale = CONSTANT_SCALE};
+    vshi_blocks_set_band(&blocks, band);
+    for (int v = 0; v < VSHI_BRICK_VALUES; ++v) {
+        f->values[v] = free ? blocks.most : 0;
+    }
     f->voxel_size = voxel_size;
+    f->value_count = VSHI_BRICK_VALUES;
+    f->level_count = 1;
+    f->levels[0] = (vshi_level){.origin = {-VSHI_BRICK_CELLS, -VSHI_BRICK_CELLS, -VSHI_BRICK_CELLS},
+                                .size = {2, 2, 2},
+                                .brick_count = 1,
+                                .scale = blocks.scale,
+                                .band = blocks.band,
+                                .quantum = blocks.quantum,
+                                .rounding = free ? 0.5f * blocks.quantum : 0.0f};
     for (int axis = 0; axis < 3; ++axis) {
         f->to_field[5 * axis] = 1.0 / voxel_size;
-        f->bounds_min[axis] = INFINITY; /* which no cone meets */
-        f->bounds_max[axis] = -INFINITY;
-    }
-    const vsh_result result = append_emptiness(f, error);
-    if (result != VSH_OK) {
-        vsh_field_free(f);
-        return result;
     }
     *field = f;
+    f = NULL;
+done:
+    vsh_field_free(f);
+    return result;
+}
+
+vsh_result vshi_field_create_empty(double voxel_size, vsh_field **field, vsh_error *error) {
+    VSHI_TRY(create_constant(voxel_size, VSHI_COARSE_BAND * CONSTANT_SCALE, true, field, error));
+    for (int axis = 0; axis < 3; ++axis) {
+        (*field)->bounds_min[axis] = INFINITY; /* which no cone meets */
+        (*field)->bounds_max[axis] = -INFINITY;
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_field_create_unknown(double voxel_size, const double low[3], const double high[3],
+                                     vsh_field **field, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_TRY(create_constant(voxel_size, CONSTANT_SCALE, false, field, error));
+    vsh_field *f = *field;
+    f->unknown = true;
+    for (int axis = 0; axis < 3; ++axis) {
+        /* around 0, for positions become floats, as a level set of the same casters is */
+        const double middle = round((low[axis] + 0.5 * (high[axis] - low[axis])) / voxel_size);
+        f->to_field[4 * axis + 3] = -middle;
+        f->world_min[axis] = low[axis];
+        f->world_max[axis] = high[axis];
+        f->bounds_min[axis] = (float)(low[axis] / voxel_size - middle);
+        f->bounds_max[axis] = (float)(high[axis] / voxel_size - middle);
+    }
     return VSH_OK;
 }
 

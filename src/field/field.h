@@ -3,8 +3,7 @@
  * Field space is the finest level's index space: lengths are finest voxels, lattice point (i, j, k) of level
  * l lies at 2^l (i, j, k). A brick holds 8³ cells of a level as 9³ values (one plane of apron on the far
  * sides), z fastest, so that a trilinear sample is one look-up of the brick and four loads of two neighbours
- * each. Bricks that are neighbours along x follow each other in memory and share the plane between them.
- * Blocks away from the surface share one of two constant bricks, so the look-up never branches.
+ * each. Blocks away from the surface share one of two constant bricks, so the look-up never branches.
  *
  * Values are 16-bit multiples of a level's quantum, a power of two: for a band of 3 voxels 2^-13 voxel, of 6
  * 2^-12. Rounding is then all that is lost, and a cell interpolates to the same bits as its floats would. */

@@ -110,9 +110,8 @@ done:
 
 typedef struct assembly {
     const vshi_blocks *blocks;
-    const int32_t *slots;   /* of each brick to write: its block in the map */
-    const int32_t *offsets; /* and where it goes, from `values` on */
-    int16_t *values;
+    const int32_t *slots; /* each brick's block in the map */
+    int16_t *bricks;
     int8_t *boxes; /* as in vshi_below */
     uint8_t *keep; /* of each block in the map: whether it needs a brick */
 } assembly;
@@ -132,9 +131,9 @@ static const int16_t *values_at(const vshi_blocks *blocks, int32_t x, int32_t y,
     return blocks->values + (size_t)blocks->map[block] * 512;
 }
 
-/* The first `planes` planes of a block's brick: its own values and those of the seven blocks beyond its far
- * faces, row by row. False where all eight have no values. */
-static bool gather_brick(const vshi_blocks *blocks, size_t block, int planes, int16_t *brick) {
+/* A block's brick: its own values and those of the seven blocks beyond its far faces, row by row. False where
+ * all eight have no values. */
+static bool gather_brick(const vshi_blocks *blocks, size_t block, int16_t *brick) {
     const size_t plane = (size_t)blocks->size[1] * (size_t)blocks->size[2];
     const int32_t at[3] = {(int32_t)(block / plane), (int32_t)(block % plane / (size_t)blocks->size[2]),
                            (int32_t)(block % (size_t)blocks->size[2])};
@@ -145,7 +144,7 @@ static bool gather_brick(const vshi_blocks *blocks, size_t block, int planes, in
         from[n] = values_at(blocks, at[0] + (n >> 2), at[1] + (n >> 1 & 1), at[2] + (n & 1), &constant[n]);
         any = any || from[n] != NULL;
     }
-    for (int row = 0; any && row < 9 * planes; ++row, brick += 9) {
+    for (int row = 0; any && row < VSHI_STRIDE_X; ++row, brick += 9) {
         const int x = row / 9, y = row % 9, n = (x >> 3) * 4 + (y >> 3) * 2;
         const int first = (x & 7) * 64 + (y & 7) * 8;
         if (from[n] != NULL) {
@@ -162,30 +161,26 @@ static bool gather_brick(const vshi_blocks *blocks, size_t block, int planes, in
 
 /* A block needs a brick where one of its 9³ values lies within the band, or where signs change without that
  * (a .vdb whose band is torn). */
-static bool varies(const vshi_blocks *blocks, const int16_t *values, int count) {
-    int others = abs(values[0]) != blocks->most;
-    for (int v = 0; v < count; ++v) {
-        others |= values[v] ^ values[0];
-    }
-    return others != 0;
-}
-
 static void mark_bricks(void *user, size_t begin, size_t end) {
     const assembly *a = user;
     for (size_t block = begin; block < end; ++block) {
-        const int32_t number = a->blocks->map[block];
         int16_t brick[VSHI_BRICK_VALUES];
-        a->keep[block] =
-            (number >= 0 && varies(a->blocks, a->blocks->values + (size_t)number * 512, 512)) ||
-            (gather_brick(a->blocks, block, 9, brick) && varies(a->blocks, brick, VSHI_BRICK_VALUES));
+        int others = 0;
+        if (gather_brick(a->blocks, block, brick)) {
+            others = abs(brick[0]) != a->blocks->most;
+            for (int v = 0; v < VSHI_BRICK_VALUES; ++v) {
+                others |= brick[v] ^ brick[0];
+            }
+        }
+        a->keep[block] = others != 0;
     }
 }
 
-/* The box of vshi_below of a brick's first planes. */
-static void find_box(const vshi_blocks *blocks, const int16_t *brick, int count, int8_t box[6]) {
+/* The box of vshi_below of a brick. */
+static void find_box(const vshi_blocks *blocks, const int16_t *brick, int8_t box[6]) {
     const int32_t near = (int32_t)(CELL_DIAGONAL * blocks->scale / blocks->quantum);
     int32_t planes = 0, across = 0, columns = 0;
-    for (int x = 0; x < count; ++x) {
+    for (int x = 0; x < VSHI_BRICK_EDGE; ++x) {
         int32_t any = 0;
         for (int v = 0; v < VSHI_STRIDE_X; ++v) {
             any |= abs(brick[x * VSHI_STRIDE_X + v]) <= near;
@@ -194,7 +189,7 @@ static void find_box(const vshi_blocks *blocks, const int16_t *brick, int count,
     }
     memset(box, 0, 6);
     box[0] = (int8_t)(planes == 0);
-    for (int x = 0; x < count; ++x) {
+    for (int x = 0; x < VSHI_BRICK_EDGE; ++x) {
         for (int y = 0; y < 9 && (planes >> x & 1) != 0; ++y) {
             for (int z = 0; z < 9; ++z) {
                 const int32_t hit = abs(brick[x * VSHI_STRIDE_X + y * VSHI_STRIDE_Y + z]) <= near;
@@ -210,16 +205,12 @@ static void find_box(const vshi_blocks *blocks, const int16_t *brick, int count,
     }
 }
 
-/* The last plane is the next brick's first one, where there is one. */
 static void write_bricks(void *user, size_t begin, size_t end) {
     const assembly *a = user;
-    const size_t plane = (size_t)a->blocks->size[1] * (size_t)a->blocks->size[2];
     for (size_t i = begin; i < end; ++i) {
-        const size_t block = (size_t)a->slots[i], next = block + plane;
-        const bool shared = next < plane * (size_t)a->blocks->size[0] && a->keep[next];
-        const int planes = shared ? 8 : 9;
-        gather_brick(a->blocks, block, planes, a->values + a->offsets[i]);
-        find_box(a->blocks, a->values + a->offsets[i], planes, a->boxes + 6 * i);
+        int16_t *const brick = a->bricks + i * VSHI_BRICK_VALUES;
+        gather_brick(a->blocks, (size_t)a->slots[i], brick);
+        find_box(a->blocks, brick, a->boxes + 6 * i);
     }
 }
 
@@ -234,33 +225,10 @@ static vsh_result grow(void **memory, uint64_t count, size_t size, vsh_error *er
     return VSH_OK;
 }
 
-/* Where the bricks go, neighbours along x after each other; returns the values that they take. */
-static uint64_t place_bricks(const assembly *a, uint64_t begin, int32_t *slots, int32_t *offsets) {
-    const int32_t *size = a->blocks->size;
-    uint64_t next = begin;
-    size_t count = 0;
-    for (int32_t y = 0; y < size[1]; ++y) {
-        for (int32_t z = 0; z < size[2]; ++z) {
-            bool after = false;
-            for (int32_t x = 0; x < size[0]; ++x) {
-                const size_t block = block_at(a->blocks, x, y, z);
-                if (a->keep[block]) {
-                    next -= after ? VSHI_STRIDE_X : 0;
-                    slots[count] = (int32_t)block;
-                    offsets[count++] = (int32_t)next; /* checked by the caller */
-                    next += VSHI_BRICK_VALUES;
-                }
-                after = a->keep[block];
-            }
-        }
-    }
-    return next - begin;
-}
-
 vsh_result vshi_level_append(vsh_field *field, const vshi_blocks *blocks, vshi_budget budget, vshi_job *job,
                              vshi_below *below, vsh_error *error) {
     const size_t block_count = block_at(blocks, blocks->size[0], 0, 0);
-    int32_t *slots = NULL, *offsets = NULL;
+    int32_t *slots = NULL;
     *below = (vshi_below){.bricks = NULL};
     assembly a = {.blocks = blocks};
     VSHI_TRY(vshi_allocate((void **)&a.keep, block_count, 1, "field blocks", error));
@@ -292,15 +260,12 @@ vsh_result vshi_level_append(vsh_field *field, const vshi_blocks *blocks, vshi_b
                       (unsigned long long)(most / VSHI_BRICK_VALUES), INT32_MAX / VSHI_BRICK_VALUES);
         goto done;
     }
-    budget.held += (double)level->brick_count * (VSHI_BRICK_VALUES * sizeof(int16_t) + 2 * sizeof *slots + 6);
+    budget.held += (double)level->brick_count * (VSHI_BRICK_VALUES * sizeof(int16_t) + sizeof *slots + 6);
     budget.held += (double)block_count * (double)(sizeof(int32_t) + 1);
     VSHI_TRY_DONE(vshi_check_limit(budget.run, budget.held, "field", error));
     VSHI_TRY_DONE(vshi_allocate((void **)&slots, brick_count, sizeof *slots, "field bricks", error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&offsets, brick_count, sizeof *offsets, "field bricks", error));
     VSHI_TRY_DONE(vshi_allocate((void **)&a.boxes, brick_count, 6, "field bricks", error));
-    const uint64_t first = level->first_value + 2 * VSHI_BRICK_VALUES;
-    const uint64_t value_count = first + place_bricks(&a, first, slots, offsets);
-    VSHI_TRY_DONE(grow((void **)&field->values, value_count, sizeof *field->values, error));
+    VSHI_TRY_DONE(grow((void **)&field->values, most, sizeof *field->values, error));
     VSHI_TRY_DONE(grow((void **)&field->index, level->first_index + block_count, sizeof(int32_t), error));
 
     const int32_t outside = (int32_t)level->first_value, inside = outside + VSHI_BRICK_VALUES;
@@ -309,27 +274,28 @@ vsh_result vshi_level_append(vsh_field *field, const vshi_blocks *blocks, vshi_b
         field->values[inside + v] = (int16_t)-blocks->most;
     }
     int32_t *index = field->index + level->first_index;
+    const int32_t first = inside + VSHI_BRICK_VALUES;
+    size_t next = 0;
     for (size_t block = 0; block < block_count; ++block) {
         const int32_t number = blocks->map[block];
         /* without a brick all of a block is background of one sign */
         const bool solid = number >= 0 ? blocks->values[(size_t)number * 512] < 0 : blocks->signs[block] < 0;
         index[block] = solid ? inside : outside;
-    }
-    for (size_t i = 0; i < brick_count; ++i) {
-        index[slots[i]] = offsets[i];
+        if (a.keep[block]) {
+            index[block] = first + (int32_t)next * VSHI_BRICK_VALUES;
+            slots[next++] = (int32_t)block;
+        }
     }
     a.slots = slots;
-    a.offsets = offsets;
-    a.values = field->values;
+    a.bricks = field->values + first;
     VSHI_TRY_DONE(vshi_parallel_for(job, brick_count, 64, 0, write_bricks, &a, error));
-    field->value_count = value_count;
+    field->value_count = most;
     ++field->level_count;
     *below = (vshi_below){.brick_count = brick_count, .bricks = slots, .boxes = a.boxes};
     slots = NULL;
     a.boxes = NULL;
 done:
     free(a.boxes);
-    free(offsets);
     free(slots);
     free(a.keep);
     return result;

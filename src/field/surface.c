@@ -29,6 +29,17 @@ static const uint8_t face_corners[6][4] = {{0, 1, 3, 2}, {4, 5, 7, 6}, {0, 1, 5,
 static const uint8_t face_edges[6][4] = {{0, 5, 1, 4},   {2, 7, 3, 6},  {0, 9, 2, 8},
                                          {1, 11, 3, 10}, {4, 10, 6, 8}, {5, 11, 7, 9}};
 
+/* The surface where the level's trilinear cells read a height, by bricks. */
+typedef struct surface_bricks {
+    const vsh_field *field;
+    int32_t height; /* half quanta, odd: no value is on it */
+    size_t brick_count;
+    uint32_t *bricks;  /* [brick_count]: their blocks */
+    uint32_t *corners; /* these two: [brick_count + 1]: how many all bricks before one have */
+    uint32_t *quads;
+    vshi_job *job;
+} surface_bricks;
+
 /* What a cell holds: quads by its edges. */
 typedef struct cell_quads {
     uint8_t count;
@@ -96,9 +107,8 @@ static void find_quads(const int32_t value[8], cell_quads *quads) {
 }
 
 typedef struct extraction {
-    vshi_surface *surface;
-    cell_quads cells[256];              /* by the signs of the corners, 1 below the height */
-    uint8_t ones[1 << VSHI_BRICK_EDGE]; /* how many bits a row has */
+    surface_bricks *surface;
+    cell_quads cells[256]; /* by the signs of the corners, 1 below the height */
     const double *centre;
     double scale;
     float *corners;
@@ -113,9 +123,6 @@ static void make_cells(extraction *e) {
         }
         find_quads(value, &e->cells[signs]);
     }
-    for (int row = 1; row < 1 << VSHI_BRICK_EDGE; ++row) {
-        e->ones[row] = (uint8_t)(e->ones[row / 2] + row % 2);
-    }
 }
 
 /* A brick on its way. */
@@ -127,11 +134,10 @@ typedef struct brick {
     uint32_t first_corner;
     float *corners; /* NULL: only to be counted */
     uint32_t *quads;
-    uint16_t rows[VSHI_STRIDE_X]; /* bits along z of values below the height */
     uint16_t number[BRICK_EDGES]; /* 1 + that of the corner on it; 0: none yet */
 } brick;
 
-/* Where the surface crosses the edge between two values. */
+/* Writes where the surface crosses the edge between two values. */
 static void write_corner(const brick *b, uint32_t corner, int at, int axis, int32_t low, int32_t high) {
     const extraction *e = b->extraction;
     double p[3] = {(double)(at / VSHI_STRIDE_X), (double)(at / VSHI_STRIDE_Y % VSHI_BRICK_EDGE),
@@ -149,89 +155,40 @@ static uint32_t corner_of(brick *b, int at, int edge, const int32_t value[8]) {
     uint16_t *number = &b->number[3 * low + axis];
     if (*number == 0) {
         *number = (uint16_t)++b->corner_count;
-        write_corner(b, *number - 1u, low, axis, value[ends[0]], value[ends[1]]);
+        if (b->corners != NULL) {
+            write_corner(b, *number - 1u, low, axis, value[ends[0]], value[ends[1]]);
+        }
     }
     return b->first_corner + *number - 1u;
 }
 
-static void add_cell(brick *b, int at, int signs) {
+/* Adds the cell whose first value is at `at`. */
+static void add_cell(brick *b, int at) {
+    int32_t value[8];
+    unsigned signs = 0;
+    for (int c = 0; c < 8; ++c) {
+        value[c] = 2 * b->values[at + corner_at[c]] - b->extraction->surface->height;
+        signs |= (unsigned)(value[c] < 0) << c;
+    }
     const cell_quads *cell = &b->extraction->cells[signs];
     cell_quads by_value;
-    int32_t value[8];
-    if (b->quads != NULL || cell->ambiguous) {
-        for (int c = 0; c < 8; ++c) {
-            value[c] = 2 * b->values[at + corner_at[c]] - b->extraction->surface->height;
-        }
-    }
     if (cell->ambiguous) {
         find_quads(value, &by_value);
         cell = &by_value;
     }
-    for (int q = 0; q < cell->count && b->quads != NULL; ++q) {
-        for (int k = 0; k < 4; ++k) {
-            b->quads[4 * (size_t)(b->quad_count + (uint32_t)q) + (size_t)k] =
-                corner_of(b, at, cell->edges[q][k], value);
-        }
-    }
-    b->quad_count += cell->count;
-}
-
-/* Which values are below the height. */
-static void find_rows(brick *b) {
-    uint8_t below[VSHI_BRICK_VALUES];
-    const int16_t most = (int16_t)((b->extraction->surface->height - 1) / 2); /* it is odd */
-    for (int v = 0; v < VSHI_BRICK_VALUES; ++v) {
-        below[v] = b->values[v] <= most;
-    }
-    for (int row = 0; row < VSHI_STRIDE_X; ++row) {
-        const uint8_t *r = below + VSHI_BRICK_EDGE * row;
-        uint64_t bytes = 0;
-        memcpy(&bytes, r, sizeof bytes);
-        if (__BYTE_ORDER__ == __ORDER_BIG_ENDIAN__) {
-            bytes = __builtin_bswap64(bytes);
-        }
-        /* each byte is moved to a bit of the highest */
-        b->rows[row] = (uint16_t)(bytes * UINT64_C(0x0102040810204080) >> 56 | (uint64_t)r[8] << 8);
-    }
-}
-
-/* Each edge that is crossed has one. */
-static uint32_t count_corners(const brick *b) {
-    const uint8_t *ones = b->extraction->ones;
-    uint32_t count = 0;
-    for (int row = 0; row < VSHI_STRIDE_X; ++row) {
-        const uint16_t *r = b->rows + row;
-        count += ones[(r[0] ^ r[0] >> 1) & 0xff];
-        count += row % VSHI_BRICK_EDGE < VSHI_BRICK_CELLS ? ones[r[0] ^ r[1]] : 0u;
-        count += row < VSHI_BRICK_EDGE * VSHI_BRICK_CELLS ? ones[r[0] ^ r[VSHI_BRICK_EDGE]] : 0u;
-    }
-    return count;
-}
-
-static void extract_brick(brick *b) {
-    find_rows(b);
-    for (int x = 0; x < VSHI_BRICK_CELLS; ++x) {
-        for (int y = 0; y < VSHI_BRICK_CELLS; ++y) {
-            const uint16_t *r = b->rows + VSHI_BRICK_EDGE * x + y;
-            const int some = r[0] | r[1] | r[VSHI_BRICK_EDGE] | r[VSHI_BRICK_EDGE + 1];
-            const int all = r[0] & r[1] & r[VSHI_BRICK_EDGE] & r[VSHI_BRICK_EDGE + 1];
-            int mixed = (some | some >> 1) & ~(all & all >> 1) & 0xff;
-            for (; mixed != 0; mixed &= mixed - 1) {
-                const int z = __builtin_ctz((unsigned)mixed);
-                const int signs = (r[0] >> z & 3) | (r[1] >> z & 3) << 2 |
-                                  (r[VSHI_BRICK_EDGE] >> z & 3) << 4 | (r[VSHI_BRICK_EDGE + 1] >> z & 3) << 6;
-                add_cell(b, VSHI_STRIDE_X * x + VSHI_STRIDE_Y * y + z, signs);
+    for (int q = 0; q < cell->count; ++q, ++b->quad_count) {
+        for (size_t k = 0; k < 4; ++k) {
+            const uint32_t corner = corner_of(b, at, cell->edges[q][k], value);
+            if (b->quads != NULL) {
+                b->quads[4 * (size_t)b->quad_count + k] = corner;
             }
         }
-    }
-    if (b->quads == NULL) {
-        b->corner_count = count_corners(b);
     }
 }
 
 static void extract(void *user, size_t begin, size_t end) {
     const extraction *e = user;
-    vshi_surface *s = e->surface;
+    surface_bricks *s = e->surface;
     const vshi_level *level = &s->field->levels[0];
     brick b = {.extraction = e};
     for (size_t i = begin; i < end; ++i) {
@@ -239,8 +196,8 @@ static void extract(void *user, size_t begin, size_t end) {
         vshi_block_corner(level->origin, level->size, s->bricks[i], corner);
         b.values = s->field->values + s->field->index[level->first_index + s->bricks[i]];
         b.corner_count = b.quad_count = 0;
+        memset(b.number, 0, sizeof b.number);
         if (e->quads != NULL) {
-            memset(b.number, 0, sizeof b.number);
             b.first_corner = s->corners[i];
             b.corners = e->corners + 3 * (size_t)s->corners[i];
             b.quads = e->quads + 4 * (size_t)s->quads[i];
@@ -248,7 +205,9 @@ static void extract(void *user, size_t begin, size_t end) {
                 b.origin[axis] = (float)corner[axis];
             }
         }
-        extract_brick(&b);
+        for (int cell = 0; cell < VSHI_BRICK_CELLS * VSHI_BRICK_CELLS * VSHI_BRICK_CELLS; ++cell) {
+            add_cell(&b, VSHI_STRIDE_X * (cell >> 6) + VSHI_STRIDE_Y * (cell >> 3 & 7) + (cell & 7));
+        }
         if (e->quads == NULL) {
             s->corners[i + 1] = b.corner_count;
             s->quads[i + 1] = b.quad_count;
@@ -273,9 +232,11 @@ static size_t list_bricks(const vsh_field *field, uint32_t *bricks) {
     return count;
 }
 
-vsh_result vshi_surface_find(const vsh_field *field, double height, vshi_budget budget, vshi_job *job,
-                             vshi_surface *surface, vsh_error *error) {
-    *surface = (vshi_surface){.field = field, .brick_count = list_bricks(field, NULL)};
+/* Counts corners and quads; free it with free_surface(), after an error too. `height` is within the level's
+ * band. */
+static vsh_result find_surface(const vsh_field *field, double height, vshi_budget budget, vshi_job *job,
+                               surface_bricks *surface, vsh_error *error) {
+    *surface = (surface_bricks){.field = field, .brick_count = list_bricks(field, NULL), .job = job};
     surface->height = 2 * (int32_t)floor(height / (double)field->levels[0].quantum) + 1;
     const size_t count = surface->brick_count;
     VSHI_TRY(vshi_check_limit(budget.run, budget.held + 3.0 * sizeof(uint32_t) * (double)(count + 1),
@@ -297,44 +258,31 @@ vsh_result vshi_surface_find(const vsh_field *field, double height, vshi_budget 
     return VSH_OK;
 }
 
-void vshi_surface_free(vshi_surface *surface) {
+static void free_surface(surface_bricks *surface) {
     free(surface->quads);
     free(surface->corners);
     free(surface->bricks);
-    *surface = (vshi_surface){.bricks = NULL};
 }
 
-vsh_result vshi_surface_write(vshi_surface *surface, const double centre[3], double scale, vshi_job *job,
-                              float *corners, uint32_t *quads, vsh_error *error) {
+/* A vshi_quads_fn: writes them, moved and scaled, field space. */
+static vsh_result write_surface(void *user, const double centre[3], double scale, float *corners,
+                                uint32_t *quads, vsh_error *error) {
+    surface_bricks *surface = user;
     extraction e = {.surface = surface, .centre = centre, .scale = scale, .corners = corners, .quads = quads};
     make_cells(&e);
-    return vshi_parallel_for(job, surface->brick_count, GRAIN, 0, extract, &e, error);
-}
-
-typedef struct writing {
-    vshi_surface *surface;
-    vshi_job *job;
-} writing;
-
-/* A vshi_quads_fn. */
-static vsh_result write(void *user, const double centre[3], double scale, float *corners, uint32_t *quads,
-                        vsh_error *error) {
-    const writing *w = user;
-    return vshi_surface_write(w->surface, centre, scale, w->job, corners, quads, error);
+    return vshi_parallel_for(surface->job, surface->brick_count, GRAIN, 0, extract, &e, error);
 }
 
 vsh_result vshi_field_add_surface(vsh_field *field, vshi_budget budget, vshi_job *job, vsh_error *error) {
-    vshi_surface surface;
-    vsh_result result;
-    result = vshi_surface_find(field, field->grown, budget, job, &surface, error);
+    surface_bricks surface;
+    vsh_result result = find_surface(field, field->grown, budget, job, &surface, error);
     if (result != VSH_OK || surface.quads[surface.brick_count] == 0) { /* of parts too thin for it: none */
         goto done;
     }
-    writing w = {&surface, job};
     vshi_quads quads = {.corner_count = surface.corners[surface.brick_count],
                         .quad_count = surface.quads[surface.brick_count],
-                        .write = write,
-                        .user = &w};
+                        .write = write_surface,
+                        .user = &surface};
     for (int axis = 0; axis < 3; ++axis) { /* a voxel around what is next to it, for any height */
         quads.low[axis] = (double)field->bounds_min[axis] - 1.0;
         quads.high[axis] = (double)field->bounds_max[axis] + 1.0;
@@ -342,7 +290,7 @@ vsh_result vshi_field_add_surface(vsh_field *field, vshi_budget budget, vshi_job
     budget.held += 3.0 * sizeof(uint32_t) * (double)(surface.brick_count + 1);
     result = vshi_triangles_of_quads(&quads, budget.run, budget.held, job, &field->surface, error);
 done:
-    vshi_surface_free(&surface);
+    free_surface(&surface);
     return result;
 }
 
@@ -477,30 +425,27 @@ static double bytes_of(const vshi_surface_quads *quads) {
     return 12.0 * (double)quads->corner_count + 16.0 * (double)quads->quad_count;
 }
 
-static vsh_result make_quads(const vsh_field *field, const vsh_run *run, vshi_job *job, vshi_surface *surface,
-                             vshi_surface_quads *made, vsh_error *error) {
+vsh_result vshi_surface_quads_make(const vsh_field *field, double height, const vsh_run *run,
+                                   vshi_surface_quads *quads, vsh_error *error) {
     static const double centre[3] = {0.0, 0.0, 0.0};
-    VSHI_TRY(vshi_surface_find(field, 0.0, (vshi_budget){run, 0.0}, job, surface, error));
-    made->corner_count = surface->corners[surface->brick_count];
-    made->quad_count = surface->quads[surface->brick_count];
-    VSHI_TRY(vshi_check_limit(run, bytes_of(made), "surface", error));
-    VSHI_TRY(vshi_allocate((void **)&made->corners, made->corner_count, 3 * sizeof *made->corners, "surface",
-                           error));
-    VSHI_TRY(
-        vshi_allocate((void **)&made->quads, made->quad_count, 4 * sizeof *made->quads, "surface", error));
-    return vshi_surface_write(surface, centre, 1.0, job, made->corners, made->quads, error);
-}
-
-vsh_result vshi_surface_quads_make(const vsh_field *field, const vsh_run *run, vshi_surface_quads *quads,
-                                   vsh_error *error) {
     *quads = (vshi_surface_quads){.corners = NULL};
+    surface_bricks surface = {.bricks = NULL};
     vshi_job *job = vshi_job_begin(run, "surface", 2 * list_bricks(field, NULL));
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "surface: the system refused memory");
     }
-    vshi_surface surface = {.bricks = NULL};
-    const vsh_result result = make_quads(field, run, job, &surface, quads, error);
-    vshi_surface_free(&surface);
+    vsh_result result;
+    VSHI_TRY_DONE(find_surface(field, height, (vshi_budget){run, 0.0}, job, &surface, error));
+    quads->corner_count = surface.corners[surface.brick_count];
+    quads->quad_count = surface.quads[surface.brick_count];
+    VSHI_TRY_DONE(vshi_check_limit(run, bytes_of(quads), "surface", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&quads->corners, quads->corner_count, 3 * sizeof *quads->corners,
+                                "surface", error));
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&quads->quads, quads->quad_count, 4 * sizeof *quads->quads, "surface", error));
+    result = write_surface(&surface, centre, 1.0, quads->corners, quads->quads, error);
+done:
+    free_surface(&surface);
     vshi_job_end(job);
     return result;
 }
@@ -539,7 +484,7 @@ vsh_result vshi_surface_mesh_make(const vsh_field *field, const vsh_run *run, vs
                                   vsh_error *error) {
     *mesh = (vshi_surface_mesh){.positions = NULL};
     vshi_surface_quads quads;
-    vsh_result result = vshi_surface_quads_make(field, run, &quads, error);
+    vsh_result result = vshi_surface_quads_make(field, 0.0, run, &quads, error);
     result = result == VSH_OK ? make_mesh(field, run, &quads, mesh, error) : result;
     vshi_surface_quads_free(&quads);
     return result;

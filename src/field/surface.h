@@ -4,49 +4,33 @@
 
 #include "field/level.h"
 
-/* Where the level's trilinear cells read a height, finest voxels. Corners lie on the cells' edges, exactly
- * where these read it; each quad lies in one cell. A triangle is a quad whose last two corners are one. In a
- * face of a cell that the surface crosses twice corners are joined as the face's own hyperbola joins them, so
- * that neighbours agree and the surface is closed (Nielson and Hamann, "The asymptotic decider", 1991).
- * Bricks share no corner, but theirs that meet are the same to the bit. */
-typedef struct vshi_surface {
-    const vsh_field *field;
-    int32_t height; /* half quanta, odd: no value is on it */
-    size_t brick_count;
-    uint32_t *bricks;  /* [brick_count]: their blocks */
-    uint32_t *corners; /* these two: [brick_count + 1]: how many all bricks before one have */
-    uint32_t *quads;
-} vshi_surface;
+/* Corners lie on the edges of the finest level's trilinear cells, exactly where these read the height; each
+ * quad lies in one cell. A triangle is a quad whose last two corners are one. In a face of a cell that the
+ * surface crosses twice corners are joined as the face's own hyperbola joins them, so that neighbours agree
+ * and the surface is closed (Nielson and Hamann, "The asymptotic decider", 1991). Bricks share no corner, but
+ * theirs that meet are the same to the bit. */
 
-/* Counts corners and quads; free it with vshi_surface_free(), after an error too. `height` is within the
- * level's band. Errors: VSH_ERROR_LIMIT (the budget's; more than 2^32 corners), VSH_ERROR_MEMORY,
- * VSH_ERROR_CANCELLED. */
-vsh_result vshi_surface_find(const vsh_field *field, double height, vshi_budget budget, vshi_job *job,
-                             vshi_surface *surface, vsh_error *error);
-void vshi_surface_free(vshi_surface *surface);
-
-/* Writes them, moved and scaled, field space. Errors: VSH_ERROR_CANCELLED. */
-vsh_result vshi_surface_write(vshi_surface *surface, const double centre[3], double scale, vshi_job *job,
-                              float *corners, uint32_t *quads, vsh_error *error);
-
-/* Finds the surface and makes it field->surface, for rays; NULL where the field reads nothing so low.
- * `budget` counts all that is held but it. Errors: also VSH_ERROR_UNSUPPORTED where Embree cannot be loaded.
- */
+/* Finds the surface at field->grown and makes it field->surface, for rays; NULL where the field reads nothing
+ * so low. `budget` counts all memory but the surface's. Errors: as vshi_surface_quads_make();
+ * VSH_ERROR_UNSUPPORTED where Embree cannot be loaded. */
 vsh_result vshi_field_add_surface(vsh_field *field, vshi_budget budget, vshi_job *job, vsh_error *error);
 
-/* The quads of the surface where the finest level reads 0. Their corners may go around either way. */
+/* The quads of the surface. Their corners may go around either way. */
 typedef struct vshi_surface_quads {
     float *corners;  /* [corner_count][3], field space */
     uint32_t *quads; /* [quad_count][4] */
     size_t corner_count, quad_count;
 } vshi_surface_quads;
 
-/* Free it with vshi_surface_quads_free(), after an error too. Errors: as vshi_surface_find(). */
-vsh_result vshi_surface_quads_make(const vsh_field *field, const vsh_run *run, vshi_surface_quads *quads,
-                                   vsh_error *error);
+/* The surface where the finest level reads `height`, finest voxels, within its band. Free it with
+ * vshi_surface_quads_free(), after an error too. Errors: VSH_ERROR_LIMIT (the run's; more than 2^32 corners),
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_surface_quads_make(const vsh_field *field, double height, const vsh_run *run,
+                                   vshi_surface_quads *quads, vsh_error *error);
 void vshi_surface_quads_free(vshi_surface_quads *quads);
 
-/* The same surface as a mesh that looks outwards, refined where the quads are off it. */
+/* The surface where the finest level reads 0 as a mesh that looks outwards, refined where the quads are off
+ * it. */
 typedef struct vshi_surface_mesh {
     float *positions;  /* [vertex_count][3], field space */
     uint32_t *indices; /* [triangle_count][3] */
@@ -54,7 +38,7 @@ typedef struct vshi_surface_mesh {
     double transform[12]; /* field space to world */
 } vshi_surface_mesh;
 
-/* Free it with vshi_surface_mesh_free(), after an error too. Errors: as vshi_surface_find(). */
+/* Free it with vshi_surface_mesh_free(), after an error too. Errors: as vshi_surface_quads_make(). */
 vsh_result vshi_surface_mesh_make(const vsh_field *field, const vsh_run *run, vshi_surface_mesh *mesh,
                                   vsh_error *error);
 void vshi_surface_mesh_free(vshi_surface_mesh *mesh);

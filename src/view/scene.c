@@ -120,7 +120,7 @@ static vsh_result make_mesh(surface *s, const vsh_occluders *occluders, vsh_erro
     vsh_result result = VSH_OK;
     for (size_t i = 0; i < count && result == VSH_OK; ++i) {
         parts[i].field = i == 0 ? occluders->field : occluders->layers[i - 1].field;
-        result = vshi_surface_quads_make(parts[i].field, s->run, &parts[i].quads, error);
+        result = vshi_surface_quads_make(parts[i].field, 0.0, s->run, &parts[i].quads, error);
     }
     vsh_field_info info;
     vsh_field_get_info(occluders->layer_count > 0 ? occluders->layers[0].field : occluders->field, &info);

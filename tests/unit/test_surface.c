@@ -7,31 +7,14 @@
 
 #define VOXEL 0.04
 
-typedef struct quads {
-    size_t corner_count, quad_count;
-    float *corners;
-    uint32_t *quads;
-} quads;
+typedef vshi_surface_quads quads;
 
 static quads quads_of(const vsh_field *field, double height) {
     const vsh_run run = vsh_run_default();
-    vshi_job *job = vshi_job_begin(&run, "surface", 1);
-    vshi_surface s;
-    assert_ok(vshi_surface_find(field, height, (vshi_budget){&run, 0.0}, job, &s, &failure));
-    quads q = {s.corners[s.brick_count], s.quads[s.brick_count], NULL, NULL};
-    q.corners = calloc(3 * q.corner_count, sizeof(float));
-    q.quads = calloc(4 * q.quad_count, sizeof(uint32_t));
-    assert_true(q.corners != NULL && q.quads != NULL && q.quad_count > 0);
-    const double nowhere[3] = {0.0, 0.0, 0.0};
-    assert_ok(vshi_surface_write(&s, nowhere, 1.0, job, q.corners, q.quads, &failure));
-    vshi_surface_free(&s);
-    vshi_job_end(job);
+    quads q;
+    assert_ok(vshi_surface_quads_make(field, height, &run, &q, &failure));
+    assert_true(q.quad_count > 0);
     return q;
-}
-
-static void quads_free(quads *q) {
-    free(q->corners);
-    free(q->quads);
 }
 
 static const double GROWN = 0.15; /* voxels */
@@ -111,23 +94,23 @@ TEST(surface_is_closed) {
     OWNED(vsh_field) *seeds = field_of(truth_seeds(), VOXEL, 1.0);
     OWNED(vsh_field) *hollow = hollow_box(VOXEL, 1.1 * VOXEL), *stones = rubble();
     for (size_t i = 0; i < sizeof heights / sizeof heights[0]; ++i) {
-        FREED_BY(quads_free) quads q = quads_of(seeds, heights[i]);
+        FREED_BY(vshi_surface_quads_free) quads q = quads_of(seeds, heights[i]);
         assert_int_equal(count_open_edges(&q), 0);
-        quads_free(&q);
+        vshi_surface_quads_free(&q);
         q = quads_of(stones, heights[i]);
         assert_int_equal(count_open_edges(&q), 0);
     }
     for (size_t i = 0; i < 2; ++i) { /* its walls are thinner than the third */
         quads q = quads_of(hollow, heights[i]);
         assert_int_equal(count_open_edges(&q), 0);
-        quads_free(&q);
+        vshi_surface_quads_free(&q);
     }
 }
 
 TEST(corners_lie_on_the_sphere) {
     const truth_solid ball = {.shape = TRUTH_SPHERE, .center = {0.1, 0.2, 0.3}, .radius = 0.5};
     OWNED(vsh_field) *field = field_of((truth_scene){&ball, 1}, VOXEL, 1.0);
-    FREED_BY(quads_free) quads q = quads_of(field, GROWN);
+    FREED_BY(vshi_surface_quads_free) quads q = quads_of(field, GROWN);
     double worst = 0.0;
     for (size_t i = 0; i < q.corner_count; ++i) {
         const float *c = q.corners + 3 * i;

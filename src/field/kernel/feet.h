@@ -1,5 +1,4 @@
-/* Nearest points of the surface (feet) of a block's voxels: the nearest of those that other voxels know, and
- * how they slide along the surface. */
+/* Nearest points of the surface (feet) of a block's voxels, among those that other voxels know. */
 #ifndef VSHI_FEET_KERNEL_H
 #define VSHI_FEET_KERNEL_H
 
@@ -21,37 +20,14 @@ typedef struct vshi_feet {
     float x[VSHI_FEET_MOST], y[VSHI_FEET_MOST], z[VSHI_FEET_MOST];
 } vshi_feet;
 
-/* A gradient shorter than this has no direction to follow: a crease of the medial axis. */
-#define VSHI_MIN_GRADIENT 0.25f
-/* A foot that ends farther off the finest level's zero, in its voxels, has slid off the surface. */
-#define VSHI_MAX_RESIDUE 0.5f
-
-/* Some of a block's voxels with their feet, in finest voxels. */
-typedef struct vshi_slides {
-    size_t count;
-    float place[3][512], foot[3][512];
-    float residue[512]; /* the finest level's value at the foot */
-    uint16_t voxel[512];
-} vshi_slides;
-
-typedef struct vshi_feet_kernel {
-    /* For each wanted voxel of a block of 8³ (word x, bit y · 8 + z) the nearest of the points that are
-     * nearer than `most` steps, the first of several: from the voxel on, as feet[3][512]. Others are not
-     * touched. */
-    void (*nearest)(const vshi_feet *points, const uint64_t wanted[8], float most, int16_t *feet);
-    /* Slides feet along the finest level's surface until they face their voxels, by no more than a voxel of
-     * the level of `scale` at a time, and tells their residues. */
-    void (*slide)(const vsh_field *field, float scale, vshi_slides *slides);
-} vshi_feet_kernel;
+/* For each wanted voxel of a block of 8³ (word x, bit y · 8 + z) the nearest of the points that are nearer
+ * than `most` steps, the first of several: from the voxel on, as feet[3][512]. Others are not touched. */
+typedef void vshi_nearest_fn(const vshi_feet *points, const uint64_t wanted[8], float most, int16_t *feet);
 
 /* One source (feet.inc), built for each instruction set; all give the same bits. Thread safe. */
-extern const vshi_feet_kernel vshi_feet_base;
+extern vshi_nearest_fn vshi_feet_base;
 #if defined(__x86_64__)
-extern const vshi_feet_kernel vshi_feet_avx2;
-extern const vshi_feet_kernel vshi_feet_avx512;
+extern vshi_nearest_fn vshi_feet_avx2, vshi_feet_avx512;
 #endif
-
-/* That of a VSH_ISA_…. */
-const vshi_feet_kernel *vshi_feet_kernel_of(int32_t isa);
 
 #endif

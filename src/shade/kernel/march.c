@@ -3,14 +3,5 @@
 #include "base/isa.h"
 
 const vshi_kernel *vshi_kernel_of(int32_t isa) {
-    switch (vshi_isa_resolve(isa)) {
-#if defined(__x86_64__)
-    case VSH_ISA_AVX512:
-        return &vshi_kernel_avx512;
-    case VSH_ISA_AVX2:
-        return &vshi_kernel_avx2;
-#endif
-    default:
-        return &vshi_kernel_base;
-    }
+    return VSHI_KERNEL_OF(vshi_kernel, isa);
 }
