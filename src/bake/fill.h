@@ -2,7 +2,7 @@
 #ifndef VSHI_BAKE_FILL_H
 #define VSHI_BAKE_FILL_H
 
-#include "levelset/volume.h"
+#include "levelset/access.h"
 
 #include <stdatomic.h>
 #include <stdbool.h>

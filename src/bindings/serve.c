@@ -1,5 +1,5 @@
 /* vsh_reader_serve(): who parses each kind of file. */
-#include "levelset/serve.h"
+#include "levelset/access.h"
 #include "image/planes.h"
 #include "lit/work.h"
 #include "model/model.h"

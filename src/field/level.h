@@ -4,7 +4,7 @@
 
 #include "base/job.h"
 #include "field/field.h"
-#include "levelset/leaves.h"
+#include "levelset/access.h"
 
 #include <math.h>
 #include <stdbool.h>

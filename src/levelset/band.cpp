@@ -1,11 +1,9 @@
 #include "levelset/band.h"
 
-#include "levelset/flood.h"
-
 #include <algorithm>
 #include <cfloat>
 #include <cmath>
-#include <unordered_map>
+#include <map>
 
 namespace vshi {
 
@@ -152,32 +150,12 @@ Corners moved(const Corners &corner, const Vec3d &origin) {
     return {corner[0] - origin, corner[1] - origin, corner[2] - origin};
 }
 
-struct CellHash {
-    size_t operator()(const Cell &c) const {
-        const uint64_t h = uint64_t(uint32_t(c[0])) * 0x9e3779b97f4a7c15u ^
-                           uint64_t(uint32_t(c[1])) * 0xc2b2ae3d27d4eb4fu ^
-                           uint64_t(uint32_t(c[2])) * 0x165667b19e3779f9u;
-        return size_t(h ^ h >> 29);
-    }
-};
-
-// Cells that a triangle reaches; few are taken as they are.
 template <typename Use> void visit_regions(const Corners &corner, double reach, const Use &use) {
     const Box box = cells_of(corner, reach, REGION);
-    double count = 1.0; // which passes all integers where a thin triangle lies across a large lattice
-    for (int axis = 0; axis < 3; ++axis) {
-        count *= double(box.last[axis] - box.first[axis] + 1);
-    }
-    if (count > 8.0) {
+    if (same(box.first, box.last)) {
+        use(box.first);
+    } else {
         visit(frame_of(moved(corner, corner[0])), corner[0], reach, REGION, box, use);
-        return;
-    }
-    for (int32_t x = box.first[0]; x <= box.last[0]; ++x) {
-        for (int32_t y = box.first[1]; y <= box.last[1]; ++y) {
-            for (int32_t z = box.first[2]; z <= box.last[2]; ++z) {
-                use(Cell{x, y, z});
-            }
-        }
     }
 }
 
@@ -185,11 +163,7 @@ template <typename Use> void visit_regions(const Corners &corner, double reach, 
 
 Band::Band(const Surface &surface_, double half_width_, Stage &stage)
     : half_width(half_width_), surface(surface_) {
-    sort_triangles(stage);
-}
-
-void Band::sort_triangles(Stage &stage) {
-    std::unordered_map<Cell, size_t, CellHash> numbers;
+    std::map<Cell, size_t> numbers;
     Cell last{};
     size_t current = 0;
     for (size_t i = 0; i < surface.polygons.size(); ++i) {
@@ -217,8 +191,8 @@ void Band::sort_triangles(Stage &stage) {
 // A region's leaves while they are measured. Places are counted from the region's middle.
 class Band::Measuring {
   public:
-    Measuring(const Band &band_, Region &region_, const vshi_leaf_kernel &kernel_, uint64_t wanted_)
-        : band(band_), region(region_), kernel(kernel_), wanted(wanted_), frames(region.triangles.size()) {
+    Measuring(const Band &band_, Region &region_, const vshi_leaf_kernel &kernel_)
+        : band(band_), region(region_), kernel(kernel_), frames(region.triangles.size()) {
         limits.fill(FLT_MAX);
     }
 
@@ -228,21 +202,15 @@ class Band::Measuring {
             limit_leaves();
         }
         list_triangles();
-        size_t count = 0;
-        for (int leaf = 0; leaf < VSHI_REGION_LEAVES; ++leaf) {
-            count += first[leaf + 1] > first[leaf];
-        }
-        region.distances.reserve(count * VSHI_LEAF_VOXELS);
+        const auto empty =
+            std::count_if(lists.begin(), lists.end(), [](const auto &list) { return list.empty(); });
+        region.distances.reserve((lists.size() - size_t(empty)) * VSHI_LEAF_VOXELS);
         for (int leaf = 0; leaf < VSHI_REGION_LEAVES; ++leaf) {
             measure_leaf(leaf, sides);
         }
     }
 
   private:
-    struct Pair {
-        uint32_t leaf, triangle;
-    };
-
     static Cell cell_of(int leaf) {
         return {leaf / (LEAVES * LEAVES), leaf / LEAVES % LEAVES, leaf % LEAVES};
     }
@@ -277,27 +245,17 @@ class Band::Measuring {
 
     // Sorts the triangles by leaves.
     void list_triangles() {
-        std::vector<Pair> pairs;
         for (uint32_t i = 0; i < frames.size(); ++i) {
             float distances[VSHI_REGION_LEAVES] = {};
             if (band.half_width > WIDE) {
                 kernel.middles(&frames[i], distances);
             }
             for_each_leaf(boxes[i], [&](int leaf) {
-                if ((wanted >> leaf & 1) != 0 && distances[leaf] <= limits[leaf] &&
+                if (distances[leaf] <= limits[leaf] &&
                     may_reach(frames[i], middle_of(leaf), LEAF_HALF, band.half_width)) {
-                    pairs.push_back({uint32_t(leaf), i});
-                    ++first[leaf + 1];
+                    lists[leaf].push_back(i);
                 }
             });
-        }
-        for (size_t i = 1; i < first.size(); ++i) {
-            first[i] += first[i - 1];
-        }
-        list.resize(pairs.size());
-        auto next = first;
-        for (const Pair &pair : pairs) {
-            list[next[pair.leaf]++] = pair.triangle;
         }
     }
 
@@ -312,13 +270,12 @@ class Band::Measuring {
     }
 
     void measure_leaf(int leaf, bool sides) {
-        const uint32_t *const triangles = list.data() + first[leaf];
-        const size_t count = first[leaf + 1] - first[leaf];
+        const std::vector<uint32_t> &triangles = lists[size_t(leaf)];
         const Vec3d middle = middle_of(leaf);
         const float place[3] = {float(middle[0]), float(middle[1]), float(middle[2])};
         float distances[VSHI_LEAF_VOXELS];
-        if (count == 0 ||
-            !kernel.measure(frames.data(), triangles, count, place, float(band.half_width), distances)) {
+        if (triangles.empty() || !kernel.measure(frames.data(), triangles.data(), triangles.size(), place,
+                                                 float(band.half_width), distances)) {
             return;
         }
         const Cell cell = cell_of(leaf);
@@ -326,9 +283,9 @@ class Band::Measuring {
                                  region.origin[2] + LEAF * cell[2]});
         region.distances.insert(region.distances.end(), distances, distances + VSHI_LEAF_VOXELS);
         if (sides && add_parts(distances, region.parts)) {
-            for (size_t i = 0; i < count; ++i) {
-                if (may_reach(frames[triangles[i]], middle, LEAF_HALF, PARTING)) {
-                    region.near_triangles.push_back(region.triangles[triangles[i]]);
+            for (const uint32_t i : triangles) {
+                if (may_reach(frames[i], middle, LEAF_HALF, PARTING)) {
+                    region.near_triangles.push_back(region.triangles[i]);
                 }
             }
         }
@@ -339,16 +296,14 @@ class Band::Measuring {
     const Band &band;
     Region &region;
     const vshi_leaf_kernel &kernel;
-    const uint64_t wanted; // leaves
     std::vector<vshi_frame> frames;
-    std::vector<Box> boxes;                               // of the leaves that each may reach
-    std::array<float, VSHI_REGION_LEAVES> limits;         // in wide bands
-    std::array<uint32_t, VSHI_REGION_LEAVES + 1> first{}; // of each leaf in the list
-    std::vector<uint32_t> list;                           // frames
+    std::vector<Box> boxes;                                      // of the leaves that each may reach
+    std::array<float, VSHI_REGION_LEAVES> limits;                // in wide bands
+    std::array<std::vector<uint32_t>, VSHI_REGION_LEAVES> lists; // frames, by leaf
 };
 
-void Band::measure(size_t number, bool sides, const vshi_leaf_kernel &kernel, uint64_t wanted) {
-    Measuring(*this, regions[number], kernel, wanted).measure(sides);
+void Band::measure(size_t number, bool sides, const vshi_leaf_kernel &kernel) {
+    Measuring(*this, regions[number], kernel).measure(sides);
     regions[number].triangles = {};
 }
 

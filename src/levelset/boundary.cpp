@@ -1,8 +1,7 @@
-#include "levelset/sides.h"
+#include "levelset/band.h"
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 namespace vshi {
 
@@ -13,31 +12,20 @@ using openvdb::Vec3d;
 constexpr int LEAF = 8;
 // Pieces of triangles are not cut below this, voxels.
 constexpr double PIECE = 1.0;
-// Below this the cells that a triangle passes through are looked at before it is cut, voxels.
-constexpr double GLANCE = 16.0;
-// Below this cutting is less work than looking.
-constexpr double LEAST_GLANCE = 4.0;
-// Below this the cells of its box are.
-constexpr double BOX_GLANCE = 32.0;
+// Below this the cells of a triangle's box are looked at before it is cut, voxels.
+constexpr double GLANCE = 32.0;
 // How far a piece's middle may be from its triangle by rounding, voxels, and more.
 constexpr double MARGIN = 1e-5;
-// Of triangles with less area than this part of their longest edge's square the plane is not known so well.
-constexpr double SLIVER = 1e-8;
-
 using Piece = std::array<openvdb::Vec3s, 3>;
-
-bool any(const Bits &bits) {
-    return std::any_of(bits.begin(), bits.end(), [](uint64_t word) { return word != 0; });
-}
 
 // For each lattice cell of a leaf, named by its first voxel, whether one of the eight voxels at its corners
 // is outside: of a surface that bounds the outside there is one on either side.
-Bits cells_near_outside(const LeafTable &table, const std::vector<Sides::Told> &told, size_t leaf) {
+Bits cells_near_outside(const LeafTable &table, const std::vector<Sides> &sides, size_t leaf) {
     const Bits *around[8];
     static const Bits none{};
     for (int n = 0; n < 8; ++n) {
         const uint32_t found = table.around(leaf)[13 + (n & 4 ? 9 : 0) + (n & 2 ? 3 : 0) + (n & 1)];
-        around[n] = found == LeafTable::NONE ? &none : &told[found].outside;
+        around[n] = found == LeafTable::NONE ? &none : &sides[found].outside;
     }
     constexpr uint64_t last_z = 0x8080808080808080u;
     // The voxels of a plane, with the next along z, then with the next along y.
@@ -90,13 +78,11 @@ class Cutting {
         if (square[longest] >= GLANCE * GLANCE && stage.cancelled()) {
             return Bounds::NOTHING; // of what is thrown away
         }
-        Bounds glanced = square[longest] < BOX_GLANCE * BOX_GLANCE ? glance_box(corner) : Bounds::SOME;
-        if (glanced == Bounds::SOME && square[longest] < GLANCE * GLANCE &&
-            square[longest] > LEAST_GLANCE * LEAST_GLANCE) {
-            glanced = glance(corner, square[longest]);
-        }
-        if (glanced != Bounds::SOME) {
-            return glanced;
+        if (square[longest] < GLANCE * GLANCE) {
+            const Bounds glanced = glance(corner);
+            if (glanced != Bounds::SOME) {
+                return glanced;
+            }
         }
         const Vec3d middle = 0.5 * (corner[longest] + corner[(longest + 1) % 3]);
         const Vec3d &from = corner[longest], &to = corner[(longest + 1) % 3],
@@ -114,9 +100,9 @@ class Cutting {
         return Bounds::SOME;
     }
 
-    // What all pieces of a triangle are, if the cells of its box are all alike: quickly told, as of planes
-    // along two axes the box is no more than the cells that they pass through.
-    Bounds glance_box(const Corners &corner) {
+    // Sorts a triangle by the cells of its box, where these are all alike. That settles planes along two axes
+    // early.
+    Bounds glance(const Corners &corner) {
         Cell low, high;
         for (int axis = 0; axis < 3; ++axis) {
             const auto ends = std::minmax({corner[0][axis], corner[1][axis], corner[2][axis]});
@@ -153,67 +139,6 @@ class Cutting {
         return all >> width * (LEAF - 1 - (last - first)) << width * first;
     }
 
-    // What all pieces of a triangle are, if the cells that it passes through are all alike.
-    Bounds glance(const Corners &corner, double longest_square) {
-        const Vec3d normal = (corner[1] - corner[0]).cross(corner[2] - corner[0]);
-        const Vec3d size = openvdb::math::Abs(normal);
-        const auto axis = openvdb::math::MaxIndex(size);
-        if (!(size[axis] > SLIVER * longest_square)) {
-            return Bounds::SOME;
-        }
-        return axis == 0   ? glance_along<0>(corner, normal)
-               : axis == 1 ? glance_along<1>(corner, normal)
-                           : glance_along<2>(corner, normal);
-    }
-
-    // By rows and columns of cells along w, the axis that the triangle faces most.
-    template <int w> Bounds glance_along(const Corners &corner, const Vec3d &normal) {
-        constexpr int u = (w + 1) % 3, v = (w + 2) % 3;
-        const double along_u = -normal[u] / normal[w], along_v = -normal[v] / normal[w];
-        const double rise = 0.5 * (std::fabs(along_u) + std::fabs(along_v)) + MARGIN;
-        const auto ends = std::minmax({corner[0][u], corner[1][u], corner[2][u]});
-        const auto heights = std::minmax({corner[0][w], corner[1][w], corner[2][w]});
-        size_t cells = 0, outer = 0;
-        Cell cell{};
-        for (cell[u] = floor_of(ends.first - MARGIN); cell[u] <= floor_of(ends.second + MARGIN); ++cell[u]) {
-            double low = HUGE_VAL, high = -HUGE_VAL; // along v, within one row of cells
-            for (int i = 0; i < 3; ++i) {
-                widen<u, v>(corner[i], corner[(i + 1) % 3], cell[u], low, high);
-            }
-            for (cell[v] = floor_of(low - MARGIN); cell[v] <= floor_of(high + MARGIN); ++cell[v]) {
-                const double middle = corner[0][w] + along_u * (cell[u] + 0.5 - corner[0][u]) +
-                                      along_v * (cell[v] + 0.5 - corner[0][v]);
-                const int32_t lowest = floor_of(std::max(middle - rise, heights.first - MARGIN));
-                const int32_t highest = floor_of(std::min(middle + rise, heights.second + MARGIN));
-                for (cell[w] = lowest; cell[w] <= highest; ++cell[w]) {
-                    ++cells;
-                    outer += is_near_outside(cell);
-                    if (outer != 0 && outer != cells) {
-                        return Bounds::SOME;
-                    }
-                }
-            }
-        }
-        return outer == cells ? Bounds::ALL : Bounds::NOTHING;
-    }
-
-    // Widens low … high, along v, by what of the edge lies in the row of cells that begins at `row` along u.
-    template <int u, int v>
-    static void widen(const Vec3d &a, const Vec3d &b, int32_t row, double &low, double &high) {
-        const double length = b[u] - a[u];
-        double begin = 0.0, end = 1.0;
-        if (std::fabs(length) > MARGIN) {
-            const double s = (row - MARGIN - a[u]) / length, t = (row + 1.0 + MARGIN - a[u]) / length;
-            begin = std::max(begin, std::min(s, t));
-            end = std::min(end, std::max(s, t));
-        }
-        if (begin <= end) { // else the edge is not in the row
-            const double from = a[v] + begin * (b[v] - a[v]), to = a[v] + end * (b[v] - a[v]);
-            low = std::min({low, from, to});
-            high = std::max({high, from, to});
-        }
-    }
-
     static int32_t floor_of(double x) {
         const auto whole = int32_t(x);
         return whole - (x < whole);
@@ -247,12 +172,12 @@ class Cutting {
 
 } // namespace
 
-Surface boundary_of(const Surface &surface, const LeafTable &table, const std::vector<Sides::Told> &told,
+Surface boundary_of(const Surface &surface, const LeafTable &table, const std::vector<Sides> &sides,
                     double begin, double end, Stage &stage) {
     std::vector<uint8_t> in_doubt(surface.polygons.size());
-    for (size_t i = 0; i < told.size(); ++i) {
+    for (size_t i = 0; i < sides.size(); ++i) {
         const BandLeaf &leaf = table.leaves[i];
-        for (size_t t = 0; any(told[i].buried) && t < leaf.triangle_count; ++t) {
+        for (size_t t = 0; any(sides[i].buried) && t < leaf.triangle_count; ++t) {
             in_doubt[leaf.triangles[t] / 2] = 1;
         }
     }
@@ -263,9 +188,9 @@ Surface boundary_of(const Surface &surface, const LeafTable &table, const std::v
         }
     }
     const double middle = 0.5 * (begin + end);
-    std::vector<Bits> near(told.size());
+    std::vector<Bits> near(sides.size());
     stage.loop(near.size(), 256, begin, middle,
-               [&](size_t i) { near[i] = cells_near_outside(table, told, i); });
+               [&](size_t i) { near[i] = cells_near_outside(table, sides, i); });
     std::vector<std::vector<Piece>> pieces(doubtful.size());
     stage.loop(doubtful.size(), 4, middle, end, [&](size_t i) {
         Cutting cutting(table, near, stage, pieces[i]);
@@ -291,18 +216,18 @@ Surface boundary_of(const Surface &surface, const LeafTable &table, const std::v
     return kept;
 }
 
-std::vector<size_t> regions_near_buried(const Band &band, const std::vector<BandLeaf> &leaves,
-                                        const std::vector<Sides::Told> &told) {
+std::set<Cell> regions_near_buried(const LeafTable &table, const std::vector<Sides> &sides,
+                                   double half_width) {
     std::set<Cell> near;
-    const int reach = int(std::ceil(band.half_width));
-    for (size_t i = 0; i < leaves.size(); ++i) {
-        if (!any(told[i].buried)) {
+    const int reach = int(std::ceil(half_width));
+    for (size_t i = 0; i < sides.size(); ++i) {
+        if (!any(sides[i].buried)) {
             continue;
         }
         Cell low, high;
         for (int axis = 0; axis < 3; ++axis) {
-            low[axis] = (leaves[i].origin[axis] - reach) & ~(Band::REGION - 1);
-            high[axis] = leaves[i].origin[axis] + LEAF - 1 + reach;
+            low[axis] = (table.leaves[i].origin[axis] - reach) & ~(Band::REGION - 1);
+            high[axis] = table.leaves[i].origin[axis] + LEAF - 1 + reach;
         }
         for (int32_t x = low[0]; x <= high[0]; x += Band::REGION) {
             for (int32_t y = low[1]; y <= high[1]; y += Band::REGION) {
@@ -312,13 +237,7 @@ std::vector<size_t> regions_near_buried(const Band &band, const std::vector<Band
             }
         }
     }
-    std::vector<size_t> numbers;
-    for (size_t i = 0; i < band.region_count(); ++i) {
-        if (near.count(band.region_origin(i)) != 0) {
-            numbers.push_back(i);
-        }
-    }
-    return numbers;
+    return near;
 }
 
 } // namespace vshi

@@ -9,9 +9,7 @@
 #ifndef VSHI_LEVELSET_CALLS_H
 #define VSHI_LEVELSET_CALLS_H
 
-#include "levelset/leaves.h"
-#include "levelset/serve.h"
-#include "levelset/volume.h"
+#include "levelset/access.h"
 
 #include <vdbshade/grid.h>
 #include <vdbshade/voxels.h>
@@ -19,6 +17,12 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+#define VSHI_SERVE_CALL(MAKE, name)                                                                          \
+    MAKE(name,                                                                                               \
+         (const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,                \
+          vsh_error *error),                                                                                 \
+         (path, request, run, payload, error), nothing)
 
 #define VSHI_OPENVDB_CALLS(MAKE, GIVE, DO)                                                                   \
     MAKE(vsh_grid_from_meshes,                                                                               \
@@ -62,22 +66,10 @@ extern "C" {
     MAKE(vsh_voxels_from_vdb,                                                                                \
          (const char *path, const char *name, const vsh_run *run, vsh_voxels **voxels, vsh_error *error),    \
          (path, name, run, voxels, error), voxels)                                                           \
-    MAKE(vshi_serve_grid,                                                                                    \
-         (const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,                \
-          vsh_error *error),                                                                                 \
-         (path, request, run, payload, error), nothing)                                                      \
-    MAKE(vshi_serve_list,                                                                                    \
-         (const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,                \
-          vsh_error *error),                                                                                 \
-         (path, request, run, payload, error), nothing)                                                      \
-    MAKE(vshi_serve_voxels,                                                                                  \
-         (const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,                \
-          vsh_error *error),                                                                                 \
-         (path, request, run, payload, error), nothing)                                                      \
-    MAKE(vshi_serve_copy,                                                                                    \
-         (const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,                \
-          vsh_error *error),                                                                                 \
-         (path, request, run, payload, error), nothing)                                                      \
+    VSHI_SERVE_CALL(MAKE, vshi_serve_grid)                                                                   \
+    VSHI_SERVE_CALL(MAKE, vshi_serve_list)                                                                   \
+    VSHI_SERVE_CALL(MAKE, vshi_serve_voxels)                                                                 \
+    VSHI_SERVE_CALL(MAKE, vshi_serve_copy)                                                                   \
     MAKE(vsh_grid_write,                                                                                     \
          (const vsh_grid *grid, const char *path, const char *name, const vsh_attribute *attributes,         \
           size_t count, vsh_error *error),                                                                   \
@@ -117,7 +109,6 @@ extern "C" {
          (volume, counts, error), nothing)                                                                   \
     GIVE(size_t, vshi_grid_leaves, (const vsh_grid *grid, vshi_leaf *leaves, size_t capacity),               \
          (grid, leaves, capacity))                                                                           \
-    GIVE(const double *, vshi_grid_transform, (const vsh_grid *grid), (grid))                                \
     GIVE(float, vshi_volume_value, (const vsh_volume *volume, size_t channel, size_t block, int voxel),      \
          (volume, channel, block, voxel))                                                                    \
     GIVE(float *, vshi_volume_values, (vsh_volume * volume, size_t channel, size_t block),                   \

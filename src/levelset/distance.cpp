@@ -4,8 +4,7 @@
 // |d| - L · (half the box's diagonal) anywhere in it. So boxes of voxels are halved only where the surface or
 // its band may be, from the whole bounds down to leaves of 8³, and the work follows the surface's area.
 #include "base/floats.h"
-#include "levelset/grid.h"
-#include "levelset/redistance.h"
+#include "levelset/surface.h"
 #include "sdf/sdf.h"
 
 #include <array>
@@ -62,27 +61,241 @@ class Voxelizer {
     Voxelizer(const Callback &call_, const Lattice &lattice_, double band_, Stage &stage_, vsh_error *error_)
         : call(call_), field(call_.field), lattice(lattice_), band(band_), stage(stage_), error(error_) {}
 
-    FloatGrid::Ptr run(const Vec3d &low, const Vec3d &high);
+    FloatGrid::Ptr run(const Vec3d &low, const Vec3d &high) {
+        grid = FloatGrid::create(float(band));
+        grid->setTransform(lattice.transform());
+        Level level = start(low, high);
+        while (level.size > 8) {
+            level = split(level);
+            foretell(level);
+        }
+        for (const Level &boxes : solid) {
+            for (const Coord &origin : boxes.origins) {
+                fill_inside(origin, boxes.size);
+            }
+        }
+        leaves(level);
+        if (grid->tree().leafCount() == 0) {
+            throw Failure{
+                vshi_fail(error, VSH_ERROR_INPUT,
+                          "no surface in the box (%.9g, %.9g, %.9g) … (%.9g, %.9g, %.9g): the distance "
+                          "does not change sign at voxel size %g",
+                          low[0], low[1], low[2], high[0], high[1], high[2], lattice.voxel)};
+        }
+        return grid;
+    }
 
   private:
     Vec3d position(const Vec3d &index) const { return index * lattice.voxel + lattice.translation; }
     double distance(const Vec3d &index) const { return call(position(index)); }
+
     // How far the field may lie from its value at the middle of a box of `size` voxels an edge, at its
     // voxels.
     double slack(int32_t size) const { return field.lipschitz * 0.5 * SQRT3 * (size - 1) * lattice.voxel; }
-    void note_bad(size_t index);
-    [[noreturn]] void fail_bad(const Vec3d &index) const;
 
-    Level start(const Vec3d &low, const Vec3d &high);
-    Level split(const Level &level);
-    void fill_inside(const Coord &origin, int32_t size);
-    void foretell(const Level &level) const;
-    void check_tiles(const Level &level, const std::vector<int8_t> &signs) const;
-    Leaf *leaf(const Coord &origin, int8_t &sign, size_t index);
-    std::vector<uint8_t> narrow(const Coord &origin) const;
-    bool sample_block(Leaf &leaf, const Callback &here, const Coord &corner, double middle, float &witness,
-                      size_t index);
-    void leaves(const Level &level);
+    // Boxes are handled by many threads; the lowest number wins, so that the message does not depend on them.
+    void note_bad(size_t index) {
+        size_t first = bad.load();
+        while (index < first && !bad.compare_exchange_weak(first, index)) {
+        }
+    }
+
+    [[noreturn]] void fail_bad(const Vec3d &index) const {
+        const Vec3d p = position(index);
+        throw Failure{vshi_fail(error, VSH_ERROR_INPUT,
+                                "distance callback: %g at (%.9g, %.9g, %.9g): expected a finite value",
+                                distance(index), p[0], p[1], p[2])};
+    }
+
+    Level start(const Vec3d &low, const Vec3d &high) {
+        const double margin = lattice.half_width + 1.0;
+        const Vec3d first = lattice.index(low) - Vec3d(margin);
+        const Vec3d last = lattice.index(high) + Vec3d(margin);
+        region = openvdb::CoordBBox(Coord::floor(first), Coord::ceil(last));
+        sides = (high - low) / lattice.voxel;
+        Level level{8, {}};
+        while (level.size < region.dim()[region.maxExtent()] / 4) {
+            level.size *= 2;
+        }
+        const int32_t mask = ~(level.size - 1);
+        const Coord begin = region.min() & mask;
+        for (int32_t x = begin[0]; x <= region.max()[0]; x += level.size) {
+            for (int32_t y = begin[1]; y <= region.max()[1]; y += level.size) {
+                for (int32_t z = begin[2]; z <= region.max()[2]; z += level.size) {
+                    level.origins.emplace_back(x, y, z);
+                }
+            }
+        }
+        return level;
+    }
+
+    // By the coarsest tiles that fit.
+    void fill_inside(const Coord &origin, int32_t size) {
+        grid->tree().sparseFill(openvdb::CoordBBox::createCube(origin, size), -grid->background(), false);
+    }
+
+    // The boxes are the children of those that slack() and the band leave on either side of the surface.
+    // Leaves are kept by their own voxels.
+    void foretell(const Level &level) const {
+        if (level.size > 8 && level.origins.size() < FORETELLING_BOXES) {
+            return;
+        }
+        const double edge = level.size;
+        const double width = 2.0 * band / (field.lipschitz * lattice.voxel);
+        const double reach = SQRT3 * (2.0 * edge - 1.0) + width;
+        const double area = double(level.origins.size()) * edge * edge * edge / reach;
+        const double leaves = area * (SQRT3 * 8.0 + width) / double(Leaf::SIZE);
+        if (field.exact) {
+            check_memory(&stage.options, lattice.voxel, leaves, leaves * BYTES_PER_LEAF, error);
+        } else {
+            check_redistance(stage.options, lattice, area, sides, leaves, 0.0, error);
+        }
+    }
+
+    // Refuses too many tiles of the root, which keeps a list of them.
+    void check_tiles(const Level &level, const std::vector<int8_t> &signs) const {
+        constexpr double TILE = 4096.0, BYTES_PER_TILE = 112.0; // voxels along its side; a node of std::map
+        if (level.size < TILE) {
+            return;
+        }
+        const double boxes = double(std::count(signs.begin(), signs.end(), int8_t(-1)));
+        const double tiles = boxes * std::pow(level.size / TILE, 3.0);
+        check_memory(&stage.options, lattice.voxel, tiles * std::pow(TILE / 8.0, 3.0), tiles * BYTES_PER_TILE,
+                     error);
+    }
+
+    Level split(const Level &level) {
+        const size_t count = level.origins.size();
+        std::vector<int8_t> signs(count); // 0: to be halved
+        const Vec3d middle(0.5 * (level.size - 1));
+        stage.loop(count, 256, 0.0, 0.0, [&](size_t i) {
+            const double d = distance(level.origins[i].asVec3d() + middle);
+            if (!std::isfinite(d)) {
+                note_bad(i);
+            } else if (std::fabs(d) > slack(level.size) + band) {
+                signs[i] = d < 0.0 ? -1 : 1;
+            }
+        });
+        if (bad != SIZE_MAX) {
+            fail_bad(level.origins[bad].asVec3d() + middle);
+        }
+        check_tiles(level, signs);
+        Level next{level.size / 2, {}};
+        Level inside{level.size, {}};
+        for (size_t i = 0; i < count; ++i) {
+            if (signs[i] < 0) {
+                inside.origins.push_back(level.origins[i]);
+            }
+            for (int32_t child = 0; signs[i] == 0 && child < 8; ++child) {
+                const Coord origin = level.origins[i].offsetBy(
+                    (child & 4) ? next.size : 0, (child & 2) ? next.size : 0, (child & 1) ? next.size : 0);
+                if (region.hasOverlap(openvdb::CoordBBox::createCube(origin, next.size))) {
+                    next.origins.push_back(origin);
+                }
+            }
+        }
+        solid.push_back(std::move(inside));
+        return next;
+    }
+
+    // Of the shapes of a tree, those that decide in a leaf.
+    std::vector<uint8_t> narrow(const Coord &origin) const {
+        constexpr double MARGIN = 1.0 + 1e-6; // for the rounding of positions
+        std::vector<uint8_t> keep;
+        if (call.tree != nullptr) {
+            keep.resize(call.tree->node_count);
+            vshi_sdf_narrow(call.tree, position(origin.asVec3d() + Vec3d(3.5)).asPointer(),
+                            MARGIN * 3.5 * SQRT3 * lattice.voxel, keep.data());
+        }
+        return keep;
+    }
+
+    // Samples a leaf by blocks of 4³ voxels: of those that the band cannot reach, only the middles. nullptr
+    // where no voxel is in the band; `sign` then tells the side.
+    Leaf *leaf(const Coord &origin, int8_t &sign, size_t index) {
+        const std::vector<uint8_t> keep = narrow(origin);
+        const Callback here{call.field, call.batch, call.tree, keep.empty() ? nullptr : keep.data()};
+        const float background = grid->background();
+        auto leaf = std::make_unique<Leaf>(origin, background, false);
+        float *const values = leaf->buffer().data();
+        bool in_band = false, inside = false, outside = false;
+        std::array<Coord, 8> corners;
+        std::array<Vec3d, 8> places;
+        std::array<double, 8> middles;
+        for (int32_t block = 0; block < 8; ++block) {
+            corners[block] =
+                origin.offsetBy((block & 4) ? BLOCK : 0, (block & 2) ? BLOCK : 0, (block & 1) ? BLOCK : 0);
+            places[block] = position(corners[block].asVec3d() + Vec3d(0.5 * (BLOCK - 1)));
+        }
+        here(places.size(), places.data(), middles.data());
+        for (int32_t block = 0; block < 8; ++block) {
+            const bool far = !(std::fabs(middles[block]) <= slack(BLOCK) + band);
+            std::array<Vec3d, BLOCK * BLOCK * BLOCK> positions;
+            std::array<double, BLOCK * BLOCK * BLOCK> distances;
+            distances.fill(middles[block]);
+            if (!far) {
+                for (int32_t i = 0; i < int32_t(positions.size()); ++i) {
+                    positions[i] = position(
+                        corners[block].offsetBy(i / (BLOCK * BLOCK), i / BLOCK % BLOCK, i % BLOCK).asVec3d());
+                }
+                here(positions.size(), positions.data(), distances.data());
+            }
+            const openvdb::Index first = Leaf::coordToOffset(corners[block]);
+            float last = 0.0f;
+            for (openvdb::Index i = 0; i < distances.size(); ++i) {
+                if (!std::isfinite(distances[i])) {
+                    note_bad(index);
+                    return nullptr;
+                }
+                const float value = float(distances[i]);
+                const bool near = !far && std::fabs(value) < background;
+                last = near ? value : std::copysign(background, value);
+                const openvdb::Index offset =
+                    first + ((i / (BLOCK * BLOCK)) << 6 | (i / BLOCK % BLOCK) << 3 | i % BLOCK);
+                values[offset] = last;
+                if (near) {
+                    leaf->setActiveState(offset, true); // meshing looks at active voxels only
+                }
+                in_band |= near;
+            }
+            (last < 0.0f ? inside : outside) = true;
+        }
+        // Both signs without a voxel in the band: a field that keeps no distance near its surface. Kept: the
+        // re-distancing, or the field's reader, must see where it changes sign.
+        if (in_band || (inside && outside)) {
+            return leaf.release();
+        }
+        sign = inside ? -1 : 1;
+        return nullptr;
+    }
+
+    void leaves(const Level &level) {
+        const size_t count = level.origins.size();
+        std::vector<std::unique_ptr<Leaf>> made(count);
+        std::vector<int8_t> signs(count);
+        stage.loop(count, 16, 0.0, field.exact ? 1.0 : 0.5, [&](size_t i) {
+            if (i < bad.load()) {
+                made[i].reset(leaf(level.origins[i], signs[i], i));
+            }
+        });
+        if (bad != SIZE_MAX) {
+            for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
+                const Vec3d index = (Leaf::offsetToLocalCoord(i) + level.origins[bad]).asVec3d();
+                if (!std::isfinite(distance(index))) {
+                    fail_bad(index);
+                }
+            }
+            throw Failure{vshi_fail(error, VSH_ERROR_INPUT,
+                                    "distance callback: a value that is not finite between voxels")};
+        }
+        for (size_t i = 0; i < count; ++i) {
+            if (made[i] != nullptr) {
+                grid->tree().addLeaf(made[i].release());
+            } else if (signs[i] < 0) {
+                fill_inside(level.origins[i], 8);
+            }
+        }
+    }
 
     const Callback &call;
     const vsh_distance &field;
@@ -97,256 +310,6 @@ class Voxelizer {
     std::atomic<size_t> bad{SIZE_MAX}; // first box with a value that is not finite
     static constexpr int32_t BLOCK = 4;
 };
-
-// Boxes are handled by many threads; the lowest number wins, so that the message does not depend on them.
-void Voxelizer::note_bad(size_t index) {
-    size_t first = bad.load();
-    while (index < first && !bad.compare_exchange_weak(first, index)) {
-    }
-}
-
-void Voxelizer::fail_bad(const Vec3d &index) const {
-    const Vec3d p = position(index);
-    throw Failure{vshi_fail(error, VSH_ERROR_INPUT,
-                            "distance callback: %g at (%.9g, %.9g, %.9g): expected a finite value",
-                            distance(index), p[0], p[1], p[2])};
-}
-
-Level Voxelizer::start(const Vec3d &low, const Vec3d &high) {
-    const double margin = lattice.half_width + 1.0;
-    const Vec3d first = lattice.index(low) - Vec3d(margin);
-    const Vec3d last = lattice.index(high) + Vec3d(margin);
-    region = openvdb::CoordBBox(Coord::floor(first), Coord::ceil(last));
-    sides = (high - low) / lattice.voxel;
-    Level level{8, {}};
-    while (level.size < region.dim()[region.maxExtent()] / 4) {
-        level.size *= 2;
-    }
-    const int32_t mask = ~(level.size - 1);
-    const Coord begin = region.min() & mask;
-    for (int32_t x = begin[0]; x <= region.max()[0]; x += level.size) {
-        for (int32_t y = begin[1]; y <= region.max()[1]; y += level.size) {
-            for (int32_t z = begin[2]; z <= region.max()[2]; z += level.size) {
-                level.origins.emplace_back(x, y, z);
-            }
-        }
-    }
-    return level;
-}
-
-// The coarsest tiles that fit: nodes of the tree span 8, 128 and 4096 voxels.
-void Voxelizer::fill_inside(const Coord &origin, int32_t size) {
-    const int32_t tile = size >= 4096 ? 4096 : size >= 128 ? 128 : 8;
-    const openvdb::Index level = tile == 4096 ? 3 : tile == 128 ? 2 : 1;
-    const float inside = -grid->background();
-    for (int32_t x = 0; x < size; x += tile) {
-        for (int32_t y = 0; y < size; y += tile) {
-            for (int32_t z = 0; z < size; z += tile) {
-                grid->tree().addTile(level, origin.offsetBy(x, y, z), inside, false);
-            }
-        }
-    }
-}
-
-// The boxes are the children of those that slack() and the band leave on either side of the surface. Leaves
-// are kept by their own voxels.
-void Voxelizer::foretell(const Level &level) const {
-    if (level.size > 8 && level.origins.size() < FORETELLING_BOXES) {
-        return;
-    }
-    const double edge = level.size;
-    const double width = 2.0 * band / (field.lipschitz * lattice.voxel);
-    const double reach = SQRT3 * (2.0 * edge - 1.0) + width;
-    const double area = double(level.origins.size()) * edge * edge * edge / reach;
-    const double leaves = area * (SQRT3 * 8.0 + width) / double(Leaf::SIZE);
-    if (field.exact) {
-        check_memory(&stage.options, lattice.voxel, leaves, leaves * BYTES_PER_LEAF, error);
-    } else {
-        check_redistance(stage.options, lattice, area, sides, leaves, 0.0, error);
-    }
-}
-
-// Of what is filled by tiles of the root: it keeps a list of them.
-void Voxelizer::check_tiles(const Level &level, const std::vector<int8_t> &signs) const {
-    constexpr double TILE = 4096.0, BYTES_PER_TILE = 112.0; // voxels along its side; a node of std::map
-    if (level.size < TILE) {
-        return;
-    }
-    const double boxes = double(std::count(signs.begin(), signs.end(), int8_t(-1)));
-    const double tiles = boxes * std::pow(level.size / TILE, 3.0);
-    check_memory(&stage.options, lattice.voxel, tiles * std::pow(TILE / 8.0, 3.0), tiles * BYTES_PER_TILE,
-                 error);
-}
-
-Level Voxelizer::split(const Level &level) {
-    const size_t count = level.origins.size();
-    std::vector<int8_t> signs(count); // 0: to be halved
-    const Vec3d middle(0.5 * (level.size - 1));
-    stage.loop(count, 256, 0.0, 0.0, [&](size_t i) {
-        const double d = distance(level.origins[i].asVec3d() + middle);
-        if (!std::isfinite(d)) {
-            note_bad(i);
-        } else if (std::fabs(d) > slack(level.size) + band) {
-            signs[i] = d < 0.0 ? -1 : 1;
-        }
-    });
-    if (bad != SIZE_MAX) {
-        fail_bad(level.origins[bad].asVec3d() + middle);
-    }
-    check_tiles(level, signs);
-    Level next{level.size / 2, {}};
-    Level inside{level.size, {}};
-    for (size_t i = 0; i < count; ++i) {
-        if (signs[i] < 0) {
-            inside.origins.push_back(level.origins[i]);
-        }
-        for (int32_t child = 0; signs[i] == 0 && child < 8; ++child) {
-            const Coord origin = level.origins[i].offsetBy(
-                (child & 4) ? next.size : 0, (child & 2) ? next.size : 0, (child & 1) ? next.size : 0);
-            if (region.hasOverlap(openvdb::CoordBBox::createCube(origin, next.size))) {
-                next.origins.push_back(origin);
-            }
-        }
-    }
-    solid.push_back(std::move(inside));
-    return next;
-}
-
-// Samples 4³ voxels of a leaf, or none but the middle where the band cannot reach them. Returns whether one
-// of them is in the band; `witness` tells the sign where none is.
-bool Voxelizer::sample_block(Leaf &leaf, const Callback &here, const Coord &corner, double middle,
-                             float &witness, size_t index) {
-    if (!std::isfinite(middle)) {
-        note_bad(index);
-        return false;
-    }
-    const float background = grid->background();
-    const bool far = std::fabs(middle) > slack(BLOCK) + band;
-    bool in_band = false;
-    std::array<Vec3d, BLOCK * BLOCK * BLOCK> positions;
-    std::array<double, BLOCK * BLOCK * BLOCK> distances;
-    if (!far) {
-        for (int32_t i = 0; i < int32_t(positions.size()); ++i) {
-            positions[i] =
-                position(corner.offsetBy(i / (BLOCK * BLOCK), i / BLOCK % BLOCK, i % BLOCK).asVec3d());
-        }
-        here(positions.size(), positions.data(), distances.data());
-    }
-    float *const values = leaf.buffer().data();
-    const openvdb::Index first = Leaf::coordToOffset(corner);
-    for (int32_t i = 0; i < int32_t(distances.size()); ++i) {
-        const double d = far ? middle : distances[i];
-        if (!std::isfinite(d)) {
-            note_bad(index);
-            return false;
-        }
-        const openvdb::Index offset =
-            first + openvdb::Index((i / (BLOCK * BLOCK)) << 6 | (i / BLOCK % BLOCK) << 3 | i % BLOCK);
-        const float value = float(d);
-        const bool near = !far && std::fabs(value) < background;
-        witness = near ? value : std::copysign(background, value);
-        values[offset] = witness;
-        if (near) {
-            leaf.setActiveState(offset, true); // meshing looks at active voxels only
-        }
-        in_band |= near;
-    }
-    return in_band;
-}
-
-// Of the shapes of a tree, those that decide in a leaf.
-std::vector<uint8_t> Voxelizer::narrow(const Coord &origin) const {
-    constexpr double MARGIN = 1.0 + 1e-6; // for the rounding of positions
-    std::vector<uint8_t> keep;
-    if (call.tree != nullptr) {
-        keep.resize(call.tree->node_count);
-        vshi_sdf_narrow(call.tree, position(origin.asVec3d() + Vec3d(3.5)).asPointer(),
-                        MARGIN * 3.5 * SQRT3 * lattice.voxel, keep.data());
-    }
-    return keep;
-}
-
-Leaf *Voxelizer::leaf(const Coord &origin, int8_t &sign, size_t index) {
-    const std::vector<uint8_t> keep = narrow(origin);
-    const Callback here{call.field, call.batch, call.tree, keep.empty() ? nullptr : keep.data()};
-    auto leaf = std::make_unique<Leaf>(origin, grid->background(), false);
-    bool in_band = false;
-    bool inside = false;
-    bool outside = false;
-    std::array<Coord, 8> corners;
-    std::array<Vec3d, 8> positions;
-    std::array<double, 8> middles;
-    for (int32_t block = 0; block < 8; ++block) {
-        corners[block] =
-            origin.offsetBy((block & 4) ? BLOCK : 0, (block & 2) ? BLOCK : 0, (block & 1) ? BLOCK : 0);
-        positions[block] = position(corners[block].asVec3d() + Vec3d(0.5 * (BLOCK - 1)));
-    }
-    here(positions.size(), positions.data(), middles.data());
-    for (int32_t block = 0; block < 8; ++block) {
-        float witness = 0.0f;
-        in_band |= sample_block(*leaf, here, corners[block], middles[block], witness, index);
-        inside |= witness < 0.0f;
-        outside |= witness >= 0.0f;
-    }
-    // Both signs without a voxel in the band: a field that keeps no distance near its surface. Kept: the
-    // re-distancing, or the field's reader, must see where it changes sign.
-    if (in_band || (inside && outside)) {
-        return leaf.release();
-    }
-    sign = inside ? -1 : 1;
-    return nullptr;
-}
-
-void Voxelizer::leaves(const Level &level) {
-    const size_t count = level.origins.size();
-    std::vector<std::unique_ptr<Leaf>> made(count);
-    std::vector<int8_t> signs(count);
-    stage.loop(count, 16, 0.0, field.exact ? 1.0 : 0.5, [&](size_t i) {
-        if (i < bad.load()) {
-            made[i].reset(leaf(level.origins[i], signs[i], i));
-        }
-    });
-    if (bad != SIZE_MAX) {
-        for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
-            const Vec3d index = (Leaf::offsetToLocalCoord(i) + level.origins[bad]).asVec3d();
-            if (!std::isfinite(distance(index))) {
-                fail_bad(index);
-            }
-        }
-        throw Failure{vshi_fail(error, VSH_ERROR_INPUT,
-                                "distance callback: a value that is not finite between voxels")};
-    }
-    for (size_t i = 0; i < count; ++i) {
-        if (made[i] != nullptr) {
-            grid->tree().addLeaf(made[i].release());
-        } else if (signs[i] < 0) {
-            fill_inside(level.origins[i], 8);
-        }
-    }
-}
-
-FloatGrid::Ptr Voxelizer::run(const Vec3d &low, const Vec3d &high) {
-    grid = FloatGrid::create(float(band));
-    grid->setTransform(lattice.transform());
-    Level level = start(low, high);
-    while (level.size > 8) {
-        level = split(level);
-        foretell(level);
-    }
-    for (const Level &boxes : solid) {
-        for (const Coord &origin : boxes.origins) {
-            fill_inside(origin, boxes.size);
-        }
-    }
-    leaves(level);
-    if (grid->tree().leafCount() == 0) {
-        throw Failure{vshi_fail(error, VSH_ERROR_INPUT,
-                                "no surface in the box (%.9g, %.9g, %.9g) … (%.9g, %.9g, %.9g): the distance "
-                                "does not change sign at voxel size %g",
-                                low[0], low[1], low[2], high[0], high[1], high[2], lattice.voxel)};
-    }
-    return grid;
-}
 
 void check_field(const vsh_distance *field, vsh_distances_fn *batch, vsh_error *error) {
     if (field == nullptr || (field->distance == nullptr && batch == nullptr)) {

@@ -4,7 +4,7 @@
 #include "levelset/file.h"
 
 #include "base/elementary.h"
-#include "levelset/redistance.h"
+#include "levelset/surface.h"
 
 #include <cmath>
 #include <cstdarg>
@@ -26,7 +26,6 @@ constexpr float BEYOND = 1.0f + 1e-3f;  // of the background: a half-float's rou
 constexpr float CLIFF = 1.5f;           // voxels from a voxel to the next, where a distance changes by 1
 constexpr float JUMP = 2.5f;            // the same, of damage: sheets thinner than a voxel make up to 1.9
 constexpr double CLIFF_SHARE = 0.1;     // of the band's rim; conversions of meshes leave some
-constexpr int32_t LARGEST_INDEX = 1 << 28;
 
 Finding finding(Finding::Kind kind, const char *format, ...) __attribute__((format(printf, 2, 3)));
 

@@ -1,13 +1,77 @@
-// What the shims that read and write .vdb files share.
+// Reading, examining and writing .vdb files.
 #pragma once
 
 #include "levelset/grid.h"
-#include "levelset/message.h"
 
+#include <functional>
 #include <string>
 #include <vector>
 
 namespace vshi {
+
+// --- grids between a reader and its caller: transforms, level sets and voxels as plain arrays
+
+// A transform: OpenVDB's name of its map, and the numbers that define it, without those that follow from
+// them. Maps of files hold both, and damaged ones do not agree.
+struct TransformData {
+    std::string map;
+    std::vector<double> numbers;
+};
+
+TransformData describe_transform(const openvdb::math::Transform &transform);
+
+// The transform that OpenVDB reads from a sound file with these numbers. Throws std::invalid_argument for a
+// map that is none of the known ones, or has other numbers.
+openvdb::math::Transform::Ptr restore_transform(const TransformData &data);
+
+// A grid of a file, as messages name it.
+struct Named {
+    const char *path;
+    std::string grid;
+
+    std::string text() const { return std::string(path) + ": grid '" + grid + "'"; }
+};
+
+// A level set as it stands in a file, before its values are looked at.
+struct LevelSet {
+    Named named;
+    FloatGrid::Ptr grid;
+    double shell; // world units; 0: none
+};
+
+void put_level_set(vshi_encoder *encoder, const LevelSet &set);
+
+// Throws Failure (VSH_ERROR_READ) for what no sound reader sends: tiles and leaves out of place, out of
+// range, twice, numbers that are not finite.
+LevelSet take_level_set(vshi_decoder *decoder, const char *path, vsh_error *error);
+
+void put_blocks(vshi_encoder *encoder, const std::string &grid, const openvdb::math::Transform &transform,
+                const std::vector<vshi_block> &blocks);
+std::vector<vshi_block> take_blocks(vshi_decoder *decoder, const char *path, std::string &grid,
+                                    openvdb::math::Transform::Ptr &transform, vsh_error *error);
+
+// An answer of run.reader, with the progress of a stage.
+class Answer {
+  public:
+    explicit Answer(Stage &stage_) : stage(stage_) {}
+    ~Answer() { vshi_answer_free(&answer); }
+    Answer(const Answer &) = delete;
+    Answer &operator=(const Answer &) = delete;
+
+    // Asks once, for a VSHI_READ_… of a file and what `encode` adds. The answer lives as long as this. Throws
+    // Failure.
+    vshi_decoder *ask(int32_t kind, const char *path, const std::function<void(vshi_encoder *)> &encode,
+                      vsh_error *error);
+
+  private:
+    static bool poll(void *user, double fraction);
+
+    Stage &stage;
+    vshi_answer answer{nullptr, 0, 0, {nullptr, nullptr, true}};
+};
+
+// Throws Failure where more follows in a request than its kind asks for, or less.
+void end_request(vshi_decoder *request, const char *path, vsh_error *error);
 
 // --- whether a grid that came from outside is a level set of true distances
 
@@ -64,16 +128,13 @@ vsh_grid *close_level_set(LevelSet &set, Stage &stage, vsh_error *error);
 // What our metadata say of it, world units; 0: nothing.
 double shell_of(const openvdb::GridBase &grid);
 
-// Up to `capacity` grids of a file, described; `count` is that of the file's. Throws Failure.
-void list_grids(const char *path, const vsh_run &run, std::vector<vsh_vdb_entry> &entries, size_t capacity,
-                size_t &count, vsh_error *error);
+// Describes up to `capacity` grids of a file; returns how many it has. Throws Failure.
+size_t list_grids(const char *path, const vsh_run &run, std::vector<vsh_vdb_entry> &entries, size_t capacity,
+                  vsh_error *error);
 
 // Throw Failure for what is BAD, and what passes the memory limit.
 void refuse_bad(const Named &named, const Finding &finding, vsh_error *error);
 void refuse_large(const Named &named, const vsh_run &run, double bytes, vsh_error *error);
-
-// Refuses voxels that OpenVDB cannot write, before a grid is copied.
-vsh_result check_writable(const char *path, double voxel_size, vsh_error *error);
 
 // A grid of ours: shares the tree.
 FloatGrid::Ptr named_grid(const FloatTree::Ptr &tree, const openvdb::math::Transform &transform,
@@ -82,10 +143,10 @@ FloatGrid::Ptr named_grid(const FloatTree::Ptr &tree, const openvdb::math::Trans
 // The same of a handle's level set.
 FloatGrid::Ptr named_surface(const vsh_grid &grid, const char *name);
 
-// Lines of text as metadata; those that are there under such a name are replaced.
-void put_attributes(FloatGrid &grid, const vsh_attribute *attributes, size_t count);
-
-// Writes float grids as one file, atomically; the same grids give the same bytes.
-vsh_result write_grids(const openvdb::GridCPtrVec &grids, const char *path, vsh_error *error);
+// Writes what `make` gives as one file, atomically, with lines of text as metadata that replace any of such
+// names; the same grids give the same bytes. Voxels that OpenVDB cannot write are refused before `make` is
+// called.
+vsh_result write_grids(const char *path, double voxel_size, const vsh_attribute *attributes, size_t count,
+                       const std::function<std::vector<FloatGrid::Ptr>()> &make, vsh_error *error);
 
 } // namespace vshi

@@ -1,28 +1,26 @@
-// The handle of a level set: what it tells, and what the field reads of it.
+// The handle of a level set: making it, what it tells, what the field reads of it, and the caller's own
+// OpenVDB grids.
 #include "levelset/grid.h"
 
 #include "base/parallel.h"
 #include "base/try.h"
-#include "levelset/bits.h"
+#include "levelset/file.h"
 
 #include <cmath>
 #include <cstdio>
 #include <memory>
-#include <sstream>
+#include <openvdb/tools/Dense.h>
+#include <openvdb/version.h>
 #include <tbb/info.h>
 #include <unistd.h>
 #include <vector>
 
+template class openvdb::tree::Tree<openvdb::FloatTree::RootNodeType>;
+template class openvdb::Grid<openvdb::FloatTree>;
+
 namespace vshi {
 
 namespace {
-
-// Indices are kept where OpenVDB's own arithmetic on them (sums, boxes, leaves beside leaves) cannot
-// overflow.
-constexpr double LARGEST_INDEX = 268435456.0;
-
-// OpenVDB's maps cannot be constructed with a voxel whose volume is below this: they take it for singular.
-constexpr double SINGULAR = 3e-15;
 
 void fail_option(vsh_error *error, const char *name, double value, const char *expected) {
     throw Failure{
@@ -49,25 +47,11 @@ vsh_grid_options resolve(const vsh_grid_options *given, vsh_error *error) {
 
 } // namespace
 
+// Restored as from a file, as OpenVDB cannot construct maps of the smallest voxels: it takes them for
+// singular.
 openvdb::math::Transform::Ptr Lattice::transform() const {
-    using Map = openvdb::math::UniformScaleTranslateMap;
-    if (voxel * voxel * voxel > 1.01 * SINGULAR) {
-        auto transform = openvdb::math::Transform::createLinearTransform(voxel);
-        transform->postTranslate(translation);
-        return transform;
-    }
-    // Read as from a file, where every size is taken: the map's name, then its members in their order.
-    openvdb::initialize();
-    const Vec3d size(voxel), inverse(1.0 / voxel);
-    std::stringstream text;
-    openvdb::io::setCurrentVersion(text);
-    openvdb::writeString(text, Map::mapType());
-    for (const Vec3d &member : {translation, size, size, inverse, inverse * inverse, 0.5 * inverse}) {
-        member.write(text);
-    }
-    const auto transform = std::make_shared<openvdb::math::Transform>();
-    transform->read(text);
-    return transform;
+    return restore_transform({openvdb::math::UniformScaleTranslateMap::mapType(),
+                              {translation[0], translation[1], translation[2], voxel, voxel, voxel}});
 }
 
 Lattice make_lattice(const vsh_grid_options *given, const Vec3d &low, const Vec3d &high, vsh_error *error) {
@@ -83,10 +67,10 @@ Lattice make_lattice(const vsh_grid_options *given, const Vec3d &low, const Vec3
         }
         lattice.voxel = longest / options.resolution;
     }
-    if (!(0.5 * longest / lattice.voxel + lattice.half_width + lattice.shell < LARGEST_INDEX)) {
+    if (!(0.5 * longest / lattice.voxel + lattice.half_width + lattice.shell < double(LARGEST_INDEX))) {
         throw Failure{vshi_fail(error, VSH_ERROR_LIMIT,
                                 "voxel size %g: %g voxels along the longest side, %g at most", lattice.voxel,
-                                longest / lattice.voxel, 2.0 * LARGEST_INDEX)};
+                                longest / lattice.voxel, 2.0 * double(LARGEST_INDEX))};
     }
     if (!(lattice.voxel >= SMALLEST_VOXEL && lattice.voxel <= LARGEST_VOXEL)) {
         throw Failure{vshi_fail(error, VSH_ERROR_LIMIT,
@@ -161,40 +145,33 @@ void Stage::check() {
 
 namespace {
 
-void set_transform(vsh_grid &grid) {
-    const openvdb::math::Transform &transform = grid.level_set->transform();
+void set_transform(vsh_grid_info &info, const openvdb::math::Transform &transform) {
     const Vec3d origin = transform.indexToWorld(Vec3d(0.0));
-    for (int column = 0; column < 3; ++column) {
+    for (int column = 0; column < 4; ++column) {
         Vec3d unit(0.0);
-        unit[column] = 1.0;
-        const Vec3d axis = transform.baseMap()->applyJacobian(unit);
+        unit[column % 3] = 1.0;
+        const Vec3d axis = column < 3 ? transform.baseMap()->applyJacobian(unit) : origin;
         for (int row = 0; row < 3; ++row) {
-            grid.transform[4 * row + column] = axis[row];
+            info.transform[4 * row + column] = axis[row];
         }
-    }
-    for (int row = 0; row < 3; ++row) {
-        grid.transform[4 * row + 3] = origin[row];
     }
 }
 
-void set_bounds(vsh_grid_info &info, const double *transform, const openvdb::CoordBBox &voxels) {
+void set_bounds(vsh_grid_info &info, const openvdb::CoordBBox &voxels) {
     for (int row = 0; row < 3; ++row) {
-        double low = transform[4 * row + 3];
-        double high = low;
+        const double *r = info.transform + 4 * row;
+        info.bounds_min[row] = info.bounds_max[row] = r[3];
         for (int column = 0; column < 3; ++column) {
-            const double a = transform[4 * row + column] * voxels.min()[column];
-            const double b = transform[4 * row + column] * voxels.max()[column];
-            low += std::min(a, b);
-            high += std::max(a, b);
+            const double a = r[column] * voxels.min()[column], b = r[column] * voxels.max()[column];
+            info.bounds_min[row] += std::min(a, b);
+            info.bounds_max[row] += std::max(a, b);
         }
-        info.bounds_min[row] = low;
-        info.bounds_max[row] = high;
     }
 }
 
-// What closing a leaf finds out: the box of voxels inside the surface or next to it.
+// The findings of closing a leaf.
 struct Closed {
-    openvdb::CoordBBox box;
+    openvdb::CoordBBox box; // of voxels inside the surface or next to it
     size_t active = 0;
     bool uniform = true; // all of one sign
 };
@@ -204,39 +181,19 @@ Closed close_leaf(Leaf &leaf, float background, float voxel) {
     float *const values = leaf.buffer().data();
     const bool first = std::signbit(values[0]);
     Leaf::NodeMaskType active;
-    uint64_t across = 0, planes = 0; // of those in the box: seen along x, and which x
-    for (openvdb::Index x = 0; x < Leaf::DIM; ++x) {
-        uint8_t within[64], low[64], others[64], beyond[64];
-        float *const plane = values + 64 * x;
-        for (int i = 0; i < 64; ++i) {
-            const float value = plane[i], size = std::fabs(value);
-            within[i] = size < background;
-            low[i] = value < voxel;
-            others[i] = std::signbit(value) != first;
-            beyond[i] = !(size <= background);
+    for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
+        const float value = values[i], size = std::fabs(value);
+        active.set(i, size < background);
+        closed.uniform &= std::signbit(value) == first;
+        if (!(size <= background)) {
+            values[i] = std::copysign(background, value);
         }
-        if (pack_plane(beyond) != 0) { // else nothing is to be written
-            for (int i = 0; i < 64; ++i) {
-                plane[i] = beyond[i] != 0 ? std::copysign(background, plane[i]) : plane[i];
-            }
+        if (value < voxel) {
+            closed.box.expand(leaf.offsetToGlobalCoord(i));
         }
-        const uint64_t word = pack_plane(within), lower = pack_plane(low);
-        active.getWord<uint64_t>(x) = word;
-        closed.active += size_t(__builtin_popcountll(word));
-        closed.uniform &= pack_plane(others) == 0;
-        across |= lower;
-        planes |= uint64_t(lower != 0) << x;
     }
     leaf.setValueMask(active);
-    if (planes != 0) {
-        uint64_t rows = across | across >> 32; // all of its y together, as z
-        rows |= rows >> 16;
-        rows = (rows | rows >> 8) & 0xff;
-        const int z[2] = {__builtin_ctzll(rows), 63 - __builtin_clzll(rows)};
-        const Coord low(__builtin_ctzll(planes), __builtin_ctzll(across) >> 3, z[0]);
-        const Coord high(63 - __builtin_clzll(planes), (63 - __builtin_clzll(across)) >> 3, z[1]);
-        closed.box = openvdb::CoordBBox(leaf.origin() + low, leaf.origin() + high);
-    }
+    closed.active = active.countOn();
     return closed;
 }
 
@@ -246,20 +203,20 @@ vsh_grid *close_grid(const FloatGrid::Ptr &level_set, double shell, Stage &stage
     auto grid = std::make_unique<vsh_grid>();
     grid->level_set = level_set;
     level_set->setGridClass(openvdb::GRID_LEVEL_SET);
-    set_transform(*grid);
-    const double voxel =
-        std::sqrt(grid->transform[0] * grid->transform[0] + grid->transform[4] * grid->transform[4] +
-                  grid->transform[8] * grid->transform[8]);
+    vsh_grid_info &info = grid->info;
+    info = {};
+    set_transform(info, level_set->transform());
+    const double *m = info.transform;
+    info.voxel_size = std::sqrt(m[0] * m[0] + m[4] * m[4] + m[8] * m[8]);
     const float background = level_set->background();
 
     std::vector<Leaf *> leaves;
     level_set->tree().getNodes(leaves);
     std::vector<Closed> closed(leaves.size());
     stage.loop(leaves.size(), 64, 1.0, 1.0,
-               [&](size_t i) { closed[i] = close_leaf(*leaves[i], background, float(voxel)); });
+               [&](size_t i) { closed[i] = close_leaf(*leaves[i], background, float(info.voxel_size)); });
 
     openvdb::CoordBBox box;
-    vsh_grid_info info{};
     for (size_t i = 0; i < leaves.size(); ++i) {
         box.expand(closed[i].box);
         info.active_voxels += closed[i].active;
@@ -268,21 +225,44 @@ vsh_grid *close_grid(const FloatGrid::Ptr &level_set, double shell, Stage &stage
             level_set->tree().addTile(1, leaves[i]->origin(), value, false);
         }
     }
-    info.voxel_size = voxel;
-    info.half_width = double(background) / voxel;
+    info.half_width = double(background) / info.voxel_size;
     info.shell_thickness = shell;
     info.bytes = level_set->memUsage();
     if (!box.empty()) {
-        set_bounds(info, grid->transform, box);
+        set_bounds(info, box);
     }
     const openvdb::CoordBBox band = level_set->evalActiveVoxelBoundingBox();
     for (int axis = 0; axis < 3; ++axis) {
         info.index_min[axis] = band.empty() ? 0 : band.min()[axis];
         info.index_max[axis] = band.empty() ? 0 : band.max()[axis];
     }
-    std::copy(std::begin(grid->transform), std::end(grid->transform), info.transform);
-    grid->info = info;
     return grid.release();
+}
+
+openvdb::CoordBBox box_to_copy(const int32_t index_min[3], const int32_t size[3], vsh_error *error) {
+    for (int axis = 0; axis < 3; ++axis) {
+        if (size[axis] < 1 || int64_t(index_min[axis]) + size[axis] - 1 > INT32_MAX) {
+            throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT, "copy: %d voxels from %d on along %c",
+                                    size[axis], index_min[axis], "xyz"[axis])};
+        }
+    }
+    return {Coord(index_min), Coord(index_min).offsetBy(size[0] - 1, size[1] - 1, size[2] - 1)};
+}
+
+void copy_dense(const FloatTree &tree, const int32_t index_min[3], const int32_t size[3], float *values,
+                vsh_error *error) {
+    openvdb::tools::Dense<float, openvdb::tools::LayoutXYZ> dense( // x fastest
+        box_to_copy(index_min, size, error), values);
+    openvdb::tools::copyToDense(tree, dense, true);
+}
+
+void check_openvdb(uint32_t version, uint32_t abi, vsh_error *error) {
+    if (version != OPENVDB_LIBRARY_VERSION_NUMBER || abi != OPENVDB_ABI_VERSION_NUMBER) {
+        throw Failure{vshi_fail(error, VSH_ERROR_UNSUPPORTED,
+                                "OpenVDB %u.%u.%u (ABI %u): vdbshade was compiled against %s (ABI %d)",
+                                version >> 24, version >> 16 & 0xff, version & 0xffff, abi,
+                                OPENVDB_LIBRARY_VERSION_STRING, OPENVDB_ABI_VERSION_NUMBER)};
+    }
 }
 
 } // namespace vshi
@@ -323,6 +303,48 @@ void vshi_grid_block_signs(const vsh_grid *grid, const int32_t origin[3], const 
     }
 }
 
-const double *vshi_grid_transform(const vsh_grid *grid) {
-    return grid->transform;
+vsh_result vsh_grid_copy(const vsh_grid *grid, const int32_t index_min[3], const int32_t size[3],
+                         float *values, vsh_error *error) {
+    VSHI_NEEDS(grid);
+    VSHI_NEEDS(index_min);
+    VSHI_NEEDS(size);
+    VSHI_NEEDS(values);
+    return vshi::guard(error, VSH_ERROR_INTERNAL, "grid", [&]() -> vsh_result {
+        vshi::copy_dense(grid->level_set->constTree(), index_min, size, values, error);
+        return VSH_OK;
+    });
+}
+
+vsh_result vsh_grid_from_openvdb(const void *level_set, uint32_t version, uint32_t abi, const vsh_run *run,
+                                 vsh_grid **grid, vsh_error *error) {
+    VSHI_NEEDS(grid);
+    *grid = nullptr;
+    VSHI_NEEDS(level_set);
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    return vshi::guard(error, VSH_ERROR_INPUT, "OpenVDB", [&]() -> vsh_result {
+        vshi::check_openvdb(version, abi, error);
+        const auto &given = *static_cast<const openvdb::FloatGrid::ConstPtr *>(level_set);
+        if (given == nullptr) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "the OpenVDB grid is NULL");
+        }
+        vshi::Stage stage(full, "load", error);
+        const vshi::Named named{"OpenVDB", given->getName()};
+        vshi::refuse_bad(named, vshi::examine_kind(*given), error);
+        vshi::refuse_large(named, full, double(given->memUsage()), error);
+        vshi::LevelSet set{named, given->deepCopy(), vshi::shell_of(*given)};
+        *grid = vshi::close_level_set(set, stage, error);
+        return VSH_OK;
+    });
+}
+
+vsh_result vsh_grid_to_openvdb(const vsh_grid *grid, uint32_t version, uint32_t abi, void *level_set,
+                               vsh_error *error) {
+    VSHI_NEEDS(grid);
+    VSHI_NEEDS(level_set);
+    return vshi::guard(error, VSH_ERROR_LIMIT, "OpenVDB", [&] {
+        vshi::check_openvdb(version, abi, error);
+        *static_cast<openvdb::FloatGrid::ConstPtr *>(level_set) = vshi::named_surface(*grid, "surface");
+        return VSH_OK;
+    });
 }

@@ -6,7 +6,7 @@
 #include "extern/arenas.h"
 #include "extern/guard.h"
 #include "extern/tsan.h"
-#include "levelset/leaves.h"
+#include "levelset/access.h"
 
 #include <algorithm>
 #include <atomic>
@@ -15,13 +15,12 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-// Compiled once, in float_grid.cpp: in each file that makes or reads a grid it would be most of its time.
+// Compiled once, in grid.cpp: in each file that makes or reads a grid it would be most of its time.
 extern template class openvdb::tree::Tree<openvdb::FloatTree::RootNodeType>;
 extern template class openvdb::Grid<openvdb::FloatTree>;
 
 struct vsh_grid {
     openvdb::FloatGrid::Ptr level_set; // never changed once the handle exists
-    double transform[12];
     vsh_grid_info info;
 };
 
@@ -32,6 +31,8 @@ using openvdb::FloatGrid;
 using openvdb::FloatTree;
 using openvdb::Vec3d;
 using Leaf = FloatTree::LeafNodeType;
+using UpperNode = FloatTree::RootNodeType::ChildNodeType;
+using LowerNode = UpperNode::ChildNodeType;
 
 // Bytes of a grid per leaf: 512 values, two masks, origin, and its share of the nodes above.
 constexpr double BYTES_PER_LEAF = 2400.0;
@@ -39,6 +40,10 @@ constexpr double BYTES_PER_LEAF = 2400.0;
 // Voxel sizes, world units: distances are 32-bit floats, and their squares and volumes must be such too.
 constexpr double SMALLEST_VOXEL = 1e-12;
 constexpr double LARGEST_VOXEL = 1e12;
+
+// Indices are kept where OpenVDB's own arithmetic on them (sums, boxes, leaves beside leaves) cannot
+// overflow.
+constexpr int32_t LARGEST_INDEX = 1 << 28;
 
 // About how many leaves the band takes that reaches `half_width` voxels to either side of a surface of `area`
 // voxel² in a box of `sides` voxels.
@@ -121,9 +126,12 @@ class Stage {
 // others active; `shell` is the thickness of open meshes in it, world units.
 vsh_grid *close_grid(const FloatGrid::Ptr &level_set, double shell, Stage &stage);
 
-// A dense copy of a tree's values, z fastest.
-vsh_result copy_dense(const FloatTree &tree, const int32_t index_min[3], const int32_t size[3], float *values,
-                      vsh_error *error);
+// Throws Failure where a box to copy holds no voxel, or ends beyond what indices can be.
+openvdb::CoordBBox box_to_copy(const int32_t index_min[3], const int32_t size[3], vsh_error *error);
+
+// A dense copy of a tree's values, x fastest.
+void copy_dense(const FloatTree &tree, const int32_t index_min[3], const int32_t size[3], float *values,
+                vsh_error *error);
 
 // Throws Failure for a caller that was compiled against another OpenVDB: its grids are other classes, though
 // their names are alike.

@@ -1,11 +1,14 @@
 // Level sets from meshes: solids together, rooms cut out of them, walls behind the faces of others, sheets as
-// shells.
-#include "levelset/shells.h"
+// shells. Filling a solid fills its rooms; each is cut out afterwards of the solids that it lies in and of no
+// others, so that what stands in a room or reaches into it stays.
+#include "levelset/surface.h"
 #include "mesh/alpha_mask.h"
 #include "mesh/mesh_set.h"
+#include "mesh/solidity.h"
 
 #include <cfloat>
 #include <cmath>
+#include <map>
 #include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/Composite.h>
 
@@ -29,26 +32,28 @@ struct Meshes {
     Vec3d low{DBL_MAX};
     Vec3d high{-DBL_MAX};
     size_t triangles = 0;
+    // all meshes, if masks cut some: those are the opaque pieces
+    std::vector<vsh_mesh> cut;
+    std::vector<vshi_mask_pieces> pieces;
 
     Meshes() = default;
-    ~Meshes() { vshi_mesh_set_free(&set); }
+    ~Meshes() {
+        vshi_mesh_set_free(&set);
+        for (vshi_mask_pieces &each : pieces) {
+            vshi_mask_pieces_free(&each);
+        }
+    }
     Meshes(const Meshes &) = delete;
     Meshes &operator=(const Meshes &) = delete;
 
     const vsh_mesh_report &report(size_t i) const { return set.checked[i].report; }
 };
 
-void check(vsh_result result) {
-    if (result != VSH_OK) {
-        throw Failure{result};
-    }
-}
-
 void look_over(const vsh_mesh *mesh, size_t count, Meshes &meshes, vsh_error *error) {
     if (mesh == nullptr || count == 0) {
         throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT, "voxelize: no meshes")};
     }
-    check(vshi_mesh_set_create(mesh, count, &meshes.set, error));
+    require(vshi_mesh_set_create(mesh, count, &meshes.set, error));
     for (size_t i = 0; i < count; ++i) {
         const vsh_mesh_report &report = meshes.report(i);
         meshes.low = openvdb::math::minComponent(meshes.low, Vec3d(report.bounds_min));
@@ -68,37 +73,22 @@ void look_over(const vsh_mesh *mesh, size_t count, Meshes &meshes, vsh_error *er
 // How long the pieces are that a mask leaves of triangles, voxels: the border is as near as half of one.
 constexpr double PIECE = 0.5;
 
-// Meshes, those that masks cut out as what is left of them.
-struct CutOut {
-    std::vector<vsh_mesh> meshes;
-    std::vector<vshi_mask_pieces> pieces;
-
-    CutOut() = default;
-    ~CutOut() {
-        for (vshi_mask_pieces &each : pieces) {
-            vshi_mask_pieces_free(&each);
-        }
-    }
-    CutOut(const CutOut &) = delete;
-    CutOut &operator=(const CutOut &) = delete;
-};
-
-// Cuts the meshes that have masks; what is made lives as long as `cut_out`. `run` comes to hold it.
-void cut_masks(const vsh_mesh *given, size_t count, double voxel, Meshes &meshes, CutOut &cut_out,
-               vsh_run &run, vsh_error *error) {
+// Cuts the meshes that have masks. `run` comes to hold what is made.
+void cut_masks(const vsh_mesh *given, size_t count, double voxel, Meshes &meshes, vsh_run &run,
+               vsh_error *error) {
     const auto masked = [](const vsh_mesh &mesh) { return mesh.mask != nullptr; };
     if (std::none_of(given, given + count, masked)) {
         return;
     }
-    cut_out.meshes.assign(given, given + count);
-    cut_out.pieces.resize(count);
+    meshes.cut.assign(given, given + count);
+    meshes.pieces.resize(count);
     for (size_t i = 0; i < count; ++i) {
-        vsh_mesh &mesh = cut_out.meshes[i];
+        vsh_mesh &mesh = meshes.cut[i];
         if (!masked(mesh)) {
             continue;
         }
-        vshi_mask_pieces &pieces = cut_out.pieces[i];
-        check(vshi_mask_pieces_cut(&mesh, PIECE * voxel, &run, &pieces, error));
+        vshi_mask_pieces &pieces = meshes.pieces[i];
+        require(vshi_mask_pieces_cut(&mesh, PIECE * voxel, &run, &pieces, error));
         mesh.positions = pieces.positions;
         mesh.indices = pieces.indices;
         mesh.vertex_count = 3 * pieces.count;
@@ -112,7 +102,7 @@ void cut_masks(const vsh_mesh *given, size_t count, double voxel, Meshes &meshes
     }
     vshi_mesh_set_free(&meshes.set);
     meshes.triangles = 0;
-    look_over(cut_out.meshes.data(), count, meshes, error);
+    look_over(meshes.cut.data(), count, meshes, error);
 }
 
 // Of a wide band to either side of a surface, voxels.
@@ -162,6 +152,143 @@ void foretell(const Meshes &meshes, const Lattice &lattice, const vsh_run &run, 
     check_memory(&run, lattice.voxel, leaves,
                  leaves * MESH_BYTES_PER_LEAF + double(meshes.triangles) * BYTES_PER_TRIANGLE, error);
 }
+
+// --- components sorted by kind
+
+// A filled surface, and the rooms that are cut out of it afterwards.
+struct Solid {
+    Surface outward;
+    Surface rooms;
+};
+
+// Faces with a thin wall behind them. Walls that stand apart are voxelised together.
+struct Wall {
+    bool inward = true; // the faces look inwards, and the wall is outside of them; else within
+    bool open = false;  // `closed` has triangles over holes
+    Surface faces;
+    Surface closed;                    // with their holes closed
+    std::vector<openvdb::BBoxd> boxes; // index space
+};
+
+struct Parts {
+    std::vector<Solid> solids; // the first takes all that have no rooms
+    std::vector<Wall> walls;
+    Surface sheets;
+};
+
+using Rooms = std::vector<uint32_t>; // components
+
+Vec3d to_index(const Lattice &lattice, const vshi_vec &p) {
+    return lattice.index(Vec3d(p.x, p.y, p.z));
+}
+
+void add_triangle(const vshi_vec corner[3], const Lattice &lattice, Surface &surface) {
+    const auto first = openvdb::Index32(surface.points.size());
+    for (int k = 0; k < 3; ++k) {
+        surface.points.emplace_back(to_index(lattice, corner[k]));
+    }
+    surface.polygons.emplace_back(first, first + 1, first + 2, UINT32_MAX);
+}
+
+class Sorting {
+  public:
+    Sorting(const vshi_solidity *solidity, const Lattice &lattice_, double apart_)
+        : lattice(lattice_), apart(apart_), all(vshi_solidity_components(solidity, &count)),
+          wholes(*vshi_solidity_wholes(solidity)), rooms(count) {
+        size_t cuts = 0;
+        const vshi_cut *cut = vshi_solidity_cuts(solidity, &cuts);
+        for (size_t i = 0; i < cuts; ++i) {
+            rooms[cut[i].solid].push_back(cut[i].room);
+        }
+        parts.solids.resize(1);
+    }
+
+    Parts sort() {
+        for (size_t i = 0; i < count; ++i) {
+            add_component(wholes.meshes[all[i].whole], all[i]);
+        }
+        return std::move(parts);
+    }
+
+  private:
+    void add_faces(const vsh_mesh &mesh, const vshi_component &c, Surface &surface) const {
+        for (size_t at = 0; at < c.triangles; ++at) {
+            if (!vshi_mesh_degenerate(&mesh, c.list[at])) {
+                vshi_vec corner[3];
+                vshi_mesh_triangle(&mesh, c.list[at], corner);
+                add_triangle(corner, lattice, surface);
+            }
+        }
+    }
+
+    void add_caps(const vshi_component &c, Surface &surface) const {
+        for (size_t k = 0; k < c.open_edges; ++k) {
+            add_triangle(c.cap[k], lattice, surface);
+        }
+    }
+
+    void add_closed(const vsh_mesh &mesh, const vshi_component &c, Surface &surface) const {
+        add_faces(mesh, c, surface);
+        add_caps(c, surface);
+    }
+
+    void add_component(const vsh_mesh &mesh, const vshi_component &c) {
+        switch (c.kind) {
+        case VSHI_KIND_SHEET:
+            add_faces(mesh, c, parts.sheets);
+            break;
+        case VSHI_KIND_WALL:
+            add_wall(mesh, c);
+            break;
+        case VSHI_KIND_SOLID:
+            add_closed(mesh, c, solid_of(rooms[size_t(&c - all)]).outward);
+            break;
+        case VSHI_KIND_ROOM: // comes with its solids
+            break;
+        }
+    }
+
+    // The solid with these rooms; a new one is given them.
+    Solid &solid_of(const Rooms &cut) {
+        const auto [found, is_new] = numbers.try_emplace(cut, parts.solids.size());
+        if (is_new) {
+            parts.solids.emplace_back();
+            for (const uint32_t room : cut) {
+                add_closed(wholes.meshes[all[room].whole], all[room], parts.solids.back().rooms);
+            }
+        }
+        return parts.solids[found->second];
+    }
+
+    void add_wall(const vsh_mesh &mesh, const vshi_component &c) {
+        openvdb::BBoxd box(to_index(lattice, c.low), to_index(lattice, c.high));
+        box.expand(0.5 * apart);
+        auto wall = std::find_if(parts.walls.begin(), parts.walls.end(), [&](const Wall &w) {
+            return w.inward == c.inward && std::none_of(w.boxes.begin(), w.boxes.end(),
+                                                        [&](const auto &b) { return b.hasOverlap(box); });
+        });
+        if (wall == parts.walls.end()) {
+            parts.walls.emplace_back();
+            wall = parts.walls.end() - 1;
+            wall->inward = c.inward;
+        }
+        wall->boxes.push_back(box);
+        wall->open |= c.open_edges > 0;
+        add_faces(mesh, c, wall->faces);
+        add_closed(mesh, c, wall->closed);
+    }
+
+    const Lattice &lattice;
+    const double apart;
+    size_t count = 0;
+    const vshi_component *all;
+    const vshi_wholes &wholes;
+    std::vector<Rooms> rooms;                      // of each solid
+    std::map<Rooms, size_t> numbers{{Rooms{}, 0}}; // of the solids, by their rooms
+    Parts parts;
+};
+
+// --- the parts as level sets
 
 // Moves the surface out by `offset` (world units) and narrows the band, so that a sheet becomes a solid.
 void move_out(FloatGrid &grid, float offset, float background, Stage &stage) {
@@ -246,20 +373,19 @@ FloatGrid::Ptr fill_sheets(const Surface &sheets, const Lattice &lattice, Progre
 vsh_result from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_options *options,
                        const vsh_run *given, vsh_grid **grid, vsh_error *error) {
     vsh_run run;
-    check(vshi_run_resolve(given, &run, error));
-    CutOut cut_out; // which the meshes may be
+    require(vshi_run_resolve(given, &run, error));
     Meshes meshes;
     look_over(mesh, count, meshes, error);
     const Lattice lattice = make_lattice(options, meshes.low, meshes.high, error);
-    cut_masks(mesh, count, lattice.voxel, meshes, cut_out, run, error);
-    check(vshi_mesh_set_solve(&meshes.set, &run, error));
+    cut_masks(mesh, count, lattice.voxel, meshes, run, error);
+    require(vshi_mesh_set_solve(&meshes.set, &run, error));
     check_work(meshes.triangles, lattice.half_width, error);
     foretell(meshes, lattice, run, error);
     Stage stage(run, "voxelize", error);
     vshi_mesh_set_note(&meshes.set, lattice.shell, lattice.voxel, &run);
 
     const double reach = 2.0 * (lattice.half_width + lattice.shell) + 2.0;
-    const Parts parts = sort_parts(meshes.set.solidity, lattice, reach);
+    const Parts parts = Sorting(meshes.set.solidity, lattice, reach).sort();
     Progress progress{0.0, 1.0 / double(meshes.triangles)};
     FloatGrid::Ptr united;
     for (const Solid &solid : parts.solids) {

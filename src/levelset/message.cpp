@@ -1,5 +1,3 @@
-#include "levelset/message.h"
-
 #include "levelset/file.h"
 
 #include <cmath>
@@ -13,34 +11,31 @@ namespace {
 
 namespace math = openvdb::math;
 
-constexpr int32_t LARGEST_INDEX = INT32_MAX - (1 << 13); // so that a root tile ends before it
+constexpr int32_t LAST_INDEX = INT32_MAX - (1 << 13); // so that a root tile ends before it
 
+// A kind of transform: how many numbers OpenVDB writes as they are, and of the scale that follows them.
 struct Kind {
     std::string map;
-    size_t count; // numbers
+    size_t plain, scale;
 };
 
-const std::vector<Kind> &kinds() {
+const Kind &kind_of(const std::string &map) {
     static const std::vector<Kind> all{
-        {math::TranslationMap::mapType(), 3},
-        {math::ScaleMap::mapType(), 3},
-        {math::UniformScaleMap::mapType(), 3},
-        {math::ScaleTranslateMap::mapType(), 6},
-        {math::UniformScaleTranslateMap::mapType(), 6},
-        {math::AffineMap::mapType(), 16},
-        {math::UnitaryMap::mapType(), 16},
-        {math::NonlinearFrustumMap::mapType(), 24},
+        {math::TranslationMap::mapType(), 3, 0},
+        {math::ScaleMap::mapType(), 0, 3},
+        {math::UniformScaleMap::mapType(), 0, 3},
+        {math::ScaleTranslateMap::mapType(), 3, 3},
+        {math::UniformScaleTranslateMap::mapType(), 3, 3},
+        {math::AffineMap::mapType(), 16, 0},
+        {math::UnitaryMap::mapType(), 16, 0},
+        {math::NonlinearFrustumMap::mapType(), 24, 0}, // 16 of them another map's
     };
-    return all;
-}
-
-size_t count_of(const std::string &map) {
-    for (const Kind &kind : kinds()) {
-        if (kind.map == map) {
-            return kind.count;
-        }
+    const auto found =
+        std::find_if(all.begin(), all.end(), [&](const Kind &kind) { return kind.map == map; });
+    if (found == all.end()) {
+        throw std::invalid_argument("its transform is of no known kind");
     }
-    throw std::invalid_argument("its transform is of no known kind");
+    return *found;
 }
 
 void add(std::vector<double> &numbers, const double *more, size_t count) {
@@ -64,7 +59,7 @@ void write_scale(std::ostream &out, const double *numbers) {
 
 TransformData describe_transform(const math::Transform &transform) {
     TransformData data{transform.mapType(), {}};
-    const size_t count = count_of(data.map);
+    const Kind &kind = kind_of(data.map);
     if (const auto frustum = transform.map<math::NonlinearFrustumMap>()) {
         add(data.numbers, frustum->getBBox().min().asPointer(), 3);
         add(data.numbers, frustum->getBBox().max().asPointer(), 3);
@@ -76,40 +71,31 @@ TransformData describe_transform(const math::Transform &transform) {
     // Every other map writes those that define it first, as doubles.
     std::stringstream text;
     transform.baseMap()->write(text);
-    data.numbers.resize(count);
-    text.read(reinterpret_cast<char *>(data.numbers.data()), std::streamsize(count * sizeof(double)));
+    data.numbers.resize(kind.plain + kind.scale);
+    text.read(reinterpret_cast<char *>(data.numbers.data()),
+              std::streamsize(data.numbers.size() * sizeof(double)));
     return data;
 }
 
 math::Transform::Ptr restore_transform(const TransformData &data) {
     initialize();
-    if (data.numbers.size() != count_of(data.map)) {
+    const Kind &kind = kind_of(data.map);
+    if (data.numbers.size() != kind.plain + kind.scale) {
         throw std::invalid_argument("its transform has other numbers");
     }
     std::stringstream text;
     openvdb::io::setCurrentVersion(text);
     openvdb::writeString(text, data.map);
     const double *numbers = data.numbers.data();
-    switch (data.numbers.size()) {
-    case 3:
-        if (data.map == math::TranslationMap::mapType()) {
-            write(text, numbers, 3);
-        } else {
-            write_scale(text, numbers);
-        }
-        break;
-    case 6:
-        write(text, numbers, 3);
-        write_scale(text, numbers + 3);
-        break;
-    case 16:
-        write(text, numbers, 16);
-        break;
-    default:
+    if (data.map == math::NonlinearFrustumMap::mapType()) {
         write(text, numbers, 8);
         openvdb::writeString(text, math::AffineMap::mapType());
         write(text, numbers + 8, 16);
-        break;
+    } else {
+        write(text, numbers, kind.plain);
+    }
+    if (kind.scale > 0) {
+        write_scale(text, numbers + kind.plain);
     }
     const auto transform = std::make_shared<math::Transform>();
     transform->read(text);
@@ -141,7 +127,7 @@ constexpr int32_t WIDTHS[4] = {0, 8, 128, 4096};
 
 bool aligned(const int32_t origin[3], int32_t width) {
     for (int axis = 0; axis < 3; ++axis) {
-        if (origin[axis] % width != 0 || origin[axis] < -LARGEST_INDEX || origin[axis] > LARGEST_INDEX) {
+        if (origin[axis] % width != 0 || origin[axis] < -LAST_INDEX || origin[axis] > LAST_INDEX) {
             return false;
         }
     }
@@ -158,8 +144,8 @@ math::Transform::Ptr take_transform(vshi_decoder *decoder, const char *path, vsh
     const char *map = vshi_decode_text(decoder, true);
     TransformData data{map != nullptr ? map : "", {}};
     try {
-        const size_t count = count_of(data.map);
-        for (size_t i = 0; i < count; ++i) {
+        const Kind &kind = kind_of(data.map);
+        for (size_t i = 0; i < kind.plain + kind.scale; ++i) {
             data.numbers.push_back(vshi_decode_number(decoder));
         }
         if (!decoder->bad) {
@@ -170,49 +156,36 @@ math::Transform::Ptr take_transform(vshi_decoder *decoder, const char *path, vsh
     fail(path, "a transform", error);
 }
 
-int32_t level_of(const FloatTree::ValueAllCIter &tile) {
-    return int32_t(FloatTree::ValueAllCIter::LEAF_DEPTH - tile.getDepth());
+// Nodes that have nothing but tiles are made by their first.
+template <typename Node>
+void add_childless(const FloatTree &tree, int32_t level, std::vector<TileData> &tiles) {
+    std::vector<const Node *> nodes;
+    tree.getNodes(nodes);
+    for (const Node *node : nodes) {
+        if (node->childCount() == 0) {
+            const Coord &at = node->origin();
+            tiles.push_back({{at[0], at[1], at[2]}, level, node->getFirstValue(), node->isValueOn(0)});
+        }
+    }
 }
 
-// Tiles that say more than their node's making does. What is inactive background is left out, but for the
-// first value of a node that has nothing else: it makes the node.
+// Tiles that say more than their node's making does: inactive background is left out.
 std::vector<TileData> tiles_of(const FloatTree &tree) {
     std::vector<TileData> tiles;
-    const auto add_tile = [&](const Coord &at, int32_t level, float value, bool active) {
-        tiles.push_back({{at[0], at[1], at[2]}, level, value, active});
-    };
     const float background = tree.background();
     FloatTree::ValueAllCIter tile(tree);
     tile.setMaxDepth(FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
     for (; tile; ++tile) {
         const float value = tile.getValue();
+        const auto level = int32_t(FloatTree::ValueAllCIter::LEAF_DEPTH - tile.getDepth());
         const bool plain = std::memcmp(&value, &background, sizeof value) == 0 && !tile.isValueOn();
-        if (!plain || level_of(tile) == 3) {
-            add_tile(tile.getBoundingBox().min(), level_of(tile), value, tile.isValueOn());
+        if (!plain || level == 3) {
+            const Coord at = tile.getBoundingBox().min();
+            tiles.push_back({{at[0], at[1], at[2]}, level, value, tile.isValueOn()});
         }
     }
-    FloatTree::NodeCIter node(tree);
-    node.setMaxDepth(FloatTree::NodeCIter::LEAF_DEPTH - 1);
-    for (; node; ++node) {
-        const openvdb::Index depth = node.getDepth();
-        if (depth == 0) {
-            continue;
-        }
-        // the children of a node that has none are all tiles
-        const Coord at = node.getCoord();
-        if (depth == 1) {
-            const auto *inner = tree.probeConstNode<FloatTree::RootNodeType::ChildNodeType>(at);
-            if (inner != nullptr && inner->childCount() == 0) {
-                add_tile(at, 2, inner->getFirstValue(), inner->isValueOn(0));
-            }
-        } else {
-            const auto *inner =
-                tree.probeConstNode<FloatTree::RootNodeType::ChildNodeType::ChildNodeType>(at);
-            if (inner != nullptr && inner->childCount() == 0) {
-                add_tile(at, 1, inner->getFirstValue(), inner->isValueOn(0));
-            }
-        }
-    }
+    add_childless<UpperNode>(tree, 2, tiles);
+    add_childless<LowerNode>(tree, 1, tiles);
     return tiles;
 }
 

@@ -1,23 +1,262 @@
-#include "levelset/sides.h"
+// Which side of a surface voxels are on. Voxels well off the surface are joined across their faces, through
+// leaves that are not there as well: no surface passes between them. A voxel near the surface takes the side
+// of a voxel that no surface separates it from. All that is not joined with the outside is inside.
+#include "levelset/band.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numeric>
 
 namespace vshi {
 
 namespace {
 
-using openvdb::Vec3d;
-
 constexpr int LEAF = 8;
 constexpr int EDGE = 10; // of a leaf with the voxels around it
+constexpr uint32_t EXTERIOR = 0;
+// Voxels farther than this from the surface are joined across faces: between two of them no surface passes,
+// and hardly any hole is wide enough to let them through.
+constexpr float WELL_OFF = 0.8660255f;
 // Voxels nearer than this lie on the surface: neither side is wrong.
 constexpr float ON = 1e-4f;
-// What goes by a triangle's edge within this, voxels, goes through it.
+// A segment that passes a triangle's edge within this, voxels, passes through the triangle.
 constexpr double AT_EDGE = 1e-6;
 // By how much boxes of triangles are too large, voxels: more than their rounding.
 constexpr double BOX_MARGIN = 1e-3;
+// Voxels near the surface learn their sides from their neighbours in so many rounds.
+constexpr int ROUNDS = 3;
+
+// Byte z is 1 where bit z is set.
+uint64_t spread(uint64_t byte) {
+    const uint64_t copies = byte * ROW_ENDS & 0x8040201008040201u;
+    return ((copies + 0x7f7f7f7f7f7f7f7fu) | copies) >> 7 & ROW_ENDS;
+}
+
+// Voxels of `within` that hang together with the seed.
+Bits flood(Bits seed, const Bits &within) {
+    for (bool changed = true; changed;) {
+        changed = false;
+        for (int x = 0; x < LEAF; ++x) {
+            const uint64_t old = seed[x];
+            uint64_t w = old | (x > 0 ? seed[x - 1] : 0) | (x < LEAF - 1 ? seed[x + 1] : 0);
+            w |= w << 8 | w >> 8;
+            w &= within[x];
+            w |= (w << 1 & ~ROW_ENDS) | (w >> 1 & ~(ROW_ENDS << 7));
+            w &= within[x];
+            w |= (w << 1 & ~ROW_ENDS) | (w >> 1 & ~(ROW_ENDS << 7));
+            w &= within[x];
+            seed[x] = w;
+            changed |= w != old;
+        }
+    }
+    return seed;
+}
+
+// The 64 voxels of a leaf's face: the last along the axis, or the first.
+uint64_t face(const Bits &bits, int axis, bool last) {
+    if (axis == 0) {
+        return bits[last ? LEAF - 1 : 0];
+    }
+    uint64_t all = 0;
+    for (int x = 0; x < LEAF; ++x) {
+        const uint64_t w = bits[x];
+        const uint64_t row = axis == 1 ? (last ? w >> 56 : w & 0xff)
+                                       : ((last ? w >> 7 : w) & ROW_ENDS) * 0x0102040810204080u >> 56;
+        all |= row << 8 * x;
+    }
+    return all;
+}
+
+} // namespace
+
+bool add_parts(const float distances[VSHI_LEAF_VOXELS], std::vector<Bits> &parts) {
+    Bits left{};
+    for (int i = 0; i < VSHI_LEAF_VOXELS; ++i) {
+        left[size_t(i >> 6)] |= uint64_t(distances[i] > WELL_OFF) << (i & 63);
+    }
+    const bool others = std::any_of(left.begin(), left.end(), [](uint64_t word) { return ~word != 0; });
+    for (int x = 0; x < LEAF;) {
+        if (left[x] == 0) {
+            ++x;
+            continue;
+        }
+        Bits seed{};
+        seed[x] = left[x] & (~left[x] + 1);
+        const Bits part = flood(seed, left);
+        for (int i = 0; i < LEAF; ++i) {
+            left[i] &= ~part[i];
+        }
+        parts.push_back(part);
+    }
+    return others;
+}
+
+size_t LeafTable::lower_bound(const Cell &place) const {
+    const auto before = [](const BandLeaf &leaf, const Cell &at) { return leaf.origin < at; };
+    return size_t(std::lower_bound(leaves.begin(), leaves.end(), place, before) - leaves.begin());
+}
+
+uint32_t LeafTable::find(const Cell &origin) const {
+    const size_t at = lower_bound(origin);
+    return at < leaves.size() && same(leaves[at].origin, origin) ? uint32_t(at) : NONE;
+}
+
+void LeafTable::find_neighbours() {
+    std::array<uint32_t, 27> none;
+    none.fill(NONE);
+    neighbours.assign(leaves.size(), none);
+    size_t next[13] = {}; // by offset: neighbours follow each other as the leaves do
+    for (size_t i = 0; i < leaves.size(); ++i) {
+        neighbours[i][13] = uint32_t(i);
+        for (int k = 14; k < 27; ++k) {
+            const Cell &origin = leaves[i].origin;
+            const Cell at{origin[0] + LEAF * (k / 9 - 1), origin[1] + LEAF * (k / 3 % 3 - 1),
+                          origin[2] + LEAF * (k % 3 - 1)};
+            size_t &found = next[k - 14];
+            while (found < leaves.size() && leaves[found].origin < at) {
+                ++found;
+            }
+            if (found < leaves.size() && same(leaves[found].origin, at)) {
+                neighbours[i][size_t(k)] = uint32_t(found);
+                neighbours[found][size_t(26 - k)] = uint32_t(i);
+            }
+        }
+    }
+}
+
+namespace {
+
+bool same_column(const Cell &a, const Cell &b) {
+    return a[0] == b[0] && a[1] == b[1];
+}
+
+// Sets of parts of leaves, of runs of empty leaves and of the exterior that are connected.
+class Joining {
+  public:
+    Joining(const LeafTable &table_, Stage &stage) : table(table_), leaves(table.leaves) {
+        size_t node = 1 + leaves.size();
+        for (const BandLeaf &leaf : leaves) {
+            first_part.push_back(node);
+            node += leaf.part_count;
+        }
+        parent.resize(node);
+        std::iota(parent.begin(), parent.end(), 0);
+        for (size_t i = 0; i < leaves.size(); ++i) {
+            if (i % 1024 == 0) {
+                stage.check();
+            }
+            if (run_below(i) != EXTERIOR && leaves[i - 1].origin[2] + LEAF < leaves[i].origin[2]) {
+                join_run(i);
+            }
+            for (int axis = 0; axis < 3; ++axis) {
+                join_face(i, axis, false);
+                join_face(i, axis, true);
+            }
+        }
+    }
+
+    bool is_outside(size_t leaf, size_t part) { return root(first_part[leaf] + part) == EXTERIOR; }
+
+  private:
+    size_t root(size_t node) {
+        while (parent[node] != node) {
+            parent[node] = parent[parent[node]];
+            node = parent[node];
+        }
+        return node;
+    }
+
+    // The exterior is the least of all nodes, and stays a root.
+    void unite(size_t a, size_t b) {
+        a = root(a);
+        b = root(b);
+        parent[std::max(a, b)] = uint32_t(std::min(a, b));
+    }
+
+    // The run of empty leaves that ends below leaf i, which may not be there; one that begins at infinity is
+    // the exterior.
+    size_t run_below(size_t i) const {
+        return i > 0 && same_column(leaves[i - 1].origin, leaves[i].origin) ? 1 + i : EXTERIOR;
+    }
+
+    // The run that a place without a leaf lies in.
+    size_t run_at(const Cell &place) const {
+        const size_t above = table.lower_bound(place);
+        return above < leaves.size() && same_column(leaves[above].origin, place) ? run_below(above)
+                                                                                 : EXTERIOR;
+    }
+
+    // Joins the run below leaf i with those beside it.
+    void join_run(size_t i) {
+        const int32_t low = leaves[i - 1].origin[2] + LEAF, high = leaves[i].origin[2];
+        for (int side = 0; side < 4; ++side) {
+            Cell at{leaves[i].origin[0], leaves[i].origin[1], low};
+            at[side / 2] += side % 2 == 0 ? LEAF : -LEAF;
+            for (size_t above = table.lower_bound(at); at[2] < high; ++above) {
+                const bool is_there = above < leaves.size() && same_column(leaves[above].origin, at);
+                if (!is_there || leaves[above].origin[2] > at[2]) {
+                    unite(1 + i, is_there ? run_below(above) : EXTERIOR);
+                }
+                if (!is_there) {
+                    break;
+                }
+                at[2] = leaves[above].origin[2] + LEAF;
+            }
+        }
+    }
+
+    // Joins the parts of leaf i with what is beyond one of its faces.
+    void join_face(size_t i, int axis, bool last) {
+        Cell beyond = leaves[i].origin;
+        beyond[axis] += last ? LEAF : -LEAF;
+        constexpr int stride[3] = {9, 3, 1};
+        const uint32_t neighbour = table.around(i)[13 + (last ? stride[axis] : -stride[axis])];
+        const bool is_there = neighbour != LeafTable::NONE;
+        if (is_there && !last) {
+            return; // the neighbour joins them
+        }
+        const size_t run = is_there ? EXTERIOR : run_at(beyond);
+        for (size_t p = 0; p < leaves[i].part_count; ++p) {
+            const uint64_t own = face(leaves[i].parts[p], axis, last);
+            if (own != 0 && !is_there) {
+                unite(first_part[i] + p, run);
+            }
+            for (size_t q = 0; is_there && q < leaves[neighbour].part_count; ++q) {
+                if ((own & face(leaves[neighbour].parts[q], axis, false)) != 0) {
+                    unite(first_part[i] + p, first_part[neighbour] + q);
+                }
+            }
+        }
+    }
+
+    const LeafTable &table;
+    const std::vector<BandLeaf> &leaves;
+    std::vector<size_t> first_part; // nodes: EXTERIOR, the runs below leaves, the parts of leaves
+    std::vector<uint32_t> parent;
+};
+
+// Voxels of a leaf whose side of the surface is known, and those that are outside.
+struct KnownSides {
+    Bits known{}, outside{};
+};
+
+// The sides of all parts.
+std::vector<KnownSides> find_outside(const LeafTable &table, Stage &stage) {
+    Joining joining(table, stage);
+    std::vector<KnownSides> all(table.leaves.size());
+    for (size_t i = 0; i < all.size(); ++i) {
+        const BandLeaf &leaf = table.leaves[i];
+        for (size_t p = 0; p < leaf.part_count; ++p) {
+            const bool outside = joining.is_outside(i, p);
+            for (int x = 0; x < LEAF; ++x) {
+                all[i].known[x] |= leaf.parts[p][x];
+                all[i].outside[x] |= outside ? leaf.parts[p][x] : 0;
+            }
+        }
+    }
+    return all;
+}
 
 // Part 0, 1 or 2 of the leaves around that position 0 … 9 of the halo lies in.
 int part_of(int position) {
@@ -28,65 +267,13 @@ int in_halo(int x, int y, int z) {
     return (x * EDGE + y) * EDGE + z;
 }
 
-} // namespace
-
-struct Sides::Halo {
+struct Halo {
     float distance[EDGE * EDGE * EDGE];
     int8_t side[EDGE * EDGE * EDGE]; // 1: outside, -1: inside, 0: not known, or tried before
 };
 
-Sides::Sides(const Surface &surface_, const LeafTable &table_, Stage &stage)
-    : surface(surface_), table(table_), leaves(table_.leaves), now(find_outside(table, stage)), next(now),
-      tried(now.size()) {
-    well_off.reserve(now.size());
-    any_fresh.reserve(now.size());
-    for (const KnownSides &sides : now) {
-        well_off.push_back(sides.known);
-        any_fresh.push_back(sides.known != Bits{});
-    }
-}
-
-// Known, and not tried in the rounds before.
-uint64_t Sides::fresh(uint32_t leaf, size_t x) const {
-    return now[leaf].known[x] & ~tried[leaf][x];
-}
-
-bool Sides::has_fresh(const uint32_t around[27]) const {
-    return std::any_of(around, around + 27,
-                       [&](uint32_t leaf) { return leaf != LeafTable::NONE && any_fresh[leaf] != 0; });
-}
-
-// What is near the surface has leaves all around it; where there is none, nothing is known.
-void Sides::gather(const uint32_t around[27], Halo &halo) const {
-    const auto take_one = [&](uint32_t leaf, int x, int n, int to) {
-        const bool is_there = leaf != LeafTable::NONE;
-        halo.distance[to] = is_there ? leaves[leaf].distances[64 * x + n] : 0.0f;
-        const bool known = is_there && (fresh(leaf, size_t(x)) >> n & 1) != 0;
-        halo.side[to] = int8_t(!known ? 0 : (now[leaf].outside[x] >> n & 1) != 0 ? 1 : -1);
-    };
-    for (int x = 0; x < EDGE; ++x) {
-        for (int y = 0; y < EDGE; ++y) {
-            const uint32_t *const from = around + 9 * part_of(x) + 3 * part_of(y);
-            const int to = in_halo(x, y, 0), inner_x = (x + 7) & 7, row = 8 * ((y + 7) & 7);
-            take_one(from[0], inner_x, row + LEAF - 1, to);
-            take_one(from[2], inner_x, row, to + EDGE - 1);
-            uint64_t sides = 0;
-            if (from[1] != LeafTable::NONE) {
-                const uint64_t known = fresh(from[1], size_t(inner_x)) >> row & 0xff;
-                const uint64_t outside = known & now[from[1]].outside[inner_x] >> row;
-                sides = spread(outside) | spread(known & ~outside) * 0xff;
-                std::memcpy(halo.distance + to + 1, leaves[from[1]].distances + 64 * inner_x + row,
-                            LEAF * sizeof *halo.distance);
-            } else {
-                std::fill_n(halo.distance + to + 1, LEAF, 0.0f);
-            }
-            std::memcpy(halo.side + to + 1, &sides, sizeof sides);
-        }
-    }
-}
-
 // The leaf's voxels that are of a set or one of whose 26 neighbours is; `word_of(leaf, x)` tells the set.
-template <typename Word> static Bits touching(const uint32_t *around, const Word &word_of) {
+template <typename Word> Bits touching(const uint32_t *around, const Word &word_of) {
     const auto word = [&](int k, int x) {
         return around[k] == LeafTable::NONE ? uint64_t(0) : word_of(around[k], size_t(x));
     };
@@ -109,19 +296,16 @@ template <typename Word> static Bits touching(const uint32_t *around, const Word
     return all;
 }
 
-namespace {
-
-// A triangle near a voxel.
+// A triangle near a leaf.
 struct Near {
     Corners corner;
     Vec3d normal;
     float low[3], high[3]; // a box around it, from the leaf's origin
-    double height;         // of the voxel over its plane, times the normal's length
 };
 
-// Whether the piece from the voxel at a to b goes through the triangle; in doubt at its edges, it does.
+// Whether the segment from a to b passes through the triangle; in doubt at its edges, it does.
 bool goes_through(const Near &near, const Vec3d &a, const Vec3d &b) {
-    const double from = near.height, to = near.normal.dot(b - near.corner[0]);
+    const double from = near.normal.dot(a - near.corner[0]), to = near.normal.dot(b - near.corner[0]);
     if (!((from < 0.0 && to > 0.0) || (from > 0.0 && to < 0.0))) {
         return false;
     }
@@ -144,101 +328,55 @@ struct Known26 {
     int8_t step[3];
 };
 
-} // namespace
-
-// The triangles near a leaf as boxes, so that one look finds those near a voxel.
-class Sides::Nearby {
+// The triangles near a leaf.
+class Nearby {
   public:
     Nearby(const Surface &surface_, const BandLeaf &leaf_) : surface(surface_), leaf(leaf_) {}
 
-    // The voxel that parts() is asked of.
-    void go_to(const Cell &local_) {
-        local = local_;
-        taken = false;
-    }
-
-    // Whether a triangle is between the voxel and a neighbour.
-    bool parts(const int8_t step[3]) {
-        if (!taken) {
-            take();
+    // Whether a triangle is between a voxel and its neighbour.
+    bool parts(const Cell &local, const int8_t step[3]) {
+        if (near.empty()) {
+            fill();
         }
         float low[3], high[3];
-        Vec3d to;
+        Vec3d from, to;
         for (int axis = 0; axis < 3; ++axis) {
             const int32_t end = local[axis] + step[axis];
             low[axis] = float(std::min(local[axis], end));
             high[axis] = float(std::max(local[axis], end));
+            from[axis] = leaf.origin[axis] + local[axis];
             to[axis] = leaf.origin[axis] + end;
         }
-        for (Near &one : near) {
-            if ((one.low[0] <= high[0]) & (one.low[1] <= high[1]) & (one.low[2] <= high[2]) &
-                    (one.high[0] >= low[0]) & (one.high[1] >= low[1]) & (one.high[2] >= low[2]) &&
-                goes_through(one, place, to)) {
-                std::swap(one, near.front()); // it is likely to part the next one, too
-                return true;
-            }
-        }
-        return false;
+        return std::any_of(near.begin(), near.end(), [&](const Near &one) {
+            return one.low[0] <= high[0] && one.low[1] <= high[1] && one.low[2] <= high[2] &&
+                   one.high[0] >= low[0] && one.high[1] >= low[1] && one.high[2] >= low[2] &&
+                   goes_through(one, from, to);
+        });
     }
 
   private:
-    void take() {
-        if (boxes.empty()) {
-            fill();
-        }
-        const size_t count = leaf.triangle_count;
-        const float *const box = boxes.data();
-        const float x = float(local[0]), y = float(local[1]), z = float(local[2]);
-        for (size_t i = 0; i < count; ++i) {
-            hit[i] = (box[i] <= x + 1.0f) & (box[count + i] <= y + 1.0f) & (box[2 * count + i] <= z + 1.0f) &
-                     (box[3 * count + i] >= x - 1.0f) & (box[4 * count + i] >= y - 1.0f) &
-                     (box[5 * count + i] >= z - 1.0f);
-        }
-        place = Vec3d(leaf.origin[0] + local[0], leaf.origin[1] + local[1], leaf.origin[2] + local[2]);
-        near.clear();
-        for (size_t i = 0; i < count; ++i) {
-            if (hit[i] == 0) {
-                continue;
-            }
-            Near one{corners_of(surface, leaf.triangles[i]), {}, {}, {}, 0.0};
+    void fill() {
+        for (size_t i = 0; i < leaf.triangle_count; ++i) {
+            Near one{corners_of(surface, leaf.triangles[i]), {}, {}, {}};
             one.normal = (one.corner[1] - one.corner[0]).cross(one.corner[2] - one.corner[0]);
-            one.height = one.normal.dot(place - one.corner[0]);
-            for (size_t axis = 0; axis < 3; ++axis) {
-                one.low[axis] = box[axis * count + i];
-                one.high[axis] = box[(3 + axis) * count + i];
+            for (int axis = 0; axis < 3; ++axis) {
+                const auto ends =
+                    std::minmax({one.corner[0][axis], one.corner[1][axis], one.corner[2][axis]});
+                one.low[axis] = float(ends.first - leaf.origin[axis] - BOX_MARGIN);
+                one.high[axis] = float(ends.second - leaf.origin[axis] + BOX_MARGIN);
             }
             near.push_back(one);
-        }
-        taken = true;
-    }
-
-    void fill() {
-        const size_t count = leaf.triangle_count;
-        boxes.resize(6 * count + 1);
-        hit.resize(count);
-        for (size_t i = 0; i < count; ++i) {
-            const Corners corner = corners_of(surface, leaf.triangles[i]);
-            for (int axis = 0; axis < 3; ++axis) {
-                const auto ends = std::minmax({corner[0][axis], corner[1][axis], corner[2][axis]});
-                boxes[axis * count + i] = float(ends.first - leaf.origin[axis] - BOX_MARGIN);
-                boxes[(3 + axis) * count + i] = float(ends.second - leaf.origin[axis] + BOX_MARGIN);
-            }
         }
     }
 
     const Surface &surface;
     const BandLeaf &leaf;
-    std::vector<float> boxes; // lows along x, y and z, then highs
-    std::vector<uint8_t> hit;
-    Cell local{};
-    Vec3d place;
-    bool taken = false;
-    std::vector<Near> near; // what may be between the voxel and its neighbours
+    std::vector<Near> near;
 };
 
 // The side of a voxel that is not known: that of a neighbour that it shares a free ball with, or of one that
 // no triangle parts it from. 0: none.
-int Sides::side_of(const Halo &halo, const Cell &local, Nearby &nearby) {
+int side_of(const Halo &halo, const Cell &local, Nearby &nearby) {
     const int at = in_halo(local[0] + 1, local[1] + 1, local[2] + 1);
     const float own = halo.distance[at];
     // First the neighbour that lies away from the surface.
@@ -274,11 +412,10 @@ int Sides::side_of(const Halo &halo, const Cell &local, Nearby &nearby) {
             }
         }
     }
-    nearby.go_to(local);
     for (int tried = 0; tried < count; ++tried) { // the farthest from the surface first
         Known26 *const farthest = std::max_element(
             known, known + count, [](const Known26 &a, const Known26 &b) { return a.distance < b.distance; });
-        if (!nearby.parts(farthest->step)) {
+        if (!nearby.parts(local, farthest->step)) {
             return farthest->side;
         }
         farthest->distance = -1.0f;
@@ -286,33 +423,84 @@ int Sides::side_of(const Halo &halo, const Cell &local, Nearby &nearby) {
     return 0;
 }
 
-void Sides::settle(size_t i) {
+class Settling {
+  public:
+    Settling(const Surface &surface_, const LeafTable &table_, Stage &stage)
+        : surface(surface_), table(table_), leaves(table_.leaves), now(find_outside(table, stage)), next(now),
+          tried(now.size()) {
+        for (const KnownSides &sides : now) {
+            well_off.push_back(sides.known);
+        }
+    }
+
+    // Finds the sides of voxels near the surface from those of their neighbours: settle() of every leaf, at
+    // the same time if wanted, then end_round().
+    void settle(size_t leaf);
+    void end_round();
+    Sides tell(size_t leaf) const; // after the rounds
+
+  private:
+    // Known, and not tried in the rounds before.
+    uint64_t fresh(uint32_t leaf, size_t x) const { return now[leaf].known[x] & ~tried[leaf][x]; }
+    void gather(const uint32_t around[27], Halo &halo) const;
+
+    const Surface &surface;
+    const LeafTable &table;
+    const std::vector<BandLeaf> &leaves;
+    std::vector<KnownSides> now, next;
+    std::vector<Bits> tried;    // voxels that were known a round before: trying them again is of no use
+    std::vector<Bits> well_off; // voxels whose sides are known from the start
+};
+
+// Voxels near the surface have leaves all around them. Without a leaf nothing is known.
+void Settling::gather(const uint32_t around[27], Halo &halo) const {
+    const auto take_one = [&](uint32_t leaf, int x, int n, int to) {
+        const bool is_there = leaf != LeafTable::NONE;
+        halo.distance[to] = is_there ? leaves[leaf].distances[64 * x + n] : 0.0f;
+        const bool known = is_there && (fresh(leaf, size_t(x)) >> n & 1) != 0;
+        halo.side[to] = int8_t(!known ? 0 : (now[leaf].outside[x] >> n & 1) != 0 ? 1 : -1);
+    };
+    for (int x = 0; x < EDGE; ++x) {
+        for (int y = 0; y < EDGE; ++y) {
+            const uint32_t *const from = around + 9 * part_of(x) + 3 * part_of(y);
+            const int to = in_halo(x, y, 0), inner_x = (x + 7) & 7, row = 8 * ((y + 7) & 7);
+            take_one(from[0], inner_x, row + LEAF - 1, to);
+            take_one(from[2], inner_x, row, to + EDGE - 1);
+            uint64_t sides = 0;
+            if (from[1] != LeafTable::NONE) {
+                const uint64_t known = fresh(from[1], size_t(inner_x)) >> row & 0xff;
+                const uint64_t outside = known & now[from[1]].outside[inner_x] >> row;
+                sides = spread(outside) | spread(known & ~outside) * 0xff;
+                std::memcpy(halo.distance + to + 1, leaves[from[1]].distances + 64 * inner_x + row,
+                            LEAF * sizeof *halo.distance);
+            } else {
+                std::fill_n(halo.distance + to + 1, LEAF, 0.0f);
+            }
+            std::memcpy(halo.side + to + 1, &sides, sizeof sides);
+        }
+    }
+}
+
+void Settling::settle(size_t i) {
     next[i] = now[i];
-    Bits left; // those on the surface stay unknown
-    bool any = false;
+    Bits left;
     for (size_t x = 0; x < LEAF; ++x) {
         left[x] = ~now[i].known[x];
+    }
+    if (!any(left)) {
+        return;
+    }
+    const uint32_t *const around = table.around(i);
+    // voxels without a neighbour of known side learn nothing now, and voxels on the surface never do
+    const Bits near_fresh = touching(around, [&](uint32_t leaf, size_t x) { return fresh(leaf, x); });
+    for (size_t x = 0; x < LEAF; ++x) {
+        left[x] &= near_fresh[x];
         for (uint64_t unknown = left[x]; unknown != 0; unknown &= unknown - 1) {
             const int n = __builtin_ctzll(unknown);
             left[x] ^= uint64_t(leaves[i].distances[64 * x + size_t(n)] < ON) << n;
         }
-        any |= left[x] != 0;
     }
-    if (!any) {
-        return;
-    }
-    const uint32_t *const around = table.around(i);
-    if (!has_fresh(around)) {
-        return;
-    }
-    // those without a neighbour whose side is known learn nothing now
-    const Bits near_fresh = touching(around, [&](uint32_t leaf, size_t x) { return fresh(leaf, x); });
-    uint64_t all = 0;
-    for (size_t x = 0; x < LEAF; ++x) {
-        left[x] &= near_fresh[x];
-        all |= left[x];
-    }
-    if (all == 0) {
+    if (!any(left)) {
         return;
     }
     Halo halo;
@@ -330,34 +518,48 @@ void Sides::settle(size_t i) {
     }
 }
 
-void Sides::end_round() {
+void Settling::end_round() {
     for (size_t i = 0; i < now.size(); ++i) {
         tried[i] = now[i].known;
-        any_fresh[i] = next[i].known != tried[i];
     }
     now.swap(next);
 }
 
-Sides::Told Sides::tell(size_t i) const {
-    Told told{now[i].outside, {}};
-    bool any = false;
+Sides Settling::tell(size_t i) const {
+    Sides sides{now[i].outside, {}};
+    Bits near;
     for (size_t x = 0; x < LEAF; ++x) {
-        any |= (~told.outside[x] & ~well_off[i][x]) != 0;
+        near[x] = ~sides.outside[x] & ~well_off[i][x];
     }
-    if (!any) {
-        return told;
+    if (!any(near)) {
+        return sides;
     }
     const Bits near_outside =
         touching(table.around(i), [&](uint32_t leaf, size_t x) { return now[leaf].outside[x]; });
     for (size_t x = 0; x < LEAF; ++x) {
-        const uint64_t near = ~told.outside[x] & ~well_off[i][x];
-        told.buried[x] = near & ~near_outside[x];
-        for (uint64_t left = near & near_outside[x]; left != 0; left &= left - 1) {
+        sides.buried[x] = near[x] & ~near_outside[x];
+        for (uint64_t left = near[x] & near_outside[x]; left != 0; left &= left - 1) {
             const int n = __builtin_ctzll(left);
-            told.outside[x] |= uint64_t(leaves[i].distances[64 * x + size_t(n)] < ON) << n;
+            sides.outside[x] |= uint64_t(leaves[i].distances[64 * x + size_t(n)] < ON) << n;
         }
     }
-    return told;
+    return sides;
+}
+
+} // namespace
+
+std::vector<Sides> find_sides(const Surface &surface, const LeafTable &table, double begin, double end,
+                              Stage &stage) {
+    Settling settling(surface, table, stage);
+    const size_t count = table.leaves.size();
+    const double last = begin + 2.0 / 3.0 * (end - begin);
+    for (int round = 0; round < ROUNDS; ++round) {
+        stage.loop(count, 16, begin, last, [&](size_t i) { settling.settle(i); });
+        settling.end_round();
+    }
+    std::vector<Sides> sides(count);
+    stage.loop(count, 16, last, end, [&](size_t i) { sides[i] = settling.tell(i); });
+    return sides;
 }
 
 } // namespace vshi

@@ -1,11 +1,9 @@
 // Grids of the distances to surfaces of triangles and quads.
-#include "levelset/surface.h"
-
-#include "levelset/sides.h"
+#include "base/isa.h"
+#include "levelset/band.h"
 
 #include <memory>
 #include <openvdb/tools/SignedFloodFill.h>
-#include <set>
 
 namespace vshi {
 
@@ -17,7 +15,7 @@ class Conversion {
     Conversion(const Surface &surface_, const Lattice &lattice_, double half_width, double begin_,
                double end_, Stage &stage_)
         : surface(surface_), lattice(lattice_), begin(begin_), end(end_), stage(stage_),
-          kernel(*vshi_leaf_kernel_of(stage.options.isa)), band(surface, half_width, stage) {}
+          kernel(*VSHI_KERNEL_OF(vshi_leaf, stage.options.isa)), band(surface, half_width, stage) {}
 
     FloatGrid::Ptr without_sides() {
         measure(false, 0.8);
@@ -28,7 +26,7 @@ class Conversion {
         measure(true, 0.5);
         LeafTable table(leaves);
         table.find_neighbours();
-        tell_sides(table);
+        sides = find_sides(surface, table, at(0.5), at(0.8), stage);
         measure_boundary(table);
         const FloatGrid::Ptr grid = make_grid();
         constexpr openvdb::Index above_leaves = 1;
@@ -39,61 +37,32 @@ class Conversion {
   private:
     double at(double share) const { return begin + share * (end - begin); }
 
-    void measure(bool sides, double until) {
+    void measure(bool with_parts, double until) {
         stage.loop(band.region_count(), 1, begin, at(until),
-                   [&](size_t i) { band.measure(i, sides, kernel); });
+                   [&](size_t i) { band.measure(i, with_parts, kernel); });
         leaves = band.leaves();
     }
 
-    void tell_sides(const LeafTable &table) {
-        Sides sides(surface, table, stage);
-        for (int round = 0; round < Sides::ROUNDS; ++round) {
-            stage.loop(leaves.size(), 16, at(0.5), at(0.7), [&](size_t i) { sides.settle(i); });
-            sides.end_round();
-        }
-        told.resize(leaves.size());
-        stage.loop(leaves.size(), 16, at(0.7), at(0.8), [&](size_t i) { told[i] = sides.tell(i); });
-    }
-
     bool has_inside(size_t leaf) const {
-        uint64_t inside = 0;
-        for (const uint64_t outside : told[leaf].outside) {
-            inside |= ~outside;
-        }
-        return inside != 0;
-    }
-
-    // Those of a region's leaves that hold some of the inside.
-    uint64_t leaves_inside(const LeafTable &table, const Cell &origin) const {
-        constexpr int edge = int(Leaf::DIM), count = Band::REGION / edge;
-        uint64_t all = 0;
-        for (int n = 0; n < VSHI_REGION_LEAVES; ++n) {
-            const uint32_t leaf =
-                table.find({origin[0] + edge * (n / (count * count)), origin[1] + edge * (n / count % count),
-                            origin[2] + edge * (n % count)});
-            all |= uint64_t(leaf != LeafTable::NONE && has_inside(leaf)) << n;
-        }
-        return all;
+        const Bits &outside = sides[leaf].outside;
+        return std::any_of(outside.begin(), outside.end(), [](uint64_t word) { return ~word != 0; });
     }
 
     // Takes the distances of the inside to what bounds it, where something else is within it.
     void measure_boundary(const LeafTable &table) {
-        const std::vector<size_t> regions = regions_near_buried(band, leaves, told);
-        if (regions.empty()) {
+        const std::set<Cell> near = regions_near_buried(table, sides, band.half_width);
+        if (near.empty()) {
             return;
         }
-        const Surface boundary = boundary_of(surface, table, told, at(0.8), at(0.85), stage);
+        const Surface boundary = boundary_of(surface, table, sides, at(0.8), at(0.85), stage);
         Band bounded(boundary, band.half_width, stage);
-        const std::vector<size_t> again = regions_near_buried(bounded, leaves, told);
-        stage.loop(again.size(), 1, at(0.85), at(0.9), [&](size_t i) {
-            bounded.measure(again[i], false, kernel, leaves_inside(table, bounded.region_origin(again[i])));
+        stage.loop(bounded.region_count(), 1, at(0.85), at(0.9), [&](size_t i) {
+            if (near.count(bounded.region_origin(i)) != 0) {
+                bounded.measure(i, false, kernel);
+            }
         });
         const std::vector<BandLeaf> others = bounded.leaves();
         const LeafTable other_table(others);
-        std::set<Cell> near;
-        for (const size_t region : regions) {
-            near.insert(band.region_origin(region));
-        }
         stage.loop(leaves.size(), 64, at(0.9), at(0.9), [&](size_t i) {
             const Cell &origin = leaves[i].origin;
             constexpr int32_t mask = ~(Band::REGION - 1);
@@ -101,18 +70,17 @@ class Conversion {
                 return;
             }
             const uint32_t other = other_table.find(origin);
-            for (size_t x = 0; x < told[i].outside.size(); ++x) {
-                uint8_t inside[64];
-                spread_plane(~told[i].outside[x], inside);
-                float *const to = leaves[i].distances + 64 * x;
-                const float *const from =
-                    other == LeafTable::NONE ? nullptr : others[other].distances + 64 * x;
-                for (int n = 0; n < 64; ++n) {
-                    const float measured = from == nullptr ? float(band.half_width) : from[n];
-                    to[n] = inside[n] != 0 ? measured : to[n];
+            for (int n = 0; n < VSHI_LEAF_VOXELS; ++n) {
+                if (!is_outside(i, n)) {
+                    leaves[i].distances[n] =
+                        other == LeafTable::NONE ? float(band.half_width) : others[other].distances[n];
                 }
             }
         });
+    }
+
+    bool is_outside(size_t leaf, int voxel) const {
+        return (sides[leaf].outside[size_t(voxel >> 6)] >> (voxel & 63) & 1) != 0;
     }
 
     // In world units; without sides all is outside.
@@ -123,18 +91,10 @@ class Conversion {
         made->allocate();
         float *const values = made->buffer().data();
         Leaf::NodeMaskType active;
-        const double voxel = lattice.voxel;
-        for (openvdb::Index x = 0; x < Leaf::DIM; ++x) {
-            uint8_t inside[64], within[64];
-            spread_plane(told.empty() ? 0 : ~told[i].outside[x], inside);
-            const float *const from = leaf.distances + 64 * x;
-            float *const to = values + 64 * x;
-            for (int n = 0; n < 64; ++n) {
-                const auto value = float(double(from[n]) * voxel);
-                within[n] = value < background;
-                to[n] = inside[n] != 0 ? -value : value;
-            }
-            active.getWord<uint64_t>(x) = pack_plane(within);
+        for (int n = 0; n < VSHI_LEAF_VOXELS; ++n) {
+            const auto value = float(double(leaf.distances[n]) * lattice.voxel);
+            active.set(openvdb::Index32(n), value < background);
+            values[n] = sides.empty() || is_outside(i, n) ? value : -value;
         }
         made->setValueMask(active);
         return made;
@@ -159,7 +119,7 @@ class Conversion {
     const vshi_leaf_kernel &kernel;
     Band band;
     std::vector<BandLeaf> leaves;
-    std::vector<Sides::Told> told;
+    std::vector<Sides> sides;
 };
 
 } // namespace

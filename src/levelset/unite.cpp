@@ -1,8 +1,7 @@
 // The union of grids: those on the new lattice are shifted by whole voxels, others are meshed, moved and
 // measured again; then each voxel takes the least value of all.
 #include "base/try.h"
-#include "levelset/redistance.h"
-#include "levelset/tiles.h"
+#include "levelset/surface.h"
 
 #include <cmath>
 #include <limits>
@@ -13,7 +12,6 @@ namespace vshi {
 
 namespace {
 
-constexpr double LARGEST_INDEX = 268435456.0;
 constexpr double SAME_SIZE =
     1e-9; // relative difference of voxel sizes that stays below the next, at any index
 constexpr double SAME_PLACE = 1e-3; // voxels by which a lattice may be off
@@ -54,7 +52,7 @@ Placed place(const vsh_grid_instance &instance, size_t number, vsh_error *error)
                       number, axis[0].length(), axis[1].length(), axis[2].length())};
     }
     Placed placed{instance.grid, {}, scale, scale * instance.grid->info.voxel_size};
-    const double *g = instance.grid->transform;
+    const double *g = instance.grid->info.transform;
     for (int row = 0; row < 3; ++row) {
         for (int column = 0; column < 4; ++column) {
             placed.transform[4 * row + column] = m[4 * row] * g[column] + m[4 * row + 1] * g[4 + column] +
@@ -102,7 +100,7 @@ bool lies_on(const Placed &placed, const Lattice &lattice, Coord &shift) {
         lattice.voxel;
     for (int i = 0; i < 3; ++i) {
         if (std::fabs(offset[i] - std::round(offset[i])) > SAME_PLACE ||
-            std::fabs(offset[i]) > LARGEST_INDEX) {
+            std::fabs(offset[i]) > double(LARGEST_INDEX)) {
             return false;
         }
         shift[i] = int32_t(std::round(offset[i]));
@@ -145,7 +143,7 @@ Lattice choose_lattice(const std::vector<Placed> &placed, const vsh_grid_options
             farthest = std::max({farthest, std::fabs(low[i] - origin[i]), std::fabs(high[i] - origin[i])});
         }
         if (is_upright(instance, lattice.voxel) &&
-            farthest / lattice.voxel + lattice.half_width < LARGEST_INDEX) {
+            farthest / lattice.voxel + lattice.half_width < double(LARGEST_INDEX)) {
             lattice.voxel = instance.voxel;
             lattice.translation = origin;
             break;
@@ -208,28 +206,14 @@ FloatGrid::Ptr resample(const Placed &placed, size_t number, const Lattice &latt
     return measured;
 }
 
-// Origins of the union's leaves: all that a part's leaf passes after its shift.
-std::vector<Coord> leaf_origins(const std::vector<Part> &parts) {
+// Origins of the union's nodes that are `size` voxels wide: all that one of a part's nodes, whose origins
+// `list` tells, touches after its shift.
+template <typename List>
+std::vector<Coord> shifted_origins(const std::vector<Part> &parts, int32_t size, const List &list) {
+    const int32_t last = size - 1;
     std::set<Coord> origins;
     for (const Part &part : parts) {
-        for (auto leaf = part.grid->constTree().cbeginLeaf(); leaf; ++leaf) {
-            const Coord low = leaf->origin() + part.shift;
-            for (int corner = 0; corner < 8; ++corner) {
-                const Coord at =
-                    low.offsetBy((corner & 1) ? 7 : 0, (corner & 2) ? 7 : 0, (corner & 4) ? 7 : 0);
-                origins.insert(at & ~7);
-            }
-        }
-    }
-    return std::vector<Coord>(origins.begin(), origins.end());
-}
-
-// The same for upper nodes.
-std::vector<Coord> upper_origins(const std::vector<Part> &parts) {
-    std::set<Coord> origins;
-    for (const Part &part : parts) {
-        for (const Coord &origin : root_origins(part.grid->constTree())) {
-            const int32_t last = UPPER_SIZE - 1;
+        for (const Coord &origin : list(part.grid->constTree())) {
             for (int corner = 0; corner < 8; ++corner) {
                 const Coord at =
                     origin + part.shift +
@@ -241,12 +225,20 @@ std::vector<Coord> upper_origins(const std::vector<Part> &parts) {
     return std::vector<Coord>(origins.begin(), origins.end());
 }
 
+std::vector<Coord> leaf_origins(const FloatTree &tree) {
+    std::vector<Coord> origins;
+    for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+        origins.push_back(leaf->origin());
+    }
+    return origins;
+}
+
 FloatGrid::Ptr unite_parts(const std::vector<Part> &parts, const Lattice &lattice, double begin,
                            Stage &stage) {
     const float background = lattice.background();
     FloatGrid::Ptr united = FloatGrid::create(background);
     united->setTransform(lattice.transform());
-    const std::vector<Coord> origins = leaf_origins(parts);
+    const std::vector<Coord> origins = shifted_origins(parts, int32_t(Leaf::DIM), leaf_origins);
     std::vector<Leaf *> leaves;
     leaves.reserve(origins.size());
     for (const Coord &origin : origins) {
@@ -262,7 +254,7 @@ FloatGrid::Ptr unite_parts(const std::vector<Part> &parts, const Lattice &lattic
             }
         }
     });
-    fill_tiles(united->tree(), upper_origins(parts), background, stage, [&] {
+    fill_tiles(united->tree(), shifted_origins(parts, UPPER_SIZE, root_origins), background, stage, [&] {
         std::vector<FloatGrid::ConstUnsafeAccessor> trees;
         trees.reserve(parts.size());
         for (const Part &part : parts) {

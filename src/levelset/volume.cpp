@@ -1,11 +1,12 @@
-// The grids of a volume: leaves that are filled block by block, and the trees made of them.
-#include "base/attributes.h"
+// Volumes: which voxels of which lattice are shaded (a level set's band, a box, another grid's active
+// voxels), the leaves that their values are put into block by block, and the trees made of them.
 #include "base/try.h"
 #include "levelset/file.h"
-#include "levelset/voxels.h"
 
 #include <cmath>
+#include <cstdio>
 #include <limits>
+#include <memory>
 #include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/Prune.h>
 
@@ -24,15 +25,26 @@ struct Slot {
 
 struct Channel {
     vshi_channel what;
-    std::string method;
     std::vector<Slot> slots; // [blocks], while it is made
     FloatTree::Ptr tree;     // afterwards
     vsh_volume_grid info{};
 };
 
+// Shared by the voxels and by the volumes made on them.
+struct VoxelSet {
+    std::vector<vshi_block> blocks; // sorted by origin
+    openvdb::math::Transform::Ptr transform;
+    double least_axis = 0.0; // shortest axis of a voxel, world units
+};
+
 } // namespace
 
 } // namespace vshi
+
+struct vsh_voxels {
+    std::shared_ptr<const vshi::VoxelSet> set;
+    vsh_voxels_info info;
+};
 
 struct vsh_volume {
     std::shared_ptr<const vshi::VoxelSet> set;
@@ -43,6 +55,290 @@ struct vsh_volume {
 namespace vshi {
 
 namespace {
+
+// --- voxels
+
+bool comes_before(const vshi_block &a, const vshi_block &b) {
+    return std::lexicographical_compare(a.origin, a.origin + 3, b.origin, b.origin + 3);
+}
+
+constexpr double FARTHEST = 1e12;      // voxels from the origin: doubles must tell voxels apart there
+constexpr double ROUNDING = 1e-6;      // voxels: a side so much longer takes no voxel more
+constexpr double BAND_ROUNDING = 1e-6; // of a band's width: the background is a float
+
+Vec3d centre_of(const VoxelSet &set, const int32_t index[3]) {
+    return set.transform->indexToWorld(Vec3d(index[0], index[1], index[2]));
+}
+
+// Lengths of the axes of a voxel at `index`.
+Vec3d axes_at(const VoxelSet &set, const Vec3d &index) {
+    Vec3d lengths;
+    for (int axis = 0; axis < 3; ++axis) {
+        Vec3d half(0.0);
+        half[axis] = 0.5;
+        lengths[axis] =
+            (set.transform->indexToWorld(index + half) - set.transform->indexToWorld(index - half)).length();
+    }
+    return lengths;
+}
+
+void grow_index_box(vsh_voxels_info &info, const vshi_block &block) {
+    for (int v = 0; v < VSHI_BLOCK_VOXELS; ++v) {
+        const int offset[3] = {v >> 6, v >> 3 & 7, v & 7};
+        for (int axis = 0; axis < 3 && (block.mask[v >> 6] >> (v & 63) & 1) != 0; ++axis) {
+            info.index_min[axis] = std::min(info.index_min[axis], block.origin[axis] + offset[axis]);
+            info.index_max[axis] = std::max(info.index_max[axis], block.origin[axis] + offset[axis]);
+        }
+    }
+}
+
+// The box of the centres: a frustum's map takes planes to planes, so that its corners are the box's too.
+bool set_bounds(const VoxelSet &set, vsh_voxels_info &info) {
+    Vec3d low(std::numeric_limits<double>::infinity()), high = -low, middle;
+    for (int corner = 0; corner < 8; ++corner) {
+        int32_t index[3];
+        for (int axis = 0; axis < 3; ++axis) {
+            index[axis] = (corner >> axis & 1) != 0 ? info.index_max[axis] : info.index_min[axis];
+            middle[axis] = 0.5 * (double(info.index_min[axis]) + double(info.index_max[axis]));
+        }
+        const Vec3d at = centre_of(set, index);
+        low = openvdb::math::minComponent(low, at);
+        high = openvdb::math::maxComponent(high, at);
+    }
+    const Vec3d axes = axes_at(set, middle);
+    bool finite = true;
+    for (int axis = 0; axis < 3; ++axis) {
+        info.bounds_min[axis] = low[axis];
+        info.bounds_max[axis] = high[axis];
+        info.voxel_size[axis] = axes[axis];
+        finite = finite && std::isfinite(low[axis]) && std::isfinite(high[axis]) && axes[axis] > 0.0;
+    }
+    return finite;
+}
+
+// Whether memory allows for so many blocks.
+void check_blocks(const vsh_run &run, double count, const char *what, vsh_error *error) {
+    require(check_bytes(&run, count * double(sizeof(vshi_block)), what, error));
+}
+
+// Takes the set; `what` names it in messages.
+vsh_voxels *close_voxels(VoxelSet &&set, bool normals, const char *what, vsh_error *error) {
+    vsh_voxels_info info{};
+    for (int axis = 0; axis < 3; ++axis) {
+        info.index_min[axis] = std::numeric_limits<int32_t>::max();
+        info.index_max[axis] = std::numeric_limits<int32_t>::min();
+    }
+    for (const vshi_block &block : set.blocks) {
+        for (const uint64_t word : block.mask) {
+            info.count += uint64_t(__builtin_popcountll(word));
+        }
+        grow_index_box(info, block);
+    }
+    if (info.count == 0) {
+        throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "%s: no active voxels", what)};
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+        if (info.index_min[axis] < -LARGEST_INDEX || info.index_max[axis] > LARGEST_INDEX) {
+            throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "%s: voxels %d to %d: indices may go to %d", what,
+                                    info.index_min[axis], info.index_max[axis], LARGEST_INDEX)};
+        }
+    }
+    if (!set_bounds(set, info)) {
+        throw Failure{
+            vshi_fail(error, VSH_ERROR_INPUT, "%s: its transform holds values that are not finite", what)};
+    }
+    set.blocks.shrink_to_fit();
+    info.blocks = set.blocks.size();
+    info.bytes = sizeof(vsh_voxels) + sizeof set + set.blocks.size() * sizeof(vshi_block);
+    info.has_normals = normals;
+    set.least_axis = std::min({info.voxel_size[0], info.voxel_size[1], info.voxel_size[2]});
+    return new vsh_voxels{std::make_shared<const VoxelSet>(std::move(set)), info};
+}
+
+// --- the band of a level set
+
+vsh_voxels *from_grid(const vsh_grid &grid, double band, const vsh_run &run, vsh_error *error) {
+    const double widest = grid.info.half_width;
+    if (!(band >= 0.0 && band <= widest * (1.0 + BAND_ROUNDING))) {
+        throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT,
+                                "band of %g voxels: expected 0 … %g, the half width of the level set", band,
+                                widest)};
+    }
+    const FloatTree &tree = grid.level_set->constTree();
+    check_blocks(run, double(tree.leafCount()), "voxels of a band", error);
+    const float most = float((band > 0.0 ? band : widest) * grid.info.voxel_size);
+    VoxelSet set;
+    set.transform = grid.level_set->transform().copy();
+    for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+        vshi_block block{{leaf->origin()[0], leaf->origin()[1], leaf->origin()[2]}, {}};
+        uint64_t any = 0;
+        for (auto value = leaf->cbeginValueOn(); value; ++value) {
+            if (std::fabs(*value) <= most) {
+                block.mask[value.pos() >> 6] |= uint64_t(1) << (value.pos() & 63);
+                any = 1;
+            }
+        }
+        if (any != 0) {
+            set.blocks.push_back(block);
+        }
+    }
+    std::sort(set.blocks.begin(), set.blocks.end(), comes_before);
+    return close_voxels(std::move(set), true, "band", error);
+}
+
+// --- a box
+
+vshi_block box_block(const int32_t origin[3], const int32_t size[3]) {
+    vshi_block block{{origin[0], origin[1], origin[2]}, {}};
+    for (int v = 0; v < VSHI_BLOCK_VOXELS; ++v) {
+        const bool within = origin[0] + (v >> 6) < size[0] && origin[1] + (v >> 3 & 7) < size[1] &&
+                            origin[2] + (v & 7) < size[2];
+        block.mask[v >> 6] |= uint64_t(within) << (v & 63);
+    }
+    return block;
+}
+
+vsh_voxels *from_box(const double low[3], const double high[3], double voxel, const vsh_run &run,
+                     vsh_error *error) {
+    if (!(voxel > 0.0 && std::isfinite(voxel))) {
+        throw Failure{
+            vshi_fail(error, VSH_ERROR_ARGUMENT, "box: voxel size %g: expected more than 0", voxel)};
+    }
+    if (voxel < SMALLEST_WRITTEN || voxel > LARGEST_VOXEL) {
+        throw Failure{vshi_fail(error, VSH_ERROR_LIMIT, "box: voxel size %g: expected %g … %g", voxel,
+                                SMALLEST_WRITTEN, LARGEST_VOXEL)};
+    }
+    int32_t size[3];
+    double blocks = 1.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        if (!(std::isfinite(low[axis]) && std::isfinite(high[axis]) && low[axis] < high[axis])) {
+            throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT,
+                                    "box: %g … %g along %c: expected finite bounds, the second above the "
+                                    "first",
+                                    low[axis], high[axis], "xyz"[axis])};
+        }
+        const double voxels = std::max(1.0, std::ceil((high[axis] - low[axis]) / voxel - ROUNDING));
+        const double far = std::max(std::fabs(low[axis]), std::fabs(high[axis])) / voxel;
+        if (!(voxels <= LARGEST_INDEX && far <= FARTHEST)) {
+            throw Failure{vshi_fail(error, VSH_ERROR_LIMIT,
+                                    "box: voxel size %g: %g voxels along %c, %g from the origin; at most %d "
+                                    "and %g",
+                                    voxel, voxels, "xyz"[axis], far, LARGEST_INDEX, FARTHEST)};
+        }
+        size[axis] = int32_t(voxels);
+        blocks *= std::ceil(voxels / 8.0);
+    }
+    char what[96];
+    std::snprintf(what, sizeof what, "box of %d x %d x %d voxels", size[0], size[1], size[2]);
+    // with the values of one grid at least: what follows would be refused for it
+    require(check_bytes(&run, blocks * (double(sizeof(vshi_block)) + BYTES_PER_LEAF), what, error));
+    VoxelSet set;
+    set.transform = openvdb::math::Transform::createLinearTransform(voxel);
+    set.transform->postTranslate(Vec3d(low[0], low[1], low[2]) + Vec3d(0.5 * voxel));
+    set.blocks.reserve(size_t(blocks));
+    int32_t at[3];
+    for (at[0] = 0; at[0] < size[0]; at[0] += 8) {
+        for (at[1] = 0; at[1] < size[1]; at[1] += 8) {
+            for (at[2] = 0; at[2] < size[2]; at[2] += 8) {
+                set.blocks.push_back(box_block(at, size));
+            }
+        }
+    }
+    return close_voxels(std::move(set), false, what, error);
+}
+
+// --- another grid's active voxels
+
+// Blocks of a tree's leaves, and of its active tiles.
+struct Topology {
+    std::vector<vshi_block> &blocks;
+    const vsh_run &run;
+    const char *what;
+    vsh_error *error;
+
+    template <typename GridType> void operator()(const GridType &grid) const {
+        using Tree = typename GridType::TreeType;
+        const Tree &tree = grid.constTree();
+        double count = double(tree.leafCount());
+        const auto begin_tiles = [&] {
+            auto tile = tree.cbeginValueOn();
+            tile.setMaxDepth(Tree::ValueOnCIter::LEAF_DEPTH - 1);
+            return tile;
+        };
+        for (auto tile = begin_tiles(); tile; ++tile) {
+            count += double(tile.getVoxelCount()) / VSHI_BLOCK_VOXELS;
+        }
+        check_blocks(run, count, what, error);
+        blocks.reserve(size_t(count));
+        for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+            vshi_block block{{leaf->origin()[0], leaf->origin()[1], leaf->origin()[2]}, {}};
+            for (openvdb::Index i = 0; i < VSHI_MASK_WORDS; ++i) {
+                block.mask[i] = leaf->getValueMask().template getWord<uint64_t>(i);
+            }
+            if (!leaf->getValueMask().isOff()) {
+                blocks.push_back(block);
+            }
+        }
+        for (auto tile = begin_tiles(); tile; ++tile) {
+            const openvdb::CoordBBox box = tile.getBoundingBox();
+            for (int32_t x = box.min()[0]; x <= box.max()[0]; x += 8) {
+                for (int32_t y = box.min()[1]; y <= box.max()[1]; y += 8) {
+                    for (int32_t z = box.min()[2]; z <= box.max()[2]; z += 8) {
+                        vshi_block block{{x, y, z}, {}};
+                        std::fill(block.mask, block.mask + VSHI_MASK_WORDS, ~uint64_t(0));
+                        blocks.push_back(block);
+                    }
+                }
+            }
+        }
+    }
+};
+
+// The blocks of a grid's active voxels, sorted.
+std::vector<vshi_block> blocks_of(const openvdb::GridBase &grid, const char *what, const vsh_run &run,
+                                  vsh_error *error) {
+    std::vector<vshi_block> blocks;
+    grid.apply<NumberGrids>(Topology{blocks, run, what, error});
+    std::sort(blocks.begin(), blocks.end(), comes_before);
+    return blocks;
+}
+
+vsh_voxels *from_vdb(const char *path, const char *name, const vsh_run &run, vsh_error *error) {
+    Stage stage(run, "load", error);
+    stage.check();
+    VoxelSet set;
+    Named named{path, ""};
+    if (run.reader != nullptr) {
+        Answer answer(stage);
+        const auto encode = [&](vshi_encoder *to) { vshi_encode_text(to, name); };
+        set.blocks = take_blocks(answer.ask(VSHI_READ_VOXELS, path, encode, error), path, named.grid,
+                                 set.transform, error);
+        check_blocks(run, double(set.blocks.size()), named.text().c_str(), error);
+    } else {
+        const openvdb::GridBase::Ptr grid = read_numbers(path, name, run, error);
+        named.grid = grid->getName();
+        set.transform = grid->transform().copy();
+        set.blocks = blocks_of(*grid, named.text().c_str(), run, error);
+        stage.check();
+    }
+    return close_voxels(std::move(set), false, named.text().c_str(), error);
+}
+
+// The public calls: `make` gives the handle.
+template <typename Make>
+vsh_result make_voxels(const vsh_run *run, vsh_result code, const char *what, vsh_voxels **voxels,
+                       vsh_error *error, const Make &make) {
+    *voxels = nullptr;
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    return guard(error, code, what, [&]() -> vsh_result {
+        initialize();
+        *voxels = make(full);
+        return VSH_OK;
+    });
+}
+
+// --- values
 
 bool every(const uint64_t *mask, uint64_t word) {
     return std::all_of(mask, mask + VSHI_MASK_WORDS, [&](uint64_t w) { return w == word; });
@@ -88,32 +384,12 @@ void grow_tree(Channel &channel, const VoxelSet &set) {
     std::copy(std::begin(channel.what.name), std::end(channel.what.name), channel.info.name);
 }
 
-vsh_result begin(const vsh_voxels &voxels, const vshi_channel *channels, size_t count, const vsh_run &run,
-                 double held, vsh_volume **volume, vsh_error *error) {
-    const double blocks = double(voxels.info.blocks);
-    const double bytes =
-        held + double(voxels.info.bytes) + blocks * double(count) * (BYTES_PER_LEAF + double(sizeof(Slot)));
-    const std::string what = std::to_string(count) + (count > 1 ? " grids" : " grid") + " of " +
-                             std::to_string(voxels.info.count) + " voxels";
-    VSHI_TRY(check_bytes(&run, bytes, what.c_str(), error));
-    auto made = std::make_unique<vsh_volume>();
-    made->set = voxels.set;
-    made->channels = std::vector<Channel>(count);
-    for (size_t c = 0; c < count; ++c) {
-        made->channels[c].what = channels[c];
-        made->channels[c].method = channels[c].method;
-        made->channels[c].slots.resize(voxels.set->blocks.size());
-    }
-    *volume = made.release();
-    return VSH_OK;
-}
-
 FloatGrid::Ptr to_grid(const Channel &channel, const VoxelSet &set, bool as_half) {
     const FloatGrid::Ptr grid =
         named_grid(channel.tree, *set.transform, channel.what.name, openvdb::GRID_UNKNOWN);
     grid->setSaveFloatAsHalf(as_half);
     grid->insertMeta("description", openvdb::StringMetadata(channel.what.description));
-    grid->insertMeta("vdbshade_method", openvdb::StringMetadata(channel.method));
+    grid->insertMeta("vdbshade_method", openvdb::StringMetadata(channel.what.method));
     if (channel.what.light[0] != '\0') {
         grid->insertMeta("vdbshade_light", openvdb::StringMetadata(channel.what.light));
     }
@@ -133,10 +409,124 @@ const Channel &channel_of(const vsh_volume &volume, size_t grid, vsh_error *erro
 
 } // namespace vshi
 
+vsh_result vsh_voxels_from_grid(const vsh_grid *grid, double band, const vsh_run *run, vsh_voxels **voxels,
+                                vsh_error *error) {
+    VSHI_NEEDS(voxels);
+    *voxels = nullptr;
+    VSHI_NEEDS(grid);
+    return vshi::make_voxels(run, VSH_ERROR_INTERNAL, "band", voxels, error,
+                             [&](const vsh_run &full) { return vshi::from_grid(*grid, band, full, error); });
+}
+
+vsh_result vsh_voxels_from_box(const double box_min[3], const double box_max[3], double voxel_size,
+                               const vsh_run *run, vsh_voxels **voxels, vsh_error *error) {
+    VSHI_NEEDS(voxels);
+    *voxels = nullptr;
+    VSHI_NEEDS(box_min);
+    VSHI_NEEDS(box_max);
+    return vshi::make_voxels(run, VSH_ERROR_INTERNAL, "box", voxels, error, [&](const vsh_run &full) {
+        return vshi::from_box(box_min, box_max, voxel_size, full, error);
+    });
+}
+
+vsh_result vsh_voxels_from_vdb(const char *path, const char *name, const vsh_run *run, vsh_voxels **voxels,
+                               vsh_error *error) {
+    VSHI_NEEDS(voxels);
+    *voxels = nullptr;
+    VSHI_NEEDS(path);
+    return vshi::make_voxels(run, VSH_ERROR_READ, path, voxels, error,
+                             [&](const vsh_run &full) { return vshi::from_vdb(path, name, full, error); });
+}
+
+vsh_result vshi_serve_voxels(const char *path, vshi_decoder *request, const vsh_run *run,
+                             vshi_encoder *payload, vsh_error *error) {
+    return vshi::guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
+        vshi::initialize();
+        const char *name = vshi_decode_text(request, false);
+        vshi::end_request(request, path, error);
+        const openvdb::GridBase::Ptr grid = vshi::read_numbers(path, name, *run, error);
+        const vshi::Named named{path, grid->getName()};
+        vshi::put_blocks(payload, named.grid, grid->transform(),
+                         vshi::blocks_of(*grid, named.text().c_str(), *run, error));
+        return VSH_OK;
+    });
+}
+
+void vsh_voxels_free(vsh_voxels *voxels) {
+    delete voxels;
+}
+
+void vsh_voxels_get_info(const vsh_voxels *voxels, vsh_voxels_info *info) {
+    *info = voxels->info;
+}
+
+void vsh_voxels_centre(const vsh_voxels *voxels, const int32_t index[3], double centre[3]) {
+    const vshi::Vec3d at = vshi::centre_of(*voxels->set, index);
+    std::copy(at.asPointer(), at.asPointer() + 3, centre);
+}
+
+const vshi_block *vshi_voxels_blocks(const vsh_voxels *voxels, size_t *count) {
+    *count = voxels->set->blocks.size();
+    return voxels->set->blocks.data();
+}
+
+size_t vshi_voxels_find(const vsh_voxels *voxels, const int32_t origin[3]) {
+    const auto &blocks = voxels->set->blocks;
+    const vshi_block wanted{{origin[0], origin[1], origin[2]}, {}};
+    const auto at = std::lower_bound(blocks.begin(), blocks.end(), wanted, vshi::comes_before);
+    return at != blocks.end() && std::equal(at->origin, at->origin + 3, origin) ? size_t(at - blocks.begin())
+                                                                                : SIZE_MAX;
+}
+
+double vshi_voxels_longest_axis(const vsh_voxels *voxels) {
+    const double *size = voxels->info.voxel_size;
+    return voxels->set->transform->isLinear() ? std::max({size[0], size[1], size[2]})
+                                              : std::numeric_limits<double>::infinity();
+}
+
+void vshi_voxels_centres(const vsh_voxels *voxels, size_t block, size_t count, const uint16_t *voxel,
+                         double (*centres)[3]) {
+    const int32_t *origin = voxels->set->blocks[block].origin;
+    for (size_t i = 0; i < count; ++i) {
+        const int32_t at[3] = {origin[0] + (voxel[i] >> 6), origin[1] + (voxel[i] >> 3 & 7),
+                               origin[2] + (voxel[i] & 7)};
+        vsh_voxels_centre(voxels, at, centres[i]);
+    }
+}
+
+void vshi_voxels_ball(const vsh_voxels *voxels, size_t block, double centre[3], double *radius) {
+    const openvdb::Coord low(voxels->set->blocks[block].origin);
+    const openvdb::math::Transform &transform = *voxels->set->transform;
+    const vshi::Vec3d middle = transform.indexToWorld(low.asVec3d() + vshi::Vec3d(3.5));
+    double square = 0.0;
+    for (int corner = 0; corner < 8; ++corner) { // centres lie within their hull
+        const vshi::Vec3d at((corner & 1) * 7.0, (corner >> 1 & 1) * 7.0, (corner >> 2) * 7.0);
+        square = std::max(square, (transform.indexToWorld(low.asVec3d() + at) - middle).lengthSqr());
+    }
+    std::copy(middle.asPointer(), middle.asPointer() + 3, centre);
+    *radius = std::sqrt(square);
+}
+
 vsh_result vshi_volume_begin(const vsh_voxels *voxels, const vshi_channel *channels, size_t count,
                              const vsh_run *run, double held, vsh_volume **volume, vsh_error *error) {
-    return vshi::guard(error, VSH_ERROR_INTERNAL, "volume",
-                       [&] { return vshi::begin(*voxels, channels, count, *run, held, volume, error); });
+    return vshi::guard(error, VSH_ERROR_INTERNAL, "volume", [&]() -> vsh_result {
+        const size_t blocks = voxels->set->blocks.size();
+        const double bytes =
+            held + double(voxels->info.bytes) +
+            double(blocks) * double(count) * (vshi::BYTES_PER_LEAF + double(sizeof(vshi::Slot)));
+        const std::string what = std::to_string(count) + (count > 1 ? " grids" : " grid") + " of " +
+                                 std::to_string(voxels->info.count) + " voxels";
+        VSHI_TRY(vshi::check_bytes(run, bytes, what.c_str(), error));
+        auto made = std::make_unique<vsh_volume>();
+        made->set = voxels->set;
+        made->channels = std::vector<vshi::Channel>(count);
+        for (size_t c = 0; c < count; ++c) {
+            made->channels[c].what = channels[c];
+            made->channels[c].slots.resize(blocks);
+        }
+        *volume = made.release();
+        return VSH_OK;
+    });
 }
 
 float *vshi_volume_values(vsh_volume *volume, size_t channel, size_t block) {
@@ -226,25 +616,22 @@ vsh_result vsh_volume_copy(const vsh_volume *volume, size_t grid, const int32_t 
     VSHI_NEEDS(values);
     return vshi::guard(error, VSH_ERROR_INTERNAL, "volume", [&]() -> vsh_result {
         const vshi::FloatTree &tree = *vshi::channel_of(*volume, grid, error).tree;
-        return vshi::copy_dense(tree, index_min, size, values, error);
+        vshi::copy_dense(tree, index_min, size, values, error);
+        return VSH_OK;
     });
 }
 
 vsh_result vsh_volume_write(const vsh_volume *volume, const char *path, int32_t as_half,
                             const vsh_attribute *attributes, size_t attribute_count, vsh_error *error) {
     VSHI_NEEDS(volume);
-    return vshi::guard(error, VSH_ERROR_WRITE, path, [&] {
-        vshi::initialize();
-        VSHI_TRY(vshi_attributes_check(path, attributes, attribute_count, error));
-        VSHI_TRY(vshi::check_writable(path, volume->set->least_axis, error));
-        openvdb::GridCPtrVec grids;
+    const auto make = [&] {
+        std::vector<vshi::FloatGrid::Ptr> grids;
         for (const vshi::Channel &channel : volume->channels) {
-            const vshi::FloatGrid::Ptr grid = vshi::to_grid(channel, *volume->set, as_half != 0);
-            vshi::put_attributes(*grid, attributes, attribute_count);
-            grids.push_back(grid);
+            grids.push_back(vshi::to_grid(channel, *volume->set, as_half != 0));
         }
-        return vshi::write_grids(grids, path, error);
-    });
+        return grids;
+    };
+    return vshi::write_grids(path, volume->set->least_axis, attributes, attribute_count, make, error);
 }
 
 vsh_result vsh_volume_to_openvdb(const vsh_volume *volume, size_t grid, uint32_t version, uint32_t abi,

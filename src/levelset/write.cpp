@@ -18,7 +18,7 @@ namespace {
 // Writes through a sink: OpenVDB's own file writing does not look whether the last bytes arrived.
 class SinkBuffer final : public std::streambuf {
   public:
-    explicit SinkBuffer(const char *path) : sink(vshi_sink_open(path)), bytes(size_t(1) << 20) {}
+    explicit SinkBuffer(const char *path) : sink(vshi_sink_open(path)), bytes(size_t(1) << 20) { flush(); }
     ~SinkBuffer() override { finish(); }
     SinkBuffer(const SinkBuffer &) = delete;
     SinkBuffer &operator=(const SinkBuffer &) = delete;
@@ -29,27 +29,14 @@ class SinkBuffer final : public std::streambuf {
     }
 
   protected:
-    std::streamsize xsputn(const char *data, std::streamsize count) override {
-        if (size_t(count) > bytes.size() - used) {
-            flush();
-        }
-        if (size_t(count) > bytes.size()) {
-            vshi_sink_write(&sink, data, size_t(count), at);
-            at += uint64_t(count);
-        } else {
-            std::memcpy(bytes.data() + used, data, size_t(count));
-            used += size_t(count);
-        }
-        return count; // failures are told by finish()
-    }
     int_type overflow(int_type value) override {
-        const char byte = traits_type::to_char_type(value);
-        xsputn(&byte, 1);
-        return traits_type::not_eof(value);
+        flush();
+        return traits_type::eq_int_type(value, traits_type::eof()) ? traits_type::not_eof(value)
+                                                                   : sputc(traits_type::to_char_type(value));
     }
     int sync() override {
         flush();
-        return 0;
+        return 0; // finish() reports failures
     }
     pos_type seekpos(pos_type position, std::ios_base::openmode) override {
         flush();
@@ -57,27 +44,24 @@ class SinkBuffer final : public std::streambuf {
         return position;
     }
     pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode mode) override {
-        if (from == std::ios_base::end) {
-            return pos_type(off_type(-1)); // never asked for
-        }
-        const off_type now = off_type(at + used);
-        return from == std::ios_base::cur && offset == 0
-                   ? pos_type(now)
-                   : seekpos(pos_type(from == std::ios_base::cur ? now + offset : offset), mode);
+        flush();
+        return from == std::ios_base::end
+                   ? pos_type(off_type(-1)) // nobody asks for it
+                   : seekpos(offset + (from == std::ios_base::cur ? off_type(at) : 0), mode);
     }
 
   private:
     void flush() {
+        const auto used = size_t(pptr() - pbase());
         if (used > 0 && sink.file >= 0) {
             vshi_sink_write(&sink, bytes.data(), used, at);
         }
         at += used;
-        used = 0;
+        setp(bytes.data(), bytes.data() + bytes.size());
     }
 
     vshi_sink sink;
     std::vector<char> bytes;
-    size_t used = 0;
     uint64_t at = 0; // of the first byte of `bytes`
 };
 
@@ -140,33 +124,39 @@ struct Output {
 
 } // namespace
 
-vsh_result check_writable(const char *path, double voxel_size, vsh_error *error) {
-    return voxel_size >= SMALLEST_WRITTEN
-               ? VSH_OK
-               : vshi_fail(error, VSH_ERROR_LIMIT,
-                           "%s: voxel size %g: OpenVDB writes %g and more; scale the scene", path, voxel_size,
-                           SMALLEST_WRITTEN);
-}
-
-vsh_result write_grids(const openvdb::GridCPtrVec &grids, const char *path, vsh_error *error) {
-    Output output;
-    VSHI_TRY(vshi_output_begin(&output.file, path, error));
-    ContentHash hash;
-    for (const openvdb::GridBase::ConstPtr &grid : grids) {
-        hash.add(openvdb::gridConstPtrCast<FloatGrid>(grid)->tree());
-    }
-    SinkBuffer buffer(output.file.temporary);
-    std::ostream stream(&buffer);
-    Writer().put(stream, grids);
-    stream.seekp(std::streamoff(UUID_AT));
-    stream << hash.uuid();
-    const bool good = stream.good();
-    const int number = buffer.finish();
-    if (number != 0 || !good) {
-        return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", path,
-                         number != 0 ? std::strerror(number) : "OpenVDB gave no reason");
-    }
-    return vshi_output_commit(&output.file, error);
+vsh_result write_grids(const char *path, double voxel_size, const vsh_attribute *attributes, size_t count,
+                       const std::function<std::vector<FloatGrid::Ptr>()> &make, vsh_error *error) {
+    return guard(error, VSH_ERROR_WRITE, path, [&]() -> vsh_result {
+        initialize();
+        VSHI_TRY(vshi_attributes_check(path, attributes, count, error));
+        if (!(voxel_size >= SMALLEST_WRITTEN)) {
+            return vshi_fail(error, VSH_ERROR_LIMIT,
+                             "%s: voxel size %g: OpenVDB writes %g and more; scale the scene", path,
+                             voxel_size, SMALLEST_WRITTEN);
+        }
+        const std::vector<FloatGrid::Ptr> grids = make();
+        Output output;
+        VSHI_TRY(vshi_output_begin(&output.file, path, error));
+        ContentHash hash;
+        for (const FloatGrid::Ptr &grid : grids) {
+            for (size_t i = 0; i < count; ++i) {
+                grid->insertMeta(attributes[i].name, openvdb::StringMetadata(attributes[i].value));
+            }
+            hash.add(grid->tree());
+        }
+        SinkBuffer buffer(output.file.temporary);
+        std::ostream stream(&buffer);
+        Writer().put(stream, openvdb::GridCPtrVec(grids.begin(), grids.end()));
+        stream.seekp(std::streamoff(UUID_AT));
+        stream << hash.uuid();
+        const bool good = stream.good();
+        const int number = buffer.finish();
+        if (number != 0 || !good) {
+            return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", path,
+                             number != 0 ? std::strerror(number) : "OpenVDB gave no reason");
+        }
+        return vshi_output_commit(&output.file, error);
+    });
 }
 
 FloatGrid::Ptr named_grid(const FloatTree::Ptr &tree, const openvdb::math::Transform &transform,
@@ -188,23 +178,12 @@ FloatGrid::Ptr named_surface(const vsh_grid &grid, const char *name) {
     return named;
 }
 
-void put_attributes(FloatGrid &grid, const vsh_attribute *attributes, size_t count) {
-    for (size_t i = 0; i < count; ++i) {
-        grid.insertMeta(attributes[i].name, openvdb::StringMetadata(attributes[i].value));
-    }
-}
-
 } // namespace vshi
 
 vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *name,
                           const vsh_attribute *attributes, size_t attribute_count, vsh_error *error) {
     VSHI_NEEDS(grid);
-    return vshi::guard(error, VSH_ERROR_WRITE, path, [&] {
-        vshi::initialize();
-        VSHI_TRY(vshi_attributes_check(path, attributes, attribute_count, error));
-        VSHI_TRY(vshi::check_writable(path, grid->info.voxel_size, error));
-        const openvdb::FloatGrid::Ptr named = vshi::named_surface(*grid, name != nullptr ? name : "surface");
-        vshi::put_attributes(*named, attributes, attribute_count);
-        return vshi::write_grids({named}, path, error);
-    });
+    return vshi::write_grids(
+        path, grid->info.voxel_size, attributes, attribute_count,
+        [&] { return std::vector{vshi::named_surface(*grid, name != nullptr ? name : "surface")}; }, error);
 }

@@ -6,12 +6,11 @@
 
 #include <stdatomic.h>
 
-#include "levelset/leaves.h"
+#include "levelset/access.h"
 
 typedef struct leaves {
     vshi_leaf *leaf;
     size_t count;
-    const double *transform;
     vsh_grid_info info;
 } leaves;
 
@@ -21,7 +20,6 @@ static inline leaves leaves_of(const vsh_grid *grid) {
     all.leaf = malloc((all.count + 1) * sizeof *all.leaf);
     assert_non_null(all.leaf);
     assert_int_equal(vshi_grid_leaves(grid, all.leaf, all.count), all.count);
-    all.transform = vshi_grid_transform(grid);
     vsh_grid_get_info(grid, &all.info);
     return all;
 }
@@ -31,7 +29,7 @@ static inline void voxel_position(const leaves *all, size_t leaf, int voxel, dou
     const double index[3] = {origin[0] + (voxel >> 6), origin[1] + ((voxel >> 3) & 7),
                              origin[2] + (voxel & 7)};
     for (int row = 0; row < 3; ++row) {
-        const double *m = all->transform + 4 * row;
+        const double *m = all->info.transform + 4 * row;
         position[row] = m[0] * index[0] + m[1] * index[1] + m[2] * index[2] + m[3];
     }
 }

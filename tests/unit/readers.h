@@ -6,8 +6,6 @@
 
 #include "image/planes.h"
 #include "levelset/file.h"
-#include "levelset/message.h"
-#include "levelset/volume.h"
 #include "model/model.h"
 #include "outline/outline.h"
 #include "sandbox/confine.h"

@@ -66,7 +66,7 @@ float value_at(const vsh_grid *grid, const openvdb::Coord &at) {
 
 // Looks a grid that was read without a word over against the sound one.
 void compare(const vsh_grid *sound, const vsh_grid *read, Tally &tally) {
-    if (std::memcmp(vshi_grid_transform(sound), vshi_grid_transform(read), 12 * sizeof(double)) != 0) {
+    if (std::memcmp(sound->info.transform, read->info.transform, sizeof read->info.transform) != 0) {
         ++tally.moved;
         return;
     }

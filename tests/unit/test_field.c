@@ -3,7 +3,7 @@
 #include "testing.h"
 
 #include "field/field.h"
-#include "levelset/leaves.h"
+#include "levelset/access.h"
 
 #define VOXEL 0.04
 
@@ -68,7 +68,7 @@ static level_errors measure(const vsh_field *field, int32_t level, truth_scene s
 }
 
 TEST(each_level_is_within_a_cell_of_the_truth_in_its_band) {
-    vsh_field *field = seeds_field(5.0);
+    OWNED(vsh_field) *field = seeds_field(5.0);
     const double center[3] = {0.0, 0.75, 0.0};
     assert_int_equal(field->level_count, 6);
     for (int32_t l = 0; l < field->level_count; ++l) {
@@ -83,11 +83,10 @@ TEST(each_level_is_within_a_cell_of_the_truth_in_its_band) {
         assert_true(e.too_long <= 0.87);
         assert_int_equal(e.wrong_signs, 0);
     }
-    vsh_field_free(field);
 }
 
 TEST(thin_parts_are_as_right_as_the_rest) {
-    vsh_field *field = seeds_field(5.0);
+    OWNED(vsh_field) *field = seeds_field(5.0);
     const truth_scene scene = truth_seeds();
     const double parts[2][3] = {{1.2, 0.6, -0.3}, {0.3, 1.4, 1.5}};
     for (int part = 0; part < 2; ++part) {
@@ -101,7 +100,6 @@ TEST(thin_parts_are_as_right_as_the_rest) {
             assert_true(e.too_long <= 0.87);
         }
     }
-    vsh_field_free(field);
 }
 
 /* World size of a voxel of the level that a sampled distance comes from. */
@@ -123,7 +121,7 @@ static double resolved_distance(const vsh_field *field, const double p[3]) {
 
 TEST(sampled_distances_are_within_a_voxel_of_the_level_that_resolves_them) {
     const truth_scene scene = truth_seeds();
-    vsh_field *field = seeds_field(5.0);
+    OWNED(vsh_field) *field = seeds_field(5.0);
     uint64_t counter = 7;
     double worst = 0.0;
     for (int i = 0; i < 1000000; ++i) {
@@ -141,7 +139,6 @@ TEST(sampled_distances_are_within_a_voxel_of_the_level_that_resolves_them) {
     }
     print_message("sampled: worst %.3f voxels of the level\n", worst);
     assert_true(worst <= 0.87);
-    vsh_field_free(field);
 }
 
 /* Callers march by these distances. */
@@ -151,7 +148,7 @@ TEST(beyond_the_finest_band_distances_are_lower_bounds) {
                                   {TRUTH_BOX, {0.0, 0.0, 0.0}, {0.7, 0.4, 1.1}, 0.0, 0.0}};
     for (int n = 0; n < 3; ++n) {
         const truth_scene scene = {&solids[n], 1};
-        vsh_field *field = field_of(scene, VOXEL, 1000.0 * VOXEL);
+        OWNED(vsh_field) *field = field_of(scene, VOXEL, 1000.0 * VOXEL);
         uint64_t counter = 7;
         double beyond = -INFINITY, within = -INFINITY, least = 1.0;
         for (int i = 0; i < 100000; ++i) {
@@ -177,13 +174,12 @@ TEST(beyond_the_finest_band_distances_are_lower_bounds) {
         assert_true(beyond <= 0.0);
         assert_true(n == 2 || within <= 0.1); /* a trilinear sample cuts a box's edges off */
         assert_true(least >= 0.6);
-        vsh_field_free(field);
     }
 }
 
 TEST(beyond_the_reach_distances_are_lower_bounds) {
     const truth_scene scene = truth_seeds();
-    vsh_field *field = seeds_field(0.5);
+    OWNED(vsh_field) *field = seeds_field(0.5);
     const vshi_level *top = &field->levels[field->level_count - 1];
     const double band = (double)top->band * VOXEL;
     assert_true(band >= 0.5 && band < 1.0);
@@ -201,11 +197,10 @@ TEST(beyond_the_reach_distances_are_lower_bounds) {
         }
     }
     assert_true(beyond > 100000);
-    vsh_field_free(field);
 }
 
 TEST(a_field_has_only_the_levels_that_the_reach_needs) {
-    vsh_grid *grid = grid_of(truth_seeds(), VOXEL);
+    OWNED(vsh_grid) *grid = grid_of(truth_seeds(), VOXEL);
     /* bands: 3 voxels of the grid, then 6 of each coarser level */
     const struct {
         double reach;
@@ -218,30 +213,27 @@ TEST(a_field_has_only_the_levels_that_the_reach_needs) {
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
         vsh_field_options options = vsh_field_options_default();
         options.reach = cases[i].reach;
-        vsh_field *field = NULL;
+        OWNED(vsh_field) *field = NULL;
         assert_ok(vsh_field_create(grid, &options, NULL, &field, &failure));
         vsh_field_info info;
         vsh_field_get_info(field, &info);
         assert_int_equal(info.levels, cases[i].levels);
         assert_true(info.reach >= cases[i].reach - 1e-6);
-        vsh_field_free(field);
     }
-    vsh_grid_free(grid);
 }
 
 TEST(without_a_wish_the_reach_is_four_diagonals) {
     const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
-    vsh_field *field = field_of((truth_scene){&ball, 1}, 0.1, 0.0);
+    OWNED(vsh_field) *field = field_of((truth_scene){&ball, 1}, 0.1, 0.0);
     vsh_field_info info;
     vsh_field_get_info(field, &info);
     assert_true(info.reach >= 4.0 * sqrt(12.0) && info.reach < 2.5 * 4.0 * sqrt(12.0));
-    vsh_field_free(field);
 }
 
 TEST(coarse_levels_take_a_fraction_of_the_finest_ones_memory) {
     const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
-    vsh_field *one = field_of((truth_scene){&ball, 1}, 0.01, 0.01);
-    vsh_field *many = field_of((truth_scene){&ball, 1}, 0.01, 0.0);
+    OWNED(vsh_field) *one = field_of((truth_scene){&ball, 1}, 0.01, 0.01);
+    OWNED(vsh_field) *many = field_of((truth_scene){&ball, 1}, 0.01, 0.0);
     vsh_field_info a, b;
     vsh_field_get_info(one, &a);
     vsh_field_get_info(many, &b);
@@ -249,8 +241,6 @@ TEST(coarse_levels_take_a_fraction_of_the_finest_ones_memory) {
                   (double)b.bytes / 1e6);
     /* a third where bands are alike; coarse bands are twice as wide in voxels as the grid's own */
     assert_true((double)b.bytes < 1.8 * (double)a.bytes);
-    vsh_field_free(one);
-    vsh_field_free(many);
 }
 
 TEST(signs_hold_deep_inside_big_solids_and_far_outside) {
@@ -259,7 +249,7 @@ TEST(signs_hold_deep_inside_big_solids_and_far_outside) {
                                   {TRUTH_BOX, {0.0, -4.0, 0.0}, {4.0, 0.04, 4.0}, 0.0, 0.0}};
     const truth_scene scene = {solids, 3};
     for (int reach = 0; reach < 3; ++reach) {
-        vsh_field *field = field_of(scene, VOXEL, reach == 0 ? 0.01 : reach == 1 ? 0.3 : 0.0);
+        OWNED(vsh_field) *field = field_of(scene, VOXEL, reach == 0 ? 0.01 : reach == 1 ? 0.3 : 0.0);
         uint64_t counter = 3;
         size_t inside = 0;
         for (int i = 0; i < 400000; ++i) {
@@ -279,7 +269,6 @@ TEST(signs_hold_deep_inside_big_solids_and_far_outside) {
             }
         }
         assert_true(inside > 10000);
-        vsh_field_free(field);
     }
 }
 
@@ -302,7 +291,7 @@ TEST(a_turned_box_far_away_is_within_what_a_trilinear_sample_errs) {
     const vsh_grid_options options = with_voxel(VOXEL);
     vsh_grid *grid = NULL;
     assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
-    vsh_field *field = field_of_grid(grid, 2.0);
+    OWNED(vsh_field) *field = field_of_grid(grid, 2.0);
 
     const truth_solid box = {TRUTH_BOX, {0.0, 0.0, 0.0}, {0.8, 0.5, 0.3}, 0.0, 0.0};
     uint64_t counter = 5;
@@ -330,11 +319,10 @@ TEST(a_turned_box_far_away_is_within_what_a_trilinear_sample_errs) {
     }
     print_message("turned box at 1000 units: rms %.4f voxels\n", sqrt(squares / count));
     assert_true(sqrt(squares / count) < 0.1);
-    vsh_field_free(field);
 }
 
 TEST(positions_that_are_not_finite_give_nan_and_far_ones_do_not) {
-    vsh_field *field = seeds_field(1.0);
+    OWNED(vsh_field) *field = seeds_field(1.0);
     for (int axis = 0; axis < 3; ++axis) {
         const double bad[] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
         for (int i = 0; i < 3; ++i) {
@@ -357,11 +345,10 @@ TEST(positions_that_are_not_finite_give_nan_and_far_ones_do_not) {
         }
     }
     vsh_field_sample(field, 0, NULL, NULL);
-    vsh_field_free(field);
 }
 
 TEST(info_tells_the_solids_box_and_voxel) {
-    vsh_field *field = seeds_field(1.0);
+    OWNED(vsh_field) *field = seeds_field(1.0);
     vsh_field_info info;
     vsh_field_get_info(field, &info);
     const double low[3] = {-3.0, -0.5, -3.0}, high[3] = {3.0, 2.0, 3.0};
@@ -371,7 +358,6 @@ TEST(info_tells_the_solids_box_and_voxel) {
         assert_true(fabs(info.bounds_max[axis] - high[axis]) < 2.0 * VOXEL);
     }
     assert_true(info.shell_thickness == 0.0);
-    vsh_field_free(field);
 }
 
 /* Against the grid's own floats, which it was made from. */
@@ -383,12 +369,12 @@ TEST(values_are_rounded_by_no_more_than_half_a_quantum) {
         const vsh_sdf sdf = {&node, 1};
         vsh_grid_options options = with_voxel(VOXEL);
         options.half_width = half_widths[h];
-        vsh_grid *grid = NULL;
+        OWNED(vsh_grid) *grid = NULL;
         assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
-        vsh_field *field = NULL;
+        OWNED(vsh_field) *field = NULL;
         assert_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
         const size_t count = vshi_grid_leaves(grid, NULL, 0);
-        vshi_leaf *leaves = malloc(count * sizeof *leaves);
+        FREED vshi_leaf *leaves = malloc(count * sizeof *leaves);
         assert_non_null(leaves);
         vshi_grid_leaves(grid, leaves, count);
         const vshi_level *finest = &field->levels[0];
@@ -412,23 +398,19 @@ TEST(values_are_rounded_by_no_more_than_half_a_quantum) {
         for (int32_t l = 0; l < field->level_count; ++l) {
             assert_true(field->levels[l].rounding < 2.5e-4f * field->levels[l].scale);
         }
-        free(leaves);
-        vsh_field_free(field);
-        vsh_grid_free(grid);
     }
 }
 
 TEST(a_voxel_takes_no_more_than_eighteen_bytes) {
     const double voxels[] = {0.04, 0.02, 0.01};
     for (int i = 0; i < 3; ++i) {
-        vsh_field *field = field_of(truth_seeds(), voxels[i], 0.0);
+        OWNED(vsh_field) *field = field_of(truth_seeds(), voxels[i], 0.0);
         vsh_field_info info;
         vsh_field_get_info(field, &info);
         const double each = (double)info.bytes / (double)info.active_voxels;
         print_message("voxel %g: %.2f bytes for each of %llu\n", voxels[i], each,
                       (unsigned long long)info.active_voxels);
         assert_true(each > 2.0 && each <= 18.0);
-        vsh_field_free(field);
     }
 }
 

@@ -5,7 +5,7 @@
 #include "testing.h"
 
 #include "field/field.h"
-#include "levelset/leaves.h"
+#include "levelset/access.h"
 
 #include <stdlib.h>
 

@@ -10,7 +10,7 @@
 #include <vdbshade/scene.h>
 #include <vector>
 
-#include "levelset/leaves.h"
+#include "levelset/access.h"
 #include "previews.h"
 
 // Last: it has macros named as OpenVDB's members are.
@@ -85,14 +85,16 @@ void several_grids_and_files_are_their_union(void **) {
     scene.grid.voxel_size = static_cast<double>(VOXEL);
     scene.shade = preview_options();
     vsh_assets *assets = nullptr;
-    vsh_grid *grid = nullptr;
+    OWNED(vsh_grid) *grid = nullptr;
     vsh_error error{};
     assert_int_equal(vsh_assets_load(&scene, nullptr, &assets, &error), VSH_OK);
     assert_int_equal(vsh_scene_casters(&scene, assets, nullptr, &grid, &error), VSH_OK);
     const size_t count = vshi_grid_leaves(grid, nullptr, 0);
     std::vector<vshi_leaf> leaves(count);
     vshi_grid_leaves(grid, leaves.data(), count);
-    const double *m = vshi_grid_transform(grid);
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    const double *m = info.transform;
     double worst = 0.0;
     size_t surfaces[5] = {};
     for (const vshi_leaf &leaf : leaves) {
@@ -121,7 +123,6 @@ void several_grids_and_files_are_their_union(void **) {
     for (size_t seen : surfaces) { // every one of them is there
         assert_true(seen > 50);
     }
-    vsh_grid_free(grid);
     vsh_assets_free(assets);
 }
 

@@ -41,14 +41,11 @@ typedef struct vshi_leaf_kernel {
 } vshi_leaf_kernel;
 
 /* One source (leaf.inc), built for each instruction set; all give the same bits. Thread safe. */
-extern const vshi_leaf_kernel vshi_leaf_base;
+extern VSHI_SHARED const vshi_leaf_kernel vshi_leaf_base;
 #if defined(__x86_64__)
-extern const vshi_leaf_kernel vshi_leaf_avx2;
-extern const vshi_leaf_kernel vshi_leaf_avx512;
+extern VSHI_SHARED const vshi_leaf_kernel vshi_leaf_avx2;
+extern VSHI_SHARED const vshi_leaf_kernel vshi_leaf_avx512;
 #endif
-
-/* That of a VSH_ISA_…. */
-VSHI_SHARED const vshi_leaf_kernel *vshi_leaf_kernel_of(int32_t isa);
 
 #ifdef __cplusplus
 }

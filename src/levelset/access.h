@@ -1,14 +1,34 @@
-/* Voxels that are to be shaded, and the grids that their values become. */
-#ifndef VSHI_OPENVDB_VOLUME_H
-#define VSHI_OPENVDB_VOLUME_H
+/* The content of level sets and volumes, for other rooms. */
+#ifndef VSHI_LEVELSET_ACCESS_H
+#define VSHI_LEVELSET_ACCESS_H
 
-#include "base/job.h"
+#include "sandbox/reader.h"
 
+#include <vdbshade/grid.h>
 #include <vdbshade/voxels.h>
 
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+/* --- level sets, for the field */
+
+/* A leaf of the grid's tree: 8³ values at index-space origin + (x, y, z), stored at x·64 + y·8 + z, in world
+ * units, negative inside; ± background where |value| reaches the half width. A view into the grid. */
+typedef struct vshi_leaf {
+    int32_t origin[3];
+    const float *values; /* [512] */
+} vshi_leaf;
+
+/* Number of leaves; fills up to `capacity` of them, sorted by origin (x, then y, then z). Thread safe. */
+size_t vshi_grid_leaves(const vsh_grid *grid, vshi_leaf *leaves, size_t capacity);
+
+/* For blocks of 8³ voxels, size[0] × size[1] × size[2] of them (z fastest) from index-space voxel `origin`
+ * (multiples of 8): -1 where the block's first voxel is inside the solid, else +1. Thread safe. */
+void vshi_grid_block_signs(const vsh_grid *grid, const int32_t origin[3], const int32_t size[3],
+                           int8_t *signs);
+
+/* --- voxels to shade, and the volume of their values */
 
 enum { VSHI_BLOCK_VOXELS = 512, VSHI_MASK_WORDS = 8 };
 
@@ -65,6 +85,10 @@ void vshi_volume_settle(vsh_volume *volume, size_t block, const uint64_t mask[VS
 
 /* Makes the trees of what was settled. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_volume_close(vsh_volume *volume, const vsh_volume_info *counts, vsh_error *error);
+
+/* --- a reader's requests for .vdb files */
+
+vshi_serve_fn vshi_serve_grid, vshi_serve_list, vshi_serve_voxels, vshi_serve_copy;
 
 #ifdef __cplusplus
 }
