@@ -168,9 +168,8 @@ TEST(distances_are_to_the_nearest_triangle_and_sides_by_crossings) {
         shape *s = bumpy(cases[i].rows, cases[i].amplitude);
         vsh_grid_options options = with_voxel(cases[i].voxel);
         options.half_width = cases[i].half_width;
-        vsh_grid *grid = grid_of(s, &options, NULL);
+        OWNED(vsh_grid) *grid = grid_of(s, &options, NULL);
         compare(s, grid, 1500);
-        vsh_grid_free(grid);
         free(s);
     }
 }
@@ -210,11 +209,10 @@ TEST(needles_are_as_exact_as_others) {
     const double voxels[] = {0.031, 0.11, 0.007};
     for (size_t i = 0; i < sizeof voxels / sizeof voxels[0]; ++i) {
         const vsh_grid_options options = with_voxel(voxels[i]);
-        vsh_grid *grid = grid_of(s, &options, NULL);
+        OWNED(vsh_grid) *grid = grid_of(s, &options, NULL);
         const double worst = worst_error(grid, unit_box, 2.99, 2.99);
         print_message("box of needles, voxel %g: worst %.2g voxels\n", voxels[i], worst);
         assert_true(worst < ERROR_MOST);
-        vsh_grid_free(grid);
     }
     free(s);
 }
@@ -231,7 +229,7 @@ TEST(a_lone_needle_ends_where_it_ends) {
         vsh_grid_options options = with_voxel(voxel);
         vsh_mesh mesh = shape_mesh(s, "needle");
         mesh.solidity = VSH_SOLIDITY_SHELL;
-        vsh_grid *grid = NULL;
+        OWNED(vsh_grid) *grid = NULL;
         assert_ok(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure));
         leaves all = leaves_of(grid);
         const double background = all.info.half_width * voxel, half = 0.5 * all.info.shell_thickness;
@@ -245,7 +243,6 @@ TEST(a_lone_needle_ends_where_it_ends) {
         print_message("needle of %g voxels: worst %.2g voxels\n", heights[k], worst);
         assert_true(worst < ERROR_MOST);
         free(all.leaf);
-        vsh_grid_free(grid);
         free(s);
     }
 }
@@ -306,7 +303,7 @@ TEST(depth_is_to_the_surface_of_the_union) {
     add_box(s, &boxes[1]);
     vsh_grid_options options = with_voxel(voxel);
     options.half_width = 6.0;
-    vsh_grid *grid = grid_of(s, &options, NULL);
+    OWNED(vsh_grid) *grid = grid_of(s, &options, NULL);
     leaves all = leaves_of(grid);
     double deeper = 0.0, shallower = 0.0;
     size_t compared = 0;
@@ -330,7 +327,6 @@ TEST(depth_is_to_the_surface_of_the_union) {
     assert_true(deeper < 0.05);
     assert_true(shallower < 2.0);
     free(all.leaf);
-    vsh_grid_free(grid);
     free(s);
 }
 

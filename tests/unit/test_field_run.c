@@ -35,7 +35,7 @@ static void assert_same_fields(const vsh_field *a, const vsh_field *b) {
 }
 
 TEST(any_number_of_threads_makes_the_same_bits) {
-    vsh_grid *grid = grid_of(truth_seeds(), VOXEL);
+    OWNED(vsh_grid) *grid = grid_of(truth_seeds(), VOXEL);
     const int32_t threads[] = {1, 2, 5};
     vsh_field *fields[3];
     for (int i = 0; i < 3; ++i) {
@@ -44,8 +44,8 @@ TEST(any_number_of_threads_makes_the_same_bits) {
         assert_same_fields(fields[0], fields[i]);
     }
     enum { COUNT = 100000 };
-    double *positions = malloc(3 * COUNT * sizeof *positions);
-    float *values = malloc(3 * COUNT * sizeof *values);
+    FREED double *positions = malloc(3 * COUNT * sizeof *positions);
+    FREED float *values = malloc(3 * COUNT * sizeof *values);
     assert_non_null(positions);
     assert_non_null(values);
     uint64_t counter = 1;
@@ -59,13 +59,10 @@ TEST(any_number_of_threads_makes_the_same_bits) {
     for (int i = 0; i < 3; ++i) {
         vsh_field_free(fields[i]);
     }
-    free(values);
-    free(positions);
-    vsh_grid_free(grid);
 }
 
 TEST(the_memory_limit_covers_every_level) {
-    vsh_grid *grid = grid_of(truth_seeds(), VOXEL);
+    OWNED(vsh_grid) *grid = grid_of(truth_seeds(), VOXEL);
     vsh_field *field = NULL;
     assert_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
     vsh_field_info info;
@@ -87,7 +84,6 @@ TEST(the_memory_limit_covers_every_level) {
     run.memory_limit = 1u << 30;
     assert_ok(vsh_field_create(grid, NULL, &run, &field, &failure));
     vsh_field_free(field);
-    vsh_grid_free(grid);
 }
 
 typedef struct progress_log {
@@ -109,14 +105,14 @@ static int32_t watch(void *user, const char *stage, double fraction) {
 }
 
 TEST(progress_rises_from_0_to_1_and_can_cancel_anywhere) {
-    vsh_grid *grid = grid_of(truth_seeds(), VOXEL);
+    OWNED(vsh_grid) *grid = grid_of(truth_seeds(), VOXEL);
     vsh_run run = vsh_run_default();
     run.progress = watch;
     const double limits[] = {2.0, 0.0, 0.1, 0.5};
     for (size_t i = 0; i < sizeof limits / sizeof limits[0]; ++i) {
         for (int32_t threads = 1; threads <= 5; threads += 4) {
             progress_log log = {.limit = limits[i], .last = 0.0};
-            vsh_field *field = NULL;
+            OWNED(vsh_field) *field = NULL;
             run.user = &log;
             run.threads = threads;
             const vsh_result result = vsh_field_create(grid, NULL, &run, &field, &failure);
@@ -133,23 +129,20 @@ TEST(progress_rises_from_0_to_1_and_can_cancel_anywhere) {
                 assert_int_equal(failure.code, VSH_ERROR_CANCELLED);
                 assert_null(field);
             }
-            vsh_field_free(field);
         }
     }
     /* at 1 nothing is left to stop: either answer is true, and neither leaks nor lies */
     progress_log log = {.limit = 1.0, .last = 0.0};
-    vsh_field *field = NULL;
+    OWNED(vsh_field) *field = NULL;
     run.user = &log;
     const vsh_result result = vsh_field_create(grid, NULL, &run, &field, NULL);
     assert_true(result == VSH_OK ? field != NULL : result == VSH_ERROR_CANCELLED && field == NULL);
     assert_true(log.last >= 1.0);
-    vsh_field_free(field);
-    vsh_grid_free(grid);
 }
 
 TEST(options_and_runs_are_checked) {
     const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
-    vsh_grid *grid = grid_of((truth_scene){&ball, 1}, 0.1);
+    OWNED(vsh_grid) *grid = grid_of((truth_scene){&ball, 1}, 0.1);
     vsh_field *field = NULL;
     assert_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
     assert_non_null(field);
@@ -181,18 +174,17 @@ TEST(options_and_runs_are_checked) {
     run.threads = 1025;
     assert_int_equal(vsh_field_create(grid, NULL, &run, &field, &failure), VSH_ERROR_ARGUMENT);
     vsh_field_free(NULL);
-    vsh_grid_free(grid);
 }
 
 /* A reach beyond anything must not make levels without end. */
 TEST(a_huge_reach_is_refused_or_met) {
     const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
-    vsh_grid *grid = grid_of((truth_scene){&ball, 1}, 0.1);
+    OWNED(vsh_grid) *grid = grid_of((truth_scene){&ball, 1}, 0.1);
     const double reaches[] = {1e3, 1e6, 1e12, 1e300};
     for (int i = 0; i < 4; ++i) {
         vsh_field_options options = vsh_field_options_default();
         options.reach = reaches[i];
-        vsh_field *field = NULL;
+        OWNED(vsh_field) *field = NULL;
         const vsh_result result = vsh_field_create(grid, &options, NULL, &field, NULL);
         if (result == VSH_OK) {
             vsh_field_info info;
@@ -210,9 +202,7 @@ TEST(a_huge_reach_is_refused_or_met) {
         } else {
             assert_true(result == VSH_ERROR_LIMIT || result == VSH_ERROR_ARGUMENT);
         }
-        vsh_field_free(field);
     }
-    vsh_grid_free(grid);
 }
 
 int main(void) {

@@ -97,10 +97,10 @@ static baked *bake_whole(const stage *s, vsh_lightmap_options options, int32_t t
 static void measure(const stage *s, const baked *b, double rmse[CHANNELS]) {
     enum { RAYS = 256 };
     const vsh_light light = sun();
-    vsh_charts *charts = create(&s->floor.mesh, 1, options_of(VSH_SHADOW_CONE, VSH_AO_CONES), NULL);
-    vsh_texels *texels = rasterize(charts);
+    OWNED(vsh_charts) *charts = create(&s->floor.mesh, 1, options_of(VSH_SHADOW_CONE, VSH_AO_CONES), NULL);
+    OWNED(vsh_texels) *texels = rasterize(charts);
     const vsh_texel_samples all = vsh_texels_samples(texels);
-    float *truth = malloc(all.count * sizeof *truth);
+    FREED float *truth = malloc(all.count * sizeof *truth);
     for (int c = 0; c < CHANNELS; ++c) {
         const vsh_result result = c == 0
                                       ? vsh_trace_shadow(s->triangles, NULL, all.count, all.positions,
@@ -117,9 +117,6 @@ static void measure(const stage *s, const baked *b, double rmse[CHANNELS]) {
         }
         rmse[c] = sqrt(sum / valid);
     }
-    free(truth);
-    vsh_texels_free(texels);
-    vsh_charts_free(charts);
 }
 
 TEST(what_voxels_lose_is_in_the_estimate) {

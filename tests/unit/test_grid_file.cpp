@@ -19,7 +19,7 @@ TEST(a_written_grid_comes_back_bit_for_bit) {
 }
 
 TEST(openvdb_reads_what_is_written) {
-    vsh_grid *grid = own_sphere();
+    OWNED(vsh_grid) *grid = own_sphere();
     const std::string path = in_folder("own.vdb");
     assert_int_equal(vsh_grid_write(grid, path.c_str(), "hull", nullptr, 0, &failure), VSH_OK);
     openvdb::io::File file(path);
@@ -30,7 +30,6 @@ TEST(openvdb_reads_what_is_written) {
     vsh_grid_get_info(grid, &info);
     assert_int_equal(read->activeVoxelCount(), info.active_voxels);
     assert_true(file.compression() != openvdb::io::COMPRESS_NONE);
-    vsh_grid_free(grid);
 }
 
 TEST(grids_are_listed_and_found_by_name) {
@@ -259,7 +258,7 @@ TEST(listing_can_be_cancelled) {
 }
 
 TEST(a_full_disk_leaves_the_old_file) {
-    vsh_grid *grid = own_sphere();
+    OWNED(vsh_grid) *grid = own_sphere();
     const std::string path = in_folder("full.vdb");
     put(path, "old");
     std::signal(SIGXFSZ, SIG_IGN);
@@ -275,7 +274,6 @@ TEST(a_full_disk_leaves_the_old_file) {
     }
     assert_said(vsh_grid_write(grid, in_folder("no/where.vdb").c_str(), nullptr, nullptr, 0, &failure),
                 VSH_ERROR_WRITE, {"no/where.vdb"});
-    vsh_grid_free(grid);
 }
 
 } // namespace

@@ -109,21 +109,18 @@ static const vsh_mesh cube = {.name = "cube",
                               .triangle_count = 12};
 
 TEST(few_large_triangles_are_exact) {
-    vsh_grid *grid = grid_of(&cube, 1, 0.03, NULL);
+    OWNED(vsh_grid) *grid = grid_of(&cube, 1, 0.03, NULL);
     assert_true(worst_error(grid, unit_cube, 2.95, 2.95) < 0.02);
     assert_int_equal(wrong_blocks(grid, unit_cube, 8), 0);
-    vsh_grid_free(grid);
 }
 
 TEST(a_mesh_far_away_and_mirrored_is_the_same) {
     const double far_away[12] = {-1, 0, 0, 1e7, 0, 1, 0, 0, 0, 0, 1, -4e6};
     vsh_mesh moved = cube;
     moved.transform = far_away;
-    vsh_grid *here = grid_of(&cube, 1, 0.03125, NULL);
-    vsh_grid *there = grid_of(&moved, 1, 0.03125, NULL);
+    OWNED(vsh_grid) *here = grid_of(&cube, 1, 0.03125, NULL);
+    OWNED(vsh_grid) *there = grid_of(&moved, 1, 0.03125, NULL);
     assert_same_leaves(here, there, 1e-6f);
-    vsh_grid_free(here);
-    vsh_grid_free(there);
 }
 
 static double sheet(const double p[3]) {
@@ -140,7 +137,7 @@ TEST(an_open_quad_becomes_a_shell_with_a_warning) {
     run.warning = keep_warning;
     run.notes = 1;
     run.user = &warnings;
-    vsh_grid *grid = NULL;
+    OWNED(vsh_grid) *grid = NULL;
     vsh_grid_options options = with_voxel(0.02);
     options.shell_thickness = 4.0;
     assert_ok(vsh_grid_from_meshes(&quad, 1, &options, &run, &grid, &failure));
@@ -160,7 +157,6 @@ TEST(an_open_quad_becomes_a_shell_with_a_warning) {
         }
     }
     free(all.leaf);
-    vsh_grid_free(grid);
 }
 
 TEST(a_crack_is_closed_and_told) {
@@ -343,7 +339,7 @@ TEST(solids_that_overlap_can_be_cancelled_whenever_progress_is_told) {
         vsh_run run = run_on(1);
         run.progress = count_down;
         run.user = &left;
-        vsh_grid *grid = NULL;
+        OWNED(vsh_grid) *grid = NULL;
         const vsh_result result = vsh_grid_from_meshes(meshes, 2, &options, &run, &grid, &failure);
         if (i == 0) {
             all -= left;
@@ -354,7 +350,6 @@ TEST(solids_that_overlap_can_be_cancelled_whenever_progress_is_told) {
             assert_int_equal(left, -1); /* and nobody asks again */
         }
         assert_true((grid == NULL) == (result == VSH_ERROR_CANCELLED));
-        vsh_grid_free(grid);
     }
     free_model(&ball);
 }

@@ -104,7 +104,7 @@ TEST(boxes_that_cross_in_one_mesh_are_their_union) {
     const double low[3] = {0.013, 0.013, 0.013}, high[3] = {2.013, 2.013, 2.013};
     shape_box(s, LOW, HIGH, ALL_SIDES);
     shape_box(s, low, high, ALL_SIDES);
-    vsh_grid *grid = grid_of_shape(s, 0.047);
+    OWNED(vsh_grid) *grid = grid_of_shape(s, 0.047);
     leaves all = leaves_of(grid);
     for (size_t i = 0; i < all.count; ++i) {
         for (int v = 0; v < 512; ++v) {
@@ -117,7 +117,6 @@ TEST(boxes_that_cross_in_one_mesh_are_their_union) {
     }
     free(all.leaf);
     assert_int_equal(wrong_blocks(grid, crossing, 4), 0);
-    vsh_grid_free(grid);
     free(s);
 }
 
@@ -158,7 +157,7 @@ TEST(the_door_of_a_room_stays_open) {
     shape *s = shape_new();
     shape_box(s, LOW, HIGH, ALL_SIDES & ~FRONT);
     shape_turn(s, 0);
-    vsh_grid *grid = grid_of_shape(s, VOXEL);
+    OWNED(vsh_grid) *grid = grid_of_shape(s, VOXEL);
     assert_false(has_sheets(grid));
     leaves all = leaves_of(grid);
     size_t compared = 0;
@@ -184,7 +183,6 @@ TEST(the_door_of_a_room_stays_open) {
     }
     assert_true(compared > 10000);
     free(all.leaf);
-    vsh_grid_free(grid);
     free(s);
 }
 

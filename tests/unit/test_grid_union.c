@@ -14,21 +14,20 @@ static vsh_grid *ball_grid(double x, double radius, double voxel) {
 TEST(one_grid_alone_is_shared_as_it_is) {
     vsh_grid *ball = ball_grid(0.0, 1.0, 0.03);
     const vsh_grid_instance instance = {ball, NULL};
-    vsh_grid *same = NULL;
+    OWNED(vsh_grid) *same = NULL;
     assert_ok(vsh_grid_unite(&instance, 1, NULL, NULL, &same, &failure));
     vsh_grid *const given = ball;
     assert_same_leaves(given, same, 0.0f);
     vsh_grid_free(given);
     assert_true(worst_error(same, unit_sphere, 2.95, 2.95) < 1e-4);
-    vsh_grid_free(same);
 }
 
 /* Shifts by whole voxels that are no whole leaves: the values are those of the closed form. */
 TEST(grids_on_one_lattice_are_shifted_and_keep_their_values) {
-    vsh_grid *ball = ball_grid(0.0, 1.0, 0.03);
+    OWNED(vsh_grid) *ball = ball_grid(0.0, 1.0, 0.03);
     const double aside[12] = {1, 0, 0, 27 * 0.03, 0, 1, 0, 0, 0, 0, 1, 0};
     const vsh_grid_instance instances[2] = {{ball, NULL}, {ball, aside}};
-    vsh_grid *both = NULL;
+    OWNED(vsh_grid) *both = NULL;
     assert_ok(vsh_grid_unite(instances, 2, NULL, NULL, &both, &failure));
     leaves all = leaves_of(both);
     for (size_t i = 0; i < all.count; ++i) {
@@ -41,8 +40,6 @@ TEST(grids_on_one_lattice_are_shifted_and_keep_their_values) {
         }
     }
     free(all.leaf);
-    vsh_grid_free(ball);
-    vsh_grid_free(both);
 }
 
 static double moved_sphere(const double p[3]) { /* twice as large, its middle at 1, 2, 3 */
@@ -51,13 +48,13 @@ static double moved_sphere(const double p[3]) { /* twice as large, its middle at
 }
 
 TEST(a_turned_mirrored_scaled_grid_is_measured_anew) {
-    vsh_grid *ball = ball_grid(0.0, 1.0, 0.03);
+    OWNED(vsh_grid) *ball = ball_grid(0.0, 1.0, 0.03);
     const double c = 2.0 * cos(0.5), s = 2.0 * sin(0.5);
     const double turned[12] = {-c, s, 0, 1, s, c, 0, 2, 0, 0, 2, 3};
     const vsh_grid_instance instance = {ball, turned};
     const double voxels[] = {0.0, 0.045, 0.09};
     for (int i = 0; i < 3; ++i) {
-        vsh_grid *moved = NULL;
+        OWNED(vsh_grid) *moved = NULL;
         const vsh_grid_options options = with_voxel(voxels[i]);
         assert_ok(vsh_grid_unite(&instance, 1, &options, NULL, &moved, &failure));
         vsh_grid_info info;
@@ -67,30 +64,25 @@ TEST(a_turned_mirrored_scaled_grid_is_measured_anew) {
         print_message("resampled sphere, voxel %g: worst error %.3f voxels\n", info.voxel_size, worst);
         assert_true(worst < 0.15);
         assert_int_equal(wrong_blocks(moved, moved_sphere, 10), 0);
-        vsh_grid_free(moved);
     }
-    vsh_grid_free(ball);
 }
 
 TEST(rooms_stay_open_in_a_union_of_different_lattices) {
     const vsh_sdf sdf = hollow_sphere();
     const vsh_grid_options options = with_voxel(0.03);
-    vsh_grid *room = NULL;
+    OWNED(vsh_grid) *room = NULL;
     assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &room, &failure));
-    vsh_grid *ball = ball_grid(0.0, 1.0, 0.05);
+    OWNED(vsh_grid) *ball = ball_grid(0.0, 1.0, 0.05);
     const double turned[12] = {0.12, -0.16, 0, 0, 0.16, 0.12, 0, 0, 0, 0, 0.2, 0};
     const vsh_grid_instance instances[2] = {{ball, turned}, {room, NULL}};
-    vsh_grid *both = NULL;
+    OWNED(vsh_grid) *both = NULL;
     assert_ok(vsh_grid_unite(instances, 2, &options, NULL, &both, &failure));
     assert_true(worst_error(both, room_with_a_ball, 2.9, 2.9) < 0.15);
     assert_int_equal(wrong_blocks(both, room_with_a_ball, 8), 0);
-    vsh_grid_free(both);
-    vsh_grid_free(room);
-    vsh_grid_free(ball);
 }
 
 TEST(threads_do_not_show_in_unions) {
-    vsh_grid *ball = ball_grid(0.0, 1.0, 0.05);
+    OWNED(vsh_grid) *ball = ball_grid(0.0, 1.0, 0.05);
     const double turned[12] = {0.6, -0.8, 0, 0.5, 0.8, 0.6, 0, 0, 0, 0, 1, 0.1};
     const vsh_grid_instance instances[2] = {{ball, NULL}, {ball, turned}};
     vsh_grid *first = NULL;
@@ -107,11 +99,10 @@ TEST(threads_do_not_show_in_unions) {
         }
     }
     vsh_grid_free(first);
-    vsh_grid_free(ball);
 }
 
 TEST(bad_unions_are_refused_with_the_reason) {
-    vsh_grid *ball = ball_grid(0.0, 1.0, 0.05);
+    OWNED(vsh_grid) *ball = ball_grid(0.0, 1.0, 0.05);
     const double uneven[12] = {1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0};
     const double sheared[12] = {1, 0.3, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     const double lost[12] = {1, 0, 0, NAN, 0, 1, 0, 0, 0, 0, 1, 0};
@@ -136,7 +127,6 @@ TEST(bad_unions_are_refused_with_the_reason) {
     instances[1] = instances[0];
     assert_fails(vsh_grid_unite(instances, 2, NULL, &run, &both, &failure), VSH_ERROR_LIMIT, "limit of 1 MB");
     assert_null(both);
-    vsh_grid_free(ball);
 }
 
 int main(void) {

@@ -29,10 +29,9 @@ TEST(turned_and_mirrored_grids_stay_where_they_are) {
 TEST(doubles_are_read) {
     const auto grid = ball<openvdb::DoubleGrid>(RADIUS, 4.0f);
     const std::string path = save("double.vdb", {grid});
-    vsh_grid *read = nullptr;
+    OWNED(vsh_grid) *read = nullptr;
     assert_said(vsh_grid_read(path.c_str(), nullptr, nullptr, &read, &failure), VSH_OK, {});
     assert_true(worst_error(read, RADIUS, openvdb::Vec3d(0.0)) < 0.01);
-    vsh_grid_free(read);
 }
 
 TEST(values_that_are_no_distances_are_made_so) {
@@ -53,7 +52,7 @@ TEST(values_that_are_no_distances_are_made_so) {
     for (const auto &one : cases) {
         const std::string path = save("odd.vdb", {one.grid});
         Warnings warnings;
-        vsh_grid *read = nullptr;
+        OWNED(vsh_grid) *read = nullptr;
         assert_said(vsh_grid_read(path.c_str(), nullptr, &warnings.run, &read, &failure), VSH_OK, {});
         assert_int_equal(warnings.lines.size(), 1);
         assert_non_null(std::strstr(warnings.lines[0].c_str(), one.reason));
@@ -63,7 +62,6 @@ TEST(values_that_are_no_distances_are_made_so) {
         assert_int_equal(vsh_vdb_list(path.c_str(), nullptr, &entry, 1, &count, &failure), VSH_OK);
         assert_non_null(std::strstr(entry.problem, one.reason));
         assert_int_equal(entry.mended, 1);
-        vsh_grid_free(read);
     }
 }
 
@@ -85,11 +83,10 @@ TEST(thin_walls_hold_distances) {
                 }
             }
             Warnings warnings;
-            vsh_grid *read = nullptr;
+            OWNED(vsh_grid) *read = nullptr;
             const std::string path = save("wall.vdb", {grid});
             assert_said(vsh_grid_read(path.c_str(), nullptr, &warnings.run, &read, &failure), VSH_OK, {});
             assert_true(warnings.lines.empty());
-            vsh_grid_free(read);
         }
     }
 }
@@ -159,7 +156,7 @@ TEST(scaled_values_and_narrow_bands_cast_the_same_shadows) {
         openvdb::tools::changeBackground(grid->tree(), one.factor * grid->background());
         const std::string path = save("scaled.vdb", {grid});
         Warnings warnings;
-        vsh_grid *read = nullptr;
+        OWNED(vsh_grid) *read = nullptr;
         assert_said(vsh_grid_read(path.c_str(), nullptr, &warnings.run, &read, &failure), VSH_OK, {});
         assert_int_equal(warnings.lines.size(), one.warnings);
         const std::vector<float> visible = shadows_of(read);
@@ -170,7 +167,6 @@ TEST(scaled_values_and_narrow_bands_cast_the_same_shadows) {
         print_message("values times %g, half width %g: shadows %.4f apart at most\n", double(one.factor),
                       double(one.half_width), double(worst));
         assert_true(worst < 0.03f);
-        vsh_grid_free(read);
     }
 }
 
@@ -192,7 +188,7 @@ TEST(making_distances_anew_names_the_file_and_the_grid) {
     const std::string path = save("narrow.vdb", {narrow});
     vsh_run run = vsh_run_default();
     run.memory_limit = 3 * narrow->memUsage(); // to read it, and no more
-    vsh_grid *read = nullptr;
+    OWNED(vsh_grid) *read = nullptr;
     assert_said(vsh_grid_read(path.c_str(), nullptr, &run, &read, &failure), VSH_ERROR_LIMIT,
                 {path.c_str(), "grid 'hull'", "voxel size 0.05", "over the memory limit"});
     assert_null(read);
@@ -210,7 +206,6 @@ TEST(making_distances_anew_names_the_file_and_the_grid) {
     vsh_grid_info info;
     vsh_grid_get_info(read, &info);
     assert_true(info.active_voxels > 4 * wide->activeVoxelCount());
-    vsh_grid_free(read);
 }
 
 } // namespace

@@ -68,7 +68,7 @@ static counts compare(const vsh_mesh *meshes, size_t mesh_count, int32_t size) {
 
 /* Walls whose arches stand in them, columns on their bases, all solids: charts end where others begin. */
 TEST(samples_of_solids_in_each_other_are_where_they_are_by_themselves) {
-    vsh_model *model = NULL;
+    OWNED(vsh_model) *model = NULL;
     check(vsh_model_read(VSH_ASSETS "/cloister.glb", NULL, &model, &failure), &failure);
     const size_t mesh_count = vsh_model_mesh_count(model);
     vsh_mesh *meshes = calloc(mesh_count, sizeof *meshes);
@@ -81,7 +81,6 @@ TEST(samples_of_solids_in_each_other_are_where_they_are_by_themselves) {
     assert_true(found.samples > 100000 && found.invalid > 10000);
     assert_int_equal(found.other, 0);
     free(meshes);
-    vsh_model_free(model);
 }
 
 enum { RINGS = 24, SECTORS = 32, BALLS = 2, QUADS = BALLS * RINGS * SECTORS };

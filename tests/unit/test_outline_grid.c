@@ -21,13 +21,12 @@ static double box_distance(const double p[3]) {
 
 TEST(a_box_is_a_box) {
     vsh_outline *outline = box(1.0, 0.5);
-    vsh_grid *grid = NULL;
+    OWNED(vsh_grid) *grid = NULL;
     const vsh_grid_options options = with_voxel(0.02);
     assert_ok(vsh_grid_from_outline(outline, 0.6, NULL, &options, NULL, &grid, &failure));
     const double worst = worst_error(grid, box_distance, 2.9, 2.9);
     print_message("box: %.2g voxels\n", worst);
     assert_true(worst < 1e-5);
-    vsh_grid_free(grid);
     vsh_outline_free(outline);
 }
 
@@ -41,11 +40,10 @@ static double placed_distance(const double p[3]) {
 
 TEST(a_transform_moves_the_solid) {
     vsh_outline *outline = box(1.0, 0.5);
-    vsh_grid *grid = NULL;
+    OWNED(vsh_grid) *grid = NULL;
     const vsh_grid_options options = with_voxel(0.05);
     assert_ok(vsh_grid_from_outline(outline, 0.6, placed, &options, NULL, &grid, &failure));
     assert_true(worst_error(grid, placed_distance, 2.9, 2.9) < 1e-5);
-    vsh_grid_free(grid);
     vsh_outline_free(outline);
 }
 

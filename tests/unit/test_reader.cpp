@@ -336,10 +336,9 @@ TEST(a_host_may_ignore_its_children_and_have_threads) {
     std::atomic<int> good{0};
     for (int i = 0; i < 4; ++i) {
         threads.emplace_back([&] {
-            vsh_grid *grid = nullptr;
+            OWNED(vsh_grid) *grid = nullptr;
             vsh_error error;
             good += vsh_grid_read(path.c_str(), nullptr, &run, &grid, &error) == VSH_OK;
-            vsh_grid_free(grid);
         });
     }
     for (std::thread &thread : threads) {
