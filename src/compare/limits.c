@@ -1,10 +1,9 @@
 /* The table of measures with their limits, the verdict, and files of limits, which are JSON. */
 #include "base/floats.h"
 #include "base/job.h"
-#include "base/threads.h"
 #include "base/try.h"
 #include "compare/compare.h"
-#include "json/keys.h"
+#include "json/json.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -67,7 +66,6 @@ struct vsh_tolerances {
     entry all;
     entry *channels; /* in the file's order */
     size_t channel_count;
-    vshi_json_block *blocks;
 };
 
 enum { OF_CHANNEL = 1, OF_FILE = 2 };
@@ -99,9 +97,8 @@ static vsh_result read_channels(vshi_json *reader, const vshi_value *value, void
     VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
     VSHI_TRY(vshi_json_allocate(reader, (void **)&made->channels, json_object_size(value->json),
                                 sizeof(entry), "channels"));
-    for (void *i = json_object_iter(value->json); i != NULL; i = json_object_iter_next(value->json, i)) {
-        const vshi_value item = {value, json_object_iter_key(i), made->channel_count, value->depth + 1,
-                                 json_object_iter_value(i)};
+    vshi_value item = {.json = NULL};
+    while (vshi_next_member(value, &item)) {
         entry *e = &made->channels[made->channel_count];
         const char *name;
         VSHI_TRY(vshi_json_copy(reader, 0, item.key, &name));
@@ -112,23 +109,9 @@ static vsh_result read_channels(vshi_json *reader, const vshi_value *value, void
     return VSH_OK;
 }
 
-typedef struct parsing {
-    vshi_json reader;
-    vsh_tolerances *made;
-} parsing;
-
-static vsh_result parse(void *user, vsh_error *error) {
-    (void)error; /* the reader has it */
-    vshi_json *reader = &((parsing *)user)->reader;
-    vsh_tolerances *made = ((parsing *)user)->made;
-    json_t *json;
-    VSHI_TRY(vshi_json_load(reader, &json));
-    const vshi_value root = {NULL, NULL, 0, 0, json};
-    made->all.given = vsh_compare_files_options_default();
-    const vsh_result result = vshi_read_object(reader, &root, &key_table, OF_FILE, "tolerances", made);
-    made->blocks = reader->blocks;
-    json_decref(json);
-    return result;
+static vsh_result read_tolerances(vshi_json *reader, const vshi_value *root, void *made) {
+    ((vsh_tolerances *)made)->all.given = vsh_compare_files_options_default();
+    return vshi_read_object(reader, root, &key_table, OF_FILE, "tolerances", made);
 }
 
 vsh_result vsh_tolerances_read(const char *path, vsh_tolerances **tolerances, vsh_error *error) {
@@ -136,31 +119,17 @@ vsh_result vsh_tolerances_read(const char *path, vsh_tolerances **tolerances, vs
     VSHI_NEEDS(tolerances);
     *tolerances = NULL;
     VSHI_NEEDS(path);
-    char *text;
-    size_t size;
     vsh_run run = vsh_run_default();
     run.memory_limit = MOST_BYTES;
-    VSHI_TRY(vshi_json_text(path, &run, &text, &size, error));
-    vsh_tolerances *made = calloc(1, sizeof *made);
-    parsing p = {{path, text, size, NULL, error}, made};
-    const vsh_result result =
-        made != NULL
-            ? vshi_on_stack(parse, &p, error)
-            : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
-    free(text);
-    if (result != VSH_OK) {
-        vsh_tolerances_free(made);
-        return result;
-    }
+    vshi_json reader = {.path = path, .run = &run, .error = error};
+    void *made;
+    VSHI_TRY(vshi_json_read(&reader, sizeof **tolerances, read_tolerances, &made));
     *tolerances = made;
     return VSH_OK;
 }
 
 void vsh_tolerances_free(vsh_tolerances *tolerances) {
-    if (tolerances != NULL) {
-        vshi_blocks_free(tolerances->blocks);
-        free(tolerances);
-    }
+    vshi_json_free(tolerances);
 }
 
 void vshi_apply_options(const vsh_compare_files_options *given, vsh_limits *limits, double *coverage) {

@@ -1,17 +1,151 @@
+/* Files of JSON: their text, the memory of what is read, and the place of every error in them. */
 #include "json/json.h"
 
+#include "base/file.h"
+#include "base/job.h"
+#include "base/bytes.h"
 #include "base/memory.h"
+#include "base/threads.h"
 #include "base/try.h"
-#include "json/locate.h"
 
 #include <errno.h>
 #include <stdarg.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+static const size_t MAX_BYTES = (size_t)64 << 20;
+
 /* Deeper than any value that a table can name: SDF trees end at 64 levels of two steps each. */
 enum { MAX_DEPTH = 256, MAX_PATH_TEXT = 320, MAX_KEY_TEXT = 48 };
+
+/* --- places: Jansson gives positions for syntax errors only */
+
+typedef struct place {
+    size_t line;   /* from 1 */
+    size_t column; /* from 1, in characters of UTF-8, as Jansson counts */
+} place;
+
+typedef struct cursor {
+    const char *text;
+    size_t size;
+    size_t at;
+} cursor;
+
+static int peek(const cursor *c) {
+    return c->at < c->size ? (unsigned char)c->text[c->at] : -1;
+}
+
+static void skip_space(cursor *c) {
+    while (peek(c) == ' ' || peek(c) == '\t' || peek(c) == '\n' || peek(c) == '\r') {
+        ++c->at;
+    }
+}
+
+static void skip_string(cursor *c) {
+    ++c->at; /* the opening quote */
+    while (peek(c) != -1 && peek(c) != '"') {
+        c->at += peek(c) == '\\' ? 2 : 1;
+    }
+    c->at = c->at < c->size ? c->at + 1 : c->size;
+}
+
+/* Counts brackets instead of recursing, so that depth costs no stack. */
+static void skip_value(cursor *c) {
+    size_t open = 0;
+    do {
+        skip_space(c);
+        const int first = peek(c);
+        const bool opens = first == '{' || first == '[', closes = first == '}' || first == ']';
+        const bool separates = first == ',' || first == ':';
+        if (first == -1 || (open == 0 && (closes || separates))) {
+            return;
+        }
+        open += opens;
+        open -= closes;
+        if (first == '"') {
+            skip_string(c);
+        } else if (opens || closes || separates) {
+            ++c->at;
+        } else {
+            do { /* one at least, whatever it is */
+                ++c->at;
+            } while (peek(c) > ' ' && peek(c) != ',' && peek(c) != '}' && peek(c) != ']');
+        }
+    } while (open > 0);
+}
+
+/* Moves the cursor to child `ordinal` of the object or array that it is at, and *key to the child's key. */
+static bool enter(cursor *c, size_t ordinal, size_t *key) {
+    const bool object = peek(c) == '{';
+    if (!object && peek(c) != '[') {
+        return false;
+    }
+    ++c->at;
+    for (size_t i = 0;; ++i) {
+        skip_space(c);
+        if (peek(c) == -1 || peek(c) == '}' || peek(c) == ']') {
+            return false;
+        }
+        *key = c->at;
+        if (object) {
+            skip_string(c);
+            skip_space(c);
+            ++c->at; /* the colon */
+            skip_space(c);
+        }
+        if (i == ordinal) {
+            return true;
+        }
+        skip_value(c);
+        skip_space(c);
+        if (peek(c) == ',') {
+            ++c->at;
+        }
+    }
+}
+
+/* Line and column of byte `at`. */
+static place place_of(const vshi_json *reader, size_t at) {
+    place found = {1, 1};
+    for (size_t i = 0; i < at && i < reader->size; ++i) {
+        if (reader->text[i] == '\n') {
+            ++found.line;
+            found.column = 1;
+        } else if (((unsigned char)reader->text[i] & 0xc0) != 0x80) { /* not inside a UTF-8 character */
+            ++found.column;
+        }
+    }
+    return found;
+}
+
+/* Where a value, or its `key`, begins. Walks by numbers and not by names: Jansson keeps members in the order
+ * of the text and rejects duplicates, so escapes in keys need no decoding here. Where the text does not hold
+ * such a path, the place is that of the last step found. */
+static place locate(const vshi_json *reader, const vshi_value *value, bool key) {
+    size_t ordinals[MAX_DEPTH];
+    while (value->depth > MAX_DEPTH) {
+        value = value->parent;
+    }
+    const size_t depth = value->depth;
+    for (; value->depth > 0; value = value->parent) {
+        ordinals[value->depth - 1] = value->ordinal;
+    }
+    cursor c = {reader->text, reader->size, 0};
+    skip_space(&c);
+    size_t found = c.at;
+    for (size_t i = 0; i < depth; ++i) {
+        size_t key_at = c.at;
+        if (!enter(&c, ordinals[i], &key_at)) {
+            break;
+        }
+        found = key && i + 1 == depth ? key_at : c.at;
+    }
+    return place_of(reader, found);
+}
+
+/* --- errors */
 
 /* Appends to a text of fixed size; what does not fit is left out. */
 static void append(char *text, size_t capacity, const char *format, ...)
@@ -46,24 +180,14 @@ static vsh_result fail(const vshi_json *reader, const vshi_value *value, bool ke
                        va_list arguments) __attribute__((format(printf, 4, 0)));
 static vsh_result fail(const vshi_json *reader, const vshi_value *value, bool key, const char *format,
                        va_list arguments) {
-    size_t ordinals[MAX_DEPTH];
-    const vshi_value *step = value;
-    while (step->depth > MAX_DEPTH) {
-        step = step->parent;
-    }
-    const size_t depth = step->depth;
-    for (; step->depth > 0; step = step->parent) {
-        ordinals[step->depth - 1] = step->ordinal;
-    }
-    const vshi_place place = vshi_locate(reader->text, reader->size, ordinals, depth, key);
-    char where[MAX_PATH_TEXT] = "";
+    const place at = locate(reader, value, key);
+    char where[MAX_PATH_TEXT] = "", message[512];
     append_path(where, value);
-    char message[512];
     if (vsnprintf(message, sizeof message, format, arguments) < 0) {
         message[0] = '\0';
     }
-    return vshi_fail(reader->error, VSH_ERROR_INPUT, "%s:%zu:%zu: %s%s%s", reader->path, place.line,
-                     place.column, where, where[0] == '\0' ? "" : ": ", message);
+    return vshi_fail(reader->error, VSH_ERROR_INPUT, "%s:%zu:%zu: %s%s%s", reader->path, at.line, at.column,
+                     where, where[0] == '\0' ? "" : ": ", message);
 }
 
 vsh_result vshi_json_fail(const vshi_json *reader, const vshi_value *value, const char *format, ...) {
@@ -82,15 +206,26 @@ vsh_result vshi_json_fail_key(const vshi_json *reader, const vshi_value *value, 
     return result;
 }
 
+/* --- values */
+
+bool vshi_next_member(const vshi_value *object, vshi_value *member) {
+    const bool first = member->json == NULL;
+    void *at = first ? json_object_iter(object->json)
+                     : json_object_iter_next(object->json, json_object_iter_at(object->json, member->key));
+    if (at != NULL) {
+        *member = (vshi_value){object, json_object_iter_key(at), first ? 0 : member->ordinal + 1,
+                               object->depth + 1, json_object_iter_value(at)};
+    }
+    return at != NULL;
+}
+
 bool vshi_member(const vshi_value *object, const char *key, vshi_value *member) {
-    size_t ordinal = 0;
-    for (void *i = json_object_iter(object->json); i != NULL; i = json_object_iter_next(object->json, i)) {
-        if (strcmp(json_object_iter_key(i), key) == 0) {
-            *member = (vshi_value){object, json_object_iter_key(i), ordinal, object->depth + 1,
-                                   json_object_iter_value(i)};
+    vshi_value at = {.json = NULL};
+    while (vshi_next_member(object, &at)) {
+        if (strcmp(at.key, key) == 0) {
+            *member = at;
             return true;
         }
-        ++ordinal;
     }
     return false;
 }
@@ -110,34 +245,40 @@ vsh_result vshi_reject_both(const vshi_json *reader, const vshi_value *object, c
     return vshi_json_fail_key(reader, later, "cannot stand beside \"%s\"", earlier->key);
 }
 
+/* --- memory */
+
+struct vshi_json_block {
+    vshi_json_block *next;
+    max_align_t contents[];
+};
+
+static vsh_result allocate_block(size_t count, size_t size, const char *what, vshi_json_block **block,
+                                 vsh_error *error) {
+    const bool fits = count <= (SIZE_MAX / 2 - sizeof **block) / size;
+    return fits ? vshi_allocate((void **)block, 1, sizeof **block + count * size, what, error)
+                : vshi_fail(error, VSH_ERROR_MEMORY,
+                            "%s: %zu × %zu bytes are more than this machine can address", what, count, size);
+}
+
+static void free_blocks(vshi_json_block *block) {
+    while (block != NULL) {
+        vshi_json_block *next = block->next;
+        free(block);
+        block = next;
+    }
+}
+
 vsh_result vshi_json_allocate(vshi_json *reader, void **memory, size_t count, size_t size, const char *what) {
     *memory = NULL;
     if (count == 0) {
         return VSH_OK;
     }
-    vshi_json_block *block = malloc(sizeof *block);
-    if (block == NULL) {
-        return vshi_fail(reader->error, VSH_ERROR_MEMORY, "%s: %s: the system refused %zu bytes",
-                         reader->path, what, sizeof *block);
-    }
-    const vsh_result result = vshi_allocate(&block->memory, count, size, what, reader->error);
-    if (result != VSH_OK) {
-        free(block);
-        return result;
-    }
+    vshi_json_block *block = NULL;
+    VSHI_TRY(allocate_block(count, size, what, &block, reader->error));
     block->next = reader->blocks;
     reader->blocks = block;
-    *memory = block->memory;
+    *memory = block->contents;
     return VSH_OK;
-}
-
-void vshi_blocks_free(vshi_json_block *blocks) {
-    while (blocks != NULL) {
-        vshi_json_block *next = blocks->next;
-        free(blocks->memory);
-        free(blocks);
-        blocks = next;
-    }
 }
 
 vsh_result vshi_json_copy(vshi_json *reader, size_t prefix, const char *string, const char **copy) {
@@ -150,7 +291,15 @@ vsh_result vshi_json_copy(vshi_json *reader, size_t prefix, const char *string, 
     return VSH_OK;
 }
 
-vsh_result vshi_json_load(vshi_json *reader, json_t **json) {
+void vshi_json_free(void *made) {
+    if (made != NULL) {
+        free_blocks((vshi_json_block *)(void *)((char *)made - offsetof(vshi_json_block, contents)));
+    }
+}
+
+/* --- files */
+
+static vsh_result load(vshi_json *reader, json_t **json) {
     static const char byte_order_mark[] = "\xef\xbb\xbf"; /* editors on Windows put it in front of UTF-8 */
     if (reader->size >= 3 && memcmp(reader->text, byte_order_mark, 3) == 0) {
         reader->text += 3;
@@ -158,23 +307,94 @@ vsh_result vshi_json_load(vshi_json *reader, json_t **json) {
     }
     const char *zero = memchr(reader->text, '\0', reader->size);
     if (zero != NULL) { /* Jansson passes over some */
-        const vshi_place place = vshi_place_of(reader->text, reader->size, (size_t)(zero - reader->text));
+        const place at = place_of(reader, (size_t)(zero - reader->text));
         return vshi_fail(reader->error, VSH_ERROR_INPUT, "%s:%zu:%zu: a byte of 0, expected text",
-                         reader->path, place.line, place.column);
+                         reader->path, at.line, at.column);
     }
     json_error_t failure;
     errno = 0;
     *json =
         json_loadb(reader->text, reader->size, JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL, &failure);
     if (errno == ENOMEM) { /* Jansson calls it a syntax error, or cuts numbers and words short */
-        json_decref(*json);
-        *json = NULL;
         return vshi_fail(reader->error, VSH_ERROR_MEMORY, "%s: the system refused memory", reader->path);
     }
-    if (*json != NULL) {
-        return VSH_OK;
+    return *json != NULL ? VSH_OK
+                         : vshi_fail(reader->error, VSH_ERROR_INPUT, "%s:%d:%d: %s", reader->path,
+                                     failure.line > 1 ? failure.line : 1,
+                                     failure.column > 1 ? failure.column : 1, failure.text);
+}
+
+vsh_result vshi_json_parse(vshi_json *reader, size_t size, vshi_read_fn *read, void **made) {
+    json_t *json = NULL;
+    vshi_json_block *block = NULL;
+    vsh_result result;
+    *made = NULL;
+    VSHI_TRY_DONE(load(reader, &json));
+    VSHI_TRY_DONE(allocate_block(1, size, reader->path, &block, reader->error));
+    result = read(reader, &(vshi_value){.json = json}, block->contents);
+    block->next = reader->blocks;
+    if (result != VSH_OK) {
+        free_blocks(block);
+        goto done;
     }
-    return vshi_fail(reader->error, VSH_ERROR_INPUT, "%s:%d:%d: %s", reader->path,
-                     failure.line > 1 ? failure.line : 1, failure.column > 1 ? failure.column : 1,
-                     failure.text);
+    *made = block->contents;
+done:
+    json_decref(json);
+    return result;
+}
+
+/* Reads in pieces, not by the size that the system told: the file may grow. */
+static vsh_result read_all(const char *path, FILE *file, char **text, size_t *size, vsh_error *error) {
+    size_t capacity = 0;
+    do {
+        capacity = capacity == 0 ? (size_t)1 << 16 : 2 * capacity;
+        capacity = capacity > MAX_BYTES ? MAX_BYTES + 1 : capacity;
+        char *grown = realloc(*text, capacity + 1);
+        if (grown == NULL) {
+            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, capacity);
+        }
+        *text = grown;
+        errno = 0;
+        *size += fread(*text + *size, 1, capacity - *size, file);
+        if (ferror(file)) {
+            return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, strerror(errno));
+        }
+        if (*size > MAX_BYTES) {
+            return vshi_fail(error, VSH_ERROR_LIMIT, "%s: is larger than the %zu bytes that a scene may have",
+                             path, MAX_BYTES);
+        }
+    } while (*size == capacity);
+    return VSH_OK;
+}
+
+typedef struct reading {
+    vshi_json *reader;
+    size_t size;
+    vshi_read_fn *read;
+    void **made;
+} reading;
+
+static vsh_result read_file(void *user, vsh_error *error) {
+    const reading *r = user;
+    vshi_json *reader = r->reader;
+    FILE *file;
+    uint64_t told;
+    char *text = NULL;
+    size_t size = 0;
+    VSHI_TRY(vshi_input_open(reader->path, reader->path, UINT64_MAX, &file, &told, error));
+    vsh_result result = read_all(reader->path, file, &text, &size, error);
+    fclose(file);
+    VSHI_TRY_DONE(result);
+    VSHI_TRY_DONE(vshi_check_limit(reader->run, vshi_json_bytes(text, size), reader->path, error));
+    reader->text = text;
+    reader->size = size;
+    result = vshi_json_parse(reader, r->size, r->read, r->made);
+done:
+    free(text);
+    return result;
+}
+
+vsh_result vshi_json_read(vshi_json *reader, size_t size, vshi_read_fn *read, void **made) {
+    *made = NULL;
+    return vshi_on_stack(read_file, &(reading){reader, size, read, made}, reader->error);
 }

@@ -1,24 +1,26 @@
-/* The state of reading one scene: its text, its memory, and where in it we are. */
-#ifndef VSHI_JSON_JSON_H
-#define VSHI_JSON_JSON_H
+/* JSON files read through tables of keys (name, type, range, place in a struct), every error with its place.
+ */
+#ifndef VSHI_JSON_H
+#define VSHI_JSON_H
 
 #include "base/error.h"
 
 #include <jansson.h>
 #include <stdbool.h>
 
-/* Memory that lives as long as the scene. */
-typedef struct vshi_json_block {
-    struct vshi_json_block *next;
-    void *memory;
-} vshi_json_block;
+/* --- a file */
 
+/* Memory that lives as long as what is read. */
+typedef struct vshi_json_block vshi_json_block;
+
+/* The state of reading one file. Callers set the first members. */
 typedef struct vshi_json {
-    const char *path; /* of the scene file, for messages and as the folder of the paths in it */
+    const char *path;   /* for messages, and as the folder of the paths in it */
+    const vsh_run *run; /* resolved; NULL: files that the text names are not opened */
+    vsh_error *error;
     const char *text;
     size_t size;
     vshi_json_block *blocks;
-    vsh_error *error;
 } vshi_json;
 
 /* A value with the way to it from the root; lives on the stack of whoever went that way. */
@@ -30,13 +32,28 @@ typedef struct vshi_value {
     json_t *json;
 } vshi_value;
 
-/* The text of a file, to be freed with free(), which reading as JSON keeps within
- * run->memory_limit. Errors: VSH_ERROR_READ, VSH_ERROR_LIMIT (64 MiB, the limit), VSH_ERROR_MEMORY. */
-vsh_result vshi_json_text(const char *path, const vsh_run *run, char **text, size_t *size, vsh_error *error);
+/* Reads a value into a struct, or into its member at the key's offset. */
+typedef vsh_result vshi_read_fn(vshi_json *reader, const vshi_value *value, void *member);
 
-/* The text as JSON, or an error with Jansson's line and column. Numbers are all read as doubles, so that one
- * too large for an integer is out of range like any other. Free with json_decref(). */
-vsh_result vshi_json_load(vshi_json *reader, json_t **json);
+/* Makes a struct of `size` bytes, zeroed, and reads the root of the reader's text into it. Free it with
+ * vshi_json_free(). Numbers are all read as doubles, so that one too large for an integer is out of range
+ * like any other. Errors: VSH_ERROR_INPUT, VSH_ERROR_MEMORY, those of `read`. */
+vsh_result vshi_json_parse(vshi_json *reader, size_t size, vshi_read_fn *read, void **made);
+
+/* The same of the file at the reader's path, whose run is set, on a stack that is large enough. Errors: also
+ * VSH_ERROR_READ, VSH_ERROR_LIMIT (64 MiB, run->memory_limit). */
+vsh_result vshi_json_read(vshi_json *reader, size_t size, vshi_read_fn *read, void **made);
+
+/* Frees what either made, with all that it points to. NULL does nothing. */
+void vshi_json_free(void *made);
+
+/* Zeroed memory that belongs to what is read. */
+vsh_result vshi_json_allocate(vshi_json *reader, void **memory, size_t count, size_t size, const char *what);
+
+/* A copy of `string`, behind the first `prefix` bytes of the file's path. */
+vsh_result vshi_json_copy(vshi_json *reader, size_t prefix, const char *string, const char **copy);
+
+/* --- values */
 
 /* "FILE:LINE:COLUMN: lights[0].angle_deg: …", with the place of the value, or of its key. */
 vsh_result vshi_json_fail(const vshi_json *reader, const vshi_value *value, const char *format, ...)
@@ -44,21 +61,139 @@ vsh_result vshi_json_fail(const vshi_json *reader, const vshi_value *value, cons
 vsh_result vshi_json_fail_key(const vshi_json *reader, const vshi_value *value, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
+/* The member behind `member` of an object, the first where member->json is NULL; false: there is none. */
+bool vshi_next_member(const vshi_value *object, vshi_value *member);
+
 /* Member `key` of an object; false where there is none. */
 bool vshi_member(const vshi_value *object, const char *key, vshi_value *member);
 
 /* Item `index` (< its size) of an array. */
 vshi_value vshi_item(const vshi_value *array, size_t index);
 
+/* Fails where `value` is not of a JSON type. */
+vsh_result vshi_expect(const vshi_json *reader, const vshi_value *value, json_type type);
+
 /* Fails where an object has both keys, at the one that comes later. */
 vsh_result vshi_reject_both(const vshi_json *reader, const vshi_value *object, const char *one,
                             const char *other);
 
-/* Zeroed memory that belongs to the scene. */
-vsh_result vshi_json_allocate(vshi_json *reader, void **memory, size_t count, size_t size, const char *what);
-void vshi_blocks_free(vshi_json_block *blocks);
+/* Reads an array of objects, each into an item of `item_size` bytes, with `read`. */
+vsh_result vshi_read_list(vshi_json *reader, const vshi_value *array, size_t lowest, size_t highest,
+                          size_t item_size, vshi_read_fn *read, void **items, size_t *count);
 
-/* A copy of `string`, behind the first `prefix` bytes of the scene's path. */
-vsh_result vshi_json_copy(vshi_json *reader, size_t prefix, const char *string, const char **copy);
+/* --- tables of keys */
+
+/* Magnitudes over this are no scene: a double then no longer tells points a unit apart, and products of a few
+ * such numbers are not finite. */
+#define VSHI_LARGEST 1e15
+/* Limits of the library for lengths of voxels and of AO. A scene can be smaller or larger. */
+#define VSHI_SMALLEST_LENGTH 1e-12
+#define VSHI_LARGEST_VOXEL 1e12
+#define VSHI_PI 3.14159265358979323846
+
+typedef enum vshi_key_kind {
+    VSHI_NUMBER,  /* double */
+    VSHI_DEGREES, /* double, kept as radians */
+    VSHI_INTEGER, /* int32_t */
+    VSHI_BOOL,    /* int32_t */
+    VSHI_VECTOR,  /* double[count] */
+    VSHI_NAME,    /* int32_t: a name's number */
+    VSHI_STRING,  /* const char *, not empty */
+    VSHI_PATH,    /* const char *, behind the folder of the scene file unless it is absolute */
+    VSHI_CUSTOM,  /* what `read` makes of it */
+    VSHI_LATER    /* read by the caller, before or after the rest */
+} vshi_key_kind;
+
+enum {
+    VSHI_ABOVE = 1,   /* the range's lower end is excluded */
+    VSHI_BELOW = 2,   /* the range's upper end is excluded */
+    VSHI_NONZERO = 4, /* a vector's length must not be 0 */
+};
+
+/* Name of value i, NULL behind the last. */
+typedef const char *vshi_name_fn(int32_t i);
+
+/* How a key is given as a text, on a command line say, and told of. All zero: it stands in files alone. */
+typedef struct vshi_option {
+    const char *name;      /* "max-error" */
+    const char *value;     /* what stands for the value: "N", "VOXELS"; NULL: of VSHI_BOOL */
+    const char *help;      /* what it is for, without range and default */
+    const char *range;     /* of VSHI_CUSTOM, and where numbers do not say it: in words */
+    const char *otherwise; /* the default, where it is not a number or name */
+    int32_t group;         /* the caller's */
+    bool by;               /* numbers have an x between them, not a comma */
+} vshi_option;
+
+typedef struct vshi_key {
+    const char *name;
+    vshi_key_kind kind;
+    uint32_t variants; /* bits of the variants of the object that have this key; 0: all */
+    uint32_t required; /* bits of those that cannot do without */
+    size_t offset;
+    double lowest; /* numbers, and each number of a vector */
+    double highest;
+    int32_t flags;
+    int32_t count;
+    int32_t names;         /* VSH_NAMES_…, if name_of is NULL */
+    vshi_name_fn *name_of; /* other names */
+    vshi_read_fn *read;
+    void (*then)(void *target); /* after it was read: what else follows for the struct; may be NULL */
+    vshi_option option;
+} vshi_key;
+
+/* A row of a table: its name, its VSHI_… and what else is not 0. */
+#define VSHI_KEY(key, of_kind, ...)                                                                          \
+    { .name = key, .kind = VSHI_##of_kind, __VA_ARGS__ }
+#define VSHI_ANY .lowest = -VSHI_LARGEST, .highest = VSHI_LARGEST  /* any number */
+#define VSHI_POSITIVE .highest = VSHI_LARGEST, .flags = VSHI_ABOVE /* numbers above 0 */
+#define VSHI_NEEDED_BY(bits) .variants = bits, .required = bits    /* variants that cannot do without */
+
+#define VSHI_ALL UINT32_MAX
+
+typedef struct vshi_table {
+    const vshi_key *keys;
+    size_t key_count;
+} vshi_table;
+
+#define VSHI_TABLE(keys)                                                                                     \
+    { keys, sizeof(keys) / sizeof((keys)[0]) }
+
+/* Reads an object's members, in the order of the text, into `target`. `variant` is one bit; `what` describes
+ * the object ("a spot light"). Errors: VSH_ERROR_INPUT at the first key that is unknown, not of this variant,
+ * missing, of the wrong type or out of range. */
+vsh_result vshi_read_object(vshi_json *reader, const vshi_value *object, const vshi_table *table,
+                            uint32_t variant, const char *what, void *target);
+
+/* Reads one value as `key` says into `member`. */
+vsh_result vshi_read_value(vshi_json *reader, const vshi_value *value, const vshi_key *key, void *member);
+
+/* Reads the value of a VSHI_NAME key before the rest of its object; keeps *index if there is no such key. */
+vsh_result vshi_read_choice(vshi_json *reader, const vshi_value *object, const vshi_key *key, int32_t *index);
+
+/* Name of a value of a VSHI_NAME key, NULL behind the last. */
+const char *vshi_key_name(const vshi_key *key, int32_t i);
+
+/* --- keys as texts */
+
+/* Reads a text as `key` says into `target`: numbers with commas between them, names, VSHI_BOOL "true",
+ * "false", or NULL for true. Strings are kept as the pointers that they are. Errors: VSH_ERROR_INPUT, "NAME
+ * 'TEXT': expected …"; VSH_ERROR_MEMORY. */
+vsh_result vshi_read_text(const vshi_key *key, const char *name, const char *text, void *target,
+                          vsh_error *error);
+
+/* Writes the range of a key in words, "1 to 4096"; "" if it has none. */
+void vshi_key_range(const vshi_key *key, char *text, size_t size);
+
+/* Writes the value of a key in `target`, "64"; "" for a value that is off. */
+void vshi_key_value(const vshi_key *key, const void *target, char *text, size_t size);
+
+/* --- misspelt words */
+
+/* Number of single-character changes (V. Levenshtein, "Binary codes capable of correcting deletions,
+ * insertions, and reversals", 1966), or SIZE_MAX where one word has more than 63 characters. */
+size_t vshi_edit_distance(const char *a, const char *b);
+
+/* Whether a distance is small enough for a word of this length to be worth saying. */
+bool vshi_is_near(size_t distance, const char *word);
 
 #endif

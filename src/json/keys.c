@@ -1,11 +1,45 @@
-#include "json/keys.h"
-
+/* Objects read through tables of keys, and keys as texts: values from a command line, and descriptions for
+ * people. */
+#include "base/decimal.h"
 #include "base/try.h"
-#include "json/suggest.h"
+#include "json/json.h"
 
 #include <math.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
+
+/* --- misspelt words */
+
+size_t vshi_edit_distance(const char *a, const char *b) {
+    enum { MAX_WORD = 63 };
+    const size_t rows = strnlen(a, MAX_WORD + 1), columns = strnlen(b, MAX_WORD + 1);
+    if (rows > MAX_WORD || columns > MAX_WORD) {
+        return SIZE_MAX;
+    }
+    size_t row[MAX_WORD + 1];
+    for (size_t j = 0; j <= columns; ++j) {
+        row[j] = j;
+    }
+    for (size_t i = 1; i <= rows; ++i) {
+        size_t diagonal = row[0];
+        row[0] = i;
+        for (size_t j = 1; j <= columns; ++j) {
+            const size_t replaced = diagonal + (a[i - 1] != b[j - 1]);
+            const size_t moved = (row[j] < row[j - 1] ? row[j] : row[j - 1]) + 1;
+            diagonal = row[j];
+            row[j] = replaced < moved ? replaced : moved;
+        }
+    }
+    return row[columns];
+}
+
+bool vshi_is_near(size_t distance, const char *word) {
+    const size_t length = strlen(word);
+    return distance <= 2 + length / 4 && distance < length;
+}
+
+/* --- values */
 
 static const char *type_name(json_type type) {
     static const char *const names[] = {
@@ -55,10 +89,7 @@ static vsh_result read_integer(const vshi_json *reader, const vshi_value *value,
 
 static vsh_result read_vector(const vshi_json *reader, const vshi_value *value, const vshi_key *key,
                               double *vector) {
-    vsh_result result = vshi_expect(reader, value, JSON_ARRAY);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_expect(reader, value, JSON_ARRAY));
     const size_t size = json_array_size(value->json);
     if (size != (size_t)key->count) {
         return vshi_json_fail(reader, value, "expected %d numbers, found %zu", (int)key->count, size);
@@ -66,10 +97,7 @@ static vsh_result read_vector(const vshi_json *reader, const vshi_value *value, 
     bool zero = true;
     for (size_t i = 0; i < size; ++i) {
         const vshi_value item = vshi_item(value, i);
-        result = read_number(reader, &item, key, &vector[i]);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(read_number(reader, &item, key, &vector[i]));
         zero = zero && vector[i] == 0.0;
     }
     if (zero && (key->flags & VSHI_NONZERO) != 0) {
@@ -82,20 +110,28 @@ const char *vshi_key_name(const vshi_key *key, int32_t i) {
     return key->name_of != NULL ? key->name_of(i) : vsh_get_name(key->names, i);
 }
 
+static void list_names(const vshi_key *key, char *text, size_t size) {
+    text[0] = '\0';
+    const char *name;
+    for (int32_t i = 0; (name = vshi_key_name(key, i)) != NULL; ++i) {
+        const size_t length = strlen(text);
+        snprintf(text + length, size - length, "%s%s", i == 0 ? "" : ", ", name);
+    }
+}
+
 static vsh_result read_name(const vshi_json *reader, const vshi_value *value, const vshi_key *key,
                             int32_t *index) {
     VSHI_TRY(vshi_expect(reader, value, JSON_STRING));
     const char *given = json_string_value(value->json);
-    char known[256] = "";
     const char *name;
     for (int32_t i = 0; (name = vshi_key_name(key, i)) != NULL; ++i) {
         if (strcmp(name, given) == 0) {
             *index = i;
             return VSH_OK;
         }
-        const size_t length = strlen(known);
-        snprintf(known + length, sizeof known - length, "%s%s", i == 0 ? "" : ", ", name);
     }
+    char known[256];
+    list_names(key, known, sizeof known);
     return vshi_json_fail(reader, value, "\"%.64s\" is none of %s", given, known);
 }
 
@@ -174,14 +210,9 @@ static vsh_result fail_unknown(const vshi_json *reader, const vshi_value *member
 
 vsh_result vshi_read_object(vshi_json *reader, const vshi_value *object, const vshi_table *table,
                             uint32_t variant, const char *what, void *target) {
-    vsh_result result = vshi_expect(reader, object, JSON_OBJECT);
-    if (result != VSH_OK) {
-        return result;
-    }
-    size_t ordinal = 0;
-    for (void *i = json_object_iter(object->json); i != NULL; i = json_object_iter_next(object->json, i)) {
-        const vshi_value member = {object, json_object_iter_key(i), ordinal++, object->depth + 1,
-                                   json_object_iter_value(i)};
+    VSHI_TRY(vshi_expect(reader, object, JSON_OBJECT));
+    vshi_value member = {.json = NULL};
+    while (vshi_next_member(object, &member)) {
         const vshi_key *key = NULL;
         for (size_t k = 0; k < table->key_count && key == NULL; ++k) {
             if (has_variant(table->keys[k].variants, variant) &&
@@ -192,10 +223,7 @@ vsh_result vshi_read_object(vshi_json *reader, const vshi_value *object, const v
         if (key == NULL) {
             return fail_unknown(reader, &member, table, variant, what);
         }
-        result = vshi_read_value(reader, &member, key, (char *)target + key->offset);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(vshi_read_value(reader, &member, key, (char *)target + key->offset));
         if (key->then != NULL) {
             key->then(target);
         }
@@ -224,5 +252,151 @@ vsh_result vshi_read_list(vshi_json *reader, const vshi_value *array, size_t low
         VSHI_TRY(read(reader, &item, (char *)*items + i * item_size));
     }
     *count = size;
+    return VSH_OK;
+}
+
+/* --- keys as texts */
+
+enum { MAX_NUMBERS = 8, MAX_NUMBER_TEXT = 64 };
+
+static bool is_number(const vshi_key *key) {
+    return key->kind == VSHI_NUMBER || key->kind == VSHI_DEGREES || key->kind == VSHI_INTEGER;
+}
+
+void vshi_key_range(const vshi_key *key, char *text, size_t size) {
+    text[0] = '\0';
+    if (key->option.range != NULL) {
+        snprintf(text, size, "%s", key->option.range);
+    } else if (key->kind == VSHI_NAME) {
+        list_names(key, text, size);
+    } else if (is_number(key) && (key->flags & VSHI_ABOVE) != 0) {
+        snprintf(text, size, "more than %.10g", key->lowest);
+    } else if (is_number(key)) {
+        snprintf(text, size, "%.10g to %.10g", key->lowest, key->highest);
+    } else if (key->kind == VSHI_VECTOR) {
+        snprintf(text, size, "at least %.10g", key->lowest);
+    }
+}
+
+/* Describes the texts that vshi_read_text() accepts: "a whole number from 1 to 4096". */
+static void describe_expected(const vshi_key *key, char *text, size_t size) {
+    const char *what = key->kind == VSHI_INTEGER ? "a whole number" : "a number";
+    const size_t used = (size_t)snprintf(text, size, "%s", key->kind == VSHI_NAME ? "one of " : "");
+    if (key->option.range != NULL || key->kind == VSHI_NAME) {
+        vshi_key_range(key, text + used, size - used);
+    } else if (is_number(key) && (key->flags & VSHI_ABOVE) != 0) {
+        snprintf(text, size, "%s greater than %.10g, at most %.10g", what, key->lowest, key->highest);
+    } else if (is_number(key)) {
+        snprintf(text, size, "%s from %.10g to %.10g", what, key->lowest, key->highest);
+    } else if (key->kind == VSHI_VECTOR) {
+        static const char *const counts[] = {[2] = "two", [3] = "three", [4] = "four"};
+        snprintf(text, size, "%s numbers of at least %.10g", counts[key->count], key->lowest);
+    } else if (key->kind == VSHI_BOOL) {
+        snprintf(text, size, "true or false");
+    } else {
+        snprintf(text, size, "a text that is not empty");
+    }
+}
+
+void vshi_key_value(const vshi_key *key, const void *target, char *text, size_t size) {
+    const char *member = (const char *)target + key->offset;
+    double number;
+    int32_t integer;
+    memcpy(&integer, member, sizeof integer);
+    text[0] = '\0';
+    if (key->kind == VSHI_NAME) {
+        snprintf(text, size, "%s", vshi_key_name(key, integer));
+    } else if (key->kind == VSHI_INTEGER) {
+        snprintf(text, size, "%d", integer);
+    } else if (key->kind == VSHI_NUMBER) {
+        memcpy(&number, member, sizeof number);
+        snprintf(text, size, "%.10g", number);
+    }
+}
+
+static bool is_whole(const char *text) {
+    text += *text == '-' || *text == '+';
+    return *text != '\0' && text[strspn(text, "0123456789")] == '\0';
+}
+
+/* One number, or several as an array; NULL: it is none. */
+static json_t *numbers_of(const char *text, char separator, bool array) {
+    json_t *all = json_array();
+    for (const char *at = text;;) {
+        const char *end = strchr(at, separator);
+        end = end != NULL ? end : at + strlen(at);
+        double number;
+        if (json_array_size(all) == MAX_NUMBERS || end - at > MAX_NUMBER_TEXT ||
+            !vshi_decimal_read(at, end, &number) || json_array_append_new(all, json_real(number)) != 0) {
+            json_decref(all);
+            return NULL;
+        }
+        if (*end == '\0') {
+            break;
+        }
+        at = end + 1;
+    }
+    if (array || json_array_size(all) > 1) {
+        return all;
+    }
+    json_t *one = json_incref(json_array_get(all, 0));
+    json_decref(all);
+    return one;
+}
+
+/* The text as a scene's file would have it; NULL: it is no value, or memory is short. */
+static json_t *json_of(const vshi_key *key, const char *text) {
+    json_t *json = NULL;
+    switch (key->kind) {
+    case VSHI_BOOL:
+        return text == NULL || strcmp(text, "true") == 0 ? json_true()
+               : strcmp(text, "false") == 0              ? json_false()
+                                                         : NULL;
+    case VSHI_NUMBER:
+    case VSHI_DEGREES:
+        return numbers_of(text, '\0', false);
+    case VSHI_INTEGER:
+        return is_whole(text) ? numbers_of(text, '\0', false) : NULL;
+    case VSHI_VECTOR:
+        return numbers_of(text, ',', true);
+    case VSHI_CUSTOM:
+        json = numbers_of(text, key->option.by ? 'x' : ',', false);
+        return json != NULL ? json : json_string(text);
+    default:
+        return json_string(text);
+    }
+}
+
+/* Whether the text is a value of the key. */
+static bool read_text(const vshi_key *key, const char *name, const char *text, char *member) {
+    if (key->kind == VSHI_STRING || key->kind == VSHI_PATH) {
+        if (text == NULL || text[0] == '\0') {
+            return false;
+        }
+        memcpy(member, &text, sizeof text);
+        return true;
+    }
+    if (text == NULL && key->kind != VSHI_BOOL) {
+        return false;
+    }
+    vsh_error unused; /* it tells of places in a file; and no such key takes memory of the reader */
+    vshi_json reader = {.path = name, .error = &unused, .text = ""};
+    const vshi_value value = {.json = json_of(key, text)};
+    const bool good = value.json != NULL && vshi_read_value(&reader, &value, key, member) == VSH_OK;
+    json_decref(value.json);
+    return good;
+}
+
+vsh_result vshi_read_text(const vshi_key *key, const char *name, const char *text, void *target,
+                          vsh_error *error) {
+    if (!read_text(key, name, text, (char *)target + key->offset)) {
+        char expected[256];
+        describe_expected(key, expected, sizeof expected);
+        return vshi_fail(error, VSH_ERROR_INPUT, "%.64s '%.200s': expected %s", name,
+                         text != NULL ? text : "", expected);
+    }
+    if (key->then != NULL) {
+        key->then(target);
+    }
     return VSH_OK;
 }

@@ -1,8 +1,6 @@
 /* From a scene's casters to one level set. */
 #include "base/floats.h"
 #include "base/similarity.h"
-#include "mesh/mesh_set.h"
-#include "scene/assets.h"
 #include "scene/occluders.h"
 #include "spheres/spheres.h"
 
@@ -27,12 +25,16 @@ typedef struct placed_sdf {
     const double *transform; /* of the grid's instance; NULL for a folded tree */
 } placed_sdf;
 
+#define ALL SIZE_MAX
+
 /* What is gathered on the way to one grid. */
 typedef struct assembly {
     const vsh_scene *scene;
     const vsh_assets *assets;
-    const bool *taken; /* [caster_count] */
-    vsh_mesh *meshes;  /* of all mesh casters */
+    size_t only;  /* the caster that is taken alone, or ALL: those that have voxels */
+    bool layered; /* of these, those in `layer`, or (NULL) in none */
+    const vsh_scene_layer *layer;
+    vsh_mesh *meshes; /* [mesh_count]: those of all casters */
     size_t mesh_count;
     placed_sdf *sdfs; /* [caster_count]; zero for casters that are none */
     vsh_grid_instance *instances;
@@ -42,17 +44,26 @@ typedef struct assembly {
     vsh_grid_options options;
 } assembly;
 
-static vsh_result place_sdf(const vsh_caster *caster, size_t index, placed_sdf *placed, vsh_error *error) {
-    vsh_result result = vsh_sdf_check(&caster->sdf, error);
-    if (result != VSH_OK) {
-        return result;
+static bool takes(const assembly *a, size_t i) {
+    const vsh_caster *caster = &a->scene->casters[i];
+    if (a->only != ALL) {
+        return i == a->only;
     }
+    return (!a->layered || vshi_caster_in_layer(caster, a->layer)) &&
+           !vshi_caster_is_direct(a->scene, caster);
+}
+
+static size_t count_taken(const assembly *a) {
+    size_t count = 0;
+    for (size_t i = 0; i < a->scene->caster_count; ++i) {
+        count += takes(a, i);
+    }
+    return count;
+}
+
+static vsh_result place_sdf(const vsh_caster *caster, placed_sdf *placed, vsh_error *error) {
     const double *m = caster->transform;
     const double scale = vshi_similarity_scale(m);
-    if (scale <= 0.0) {
-        return vshi_fail(error, VSH_ERROR_INPUT,
-                         "caster %zu: the transform of an sdf must neither shear nor scale unevenly", index);
-    }
     placed->sdf = caster->sdf;
     if (vshi_transform_determinant(m) < 0.0) {
         placed->scale = scale;
@@ -60,10 +71,7 @@ static vsh_result place_sdf(const vsh_caster *caster, size_t index, placed_sdf *
         return VSH_OK;
     }
     void *memory = NULL;
-    result = vshi_allocate(&memory, caster->sdf.node_count, sizeof *placed->nodes, "sdf nodes", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate(&memory, caster->sdf.node_count, sizeof *placed->nodes, "sdf nodes", error));
     placed->nodes = memory;
     memcpy(placed->nodes, caster->sdf.nodes, caster->sdf.node_count * sizeof *placed->nodes);
     placed->sdf.nodes = placed->nodes;
@@ -81,47 +89,52 @@ static vsh_result place_sdf(const vsh_caster *caster, size_t index, placed_sdf *
 }
 
 static vsh_result allocate_assembly(assembly *a, vsh_error *error) {
-    const size_t casters = a->scene->caster_count;
-    size_t meshes = 0;
-    for (size_t i = 0; i < casters; ++i) {
-        size_t count = 0;
-        vsh_assets_caster(a->assets, i, &count);
-        meshes += count;
-    }
+    const size_t casters = a->scene->caster_count, meshes = vshi_assets_mesh_count(a->assets);
     VSHI_TRY(vshi_allocate((void **)&a->meshes, meshes, sizeof *a->meshes, "meshes", error));
     VSHI_TRY(vshi_allocate((void **)&a->sdfs, casters, sizeof *a->sdfs, "casters", error));
     VSHI_TRY(vshi_allocate((void **)&a->instances, casters + 1, sizeof *a->instances, "casters", error));
     return vshi_allocate((void **)&a->made, casters + 1, sizeof *a->made, "casters", error);
 }
 
+/* Names a caster that must keep its shape; NULL: it may be sheared. */
+static const char *name_rigid(const vsh_caster *caster) {
+    return caster->type == VSH_CASTER_SDF                                       ? "an sdf"
+           : caster->type == VSH_CASTER_VDB                                     ? "a level set"
+           : caster->type == VSH_CASTER_MASK || caster->type == VSH_CASTER_TEXT ? "a mask or text"
+                                                                                : NULL;
+}
+
+static vsh_result gather_caster(assembly *a, size_t i, vsh_error *error) {
+    const vsh_caster *caster = &a->scene->casters[i];
+    const vshi_asset_place *place = vshi_assets_caster(a->assets, i);
+    const char *rigid = name_rigid(caster);
+    const bool vdb = caster->type == VSH_CASTER_VDB;
+    if (caster->type == VSH_CASTER_SDF) {
+        VSHI_TRY(vsh_sdf_check(&caster->sdf, error));
+    }
+    if (rigid != NULL && vshi_similarity_scale(caster->transform) <= 0.0) {
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "caster %zu: %s%sthe transform of %s must neither shear nor scale unevenly", i,
+                         vdb ? caster->path : "", vdb ? ": " : "", rigid);
+    }
+    if (vdb && place->grid == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "caster %zu: %s: was not read, as the scene takes its field from a file", i,
+                         caster->path);
+    }
+    if (caster->type == VSH_CASTER_SDF) {
+        VSHI_TRY(place_sdf(caster, &a->sdfs[i], error));
+    }
+    for (size_t k = 0; k < place->count; ++k) {
+        a->meshes[a->mesh_count++] = place->meshes[k];
+    }
+    return VSH_OK;
+}
+
 static vsh_result gather(assembly *a, vsh_error *error) {
     for (size_t i = 0; i < a->scene->caster_count; ++i) {
-        const vsh_caster *caster = &a->scene->casters[i];
-        if (!a->taken[i]) {
-            continue;
-        }
-        if (caster->type == VSH_CASTER_SDF) {
-            VSHI_TRY(place_sdf(caster, i, &a->sdfs[i], error));
-        } else if (caster->type == VSH_CASTER_VDB && vshi_similarity_scale(caster->transform) <= 0.0) {
-            return vshi_fail(error, VSH_ERROR_INPUT,
-                             "caster %zu: %s: the transform of a level set must neither shear nor scale "
-                             "unevenly",
-                             i, caster->path);
-        } else if (caster->type == VSH_CASTER_VDB && vshi_assets_grid(a->assets, i) == NULL) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                             "caster %zu: %s: was not read, as the scene takes its field from a file", i,
-                             caster->path);
-        }
-        if (vshi_assets_outline(a->assets, i) != NULL && vshi_similarity_scale(caster->transform) <= 0.0) {
-            return vshi_fail(error, VSH_ERROR_INPUT,
-                             "caster %zu: the transform of a mask or text must neither shear nor scale "
-                             "unevenly",
-                             i);
-        }
-        size_t count = 0;
-        const vsh_mesh *views = vsh_assets_caster(a->assets, i, &count);
-        for (size_t k = 0; k < count; ++k) {
-            a->meshes[a->mesh_count++] = views[k];
+        if (takes(a, i)) {
+            VSHI_TRY(gather_caster(a, i, error));
         }
     }
     return VSH_OK;
@@ -155,11 +168,7 @@ static vsh_result take_own_voxels(assembly *a, double finest, vsh_error *error) 
                          "resolution 0: no caster is a level set, whose voxel size it stands for");
     }
     a->options.resolution = vsh_grid_options_default().resolution; /* not looked at */
-    size_t taken = 0;
-    for (size_t i = 0; i < a->scene->caster_count; ++i) {
-        taken += a->taken[i];
-    }
-    a->options.voxel_size = taken > 1 ? finest : 0.0;
+    a->options.voxel_size = count_taken(a) > 1 ? finest : 0.0;
     return VSH_OK;
 }
 
@@ -173,7 +182,8 @@ static vsh_result choose_voxel_size(assembly *a, vsh_error *error) {
     }
     for (size_t i = 0; i < a->scene->caster_count; ++i) {
         const vsh_caster *caster = &a->scene->casters[i];
-        if (!a->taken[i]) {
+        const vshi_asset_place *place = vshi_assets_caster(a->assets, i);
+        if (!takes(a, i)) {
             continue;
         }
         if (caster->type == VSH_CASTER_SDF) {
@@ -182,18 +192,18 @@ static vsh_result choose_voxel_size(assembly *a, vsh_error *error) {
             grow_box(&all, min, max, a->sdfs[i].transform);
         } else if (caster->type == VSH_CASTER_VDB) {
             vsh_grid_info info;
-            vsh_grid_get_info(vshi_assets_grid(a->assets, i), &info);
+            vsh_grid_get_info(place->grid, &info);
             grow_box(&all, info.bounds_min, info.bounds_max, caster->transform);
             finest = fmin(finest, info.voxel_size * vshi_similarity_scale(caster->transform));
-        } else if (vshi_assets_outline(a->assets, i) != NULL) {
+        } else if (place->outline != NULL) {
             vsh_outline_info info;
-            vsh_outline_get_info(vshi_assets_outline(a->assets, i), &info);
+            vsh_outline_get_info(place->outline, &info);
             const double half = 0.5 * caster->thickness;
             grow_box(&all, (const double[]){info.bounds_min[0], info.bounds_min[1], -half},
                      (const double[]){info.bounds_max[0], info.bounds_max[1], half}, caster->transform);
         } else if (caster->type == VSH_CASTER_SPHERES) {
             vsh_spheres_info info;
-            vsh_spheres_get_info(vshi_assets_spheres(a->assets, i), &info);
+            vsh_spheres_get_info(place->spheres, &info);
             grow_box(&all, info.bounds_min, info.bounds_max, NULL);
         }
     }
@@ -214,15 +224,15 @@ static vsh_result choose_voxel_size(assembly *a, vsh_error *error) {
 }
 
 /* Warns of level sets whose voxels become others, where values are marched through these. */
-static void warn_resampled(const assembly *a, const vsh_scene_layer *layer, const vsh_run *run) {
+static void warn_resampled(const assembly *a, const vsh_run *run) {
     static const double SAME = 1e-4;
-    for (size_t i = 0; i < a->scene->caster_count && vsh_scene_marches(a->scene, layer); ++i) {
+    for (size_t i = 0; i < a->scene->caster_count && vsh_scene_marches(a->scene, a->layer); ++i) {
         const vsh_caster *caster = &a->scene->casters[i];
-        if (!a->taken[i] || caster->type != VSH_CASTER_VDB || a->options.voxel_size == 0.0) {
+        if (!takes(a, i) || caster->type != VSH_CASTER_VDB || a->options.voxel_size == 0.0) {
             continue;
         }
         vsh_grid_info info;
-        vsh_grid_get_info(vshi_assets_grid(a->assets, i), &info);
+        vsh_grid_get_info(vshi_assets_caster(a->assets, i)->grid, &info);
         const double own = info.voxel_size * vshi_similarity_scale(caster->transform);
         if (fabs(own - a->options.voxel_size) > SAME * own) {
             vshi_warn(run, "%s: its voxels of %g are resampled to %g; --resolution 0 keeps them",
@@ -268,21 +278,22 @@ static vsh_result voxelise_spheres(assembly *a, const vsh_spheres *spheres, vsh_
 /* The limit of memory is that of all the grids together: run->memory_held grows by each. */
 static vsh_result make_grid(assembly *a, size_t i, vsh_run *run, vsh_error *error) {
     const vsh_caster *caster = &a->scene->casters[i];
+    const vshi_asset_place *place = vshi_assets_caster(a->assets, i);
     vsh_grid **made = &a->made[a->made_count];
     if (caster->type == VSH_CASTER_VDB) {
-        add_instance(a, vshi_assets_grid(a->assets, i), caster->transform);
+        add_instance(a, place->grid, caster->transform);
     } else if (caster->type == VSH_CASTER_SDF) {
         const placed_sdf *placed = &a->sdfs[i];
         vsh_grid_options options = a->options;
         options.voxel_size /= placed->scale;
         VSHI_TRY(vsh_grid_from_sdf(&placed->sdf, &options, run, made, error));
         return add_made(a, placed->transform, run, error);
-    } else if (vshi_assets_outline(a->assets, i) != NULL) {
-        VSHI_TRY(vsh_grid_from_outline(vshi_assets_outline(a->assets, i), caster->thickness,
-                                       caster->transform, &a->options, run, made, error));
+    } else if (place->outline != NULL) {
+        VSHI_TRY(vsh_grid_from_outline(place->outline, caster->thickness, caster->transform, &a->options, run,
+                                       made, error));
         return add_made(a, NULL, run, error);
     } else if (caster->type == VSH_CASTER_SPHERES) {
-        return voxelise_spheres(a, vshi_assets_spheres(a->assets, i), run, error);
+        return voxelise_spheres(a, place->spheres, run, error);
     }
     return VSH_OK;
 }
@@ -294,7 +305,7 @@ static vsh_result make_grids(assembly *a, vsh_run *run, vsh_error *error) {
         VSHI_TRY(add_made(a, NULL, run, error));
     }
     for (size_t i = 0; i < a->scene->caster_count; ++i) {
-        if (a->taken[i]) {
+        if (takes(a, i)) {
             VSHI_TRY(make_grid(a, i, run, error));
         }
     }
@@ -324,37 +335,25 @@ static void free_assembly(assembly *a) {
 }
 
 /* The union of the casters that are taken, with these options over the defaults. */
-static vsh_result assemble(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
-                           const bool *taken, const vsh_grid_options *options, const vsh_run *run,
-                           vsh_grid **grid, vsh_error *error) {
-    assembly a = {.scene = scene, .assets = assets, .taken = taken, .options = vsh_grid_options_default()};
+static vsh_result assemble(assembly a, const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
+                           vsh_error *error) {
     vsh_run full;
+    a.options = vsh_grid_options_default();
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     VSHI_TRY(vshi_options_resolve(options, &a.options, sizeof a.options, "vsh_grid_options", error));
-    vsh_result result = VSH_OK;
-    full.memory_held += scene->caster_count * BYTES_PER_CASTER;
+    vsh_result result;
+    full.memory_held += a.scene->caster_count * BYTES_PER_CASTER;
     VSHI_TRY_DONE(allocate_assembly(&a, error));
     VSHI_TRY_DONE(gather(&a, error));
     if (a.options.voxel_size == 0.0) {
         VSHI_TRY_DONE(choose_voxel_size(&a, error));
     }
-    warn_resampled(&a, layer, &full);
+    warn_resampled(&a, &full);
     VSHI_TRY_DONE(make_grids(&a, &full, error));
     VSHI_TRY_DONE(unite(&a, run, grid, error)); /* which counts the instances itself */
 done:
     free_assembly(&a);
     return result;
-}
-
-/* Which casters are taken: all that are voxelised, or those of a layer (NULL: of none); returns how many. */
-static size_t take(const vsh_scene *scene, bool all, const vsh_scene_layer *layer, bool *taken) {
-    size_t count = 0;
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        const vsh_caster *caster = &scene->casters[i];
-        taken[i] = (all || vshi_caster_in_layer(caster, layer)) && !vshi_caster_is_direct(scene, caster);
-        count += taken[i];
-    }
-    return count;
 }
 
 vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
@@ -367,19 +366,13 @@ vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, c
     if (scene->caster_count == 0) {
         return vshi_fail(error, VSH_ERROR_INPUT, "scene: no casters");
     }
-    bool *taken;
-    vsh_result result = VSH_OK;
-    VSHI_TRY_DONE(vshi_allocate((void **)&taken, scene->caster_count, sizeof *taken, "casters", error));
-    if (take(scene, true, NULL, taken) == 0) {
-        VSHI_TRY_DONE(
-            vshi_fail(error, VSH_ERROR_INPUT, "scene: its methods shade all casters without voxels"));
+    const assembly a = {.scene = scene, .assets = assets, .only = ALL};
+    if (count_taken(&a) == 0) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "scene: its methods shade all casters without voxels");
     }
     const vsh_grid_options options =
         scene->layer_count == 0 ? vshi_scene_grid_options(scene, NULL) : scene->grid;
-    VSHI_TRY_DONE(assemble(scene, assets, NULL, taken, &options, run, grid, error));
-done:
-    free(taken);
-    return result;
+    return assemble(a, &options, run, grid, error);
 }
 
 vsh_grid_options vshi_scene_grid_options(const vsh_scene *scene, const vsh_scene_layer *layer) {
@@ -402,28 +395,14 @@ vsh_result vsh_scene_layer_casters(const vsh_scene *scene, const vsh_assets *ass
     *grid = NULL;
     VSHI_NEEDS(scene);
     VSHI_NEEDS(assets);
+    const assembly a = {.scene = scene, .assets = assets, .only = ALL, .layered = true, .layer = layer};
     const vsh_grid_options options = vshi_scene_grid_options(scene, layer);
-    bool *taken;
-    vsh_result result = VSH_OK;
-    VSHI_TRY_DONE(vshi_allocate((void **)&taken, scene->caster_count, sizeof *taken, "casters", error));
-    if (take(scene, false, layer, taken) > 0) {
-        VSHI_TRY_DONE(assemble(scene, assets, layer, taken, &options, run, grid, error));
-    }
-done:
-    free(taken);
-    return result;
+    return count_taken(&a) > 0 ? assemble(a, &options, run, grid, error) : VSH_OK;
 }
 
 vsh_result vshi_scene_caster_grid(const vsh_scene *scene, const vsh_assets *assets, size_t caster,
                                   const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
                                   vsh_error *error) {
-    bool *taken;
-    vsh_result result;
     *grid = NULL;
-    VSHI_TRY_DONE(vshi_allocate((void **)&taken, scene->caster_count, sizeof *taken, "casters", error));
-    taken[caster] = true;
-    result = assemble(scene, assets, NULL, taken, options, run, grid, error);
-done:
-    free(taken);
-    return result;
+    return assemble((assembly){.scene = scene, .assets = assets, .only = caster}, options, run, grid, error);
 }

@@ -1,28 +1,38 @@
-/* What stands behind a scene: the meshes of its files put where casters and receivers stand. */
+/* Loads a scene: reads each file once, and puts the meshes where casters and receivers
+ * stand. */
 #include "scene/assets.h"
 
-#include "base/error.h"
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/similarity.h"
 #include "base/try.h"
-#include "base/vec.h"
 #include "heightfield/heights.h"
 #include "model/model.h"
-#include "scene/asset_files.h"
-#include "scene/asset_place.h"
+#include "scene/masks.h"
 #include "scene/select.h"
-#include "scene/solidity.h"
-#include "scene/unwrapped.h"
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include <vdbshade/lit.h>
 
+/* --- files */
+
+typedef enum file_kind { MODEL, GRID, HEIGHTS } file_kind;
+
+typedef struct vshi_asset_file {
+    file_kind kind;
+    const char *path, *name; /* the scene's: not looked at when all is loaded; name: of a grid, or NULL */
+    vsh_model *model;
+    vshi_masks *masks; /* of the model's textures */
+    vsh_grid *grid;
+    vshi_height_image heights; /* until all models are made of them */
+    bool checked;              /* for triangles of zero area */
+} vshi_asset_file;
+
 struct vsh_assets {
-    vshi_asset_files files;
+    vshi_asset_file *files; /* [file_count] */
+    size_t file_count;
     vshi_asset_place *casters;
     size_t caster_count;
     vshi_asset_place *receivers;
@@ -30,10 +40,198 @@ struct vsh_assets {
     vshi_mesh_set set; /* of the casters' meshes */
 };
 
-static vsh_result place_model(vshi_asset_place *place, const vsh_model *model, int32_t uv_set,
-                              const double transform[12], vsh_error *error) {
-    return vshi_place_chosen(place, model, NULL, uv_set, 0.0, transform, error);
+static bool is_same(const char *a, const char *b) {
+    return a == NULL || b == NULL ? a == b : strcmp(a, b) == 0;
 }
+
+static vsh_result read_file(vsh_assets *assets, file_kind kind, const char *path, const char *name,
+                            const vsh_run *run, vshi_asset_file **file, vsh_error *error) {
+    for (size_t i = 0; i < assets->file_count; ++i) {
+        *file = &assets->files[i];
+        if ((*file)->kind == kind && is_same((*file)->path, path) && is_same((*file)->name, name)) {
+            return VSH_OK;
+        }
+    }
+    vshi_asset_file *made = *file = &assets->files[assets->file_count++];
+    *made = (vshi_asset_file){.kind = kind, .path = path, .name = name};
+    if (kind == GRID) {
+        return vsh_grid_read(path, name, run, &made->grid, error);
+    }
+    if (kind == HEIGHTS) {
+        return vshi_height_image_read(path, run, &made->heights, error);
+    }
+    VSHI_TRY(vsh_model_read(path, run, &made->model, error));
+    return vshi_masks_create(made->model, path, &made->masks, error);
+}
+
+static void free_heights(vsh_assets *assets) {
+    for (size_t i = 0; i < assets->file_count; ++i) {
+        free(assets->files[i].heights.values);
+        assets->files[i].heights.values = NULL;
+    }
+}
+
+/* --- meshes of a model */
+
+/* outer × inner, three rows of four each. */
+static void compose(const double outer[12], const double inner[12], double result[12]) {
+    for (int row = 0; row < 3; ++row) {
+        const double *o = outer + 4 * row;
+        for (int column = 0; column < 4; ++column) {
+            result[4 * row + column] = o[0] * inner[column] + o[1] * inner[4 + column] +
+                                       o[2] * inner[8 + column] + (column == 3 ? o[3] : 0.0);
+        }
+    }
+}
+
+/* Adds a mesh: number `number` of a model, or a part of that. */
+static void add_mesh(vshi_asset_place *place, vsh_mesh mesh, size_t number, double scale,
+                     const double transform[12]) {
+    double *composed = place->transforms + 12 * place->count, scaled[12];
+    for (int k = 0; k < 12; ++k) {
+        scaled[k] = mesh.transform[k] * scale;
+    }
+    compose(transform, scaled, composed);
+    mesh.transform = composed;
+    place->numbers[place->count] = number;
+    place->meshes[place->count++] = mesh;
+}
+
+static vsh_result allocate_meshes(vshi_asset_place *place, size_t count, vsh_error *error) {
+    VSHI_TRY(vshi_allocate((void **)&place->meshes, count, sizeof *place->meshes, "meshes", error));
+    VSHI_TRY(vshi_allocate((void **)&place->transforms, count, 12 * sizeof(double), "transforms", error));
+    return vshi_allocate((void **)&place->numbers, count, sizeof *place->numbers, "meshes", error);
+}
+
+static double scale_of(const vsh_model *model, double unit) {
+    const double own_unit = vsh_model_unit(model) > 0.0 ? vsh_model_unit(model) : 1.0;
+    return unit > 0.0 ? unit / own_unit : 1.0;
+}
+
+/* Puts the meshes of the model that are `chosen` there; NULL: all. */
+static vsh_result place_chosen(vshi_asset_place *place, const vsh_model *model, const unsigned char *chosen,
+                               int32_t uv_set, double unit, const double transform[12], vsh_error *error) {
+    const size_t all = vsh_model_mesh_count(model);
+    const double scale = scale_of(model, unit);
+    VSHI_TRY(allocate_meshes(place, all, error));
+    for (size_t i = 0; i < all; ++i) {
+        if (chosen == NULL || chosen[i] != 0) {
+            add_mesh(place, vsh_model_mesh(model, i, uv_set), i, scale, transform);
+        }
+    }
+    return VSH_OK;
+}
+
+/* Adds the chosen meshes as they cast. Meshes that `parts`, a receiver of the same model, has unwrapped come
+ * from there, so that a mesh that casts and receives is one; NULL: none. A mesh that a mask cuts out keeps
+ * the UVs of its texture. */
+static vsh_result add_casting(vshi_asset_place *place, vshi_masks *masks, const unsigned char *chosen,
+                              const vshi_asset_place *parts, double unit, const double transform[12],
+                              const vsh_run *run, vsh_error *error) {
+    const vsh_model *model = place->model;
+    const size_t all = vsh_model_mesh_count(model), part_count = parts != NULL ? parts->count : 0;
+    const double scale = scale_of(model, unit);
+    unsigned char *left = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(allocate_meshes(place, 2 * all + part_count, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&left, all, 1, "meshes", error));
+    memcpy(left, chosen, all);
+    for (size_t i = 0; i < part_count; ++i) {
+        const size_t number = parts->numbers[i];
+        vshi_cast_views views = {.count = 0};
+        if (chosen[number] != 0) {
+            VSHI_TRY_DONE(vshi_masks_cast(masks, number, run, &views, error));
+        }
+        if (chosen[number] != 0 && !views.cut) {
+            vsh_mesh part = parts->meshes[i];
+            part.transform = vsh_model_mesh(model, number, -1).transform;
+            add_mesh(place, part, number, scale, transform);
+            left[number] = 0;
+        }
+    }
+    for (size_t i = 0; i < all; ++i) {
+        vshi_cast_views views = {.count = 0};
+        if (left[i] != 0) {
+            VSHI_TRY_DONE(vshi_masks_cast(masks, i, run, &views, error));
+        }
+        for (int k = 0; k < views.count; ++k) {
+            add_mesh(place, views.meshes[k], i, scale, transform);
+        }
+    }
+done:
+    free(left);
+    return result;
+}
+
+/* Takes glass and the like out of `chosen`; what is a cut-out, though its material is blended, stays. */
+static vsh_result leave_out_blended(const vsh_scene *scene, vshi_masks *masks, const vsh_model *model,
+                                    const char *path, const vsh_run *run, unsigned char *chosen,
+                                    vsh_error *error) {
+    const size_t count = vsh_model_mesh_count(model);
+    size_t left = 0, blended = 0, cut_out = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const int32_t alpha = vsh_model_mesh(model, i, -1).alpha;
+        bool out = chosen[i] != 0 && alpha == VSH_ALPHA_BLENDED && scene->cast_blended == 0;
+        vshi_blend blend = VSHI_BLEND_GLASS;
+        if (out) {
+            VSHI_TRY(vshi_masks_blend(masks, i, run, &blend, error));
+        }
+        out = out && blend == VSHI_BLEND_GLASS;
+        cut_out += blend == VSHI_BLEND_CUT_OUT;
+        blended += out;
+        chosen[i] = out ? 0 : chosen[i];
+        left += chosen[i] != 0;
+    }
+    if (left == 0) {
+        return vshi_fail(
+            error, VSH_ERROR_INPUT,
+            "%s: all its materials are blended (glass, smoke), and cast nothing; \"cast_blended\" "
+            "in a scene, or --cast-blended, has them cast",
+            path);
+    }
+    if (blended > 0) {
+        vshi_warn(run,
+                  "%s: %zu of %zu meshes have blended materials (glass, smoke) and cast no shadow; "
+                  "--cast-blended makes them cast",
+                  path, blended, count);
+    }
+    if (cut_out > 0) {
+        vshi_note(
+            run,
+            "%s: %zu of %zu meshes have blended materials that their textures cut out (leaves, fences): "
+            "they cast where alpha is at least half; --no-cast NAME leaves them out",
+            path, cut_out, count);
+    }
+    return VSH_OK;
+}
+
+/* Adds the meshes of the place's model that a mesh caster takes, as they cast. `parts` is a receiver that has
+ * unwrapped meshes of the model, or NULL. Warns of blended meshes that do not cast. */
+static vsh_result place_casting(vshi_asset_place *place, const vsh_scene *scene, const vsh_caster *caster,
+                                const vshi_asset_place *parts, const vsh_run *run, vsh_error *error) {
+    vshi_masks *masks = place->file->masks;
+    unsigned char *chosen = NULL, *one_sided = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_select(place->model, caster->path, &caster->objects, &chosen, error));
+    VSHI_TRY_DONE(leave_out_blended(scene, masks, place->model, caster->path, run, chosen, error));
+    VSHI_TRY_DONE(vshi_select_some(place->model, caster->path, caster->one_sided, caster->one_sided_count,
+                                   &one_sided, error));
+    VSHI_TRY_DONE(add_casting(place, masks, chosen, parts, scene->unit, caster->transform, run, error));
+    for (size_t i = 0; i < place->count; ++i) {
+        place->meshes[i].one_sided = one_sided[place->numbers[i]];
+    }
+    if (place->count == 0) {
+        result = vshi_fail(error, VSH_ERROR_INPUT,
+                           "%s: the masks of its materials leave nothing of what is to cast", caster->path);
+    }
+done:
+    vshi_masks_trim(masks);
+    free(one_sided);
+    free(chosen);
+    return result;
+}
+
+/* --- casters and receivers */
 
 /* A second side of 0 follows from the first, which is the longer one, by the cells. */
 static void settle_size(vsh_heights_source *source) {
@@ -48,11 +246,11 @@ static void settle_size(vsh_heights_source *source) {
 static vsh_result place_heights(vsh_assets *assets, vshi_asset_place *place, vsh_heights_source *source,
                                 int32_t what, const size_t *texels, const double transform[12],
                                 const vsh_run *run, vsh_error *error) {
-    const vshi_height_image *map = NULL;
-    VSHI_TRY(vshi_asset_map(&assets->files, source->name, run, &map, error));
-    source->columns = map->columns;
-    source->rows = map->rows;
-    source->values = map->values;
+    vshi_asset_file *file;
+    VSHI_TRY(read_file(assets, HEIGHTS, source->name, NULL, run, &file, error));
+    source->columns = file->heights.columns;
+    source->rows = file->heights.rows;
+    source->values = file->heights.values;
     settle_size(source);
     if (place->direct) {
         vsh_heights_source placed = *source;
@@ -60,7 +258,7 @@ static vsh_result place_heights(vsh_assets *assets, vshi_asset_place *place, vsh
         VSHI_TRY(vsh_heights_create(&placed, run, &place->heights, error));
     }
     VSHI_TRY(vshi_model_of_heights(source, what, texels, run, &place->made, error));
-    return place_model(place, place->made, 0, transform, error);
+    return place_chosen(place, place->made, NULL, 0, 0.0, transform, error);
 }
 
 static vsh_result place_spheres(vshi_asset_place *place, const vsh_caster *caster, size_t index,
@@ -111,7 +309,9 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "caster %zu: no path", index);
     }
     if (caster->type == VSH_CASTER_VDB) {
-        return vshi_asset_grid(&assets->files, caster->path, caster->grid, run, &place->grid, error);
+        VSHI_TRY(read_file(assets, GRID, caster->path, caster->grid, run, &place->file, error));
+        place->grid = place->file->grid;
+        return VSH_OK;
     }
     if (caster->type == VSH_CASTER_MASK) {
         return vsh_outline_from_image(caster->path, &caster->mask, run, &place->outline, error);
@@ -127,48 +327,9 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
                                      .base = caster->base};
         return place_heights(assets, place, &source, VSH_HEIGHTS_SOLID, NULL, caster->transform, run, error);
     }
-    VSHI_TRY(vshi_asset_model(&assets->files, caster->path, run, &place->model, error));
-    return vshi_place_casting(place, scene, caster, vshi_asset_masks(&assets->files, place->model),
-                              find_unwrapped(assets, place->model), run, error);
-}
-
-static vsh_result settle_solidity(vsh_assets *assets, const vsh_scene *scene, const vsh_run *run,
-                                  vsh_error *error) {
-    vshi_mesh_list *lists = NULL;
-    const size_t casters = assets->caster_count, count = casters + assets->receiver_count;
-    vsh_result result = vshi_allocate((void **)&lists, count, sizeof *lists, "meshes", error);
-    if (result != VSH_OK || count == 0) {
-        return result;
-    }
-    for (size_t i = 0; i < count; ++i) {
-        const vshi_asset_place *place = i < casters ? &assets->casters[i] : &assets->receivers[i - casters];
-        lists[i] = (vshi_mesh_list){place->meshes, place->count, place->model,
-                                    i < casters ? scene->casters[i].path : NULL};
-    }
-    result = vshi_solidity_settle(scene, lists, lists + casters, run, &assets->set, error);
-    free(lists);
-    return result;
-}
-
-/* Those that do not cast, too. */
-static vsh_result check_receivers(vsh_assets *assets, const vsh_scene *scene, const vsh_run *run,
-                                  vsh_error *error) {
-    for (size_t i = 0; i < assets->receiver_count; ++i) {
-        vshi_asset_place *place = &assets->receivers[i];
-        vsh_error why;
-        const vsh_result result = vshi_mesh_set_create(place->meshes, place->count, &place->set, &why);
-        if (result != VSH_OK) {
-            return vshi_fail(error, result, "%s: %s", scene->receivers[i].path, why.message);
-        }
-        for (size_t m = 0; m < place->count; ++m) {
-            place->meshes[m].checked = place->set.meshes[m].checked;
-        }
-        const bool shared = scene->receivers[i].atlas == VSH_ATLAS_SHARED;
-        if (shared && place->unwrapped.page_count > 1) { /* what hangs together may be on several */
-            VSHI_TRY(vshi_mesh_set_solve(&place->set, run, error));
-        }
-    }
-    return VSH_OK;
+    VSHI_TRY(read_file(assets, MODEL, caster->path, NULL, run, &place->file, error));
+    place->model = place->file->model;
+    return place_casting(place, scene, caster, find_unwrapped(assets, place->model), run, error);
 }
 
 /* Whether a lit asset's own UVs are a packer's integers. Few engines read a lightmap with those. */
@@ -207,7 +368,7 @@ static vsh_result place_plane(vshi_asset_place *place, const vsh_receiver *recei
                                        .values = flat,
                                        .size = {receiver->extent[0], receiver->extent[1]}};
     VSHI_TRY(vsh_model_from_heights(&source, VSH_HEIGHTS_SURFACE, run, &place->made, error));
-    VSHI_TRY(place_model(place, place->made, 0, receiver->transform, error));
+    VSHI_TRY(place_chosen(place, place->made, NULL, 0, 0.0, receiver->transform, error));
     return vshi_pages_as_they_are(receiver, place->meshes, place->count, &place->unwrapped, error);
 }
 
@@ -233,23 +394,165 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, siz
     if (receiver->type == VSH_RECEIVER_PLANE) {
         return place_plane(&assets->receivers[index], receiver, run, error);
     }
-    const vsh_model *model = NULL;
+    vshi_asset_place *place = &assets->receivers[index];
     unsigned char *chosen = NULL;
-    vsh_result result = VSH_OK;
-    VSHI_TRY_DONE(vshi_asset_model(&assets->files, receiver->path, run, &model, error));
+    vsh_result result;
+    VSHI_TRY(read_file(assets, MODEL, receiver->path, NULL, run, &place->file, error));
+    const vsh_model *model = place->model = place->file->model;
     VSHI_TRY_DONE(vshi_select(model, receiver->path, &receiver->objects, &chosen, error));
     VSHI_TRY_DONE(vshi_select_uvs(model, receiver, run, chosen, error));
-    assets->receivers[index].model = model;
-    VSHI_TRY_DONE(vshi_place_chosen(&assets->receivers[index], model, chosen, receiver->uv_set, scene->unit,
-                                    receiver->transform, error));
-    result = unwrap(&assets->receivers[index], receiver, run, error);
+    VSHI_TRY_DONE(
+        place_chosen(place, model, chosen, receiver->uv_set, scene->unit, receiver->transform, error));
+    result = unwrap(place, receiver, run, error);
 done:
     free(chosen);
     return result;
 }
 
+/* --- what meshes are taken for: as the scene's rules say, or as is found */
+
+/* Applies the rules of one caster, or of all, each by objects' names, or where none is called so, by those of
+ * materials. Each must match something. */
+static vsh_result apply_rules(const vsh_solidity_rule *rules, size_t rule_count, vshi_asset_place *casters,
+                              size_t count, vsh_error *error) {
+    for (size_t r = 0; r < rule_count; ++r) {
+        const vsh_solidity_rule *rule = &rules[r];
+        const vshi_asset_file *first = NULL;
+        bool matched = false;
+        if (rule->pattern == NULL || rule->solidity < VSH_SOLIDITY_AUTO ||
+            rule->solidity > VSH_SOLIDITY_INWARD) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "rule of solidity %zu: %s", r,
+                             rule->pattern == NULL ? "pattern is NULL"
+                                                   : "solidity is none of VSH_SOLIDITY_…");
+        }
+        for (int material = 0; material < 2 && !matched; ++material) {
+            for (size_t i = 0; i < count; ++i) {
+                first = first == NULL && casters[i].model != NULL ? casters[i].file : first;
+                for (size_t m = 0; casters[i].model != NULL && m < casters[i].count; ++m) {
+                    vsh_mesh *mesh = &casters[i].meshes[m];
+                    if (vshi_mesh_is_meant(mesh, rule->pattern, material != 0)) {
+                        mesh->solidity = mesh->mask != NULL ? VSH_SOLIDITY_SHELL : rule->solidity;
+                        matched = true;
+                    }
+                }
+            }
+        }
+        if (!matched) {
+            return first != NULL
+                       ? vshi_fail_unmatched(first->model, first->path, rule->pattern, error)
+                       : vshi_fail(error, VSH_ERROR_INPUT, "no object is named '%.100s': no caster is a mesh",
+                                   rule->pattern);
+        }
+    }
+    return VSH_OK;
+}
+
+/* Tells a receiver's meshes what is known of those that cast: the same triangles in the same place. */
+static void share_solidity(const vshi_mesh_set *casters, vshi_asset_place *receiver) {
+    for (size_t i = 0; i < receiver->count; ++i) {
+        vsh_mesh *mesh = &receiver->meshes[i];
+        for (size_t k = 0; k < casters->count && mesh->checked == NULL; ++k) {
+            /* a file's meshes stand in the same order where all of them cast */
+            const vsh_mesh *caster = &casters->meshes[(i + k) % casters->count];
+            if (mesh->positions == caster->positions && mesh->indices == caster->indices &&
+                vshi_mesh_same_transform(mesh->transform, caster->transform)) {
+                mesh->checked = caster->checked;
+                mesh->solidity = caster->solidity;
+            }
+        }
+    }
+}
+
+/* Applies the rules of solidity to the casters' meshes, makes one set of them all and finds what they are,
+ * together. Their views know it then. */
+static vsh_result settle_solidity(vsh_assets *assets, const vsh_scene *scene, const vsh_run *run,
+                                  vsh_error *error) {
+    size_t count = 0;
+    vsh_mesh *all = NULL;
+    vsh_result result;
+    for (size_t i = 0; i < assets->caster_count; ++i) {
+        const vsh_caster *caster = &scene->casters[i];
+        VSHI_TRY(apply_rules(caster->solidity, caster->solidity_count, &assets->casters[i], 1, error));
+        count += assets->casters[i].count;
+    }
+    VSHI_TRY(
+        apply_rules(scene->solidity, scene->solidity_count, assets->casters, assets->caster_count, error));
+    if (count == 0) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_allocate((void **)&all, count, sizeof *all, "meshes", error));
+    for (size_t i = 0, at = 0; i < assets->caster_count; ++i) {
+        for (size_t m = 0; m < assets->casters[i].count; ++m) {
+            all[at++] = assets->casters[i].meshes[m];
+        }
+    }
+    VSHI_TRY_DONE(vshi_mesh_set_create(all, count, &assets->set, error));
+    VSHI_TRY_DONE(vshi_mesh_set_solve(&assets->set, run, error));
+    for (size_t i = 0, at = 0; i < assets->caster_count; ++i) {
+        for (size_t m = 0; m < assets->casters[i].count; ++m) {
+            assets->casters[i].meshes[m].checked = assets->set.meshes[at++].checked;
+        }
+    }
+    for (size_t i = 0; i < assets->receiver_count; ++i) {
+        share_solidity(&assets->set, &assets->receivers[i]);
+    }
+done:
+    free(all);
+    return result;
+}
+
+/* Checks the meshes of receivers, also of those that do not cast. */
+static vsh_result check_receivers(vsh_assets *assets, const vsh_scene *scene, const vsh_run *run,
+                                  vsh_error *error) {
+    for (size_t i = 0; i < assets->receiver_count; ++i) {
+        vshi_asset_place *place = &assets->receivers[i];
+        vsh_error why;
+        const vsh_result result = vshi_mesh_set_create(place->meshes, place->count, &place->set, &why);
+        if (result != VSH_OK) {
+            return vshi_fail(error, result, "%s: %s", scene->receivers[i].path, why.message);
+        }
+        for (size_t m = 0; m < place->count; ++m) {
+            place->meshes[m].checked = place->set.meshes[m].checked;
+        }
+        const bool shared = scene->receivers[i].atlas == VSH_ATLAS_SHARED;
+        if (shared && place->unwrapped.page_count > 1) { /* connected meshes may be on several pages */
+            VSHI_TRY(vshi_mesh_set_solve(&place->set, run, error));
+        }
+    }
+    return VSH_OK;
+}
+
+/* Notes the triangles of zero area, which everything skips, of a file that is seen for the first time. The
+ * voxeliser tells what is open. */
+static vsh_result check_triangles(const vshi_asset_place *place, const vsh_run *run, vsh_error *error) {
+    if (place->model == NULL || place->file->checked) {
+        return VSH_OK;
+    }
+    const char *path = place->file->path;
+    size_t sound = 0;
+    place->file->checked = true;
+    for (size_t i = 0; i < place->count; ++i) {
+        sound += place->meshes[i].triangle_count - place->meshes[i].checked->report.degenerate_triangles;
+    }
+    if (sound == 0) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: every triangle has zero area", path);
+    }
+    for (size_t i = 0; i < place->count; ++i) {
+        const vsh_mesh *mesh = &place->meshes[i];
+        const size_t skipped = mesh->checked->report.degenerate_triangles;
+        if (skipped > 0) {
+            vshi_note(run, "%s: mesh '%s': %zu triangles of zero area are skipped", path,
+                      mesh->name != NULL ? mesh->name : "", skipped);
+        }
+    }
+    return VSH_OK;
+}
+
+/* --- all of it */
+
 static vsh_result allocate_places(vsh_assets *assets, const vsh_scene *scene, vsh_error *error) {
-    VSHI_TRY(vshi_asset_files_create(scene, &assets->files, error));
+    VSHI_TRY(vshi_allocate((void **)&assets->files, scene->caster_count + scene->receiver_count,
+                           sizeof *assets->files, "files", error));
     VSHI_TRY(vshi_allocate((void **)&assets->casters, scene->caster_count, sizeof *assets->casters, "casters",
                            error));
     VSHI_TRY(vshi_allocate((void **)&assets->receivers, scene->receiver_count, sizeof *assets->receivers,
@@ -309,11 +612,15 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
     for (size_t i = 0; i < scene->caster_count; ++i) {
         VSHI_TRY_DONE(place_caster(loaded, scene, i, &full, error));
     }
-    vshi_asset_maps_free(&loaded->files);
+    free_heights(loaded);
     VSHI_TRY_DONE(settle_solidity(loaded, scene, &full, error));
     VSHI_TRY_DONE(check_receivers(loaded, scene, &full, error));
-    /* with the places in it, which the check asks for */
-    VSHI_TRY_DONE(vshi_assets_check(loaded, scene, &full, error));
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        VSHI_TRY_DONE(check_triangles(&loaded->casters[i], &full, error));
+    }
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        VSHI_TRY_DONE(check_triangles(&loaded->receivers[i], &full, error));
+    }
     *assets = loaded;
     loaded = NULL;
 done:
@@ -343,18 +650,46 @@ void vsh_assets_free(vsh_assets *assets) {
     vshi_mesh_set_free(&assets->set);
     free_places(assets->receivers, assets->receiver_count);
     free_places(assets->casters, assets->caster_count);
-    vshi_asset_files_free(&assets->files);
+    free_heights(assets);
+    for (size_t i = 0; i < assets->file_count; ++i) {
+        vshi_masks_free(assets->files[i].masks);
+        vsh_model_free(assets->files[i].model);
+        vsh_grid_free(assets->files[i].grid);
+    }
+    free(assets->files);
     free(assets);
 }
 
-static const vsh_mesh *placed_meshes(const vshi_asset_place *places, size_t count, size_t index,
-                                     size_t *mesh_count) {
-    *mesh_count = index < count ? places[index].count : 0;
-    return index < count ? places[index].meshes : NULL;
+/* --- what is loaded */
+
+const vshi_asset_place *vshi_assets_caster(const vsh_assets *assets, size_t index) {
+    static const vshi_asset_place none;
+    return index < assets->caster_count ? &assets->casters[index] : &none;
+}
+
+size_t vshi_assets_mesh_count(const vsh_assets *assets) {
+    return assets->set.count;
+}
+
+const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t *mesh_count) {
+    const vshi_asset_place *place = vshi_assets_caster(assets, index);
+    *mesh_count = place->count;
+    return place->meshes;
+}
+
+const vsh_heights *vsh_assets_heights(const vsh_assets *assets, size_t index) {
+    return vshi_assets_caster(assets, index)->heights;
+}
+
+const vsh_spheres *vsh_assets_spheres(const vsh_assets *assets, size_t index) {
+    const vshi_asset_place *place = vshi_assets_caster(assets, index);
+    return place->direct ? place->spheres : NULL;
 }
 
 const vsh_mesh *vsh_assets_receiver(const vsh_assets *assets, size_t index, size_t *mesh_count) {
-    return placed_meshes(assets->receivers, assets->receiver_count, index, mesh_count);
+    const vshi_asset_place *place = index < assets->receiver_count ? &assets->receivers[index] : NULL;
+    *mesh_count = place != NULL ? place->count : 0;
+    return place != NULL ? place->meshes : NULL;
 }
 
 const vsh_model *vsh_assets_receiver_model(const vsh_assets *assets, size_t index, const size_t **numbers) {
@@ -398,29 +733,4 @@ const vsh_atlas *vsh_assets_receiver_atlas(const vsh_assets *assets, size_t inde
     const vshi_unwrapped *made = index < assets->receiver_count ? &assets->receivers[index].unwrapped : NULL;
     *numbers = made != NULL ? made->numbers : NULL;
     return made != NULL ? made->atlas : NULL;
-}
-
-const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t *mesh_count) {
-    return placed_meshes(assets->casters, assets->caster_count, index, mesh_count);
-}
-
-const vsh_grid *vshi_assets_grid(const vsh_assets *assets, size_t index) {
-    return index < assets->caster_count ? assets->casters[index].grid : NULL;
-}
-
-const vsh_outline *vshi_assets_outline(const vsh_assets *assets, size_t index) {
-    return index < assets->caster_count ? assets->casters[index].outline : NULL;
-}
-
-const vsh_spheres *vshi_assets_spheres(const vsh_assets *assets, size_t index) {
-    return index < assets->caster_count ? assets->casters[index].spheres : NULL;
-}
-
-const vsh_heights *vsh_assets_heights(const vsh_assets *assets, size_t index) {
-    return index < assets->caster_count ? assets->casters[index].heights : NULL;
-}
-
-const vsh_spheres *vsh_assets_spheres(const vsh_assets *assets, size_t index) {
-    return index < assets->caster_count && assets->casters[index].direct ? assets->casters[index].spheres
-                                                                         : NULL;
 }

@@ -1,6 +1,9 @@
-/* What the assembly of casters reads of a scene's assets. */
+/* The loaded casters and receivers of a scene: meshes, level sets, outlines, spheres. */
 #ifndef VSHI_ASSETS_H
 #define VSHI_ASSETS_H
+
+#include "mesh/mesh_set.h"
+#include "scene/unwrapped.h"
 
 #include <stdbool.h>
 #include <string.h>
@@ -15,21 +18,28 @@ static inline bool vshi_caster_in_layer(const vsh_caster *caster, const vsh_scen
  * `classic` and AO, if there is any, is traced. */
 bool vshi_caster_is_direct(const vsh_scene *scene, const vsh_caster *caster);
 
-/* outer × inner, three rows of four each; inner NULL: identity. */
-void vshi_transform_compose(const double outer[12], const double *inner, double result[12]);
+/* One caster or receiver. Its transform is in front of its meshes' own. */
+typedef struct vshi_asset_place {
+    vsh_mesh *meshes;
+    double *transforms; /* [count][12] */
+    size_t *numbers;    /* [count]: of each in its model */
+    size_t count;
+    struct vshi_asset_file *file; /* of mesh casters and receivers; belongs to the assets, as the next two */
+    const vsh_model *model;       /* that of the file */
+    const vsh_grid *grid;         /* vdb casters */
+    vsh_outline *outline;         /* mask and text casters */
+    vsh_model *made;              /* of heightfields; its meshes are this place's */
+    vsh_heights *heights;         /* of direct heightfields, beside `made` */
+    vsh_spheres *spheres;         /* voxelised or not */
+    bool direct;
+    vshi_mesh_set set; /* these two of a receiver */
+    vshi_unwrapped unwrapped;
+} vshi_asset_place;
 
-/* The level set of vdb caster `index`, or NULL. Belongs to the assets. */
-const vsh_grid *vshi_assets_grid(const vsh_assets *assets, size_t index);
+/* A caster; all zero beyond the last. */
+const vshi_asset_place *vshi_assets_caster(const vsh_assets *assets, size_t index);
 
-/* The outline of mask or text caster `index`, or NULL. Belongs to the assets. */
-const vsh_outline *vshi_assets_outline(const vsh_assets *assets, size_t index);
-
-/* The spheres of a caster, voxelised or not; NULL for every other. */
-const vsh_spheres *vshi_assets_spheres(const vsh_assets *assets, size_t index);
-
-/* Warns of triangles of zero area, and refuses a file of nothing else, each file once. Errors:
- * VSH_ERROR_INPUT. */
-vsh_result vshi_assets_check(const vsh_assets *assets, const vsh_scene *scene, const vsh_run *run,
-                             vsh_error *error);
+/* Meshes of all casters. */
+size_t vshi_assets_mesh_count(const vsh_assets *assets);
 
 #endif

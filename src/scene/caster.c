@@ -1,13 +1,388 @@
+/* Reads casters from scene files: transforms, procedural shapes, and one table of keys for all types. */
+#include "base/elementary.h"
+#include "base/memory.h"
+#include "base/similarity.h"
 #include "base/try.h"
-#include "scene/outline_keys.h"
-#include "scene/parts.h"
-#include "scene/transform.h"
-#include "scene/tree.h"
+#include "base/vec.h"
+#include "scene/scene.h"
 
+#include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <unistd.h>
-#include <vdbshade/settings.h>
+
+/* --- transforms */
+
+/* Shear that numbers written with seven digits leave in a rotation. */
+static const double SIMILARITY_TOLERANCE = 1e-5;
+static const double SMALLEST_SCALE = 1e-6;
+static const double LARGEST_SCALE = 1e6;
+
+/* [x, y, z] degrees into double[4], the quaternion x, y, z, w: about x first, then y, then z, each about the
+ * fixed axes (Blender's "XYZ Euler"). */
+static vsh_result read_rotation(vshi_json *reader, const vshi_value *value, void *quaternion) {
+    const vshi_key key = {.kind = VSHI_VECTOR, .count = 3, .lowest = -1e6, .highest = 1e6};
+    double degrees[3];
+    VSHI_TRY(vshi_read_value(reader, value, &key, degrees));
+    double s[3], c[3];
+    for (int i = 0; i < 3; ++i) {
+        const double half = remainder(degrees[i], 720.0) / 360.0 * VSHI_PI;
+        s[i] = vshi_sin(half);
+        c[i] = vshi_cos(half);
+    }
+    /* The product of the quaternions about z, y, x, as they act on a vector from the right. */
+    double *q = quaternion;
+    q[0] = s[0] * c[1] * c[2] - c[0] * s[1] * s[2];
+    q[1] = c[0] * s[1] * c[2] + s[0] * c[1] * s[2];
+    q[2] = c[0] * c[1] * s[2] - s[0] * s[1] * c[2];
+    q[3] = c[0] * c[1] * c[2] + s[0] * s[1] * s[2];
+    return VSH_OK;
+}
+
+/* One number for all axes, or one for each. */
+static vsh_result read_scale(vshi_json *reader, const vshi_value *value, void *member) {
+    const vshi_key key = {.kind = json_is_array(value->json) ? VSHI_VECTOR : VSHI_NUMBER,
+                          .count = 3,
+                          .lowest = SMALLEST_SCALE,
+                          .highest = LARGEST_SCALE};
+    double *scale = member;
+    VSHI_TRY(vshi_read_value(reader, value, &key, scale));
+    if (key.kind == VSHI_NUMBER) {
+        scale[1] = scale[2] = scale[0];
+    }
+    return VSH_OK;
+}
+
+typedef struct parts {
+    double translate[3];
+    double rotation[4];
+    double scale[3];
+    double matrix[12];
+} parts;
+
+#define AT(member) .offset = offsetof(parts, member)
+static const vshi_key transform_keys[] = {
+    VSHI_KEY("translate", VECTOR, AT(translate), .count = 3, VSHI_ANY),
+    VSHI_KEY("rotate_deg", CUSTOM, AT(rotation), .read = read_rotation),
+    VSHI_KEY("rotate_quat", VECTOR, AT(rotation), .count = 4, .flags = VSHI_NONZERO, VSHI_ANY),
+    VSHI_KEY("scale", CUSTOM, AT(scale), .read = read_scale),
+    VSHI_KEY("matrix", VECTOR, AT(matrix), .count = 12, VSHI_ANY),
+};
+static const vshi_table transform_table = VSHI_TABLE(transform_keys);
+#undef AT
+
+/* Scale, then rotation, then translation. */
+static void compose(const parts *p, double m[12]) {
+    double q[4];
+    double largest = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        largest = fmax(largest, fabs(p->rotation[i]));
+    }
+    for (int i = 0; i < 4; ++i) {
+        q[i] = p->rotation[i] / largest;
+    }
+    const double x = q[0], y = q[1], z = q[2], w = q[3];
+    const double length2 = x * x + y * y + z * z + w * w;
+    const double rotation[9] = {
+        w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z),         2.0 * (x * z + w * y),
+        2.0 * (x * y + w * z),         w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x),
+        2.0 * (x * z - w * y),         2.0 * (y * z + w * x),         w * w - x * x - y * y + z * z,
+    };
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column) {
+            m[row * 4 + column] = rotation[row * 3 + column] / length2 * p->scale[column];
+        }
+        m[row * 4 + 3] = p->translate[row];
+    }
+}
+
+/* Column of the linear part: where an axis goes. */
+static vshi_vec axis(const double m[12], int column) {
+    return (vshi_vec){m[column], m[4 + column], m[8 + column]};
+}
+
+vsh_result vshi_read_transform(vshi_json *reader, const vshi_value *value, void *matrix) {
+    parts p = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}, {1.0, 1.0, 1.0}, {0.0}};
+    VSHI_TRY(vshi_read_object(reader, value, &transform_table, 1, "a transform", &p));
+    VSHI_TRY(vshi_reject_both(reader, value, "rotate_deg", "rotate_quat"));
+    static const char *const other[] = {"translate", "rotate_deg", "rotate_quat", "scale"};
+    for (size_t i = 0; i < sizeof other / sizeof other[0]; ++i) {
+        VSHI_TRY(vshi_reject_both(reader, value, "matrix", other[i]));
+    }
+    double *m = matrix;
+    vshi_value given;
+    if (!vshi_member(value, "matrix", &given)) {
+        compose(&p, m);
+        return VSH_OK;
+    }
+    memcpy(m, p.matrix, sizeof p.matrix);
+    if (vshi_transform_flattens(m)) {
+        return vshi_json_fail(reader, &given, "flattens: the determinant of its first three columns is 0");
+    }
+    return VSH_OK;
+}
+
+/* Whether lengths all change by the same factor: rotation, translation, mirroring, uniform scale. */
+static bool is_similarity(const double m[12]) {
+    const vshi_vec a[3] = {axis(m, 0), axis(m, 1), axis(m, 2)};
+    const double length2 = vshi_dot(a[0], a[0]);
+    for (int i = 0; i < 3; ++i) {
+        const int j = (i + 1) % 3;
+        if (fabs(vshi_dot(a[i], a[i]) - length2) > SIMILARITY_TOLERANCE * length2 ||
+            fabs(vshi_dot(a[i], a[j])) > SIMILARITY_TOLERANCE * length2) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* --- procedural shapes */
+
+enum { MAX_NODES = 65536, MAX_LEVELS = 64 };
+
+#define BIT(shape) (1U << (shape))
+#define OPERATIONS                                                                                           \
+    (BIT(VSH_SDF_UNION) | BIT(VSH_SDF_INTERSECTION) | BIT(VSH_SDF_SUBTRACTION) | BIT(VSH_SDF_SMOOTH_UNION))
+#define ROUND                                                                                                \
+    (BIT(VSH_SDF_SPHERE) | BIT(VSH_SDF_TORUS) | BIT(VSH_SDF_CAPSULE) | BIT(VSH_SDF_CYLINDER) |               \
+     BIT(VSH_SDF_CONE))
+#define TALL (BIT(VSH_SDF_CAPSULE) | BIT(VSH_SDF_CYLINDER) | BIT(VSH_SDF_CONE))
+
+/* By VSH_SDF_…: shapes, and from VSH_SDF_UNION on, operations. */
+static const struct {
+    const char *name;
+    const char *what;
+} shapes[] = {
+    [VSH_SDF_SPHERE] = {"sphere", "a sphere"},
+    [VSH_SDF_BOX] = {"box", "a box"},
+    [VSH_SDF_TORUS] = {"torus", "a torus"},
+    [VSH_SDF_PLANE] = {"plane", "a plane"},
+    [VSH_SDF_CAPSULE] = {"capsule", "a capsule"},
+    [VSH_SDF_CYLINDER] = {"cylinder", "a cylinder"},
+    [VSH_SDF_CONE] = {"cone", "a cone"},
+    [VSH_SDF_UNION] = {"union", "a union"},
+    [VSH_SDF_INTERSECTION] = {"intersection", "an intersection"},
+    [VSH_SDF_SUBTRACTION] = {"subtraction", "a subtraction"},
+    [VSH_SDF_SMOOTH_UNION] = {"smooth_union", "a smooth union"},
+};
+
+static const char *shape_name(int32_t i) {
+    return i < VSH_SDF_UNION ? shapes[i].name : NULL;
+}
+
+static const char *operation_name(int32_t i) {
+    return i <= VSH_SDF_SMOOTH_UNION - VSH_SDF_UNION ? shapes[VSH_SDF_UNION + i].name : NULL;
+}
+
+/* [x, z] into size[0] and size[2]. */
+static vsh_result read_plane_size(vshi_json *reader, const vshi_value *value, void *member) {
+    const vshi_key key = {.kind = VSHI_VECTOR, .count = 2, .highest = VSHI_LARGEST, .flags = VSHI_ABOVE};
+    double size[2];
+    VSHI_TRY(vshi_read_value(reader, value, &key, size));
+    ((double *)member)[0] = size[0];
+    ((double *)member)[2] = size[1];
+    return VSH_OK;
+}
+
+#define AT(member) .offset = offsetof(vsh_sdf_node, member)
+static const vshi_key node_keys[] = {
+    VSHI_KEY("shape", LATER, .variants = ~OPERATIONS),
+    VSHI_KEY("op", LATER, .variants = OPERATIONS),
+    VSHI_KEY("of", LATER, VSHI_NEEDED_BY(OPERATIONS)),
+    VSHI_KEY("radius", NUMBER, AT(radius), VSHI_NEEDED_BY(ROUND), VSHI_POSITIVE),
+    VSHI_KEY("tube_radius", NUMBER, AT(minor_radius), VSHI_NEEDED_BY(BIT(VSH_SDF_TORUS)), VSHI_POSITIVE),
+    VSHI_KEY("half_height", NUMBER, AT(size[1]), VSHI_NEEDED_BY(TALL), VSHI_POSITIVE),
+    VSHI_KEY("thickness", NUMBER, AT(size[1]), VSHI_NEEDED_BY(BIT(VSH_SDF_PLANE)), VSHI_POSITIVE),
+    VSHI_KEY("smoothing", NUMBER, AT(smoothing), VSHI_NEEDED_BY(BIT(VSH_SDF_SMOOTH_UNION)), VSHI_POSITIVE),
+    VSHI_KEY("half_size", VECTOR, AT(size), VSHI_NEEDED_BY(BIT(VSH_SDF_BOX)), .count = 3, VSHI_POSITIVE),
+    VSHI_KEY("half_size", CUSTOM, AT(size), VSHI_NEEDED_BY(BIT(VSH_SDF_PLANE)), .read = read_plane_size),
+    VSHI_KEY("rounding", NUMBER, AT(rounding), .variants = BIT(VSH_SDF_BOX), .highest = VSHI_LARGEST),
+    VSHI_KEY("top_radius", NUMBER, AT(minor_radius), .variants = BIT(VSH_SDF_CONE), .highest = VSHI_LARGEST),
+    VSHI_KEY("translate", VECTOR, AT(translation), .count = 3, VSHI_ANY),
+    VSHI_KEY("rotate_deg", CUSTOM, AT(rotation), .read = read_rotation),
+    VSHI_KEY("rotate_quat", VECTOR, AT(rotation), .count = 4, .flags = VSHI_NONZERO, VSHI_ANY),
+    VSHI_KEY("scale", NUMBER, AT(scale), .lowest = 1e-6, .highest = 1e6),
+};
+static const vshi_table node_table = VSHI_TABLE(node_keys);
+#undef AT
+
+/* Nodes so far; grown by doubling, since their number is known only at the end. */
+typedef struct tree {
+    vsh_sdf_node *nodes;
+    size_t count;
+    size_t capacity;
+} tree;
+
+static vsh_result push(vshi_json *reader, const vshi_value *value, tree *t, const vsh_sdf_node *node,
+                       int32_t *index) {
+    if (t->count == MAX_NODES) {
+        return vshi_json_fail(reader, value, "is node %zu of its tree, out of range 1 … %d", t->count + 1,
+                              MAX_NODES);
+    }
+    if (t->count == t->capacity) {
+        const size_t capacity = t->capacity == 0 ? 16 : 2 * t->capacity;
+        void *nodes;
+        VSHI_TRY(vshi_allocate(&nodes, capacity, sizeof *t->nodes, "sdf nodes", reader->error));
+        if (t->count > 0) {
+            memcpy(nodes, t->nodes, t->count * sizeof *t->nodes);
+        }
+        free(t->nodes);
+        t->nodes = nodes;
+        t->capacity = capacity;
+    }
+    *index = (int32_t)t->count;
+    t->nodes[t->count++] = *node;
+    return VSH_OK;
+}
+
+static vsh_result read_kind(vshi_json *reader, const vshi_value *value, int32_t *shape) {
+    VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
+    VSHI_TRY(vshi_reject_both(reader, value, "shape", "op"));
+    int32_t operation = -1;
+    *shape = -1;
+    VSHI_TRY(vshi_read_choice(reader, value, &(vshi_key){.name = "shape", .name_of = shape_name}, shape));
+    VSHI_TRY(
+        vshi_read_choice(reader, value, &(vshi_key){.name = "op", .name_of = operation_name}, &operation));
+    if (operation >= 0) {
+        *shape = VSH_SDF_UNION + operation;
+    }
+    if (*shape < 0) {
+        return vshi_json_fail(reader, value, "key \"shape\" or \"op\" is missing");
+    }
+    return VSH_OK;
+}
+
+/* `scale` is that of the nodes above. */
+static vsh_result read_node(vshi_json *reader, const vshi_value *value, tree *t, int level, double scale,
+                            int32_t *index) {
+    if (level > MAX_LEVELS) {
+        return vshi_json_fail(reader, value, "is nested more than %d deep", MAX_LEVELS);
+    }
+    vsh_sdf_node node = vsh_sdf_node_default();
+    VSHI_TRY(read_kind(reader, value, &node.shape));
+    if (node.shape == VSH_SDF_CONE) {
+        node.minor_radius = 0.0; /* a tip, unless "top_radius" is given */
+    }
+    VSHI_TRY(vshi_read_object(reader, value, &node_table, BIT(node.shape), shapes[node.shape].what, &node));
+    VSHI_TRY(vshi_reject_both(reader, value, "rotate_deg", "rotate_quat"));
+    scale *= node.scale;
+    if (!(scale >= 1.0 / VSHI_LARGEST && scale <= VSHI_LARGEST)) {
+        return vshi_json_fail(reader, value, "the scales of all levels make %.9g, out of range %.9g … %.9g",
+                              scale, 1.0 / VSHI_LARGEST, VSHI_LARGEST);
+    }
+    vshi_value of;
+    if (!vshi_member(value, "of", &of)) {
+        return push(reader, value, t, &node, index);
+    }
+    VSHI_TRY(vshi_expect(reader, &of, JSON_ARRAY));
+    const size_t size = json_array_size(of.json);
+    if (size < 2) {
+        return vshi_json_fail(reader, &of, "has %zu items, out of range 2 … %d", size, MAX_NODES);
+    }
+    /* Folded from the left; the operation's own transform belongs to the last of the pairs alone. */
+    vsh_sdf_node pair = vsh_sdf_node_default();
+    pair.shape = node.shape;
+    pair.smoothing = node.smoothing;
+    int32_t left = -1;
+    for (size_t i = 0; i < size; ++i) {
+        const vshi_value item = vshi_item(&of, i);
+        int32_t right;
+        VSHI_TRY(read_node(reader, &item, t, level + 1, scale, &right));
+        if (i == 0) {
+            left = right;
+            continue;
+        }
+        vsh_sdf_node *next = i + 1 < size ? &pair : &node;
+        next->left = left;
+        next->right = right;
+        VSHI_TRY(push(reader, &item, t, next, &left));
+    }
+    *index = left;
+    return VSH_OK;
+}
+
+/* Nested objects, as the plain array of nodes that a vsh_sdf is. */
+static vsh_result read_sdf(vshi_json *reader, const vshi_value *value, void *member) {
+    tree t = {NULL, 0, 0};
+    int32_t root;
+    void *nodes = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(read_node(reader, value, &t, 1, 1.0, &root));
+    VSHI_TRY_DONE(vshi_json_allocate(reader, &nodes, t.count, sizeof *t.nodes, "sdf nodes"));
+    memcpy(nodes, t.nodes, t.count * sizeof *t.nodes);
+    *(vsh_sdf *)member = (vsh_sdf){nodes, t.count};
+done:
+    free(t.nodes);
+    return result;
+}
+
+/* --- patterns of names */
+
+static vsh_result read_patterns(vshi_json *reader, const vshi_value *value, const char *const **patterns,
+                                size_t *count) {
+    static const vshi_key key = {.kind = VSHI_STRING};
+    const bool list = json_is_array(value->json);
+    *count = list ? json_array_size(value->json) : 1;
+    if (*count == 0) {
+        return vshi_json_fail(reader, value, "is empty");
+    }
+    const char **strings;
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&strings, *count, sizeof *strings, "patterns"));
+    for (size_t i = 0; i < *count; ++i) {
+        const vshi_value item = list ? vshi_item(value, i) : *value;
+        VSHI_TRY(vshi_read_value(reader, &item, &key, &strings[i]));
+    }
+    *patterns = strings;
+    return VSH_OK;
+}
+
+vsh_result vshi_read_only(vshi_json *reader, const vshi_value *value, void *member) {
+    vsh_selection *selection = member;
+    return read_patterns(reader, value, &selection->only, &selection->only_count);
+}
+
+vsh_result vshi_read_except(vshi_json *reader, const vshi_value *value, void *member) {
+    vsh_selection *selection = member;
+    return read_patterns(reader, value, &selection->except, &selection->except_count);
+}
+
+/* Adds patterns to a caster's rules of solidity. */
+static vsh_result read_rules(vshi_json *reader, const vshi_value *value, vsh_caster *caster,
+                             int32_t solidity) {
+    vsh_selection given = {.only = NULL};
+    VSHI_TRY(vshi_read_only(reader, value, &given));
+    const size_t count = caster->solidity_count + given.only_count;
+    vsh_solidity_rule *rules;
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&rules, count, sizeof *rules, "patterns"));
+    for (size_t i = 0; i < count; ++i) {
+        rules[i] = i < caster->solidity_count
+                       ? caster->solidity[i]
+                       : (vsh_solidity_rule){given.only[i - caster->solidity_count], solidity};
+    }
+    caster->solidity = rules;
+    caster->solidity_count = count;
+    return VSH_OK;
+}
+
+static vsh_result read_solid(vshi_json *reader, const vshi_value *value, void *caster) {
+    return read_rules(reader, value, caster, VSH_SOLIDITY_SOLID);
+}
+
+static vsh_result read_shell(vshi_json *reader, const vshi_value *value, void *caster) {
+    return read_rules(reader, value, caster, VSH_SOLIDITY_SHELL);
+}
+
+static vsh_result read_inward(vshi_json *reader, const vshi_value *value, void *caster) {
+    return read_rules(reader, value, caster, VSH_SOLIDITY_INWARD);
+}
+
+static vsh_result read_one_sided(vshi_json *reader, const vshi_value *value, void *member) {
+    vsh_caster *caster = member;
+    return read_patterns(reader, value, &caster->one_sided, &caster->one_sided_count);
+}
+
+/* --- casters */
 
 enum {
     MESH = 1 << VSH_CASTER_MESH,
@@ -19,19 +394,19 @@ enum {
     TEXT = 1 << VSH_CASTER_TEXT
 };
 
-static const char *const types[] = {
-    [VSH_CASTER_MESH] = "mesh",       [VSH_CASTER_SDF] = "sdf",
-    [VSH_CASTER_VDB] = "vdb",         [VSH_CASTER_HEIGHTFIELD] = "heightfield",
-    [VSH_CASTER_SPHERES] = "spheres", [VSH_CASTER_MASK] = "mask",
-    [VSH_CASTER_TEXT] = "text"};
+/* The key that tells the type, and what messages call it. */
+static const struct {
+    const char *key, *what;
+} types[] = {
+    [VSH_CASTER_MESH] = {"mesh", "a mesh caster"},
+    [VSH_CASTER_SDF] = {"sdf", "an sdf caster"},
+    [VSH_CASTER_VDB] = {"vdb", "a vdb caster"},
+    [VSH_CASTER_HEIGHTFIELD] = {"heightfield", "a heightfield caster"},
+    [VSH_CASTER_SPHERES] = {"spheres", "a caster of spheres"},
+    [VSH_CASTER_MASK] = {"mask", "a mask caster"},
+    [VSH_CASTER_TEXT] = {"text", "a text caster"},
+};
 enum { TYPE_COUNT = sizeof types / sizeof types[0] };
-static const char *const whats[] = {[VSH_CASTER_MESH] = "a mesh caster",
-                                    [VSH_CASTER_SDF] = "an sdf caster",
-                                    [VSH_CASTER_VDB] = "a vdb caster",
-                                    [VSH_CASTER_HEIGHTFIELD] = "a heightfield caster",
-                                    [VSH_CASTER_SPHERES] = "a caster of spheres",
-                                    [VSH_CASTER_MASK] = "a mask caster",
-                                    [VSH_CASTER_TEXT] = "a text caster"};
 
 /* A file's name, or [[x, y, z, radius], …]. */
 static vsh_result read_spheres(vshi_json *reader, const vshi_value *value, void *member) {
@@ -86,79 +461,33 @@ static vsh_result read_vdb(vshi_json *reader, const vshi_value *value, void *mem
     return VSH_OK;
 }
 
+#define AT(member) .offset = offsetof(vsh_caster, member)
 static const vshi_key caster_keys[] = {
-    {.name = "mesh", .kind = VSHI_PATH, .variants = MESH, .offset = offsetof(vsh_caster, path)},
-    {.name = "objects",
-     .kind = VSHI_CUSTOM,
-     .variants = MESH,
-     .offset = offsetof(vsh_caster, objects),
-     .read = vshi_read_only},
-    {.name = "except",
-     .kind = VSHI_CUSTOM,
-     .variants = MESH,
-     .offset = offsetof(vsh_caster, objects),
-     .read = vshi_read_except},
-    {.name = "solid", .kind = VSHI_CUSTOM, .variants = MESH, .read = vshi_read_solid},
-    {.name = "shell", .kind = VSHI_CUSTOM, .variants = MESH, .read = vshi_read_shell},
-    {.name = "inward", .kind = VSHI_CUSTOM, .variants = MESH, .read = vshi_read_inward},
-    {.name = "one_sided", .kind = VSHI_CUSTOM, .variants = MESH, .read = vshi_read_one_sided},
-    {.name = "sdf",
-     .kind = VSHI_CUSTOM,
-     .variants = SDF,
-     .offset = offsetof(vsh_caster, sdf),
-     .read = vshi_read_sdf},
-    {.name = "vdb", .kind = VSHI_CUSTOM, .variants = VDB, .read = read_vdb},
-    {.name = "grid", .kind = VSHI_STRING, .variants = VDB, .offset = offsetof(vsh_caster, grid)},
-    {.name = "heightfield", .kind = VSHI_PATH, .variants = HEIGHTFIELD, .offset = offsetof(vsh_caster, path)},
-    {.name = "extent",
-     .kind = VSHI_VECTOR,
-     .variants = HEIGHTFIELD,
-     .offset = offsetof(vsh_caster, size),
-     .count = 2,
-     .lowest = 1e-12,
-     .highest = 1e12},
-    {.name = "size", /* the old name of "extent" */
-     .kind = VSHI_VECTOR,
-     .variants = HEIGHTFIELD,
-     .offset = offsetof(vsh_caster, size),
-     .count = 2,
-     .lowest = 1e-12,
-     .highest = 1e12},
-    {.name = "height",
-     .kind = VSHI_NUMBER,
-     .variants = HEIGHTFIELD,
-     .required = HEIGHTFIELD,
-     .offset = offsetof(vsh_caster, height),
-     .lowest = -1e12,
-     .highest = 1e12},
-    {.name = "base",
-     .kind = VSHI_NUMBER,
-     .variants = HEIGHTFIELD,
-     .offset = offsetof(vsh_caster, base),
-     .highest = 1e12,
-     .flags = VSHI_ABOVE},
-    {.name = "direct", .kind = VSHI_BOOL, .variants = HEIGHTFIELD, .offset = offsetof(vsh_caster, direct)},
-    {.name = "spheres", .kind = VSHI_CUSTOM, .variants = SPHERES, .read = read_spheres},
-    {.name = "voxelised", .kind = VSHI_BOOL, .variants = SPHERES, .offset = offsetof(vsh_caster, voxelised)},
-    {.name = "transform",
-     .kind = VSHI_CUSTOM,
-     .offset = offsetof(vsh_caster, transform),
-     .read = vshi_read_transform},
-    {.name = "layer", .kind = VSHI_STRING, .offset = offsetof(vsh_caster, layer)},
-    {.name = "color",
-     .kind = VSHI_VECTOR,
-     .offset = offsetof(vsh_caster, color),
-     .highest = 1.0,
-     .flags = VSHI_NONZERO,
-     .count = 3},
+    VSHI_KEY("mesh", PATH, AT(path), .variants = MESH),
+    VSHI_KEY("objects", CUSTOM, AT(objects), .variants = MESH, .read = vshi_read_only),
+    VSHI_KEY("except", CUSTOM, AT(objects), .variants = MESH, .read = vshi_read_except),
+    VSHI_KEY("solid", CUSTOM, .variants = MESH, .read = read_solid),
+    VSHI_KEY("shell", CUSTOM, .variants = MESH, .read = read_shell),
+    VSHI_KEY("inward", CUSTOM, .variants = MESH, .read = read_inward),
+    VSHI_KEY("one_sided", CUSTOM, .variants = MESH, .read = read_one_sided),
+    VSHI_KEY("sdf", CUSTOM, AT(sdf), .variants = SDF, .read = read_sdf),
+    VSHI_KEY("vdb", CUSTOM, .variants = VDB, .read = read_vdb),
+    VSHI_KEY("grid", STRING, AT(grid), .variants = VDB),
+    VSHI_KEY("heightfield", PATH, AT(path), .variants = HEIGHTFIELD),
+    VSHI_KEY("extent", VECTOR, AT(size), .variants = HEIGHTFIELD, .count = 2, .lowest = 1e-12,
+             .highest = 1e12),
+    /* the old name of "extent" */
+    VSHI_KEY("size", VECTOR, AT(size), .variants = HEIGHTFIELD, .count = 2, .lowest = 1e-12, .highest = 1e12),
+    VSHI_KEY("height", NUMBER, AT(height), VSHI_NEEDED_BY(HEIGHTFIELD), .lowest = -1e12, .highest = 1e12),
+    VSHI_KEY("base", NUMBER, AT(base), .variants = HEIGHTFIELD, .highest = 1e12, .flags = VSHI_ABOVE),
+    VSHI_KEY("direct", BOOL, AT(direct), .variants = HEIGHTFIELD),
+    VSHI_KEY("spheres", CUSTOM, .variants = SPHERES, .read = read_spheres),
+    VSHI_KEY("voxelised", BOOL, AT(voxelised), .variants = SPHERES),
+    VSHI_KEY("transform", CUSTOM, AT(transform), .read = vshi_read_transform),
+    VSHI_KEY("layer", STRING, AT(layer)),
+    VSHI_KEY("color", VECTOR, AT(color), .highest = 1.0, .flags = VSHI_NONZERO, .count = 3),
     VSHI_OUTLINE_KEYS(vsh_caster, MASK, TEXT),
-    {.name = "thickness",
-     .kind = VSHI_NUMBER,
-     .variants = MASK | TEXT,
-     .required = MASK | TEXT,
-     .offset = offsetof(vsh_caster, thickness),
-     .highest = VSHI_LARGEST,
-     .flags = VSHI_ABOVE},
+    VSHI_KEY("thickness", NUMBER, AT(thickness), VSHI_NEEDED_BY(MASK | TEXT), VSHI_POSITIVE),
 };
 static const vshi_table caster_table = VSHI_TABLE(caster_keys);
 
@@ -166,27 +495,21 @@ vsh_result vshi_read_caster(vshi_json *reader, const vshi_value *value, void *me
     vsh_caster *caster = member;
     *caster = vsh_caster_default();
     caster->type = -1;
-    vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
     vshi_value given, transform;
     for (int32_t i = VSH_CASTER_MESH; i < TYPE_COUNT; ++i) {
-        if (!vshi_member(value, types[i], &given)) {
+        if (!vshi_member(value, types[i].key, &given)) {
             continue;
         }
         if (caster->type >= 0) {
-            return vshi_reject_both(reader, value, types[caster->type], types[i]);
+            return vshi_reject_both(reader, value, types[caster->type].key, types[i].key);
         }
         caster->type = i;
     }
     /* A caster of no type still has its keys looked over: the type's name may be what is misspelt. */
     const uint32_t variant = caster->type < 0 ? VSHI_ALL : 1U << caster->type;
-    result = vshi_read_object(reader, value, &caster_table, variant,
-                              caster->type < 0 ? "a caster" : whats[caster->type], caster);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_read_object(reader, value, &caster_table, variant,
+                              caster->type < 0 ? "a caster" : types[caster->type].what, caster));
     if (caster->type < 0) {
         return vshi_json_fail(reader, value,
                               "key \"mesh\", \"sdf\", \"vdb\", \"heightfield\", \"spheres\", \"mask\" "
@@ -196,13 +519,13 @@ vsh_result vshi_read_caster(vshi_json *reader, const vshi_value *value, void *me
         VSHI_TRY(vshi_reject_both(reader, value, "extent", "size"));
         if (!(caster->size[0] > 0.0)) {
             return vshi_json_fail(reader, value, "key \"extent\" is missing: %s needs it",
-                                  whats[caster->type]);
+                                  types[caster->type].what);
         }
     }
-    if (caster->type != VSH_CASTER_MESH && !vshi_transform_is_similarity(caster->transform) &&
+    if (caster->type != VSH_CASTER_MESH && !is_similarity(caster->transform) &&
         vshi_member(value, "transform", &transform)) {
         return vshi_json_fail(reader, &transform, "shears or scales unevenly, which %s cannot",
-                              whats[caster->type]);
+                              types[caster->type].what);
     }
     return VSH_OK;
 }

@@ -3,16 +3,14 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "base/threads.h"
 #include "base/try.h"
-#include "scene/parts.h"
+#include "model/model.h"
 #include "scene/scene.h"
-
-#include <vdbshade/image.h>
-#include <vdbshade/settings.h>
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
+#include <vdbshade/image.h>
 
 enum {
     MAX_ITEMS = 65536,
@@ -20,17 +18,129 @@ enum {
     CIRCLE_SIDES = 256
 };
 
-/* What vsh_flat_scene_free() gets is the first member. */
-typedef struct owner {
-    vsh_flat_scene scene;
-    vshi_json_block *blocks;
-} owner;
+/* --- casters in files */
+
+enum {
+    MASK = 1 << VSH_FLAT_MASK,
+    TEXT = 1 << VSH_FLAT_TEXT,
+    CIRCLE = 1 << VSH_FLAT_CIRCLE,
+    BOX = 1 << VSH_FLAT_BOX,
+    POLYGON = 1 << VSH_FLAT_POLYGON
+};
+
+static const char *const whats[] = {"a mask", "a text", "a circle", "a box", "a polygon"};
+static const size_t MAX_POINTS = (size_t)1 << 20;
+
+/* Names of the shapes, from VSH_FLAT_CIRCLE on. */
+static const char *shape_name(int32_t i) {
+    static const char *const names[] = {"circle", "box", "polygon", NULL};
+    return names[i];
+}
+
+vsh_result vshi_read_mask_size(vshi_json *reader, const vshi_value *value, void *member) {
+    vsh_mask_options *mask = member;
+    const vshi_key key = {.kind = json_is_array(value->json) ? VSHI_VECTOR : VSHI_NUMBER,
+                          .count = 2,
+                          .highest = VSHI_LARGEST,
+                          .flags = VSHI_ABOVE};
+    double size[2] = {0.0, 0.0}; /* a height of 0: by the image's proportions */
+    const vsh_result result = vshi_read_value(reader, value, &key, size);
+    mask->width = size[0];
+    mask->height = size[1];
+    return result;
+}
+
+static vsh_result read_points(vshi_json *reader, const vshi_value *value, void *member) {
+    vsh_flat_caster *caster = member;
+    VSHI_TRY(vshi_expect(reader, value, JSON_ARRAY));
+    const size_t count = json_array_size(value->json);
+    if (count < 3 || count > MAX_POINTS) {
+        return vshi_json_fail(reader, value, "has %zu points, out of range 3 … %zu", count, MAX_POINTS);
+    }
+    double *points;
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&points, count, sizeof(double[2]), "points"));
+    const vshi_key key = {.kind = VSHI_VECTOR, .count = 2, .lowest = -VSHI_LARGEST, .highest = VSHI_LARGEST};
+    for (size_t i = 0; i < count; ++i) {
+        const vshi_value point = vshi_item(value, i);
+        VSHI_TRY(vshi_read_value(reader, &point, &key, points + 2 * i));
+    }
+    caster->points = points;
+    caster->point_count = count;
+    return VSH_OK;
+}
+
+/* A caster, and the numbers that make its transform. */
+typedef struct placed {
+    vsh_flat_caster caster; /* first: its keys' offsets are those of the whole */
+    double translate[2];
+    double rotate;
+    double scale;
+} placed;
+
+#define AT(member) .offset = offsetof(placed, member)
+static const vshi_key caster_keys[] = {
+    VSHI_OUTLINE_KEYS(vsh_flat_caster, MASK, TEXT),
+    VSHI_KEY("shape", LATER, .variants = CIRCLE | BOX | POLYGON),
+    VSHI_KEY("radius", NUMBER, AT(caster.radius), VSHI_NEEDED_BY(CIRCLE), VSHI_POSITIVE),
+    VSHI_KEY("half_size", VECTOR, AT(caster.half_size), VSHI_NEEDED_BY(BOX), .count = 2, VSHI_POSITIVE),
+    VSHI_KEY("points", CUSTOM, VSHI_NEEDED_BY(POLYGON), .read = read_points),
+    VSHI_KEY("translate", VECTOR, AT(translate), .count = 2, VSHI_ANY),
+    VSHI_KEY("rotate_deg", NUMBER, AT(rotate), .lowest = -1e6, .highest = 1e6),
+    VSHI_KEY("scale", NUMBER, AT(scale), .lowest = 1e-6, .highest = 1e6),
+};
+static const vshi_table caster_table = VSHI_TABLE(caster_keys);
+#undef AT
+
+static void compose(const placed *p, double m[6]) {
+    const double angle = remainder(p->rotate, 360.0) / 180.0 * VSHI_PI;
+    const double c = p->scale * vshi_cos(angle), s = p->scale * vshi_sin(angle);
+    const double transform[6] = {c, -s, p->translate[0], s, c, p->translate[1]};
+    memcpy(m, transform, sizeof transform);
+}
+
+static vsh_result read_caster(vshi_json *reader, const vshi_value *value, void *member) {
+    vsh_flat_caster *caster = member;
+    placed p = {.scale = 1.0};
+    p.caster.mask = vsh_mask_options_default();
+    p.caster.letters = vsh_text_options_default();
+    VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
+    static const char *const kinds[] = {"mask", "text", "shape"};
+    int32_t type = -1;
+    for (int32_t i = 0; i < 3; ++i) {
+        vshi_value given;
+        if (!vshi_member(value, kinds[i], &given)) {
+            continue;
+        }
+        if (type >= 0) {
+            return vshi_reject_both(reader, value, kinds[type], kinds[i]);
+        }
+        type = i;
+    }
+    if (type == 2) {
+        int32_t shape = 0;
+        VSHI_TRY(
+            vshi_read_choice(reader, value, &(vshi_key){.name = "shape", .name_of = shape_name}, &shape));
+        type = VSH_FLAT_CIRCLE + shape;
+    }
+    /* A caster of no type still has its keys looked over: the type's name may be what is misspelt. */
+    p.caster.type = type;
+    VSHI_TRY(vshi_read_object(reader, value, &caster_table, type < 0 ? VSHI_ALL : 1U << type,
+                              type < 0 ? "a caster" : whats[type], &p));
+    if (type < 0) {
+        return vshi_json_fail(reader, value, "key \"mask\", \"text\" or \"shape\" is missing");
+    }
+    compose(&p, p.caster.transform);
+    *caster = p.caster;
+    return VSH_OK;
+}
+
+/* --- the scene */
 
 static vsh_result read_casters(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_flat_scene *scene = member;
     void *items = NULL;
-    const vsh_result result = vshi_read_list(reader, value, 0, MAX_ITEMS, sizeof *scene->casters,
-                                             vshi_read_flat_caster, &items, &scene->caster_count);
+    const vsh_result result = vshi_read_list(reader, value, 0, MAX_ITEMS, sizeof *scene->casters, read_caster,
+                                             &items, &scene->caster_count);
     scene->casters = items;
     return result;
 }
@@ -66,113 +176,49 @@ static vsh_result read_region(vshi_json *reader, const vshi_value *value, void *
     return VSH_OK;
 }
 
+#define AT(member) .offset = offsetof(vsh_flat_scene, member)
 static const vshi_key scene_keys[] = {
-    {.name = "casters", .kind = VSHI_CUSTOM, .read = read_casters},
-    {.name = "lights", .kind = VSHI_CUSTOM, .required = VSHI_ALL, .read = read_lights},
-    {.name = "region", .kind = VSHI_CUSTOM, .required = VSHI_ALL, .read = read_region},
-    {.name = "size",
-     .kind = VSHI_CUSTOM,
-     .read = read_size,
-     .option = {.name = "size",
-                .value = "W[xH]",
-                .group = VSH_SETTINGS_FLAT_IMAGE,
-                .help = "texels of the map",
-                .range = "W or WxH, each from 1 to 65536 texels",
-                .otherwise = "512",
-                .by = true}},
-    {.name = "method",
-     .kind = VSHI_NAME,
-     .offset = offsetof(vsh_flat_scene, options.method),
-     .names = VSH_NAMES_FLAT,
-     .option = {.name = "method",
-                .value = "NAME",
-                .group = VSH_SETTINGS_FLAT_TEXELS,
-                .help = "of the shadow; classic has the outer half of the penumbra only, hard none"}},
-    {.name = "supersample",
-     .kind = VSHI_INTEGER,
-     .offset = offsetof(vsh_flat_scene, options.supersample),
-     .lowest = 1.0,
-     .highest = 16.0,
-     .option = {.name = "supersample",
-                .value = "N",
-                .group = VSH_SETTINGS_FLAT_TEXELS,
-                .help = "N × N samples a texel"}},
-    {.name = "padding",
-     .kind = VSHI_INTEGER,
-     .offset = offsetof(vsh_flat_scene, options.padding),
-     .highest = 4096.0,
-     .option = {.name = "padding",
-                .value = "N",
-                .group = VSH_SETTINGS_FLAT_TEXELS,
-                .help = "texels that values are grown by into solids"}},
-    {.name = "max_steps",
-     .kind = VSHI_INTEGER,
-     .offset = offsetof(vsh_flat_scene, options.max_steps),
-     .lowest = 16.0,
-     .highest = 65536.0,
-     .option = {.name = "max-steps",
-                .value = "N",
-                .group = VSH_SETTINGS_FLAT_TEXELS,
-                .help = "with classic: steps after which a ray takes what is known by then"}},
-    {.name = "output", .kind = VSHI_PATH, .offset = offsetof(vsh_flat_scene, output)},
-    {.name = "bits",
-     .kind = VSHI_CUSTOM,
-     .offset = offsetof(vsh_flat_scene, bits),
-     .read = vshi_read_bits,
-     .option = {.name = "bits",
-                .value = "N",
-                .group = VSH_SETTINGS_FLAT_IMAGE,
-                .help = "bits a channel",
-                .range = "8, 16 or 32",
-                .otherwise = "32 for EXR, else 16 where the format has it, else 8"}},
-    {.name = "pack",
-     .kind = VSHI_STRING,
-     .offset = offsetof(vsh_flat_scene, pack),
-     .option = {.name = "pack",
-                .value = "R=NAME,…",
-                .group = VSH_SETTINGS_FLAT_IMAGE,
-                .help = "what goes where in formats that cannot name channels",
-                .otherwise = "irradiance.R, .G and .B to R, G, B; A to A"}},
-    {.name = "color_space",
-     .kind = VSHI_NAME,
-     .offset = offsetof(vsh_flat_scene, color_space),
-     .name_of = vshi_color_space_key,
-     .option = {.name = "color-space",
-                .value = "SPACE",
-                .group = VSH_SETTINGS_FLAT_IMAGE,
-                .help = "of R, G, B in 8 and 16 bits",
-                .otherwise = "auto: srgb for irradiance, linear for shadows"}},
+    VSHI_KEY("casters", CUSTOM, .read = read_casters),
+    VSHI_KEY("lights", CUSTOM, .required = VSHI_ALL, .read = read_lights),
+    VSHI_KEY("region", CUSTOM, .required = VSHI_ALL, .read = read_region),
+    VSHI_KEY("size", CUSTOM, .read = read_size,
+             VSHI_OPTION("size", "W[xH]", FLAT_IMAGE, "texels of the map",
+                         .range = "W or WxH, each from 1 to 65536 texels", .otherwise = "512", .by = true)),
+    VSHI_KEY("method", NAME, AT(options.method), .names = VSH_NAMES_FLAT,
+             VSHI_OPTION("method", "NAME", FLAT_TEXELS,
+                         "of the shadow; classic has the outer half of the penumbra only, hard none")),
+    VSHI_KEY("supersample", INTEGER, AT(options.supersample), .lowest = 1.0, .highest = 16.0,
+             VSHI_OPTION("supersample", "N", FLAT_TEXELS, "N × N samples a texel")),
+    VSHI_KEY("padding", INTEGER, AT(options.padding), .highest = 4096.0,
+             VSHI_OPTION("padding", "N", FLAT_TEXELS, "texels that values are grown by into solids")),
+    VSHI_KEY("max_steps", INTEGER, AT(options.max_steps), .lowest = 16.0, .highest = 65536.0,
+             VSHI_OPTION("max-steps", "N", FLAT_TEXELS,
+                         "with classic: steps after which a ray takes what is known by then")),
+    VSHI_KEY("output", PATH, AT(output)),
+    VSHI_KEY("bits", CUSTOM, AT(bits), .read = vshi_read_bits,
+             VSHI_OPTION("bits", "N", FLAT_IMAGE, "bits a channel", .range = "8, 16 or 32",
+                         .otherwise = "32 for EXR, else 16 where the format has it, else 8")),
+    VSHI_KEY("pack", STRING, AT(pack),
+             VSHI_OPTION("pack", "R=NAME,…", FLAT_IMAGE,
+                         "what goes where in formats that cannot name channels",
+                         .otherwise = "irradiance.R, .G and .B to R, G, B; A to A")),
+    VSHI_KEY("color_space", NAME, AT(color_space), .name_of = vshi_color_space_key,
+             VSHI_OPTION("color-space", "SPACE", FLAT_IMAGE, "of R, G, B in 8 and 16 bits",
+                         .otherwise = "auto: srgb for irradiance, linear for shadows")),
 };
 const vshi_table vshi_flat_table = VSHI_TABLE(scene_keys);
 
-typedef struct parsing {
-    vshi_json reader;
-    owner *made;
-} parsing;
-
-static vsh_result parse(void *user, vsh_error *error) {
-    (void)error; /* the reader holds it */
-    vshi_json *reader = &((parsing *)user)->reader;
-    owner *made = ((parsing *)user)->made;
-    json_t *json = NULL;
-    vsh_result result = VSH_OK;
-    VSHI_TRY_DONE(vshi_json_load(reader, &json));
-    const vshi_value root = {NULL, NULL, 0, 0, json};
+static vsh_result read_scene(vshi_json *reader, const vshi_value *root, void *made) {
+    vsh_flat_scene *scene = made;
     vshi_value region;
-    VSHI_TRY_DONE(vshi_expect(reader, &root, JSON_OBJECT));
-    if (!vshi_member(&root, "region", &region)) {
-        result =
-            vshi_json_fail(reader, &root,
-                           "key \"region\" is missing: a flat scene needs it; 'vdbshade bake' bakes scenes "
-                           "with receivers");
-        goto done;
+    VSHI_TRY(vshi_expect(reader, root, JSON_OBJECT));
+    if (!vshi_member(root, "region", &region)) {
+        return vshi_json_fail(reader, root,
+                              "key \"region\" is missing: a flat scene needs it; 'vdbshade bake' bakes "
+                              "scenes with receivers");
     }
-    made->scene = vsh_flat_scene_default();
-    VSHI_TRY_DONE(vshi_read_object(reader, &root, &vshi_flat_table, 1, "a flat scene", &made->scene));
-done:
-    made->blocks = reader->blocks;
-    json_decref(json);
-    return result;
+    *scene = vsh_flat_scene_default();
+    return vshi_read_object(reader, root, &vshi_flat_table, 1, "a flat scene", scene);
 }
 
 vsh_result vsh_flat_scene_read(const char *path, const vsh_run *run, vsh_flat_scene **scene,
@@ -181,35 +227,21 @@ vsh_result vsh_flat_scene_read(const char *path, const vsh_run *run, vsh_flat_sc
     VSHI_NEEDS(scene);
     *scene = NULL;
     VSHI_NEEDS(path);
-    char *text = NULL;
-    size_t size;
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    VSHI_TRY(vshi_scene_text(path, &full, &text, &size, error));
-    owner *made = calloc(1, sizeof *made);
-    parsing p = {{path, text, size, NULL, error}, made};
-    const vsh_result result =
-        made != NULL
-            ? vshi_on_stack(parse, &p, error)
-            : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
-    free(text);
-    if (result == VSH_OK) {
-        *scene = &made->scene;
-    } else if (made != NULL) {
-        vsh_flat_scene_free(&made->scene);
-    }
-    return result;
+    VSHI_TRY(vshi_unsupported_check(path, error));
+    vshi_json reader = {.path = path, .run = &full, .error = error};
+    void *made;
+    VSHI_TRY(vshi_json_read(&reader, sizeof **scene, read_scene, &made));
+    *scene = made;
+    return VSH_OK;
 }
 
 void vsh_flat_scene_free(vsh_flat_scene *scene) {
-    if (scene != NULL) {
-        owner *made = (owner *)scene;
-        vshi_blocks_free(made->blocks);
-        free(made);
-    }
+    vshi_json_free(scene);
 }
 
-/* --- casters */
+/* --- the outline of its casters */
 
 /* As many-sided that it is off by 1e-4 of the radius at most, and of the circle's area. */
 static vsh_result make_circle(double radius, const vsh_run *run, vsh_outline **outline, vsh_error *error) {

@@ -1,13 +1,19 @@
+/* Lights: those that a scene file lists, in space or in a plane, and those of models and their files. */
+#include "base/memory.h"
 #include "base/try.h"
 #include "light/light.h"
 #include "light/types.h"
-#include "scene/parts.h"
+#include "scene/scene.h"
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <vdbshade/image.h>
 
-/* Behind those of lights what stands in their place: a file of some (light_list.c). */
+/* --- one light */
+
+/* Behind those of lights what stands in their place: a file of some (read_item()). */
 static const char *type_name(int32_t i) {
     const vshi_light_type *type = vshi_light_type_of(i);
     const bool behind = type == NULL && i > 0 && vshi_light_type_of(i - 1) != NULL;
@@ -66,10 +72,10 @@ static double bound_of(const vshi_light_member *m, double bound) {
 }
 
 static vshi_key key_of(const vshi_light_member *m, int32_t dimensions) {
-    static const vshi_kind kinds[] = {[VSHI_LIGHT_NUMBER] = VSHI_NUMBER,
-                                      [VSHI_LIGHT_ANGLE] = VSHI_DEGREES,
-                                      [VSHI_LIGHT_VECTOR] = VSHI_VECTOR,
-                                      [VSHI_LIGHT_SWITCH] = VSHI_BOOL};
+    static const vshi_key_kind kinds[] = {[VSHI_LIGHT_NUMBER] = VSHI_NUMBER,
+                                          [VSHI_LIGHT_ANGLE] = VSHI_DEGREES,
+                                          [VSHI_LIGHT_VECTOR] = VSHI_VECTOR,
+                                          [VSHI_LIGHT_SWITCH] = VSHI_BOOL};
     /* what is excluded at infinity is not at the largest number */
     const bool above = m->above && isfinite(m->lowest), below = m->below && isfinite(m->highest);
     return (vshi_key){.name = m->key,
@@ -145,7 +151,7 @@ static vsh_result check(vshi_json *reader, const vshi_value *value, const vsh_li
     return VSH_OK;
 }
 
-vsh_result vshi_read_light(vshi_json *reader, const vshi_value *value, void *member) {
+static vsh_result read_light(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_light *light = member;
     *light = vsh_light_default();
     VSHI_TRY(read_keys(reader, value, false, light));
@@ -185,4 +191,234 @@ vsh_result vshi_check_light_names(vshi_json *reader, const vshi_value *value, co
         }
     }
     return VSH_OK;
+}
+
+/* --- lists of lights and of files that have some */
+
+enum { MAX_LIGHTS = VSH_MAX_CHANNELS - 5 /* ao, A and three of irradiance must fit into the image too */ };
+
+/* An item of the list. */
+typedef struct item {
+    vsh_light light;
+    vsh_light_file file; /* path NULL: a light */
+} item;
+
+#define AT(member) .offset = offsetof(vsh_light_file, member)
+static const vshi_key file_keys[] = {
+    VSHI_KEY("type", LATER, .required = VSHI_ALL),
+    VSHI_KEY("file", PATH, AT(path), .required = VSHI_ALL),
+    VSHI_KEY("angle_deg", DEGREES, AT(angle), .highest = 180.0, .flags = VSHI_BELOW),
+    VSHI_KEY("radius", NUMBER, AT(radius), .highest = VSHI_LARGEST),
+    {.name = "layers", .kind = VSHI_LATER},
+};
+static const vshi_table file_table = VSHI_TABLE(file_keys);
+
+static vsh_result read_item(vshi_json *reader, const vshi_value *value, void *member) {
+    item *one = member;
+    VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
+    const char *type = json_string_value(json_object_get(value->json, "type"));
+    if (type == NULL || strcmp(type, "file") != 0) {
+        return read_light(reader, value, &one->light);
+    }
+    one->file.angle = vsh_light_default().angle;
+    return vshi_read_object(reader, value, &file_table, VSHI_ALL, "a file of lights", &one->file);
+}
+
+/* The lights of one file: *lights, to be freed. */
+static vsh_result read_file(vshi_json *reader, const vshi_value *value, double unit, vsh_light_file *file,
+                            vsh_light **lights) {
+    vshi_value path;
+    VSHI_TRY(vsh_lights_read(file->path, file->angle, file->radius, unit, reader->run, lights, &file->count,
+                             reader->error));
+    return file->count > 0 || !vshi_member(value, "file", &path)
+               ? VSH_OK
+               : vshi_json_fail(reader, &path, "%.200s has no lights; those of a glTF or GLB are read",
+                                file->path);
+}
+
+/* Puts the lights of an item behind those that the scene has. */
+static vsh_result append(vshi_json *reader, const vshi_value *value, const vsh_light *lights, size_t count,
+                         vsh_light *all, vsh_scene *scene) {
+    if (count > MAX_LIGHTS - scene->light_count) {
+        return vshi_json_fail(reader, value, "are %zu lights, which with those before are over %d", count,
+                              MAX_LIGHTS);
+    }
+    if (count > 0) {
+        memcpy(all + scene->light_count, lights, count * sizeof *all);
+    }
+    scene->light_count += count;
+    return VSH_OK;
+}
+
+static vsh_result append_file(vshi_json *reader, const vshi_value *value, vsh_light_file *file,
+                              vsh_light *all, vsh_scene *scene) {
+    vsh_light *lights = NULL;
+    VSHI_TRY(read_file(reader, value, scene->unit, file, &lights));
+    const vsh_result result = append(reader, value, lights, file->count, all, scene);
+    vsh_lights_free(lights);
+    return result;
+}
+
+/* Which item of the list a light is of. */
+static size_t item_of(const vsh_scene *scene, size_t light) {
+    size_t place = light;
+    for (size_t i = 0; i < scene->light_file_count && light >= scene->light_files[i].first; ++i) {
+        const vsh_light_file *file = &scene->light_files[i];
+        if (light < file->first + file->count) {
+            return place - (light - file->first);
+        }
+        place = place + 1 - file->count;
+    }
+    return place;
+}
+
+vshi_value vshi_light_item(const vshi_value *list, const vsh_scene *scene, size_t light) {
+    return vshi_item(list, item_of(scene, light));
+}
+
+static vsh_result check_names(vshi_json *reader, const vshi_value *list, const vsh_scene *scene) {
+    if (scene->light_file_count == 0) {
+        return vshi_check_light_names(reader, list, scene->lights, scene->light_count);
+    }
+    for (size_t i = 0; i < scene->light_count; ++i) {
+        for (size_t k = 0; k < i; ++k) {
+            if (strcmp(scene->lights[i].name, scene->lights[k].name) == 0) {
+                const vshi_value value = vshi_light_item(list, scene, i);
+                return vshi_json_fail(reader, &value, "has a light \"%s\", as lights[%zu] has",
+                                      scene->lights[i].name, item_of(scene, k));
+            }
+        }
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_read_lights(vshi_json *reader, const vshi_value *list, vsh_scene *scene) {
+    item *items = NULL;
+    size_t count;
+    vsh_light *lights = NULL;
+    vsh_light_file *files = NULL;
+    void *memory;
+    VSHI_TRY(vshi_read_list(reader, list, 0, MAX_LIGHTS, sizeof *items, read_item, &memory, &count));
+    items = memory;
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&files, count, sizeof *files, "files of lights"));
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&lights, MAX_LIGHTS, sizeof *lights, "lights"));
+    scene->lights = lights;
+    scene->light_files = files;
+    for (size_t i = 0; i < count; ++i) {
+        const vshi_value value = vshi_item(list, i);
+        if (items[i].file.path == NULL) {
+            VSHI_TRY(append(reader, &value, &items[i].light, 1, lights, scene));
+            continue;
+        }
+        vsh_light_file *file = &files[scene->light_file_count];
+        *file = items[i].file;
+        file->first = scene->light_count;
+        if (reader->run != NULL) {
+            VSHI_TRY(append_file(reader, &value, file, lights, scene));
+        }
+        ++scene->light_file_count;
+    }
+    return check_names(reader, list, scene);
+}
+
+/* --- lights of a model */
+
+static bool is_taken(const vsh_light *lights, size_t count, const char *name) {
+    for (size_t i = 0; i < count; ++i) {
+        if (strcmp(lights[i].name, name) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* One that a channel can have, and that none of the lights before it has: "Key light" becomes "Key_light",
+ * and the next of them "Key_light_2". */
+static void make_name(const char *given, const vsh_light *before, size_t count, char name[64]) {
+    enum { ROOM = 10 /* for the number of a second light of one name */ };
+    snprintf(name, 64 - ROOM, "%s", given != NULL && given[0] != '\0' ? given : "light");
+    for (char *c = name; *c != '\0'; ++c) {
+        const char one[2] = {*c, '\0'};
+        *c = vshi_light_name_valid(one) ? *c : '_';
+    }
+    const size_t length = strlen(name);
+    for (unsigned k = 2; is_taken(before, count, name); ++k) {
+        snprintf(name + length, 64 - length, "_%u", k);
+    }
+}
+
+/* Directions are towards a sun, and away from a spot. */
+static void place(const vsh_model_light *given, double scale, vsh_light *light) {
+    for (int i = 0; i < 3; ++i) {
+        light->direction[i] =
+            given->type == VSH_MODEL_LIGHT_DIRECTIONAL ? 0.0 - given->direction[i] : light->direction[i];
+        light->axis[i] = given->type == VSH_MODEL_LIGHT_SPOT ? given->direction[i] : light->axis[i];
+        light->position[i] = scale * given->position[i];
+        light->color[i] = given->color[i] * given->intensity;
+    }
+}
+
+static vsh_light light_of(const vsh_model_light *given, double angle, double radius, double scale) {
+    static const int32_t types[] = {[VSH_MODEL_LIGHT_DIRECTIONAL] = VSH_LIGHT_DIRECTIONAL,
+                                    [VSH_MODEL_LIGHT_POINT] = VSH_LIGHT_SPHERE,
+                                    [VSH_MODEL_LIGHT_SPOT] = VSH_LIGHT_SPOT};
+    vsh_light light = vsh_light_default();
+    light.type = types[given->type];
+    light.falloff =
+        given->type == VSH_MODEL_LIGHT_DIRECTIONAL ? VSH_FALLOFF_NONE : VSH_FALLOFF_INVERSE_SQUARE;
+    light.angle = angle;
+    light.radius = radius;
+    if (given->type == VSH_MODEL_LIGHT_SPOT) {
+        light.inner_angle = given->inner_angle;
+        light.outer_angle = given->outer_angle;
+    }
+    place(given, scale, &light);
+    return light;
+}
+
+vsh_result vsh_lights_from_model(const vsh_model *model, double angle, double radius, double unit,
+                                 vsh_light **lights, size_t *count, vsh_error *error) {
+    VSHI_NEEDS(lights);
+    *lights = NULL;
+    VSHI_NEEDS(count);
+    *count = 0;
+    VSHI_NEEDS(model);
+    if (!(unit >= 0.0 && isfinite(unit))) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_lights_from_model: unit is %g, expected at least 0",
+                         unit);
+    }
+    const size_t all = vsh_model_light_count(model);
+    const double own = vsh_model_unit(model) > 0.0 ? vsh_model_unit(model) : 1.0;
+    vsh_light *made = NULL;
+    VSHI_TRY(vshi_allocate((void **)&made, all, sizeof *made, "lights", error));
+    for (size_t i = 0; i < all; ++i) {
+        const vsh_model_light given = vsh_model_get_light(model, i);
+        made[i] = light_of(&given, angle, radius, unit > 0.0 ? unit / own : 1.0);
+        make_name(given.name, made, i, made[i].name);
+        const vsh_result result = vsh_light_check(&made[i], error);
+        if (result != VSH_OK) {
+            free(made);
+            return result;
+        }
+    }
+    *lights = made;
+    *count = all;
+    return VSH_OK;
+}
+
+vsh_result vsh_lights_read(const char *path, double angle, double radius, double unit, const vsh_run *run,
+                           vsh_light **lights, size_t *count, vsh_error *error) {
+    VSHI_NEEDS(lights);
+    *lights = NULL;
+    VSHI_NEEDS(count);
+    *count = 0;
+    vsh_model *model = NULL;
+    VSHI_TRY(vsh_model_read(path, run, &model, error));
+    const vsh_result result = vsh_lights_from_model(model, angle, radius, unit, lights, count, error);
+    vsh_model_free(model);
+    return result;
+}
+
+void vsh_lights_free(vsh_light *lights) {
+    free(lights);
 }

@@ -7,8 +7,8 @@
 #include "mesh/alpha_mask.h"
 #include "mesh/mesh.h"
 #include "model/model.h"
-#include "scene/vertex_alpha.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -32,6 +32,14 @@ typedef struct material {
     vshi_mask_table table; /* NULL sums: not made yet */
 } material;
 
+/* The alpha of a shape's vertex colours, which is linear over a triangle. */
+typedef struct vertex_alpha {
+    bool uniform;  /* all vertices have `factor`, a factor as the material's is */
+    double factor; /* 0 … 1; what is not finite is 1 */
+    bool binary;   /* nearly all vertices are clear or opaque, and there are some of both */
+    float *uvs;    /* [count][2], for mask_by_vertices(); NULL where it is uniform */
+} vertex_alpha;
+
 /* Of a shape's triangles, those that are opaque and those that the mask cuts out; NULL where they are all, or
  * none. */
 typedef struct shape {
@@ -39,7 +47,7 @@ typedef struct shape {
     uint32_t *opaque, *mixed;
     size_t opaque_count, mixed_count;
     bool looked; /* at its vertices' alpha */
-    vshi_vertex_alpha vertices;
+    vertex_alpha vertices;
     vsh_alpha_mask mask; /* where `masked`: its material's with that */
     bool masked;
 } shape;
@@ -89,7 +97,7 @@ void vshi_masks_free(vshi_masks *masks) {
     for (size_t i = 0; masks->shapes != NULL && i < masks->model->shape_count; ++i) {
         free(masks->shapes[i].opaque);
         free(masks->shapes[i].mixed);
-        vshi_vertex_alpha_free(&masks->shapes[i].vertices);
+        free(masks->shapes[i].vertices.uvs);
     }
     for (size_t i = 0; i < masks->texture_count; ++i) {
         free(masks->textures[i].alpha);
@@ -98,6 +106,68 @@ void vshi_masks_free(vshi_masks *masks) {
     free(masks->textures);
     free(masks->shapes);
     free(masks);
+}
+
+/* --- alpha of vertices */
+
+/* Whether alphas of 8 bits are those of a cut-out, whose edges are few texels wide; smoke and glass are
+ * between all over. */
+static bool is_binary(const uint8_t *alpha, size_t count) {
+    static const double BETWEEN = 0.25, SOME = 0.01;
+    enum { CLEAR = 25, OPAQUE = 230 };
+    size_t clear = 0, opaque = 0;
+    for (size_t i = 0; i < count; ++i) {
+        clear += alpha[i] <= CLEAR;
+        opaque += alpha[i] >= OPAQUE;
+    }
+    const double all = (double)count;
+    return (double)(count - clear - opaque) <= BETWEEN * all && (double)clear >= SOME * all &&
+           (double)opaque >= SOME * all;
+}
+
+/* 0 … 1 */
+static float within(float alpha) {
+    return !isfinite(alpha) || alpha > 1.0F ? 1.0F : alpha < 0.0F ? 0.0F : alpha;
+}
+
+static vsh_result fill_vertex_alpha(const float *alphas, size_t count, const char *what, const vsh_run *run,
+                                    vertex_alpha *alpha, vsh_error *error) {
+    uint8_t *bytes = NULL;
+    vsh_result result;
+    VSHI_TRY(vshi_check_limit(run, (1.0 + sizeof(float[2])) * (double)count, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&bytes, count, 1, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&alpha->uvs, count, sizeof(float[2]), what, error));
+    for (size_t v = 0; v < count; ++v) {
+        alpha->uvs[2 * v] = within(alphas[v]);
+        bytes[v] = (uint8_t)(255.0F * alpha->uvs[2 * v] + 0.5F);
+    }
+    alpha->binary = is_binary(bytes, count);
+done:
+    free(bytes);
+    return result;
+}
+
+static vsh_result find_vertex_alpha(const float *alphas, size_t count, const char *what, const vsh_run *run,
+                                    vertex_alpha *alpha, vsh_error *error) {
+    *alpha = (vertex_alpha){.uniform = true, .factor = count > 0 ? (double)within(alphas[0]) : 1.0};
+    for (size_t v = 1; v < count && alpha->uniform; ++v) {
+        alpha->uniform = (double)within(alphas[v]) == alpha->factor;
+    }
+    return alpha->uniform ? VSH_OK : fill_vertex_alpha(alphas, count, what, run, alpha, error);
+}
+
+/* Where base_alpha × alpha is at least alpha_cutoff, as a mask: a texture of two texels in a row, 0 and 1, is
+ * looked up at a vertex's alpha, and bilinear between them is that alpha. */
+static vsh_alpha_mask mask_by_vertices(double base_alpha, double alpha_cutoff) {
+    static const uint8_t ramp[2] = {0, 255};
+    return (vsh_alpha_mask){.alpha = ramp,
+                            .width = 2,
+                            .height = 1,
+                            .wrap = {VSH_WRAP_CLAMP, VSH_WRAP_CLAMP},
+                            /* from the middle of the first texel to that of the second */
+                            .uv_transform = {0.5, 0.0, 0.25, 0.0, 0.0, 0.5},
+                            .alpha_cutoff = alpha_cutoff,
+                            .base_alpha = base_alpha};
 }
 
 /* --- textures */
@@ -170,7 +240,7 @@ static vsh_result take_alpha(const vsh_image *image, const char *path, const vsh
     }
     to->width = image->width;
     to->height = image->height;
-    to->binary = vshi_alpha_is_binary(to->alpha, texels);
+    to->binary = is_binary(to->alpha, texels);
     return VSH_OK;
 }
 
@@ -273,16 +343,15 @@ static vsh_result look_at_vertices(vshi_masks *masks, size_t mesh, const vsh_run
         return VSH_OK;
     }
     s->looked = true;
-    s->vertices = (vshi_vertex_alpha){.uniform = true, .factor = 1.0};
+    s->vertices = (vertex_alpha){.uniform = true, .factor = 1.0};
     if (of->alphas == NULL || told.alpha == VSH_ALPHA_OPAQUE) {
         return VSH_OK;
     }
     const bool masked = told.alpha == VSH_ALPHA_MASKED;
-    VSHI_TRY(vshi_vertex_alpha_look(of->alphas, of->vertex_count, masks->path, run, &s->vertices, error));
+    VSHI_TRY(find_vertex_alpha(of->alphas, of->vertex_count, masks->path, run, &s->vertices, error));
     if (m->state == WHOLE && !s->vertices.uniform && (!masked || told.alpha_cutoff > 0.0)) {
         s->masked = true;
-        s->mask = masked ? vshi_vertex_alpha_mask(told.base_alpha, told.alpha_cutoff)
-                         : vshi_vertex_alpha_mask(1.0, HALF);
+        s->mask = masked ? mask_by_vertices(told.base_alpha, told.alpha_cutoff) : mask_by_vertices(1.0, HALF);
     } else if (m->state == BY_MASK && s->vertices.uniform && masked) {
         s->masked = true;
         s->mask = m->mask;

@@ -2,15 +2,178 @@
 #include "scene/occluders.h"
 
 #include "base/clock.h"
+#include "base/elementary.h"
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
+#include "base/vec.h"
+#include "light/view.h"
+#include "mesh/mesh_set.h"
 #include "shade/occluders.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+
+/* --- reach */
+
+/* Tangent of 60°: wider half angles are marched as if they were this wide, as a tangent without
+ * bound would ask for a field without bound. */
+static const double widest_tangent = 1.7320508075688772;
+
+/* Finds the distance from surfaces up to which the field of a level set must be exact. */
+static double find_reach(const vsh_scene *scene, const vsh_grid_info *info, const double receivers_min[3],
+                         const double receivers_max[3]) {
+    vshi_vec sides;
+    double *side[3] = {&sides.x, &sides.y, &sides.z};
+    for (int i = 0; i < 3; ++i) {
+        *side[i] = fmax(info->bounds_max[i], receivers_max[i]) - fmin(info->bounds_min[i], receivers_min[i]);
+    }
+    const double longest = vshi_length(sides);          /* ray from a receiver to a caster */
+    double reach = info->half_width * info->voxel_size; /* that of the finest level */
+    for (size_t i = 0; i < scene->light_count; ++i) {
+        const vshi_light_place place = vshi_light_in_world(&scene->lights[i]);
+        if (place.parallel) {
+            const double half_angle = fmin(place.half, vshi_atan(widest_tangent));
+            reach = fmax(reach, vshi_tan(half_angle) * longest);
+        } else {
+            /* At t of the distance d to a sphere of radius r, the cone is r t/d wide: never wider than r. */
+            reach = fmax(reach, fmin(place.radius, widest_tangent * longest));
+        }
+    }
+    if (vsh_planes_shaded(&scene->planes) > 0) { /* rays across the scene, which coarse levels shorten */
+        reach = fmax(reach, longest);
+    }
+    return scene->ao ? fmax(reach, scene->shade.ao_distance) : reach;
+}
+
+double vsh_scene_reach(const vsh_scene *scene, const vsh_grid *grid, const double receivers_min[3],
+                       const double receivers_max[3]) {
+    VSHI_FLOATS;
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    return find_reach(scene, &info, receivers_min, receivers_max);
+}
+
+/* --- casters that are thinner than voxels, where what is baked depends on them */
+
+/* Of a mesh's area: less is told of none. Edges sharper than a voxel are lost everywhere. */
+static const double TOLD = 0.005;
+/* Voxels that hold a part are so much smaller than it is thick. */
+static const double HELD = 0.8;
+
+static void warn_lost(const vsh_caster *caster, const vsh_mesh *mesh, const vsh_lost *lost, double voxel_size,
+                      const vsh_run *run) {
+    char share[32], help[64] = "finer ones may hold it";
+    snprintf(share, sizeof share, "%.2g %%", 100.0 * lost->share);
+    if (lost->thickness > 0.0) {
+        snprintf(help, sizeof help, "voxels of %.2g hold most of it", HELD * lost->thickness);
+    }
+    vshi_warn(run,
+              "%s: mesh '%s': %s of its area is thinner than 1.25 voxels of %.3g and casts nothing; "
+              "%s, and --method exact needs none",
+              caster->path, mesh->name != NULL ? mesh->name : "", share, voxel_size, help);
+}
+
+/* Finds what is lost of one caster's meshes, a second time with triangles where something is. */
+static vsh_result find_lost(const vsh_mesh *meshes, size_t count, const vsh_field *field, const vsh_run *run,
+                            vsh_lost *lost, vsh_error *error) {
+    VSHI_TRY(vsh_field_find_lost(field, meshes, count, NULL, lost, error));
+    bool any = false;
+    for (size_t m = 0; m < count; ++m) {
+        any = any || lost[m].share >= TOLD;
+    }
+    if (!any) {
+        return VSH_OK;
+    }
+    vsh_triangles *triangles = NULL;
+    VSHI_TRY(vsh_triangles_create(meshes, count, run, &triangles, error));
+    const vsh_result result = vsh_field_find_lost(field, meshes, count, triangles, lost, error);
+    vsh_triangles_free(triangles);
+    return result;
+}
+
+static vsh_result check_lost(const vsh_caster *caster, const vsh_mesh *meshes, size_t count,
+                             const vsh_field *field, const vsh_run *run, vsh_error *error) {
+    vsh_lost *lost;
+    vsh_field_info info;
+    vsh_field_get_info(field, &info);
+    VSHI_TRY(vshi_allocate((void **)&lost, count, sizeof *lost, "lost casters", error));
+    const vsh_result result = find_lost(meshes, count, field, run, lost, error);
+    for (size_t m = 0; m < count && result == VSH_OK; ++m) {
+        if (lost[m].share >= TOLD) {
+            warn_lost(caster, &meshes[m], &lost[m], info.voxel_size, run);
+        }
+    }
+    free(lost);
+    return result;
+}
+
+static void warn_one_sided(const vsh_caster *caster, const vsh_mesh *meshes, size_t count,
+                           const vsh_run *run) {
+    size_t one_sided = 0;
+    for (size_t m = 0; m < count; ++m) {
+        one_sided += meshes[m].one_sided != 0;
+    }
+    if (one_sided > 0) {
+        vshi_warn(run,
+                  "%s: %zu of %zu meshes are one-sided, but voxels cast to both sides; --method exact and "
+                  "--ao-method exact let light through their backs",
+                  caster->path, one_sided, count);
+    }
+}
+
+/* Warns of parts of a layer's meshes, or (NULL) of those in no layer, that their field has lost, unless their
+ * triangles are traced. */
+static vsh_result warn_of_lost(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
+                               const vsh_field *field, const vsh_run *run, vsh_error *error) {
+    if (run->warning == NULL || !vsh_scene_marches(scene, layer)) {
+        return VSH_OK;
+    }
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        const vsh_caster *caster = &scene->casters[i];
+        size_t count = 0;
+        const vsh_mesh *meshes = vsh_assets_caster(assets, i, &count);
+        if (count == 0 || caster->type != VSH_CASTER_MESH || !vshi_caster_in_layer(caster, layer)) {
+            continue;
+        }
+        warn_one_sided(caster, meshes, count, run);
+        VSHI_TRY(check_lost(caster, meshes, count, field, run, error));
+    }
+    return VSH_OK;
+}
+
+/* Sends notes on the solids and sheets of a layer's casters, or (NULL) of those in none, that have no voxels.
+ */
+static vsh_result note_solidity(const vsh_scene *scene, const vsh_assets *assets,
+                                const vsh_scene_layer *layer, const vsh_run *run, vsh_error *error) {
+    if (!vshi_wants_notes(run)) {
+        return VSH_OK;
+    }
+    vshi_mesh_set set = {.count = 0};
+    vsh_mesh *meshes;
+    size_t count = 0;
+    vsh_result result;
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&meshes, vshi_assets_mesh_count(assets), sizeof *meshes, "triangles", error));
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        const vshi_asset_place *place = vshi_assets_caster(assets, i);
+        for (size_t m = 0; vshi_caster_has_voxels(scene, &scene->casters[i], layer) && m < place->count;
+             ++m) {
+            meshes[count++] = place->meshes[m];
+        }
+    }
+    VSHI_TRY_DONE(vshi_mesh_set_create(meshes, count, &set, error));
+    VSHI_TRY_DONE(vshi_mesh_set_solve(&set, run, error));
+    vshi_mesh_set_note(&set, 0.0, 0.0, run);
+done:
+    vshi_mesh_set_free(&set);
+    free(meshes);
+    return result;
+}
+
+/* --- fields */
 
 /* Diagonals of the casters' box that points are within, where nothing else is said. */
 static const double WITHIN = 4.0;
@@ -30,7 +193,7 @@ typedef struct making {
 static double reach_of(const making *m, const vsh_grid_info *info) {
     const vsh_scene_occluders_options *o = &m->options;
     if (o->receivers_min != NULL) {
-        return vshi_scene_reach(m->scene, info, o->receivers_min, o->receivers_max);
+        return find_reach(m->scene, info, o->receivers_min, o->receivers_max);
     }
     double diagonal = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
@@ -44,7 +207,7 @@ static double reach_of(const making *m, const vsh_grid_info *info) {
         around_min[axis] = info->bounds_min[axis] - margin;
         around_max[axis] = info->bounds_max[axis] + margin;
     }
-    const double reach = vshi_scene_reach(m->scene, info, around_min, around_max);
+    const double reach = find_reach(m->scene, info, around_min, around_max);
     /* the field's own default, where that is enough: a program that takes it gets the same bits */
     return reach > WITHIN * diagonal ? reach : vsh_field_options_default().reach;
 }
@@ -121,8 +284,7 @@ static vsh_result make_field(making *m, const vsh_scene_layer *layer, const vsh_
     }
     if (resolution == 0 && triangles != NULL && m->options.voxels == 0) {
         VSHI_TRY(vshi_occluders_unknown(triangles, 0.0, field, error));
-        return *field == NULL ? VSH_OK
-                              : vshi_scene_note_solidity(m->scene, m->assets, layer, &m->voxel, error);
+        return *field == NULL ? VSH_OK : note_solidity(m->scene, m->assets, layer, &m->voxel, error);
     }
     vsh_grid_info voxels;
     VSHI_TRY(create_field(m, layer, resolution, &voxels, field, error));
@@ -136,7 +298,7 @@ static vsh_result make_field(making *m, const vsh_scene_layer *layer, const vsh_
     m->own.field_s += vshi_seconds() - start - (m->own.voxelize_s - voxelized);
     vsh_run run = m->run;
     run.warning = m->voxel.warning;
-    return vshi_scene_warn_lost(m->scene, m->assets, layer, *field, &run, error);
+    return warn_of_lost(m->scene, m->assets, layer, *field, &run, error);
 }
 
 static vsh_result make_field_of(making *m, const vsh_scene_layer *layer, const vsh_triangles *triangles,

@@ -6,17 +6,6 @@
 
 #include <vdbshade/field.h>
 
-/* Warns of what the field of a layer's casters, or (NULL) of those in none, has lost of their meshes, unless
- * their triangles are traced. Errors: as vsh_field_find_lost(). */
-vsh_result vshi_scene_warn_lost(const vsh_scene *scene, const vsh_assets *assets,
-                                const vsh_scene_layer *layer, const vsh_field *field, const vsh_run *run,
-                                vsh_error *error);
-
-/* Sends notes on the solids and sheets of a layer's casters that have no voxels. NULL: the casters in no
- * layer. Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_scene_note_solidity(const vsh_scene *scene, const vsh_assets *assets,
-                                    const vsh_scene_layer *layer, const vsh_run *run, vsh_error *error);
-
 /* How a layer's casters, or (NULL) those in none, are voxelised. */
 vsh_grid_options vshi_scene_grid_options(const vsh_scene *scene, const vsh_scene_layer *layer);
 
@@ -50,8 +39,8 @@ bool vshi_scene_method_is(const vsh_scene *scene, const vsh_scene_layer *layer, 
  * point that is shaded. */
 double vshi_scene_field_rays(const vsh_scene *scene, const vsh_scene_layer *layer);
 
-/* vsh_scene_reach() of a level set that is known by what it told of itself. */
-double vshi_scene_reach(const vsh_scene *scene, const vsh_grid_info *info, const double receivers_min[3],
-                        const double receivers_max[3]);
+/* Whether a caster has triangles, or is made of voxels among a layer's, or (NULL) those in none. */
+bool vshi_caster_has_triangles(const vsh_caster *caster);
+bool vshi_caster_has_voxels(const vsh_scene *scene, const vsh_caster *caster, const vsh_scene_layer *layer);
 
 #endif

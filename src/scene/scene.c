@@ -1,22 +1,20 @@
+/* Scene files: their keys, the layers and terrains in them, and settings, which are keys given one by one. */
 #include "scene/scene.h"
 
+#include "base/floats.h"
+#include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
-#include "scene/parts.h"
-#include "json/keys.h"
+#include "model/model.h"
+#include "scene/assets.h"
 
-#include <vdbshade/settings.h>
-
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { MAX_ITEMS = 65536 };
 
-/* What vsh_scene_free() gets is the first member. */
-typedef struct owner {
-    vsh_scene scene;
-    vshi_json_block *blocks;
-} owner;
+/* --- lists */
 
 static vsh_result read_casters(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_scene *scene = member;
@@ -27,10 +25,58 @@ static vsh_result read_casters(vshi_json *reader, const vshi_value *value, void 
     return VSH_OK;
 }
 
+/* Names of lights, each a string that is the name of one. */
+static vsh_result read_light_names(vshi_json *reader, const vshi_value *value, void *member) {
+    vsh_scene_layer *layer = member;
+    VSHI_TRY(vshi_expect(reader, value, JSON_ARRAY));
+    const vshi_key key = {.kind = VSHI_STRING};
+    const size_t count = json_array_size(value->json);
+    const char **names;
+    /* one more: no lights at all are not NULL, which is all of them */
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&names, count + 1, sizeof *names, "lights of a layer"));
+    for (size_t i = 0; i < count; ++i) {
+        const vshi_value name = vshi_item(value, i);
+        VSHI_TRY(vshi_read_value(reader, &name, &key, &names[i]));
+    }
+    layer->shade.lights = names;
+    layer->shade.light_count = count;
+    return VSH_OK;
+}
+
+#define AT(member) .offset = offsetof(vsh_scene_layer, member)
+static const vshi_key layer_keys[] = {
+    VSHI_KEY("name", STRING, AT(name), .required = VSHI_ALL),
+    VSHI_KEY("voxel_size", NUMBER, AT(voxel_size), .lowest = VSHI_SMALLEST_LENGTH,
+             .highest = VSHI_LARGEST_VOXEL),
+    VSHI_KEY("resolution", INTEGER, AT(resolution), .lowest = 2.0, .highest = 65536.0),
+    VSHI_KEY("method", NAME, AT(shade.method), .names = VSH_NAMES_SHADOW),
+    VSHI_KEY("combine", NAME, AT(shade.combine), .names = VSH_NAMES_COMBINE),
+    VSHI_KEY("softness", NUMBER, AT(shade.softness), .highest = 1000.0),
+    VSHI_KEY("remap", VECTOR, AT(shade.remap), .highest = 1.0, .count = 2),
+    VSHI_KEY("start_offset", NUMBER, AT(shade.start_offset), .highest = 16.0),
+    VSHI_KEY("lights", CUSTOM, .read = read_light_names),
+    VSHI_KEY("ao", BOOL, AT(shade.ao)),
+};
+static const vshi_table layer_table = VSHI_TABLE(layer_keys);
+#undef AT
+
+static vsh_result read_layer(vshi_json *reader, const vshi_value *value, void *member) {
+    vsh_scene_layer *layer = member;
+    layer->shade = vsh_layer_default();
+    VSHI_TRY(vshi_read_object(reader, value, &layer_table, 1, "a layer", layer));
+    VSHI_TRY(vshi_reject_both(reader, value, "voxel_size", "resolution"));
+    vshi_value remap;
+    if (vshi_member(value, "remap", &remap) && !(layer->shade.remap[0] < layer->shade.remap[1])) {
+        return vshi_json_fail(reader, &remap, "expected two numbers that rise, found %g and %g",
+                              layer->shade.remap[0], layer->shade.remap[1]);
+    }
+    return VSH_OK;
+}
+
 static vsh_result read_layers(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_scene *scene = member;
     void *items;
-    VSHI_TRY(vshi_read_list(reader, value, 0, VSH_MAX_LAYERS, sizeof *scene->layers, vshi_read_layer, &items,
+    VSHI_TRY(vshi_read_list(reader, value, 0, VSH_MAX_LAYERS, sizeof *scene->layers, read_layer, &items,
                             &scene->layer_count));
     scene->layers = items;
     return VSH_OK;
@@ -89,45 +135,23 @@ static void wants_bent(void *target) {
     ++scene->bent; /* behind 0, which is none */
 }
 
+#define AT(member) .offset = offsetof(vsh_scene, member)
 static const vshi_key ao_keys[] = {
-    {.name = "distance",
-     .kind = VSHI_NUMBER,
-     .required = VSHI_ALL,
-     .offset = offsetof(vsh_scene, shade.ao_distance),
-     .lowest = VSHI_SMALLEST_LENGTH,
-     .highest = VSHI_LARGEST,
-     .then = wants_ao,
-     .option = {.name = "ao",
-                .value = "DISTANCE",
-                .group = VSH_SETTINGS_OCCLUSION,
-                .help = "ambient occlusion within a distance, scene units",
-                .otherwise = "none"}},
-    {.name = "method",
-     .kind = VSHI_NAME,
-     .offset = offsetof(vsh_scene, shade.ao_method),
-     .names = VSH_NAMES_AO,
-     .option = {.name = "ao-method",
-                .value = "NAME",
-                .group = VSH_SETTINGS_OCCLUSION,
-                .help = "of AO; cones and taps are previews"}},
-    {.name = "cones",
-     .kind = VSHI_INTEGER,
-     .variants = 1U << VSH_AO_CONES | 1U << VSH_AO_ADAPTIVE | 1U << VSH_AO_EXACT | 1U << VSH_AO_AUTO,
-     .offset = offsetof(vsh_scene, shade.ao_cones),
-     .lowest = 1.0,
-     .highest = 256.0},
-    {.name = "bent_normals",
-     .kind = VSHI_NAME,
-     .variants = ~(1U << VSH_AO_TAPS),
-     .offset = offsetof(vsh_scene, bent),
-     .names = VSH_NAMES_BENT,
-     .then = wants_bent,
-     .option = {.name = "bent-normals",
-                .value = "SPACE",
-                .group = VSH_SETTINGS_CHANNELS,
-                .help = "with --ao also bent.X, .Y, .Z: the mean direction that is open, in world or tangent "
-                        "space; -1 to 1, in integer formats (1 + x) / 2",
-                .otherwise = "none"}},
+    VSHI_KEY("distance", NUMBER, AT(shade.ao_distance), .required = VSHI_ALL, .lowest = VSHI_SMALLEST_LENGTH,
+             .highest = VSHI_LARGEST, .then = wants_ao,
+             VSHI_OPTION("ao", "DISTANCE", OCCLUSION, "ambient occlusion within a distance, scene units",
+                         .otherwise = "none")),
+    VSHI_KEY("method", NAME, AT(shade.ao_method), .names = VSH_NAMES_AO,
+             VSHI_OPTION("ao-method", "NAME", OCCLUSION, "of AO; cones and taps are previews")),
+    VSHI_KEY("cones", INTEGER, AT(shade.ao_cones),
+             .variants = 1U << VSH_AO_CONES | 1U << VSH_AO_ADAPTIVE | 1U << VSH_AO_EXACT | 1U << VSH_AO_AUTO,
+             .lowest = 1.0, .highest = 256.0),
+    VSHI_KEY("bent_normals", NAME, AT(bent), .variants = ~(1U << VSH_AO_TAPS), .names = VSH_NAMES_BENT,
+             .then = wants_bent,
+             VSHI_OPTION("bent-normals", "SPACE", CHANNELS,
+                         "with --ao also bent.X, .Y, .Z: the mean direction that is open, in world or "
+                         "tangent space; -1 to 1, in integer formats (1 + x) / 2",
+                         .otherwise = "none")),
 };
 const vshi_table vshi_ao_table = VSHI_TABLE(ao_keys);
 
@@ -189,194 +213,86 @@ static vsh_result read_unit(vshi_json *reader, const vshi_value *value, void *me
 }
 
 static const vshi_key scene_keys[] = {
-    {.name = "casters", .kind = VSHI_CUSTOM, .read = read_casters},
-    {.name = "voxel_size",
-     .kind = VSHI_NUMBER,
-     .offset = offsetof(vsh_scene, grid.voxel_size),
-     .lowest = VSHI_SMALLEST_LENGTH,
-     .highest = VSHI_LARGEST_VOXEL,
-     .then = voxels_are_named,
-     .option = {.name = "voxel-size",
-                .value = "SIZE",
-                .group = VSH_SETTINGS_CASTERS,
-                .help = "in place of --resolution: the edge of a voxel, scene units",
-                .otherwise = "as --resolution says"}},
-    {.name = "resolution",
-     .kind = VSHI_INTEGER,
-     .offset = offsetof(vsh_scene, grid.resolution),
-     .lowest = 2.0,
-     .highest = 65536.0,
-     .then = resolution_is_named,
-     .option = {.name = "resolution",
-                .value = "N",
-                .group = VSH_SETTINGS_CASTERS,
-                .help = "voxels along the longest side of the casters",
-                .otherwise = "what pays: see docs/auto.md"}},
-    {.name = "half_width",
-     .kind = VSHI_NUMBER,
-     .offset = offsetof(vsh_scene, grid.half_width),
-     .lowest = 3.0,
-     .highest = 100.0,
-     .option = {.name = "half-width",
-                .value = "VOXELS",
-                .group = VSH_SETTINGS_LEVEL_SET,
-                .help = "half width of the narrow band"}},
-    {.name = "shell_thickness",
-     .kind = VSHI_NUMBER,
-     .offset = offsetof(vsh_scene, grid.shell_thickness),
-     .lowest = 1.0,
-     .highest = 50.0,
-     .option = {.name = "shell-thickness",
-                .value = "VOXELS",
-                .group = VSH_SETTINGS_LEVEL_SET,
-                .help = "thickness of sheets and of walls behind rooms' faces"}},
-    {.name = "layers", .kind = VSHI_CUSTOM, .read = read_layers},
+    VSHI_KEY("casters", CUSTOM, .read = read_casters),
+    VSHI_KEY("voxel_size", NUMBER, AT(grid.voxel_size), .lowest = VSHI_SMALLEST_LENGTH,
+             .highest = VSHI_LARGEST_VOXEL, .then = voxels_are_named,
+             VSHI_OPTION("voxel-size", "SIZE", CASTERS,
+                         "in place of --resolution: the edge of a voxel, scene units",
+                         .otherwise = "as --resolution says")),
+    VSHI_KEY("resolution", INTEGER, AT(grid.resolution), .lowest = 2.0, .highest = 65536.0,
+             .then = resolution_is_named,
+             VSHI_OPTION("resolution", "N", CASTERS, "voxels along the longest side of the casters",
+                         .otherwise = "what pays: see docs/auto.md")),
+    VSHI_KEY("half_width", NUMBER, AT(grid.half_width), .lowest = 3.0, .highest = 100.0,
+             VSHI_OPTION("half-width", "VOXELS", LEVEL_SET, "half width of the narrow band")),
+    VSHI_KEY("shell_thickness", NUMBER, AT(grid.shell_thickness), .lowest = 1.0, .highest = 50.0,
+             VSHI_OPTION("shell-thickness", "VOXELS", LEVEL_SET,
+                         "thickness of sheets and of walls behind rooms' faces")),
+    VSHI_KEY("layers", CUSTOM, .read = read_layers),
     {.name = "lights", .kind = VSHI_LATER},
-    {.name = "ao", .kind = VSHI_CUSTOM, .read = read_ao},
-    {.name = "irradiance",
-     .kind = VSHI_BOOL,
-     .offset = offsetof(vsh_scene, irradiance),
-     .option =
-         {.name = "irradiance",
-          .group = VSH_SETTINGS_CHANNELS,
-          .help =
-              "also irradiance.R, .G, .B: visibility × colour × falloff × cosine, summed, × AO where baked"}},
-    {.name = "ambient",
-     .kind = VSHI_VECTOR,
-     .offset = offsetof(vsh_scene, ambient),
-     .highest = VSHI_LARGEST,
-     .count = 3,
-     .then = has_ambient,
-     .option = {.name = "ambient",
-                .value = "R,G,B",
-                .group = VSH_SETTINGS_CHANNELS,
-                .help = "light from all around, linear: irradiance is then that of the lights + ambient × AO",
-                .otherwise = "none"}},
-    {.name = "tint",
-     .kind = VSHI_CUSTOM,
-     .read = read_tint,
-     .option = {.name = "tint",
-                .value = "TINT",
-                .group = VSH_SETTINGS_FILE_ONLY,
-                .help = "also tint.NAME.R, .G, .B of each light, its penumbra coloured: (V, V²/2 + V/2, V²) "
-                        "or powers of V such as 1,1.2,1.5; irradiance takes it too",
-                .range = "quadratic, or R,G,B: powers from 0.0625 to 16",
-                .otherwise = "none"}},
-    {.name = "method",
-     .kind = VSHI_NAME,
-     .offset = offsetof(vsh_scene, shade.method),
-     .names = VSH_NAMES_SHADOW,
-     .option = {.name = "method",
-                .value = "NAME",
-                .group = VSH_SETTINGS_OCCLUSION,
-                .help = "of the shadow; auto: exact where all casters are triangles, else adaptive; all but "
-                        "these and rays are previews, which keep no error; classic, practical and improved "
-                        "have the outer half of the penumbra only"}},
-    {.name = "rays",
-     .kind = VSHI_INTEGER,
-     .offset = offsetof(vsh_scene, shade.rays),
-     .lowest = 1.0,
-     .highest = 4096.0,
-     .option = {.name = "rays",
-                .value = "N",
-                .group = VSH_SETTINGS_ACCURACY,
-                .help = "rays a texel; with adaptive and exact a limit",
-                .otherwise = "64, or as many as the error takes"}},
-    {.name = "sampler",
-     .kind = VSHI_NAME,
-     .offset = offsetof(vsh_scene, shade.sampler),
-     .names = VSH_NAMES_SAMPLER,
-     .option =
-         {.name = "sampler", .value = "NAME", .group = VSH_SETTINGS_FILE_ONLY, .help = "where they go"}},
-    {.name = "frame",
-     .kind = VSHI_INTEGER,
-     .offset = offsetof(vsh_scene, shade.frame),
-     .highest = INT32_MAX,
-     .option = {.name = "frame",
-                .value = "N",
-                .group = VSH_SETTINGS_FILE_ONLY,
-                .help = "another set of them: bakes of frames 0, 1, 2 … may be averaged"}},
-    {.name = "early_rays",
-     .kind = VSHI_INTEGER,
-     .offset = offsetof(vsh_scene, shade.early_rays),
-     .highest = 4096.0,
-     .option = {.name = "early-rays",
-                .value = "N",
-                .group = VSH_SETTINGS_FILE_ONLY,
-                .help = "with rays: where the first N agree, the rest are not marched",
-                .otherwise = "0: never"}},
-    {.name = "max_error",
-     .kind = VSHI_NUMBER,
-     .offset = offsetof(vsh_scene, shade.max_error),
-     .lowest = 1e-4,
-     .highest = 1.0,
-     .option = {.name = "max-error",
-                .value = "E",
-                .group = VSH_SETTINGS_ACCURACY,
-                .help = "standard error that a value may keep, which rays follow from; takes the place of a "
-                        "scene's preview methods by auto"}},
-    {.name = "jitter",
-     .kind = VSHI_NUMBER,
-     .offset = offsetof(vsh_scene, shade.jitter),
-     .highest = 1.0,
-     .option = {.name = "jitter",
-                .value = "J",
-                .group = VSH_SETTINGS_FILE_ONLY,
-                .help =
-                    "shadows by one march: steps are shortened by a part of up to this, another a texel"}},
-    {.name = "error",
-     .kind = VSHI_BOOL,
-     .offset = offsetof(vsh_scene, error),
-     .option = {.name = "error",
-                .group = VSH_SETTINGS_ACCURACY,
-                .help = "also error.NAME of each light and error.ao: the standard error left in each value"}},
-    {.name = "invalid",
-     .kind = VSHI_BOOL,
-     .offset = offsetof(vsh_scene, planes.invalid),
-     .option = {.name = "invalid-channel",
-                .group = VSH_SETTINGS_FILE_ONLY,
-                .help = "also the channel invalid: 1 for texels inside solids or behind walls, else 0"}},
-    {.name = "sky",
-     .kind = VSHI_NAME,
-     .offset = offsetof(vsh_scene, planes.sky),
-     .names = VSH_NAMES_UP,
-     .option = {.name = "sky",
-                .value = "AXIS",
-                .group = VSH_SETTINGS_CHANNELS,
-                .help = "also sky: what of an even sky is seen, however far the casters; up is this axis"}},
-    {.name = "max_steps",
-     .kind = VSHI_INTEGER,
-     .offset = offsetof(vsh_scene, shade.max_steps),
-     .lowest = 16.0,
-     .highest = 65536.0,
-     .option = {.name = "max-steps",
-                .value = "N",
-                .group = VSH_SETTINGS_FILE_ONLY,
-                .help = "steps after which a ray is given up"}},
-    {.name = "start_offset",
-     .kind = VSHI_NUMBER,
-     .offset = offsetof(vsh_scene, shade.start_offset),
-     .highest = 16.0,
-     .option = {.name = "start-offset",
-                .value = "VOXELS",
-                .group = VSH_SETTINGS_FILE_ONLY,
-                .help = "how far above the surface rays begin, along its normal"}},
-    {.name = "unit",
-     .kind = VSHI_CUSTOM,
-     .read = read_unit,
-     .option = {.name = "unit",
-                .value = "UNIT",
-                .group = VSH_SETTINGS_CASTERS,
-                .help = "of the numbers in mesh files",
-                .range = "m, cm, mm, in, ft, or metres",
-                .otherwise = "as FBX and DAE say; OBJ, PLY and STL stay as they are"}},
-    {.name = "cast_blended",
-     .kind = VSHI_BOOL,
-     .offset = offsetof(vsh_scene, cast_blended),
-     .option = {.name = "cast-blended",
-                .group = VSH_SETTINGS_CASTERS,
-                .help = "meshes of blended materials (glass) cast too"}},
-    {.name = "receivers", .kind = VSHI_CUSTOM, .read = read_receivers},
+    VSHI_KEY("ao", CUSTOM, .read = read_ao),
+    VSHI_KEY(
+        "irradiance", BOOL, AT(irradiance),
+        VSHI_OPTION(
+            "irradiance", NULL, CHANNELS,
+            "also irradiance.R, .G, .B: visibility × colour × falloff × cosine, summed, × AO where baked")),
+    VSHI_KEY(
+        "ambient", VECTOR, AT(ambient), .highest = VSHI_LARGEST, .count = 3, .then = has_ambient,
+        VSHI_OPTION("ambient", "R,G,B", CHANNELS,
+                    "light from all around, linear: irradiance is then that of the lights + ambient × AO",
+                    .otherwise = "none")),
+    VSHI_KEY("tint", CUSTOM, .read = read_tint,
+             VSHI_OPTION("tint", "TINT", FILE_ONLY,
+                         "also tint.NAME.R, .G, .B of each light, its penumbra coloured: (V, V²/2 + V/2, V²) "
+                         "or powers of V such as 1,1.2,1.5; irradiance takes it too",
+                         .range = "quadratic, or R,G,B: powers from 0.0625 to 16", .otherwise = "none")),
+    VSHI_KEY("method", NAME, AT(shade.method), .names = VSH_NAMES_SHADOW,
+             VSHI_OPTION("method", "NAME", OCCLUSION,
+                         "of the shadow; auto: exact where all casters are triangles, else adaptive; all but "
+                         "these and rays are previews, which keep no error; classic, practical and improved "
+                         "have the outer half of the penumbra only")),
+    VSHI_KEY("rays", INTEGER, AT(shade.rays), .lowest = 1.0, .highest = 4096.0,
+             VSHI_OPTION("rays", "N", ACCURACY, "rays a texel; with adaptive and exact a limit",
+                         .otherwise = "64, or as many as the error takes")),
+    VSHI_KEY("sampler", NAME, AT(shade.sampler), .names = VSH_NAMES_SAMPLER,
+             VSHI_OPTION("sampler", "NAME", FILE_ONLY, "where they go")),
+    VSHI_KEY("frame", INTEGER, AT(shade.frame), .highest = INT32_MAX,
+             VSHI_OPTION("frame", "N", FILE_ONLY,
+                         "another set of them: bakes of frames 0, 1, 2 … may be averaged")),
+    VSHI_KEY("early_rays", INTEGER, AT(shade.early_rays), .highest = 4096.0,
+             VSHI_OPTION("early-rays", "N", FILE_ONLY,
+                         "with rays: where the first N agree, the rest are not marched",
+                         .otherwise = "0: never")),
+    VSHI_KEY("max_error", NUMBER, AT(shade.max_error), .lowest = 1e-4, .highest = 1.0,
+             VSHI_OPTION("max-error", "E", ACCURACY,
+                         "standard error that a value may keep, which rays follow from; takes the place of a "
+                         "scene's preview methods by auto")),
+    VSHI_KEY(
+        "jitter", NUMBER, AT(shade.jitter), .highest = 1.0,
+        VSHI_OPTION("jitter", "J", FILE_ONLY,
+                    "shadows by one march: steps are shortened by a part of up to this, another a texel")),
+    VSHI_KEY(
+        "error", BOOL, AT(error),
+        VSHI_OPTION("error", NULL, ACCURACY,
+                    "also error.NAME of each light and error.ao: the standard error left in each value")),
+    VSHI_KEY("invalid", BOOL, AT(planes.invalid),
+             VSHI_OPTION("invalid-channel", NULL, FILE_ONLY,
+                         "also the channel invalid: 1 for texels inside solids or behind walls, else 0")),
+    VSHI_KEY("sky", NAME, AT(planes.sky), .names = VSH_NAMES_UP,
+             VSHI_OPTION("sky", "AXIS", CHANNELS,
+                         "also sky: what of an even sky is seen, however far the casters; up is this axis")),
+    VSHI_KEY("max_steps", INTEGER, AT(shade.max_steps), .lowest = 16.0, .highest = 65536.0,
+             VSHI_OPTION("max-steps", "N", FILE_ONLY, "steps after which a ray is given up")),
+    VSHI_KEY("start_offset", NUMBER, AT(shade.start_offset), .highest = 16.0,
+             VSHI_OPTION("start-offset", "VOXELS", FILE_ONLY,
+                         "how far above the surface rays begin, along its normal")),
+    VSHI_KEY("unit", CUSTOM, .read = read_unit,
+             VSHI_OPTION("unit", "UNIT", CASTERS, "of the numbers in mesh files",
+                         .range = "m, cm, mm, in, ft, or metres",
+                         .otherwise = "as FBX and DAE say; OBJ, PLY and STL stay as they are")),
+    VSHI_KEY("cast_blended", BOOL, AT(cast_blended),
+             VSHI_OPTION("cast-blended", NULL, CASTERS, "meshes of blended materials (glass) cast too")),
+    VSHI_KEY("receivers", CUSTOM, .read = read_receivers),
 };
 const vshi_table vshi_scene_table = VSHI_TABLE(scene_keys);
 
@@ -420,52 +336,285 @@ static vsh_result add_terrains(vshi_json *reader, const vshi_value *root, vsh_sc
     return VSH_OK;
 }
 
-static vsh_result read_scene(vshi_json *reader, json_t *json, const vsh_run *run, vsh_scene *scene) {
-    const vshi_value root = {NULL, NULL, 0, 0, json};
+/* --- layers */
+
+static vsh_result check_casters(vshi_json *reader, const vshi_value *root, const vsh_scene *scene) {
+    vshi_value casters, name;
+    for (size_t i = 0; i < scene->caster_count && vshi_member(root, "casters", &casters); ++i) {
+        bool found = scene->casters[i].layer == NULL;
+        for (size_t k = 0; !found && k < scene->layer_count; ++k) {
+            found = vshi_caster_in_layer(&scene->casters[i], &scene->layers[k]);
+        }
+        const vshi_value caster = vshi_item(&casters, i);
+        if (!found && vshi_member(&caster, "layer", &name)) {
+            return vshi_json_fail(reader, &name, "\"%.64s\" is none of the scene's layers",
+                                  scene->casters[i].layer);
+        }
+    }
+    return VSH_OK;
+}
+
+/* Whether a light is among those that a layer casts for. */
+static bool casts_for(const vsh_layer *layer, const vsh_light *light) {
+    bool casts = layer->lights == NULL;
+    for (size_t i = 0; !casts && i < layer->light_count; ++i) {
+        casts = strcmp(layer->lights[i], light->name) == 0;
+    }
+    return casts;
+}
+
+static vsh_result check_lights(vshi_json *reader, const vshi_value *layers, const vsh_scene *scene,
+                               size_t i) {
+    const vsh_layer *layer = &scene->layers[i].shade;
+    const vshi_value at = vshi_item(layers, i);
+    vshi_value names;
+    for (size_t k = 0; layer->lights != NULL && k < layer->light_count; ++k) {
+        bool found = false;
+        for (size_t l = 0; !found && l < scene->light_count; ++l) {
+            found = strcmp(layer->lights[k], scene->lights[l].name) == 0;
+        }
+        if (!found && vshi_member(&at, "lights", &names)) {
+            const vshi_value name = vshi_item(&names, k);
+            return vshi_json_fail(reader, &name, "\"%.64s\" is none of the scene's lights", layer->lights[k]);
+        }
+    }
+    return VSH_OK;
+}
+
+/* Takes a light from those that a layer casts for. */
+static vsh_result take_out(vshi_json *reader, const vsh_scene *scene, const vsh_light *light,
+                           vsh_layer *layer) {
+    const char **left;
+    size_t count = 0;
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&left, scene->light_count + 1, sizeof *left,
+                                "lights of a layer"));
+    for (size_t l = 0; l < scene->light_count; ++l) {
+        if (&scene->lights[l] != light && casts_for(layer, &scene->lights[l])) {
+            left[count++] = scene->lights[l].name;
+        }
+    }
+    layer->lights = left;
+    layer->light_count = count;
+    return VSH_OK;
+}
+
+/* A light that names layers: the others do not cast for it. */
+static vsh_result choose_layers(vshi_json *reader, const vshi_value *names, const vsh_light *light,
+                                const vsh_scene *scene, vsh_scene_layer *layers) {
+    bool named[VSH_MAX_LAYERS] = {false};
+    VSHI_TRY(vshi_expect(reader, names, JSON_ARRAY));
+    for (size_t n = 0; n < json_array_size(names->json); ++n) {
+        const vshi_value name = vshi_item(names, n);
+        VSHI_TRY(vshi_expect(reader, &name, JSON_STRING));
+        bool found = false;
+        for (size_t k = 0; k < scene->layer_count; ++k) {
+            const bool is = strcmp(json_string_value(name.json), layers[k].name) == 0;
+            named[k] = named[k] || is;
+            found = found || is;
+        }
+        if (!found) {
+            return vshi_json_fail(reader, &name, "\"%.64s\" is none of the scene's layers",
+                                  json_string_value(name.json));
+        }
+    }
+    for (size_t k = 0; k < scene->layer_count; ++k) {
+        if (!named[k] && casts_for(&layers[k].shade, light)) {
+            VSHI_TRY(take_out(reader, scene, light, &layers[k].shade));
+        }
+    }
+    return VSH_OK;
+}
+
+static vsh_result choose_all(vshi_json *reader, const vshi_value *root, vsh_scene *scene) {
+    vshi_value lights, names;
+    vsh_scene_layer *layers;
+    if (!vshi_member(root, "lights", &lights)) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&layers, scene->layer_count + 1, sizeof *layers, "layers"));
+    if (scene->layer_count > 0) {
+        memcpy(layers, scene->layers, scene->layer_count * sizeof *layers);
+    }
+    for (size_t l = 0; l < scene->light_count; ++l) {
+        const vshi_value light = vshi_light_item(&lights, scene, l);
+        if (vshi_member(&light, "layers", &names)) {
+            VSHI_TRY(choose_layers(reader, &names, &scene->lights[l], scene, layers));
+        }
+    }
+    scene->layers = layers;
+    return VSH_OK;
+}
+
+/* Fails where casters and lights name layers, or layers lights, that the scene does not have; layers that a
+ * light does not name where it names some cast for it no more. */
+static vsh_result check_layers(vshi_json *reader, const vshi_value *root, vsh_scene *scene) {
+    vshi_value layers, name;
+    VSHI_TRY(check_casters(reader, root, scene));
+    const bool layered = vshi_member(root, "layers", &layers);
+    for (size_t i = 0; layered && i < scene->layer_count; ++i) {
+        const vshi_value at = vshi_item(&layers, i);
+        for (size_t k = 0; k < i; ++k) {
+            if (strcmp(scene->layers[i].name, scene->layers[k].name) == 0 &&
+                vshi_member(&at, "name", &name)) {
+                return vshi_json_fail(reader, &name, "\"%.64s\" is the name of layers[%zu] too",
+                                      scene->layers[i].name, k);
+            }
+        }
+        VSHI_TRY(check_lights(reader, &layers, scene, i));
+    }
+    return choose_all(reader, root, scene);
+}
+
+/* --- the scene */
+
+static vsh_result read_scene(vshi_json *reader, const vshi_value *root, void *made) {
+    vsh_scene *scene = made;
     vshi_value lights, region;
     *scene = vsh_scene_default();
-    VSHI_TRY(vshi_expect(reader, &root, JSON_OBJECT));
-    if (vshi_member(&root, "region", &region)) {
+    VSHI_TRY(vshi_expect(reader, root, JSON_OBJECT));
+    if (vshi_member(root, "region", &region)) {
         return vshi_json_fail(reader, &region, "belongs to flat scenes, which 'vdbshade flat' bakes");
     }
-    VSHI_TRY(vshi_read_object(reader, &root, &vshi_scene_table, 1, "a scene", scene));
-    VSHI_TRY(vshi_reject_both(reader, &root, "voxel_size", "resolution"));
-    VSHI_TRY(add_terrains(reader, &root, scene));
-    if (vshi_member(&root, "lights", &lights)) { /* after the unit of files' numbers */
-        VSHI_TRY(vshi_read_lights(reader, &lights, run, scene));
+    VSHI_TRY(vshi_read_object(reader, root, &vshi_scene_table, 1, "a scene", scene));
+    VSHI_TRY(vshi_reject_both(reader, root, "voxel_size", "resolution"));
+    VSHI_TRY(add_terrains(reader, root, scene));
+    if (vshi_member(root, "lights", &lights)) { /* after the unit of files' numbers */
+        VSHI_TRY(vshi_read_lights(reader, &lights, scene));
     }
-    return vshi_check_layers(reader, &root, scene);
+    return check_layers(reader, root, scene);
 }
 
 vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, const vsh_run *run,
                             vsh_scene **scene, vsh_error *error) {
-    *scene = NULL;
-    vshi_json reader = {path, text, size, NULL, error};
-    json_t *json = NULL;
-    vsh_result result;
-    VSHI_TRY(vshi_json_load(&reader, &json));
-    owner *made = calloc(1, sizeof *made);
-    if (made == NULL) {
-        result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
-        goto done;
-    }
-    result = read_scene(&reader, json, run, &made->scene);
-    made->blocks = reader.blocks;
-    if (result != VSH_OK) {
-        vsh_scene_free(&made->scene);
-        goto done;
-    }
-    *scene = &made->scene;
-done:
-    json_decref(json);
+    vshi_json reader = {.path = path, .run = run, .error = error, .text = text, .size = size};
+    void *made;
+    const vsh_result result = vshi_json_parse(&reader, sizeof **scene, read_scene, &made);
+    *scene = made;
     return result;
 }
 
+vsh_result vsh_scene_read(const char *path, const vsh_run *run, vsh_scene **scene, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(scene);
+    *scene = NULL;
+    VSHI_NEEDS(path);
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    VSHI_TRY(vshi_unsupported_check(path, error));
+    vshi_json reader = {.path = path, .run = &full, .error = error};
+    void *made;
+    VSHI_TRY(vshi_json_read(&reader, sizeof **scene, read_scene, &made));
+    *scene = made;
+    return VSH_OK;
+}
+
 void vsh_scene_free(vsh_scene *scene) {
-    if (scene == NULL) {
-        return;
+    vshi_json_free(scene);
+}
+
+/* --- settings: keys that are also options */
+
+/* Where settings stand, and what their keys are called from the scene on. */
+static const struct {
+    const vshi_table *table;
+    const char *prefix;
+    int32_t owner;
+} places[] = {
+    {&vshi_scene_table, "", VSH_SETTING_OF_SCENE},
+    {&vshi_ao_table, "ao.", VSH_SETTING_OF_SCENE},
+    {&vshi_receiver_table, "receivers.", VSH_SETTING_OF_RECEIVER},
+    {&vshi_flat_table, "", VSH_SETTING_OF_FLAT},
+};
+enum { PLACES = sizeof places / sizeof places[0] };
+
+static const vshi_key *key_at(size_t index, size_t *place) {
+    for (*place = 0; *place < PLACES; ++*place) {
+        const vshi_table *table = places[*place].table;
+        for (size_t i = 0; i < table->key_count; ++i) {
+            if (table->keys[i].option.name != NULL && index-- == 0) {
+                return &table->keys[i];
+            }
+        }
     }
-    owner *made = (owner *)scene;
-    vshi_blocks_free(made->blocks);
-    free(made);
+    return NULL;
+}
+
+static void tell_default(const vshi_key *key, int32_t owner, char *text, size_t size) {
+    const vsh_scene scene = vsh_scene_default();
+    const vsh_receiver receiver = vsh_receiver_default();
+    const vsh_flat_scene flat = vsh_flat_scene_default();
+    const void *const defaults[] = {[VSH_SETTING_OF_SCENE] = &scene,
+                                    [VSH_SETTING_OF_RECEIVER] = &receiver,
+                                    [VSH_SETTING_OF_FLAT] = &flat};
+    if (key->option.otherwise != NULL) {
+        snprintf(text, size, "%s", key->option.otherwise);
+    } else {
+        vshi_key_value(key, defaults[owner], text, size);
+    }
+}
+
+int32_t vsh_setting_get(size_t index, vsh_setting *setting) {
+    size_t place;
+    const vshi_key *key = key_at(index, &place);
+    if (key == NULL) {
+        return 0;
+    }
+    vsh_setting told;
+    memset(&told, 0, sizeof told);
+    snprintf(told.key, sizeof told.key, "%s%s", places[place].prefix, key->name);
+    snprintf(told.option, sizeof told.option, "%s", key->option.name);
+    snprintf(told.value, sizeof told.value, "%s", key->option.value != NULL ? key->option.value : "");
+    snprintf(told.help, sizeof told.help, "%s", key->option.help);
+    vshi_key_range(key, told.range, sizeof told.range);
+    tell_default(key, places[place].owner, told.otherwise, sizeof told.otherwise);
+    told.group = key->option.group;
+    told.owner = places[place].owner;
+    *setting = told;
+    return 1;
+}
+
+static bool is_called(const vshi_key *key, const char *prefix, const char *name) {
+    const size_t length = strlen(prefix);
+    return (strncmp(name, "--", 2) == 0 && strcmp(name + 2, key->option.name) == 0) ||
+           (strncmp(name, prefix, length) == 0 && strcmp(name + length, key->name) == 0);
+}
+
+/* Sets what `target` holds, `size` bytes, unless the text is no value. */
+static vsh_result set(int32_t owner, const char *name, const char *text, void *target, size_t size,
+                      vsh_error *error) {
+    static const char *const owners[] = {"scene", "receiver", "flat scene"};
+    union {
+        vsh_scene scene;
+        vsh_receiver receiver;
+        vsh_flat_scene flat;
+    } changed;
+    size_t place;
+    const vshi_key *key;
+    for (size_t i = 0; (key = key_at(i, &place)) != NULL; ++i) {
+        if (places[place].owner == owner && is_called(key, places[place].prefix, name)) {
+            memcpy(&changed, target, size);
+            VSHI_TRY(vshi_read_text(key, name, text, &changed, error));
+            memcpy(target, &changed, size);
+            return VSH_OK;
+        }
+    }
+    return vshi_fail(error, VSH_ERROR_ARGUMENT, "%.64s: no such setting of a %s", name, owners[owner]);
+}
+
+vsh_result vsh_scene_set(vsh_scene *scene, const char *name, const char *text, vsh_error *error) {
+    VSHI_NEEDS(scene);
+    VSHI_NEEDS(name);
+    return set(VSH_SETTING_OF_SCENE, name, text, scene, sizeof *scene, error);
+}
+
+vsh_result vsh_receiver_set(vsh_receiver *receiver, const char *name, const char *text, vsh_error *error) {
+    VSHI_NEEDS(receiver);
+    VSHI_NEEDS(name);
+    return set(VSH_SETTING_OF_RECEIVER, name, text, receiver, sizeof *receiver, error);
+}
+
+vsh_result vsh_flat_scene_set(vsh_flat_scene *scene, const char *name, const char *text, vsh_error *error) {
+    VSHI_NEEDS(scene);
+    VSHI_NEEDS(name);
+    return set(VSH_SETTING_OF_FLAT, name, text, scene, sizeof *scene, error);
 }

@@ -5,8 +5,7 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "mesh/mesh.h"
-#include "scene/parts.h"
-#include "json/suggest.h"
+#include "json/json.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -15,86 +14,11 @@
 
 #define OF_MATERIAL "material:" /* begins a pattern of materials */
 
-/* --- in scene files */
-
-static vsh_result read_patterns(vshi_json *reader, const vshi_value *value, const char *const **patterns,
-                                size_t *count) {
-    static const vshi_key key = {.kind = VSHI_STRING};
-    const bool list = json_is_array(value->json);
-    *count = list ? json_array_size(value->json) : 1;
-    if (*count == 0) {
-        return vshi_json_fail(reader, value, "is empty");
-    }
-    const char **strings;
-    VSHI_TRY(vshi_json_allocate(reader, (void **)&strings, *count, sizeof *strings, "patterns"));
-    for (size_t i = 0; i < *count; ++i) {
-        const vshi_value item = list ? vshi_item(value, i) : *value;
-        VSHI_TRY(vshi_read_value(reader, &item, &key, &strings[i]));
-    }
-    *patterns = strings;
-    return VSH_OK;
-}
-
-vsh_result vshi_read_only(vshi_json *reader, const vshi_value *value, void *member) {
-    vsh_selection *selection = member;
-    return read_patterns(reader, value, &selection->only, &selection->only_count);
-}
-
-vsh_result vshi_read_except(vshi_json *reader, const vshi_value *value, void *member) {
-    vsh_selection *selection = member;
-    return read_patterns(reader, value, &selection->except, &selection->except_count);
-}
-
-static vsh_result read_rules(vshi_json *reader, const vshi_value *value, vsh_caster *caster,
-                             int32_t solidity) {
-    vsh_selection given = {.only = NULL};
-    VSHI_TRY(vshi_read_only(reader, value, &given));
-    const size_t count = caster->solidity_count + given.only_count;
-    vsh_solidity_rule *rules;
-    VSHI_TRY(vshi_json_allocate(reader, (void **)&rules, count, sizeof *rules, "patterns"));
-    for (size_t i = 0; i < count; ++i) {
-        rules[i] = i < caster->solidity_count
-                       ? caster->solidity[i]
-                       : (vsh_solidity_rule){given.only[i - caster->solidity_count], solidity};
-    }
-    caster->solidity = rules;
-    caster->solidity_count = count;
-    return VSH_OK;
-}
-
-vsh_result vshi_read_solid(vshi_json *reader, const vshi_value *value, void *caster) {
-    return read_rules(reader, value, caster, VSH_SOLIDITY_SOLID);
-}
-
-vsh_result vshi_read_shell(vshi_json *reader, const vshi_value *value, void *caster) {
-    return read_rules(reader, value, caster, VSH_SOLIDITY_SHELL);
-}
-
-vsh_result vshi_read_inward(vshi_json *reader, const vshi_value *value, void *caster) {
-    return read_rules(reader, value, caster, VSH_SOLIDITY_INWARD);
-}
-
-vsh_result vshi_read_one_sided(vshi_json *reader, const vshi_value *value, void *member) {
-    vsh_caster *caster = member;
-    return read_patterns(reader, value, &caster->one_sided, &caster->one_sided_count);
-}
-
-/* --- in a model */
-
-/* A name as messages tell it: that of the object. */
-static const char *name_of(const vsh_mesh *mesh) {
-    const char *name = mesh->object_name != NULL ? mesh->object_name : mesh->name;
-    return name != NULL ? name : "";
-}
-
-/* That of the object of mesh `index`; of `materials`, that of material `index`. */
+/* The name of the object of mesh `index`; of `materials`, that of material `index`. */
 static const char *name_at(const vsh_model *model, size_t index, bool materials) {
-    if (materials) {
-        const char *name = vsh_model_get_material(model, index).name;
-        return name != NULL ? name : "";
-    }
-    const vsh_mesh mesh = vsh_model_mesh(model, index, -1);
-    return name_of(&mesh);
+    const vsh_mesh mesh = materials ? (vsh_mesh){.name = vsh_model_get_material(model, index).name}
+                                    : vsh_model_mesh(model, index, -1);
+    return vshi_object_name(&mesh);
 }
 
 static size_t count_of(const vsh_model *model, bool materials) {
@@ -124,16 +48,12 @@ static void list_names(const vsh_model *model, bool materials, char *text, size_
     }
 }
 
-static char lower(char c) {
-    return c >= 'A' && c <= 'Z' ? (char)(c - 'A' + 'a') : c;
-}
-
 /* The letters of a pattern or name, all small: case is what is mistaken most. */
 static void fold(const char *from, bool pattern, char to[64]) {
     size_t length = 0;
     for (; *from != '\0' && length < 63; ++from) {
         if (!pattern || strchr("*?[]\\", *from) == NULL) {
-            to[length++] = lower(*from);
+            to[length++] = (char)(*from >= 'A' && *from <= 'Z' ? *from - 'A' + 'a' : *from);
         }
     }
     to[length] = '\0';
@@ -186,30 +106,24 @@ bool vshi_mesh_is_meant(const vsh_mesh *mesh, const char *pattern, bool material
     return (!material || named.name != NULL) && vsh_mesh_matches(&named, pattern) != 0;
 }
 
-/* Sets those that a pattern matches by the name of their object, or of their `material`, to `value`; whether
- * there are any. */
-static bool apply_one(const vsh_model *model, const char *pattern, bool material, unsigned char value,
-                      unsigned char *chosen) {
-    bool matched = false;
-    for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
-        const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
-        if (vshi_mesh_is_meant(&mesh, pattern, material)) {
-            chosen[i] = value;
-            matched = true;
-        }
-    }
-    return matched;
-}
-
 /* Sets those that a pattern matches to `value`: objects, or where none is called so, materials. */
 static vsh_result apply(const vsh_model *model, const char *path, const char *const *patterns, size_t count,
                         unsigned char value, unsigned char *chosen, vsh_error *error) {
     for (size_t p = 0; p < count; ++p) {
+        bool matched = false;
         if (patterns[p] == NULL) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: pattern %zu of objects is NULL", path, p);
         }
-        if (!apply_one(model, patterns[p], false, value, chosen) &&
-            !apply_one(model, patterns[p], true, value, chosen)) {
+        for (int material = 0; material < 2 && !matched; ++material) {
+            for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
+                const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
+                if (vshi_mesh_is_meant(&mesh, patterns[p], material != 0)) {
+                    chosen[i] = value;
+                    matched = true;
+                }
+            }
+        }
+        if (!matched) {
             return vshi_fail_unmatched(model, path, patterns[p], error);
         }
     }

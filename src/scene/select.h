@@ -17,6 +17,12 @@ vsh_result vshi_select(const vsh_model *model, const char *path, const vsh_selec
 vsh_result vshi_select_some(const vsh_model *model, const char *path, const char *const *patterns,
                             size_t count, unsigned char **chosen, vsh_error *error);
 
+/* The name of a mesh's object; "" where it has none. */
+static inline const char *vshi_object_name(const vsh_mesh *mesh) {
+    const char *name = mesh->object_name != NULL ? mesh->object_name : mesh->name;
+    return name != NULL ? name : "";
+}
+
 /* Whether a pattern means a mesh by its object's name, as vsh_mesh_matches() does, or by its `material`'s:
  * that is asked where it means no mesh by the other. */
 bool vshi_mesh_is_meant(const vsh_mesh *mesh, const char *pattern, bool material);

@@ -3,92 +3,12 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "field/surface.h"
-#include "mesh/mesh_set.h"
-#include "scene/assets.h"
 #include "scene/occluders.h"
 #include "shade/resolution.h"
 #include "spheres/spheres.h"
 #include "trace/embree.h"
 
-#include <math.h>
 #include <stdlib.h>
-
-static bool is_voxelised_in(const vsh_scene *scene, const vsh_caster *caster, const vsh_scene_layer *layer) {
-    return vshi_caster_in_layer(caster, layer) && !vshi_caster_is_direct(scene, caster);
-}
-
-static bool has_triangles(const vsh_caster *caster) {
-    return caster->type == VSH_CASTER_MESH || caster->type == VSH_CASTER_HEIGHTFIELD;
-}
-
-static bool has_solids(const vsh_caster *caster) {
-    return caster->type == VSH_CASTER_SDF || caster->type == VSH_CASTER_SPHERES;
-}
-
-/* A level set alone keeps its voxels when it is marched. Several, or one beside other casters, would have to
- * be resampled to the voxels of all. */
-int32_t vsh_scene_traceable(const vsh_scene *scene, const vsh_scene_layer *layer) {
-    size_t exact = 0, level_sets = 0, outlines = 0;
-    for (size_t i = 0; scene != NULL && i < scene->caster_count; ++i) {
-        const vsh_caster *caster = &scene->casters[i];
-        if (is_voxelised_in(scene, caster, layer)) {
-            exact += has_triangles(caster) || has_solids(caster);
-            level_sets += caster->type == VSH_CASTER_VDB;
-            outlines += caster->type == VSH_CASTER_MASK || caster->type == VSH_CASTER_TEXT;
-        }
-    }
-    const bool alone = exact == 0 && (level_sets == 0) != (outlines == 0) && level_sets <= 1;
-    return scene != NULL && !alone;
-}
-
-static int32_t method_of(const vsh_scene *scene, const vsh_scene_layer *layer) {
-    return layer != NULL && layer->shade.method >= 0 ? layer->shade.method : scene->shade.method;
-}
-
-static bool casts_ao(const vsh_scene *scene, const vsh_scene_layer *layer) {
-    return (scene->ao || vsh_planes_shaded(&scene->planes) > 0) && (layer == NULL || layer->shade.ao);
-}
-
-bool vshi_caster_is_direct(const vsh_scene *scene, const vsh_caster *caster) {
-    const bool may = (caster->type == VSH_CASTER_HEIGHTFIELD && caster->direct != 0) ||
-                     (caster->type == VSH_CASTER_SPHERES && caster->voxelised == 0);
-    if (!may) {
-        return false;
-    }
-    const vsh_scene_layer *layer = NULL;
-    for (size_t i = 0; caster->layer != NULL && i < scene->layer_count; ++i) {
-        layer = strcmp(scene->layers[i].name, caster->layer) == 0 ? &scene->layers[i] : layer;
-    }
-    const int32_t method = method_of(scene, layer);
-    const bool traced = vsh_ao_method_resolve(scene->shade.ao_method, 1) == VSH_AO_EXACT;
-    return scene->light_count > 0 && (method == VSH_SHADOW_HARD || method == VSH_SHADOW_CLASSIC) &&
-           (traced || !casts_ao(scene, layer));
-}
-
-bool vshi_scene_method_is(const vsh_scene *scene, const vsh_scene_layer *layer, uint32_t traits, bool has) {
-    const int32_t can = vsh_scene_traceable(scene, layer);
-    const uint32_t shadow = vsh_shadow_method_traits(vsh_shadow_method_resolve(method_of(scene, layer), can));
-    const uint32_t ao = vsh_ao_method_traits(vsh_ao_method_resolve(scene->shade.ao_method, can));
-    return (scene->light_count > 0 && ((shadow & traits) == traits) == has) ||
-           (casts_ao(scene, layer) && ((ao & traits) == traits) == has);
-}
-
-double vshi_scene_field_rays(const vsh_scene *scene, const vsh_scene_layer *layer) {
-    /* over max_error, of all points; measured on the cloister, 0.6 units of AO and a sun of 5° */
-    static const double OF_LIGHT = 0.14, OF_AO = 0.6;
-    const int32_t can = vsh_scene_traceable(scene, layer);
-    const int32_t method = vsh_shadow_method_resolve(method_of(scene, layer), can);
-    double rays = method == VSH_SHADOW_ADAPTIVE ? OF_LIGHT * (double)scene->light_count : 0.0;
-    if (casts_ao(scene, layer) && vsh_ao_method_resolve(scene->shade.ao_method, can) == VSH_AO_ADAPTIVE) {
-        rays += OF_AO;
-    }
-    rays /= scene->shade.max_error;
-    return scene->shade.rays > 0 ? fmin(rays, scene->shade.rays) : rays;
-}
-
-int32_t vsh_scene_marches(const vsh_scene *scene, const vsh_scene_layer *layer) {
-    return scene != NULL && vshi_scene_method_is(scene, layer, VSH_METHOD_TRIANGLES, false);
-}
 
 /* What rays meet, of casters that are voxelised. */
 typedef struct traced {
@@ -113,16 +33,13 @@ static void free_traced(traced *t) {
 
 static vsh_result allocate_traced(const vsh_scene *scene, const vsh_assets *assets, traced *t,
                                   vsh_error *error) {
-    size_t meshes = 1, sdfs = 1, balls = 0;
+    size_t sdfs = 1, balls = 0;
     for (size_t i = 0; i < scene->caster_count; ++i) {
-        size_t own;
-        vsh_assets_caster(assets, i, &own);
-        meshes += own + 1;
+        const vsh_spheres *spheres = vshi_assets_caster(assets, i)->spheres;
+        balls += spheres != NULL ? spheres->info.count : 0;
         sdfs += scene->casters[i].type == VSH_CASTER_SDF;
-        if (scene->casters[i].type == VSH_CASTER_SPHERES) {
-            balls += vshi_assets_spheres(assets, i)->info.count;
-        }
     }
+    const size_t meshes = vshi_assets_mesh_count(assets) + scene->caster_count + 1;
     VSHI_TRY(vshi_allocate((void **)&t->meshes, meshes, sizeof *t->meshes, "casters", error));
     VSHI_TRY(vshi_allocate((void **)&t->surfaces, meshes, sizeof *t->surfaces, "casters", error));
     VSHI_TRY(vshi_allocate((void **)&t->sdfs, sdfs + balls, sizeof *t->sdfs, "casters", error));
@@ -183,16 +100,15 @@ done:
 static vsh_result add_caster(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
                              size_t i, const vsh_run *run, traced *t, vsh_error *error) {
     const vsh_caster *caster = &scene->casters[i];
-    size_t own;
-    const vsh_mesh *of_caster = vsh_assets_caster(assets, i, &own);
-    for (size_t m = 0; m < own; ++m) {
-        t->meshes[t->mesh_count++] = of_caster[m];
+    const vshi_asset_place *place = vshi_assets_caster(assets, i);
+    for (size_t m = 0; m < place->count; ++m) {
+        t->meshes[t->mesh_count++] = place->meshes[m];
     }
     if (caster->type == VSH_CASTER_SDF) {
         add_sdf(t, caster->sdf, caster->transform);
     } else if (caster->type == VSH_CASTER_SPHERES) {
-        add_balls(t, vshi_assets_spheres(assets, i));
-    } else if (!has_triangles(caster)) {
+        add_balls(t, place->spheres);
+    } else if (!vshi_caster_has_triangles(caster)) {
         return add_surface(scene, assets, layer, i, run, t, error);
     }
     return VSH_OK;
@@ -229,7 +145,7 @@ vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets,
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     VSHI_TRY_DONE(allocate_traced(scene, assets, &t, error));
     for (size_t i = 0; i < scene->caster_count; ++i) {
-        if (is_voxelised_in(scene, &scene->casters[i], layer)) {
+        if (vshi_caster_has_voxels(scene, &scene->casters[i], layer)) {
             VSHI_TRY_DONE(add_caster(scene, assets, layer, i, &full, &t, error));
         }
     }
@@ -280,56 +196,5 @@ done:
         *triangles = NULL;
     }
     free_traced(&t);
-    return result;
-}
-
-bool vshi_scene_wants_truth(const vsh_scene *scene) {
-    bool measured =
-        scene->layer_count == 0 && vshi_scene_method_is(scene, NULL, VSH_METHOD_KEEPS_ERROR, true);
-    for (size_t i = 0; i < scene->caster_count; ++i) { /* of these voxels are the definition, or as good */
-        const vsh_caster *caster = &scene->casters[i];
-        measured = measured && (has_triangles(caster) || has_solids(caster)) &&
-                   !vshi_caster_is_direct(scene, caster);
-    }
-    return measured;
-}
-
-/* The meshes of a layer's casters, which stay those of the assets; the list is the caller's to free. */
-static vsh_result list_meshes(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
-                              vsh_mesh **meshes, size_t *count, vsh_error *error) {
-    size_t most = 0;
-    *count = 0;
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        size_t own;
-        vsh_assets_caster(assets, i, &own);
-        most += own;
-    }
-    VSHI_TRY(vshi_allocate((void **)meshes, most, sizeof **meshes, "triangles", error));
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        size_t own;
-        const vsh_mesh *of_caster = vsh_assets_caster(assets, i, &own);
-        for (size_t m = 0; is_voxelised_in(scene, &scene->casters[i], layer) && m < own; ++m) {
-            (*meshes)[(*count)++] = of_caster[m];
-        }
-    }
-    return VSH_OK;
-}
-
-vsh_result vshi_scene_note_solidity(const vsh_scene *scene, const vsh_assets *assets,
-                                    const vsh_scene_layer *layer, const vsh_run *run, vsh_error *error) {
-    if (!vshi_wants_notes(run)) {
-        return VSH_OK;
-    }
-    vshi_mesh_set set = {.count = 0};
-    vsh_mesh *meshes;
-    size_t count;
-    vsh_result result;
-    VSHI_TRY_DONE(list_meshes(scene, assets, layer, &meshes, &count, error));
-    VSHI_TRY_DONE(vshi_mesh_set_create(meshes, count, &set, error));
-    VSHI_TRY_DONE(vshi_mesh_set_solve(&set, run, error));
-    vshi_mesh_set_note(&set, 0.0, 0.0, run);
-done:
-    vshi_mesh_set_free(&set);
-    free(meshes);
     return result;
 }

@@ -236,11 +236,6 @@ static vsh_result cut(cutting *c, const vsh_run *run, vsh_error *error) {
     return VSH_OK;
 }
 
-static const char *object_of(const vsh_mesh *mesh) {
-    const char *name = mesh->object_name != NULL ? mesh->object_name : mesh->name;
-    return name != NULL ? name : "";
-}
-
 vsh_result vshi_pages_as_they_are(const vsh_receiver *receiver, const vsh_mesh *meshes, size_t count,
                                   vshi_unwrapped *unwrapped, vsh_error *error) {
     unwrapped->whole = (vsh_receiver_page){receiver->width, receiver->height, NULL};
@@ -252,7 +247,7 @@ vsh_result vshi_pages_as_they_are(const vsh_receiver *receiver, const vsh_mesh *
     VSHI_TRY(vshi_allocate((void **)&unwrapped->pages, count, sizeof *unwrapped->pages, "pages", error));
     for (size_t first = 0; first < count; first += vshi_mesh_object_size(meshes, first, count)) {
         unwrapped->pages[unwrapped->page_count] = unwrapped->whole;
-        unwrapped->pages[unwrapped->page_count].object = object_of(&meshes[first]);
+        unwrapped->pages[unwrapped->page_count].object = vshi_object_name(&meshes[first]);
         unwrapped->page_begins[unwrapped->page_count++] = first;
     }
     unwrapped->page_begins[unwrapped->page_count] = count;
@@ -265,24 +260,10 @@ static vsh_result list_pages(const vsh_receiver *receiver, const vsh_mesh *meshe
     for (size_t i = 0; i < made->page_count; ++i) {
         const vsh_atlas_page page = vsh_atlas_page_view(made->atlas, i);
         const bool own = receiver->atlas == VSH_ATLAS_OBJECTS;
-        made->pages[i] =
-            (vsh_receiver_page){page.width, page.height, own ? object_of(&meshes[page.first_mesh]) : NULL};
+        made->pages[i] = (vsh_receiver_page){page.width, page.height,
+                                             own ? vshi_object_name(&meshes[page.first_mesh]) : NULL};
     }
     return VSH_OK;
-}
-
-/* Of the objects that a rule means by their names, or by those of their materials; whether there are any. */
-static bool apply_density(const vsh_model *model, const vsh_density_rule *rule, bool material,
-                          double *density) {
-    bool matched = false;
-    for (size_t m = 0; m < vsh_model_mesh_count(model); ++m) {
-        const vsh_mesh mesh = vsh_model_mesh(model, m, -1);
-        if (vshi_mesh_is_meant(&mesh, rule->pattern, material)) {
-            density[m] = rule->factor;
-            matched = true;
-        }
-    }
-    return matched;
 }
 
 vsh_result vsh_model_densities(const vsh_model *model, const char *path, const vsh_density_rule *rules,
@@ -302,7 +283,17 @@ vsh_result vsh_model_densities(const vsh_model *model, const char *path, const v
                              "%s: density '%.100s' is %g, expected a pattern and a finite number above 0",
                              path, rule->pattern != NULL ? rule->pattern : "", rule->factor);
         }
-        if (!apply_density(model, rule, false, density) && !apply_density(model, rule, true, density)) {
+        bool matched = false; /* by objects, or where none is called so, by materials */
+        for (int material = 0; material < 2 && !matched; ++material) {
+            for (size_t m = 0; m < meshes; ++m) {
+                const vsh_mesh mesh = vsh_model_mesh(model, m, -1);
+                if (vshi_mesh_is_meant(&mesh, rule->pattern, material != 0)) {
+                    density[m] = rule->factor;
+                    matched = true;
+                }
+            }
+        }
+        if (!matched) {
             return vshi_fail_unmatched(model, path, rule->pattern, error);
         }
     }
@@ -375,21 +366,19 @@ vsh_result vshi_unwrap_receiver(const vsh_receiver *receiver, const vsh_model *m
     return result == VSH_OK ? list_pages(receiver, meshes, unwrapped, error) : result;
 }
 
-vsh_result vshi_unwrapped_take(const vshi_unwrapped *made, vsh_mesh **meshes, size_t **numbers, size_t *count,
+vsh_result vshi_unwrapped_take(vshi_unwrapped *made, vsh_mesh **meshes, size_t **numbers, size_t *count,
                                vsh_error *error) {
     size_t *of_parts = NULL;
-    vsh_mesh *parts = NULL;
     VSHI_TRY(vshi_allocate((void **)&of_parts, made->part_count, sizeof *of_parts, "meshes", error));
     for (size_t i = 0; i < made->part_count; ++i) {
         of_parts[i] = (*numbers)[made->numbers[i]];
     }
     free(*numbers);
-    *numbers = of_parts;
-    VSHI_TRY(vshi_allocate((void **)&parts, made->part_count, sizeof *parts, "meshes", error));
-    memcpy(parts, made->parts, made->part_count * sizeof *parts);
     free(*meshes);
-    *meshes = parts;
+    *numbers = of_parts;
+    *meshes = made->parts;
     *count = made->part_count;
+    made->parts = NULL;
     return VSH_OK;
 }
 

@@ -9,7 +9,8 @@
  * object. They are sorted by their pages, and stand in the meshes' order on each. */
 typedef struct vshi_unwrapped {
     vsh_atlas *atlas; /* NULL: nothing was unwrapped, and all but the pages is 0 */
-    vsh_mesh *parts;  /* [part_count]: views of what this holds and of the meshes' own transforms */
+    vsh_mesh *parts;  /* [part_count]: views of the arrays below, with the meshes' own transforms; NULL when
+                         they were moved */
     size_t *numbers;  /* [part_count]: which of the meshes each is a part of */
     size_t part_count;
     size_t *page_begins; /* [page_count + 1]: first part of each page, or first mesh where nothing was
@@ -35,10 +36,10 @@ vsh_result vshi_unwrap_receiver(const vsh_receiver *receiver, const vsh_model *m
                                 const size_t *numbers, size_t count, const vsh_run *run,
                                 vshi_unwrapped *unwrapped, vsh_error *error);
 
-/* Puts the parts, and what their meshes are numbered, in place of the meshes; both lists are freed. Errors:
- * VSH_ERROR_MEMORY. */
-vsh_result vshi_unwrapped_take(const vshi_unwrapped *unwrapped, vsh_mesh **meshes, size_t **numbers,
-                               size_t *count, vsh_error *error);
+/* Moves the parts, and what their meshes are numbered, into the place of the meshes; both lists are freed.
+ * Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_unwrapped_take(vshi_unwrapped *unwrapped, vsh_mesh **meshes, size_t **numbers, size_t *count,
+                               vsh_error *error);
 void vshi_unwrapped_free(vshi_unwrapped *unwrapped);
 
 #endif

@@ -3,7 +3,6 @@
 #include "testing.h"
 
 #include "base/error.h"
-#include "scene/parts.h"
 #include "shade/shade.h"
 
 /* A scene around a part, and the part's place in it. */
