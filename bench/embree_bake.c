@@ -8,7 +8,6 @@
  * proofs, nothing that texels share. Truth is that of many rays of another frame. */
 #include "bake/origins.h"
 #include "bake/page.h"
-#include "bake_scene/channels.h"
 #include "bake_scene/pages.h"
 #include "base/clock.h"
 #include "base/parallel.h"

@@ -1,6 +1,5 @@
 #include "bake_scene/bake_scene.h"
 
-#include "bake_scene/lit_output.h"
 #include "bake_scene/pages.h"
 #include "bake_scene/parts.h"
 #include "base/clock.h"
@@ -91,8 +90,13 @@ static vsh_result check_outputs(const vsh_scene *scene, const vsh_bake_options *
 
 /* --- loading */
 
-static vsh_result list_lightmaps(vshi_scene_bake *bake, vsh_error *error) {
+/* Takes memory for the results, and lists the lightmaps. */
+static vsh_result prepare_results(vshi_scene_bake *bake, vsh_error *error) {
     const vshi_targets *targets = &bake->targets;
+    bake->error_count = bake->scene.light_count + 2;
+    bake->report.lightmap_count = targets->count;
+    VSHI_TRY(vshi_allocate((void **)&bake->errors, bake->error_count, sizeof *bake->errors, "bake", error));
+    VSHI_TRY(vshi_allocate((void **)&bake->lit, bake->error_count, sizeof *bake->lit, "bake", error));
     VSHI_TRY(vshi_allocate((void **)&bake->lightmaps, targets->count + 1, sizeof *bake->lightmaps,
                            "lightmaps", error));
     for (size_t i = 0; i < targets->count; ++i) {
@@ -106,14 +110,7 @@ static vsh_result list_lightmaps(vshi_scene_bake *bake, vsh_error *error) {
                                                   .width = target->receiver.width,
                                                   .height = target->receiver.height};
     }
-    bake->report.lightmap_count = targets->count;
     return VSH_OK;
-}
-
-static vsh_result allocate_errors(vshi_scene_bake *bake, vsh_error *error) {
-    bake->error_count = bake->scene.light_count + 2;
-    VSHI_TRY(vshi_allocate((void **)&bake->errors, bake->error_count, sizeof *bake->errors, "bake", error));
-    return vshi_allocate((void **)&bake->lit, bake->error_count, sizeof *bake->lit, "bake", error);
 }
 
 /* Checks the arguments, reads the scene's files and lists its lightmaps. Free the bake also after an error.
@@ -135,9 +132,8 @@ static vsh_result load(vshi_scene_bake *bake, const vsh_scene *scene, const vsh_
     }
     VSHI_TRY(vsh_assets_load(&bake->scene, &bake->run, &bake->assets, error));
     VSHI_TRY(vshi_targets_make(&bake->scene, bake->assets, &bake->run, &bake->targets, error));
-    VSHI_TRY(list_lightmaps(bake, error));
-    VSHI_TRY(vshi_lit_check_uvs(bake, &bake->run, error));
-    VSHI_TRY(allocate_errors(bake, error));
+    VSHI_TRY(prepare_results(bake, error));
+    VSHI_TRY(vshi_lit_check_uvs(bake, error));
     bake->report.load_s = vshi_seconds() - start;
     return bake->options.loaded != NULL
                ? bake->options.loaded(bake->options.user, bake->lightmaps, bake->targets.count, error)
@@ -260,19 +256,13 @@ static vsh_scene_occluders_options choose_occluders(const vshi_scene_bake *bake)
     return options;
 }
 
-static vsh_result make_tracer(vshi_scene_bake *bake, vsh_error *error) {
+static vsh_result make_occluders(vshi_scene_bake *bake, vsh_error *error) {
     const vsh_scene *scene = &bake->scene;
     const vsh_lightmap planes = vshi_channels_shape(scene);
-    vsh_shade_options shade;
-    VSHI_TRY(vshi_shade_options_resolve(&scene->shade, &shade, error));
-    return vshi_tracer_create(bake->occluders, scene->lights, scene->light_count, &shade, &planes, true,
-                              &bake->run, &bake->tracer, error);
-}
-
-static vsh_result make_occluders(vshi_scene_bake *bake, vsh_error *error) {
     vsh_scene_occluders_options options = choose_occluders(bake);
+    vsh_shade_options shade;
     options.truth = 1;
-    VSHI_TRY(vsh_scene_occluders(&bake->scene, bake->assets, &options, &bake->run, &bake->occluders, error));
+    VSHI_TRY(vsh_scene_occluders(scene, bake->assets, &options, &bake->run, &bake->occluders, error));
     vsh_occluders_get_info(bake->occluders, &bake->report.occluders);
     for (size_t i = 0; i < bake->occluders->layer_count; ++i) {
         bake->layered_ao = bake->layered_ao || bake->occluders->layers[i].ao != 0;
@@ -280,7 +270,9 @@ static vsh_result make_occluders(vshi_scene_bake *bake, vsh_error *error) {
     if (bake->options.rows == NULL) {
         VSHI_TRY(vshi_bake_find_provenance(bake, error));
     }
-    return make_tracer(bake, error);
+    VSHI_TRY(vshi_shade_options_resolve(&scene->shade, &shade, error));
+    return vshi_tracer_create(bake->occluders, scene->lights, scene->light_count, &shade, &planes, true,
+                              &bake->run, &bake->tracer, error);
 }
 
 vsh_result vshi_bake_find_provenance(vshi_scene_bake *bake, vsh_error *error) {

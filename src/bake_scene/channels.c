@@ -1,4 +1,4 @@
-#include "bake_scene/channels.h"
+#include "bake_scene/pages.h"
 
 #include "bake/planes.h"
 #include "base/memory.h"
@@ -111,38 +111,26 @@ vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t hei
 
 /* --- values */
 
-static int32_t bent_space(const vsh_scene *scene) {
-    return scene->bent > 0 ? scene->bent - 1 : VSH_BENT_WORLD;
-}
-
-static void bind_all(vshi_channels *channels, const vsh_scene *scene) {
-    float *const *value = channels->values;
+/* Puts the values into the planes of a lightmap; NULL: any. */
+static void bind_planes(vsh_lightmap *lightmap, const vsh_scene *scene, float *const *values) {
+    static float plane;
+    float *const any[] = {&plane};
     size_t kind_count;
     const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
     for (size_t k = 0; k < kind_count; ++k) {
         const size_t count = count_of(&kinds[k], scene);
         if (count > 0) {
-            vshi_plane_put(&channels->lightmap, &kinds[k], value);
+            vshi_plane_put(lightmap, &kinds[k], values != NULL ? values : any);
         }
-        value += count;
+        values = values != NULL ? values + count : NULL;
     }
-    channels->lightmap.tint_by = scene->tint; /* of irradiance too */
-    channels->lightmap.ambient = scene->has_ambient ? scene->ambient : NULL;
-    channels->lightmap.bent_space = bent_space(scene);
-    channels->lightmap.asked = scene->planes;
+    lightmap->bent_space = scene->bent > 0 ? scene->bent - 1 : VSH_BENT_WORLD;
+    lightmap->asked = scene->planes;
 }
 
 vsh_lightmap vshi_channels_shape(const vsh_scene *scene) {
-    static float plane;
-    float *const any[] = {&plane};
-    vsh_lightmap lightmap = {.bent_space = bent_space(scene), .asked = scene->planes};
-    size_t kind_count;
-    const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
-    for (size_t k = 0; k < kind_count; ++k) {
-        if (count_of(&kinds[k], scene) > 0) {
-            vshi_plane_put(&lightmap, &kinds[k], any);
-        }
-    }
+    vsh_lightmap lightmap = {.asked = scene->planes};
+    bind_planes(&lightmap, scene, NULL);
     return lightmap;
 }
 
@@ -154,7 +142,9 @@ vsh_result vshi_channels_allocate(vshi_channels *channels, const vsh_scene *scen
         VSHI_TRY(vshi_store_take(store, (void **)&channels->values[i], texels,
                                  channels->components[i] * sizeof(float), output, error));
     }
-    bind_all(channels, scene);
+    bind_planes(&channels->lightmap, scene, channels->values);
+    channels->lightmap.tint_by = scene->tint; /* of irradiance too */
+    channels->lightmap.ambient = scene->has_ambient ? scene->ambient : NULL;
     return VSH_OK;
 }
 

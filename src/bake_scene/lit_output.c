@@ -1,6 +1,5 @@
-#include "bake_scene/lit_output.h"
+#include "bake_scene/pages.h"
 
-#include "bake_scene/channels.h"
 #include "base/file.h"
 #include "base/memory.h"
 #include "base/try.h"
@@ -26,26 +25,26 @@ static size_t page_count(const vshi_lit_output *lit) {
     return vsh_assets_receiver_pages(lit->bake->assets, lit->lightmap->receiver);
 }
 
-static void take(vshi_lit_output *lit, int plane, int32_t channel) {
-    lit->sources[plane][lit->source_count[plane]++] = channel;
+static void add_source(vshi_lit_output *lit, int plane, int32_t channel) {
+    lit->first_source[plane] = lit->source_count[plane]++ == 0 ? channel : lit->first_source[plane];
 }
 
+/* Finds the channels that make planes: AO, and irradiance or else shadows, which follow each other. */
 static void find_sources(vshi_lit_output *lit, const vsh_image *image) {
     static const char *const colors[3] = {"irradiance.R", "irradiance.G", "irradiance.B"};
-    memset(lit->source_count, 0, sizeof lit->source_count);
     for (int32_t c = 0; c < image->channel_count; ++c) {
         if (strcmp(image->names[c], "ao") == 0) {
-            take(lit, AO, c);
+            add_source(lit, AO, c);
         }
         for (int k = 0; k < 3; ++k) {
             if (strcmp(image->names[c], colors[k]) == 0) {
-                take(lit, LIGHT + k, c);
+                add_source(lit, LIGHT + k, c);
             }
         }
     }
     for (int32_t c = 0; c < image->channel_count && lit->source_count[LIGHT + 2] == 0; ++c) {
         if (strncmp(image->names[c], "shadow.", strlen("shadow.")) == 0) {
-            take(lit, LIGHT, c);
+            add_source(lit, LIGHT, c);
         }
     }
 }
@@ -67,14 +66,9 @@ void vshi_lit_output_scene(vsh_scene *scene) {
 }
 
 vsh_result vshi_lit_output_check(const vsh_receiver *receiver, const vsh_image *image, vsh_error *error) {
-    vshi_lit_output *lit = calloc(1, sizeof *lit);
-    if (lit == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", receiver->output);
-    }
-    find_sources(lit, image);
-    const bool any = lit->source_count[AO] > 0 || lit->source_count[LIGHT] > 0;
-    free(lit);
-    if (!any) {
+    vshi_lit_output lit = {.bake = NULL};
+    find_sources(&lit, image);
+    if (lit.source_count[AO] == 0 && lit.source_count[LIGHT] == 0) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "%s: an asset is lit by AO, irradiance or shadows, and there are none",
                          receiver->output);
@@ -122,15 +116,12 @@ void vshi_lit_output_close(vshi_lit_output *lit) {
     free_page(&lit->page);
     vsh_image_writer_abandon(lit->exr);
     free(lit->exr_path);
-    memset(lit, 0, sizeof *lit);
+    *lit = (vshi_lit_output){.bake = NULL};
 }
 
 vsh_result vshi_lit_output_open(vshi_lit_output *lit, const vshi_scene_page *page, vsh_error *error) {
     const vsh_image *image = &page->channels.image;
-    memset(lit, 0, sizeof *lit);
-    lit->bake = page->bake;
-    lit->target = page->target;
-    lit->lightmap = page->lightmap;
+    *lit = (vshi_lit_output){.bake = page->bake, .target = page->target, .lightmap = page->lightmap};
     lit->page =
         (vshi_lit_page){.width = image->width, .height = image->height, .object = lit->target->object};
     find_sources(lit, image);
@@ -169,7 +160,7 @@ vsh_result vshi_lit_output_add(vshi_lit_output *lit, int32_t rows, const float *
         for (size_t i = 0; i < count; ++i) {
             float sum = 0.0F;
             for (int32_t s = 0; s < lit->source_count[p]; ++s) {
-                sum += planes[lit->sources[p][s]][i];
+                sum += planes[lit->first_source[p] + s][i];
             }
             to[i] = sum / (float)lit->source_count[p];
         }
@@ -258,19 +249,19 @@ static void multiply_by_ao(const vshi_lit_page *page) {
     }
 }
 
-/* Lists the images of a page, at most two. */
-static size_t list_images(const vshi_lit_output *lit, size_t number, vsh_lit_image *images) {
-    const vshi_scene_bake *bake = lit->bake;
-    const vshi_lit_page *page = &bake->lit_pages[number];
-    const vsh_receiver *receiver = &bake->scene.receivers[lit->lightmap->receiver];
-    const bool light = page->planes[LIGHT] != NULL, preview = previews(lit);
+/* Lists the images of a page, at most two. `page` NULL: it is not baked yet. */
+static size_t list_images(const vshi_lit_output *lit, size_t number, const vshi_lit_page *page,
+                          vsh_lit_image *images) {
+    static const vshi_lit_page unknown;
+    const bool light = lit->source_count[LIGHT] > 0, preview = previews(lit);
     size_t count = 0;
+    page = page != NULL ? page : &unknown;
     if (light && preview) {
         multiply_by_ao(page);
     }
-    for (int kind = 0; kind < 2; ++kind) {
-        const bool is_light = kind == 1;
-        if ((is_light ? !light : page->planes[AO] == NULL) || (preview && is_light != light)) {
+    for (int kind = AO; kind <= LIGHT; ++kind) {
+        const bool is_light = kind == LIGHT;
+        if (lit->source_count[kind] == 0 || (preview && is_light != light)) {
             continue;
         }
         images[count++] =
@@ -280,46 +271,50 @@ static size_t list_images(const vshi_lit_output *lit, size_t number, vsh_lit_ima
                             .page = (uint32_t)number,
                             .width = page->width,
                             .height = page->height,
-                            .channels = (const float *const *)page->planes + (is_light ? LIGHT : AO),
+                            .channels = (const float *const *)page->planes + kind,
                             .channel_count = is_light && page->planes[LIGHT + 2] != NULL ? 3 : 1,
-                            .bits = receiver->bits,
+                            .bits = lit->bake->scene.receivers[lit->lightmap->receiver].bits,
                             .intensity = is_light && !preview ? full_light : 1.0};
     }
     return count;
 }
 
-/* Writes the asset, once all pages are there. */
-static vsh_result write(const vshi_lit_output *lit, vsh_error *error) {
+/* Writes the asset, once all pages are there; or before, checks that it has room for their UVs. */
+static vsh_result write(const vshi_lit_output *lit, bool check, vsh_error *error) {
     const vshi_scene_bake *bake = lit->bake;
+    const char *output = lit->lightmap->output;
     const vsh_receiver *receiver = &bake->scene.receivers[lit->lightmap->receiver];
-    const size_t *numbers;
+    const char *path = receiver->type != VSH_RECEIVER_MESH ? NULL : receiver->path;
+    const size_t count = page_count(lit), *numbers;
     const vsh_model *model = vsh_assets_receiver_model(bake->assets, lit->lightmap->receiver, &numbers);
     vsh_lit_mesh *meshes = NULL;
     vsh_lit_image *images = NULL;
     const char **names = NULL;
-    uint32_t *pages = NULL;
+    uint32_t *chart_pages = NULL;
     vsh_lit_options options = vsh_lit_options_default();
-    vsh_run run = lit->bake->run;
+    vsh_run run = bake->run;
     run.progress = NULL; /* writing is a stage of the bake's */
     vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&images, 2 * bake->lit_page_count, sizeof *images,
-                                lit->lightmap->output, error));
-    VSHI_TRY_DONE(
-        vshi_allocate((void **)&names, bake->lit_page_count, sizeof *names, lit->lightmap->output, error));
-    options.page_names = names;
-    options.page_count = bake->lit_page_count;
-    for (size_t page = 0; page < bake->lit_page_count; ++page) {
-        names[page] = bake->lit_pages[page].object;
-        options.image_count += list_images(lit, page, images + options.image_count);
+    VSHI_TRY_DONE(vshi_allocate((void **)&images, 2 * count, sizeof *images, output, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&names, count, sizeof *names, output, error));
+    for (size_t i = 0; i < count; ++i) {
+        const vshi_lit_page *page = check ? NULL : &bake->lit_pages[i];
+        names[i] = check ? NULL : page->object;
+        options.image_count += list_images(lit, i, page, images + options.image_count);
     }
     options.images = images;
-    options.attributes = vsh_provenance_attributes(bake->provenance, &options.attribute_count);
-    VSHI_TRY_DONE(list_chart_pages(lit, &options, &pages, error));
+    VSHI_TRY_DONE(list_chart_pages(lit, &options, &chart_pages, error));
     VSHI_TRY_DONE(list_meshes(lit, model, &meshes, error));
-    result = vsh_lit_write(receiver->type != VSH_RECEIVER_MESH ? NULL : receiver->path, model, meshes,
-                           &options, lit->lightmap->output, &run, error);
+    if (check) {
+        result = vsh_lit_check_uvs(path, model, meshes, &options, &run, error);
+    } else {
+        options.page_names = names;
+        options.page_count = count;
+        options.attributes = vsh_provenance_attributes(bake->provenance, &options.attribute_count);
+        result = vsh_lit_write(path, model, meshes, &options, output, &run, error);
+    }
 done:
-    free(pages);
+    free(chart_pages);
     free(names);
     free(images);
     free(meshes);
@@ -340,7 +335,7 @@ static vsh_result keep_page(vshi_lit_output *lit, vsh_error *error) {
     if (bake->lit_page_count < pages) {
         return VSH_OK;
     }
-    const vsh_result result = write(lit, error);
+    const vsh_result result = write(lit, false, error);
     vshi_lit_pages_free(bake);
     return result;
 }
@@ -352,55 +347,9 @@ vsh_result vshi_lit_output_finish(vshi_lit_output *lit, vsh_error *error) {
     return exr != NULL ? vsh_image_writer_finish(exr, error) : VSH_OK;
 }
 
-/* --- room for them */
+/* --- room for the UVs */
 
-/* The images that pages are going to have, as far as they are known before: two purposes at most. */
-static size_t expect_images(const vshi_lit_output *lit, size_t pages, vsh_lit_image *images) {
-    const bool ao = lit->source_count[AO] > 0, light = lit->source_count[LIGHT] > 0;
-    size_t count = 0;
-    for (size_t page = 0; page < pages; ++page) {
-        if (previews(lit)) {
-            images[count++] = (vsh_lit_image){.purpose = VSH_LIT_PREVIEW, .page = (uint32_t)page};
-            continue;
-        }
-        if (ao) {
-            images[count++] = (vsh_lit_image){.purpose = VSH_LIT_OCCLUSION, .page = (uint32_t)page};
-        }
-        if (light) {
-            images[count++] = (vsh_lit_image){.purpose = VSH_LIT_LIGHTMAP, .page = (uint32_t)page};
-        }
-    }
-    return count;
-}
-
-static vsh_result check_uvs(const vshi_lit_output *lit, const vsh_run *run, vsh_error *error) {
-    const vsh_scene_lightmap *lightmap = lit->lightmap;
-    const size_t pages = vsh_assets_receiver_pages(lit->bake->assets, lit->lightmap->receiver);
-    const size_t *numbers;
-    const vsh_model *model = vsh_assets_receiver_model(lit->bake->assets, lightmap->receiver, &numbers);
-    const vsh_receiver *receiver = &lit->bake->scene.receivers[lightmap->receiver];
-    const char *path = receiver->type != VSH_RECEIVER_MESH ? NULL : receiver->path;
-    vsh_lit_mesh *meshes = NULL;
-    vsh_lit_image *images = NULL;
-    uint32_t *chart_pages = NULL;
-    vsh_lit_options options = vsh_lit_options_default();
-    vsh_run quiet = *run;
-    quiet.progress = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&images, 2 * pages, sizeof *images, lightmap->output, error));
-    options.images = images;
-    options.image_count = expect_images(lit, pages, images);
-    VSHI_TRY_DONE(list_chart_pages(lit, &options, &chart_pages, error));
-    VSHI_TRY_DONE(list_meshes(lit, model, &meshes, error));
-    result = vsh_lit_check_uvs(path, model, meshes, &options, &quiet, error);
-done:
-    free(chart_pages);
-    free(images);
-    free(meshes);
-    return result;
-}
-
-static vsh_result check_receiver(vshi_scene_bake *bake, size_t index, const vsh_run *run, vsh_error *error) {
+static vsh_result check_receiver(vshi_scene_bake *bake, size_t index, vsh_error *error) {
     const vsh_receiver *receiver = &bake->scene.receivers[index];
     const vsh_scene_lightmap lightmap = {.receiver = index, .output = receiver->output};
     const size_t *numbers;
@@ -408,25 +357,21 @@ static vsh_result check_receiver(vshi_scene_bake *bake, size_t index, const vsh_
         strcasecmp(vshi_path_ending(receiver->output), "obj") == 0) {
         return VSH_OK; /* no set is made, or (OBJ) there is one alone */
     }
-    vshi_channels channels = {.value_count = 0};
-    vshi_lit_output *lit = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&lit, 1, sizeof *lit, lightmap.output, error));
-    VSHI_TRY_DONE(vshi_channels_name(&bake->scene, receiver->width, receiver->height, &channels, error));
-    lit->bake = bake;
-    lit->lightmap = &lightmap;
-    find_sources(lit, &channels.image);
-    result = check_uvs(lit, run, error);
-done:
+    vshi_channels channels;
+    vshi_lit_output lit = {.bake = bake, .lightmap = &lightmap};
+    vsh_result result = vshi_channels_name(&bake->scene, receiver->width, receiver->height, &channels, error);
+    if (result == VSH_OK) {
+        find_sources(&lit, &channels.image);
+        result = write(&lit, true, error);
+    }
     vshi_channels_free(&channels);
-    free(lit);
     return result;
 }
 
-vsh_result vshi_lit_check_uvs(vshi_scene_bake *bake, const vsh_run *run, vsh_error *error) {
+vsh_result vshi_lit_check_uvs(vshi_scene_bake *bake, vsh_error *error) {
     for (size_t i = 0; i < bake->scene.receiver_count && bake->options.rows == NULL; ++i) {
         if (vsh_lit_is_output(bake->scene.receivers[i].output)) {
-            VSHI_TRY(check_receiver(bake, i, run, error));
+            VSHI_TRY(check_receiver(bake, i, error));
         }
     }
     return VSH_OK;

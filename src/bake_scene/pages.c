@@ -1,7 +1,6 @@
 #include "bake_scene/pages.h"
 
 #include "bake_scene/bake_scene.h"
-#include "bake_scene/lit_output.h"
 #include "bake_scene/parts.h"
 #include "base/bytes.h"
 #include "base/clock.h"
@@ -10,8 +9,10 @@
 #include "base/try.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 enum { ROWS = 64 }; /* that are handed over at a time */
 
@@ -193,7 +194,132 @@ static vsh_result stitch(group *g, vsh_error *error) {
     return keep_without_memory(&g->pages[0], result, "seams", error);
 }
 
-/* --- written */
+/* --- a picture of a lightmap's charts, and of the texels of them that are not valid */
+
+typedef struct invalid_picture {
+    char *path; /* NULL: nobody wants one */
+    vsh_image image;
+    float *planes[3]; /* R, G, B of as many rows as are baked at a time */
+    vsh_image_writer *writer;
+} invalid_picture;
+
+/* Colours of texels outside charts, of valid and of invalid texels. */
+static const float COLOURS[3][3] = {{0.05f, 0.05f, 0.06f}, {0.5f, 0.5f, 0.5f}, {0.7f, 0.05f, 0.05f}};
+static const char *const NAMES[3] = {"R", "G", "B"};
+
+/* "floor" of "out/floor.exr". */
+typedef struct stem {
+    const char *at;
+    size_t size;
+} stem;
+
+static stem stem_of(const vshi_target *target) {
+    const char *output = target->output != NULL ? target->output : "";
+    const char *slash = strrchr(output, '/');
+    const char *name = slash != NULL ? slash + 1 : output, *dot = strrchr(name, '.');
+    return (stem){name, dot != NULL ? (size_t)(dot - name) : strlen(name)};
+}
+
+/* Names that differ in case only are one file to some systems. */
+static bool are_alike(stem a, stem b) {
+    return a.size == b.size && strncasecmp(a.at, b.at, a.size) == 0;
+}
+
+static bool is_taken(const vshi_targets *targets, const char *name) {
+    for (size_t i = 0; i < targets->count; ++i) {
+        if (are_alike(stem_of(&targets->list[i]), (stem){name, strlen(name)})) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* FILE.png for one lightmap, else "where.floor.png" for the first "floor", "where.floor-2.png" for the
+ * second; numbers that another output has by itself are left out. To be freed; NULL where memory is short. */
+static char *name_picture(const char *path, const vshi_targets *targets, size_t index) {
+    if (targets->count == 1) {
+        return strdup(path);
+    }
+    const stem own = stem_of(&targets->list[index]);
+    const int before = (int)(strlen(path) - strlen(".png"));
+    const size_t size = strlen(path) + own.size + 32;
+    char *made = malloc(size), *name = malloc(own.size + 32);
+    size_t alike = 0, number = 1;
+    for (size_t i = 0; i < index; ++i) {
+        alike += are_alike(stem_of(&targets->list[i]), own);
+    }
+    if (made != NULL && name != NULL) {
+        snprintf(name, own.size + 32, "%.*s", (int)own.size, own.at);
+        while (alike > 0) {
+            snprintf(name, own.size + 32, "%.*s-%zu", (int)own.size, own.at, ++number);
+            alike -= !is_taken(targets, name);
+        }
+        snprintf(made, size, "%.*s.%s.png", before, path, name);
+    } else {
+        free(made);
+        made = NULL;
+    }
+    free(name);
+    return made;
+}
+
+/* Opens the picture of lightmap `index`, of which ROWS come at a time. Does nothing if nobody wants it. Close
+ * it also after a failure. */
+static vsh_result open_picture(invalid_picture *picture, const vshi_scene_bake *bake, size_t index,
+                               vsh_error *error) {
+    const char *path = bake->options.invalid_picture;
+    const vsh_receiver *receiver = &bake->targets.list[index].receiver;
+    const int32_t width = receiver->width, height = receiver->height;
+    memset(picture, 0, sizeof *picture);
+    if (path == NULL) {
+        return VSH_OK;
+    }
+    picture->path = name_picture(path, &bake->targets, index);
+    for (int c = 0; c < 3; ++c) {
+        picture->planes[c] = calloc((size_t)width * ROWS, sizeof(float));
+        if (picture->planes[c] == NULL || picture->path == NULL) {
+            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+        }
+    }
+    picture->image = (vsh_image){
+        width, height, 3, (const char *const *)NAMES, (const float *const *)picture->planes, NULL};
+    vsh_image_options options = vsh_image_options_default();
+    options.bits = 8;
+    return vsh_image_writer_create(picture->path, &picture->image, &options, &picture->writer, error);
+}
+
+/* Adds rows of texels, each VSHI_TEXEL_…. */
+static vsh_result add_to_picture(invalid_picture *picture, int32_t rows, const uint8_t *state,
+                                 vsh_error *error) {
+    if (picture->writer == NULL) {
+        return VSH_OK;
+    }
+    const size_t texels = (size_t)picture->image.width * (size_t)rows;
+    for (size_t i = 0; i < texels; ++i) {
+        const int kind = state[i] == VSHI_TEXEL_EMPTY ? 0 : state[i] == VSHI_TEXEL_VALID ? 1 : 2;
+        for (int c = 0; c < 3; ++c) {
+            picture->planes[c][i] = COLOURS[kind][c];
+        }
+    }
+    return vsh_image_writer_add(picture->writer, rows, picture->image.planes, error);
+}
+
+/* Completes the file where `result` is VSH_OK, else leaves what was there. Returns `result`, or why not. */
+static vsh_result close_picture(invalid_picture *picture, vsh_result result, vsh_error *error) {
+    if (picture->writer != NULL && result != VSH_OK) {
+        vsh_image_writer_abandon(picture->writer);
+    } else if (picture->writer != NULL) {
+        result = vsh_image_writer_finish(picture->writer, error);
+    }
+    for (int c = 0; c < 3; ++c) {
+        free(picture->planes[c]);
+    }
+    free(picture->path);
+    memset(picture, 0, sizeof *picture);
+    return result;
+}
+
+/* --- writing */
 
 /* Where the rows of a page go, besides the picture of invalid texels. */
 typedef struct output {
@@ -258,7 +384,7 @@ static vsh_result report_writing(const vsh_run *run, double fraction, vsh_error 
     return VSH_OK;
 }
 
-static vsh_result add_all_rows(const vshi_scene_page *page, output *out, vshi_invalid_picture *picture,
+static vsh_result add_all_rows(const vshi_scene_page *page, output *out, invalid_picture *picture,
                                vsh_error *error) {
     const int32_t height = page->lightmap->height;
     const float *planes[VSH_MAX_CHANNELS];
@@ -270,8 +396,8 @@ static vsh_result add_all_rows(const vshi_scene_page *page, output *out, vshi_in
         const int32_t count = height - first < ROWS ? height - first : ROWS;
         vshi_channels_rows(&page->channels, first, count, rows, planes);
         VSHI_TRY_DONE(add_rows(page, out, first, count, planes, error));
-        VSHI_TRY_DONE(vshi_invalid_picture_add(picture, count,
-                                               page->page.state + (size_t)first * page->page.width, error));
+        VSHI_TRY_DONE(
+            add_to_picture(picture, count, page->page.state + (size_t)first * page->page.width, error));
         VSHI_TRY_DONE(report_writing(&page->bake->run, (double)(first + count) / (double)height, error));
     }
 done:
@@ -281,12 +407,12 @@ done:
 
 static vsh_result write_page(vshi_scene_page *page, vsh_error *error) {
     output out = {.writer = NULL};
-    vshi_invalid_picture picture;
-    vsh_result result = vshi_invalid_picture_open(&picture, page->bake, page->index, ROWS, error);
+    invalid_picture picture;
+    vsh_result result = open_picture(&picture, page->bake, page->index, error);
     result = result == VSH_OK ? open_output(page, &out, error) : result;
     result = result == VSH_OK ? add_all_rows(page, &out, &picture, error) : result;
     result = close_output(page, &out, result, error);
-    return vshi_invalid_picture_close(&picture, result, error);
+    return close_picture(&picture, result, error);
 }
 
 static vsh_result write_pages(group *g, vsh_error *error) {

@@ -5,11 +5,49 @@
 #include "bake/padding.h"
 #include "bake/page.h"
 #include "bake_scene/bake_scene.h"
-#include "bake_scene/channels.h"
 #include "base/error.h"
+#include "base/store.h"
 
 #include <stdbool.h>
 #include <vdbshade/image.h>
+
+/* --- the channels of lightmaps: which there are, in which order, and the planes that a bake fills */
+
+typedef struct vshi_channels {
+    vsh_image image;       /* their names, in the order of bake/planes.c; A is the last. No planes */
+    vsh_lightmap lightmap; /* the values, as the bake takes them */
+    char (*names)[VSH_CHANNEL_NAME];
+    const char **name_list;
+    int32_t *holds;
+    float **values;     /* [value_count][height][width][components]: of the store */
+    size_t *components; /* [value_count]: 1 or 3 channels each */
+    size_t value_count;
+    vshi_store *store; /* NULL: there is no memory for values */
+} vshi_channels;
+
+/* Names the channels of a scene at a size, without memory for values: enough for vsh_image_check(). Errors:
+ * VSH_ERROR_ARGUMENT (more than VSH_MAX_CHANNELS), VSH_ERROR_MEMORY. Free them also after a failure. */
+vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t height, vshi_channels *channels,
+                              vsh_error *error);
+
+/* Takes the memory for the values, zeroed. `output` is for messages. Errors: as vshi_store_take(). */
+vsh_result vshi_channels_allocate(vshi_channels *channels, const vsh_scene *scene, vshi_store *store,
+                                  const char *output, vsh_error *error);
+
+/* Which planes a scene's bake fills, and how: those that are not NULL, which are none to be written to. */
+vsh_lightmap vshi_channels_shape(const vsh_scene *scene);
+
+/* Memory that vshi_channels_rows() takes for so many rows, to be freed. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_channels_allocate_rows(const vshi_channels *channels, int32_t rows, float **memory,
+                                       vsh_error *error);
+
+/* Rows of all channels, planes[image.channel_count][rows][width]. */
+void vshi_channels_rows(const vshi_channels *channels, int32_t first, int32_t rows, float *memory,
+                        const float **planes);
+
+void vshi_channels_free(vshi_channels *channels); /* zeroed ones too */
+
+/* --- pages */
 
 /* One lightmap. */
 typedef struct vshi_scene_page {
@@ -44,27 +82,46 @@ vsh_result vshi_bake_pages(vshi_scene_bake *bake, vsh_error *error);
 /* Adds the file's name to an error of a function that knows arrays only. Returns `result`. */
 vsh_result vshi_name_file(const char *path, vsh_result result, vsh_error *error);
 
-/* --- a picture of a lightmap's charts, and of the texels of them that are not valid */
+/* --- a receiver's own file, written with its light in the materials */
 
-typedef struct vshi_invalid_picture {
-    char *path; /* NULL: nobody wants one */
-    vsh_image image;
-    float *planes[3]; /* R, G, B of as many rows as are baked at a time */
-    vsh_image_writer *writer;
-} vshi_invalid_picture;
+typedef struct vshi_lit_output {
+    vshi_scene_bake *bake;
+    const vshi_target *target;
+    const vsh_scene_lightmap *lightmap;
+    vshi_lit_page page;    /* the current one; the bake keeps it when it is complete */
+    int32_t rows;          /* received so far */
+    vsh_image_writer *exr; /* an EXR of all channels; NULL: not asked for */
+    char *exr_path;
+    int32_t first_source[4]; /* each plane is the mean of so many channels from this one on */
+    int32_t source_count[4];
+} vshi_lit_output;
 
-/* Opens the picture of lightmap `index`, of which `rows` come at a time: FILE.png, or where there are several
- * FILE.OUTPUT.png, no two of which are alike. Does nothing if nobody wants it. Errors: as
- * vsh_image_writer_create(). Close it also after a failure. */
-vsh_result vshi_invalid_picture_open(vshi_invalid_picture *picture, const vshi_scene_bake *bake, size_t index,
-                                     int32_t rows, vsh_error *error);
+/* Ambient light, linear, of an asset whose scene names none: shadows are not black. */
+#define VSHI_LIT_AMBIENT 0.25
 
-/* Adds rows of texels, each VSHI_TEXEL_…. */
-vsh_result vshi_invalid_picture_add(vshi_invalid_picture *picture, int32_t rows, const uint8_t *state,
-                                    vsh_error *error);
+/* Adds irradiance and ambient light to a scene whose outputs are all assets. */
+void vshi_lit_output_scene(vsh_scene *scene);
 
-/* Completes the file where `result` is VSH_OK, else leaves what was there. Returns `result`, or why not. */
-vsh_result vshi_invalid_picture_close(vshi_invalid_picture *picture, vsh_result result, vsh_error *error);
+/* Whether an asset can be written with these channels. Errors: as vsh_receiver_check(). */
+vsh_result vshi_lit_output_check(const vsh_receiver *receiver, const vsh_image *image, vsh_error *error);
+
+/* Whether the receivers' files have room for the UVs of their new atlases; before anything is baked. Errors:
+ * as vsh_lit_check_uvs(). */
+vsh_result vshi_lit_check_uvs(vshi_scene_bake *bake, vsh_error *error);
+
+/* Takes memory for a page. Close it also after an error. */
+vsh_result vshi_lit_output_open(vshi_lit_output *lit, const vshi_scene_page *page, vsh_error *error);
+
+/* Adds the next rows of all channels. */
+vsh_result vshi_lit_output_add(vshi_lit_output *lit, int32_t rows, const float *const *planes,
+                               vsh_error *error);
+
+/* Keeps the page, and writes the asset with the receiver's last one. */
+vsh_result vshi_lit_output_finish(vshi_lit_output *lit, vsh_error *error);
+void vshi_lit_output_close(vshi_lit_output *lit); /* zeroed ones too */
+
+/* Frees the pages that wait for others. */
+void vshi_lit_pages_free(vshi_scene_bake *bake);
 
 /* --- warnings and errors about a lightmap's UVs, texels and file */
 

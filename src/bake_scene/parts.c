@@ -2,125 +2,176 @@
 
 #include "bake/planes.h"
 #include "base/clock.h"
+#include "base/file.h"
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/try.h"
 #include "shade/ao.h"
 
+#include <errno.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-
-/* A lightmap of the job that a part is of. */
-typedef struct part_lightmap {
-    int32_t width, height;
-    uint64_t mesh_count, covered, samples; /* as in vsh_scene_lightmap */
-} part_lightmap;
-
-/* All of it is owned. */
-typedef struct part_head {
-    vshi_part_about about;
-    char **channels; /* [channel_count]: names */
-    uint64_t channel_count;
-    uint64_t error_count; /* as in vsh_bake_report */
-    double voxel_size;    /* these of what cast, as in vsh_occluders_info */
-    uint64_t active_voxels, field_bytes;
-    int32_t levels, has_triangles;
-    int32_t layered_ao;       /* as of the job */
-    part_lightmap *lightmaps; /* [lightmap_count] */
-    uint64_t lightmap_count;
-} part_head;
 
 /* --- the head */
 
-static void code_head(vshi_part_code *code, part_head *head) {
-    vshi_part_code_texts(code, &head->channels, &head->channel_count);
-    vshi_part_code_u64(code, &head->error_count);
-    vshi_part_code_f64(code, &head->voxel_size);
-    vshi_part_code_u64(code, &head->active_voxels);
-    vshi_part_code_u64(code, &head->field_bytes);
-    vshi_part_code_i32(code, &head->levels);
-    vshi_part_code_i32(code, &head->has_triangles);
-    vshi_part_code_i32(code, &head->layered_ao);
-    vshi_part_code_count(code, &head->lightmap_count, sizeof(uint64_t), (void **)&head->lightmaps,
-                         sizeof *head->lightmaps);
-    for (uint64_t i = 0; i < head->lightmap_count && !code->failed; ++i) {
-        part_lightmap *lightmap = &head->lightmaps[i];
-        vshi_part_code_i32(code, &lightmap->width);
-        vshi_part_code_i32(code, &lightmap->height);
-        vshi_part_code_u64(code, &lightmap->mesh_count);
-        vshi_part_code_u64(code, &lightmap->covered);
-        vshi_part_code_u64(code, &lightmap->samples);
-    }
-}
+/* Begins the head. The lightmaps follow, then the texts, each with its NUL: the library's version, words,
+ * names and values of attributes, channels; then bytes of 0 up to a multiple of 8. */
+typedef struct head_numbers {
+    uint64_t words, attributes, channels, lightmaps; /* how many there are */
+    uint64_t errors;                                 /* as in vsh_bake_report */
+    uint64_t active_voxels, field_bytes;             /* these of what cast, as in vsh_occluders_info */
+    double voxel_size;
+    int32_t levels, has_triangles;
+    int32_t layered_ao; /* as of the job */
+    int32_t shard, shard_count;
+    int32_t unused;
+} head_numbers;
+
+/* A lightmap of the job that a part is of. */
+typedef struct part_lightmap {
+    uint64_t mesh_count, covered, samples; /* as in vsh_scene_lightmap */
+    int32_t width, height;
+} part_lightmap;
+
+enum { ROUND = 8 };
+
+typedef struct part_head {
+    head_numbers numbers;
+    unsigned char *bytes; /* owned: all of it, a multiple of 8 */
+    size_t size;
+    const char **texts;                           /* owned; they lie in `bytes` */
+    const char **words, **attributes, **channels; /* in `texts` */
+    const part_lightmap *lightmaps;               /* in `bytes` */
+} part_head;
 
 static void free_head(part_head *head) {
-    for (uint64_t i = 0; i < head->channel_count && head->channels != NULL; ++i) {
-        free(head->channels[i]);
-    }
-    free(head->lightmaps);
-    free(head->channels);
-    vshi_part_about_free(&head->about);
-    *head = (part_head){.channel_count = 0};
+    free(head->texts);
+    free(head->bytes);
+    *head = (part_head){.bytes = NULL};
 }
 
-/* What parts' files are named after: the options' name, or the first lightmap's output. */
+/* The name of the parts' files: the options' name, or the first lightmap's output. */
 static const char *parts_name(const vshi_scene_bake *bake) {
     return bake->options.parts != NULL ? bake->options.parts
            : bake->targets.count > 0   ? bake->lightmaps[0].output
                                        : bake->scene.receivers[0].output;
 }
 
-/* What its parts' files say of themselves, of `count` shards. */
-static vshi_part_options options_of(const vshi_scene_bake *bake, int32_t count) {
-    vshi_part_options options = {.parts = parts_name(bake),
-                                 .shard = bake->options.shard,
-                                 .shard_count = count,
-                                 .words = bake->options.words,
-                                 .word_count = bake->options.word_count};
-    options.attributes = vsh_provenance_attributes(bake->provenance, &options.attribute_count);
-    return options;
+static uint64_t count_texts(const head_numbers *numbers) {
+    return 1 + numbers->words + 2 * numbers->attributes + numbers->channels;
 }
 
-static vsh_result copy_channels(const vshi_channels *channels, part_head *head, vsh_error *error) {
-    const size_t count = (size_t)channels->image.channel_count;
-    VSHI_TRY(vshi_allocate((void **)&head->channels, count + 1, sizeof *head->channels, "part", error));
-    for (; head->channel_count < count; ++head->channel_count) {
-        head->channels[head->channel_count] = strdup(channels->names[head->channel_count]);
-        if (head->channels[head->channel_count] == NULL) {
-            return vshi_fail(error, VSH_ERROR_MEMORY, "part: the system refused memory");
-        }
+/* Lists the texts of a head in their order. */
+static void list_texts(const vshi_scene_bake *bake, const vshi_channels *channels, const char **texts) {
+    size_t attributes;
+    const vsh_attribute *attribute = vsh_provenance_attributes(bake->provenance, &attributes);
+    *texts++ = VSHI_VERSION;
+    for (size_t i = 0; i < bake->options.word_count; ++i) {
+        *texts++ = bake->options.words[i];
     }
-    return VSH_OK;
+    for (size_t i = 0; i < attributes; ++i) {
+        *texts++ = attribute[i].name;
+        *texts++ = attribute[i].value;
+    }
+    for (int32_t i = 0; i < channels->image.channel_count; ++i) {
+        *texts++ = channels->names[i];
+    }
 }
 
+static unsigned char *append(unsigned char *to, const void *from, size_t size) {
+    memcpy(to, from, size);
+    return to + size;
+}
+
+/* VSH_ERROR_INPUT: `what` of a part cannot be. */
+static vsh_result fail_damaged(const char *path, const char *what, vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_INPUT, "%s: damaged: %s; bake this part again", path, what);
+}
+
+/* Finds numbers, lightmaps and texts in the bytes of a head, and checks that they are there. */
+static vsh_result parse_head(const char *path, part_head *head, vsh_error *error) {
+    head_numbers *n = &head->numbers;
+    size_t size = head->size;
+    if (size < sizeof *n) {
+        return fail_damaged(path, "its head", error);
+    }
+    memcpy(n, head->bytes, sizeof *n);
+    size -= sizeof *n;
+    if (n->lightmaps > size / sizeof *head->lightmaps) {
+        return fail_damaged(path, "its head", error);
+    }
+    head->lightmaps = (const part_lightmap *)(const void *)(head->bytes + sizeof *n);
+    size -= (size_t)n->lightmaps * sizeof *head->lightmaps;
+    const char *text = (const char *)(head->lightmaps + n->lightmaps);
+    if (n->words > size || n->attributes > size || n->channels > size || count_texts(n) > size) {
+        return fail_damaged(path, "its head", error);
+    }
+    const size_t count = (size_t)count_texts(n);
+    VSHI_TRY(vshi_allocate((void **)&head->texts, count, sizeof *head->texts, path, error));
+    for (size_t i = 0; i < count; ++i) {
+        const size_t length = strnlen(text, size);
+        if (length == size) {
+            return fail_damaged(path, "its head", error);
+        }
+        head->texts[i] = text;
+        text += length + 1;
+        size -= length + 1;
+    }
+    head->words = head->texts + 1;
+    head->attributes = head->words + n->words;
+    head->channels = head->attributes + 2 * n->attributes;
+    return size < ROUND ? VSH_OK : fail_damaged(path, "its head", error);
+}
+
+/* Makes the head of the job's part, or in a merge what the parts' heads should be. Free it also after an
+ * error. */
 static vsh_result make_head(const vshi_scene_bake *bake, part_head *head, vsh_error *error) {
     const vsh_occluders_info *casters = &bake->report.occluders;
-    const vshi_part_options options = options_of(bake, bake->options.shard_count);
-    const size_t count = bake->targets.count;
-    *head = (part_head){.error_count = bake->error_count,
-                        .voxel_size = casters->voxel_size,
-                        .active_voxels = casters->active_voxels,
-                        .field_bytes = casters->field_bytes,
-                        .levels = casters->levels,
-                        .has_triangles = casters->has_triangles,
-                        .layered_ao = bake->layered_ao};
+    size_t attributes;
     vshi_channels channels;
+    const char **texts = NULL;
     vsh_result result;
+    *head = (part_head){.bytes = NULL};
     VSHI_TRY_DONE(vshi_channels_name(&bake->scene, 1, 1, &channels, error));
-    VSHI_TRY_DONE(copy_channels(&channels, head, error));
-    VSHI_TRY_DONE(vshi_part_about_make(&options, &head->about, error));
-    VSHI_TRY_DONE(
-        vshi_allocate((void **)&head->lightmaps, count + 1, sizeof *head->lightmaps, "part", error));
-    for (; head->lightmap_count < count; ++head->lightmap_count) {
-        const vsh_scene_lightmap *own = &bake->lightmaps[head->lightmap_count];
-        head->lightmaps[head->lightmap_count] =
-            (part_lightmap){own->width, own->height, own->mesh_count, own->covered, own->samples};
+    vsh_provenance_attributes(bake->provenance, &attributes);
+    const head_numbers numbers = {.words = bake->options.word_count,
+                                  .attributes = attributes,
+                                  .channels = (uint64_t)channels.image.channel_count,
+                                  .lightmaps = bake->targets.count,
+                                  .errors = bake->error_count,
+                                  .active_voxels = casters->active_voxels,
+                                  .field_bytes = casters->field_bytes,
+                                  .voxel_size = casters->voxel_size,
+                                  .levels = casters->levels,
+                                  .has_triangles = casters->has_triangles,
+                                  .layered_ao = bake->layered_ao,
+                                  .shard = bake->options.shard,
+                                  .shard_count = bake->options.shard_count};
+    const size_t text_count = (size_t)count_texts(&numbers);
+    VSHI_TRY_DONE(vshi_allocate((void **)&texts, text_count, sizeof *texts, "part", error));
+    list_texts(bake, &channels, texts);
+    size_t size = sizeof numbers + bake->targets.count * sizeof(part_lightmap);
+    for (size_t i = 0; i < text_count; ++i) {
+        size += strlen(texts[i]) + 1;
     }
+    head->size = (size + ROUND - 1) / ROUND * ROUND;
+    VSHI_TRY_DONE(vshi_allocate((void **)&head->bytes, head->size, 1, "part", error));
+    unsigned char *at = append(head->bytes, &numbers, sizeof numbers);
+    for (size_t i = 0; i < bake->targets.count; ++i) {
+        const vsh_scene_lightmap *own = &bake->lightmaps[i];
+        const part_lightmap lightmap = {own->mesh_count, own->covered, own->samples, own->width, own->height};
+        at = append(at, &lightmap, sizeof lightmap);
+    }
+    for (size_t i = 0; i < text_count; ++i) {
+        at = append(at, texts[i], strlen(texts[i]) + 1);
+    }
+    result = parse_head("part", head, error);
 done:
+    free(texts);
     vshi_channels_free(&channels);
     return result;
 }
@@ -190,6 +241,11 @@ static place place_of(const vshi_scene_page *page, size_t tile) {
     return at;
 }
 
+/* Texel `k` of a tile, in rows. */
+static size_t texel_of(const vshi_scene_page *page, const place *at, size_t k) {
+    return (at->top + k / at->columns) * page->page.width + at->left + k % at->columns;
+}
+
 /* Copies the texels of a tile out of an array, or into it. Returns the bytes. */
 static size_t copy_tile(const vshi_scene_page *page, const tile_array *array, size_t tile,
                         unsigned char *bytes, bool in) {
@@ -246,6 +302,10 @@ static bool is_sound(const vshi_scene_page *page, const vshi_shots *shots, size_
     return sound;
 }
 
+static vshi_held_texels held_of(const vshi_shots *shots, size_t tile) {
+    return shots->held != NULL ? shots->held[tile] : (vshi_held_texels){NULL, 0};
+}
+
 static bool is_held_sound(const vshi_scene_page *page, const vshi_held_texel *held, size_t tile) {
     const place at = place_of(page, tile);
     const int32_t rays = vshi_field_error_rays(page->page.shade.max_error);
@@ -263,7 +323,7 @@ static vsh_result check_tile_values(const vshi_scene_page *page, size_t tile, co
     const vshi_page *p = &page->page;
     bool sound = true;
     for (size_t k = 0; k < at.columns * at.rows; ++k) {
-        const size_t texel = (at.top + k / at.columns) * p->width + at.left + k % at.columns;
+        const size_t texel = texel_of(page, &at, k);
         for (size_t i = 0; i < count; ++i) {
             VSHI_TRY(arrays[i].channel != NULL ? check_values(page, &arrays[i], texel, path, error) : VSH_OK);
         }
@@ -271,16 +331,62 @@ static vsh_result check_tile_values(const vshi_scene_page *page, size_t tile, co
                 (p->state[texel] != VSHI_TEXEL_EMPTY) == (p->mesh[texel] != 0) &&
                 is_sound(page, &p->ao, texel) && is_sound(page, &p->sky, texel);
     }
-    const vshi_shots *shots[2] = {&p->ao, &p->sky};
+    const vshi_held_texels held[2] = {held_of(&p->ao, tile), held_of(&p->sky, tile)};
     for (size_t s = 0; s < 2; ++s) {
-        for (size_t k = 0; shots[s]->held != NULL && k < shots[s]->held[tile].count; ++k) {
-            sound = sound && is_held_sound(page, &shots[s]->held[tile].list[k], tile);
+        for (size_t k = 0; k < held[s].count; ++k) {
+            sound = sound && is_held_sound(page, &held[s].list[k], tile);
         }
     }
-    return sound ? VSH_OK : vshi_part_damaged(path, "its tiles", error);
+    return sound ? VSH_OK : fail_damaged(path, "its tiles", error);
 }
 
 /* --- writing */
+
+typedef struct part_output {
+    vshi_output output;
+    FILE *file;
+    uint64_t sum;
+    int error; /* errno of the first write that failed; 0: none */
+} part_output;
+
+/* Writes a multiple of 4 bytes. finish_part() reports errors. */
+static void put(part_output *part, const void *bytes, size_t size) {
+    part->sum = vshi_part_sum(part->sum, bytes, size);
+    if (size > 0 && fwrite(bytes, size, 1, part->file) != 1 && part->error == 0) {
+        part->error = errno != 0 ? errno : EIO;
+    }
+}
+
+static vsh_result begin_part(const vshi_scene_bake *bake, const char *path, part_output *part,
+                             vsh_error *error) {
+    part_head head;
+    vsh_result result;
+    VSHI_TRY_DONE(make_head(bake, &head, error));
+    VSHI_TRY_DONE(vshi_output_begin(&part->output, path, error));
+    part->file = fopen(part->output.temporary, "wb");
+    if (part->file == NULL) {
+        result = vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", path, strerror(errno));
+        goto done;
+    }
+    const vshi_part_front front = {VSHI_PART_MAGIC, VSHI_PART_ORDER, head.size};
+    put(part, &front, sizeof front);
+    put(part, head.bytes, head.size);
+done:
+    free_head(&head);
+    return result;
+}
+
+static vsh_result finish_part(part_output *part, vsh_error *error) {
+    const uint64_t sum = part->sum;
+    put(part, &sum, sizeof sum);
+    if (fclose(part->file) != 0 && part->error == 0) {
+        part->error = errno;
+    }
+    part->file = NULL;
+    return part->error == 0 ? vshi_output_commit(&part->output, error)
+                            : vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s",
+                                        part->output.target, strerror(part->error));
+}
 
 /* The tiles of a lightmap that are the shard's; *number is of the first tile that has texels, and moves on to
  * the next lightmap's. */
@@ -298,44 +404,31 @@ static vsh_result list_tiles(const vshi_scene_bake *bake, const vsh_charts *char
     return VSH_OK;
 }
 
-static void write_held(vshi_part_output *file, const vshi_shots *shots, size_t tile) {
-    if (shots->held != NULL && shots->held[tile].count > 0) {
-        vshi_part_output_put(file, shots->held[tile].list,
-                             shots->held[tile].count * sizeof *shots->held[tile].list);
-    }
-}
-
-static uint32_t count_held(const vshi_shots *shots, size_t tile) {
-    return shots->held != NULL ? (uint32_t)shots->held[tile].count : 0;
-}
-
-static void write_tile(vshi_part_output *file, const vshi_scene_page *page, size_t tile,
-                       unsigned char *bytes) {
+static void write_tile(part_output *file, const vshi_scene_page *page, size_t tile, unsigned char *bytes) {
     const vshi_page *p = &page->page;
+    const vshi_held_texels ao = held_of(&p->ao, tile), sky = held_of(&p->sky, tile);
     const vshi_part_tile head = {
-        (uint32_t)page->index, (uint32_t)tile, {count_held(&p->ao, tile), count_held(&p->sky, tile)}};
+        (uint32_t)page->index, (uint32_t)tile, {(uint32_t)ao.count, (uint32_t)sky.count}};
     tile_array arrays[MOST_ARRAYS];
     const size_t count = list_arrays(page, arrays);
-    vshi_part_output_put(file, &head, sizeof head);
-    vshi_part_output_put(file, &p->stats[tile], sizeof *p->stats);
-    vshi_part_output_put(file, &p->errors[tile * p->error_count], p->error_count * sizeof *p->errors);
+    put(file, &head, sizeof head);
+    put(file, &p->stats[tile], sizeof *p->stats);
+    put(file, &p->errors[tile * p->error_count], p->error_count * sizeof *p->errors);
     for (size_t i = 0; i < count; ++i) {
-        vshi_part_output_put(file, bytes, copy_tile(page, &arrays[i], tile, bytes, false));
+        put(file, bytes, copy_tile(page, &arrays[i], tile, bytes, false));
     }
-    write_held(file, &p->ao, tile);
-    write_held(file, &p->sky, tile);
+    put(file, ao.list, ao.count * sizeof *ao.list);
+    put(file, sky.list, sky.count * sizeof *sky.list);
 }
 
-/* What the report counts of the part. */
+/* Adds a tile to the report. */
 static void add_tile(vshi_scene_bake *bake, const vshi_scene_page *page, size_t tile) {
     const vshi_page *p = &page->page;
-    const size_t left = tile % page->charts->sorted.columns * VSHI_TILE,
-                 top = tile / page->charts->sorted.columns * VSHI_TILE;
-    for (size_t y = top; y < top + VSHI_TILE && y < p->height; ++y) {
-        for (size_t x = left; x < left + VSHI_TILE && x < p->width; ++x) {
-            bake->report.texels += p->state[y * p->width + x] != VSHI_TEXEL_EMPTY;
-            bake->report.invalid_texels += p->state[y * p->width + x] == VSHI_TEXEL_INVALID;
-        }
+    const place at = place_of(page, tile);
+    for (size_t k = 0; k < at.columns * at.rows; ++k) {
+        const uint8_t state = p->state[texel_of(page, &at, k)];
+        bake->report.texels += state != VSHI_TEXEL_EMPTY;
+        bake->report.invalid_texels += state == VSHI_TEXEL_INVALID;
     }
     vshi_shade_stats_add(&bake->report.shade, &p->stats[tile]);
 }
@@ -351,7 +444,7 @@ static size_t count_tiles(const vshi_scene_bake *bake) {
     return count;
 }
 
-static vsh_result bake_lightmap(vshi_scene_bake *bake, size_t index, uint64_t *number, vshi_part_output *file,
+static vsh_result bake_lightmap(vshi_scene_bake *bake, size_t index, uint64_t *number, part_output *file,
                                 vshi_job *tiles_done, vsh_error *error) {
     vsh_run held = bake->run;
     vshi_store store = {.folder = NULL};
@@ -384,27 +477,12 @@ done:
     return result;
 }
 
-static vsh_result begin_part(const vshi_scene_bake *bake, const char *path, vshi_part_output *file,
-                             vsh_error *error) {
-    part_head head;
-    vshi_part_code code = {.reads = false};
-    vsh_result result;
-    VSHI_TRY_DONE(make_head(bake, &head, error));
-    vshi_part_about_code(&code, &head.about);
-    code_head(&code, &head);
-    result = vshi_part_output_begin(file, path, &code, error);
-done:
-    free_head(&head);
-    return result;
-}
-
 vsh_result vshi_bake_part(vshi_scene_bake *bake, vsh_error *error) {
-    const int32_t shards = bake->options.shard_count;
-    vshi_part_output file = {.file = NULL};
+    const size_t shards = (size_t)bake->options.shard_count;
+    part_output file = {.sum = VSHI_PART_SUM};
     uint64_t number = 0;
-    vshi_job *tiles =
-        vshi_job_begin(&bake->run, "bake", (count_tiles(bake) + (size_t)shards - 1) / (size_t)shards);
-    char *path = vshi_part_path(parts_name(bake), bake->options.shard, shards);
+    vshi_job *tiles = vshi_job_begin(&bake->run, "bake", (count_tiles(bake) + shards - 1) / shards);
+    char *path = vshi_part_path(parts_name(bake), bake->options.shard, bake->options.shard_count);
     vsh_result result;
     if (path == NULL || tiles == NULL) {
         result = vshi_fail(error, VSH_ERROR_MEMORY, "part: the system refused memory");
@@ -415,10 +493,13 @@ vsh_result vshi_bake_part(vshi_scene_bake *bake, vsh_error *error) {
         VSHI_TRY_DONE(bake_lightmap(bake, i, &number, &file, tiles, error));
     }
     const double baked = vshi_seconds();
-    result = vshi_part_output_finish(&file, error);
+    result = finish_part(&file, error);
     bake->report.write_s += vshi_seconds() - baked;
 done:
-    vshi_part_output_abandon(&file);
+    if (file.file != NULL) {
+        fclose(file.file);
+    }
+    vshi_output_abandon(&file.output);
     vshi_job_end(tiles);
     free(path);
     return result;
@@ -426,10 +507,13 @@ done:
 
 /* --- reading */
 
+enum { MOST_HEAD = 1 << 28, CHUNK = 1 << 20 }; /* bytes; read at once */
+enum { IN_MEMORY = 1 + sizeof(char *) };       /* bytes of a head's byte, which may be a text */
+
 typedef struct part {
     char *path;
     part_head head;
-    uint64_t at, end; /* of the body that is left, bytes of the file */
+    uint64_t at, end; /* of the tiles that are left, bytes of the file */
 } part;
 
 struct vshi_parts {
@@ -438,10 +522,14 @@ struct vshi_parts {
     uint64_t number; /* of the first tile of the lightmap that comes next */
 };
 
+static void free_part(part *p) {
+    free_head(&p->head);
+    free(p->path);
+}
+
 void vshi_parts_free(vshi_parts *parts) {
     for (size_t i = 0; parts != NULL && parts->list != NULL && i < parts->count; ++i) {
-        free_head(&parts->list[i].head);
-        free(parts->list[i].path);
+        free_part(&parts->list[i]);
     }
     if (parts != NULL) {
         free(parts->list);
@@ -449,65 +537,161 @@ void vshi_parts_free(vshi_parts *parts) {
     }
 }
 
-/* Reads the head, and checks that the file is what was written. */
-static vsh_result open_part(const vsh_run *run, part *p, vsh_error *error) {
-    vshi_part_input input;
+static vsh_result read_bytes(FILE *file, const char *path, void *bytes, size_t size, vsh_error *error) {
+    return size == 0 || fread(bytes, size, 1, file) == 1
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path,
+                           ferror(file) ? strerror(errno) : "it ends early");
+}
+
+/* Reads the front of a file of `size` bytes: whether it is one of ours, and its sizes are those of the file.
+ */
+static vsh_result read_front(FILE *file, const char *path, uint64_t size, vshi_part_front *front,
+                             vsh_error *error) {
+    const bool whole = size >= sizeof *front + sizeof(uint64_t);
+    *front = (vshi_part_front){.order = 0};
+    VSHI_TRY(read_bytes(file, path, front, whole ? sizeof *front : (size_t)size, error));
+    if (memcmp(front->magic, VSHI_PART_MAGIC_BEGIN, strlen(VSHI_PART_MAGIC_BEGIN)) != 0) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: is no part of a bake", path);
+    }
+    if (!whole) {
+        return fail_damaged(path, "it ends early", error);
+    }
+    if (memcmp(front->magic, VSHI_PART_MAGIC, sizeof front->magic) != 0 || front->order != VSHI_PART_ORDER) {
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "%s: is of another version of vdbshade, or of another kind of machine; bake this "
+                         "part again",
+                         path);
+    }
+    const uint64_t rest = size - sizeof *front - sizeof(uint64_t);
+    return front->head_bytes <= rest && front->head_bytes % ROUND == 0 && rest % 4 == 0
+               ? VSH_OK
+               : fail_damaged(path, "it has not the size that it tells", error);
+}
+
+/* Opens a part and reads its head, up to the tiles; *sum is that of what was read. Close the file also after
+ * an error, unless it is NULL. */
+static vsh_result open_part(part *p, const vsh_run *run, FILE **file, uint64_t *sum, vsh_error *error) {
+    uint64_t size;
+    vshi_part_front front;
+    *file = NULL;
+    VSHI_TRY(vshi_input_open(p->path, p->path, UINT64_MAX / 2, file, &size, error));
+    VSHI_TRY(read_front(*file, p->path, size, &front, error));
+    if (front.head_bytes > MOST_HEAD) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: tells %" PRIu64 " bytes of itself, at most %d", p->path,
+                         front.head_bytes, MOST_HEAD);
+    }
+    part_head *head = &p->head;
+    head->size = (size_t)front.head_bytes;
+    VSHI_TRY(vshi_check_limit(run, IN_MEMORY * (double)head->size, p->path, error));
+    VSHI_TRY(vshi_allocate((void **)&head->bytes, head->size, 1, p->path, error));
+    VSHI_TRY(read_bytes(*file, p->path, head->bytes, head->size, error));
+    *sum = vshi_part_sum(vshi_part_sum(VSHI_PART_SUM, &front, sizeof front), head->bytes, head->size);
+    p->at = sizeof front + head->size;
+    p->end = size - sizeof(uint64_t);
+    VSHI_TRY(parse_head(p->path, head, error));
+    return head->numbers.shard >= 1 && head->numbers.shard <= head->numbers.shard_count
+               ? VSH_OK
+               : fail_damaged(p->path, "its number", error);
+}
+
+/* Goes over the tiles, and checks that the file is what was written. */
+static vsh_result check_sum(const part *p, FILE *file, uint64_t sum, const vsh_run *run, vsh_error *error) {
+    unsigned char *chunk = NULL;
+    uint64_t told;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_part_input_open(p->path, run, &input, &p->head.about, error));
-    code_head(&input.head, &p->head);
-    VSHI_TRY_DONE(vshi_part_input_end_head(&input, error));
-    p->at = sizeof input.front + input.front.head_bytes;
-    p->end = p->at + input.body_bytes;
-    VSHI_TRY_DONE(vshi_part_input_check_body(&input, run, error));
+    vshi_job *job = vshi_job_begin(run, "parts", (size_t)((p->end - p->at) / CHUNK) + 1);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", p->path);
+    }
+    VSHI_TRY_DONE(vshi_allocate((void **)&chunk, CHUNK, 1, p->path, error));
+    for (uint64_t left = p->end - p->at; left > 0;) {
+        const size_t size = left < CHUNK ? (size_t)left : CHUNK;
+        VSHI_TRY_DONE(read_bytes(file, p->path, chunk, size, error));
+        sum = vshi_part_sum(sum, chunk, size);
+        left -= size;
+        VSHI_TRY_DONE(vshi_job_advance(job, 1) ? vshi_job_fail_cancelled(job, error) : VSH_OK);
+    }
+    VSHI_TRY_DONE(read_bytes(file, p->path, &told, sizeof told, error));
+    result = told == sum ? VSH_OK : fail_damaged(p->path, "its checksum does not match", error);
 done:
-    vshi_part_input_close(&input);
+    free(chunk);
+    vshi_job_end(job);
     return result;
 }
 
-static vsh_result check_lightmaps(const vshi_scene_bake *bake, const part *p, vsh_error *error) {
-    const part_head *head = &p->head;
-    if (head->lightmap_count != bake->targets.count || head->error_count != bake->error_count) {
-        return vshi_fail(error, VSH_ERROR_INPUT,
-                         "%s: is of other inputs or options: of %" PRIu64
-                         " lightmaps, not of %zu; bake this part again",
-                         p->path, head->lightmap_count, bake->targets.count);
+static vsh_result read_part(part *p, const vsh_run *run, vsh_error *error) {
+    FILE *file;
+    uint64_t sum = 0;
+    vsh_result result = open_part(p, run, &file, &sum, error);
+    result = result == VSH_OK ? check_sum(p, file, sum, run, error) : result;
+    if (file != NULL) {
+        fclose(file);
     }
-    for (size_t i = 0; i < bake->targets.count; ++i) {
-        const vsh_scene_lightmap *own = &bake->lightmaps[i];
-        const part_lightmap *lightmap = &head->lightmaps[i];
-        if (lightmap->width != own->width || lightmap->height != own->height ||
-            lightmap->mesh_count != own->mesh_count || lightmap->covered != own->covered ||
-            lightmap->samples != own->samples) {
-            return vshi_fail(
-                error, VSH_ERROR_INPUT,
-                "%s: is of other inputs or options: its lightmap %s is of %d × %d texels, %" PRIu64
-                " of them covered, not of %d × %d and %" PRIu64 "; bake this part again",
-                p->path, own->output, lightmap->width, lightmap->height, lightmap->covered, own->width,
-                own->height, own->covered);
+    return result;
+}
+
+/* --- parts that belong together */
+
+/* VSH_ERROR_INPUT: something that tells of inputs or options is not as in the other parts, or here. */
+static vsh_result refuse(const char *path, const char *what, const char *theirs, const char *ours,
+                         vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_INPUT,
+                     "%s: is of other inputs or options: its %s is '%.160s', of the others or here '%.160s'; "
+                     "bake this part again",
+                     path, what, theirs, ours);
+}
+
+static vsh_result check_attributes(const part *p, const part_head *own, vsh_error *error) {
+    const uint64_t count = own->numbers.attributes, theirs = p->head.numbers.attributes;
+    for (uint64_t i = 0; i < count || i < theirs; ++i) {
+        const char *const *a = i < theirs ? p->head.attributes + 2 * i : NULL;
+        const char *const *b = i < count ? own->attributes + 2 * i : NULL;
+        if (a == NULL || b == NULL || strcmp(a[0], b[0]) != 0 || strcmp(a[1], b[1]) != 0) {
+            return refuse(p->path, b != NULL ? b[0] : a[0], a != NULL ? a[1] : "", b != NULL ? b[1] : "",
+                          error);
         }
     }
     return VSH_OK;
 }
 
-static vsh_result check_channels(const vshi_scene_bake *bake, const part *p, vsh_error *error) {
-    vshi_channels channels;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_channels_name(&bake->scene, 1, 1, &channels, error));
-    const bool same = (uint64_t)channels.image.channel_count == p->head.channel_count;
-    for (int32_t c = 0; c < channels.image.channel_count && result == VSH_OK; ++c) {
-        if (!same || strcmp(channels.names[c], p->head.channels[c]) != 0) {
-            result = vshi_part_refuse(p->path, "channel", same ? p->head.channels[c] : "another",
-                                      channels.names[c], error);
+static vsh_result check_lightmaps(const vshi_scene_bake *bake, const part *p, const part_head *own,
+                                  vsh_error *error) {
+    const head_numbers *n = &p->head.numbers;
+    if (n->lightmaps != own->numbers.lightmaps || n->errors != own->numbers.errors) {
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "%s: is of other inputs or options: of %" PRIu64 " lightmaps, not of %" PRIu64
+                         "; bake this part again",
+                         p->path, n->lightmaps, own->numbers.lightmaps);
+    }
+    for (uint64_t i = 0; i < n->lightmaps; ++i) {
+        const part_lightmap *theirs = &p->head.lightmaps[i], *ours = &own->lightmaps[i];
+        if (memcmp(theirs, ours, sizeof *ours) != 0) {
+            return vshi_fail(
+                error, VSH_ERROR_INPUT,
+                "%s: is of other inputs or options: its lightmap %s is of %d × %d texels, %" PRIu64
+                " of them covered, not of %d × %d and %" PRIu64 "; bake this part again",
+                p->path, bake->lightmaps[i].output, theirs->width, theirs->height, theirs->covered,
+                ours->width, ours->height, ours->covered);
         }
     }
-done:
-    vshi_channels_free(&channels);
-    return result;
+    return VSH_OK;
 }
 
-/* What casts is the same for all of them, and told of by the first. */
-static vsh_result check_casters(const part *p, const part *first, vsh_error *error) {
-    const part_head *a = &p->head, *b = &first->head;
+static vsh_result check_channels(const part *p, const part_head *own, vsh_error *error) {
+    const bool same = p->head.numbers.channels == own->numbers.channels;
+    for (uint64_t c = 0; c < own->numbers.channels; ++c) {
+        if (!same || strcmp(own->channels[c], p->head.channels[c]) != 0) {
+            return refuse(p->path, "channel", same ? p->head.channels[c] : "another", own->channels[c],
+                          error);
+        }
+    }
+    return VSH_OK;
+}
+
+/* The casters are the same for all parts, and described by the first. */
+static vsh_result check_casters(const part *p, const part_head *own, vsh_error *error) {
+    const head_numbers *a = &p->head.numbers, *b = &own->numbers;
     if (a->voxel_size == b->voxel_size && a->has_triangles == b->has_triangles &&
         a->active_voxels == b->active_voxels && a->levels == b->levels && a->layered_ao == b->layered_ao) {
         return VSH_OK;
@@ -515,28 +699,37 @@ static vsh_result check_casters(const part *p, const part *first, vsh_error *err
     char theirs[64], ours[64];
     snprintf(theirs, sizeof theirs, "%.9g, %" PRIu64 " of them", a->voxel_size, a->active_voxels);
     snprintf(ours, sizeof ours, "%.9g, %" PRIu64 " of them", b->voxel_size, b->active_voxels);
-    return vshi_part_refuse(p->path, "voxel size", theirs, ours, error);
+    return refuse(p->path, "voxel size", theirs, ours, error);
 }
 
-/* Checks that a part is of the job's inputs, and of the first one's casters. */
-static vsh_result check_part(const vshi_scene_bake *bake, const part *p, const part *first, int32_t shard,
+/* Checks that a part is of the job's inputs, and of the first one's casters: `own` is what its head should
+ * be. */
+static vsh_result check_part(const vshi_scene_bake *bake, const part *p, const part_head *own, int32_t shard,
                              int32_t count, vsh_error *error) {
-    const vshi_part_options own = options_of(bake, count);
-    VSHI_TRY(vshi_part_about_check(&p->head.about, p->path, shard, &own, error));
-    VSHI_TRY(check_lightmaps(bake, p, error));
-    VSHI_TRY(check_channels(bake, p, error));
-    return check_casters(p, first, error);
+    const head_numbers *n = &p->head.numbers;
+    if (strcmp(p->head.texts[0], VSHI_VERSION) != 0) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: is of vdbshade %.32s, this is %s; bake this part again",
+                         p->path, p->head.texts[0], VSHI_VERSION);
+    }
+    if (n->shard != shard || n->shard_count != count) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: holds part %d of %d; was it renamed?", p->path,
+                         n->shard, n->shard_count);
+    }
+    VSHI_TRY(check_attributes(p, own, error));
+    VSHI_TRY(check_lightmaps(bake, p, own, error));
+    VSHI_TRY(check_channels(p, own, error));
+    return check_casters(p, own, error);
 }
 
-/* What the report tells of casters, which are not made. */
-static vsh_result take_casters(vshi_scene_bake *bake, const part_head *head, vsh_error *error) {
+/* Reports the casters of the parts, which are not made. */
+static vsh_result report_casters(vshi_scene_bake *bake, const head_numbers *n, vsh_error *error) {
     vsh_occluders_info *casters = &bake->report.occluders;
-    casters->voxel_size = head->voxel_size;
-    casters->has_triangles = head->has_triangles;
-    casters->active_voxels = head->active_voxels;
-    casters->field_bytes = head->field_bytes;
-    casters->levels = head->levels;
-    bake->layered_ao = head->layered_ao != 0;
+    casters->voxel_size = n->voxel_size;
+    casters->has_triangles = n->has_triangles;
+    casters->active_voxels = n->active_voxels;
+    casters->field_bytes = n->field_bytes;
+    casters->levels = n->levels;
+    bake->layered_ao = n->layered_ao != 0;
     return vshi_bake_find_provenance(bake, error);
 }
 
@@ -551,23 +744,92 @@ vsh_result vshi_parts_find(const vshi_scene_bake *bake, int32_t *count, vsh_erro
 vsh_result vshi_parts_open(vshi_scene_bake *bake, int32_t count, vsh_error *error) {
     const double start = vshi_seconds();
     const char *name = parts_name(bake);
+    part_head own = {.bytes = NULL};
     vshi_parts *parts = NULL;
-    VSHI_TRY(vshi_allocate((void **)&parts, 1, sizeof *parts, "parts", error));
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&parts, 1, sizeof *parts, "parts", error));
     bake->parts = parts;
     parts->count = (size_t)count;
-    VSHI_TRY(vshi_allocate((void **)&parts->list, parts->count, sizeof *parts->list, "parts", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&parts->list, parts->count, sizeof *parts->list, "parts", error));
     for (int32_t i = 0; i < count; ++i) {
         part *p = &parts->list[i];
         p->path = vshi_part_path(name, i + 1, count);
         if (p->path == NULL) {
-            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", name);
+            result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", name);
+            goto done;
         }
-        VSHI_TRY(open_part(&bake->run, p, error));
-        VSHI_TRY(i == 0 ? take_casters(bake, &p->head, error) : VSH_OK);
-        VSHI_TRY(check_part(bake, p, &parts->list[0], i + 1, count, error));
+        VSHI_TRY_DONE(read_part(p, &bake->run, error));
+        if (i == 0) {
+            VSHI_TRY_DONE(report_casters(bake, &p->head.numbers, error));
+            VSHI_TRY_DONE(make_head(bake, &own, error));
+        }
+        VSHI_TRY_DONE(check_part(bake, p, &own, i + 1, count, error));
     }
     bake->report.load_s += vshi_seconds() - start;
+done:
+    free_head(&own);
+    return result;
+}
+
+/* --- words of a part */
+
+/* Copies the words into one block: their list with a NULL at its end, then the texts. */
+static vsh_result copy_words(const part *p, char ***words, vsh_error *error) {
+    const size_t count = (size_t)p->head.numbers.words;
+    size_t texts = 0;
+    for (size_t i = 0; i < count; ++i) {
+        texts += strlen(p->head.words[i]) + 1;
+    }
+    VSHI_TRY(vshi_allocate((void **)words, (count + 1) * sizeof **words + texts, 1, p->path, error));
+    char *text = (char *)(*words + count + 1);
+    for (size_t i = 0; i < count; ++i) {
+        (*words)[i] = text;
+        text = stpcpy(text, p->head.words[i]) + 1;
+    }
     return VSH_OK;
+}
+
+vsh_result vsh_part_words(const char *parts, int32_t shard_count, const vsh_run *run, char ***words,
+                          size_t *count, vsh_error *error) {
+    VSHI_NEEDS(words);
+    VSHI_NEEDS(count);
+    *words = NULL;
+    *count = 0;
+    VSHI_NEEDS(parts);
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    if (shard_count < 0 || shard_count > VSHI_MOST_SHARDS) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "shard_count %d: expected 0 to %d", shard_count,
+                         VSHI_MOST_SHARDS);
+    }
+    part p = {.path = NULL};
+    FILE *file;
+    uint64_t sum;
+    VSHI_TRY(vshi_parts_first(parts, shard_count, &p.path, error));
+    vsh_result result = open_part(&p, &full, &file, &sum, error);
+    result = result == VSH_OK ? copy_words(&p, words, error) : result;
+    *count = result == VSH_OK ? (size_t)p.head.numbers.words : 0;
+    if (file != NULL) {
+        fclose(file);
+    }
+    free_part(&p);
+    return result;
+}
+
+void vsh_part_words_free(char **words) {
+    free(words);
+}
+
+/* Opens a part at its next tile. */
+static vsh_result reopen(const part *p, FILE **file, vsh_error *error) {
+    uint64_t size;
+    VSHI_TRY(vshi_input_open(p->path, p->path, UINT64_MAX / 2, file, &size, error));
+    if (fseeko(*file, (off_t)p->at, SEEK_SET) == 0) {
+        return VSH_OK;
+    }
+    const int why = errno;
+    fclose(*file);
+    return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", p->path, strerror(why));
 }
 
 /* --- reading tiles */
@@ -582,10 +844,10 @@ typedef struct taking {
 
 static vsh_result take_bytes(const taking *t, void *bytes, size_t size, vsh_error *error) {
     if (size > t->part->end - t->part->at) {
-        return vshi_part_damaged(t->part->path, "its tiles", error);
+        return fail_damaged(t->part->path, "its tiles", error);
     }
     t->part->at += size;
-    return vshi_part_read_bytes(t->file, t->part->path, bytes, size, error);
+    return read_bytes(t->file, t->part->path, bytes, size, error);
 }
 
 static vsh_result take_held(const taking *t, vshi_shots *shots, size_t tile, uint32_t count,
@@ -594,7 +856,7 @@ static vsh_result take_held(const taking *t, vshi_shots *shots, size_t tile, uin
         return VSH_OK;
     }
     if (shots->held == NULL || shots->held[tile].list != NULL || count > VSHI_TILE * VSHI_TILE) {
-        return vshi_part_damaged(t->part->path, "its tiles", error);
+        return fail_damaged(t->part->path, "its tiles", error);
     }
     vshi_held_texels *held = &shots->held[tile];
     VSHI_TRY(vshi_allocate((void **)&held->list, count, sizeof *held->list, t->part->path, error));
@@ -629,11 +891,10 @@ static vsh_result take_part(const taking *t, uint32_t *owner, uint32_t shard, vs
         VSHI_TRY(take_bytes(t, &head, sizeof head, error));
         if (head.lightmap != t->page->index) {
             t->part->at -= sizeof head;
-            return head.lightmap > t->page->index ? VSH_OK
-                                                  : vshi_part_damaged(t->part->path, "its tiles", error);
+            return head.lightmap > t->page->index ? VSH_OK : fail_damaged(t->part->path, "its tiles", error);
         }
         if (head.tile >= tiles || owner[head.tile] != shard + 1) {
-            return vshi_part_damaged(t->part->path, "its tiles", error);
+            return fail_damaged(t->part->path, "its tiles", error);
         }
         owner[head.tile] |= TAKEN;
         VSHI_TRY(take_tile(t, &head, error));
@@ -677,14 +938,14 @@ static vsh_result take_all(vshi_parts *parts, vshi_scene_page *page, uint32_t *o
     }
     for (size_t i = 0; i < parts->count; ++i) {
         taking t = {.part = &parts->list[i], .page = page, .bytes = bytes};
-        VSHI_TRY(vshi_part_reopen(t.part->path, t.part->at, &t.file, error));
+        VSHI_TRY(reopen(t.part, &t.file, error));
         const vsh_result result = take_part(&t, owner, (uint32_t)i, job, error);
         fclose(t.file);
         VSHI_TRY(result);
     }
     for (size_t tile = 0; tile < tiles; ++tile) {
         if (owner[tile] != 0 && (owner[tile] & TAKEN) == 0) {
-            return vshi_part_damaged(parts->list[owner[tile] - 1].path, "a tile is missing", error);
+            return fail_damaged(parts->list[owner[tile] - 1].path, "a tile is missing", error);
         }
     }
     checking c = {.parts = parts, .page = page, .owner = owner, .failed = SIZE_MAX};

@@ -1,12 +1,16 @@
-#include "bake_scene/target.h"
+/* The lightmaps of a job, and the names of their files and of its parts. */
+#include "bake_scene/parts.h"
 
 #include "base/try.h"
 #include "base/utf8.h"
 
+#include <dirent.h>
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <unistd.h>
 #include <vdbshade/lit.h>
 
 enum {
@@ -84,7 +88,8 @@ static char *mark_output(const char *output, const char *mark) {
     return marked;
 }
 
-char *vshi_object_output(const char *output, const char *object) {
+/* FILE.OBJECT.exr for FILE.exr, or with the object's name in place of "%s". */
+static char *object_output(const char *output, const char *object) {
     const char *at = find_place(output);
     if (at == NULL) {
         return mark_output(output, object);
@@ -97,15 +102,16 @@ char *vshi_object_output(const char *output, const char *object) {
     return filled;
 }
 
-char *vshi_page_output(const char *output, size_t page) {
+/* FILE.PAGE.exr for FILE.exr. */
+static char *page_output(const char *output, size_t page) {
     char number[24];
     snprintf(number, sizeof number, "%zu", page);
     return mark_output(output, number);
 }
 
 char *vshi_target_file(const vshi_target *target, size_t pages, const char *file) {
-    return target->object != NULL ? vshi_object_output(file, target->object)
-           : pages > 1            ? vshi_page_output(file, target->page)
+    return target->object != NULL ? object_output(file, target->object)
+           : pages > 1            ? page_output(file, target->page)
                                   : strdup(file);
 }
 
@@ -161,36 +167,27 @@ static vsh_result add_pages(vshi_targets *t, const vsh_scene *scene, size_t inde
     const vsh_receiver *receiver = &scene->receivers[index];
     const size_t pages = vsh_assets_receiver_pages(assets, index), *numbers;
     const bool unwrapped = vsh_assets_receiver_atlas(assets, index, &numbers) != NULL;
-    const bool image = receiver->output != NULL && !vsh_lit_is_output(receiver->output);
+    const bool lit = vsh_lit_is_output(receiver->output) != 0;
+    if (lit && pages > MOST_LIT_PAGES) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu lightmaps, an asset has at most %d",
+                         receiver->output, pages, MOST_LIT_PAGES);
+    }
     for (size_t page = 0; page < pages; ++page) {
-        size_t first, count;
+        size_t first;
         vsh_receiver_page info;
+        vshi_target *target = &t->list[t->count++];
         vsh_assets_receiver_page_info(assets, index, page, &info);
-        const vsh_mesh *meshes = vsh_assets_receiver_page(assets, index, page, &first, &count);
-        vshi_target *target = &t->list[t->count];
-        const bool own = info.object != NULL, named = image && (own || pages > 1);
         *target = (vshi_target){.receiver = *receiver, .index = index, .page = page, .unwrapped = unwrapped};
-        ++t->count;
         target->receiver.width = info.width;
         target->receiver.height = info.height;
-        target->meshes = meshes;
-        target->mesh_count = count;
-        if (own) {
-            target->object = unique_name(t, scene, info.object);
-        }
-        if (named) {
-            target->output = own && target->object != NULL
-                                 ? vshi_object_output(receiver->output, target->object)
-                                 : vshi_page_output(receiver->output, page);
-            target->receiver.output = target->output;
-        }
-        if (vsh_lit_is_output(receiver->output) && page >= MOST_LIT_PAGES) {
-            return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu lightmaps, an asset has at most %d",
-                             receiver->output, pages, MOST_LIT_PAGES);
-        }
-        if ((own && target->object == NULL) || (named && target->output == NULL)) {
+        target->meshes = vsh_assets_receiver_page(assets, index, page, &first, &target->mesh_count);
+        target->object = info.object != NULL ? unique_name(t, scene, info.object) : NULL;
+        target->output = receiver->output != NULL ? vshi_target_file(target, pages, receiver->output) : NULL;
+        if ((info.object != NULL && target->object == NULL) ||
+            (receiver->output != NULL && target->output == NULL)) {
             return refuse_memory(error);
         }
+        target->receiver.output = lit ? receiver->output : target->output;
         VSHI_TRY(finish(target, run, error));
     }
     return VSH_OK;
@@ -229,4 +226,101 @@ vsh_image_options vshi_receiver_image(const vsh_receiver *receiver) {
     options.pack = receiver->pack;
     options.color_space = receiver->color_space;
     return options;
+}
+
+/* --- files of parts */
+
+enum { MOST_NAMED = 6 }; /* parts that are missing */
+
+char *vshi_part_path(const char *parts, int32_t shard, int32_t count) {
+    static const char *const form = "%s.%d-of-%d.part";
+    const int length = snprintf(NULL, 0, form, parts, shard, count);
+    char *path = length > 0 ? malloc((size_t)length + 1) : NULL;
+    if (path != NULL) {
+        snprintf(path, (size_t)length + 1, form, parts, shard, count);
+    }
+    return path;
+}
+
+/* N of "NAME.I-of-N.part"; 0: it is no such name. */
+static int32_t count_of_name(const char *entry, const char *name) {
+    const size_t length = strlen(name);
+    int shard = 0, count = 0, used = 0;
+    if (strncmp(entry, name, length) != 0 || entry[length] != '.' ||
+        sscanf(entry + length, ".%5d-of-%5d.part%n", &shard, &count, &used) != 2 || used == 0 ||
+        entry[length + (size_t)used] != '\0') {
+        return 0;
+    }
+    return shard >= 1 && shard <= count && count <= VSHI_MOST_SHARDS ? count : 0;
+}
+
+vsh_result vshi_parts_count(const char *parts, int32_t *count, vsh_error *error) {
+    *count = 0;
+    const char *slash = strrchr(parts, '/');
+    char *folder = slash == NULL ? strdup(".") : strndup(parts, slash == parts ? 1 : (size_t)(slash - parts));
+    if (folder == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", parts);
+    }
+    DIR *open = opendir(folder);
+    free(folder);
+    if (open == NULL) {
+        return vshi_fail(error, VSH_ERROR_READ, "%s: its folder cannot be read: %s", parts, strerror(errno));
+    }
+    int32_t other = 0;
+    for (const struct dirent *entry; (entry = readdir(open)) != NULL;) {
+        const int32_t found = count_of_name(entry->d_name, slash != NULL ? slash + 1 : parts);
+        other = found != 0 && *count != 0 && found != *count ? found : other;
+        *count = found != 0 && *count == 0 ? found : *count;
+    }
+    closedir(open);
+    if (other != 0) {
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "%s: there are parts of %d and of %d shards beside it; say which, by their number",
+                         parts, *count < other ? *count : other, *count < other ? other : *count);
+    }
+    return *count != 0
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_INPUT,
+                           "%s: there are no parts beside it, %s.1-of-N.part and so on", parts, parts);
+}
+
+vsh_result vshi_parts_check_there(const char *name, int32_t count, vsh_error *error) {
+    char list[256] = "";
+    size_t at = 0;
+    int32_t missing = 0;
+    for (int32_t i = 1; i <= count; ++i) {
+        char *path = vshi_part_path(name, i, count);
+        if (path == NULL) {
+            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", name);
+        }
+        if (access(path, F_OK) != 0 && ++missing <= MOST_NAMED && at < sizeof list) {
+            at += (size_t)snprintf(list + at, sizeof list - at, "%s%d", missing > 1 ? ", " : "", i);
+        }
+        free(path);
+    }
+    if (missing == 0) {
+        return VSH_OK;
+    }
+    if (missing > MOST_NAMED && at < sizeof list) {
+        snprintf(list + at, sizeof list - at, " and %d more", missing - MOST_NAMED);
+    }
+    return vshi_fail(error, VSH_ERROR_READ, "%s: %s missing: %s of %d; bake %s by --shard I/%d", name,
+                     missing == 1 ? "a part is" : "parts are", list, count, missing == 1 ? "it" : "them",
+                     count);
+}
+
+vsh_result vshi_parts_first(const char *parts, int32_t shard_count, char **path, vsh_error *error) {
+    *path = NULL;
+    if (shard_count == 0) {
+        VSHI_TRY(vshi_parts_count(parts, &shard_count, error));
+    }
+    for (int32_t i = 1; i <= shard_count; ++i) {
+        *path = vshi_part_path(parts, i, shard_count);
+        if (*path == NULL || i == shard_count || access(*path, F_OK) == 0) {
+            break;
+        }
+        free(*path);
+    }
+    return *path != NULL ? VSH_OK
+                         : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", parts);
 }

@@ -137,7 +137,8 @@ typedef struct vshi_key {
     int32_t names;         /* VSH_NAMES_…, if name_of is NULL */
     vshi_name_fn *name_of; /* other names */
     vshi_read_fn *read;
-    void (*then)(void *target); /* after it was read: what else follows for the struct; may be NULL */
+    size_t flag;                /* offset of an int32_t that becomes 1 when the key is read; 0: none */
+    void (*then)(void *target); /* what else follows for the struct when the key was read; may be NULL */
     vshi_option option;
 } vshi_key;
 

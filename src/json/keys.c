@@ -208,6 +208,16 @@ static vsh_result fail_unknown(const vshi_json *reader, const vshi_value *member
     return vshi_json_fail_key(reader, member, "unknown key");
 }
 
+/* Does what follows for the struct when a key was read. */
+static void finish_key(const vshi_key *key, void *target) {
+    if (key->flag > 0) {
+        *(int32_t *)(void *)((char *)target + key->flag) = 1;
+    }
+    if (key->then != NULL) {
+        key->then(target);
+    }
+}
+
 vsh_result vshi_read_object(vshi_json *reader, const vshi_value *object, const vshi_table *table,
                             uint32_t variant, const char *what, void *target) {
     VSHI_TRY(vshi_expect(reader, object, JSON_OBJECT));
@@ -224,9 +234,7 @@ vsh_result vshi_read_object(vshi_json *reader, const vshi_value *object, const v
             return fail_unknown(reader, &member, table, variant, what);
         }
         VSHI_TRY(vshi_read_value(reader, &member, key, (char *)target + key->offset));
-        if (key->then != NULL) {
-            key->then(target);
-        }
+        finish_key(key, target);
     }
     for (size_t k = 0; k < table->key_count; ++k) {
         const vshi_key *key = &table->keys[k];
@@ -395,8 +403,6 @@ vsh_result vshi_read_text(const vshi_key *key, const char *name, const char *tex
         return vshi_fail(error, VSH_ERROR_INPUT, "%.64s '%.200s': expected %s", name,
                          text != NULL ? text : "", expected);
     }
-    if (key->then != NULL) {
-        key->then(target);
-    }
+    finish_key(key, target);
     return VSH_OK;
 }

@@ -1,8 +1,11 @@
-/* From a scene's casters to one level set. */
+/* From a scene's casters to one level set, and to what rays meet. */
 #include "base/floats.h"
 #include "base/similarity.h"
+#include "field/surface.h"
 #include "scene/occluders.h"
+#include "shade/resolution.h"
 #include "spheres/spheres.h"
+#include "trace/embree.h"
 
 #include "base/job.h"
 #include "base/memory.h"
@@ -11,6 +14,36 @@
 
 #include <stdlib.h>
 #include <string.h>
+
+/* --- which casters */
+
+typedef enum choice { ALL, VOXELISED, OF_LAYER, ONE } choice;
+
+/* Casters of a scene: all, all that have voxels, or of these those in `layer`, or (NULL) in none; or one. */
+typedef struct chosen {
+    const vsh_scene *scene;
+    const vsh_assets *assets;
+    choice choice;
+    const vsh_scene_layer *layer;
+    size_t one;
+} chosen;
+
+static bool takes(const chosen *of, size_t i) {
+    const vsh_caster *caster = &of->scene->casters[i];
+    return of->choice == ALL || (of->choice == ONE && i == of->one) ||
+           (of->choice == VOXELISED && !vshi_caster_is_direct(of->scene, caster)) ||
+           (of->choice == OF_LAYER && vshi_caster_has_voxels(of->scene, caster, of->layer));
+}
+
+static size_t count_taken(const chosen *of) {
+    size_t count = 0;
+    for (size_t i = 0; i < of->scene->caster_count; ++i) {
+        count += takes(of, i);
+    }
+    return count;
+}
+
+/* --- one level set */
 
 /* Of a scene and on the way from it: measured with 65,536 of one node, what is left of their text included.
  */
@@ -25,15 +58,9 @@ typedef struct placed_sdf {
     const double *transform; /* of the grid's instance; NULL for a folded tree */
 } placed_sdf;
 
-#define ALL SIZE_MAX
-
 /* What is gathered on the way to one grid. */
 typedef struct assembly {
-    const vsh_scene *scene;
-    const vsh_assets *assets;
-    size_t only;  /* the caster that is taken alone, or ALL: those that have voxels */
-    bool layered; /* of these, those in `layer`, or (NULL) in none */
-    const vsh_scene_layer *layer;
+    chosen of;
     vsh_mesh *meshes; /* [mesh_count]: those of all casters */
     size_t mesh_count;
     placed_sdf *sdfs; /* [caster_count]; zero for casters that are none */
@@ -43,23 +70,6 @@ typedef struct assembly {
     size_t made_count;
     vsh_grid_options options;
 } assembly;
-
-static bool takes(const assembly *a, size_t i) {
-    const vsh_caster *caster = &a->scene->casters[i];
-    if (a->only != ALL) {
-        return i == a->only;
-    }
-    return (!a->layered || vshi_caster_in_layer(caster, a->layer)) &&
-           !vshi_caster_is_direct(a->scene, caster);
-}
-
-static size_t count_taken(const assembly *a) {
-    size_t count = 0;
-    for (size_t i = 0; i < a->scene->caster_count; ++i) {
-        count += takes(a, i);
-    }
-    return count;
-}
 
 static vsh_result place_sdf(const vsh_caster *caster, placed_sdf *placed, vsh_error *error) {
     const double *m = caster->transform;
@@ -89,7 +99,7 @@ static vsh_result place_sdf(const vsh_caster *caster, placed_sdf *placed, vsh_er
 }
 
 static vsh_result allocate_assembly(assembly *a, vsh_error *error) {
-    const size_t casters = a->scene->caster_count, meshes = vshi_assets_mesh_count(a->assets);
+    const size_t casters = a->of.scene->caster_count, meshes = vshi_assets_mesh_count(a->of.assets);
     VSHI_TRY(vshi_allocate((void **)&a->meshes, meshes, sizeof *a->meshes, "meshes", error));
     VSHI_TRY(vshi_allocate((void **)&a->sdfs, casters, sizeof *a->sdfs, "casters", error));
     VSHI_TRY(vshi_allocate((void **)&a->instances, casters + 1, sizeof *a->instances, "casters", error));
@@ -105,8 +115,8 @@ static const char *name_rigid(const vsh_caster *caster) {
 }
 
 static vsh_result gather_caster(assembly *a, size_t i, vsh_error *error) {
-    const vsh_caster *caster = &a->scene->casters[i];
-    const vshi_asset_place *place = vshi_assets_caster(a->assets, i);
+    const vsh_caster *caster = &a->of.scene->casters[i];
+    const vshi_asset_place *place = vshi_assets_caster(a->of.assets, i);
     const char *rigid = name_rigid(caster);
     const bool vdb = caster->type == VSH_CASTER_VDB;
     if (caster->type == VSH_CASTER_SDF) {
@@ -132,8 +142,8 @@ static vsh_result gather_caster(assembly *a, size_t i, vsh_error *error) {
 }
 
 static vsh_result gather(assembly *a, vsh_error *error) {
-    for (size_t i = 0; i < a->scene->caster_count; ++i) {
-        if (takes(a, i)) {
+    for (size_t i = 0; i < a->of.scene->caster_count; ++i) {
+        if (takes(&a->of, i)) {
             VSHI_TRY(gather_caster(a, i, error));
         }
     }
@@ -168,7 +178,7 @@ static vsh_result take_own_voxels(assembly *a, double finest, vsh_error *error) 
                          "resolution 0: no caster is a level set, whose voxel size it stands for");
     }
     a->options.resolution = vsh_grid_options_default().resolution; /* not looked at */
-    a->options.voxel_size = count_taken(a) > 1 ? finest : 0.0;
+    a->options.voxel_size = count_taken(&a->of) > 1 ? finest : 0.0;
     return VSH_OK;
 }
 
@@ -180,10 +190,10 @@ static vsh_result choose_voxel_size(assembly *a, vsh_error *error) {
         const vsh_mesh_report *report = &a->meshes[i].checked->report;
         grow_box(&all, report->bounds_min, report->bounds_max, NULL);
     }
-    for (size_t i = 0; i < a->scene->caster_count; ++i) {
-        const vsh_caster *caster = &a->scene->casters[i];
-        const vshi_asset_place *place = vshi_assets_caster(a->assets, i);
-        if (!takes(a, i)) {
+    for (size_t i = 0; i < a->of.scene->caster_count; ++i) {
+        const vsh_caster *caster = &a->of.scene->casters[i];
+        const vshi_asset_place *place = vshi_assets_caster(a->of.assets, i);
+        if (!takes(&a->of, i)) {
             continue;
         }
         if (caster->type == VSH_CASTER_SDF) {
@@ -226,13 +236,13 @@ static vsh_result choose_voxel_size(assembly *a, vsh_error *error) {
 /* Warns of level sets whose voxels become others, where values are marched through these. */
 static void warn_resampled(const assembly *a, const vsh_run *run) {
     static const double SAME = 1e-4;
-    for (size_t i = 0; i < a->scene->caster_count && vsh_scene_marches(a->scene, a->layer); ++i) {
-        const vsh_caster *caster = &a->scene->casters[i];
-        if (!takes(a, i) || caster->type != VSH_CASTER_VDB || a->options.voxel_size == 0.0) {
+    for (size_t i = 0; i < a->of.scene->caster_count && vsh_scene_marches(a->of.scene, a->of.layer); ++i) {
+        const vsh_caster *caster = &a->of.scene->casters[i];
+        if (!takes(&a->of, i) || caster->type != VSH_CASTER_VDB || a->options.voxel_size == 0.0) {
             continue;
         }
         vsh_grid_info info;
-        vsh_grid_get_info(vshi_assets_caster(a->assets, i)->grid, &info);
+        vsh_grid_get_info(vshi_assets_caster(a->of.assets, i)->grid, &info);
         const double own = info.voxel_size * vshi_similarity_scale(caster->transform);
         if (fabs(own - a->options.voxel_size) > SAME * own) {
             vshi_warn(run, "%s: its voxels of %g are resampled to %g; --resolution 0 keeps them",
@@ -277,8 +287,8 @@ static vsh_result voxelise_spheres(assembly *a, const vsh_spheres *spheres, vsh_
 
 /* The limit of memory is that of all the grids together: run->memory_held grows by each. */
 static vsh_result make_grid(assembly *a, size_t i, vsh_run *run, vsh_error *error) {
-    const vsh_caster *caster = &a->scene->casters[i];
-    const vshi_asset_place *place = vshi_assets_caster(a->assets, i);
+    const vsh_caster *caster = &a->of.scene->casters[i];
+    const vshi_asset_place *place = vshi_assets_caster(a->of.assets, i);
     vsh_grid **made = &a->made[a->made_count];
     if (caster->type == VSH_CASTER_VDB) {
         add_instance(a, place->grid, caster->transform);
@@ -304,8 +314,8 @@ static vsh_result make_grids(assembly *a, vsh_run *run, vsh_error *error) {
         VSHI_TRY(vsh_grid_from_meshes(a->meshes, a->mesh_count, &a->options, run, made, error));
         VSHI_TRY(add_made(a, NULL, run, error));
     }
-    for (size_t i = 0; i < a->scene->caster_count; ++i) {
-        if (takes(a, i)) {
+    for (size_t i = 0; i < a->of.scene->caster_count; ++i) {
+        if (takes(&a->of, i)) {
             VSHI_TRY(make_grid(a, i, run, error));
         }
     }
@@ -325,7 +335,7 @@ static void free_assembly(assembly *a) {
     while (a->made_count > 0) {
         vsh_grid_free(a->made[--a->made_count]);
     }
-    for (size_t i = 0; a->sdfs != NULL && i < a->scene->caster_count; ++i) {
+    for (size_t i = 0; a->sdfs != NULL && i < a->of.scene->caster_count; ++i) {
         free(a->sdfs[i].nodes);
     }
     free(a->made);
@@ -334,15 +344,28 @@ static void free_assembly(assembly *a) {
     free(a->meshes);
 }
 
-/* The union of the casters that are taken, with these options over the defaults. */
-static vsh_result assemble(assembly a, const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
-                           vsh_error *error) {
+/* How a layer's casters, or (NULL) those in none, are voxelised. */
+static vsh_grid_options choose_grid_options(const vsh_scene *scene, const vsh_scene_layer *layer) {
+    vsh_grid_options options = scene->grid;
+    if (vshi_scene_keeps_voxels(scene, layer)) {
+        options.resolution = 0;
+    }
+    if (layer != NULL && (layer->voxel_size != 0.0 || layer->resolution != 0)) {
+        options.voxel_size = layer->voxel_size;
+        options.resolution = layer->resolution;
+    }
+    return options;
+}
+
+/* The union of the casters that are chosen, with these options over the defaults. */
+static vsh_result assemble(const chosen *of, const vsh_grid_options *options, const vsh_run *run,
+                           vsh_grid **grid, vsh_error *error) {
+    assembly a = {.of = *of, .options = vsh_grid_options_default()};
     vsh_run full;
-    a.options = vsh_grid_options_default();
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     VSHI_TRY(vshi_options_resolve(options, &a.options, sizeof a.options, "vsh_grid_options", error));
     vsh_result result;
-    full.memory_held += a.scene->caster_count * BYTES_PER_CASTER;
+    full.memory_held += of->scene->caster_count * BYTES_PER_CASTER;
     VSHI_TRY_DONE(allocate_assembly(&a, error));
     VSHI_TRY_DONE(gather(&a, error));
     if (a.options.voxel_size == 0.0) {
@@ -366,25 +389,12 @@ vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, c
     if (scene->caster_count == 0) {
         return vshi_fail(error, VSH_ERROR_INPUT, "scene: no casters");
     }
-    const assembly a = {.scene = scene, .assets = assets, .only = ALL};
-    if (count_taken(&a) == 0) {
+    const chosen of = {.scene = scene, .assets = assets, .choice = VOXELISED};
+    if (count_taken(&of) == 0) {
         return vshi_fail(error, VSH_ERROR_INPUT, "scene: its methods shade all casters without voxels");
     }
-    const vsh_grid_options options =
-        scene->layer_count == 0 ? vshi_scene_grid_options(scene, NULL) : scene->grid;
-    return assemble(a, &options, run, grid, error);
-}
-
-vsh_grid_options vshi_scene_grid_options(const vsh_scene *scene, const vsh_scene_layer *layer) {
-    vsh_grid_options options = scene->grid;
-    if (vshi_scene_keeps_voxels(scene, layer)) {
-        options.resolution = 0;
-    }
-    if (layer != NULL && (layer->voxel_size != 0.0 || layer->resolution != 0)) {
-        options.voxel_size = layer->voxel_size;
-        options.resolution = layer->resolution;
-    }
-    return options;
+    const vsh_grid_options options = scene->layer_count == 0 ? choose_grid_options(scene, NULL) : scene->grid;
+    return assemble(&of, &options, run, grid, error);
 }
 
 vsh_result vsh_scene_layer_casters(const vsh_scene *scene, const vsh_assets *assets,
@@ -395,14 +405,190 @@ vsh_result vsh_scene_layer_casters(const vsh_scene *scene, const vsh_assets *ass
     *grid = NULL;
     VSHI_NEEDS(scene);
     VSHI_NEEDS(assets);
-    const assembly a = {.scene = scene, .assets = assets, .only = ALL, .layered = true, .layer = layer};
-    const vsh_grid_options options = vshi_scene_grid_options(scene, layer);
-    return count_taken(&a) > 0 ? assemble(a, &options, run, grid, error) : VSH_OK;
+    const chosen of = {.scene = scene, .assets = assets, .choice = OF_LAYER, .layer = layer};
+    const vsh_grid_options options = choose_grid_options(scene, layer);
+    return count_taken(&of) > 0 ? assemble(&of, &options, run, grid, error) : VSH_OK;
 }
 
-vsh_result vshi_scene_caster_grid(const vsh_scene *scene, const vsh_assets *assets, size_t caster,
-                                  const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
+/* --- what rays meet */
+
+/* What rays meet. */
+typedef struct traced {
+    vsh_mesh *meshes; /* the casters' own, and those of `surfaces` */
+    vshi_surface_mesh *surfaces;
+    vsh_sdf *sdfs;
+    double (*places)[12]; /* of the sdfs */
+    vsh_sdf_node *balls;
+    size_t mesh_count, surface_count, sdf_count, ball_count;
+} traced;
+
+static void free_traced(traced *t) {
+    while (t->surface_count > 0) {
+        vshi_surface_mesh_free(&t->surfaces[--t->surface_count]);
+    }
+    free(t->balls);
+    free(t->places);
+    free(t->sdfs);
+    free(t->surfaces);
+    free(t->meshes);
+}
+
+static vsh_result allocate_traced(const vsh_scene *scene, const vsh_assets *assets, traced *t,
                                   vsh_error *error) {
-    *grid = NULL;
-    return assemble((assembly){.scene = scene, .assets = assets, .only = caster}, options, run, grid, error);
+    size_t sdfs = 1, balls = 0;
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        const vsh_spheres *spheres = vshi_assets_caster(assets, i)->spheres;
+        balls += spheres != NULL ? spheres->info.count : 0;
+        sdfs += scene->casters[i].type == VSH_CASTER_SDF;
+    }
+    const size_t meshes = vshi_assets_mesh_count(assets) + scene->caster_count + 1;
+    VSHI_TRY(vshi_allocate((void **)&t->meshes, meshes, sizeof *t->meshes, "casters", error));
+    VSHI_TRY(vshi_allocate((void **)&t->surfaces, meshes, sizeof *t->surfaces, "casters", error));
+    VSHI_TRY(vshi_allocate((void **)&t->sdfs, sdfs + balls, sizeof *t->sdfs, "casters", error));
+    VSHI_TRY(vshi_allocate((void **)&t->places, sdfs + balls, sizeof *t->places, "casters", error));
+    return vshi_allocate((void **)&t->balls, balls, sizeof *t->balls, "casters", error);
+}
+
+static void add_sdf(traced *t, vsh_sdf sdf, const double transform[12]) {
+    memcpy(t->places[t->sdf_count], transform, sizeof t->places[0]);
+    t->sdfs[t->sdf_count++] = sdf;
+}
+
+static void add_balls(traced *t, const vsh_spheres *spheres) {
+    static const double identity[12] = {1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0};
+    for (size_t i = 0; i < spheres->info.count; ++i) {
+        vsh_sdf_node *ball = &t->balls[t->ball_count++];
+        *ball = vsh_sdf_node_default();
+        memcpy(ball->translation, spheres->sphere[i], sizeof ball->translation);
+        ball->radius = spheres->sphere[i][3];
+        add_sdf(t, (vsh_sdf){ball, 1}, identity);
+    }
+}
+
+/* The surface of a caster's own level set: a file's keeps its voxels; an outline's are those that are named,
+ * or suit the error. */
+static vsh_result add_surface(const chosen *of, size_t caster, const vsh_run *run, traced *t,
+                              vsh_error *error) {
+    const vsh_scene *scene = of->scene;
+    const chosen alone = {.scene = scene, .assets = of->assets, .choice = ONE, .one = caster};
+    vsh_grid_options grid_options = choose_grid_options(scene, of->layer);
+    if (scene->casters[caster].type == VSH_CASTER_VDB) {
+        grid_options.voxel_size = 0.0;
+        grid_options.resolution = 0;
+    } else if (!vshi_scene_voxels_named(scene, of->layer)) {
+        grid_options.resolution = vshi_resolution_marched(scene->shade.max_error, scene->light_count == 0);
+    }
+    vsh_field_options field_options = vsh_field_options_default();
+    vsh_grid *grid = NULL;
+    vsh_field *field = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(assemble(&alone, &grid_options, run, &grid, error));
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    field_options.reach = info.voxel_size; /* the finest level alone */
+    VSHI_TRY_DONE(vsh_field_create(grid, &field_options, run, &field, error));
+    vshi_surface_mesh *surface = &t->surfaces[t->surface_count++];
+    VSHI_TRY_DONE(vshi_surface_mesh_make(field, run, surface, error));
+    t->meshes[t->mesh_count++] = (vsh_mesh){.positions = surface->positions,
+                                            .indices = surface->indices,
+                                            .vertex_count = surface->vertex_count,
+                                            .triangle_count = surface->triangle_count,
+                                            .transform = surface->transform,
+                                            .solidity = VSH_SOLIDITY_SOLID};
+done:
+    vsh_field_free(field);
+    vsh_grid_free(grid);
+    return result;
+}
+
+/* Gathers what rays meet of the casters that are chosen. Free it also after an error. */
+static vsh_result gather_traced(const chosen *of, const vsh_run *run, traced *t, vsh_error *error) {
+    VSHI_TRY(allocate_traced(of->scene, of->assets, t, error));
+    for (size_t i = 0; i < of->scene->caster_count; ++i) {
+        const vsh_caster *caster = &of->scene->casters[i];
+        const vshi_asset_place *place = vshi_assets_caster(of->assets, i);
+        if (!takes(of, i)) {
+            continue;
+        }
+        for (size_t m = 0; m < place->count; ++m) {
+            t->meshes[t->mesh_count++] = place->meshes[m];
+        }
+        if (caster->type == VSH_CASTER_SDF) {
+            add_sdf(t, caster->sdf, caster->transform);
+        } else if (caster->type == VSH_CASTER_SPHERES) {
+            add_balls(t, place->spheres);
+        } else if (!vshi_caster_has_triangles(caster)) {
+            VSHI_TRY(add_surface(of, i, run, t, error));
+        }
+    }
+    return VSH_OK;
+}
+
+static vsh_result make_triangles(const chosen *of, const vsh_run *run, vsh_triangles **triangles,
+                                 vsh_error *error) {
+    vsh_solids *solids = NULL;
+    traced t = {.mesh_count = 0};
+    vsh_run full;
+    vsh_result result;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    VSHI_TRY_DONE(gather_traced(of, &full, &t, error));
+    if (t.mesh_count + t.sdf_count == 0) {
+        goto done;
+    }
+    if (t.sdf_count > 0) {
+        VSHI_TRY_DONE(vsh_solids_create(t.sdfs, t.places[0], t.sdf_count, &solids, error));
+    }
+    VSHI_TRY_DONE(vsh_triangles_create_beside(t.meshes, t.mesh_count, solids, run, triangles, error));
+    vshi_triangles_own_solids(*triangles);
+    solids = NULL;
+done:
+    vsh_solids_free(solids);
+    free_traced(&t);
+    return result;
+}
+
+vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
+                               const vsh_run *run, vsh_triangles **triangles, vsh_error *error) {
+    VSHI_NEEDS(triangles);
+    *triangles = NULL;
+    VSHI_NEEDS(scene);
+    VSHI_NEEDS(assets);
+    const chosen of = {.scene = scene, .assets = assets, .choice = OF_LAYER, .layer = layer};
+    return make_triangles(&of, run, triangles, error);
+}
+
+vsh_result vshi_scene_caster_triangles(const vsh_scene *scene, const vsh_assets *assets, size_t caster,
+                                       const vsh_run *run, vsh_triangles **triangles, vsh_error *error) {
+    const chosen of = {.scene = scene, .assets = assets, .choice = ONE, .one = caster};
+    return make_triangles(&of, run, triangles, error);
+}
+
+/* The casters as estimates measure errors against them. Procedural solids alone need no Embree. */
+vsh_result vsh_scene_truth(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
+                           vsh_triangles **triangles, vsh_solids **solids, vsh_error *error) {
+    VSHI_NEEDS(triangles);
+    VSHI_NEEDS(solids);
+    *triangles = NULL;
+    *solids = NULL;
+    VSHI_NEEDS(scene);
+    VSHI_NEEDS(assets);
+    traced t = {.mesh_count = 0};
+    vsh_run full;
+    vsh_result result;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    const chosen of = {.scene = scene, .assets = assets, .choice = ALL};
+    VSHI_TRY_DONE(gather_traced(&of, &full, &t, error));
+    if (t.mesh_count > 0) {
+        VSHI_TRY_DONE(vsh_triangles_create(t.meshes, t.mesh_count, run, triangles, error));
+    }
+    if (t.sdf_count > 0) {
+        result = vsh_solids_create(t.sdfs, t.places[0], t.sdf_count, solids, error);
+    }
+done:
+    if (result != VSH_OK) {
+        vsh_triangles_free(*triangles);
+        *triangles = NULL;
+    }
+    free_traced(&t);
+    return result;
 }

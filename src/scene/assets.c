@@ -686,24 +686,32 @@ const vsh_spheres *vsh_assets_spheres(const vsh_assets *assets, size_t index) {
     return place->direct ? place->spheres : NULL;
 }
 
+static const vshi_asset_place *receiver_at(const vsh_assets *assets, size_t index) {
+    static const vshi_asset_place none;
+    return index < assets->receiver_count ? &assets->receivers[index] : &none;
+}
+
 const vsh_mesh *vsh_assets_receiver(const vsh_assets *assets, size_t index, size_t *mesh_count) {
-    const vshi_asset_place *place = index < assets->receiver_count ? &assets->receivers[index] : NULL;
-    *mesh_count = place != NULL ? place->count : 0;
-    return place != NULL ? place->meshes : NULL;
+    const vshi_asset_place *place = receiver_at(assets, index);
+    *mesh_count = place->count;
+    return place->meshes;
 }
 
 const vsh_model *vsh_assets_receiver_model(const vsh_assets *assets, size_t index, const size_t **numbers) {
-    const vshi_asset_place *place = index < assets->receiver_count ? &assets->receivers[index] : NULL;
-    *numbers = place != NULL ? place->numbers : NULL;
-    return place == NULL ? NULL : place->made != NULL ? place->made : place->model;
+    const vshi_asset_place *place = receiver_at(assets, index);
+    *numbers = place->numbers;
+    return place->made != NULL ? place->made : place->model;
+}
+
+const vsh_atlas *vsh_assets_receiver_atlas(const vsh_assets *assets, size_t index, const size_t **numbers) {
+    const vshi_unwrapped *made = &receiver_at(assets, index)->unwrapped;
+    *numbers = made->numbers;
+    return made->atlas;
 }
 
 size_t vsh_assets_receiver_pages(const vsh_assets *assets, size_t index) {
-    if (index >= assets->receiver_count) {
-        return 0;
-    }
-    const vshi_unwrapped *made = &assets->receivers[index].unwrapped;
-    return made->page_begins != NULL ? made->page_count : 1;
+    const vshi_unwrapped *made = &receiver_at(assets, index)->unwrapped;
+    return made->page_begins != NULL ? made->page_count : index < assets->receiver_count;
 }
 
 int32_t vsh_assets_receiver_page_info(const vsh_assets *assets, size_t index, size_t page,
@@ -711,7 +719,7 @@ int32_t vsh_assets_receiver_page_info(const vsh_assets *assets, size_t index, si
     if (page >= vsh_assets_receiver_pages(assets, index)) {
         return 0;
     }
-    const vshi_unwrapped *made = &assets->receivers[index].unwrapped;
+    const vshi_unwrapped *made = &receiver_at(assets, index)->unwrapped;
     *info = made->pages != NULL ? made->pages[page] : made->whole;
     return 1;
 }
@@ -722,15 +730,9 @@ const vsh_mesh *vsh_assets_receiver_page(const vsh_assets *assets, size_t index,
     if (page >= vsh_assets_receiver_pages(assets, index)) {
         return NULL;
     }
-    const vshi_asset_place *place = &assets->receivers[index];
+    const vshi_asset_place *place = receiver_at(assets, index);
     const size_t *begins = place->unwrapped.page_begins;
     *first = begins != NULL ? begins[page] : 0;
     *mesh_count = (begins != NULL ? begins[page + 1] : place->count) - *first;
     return place->meshes + *first;
-}
-
-const vsh_atlas *vsh_assets_receiver_atlas(const vsh_assets *assets, size_t index, const size_t **numbers) {
-    const vshi_unwrapped *made = index < assets->receiver_count ? &assets->receivers[index].unwrapped : NULL;
-    *numbers = made != NULL ? made->numbers : NULL;
-    return made != NULL ? made->atlas : NULL;
 }

@@ -6,15 +6,6 @@
 
 #include <vdbshade/field.h>
 
-/* How a layer's casters, or (NULL) those in none, are voxelised. */
-vsh_grid_options vshi_scene_grid_options(const vsh_scene *scene, const vsh_scene_layer *layer);
-
-/* The level set of one caster alone, with these options over the defaults. Errors: as
- * vsh_scene_layer_casters(). */
-vsh_result vshi_scene_caster_grid(const vsh_scene *scene, const vsh_assets *assets, size_t caster,
-                                  const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
-                                  vsh_error *error);
-
 /* vsh_scene_triangles() of one caster alone, for the AO of casters that are shaded without voxels. */
 vsh_result vshi_scene_caster_triangles(const vsh_scene *scene, const vsh_assets *assets, size_t caster,
                                        const vsh_run *run, vsh_triangles **triangles, vsh_error *error);

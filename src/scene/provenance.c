@@ -7,28 +7,148 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "light/light.h"
-#include "scene/inputs.h"
+#include "model/model.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <vdbshade/provenance.h>
 
-enum { NAME_SIZE = 96, LINE_SIZE = 512, HASH_PREFIX = sizeof "sha256:" - 1 };
+enum { NAME_SIZE = 96, LINE_SIZE = 512 };
 enum { HASH_UNITS = 1 << 30 }; /* of the job, for all inputs */
 enum { RAYS = 64 };            /* of methods that keep no error, where none are given */
+
+static vsh_result out_of_memory(const char *what, vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
+}
+
+/* --- inputs: the files that a scene is made of */
+
+typedef struct file_list {
+    char **paths;
+    size_t count, capacity;
+} file_list;
+
+/* Takes `path` over, which is NULL where memory was short. */
+static vsh_result add_path(file_list *inputs, char *path, vsh_error *error) {
+    if (path == NULL) {
+        return out_of_memory("inputs", error);
+    }
+    for (size_t i = 0; i < inputs->count; ++i) {
+        if (strcmp(inputs->paths[i], path) == 0) {
+            free(path);
+            return VSH_OK;
+        }
+    }
+    if (inputs->count == inputs->capacity) {
+        const size_t capacity = 2 * inputs->capacity + 16;
+        char **paths = realloc(inputs->paths, capacity * sizeof *paths);
+        if (paths == NULL) {
+            free(path);
+            return out_of_memory("inputs", error);
+        }
+        inputs->paths = paths;
+        inputs->capacity = capacity;
+    }
+    inputs->paths[inputs->count++] = path;
+    return VSH_OK;
+}
+
+static vsh_result copy_path(file_list *inputs, const char *path, vsh_error *error) {
+    return path != NULL ? add_path(inputs, strdup(path), error) : VSH_OK;
+}
+
+static vsh_result add_beside(void *user, char *path, vsh_error *error) {
+    return add_path(user, path, error);
+}
+
+/* Finds `files`, then the files of casters, receivers and lights, then what is read with the models among
+ * them (model/model_file.h); each path once. `scene` may be NULL. Files that cannot be read are listed all
+ * the same. Free the inputs also where it fails. */
+static vsh_result find_inputs(const vsh_scene *scene, const char *const *files, size_t file_count,
+                              const vsh_run *run, vshi_job *job, file_list *inputs, vsh_error *error) {
+    for (size_t i = 0; i < file_count; ++i) {
+        VSHI_TRY(copy_path(inputs, files[i], error));
+    }
+    for (size_t i = 0; scene != NULL && i < scene->caster_count; ++i) {
+        VSHI_TRY(copy_path(inputs, scene->casters[i].path, error));
+    }
+    for (size_t i = 0; scene != NULL && i < scene->receiver_count; ++i) {
+        const vsh_receiver *receiver = &scene->receivers[i];
+        VSHI_TRY(copy_path(inputs, receiver->type != VSH_RECEIVER_PLANE ? receiver->path : NULL, error));
+    }
+    for (size_t i = 0; scene != NULL && i < scene->light_file_count; ++i) {
+        VSHI_TRY(copy_path(inputs, scene->light_files[i].path, error));
+    }
+    const size_t named = inputs->count;
+    for (size_t i = 0; i < named; ++i) {
+        VSHI_TRY(vshi_model_beside(inputs->paths[i], run, job, add_beside, inputs, error));
+    }
+    return VSH_OK;
+}
+
+static void free_inputs(file_list *inputs) {
+    for (size_t i = 0; i < inputs->count; ++i) {
+        free(inputs->paths[i]);
+    }
+    free(inputs->paths);
+    *inputs = (file_list){NULL, 0, 0};
+}
+
+static vsh_result check_output(const char *output, const struct stat *status, const file_list *inputs,
+                               vsh_error *error) {
+    for (size_t i = 0; i < inputs->count; ++i) {
+        struct stat input;
+        if (stat(inputs->paths[i], &input) == 0 && input.st_ino == status->st_ino &&
+            input.st_dev == status->st_dev) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: the output is also an input: %s", output,
+                             inputs->paths[i]);
+        }
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_scene_check_outputs(const vsh_scene *scene, const char *const *outputs, size_t output_count,
+                                   const vsh_run *run, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(scene);
+    VSHI_NEEDS_OF(output_count, outputs);
+    for (size_t i = 0; i < output_count; ++i) {
+        VSHI_NEEDS(outputs[i]);
+    }
+    vsh_run settings;
+    VSHI_TRY(vshi_run_resolve(run, &settings, error));
+    file_list inputs = {NULL, 0, 0};
+    vshi_job *job = NULL;
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; i < output_count; ++i) {
+        struct stat status;
+        if (stat(outputs[i], &status) != 0) {
+            continue;
+        }
+        if (job == NULL) {
+            job = vshi_job_begin(&settings, "hash", 1);
+            VSHI_TRY_DONE(job != NULL ? VSH_OK : out_of_memory("inputs", error));
+            VSHI_TRY_DONE(find_inputs(scene, NULL, 0, &settings, job, &inputs, error));
+        }
+        VSHI_TRY_DONE(check_output(outputs[i], &status, &inputs, error));
+    }
+done:
+    vshi_job_end(job);
+    free_inputs(&inputs);
+    return result;
+}
+
+/* --- lines */
 
 struct vsh_provenance {
     vshi_attributes attributes;
 };
 
-static vsh_result out_of_memory(vsh_error *error) {
-    return vshi_fail(error, VSH_ERROR_MEMORY, "provenance: the system refused memory");
-}
-
 static vsh_result add(vsh_provenance *p, const char *name, const char *value, vsh_error *error) {
-    return vshi_attributes_add(&p->attributes, name, value) ? VSH_OK : out_of_memory(error);
+    return vshi_attributes_add(&p->attributes, name, value) ? VSH_OK : out_of_memory("provenance", error);
 }
 
 static const char MAX_ERROR[] = ", max error ", RAYS_GIVEN[] = " rays";
@@ -52,49 +172,46 @@ static void describe_rays(const vsh_shade_options *o, bool adaptive, char *text,
     }
 }
 
-static vsh_result add_shadow(vsh_provenance *p, const vsh_provenance_source *source, vsh_error *error) {
-    char text[LINE_SIZE], more[LINE_SIZE / 2] = "";
-    const vsh_shade_options *o = &source->scene->shade;
-    const int32_t method = vsh_shadow_method_resolve(o->method, source->has_triangles);
-    const uint32_t traits = vsh_shadow_method_traits(method);
-    if ((traits & VSH_METHOD_RAYS) != 0) {
-        describe_rays(o, (traits & VSH_METHOD_KEEPS_ERROR) != 0, more, sizeof more);
-    } else if (o->jitter > 0.0) {
-        snprintf(more, sizeof more, ", jitter %.9g", o->jitter);
+/* Of methods by one march, and of AO by cones: what is not the rays'. */
+static void describe_march(const vsh_shade_options *o, bool ao, int32_t method, char *text, size_t size) {
+    if (ao && method == VSH_AO_CONES) {
+        snprintf(text, size, ", %d cones", o->ao_cones);
+    } else if (!ao && o->jitter > 0.0) {
+        snprintf(text, size, ", jitter %.9g", o->jitter);
     }
-    snprintf(text, sizeof text, "%s%s", vsh_get_name(VSH_NAMES_SHADOW, method), more);
-    return add(p, "vdbshade_shadow", text, error);
 }
 
-/* AO's method: of AO itself `what` is "within 2", of the sky "over y". */
-static vsh_result add_open(vsh_provenance *p, const vsh_provenance_source *source, const char *name,
-                           const char *what, vsh_error *error) {
+/* Adds a method: that of shadows (`ao` false), of AO itself (" within 2") or of the sky (" over y"). */
+static vsh_result add_method(vsh_provenance *p, const vsh_provenance_source *source, const char *name,
+                             bool ao, const char *what, vsh_error *error) {
     char text[LINE_SIZE], more[LINE_SIZE / 2] = "";
     const vsh_shade_options *o = &source->scene->shade;
-    const int32_t method = vsh_ao_method_resolve(o->ao_method, source->has_triangles);
-    const uint32_t traits = vsh_ao_method_traits(method);
+    const int32_t method = ao ? vsh_ao_method_resolve(o->ao_method, source->has_triangles)
+                              : vsh_shadow_method_resolve(o->method, source->has_triangles);
+    const uint32_t traits = ao ? vsh_ao_method_traits(method) : vsh_shadow_method_traits(method);
     if ((traits & VSH_METHOD_RAYS) != 0) {
         describe_rays(o, (traits & VSH_METHOD_KEEPS_ERROR) != 0, more, sizeof more);
-    } else if (method == VSH_AO_CONES) {
-        snprintf(more, sizeof more, ", %d cones", o->ao_cones);
+    } else {
+        describe_march(o, ao, method, more, sizeof more);
     }
-    snprintf(text, sizeof text, "%s %s%s", vsh_get_name(VSH_NAMES_AO, method), what, more);
+    snprintf(text, sizeof text, "%s%s%s", vsh_get_name(ao ? VSH_NAMES_AO : VSH_NAMES_SHADOW, method), what,
+             more);
     return add(p, name, text, error);
 }
 
 static vsh_result add_scene(vsh_provenance *p, const vsh_provenance_source *source, vsh_error *error) {
     const vsh_scene *scene = source->scene;
     if (scene->light_count > 0) {
-        VSHI_TRY(add_shadow(p, source, error));
+        VSHI_TRY(add_method(p, source, "vdbshade_shadow", false, "", error));
     }
     char what[NAME_SIZE];
     if (scene->ao) {
-        snprintf(what, sizeof what, "within %.9g", scene->shade.ao_distance);
-        VSHI_TRY(add_open(p, source, "vdbshade_ao", what, error));
+        snprintf(what, sizeof what, " within %.9g", scene->shade.ao_distance);
+        VSHI_TRY(add_method(p, source, "vdbshade_ao", true, what, error));
     }
     if (source->lightmap != 0 && scene->planes.sky != VSH_UP_NONE) {
-        snprintf(what, sizeof what, "over %s", vsh_get_name(VSH_NAMES_UP, scene->planes.sky));
-        VSHI_TRY(add_open(p, source, "vdbshade_sky", what, error));
+        snprintf(what, sizeof what, " over %s", vsh_get_name(VSH_NAMES_UP, scene->planes.sky));
+        VSHI_TRY(add_method(p, source, "vdbshade_sky", true, what, error));
     }
     for (size_t i = 0; i < scene->light_count; ++i) {
         char name[NAME_SIZE], text[LINE_SIZE];
@@ -124,25 +241,16 @@ static vsh_result add_settings(vsh_provenance *p, const vsh_provenance_source *s
     return VSH_OK;
 }
 
-static vsh_result add_inputs(vsh_provenance *p, const vshi_inputs *inputs, vshi_job *job, vsh_error *error) {
+static vsh_result add_inputs(vsh_provenance *p, const file_list *inputs, vshi_job *job, vsh_error *error) {
     for (size_t i = 0; i < inputs->count; ++i) {
         const char *path = inputs->paths[i];
         const char *slash = strrchr(path, '/');
-        char name[NAME_SIZE], digest[VSH_DIGEST_TEXT];
+        char name[NAME_SIZE], digest[VSH_DIGEST_TEXT],
+            text[LINE_SIZE]; /* files' names have up to 255 bytes */
         VSHI_TRY(vshi_file_digest(path, digest, job, error));
-        const char *last = slash != NULL ? slash + 1 : path;
-        const size_t size = HASH_PREFIX + VSH_DIGEST_TEXT + 1 + strlen(last);
-        char *text = malloc(size);
-        if (text == NULL) {
-            return out_of_memory(error);
-        }
-        snprintf(text, size, "sha256:%s %s", digest, last);
+        snprintf(text, sizeof text, "sha256:%s %s", digest, slash != NULL ? slash + 1 : path);
         snprintf(name, sizeof name, "vdbshade_input_%zu", i);
-        const vsh_result result = add(p, name, text, error);
-        free(text);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(add(p, name, text, error));
         if (vshi_job_advance(job, HASH_UNITS / inputs->count)) {
             return vshi_job_fail_cancelled(job, error);
         }
@@ -154,16 +262,16 @@ static vsh_result fill(vsh_provenance *p, const vsh_provenance_source *source, c
                        vsh_error *error) {
     VSHI_NUMBERS;
     VSHI_TRY(add_settings(p, source, error));
-    vshi_inputs inputs = {NULL, 0, 0};
+    file_list inputs = {NULL, 0, 0};
     vshi_job *job = vshi_job_begin(run, "hash", HASH_UNITS);
     if (job == NULL) {
-        return out_of_memory(error);
+        return out_of_memory("provenance", error);
     }
     vsh_result result =
-        vshi_inputs_find(source->scene, source->files, source->file_count, run, job, &inputs, error);
+        find_inputs(source->scene, source->files, source->file_count, run, job, &inputs, error);
     result = result == VSH_OK ? add_inputs(p, &inputs, job, error) : result;
     vshi_job_end(job);
-    vshi_inputs_free(&inputs);
+    free_inputs(&inputs);
     return result;
 }
 

@@ -125,12 +125,7 @@ static vsh_result read_receivers(vshi_json *reader, const vshi_value *value, voi
     return check_outputs(reader, value, scene);
 }
 
-static void wants_ao(void *target) {
-    vsh_scene *scene = target;
-    scene->ao = 1;
-}
-
-static void wants_bent(void *target) {
+static void count_bent(void *target) {
     vsh_scene *scene = target;
     ++scene->bent; /* behind 0, which is none */
 }
@@ -138,7 +133,7 @@ static void wants_bent(void *target) {
 #define AT(member) .offset = offsetof(vsh_scene, member)
 static const vshi_key ao_keys[] = {
     VSHI_KEY("distance", NUMBER, AT(shade.ao_distance), .required = VSHI_ALL, .lowest = VSHI_SMALLEST_LENGTH,
-             .highest = VSHI_LARGEST, .then = wants_ao,
+             .highest = VSHI_LARGEST, .flag = offsetof(vsh_scene, ao),
              VSHI_OPTION("ao", "DISTANCE", OCCLUSION, "ambient occlusion within a distance, scene units",
                          .otherwise = "none")),
     VSHI_KEY("method", NAME, AT(shade.ao_method), .names = VSH_NAMES_AO,
@@ -147,7 +142,7 @@ static const vshi_key ao_keys[] = {
              .variants = 1U << VSH_AO_CONES | 1U << VSH_AO_ADAPTIVE | 1U << VSH_AO_EXACT | 1U << VSH_AO_AUTO,
              .lowest = 1.0, .highest = 256.0),
     VSHI_KEY("bent_normals", NAME, AT(bent), .variants = ~(1U << VSH_AO_TAPS), .names = VSH_NAMES_BENT,
-             .then = wants_bent,
+             .then = count_bent,
              VSHI_OPTION("bent-normals", "SPACE", CHANNELS,
                          "with --ao also bent.X, .Y, .Z: the mean direction that is open, in world or "
                          "tangent space; -1 to 1, in integer formats (1 + x) / 2",
@@ -183,19 +178,8 @@ static vsh_result read_tint(vshi_json *reader, const vshi_value *value, void *me
                                 json_string_value(value->json));
 }
 
-static void has_ambient(void *target) {
+static void drop_voxel_size(void *target) {
     vsh_scene *scene = target;
-    scene->has_ambient = 1;
-}
-
-static void voxels_are_named(void *target) {
-    vsh_scene *scene = target;
-    scene->voxels_named = 1;
-}
-
-static void resolution_is_named(void *target) {
-    vsh_scene *scene = target;
-    scene->voxels_named = 1;
     scene->grid.voxel_size = 0.0; /* which would stand in its place */
 }
 
@@ -215,12 +199,12 @@ static vsh_result read_unit(vshi_json *reader, const vshi_value *value, void *me
 static const vshi_key scene_keys[] = {
     VSHI_KEY("casters", CUSTOM, .read = read_casters),
     VSHI_KEY("voxel_size", NUMBER, AT(grid.voxel_size), .lowest = VSHI_SMALLEST_LENGTH,
-             .highest = VSHI_LARGEST_VOXEL, .then = voxels_are_named,
+             .highest = VSHI_LARGEST_VOXEL, .flag = offsetof(vsh_scene, voxels_named),
              VSHI_OPTION("voxel-size", "SIZE", CASTERS,
                          "in place of --resolution: the edge of a voxel, scene units",
                          .otherwise = "as --resolution says")),
     VSHI_KEY("resolution", INTEGER, AT(grid.resolution), .lowest = 2.0, .highest = 65536.0,
-             .then = resolution_is_named,
+             .flag = offsetof(vsh_scene, voxels_named), .then = drop_voxel_size,
              VSHI_OPTION("resolution", "N", CASTERS, "voxels along the longest side of the casters",
                          .otherwise = "what pays: see docs/auto.md")),
     VSHI_KEY("half_width", NUMBER, AT(grid.half_width), .lowest = 3.0, .highest = 100.0,
@@ -237,7 +221,8 @@ static const vshi_key scene_keys[] = {
             "irradiance", NULL, CHANNELS,
             "also irradiance.R, .G, .B: visibility × colour × falloff × cosine, summed, × AO where baked")),
     VSHI_KEY(
-        "ambient", VECTOR, AT(ambient), .highest = VSHI_LARGEST, .count = 3, .then = has_ambient,
+        "ambient", VECTOR, AT(ambient), .highest = VSHI_LARGEST, .count = 3,
+        .flag = offsetof(vsh_scene, has_ambient),
         VSHI_OPTION("ambient", "R,G,B", CHANNELS,
                     "light from all around, linear: irradiance is then that of the lights + ambient × AO",
                     .otherwise = "none")),
@@ -338,17 +323,32 @@ static vsh_result add_terrains(vshi_json *reader, const vshi_value *root, vsh_sc
 
 /* --- layers */
 
+/* The number of the layer, or of the light, of that name; SIZE_MAX: there is none. */
+static size_t find_layer(const vsh_scene *scene, const char *name) {
+    for (size_t k = 0; k < scene->layer_count; ++k) {
+        if (strcmp(scene->layers[k].name, name) == 0) {
+            return k;
+        }
+    }
+    return SIZE_MAX;
+}
+
+static size_t find_light(const vsh_scene *scene, const char *name) {
+    for (size_t i = 0; i < scene->light_count; ++i) {
+        if (strcmp(scene->lights[i].name, name) == 0) {
+            return i;
+        }
+    }
+    return SIZE_MAX;
+}
+
 static vsh_result check_casters(vshi_json *reader, const vshi_value *root, const vsh_scene *scene) {
     vshi_value casters, name;
     for (size_t i = 0; i < scene->caster_count && vshi_member(root, "casters", &casters); ++i) {
-        bool found = scene->casters[i].layer == NULL;
-        for (size_t k = 0; !found && k < scene->layer_count; ++k) {
-            found = vshi_caster_in_layer(&scene->casters[i], &scene->layers[k]);
-        }
+        const char *layer = scene->casters[i].layer;
         const vshi_value caster = vshi_item(&casters, i);
-        if (!found && vshi_member(&caster, "layer", &name)) {
-            return vshi_json_fail(reader, &name, "\"%.64s\" is none of the scene's layers",
-                                  scene->casters[i].layer);
+        if (layer != NULL && find_layer(scene, layer) == SIZE_MAX && vshi_member(&caster, "layer", &name)) {
+            return vshi_json_fail(reader, &name, "\"%.64s\" is none of the scene's layers", layer);
         }
     }
     return VSH_OK;
@@ -369,11 +369,7 @@ static vsh_result check_lights(vshi_json *reader, const vshi_value *layers, cons
     const vshi_value at = vshi_item(layers, i);
     vshi_value names;
     for (size_t k = 0; layer->lights != NULL && k < layer->light_count; ++k) {
-        bool found = false;
-        for (size_t l = 0; !found && l < scene->light_count; ++l) {
-            found = strcmp(layer->lights[k], scene->lights[l].name) == 0;
-        }
-        if (!found && vshi_member(&at, "lights", &names)) {
+        if (find_light(scene, layer->lights[k]) == SIZE_MAX && vshi_member(&at, "lights", &names)) {
             const vshi_value name = vshi_item(&names, k);
             return vshi_json_fail(reader, &name, "\"%.64s\" is none of the scene's lights", layer->lights[k]);
         }
@@ -406,16 +402,12 @@ static vsh_result choose_layers(vshi_json *reader, const vshi_value *names, cons
     for (size_t n = 0; n < json_array_size(names->json); ++n) {
         const vshi_value name = vshi_item(names, n);
         VSHI_TRY(vshi_expect(reader, &name, JSON_STRING));
-        bool found = false;
-        for (size_t k = 0; k < scene->layer_count; ++k) {
-            const bool is = strcmp(json_string_value(name.json), layers[k].name) == 0;
-            named[k] = named[k] || is;
-            found = found || is;
-        }
-        if (!found) {
+        const size_t layer = find_layer(scene, json_string_value(name.json));
+        if (layer == SIZE_MAX) {
             return vshi_json_fail(reader, &name, "\"%.64s\" is none of the scene's layers",
                                   json_string_value(name.json));
         }
+        named[layer] = true;
     }
     for (size_t k = 0; k < scene->layer_count; ++k) {
         if (!named[k] && casts_for(&layers[k].shade, light)) {
@@ -453,12 +445,10 @@ static vsh_result check_layers(vshi_json *reader, const vshi_value *root, vsh_sc
     const bool layered = vshi_member(root, "layers", &layers);
     for (size_t i = 0; layered && i < scene->layer_count; ++i) {
         const vshi_value at = vshi_item(&layers, i);
-        for (size_t k = 0; k < i; ++k) {
-            if (strcmp(scene->layers[i].name, scene->layers[k].name) == 0 &&
-                vshi_member(&at, "name", &name)) {
-                return vshi_json_fail(reader, &name, "\"%.64s\" is the name of layers[%zu] too",
-                                      scene->layers[i].name, k);
-            }
+        const size_t first = find_layer(scene, scene->layers[i].name);
+        if (first < i && vshi_member(&at, "name", &name)) {
+            return vshi_json_fail(reader, &name, "\"%.64s\" is the name of layers[%zu] too",
+                                  scene->layers[i].name, first);
         }
         VSHI_TRY(check_lights(reader, &layers, scene, i));
     }
