@@ -302,48 +302,44 @@ void vshi_bake_report_add(vshi_scene_bake *bake, const vsh_bake_stats *baked) {
     }
 }
 
-static void fill_report(const vshi_scene_bake *bake, vsh_bake_report *report) {
-    if (report == NULL) {
-        return;
+/* Traces the tiles, or reads them from parts. */
+static vsh_result bake_or_merge(const vsh_scene *scene, const vsh_bake_options *options, const vsh_run *run,
+                                bool merges, vsh_bake_report *report, vsh_error *error) {
+    vshi_scene_bake bake;
+    int32_t parts = 0;
+    vsh_result result;
+    VSHI_TRY_DONE(load(&bake, scene, options, run, false, error));
+    const bool shard = bake.options.shard > 0 && !merges;
+    if (merges) {
+        VSHI_TRY_DONE(vshi_parts_find(&bake, &parts, error)); /* before what takes a while */
     }
-    vsh_bake_error *errors = report->errors;
-    *report = bake->report;
-    report->errors = errors;
-    if (errors != NULL) {
-        memcpy(errors, bake->errors, bake->error_count * sizeof *errors);
+    /* one shard warns of UVs */
+    VSHI_TRY_DONE(count_lightmaps(&bake, bake.options.shard <= 1 && !merges, error));
+    VSHI_TRY_DONE(merges ? vshi_parts_open(&bake, parts, error) : make_occluders(&bake, error));
+    VSHI_TRY_DONE(shard ? vshi_bake_part(&bake, error) : vshi_bake_pages(&bake, error));
+    if (report != NULL) {
+        vsh_bake_error *errors = report->errors;
+        *report = bake.report;
+        report->errors = errors;
+        if (errors != NULL) {
+            memcpy(errors, bake.errors, bake.error_count * sizeof *errors);
+        }
     }
+done:
+    free_bake(&bake);
+    return result;
 }
 
 vsh_result vsh_bake_scene(const vsh_scene *scene, const vsh_bake_options *options, const vsh_run *run,
                           vsh_bake_report *report, vsh_error *error) {
     VSHI_NEEDS(scene);
-    vshi_scene_bake bake;
-    vsh_result result;
-    VSHI_TRY_DONE(load(&bake, scene, options, run, false, error));
-    VSHI_TRY_DONE(count_lightmaps(&bake, bake.options.shard <= 1, error)); /* one shard warns of UVs */
-    VSHI_TRY_DONE(make_occluders(&bake, error));
-    VSHI_TRY_DONE(bake.options.shard > 0 ? vshi_bake_part(&bake, error) : vshi_bake_pages(&bake, error));
-    fill_report(&bake, report);
-done:
-    free_bake(&bake);
-    return result;
+    return bake_or_merge(scene, options, run, false, report, error);
 }
 
 vsh_result vsh_merge_scene(const vsh_scene *scene, const vsh_bake_options *options, const vsh_run *run,
                            vsh_bake_report *report, vsh_error *error) {
     VSHI_NEEDS(scene);
-    vshi_scene_bake bake;
-    int32_t count;
-    vsh_result result;
-    VSHI_TRY_DONE(load(&bake, scene, options, run, false, error));
-    VSHI_TRY_DONE(vshi_parts_find(&bake, &count, error)); /* before what takes a while */
-    VSHI_TRY_DONE(count_lightmaps(&bake, false, error));
-    VSHI_TRY_DONE(vshi_parts_open(&bake, count, error));
-    VSHI_TRY_DONE(vshi_bake_pages(&bake, error));
-    fill_report(&bake, report);
-done:
-    free_bake(&bake);
-    return result;
+    return bake_or_merge(scene, options, run, true, report, error);
 }
 
 /* --- forecasts */

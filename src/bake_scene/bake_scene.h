@@ -20,10 +20,10 @@ typedef struct vshi_target {
     const vsh_mesh *meshes;
     size_t mesh_count;
     char *output;      /* FILE.OBJECT.exr of an object, FILE.PAGE.exr of a page, or the receiver's own */
-    vshi_mesh_set set; /* whose the meshes are */
+    vshi_mesh_set set; /* the set that holds the meshes */
     size_t page;       /* of the receiver */
     bool unwrapped;    /* its UVs are new, or packed again */
-    char *object;      /* whose it is, as files are named by it, each in its own way; NULL: of several */
+    char *object;      /* the object's name in files, unique among the lightmaps; NULL: several objects */
 } vshi_target;
 
 typedef struct vshi_targets {

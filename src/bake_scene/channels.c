@@ -10,25 +10,19 @@
 
 /* --- which there are */
 
-/* Errors that are left: only where the method knows them. */
-static bool has_shadow_error(const vsh_scene *scene) {
-    return scene->error && (vsh_shadow_method_traits(scene->shade.method) & VSH_METHOD_RAYS) != 0;
-}
-
-static bool has_ao_error(const vsh_scene *scene) {
-    return scene->error && scene->ao && (vsh_ao_method_traits(scene->shade.ao_method) & VSH_METHOD_RAYS) != 0;
-}
-
 /* Whether a scene's lights, AO and what goes with them ask for a plane; the others are wished for. */
 static bool is_asked(const vshi_plane_kind *kind, const vsh_scene *scene) {
+    /* errors that are left: only where the method knows them */
+    const bool shadow_error = (vsh_shadow_method_traits(scene->shade.method) & VSH_METHOD_RAYS) != 0;
+    const bool ao_error = (vsh_ao_method_traits(scene->shade.ao_method) & VSH_METHOD_RAYS) != 0;
     const struct {
         size_t plane;
         bool asked;
     } own[] = {
         {offsetof(vsh_lightmap, shadow), scene->light_count > 0},
         {offsetof(vsh_lightmap, ao), scene->ao != 0},
-        {offsetof(vsh_lightmap, shadow_error), has_shadow_error(scene)},
-        {offsetof(vsh_lightmap, ao_error), has_ao_error(scene)},
+        {offsetof(vsh_lightmap, shadow_error), scene->error && shadow_error},
+        {offsetof(vsh_lightmap, ao_error), scene->error && scene->ao && ao_error},
         {offsetof(vsh_lightmap, irradiance), scene->irradiance != 0},
         {offsetof(vsh_lightmap, bent), scene->bent != 0},
         {offsetof(vsh_lightmap, tint), scene->tint.type != VSH_TINT_NONE},

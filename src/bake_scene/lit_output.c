@@ -174,17 +174,6 @@ vsh_result vshi_lit_output_add(vshi_lit_output *lit, int32_t rows, const float *
 
 /* --- UVs */
 
-/* A mesh that is lit by the UVs of its file. */
-static vsh_lit_mesh mesh_of_file(const vsh_receiver *receiver, const vsh_model *model, size_t number) {
-    vsh_lit_mesh mesh = {.uv_set = receiver->uv_set};
-    if (receiver->type != VSH_RECEIVER_MESH) {
-        mesh.uv_set = 0;
-    } else if (receiver->uv_set < 0) {
-        mesh.uv_set = vsh_model_uv_sets(model, number) > 1;
-    }
-    return mesh;
-}
-
 static vsh_lit_mesh mesh_of_atlas(const vsh_atlas *atlas, size_t number) {
     const vsh_atlas_mesh mesh = vsh_atlas_mesh_view(atlas, number);
     return (vsh_lit_mesh){.uvs = mesh.uvs,
@@ -199,6 +188,7 @@ static vsh_result list_meshes(const vshi_lit_output *lit, const vsh_model *model
                               vsh_error *error) {
     const size_t index = lit->lightmap->receiver;
     const vsh_assets *assets = lit->bake->assets;
+    const vsh_receiver *receiver = &lit->bake->scene.receivers[index];
     const size_t *numbers, *of_atlas;
     size_t count;
     vsh_assets_receiver_model(assets, index, &numbers);
@@ -213,8 +203,11 @@ static vsh_result list_meshes(const vshi_lit_output *lit, const vsh_model *model
         vsh_assets_receiver_page(assets, index, page, &first, &count);
         for (size_t i = first; i < first + count; ++i) {
             vsh_lit_mesh *mesh = &(*meshes)[numbers[i]];
-            *mesh = atlas != NULL ? mesh_of_atlas(atlas, of_atlas[i])
-                                  : mesh_of_file(&lit->bake->scene.receivers[index], model, numbers[i]);
+            *mesh = atlas != NULL                         ? mesh_of_atlas(atlas, of_atlas[i])
+                    : receiver->type != VSH_RECEIVER_MESH ? (vsh_lit_mesh){.uv_set = 0}
+                    : receiver->uv_set >= 0
+                        ? (vsh_lit_mesh){.uv_set = receiver->uv_set}
+                        : (vsh_lit_mesh){.uv_set = vsh_model_uv_sets(model, numbers[i]) > 1};
             mesh->page = (uint32_t)page; /* read where it has no charts */
         }
     }

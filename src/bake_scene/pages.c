@@ -354,20 +354,18 @@ static vsh_result add_rows(const vshi_scene_page *page, output *out, int32_t fir
                        : vsh_image_writer_add(out->writer, count, planes, error);
 }
 
-static vsh_result finish_image(const vshi_scene_page *page, vsh_image_writer **writer, vsh_error *error) {
-    vsh_image_clipping cut;
-    VSHI_TRY(vsh_image_writer_get_clipping(*writer, &cut, error));
-    const vsh_result result = vsh_image_writer_finish(*writer, error);
-    *writer = NULL;
-    VSHI_TRY(result);
-    vshi_warn_clipping(page->lightmap->output, &cut, &page->bake->run);
-    return VSH_OK;
-}
-
 static vsh_result close_output(const vshi_scene_page *page, output *out, vsh_result result,
                                vsh_error *error) {
     if (result == VSH_OK && out->writer != NULL) {
-        result = finish_image(page, &out->writer, error);
+        vsh_image_clipping cut;
+        result = vsh_image_writer_get_clipping(out->writer, &cut, error);
+        if (result == VSH_OK) {
+            result = vsh_image_writer_finish(out->writer, error);
+            out->writer = NULL;
+        }
+        if (result == VSH_OK) {
+            vshi_warn_clipping(page->lightmap->output, &cut, &page->bake->run);
+        }
     }
     if (result == VSH_OK && out->is_lit) {
         result = vshi_lit_output_finish(&out->lit, error);

@@ -21,9 +21,9 @@
 /* Begins the head. The lightmaps follow, then the texts, each with its NUL: the library's version, words,
  * names and values of attributes, channels; then bytes of 0 up to a multiple of 8. */
 typedef struct head_numbers {
-    uint64_t words, attributes, channels, lightmaps; /* how many there are */
+    uint64_t words, attributes, channels, lightmaps; /* their numbers */
     uint64_t errors;                                 /* as in vsh_bake_report */
-    uint64_t active_voxels, field_bytes;             /* these of what cast, as in vsh_occluders_info */
+    uint64_t active_voxels, field_bytes;             /* of the casters, as in vsh_occluders_info */
     double voxel_size;
     int32_t levels, has_triangles;
     int32_t layered_ao; /* as of the job */
@@ -569,8 +569,8 @@ static vsh_result read_front(FILE *file, const char *path, uint64_t size, vshi_p
                : fail_damaged(path, "it has not the size that it tells", error);
 }
 
-/* Opens a part and reads its head, up to the tiles; *sum is that of what was read. Close the file also after
- * an error, unless it is NULL. */
+/* Opens a part and reads its head, up to the tiles; *sum becomes the checksum so far. Close the file also
+ * after an error, unless it is NULL. */
 static vsh_result open_part(part *p, const vsh_run *run, FILE **file, uint64_t *sum, vsh_error *error) {
     uint64_t size;
     vshi_part_front front;

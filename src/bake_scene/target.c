@@ -68,13 +68,6 @@ static vsh_result find_solid(vshi_target *target, const vsh_run *run, vsh_error 
     return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "%s: %s", target->receiver.path, why.message);
 }
 
-static vsh_result finish(vshi_target *target, const vsh_run *run, vsh_error *error) {
-    if (target->receiver.seams == VSH_SEAMS_DEFAULT) {
-        target->receiver.seams = vsh_lit_is_output(target->receiver.output) ? VSH_SEAMS_FIX : VSH_SEAMS_KEEP;
-    }
-    return find_solid(target, run, error);
-}
-
 /* FILE.MARK.exr for FILE.exr. */
 static char *mark_output(const char *output, const char *mark) {
     const char *slash = strrchr(output, '/'), *dot = strrchr(output, '.');
@@ -188,7 +181,10 @@ static vsh_result add_pages(vshi_targets *t, const vsh_scene *scene, size_t inde
             return refuse_memory(error);
         }
         target->receiver.output = lit ? receiver->output : target->output;
-        VSHI_TRY(finish(target, run, error));
+        if (receiver->seams == VSH_SEAMS_DEFAULT) {
+            target->receiver.seams = lit ? VSH_SEAMS_FIX : VSH_SEAMS_KEEP;
+        }
+        VSHI_TRY(find_solid(target, run, error));
     }
     return VSH_OK;
 }

@@ -1,4 +1,4 @@
-/* Files of JSON: their text, the memory of what is read, and the place of every error in them. */
+/* Reads files of JSON into memory of their own, and finds the place of every error in them. */
 #include "json/json.h"
 
 #include "base/file.h"
@@ -147,25 +147,16 @@ static place locate(const vshi_json *reader, const vshi_value *value, bool key) 
 
 /* --- errors */
 
-/* Appends to a text of fixed size; what does not fit is left out. */
-static void append(char *text, size_t capacity, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
-static void append(char *text, size_t capacity, const char *format, ...) {
-    const size_t length = strlen(text);
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text + length, capacity - length, format, arguments);
-    va_end(arguments);
-}
-
 /* "lights[0].angle_deg" */
 static void append_path(char *text, const vshi_value *value) {
     if (value->parent == NULL) {
         return;
     }
     append_path(text, value->parent);
+    char *end = text + strlen(text);
+    const size_t room = MAX_PATH_TEXT - (size_t)(end - text); /* the rest is left out */
     if (value->key == NULL) {
-        append(text, MAX_PATH_TEXT, "[%zu]", value->ordinal);
+        snprintf(end, room, "[%zu]", value->ordinal);
         return;
     }
     int length = (int)strnlen(value->key, MAX_KEY_TEXT + 1);
@@ -173,13 +164,11 @@ static void append_path(char *text, const vshi_value *value) {
     while (cut && length > 0 && ((unsigned char)value->key[length] & 0xc0) == 0x80) {
         --length; /* not inside a UTF-8 character */
     }
-    append(text, MAX_PATH_TEXT, "%s%.*s%s", text[0] == '\0' ? "" : ".", length, value->key, cut ? "…" : "");
+    snprintf(end, room, "%s%.*s%s", text[0] == '\0' ? "" : ".", length, value->key, cut ? "…" : "");
 }
 
-static vsh_result fail(const vshi_json *reader, const vshi_value *value, bool key, const char *format,
-                       va_list arguments) __attribute__((format(printf, 4, 0)));
-static vsh_result fail(const vshi_json *reader, const vshi_value *value, bool key, const char *format,
-                       va_list arguments) {
+__attribute__((format(printf, 4, 0))) static vsh_result
+fail(const vshi_json *reader, const vshi_value *value, bool key, const char *format, va_list arguments) {
     const place at = locate(reader, value, key);
     char where[MAX_PATH_TEXT] = "", message[512];
     append_path(where, value);

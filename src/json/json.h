@@ -10,7 +10,7 @@
 
 /* --- a file */
 
-/* Memory that lives as long as what is read. */
+/* Memory that is freed with the struct that was read. */
 typedef struct vshi_json_block vshi_json_block;
 
 /* The state of reading one file. Callers set the first members. */
@@ -47,7 +47,7 @@ vsh_result vshi_json_read(vshi_json *reader, size_t size, vshi_read_fn *read, vo
 /* Frees what either made, with all that it points to. NULL does nothing. */
 void vshi_json_free(void *made);
 
-/* Zeroed memory that belongs to what is read. */
+/* Zeroed memory that is freed with the struct that is read. */
 vsh_result vshi_json_allocate(vshi_json *reader, void **memory, size_t count, size_t size, const char *what);
 
 /* A copy of `string`, behind the first `prefix` bytes of the file's path. */
@@ -77,9 +77,11 @@ vsh_result vshi_expect(const vshi_json *reader, const vshi_value *value, json_ty
 vsh_result vshi_reject_both(const vshi_json *reader, const vshi_value *object, const char *one,
                             const char *other);
 
-/* Reads an array of objects, each into an item of `item_size` bytes, with `read`. */
-vsh_result vshi_read_list(vshi_json *reader, const vshi_value *array, size_t lowest, size_t highest,
-                          size_t item_size, vshi_read_fn *read, void **items, size_t *count);
+/* A list that was read, as it stands in a struct. */
+typedef struct vshi_list {
+    void *items;
+    size_t count;
+} vshi_list;
 
 /* --- tables of keys */
 
@@ -100,7 +102,8 @@ typedef enum vshi_key_kind {
     VSHI_NAME,    /* int32_t: a name's number */
     VSHI_STRING,  /* const char *, not empty */
     VSHI_PATH,    /* const char *, behind the folder of the scene file unless it is absolute */
-    VSHI_CUSTOM,  /* what `read` makes of it */
+    VSHI_LIST,    /* { items; size_t count; }: an array of objects; `read` reads each into `count` bytes */
+    VSHI_CUSTOM,  /* any value; `read` reads it */
     VSHI_LATER    /* read by the caller, before or after the rest */
 } vshi_key_kind;
 
@@ -116,8 +119,8 @@ typedef const char *vshi_name_fn(int32_t i);
 /* How a key is given as a text, on a command line say, and told of. All zero: it stands in files alone. */
 typedef struct vshi_option {
     const char *name;      /* "max-error" */
-    const char *value;     /* what stands for the value: "N", "VOXELS"; NULL: of VSHI_BOOL */
-    const char *help;      /* what it is for, without range and default */
+    const char *value;     /* a word for the value: "N", "VOXELS"; NULL: of VSHI_BOOL */
+    const char *help;      /* its purpose, without range and default */
     const char *range;     /* of VSHI_CUSTOM, and where numbers do not say it: in words */
     const char *otherwise; /* the default, where it is not a number or name */
     int32_t group;         /* the caller's */
@@ -138,7 +141,7 @@ typedef struct vshi_key {
     vshi_name_fn *name_of; /* other names */
     vshi_read_fn *read;
     size_t flag;                /* offset of an int32_t that becomes 1 when the key is read; 0: none */
-    void (*then)(void *target); /* what else follows for the struct when the key was read; may be NULL */
+    void (*then)(void *target); /* called when the key was read; may be NULL */
     vshi_option option;
 } vshi_key;
 

@@ -145,6 +145,24 @@ static vsh_result read_string(vshi_json *reader, const vshi_value *value, bool p
     return vshi_json_copy(reader, slash == NULL ? 0 : (size_t)(slash - reader->path) + 1, given, string);
 }
 
+static vsh_result read_list(vshi_json *reader, const vshi_value *value, const vshi_key *key, void *member) {
+    vshi_list list = {.items = NULL};
+    VSHI_TRY(vshi_expect(reader, value, JSON_ARRAY));
+    list.count = json_array_size(value->json);
+    if ((double)list.count < key->lowest || (double)list.count > key->highest) {
+        return vshi_json_fail(reader, value, "has %zu items, out of range %.0f … %.0f", list.count,
+                              key->lowest, key->highest);
+    }
+    const size_t size = (size_t)key->count;
+    VSHI_TRY(vshi_json_allocate(reader, &list.items, list.count, size, value->key));
+    for (size_t i = 0; i < list.count; ++i) {
+        const vshi_value item = vshi_item(value, i);
+        VSHI_TRY(key->read(reader, &item, (char *)list.items + i * size));
+    }
+    memcpy(member, &list, sizeof list);
+    return VSH_OK;
+}
+
 vsh_result vshi_read_value(vshi_json *reader, const vshi_value *value, const vshi_key *key, void *member) {
     switch (key->kind) {
     case VSHI_NUMBER:
@@ -166,6 +184,8 @@ vsh_result vshi_read_value(vshi_json *reader, const vshi_value *value, const vsh
     case VSHI_STRING:
     case VSHI_PATH:
         return read_string(reader, value, key->kind == VSHI_PATH, member);
+    case VSHI_LIST:
+        return read_list(reader, value, key, member);
     case VSHI_CUSTOM:
         return key->read(reader, value, member);
     case VSHI_LATER:
@@ -244,22 +264,6 @@ vsh_result vshi_read_object(vshi_json *reader, const vshi_value *object, const v
             return vshi_json_fail(reader, object, "key \"%s\" is missing: %s needs it", key->name, what);
         }
     }
-    return VSH_OK;
-}
-
-vsh_result vshi_read_list(vshi_json *reader, const vshi_value *array, size_t lowest, size_t highest,
-                          size_t item_size, vshi_read_fn *read, void **items, size_t *count) {
-    VSHI_TRY(vshi_expect(reader, array, JSON_ARRAY));
-    const size_t size = json_array_size(array->json);
-    if (size < lowest || size > highest) {
-        return vshi_json_fail(reader, array, "has %zu items, out of range %zu … %zu", size, lowest, highest);
-    }
-    VSHI_TRY(vshi_json_allocate(reader, items, size, item_size, array->key));
-    for (size_t i = 0; i < size; ++i) {
-        const vshi_value item = vshi_item(array, i);
-        VSHI_TRY(read(reader, &item, (char *)*items + i * item_size));
-    }
-    *count = size;
     return VSH_OK;
 }
 

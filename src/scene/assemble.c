@@ -1,4 +1,4 @@
-/* From a scene's casters to one level set, and to what rays meet. */
+/* Makes one level set of a scene's casters, and triangles and solids for rays. */
 #include "base/floats.h"
 #include "base/similarity.h"
 #include "field/surface.h"
@@ -251,15 +251,11 @@ static void warn_resampled(const assembly *a, const vsh_run *run) {
     }
 }
 
-static void add_instance(assembly *a, const vsh_grid *grid, const double *transform) {
-    a->instances[a->instance_count++] = (vsh_grid_instance){grid, transform};
-}
-
 /* The grid that was made last: one of the union, and held until that is there. Small ones are checked here
  * alone, together with all before. */
 static vsh_result add_made(assembly *a, const double *transform, vsh_run *run, vsh_error *error) {
     const vsh_grid *grid = a->made[a->made_count++];
-    add_instance(a, grid, transform);
+    a->instances[a->instance_count++] = (vsh_grid_instance){grid, transform};
     vsh_grid_info info;
     vsh_grid_get_info(grid, &info);
     run->memory_held += info.bytes;
@@ -291,7 +287,7 @@ static vsh_result make_grid(assembly *a, size_t i, vsh_run *run, vsh_error *erro
     const vshi_asset_place *place = vshi_assets_caster(a->of.assets, i);
     vsh_grid **made = &a->made[a->made_count];
     if (caster->type == VSH_CASTER_VDB) {
-        add_instance(a, place->grid, caster->transform);
+        a->instances[a->instance_count++] = (vsh_grid_instance){place->grid, caster->transform};
     } else if (caster->type == VSH_CASTER_SDF) {
         const placed_sdf *placed = &a->sdfs[i];
         vsh_grid_options options = a->options;

@@ -368,33 +368,34 @@ static vsh_result place_plane(vshi_asset_place *place, const vsh_receiver *recei
                                        .values = flat,
                                        .size = {receiver->extent[0], receiver->extent[1]}};
     VSHI_TRY(vsh_model_from_heights(&source, VSH_HEIGHTS_SURFACE, run, &place->made, error));
-    VSHI_TRY(place_chosen(place, place->made, NULL, 0, 0.0, receiver->transform, error));
-    return vshi_pages_as_they_are(receiver, place->meshes, place->count, &place->unwrapped, error);
+    return place_chosen(place, place->made, NULL, 0, 0.0, receiver->transform, error);
+}
+
+static vsh_result place_terrain(vsh_assets *assets, vshi_asset_place *place, const vsh_receiver *receiver,
+                                const vsh_run *run, vsh_error *error) {
+    vsh_heights_source source = {.name = receiver->path,
+                                 .size = {receiver->extent[0], receiver->extent[1]},
+                                 .height = receiver->relief};
+    const size_t samples = receiver->supersample > 1 ? (size_t)receiver->supersample : 1;
+    const size_t texels[2] = {samples * (size_t)receiver->width, samples * (size_t)receiver->height};
+    const bool sized = receiver->width > 0 && receiver->height > 0 && !vsh_lit_is_output(receiver->output);
+    return place_heights(assets, place, &source, VSH_HEIGHTS_SURFACE, sized ? texels : NULL,
+                         receiver->transform, run, error);
 }
 
 static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, size_t index, const vsh_run *run,
                                  vsh_error *error) {
     const vsh_receiver *receiver = &scene->receivers[index];
+    vshi_asset_place *place = &assets->receivers[index];
     if (receiver->path == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "receiver %zu: no path", index);
     }
-    if (receiver->type == VSH_RECEIVER_HEIGHTFIELD) {
-        vsh_heights_source source = {.name = receiver->path,
-                                     .size = {receiver->extent[0], receiver->extent[1]},
-                                     .height = receiver->relief};
-        vshi_asset_place *place = &assets->receivers[index];
-        const size_t samples = receiver->supersample > 1 ? (size_t)receiver->supersample : 1;
-        const size_t texels[2] = {samples * (size_t)receiver->width, samples * (size_t)receiver->height};
-        const bool sized =
-            receiver->width > 0 && receiver->height > 0 && !vsh_lit_is_output(receiver->output);
-        VSHI_TRY(place_heights(assets, place, &source, VSH_HEIGHTS_SURFACE, sized ? texels : NULL,
-                               receiver->transform, run, error));
+    const bool plane = receiver->type == VSH_RECEIVER_PLANE;
+    if (plane || receiver->type == VSH_RECEIVER_HEIGHTFIELD) {
+        VSHI_TRY(plane ? place_plane(place, receiver, run, error)
+                       : place_terrain(assets, place, receiver, run, error));
         return vshi_pages_as_they_are(receiver, place->meshes, place->count, &place->unwrapped, error);
     }
-    if (receiver->type == VSH_RECEIVER_PLANE) {
-        return place_plane(&assets->receivers[index], receiver, run, error);
-    }
-    vshi_asset_place *place = &assets->receivers[index];
     unsigned char *chosen = NULL;
     vsh_result result;
     VSHI_TRY(read_file(assets, MODEL, receiver->path, NULL, run, &place->file, error));
@@ -409,7 +410,7 @@ done:
     return result;
 }
 
-/* --- what meshes are taken for: as the scene's rules say, or as is found */
+/* --- solids and sheets: the scene's rules decide, or the shape of the mesh */
 
 /* Applies the rules of one caster, or of all, each by objects' names, or where none is called so, by those of
  * materials. Each must match something. */

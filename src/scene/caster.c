@@ -97,11 +97,6 @@ static void compose(const parts *p, double m[12]) {
     }
 }
 
-/* Column of the linear part: where an axis goes. */
-static vshi_vec axis(const double m[12], int column) {
-    return (vshi_vec){m[column], m[4 + column], m[8 + column]};
-}
-
 vsh_result vshi_read_transform(vshi_json *reader, const vshi_value *value, void *matrix) {
     parts p = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}, {1.0, 1.0, 1.0}, {0.0}};
     VSHI_TRY(vshi_read_object(reader, value, &transform_table, 1, "a transform", &p));
@@ -125,7 +120,7 @@ vsh_result vshi_read_transform(vshi_json *reader, const vshi_value *value, void 
 
 /* Whether lengths all change by the same factor: rotation, translation, mirroring, uniform scale. */
 static bool is_similarity(const double m[12]) {
-    const vshi_vec a[3] = {axis(m, 0), axis(m, 1), axis(m, 2)};
+    const vshi_vec a[3] = {{m[0], m[4], m[8]}, {m[1], m[5], m[9]}, {m[2], m[6], m[10]}}; /* of the axes */
     const double length2 = vshi_dot(a[0], a[0]);
     for (int i = 0; i < 3; ++i) {
         const int j = (i + 1) % 3;
@@ -221,15 +216,12 @@ static vsh_result push(vshi_json *reader, const vshi_value *value, tree *t, cons
                               MAX_NODES);
     }
     if (t->count == t->capacity) {
-        const size_t capacity = t->capacity == 0 ? 16 : 2 * t->capacity;
-        void *nodes;
-        VSHI_TRY(vshi_allocate(&nodes, capacity, sizeof *t->nodes, "sdf nodes", reader->error));
-        if (t->count > 0) {
-            memcpy(nodes, t->nodes, t->count * sizeof *t->nodes);
+        t->capacity = t->capacity == 0 ? 16 : 2 * t->capacity;
+        vsh_sdf_node *nodes = realloc(t->nodes, t->capacity * sizeof *nodes);
+        if (nodes == NULL) {
+            return vshi_fail(reader->error, VSH_ERROR_MEMORY, "sdf nodes: the system refused memory");
         }
-        free(t->nodes);
         t->nodes = nodes;
-        t->capacity = capacity;
     }
     *index = (int32_t)t->count;
     t->nodes[t->count++] = *node;

@@ -136,24 +136,6 @@ static vsh_result read_caster(vshi_json *reader, const vshi_value *value, void *
 
 /* --- the scene */
 
-static vsh_result read_casters(vshi_json *reader, const vshi_value *value, void *member) {
-    vsh_flat_scene *scene = member;
-    void *items = NULL;
-    const vsh_result result = vshi_read_list(reader, value, 0, MAX_ITEMS, sizeof *scene->casters, read_caster,
-                                             &items, &scene->caster_count);
-    scene->casters = items;
-    return result;
-}
-
-static vsh_result read_lights(vshi_json *reader, const vshi_value *value, void *member) {
-    vsh_flat_scene *scene = member;
-    void *items = NULL;
-    VSHI_TRY(vshi_read_list(reader, value, 1, MAX_LIGHTS, sizeof *scene->lights, vshi_read_flat_light, &items,
-                            &scene->light_count));
-    scene->lights = items;
-    return vshi_check_light_names(reader, value, scene->lights, scene->light_count);
-}
-
 static vsh_result read_size(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_flat_scene *scene = member;
     return vshi_read_size(reader, value, &scene->options.width, &scene->options.height);
@@ -178,8 +160,10 @@ static vsh_result read_region(vshi_json *reader, const vshi_value *value, void *
 
 #define AT(member) .offset = offsetof(vsh_flat_scene, member)
 static const vshi_key scene_keys[] = {
-    VSHI_KEY("casters", CUSTOM, .read = read_casters),
-    VSHI_KEY("lights", CUSTOM, .required = VSHI_ALL, .read = read_lights),
+    VSHI_KEY("casters", LIST, AT(casters), .highest = MAX_ITEMS, .read = read_caster,
+             .count = sizeof(vsh_flat_caster)),
+    VSHI_KEY("lights", LIST, AT(lights), .required = VSHI_ALL, .lowest = 1.0, .highest = MAX_LIGHTS,
+             .read = vshi_read_flat_light, .count = sizeof(vsh_light)),
     VSHI_KEY("region", CUSTOM, .required = VSHI_ALL, .read = read_region),
     VSHI_KEY("size", CUSTOM, .read = read_size,
              VSHI_OPTION("size", "W[xH]", FLAT_IMAGE, "texels of the map",
@@ -207,10 +191,13 @@ static const vshi_key scene_keys[] = {
                          .otherwise = "auto: srgb for irradiance, linear for shadows")),
 };
 const vshi_table vshi_flat_table = VSHI_TABLE(scene_keys);
+_Static_assert(offsetof(vsh_flat_scene, caster_count) == offsetof(vsh_flat_scene, casters) + sizeof(void *) &&
+                   offsetof(vsh_flat_scene, light_count) == offsetof(vsh_flat_scene, lights) + sizeof(void *),
+               "lists are as vshi_list");
 
 static vsh_result read_scene(vshi_json *reader, const vshi_value *root, void *made) {
     vsh_flat_scene *scene = made;
-    vshi_value region;
+    vshi_value region, lights;
     VSHI_TRY(vshi_expect(reader, root, JSON_OBJECT));
     if (!vshi_member(root, "region", &region)) {
         return vshi_json_fail(reader, root,
@@ -218,7 +205,10 @@ static vsh_result read_scene(vshi_json *reader, const vshi_value *root, void *ma
                               "scenes with receivers");
     }
     *scene = vsh_flat_scene_default();
-    return vshi_read_object(reader, root, &vshi_flat_table, 1, "a flat scene", scene);
+    VSHI_TRY(vshi_read_object(reader, root, &vshi_flat_table, 1, "a flat scene", scene));
+    return vshi_member(root, "lights", &lights)
+               ? vshi_check_light_names(reader, &lights, scene->lights, scene->light_count)
+               : VSH_OK;
 }
 
 vsh_result vsh_flat_scene_read(const char *path, const vsh_run *run, vsh_flat_scene **scene,
@@ -277,16 +267,6 @@ static vsh_result make_caster(const vsh_flat_caster *caster, const vsh_run *run,
     }
 }
 
-/* The same, counted into what is held. */
-static vsh_result make_held(const vsh_flat_caster *caster, vsh_run *held, vsh_outline **outline,
-                            vsh_error *error) {
-    VSHI_TRY(make_caster(caster, held, outline, error));
-    vsh_outline_info info;
-    vsh_outline_get_info(*outline, &info);
-    held->memory_held += info.bytes;
-    return vshi_check_limit(held, 0.0, "outlines", error);
-}
-
 /* Of a scene and on the way from it, what is left of its text included: measured with 60,000 circles. */
 enum { BYTES_PER_CASTER = 1536 };
 
@@ -307,7 +287,13 @@ vsh_result vsh_flat_scene_casters(const vsh_flat_scene *scene, const vsh_run *ru
     VSHI_TRY_DONE(vshi_allocate((void **)&instances, count, sizeof *instances, "casters", error));
     for (size_t i = 0; i < count; ++i) {
         vsh_error reason;
-        result = make_held(&scene->casters[i], &held, &made[i], &reason);
+        result = make_caster(&scene->casters[i], &held, &made[i], &reason);
+        if (result == VSH_OK) {
+            vsh_outline_info info;
+            vsh_outline_get_info(made[i], &info);
+            held.memory_held += info.bytes;
+            result = vshi_check_limit(&held, 0.0, "outlines", &reason);
+        }
         if (result != VSH_OK) {
             vshi_fail(error, result, "casters[%zu]: %.960s", i, reason.message);
             goto done;

@@ -40,17 +40,6 @@ static vsh_result read_name(vshi_json *reader, const vshi_value *value, void *me
     return VSH_OK;
 }
 
-static const vshi_key name_key = {.name = "name",
-                                  .kind = VSHI_CUSTOM,
-                                  .required = VSHI_ALL,
-                                  .offset = offsetof(vsh_light, name),
-                                  .read = read_name};
-static const vshi_key color_key = {.name = "color",
-                                   .kind = VSHI_VECTOR,
-                                   .offset = offsetof(vsh_light, color),
-                                   .count = 3,
-                                   .highest = VSHI_LARGEST};
-
 enum { MOST_KEYS = 24 };
 
 /* The keys of lights in space, or in a plane. */
@@ -59,9 +48,9 @@ typedef struct light_keys {
     size_t count;
 } light_keys;
 
-static void add_key(light_keys *all, const vshi_key *key) {
+static void add_key(light_keys *all, vshi_key key) {
     if (all->count < MOST_KEYS) {
-        all->keys[all->count++] = *key;
+        all->keys[all->count++] = key;
     }
 }
 
@@ -90,35 +79,31 @@ static vshi_key key_of(const vshi_light_member *m, int32_t dimensions) {
                       .count = dimensions};
 }
 
+#define AT(member) .offset = offsetof(vsh_light, member)
+
 static void make_keys(bool flat, light_keys *all) {
     const uint32_t types = flat ? vshi_light_types_flat() : VSHI_ALL, falling = vshi_light_types_falling();
-    const vshi_key type = type_key(flat);
+    const vshi_key name = VSHI_KEY("name", CUSTOM, AT(name), .required = VSHI_ALL, .read = read_name);
+    const vshi_key reach = VSHI_KEY("reach", NUMBER, AT(reach), .variants = falling, VSHI_POSITIVE);
+    const vshi_key color = VSHI_KEY("color", VECTOR, AT(color), .count = 3, .highest = VSHI_LARGEST);
+    const vshi_key falloff =
+        VSHI_KEY("falloff", NAME, AT(falloff), .variants = falling, .names = VSH_NAMES_FALLOFF);
     all->count = 0;
-    add_key(all, &name_key);
-    add_key(all, &type);
+    add_key(all, name);
+    add_key(all, type_key(flat));
     for (size_t i = 0; i < vshi_light_member_count; ++i) {
         if ((vshi_light_members[i].types & types) != 0) {
-            const vshi_key key = key_of(&vshi_light_members[i], flat ? 2 : 3);
-            add_key(all, &key);
+            add_key(all, key_of(&vshi_light_members[i], flat ? 2 : 3));
         }
     }
-    add_key(all, &(vshi_key){.name = "reach",
-                             .kind = VSHI_NUMBER,
-                             .variants = falling,
-                             .offset = offsetof(vsh_light, reach),
-                             .highest = VSHI_LARGEST,
-                             .flags = VSHI_ABOVE});
-    add_key(all, &color_key);
-    if (flat) {
-        return;
+    add_key(all, reach);
+    add_key(all, color);
+    if (!flat) {
+        add_key(all, falloff);
+        add_key(all, (vshi_key){.name = "layers", .kind = VSHI_LATER});
     }
-    add_key(all, &(vshi_key){.name = "falloff",
-                             .kind = VSHI_NAME,
-                             .variants = falling,
-                             .offset = offsetof(vsh_light, falloff),
-                             .names = VSH_NAMES_FALLOFF});
-    add_key(all, &(vshi_key){.name = "layers", .kind = VSHI_LATER});
 }
+#undef AT
 
 static vsh_result read_keys(vshi_json *reader, const vshi_value *value, bool flat, vsh_light *light) {
     const vshi_key key = type_key(flat);
@@ -224,41 +209,6 @@ static vsh_result read_item(vshi_json *reader, const vshi_value *value, void *me
     return vshi_read_object(reader, value, &file_table, VSHI_ALL, "a file of lights", &one->file);
 }
 
-/* The lights of one file: *lights, to be freed. */
-static vsh_result read_file(vshi_json *reader, const vshi_value *value, double unit, vsh_light_file *file,
-                            vsh_light **lights) {
-    vshi_value path;
-    VSHI_TRY(vsh_lights_read(file->path, file->angle, file->radius, unit, reader->run, lights, &file->count,
-                             reader->error));
-    return file->count > 0 || !vshi_member(value, "file", &path)
-               ? VSH_OK
-               : vshi_json_fail(reader, &path, "%.200s has no lights; those of a glTF or GLB are read",
-                                file->path);
-}
-
-/* Puts the lights of an item behind those that the scene has. */
-static vsh_result append(vshi_json *reader, const vshi_value *value, const vsh_light *lights, size_t count,
-                         vsh_light *all, vsh_scene *scene) {
-    if (count > MAX_LIGHTS - scene->light_count) {
-        return vshi_json_fail(reader, value, "are %zu lights, which with those before are over %d", count,
-                              MAX_LIGHTS);
-    }
-    if (count > 0) {
-        memcpy(all + scene->light_count, lights, count * sizeof *all);
-    }
-    scene->light_count += count;
-    return VSH_OK;
-}
-
-static vsh_result append_file(vshi_json *reader, const vshi_value *value, vsh_light_file *file,
-                              vsh_light *all, vsh_scene *scene) {
-    vsh_light *lights = NULL;
-    VSHI_TRY(read_file(reader, value, scene->unit, file, &lights));
-    const vsh_result result = append(reader, value, lights, file->count, all, scene);
-    vsh_lights_free(lights);
-    return result;
-}
-
 /* Which item of the list a light is of. */
 static size_t item_of(const vsh_scene *scene, size_t light) {
     size_t place = light;
@@ -292,31 +242,56 @@ static vsh_result check_names(vshi_json *reader, const vshi_value *list, const v
     return VSH_OK;
 }
 
+/* Adds the light of an item, or those of its file, behind those that the scene has. */
+static vsh_result add_item(vshi_json *reader, const vshi_value *value, const item *one, vsh_light *all,
+                           vsh_light_file *files, vsh_scene *scene) {
+    const bool file = one->file.path != NULL;
+    vsh_light *read = NULL;
+    size_t count = file ? 0 : 1;
+    vshi_value path;
+    vsh_result result = VSH_OK;
+    if (file && reader->run != NULL) {
+        VSHI_TRY_DONE(vsh_lights_read(one->file.path, one->file.angle, one->file.radius, scene->unit,
+                                      reader->run, &read, &count, reader->error));
+        if (count == 0 && vshi_member(value, "file", &path)) {
+            result = vshi_json_fail(reader, &path, "%.200s has no lights; those of a glTF or GLB are read",
+                                    one->file.path);
+            goto done;
+        }
+    }
+    if (count > MAX_LIGHTS - scene->light_count) {
+        result = vshi_json_fail(reader, value, "are %zu lights, which with those before are over %d", count,
+                                MAX_LIGHTS);
+        goto done;
+    }
+    if (file) {
+        vsh_light_file *added = &files[scene->light_file_count++];
+        *added = one->file;
+        added->first = scene->light_count;
+        added->count = count;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        all[scene->light_count++] = file ? read[i] : one->light;
+    }
+done:
+    vsh_lights_free(read);
+    return result;
+}
+
 vsh_result vshi_read_lights(vshi_json *reader, const vshi_value *list, vsh_scene *scene) {
-    item *items = NULL;
-    size_t count;
-    vsh_light *lights = NULL;
-    vsh_light_file *files = NULL;
-    void *memory;
-    VSHI_TRY(vshi_read_list(reader, list, 0, MAX_LIGHTS, sizeof *items, read_item, &memory, &count));
-    items = memory;
-    VSHI_TRY(vshi_json_allocate(reader, (void **)&files, count, sizeof *files, "files of lights"));
+    static const vshi_key key = {
+        .kind = VSHI_LIST, .read = read_item, .count = sizeof(item), .highest = MAX_LIGHTS};
+    vshi_list items;
+    vsh_light *lights;
+    vsh_light_file *files;
+    VSHI_TRY(vshi_read_value(reader, list, &key, &items));
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&files, items.count, sizeof *files, "files of lights"));
     VSHI_TRY(vshi_json_allocate(reader, (void **)&lights, MAX_LIGHTS, sizeof *lights, "lights"));
     scene->lights = lights;
     scene->light_files = files;
-    for (size_t i = 0; i < count; ++i) {
+    for (size_t i = 0; i < items.count; ++i) {
         const vshi_value value = vshi_item(list, i);
-        if (items[i].file.path == NULL) {
-            VSHI_TRY(append(reader, &value, &items[i].light, 1, lights, scene));
-            continue;
-        }
-        vsh_light_file *file = &files[scene->light_file_count];
-        *file = items[i].file;
-        file->first = scene->light_count;
-        if (reader->run != NULL) {
-            VSHI_TRY(append_file(reader, &value, file, lights, scene));
-        }
-        ++scene->light_file_count;
+        VSHI_TRY(add_item(reader, &value, (const item *)items.items + i, lights, files, scene));
     }
     return check_names(reader, list, scene);
 }
@@ -347,17 +322,6 @@ static void make_name(const char *given, const vsh_light *before, size_t count, 
     }
 }
 
-/* Directions are towards a sun, and away from a spot. */
-static void place(const vsh_model_light *given, double scale, vsh_light *light) {
-    for (int i = 0; i < 3; ++i) {
-        light->direction[i] =
-            given->type == VSH_MODEL_LIGHT_DIRECTIONAL ? 0.0 - given->direction[i] : light->direction[i];
-        light->axis[i] = given->type == VSH_MODEL_LIGHT_SPOT ? given->direction[i] : light->axis[i];
-        light->position[i] = scale * given->position[i];
-        light->color[i] = given->color[i] * given->intensity;
-    }
-}
-
 static vsh_light light_of(const vsh_model_light *given, double angle, double radius, double scale) {
     static const int32_t types[] = {[VSH_MODEL_LIGHT_DIRECTIONAL] = VSH_LIGHT_DIRECTIONAL,
                                     [VSH_MODEL_LIGHT_POINT] = VSH_LIGHT_SPHERE,
@@ -371,8 +335,15 @@ static vsh_light light_of(const vsh_model_light *given, double angle, double rad
     if (given->type == VSH_MODEL_LIGHT_SPOT) {
         light.inner_angle = given->inner_angle;
         light.outer_angle = given->outer_angle;
+        memcpy(light.axis, given->direction, sizeof light.axis); /* away from the spot */
     }
-    place(given, scale, &light);
+    for (int i = 0; i < 3; ++i) {
+        if (given->type == VSH_MODEL_LIGHT_DIRECTIONAL) {
+            light.direction[i] = 0.0 - given->direction[i]; /* towards the sun */
+        }
+        light.position[i] = scale * given->position[i];
+        light.color[i] = given->color[i] * given->intensity;
+    }
     return light;
 }
 

@@ -290,33 +290,32 @@ static vsh_result read_texture(vshi_masks *masks, const vsh_model_material *told
 
 /* --- materials */
 
-static vsh_result read_material(vshi_masks *masks, size_t index, const vsh_run *run, vsh_error *error) {
-    material *m = &masks->materials[index];
-    const vsh_model_material told = vsh_model_get_material(masks->model, index);
-    const bool masked = told.alpha == VSH_ALPHA_MASKED;
+static vsh_result read_material(vshi_masks *masks, const vsh_model_material *told, material *m,
+                                const vsh_run *run, vsh_error *error) {
+    const bool masked = told->alpha == VSH_ALPHA_MASKED;
     if (m->state != NOT_READ) {
         return VSH_OK;
     }
     m->state = WHOLE;
-    if (told.alpha == VSH_ALPHA_OPAQUE || (masked && !(told.alpha_cutoff > 0.0))) {
+    if (told->alpha == VSH_ALPHA_OPAQUE || (masked && !(told->alpha_cutoff > 0.0))) {
         return VSH_OK;
     }
     const texture *found = NULL;
-    if (told.image != NULL || told.image_path != NULL) {
-        VSHI_TRY(read_texture(masks, &told, run, &found, error));
+    if (told->image != NULL || told->image_path != NULL) {
+        VSHI_TRY(read_texture(masks, told, run, &found, error));
     }
-    if (masked && told.base_alpha < told.alpha_cutoff) {
+    if (masked && told->base_alpha < told->alpha_cutoff) {
         m->state = NOTHING;
     } else if (found != NULL && found->alpha != NULL) {
         m->state = BY_MASK;
-        m->binary = found->binary && told.base_alpha >= HALF;
+        m->binary = found->binary && told->base_alpha >= HALF;
         m->mask = (vsh_alpha_mask){.alpha = found->alpha,
                                    .width = found->width,
                                    .height = found->height,
-                                   .wrap = {told.wrap[0], told.wrap[1]},
-                                   .alpha_cutoff = masked ? told.alpha_cutoff : HALF,
-                                   .base_alpha = masked ? told.base_alpha : 1.0};
-        memcpy(m->mask.uv_transform, told.uv_transform, sizeof told.uv_transform);
+                                   .wrap = {told->wrap[0], told->wrap[1]},
+                                   .alpha_cutoff = masked ? told->alpha_cutoff : HALF,
+                                   .base_alpha = masked ? told->base_alpha : 1.0};
+        memcpy(m->mask.uv_transform, told->uv_transform, sizeof told->uv_transform);
     }
     return VSH_OK;
 }
@@ -332,13 +331,20 @@ static vshi_mask_cover cover_of(const vshi_mask_table *table, const vsh_mesh *me
     return vshi_mask_table_cover(table, places);
 }
 
+/* A mesh's material and shape. */
+typedef struct looked {
+    vsh_model_material told;
+    material *material; /* NULL: it has none, and so is opaque */
+    shape *shape;
+} looked;
+
 /* The alpha of a mesh's vertices, where it has any and its material is not opaque, as its shape's mask. */
-static vsh_result look_at_vertices(vshi_masks *masks, size_t mesh, const vsh_run *run, vsh_error *error) {
-    const size_t number = (size_t)vsh_model_mesh_material(masks->model, mesh);
-    const vsh_model_material told = vsh_model_get_material(masks->model, number);
+static vsh_result look_at_vertices(vshi_masks *masks, const looked *l, size_t mesh, const vsh_run *run,
+                                   vsh_error *error) {
+    const vsh_model_material told = l->told;
     const vshi_model_shape *of = &masks->model->shapes[masks->model->entries[mesh].shape];
-    const material *m = &masks->materials[number];
-    shape *s = &masks->shapes[masks->model->entries[mesh].shape];
+    const material *m = l->material;
+    shape *s = l->shape;
     if (s->looked) {
         return VSH_OK;
     }
@@ -365,21 +371,30 @@ static vsh_result look_at_vertices(vshi_masks *masks, size_t mesh, const vsh_run
     return VSH_OK;
 }
 
-vsh_result vshi_masks_blend(vshi_masks *masks, size_t mesh, const vsh_run *run, vshi_blend *blend,
-                            vsh_error *error) {
+/* Finds the material and the shape of a mesh, and reads what is not known of them. */
+static vsh_result look_at(vshi_masks *masks, size_t mesh, const vsh_run *run, looked *l, vsh_error *error) {
     const int32_t number = vsh_model_mesh_material(masks->model, mesh);
-    *blend = VSHI_BLEND_GLASS;
+    *l = (looked){.shape = &masks->shapes[masks->model->entries[mesh].shape]};
     if (number < 0) {
         return VSH_OK;
     }
-    const vsh_model_material told = vsh_model_get_material(masks->model, (size_t)number);
-    if (told.alpha != VSH_ALPHA_BLENDED) {
+    l->told = vsh_model_get_material(masks->model, (size_t)number);
+    l->material = &masks->materials[number];
+    VSHI_TRY(read_material(masks, &l->told, l->material, run, error));
+    return look_at_vertices(masks, l, mesh, run, error);
+}
+
+vsh_result vshi_masks_blend(vshi_masks *masks, size_t mesh, const vsh_run *run, vshi_blend *blend,
+                            vsh_error *error) {
+    looked l;
+    *blend = VSHI_BLEND_GLASS;
+    VSHI_TRY(look_at(masks, mesh, run, &l, error));
+    const vsh_model_material told = l.told;
+    const material *m = l.material;
+    const shape *s = l.shape;
+    if (m == NULL || told.alpha != VSH_ALPHA_BLENDED) {
         return VSH_OK;
     }
-    VSHI_TRY(read_material(masks, (size_t)number, run, error));
-    const material *m = &masks->materials[number];
-    const shape *s = &masks->shapes[masks->model->entries[mesh].shape];
-    VSHI_TRY(look_at_vertices(masks, mesh, run, error));
     const double factor = told.base_alpha * (s->vertices.uniform ? s->vertices.factor : 1.0);
     if (m->state == BY_MASK ? m->binary && factor >= HALF : s->vertices.binary && factor >= HALF) {
         *blend = VSHI_BLEND_CUT_OUT;
@@ -429,14 +444,11 @@ done:
 static vsh_result sort_by(material *m, const vsh_mesh *textured, const vsh_run *run, shape *sorted,
                           vsh_error *error) {
     vshi_mask_table own = {.sums = NULL};
-    if (!sorted->masked) {
-        if (m->table.sums == NULL) {
-            VSHI_TRY(vshi_mask_table_create(&m->mask, run, &m->table, error));
-        }
-        return sort(&m->table, textured, run, sorted, error);
+    vshi_mask_table *table = sorted->masked ? &own : &m->table;
+    if (table->sums == NULL) {
+        VSHI_TRY(vshi_mask_table_create(sorted->masked ? &sorted->mask : &m->mask, run, table, error));
     }
-    VSHI_TRY(vshi_mask_table_create(&sorted->mask, run, &own, error));
-    const vsh_result result = sort(&own, textured, run, sorted, error);
+    const vsh_result result = sort(table, textured, run, sorted, error);
     vshi_mask_table_free(&own);
     return result;
 }
@@ -444,16 +456,15 @@ static vsh_result sort_by(material *m, const vsh_mesh *textured, const vsh_run *
 vsh_result vshi_masks_cast(vshi_masks *masks, size_t index, const vsh_run *run, vshi_cast_views *views,
                            vsh_error *error) {
     const vsh_mesh mesh = vsh_model_mesh(masks->model, index, -1);
-    const int32_t number = vsh_model_mesh_material(masks->model, index);
+    looked l;
     *views = (vshi_cast_views){.meshes = {mesh}, .count = 1};
-    if (number < 0) {
+    VSHI_TRY(look_at(masks, index, run, &l, error));
+    if (l.material == NULL) {
         return VSH_OK;
     }
-    VSHI_TRY(read_material(masks, (size_t)number, run, error));
-    VSHI_TRY(look_at_vertices(masks, index, run, error));
-    material *m = &masks->materials[number];
-    shape *sorted = &masks->shapes[masks->model->entries[index].shape];
-    const vsh_model_material told = vsh_model_get_material(masks->model, (size_t)number);
+    const vsh_model_material told = l.told;
+    material *m = l.material;
+    shape *sorted = l.shape;
     const bool faint = told.alpha == VSH_ALPHA_MASKED && sorted->vertices.uniform &&
                        told.base_alpha * sorted->vertices.factor < told.alpha_cutoff;
     if (m->state == NOTHING || faint) {

@@ -58,7 +58,8 @@ double vsh_scene_reach(const vsh_scene *scene, const vsh_grid *grid, const doubl
 
 /* --- casters that are thinner than voxels, where what is baked depends on them */
 
-/* Of a mesh's area: less is told of none. Edges sharper than a voxel are lost everywhere. */
+/* The least share of a mesh's area that is worth a warning. Edges sharper than a voxel are lost everywhere.
+ */
 static const double TOLD = 0.005;
 /* Voxels that hold a part are so much smaller than it is thick. */
 static const double HELD = 0.8;
@@ -212,37 +213,16 @@ static double reach_of(const making *m, const vsh_grid_info *info) {
     return reach > WITHIN * diagonal ? reach : vsh_field_options_default().reach;
 }
 
-/* Whether enough rays are cast on a field for its surface: to make it takes as long as two rays an active
- * voxel are faster by it. */
-static bool pays(const making *m, const vsh_scene_layer *layer, const vsh_grid_info *voxels) {
-    static const double RAYS = 2.0;
-    const double rays = m->options.points * vshi_scene_field_rays(m->scene, layer);
-    return rays >= RAYS * (double)voxels->active_voxels;
-}
-
-/* The level set of a layer's casters, or (NULL) of those in none, of so many voxels; NULL where there are
- * none. *made is what is to be freed of it. */
-static vsh_result find_grid(making *m, const vsh_scene_layer *layer, int32_t resolution,
-                            const vsh_grid **grid, vsh_grid **made, vsh_error *error) {
-    *made = NULL;
-    *grid = layer == NULL ? m->options.grid : NULL;
-    if (*grid != NULL) {
-        return VSH_OK;
-    }
-    vsh_scene scene = *m->scene;
-    scene.grid.resolution = resolution != VSH_RESOLUTION_NAMED ? resolution : scene.grid.resolution;
-    const vsh_result result = vsh_scene_layer_casters(&scene, m->assets, layer, &m->voxel, made, error);
-    *grid = *made;
-    return result;
-}
-
 /* The field of a layer's casters, or (NULL) of those in none, whose level set is known; surfaces where rays
  * pay for them. */
 static vsh_field_options options_of(const making *m, const vsh_scene_layer *layer,
                                     const vsh_grid_info *voxels) {
+    /* to make a surface takes as long as two rays an active voxel are faster by it */
+    static const double RAYS = 2.0;
     vsh_field_options options = vsh_field_options_default();
     options.reach = reach_of(m, voxels);
-    options.surface = pays(m, layer, voxels);
+    options.surface =
+        m->options.points * vshi_scene_field_rays(m->scene, layer) >= RAYS * (double)voxels->active_voxels;
     if (vshi_scene_is_level_set(m->scene, layer)) {
         options.grown = 0.0; /* its voxels are the definition */
     }
@@ -252,22 +232,27 @@ static vsh_field_options options_of(const making *m, const vsh_scene_layer *laye
     return options;
 }
 
-/* Out of voxels that are made, or given. */
+/* Makes a field of the level set of a layer's casters, of so many voxels, or of the one that is given. */
 static vsh_result create_field(making *m, const vsh_scene_layer *layer, int32_t resolution,
                                vsh_grid_info *voxels, vsh_field **field, vsh_error *error) {
     const double start = vshi_seconds();
-    const vsh_grid *grid;
-    vsh_grid *made;
-    const vsh_result result = find_grid(m, layer, resolution, &grid, &made, error);
-    if (result != VSH_OK || grid == NULL) {
-        return result;
+    const vsh_grid *grid = layer == NULL ? m->options.grid : NULL;
+    vsh_grid *made = NULL;
+    if (grid == NULL) {
+        vsh_scene scene = *m->scene;
+        scene.grid.resolution = resolution != VSH_RESOLUTION_NAMED ? resolution : scene.grid.resolution;
+        VSHI_TRY(vsh_scene_layer_casters(&scene, m->assets, layer, &m->voxel, &made, error));
+        grid = made;
+    }
+    if (grid == NULL) {
+        return VSH_OK;
     }
     m->own.voxelize_s += vshi_seconds() - start;
     vsh_grid_get_info(grid, voxels);
     const vsh_field_options options = options_of(m, layer, voxels);
-    const vsh_result created = vsh_field_create(grid, &options, &m->voxel, field, error);
+    const vsh_result result = vsh_field_create(grid, &options, &m->voxel, field, error);
     vsh_grid_free(made); /* the field does not need it */
-    return created;
+    return result;
 }
 
 /* *field is NULL where there are no casters. */
@@ -305,15 +290,9 @@ static vsh_result make_field_of(making *m, const vsh_scene_layer *layer, const v
                                 vsh_field **field, vsh_error *error) {
     vsh_error why;
     const vsh_result result = make_field(m, layer, triangles, field, &why);
-    if (result == VSH_OK || error == NULL) {
-        return result;
-    }
-    vsh_error placed = {why.code, ""};
-    const size_t size = sizeof placed.message;
-    const int written =
-        layer != NULL ? snprintf(placed.message, size, "layer '%s': %s", layer->name, why.message) : -1;
-    *error = written >= 0 && written < (int)size ? placed : why;
-    return result;
+    return result == VSH_OK ? VSH_OK
+           : layer != NULL  ? vshi_fail(error, result, "layer '%s': %s", layer->name, why.message)
+                            : vshi_fail(error, result, "%s", why.message);
 }
 
 /* Triangles where exact methods trace them, else NULL. */
@@ -384,16 +363,6 @@ static vsh_result add_direct(making *m, size_t place, vsh_error *error) {
     return VSH_OK;
 }
 
-static vsh_result allocate_layers(making *m, size_t count, vsh_error *error) {
-    VSHI_TRY(vshi_allocate((void **)&m->layers, count, sizeof *m->layers, "layers", error));
-    VSHI_TRY(
-        vshi_allocate((void **)&m->own.layer_fields, count, sizeof *m->own.layer_fields, "layers", error));
-    VSHI_TRY(vshi_allocate((void **)&m->own.layer_triangles, count, sizeof *m->own.layer_triangles, "layers",
-                           error));
-    m->own.layer_capacity = count;
-    return VSH_OK;
-}
-
 static vsh_result make_layers(making *m, vsh_error *error) {
     const vsh_scene *scene = m->scene;
     size_t direct = 0;
@@ -406,7 +375,12 @@ static vsh_result make_layers(making *m, vsh_error *error) {
                          "%zu layers and %zu casters that are not voxelised: at most %d together",
                          scene->layer_count, direct, VSH_MAX_LAYERS);
     }
-    VSHI_TRY(allocate_layers(m, most, error));
+    vshi_occluders_own *own = &m->own;
+    VSHI_TRY(vshi_allocate((void **)&m->layers, most, sizeof *m->layers, "layers", error));
+    VSHI_TRY(vshi_allocate((void **)&own->layer_fields, most, sizeof *own->layer_fields, "layers", error));
+    VSHI_TRY(
+        vshi_allocate((void **)&own->layer_triangles, most, sizeof *own->layer_triangles, "layers", error));
+    own->layer_capacity = most;
     for (size_t i = 0; i < scene->layer_count; ++i) {
         const vsh_scene_layer *of_scene = &scene->layers[i];
         vsh_field **field = &m->own.layer_fields[i];

@@ -172,15 +172,6 @@ static void describe_rays(const vsh_shade_options *o, bool adaptive, char *text,
     }
 }
 
-/* Of methods by one march, and of AO by cones: what is not the rays'. */
-static void describe_march(const vsh_shade_options *o, bool ao, int32_t method, char *text, size_t size) {
-    if (ao && method == VSH_AO_CONES) {
-        snprintf(text, size, ", %d cones", o->ao_cones);
-    } else if (!ao && o->jitter > 0.0) {
-        snprintf(text, size, ", jitter %.9g", o->jitter);
-    }
-}
-
 /* Adds a method: that of shadows (`ao` false), of AO itself (" within 2") or of the sky (" over y"). */
 static vsh_result add_method(vsh_provenance *p, const vsh_provenance_source *source, const char *name,
                              bool ao, const char *what, vsh_error *error) {
@@ -191,8 +182,10 @@ static vsh_result add_method(vsh_provenance *p, const vsh_provenance_source *sou
     const uint32_t traits = ao ? vsh_ao_method_traits(method) : vsh_shadow_method_traits(method);
     if ((traits & VSH_METHOD_RAYS) != 0) {
         describe_rays(o, (traits & VSH_METHOD_KEEPS_ERROR) != 0, more, sizeof more);
-    } else {
-        describe_march(o, ao, method, more, sizeof more);
+    } else if (ao && method == VSH_AO_CONES) {
+        snprintf(more, sizeof more, ", %d cones", o->ao_cones);
+    } else if (!ao && o->jitter > 0.0) {
+        snprintf(more, sizeof more, ", jitter %.9g", o->jitter);
     }
     snprintf(text, sizeof text, "%s%s%s", vsh_get_name(ao ? VSH_NAMES_AO : VSH_NAMES_SHADOW, method), what,
              more);
@@ -258,26 +251,10 @@ static vsh_result add_inputs(vsh_provenance *p, const file_list *inputs, vshi_jo
     return VSH_OK;
 }
 
-static vsh_result fill(vsh_provenance *p, const vsh_provenance_source *source, const vsh_run *run,
-                       vsh_error *error) {
-    VSHI_NUMBERS;
-    VSHI_TRY(add_settings(p, source, error));
-    file_list inputs = {NULL, 0, 0};
-    vshi_job *job = vshi_job_begin(run, "hash", HASH_UNITS);
-    if (job == NULL) {
-        return out_of_memory("provenance", error);
-    }
-    vsh_result result =
-        find_inputs(source->scene, source->files, source->file_count, run, job, &inputs, error);
-    result = result == VSH_OK ? add_inputs(p, &inputs, job, error) : result;
-    vshi_job_end(job);
-    free_inputs(&inputs);
-    return result;
-}
-
 vsh_result vsh_provenance_create(const vsh_provenance_source *source, const vsh_run *run,
                                  vsh_provenance **provenance, vsh_error *error) {
     VSHI_FLOATS;
+    VSHI_NUMBERS;
     VSHI_NEEDS(provenance);
     *provenance = NULL;
     VSHI_NEEDS(source);
@@ -285,15 +262,22 @@ vsh_result vsh_provenance_create(const vsh_provenance_source *source, const vsh_
     vsh_run settings;
     VSHI_TRY(vshi_options_resolve(source, &full, sizeof full, "provenance source", error));
     VSHI_TRY(vshi_run_resolve(run, &settings, error));
+    file_list inputs = {NULL, 0, 0};
     vsh_provenance *made = NULL;
-    VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "provenance", error));
-    const vsh_result result = fill(made, &full, &settings, error);
-    if (result != VSH_OK) {
-        vsh_provenance_free(made);
-        return result;
-    }
+    vshi_job *job = vshi_job_begin(&settings, "hash", HASH_UNITS);
+    vsh_result result;
+    VSHI_TRY_DONE(job != NULL ? VSH_OK : out_of_memory("provenance", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, "provenance", error));
+    VSHI_TRY_DONE(add_settings(made, &full, error));
+    VSHI_TRY_DONE(find_inputs(full.scene, full.files, full.file_count, &settings, job, &inputs, error));
+    VSHI_TRY_DONE(add_inputs(made, &inputs, job, error));
     *provenance = made;
-    return VSH_OK;
+    made = NULL;
+done:
+    vsh_provenance_free(made);
+    vshi_job_end(job);
+    free_inputs(&inputs);
+    return result;
 }
 
 const vsh_attribute *vsh_provenance_attributes(const vsh_provenance *provenance, size_t *count) {

@@ -46,11 +46,10 @@ static vsh_result read_density(vshi_json *reader, const vshi_value *value, void 
     VSHI_TRY(vshi_json_allocate(reader, (void **)&rules, json_object_size(value->json), sizeof *rules,
                                 "patterns"));
     receiver->density = rules;
-    for (void *at = json_object_iter(value->json); at != NULL; at = json_object_iter_next(value->json, at)) {
-        vshi_value factor;
+    vshi_value factor = {.json = NULL};
+    while (vshi_next_member(value, &factor)) {
         vsh_density_rule *rule = &rules[receiver->density_count++];
-        VSHI_TRY(vshi_json_copy(reader, 0, json_object_iter_key(at), &rule->pattern));
-        vshi_member(value, json_object_iter_key(at), &factor);
+        VSHI_TRY(vshi_json_copy(reader, 0, factor.key, &rule->pattern));
         VSHI_TRY(vshi_read_value(reader, &factor, &key, &rule->factor));
     }
     return VSH_OK;
@@ -111,19 +110,14 @@ static void stand(const plane *p, double transform[12]) {
     }
 }
 
-/* Comes after the other keys, as it is put before the transform. */
-static vsh_result take_plane(vshi_json *reader, const vshi_value *value, vsh_receiver *receiver) {
+/* Reads the plane after the other keys, as it stands before the transform. */
+static vsh_result read_plane(vshi_json *reader, const vshi_value *value, vsh_receiver *receiver) {
     plane p = {.normal = {0.0, 1.0, 0.0}};
     VSHI_TRY(vshi_read_object(reader, value, &plane_table, 1, "a plane", &p));
     memcpy(receiver->extent, p.size, sizeof p.size);
     stand(&p, receiver->transform);
     receiver->path = "plane";
     return VSH_OK;
-}
-
-static vsh_result read_plane(vshi_json *reader, const vshi_value *value, void *member) {
-    (void)member;
-    return vshi_expect(reader, value, JSON_OBJECT);
 }
 
 const char *vshi_color_space_key(int32_t i) {
@@ -134,7 +128,7 @@ const char *vshi_color_space_key(int32_t i) {
 static const vshi_key receiver_keys[] = {
     VSHI_KEY("mesh", PATH, AT(path), VSHI_NEEDED_BY(MESH)),
     VSHI_KEY("heightfield", PATH, AT(path), .variants = HEIGHTFIELD),
-    VSHI_KEY("plane", CUSTOM, .variants = PLANE, .read = read_plane),
+    VSHI_KEY("plane", LATER, .variants = PLANE),
     VSHI_KEY("extent", VECTOR, AT(extent), VSHI_NEEDED_BY(HEIGHTFIELD), .count = 2, .lowest = 1e-12,
              .highest = 1e12),
     VSHI_KEY("height", NUMBER, AT(relief), VSHI_NEEDED_BY(HEIGHTFIELD), .lowest = -1e12, .highest = 1e12),
@@ -223,5 +217,5 @@ vsh_result vshi_read_receiver(vshi_json *reader, const vshi_value *value, void *
                                                                : VSH_RECEIVER_MESH;
     VSHI_TRY(vshi_read_object(reader, value, &vshi_receiver_table, 1U << receiver->type,
                               whats[receiver->type], receiver));
-    return receiver->type == VSH_RECEIVER_PLANE ? take_plane(reader, &given, receiver) : VSH_OK;
+    return receiver->type == VSH_RECEIVER_PLANE ? read_plane(reader, &given, receiver) : VSH_OK;
 }

@@ -14,17 +14,6 @@
 
 enum { MAX_ITEMS = 65536 };
 
-/* --- lists */
-
-static vsh_result read_casters(vshi_json *reader, const vshi_value *value, void *member) {
-    vsh_scene *scene = member;
-    void *items;
-    VSHI_TRY(vshi_read_list(reader, value, 1, MAX_ITEMS, sizeof *scene->casters, vshi_read_caster, &items,
-                            &scene->caster_count));
-    scene->casters = items;
-    return VSH_OK;
-}
-
 /* Names of lights, each a string that is the name of one. */
 static vsh_result read_light_names(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_scene_layer *layer = member;
@@ -73,15 +62,6 @@ static vsh_result read_layer(vshi_json *reader, const vshi_value *value, void *m
     return VSH_OK;
 }
 
-static vsh_result read_layers(vshi_json *reader, const vshi_value *value, void *member) {
-    vsh_scene *scene = member;
-    void *items;
-    VSHI_TRY(vshi_read_list(reader, value, 0, VSH_MAX_LAYERS, sizeof *scene->layers, read_layer, &items,
-                            &scene->layer_count));
-    scene->layers = items;
-    return VSH_OK;
-}
-
 static int by_output(const void *a, const void *b) {
     const vsh_receiver *const *x = a, *const *y = b;
     const int order = strcmp((*x)->output, (*y)->output);
@@ -114,15 +94,6 @@ static vsh_result check_outputs(vshi_json *reader, const vshi_value *value, cons
     }
     free(sorted);
     return result;
-}
-
-static vsh_result read_receivers(vshi_json *reader, const vshi_value *value, void *member) {
-    vsh_scene *scene = member;
-    void *items;
-    VSHI_TRY(vshi_read_list(reader, value, 0, MAX_ITEMS, sizeof *scene->receivers, vshi_read_receiver, &items,
-                            &scene->receiver_count));
-    scene->receivers = items;
-    return check_outputs(reader, value, scene);
 }
 
 static void count_bent(void *target) {
@@ -197,7 +168,8 @@ static vsh_result read_unit(vshi_json *reader, const vshi_value *value, void *me
 }
 
 static const vshi_key scene_keys[] = {
-    VSHI_KEY("casters", CUSTOM, .read = read_casters),
+    VSHI_KEY("casters", LIST, AT(casters), .lowest = 1.0, .highest = MAX_ITEMS, .read = vshi_read_caster,
+             .count = sizeof(vsh_caster)),
     VSHI_KEY("voxel_size", NUMBER, AT(grid.voxel_size), .lowest = VSHI_SMALLEST_LENGTH,
              .highest = VSHI_LARGEST_VOXEL, .flag = offsetof(vsh_scene, voxels_named),
              VSHI_OPTION("voxel-size", "SIZE", CASTERS,
@@ -212,7 +184,8 @@ static const vshi_key scene_keys[] = {
     VSHI_KEY("shell_thickness", NUMBER, AT(grid.shell_thickness), .lowest = 1.0, .highest = 50.0,
              VSHI_OPTION("shell-thickness", "VOXELS", LEVEL_SET,
                          "thickness of sheets and of walls behind rooms' faces")),
-    VSHI_KEY("layers", CUSTOM, .read = read_layers),
+    VSHI_KEY("layers", LIST, AT(layers), .highest = VSH_MAX_LAYERS, .read = read_layer,
+             .count = sizeof(vsh_scene_layer)),
     {.name = "lights", .kind = VSHI_LATER},
     VSHI_KEY("ao", CUSTOM, .read = read_ao),
     VSHI_KEY(
@@ -277,9 +250,14 @@ static const vshi_key scene_keys[] = {
                          .otherwise = "as FBX and DAE say; OBJ, PLY and STL stay as they are")),
     VSHI_KEY("cast_blended", BOOL, AT(cast_blended),
              VSHI_OPTION("cast-blended", NULL, CASTERS, "meshes of blended materials (glass) cast too")),
-    VSHI_KEY("receivers", CUSTOM, .read = read_receivers),
+    VSHI_KEY("receivers", LIST, AT(receivers), .highest = MAX_ITEMS, .read = vshi_read_receiver,
+             .count = sizeof(vsh_receiver)),
 };
 const vshi_table vshi_scene_table = VSHI_TABLE(scene_keys);
+_Static_assert(offsetof(vsh_scene, caster_count) == offsetof(vsh_scene, casters) + sizeof(void *) &&
+                   offsetof(vsh_scene, layer_count) == offsetof(vsh_scene, layers) + sizeof(void *) &&
+                   offsetof(vsh_scene, receiver_count) == offsetof(vsh_scene, receivers) + sizeof(void *),
+               "lists are as vshi_list");
 
 static bool is_named(const vsh_scene *scene, const char *path) {
     bool named = false;
@@ -459,7 +437,7 @@ static vsh_result check_layers(vshi_json *reader, const vshi_value *root, vsh_sc
 
 static vsh_result read_scene(vshi_json *reader, const vshi_value *root, void *made) {
     vsh_scene *scene = made;
-    vshi_value lights, region;
+    vshi_value lights, receivers, region;
     *scene = vsh_scene_default();
     VSHI_TRY(vshi_expect(reader, root, JSON_OBJECT));
     if (vshi_member(root, "region", &region)) {
@@ -467,6 +445,9 @@ static vsh_result read_scene(vshi_json *reader, const vshi_value *root, void *ma
     }
     VSHI_TRY(vshi_read_object(reader, root, &vshi_scene_table, 1, "a scene", scene));
     VSHI_TRY(vshi_reject_both(reader, root, "voxel_size", "resolution"));
+    if (vshi_member(root, "receivers", &receivers)) {
+        VSHI_TRY(check_outputs(reader, &receivers, scene));
+    }
     VSHI_TRY(add_terrains(reader, root, scene));
     if (vshi_member(root, "lights", &lights)) { /* after the unit of files' numbers */
         VSHI_TRY(vshi_read_lights(reader, &lights, scene));

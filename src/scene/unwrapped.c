@@ -96,10 +96,10 @@ typedef struct cutting {
     vshi_unwrapped *made;
 } cutting;
 
-static vsh_result take(vshi_unwrapped *made, size_t count, size_t size, void **array, vsh_error *error) {
-    VSHI_TRY(vshi_allocate(array, count, size, "unwrapped meshes", error));
-    made->arrays[made->array_count++] = *array;
-    return VSH_OK;
+/* The next `count` elements of four bytes in the memory for positions, normals and indices. */
+static void *take(vshi_unwrapped *made, size_t count) {
+    made->used += count;
+    return made->memory + made->used - count;
 }
 
 static uint32_t page_of(const cutting *c, const vsh_atlas_mesh *view, size_t triangle) {
@@ -127,29 +127,22 @@ static size_t count_by_page(const cutting *c, const vsh_atlas_mesh *view, size_t
     return pages > 0 ? pages : 1;
 }
 
-/* Copies `width` floats a vertex to where the atlas wants them; NULL where there are none. */
-static vsh_result gather(vshi_unwrapped *made, const float *from, const vsh_atlas_mesh *view, size_t width,
-                         const float **to, vsh_error *error) {
-    *to = NULL;
+/* Copies three floats a vertex to where the atlas wants them; NULL where there are none. */
+static const float *gather(vshi_unwrapped *made, const float *from, const vsh_atlas_mesh *view) {
     if (from == NULL || view->vertex_count == 0) {
-        return VSH_OK;
+        return NULL;
     }
-    void *memory;
-    VSHI_TRY(take(made, view->vertex_count, width * sizeof(float), &memory, error));
-    float *gathered = memory;
+    float *to = take(made, 3 * (size_t)view->vertex_count);
     for (size_t v = 0; v < view->vertex_count; ++v) {
-        memcpy(gathered + width * v, from + width * (size_t)view->sources[v], width * sizeof *gathered);
+        memcpy(to + 3 * v, from + 3 * (size_t)view->sources[v], 3 * sizeof *to);
     }
-    *to = gathered;
-    return VSH_OK;
+    return to;
 }
 
-/* The triangles of a mesh that lie on one page. */
-static vsh_result select_page(const cutting *c, const vsh_atlas_mesh *view, uint32_t page, bool first,
-                              vsh_mesh *part, vsh_error *error) {
-    void *memory;
-    VSHI_TRY(take(c->made, c->on_page[page], 3 * sizeof(uint32_t), &memory, error));
-    uint32_t *indices = memory;
+/* Copies the triangles of a mesh that lie on one page. */
+static void select_page(const cutting *c, const vsh_atlas_mesh *view, uint32_t page, bool first,
+                        vsh_mesh *part) {
+    uint32_t *indices = take(c->made, 3 * c->on_page[page]);
     part->indices = indices;
     part->triangle_count = 0;
     for (size_t t = 0; t < view->triangle_count; ++t) {
@@ -158,11 +151,10 @@ static vsh_result select_page(const cutting *c, const vsh_atlas_mesh *view, uint
             memcpy(indices + 3 * part->triangle_count++, view->indices + 3 * t, 3 * sizeof *indices);
         }
     }
-    return VSH_OK;
 }
 
 /* Adds a mesh's parts to the pages' lists, of which `page_begins` says where each goes on. */
-static vsh_result add_parts(cutting *c, size_t m, vsh_error *error) {
+static void add_parts(cutting *c, size_t m) {
     vshi_unwrapped *made = c->made;
     const vsh_atlas_mesh view = vsh_atlas_mesh_view(made->atlas, m);
     size_t first;
@@ -173,8 +165,8 @@ static vsh_result add_parts(cutting *c, size_t m, vsh_error *error) {
     part.indices = view.indices;
     part.vertex_count = view.vertex_count;
     part.object = pages > 1 && part.object == 0 ? ++c->objects : part.object;
-    VSHI_TRY(gather(made, c->meshes[m].positions, &view, 3, &part.positions, error));
-    VSHI_TRY(gather(made, c->meshes[m].normals, &view, 3, &part.normals, error));
+    part.positions = gather(made, c->meshes[m].positions, &view);
+    part.normals = gather(made, c->meshes[m].normals, &view);
     for (size_t page = 0; page < made->page_count; ++page) {
         if (c->on_page[page] == 0 && !(page == first && pages == 1)) {
             continue;
@@ -183,19 +175,22 @@ static vsh_result add_parts(cutting *c, size_t m, vsh_error *error) {
         *placed = part;
         made->numbers[made->page_begins[page]++] = m;
         if (pages > 1) {
-            VSHI_TRY(select_page(c, &view, (uint32_t)page, page == first, placed, error));
+            select_page(c, &view, (uint32_t)page, page == first, placed);
         }
     }
-    return VSH_OK;
 }
 
-/* Where each page's parts begin, and how many there are. */
-static void count_parts(cutting *c) {
+/* Finds where each page's parts begin, and how many there are. Returns the elements that they take. */
+static size_t count_parts(cutting *c) {
     vshi_unwrapped *made = c->made;
+    size_t elements = 0;
     for (size_t m = 0; m < c->count; ++m) {
         const vsh_atlas_mesh view = vsh_atlas_mesh_view(made->atlas, m);
         size_t first;
-        const bool empty = count_by_page(c, &view, &first) == 1 && c->on_page[first] == 0;
+        const size_t pages = count_by_page(c, &view, &first);
+        const bool empty = pages == 1 && c->on_page[first] == 0;
+        elements += (c->meshes[m].normals != NULL ? 6 : 3) * (size_t)view.vertex_count;
+        elements += pages > 1 ? 3 * (size_t)view.triangle_count : 0;
         for (size_t page = 0; page < made->page_count; ++page) {
             made->page_begins[page + 1] += c->on_page[page] > 0 || (empty && page == first);
         }
@@ -204,6 +199,7 @@ static void count_parts(cutting *c) {
         made->page_begins[page + 1] += made->page_begins[page];
     }
     made->part_count = made->page_begins[made->page_count];
+    return elements;
 }
 
 static vsh_result cut(cutting *c, const vsh_run *run, vsh_error *error) {
@@ -221,15 +217,15 @@ static vsh_result cut(cutting *c, const vsh_run *run, vsh_error *error) {
     VSHI_TRY(vshi_allocate((void **)&c->on_page, made->page_count, sizeof *c->on_page, "pages", error));
     VSHI_TRY(vshi_allocate((void **)&made->page_begins, made->page_count + 2, sizeof *made->page_begins,
                            "pages", error));
-    count_parts(c);
+    const size_t elements = count_parts(c);
     VSHI_TRY(vshi_allocate((void **)&made->parts, made->part_count, sizeof *made->parts, "meshes", error));
     VSHI_TRY(
         vshi_allocate((void **)&made->numbers, made->part_count, sizeof *made->numbers, "meshes", error));
-    VSHI_TRY(vshi_allocate((void **)&made->arrays, 2 * c->count + made->part_count, sizeof *made->arrays,
-                           "meshes", error));
+    VSHI_TRY(
+        vshi_allocate((void **)&made->memory, elements, sizeof *made->memory, "unwrapped meshes", error));
     /* each page's beginning moves to its end, which is where the next one's is */
     for (size_t m = 0; m < c->count; ++m) {
-        VSHI_TRY(add_parts(c, m, error));
+        add_parts(c, m);
     }
     memmove(made->page_begins + 1, made->page_begins, made->page_count * sizeof *made->page_begins);
     made->page_begins[0] = 0;
@@ -300,25 +296,21 @@ vsh_result vsh_model_densities(const vsh_model *model, const char *path, const v
     return VSH_OK;
 }
 
-/* Factors of the density of a receiver's meshes; NULL: all are 1. To be freed. */
+/* Lists the factors of the density of a receiver's meshes, to be freed also after an error; NULL: all are 1.
+ */
 static vsh_result list_densities(const vsh_receiver *receiver, const vsh_model *model, const size_t *numbers,
                                  size_t count, double **density, vsh_error *error) {
-    double *all = NULL;
-    vsh_result result;
-    *density = NULL;
     if (receiver->density_count == 0) {
         return VSH_OK;
     }
-    VSHI_TRY_DONE(vshi_allocate((void **)&all, vsh_model_mesh_count(model), sizeof *all, "densities", error));
-    VSHI_TRY_DONE(vshi_allocate((void **)density, count, sizeof **density, "densities", error));
-    VSHI_TRY_DONE(
-        vsh_model_densities(model, receiver->path, receiver->density, receiver->density_count, all, error));
+    const size_t all = vsh_model_mesh_count(model);
+    VSHI_TRY(vshi_allocate((void **)density, all, sizeof **density, "densities", error));
+    VSHI_TRY(vsh_model_densities(model, receiver->path, receiver->density, receiver->density_count, *density,
+                                 error));
     for (size_t m = 0; m < count; ++m) {
-        (*density)[m] = all[numbers[m]];
+        (*density)[m] = (*density)[numbers[m]]; /* numbers rise, so none was overwritten */
     }
-done:
-    free(all);
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_unwrap_receiver(const vsh_receiver *receiver, const vsh_model *model, const vsh_mesh *meshes,
@@ -383,10 +375,7 @@ vsh_result vshi_unwrapped_take(vshi_unwrapped *made, vsh_mesh **meshes, size_t *
 }
 
 void vshi_unwrapped_free(vshi_unwrapped *unwrapped) {
-    for (size_t i = 0; i < unwrapped->array_count; ++i) {
-        free(unwrapped->arrays[i]);
-    }
-    free(unwrapped->arrays);
+    free(unwrapped->memory);
     free(unwrapped->pages);
     free(unwrapped->page_begins);
     free(unwrapped->numbers);

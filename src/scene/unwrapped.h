@@ -9,7 +9,7 @@
  * object. They are sorted by their pages, and stand in the meshes' order on each. */
 typedef struct vshi_unwrapped {
     vsh_atlas *atlas; /* NULL: nothing was unwrapped, and all but the pages is 0 */
-    vsh_mesh *parts;  /* [part_count]: views of the arrays below, with the meshes' own transforms; NULL when
+    vsh_mesh *parts;  /* [part_count]: views of the memory below, with the meshes' own transforms; NULL when
                          they were moved */
     size_t *numbers;  /* [part_count]: which of the meshes each is a part of */
     size_t part_count;
@@ -18,8 +18,8 @@ typedef struct vshi_unwrapped {
     size_t page_count;
     vsh_receiver_page *pages; /* [page_count] */
     vsh_receiver_page whole;
-    void **arrays; /* [array_count] */
-    size_t array_count;
+    uint32_t *memory; /* of the parts' positions, normals and indices, of which so many elements are used */
+    size_t used;
 } vshi_unwrapped;
 
 /* Whether its meshes are unwrapped: VSH_RECEIVER_UNWRAP_NEVER, …_AUTO or …_ALWAYS. */

@@ -39,9 +39,9 @@ static void points_on(const vsh_mesh *mesh, double *positions, float *normals) {
 TEST(a_layer_of_heights_is_marched_by_hard_and_classic_and_by_no_other_method) {
     static double positions[3 * POINTS];
     static float normals[3 * POINTS], values[POINTS], other[POINTS];
-    float *heights = hills(SIDE, SIDE);
+    FREED float *heights = hills(SIDE, SIDE);
     const vsh_heights_source source = source_of(heights, SIDE, SIDE, 10.0, 1.5);
-    vsh_model *model = model_of(&source, VSH_HEIGHTS_SOLID);
+    OWNED(vsh_model) *model = model_of(&source, VSH_HEIGHTS_SOLID);
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     points_on(&mesh, positions, normals);
     vsh_layer layer = vsh_layer_default();
@@ -88,8 +88,6 @@ TEST(a_layer_of_heights_is_marched_by_hard_and_classic_and_by_no_other_method) {
     }
     vsh_field_free(empty);
     vsh_heights_free((vsh_heights *)(uintptr_t)layer.heights);
-    vsh_model_free(model);
-    free(heights);
 }
 
 /* Bakes the floor under casters given as JSON; coverage of its texels. */
@@ -100,7 +98,7 @@ static void bake_floor(const char *casters, float *shadow, float *coverage, int3
              "\"direction\":[0,1,0]}],"
              "\"receivers\":[{\"mesh\":\"seeds_floor.obj\",\"output\":\"none.exr\"}]}",
              casters);
-    vsh_scene *scene = NULL;
+    OWNED(vsh_scene) *scene = NULL;
     vsh_assets *assets = NULL;
     assert_ok(vshi_scene_parse(VSH_ASSETS "/scene.json", text, strlen(text), NULL, &scene, &failure) !=
                   VSH_OK ||
@@ -115,19 +113,16 @@ static void bake_floor(const char *casters, float *shadow, float *coverage, int3
     options.padding = 0;
     size_t count = 0;
     const vsh_mesh *meshes = vsh_assets_receiver(assets, 0, &count);
-    vsh_charts *texels = NULL;
+    OWNED(vsh_charts) *texels = NULL;
     assert_ok(vsh_charts_create(meshes, count, &options, NULL, NULL, &texels, &failure));
     static const double high[3] = {0.0, 1.0, 0.0};
     const vsh_light light = sun(high, 0.1);
     float *const planes[1] = {shadow};
     vsh_lightmap lightmap = {.shadow = planes, .coverage = coverage};
-    vsh_field *empty = empty_field();
+    OWNED(vsh_field) *empty = empty_field();
     assert_ok(vsh_bake_lightmap(occluders_with(empty, &layer, 1), texels, &light, 1, &shade, NULL, &lightmap,
                                 NULL, &failure));
-    vsh_field_free(empty);
-    vsh_charts_free(texels);
     vsh_assets_free(assets);
-    vsh_scene_free(scene);
 }
 
 TEST(texels_within_a_sphere_or_a_terrain_are_not_valid) {

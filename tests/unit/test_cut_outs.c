@@ -82,7 +82,7 @@ static void write_card(const char *materials, const char *sampler, const char *i
     memcpy(body + sizeof positions, uvs, sizeof uvs);
     memcpy(body + sizeof positions + sizeof uvs, indices, sizeof indices);
     const size_t room = 2 * BODY + strlen(image_uri) + 4096;
-    char *json = malloc(room), *buffer = malloc(2 * BODY + 8);
+    FREED char *json = malloc(room), *buffer = malloc(2 * BODY + 8);
     base64(body, BODY, buffer);
     const int size = snprintf(
         json, room,
@@ -99,8 +99,6 @@ static void write_card(const char *materials, const char *sampler, const char *i
         sizeof positions + sizeof uvs, sizeof indices, materials, sampler, image_uri, BODY, buffer);
     assert_in_range(size, 1, room - 1);
     write_bytes("a.gltf", json, (size_t)size);
-    free(buffer);
-    free(json);
 }
 
 #define MASKED(more)                                                                                         \
@@ -154,7 +152,7 @@ static vsh_result load(card c, vsh_assets **assets) {
 static void expect_shadow(vsh_assets *assets, int (*expected)(double x, double z)) {
     size_t count = 0;
     const vsh_mesh *meshes = vsh_assets_caster(assets, 0, &count);
-    vsh_triangles *triangles = NULL;
+    OWNED(vsh_triangles) *triangles = NULL;
     assert_ok(vsh_triangles_create(meshes, count, NULL, &triangles, &failure));
     int met = 0, asked = 0;
     for (int i = 0; i < 79 * 79; ++i) {
@@ -172,7 +170,6 @@ static void expect_shadow(vsh_assets *assets, int (*expected)(double x, double z
         }
     }
     assert_true(asked > 5000 && met > 150);
-    vsh_triangles_free(triangles);
     vsh_assets_free(assets);
 }
 
@@ -331,11 +328,10 @@ TEST(textures_that_cannot_be_had_leave_the_card_whole) {
                           {(unsigned char *)(uintptr_t) "RIFF\1\0\0\0WEBPVP8 ", 16}};
     for (size_t i = 0; i < 2 * (sizeof none / sizeof none[0] + 1); ++i) {
         const bool missing = i / 2 == sizeof none / sizeof none[0];
-        char *uri = missing ? strdup("gone.png") : data_uri(none[i / 2]);
+        FREED char *uri = missing ? strdup("gone.png") : data_uri(none[i / 2]);
         assert_casts((card){.reader = i % 2 != 0, .uri = uri}, everywhere);
         assert_non_null(strstr(warnings, "material 'leaf' casts whole"));
         assert_null(strchr(warnings, '\n'));
-        free(uri);
     }
     free(png.at);
 }

@@ -188,10 +188,10 @@ TEST(level_sets_and_volumes_carry_them) {
     const vsh_sdf sdf = {&ball, 1};
     vsh_grid_options options = vsh_grid_options_default();
     options.resolution = 16;
-    vsh_grid *grid = NULL;
-    vsh_field *field = NULL;
-    vsh_voxels *voxels = NULL;
-    vsh_volume *volume = NULL;
+    OWNED(vsh_grid) *grid = NULL;
+    OWNED(vsh_field) *field = NULL;
+    OWNED(vsh_voxels) *voxels = NULL;
+    OWNED(vsh_volume) *volume = NULL;
     const vsh_light sun = vsh_light_default();
     const vsh_attribute told = {"vdbshade_command", "voxelize ball"};
     assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
@@ -208,10 +208,6 @@ TEST(level_sets_and_volumes_carry_them) {
         assert_int_equal(count, 1);
         assert_non_null(strstr(entry.attributes, "vdbshade_command: voxelize ball\n"));
     }
-    vsh_volume_free(volume);
-    vsh_voxels_free(voxels);
-    vsh_field_free(field);
-    vsh_grid_free(grid);
 }
 
 TEST(attributes_that_no_file_could_hold_are_refused) {

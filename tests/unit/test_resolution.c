@@ -40,7 +40,7 @@ static void scatter(double positions[POINTS][3], float normals[POINTS][3]) {
 /* --- casters without voxels */
 
 TEST(triangles_alone_give_shadows_within_the_error_of_the_truth) {
-    vsh_occluders *made = plate_of(0);
+    OWNED(vsh_occluders) *made = plate_of(0);
     vsh_occluders_info info;
     vsh_occluders_get_info(made, &info);
     assert_true(info.voxel_size == 0.0 && info.field_bytes == 0 && info.levels == 0 && info.has_triangles);
@@ -73,7 +73,6 @@ TEST(triangles_alone_give_shadows_within_the_error_of_the_truth) {
         assert_true(between_both > 20);
         assert_true(sqrt(square / POINTS) < options.max_error);
     }
-    vsh_occluders_free(made);
 }
 
 TEST(ao_by_rays_has_the_bits_that_it_has_with_voxels) {
@@ -82,15 +81,14 @@ TEST(ao_by_rays_has_the_bits_that_it_has_with_voxels) {
     scatter(positions, normals);
     const vsh_points points = {POINTS, positions[0], normals[0], NULL};
     for (int voxels = 0; voxels < 2; ++voxels) {
-        vsh_occluders *made = plate_of(voxels ? 64 : 0);
+        OWNED(vsh_occluders) *made = plate_of(voxels ? 64 : 0);
         assert_ok(vsh_shade_ao(made, &points, NULL, NULL, ao[voxels], NULL, NULL, NULL, &failure));
-        vsh_occluders_free(made);
     }
     assert_memory_equal(ao[0], ao[1], sizeof ao[0]);
 }
 
 TEST(what_needs_voxels_is_refused_without_them) {
-    vsh_occluders *made = plate_of(0);
+    OWNED(vsh_occluders) *made = plate_of(0);
     const double at[3] = {0.0, 0.0, 0.0};
     const float up[3] = {0.0f, 1.0f, 0.0f};
     const vsh_points points = {1, at, up, NULL};
@@ -115,23 +113,21 @@ TEST(what_needs_voxels_is_refused_without_them) {
     vsh_occluders_get_parts(made, &parts);
     vsh_field_sample(parts.field, 1, at, &value);
     assert_true(isnan(value));
-    vsh_query *query = NULL;
+    OWNED(vsh_query) *query = NULL;
     assert_ok(vsh_query_create(made, &light, 1, NULL, &query, &failure));
     vsh_query_output output = vsh_query_output_default();
     output.distance = &value;
     assert_int_equal(vsh_query_points(query, &points, NULL, NULL, &output, NULL, &failure),
                      VSH_ERROR_ARGUMENT);
-    vsh_query_free(query);
-    vsh_occluders_free(made);
 }
 
 TEST(parts_of_triangles_alone_cast) {
     const vsh_mesh mesh = plate();
-    vsh_triangles *triangles = NULL;
+    OWNED(vsh_triangles) *triangles = NULL;
     assert_ok(vsh_triangles_create(&mesh, 1, NULL, &triangles, &failure));
     vsh_occluder_parts parts = vsh_occluder_parts_default();
     parts.triangles = triangles;
-    vsh_occluders *made = NULL;
+    OWNED(vsh_occluders) *made = NULL;
     assert_ok(vsh_occluders_from_parts(&parts, &made, &failure));
     const double at[2][3] = {{0.0, 0.0, 0.0}, {3.0, 0.0, 0.0}};
     const vsh_points points = {2, at[0], NULL, NULL};
@@ -139,8 +135,6 @@ TEST(parts_of_triangles_alone_cast) {
     float lit[2];
     assert_ok(vsh_shade_shadow(made, &points, &light, NULL, NULL, lit, NULL, NULL, &failure));
     assert_true(lit[0] == 0.0f && lit[1] == 1.0f);
-    vsh_occluders_free(made);
-    vsh_triangles_free(triangles);
 }
 
 /* Shadows of a scene of the thin asset, in a layer of its own or in none, and the truth; returns what fields

@@ -284,12 +284,11 @@ TEST(a_scene_with_any_byte_changed_is_read_or_refused) {
             memcpy(text, full_scene, sizeof text);
             text[i] = bytes[b];
             failure.message[0] = '\0';
-            vsh_scene *scene = NULL;
+            OWNED(vsh_scene) *scene = NULL;
             const vsh_result result = vshi_scene_parse("s", text, sizeof text - 1, NULL, &scene, &failure);
             assert_true(result == VSH_OK || result == VSH_ERROR_INPUT);
             assert_true((result == VSH_OK) == (scene != NULL));
             assert_true((result == VSH_OK) == (failure.message[0] == '\0'));
-            vsh_scene_free(scene);
         }
     }
 }
