@@ -2,7 +2,6 @@
 #ifndef VSHI_BAKE_SCENE_H
 #define VSHI_BAKE_SCENE_H
 
-#include "base/error.h"
 #include "mesh/mesh_set.h"
 
 #include <stdbool.h>

@@ -2,13 +2,10 @@
 #ifndef VSHI_PAGES_H
 #define VSHI_PAGES_H
 
-#include "bake/padding.h"
 #include "bake/page.h"
 #include "bake_scene/bake_scene.h"
-#include "base/error.h"
 #include "base/store.h"
 
-#include <stdbool.h>
 #include <vdbshade/image.h>
 
 /* --- the channels of lightmaps: which there are, in which order, and the planes that a bake fills */

@@ -2,7 +2,6 @@
 #include "json/json.h"
 
 #include "base/file.h"
-#include "base/job.h"
 #include "base/bytes.h"
 #include "base/memory.h"
 #include "base/threads.h"

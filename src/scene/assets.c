@@ -10,7 +10,6 @@
 #include "heightfield/heights.h"
 #include "model/model.h"
 #include "scene/masks.h"
-#include "scene/select.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -332,32 +331,6 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
     return place_casting(place, scene, caster, find_unwrapped(assets, place->model), run, error);
 }
 
-/* Whether a lit asset's own UVs are a packer's integers. Few engines read a lightmap with those. */
-static bool is_packed(const vshi_asset_place *place, const vsh_receiver *receiver) {
-    bool packed = false;
-    for (size_t i = 0; i < place->count; ++i) {
-        const vshi_model_shape *shape = &place->model->shapes[place->model->entries[place->numbers[i]].shape];
-        const int32_t set = receiver->uv_set < 0 ? shape->uv_sets > 1 : receiver->uv_set;
-        packed = packed || (shape->packed >> set & 1) != 0;
-    }
-    return packed && vshi_receiver_unwrap(receiver) == VSH_RECEIVER_UNWRAP_AUTO &&
-           vsh_lit_is_output(receiver->output) != 0;
-}
-
-/* Puts the parts of unwrapped meshes in their places. */
-static vsh_result unwrap(vshi_asset_place *place, const vsh_receiver *receiver, const vsh_run *run,
-                         vsh_error *error) {
-    int32_t needs = 0;
-    vshi_unwrapped *made = &place->unwrapped;
-    VSHI_TRY(vsh_receiver_needs_unwrap(receiver, place->meshes, place->count, run, &needs, error));
-    if (needs == 0 && !is_packed(place, receiver)) {
-        return vshi_pages_as_they_are(receiver, place->meshes, place->count, made, error);
-    }
-    VSHI_TRY(vshi_unwrap_receiver(receiver, place->model, place->meshes, place->numbers, place->count, run,
-                                  made, error));
-    return vshi_unwrapped_take(made, &place->meshes, &place->numbers, &place->count, error);
-}
-
 /* A heightfield of four heights, all 0. */
 static vsh_result place_plane(vshi_asset_place *place, const vsh_receiver *receiver, const vsh_run *run,
                               vsh_error *error) {
@@ -394,7 +367,7 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, siz
     if (plane || receiver->type == VSH_RECEIVER_HEIGHTFIELD) {
         VSHI_TRY(plane ? place_plane(place, receiver, run, error)
                        : place_terrain(assets, place, receiver, run, error));
-        return vshi_pages_as_they_are(receiver, place->meshes, place->count, &place->unwrapped, error);
+        return vshi_place_pages(place, receiver, run, error);
     }
     unsigned char *chosen = NULL;
     vsh_result result;
@@ -404,7 +377,7 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, siz
     VSHI_TRY_DONE(vshi_select_uvs(model, receiver, run, chosen, error));
     VSHI_TRY_DONE(
         place_chosen(place, model, chosen, receiver->uv_set, scene->unit, receiver->transform, error));
-    result = unwrap(place, receiver, run, error);
+    result = vshi_place_pages(place, receiver, run, error);
 done:
     free(chosen);
     return result;

@@ -1,13 +1,14 @@
-/* The loaded casters and receivers of a scene: meshes, level sets, outlines, spheres. */
+/* The loaded casters and receivers of a scene: meshes, level sets, outlines, spheres; which meshes of a file
+ * they take, and lightmap UVs that are made for them. */
 #ifndef VSHI_ASSETS_H
 #define VSHI_ASSETS_H
 
 #include "mesh/mesh_set.h"
-#include "scene/unwrapped.h"
 
 #include <stdbool.h>
 #include <string.h>
 #include <vdbshade/scene.h>
+#include <vdbshade/unwrap.h>
 
 /* Whether a caster is in a layer, or (NULL) in none. */
 static inline bool vshi_caster_in_layer(const vsh_caster *caster, const vsh_scene_layer *layer) {
@@ -17,6 +18,24 @@ static inline bool vshi_caster_in_layer(const vsh_caster *caster, const vsh_scen
 /* Whether a caster stays out of level sets: spheres and direct heightfields, if shadows are `hard` or
  * `classic` and AO, if there is any, is traced. */
 bool vshi_caster_is_direct(const vsh_scene *scene, const vsh_caster *caster);
+
+/* A receiver's meshes with lightmap UVs that were made for them: cut along their charts, and on pages. Parts
+ * are whole meshes, but for those that lie on several pages, which have a part on each, all of one object.
+ * They are sorted by their pages, and stand in the meshes' order on each. */
+typedef struct vshi_unwrapped {
+    vsh_atlas *atlas; /* NULL: nothing was unwrapped, and all but the pages is 0 */
+    vsh_mesh *parts;  /* [part_count]: views of the memory below, with the meshes' own transforms; NULL when
+                         they were moved */
+    size_t *numbers;  /* [part_count]: which of the meshes each is a part of */
+    size_t part_count;
+    size_t *page_begins; /* [page_count + 1]: first part of each page, or first mesh where nothing was
+                            unwrapped; NULL: all are on one, `whole` */
+    size_t page_count;
+    vsh_receiver_page *pages; /* [page_count] */
+    vsh_receiver_page whole;
+    uint32_t *memory; /* of the parts' positions, normals and indices, of which so many elements are used */
+    size_t used;
+} vshi_unwrapped;
 
 /* One caster or receiver. Its transform is in front of its meshes' own. */
 typedef struct vshi_asset_place {
@@ -41,5 +60,49 @@ const vshi_asset_place *vshi_assets_caster(const vsh_assets *assets, size_t inde
 
 /* Meshes of all casters. */
 size_t vshi_assets_mesh_count(const vsh_assets *assets);
+
+/* --- receivers */
+
+/* Whether its meshes are unwrapped: VSH_RECEIVER_UNWRAP_NEVER, …_AUTO or …_ALWAYS. */
+int32_t vshi_receiver_unwrap(const vsh_receiver *receiver);
+
+/* Lists a receiver's pages: one, or one for each object. Unwraps its meshes where it has to, and puts the
+ * parts in their place. Errors: as vsh_unwrap(); VSH_ERROR_ARGUMENT (max_size without texels_per_unit). */
+vsh_result vshi_place_pages(vshi_asset_place *place, const vsh_receiver *receiver, const vsh_run *run,
+                            vsh_error *error);
+void vshi_unwrapped_free(vshi_unwrapped *unwrapped);
+
+/* --- which of a file's meshes a caster or receiver takes */
+
+/* *chosen [mesh count]: 1 for each mesh that the selection means; to be freed, also after an error. `path` is
+ * the model's, for messages. Errors: VSH_ERROR_INPUT where a pattern matches nothing (with names that it
+ * might have meant) or nothing is left; VSH_ERROR_ARGUMENT where a pattern is NULL; VSH_ERROR_MEMORY. */
+vsh_result vshi_select(const vsh_model *model, const char *path, const vsh_selection *selection,
+                       unsigned char **chosen, vsh_error *error);
+
+/* The same of a list of patterns: *chosen is 1 for each mesh that one of them matches, of none of them for
+ * no mesh. */
+vsh_result vshi_select_some(const vsh_model *model, const char *path, const char *const *patterns,
+                            size_t count, unsigned char **chosen, vsh_error *error);
+
+/* The name of a mesh's object; "" where it has none. */
+static inline const char *vshi_object_name(const vsh_mesh *mesh) {
+    const char *name = mesh->object_name != NULL ? mesh->object_name : mesh->name;
+    return name != NULL ? name : "";
+}
+
+/* Whether a pattern means a mesh by its object's name, as vsh_mesh_matches() does, or by its `material`'s:
+ * that is asked where it means no mesh by the other. */
+bool vshi_mesh_is_meant(const vsh_mesh *mesh, const char *pattern, bool material);
+
+/* VSH_ERROR_INPUT, saying what a pattern may have meant that matches none of a model's meshes. */
+vsh_result vshi_fail_unmatched(const vsh_model *model, const char *path, const char *pattern,
+                               vsh_error *error);
+
+/* Takes those out of `chosen` that cannot receive, where the receiver is partial and not unwrapped; else
+ * errors: VSH_ERROR_INPUT where a mesh has no UVs or not the set, VSH_ERROR_ARGUMENT where there is no such
+ * set. */
+vsh_result vshi_select_uvs(const vsh_model *model, const vsh_receiver *receiver, const vsh_run *run,
+                           unsigned char *chosen, vsh_error *error);
 
 #endif

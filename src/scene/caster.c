@@ -1,6 +1,5 @@
 /* Reads casters from scene files: transforms, procedural shapes, and one table of keys for all types. */
 #include "base/elementary.h"
-#include "base/memory.h"
 #include "base/similarity.h"
 #include "base/try.h"
 #include "base/vec.h"
@@ -16,8 +15,6 @@
 
 /* Shear that numbers written with seven digits leave in a rotation. */
 static const double SIMILARITY_TOLERANCE = 1e-5;
-static const double SMALLEST_SCALE = 1e-6;
-static const double LARGEST_SCALE = 1e6;
 
 /* [x, y, z] degrees into double[4], the quaternion x, y, z, w: about x first, then y, then z, each about the
  * fixed axes (Blender's "XYZ Euler"). */
@@ -44,8 +41,8 @@ static vsh_result read_rotation(vshi_json *reader, const vshi_value *value, void
 static vsh_result read_scale(vshi_json *reader, const vshi_value *value, void *member) {
     const vshi_key key = {.kind = json_is_array(value->json) ? VSHI_VECTOR : VSHI_NUMBER,
                           .count = 3,
-                          .lowest = SMALLEST_SCALE,
-                          .highest = LARGEST_SCALE};
+                          .lowest = 1e-6,
+                          .highest = 1e6};
     double *scale = member;
     VSHI_TRY(vshi_read_value(reader, value, &key, scale));
     if (key.kind == VSHI_NUMBER) {

@@ -4,7 +4,6 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
-#include "model/model.h"
 #include "scene/scene.h"
 
 #include <math.h>
@@ -217,14 +216,10 @@ vsh_result vsh_flat_scene_read(const char *path, const vsh_run *run, vsh_flat_sc
     VSHI_NEEDS(scene);
     *scene = NULL;
     VSHI_NEEDS(path);
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    VSHI_TRY(vshi_unsupported_check(path, error));
-    vshi_json reader = {.path = path, .run = &full, .error = error};
     void *made;
-    VSHI_TRY(vshi_json_read(&reader, sizeof **scene, read_scene, &made));
+    const vsh_result result = vshi_scene_file_read(path, run, sizeof **scene, read_scene, &made, error);
     *scene = made;
-    return VSH_OK;
+    return result;
 }
 
 void vsh_flat_scene_free(vsh_flat_scene *scene) {

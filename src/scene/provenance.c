@@ -6,7 +6,6 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
-#include "light/light.h"
 #include "model/model.h"
 
 #include <math.h>

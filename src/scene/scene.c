@@ -6,7 +6,6 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "model/model.h"
-#include "scene/assets.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -464,19 +463,25 @@ vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, con
     return result;
 }
 
+vsh_result vshi_scene_file_read(const char *path, const vsh_run *run, size_t size, vshi_read_fn *read,
+                                void **made, vsh_error *error) {
+    vsh_run full;
+    *made = NULL;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    VSHI_TRY(vshi_unsupported_check(path, error));
+    vshi_json reader = {.path = path, .run = &full, .error = error};
+    return vshi_json_read(&reader, size, read, made);
+}
+
 vsh_result vsh_scene_read(const char *path, const vsh_run *run, vsh_scene **scene, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(scene);
     *scene = NULL;
     VSHI_NEEDS(path);
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    VSHI_TRY(vshi_unsupported_check(path, error));
-    vshi_json reader = {.path = path, .run = &full, .error = error};
     void *made;
-    VSHI_TRY(vshi_json_read(&reader, sizeof **scene, read_scene, &made));
+    const vsh_result result = vshi_scene_file_read(path, run, sizeof **scene, read_scene, &made, error);
     *scene = made;
-    return VSH_OK;
+    return result;
 }
 
 void vsh_scene_free(vsh_scene *scene) {

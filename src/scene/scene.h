@@ -4,7 +4,6 @@
 
 #include "json/json.h"
 
-#include <vdbshade/outline.h>
 #include <vdbshade/scene.h>
 #include <vdbshade/settings.h>
 
@@ -20,6 +19,11 @@ extern const vshi_table vshi_scene_table, vshi_ao_table, vshi_receiver_table, vs
  * lights have none then. */
 vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, const vsh_run *run,
                             vsh_scene **scene, vsh_error *error);
+
+/* Reads the file of a scene, or of a flat one, as vshi_json_read(); refuses files of other programs' scenes.
+ */
+vsh_result vshi_scene_file_read(const char *path, const vsh_run *run, size_t size, vshi_read_fn *read,
+                                void **made, vsh_error *error);
 
 /* --- items of lists */
 

