@@ -191,13 +191,4 @@ void vshi_key_range(const vshi_key *key, char *text, size_t size);
 /* Writes the value of a key in `target`, "64"; "" for a value that is off. */
 void vshi_key_value(const vshi_key *key, const void *target, char *text, size_t size);
 
-/* --- misspelt words */
-
-/* Number of single-character changes (V. Levenshtein, "Binary codes capable of correcting deletions,
- * insertions, and reversals", 1966), or SIZE_MAX where one word has more than 63 characters. */
-size_t vshi_edit_distance(const char *a, const char *b);
-
-/* Whether a distance is small enough for a word of this length to be worth saying. */
-bool vshi_is_near(size_t distance, const char *word);
-
 #endif

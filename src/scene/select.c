@@ -3,6 +3,7 @@
 
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/suggest.h"
 #include "base/try.h"
 #include "mesh/mesh.h"
 #include "json/json.h"
