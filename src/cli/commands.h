@@ -19,8 +19,6 @@ extern const cli_command cli_view;
 extern const cli_command cli_help;
 extern const cli_command cli_merge;
 
-int cli_bake_main(int argc, char **argv);
-
 /* A command, and the line that tells of it. */
 typedef struct cli_command_row {
     const cli_command *command;

@@ -116,8 +116,17 @@ int cli_fail_of(const char *path, const vsh_error *error) {
     return code_of(error->code);
 }
 
+int cli_check(vsh_result result, const vsh_error *error) {
+    return result == VSH_OK ? CLI_OK : cli_fail(error);
+}
+
 int cli_check_result(vsh_result result, const vsh_error *error) {
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, error);
+}
+
+int cli_begin_writing(void) {
+    const vsh_error cancelled = {VSH_ERROR_CANCELLED, "write: cancelled"};
+    return cli_progress_report(NULL, "write", 0.0) == 0 ? CLI_OK : cli_fail(&cancelled);
 }
 
 int cli_out_of_memory(const char *what) {
@@ -183,4 +192,44 @@ void cli_plain_output(void) {
         stdout = plain;
         is_plain = true;
     }
+}
+
+int cli_text_characters(const char *text, size_t length) {
+    int count = 0;
+    for (size_t i = 0; i < length; ++i) {
+        count += ((unsigned char)text[i] & 0xc0) != 0x80;
+    }
+    return count;
+}
+
+void cli_text_add(cli_text *text, const char *words) {
+    static const char blanks[] = " \n";
+    for (words += strspn(words, blanks); *words != '\0'; words += strspn(words, blanks)) {
+        const size_t length = strcspn(words, blanks);
+        const int wide = cli_text_characters(words, length);
+        if (text->column > 0 && text->column + 1 + wide > text->width) {
+            cli_text_end(text);
+        }
+        const int first = text->column == 0;
+        if (first) {
+            fprintf(text->out, "%*s", text->lead, "");
+            text->lead = text->indent;
+        } else {
+            fputc(' ', text->out);
+        }
+        if (text->put != NULL) {
+            text->put(text->out, words, (int)length, first);
+        } else {
+            fwrite(words, 1, length, text->out);
+        }
+        text->column += wide + !first;
+        words += length;
+    }
+}
+
+void cli_text_end(cli_text *text) {
+    if (text->column > 0) {
+        fputc('\n', text->out);
+    }
+    text->column = 0;
 }

@@ -3,9 +3,11 @@
 #define CLI_MESSAGE_H
 
 #include <stddef.h>
+#include <stdio.h>
 #include <vdbshade/base.h>
 
 enum {
+    CLI_HELP = -1, /* the help was printed, and nothing is left to do */
     CLI_OK = 0,
     CLI_UNLIKE = 1, /* a comparison did not hold */
     CLI_USAGE = 2,
@@ -32,11 +34,15 @@ int cli_fail(const vsh_error *error);
  * begins with none of a file that is there begins with `path`, or (NULL) the command's first operand. */
 int cli_fail_of(const char *path, const vsh_error *error);
 
-/* CLI_OK of VSH_OK; else as cli_fail_of() without a path. */
+/* CLI_OK of VSH_OK; else as cli_fail(), or as cli_fail_of() without a path. */
+int cli_check(vsh_result result, const vsh_error *error);
 int cli_check_result(vsh_result result, const vsh_error *error);
 
 /* What that operand is; it must live on. */
 void cli_message_input(const char *path);
+
+/* Shows that the output is being written. CLI_OK, or CLI_INTERRUPTED after saying so. */
+int cli_begin_writing(void);
 
 /* Says that there is no memory for `what` and returns CLI_LIMIT. */
 int cli_out_of_memory(const char *what);
@@ -47,6 +53,25 @@ void cli_plain(char *text, size_t size);
 
 /* From here on standard output is text, and goes through cli_plain(). */
 void cli_plain_output(void);
+
+/* Running text, broken into lines at blanks. */
+typedef struct cli_text {
+    FILE *out;
+    int width;                                                       /* characters a line, if words allow */
+    int lead;                                                        /* blanks before the first line */
+    int indent;                                                      /* blanks before each later line */
+    void (*put)(FILE *out, const char *word, int length, int first); /* NULL: as it is; first of a line */
+    int column;                                                      /* 0 to begin with */
+} cli_text;
+
+/* Counts the characters of UTF-8 text. */
+int cli_text_characters(const char *text, size_t length);
+
+/* Adds words that blanks or newlines part. */
+void cli_text_add(cli_text *text, const char *words);
+
+/* Ends the line, where one was begun. */
+void cli_text_end(cli_text *text);
 
 /* --- early returns of functions that return an exit code, as in base/try.h */
 

@@ -1,14 +1,19 @@
-/* The parser of command lines and their help. */
+/* The parser of command lines, and their help. */
 #include "options.h"
 
+#include "base/suggest.h"
 #include "message.h"
 #include "paths.h"
-#include "text.h"
+#include "progress.h"
+#include "warnings.h"
 
 #include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
+#include <vdbshade/reader.h>
 
 enum { HELP_COLUMN = 30, HELP_WIDTH = 56 };
 
@@ -46,54 +51,46 @@ const vsh_setting *cli_setting(size_t index) {
     return index < listed_count ? &listed[index].setting : NULL;
 }
 
-/* A command's options, with settings in the place of their groups. */
-typedef struct option_list {
-    cli_option options[CLI_MOST_OPTIONS];
-    size_t count;
-} option_list;
-
-static void add_option(option_list *list, const cli_option *option) {
-    if (list->count < CLI_MOST_OPTIONS) {
-        list->options[list->count++] = *option;
-    }
-}
-
-static void list_options(const cli_command *command, option_list *list) {
-    list->count = 0;
-    for (size_t i = 0; i < command->option_count; ++i) {
-        const cli_option *option = &command->options[i];
-        if (option->key < CLI_KEY_SETTINGS) {
-            add_option(list, option);
-            continue;
-        }
-        const vsh_setting *setting;
-        bool found = false; /* by a name that is another's too: the first */
-        for (size_t k = 0; (setting = cli_setting(k)) != NULL && !found; ++k) {
-            found = option->name != NULL && strcmp(setting->option, option->name) == 0;
-            if (found || (option->name == NULL && setting->group == option->key - CLI_KEY_SETTINGS)) {
-                add_option(list,
-                           &(cli_option){CLI_KEY_SETTING + (int)k, setting->option,
-                                         setting->value[0] != '\0' ? setting->value : NULL, listed[k].help});
-            }
+/* The setting that a row stands for by its group or, where it has one, by its option's name; from *at on. */
+static const vsh_setting *next_setting(const cli_option *row, size_t *at) {
+    const vsh_setting *setting;
+    while ((setting = cli_setting(*at)) != NULL) {
+        ++*at;
+        if (row->name != NULL ? strcmp(setting->option, row->name) == 0
+                              : setting->group == row->key - CLI_KEY_SETTINGS) {
+            return setting;
         }
     }
+    return NULL;
 }
 
 size_t cli_list_options(const cli_command *command, cli_option *options, size_t most) {
-    option_list list;
-    list_options(command, &list);
-    const size_t count = list.count < most ? list.count : most;
-    memcpy(options, list.options, count * sizeof *options);
+    size_t count = 0;
+    for (size_t i = 0; i < command->option_count && count < most; ++i) {
+        const cli_option *option = &command->options[i];
+        if (option->key < CLI_KEY_SETTINGS || option->key >= CLI_STORE_TEXT) {
+            options[count++] = *option;
+            continue;
+        }
+        const vsh_setting *setting;
+        for (size_t at = 0; count < most && (setting = next_setting(option, &at)) != NULL;) {
+            const char *value = setting->value[0] != '\0' ? setting->value : NULL;
+            options[count++] =
+                (cli_option){CLI_KEY_SETTING + (int)at - 1, setting->option, value, listed[at - 1].help};
+            if (option->name != NULL) {
+                break; /* others may have the name, too */
+            }
+        }
+    }
     return count;
 }
 
 bool cli_find_option(const cli_command *command, const char *name, size_t length, cli_option *option) {
-    option_list list;
-    list_options(command, &list);
-    for (size_t i = 0; i < list.count; ++i) {
-        const cli_option *one = &list.options[i];
-        if (one->key != 0 && strlen(one->name) == length && strncmp(one->name, name, length) == 0) {
-            *option = *one;
+    cli_option list[CLI_MOST_OPTIONS];
+    const size_t count = cli_list_options(command, list, CLI_MOST_OPTIONS);
+    for (size_t i = 0; i < count; ++i) {
+        if (list[i].key != 0 && strlen(list[i].name) == length && strncmp(list[i].name, name, length) == 0) {
+            *option = list[i];
             return true;
         }
     }
@@ -102,39 +99,12 @@ bool cli_find_option(const cli_command *command, const char *name, size_t length
 
 /* --- words that are none */
 
-static int least(int a, int b) {
-    return a < b ? a : b;
-}
-
-/* Edit distance (V. Levenshtein, 1966), for words of up to 63 letters. */
-static int edit_distance(const char *a, const char *b) {
-    enum { LONGEST = 64 };
-    const size_t b_length = strlen(b);
-    if (strlen(a) >= LONGEST || b_length >= LONGEST) {
-        return LONGEST;
-    }
-    int row[LONGEST];
-    for (size_t j = 0; j <= b_length; ++j) {
-        row[j] = (int)j;
-    }
-    for (size_t i = 1; a[i - 1] != '\0'; ++i) {
-        int diagonal = row[0];
-        row[0] = (int)i;
-        for (size_t j = 1; j <= b_length; ++j) {
-            const int above = row[j];
-            row[j] = least(diagonal + (a[i - 1] != b[j - 1]), 1 + least(above, row[j - 1]));
-            diagonal = above;
-        }
-    }
-    return row[b_length];
-}
-
 const char *cli_nearest(const char *text, const char *const *candidates, size_t count) {
     const char *nearest = NULL;
-    const int length = (int)strlen(text);
-    int best = 1 + (length > 6 ? length / 3 : 2);
+    const size_t length = strlen(text);
+    size_t best = 1 + (length > 6 ? length / 3 : 2);
     for (size_t i = 0; i < count; ++i) {
-        const int distance = edit_distance(text, candidates[i]);
+        const size_t distance = vshi_edit_distance(text, candidates[i]);
         if (distance < best) {
             best = distance;
             nearest = candidates[i];
@@ -143,12 +113,22 @@ const char *cli_nearest(const char *text, const char *const *candidates, size_t 
     return nearest;
 }
 
-static int unknown_option(const cli_command *command, const option_list *list, const char *text) {
+/* A command line that is being parsed. */
+typedef struct parsing {
+    const cli_command *command;
+    cli_option options[CLI_MOST_OPTIONS];
+    size_t count;
+    int argc;
+    char **argv;
+    FILE *told; /* the command line as outputs tell it */
+} parsing;
+
+static int unknown_option(const parsing *p, const char *text) {
     const char *names[CLI_MOST_OPTIONS];
     size_t count = 0;
-    for (size_t i = 0; i < list->count; ++i) {
-        if (list->options[i].key != 0) {
-            names[count++] = list->options[i].name;
+    for (size_t i = 0; i < p->count; ++i) {
+        if (p->options[i].key != 0) {
+            names[count++] = p->options[i].name;
         }
     }
     char word[64];
@@ -158,28 +138,27 @@ static int unknown_option(const cli_command *command, const option_list *list, c
     if (near != NULL) {
         return cli_usage("%s: no such option; did you mean --%s?", text, near);
     }
-    return cli_usage("%s: no such option; see 'vdbshade %s --help'", text, command->name);
+    return cli_usage("%s: no such option; see 'vdbshade %s --help'", text, p->command->name);
 }
 
-static const cli_option *option_of_key(const option_list *list, int key) {
-    for (size_t i = 0; i < list->count; ++i) {
-        if (list->options[i].key == key) {
-            return &list->options[i];
+static const cli_option *option_of_key(const parsing *p, int key) {
+    for (size_t i = 0; i < p->count; ++i) {
+        if (p->options[i].key == key) {
+            return &p->options[i];
         }
     }
     return NULL;
 }
 
-static void make_getopt_tables(const option_list *list, struct option *longs, char *shorts) {
-    size_t count = 0;
+static void make_getopt_tables(const parsing *p, struct option *longs, char *shorts) {
     *shorts++ = ':'; /* a missing value is told from an unknown option */
-    for (size_t i = 0; i < list->count && count + 1 < CLI_MOST_OPTIONS; ++i) {
-        const cli_option *option = &list->options[i];
+    for (size_t i = 0; i < p->count; ++i) {
+        const cli_option *option = &p->options[i];
         if (option->key == 0) {
             continue;
         }
-        longs[count++] = (struct option){
-            option->name, option->value != NULL ? required_argument : no_argument, NULL, option->key};
+        *longs++ = (struct option){option->name, option->value != NULL ? required_argument : no_argument,
+                                   NULL, option->key};
         if (option->key < 256) {
             *shorts++ = (char)option->key;
             if (option->value != NULL) {
@@ -188,7 +167,7 @@ static void make_getopt_tables(const option_list *list, struct option *longs, ch
         }
     }
     *shorts = '\0';
-    longs[count] = (struct option){NULL, 0, NULL, 0};
+    *longs = (struct option){NULL, 0, NULL, 0};
 }
 
 /* getopt_long() takes any beginning of a name; a script that relies on one would break at the next option.
@@ -208,7 +187,6 @@ static bool abbreviated(const cli_option *option, char **argv, const char *value
 /* --- the command line as outputs tell it */
 
 static char *parsed_command; /* of the process's one command line at a time */
-static char *parsed_file;    /* FILE.vdb of an operand FILE.vdb:NAME */
 static const char *parsed_grid;
 
 const char *cli_parsed_grid(void) {
@@ -219,41 +197,21 @@ const char *cli_parsed_command(void) {
     return parsed_command != NULL ? parsed_command : "";
 }
 
-static void append(const char *text, size_t length) {
-    const size_t used = strlen(cli_parsed_command());
-    char *longer = realloc(parsed_command, used + length + 1);
-    if (longer != NULL) {
-        memcpy(longer + used, text, length);
-        longer[used + length] = '\0';
-        parsed_command = longer;
-    }
-}
-
-/* A word behind a blank, quoted as a shell would have it. */
-static void append_word(const char *word) {
+/* Writes a word behind a blank, quoted as a shell would have it. */
+static void tell_word(FILE *told, const char *word) {
     static const char plain[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-+=.,:/@%";
-    append(" ", 1);
     if (word[0] != '\0' && strspn(word, plain) == strlen(word)) {
-        append(word, strlen(word));
+        fprintf(told, " %s", word);
         return;
     }
-    append("'", 1);
+    fputs(" '", told);
     for (const char *c = word; *c != '\0'; ++c) {
-        if (*c == '\'') {
-            append("'\\''", 4);
-        } else {
-            append(c, 1);
-        }
+        fprintf(told, "%s%c", *c == '\'' ? "'\\'" : "", *c);
     }
-    append("'", 1);
+    fputc('\'', told);
 }
 
-static const char *without_folder(const char *path) {
-    const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
-}
-
-static void append_option(const cli_option *option, const char *value) {
+static void tell_option(FILE *told, const cli_option *option, const char *value) {
     static const char *const changes_nothing[] = {
         "output",  "output-folder", "stats", "threads", "memory-limit", "sandbox", "allow-outside", "quiet",
         "verbose", "progress",      "json",  "dry-run", "help",         "view",    "shard"};
@@ -262,96 +220,199 @@ static void append_option(const cli_option *option, const char *value) {
             return;
         }
     }
-    char name[64];
-    snprintf(name, sizeof name, "--%s", option->name);
-    append_word(name);
+    fprintf(told, " --%s", option->name);
     if (value != NULL) {
-        append_word(strncmp(option->value, "FILE", 4) == 0 ? without_folder(value) : value);
+        tell_word(told, strncmp(option->value, "FILE", 4) == 0 ? cli_file_name(value) : value);
     }
 }
 
-int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
-              const char *what, const char **operand, bool *help) {
-    const int code = cli_parse_operands(command, argc, argv, take, settings, &what, operand, 1, help);
-    parsed_grid = code == CLI_OK && !*help ? cli_grid_name(*operand) : NULL;
-    if (parsed_grid != NULL) {
-        free(parsed_file);
-        parsed_file = strndup(*operand, (size_t)(parsed_grid - 1 - *operand));
-        if (parsed_file == NULL) {
-            return cli_out_of_memory("file name");
+/* --- parsing */
+
+cli_common cli_given;
+
+/* The machine's memory, or where they are less the control group's (a container) and what the process may
+ * address (ulimit -v). 0: not known. */
+static uint64_t machine_memory(void) {
+    const long pages = sysconf(_SC_PHYS_PAGES);
+    const long page = sysconf(_SC_PAGESIZE);
+    uint64_t bytes = pages > 0 && page > 0 ? (uint64_t)pages * (uint64_t)page : 0;
+    static const char *const limits[] = {"/sys/fs/cgroup/memory.max",
+                                         "/sys/fs/cgroup/memory/memory.limit_in_bytes"};
+    for (size_t i = 0; i < sizeof limits / sizeof limits[0]; ++i) {
+        FILE *file = fopen(limits[i], "r");
+        unsigned long long limit = 0;
+        if (file != NULL) {
+            if (fscanf(file, "%llu", &limit) == 1 && limit > 0 && (bytes == 0 || limit < bytes)) {
+                bytes = limit;
+            }
+            fclose(file);
         }
-        *operand = parsed_file;
-        cli_message_input(parsed_file);
     }
-    return code;
+    struct rlimit space;
+    if (getrlimit(RLIMIT_AS, &space) == 0 && space.rlim_cur != RLIM_INFINITY &&
+        (bytes == 0 || space.rlim_cur < bytes)) {
+        bytes = space.rlim_cur;
+    }
+    return bytes;
 }
 
-int cli_parse_operands(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
-                       const char *const *what, const char **operands, int count, bool *help) {
-    return cli_parse_some(command, argc, argv, take, settings, what, operands, count, count, help);
+vsh_run cli_make_run(void) {
+    vsh_run run = vsh_run_default();
+    run.threads = cli_given.threads;
+    run.memory_limit = cli_given.memory_limit;
+    run.reader = cli_given.sandbox == CLI_SANDBOX_OFF ? NULL : VSH_READER;
+    run.confined = cli_given.sandbox == CLI_SANDBOX_REQUIRE;
+    run.allow_outside = cli_given.allow_outside;
+    run.progress = cli_progress_report;
+    run.warning = cli_warnings_parse;
+    run.notes = cli_given.verbose;
+    cli_warnings_begin(cli_given.verbose, cli_given.quiet);
+    return run;
 }
 
-int cli_parse_some(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
-                   const char *const *what, const char **operands, int least, int count, bool *help) {
-    struct option longs[CLI_MOST_OPTIONS];
+static int parse_sandbox(const char *name, const char *value) {
+    static const char *const names[] = {
+        [CLI_SANDBOX_AUTO] = "auto", [CLI_SANDBOX_REQUIRE] = "require", [CLI_SANDBOX_OFF] = "off"};
+    for (int i = CLI_SANDBOX_AUTO; i <= CLI_SANDBOX_OFF; ++i) {
+        if (strcmp(value, names[i]) == 0) {
+            cli_given.sandbox = i;
+            return CLI_OK;
+        }
+    }
+    return cli_usage("%s '%s': expected auto, require or off", name, value);
+}
+
+/* Stores the value of an option whose key is a place in the settings. */
+static int store(void *settings, int key, const char *name, const char *value) {
+    char *member = (char *)settings + key % CLI_STORE_TEXT;
+    const bool flag = true;
+    double number;
+    switch (key - key % CLI_STORE_TEXT) {
+    case CLI_STORE_TEXT:
+        memcpy(member, &value, sizeof value);
+        return CLI_OK;
+    case CLI_STORE_FLAG:
+        memcpy(member, &flag, sizeof flag);
+        return CLI_OK;
+    default:
+        CLI_TRY(cli_parse_positive(name, value, &number));
+        memcpy(member, &number, sizeof number);
+        return CLI_OK;
+    }
+}
+
+static int parse_option(cli_option_fn *take, void *settings, int key, const char *name, const char *value) {
+    switch (key) {
+    case CLI_KEY_THREADS:
+        return cli_parse_integer(name, value, 1, 1024, &cli_given.threads);
+    case CLI_KEY_MEMORY_LIMIT:
+        return cli_parse_bytes(name, value, &cli_given.memory_limit);
+    case CLI_KEY_SANDBOX:
+        return parse_sandbox(name, value);
+    case CLI_KEY_ALLOW_OUTSIDE:
+        cli_given.allow_outside = true;
+        return CLI_OK;
+    case CLI_KEY_QUIET:
+        cli_given.quiet = true;
+        return CLI_OK;
+    case CLI_KEY_VERBOSE:
+        cli_given.verbose = true;
+        return CLI_OK;
+    case CLI_KEY_PROGRESS:
+        cli_given.progress = true;
+        return CLI_OK;
+    default:
+        return key >= CLI_STORE_TEXT ? store(settings, key, name, value) : take(settings, key, name, value);
+    }
+}
+
+/* Parses all options; optind is then the first operand's place. */
+static int parse_options(const parsing *p, cli_option_fn *take, void *settings) {
+    struct option longs[CLI_MOST_OPTIONS + 1];
     char shorts[2 * CLI_MOST_OPTIONS + 2];
-    option_list list;
-    list_options(command, &list);
-    make_getopt_tables(&list, longs, shorts);
-    *help = false;
+    make_getopt_tables(p, longs, shorts);
     opterr = 0;
     optind = 1;
-    free(parsed_command);
-    parsed_command = NULL;
-    append(command->name, strlen(command->name));
     int key;
-    while ((key = getopt_long(argc, argv, shorts, longs, NULL)) != -1) {
+    while ((key = getopt_long(p->argc, p->argv, shorts, longs, NULL)) != -1) {
         if (key == ':') {
-            return cli_usage("%s: needs a value", argv[optind - 1]);
+            return cli_usage("%s: needs a value", p->argv[optind - 1]);
         }
         if (key == '?') {
-            const cli_option *known = optopt != 0 ? option_of_key(&list, optopt) : NULL;
+            const cli_option *known = optopt != 0 ? option_of_key(p, optopt) : NULL;
             if (known != NULL && known->value == NULL) {
                 return cli_usage("--%s: takes no value", known->name);
             }
-            char letter[3] = {'-', (char)optopt, '\0'};
-            return unknown_option(command, &list, optopt > 0 && optopt < 256 ? letter : argv[optind - 1]);
+            const char letter[3] = {'-', (char)optopt, '\0'};
+            return unknown_option(p, optopt > 0 && optopt < 256 ? letter : p->argv[optind - 1]);
         }
         if (key == 'h') {
-            *help = true;
-            cli_print_help(command);
-            return CLI_OK;
+            cli_print_help(p->command);
+            return CLI_HELP;
         }
-        const cli_option *option = option_of_key(&list, key);
+        const cli_option *option = option_of_key(p, key);
         const char *word;
-        if (abbreviated(option, argv, optarg, &word)) {
-            return unknown_option(command, &list, word);
+        if (abbreviated(option, p->argv, optarg, &word)) {
+            return unknown_option(p, word);
         }
         char name[64];
         snprintf(name, sizeof name, "--%s", option->name);
-        append_option(option, optarg);
-        const int code = take(settings, key, key < 256 ? word : name, optarg);
-        if (code != CLI_OK) {
-            return code;
-        }
-    }
-    for (int i = 0; i < count; ++i) {
-        operands[i] = NULL;
-        if (optind + i >= argc && i >= least) {
-            continue;
-        }
-        if (optind + i >= argc) {
-            return cli_usage("%s: no %s; see 'vdbshade %s --help'", command->name, what[i], command->name);
-        }
-        operands[i] = argv[optind + i];
-        append_word(without_folder(operands[i]));
-    }
-    cli_message_input(operands[0]);
-    if (optind + count < argc) {
-        return cli_usage("%s: one %s is taken, not also '%s'", command->name, what[count - 1],
-                         argv[optind + count]);
+        tell_option(p->told, option, optarg);
+        CLI_TRY(parse_option(take, settings, key, key < 256 ? word : name, optarg));
     }
     return CLI_OK;
+}
+
+/* Takes the operands that the usage begins with: "INPUT [OTHER] -o OUT [options]". */
+static int parse_operands(const parsing *p, const char **operands) {
+    const char *command = p->command->name, *at = p->command->usage;
+    char name[32] = "";
+    bool optional = false;
+    int count = 0;
+    for (; *at != '\0' && *at != '-' && strncmp(at, "[options]", strlen("[options]")) != 0; ++count) {
+        const size_t length = strcspn(at, " ");
+        optional = *at == '[';
+        snprintf(name, sizeof name, "%.*s", (int)length - 2 * optional, at + optional);
+        operands[count] = optind < p->argc ? p->argv[optind++] : NULL;
+        if (operands[count] != NULL) {
+            tell_word(p->told, cli_file_name(operands[count]));
+        } else if (!optional) {
+            return cli_usage("%s: no %s; see 'vdbshade %s --help'", command, name, command);
+        }
+        at += length + strspn(at + length, " ");
+    }
+    cli_message_input(operands[0]);
+    if (optind < p->argc) {
+        return cli_usage("%s: one %s is taken, not also '%s'", command, name, p->argv[optind]);
+    }
+    parsed_grid = count == 1 && !optional ? cli_grid_name(operands[0]) : NULL;
+    if (parsed_grid != NULL) {
+        operands[0] = cli_keep_text("%.*s", (int)(parsed_grid - 1 - operands[0]), operands[0]);
+        cli_message_input(operands[0]);
+    }
+    return operands[0] != NULL || optional ? CLI_OK : cli_out_of_memory("file name");
+}
+
+int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
+              const char **operands) {
+    parsing p = {.command = command, .argc = argc, .argv = argv};
+    p.count = cli_list_options(command, p.options, CLI_MOST_OPTIONS);
+    cli_given = (cli_common){.memory_limit = machine_memory() / 4 * 3, .sandbox = CLI_SANDBOX_AUTO};
+    free(parsed_command);
+    parsed_command = NULL;
+    size_t size;
+    p.told = open_memstream(&parsed_command, &size);
+    if (p.told == NULL) {
+        return cli_out_of_memory("command line");
+    }
+    fputs(command->name, p.told);
+    int code = parse_options(&p, take, settings);
+    code = code == CLI_OK ? parse_operands(&p, operands) : code;
+    fclose(p.told);
+    if (code == CLI_OK) {
+        cli_progress_begin(cli_given.progress, cli_given.quiet);
+    }
+    return code;
 }
 
 static void print_option(const cli_option *option) {
@@ -374,14 +435,14 @@ static void print_option(const cli_option *option) {
 }
 
 void cli_print_help(const cli_command *command) {
-    option_list list;
-    list_options(command, &list);
+    cli_option list[CLI_MOST_OPTIONS];
+    const size_t count = cli_list_options(command, list, CLI_MOST_OPTIONS);
     printf("Usage: vdbshade %s %s\n\n%s\n", command->name, command->usage, command->summary);
-    for (size_t i = 0; i < list.count; ++i) {
-        if (list.options[i].key == 0) {
-            printf("\n%s:\n", list.options[i].help);
+    for (size_t i = 0; i < count; ++i) {
+        if (list[i].key == 0) {
+            printf("\n%s:\n", list[i].help);
         } else {
-            print_option(&list.options[i]);
+            print_option(&list[i]);
         }
     }
 }
@@ -396,19 +457,9 @@ int cli_density_take(cli_densities *densities, const char *name, const char *val
     }
     vsh_density_rule *rule = &densities->list[densities->count];
     CLI_TRY(cli_parse_positive(name, sign + 1, &rule->factor));
-    char *own = strndup(value, (size_t)(sign - value));
-    if (own == NULL) {
-        return cli_out_of_memory(name);
-    }
-    rule->pattern = densities->own[densities->count++] = own;
-    return CLI_OK;
-}
-
-void cli_densities_free(cli_densities *densities) {
-    for (size_t i = 0; i < densities->count; ++i) {
-        free(densities->own[i]);
-    }
-    densities->count = 0;
+    rule->pattern = cli_keep_text("%.*s", (int)(sign - value), value);
+    densities->count += rule->pattern != NULL;
+    return rule->pattern != NULL ? CLI_OK : cli_out_of_memory(name);
 }
 
 int cli_provenance_make(const vsh_scene *scene, const char *const *files, size_t file_count,

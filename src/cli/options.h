@@ -1,4 +1,4 @@
-/* Command lines: tables of options that are parsed, explained and suggested from. */
+/* Command lines: tables of options, which parsing, help and suggestions share. */
 #ifndef CLI_OPTIONS_H
 #define CLI_OPTIONS_H
 
@@ -24,8 +24,14 @@ typedef struct cli_command {
     int (*main)(int argc, char **argv); /* argv[0] is the command's name */
 } cli_command;
 
-/* A row of a table that stands for the library's settings of a group, VSH_SETTINGS_…: their names, help,
- * ranges and defaults are taken from there, and their keys are CLI_KEY_SETTING + the number of each. */
+/* Keys of options whose values the parser stores itself, in a member of the command's settings: a text, a
+ * flag that becomes true, a number above 0. */
+#define CLI_TEXT(type, member) (CLI_STORE_TEXT + (int)offsetof(type, member))
+#define CLI_FLAG(type, member) (CLI_STORE_FLAG + (int)offsetof(type, member))
+#define CLI_POSITIVE(type, member) (CLI_STORE_POSITIVE + (int)offsetof(type, member))
+
+/* A row of a table that stands for the library's settings of a group, VSH_SETTINGS_…: the library gives their
+ * names, help, ranges and defaults. The key of each is CLI_KEY_SETTING + its number. */
 #define CLI_SETTINGS(group)                                                                                  \
     { CLI_KEY_SETTINGS + (group), NULL, NULL, NULL }
 
@@ -33,47 +39,49 @@ typedef struct cli_command {
 #define CLI_SETTING(option)                                                                                  \
     { CLI_KEY_SETTINGS, option, NULL, NULL }
 
-enum { CLI_KEY_SETTINGS = 0x8000, CLI_KEY_SETTING = 0x9000, CLI_MOST_SETTINGS = 64 };
+enum {
+    CLI_MOST_SETTINGS = 64,
+    CLI_MOST_OPTIONS = 128,
+    CLI_KEY_SETTINGS = 0x8000,
+    CLI_KEY_SETTING = 0x9000,
+    CLI_STORE_TEXT = 0x100000,
+    CLI_STORE_FLAG = 0x200000,
+    CLI_STORE_POSITIVE = 0x300000
+};
 
 /* Setting `index` of the library; NULL beyond the last. */
 const vsh_setting *cli_setting(size_t index);
 
-/* The option of that name, of `length` bytes; false: it is none of the command's. */
+/* The option of that name, of `length` bytes; false: the command has none. */
 bool cli_find_option(const cli_command *command, const char *name, size_t length, cli_option *option);
 
 /* Its options and headings with the library's settings in the place of their rows, which last as long as the
  * process; at most `most` of them. Returns how many. */
 size_t cli_list_options(const cli_command *command, cli_option *options, size_t most);
 
-enum { CLI_MOST_OPTIONS = 128 };
-
 /* Takes one option; returns CLI_OK or an exit code after saying why. `name` is "--sun". */
 typedef int cli_option_fn(void *settings, int key, const char *name, const char *value);
 
-/* Parses argv and takes exactly one operand, `what` ("INPUT"). *help tells that the help was asked for and
- * printed. */
+/* Parses argv: the shared options into cli_given, those that have a place in `settings` there, each other one
+ * by `take`. Operands are those that the usage begins with; NULL stands for one in brackets that is not
+ * there. A single operand FILE.vdb:NAME becomes FILE.vdb. Also begins the progress. CLI_OK, CLI_HELP
+ * after printing the help, or an exit code after saying why. */
 int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
-              const char *what, const char **operand, bool *help);
+              const char **operands);
 
-/* Of an operand FILE.vdb:NAME, which cli_parse() gives as FILE.vdb, the NAME; else NULL. */
+/* The NAME of an operand FILE.vdb:NAME, else NULL. */
 const char *cli_parsed_grid(void);
 
 /* The last command line that was parsed, as outputs tell it: without options that change no value (threads,
- * limits, output, …), and files by their names alone. Belongs to the parser; "" where memory was short. */
+ * limits, output, …), and files by their names alone. "" at first. */
 const char *cli_parsed_command(void);
-
-/* The same with `least` to `count` operands, one or more; NULL stands for those that are not there. */
-int cli_parse_some(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
-                   const char *const *what, const char **operands, int least, int count, bool *help);
-
-/* The same with `count` operands. */
-int cli_parse_operands(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
-                       const char *const *what, const char **operands, int count, bool *help);
 
 void cli_print_help(const cli_command *command);
 
 /* The candidate nearest to `text`, or NULL where none is near. */
 const char *cli_nearest(const char *text, const char *const *candidates, size_t count);
+
+#define CLI_DEGREE 0.017453292519943295 /* radians */
 
 /* Strict parsing: the whole text, finite, in the range; says what was expected. */
 int cli_parse_number(const char *name, const char *text, double least, double most, double *value);
@@ -104,8 +112,11 @@ typedef struct cli_common {
 
 enum { CLI_SANDBOX_AUTO, CLI_SANDBOX_REQUIRE, CLI_SANDBOX_OFF };
 
-cli_common cli_common_default(void);
-vsh_run cli_common_run(const cli_common *common);
+/* As the last command line gave them. */
+extern cli_common cli_given;
+
+/* A run by cli_given, whose warnings are gathered from here on. */
+vsh_run cli_make_run(void);
 
 enum {
     CLI_KEY_THREADS = 0x1000,
@@ -114,14 +125,13 @@ enum {
     CLI_KEY_SANDBOX,
     CLI_KEY_ALLOW_OUTSIDE,
     CLI_KEY_TREAT,
-    CLI_KEY_SHARD,
     CLI_KEY_QUIET = 'q', /* as one letter, too */
     CLI_KEY_VERBOSE = 'v'
 };
 
-/* Work that is shared out: `what` it does of it. */
-#define CLI_SHARD_OPTION(what)                                                                               \
-    { CLI_KEY_SHARD, "shard", "I/N", what }
+/* The file of statistics, a member of settings. */
+#define CLI_STATS_OPTION(type, member)                                                                       \
+    { CLI_TEXT(type, member), "stats", "FILE.json", "write times, counts and peak memory as JSON" }
 
 #define CLI_READER_OPTIONS                                                                                   \
     {CLI_KEY_SANDBOX, "sandbox", "auto|require|off",                                                         \
@@ -159,22 +169,17 @@ enum {
             "sides, or for rooms\nwith air in what they enclose; repeatable"                                 \
     }
 
-/* Takes an option of the tables above; *taken tells whether it was one of them. */
-int cli_common_parse(cli_common *common, int key, const char *name, const char *value, bool *taken);
-
 /* --- --density PATTERN=X: factors of the density by objects' names */
 
 enum { CLI_MOST_DENSITIES = 256 };
 
 typedef struct cli_densities {
     vsh_density_rule list[CLI_MOST_DENSITIES];
-    char *own[CLI_MOST_DENSITIES]; /* the rules' patterns */
     size_t count;
 } cli_densities;
 
 /* Takes one more. CLI_OK or an exit code, having said why. */
 int cli_density_take(cli_densities *densities, const char *name, const char *value);
-void cli_densities_free(cli_densities *densities);
 
 /* --- provenance: notes of an output's inputs and options */
 

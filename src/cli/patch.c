@@ -63,13 +63,9 @@ static int take_rule(cli_patch *patch, const char *name, const char *value) {
     return cli_usage("%s '%s': expected PATTERN=solid, PATTERN=sheet or PATTERN=room", name, value);
 }
 
-int cli_patch_take(cli_patch *patch, int key, const char *name, const char *value, bool *taken) {
-    *taken = true;
-    if (key >= CLI_KEY_SETTING) {
-        return give(patch, (size_t)(key - CLI_KEY_SETTING), value);
-    }
-    *taken = key == CLI_KEY_TREAT;
-    return *taken ? take_rule(patch, name, value) : CLI_OK;
+int cli_patch_take(cli_patch *patch, int key, const char *name, const char *value) {
+    return key == CLI_KEY_TREAT ? take_rule(patch, name, value)
+                                : give(patch, (size_t)(key - CLI_KEY_SETTING), value);
 }
 
 static size_t index_of(const char *name) {

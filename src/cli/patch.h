@@ -15,8 +15,8 @@ typedef struct cli_patch {
     size_t pattern_bytes;
 } cli_patch;
 
-/* Takes an option of a group of settings, or --treat; *taken tells whether it was one. */
-int cli_patch_take(cli_patch *patch, int key, const char *name, const char *value, bool *taken);
+/* Takes an option of a group of settings, or --treat. */
+int cli_patch_take(cli_patch *patch, int key, const char *name, const char *value);
 
 /* The same by the option's name, "--size". */
 int cli_patch_set(cli_patch *patch, const char *name, const char *value);

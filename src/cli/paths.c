@@ -4,6 +4,7 @@
 
 #include <errno.h>
 #include <limits.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,9 +12,33 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-bool cli_has_ending(const char *path, const char *ending) {
+const char *cli_keep_text(const char *format, ...) {
+    static struct kept {
+        struct kept *before;
+        char text[];
+    } * last; /* reaches all, so that no tool takes them for leaks */
+    va_list values, again;
+    va_start(values, format);
+    va_copy(again, values);
+    const int length = vsnprintf(NULL, 0, format, values);
+    struct kept *kept = malloc(sizeof *kept + (size_t)length + 1);
+    if (kept != NULL) {
+        vsnprintf(kept->text, (size_t)length + 1, format, again);
+        kept->before = last;
+        last = kept;
+    }
+    va_end(again);
+    va_end(values);
+    return kept != NULL ? kept->text : NULL;
+}
+
+const char *cli_file_name(const char *path) {
     const char *slash = strrchr(path, '/');
-    const char *dot = strrchr(slash != NULL ? slash : path, '.');
+    return slash != NULL ? slash + 1 : path;
+}
+
+bool cli_has_ending(const char *path, const char *ending) {
+    const char *dot = strrchr(cli_file_name(path), '.');
     return dot != NULL && strcasecmp(dot + 1, ending) == 0;
 }
 
@@ -64,14 +89,7 @@ bool cli_same_file(const char *a, const char *b) {
 }
 
 bool cli_is_model(const char *path) {
-    static const char *const endings[] = {"obj", "gltf", "glb", "fbx",   "stl",
-                                          "dae", "x3d",  "3ds", "blend", "off"};
-    for (size_t i = 0; i < sizeof endings / sizeof endings[0]; ++i) {
-        if (cli_has_ending(path, endings[i])) {
-            return true;
-        }
-    }
-    return false;
+    return cli_has_ending_of(path, "obj gltf glb fbx stl dae x3d 3ds blend off");
 }
 
 bool cli_is_folder(const char *path) {
@@ -80,17 +98,12 @@ bool cli_is_folder(const char *path) {
     return (length > 0 && path[length - 1] == '/') || (stat(path, &status) == 0 && S_ISDIR(status.st_mode));
 }
 
-char *cli_end_path(const char *path, const char *end) {
+const char *cli_end_path(const char *path, const char *end) {
     size_t length = strlen(path);
     while (length > 1 && path[length - 1] == '/') {
         --length;
     }
-    const size_t size = length + strlen(end) + 1;
-    char *ended = malloc(size);
-    if (ended != NULL) {
-        snprintf(ended, size, "%.*s%s", (int)length, path, end);
-    }
-    return ended;
+    return cli_keep_text("%.*s%s", (int)length, path, end);
 }
 
 /* The folder of a path into folder[PATH_MAX]; false where it is the current one. */
@@ -122,22 +135,24 @@ int cli_check_folder(const char *path) {
     return CLI_FILE;
 }
 
-int cli_make_folder(const char *path) {
+int cli_make_folder_of(const char *path) {
     char part[PATH_MAX];
     struct stat status;
-    const size_t length = strlen(path);
+    const char *slash = strrchr(path, '/');
+    const size_t length = slash != NULL ? (size_t)(slash - path) : 0;
+    const int shown = (int)length;
     if (length >= sizeof part) {
-        cli_say("%s: cannot be made: %s", path, strerror(ENAMETOOLONG));
+        cli_say("%.*s: cannot be made: %s", shown, path, strerror(ENAMETOOLONG));
         return CLI_FILE;
     }
     for (size_t i = 1; i <= length; ++i) {
-        if (path[i] != '/' && path[i] != '\0') {
+        if (path[i] != '/') {
             continue;
         }
         snprintf(part, sizeof part, "%.*s", (int)i, path);
         if (mkdir(part, 0777) != 0 && !(stat(part, &status) == 0 && S_ISDIR(status.st_mode))) {
             const int why = errno == EEXIST ? ENOTDIR : errno;
-            cli_say("%s: cannot be made: %s: %s", path, part, strerror(why));
+            cli_say("%.*s: cannot be made: %s: %s", shown, path, part, strerror(why));
             return CLI_FILE;
         }
     }
@@ -216,28 +231,13 @@ int cli_check_links(const char *namer, const char *path) {
 
 /* --- a file for each object */
 
-char *cli_object_output(const char *output) {
-    const size_t length = strlen(output);
-    const char *slash = strrchr(output, '/'), *dot = strrchr(slash != NULL ? slash : output, '.');
-    const size_t stem =
-        dot != NULL && dot > (slash != NULL ? slash + 1 : output) ? (size_t)(dot - output) : length;
-    const bool folder = cli_is_folder(output) || stem == length;
-    char *path = malloc(length + sizeof "/.exr" CLI_OBJECT_NAME);
-    if (path == NULL) {
-        return NULL;
+const char *cli_object_output(const char *output) {
+    const char *name = cli_file_name(output), *dot = strrchr(name, '.');
+    if (strstr(name, CLI_OBJECT_NAME) != NULL) {
+        return cli_keep_text("%s", output);
     }
-    if (strstr(slash != NULL ? slash : output, CLI_OBJECT_NAME) != NULL) {
-        strcpy(path, output);
-    } else if (folder) {
-        sprintf(path, "%s%s%s.exr", output, output[length - 1] == '/' ? "" : "/", CLI_OBJECT_NAME);
-    } else {
-        sprintf(path, "%.*s.%s%s", (int)stem, output, CLI_OBJECT_NAME, output + stem);
+    if (cli_is_folder(output) || dot == NULL || dot == name) {
+        return cli_end_path(output, "/" CLI_OBJECT_NAME ".exr");
     }
-    return path;
-}
-
-char *cli_object_folder(const char *path) {
-    const char *slash = strrchr(path, '/');
-    const size_t length = slash == NULL || slash == path ? 1 : (size_t)(slash - path);
-    return strndup(slash == NULL ? "." : path, length);
+    return cli_keep_text("%.*s.%s%s", (int)(dot - output), output, CLI_OBJECT_NAME, dot);
 }

@@ -1,9 +1,15 @@
-/* File names: endings, and whether two name one file. */
+/* File names: their parts, and whether two name one file. */
 #ifndef CLI_PATHS_H
 #define CLI_PATHS_H
 
 #include <stdbool.h>
 #include <stddef.h>
+
+/* Text that lives as long as the process; NULL where memory is short. */
+const char *cli_keep_text(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+/* The last part of a path: what stands behind its last slash. */
+const char *cli_file_name(const char *path);
 
 /* Whether `path` ends in ".ENDING", in any case. */
 bool cli_has_ending(const char *path, const char *ending);
@@ -29,8 +35,8 @@ bool cli_is_model(const char *path);
 /* Whether a path is a folder, or ends as one. */
 bool cli_is_folder(const char *path);
 
-/* A path with `end` in place of the slashes at its end, to be freed; NULL where memory was short. */
-char *cli_end_path(const char *path, const char *end);
+/* A path with `end` in place of the slashes at its end, kept; NULL where memory is short. */
+const char *cli_end_path(const char *path, const char *end);
 
 /* Outputs that a file names, and not the user, must not leave for elsewhere by links: the file and its folder
  * may be a stranger's. `path` is as it was made of the folder of `namer` and of what stands there; its links
@@ -43,8 +49,9 @@ int cli_check_input(const char *path);
 /* Says which folder is missing where an output's is. CLI_OK or CLI_FILE. */
 int cli_check_folder(const char *path);
 
-/* Makes a folder and those that it is in, where they are not there. CLI_OK or CLI_FILE, having said why. */
-int cli_make_folder(const char *path);
+/* Makes the folder that a file is in, and those that this is in, where they are not there. CLI_OK or
+ * CLI_FILE, having said why. */
+int cli_make_folder_of(const char *path);
 
 /* --- outputs that are a file for each object (--per-object) */
 
@@ -52,10 +59,7 @@ int cli_make_folder(const char *path);
 #define CLI_OBJECT_NAME "%s"
 
 /* OUT as a path with CLI_OBJECT_NAME in it: "out/", a folder that is there and "out" (without an ending)
- * become out/%s.exr, out.png becomes out.%s.png. To be freed; NULL where memory was short. */
-char *cli_object_output(const char *output);
-
-/* The folder that such a path's files go to, to be freed; NULL where memory was short. */
-char *cli_object_folder(const char *path);
+ * become out/%s.exr, out.png becomes out.%s.png. Kept; NULL where memory is short. */
+const char *cli_object_output(const char *output);
 
 #endif

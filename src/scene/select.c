@@ -6,7 +6,6 @@
 #include "base/suggest.h"
 #include "base/try.h"
 #include "mesh/mesh.h"
-#include "json/json.h"
 
 #include <stdint.h>
 #include <stdio.h>

@@ -1,5 +1,4 @@
 /* vdbshade bake: from files to lightmaps. */
-#include "bake.h"
 #include "base/bytes.h"
 #include "cli/message.h"
 #include "cli/paths.h"
@@ -14,13 +13,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-static int make_folder_of(const char *output) {
-    char *folder = cli_object_folder(output);
-    const int code = folder != NULL ? cli_make_folder(folder) : cli_out_of_memory(output);
-    free(folder);
-    return code;
-}
 
 /* Whether the image of a receiver can be written, which the scene's file names or the command line. */
 static int check_image(const cli_bake_settings *settings, const vsh_scene *scene, size_t index) {
@@ -78,6 +70,33 @@ static int check_shard(const cli_bake_settings *s, const vsh_scene *scene) {
     return CLI_OK;
 }
 
+/* Whether the page of --view can be written. */
+static int check_view(const cli_bake_settings *settings, const vsh_scene *scene) {
+    const char *page = settings->view;
+    if (page == NULL) {
+        return CLI_OK;
+    }
+    if (!cli_has_ending(page, "html")) {
+        return cli_usage("--view '%s': expected a name that ends in .html", page);
+    }
+    const bool images = settings->per_object && !vsh_lit_is_output(scene->receivers[0].output);
+    if (images || scene->receiver_count != 1 || scene->receivers[0].type != VSH_RECEIVER_MESH) {
+        return cli_usage("--view '%s': shows one lightmap of one mesh; 'vdbshade view' shows others", page);
+    }
+    const int32_t unwrap = scene->receivers[0].unwrap;
+    if (!vsh_lit_is_output(scene->receivers[0].output) &&
+        (unwrap == VSH_RECEIVER_UNWRAP_AUTO || unwrap == VSH_RECEIVER_UNWRAP_ALWAYS)) {
+        return cli_usage("--view '%s': an image does not hold the UVs that are made; bake a .glb", page);
+    }
+    if (cli_has_ending(scene->receivers[0].output, "obj")) {
+        return cli_usage("--view '%s': shows what a .glb, a .gltf or an image holds, not an .obj", page);
+    }
+    if (cli_same_file(page, scene->receivers[0].output) || cli_same_file(page, settings->input)) {
+        return cli_usage("--view '%s': is also the input or the output", page);
+    }
+    return cli_temporary_check(page);
+}
+
 /* What can be refused before anything is read. */
 static int check_files(const cli_bake_settings *settings, const vsh_scene *scene) {
     if (settings->stats != NULL) {
@@ -86,14 +105,14 @@ static int check_files(const cli_bake_settings *settings, const vsh_scene *scene
     CLI_TRY(check_shard(settings, scene));
     CLI_TRY(check_picture(settings));
     CLI_TRY(check_lit(settings, scene));
-    CLI_TRY(cli_bake_check_view(settings, scene));
+    CLI_TRY(check_view(settings, scene));
     const bool makes = settings->output_folder != NULL || settings->per_object;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         const char *output = scene->receivers[i].output;
         if (makes && settings->dry_run) {
             continue; /* its folder need not be there yet */
         }
-        CLI_TRY(makes ? make_folder_of(output) : cli_check_folder(output));
+        CLI_TRY(makes ? cli_make_folder_of(output) : cli_check_folder(output));
         CLI_TRY(check_image(settings, scene, i));
     }
     return CLI_OK;
@@ -124,7 +143,7 @@ static int check_outputs(const baking *b, const vsh_scene_lightmap *lightmaps, c
         outputs[count] = others[i];
         count += others[i] != NULL;
     }
-    return cli_bake_check_inputs(s, b->scene, outputs, count);
+    return cli_bake_check_inputs(b->scene, outputs, count);
 }
 
 static vsh_result check_loaded(void *user, const vsh_scene_lightmap *lightmaps, size_t count,
@@ -150,12 +169,12 @@ static int32_t report_progress(void *user, const char *stage, double fraction) {
 }
 
 static bool has_lines(const baking *b) {
-    return b->settings->shard == 0 && (b->count <= MOST_LINES || b->settings->common.verbose);
+    return b->settings->shard == 0 && (b->count <= MOST_LINES || cli_given.verbose);
 }
 
 static void say_lightmap(void *user, const vsh_scene_lightmap *lightmap) {
     const baking *b = user;
-    if (has_lines(b) && !b->settings->common.quiet) {
+    if (has_lines(b) && !cli_given.quiet) {
         cli_say("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid", lightmap->output,
                 lightmap->width, lightmap->height, lightmap->covered, lightmap->invalid_texels);
     }
@@ -163,8 +182,8 @@ static void say_lightmap(void *user, const vsh_scene_lightmap *lightmap) {
 
 /* --- reports */
 
-/* A name to go before ".I-of-N.part", to be freed. */
-static char *name_parts(const cli_bake_settings *s, const vsh_scene *scene) {
+/* A name to go before ".I-of-N.part". */
+static const char *name_parts(const cli_bake_settings *s, const vsh_scene *scene) {
     const char *output = s->output != NULL ? s->output : scene->receivers[0].output;
     return cli_end_path(output, ""); /* a folder, of objects */
 }
@@ -194,15 +213,34 @@ static cli_stats make_stats(const vsh_scene *scene, const vsh_bake_report *repor
     return stats;
 }
 
+/* Writes the page that shows the bake. */
+static int write_view(const cli_bake_settings *settings, const vsh_scene *scene, const vsh_run *run) {
+    const vsh_receiver *receiver = &scene->receivers[0];
+    if (settings->view == NULL) {
+        return CLI_OK;
+    }
+    vsh_view_bake bake = vsh_view_bake_default();
+    if (cli_has_ending(receiver->output, "glb") || cli_has_ending(receiver->output, "gltf")) {
+        bake.model = receiver->output; /* its light is in it */
+    } else {
+        bake.model = receiver->path;
+        bake.planes = (const char *const *)&receiver->output;
+        bake.plane_count = 1;
+        bake.uv_set = receiver->uv_set;
+    }
+    vsh_error error;
+    return cli_check_result(vsh_view_write(settings->view, &bake, NULL, run, &error), &error);
+}
+
 static int report_bake(const baking *b, const char *parts, const vsh_bake_report *report,
                        const vsh_run *run) {
     const cli_bake_settings *s = b->settings;
     const cli_stats stats = make_stats(b->scene, report, run->threads);
     cli_stats_warn(&stats, b->scene, run);
-    CLI_TRY(cli_bake_view(s, b->scene, run));
+    CLI_TRY(write_view(s, b->scene, run));
     CLI_TRY(cli_stats_finish(&stats, run, s->stats));
     cli_warnings_tell();
-    if (s->common.quiet) {
+    if (cli_given.quiet) {
         return CLI_OK;
     }
     if (s->shard > 0) {
@@ -262,11 +300,11 @@ static int print_forecast(baking *b, const vsh_bake_options *options, const vsh_
 /* Bakes a scene whose options were checked, or merges its parts, or forecasts the bake. */
 static int bake_scene(const cli_bake_settings *settings, const vsh_scene *scene) {
     baking b = {.settings = settings, .scene = scene};
-    vsh_run run = cli_common_run(&settings->common);
+    vsh_run run = cli_make_run();
     run.progress = report_progress;
     run.user = &b;
     const char *const files[] = {settings->input, cli_bake_lights(settings)};
-    char *parts = name_parts(settings, scene);
+    const char *parts = name_parts(settings, scene);
     if (parts == NULL) {
         return cli_out_of_memory(settings->input);
     }
@@ -285,15 +323,11 @@ static int bake_scene(const cli_bake_settings *settings, const vsh_scene *scene)
     options.loaded = check_loaded;
     options.done = say_lightmap;
     options.user = &b;
-    const int code =
-        settings->dry_run ? print_forecast(&b, &options, &run) : run_bake(&b, parts, &options, &run);
-    free(parts);
-    return code;
+    return settings->dry_run ? print_forecast(&b, &options, &run) : run_bake(&b, parts, &options, &run);
 }
 
 int cli_bake_by(const cli_bake_settings *settings) {
     int code;
-    cli_progress_begin(settings->common.progress, settings->common.quiet);
     cli_bake_scene made;
     CLI_TRY_DONE(cli_bake_scene_make(settings, &made));
     CLI_TRY_DONE(check_files(settings, &made.scene));
@@ -301,15 +335,5 @@ int cli_bake_by(const cli_bake_settings *settings) {
     code = bake_scene(settings, &made.scene);
 done:
     cli_bake_scene_free(&made);
-    cli_progress_end();
-    return code;
-}
-
-int cli_bake_main(int argc, char **argv) {
-    cli_bake_settings settings;
-    bool help;
-    int code = cli_bake_parse(argc, argv, &settings, &help);
-    code = code != CLI_OK || help ? code : cli_bake_by(&settings);
-    cli_densities_free(&settings.densities);
     return code;
 }

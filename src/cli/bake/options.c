@@ -1,3 +1,4 @@
+/* The command line of `vdbshade bake`, and the options that other commands share with it. */
 #include "options.h"
 
 #include "cli/message.h"
@@ -5,21 +6,9 @@
 #include <stdio.h>
 #include <string.h>
 
-enum {
-    KEY_STATS = 0x2000,
-    KEY_DRY_RUN,
-    KEY_OUTPUT_FOLDER,
-    KEY_RECEIVE,
-    KEY_NO_RECEIVE,
-    KEY_PER_OBJECT,
-    KEY_INVALID,
-    KEY_PREVIEW,
-    KEY_EXR,
-    KEY_VIEW,
-    KEY_DENSITY,
-    KEY_HEIGHT,
-    KEY_SIZE_WORLD
-};
+enum { KEY_RECEIVE = 0x2000, KEY_NO_RECEIVE, KEY_DENSITY, KEY_HEIGHT, KEY_SIZE_WORLD, KEY_SHARD };
+
+static int bake_main(int argc, char **argv);
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
@@ -28,21 +17,24 @@ static const cli_option options[] = {
      ".png .tif .dpx .jp2 .tga .bmp .hdr .ppm .pgm .jpg\n"
      ".webp .gif; what each can hold, and what is not\nwritten: docs/formats.md;\n"
      ".glb .gltf .obj: the input with its light in its\nmaterials (docs/lit.md)"},
-    {KEY_OUTPUT_FOLDER, "output-folder", "FOLDER",
+    {CLI_TEXT(cli_bake_settings, output_folder), "output-folder", "FOLDER",
      "write there what a scene's file says is written, under\nthe same names; it is made where it is not "
      "there"},
     CLI_SETTINGS(VSH_SETTINGS_IMAGE),
-    {KEY_INVALID, "invalid", "FILE.png",
+    {CLI_TEXT(cli_bake_settings, invalid_picture), "invalid", "FILE.png",
      "also a picture of the lightmap: charts grey, texels\ninside solids or behind walls red; FILE.OUT.png "
      "where\nthere are several outputs"},
-    {KEY_PREVIEW, "preview", NULL,
+    {CLI_FLAG(cli_bake_settings, preview), "preview", NULL,
      "into a .glb or .gltf: the light as unlit base colour,\nwhich every viewer shows, in place of textures"},
-    {KEY_EXR, "exr", "FILE.exr", "also an EXR of all channels beside a .glb or .gltf"},
-    {KEY_VIEW, "view", "PAGE.html", "also a page to look at it in a browser: docs/view.md"},
-    {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
-    {KEY_DRY_RUN, "dry-run", NULL, "bake nothing: print texels, voxels and memory"},
-    CLI_SHARD_OPTION("bake part I of N into OUT.I-of-N.part: on any machine, in\nany order, again where it "
-                     "failed; 'vdbshade merge OUT' puts\nall parts together to the bits of one bake"),
+    {CLI_TEXT(cli_bake_settings, exr), "exr", "FILE.exr",
+     "also an EXR of all channels beside a .glb or .gltf"},
+    {CLI_TEXT(cli_bake_settings, view), "view", "PAGE.html",
+     "also a page to look at it in a browser: docs/view.md"},
+    CLI_STATS_OPTION(cli_bake_settings, stats),
+    {CLI_FLAG(cli_bake_settings, dry_run), "dry-run", NULL, "bake nothing: print texels, voxels and memory"},
+    {KEY_SHARD, "shard", "I/N",
+     "bake part I of N into OUT.I-of-N.part: on any machine, in\nany order, again where it "
+     "failed; 'vdbshade merge OUT' puts\nall parts together to the bits of one bake"},
     {0, NULL, NULL, "Objects"},
     {KEY_RECEIVE, "receive", "NAME",
      "only objects of this name receive, all cast; * and ?\nmatch as in a shell; may be repeated"},
@@ -51,7 +43,7 @@ static const cli_option options[] = {
      "repeated"},
     CLI_FLOOR_OPTION,
     CLI_NO_CAST_OPTION,
-    {KEY_PER_OBJECT, "per-object", NULL,
+    {CLI_FLAG(cli_bake_settings, per_object), "per-object", NULL,
      "an image for each object: FOLDER/NAME.exr with\n-o FOLDER/, else OUT.NAME.exr, or where OUT has %s"},
     {0, NULL, NULL, "Terrain"},
     {KEY_HEIGHT, "height", "H", "height of white in INPUT, an image of heights; scene\nunits"},
@@ -80,21 +72,20 @@ const cli_command cli_bake = {
     "the option.",
     options,
     sizeof options / sizeof options[0],
-    cli_bake_main};
+    bake_main};
 
 /* W or W,D */
 static int parse_world(const char *name, const char *value, double world[2]) {
-    const char *comma = strchr(value, ',');
     char first[64];
-    const size_t length = comma != NULL ? (size_t)(comma - value) : strlen(value);
+    const size_t length = strcspn(value, ",");
     if (length >= sizeof first) {
         return cli_usage("%s '%s': expected W or W,D", name, value);
     }
-    memcpy(first, value, length);
-    first[length] = '\0';
+    snprintf(first, sizeof first, "%.*s", (int)length, value);
     world[1] = 0.0;
     CLI_TRY(cli_parse_number(name, first, 1e-12, 1e12, &world[0]));
-    return comma != NULL ? cli_parse_number(name, comma + 1, 1e-12, 1e12, &world[1]) : CLI_OK;
+    return value[length] != '\0' ? cli_parse_number(name, value + length + 1, 1e-12, 1e12, &world[1])
+                                 : CLI_OK;
 }
 
 static int take_caster(cli_bake_settings *s, const char *name, const char *value) {
@@ -119,8 +110,6 @@ static int take_pattern(cli_patterns *patterns, const char *name, const char *va
 }
 
 int cli_shared_parse(cli_bake_settings *s, int key, const char *name, const char *value) {
-    bool taken;
-    int code;
     switch (key) {
     case CLI_KEY_SUN:
         s->has_sun = true;
@@ -141,8 +130,7 @@ int cli_shared_parse(cli_bake_settings *s, int key, const char *name, const char
     case CLI_KEY_NO_CAST:
         return take_pattern(&s->no_cast, name, value);
     default:
-        code = cli_patch_take(&s->patch, key, name, value, &taken);
-        return taken ? code : cli_common_parse(&s->common, key, name, value, &taken);
+        return cli_patch_take(&s->patch, key, name, value);
     }
 }
 
@@ -151,9 +139,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
     switch (key) {
     case 'o':
         s->output = value;
-        return CLI_OK;
-    case KEY_OUTPUT_FOLDER:
-        s->output_folder = value;
         return CLI_OK;
     case KEY_RECEIVE:
         return take_pattern(&s->receive, name, value);
@@ -167,40 +152,21 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return parse_world(name, value, s->world);
     case KEY_DENSITY:
         return cli_density_take(&s->densities, name, value);
-    case KEY_PER_OBJECT:
-        s->per_object = true;
-        return CLI_OK;
-    case KEY_INVALID:
-        s->invalid_picture = value;
-        return CLI_OK;
-    case KEY_PREVIEW:
-        s->preview = true;
-        return CLI_OK;
-    case KEY_EXR:
-        s->exr = value;
-        return CLI_OK;
-    case KEY_VIEW:
-        s->view = value;
-        return CLI_OK;
-    case KEY_STATS:
-        s->stats = value;
-        return CLI_OK;
-    case KEY_DRY_RUN:
-        s->dry_run = true;
-        return CLI_OK;
-    case CLI_KEY_SHARD:
+    case KEY_SHARD:
         return cli_parse_shard(name, value, &s->shard, &s->shard_count);
     default:
-        break;
+        return cli_shared_parse(s, key, name, value);
     }
-    return cli_shared_parse(s, key, name, value);
 }
 
-int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings, bool *help) {
-    memset(settings, 0, sizeof *settings);
-    settings->common = cli_common_default();
-    settings->words = (const char *const *)argv;
-    settings->word_count = (size_t)argc;
-    const int code = cli_parse(&cli_bake, argc, argv, take, settings, "INPUT", &settings->input, help);
-    return code != CLI_OK || *help ? code : cli_patch_check(&settings->patch);
+int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings) {
+    *settings = (cli_bake_settings){.words = (const char *const *)argv, .word_count = (size_t)argc};
+    CLI_TRY(cli_parse(&cli_bake, argc, argv, take, settings, &settings->input));
+    return cli_patch_check(&settings->patch);
+}
+
+static int bake_main(int argc, char **argv) {
+    cli_bake_settings settings;
+    CLI_TRY(cli_bake_parse(argc, argv, &settings));
+    return cli_bake_by(&settings);
 }

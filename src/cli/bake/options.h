@@ -5,6 +5,7 @@
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "cli/patch.h"
+#include "cli/stats.h"
 
 enum { CLI_MAX_EXTRA_CASTERS = 256, CLI_MAX_PATTERNS = 256 };
 
@@ -62,6 +63,11 @@ enum {
             "another mesh or .vdb (FILE.vdb:GRID) that casts\nshadows; may be repeated"                      \
     }
 
+/* Whether a caster stays out of level sets if a scene's shadows are `hard` or `classic`. */
+static inline bool cli_caster_is_direct(const vsh_caster *caster) {
+    return caster->type == VSH_CASTER_SPHERES && !caster->voxelised;
+}
+
 typedef struct cli_bake_settings {
     const char *input;
     const char *output;
@@ -71,8 +77,7 @@ typedef struct cli_bake_settings {
     const char *stats;
     const char *invalid_picture; /* NULL: none */
     const char *view;            /* page; NULL: none */
-    cli_common common;
-    cli_patch patch; /* over the scene and its receivers */
+    cli_patch patch;             /* over the scene and its receivers */
     double sun[3];
     double sun_angle_deg;
     const char *lights; /* a file whose lights are taken, or CLI_LIGHTS_OF_INPUT; NULL: none */
@@ -90,31 +95,37 @@ typedef struct cli_bake_settings {
     const char *merged; /* parts of this name are put together, and nothing is baked; NULL: it is baked */
 } cli_bake_settings;
 
-/* Takes an option of the tables above, a setting or one of the common ones. */
+/* Takes an option of the tables above, or a setting. */
 int cli_shared_parse(cli_bake_settings *settings, int key, const char *name, const char *value);
 
 /* The file of --lights; NULL: none. */
 const char *cli_bake_lights(const cli_bake_settings *settings);
 
-/* Takes the command line. */
-int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings, bool *help);
+/* Takes the command line, as cli_parse() does. */
+int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings);
+
+/* Bakes, or puts parts together, by settings that were taken. CLI_OK or an exit code, having said why. */
+int cli_bake_by(const cli_bake_settings *settings);
 
 /* A scene and what of it is ours: the input's, with the options put over it. */
 typedef struct cli_bake_scene {
     vsh_scene scene;
     vsh_scene *read; /* the scene file's; NULL for a mesh */
     vsh_caster *casters;
-    char *caster_files[CLI_MAX_EXTRA_CASTERS]; /* FILE.vdb of each --caster FILE.vdb:NAME */
     vsh_receiver *receivers;
-    char **outputs;    /* [receiver_count], where they are not the scene's own; NULL: none is */
     vsh_light *lights; /* [scene.light_count], where they are not all the scene file's */
 } cli_bake_scene;
 
-/* Makes the scene, checks that it can be baked and that its outputs replace no input. */
-int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made);
+/* These make a scene; free it also after a failure. CLI_OK or an exit code, having said why. */
 
-/* The same without its receivers: for points, which may ask for no light and no AO. */
+/* Its casters, and the settings that were given. */
+int cli_bake_scene_casters(const cli_bake_settings *settings, cli_bake_scene *made);
+
+/* The lights, too, but no receivers: for points. There may be no light and no AO. */
 int cli_bake_scene_for_points(const cli_bake_settings *settings, cli_bake_scene *made);
+
+/* All of it, with something to bake and outputs that replace no input. */
+int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made);
 
 /* Then adds the receivers, with the options put over them. CLI_OK or an exit code, having said why. */
 int cli_bake_scene_receivers(const cli_bake_settings *settings, cli_bake_scene *made);
@@ -127,8 +138,30 @@ int cli_bake_check_output(const cli_bake_settings *settings, const vsh_scene *sc
 
 /* The same of outputs that are read with what the scene names, as textures are: looks into its models where
  * such a file is there. */
-int cli_bake_check_inputs(const cli_bake_settings *settings, const vsh_scene *scene,
-                          const char *const *outputs, size_t count);
+int cli_bake_check_inputs(const vsh_scene *scene, const char *const *outputs, size_t count);
+
+/* Refuses the output and the file of statistics, either of which may be NULL, where they are one file or an
+ * input, or cannot be written. CLI_OK or an exit code, having said why. */
+int cli_bake_check_files(const cli_bake_settings *settings, const vsh_scene *scene);
 void cli_bake_scene_free(cli_bake_scene *made);
+
+/* --- the work of commands that shade points */
+
+typedef struct cli_shading {
+    vsh_scene *scene;
+    vsh_run run;
+    vsh_assets *assets;
+    vsh_occluders *occluders;
+    cli_provenance origin;
+    cli_stats stats;
+} cli_shading;
+
+/* Nothing yet; `of` is CLI_STATS_…. Free it in the end. */
+cli_shading cli_shading_begin(vsh_scene *scene, int32_t of);
+
+/* Load the assets, and make what casts. CLI_OK or an exit code, having said why. */
+int cli_shading_load(cli_shading *shading);
+int cli_shading_cast(cli_shading *shading, const vsh_scene_occluders_options *what);
+void cli_shading_free(cli_shading *shading);
 
 #endif

@@ -3,7 +3,6 @@
 #include "cli/compare/comparison.h"
 #include "cli/message.h"
 #include "cli/paths.h"
-#include "cli/progress.h"
 #include "cli/signals.h"
 #include "cli/temporary.h"
 
@@ -50,7 +49,7 @@ static int print(const cli_compare_settings *s, const cli_comparison *c) {
     if (s->json) {
         return cli_print_json(cli_comparison_json(c), c->golden);
     }
-    if (!s->common.quiet) {
+    if (!cli_given.quiet) {
         cli_comparison_print(stdout, c, "");
     }
     return CLI_OK;
@@ -58,15 +57,9 @@ static int print(const cli_compare_settings *s, const cli_comparison *c) {
 
 static int compare_main(int argc, char **argv) {
     cli_compare_settings s = cli_compare_settings_default();
-    static const char *const what[2] = {"GOLDEN", "NEW"};
     const char *files[2];
-    bool help;
-    int code = cli_parse_operands(&cli_compare, argc, argv, take, &s, what, files, 2, &help);
-    if (code != CLI_OK || help) {
-        return code;
-    }
-    cli_progress_begin(s.common.progress, s.common.quiet);
-    code = cli_compare_check_reports(&s, files, 2);
+    CLI_TRY(cli_parse(&cli_compare, argc, argv, take, &s, files));
+    int code = cli_compare_check_reports(&s, files, 2);
     cli_comparison comparison = {.alike = false};
     if (code == CLI_OK) {
         cli_signals_watch();
@@ -79,14 +72,13 @@ static int compare_main(int argc, char **argv) {
         cli_signals_end(code);
     }
     cli_comparison_free(&comparison);
-    cli_progress_end();
     return code;
 }
 
 /* --- options */
 
 cli_compare_settings cli_compare_settings_default(void) {
-    cli_compare_settings s = {.common = cli_common_default(), .options = vsh_compare_files_options_default()};
+    cli_compare_settings s = {.options = vsh_compare_files_options_default()};
     return s;
 }
 
@@ -122,10 +114,8 @@ int cli_compare_parse(cli_compare_settings *s, int key, const char *name, const 
         s->html = value;
         return CLI_OK;
     default:
-        break;
+        return CLI_OK;
     }
-    bool taken;
-    return cli_common_parse(&s->common, key, name, value, &taken);
 }
 
 int cli_compare_check_reports(const cli_compare_settings *s, const char *const *inputs, size_t count) {
@@ -182,7 +172,7 @@ int cli_comparison_make(const cli_compare_settings *settings, const char *golden
     if (c->golden == NULL || c->fresh == NULL) {
         return cli_out_of_memory(golden);
     }
-    const vsh_run run = cli_common_run(&settings->common);
+    const vsh_run run = cli_make_run();
     drawing d = {settings->html, c, CLI_OK};
     vsh_compare_files_options wanted = settings->options;
     wanted.look = settings->html != NULL ? draw : NULL;

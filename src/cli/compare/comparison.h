@@ -8,7 +8,6 @@
 #include <stdio.h>
 
 typedef struct cli_compare_settings {
-    cli_common common;
     vsh_compare_files_options options;
     bool json; /* on standard output, instead of text */
     const char *junit, *html;
@@ -60,7 +59,7 @@ enum {
             "files where these\ndiffer, else 0)"                                                             \
     }
 
-/* Parses one of these options, or a common one. */
+/* Parses one of these options. */
 int cli_compare_parse(cli_compare_settings *settings, int key, const char *name, const char *value);
 
 /* Refuses reports that would replace one of `inputs` or each other, or cannot be written. */

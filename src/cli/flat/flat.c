@@ -3,10 +3,8 @@
 #include "base/clock.h"
 #include "cli/commands.h"
 #include "cli/message.h"
-#include "cli/options.h"
 #include "cli/patch.h"
 #include "cli/paths.h"
-#include "cli/progress.h"
 #include "cli/signals.h"
 #include "cli/stats.h"
 #include "cli/temporary.h"
@@ -16,11 +14,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { KEY_STATS = 0x2000 };
-
 typedef struct flat_settings {
     const char *input, *output, *stats;
-    cli_common common;
     cli_patch patch; /* over the scene */
 } flat_settings;
 
@@ -28,7 +23,7 @@ static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
     {'o', "output", "OUT", "image to write; formats as of bake (the scene's)"},
     CLI_SETTINGS(VSH_SETTINGS_FLAT_IMAGE),
-    {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
+    CLI_STATS_OPTION(flat_settings, stats),
     {0, NULL, NULL, "Texels"},
     CLI_SETTINGS(VSH_SETTINGS_FLAT_TEXELS),
     CLI_COMMON_OPTIONS,
@@ -49,19 +44,11 @@ const cli_command cli_flat = {
 
 static int take(void *settings, int key, const char *name, const char *value) {
     flat_settings *s = settings;
-    switch (key) {
-    case 'o':
-        s->output = value;
-        return CLI_OK;
-    case KEY_STATS:
-        s->stats = value;
-        return CLI_OK;
-    default:
-        break;
+    if (key != 'o') {
+        return cli_patch_take(&s->patch, key, name, value);
     }
-    bool taken;
-    const int code = cli_patch_take(&s->patch, key, name, value, &taken);
-    return taken ? code : cli_common_parse(&s->common, key, name, value, &taken);
+    s->output = value;
+    return CLI_OK;
 }
 
 /* Puts what was given over the scene's own. */
@@ -71,21 +58,16 @@ static int apply(const flat_settings *s, vsh_flat_scene *scene) {
                                  : cli_usage("%s: no output; give -o OUT", s->input);
 }
 
-/* --- channels */
+/* --- channels: irradiance.R, .G and .B, then the shadows, then A */
 
 typedef struct flat_planes {
     char (*names)[VSH_CHANNEL_NAME];
     const char **name_list;
     int32_t *holds;
-    float **planes; /* irradiance.R, .G, .B, then the shadows, then A */
+    float **planes; /* [count], in one piece of memory */
     size_t count;
     vsh_image image;
 } flat_planes;
-
-static int out_of_memory(const char *what) {
-    cli_say("%s: the system refused memory", what);
-    return CLI_LIMIT;
-}
 
 static int name_planes(const vsh_flat_scene *scene, flat_planes *p) {
     p->count = scene->light_count + 4;
@@ -94,7 +76,7 @@ static int name_planes(const vsh_flat_scene *scene, flat_planes *p) {
     p->holds = calloc(p->count, sizeof *p->holds);
     p->planes = calloc(p->count, sizeof *p->planes);
     if (p->names == NULL || p->name_list == NULL || p->holds == NULL || p->planes == NULL) {
-        return out_of_memory("channels");
+        return cli_out_of_memory("channels");
     }
     for (size_t i = 0; i < p->count; ++i) {
         if (i < 3) {
@@ -112,32 +94,28 @@ static int name_planes(const vsh_flat_scene *scene, flat_planes *p) {
     return CLI_OK;
 }
 
-static int allocate_planes(const flat_settings *s, const vsh_flat_scene *scene,
-                           const vsh_image_options *image, flat_planes *p) {
+static int allocate_planes(const vsh_flat_scene *scene, const vsh_image_options *image, flat_planes *p) {
     const size_t texels = (size_t)scene->options.width * (size_t)scene->options.height;
     const double bytes = (double)texels * sizeof(float) * (double)p->count +
                          (double)vsh_image_writer_bytes(scene->output, &p->image, image);
-    if (s->common.memory_limit > 0 && bytes > (double)s->common.memory_limit) {
+    const uint64_t limit = cli_given.memory_limit;
+    if (limit > 0 && bytes > (double)limit) {
         char need[32], have[32];
         cli_say("%s: %d × %d texels in %zu channels need %s; the memory limit is %s", scene->output,
                 scene->options.width, scene->options.height, p->count,
                 vshi_bytes_text((uint64_t)bytes, need, sizeof need),
-                vshi_bytes_text(s->common.memory_limit, have, sizeof have));
+                vshi_bytes_text(limit, have, sizeof have));
         return CLI_LIMIT;
     }
-    for (size_t i = 0; i < p->count; ++i) {
-        p->planes[i] = calloc(texels, sizeof(float));
-        if (p->planes[i] == NULL) {
-            return out_of_memory(scene->output);
-        }
+    p->planes[0] = calloc(texels * p->count, sizeof(float));
+    for (size_t i = 1; i < p->count && p->planes[0] != NULL; ++i) {
+        p->planes[i] = p->planes[0] + i * texels;
     }
-    return CLI_OK;
+    return p->planes[0] != NULL ? CLI_OK : cli_out_of_memory(scene->output);
 }
 
 static void free_planes(flat_planes *p) {
-    for (size_t i = 0; p->planes != NULL && i < p->count; ++i) {
-        free(p->planes[i]);
-    }
+    free(p->planes != NULL ? p->planes[0] : NULL);
     free(p->planes);
     free(p->holds);
     free(p->name_list);
@@ -174,8 +152,7 @@ static int check_files(const flat_settings *s, const vsh_flat_scene *scene, cons
         CLI_TRY(cli_temporary_check(s->stats));
     }
     vsh_error error;
-    return vsh_image_check(scene->output, image, options_of_image, &error) == VSH_OK ? CLI_OK
-                                                                                     : cli_fail(&error);
+    return cli_check(vsh_image_check(scene->output, image, options_of_image, &error), &error);
 }
 
 /* Inputs are the scene's file and those that it names. */
@@ -183,8 +160,9 @@ static int make_origin(const flat_settings *s, const vsh_flat_scene *scene, cons
                        cli_provenance *origin) {
     const size_t count = 1 + scene->caster_count;
     const char **files = calloc(count, sizeof *files);
+    *origin = (cli_provenance){.count = 0};
     if (files == NULL) {
-        return out_of_memory(scene->output);
+        return cli_out_of_memory(scene->output);
     }
     files[0] = s->input;
     for (size_t i = 0; i < scene->caster_count; ++i) {
@@ -195,43 +173,32 @@ static int make_origin(const flat_settings *s, const vsh_flat_scene *scene, cons
     return code;
 }
 
-/* Puts an image in place, and warns where light over 1 was cut. Frees the writer. */
-static int finish_image(vsh_image_writer *writer, const char *output) {
-    vsh_error error;
-    vsh_image_clipping cut;
-    if (vsh_image_writer_get_clipping(writer, &cut, &error) != VSH_OK) {
-        vsh_image_writer_abandon(writer);
-        return cli_fail(&error);
-    }
-    if (vsh_image_writer_finish(writer, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
-    if (cut.clipped > 0) {
-        cli_warn(
-            "%s: %.3g %% of the texels are brighter than 1, up to %.3g, and cut to 1; write .exr, or floats "
-            "(--bits 32) where the format has them, or dim the lights",
-            output, 100.0 * (double)cut.clipped / (double)cut.texels, (double)cut.largest);
-    }
-    return CLI_OK;
-}
-
+/* Writes the image, and warns where light over 1 was cut. */
 static int write_map(const flat_settings *s, const vsh_flat_scene *scene, const flat_planes *planes,
                      const vsh_image_options *image, const vsh_run *run) {
-    cli_provenance origin = {NULL, NULL, 0};
+    cli_provenance origin;
+    vsh_image_options told = *image;
+    vsh_image_writer *writer = NULL;
+    vsh_image_clipping cut;
+    vsh_error error;
     int code;
     CLI_TRY_DONE(make_origin(s, scene, run, &origin));
-    vsh_image_options told = *image;
     told.attributes = origin.attributes;
     told.attribute_count = origin.count;
-    vsh_error error;
-    vsh_image_writer *writer = NULL;
     if (vsh_image_writer_create(scene->output, &planes->image, &told, &writer, &error) != VSH_OK ||
-        vsh_image_writer_add(writer, planes->image.height, planes->image.planes, &error) != VSH_OK) {
+        vsh_image_writer_add(writer, planes->image.height, planes->image.planes, &error) != VSH_OK ||
+        vsh_image_writer_get_clipping(writer, &cut, &error) != VSH_OK) {
         vsh_image_writer_abandon(writer);
         code = cli_fail(&error);
         goto done;
     }
-    code = finish_image(writer, scene->output);
+    CLI_TRY_DONE(cli_check(vsh_image_writer_finish(writer, &error), &error));
+    if (cut.clipped > 0) {
+        cli_warn(
+            "%s: %.3g %% of the texels are brighter than 1, up to %.3g, and cut to 1; write .exr, or floats "
+            "(--bits 32) where the format has them, or dim the lights",
+            scene->output, 100.0 * (double)cut.clipped / (double)cut.texels, (double)cut.largest);
+    }
 done:
     cli_provenance_free(&origin);
     return code;
@@ -242,80 +209,62 @@ static int bake(const flat_settings *s, const vsh_flat_scene *scene, const flat_
     vsh_outline *casters = NULL;
     vsh_error error;
     double now = vshi_seconds();
-    if (vsh_flat_scene_casters(scene, run, &casters, &error) != VSH_OK) {
-        return cli_fail_of(NULL, &error);
-    }
+    CLI_TRY(cli_check_result(vsh_flat_scene_casters(scene, run, &casters, &error), &error));
     now = cli_stats_stage(stats, CLI_STAGE_LOAD, now);
     const vsh_flat_map map = {planes->planes + 3, planes->planes, planes->planes[planes->count - 1]};
     const vsh_result result =
         vsh_flat_bake(casters, scene->lights, scene->light_count, &scene->options, run, &map, &error);
     now = cli_stats_stage(stats, CLI_STAGE_BAKE, now);
     vsh_outline_free(casters);
-    if (result != VSH_OK) {
-        return cli_fail_of(NULL, &error);
-    }
-    if (cli_progress_report(NULL, "write", 0.0) != 0) {
-        error = (vsh_error){VSH_ERROR_CANCELLED, "write: cancelled"};
-        return cli_fail_of(NULL, &error);
-    }
+    CLI_TRY(cli_check_result(result, &error));
+    CLI_TRY(cli_begin_writing());
     CLI_TRY(write_map(s, scene, planes, image, run));
     cli_stats_stage(stats, CLI_STAGE_WRITE, now);
     return CLI_OK;
 }
 
-static void say_summary(const flat_settings *s, const vsh_flat_scene *scene, const cli_stats *stats) {
-    if (!s->common.quiet) {
-        const double *seconds = stats->seconds;
-        cli_say("%s: %d × %d, %zu light%s; load %.2f s, bake %.2f s, write %.2f s", scene->output,
-                scene->options.width, scene->options.height, scene->light_count,
-                scene->light_count == 1 ? "" : "s", seconds[CLI_STAGE_LOAD], seconds[CLI_STAGE_BAKE],
-                seconds[CLI_STAGE_WRITE]);
-    }
+static void say_summary(const vsh_flat_scene *scene, const cli_stats *stats) {
+    const double *seconds = stats->seconds;
+    cli_say("%s: %d × %d, %zu light%s; load %.2f s, bake %.2f s, write %.2f s", scene->output,
+            scene->options.width, scene->options.height, scene->light_count,
+            scene->light_count == 1 ? "" : "s", seconds[CLI_STAGE_LOAD], seconds[CLI_STAGE_BAKE],
+            seconds[CLI_STAGE_WRITE]);
 }
 
-static int run_flat(const flat_settings *s, const vsh_flat_scene *scene) {
+static int run_flat(const flat_settings *s, const vsh_flat_scene *scene, const vsh_run *run) {
     vsh_image_options image = vsh_image_options_default();
     image.bits = scene->bits;
     image.pack = scene->pack;
     image.color_space = scene->color_space;
     flat_planes planes = {.count = 0};
-    const vsh_run run = cli_common_run(&s->common);
-    cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS, s->common.threads);
+    cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS, run->threads);
     stats.texels = (uint64_t)scene->options.width * (uint64_t)scene->options.height;
     int code;
     CLI_TRY_DONE(name_planes(scene, &planes));
     CLI_TRY_DONE(check_files(s, scene, &planes.image, &image));
-    CLI_TRY_DONE(allocate_planes(s, scene, &image, &planes));
+    CLI_TRY_DONE(allocate_planes(scene, &image, &planes));
     cli_signals_watch();
-    CLI_TRY_DONE(bake(s, scene, &planes, &image, &run, &stats));
-    CLI_TRY_DONE(cli_stats_finish(&stats, &run, s->stats));
-    say_summary(s, scene, &stats);
+    CLI_TRY_DONE(bake(s, scene, &planes, &image, run, &stats));
+    CLI_TRY_DONE(cli_stats_finish(&stats, run, s->stats));
+    if (!cli_given.quiet) {
+        say_summary(scene, &stats);
+    }
 done:
     free_planes(&planes);
     return code;
 }
 
 static int flat_main(int argc, char **argv) {
-    flat_settings s;
-    memset(&s, 0, sizeof s);
-    s.common = cli_common_default();
-    bool help;
-    int code = cli_parse(&cli_flat, argc, argv, take, &s, "SCENE.json", &s.input, &help);
-    if (code != CLI_OK || help) {
-        return code;
-    }
-    cli_progress_begin(s.common.progress, s.common.quiet);
-    const vsh_run run = cli_common_run(&s.common);
+    flat_settings s = {.output = NULL};
+    CLI_TRY(cli_parse(&cli_flat, argc, argv, take, &s, &s.input));
+    const vsh_run run = cli_make_run();
     vsh_flat_scene *scene = NULL;
     vsh_error error;
-    if (vsh_flat_scene_read(s.input, &run, &scene, &error) != VSH_OK) {
-        code = cli_fail(&error);
-        goto done;
-    }
+    int code;
+    CLI_TRY_DONE(cli_check(vsh_flat_scene_read(s.input, &run, &scene, &error), &error));
     CLI_TRY_DONE(apply(&s, scene));
-    code = run_flat(&s, scene);
+    code = run_flat(&s, scene, &run);
 done:
     vsh_flat_scene_free(scene);
-    cli_progress_end();
     return code;
 }

@@ -135,10 +135,8 @@ static int write_file(const char *folder, const char *path, void (*compose)(FILE
     if (snprintf(whole, sizeof whole, "%s/%s", folder, path) >= (int)sizeof whole) {
         return cli_usage("--write '%s': the name is too long", folder);
     }
-    *strrchr(whole, '/') = '\0';
-    const int code = cli_make_folder(whole);
-    whole[strlen(whole)] = '/';
-    return code == CLI_OK ? cli_document_write(whole, compose, user) : code;
+    CLI_TRY(cli_make_folder_of(whole));
+    return cli_document_write(whole, compose, user);
 }
 
 static int write_all(const char *folder) {
@@ -195,13 +193,8 @@ static int print_topic(const char *topic, bool man) {
 
 static int help_main(int argc, char **argv) {
     help_settings s = {.shell = NULL};
-    static const char *const what[1] = {"TOPIC"};
     const char *topic;
-    bool help;
-    const int code = cli_parse_some(&cli_help, argc, argv, take, &s, what, &topic, 0, 1, &help);
-    if (code != CLI_OK || help) {
-        return code;
-    }
+    CLI_TRY(cli_parse(&cli_help, argc, argv, take, &s, &topic));
     if (s.man + (s.shell != NULL) + (s.folder != NULL) > 1 ||
         (topic != NULL && (s.shell != NULL || s.folder != NULL))) {
         return cli_usage("help: one of TOPIC, --man, --completion and --write is taken, or TOPIC with --man");

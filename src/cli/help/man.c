@@ -4,7 +4,7 @@
  * build gives the same page. */
 #include "help.h"
 
-#include "cli/text.h"
+#include "cli/message.h"
 
 #include <string.h>
 #include <vdbshade/vdbshade.h>

@@ -47,19 +47,14 @@ typedef struct info_look {
 } info_look;
 
 typedef struct info_settings {
-    cli_common common;
     cli_patch patch;
     info_look look;
 } info_settings;
 
 static int parse_option(void *settings, int key, const char *name, const char *value) {
     info_settings *s = settings;
-    bool taken;
-    if (key == KEY_SIZE) {
-        return cli_parse_size(name, value, &s->look.width, &s->look.height);
-    }
-    const int code = cli_patch_take(&s->patch, key, name, value, &taken);
-    return taken ? code : cli_common_parse(&s->common, key, name, value, &taken);
+    return key == KEY_SIZE ? cli_parse_size(name, value, &s->look.width, &s->look.height)
+                           : cli_patch_take(&s->patch, key, name, value);
 }
 
 static void print_light(const vsh_light *light) {
@@ -702,17 +697,13 @@ static int print_info(const char *path, const info_look *look, const vsh_run *ru
 }
 
 static int info_main(int argc, char **argv) {
-    info_settings s = {.common = cli_common_default(), .look = {.width = 1024, .height = 1024}};
+    info_settings s = {.look = {.width = 1024, .height = 1024}};
     const char *path = NULL;
-    bool help;
-    const int code = cli_parse(&cli_info, argc, argv, parse_option, &s, "FILE", &path, &help);
-    if (code != CLI_OK || help) {
-        return code;
-    }
+    CLI_TRY(cli_parse(&cli_info, argc, argv, parse_option, &s, &path));
     cli_progress_begin(false, true);
     cli_signals_watch();
-    const vsh_run run = cli_common_run(&s.common);
-    s.look.all = s.common.verbose;
+    const vsh_run run = cli_make_run();
+    s.look.all = cli_given.verbose;
     vsh_scene scene = vsh_scene_default();
     cli_patch_scene(&s.patch, &scene);
     s.look.unit = scene.unit;

@@ -4,7 +4,6 @@
 #include "cli/bake/options.h"
 #include "cli/message.h"
 #include "cli/paths.h"
-#include "cli/progress.h"
 #include "cli/signals.h"
 #include "cli/stats.h"
 #include "cli/warnings.h"
@@ -49,8 +48,7 @@ enum {
     KEY_BATCH,
     KEY_DISTANCE,
     KEY_GRADIENT,
-    KEY_WITHIN,
-    KEY_STATS
+    KEY_WITHIN
 };
 
 static const cli_option options[] = {
@@ -70,7 +68,7 @@ static const cli_option options[] = {
     {KEY_STRICT, "strict", NULL, "end at the first bad row, with code 2"},
     {KEY_BATCH, "batch", "N",
      "rows answered and written at a time, 1 to 1048576\n(1048576, or as many as --memory-limit allows)"},
-    {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
+    CLI_STATS_OPTION(query_settings, bake.stats),
     {0, NULL, NULL, "What is answered"},
     CLI_LIGHT_OPTIONS,
     {KEY_DISTANCE, "distance", NULL,
@@ -135,9 +133,6 @@ static int parse_option(void *settings, int key, const char *name, const char *v
         return CLI_OK;
     case KEY_WITHIN:
         return cli_parse_positive(name, value, &s->within);
-    case KEY_STATS:
-        s->bake.stats = value;
-        return CLI_OK;
     default:
         return cli_shared_parse(&s->bake, key, name, value);
     }
@@ -181,7 +176,7 @@ static int check_output(const query_settings *s, const vsh_scene *scene, const c
         return cli_usage("%s: the output is also the points' file", output);
     }
     CLI_TRY(cli_bake_check_output(&s->bake, scene, output));
-    CLI_TRY(cli_bake_check_inputs(&s->bake, scene, &output, 1));
+    CLI_TRY(cli_bake_check_inputs(scene, &output, 1));
     return cli_temporary_check(output);
 }
 
@@ -275,7 +270,7 @@ static void free_answers(query_answers *a) {
 /* Chooses the rows of a batch, and the most of their own bytes that it holds. */
 static int plan_batch(const query_work *work, bool keep, size_t *rows, size_t *most_kept) {
     const int32_t asked = work->settings->batch;
-    const uint64_t limit = work->settings->bake.common.memory_limit;
+    const uint64_t limit = cli_given.memory_limit;
     const uint64_t held = work->stats.casters.field_bytes + work->stats.casters.triangles_bytes +
                           work->reader.face_vertices * (uint64_t)sizeof(float[6]);
     const size_t row_size = work->reader.table.row_size;   /* 0: text */
@@ -432,7 +427,7 @@ static void say_results(const query_work *work) {
         cli_say("%s: %" PRIu64 " of %" PRIu64 " rows are bad; their answers are nan",
                 work->reader.table.source.name, stats->bad_rows, stats->points);
     }
-    if (work->settings->bake.common.quiet) {
+    if (cli_given.quiet) {
         return;
     }
     if (stats->shade.beyond_reach > 0) {
@@ -445,7 +440,7 @@ static void say_results(const query_work *work) {
 }
 
 static int run_query(const query_settings *s, vsh_scene *scene) {
-    query_work work = {.settings = s, .scene = scene, .run = cli_common_run(&s->bake.common)};
+    query_work work = {.settings = s, .scene = scene, .run = cli_make_run()};
     work.stats = cli_stats_begin(CLI_STATS_POINTS, work.run.threads);
     int code = CLI_OK;
     CLI_TRY_DONE(cli_points_open(s->points, s->points_format, s->normals, s->strict, &work.reader));
@@ -471,16 +466,11 @@ done:
 static int query_main(int argc, char **argv) {
     query_settings s;
     memset(&s, 0, sizeof s);
-    s.bake.common = cli_common_default();
     s.format = s.points_format = s.normals = -1;
-    bool help;
-    int code = cli_parse(&cli_query, argc, argv, parse_option, &s, "INPUT", &s.bake.input, &help);
-    if (code != CLI_OK || help) {
-        return code;
-    }
+    CLI_TRY(cli_parse(&cli_query, argc, argv, parse_option, &s, &s.bake.input));
     CLI_TRY(cli_patch_check(&s.bake.patch));
     CLI_TRY(find_formats(&s));
-    cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
+    int code;
     cli_bake_scene made;
     CLI_TRY_DONE(cli_bake_scene_for_points(&s.bake, &made));
     CLI_TRY_DONE(check_files(&s, &made.scene));
@@ -488,6 +478,5 @@ static int query_main(int argc, char **argv) {
     code = run_query(&s, &made.scene);
 done:
     cli_bake_scene_free(&made);
-    cli_progress_end();
     return code;
 }

@@ -136,7 +136,6 @@ void regress_remove_folder(regress_work *work) {
 
 static int list_words(const regress_work *work, const regress_case *one, regress_lines *words) {
     static const char *const sandbox[] = {[CLI_SANDBOX_OFF] = "off", [CLI_SANDBOX_REQUIRE] = "require"};
-    const cli_common *common = &work->settings->compare.common;
     CLI_TRY(regress_add_line(words, "vdbshade"));
     CLI_TRY(regress_add_line(words, "%s", one->command->name));
     /* a scene "--stats=x.json" is a file in the folder, and no option */
@@ -147,14 +146,14 @@ static int list_words(const regress_work *work, const regress_case *one, regress
     CLI_TRY(one->output != NULL ? regress_add_line(words, "--output=%s/%s", work->bakes, one->output)
                                 : regress_add_line(words, "--output-folder=%s", work->bakes));
     CLI_TRY(regress_add_line(words, "--quiet"));
-    CLI_TRY(regress_add_line(words, "--memory-limit=%llu", (unsigned long long)common->memory_limit));
-    if (common->threads > 0) {
-        CLI_TRY(regress_add_line(words, "--threads=%d", common->threads));
+    CLI_TRY(regress_add_line(words, "--memory-limit=%llu", (unsigned long long)cli_given.memory_limit));
+    if (cli_given.threads > 0) {
+        CLI_TRY(regress_add_line(words, "--threads=%d", cli_given.threads));
     }
-    if (common->sandbox != CLI_SANDBOX_AUTO) {
-        CLI_TRY(regress_add_line(words, "--sandbox=%s", sandbox[common->sandbox]));
+    if (cli_given.sandbox != CLI_SANDBOX_AUTO) {
+        CLI_TRY(regress_add_line(words, "--sandbox=%s", sandbox[cli_given.sandbox]));
     }
-    return common->allow_outside ? regress_add_line(words, "--allow-outside") : CLI_OK;
+    return cli_given.allow_outside ? regress_add_line(words, "--allow-outside") : CLI_OK;
 }
 
 int regress_bake(const regress_work *work, const regress_case *one) {

@@ -303,7 +303,7 @@ static int report(const regress_work *work) {
     int code = CLI_OK;
     if (s->json) {
         code = print_json(work);
-    } else if (!s->common.quiet) {
+    } else if (!cli_given.quiet) {
         print_lines(work);
     }
     return code == CLI_OK && (s->junit != NULL || s->html != NULL) ? write_files(work) : code;
@@ -337,14 +337,9 @@ static int run(regress_work *work) {
 
 static int regress_main(int argc, char **argv) {
     regress_settings s = {.compare = cli_compare_settings_default()};
-    bool help;
-    int code = cli_parse(&cli_regress, argc, argv, take, &s, "DIR", &s.folder, &help);
-    if (code != CLI_OK || help) {
-        return code;
-    }
-    cli_progress_begin(s.compare.common.progress, s.compare.common.quiet);
-    regress_work work = {.settings = &s, .run = cli_common_run(&s.compare.common)};
-    code = run(&work);
+    CLI_TRY(cli_parse(&cli_regress, argc, argv, take, &s, &s.folder));
+    regress_work work = {.settings = &s, .run = cli_make_run()};
+    const int code = run(&work);
     regress_remove_folder(&work);
     for (size_t i = 0; i < work.case_count; ++i) {
         regress_free_case(&work.cases[i]);
@@ -355,6 +350,5 @@ static int regress_main(int argc, char **argv) {
     free(work.cache);
     free(work.golden);
     free(work.folder);
-    cli_progress_end();
     return code;
 }

@@ -7,13 +7,9 @@
 enum { RENDER_MOST_LIGHTMAPS = 64 };
 
 typedef struct render_settings {
-    cli_bake_settings bake; /* the scene, with the options that `bake` has too */
-    double camera[3], look_at[3], up[3];
-    double fov_deg, orbit_deg;
-    int32_t width, height, samples;
-    double sky[3], background[3];
-    double exposure, shafts;
-    int32_t shaft_steps;
+    cli_bake_settings bake;     /* the scene, the output and the stats */
+    vsh_render_options options; /* but for what follows from the scene */
+    double orbit_deg, exposure;
     const char *lightmaps[RENDER_MOST_LIGHTMAPS];
     size_t lightmap_count;
     const char *pack; /* of the lightmaps, as of `bake`; NULL: their own names */
@@ -23,10 +19,10 @@ typedef struct render_settings {
 typedef struct render_lightmap {
     vsh_image_file *file;
     vsh_image image;
-    const char *names[VSH_MAX_CHANNELS]; /* of the image if it was unpacked or decoded */
+    float *linear;                          /* R, G and B of an sRGB file; else NULL */
+    const float *decoded[VSH_MAX_CHANNELS]; /* planes of such a file */
+    const char *names[VSH_MAX_CHANNELS];    /* these two of an image that was unpacked */
     const float *planes[VSH_MAX_CHANNELS];
-    float *linear; /* R, G and B of an sRGB file; else NULL */
-    char text[VSH_CHANNEL_NAME * 4];
 } render_lightmap;
 
 /* Everything in the picture. */
@@ -44,12 +40,10 @@ typedef struct render_shown {
  * failure. */
 
 /* Reads the lightmaps of the scene's first receivers. */
-int render_read_lightmaps(const render_settings *settings, const vsh_scene *scene, const vsh_assets *assets,
-                          const vsh_run *run, render_shown *shown);
+int render_read_lightmaps(const render_settings *settings, const cli_shading *shading, render_shown *shown);
 
 /* Adds the triangles of every caster that has them, and for the others a surface for every layer's colour. */
-int render_add_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_occluders *occluders,
-                       const vsh_run *run, render_shown *shown);
+int render_add_casters(const cli_shading *shading, render_shown *shown);
 
 /* Places the camera as the settings say, or so that all of `shown` is seen. */
 int render_place_camera(const render_settings *settings, const render_shown *shown, vsh_camera *camera);

@@ -3,8 +3,8 @@
  * Casters with triangles are shown as these, the others as a field for each colour. A layer's casters share
  * one field, which knows no casters. If they differ in colour, or some have triangles, each colour gets a
  * field of its own, for camera rays alone. */
-#include "cli/casters.h"
 #include "cli/message.h"
+#include "cli/paths.h"
 #include "render.h"
 
 #include <math.h>
@@ -40,27 +40,24 @@ static void find_color(const vsh_caster *caster, double color[3]) {
     }
 }
 
+static bool is_in_layer(const vsh_caster *caster, const char *layer) {
+    return caster->layer == NULL || layer == NULL ? caster->layer == layer
+                                                  : strcmp(caster->layer, layer) == 0;
+}
+
 /* Whether the same field can show both. */
-static bool same_color(const vsh_caster *a, const vsh_caster *b) {
+static bool is_alike(const vsh_caster *a, const vsh_caster *b) {
     double one[3], other[3];
-    if (cli_caster_is_direct(a) != cli_caster_is_direct(b)) {
-        return false;
-    }
     find_color(a, one);
     find_color(b, other);
-    return memcmp(one, other, sizeof one) == 0;
+    return is_in_layer(a, b->layer) && cli_caster_is_direct(a) == cli_caster_is_direct(b) &&
+           memcmp(one, other, sizeof one) == 0;
 }
 
-static bool same_layer(const char *a, const char *b) {
-    return a == NULL || b == NULL ? a == b : strcmp(a, b) == 0;
-}
-
-/* Caster `index`'s group: that of the first caster without triangles in its layer of its colour. */
+/* Caster `index`'s group: that of the first caster without triangles that is like it. */
 static size_t group_of(const vsh_scene *scene, const vsh_assets *assets, size_t index) {
-    const vsh_caster *caster = &scene->casters[index];
     size_t first = 0;
-    while (is_shown_as_mesh(assets, first) || !same_layer(scene->casters[first].layer, caster->layer) ||
-           !same_color(&scene->casters[first], caster)) {
+    while (is_shown_as_mesh(assets, first) || !is_alike(&scene->casters[first], &scene->casters[index])) {
         ++first;
     }
     return first;
@@ -79,20 +76,15 @@ static const vsh_field *field_of(const vsh_occluder_parts *parts, const char *la
     return NULL;
 }
 
-/* Whether all casters of a layer have one colour and no triangles, and are in its field. */
-static bool is_plain(const vsh_scene *scene, const vsh_assets *assets, const char *layer) {
-    const vsh_caster *first = NULL;
+/* Whether all of a caster's layer are like it and without triangles, so that the layer's field shows them. */
+static bool is_plain(const vsh_scene *scene, const vsh_assets *assets, const vsh_caster *caster) {
+    bool plain = !cli_caster_is_direct(caster);
     for (size_t i = 0; i < scene->caster_count; ++i) {
-        const vsh_caster *caster = &scene->casters[i];
-        if (!same_layer(caster->layer, layer)) {
-            continue;
-        }
-        first = first == NULL ? caster : first;
-        if (cli_caster_is_direct(caster) || !same_color(first, caster) || is_shown_as_mesh(assets, i)) {
-            return false;
+        if (is_in_layer(&scene->casters[i], caster->layer)) {
+            plain = plain && is_alike(&scene->casters[i], caster) && !is_shown_as_mesh(assets, i);
         }
     }
-    return true;
+    return plain;
 }
 
 static void add_surface(render_shown *shown, const vsh_field *field, const vsh_caster *caster) {
@@ -105,102 +97,100 @@ static void add_surface(render_shown *shown, const vsh_field *field, const vsh_c
 typedef struct split {
     vsh_caster *casters;
     vsh_scene_layer *layers;
-    char (*names)[24];
     size_t *first; /* caster of each layer */
     size_t count;
 } split;
 
-/* Makes the fields of the groups, each of which is a layer. */
-static int make_own(const vsh_scene *colored, const vsh_assets *assets, const vsh_run *run, const split *p,
-                    render_shown *shown) {
-    vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
-    what.voxels = 1; /* the camera sees them */
-    vsh_error error;
-    CLI_TRY(cli_check_result(vsh_scene_occluders(colored, assets, &what, run, &shown->own, &error), &error));
-    vsh_occluder_parts own;
-    vsh_occluders_get_parts(shown->own, &own);
-    for (size_t k = 0; k < own.layer_count; ++k) {
-        add_surface(shown, own.layers[k].field, &colored->casters[p->first[k]]);
-    }
-    return CLI_OK;
-}
-
-static int make_split(const vsh_scene *scene, const vsh_assets *assets, const vsh_occluders *occluders,
-                      const vsh_run *run, split *p, render_shown *shown) {
+/* Splits casters without triangles into groups; those that a field of the scene shows are done. */
+static int find_groups(const cli_shading *shading, split *p, render_shown *shown) {
+    const vsh_scene *scene = shading->scene;
     vsh_occluder_parts parts;
-    vsh_occluders_get_parts(occluders, &parts);
+    vsh_occluders_get_parts(shading->occluders, &parts);
     for (size_t i = 0; i < scene->caster_count; ++i) {
-        const vsh_field *field = field_of(&parts, scene->casters[i].layer);
-        p->casters[i] = scene->casters[i];
-        p->casters[i].layer = p->names[i];
-        if (is_shown_as_mesh(assets, i)) {
-            snprintf(p->names[i], sizeof p->names[i], "mesh"); /* a layer that is not made */
+        const vsh_caster *caster = &scene->casters[i];
+        const vsh_field *field = field_of(&parts, caster->layer);
+        p->casters[i] = *caster;
+        p->casters[i].direct = 0;
+        p->casters[i].voxelised = 1;
+        if (is_shown_as_mesh(shading->assets, i)) {
+            p->casters[i].layer = "mesh"; /* a layer that is not made */
             continue;
         }
-        const size_t group = group_of(scene, assets, i);
-        snprintf(p->names[i], sizeof p->names[i], "%zu", group);
-        if (group == i && is_plain(scene, assets, scene->casters[i].layer)) {
-            add_surface(shown, field, &scene->casters[i]);
+        const size_t group = group_of(scene, shading->assets, i);
+        p->casters[i].layer = cli_keep_text("%zu", group);
+        if (p->casters[i].layer == NULL) {
+            return cli_out_of_memory("surfaces");
+        }
+        if (group == i && is_plain(scene, shading->assets, caster)) {
+            add_surface(shown, field, caster);
         } else if (group == i) {
             vsh_field_info info = {.voxel_size = 0.0}; /* the scene's, or by its resolution */
-            if (!cli_caster_is_direct(&scene->casters[i])) {
+            if (!cli_caster_is_direct(caster)) {
                 vsh_field_get_info(field, &info);
             }
             p->first[p->count] = i;
             p->layers[p->count++] = (vsh_scene_layer){
-                .name = p->names[i], .voxel_size = info.voxel_size, .shade = vsh_layer_default()};
+                .name = p->casters[i].layer, .voxel_size = info.voxel_size, .shade = vsh_layer_default()};
         }
     }
-    if (p->count == 0) {
-        return CLI_OK;
-    }
-    vsh_scene colored = *scene;
+    return CLI_OK;
+}
+
+/* Makes the fields of the groups, each of which is a layer. */
+static int make_fields(const cli_shading *shading, const split *p, render_shown *shown) {
+    vsh_scene colored = *shading->scene;
     colored.casters = p->casters;
     colored.layers = p->layers;
     colored.layer_count = p->count;
     colored.light_count = 0;
     colored.ao = 0;
     bool direct = false;
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        direct = direct || cli_caster_is_direct(&p->casters[i]);
-        p->casters[i].direct = 0;
-        p->casters[i].voxelised = 1;
+    for (size_t i = 0; i < colored.caster_count; ++i) {
+        direct = direct || cli_caster_is_direct(&shading->scene->casters[i]);
     }
+    vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
+    what.voxels = 1;          /* the camera sees them */
     vsh_assets *again = NULL; /* direct casters were loaded without their voxels */
+    vsh_occluder_parts own;
     vsh_error error;
-    if (direct && vsh_assets_load(&colored, run, &again, &error) != VSH_OK) {
-        return cli_fail_of(NULL, &error);
+    int code;
+    if (direct) {
+        CLI_TRY_DONE(cli_check_result(vsh_assets_load(&colored, &shading->run, &again, &error), &error));
     }
-    const int code = make_own(&colored, direct ? again : assets, run, p, shown);
+    CLI_TRY_DONE(cli_check_result(vsh_scene_occluders(&colored, direct ? again : shading->assets, &what,
+                                                      &shading->run, &shown->own, &error),
+                                  &error));
+    vsh_occluders_get_parts(shown->own, &own);
+    for (size_t k = 0; k < own.layer_count; ++k) {
+        add_surface(shown, own.layers[k].field, &p->casters[p->first[k]]);
+    }
+done:
     vsh_assets_free(again);
     return code;
 }
 
-int render_add_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_occluders *occluders,
-                       const vsh_run *run, render_shown *shown) {
-    const size_t count = scene->caster_count;
+int render_add_casters(const cli_shading *shading, render_shown *shown) {
+    const size_t count = shading->scene->caster_count;
     split p = {.casters = calloc(count, sizeof *p.casters),
                .layers = calloc(count, sizeof *p.layers),
-               .names = calloc(count, sizeof *p.names),
                .first = calloc(count, sizeof *p.first)};
-    int code = CLI_OK;
+    int code;
     shown->surfaces = calloc(count, sizeof *shown->surfaces);
-    if (p.casters == NULL || p.layers == NULL || p.names == NULL || p.first == NULL ||
-        shown->surfaces == NULL) {
+    if (p.casters == NULL || p.layers == NULL || p.first == NULL || shown->surfaces == NULL) {
         code = cli_out_of_memory("surfaces");
         goto done;
     }
     for (size_t i = 0; i < count; ++i) {
-        if (is_shown_as_mesh(assets, i)) {
+        if (is_shown_as_mesh(shading->assets, i)) {
             vsh_lit_meshes *lit = &shown->lit[shown->lit_count++];
-            lit->meshes = vsh_assets_caster(assets, i, &lit->mesh_count);
-            find_color(&scene->casters[i], lit->color);
+            lit->meshes = vsh_assets_caster(shading->assets, i, &lit->mesh_count);
+            find_color(&shading->scene->casters[i], lit->color);
         }
     }
-    code = make_split(scene, assets, occluders, run, &p, shown);
+    CLI_TRY_DONE(find_groups(shading, &p, shown));
+    code = p.count > 0 ? make_fields(shading, &p, shown) : CLI_OK;
 done:
     free(p.first);
-    free(p.names);
     free(p.layers);
     free(p.casters);
     return code;
@@ -208,33 +198,28 @@ done:
 
 /* --- lightmaps */
 
+/* The plane of channel `letter` (or for R, of Y); NULL if there is none. */
+static const float *find_plane(const vsh_image *image, char letter) {
+    const float *plane = NULL;
+    for (int32_t i = 0; i < image->channel_count; ++i) {
+        const char *name = image->names[i];
+        if (name[0] != '\0' && name[1] == '\0' && (name[0] == letter || (name[0] == 'Y' && letter == 'R'))) {
+            plane = image->planes[i];
+        }
+    }
+    return plane;
+}
+
 /* Renames the channels R, G, B, A (Y: R) by a pack such as "R=shadow.sun,G=ao". */
 static int unpack(const char *pack, const char *path, render_lightmap *map) {
-    const char *names[VSH_MAX_CHANNELS];
-    const float *planes[VSH_MAX_CHANNELS];
-    vsh_image read = map->image;
-    memcpy(names, read.names, (size_t)read.channel_count * sizeof *names);
-    memcpy(planes, read.planes, (size_t)read.channel_count * sizeof *planes);
-    read.names = names;
-    read.planes = planes;
-    if (strlen(pack) >= sizeof map->text) {
-        return cli_usage("--lightmap-pack '%s': is too long", pack);
-    }
-    strcpy(map->text, pack);
+    const vsh_image read = map->image;
     map->image = (vsh_image){read.width, read.height, 0, map->names, map->planes, NULL};
-    for (char *save = NULL, *item = strtok_r(map->text, ",", &save); item != NULL;
-         item = strtok_r(NULL, ",", &save)) {
-        char *name = strchr(item, '=');
-        if (name == NULL || name - item != 1 || name[1] == '\0' || strchr("RGBA", item[0]) == NULL) {
+    for (const char *item = pack + strspn(pack, ","); *item != '\0'; item += strspn(item, ",")) {
+        const int length = (int)strcspn(item, ",");
+        if (length < 3 || item[1] != '=' || strchr("RGBA", item[0]) == NULL) {
             return cli_usage("--lightmap-pack '%s': expected R=CHANNEL,G=CHANNEL and so on", pack);
         }
-        const float *plane = NULL;
-        for (int32_t i = 0; i < read.channel_count; ++i) {
-            const char *own = read.names[i];
-            plane = own[1] == '\0' && (own[0] == item[0] || (own[0] == 'Y' && item[0] == 'R'))
-                        ? read.planes[i]
-                        : plane;
-        }
+        const float *plane = find_plane(&read, item[0]);
         if (plane == NULL) {
             return cli_usage("%s: no channel %c, which --lightmap-pack names", path, item[0]);
         }
@@ -242,9 +227,13 @@ static int unpack(const char *pack, const char *path, render_lightmap *map) {
         if (at == VSH_MAX_CHANNELS) {
             return cli_usage("--lightmap-pack '%s': more than %d channels", pack, VSH_MAX_CHANNELS);
         }
-        map->names[at] = name + 1;
+        map->names[at] = cli_keep_text("%.*s", length - 2, item + 2);
+        if (map->names[at] == NULL) {
+            return cli_out_of_memory("lightmaps");
+        }
         map->planes[at] = plane;
         ++map->image.channel_count;
+        item += length;
     }
     return CLI_OK;
 }
@@ -261,7 +250,7 @@ static bool says_srgb(const vsh_image_file *file) {
     return false;
 }
 
-/* Makes R, G and B linear, whose file says that they are sRGB. The image is then one of map->planes. */
+/* Makes R, G and B linear, whose file says that they are sRGB. */
 static int decode(render_lightmap *map) {
     const vsh_image read = map->image;
     const size_t texels = (size_t)read.width * (size_t)read.height;
@@ -269,14 +258,12 @@ static int decode(render_lightmap *map) {
     if (map->linear == NULL) {
         return cli_out_of_memory("lightmaps");
     }
-    map->image.names = map->names;
-    map->image.planes = map->planes;
+    map->image.planes = map->decoded;
     for (int32_t c = 0; c < read.channel_count; ++c) {
         static const char rgb[] = "RGB";
         const char *name = read.names[c], *at = name[1] == '\0' ? strchr(rgb, name[0]) : NULL;
         float *plane = at != NULL ? map->linear + (size_t)(at - rgb) * texels : NULL;
-        map->names[c] = name;
-        map->planes[c] = plane != NULL ? plane : read.planes[c];
+        map->decoded[c] = plane != NULL ? plane : read.planes[c];
         for (size_t i = 0; plane != NULL && i < texels; ++i) {
             plane[i] = (float)vsh_srgb_to_linear((double)read.planes[c][i]);
         }
@@ -287,9 +274,7 @@ static int decode(render_lightmap *map) {
 static int read_lightmap(const render_settings *s, const char *path, const vsh_run *run,
                          render_lightmap *map) {
     vsh_error error;
-    if (vsh_image_read(path, run, &map->file, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
+    CLI_TRY(cli_check(vsh_image_read(path, run, &map->file, &error), &error));
     map->image = vsh_image_view(map->file);
     CLI_TRY(says_srgb(map->file) ? decode(map) : CLI_OK);
     return s->pack != NULL ? unpack(s->pack, path, map) : CLI_OK;
@@ -306,8 +291,8 @@ static const vsh_caster *find_caster(const vsh_scene *scene, const char *path) {
     return NULL;
 }
 
-int render_read_lightmaps(const render_settings *s, const vsh_scene *scene, const vsh_assets *assets,
-                          const vsh_run *run, render_shown *shown) {
+int render_read_lightmaps(const render_settings *s, const cli_shading *shading, render_shown *shown) {
+    const vsh_scene *scene = shading->scene;
     const size_t count = s->lightmap_count;
     if (count > scene->receiver_count) {
         return cli_usage("--lightmap '%s': %s has %zu receivers", s->lightmaps[scene->receiver_count],
@@ -321,8 +306,8 @@ int render_read_lightmaps(const render_settings *s, const vsh_scene *scene, cons
     shown->map_count = shown->lit_count = count;
     for (size_t i = 0; i < count; ++i) {
         vsh_lit_meshes *lit = &shown->lit[i];
-        CLI_TRY(read_lightmap(s, s->lightmaps[i], run, &shown->maps[i]));
-        lit->meshes = vsh_assets_receiver(assets, i, &lit->mesh_count);
+        CLI_TRY(read_lightmap(s, s->lightmaps[i], &shading->run, &shown->maps[i]));
+        lit->meshes = vsh_assets_receiver(shading->assets, i, &lit->mesh_count);
         lit->lightmap = &shown->maps[i].image;
         lit->ambient = scene->has_ambient;
         find_color(find_caster(scene, scene->receivers[i].path), lit->color);
@@ -343,9 +328,8 @@ void render_free_shown(render_shown *shown) {
 
 /* --- the camera */
 
-static const double degree = 0.017453292519943295;
 /* A three-quarter view from a little above. */
-static const double azimuth_deg = 35.0, elevation_deg = 25.0;
+static const double azimuth = 35.0 * CLI_DEGREE, elevation = 25.0 * CLI_DEGREE;
 
 static size_t count_vertices(const vsh_lit_meshes *lit, size_t count) {
     size_t vertices = 0;
@@ -412,43 +396,40 @@ static double *find_points(const render_shown *seen, size_t *count) {
 }
 
 /* Frames the box around points, so that all of it is seen from any angle of --orbit. */
-static vsh_result frame_box(const render_settings *s, size_t count, const double *points, vsh_camera *camera,
+static vsh_result frame_box(size_t count, const double *points, double aspect, vsh_camera *camera,
                             vsh_error *error) {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (size_t i = 0; i < 3 * count; ++i) {
         low[i % 3] = fmin(low[i % 3], points[i]);
         high[i % 3] = fmax(high[i % 3], points[i]);
     }
-    return vsh_camera_frame(camera, low, high, azimuth_deg * degree, elevation_deg * degree,
-                            (double)s->width / (double)s->height, error);
+    return vsh_camera_frame(camera, low, high, azimuth, elevation, aspect, error);
 }
 
 int render_place_camera(const render_settings *s, const render_shown *seen, vsh_camera *camera) {
+    const vsh_camera given = s->options.camera;
+    const double aspect = (double)s->options.width / (double)s->options.height;
     vsh_error error;
     size_t count;
     double *points = find_points(seen, &count);
     if (points == NULL) {
         return cli_out_of_memory("camera");
     }
-    memcpy(camera->up, s->up, sizeof camera->up);
-    camera->fov = s->fov_deg * degree;
     const bool near = s->orbit_deg == 0.0 && !s->has_camera;
     const vsh_result result =
-        near ? vsh_camera_frame_points(camera, count, points, azimuth_deg * degree, elevation_deg * degree,
-                                       (double)s->width / (double)s->height, &error)
-             : frame_box(s, count, points, camera, &error);
+        near ? vsh_camera_frame_points(camera, count, points, azimuth, elevation, aspect, &error)
+             : frame_box(count, points, aspect, camera, &error);
     free(points);
+    CLI_TRY(cli_check(result, &error));
     if (s->has_camera) {
-        memcpy(camera->position, s->camera, sizeof camera->position);
+        memcpy(camera->position, given.position, sizeof camera->position);
     }
     if (s->has_look_at) {
-        memcpy(camera->target, s->look_at, sizeof camera->target);
+        memcpy(camera->target, given.target, sizeof camera->target);
     }
-    if (result != VSH_OK || vsh_camera_check(camera, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
+    CLI_TRY(cli_check(vsh_camera_check(camera, &error), &error));
     if (!near) {
-        vsh_camera_orbit(camera, s->orbit_deg * degree);
+        vsh_camera_orbit(camera, s->orbit_deg * CLI_DEGREE);
     }
     return CLI_OK;
 }

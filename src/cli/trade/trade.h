@@ -41,10 +41,10 @@ typedef struct trade_run {
     double valid_rmse;    /* over the run's own valid texels */
 } trade_run;
 
-/* The casters at one resolution. */
+/* The casters at one resolution, or as auto makes them. */
 typedef struct trade_field {
-    int32_t resolution;
-    vsh_occluders *voxels;
+    int32_t resolution;    /* 0: chosen by auto */
+    vsh_occluders *voxels; /* NULL for auto */
     vsh_occluders *traced; /* `voxels` with triangles, if all casters are meshes */
     double build_s;
     uint8_t *mask; /* [texels]: 1 where the texel is valid */
@@ -87,15 +87,11 @@ typedef struct trade_work {
     trade_subject subjects[2];
     size_t subject_count;
     float *values;    /* [planes of the larger subject][texels]: those of the run being measured */
-    uint8_t *mask;    /* [texels]: where a run of auto has values */
     size_t skipped;   /* runs that did not fit into the budget */
     double measuring; /* when the budget began, seconds */
     double truth_s;
     int32_t truth_rays; /* a texel */
 } trade_work;
-
-/* Loads the scene, makes its truth and measures all runs. CLI_OK or an exit code, having said why. */
-int trade_measure(trade_work *work);
 
 /* Write the page and the CSV of settings. CLI_OK or an exit code, having said why. */
 int trade_write_page(const trade_work *work);

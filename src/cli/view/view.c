@@ -3,11 +3,8 @@
 #include "cli/commands.h"
 #include "cli/message.h"
 #include "cli/paths.h"
-#include "cli/progress.h"
 #include "cli/signals.h"
 #include "cli/temporary.h"
-
-#include <string.h>
 
 enum { KEY_PLANES = 0x2000, KEY_OTHER_PLANES, KEY_UV_SET };
 
@@ -22,7 +19,6 @@ typedef struct view_settings {
     const char *output;
     view_planes planes[2];
     int32_t uv_set;
-    cli_common common;
 } view_settings;
 
 static const cli_option options[] = {
@@ -69,13 +65,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return take_planes(&s->planes[0], name, value);
     case KEY_OTHER_PLANES:
         return take_planes(&s->planes[1], name, value);
-    case KEY_UV_SET:
+    default: /* --uv-set */
         return cli_parse_integer(name, value, 0, VSH_MAX_UV_SETS - 1, &s->uv_set);
-    default:
-        break;
     }
-    bool taken;
-    return cli_common_parse(&s->common, key, name, value, &taken);
 }
 
 static bool is_scene(const view_settings *s) {
@@ -105,20 +97,18 @@ static int check(const view_settings *s) {
     return cli_temporary_check(s->output);
 }
 
-static int write_scene(const view_settings *s) {
-    const vsh_run run = cli_common_run(&s->common);
-    const char *slash = strrchr(s->inputs[0], '/');
+static int write_scene(const view_settings *s, const vsh_run *run) {
     vsh_scene *scene = NULL;
     vsh_error error;
-    const bool done = vsh_scene_read(s->inputs[0], &run, &scene, &error) == VSH_OK &&
-                      vsh_scene_check_outputs(scene, &s->output, 1, &run, &error) == VSH_OK &&
-                      vsh_view_write_scene(s->output, slash != NULL ? slash + 1 : s->inputs[0], scene, &run,
-                                           &error) == VSH_OK;
+    const bool done =
+        vsh_scene_read(s->inputs[0], run, &scene, &error) == VSH_OK &&
+        vsh_scene_check_outputs(scene, &s->output, 1, run, &error) == VSH_OK &&
+        vsh_view_write_scene(s->output, cli_file_name(s->inputs[0]), scene, run, &error) == VSH_OK;
     vsh_scene_free(scene);
     return done ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
-static int write_page(const view_settings *s) {
+static int write_page(const view_settings *s, const vsh_run *run) {
     vsh_view_bake bakes[2];
     for (size_t i = 0; i < 2; ++i) {
         bakes[i] = vsh_view_bake_default();
@@ -128,34 +118,22 @@ static int write_page(const view_settings *s) {
         bakes[i].uv_set = s->uv_set;
     }
     const bool two = s->inputs[1] != NULL || s->planes[1].count > 0;
-    const vsh_run run = cli_common_run(&s->common);
     vsh_error error;
-    const vsh_result result = vsh_view_write(s->output, &bakes[0], two ? &bakes[1] : NULL, &run, &error);
-    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+    return cli_check_result(vsh_view_write(s->output, &bakes[0], two ? &bakes[1] : NULL, run, &error),
+                            &error);
 }
 
 static int view_main(int argc, char **argv) {
-    static view_settings s; /* 16 KiB of pointers */
-    memset(&s, 0, sizeof s);
-    s.common = cli_common_default();
-    s.uv_set = -1;
-    bool help;
-    static const char *const what[] = {"INPUT", "OTHER"};
-    CLI_TRY(cli_parse_some(&cli_view, argc, argv, take, &s, what, s.inputs, 1, 2, &help));
-    if (help) {
-        return CLI_OK;
-    }
+    view_settings s = {.uv_set = -1};
+    CLI_TRY(cli_parse(&cli_view, argc, argv, take, &s, s.inputs));
     CLI_TRY(check(&s));
     const double start = vshi_seconds();
-    cli_progress_begin(s.common.progress, s.common.quiet);
+    const vsh_run run = cli_make_run();
     cli_signals_watch();
-    const int code = is_scene(&s) ? write_scene(&s) : write_page(&s);
-    cli_progress_end();
-    if (code == CLI_OK) {
-        cli_signals_end(CLI_OK);
-        if (!s.common.quiet) {
-            cli_say("%s: written in %.2f s; open it in a browser", s.output, vshi_seconds() - start);
-        }
+    CLI_TRY(is_scene(&s) ? write_scene(&s, &run) : write_page(&s, &run));
+    cli_signals_end(CLI_OK);
+    if (!cli_given.quiet) {
+        cli_say("%s: written in %.2f s; open it in a browser", s.output, vshi_seconds() - start);
     }
-    return code;
+    return CLI_OK;
 }

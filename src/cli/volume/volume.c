@@ -4,12 +4,8 @@
 #include "base/memory.h"
 #include "cli/bake/options.h"
 #include "cli/message.h"
-#include "cli/options.h"
 #include "cli/paths.h"
-#include "cli/progress.h"
 #include "cli/signals.h"
-#include "cli/stats.h"
-#include "cli/temporary.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -18,39 +14,30 @@
 /* --- options */
 
 typedef struct volume_settings {
-    cli_bake_settings bake; /* the scene, as `bake` takes it; its output and stats are ours */
+    cli_bake_settings bake; /* the scene, the output and the stats */
     double band;            /* 0: not given */
     bool has_box;
     double box_min[3], box_max[3], box_voxel_size; /* 0: not given */
     const char *like;                              /* file; NULL: not given */
     const char *like_grid;                         /* NULL: the first */
-    char like_text[4096];
     int32_t inside;
     bool half;
 } volume_settings;
 
-enum {
-    KEY_BAND = 0x2000,
-    KEY_BOX,
-    KEY_BOX_VOXEL_SIZE,
-    KEY_LIKE,
-    KEY_INSIDE,
-    KEY_HALF,
-    KEY_STATS,
-    KEY_DRY_RUN
-};
+enum { KEY_BAND = 0x2000, KEY_BOX, KEY_LIKE, KEY_INSIDE };
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
     {'o', "output", "OUT.vdb", "file to write: grids shadow.NAME of each light, and ao"},
-    {KEY_HALF, "half", NULL, "write 16-bit floats"},
-    {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
-    {KEY_DRY_RUN, "dry-run", NULL, "bake nothing: print voxels and memory"},
+    {CLI_FLAG(volume_settings, half), "half", NULL, "write 16-bit floats"},
+    CLI_STATS_OPTION(volume_settings, bake.stats),
+    {CLI_FLAG(volume_settings, bake.dry_run), "dry-run", NULL, "bake nothing: print voxels and memory"},
     {0, NULL, NULL, "Which voxels (without --box and --like the casters' own band)"},
     {KEY_BAND, "band", "VOXELS",
      "how far from the surface, in voxels, more than 0 to 100\n(all of the level set's band)"},
     {KEY_BOX, "box", "X0,Y0,Z0,X1,Y1,Z1", "a box, scene units: lower corner, upper corner"},
-    {KEY_BOX_VOXEL_SIZE, "box-voxel-size", "SIZE", "the edge of its voxels (that of the casters' voxels)"},
+    {CLI_POSITIVE(volume_settings, box_voxel_size), "box-voxel-size", "SIZE",
+     "the edge of its voxels (that of the casters' voxels)"},
     {KEY_LIKE, "like", "FILE[:GRID]",
      "the active voxels of a grid in a .vdb file, a fog say,\non its own lattice (the file's first grid of "
      "numbers)"},
@@ -77,18 +64,18 @@ const cli_command cli_volume = {
     volume_main};
 
 static int take_like(volume_settings *s, const char *name, const char *value) {
-    if (value[0] == '\0' || strlen(value) >= sizeof s->like_text) {
-        return cli_usage("%s '%.60s': expected FILE.vdb or FILE.vdb:GRID", name, value);
+    if (value[0] == '\0') {
+        return cli_usage("%s '': expected FILE.vdb or FILE.vdb:GRID", name);
     }
-    strcpy(s->like_text, value);
-    s->like = s->like_text;
+    s->like = value;
     s->like_grid = cli_grid_name(value);
-    if (s->like_grid != NULL) {
-        s->like_text[s->like_grid - 1 - value] = '\0';
+    if (s->like_grid != NULL && s->like_grid[0] == '\0') {
+        return cli_usage("%s '%s': no grid is named behind the colon", name, value);
     }
-    return s->like_grid == NULL || s->like_grid[0] != '\0'
-               ? CLI_OK
-               : cli_usage("%s '%s': no grid is named behind the colon", name, value);
+    if (s->like_grid != NULL) {
+        s->like = cli_keep_text("%.*s", (int)(s->like_grid - 1 - value), value);
+    }
+    return s->like != NULL ? CLI_OK : cli_out_of_memory(name);
 }
 
 static int take(void *settings, int key, const char *name, const char *value) {
@@ -97,32 +84,19 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case 'o':
         s->bake.output = value;
         return CLI_OK;
-    case KEY_STATS:
-        s->bake.stats = value;
-        return CLI_OK;
-    case KEY_DRY_RUN:
-        s->bake.dry_run = true;
-        return CLI_OK;
-    case KEY_HALF:
-        s->half = true;
-        return CLI_OK;
-    case KEY_BAND: {
-        const int code = cli_parse_positive(name, value, &s->band);
-        return code == CLI_OK && s->band > 100.0 ? cli_parse_number(name, value, 0.0, 100.0, &s->band) : code;
-    }
+    case KEY_BAND:
+        CLI_TRY(cli_parse_positive(name, value, &s->band));
+        return cli_parse_number(name, value, 0.0, 100.0, &s->band);
     case KEY_BOX:
         s->has_box = true;
         return cli_parse_box(name, value, s->box_min, s->box_max);
-    case KEY_BOX_VOXEL_SIZE:
-        return cli_parse_positive(name, value, &s->box_voxel_size);
     case KEY_LIKE:
         return take_like(s, name, value);
     case KEY_INSIDE:
         return cli_parse_name(name, value, VSH_NAMES_INSIDE, &s->inside);
     default:
-        break;
+        return cli_shared_parse(&s->bake, key, name, value);
     }
-    return cli_shared_parse(&s->bake, key, name, value);
 }
 
 static int check_options(const volume_settings *s) {
@@ -139,67 +113,45 @@ static int check_options(const volume_settings *s) {
     return cli_patch_check(&s->bake.patch);
 }
 
-static int check_output(const volume_settings *s, const vsh_scene *scene, const char *output) {
-    if (s->like != NULL && cli_same_file(output, s->like)) {
-        return cli_usage("%s: the output is also the file of --like", output);
-    }
-    CLI_TRY(cli_bake_check_output(&s->bake, scene, output));
-    CLI_TRY(cli_bake_check_inputs(&s->bake, scene, &output, 1));
-    return cli_temporary_check(output);
-}
-
 /* Refuses bad outputs before anything is read. */
 static int check_files(const volume_settings *s, const vsh_scene *scene) {
-    const char *output = s->bake.output, *stats = s->bake.stats;
-    if (stats != NULL && cli_same_file(output, stats)) {
-        return cli_usage("%s: both the output and the --stats file", output);
+    const char *const outputs[] = {s->bake.output, s->bake.stats};
+    for (size_t i = 0; i < 2 && s->like != NULL; ++i) {
+        if (outputs[i] != NULL && cli_same_file(outputs[i], s->like)) {
+            return cli_usage("%s: the output is also the file of --like", outputs[i]);
+        }
     }
-    const int code = check_output(s, scene, output);
-    return code == CLI_OK && stats != NULL ? check_output(s, scene, stats) : code;
-}
-
-static vsh_volume_options volume_options(const volume_settings *s, const vsh_scene *scene) {
-    vsh_volume_options bake = vsh_volume_options_default();
-    bake.inside = s->inside;
-    bake.ao = scene->ao;
-    bake.error = scene->error;
-    bake.shade = scene->shade;
-    return bake;
+    return cli_bake_check_files(&s->bake, scene);
 }
 
 /* --- the work */
 
 typedef struct volume_work {
     const volume_settings *settings;
-    vsh_scene *scene;
-    vsh_run run;
-    vsh_assets *assets;
-    vsh_occluders *occluders;
+    cli_shading shading;
     vsh_grid *grid;
     vsh_voxels *voxels;
     vsh_volume *volume;
-    cli_provenance origin;
-    cli_stats stats;
 } volume_work;
 
 static int load(volume_work *work) {
-    const double start = vshi_seconds();
     const volume_settings *s = work->settings;
+    CLI_TRY(cli_shading_load(&work->shading));
+    if (s->like == NULL) {
+        return CLI_OK;
+    }
+    const double start = vshi_seconds();
     vsh_error error;
-    if (vsh_assets_load(work->scene, &work->run, &work->assets, &error) != VSH_OK) {
-        return cli_fail_of(NULL, &error);
-    }
-    if (s->like != NULL &&
-        vsh_voxels_from_vdb(s->like, s->like_grid, &work->run, &work->voxels, &error) != VSH_OK) {
-        return cli_fail_of(NULL, &error);
-    }
-    cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
+    CLI_TRY(cli_check_result(
+        vsh_voxels_from_vdb(s->like, s->like_grid, &work->shading.run, &work->voxels, &error), &error));
+    cli_stats_stage(&work->shading.stats, CLI_STAGE_LOAD, start);
     return CLI_OK;
 }
 
-/* Of the casters' band, or of the box, whose voxels may be of the casters' size. */
+/* Makes the voxels of the casters' band, or of the box, whose voxels may be of the casters' size. */
 static int choose_voxels(volume_work *work) {
     const volume_settings *s = work->settings;
+    const vsh_run *run = &work->shading.run;
     vsh_error error;
     vsh_result result = VSH_OK;
     if (s->has_box) {
@@ -209,25 +161,26 @@ static int choose_voxels(volume_work *work) {
             vsh_grid_get_info(work->grid, &info);
             size = info.voxel_size;
         }
-        result = vsh_voxels_from_box(s->box_min, s->box_max, size, &work->run, &work->voxels, &error);
+        result = vsh_voxels_from_box(s->box_min, s->box_max, size, run, &work->voxels, &error);
     } else if (s->like == NULL) {
-        result = vsh_voxels_from_grid(work->grid, s->band, &work->run, &work->voxels, &error);
+        result = vsh_voxels_from_grid(work->grid, s->band, run, &work->voxels, &error);
     }
-    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+    return cli_check_result(result, &error);
 }
 
-/* The union of all casters in voxels: what has the band, or tells the size of a box's voxels; and without
- * layers what casts. */
+/* Makes the union of all casters in voxels: what has the band, or tells the size of a box's voxels; and
+ * without layers what casts. */
 static int make_grid(volume_work *work) {
-    const volume_settings *s = work->settings;
-    if (s->like != NULL || s->box_voxel_size > 0.0) {
+    cli_shading *shading = &work->shading;
+    if (work->settings->like != NULL || work->settings->box_voxel_size > 0.0) {
         return CLI_OK;
     }
     const double start = vshi_seconds();
     vsh_error error;
-    const vsh_result result = vsh_scene_casters(work->scene, work->assets, &work->run, &work->grid, &error);
-    cli_stats_stage(&work->stats, CLI_STAGE_VOXELIZE, start);
-    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+    const vsh_result result =
+        vsh_scene_casters(shading->scene, shading->assets, &shading->run, &work->grid, &error);
+    cli_stats_stage(&shading->stats, CLI_STAGE_VOXELIZE, start);
+    return cli_check_result(result, &error);
 }
 
 static int make_occluders(volume_work *work) {
@@ -239,78 +192,66 @@ static int make_occluders(volume_work *work) {
     what.receivers_min = info.bounds_min;
     what.receivers_max = info.bounds_max;
     what.voxels = 1; /* whose slopes are normals, and whose insides are filled */
-    what.grid = work->scene->layer_count == 0 ? work->grid : NULL;
-    vsh_error error;
-    if (vsh_scene_occluders(work->scene, work->assets, &what, &work->run, &work->occluders, &error) !=
-        VSH_OK) {
-        return cli_fail_of(NULL, &error);
-    }
+    what.grid = work->shading.scene->layer_count == 0 ? work->grid : NULL;
+    CLI_TRY(cli_shading_cast(&work->shading, &what));
     vsh_grid_free(work->grid); /* neither what casts nor the voxels need it */
     work->grid = NULL;
-    vsh_occluders_info casters;
-    vsh_occluders_get_info(work->occluders, &casters);
-    cli_stats_casters(&work->stats, work->scene, &casters);
     return CLI_OK;
 }
 
-static int find_origin(volume_work *work) {
-    const cli_bake_settings *bake = &work->settings->bake;
-    const char *const files[] = {bake->input, work->settings->like, cli_bake_lights(bake)};
-    return cli_provenance_make(work->scene, files, 3, &work->stats.casters, &work->run, &work->origin);
-}
-
 static int bake_volume(volume_work *work) {
+    cli_shading *shading = &work->shading;
+    const vsh_scene *scene = shading->scene;
     const double start = vshi_seconds();
-    const vsh_volume_options bake = volume_options(work->settings, work->scene);
+    vsh_volume_options bake = vsh_volume_options_default();
+    bake.inside = work->settings->inside;
+    bake.ao = scene->ao;
+    bake.error = scene->error;
+    bake.shade = scene->shade;
     vsh_error error;
     const vsh_result result =
-        vsh_bake_volume(work->occluders, work->voxels, work->scene->lights, work->scene->light_count, &bake,
-                        &work->run, &work->volume, &work->stats.shade, &error);
-    cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
-    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+        vsh_bake_volume(shading->occluders, work->voxels, scene->lights, scene->light_count, &bake,
+                        &shading->run, &work->volume, &shading->stats.shade, &error);
+    cli_stats_stage(&shading->stats, CLI_STAGE_BAKE, start);
+    return cli_check_result(result, &error);
 }
 
 static int write_volume(volume_work *work) {
     const double start = vshi_seconds();
-    const char *output = work->settings->bake.output;
-    if (cli_progress_report(NULL, "write", 0.0) != 0) {
-        const vsh_error cancelled = {VSH_ERROR_CANCELLED, "write: cancelled"};
-        return cli_fail(&cancelled);
-    }
+    const cli_provenance *origin = &work->shading.origin;
+    CLI_TRY(cli_begin_writing());
     vsh_error error;
-    const vsh_result result = vsh_volume_write(work->volume, output, work->settings->half,
-                                               work->origin.attributes, work->origin.count, &error);
-    cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
-    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+    const vsh_result result =
+        vsh_volume_write(work->volume, work->settings->bake.output, work->settings->half, origin->attributes,
+                         origin->count, &error);
+    cli_stats_stage(&work->shading.stats, CLI_STAGE_WRITE, start);
+    return cli_check(result, &error);
 }
 
-static void count_voxels(volume_work *work, vsh_volume_info *info) {
-    vsh_volume_get_info(work->volume, info);
-    work->stats.voxels = info->shaded;
-    work->stats.inside_voxels = info->filled + info->off;
+static void count_voxels(const vsh_volume *volume, cli_stats *stats, vsh_volume_info *info) {
+    vsh_volume_get_info(volume, info);
+    stats->voxels = info->shaded;
+    stats->inside_voxels = info->filled + info->off;
     for (size_t i = 0; i < info->grids; ++i) {
         vsh_volume_grid grid;
-        vsh_volume_get_grid(work->volume, i, &grid);
-        work->stats.tiles += grid.tiles;
+        vsh_volume_get_grid(volume, i, &grid);
+        stats->tiles += grid.tiles;
     }
 }
 
 static void say_results(const volume_work *work, const vsh_volume_info *info) {
-    if (work->settings->bake.common.quiet) {
-        return;
-    }
     char bytes[32];
     cli_say("%s: %zu grid%s of %" PRIu64 " voxels, %" PRIu64 " more inside, %" PRIu64 " of them filled; %s",
             work->settings->bake.output, info->grids, info->grids == 1 ? "" : "s", info->shaded,
             info->filled + info->off, info->filled, vshi_bytes_text(info->bytes, bytes, sizeof bytes));
-    cli_stats_say(&work->stats);
+    cli_stats_say(&work->shading.stats);
 }
 
 /* Bytes of a block of 8³ voxels: its values in one grid with its share of the tree, and its masks. */
 static const double GRID_BYTES = 2200.0, BLOCK_BYTES = 640.0;
 
 static void print_forecast(const volume_work *work) {
-    const vsh_scene *scene = work->scene;
+    const vsh_scene *scene = work->shading.scene;
     vsh_voxels_info info;
     vsh_voxels_get_info(work->voxels, &info);
     const double grids =
@@ -322,8 +263,9 @@ static void print_forecast(const volume_work *work) {
 }
 
 static int run_volume(const volume_settings *s, vsh_scene *scene) {
-    volume_work work = {.settings = s, .scene = scene, .run = cli_common_run(&s->bake.common)};
-    work.stats = cli_stats_begin(CLI_STATS_VOXELS, work.run.threads);
+    volume_work work = {.settings = s, .shading = cli_shading_begin(scene, CLI_STATS_VOXELS)};
+    cli_shading *shading = &work.shading;
+    const char *const files[] = {s->bake.input, s->like, cli_bake_lights(&s->bake)};
     vsh_volume_info info;
     int code;
     CLI_TRY_DONE(load(&work));
@@ -332,32 +274,29 @@ static int run_volume(const volume_settings *s, vsh_scene *scene) {
         print_forecast(&work);
         goto done;
     }
-    CLI_TRY_DONE(find_origin(&work));
+    CLI_TRY_DONE(
+        cli_provenance_make(scene, files, 3, &shading->stats.casters, &shading->run, &shading->origin));
     CLI_TRY_DONE(bake_volume(&work));
     CLI_TRY_DONE(write_volume(&work));
-    count_voxels(&work, &info);
-    CLI_TRY_DONE(cli_stats_finish(&work.stats, &work.run, s->bake.stats));
-    say_results(&work, &info);
+    count_voxels(work.volume, &shading->stats, &info);
+    CLI_TRY_DONE(cli_stats_finish(&shading->stats, &shading->run, s->bake.stats));
+    if (!cli_given.quiet) {
+        say_results(&work, &info);
+    }
 done:
-    cli_provenance_free(&work.origin);
     vsh_volume_free(work.volume);
     vsh_voxels_free(work.voxels);
     vsh_grid_free(work.grid);
-    vsh_occluders_free(work.occluders);
-    vsh_assets_free(work.assets);
+    cli_shading_free(shading);
     return code;
 }
 
 static int volume_main(int argc, char **argv) {
-    volume_settings s = {.bake = {.common = cli_common_default()}};
-    bool help;
-    int code = cli_parse(&cli_volume, argc, argv, take, &s, "INPUT", &s.bake.input, &help);
-    if (code != CLI_OK || help) {
-        return code;
-    }
+    volume_settings s = {.band = 0.0};
+    CLI_TRY(cli_parse(&cli_volume, argc, argv, take, &s, &s.bake.input));
     CLI_TRY(check_options(&s));
-    cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
     cli_bake_scene made;
+    int code;
     CLI_TRY_DONE(cli_bake_scene_for_points(&s.bake, &made));
     if (s.band > made.scene.grid.half_width) {
         made.scene.grid.half_width = s.band;
@@ -368,6 +307,5 @@ static int volume_main(int argc, char **argv) {
     code = run_volume(&s, &made.scene);
 done:
     cli_bake_scene_free(&made);
-    cli_progress_end();
     return code;
 }

@@ -1,27 +1,19 @@
 /* vdbshade voxelize: casters to a .vdb level set. */
 #include "base/bytes.h"
 #include "base/clock.h"
-#include "cli/commands.h"
+#include "cli/bake/options.h"
 #include "cli/message.h"
-#include "cli/options.h"
-#include "cli/patch.h"
 #include "cli/paths.h"
-#include "cli/progress.h"
 #include "cli/signals.h"
 #include "cli/temporary.h"
 
 #include <inttypes.h>
-#include <stdio.h>
-#include <string.h>
 
 enum { KEY_NAME = 0x2000 };
 
 typedef struct voxelize_settings {
-    const char *input;
-    const char *output;
+    cli_bake_settings bake; /* the casters, as `bake` takes them */
     const char *name;
-    cli_common common;
-    cli_patch patch;
 } voxelize_settings;
 
 static const cli_option options[] = {
@@ -48,30 +40,14 @@ const cli_command cli_voxelize = {
 static int take(void *settings, int key, const char *name, const char *value) {
     voxelize_settings *s = settings;
     if (key == 'o') {
-        s->output = value;
+        s->bake.output = value;
         return CLI_OK;
     }
     if (key == KEY_NAME) {
         s->name = value;
         return value[0] != '\0' ? CLI_OK : cli_usage("%s '': expected a name", name);
     }
-    bool taken;
-    const int code = cli_patch_take(&s->patch, key, name, value, &taken);
-    return taken ? code : cli_common_parse(&s->common, key, name, value, &taken);
-}
-
-/* What can be refused before anything is read. */
-static int check_files(const voxelize_settings *s, const vsh_scene *scene) {
-    if (cli_same_file(s->output, s->input)) {
-        return cli_usage("%s: the output is the input", s->output);
-    }
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        const vsh_caster *caster = &scene->casters[i];
-        if (caster->path != NULL && cli_same_file(s->output, caster->path)) {
-            return cli_usage("%s: the output is also a caster's file", s->output);
-        }
-    }
-    return cli_temporary_check(s->output);
+    return cli_patch_take(&s->bake.patch, key, name, value);
 }
 
 static int write_grid(const voxelize_settings *s, const vsh_scene *scene, const vsh_run *run,
@@ -81,45 +57,40 @@ static int write_grid(const voxelize_settings *s, const vsh_scene *scene, const 
     vsh_grid_get_info(grid, &info);
     cli_provenance origin;
     const vsh_occluders_info made = {.voxel_size = info.voxel_size};
-    const int code = cli_provenance_make(&casters, &s->input, 1, &made, run, &origin);
-    if (code != CLI_OK) {
-        return code;
+    int code = cli_provenance_make(&casters, &s->bake.input, 1, &made, run, &origin);
+    code = code == CLI_OK ? cli_begin_writing() : code;
+    if (code == CLI_OK) {
+        vsh_error error;
+        code = cli_check(
+            vsh_grid_write(grid, s->bake.output, s->name, origin.attributes, origin.count, &error), &error);
     }
-    if (cli_progress_report(NULL, "write", 0.0) != 0) {
-        const vsh_error cancelled = {VSH_ERROR_CANCELLED, "write: cancelled"};
-        cli_provenance_free(&origin);
-        return cli_fail(&cancelled);
-    }
-    vsh_error error;
-    const vsh_result result =
-        vsh_grid_write(grid, s->output, s->name, origin.attributes, origin.count, &error);
     cli_provenance_free(&origin);
-    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+    return code;
 }
 
 static void say_summary(const voxelize_settings *s, const vsh_grid *grid, double seconds) {
     vsh_grid_info info;
     vsh_grid_get_info(grid, &info);
     char bytes[32];
-    cli_say("%s: voxel %.4g, %" PRIu64 " active voxels, %s in memory, %.2f s", s->output, info.voxel_size,
-            info.active_voxels, vshi_bytes_text(info.bytes, bytes, sizeof bytes), seconds);
+    cli_say("%s: voxel %.4g, %" PRIu64 " active voxels, %s in memory, %.2f s", s->bake.output,
+            info.voxel_size, info.active_voxels, vshi_bytes_text(info.bytes, bytes, sizeof bytes), seconds);
 }
 
 static int voxelize(const voxelize_settings *s, const vsh_scene *scene) {
+    CLI_TRY(cli_bake_check_output(&s->bake, scene, s->bake.output));
+    CLI_TRY(cli_temporary_check(s->bake.output));
+    cli_signals_watch();
     const double start = vshi_seconds();
-    const vsh_run run = cli_common_run(&s->common);
+    const vsh_run run = cli_make_run();
     vsh_assets *assets = NULL;
     vsh_grid *grid = NULL;
     vsh_error error;
     int code;
-    if (vsh_assets_load(scene, &run, &assets, &error) != VSH_OK ||
-        vsh_scene_casters(scene, assets, &run, &grid, &error) != VSH_OK) {
-        code = cli_fail_of(NULL, &error);
-        goto done;
-    }
+    CLI_TRY_DONE(cli_check_result(vsh_assets_load(scene, &run, &assets, &error), &error));
+    CLI_TRY_DONE(cli_check_result(vsh_scene_casters(scene, assets, &run, &grid, &error), &error));
     CLI_TRY_DONE(write_grid(s, scene, &run, grid));
     cli_signals_end(CLI_OK);
-    if (!s->common.quiet) {
+    if (!cli_given.quiet) {
         say_summary(s, grid, vshi_seconds() - start);
     }
 done:
@@ -129,50 +100,25 @@ done:
 }
 
 static int voxelize_main(int argc, char **argv) {
-    voxelize_settings s;
-    memset(&s, 0, sizeof s);
-    s.common = cli_common_default();
-    bool help;
-    int code = cli_parse(&cli_voxelize, argc, argv, take, &s, "INPUT", &s.input, &help);
-    if (code != CLI_OK || help) {
-        return code;
+    voxelize_settings s = {.name = NULL};
+    CLI_TRY(cli_parse(&cli_voxelize, argc, argv, take, &s, &s.bake.input));
+    CLI_TRY(cli_patch_check(&s.bake.patch));
+    if (s.bake.output == NULL || !cli_has_ending(s.bake.output, "vdb")) {
+        return cli_usage("%s: give -o OUT.vdb", s.bake.output != NULL ? s.bake.output : s.bake.input);
     }
-    code = cli_patch_check(&s.patch);
-    if (code != CLI_OK) {
-        return code;
-    }
-    if (s.output == NULL || !cli_has_ending(s.output, "vdb")) {
-        return cli_usage("%s: give -o OUT.vdb", s.output != NULL ? s.output : s.input);
-    }
-    cli_progress_begin(s.common.progress, s.common.quiet);
-    const bool vdb = cli_has_ending(s.input, "vdb");
-    vsh_caster caster = vsh_caster_default();
-    caster.type = vdb ? VSH_CASTER_VDB : VSH_CASTER_MESH;
-    caster.path = s.input;
-    caster.grid = cli_parsed_grid();
-    vsh_scene scene = vsh_scene_default();
-    scene.casters = &caster;
-    scene.caster_count = 1;
-    scene.grid.resolution = vdb ? 0 : scene.grid.resolution; /* its own voxels */
-    vsh_scene *read = NULL;
-    if (cli_has_ending(s.input, "json")) {
-        const vsh_run run = cli_common_run(&s.common);
-        vsh_error error;
-        if (vsh_scene_read(s.input, &run, &read, &error) != VSH_OK) {
-            return cli_fail(&error);
-        }
-        scene.casters = read->casters;
-        scene.caster_count = read->caster_count;
-        scene.grid = read->grid;
-        scene.unit = read->unit;
-        scene.cast_blended = read->cast_blended;
-    }
-    CLI_TRY_DONE(cli_patch_scene(&s.patch, &scene));
-    CLI_TRY_DONE(check_files(&s, &scene));
-    cli_signals_watch();
-    code = voxelize(&s, &scene);
+    cli_bake_scene made;
+    int code;
+    CLI_TRY_DONE(cli_bake_scene_casters(&s.bake, &made));
+    vsh_scene casters = vsh_scene_default(); /* no method of the scene's leaves any of them out */
+    casters.casters = made.scene.casters;
+    casters.caster_count = made.scene.caster_count;
+    casters.grid = made.scene.grid;
+    casters.unit = made.scene.unit;
+    casters.cast_blended = made.scene.cast_blended;
+    casters.solidity = made.scene.solidity;
+    casters.solidity_count = made.scene.solidity_count;
+    code = voxelize(&s, &casters);
 done:
-    vsh_scene_free(read);
-    cli_progress_end();
+    cli_bake_scene_free(&made);
     return code;
 }
