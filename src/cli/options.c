@@ -69,7 +69,11 @@ size_t cli_list_options(const cli_command *command, cli_option *options, size_t 
     for (size_t i = 0; i < command->option_count && count < most; ++i) {
         const cli_option *option = &command->options[i];
         if (option->key < CLI_KEY_SETTINGS || option->key >= CLI_STORE_TEXT) {
-            options[count++] = *option;
+            options[count] = *option;
+            if (option->name != NULL && strcmp(option->name, "output") == 0) {
+                options[count].key = 'o';
+            }
+            ++count;
             continue;
         }
         const vsh_setting *setting;
@@ -301,6 +305,16 @@ static int store(void *settings, int key, const char *name, const char *value) {
     }
 }
 
+/* The place in the settings that the command's table gives for the output; else 'o'. */
+static int find_output(const cli_command *command) {
+    for (size_t i = 0; i < command->option_count; ++i) {
+        if (command->options[i].name != NULL && strcmp(command->options[i].name, "output") == 0) {
+            return command->options[i].key;
+        }
+    }
+    return 'o';
+}
+
 static int parse_option(cli_option_fn *take, void *settings, int key, const char *name, const char *value) {
     switch (key) {
     case CLI_KEY_THREADS:
@@ -358,7 +372,8 @@ static int parse_options(const parsing *p, cli_option_fn *take, void *settings) 
         char name[64];
         snprintf(name, sizeof name, "--%s", option->name);
         tell_option(p->told, option, optarg);
-        CLI_TRY(parse_option(take, settings, key, key < 256 ? word : name, optarg));
+        const int place = key == 'o' ? find_output(p->command) : key;
+        CLI_TRY(parse_option(take, settings, place, key < 256 ? word : name, optarg));
     }
     return CLI_OK;
 }

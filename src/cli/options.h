@@ -25,7 +25,7 @@ typedef struct cli_command {
 } cli_command;
 
 /* Keys of options whose values the parser stores itself, in a member of the command's settings: a text, a
- * flag that becomes true, a number above 0. */
+ * flag that becomes true, a number above 0. The option "output" has the letter o, too. */
 #define CLI_TEXT(type, member) (CLI_STORE_TEXT + (int)offsetof(type, member))
 #define CLI_FLAG(type, member) (CLI_STORE_FLAG + (int)offsetof(type, member))
 #define CLI_POSITIVE(type, member) (CLI_STORE_POSITIVE + (int)offsetof(type, member))

@@ -12,7 +12,7 @@ static int bake_main(int argc, char **argv);
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
-    {'o', "output", "OUT",
+    {CLI_TEXT(cli_bake_settings, output), "output", "OUT",
      "image to write: .exr with named channels, or\n"
      ".png .tif .dpx .jp2 .tga .bmp .hdr .ppm .pgm .jpg\n"
      ".webp .gif; what each can hold, and what is not\nwritten: docs/formats.md;\n"
@@ -117,9 +117,6 @@ int cli_shared_parse(cli_bake_settings *s, int key, const char *name, const char
     case CLI_KEY_SUN_ANGLE:
         s->has_sun_angle = true;
         return cli_parse_number(name, value, 0.0, 179.0, &s->sun_angle_deg);
-    case CLI_KEY_LIGHTS:
-        s->lights = value;
-        return CLI_OK;
     case CLI_KEY_LIGHT_RADIUS:
         s->has_light_radius = true;
         return cli_parse_number(name, value, 0.0, 1e12, &s->light_radius);
@@ -137,9 +134,6 @@ int cli_shared_parse(cli_bake_settings *s, int key, const char *name, const char
 static int take(void *settings, int key, const char *name, const char *value) {
     cli_bake_settings *s = settings;
     switch (key) {
-    case 'o':
-        s->output = value;
-        return CLI_OK;
     case KEY_RECEIVE:
         return take_pattern(&s->receive, name, value);
     case KEY_NO_RECEIVE:

@@ -15,11 +15,10 @@ typedef struct cli_patterns {
     size_t count;
 } cli_patterns;
 
-/* What commands that shade share. */
+/* Options of commands that shade, whose settings begin with cli_bake_settings. */
 enum {
     CLI_KEY_SUN = 0x3000,
     CLI_KEY_SUN_ANGLE,
-    CLI_KEY_LIGHTS,
     CLI_KEY_LIGHT_RADIUS,
     CLI_KEY_CASTER,
     CLI_KEY_NO_CAST,
@@ -32,7 +31,7 @@ enum {
 #define CLI_LIGHTS                                                                                           \
     {CLI_KEY_SUN, "sun", "X,Y,Z", "direction towards the sun; its channel is shadow.sun"},                   \
         {CLI_KEY_SUN_ANGLE, "sun-angle", "DEG", "its angular diameter, degrees, 0 to 179 (0.53)"},           \
-        {CLI_KEY_LIGHTS, "lights", "FILE",                                                                   \
+        {CLI_TEXT(cli_bake_settings, lights), "lights", "FILE",                                              \
          "also the lights in a glTF or GLB, or by the word file\nthose in INPUT; their channels are "        \
          "shadow.NAME, suns\nare as wide as --sun-angle says"},                                              \
     {                                                                                                        \

@@ -21,7 +21,7 @@ typedef struct flat_settings {
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
-    {'o', "output", "OUT", "image to write; formats as of bake (the scene's)"},
+    {CLI_TEXT(flat_settings, output), "output", "OUT", "image to write; formats as of bake (the scene's)"},
     CLI_SETTINGS(VSH_SETTINGS_FLAT_IMAGE),
     CLI_STATS_OPTION(flat_settings, stats),
     {0, NULL, NULL, "Texels"},
@@ -43,12 +43,7 @@ const cli_command cli_flat = {
     flat_main};
 
 static int take(void *settings, int key, const char *name, const char *value) {
-    flat_settings *s = settings;
-    if (key != 'o') {
-        return cli_patch_take(&s->patch, key, name, value);
-    }
-    s->output = value;
-    return CLI_OK;
+    return cli_patch_take(&((flat_settings *)settings)->patch, key, name, value);
 }
 
 /* Puts what was given over the scene's own. */

@@ -47,8 +47,8 @@ static int refuse_parts(const merge_settings *s) {
     return cli_usage("%s: its parts are of no bake", s->output);
 }
 
-/* Repeats the command of the parts with the outputs of this one. Anybody may have written a part, so nothing is
- * written to files that it names. */
+/* Repeats the command of the parts with the outputs of this one. Anybody may have written a part, so nothing
+ * is written to files that it names. */
 static int merge(const merge_settings *s, int argc, char **argv) {
     if (argc < 2 || argc >= MOST_WORDS || strcmp(argv[0], cli_bake.name) != 0) {
         return refuse_parts(s);

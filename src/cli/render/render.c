@@ -30,7 +30,7 @@ enum {
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Picture"},
-    {'o', "output", "OUT",
+    {CLI_TEXT(render_settings, bake.output), "output", "OUT",
      "image to write: .exr has linear R G B, A, Z and N.X N.Y\nN.Z; others are sRGB of 8 bits"},
     {KEY_SIZE, "size", "W[xH]", "pixels, 1 to 16384 (1280x720)"},
     {KEY_SAMPLES, "samples", "N", "N x N rays a pixel, 1 to 16 (3)"},
@@ -96,9 +96,6 @@ static int parse_option(void *settings, int key, const char *name, const char *v
     vsh_render_options *o = &s->options;
     double degrees;
     switch (key) {
-    case 'o':
-        s->bake.output = value;
-        return CLI_OK;
     case KEY_CAMERA:
         s->has_camera = true;
         return cli_parse_point(name, value, o->camera.position);

@@ -37,16 +37,16 @@ static const char *color_of(const char *method) {
     return "#666666";
 }
 
-/* Powers of ten from which to which a logarithmic axis goes. */
+/* A logarithmic axis: powers of ten, and the pixels that they lie at. */
 typedef struct axis {
-    double low, high;
+    double low, high, from, to;
 } axis;
 
 typedef struct plot {
     FILE *out;
     const trade_work *work;
     const trade_subject *subject;
-    axis x, y;
+    axis axes[2]; /* x and y */
 } plot;
 
 static void include_value(axis *a, double value) {
@@ -57,11 +57,16 @@ static void include_value(axis *a, double value) {
 /* Widens an axis by a margin, and to one power of ten at least. */
 static void widen(axis *a) {
     if (!(a->low <= a->high)) {
-        *a = (axis){-1.0, 1.0};
+        a->low = -1.0;
+        a->high = 1.0;
     }
     const double margin = fmax(0.08, 0.5 * (1.0 - (a->high - a->low)));
     a->low -= margin;
     a->high += margin;
+}
+
+static double place(const axis *a, double value) {
+    return a->from + (log10(value) - a->low) / (a->high - a->low) * (a->to - a->from);
 }
 
 /* An error of 0 stands at the bottom. */
@@ -69,44 +74,29 @@ static double error_of(const trade_run *run) {
     return fmax(run->metrics.rmse, 1e-4);
 }
 
-static double place_x(const plot *p, double value) {
-    return LEFT + (log10(value) - p->x.low) / (p->x.high - p->x.low) * (WIDTH - LEFT - RIGHT);
-}
-
-static double place_y(const plot *p, double value) {
-    return TOP + (p->y.high - log10(value)) / (p->y.high - p->y.low) * (HEIGHT - TOP - BOTTOM);
-}
-
-static bool contains(const axis *a, double value) {
-    return log10(value) >= a->low && log10(value) <= a->high;
-}
-
-/* Lines at 1, 2 and 5 times each power of ten; a short axis has a label at each. */
-static void write_grid(const plot *p) {
+/* Draws lines at 1, 2 and 5 times each power of ten; a short axis has a label at each. */
+static void write_grid(const plot *p, const axis *a) {
     static const int steps[] = {1, 2, 5};
-    const bool all_x = p->x.high - p->x.low < 3.5, all_y = p->y.high - p->y.low < 3.5;
+    const bool across = a == &p->axes[0], all = a->high - a->low < 3.5;
     for (int i = 0; i < 3 * 14; ++i) {
         const int step = steps[i % 3];
-        const double value = step * pow(10.0, i / 3 - 7);
-        const char *class = step == 1 ? "grid" : "minor";
-        if (contains(&p->x, value)) {
-            const double x = place_x(p, value);
-            fprintf(p->out, "<path class=\"%s\" d=\"M%.1f %dV%d\"/>", class, x, TOP, HEIGHT - BOTTOM);
-            if (step == 1 || all_x) {
-                fprintf(p->out, "<text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%g</text>\n", x,
-                        HEIGHT - BOTTOM + 18, value);
-            }
+        const double value = step * pow(10.0, i / 3 - 7), at = place(a, value);
+        if (log10(value) < a->low || log10(value) > a->high) {
+            continue;
         }
-        if (contains(&p->y, value)) {
-            const double y = place_y(p, value);
-            fprintf(p->out, "<path class=\"%s\" d=\"M%d %.1fH%d\"/>", class, LEFT, y, WIDTH - RIGHT);
-            if (step == 1 || all_y) {
-                fprintf(p->out, "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%g</text>\n", LEFT - 6,
-                        y + 4.0, value);
-            }
+        fprintf(p->out, "<path class=\"%s\" d=\"M%.1f %.1f%c%d\"/>", step == 1 ? "grid" : "minor",
+                across ? at : LEFT, across ? TOP : at, across ? 'V' : 'H',
+                across ? HEIGHT - BOTTOM : WIDTH - RIGHT);
+        if (step == 1 || all) {
+            fprintf(p->out, "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\">%g</text>\n",
+                    across ? at : LEFT - 6.0, across ? HEIGHT - BOTTOM + 18.0 : at + 4.0,
+                    across ? "middle" : "end", value);
         }
     }
-    fprintf(p->out,
+}
+
+static void write_titles(FILE *out) {
+    fprintf(out,
             "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">bake, microseconds a value</text>\n"
             "<text transform=\"translate(14 %d) rotate(-90)\" text-anchor=\"middle\">RMSE against the "
             "truth</text>\n",
@@ -134,7 +124,7 @@ static void write_line(const plot *p, const trade_run *like, const char *class, 
         if (next == NULL) {
             break;
         }
-        fprintf(p->out, "%.1f,%.1f ", place_x(p, next->rate), place_y(p, error_of(next)));
+        fprintf(p->out, "%.1f,%.1f ", place(&p->axes[0], next->rate), place(&p->axes[1], error_of(next)));
         last = next->rate;
     }
     fputs("\"/>\n", p->out);
@@ -171,9 +161,10 @@ static void write_dots(const plot *p) {
         fprintf(p->out,
                 "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"%g\" fill=\"%s\"%s><title>%s%s: RMSE %.4f, %.3g "
                 "µs</title></circle>\n",
-                place_x(p, run->rate), place_y(p, error_of(run)), radius_of(p, run->resolution),
-                color_of(run->method), run->front ? " stroke=\"#000\" stroke-width=\"1.5\"" : "",
-                run->embree ? "Embree, " : "", run->options, run->metrics.rmse, run->rate);
+                place(&p->axes[0], run->rate), place(&p->axes[1], error_of(run)),
+                radius_of(p, run->resolution), color_of(run->method),
+                run->front ? " stroke=\"#000\" stroke-width=\"1.5\"" : "", run->embree ? "Embree, " : "",
+                run->options, run->metrics.rmse, run->rate);
     }
 }
 
@@ -207,19 +198,24 @@ static void write_legend(const plot *p) {
 }
 
 static void write_plot(FILE *out, const trade_work *work, const trade_subject *subject) {
-    plot p = {out, work, subject, {INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
+    plot p = {out,
+              work,
+              subject,
+              {{INFINITY, -INFINITY, LEFT, WIDTH - RIGHT}, {INFINITY, -INFINITY, HEIGHT - BOTTOM, TOP}}};
     for (size_t i = 0; i < subject->run_count; ++i) {
-        include_value(&p.x, subject->runs[i].rate);
-        include_value(&p.y, error_of(&subject->runs[i]));
+        include_value(&p.axes[0], subject->runs[i].rate);
+        include_value(&p.axes[1], error_of(&subject->runs[i]));
     }
-    widen(&p.x);
-    widen(&p.y);
+    widen(&p.axes[0]);
+    widen(&p.axes[1]);
     fprintf(out,
             "<div class=\"wide\">\n<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 "
             "%d %d\" role=\"img\" aria-label=\"error against time\">\n%s<rect width=\"%d\" height=\"%d\" "
             "fill=\"#fff\"/>\n",
             WIDTH, HEIGHT, plot_style, WIDTH, HEIGHT);
-    write_grid(&p);
+    write_grid(&p, &p.axes[0]);
+    write_grid(&p, &p.axes[1]);
+    write_titles(out);
     write_lines(&p);
     write_dots(&p);
     write_legend(&p);

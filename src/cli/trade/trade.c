@@ -24,7 +24,7 @@ enum { KEY_RECEIVER = 0x2000, KEY_SIZE, KEY_RESOLUTIONS, KEY_TRUTH_RAYS };
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
-    {'o', "output", "OUT.html", "page to write: plots and tables in one file"},
+    {CLI_TEXT(trade_settings, page), "output", "OUT.html", "page to write: plots and tables in one file"},
     {CLI_TEXT(trade_settings, csv), "csv", "FILE.csv", "write the table of all runs as CSV too"},
     {0, NULL, NULL, "What is measured"},
     {KEY_RECEIVER, "receiver", "N", "one receiver of the scene only, from 0 (all)"},
@@ -49,7 +49,7 @@ const cli_command cli_trade = {
     "INPUT -o OUT.html [options]",
     "Bakes a mesh or a scene (.json) by every method, at several voxel sizes and settings, and compares\n"
     "with the truth: rays against the triangles and the procedural shapes themselves, or against a finer\n"
-    "field where a caster is a .vdb file. The page shows error against time and the fastest options for\n"
+    "field where the build has no Embree. The page shows error against time and the fastest options for\n"
     "a given error. Defaults are in brackets.",
     options,
     sizeof options / sizeof options[0],
@@ -85,9 +85,6 @@ static int parse_size(trade_settings *s, const char *name, const char *value) {
 static int parse_option(void *settings, int key, const char *name, const char *value) {
     trade_settings *s = settings;
     switch (key) {
-    case 'o':
-        s->page = value;
-        return CLI_OK;
     case KEY_RECEIVER:
         return cli_parse_integer(name, value, 0, INT32_MAX, &s->receiver);
     case KEY_SIZE:
@@ -196,19 +193,24 @@ static int allocate(trade_work *work) {
     if (work->scene->ao) {
         work->subjects[work->subject_count++] = (trade_subject){.ao = true, .planes = 1};
     }
-    work->values = calloc((work->scene->light_count + 1) * work->texels, sizeof *work->values);
+    const size_t lights = work->scene->light_count;
+    work->values = calloc((lights + 1) * work->texels, sizeof *work->values);
+    work->planes = calloc(lights + 1, sizeof *work->planes);
+    work->compared = calloc((lights + 1) * work->receiver_count, sizeof *work->compared);
     work->common = malloc(work->texels);
     work->any = calloc(work->texels, 1);
-    bool whole = work->values != NULL && work->common != NULL && work->any != NULL;
+    bool whole = work->values != NULL && work->planes != NULL && work->compared != NULL &&
+                 work->common != NULL && work->any != NULL;
     for (size_t s = 0; s < work->subject_count; ++s) {
         trade_subject *subject = &work->subjects[s];
         subject->truth = calloc(subject->planes * work->texels, sizeof *subject->truth);
         whole = whole && subject->truth != NULL;
     }
-    if (whole) {
-        memset(work->common, 1, work->texels);
+    if (!whole) {
+        return cli_out_of_memory("values");
     }
-    return whole ? CLI_OK : cli_out_of_memory("values");
+    memset(work->common, 1, work->texels);
+    return CLI_OK;
 }
 
 /* --- baking */
@@ -241,25 +243,20 @@ static int make_voxels(const trade_work *work, int32_t resolution, vsh_occluders
 static int bake(const trade_work *work, const trade_subject *subject, const vsh_occluders *occluders,
                 const vsh_shade_options *shade, float *values) {
     const size_t lights = subject != NULL && !subject->ao ? subject->planes : 0;
-    float **planes = calloc(lights + 1, sizeof *planes);
-    if (planes == NULL) {
-        return cli_out_of_memory("planes");
-    }
     vsh_bake_stats baked = vsh_bake_stats_zero();
     vsh_result result = VSH_OK;
     vsh_error error;
     for (size_t r = 0; r < work->receiver_count && result == VSH_OK; ++r) {
         float *first = values + work->receivers[r].first;
         for (size_t i = 0; i < lights; ++i) {
-            planes[i] = first + i * work->texels;
+            work->planes[i] = first + i * work->texels;
         }
-        const vsh_lightmap lightmap = {.shadow = lights > 0 ? planes : NULL,
+        const vsh_lightmap lightmap = {.shadow = lights > 0 ? work->planes : NULL,
                                        .ao = subject != NULL && subject->ao ? first : NULL,
                                        .coverage = subject == NULL ? first : NULL};
         result = vsh_bake_lightmap(occluders, work->receivers[r].charts, work->scene->lights, lights, shade,
                                    &work->run, &lightmap, &baked, &error);
     }
-    free(planes);
     return cli_check_result(result, &error);
 }
 
@@ -357,7 +354,8 @@ static int place_points(trade_work *work) {
     work->positions = calloc(work->points, 3 * sizeof *work->positions);
     work->normals = calloc(work->points, 3 * sizeof *work->normals);
     work->texel = calloc(work->points, sizeof *work->texel);
-    if (work->positions == NULL || work->normals == NULL || work->texel == NULL) {
+    work->traced = calloc(work->points, sizeof *work->traced);
+    if (work->positions == NULL || work->normals == NULL || work->texel == NULL || work->traced == NULL) {
         return cli_out_of_memory("points");
     }
     vsh_occluder_parts parts;
@@ -385,10 +383,6 @@ static int place_points(trade_work *work) {
 /* Traces rays from the points into the subject's planes; *seconds is the time of the tracing alone. */
 static int trace(const trade_work *work, const trade_subject *subject, int32_t rays, float *values,
                  double *seconds) {
-    float *packed = calloc(work->points, sizeof *packed);
-    if (packed == NULL) {
-        return cli_out_of_memory("rays");
-    }
     *seconds = 0.0;
     vsh_result result = VSH_OK;
     vsh_error error;
@@ -396,16 +390,15 @@ static int trace(const trade_work *work, const trade_subject *subject, int32_t r
         const double start = read_clock(work);
         result = subject->ao ? vsh_trace_ao(work->triangles, work->solids, work->points, work->positions,
                                             work->normals, 0.0, work->scene->shade.ao_distance, rays,
-                                            &work->run, packed, &error)
+                                            &work->run, work->traced, &error)
                              : vsh_trace_shadow(work->triangles, work->solids, work->points, work->positions,
                                                 work->normals, 0.0, &work->scene->lights[plane], rays,
-                                                &work->run, packed, &error);
+                                                &work->run, work->traced, &error);
         *seconds += read_clock(work) - start;
         for (size_t i = 0; i < work->points; ++i) {
-            values[plane * work->texels + work->texel[i]] = packed[i];
+            values[plane * work->texels + work->texel[i]] = work->traced[i];
         }
     }
-    free(packed);
     return cli_check_result(result, &error);
 }
 
@@ -450,22 +443,17 @@ static int make_truth(trade_work *work) {
 static int compare(const trade_work *work, const trade_subject *subject, const uint8_t *mask,
                    vsh_accuracy *accuracy) {
     const size_t count = subject->planes * work->receiver_count;
-    vsh_compared *planes = calloc(count, sizeof *planes);
-    if (planes == NULL) {
-        return cli_out_of_memory("planes");
-    }
     for (size_t i = 0; i < count; ++i) {
         const trade_receiver *receiver = &work->receivers[i % work->receiver_count];
         const size_t first = i / work->receiver_count * work->texels + receiver->first;
-        planes[i] = (vsh_compared){{receiver->info.width, receiver->info.height, 1},
-                                   subject->truth + first,
-                                   work->values + first,
-                                   mask + receiver->first};
+        work->compared[i] = (vsh_compared){{receiver->info.width, receiver->info.height, 1},
+                                           subject->truth + first,
+                                           work->values + first,
+                                           mask + receiver->first};
     }
     vsh_error error;
-    const vsh_result result = vsh_compare_accuracy(planes, count, &work->run, accuracy, &error);
-    free(planes);
-    return cli_check_result(result, &error);
+    return cli_check_result(vsh_compare_accuracy(work->compared, count, &work->run, accuracy, &error),
+                            &error);
 }
 
 static int compare_times(const void *a, const void *b) {
@@ -620,36 +608,26 @@ static const plan plans[] = {
     {false, VSH_SHADOW_RAYS, 64, 0.0},
 };
 
-/* Writes the plan as options of `bake`. */
-static void name_plan(const plan *p, trade_run *run) {
-    char more[64] = "";
-    if (p->max_error > 0.0) {
-        snprintf(more, sizeof more, " --max-error %g", p->max_error);
-    } else if (p->number > 0) {
-        const bool cones = p->ao && p->method == VSH_AO_CONES;
-        snprintf(more, sizeof more, cones ? " with %d cones" : " --rays %d", p->number);
-    }
-    run->method = p->ao ? vsh_get_name(VSH_NAMES_AO, p->method) : vsh_get_name(VSH_NAMES_SHADOW, p->method);
-    snprintf(run->options, sizeof run->options, "%s %s%s --resolution %d", p->ao ? "--ao-method" : "--method",
-             run->method, more, run->resolution);
-}
-
-static vsh_shade_options shade_of(const trade_work *work, const plan *p) {
+/* The options of a plan, which the run also names as those of `bake`. */
+static vsh_shade_options apply_plan(const trade_work *work, const plan *p, trade_run *run) {
     vsh_shade_options shade = work->scene->shade;
+    char more[64] = "";
     shade.early_rays = 0;
-    if (p->ao) {
-        shade.ao_method = p->method;
-    } else {
-        shade.method = p->method;
-    }
+    *(p->ao ? &shade.ao_method : &shade.method) = p->method;
     if (p->max_error > 0.0) {
         shade.max_error = p->max_error;
         shade.rays = 0; /* the error decides */
+        snprintf(more, sizeof more, " --max-error %g", p->max_error);
     } else if (p->ao && p->method == VSH_AO_CONES) {
         shade.ao_cones = p->number;
+        snprintf(more, sizeof more, " with %d cones", p->number);
     } else if (p->number > 0) {
         shade.rays = p->number;
+        snprintf(more, sizeof more, " --rays %d", p->number);
     }
+    run->method = vsh_get_name(p->ao ? VSH_NAMES_AO : VSH_NAMES_SHADOW, p->method);
+    snprintf(run->options, sizeof run->options, "%s %s%s --resolution %d", p->ao ? "--ao-method" : "--method",
+             run->method, more, run->resolution);
     return shade;
 }
 
@@ -659,7 +637,7 @@ static int measure_plan(trade_work *work, trade_subject *subject, const trade_fi
         return CLI_OK;
     }
     trade_run run = {.resolution = field->resolution, .build_s = field->build_s, .valid = field->valid};
-    name_plan(p, &run);
+    const vsh_shade_options shade = apply_plan(work, p, &run);
     /* on the first field, the method's last run had an easier setting */
     if (exceeds_budget(work, subject, run.method, field == work->fields ? 4.0 : 1.0)) {
         return CLI_OK;
@@ -668,7 +646,6 @@ static int measure_plan(trade_work *work, trade_subject *subject, const trade_fi
     vsh_occluders_get_info(field->voxels, &info);
     run.bytes = info.field_bytes + (exact ? vsh_triangles_bytes(work->triangles) : 0);
     run.build_s += exact ? work->triangles_s : 0.0;
-    const vsh_shade_options shade = shade_of(work, p);
     return measure_run(work, subject, field, &shade, &run);
 }
 
@@ -771,7 +748,10 @@ static void free_work(trade_work *work) {
     free(work->positions);
     free(work->normals);
     free(work->texel);
+    free(work->traced);
     free(work->values);
+    free(work->planes);
+    free(work->compared);
     vsh_triangles_free(work->triangles);
     vsh_solids_free(work->solids);
     vsh_assets_free(work->assets);

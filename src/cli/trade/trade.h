@@ -84,11 +84,14 @@ typedef struct trade_work {
     double *positions; /* [points][3] */
     float *normals;    /* [points][3] */
     uint32_t *texel;   /* [points]: place in a plane */
+    float *traced;     /* [points]: values of the rays */
     trade_subject subjects[2];
     size_t subject_count;
-    float *values;    /* [planes of the larger subject][texels]: those of the run being measured */
-    size_t skipped;   /* runs that did not fit into the budget */
-    double measuring; /* when the budget began, seconds */
+    float *values;          /* [planes of the larger subject][texels]: those of the run being measured */
+    float **planes;         /* [lights]: of a receiver that is baked */
+    vsh_compared *compared; /* [planes of the larger subject][receivers] */
+    size_t skipped;         /* runs that did not fit into the budget */
+    double measuring;       /* when the budget began, seconds */
     double truth_s;
     int32_t truth_rays; /* a texel */
 } trade_work;

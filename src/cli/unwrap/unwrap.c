@@ -36,7 +36,7 @@ typedef struct unwrap_settings {
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
-    {'o', "output", "OUT",
+    {CLI_TEXT(unwrap_settings, output), "output", "OUT",
      "mesh file to write, with the UVs that were made: .glb or\n.gltf, the input with one more set; .obj, "
      "its meshes "
      "in\nthe world with that set alone"},
@@ -77,9 +77,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
     unwrap_settings *s = settings;
     vsh_unwrap_options *o = &s->options;
     switch (key) {
-    case 'o':
-        s->output = value;
-        return CLI_OK;
     case KEY_ATLAS:
         return cli_parse_name(name, value, VSH_NAMES_ATLAS, &o->atlas);
     case KEY_SIZE:

@@ -23,7 +23,7 @@ typedef struct view_settings {
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Page"},
-    {'o', "output", "OUT.html", "page to write"},
+    {CLI_TEXT(view_settings, output), "output", "OUT.html", "page to write"},
     {KEY_PLANES, "planes", "FILE",
      "image of a bake of INPUT, best an EXR with every\nchannel; again for each further page of its "
      "lightmap"},
@@ -58,9 +58,6 @@ static int take_planes(view_planes *planes, const char *name, const char *value)
 static int take(void *settings, int key, const char *name, const char *value) {
     view_settings *s = settings;
     switch (key) {
-    case 'o':
-        s->output = value;
-        return CLI_OK;
     case KEY_PLANES:
         return take_planes(&s->planes[0], name, value);
     case KEY_OTHER_PLANES:

@@ -28,7 +28,8 @@ enum { KEY_BAND = 0x2000, KEY_BOX, KEY_LIKE, KEY_INSIDE };
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
-    {'o', "output", "OUT.vdb", "file to write: grids shadow.NAME of each light, and ao"},
+    {CLI_TEXT(volume_settings, bake.output), "output", "OUT.vdb",
+     "file to write: grids shadow.NAME of each light, and ao"},
     {CLI_FLAG(volume_settings, half), "half", NULL, "write 16-bit floats"},
     CLI_STATS_OPTION(volume_settings, bake.stats),
     {CLI_FLAG(volume_settings, bake.dry_run), "dry-run", NULL, "bake nothing: print voxels and memory"},
@@ -81,9 +82,6 @@ static int take_like(volume_settings *s, const char *name, const char *value) {
 static int take(void *settings, int key, const char *name, const char *value) {
     volume_settings *s = settings;
     switch (key) {
-    case 'o':
-        s->bake.output = value;
-        return CLI_OK;
     case KEY_BAND:
         CLI_TRY(cli_parse_positive(name, value, &s->band));
         return cli_parse_number(name, value, 0.0, 100.0, &s->band);

@@ -18,7 +18,7 @@ typedef struct voxelize_settings {
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
-    {'o', "output", "OUT.vdb", "OpenVDB file to write"},
+    {CLI_TEXT(voxelize_settings, bake.output), "output", "OUT.vdb", "OpenVDB file to write"},
     {KEY_NAME, "name", "NAME", "name of the grid in it (surface)"},
     {0, NULL, NULL, "Voxels"},
     CLI_GRID_OPTIONS,
@@ -39,10 +39,6 @@ const cli_command cli_voxelize = {
 
 static int take(void *settings, int key, const char *name, const char *value) {
     voxelize_settings *s = settings;
-    if (key == 'o') {
-        s->bake.output = value;
-        return CLI_OK;
-    }
     if (key == KEY_NAME) {
         s->name = value;
         return value[0] != '\0' ? CLI_OK : cli_usage("%s '': expected a name", name);
