@@ -25,22 +25,6 @@ void cli_keep_message(const char *line) {
     snprintf(last_line, sizeof last_line, "%s", line);
 }
 
-static const struct {
-    vsh_result result;
-    int code;
-} exit_codes[] = {
-    {VSH_OK, CLI_OK},
-    {VSH_ERROR_ARGUMENT, CLI_USAGE},
-    {VSH_ERROR_INPUT, CLI_USAGE},
-    {VSH_ERROR_UNSUPPORTED, CLI_USAGE},
-    {VSH_ERROR_READ, CLI_FILE},
-    {VSH_ERROR_WRITE, CLI_FILE},
-    {VSH_ERROR_LIMIT, CLI_LIMIT},
-    {VSH_ERROR_MEMORY, CLI_LIMIT},
-    {VSH_ERROR_CANCELLED, CLI_INTERRUPTED},
-    {VSH_ERROR_INTERNAL, CLI_DEFECT},
-};
-
 static void __attribute__((format(printf, 1, 0))) say(const char *format, va_list arguments) {
     char line[3 * 4096]; /* two paths and what is said of them */
     vsnprintf(line, sizeof line, format, arguments);
@@ -67,12 +51,24 @@ int cli_usage(const char *format, ...) {
 }
 
 static int code_of(vsh_result result) {
-    for (size_t i = 0; i < sizeof exit_codes / sizeof exit_codes[0]; ++i) {
-        if (exit_codes[i].result == result) {
-            return exit_codes[i].code;
-        }
+    switch (result) {
+    case VSH_OK:
+        return CLI_OK;
+    case VSH_ERROR_ARGUMENT:
+    case VSH_ERROR_INPUT:
+    case VSH_ERROR_UNSUPPORTED:
+        return CLI_USAGE;
+    case VSH_ERROR_READ:
+    case VSH_ERROR_WRITE:
+        return CLI_FILE;
+    case VSH_ERROR_LIMIT:
+    case VSH_ERROR_MEMORY:
+        return CLI_LIMIT;
+    case VSH_ERROR_CANCELLED:
+        return CLI_INTERRUPTED;
+    default:
+        return CLI_DEFECT;
     }
-    return CLI_DEFECT;
 }
 
 int cli_fail(const vsh_error *error) {

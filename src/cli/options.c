@@ -405,7 +405,7 @@ static int parse_operands(const parsing *p, const char **operands) {
         operands[0] = cli_keep_text("%.*s", (int)(parsed_grid - 1 - operands[0]), operands[0]);
         cli_message_input(operands[0]);
     }
-    return operands[0] != NULL || optional ? CLI_OK : cli_out_of_memory("file name");
+    return CLI_OK;
 }
 
 int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
@@ -417,9 +417,6 @@ int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *
     parsed_command = NULL;
     size_t size;
     p.told = open_memstream(&parsed_command, &size);
-    if (p.told == NULL) {
-        return cli_out_of_memory("command line");
-    }
     fputs(command->name, p.told);
     int code = parse_options(&p, take, settings);
     code = code == CLI_OK ? parse_operands(&p, operands) : code;
@@ -473,8 +470,8 @@ int cli_density_take(cli_densities *densities, const char *name, const char *val
     vsh_density_rule *rule = &densities->list[densities->count];
     CLI_TRY(cli_parse_positive(name, sign + 1, &rule->factor));
     rule->pattern = cli_keep_text("%.*s", (int)(sign - value), value);
-    densities->count += rule->pattern != NULL;
-    return rule->pattern != NULL ? CLI_OK : cli_out_of_memory(name);
+    ++densities->count;
+    return CLI_OK;
 }
 
 int cli_provenance_make(const vsh_scene *scene, const char *const *files, size_t file_count,

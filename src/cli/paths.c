@@ -22,14 +22,12 @@ const char *cli_keep_text(const char *format, ...) {
     va_copy(again, values);
     const int length = vsnprintf(NULL, 0, format, values);
     struct kept *kept = malloc(sizeof *kept + (size_t)length + 1);
-    if (kept != NULL) {
-        vsnprintf(kept->text, (size_t)length + 1, format, again);
-        kept->before = last;
-        last = kept;
-    }
+    vsnprintf(kept->text, (size_t)length + 1, format, again);
+    kept->before = last;
+    last = kept;
     va_end(again);
     va_end(values);
-    return kept != NULL ? kept->text : NULL;
+    return kept->text;
 }
 
 const char *cli_file_name(const char *path) {

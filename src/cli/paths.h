@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Text that lives as long as the process; NULL where memory is short. */
+/* Text that lives as long as the process. */
 const char *cli_keep_text(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
 /* The last part of a path: what stands behind its last slash. */
@@ -35,7 +35,7 @@ bool cli_is_model(const char *path);
 /* Whether a path is a folder, or ends as one. */
 bool cli_is_folder(const char *path);
 
-/* A path with `end` in place of the slashes at its end, kept; NULL where memory is short. */
+/* A path with `end` in place of the slashes at its end, kept. */
 const char *cli_end_path(const char *path, const char *end);
 
 /* Outputs that a file names, and not the user, must not leave for elsewhere by links: the file and its folder
@@ -59,7 +59,7 @@ int cli_make_folder_of(const char *path);
 #define CLI_OBJECT_NAME "%s"
 
 /* OUT as a path with CLI_OBJECT_NAME in it: "out/", a folder that is there and "out" (without an ending)
- * become out/%s.exr, out.png becomes out.%s.png. Kept; NULL where memory is short. */
+ * become out/%s.exr, out.png becomes out.%s.png. Kept. */
 const char *cli_object_output(const char *output);
 
 #endif

@@ -10,9 +10,8 @@ setup() {
 by_rays() {
     write_scene box.json box.obj '"sampler": "blue", "frame": 1'
     no_sun "${SMALL[@]}"
-    shade bake box.json "${rest[@]}" --ao 0.5 --method "$1" --ao-method "$1" --rays 8 --quiet \
+    succeed bake box.json "${rest[@]}" --ao 0.5 --method "$1" --ao-method "$1" --rays 8 --quiet \
         --stats stats.json -o "$1.exr"
-    done_well
     grep -q '"rays": [1-9]' stats.json || fail "no rays: $(cat stats.json)"
     shade info "$1.exr"
     [[ $output == *"channel 'shadow.sun': min 0, mean 0.5, max 1"* ]] || fail "half of the box is lit"
@@ -38,19 +37,16 @@ by_rays() {
  "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0], "angle_deg": 5}],
  "method": "exact", "receivers": [{"mesh": "box.obj", "size": 16, "output": "a.exr"}]}
 JSON
-    shade bake mixed.json
-    done_well
+    succeed bake mixed.json
     [[ $stderr == *"shadow exact"*"no voxels"* ]] || fail "are there voxels?"
 }
 
 @test "--error bakes what error is left, for methods that know it" {
-    shade bake box.obj "${SMALL[@]}" --ao 0.5 --method adaptive --ao-method cones --error --quiet -o out.exr
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --ao 0.5 --method adaptive --ao-method cones --error --quiet -o out.exr
     shade info out.exr
     [[ $output == *"channel 'error.sun'"* ]] || fail "no error.sun"
     [[ $output != *"channel 'error.ao'"* ]] || fail "cones know no error"
-    shade bake box.obj "${SMALL[@]}" --ao 0.5 --method adaptive --ao-method adaptive --error --irradiance --quiet -o all.exr
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --ao 0.5 --method adaptive --ao-method adaptive --error --irradiance --quiet -o all.exr
     shade info all.exr
     for channel in shadow.sun ao error.sun error.ao irradiance.R A; do
         [[ $output == *"channel '$channel'"* ]] || fail "no $channel"
@@ -59,20 +55,16 @@ JSON
 }
 
 @test "who asks for an error gets a method that keeps it" {
-    shade bake box.obj "${SMALL[@]}" --ao 0.5 --max-error 0.05 --quiet -o asked.exr
-    done_well
-    shade bake box.obj "${SMALL[@]}" --ao 0.5 --max-error 0.05 --method adaptive --ao-method adaptive --quiet -o named.exr
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --ao 0.5 --max-error 0.05 --quiet -o asked.exr
+    succeed bake box.obj "${SMALL[@]}" --ao 0.5 --max-error 0.05 --method adaptive --ao-method adaptive --quiet -o named.exr
     same_values asked.exr named.exr
 }
 
 @test "the statistics say what adaptive methods know of themselves" {
-    shade bake box.obj "${SMALL[@]}" --method adaptive --quiet --stats stats.json -o out.exr
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --method adaptive --quiet --stats stats.json -o out.exr
     for key in rays refined certified_share estimated_rmse; do
         grep -q "\"$key\": [0-9]" stats.json || fail "no $key: $(cat stats.json)"
     done
-    shade bake box.obj "${SMALL[@]}" --method cone --quiet --stats stats.json -o out.exr
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --method cone --quiet --stats stats.json -o out.exr
     grep -q '"estimated_rmse": null' stats.json
 }

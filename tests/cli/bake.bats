@@ -8,19 +8,16 @@ setup() {
 
 @test "the same bits for 1, 2 and 5 threads" {
     for threads in 1 2 5; do
-        shade bake "$ASSETS/cloister.glb" --sun -0.5,0.8,-0.6 --sun-angle 5 --ao 0.6 --irradiance \
+        succeed bake "$ASSETS/cloister.glb" --sun -0.5,0.8,-0.6 --sun-angle 5 --ao 0.6 --irradiance \
             --size 128 --resolution 96 --threads "$threads" --quiet -o "$threads.exr"
-        done_well
     done
     cmp 1.exr 2.exr
     cmp 1.exr 5.exr
 }
 
 @test "the channels are named by light, ao, irradiance and coverage" {
-    shade bake box.obj "${SMALL[@]}" --ao 1 --irradiance --quiet -o out.exr
-    done_well
-    shade info out.exr
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --ao 1 --irradiance --quiet -o out.exr
+    succeed info out.exr
     for channel in shadow.sun ao irradiance.R irradiance.G irradiance.B A; do
         [[ $output == *"channel '$channel'"* ]] || fail "$channel is missing"
     done
@@ -29,19 +26,16 @@ setup() {
 }
 
 @test "what is not asked for is not in the file" {
-    shade bake box.obj --ao 1 --size 32 --resolution 24 --quiet -o out.exr
-    done_well
+    succeed bake box.obj --ao 1 --size 32 --resolution 24 --quiet -o out.exr
     shade info out.exr
     [[ $output == *"5 channels"* ]] || fail "more than ao and A, and R, G and B made of it"
-    shade bake box.obj --ao 1 --size 32 --resolution 24 --pack channels --quiet -o out.exr
-    done_well
+    succeed bake box.obj --ao 1 --size 32 --resolution 24 --pack channels --quiet -o out.exr
     shade info out.exr
     [[ $output == *"2 channels"* ]] || fail "more than ao and A"
 }
 
 @test "a lone convex body: lit where it faces the sun, dark where it does not, open all over" {
-    shade bake box.obj --sun 0,1,0 --sun-angle 5 --ao 0.5 --size 64 --resolution 48 --quiet -o out.exr
-    done_well
+    succeed bake box.obj --sun 0,1,0 --sun-angle 5 --ao 0.5 --size 64 --resolution 48 --quiet -o out.exr
     shade info out.exr
     [[ $output == *"channel 'shadow.sun': min 0, mean "*", max 1"* ]] || fail "no light or no dark"
     [[ $output == *"channel 'ao': min 1, mean 1, max 1"* ]] || fail "not open all over"
@@ -50,9 +44,8 @@ setup() {
 
 # of_preview CHANNEL OPTION METHOD: a bake of the floor under the seeds, for its penumbrae; its mean is new to $means.
 of_preview() {
-    shade bake "$ASSETS/seeds.json" --size 64 --voxel-size 0.1 --method hard --ao-method cones "$2" "$3" --quiet \
+    succeed bake "$ASSETS/seeds.json" --size 64 --voxel-size 0.1 --method hard --ao-method cones "$2" "$3" --quiet \
         --pack channels -o preview.exr
-    done_well
     shade info preview.exr
     [[ $output == *"vdbshade_${1%.sun}: $3"* ]] || fail "$3 is not named"
     [[ $output =~ channel\ \'$1\':\ min\ 0[0-9.]*,\ mean\ (0\.[0-9]+),\ max\ 1 ]] || fail "$3: no light or no dark"
@@ -71,28 +64,23 @@ of_preview() {
 }
 
 @test "a packed PNG" {
-    shade bake box.obj "${SMALL[@]}" --ao 1 --pack R=shadow.sun,G=ao,B=0,A=A --bits 8 --quiet -o out.png
-    done_well
-    shade info out.png
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --ao 1 --pack R=shadow.sun,G=ao,B=0,A=A --bits 8 --quiet -o out.png
+    succeed info out.png
     [[ $output == *"32 × 32, 4 channels"* ]] || fail "not four channels"
     [[ $output == *"channel 'B': min 0, mean 0, max 0"* ]] || fail "B is not 0"
 }
 
 @test "a size of its own in each direction" {
-    shade bake box.obj --ao 1 --size 64x16 --resolution 24 --quiet -o out.exr
-    done_well
+    succeed bake box.obj --ao 1 --size 64x16 --resolution 24 --quiet -o out.exr
     shade info out.exr
     [[ $output == *"64 × 16"* ]] || fail "wrong size"
 }
 
 @test "another caster darkens" {
     sed 's/^v \([01]\) \([01]\) \([01]\)/v \1 2.\2 \3/' box.obj >roof.obj
-    shade bake box.obj --sun 0,1,0 --sun-angle 5 --size 32 --resolution 24 --quiet -o alone.exr
-    done_well
-    shade bake box.obj --sun 0,1,0 --sun-angle 5 --size 32 --resolution 24 --caster roof.obj --quiet \
+    succeed bake box.obj --sun 0,1,0 --sun-angle 5 --size 32 --resolution 24 --quiet -o alone.exr
+    succeed bake box.obj --sun 0,1,0 --sun-angle 5 --size 32 --resolution 24 --caster roof.obj --quiet \
         -o under.exr
-    done_well
     shade info alone.exr
     [[ $output == *"'shadow.sun': min 0, mean 0."*", max 1"* ]] || fail "nothing is lit without the roof"
     local alone
@@ -104,8 +92,7 @@ of_preview() {
 }
 
 @test "the statistics have every key" {
-    shade bake box.obj "${SMALL[@]}" --method cone --ao 1 --ao-method cones --quiet --stats stats.json --threads 2 -o out.exr
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --method cone --ao 1 --ao-method cones --quiet --stats stats.json --threads 2 -o out.exr
     for key in version stages_s load voxelize field bake write texels invalid_texels samples marches \
         certified unfinished skipped rays peak_bytes threads voxel_size levels field_bytes field_bytes_per_voxel active_voxels; do
         grep -q "\"$key\":" stats.json || fail "$key is missing"
@@ -120,8 +107,7 @@ of_preview() {
 }
 
 @test "the summary names the output, the texels and the stages" {
-    shade bake box.obj "${SMALL[@]}" -o out.exr
-    done_well
+    succeed bake box.obj "${SMALL[@]}" -o out.exr
     [ -z "$output" ] || fail "something on standard output"
     [[ $stderr == *"out.exr: 32 × 32, "*" texels"* ]] || fail "no texels"
     [[ $stderr == *load*voxelize*field*bake*write* ]] || fail "no stages"
@@ -129,8 +115,7 @@ of_preview() {
 }
 
 @test "progress on request, by stage" {
-    shade bake box.obj "${SMALL[@]}" --ao 1 --progress -o out.exr
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --ao 1 --progress -o out.exr
     for stage in load charts voxelize field bake ao padding write; do
         [[ $stderr == *"vdbshade: $stage "*%* ]] || fail "no $stage"
     done
@@ -138,8 +123,7 @@ of_preview() {
 
 @test "an open mesh, overlapping charts and UVs outside the square are reported with the mesh's name" {
     sed -e '$d' -e 's/^vt 0.35 0.02/vt 0.05 0.02/' -e 's/^vt 0.97 0.97/vt 1.2 0.97/' box.obj >bad.obj
-    shade bake bad.obj "${SMALL[@]}" --size 128 --verbose -o out.exr
-    done_well
+    succeed bake bad.obj "${SMALL[@]}" --size 128 --verbose -o out.exr
     [[ $stderr == *"note: "*"box"*"open edges"* ]] || fail "no open edges"
     [[ $stderr == *"warning: "*"box"*"lie over other charts"* ]] || fail "no overlap"
     [[ $stderr == *"warning: "*"box"*"leave the UV square"* ]] || fail "no outside"
@@ -154,8 +138,7 @@ of_preview() {
  "receivers": [{"mesh": "box.obj", "size": 16, "output": "a.exr"},
                {"mesh": "box.obj", "size": 16, "output": "b.exr"}]}
 JSON
-    shade bake two.json --size 24 --method smooth --quiet
-    done_well
+    succeed bake two.json --size 24 --method smooth --quiet
     cmp a.exr b.exr
     shade info a.exr
     [[ $output == *"24 × 24, 6 channels"* ]] || fail "--size did not override"
@@ -163,16 +146,14 @@ JSON
 }
 
 @test "a level set from a file casts like the mesh it was made of" {
-    shade voxelize box.obj -o box.vdb --voxel-size 0.04 --quiet
-    done_well
+    succeed voxelize box.obj -o box.vdb --voxel-size 0.04 --quiet
     for caster in '"mesh": "box.obj"' '"vdb": "box.vdb"'; do
         name=${caster:1:3}
         cat >"$name.json" <<JSON
 {"casters": [{$caster}], "voxel_size": 0.04, "ao": {"distance": 1},
  "receivers": [{"mesh": "box.obj", "size": 32, "output": "$name.exr"}]}
 JSON
-        shade bake "$name.json" --quiet
-        done_well
+        succeed bake "$name.json" --quiet
     done
     same_values mes.exr vdb.exr || fail "they differ"
 }
@@ -181,8 +162,7 @@ JSON
 receiver() {
     sed "s/0\.02,/0.06,/; s|\"mesh\": \"seeds_floor.obj\", \"size\": 512, \"output\": \"seeds.exr\"|$2, \"size\": 48, \"output\": \"$1.exr\"|" \
         "$ASSETS/seeds.json" >"$1.json"
-    shade bake "$1.json" --quiet
-    done_well
+    succeed bake "$1.json" --quiet
 }
 
 @test "a plane receives as the mesh of it does, however it is stood" {
@@ -202,24 +182,20 @@ receiver() {
     shade voxelize box.obj -o box.vdb --voxel-size 0.1 --quiet
     shade bake box.vdb --sun 1,2,1 -o floor.exr
     refused 2 box.vdb --floor volume
-    shade bake box.vdb --sun 1,2,1 --sun-angle 5 --floor 6,6,0,-1,0 --size 32 --quiet -o floor.exr
-    done_well
+    succeed bake box.vdb --sun 1,2,1 --sun-angle 5 --floor 6,6,0,-1,0 --size 32 --quiet -o floor.exr
     local scene='"casters": [{"vdb": "box.vdb"}], "voxel_size": 0.1, "lights": [{"name": "sun", "type": "directional", "direction": [1, 2, 1], "angle_deg": 5}]'
     echo "{$scene}" >bare.json
     echo "{$scene, \"receivers\": [{\"plane\": {\"size\": [6, 6], \"center\": [0, -1, 0]}, \"size\": 32, \"output\": \"scene.exr\"}]}" >scene.json
     shade bake bare.json -o bare.exr
     refused 2 bare.json --floor
-    shade bake bare.json --floor 6,6,0,-1,0 --size 32 --quiet -o bare.exr
-    done_well
-    shade bake scene.json --quiet
-    done_well
+    succeed bake bare.json --floor 6,6,0,-1,0 --size 32 --quiet -o bare.exr
+    succeed bake scene.json --quiet
     same_values bare.exr scene.exr || fail "the option and the key differ"
     shade bake scene.json --floor 6,6 -o other.exr
     refused 2 --floor plane
     shade trade box.vdb --sun 1,2,1 -o trade.html
     refused 2 box.vdb --floor
-    shade trade box.vdb --sun 1,2,1 --floor 6,6,0,-1,0 --size 16 --resolutions 16 --truth-rays 16 --budget 1 --quiet -o trade.html
-    done_well
+    succeed trade box.vdb --sun 1,2,1 --floor 6,6,0,-1,0 --size 16 --resolutions 16 --truth-rays 16 --budget 1 --quiet -o trade.html
     [ -s trade.html ] || fail "no page"
 }
 
@@ -237,8 +213,7 @@ receiver() {
 
 @test "a dry run says what a bake will take, and writes nothing" {
     old_output out.exr
-    shade bake box.obj "${SMALL[@]}" --ao 0.5 -o out.exr --dry-run
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --ao 0.5 -o out.exr --dry-run
     for word in texels voxels memory; do
         [[ $output == *"$word"* ]] || fail "no $word"
     done
@@ -248,37 +223,31 @@ receiver() {
 
 @test "a dry run needs no folder that a bake would make" {
     for out in new/ new/lit.glb; do
-        shade bake box.obj "${SMALL[@]}" --per-object -o "$out" --dry-run
-        done_well
+        succeed bake box.obj "${SMALL[@]}" --per-object -o "$out" --dry-run
     done
     printf '{"casters": [{"mesh": "box.obj"}], "ao": {"distance": 1}, "receivers": [{"mesh": "box.obj", "size": 32, "output": "lit.glb"}]}' >scene.json
-    shade bake scene.json --output-folder new --dry-run
-    done_well
+    succeed bake scene.json --output-folder new --dry-run
     [ ! -e new ] || fail "it was made"
     shade bake box.obj "${SMALL[@]}" -o new/out.exr --dry-run
     refused 3 "no folder 'new'"
 }
 
 @test "its texels are those of the bake" {
-    shade bake box.obj "${SMALL[@]}" --size 200x90 -o out.exr --dry-run
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --size 200x90 -o out.exr --dry-run
     local texels
     texels=$(grep -o '^texels *[0-9]*' <<<"$output" | grep -o '[0-9]*$')
-    shade bake box.obj "${SMALL[@]}" --size 200x90 -o out.exr --quiet --stats stats.json
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --size 200x90 -o out.exr --quiet --stats stats.json
     grep -q "\"texels\": $texels," stats.json || fail "$texels, and $(cat stats.json)"
 }
 
 @test "its voxels are near those of the bake, by resolution and by size" {
     for voxels in '--resolution 200' '--voxel-size 0.004'; do
         # shellcheck disable=SC2086
-        shade bake box.obj --ao 0.5 --size 32 $voxels -o out.exr --dry-run
-        done_well
+        succeed bake box.obj --ao 0.5 --size 32 $voxels -o out.exr --dry-run
         local about
         about=$(grep '^voxels' <<<"$output" | awk '{ print $3 }')
         # shellcheck disable=SC2086
-        shade bake box.obj --ao 0.5 --size 32 $voxels -o out.exr --quiet --stats stats.json
-        done_well
+        succeed bake box.obj --ao 0.5 --size 32 $voxels -o out.exr --quiet --stats stats.json
         awk -v a="$about" '/active_voxels/ { exit !(a > 0.8 * ($2 + 0) && a < 1.25 * ($2 + 0)) }' stats.json ||
             fail "about $about, and $(grep active stats.json)"
     done

@@ -29,12 +29,10 @@ write_hill() {
 @test "a direct terrain is marched by hard and classic, and makes no voxel and the same bits for any number of threads" {
     for method in hard classic; do
         scene "{$LAND, \"direct\": true}" "$OVER" "\"ao\": {\"distance\": 1}, \"method\": \"$method\""
-        shade bake scene.json --threads 1 --stats stats.json
-        done_well
+        succeed bake scene.json --threads 1 --stats stats.json
         grep -q '"active_voxels": 0' stats.json
         one=$(sha256sum <out.exr)
-        shade bake scene.json --threads 4
-        done_well
+        succeed bake scene.json --threads 4
         [ "$(sha256sum <out.exr)" = "$one" ]
         grep -A1 '"shadow": {' stats.json | grep -q "\"method\": \"$method\""
         grep -A1 '"ao": {' stats.json | grep -q '"method": "exact"'
@@ -46,21 +44,17 @@ write_hill() {
     hill='"heightfield": "hill.pgm", "size": [10, 10], "height": 2'
     over='"receivers": [{"heightfield": "hill.pgm", "extent": [10, 10], "height": 2, "size": 256, "output": "out.exr"}]'
     scene "{$hill, \"direct\": true}" "$over" '"ao": {"distance": 1}'
-    shade bake scene.json
-    done_well
+    succeed bake scene.json
     scene "{$hill}" "$over" '"ao": {"distance": 1}'
-    shade bake scene.json -o traced.exr
-    done_well
-    shade compare out.exr traced.exr --max-difference 0.001
-    done_well
+    succeed bake scene.json -o traced.exr
+    succeed compare out.exr traced.exr --max-difference 0.001
 }
 
 @test "a direct terrain and spheres are shaded by query as by bake" {
     scene "{$LAND, \"direct\": true}, {\"spheres\": [[0, 2, 0, 0.5]]}" "$OVER" '"method": "hard"'
     # above all, beneath the terrain, in the sphere's shadow, and as far away on its other side
     printf 'x,y,z\n0,5,0\n2,-1,0\n1.05,1.4,-0.45\n-1.05,2.6,0.45\n' >points.csv
-    shade query scene.json --points points.csv -o answers.csv --quiet
-    done_well
+    succeed query scene.json --points points.csv -o answers.csv --quiet
     [ "$(cut -d, -f4 answers.csv | tr '\n' ' ')" = "shadow.sun 1 0 0 1 " ] || fail "$(cat answers.csv)"
 }
 
@@ -69,10 +63,8 @@ write_hill() {
     for method in hard classic; do
         for kind in '{"spheres": [[0, 1, 0, 0.4]]}' "{$LAND, \"direct\": true, \"transform\": {\"translate\": [-7.5, -0.5, 0]}}"; do
             scene "$kind" "$FLOOR" "\"method\": \"$method\""
-            shade bake scene.json -o alone.exr --quiet
-            done_well
-            shade bake scene.json --ao 2 -o both.exr --quiet
-            done_well
+            succeed bake scene.json -o alone.exr --quiet
+            succeed bake scene.json --ao 2 -o both.exr --quiet
             # texels on the edge of a shadow may change, as rays of AO have a start offset of their own
             shade compare alone.exr both.exr
             [[ $output =~ shadow.sun:[^$'\n']*' p99 '0(,|[.]00) ]] || fail "$kind, $method: $output"
@@ -84,45 +76,35 @@ write_hill() {
 
 @test "an image of heights, a receiver alone and a caster of either name bake one terrain" {
     scene "{$LAND}" "$OVER" '"ao": {"distance": 1}'
-    shade bake scene.json -o one.exr
-    done_well
+    succeed bake scene.json -o one.exr
     printf '{%s, %s, "ao": {"distance": 1}}' "$SUN" "$OVER" >scene.json
-    shade bake scene.json
-    done_well
+    succeed bake scene.json
     same_values one.exr out.exr || fail "a receiver alone"
     scene "{${LAND/size/extent}}" "$OVER" '"ao": {"distance": 1}'
-    shade bake scene.json
-    done_well
+    succeed bake scene.json
     same_values one.exr out.exr || fail "extent"
     for world in 10 10,10; do
-        shade bake terrain.png --height 2 --size-world $world --sun=-0.7,0.4,0.3 --sun-angle 4 --ao 1 --size 96 -o out.exr
-        done_well
+        succeed bake terrain.png --height 2 --size-world $world --sun=-0.7,0.4,0.3 --sun-angle 4 --ao 1 --size 96 -o out.exr
         same_values one.exr out.exr || fail "--size-world $world"
     done
 }
 
 @test "the shorter side of a terrain follows from its pixels" {
     printf 'P2 5 3 9 0 1 2 3 4 5 6 7 8 9 8 7 6 5 4\n' >long.pgm
-    shade bake long.pgm --height 2 --size-world 8 --ao 1 --size 32 -o one.exr
-    done_well
-    shade bake long.pgm --height 2 --size-world 8,4 --ao 1 --size 32 -o out.exr
-    done_well
+    succeed bake long.pgm --height 2 --size-world 8 --ao 1 --size 32 -o one.exr
+    succeed bake long.pgm --height 2 --size-world 8,4 --ao 1 --size 32 -o out.exr
     same_values one.exr out.exr
 }
 
 @test "what a terrain's image lacks is said, and what to do" {
-    shade bake terrain.png --ao 1 -o out.exr
-    refused 2 'terrain.png' '--height H, the height of white, and --size-world W'
-    shade bake terrain.png --height 2 --ao 1 -o out.exr
-    refused 2 'terrain.png' 'give --size-world W, the length of its longer side'
-    shade bake terrain.png --size-world 10 --ao 1 -o out.exr
-    refused 2 'terrain.png' 'give --height H, the height of white'
-    shade bake terrain.png --height 0 --size-world 10 --ao 1 -o out.exr
-    refused 2 "--height '0'"
-    shade bake terrain.png --height 2 --size-world 10,0 --ao 1 -o out.exr
-    refused 2 "--size-world '0'"
-    shade bake seeds_floor.obj --height 2 --ao 1 -o out.exr
-    refused 2 '--height' 'seeds_floor.obj is no image of heights'
+    refuse bake <<'LIST'
+2 'terrain.png' '--height H, the height of white, and --size-world W' | terrain.png --ao 1 -o out.exr
+2 'terrain.png' 'give --size-world W, the length of its longer side' | terrain.png --height 2 --ao 1 -o out.exr
+2 'terrain.png' 'give --height H, the height of white' | terrain.png --size-world 10 --ao 1 -o out.exr
+2 "--height '0'" | terrain.png --height 0 --size-world 10 --ao 1 -o out.exr
+2 "--size-world '0'" | terrain.png --height 2 --size-world 10,0 --ao 1 -o out.exr
+2 '--height' 'seeds_floor.obj is no image of heights' | seeds_floor.obj --height 2 --ao 1 -o out.exr
+LIST
     printf '{%s, "receivers": []}' "$SUN" >scene.json
     shade bake scene.json
     refused 2 'key "casters" is missing'
@@ -133,17 +115,14 @@ write_hill() {
 
 @test "voxelize takes a terrain and spheres" {
     scene "{$LAND}, {\"spheres\": [[0, 3, 0, 0.5]], \"voxelised\": true}" "$OVER" '"resolution": 48'
-    shade voxelize scene.json -o out.vdb --quiet
-    done_well
+    succeed voxelize scene.json -o out.vdb --quiet
     scene '{"spheres": [[0, 3, 0, 0.5]]}' "$FLOOR" '"method": "hard"'
-    shade voxelize scene.json -o out.vdb --quiet
-    done_well
+    succeed voxelize scene.json -o out.vdb --quiet
 }
 
 @test "info tells of terrains and spheres" {
     scene "{$LAND, \"direct\": true}, {\"spheres\": \"spheres.csv\"}, {\"spheres\": [[0, 0, 0, 1]], \"voxelised\": true}" "$OVER"
-    shade info scene.json
-    done_well
+    succeed info scene.json
     [[ $output == *"heightfield"*"terrain.png, 10 × 10, height 2, direct"* ]]
     [[ $output == *"spheres"*"spheres.csv"* ]]
     [[ $output == *"spheres, 1, voxelised"* ]]

@@ -8,8 +8,7 @@ setup() {
 
 
 @test "info tells a file's unit, and the size in metres" {
-    shade info "$models/scene.fbx"
-    done_well
+    succeed info "$models/scene.fbx"
     [[ $output == *"unit: 0.01 m; bounds are in metres"* ]] || fail "no unit"
     [[ $output == *"bounds: 0 2 -3 to 2 4 -1"* ]] || fail "not in metres"
     shade info "$models/scene.obj"
@@ -23,23 +22,19 @@ setup() {
     [[ $output == *"bounds: 0 0.0508 -0.0762 to 0.0508 0.1016 -0.0254"* ]] || fail "OBJ in inches"
     shade info --unit 10 "$models/scene.obj"
     [[ $output == *"bounds: 0 20 -30 to 20 40 -10"* ]] || fail "OBJ by ten"
-    shade voxelize "$models/scene.obj" -o a.vdb --unit cm --resolution 32
-    done_well
+    succeed voxelize "$models/scene.obj" -o a.vdb --unit cm --resolution 32
     shade info a.vdb
     [[ $output == *"voxel size: 0.0014667"* ]] || fail "voxelize: $output"
     refuses 2 "--unit 'yard'" -- info --unit yard "$models/scene.obj"
 }
 
 @test "blended materials cast nothing unless asked, and one line says so" {
-    shade voxelize "$models/scene.glb" -o without.vdb --resolution 32
-    done_well
+    succeed voxelize "$models/scene.glb" -o without.vdb --resolution 32
     [[ $stderr == *"1 of 3 meshes have blended materials"*"--cast-blended"* ]] || fail "not told: $stderr"
-    shade voxelize "$models/scene.glb" -o with.vdb --resolution 32 --cast-blended
-    done_well
+    succeed voxelize "$models/scene.glb" -o with.vdb --resolution 32 --cast-blended
     [[ $stderr != *blended* ]] || fail "told all the same: $stderr"
     printf '{"casters": [{"mesh": "%s"}], "resolution": 32, "cast_blended": true, "unit": "cm"}' "$models/scene.glb" >a.json
-    shade voxelize a.json -o scene.vdb
-    done_well
+    succeed voxelize a.json -o scene.vdb
     [[ $stderr != *blended* ]] || fail "the scene: $stderr"
     "$VDBSHADE" info with.vdb | grep "active voxels" >with.txt
     "$VDBSHADE" info without.vdb | grep "active voxels" >without.txt
@@ -62,8 +57,7 @@ setup() {
 @test "a file with blanks in its name is read in every format" {
     for format in glb fbx dae obj ply stl; do
         cp "$models/scene.$format" "my scene.$format"
-        shade info "my scene.$format"
-        done_well
+        succeed info "my scene.$format"
         [[ $output == *", 16 triangles;"* ]] || fail "$format: not its triangles"
     done
 }

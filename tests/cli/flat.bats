@@ -21,8 +21,7 @@ channel() {
 }
 
 @test "the channels of a map, and how much of it is lit" {
-    shade flat wall.json -o out.exr --quiet
-    done_well
+    succeed flat wall.json -o out.exr --quiet
     # the wall covers 1.9 to 2.1 … of 16: x from -2 to 0 and 0.2 high, so 3 or 4 rows of 64, half of them
     read -r _ mean _ <<<"$(channel out.exr A)"
     awk -v m="$mean" 'BEGIN { exit !(m > 1 - 0.032 && m < 1 - 0.022) }' || fail "coverage $mean"
@@ -47,30 +46,25 @@ channel() {
 JSON
     local method
     for method in exact classic hard; do
-        shade flat text.json -o one.exr --threads 1 --method "$method" --quiet
-        done_well
-        shade flat text.json -o seven.exr --threads 7 --method "$method" --quiet
-        done_well
+        succeed flat text.json -o one.exr --threads 1 --method "$method" --quiet
+        succeed flat text.json -o seven.exr --threads 7 --method "$method" --quiet
         cmp one.exr seven.exr
     done
 }
 
 @test "options go over the scene's" {
-    shade flat wall.json -o small.png --size 32x16 --bits 8 --pack R=shadow.sun --stats stats.json
-    done_well
+    succeed flat wall.json -o small.png --size 32x16 --bits 8 --pack R=shadow.sun --stats stats.json
     [[ $stderr == *"small.png: 32 × 16, 2 lights"* ]] || fail "no summary"
     shade info small.png
     [[ $output == *"32 × 16"* ]] || fail "another size"
     grep -q '"texels": 512' stats.json
     sed -i 's/"padding": 0/"padding": 0, "output": "own.exr"/' wall.json
-    shade flat wall.json --quiet
-    done_well
+    succeed flat wall.json --quiet
     [ -s own.exr ]
 }
 
 @test "info describes a flat scene" {
-    shade info wall.json
-    done_well
+    succeed info wall.json
     [[ $output == *"flat scene: -2 -2 to 2 2, 64 × 64, method exact"*"caster 0: box"*"light 'lamp': disc"* ]] ||
         fail "not described"
 }
@@ -104,14 +98,16 @@ spoilt() {
 }
 
 @test "bad options" {
-    refuses 2 --method hard -- flat wall.json -o out.exr --method cone
-    refuses 2 --size -- flat wall.json -o out.exr --size 70000
-    refuses 2 --supersample -- flat wall.json -o out.exr --supersample 0
-    refuses 2 out.txt -- flat wall.json -o out.txt
-    refuses 3 none/out.exr -- flat wall.json -o none/out.exr
-    refuses 2 wall.json -- flat wall.json -o wall.json
-    refuses 4 out.exr -- flat wall.json -o out.exr --size 8192 --memory-limit 64MiB
-    refuses 4 -- flat wall.json -o out.exr --method classic --size 2048x64 --memory-limit 2MiB
+    refuse flat wall.json -o <<'LIST'
+2 --method hard | out.exr --method cone
+2 --size | out.exr --size 70000
+2 --supersample | out.exr --supersample 0
+2 out.txt | out.txt
+3 none/out.exr | none/out.exr
+2 wall.json | wall.json
+4 out.exr | out.exr --size 8192 --memory-limit 64MiB
+4 | out.exr --method classic --size 2048x64 --memory-limit 2MiB
+LIST
     untouched out.exr
 }
 

@@ -38,8 +38,7 @@ endings_after() {
 }
 
 @test "the help names the first ending of every row" {
-    shade bake --help
-    done_well
+    succeed bake --help
     local ending
     for ending in $(endings_after '| ending | bits' | while read -r first _; do echo "$first"; done); do
         [[ $output == *".$ending"* ]] || fail "$ending"
@@ -50,8 +49,7 @@ endings_after() {
 @test "light in a PNG is sRGB, and light over 1 is told once with its share" {
     write_box box.obj
     bake=(bake box.obj --sun 0,3,4 --irradiance --size 32 --resolution 24 --bits 8)
-    shade "${bake[@]}" -o light.png --quiet
-    done_well
+    succeed "${bake[@]}" -o light.png --quiet
     "$VDBSHADE" info light.png | grep -qx 'vdbshade_color_space: sRGB' || fail "it does not say sRGB"
     shade "${bake[@]}" --pack R=shadow.sun,A=A -o data.png --quiet
     "$VDBSHADE" info data.png | grep -qx 'vdbshade_color_space: linear' || fail "it does not say linear"
@@ -63,8 +61,7 @@ endings_after() {
     refuses 2 srgb -- bake srgb.json "${rest[@]}" -o x.tif --bits 32
     shade "${bake[@]}" -o light.png
     [[ $stderr != *"brighter than 1"* ]] || fail "nothing is"
-    shade "${bake[@]}" --ambient 0.5,0.5,2.25 --ao 1 -o light.png
-    done_well
+    succeed "${bake[@]}" --ambient 0.5,0.5,2.25 --ao 1 -o light.png
     [ "$(grep -c 'texels are brighter than 1, up to 3.05, and cut to 1' <<<"$stderr")" -eq 1 ] || fail "not told"
     shade "${bake[@]}" --ambient 0.5,0.5,2.25 --ao 1 --bits 32 -o light.exr
     [[ $stderr != *"brighter than 1"* ]] || fail "EXR holds it"

@@ -144,6 +144,25 @@ done_well() {
     [ "$status" -eq 0 ] || fail "expected success"
 }
 
+# succeed WORD …: runs the program, which must end with 0.
+succeed() {
+    shade "$@"
+    done_well
+}
+
+# refuse WORD …: reads lines "CODE WORD … | WORD …". The program, run with the words of each line behind the given ones, must
+# end as refused() says.
+refuse() {
+    local -a cases said more
+    local case
+    mapfile -t cases
+    for case in "${cases[@]}"; do
+        eval "said=(${case%%|*}) more=(${case#*|})"
+        shade "$@" "${more[@]}"
+        refused "${said[@]}" || fail "$case"
+    done
+}
+
 # unless_sanitized REASON: skips the test if the program is built with a sanitizer.
 unless_sanitized() {
     case ${CFLAGS:-} in *-fsanitize*) skip "$1" ;; esac

@@ -36,10 +36,8 @@ SPOT='{"type": "spot", "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.5}}'
 
 @test "a file's sun casts as the same sun of the command line" {
     write_lit lit.gltf "$(down 0 sun 0,7,0)" "$SUN"
-    shade bake lit.gltf --lights lit.gltf --sun-angle 9 --receive floor --size 48 -o file.exr
-    done_well
-    shade bake lit.gltf --sun 0,1,0 --sun-angle 9 --receive floor --size 48 -o line.exr
-    done_well
+    succeed bake lit.gltf --lights lit.gltf --sun-angle 9 --receive floor --size 48 -o file.exr
+    succeed bake lit.gltf --sun 0,1,0 --sun-angle 9 --receive floor --size 48 -o line.exr
     same_values file.exr line.exr || fail "not the same values"
     shade info file.exr
     [[ $output == *"vdbshade_light_sun: directional towards 0 1 0, 9 degrees across, color 3 3 3"* ]] || fail "$output"
@@ -47,8 +45,7 @@ SPOT='{"type": "spot", "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.5}}'
 
 @test "suns, points and spots are channels by their nodes' names, and in what the output tells" {
     write_lit lit.gltf "$(down 0 'Key light' 0,7,0), $(down 1 lamp 1,3,0), $(down 2 'Key light' 0,4,0)" "$SUN,$LAMP,$SPOT"
-    shade bake lit.gltf --lights lit.gltf --light-radius 0.25 --receive floor --size 16 -o out.exr
-    done_well
+    succeed bake lit.gltf --lights lit.gltf --light-radius 0.25 --receive floor --size 16 -o out.exr
     shade info out.exr
     for line in "channel 'shadow.Key_light'" "channel 'shadow.lamp'" "channel 'shadow.Key_light_2'" \
         'vdbshade_light_lamp: sphere at 1 3 0, radius 0.25, color 8 4 0, inverse square' \
@@ -59,8 +56,7 @@ SPOT='{"type": "spot", "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.5}}'
 
 @test "info tells the lights of a file" {
     write_lit lit.gltf "$(down 0 'Key light' 0,7,0), $(down 1 lamp 1,3,0)" "$SUN,$LAMP"
-    shade info lit.gltf
-    done_well
+    succeed info lit.gltf
     for line in "light 'Key_light': directional towards 0 1 0" "light 'lamp': sphere at 1 3 0, radius 0, color 8 4 0"; do
         [[ $output == *"$line"* ]] || fail "no '$line'"
     done
@@ -77,8 +73,7 @@ SPOT='{"type": "spot", "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.5}}'
  "lights": [{"name": "sky", "type": "directional", "direction": [0, 1, 0], "angle_deg": 3}]}
 JSON
     write_lit other.gltf "$(down 0 lamp 0,3,0)" "$LAMP"
-    shade bake scene.json --lights other.gltf
-    done_well
+    succeed bake scene.json --lights other.gltf
     shade info out.exr
     [[ $output == *"shadow.lamp"* && $output == *"shadow.sky"* && $output == *"other.gltf"* ]] || fail "$output"
     sed -i 's/"name": "sky"/"name": "lamp"/' scene.json
@@ -88,12 +83,11 @@ JSON
 
 @test "a file without lights, one that is not there and sizes without lights are refused" {
     write_box box.obj
-    shade bake box.obj --lights box.obj -o out.exr
-    refused 2 "--lights 'box.obj': has no lights"
-    shade bake box.obj --lights none.glb -o out.exr
-    refused 3 none.glb 'No such file'
-    shade bake box.obj --sun 0,1,0 --light-radius 1 -o out.exr
-    refused 2 '--light-radius: there is no --lights'
+    refuse bake box.obj <<'LIST'
+2 "--lights 'box.obj': has no lights" | --lights box.obj -o out.exr
+3 none.glb 'No such file' | --lights none.glb -o out.exr
+2 '--light-radius: there is no --lights' | --sun 0,1,0 --light-radius 1 -o out.exr
+LIST
     write_lit lit.gltf "$(down 0 lamp 0,3,0)" '{"type": "point", "intensity": -1}'
     shade bake box.obj --lights lit.gltf -o out.exr
     refused 2 lit.gltf 'lights[0]' 'intensity' '-1'
@@ -111,10 +105,8 @@ write_scene() {
 @test "a scene takes the lights of a file among its own, as --lights takes them" {
     write_lit lit.gltf "$(down 0 sun 0,7,0), $(down 1 lamp 1,3,0)" "$SUN,$LAMP"
     write_scene scene.json '{"type": "file", "file": "lit.gltf", "angle_deg": 9, "radius": 0.25}'
-    shade bake scene.json
-    done_well
-    shade bake lit.gltf --lights file --sun-angle 9 --light-radius 0.25 --receive floor --size 32 -o line.exr
-    done_well
+    succeed bake scene.json
+    succeed bake lit.gltf --lights file --sun-angle 9 --light-radius 0.25 --receive floor --size 32 -o line.exr
     same_values scene.exr line.exr || fail 'not the same values'
     mkdir -p elsewhere
     write_lit elsewhere/lamps.gltf "$(down 0 spot 0,4,0)" "$SPOT"
@@ -124,8 +116,7 @@ write_scene() {
     shade info scene.json
     [ "$(grep -o "^light '[a-z]*'" <<<"$output" | tr -d '\n')" = "light 'first'light 'sun'light 'lamp'light 'spot'light 'last'" ] || fail "$output"
     [[ $output == *"light 'sun': directional towards 0 1 0, 0.529985"* ]] || fail 'not the sun of the sky'
-    shade bake scene.json
-    done_well
+    succeed bake scene.json
     shade info scene.exr
     [[ $output == *lamps.gltf* ]] || fail 'the file is no input of the output'
 }
@@ -137,8 +128,7 @@ write_scene() {
         printf '{"casters": [{"mesh": "lit.gltf", "objects": "floor"}, {"mesh": "lit.gltf", "objects": "plate", "layer": "plates"}],
             "layers": [{"name": "plates"%s}], "lights": [{"type": "file", "file": "lit.gltf"%s},
             {"name": "own", "type": "directional", "direction": [0, 1, 0]}]}' "$1" "$2" >scene.json
-        shade query scene.json --points points.xyz -o answers.csv --answers-only
-        done_well
+        succeed query scene.json --points points.xyz -o answers.csv --answers-only
         [ "$(cat answers.csv)" = "shadow.sun,shadow.lamp,shadow.own"$'\n'"$3" ] || fail "$(cat answers.csv)"
     }
     layered '' '' 0,0,0
@@ -152,28 +142,23 @@ write_scene() {
 @test "render, query, volume and trade take the lights of a file" {
     write_lit lit.gltf "$(down 0 lamp 1,3,0)" "$LAMP"
     printf '0 0.1 0\n-1.9 0.1 -1.9\n' >points.xyz
-    shade query lit.gltf --lights file --light-radius 0.1 --points points.xyz -o answers.csv --answers-only
-    done_well
+    succeed query lit.gltf --lights file --light-radius 0.1 --points points.xyz -o answers.csv --answers-only
     [ "$(cat answers.csv)" = $'shadow.lamp\n0\n1' ] || fail "$(cat answers.csv)"
-    shade volume lit.gltf --lights lit.gltf --box -1,0.1,-1,1,0.3,1 --box-voxel-size 0.1 -o out.vdb
-    done_well
+    succeed volume lit.gltf --lights lit.gltf --box -1,0.1,-1,1,0.3,1 --box-voxel-size 0.1 -o out.vdb
     shade info out.vdb
     [[ $output == *shadow.lamp* ]] || fail "$output"
-    shade render lit.gltf --lights lit.gltf --size 48x32 -o lamp.png
-    done_well
+    succeed render lit.gltf --lights lit.gltf --size 48x32 -o lamp.png
     shade render lit.gltf --sun 0,1,0 --size 48x32 -o sun.png
     ! cmp -s lamp.png sun.png || fail 'the picture of another light'
     write_scene scene.json ''
-    shade trade scene.json --lights lit.gltf --size 16 --resolutions 16 --truth-rays 16 --budget 0.001 -o out.html --csv out.csv
-    done_well
+    succeed trade scene.json --lights lit.gltf --size 16 --resolutions 16 --truth-rays 16 --budget 0.001 -o out.html --csv out.csv
     grep -q '^shadow,' out.csv || fail 'no shadow'
 }
 
 @test "--unit moves the lights of a scene's files with its meshes" {
     write_lit lit.gltf "$(down 0 lamp 1,3,0)" "$LAMP"
     write_scene scene.json '{"name": "sky", "type": "directional", "direction": [0, 1, 0]}, {"type": "file", "file": "lit.gltf"}'
-    shade bake scene.json --unit cm
-    done_well
+    succeed bake scene.json --unit cm
     shade info scene.exr
     [[ $output == *'vdbshade_light_lamp: sphere at 0.01 0.03 0,'* ]] || fail "$output"
     write_scene scene.json '{"type": "file", "file": "lit.gltf"}' '"unit": "mm",'

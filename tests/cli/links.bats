@@ -59,16 +59,13 @@ kept() {
     mkdir theirs/bakes
     ln -s bakes/kept.exr theirs/box.exr
     old_output theirs/bakes/kept.exr
-    shade bake theirs/scene.json --quiet
-    done_well
+    succeed bake theirs/scene.json --quiet
     [ -L theirs/box.exr ] && [ "$(wc -c <theirs/bakes/kept.exr)" -gt 100 ] || fail "not followed"
     ln -s elsewhere/mine.exr link.exr
-    shade bake theirs/scene.json -o link.exr --quiet
-    done_well
+    succeed bake theirs/scene.json -o link.exr --quiet
     [ -L link.exr ] && [ "$(wc -c <elsewhere/mine.exr)" -gt 100 ] || fail "the user's link"
     scene ../elsewhere/said.exr # openly elsewhere
-    shade bake theirs/scene.json --quiet
-    done_well
+    succeed bake theirs/scene.json --quiet
     [ -s elsewhere/said.exr ] || fail "not written"
     scene absent/x.exr
     shade bake theirs/scene.json

@@ -36,15 +36,13 @@ is_at_most() {
 }
 
 @test "with nothing said meshes are baked by exact, and it is said" {
-    shade bake box.obj "${SMALL[@]}" --ao 0.5 --stats s.json -o a.exr
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --ao 0.5 --stats s.json -o a.exr
     [[ $stderr == *"shadow exact, AO exact, max error 0.02"* ]] || fail "$stderr"
     for kind in shadow ao; do
         [ "$(said $kind method)" = exact ] || fail "$(cat s.json)"
         is_at_most "$(said $kind estimated_rmse)" "$(said $kind max_error)"
     done
-    shade bake box.obj "${SMALL[@]}" --ao 0.5 --method exact --ao-method exact --quiet -o b.exr
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --ao 0.5 --method exact --ao-method exact --quiet -o b.exr
     same_values a.exr b.exr
     shade info a.exr
     [[ $output == *"exact, max error 0.02, sobol"* ]] || fail "$output"
@@ -60,36 +58,31 @@ is_at_most() {
  "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0], "angle_deg": 5}],
  "receivers": [{"mesh": "box.obj", "size": 16, "output": "a.exr"}]}
 JSON
-    shade bake sphere.json --stats s.json
-    done_well
+    succeed bake sphere.json --stats s.json
     [ "$(said shadow method)" = adaptive ] || fail "$(cat s.json)"
     [[ $stderr == *"shadow adaptive, max error 0.02"* ]] || fail "$stderr"
 }
 
 @test "an error that a limit of rays does not keep is told" {
-    shade bake fence.obj --size 64 --resolution 32 --sun 0.3,1,0.5 --sun-angle 20 --max-error 0.003 --rays 8 \
+    succeed bake fence.obj --size 64 --resolution 32 --sun 0.3,1,0.5 --sun-angle 20 --max-error 0.003 --rays 8 \
         --stats s.json -o a.exr
-    done_well
     [[ $stderr == *"above the limit of 0.003: 8 rays are too few"* ]] || fail "$stderr"
     is_at_most "$(said shadow max_error)" "$(said shadow estimated_rmse)"
-    shade bake fence.obj --size 64 --resolution 32 --sun 0.3,1,0.5 --sun-angle 20 --max-error 0.003 \
+    succeed bake fence.obj --size 64 --resolution 32 --sun 0.3,1,0.5 --sun-angle 20 --max-error 0.003 \
         --stats s.json -o a.exr
-    done_well
     [[ $stderr != *"above the limit"* ]] || fail "$stderr"
     is_at_most "$(said shadow estimated_rmse)" 0.003
 }
 
 @test "what voxels leave of an error is measured, told, and by exact not there" {
-    shade bake fence.obj --size 96 --resolution 32 --sun 0.3,1,0.5 --sun-angle 2 --method adaptive --max-error 0.01 \
+    succeed bake fence.obj --size 96 --resolution 32 --sun 0.3,1,0.5 --sun-angle 2 --method adaptive --max-error 0.01 \
         --stats s.json -o a.exr
-    done_well
     [[ $stderr == *"shadow: the estimated error is "*"above the limit of 0.01: "*"comes from voxels of"*"--method exact has none"* ]] ||
         fail "$stderr"
     [[ $stderr == *"estimated error: shadow "*"(the voxels' "* ]] || fail "$stderr"
     is_at_most 0.05 "$(said shadow estimated_rmse)"
     is_at_most 0.05 "$(said shadow field_rmse)"
-    shade bake fence.obj --size 96 --resolution 32 --sun 0.3,1,0.5 --sun-angle 2 --max-error 0.01 --stats s.json -o a.exr
-    done_well
+    succeed bake fence.obj --size 96 --resolution 32 --sun 0.3,1,0.5 --sun-angle 2 --max-error 0.01 --stats s.json -o a.exr
     [[ $stderr != *"above the limit"* ]] || fail "$stderr"
     is_at_most "$(said shadow estimated_rmse)" 0.01
 }
@@ -97,24 +90,20 @@ JSON
 @test "any number of threads tells the same error" {
     local bake=(bake fence.obj --size 96 --resolution 32 --sun 0.3,1,0.5 --sun-angle 2 --method adaptive -o a.exr --quiet)
     shade "${bake[@]}" --stats whole.json
-    shade "${bake[@]}" --stats one.json --threads 1
-    done_well
+    succeed "${bake[@]}" --stats one.json --threads 1
     whole=$(sed -n '/"channels"/,/]/p' whole.json)
     [ -n "$whole" ] && [ "$whole" = "$(sed -n '/"channels"/,/]/p' one.json)" ] || fail "$whole $(cat one.json)"
 }
 
 @test "a fence that voxels lose is named, unless its triangles are traced" {
-    shade bake fence.obj --size 32 --resolution 32 --sun 0.3,1,0.5 --method cone -o a.exr
-    done_well
+    succeed bake fence.obj --size 32 --resolution 32 --sun 0.3,1,0.5 --method cone -o a.exr
     [[ $stderr == *"pickets"*"thinner than 1.25 voxels"*"casts nothing"* ]] || fail "$stderr"
-    shade bake fence.obj --size 32 --resolution 32 --sun 0.3,1,0.5 -o a.exr
-    done_well
+    succeed bake fence.obj --size 32 --resolution 32 --sun 0.3,1,0.5 -o a.exr
     [[ $stderr != *"casts nothing"* ]] || fail "$stderr"
 }
 
 # The project's own bakes: every method, kind of caster and kind of output, against what they were.
 @test "the project's scenes bake as they did" {
-    shade regress "$BATS_TEST_DIRNAME/../golden" --all --cache "$BATS_TEST_TMPDIR/cache.json"
-    done_well
+    succeed regress "$BATS_TEST_DIRNAME/../golden" --all --cache "$BATS_TEST_TMPDIR/cache.json"
     [ "$(grep -c ': alike$' <<<"$output")" -eq 15 ] || fail "not all cases"
 }

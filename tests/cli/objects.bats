@@ -34,68 +34,55 @@ LEVEL=(--sun 0.3,1,0.2 --sun-angle 5 --size 32 --resolution 24)
     [ ! -e out.exr ] || fail "an image beside the error"
     write_scene level.json level.obj '' '"allow_overlap": true'
     no_sun "${LEVEL[@]}"
-    shade bake level.json "${rest[@]}" -o out.exr
-    done_well
+    succeed bake level.json "${rest[@]}" -o out.exr
     [[ $stderr == *"2 objects"*"lie over charts of other objects"* ]] || fail "no warning"
 }
 
 @test "an atlas of objects, and charts that only touch, are not refused" {
     write_level level.obj floor wall
     awk '/^o /{n++} /^vt/{$2 = $2 / 2 + (n - 1) / 2} {print}' level.obj >atlas.obj
-    shade bake atlas.obj "${LEVEL[@]}" -o out.exr
-    done_well
+    succeed bake atlas.obj "${LEVEL[@]}" -o out.exr
     [[ $stderr != *"other objects"* ]] || fail "nothing overlaps"
     # a column of texels or two of the second object over the first
     awk '/^o /{n++} /^vt/{$2 = $2 / 2 + (n - 1) * 0.472} {print}' level.obj >touching.obj
-    shade bake touching.obj --sun 0.3,1,0.2 --size 256 --resolution 24 -o out.exr
-    done_well
+    succeed bake touching.obj --sun 0.3,1,0.2 --size 256 --resolution 24 -o out.exr
     [[ $stderr == *"mesh 'wall': "*" texels lie over charts of other objects"* ]] || fail "no warning"
 }
 
 @test "--receive chooses by name and pattern; what is not chosen casts all the same" {
     write_level level.obj floor wall_1 wall_2
-    shade bake level.obj "${LEVEL[@]}" --receive floor -o floor.exr --quiet
-    done_well
-    shade bake level.obj "${LEVEL[@]}" --receive 'f*' -o pattern.exr --quiet
-    done_well
+    succeed bake level.obj "${LEVEL[@]}" --receive floor -o floor.exr --quiet
+    succeed bake level.obj "${LEVEL[@]}" --receive 'f*' -o pattern.exr --quiet
     same_values floor.exr pattern.exr || fail "the pattern chose something else"
-    shade bake level.obj "${LEVEL[@]}" --no-receive 'wall_?' -o others.exr --quiet
-    done_well
+    succeed bake level.obj "${LEVEL[@]}" --no-receive 'wall_?' -o others.exr --quiet
     same_values floor.exr others.exr || fail "--no-receive left something else"
     shade bake level.obj "${LEVEL[@]}" --receive 'wall*' -o walls.exr
     refused 2 '1 of 2 meshes' "'wall_2'" "'wall_1'"
     # from the side, the next object's shadow; none where nothing else casts
     local side=(--sun 1,0.3,0 --sun-angle 2 --size 32 --voxel-size 0.05 --receive floor --quiet)
-    shade bake level.obj "${side[@]}" -o shadowed.exr
-    done_well
-    shade bake level.obj "${side[@]}" --no-cast 'wall*' -o alone.exr
-    done_well
+    succeed bake level.obj "${side[@]}" -o shadowed.exr
+    succeed bake level.obj "${side[@]}" --no-cast 'wall*' -o alone.exr
     ! same_values shadowed.exr alone.exr || fail "the walls cast nothing"
 }
 
 @test "a name that is not there is an error with the names that are" {
     write_level level.obj floor wall
-    shade bake level.obj "${LEVEL[@]}" --receive 'Flor*' -o out.exr
-    refused 2 level.obj "'Flor*'" "did you mean 'floor'?" "'floor', 'wall'"
-    shade bake level.obj "${LEVEL[@]}" --no-cast zzz -o out.exr
-    refused 2 level.obj "'zzz'" "'floor', 'wall'"
-    shade bake level.obj "${LEVEL[@]}" --receive wall --no-receive wall -o out.exr
-    refused 2 'no object is left'
+    refuse bake level.obj "${LEVEL[@]}" <<'LIST'
+2 level.obj "'Flor*'" "did you mean 'floor'?" "'floor', 'wall'" | --receive 'Flor*' -o out.exr
+2 level.obj "'zzz'" "'floor', 'wall'" | --no-cast zzz -o out.exr
+2 'no object is left' | --receive wall --no-receive wall -o out.exr
+LIST
 }
 
 @test "--per-object writes an image for each, the same as --receive of it" {
     write_level level.obj floor wall roof
-    shade bake level.obj "${LEVEL[@]}" --per-object -o maps/new/ --quiet
-    done_well
+    succeed bake level.obj "${LEVEL[@]}" --per-object -o maps/new/ --quiet
     [ "$(ls maps/new | tr '\n' ' ')" = "floor.exr roof.exr wall.exr " ] || fail "$(ls maps/new)"
-    shade bake level.obj "${LEVEL[@]}" --receive roof -o roof.exr --quiet
-    done_well
+    succeed bake level.obj "${LEVEL[@]}" --receive roof -o roof.exr --quiet
     same_values roof.exr maps/new/roof.exr || fail "another image"
-    shade bake level.obj "${LEVEL[@]}" --per-object -o base.png --quiet
-    done_well
+    succeed bake level.obj "${LEVEL[@]}" --per-object -o base.png --quiet
     [ -s base.floor.png ] && [ -s base.wall.png ] || fail "$(ls)"
-    shade bake level.obj "${LEVEL[@]}" --per-object -o 'x/%s_light.png' --quiet
-    done_well
+    succeed bake level.obj "${LEVEL[@]}" --per-object -o 'x/%s_light.png' --quiet
     [ -s x/roof_light.png ] || fail "$(ls x)"
     shade bake level.obj "${LEVEL[@]}" -o maps/
     refused 2 maps/ --per-object
@@ -103,8 +90,7 @@ LEVEL=(--sun 0.3,1,0.2 --sun-angle 5 --size 32 --resolution 24)
 
 @test "names are made safe for file systems and unique" {
     write_level level.obj 'a/b' 'a_b' 'A-b' 'a-b' 'Wände' '../evil' '...' 'a?b'
-    shade bake level.obj "${LEVEL[@]}" --per-object -o maps/ --quiet
-    done_well
+    succeed bake level.obj "${LEVEL[@]}" --per-object -o maps/ --quiet
     [ "$(ls maps | wc -l)" -eq 8 ] || fail "$(ls maps)"
     for name in a_b a_b-2 a_b-3 A-b a-b-2 'Wände' _._evil ___; do
         [ -s "maps/$name.exr" ] || fail "no $name: $(ls maps)"
@@ -115,8 +101,7 @@ LEVEL=(--sun 0.3,1,0.2 --sun-angle 5 --size 32 --resolution 24)
 @test "objects without UVs cast only where each has an image, and are said in one line" {
     write_level level.obj floor bare naked
     awk '/^o /{n++} n > 1 && /^vt/{next} n > 1 && /^f/{gsub(/\/[0-9]+/, "")} {print}' level.obj >bare.obj
-    shade bake bare.obj "${LEVEL[@]}" --per-object -o maps/
-    done_well
+    succeed bake bare.obj "${LEVEL[@]}" --per-object -o maps/
     [ "$(ls maps)" = floor.exr ] || fail "$(ls maps)"
     [ "$(grep -c 'no UVs' <<<"$stderr")" -eq 1 ] || fail "not one line"
     [[ $stderr == *"2 objects"*"'bare'"*"casts only"*"'naked'"* ]] || fail "not both"
@@ -131,8 +116,7 @@ LEVEL=(--sun 0.3,1,0.2 --sun-angle 5 --size 32 --resolution 24)
  "receivers": [{"mesh": "level.obj", "objects": ["fl*"], "size": 16, "output": "floor.exr"},
                {"mesh": "level.obj", "except": "floor", "allow_overlap": true, "size": 16, "output": "rest.exr"}]}
 JSON
-    shade bake scene.json --quiet
-    done_well
+    succeed bake scene.json --quiet
     sed 's/true/false/' scene.json >refused.json
     shade bake refused.json --quiet
     refused 2 level.obj "'roof' on" "over 'wall'"
@@ -148,26 +132,21 @@ JSON
     write_level level.obj $(seq -f 'crate_%03g' 40)
     write_scene level.json level.obj '' '"allow_overlap": true'
     no_sun "${LEVEL[@]}"
-    shade bake level.json "${rest[@]}" -o out.exr
-    done_well
+    succeed bake level.json "${rest[@]}" -o out.exr
     [ "$(grep -c warning: <<<"$stderr")" -lt 4 ] || fail "too many lines"
     [[ $stderr == *"warning: 39 objects: level.obj: mesh 'crate_"*"then 'crate_"*"--verbose lists all"* ]] || fail "no summary"
-    shade bake level.json "${rest[@]}" -o out.exr --verbose
-    done_well
+    succeed bake level.json "${rest[@]}" -o out.exr --verbose
     [ "$(grep -c 'lie over charts of other objects' <<<"$stderr")" -eq 39 ] || fail "not all"
-    shade bake level.json "${rest[@]}" -o out.exr --quiet
-    done_well
+    succeed bake level.json "${rest[@]}" -o out.exr --quiet
     [ -z "$stderr" ] || fail "--quiet said something"
 }
 
 @test "what users need not act on is a note, which --verbose alone prints" {
     write_level level.obj floor crate
     printf 'o card\nv 0 0 -3\nv 1 0 -3\nv 0 1 -3\nf -3 -2 -1\nf -1 -1 -2\n' >>level.obj
-    shade bake level.obj "${LEVEL[@]}" --receive floor -o out.exr
-    done_well
+    succeed bake level.obj "${LEVEL[@]}" --receive floor -o out.exr
     [[ $stderr != *warning:* && $stderr != *note:* ]] || fail "told: $stderr"
-    shade bake level.obj "${LEVEL[@]}" --receive floor -o out.exr --verbose
-    done_well
+    succeed bake level.obj "${LEVEL[@]}" --receive floor -o out.exr --verbose
     [[ $stderr == *"vdbshade: note: level.obj: mesh 'card': 1 triangles of zero area are skipped"* ]] || fail "no area"
     [[ $stderr == *"vdbshade: note: mesh 'card' ("*"3 open edges: baked as a "* ]] || fail "no sheet"
     [[ $stderr != *warning:* ]] || fail "a warning"
@@ -183,8 +162,7 @@ JSON
 
 @test "info tells a level's objects in a table, and what bake would refuse at a size" {
     write_level level.obj $(seq -f 'crate_%03g' 12)
-    shade info level.obj --size 64
-    done_well
+    succeed info level.obj --size 64
     [[ ${lines[0]} == "objects: 12, in 12 meshes, 144 triangles; UV sets: 1" ]] || fail "no summary"
     [ "$(grep -c ' crate_' <<<"$output")" -eq 12 ] || fail "no line each"
     [[ $output == *"64 × 64 texels"*"problem: objects share texels: 11 of 12 meshes"*"'crate_002'"*"over 'crate_001'"*--per-object* ]] ||
@@ -205,17 +183,14 @@ JSON
 
 @test "info calls a volume of our own no problem" {
     write_level level.obj floor
-    shade volume level.obj --sun 0,1,0 --resolution 16 --box -1,-1,-1,2,2,2 --box-voxel-size 0.5 -o box.vdb --quiet
-    done_well
-    shade info box.vdb
-    done_well
+    succeed volume level.obj --sun 0,1,0 --resolution 16 --box -1,-1,-1,2,2,2 --box-voxel-size 0.5 -o box.vdb --quiet
+    succeed info box.vdb
     [[ $output == *"holds: values that vdbshade baked"* && $output != *problem* ]] || fail "a problem"
 }
 
 @test "cones within the reach of their field are not warned of" {
     for size in 16 24 48 96; do
-        shade bake "$ASSETS/cloister.glb" --sun 0.6,0.75,0.5 --sun-angle 10 --method cone --size 64 --resolution "$size" -o out.exr
-        done_well
+        succeed bake "$ASSETS/cloister.glb" --sun 0.6,0.75,0.5 --sun-angle 10 --method cone --size 64 --resolution "$size" -o out.exr
         [[ $stderr != *reach* ]] || fail "at $size voxels"
     done
 }
@@ -265,8 +240,7 @@ add_box() {
     add_box dome.obj crate -1,0,-1 1,2,1
     cp dome.obj open.obj
     add_box dome.obj sky -30,-2,-30 30,30,30 1
-    shade bake dome.obj "${sun[@]}" --sky y "${options[@]}"
-    done_well
+    succeed bake dome.obj "${sun[@]}" --sky y "${options[@]}"
     local help="from all other objects; --no-cast 'sky' lets it through" name
     [[ $stderr == *"warning: 'sky' hides light sun $help"* && $stderr == *"warning: 'sky' hides the sky $help"* ]] || fail "no warning"
     for name in 1 2 merge; do
@@ -276,11 +250,9 @@ add_box() {
         [[ $name == merge || $stderr != *hides* ]] || fail "a part knows only its own rows"
     done
     [[ $stderr == *"'sky' hides light sun $help"* ]] || fail "no warning by merge"
-    shade bake dome.obj "${sun[@]}" --no-receive sky --method cone --resolution 32 "${options[@]}"
-    done_well
+    succeed bake dome.obj "${sun[@]}" --no-receive sky --method cone --resolution 32 "${options[@]}"
     [[ $stderr == *"'sky' hides light sun $help"* ]] || fail "no warning where voxels cast"
-    shade bake dome.obj "${sun[@]}" --sky y --no-cast sky "${options[@]}"
-    done_well
+    succeed bake dome.obj "${sun[@]}" --sky y --no-cast sky "${options[@]}"
     [[ $stderr != *hides* ]] || fail "the dome does not cast"
 
     # a lamp in its bulb; and in the open
@@ -290,8 +262,7 @@ add_box() {
 {"casters": [{"mesh": "open.obj"}], "lights": [{"name": "lamp", "type": "sphere", "position": [0, $height, 0], "radius": 0.05}],
  "receivers": [{"mesh": "open.obj", "size": 64, "unwrap": "always", "output": "out.exr"}]}
 JSON
-        shade bake lamp.json
-        done_well
+        succeed bake lamp.json
         [[ $height != 4.1 || $stderr == *"'bulb+1' hides light lamp from all other objects; --no-cast 'bulb+1' lets it through"* ]] || fail "no bulb"
         [[ $height != 5 || $stderr != *hides* ]] || fail "the lamp is in the open"
     done
@@ -301,20 +272,17 @@ JSON
     add_box apart.obj cell 22,0,-2 26,4,2
     awk '/^o cell/ { inward = 1 } inward && /^f/ { print "f", $5, $4, $3, $2; next } { print }' apart.obj >cell.obj
     sed 's/open.obj/cell.obj/g; s/"position": [^]]*/"position": [24, 2, 0/' lamp.json >cell.json
-    shade bake cell.json
-    done_well
+    succeed bake cell.json
     [[ $stderr != *hides* ]] || fail "the lamp lights its room"
 
     # the shade of a wall, faces that look away from the sun, a room of several walls
     cp open.obj wall.obj
     add_box wall.obj wall 2,0,-20 3,40,20
-    shade bake wall.obj --sun 1,0.3,0 --receive crate "${options[@]}"
-    done_well
+    succeed bake wall.obj --sun 1,0.3,0 --receive crate "${options[@]}"
     [[ $stderr != *hides* ]] || fail "a crate may lie in the shade of a wall"
     cp dome.obj card.obj
     printf 'o card\nv -1 3 -1\nv 1 3 -1\nv 0 3 1\nf -3 -2 -1\n' >>card.obj
-    shade bake card.obj "${sun[@]}" --receive card "${options[@]}"
-    done_well
+    succeed bake card.obj "${sun[@]}" --receive card "${options[@]}"
     [[ $stderr != *hides* ]] || fail "the card looks away from the sun"
     add_box room.obj crate -1,0,-1 1,2,1
     add_box room.obj floor -5,-1,-5 5,0,5
@@ -323,16 +291,13 @@ JSON
     add_box room.obj right 5,-1,-5 6,5,5
     add_box room.obj back -6,-1,-6 6,5,-5
     add_box room.obj front -6,-1,5 6,5,6
-    shade bake room.obj "${sun[@]}" --receive crate --receive floor "${options[@]}"
-    done_well
+    succeed bake room.obj "${sun[@]}" --receive crate --receive floor "${options[@]}"
     [[ $stderr != *hides* ]] || fail "no wall alone encloses the crate"
 }
 
 @test "compare tells no measure that too few edges do not give" {
     write_level level.obj floor wall
-    shade bake level.obj --receive floor --sun 1,0.3,0 --sun-angle 2 --method cone --size 8 --resolution 48 --quiet -o out.exr
-    done_well
-    shade compare out.exr out.exr
-    done_well
+    succeed bake level.obj --receive floor --sun 1,0.3,0 --sun-angle 2 --method cone --size 8 --resolution 48 --quiet -o out.exr
+    succeed compare out.exr out.exr
     [[ $output == *"shadow.sun: alike; "*"rmse 0"* && $output != *penumbra* && $output != *nan* ]] || fail "$output"
 }

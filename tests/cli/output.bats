@@ -123,16 +123,16 @@ bake_to() {
  "receivers": [{"mesh": "box.obj", "size": 16, "output": "maps/one.exr"},
                {"mesh": "box.obj", "size": 8, "output": "two.png"}]}
 JSON
-    shade bake two.json --output-folder elsewhere --quiet
-    done_well
+    succeed bake two.json --output-folder elsewhere --quiet
     [ -s elsewhere/one.exr ] && [ -s elsewhere/two.png ] || fail "not there"
     [ ! -e maps/one.exr ] && [ ! -e two.png ] || fail "in both places"
-    shade bake two.json --output-folder no/where --quiet
-    done_well
+    succeed bake two.json --output-folder no/where --quiet
     [ -s no/where/one.exr ] || fail "the folder was not made"
-    refuses 3 box.obj/maps 'cannot be made' -- bake two.json --output-folder box.obj/maps --quiet
-    refuses 3 missing/out.exr "no folder 'missing'" "mkdir -p 'missing'" -- bake box.obj --ao 1 --resolution 16 -o missing/out.exr
-    refuses 2 --output-folder -- bake box.obj --ao 1 --output-folder elsewhere -o out.exr
+    refuse bake <<'LIST'
+3 box.obj/maps 'cannot be made' | two.json --output-folder box.obj/maps --quiet
+3 missing/out.exr "no folder 'missing'" "mkdir -p 'missing'" | box.obj --ao 1 --resolution 16 -o missing/out.exr
+2 --output-folder | box.obj --ao 1 --output-folder elsewhere -o out.exr
+LIST
     sed -i 's/two.png/one.exr/' two.json
     refuses 2 elsewhere/one.exr 'two receivers' -- bake two.json --output-folder elsewhere --quiet
 }

@@ -16,8 +16,7 @@ png_size() {
 }
 
 @test "a picture of a mesh, of the size asked for" {
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --ao 0.5 -o view.png --stats stats.json
-    done_well
+    succeed render box.obj "${SUN[@]}" "${QUICK[@]}" --ao 0.5 -o view.png --stats stats.json
     [ "$(png_size view.png)" = "40 24" ] || fail "size: $(png_size view.png)"
     [[ $stderr == *"40 × 24, camera "* ]] || fail "the camera is not told"
     grep -q '"points": 960' stats.json || fail "$(cat stats.json)"
@@ -25,17 +24,14 @@ png_size() {
 }
 
 @test "quiet says nothing; threads change no byte" {
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --ao 0.5 -o one.png --threads 1 --quiet
-    done_well
+    succeed render box.obj "${SUN[@]}" "${QUICK[@]}" --ao 0.5 -o one.png --threads 1 --quiet
     [ -z "$stderr" ] || fail "something on standard error"
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --ao 0.5 -o three.png --threads 3 --quiet
-    done_well
+    succeed render box.obj "${SUN[@]}" "${QUICK[@]}" --ao 0.5 -o three.png --threads 3 --quiet
     cmp one.png three.png || fail "threads show"
 }
 
 @test "an EXR has linear colours, coverage, depth and normals" {
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" -o view.exr --quiet
-    done_well
+    succeed render box.obj "${SUN[@]}" "${QUICK[@]}" -o view.exr --quiet
     "$VDBSHADE" info view.exr >info.txt
     for channel in R G B A Z N.X N.Y N.Z; do
         grep -qw "$channel" info.txt || fail "no $channel: $(cat info.txt)"
@@ -43,8 +39,7 @@ png_size() {
 }
 
 @test "without a background a PNG is transparent" {
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" -o view.png --background none --quiet
-    done_well
+    succeed render box.obj "${SUN[@]}" "${QUICK[@]}" -o view.png --background none --quiet
     [ "$(od -An -tu1 -j25 -N1 view.png | tr -d ' ')" = 6 ] || fail "no alpha"
     shade render box.obj "${SUN[@]}" "${QUICK[@]}" -o view.png --quiet
     [ "$(od -An -tu1 -j25 -N1 view.png | tr -d ' ')" = 2 ] || fail "alpha with a background"
@@ -52,8 +47,7 @@ png_size() {
 }
 
 @test "--orbit turns the camera around what it looks at, anticlockwise from above" {
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --camera 0.5,1.5,4 --look-at 0.5,0,0 --orbit 90 -o turned.png --quiet
-    done_well
+    succeed render box.obj "${SUN[@]}" "${QUICK[@]}" --camera 0.5,1.5,4 --look-at 0.5,0,0 --orbit 90 -o turned.png --quiet
     shade render box.obj "${SUN[@]}" "${QUICK[@]}" --camera 4.5,1.5,0 --look-at 0.5,0,0 -o placed.png --quiet
     same_values turned.png placed.png || fail "another place"
     shade render box.obj "${SUN[@]}" "${QUICK[@]}" --camera 0.5,1.5,4 --look-at 0.5,0,0 -o front.png --quiet
@@ -61,14 +55,16 @@ png_size() {
 }
 
 @test "cameras that see nothing are refused" {
-    refuses 2 --camera -- render box.obj "${SUN[@]}" --camera nan,0,0 -o view.png
-    refuses 2 --camera -- render box.obj "${SUN[@]}" --camera 1,2 -o view.png
-    refuses 2 'position and target' -- render box.obj "${SUN[@]}" --camera 1,2,3 --look-at 1,2,3 -o view.png
-    refuses 2 'along the view' -- render box.obj "${SUN[@]}" --camera 0,5,0 --look-at 0,0,0 -o view.png
-    refuses 2 'along the view' -- render box.obj "${SUN[@]}" --camera 0.5,5,0.5 --resolution 24 -o view.png --quiet
-    refuses 2 --up -- render box.obj "${SUN[@]}" --up 0,0,0 -o view.png
-    refuses 2 --fov -- render box.obj "${SUN[@]}" --fov 180 -o view.png
-    refuses 2 --look-at -- render box.obj "${SUN[@]}" --look-at 0,0,0 -o view.png
+    refuse render box.obj "${SUN[@]}" <<'LIST'
+2 --camera | --camera nan,0,0 -o view.png
+2 --camera | --camera 1,2 -o view.png
+2 'position and target' | --camera 1,2,3 --look-at 1,2,3 -o view.png
+2 'along the view' | --camera 0,5,0 --look-at 0,0,0 -o view.png
+2 'along the view' | --camera 0.5,5,0.5 --resolution 24 -o view.png --quiet
+2 --up | --up 0,0,0 -o view.png
+2 --fov | --fov 180 -o view.png
+2 --look-at | --look-at 0,0,0 -o view.png
+LIST
     [ ! -e view.png ] || fail "a picture all the same"
 }
 
@@ -77,9 +73,11 @@ png_size() {
     refuses 2 view.xyz -- render box.obj "${SUN[@]}" -o view.xyz
     shade render box.obj "${SUN[@]}" -o box.obj
     [ "$status" -eq 2 ] || fail "the input would be replaced"
-    refuses 2 view.png -- render box.obj "${SUN[@]}" -o view.png --stats view.png
-    refuses 2 'no output' -- render box.obj "${SUN[@]}"
-    refuses 2 --sun -- render box.obj -o view.png
+    refuse render box.obj <<'LIST'
+2 view.png | "${SUN[@]}" -o view.png --stats view.png
+2 'no output' | "${SUN[@]}"
+2 --sun | -o view.png
+LIST
 }
 
 @test "a memory limit ends it with code 4, and the old picture stays" {
@@ -89,49 +87,42 @@ png_size() {
 }
 
 @test "a lightmap of any size is shown on the receiver" {
-    shade bake box.obj "${SUN[@]}" --size 64x32 --resolution 24 -o box.exr --quiet
-    done_well
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.exr -o lit.png --quiet
-    done_well
+    succeed bake box.obj "${SUN[@]}" --size 64x32 --resolution 24 -o box.exr --quiet
+    succeed render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.exr -o lit.png --quiet
     shade render box.obj "${SUN[@]}" "${QUICK[@]}" -o computed.png --quiet
     # The same mesh is seen, and on a lone convex body the same light; a lightmap that is all dark shows.
     "$VDBSHADE" compare computed.png lit.png --max-rmse 0.02 --quiet || fail "not the light that is computed"
     printf 'P5 2 2 255\n\0\0\0\0' >black.pgm
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap black.pgm --lightmap-pack R=shadow.sun -o dark.png --quiet
-    done_well
+    succeed render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap black.pgm --lightmap-pack R=shadow.sun -o dark.png --quiet
     ! same_values lit.png dark.png || fail "the lightmap is not what is shown"
     # With other sizes the picture is nearly the same.
     shade bake box.obj "${SUN[@]}" --irradiance --size 256 --resolution 24 -o fine.exr --quiet
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap fine.exr -o fine.png --quiet
-    done_well
+    succeed render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap fine.exr -o fine.png --quiet
 }
 
 @test "a packed lightmap is told what it holds" {
-    shade bake box.obj "${SUN[@]}" --size 64 --resolution 24 -o box.png --pack R=shadow.sun --bits 16 --quiet
-    done_well
+    succeed bake box.obj "${SUN[@]}" --size 64 --resolution 24 -o box.png --pack R=shadow.sun --bits 16 --quiet
     shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.png -o lit.png
     [ "$status" -eq 2 ] && [[ $stderr == *shadow.sun* ]] || fail "channels without names"
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.png --lightmap-pack R=shadow.sun -o lit.png --quiet
-    done_well
+    succeed render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.png --lightmap-pack R=shadow.sun -o lit.png --quiet
     shade bake box.obj "${SUN[@]}" --size 64 --resolution 24 -o box.exr --quiet
     shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.exr -o same.exr --quiet
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.png --lightmap-pack R=shadow.sun -o lit.exr --quiet
-    done_well
+    succeed render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.png --lightmap-pack R=shadow.sun -o lit.exr --quiet
     for pack in shadow.sun RG=ao R= Q=ao; do
         refuses 2 --lightmap-pack -- render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.png --lightmap-pack "$pack" -o x.png
     done
 }
 
 @test "lightmaps that do not fit are refused" {
-    shade bake box.obj --ao 0.5 --size 16 --resolution 24 -o ao.exr --quiet
-    done_well
-    refuses 2 shadow.sun -- render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap ao.exr -o view.png --quiet
-    refuses 3 gone.exr -- render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap gone.exr -o view.png --quiet
-    refuses 2 receivers -- render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap ao.exr --lightmap ao.exr -o view.png --quiet
-    refuses 2 lightmap -- render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap ao.exr -o ao.exr --quiet
+    succeed bake box.obj --ao 0.5 --size 16 --resolution 24 -o ao.exr --quiet
+    refuse render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap <<'LIST'
+2 shadow.sun | ao.exr -o view.png --quiet
+3 gone.exr | gone.exr -o view.png --quiet
+2 receivers | ao.exr --lightmap ao.exr -o view.png --quiet
+2 lightmap | ao.exr -o ao.exr --quiet
+LIST
     # Without lights its AO is what there is to show.
-    shade render box.obj "${QUICK[@]}" --lightmap ao.exr -o view.png --quiet
-    done_well
+    succeed render box.obj "${QUICK[@]}" --lightmap ao.exr -o view.png --quiet
 }
 
 # write_quad FILE: a square of two triangles that faces +z, open.
@@ -144,8 +135,7 @@ write_quad() {
     write_quad quad.obj
     local which
     for which in quad box; do
-        shade render $which.obj --sun 0,0,1 --resolution 12 --size 9 --samples 1 --camera 0.5,0.5,4 --look-at 0.5,0.5,0 --fov 3 -o $which.exr --quiet
-        done_well
+        succeed render $which.obj --sun 0,0,1 --resolution 12 --size 9 --samples 1 --camera 0.5,0.5,4 --look-at 0.5,0.5,0 --fov 3 -o $which.exr --quiet
     done
     "$VDBSHADE" info quad.exr | grep -q "channel 'Z': min 4, mean 4, max 4" || fail "quad: $("$VDBSHADE" info quad.exr)"
     "$VDBSHADE" info box.exr | grep -q "channel 'Z': min 3, mean 3, max 3" || fail "box: $("$VDBSHADE" info box.exr)"
@@ -192,8 +182,7 @@ middle_row() {
     # The floor is dark from x = -3.125 to the foot at -0.125; behind it the post's dark side is seen up to 0.118.
     for options in "" "--resolution 64" "--voxel-size 0.5 --ao 1 --ao-method cones"; do
         # shellcheck disable=SC2086
-        shade render post.obj --sun 1,1,0 --sun-angle 0 "${ABOVE[@]}" --sky 0,0,0 $options -o view.ppm --quiet
-        done_well
+        succeed render post.obj --sun 1,1,0 --sun-angle 0 "${ABOVE[@]}" --sky 0,0,0 $options -o view.ppm --quiet
         middle_row view.ppm | awk '{ c = NR - 1; bad += c >= 20 && c <= 179 && $1 > 60 || c <= 17 && $1 < 150 } END { exit bad > 0 }' ||
             fail "'$options': $(middle_row view.ppm | tr '\n' ' ')"
     done
@@ -207,11 +196,9 @@ middle_row() {
     # Light that falls on the floor where all is open: a sun's cosine, the whole sky.
     while read -r open sky light; do
         # shellcheck disable=SC2086
-        shade query post.obj --points points.csv $light --max-error 0.003 -o answers.csv --answers-only --quiet
-        done_well
+        succeed query post.obj --points points.csv $light --max-error 0.003 -o answers.csv --answers-only --quiet
         # shellcheck disable=SC2086
-        shade render post.obj $light --max-error 0.003 "${ABOVE[@]}" --sky "$sky,$sky,$sky" -o view.ppm --quiet
-        done_well
+        succeed render post.obj $light --max-error 0.003 "${ABOVE[@]}" --sky "$sky,$sky,$sky" -o view.ppm --quiet
         paste <(grep -v '[a-z]' answers.csv) <(middle_row view.ppm | awk 'NR % 6 == 5 && NR <= 165') |
             awk -v open="$open" '{ v = $2 / 255; seen = v < 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ^ 2.4
                     n++; bad += (seen - 0.6 * open * $1) ^ 2 > 0.012 ^ 2 }
@@ -227,9 +214,8 @@ LIGHTS
     write_quad quad.obj
     printf 'P5 2 2 255\n\0\0\0\0' >black.pgm
     for from in 0,0,4 2,0.4,1.5 -0.5,1,-3; do
-        shade render quad.obj --sun 0.2,0.3,1 --lightmap black.pgm --lightmap-pack R=shadow.sun --camera $from \
+        succeed render quad.obj --sun 0.2,0.3,1 --lightmap black.pgm --lightmap-pack R=shadow.sun --camera $from \
             --resolution 12 --size 40 --samples 1 --sky 0,0,0 --background 0,0,0 -o view.ppm --quiet
-        done_well
         [ "$(tail -c 4800 view.ppm | tr -d '\0' | wc -c)" -eq 0 ] || fail "from $from: not all dark"
     done
     shade render quad.obj --sun 0.2,0.3,1 --camera 0,0,4 --resolution 12 --size 40 --samples 1 --sky 0,0,0 --background 0,0,0 -o view.ppm --quiet
@@ -238,8 +224,7 @@ LIGHTS
 
 @test "what is rendered fills 80 to 90 % of the picture" {
     for up in 0,1,0 0,0,1; do
-        shade render box.obj "${SUN[@]}" --size 50 --samples 2 --resolution 24 --background 0,0,0 --up $up -o view.ppm --quiet
-        done_well
+        succeed render box.obj "${SUN[@]}" --size 50 --samples 2 --resolution 24 --background 0,0,0 --up $up -o view.ppm --quiet
         # Columns and rows of the pixels that are not black.
         tail -c 7500 view.ppm | od -An -v -tu1 -w3 | awk '$1 + $2 + $3 > 0 {
                 x = (NR - 1) % 50; y = int((NR - 1) / 50); n++
@@ -268,8 +253,7 @@ pixel() {
 @test "casters have their colours, in a layer or in none" {
     for second in ', "color": [0.05, 0.05, 0.9]' ', "color": [0.05, 0.05, 0.9], "layer": "other"'; do
         scene "$second"
-        shade render scene.json --size 60x20 --samples 2 --camera 0.6,0,6 --look-at 0.6,0,0 --fov 12 -o view.ppm --quiet
-        done_well
+        succeed render scene.json --size 60x20 --samples 2 --camera 0.6,0,6 --look-at 0.6,0,0 --fov 12 -o view.ppm --quiet
         read -r r _ b <<<"$(pixel view.ppm 20 10)"
         [ "$r" -gt 180 ] && [ "$b" -lt 100 ] || fail "left: $r $b"
         read -r r _ b <<<"$(pixel view.ppm 40 10)"
@@ -287,8 +271,7 @@ pixel() {
 }
 
 @test "light shafts show, and are the same for any number of threads" {
-    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --shafts 0.5 -o one.png --threads 1 --quiet
-    done_well
+    succeed render box.obj "${SUN[@]}" "${QUICK[@]}" --shafts 0.5 -o one.png --threads 1 --quiet
     shade render box.obj "${SUN[@]}" "${QUICK[@]}" --shafts 0.5 -o two.png --threads 2 --quiet
     cmp one.png two.png || fail "threads show"
     shade render box.obj "${SUN[@]}" "${QUICK[@]}" -o none.png --quiet
@@ -304,8 +287,7 @@ pixel() {
  "resolution": 64, "ao": {"distance": 1},
  "lights": [{"name": "sun", "type": "directional", "direction": [0.6, 0.5, 0.3], "angle_deg": 3}]}
 JSON
-        shade render terrain.json --size 60x40 --samples 2 --camera 6,8,16 --look-at 0,1.5,0 -o $direct.ppm --quiet
-        done_well
+        succeed render terrain.json --size 60x40 --samples 2 --camera 6,8,16 --look-at 0,1.5,0 -o $direct.ppm --quiet
     done
     # Both see the same; light differs by what voxels lose.
     paste <(od -An -v -tu1 -w1 -j13 true.ppm) <(od -An -v -tu1 -w1 -j13 false.ppm) |

@@ -102,8 +102,7 @@ load parts
     options=("${CLOISTER[@]}" --size 128x2048 --irradiance --bent-normals tangent --sky y --error)
     one out.exr "${options[@]}"
     parts out.exr 3 "" "${options[@]}"
-    shade merge out.exr --memory-limit 16M
-    done_well
+    succeed merge out.exr --memory-limit 16M
     cmp one/out.exr out.exr
 }
 

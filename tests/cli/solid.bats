@@ -9,14 +9,11 @@ setup() {
 }
 
 @test "info says what objects are taken for" {
-    shade info box.obj
-    done_well
+    succeed info box.obj
     [[ $output == *"taken for: 1 solid"* ]] || fail "a box is solid"
-    shade info room.obj
-    done_well
+    succeed info room.obj
     [[ $output == *"taken for: 1 wall with air in front of its faces"* ]] || fail "a room is a wall"
-    shade info crate.obj
-    done_well
+    succeed info crate.obj
     [[ $output == *"taken for: 1 open solid,"* ]] || fail "a crate is an open solid"
     [[ $output == *"problem: 4 open edges"* ]] || fail "no open edges"
 }
@@ -53,14 +50,11 @@ OBJ
 
 @test "texels of a floor below a hut without a floor are hidden" {
     write_standing stands.obj
-    shade info stands.obj
-    done_well
+    succeed info stands.obj
     [[ $output == *"taken for: 1 open solid, hidden"* ]] || fail "$output"
-    shade bake stands.obj --receive floor -o floor.exr --ao 1 --size 60 --stats stats.json --verbose
-    done_well
+    succeed bake stands.obj --receive floor -o floor.exr --ao 1 --size 60 --stats stats.json --verbose
     [ "$(grep -oE '"invalid_texels": [0-9]+' stats.json)" = '"invalid_texels": 400' ] || fail "$(cat stats.json)"
-    shade bake stands.obj --receive floor --treat hut=sheet -o floor.exr --ao 1 --size 60 --stats stats.json
-    done_well
+    succeed bake stands.obj --receive floor --treat hut=sheet -o floor.exr --ao 1 --size 60 --stats stats.json
     [ "$(grep -oE '"invalid_texels": [0-9]+' stats.json)" = '"invalid_texels": 0' ] || fail "$(cat stats.json)"
 }
 
@@ -88,8 +82,7 @@ write_studs() {
     write_studs studs.obj
     for spacing in 1 8; do
         write_scene studs.json studs.obj '' "\"objects\": \"floor\", \"ao_spacing\": $spacing"
-        shade bake studs.json --resolution 16 --ao 0.3 --size 384 -o $spacing.exr
-        done_well
+        succeed bake studs.json --resolution 16 --ao 0.3 --size 384 -o $spacing.exr
     done
     shade compare 1.exr 8.exr
     local largest
@@ -98,23 +91,18 @@ write_studs() {
 }
 
 @test "a room whose faces look inwards is baked" {
-    shade bake room.obj -o room.exr --verbose --ao 0.5 --size 64 --resolution 64 --ao-method exact
-    done_well
+    succeed bake room.obj -o room.exr --verbose --ao 0.5 --size 64 --resolution 64 --ao-method exact
     [[ $stderr != *"are invalid"* ]] || fail "$stderr"
 }
 
 @test "solid, shell and inward overrule what is found" {
-    shade voxelize crate.obj --verbose -o crate.vdb --resolution 32
-    done_well
+    succeed voxelize crate.obj --verbose -o crate.vdb --resolution 32
     [[ $stderr == *"baked as a shell"* ]] || fail "no shell: $stderr"
-    shade voxelize crate.obj --verbose -o crate.vdb --resolution 32 --treat '*=solid'
-    done_well
+    succeed voxelize crate.obj --verbose -o crate.vdb --resolution 32 --treat '*=solid'
     [[ $stderr == *"closed over the holes"* ]] || fail "not closed: $stderr"
-    shade voxelize box.obj --verbose -o shell.vdb --resolution 32 --treat 'b*=sheet' --treat 'box=sheet'
-    done_well
+    succeed voxelize box.obj --verbose -o shell.vdb --resolution 32 --treat 'b*=sheet' --treat 'box=sheet'
     [[ $stderr == *"baked as a shell"* ]] || fail "no shell: $stderr"
-    shade voxelize box.obj --verbose -o wall.vdb --resolution 32 --treat box=room
-    done_well
+    succeed voxelize box.obj --verbose -o wall.vdb --resolution 32 --treat box=room
     [[ $stderr == *"triangles that face the other way"* ]] || fail "not turned: $stderr"
 }
 
@@ -133,8 +121,7 @@ write_studs() {
   "transform": {"translate": [3, 0, 0]}}],
  "resolution": 32}
 JSON
-    shade voxelize scene.json --verbose -o out.vdb
-    done_well
+    succeed voxelize scene.json --verbose -o out.vdb
     [[ $stderr == *"closed over the holes"* ]] || fail "not closed: $stderr"
     [[ $stderr == *"face the other way"* ]] || fail "not inward: $stderr"
     sed -i 's/"solid": "box"/"solid": "bax"/' scene.json

@@ -8,22 +8,19 @@ setup() {
 }
 
 @test "a mesh without UVs gets some that bake without a warning" {
-    shade unwrap bare.obj -o out.obj --size 64 --picture charts.png
-    done_well
+    succeed unwrap bare.obj -o out.obj --size 64 --picture charts.png
     [[ $stderr == "vdbshade: out.obj: 6 charts on 1 page of 64 × 64, "*"texels a unit, stretch 1.0"* ]] || fail "no summary"
     shade info out.obj --size 64
     [[ $output == *"triangles: 12"*"UV sets: 1"* ]] || fail "no UVs"
     [[ $output != *problem* ]] || fail "a problem"
-    shade bake out.obj -o out.exr --sun 0.3,1,0.2 --size 64 --resolution 24
-    done_well
+    succeed bake out.obj -o out.exr --sun 0.3,1,0.2 --size 64 --resolution 24
     [[ $stderr != *warning* ]] || fail "a warning"
     shade info charts.png
     [[ $output == *"64 × 64"* || $output == *"64 x 64"* ]] || fail "no picture of the page"
 }
 
 @test "positions, normals and triangles are the input's" {
-    shade unwrap "$ASSETS/cloister.glb" -o out.obj --quiet
-    done_well
+    succeed unwrap "$ASSETS/cloister.glb" -o out.obj --quiet
     [ -z "$stderr" ] || fail "not quiet"
     shade info "$ASSETS/cloister.glb"
     before=$(grep -o 'objects: .* triangles' <<<"$output")
@@ -36,8 +33,7 @@ setup() {
     shade unwrap bare.obj -o out.obj --size 32 --texels-per-unit 20
     refused 4 "texels a unit: "
     [ ! -e out.obj ] || fail "it was written"
-    shade unwrap bare.obj -o out.obj --size 32 --texels-per-unit 20 --pages 6
-    done_well
+    succeed unwrap bare.obj -o out.obj --size 32 --texels-per-unit 20 --pages 6
     grep -q '^usemtl page_1' out.obj || fail "no second page"
 }
 
@@ -48,28 +44,23 @@ setup() {
         sed -n 's/^v //p' bare.obj | awk '{print "v", 3 * $1 + 5, 3 * $2, 3 * $3}'
         sed -n 's/^f //p' bare.obj | awk '{ out = "f"; for (i = 1; i <= NF; ++i) out = out " " $i + 8; print out }'
     } >two.obj
-    shade unwrap two.obj -o out.obj --atlas objects --max-size 256 --texels-per-unit 8 --picture charts.png
-    done_well
+    succeed unwrap two.obj -o out.obj --atlas objects --max-size 256 --texels-per-unit 8 --picture charts.png
     [[ $stderr == *"12 charts on 2 pages of up to 128 × 64"* ]] || fail "no summary"
     [ "$(grep '^usemtl' out.obj | tr '\n' ' ')" = "usemtl box usemtl second " ] || fail "$(grep usemtl out.obj)"
     shade info charts.png
     [[ $output == *"128 × "* ]] || fail "no picture of the pages"
-    shade unwrap two.obj -o out.obj --atlas objects --pages 2
-    refused 2 --pages
-    shade unwrap two.obj -o out.obj --atlas each
-    refused 2 --atlas objects
-    shade unwrap two.obj -o out.obj --max-size 64
-    refused 2 --max-size --texels-per-unit
-    shade unwrap two.obj -o out.obj --max-size 64 --size 32 --texels-per-unit 1
-    refused 2 --max-size --size
+    refuse unwrap two.obj -o out.obj <<'LIST'
+2 --pages | --atlas objects --pages 2
+2 --atlas objects | --atlas each
+2 --max-size --texels-per-unit | --max-size 64
+2 --max-size --size | --max-size 64 --size 32 --texels-per-unit 1
+LIST
 }
 
 @test "UVs that can serve are kept, and densities go by name" {
-    shade unwrap box.obj -o out.obj --size 128 --keep
-    done_well
+    succeed unwrap box.obj -o out.obj --size 128 --keep
     [[ $stderr == *"1 mesh kept their UVs"* ]] || fail "they were not kept"
-    shade unwrap box.obj -o out.obj --size 128 --density 'b*=0.5'
-    done_well
+    succeed unwrap box.obj -o out.obj --size 128 --density 'b*=0.5'
     shade unwrap box.obj -o out.obj --density none=2
     refused 2 none "'box'"
     shade unwrap box.obj -o out.obj --density 3
@@ -78,31 +69,23 @@ setup() {
 
 @test "the same file for any number of threads" {
     for threads in 1 5; do
-        shade unwrap "$ASSETS/smooth.glb" -o "$threads.obj" --size 256 --threads "$threads" --quiet
-        done_well
+        succeed unwrap "$ASSETS/smooth.glb" -o "$threads.obj" --size 256 --threads "$threads" --quiet
     done
     cmp 1.obj 5.obj || fail "they differ"
 }
 
 @test "bad options and places are refused" {
     old_output out.obj
-    shade unwrap box.obj
-    refused 2 -o
-    shade unwrap box.obj -o out.ply
-    refused 2 out.ply
-    shade unwrap box.obj -o none/out.obj
-    refused 3 none/out.obj
-    shade unwrap box.obj -o box.obj
-    refused 2 box.obj
-    shade unwrap box.obj -o out.obj --picture out.obj
-    refused 2 picture
-    shade unwrap box.obj -o out.obj --picture out.none
-    refused 2 out.none
-    shade unwrap box.obj -o out.obj --padding -1
-    refused 2 --padding
-    shade unwrap box.obj -o out.obj --max-stretch 1
-    refused 2 --max-stretch
-    shade unwrap none.obj -o out.obj
-    refused 3 none.obj
+    refuse unwrap <<'LIST'
+2 -o | box.obj
+2 out.ply | box.obj -o out.ply
+3 none/out.obj | box.obj -o none/out.obj
+2 box.obj | box.obj -o box.obj
+2 picture | box.obj -o out.obj --picture out.obj
+2 out.none | box.obj -o out.obj --picture out.none
+2 --padding | box.obj -o out.obj --padding -1
+2 --max-stretch | box.obj -o out.obj --max-stretch 1
+3 none.obj | none.obj -o out.obj
+LIST
     untouched out.obj
 }

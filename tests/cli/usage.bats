@@ -10,23 +10,20 @@ fits() {
 
 @test "the help names the commands and the exit codes" {
     for flag in --help -h; do
-        shade "$flag"
-        done_well
+        succeed "$flag"
         [[ $output == *bake*voxelize*info*130* ]] || fail "commands or exit codes are missing"
         fits
     done
 }
 
 @test "the version is the library's" {
-    shade --version
-    done_well
+    succeed --version
     [[ $output =~ ^vdbshade\ [0-9]+\.[0-9]+\.[0-9]+$ ]] || fail "no version"
 }
 
 @test "every command has its own help, which fits 100 columns" {
     for command in bake voxelize info trade query volume flat render compare regress unwrap view merge help; do
-        shade "$command" --help
-        done_well
+        succeed "$command" --help
         [[ $output == "Usage: vdbshade $command "* ]] || fail "no usage line"
         [ -z "$stderr" ] || fail "something on standard error"
         fits
@@ -36,8 +33,7 @@ fits() {
 @test "the help of options fills its column, counted in characters" {
     local LC_ALL=C.UTF-8 line text before
     for command in bake voxelize info trade query volume flat render compare regress unwrap view merge help; do
-        shade "$command" --help
-        done_well
+        succeed "$command" --help
         before=
         for line in "${lines[@]}"; do
             text=${line:30}
@@ -76,12 +72,11 @@ fits() {
 
 @test "an unknown option suggests the nearest" {
     write_box box.obj
-    shade bake box.obj -o out.exr --resolutoin 5
-    refused 2 'did you mean --resolution?'
-    shade bake box.obj -o out.exr --zzzzzzzzzz
-    refused 2 'bake --help'
-    shade bake box.obj -o out.exr -z
-    refused 2 '-z'
+    refuse bake box.obj -o out.exr <<'LIST'
+2 'did you mean --resolution?' | --resolutoin 5
+2 'bake --help' | --zzzzzzzzzz
+2 '-z' | -z
+LIST
 }
 
 @test "an abbreviated option is refused, as the next version may have another of that beginning" {
@@ -92,16 +87,13 @@ fits() {
 
 @test "a missing value, a value too many and an operand too many are usage errors" {
     write_box box.obj
-    shade bake box.obj -o
-    refused 2 '-o' value
-    shade bake box.obj -o out.exr --sun
-    refused 2 '--sun' value
-    shade bake box.obj -o out.exr --quiet=yes
-    refused 2 '--quiet'
-    shade bake box.obj other.obj -o out.exr --ao 1
-    refused 2 other.obj
-    shade bake -o out.exr
-    refused 2 'no INPUT'
+    refuse bake <<'LIST'
+2 '-o' value | box.obj -o
+2 '--sun' value | box.obj -o out.exr --sun
+2 '--quiet' | box.obj -o out.exr --quiet=yes
+2 other.obj | box.obj other.obj -o out.exr --ao 1
+2 'no INPUT' | -o out.exr
+LIST
 }
 
 @test "numbers are taken strictly" {
@@ -171,26 +163,22 @@ LIST
 
 @test "what a method does not use is refused beside it" {
     write_box box.obj
-    shade bake box.obj -o out.exr "${SMALL[@]}" --rays 8 --method cone
-    refused 2 --rays cone 'rays, adaptive and exact'
-    shade bake box.obj -o out.exr "${SMALL[@]}" --error --method smooth
-    refused 2 --error smooth
-    shade bake box.obj -o out.exr "${SMALL[@]}" --max-error 0.1 --method rays
-    refused 2 --max-error rays 'adaptive and exact'
+    refuse bake box.obj -o out.exr "${SMALL[@]}" <<'LIST'
+2 --rays cone 'rays, adaptive and exact' | --rays 8 --method cone
+2 --error smooth | --error --method smooth
+2 --max-error rays 'adaptive and exact' | --max-error 0.1 --method rays
+LIST
 }
 
 @test "a mesh needs something to bake" {
     write_box box.obj
-    shade bake box.obj -o out.exr
-    refused 2 --sun --ao
-    shade bake box.obj -o out.exr --ao 1 --sun-angle 5
-    refused 2 --sun-angle
-    shade bake box.obj -o out.exr --sun 0,1,0 --ao-method cones
-    refused 2 --ao-method
-    shade bake box.obj -o out.exr --ao 1 --irradiance
-    refused 2 --irradiance
-    shade bake box.obj --ao 1
-    refused 2 '-o'
+    refuse bake box.obj <<'LIST'
+2 --sun --ao | -o out.exr
+2 --sun-angle | -o out.exr --ao 1 --sun-angle 5
+2 --ao-method | -o out.exr --sun 0,1,0 --ao-method cones
+2 --irradiance | -o out.exr --ao 1 --irradiance
+2 '-o' | --ao 1
+LIST
 }
 
 @test "voxel size and resolution exclude each other" {
@@ -201,18 +189,15 @@ LIST
 
 @test "-q and -v are --quiet and --verbose, together with other letters too" {
     write_box box.obj
-    shade bake box.obj "${SMALL[@]}" -qo out.exr
-    done_well
+    succeed bake box.obj "${SMALL[@]}" -qo out.exr
     [ -z "$stderr" ]
-    shade bake box.obj "${SMALL[@]}" -v -o told.exr
-    done_well
+    succeed bake box.obj "${SMALL[@]}" -v -o told.exr
     [ -n "$stderr" ]
     cmp out.exr told.exr
 }
 
 @test "a file whose name begins with a dash comes after --" {
     write_box ./-box.obj
-    shade bake "${SMALL[@]}" --quiet -o out.exr -- -box.obj
-    done_well
+    succeed bake "${SMALL[@]}" --quiet -o out.exr -- -box.obj
     [ -s out.exr ]
 }

@@ -5,9 +5,8 @@ load helper
     write_box box.obj
     awk '$1 == "v" { print "v", $2, $3 + 0.25, $4; next } { print }' box.obj >above.obj
     write_scene box.json box.obj '"invalid": true'
-    shade bake box.json --caster above.obj --ao 0.5 --method exact --ao-method exact --size 64 --resolution 24 \
+    succeed bake box.json --caster above.obj --ao 0.5 --method exact --ao-method exact --size 64 --resolution 24 \
         -o box.exr --invalid where.png --verbose
-    done_well
     [[ $stderr == *"texels are invalid (inside a solid or behind a wall)"*"--invalid"* ]] ||
         fail "not told"
     run -0 "$VDBSHADE" info box.exr
@@ -26,8 +25,7 @@ load helper
         $1 == "v" { print "v", 3 * $2 - 1, 3 * $3 - 1, 3 * $4 - 1; next } { print }' box.obj >around.obj
     printf 'o sheet\nv -9 -9 -3\nv 9 -9 -3\nv 9 9 -3\nv -9 9 -3\nf 1 2 3 4\n' >sheet.obj
     write_scene bar.json bar.obj '"invalid": true'
-    shade bake bar.json --caster around.obj --caster sheet.obj --treat around=solid --ao 0.5 --size 64 --verbose -o bar.exr
-    done_well
+    succeed bake bar.json --caster around.obj --caster sheet.obj --treat around=solid --ao 0.5 --size 64 --verbose -o bar.exr
     [[ $stderr == *"texels are invalid"* && $stderr != *"plain sight"* ]] || fail "claimed"
     run -0 "$VDBSHADE" info bar.exr
     [[ $output == *"'invalid': min 0, "*", max 1"* ]] || fail "$output"
@@ -70,8 +68,7 @@ load helper
         outputs+=("{\"mesh\": \"box.obj\", \"size\": $((32 + 8 * ${#outputs[@]})), \"output\": \"$output\"}")
     done
     (IFS=, && echo "{\"casters\": [{\"mesh\": \"box.obj\"}], \"ao\": {\"distance\": 1}, \"receivers\": [${outputs[*]}]}") >walls.json
-    shade bake walls.json --invalid where.png
-    done_well
+    succeed bake walls.json --invalid where.png
     [ "$(ls where* | wc -l)" -eq 4 ] || fail "$(ls)"
     local name
     for name in wall:32 wall-3:40 wall-2:48 Wall-4:56; do
@@ -82,11 +79,9 @@ load helper
 
 @test "charts closer than a texel are told of, and from which size on they are apart" {
     write_box box.obj
-    shade bake box.obj "${SMALL[@]}" --size 16 -o out.exr
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --size 16 -o out.exr
     [[ $stderr == *"charts lie closer than a texel"*"mesh 'box'"*"from --size 2"[56]" on"* ]] || fail "not told"
-    shade bake box.obj "${SMALL[@]}" --size 26 -o out.exr
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --size 26 -o out.exr
     [[ $stderr != *"charts lie closer"* ]] || fail "told for no reason"
     # no size parts charts that touch
     sed 's/^vt 0.31 /vt 0.33 /; s/^vt 0.35 /vt 0.33 /' box.obj >touching.obj
@@ -98,13 +93,10 @@ load helper
     write_box box.obj
     awk '$1 == "v" { print "v", $2, $3 + 0.25, $4; next } { print }' box.obj >above.obj
     options=(--caster above.obj --sun 0.3,1,0.2 --ao 0.5 --size 64 --quiet)
-    shade bake box.obj "${options[@]}" --resolution 8 -o auto.exr
-    done_well
-    shade bake box.obj "${options[@]}" --resolution 8 --method exact --ao-method exact -o exact.exr
-    done_well
+    succeed bake box.obj "${options[@]}" --resolution 8 -o auto.exr
+    succeed bake box.obj "${options[@]}" --resolution 8 --method exact --ao-method exact -o exact.exr
     same_values auto.exr exact.exr
-    shade bake box.obj "${options[@]}" --resolution 64 -o finer.exr
-    done_well
+    succeed bake box.obj "${options[@]}" --resolution 64 -o finer.exr
     shade compare auto.exr finer.exr
     [[ $output == *"A: alike; "*" covered, 0 in one alone"* ]] || fail "voxels decide"
 }

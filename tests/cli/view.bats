@@ -13,8 +13,7 @@ block() {
 }
 
 @test "a page that needs nothing beside it, of what was given" {
-    shade view box.obj --planes box.exr -o box.html
-    done_well
+    succeed view box.obj --planes box.exr -o box.html
     [ -z "$output" ] || fail "something on standard output"
     no_leftovers
     ! grep -qE '(src|href)="?(https?:|/|\.)' box.html || fail "the page needs something beside it"
@@ -27,8 +26,7 @@ block() {
 }
 
 @test "every script of the page is one that its policy lets run" {
-    shade view box.obj -o box.html --quiet
-    done_well
+    succeed view box.obj -o box.html --quiet
     awk 'BEGIN { RS = "</script>" } match($0, /<script>/) { file = "script" ++n; printf "%s", substr($0, RSTART + 8) > file; close(file) }' box.html
     [ -s script3 ] || fail "too few scripts"
     for script in script*; do
@@ -39,8 +37,7 @@ block() {
 
 @test "what scripts look for in the page is there once" {
     local id
-    shade view box.obj --planes box.exr -o box.html --quiet
-    done_well
+    succeed view box.obj --planes box.exr -o box.html --quiet
     grep -oE '<[a-z0-9]+ ([^<>]* )?id="[a-z0-9-]+"' box.html | grep -oE 'id="[^"]+"' | sort >ids
     [ -z "$(uniq -d ids)" ] || fail "twice: $(uniq -d ids)"
     grep -ohE "byId\('[a-z-]+'\)" "$BATS_TEST_DIRNAME"/../../src/view/page/*.js | cut -d"'" -f2 | sort -u >sought
@@ -51,13 +48,11 @@ block() {
 }
 
 @test "a GLB goes in byte by byte; compressed geometry and other formats as triangles" {
-    shade view "$ASSETS/cloister.glb" -o page.html --quiet
-    done_well
+    succeed view "$ASSETS/cloister.glb" -o page.html --quiet
     block data0 page.html | cmp - "$ASSETS/cloister.glb" || fail "another GLB"
     models=$BATS_TEST_DIRNAME/../models
     for file in "$models/scene_draco.glb" "$models/scene.fbx" box.obj; do
-        shade view "$file" -o page.html --quiet
-        done_well
+        succeed view "$file" -o page.html --quiet
         block data0 page.html >plain.glb
         "$VDBSHADE" info "$file" | sed -n 's/^objects: .*, \([0-9]* triangles\).*/\1/p' >before
         "$VDBSHADE" info plain.glb | sed -n 's/^objects: .*, \([0-9]* triangles\).*/\1/p' >after
@@ -72,15 +67,13 @@ block() {
 @test "a glTF takes along what it names, and warns of what is not there" {
     models=$BATS_TEST_DIRNAME/../models
     cp "$models/scene.gltf" "$models/scene.bin" .
-    shade view scene.gltf -o page.html
-    done_well
+    succeed view scene.gltf -o page.html
     block data0 page.html | cmp - scene.gltf
     block data1 page.html | cmp - scene.bin
     grep -q '"files":\[{"uri":"scene.bin","data":"data1"}\]' page.html || fail "no word of the buffer"
     sed 's|"buffers"|"images":[{"uri":"gone.png"},{"uri":"../secret.png"}],"buffers"|' scene.gltf >named.gltf
     echo secret >../secret.png
-    shade view named.gltf -o page.html
-    done_well
+    succeed view named.gltf -o page.html
     [[ $stderr == *"gone.png"* ]] || fail "no warning of the missing picture"
     [[ $stderr == *"'../secret.png' is outside of its folder"* ]] || fail "no warning of the picture outside"
     ! grep -q "$(base64 <../secret.png)" page.html || fail "a file outside of the folder is in the page"
@@ -91,8 +84,7 @@ block() {
 @test "planes are those of the file, to a half float" {
     build=$(dirname "$(realpath "$VDBSHADE")")
     [ -e "$build/libvdbshade.so" ] || skip "this program has the library in it"
-    shade view box.obj --planes box.exr -o page.html --quiet
-    done_well
+    succeed view box.obj --planes box.exr -o page.html --quiet
     cat >planes.c <<'C'
 #include <Imath/half.h>
 #include <math.h>
@@ -146,20 +138,17 @@ C
     no_sun "${SMALL[@]}"
     "$VDBSHADE" bake box.json "${rest[@]}" --irradiance --bits 16 --quiet -o plain.png
     for name in light plain; do
-        shade view box.obj --planes $name.png -o $name.html --quiet
-        done_well
+        succeed view box.obj --planes $name.png -o $name.html --quiet
         block data1 $name.html >$name.z
     done
     [ -s light.z ] && cmp light.z plain.z
 }
 
 @test "two bakes, of one mesh and of two" {
-    shade view box.obj --planes box.exr --other-planes box.exr -o page.html --quiet
-    done_well
+    succeed view box.obj --planes box.exr --other-planes box.exr -o page.html --quiet
     [ "$(grep -o '"uvSet"' page.html | wc -l)" -eq 2 ] || fail "not two"
     [ "$(grep -o '"model":"data[0-9]*"' page.html | wc -l)" -eq 1 ] || fail "not one model"
-    shade view box.obj "$ASSETS/cloister.glb" --planes box.exr -o page.html --quiet
-    done_well
+    succeed view box.obj "$ASSETS/cloister.glb" --planes box.exr -o page.html --quiet
     grep -q '"model":"data0"' page.html && grep -q '"model":"data4"' page.html || fail "not two models"
 }
 
@@ -177,8 +166,7 @@ C
 
 @test "a scene is the surface of its voxels, with the shadow, AO and light of its sun and sky at each vertex" {
     sed 's/"voxel_size": 0.02/"voxel_size": 0.05/' "$ASSETS/seeds.json" >seeds.json
-    shade view seeds.json -o page.html --quiet
-    done_well
+    succeed view seeds.json -o page.html --quiet
     no_leftovers
     grep -oE '"name":"[a-zA-Z.]*","data":"data[0-9]"' page.html | cut -d'"' -f4,8 --output-delimiter=' ' >channels
     printf '%s\n' 'shadow.sun data1' 'ao data2' 'irradiance.R data3' 'irradiance.G data4' 'irradiance.B data5' | diff - channels
@@ -275,8 +263,7 @@ C
              {"spheres": [[0, 4, 0, 1]], "layer": "above"}],
  "layers": [{"name": "above", "voxel_size": 0.2}], "voxel_size": 0.2}
 JSON
-    shade view scene.json -o page.html --quiet
-    done_well
+    succeed view scene.json -o page.html --quiet
     block data0 page.html >surface.glb
     # the terrain's base is at y = -1, the sphere's top at y = 5
     "$VDBSHADE" info surface.glb | awk '$1 == "bounds:" { printf "%.2f %.2f %.2f\n", $3, $7, $6 }' >bounds
@@ -285,10 +272,12 @@ JSON
 
 @test "bad usage" {
     old_output page.html
-    refuses 2 'give -o OUT.html' -- view box.obj --planes box.exr
-    refuses 2 'page.exr' 'give -o OUT.html' -- view box.obj -o page.exr
-    refuses 2 'no INPUT' -- view -o page.html
-    refuses 2 'box.obj' -- view box.obj box.obj box.obj -o page.html
+    refuse view <<'LIST'
+2 'give -o OUT.html' | box.obj --planes box.exr
+2 'page.exr' 'give -o OUT.html' | box.obj -o page.exr
+2 'no INPUT' | -o page.html
+2 'box.obj' | box.obj box.obj box.obj -o page.html
+LIST
     cp box.obj in.html
     refuses 2 'the output is the input' -- view in.html -o in.html
     refuses 2 'also a file of planes' -- view box.obj --planes in.html -o in.html
@@ -300,9 +289,11 @@ JSON
 
 @test "files that are not there, damaged, or too large" {
     old_output page.html
-    refuses 3 gone.glb -- view gone.glb -o page.html
-    refuses 3 gone.exr -- view box.obj --planes gone.exr -o page.html
-    refuses 3 gone.obj -- view box.obj gone.obj -o page.html
+    refuse view <<'LIST'
+3 gone.glb | gone.glb -o page.html
+3 gone.exr | box.obj --planes gone.exr -o page.html
+3 gone.obj | box.obj gone.obj -o page.html
+LIST
     head -c 3000 "$ASSETS/cloister.glb" >cut.glb
     refuses 3 cut.glb -- view cut.glb -o page.html
     head -c 300 box.exr >cut.exr
@@ -316,8 +307,7 @@ JSON
 }
 
 @test "bake --view writes the page of what it baked, and the same image as without it" {
-    shade bake box.obj "${SMALL[@]}" --ao 0.5 -o again.exr --view baked.html --quiet
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --ao 0.5 -o again.exr --view baked.html --quiet
     cmp box.exr again.exr || fail "another image"
     shade view box.obj --planes again.exr -o page.html --quiet
     cmp baked.html page.html || fail "another page"
@@ -325,8 +315,10 @@ JSON
     for wrong in page.exr again.exr; do
         refuses 2 "--view '$wrong'" -- bake box.obj "${SMALL[@]}" -o again.exr --view $wrong
     done
-    refuses 3 nowhere -- bake box.obj "${SMALL[@]}" -o again.exr --view nowhere/page.html
-    refuses 2 'one lightmap of one mesh' -- bake box.obj "${SMALL[@]}" --per-object -o objects/ --view page.html
-    refuses 2 "--view 'page.html': an image does not hold the UVs that are made" -- bake box.obj --ao 1 --unwrap always -o unwrapped.png --view page.html
+    refuse bake box.obj <<'LIST'
+3 nowhere | "${SMALL[@]}" -o again.exr --view nowhere/page.html
+2 'one lightmap of one mesh' | "${SMALL[@]}" --per-object -o objects/ --view page.html
+2 "--view 'page.html': an image does not hold the UVs that are made" | --ao 1 --unwrap always -o unwrapped.png --view page.html
+LIST
     untouched page.html
 }

@@ -11,13 +11,11 @@ setup() {
 }
 
 info() {
-    shade info "$1"
-    done_well
+    succeed info "$1"
 }
 
 @test "a scene's band has a grid for each light, and ao" {
-    shade volume scene.json -o out.vdb
-    done_well
+    succeed volume scene.json -o out.vdb
     [[ $stderr == *"out.vdb: 2 grids of "*" voxels"* ]] || fail "no summary"
     info out.vdb
     [[ $output == *"grid 'shadow.sun'"*"class: unknown"*"voxel size: 0.1 0.1 0.1"*"background: 1"*"grid 'ao'"* ]] || fail "not what was asked for"
@@ -28,8 +26,7 @@ info() {
     info box.vdb
     [[ $output =~ active\ voxels:\ ([0-9]+) ]]
     band=${BASH_REMATCH[1]}
-    shade volume box.obj "${SUN[@]}" -o out.vdb --resolution 24 --quiet
-    done_well
+    succeed volume box.obj "${SUN[@]}" -o out.vdb --resolution 24 --quiet
     info out.vdb
     [[ $output =~ active\ voxels:\ ([0-9]+) ]]
     [ "${BASH_REMATCH[1]}" -eq "$band" ] || fail "not $band"
@@ -47,12 +44,10 @@ info() {
     shade voxelize box.obj -o asset.vdb --voxel-size 0.07 --quiet
     info asset.vdb
     box=$(grep 'active voxels' <<<"$output" | sed 's/.*: //')
-    shade volume asset.vdb "${SUN[@]}" -o out.vdb --quiet
-    done_well
+    succeed volume asset.vdb "${SUN[@]}" -o out.vdb --quiet
     info out.vdb
     [[ $output == *"voxel size: 0.07 0.07 0.07"*"active voxels: $box"* ]] || fail "other voxels than $box"
-    shade volume asset.vdb "${SUN[@]}" -o off.vdb --inside off --stats stats.json
-    done_well
+    succeed volume asset.vdb "${SUN[@]}" -o off.vdb --inside off --stats stats.json
     [[ $stderr == *" 0 of them filled"* ]] || fail "some were filled"
     grep -q '"inside_voxels": [1-9]' stats.json && grep -q '"voxels": [1-9]' stats.json
     info off.vdb
@@ -60,12 +55,10 @@ info() {
 }
 
 @test "a box has its own voxels" {
-    shade volume scene.json -o out.vdb --box -2,-0.2,-2,2,1.8,2 --box-voxel-size 0.25 --quiet
-    done_well
+    succeed volume scene.json -o out.vdb --box -2,-0.2,-2,2,1.8,2 --box-voxel-size 0.25 --quiet
     info out.vdb
     [[ $output == *"voxel size: 0.25 0.25 0.25"*"0 0 0 to 15 7 15"* ]] || fail "another box"
-    shade volume scene.json -o out.vdb --box 0,3,0,1,4,1 --quiet
-    done_well
+    succeed volume scene.json -o out.vdb --box 0,3,0,1,4,1 --quiet
     info out.vdb
     [[ $output == *"voxel size: 0.1 0.1 0.1"*"active voxels: 1000,"* ]] || fail "not the casters' voxels"
 }
@@ -74,8 +67,7 @@ info() {
     shade volume scene.json -o fog.vdb --box -1,0.5,-1,1,1.5,1 --box-voxel-size 0.1 --quiet
     info fog.vdb
     for like in fog.vdb fog.vdb:ao fog.vdb:shadow.sun ./fog.vdb:ao; do
-        shade volume scene.json -o lit.vdb --like "$like" --quiet
-        done_well
+        succeed volume scene.json -o lit.vdb --like "$like" --quiet
         same_values fog.vdb lit.vdb || fail "$like: other voxels or values"
     done
 }
@@ -84,35 +76,31 @@ info() {
     shade volume scene.json --method cone --ao-method cones -o 1.vdb --threads 1 --quiet
     shade volume scene.json --method cone --ao-method cones -o 5.vdb --threads 5 --quiet
     cmp 1.vdb 5.vdb
-    shade volume scene.json --method cone --ao-method cones -o half.vdb --half --quiet
-    done_well
+    succeed volume scene.json --method cone --ao-method cones -o half.vdb --half --quiet
     [ "$(stat -c %s half.vdb)" -lt "$(($(stat -c %s 1.vdb) * 19 / 20))" ] || fail "not smaller"
     info half.vdb
     [[ $output == *"Tree_float_5_4_3"* ]] || fail "no floats"
 }
 
 @test "errors have grids of their own" {
-    shade volume scene.json -o out.vdb --max-error 0.1 --error --quiet
-    done_well
+    succeed volume scene.json -o out.vdb --max-error 0.1 --error --quiet
     info out.vdb
     [[ $output == *"shadow.sun"*"'ao'"*"error.sun"*"error.ao"* ]] || fail "no errors"
 }
 
 @test "a dry run tells voxels and memory, and bakes nothing" {
-    shade volume "$ASSETS/cloister.glb" --sun 1,1,1 --ao 1 --box 0,0,0,1,2,3 --box-voxel-size 0.1 --resolution 16 -o out.vdb --dry-run
-    done_well
+    succeed volume "$ASSETS/cloister.glb" --sun 1,1,1 --ao 1 --box 0,0,0,1,2,3 --box-voxel-size 0.1 --resolution 16 -o out.vdb --dry-run
     [[ "$output" =~ ^"voxels        6000, those inside too"$'\n'"memory        about "[0-9.]+" MiB at most"$ ]] || fail "$output"
     [ ! -e out.vdb ]
 }
 
 @test "bad options are refused, and the old file stays" {
     old_output out.vdb
-    shade volume scene.json
-    refused 2 -o
-    shade volume scene.json -o out.exr
-    refused 2 out.exr
-    shade volume box.obj -o out.vdb
-    refused 2 'nothing to bake'
+    refuse volume <<'LIST'
+2 -o | scene.json
+2 out.exr | scene.json -o out.exr
+2 'nothing to bake' | box.obj -o out.vdb
+LIST
     for box in 0,0,0,1,1 0,0,0,1,0,1 0,0,0,1,-1,1 0,0,nan,1,1,1 0,0,0,1,1,1,1 a; do
         shade volume scene.json -o out.vdb --box "$box"
         refused 2 --box "$box"
@@ -121,36 +109,28 @@ info() {
         shade volume scene.json -o out.vdb --box 0,0,0,1,1,1 --box-voxel-size "$size"
         refused 2 --box-voxel-size
     done
-    shade volume scene.json -o out.vdb --box-voxel-size 1
-    refused 2 'no --box'
-    shade volume scene.json -o out.vdb --box 0,0,0,1,1,1 --band 2
-    refused 2 'one of'
-    shade volume scene.json -o out.vdb --box 0,0,0,1,1,1 --like a.vdb
-    refused 2 'one of'
-    shade volume scene.json -o out.vdb --band 0
-    refused 2 --band
-    shade volume scene.json -o out.vdb --band 101
-    refused 2 --band
-    shade volume scene.json -o out.vdb --inside maybe
-    refused 2 'nearest, off'
-    shade volume scene.json -o out.vdb --box 0,3,0,1,4,1 --ao-method taps
-    refused 2 taps
-    shade volume scene.json -o none/out.vdb
-    refused 3 none/out.vdb
+    refuse volume scene.json -o <<'LIST'
+2 'no --box' | out.vdb --box-voxel-size 1
+2 'one of' | out.vdb --box 0,0,0,1,1,1 --band 2
+2 'one of' | out.vdb --box 0,0,0,1,1,1 --like a.vdb
+2 --band | out.vdb --band 0
+2 --band | out.vdb --band 101
+2 'nearest, off' | out.vdb --inside maybe
+2 taps | out.vdb --box 0,3,0,1,4,1 --ao-method taps
+3 none/out.vdb | none/out.vdb
+LIST
     untouched out.vdb
 }
 
 @test "a bad --like is refused with its reason" {
     old_output out.vdb
     shade voxelize box.obj -o ls.vdb --resolution 24 --quiet
-    shade volume scene.json -o out.vdb --like none.vdb
-    refused 3 none.vdb
-    shade volume scene.json -o out.vdb --like ls.vdb:density
-    refused 2 ls.vdb "no grid 'density'" "'surface'"
-    shade volume scene.json -o out.vdb --like ls.vdb:
-    refused 2 --like
-    shade volume scene.json -o out.vdb --like scene.json
-    refused 3 scene.json
+    refuse volume scene.json -o out.vdb --like <<'LIST'
+3 none.vdb | none.vdb
+2 ls.vdb "no grid 'density'" "'surface'" | ls.vdb:density
+2 --like | ls.vdb:
+3 scene.json | scene.json
+LIST
     head -c 300 ls.vdb >cut.vdb
     shade volume scene.json -o out.vdb --like cut.vdb
     refused 3 cut.vdb
@@ -161,12 +141,11 @@ info() {
 
 @test "too many voxels are a limit, named before memory is taken" {
     old_output out.vdb
-    shade volume scene.json -o out.vdb --box -5,-5,-5,5,5,5 --box-voxel-size 0.0077 --memory-limit 2G
-    refused 4 '1299 x 1299 x 1299' 'limit'
-    shade volume scene.json -o out.vdb --box -5,-5,-5,5,5,5 --box-voxel-size 0.05 --memory-limit 40M
-    refused 4 'limit'
-    shade volume scene.json -o out.vdb --box -5,-5,-5,5,5,5 --box-voxel-size 1e-6
-    refused 4 1e-06
+    refuse volume scene.json -o out.vdb --box -5,-5,-5,5,5,5 --box-voxel-size <<'LIST'
+4 '1299 x 1299 x 1299' 'limit' | 0.0077 --memory-limit 2G
+4 'limit' | 0.05 --memory-limit 40M
+4 1e-06 | 1e-6
+LIST
     untouched out.vdb
 }
 

@@ -7,31 +7,27 @@ setup() {
 }
 
 @test "a mesh becomes a level set of the voxel size and band asked for" {
-    shade voxelize box.obj -o out.vdb --voxel-size 0.04 --half-width 5
-    done_well
+    succeed voxelize box.obj -o out.vdb --voxel-size 0.04 --half-width 5
     [[ $stderr == *"out.vdb: voxel 0.04, "*"active voxels"* ]] || fail "no summary"
     shade info out.vdb
     [[ $output == *"grid 'surface'"*"voxel size: 0.04 0.04 0.04"*"(5 voxels)"* ]] || fail "not what was asked for"
 }
 
 @test "a resolution is counted along the longest side" {
-    shade voxelize box.obj -o out.vdb --resolution 50 --quiet
-    done_well
+    succeed voxelize box.obj -o out.vdb --resolution 50 --quiet
     shade info out.vdb
     [[ $output == *"voxel size: 0.02 0.02 0.02"* ]] || fail "wrong voxel size"
 }
 
 @test "a scene's casters become one level set" {
-    shade voxelize "$ASSETS/seeds.json" -o seeds.vdb --voxel-size 0.1 --quiet
-    done_well
+    succeed voxelize "$ASSETS/seeds.json" -o seeds.vdb --voxel-size 0.1 --quiet
     shade info seeds.vdb
     [[ $output == *"class: level set"* ]] || fail "no level set"
 }
 
 @test "the same values for any number of threads" {
     for threads in 1 5; do
-        shade voxelize box.obj -o "$threads.vdb" --resolution 64 --threads "$threads" --quiet
-        done_well
+        succeed voxelize box.obj -o "$threads.vdb" --resolution 64 --threads "$threads" --quiet
     done
     same_values 1.vdb 5.vdb || fail "they differ"
     shade voxelize box.obj -o other.vdb --resolution 65 --quiet
@@ -40,20 +36,15 @@ setup() {
 
 @test "bad options and places are refused" {
     old_output out.vdb
-    shade voxelize box.obj --resolution 24
-    refused 2 -o
-    shade voxelize box.obj -o out.exr
-    refused 2 out.exr
-    shade voxelize box.obj -o none/out.vdb
-    refused 3 none/out.vdb
-    shade voxelize box.obj -o out.vdb --voxel-size 0
-    refused 2 --voxel-size
-    shade voxelize box.obj -o out.vdb --voxel-size 1e-7
-    refused 4
-    shade voxelize none.obj -o out.vdb
-    refused 3 none.obj
-    shade voxelize out.vdb -o out.vdb
-    refused 2 out.vdb
+    refuse voxelize <<'LIST'
+2 -o | box.obj --resolution 24
+2 out.exr | box.obj -o out.exr
+3 none/out.vdb | box.obj -o none/out.vdb
+2 --voxel-size | box.obj -o out.vdb --voxel-size 0
+4 | box.obj -o out.vdb --voxel-size 1e-7
+3 none.obj | none.obj -o out.vdb
+2 out.vdb | out.vdb -o out.vdb
+LIST
     untouched out.vdb
 }
 
@@ -82,8 +73,6 @@ setup() {
     shade query no.vdb:hull --points points.csv --distance -o out.csv
     refused 3 no.vdb
     mv box.vdb 'a.vdb:hull.vdb'
-    shade query a.vdb:hull.vdb --points points.csv --distance -o out.csv
-    done_well
-    shade query a.vdb:hull.vdb:hull --points points.csv --distance -o out.csv
-    done_well
+    succeed query a.vdb:hull.vdb --points points.csv --distance -o out.csv
+    succeed query a.vdb:hull.vdb:hull --points points.csv --distance -o out.csv
 }

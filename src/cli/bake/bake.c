@@ -25,14 +25,6 @@ static int check_image(const cli_bake_settings *settings, const vsh_scene *scene
                : cli_fail(&error);
 }
 
-static int check_picture(const cli_bake_settings *settings) {
-    const char *path = settings->invalid_picture;
-    if (path != NULL && !cli_has_ending(path, "png")) {
-        return cli_usage("--invalid '%s': expected a name that ends in .png", path);
-    }
-    return CLI_OK;
-}
-
 /* What is only for outputs that are assets. */
 static int check_lit(const cli_bake_settings *settings, const vsh_scene *scene) {
     const char *given = settings->preview ? "preview" : settings->exr != NULL ? "exr" : NULL;
@@ -103,7 +95,9 @@ static int check_files(const cli_bake_settings *settings, const vsh_scene *scene
         CLI_TRY(cli_temporary_check(settings->stats));
     }
     CLI_TRY(check_shard(settings, scene));
-    CLI_TRY(check_picture(settings));
+    if (settings->invalid_picture != NULL && !cli_has_ending(settings->invalid_picture, "png")) {
+        return cli_usage("--invalid '%s': expected a name that ends in .png", settings->invalid_picture);
+    }
     CLI_TRY(check_lit(settings, scene));
     CLI_TRY(check_view(settings, scene));
     const bool makes = settings->output_folder != NULL || settings->per_object;
@@ -125,36 +119,41 @@ enum { MOST_LINES = 8 }; /* lightmaps that get a line each */
 typedef struct baking {
     const cli_bake_settings *settings;
     const vsh_scene *scene;
-    size_t count;     /* lightmaps */
-    int code;         /* an exit code of check_outputs() */
-    bool files_known; /* their warnings are not printed yet */
+    const char *parts; /* what goes before ".I-of-N.part" */
+    size_t count;      /* lightmaps */
+    int code;          /* an exit code of check_outputs() */
+    bool files_known;  /* their warnings are not printed yet */
 } baking;
 
 /* Checks the outputs again: objects' outputs have their names now, and models their textures. */
-static int check_outputs(const baking *b, const vsh_scene_lightmap *lightmaps, const char **outputs) {
+static int check_outputs(const baking *b, const vsh_scene_lightmap *lightmaps) {
     const cli_bake_settings *s = b->settings;
     const char *const others[] = {s->stats, s->exr, s->view, s->invalid_picture};
+    enum { OTHERS = sizeof others / sizeof others[0] };
+    const char **outputs = calloc(b->count + OTHERS, sizeof *outputs);
     size_t count = 0;
+    int code;
     for (; count < b->count; ++count) {
         outputs[count] = lightmaps[count].output;
-        CLI_TRY(cli_bake_check_output(s, b->scene, outputs[count]));
+        CLI_TRY_DONE(cli_bake_check_output(s, b->scene, outputs[count]));
     }
-    for (size_t i = 0; i < sizeof others / sizeof others[0]; ++i) {
+    for (size_t i = 0; i < OTHERS; ++i) {
         outputs[count] = others[i];
         count += others[i] != NULL;
     }
-    return cli_bake_check_inputs(b->scene, outputs, count);
+    code = cli_bake_check_inputs(b->scene, outputs, count);
+done:
+    free(outputs);
+    return code;
 }
 
 static vsh_result check_loaded(void *user, const vsh_scene_lightmap *lightmaps, size_t count,
                                vsh_error *error) {
     (void)error; /* check_outputs() has said why */
     baking *b = user;
-    const char **outputs = calloc(count + 4, sizeof *outputs);
     b->count = count;
     b->files_known = true;
-    b->code = outputs != NULL ? check_outputs(b, lightmaps, outputs) : cli_out_of_memory(b->settings->input);
-    free(outputs);
+    b->code = check_outputs(b, lightmaps);
     return b->code == CLI_OK ? VSH_OK : VSH_ERROR_CANCELLED;
 }
 
@@ -181,18 +180,6 @@ static void say_lightmap(void *user, const vsh_scene_lightmap *lightmap) {
 }
 
 /* --- reports */
-
-/* A name to go before ".I-of-N.part". */
-static const char *name_parts(const cli_bake_settings *s, const vsh_scene *scene) {
-    const char *output = s->output != NULL ? s->output : scene->receivers[0].output;
-    return cli_end_path(output, ""); /* a folder, of objects */
-}
-
-static void say_part(const cli_bake_settings *s, const char *parts, const vsh_bake_report *report) {
-    cli_say("%s.%d-of-%d.part: %" PRIu64 " texels, %" PRIu64
-            " of them invalid; 'vdbshade merge %s' once all parts are there",
-            parts, s->shard, s->shard_count, report->texels, report->invalid_texels, parts);
-}
 
 static cli_stats make_stats(const vsh_scene *scene, const vsh_bake_report *report, int32_t threads) {
     cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS, threads);
@@ -232,8 +219,7 @@ static int write_view(const cli_bake_settings *settings, const vsh_scene *scene,
     return cli_check_result(vsh_view_write(settings->view, &bake, NULL, run, &error), &error);
 }
 
-static int report_bake(const baking *b, const char *parts, const vsh_bake_report *report,
-                       const vsh_run *run) {
+static int report_bake(const baking *b, const vsh_bake_report *report, const vsh_run *run) {
     const cli_bake_settings *s = b->settings;
     const cli_stats stats = make_stats(b->scene, report, run->threads);
     cli_stats_warn(&stats, b->scene, run);
@@ -244,7 +230,9 @@ static int report_bake(const baking *b, const char *parts, const vsh_bake_report
         return CLI_OK;
     }
     if (s->shard > 0) {
-        say_part(s, parts, report);
+        cli_say("%s.%d-of-%d.part: %" PRIu64 " texels, %" PRIu64
+                " of them invalid; 'vdbshade merge %s' once all parts are there",
+                b->parts, s->shard, s->shard_count, report->texels, report->invalid_texels, b->parts);
     } else if (!has_lines(b)) {
         cli_say("%zu lightmaps: %" PRIu64 " texels, %" PRIu64 " of them invalid; --verbose lists each",
                 b->count, report->texels, report->invalid_texels);
@@ -255,23 +243,20 @@ static int report_bake(const baking *b, const char *parts, const vsh_bake_report
     return CLI_OK;
 }
 
-static int run_bake(baking *b, const char *parts, const vsh_bake_options *options, const vsh_run *run) {
+static int run_bake(const baking *b, const vsh_bake_options *options, const vsh_run *run) {
     const bool merges = b->settings->merged != NULL;
     vsh_bake_report report = {.errors = calloc(b->scene->light_count + 2, sizeof *report.errors)};
     vsh_error error;
-    if (report.errors == NULL) {
-        return cli_out_of_memory(b->settings->input);
-    }
     const vsh_result result =
         (merges ? vsh_merge_scene : vsh_bake_scene)(b->scene, options, run, &report, &error);
     const int code = b->code != CLI_OK  ? b->code
                      : result != VSH_OK ? cli_fail_of(NULL, &error)
-                                        : report_bake(b, parts, &report, run);
+                                        : report_bake(b, &report, run);
     free(report.errors);
     return code;
 }
 
-static int print_forecast(baking *b, const vsh_bake_options *options, const vsh_run *run) {
+static int print_forecast(const baking *b, const vsh_bake_options *options, const vsh_run *run) {
     vsh_bake_forecast f;
     vsh_error error;
     const vsh_result result = vsh_forecast_scene(b->scene, options, run, &f, &error);
@@ -298,32 +283,30 @@ static int print_forecast(baking *b, const vsh_bake_options *options, const vsh_
 }
 
 /* Bakes a scene whose options were checked, or merges its parts, or forecasts the bake. */
-static int bake_scene(const cli_bake_settings *settings, const vsh_scene *scene) {
-    baking b = {.settings = settings, .scene = scene};
+static int bake_scene(const cli_bake_settings *s, const vsh_scene *scene) {
+    const char *output = s->output != NULL ? s->output : scene->receivers[0].output;
+    baking b = {.settings = s, .scene = scene};
+    b.parts = s->merged != NULL ? s->merged : cli_end_path(output, ""); /* it may be a folder, of objects */
     vsh_run run = cli_make_run();
     run.progress = report_progress;
     run.user = &b;
-    const char *const files[] = {settings->input, cli_bake_lights(settings)};
-    const char *parts = name_parts(settings, scene);
-    if (parts == NULL) {
-        return cli_out_of_memory(settings->input);
-    }
+    const char *const files[] = {s->input, cli_bake_lights(s)};
     vsh_bake_options options = vsh_bake_options_default();
-    options.invalid_picture = settings->invalid_picture;
-    options.lit_preview = settings->preview;
-    options.lit_exr = settings->exr;
+    options.invalid_picture = s->invalid_picture;
+    options.lit_preview = s->preview;
+    options.lit_exr = s->exr;
     options.command = cli_parsed_command();
     options.files = files;
-    options.file_count = settings->lights != NULL ? 2 : 1;
-    options.shard = settings->dry_run ? 0 : settings->shard; /* a forecast is of the whole bake */
-    options.shard_count = settings->shard_count;
-    options.parts = settings->merged != NULL ? settings->merged : parts;
-    options.words = settings->words;
-    options.word_count = settings->word_count;
+    options.file_count = s->lights != NULL ? 2 : 1;
+    options.shard = s->dry_run ? 0 : s->shard; /* a forecast is of the whole bake */
+    options.shard_count = s->shard_count;
+    options.parts = b.parts;
+    options.words = s->words;
+    options.word_count = s->word_count;
     options.loaded = check_loaded;
     options.done = say_lightmap;
     options.user = &b;
-    return settings->dry_run ? print_forecast(&b, &options, &run) : run_bake(&b, parts, &options, &run);
+    return s->dry_run ? print_forecast(&b, &options, &run) : run_bake(&b, &options, &run);
 }
 
 int cli_bake_by(const cli_bake_settings *settings) {

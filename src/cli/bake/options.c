@@ -8,8 +8,6 @@
 
 enum { KEY_RECEIVE = 0x2000, KEY_NO_RECEIVE, KEY_DENSITY, KEY_HEIGHT, KEY_SIZE_WORLD, KEY_SHARD };
 
-static int bake_main(int argc, char **argv);
-
 static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
     {CLI_TEXT(cli_bake_settings, output), "output", "OUT",
@@ -62,17 +60,6 @@ static const cli_option options[] = {
      "last\nthat means one holds (1)"},
     CLI_COMMON_OPTIONS,
 };
-
-const cli_command cli_bake = {
-    "bake",
-    "INPUT -o OUT [options]",
-    "Bakes soft shadows and ambient occlusion into a lightmap. INPUT is a mesh file with lightmap UVs\n"
-    "(OBJ, glTF, GLB, PLY, FBX …), which casts and receives, an image of heights (with --height), or a\n"
-    "scene file (.json), whose values the options override. Numbers in brackets are what holds without\n"
-    "the option.",
-    options,
-    sizeof options / sizeof options[0],
-    bake_main};
 
 /* W or W,D */
 static int parse_world(const char *name, const char *value, double world[2]) {
@@ -164,3 +151,14 @@ static int bake_main(int argc, char **argv) {
     CLI_TRY(cli_bake_parse(argc, argv, &settings));
     return cli_bake_by(&settings);
 }
+
+const cli_command cli_bake = {
+    "bake",
+    "INPUT -o OUT [options]",
+    "Bakes soft shadows and ambient occlusion into a lightmap. INPUT is a mesh file with lightmap UVs\n"
+    "(OBJ, glTF, GLB, PLY, FBX …), which casts and receives, an image of heights (with --height), or a\n"
+    "scene file (.json), whose values the options override. Numbers in brackets are what holds without\n"
+    "the option.",
+    options,
+    sizeof options / sizeof options[0],
+    bake_main};

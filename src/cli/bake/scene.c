@@ -59,18 +59,12 @@ static vsh_caster caster_of_input(const cli_bake_settings *s) {
 static int add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
     const size_t own = made->read != NULL ? made->read->caster_count : 1;
     made->casters = calloc(own + s->caster_count, sizeof *made->casters);
-    if (made->casters == NULL) {
-        return cli_out_of_memory("casters");
-    }
     for (size_t i = 0; i < own; ++i) {
         made->casters[i] = made->read != NULL ? made->read->casters[i] : caster_of_input(s);
     }
     for (size_t i = 0; i < s->caster_count; ++i) {
         const char *given = s->casters[i], *grid = cli_grid_name(given);
         const char *path = grid != NULL ? cli_keep_text("%.*s", (int)(grid - 1 - given), given) : given;
-        if (path == NULL) {
-            return cli_out_of_memory("casters");
-        }
         made->casters[own + i] = caster_of(path, grid);
     }
     made->scene.casters = made->casters;
@@ -130,9 +124,6 @@ int cli_bake_scene_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
         return CLI_OK;
     }
     made->receivers = calloc(count, sizeof *made->receivers);
-    if (made->receivers == NULL) {
-        return cli_out_of_memory("receivers");
-    }
     for (size_t i = 0; i < count; ++i) {
         made->receivers[i] = floor                ? floor_of(s)
                              : made->read != NULL ? made->read->receivers[i]
@@ -217,9 +208,6 @@ static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
     }
     for (size_t i = 0; i < made->scene.receiver_count; ++i) {
         made->receivers[i].output = place_output(s, made->receivers[i].output);
-        if (made->receivers[i].output == NULL) {
-            return cli_out_of_memory("outputs");
-        }
     }
     return CLI_OK;
 }
@@ -347,9 +335,6 @@ static int join_lights(const cli_bake_settings *s, const vsh_light *others, size
     const size_t own = made->scene.light_count;
     vsh_error error;
     made->lights = calloc(own + 1 + count, sizeof *made->lights);
-    if (made->lights == NULL) {
-        return cli_out_of_memory("lights");
-    }
     if (own > 0) {
         memcpy(made->lights, made->scene.lights, own * sizeof *made->lights);
     }

@@ -29,19 +29,6 @@ static const cli_option options[] = {
     CLI_COMMON_OPTIONS,
 };
 
-static int flat_main(int argc, char **argv);
-
-const cli_command cli_flat = {
-    "flat",
-    "SCENE.json -o OUT [options]",
-    "Bakes a light map of a plane, for 2D games: for each light the share of it that is seen, soft\n"
-    "shadows of areas, images and text included, the irradiance by all, and where solids are. The\n"
-    "scene's file is one of its own kind: docs/flat.md. What is in brackets holds without the option\n"
-    "and without the scene's key.",
-    options,
-    sizeof options / sizeof options[0],
-    flat_main};
-
 static int take(void *settings, int key, const char *name, const char *value) {
     return cli_patch_take(&((flat_settings *)settings)->patch, key, name, value);
 }
@@ -56,37 +43,34 @@ static int apply(const flat_settings *s, vsh_flat_scene *scene) {
 /* --- channels: irradiance.R, .G and .B, then the shadows, then A */
 
 typedef struct flat_planes {
-    char (*names)[VSH_CHANNEL_NAME];
-    const char **name_list;
+    const char **names;
     int32_t *holds;
     float **planes; /* [count], in one piece of memory */
     size_t count;
     vsh_image image;
 } flat_planes;
 
-static int name_planes(const vsh_flat_scene *scene, flat_planes *p) {
+static void name_planes(const vsh_flat_scene *scene, flat_planes *p) {
     p->count = scene->light_count + 4;
     p->names = calloc(p->count, sizeof *p->names);
-    p->name_list = calloc(p->count, sizeof *p->name_list);
     p->holds = calloc(p->count, sizeof *p->holds);
     p->planes = calloc(p->count, sizeof *p->planes);
-    if (p->names == NULL || p->name_list == NULL || p->holds == NULL || p->planes == NULL) {
-        return cli_out_of_memory("channels");
-    }
     for (size_t i = 0; i < p->count; ++i) {
         if (i < 3) {
-            snprintf(p->names[i], VSH_CHANNEL_NAME, "irradiance.%c", "RGB"[i]);
+            p->names[i] = cli_keep_text("irradiance.%c", "RGB"[i]);
             p->holds[i] = VSH_CHANNEL_LIGHT;
         } else if (i + 1 < p->count) {
-            snprintf(p->names[i], VSH_CHANNEL_NAME, "shadow.%s", scene->lights[i - 3].name);
+            p->names[i] = cli_keep_text("shadow.%s", scene->lights[i - 3].name);
         } else {
-            snprintf(p->names[i], VSH_CHANNEL_NAME, "A");
+            p->names[i] = "A";
         }
-        p->name_list[i] = p->names[i];
     }
-    p->image = (vsh_image){scene->options.width, scene->options.height,           (int32_t)p->count,
-                           p->name_list,         (const float *const *)p->planes, p->holds};
-    return CLI_OK;
+    p->image = (vsh_image){scene->options.width,
+                           scene->options.height,
+                           (int32_t)p->count,
+                           p->names,
+                           (const float *const *)p->planes,
+                           p->holds};
 }
 
 static int allocate_planes(const vsh_flat_scene *scene, const vsh_image_options *image, flat_planes *p) {
@@ -103,17 +87,16 @@ static int allocate_planes(const vsh_flat_scene *scene, const vsh_image_options 
         return CLI_LIMIT;
     }
     p->planes[0] = calloc(texels * p->count, sizeof(float));
-    for (size_t i = 1; i < p->count && p->planes[0] != NULL; ++i) {
+    for (size_t i = 1; i < p->count; ++i) {
         p->planes[i] = p->planes[0] + i * texels;
     }
-    return p->planes[0] != NULL ? CLI_OK : cli_out_of_memory(scene->output);
+    return CLI_OK;
 }
 
 static void free_planes(flat_planes *p) {
-    free(p->planes != NULL ? p->planes[0] : NULL);
+    free(p->planes[0]);
     free(p->planes);
     free(p->holds);
-    free(p->name_list);
     free(p->names);
 }
 
@@ -156,9 +139,6 @@ static int make_origin(const flat_settings *s, const vsh_flat_scene *scene, cons
     const size_t count = 1 + scene->caster_count;
     const char **files = calloc(count, sizeof *files);
     *origin = (cli_provenance){.count = 0};
-    if (files == NULL) {
-        return cli_out_of_memory(scene->output);
-    }
     files[0] = s->input;
     for (size_t i = 0; i < scene->caster_count; ++i) {
         files[1 + i] = scene->casters[i].path;
@@ -235,7 +215,7 @@ static int run_flat(const flat_settings *s, const vsh_flat_scene *scene, const v
     cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS, run->threads);
     stats.texels = (uint64_t)scene->options.width * (uint64_t)scene->options.height;
     int code;
-    CLI_TRY_DONE(name_planes(scene, &planes));
+    name_planes(scene, &planes);
     CLI_TRY_DONE(check_files(s, scene, &planes.image, &image));
     CLI_TRY_DONE(allocate_planes(scene, &image, &planes));
     cli_signals_watch();
@@ -263,3 +243,14 @@ done:
     vsh_flat_scene_free(scene);
     return code;
 }
+
+const cli_command cli_flat = {
+    "flat",
+    "SCENE.json -o OUT [options]",
+    "Bakes a light map of a plane, for 2D games: for each light the share of it that is seen, soft\n"
+    "shadows of areas, images and text included, the irradiance by all, and where solids are. The\n"
+    "scene's file is one of its own kind: docs/flat.md. What is in brackets holds without the option\n"
+    "and without the scene's key.",
+    options,
+    sizeof options / sizeof options[0],
+    flat_main};

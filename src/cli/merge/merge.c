@@ -25,18 +25,6 @@ static const cli_option options[] = {
     CLI_COMMON_OPTIONS,
 };
 
-static int merge_main(int argc, char **argv);
-
-const cli_command cli_merge = {
-    "merge",
-    "OUT [options]",
-    "Puts together what 'bake --shard I/N -o OUT' left in OUT.1-of-N.part to OUT.N-of-N.part: the same\n"
-    "file, bit by bit, as without --shard. The parts say by which options; their inputs are read again,\n"
-    "from this folder where paths are relative, and must not have changed. Parts stay. See docs/farm.md.",
-    options,
-    sizeof options / sizeof options[0],
-    merge_main};
-
 static int take(void *settings, int key, const char *name, const char *value) {
     merge_settings *s = settings;
     (void)key; /* --shards: the parser stores the others */
@@ -63,9 +51,6 @@ static int merge(const merge_settings *s, int argc, char **argv) {
     }
     if (bake.output != NULL) { /* a folder of objects stays one */
         bake.output = *cli_file_name(bake.output) == '\0' ? cli_end_path(s->output, "/") : s->output;
-        if (bake.output == NULL) {
-            return cli_out_of_memory(s->output);
-        }
     }
     bake.merged = s->output;
     bake.shard = 0;
@@ -85,9 +70,6 @@ static int merge_main(int argc, char **argv) {
     CLI_TRY(cli_parse(&cli_merge, argc, argv, take, &s, &s.output));
     const vsh_run run = cli_make_run();
     s.output = cli_end_path(s.output, "");
-    if (s.output == NULL) {
-        return cli_out_of_memory("OUT");
-    }
     char **words = NULL;
     size_t count = 0;
     vsh_error error;
@@ -96,3 +78,13 @@ static int merge_main(int argc, char **argv) {
     vsh_part_words_free(words);
     return code;
 }
+
+const cli_command cli_merge = {
+    "merge",
+    "OUT [options]",
+    "Puts together what 'bake --shard I/N -o OUT' left in OUT.1-of-N.part to OUT.N-of-N.part: the same\n"
+    "file, bit by bit, as without --shard. The parts say by which options; their inputs are read again,\n"
+    "from this folder where paths are relative, and must not have changed. Parts stay. See docs/farm.md.",
+    options,
+    sizeof options / sizeof options[0],
+    merge_main};

@@ -42,19 +42,6 @@ static const cli_option options[] = {
     CLI_COMMON_OPTIONS,
 };
 
-static int trade_main(int argc, char **argv);
-
-const cli_command cli_trade = {
-    "trade",
-    "INPUT -o OUT.html [options]",
-    "Bakes a mesh or a scene (.json) by every method, at several voxel sizes and settings, and compares\n"
-    "with the truth: rays against the triangles and the procedural shapes themselves, or against a finer\n"
-    "field where the build has no Embree. The page shows error against time and the fastest options for\n"
-    "a given error. Defaults are in brackets.",
-    options,
-    sizeof options / sizeof options[0],
-    trade_main};
-
 static int parse_resolutions(trade_settings *s, const char *name, const char *value) {
     s->resolution_count = 0;
     for (const char *at = value; s->resolution_count < TRADE_MAX_RESOLUTIONS; ++at) {
@@ -63,7 +50,11 @@ static int parse_resolutions(trade_settings *s, const char *name, const char *va
         if (number < LEAST_RESOLUTION || number > MOST_RESOLUTION || (*end != ',' && *end != '\0')) {
             break;
         }
-        s->resolutions[s->resolution_count++] = (int32_t)number;
+        size_t place = s->resolution_count++;
+        for (; place > 0 && s->resolutions[place - 1] < number; --place) {
+            s->resolutions[place] = s->resolutions[place - 1];
+        }
+        s->resolutions[place] = (int32_t)number;
         at = end;
         if (*at == '\0') {
             return CLI_OK;
@@ -96,11 +87,6 @@ static int parse_option(void *settings, int key, const char *name, const char *v
     default:
         return cli_shared_parse(&s->bake, key, name, value);
     }
-}
-
-static int compare_descending(const void *a, const void *b) {
-    const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
-    return (x < y) - (x > y);
 }
 
 /* --- the scene */
@@ -164,9 +150,6 @@ static int load(trade_work *work) {
     vsh_error error;
     CLI_TRY(cli_check_result(vsh_assets_load(scene, &work->run, &work->assets, &error), &error));
     work->receivers = calloc(scene->receiver_count, sizeof *work->receivers);
-    if (work->receivers == NULL) {
-        return cli_out_of_memory("receivers");
-    }
     for (int k = 0; k < 3; ++k) {
         work->low[k] = INFINITY;
         work->high[k] = -INFINITY;
@@ -186,31 +169,24 @@ static int load(trade_work *work) {
     return cli_check_result(result, &error);
 }
 
-static int allocate(trade_work *work) {
-    if (work->scene->light_count > 0) {
-        work->subjects[work->subject_count++] = (trade_subject){.planes = work->scene->light_count};
+static void allocate(trade_work *work) {
+    const size_t lights = work->scene->light_count;
+    if (lights > 0) {
+        work->subjects[work->subject_count++] = (trade_subject){.planes = lights};
     }
     if (work->scene->ao) {
         work->subjects[work->subject_count++] = (trade_subject){.ao = true, .planes = 1};
     }
-    const size_t lights = work->scene->light_count;
-    work->values = calloc((lights + 1) * work->texels, sizeof *work->values);
-    work->planes = calloc(lights + 1, sizeof *work->planes);
-    work->compared = calloc((lights + 1) * work->receiver_count, sizeof *work->compared);
-    work->common = malloc(work->texels);
-    work->any = calloc(work->texels, 1);
-    bool whole = work->values != NULL && work->planes != NULL && work->compared != NULL &&
-                 work->common != NULL && work->any != NULL;
     for (size_t s = 0; s < work->subject_count; ++s) {
         trade_subject *subject = &work->subjects[s];
         subject->truth = calloc(subject->planes * work->texels, sizeof *subject->truth);
-        whole = whole && subject->truth != NULL;
     }
-    if (!whole) {
-        return cli_out_of_memory("values");
-    }
+    work->values = calloc((lights + 1) * work->texels, sizeof *work->values);
+    work->planes = calloc(lights + 1, sizeof *work->planes);
+    work->compared = calloc((lights + 1) * work->receiver_count, sizeof *work->compared);
+    work->any = calloc(work->texels, 1);
+    work->common = malloc(work->texels);
     memset(work->common, 1, work->texels);
-    return CLI_OK;
 }
 
 /* --- baking */
@@ -263,9 +239,6 @@ static int bake(const trade_work *work, const trade_subject *subject, const vsh_
 /* Finds the texels that are valid with the field's casters. */
 static int find_valid(const trade_work *work, const vsh_shade_options *shade, trade_field *field) {
     field->mask = malloc(work->texels);
-    if (field->mask == NULL) {
-        return cli_out_of_memory("coverage");
-    }
     CLI_TRY(bake(work, NULL, field->voxels != NULL ? field->voxels : field->traced, shade, work->values));
     for (size_t i = 0; i < work->texels; ++i) {
         field->mask[i] = work->values[i] > 0.0f;
@@ -355,9 +328,6 @@ static int place_points(trade_work *work) {
     work->normals = calloc(work->points, 3 * sizeof *work->normals);
     work->texel = calloc(work->points, sizeof *work->texel);
     work->traced = calloc(work->points, sizeof *work->traced);
-    if (work->positions == NULL || work->normals == NULL || work->texel == NULL || work->traced == NULL) {
-        return cli_out_of_memory("points");
-    }
     vsh_occluder_parts parts;
     vsh_occluders_get_parts(work->fields[0].voxels, &parts);
     vsh_field_info info;
@@ -489,12 +459,8 @@ static int measure_run(const trade_work *work, trade_subject *subject, const tra
     CLI_TRY(compare(work, subject, field != NULL ? field->mask : work->any, &valid));
     CLI_TRY(compare(work, subject, work->common, &run->metrics));
     run->valid_rmse = valid.rmse;
-    trade_run *more = realloc(subject->runs, (subject->run_count + 1) * sizeof *more);
-    if (more == NULL) {
-        return cli_out_of_memory("runs");
-    }
-    subject->runs = more;
-    more[subject->run_count++] = *run;
+    subject->runs = realloc(subject->runs, (subject->run_count + 1) * sizeof *run);
+    subject->runs[subject->run_count++] = *run;
     if (!cli_given.quiet) {
         char line[256];
         snprintf(line, sizeof line, "%s%s: RMSE %.4f, %.3f s", run->embree ? "Embree, " : "", run->options,
@@ -681,7 +647,7 @@ static void mark_front(trade_subject *subject) {
 /* Loads the scene, makes its truth and measures all runs. */
 static int measure(trade_work *work) {
     CLI_TRY(load(work));
-    CLI_TRY(allocate(work));
+    allocate(work);
     CLI_TRY(make_fields(work));
     CLI_TRY(place_points(work));
     CLI_TRY(make_truth(work));
@@ -785,7 +751,6 @@ static int trade_main(int argc, char **argv) {
     cli_patch_set(&s.bake.patch, "--supersample", "1"); /* the truth has one sample a texel too */
     cli_patch_set(&s.bake.patch, "--padding", "0");
     CLI_TRY(cli_parse(&cli_trade, argc, argv, parse_option, &s, &s.bake.input));
-    qsort(s.resolutions, s.resolution_count, sizeof s.resolutions[0], compare_descending);
     if (s.page == NULL || !cli_has_ending(s.page, "html")) {
         return cli_usage("%s: give -o OUT.html", s.page != NULL ? s.page : s.bake.input);
     }
@@ -806,3 +771,14 @@ done:
     cli_bake_scene_free(&made);
     return code;
 }
+
+const cli_command cli_trade = {
+    "trade",
+    "INPUT -o OUT.html [options]",
+    "Bakes a mesh or a scene (.json) by every method, at several voxel sizes and settings, and compares\n"
+    "with the truth: rays against the triangles and the procedural shapes themselves, or against a finer\n"
+    "field where the build has no Embree. The page shows error against time and the fastest options for\n"
+    "a given error. Defaults are in brackets.",
+    options,
+    sizeof options / sizeof options[0],
+    trade_main};

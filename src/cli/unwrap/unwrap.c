@@ -61,18 +61,6 @@ static const cli_option options[] = {
     CLI_COMMON_OPTIONS,
 };
 
-static int unwrap_main(int argc, char **argv);
-
-const cli_command cli_unwrap = {
-    "unwrap",
-    "INPUT -o OUT [options]",
-    "Cuts the meshes of a file into charts, lays them out flat, and packs them into an atlas:\n"
-    "lightmap UVs for meshes that have none. Numbers in brackets are what holds without the\n"
-    "option.",
-    options,
-    sizeof options / sizeof options[0],
-    unwrap_main};
-
 static int take(void *settings, int key, const char *name, const char *value) {
     unwrap_settings *s = settings;
     vsh_unwrap_options *o = &s->options;
@@ -195,11 +183,6 @@ static int write_model(const unwrap_settings *s, const vsh_model *model, const v
     vsh_lit_mesh *places = calloc(vsh_atlas_mesh_count(atlas) + 1, sizeof *places);
     const char **names = calloc(vsh_atlas_page_count(atlas) + 1, sizeof *names);
     uint32_t *pages = calloc(vsh_atlas_chart_count(atlas) + 1, sizeof *pages);
-    int code = CLI_OK;
-    if (places == NULL || names == NULL || pages == NULL) {
-        code = cli_out_of_memory(s->output);
-        goto done;
-    }
     place_all(atlas, places);
     if (s->options.atlas == VSH_ATLAS_OBJECTS) {
         name_pages(meshes, atlas, names);
@@ -212,12 +195,11 @@ static int write_model(const unwrap_settings *s, const vsh_model *model, const v
         pages[i] = vsh_atlas_charts(atlas)[i].page;
     }
     vsh_error error;
-    code = cli_check_result(vsh_lit_write(s->input, model, places, &lit, s->output, run, &error), &error);
-done:
+    const vsh_result result = vsh_lit_write(s->input, model, places, &lit, s->output, run, &error);
     free(pages);
     free((void *)names);
     free(places);
-    return code;
+    return cli_check_result(result, &error);
 }
 
 /* --- the picture of charts */
@@ -241,10 +223,11 @@ typedef struct picture {
 static void paint(const picture *p, const vsh_atlas_page *page, size_t row, const double at[3][2],
                   const float rgb[3]) {
     const int32_t width = page->width, height = page->height;
-    const double low[2] = {fmin(at[0][0], fmin(at[1][0], at[2][0])),
-                           fmin(at[0][1], fmin(at[1][1], at[2][1]))};
-    const double high[2] = {fmax(at[0][0], fmax(at[1][0], at[2][0])),
-                            fmax(at[0][1], fmax(at[1][1], at[2][1]))};
+    double low[2] = {width, height}, high[2] = {0.0, 0.0};
+    for (int k = 0; k < 6; ++k) {
+        low[k % 2] = fmin(low[k % 2], at[k / 2][k % 2]);
+        high[k % 2] = fmax(high[k % 2], at[k / 2][k % 2]);
+    }
     const int32_t x0 = (int32_t)fmax(0.0, floor(low[0])), y0 = (int32_t)fmax(0.0, floor(low[1]));
     const int32_t x1 = (int32_t)fmin(width, ceil(high[0])), y1 = (int32_t)fmin(height, ceil(high[1]));
     for (int32_t y = y0; y < y1; ++y) {
@@ -286,9 +269,6 @@ static int make_picture(const vsh_atlas *atlas, picture *p) {
     const size_t pages = vsh_atlas_page_count(atlas);
     double width = 0.0, height = 0.0;
     p->rows = calloc(pages, sizeof *p->rows);
-    if (p->rows == NULL) {
-        return cli_out_of_memory("the picture");
-    }
     for (size_t i = 0; i < pages; ++i) {
         const vsh_atlas_page page = vsh_atlas_page_view(atlas, i);
         p->rows[i] = (size_t)height;
@@ -304,9 +284,6 @@ static int make_picture(const vsh_atlas *atlas, picture *p) {
     p->height = (int32_t)height;
     for (int k = 0; k < 3; ++k) {
         p->planes[k] = calloc((size_t)p->width * (size_t)p->height, sizeof *p->planes[k]);
-        if (p->planes[k] == NULL) {
-            return cli_out_of_memory("the picture");
-        }
     }
     return CLI_OK;
 }
@@ -366,10 +343,6 @@ static int unwrap(unwrap_settings *s) {
     const size_t count = vsh_model_mesh_count(model);
     meshes = calloc(count, sizeof *meshes);
     density = calloc(count, sizeof *density);
-    if (meshes == NULL || density == NULL) {
-        code = cli_out_of_memory(s->input);
-        goto done;
-    }
     for (size_t m = 0; m < count; ++m) {
         meshes[m] = vsh_model_mesh(model, m, -1);
     }
@@ -402,3 +375,13 @@ static int unwrap_main(int argc, char **argv) {
     cli_signals_watch();
     return unwrap(&s);
 }
+
+const cli_command cli_unwrap = {
+    "unwrap",
+    "INPUT -o OUT [options]",
+    "Cuts the meshes of a file into charts, lays them out flat, and packs them into an atlas:\n"
+    "lightmap UVs for meshes that have none. Numbers in brackets are what holds without the\n"
+    "option.",
+    options,
+    sizeof options / sizeof options[0],
+    unwrap_main};

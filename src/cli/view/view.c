@@ -34,19 +34,6 @@ static const cli_option options[] = {
     CLI_COMMON_OPTIONS,
 };
 
-static int view_main(int argc, char **argv);
-
-const cli_command cli_view = {
-    "view",
-    "INPUT [OTHER] -o OUT.html [options]",
-    "Writes a page that shows a lit mesh in a browser, in three dimensions: its light, AO, every channel\n"
-    "of its bake, texel density and charts, and compares two bakes. A page of a scene (.json) shows the\n"
-    "surface of the casters' voxels, with shadows and AO at its vertices. The page needs no other file;\n"
-    "docs/view.md",
-    options,
-    sizeof options / sizeof options[0],
-    view_main};
-
 static int take_planes(view_planes *planes, const char *name, const char *value) {
     if (planes->count == VSH_MAX_VIEW_PLANES) {
         return cli_usage("%s '%s': at most %d are taken", name, value, VSH_MAX_VIEW_PLANES);
@@ -134,3 +121,14 @@ static int view_main(int argc, char **argv) {
     }
     return CLI_OK;
 }
+
+const cli_command cli_view = {
+    "view",
+    "INPUT [OTHER] -o OUT.html [options]",
+    "Writes a page that shows a lit mesh in a browser, in three dimensions: its light, AO, every channel\n"
+    "of its bake, texel density and charts, and compares two bakes. A page of a scene (.json) shows the\n"
+    "surface of the casters' voxels, with shadows and AO at its vertices. The page needs no other file;\n"
+    "docs/view.md",
+    options,
+    sizeof options / sizeof options[0],
+    view_main};

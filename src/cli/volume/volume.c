@@ -52,18 +52,6 @@ static const cli_option options[] = {
     CLI_COMMON_OPTIONS,
 };
 
-static int volume_main(int argc, char **argv);
-
-const cli_command cli_volume = {
-    "volume",
-    "INPUT -o OUT.vdb [options]",
-    "Bakes soft shadows and ambient occlusion into sparse grids. INPUT is a mesh file, a level set\n"
-    "(FILE.vdb, FILE.vdb:GRID) or a scene file (.json; its casters, lights and ao, not its receivers).\n"
-    "docs/volume.md describes the output. Numbers in brackets are the defaults.",
-    options,
-    sizeof options / sizeof options[0],
-    volume_main};
-
 static int take_like(volume_settings *s, const char *name, const char *value) {
     if (value[0] == '\0') {
         return cli_usage("%s '': expected FILE.vdb or FILE.vdb:GRID", name);
@@ -76,7 +64,7 @@ static int take_like(volume_settings *s, const char *name, const char *value) {
     if (s->like_grid != NULL) {
         s->like = cli_keep_text("%.*s", (int)(s->like_grid - 1 - value), value);
     }
-    return s->like != NULL ? CLI_OK : cli_out_of_memory(name);
+    return CLI_OK;
 }
 
 static int take(void *settings, int key, const char *name, const char *value) {
@@ -307,3 +295,13 @@ done:
     cli_bake_scene_free(&made);
     return code;
 }
+
+const cli_command cli_volume = {
+    "volume",
+    "INPUT -o OUT.vdb [options]",
+    "Bakes soft shadows and ambient occlusion into sparse grids. INPUT is a mesh file, a level set\n"
+    "(FILE.vdb, FILE.vdb:GRID) or a scene file (.json; its casters, lights and ao, not its receivers).\n"
+    "docs/volume.md describes the output. Numbers in brackets are the defaults.",
+    options,
+    sizeof options / sizeof options[0],
+    volume_main};

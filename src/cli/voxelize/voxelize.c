@@ -26,17 +26,6 @@ static const cli_option options[] = {
     CLI_COMMON_OPTIONS,
 };
 
-static int voxelize_main(int argc, char **argv);
-
-const cli_command cli_voxelize = {
-    "voxelize",
-    "INPUT -o OUT.vdb [options]",
-    "Turns a mesh file, a level set (FILE.vdb or FILE.vdb:GRID), or all casters of a scene file (.json)\n"
-    "into one narrow-band level set. Numbers in brackets are what holds without the option.",
-    options,
-    sizeof options / sizeof options[0],
-    voxelize_main};
-
 static int take(void *settings, int key, const char *name, const char *value) {
     voxelize_settings *s = settings;
     if (key == KEY_NAME) {
@@ -118,3 +107,12 @@ done:
     cli_bake_scene_free(&made);
     return code;
 }
+
+const cli_command cli_voxelize = {
+    "voxelize",
+    "INPUT -o OUT.vdb [options]",
+    "Turns a mesh file, a level set (FILE.vdb or FILE.vdb:GRID), or all casters of a scene file (.json)\n"
+    "into one narrow-band level set. Numbers in brackets are what holds without the option.",
+    options,
+    sizeof options / sizeof options[0],
+    voxelize_main};
