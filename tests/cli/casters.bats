@@ -15,6 +15,12 @@ scene() { # casters, receivers, more keys
     printf '{"casters": [%s], %s, %s%s}\n' "$1" "$SUN" "$2" "${3:+, $3}" >scene.json
 }
 
+# refuse_scene CASTERS RECEIVERS CODE WORD …: a bake of that scene ends with the code, and says the words.
+refuse_scene() {
+    scene "$1" "$2"
+    shade bake scene.json
+    refused "${@:3}"
+}
 
 # A hill of 16 bits, 257 × 257.
 write_hill() {
@@ -108,9 +114,7 @@ LIST
     printf '{%s, "receivers": []}' "$SUN" >scene.json
     shade bake scene.json
     refused 2 'key "casters" is missing'
-    scene "{$LAND, \"extent\": [10, 10]}" "$OVER"
-    shade bake scene.json
-    refused 2 'casters[0].extent: cannot stand beside "size"'
+    refuse_scene "{$LAND, \"extent\": [10, 10]}" "$OVER" 2 'casters[0].extent: cannot stand beside "size"'
 }
 
 @test "voxelize takes a terrain and spheres" {
@@ -128,21 +132,26 @@ LIST
     [[ $output == *"spheres, 1, voxelised"* ]]
 }
 
-refuses() { # STATUS CASTER WORD …: a bake of the caster above the floor
-    scene "$2" "$FLOOR"
-    shade bake scene.json
-    refused "$1" "${@:3}"
+@test "a missing image or list of spheres, and an image that is none" {
+    echo nothing >bad.png
+    refuse_scene '{"heightfield": "none.png", "size": [1, 1], "height": 1}' "$OVER" 3 none.png
+    refuse_scene '{"spheres": "none.csv"}' "$FLOOR" 3 none.csv
+    refuse_scene '{"heightfield": "bad.png", "size": [1, 1], "height": 1, "direct": true}' "$OVER" 3 bad.png
 }
 
-@test "files of casters that are missing, damaged or wrong are named, with the row" {
-    echo nothing >bad.png
-    printf 'x,y,z,r\n0,1,0,0.5\n0,1,0\n' >short.csv
-    printf '0,1,0,0.5\n0,1,0,-1\n' >radius.csv
-    refuses 3 '{"heightfield": "none.png", "size": [1, 1], "height": 1}' none.png
-    refuses 3 '{"spheres": "none.csv"}' none.csv
-    refuses 3 '{"heightfield": "bad.png", "size": [1, 1], "height": 1, "direct": true}' bad.png
-    refuses 2 '{"spheres": "short.csv"}' 'short.csv:3:' 'four numbers'
-    refuses 2 '{"spheres": "radius.csv"}' 'radius.csv:2:' 'radius -1'
+@test "zero and huge sizes are refused by line and column" {
+    refuse_scene '{"heightfield": "terrain.png", "size": [0, 1], "height": 1}' "$OVER" 2 'scene.json:1:' 'size[0]' 'out of range'
+    refuse_scene '{"heightfield": "terrain.png", "size": [1, 2147483648e9], "height": 1}' "$OVER" 2 'size[1]' 'out of range'
+}
+
+@test "bad rows of spheres are told by their number" {
+    printf 'x,y,z,r\n0,1,0,0.5\n0,1,0\n' >bad.csv
+    refuse_scene '{"spheres": "bad.csv"}' "$FLOOR" 2 'bad.csv:3:' 'four numbers'
+    printf '0,1,0,0.5\n0,1,0,-1\n' >bad.csv
+    refuse_scene '{"spheres": "bad.csv"}' "$FLOOR" 2 'bad.csv:2:' 'radius -1'
+}
+
+@test "a memory limit holds for terrains and spheres" {
     scene "{$LAND, \"direct\": true}" "$FLOOR"
     shade bake scene.json --memory-limit 200000
     refused 4 terrain.png

@@ -8,11 +8,8 @@ setup() {
 
 
 @test "info tells a file's unit, and the size in metres" {
-    succeed info "$models/scene.fbx"
-    [[ $output == *"unit: 0.01 m; bounds are in metres"* ]] || fail "no unit"
-    [[ $output == *"bounds: 0 2 -3 to 2 4 -1"* ]] || fail "not in metres"
-    shade info "$models/scene.obj"
-    [[ $output == *"unit: none"* ]] || fail "a unit of OBJ"
+    info_tells "$models/scene.fbx" "unit: 0.01 m; bounds are in metres" "bounds: 0 2 -3 to 2 4 -1"
+    info_tells "$models/scene.obj" "unit: none"
 }
 
 @test "--unit overrules, by a name or in metres" {
@@ -23,9 +20,9 @@ setup() {
     shade info --unit 10 "$models/scene.obj"
     [[ $output == *"bounds: 0 20 -30 to 20 40 -10"* ]] || fail "OBJ by ten"
     succeed voxelize "$models/scene.obj" -o a.vdb --unit cm --resolution 32
-    shade info a.vdb
-    [[ $output == *"voxel size: 0.0014667"* ]] || fail "voxelize: $output"
-    refuses 2 "--unit 'yard'" -- info --unit yard "$models/scene.obj"
+    info_tells a.vdb "voxel size: 0.0014667"
+    shade info --unit yard "$models/scene.obj"
+    refused 2 "--unit 'yard'"
 }
 
 @test "blended materials cast nothing unless asked, and one line says so" {

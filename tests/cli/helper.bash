@@ -150,6 +150,15 @@ succeed() {
     done_well
 }
 
+# info_tells FILE TEXT …: what info prints of the file has every text.
+info_tells() {
+    local text
+    succeed info "$1"
+    for text in "${@:2}"; do
+        [[ $output == *"$text"* ]] || fail "not told: $text"
+    done
+}
+
 # refuse WORD …: reads lines "CODE WORD … | WORD …". The program, run with the words of each line behind the given ones, must
 # end as refused() says.
 refuse() {

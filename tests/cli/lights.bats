@@ -39,8 +39,7 @@ SPOT='{"type": "spot", "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.5}}'
     succeed bake lit.gltf --lights lit.gltf --sun-angle 9 --receive floor --size 48 -o file.exr
     succeed bake lit.gltf --sun 0,1,0 --sun-angle 9 --receive floor --size 48 -o line.exr
     same_values file.exr line.exr || fail "not the same values"
-    shade info file.exr
-    [[ $output == *"vdbshade_light_sun: directional towards 0 1 0, 9 degrees across, color 3 3 3"* ]] || fail "$output"
+    info_tells file.exr "vdbshade_light_sun: directional towards 0 1 0, 9 degrees across, color 3 3 3"
 }
 
 @test "suns, points and spots are channels by their nodes' names, and in what the output tells" {
@@ -117,8 +116,7 @@ write_scene() {
     [ "$(grep -o "^light '[a-z]*'" <<<"$output" | tr -d '\n')" = "light 'first'light 'sun'light 'lamp'light 'spot'light 'last'" ] || fail "$output"
     [[ $output == *"light 'sun': directional towards 0 1 0, 0.529985"* ]] || fail 'not the sun of the sky'
     succeed bake scene.json
-    shade info scene.exr
-    [[ $output == *lamps.gltf* ]] || fail 'the file is no input of the output'
+    info_tells scene.exr lamps.gltf
 }
 
 @test "layers know the lights of a file by name, and a file's lights know layers" {
@@ -145,8 +143,7 @@ write_scene() {
     succeed query lit.gltf --lights file --light-radius 0.1 --points points.xyz -o answers.csv --answers-only
     [ "$(cat answers.csv)" = $'shadow.lamp\n0\n1' ] || fail "$(cat answers.csv)"
     succeed volume lit.gltf --lights lit.gltf --box -1,0.1,-1,1,0.3,1 --box-voxel-size 0.1 -o out.vdb
-    shade info out.vdb
-    [[ $output == *shadow.lamp* ]] || fail "$output"
+    info_tells out.vdb shadow.lamp
     succeed render lit.gltf --lights lit.gltf --size 48x32 -o lamp.png
     shade render lit.gltf --sun 0,1,0 --size 48x32 -o sun.png
     ! cmp -s lamp.png sun.png || fail 'the picture of another light'
@@ -162,8 +159,7 @@ write_scene() {
     shade info scene.exr
     [[ $output == *'vdbshade_light_lamp: sphere at 0.01 0.03 0,'* ]] || fail "$output"
     write_scene scene.json '{"type": "file", "file": "lit.gltf"}' '"unit": "mm",'
-    shade info scene.json
-    [[ $output == *"light 'lamp': sphere at 0.001 0.003 0,"* ]] || fail "$output"
+    info_tells scene.json "light 'lamp': sphere at 0.001 0.003 0,"
 }
 
 @test "what is wrong with a file of lights is told with its place" {

@@ -170,59 +170,27 @@ C
     no_leftovers
     grep -oE '"name":"[a-zA-Z.]*","data":"data[0-9]"' page.html | cut -d'"' -f4,8 --output-delimiter=' ' >channels
     printf '%s\n' 'shadow.sun data1' 'ao data2' 'irradiance.R data3' 'irradiance.G data4' 'irradiance.B data5' | diff - channels
-    cat >vertices.c <<'C'
-#include <Imath/half.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <zlib.h>
-static unsigned char *read_all(const char *path, size_t *size) {
-    FILE *in = fopen(path, "rb");
-    unsigned char *bytes = calloc(1, 1 << 24);
-    if (in == NULL || bytes == NULL) exit(2);
-    *size = fread(bytes, 1, 1 << 24, in);
-    fclose(in);
-    return bytes;
-}
-/* GLB PLANE …: the world position of each vertex, and its values. A row of a plane has 2048. */
-int main(int argc, char **argv) {
-    size_t size;
-    unsigned char *glb = read_all(argv[1], &size), *planes[8];
-    char *json = (char *)glb + 20;
-    unsigned length, count;
-    double matrix[16];
-    memcpy(&length, glb + 12, sizeof length);
-    if (sscanf(strstr(json, "\"count\":"), "\"count\":%u", &count) != 1) return 3;
-    char *at = strstr(json, "\"matrix\":[") + 10;
-    for (int i = 0; i < 16; ++i, ++at) matrix[i] = strtod(at, &at);
-    const unsigned char *positions = glb + 20 + length + 8;
-    const size_t texels = (count + 2047) / 2048 * (size_t)2048;
-    for (int k = 2; k < argc; ++k) {
-        unsigned char *packed = read_all(argv[k], &size), *bytes = planes[k - 2] = malloc(2 * texels);
-        uLongf unpacked = 2 * texels;
-        if (uncompress(bytes, &unpacked, packed, size) != Z_OK || unpacked != 2 * texels) return 4;
-        for (size_t i = 0; i < 2 * texels; ++i)
-            if (i % 2048) bytes[i] += bytes[i - 1];
-        free(packed);
-    }
-    for (size_t i = 0; i < count; ++i) {
-        float p[3];
-        memcpy(p, positions + 12 * i, sizeof p);
-        for (int c = 0; c < 3; ++c) printf("%g ", p[c] + matrix[12 + c]);
-        for (int k = 0; k < argc - 2; ++k)
-            printf("%g ", imath_half_to_float((imath_half_bits_t)(planes[k][i] << 8 | planes[k][texels + i])));
-        printf("\n");
-    }
-    for (int k = 0; k < argc - 2; ++k) free(planes[k]);
-    free(glb);
-    return 0;
-}
-C
-    "${CC:-cc}" -std=gnu11 ${CFLAGS-} vertices.c -lz -lImath-3_1 -lm -o vertices
     for block in 0 1 2 3; do
         block data$block page.html >$block
     done
-    ./vertices 0 1 2 3 >vertices.txt
+    # world position of each vertex, and its values; a row of a plane has 2048
+    python3 - 0 1 2 3 >vertices.txt <<'PY'
+import json, struct, sys, zlib
+glb = open(sys.argv[1], "rb").read()
+size = struct.unpack_from("<I", glb, 12)[0]
+root = json.loads(glb[20:20 + size])
+count, matrix = root["accessors"][0]["count"], root["nodes"][0]["matrix"]
+positions = struct.unpack_from(f"<{3 * count}f", glb, 28 + size)
+texels = (count + 2047) // 2048 * 2048
+planes = []
+for path in sys.argv[2:]:
+    data = bytearray(zlib.decompress(open(path, "rb").read()))
+    for i in range(2 * texels):
+        data[i] = data[i] + data[i - 1] & 255 if i % 2048 else data[i]
+    planes.append(struct.unpack(f">{texels}e", bytes(b for pair in zip(data[:texels], data[texels:]) for b in pair)))
+for i in range(count):
+    print(*(positions[3 * i + c] + matrix[12 + c] for c in range(3)), *(plane[i] for plane in planes))
+PY
     # x y z shadow ao light. The floor is 6 × 6 at y = 0, the sphere's radius 0.5 around y = 0.8; the sun casts its shadow to
     # x = 0.67, z = 0.8. Under it AO is 1 - (0.5 / 0.8)². Light is 0.3 of the sky and the sun's cosine, 0.609.
     awk 'function near(x, y, z, r) { return ($1 - x) ^ 2 + ($2 - y) ^ 2 + ($3 - z) ^ 2 < r * r }

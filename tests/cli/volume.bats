@@ -149,12 +149,6 @@ LIST
     untouched out.vdb
 }
 
-@test "a bake of a lightmap refuses a level set, and says what takes it" {
-    shade voxelize box.obj -o asset.vdb --resolution 24 --quiet
-    shade bake asset.vdb "${SUN[@]}" -o out.exr
-    refused 2 asset.vdb 'vdbshade volume'
-}
-
 @test "a signal ends it, and leaves the old file" {
     old_output out.vdb
     rm -f err.txt

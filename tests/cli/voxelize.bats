@@ -15,14 +15,12 @@ setup() {
 
 @test "a resolution is counted along the longest side" {
     succeed voxelize box.obj -o out.vdb --resolution 50 --quiet
-    shade info out.vdb
-    [[ $output == *"voxel size: 0.02 0.02 0.02"* ]] || fail "wrong voxel size"
+    info_tells out.vdb "voxel size: 0.02 0.02 0.02"
 }
 
 @test "a scene's casters become one level set" {
     succeed voxelize "$ASSETS/seeds.json" -o seeds.vdb --voxel-size 0.1 --quiet
-    shade info seeds.vdb
-    [[ $output == *"class: level set"* ]] || fail "no level set"
+    info_tells seeds.vdb "class: level set"
 }
 
 @test "the same values for any number of threads" {
