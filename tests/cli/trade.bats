@@ -4,6 +4,7 @@ load helper
 setup() {
     cd "$BATS_TEST_TMPDIR" || return 1
     write_box box.obj
+    "$VDBSHADE" bake box.obj --ao 1 --ao-method exact --size 4 -o probe.exr --quiet || skip "built without Embree"
 }
 
 TINY=(--sun 0.3,1,0.2 --sun-angle 20 --size 24 --resolutions 12,24 --truth-rays 64 --budget 60)
@@ -71,7 +72,6 @@ write_floor() {
     write_floor floor.obj
     scene "$BOX" '{"mesh": "floor.obj", "output": "a.exr"}'
     succeed trade scene.json --size 48 --resolutions 24 --truth-rays 64 -o trade.html --csv trade.csv --quiet
-    column method | grep -qx embree || skip "built without Embree"
     awk -F, '$2 == "embree" { if (last != "" && $13 > last + 0.002) exit 1; first = first ? first : $13; last = $13 }
              END { exit !(first > 0.03 && last < first / 4) }' trade.csv || fail "$(cat trade.csv)"
     # 1, 2, 4 … 32 rays, half of the truth's, in the same page and plot as the bakes
@@ -100,7 +100,7 @@ write_floor() {
     write_floor floor.obj
     scene "$BALL, $BOX" '{"mesh": "floor.obj", "output": "a.exr"}'
     succeed trade scene.json --size 48 --resolutions 96 --truth-rays 256 -o trade.html --csv trade.csv --quiet
-    grep -q 'a field of 192 voxels\|triangles by Embree; procedural shapes' trade.html || fail "no word of the truth"
+    grep -q 'triangles by Embree; procedural shapes' trade.html || fail "no word of the truth"
     ! column method | grep -qx 'exact\|embree' || fail "triangles that are not all"
     # the box alone, or the ball alone, would leave a part of the shadow out
     awk -F, '$3 == "--method rays --rays 64 --resolution 96" { exit !($13 < 0.02) }' trade.csv ||

@@ -327,7 +327,7 @@ static void write_truth(FILE *out, const trade_work *work) {
         out,
         "<dt>Truth</dt><dd>%d rays a texel, from just above it, against the casters themselves%s%s; it took "
         "%.1f s.</dd>\n",
-        work->truth_rays, work->triangles != NULL ? "; triangles by Embree" : "",
+        work->settings->truth_rays, work->triangles != NULL ? "; triangles by Embree" : "",
         work->solids != NULL ? "; procedural shapes by sphere tracing in double precision" : "",
         work->truth_s);
 }

@@ -103,9 +103,6 @@ enum { SURFACE_STEPS = 16 };
 enum { REPEATS = 3 };
 static const double SHORT_SECONDS = 0.3;
 
-/* Most voxels along a side, and most rays a texel that `bake` marches. */
-enum { MOST_TRUTH_RESOLUTION = 65536, MOST_MARCHED_RAYS = 4096 };
-
 /* Embree's curve ends at so many rays, or at half of the truth's. */
 enum { CURVE_RAYS = 256 };
 
@@ -207,14 +204,6 @@ static int make_occluders(const trade_work *work, const vsh_scene *scene, bool v
     return cli_check_result(result, &error);
 }
 
-static int make_voxels(const trade_work *work, int32_t resolution, vsh_occluders **occluders,
-                       double *seconds) {
-    vsh_scene scene = *work->scene;
-    scene.grid.resolution = resolution;
-    scene.grid.voxel_size = 0.0;
-    return make_occluders(work, &scene, true, occluders, seconds);
-}
-
 /* Bakes the subject, or (NULL) coverage, of all receivers into `values`. */
 static int bake(const trade_work *work, const trade_subject *subject, const vsh_occluders *occluders,
                 const vsh_shade_options *shade, float *values) {
@@ -248,7 +237,10 @@ static int find_valid(const trade_work *work, const vsh_shade_options *shade, tr
 }
 
 static int make_field(trade_work *work, trade_field *field) {
-    CLI_TRY(make_voxels(work, field->resolution, &field->voxels, &field->build_s));
+    vsh_scene scene = *work->scene;
+    scene.grid.resolution = field->resolution;
+    scene.grid.voxel_size = 0.0;
+    CLI_TRY(make_occluders(work, &scene, true, &field->voxels, &field->build_s));
     vsh_occluder_parts parts;
     vsh_occluders_get_parts(field->voxels, &parts);
     parts.triangles = work->meshes ? work->triangles : NULL;
@@ -283,7 +275,7 @@ static int make_fields(trade_work *work) {
                                               work->settings->bake.input);
 }
 
-/* --- the truth: rays against the casters themselves, or against a finer field if rays cannot meet them */
+/* --- the truth: rays against the casters themselves */
 
 /* Moves a point that is inside a solid, by less than a voxel, along its normal to just outside. */
 static void leave_solid(const trade_work *work, double *position, const float *normal, double lift,
@@ -372,35 +364,12 @@ static int trace(const trade_work *work, const trade_subject *subject, int32_t r
     return cli_check_result(result, &error);
 }
 
-static int march_truth(trade_work *work) {
-    const int32_t finest = work->fields[0].resolution;
-    work->truth_resolution = finest <= MOST_TRUTH_RESOLUTION / 2 ? 2 * finest : finest;
-    work->truth_rays = work->truth_rays < MOST_MARCHED_RAYS ? work->truth_rays : MOST_MARCHED_RAYS;
-    vsh_occluders *occluders = NULL;
-    double seconds;
-    int code = make_voxels(work, work->truth_resolution, &occluders, &seconds);
-    vsh_shade_options shade = work->scene->shade;
-    shade.method = VSH_SHADOW_RAYS;
-    shade.ao_method = VSH_AO_RAYS;
-    shade.rays = work->truth_rays;
-    shade.early_rays = 0;
-    for (size_t s = 0; s < work->subject_count && code == CLI_OK; ++s) {
-        code = bake(work, &work->subjects[s], occluders, &shade, work->subjects[s].truth);
-    }
-    vsh_occluders_free(occluders);
-    return code;
-}
-
 static int make_truth(trade_work *work) {
     const double start = read_clock(work);
-    work->truth_rays = work->settings->truth_rays;
-    if (vsh_scene_has_truth(work->scene)) {
-        for (size_t s = 0; s < work->subject_count; ++s) {
-            double seconds;
-            CLI_TRY(trace(work, &work->subjects[s], work->truth_rays, work->subjects[s].truth, &seconds));
-        }
-    } else {
-        CLI_TRY(march_truth(work));
+    for (size_t s = 0; s < work->subject_count; ++s) {
+        double seconds;
+        CLI_TRY(
+            trace(work, &work->subjects[s], work->settings->truth_rays, work->subjects[s].truth, &seconds));
     }
     work->truth_s = read_clock(work) - start;
     return CLI_OK;
@@ -776,9 +745,8 @@ const cli_command cli_trade = {
     "trade",
     "INPUT -o OUT.html [options]",
     "Bakes a mesh or a scene (.json) by every method, at several voxel sizes and settings, and compares\n"
-    "with the truth: rays against the triangles and the procedural shapes themselves, or against a finer\n"
-    "field where the build has no Embree. The page shows error against time and the fastest options for\n"
-    "a given error. Defaults are in brackets.",
+    "with the truth: rays against the triangles and the procedural shapes themselves. The page shows error\n"
+    "against time and the fastest options for a given error. Defaults are in brackets.",
     options,
     sizeof options / sizeof options[0],
     trade_main};

@@ -93,7 +93,6 @@ typedef struct trade_work {
     size_t skipped;         /* runs that did not fit into the budget */
     double measuring;       /* when the budget began, seconds */
     double truth_s;
-    int32_t truth_rays; /* a texel */
 } trade_work;
 
 /* Write the page and the CSV of settings. CLI_OK or an exit code, having said why. */
