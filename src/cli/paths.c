@@ -35,17 +35,11 @@ const char *cli_file_name(const char *path) {
     return slash != NULL ? slash + 1 : path;
 }
 
-bool cli_has_ending(const char *path, const char *ending) {
+bool cli_has_ending(const char *path, const char *endings) {
     const char *dot = strrchr(cli_file_name(path), '.');
-    return dot != NULL && strcasecmp(dot + 1, ending) == 0;
-}
-
-bool cli_has_ending_of(const char *path, const char *endings) {
-    for (const char *at = endings + strspn(endings, " "); *at != '\0'; at += strspn(at, " ")) {
-        char ending[16];
+    for (const char *at = endings; dot != NULL && *at != '\0'; at += strspn(at, " ")) {
         const size_t length = strcspn(at, " ");
-        snprintf(ending, sizeof ending, "%.*s", (int)length, at);
-        if (cli_has_ending(path, ending)) {
+        if (strlen(dot + 1) == length && strncasecmp(dot + 1, at, length) == 0) {
             return true;
         }
         at += length;
@@ -87,7 +81,7 @@ bool cli_same_file(const char *a, const char *b) {
 }
 
 bool cli_is_model(const char *path) {
-    return cli_has_ending_of(path, "obj gltf glb fbx stl dae x3d 3ds blend off");
+    return cli_has_ending(path, "obj gltf glb fbx stl dae x3d 3ds blend off");
 }
 
 bool cli_is_folder(const char *path) {

@@ -11,11 +11,8 @@ const char *cli_keep_text(const char *format, ...) __attribute__((format(printf,
 /* The last part of a path: what stands behind its last slash. */
 const char *cli_file_name(const char *path);
 
-/* Whether `path` ends in ".ENDING", in any case. */
-bool cli_has_ending(const char *path, const char *ending);
-
-/* Whether it ends in one of these, which blanks part. */
-bool cli_has_ending_of(const char *path, const char *endings);
+/* Whether `path` ends in ".ENDING", in any case, for one of the endings that blanks part. */
+bool cli_has_ending(const char *path, const char *endings);
 
 /* The NAME of FILE.vdb:NAME, the file's grid; NULL for any other path, and if a file has the whole name. */
 const char *cli_grid_name(const char *path);

@@ -207,7 +207,7 @@ static int write_view(const cli_bake_settings *settings, const vsh_scene *scene,
         return CLI_OK;
     }
     vsh_view_bake bake = vsh_view_bake_default();
-    if (cli_has_ending(receiver->output, "glb") || cli_has_ending(receiver->output, "gltf")) {
+    if (cli_has_ending(receiver->output, "glb gltf")) {
         bake.model = receiver->output; /* its light is in it */
     } else {
         bake.model = receiver->path;

@@ -18,7 +18,7 @@ static vsh_selection selection(const cli_patterns *only, const cli_patterns *exc
 
 static int check_heights(const cli_bake_settings *s) {
     const bool given[2] = {s->height != 0.0, s->world[0] > 0.0};
-    const bool wanted = cli_has_ending_of(
+    const bool wanted = cli_has_ending(
         s->input, "png exr tif tiff pgm ppm pfm hdr jpg jpeg bmp tga jp2 webp dpx"); /* images of heights */
     if (!wanted && (given[0] || given[1])) {
         return cli_usage("--%s: %s is no image of heights, to which it belongs",

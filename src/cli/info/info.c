@@ -690,7 +690,7 @@ static int print_info(const char *path, const info_look *look, const vsh_run *ru
     if (cli_has_ending(path, "json")) {
         return print_scene(path, run);
     }
-    if (cli_has_ending_of(path, CLI_IMAGE_ENDINGS)) {
+    if (cli_has_ending(path, CLI_IMAGE_ENDINGS)) {
         return print_image(path, run);
     }
     return print_meshes(path, look, run);

@@ -29,9 +29,9 @@ int cli_points_parse_format(const char *option, const char *text, int32_t *forma
 }
 
 int32_t cli_points_format_of_path(const char *path) {
-    return cli_has_ending_of(path, "csv tsv txt xyz") ? VSHI_TABLE_CSV
+    return cli_has_ending(path, "csv tsv txt xyz") ? VSHI_TABLE_CSV
            : cli_has_ending(path, "ply")              ? VSHI_TABLE_PLY
-           : cli_has_ending_of(path, "raw f32 bin")   ? VSHI_TABLE_RAW
+           : cli_has_ending(path, "raw f32 bin")   ? VSHI_TABLE_RAW
                                                       : -1;
 }
 

@@ -35,50 +35,37 @@ static int take(void *settings, int key, const char *name, const char *value) {
     return cli_patch_take(&s->bake.patch, key, name, value);
 }
 
-static int write_grid(const voxelize_settings *s, const vsh_scene *scene, const vsh_run *run,
-                      const vsh_grid *grid) {
-    const vsh_scene casters = {.casters = scene->casters, .caster_count = scene->caster_count};
-    vsh_grid_info info;
-    vsh_grid_get_info(grid, &info);
-    cli_provenance origin;
-    const vsh_occluders_info made = {.voxel_size = info.voxel_size};
-    int code = cli_provenance_make(&casters, &s->bake.input, 1, &made, run, &origin);
-    code = code == CLI_OK ? cli_begin_writing() : code;
-    if (code == CLI_OK) {
-        vsh_error error;
-        code = cli_check(
-            vsh_grid_write(grid, s->bake.output, s->name, origin.attributes, origin.count, &error), &error);
-    }
-    cli_provenance_free(&origin);
-    return code;
-}
-
-static void say_summary(const voxelize_settings *s, const vsh_grid *grid, double seconds) {
-    vsh_grid_info info;
-    vsh_grid_get_info(grid, &info);
-    char bytes[32];
-    cli_say("%s: voxel %.4g, %" PRIu64 " active voxels, %s in memory, %.2f s", s->bake.output,
-            info.voxel_size, info.active_voxels, vshi_bytes_text(info.bytes, bytes, sizeof bytes), seconds);
-}
-
 static int voxelize(const voxelize_settings *s, const vsh_scene *scene) {
     CLI_TRY(cli_bake_check_output(&s->bake, scene, s->bake.output));
     CLI_TRY(cli_temporary_check(s->bake.output));
     cli_signals_watch();
     const double start = vshi_seconds();
     const vsh_run run = cli_make_run();
+    const vsh_scene casters = {.casters = scene->casters, .caster_count = scene->caster_count};
+    vsh_occluders_info made = {.voxel_size = 0.0};
+    cli_provenance origin = {.count = 0};
     vsh_assets *assets = NULL;
     vsh_grid *grid = NULL;
+    vsh_grid_info info;
     vsh_error error;
     int code;
     CLI_TRY_DONE(cli_check_result(vsh_assets_load(scene, &run, &assets, &error), &error));
     CLI_TRY_DONE(cli_check_result(vsh_scene_casters(scene, assets, &run, &grid, &error), &error));
-    CLI_TRY_DONE(write_grid(s, scene, &run, grid));
+    vsh_grid_get_info(grid, &info);
+    made.voxel_size = info.voxel_size;
+    CLI_TRY_DONE(cli_provenance_make(&casters, &s->bake.input, 1, &made, &run, &origin));
+    CLI_TRY_DONE(cli_begin_writing());
+    CLI_TRY_DONE(cli_check(
+        vsh_grid_write(grid, s->bake.output, s->name, origin.attributes, origin.count, &error), &error));
     cli_signals_end(CLI_OK);
     if (!cli_given.quiet) {
-        say_summary(s, grid, vshi_seconds() - start);
+        char bytes[32];
+        cli_say("%s: voxel %.4g, %" PRIu64 " active voxels, %s in memory, %.2f s", s->bake.output,
+                info.voxel_size, info.active_voxels, vshi_bytes_text(info.bytes, bytes, sizeof bytes),
+                vshi_seconds() - start);
     }
 done:
+    cli_provenance_free(&origin);
     vsh_grid_free(grid);
     vsh_assets_free(assets);
     return code;
