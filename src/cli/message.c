@@ -11,6 +11,7 @@
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -151,33 +152,28 @@ void cli_plain(char *text, size_t size) {
     }
 }
 
-/* A cookie_write_function_t: all of it, or 0 with errno. What a piece begins with may belong to the one
- * before. */
+/* A cookie_write_function_t: all of it, or 0 with errno. A character that the text before began goes on here,
+ * so its last byte is looked at again. */
 static ssize_t write_plain(void *last, const char *text, size_t size) {
-    unsigned char *before = last;
-    for (size_t done = 0; done < size;) {
-        char piece[4096];
-        const size_t count = size - done < sizeof piece ? size - done : sizeof piece;
-        memcpy(piece, text + done, count);
-        if (is_control(*before, (unsigned char)piece[0])) {
-            piece[0] = '?';
+    char *before = last, *plain = malloc(size + 1);
+    plain[0] = *before;
+    memcpy(plain + 1, text, size);
+    *before = plain[size];
+    cli_plain(plain, size + 1);
+    size_t done = 0;
+    while (done < size) {
+        const ssize_t got = write(STDOUT_FILENO, plain + 1 + done, size - done);
+        if (got < 0 && errno != EINTR) {
+            break;
         }
-        *before = (unsigned char)text[done + count - 1];
-        cli_plain(piece, count);
-        for (size_t written = 0; written < count;) {
-            const ssize_t got = write(STDOUT_FILENO, piece + written, count - written);
-            if (got < 0 && errno != EINTR) {
-                return 0;
-            }
-            written += got > 0 ? (size_t)got : 0;
-        }
-        done += count;
+        done += got > 0 ? (size_t)got : 0;
     }
-    return (ssize_t)size;
+    free(plain);
+    return done == size ? (ssize_t)size : 0;
 }
 
 void cli_plain_output(void) {
-    static unsigned char before;
+    static char before;
     static bool is_plain;
     if (is_plain) {
         return;

@@ -37,17 +37,13 @@ static void tell_help(const vsh_setting *s, char *help, size_t size) {
              s->range, always ? "" : " (", s->otherwise, always ? "" : ")");
 }
 
-static void read_settings(void) {
+const vsh_setting *cli_setting(size_t index) {
     vsh_setting setting;
     while (listed_count < CLI_MOST_SETTINGS && vsh_setting_get(listed_count, &setting) != 0) {
         setting_text *text = &listed[listed_count++];
         text->setting = setting;
         tell_help(&setting, text->help, sizeof text->help);
     }
-}
-
-const vsh_setting *cli_setting(size_t index) {
-    read_settings();
     return index < listed_count ? &listed[index].setting : NULL;
 }
 
@@ -396,15 +392,11 @@ static int parse_operands(const parsing *p, const char **operands) {
         }
         at += length + strspn(at + length, " ");
     }
-    cli_message_input(operands[0]);
     if (optind < p->argc) {
         return cli_usage("%s: one %s is taken, not also '%s'", command, name, p->argv[optind]);
     }
-    parsed_grid = count == 1 && !optional ? cli_grid_name(operands[0]) : NULL;
-    if (parsed_grid != NULL) {
-        operands[0] = cli_keep_text("%.*s", (int)(parsed_grid - 1 - operands[0]), operands[0]);
-        cli_message_input(operands[0]);
-    }
+    parsed_grid = count == 1 && !optional ? cli_split_grid(&operands[0]) : NULL;
+    cli_message_input(operands[0]);
     return CLI_OK;
 }
 

@@ -47,12 +47,16 @@ bool cli_has_ending(const char *path, const char *endings) {
     return false;
 }
 
-const char *cli_grid_name(const char *path) {
+const char *cli_split_grid(const char **path) {
     const char *colon = NULL;
-    for (const char *at = strchr(path, ':'); at != NULL; at = strchr(at + 1, ':')) {
-        colon = at - path > 4 && strncasecmp(at - 4, ".vdb", 4) == 0 ? at : colon;
+    for (const char *at = strchr(*path, ':'); at != NULL; at = strchr(at + 1, ':')) {
+        colon = at - *path > 4 && strncasecmp(at - 4, ".vdb", 4) == 0 ? at : colon;
     }
-    return colon != NULL && access(path, F_OK) != 0 ? colon + 1 : NULL;
+    if (colon == NULL || access(*path, F_OK) == 0) {
+        return NULL;
+    }
+    *path = cli_keep_text("%.*s", (int)(colon - *path), *path);
+    return colon + 1;
 }
 
 /* Folder resolved, last part as it is. */

@@ -14,8 +14,9 @@ const char *cli_file_name(const char *path);
 /* Whether `path` ends in ".ENDING", in any case, for one of the endings that blanks part. */
 bool cli_has_ending(const char *path, const char *endings);
 
-/* The NAME of FILE.vdb:NAME, the file's grid; NULL for any other path, and if a file has the whole name. */
-const char *cli_grid_name(const char *path);
+/* The NAME of FILE.vdb:NAME, of which *path keeps FILE.vdb; NULL for any other path, and if a file has the
+ * whole name. */
+const char *cli_split_grid(const char **path);
 
 /* Endings of the meshes and the images that are read. */
 #define CLI_MODEL_ENDINGS "obj gltf glb fbx dae ply stl"

@@ -11,11 +11,6 @@
 
 /* --- casters */
 
-static vsh_selection selection(const cli_patterns *only, const cli_patterns *except) {
-    return (vsh_selection){only != NULL ? only->list : NULL, only != NULL ? only->count : 0, except->list,
-                           except->count};
-}
-
 static int check_heights(const cli_bake_settings *s) {
     const bool given[2] = {s->height != 0.0, s->world[0] > 0.0};
     const bool wanted = cli_has_ending(
@@ -50,33 +45,32 @@ static vsh_caster caster_of_input(const cli_bake_settings *s) {
         caster.height = s->height;
         memcpy(caster.size, s->world, sizeof s->world);
     } else {
-        caster.objects = selection(NULL, &s->no_cast);
+        caster.objects = (vsh_selection){NULL, 0, s->no_cast.list, s->no_cast.count};
     }
     return caster;
 }
 
 /* The input's casters, then those of --caster. */
-static int add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
+static void add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
     const size_t own = made->read != NULL ? made->read->caster_count : 1;
     made->casters = calloc(own + s->caster_count, sizeof *made->casters);
     for (size_t i = 0; i < own; ++i) {
         made->casters[i] = made->read != NULL ? made->read->casters[i] : caster_of_input(s);
     }
     for (size_t i = 0; i < s->caster_count; ++i) {
-        const char *given = s->casters[i], *grid = cli_grid_name(given);
-        const char *path = grid != NULL ? cli_keep_text("%.*s", (int)(grid - 1 - given), given) : given;
+        const char *path = s->casters[i], *grid = cli_split_grid(&path);
         made->casters[own + i] = caster_of(path, grid);
     }
     made->scene.casters = made->casters;
     made->scene.caster_count = own + s->caster_count;
-    return CLI_OK;
 }
 
 /* --- receivers */
 
 static int override_receiver(const cli_bake_settings *s, vsh_receiver *receiver) {
     if (s->receive.count > 0 || s->no_receive.count > 0) {
-        receiver->objects = selection(&s->receive, &s->no_receive);
+        receiver->objects =
+            (vsh_selection){s->receive.list, s->receive.count, s->no_receive.list, s->no_receive.count};
     }
     if (s->densities.count > 0) {
         receiver->density = s->densities.list;
@@ -482,8 +476,8 @@ int cli_bake_scene_casters(const cli_bake_settings *s, cli_bake_scene *made) {
             made->scene.grid.resolution = 0; /* its own voxels */
         }
     }
-    CLI_TRY(cli_patch_scene(&s->patch, &made->scene));
-    return add_casters(s, made);
+    add_casters(s, made);
+    return cli_patch_scene(&s->patch, &made->scene);
 }
 
 int cli_bake_scene_for_points(const cli_bake_settings *s, cli_bake_scene *made) {

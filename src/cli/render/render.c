@@ -74,16 +74,6 @@ static const cli_option options[] = {
     CLI_COMMON_OPTIONS,
 };
 
-static int parse_background(render_settings *s, const char *name, const char *value) {
-    double *background = s->options.background;
-    s->transparent = strcmp(value, "none") == 0;
-    if (s->transparent) {
-        memset(background, 0, sizeof s->options.background);
-        return CLI_OK;
-    }
-    return cli_parse_color(name, value, background);
-}
-
 static int add_lightmap(render_settings *s, const char *value) {
     if (s->lightmap_count == MOST_LIGHTMAPS) {
         return cli_usage("--lightmap '%s': at most %d are taken", value, MOST_LIGHTMAPS);
@@ -119,7 +109,8 @@ static int parse_option(void *settings, int key, const char *name, const char *v
         s->has_sky = true;
         return cli_parse_color(name, value, o->sky);
     case KEY_BACKGROUND:
-        return parse_background(s, name, value);
+        s->transparent = strcmp(value, "none") == 0;
+        return cli_parse_color(name, s->transparent ? "0,0,0" : value, o->background);
     case KEY_EXPOSURE:
         return cli_parse_number(name, value, -20.0, 20.0, &s->exposure);
     case KEY_SHAFTS:
@@ -135,10 +126,9 @@ static int parse_option(void *settings, int key, const char *name, const char *v
 
 /* --- the picture and its file */
 
-/* Floats of a pixel: colour, alpha, depth, normal; and R, G, B, A of a file of 8 bits. */
-enum { FLOATS = 8, ENCODED = 4 };
-/* Planes of a file of floats that are made of colour and normal. */
-enum { PLANES = 6 };
+/* Floats of a pixel: colour, alpha, depth, normal; and those that a file is made of, which are R, G, B and A
+ * of 8 bits, or colour and normal of a file of floats. */
+enum { FLOATS = 8, ENCODED = 4, SPLIT = 6 };
 
 static const char *const plane_names[FLOATS] = {"R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z"};
 
@@ -149,14 +139,7 @@ static bool is_linear(const char *path) {
 
 static uint64_t count_picture_bytes(const render_settings *s) {
     const uint64_t pixels = (uint64_t)s->options.width * (uint64_t)s->options.height;
-    return pixels * (FLOATS + ENCODED + (is_linear(s->bake.output) ? PLANES : 0)) * sizeof(float);
-}
-
-static vsh_picture view_picture(float *memory, size_t pixels) {
-    return (vsh_picture){.color = memory,
-                         .alpha = memory + 3 * pixels,
-                         .depth = memory + 4 * pixels,
-                         .normal = memory + 5 * pixels};
+    return pixels * (FLOATS + (is_linear(s->bake.output) ? SPLIT : ENCODED)) * sizeof(float);
 }
 
 /* The file's options and, but for the planes, what it holds. */
@@ -169,47 +152,6 @@ static vsh_image describe_image(const render_settings *s, vsh_image_options *as)
                              : linear || s->transparent                      ? 4
                                                                              : 3;
     return (vsh_image){s->options.width, s->options.height, channels, plane_names, NULL, NULL};
-}
-
-static int write_image(const render_settings *s, const float *const *planes, const cli_provenance *origin) {
-    vsh_image_options as;
-    vsh_image image = describe_image(s, &as);
-    image.planes = planes;
-    as.attributes = origin->attributes;
-    as.attribute_count = origin->count;
-    vsh_error error;
-    return cli_check(vsh_image_write(s->bake.output, &image, &as, &error), &error);
-}
-
-/* Splits the triples of colour and normal into the planes of a file. */
-static int write_linear(const render_settings *s, const vsh_picture *p, const cli_provenance *origin) {
-    const size_t pixels = (size_t)s->options.width * (size_t)s->options.height;
-    float *memory = malloc(PLANES * pixels * sizeof *memory);
-    for (size_t i = 0; i < pixels; ++i) {
-        for (size_t c = 0; c < 3; ++c) {
-            memory[c * pixels + i] = p->color[3 * i + c];
-            memory[(3 + c) * pixels + i] = p->normal[3 * i + c];
-        }
-    }
-    const float *planes[FLOATS] = {memory,   memory + pixels,     memory + 2 * pixels, p->alpha,
-                                   p->depth, memory + 3 * pixels, memory + 4 * pixels, memory + 5 * pixels};
-    const int code = write_image(s, planes, origin);
-    free(memory);
-    return code;
-}
-
-static int write_encoded(const render_settings *s, const vsh_picture *p, float *encoded,
-                         const cli_provenance *origin) {
-    const size_t pixels = (size_t)s->options.width * (size_t)s->options.height;
-    float *planes[ENCODED];
-    for (size_t c = 0; c < ENCODED; ++c) {
-        planes[c] = encoded + c * pixels;
-    }
-    vsh_error error;
-    CLI_TRY(cli_check(vsh_picture_encode(p, s->options.width, s->options.height, s->exposure, planes,
-                                         s->transparent ? planes[3] : NULL, &error),
-                      &error));
-    return write_image(s, (const float *const *)planes, origin);
 }
 
 /* --- checks */
@@ -743,14 +685,45 @@ static const char *lightmap_named(const render_settings *s, const char *message)
                                                                                        : NULL;
 }
 
+/* Encodes the picture, or splits the triples of its colour and normal into planes, which stand behind it. */
+static int write_picture(const render_work *work, const vsh_picture *p) {
+    const render_settings *s = work->settings;
+    const size_t pixels = (size_t)s->options.width * (size_t)s->options.height;
+    const bool linear = is_linear(s->bake.output);
+    float *made[SPLIT] = {NULL};
+    for (size_t c = 0; c < (linear ? SPLIT : ENCODED); ++c) {
+        made[c] = work->memory + (FLOATS + c) * pixels;
+    }
+    for (size_t i = 0; i < 3 * pixels && linear; ++i) {
+        made[i % 3][i / 3] = p->color[i];
+        made[3 + i % 3][i / 3] = p->normal[i];
+    }
+    vsh_error error;
+    CLI_TRY(linear ? CLI_OK
+                   : cli_check(vsh_picture_encode(p, s->options.width, s->options.height, s->exposure, made,
+                                                  s->transparent ? made[3] : NULL, &error),
+                               &error));
+    const float *planes[FLOATS] = {made[0],  made[1], made[2], linear ? p->alpha : made[3],
+                                   p->depth, made[3], made[4], made[5]};
+    vsh_image_options as;
+    vsh_image image = describe_image(s, &as);
+    image.planes = planes;
+    as.attributes = work->shading.origin.attributes;
+    as.attribute_count = work->shading.origin.count;
+    return cli_check(vsh_image_write(s->bake.output, &image, &as, &error), &error);
+}
+
 static int draw_picture(render_work *work) {
     const render_settings *s = work->settings;
     const render_shown *shown = &work->shown;
     cli_shading *shading = &work->shading;
     const vsh_scene *scene = shading->scene;
     const size_t pixels = (size_t)s->options.width * (size_t)s->options.height;
-    work->memory = calloc(pixels * (FLOATS + ENCODED), sizeof *work->memory);
-    const vsh_picture picture = view_picture(work->memory, pixels);
+    work->memory = calloc(count_picture_bytes(s), 1);
+    const vsh_picture picture = {.color = work->memory,
+                                 .alpha = work->memory + 3 * pixels,
+                                 .depth = work->memory + 4 * pixels,
+                                 .normal = work->memory + 5 * pixels};
     double start = vshi_seconds();
     vsh_error error;
     const vsh_result result =
@@ -761,11 +734,9 @@ static int draw_picture(render_work *work) {
         return cli_fail_of(lightmap_named(s, error.message), &error);
     }
     shading->stats.points += (uint64_t)pixels * (uint64_t)(s->options.samples * s->options.samples);
-    const int code = is_linear(s->bake.output)
-                         ? write_linear(s, &picture, &shading->origin)
-                         : write_encoded(s, &picture, work->memory + FLOATS * pixels, &shading->origin);
+    CLI_TRY(write_picture(work, &picture));
     cli_stats_stage(&shading->stats, CLI_STAGE_WRITE, start);
-    return code;
+    return CLI_OK;
 }
 
 /* Lightmaps and the file of --lights are inputs too. */

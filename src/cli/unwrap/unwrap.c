@@ -128,18 +128,6 @@ static int check_files(const unwrap_settings *s) {
 
 /* --- the mesh file */
 
-static void place_all(const vsh_atlas *atlas, vsh_lit_mesh *meshes) {
-    for (size_t i = 0; i < vsh_atlas_mesh_count(atlas); ++i) {
-        const vsh_atlas_mesh placed = vsh_atlas_mesh_view(atlas, i);
-        meshes[i] = (vsh_lit_mesh){.uvs = placed.uvs,
-                                   .sources = placed.sources,
-                                   .indices = placed.indices,
-                                   .charts = placed.charts,
-                                   .vertex_count = placed.vertex_count,
-                                   .triangle_count = placed.triangle_count};
-    }
-}
-
 enum { NAME_BYTES = 120 }; /* of a page's */
 
 /* The name of a mesh's object as a page may have it; NULL: none, or one that names of files cannot have. */
@@ -183,7 +171,15 @@ static int write_model(const unwrap_settings *s, const vsh_model *model, const v
     vsh_lit_mesh *places = calloc(vsh_atlas_mesh_count(atlas) + 1, sizeof *places);
     const char **names = calloc(vsh_atlas_page_count(atlas) + 1, sizeof *names);
     uint32_t *pages = calloc(vsh_atlas_chart_count(atlas) + 1, sizeof *pages);
-    place_all(atlas, places);
+    for (size_t i = 0; i < vsh_atlas_mesh_count(atlas); ++i) {
+        const vsh_atlas_mesh placed = vsh_atlas_mesh_view(atlas, i);
+        places[i] = (vsh_lit_mesh){.uvs = placed.uvs,
+                                   .sources = placed.sources,
+                                   .indices = placed.indices,
+                                   .charts = placed.charts,
+                                   .vertex_count = placed.vertex_count,
+                                   .triangle_count = placed.triangle_count};
+    }
     if (s->options.atlas == VSH_ATLAS_OBJECTS) {
         name_pages(meshes, atlas, names);
         lit.page_names = names;

@@ -57,12 +57,9 @@ static int take_like(volume_settings *s, const char *name, const char *value) {
         return cli_usage("%s '': expected FILE.vdb or FILE.vdb:GRID", name);
     }
     s->like = value;
-    s->like_grid = cli_grid_name(value);
+    s->like_grid = cli_split_grid(&s->like);
     if (s->like_grid != NULL && s->like_grid[0] == '\0') {
         return cli_usage("%s '%s': no grid is named behind the colon", name, value);
-    }
-    if (s->like_grid != NULL) {
-        s->like = cli_keep_text("%.*s", (int)(s->like_grid - 1 - value), value);
     }
     return CLI_OK;
 }
