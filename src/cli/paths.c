@@ -84,6 +84,11 @@ bool cli_same_file(const char *a, const char *b) {
            strcmp(first, second) == 0;
 }
 
+int cli_check_apart(const char *output, const char *input, const char *what) {
+    const bool apart = output == NULL || input == NULL || !cli_same_file(output, input);
+    return apart ? CLI_OK : cli_usage("%s: the output is %s", output, what);
+}
+
 bool cli_is_model(const char *path) {
     return cli_has_ending(path, "obj gltf glb fbx stl dae x3d 3ds blend off");
 }

@@ -27,6 +27,9 @@ const char *cli_split_grid(const char **path);
 /* Whether the two name one file, whether by links or through folders; also where it does not exist yet. */
 bool cli_same_file(const char *a, const char *b);
 
+/* Refuses an output that is an input, `what`; NULL for either: there is none. CLI_OK or CLI_USAGE. */
+int cli_check_apart(const char *output, const char *input, const char *what);
+
 /* Whether a path ends as a mesh's file does (but for .ply, which may hold points alone). */
 bool cli_is_model(const char *path);
 

@@ -26,18 +26,14 @@ static bool read_number(const char *text, double *value, const char **rest) {
 
 int cli_parse_number(const char *name, const char *text, double least, double most, double *value) {
     const char *rest;
-    if (!read_number(text, value, &rest) || *rest != '\0' || *value < least || *value > most) {
-        return cli_usage("%s '%s': expected a number from %g to %g", name, text, least, most);
-    }
-    return CLI_OK;
+    const bool good = read_number(text, value, &rest) && *rest == '\0' && *value >= least && *value <= most;
+    return good ? CLI_OK : cli_usage("%s '%s': expected a number from %g to %g", name, text, least, most);
 }
 
 int cli_parse_positive(const char *name, const char *text, double *value) {
     const char *rest;
-    if (!read_number(text, value, &rest) || *rest != '\0' || !(*value > 0.0)) {
-        return cli_usage("%s '%s': expected a number greater than 0", name, text);
-    }
-    return CLI_OK;
+    const bool good = read_number(text, value, &rest) && *rest == '\0' && *value > 0.0;
+    return good ? CLI_OK : cli_usage("%s '%s': expected a number greater than 0", name, text);
 }
 
 static bool read_integer(const char *text, int32_t *value, const char **rest) {
@@ -57,10 +53,9 @@ static bool read_integer(const char *text, int32_t *value, const char **rest) {
 
 int cli_parse_integer(const char *name, const char *text, int32_t least, int32_t most, int32_t *value) {
     const char *rest;
-    if (!read_integer(text, value, &rest) || *rest != '\0' || *value < least || *value > most) {
-        return cli_usage("%s '%s': expected a whole number from %d to %d", name, text, least, most);
-    }
-    return CLI_OK;
+    const bool good = read_integer(text, value, &rest) && *rest == '\0' && *value >= least && *value <= most;
+    return good ? CLI_OK
+                : cli_usage("%s '%s': expected a whole number from %d to %d", name, text, least, most);
 }
 
 int cli_parse_shard(const char *name, const char *text, int32_t *shard, int32_t *count) {
@@ -85,10 +80,8 @@ static bool read_numbers(const char *text, int count, double *value) {
 }
 
 int cli_parse_vector(const char *name, const char *text, double value[3]) {
-    if (!read_numbers(text, 3, value) || (value[0] == 0.0 && value[1] == 0.0 && value[2] == 0.0)) {
-        return cli_usage("%s '%s': expected X,Y,Z, three numbers that are not all 0", name, text);
-    }
-    return CLI_OK;
+    const bool good = read_numbers(text, 3, value) && (value[0] != 0.0 || value[1] != 0.0 || value[2] != 0.0);
+    return good ? CLI_OK : cli_usage("%s '%s': expected X,Y,Z, three numbers that are not all 0", name, text);
 }
 
 int cli_parse_point(const char *name, const char *text, double value[3]) {
@@ -97,10 +90,8 @@ int cli_parse_point(const char *name, const char *text, double value[3]) {
 }
 
 int cli_parse_color(const char *name, const char *text, double value[3]) {
-    if (!read_numbers(text, 3, value) || value[0] < 0.0 || value[1] < 0.0 || value[2] < 0.0) {
-        return cli_usage("%s '%s': expected R,G,B, three numbers from 0", name, text);
-    }
-    return CLI_OK;
+    const bool good = read_numbers(text, 3, value) && value[0] >= 0.0 && value[1] >= 0.0 && value[2] >= 0.0;
+    return good ? CLI_OK : cli_usage("%s '%s': expected R,G,B, three numbers from 0", name, text);
 }
 
 int cli_parse_box(const char *name, const char *text, double min[3], double max[3]) {

@@ -129,25 +129,19 @@ int cli_bake_scene_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
     return CLI_OK;
 }
 
-/* Whether an output means a folder. A folder with the name of an image is in the way of one. */
-static bool names_folder(const char *output) {
-    return cli_is_folder(output) && strchr(cli_file_name(output), '.') == NULL;
-}
-
 /* Whether an output is for many objects, of any file. */
 static bool is_of_objects(const char *output) {
     const char *name = cli_file_name(output);
     return cli_is_folder(output) || strstr(name, CLI_OBJECT_NAME) != NULL || strchr(name, '.') == NULL;
 }
 
-/* Where a receiver's output goes: into the folder of --output-folder, and with --per-object where the
- * object's name goes in it. NULL where memory is short. */
+/* Puts a receiver's output into the folder of --output-folder, and with --per-object the place of the
+ * object's name into it. */
 static const char *place_output(const cli_bake_settings *s, const char *output) {
     if (s->output_folder != NULL) {
         output = cli_keep_text("%s/%s", s->output_folder, cli_file_name(output));
     }
-    const bool marked = output != NULL && s->per_object && !vsh_lit_is_output(output);
-    return marked ? cli_object_output(output) : output;
+    return s->per_object && !vsh_lit_is_output(output) ? cli_object_output(output) : output;
 }
 
 /* Names are those of one file. */
@@ -194,7 +188,9 @@ static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
             return cli_usage("%s: no output; give -o OUT", s->input);
         }
     }
-    if (s->output != NULL && !s->per_object && names_folder(s->output)) {
+    /* a folder with the name of an image is in the way of one */
+    if (s->output != NULL && !s->per_object && cli_is_folder(s->output) &&
+        strchr(cli_file_name(s->output), '.') == NULL) {
         return cli_usage(
             "-o '%s': is a folder; give an image in it, as '%s%slightmap.exr', or an image for each "
             "object with --per-object",
@@ -210,26 +206,19 @@ static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
 
 int cli_bake_check_work(const cli_bake_settings *s, const cli_bake_scene *made) {
     const bool shades = made->scene.ao || vsh_planes_shaded(&made->scene.planes) > 0;
-    if (made->read == NULL && made->scene.light_count == 0 && !shades) {
-        return cli_usage("%s: nothing to bake; give --sun X,Y,Z or --ao DISTANCE, or both", s->input);
-    }
     if (made->scene.light_count == 0 && !shades) {
-        return cli_usage("%s: nothing to bake: no lights and no ao", s->input);
+        return cli_usage("%s: nothing to bake%s", s->input,
+                         made->read != NULL ? ": no lights and no ao"
+                                            : "; give --sun X,Y,Z or --ao DISTANCE, or both");
     }
     return CLI_OK;
 }
 
 int cli_bake_check_output(const cli_bake_settings *s, const vsh_scene *scene, const char *output) {
-    if (cli_same_file(output, s->input)) {
-        return cli_usage("%s: the output is the input", output);
-    }
-    if (s->lights != NULL && cli_same_file(output, cli_bake_lights(s))) {
-        return cli_usage("%s: the output is the file of --lights", output);
-    }
+    CLI_TRY(cli_check_apart(output, s->input, "the input"));
+    CLI_TRY(cli_check_apart(output, cli_bake_lights(s), "the file of --lights"));
     for (size_t i = 0; i < scene->light_file_count; ++i) {
-        if (cli_same_file(output, scene->light_files[i].path)) {
-            return cli_usage("%s: the output is also a file of lights", output);
-        }
+        CLI_TRY(cli_check_apart(output, scene->light_files[i].path, "also a file of lights"));
     }
     const bool named_by_scene = s->output == NULL && s->output_folder == NULL && output != s->stats;
     CLI_TRY(named_by_scene ? cli_check_links(s->input, output) : CLI_OK);
@@ -238,15 +227,11 @@ int cli_bake_check_output(const cli_bake_settings *s, const vsh_scene *scene, co
         return CLI_OK; /* it replaces nothing */
     }
     for (size_t i = 0; i < scene->caster_count; ++i) {
-        if (scene->casters[i].path != NULL && cli_same_file(output, scene->casters[i].path)) {
-            return cli_usage("%s: the output is also a caster's file", output);
-        }
+        CLI_TRY(cli_check_apart(output, scene->casters[i].path, "also a caster's file"));
     }
     for (size_t i = 0; i < scene->receiver_count; ++i) {
-        if (scene->receivers[i].type != VSH_RECEIVER_PLANE &&
-            cli_same_file(output, scene->receivers[i].path)) {
-            return cli_usage("%s: the output is also a receiver's file", output);
-        }
+        const bool plane = scene->receivers[i].type == VSH_RECEIVER_PLANE;
+        CLI_TRY(cli_check_apart(output, plane ? NULL : scene->receivers[i].path, "also a receiver's file"));
     }
     return CLI_OK;
 }

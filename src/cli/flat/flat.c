@@ -103,14 +103,9 @@ static void free_planes(flat_planes *p) {
 /* --- the work */
 
 static int check_output(const flat_settings *s, const vsh_flat_scene *scene, const char *output) {
-    if (cli_same_file(output, s->input)) {
-        return cli_usage("%s: the output is the input", output);
-    }
+    CLI_TRY(cli_check_apart(output, s->input, "the input"));
     for (size_t i = 0; i < scene->caster_count; ++i) {
-        const char *path = scene->casters[i].path;
-        if (path != NULL && cli_same_file(output, path)) {
-            return cli_usage("%s: the output is also a caster's file", output);
-        }
+        CLI_TRY(cli_check_apart(output, scene->casters[i].path, "also a caster's file"));
     }
     return CLI_OK;
 }

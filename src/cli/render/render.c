@@ -180,9 +180,7 @@ static int check_options(const render_settings *s) {
         CLI_TRY(cli_check(vsh_camera_check(&o->camera, &error), &error));
     }
     for (size_t i = 0; i < s->lightmap_count; ++i) {
-        if (cli_same_file(s->bake.output, s->lightmaps[i])) {
-            return cli_usage("%s: the output is also a lightmap", s->bake.output);
-        }
+        CLI_TRY(cli_check_apart(s->bake.output, s->lightmaps[i], "also a lightmap"));
     }
     vsh_image_options as;
     const vsh_image image = describe_image(s, &as);

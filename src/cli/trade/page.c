@@ -224,8 +224,8 @@ static void write_plot(FILE *out, const trade_work *work, const trade_subject *s
 
 /* --- the tables */
 
-/* The fastest run with an RMSE of at most `target`; NULL if there is none. */
-static const trade_run *find_fastest(const trade_subject *subject, double target, bool embree) {
+/* Writes the fastest run with an RMSE of at most `target`. */
+static void write_fastest(FILE *out, const trade_subject *subject, double target, bool embree) {
     const trade_run *best = NULL;
     for (size_t i = 0; i < subject->run_count; ++i) {
         const trade_run *run = &subject->runs[i];
@@ -234,12 +234,8 @@ static const trade_run *find_fastest(const trade_subject *subject, double target
             best = run;
         }
     }
-    return best;
-}
-
-static void write_fastest(FILE *out, const trade_run *run) {
-    if (run != NULL) {
-        fprintf(out, "<td class=\"t\"><code>%s</code></td><td>%.3g</td>", run->options, run->rate);
+    if (best != NULL) {
+        fprintf(out, "<td class=\"t\"><code>%s</code></td><td>%.3g</td>", best->options, best->rate);
     } else {
         fputs("<td class=\"t\">none of these</td><td>–</td>", out);
     }
@@ -253,9 +249,9 @@ static void write_targets(FILE *out, const trade_subject *subject, bool embree) 
             embree ? "<th class=\"t\">Embree’s rays</th><th>µs a value</th>" : "");
     for (size_t i = 0; i < sizeof targets / sizeof targets[0]; ++i) {
         fprintf(out, "<tr><td>%g</td>", targets[i]);
-        write_fastest(out, find_fastest(subject, targets[i], false));
+        write_fastest(out, subject, targets[i], false);
         if (embree) {
-            write_fastest(out, find_fastest(subject, targets[i], true));
+            write_fastest(out, subject, targets[i], true);
         }
         fputs("</tr>\n", out);
     }
@@ -322,7 +318,11 @@ static void write_receivers(FILE *out, const trade_work *work) {
     fprintf(out, "; %zu at all sizes.</dd>\n", work->covered - work->points);
 }
 
-static void write_truth(FILE *out, const trade_work *work) {
+static void write_conditions(FILE *out, const trade_work *work) {
+    fputs("<dl><dt>Input</dt><dd><code>", out);
+    cli_document_escape(out, work->settings->bake.input);
+    fputs("</code></dd>\n", out);
+    write_receivers(out, work);
     fprintf(
         out,
         "<dt>Truth</dt><dd>%d rays a texel, from just above it, against the casters themselves%s%s; it took "
@@ -330,14 +330,6 @@ static void write_truth(FILE *out, const trade_work *work) {
         work->settings->truth_rays, work->triangles != NULL ? "; triangles by Embree" : "",
         work->solids != NULL ? "; procedural shapes by sphere tracing in double precision" : "",
         work->truth_s);
-}
-
-static void write_conditions(FILE *out, const trade_work *work) {
-    fputs("<dl><dt>Input</dt><dd><code>", out);
-    cli_document_escape(out, work->settings->bake.input);
-    fputs("</code></dd>\n", out);
-    write_receivers(out, work);
-    write_truth(out, work);
     fprintf(
         out,
         "<dt>Time</dt><dd>%s; the median of three bakes if they are short. A bake finds the valid texels, "

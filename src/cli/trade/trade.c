@@ -745,8 +745,8 @@ const cli_command cli_trade = {
     "trade",
     "INPUT -o OUT.html [options]",
     "Bakes a mesh or a scene (.json) by every method, at several voxel sizes and settings, and compares\n"
-    "with the truth: rays against the triangles and the procedural shapes themselves. The page shows error\n"
-    "against time and the fastest options for a given error. Defaults are in brackets.",
+    "with the truth: rays against the triangles and the procedural shapes themselves. The page shows\n"
+    "error against time and the fastest options for a given error. Defaults are in brackets.",
     options,
     sizeof options / sizeof options[0],
     trade_main};

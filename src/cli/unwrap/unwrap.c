@@ -108,9 +108,7 @@ static int check_files(const unwrap_settings *s) {
     if (!vsh_lit_is_output(s->output)) {
         return cli_usage("%s: give -o OUT.obj, .glb or .gltf", s->output != NULL ? s->output : s->input);
     }
-    if (cli_same_file(s->output, s->input)) {
-        return cli_usage("%s: the output is the input", s->output);
-    }
+    CLI_TRY(cli_check_apart(s->output, s->input, "the input"));
     if (s->picture != NULL && (cli_same_file(s->picture, s->input) || cli_same_file(s->picture, s->output))) {
         return cli_usage("%s: the picture is the %s", s->picture,
                          cli_same_file(s->picture, s->input) ? "input" : "output");

@@ -69,13 +69,9 @@ static int check(const view_settings *s) {
                          s->inputs[0]);
     }
     for (size_t i = 0; i < 2; ++i) {
-        if (s->inputs[i] != NULL && cli_same_file(s->output, s->inputs[i])) {
-            return cli_usage("%s: the output is the input", s->output);
-        }
+        CLI_TRY(cli_check_apart(s->output, s->inputs[i], "the input"));
         for (size_t k = 0; k < s->planes[i].count; ++k) {
-            if (cli_same_file(s->output, s->planes[i].files[k])) {
-                return cli_usage("%s: the output is also a file of planes", s->output);
-            }
+            CLI_TRY(cli_check_apart(s->output, s->planes[i].files[k], "also a file of planes"));
         }
     }
     return cli_temporary_check(s->output);

@@ -98,12 +98,8 @@ static int check_options(const volume_settings *s) {
 
 /* Refuses bad outputs before anything is read. */
 static int check_files(const volume_settings *s, const vsh_scene *scene) {
-    const char *const outputs[] = {s->bake.output, s->bake.stats};
-    for (size_t i = 0; i < 2 && s->like != NULL; ++i) {
-        if (outputs[i] != NULL && cli_same_file(outputs[i], s->like)) {
-            return cli_usage("%s: the output is also the file of --like", outputs[i]);
-        }
-    }
+    CLI_TRY(cli_check_apart(s->bake.output, s->like, "also the file of --like"));
+    CLI_TRY(cli_check_apart(s->bake.stats, s->like, "also the file of --like"));
     return cli_bake_check_files(&s->bake, scene);
 }
 
