@@ -240,16 +240,6 @@ static bool is_shown_as_mesh(const vsh_assets *assets, size_t index) {
     return count > 0;
 }
 
-/* Whether any caster has no triangles, so that the picture shows its field. */
-static bool shows_fields(const vsh_scene *scene, const vsh_assets *assets) {
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        if (!is_shown_as_mesh(assets, i)) {
-            return true;
-        }
-    }
-    return false;
-}
-
 static void find_color(const vsh_caster *caster, double color[3]) {
     const bool given =
         caster != NULL && (caster->color[0] > 0.0 || caster->color[1] > 0.0 || caster->color[2] > 0.0);
@@ -533,16 +523,6 @@ static void free_shown(render_shown *shown) {
 /* A three-quarter view from a little above. */
 static const double azimuth = 35.0 * CLI_DEGREE, elevation = 25.0 * CLI_DEGREE;
 
-static size_t count_vertices(const vsh_lit_meshes *lit, size_t count) {
-    size_t vertices = 0;
-    for (size_t i = 0; i < count; ++i) {
-        for (size_t m = 0; m < lit[i].mesh_count; ++m) {
-            vertices += lit[i].meshes[m].vertex_count;
-        }
-    }
-    return vertices;
-}
-
 /* Adds the vertices that the mesh's triangles use, in the world. */
 static void add_vertices(const vsh_mesh *mesh, double *points, size_t *count) {
     static const double identity[12] = {1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0};
@@ -576,7 +556,12 @@ static void add_box(const vsh_field *field, double *points, size_t *count) {
 
 /* Finds the points to keep in view: vertices of meshes, corners of the fields' boxes. [*count][3] */
 static double *find_points(const render_shown *seen, size_t *count) {
-    const size_t room = 8 * seen->count + count_vertices(seen->lit, seen->lit_count) + 1;
+    size_t room = 8 * seen->count + 1;
+    for (size_t i = 0; i < seen->lit_count; ++i) {
+        for (size_t m = 0; m < seen->lit[i].mesh_count; ++m) {
+            room += seen->lit[i].meshes[m].vertex_count;
+        }
+    }
     double *points = malloc(3 * room * sizeof *points);
     *count = 0;
     for (size_t i = 0; i < seen->count; ++i) {
@@ -647,7 +632,11 @@ static int load(render_work *work) {
 
 static int make_occluders(render_work *work) {
     vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
-    what.voxels = shows_fields(work->shading.scene, work->shading.assets);
+    what.voxels = 0;
+    for (size_t i = 0; i < work->shading.scene->caster_count;
+         ++i) { /* those without triangles show their field */
+        what.voxels = what.voxels || !is_shown_as_mesh(work->shading.assets, i);
+    }
     CLI_TRY(cli_shading_cast(&work->shading, &what));
     const double start = vshi_seconds();
     const int code = add_casters(&work->shading, &work->shown);

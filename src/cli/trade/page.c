@@ -301,7 +301,7 @@ static void write_receivers(FILE *out, const trade_work *work) {
     for (size_t r = 0; r < work->receiver_count; ++r) {
         const trade_receiver *receiver = &work->receivers[r];
         fputs(r > 0 ? "; " : "", out);
-        cli_document_escape(out, receiver->path);
+        cli_document_escape(out, work->scene->receivers[r].path);
         fprintf(out, ", %d × %d", receiver->info.width, receiver->info.height);
     }
     if (work->settings->receiver >= 0) {

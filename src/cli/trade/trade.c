@@ -130,7 +130,6 @@ static int load_receiver(trade_work *work, size_t index) {
         work->low[k] = fmin(work->low[k], receiver->info.bounds_min[k]);
         work->high[k] = fmax(work->high[k], receiver->info.bounds_max[k]);
     }
-    receiver->path = work->scene->receivers[index].path;
     receiver->first = work->texels;
     work->texels += (size_t)receiver->info.width * (size_t)receiver->info.height;
     work->covered += receiver->info.covered;

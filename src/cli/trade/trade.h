@@ -19,7 +19,6 @@ typedef struct trade_settings {
 
 /* A plane of values holds the texels of all receivers, one receiver after the other. */
 typedef struct trade_receiver {
-    const char *path;
     vsh_charts *charts;
     vsh_charts_info info;
     size_t first; /* its first texel in a plane */
