@@ -1,5 +1,5 @@
-# Pages of docs/ that the program prints (`vdbshade help TOPIC`), as arrays; and what it writes of its own tables when it is
-# built: man pages and completions, which packages install (`vdbshade help --write FOLDER`).
+# Pages of docs/ that the program prints (`vdbshade help TOPIC`), as arrays; and the man pages, which it writes
+# when it is built (`vdbshade help --write FOLDER`).
 set(VSH_HELP_PAGES ${PROJECT_BINARY_DIR}/help_pages.c)
 file(GLOB VSH_HELP_TEXTS CONFIGURE_DEPENDS docs/*.md)
 list(FILTER VSH_HELP_TEXTS EXCLUDE REGEX "/architecture.md$") # which is for who changes it
@@ -20,7 +20,4 @@ function(vsh_add_manual program)
                      DEPENDS ${program} VERBATIM)
   add_custom_target(manual ALL DEPENDS ${VSH_MANUAL}/done)
   install(DIRECTORY ${VSH_MANUAL}/share/man/man1 DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT program)
-  foreach(folder bash-completion zsh fish)
-    install(DIRECTORY ${VSH_MANUAL}/share/${folder} DESTINATION ${CMAKE_INSTALL_DATADIR} COMPONENT program)
-  endforeach()
 endfunction()

@@ -1,8 +1,10 @@
-/* The subcommands. */
+/* The subcommands, the exit codes, and the pages of the manual. */
 #ifndef CLI_COMMANDS_H
 #define CLI_COMMANDS_H
 
 #include "options.h"
+
+#include <stdio.h>
 
 extern const cli_command cli_bake;
 extern const cli_command cli_voxelize;
@@ -19,35 +21,41 @@ extern const cli_command cli_view;
 extern const cli_command cli_help;
 extern const cli_command cli_merge;
 
-/* A command, and the line that tells of it. */
+/* A command, and its line in the help of the whole program. */
 typedef struct cli_command_row {
     const cli_command *command;
     const char *operands;
     const char *brief;
 } cli_command_row;
 
-/* Row `index`, in the order of the help; NULL beyond the last. */
-const cli_command_row *cli_command_get(size_t index);
+extern const cli_command_row cli_commands[]; /* in the order of the help; the last row has no command */
 
-/* The command of that name; NULL: there is none. */
-const cli_command *cli_command_find(const char *name);
+/* Returns the row of a command's name, or NULL. */
+const cli_command_row *cli_find_command(const char *name);
 
-/* What vdbshade is; what it does, in a line. */
-extern const char cli_summary[];
-
-/* An exit code and what it says. */
 typedef struct cli_exit_row {
     int code;
     const char *meaning;
 } cli_exit_row;
 
-/* Row `index`; NULL beyond the last. */
-const cli_exit_row *cli_exit_get(size_t index);
+extern const cli_exit_row cli_exits[]; /* the last row has no meaning */
 
-/* What holds of errors in every command. */
-extern const char cli_errors[];
+/* A page of docs/, built in (cmake/embed_docs.cmake). */
+typedef struct cli_page {
+    const char *name; /* "scene", of docs/scene.md */
+    const unsigned char *bytes;
+    size_t size;
+} cli_page;
 
-/* The help of the whole program. */
+extern const cli_page cli_pages[]; /* the last row has no name */
+
+/* Texts of the help: a line about vdbshade, and how every command reports errors. */
+extern const char cli_summary[], cli_errors[];
+
+/* Prints the help of the whole program. */
 void cli_print_commands(void);
+
+/* Writes a man page in the man macros: of a command, or for NULL of the program. */
+void cli_write_man(FILE *out, const cli_command_row *row);
 
 #endif

@@ -1,5 +1,4 @@
 /* vdbshade: the command line. Which subcommand, and the exit code. */
-#include "child.h"
 #include "commands.h"
 #include "message.h"
 #include "progress.h"
@@ -9,6 +8,8 @@
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 #include <vdbshade/reader.h>
 
@@ -19,8 +20,8 @@ static int unknown_command(const char *text) {
     enum { MOST = 64 };
     const char *names[MOST];
     size_t count = 0;
-    for (const cli_command_row *row; count < MOST && (row = cli_command_get(count)) != NULL;) {
-        names[count++] = row->command->name;
+    for (; cli_commands[count].command != NULL; ++count) {
+        names[count] = cli_commands[count].command->name;
     }
     const char *near = cli_nearest(text, names, count);
     if (near != NULL) {
@@ -41,14 +42,40 @@ static int dispatch(int argc, char **argv) {
         printf("vdbshade %s\n", vsh_version());
         return CLI_OK;
     }
-    const cli_command *command = cli_command_find(argv[1]);
-    if (command == NULL) {
+    const cli_command_row *row = cli_find_command(argv[1]);
+    if (row == NULL) {
         return unknown_command(argv[1]);
     }
-    if (command != &cli_query) { /* which may write points there */
+    if (row->command != &cli_query) { /* which may write points there */
         cli_plain_output();
     }
-    return command->main(argc - 1, argv + 1);
+    return row->command->main(argc - 1, argv + 1);
+}
+
+#ifndef SYS_landlock_create_ruleset
+#define SYS_landlock_create_ruleset 444
+#endif
+
+/* Sanitizers look into their own process by way of another. */
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
+#define SANITIZED 1
+#endif
+#endif
+#ifndef SANITIZED
+#define SANITIZED 0
+#endif
+
+/* A reader that a file has taken over is kept by Landlock from the memory and environment of other processes.
+ * Where the kernel has no Landlock, this process closes its own before any file is read. That shuts debuggers
+ * and core files out, too, so it is not done elsewhere. */
+static void close_own_memory(void) {
+    enum { ASK_VERSION = 1 };
+    if (!SANITIZED && syscall(SYS_landlock_create_ruleset, NULL, 0, ASK_VERSION) < 1) {
+        prctl(PR_SET_DUMPABLE, 0, 0, 0, 0);
+    }
 }
 
 int main(int argc, char **argv) {
@@ -56,7 +83,7 @@ int main(int argc, char **argv) {
     if (served >= 0) {
         _exit(served); /* what it holds goes with it */
     }
-    cli_self_close();
+    close_own_memory();
     cli_signals_begin();
     int code = dispatch(argc, argv);
     code = code == CLI_HELP ? CLI_OK : code;

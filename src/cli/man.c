@@ -1,11 +1,10 @@
-/* Man pages in the man macros (man(7)), one of the program and one of each command. What is no ASCII is
- * written as
- * \[u2026], so that a page is the same whatever its reader takes its bytes for. There is no date: the same
- * build gives the same page. */
-#include "help.h"
+/* Man pages in the man macros (man(7)), one of the program and one of each command. Characters beyond ASCII
+ * become \[u2026], so that a page reads the same in every encoding. There is no date: the same build gives
+ * the same page. */
+#include "commands.h"
+#include "message.h"
 
-#include "cli/message.h"
-
+#include <limits.h>
 #include <string.h>
 #include <vdbshade/vdbshade.h>
 
@@ -45,19 +44,19 @@ static void put_word(FILE *out, const char *word, int length, int first) {
     }
 }
 
-static void paragraph(FILE *out, const char *words) {
+static void write_paragraph(FILE *out, const char *words) {
     cli_text text = {.out = out, .width = WIDTH, .put = put_word};
     cli_text_add(&text, words);
     cli_text_end(&text);
 }
 
-static void in_font(FILE *out, char font, const char *words) {
+static void put_in_font(FILE *out, char font, const char *word, int length) {
     fprintf(out, "\\f%c", font);
-    put_word(out, words, (int)strlen(words), 0);
+    put_word(out, word, length, 0);
     fputs("\\fR", out);
 }
 
-static void title(FILE *out, const char *name) {
+static void write_title(FILE *out, const char *name) {
     fprintf(out, ".\\\" Made by 'vdbshade help --man'.\n.TH ");
     for (const char *c = name; *c != '\0'; ++c) {
         fputc(*c >= 'a' && *c <= 'z' ? *c - 'a' + 'A' : *c, out);
@@ -72,43 +71,43 @@ static void write_option(FILE *out, const cli_option *option) {
     }
     char name[72];
     snprintf(name, sizeof name, "--%s", option->name);
-    in_font(out, 'B', name);
+    put_in_font(out, 'B', name, (int)strlen(name));
     if (option->value != NULL) {
         fputc(' ', out);
-        in_font(out, 'I', option->value);
+        put_in_font(out, 'I', option->value, (int)strlen(option->value));
     }
     fputc('\n', out);
-    paragraph(out, option->help);
+    write_paragraph(out, option->help);
 }
 
-/* "INPUT -o OUT [options]": placeholders in italics, options in bold. */
+/* Options are bold, placeholders in italics. */
+static void put_usage(FILE *out, const char *word, int length, int first) {
+    (void)first;
+    put_in_font(out, word[0] == '-' ? 'B' : 'I', word, length);
+}
+
+/* Writes " INPUT -o OUT [options]". */
 static void write_usage(FILE *out, const char *usage) {
-    const char *at = usage, *word;
-    for (size_t length; (length = cli_next_word(&at, &word)) > 0;) {
-        char one[64];
-        snprintf(one, sizeof one, "%.*s", (int)length, word);
-        fputc(' ', out);
-        in_font(out, one[0] == '-' ? 'B' : 'I', one);
-    }
-    fputc('\n', out);
+    cli_text text = {.out = out, .width = INT_MAX, .lead = 1, .put = put_usage};
+    cli_text_add(&text, usage);
+    cli_text_end(&text);
 }
 
 static void write_exit_codes(FILE *out) {
     fputs(".SH EXIT STATUS\n", out);
-    const cli_exit_row *exit;
-    for (size_t i = 0; (exit = cli_exit_get(i)) != NULL; ++i) {
+    for (const cli_exit_row *exit = cli_exits; exit->meaning != NULL; ++exit) {
         fprintf(out, ".TP\n\\fB%d\\fR\n", exit->code);
-        paragraph(out, exit->meaning);
+        write_paragraph(out, exit->meaning);
     }
     fputs(".PP\n", out);
-    paragraph(out, cli_errors);
+    write_paragraph(out, cli_errors);
 }
 
 /* The other pages. */
 static void write_see_also(FILE *out, const cli_command *command) {
     fputs(command != NULL ? ".SH SEE ALSO\n.BR vdbshade (1)" : ".SH SEE ALSO", out);
-    const cli_command_row *row;
-    for (size_t i = 0, listed = command != NULL; (row = cli_command_get(i)) != NULL; ++i) {
+    size_t listed = command != NULL;
+    for (const cli_command_row *row = cli_commands; row->command != NULL; ++row) {
         if (row->command != command) {
             fprintf(out, "%s\n.BR vdbshade\\-%s (1)", listed++ > 0 ? "," : "", row->command->name);
         }
@@ -121,23 +120,22 @@ static void write_see_also(FILE *out, const cli_command *command) {
         snprintf(pages + used, sizeof pages - used, " docs/%s.md%s", page->name,
                  page[1].name != NULL ? "," : ".");
     }
-    paragraph(out, pages);
+    write_paragraph(out, pages);
 }
 
 static void write_program(FILE *out) {
-    title(out, "vdbshade");
+    write_title(out, "vdbshade");
     fputs(".SH NAME\nvdbshade \\- soft shadows and ambient occlusion from signed distance fields\n"
           ".SH SYNOPSIS\n\\fBvdbshade\\fR \\fICOMMAND\\fR ...\n.br\n"
           "\\fBvdbshade\\fR \\fICOMMAND\\fR \\fB\\-\\-help\\fR\n.br\n\\fBvdbshade \\-\\-version\\fR\n.SH "
           "DESCRIPTION\n",
           out);
-    paragraph(out, cli_summary);
+    write_paragraph(out, cli_summary);
     fputs(".SH COMMANDS\n", out);
-    const cli_command_row *row;
-    for (size_t i = 0; (row = cli_command_get(i)) != NULL; ++i) {
+    for (const cli_command_row *row = cli_commands; row->command != NULL; ++row) {
         fprintf(out, ".TP\n\\fB%s\\fR", row->command->name);
         write_usage(out, row->operands);
-        paragraph(out, row->brief);
+        write_paragraph(out, row->brief);
     }
     write_exit_codes(out);
     write_see_also(out, NULL);
@@ -151,13 +149,13 @@ void cli_write_man(FILE *out, const cli_command_row *row) {
     const cli_command *command = row->command;
     char name[64];
     snprintf(name, sizeof name, "vdbshade-%s", command->name);
-    title(out, name);
+    write_title(out, name);
     fprintf(out, ".SH NAME\nvdbshade\\-%s \\-\n", command->name);
-    paragraph(out, row->brief);
+    write_paragraph(out, row->brief);
     fprintf(out, ".SH SYNOPSIS\n\\fBvdbshade %s\\fR", command->name);
     write_usage(out, command->usage);
     fputs(".SH DESCRIPTION\n", out);
-    paragraph(out, command->summary);
+    write_paragraph(out, command->summary);
     fputs(".SH OPTIONS\n", out);
     cli_option options[CLI_MOST_OPTIONS];
     const size_t count = cli_list_options(command, options, CLI_MOST_OPTIONS);
@@ -166,7 +164,7 @@ void cli_write_man(FILE *out, const cli_command_row *row) {
             write_option(out, &options[i]);
         } else {
             fputs(".SS ", out);
-            paragraph(out, options[i].help);
+            write_paragraph(out, options[i].help);
         }
     }
     write_exit_codes(out);
