@@ -1,5 +1,5 @@
-/* SIGINT, SIGTERM and SIGHUP: the work is asked to stop, and ended where it does not. Refused memory ends it
- * at once. Either takes temporary files away. */
+/* SIGINT, SIGTERM and SIGHUP ask the work to stop, and end it if it does not. Refused memory ends the program
+ * at once (base/guarded_malloc.c), so the command line checks no malloc(). Both remove temporary files. */
 #ifndef CLI_SIGNALS_H
 #define CLI_SIGNALS_H
 

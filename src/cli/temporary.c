@@ -1,8 +1,11 @@
 #include "temporary.h"
 
+#include "base/utf8.h"
 #include "message.h"
 
 #include <errno.h>
+#include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 static int fail(const char *target) {
@@ -13,9 +16,7 @@ static int fail(const char *target) {
 int cli_temporary_begin(cli_temporary *t, const char *target) {
     *t = (cli_temporary){.target = target};
     vsh_error error;
-    if (vshi_output_begin(&t->output, target, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
+    CLI_TRY(cli_check(vshi_output_begin(&t->output, target, &error), &error));
     t->file = fopen(t->output.temporary, "wb");
     if (t->file == NULL) {
         const int code = fail(target);
@@ -43,28 +44,73 @@ int cli_temporary_check(const char *target) {
 }
 
 int cli_temporary_commit(cli_temporary *t) {
-    if (fflush(t->file) != 0 || ferror(t->file)) {
-        const int code = fail(t->target);
-        cli_temporary_abandon(t);
-        return code;
+    int code = fflush(t->file) == 0 && !ferror(t->file) ? CLI_OK : fail(t->target);
+    if (fclose(t->file) != 0 && code == CLI_OK) {
+        code = fail(t->target);
     }
-    const bool closed = fclose(t->file) == 0;
     t->file = NULL;
-    if (!closed) {
-        const int code = fail(t->target);
+    if (code != CLI_OK) {
         vshi_output_abandon(&t->output);
         return code;
     }
     vsh_error error;
-    return vshi_output_commit(&t->output, &error) == VSH_OK ? CLI_OK : cli_fail(&error);
+    return cli_check(vshi_output_commit(&t->output, &error), &error);
 }
 
 int cli_temporary_write(const char *target, const char *text) {
     cli_temporary t;
-    const int code = cli_temporary_begin(&t, target);
-    if (code != CLI_OK) {
-        return code;
-    }
+    CLI_TRY(cli_temporary_begin(&t, target));
     fputs(text, t.file); /* a failure stays with the file */
     return cli_temporary_commit(&t);
+}
+
+/* --- text in files */
+
+json_t *cli_number_json(double value) {
+    return isfinite(value) ? json_real(value) : json_null();
+}
+
+json_t *cli_utf8_json(const char *text) {
+    if (text == NULL) {
+        return json_null();
+    }
+    char *clean = malloc(3 * strlen(text) + 1);
+    size_t used = 0;
+    while (*text != '\0') {
+        const size_t length = vshi_utf8_length(text);
+        memcpy(clean + used, length > 0 ? text : VSHI_NO_CHARACTER, length > 0 ? length : 3);
+        used += length > 0 ? length : 3;
+        text += length > 0 ? length : 1;
+    }
+    json_t *json = json_stringn(clean, used);
+    free(clean);
+    return json;
+}
+
+void cli_escape(FILE *out, const char *text) {
+    for (size_t length; *text != '\0'; text += length > 0 ? length : 1) {
+        length = vshi_utf8_length(text);
+        switch (*text) {
+        case '<':
+            fputs("&lt;", out);
+            break;
+        case '>':
+            fputs("&gt;", out);
+            break;
+        case '&':
+            fputs("&amp;", out);
+            break;
+        case '"':
+            fputs("&quot;", out);
+            break;
+        default: /* control characters are none of XML's */
+            if (length == 0) {
+                fputs(VSHI_NO_CHARACTER, out);
+            } else if (length == 1 && ((unsigned char)*text < 0x20 || *text == 0x7f)) {
+                fputc('?', out);
+            } else {
+                fwrite(text, 1, length, out);
+            }
+        }
+    }
 }

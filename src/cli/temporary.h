@@ -1,9 +1,10 @@
-/* Files of the command line's own that appear whole or not at all, as the library's do. */
+/* Files that the command line writes itself, whole or not at all as the library does, and text in them. */
 #ifndef CLI_TEMPORARY_H
 #define CLI_TEMPORARY_H
 
 #include "base/file.h"
 
+#include <jansson.h>
 #include <stdio.h>
 
 /* A file under way, written through `file`. */
@@ -25,5 +26,14 @@ int cli_temporary_write(const char *target, const char *text);
 
 /* Whether cli_temporary_write() is likely to succeed: CLI_OK or an exit code, having said why. */
 int cli_temporary_check(const char *target);
+
+/* Makes a JSON number, or null of NaN and infinity. */
+json_t *cli_number_json(double value);
+
+/* Makes a JSON string, or null of NULL. Names come from files: each byte that is no UTF-8 becomes U+FFFD. */
+json_t *cli_utf8_json(const char *text);
+
+/* Writes text within HTML or XML, attributes too. Bytes that are no UTF-8 become U+FFFD. */
+void cli_escape(FILE *out, const char *text);
 
 #endif

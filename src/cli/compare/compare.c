@@ -8,7 +8,6 @@
 
 #include <inttypes.h>
 #include <math.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -16,7 +15,7 @@ static const cli_option options[] = {
     {0, NULL, NULL, "Reports"},
     CLI_REPORT_OPTIONS,
     CLI_COMPARE_OPTIONS,
-    {CLI_KEY_TOLERANCES, "tolerances", "FILE.json",
+    {CLI_TEXT(cli_compare_settings, options.tolerances), "tolerances", "FILE.json",
      "limits, also for single channels\n(GOLDEN.tolerance.json if it exists)"},
     CLI_COMMON_OPTIONS,
 };
@@ -34,43 +33,30 @@ const cli_command cli_compare = {
     sizeof options / sizeof options[0],
     compare_main};
 
-static int take(void *settings, int key, const char *name, const char *value) {
-    return cli_compare_parse(settings, key, name, value);
-}
-
-int cli_print_json(json_t *root, const char *what) {
-    const bool whole = root != NULL && json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) == 0;
+void cli_print_json(json_t *root) {
+    json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
     json_decref(root);
     putchar('\n');
-    return whole ? CLI_OK : cli_out_of_memory(what);
-}
-
-static int print(const cli_compare_settings *s, const cli_comparison *c) {
-    if (s->json) {
-        return cli_print_json(cli_comparison_json(c), c->golden);
-    }
-    if (!cli_given.quiet) {
-        cli_comparison_print(stdout, c, "");
-    }
-    return CLI_OK;
 }
 
 static int compare_main(int argc, char **argv) {
     cli_compare_settings s = cli_compare_settings_default();
     const char *files[2];
-    CLI_TRY(cli_parse(&cli_compare, argc, argv, take, &s, files));
-    int code = cli_compare_check_reports(&s, files, 2);
+    CLI_TRY(cli_parse(&cli_compare, argc, argv, cli_compare_parse, &s, files));
+    int code;
     cli_comparison comparison = {.alike = false};
-    if (code == CLI_OK) {
-        cli_signals_watch();
-        code = cli_comparison_make(&s, files[0], files[1], &comparison);
+    CLI_TRY_DONE(cli_compare_check_reports(&s, files, 2));
+    cli_signals_watch();
+    CLI_TRY_DONE(cli_comparison_make(&s, files[0], files[1], &comparison));
+    CLI_TRY_DONE(cli_comparison_report(&s, &comparison, 1));
+    if (s.json) {
+        cli_print_json(cli_comparison_json(&comparison));
+    } else if (!cli_given.quiet) {
+        cli_comparison_print(&comparison, "");
     }
-    code = code == CLI_OK ? cli_comparison_report(&s, &comparison, 1) : code;
-    code = code == CLI_OK ? print(&s, &comparison) : code;
-    if (code == CLI_OK) {
-        code = comparison.alike ? CLI_OK : CLI_UNLIKE;
-        cli_signals_end(code);
-    }
+    code = comparison.alike ? CLI_OK : CLI_UNLIKE;
+    cli_signals_end(code);
+done:
     cli_comparison_free(&comparison);
     return code;
 }
@@ -82,17 +68,12 @@ cli_compare_settings cli_compare_settings_default(void) {
     return s;
 }
 
-int cli_compare_parse(cli_compare_settings *s, int key, const char *name, const char *value) {
+int cli_compare_parse(void *settings, int key, const char *name, const char *value) {
+    cli_compare_settings *s = settings;
     if (key >= CLI_KEY_LIMIT && key < CLI_KEY_LIMIT + VSH_MEASURE_COUNT) {
         return cli_parse_number(name, value, 0.0, 1e15, &s->options.limits[key - CLI_KEY_LIMIT]);
     }
     switch (key) {
-    case CLI_KEY_TOLERANCES:
-        s->options.tolerances = value;
-        return CLI_OK;
-    case CLI_KEY_COVERAGE:
-        s->options.coverage = value;
-        return CLI_OK;
     case CLI_KEY_MAX_COVERAGE:
         return cli_parse_number(name, value, 0.0, 1.0, &s->options.coverage_limit);
     case CLI_KEY_STEP:
@@ -101,19 +82,8 @@ int cli_compare_parse(cli_compare_settings *s, int key, const char *name, const 
         return cli_parse_integer(name, value, 0, 16, &s->options.reach);
     case CLI_KEY_NOISE:
         return cli_parse_number(name, value, 0.0, 1.0, &s->options.noise);
-    case CLI_KEY_COMPARE_PADDING:
+    default: /* --padding */
         s->options.padding = 1;
-        return CLI_OK;
-    case CLI_KEY_JSON:
-        s->json = true;
-        return CLI_OK;
-    case CLI_KEY_JUNIT:
-        s->junit = value;
-        return CLI_OK;
-    case CLI_KEY_HTML:
-        s->html = value;
-        return CLI_OK;
-    default:
         return CLI_OK;
     }
 }
@@ -129,58 +99,34 @@ int cli_compare_check_reports(const cli_compare_settings *s, const char *const *
                 return cli_usage("%s: the report is an input", reports[r]);
             }
         }
-        const int code = reports[r] != NULL ? cli_temporary_check(reports[r]) : CLI_OK;
-        if (code != CLI_OK) {
-            return code;
-        }
+        CLI_TRY(reports[r] != NULL ? cli_temporary_check(reports[r]) : CLI_OK);
     }
     return CLI_OK;
 }
 
 /* --- comparing */
 
-/* State of draw(). */
-typedef struct drawing {
-    const char *page;
-    cli_comparison *comparison;
-    int code;
-} drawing;
-
+/* Draws a channel. Channels that are not measured, before it, have no pictures. */
 static int32_t draw(void *user, size_t index, const vsh_channel_comparison *channel,
                     const vsh_compared *compared) {
-    drawing *d = user;
-    cli_comparison *c = d->comparison;
-    char **more = realloc(c->pictures, (index + 1) * sizeof *more);
-    if (more == NULL) {
-        d->code = cli_out_of_memory(d->page);
-        return 1;
-    }
-    c->pictures = more;
-    while (c->picture_count <= index) {
+    cli_comparison *c = user;
+    c->pictures = realloc(c->pictures, (index + 1) * sizeof *c->pictures);
+    while (c->picture_count < index) {
         c->pictures[c->picture_count++] = NULL;
     }
-    c->pictures[index] = cli_comparison_pictures(d->page, channel, compared);
-    d->code = c->pictures[index] != NULL ? CLI_OK : CLI_LIMIT;
-    return d->code;
+    c->pictures[c->picture_count++] = cli_comparison_pictures(channel, compared);
+    return 0;
 }
 
 int cli_comparison_make(const cli_compare_settings *settings, const char *golden, const char *fresh,
                         cli_comparison *c) {
-    memset(c, 0, sizeof *c);
-    c->golden = strdup(golden);
-    c->fresh = strdup(fresh);
-    if (c->golden == NULL || c->fresh == NULL) {
-        return cli_out_of_memory(golden);
-    }
+    *c = (cli_comparison){.golden = strdup(golden), .fresh = strdup(fresh)};
     const vsh_run run = cli_make_run();
-    drawing d = {settings->html, c, CLI_OK};
     vsh_compare_files_options wanted = settings->options;
     wanted.look = settings->html != NULL ? draw : NULL;
-    wanted.user = &d;
+    wanted.user = c;
     vsh_error error;
-    if (vsh_compare_files(golden, fresh, &wanted, &run, &c->made, &error) != VSH_OK) {
-        return d.code != CLI_OK ? d.code : cli_fail(&error);
-    }
+    CLI_TRY(cli_check(vsh_compare_files(golden, fresh, &wanted, &run, &c->made, &error), &error));
     c->alike = vsh_comparison_alike(c->made) != 0;
     return CLI_OK;
 }
@@ -206,180 +152,180 @@ void cli_comparison_free(cli_comparison *c) {
 
 /* --- words */
 
-typedef struct text {
-    char *at;
-    size_t left;
-} text;
+void cli_channel_position(const vsh_channel_comparison *channel, uint64_t index, int32_t position[3]) {
+    for (int axis = 0; axis < 3; ++axis) {
+        const uint64_t size = axis < 2 ? (uint64_t)channel->size[axis] : UINT64_MAX;
+        position[axis] = (int32_t)(index % size) + channel->origin[axis];
+        index /= size;
+    }
+}
 
-static void __attribute__((format(printf, 2, 3))) add(text *t, const char *format, ...) {
-    va_list arguments;
-    va_start(arguments, format);
-    const int length = vsnprintf(t->at, t->left, format, arguments);
-    va_end(arguments);
-    const size_t used = length < 0 ? 0 : (size_t)length < t->left ? (size_t)length : t->left - 1;
-    t->at += used;
-    t->left -= used;
+static bool is_flat(const vsh_channel_comparison *channel) {
+    return channel->size[2] == 1 && channel->origin[2] == 0;
 }
 
 const char *cli_channel_place(const vsh_channel_comparison *channel, uint64_t index, char place[64]) {
-    const uint64_t width = (uint64_t)channel->size[0], height = (uint64_t)channel->size[1];
-    const int64_t x = (int64_t)(index % width) + channel->origin[0];
-    const int64_t y = (int64_t)(index / width % height) + channel->origin[1];
-    const int64_t z = (int64_t)(index / width / height) + channel->origin[2];
-    if (channel->size[2] == 1 && channel->origin[2] == 0) {
-        snprintf(place, 64, "(%" PRId64 ", %" PRId64 ")", x, y);
-    } else {
-        snprintf(place, 64, "(%" PRId64 ", %" PRId64 ", %" PRId64 ")", x, y, z);
-    }
+    int32_t at[3];
+    cli_channel_position(channel, index, at);
+    snprintf(place, 64, is_flat(channel) ? "(%d, %d)" : "(%d, %d, %d)", at[0], at[1], at[2]);
     return place;
 }
 
 static const char *texel(const vsh_channel_comparison *channel) {
-    return channel->size[2] == 1 && channel->origin[2] == 0 ? "texel" : "voxel";
+    return is_flat(channel) ? "texel" : "voxel";
 }
 
-static void add_nonfinite(text *t, const vsh_channel_comparison *channel) {
+static void add_nonfinite(FILE *out, const vsh_channel_comparison *channel) {
     const vsh_measures *m = &channel->measures;
     char place[64];
     for (int which = 0; which < 2; ++which) {
         if (m->nonfinite[which] > 0) {
-            add(t, "%s%" PRIu64 " %s value%s NaN or infinite, the first at %s",
-                which > 0 && m->nonfinite[0] > 0 ? ", " : "", m->nonfinite[which],
-                which == 0 ? "golden" : "new", m->nonfinite[which] == 1 ? " is" : "s are",
-                cli_channel_place(channel, m->nonfinite_first[which], place));
+            fprintf(out, "%s%" PRIu64 " %s value%s NaN or infinite, the first at %s",
+                    which > 0 && m->nonfinite[0] > 0 ? ", " : "", m->nonfinite[which],
+                    which == 0 ? "golden" : "new", m->nonfinite[which] == 1 ? " is" : "s are",
+                    cli_channel_place(channel, m->nonfinite_first[which], place));
         }
     }
 }
 
-static void add_region(text *t, const vsh_channel_comparison *channel, const vsh_region *region, double limit,
-                       const char *caster) {
+static void add_region(FILE *out, const vsh_channel_comparison *channel, const vsh_region *region,
+                       double limit, const char *caster) {
     const uint32_t others = UINT32_C(1) << VSH_MEASURE_SHIFT | UINT32_C(1) << VSH_MEASURE_PENUMBRA;
     char place[64];
-    add(t, "%" PRIu64 " %ss around %s got %s by up to %.2f with nothing like it nearby%s (limit %g)",
-        region->count, texel(channel), cli_channel_place(channel, region->worst, place),
-        region->by > 0.0 ? "lighter" : "darker", fabs(region->by),
-        (channel->failed & others) == 0 ? caster : "", limit);
+    fprintf(out, "%" PRIu64 " %ss around %s got %s by up to %.2f with nothing like it nearby%s (limit %g)",
+            region->count, texel(channel), cli_channel_place(channel, region->worst, place),
+            region->by > 0.0 ? "lighter" : "darker", fabs(region->by),
+            (channel->failed & others) == 0 ? caster : "", limit);
 }
 
-static void add_failure(text *t, const vsh_channel_comparison *channel, int measure) {
+static void add_failure(FILE *out, const vsh_channel_comparison *channel, int measure) {
     const vsh_measures *m = &channel->measures;
     const double limit = channel->limits.value[measure];
     switch (measure) {
     case VSH_MEASURE_NONFINITE:
-        add_nonfinite(t, channel);
+        add_nonfinite(out, channel);
         break;
     case VSH_MEASURE_LOST:
-        add_region(t, channel, &m->lost, limit, ": a lost caster?");
+        add_region(out, channel, &m->lost, limit, ": a lost caster?");
         break;
     case VSH_MEASURE_GAINED:
-        add_region(t, channel, &m->gained, limit, ": a new caster?");
+        add_region(out, channel, &m->gained, limit, ": a new caster?");
         break;
     case VSH_MEASURE_SHIFT:
-        add(t, "shifted by (%.2f, %.2f", m->shift[0], m->shift[1]);
-        add(t, channel->size[2] > 1 ? ", %.2f)" : ")", m->shift[2]);
-        add(t, " %ss, which explains %.0f %% of the difference (limit %g)", texel(channel),
-            100.0 * m->explained, limit);
+        fprintf(out, "shifted by (%.2f, %.2f", m->shift[0], m->shift[1]);
+        fprintf(out, channel->size[2] > 1 ? ", %.2f)" : ")", m->shift[2]);
+        fprintf(out, " %ss, which explains %.0f %% of the difference (limit %g)", texel(channel),
+                100.0 * m->explained, limit);
         break;
     case VSH_MEASURE_PENUMBRA:
-        add(t, "penumbrae %.3f times as wide, %.2f for %.2f %ss (limit ±%g %%)", m->width[1] / m->width[0],
-            m->width[1], m->width[0], texel(channel), 100.0 * limit);
+        fprintf(out, "penumbrae %.3f times as wide, %.2f for %.2f %ss (limit ±%g %%)",
+                m->width[1] / m->width[0], m->width[1], m->width[0], texel(channel), 100.0 * limit);
         break;
     default:
-        add(t, "%s %.3g (limit %g)", vsh_get_name(VSH_NAMES_MEASURE, measure), m->value[measure], limit);
+        fprintf(out, "%s %.3g (limit %g)", vsh_get_name(VSH_NAMES_MEASURE, measure), m->value[measure],
+                limit);
     }
 }
 
 /* Names noise or a curve if it explains most of the difference. */
-static void add_causes(text *t, const vsh_channel_comparison *channel) {
+static bool add_cause(FILE *out, const vsh_channel_comparison *channel, const char *separator) {
     const vsh_measures *m = &channel->measures;
     if (m->curve[2][0] > 0.0) {
-        add(t, "values follow a curve that takes %.2f, %.2f, %.2f to %.2f, %.2f, %.2f: gamma or exposure?",
-            m->curve[0][0], m->curve[1][0], m->curve[2][0], m->curve[0][1], m->curve[1][1], m->curve[2][1]);
-    } else if (m->noise_share >= 0.5 && m->noise > channel->limits.options.noise) {
-        add(t, "noise of %.3g, which is %.0f %% of the squared difference", m->noise, 100.0 * m->noise_share);
+        fprintf(out,
+                "%svalues follow a curve that takes %.2f, %.2f, %.2f to %.2f, %.2f, %.2f: gamma or exposure?",
+                separator, m->curve[0][0], m->curve[1][0], m->curve[2][0], m->curve[0][1], m->curve[1][1],
+                m->curve[2][1]);
+        return true;
     }
+    if (m->noise_share >= 0.5 && m->noise > channel->limits.options.noise) {
+        fprintf(out, "%snoise of %.3g, which is %.0f %% of the squared difference", separator, m->noise,
+                100.0 * m->noise_share);
+        return true;
+    }
+    return false;
 }
 
-void cli_channel_explain(const vsh_channel_comparison *channel, char out[CLI_EXPLANATION]) {
-    text t = {out, CLI_EXPLANATION};
-    out[0] = '\0';
+void cli_channel_explain(const vsh_channel_comparison *channel, char text[CLI_EXPLANATION]) {
+    FILE *out = fmemopen(text, CLI_EXPLANATION - 1, "w");
+    text[0] = text[CLI_EXPLANATION - 1] = '\0'; /* no stream ends an empty or a full text */
+    const char *separator = "";
     if (channel->coverage_failed) {
         const vsh_coverage *c = &channel->coverage;
         char place[64];
-        add(&t, "coverage differs in %" PRIu64 " %ss, %.3g of those covered, the first at %s (limit %g)",
-            c->differs, texel(channel), c->share, cli_channel_place(channel, c->first, place),
-            channel->coverage_limit);
+        fprintf(out, "coverage differs in %" PRIu64 " %ss, %.3g of those covered, the first at %s (limit %g)",
+                c->differs, texel(channel), c->share, cli_channel_place(channel, c->first, place),
+                channel->coverage_limit);
+        separator = "; ";
     }
-    if (channel->is_coverage) {
-        return;
-    }
-    if (channel->measures.count == 0) {
-        add(&t, "%snothing is covered in both: nothing was compared", out[0] != '\0' ? "; " : "");
+    if (!channel->is_coverage && channel->measures.count == 0) {
+        fprintf(out, "%snothing is covered in both: nothing was compared", separator);
         if (channel->measures.nonfinite[0] + channel->measures.nonfinite[1] > 0) {
-            add(&t, "; ");
-            add_nonfinite(&t, channel);
+            fputs("; ", out);
+            add_nonfinite(out, channel);
         }
-        return;
-    }
-    if (channel->failed != 0) {
-        add_causes(&t, channel);
-    }
-    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-        if ((channel->failed >> i & 1) != 0) {
-            add(&t, "%s", out[0] != '\0' ? "; " : "");
-            add_failure(&t, channel, i);
+    } else if (!channel->is_coverage && channel->failed != 0) {
+        if (add_cause(out, channel, separator)) {
+            separator = "; ";
+        }
+        for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+            if ((channel->failed >> i & 1) != 0) {
+                fputs(separator, out);
+                add_failure(out, channel, i);
+                separator = "; ";
+            }
         }
     }
+    fclose(out);
 }
 
 /* --- lines */
 
-static void print_measures(FILE *out, const vsh_channel_comparison *channel) {
+static void print_measures(const vsh_channel_comparison *channel) {
     const vsh_measures *m = &channel->measures;
     const char *separator = "; ";
     char place[64];
     for (int i = VSH_MEASURE_NONFINITE + 1; i < VSH_MEASURE_COUNT; ++i) {
         if (!isnan(m->value[i])) {
-            fprintf(out, "%s%s %.3g", separator, vsh_get_name(VSH_NAMES_MEASURE, i), m->value[i]);
+            printf("%s%s %.3g", separator, vsh_get_name(VSH_NAMES_MEASURE, i), m->value[i]);
             separator = ", ";
         }
     }
-    fprintf(out, " at %s", cli_channel_place(channel, m->worst, place));
+    printf(" at %s", cli_channel_place(channel, m->worst, place));
 }
 
-static void print_noise(FILE *out, const vsh_channel_comparison *channel) {
+static void print_noise(const vsh_channel_comparison *channel) {
     const double *made_to = channel->max_error;
-    fprintf(out, "; noise of %.3g is allowed for", channel->limits.options.noise);
+    printf("; noise of %.3g is allowed for", channel->limits.options.noise);
     if (!isnan(made_to[0]) && !isnan(made_to[1])) {
-        fprintf(out, " (made to max errors %.3g and %.3g)", made_to[0], made_to[1]);
+        printf(" (made to max errors %.3g and %.3g)", made_to[0], made_to[1]);
     }
 }
 
-static void print_channel(FILE *out, const vsh_channel_comparison *channel) {
+static void print_channel(const vsh_channel_comparison *channel) {
     char what[CLI_EXPLANATION];
     cli_channel_explain(channel, what);
-    fprintf(out, "%s: %s%s%s", channel->name, channel->alike ? "alike" : "not alike",
-            what[0] != '\0' ? ": " : "", what);
+    printf("%s: %s%s%s", channel->name, channel->alike ? "alike" : "not alike", what[0] != '\0' ? ": " : "",
+           what);
     if (!channel->is_coverage && channel->limits.options.noise > 0.0) {
-        print_noise(out, channel);
+        print_noise(channel);
     }
     if (channel->is_coverage) {
-        fprintf(out, "; %" PRIu64 " and %" PRIu64 " covered, %" PRIu64 " in one alone",
-                channel->coverage.golden, channel->coverage.values, channel->coverage.differs);
+        printf("; %" PRIu64 " and %" PRIu64 " covered, %" PRIu64 " in one alone", channel->coverage.golden,
+               channel->coverage.values, channel->coverage.differs);
     } else if (channel->measures.count > 0) {
-        print_measures(out, channel);
+        print_measures(channel);
     }
 }
 
-void cli_comparison_print(FILE *out, const cli_comparison *c, const char *prefix) {
+void cli_comparison_print(const cli_comparison *c, const char *prefix) {
     const char *problem;
     const vsh_channel_comparison *channel;
     for (size_t i = 0; (problem = cli_comparison_problem(c, i)) != NULL; ++i) {
-        fprintf(out, "%snot alike: %s\n", prefix, problem);
+        printf("%snot alike: %s\n", prefix, problem);
     }
     for (size_t i = 0; (channel = vsh_comparison_channel(c->made, i)) != NULL; ++i) {
-        fputs(prefix, out);
-        print_channel(out, channel);
-        fputc('\n', out);
+        fputs(prefix, stdout);
+        print_channel(channel);
+        putchar('\n');
     }
 }

@@ -5,7 +5,6 @@
 #include "cli/options.h"
 
 #include <jansson.h>
-#include <stdio.h>
 
 typedef struct cli_compare_settings {
     vsh_compare_files_options options;
@@ -16,28 +15,28 @@ typedef struct cli_compare_settings {
 cli_compare_settings cli_compare_settings_default(void);
 
 enum {
-    CLI_KEY_TOLERANCES = 0x4000,
-    CLI_KEY_COVERAGE,
-    CLI_KEY_MAX_COVERAGE,
+    CLI_KEY_MAX_COVERAGE = 0x4000,
     CLI_KEY_STEP,
     CLI_KEY_REACH,
     CLI_KEY_NOISE,
     CLI_KEY_COMPARE_PADDING,
-    CLI_KEY_JSON,
-    CLI_KEY_JUNIT,
-    CLI_KEY_HTML,
     CLI_KEY_LIMIT /* + measure; the last */
 };
 
+/* Options of commands whose settings are cli_compare_settings, or begin with them. */
 #define CLI_REPORT_OPTIONS                                                                                   \
-    {CLI_KEY_JSON, "json", NULL, "print everything as JSON instead of text"},                                \
-        {CLI_KEY_JUNIT, "junit", "FILE.xml", "write a JUnit report, a test case a channel"}, {               \
-        CLI_KEY_HTML, "html", "FILE.html", "write a page: golden, new, difference, measures"                 \
+    {CLI_FLAG(cli_compare_settings, json), "json", NULL, "print everything as JSON instead of text"},        \
+        {CLI_TEXT(cli_compare_settings, junit), "junit", "FILE.xml",                                         \
+         "write a JUnit report, a test case a channel"},                                                     \
+    {                                                                                                        \
+        CLI_TEXT(cli_compare_settings, html), "html", "FILE.html",                                           \
+            "write a page: golden, new, difference, measures"                                                \
     }
 
 #define CLI_COMPARE_OPTIONS                                                                                  \
     {0, NULL, NULL, "What is compared"},                                                                     \
-        {CLI_KEY_COVERAGE, "coverage", "NAME", "channel with the coverage, or none (A)"},                    \
+        {CLI_TEXT(cli_compare_settings, options.coverage), "coverage", "NAME",                               \
+         "channel with the coverage, or none (A)"},                                                          \
         {CLI_KEY_COMPARE_PADDING, "padding", NULL, "compare texels that are not covered, too"},              \
         {0, NULL, NULL, "Limits, instead of those of the tolerance file"},                                   \
         {CLI_KEY_MAX_COVERAGE, "max-coverage", "SHARE",                                                      \
@@ -59,8 +58,8 @@ enum {
             "files where these\ndiffer, else 0)"                                                             \
     }
 
-/* Parses one of these options. */
-int cli_compare_parse(cli_compare_settings *settings, int key, const char *name, const char *value);
+/* Parses one of these options into cli_compare_settings, if the parser does not store it itself. */
+int cli_compare_parse(void *settings, int key, const char *name, const char *value);
 
 /* Refuses reports that would replace one of `inputs` or each other, or cannot be written. */
 int cli_compare_check_reports(const cli_compare_settings *settings, const char *const *inputs, size_t count);
@@ -78,7 +77,7 @@ typedef struct cli_comparison {
 } cli_comparison;
 
 /* Compares two files. CLI_OK whether they are alike or not, else an exit code after printing why. Free the
- * comparison in each case. */
+ * comparison also after a failure. */
 int cli_comparison_make(const cli_compare_settings *settings, const char *golden, const char *fresh,
                         cli_comparison *comparison);
 void cli_comparison_free(cli_comparison *comparison);
@@ -90,24 +89,25 @@ const char *cli_comparison_problem(const cli_comparison *comparison, size_t inde
 void cli_channel_explain(const vsh_channel_comparison *channel, char text[CLI_EXPLANATION]);
 
 /* Prints a line for each problem and channel, each after `prefix`. */
-void cli_comparison_print(FILE *out, const cli_comparison *comparison, const char *prefix);
+void cli_comparison_print(const cli_comparison *comparison, const char *prefix);
 
-/* Returns a new reference, or NULL if memory is short. */
+/* Returns a new reference. */
 json_t *cli_comparison_json(const cli_comparison *comparison);
 
-/* Prints JSON and drops it. CLI_OK or an exit code; NULL is short memory. */
-int cli_print_json(json_t *root, const char *what);
+/* Prints JSON and drops it. */
+void cli_print_json(json_t *root);
 
 /* Writes the JUnit and HTML reports of the settings. CLI_OK or an exit code after printing why. */
 int cli_comparison_report(const cli_compare_settings *settings, const cli_comparison *comparisons,
                           size_t count);
 
-/* Formats the place of a value, "(3, 4)". */
+/* Finds the texel or voxel of a value. */
+void cli_channel_position(const vsh_channel_comparison *channel, uint64_t index, int32_t position[3]);
+
+/* Formats that position, "(3, 4)". */
 const char *cli_channel_place(const vsh_channel_comparison *channel, uint64_t index, char text[64]);
 
-/* Draws golden, new and difference as HTML for `page`. NULL if memory is short, or after printing an error.
- */
-char *cli_comparison_pictures(const char *page, const vsh_channel_comparison *channel,
-                              const vsh_compared *compared);
+/* Draws golden, new and difference as HTML, to be freed. */
+char *cli_comparison_pictures(const vsh_channel_comparison *channel, const vsh_compared *compared);
 
 #endif

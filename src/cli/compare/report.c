@@ -1,26 +1,24 @@
 /* Reports of comparisons: JSON, JUnit's XML for a CI, and a page with pictures. */
+#include "base/uri.h"
 #include "cli/compare/comparison.h"
-#include "cli/document.h"
 #include "cli/message.h"
+#include "cli/temporary.h"
 
 #include <inttypes.h>
 #include <math.h>
+#include <png.h>
 #include <stdlib.h>
 
 /* --- JSON */
 
-static json_t *number(double value) {
-    return isfinite(value) ? json_real(value) : json_null();
-}
-
-static json_t *corner(const vsh_channel_comparison *c, const int32_t place[3]) {
-    return json_pack("[i,i,i]", place[0] + c->origin[0], place[1] + c->origin[1], place[2] + c->origin[2]);
-}
-
 static json_t *place(const vsh_channel_comparison *channel, uint64_t index) {
-    const uint64_t width = (uint64_t)channel->size[0], height = (uint64_t)channel->size[1];
-    return corner(channel, (const int32_t[3]){(int32_t)(index % width), (int32_t)(index / width % height),
-                                              (int32_t)(index / width / height)});
+    int32_t at[3];
+    cli_channel_position(channel, index, at);
+    return json_pack("[i,i,i]", at[0], at[1], at[2]);
+}
+
+static json_t *corner(const vsh_channel_comparison *c, const int32_t at[3]) {
+    return json_pack("[i,i,i]", at[0] + c->origin[0], at[1] + c->origin[1], at[2] + c->origin[2]);
 }
 
 static json_t *region(const vsh_channel_comparison *channel, const vsh_region *r) {
@@ -48,33 +46,28 @@ static json_t *measures(const vsh_channel_comparison *channel) {
     json_t *values = json_object(), *limits = json_object(), *failed = json_array();
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
         const char *name = vsh_get_name(VSH_NAMES_MEASURE, i);
-        json_object_set_new(values, name, number(m->value[i]));
-        json_object_set_new(limits, name, number(channel->limits.value[i]));
+        json_object_set_new(values, name, cli_number_json(m->value[i]));
+        json_object_set_new(limits, name, cli_number_json(channel->limits.value[i]));
         if ((channel->failed >> i & 1) != 0) {
             json_array_append_new(failed, json_string(name));
         }
     }
     return json_pack("{s:I,s:f,s:[o,o],s:f,s:o,s:o,s:o,s:o,s:o}", "compared", (json_int_t)m->count, "range",
-                     m->range, "max_error", number(channel->max_error[0]), number(channel->max_error[1]),
-                     "noise", channel->limits.options.noise, "failed", failed, "measures", values, "limits",
-                     limits, "golden_nonfinite", nonfinite(channel, 0), "new_nonfinite",
-                     nonfinite(channel, 1));
+                     m->range, "max_error", cli_number_json(channel->max_error[0]),
+                     cli_number_json(channel->max_error[1]), "noise", channel->limits.options.noise, "failed",
+                     failed, "measures", values, "limits", limits, "golden_nonfinite", nonfinite(channel, 0),
+                     "new_nonfinite", nonfinite(channel, 1));
 }
 
 static json_t *details(const vsh_channel_comparison *channel) {
     const vsh_measures *m = &channel->measures;
     return json_pack("{s:{s:o,s:f,s:f},s:I,s:{s:o,s:o},s:[f,f,f],s:f,s:f,s:f,s:o,s:o,s:o}", "worst", "at",
                      place(channel, m->worst), "golden", m->worst_value[0], "new", m->worst_value[1], "edges",
-                     (json_int_t)m->pairs, "penumbra_width", "golden", number(m->width[0]), "new",
-                     number(m->width[1]), "shift", m->shift[0], m->shift[1], m->shift[2], "shift_explains",
-                     m->explained, "measured_noise", m->noise, "noise_explains", m->noise_share, "curve",
-                     curve(m), "lost", region(channel, &m->lost), "gained", region(channel, &m->gained));
-}
-
-/* Adds the keys of `more`, and drops it. */
-static void merge(json_t *root, json_t *more) {
-    json_object_update(root, more);
-    json_decref(more);
+                     (json_int_t)m->pairs, "penumbra_width", "golden", cli_number_json(m->width[0]), "new",
+                     cli_number_json(m->width[1]), "shift", m->shift[0], m->shift[1], m->shift[2],
+                     "shift_explains", m->explained, "measured_noise", m->noise, "noise_explains",
+                     m->noise_share, "curve", curve(m), "lost", region(channel, &m->lost), "gained",
+                     region(channel, &m->gained));
 }
 
 static json_t *describe(const vsh_channel_comparison *channel) {
@@ -84,21 +77,18 @@ static json_t *describe(const vsh_channel_comparison *channel) {
     json_t *root = json_pack("{s:o,s:b,s:o}", "name", cli_utf8_json(channel->name), "alike", channel->alike,
                              "what", cli_utf8_json(what));
     if (channel->is_coverage || c->golden + c->values > 0) {
-        merge(root, json_pack("{s:{s:I,s:I,s:I,s:f,s:f}}", "coverage", "golden", (json_int_t)c->golden, "new",
-                              (json_int_t)c->values, "differs", (json_int_t)c->differs, "share", c->share,
-                              "limit", channel->coverage_limit));
+        json_object_update_new(root, json_pack("{s:{s:I,s:I,s:I,s:f,s:f}}", "coverage", "golden",
+                                               (json_int_t)c->golden, "new", (json_int_t)c->values, "differs",
+                                               (json_int_t)c->differs, "share", c->share, "limit",
+                                               channel->coverage_limit));
     }
     if (!channel->is_coverage) {
-        merge(root, measures(channel));
+        json_object_update_new(root, measures(channel));
     }
     if (channel->measures.count > 0) {
-        merge(root, details(channel));
+        json_object_update_new(root, details(channel));
     }
     return root;
-}
-
-static json_t *path(const char *name) {
-    return name != NULL ? cli_utf8_json(name) : json_null();
 }
 
 json_t *cli_comparison_json(const cli_comparison *c) {
@@ -111,11 +101,13 @@ json_t *cli_comparison_json(const cli_comparison *c) {
     for (size_t i = 0; (channel = vsh_comparison_channel(c->made, i)) != NULL; ++i) {
         json_array_append_new(channels, describe(channel));
     }
-    return json_pack("{s:o,s:o,s:b,s:o,s:o}", "golden", path(c->golden), "new", path(c->fresh), "alike",
-                     c->alike, "problems", problems, "channels", channels);
+    return json_pack("{s:o,s:o,s:b,s:o,s:o}", "golden", cli_utf8_json(c->golden), "new",
+                     cli_utf8_json(c->fresh), "alike", c->alike, "problems", problems, "channels", channels);
 }
 
 /* --- pictures: golden, new and difference, for the page */
+
+enum { GOLDEN, FRESH, DIFFERENCE, PICTURES };
 
 enum { LONGEST = 512 }; /* texels along a side of a picture: larger planes are shrunk */
 
@@ -132,8 +124,6 @@ static bool shown(const view *v, size_t at) {
     const vsh_compared *c = v->compared;
     return (c->mask == NULL || c->mask[at] != 0) && isfinite(c->golden[at]) && isfinite(c->values[at]);
 }
-
-enum { GOLDEN, FRESH, DIFFERENCE, PICTURES };
 
 /* Draws the mean of the values in a pixel, and of differences the largest, so that shrinking hides none. They
  * are white at 0, red if new is lighter, blue if it is darker. */
@@ -167,18 +157,26 @@ static void draw_pixel(const view *v, int what, size_t px, size_t py, uint8_t rg
     }
 }
 
-static int write_picture(FILE *out, const char *page, const view *v, int what) {
+/* Writes a PNG in base64. */
+static void write_picture(FILE *out, const view *v, int what) {
     uint8_t *values = malloc(3 * v->width * v->height);
-    if (values == NULL) {
-        return cli_out_of_memory(page);
-    }
     for (size_t i = 0; i < v->width * v->height; ++i) {
         draw_pixel(v, what, i % v->width, i / v->width, &values[3 * i]);
     }
-    const cli_pixels pixels = {(int32_t)v->width, (int32_t)v->height, 3, values};
-    const int code = cli_document_png(out, page, &pixels);
+    png_image image = {.version = PNG_IMAGE_VERSION,
+                       .width = (png_uint_32)v->width,
+                       .height = (png_uint_32)v->height,
+                       .format = PNG_FORMAT_RGB};
+    png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
+    uint8_t *bytes = malloc(size);
+    png_image_write_to_memory(&image, bytes, &size, 0, values, 0, NULL); /* only memory could be short */
+    for (size_t i = 0; i < size; i += VSHI_BASE64_BYTES) {
+        char letters[VSHI_BASE64_LETTERS];
+        vshi_base64_group(bytes + i, size - i < VSHI_BASE64_BYTES ? size - i : VSHI_BASE64_BYTES, letters);
+        fwrite(letters, 1, sizeof letters, out);
+    }
+    free(bytes);
     free(values);
-    return code;
 }
 
 /* Greys go from 0 to 1, or as far as golden does. Differences are scaled to the 99th percentile. */
@@ -197,8 +195,7 @@ static void set_scales(view *v, const vsh_channel_comparison *channel) {
     v->full = m->count > 0 ? m->range * fmax(0.01, m->value[VSH_MEASURE_P99]) : 1.0;
 }
 
-char *cli_comparison_pictures(const char *page, const vsh_channel_comparison *channel,
-                              const vsh_compared *compared) {
+char *cli_comparison_pictures(const vsh_channel_comparison *channel, const vsh_compared *compared) {
     static const char *const what[PICTURES] = {"golden", "new", "difference"};
     const int32_t w = compared->size[0], h = compared->size[1], longest = w > h ? w : h;
     const int32_t most = longest < LONGEST ? longest : LONGEST;
@@ -211,19 +208,14 @@ char *cli_comparison_pictures(const char *page, const vsh_channel_comparison *ch
     char *text = NULL;
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);
-    if (out == NULL) {
-        cli_out_of_memory(page);
-        return NULL;
-    }
     if (compared->size[2] > 1) {
         fprintf(out, "<p>The slice at z = %d has the largest difference.</p>\n",
                 (int32_t)slice + channel->origin[2]);
     }
     fputs("<div class=\"three\">\n", out);
-    int code = CLI_OK;
-    for (int i = 0; i < PICTURES && code == CLI_OK; ++i) {
+    for (int i = 0; i < PICTURES; ++i) {
         fprintf(out, "<figure><img alt=\"%s\" src=\"data:image/png;base64,", what[i]);
-        code = write_picture(out, page, &v, i);
+        write_picture(out, &v, i);
         fprintf(out, "\"><figcaption>%s, ", what[i]);
         if (i == DIFFERENCE) {
             fprintf(out, "red: lighter, blue: darker, full at ±%.2g", v.full);
@@ -233,21 +225,9 @@ char *cli_comparison_pictures(const char *page, const vsh_channel_comparison *ch
         fputs("</figcaption></figure>\n", out);
     }
     fputs("</div>\n", out);
-    const bool whole = !ferror(out);
-    if (fclose(out) != 0 || !whole) {
-        code = cli_out_of_memory(page);
-    }
-    if (code != CLI_OK) {
-        free(text);
-        return NULL;
-    }
+    fclose(out);
     return text;
 }
-
-typedef struct all {
-    const cli_comparison *comparisons;
-    size_t count;
-} all;
 
 static const char *name_of(const cli_comparison *c) {
     return c->name != NULL ? c->name : c->golden;
@@ -269,7 +249,7 @@ static size_t count_tests(const cli_comparison *c, size_t *failures) {
 /* Writes text with its special characters escaped, between markup. */
 static void put(FILE *out, const char *before, const char *text, const char *after) {
     fputs(before, out);
-    cli_document_escape(out, text);
+    cli_escape(out, text);
     fputs(after, out);
 }
 
@@ -281,16 +261,15 @@ static void write_case(FILE *out, const cli_comparison *c, const char *name, con
     }
 }
 
-static void write_junit(FILE *out, const void *user) {
-    const all *a = user;
+static void write_junit(FILE *out, const cli_comparison *comparisons, size_t count) {
     size_t tests = 0, failures = 0;
-    for (size_t i = 0; i < a->count; ++i) {
-        tests += count_tests(&a->comparisons[i], &failures);
+    for (size_t i = 0; i < count; ++i) {
+        tests += count_tests(&comparisons[i], &failures);
     }
     fprintf(out, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites tests=\"%zu\" failures=\"%zu\">\n",
             tests, failures);
-    for (size_t i = 0; i < a->count; ++i) {
-        const cli_comparison *c = &a->comparisons[i];
+    for (size_t i = 0; i < count; ++i) {
+        const cli_comparison *c = &comparisons[i];
         failures = 0;
         tests = count_tests(c, &failures);
         put(out, "  <testsuite name=\"", name_of(c), "\"");
@@ -370,12 +349,11 @@ static void write_channel(FILE *out, const vsh_channel_comparison *channel, cons
     }
 }
 
-static void write_page(FILE *out, const void *user) {
-    const all *a = user;
+static void write_page(FILE *out, const cli_comparison *comparisons, size_t count) {
     fputs(head, out);
     fputs("<title>vdbshade: golden and new</title>\n<h1>Golden and new</h1>\n", out);
-    for (size_t i = 0; i < a->count; ++i) {
-        const cli_comparison *c = &a->comparisons[i];
+    for (size_t i = 0; i < count; ++i) {
+        const cli_comparison *c = &comparisons[i];
         put(out, "<h2>", name_of(c), ": ");
         fprintf(out, "%s</h2>\n", verdict(c->alike));
         if (c->golden != NULL && c->fresh != NULL) {
@@ -399,10 +377,16 @@ static void write_page(FILE *out, const void *user) {
 }
 
 int cli_comparison_report(const cli_compare_settings *s, const cli_comparison *comparisons, size_t count) {
-    const all a = {comparisons, count};
-    int code = 0;
+    cli_temporary report;
     if (s->junit != NULL) {
-        code = cli_document_write(s->junit, write_junit, &a);
+        CLI_TRY(cli_temporary_begin(&report, s->junit));
+        write_junit(report.file, comparisons, count);
+        CLI_TRY(cli_temporary_commit(&report));
     }
-    return code == 0 && s->html != NULL ? cli_document_write(s->html, write_page, &a) : code;
+    if (s->html != NULL) {
+        CLI_TRY(cli_temporary_begin(&report, s->html));
+        write_page(report.file, comparisons, count);
+        CLI_TRY(cli_temporary_commit(&report));
+    }
+    return CLI_OK;
 }

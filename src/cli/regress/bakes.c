@@ -1,77 +1,70 @@
 /* The folder of new bakes, the child processes that bake into it, and golden bakes that are replaced. */
-#include "cli/child.h"
+#define _GNU_SOURCE /* scandirat, pipe2 */
 #include "cli/message.h"
 #include "cli/paths.h"
 #include "cli/regress/regress.h"
+#include "cli/signals.h"
 #include "cli/temporary.h"
 
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <fnmatch.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
+#include <sys/prctl.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 /* --- the folder */
 
-enum { ATTEMPTS = 16 };
-
-static const char prefix[] = "vdbshade-regress-", unique[] = "XXXXXX";
-
-static int make_failed(const char *path) {
+static int fail_making(const char *path) {
     cli_say("%s: cannot be made: %s", path, strerror(errno));
     return CLI_FILE;
 }
 
 /* Opens a folder, but no link to one; -1 if that fails. */
-static int open_folder(int parent, const char *name) {
-    return openat(parent, name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+static int open_folder(const char *path) {
+    return open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
 }
 
-/* Removes the files of a folder, which has no folders in it. */
-static void remove_files(int folder) {
-    const int own = dup(folder); /* closedir() closes it */
-    DIR *listing = own >= 0 ? fdopendir(own) : NULL;
-    if (listing == NULL) {
-        if (own >= 0) {
-            close(own);
-        }
-        return;
+/* Removes a folder that has no folders in it. */
+static void remove_folder(int folder, const char *path) {
+    struct dirent **entries = NULL;
+    const int count = scandirat(folder, ".", &entries, NULL, NULL);
+    for (int i = 0; i < count; ++i) {
+        unlinkat(folder, entries[i]->d_name, 0); /* fails for "." and ".." */
+        free(entries[i]);
     }
-    rewinddir(listing);
-    for (const struct dirent *entry = readdir(listing); entry != NULL; entry = readdir(listing)) {
-        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0) {
-            unlinkat(folder, entry->d_name, 0);
-        }
-    }
-    closedir(listing);
+    free(entries);
+    rmdir(path);
+}
+
+static int is_folder_of_bakes(const struct dirent *entry) {
+    return fnmatch("vdbshade-regress-??????", entry->d_name, 0) == 0;
 }
 
 /* Removes folders of killed runs: those with such a name that belong to this user, and that nobody locks. */
 static void remove_old_folders(const char *place) {
-    DIR *listing = opendir(place);
-    if (listing == NULL) {
-        return;
-    }
-    for (const struct dirent *entry = readdir(listing); entry != NULL; entry = readdir(listing)) {
-        if (strncmp(entry->d_name, prefix, sizeof prefix - 1) != 0 ||
-            strlen(entry->d_name) != sizeof prefix - 1 + sizeof unique - 1) {
-            continue;
-        }
-        const int folder = open_folder(dirfd(listing), entry->d_name);
+    struct dirent **entries = NULL;
+    const int count = scandir(place, &entries, is_folder_of_bakes, NULL);
+    for (int i = 0; i < count; ++i) {
+        char *path = regress_path(place, entries[i]->d_name);
+        const int folder = open_folder(path);
         struct stat status;
         if (folder >= 0 && fstat(folder, &status) == 0 && status.st_uid == geteuid() &&
             (status.st_mode & 0777) == 0700 && flock(folder, LOCK_EX | LOCK_NB) == 0) {
-            remove_files(folder);
-            unlinkat(dirfd(listing), entry->d_name, AT_REMOVEDIR);
+            remove_folder(folder, path);
         }
-        if (folder >= 0) {
-            close(folder);
-        }
+        close(folder);
+        free(path);
+        free(entries[i]);
     }
-    closedir(listing);
+    free(entries);
 }
 
 /* Locks a new folder. Another run may have removed it before, so checks that it still exists. */
@@ -84,21 +77,17 @@ static bool lock_folder(int folder, const char *path) {
 }
 
 static int make_temporary_folder(regress_work *work) {
+    enum { ATTEMPTS = 16 };
     const char *place = getenv("TMPDIR");
     place = place != NULL && place[0] == '/' ? place : "/tmp";
     remove_old_folders(place);
-    char name[sizeof prefix + sizeof unique];
     for (int i = 0; i < ATTEMPTS; ++i) {
-        snprintf(name, sizeof name, "%s%s", prefix, unique);
         free(work->bakes);
-        work->bakes = regress_path(place, name);
-        if (work->bakes == NULL) {
-            return cli_out_of_memory("folder for new bakes");
-        }
+        work->bakes = regress_path(place, "vdbshade-regress-XXXXXX");
         if (mkdtemp(work->bakes) == NULL) {
             break;
         }
-        const int folder = open_folder(AT_FDCWD, work->bakes);
+        const int folder = open_folder(work->bakes);
         if (folder >= 0 && lock_folder(folder, work->bakes)) {
             work->folder_of_bakes = folder + 1;
             return CLI_OK;
@@ -117,16 +106,15 @@ int regress_make_folder(regress_work *work) {
         return make_temporary_folder(work);
     }
     if (mkdir(given, 0777) != 0 && errno != EEXIST) {
-        return make_failed(given);
+        return fail_making(given);
     }
     work->bakes = realpath(given, NULL);
-    return work->bakes != NULL ? CLI_OK : make_failed(given);
+    return work->bakes != NULL ? CLI_OK : fail_making(given);
 }
 
 void regress_remove_folder(regress_work *work) {
     if (work->folder_of_bakes > 0) {
-        remove_files(work->folder_of_bakes - 1);
-        rmdir(work->bakes);
+        remove_folder(work->folder_of_bakes - 1, work->bakes);
         close(work->folder_of_bakes - 1);
         work->folder_of_bakes = 0;
     }
@@ -134,33 +122,128 @@ void regress_remove_folder(regress_work *work) {
 
 /* --- baking */
 
-static int list_words(const regress_work *work, const regress_case *one, regress_lines *words) {
-    static const char *const sandbox[] = {[CLI_SANDBOX_OFF] = "off", [CLI_SANDBOX_REQUIRE] = "require"};
-    CLI_TRY(regress_add_line(words, "vdbshade"));
-    CLI_TRY(regress_add_line(words, "%s", one->command->name));
+/* Runs between fork and exec: other threads are gone, so a lock that one of them held stays locked. */
+static void become_program(const char *folder, char **words, pid_t parent, int errors) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    dup2(errors, STDERR_FILENO);
+    if (getppid() != parent) {
+        _exit(CLI_INTERRUPTED);
+    }
+    if (chdir(folder) == 0) {
+        execv("/proc/self/exe", words);
+    }
+    static const char text[] = "vdbshade: a process of its own cannot be begun\n";
+    _exit(write(STDERR_FILENO, text, sizeof text - 1) > 0 ? CLI_FILE : CLI_DEFECT);
+}
+
+/* A child's standard error. */
+typedef struct errors {
+    int from; /* the pipe's end, which does not block */
+    char line[1024];
+    size_t length; /* of the line so far, maybe more than fits */
+} errors;
+
+/* Passes on what has come, and keeps the last error: a line of ours that is no warning. */
+static void pass_errors(errors *e) {
+    static const char name[] = "vdbshade: ", warning[] = "vdbshade: warning";
+    char piece[4096];
+    ssize_t count;
+    while ((count = read(e->from, piece, sizeof piece)) > 0) {
+        fwrite(piece, 1, (size_t)count, stderr);
+        for (ssize_t i = 0; i < count; ++i) {
+            if (piece[i] != '\n') {
+                e->line[e->length < sizeof e->line - 1 ? e->length : sizeof e->line - 1] = piece[i];
+                ++e->length;
+                continue;
+            }
+            e->line[e->length < sizeof e->line - 1 ? e->length : sizeof e->line - 1] = '\0';
+            if (strncmp(e->line, name, sizeof name - 1) == 0 &&
+                strncmp(e->line, warning, sizeof warning - 1) != 0) {
+                cli_keep_message(e->line + sizeof name - 1);
+            }
+            e->length = 0;
+        }
+    }
+}
+
+/* Runs this program in `folder` with the words of a command line, NULL after the last, and returns its exit
+ * code. Passes its errors on; the last is cli_last_message(). If the child dies, says so of `what` and
+ * returns CLI_DEFECT. */
+static int run_child(const char *what, const char *folder, char **words) {
+    fflush(NULL);
+    const pid_t parent = getpid();
+    int ends[2];
+    const bool piped = pipe2(ends, O_CLOEXEC | O_NONBLOCK) == 0;
+    const pid_t child = piped ? fork() : -1;
+    if (child < 0) {
+        cli_say("%s: no process for it: %s", what, strerror(errno));
+        if (piped) {
+            close(ends[0]);
+            close(ends[1]);
+        }
+        return CLI_LIMIT;
+    }
+    if (child == 0) {
+        fcntl(ends[1], F_SETFL, 0); /* its end blocks */
+        become_program(folder, words, parent, ends[1]);
+    }
+    close(ends[1]);
+    errors e = {.from = ends[0]};
+    int status = 0;
+    while (waitpid(child, &status, WNOHANG) != child) {
+        pass_errors(&e);
+        if (cli_interrupted()) {
+            kill(child, SIGKILL);
+            waitpid(child, &status, 0);
+            break;
+        }
+        const struct timespec pause = {0, 2000000};
+        nanosleep(&pause, NULL);
+    }
+    pass_errors(&e);
+    close(e.from);
+    if (cli_interrupted()) { /* as the child was, maybe before it could take a signal */
+        const vsh_error cancelled = {VSH_ERROR_CANCELLED, ""};
+        return cli_fail(&cancelled);
+    }
+    if (WIFEXITED(status)) {
+        return WEXITSTATUS(status);
+    }
+    cli_say("%s: its process ended by signal %d", what, WTERMSIG(status));
+    return CLI_DEFECT;
+}
+
+static void list_words(const regress_work *work, const regress_case *one, regress_lines *words) {
+    static const char *const sandbox[] = {
+        [CLI_SANDBOX_AUTO] = "auto", [CLI_SANDBOX_OFF] = "off", [CLI_SANDBOX_REQUIRE] = "require"};
+    regress_add_line(words, "vdbshade");
+    regress_add_line(words, "%s", one->command->name);
     /* a scene "--stats=x.json" is a file in the folder, and no option */
-    CLI_TRY(regress_add_line(words, "%s%s", one->scene[0] == '-' ? "./" : "", one->scene));
+    regress_add_line(words, "%s%s", one->scene[0] == '-' ? "./" : "", one->scene);
     for (size_t i = 0; i < one->options.count; ++i) {
-        CLI_TRY(regress_add_line(words, "%s", one->options.line[i]));
+        regress_add_line(words, "%s", one->options.line[i]);
     }
-    CLI_TRY(one->output != NULL ? regress_add_line(words, "--output=%s/%s", work->bakes, one->output)
-                                : regress_add_line(words, "--output-folder=%s", work->bakes));
-    CLI_TRY(regress_add_line(words, "--quiet"));
-    CLI_TRY(regress_add_line(words, "--memory-limit=%llu", (unsigned long long)cli_given.memory_limit));
+    if (one->output != NULL) {
+        regress_add_line(words, "--output=%s/%s", work->bakes, one->output);
+    } else {
+        regress_add_line(words, "--output-folder=%s", work->bakes);
+    }
+    regress_add_line(words, "--quiet");
+    regress_add_line(words, "--memory-limit=%llu", (unsigned long long)cli_given.memory_limit);
+    regress_add_line(words, "--sandbox=%s", sandbox[cli_given.sandbox]);
     if (cli_given.threads > 0) {
-        CLI_TRY(regress_add_line(words, "--threads=%d", cli_given.threads));
+        regress_add_line(words, "--threads=%d", cli_given.threads);
     }
-    if (cli_given.sandbox != CLI_SANDBOX_AUTO) {
-        CLI_TRY(regress_add_line(words, "--sandbox=%s", sandbox[cli_given.sandbox]));
+    if (cli_given.allow_outside) {
+        regress_add_line(words, "--allow-outside");
     }
-    return cli_given.allow_outside ? regress_add_line(words, "--allow-outside") : CLI_OK;
 }
 
 int regress_bake(const regress_work *work, const regress_case *one) {
     regress_lines words = {NULL, 0};
-    int code = list_words(work, one, &words);
+    list_words(work, one, &words);
     /* in the folder of the scenes, because options name files relative to it */
-    code = code == CLI_OK ? cli_in_child(one->scene, work->folder, words.line) : code;
+    const int code = run_child(one->scene, work->settings->folder, words.line);
     regress_free_lines(&words);
     return code;
 }
@@ -197,10 +280,10 @@ static int copy(const char *from, const char *to) {
 
 int regress_update(const regress_work *work, const char *output) {
     if (mkdir(work->golden, 0777) != 0 && errno != EEXIST) {
-        return make_failed(work->golden);
+        return fail_making(work->golden);
     }
     char *from = regress_path(work->bakes, output), *to = regress_path(work->golden, output);
-    int code = from != NULL && to != NULL ? cli_check_links(work->golden, to) : cli_out_of_memory(output);
+    int code = cli_check_links(work->golden, to);
     code = code == CLI_OK ? copy(from, to) : code;
     free(from);
     free(to);

@@ -18,22 +18,15 @@
 
 static const char list_name[] = "regress.json", tolerance_ending[] = ".tolerance.json";
 
-/* Sizes of files that strangers may have made; parsed JSON takes a hundred times as much. */
-enum { MOST_BYTES = 4 << 20, MOST_SCENE = 64 << 20 };
+enum { MOST_SCENE = 64 << 20 }; /* bytes of a scene */
 
-int regress_add_line(regress_lines *lines, const char *format, ...) {
-    char **more = realloc(lines->line, (lines->count + 2) * sizeof *more);
-    if (more == NULL) {
-        return cli_out_of_memory("list");
-    }
-    lines->line = more;
+void regress_add_line(regress_lines *lines, const char *format, ...) {
+    lines->line = realloc(lines->line, (lines->count + 2) * sizeof *lines->line);
     va_list arguments;
     va_start(arguments, format);
-    const int length = vasprintf(&more[lines->count], format, arguments);
+    lines->count += vasprintf(&lines->line[lines->count], format, arguments) >= 0;
     va_end(arguments);
-    lines->count += length >= 0;
-    more[lines->count] = NULL;
-    return length >= 0 ? CLI_OK : cli_out_of_memory("list");
+    lines->line[lines->count] = NULL;
 }
 
 void regress_free_lines(regress_lines *lines) {
@@ -70,7 +63,7 @@ void regress_mark_failed(regress_case *one, int code) {
     one->status = REGRESS_FAILED;
     one->code = code;
     free(one->reason);
-    one->reason = cli_last_message()[0] != '\0' ? strdup(cli_last_message()) : NULL;
+    one->reason = strdup(cli_last_message());
 }
 
 int regress_fail_alone(regress_case *one, int code) {
@@ -81,24 +74,18 @@ int regress_fail_alone(regress_case *one, int code) {
     return CLI_OK;
 }
 
-static int add_case(regress_work *work, const char *scene, const char *name, size_t name_length) {
-    regress_case *more = realloc(work->cases, (work->case_count + 1) * sizeof *more);
-    if (more == NULL) {
-        return cli_out_of_memory(work->folder);
-    }
-    work->cases = more;
-    regress_case *one = &more[work->case_count++];
-    memset(one, 0, sizeof *one);
-    one->scene = strdup(scene);
-    one->path = regress_path(work->folder, scene);
-    one->name = strndup(name, name_length);
-    return one->scene != NULL && one->path != NULL && one->name != NULL ? CLI_OK
-                                                                        : cli_out_of_memory(work->folder);
+static regress_case *add_case(regress_work *work, const char *scene, const char *name, size_t name_length) {
+    work->cases = realloc(work->cases, (work->case_count + 1) * sizeof *work->cases);
+    regress_case *one = &work->cases[work->case_count++];
+    *one = (regress_case){.scene = strdup(scene),
+                          .path = regress_path(work->settings->folder, scene),
+                          .name = strndup(name, name_length)};
+    return one;
 }
 
 /* --- outputs of scenes */
 
-static json_t *load(const char *path, uint64_t most) {
+json_t *regress_load(const char *path, uint64_t most) {
     FILE *file;
     uint64_t size;
     if (vshi_input_open(path, path, most, &file, &size, NULL) != VSH_OK) {
@@ -107,10 +94,6 @@ static json_t *load(const char *path, uint64_t most) {
     json_t *root = json_loadf(file, 0, NULL);
     fclose(file);
     return root;
-}
-
-json_t *regress_load(const char *path) {
-    return load(path, MOST_BYTES);
 }
 
 /* Finds out whether a scene is for `flat`: those have a region. Reads it as a scene first, because that
@@ -124,7 +107,7 @@ static int find_command(const regress_work *work, regress_case *one) {
         return cli_fail(&error);
     }
     if (!flat) {
-        json_t *root = load(one->path, MOST_SCENE);
+        json_t *root = regress_load(one->path, MOST_SCENE);
         flat = json_object_get(root, "region") != NULL;
         json_decref(root);
     }
@@ -132,45 +115,39 @@ static int find_command(const regress_work *work, regress_case *one) {
     return CLI_OK;
 }
 
-static int add_output(regress_case *one, const char *path) {
+static void add_output(regress_case *one, const char *path) {
     const char *slash = strrchr(path, '/');
-    return regress_add_line(&one->outputs, "%s", slash != NULL ? slash + 1 : path);
+    regress_add_line(&one->outputs, "%s", slash != NULL ? slash + 1 : path);
 }
 
 static int list_scene_outputs(const regress_work *work, regress_case *one) {
     vsh_error error;
     vsh_scene *scene = NULL;
-    if (vsh_scene_read(one->path, &work->run, &scene, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
-    int code = CLI_OK;
-    for (size_t i = 0; i < scene->receiver_count && code == CLI_OK; ++i) {
-        code = add_output(one, scene->receivers[i].output);
+    CLI_TRY(cli_check(vsh_scene_read(one->path, &work->run, &scene, &error), &error));
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        add_output(one, scene->receivers[i].output);
     }
     vsh_scene_free(scene);
-    return code;
+    return CLI_OK;
 }
 
 static int list_flat_output(const regress_work *work, regress_case *one) {
     vsh_error error;
     vsh_flat_scene *scene = NULL;
-    if (vsh_flat_scene_read(one->path, &work->run, &scene, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
-    int code = scene->output != NULL ? add_output(one, scene->output) : CLI_OK;
-    vsh_flat_scene_free(scene);
-    if (code == CLI_OK && one->outputs.count > 0) {
+    CLI_TRY(cli_check(vsh_flat_scene_read(one->path, &work->run, &scene, &error), &error));
+    if (scene->output != NULL) {
+        add_output(one, scene->output);
         one->output = strdup(one->outputs.line[0]);
-        code = one->output != NULL ? CLI_OK : cli_out_of_memory(one->path);
     }
-    return code;
+    vsh_flat_scene_free(scene);
+    return CLI_OK;
 }
 
 /* Completes command and outputs. */
 static int list_outputs(const regress_work *work, regress_case *one) {
     CLI_TRY(one->command == NULL ? find_command(work, one) : CLI_OK);
     if (one->output != NULL) {
-        CLI_TRY(add_output(one, one->output));
+        add_output(one, one->output);
     } else if (one->command == &cli_bake) {
         CLI_TRY(list_scene_outputs(work, one));
     } else if (one->command == &cli_flat) {
@@ -185,7 +162,7 @@ static int list_outputs(const regress_work *work, regress_case *one) {
 /* --- regress.json */
 
 static int bad_case(const regress_work *work, size_t i, const char *what) {
-    return cli_usage("%s/%s: cases[%zu]: %s", work->folder, list_name, i, what);
+    return cli_usage("%s/%s: cases[%zu]: %s", work->settings->folder, list_name, i, what);
 }
 
 static int check_keys(const regress_work *work, json_t *json, size_t i) {
@@ -219,7 +196,9 @@ static int read_options(const regress_work *work, const json_t *options, size_t 
     bool strings = options == NULL || json_is_array(options);
     json_array_foreach(options, k, word) {
         strings = strings && json_is_string(word);
-        CLI_TRY(strings ? regress_add_line(&one->options, "%s", json_string_value(word)) : CLI_OK);
+        if (strings) {
+            regress_add_line(&one->options, "%s", json_string_value(word));
+        }
     }
     return strings ? CLI_OK : bad_case(work, i, "options: expected an array of strings");
 }
@@ -230,10 +209,9 @@ static int read_case(regress_work *work, json_t *json, size_t i) {
         return bad_case(work, i, "expected an object");
     }
     CLI_TRY(check_keys(work, json, i));
-    const char *scene = json_string_value(json_object_get(json, "scene"));
-    const char *name = json_string_value(json_object_get(json, "name"));
-    const char *output = json_string_value(json_object_get(json, "output"));
-    const char *command = json_string_value(json_object_get(json, "command"));
+    const char *scene = NULL, *name = NULL, *output = NULL, *command = NULL;
+    json_unpack(json, "{s?s,s?s,s?s,s?s}", "scene", &scene, "name", &name, "output", &output, "command",
+                &command);
     if (scene == NULL) {
         return bad_case(work, i, "key \"scene\" is missing");
     }
@@ -241,13 +219,9 @@ static int read_case(regress_work *work, json_t *json, size_t i) {
         (strchr(output, '/') != NULL || strcmp(output, ".") == 0 || strcmp(output, "..") == 0)) {
         return bad_case(work, i, "output: a name without a folder is expected");
     }
-    CLI_TRY(name != NULL ? add_case(work, scene, name, strlen(name))
-                         : add_case(work, scene, scene, strcspn(scene, ".")));
-    regress_case *one = &work->cases[work->case_count - 1];
+    regress_case *one = name != NULL ? add_case(work, scene, name, strlen(name))
+                                     : add_case(work, scene, scene, strcspn(scene, "."));
     one->output = output != NULL ? strdup(output) : NULL;
-    if (output != NULL && one->output == NULL) {
-        return cli_out_of_memory(work->folder);
-    }
     for (size_t k = 0; command != NULL && k < sizeof commands / sizeof commands[0]; ++k) {
         one->command = strcmp(commands[k]->name, command) == 0 ? commands[k] : one->command;
     }
@@ -261,7 +235,7 @@ static int read_list(regress_work *work, const char *path) {
     FILE *file;
     uint64_t size;
     vsh_error error;
-    if (vshi_input_open(path, path, MOST_BYTES, &file, &size, &error) != VSH_OK) {
+    if (vshi_input_open(path, path, REGRESS_MOST_BYTES, &file, &size, &error) != VSH_OK) {
         return access(path, F_OK) != 0 && errno == ENOENT ? CLI_OK : cli_fail(&error);
     }
     int code = CLI_OK;
@@ -315,7 +289,7 @@ static int check_options(const regress_work *work, const regress_case *one) {
             return cli_usage(
                 "%s/%s: case '%s': option '%s' of '%s' may not be in this file, because it does not change "
                 "values; give --sandbox, --threads and --memory-limit to 'vdbshade regress' itself",
-                work->folder, list_name, one->name, word, one->command->name);
+                work->settings->folder, list_name, one->name, word, one->command->name);
         }
         i += option.value != NULL && strchr(word, '=') == NULL; /* skip its value */
     }
@@ -342,22 +316,21 @@ static bool is_listed(const regress_work *work, size_t listed, const char *scene
 
 static int add_scenes(regress_work *work) {
     struct dirent **entries;
-    const int count = scandir(work->folder, &entries, is_scene, alphasort);
+    const int count = scandir(work->settings->folder, &entries, is_scene, alphasort);
     if (count < 0) {
-        cli_say("%s: cannot be read: %s", work->folder, strerror(errno));
+        cli_say("%s: cannot be read: %s", work->settings->folder, strerror(errno));
         return CLI_FILE;
     }
-    int code = CLI_OK;
     const size_t listed = work->case_count;
     for (int i = 0; i < count; ++i) {
         const char *scene = entries[i]->d_name;
-        if (code == CLI_OK && !is_listed(work, listed, scene)) {
-            code = add_case(work, scene, scene, strlen(scene) - strlen(".json"));
+        if (!is_listed(work, listed, scene)) {
+            add_case(work, scene, scene, strlen(scene) - strlen(".json"));
         }
         free(entries[i]);
     }
     free(entries);
-    return code;
+    return CLI_OK;
 }
 
 /* --- all cases */
@@ -368,14 +341,14 @@ static int check_unique(const regress_work *work) {
         for (size_t k = 0; k <= i; ++k) {
             const regress_case *other = &work->cases[k];
             if (k < i && strcmp(one->name, other->name) == 0) {
-                return cli_usage("%s: two cases are named '%s'; name them in %s", work->folder, one->name,
-                                 list_name);
+                return cli_usage("%s: two cases are named '%s'; name them in %s", work->settings->folder,
+                                 one->name, list_name);
             }
             for (size_t a = 0; a < one->outputs.count; ++a) {
                 for (size_t b = 0; b < (k < i ? other->outputs.count : a); ++b) {
                     if (strcmp(one->outputs.line[a], other->outputs.line[b]) == 0) {
-                        return cli_usage("%s: both '%s' and '%s' write '%s'", work->folder, other->name,
-                                         one->name, one->outputs.line[a]);
+                        return cli_usage("%s: both '%s' and '%s' write '%s'", work->settings->folder,
+                                         other->name, one->name, one->outputs.line[a]);
                     }
                 }
             }
@@ -389,15 +362,15 @@ static int complete_case(const regress_work *work, regress_case *one) {
     CLI_TRY(one->options.count > 0 ? check_options(work, one) : CLI_OK);
     if (one->status == REGRESS_FAILED) { /* reported under the scene's own name */
         regress_free_lines(&one->outputs);
-        CLI_TRY(regress_add_line(&one->outputs, "%s", one->scene));
+        regress_add_line(&one->outputs, "%s", one->scene);
     }
     one->comparisons = calloc(one->outputs.count, sizeof *one->comparisons);
-    return one->comparisons != NULL ? CLI_OK : cli_out_of_memory(work->folder);
+    return CLI_OK;
 }
 
 int regress_find_cases(regress_work *work) {
-    char *list = regress_path(work->folder, list_name);
-    int code = list != NULL ? read_list(work, list) : cli_out_of_memory(work->folder);
+    char *list = regress_path(work->settings->folder, list_name);
+    const int code = read_list(work, list);
     free(list);
     CLI_TRY(code);
     CLI_TRY(add_scenes(work));
@@ -412,8 +385,8 @@ int regress_find_cases(regress_work *work) {
     }
     work->case_count = kept;
     if (kept == 0) {
-        return only != NULL ? cli_usage("%s: no case's name holds '%s'", work->folder, only)
-                            : cli_usage("%s: no scenes (.json) in it", work->folder);
+        return only != NULL ? cli_usage("%s: no case's name holds '%s'", work->settings->folder, only)
+                            : cli_usage("%s: no scenes (.json) in it", work->settings->folder);
     }
     for (size_t i = 0; i < kept; ++i) {
         CLI_TRY(complete_case(work, &work->cases[i]));

@@ -1,10 +1,10 @@
 /* Lists the inputs of a bake and its verdict, and finds what changed since the case was last alike. */
-#define _GNU_SOURCE /* asprintf */
 #include "cli/commands.h"
 #include "cli/message.h"
 #include "cli/regress/regress.h"
 #include "cli/temporary.h"
 
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,51 +16,46 @@
 static int add_digest(const regress_work *work, regress_case *one, const char *what, const char *path) {
     char digest[VSH_DIGEST_TEXT] = "none";
     vsh_error error;
-    if (access(path, F_OK) == 0 && vsh_file_digest(path, &work->run, digest, &error) != VSH_OK) {
-        return cli_fail(&error);
+    if (access(path, F_OK) == 0) {
+        CLI_TRY(cli_check(vsh_file_digest(path, &work->run, digest, &error), &error));
     }
-    return regress_add_line(&one->inputs, "%s: %s", what, digest);
+    regress_add_line(&one->inputs, "%s: %s", what, digest);
+    return CLI_OK;
 }
 
 /* Adds the limits of the command line. */
-static int add_limits(const regress_work *work, regress_case *one) {
+static void add_limits(const regress_work *work, regress_case *one) {
     const vsh_compare_files_options *o = &work->settings->compare.options;
-    CLI_TRY(regress_add_line(&one->inputs, "coverage: %s, at most %.9g, padding %d", o->coverage,
-                             o->coverage_limit, o->padding));
-    CLI_TRY(regress_add_line(&one->inputs, "step %.9g, reach %d, noise %.9g", o->step, o->reach, o->noise));
+    regress_add_line(&one->inputs, "coverage: %s, at most %.9g, padding %d", o->coverage, o->coverage_limit,
+                     o->padding);
+    regress_add_line(&one->inputs, "step %.9g, reach %d, noise %.9g", o->step, o->reach, o->noise);
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
         if (!isnan(o->limits[i])) {
-            CLI_TRY(regress_add_line(&one->inputs, "limit of %s: %.9g", vsh_get_name(VSH_NAMES_MEASURE, i),
-                                     o->limits[i]));
+            regress_add_line(&one->inputs, "limit of %s: %.9g", vsh_get_name(VSH_NAMES_MEASURE, i),
+                             o->limits[i]);
         }
     }
-    return CLI_OK;
 }
 
 /* Adds the files that a flat scene names. */
 static int add_flat_files(const regress_work *work, const regress_case *one, regress_lines *files) {
     vsh_flat_scene *scene = NULL;
     vsh_error error;
-    if (vsh_flat_scene_read(one->path, &work->run, &scene, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
-    int code = CLI_OK;
-    for (size_t i = 0; i < scene->caster_count && code == CLI_OK; ++i) {
-        const char *path = scene->casters[i].path;
-        code = path != NULL ? regress_add_line(files, "%s", path) : CLI_OK;
+    CLI_TRY(cli_check(vsh_flat_scene_read(one->path, &work->run, &scene, &error), &error));
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        if (scene->casters[i].path != NULL) {
+            regress_add_line(files, "%s", scene->casters[i].path);
+        }
     }
     vsh_flat_scene_free(scene);
-    return code;
+    return CLI_OK;
 }
 
 /* Adds files in options, which may be FILE.vdb:GRID. */
-static int add_option_files(const regress_work *work, const regress_case *one, regress_lines *files) {
+static void add_option_files(const regress_work *work, const regress_case *one, regress_lines *files) {
     for (size_t i = 0; i < one->options.count; ++i) {
         const char *word = one->options.line[i];
-        char *path = word[0] == '/' ? strdup(word) : regress_path(work->folder, word);
-        if (path == NULL) {
-            return cli_out_of_memory(work->folder);
-        }
+        char *path = word[0] == '/' ? strdup(word) : regress_path(work->settings->folder, word);
         struct stat status;
         bool good = stat(path, &status) == 0;
         char *colon = strrchr(path, ':');
@@ -68,11 +63,11 @@ static int add_option_files(const regress_work *work, const regress_case *one, r
             *colon = '\0';
             good = stat(path, &status) == 0;
         }
-        const int code = good && S_ISREG(status.st_mode) ? regress_add_line(files, "%s", path) : CLI_OK;
+        if (good && S_ISREG(status.st_mode)) {
+            regress_add_line(files, "%s", path);
+        }
         free(path);
-        CLI_TRY(code);
     }
-    return CLI_OK;
 }
 
 /* Adds digests of the scene's file and of all files it names. */
@@ -80,27 +75,22 @@ static int add_provenance(const regress_work *work, regress_case *one) {
     const bool flat = one->command == &cli_flat;
     vsh_scene *scene = NULL;
     vsh_error error;
-    if (!flat && vsh_scene_read(one->path, &work->run, &scene, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
+    CLI_TRY(flat ? CLI_OK : cli_check(vsh_scene_read(one->path, &work->run, &scene, &error), &error));
     regress_lines files = {NULL, 0};
     vsh_provenance *provenance = NULL;
     int code;
-    CLI_TRY_DONE(regress_add_line(&files, "%s", one->path));
+    regress_add_line(&files, "%s", one->path);
     CLI_TRY_DONE(flat ? add_flat_files(work, one, &files) : CLI_OK);
-    CLI_TRY_DONE(add_option_files(work, one, &files));
+    add_option_files(work, one, &files);
     vsh_provenance_source source = vsh_provenance_source_default();
     source.scene = scene;
     source.files = (const char *const *)files.line;
     source.file_count = files.count;
-    if (vsh_provenance_create(&source, &work->run, &provenance, &error) != VSH_OK) {
-        code = cli_fail(&error);
-        goto done;
-    }
+    CLI_TRY_DONE(cli_check(vsh_provenance_create(&source, &work->run, &provenance, &error), &error));
     size_t count;
     const vsh_attribute *attributes = vsh_provenance_attributes(provenance, &count);
     for (size_t i = 0; i < count; ++i) {
-        CLI_TRY_DONE(regress_add_line(&one->inputs, "%s: %s", attributes[i].name, attributes[i].value));
+        regress_add_line(&one->inputs, "%s: %s", attributes[i].name, attributes[i].value);
     }
 done:
     vsh_provenance_free(provenance);
@@ -114,14 +104,10 @@ static int add_golden(const regress_work *work, regress_case *one) {
     static const char *const endings[] = {"", ".tolerance.json"};
     int code = CLI_OK;
     for (size_t i = 0; i < 2 * one->outputs.count && code == CLI_OK; ++i) {
-        char *name, *path;
-        if (asprintf(&name, "golden %s%s", one->outputs.line[i / 2], endings[i % 2]) < 0) {
-            return cli_out_of_memory(work->folder);
-        }
-        path = regress_path(work->golden, name + strlen("golden "));
-        code = path != NULL ? add_digest(work, one, name, path) : cli_out_of_memory(work->folder);
-        free(path);
-        free(name);
+        char what[PATH_MAX], path[PATH_MAX];
+        snprintf(what, sizeof what, "golden %s%s", one->outputs.line[i / 2], endings[i % 2]);
+        snprintf(path, sizeof path, "%s/%s", work->golden, what + strlen("golden "));
+        code = add_digest(work, one, what, path);
     }
     const char *tolerances = work->settings->compare.options.tolerances;
     return code == CLI_OK && tolerances != NULL ? add_digest(work, one, "tolerances", tolerances) : code;
@@ -129,13 +115,13 @@ static int add_golden(const regress_work *work, regress_case *one) {
 
 int regress_list_inputs(const regress_work *work, regress_case *one) {
     regress_free_lines(&one->inputs);
-    CLI_TRY(regress_add_line(&one->inputs, "program: %s", work->program));
-    CLI_TRY(regress_add_line(&one->inputs, "command: %s", one->command->name));
+    regress_add_line(&one->inputs, "program: %s", work->program);
+    regress_add_line(&one->inputs, "command: %s", one->command->name);
     for (size_t i = 0; i < one->options.count; ++i) {
-        CLI_TRY(regress_add_line(&one->inputs, "option: %s", one->options.line[i]));
+        regress_add_line(&one->inputs, "option: %s", one->options.line[i]);
     }
     CLI_TRY(add_provenance(work, one));
-    CLI_TRY(add_limits(work, one));
+    add_limits(work, one);
     return add_golden(work, one);
 }
 
@@ -178,7 +164,7 @@ static void look_up(json_t *lines, regress_case *one) {
 }
 
 void regress_read_cache(regress_work *work) {
-    json_t *root = regress_load(work->cache);
+    json_t *root = regress_load(work->cache, REGRESS_MOST_BYTES);
     for (size_t i = 0; i < work->case_count; ++i) {
         regress_case *one = &work->cases[i];
         if (one->status == REGRESS_FAILED) {
@@ -192,7 +178,8 @@ void regress_read_cache(regress_work *work) {
 
 /* Keeps cases that --only left out. */
 int regress_write_cache(const regress_work *work) {
-    json_t *old = regress_load(work->cache), *alike = json_object(), *root = json_object();
+    json_t *old = regress_load(work->cache, REGRESS_MOST_BYTES), *alike = json_object(),
+           *root = json_object();
     if (work->settings->only != NULL) {
         json_object_update(alike, json_object_get(old, "alike"));
     }
@@ -211,7 +198,7 @@ int regress_write_cache(const regress_work *work) {
     char *text = json_dumps(root, JSON_INDENT(1));
     json_decref(root);
     json_decref(old);
-    const int code = text != NULL ? cli_temporary_write(work->cache, text) : cli_out_of_memory(work->folder);
+    const int code = cli_temporary_write(work->cache, text);
     free(text);
     return code;
 }

@@ -1,9 +1,8 @@
 /* vdbshade regress: bakes the scenes of a folder that changed, compares them with golden bakes, and reports.
  */
-#define _GNU_SOURCE /* asprintf, dladdr */
+#define _GNU_SOURCE /* dladdr */
 #include "cli/regress/regress.h"
 #include "cli/commands.h"
-#include "cli/document.h"
 #include "cli/message.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
@@ -14,21 +13,20 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include <vdbshade/provenance.h>
-
-enum { KEY_UPDATE = 0x2000, KEY_ALL, KEY_CACHE, KEY_BAKES, KEY_ONLY };
 
 static const cli_option options[] = {
     {0, NULL, NULL, "What is done"},
-    {KEY_UPDATE, "update", NULL, "replace golden bakes that differ, and add missing ones"},
-    {KEY_ALL, "all", NULL, "bake unchanged cases, too"},
-    {KEY_ONLY, "only", "TEXT", "only cases whose names contain it"},
-    {KEY_CACHE, "cache", "FILE", "cases that were alike, with their inputs\n(DIR/.regress-cache.json)"},
-    {KEY_BAKES, "bakes", "FOLDER", "keep the new bakes there"},
+    {CLI_FLAG(regress_settings, update), "update", NULL,
+     "replace golden bakes that differ, and add missing ones"},
+    {CLI_FLAG(regress_settings, all), "all", NULL, "bake unchanged cases, too"},
+    {CLI_TEXT(regress_settings, only), "only", "TEXT", "only cases whose names contain it"},
+    {CLI_TEXT(regress_settings, cache), "cache", "FILE",
+     "cases that were alike, with their inputs\n(DIR/.regress-cache.json)"},
+    {CLI_TEXT(regress_settings, bakes), "bakes", "FOLDER", "keep the new bakes there"},
     {0, NULL, NULL, "Reports"},
     CLI_REPORT_OPTIONS,
     CLI_COMPARE_OPTIONS,
-    {CLI_KEY_TOLERANCES, "tolerances", "FILE.json",
+    {CLI_TEXT(cli_compare_settings, options.tolerances), "tolerances", "FILE.json",
      "limits of all, instead of\nDIR/golden/OUTPUT.tolerance.json"},
     CLI_COMMON_OPTIONS,
 };
@@ -46,38 +44,13 @@ const cli_command cli_regress = {
     sizeof options / sizeof options[0],
     regress_main};
 
-static int take(void *settings, int key, const char *name, const char *value) {
-    regress_settings *s = settings;
-    switch (key) {
-    case KEY_UPDATE:
-        s->update = true;
-        return CLI_OK;
-    case KEY_ALL:
-        s->all = true;
-        return CLI_OK;
-    case KEY_ONLY:
-        s->only = value;
-        return CLI_OK;
-    case KEY_CACHE:
-        s->cache = value;
-        return CLI_OK;
-    case KEY_BAKES:
-        s->bakes = value;
-        return CLI_OK;
-    default:
-        return cli_compare_parse(&s->compare, key, name, value);
-    }
-}
-
 /* --- preparing */
 
 /* Hashes program and library: another version may bake other values. */
 static int hash_program(regress_work *work) {
     char program[VSH_DIGEST_TEXT], library[VSH_DIGEST_TEXT] = "";
     vsh_error error;
-    if (vsh_file_digest("/proc/self/exe", NULL, program, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
+    CLI_TRY(cli_check(vsh_file_digest("/proc/self/exe", NULL, program, &error), &error));
     Dl_info found;
     const char *(*const version)(void) = vsh_version;
     void *address;
@@ -85,19 +58,14 @@ static int hash_program(regress_work *work) {
     if (dladdr(address, &found) != 0 && found.dli_fname != NULL) {
         vsh_file_digest(found.dli_fname, NULL, library, &error); /* empty if there is no such file */
     }
-    return asprintf(&work->program, "%s %s %s", vsh_version(), program, library) >= 0
-               ? CLI_OK
-               : cli_out_of_memory("program");
+    snprintf(work->program, sizeof work->program, "%s %s %s", vsh_version(), program, library);
+    return CLI_OK;
 }
 
 static int prepare(regress_work *work) {
     const regress_settings *s = work->settings;
-    work->folder = strdup(s->folder);
     work->golden = regress_path(s->folder, "golden");
     work->cache = s->cache != NULL ? strdup(s->cache) : regress_path(s->folder, ".regress-cache.json");
-    if (work->folder == NULL || work->golden == NULL || work->cache == NULL) {
-        return cli_out_of_memory(s->folder);
-    }
     CLI_TRY(regress_find_cases(work));
     CLI_TRY(cli_compare_check_reports(&s->compare, (const char *const *)&work->cache, 1));
     CLI_TRY(s->cache == NULL ? cli_check_links(work->golden, work->cache) : CLI_OK);
@@ -142,9 +110,7 @@ static int compare_output(const regress_work *work, const regress_case *one, siz
     const char *name = one->outputs.line[output];
     char *golden = regress_path(work->golden, name), *fresh = regress_path(work->bakes, name);
     int code = CLI_OK;
-    if (golden == NULL || fresh == NULL) {
-        code = cli_out_of_memory(work->folder);
-    } else if (access(golden, F_OK) == 0) {
+    if (access(golden, F_OK) == 0) {
         code = cli_comparison_make(&work->settings->compare, golden, fresh, c);
     } else {
         snprintf(c->problem, sizeof c->problem, "no golden bake %.200s; 'vdbshade regress --update' makes it",
@@ -217,8 +183,8 @@ static void print_updated(const cli_comparison *c, const char *output) {
 }
 
 static const char *failure_of(const regress_case *one, char *text, size_t size) {
-    snprintf(text, size, "the bake ended with exit code %d%s%s", one->code, one->reason != NULL ? ": " : "",
-             one->reason != NULL ? one->reason : "");
+    snprintf(text, size, "the bake ended with exit code %d%s%s", one->code,
+             one->reason[0] != '\0' ? ": " : "", one->reason);
     return text;
 }
 
@@ -239,7 +205,7 @@ static void print_lines(const regress_work *work) {
             } else if (one->status != REGRESS_UNCHANGED && !one->comparisons[k].alike) {
                 char prefix[300];
                 snprintf(prefix, sizeof prefix, "  %.250s: ", one->outputs.line[k]);
-                cli_comparison_print(stdout, &one->comparisons[k], prefix);
+                cli_comparison_print(&one->comparisons[k], prefix);
             }
         }
     }
@@ -249,7 +215,7 @@ static bool is_compared(const regress_case *one) {
     return one->status != REGRESS_UNCHANGED && one->status != REGRESS_FAILED;
 }
 
-static int print_json(const regress_work *work) {
+static void print_json(const regress_work *work) {
     json_t *cases = json_array();
     for (size_t i = 0; i < work->case_count; ++i) {
         const regress_case *one = &work->cases[i];
@@ -260,32 +226,26 @@ static int print_json(const regress_work *work) {
         const bool failed = one->status == REGRESS_FAILED;
         json_array_append_new(
             cases, json_pack("{s:o,s:s,s:o,s:o,s:o,s:o}", "name", cli_utf8_json(one->name), "status",
-                             status_names[one->status], "changed",
-                             one->changed != NULL ? cli_utf8_json(one->changed) : json_null(), "exit_code",
+                             status_names[one->status], "changed", cli_utf8_json(one->changed), "exit_code",
                              failed ? json_integer(one->code) : json_null(), "reason",
-                             failed && one->reason != NULL ? cli_utf8_json(one->reason) : json_null(),
+                             failed && one->reason[0] != '\0' ? cli_utf8_json(one->reason) : json_null(),
                              "outputs", outputs));
     }
-    return cli_print_json(json_pack("{s:o}", "cases", cases), work->folder);
+    cli_print_json(json_pack("{s:o}", "cases", cases));
 }
 
 /* Writes JUnit and HTML, also for cases that were not baked. */
 static int write_files(const regress_work *work) {
-    const cli_compare_settings *s = &work->settings->compare;
     size_t count = 0, at = 0;
     for (size_t i = 0; i < work->case_count; ++i) {
         count += work->cases[i].outputs.count;
     }
-    cli_comparison *all = calloc(count + 1, sizeof *all);
-    bool good = all != NULL;
-    for (size_t i = 0; i < work->case_count && good; ++i) {
-        regress_case *one = &work->cases[i];
-        for (size_t k = 0; k < one->outputs.count && good; ++k) {
+    cli_comparison *all = calloc(count, sizeof *all);
+    for (size_t i = 0; i < work->case_count; ++i) {
+        const regress_case *one = &work->cases[i];
+        for (size_t k = 0; k < one->outputs.count; ++k) {
             cli_comparison *c = &one->comparisons[k];
-            if (asprintf(&c->name, "%s/%s", one->name, one->outputs.line[k]) < 0) {
-                c->name = NULL;
-                good = false;
-            }
+            c->name = regress_path(one->name, one->outputs.line[k]);
             c->alike = c->alike || one->status == REGRESS_UNCHANGED;
             if (one->status == REGRESS_FAILED && cli_comparison_problem(c, 0) == NULL) {
                 failure_of(one, c->problem, sizeof c->problem);
@@ -293,25 +253,14 @@ static int write_files(const regress_work *work) {
             all[at++] = *c;
         }
     }
-    const int code = good ? cli_comparison_report(s, all, at) : cli_out_of_memory(work->folder);
+    const int code = cli_comparison_report(&work->settings->compare, all, at);
     free(all);
     return code;
 }
 
-static int report(const regress_work *work) {
-    const cli_compare_settings *s = &work->settings->compare;
-    int code = CLI_OK;
-    if (s->json) {
-        code = print_json(work);
-    } else if (!cli_given.quiet) {
-        print_lines(work);
-    }
-    return code == CLI_OK && (s->junit != NULL || s->html != NULL) ? write_files(work) : code;
-}
-
 /* --- the command */
 
-static int verdict(const regress_work *work) {
+static int find_verdict(const regress_work *work) {
     int code = CLI_OK;
     for (size_t i = 0; i < work->case_count; ++i) {
         const regress_case *one = &work->cases[i];
@@ -324,31 +273,35 @@ static int verdict(const regress_work *work) {
     return code;
 }
 
-static int run(regress_work *work) {
+static int run_cases(regress_work *work) {
     CLI_TRY(prepare(work));
     regress_read_cache(work);
     CLI_TRY(regress_make_folder(work));
     CLI_TRY(bake_all(work));
     CLI_TRY(compare_all(work));
     CLI_TRY(regress_write_cache(work));
-    CLI_TRY(report(work));
-    return verdict(work);
+    const cli_compare_settings *s = &work->settings->compare;
+    if (s->json) {
+        print_json(work);
+    } else if (!cli_given.quiet) {
+        print_lines(work);
+    }
+    CLI_TRY(write_files(work));
+    return find_verdict(work);
 }
 
 static int regress_main(int argc, char **argv) {
     regress_settings s = {.compare = cli_compare_settings_default()};
-    CLI_TRY(cli_parse(&cli_regress, argc, argv, take, &s, &s.folder));
+    CLI_TRY(cli_parse(&cli_regress, argc, argv, cli_compare_parse, &s, &s.folder));
     regress_work work = {.settings = &s, .run = cli_make_run()};
-    const int code = run(&work);
+    const int code = run_cases(&work);
     regress_remove_folder(&work);
     for (size_t i = 0; i < work.case_count; ++i) {
         regress_free_case(&work.cases[i]);
     }
     free(work.cases);
-    free(work.program);
     free(work.bakes);
     free(work.cache);
     free(work.golden);
-    free(work.folder);
     return code;
 }

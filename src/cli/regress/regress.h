@@ -4,14 +4,15 @@
 
 #include "cli/compare/comparison.h"
 
+#include <vdbshade/provenance.h>
+
 /* Lines of text that grow. */
 typedef struct regress_lines {
     char **line; /* [count], and NULL after the last */
     size_t count;
 } regress_lines;
 
-/* Adds a line. This and the other functions with an int return CLI_OK, or an exit code after printing why. */
-int regress_add_line(regress_lines *lines, const char *format, ...) __attribute__((format(printf, 2, 3)));
+void regress_add_line(regress_lines *lines, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void regress_free_lines(regress_lines *lines);
 
 enum { REGRESS_UNCHANGED, REGRESS_ALIKE, REGRESS_UNLIKE, REGRESS_FAILED, REGRESS_UPDATED };
@@ -29,12 +30,12 @@ typedef struct regress_case {
     char *changed;               /* the input that changed; NULL: unknown */
     int status;                  /* REGRESS_… */
     int code;                    /* exit code of a failed bake */
-    char *reason;                /* its last error; NULL: unknown */
+    char *reason;                /* its last error; "": unknown */
     cli_comparison *comparisons; /* [outputs.count]; zeroed if there is none */
 } regress_case;
 
 typedef struct regress_settings {
-    cli_compare_settings compare;
+    cli_compare_settings compare; /* the first member: cli_compare_parse() takes a pointer to it */
     const char *folder, *cache, *bakes, *only;
     bool update, all;
 } regress_settings;
@@ -42,20 +43,23 @@ typedef struct regress_settings {
 typedef struct regress_work {
     const regress_settings *settings;
     vsh_run run;
-    char *folder, *golden; /* `golden` is the folder of golden bakes */
-    char *cache;           /* file */
-    char *bakes;           /* folder of the new bakes, absolute */
-    int folder_of_bakes;   /* descriptor + 1 of that folder if it is temporary */
-    char *program;         /* hashes of the program and the library */
+    char *golden;                           /* folder of golden bakes */
+    char *cache;                            /* file */
+    char *bakes;                            /* folder of the new bakes, absolute */
+    int folder_of_bakes;                    /* descriptor + 1 of that folder if it is temporary */
+    char program[64 + 2 * VSH_DIGEST_TEXT]; /* its version, its hash, and that of the library */
     regress_case *cases;
     size_t case_count;
 } regress_work;
 
-/* Returns "FOLDER/NAME", to be freed; NULL if memory is short. */
+/* Returns "FOLDER/NAME", to be freed. */
 char *regress_path(const char *folder, const char *name);
 
-/* Reads a JSON file that strangers may have made; NULL if that fails. */
-json_t *regress_load(const char *path);
+/* Reads a JSON file that strangers may have made, of up to `most` bytes; NULL if that fails. */
+enum { REGRESS_MOST_BYTES = 4 << 20 }; /* parsed JSON takes a hundred times as much */
+json_t *regress_load(const char *path, uint64_t most);
+
+/* The functions below that return an int return CLI_OK, or an exit code after printing why. */
 
 /* Finds the cases of a folder: those of its regress.json, then its other scenes by name. */
 int regress_find_cases(regress_work *work);

@@ -1,6 +1,6 @@
 /* The page: error against time as a plot and as tables, with nothing beside it; and the CSV. */
-#include "cli/document.h"
 #include "cli/message.h"
+#include "cli/temporary.h"
 #include "trade.h"
 
 #include <inttypes.h>
@@ -301,7 +301,7 @@ static void write_receivers(FILE *out, const trade_work *work) {
     for (size_t r = 0; r < work->receiver_count; ++r) {
         const trade_receiver *receiver = &work->receivers[r];
         fputs(r > 0 ? "; " : "", out);
-        cli_document_escape(out, work->scene->receivers[r].path);
+        cli_escape(out, work->scene->receivers[r].path);
         fprintf(out, ", %d × %d", receiver->info.width, receiver->info.height);
     }
     if (work->settings->receiver >= 0) {
@@ -320,7 +320,7 @@ static void write_receivers(FILE *out, const trade_work *work) {
 
 static void write_conditions(FILE *out, const trade_work *work) {
     fputs("<dl><dt>Input</dt><dd><code>", out);
-    cli_document_escape(out, work->settings->bake.input);
+    cli_escape(out, work->settings->bake.input);
     fputs("</code></dd>\n", out);
     write_receivers(out, work);
     fprintf(
@@ -348,11 +348,10 @@ static void write_conditions(FILE *out, const trade_work *work) {
     fprintf(out, "<dt>Made by</dt><dd>vdbshade %s</dd></dl>\n", vsh_version());
 }
 
-static void compose_page(FILE *out, const void *user) {
-    const trade_work *work = user;
+static void compose_page(FILE *out, const trade_work *work) {
     fputs(head, out);
     fputs("<title>Speed against accuracy: ", out);
-    cli_document_escape(out, work->settings->bake.input);
+    cli_escape(out, work->settings->bake.input);
     fputs("</title>\n<h1>Speed against accuracy</h1>\n", out);
     write_conditions(out, work);
     for (size_t s = 0; s < work->subject_count; ++s) {
@@ -370,13 +369,15 @@ static void compose_page(FILE *out, const void *user) {
 }
 
 int trade_write_page(const trade_work *work) {
-    return cli_document_write(work->settings->page, compose_page, work);
+    cli_temporary page;
+    CLI_TRY(cli_temporary_begin(&page, work->settings->page));
+    compose_page(page.file, work);
+    return cli_temporary_commit(&page);
 }
 
 /* --- the CSV, with every digit; bench/README.md explains the columns */
 
-static void compose_csv(FILE *out, const void *user) {
-    const trade_work *work = user;
+static void compose_csv(FILE *out, const trade_work *work) {
     fputs("subject,method,options,resolution,build_s,bake_s,us_per_value,bytes,covered,invalid,left_out,"
           "texels,rmse,penumbra_rmse,bias,p95,p99,max,width_error,front,valid_rmse\n",
           out);
@@ -398,5 +399,11 @@ static void compose_csv(FILE *out, const void *user) {
 }
 
 int trade_write_csv(const trade_work *work) {
-    return work->settings->csv != NULL ? cli_document_write(work->settings->csv, compose_csv, work) : CLI_OK;
+    if (work->settings->csv == NULL) {
+        return CLI_OK;
+    }
+    cli_temporary csv;
+    CLI_TRY(cli_temporary_begin(&csv, work->settings->csv));
+    compose_csv(csv.file, work);
+    return cli_temporary_commit(&csv);
 }
