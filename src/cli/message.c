@@ -126,12 +126,6 @@ int cli_begin_writing(void) {
     return cli_progress_report(NULL, "write", 0.0) == 0 ? CLI_OK : cli_fail(&cancelled);
 }
 
-int cli_out_of_memory(const char *what) {
-    cli_warnings_tell();
-    cli_say("%s: the system refused memory", what);
-    return CLI_LIMIT;
-}
-
 /* --- text for terminals */
 
 static bool is_control(unsigned char before, unsigned char c) {

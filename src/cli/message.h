@@ -44,10 +44,6 @@ void cli_message_input(const char *path);
 /* Shows that the output is being written. CLI_OK, or CLI_INTERRUPTED after saying so. */
 int cli_begin_writing(void);
 
-/* Says that there is no memory for `what` and returns CLI_LIMIT. The program's own malloc() and the like end
- * it where memory is refused (base/guarded_malloc.c): nothing checks what they return. */
-int cli_out_of_memory(const char *what);
-
 /* Text for terminals: names come from files, and terminals obey control characters. Those but newlines become
  * '?': those of ASCII, and those that UTF-8 has of its own. */
 void cli_plain(char *text, size_t size);

@@ -16,11 +16,9 @@ static int copy(cli_points_reader *reader, int32_t format, bool answers_only, co
     const bool keep = !answers_only && format == reader->table.format && cli_points_can_keep(reader);
     float values[2 * ROWS] = {1.0f, 0.5f, 1e-30f};
     const cli_points_column columns[] = {{"shadow.fuzz", values, 2}, {"fuzz", values + 1, 2}};
-    cli_points points = {0};
+    cli_points points = cli_points_create(ROWS, reader->has_normals, keep);
     cli_points_writer writer = {0};
-    int code = cli_points_create(ROWS, reader->has_normals, keep, &points);
-    code =
-        code == CLI_OK ? cli_points_writer_open(to, format, answers_only, reader, columns, 2, &writer) : code;
+    int code = cli_points_writer_open(to, format, answers_only, reader, columns, 2, &writer);
     while (code == CLI_OK) {
         code = cli_points_read(reader, MOST_KEPT, &points);
         if (code != CLI_OK || points.count == 0) {
@@ -37,9 +35,8 @@ static int copy(cli_points_reader *reader, int32_t format, bool answers_only, co
 static void read_back(const char *path, int32_t format, const cli_points_reader *written) {
     fuzz_run(); /* the time begins anew */
     cli_points_reader reader;
-    cli_points points = {0};
     int code = cli_points_open(path, format, -1, false, &reader);
-    code = code == CLI_OK ? cli_points_create(ROWS, reader.has_normals, false, &points) : code;
+    cli_points points = cli_points_create(ROWS, reader.has_normals, false);
     while (code == CLI_OK) {
         code = cli_points_read(&reader, MOST_KEPT, &points);
         if (points.count == 0) {

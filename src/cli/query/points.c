@@ -14,9 +14,10 @@
 #include <sys/stat.h>
 #include <vdbshade/scene.h>
 
-enum { NX = 3 }; /* columns before the normal */
-
-enum { SAID = 5 }; /* bad rows that get a message each */
+enum {
+    NX = 3,  /* columns before the normal */
+    SAID = 5 /* bad rows that get a message each */
+};
 
 int cli_points_parse_format(const char *option, const char *text, int32_t *format) {
     static const char *const names[] = {"csv", "ply", "raw"};
@@ -42,18 +43,12 @@ size_t cli_points_bytes(bool normals, bool keep) {
            (keep ? sizeof(size_t) : 0);
 }
 
-int cli_points_create(size_t room, bool normals, bool keep, cli_points *points) {
-    *points = (cli_points){.room = room};
-    points->positions = malloc(room * 3 * sizeof *points->positions);
-    points->normals = normals ? malloc(room * 3 * sizeof *points->normals) : NULL;
-    points->texels = malloc(room * sizeof *points->texels);
-    points->kept_end = keep ? malloc(room * sizeof *points->kept_end) : NULL;
-    if (points->positions == NULL || points->texels == NULL || (normals && points->normals == NULL) ||
-        (keep && points->kept_end == NULL)) {
-        cli_points_free(points);
-        return cli_out_of_memory("points");
-    }
-    return CLI_OK;
+cli_points cli_points_create(size_t room, bool normals, bool keep) {
+    return (cli_points){.room = room,
+                        .positions = malloc(room * sizeof(double[3])),
+                        .normals = normals ? malloc(room * sizeof(float[3])) : NULL,
+                        .texels = malloc(room * sizeof(uint32_t)),
+                        .kept_end = keep ? malloc(room * sizeof(size_t)) : NULL};
 }
 
 void cli_points_free(cli_points *points) {
@@ -65,28 +60,13 @@ void cli_points_free(cli_points *points) {
     *points = (cli_points){0};
 }
 
-static int keep_row(cli_points *points, const char *raw, size_t size) {
+static void keep_bytes(cli_points *points, const char *bytes, size_t size) {
     if (points->kept_size + size > points->kept_room) {
-        const size_t room = 2 * (points->kept_size + size) + 4096;
-        char *more = realloc(points->kept, room);
-        if (more == NULL) {
-            return cli_out_of_memory("points");
-        }
-        points->kept = more;
-        points->kept_room = room;
+        points->kept_room = 2 * (points->kept_size + size) + 4096;
+        points->kept = realloc(points->kept, points->kept_room);
     }
-    memcpy(points->kept + points->kept_size, raw, size);
+    memcpy(points->kept + points->kept_size, bytes, size);
     points->kept_size += size;
-    return CLI_OK;
-}
-
-/* Adds the fields that a bad row lacks, so that answers stay in their columns. */
-static int keep_fillers(cli_points *points, char delimiter, int missing) {
-    const char filler[] = {delimiter, 'n', 'a', 'n'};
-    for (; missing > 0; --missing) {
-        CLI_TRY(keep_row(points, filler, delimiter == ' ' ? sizeof filler : 1));
-    }
-    return CLI_OK;
 }
 
 /* Sets row->bad if its values cannot be used. */
@@ -112,7 +92,7 @@ static void check_row(const cli_points_reader *reader, vshi_table_row *row) {
 }
 
 /* Adds the row to the points. */
-static int add_row(const cli_points_reader *reader, const vshi_table_row *row, cli_points *points) {
+static void add_row(const cli_points_reader *reader, const vshi_table_row *row, cli_points *points) {
     const size_t i = points->count;
     memcpy(points->positions + 3 * i, row->value, 3 * sizeof *row->value);
     for (size_t axis = 0; points->normals != NULL && axis < 3; ++axis) {
@@ -120,23 +100,24 @@ static int add_row(const cli_points_reader *reader, const vshi_table_row *row, c
     }
     points->texels[i] = (uint32_t)(reader->table.rows - 1);
     if (points->kept_end != NULL) {
-        CLI_TRY(keep_row(points, row->bytes, row->size));
-        CLI_TRY(keep_fillers(points, reader->table.delimiter, row->missing));
+        keep_bytes(points, row->bytes, row->size);
+        const char filler[] = {reader->table.delimiter, 'n', 'a', 'n'};
+        for (int k = 0; k < row->missing; ++k) { /* so that answers stay in their columns */
+            keep_bytes(points, filler, filler[0] == ' ' ? sizeof filler : 1);
+        }
         points->kept_end[i] = points->kept_size;
     }
     ++points->count;
-    return CLI_OK;
 }
 
 /* --- normals of faces */
 
 /* Makes each vertex's normal: the sum of its triangles' normals, weighted by area. */
-static bool make_normals(const vsh_mesh *mesh, cli_points_reader *reader) {
+static void make_normals(const vsh_mesh *mesh, cli_points_reader *reader) {
     const size_t count = mesh->vertex_count;
     float *positions = malloc(count * 3 * sizeof *positions), *normals = malloc(count * 3 * sizeof *normals);
     double *sums = calloc(count, 3 * sizeof *sums);
-    const bool good = positions != NULL && normals != NULL && sums != NULL;
-    for (size_t t = 0; good && t < mesh->triangle_count; ++t) {
+    for (size_t t = 0; t < mesh->triangle_count; ++t) {
         const size_t corner[] = {mesh->indices[3 * t], mesh->indices[3 * t + 1], mesh->indices[3 * t + 2]};
         const float *p = mesh->positions + 3 * corner[0];
         double a[3], b[3];
@@ -149,7 +130,7 @@ static bool make_normals(const vsh_mesh *mesh, cli_points_reader *reader) {
             sums[3 * corner[i / 3] + k] += a[x] * b[y] - a[y] * b[x];
         }
     }
-    for (size_t v = 0; good && v < count; ++v) {
+    for (size_t v = 0; v < count; ++v) {
         const double *s = sums + 3 * v, length = sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
         for (size_t k = 0; k < 3; ++k) {
             normals[3 * v + k] = length > 0.0 ? (float)(s[k] / length) : 0.0f;
@@ -160,7 +141,7 @@ static bool make_normals(const vsh_mesh *mesh, cli_points_reader *reader) {
     reader->face_positions = positions;
     reader->face_normals = normals;
     reader->face_vertices = count;
-    return good;
+    reader->has_normals = true;
 }
 
 static bool has_faces(const vshi_ply_header *ply) {
@@ -188,11 +169,8 @@ void cli_points_take_faces(const char *path, const vsh_run *run, cli_points_read
         return;
     }
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
-    reader->has_normals = make_normals(&mesh, reader);
+    make_normals(&mesh, reader);
     vsh_model_free(model);
-    if (!reader->has_normals) {
-        snprintf(error->message, sizeof error->message, "the system refused memory");
-    }
 }
 
 /* Gives the row the normal of the next vertex of a face, if that lies there. */
@@ -248,9 +226,7 @@ int cli_points_read(cli_points_reader *reader, size_t most_kept, cli_points *poi
     while (points->count < points->room && points->kept_size <= most_kept) {
         vshi_table_row row;
         vsh_error error;
-        if (vshi_table_next(&reader->table, &row, &error) != VSH_OK) {
-            return cli_fail(&error);
-        }
+        CLI_TRY(cli_check(vshi_table_next(&reader->table, &row, &error), &error));
         if (row.bytes == NULL) {
             break;
         }
@@ -266,7 +242,7 @@ int cli_points_read(cli_points_reader *reader, size_t most_kept, cli_points *poi
         if (row.bad[0] != '\0' && reader->strict) {
             return CLI_USAGE;
         }
-        CLI_TRY(add_row(reader, &row, points));
+        add_row(reader, &row, points);
     }
     return CLI_OK;
 }
@@ -383,6 +359,7 @@ int cli_points_writer_open(const char *path, int32_t format, bool answers_only,
                              .format = format,
                              .answers_only = answers_only,
                              .keep = !answers_only && same && cli_points_can_keep(reader),
+                             .counted = format == VSHI_TABLE_PLY && !same,
                              .big_endian = same && reader->table.ply.big_endian,
                              .text = format == VSHI_TABLE_CSV ||
                                      (format == VSHI_TABLE_PLY && same && reader->table.ply.ascii),
@@ -396,44 +373,30 @@ int cli_points_writer_open(const char *path, int32_t format, bool answers_only,
         w->delimiter = reader->table.delimiter;
     }
     CLI_TRY(check_names(w, reader));
-    const bool counted = format == VSHI_TABLE_PLY && reader->table.format != VSHI_TABLE_PLY;
     if (!standard) {
         CLI_TRY(cli_temporary_begin(&w->temporary, path));
         w->file = w->temporary.file;
-    } else if (counted) {
-        w->file = w->spool = tmpfile();
+    } else if (w->counted) {
+        w->spool = tmpfile();
         if (w->spool == NULL) {
             return fail(w);
         }
+        w->file = w->spool;
     }
     w->row = malloc((6 + column_count) * (VSHI_DECIMAL_ROOM + 1) + 1);
-    if (w->row == NULL) {
-        return cli_out_of_memory(w->name);
-    }
     if (format == VSHI_TABLE_CSV) {
         write_csv_head(w, reader);
     } else if (format == VSHI_TABLE_PLY && w->keep) {
         write_kept_ply_head(w, reader);
     } else if (format == VSHI_TABLE_PLY) {
-        w->counted = counted;
-        if (w->spool == NULL) {
-            write_ply_head(w, counted ? 0 : reader->table.ply.element[reader->table.vertex].count);
-        }
+        write_ply_head(w, w->counted ? 0 : reader->table.ply.element[reader->table.vertex].count);
     }
     return ferror(w->file) ? fail(w) : CLI_OK;
 }
 
 /* --- rows */
 
-static char *put_binary(const cli_points_writer *w, char *at, const void *value, size_t size) {
-    uint64_t bits = 0;
-    uint32_t low;
-    if (size == sizeof low) {
-        memcpy(&low, value, sizeof low);
-        bits = low;
-    } else {
-        memcpy(&bits, value, sizeof bits);
-    }
+static char *put_bits(const cli_points_writer *w, char *at, uint64_t bits, size_t size) {
     for (size_t i = 0; i < size; ++i) {
         at[i] = (char)(bits >> 8 * (w->big_endian ? size - 1 - i : i));
     }
@@ -441,24 +404,21 @@ static char *put_binary(const cli_points_writer *w, char *at, const void *value,
 }
 
 /* Text has all digits of a double even for a float's position, so that readers get the same point. */
-static char *put_position(const cli_points_writer *w, char *at, double value) {
+static char *put_value(const cli_points_writer *w, char *at, double value, bool position) {
     const float single = (float)value;
     if (w->text) {
-        at = vshi_decimal_write_double(at, value);
+        at = position ? vshi_decimal_write_double(at, value) : vshi_decimal_write_float(at, single);
         *at++ = w->delimiter;
         return at;
     }
-    return w->floats || w->format == VSHI_TABLE_RAW ? put_binary(w, at, &single, sizeof single)
-                                                    : put_binary(w, at, &value, sizeof value);
-}
-
-static char *put_float(const cli_points_writer *w, char *at, float value) {
-    if (w->text) {
-        at = vshi_decimal_write_float(at, value);
-        *at++ = w->delimiter;
-        return at;
+    if (position && !w->floats && w->format != VSHI_TABLE_RAW) {
+        uint64_t bits;
+        memcpy(&bits, &value, sizeof bits);
+        return put_bits(w, at, bits, sizeof bits);
     }
-    return put_binary(w, at, &value, sizeof value);
+    uint32_t bits;
+    memcpy(&bits, &single, sizeof bits);
+    return put_bits(w, at, bits, sizeof bits);
 }
 
 static bool write_row(const cli_points_writer *w, const cli_points *points, size_t i) {
@@ -473,14 +433,14 @@ static bool write_row(const cli_points_writer *w, const cli_points *points, size
         }
     } else if (!w->answers_only) {
         for (size_t k = 0; k < 3; ++k) {
-            at = put_position(w, at, points->positions[3 * i + k]);
+            at = put_value(w, at, points->positions[3 * i + k], true);
         }
         for (size_t k = 0; w->normals && k < 3; ++k) {
-            at = put_float(w, at, points->normals[3 * i + k]);
+            at = put_value(w, at, points->normals[3 * i + k], false);
         }
     }
     for (size_t c = 0; c < w->column_count; ++c) {
-        at = put_float(w, at, w->columns[c].values[i * w->columns[c].stride]);
+        at = put_value(w, at, w->columns[c].values[i * w->columns[c].stride], false);
     }
     if (w->text) {
         at[-1] = '\n';
@@ -502,36 +462,30 @@ int cli_points_writer_flush(cli_points_writer *w) {
     return fflush(w->file) == 0 ? CLI_OK : fail(w);
 }
 
-/* Writes the head, then the spool. */
-static int write_spool(cli_points_writer *w) {
-    FILE *spool = w->spool;
-    if (fflush(spool) != 0 || fseek(spool, 0, SEEK_SET) != 0) {
-        return fail(w);
-    }
-    w->file = stdout;
-    write_ply_head(w, w->rows);
+/* Copies the spool to standard output. */
+static int copy_spool(const cli_points_writer *w) {
+    rewind(w->spool);
     char bytes[1 << 14];
     size_t got;
-    while ((got = fread(bytes, 1, sizeof bytes, spool)) > 0) {
+    while ((got = fread(bytes, 1, sizeof bytes, w->spool)) > 0) {
         if (fwrite(bytes, 1, got, stdout) != got) {
             return fail(w);
         }
     }
-    return ferror(spool) ? fail(w) : CLI_OK;
+    return ferror(w->spool) ? fail(w) : CLI_OK;
 }
 
 int cli_points_writer_commit(cli_points_writer *w, cli_points_reader *reader) {
     vsh_error error;
-    if (vshi_table_rest(&reader->table, w->keep ? w->file : NULL, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
-    if (w->spool != NULL) {
-        CLI_TRY(write_spool(w));
-    } else if (w->counted) {
+    CLI_TRY(cli_check(vshi_table_rest(&reader->table, w->keep ? w->file : NULL, &error), &error));
+    if (w->counted) {
         if (fseek(w->file, 0, SEEK_SET) != 0) {
             return fail(w);
         }
         write_ply_head(w, w->rows);
+    }
+    if (w->spool != NULL) {
+        CLI_TRY(fflush(w->spool) == 0 ? copy_spool(w) : fail(w));
     }
     if (w->temporary.file != NULL) {
         return cli_temporary_commit(&w->temporary);

@@ -26,7 +26,7 @@ typedef struct cli_points {
 
 /* Bytes that a row takes in cli_points, but for the bytes that are kept. */
 size_t cli_points_bytes(bool normals, bool keep);
-int cli_points_create(size_t room, bool normals, bool keep, cli_points *points);
+cli_points cli_points_create(size_t room, bool normals, bool keep);
 void cli_points_free(cli_points *points);
 
 typedef struct cli_points_reader {
@@ -72,8 +72,8 @@ typedef struct cli_points_writer {
     char delimiter;
     const cli_points_column *columns;
     size_t column_count;
-    FILE *file;  /* the rows are written to it */
-    FILE *spool; /* holds rows for standard output if the head needs their number; else NULL */
+    FILE *file;  /* head and rows are written to it */
+    FILE *spool; /* holds them for standard output if the head needs the rows' number; else NULL */
     cli_temporary temporary;
     uint64_t rows;
     bool counted; /* the head is written again with the number of rows */

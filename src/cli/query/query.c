@@ -38,47 +38,37 @@ typedef struct query_answers {
     size_t column_count;
 } query_answers;
 
-enum {
-    KEY_POINTS = 0x2000,
-    KEY_POINTS_FORMAT,
-    KEY_FORMAT,
-    KEY_NORMALS,
-    KEY_ANSWERS_ONLY,
-    KEY_STRICT,
-    KEY_BATCH,
-    KEY_DISTANCE,
-    KEY_GRADIENT,
-    KEY_WITHIN
-};
+enum { KEY_POINTS_FORMAT = 0x2000, KEY_FORMAT, KEY_NORMALS, KEY_BATCH };
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Points and output"},
-    {KEY_POINTS, "points", "FILE",
+    {CLI_TEXT(query_settings, points), "points", "FILE",
      "points: .csv .tsv .txt .xyz, .ply, or .raw .f32 .bin of\nfloats (32 bits, little endian); - is "
      "standard input"},
     {KEY_POINTS_FORMAT, "points-format", "csv|ply|raw", "what they are, whatever the ending"},
-    {'o', "output", "OUT", "file to write, by the same endings; - is standard output"},
+    {CLI_TEXT(query_settings, bake.output), "output", "OUT",
+     "file to write, by the same endings; - is standard output"},
     {KEY_FORMAT, "format", "csv|ply|raw", "what it is, whatever the ending (for -, as the points)"},
     {KEY_NORMALS, "normals", "yes|no",
      "whether normals are read (csv and ply: if there are any,\na PLY mesh has those of its faces; raw: no, "
      "rows "
      "of 3\nfloats; yes: of 6)"},
-    {KEY_ANSWERS_ONLY, "answers-only", NULL,
+    {CLI_FLAG(query_settings, answers_only), "answers-only", NULL,
      "write answers alone; else behind each row as it came,\nor (formats differ) behind x y z nx ny nz"},
-    {KEY_STRICT, "strict", NULL, "end at the first bad row, with code 2"},
+    {CLI_FLAG(query_settings, strict), "strict", NULL, "end at the first bad row, with code 2"},
     {KEY_BATCH, "batch", "N",
      "rows answered and written at a time, 1 to 1048576\n(1048576, or as many as --memory-limit allows)"},
     CLI_STATS_OPTION(query_settings, bake.stats),
     {0, NULL, NULL, "What is answered"},
     CLI_LIGHT_OPTIONS,
-    {KEY_DISTANCE, "distance", NULL,
+    {CLI_FLAG(query_settings, distance), "distance", NULL,
      "also distance: to the nearest surface, scene units,\nnegative inside; far away a lower bound"},
-    {KEY_GRADIENT, "gradient", NULL,
+    {CLI_FLAG(query_settings, gradient), "gradient", NULL,
      "also gradient.x, .y, .z: unit, the way that distance\ngrows; next to a surface its normal"},
     CLI_ACCURACY_OPTIONS,
     CLI_CASTER_OPTIONS,
     CLI_GRID_OPTIONS,
-    {KEY_WITHIN, "within", "DISTANCE",
+    {CLI_POSITIVE(query_settings, within), "within", "DISTANCE",
      "how far from the casters' box points may be for wide\nlights to be right there (four times its "
      "diagonal)"},
     CLI_COMMON_OPTIONS,
@@ -102,12 +92,6 @@ const cli_command cli_query = {
 static int parse_option(void *settings, int key, const char *name, const char *value) {
     query_settings *s = settings;
     switch (key) {
-    case 'o':
-        s->bake.output = value;
-        return CLI_OK;
-    case KEY_POINTS:
-        s->points = value;
-        return CLI_OK;
     case KEY_POINTS_FORMAT:
         return cli_points_parse_format(name, value, &s->points_format);
     case KEY_FORMAT:
@@ -117,22 +101,8 @@ static int parse_option(void *settings, int key, const char *name, const char *v
         return s->normals == 1 || strcmp(value, "no") == 0
                    ? CLI_OK
                    : cli_usage("%s '%s': expected yes or no", name, value);
-    case KEY_ANSWERS_ONLY:
-        s->answers_only = true;
-        return CLI_OK;
-    case KEY_STRICT:
-        s->strict = true;
-        return CLI_OK;
     case KEY_BATCH:
         return cli_parse_integer(name, value, 1, VSH_QUERY_BATCH, &s->batch);
-    case KEY_DISTANCE:
-        s->distance = true;
-        return CLI_OK;
-    case KEY_GRADIENT:
-        s->gradient = true;
-        return CLI_OK;
-    case KEY_WITHIN:
-        return cli_parse_positive(name, value, &s->within);
     default:
         return cli_shared_parse(&s->bake, key, name, value);
     }
@@ -234,15 +204,12 @@ static float *add_column(query_answers *a, float **next, size_t room, const char
     return values;
 }
 
-static int create_answers(query_answers *a, size_t room) {
+static void create_answers(query_answers *a, size_t room) {
     const size_t floats = count_floats(a);
     a->memory = malloc(room * floats * sizeof *a->memory);
     a->columns = calloc(floats, sizeof *a->columns);
     a->visibility = calloc(a->lights + 1, sizeof *a->visibility);
     a->deviation = calloc(a->lights + 1, sizeof *a->deviation);
-    if (a->memory == NULL || a->columns == NULL || a->visibility == NULL || a->deviation == NULL) {
-        return cli_out_of_memory("points");
-    }
     float *next = a->memory;
     a->output = vsh_query_output_default();
     a->output.visibility = a->visibility;
@@ -257,14 +224,6 @@ static int create_answers(query_answers *a, size_t room) {
     a->output.ao_deviation = a->ao && a->ao_error ? add_column(a, &next, room, "error.", "ao", 1) : NULL;
     a->output.distance = a->distance ? add_column(a, &next, room, "distance", "", 1) : NULL;
     a->output.gradient = a->gradient ? add_column(a, &next, room, "gradient", "", 3) : NULL;
-    return CLI_OK;
-}
-
-static void free_answers(query_answers *a) {
-    free(a->memory);
-    free(a->columns);
-    free(a->visibility);
-    free(a->deviation);
 }
 
 /* Chooses the rows of a batch, and the most of their own bytes that it holds. */
@@ -273,9 +232,9 @@ static int plan_batch(const query_work *work, bool keep, size_t *rows, size_t *m
     const uint64_t limit = cli_given.memory_limit;
     const uint64_t held = work->stats.casters.field_bytes + work->stats.casters.triangles_bytes +
                           work->reader.face_vertices * (uint64_t)sizeof(float[6]);
-    const size_t row_size = work->reader.table.row_size;   /* 0: text */
-    size_t own = row_size > 0 ? 2 * row_size : TEXT_BYTES; /* twice: room grows by doubling */
-    own = keep ? own : 0;
+    const size_t row_size = work->reader.table.row_size; /* 0: text */
+    /* twice, because room grows by doubling */
+    const size_t own = !keep ? 0 : row_size > 0 ? 2 * row_size : TEXT_BYTES;
     const size_t each = cli_points_bytes(work->reader.has_normals, keep) + ORDER_BYTES + own +
                         count_floats(&work->answers) * sizeof(float);
     const size_t least = asked > 0 && asked < LEAST_ROWS ? (size_t)asked : LEAST_ROWS;
@@ -351,8 +310,8 @@ static int answer_points(query_work *work) {
     const bool keep = !s->answers_only && s->format == s->points_format && cli_points_can_keep(reader);
     int code = CLI_OK;
     CLI_TRY_DONE(plan_batch(work, keep, &rows, &most_kept));
-    CLI_TRY_DONE(cli_points_create(rows, reader->has_normals, keep, &points));
-    CLI_TRY_DONE(create_answers(&work->answers, rows));
+    points = cli_points_create(rows, reader->has_normals, keep);
+    create_answers(&work->answers, rows);
     CLI_TRY_DONE(cli_points_writer_open(s->bake.output, s->format, s->answers_only, reader,
                                         work->answers.columns, work->answers.column_count, &writer));
     CLI_TRY_DONE(answer_rows(work, most_kept, &points, &writer));
@@ -394,19 +353,14 @@ static int choose_answers(query_work *work, const char *why) {
     return CLI_OK;
 }
 
-static int load(query_work *work) {
+static int make_query(query_work *work) {
     const double start = vshi_seconds();
     vsh_error error;
-    const vsh_result result = vsh_assets_load(work->scene, &work->run, &work->assets, &error);
+    CLI_TRY(cli_check_result(vsh_assets_load(work->scene, &work->run, &work->assets, &error), &error));
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
-    return cli_check_result(result, &error);
-}
-
-static int make_query(query_work *work) {
     vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
     what.within = work->settings->within;
     what.voxels = work->settings->distance || work->settings->gradient;
-    vsh_error error;
     CLI_TRY(cli_check_result(
         vsh_scene_occluders(work->scene, work->assets, &what, &work->run, &work->occluders, &error), &error));
     vsh_occluders_info casters;
@@ -449,13 +403,15 @@ static int run_query(const query_settings *s, vsh_scene *scene) {
         cli_points_take_faces(s->points, &work.run, &work.reader, &why);
     }
     CLI_TRY_DONE(choose_answers(&work, why.message));
-    CLI_TRY_DONE(load(&work));
     CLI_TRY_DONE(make_query(&work));
     CLI_TRY_DONE(answer_points(&work));
     CLI_TRY_DONE(cli_stats_finish(&work.stats, &work.run, s->bake.stats));
     say_results(&work);
 done:
-    free_answers(&work.answers);
+    free(work.answers.memory);
+    free(work.answers.columns);
+    free(work.answers.visibility);
+    free(work.answers.deviation);
     vsh_query_free(work.query);
     vsh_occluders_free(work.occluders);
     vsh_assets_free(work.assets);
@@ -464,9 +420,7 @@ done:
 }
 
 static int query_main(int argc, char **argv) {
-    query_settings s;
-    memset(&s, 0, sizeof s);
-    s.format = s.points_format = s.normals = -1;
+    query_settings s = {.format = -1, .points_format = -1, .normals = -1};
     CLI_TRY(cli_parse(&cli_query, argc, argv, parse_option, &s, &s.bake.input));
     CLI_TRY(cli_patch_check(&s.bake.patch));
     CLI_TRY(find_formats(&s));
