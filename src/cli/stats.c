@@ -23,7 +23,7 @@ double cli_stats_stage(cli_stats *stats, int stage, double since) {
     return now;
 }
 
-/* Of the field, for each active voxel of the level set. */
+/* Returns the field's bytes for each active voxel of the level set. */
 static double bytes_per_voxel(const cli_stats *stats) {
     return (double)stats->casters.field_bytes / fmax(1.0, (double)stats->casters.active_voxels);
 }
@@ -37,10 +37,6 @@ static const struct {
     [CLI_STATS_AO] = {"ao", "AO", "--ao-method"},
     [CLI_STATS_SKY] = {"sky", "sky", "--ao-method"},
 };
-
-static json_t *number_or_null(double value) {
-    return isnan(value) ? json_null() : json_real(value);
-}
 
 static cli_method method_of(const char *name, uint32_t traits) {
     return (cli_method){name, (traits & VSH_METHOD_KEEPS_ERROR) != 0, (traits & VSH_METHOD_TRIANGLES) != 0};
@@ -71,13 +67,14 @@ void cli_stats_methods(cli_stats *stats, const vsh_scene *scene, int32_t has_tri
     }
 }
 
-/* Of a channel, by its place among the errors. */
+/* Returns the kind of a channel by its place among the errors. */
 static int kind_of(const cli_stats *stats, size_t channel) {
     return channel < stats->light_count ? CLI_STATS_SHADOW
                                         : CLI_STATS_AO + (int)(channel - stats->light_count);
 }
 
-vsh_bake_error cli_stats_error(const cli_stats *stats, int kind) {
+/* Sums the errors of a kind's values over all lights. */
+static vsh_bake_error sum_errors(const cli_stats *stats, int kind) {
     vsh_bake_error sum = {0.0, 0.0, 0.0, 0.0, 0.0};
     for (size_t i = 0; stats->errors != NULL && i < stats->light_count + 2; ++i) {
         if (kind_of(stats, i) != kind) {
@@ -110,9 +107,9 @@ const char *cli_stats_methods_text(const cli_stats *stats, char *text, size_t si
     return text;
 }
 
-/* What would help against an error of a kind that is left. */
-static void say_help(const cli_stats *stats, const vsh_scene *scene, int kind, char *text, size_t size) {
-    const vsh_bake_error known = cli_stats_error(stats, kind);
+/* Writes what would make the error of a kind smaller. */
+static void write_advice(const cli_stats *stats, const vsh_scene *scene, int kind, char *text, size_t size) {
+    const vsh_bake_error known = sum_errors(stats, kind);
     const bool by_rays = sqrt(known.square_error / known.values) > stats->max_error;
     if (by_rays && scene->shade.rays > 0) {
         snprintf(text, size, "%d rays are too few; raise --rays, or leave it off", scene->shade.rays);
@@ -132,13 +129,13 @@ static void say_help(const cli_stats *stats, const vsh_scene *scene, int kind, c
 
 void cli_stats_warn(const cli_stats *stats, const vsh_scene *scene, const vsh_run *run) {
     for (int kind = 0; kind < CLI_STATS_KINDS; ++kind) {
-        const vsh_bake_error known = cli_stats_error(stats, kind);
+        const vsh_bake_error known = sum_errors(stats, kind);
         const double error = vsh_bake_error_rmse(&known);
         if (!stats->methods[kind].keeps_error || !(error > stats->max_error) || run->warning == NULL) {
             continue;
         }
         char line[512], help[256];
-        say_help(stats, scene, kind, help, sizeof help);
+        write_advice(stats, scene, kind, help, sizeof help);
         snprintf(line, sizeof line, "%s: the estimated error is %.3g, above the limit of %g: %s",
                  kinds[kind].said, error, stats->max_error, help);
         run->warning(run->user, line);
@@ -146,13 +143,12 @@ void cli_stats_warn(const cli_stats *stats, const vsh_scene *scene, const vsh_ru
 }
 
 static void set_error(json_t *of, const vsh_bake_error *known) {
-    json_object_set_new(of, "estimated_rmse", number_or_null(vsh_bake_error_rmse(known)));
-    json_object_set_new(of, "field_rmse", number_or_null(vsh_bake_error_field(known)));
-    json_object_set_new(of, "worst_error", number_or_null(known->values > 0.0 ? known->worst : NAN));
+    json_object_set_new(of, "estimated_rmse", cli_number_json(vsh_bake_error_rmse(known)));
+    json_object_set_new(of, "field_rmse", cli_number_json(vsh_bake_error_field(known)));
+    json_object_set_new(of, "worst_error", cli_number_json(known->values > 0.0 ? known->worst : NAN));
 }
 
-/* Of each channel on its own. */
-static json_t *channels_of(const cli_stats *stats) {
+static json_t *list_channels(const cli_stats *stats) {
     json_t *channels = json_array();
     for (size_t i = 0; stats->errors != NULL && i < stats->light_count + 2; ++i) {
         const int kind = kind_of(stats, i);
@@ -160,8 +156,7 @@ static json_t *channels_of(const cli_stats *stats) {
         snprintf(name, sizeof name, "%s%s%.64s", kinds[kind].name, kind == CLI_STATS_SHADOW ? "." : "",
                  kind == CLI_STATS_SHADOW ? stats->lights[i].name : "");
         if (stats->methods[kind].name != NULL) {
-            json_t *of = json_object();
-            json_object_set_new(of, "name", json_string(name));
+            json_t *of = json_pack("{s:o}", "name", cli_utf8_json(name));
             set_error(of, &stats->errors[i]);
             json_array_append_new(channels, of);
         }
@@ -169,46 +164,40 @@ static json_t *channels_of(const cli_stats *stats) {
     return channels;
 }
 
-/* What methods that keep an error say of themselves; null where no such method ran. */
+static json_t *list_methods(const cli_stats *stats) {
+    json_t *methods = json_object();
+    for (int kind = 0; kind < CLI_STATS_KINDS; ++kind) {
+        const cli_method *method = &stats->methods[kind];
+        if (method->name != NULL) {
+            const vsh_bake_error known = sum_errors(stats, kind);
+            json_t *of = json_pack("{s:s,s:o}", "method", method->name, "max_error",
+                                   cli_number_json(method->keeps_error ? stats->max_error : NAN));
+            set_error(of, &known);
+            json_object_set_new(methods, kinds[kind].name, of);
+        }
+    }
+    return methods;
+}
+
+/* Adds errors by their estimates; null if no method estimates any. */
 static void add_errors(const cli_stats *stats, json_t *root) {
     double values = 0.0, square = 0.0;
     for (int kind = 0; kind < CLI_STATS_KINDS; ++kind) {
-        const vsh_bake_error known = cli_stats_error(stats, kind);
+        const vsh_bake_error known = sum_errors(stats, kind);
         const double error = known.values > 0.0 ? vsh_bake_error_rmse(&known) : 0.0;
         values += known.values;
         square += known.values * error * error;
     }
-    json_object_set_new(
-        root, "certified_share",
-        number_or_null(values > 0.0 ? 1.0 - fmin(1.0, (double)stats->shade.refined / values) : NAN));
-    json_object_set_new(root, "rays_per_value",
-                        number_or_null(values > 0.0 ? (double)stats->shade.rays / values : NAN));
-    json_object_set_new(root, "estimated_rmse", number_or_null(values > 0.0 ? sqrt(square / values) : NAN));
-    json_t *methods = json_object();
-    for (int kind = 0; kind < CLI_STATS_KINDS; ++kind) {
-        const cli_method *method = &stats->methods[kind];
-        if (method->name == NULL) {
-            continue;
-        }
-        json_t *of = json_object();
-        json_object_set_new(of, "method", json_string(method->name));
-        json_object_set_new(of, "max_error", number_or_null(method->keeps_error ? stats->max_error : NAN));
-        const vsh_bake_error known = cli_stats_error(stats, kind);
-        set_error(of, &known);
-        json_object_set_new(methods, kinds[kind].name, of);
-    }
-    json_object_set_new(root, "methods", methods);
-    json_object_set_new(root, "channels", channels_of(stats));
+    const double certified = 1.0 - fmin(1.0, (double)stats->shade.refined / values);
+    json_object_set_new(root, "certified_share", cli_number_json(values > 0.0 ? certified : NAN));
+    json_object_set_new(root, "rays_per_value", cli_number_json((double)stats->shade.rays / values));
+    json_object_set_new(root, "estimated_rmse", cli_number_json(sqrt(square / values)));
+    json_object_set_new(root, "methods", list_methods(stats));
+    json_object_set_new(root, "channels", list_channels(stats));
 }
 
-/* The JSON file. */
-/* How a reader is confined here; null where files were read without one (--sandbox off). */
-static json_t *confinement(const vsh_run *run) {
-    static const struct {
-        const char *name;
-        uint32_t bit;
-    } parts[] = {
-        {"limits", VSH_CONFINED_LIMITS}, {"calls", VSH_CONFINED_CALLS}, {"files", VSH_CONFINED_FILES}};
+/* Tells how a reader is confined here; null if files were read without one (--sandbox off). */
+static json_t *describe_confinement(const vsh_run *run) {
     vsh_run quiet = *run;
     quiet.progress = NULL;
     uint32_t confined = 0;
@@ -216,53 +205,44 @@ static json_t *confinement(const vsh_run *run) {
     if (run->reader == NULL || vsh_reader_confinement(&quiet, &confined, &error) != VSH_OK) {
         return json_null();
     }
-    json_t *of = json_object();
-    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
-        json_object_set_new(of, parts[i].name, json_boolean((confined & parts[i].bit) != 0));
-    }
-    return of;
+    return json_pack("{s:b,s:b,s:b}", "limits", confined & VSH_CONFINED_LIMITS, "calls",
+                     confined & VSH_CONFINED_CALLS, "files", confined & VSH_CONFINED_FILES);
 }
 
 static int write_file(const cli_stats *stats, const vsh_run *run, const char *path) {
+    const struct {
+        const char *name;
+        uint64_t value;
+        int of; /* CLI_STATS_…; -1: any */
+    } counts[] = {
+        {"texels", stats->texels, CLI_STATS_TEXELS},
+        {"invalid_texels", stats->invalid_texels, CLI_STATS_TEXELS},
+        {"points", stats->points, CLI_STATS_POINTS},
+        {"bad_rows", stats->bad_rows, CLI_STATS_POINTS},
+        {"beyond_reach", stats->shade.beyond_reach, CLI_STATS_POINTS},
+        {"voxels", stats->voxels, CLI_STATS_VOXELS},
+        {"inside_voxels", stats->inside_voxels, CLI_STATS_VOXELS},
+        {"tiles", stats->tiles, CLI_STATS_VOXELS},
+        {"samples", stats->shade.samples, -1},
+        {"marches", stats->shade.marches, -1},
+        {"certified", stats->shade.certified, -1},
+        {"unfinished", stats->shade.unfinished, -1},
+        {"skipped", stats->shade.skipped, -1},
+        {"rays", stats->shade.rays, -1},
+        {"refined", stats->shade.refined, -1},
+        {"peak_bytes", vshi_peak_bytes(), -1},
+        {"threads", (uint64_t)stats->threads, -1},
+        {"levels", (uint64_t)stats->casters.levels, -1},
+        {"field_bytes", stats->casters.field_bytes, -1},
+        {"active_voxels", stats->casters.active_voxels, -1},
+    };
     json_t *stages = json_object();
     for (int i = 0; i < CLI_STAGE_COUNT; ++i) {
         json_object_set_new(stages, stage_names[i], json_real(stats->seconds[i]));
     }
-    typedef struct count {
-        const char *name;
-        uint64_t value;
-    } count;
-    const count own[][3] = {
-        [CLI_STATS_TEXELS] = {{"texels", stats->texels}, {"invalid_texels", stats->invalid_texels}},
-        [CLI_STATS_POINTS] = {{"points", stats->points},
-                              {"bad_rows", stats->bad_rows},
-                              {"beyond_reach", stats->shade.beyond_reach}},
-        [CLI_STATS_VOXELS] = {{"voxels", stats->voxels},
-                              {"inside_voxels", stats->inside_voxels},
-                              {"tiles", stats->tiles}},
-    };
-    const count counts[] = {
-        own[stats->of][0],
-        own[stats->of][1],
-        {"samples", stats->shade.samples},
-        {"marches", stats->shade.marches},
-        {"certified", stats->shade.certified},
-        {"unfinished", stats->shade.unfinished},
-        {"skipped", stats->shade.skipped},
-        {"rays", stats->shade.rays},
-        {"refined", stats->shade.refined},
-        {"peak_bytes", vshi_peak_bytes()},
-        own[stats->of][2],
-        {"threads", (uint64_t)stats->threads},
-        {"levels", (uint64_t)stats->casters.levels},
-        {"field_bytes", stats->casters.field_bytes},
-        {"active_voxels", stats->casters.active_voxels},
-    };
-    json_t *root = json_object();
-    json_object_set_new(root, "version", json_string(vsh_version()));
-    json_object_set_new(root, "stages_s", stages);
+    json_t *root = json_pack("{s:s,s:o}", "version", vsh_version(), "stages_s", stages);
     for (size_t i = 0; i < sizeof counts / sizeof counts[0]; ++i) {
-        if (counts[i].name != NULL) { /* some have two counts of their own */
+        if (counts[i].of < 0 || counts[i].of == stats->of) {
             json_object_set_new(root, counts[i].name, json_integer((json_int_t)counts[i].value));
         }
     }
@@ -271,15 +251,11 @@ static int write_file(const cli_stats *stats, const vsh_run *run, const char *pa
                             stats->ao_spacing > 0 ? json_integer(stats->ao_spacing) : json_null());
     }
     add_errors(stats, root);
-    json_object_set_new(root, "confined", confinement(run));
+    json_object_set_new(root, "confined", describe_confinement(run));
     json_object_set_new(root, "field_bytes_per_voxel", json_real(bytes_per_voxel(stats)));
     json_object_set_new(root, "voxel_size", json_real(stats->casters.voxel_size));
     char *text = json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
     json_decref(root);
-    if (text == NULL) {
-        cli_say("%s: the system refused memory", path);
-        return CLI_LIMIT;
-    }
     const int code = cli_temporary_write(path, text);
     free(text);
     return code;
@@ -292,38 +268,33 @@ cli_stats cli_stats_begin(int32_t of, int32_t threads) {
 }
 
 int cli_stats_finish(const cli_stats *stats, const vsh_run *run, const char *path) {
-    int code = CLI_OK;
-    if (path != NULL) {
-        code = write_file(stats, run, path);
-    }
-    if (code == CLI_OK) {
-        cli_signals_end(CLI_OK);
-    }
-    return code;
+    CLI_TRY(path != NULL ? write_file(stats, run, path) : CLI_OK);
+    cli_signals_end(CLI_OK);
+    return CLI_OK;
 }
 
 /* "estimated error: shadow 0.0123 (the voxels' 0.012; worst 0.05), AO 0.0071 (worst 0.02)". */
 static void say_errors(const cli_stats *stats) {
-    char text[256] = "";
-    size_t used = 0;
-    for (int kind = 0; kind < CLI_STATS_KINDS && used < sizeof text; ++kind) {
-        const vsh_bake_error known = cli_stats_error(stats, kind);
+    char *text = NULL;
+    size_t size = 0;
+    FILE *out = open_memstream(&text, &size);
+    for (int kind = 0; kind < CLI_STATS_KINDS; ++kind) {
+        const vsh_bake_error known = sum_errors(stats, kind);
         const double error = vsh_bake_error_rmse(&known), field = vsh_bake_error_field(&known);
         if (isnan(error)) {
             continue;
         }
-        used += (size_t)snprintf(text + used, sizeof text - used, "%s%s %.3g (", used > 0 ? ", " : "",
-                                 kinds[kind].said, error);
-        if (!isnan(field) && !stats->methods[kind].traces && used < sizeof text) {
-            used += (size_t)snprintf(text + used, sizeof text - used, "the voxels' %.3g; ", field);
+        fprintf(out, "%s%s %.3g (", ftell(out) > 0 ? ", " : "", kinds[kind].said, error);
+        if (!isnan(field) && !stats->methods[kind].traces) {
+            fprintf(out, "the voxels' %.3g; ", field);
         }
-        if (used < sizeof text) {
-            used += (size_t)snprintf(text + used, sizeof text - used, "worst %.3g)", known.worst);
-        }
+        fprintf(out, "worst %.3g)", known.worst);
     }
-    if (used > 0) {
+    fclose(out);
+    if (size > 0) {
         cli_say("estimated error: %s", text);
     }
+    free(text);
 }
 
 /* "shadow exact, AO exact, max error 0.02; no voxels, 11.3 rays a value, those of AO shared by texels". */
@@ -337,7 +308,7 @@ static void say_choice(const cli_stats *stats) {
     }
     double values = 0.0;
     for (int kind = 0; kind < CLI_STATS_KINDS; ++kind) {
-        values += cli_stats_error(stats, kind).values;
+        values += sum_errors(stats, kind).values;
     }
     if (values > 0.0) {
         snprintf(rays, sizeof rays, ", %.3g rays a value", (double)stats->shade.rays / values);

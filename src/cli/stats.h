@@ -55,9 +55,6 @@ void cli_stats_methods(cli_stats *stats, const vsh_scene *scene, int32_t has_tri
 /* Takes what casts and the seconds that it took to make, and what the scene's methods come to with it. */
 void cli_stats_casters(cli_stats *stats, const vsh_scene *scene, const vsh_occluders_info *casters);
 
-/* What is known of the errors of a kind's values, all lights together. */
-vsh_bake_error cli_stats_error(const cli_stats *stats, int kind);
-
 /* "shadow exact, AO exact, max error 0.02". Returns text. */
 const char *cli_stats_methods_text(const cli_stats *stats, char *text, size_t size);
 

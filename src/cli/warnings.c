@@ -24,21 +24,20 @@ typedef struct example {
     char name[NAME]; /* what it is about; "": it does not say */
     double number;   /* the first that it gives: the larger, the worse */
     bool numbered;
-    size_t order; /* the earlier goes first, where numbers are the same */
 } example;
 
 typedef struct kind {
     char shape[TEXT]; /* the words, without what differs */
     char text[TEXT];  /* of the worst */
     size_t count;
-    bool objects; /* all are about meshes */
-    example worst[WORST];
+    bool objects;         /* all are about meshes */
+    example worst[WORST]; /* of two with the same number the earlier goes first */
 } kind;
 
 static struct {
     pthread_mutex_t lock;
-    kind *kinds; /* [KINDS]; NULL: nothing was kept yet */
-    size_t count, taken;
+    kind kinds[KINDS];
+    size_t count;
     bool keep, quiet;
 } state = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
@@ -113,16 +112,14 @@ static void examine(const char *message, char shape[TEXT], example *about, bool 
     }
 }
 
+/* Finds the kind of a shape, or adds it; NULL if there are too many. */
 static kind *find_kind(const char *shape) {
     for (size_t i = 0; i < state.count; ++i) {
         if (strcmp(state.kinds[i].shape, shape) == 0) {
             return &state.kinds[i];
         }
     }
-    if (state.kinds == NULL) {
-        state.kinds = calloc(KINDS, sizeof *state.kinds);
-    }
-    if (state.kinds == NULL || state.count == KINDS) {
+    if (state.count == KINDS) {
         return NULL;
     }
     kind *fresh = &state.kinds[state.count++];
@@ -131,17 +128,12 @@ static kind *find_kind(const char *shape) {
     return fresh;
 }
 
-static bool before(const example *a, const example *b) {
-    return a->number > b->number || (a->number == b->number && a->order < b->order);
-}
-
 static void keep(kind *of, const char *message, const example *about) {
     size_t at = of->count < WORST ? of->count : WORST;
-    while (at > 0 && before(about, &of->worst[at - 1])) {
+    for (; at > 0 && about->number > of->worst[at - 1].number; --at) {
         if (at < WORST) {
             of->worst[at] = of->worst[at - 1];
         }
-        --at;
     }
     if (at < WORST) {
         of->worst[at] = *about;
@@ -160,7 +152,7 @@ void cli_warnings_parse(void *user, const char *message) {
     pthread_mutex_lock(&state.lock);
     kind *of = NULL;
     if (state.keep) {
-        example about = {.order = state.taken++};
+        example about = {.numbered = false};
         char shape[TEXT];
         bool object;
         examine(message, shape, &about, &object);
@@ -177,34 +169,33 @@ void cli_warnings_parse(void *user, const char *message) {
 }
 
 /* "7 objects, the worst: <its text>; then 'b' (12), 'c' (3); --verbose lists all". */
-static void tell(const kind *of) {
+static void say_kind(const kind *of) {
     if (of->count == 1) {
         cli_say("warning: %s", of->text);
         return;
     }
-    char then[WORST * (NAME + 40)] = "";
-    size_t used = 0;
+    char *then;
+    size_t size;
+    FILE *out = open_memstream(&then, &size);
     for (size_t i = 1; i < WORST && i < of->count; ++i) {
         const example *one = &of->worst[i];
-        char number[32] = "";
-        if (one->numbered) {
-            snprintf(number, sizeof number, " (%g)", one->number);
-        }
         if (one->name[0] != '\0') {
-            used += (size_t)snprintf(then + used, sizeof then - used, "%s'%s'%s", used > 0 ? ", " : "; then ",
-                                     one->name, number);
+            fprintf(out, "%s'%s'", ftell(out) > 0 ? ", " : "; then ", one->name);
+            if (one->numbered) {
+                fprintf(out, " (%g)", one->number);
+            }
         }
     }
+    fclose(out);
     cli_say("warning: %zu %s: %s%s; --verbose lists all", of->count, of->objects ? "objects" : "times",
             of->text, then);
+    free(then);
 }
 
 void cli_warnings_tell(void) {
     for (size_t i = 0; i < state.count; ++i) {
-        tell(&state.kinds[i]);
+        say_kind(&state.kinds[i]);
     }
-    free(state.kinds);
-    state.kinds = NULL;
     state.count = 0;
 }
 
