@@ -22,7 +22,7 @@ static int set(const vsh_setting *setting, const char *text, void *owner) {
         result = vsh_flat_scene_set(owner, name, text, &error);
         break;
     }
-    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+    return cli_check(result, &error);
 }
 
 /* A text is held against its range at once: before anything is read. */

@@ -70,10 +70,9 @@ static void print_channel(const char *name, const float *plane, size_t count) {
     size_t finite = 0;
     for (size_t i = 0; i < count; ++i) {
         if (isfinite(plane[i])) {
-            const double value = plane[i];
-            least = value < least ? value : least;
-            most = value > most ? value : most;
-            sum += value;
+            least = fmin(least, (double)plane[i]);
+            most = fmax(most, (double)plane[i]);
+            sum += (double)plane[i];
             ++finite;
         }
     }
@@ -90,9 +89,7 @@ static void print_channel(const char *name, const float *plane, size_t count) {
 static int print_image(const char *path, const vsh_run *run) {
     vsh_image_file *file = NULL;
     vsh_error error;
-    if (vsh_image_read(path, run, &file, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
+    CLI_TRY(cli_check(vsh_image_read(path, run, &file, &error), &error));
     const vsh_image image = vsh_image_view(file);
     printf("image: %d × %d, %d channels\n", image.width, image.height, image.channel_count);
     for (int32_t i = 0; i < image.channel_count; ++i) {
@@ -147,47 +144,39 @@ static void print_grid(const vsh_vdb_entry *grid) {
 }
 
 static void say_names(const char *path, const char *name, const vsh_vdb_entry *entries, size_t count) {
-    char names[700] = "";
-    size_t used = 0;
-    for (size_t i = 0; i < count && used < sizeof names; ++i) {
-        used +=
-            (size_t)snprintf(names + used, sizeof names - used, "%s'%s'", i > 0 ? ", " : "", entries[i].name);
+    char *names;
+    size_t size;
+    FILE *out = open_memstream(&names, &size);
+    for (size_t i = 0; i < count; ++i) {
+        fprintf(out, "%s'%s'", i > 0 ? ", " : "", entries[i].name);
     }
-    cli_say("%s: no grid '%s'; it holds %s", path, name, names);
+    fclose(out);
+    cli_say("%s: no grid '%s'; it holds %.700s", path, name, names);
+    free(names);
 }
 
 static int print_vdb(const char *path, const char *name, const vsh_run *run) {
     vsh_vdb_entry *entries = calloc(MAX_LISTED, sizeof *entries);
-    if (entries == NULL) {
-        return cli_out_of_memory(path);
-    }
-    size_t count = 0;
+    size_t count = 0, shown = 0;
     vsh_error error;
-    if (vsh_vdb_list(path, run, entries, MAX_LISTED, &count, &error) != VSH_OK) {
-        free(entries);
-        return cli_fail(&error);
-    }
+    int code = cli_check_result(vsh_vdb_list(path, run, entries, MAX_LISTED, &count, &error), &error);
     const size_t listed = count < MAX_LISTED ? count : MAX_LISTED;
-    size_t shown = 0;
     for (size_t i = 0; i < listed; ++i) {
         if (name == NULL || strcmp(entries[i].name, name) == 0) {
             print_grid(&entries[i]);
             ++shown;
         }
     }
-    if (name != NULL && shown == 0) {
+    if (code == CLI_OK && name != NULL && shown == 0) {
         say_names(path, name, entries, listed);
-        free(entries);
-        return CLI_USAGE;
-    }
-    if (count == 0) {
+        code = CLI_USAGE;
+    } else if (code == CLI_OK && count == 0) {
         printf("problem: no grids\n");
-    }
-    if (count > MAX_LISTED && name == NULL) {
+    } else if (count > MAX_LISTED && name == NULL) {
         printf("… and %zu more grids\n", count - MAX_LISTED);
     }
     free(entries);
-    return CLI_OK;
+    return code;
 }
 
 /* --- scenes */
@@ -367,29 +356,25 @@ static const struct {
     {"sheet", "sheets", " with air on both sides", " with air on both sides"},
 };
 
-static void count_kinds(const vsh_solidity_report *report, size_t counts[KINDS]) {
-    counts[0] = report->solids;
-    counts[1] = report->rooms;
-    counts[2] = report->walls;
-    counts[3] = report->open_solids;
-    counts[4] = report->sheets;
+static size_t count_kind(const vsh_solidity_report *report, int kind) {
+    const size_t counts[KINDS] = {report->solids, report->rooms, report->walls, report->open_solids,
+                                  report->sheets};
+    return counts[kind];
 }
 
 /* Writes a few words, such as "solid", "3 walls" or "mixed". */
-static void describe_kind(const vsh_solidity_report *report, char *text, size_t capacity) {
-    size_t counts[KINDS], found = 0;
-    count_kinds(report, counts);
-    snprintf(text, capacity, "nothing");
-    for (size_t i = 0; i < KINDS; ++i) {
-        if (counts[i] == 1) {
-            snprintf(text, capacity, "%s", kinds[i].one);
-        } else if (counts[i] > 1) {
-            snprintf(text, capacity, "%zu %s", counts[i], kinds[i].many);
+static void describe_kind(const vsh_solidity_report *report, char text[TAKEN]) {
+    strcpy(text, "nothing");
+    for (int i = 0, found = 0; i < KINDS; ++i) {
+        const size_t count = count_kind(report, i);
+        found += count > 0;
+        if (found > 1) {
+            strcpy(text, "mixed");
+        } else if (count == 1) {
+            strcpy(text, kinds[i].one);
+        } else if (count > 1) {
+            snprintf(text, TAKEN, "%zu %s", count, kinds[i].many);
         }
-        found += counts[i] > 0;
-    }
-    if (found > 1) {
-        snprintf(text, capacity, "mixed");
     }
 }
 
@@ -400,17 +385,17 @@ static void print_problem(size_t count, const char *what) {
 }
 
 static void print_solidity(const vsh_solidity_report *report) {
-    size_t counts[KINDS], found = 0;
-    count_kinds(report, counts);
+    const char *separator = "";
     printf("  taken for: ");
-    for (size_t i = 0; i < KINDS; ++i) {
-        if (counts[i] > 0) {
-            printf("%s%zu %s%s", found++ > 0 ? ", " : "", counts[i],
-                   counts[i] == 1 ? kinds[i].one : kinds[i].many,
-                   counts[i] == 1 ? kinds[i].more_of_one : kinds[i].more_of_many);
+    for (int i = 0; i < KINDS; ++i) {
+        const size_t count = count_kind(report, i);
+        if (count > 0) {
+            printf("%s%zu %s%s", separator, count, count == 1 ? kinds[i].one : kinds[i].many,
+                   count == 1 ? kinds[i].more_of_one : kinds[i].more_of_many);
+            separator = ", ";
         }
     }
-    puts(found == 0 ? "nothing" : "");
+    puts(separator[0] == '\0' ? "nothing" : "");
     if (report->closed_over > 0) {
         printf("  closed over: %zu hole%s with %zu open edges, of %zu of these\n", report->holes,
                report->holes == 1 ? "" : "s", report->open_edges, report->closed_over);
@@ -419,12 +404,6 @@ static void print_solidity(const vsh_solidity_report *report) {
 }
 
 /* --- a paragraph for each mesh */
-
-/* The factor on positions if the user gives their unit. */
-static double scale_for(const vsh_model *model, double unit) {
-    const double own = vsh_model_unit(model);
-    return unit > 0.0 ? unit / (own > 0.0 ? own : 1.0) : 1.0;
-}
 
 static void print_unit(const vsh_model *model, double unit) {
     const double own = vsh_model_unit(model);
@@ -454,10 +433,10 @@ static int print_lights(const vsh_model *model, double unit) {
 
 static int print_paragraph(const mesh_info *info, size_t index, const info_look *look) {
     vsh_mesh mesh = info->meshes[index];
-    const double scale = scale_for(info->model, look->unit);
-    double scaled[12];
+    double scaled[12]; /* the user gives the unit of positions */
+    const double own = vsh_model_unit(info->model), scale = look->unit / (own > 0.0 ? own : 1.0);
     for (int i = 0; i < 12; ++i) {
-        scaled[i] = mesh.transform[i] * scale;
+        scaled[i] = mesh.transform[i] * (look->unit > 0.0 ? scale : 1.0);
     }
     mesh.transform = scaled;
     vsh_mesh_report report;
@@ -500,7 +479,7 @@ static void print_row(const mesh_info *info, size_t index, const vsh_uv_report *
     if (uv != NULL && uv->overlap_texels > uv->other_texels) {
         snprintf(itself, sizeof itself, "%zu", uv->overlap_texels - uv->other_texels);
     }
-    describe_kind(&info->solidity[index], taken, sizeof taken);
+    describe_kind(&info->solidity[index], taken);
     printf("%10zu %8d %12s %12s %-*s %s\n", info->meshes[index].triangle_count,
            vsh_model_uv_sets(info->model, index), others, itself, wide, taken, name_of(&info->meshes[index]));
 }
@@ -510,7 +489,7 @@ static void print_table(const mesh_info *info, const vsh_uv_report *reports) {
     int wide = LEAST_WIDE;
     for (size_t i = 0; i < info->count; ++i) {
         char taken[TAKEN];
-        describe_kind(&info->solidity[i], taken, sizeof taken);
+        describe_kind(&info->solidity[i], taken);
         wide = (int)strlen(taken) > wide ? (int)strlen(taken) : wide;
     }
     printf("%10s %8s %12s %12s %-*s %s\n", "triangles", "UV sets", "over others", "over itself", wide,
@@ -582,9 +561,6 @@ static int print_uvs(const mesh_info *info, const info_look *look, const vsh_run
     lightmap.width = look->width;
     lightmap.height = look->height;
     vsh_uv_report *reports = calloc(info->with_uv_count, sizeof *reports);
-    if (reports == NULL) {
-        return cli_out_of_memory("UV reports");
-    }
     vsh_run quiet = *run;
     quiet.warning = NULL; /* printed below */
     vsh_charts *charts = NULL;
@@ -627,8 +603,8 @@ static int print_unwrap(const vsh_mesh *meshes, size_t count, const info_look *l
     size_t kept = 0;
     for (size_t i = 0; i < count; ++i) {
         int32_t usable = 0;
-        if (meshes[i].uvs != NULL && vsh_uvs_usable(&meshes[i], run, &usable, &error) != VSH_OK) {
-            return cli_fail_of(NULL, &error);
+        if (meshes[i].uvs != NULL) {
+            CLI_TRY(cli_check_result(vsh_uvs_usable(&meshes[i], run, &usable, &error), &error));
         }
         kept += usable != 0;
     }
@@ -650,10 +626,6 @@ static int print_meshes(const char *path, const info_look *look, const vsh_run *
                       .table = count > PARAGRAPHS && !look->all};
     int code;
     print_summary(model);
-    if (info.meshes == NULL || info.solidity == NULL || info.with_uvs == NULL) {
-        code = cli_out_of_memory(path);
-        goto done;
-    }
     print_unit(model, look->unit);
     for (size_t i = 0; i < count; ++i) {
         info.meshes[i] = vsh_model_mesh(model, i, -1);
