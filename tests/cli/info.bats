@@ -9,26 +9,20 @@ setup() {
 @test "a sound mesh has no problems" {
     shade info box.obj
     done_well
-    [[ $output == *"triangles: 12"* ]] || fail "no triangles"
-    [[ $output == *"UV sets: 1"* ]] || fail "no UV sets"
-    [[ $output == *"bounds: 0 0 0 to 1 1 1"* ]] || fail "no bounds"
-    [[ $output != *problem* ]] || fail "a problem"
+    [[ $output == *"triangles: 12"*"UV sets: 1"*"bounds: 0 0 0 to 1 1 1"* && $output != *problem* ]] || fail "not so"
 }
 
 @test "an open mesh, degenerate triangles and overlapping UVs are problems" {
     { sed -e '$d' -e 's/^vt 0.35 0.02/vt 0.05 0.02/' box.obj && echo 'f 1/1 1/1 2/2'; } >bad.obj
     shade info bad.obj
     done_well
-    [[ $output == *"problem: 3 open edges"* ]] || fail "no open edges"
-    [[ $output == *"problem: 1 triangles of zero area"* ]] || fail "no degenerate triangles"
-    [[ $output == *"lie over other charts"* ]] || fail "no overlap"
+    [[ $output == *"problem: 3 open edges"*"problem: 1 triangles of zero area"*"lie over other charts"* ]] || fail "not so"
 }
 
 @test "the sample asset is sound" {
     shade info "$ASSETS/cloister.glb"
     done_well
-    [[ $output != *"other charts"* ]] || fail "charts overlap"
-    [[ $output != *"leave the UV square"* ]] || fail "UVs outside"
+    [[ $output != *"other charts"* && $output != *"leave the UV square"* ]] || fail "UVs"
 }
 
 @test "a level set" {
@@ -47,14 +41,10 @@ setup() {
 }
 
 @test "missing, damaged and empty files" {
-    shade info none.obj
-    refused 3 none.obj
-    shade info none.vdb
-    refused 3 none.vdb
-    shade info none.exr
-    refused 3 none.exr
-    shade info none.json
-    refused 3 none.json
+    for ending in obj vdb exr json; do
+        shade info "none.$ending"
+        refused 3 "none.$ending"
+    done
     for ending in obj glb ply stl exr png vdb; do
         : >"empty.$ending"
         shade info "empty.$ending"
