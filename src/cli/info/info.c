@@ -294,7 +294,7 @@ static int print_scene(const char *path, const vsh_run *run) {
 /* --- meshes */
 
 enum { PARAGRAPHS = 8 }; /* more meshes have a line each */
-enum { TAKEN = 64, LEAST_WIDE = 10 };
+enum { TAKEN = 64 };
 
 /* A file's meshes. */
 typedef struct mesh_info {
@@ -303,6 +303,7 @@ typedef struct mesh_info {
     vsh_mesh *meshes;              /* [count] */
     vsh_solidity_report *solidity; /* [count] */
     vsh_mesh *with_uvs;            /* [with_uv_count] */
+    vsh_uv_report *reports;        /* [with_uv_count] */
     size_t with_uv_count;
     bool table; /* a line for each */
 } mesh_info;
@@ -418,12 +419,11 @@ static void print_unit(const vsh_model *model, double unit) {
 
 /* Prints the lights that 'bake --lights' would read with its defaults. */
 static int print_lights(const vsh_model *model, double unit) {
-    static const double angle = 0.53 * 0.017453292519943295; /* radians */
     vsh_light *lights = NULL;
     size_t count = 0;
     vsh_error error;
-    CLI_TRY(
-        cli_check_result(vsh_lights_from_model(model, angle, 0.0, unit, &lights, &count, &error), &error));
+    CLI_TRY(cli_check_result(
+        vsh_lights_from_model(model, 0.53 * CLI_DEGREE, 0.0, unit, &lights, &count, &error), &error));
     for (size_t i = 0; i < count; ++i) {
         print_light(&lights[i]);
     }
@@ -471,42 +471,29 @@ static int print_paragraph(const mesh_info *info, size_t index, const info_look 
 
 /* --- a line for each mesh */
 
-static void print_row(const mesh_info *info, size_t index, const vsh_uv_report *uv, int wide) {
-    char others[32] = "", itself[32] = "", taken[TAKEN];
-    if (uv != NULL && uv->other_texels > 0) {
-        snprintf(others, sizeof others, "%zu", uv->other_texels);
-    }
-    if (uv != NULL && uv->overlap_texels > uv->other_texels) {
-        snprintf(itself, sizeof itself, "%zu", uv->overlap_texels - uv->other_texels);
-    }
-    describe_kind(&info->solidity[index], taken);
-    printf("%10zu %8d %12s %12s %-*s %s\n", info->meshes[index].triangle_count,
-           vsh_model_uv_sets(info->model, index), others, itself, wide, taken, name_of(&info->meshes[index]));
-}
-
-/* `reports` are of the meshes with UVs; NULL: there are none. */
-static void print_table(const mesh_info *info, const vsh_uv_report *reports) {
-    int wide = LEAST_WIDE;
+static void print_table(const mesh_info *info) {
+    printf("%10s %8s %12s %12s %-16s %s\n", "triangles", "UV sets", "over others", "over itself", "taken for",
+           "mesh");
+    const vsh_uv_report none = {0}, *next = info->reports;
     for (size_t i = 0; i < info->count; ++i) {
+        const vsh_mesh *mesh = &info->meshes[i];
+        const vsh_uv_report *uv = mesh->uvs != NULL ? next++ : &none;
         char taken[TAKEN];
         describe_kind(&info->solidity[i], taken);
-        wide = (int)strlen(taken) > wide ? (int)strlen(taken) : wide;
-    }
-    printf("%10s %8s %12s %12s %-*s %s\n", "triangles", "UV sets", "over others", "over itself", wide,
-           "taken for", "mesh");
-    for (size_t i = 0, next = 0; i < info->count; ++i) {
-        const bool uvs = info->meshes[i].uvs != NULL && reports != NULL;
-        print_row(info, i, uvs ? &reports[next++] : NULL, wide);
+        /* a precision of 0 prints no 0 */
+        printf("%10zu %8d %12.0zu %12.0zu %-16s %s\n", mesh->triangle_count,
+               vsh_model_uv_sets(info->model, i), uv->other_texels, uv->overlap_texels - uv->other_texels,
+               taken, name_of(mesh));
     }
     puts("(over others, over itself: texels that another object's triangle has, or one of its own)");
 }
 
 /* --- UVs in one lightmap */
 
-static void print_uv_problems(const vsh_mesh *meshes, const vsh_uv_report *reports, size_t count) {
-    for (size_t i = 0; i < count; ++i) {
-        const vsh_uv_report *uv = &reports[i];
-        const char *name = name_of(&meshes[i]);
+static void print_uv_problems(const mesh_info *info) {
+    for (size_t i = 0; i < info->with_uv_count; ++i) {
+        const vsh_uv_report *uv = &info->reports[i];
+        const char *name = name_of(&info->with_uvs[i]);
         if (uv->overlap_texels > 0) {
             printf("  problem: mesh '%s': %zu texels of %zu triangles lie over other charts", name,
                    uv->overlap_texels, uv->overlap_triangles);
@@ -525,15 +512,15 @@ static void print_uv_problems(const vsh_mesh *meshes, const vsh_uv_report *repor
     }
 }
 
-static void print_verdict(const vsh_mesh *meshes, const vsh_uv_report *reports, size_t count,
-                          uint64_t covered) {
+static void print_verdict(const mesh_info *info, uint64_t covered) {
     uint64_t texels = 0;
     size_t over = 0;
-    const vsh_uv_report *worst = reports;
-    for (size_t i = 0; i < count; ++i) {
-        texels += reports[i].other_texels;
-        over += reports[i].other_texels > 0;
-        worst = reports[i].other_texels > worst->other_texels ? &reports[i] : worst;
+    const vsh_uv_report *worst = info->reports;
+    for (size_t i = 0; i < info->with_uv_count; ++i) {
+        const vsh_uv_report *uv = &info->reports[i];
+        texels += uv->other_texels;
+        over += uv->other_texels > 0;
+        worst = uv->other_texels > worst->other_texels ? uv : worst;
     }
     if (texels == 0) {
         return;
@@ -541,8 +528,9 @@ static void print_verdict(const vsh_mesh *meshes, const vsh_uv_report *reports, 
     const bool refused = (double)texels > VSH_LARGEST_OVERLAP * (double)covered;
     printf("%s: objects share texels: %zu of %zu meshes lie over others, on %" PRIu64
            " texels, most of all '%s', on %zu over '%s'%s\n",
-           refused ? "problem" : "note", over, count, texels, object_of(&meshes[worst - reports]),
-           worst->other_mesh_texels, object_of(&meshes[worst->other_mesh]),
+           refused ? "problem" : "note", over, info->with_uv_count, texels,
+           object_of(&info->with_uvs[worst - info->reports]), worst->other_mesh_texels,
+           object_of(&info->with_uvs[worst->other_mesh]),
            refused
                ? ": one image of all is refused; bake with --per-object, choose with --receive, or unwrap "
                  "them into one atlas"
@@ -551,39 +539,34 @@ static void print_verdict(const vsh_mesh *meshes, const vsh_uv_report *reports, 
 
 /* All meshes with UVs share one lightmap, as they do in `bake`. */
 static int print_uvs(const mesh_info *info, const info_look *look, const vsh_run *run) {
-    if (info->with_uv_count == 0) {
-        if (info->table) {
-            print_table(info, NULL);
-        }
-        return CLI_OK;
-    }
     vsh_lightmap_options lightmap = vsh_lightmap_options_default();
     lightmap.width = look->width;
     lightmap.height = look->height;
-    vsh_uv_report *reports = calloc(info->with_uv_count, sizeof *reports);
     vsh_run quiet = *run;
     quiet.warning = NULL; /* printed below */
     vsh_charts *charts = NULL;
     vsh_charts_info found;
     vsh_error error;
-    int code;
-    CLI_TRY_DONE(cli_check_result(
-        vsh_charts_create(info->with_uvs, info->with_uv_count, &lightmap, &quiet, reports, &charts, &error),
-        &error));
-    vsh_charts_get_info(charts, &found);
-    if (info->table) {
-        print_table(info, reports);
+    if (info->with_uv_count > 0) {
+        CLI_TRY(cli_check_result(vsh_charts_create(info->with_uvs, info->with_uv_count, &lightmap, &quiet,
+                                                   info->reports, &charts, &error),
+                                 &error));
     }
+    if (info->table) {
+        print_table(info);
+    }
+    if (charts == NULL) {
+        return CLI_OK;
+    }
+    vsh_charts_get_info(charts, &found);
+    vsh_charts_free(charts);
     printf("lightmap of %d × %d texels: %.1f %% covered\n", look->width, look->height,
            100.0 * (double)found.covered / ((double)look->width * look->height));
     if (!info->table) {
-        print_uv_problems(info->with_uvs, reports, info->with_uv_count);
+        print_uv_problems(info);
     }
-    print_verdict(info->with_uvs, reports, info->with_uv_count, found.covered);
-done:
-    vsh_charts_free(charts);
-    free(reports);
-    return code;
+    print_verdict(info, found.covered);
+    return CLI_OK;
 }
 
 /* Prints the work of `bake --unwrap auto`. */
@@ -623,6 +606,7 @@ static int print_meshes(const char *path, const info_look *look, const vsh_run *
                       .meshes = calloc(count, sizeof *info.meshes),
                       .solidity = calloc(count, sizeof *info.solidity),
                       .with_uvs = calloc(count, sizeof *info.with_uvs),
+                      .reports = calloc(count, sizeof *info.reports),
                       .table = count > PARAGRAPHS && !look->all};
     int code;
     print_summary(model);
@@ -646,6 +630,7 @@ static int print_meshes(const char *path, const info_look *look, const vsh_run *
                count - info.with_uv_count, count);
     }
 done:
+    free(info.reports);
     free(info.with_uvs);
     free(info.solidity);
     free(info.meshes);
@@ -654,19 +639,6 @@ done:
 }
 
 /* --- the command */
-
-static int print_info(const char *path, const info_look *look, const vsh_run *run) {
-    if (cli_has_ending(path, "vdb")) {
-        return print_vdb(path, cli_parsed_grid(), run);
-    }
-    if (cli_has_ending(path, "json")) {
-        return print_scene(path, run);
-    }
-    if (cli_has_ending(path, CLI_IMAGE_ENDINGS)) {
-        return print_image(path, run);
-    }
-    return print_meshes(path, look, run);
-}
 
 static int info_main(int argc, char **argv) {
     info_settings s = {.look = {.width = 1024, .height = 1024}};
@@ -679,5 +651,8 @@ static int info_main(int argc, char **argv) {
     vsh_scene scene = vsh_scene_default();
     cli_patch_scene(&s.patch, &scene);
     s.look.unit = scene.unit;
-    return print_info(path, &s.look, &run);
+    return cli_has_ending(path, "vdb")               ? print_vdb(path, cli_parsed_grid(), &run)
+           : cli_has_ending(path, "json")            ? print_scene(path, &run)
+           : cli_has_ending(path, CLI_IMAGE_ENDINGS) ? print_image(path, &run)
+                                                     : print_meshes(path, &s.look, &run);
 }
