@@ -164,14 +164,10 @@ static int check_files(const query_settings *s, const vsh_scene *scene) {
 
 typedef struct query_work {
     const query_settings *settings;
-    vsh_scene *scene;
-    vsh_run run;
-    vsh_assets *assets;
-    vsh_occluders *occluders;
+    cli_shading shading;
     vsh_query *query;
     cli_points_reader reader;
     query_answers answers;
-    cli_stats stats;
     double begin, share; /* of the batch, as parts of the file */
 } query_work;
 
@@ -230,7 +226,8 @@ static void create_answers(query_answers *a, size_t room) {
 static int plan_batch(const query_work *work, bool keep, size_t *rows, size_t *most_kept) {
     const int32_t asked = work->settings->batch;
     const uint64_t limit = cli_given.memory_limit;
-    const uint64_t held = work->stats.casters.field_bytes + work->stats.casters.triangles_bytes +
+    const uint64_t held = work->shading.stats.casters.field_bytes +
+                          work->shading.stats.casters.triangles_bytes +
                           work->reader.face_vertices * (uint64_t)sizeof(float[6]);
     const size_t row_size = work->reader.table.row_size; /* 0: text */
     /* twice, because room grows by doubling */
@@ -257,7 +254,7 @@ static int plan_batch(const query_work *work, bool keep, size_t *rows, size_t *m
 /* Shows a batch's progress as a part of the file. */
 static int32_t report_progress(void *user, const char *stage, double fraction) {
     const query_work *work = user;
-    return work->run.progress(work->run.user, stage, work->begin + work->share * fraction);
+    return work->shading.run.progress(work->shading.run.user, stage, work->begin + work->share * fraction);
 }
 
 static int answer_batch(query_work *work, const cli_points *points) {
@@ -266,14 +263,14 @@ static int answer_batch(query_work *work, const cli_points *points) {
     const double done = source->size > 0 ? (double)source->taken / (double)source->size : 1.0;
     work->begin = source->size > 0 ? work->begin + work->share : 0.0;
     work->share = fmin(done, 1.0) - work->begin;
-    vsh_run run = work->run;
+    vsh_run run = work->shading.run;
     run.progress = report_progress;
     run.user = work;
     const vsh_points view = {points->count, points->positions, points->normals, points->texels};
     vsh_error error;
-    const vsh_result result =
-        vsh_query_points(work->query, &view, NULL, &run, &work->answers.output, &work->stats.shade, &error);
-    cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
+    const vsh_result result = vsh_query_points(work->query, &view, NULL, &run, &work->answers.output,
+                                               &work->shading.stats.shade, &error);
+    cli_stats_stage(&work->shading.stats, CLI_STAGE_BAKE, start);
     return cli_check_result(result, &error);
 }
 
@@ -282,7 +279,7 @@ static int answer_rows(query_work *work, size_t most_kept, cli_points *points, c
     for (;;) {
         double start = vshi_seconds();
         CLI_TRY(cli_points_read(&work->reader, most_kept, points));
-        cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
+        cli_stats_stage(&work->shading.stats, CLI_STAGE_LOAD, start);
         if (points->count == 0) {
             break;
         }
@@ -290,13 +287,13 @@ static int answer_rows(query_work *work, size_t most_kept, cli_points *points, c
         start = vshi_seconds();
         CLI_TRY(cli_points_write(writer, points));
         CLI_TRY(flush ? cli_points_writer_flush(writer) : CLI_OK);
-        cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
+        cli_stats_stage(&work->shading.stats, CLI_STAGE_WRITE, start);
     }
     const double start = vshi_seconds();
     CLI_TRY(cli_points_writer_commit(writer, &work->reader));
-    cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
-    work->stats.points = work->reader.table.rows;
-    work->stats.bad_rows = work->reader.bad;
+    cli_stats_stage(&work->shading.stats, CLI_STAGE_WRITE, start);
+    work->shading.stats.points = work->reader.table.rows;
+    work->shading.stats.bad_rows = work->reader.bad;
     return CLI_OK;
 }
 
@@ -327,7 +324,7 @@ done:
 static int choose_answers(query_work *work, const char *why) {
     const query_settings *s = work->settings;
     query_answers *a = &work->answers;
-    vsh_scene *scene = work->scene;
+    vsh_scene *scene = work->shading.scene;
     if (scene->ao && !work->reader.has_normals) {
         if (cli_patch_has(&s->bake.patch, "--ao")) {
             return cli_usage("%s: no normals, which --ao needs%s%s", work->reader.table.source.name,
@@ -354,29 +351,24 @@ static int choose_answers(query_work *work, const char *why) {
 }
 
 static int make_query(query_work *work) {
-    const double start = vshi_seconds();
-    vsh_error error;
-    CLI_TRY(cli_check_result(vsh_assets_load(work->scene, &work->run, &work->assets, &error), &error));
-    cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
+    const vsh_scene *scene = work->shading.scene;
+    CLI_TRY(cli_shading_load(&work->shading));
     vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
     what.within = work->settings->within;
     what.voxels = work->settings->distance || work->settings->gradient;
-    CLI_TRY(cli_check_result(
-        vsh_scene_occluders(work->scene, work->assets, &what, &work->run, &work->occluders, &error), &error));
-    vsh_occluders_info casters;
-    vsh_occluders_get_info(work->occluders, &casters);
-    cli_stats_casters(&work->stats, work->scene, &casters);
-    vsh_shade_options shade = work->scene->shade;
-    if (!work->scene->ao) {
+    CLI_TRY(cli_shading_cast(&work->shading, &what));
+    vsh_shade_options shade = scene->shade;
+    if (!scene->ao) {
         shade.ao_method = VSH_AO_AUTO; /* not asked for, and it may need triangles that are not there */
     }
-    return cli_check_result(vsh_query_create(work->occluders, work->scene->lights, work->scene->light_count,
+    vsh_error error;
+    return cli_check_result(vsh_query_create(work->shading.occluders, scene->lights, scene->light_count,
                                              &shade, &work->query, &error),
                             &error);
 }
 
 static void say_results(const query_work *work) {
-    const cli_stats *stats = &work->stats;
+    const cli_stats *stats = &work->shading.stats;
     if (stats->bad_rows > 0) {
         cli_say("%s: %" PRIu64 " of %" PRIu64 " rows are bad; their answers are nan",
                 work->reader.table.source.name, stats->bad_rows, stats->points);
@@ -394,18 +386,17 @@ static void say_results(const query_work *work) {
 }
 
 static int run_query(const query_settings *s, vsh_scene *scene) {
-    query_work work = {.settings = s, .scene = scene, .run = cli_make_run()};
-    work.stats = cli_stats_begin(CLI_STATS_POINTS, work.run.threads);
+    query_work work = {.settings = s, .shading = cli_shading_begin(scene, CLI_STATS_POINTS)};
     int code = CLI_OK;
     CLI_TRY_DONE(cli_points_open(s->points, s->points_format, s->normals, s->strict, &work.reader));
     vsh_error why = {VSH_OK, ""};
     if (s->normals != 0) {
-        cli_points_take_faces(s->points, &work.run, &work.reader, &why);
+        cli_points_take_faces(s->points, &work.shading.run, &work.reader, &why);
     }
     CLI_TRY_DONE(choose_answers(&work, why.message));
     CLI_TRY_DONE(make_query(&work));
     CLI_TRY_DONE(answer_points(&work));
-    CLI_TRY_DONE(cli_stats_finish(&work.stats, &work.run, s->bake.stats));
+    CLI_TRY_DONE(cli_stats_finish(&work.shading.stats, &work.shading.run, s->bake.stats));
     say_results(&work);
 done:
     free(work.answers.memory);
@@ -413,8 +404,7 @@ done:
     free(work.answers.visibility);
     free(work.answers.deviation);
     vsh_query_free(work.query);
-    vsh_occluders_free(work.occluders);
-    vsh_assets_free(work.assets);
+    cli_shading_free(&work.shading);
     cli_points_close(&work.reader);
     return code;
 }
