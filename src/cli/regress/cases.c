@@ -10,13 +10,14 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <fnmatch.h>
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 #include <vdbshade/flat.h>
 
-static const char list_name[] = "regress.json", tolerance_ending[] = ".tolerance.json";
+static const char list_name[] = "regress.json";
 
 enum { MOST_SCENE = 64 << 20 }; /* bytes of a scene */
 
@@ -96,62 +97,41 @@ json_t *regress_load(const char *path, uint64_t most) {
     return root;
 }
 
-/* Finds out whether a scene is for `flat`: those have a region. Reads it as a scene first, because that
- * checks the memory limit before taking any. */
-static int find_command(const regress_work *work, regress_case *one) {
-    vsh_error error;
-    vsh_flat_scene *scene = NULL;
-    bool flat = vsh_flat_scene_read(one->path, &work->run, &scene, &error) == VSH_OK;
-    vsh_flat_scene_free(scene);
-    if (!flat && error.code == VSH_ERROR_LIMIT) {
+static bool has_region(const char *path) {
+    json_t *root = regress_load(path, MOST_SCENE);
+    const bool has = json_object_get(root, "region") != NULL;
+    json_decref(root);
+    return has;
+}
+
+/* Completes command and outputs. A scene with a region is for `flat`. It is read as a scene first, because
+ * that checks the memory limit before taking any. */
+static int list_outputs(const regress_work *work, regress_case *one) {
+    vsh_error error = {VSH_OK, ""};
+    vsh_flat_scene *flat = NULL;
+    if (one->command == NULL || (one->command == &cli_flat && one->output == NULL)) {
+        vsh_flat_scene_read(one->path, &work->run, &flat, &error);
+    }
+    if (one->command == NULL) {
+        const bool is_flat = flat != NULL || error.code == VSH_ERROR_LIMIT || has_region(one->path);
+        one->command = is_flat ? &cli_flat : &cli_bake;
+    }
+    if (one->command == &cli_flat && error.code != VSH_OK) {
         return cli_fail(&error);
     }
-    if (!flat) {
-        json_t *root = regress_load(one->path, MOST_SCENE);
-        flat = json_object_get(root, "region") != NULL;
-        json_decref(root);
+    if (one->output == NULL && flat != NULL && flat->output != NULL) {
+        one->output = strdup(cli_file_name(flat->output));
     }
-    one->command = flat ? &cli_flat : &cli_bake;
-    return CLI_OK;
-}
-
-static void add_output(regress_case *one, const char *path) {
-    const char *slash = strrchr(path, '/');
-    regress_add_line(&one->outputs, "%s", slash != NULL ? slash + 1 : path);
-}
-
-static int list_scene_outputs(const regress_work *work, regress_case *one) {
-    vsh_error error;
-    vsh_scene *scene = NULL;
-    CLI_TRY(cli_check(vsh_scene_read(one->path, &work->run, &scene, &error), &error));
-    for (size_t i = 0; i < scene->receiver_count; ++i) {
-        add_output(one, scene->receivers[i].output);
-    }
-    vsh_scene_free(scene);
-    return CLI_OK;
-}
-
-static int list_flat_output(const regress_work *work, regress_case *one) {
-    vsh_error error;
-    vsh_flat_scene *scene = NULL;
-    CLI_TRY(cli_check(vsh_flat_scene_read(one->path, &work->run, &scene, &error), &error));
-    if (scene->output != NULL) {
-        add_output(one, scene->output);
-        one->output = strdup(one->outputs.line[0]);
-    }
-    vsh_flat_scene_free(scene);
-    return CLI_OK;
-}
-
-/* Completes command and outputs. */
-static int list_outputs(const regress_work *work, regress_case *one) {
-    CLI_TRY(one->command == NULL ? find_command(work, one) : CLI_OK);
+    vsh_flat_scene_free(flat);
     if (one->output != NULL) {
-        add_output(one, one->output);
+        regress_add_line(&one->outputs, "%s", one->output);
     } else if (one->command == &cli_bake) {
-        CLI_TRY(list_scene_outputs(work, one));
-    } else if (one->command == &cli_flat) {
-        CLI_TRY(list_flat_output(work, one));
+        vsh_scene *scene = NULL;
+        CLI_TRY(cli_check(vsh_scene_read(one->path, &work->run, &scene, &error), &error));
+        for (size_t i = 0; i < scene->receiver_count; ++i) {
+            regress_add_line(&one->outputs, "%s", cli_file_name(scene->receivers[i].output));
+        }
+        vsh_scene_free(scene);
     }
     return one->outputs.count > 0
                ? CLI_OK
@@ -300,9 +280,8 @@ static int check_options(const regress_work *work, const regress_case *one) {
 
 static int is_scene(const struct dirent *entry) {
     const char *name = entry->d_name;
-    const size_t length = strlen(name), tolerance = sizeof tolerance_ending - 1;
     return name[0] != '.' && cli_has_ending(name, "json") && strcmp(name, list_name) != 0 &&
-           (length < tolerance || strcmp(name + length - tolerance, tolerance_ending) != 0);
+           fnmatch("*.tolerance.json", name, 0) != 0;
 }
 
 static bool is_listed(const regress_work *work, size_t listed, const char *scene) {
