@@ -1,4 +1,4 @@
-# Small files that ask for much memory are refused before it is taken; tools/memory-bombs has 200 and more.
+# Small files that ask for much memory are refused before it is taken.
 load helper
 
 # within MB ARGUMENT…: the program on one thread, where the system refuses it more data than that.
