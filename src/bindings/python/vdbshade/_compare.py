@@ -1,20 +1,17 @@
 """Comparing baked values with golden ones."""
 from __future__ import annotations
 
-import os
-from typing import TYPE_CHECKING, Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy
 from numpy.typing import ArrayLike
 
 from . import types
-from ._arrays import array, pointer
-from ._library import RUN, Handle, Run, call, ffi, lib, make, place, text
-from ._structs import Filled, constant, path_of, told
+from ._arrays import array
+from ._calls import OUT, Handle, Run, ask, call
+from ._library import Path, Unpack, ffi, lib
+from ._structs import Filled, constant, path_of, structs_of, told
 from ._tables import WORDS
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
 
 MEASURES = tuple(WORDS["VSH_MEASURE_"])
 
@@ -28,23 +25,25 @@ class Measures(types.Measures):
 
 
 def _measures(struct: Any) -> Measures:
-    found = Measures(**told(struct, "vsh_measures").__dict__)
+    found = Measures(**told(struct).__dict__)
     found.value = dict(zip(MEASURES, struct.value))
     found._struct = ffi.new("vsh_measures *", struct)
     return found
 
 
-def _compared(golden: ArrayLike, values: ArrayLike, mask: Optional[ArrayLike]) -> Tuple[Any, Any]:
-    first = numpy.asarray(golden)
-    if first.ndim not in (2, 3):
-        raise ValueError(f"golden: expected shape (height, width) or (depth, height, width), got {first.shape}")
-    if max(first.shape, default=0) >= 2**31:
-        raise ValueError(f"golden: {first.shape}: too large")
-    planes = [array(golden, numpy.float32, first.shape, "golden"), array(values, numpy.float32, first.shape, "values")]
-    over = None if mask is None else array(mask, numpy.uint8, first.shape, "mask")
-    keeps = [pointer(planes[0]), pointer(planes[1]), pointer(over)]
-    size = list(reversed(first.shape)) + [1] * (3 - first.ndim)
-    return ffi.new("vsh_compared *", [size] + keeps), (keeps, planes, over)
+def _failed(bits: int) -> List[str]:
+    return [name for i, name in enumerate(MEASURES) if bits >> i & 1]
+
+
+def _compared(golden: ArrayLike, values: ArrayLike, mask: Optional[ArrayLike]) -> Filled:
+    shape = numpy.shape(golden)
+    if len(shape) not in (2, 3):
+        raise ValueError(f"golden: expected shape (height, width) or (depth, height, width), got {shape}")
+    if max(shape, default=0) >= 2**31:
+        raise ValueError(f"golden: {shape}: too large")
+    return Filled("vsh_compared", size=list(reversed(shape)) + [1] * (3 - len(shape)), golden=array(golden, numpy.float32, shape, "golden"),
+                  values=array(values, numpy.float32, shape, "values"),
+                  mask=None if mask is None else array(mask, numpy.uint8, shape, "mask"))
 
 
 def compare(golden: ArrayLike, values: ArrayLike, mask: Optional[ArrayLike] = None, *, run: Optional[Run] = None,
@@ -59,10 +58,8 @@ def compare(golden: ArrayLike, values: ArrayLike, mask: Optional[ArrayLike] = No
     **options
         vdbshade.types.CompareOptions
     """
-    compared, keeps = _compared(golden, values, mask)
     measures = ffi.new("vsh_measures *")
-    call(lib.vsh_compare, compared, Filled("vsh_compare_options", options).pointer, RUN, measures, run=run)
-    del keeps
+    call(lib.vsh_compare, _compared(golden, values, mask), Filled("vsh_compare_options", options), measures, run=run)
     return _measures(measures[0])
 
 
@@ -73,9 +70,8 @@ def compare_coverage(golden: Optional[ArrayLike], values: Optional[ArrayLike]) -
     if shape is None:
         raise TypeError("golden, values: expected an array for one of them")
     given = [None if p is None else array(p, numpy.float32, shape, "coverage") for p in planes]
-    mask, found = numpy.empty(shape, numpy.uint8), ffi.new("vsh_coverage *")
-    lib.vsh_compare_coverage(mask.size, pointer(given[0]), pointer(given[1]), pointer(mask), found)
-    return told(found[0], "vsh_coverage"), mask
+    mask = numpy.empty(shape, numpy.uint8)
+    return ask(lib.vsh_compare_coverage, mask.size, *given, mask, OUT), mask
 
 
 def compare_accuracy(truths: Sequence[ArrayLike], values: Sequence[ArrayLike], masks: Optional[Sequence[ArrayLike]] = None, *,
@@ -84,10 +80,7 @@ def compare_accuracy(truths: Sequence[ArrayLike], values: Sequence[ArrayLike], m
     if len(truths) != len(values) or (masks is not None and len(masks) != len(values)):
         raise ValueError(f"expected as many truths as values and masks, got {len(truths)} and {len(values)}")
     parts = [_compared(t, v, None if masks is None else masks[i]) for i, (t, v) in enumerate(zip(truths, values))]
-    planes = ffi.new("vsh_compared[]", [p[0][0] for p in parts] or 1)
-    found = ffi.new("vsh_accuracy *")
-    call(lib.vsh_compare_accuracy, planes, len(parts), RUN, found, run=run)
-    return told(found[0], "vsh_accuracy")
+    return call(lib.vsh_compare_accuracy, structs_of("vsh_compared", parts), len(parts), OUT, run=run)
 
 
 class Limits:
@@ -116,20 +109,19 @@ class Limits:
 
 def compare_judge(measures: Measures, limits: Optional[Limits] = None) -> List[str]:
     """Names of the measures that do not hold; none: they are alike."""
-    failed = lib.vsh_compare_judge(measures._struct, (limits or Limits()).struct)
-    return [name for i, name in enumerate(MEASURES) if failed >> i & 1]
+    return _failed(ask(lib.vsh_compare_judge, measures._struct, (limits or Limits()).struct))
 
 
-class Tolerances(Handle):
+class Tolerances(Handle, kind="vsh_tolerances"):
     """Limits from a JSON file (docs/regression.md)."""
 
-    def __init__(self, path: "str | os.PathLike[str]") -> None:
-        super().__init__(make(lib.vsh_tolerances_free, lib.vsh_tolerances_read, path_of(path, "path"), place("vsh_tolerances")))
+    def __init__(self, path: Path) -> None:
+        super().__init__(call(lib.vsh_tolerances_read, path_of(path, "path"), OUT))
 
     def limits(self, channel: str) -> Tuple[Limits, float]:
         """What it says of a channel, and the share of covered texels that may differ (NaN: nothing)."""
         limits, coverage = Limits(), ffi.new("double *", float("nan"))
-        lib.vsh_tolerances_apply(self.handle, channel.encode(), limits.struct, coverage)
+        ask(lib.vsh_tolerances_apply, self, channel, limits.struct, coverage)
         return limits, coverage[0]
 
 
@@ -150,12 +142,14 @@ class Comparison:
         self.problems: List[str] = []
         while lib.vsh_comparison_channel(cdata, len(self.channels)) != ffi.NULL:
             struct = lib.vsh_comparison_channel(cdata, len(self.channels))[0]
-            channel = told(struct, "vsh_channel_comparison")
-            channel.measures = _measures(struct.measures)
-            channel.failed = [name for i, name in enumerate(MEASURES) if struct.failed >> i & 1]
+            channel = told(struct)
+            channel.measures, channel.failed = _measures(struct.measures), _failed(struct.failed)
             self.channels.append(channel)
-        while lib.vsh_comparison_problem(cdata, len(self.problems)) != ffi.NULL:
-            self.problems.append(text(lib.vsh_comparison_problem(cdata, len(self.problems))) or "")
+        while True:
+            problem = ask(lib.vsh_comparison_problem, cdata, len(self.problems))
+            if problem is None:
+                break
+            self.problems.append(problem)
 
     def __bool__(self) -> bool:
         return self.alike
@@ -164,7 +158,7 @@ class Comparison:
         return f"<vdbshade.Comparison: {'alike' if self.alike else 'not alike'}, {len(self.channels)} channels, problems {self.problems}>"
 
 
-def compare_files(golden: "str | os.PathLike[str]", fresh: "str | os.PathLike[str]", *, limits: Optional[Mapping[str, float]] = None,
+def compare_files(golden: Path, fresh: Path, *, limits: Optional[Mapping[str, float]] = None,
                   run: Optional[Run] = None, **options: "Unpack[types.CompareFilesOptions]") -> Comparison:
     """Compares two images channel by channel, or two .vdb files grid by grid.
 
@@ -177,10 +171,5 @@ def compare_files(golden: "str | os.PathLike[str]", fresh: "str | os.PathLike[st
     """
     filled = Filled("vsh_compare_files_options", options)
     for name, value in (limits or {}).items():
-        filled.pointer.limits[constant("VSH_MEASURE_", name, "limits")] = value
-    return Comparison(make(lib.vsh_comparison_free, lib.vsh_compare_files, path_of(golden, "golden"), path_of(fresh, "fresh"),
-                           filled.pointer, RUN, place("vsh_comparison"), run=run))
-
-
-__all__ = ["Comparison", "Limits", "Measures", "Tolerances", "compare", "compare_accuracy", "compare_coverage", "compare_files",
-           "compare_judge"]
+        filled.struct.limits[constant("VSH_MEASURE_", name, "limits")] = value
+    return Comparison(call(lib.vsh_compare_files, path_of(golden, "golden"), path_of(fresh, "fresh"), filled, OUT, run=run))

@@ -1,23 +1,20 @@
 """Flat scenes: light maps of a plane, for 2D games."""
 from __future__ import annotations
 
-import os
-from typing import TYPE_CHECKING, Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy
 from numpy.typing import ArrayLike
 
-from ._arrays import array, output, pointer
-from ._library import RUN, Handle, Run, call, ffi, handle_of, lib, make, place
-from ._structs import Filled, path_of
+from . import types
+from ._arrays import output, pointer
+from ._calls import OUT, Run, ask, call
+from ._library import Path, Unpack, ffi, lib
 from ._light import Light, lights_of
-from ._outline import Outline
-from ._scene import _known, _option, _setting_text
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
-    from . import types
+from ._occluders import optional
+from ._scene import known_settings, option_of, setting_text
+from ._shapes import Outline, distances_at
+from ._structs import Filled, Struct, path_of, struct_of
 
 
 def flat_bake(casters: Optional[Outline], lights: Union[Light, Sequence[Light]] = (), *, irradiance: bool = False,
@@ -41,9 +38,7 @@ def flat_bake(casters: Optional[Outline], lights: Union[Light, Sequence[Light]] 
     dict
         arrays of float32 of shape (height, width), row 0 on top: "shadow.NAME" of each light, "A" (coverage)
     """
-    structs, count = lights_of(lights)
-    filled = Filled("vsh_flat_options", options)
-    return _bake(casters, structs, count, filled.pointer, irradiance, out, run)
+    return _bake(casters, *lights_of(lights), Filled("vsh_flat_options", options).struct, irradiance, out, run)
 
 
 def _bake(casters: Optional[Outline], structs: Any, count: int, options: Any, irradiance: bool,
@@ -60,40 +55,36 @@ def _bake(casters: Optional[Outline], structs: Any, count: int, options: Any, ir
     shadow = ffi.new("float *[]", [pointer(planes[n]) for n in names] or 1)
     colour = ffi.new("float *[3]", [pointer(planes[f"irradiance.{c}"]) for c in "RGB"]) if irradiance else ffi.NULL
     target = ffi.new("vsh_flat_map *", [shadow, colour, pointer(planes["A"])])
-    call(lib.vsh_flat_bake, ffi.NULL if casters is None else handle_of(casters, Outline, "casters"), structs, count, options, RUN,
-         target, run=run)
+    call(lib.vsh_flat_bake, optional(casters, "vsh_outline", "casters"), structs, count, options, target, run=run)
     return planes
 
 
 def flat_visibility(casters: Optional[Outline], light: Light, points: ArrayLike) -> numpy.ndarray:
     """The share of a light that points (n, 2) see, exactly: float64 of shape (n,)."""
-    at = array(points, numpy.float64, (None, 2), "points")
-    outline = ffi.NULL if casters is None else handle_of(casters, Outline, "casters")
-    first, struct = pointer(at), light.struct
-    return numpy.array([lib.vsh_flat_visibility(outline, struct, first + 2 * i) for i in range(len(at))], numpy.float64)
+    outline, struct = optional(casters, "vsh_outline", "casters"), struct_of(light, ffi.typeof("vsh_light"))
+    return distances_at(lambda shape, at: lib.vsh_flat_visibility(shape, struct, at), outline, points, 2, "points")
 
 
 def flat_light_name(type: int) -> Optional[str]:
     """What a light of a type's number is in a plane: "directional", "disc", "spot"; None where there is none."""
-    name = lib.vsh_get_name(lib.VSH_NAMES_FLAT_LIGHT, type)
-    return None if name == ffi.NULL else ffi.string(name).decode()
+    return ask(lib.vsh_get_name, lib.VSH_NAMES_FLAT_LIGHT, type)
 
 
-class FlatScene:
+class FlatScene(Struct, kind="vsh_flat_scene"):
     """A flat scene's file (docs/flat.md); settings by the names of `vdbshade flat`'s options."""
 
-    def __init__(self, path: "str | os.PathLike[str]", *, run: Optional[Run] = None, **settings: Any) -> None:
+    def __init__(self, path: Path, *, run: Optional[Run] = None, **settings: Any) -> None:
         self._filled = Filled("vsh_flat_scene")
-        self.struct = self._filled.pointer
-        self._file = make(lib.vsh_flat_scene_free, lib.vsh_flat_scene_read, path_of(path, "path"), RUN, place("vsh_flat_scene"), run=run)
+        self.struct = self._filled.struct
+        self._file = call(lib.vsh_flat_scene_read, path_of(path, "path"), OUT, run=run)
         self.struct[0] = self._file[0]
         for name, value in settings.items():
             self.set(name, value)
 
     def set(self, name: str, value: Any) -> None:
         """Sets what a setting's key or option says."""
-        _known(name, ("flat",))
-        call(lib.vsh_flat_scene_set, self.struct, _option(name).encode(), self._filled.text(_setting_text(value), name))
+        known_settings(name, ("flat",))
+        call(lib.vsh_flat_scene_set, self, option_of(name), self._filled.text(setting_text(value), name))
 
     @property
     def lights(self) -> List[Light]:
@@ -105,17 +96,9 @@ class FlatScene:
 
     def casters(self, *, run: Optional[Run] = None) -> Optional[Outline]:
         """The union of its casters; None where it has none."""
-        cdata = make(lib.vsh_outline_free, lib.vsh_flat_scene_casters, self.struct, RUN, place("vsh_outline"), run=run)
-        if cdata is None:
-            return None
-        outline = Outline.__new__(Outline)
-        Handle.__init__(outline, cdata)
-        return outline
+        return Outline._of(call(lib.vsh_flat_scene_casters, self, OUT, run=run))
 
     def bake(self, *, irradiance: bool = True, run: Optional[Run] = None) -> Dict[str, numpy.ndarray]:
         """As flat_bake()."""
         return _bake(self.casters(run=run), self.struct.lights, self.struct.light_count, ffi.addressof(self.struct, "options"),
                      irradiance, None, run)
-
-
-__all__ = ["FlatScene", "flat_bake", "flat_light_name", "flat_visibility"]

@@ -1,34 +1,25 @@
 """Narrow-band level sets: of meshes, procedural shapes, functions, outlines and .vdb files."""
 from __future__ import annotations
 
-import os
-from typing import TYPE_CHECKING, Any, Callable, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy
 from numpy.typing import ArrayLike
 
-from ._arrays import output, pointer, transform as matrix
-from ._library import RUN, Handle, Run, call, ffi, handle_of, lib, make, note, place
-from ._structs import Filled, info, path_of, told
+from . import types
+from ._arrays import output, transform as matrix
+from ._calls import OUT, Handle, Run, call, note
+from ._library import Path, Unpack, ffi, lib
 from ._mesh import Meshes, meshes_of
-from ._outline import Outline
-from ._sdf import Sdf
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
-    from . import types
+from ._shapes import Outline, Sdf, instances_of
+from ._structs import Filled, path_of, structs_of, told
 
 Attributes = Mapping[str, str]
 
 
-class attributes_of:
-    """Lines of text that a file carries, as C takes them."""
-
-    def __init__(self, given: Optional[Attributes]) -> None:
-        self.keeps = [(ffi.new("char[]", k.encode()), ffi.new("char[]", v.encode())) for k, v in (given or {}).items()]
-        self.array = ffi.new("vsh_attribute[]", [dict(name=k, value=v) for k, v in self.keeps] or 1)
-        self.count = len(self.keeps)
+def attributes_of(given: Optional[Attributes]) -> List[Dict[str, str]]:
+    """Lines of text that a file carries, as members of ``vsh_attribute``."""
+    return [dict(name=name, value=value) for name, value in (given or {}).items()]
 
 
 class _Distance:
@@ -39,58 +30,43 @@ class _Distance:
         self.raised: Optional[BaseException] = None
 
 
-def _raised(kind: Any, value: Any, traceback: Any) -> None:
-    given = traceback.tb_frame.f_locals.get("distance") if traceback is not None else None
-    if isinstance(given, _Distance):
-        given.raised = given.raised or value
-    else:
-        note(kind, value, traceback)
-
-
 # Called by several threads, which hold the GIL here in turn.
-@ffi.callback("vsh_distances_fn *", onerror=_raised)
+@ffi.callback("vsh_distances_fn *", onerror=note)
 def _distances(user: Any, count: int, positions: Any, distances: Any) -> None:
-    distance = ffi.from_handle(user)
+    running = ffi.from_handle(user)
     result = numpy.frombuffer(ffi.buffer(distances, 8 * count), numpy.float64)
     result[:] = numpy.nan  # what ends the call, where the function raises
-    if distance.raised is None:
+    if running.raised is None:
         # a copy: C's own are gone when the function returns, whoever keeps them
         at = numpy.array(numpy.frombuffer(ffi.buffer(positions, 24 * count), numpy.float64)).reshape(count, 3)
         at.flags.writeable = False
-        found = numpy.asarray(distance.function(at), numpy.float64)
+        found = numpy.asarray(running.function(at), numpy.float64)
         if found.shape != (count,):
             raise ValueError(f"distance function: expected {count} distances for {count} positions, got shape {found.shape}")
         result[:] = found
 
 
-class Grid(Handle):
+class Grid(Handle, kind="vsh_grid"):
     """A level set: OpenVDB's grid of floats. Made by its ``from_…`` methods and ``read``.
 
     Voxels are given by `voxel_size` (world units) or `resolution` (voxels along the longest side, 256), the band's
     `half_width` and sheets' `shell_thickness` in voxels (vdbshade.types.GridOptions).
     """
 
+    info: types.GridInfo
+
     def __init__(self, *arguments: Any) -> None:
         raise TypeError("a Grid is made by Grid.from_meshes(), from_sdf(), from_distance(), from_outline(), unite() or read()")
 
     @classmethod
-    def _made(cls, function: Any, *arguments: Any, run: Optional[Run]) -> "Grid":
-        self = cls.__new__(cls)
-        Handle.__init__(self, make(lib.vsh_grid_free, function, *arguments, RUN, place("vsh_grid"), run=run))
-        return self
-
-    @classmethod
     def from_meshes(cls, meshes: Meshes, *, run: Optional[Run] = None, **options: "Unpack[types.GridOptions]") -> "Grid":
         """The union of what meshes are taken for: solids, rooms, walls, sheets."""
-        structs, count, _ = meshes_of(meshes)
-        return cls._made(lib.vsh_grid_from_meshes, structs, count, Filled("vsh_grid_options", options).pointer, run=run)
+        return cls._of(call(lib.vsh_grid_from_meshes, *meshes_of(meshes), Filled("vsh_grid_options", options), OUT, run=run))
 
     @classmethod
     def from_sdf(cls, sdf: Sdf, *, run: Optional[Run] = None, **options: "Unpack[types.GridOptions]") -> "Grid":
         """A procedural tree, voxelised where its surface is."""
-        if not isinstance(sdf, Sdf):
-            raise TypeError(f"sdf: expected a vdbshade.Sdf, got {type(sdf).__name__}")
-        return cls._made(lib.vsh_grid_from_sdf, sdf.struct, Filled("vsh_grid_options", options).pointer, run=run)
+        return cls._of(call(lib.vsh_grid_from_sdf, sdf, Filled("vsh_grid_options", options), OUT, run=run))
 
     @classmethod
     def from_distance(cls, distance: Callable[[numpy.ndarray], ArrayLike], bounds_min: Sequence[float],
@@ -115,51 +91,35 @@ class Grid(Handle):
         if not callable(distance):
             raise TypeError(f"distance: expected a function, got {type(distance).__name__}")
         given = _Distance(distance)
-        handle = ffi.new_handle(given)
-        filled = Filled("vsh_distance", dict(lipschitz=lipschitz, exact=exact, bounds_min=bounds_min, bounds_max=bounds_max))
-        filled.pointer.user = handle
-        try:
-            return cls._made(lib.vsh_grid_from_distances, filled.pointer, _distances,
-                             Filled("vsh_grid_options", options).pointer, run=run)
-        except Exception:
-            if given.raised is not None:
-                raise given.raised from None
-            raise
+        filled = Filled("vsh_distance", lipschitz=lipschitz, exact=exact, bounds_min=bounds_min, bounds_max=bounds_max,
+                        user=ffi.new_handle(given))
+        return cls._of(call(lib.vsh_grid_from_distances, filled, _distances, Filled("vsh_grid_options", options), OUT, run=run,
+                            watched=given))
 
     @classmethod
     def from_outline(cls, outline: Outline, thickness: float, *, transform: Optional[ArrayLike] = None,
                      run: Optional[Run] = None, **options: "Unpack[types.GridOptions]") -> "Grid":
         """An outline extruded along z by a thickness, local units; `transform` (3, 4) as of unite()."""
-        moved = matrix(transform)
-        return cls._made(lib.vsh_grid_from_outline, handle_of(outline, Outline, "outline"), thickness, pointer(moved),
-                         Filled("vsh_grid_options", options).pointer, run=run)
+        return cls._of(call(lib.vsh_grid_from_outline, outline, thickness, matrix(transform), Filled("vsh_grid_options", options), OUT,
+                            run=run))
 
     @classmethod
-    def read(cls, path: "str | os.PathLike[str]", name: Optional[str] = None, *, run: Optional[Run] = None) -> "Grid":
+    def read(cls, path: Path, name: Optional[str] = None, *, run: Optional[Run] = None) -> "Grid":
         """A level set of a .vdb file; `name` None: its first."""
-        return cls._made(lib.vsh_grid_read, path_of(path, "path"), ffi.NULL if name is None else name.encode(), run=run)
+        return cls._of(call(lib.vsh_grid_read, path_of(path, "path"), name, OUT, run=run))
 
     @classmethod
     def unite(cls, grids: "Sequence[Union[Grid, Tuple[Grid, ArrayLike]]]", *, run: Optional[Run] = None,
               **options: "Unpack[types.GridOptions]") -> "Grid":
         """The union of grids, or of pairs of a grid and its transform, shape (3, 4): rotation, translation, mirroring
         and one scale."""
-        keeps = []
-        for entry in grids:
-            grid, moved = entry if isinstance(entry, tuple) else (entry, None)
-            keeps.append((handle_of(grid, Grid, "grids"), pointer(matrix(moved))))
-        instances = ffi.new("vsh_grid_instance[]", [dict(grid=g, transform=t) for g, t in keeps] or 1)
-        return cls._made(lib.vsh_grid_unite, instances, len(keeps), Filled("vsh_grid_options", options).pointer, run=run)
+        instances = instances_of("vsh_grid_instance", grids, matrix)
+        return cls._of(call(lib.vsh_grid_unite, instances, len(grids), Filled("vsh_grid_options", options), OUT, run=run))
 
-    def write(self, path: "str | os.PathLike[str]", name: Optional[str] = None, attributes: Optional[Attributes] = None) -> None:
+    def write(self, path: Path, name: Optional[str] = None, attributes: Optional[Attributes] = None) -> None:
         """Writes a .vdb file, whole or not at all; `name` None: "surface"."""
-        told_of = attributes_of(attributes)
-        call(lib.vsh_grid_write, self.handle, path_of(path, "path"), ffi.NULL if name is None else name.encode(),
-             told_of.array, told_of.count)
-
-    @property
-    def info(self) -> "types.GridInfo":
-        return info(lib.vsh_grid_get_info, "vsh_grid_info", self.handle)
+        lines = attributes_of(attributes)
+        call(lib.vsh_grid_write, self, path_of(path, "path"), name, structs_of("vsh_attribute", lines), len(lines))
 
     def values(self, index_min: Optional[Sequence[int]] = None, shape: Optional[Sequence[int]] = None,
                out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
@@ -179,7 +139,7 @@ class Grid(Handle):
         array of float32, shape (depth, height, width)
             world units, negative inside; beyond the band ± its half width
         """
-        return dense(self.info, index_min, shape, out, lambda low, size, values: call(lib.vsh_grid_copy, self.handle, low, size, values))
+        return dense(self.info, index_min, shape, out, lambda *box: call(lib.vsh_grid_copy, self, *box))
 
 
 def dense(box: Any, index_min: Optional[Sequence[int]], shape: Optional[Sequence[int]], out: Optional[numpy.ndarray],
@@ -191,30 +151,25 @@ def dense(box: Any, index_min: Optional[Sequence[int]], shape: Optional[Sequence
     if len(low) != 3 or len(shape) != 3 or not all(1 <= n < 2**31 for n in shape) or not all(abs(i) < 2**31 for i in low):
         raise ValueError(f"index_min {tuple(low)}, shape {tuple(shape)}: expected three indices, and sizes of at least 1")
     values = output(out, numpy.float32, tuple(int(n) for n in shape), "out")
-    copy(ffi.new("int32_t[3]", low), ffi.new("int32_t[3]", [int(n) for n in reversed(shape)]), pointer(values))
+    copy(ffi.new("int32_t[3]", low), ffi.new("int32_t[3]", [int(n) for n in reversed(shape)]), values)
     return values
 
 
-def vdb_list(path: "str | os.PathLike[str]", *, run: Optional[Run] = None) -> "List[types.VdbEntry]":
+def vdb_list(path: Path, *, run: Optional[Run] = None) -> List[types.VdbEntry]:
     """What grids a .vdb file has, of any kind."""
     count, capacity = ffi.new("size_t *"), 16
     while True:
         entries = ffi.new("vsh_vdb_entry[]", capacity)
-        call(lib.vsh_vdb_list, path_of(path, "path"), RUN, entries, capacity, count, run=run)
+        call(lib.vsh_vdb_list, path_of(path, "path"), entries, capacity, count, run=run)
         if count[0] <= capacity:
-            return [told(entries[i], "vsh_vdb_entry") for i in range(count[0])]
+            return [told(entries[i]) for i in range(count[0])]
         capacity = count[0]
 
 
-def vdb_copy(path: "str | os.PathLike[str]", index_min: Sequence[int], shape: Sequence[int], name: Optional[str] = None, *,
+def vdb_copy(path: Path, index_min: Sequence[int], shape: Sequence[int], name: Optional[str] = None, *,
              run: Optional[Run] = None) -> Tuple[numpy.ndarray, numpy.ndarray]:
     """Values of a grid of numbers of a .vdb file, and where it is active: two arrays of float32 (depth, height, width),
     from the voxel `index_min` (x, y, z) on; `name` None: the first such grid."""
     active = numpy.empty(tuple(int(n) for n in shape), numpy.float32)
-    values = dense(None, index_min, shape, None, lambda low, size, values: call(
-        lib.vsh_vdb_copy, path_of(path, "path"), ffi.NULL if name is None else name.encode(), low, size, RUN, values,
-        pointer(active), run=run))
+    values = dense(None, index_min, shape, None, lambda *box: call(lib.vsh_vdb_copy, path_of(path, "path"), name, *box, active, run=run))
     return values, active
-
-
-__all__ = ["Grid", "vdb_copy", "vdb_list"]

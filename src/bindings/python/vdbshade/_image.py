@@ -1,20 +1,17 @@
 """Image files: planes of floats with names."""
 from __future__ import annotations
 
-import os
-from typing import TYPE_CHECKING, Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Dict, Mapping, Optional, Sequence, Tuple
 
 import numpy
 from numpy.typing import ArrayLike
 
 from . import types
 from ._arrays import array, borrowed, pointer
-from ._library import RUN, Run, call, ffi, lib, make, place, text
-from ._structs import Filled, constant, keep, path_of, told
+from ._calls import OUT, Run, ask, call
 from ._grid import Attributes, attributes_of
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
+from ._library import Path, Unpack, ffi, lib, text
+from ._structs import Filled, constant, keep, pairs_of, path_of, texts_of
 
 _AXES = {"irradiance": "RGB", "tint": "RGB", "bent": "XYZ"}
 _HOLDS = {"irradiance": "light", "tint": "light", "bent": "vector"}
@@ -36,30 +33,26 @@ def _flat(channels: Mapping[str, ArrayLike]) -> "Tuple[Dict[str, numpy.ndarray],
     return planes, holds
 
 
-class _Image:
-    """``vsh_image`` of channels by their names."""
+def _named(names: Sequence[str], shape: Tuple[int, int], holds: Optional[Mapping[str, str]] = None) -> Filled:
+    """``vsh_image`` of channels' names, without planes."""
+    kinds = [constant("VSH_CHANNEL_", (holds or {}).get(n, _HOLDS.get(n.split(".")[0], "data")), "holds") for n in names]
+    return Filled("vsh_image", width=shape[1], height=shape[0], channel_count=len(names), names=texts_of(list(names), "names"),
+                  holds=ffi.new("int32_t[]", kinds or 1))
 
-    def __init__(self, channels: Mapping[str, ArrayLike], holds: Optional[Mapping[str, str]] = None,
-                 shape: Optional[Tuple[int, int]] = None) -> None:
-        planes, kinds = _flat(channels)
-        kinds.update(holds or {})
-        arrays: List[numpy.ndarray] = []
-        for name, values in planes.items():
-            if shape is None:
-                if values.ndim != 2:
-                    raise ValueError(f"channel {name!r}: expected shape (height, width) or (height, width, 3), got {values.shape}")
-                shape = values.shape  # type: ignore[assignment]
-            arrays.append(array(values, numpy.float32, shape or (), f"channel {name!r}"))
-        height, width = shape or (0, 0)
-        if max(height, width) >= 2**31:
-            raise ValueError(f"an image of {width} × {height}: too large")
-        texts = [ffi.new("char[]", name.encode()) for name in planes]
-        count = len(planes)
-        names = ffi.new("char *[]", texts or 1)
-        pointers = ffi.new("float *[]", [pointer(a) for a in arrays] or 1)
-        held = ffi.new("int32_t[]", [constant("VSH_CHANNEL_", kinds[n], "holds") for n in planes] or 1)
-        self.struct = ffi.new("vsh_image *", [width, height, count, names, pointers, held])
-        keep(self.struct, [texts, arrays, names, pointers, held])
+
+def image_of(channels: Mapping[str, ArrayLike], holds: Optional[Mapping[str, str]] = None) -> Filled:
+    """``vsh_image`` of channels by their names."""
+    planes, kinds = _flat(channels)
+    kinds.update(holds or {})
+    shape: Any = next((plane.shape for plane in planes.values()), (0, 0))
+    if len(shape) != 2:
+        raise ValueError(f"channel {next(iter(planes))!r}: expected shape (height, width) or (height, width, 3), got {shape}")
+    if max(shape) >= 2**31:
+        raise ValueError(f"an image of {shape[1]} × {shape[0]}: too large")
+    pointers = [pointer(array(plane, numpy.float32, shape, f"channel {name!r}")) for name, plane in planes.items()]
+    image = _named(list(planes), shape, kinds)
+    image.fill(dict(planes=keep(ffi.new("float *[]", pointers or 1), pointers)))
+    return image
 
 
 class Image(dict):
@@ -74,28 +67,24 @@ class Image(dict):
     attributes: Dict[str, str]
 
 
-def image_read(path: "str | os.PathLike[str]", *, run: Optional[Run] = None) -> Image:
+def image_read(path: Path, *, run: Optional[Run] = None) -> Image:
     """Reads an image; integers become 0 … 1 as they stand."""
-    file = make(lib.vsh_image_free, lib.vsh_image_read, path_of(path, "path"), RUN, place("vsh_image_file"), run=run)
+    file = call(lib.vsh_image_read, path_of(path, "path"), OUT, run=run)
     view = lib.vsh_image_view(file)
     image = Image()
     for i in range(view.channel_count):
         image[text(view.names[i])] = borrowed(view.planes[i], (view.height, view.width), numpy.float32, file)
     count = ffi.new("size_t *")
     attributes = lib.vsh_image_attributes(file, count)
-    image.attributes = {text(attributes[i].name): text(attributes[i].value) for i in range(count[0])}  # type: ignore[misc]
+    image.attributes = pairs_of(attributes, count[0])
     return image
 
 
 def _options(options: Any, attributes: Optional[Attributes]) -> Filled:
-    filled = Filled("vsh_image_options", options)
-    lines = attributes_of(attributes)
-    filled.keeps.append(lines)
-    filled.pointer.attributes, filled.pointer.attribute_count = lines.array, lines.count
-    return filled
+    return Filled("vsh_image_options", options, attributes=attributes_of(attributes))
 
 
-def image_write(path: "str | os.PathLike[str]", channels: Mapping[str, ArrayLike], *, holds: Optional[Mapping[str, str]] = None,
+def image_write(path: Path, channels: Mapping[str, ArrayLike], *, holds: Optional[Mapping[str, str]] = None,
                 attributes: Optional[Attributes] = None, **options: "Unpack[types.ImageOptions]") -> None:
     """Writes an image, whole or not at all; the path's ending is the format (docs/formats.md).
 
@@ -111,34 +100,21 @@ def image_write(path: "str | os.PathLike[str]", channels: Mapping[str, ArrayLike
     **options
         vdbshade.types.ImageOptions: bits, pack, color_space
     """
-    image = _Image(channels, holds)
-    call(lib.vsh_image_write, path_of(path, "path"), image.struct, _options(options, attributes).pointer)
+    call(lib.vsh_image_write, path_of(path, "path"), image_of(channels, holds), _options(options, attributes))
 
 
-def image_check(path: "str | os.PathLike[str]", names: Sequence[str], shape: Tuple[int, int], *,
+def image_check(path: Path, names: Sequence[str], shape: Tuple[int, int], *,
                 attributes: Optional[Attributes] = None, **options: "Unpack[types.ImageOptions]") -> int:
     """Whether such an image could be written, without writing; bytes that writing would take at most."""
-    image = _named(names, shape)
-    given = _options(options, attributes)
-    call(lib.vsh_image_check, path_of(path, "path"), image, given.pointer)
-    return lib.vsh_image_writer_bytes(path_of(path, "path"), image, given.pointer)
-
-
-def _named(names: Sequence[str], shape: Tuple[int, int], holds: Optional[Mapping[str, str]] = None) -> Any:
-    """``vsh_image`` of channels' names, without planes."""
-    texts = [ffi.new("char[]", name.encode()) for name in names]
-    listed = ffi.new("char *[]", texts or 1)
-    kinds = [(holds or {}).get(n, _HOLDS.get(n.split(".")[0], "data")) for n in names]
-    held = ffi.new("int32_t[]", [constant("VSH_CHANNEL_", k, "holds") for k in kinds] or 1)
-    struct = ffi.new("vsh_image *", [shape[1], shape[0], len(names), listed, ffi.NULL, held])
-    keep(struct, [texts, listed, held])
-    return struct
+    given = (path_of(path, "path"), _named(names, shape), _options(options, attributes))
+    call(lib.vsh_image_check, *given)
+    return ask(lib.vsh_image_writer_bytes, *given)
 
 
 def image_default_pack(names: Sequence[str]) -> str:
     """The packing that is used where none is given: "R=irradiance.R,…"."""
     packed = ffi.new("char[]", 1024)
-    lib.vsh_image_default_pack(_named(names, (1, 1)), packed, 1024)
+    ask(lib.vsh_image_default_pack, _named(names, (1, 1)), packed, 1024)
     return ffi.string(packed).decode()
 
 
@@ -154,12 +130,11 @@ class ImageWriter:
         height and width
     """
 
-    def __init__(self, path: "str | os.PathLike[str]", names: Sequence[str], shape: Tuple[int, int], *,
+    def __init__(self, path: Path, names: Sequence[str], shape: Tuple[int, int], *,
                  holds: Optional[Mapping[str, str]] = None, attributes: Optional[Attributes] = None,
                  **options: "Unpack[types.ImageOptions]") -> None:
         self._names, self._width = list(names), shape[1]
-        self._writer = make(lib.vsh_image_writer_abandon, lib.vsh_image_writer_create, path_of(path, "path"),
-                            _named(names, shape, holds), _options(options, attributes).pointer, place("vsh_image_writer"))
+        self._writer = call(lib.vsh_image_writer_create, path_of(path, "path"), _named(names, shape, holds), _options(options, attributes), OUT)
 
     def _open(self) -> Any:
         if self._writer is None:
@@ -179,9 +154,7 @@ class ImageWriter:
     @property
     def clipping(self) -> types.ImageClipping:
         """Light that integers cut, of the rows so far."""
-        found = ffi.new("vsh_image_clipping *")
-        call(lib.vsh_image_writer_get_clipping, self._open(), found)
-        return told(found[0], "vsh_image_clipping")
+        return call(lib.vsh_image_writer_get_clipping, self._open(), OUT)
 
     def finish(self) -> None:
         """Puts the file in place."""
@@ -208,6 +181,3 @@ class ImageWriter:
 def srgb_to_linear(encoded: float) -> float:
     """Takes the sRGB curve off a value of 0 … 1."""
     return lib.vsh_srgb_to_linear(encoded)
-
-
-__all__ = ["Image", "ImageWriter", "image_check", "image_default_pack", "image_read", "image_write", "srgb_to_linear"]

@@ -1,19 +1,15 @@
 """Lights: directional with an angular diameter, sphere, spot, rectangle."""
 from __future__ import annotations
 
-import os
-from typing import TYPE_CHECKING, Any, List, Optional, Sequence, Tuple, Union
+from typing import Any, List, Optional, Sequence, Tuple, Union
 
-from ._library import RUN, Run, call, ffi, lib
-from ._structs import Filled, members, path_of, told
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
-    from . import types
+from . import types
+from ._calls import OUT, Run, call
+from ._library import Path, Unpack, ffi, lib
+from ._structs import Filled, Struct, path_of, structs_of, told
 
 
-class Light:
+class Light(Struct, kind="vsh_light"):
     """A light. What a type does not name is ignored; a size of 0 is a hard light.
 
     Parameters
@@ -32,22 +28,14 @@ class Light:
     """
 
     def __init__(self, type: str = "directional", **options: "Unpack[types.Light]") -> None:
-        self._filled = Filled("vsh_light", dict(options, type=type))
-        self.struct = self._filled.pointer
-        call(lib.vsh_light_check, self.struct)
+        self.struct = Filled("vsh_light", options, type=type).struct
+        call(lib.vsh_light_check, self)
 
     @classmethod
     def _of(cls, struct: Any) -> "Light":
         self = cls.__new__(cls)
-        self._filled = Filled("vsh_light")
-        self.struct = self._filled.pointer
-        self.struct[0] = struct
+        self.struct = ffi.new("vsh_light *", struct)
         return self
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_") or name not in members("vsh_light"):
-            raise AttributeError(name)
-        return getattr(told(self.struct[0], "vsh_light"), name)
 
     def __repr__(self) -> str:
         text = ffi.new("char[]", 256)
@@ -55,7 +43,7 @@ class Light:
         return f"<vdbshade.Light {self.name}: {ffi.string(text).decode()}>"
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Light) and told(self.struct[0], "vsh_light") == told(other.struct[0], "vsh_light")
+        return isinstance(other, Light) and told(self.struct) == told(other.struct)
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -65,14 +53,10 @@ def lights_of(given: Union[Light, Sequence[Light]], name: str = "lights") -> Tup
     lights = [given] if isinstance(given, Light) else list(given)
     if not all(isinstance(light, Light) for light in lights):
         raise TypeError(f"{name}: expected a vdbshade.Light, or several in a list")
-    structs = ffi.new("vsh_light[]", max(len(lights), 1))
-    for i, light in enumerate(lights):
-        structs[i] = light.struct[0]
-    return structs, len(lights)
+    return structs_of("vsh_light", lights), len(lights)
 
 
-def lights_read(path: "str | os.PathLike[str]", angle: float, radius: float, unit: float = 0.0, *,
-                run: Optional[Run] = None) -> List[Light]:
+def lights_read(path: Path, angle: float, radius: float, unit: float = 0.0, *, run: Optional[Run] = None) -> List[Light]:
     """The lights of a glTF's file as those of a scene, which have sizes.
 
     Parameters
@@ -84,7 +68,5 @@ def lights_read(path: "str | os.PathLike[str]", angle: float, radius: float, uni
     unit : float
         of the file's numbers, metres; 0: as it says itself
     """
-    lights, count = ffi.new("vsh_light **"), ffi.new("size_t *")
-    call(lib.vsh_lights_read, path_of(path, "path"), angle, radius, unit, RUN, lights, count, run=run)
-    owned = ffi.gc(lights[0], lib.vsh_lights_free)
-    return [Light._of(owned[i]) for i in range(count[0])]
+    lights, count = call(lib.vsh_lights_read, path_of(path, "path"), angle, radius, unit, OUT, OUT, run=run)
+    return [Light._of(lights[i]) for i in range(count)]

@@ -1,23 +1,22 @@
-"""Lightmaps: the texels of a receiver's charts, shaded into arrays."""
+"""Lightmaps and volumes: a receiver's charts shaded into arrays, and voxels shaded into sparse grids."""
 from __future__ import annotations
 
-import os
-from typing import TYPE_CHECKING, Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy
+from numpy.typing import ArrayLike
 
 from . import types
-from ._arrays import borrowed, output, pointer, vector
-from ._library import RUN, Handle, Run, call, ffi, handle_of, lib, make, place
-from ._structs import Filled, constant, info, split, told
+from ._arrays import array, borrowed, output, pointer, vector
+from ._calls import OUT, Handle, Run, Several, ask, call
+from ._grid import Attributes, Grid, attributes_of, dense
 from ._image import image_write
+from ._library import Path, Unpack, ffi, lib
 from ._light import Light, lights_of
 from ._mesh import Meshes, meshes_of
 from ._occluders import Occluders
-from ._points import tint_of
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
+from ._points import Stats, tint_of
+from ._structs import Filled, Struct, constant, keep, path_of, split, struct_of, structs_of, told
 
 
 def _lightmap_options(options: Dict[str, Any]) -> Filled:
@@ -25,23 +24,23 @@ def _lightmap_options(options: Dict[str, Any]) -> Filled:
     return Filled("vsh_lightmap_options", dict(own, shade=shade))
 
 
+def _handle(charts: Any) -> Any:
+    return struct_of(charts, ffi.typeof("vsh_charts"))
+
+
 def charts_closeness(meshes: Meshes, width: int, height: int, *, run: Optional[Run] = None) -> types.Closeness:
     """How close to each other the charts of a lightmap of this size (texels) lie."""
-    structs, count, _ = meshes_of(meshes)
-    found = ffi.new("vsh_closeness *")
-    call(lib.vsh_charts_closeness, structs, count, width, height, RUN, found, run=run)
-    return told(found[0], "vsh_closeness")
+    return call(lib.vsh_charts_closeness, *meshes_of(meshes), width, height, OUT, run=run)
 
 
-class Texels(Handle):
+class Texels(Handle, kind="vsh_texels"):
     """Where each texel of a lightmap lies in the world, by Charts.texels()."""
 
     @property
     def samples(self) -> Dict[str, numpy.ndarray]:
         """The samples, tile by tile, as views: "positions" float64 (n, 3), "normals" and "geometric_normals" float32 (n, 3),
         "texels" uint32 (n,)."""
-        found = ffi.new("vsh_texel_samples *")
-        found[0] = lib.vsh_texels_samples(self.handle)
+        found = lib.vsh_texels_samples(self.handle)
         n, owner = found.count, self.handle
         return dict(positions=borrowed(found.positions, (n, 3), numpy.float64, owner),
                     normals=borrowed(found.normals, (n, 3), numpy.float32, owner),
@@ -49,7 +48,7 @@ class Texels(Handle):
                     texels=borrowed(found.texels, (n,), numpy.uint32, owner))
 
 
-class Charts(Handle):
+class Charts(Handle, kind="vsh_charts"):
     """The charts of a receiver at one size of lightmap. They keep the meshes' arrays.
 
     Parameters
@@ -66,39 +65,29 @@ class Charts(Handle):
         vdbshade.types.LightmapOptions and ShadeOptions: what a bake is made by that is given no other
     """
 
+    info: types.ChartsInfo
+
     def __init__(self, meshes: Meshes, *, run: Optional[Run] = None, **options: Any) -> None:
-        structs, count, keeps = meshes_of(meshes)
-        reports = ffi.new("vsh_uv_report[]", max(count, 1))
-        self._begin(make(_freeing(lib.vsh_charts_free, (structs, keeps)), lib.vsh_charts_create, structs, count,
-                         _lightmap_options(options).pointer, RUN, reports, place("vsh_charts"), run=run),
-                    count)
+        structs, count = meshes_of(meshes)
+        reports, charts = call(lib.vsh_charts_create, structs, count, _lightmap_options(options), Several(count), OUT, run=run, keeps=structs)
+        self._begin(charts, count)
         #: what is wrong with the UVs, mesh by mesh
-        self.uv_reports: List[types.UvReport] = [told(reports[i], "vsh_uv_report") for i in range(count)]
+        self.uv_reports: List[types.UvReport] = reports
 
     def _begin(self, cdata: Any, mesh_count: int) -> None:
         Handle.__init__(self, cdata)
         self.shape: Tuple[int, int] = (self.info.height, self.info.width)
         self.mesh_count = mesh_count
 
-    @property
-    def info(self) -> types.ChartsInfo:
-        return info(lib.vsh_charts_get_info, "vsh_charts_info", self.handle)
-
     def texels(self, *, run: Optional[Run] = None) -> Texels:
         """Where each texel lies in the world."""
-        return Texels(make(lib.vsh_texels_free, lib.vsh_texels_create, self.handle, RUN, place("vsh_texels"), run=run))
-
-
-def _freeing(free: Any, keeps: Any) -> Any:
-    def freed(cdata: Any, keeps: Any = keeps) -> None:  # what it refers to lives until then
-        free(cdata)
-    return freed
+        return Texels(call(lib.vsh_texels_create, self, OUT, run=run))
 
 
 class Planes(Dict[str, numpy.ndarray]):
     """Planes of an image by their channels' names."""
 
-    def write(self, path: "str | os.PathLike[str]", **options: Any) -> None:
+    def write(self, path: Path, **options: Any) -> None:
         """Writes them as an image; options of image_write()."""
         image_write(path, self, **options)
 
@@ -122,18 +111,17 @@ class Lightmap(Planes):
     field_errors: Dict[str, float]
 
 
-class _Planes:
+class _Planes(Struct):
     """``vsh_lightmap`` and the arrays that it points to."""
 
     def __init__(self, shape: Tuple[int, int], names: Sequence[str], out: Optional[Mapping[str, numpy.ndarray]], *, ao: bool = False,
                  irradiance: bool = False, bent: Optional[str] = None, sky: Optional[str] = None, error: bool = False,
-                 invalid: bool = False, tint: Any = None, ambient: Any = None, shadow: bool = True) -> None:
+                 invalid: bool = False, tint: Any = None, ambient: Any = None) -> None:
         wanted: Dict[str, Tuple[int, ...]] = {}
         threes = (*shape, 3)
-        lights = [n for n in names if shadow]
-        wanted.update({f"shadow.{n}": shape for n in lights})
-        wanted.update({f"tint.{n}": threes for n in lights if tint is not None})
-        wanted.update({f"error.{n}": shape for n in lights if error})
+        wanted.update({f"shadow.{n}": shape for n in names})
+        wanted.update({f"tint.{n}": threes for n in names if tint is not None})
+        wanted.update({f"error.{n}": shape for n in names if error})
         for name, asked, size in (("ao", ao, shape), ("error.ao", ao and error, shape), ("irradiance", irradiance, threes),
                                   ("bent", bent, threes), ("sky", sky, shape), ("invalid", invalid, shape), ("A", True, shape)):
             if asked:
@@ -144,27 +132,17 @@ class _Planes:
         if unknown:
             raise ValueError(f"out: {', '.join(sorted(unknown))}: not asked for; there are {', '.join(wanted)}")
         self.arrays = {n: output((out or {}).get(n), numpy.float32, size, f"out[{n!r}]") for n, size in wanted.items()}
-        self.keeps: list = []
-        struct = self.struct = ffi.new("vsh_lightmap *")
+        given: Dict[str, Any] = dict(asked=dict(invalid=bool(invalid), sky=sky))
+        given["bent_space"] = None if bent is None else constant("VSH_BENT_", bent, "bent")
+        given["tint_by"] = None if tint is None else tint_of(tint)
+        given["ambient"] = None if ambient is None else vector(ambient, 3, "ambient")
         for member, kind in (("shadow", "shadow"), ("tint", "tint"), ("shadow_error", "error")):
             planes = [pointer(self.arrays[f"{kind}.{n}"]) for n in names if f"{kind}.{n}" in self.arrays]
-            if planes:
-                self.keeps.append(ffi.new("float *[]", planes))
-                setattr(struct, member, self.keeps[-1])
+            given[member] = keep(ffi.new("float *[]", planes), planes) if planes else None
         for member, kind in (("ao", "ao"), ("ao_error", "error.ao"), ("irradiance", "irradiance"), ("coverage", "A"),
                              ("bent", "bent"), ("sky", "sky"), ("invalid", "invalid")):
-            if kind in self.arrays:
-                setattr(struct, member, pointer(self.arrays[kind]))
-        if tint is not None:
-            struct.tint_by = tint_of(tint).pointer[0]
-        if ambient is not None:
-            self.keeps.append(vector(ambient, 3, "ambient"))
-            struct.ambient = self.keeps[-1]
-        if bent is not None:
-            struct.bent_space = constant("VSH_BENT_", bent, "bent")
-        struct.asked.invalid = bool(invalid)
-        if sky is not None:
-            struct.asked.sky = constant("VSH_UP_", sky, "sky")
+            given[member] = self.arrays.get(kind)
+        self.struct = Filled("vsh_lightmap", given).struct
 
 
 def _names(structs: Any, count: int) -> List[str]:
@@ -207,18 +185,16 @@ def bake_lightmap(occluders: Occluders, charts: Charts, lights: Union[Light, Seq
     """
     structs, count = lights_of(lights)
     names = _names(structs, count)
-    target = handle_of(charts, Charts, "charts")
+    target = _handle(charts)
     planes = _Planes(charts.shape, names, out, ao=ao, irradiance=irradiance, bent=bent, sky=sky, error=error, invalid=invalid,
                      tint=tint, ambient=ambient)
-    stats = Filled("vsh_bake_stats")
     errors = ffi.new("vsh_bake_error[]", count + 2)
     by_mesh = ffi.new("uint64_t[]", max(charts.mesh_count, 1))
-    stats.pointer.errors, stats.pointer.invalid_by_mesh = errors, by_mesh
-    shade = Filled("vsh_shade_options", options).pointer if options else ffi.NULL
-    call(lib.vsh_bake_lightmap, handle_of(occluders, Occluders, "occluders"), target, structs, count, shade, RUN, planes.struct,
-         stats.pointer, run=run)
+    stats = Filled("vsh_bake_stats", errors=errors, invalid_by_mesh=by_mesh)
+    call(lib.vsh_bake_lightmap, occluders, target, structs, count, Filled("vsh_shade_options", options) if options else None, planes, stats,
+         run=run)
     lightmap = Lightmap(planes.arrays)
-    lightmap.stats = told(stats.pointer[0], "vsh_bake_stats")
+    lightmap.stats = told(stats.struct)
     lightmap.stats.errors = None
     lightmap.stats.invalid_by_mesh = list(by_mesh)[: charts.mesh_count]
     kinds = [f"shadow.{n}" for n in names] + ["ao"] + (["sky"] if sky else [])
@@ -247,12 +223,7 @@ def lightmap_stitch(charts: Charts, lightmap: Mapping[str, numpy.ndarray], *, ru
                     **options: "Unpack[types.StitchOptions]") -> types.StitchReport:
     """Makes the values on both sides of charts' borders agree, in a whole lightmap that was baked of these charts. Its arrays
     are written into."""
-    names = _shadows(lightmap)
-    planes = _given(charts.shape, names, lightmap)
-    report = ffi.new("vsh_stitch_report *")
-    call(lib.vsh_lightmap_stitch, handle_of(charts, Charts, "charts"), planes.struct, len(names),
-         Filled("vsh_stitch_options", options).pointer, RUN, report, run=run)
-    return told(report[0], "vsh_stitch_report")
+    return lightmaps_stitch([(charts, lightmap)], run=run, **options)
 
 
 def lightmaps_stitch(pages: Sequence[Tuple[Charts, Mapping[str, numpy.ndarray]]], *, run: Optional[Run] = None,
@@ -267,17 +238,12 @@ def lightmaps_stitch(pages: Sequence[Tuple[Charts, Mapping[str, numpy.ndarray]]]
         vdbshade.types.StitchOptions
     """
     pages = list(pages)
-    structs = ffi.new("vsh_stitch_page[]", max(len(pages), 1))
     names = _shadows(pages[0][1]) if pages else []
-    keeps: list = []
-    for i, (charts, lightmap) in enumerate(pages):
+    for i, (_, lightmap) in enumerate(pages):
         if set(lightmap) != set(pages[0][1]):
             raise ValueError(f"pages: number {i} has planes {', '.join(sorted(lightmap))}, the first {', '.join(sorted(pages[0][1]))}")
-        keeps += [handle_of(charts, Charts, "charts"), _given(charts.shape, names, lightmap)]
-        structs[i].charts, structs[i].lightmap = keeps[-2], keeps[-1].struct
-    report = ffi.new("vsh_stitch_report *")
-    call(lib.vsh_lightmaps_stitch, structs, len(pages), len(names), Filled("vsh_stitch_options", options).pointer, RUN, report, run=run)
-    return told(report[0], "vsh_stitch_report")
+    structs = structs_of("vsh_stitch_page", [dict(charts=_handle(c), lightmap=_given(c.shape, names, lightmap)) for c, lightmap in pages])
+    return call(lib.vsh_lightmaps_stitch, structs, len(pages), len(names), Filled("vsh_stitch_options", options), OUT, run=run)
 
 
 def lightmap_fill_hidden(charts: Charts, lightmap: Mapping[str, numpy.ndarray], *, bent: Optional[str] = None,
@@ -298,12 +264,86 @@ def lightmap_fill_hidden(charts: Charts, lightmap: Mapping[str, numpy.ndarray], 
         how many texels were filled
     """
     names = _shadows(lightmap)
-    target = handle_of(charts, Charts, "charts")
-    planes = _given(charts.shape, names, lightmap, bent)
-    filled = ffi.new("uint64_t *")
-    call(lib.vsh_lightmap_fill_hidden, target, planes.struct, len(names), RUN, filled, run=run)
-    return filled[0]
+    return call(lib.vsh_lightmap_fill_hidden, _handle(charts), _given(charts.shape, names, lightmap, bent), len(names), OUT, run=run)
 
 
-__all__ = ["Charts", "Lightmap", "Texels", "bake_lightmap", "charts_closeness", "lightmap_fill_hidden", "lightmap_stitch",
-           "lightmaps_stitch"]
+class Voxels(Handle, kind="vsh_voxels"):
+    """Voxels that are to be shaded, and where they lie. Made by its ``from_…`` methods."""
+
+    info: types.VoxelsInfo
+
+    def __init__(self, *arguments: Any) -> None:
+        raise TypeError("Voxels are made by Voxels.from_grid(), from_box() or from_vdb()")
+
+    @classmethod
+    def from_grid(cls, grid: Grid, band: float = 0.0, *, run: Optional[Run] = None) -> "Voxels":
+        """A level set's own narrow band, `band` voxels to both sides; 0: all of it."""
+        return cls._of(call(lib.vsh_voxels_from_grid, grid, band, OUT, run=run))
+
+    @classmethod
+    def from_box(cls, box_min: Sequence[float], box_max: Sequence[float], voxel_size: float, *, run: Optional[Run] = None) -> "Voxels":
+        """Cubes that cover a world box, world units."""
+        return cls._of(call(lib.vsh_voxels_from_box, vector(box_min, 3, "box_min"), vector(box_max, 3, "box_max"), voxel_size, OUT, run=run))
+
+    @classmethod
+    def from_vdb(cls, path: Path, name: Optional[str] = None, *, run: Optional[Run] = None) -> "Voxels":
+        """The active voxels of a grid of numbers in a .vdb file; `name` None: the first such grid."""
+        return cls._of(call(lib.vsh_voxels_from_vdb, path_of(path, "path"), name, OUT, run=run))
+
+    def centre(self, x: int, y: int, z: int) -> Tuple[float, ...]:
+        """World position of a voxel's centre."""
+        return ask(lib.vsh_voxels_centre, self, ffi.new("int32_t[3]", [x, y, z]), Several(3))
+
+
+class Volume(Handle, kind="vsh_volume"):
+    """Grids of a bake: "shadow.NAME", "ao", "error.NAME", "error.ao"."""
+
+    info: types.VolumeInfo
+
+    @property
+    def grids(self) -> List[types.VolumeGrid]:
+        """Names and values of its grids."""
+        return [ask(lib.vsh_volume_get_grid, self, i, OUT) for i in range(self.info.grids)]
+
+    def _number(self, grid: Union[int, str]) -> int:
+        if isinstance(grid, int):
+            return grid if grid >= 0 else 2**32  # which is none
+        names = [g.name for g in self.grids]
+        if grid not in names:
+            raise KeyError(f"no grid {grid!r}; there are {', '.join(names)}")
+        return names.index(grid)
+
+    def sample(self, grid: Union[int, str], positions: ArrayLike, out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
+        """Values at positions (n, 3), world units, interpolated: an array of float32 of shape (n,)."""
+        at = array(positions, numpy.float64, (None, 3), "positions")
+        values = output(out, numpy.float32, (len(at),), "out")
+        call(lib.vsh_volume_sample, self, self._number(grid), len(at), at, values)
+        return values
+
+    def values(self, grid: Union[int, str], index_min: Sequence[int], shape: Sequence[int],
+               out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
+        """A dense copy: float32 of shape (depth, height, width) from voxel `index_min` (x, y, z) on; 1 where not active."""
+        number = self._number(grid)
+        return dense(None, index_min, shape, out, lambda *box: call(lib.vsh_volume_copy, self, number, *box))
+
+    def write(self, path: Path, *, half: bool = False, attributes: Optional[Attributes] = None) -> None:
+        """Writes all grids as one .vdb file, whole or not at all."""
+        lines = attributes_of(attributes)
+        call(lib.vsh_volume_write, self, path_of(path, "path"), half, structs_of("vsh_attribute", lines), len(lines))
+
+
+def bake_volume(occluders: Occluders, voxels: Voxels, lights: Union[Light, Sequence[Light]] = (), *, stats: Optional[Stats] = None,
+                run: Optional[Run] = None, **options: Any) -> Volume:
+    """Shades voxels.
+
+    Parameters
+    ----------
+    occluders : Occluders
+        with voxels of their own
+    **options
+        ``ao``, ``error`` (bool), ``inside`` ("nearest", "off") of vdbshade.types.VolumeOptions, and vdbshade.types.ShadeOptions
+    """
+    structs, count = lights_of(lights)
+    own, shade = split(options, "vsh_volume_options", "vsh_shade_options")
+    filled = Filled("vsh_volume_options", own, shade=shade)
+    return Volume(call(lib.vsh_bake_volume, occluders, voxels, structs, count, filled, OUT, stats, run=run))

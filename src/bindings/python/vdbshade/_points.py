@@ -1,45 +1,44 @@
 """Shadow and ambient occlusion at points."""
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Dict, List, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy
 from numpy.typing import ArrayLike
 
 from . import types
 from ._arrays import array, output, pointer
-from ._library import RUN, Handle, Run, call, fail, ffi, handle_of, lib, make, place, run_of
-from ._structs import Filled, constant, told, word
-from ._tables import WORDS
+from ._calls import OUT, Handle, Run, ask, call, run_of
+from ._library import Unpack, fail, ffi, lib
 from ._light import Light, lights_of
 from ._occluders import Occluders
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
+from ._structs import Filled, Struct, constant, keep, struct_of, told, word, words_of_bits
 
 
-class Stats:
+class Stats(Struct, kind="vsh_shade_stats"):
     """Work that was done, added up over the calls that it was given to (vdbshade.types.ShadeStats)."""
 
+    OPTIONAL = True
+
     def __init__(self) -> None:
-        self._filled = Filled("vsh_shade_stats")
-        self.struct = self._filled.pointer
+        self.struct = Filled("vsh_shade_stats").struct
 
     @property
     def told(self) -> types.ShadeStats:
-        return told(self.struct[0], "vsh_shade_stats")
+        return told(self.struct)
 
 
-def _points(positions: ArrayLike, normals: Optional[ArrayLike], texels: Optional[ArrayLike]) -> Tuple[Any, int, Any]:
+def _points(positions: ArrayLike, normals: Optional[ArrayLike], texels: Optional[ArrayLike] = None) -> Tuple[Any, int]:
     at = array(positions, numpy.float64, (None, 3), "positions")
     up = None if normals is None else array(normals, numpy.float32, (len(at), 3), "normals")
     numbers = None if texels is None else array(texels, numpy.uint32, (len(at),), "texels")
-    keeps = [pointer(at), pointer(up), pointer(numbers)]
-    return ffi.new("vsh_points *", [len(at)] + keeps), len(at), (keeps, at, up)
+    pointers = [pointer(at), pointer(up), pointer(numbers)]
+    return keep(ffi.new("vsh_points *", [len(at)] + pointers), pointers), len(at)
 
 
-def _stats(stats: Optional[Stats]) -> Any:
-    return ffi.NULL if stats is None else stats.struct
+def _written(out: Optional[numpy.ndarray], shape: Tuple[int, ...], name: str) -> Optional[numpy.ndarray]:
+    """An array to be written into, checked; None if none was given."""
+    return None if out is None else output(out, numpy.float32, shape, name)
 
 
 def shade_shadow(occluders: Occluders, positions: ArrayLike, normals: Optional[ArrayLike], light: Light, *,
@@ -66,14 +65,10 @@ def shade_shadow(occluders: Occluders, positions: ArrayLike, normals: Optional[A
     array of float32, shape (n,)
         NaN for invalid points
     """
-    points, count, keeps = _points(positions, normals, texels)
+    points, count = _points(positions, normals, texels)
     values = output(out, numpy.float32, (count,), "out")
-    left = None if deviation is None else output(deviation, numpy.float32, (count,), "deviation")
-    if not isinstance(light, Light):
-        raise TypeError(f"light: expected a vdbshade.Light, got {type(light).__name__}")
-    call(lib.vsh_shade_shadow, handle_of(occluders, Occluders, "occluders"), points, light.struct,
-         Filled("vsh_shade_options", options).pointer, RUN, pointer(values), pointer(left), _stats(stats), run=run)
-    del keeps
+    call(lib.vsh_shade_shadow, occluders, points, light, Filled("vsh_shade_options", options), values,
+         _written(deviation, (count,), "deviation"), stats, run=run)
     return values
 
 
@@ -85,20 +80,17 @@ def shade_ao(occluders: Occluders, positions: ArrayLike, normals: ArrayLike, *, 
 
     Arguments as of shade_shadow(); `bent`, an array of float32 of shape (n, 3), takes bent normals: unit, world space.
     """
-    points, count, keeps = _points(positions, normals, texels)
+    points, count = _points(positions, numpy.asarray(normals), texels)
     values = output(out, numpy.float32, (count,), "out")
-    left = None if deviation is None else output(deviation, numpy.float32, (count,), "deviation")
-    directions = None if bent is None else output(bent, numpy.float32, (count, 3), "bent")
-    call(lib.vsh_shade_ao, handle_of(occluders, Occluders, "occluders"), points, Filled("vsh_shade_options", options).pointer,
-         RUN, pointer(values), pointer(left), pointer(directions), _stats(stats), run=run)
-    del keeps
+    call(lib.vsh_shade_ao, occluders, points, Filled("vsh_shade_options", options), values, _written(deviation, (count,), "deviation"),
+         _written(bent, (count, 3), "bent"), stats, run=run)
     return values
 
 
 def tint_of(tint: "str | dict | types.Tint") -> Filled:
     """``vsh_tint`` of "quadratic" or dict(type="power", power=(r, g, b)), checked."""
     filled = Filled("vsh_tint", dict(type=tint) if isinstance(tint, str) else tint)
-    call(lib.vsh_tint_check, filled.pointer)
+    call(lib.vsh_tint_check, filled)
     return filled
 
 
@@ -106,7 +98,7 @@ def shade_tint(visibility: ArrayLike, tint: "str | types.Tint", out: Optional[nu
     """Tinted visibility, linear RGB: float32 (n,) to float32 (n, 3)."""
     values = array(visibility, numpy.float32, (None,), "visibility")
     rgb = output(out, numpy.float32, (len(values), 3), "out")
-    lib.vsh_shade_tint(len(values), pointer(values), tint_of(tint).pointer, pointer(rgb))
+    ask(lib.vsh_shade_tint, len(values), values, tint_of(tint), rgb)
     return rgb
 
 
@@ -114,12 +106,11 @@ def shade_irradiance(positions: ArrayLike, normals: ArrayLike, light: Light, vis
                      out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
     """Irradiance of one light, linear RGB, added to `out`, an array of float32 of shape (n, 3) (None: to zeros):
     visibility × colour × falloff × cosine."""
-    points, count, keeps = _points(positions, normals, None)
+    points, count = _points(positions, numpy.asarray(normals))
     values = array(visibility, numpy.float32, (count,), "visibility")
     rgb = numpy.zeros((count, 3), numpy.float32) if out is None else output(out, numpy.float32, (count, 3), "out")
-    call(lib.vsh_light_check, light.struct)
-    lib.vsh_shade_irradiance(points, ffi.NULL, light.struct, pointer(values), pointer(rgb))
-    del keeps
+    call(lib.vsh_light_check, light)
+    ask(lib.vsh_shade_irradiance, points, None, light, values, rgb)
     return rgb
 
 
@@ -150,7 +141,7 @@ def _at(values: numpy.ndarray, kind: str, stride: int) -> Any:
     return ffi.cast(kind.replace("[]", " *"), values.__array_interface__["data"][0])
 
 
-class Query(Handle):
+class Query(Handle, kind="vsh_query"):
     """Occluders, lights and options, checked and made ready once: for points, asked for again and again.
 
     Parameters
@@ -164,13 +155,8 @@ class Query(Handle):
 
     def __init__(self, occluders: Occluders, lights: Union[Light, Sequence[Light]] = (), **options: "Unpack[types.ShadeOptions]") -> None:
         structs, count = lights_of(lights)
-        owner = handle_of(occluders, Occluders, "occluders")
-
-        def free(query: Any, keeps: Any = owner) -> None:  # the occluders live until then
-            lib.vsh_query_free(query)
-
-        super().__init__(make(free, lib.vsh_query_create, owner, structs, count, Filled("vsh_shade_options", options).pointer,
-                              place("vsh_query")))
+        owner = struct_of(occluders, ffi.typeof("vsh_occluders"))
+        super().__init__(call(lib.vsh_query_create, owner, structs, count, Filled("vsh_shade_options", options), OUT, keeps=owner))
         self.light_count = count
         self.names: List[str] = [ffi.string(structs[i].name).decode() for i in range(count)]
 
@@ -249,11 +235,12 @@ class Query(Handle):
         values, keeps = self._output(out, count)
         if count <= _SMALL:
             error = ffi.new("vsh_error *")
-            result = lib.vsh_query_points(self.handle, points, layout, run_of(run).struct, values, _stats(stats), error)
+            result = lib.vsh_query_points(self.handle, points, layout, run_of(run).struct, values, ffi.NULL if stats is None else stats.struct,
+                                          error)
             if result != 0:
                 fail(result, error)
         else:
-            call(lib.vsh_query_points, self.handle, points, layout, RUN, values, _stats(stats), run=run)
+            call(lib.vsh_query_points, self, points, layout, values, stats, run=run)
         del keeps
         return out
 
@@ -293,12 +280,12 @@ _OUTPUT_SIZE = ffi.sizeof("vsh_query_output")
 
 def shadow_method_traits(method: str) -> List[str]:
     """What a shadow method is like: "rays", "keeps_error", "triangles", "inner"."""
-    return _traits(lib.vsh_shadow_method_traits(constant("VSH_SHADOW_", method, "method")))
+    return words_of_bits("VSH_METHOD_", lib.vsh_shadow_method_traits(constant("VSH_SHADOW_", method, "method")))
 
 
 def ao_method_traits(method: str) -> List[str]:
     """What an AO method is like, likewise."""
-    return _traits(lib.vsh_ao_method_traits(constant("VSH_AO_", method, "method")))
+    return words_of_bits("VSH_METHOD_", lib.vsh_ao_method_traits(constant("VSH_AO_", method, "method")))
 
 
 def shadow_method_resolve(method: str, has_triangles: bool) -> str:
@@ -309,11 +296,3 @@ def shadow_method_resolve(method: str, has_triangles: bool) -> str:
 def ao_method_resolve(method: str, has_triangles: bool) -> str:
     """Likewise of AO."""
     return word("VSH_AO_", lib.vsh_ao_method_resolve(constant("VSH_AO_", method, "method"), has_triangles))
-
-
-def _traits(bits: int) -> List[str]:
-    return [name for name, bit in WORDS["VSH_METHOD_"].items() if bits & bit]
-
-
-__all__ = ["Query", "Stats", "ao_method_resolve", "ao_method_traits", "shadow_method_resolve",
-           "shade_ao", "shade_irradiance", "shade_shadow", "shade_tint", "shadow_method_traits"]

@@ -3,15 +3,14 @@ from __future__ import annotations
 
 import os
 import weakref
-from typing import Any, Dict, Mapping, Optional
+from typing import Any, Dict, List, Mapping, Optional, Sequence
 
 import numpy
 
 from . import types
-from ._library import ffi, lib
+from ._arrays import pointer
+from ._library import ffi, lib, text
 from ._tables import MEMBERS, WORDS
-
-_NUMBER = "primitive"
 
 
 def constant(prefix: str, given: Any, name: str) -> int:
@@ -30,8 +29,13 @@ def constant(prefix: str, given: Any, name: str) -> int:
 
 
 def word(prefix: str, number: int) -> Any:
-    """And back; a number for which there is no word stays."""
+    """The word of a number, or the number if it has no word."""
     return next((w for w, n in WORDS[prefix].items() if n == number), number)
+
+
+def words_of_bits(prefix: str, bits: int) -> List[str]:
+    """The words of the constants whose bits are set."""
+    return [name for name, bit in WORDS[prefix].items() if bits & bit]
 
 
 def path_of(given: Any, name: str) -> bytes:
@@ -45,17 +49,101 @@ def path_of(given: Any, name: str) -> bytes:
     return path
 
 
+def text_of(value: Any, name: str) -> Any:
+    """A string or a path as ``char[]``."""
+    encoded = value.encode() if isinstance(value, str) else path_of(value, name)
+    if b"\0" in encoded:
+        raise ValueError(f"{name}: a text with a NUL character")
+    return ffi.new("char[]", encoded)
+
+
 # What a struct points to lives as long as the struct.
 _KEPT: Any = weakref.WeakKeyDictionary()
 
 
-def keep(struct: Any, keeps: list) -> None:
-    """`keeps` live as long as a struct that ffi.new() made; they must not refer to it."""
+def keep(struct: Any, keeps: Any) -> Any:
+    """Keeps objects alive as long as a struct or an array that ffi.new() made. They must not refer to it."""
     _KEPT[struct] = keeps
+    return struct
 
 
-class Filled:
-    """A struct of C, begun by its defaults, with what it points to.
+def texts_of(values: Sequence[Any], name: str) -> Any:
+    """Strings or paths as ``char *[]``."""
+    texts = [text_of(value, name) for value in values]
+    return keep(ffi.new("char *[]", texts or 1), texts)
+
+
+_fields_known: Dict[str, Dict[str, Any]] = {}
+_defaults: Dict[str, Any] = {}
+_classes: Dict[Any, Any] = {}  # by types of structs
+
+
+def _fields(kind: str) -> Dict[str, Any]:
+    if kind not in _fields_known:
+        _fields_known[kind] = {name: field.type for name, field in (kind and ffi.typeof(kind).fields) or ()}
+    return _fields_known[kind]
+
+
+def members(kind: str) -> list:
+    """Names of a struct's members."""
+    return list(_fields(kind))
+
+
+def is_text(ctype: Any) -> bool:
+    """Whether a type is a pointer to characters."""
+    return ctype.kind == "pointer" and ctype.item.cname in ("char", "char const")
+
+
+def kind_of(ctype: Any) -> str:
+    """The name of a struct: "vsh_grid"."""
+    return ctype.cname[len("struct ") :]
+
+
+class Struct:
+    """An object that C takes as a pointer to a struct.
+
+    Attributes
+    ----------
+    struct : cdata
+        the pointer; what the struct points to lives as long
+    """
+
+    KIND = ""
+    OPTIONAL = False  # whether C takes NULL for None
+    struct: Any
+
+    def __init_subclass__(cls, kind: str = "") -> None:
+        if kind:
+            cls.KIND = kind
+            _classes[ffi.typeof(kind)] = cls
+
+    def __getattr__(self, name: str) -> Any:
+        if name[:1] == "_" or name in ("struct", "struct_size") or name not in _fields(self.KIND):
+            raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
+        return member(self.struct, self.KIND, name)
+
+
+def struct_of(given: Any, ctype: Any, name: Optional[str] = None) -> Any:
+    """The C pointer of a struct or of a handle; TypeError if the object is not of the class that stands for it."""
+    if isinstance(given, ffi.CData):
+        return given
+    expected = _classes.get(ctype)
+    if given is None and (expected is None or expected.OPTIONAL):
+        return ffi.NULL
+    if expected is not None and not isinstance(given, (expected, Filled)):
+        raise TypeError(f"{name or kind_of(ctype)[4:]}: expected a vdbshade.{expected.__name__}, got {type(given).__name__}")
+    return given.struct
+
+
+def structs_of(kind: str, given: Sequence[Any], name: Optional[str] = None) -> Any:
+    """An array of structs, ``vsh_light[]``, of objects or of dicts of members."""
+    made = [Filled(kind, one) if isinstance(one, Mapping) else one for one in given]
+    pointers = [struct_of(one, ffi.typeof(kind), name) for one in made]
+    return keep(ffi.new(kind + "[]", [p[0] for p in pointers] or 1), (made, pointers))
+
+
+class Filled(Struct):
+    """A struct that begins with its defaults.
 
     Parameters
     ----------
@@ -65,59 +153,50 @@ class Filled:
         members by their names; None leaves one as it is
     """
 
-    def __init__(self, kind: str, values: Optional[Mapping[str, Any]] = None) -> None:
-        self.kind = kind
+    def __init__(self, kind: str, values: Optional[Mapping[str, Any]] = None, /, **more: Any) -> None:
+        self.KIND = kind
         self.keeps: list = []
-        default = _DEFAULTS.get(kind)
-        if default is None:
-            default = ffi.new(kind + " *")
-            lib.vsh_struct_init(kind.encode(), default, ffi.sizeof(kind))
-            _DEFAULTS[kind] = default
-        self.pointer = ffi.new(kind + " *", default[0])
-        keep(self.pointer, self.keeps)
-        for name, value in (values or {}).items():
+        if kind not in _defaults:
+            _defaults[kind] = ffi.new(kind + " *")
+            lib.vsh_struct_init(kind.encode(), _defaults[kind], ffi.sizeof(kind))
+        self.struct = keep(ffi.new(kind + " *", _defaults[kind][0]), self.keeps)
+        for given in (values, more):
+            if given:
+                self._fill(self.struct, kind, given)
+
+    def fill(self, values: Mapping[str, Any]) -> None:
+        """Sets members."""
+        self._fill(self.struct, self.KIND, values)
+
+    def _fill(self, struct: Any, kind: str, values: Mapping[str, Any]) -> None:
+        for name, value in values.items():
             if value is not None:
-                self.set(self.pointer, kind, name, value)
+                self._set(struct, kind, name, value)
+
+    def _kept(self, cdata: Any) -> Any:
+        self.keeps.append(cdata)
+        return cdata
 
     def text(self, value: Any, name: str) -> Any:
-        """A string or path that lives as long as this."""
-        encoded = value.encode() if isinstance(value, str) else path_of(value, name)
-        if b"\0" in encoded:
-            raise ValueError(f"{name}: a text with a NUL character")
-        self.keeps.append(ffi.new("char[]", encoded))
-        return self.keeps[-1]
+        """A string or path that lives as long as the struct."""
+        return self._kept(text_of(value, name))
 
-    def set(self, struct: Any, kind: str, name: str, value: Any) -> None:
-        """Sets one member."""
+    def _set(self, struct: Any, kind: str, name: str, value: Any) -> None:
         fields = _fields(kind)
         if name not in fields or name == "struct_size":
-            known = ", ".join(f for f in fields if f not in ("struct_size", "user"))
-            raise TypeError(f"{kind[4:]}: no option {name!r}; there are {known}")
+            raise TypeError(f"{kind[4:]}: no option {name!r}; there are {', '.join(f for f in fields if f not in ('struct_size', 'user'))}")
         field = fields[name]
-        prefix = MEMBERS.get(f"{kind}.{name}")
         try:
-            if prefix is not None and field.kind == _NUMBER:
-                setattr(struct, name, constant(prefix, value, name))
-            elif field.kind == _NUMBER:
-                if isinstance(value, str):
-                    raise TypeError(f"{name}: expected a number, got {value!r}")
-                setattr(struct, name, float(value) if field.cname in ("double", "float") else _whole(value, name))
+            if field.kind == "primitive":
+                setattr(struct, name, _number(field, MEMBERS.get(f"{kind}.{name}"), value, name))
             elif field.kind == "struct":
-                self.set_struct(getattr(struct, name), field.cname.replace("struct ", ""), value, name)
-            elif field.kind == "array" and field.item.cname == "char":
-                encoded = value.encode()
-                if len(encoded) >= field.length or b"\0" in encoded:
-                    raise ValueError(f"{name} {value!r}: expected at most {field.length - 1} bytes, without NUL")
-                setattr(struct, name, encoded)
+                self._set_struct(getattr(struct, name), kind_of(field), value, name)
             elif field.kind == "array":
-                numbers = list(value)
-                if len(numbers) != field.length:
-                    raise ValueError(f"{name}: expected {field.length} numbers, got {len(numbers)}")
-                setattr(struct, name, [float(n) if field.item.cname in ("double", "float") else int(n) for n in numbers])
-            elif field.cname == "char *" or field.cname == "char const *":
-                setattr(struct, name, self.text(value, name))
+                setattr(struct, name, _items(field, MEMBERS.get(f"{kind}.{name}"), value, name))
+            elif field.kind == "pointer":
+                setattr(struct, name, self._pointer(struct, kind, field, value, name))
             else:
-                setattr(struct, name, value)  # a pointer of the binding's own
+                setattr(struct, name, value)  # a callback
         except OverflowError:
             raise ValueError(f"{name} {value!r}: too large for {field.cname}") from None
         except TypeError as error:
@@ -125,33 +204,54 @@ class Filled:
                 raise
             raise TypeError(f"{name}: {error}") from None
 
-    def set_struct(self, struct: Any, kind: str, value: Any, name: str) -> None:
-        """Sets a struct in a struct from a mapping of its members, or from a struct."""
-        if isinstance(value, Filled):
-            struct_to = ffi.addressof(struct)
-            struct_to[0] = value.pointer[0]
+    def _set_struct(self, struct: Any, kind: str, value: Any, name: str) -> None:
+        """Sets a struct in a struct, of a mapping of its members or of a struct."""
+        if isinstance(value, Mapping):
+            self._fill(struct, kind, value)
+        elif isinstance(value, Struct):
+            ffi.addressof(struct)[0] = struct_of(value, ffi.typeof(kind), name)[0]
             self.keeps.append(value)
-        elif isinstance(value, Mapping):
-            for member, given in value.items():
-                if given is not None:
-                    self.set(struct, kind, member, given)
         else:
             raise TypeError(f"{name}: expected a dict of its members, got {type(value).__name__}")
 
+    def _pointer(self, struct: Any, kind: str, field: Any, value: Any, name: str) -> Any:
+        """Makes the pointer of a member: to a text, an array, a struct, a handle, or several. Sets the member behind it that counts them."""
+        if isinstance(value, numpy.ndarray):
+            return self._kept(pointer(value))
+        if isinstance(value, ffi.CData):
+            return self._kept(value)
+        if is_text(field):
+            return self.text(value, name)
+        names = members(kind) + [""]
+        count = names[names.index(name) + 1]
+        if not count.endswith("_count"):
+            return self._kept(struct_of(value, field.item, name))
+        values = [value] if isinstance(value, (str, bytes, os.PathLike, Struct)) else list(value)
+        setattr(struct, count, len(values))
+        return self._kept(texts_of(values, name) if field.item.kind == "pointer" else structs_of(kind_of(field.item), values, name))
 
-_known: Dict[str, Dict[str, Any]] = {}
-_DEFAULTS: Dict[str, Any] = {}
+
+def _number(field: Any, prefix: Optional[str], value: Any, name: str) -> Any:
+    if prefix is not None:
+        return constant(prefix, value, name)
+    if isinstance(value, str):
+        raise TypeError(f"{name}: expected a number, got {value!r}")
+    return float(value) if field.cname in ("double", "float") else _whole(value, name)
 
 
-def _fields(kind: str) -> Dict[str, Any]:
-    if kind not in _known:
-        _known[kind] = {name: field.type for name, field in ffi.typeof(kind).fields}
-    return _known[kind]
-
-
-def members(kind: str) -> list:
-    """Names of a struct's members."""
-    return list(_fields(kind))
+def _items(field: Any, prefix: Optional[str], value: Any, name: str) -> Any:
+    """Converts a text or numbers for an array in a struct."""
+    if field.item.cname == "char":
+        encoded = value.encode()
+        if len(encoded) >= field.length or b"\0" in encoded:
+            raise ValueError(f"{name} {value!r}: expected at most {field.length - 1} bytes, without NUL")
+        return encoded
+    numbers = list(value)
+    if len(numbers) != field.length:
+        raise ValueError(f"{name}: expected {field.length} numbers, got {len(numbers)}")
+    if prefix is not None:
+        return [constant(prefix, n, name) for n in numbers]
+    return [float(n) if field.item.cname in ("double", "float") else int(n) for n in numbers]
 
 
 def _whole(value: Any, name: str) -> int:
@@ -169,47 +269,43 @@ def _whole(value: Any, name: str) -> int:
 
 def split(options: Dict[str, Any], *kinds: str) -> list:
     """Options by the structs that have them, the first one first; TypeError for one that none has."""
+    known = [{n for n, f in _fields(kind).items() if n != "struct_size" and f.kind != "struct"} for kind in kinds]
     parts: list = [{} for _ in kinds]
     for name, value in options.items():
-        for part, kind in zip(parts, kinds):
-            if name in _fields(kind) and name != "struct_size" and _fields(kind)[name].kind != "struct":
-                part[name] = value
-                break
-        else:
-            known = ", ".join(n for kind in kinds for n, f in _fields(kind).items() if n != "struct_size" and f.kind != "struct")
-            raise TypeError(f"no option {name!r}; there are {known}")
+        found = next((part for part, names in zip(parts, known) if name in names), None)
+        if found is None:
+            every = (n for kind, names in zip(kinds, known) for n in members(kind) if n in names)
+            raise TypeError(f"no option {name!r}; there are {', '.join(every)}")
+        found[name] = value
     return parts
 
 
-def told(struct: Any, kind: str) -> Any:
+def told(struct: Any) -> Any:
     """A struct that the library filled, as a record of vdbshade.types."""
-    name = "".join(part.capitalize() for part in kind[len("vsh_") :].split("_"))
-    record = getattr(types, name)
+    ctype = ffi.typeof(struct)
+    kind = kind_of(ctype if ctype.kind == "struct" else ctype.item)
+    record = getattr(types, "".join(part.capitalize() for part in kind[len("vsh_") :].split("_")))
     if not issubclass(record, types.Record):
         record = types.Record  # of options
-    values = {member: _value(getattr(struct, member), field, MEMBERS.get(f"{kind}.{member}"))
-              for member, field in _fields(kind).items() if member not in ("struct_size", "user")}
-    return record(**values)
+    return record(**{name: member(struct, kind, name) for name in members(kind) if name not in ("struct_size", "user")})
 
 
-def _value(value: Any, field: Any, prefix: Optional[str]) -> Any:
-    if field.kind == _NUMBER:
+def member(struct: Any, kind: str, name: str) -> Any:
+    """A member of a struct as Python has it: a word, a number, a text, a tuple, a record, or the pointer."""
+    field, prefix, value = _fields(kind)[name], MEMBERS.get(f"{kind}.{name}"), getattr(struct, name)
+    if field.kind == "primitive":
         return word(prefix, value) if prefix else value
     if field.kind == "array":
         if field.item.cname == "char":
-            return ffi.string(value).decode("utf-8", "replace")
+            return text(value)
         return tuple(word(prefix, v) for v in value) if prefix else tuple(value)
     if field.kind == "struct":
-        return told(value, field.cname.replace("struct ", ""))
-    if field.kind == "pointer" and field.item.cname in ("char", "char const"):
-        return None if value == ffi.NULL else ffi.string(value).decode("utf-8", "replace")
+        return told(value)
+    if is_text(field):
+        return text(value)
     return None if value == ffi.NULL else value
 
 
-def info(function: Any, kind: str, *arguments: Any) -> Any:
-    """The struct that a …_get_…() function returns or fills: ``info(lib.vsh_grid_get_info, "vsh_grid_info", grid)``."""
-    if ffi.typeof(function).result.kind == "struct":
-        return told(function(*arguments), kind)
-    struct = ffi.new(kind + " *")
-    function(*arguments, struct)
-    return told(struct[0], kind)
+def pairs_of(found: Any, count: int) -> Dict[str, str]:
+    """Attributes of C, ``vsh_attribute[]``, as a dict."""
+    return {text(found[i].name) or "": text(found[i].value) or "" for i in range(count)}

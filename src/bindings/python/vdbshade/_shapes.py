@@ -1,19 +1,30 @@
-"""Procedural signed distance fields: shapes at the origin, moved and combined."""
+"""Shapes: procedural signed distance fields, and outlines in a plane."""
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy
 from numpy.typing import ArrayLike
 
-from ._arrays import array, pointer, transform as matrix
-from ._library import Handle, call, ffi, lib, make, place
-from ._structs import Filled
+from . import types
+from ._arrays import array, borrowed, pointer, transform as matrix
+from ._calls import OUT, Handle, Run, Several, ask, call
+from ._library import Path, Unpack, ffi, lib
+from ._structs import Filled, Struct, keep, path_of, structs_of
 
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
 
-    from . import types
+def distances_at(function: Callable[[Any, Any], float], shape: Any, positions: ArrayLike, axes: int, name: str) -> numpy.ndarray:
+    """The values of a C function that takes one point, at points (n, axes)."""
+    at = array(positions, numpy.float64, (None, axes), name)
+    first = pointer(at)
+    return numpy.array([function(shape, first + axes * i) for i in range(len(at))], numpy.float64)
+
+
+def instances_of(kind: str, given: Sequence[Any], matrix_of: Callable[[Any], Optional[numpy.ndarray]]) -> Any:
+    """An array of instances: handles, or pairs of a handle and its transform."""
+    member = kind[len("vsh_") : -len("_instance")]
+    pairs = [entry if isinstance(entry, tuple) else (entry, None) for entry in given]
+    return structs_of(kind, [{member: thing, "transform": matrix_of(moved)} for thing, moved in pairs])
 
 
 def _turned(q: numpy.ndarray, v: numpy.ndarray) -> numpy.ndarray:
@@ -25,7 +36,7 @@ def _product(a: numpy.ndarray, b: numpy.ndarray) -> numpy.ndarray:
     return numpy.append(a[3] * b[:3] + b[3] * a[:3] + numpy.cross(a[:3], b[:3]), a[3] * b[3] - a[:3] @ b[:3])
 
 
-class Sdf:
+class Sdf(Struct, kind="vsh_sdf"):
     """A tree of shapes; lengths in world units. ``a | b`` is a union, ``a & b`` an intersection, ``a - b`` a without b.
 
     Parameters
@@ -50,10 +61,9 @@ class Sdf:
         self._made()
 
     def _made(self) -> None:
-        filled = [Filled("vsh_sdf_node", node) for node in self._nodes]
-        self._array = ffi.new("vsh_sdf_node[]", [f.pointer[0] for f in filled])
-        self.struct = ffi.new("vsh_sdf *", dict(nodes=self._array, node_count=len(filled)))
-        call(lib.vsh_sdf_check, self.struct)
+        nodes = structs_of("vsh_sdf_node", self._nodes)
+        self.struct = keep(ffi.new("vsh_sdf *", [nodes, len(self._nodes)]), nodes)
+        call(lib.vsh_sdf_check, self)
 
     @classmethod
     def _of(cls, nodes: List[Dict[str, Any]]) -> "Sdf":
@@ -127,18 +137,14 @@ class Sdf:
         array of float64, shape (n,)
             NaN for positions that are not finite
         """
-        at = array(positions, numpy.float64, (None, 3), "positions")
-        first, sdf, distance = pointer(at), self.struct, lib.vsh_sdf_distance
-        return numpy.array([distance(sdf, first + 3 * i) for i in range(len(at))], numpy.float64)
+        return distances_at(lib.vsh_sdf_distance, self.struct, positions, 3, "positions")
 
     def bounds(self) -> Tuple[Tuple[float, ...], Tuple[float, ...]]:
         """A box around the surface, world units: its least and its greatest corner."""
-        low, high = ffi.new("double[3]"), ffi.new("double[3]")
-        lib.vsh_sdf_bounds(self.struct, low, high)
-        return tuple(low), tuple(high)
+        return ask(lib.vsh_sdf_bounds, self, Several(3), Several(3))
 
 
-class Solids(Handle):
+class Solids(Handle, kind="vsh_solids"):
     """Procedural casters as they are, for trace_shadow() and trace_ao().
 
     Parameters
@@ -152,18 +158,59 @@ class Solids(Handle):
         sdfs = [sdfs] if isinstance(sdfs, Sdf) else list(sdfs)
         if not all(isinstance(sdf, Sdf) for sdf in sdfs):
             raise TypeError("sdfs: expected a list of vdbshade.Sdf")
-        trees = ffi.new("vsh_sdf[]", [sdf.struct[0] for sdf in sdfs] or 1)
         moved = None
         if transforms is not None:
             moved = numpy.array([matrix(t, "transforms") for t in numpy.asarray(transforms)], numpy.float64)
             moved = array(moved, numpy.float64, (len(sdfs), 3, 4), "transforms")
-        super().__init__(make(lib.vsh_solids_free, lib.vsh_solids_create, trees, pointer(moved), len(sdfs), place("vsh_solids")))
+        super().__init__(call(lib.vsh_solids_create, structs_of("vsh_sdf", sdfs), moved, len(sdfs), OUT))
 
     def distance(self, positions: ArrayLike) -> numpy.ndarray:
         """Signed distance to the nearest, at positions (n, 3), world units; infinite where there is none."""
-        at = array(positions, numpy.float64, (None, 3), "positions")
-        first, solids = pointer(at), self.handle
-        return numpy.array([lib.vsh_solids_distance(solids, first + 3 * i) for i in range(len(at))], numpy.float64)
+        return distances_at(lib.vsh_solids_distance, self.handle, positions, 3, "positions")
 
 
-__all__ = ["Sdf", "Solids"]
+class Outline(Handle, kind="vsh_outline"):
+    """An area of the xy-plane, bounded by closed contours; world units, y up. Made by its ``from_…`` methods."""
+
+    info: types.OutlineInfo
+
+    def __init__(self, *arguments: Any) -> None:
+        raise TypeError("an Outline is made by Outline.from_image(), from_text(), from_polygons() or unite()")
+
+    @classmethod
+    def from_image(cls, path: Path, *, run: Optional[Run] = None, **options: "Unpack[types.MaskOptions]") -> "Outline":
+        """Where a channel of an image is at least the threshold."""
+        return cls._of(call(lib.vsh_outline_from_image, path_of(path, "path"), Filled("vsh_mask_options", options), OUT, run=run))
+
+    @classmethod
+    def from_text(cls, text: str, font: Path, *, run: Optional[Run] = None, **options: "Unpack[types.TextOptions]") -> "Outline":
+        """The letters of a text, of a font's file."""
+        return cls._of(call(lib.vsh_outline_from_text, text, path_of(font, "font"), Filled("vsh_text_options", options), OUT, run=run))
+
+    @classmethod
+    def from_polygons(cls, polygons: Sequence[ArrayLike], *, run: Optional[Run] = None) -> "Outline":
+        """What closed polygons wind around: arrays of float64 of shape (n, 2)."""
+        parts = [array(p, numpy.float64, (None, 2), f"polygons[{i}]") for i, p in enumerate(polygons)]
+        points = numpy.concatenate(parts) if parts else numpy.zeros((0, 2))
+        counts = ffi.new("size_t[]", [len(p) for p in parts] or 1)
+        return cls._of(call(lib.vsh_outline_from_polygons, points, counts, len(parts), OUT, run=run))
+
+    @classmethod
+    def unite(cls, outlines: "Sequence[Union[Outline, Tuple[Outline, ArrayLike]]]", *, run: Optional[Run] = None) -> "Outline":
+        """The union of outlines, or of pairs of an outline and its transform, shape (2, 3)."""
+        instances = instances_of("vsh_outline_instance", outlines, lambda moved: None if moved is None else array(
+            moved, numpy.float64, (2, 3), "transform"))
+        return cls._of(call(lib.vsh_outline_unite, instances, len(outlines), OUT, run=run))
+
+    @property
+    def contours(self) -> List[numpy.ndarray]:
+        """Each contour's points, arrays of float64 of shape (n, 2), views; the area lies to their left."""
+        found, count = [], ffi.new("size_t *")
+        for index in range(self.info.contours):
+            points = lib.vsh_outline_contour(self.handle, index, count)
+            found.append(borrowed(points, (count[0], 2), numpy.float64, self.handle))
+        return found
+
+    def distance(self, points: ArrayLike) -> numpy.ndarray:
+        """Signed distance at points (n, 2), world units, negative inside."""
+        return distances_at(lib.vsh_outline_distance, self.handle, points, 2, "points")
