@@ -11,7 +11,7 @@
 #include "bake_scene/pages.h"
 #include "base/clock.h"
 #include "base/parallel.h"
-#include "bench.h"
+#include "common.h"
 #include "embree_rays.h"
 #include "field/field.h"
 #include "trace/embree_scene.h"

@@ -1,6 +1,6 @@
 /* Cancelling from the callback, in every stage of every scenario at 0, a tenth, a half and nearly all of it:
- * the call says so, leaks nothing, leaves outputs as they were, and works when it is asked again. How soon it
- * answers is measured by bench/cancel.c. */
+ * the call says so, leaks nothing, leaves outputs as they were, and works when it is asked again.
+ * `tools/bench FILE.csv cancel` measures how soon it answers. */
 #include "faults.h"
 #include "scenarios.h"
 

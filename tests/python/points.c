@@ -1,5 +1,5 @@
-/* What Python does, in C: the tests compare its values, tools/bench-python its times.
- * points MODEL POINTS OUT: shadow, AO and distance at points (float64 positions, then float32 normals,
+/* The C side of tests that compare values with Python, and of `tools/bench FILE.csv calls`, which compares
+ * times. points MODEL POINTS OUT: shadow, AO and distance at points (float64 positions, then float32 normals,
  * native) as floats. points MODEL POINTS time ROUNDS: processor seconds of a call for all of them, of each
  * round a line, and then nanoseconds of a call for one point: of a query, of a sample of a field, of
  * vsh_shade_shadow(). */
