@@ -94,16 +94,6 @@ typedef struct judge_shape {
 /* "v" and "f" of an OBJ with convex faces, which are cut into fans: the faces of objects "KIND:…" only. */
 judge_shape judge_read_solids(const char *path, const char *kind);
 
-typedef struct judge_bake {
-    vsh_image_file *file;
-    vsh_image image;
-    const char *path;
-} judge_bake;
-
-/* A bake and one of its channels, or the end of the program. */
-judge_bake judge_read_bake(const char *path);
-const float *judge_plane(const judge_bake *bake, const char *name);
-
 /* `vsh_judge seen`, of its arguments (judge_seen.c); returns the exit code. */
 int judge_seen(int count, char **arguments);
 

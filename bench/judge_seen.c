@@ -62,6 +62,32 @@ static double random_number(uint64_t index, uint64_t use) {
     return (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
 }
 
+typedef struct bake {
+    vsh_image_file *file;
+    vsh_image image;
+    const char *path;
+} bake;
+
+static bake read_bake(const char *path) {
+    vsh_error error;
+    bake b = {.path = path};
+    if (vsh_image_read(path, NULL, &b.file, &error) != VSH_OK) {
+        judge_give_up(path, error.message);
+    }
+    b.image = vsh_image_view(b.file);
+    return b;
+}
+
+static const float *plane_of(const bake *b, const char *name) {
+    for (int32_t i = 0; i < b->image.channel_count; ++i) {
+        if (strcmp(b->image.names[i], name) == 0) {
+            return b->image.planes[i];
+        }
+    }
+    fprintf(stderr, "judge: %s: no channel %s\n", b->path, name);
+    exit(2);
+}
+
 /* --- charts */
 
 typedef struct corner {
@@ -361,11 +387,11 @@ int judge_seen(int count, char **arguments) {
         fputs("usage: the first lines of bench/judge_seen.c\n", stderr);
         return 2;
     }
-    judge_bake bake = judge_read_bake(arguments[1]);
+    bake found = read_bake(arguments[1]);
     t.scene = judge_open(arguments[0], solids, uv_set, LIFT);
-    t.image = bake.image;
-    t.planes[SHADOW] = sun ? judge_plane(&bake, "shadow.sun") : NULL;
-    t.planes[AO] = t.distance > 0.0 ? judge_plane(&bake, "ao") : NULL;
+    t.image = found.image;
+    t.planes[SHADOW] = sun ? plane_of(&found, "shadow.sun") : NULL;
+    t.planes[AO] = t.distance > 0.0 ? plane_of(&found, "ao") : NULL;
     t.sun = truth_frame_around(sun ? towards : (double[]){0.0, 1.0, 0.0});
     t.half_angle = 0.5 * angle * PI / 180.0;
     t.area = judge_take(t.scene.count * sizeof *t.area);
@@ -384,6 +410,6 @@ int judge_seen(int count, char **arguments) {
     free(t.width);
     free(t.area);
     judge_close(&t.scene);
-    vsh_image_free(bake.file);
+    vsh_image_free(found.file);
     return 0;
 }

@@ -1,6 +1,9 @@
 /* Truth of a model's lightmap at the texels' centres, by Embree's rays against the triangles as they are. AO
  * is over the hemisphere of the smooth normal. Directions below the face count neither as open nor as hidden.
- * A file of its own says what is solid: its faces look to the air. */
+ * A file of its own says what is solid: its faces look to the air.
+ *
+ *   vsh_judge truth MODEL SIZE X,Y,Z DEGREES DISTANCE RAYS[:N] SOLIDS.obj|- OUT.exr
+ *       verdict, shadow, ao, apart and triangle of every texel, or of one in N (judge.h) */
 #include "directions.h"
 #include "embree_scene.h"
 #include "judge.h"
@@ -364,4 +367,47 @@ void judge_free(judge_truth *truth) {
     free(truth->ao);
     free(truth->apart);
     free(truth->triangle);
+}
+
+static int write_truth(char **arguments) {
+    judge_question q = {.size = atoi(arguments[1]),
+                        .angle = atof(arguments[3]),
+                        .distance = atof(arguments[4]),
+                        .rays = atoi(arguments[5]),
+                        .every = 1,
+                        .solids = strcmp(arguments[6], "-") != 0 ? arguments[6] : NULL};
+    vsh_error error;
+    const char *every = strchr(arguments[5], ':');
+    q.every = every != NULL ? atoi(every + 1) : 1;
+    if (q.every < 1 ||
+        sscanf(arguments[2], "%lf,%lf,%lf", &q.towards[0], &q.towards[1], &q.towards[2]) != 3 || q.size < 1 ||
+        q.rays < 1) {
+        fputs("judge: size, rays or direction\n", stderr);
+        return 2;
+    }
+    judge_truth t = judge_make(arguments[0], &q);
+    static const char *const names[] = {"verdict", "shadow", "ao", "apart", "triangle"};
+    const float *const planes[] = {t.verdict, t.shadow, t.ao, t.apart, t.triangle};
+    const vsh_image image = {q.size, q.size, 5, names, planes, NULL};
+    if (fabs(t.units - 1.0) > 1e-3) {
+        printf("%s: lengths are %.6g times what was meant\n", arguments[0], t.units);
+    }
+    if (vsh_image_write(arguments[7], &image, NULL, &error) != VSH_OK) {
+        fprintf(stderr, "judge: %s\n", error.message);
+        return 2;
+    }
+    judge_free(&t);
+    return 0;
+}
+
+int main(int argc, char **argv) {
+    if (argc == 10 && strcmp(argv[1], "truth") == 0) {
+        return write_truth(argv + 2);
+    }
+    if (argc >= 2 && strcmp(argv[1], "seen") == 0) {
+        return judge_seen(argc - 2, argv + 2);
+    }
+    fputs("usage: vsh_judge truth|seen …, as the first lines of bench/judge_truth.c and judge_seen.c say\n",
+          stderr);
+    return 2;
 }
