@@ -157,31 +157,31 @@ class Several:
 
 
 _FREE = {"vsh_image_file": "vsh_image_free", "vsh_image_writer": "vsh_image_writer_abandon", "vsh_light": "vsh_lights_free"}
-_ADDED = {ffi.typeof("vsh_run *"): "run", ffi.typeof("vsh_error *"): "error"}  # arguments that callers do not name
-_roles: Dict[Any, list] = {}
+_RUN, _ERROR = ffi.typeof("vsh_run *"), ffi.typeof("vsh_error *")  # arguments that callers do not name
+_types: Dict[Any, list] = {}
 
 
-def _roles_of(function: Any) -> list:
-    """For each argument of a function its type, and "run", "error", "struct" or ""."""
-    if function not in _roles:
-        _roles[function] = [(kind, _ADDED.get(kind, "struct" if kind.kind == "pointer" and kind.item.kind == "struct" else ""))
+def _types_of(function: Any) -> list:
+    """For each argument of a function its type, and the struct that it points to, if any."""
+    if function not in _types:
+        _types[function] = [(kind, kind.item if kind.kind == "pointer" and kind.item.kind == "struct" else None)
                             for kind in ffi.typeof(function).args]
-    return _roles[function]
+    return _types[function]
 
 
 def _arguments(function: Any, given: Tuple[Any, ...], run: Any, error: Any) -> Tuple[list, list]:
     """Arguments as C takes them, with the run and the error if the function has them; and what it fills."""
-    rest, arguments, filled = iter(given), [], []
-    for kind, role in _roles_of(function):
-        one = run if role == "run" else error if role == "error" else next(rest)
+    arguments, filled, rest = [], [], iter(given)
+    for kind, struct in _types.get(function) or _types_of(function):
+        one = run if kind is _RUN else error if kind is _ERROR else next(rest)
         if one is OUT:
             one = ffi.new(kind)
             filled.append((one, None))
-        elif isinstance(one, Several):
+        elif one.__class__ is Several:
             several, one = one, ffi.new(ffi.typeof(kind.item.cname + "[]"), max(one.count, 1))
             filled.append((one, several.count))
-        elif role == "struct":
-            one = struct_of(one, kind.item)
+        elif struct is not None:
+            one = struct_of(one, struct)
         elif one is None:
             one = ffi.NULL
         elif isinstance(one, numpy.ndarray):
@@ -248,7 +248,7 @@ def call(function: Any, *given: Any, run: Optional[Run] = None, keeps: Any = Non
         result = function(*arguments)
     finally:
         _in_thread.running = running.outer
-    values = _values(filled, keeps) if result == 0 else None
+    values = _values(filled, keeps) if filled and result == 0 else None
     for message in running.messages:
         warnings.warn(message, VdbshadeWarning, stacklevel=_level_of_caller())
     raised = running.raised or (watched.raised if watched is not None and result != 0 else None)

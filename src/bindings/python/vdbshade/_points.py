@@ -15,13 +15,13 @@ from ._occluders import Occluders
 from ._structs import Filled, Struct, constant, keep, struct_of, told, word, words_of_bits
 
 
-class Stats(Struct, kind="vsh_shade_stats"):
+class Stats(Struct):
     """Work that was done, added up over the calls that it was given to (vdbshade.types.ShadeStats)."""
 
-    OPTIONAL = True
+    KIND = "vsh_shade_stats"
 
     def __init__(self) -> None:
-        self.struct = Filled("vsh_shade_stats").struct
+        self.struct = Filled(self.KIND).struct
 
     @property
     def told(self) -> types.ShadeStats:

@@ -109,12 +109,12 @@ class Struct:
     """
 
     KIND = ""
-    OPTIONAL = False  # whether C takes NULL for None
+    OPTIONAL = True  # whether C takes NULL for None
     struct: Any
 
     def __init_subclass__(cls, kind: str = "") -> None:
         if kind:
-            cls.KIND = kind
+            cls.KIND, cls.OPTIONAL = kind, False
             _classes[ffi.typeof(kind)] = cls
 
     def __getattr__(self, name: str) -> Any:
@@ -127,10 +127,10 @@ def struct_of(given: Any, ctype: Any, name: Optional[str] = None) -> Any:
     """The C pointer of a struct or of a handle; TypeError if the object is not of the class that stands for it."""
     if isinstance(given, ffi.CData):
         return given
-    expected = _classes.get(ctype)
-    if given is None and (expected is None or expected.OPTIONAL):
+    expected = _classes.get(ctype, Struct)
+    if given is None and expected.OPTIONAL:
         return ffi.NULL
-    if expected is not None and not isinstance(given, (expected, Filled)):
+    if not isinstance(given, expected) and not isinstance(given, Filled):
         raise TypeError(f"{name or kind_of(ctype)[4:]}: expected a vdbshade.{expected.__name__}, got {type(given).__name__}")
     return given.struct
 
