@@ -105,9 +105,7 @@ class Layout:
                 layers.active_index = active
             self.undo.append(lambda obj=obj: obj.data.uv_layers.remove(obj.data.uv_layers[materials.UV_NAME]))
         else:
-            numpy = scene.numpy_of()
-            before = numpy.empty(uvs.size, numpy.float32)
-            layer.data.foreach_get("uv", before)
+            before = scene.values_of(scene.numpy_of(), layer.data, "uv", 2)
             self.undo.append(lambda obj=obj: obj.data.uv_layers[materials.UV_NAME].data.foreach_set("uv", before))
         layer.data.foreach_set("uv", uvs.ravel())
         obj.data.update()

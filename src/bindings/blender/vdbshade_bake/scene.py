@@ -19,18 +19,21 @@ def numpy_of():
     return numpy
 
 
+def values_of(numpy, items, name, width=1, kind=None):
+    """Values of all items of a collection, such as "co" of a mesh's vertices, in one array of float32 or `kind`."""
+    values = numpy.empty(width * len(items), kind or numpy.float32)
+    items.foreach_get(name, values)
+    return values
+
+
 def is_caster(obj):
     return obj.type == "MESH" and not obj.hide_render and len(obj.data.polygons) > 0
 
 
 def keeps_corners(numpy, obj, mesh):
     """Whether modifiers left an object's faces as they are, if not its vertices: each corner is what it was."""
-    def vertices_of(which):
-        vertices = numpy.empty(len(which.loops), numpy.int32)
-        which.loops.foreach_get("vertex_index", vertices)
-        return vertices
-
-    return len(obj.data.polygons) == len(mesh.polygons) and numpy.array_equal(vertices_of(obj.data), vertices_of(mesh))
+    ours, theirs = (values_of(numpy, which.loops, "vertex_index", 1, numpy.int32) for which in (obj.data, mesh))
+    return len(obj.data.polygons) == len(mesh.polygons) and numpy.array_equal(ours, theirs)
 
 
 def arrays_of(numpy, obj, mesh, uv_name):
@@ -38,21 +41,15 @@ def arrays_of(numpy, obj, mesh, uv_name):
     mesh.calc_loop_triangles()
     if hasattr(mesh, "calc_normals_split"):  # until Blender 4.1
         mesh.calc_normals_split()
-    corners = len(mesh.loops)
-    points = numpy.empty(3 * len(mesh.vertices), numpy.float32)
-    mesh.vertices.foreach_get("co", points)
-    vertices = numpy.empty(corners, numpy.int32)
-    mesh.loops.foreach_get("vertex_index", vertices)
-    normals = numpy.empty(3 * corners, numpy.float32)
-    mesh.loops.foreach_get("normal", normals)
-    indices = numpy.empty(3 * len(mesh.loop_triangles), numpy.int32)
-    mesh.loop_triangles.foreach_get("loops", indices)
+    points = values_of(numpy, mesh.vertices, "co", 3)
+    vertices = values_of(numpy, mesh.loops, "vertex_index", 1, numpy.int32)
+    normals = values_of(numpy, mesh.loops, "normal", 3)
+    indices = values_of(numpy, mesh.loop_triangles, "loops", 3, numpy.int32)
     uvs = None
     if uv_name is not None:
         if uv_name not in mesh.uv_layers:
             raise BakeError("'%s': its modifiers leave nothing of the UV map '%s'" % (obj.name, uv_name))
-        uvs = numpy.empty(2 * corners, numpy.float32)
-        mesh.uv_layers[uv_name].data.foreach_get("uv", uvs)
+        uvs = values_of(numpy, mesh.uv_layers[uv_name].data, "uv", 2)
     if len(indices) == 0:
         return None
     matrix = numpy.array(obj.matrix_world, numpy.float64)
@@ -120,10 +117,8 @@ class Glb:
         numpy, key = self.numpy, mesh.as_pointer()
         if key not in known:
             mesh.calc_loop_triangles()
-            points = numpy.empty(3 * len(mesh.vertices), numpy.float32)
-            mesh.vertices.foreach_get("co", points)
-            indices = numpy.empty(3 * len(mesh.loop_triangles), numpy.int32)
-            mesh.loop_triangles.foreach_get("vertices", indices)
+            points = values_of(numpy, mesh.vertices, "co", 3)
+            indices = values_of(numpy, mesh.loop_triangles, "vertices", 3, numpy.int32)
             known[key] = None if len(indices) == 0 else self.add_mesh(
                 "instanced " + mesh.name, points.reshape(-1, 3).astype("<f4"), indices.astype("<u4"))
         if known[key] is not None and matrix.determinant() != 0.0:
