@@ -12,9 +12,9 @@ from ._calls import OUT, Run, ask, call
 from ._library import Path, Unpack, ffi, lib
 from ._light import Light, lights_of
 from ._occluders import optional
-from ._scene import known_settings, option_of, setting_text
+from ._scene import SceneFile, known_settings, option_of, setting_text
 from ._shapes import Outline, distances_at
-from ._structs import Filled, Struct, path_of, struct_of
+from ._structs import Filled, path_of, struct_of
 
 
 def flat_bake(casters: Optional[Outline], lights: Union[Light, Sequence[Light]] = (), *, irradiance: bool = False,
@@ -70,14 +70,11 @@ def flat_light_name(type: int) -> Optional[str]:
     return ask(lib.vsh_get_name, lib.VSH_NAMES_FLAT_LIGHT, type)
 
 
-class FlatScene(Struct, kind="vsh_flat_scene"):
+class FlatScene(SceneFile, kind="vsh_flat_scene"):
     """A flat scene's file (docs/flat.md); settings by the names of `vdbshade flat`'s options."""
 
     def __init__(self, path: Path, *, run: Optional[Run] = None, **settings: Any) -> None:
-        self._filled = Filled("vsh_flat_scene")
-        self.struct = self._filled.struct
-        self._file = call(lib.vsh_flat_scene_read, path_of(path, "path"), OUT, run=run)
-        self.struct[0] = self._file[0]
+        self._read(lib.vsh_flat_scene_read, path_of(path, "path"), run)
         for name, value in settings.items():
             self.set(name, value)
 
@@ -85,10 +82,6 @@ class FlatScene(Struct, kind="vsh_flat_scene"):
         """Sets what a setting's key or option says."""
         known_settings(name, ("flat",))
         call(lib.vsh_flat_scene_set, self, option_of(name), self._filled.text(setting_text(value), name))
-
-    @property
-    def lights(self) -> List[Light]:
-        return [Light._of(self.struct.lights[i]) for i in range(self.struct.light_count)]
 
     @property
     def shape(self) -> Tuple[int, int]:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from . import types
 from ._arrays import array, borrowed, pointer
-from ._calls import OUT, Run, ask, call
+from ._calls import OUT, Handle, Run, ask, call
 from ._grid import Attributes, attributes_of
 from ._library import Path, Unpack, ffi, lib, text
 from ._structs import Filled, constant, keep, pairs_of, path_of, texts_of
@@ -118,7 +118,7 @@ def image_default_pack(names: Sequence[str]) -> str:
     return ffi.string(packed).decode()
 
 
-class ImageWriter:
+class ImageWriter(Handle, kind="vsh_image_writer"):
     """An image that is written as its rows come. In a ``with``, which puts the file in place at its end, or leaves the old
     one where something is raised.
 
@@ -133,13 +133,9 @@ class ImageWriter:
     def __init__(self, path: Path, names: Sequence[str], shape: Tuple[int, int], *,
                  holds: Optional[Mapping[str, str]] = None, attributes: Optional[Attributes] = None,
                  **options: "Unpack[types.ImageOptions]") -> None:
+        super().__init__(call(lib.vsh_image_writer_create, path_of(path, "path"), _named(names, shape, holds),
+                              _options(options, attributes), OUT))
         self._names, self._width = list(names), shape[1]
-        self._writer = call(lib.vsh_image_writer_create, path_of(path, "path"), _named(names, shape, holds), _options(options, attributes), OUT)
-
-    def _open(self) -> Any:
-        if self._writer is None:
-            raise ValueError("ImageWriter is closed")
-        return self._writer
 
     def add(self, channels: Mapping[str, ArrayLike]) -> None:
         """The next rows from the top: arrays of float32 of shape (rows, width)."""
@@ -149,32 +145,30 @@ class ImageWriter:
         rows = len(arrays[0]) if arrays else 0
         if any(len(a) != rows for a in arrays):
             raise ValueError("channels: expected as many rows of each")
-        call(lib.vsh_image_writer_add, self._open(), rows, ffi.new("float *[]", [pointer(a) for a in arrays]))
+        call(lib.vsh_image_writer_add, self, rows, ffi.new("float *[]", [pointer(a) for a in arrays]))
 
     @property
     def clipping(self) -> types.ImageClipping:
         """Light that integers cut, of the rows so far."""
-        return call(lib.vsh_image_writer_get_clipping, self._open(), OUT)
+        return call(lib.vsh_image_writer_get_clipping, self, OUT)
 
     def finish(self) -> None:
         """Puts the file in place."""
-        writer, self._writer = self._open(), None
+        writer = self.handle
+        self.close()
         ffi.gc(writer, None)  # it is freed by this, also where it fails
         call(lib.vsh_image_writer_finish, writer)
 
     def abandon(self) -> None:
         """Leaves the old file as it was."""
-        if self._writer is not None:
-            ffi.release(self._writer)
-            self._writer = None
-
-    def __enter__(self) -> "ImageWriter":
-        return self
+        if not self.closed:
+            ffi.release(self.handle)
+            self.close()
 
     def __exit__(self, kind: Any, *raised: Any) -> None:
         if kind is not None:
             self.abandon()
-        elif self._writer is not None:
+        elif not self.closed:
             self.finish()
 
 

@@ -87,7 +87,22 @@ def _receiver_of(given: Any) -> Filled:
     return Filled("vsh_receiver", members)
 
 
-class Scene(Struct, kind="vsh_scene"):
+class SceneFile(Struct):
+    """What a scene's file holds, changed by settings."""
+
+    def _read(self, function: Any, path: Optional[Path], run: Optional[Run]) -> None:
+        self._filled = Filled(self.KIND)
+        self.struct = self._filled.struct
+        if path is not None:
+            self._file = call(function, path_of(path, "path"), OUT, run=run)
+            self.struct[0] = self._file[0]
+
+    @property
+    def lights(self) -> List[Light]:
+        return [Light._of(self.struct.lights[i]) for i in range(self.struct.light_count)]
+
+
+class Scene(SceneFile, kind="vsh_scene"):
     """A scene, of a file (docs/scene.md) or of arguments.
 
     Parameters
@@ -116,11 +131,7 @@ class Scene(Struct, kind="vsh_scene"):
     def __init__(self, path: Optional[Path] = None, *, casters: Optional[Sequence[Any]] = None,
                  receivers: Optional[Sequence[Any]] = None, lights: Optional[Sequence[Light]] = None,
                  solidity: Optional[Mapping[str, str]] = None, run: Optional[Run] = None, **settings: Any) -> None:
-        self._filled = Filled("vsh_scene")
-        self.struct = self._filled.struct
-        if path is not None:
-            self._file = call(lib.vsh_scene_read, path_of(path, "path"), OUT, run=run)
-            self.struct[0] = self._file[0]
+        self._read(lib.vsh_scene_read, path, run)
         given: dict = {}
         given["receivers"] = [self.struct.receivers + i for i in range(self.struct.receiver_count)] if receivers is None else [
             _receiver_of(r) for r in receivers]
@@ -145,10 +156,6 @@ class Scene(Struct, kind="vsh_scene"):
 
     def _receiver(self, index: int) -> Any:
         return self.struct.receivers + index
-
-    @property
-    def lights(self) -> List[Light]:
-        return [Light._of(self.struct.lights[i]) for i in range(self.struct.light_count)]
 
     @property
     def light_files(self) -> List[types.LightFile]:
