@@ -14,17 +14,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Whether the image of a receiver can be written, which the scene's file names or the command line. */
-static int check_image(const cli_bake_settings *settings, const vsh_scene *scene, size_t index) {
-    vsh_error error;
-    if (vsh_receiver_check(scene, index, &error) == VSH_OK) {
-        return CLI_OK;
-    }
-    return settings->output == NULL && error.code == VSH_ERROR_ARGUMENT
-               ? cli_usage("%s: receivers[%zu]: output %s", settings->input, index, error.message)
-               : cli_fail(&error);
-}
-
 /* What is only for outputs that are assets. */
 static int check_lit(const cli_bake_settings *settings, const vsh_scene *scene) {
     const char *given = settings->preview ? "preview" : settings->exr != NULL ? "exr" : NULL;
@@ -107,7 +96,12 @@ static int check_files(const cli_bake_settings *settings, const vsh_scene *scene
             continue; /* its folder need not be there yet */
         }
         CLI_TRY(makes ? cli_make_folder_of(output) : cli_check_folder(output));
-        CLI_TRY(check_image(settings, scene, i));
+        vsh_error error;
+        if (vsh_receiver_check(scene, i, &error) != VSH_OK) {
+            return settings->output == NULL && error.code == VSH_ERROR_ARGUMENT
+                       ? cli_usage("%s: receivers[%zu]: output %s", settings->input, i, error.message)
+                       : cli_fail(&error);
+        }
     }
     return CLI_OK;
 }

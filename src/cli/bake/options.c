@@ -75,15 +75,6 @@ static int parse_world(const char *name, const char *value, double world[2]) {
                                  : CLI_OK;
 }
 
-static int take_caster(cli_bake_settings *s, const char *name, const char *value) {
-    if (s->caster_count == CLI_MAX_EXTRA_CASTERS) {
-        return cli_usage("%s '%s': more than %d casters; put them into a scene file", name, value,
-                         CLI_MAX_EXTRA_CASTERS);
-    }
-    s->casters[s->caster_count++] = value;
-    return CLI_OK;
-}
-
 static int take_pattern(cli_patterns *patterns, const char *name, const char *value) {
     if (value[0] == '\0') {
         return cli_usage("%s: expected the name of an object or a material, or a pattern such as 'floor*'",
@@ -108,7 +99,12 @@ int cli_shared_parse(cli_bake_settings *s, int key, const char *name, const char
         s->has_light_radius = true;
         return cli_parse_number(name, value, 0.0, 1e12, &s->light_radius);
     case CLI_KEY_CASTER:
-        return take_caster(s, name, value);
+        if (s->caster_count == CLI_MAX_EXTRA_CASTERS) {
+            return cli_usage("%s '%s': more than %d casters; put them into a scene file", name, value,
+                             CLI_MAX_EXTRA_CASTERS);
+        }
+        s->casters[s->caster_count++] = value;
+        return CLI_OK;
     case CLI_KEY_FLOOR:
         return cli_parse_floor(name, value, s->floor_size, s->floor_center);
     case CLI_KEY_NO_CAST:

@@ -337,16 +337,6 @@ static int join_lights(const cli_bake_settings *s, const vsh_light *others, size
     return CLI_OK;
 }
 
-static int read_lights(const cli_bake_settings *s, const vsh_run *run, double unit, vsh_light **lights,
-                       size_t *count) {
-    vsh_error error;
-    CLI_TRY(cli_check(
-        vsh_lights_read(cli_bake_lights(s), sun_angle(s), s->light_radius, unit, run, lights, count, &error),
-        &error));
-    return *count > 0 ? CLI_OK
-                      : cli_usage("--lights '%s': has no lights; those of a glTF or GLB are read", s->lights);
-}
-
 static int check_options(const cli_bake_settings *s, const cli_bake_scene *made) {
     if (s->has_sun && made->read != NULL) {
         return cli_usage("--sun: the lights of a scene stand in its file, %s", s->input);
@@ -358,10 +348,8 @@ static int check_options(const cli_bake_settings *s, const cli_bake_scene *made)
     if (s->has_sun_angle && !s->has_sun && s->lights == NULL) {
         return cli_usage("--sun-angle: there is no --sun");
     }
-    if (s->has_light_radius && s->lights == NULL) {
-        return cli_usage("--light-radius: there is no --lights");
-    }
-    return CLI_OK;
+    return s->has_light_radius && s->lights == NULL ? cli_usage("--light-radius: there is no --lights")
+                                                    : CLI_OK;
 }
 
 /* Puts the sun and the lights of a file that the options name behind those of the scene's file. */
@@ -370,10 +358,17 @@ static int add_lights(const cli_bake_settings *s, cli_bake_scene *made) {
     const bool moves = made->scene.light_file_count > 0 && cli_patch_has(&s->patch, "--unit");
     vsh_light *others = NULL;
     size_t count = 0;
+    vsh_error error;
     int code;
     CLI_TRY_DONE(check_options(s, made));
     if (s->lights != NULL) {
-        CLI_TRY_DONE(read_lights(s, &run, made->scene.unit, &others, &count));
+        CLI_TRY_DONE(cli_check(vsh_lights_read(cli_bake_lights(s), sun_angle(s), s->light_radius,
+                                               made->scene.unit, &run, &others, &count, &error),
+                               &error));
+    }
+    if (s->lights != NULL && count == 0) {
+        code = cli_usage("--lights '%s': has no lights; those of a glTF or GLB are read", s->lights);
+        goto done;
     }
     if (s->has_sun || count > 0 || moves) {
         CLI_TRY_DONE(join_lights(s, others, count, made));
@@ -439,10 +434,8 @@ static int check_shade(const cli_bake_settings *s, vsh_scene *scene) {
         return cli_usage("%s: method %s takes no rays; rays, adaptive and exact do", option,
                          method_of(scene));
     }
-    if (scene->irradiance && scene->light_count == 0) {
-        return cli_usage("--irradiance: there is no light");
-    }
-    return CLI_OK;
+    return scene->irradiance && scene->light_count == 0 ? cli_usage("--irradiance: there is no light")
+                                                        : CLI_OK;
 }
 
 /* --- all of it */

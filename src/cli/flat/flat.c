@@ -33,13 +33,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
     return cli_patch_take(&((flat_settings *)settings)->patch, key, name, value);
 }
 
-/* Puts what was given over the scene's own. */
-static int apply(const flat_settings *s, vsh_flat_scene *scene) {
-    scene->output = s->output != NULL ? s->output : scene->output;
-    return scene->output != NULL ? cli_patch_flat(&s->patch, scene)
-                                 : cli_usage("%s: no output; give -o OUT", s->input);
-}
-
 /* --- channels: irradiance.R, .G and .B, then the shadows, then A */
 
 typedef struct flat_planes {
@@ -232,7 +225,12 @@ static int flat_main(int argc, char **argv) {
     vsh_error error;
     int code;
     CLI_TRY_DONE(cli_check(vsh_flat_scene_read(s.input, &run, &scene, &error), &error));
-    CLI_TRY_DONE(apply(&s, scene));
+    scene->output = s.output != NULL ? s.output : scene->output;
+    if (scene->output == NULL) {
+        code = cli_usage("%s: no output; give -o OUT", s.input);
+        goto done;
+    }
+    CLI_TRY_DONE(cli_patch_flat(&s.patch, scene));
     code = run_flat(&s, scene, &run);
 done:
     vsh_flat_scene_free(scene);

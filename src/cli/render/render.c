@@ -74,14 +74,6 @@ static const cli_option options[] = {
     CLI_COMMON_OPTIONS,
 };
 
-static int add_lightmap(render_settings *s, const char *value) {
-    if (s->lightmap_count == MOST_LIGHTMAPS) {
-        return cli_usage("--lightmap '%s': at most %d are taken", value, MOST_LIGHTMAPS);
-    }
-    s->lightmaps[s->lightmap_count++] = value;
-    return CLI_OK;
-}
-
 static int parse_option(void *settings, int key, const char *name, const char *value) {
     render_settings *s = settings;
     vsh_render_options *o = &s->options;
@@ -118,7 +110,11 @@ static int parse_option(void *settings, int key, const char *name, const char *v
     case KEY_SHAFT_STEPS:
         return cli_parse_integer(name, value, 1, 64, &o->shaft_steps);
     case KEY_LIGHTMAP:
-        return add_lightmap(s, value);
+        if (s->lightmap_count == MOST_LIGHTMAPS) {
+            return cli_usage("--lightmap '%s': at most %d are taken", value, MOST_LIGHTMAPS);
+        }
+        s->lightmaps[s->lightmap_count++] = value;
+        return CLI_OK;
     default:
         return cli_shared_parse(&s->bake, key, name, value);
     }
@@ -634,7 +630,7 @@ static int make_occluders(render_work *work) {
     vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
     what.voxels = 0;
     for (size_t i = 0; i < work->shading.scene->caster_count;
-         ++i) { /* those without triangles show their field */
+         ++i) { /* casters without triangles show their field */
         what.voxels = what.voxels || !is_shown_as_mesh(work->shading.assets, i);
     }
     CLI_TRY(cli_shading_cast(&work->shading, &what));

@@ -95,14 +95,6 @@ static void write_grid(const plot *p, const axis *a) {
     }
 }
 
-static void write_titles(FILE *out) {
-    fprintf(out,
-            "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">bake, microseconds a value</text>\n"
-            "<text transform=\"translate(14 %d) rotate(-90)\" text-anchor=\"middle\">RMSE against the "
-            "truth</text>\n",
-            (LEFT + WIDTH - RIGHT) / 2, HEIGHT - 10, (TOP + HEIGHT - BOTTOM) / 2);
-}
-
 /* Whether a run is on the line through `like`, or (NULL) on the front. */
 static bool is_on_line(const trade_run *run, const trade_run *like) {
     return like == NULL ? run->front
@@ -215,7 +207,11 @@ static void write_plot(FILE *out, const trade_work *work, const trade_subject *s
             WIDTH, HEIGHT, plot_style, WIDTH, HEIGHT);
     write_grid(&p, &p.axes[0]);
     write_grid(&p, &p.axes[1]);
-    write_titles(out);
+    fprintf(out,
+            "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">bake, microseconds a value</text>\n"
+            "<text transform=\"translate(14 %d) rotate(-90)\" text-anchor=\"middle\">RMSE against the "
+            "truth</text>\n",
+            (LEFT + WIDTH - RIGHT) / 2, HEIGHT - 10, (TOP + HEIGHT - BOTTOM) / 2);
     write_lines(&p);
     write_dots(&p);
     write_legend(&p);
