@@ -25,7 +25,7 @@ static int set(const vsh_setting *setting, const char *text, void *owner) {
     return cli_check(result, &error);
 }
 
-/* A text is held against its range at once: before anything is read. */
+/* Checks a text against its range at once, before any file is read. */
 static int give(cli_patch *patch, size_t index, const char *value) {
     vsh_scene scene = vsh_scene_default();
     vsh_receiver receiver = vsh_receiver_default();

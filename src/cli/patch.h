@@ -8,20 +8,20 @@
 enum { CLI_MOST_RULES = 64, CLI_MOST_PATTERNS = 4096 /* bytes of all */ };
 
 typedef struct cli_patch {
-    const char *text[CLI_MOST_SETTINGS]; /* of each setting; NULL: not given */
+    const char *text[CLI_MOST_SETTINGS]; /* the value of each setting; NULL: not given */
     vsh_solidity_rule rules[CLI_MOST_RULES];
     size_t rule_count;
     char patterns[CLI_MOST_PATTERNS]; /* the rules', one after the other */
     size_t pattern_bytes;
 } cli_patch;
 
-/* Takes an option of a group of settings, or --treat. */
+/* Parses an option of a group of settings, or --treat. */
 int cli_patch_take(cli_patch *patch, int key, const char *name, const char *value);
 
 /* The same by the option's name, "--size". */
 int cli_patch_set(cli_patch *patch, const char *name, const char *value);
 
-/* What an option was given; NULL: it was not. */
+/* Returns the value that an option was given, or NULL. */
 const char *cli_patch_text(const cli_patch *patch, const char *name);
 
 /* Whether an option was given. */

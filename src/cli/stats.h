@@ -1,4 +1,4 @@
-/* What a bake did and what it cost: the --stats file and the summary. */
+/* Counts, times and errors of a run: the --stats file and the summary. */
 #ifndef CLI_STATS_H
 #define CLI_STATS_H
 
@@ -18,7 +18,7 @@ enum { CLI_STATS_TEXELS, CLI_STATS_POINTS, CLI_STATS_VOXELS };
 
 enum { CLI_STATS_SHADOW, CLI_STATS_AO, CLI_STATS_SKY, CLI_STATS_KINDS };
 
-/* What a kind of value is made by. */
+/* The method that made the values of a kind. */
 typedef struct cli_method {
     const char *name; /* NULL: there are no such values */
     bool keeps_error, traces;
@@ -38,7 +38,7 @@ typedef struct cli_stats {
     const vsh_light *lights; /* of `errors` */
     size_t light_count;
     cli_method methods[CLI_STATS_KINDS]; /* NULL names where nothing is baked by one */
-    double max_error;                    /* that was asked for */
+    double max_error;                    /* of --max-error */
     int32_t threads;
     vsh_occluders_info casters;
 } cli_stats;
@@ -46,26 +46,26 @@ typedef struct cli_stats {
 /* Adds the seconds since `since` to a stage and returns the time now. */
 double cli_stats_stage(cli_stats *stats, int stage, double since);
 
-/* Nothing yet; `threads` as of vsh_run. */
+/* Begins with nothing counted; `threads` as of vsh_run. */
 cli_stats cli_stats_begin(int32_t of, int32_t threads);
 
-/* Takes what the scene's methods come to, with triangles (not 0) or without. */
+/* Stores the methods that the scene's settings choose, with triangles (not 0) or without. */
 void cli_stats_methods(cli_stats *stats, const vsh_scene *scene, int32_t has_triangles);
 
-/* Takes what casts and the seconds that it took to make, and what the scene's methods come to with it. */
+/* Stores the casters, adds the seconds that making them took, and stores the scene's methods. */
 void cli_stats_casters(cli_stats *stats, const vsh_scene *scene, const vsh_occluders_info *casters);
 
 /* "shadow exact, AO exact, max error 0.02". Returns text. */
 const char *cli_stats_methods_text(const cli_stats *stats, char *text, size_t size);
 
-/* Where the error asked for is not kept: by how much, and what would help. */
+/* Warns if an error is above --max-error: by how much, and what would help. */
 void cli_stats_warn(const cli_stats *stats, const vsh_scene *scene, const vsh_run *run);
 
-/* The end of a run that went well: writes the JSON file where `path` is not NULL; signals then end nothing
- * any more. CLI_OK or an exit code, having said why. */
+/* Ends a run that went well: writes the JSON file, if `path` is not NULL. After that, signals end nothing any
+ * more. CLI_OK or an exit code, having said why. */
 int cli_stats_finish(const cli_stats *stats, const vsh_run *run, const char *path);
 
-/* Some lines on standard error. */
+/* Prints the summary on standard error. */
 void cli_stats_say(const cli_stats *stats);
 
 #endif

@@ -35,8 +35,8 @@ void cli_temporary_abandon(cli_temporary *t) {
 }
 
 int cli_temporary_check(const char *target) {
-    /* what only a file that is made shows: a name too long, a file system that takes none, a folder without
-     * room */
+    /* Only a file that is made shows a name too long, a file system that takes none, a folder without room.
+     */
     cli_temporary t;
     const int code = cli_temporary_begin(&t, target);
     cli_temporary_abandon(&t);

@@ -14,14 +14,14 @@
 #include <string.h>
 
 enum {
-    WORST = 3,   /* of a kind, that are told */
-    KINDS = 64,  /* that are kept; what is beyond is told at once */
-    TEXT = 1024, /* of a warning */
-    NAME = 100   /* of what a warning is about */
+    WORST = 3,   /* examples that the line of a kind names */
+    KINDS = 64,  /* warnings of further kinds are printed at once */
+    TEXT = 1024, /* bytes of a warning */
+    NAME = 100   /* bytes of an example's name */
 };
 
 typedef struct example {
-    char name[NAME]; /* what it is about; "": it does not say */
+    char name[NAME]; /* of a mesh or file; "": the warning names none */
     double number;   /* the first that it gives: the larger, the worse */
     bool numbered;
 } example;
@@ -60,7 +60,7 @@ static const char *behind_file(const char *message) {
     return file ? colon + 2 : message;
 }
 
-/* Keeps the first quoted name as what the warning is about. Returns the end of the quotation at `c`. */
+/* Keeps the first quoted name as the example's. Returns the end of the quotation at `c`. */
 static const char *take_name(const char *message, const char *c, example *about, bool *object) {
     const char *end = c + 1;
     while (*end != '\0' && !closes(end)) {

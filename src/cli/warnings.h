@@ -4,18 +4,18 @@
 
 #include <stdbool.h>
 
-/* From here on warnings are kept until cli_warnings_tell(); where all are wanted, or none (quiet), they are
- * told at once, or never. Without this call they are told at once. */
+/* From here on warnings wait for cli_warnings_tell(). `all` prints each at once, `quiet` none. Without this
+ * call each is printed at once. */
 void cli_warnings_begin(bool all, bool quiet);
 
-/* Takes one: "file.glb: mesh 'sail': 4 open edges: …". For vsh_run; any thread. */
+/* Adds a warning, "file.glb: mesh 'sail': 4 open edges: …". For vsh_run; any thread. */
 void cli_warnings_parse(void *user, const char *message);
 
-/* The same of one that the program makes. */
+/* Adds a warning of the program's own. */
 void cli_warn(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
-/* Says what was kept, one line a kind, in the order in which kinds came first, and forgets it. To be called
- * where a stage is over, and before an error is told. */
+/* Prints the warnings that wait, one line a kind, in the order in which the kinds came first. Call it at the
+ * end of a stage, and before an error is printed. */
 void cli_warnings_tell(void);
 
 #endif

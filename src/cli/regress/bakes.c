@@ -1,5 +1,5 @@
 /* The folder of new bakes, the child processes that bake into it, and golden bakes that are replaced. */
-#define _GNU_SOURCE /* scandirat, pipe2 */
+#define _GNU_SOURCE /* scandirat, memfd_create */
 #include "cli/message.h"
 #include "cli/paths.h"
 #include "cli/regress/regress.h"
@@ -14,6 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -136,62 +137,40 @@ static void become_program(const char *folder, char **words, pid_t parent, int e
     _exit(write(STDERR_FILENO, text, sizeof text - 1) > 0 ? CLI_FILE : CLI_DEFECT);
 }
 
-/* A child's standard error. */
-typedef struct errors {
-    int from; /* the pipe's end, which does not block */
-    char line[1024];
-    size_t length; /* of the line so far, maybe more than fits */
-} errors;
-
-/* Passes on what has come, and keeps the last error: a line of ours that is no warning. */
-static void pass_errors(errors *e) {
+/* Passes a child's errors on, and keeps the last: a line of ours that is no warning. */
+static void pass_errors(int from) {
     static const char name[] = "vdbshade: ", warning[] = "vdbshade: warning";
-    char piece[4096];
-    ssize_t count;
-    while ((count = read(e->from, piece, sizeof piece)) > 0) {
-        fwrite(piece, 1, (size_t)count, stderr);
-        for (ssize_t i = 0; i < count; ++i) {
-            if (piece[i] != '\n') {
-                e->line[e->length < sizeof e->line - 1 ? e->length : sizeof e->line - 1] = piece[i];
-                ++e->length;
-                continue;
-            }
-            e->line[e->length < sizeof e->line - 1 ? e->length : sizeof e->line - 1] = '\0';
-            if (strncmp(e->line, name, sizeof name - 1) == 0 &&
-                strncmp(e->line, warning, sizeof warning - 1) != 0) {
-                cli_keep_message(e->line + sizeof name - 1);
-            }
-            e->length = 0;
+    char line[1024];
+    FILE *errors = fdopen(from, "r");
+    rewind(errors);
+    while (fgets(line, sizeof line, errors) != NULL) {
+        fputs(line, stderr);
+        line[strcspn(line, "\n")] = '\0';
+        if (strncmp(line, name, sizeof name - 1) == 0 && strncmp(line, warning, sizeof warning - 1) != 0) {
+            cli_keep_message(line + sizeof name - 1);
         }
     }
+    fclose(errors);
 }
 
 /* Runs this program in `folder` with the words of a command line, NULL after the last, and returns its exit
- * code. Passes its errors on; the last is cli_last_message(). If the child dies, says so of `what` and
+ * code. Then passes its errors on; the last is cli_last_message(). If the child dies, says so of `what` and
  * returns CLI_DEFECT. */
 static int run_child(const char *what, const char *folder, char **words) {
     fflush(NULL);
     const pid_t parent = getpid();
-    int ends[2];
-    const bool piped = pipe2(ends, O_CLOEXEC | O_NONBLOCK) == 0;
-    const pid_t child = piped ? fork() : -1;
+    const int errors = memfd_create("errors", MFD_CLOEXEC);
+    const pid_t child = errors >= 0 ? fork() : -1;
     if (child < 0) {
         cli_say("%s: no process for it: %s", what, strerror(errno));
-        if (piped) {
-            close(ends[0]);
-            close(ends[1]);
-        }
+        close(errors);
         return CLI_LIMIT;
     }
     if (child == 0) {
-        fcntl(ends[1], F_SETFL, 0); /* its end blocks */
-        become_program(folder, words, parent, ends[1]);
+        become_program(folder, words, parent, errors);
     }
-    close(ends[1]);
-    errors e = {.from = ends[0]};
     int status = 0;
     while (waitpid(child, &status, WNOHANG) != child) {
-        pass_errors(&e);
         if (cli_interrupted()) {
             kill(child, SIGKILL);
             waitpid(child, &status, 0);
@@ -200,8 +179,7 @@ static int run_child(const char *what, const char *folder, char **words) {
         const struct timespec pause = {0, 2000000};
         nanosleep(&pause, NULL);
     }
-    pass_errors(&e);
-    close(e.from);
+    pass_errors(errors);
     if (cli_interrupted()) { /* as the child was, maybe before it could take a signal */
         const vsh_error cancelled = {VSH_ERROR_CANCELLED, ""};
         return cli_fail(&cancelled);
@@ -257,23 +235,21 @@ static int copy(const char *from, const char *to) {
         return CLI_FILE;
     }
     cli_temporary target;
-    int code = cli_temporary_begin(&target, to);
-    if (code != CLI_OK) {
-        fclose(file);
-        return code;
-    }
+    int code;
+    CLI_TRY_DONE(cli_temporary_begin(&target, to));
     char bytes[65536];
     size_t count;
     while ((count = fread(bytes, 1, sizeof bytes, file)) > 0 &&
            fwrite(bytes, 1, count, target.file) == count) {
     }
-    if (ferror(file)) {
+    if (!ferror(file)) {
+        code = cli_temporary_commit(&target);
+    } else {
         cli_say("%s: cannot be read", from);
         cli_temporary_abandon(&target);
         code = CLI_FILE;
-    } else {
-        code = cli_temporary_commit(&target);
     }
+done:
     fclose(file);
     return code;
 }
