@@ -227,9 +227,6 @@ JSON
     refused 2 'mine.exr.tolerance.json:1:2: rms: unknown key' 'rmse'
     compare mine.exr narrower.exr --tolerances other.json
     done_well
-    echo '{"ssim": 0.9}' >mine.exr.tolerance.json
-    compare mine.exr narrower.exr
-    refused 2 'mine.exr.tolerance.json:1:2: ssim: unknown key'
     compare golden.exr golden.exr --reach 17
     refused 2 "--reach '17'" '16'
 }
@@ -265,7 +262,7 @@ picture() {
     [ "$(grep -o 'data:image/png;base64,iVBORw0KGgo[^"]*' out.html | wc -l)" -eq 6 ] || fail "not three pictures a channel"
     ! grep -qE '(src|href)="?(https?:|/|\.)' out.html || fail "the page needs something beside it"
     grep -q '</html>' out.html || fail "cut short"
-    [ -z "$(find . -name '*.tmp*')" ] || fail "left behind"
+    no_leftovers
     compare golden.exr golden.exr --quiet --junit out.xml
     done_well
     [ -z "$output$stderr" ] || fail "not quiet"
@@ -273,22 +270,22 @@ picture() {
 }
 
 @test "what cannot be compared is an error of its own" {
-    compare golden.exr nowhere.exr
-    refused 3 nowhere.exr
     echo text >text.exr
-    compare text.exr golden.exr
-    refused 3 text.exr
     head -c 3000 golden.vdb >cut.vdb
-    compare golden.vdb cut.vdb
-    refused 3 cut.vdb
-    compare golden.exr
-    refused 2 'no NEW'
-    compare golden.exr half.exr wider.exr
-    refused 2 wider.exr
-    compare golden.exr half.exr --html half.exr
-    refused 2 'half.exr: the report is an input'
-    compare golden.exr half.exr --html same.xml --junit same.xml
-    refused 2 same.xml
+    local code what options
+    while IFS='|' read -r code what options; do
+        # shellcheck disable=SC2086 # words
+        compare $options
+        refused "$code" "$what"
+    done <<'CASES'
+3|nowhere.exr|golden.exr nowhere.exr
+3|text.exr|text.exr golden.exr
+3|cut.vdb|golden.vdb cut.vdb
+2|no NEW|golden.exr
+2|wider.exr|golden.exr half.exr wider.exr
+2|half.exr: the report is an input|golden.exr half.exr --html half.exr
+2|same.xml|golden.exr half.exr --html same.xml --junit same.xml
+CASES
 }
 
 # of_error E OUT [options]: shadows and AO of a ball over a floor by rays.

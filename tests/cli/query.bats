@@ -364,27 +364,26 @@ write_binary_ply() {
         refused 3 cut.ply "cut short"
         untouched out.ply
     done
-    head -c 40 whole.ply >cut.ply
-    shade "${QUERY[@]}" --points cut.ply -o out.ply
-    refused 3 "end_header"
-    write_ascii_ply | head -n -3 >cut.ply
-    shade "${QUERY[@]}" --points cut.ply -o out.ply
-    refused 3 "vertex 3 of 4"
-    printf 'plx\n' >none.ply
-    shade "${QUERY[@]}" --points none.ply -o out.ply
-    refused 2 none.ply "line 1"
-    ply_head binary_middle_endian >none.ply
-    shade "${QUERY[@]}" --points none.ply -o out.ply
-    refused 2 "binary_middle_endian"
-    printf 'ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n' >none.ply
-    shade "${QUERY[@]}" --points none.ply -o out.ply
-    refused 2 "'z'"
+    head -c 40 whole.ply >head.ply
+    write_ascii_ply | head -n -3 >rows.ply
+    printf 'plx\n' >magic.ply
+    ply_head binary_middle_endian >middle.ply
+    printf 'ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n' >flat.ply
     points 3 | head -c 50 >cut.raw
-    shade "${QUERY[@]}" --points cut.raw --normals yes -o out.ply
-    refused 3 cut.raw "row 3"
     printf 'a,b,c\n1,2,3\n' >none.csv
-    shade "${QUERY[@]}" --points none.csv -o out.ply
-    refused 2 none.csv "column x"
+    local file code what
+    while read -r file code what; do
+        shade "${QUERY[@]}" --points "$file" --normals yes -o out.ply
+        refused "$code" "$file" "$what"
+    done <<'CASES'
+head.ply 3 end_header
+rows.ply 3 vertex 3 of 4
+magic.ply 2 line 1
+middle.ply 2 binary_middle_endian
+flat.ply 2 'z'
+cut.raw 3 row 3
+none.csv 2 column x
+CASES
     untouched out.ply
 }
 
