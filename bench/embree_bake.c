@@ -8,7 +8,7 @@
  * proofs, nothing that texels share. Truth is that of many rays of another frame. */
 #include "bake/origins.h"
 #include "bake/page.h"
-#include "bake_scene/pages.h"
+#include "bake_scene/bake_scene.h"
 #include "base/clock.h"
 #include "base/parallel.h"
 #include "common.h"

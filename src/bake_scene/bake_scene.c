@@ -1,6 +1,5 @@
 #include "bake_scene/bake_scene.h"
 
-#include "bake_scene/pages.h"
 #include "bake_scene/parts.h"
 #include "base/clock.h"
 #include "base/file.h"

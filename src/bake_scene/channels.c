@@ -1,4 +1,4 @@
-#include "bake_scene/pages.h"
+#include "bake_scene/bake_scene.h"
 
 #include "bake/planes.h"
 #include "base/memory.h"

@@ -5,7 +5,7 @@
 #ifndef VSHI_BAKE_PARTS_H
 #define VSHI_BAKE_PARTS_H
 
-#include "bake_scene/pages.h"
+#include "bake_scene/bake_scene.h"
 
 #include <string.h>
 

@@ -2,7 +2,7 @@
 #include "base/floats.h"
 #include "base/similarity.h"
 #include "field/surface.h"
-#include "scene/occluders.h"
+#include "scene/assets.h"
 #include "shade/resolution.h"
 #include "spheres/spheres.h"
 #include "trace/embree.h"

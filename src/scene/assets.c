@@ -9,7 +9,6 @@
 #include "base/try.h"
 #include "heightfield/heights.h"
 #include "model/model.h"
-#include "scene/masks.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-#include "scene/masks.h"
+#include "scene/assets.h"
 
 #include "base/job.h"
 #include "base/memory.h"

@@ -1,7 +1,7 @@
 /* How casters are shaded: which methods, with voxels or without, and how many voxels by default. */
 #include "base/floats.h"
 #include "mesh/mesh_set.h"
-#include "scene/occluders.h"
+#include "scene/assets.h"
 #include "shade/resolution.h"
 
 #include <math.h>

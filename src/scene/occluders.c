@@ -1,5 +1,5 @@
 /* From a scene's casters to what is marched and traced. */
-#include "scene/occluders.h"
+#include "scene/assets.h"
 
 #include "base/clock.h"
 #include "base/elementary.h"
