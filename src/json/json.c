@@ -1,8 +1,8 @@
 /* Reads files of JSON into memory of their own, and finds the place of every error in them. */
 #include "json/json.h"
 
-#include "base/file.h"
 #include "base/bytes.h"
+#include "base/file.h"
 #include "base/memory.h"
 #include "base/threads.h"
 #include "base/try.h"

@@ -86,7 +86,8 @@ int32_t vsh_scene_marches(const vsh_scene *scene, const vsh_scene_layer *layer) 
 }
 
 bool vshi_scene_wants_truth(const vsh_scene *scene) {
-    bool measured = scene->layer_count == 0 && vshi_scene_method_is(scene, NULL, VSH_METHOD_KEEPS_ERROR, true);
+    bool measured =
+        scene->layer_count == 0 && vshi_scene_method_is(scene, NULL, VSH_METHOD_KEEPS_ERROR, true);
     for (size_t i = 0; i < scene->caster_count; ++i) { /* of these voxels are the definition, or as good */
         const vsh_caster *caster = &scene->casters[i];
         measured = measured && (vshi_caster_has_triangles(caster) || has_solids(caster)) &&

@@ -14,14 +14,7 @@
 #include "previews.h"
 
 // Last: it has macros named as OpenVDB's members are.
-#include <csetjmp>
-#include <cstdarg>
-#include <cstddef>
-#include <cstdint>
-
-extern "C" {
-#include <cmocka.h>
-}
+#include "testing.h"
 
 namespace {
 

@@ -16,14 +16,7 @@
 #include <vector>
 
 // Last: it has macros named as OpenVDB's members are.
-#include <csetjmp>
-#include <cstdarg>
-#include <cstddef>
-#include <cstdint>
-
-extern "C" {
-#include <cmocka.h>
-}
+#include "testing.h"
 
 namespace {
 
@@ -33,7 +26,6 @@ using openvdb::FloatGrid;
 using openvdb::Vec3d;
 
 std::string folder;
-vsh_error failure;
 
 std::string in_folder(const char *name) {
     return folder + "/" + name;
