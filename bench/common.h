@@ -1,4 +1,4 @@
-/* What the benchmarks of this folder share. */
+/* Helpers of the benchmarks in this folder. */
 #ifndef BENCH_COMMON_H
 #define BENCH_COMMON_H
 

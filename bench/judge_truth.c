@@ -390,7 +390,7 @@ static int write_truth(char **arguments) {
     const float *const planes[] = {t.verdict, t.shadow, t.ao, t.apart, t.triangle};
     const vsh_image image = {q.size, q.size, 5, names, planes, NULL};
     if (fabs(t.units - 1.0) > 1e-3) {
-        printf("%s: lengths are %.6g times what was meant\n", arguments[0], t.units);
+        printf("%s: lengths are %.6g times those of the solids\n", arguments[0], t.units);
     }
     if (vsh_image_write(arguments[7], &image, NULL, &error) != VSH_OK) {
         fprintf(stderr, "judge: %s\n", error.message);

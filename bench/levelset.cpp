@@ -1,5 +1,5 @@
-// What it costs to make a mesh a level set of 512 voxels and that a field, beside OpenVDB's meshToVolume of
-// the same triangles. Milliseconds of one thread's processor time; the ratio is OpenVDB's to ours. An
+// Measures the time to make a mesh a level set of 512 voxels and that a field, beside OpenVDB's meshToVolume
+// of the same triangles. Milliseconds of one thread's processor time; the ratio is OpenVDB's to ours. An
 // exception ends the program.
 //
 //   vsh_levelset FILE.csv

@@ -49,7 +49,7 @@ def median(function, *arguments, runs=5, **options):
     return statistics.median(seconds), result
 
 
-# --- features: what each feature of a bake adds if it is on, and that options of what is off add nothing. The cloister at 512² and
+# --- features: the cost of each feature of a bake. Options of features that are off must add nothing. The cloister at 512² and
 # 256 voxels, each row in a process of its own.
 
 ADAPTIVE, EXACT = dict(method="adaptive", max_error=0.02), dict(method="exact", max_error=0.02)
@@ -169,7 +169,7 @@ def plot_scaling(path):
 # --- read: files parsed by a reader and in the process itself, and meshes of a million triangles by Assimp, in turn
 
 def processor():
-    """Seconds of this process and of those that it waited for."""
+    """Seconds of this process and of its children."""
     return sum(used.ru_utime + used.ru_stime for used in map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)))
 
 
@@ -391,7 +391,7 @@ def cancel():
 
 
 # --- seams: how far values on both sides of charts' borders differ if the surface is smooth, as bilinear lookups give them (docs/seams.md):
-# of a lightmap of many rays, as baked, and stitched; "off" is the error of the lookups, against rays from these very places
+# Lightmaps are of many rays, as baked, and stitched; "off" is the error of the lookups against rays from these very places.
 
 def edges_of(mesh):
     """Edges of triangles, the lower end first, world units: (3 n, 2 ends, x y z | normal | uv)."""

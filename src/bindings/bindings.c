@@ -1,5 +1,5 @@
-/* What bindings call: defaults of structs by their names, as the headers' functions are inline, and progress
- * for languages whose callbacks take long. */
+/* Functions for bindings: defaults of structs by their names, as the headers' functions are inline, and
+ * progress for languages whose callbacks take long. */
 #include "base/clock.h"
 
 #include <vdbshade/vdbshade.h>

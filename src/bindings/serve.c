@@ -1,6 +1,6 @@
 /* vsh_reader_serve(): who parses each kind of file. */
-#include "levelset/access.h"
 #include "image/planes.h"
+#include "levelset/access.h"
 #include "lit/work.h"
 #include "model/model.h"
 #include "outline/outline.h"

@@ -348,7 +348,7 @@ openvdb::CoordBBox told_box(const GridBase &grid) {
     return low && high ? openvdb::CoordBBox(Coord(low->value()), Coord(high->value())) : openvdb::CoordBBox();
 }
 
-// Describes a grid; one that is too large to be read by what the file says.
+// Describes a grid. Where it is too large to be read, the metadata must do.
 void describe(GridReader &reader, size_t i, Stage &stage, vsh_vdb_entry &entry) {
     copy_text(entry.name, reader.name(i));
     vsh_error over;

@@ -28,8 +28,8 @@ vshi_mask_place vshi_alpha_mask_place(const vsh_alpha_mask *mask, const float uv
 /* Whether a mask is opaque at a place. */
 bool vshi_alpha_mask_opaque(const vsh_alpha_mask *mask, vshi_mask_place at);
 
-/* How many texels are opaque, above and left of each corner of the image: any rectangle of it is told by four
- * (Crow, "Summed-area tables for texture mapping", 1984). */
+/* Counts of opaque texels above and left of each corner of the image. Four of them give the count of any
+ * rectangle (Crow, "Summed-area tables for texture mapping", 1984). */
 typedef struct vshi_mask_table {
     const vsh_alpha_mask *mask;
     uint32_t *sums; /* [height + 1][width + 1] */
@@ -42,8 +42,8 @@ vsh_result vshi_mask_table_create(const vsh_alpha_mask *mask, const vsh_run *run
                                   vsh_error *error);
 void vshi_mask_table_free(vshi_mask_table *table);
 
-/* What a mask is over a triangle of such corners: exact over all of the rectangle around it where that is of
- * few texels, else MIXED unless it can be told. */
+/* Covers of a mask over the rectangle around a triangle of such corners. They are exact for a rectangle of
+ * few texels. For others MIXED also means that the table cannot tell. */
 typedef enum vshi_mask_cover {
     VSHI_MASK_CLEAR,  /* nowhere opaque */
     VSHI_MASK_OPAQUE, /* everywhere */
@@ -51,9 +51,9 @@ typedef enum vshi_mask_cover {
 } vshi_mask_cover;
 vshi_mask_cover vshi_mask_table_cover(const vshi_mask_table *table, const vshi_mask_place corners[3]);
 
-/* What a masked mesh is where it is opaque: each triangle cut into ever smaller ones, until they are opaque,
- * or clear and left out, or no longer than `size` (world units) and not all clear. Corners are in the mesh's
- * own space; neighbours may meet in the middle of an edge. */
+/* The opaque parts of a masked mesh. Each triangle is cut until its pieces are opaque, or clear and left out,
+ * or no longer than `size` (world units) and not all clear. Corners are in the mesh's own space. Neighbours
+ * may meet in the middle of an edge. */
 typedef struct vshi_mask_pieces {
     float *positions;  /* [3 × count][3] */
     uint32_t *indices; /* [count][3] */

@@ -72,9 +72,9 @@ static int compare_spokes(const void *a, const void *b) {
     return (x->side > y->side) - (x->side < y->side);
 }
 
-/* Which of three spokes ends at the edge while the two others go on in each other: a card that is stuck to a
- * solid, where one of them hangs together with edges of one triangle; else the two that come nearest to a
- * plane go on, one of which begins a wedge and one ends it if there are such. */
+/* Chooses the spoke of three that ends at the edge, while the two others go on in each other. It is a card
+ * that is stuck to a solid, if one of them hangs together with edges of one triangle. Else the two go on that
+ * come nearest to a plane, preferably one that begins a wedge and one that ends it. */
 static size_t ending_of_three(const spoke *s) {
     static const double PI = 3.14159265358979323846;
     size_t best = 0;

@@ -1,4 +1,4 @@
-/* What each component is for itself. */
+/* Tells solids, walls and sheets apart, each component for itself. */
 #include "base/elementary.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -119,7 +119,7 @@ static double part_encloses(const vshi_surface_part *part, double area, const vs
 
 /* --- measures */
 
-/* What is known of a component before its kind. */
+/* Areas of a component that decide its kind, world units². */
 typedef struct measure {
     double turned_area, doubled_area;
 } measure;
@@ -187,7 +187,7 @@ static void turn_component(vshi_solidity *s, vshi_component *c) {
 /* --- holes: each group of open edges that hang together is closed by triangles to its middle */
 
 typedef struct hole {
-    vshi_vec sum; /* of its edges' middles by their lengths */
+    vshi_vec sum; /* the middles of its edges, by their lengths */
     double length;
 } hole;
 
@@ -195,7 +195,7 @@ typedef struct closing {
     const vsh_mesh *mesh;
     uint32_t *parent; /* [vertex_count] */
     uint32_t *number; /* [vertex_count]: of a root's hole */
-    hole *holes;      /* as many as there are open edges */
+    hole *holes;      /* [open edges] */
 } closing;
 
 static size_t close_holes(closing *k, const vshi_rim *rims, size_t count, vshi_vec (*caps)[3]) {

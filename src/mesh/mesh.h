@@ -22,8 +22,8 @@ typedef struct vshi_mesh_name {
 
 VSHI_SHARED vshi_mesh_name vshi_mesh_label(const vsh_mesh *mesh, size_t index);
 
-/* How many meshes from `first` on (< count) are one object: those in a row of one number above 0, else one.
- */
+/* Counts the meshes from `first` on (< count) that are one object: a row of one number above 0, else one
+ * mesh. */
 static inline size_t vshi_mesh_object_size(const vsh_mesh *meshes, size_t first, size_t count) {
     size_t end = first + 1;
     while (end < count && meshes[first].object > 0 && meshes[end].object == meshes[first].object) {
@@ -32,9 +32,9 @@ static inline size_t vshi_mesh_object_size(const vsh_mesh *meshes, size_t first,
     return end - first;
 }
 
-/* The checks that vsh_mesh_check() refuses a mesh for. Whoever takes meshes from a caller calls this first,
- * or makes a set of them (mesh/mesh_set.h): nothing is done for a mesh of which it is known that it passes.
- * `index` is the mesh's place in a list, for messages. */
+/* Checks a mesh as vsh_mesh_check() does. A function that gets meshes from a caller calls this first, or
+ * makes a set of them (mesh/mesh_set.h). A mesh that is known to pass costs nothing. `index` is the mesh's
+ * place in a list, for messages. */
 vsh_result vshi_mesh_check_data(const vsh_mesh *mesh, size_t index, vsh_error *error);
 
 /* The same, whatever is known. */

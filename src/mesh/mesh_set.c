@@ -67,7 +67,7 @@ void vshi_mesh_set_free(vshi_mesh_set *set) {
     *set = (vshi_mesh_set){0};
 }
 
-/* What is solid among just these meshes, in this order; NULL where nobody looked at them together. */
+/* The solidity of just these meshes, in this order; NULL if they were not looked at together. */
 static const vshi_solidity *known_together(const vshi_mesh_set *set) {
     const vshi_solidity *solidity = set->count > 0 ? set->checked[0].solidity : NULL;
     if (solidity == NULL || solidity->mesh_count != set->count) {

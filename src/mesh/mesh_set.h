@@ -11,7 +11,7 @@
 extern "C" {
 #endif
 
-/* What is known of a mesh. */
+/* The result of checking a mesh. */
 struct vsh_checked_mesh {
     vsh_mesh of;                   /* to tell a view that was changed since */
     vsh_mesh_report report;        /* but for its edges, which are 0 */
@@ -27,7 +27,7 @@ typedef struct vshi_mesh_set {
     vshi_solidity *own;               /* where no other had it */
 } vshi_mesh_set;
 
-/* What is known of a mesh, or NULL. */
+/* The result of checking this very mesh, or NULL. */
 const struct vsh_checked_mesh *vshi_mesh_known(const vsh_mesh *mesh);
 
 /* VSHI_SIDE_… of the triangles of a mesh, or NULL where it is not known what is solid. */
@@ -40,8 +40,8 @@ VSHI_SHARED vsh_result vshi_mesh_set_create(const vsh_mesh *meshes, size_t count
                                             vsh_error *error);
 VSHI_SHARED void vshi_mesh_set_free(vshi_mesh_set *set);
 
-/* Finds what is solid, unless it is known of just these meshes; not a stage of its own in the progress, as it
- * is a small part of a second for a million triangles. Errors: as vshi_solidity_create(). */
+/* Finds the solidity, unless it is known of just these meshes. It takes a small part of a second for a
+ * million triangles, so it is no stage of the progress. Errors: as vshi_solidity_create(). */
 VSHI_SHARED vsh_result vshi_mesh_set_solve(vshi_mesh_set *set, const vsh_run *run, vsh_error *error);
 
 /* Sends notes on the sheets, the solids with holes and the flipped faces of a solved set. Sheets become

@@ -8,8 +8,8 @@
 
 enum { SAMPLES = 24, AROUND_SAMPLES = 8, MOST_ANGLES = 1 << 24 };
 
-/* Of a room's samples: those that lie in any solid, so that it is one; and in one solid, so that it is cut
- * out of it and the solid not left to stand in it as a pillar that reaches into the wall would. */
+/* Shares of a room's samples. With the first in any solids it is a room. With the second in one solid it is
+ * cut out of that one; a pillar that only reaches into the wall is left to stand in it. */
 static const double ROOM_SHARE = 0.5, CUT_SHARE = 0.25;
 /* A sample goes a whole number of times around what it does not lie on: nearer to 1/2 than this it does. */
 static const double ON_SURFACE = 0.25;
@@ -103,10 +103,10 @@ static bool hollow(vshi_solidity *s) {
     return found;
 }
 
-/* Of samples of all else, the share that must lie within what is taken for a dome around it. */
+/* A dome has at least this share of the samples of all other components within. */
 static const double AROUND_SHARE = 0.95;
 
-/* How many of a component's samples lie in a solid. */
+/* Counts the samples of a component that lie in a solid. */
 static size_t count_within(const vshi_solidity *s, const vshi_component *solid, const vshi_component *c) {
     const vshi_surface_part around = vshi_component_part(s, solid), part = vshi_component_part(s, c);
     vshi_vec samples[AROUND_SAMPLES];
@@ -118,8 +118,8 @@ static size_t count_within(const vshi_solidity *s, const vshi_component *solid, 
     return within;
 }
 
-/* What lies within a dome is smaller than this part of it, or none of its solids alone: eyes in a head and an
- * engine in its hood are solids of about its size. */
+/* The content of a dome is smaller than this share of it, or has more than solids. Eyes in a head and an
+ * engine in its hood are solids alone, and of about the size around them. */
 static const double DOME_SHARE = 0.5;
 
 static double longest(vshi_vec size) {
@@ -141,8 +141,8 @@ static bool fits_a_dome(const vshi_solidity *s, const vshi_component *dome) {
     return !solids || longest(vshi_sub(high, low)) < DOME_SHARE * longest(vshi_sub(dome->high, dome->low));
 }
 
-/* A closed solid that everything else lies within, and no room in it: all of that would be buried, and is
- * meant to be seen. A sky dome whose faces look outwards. */
+/* Finds a sky dome whose faces look outwards: a closed solid around everything else, without a room. As a
+ * solid it would bury all that it is to surround. */
 static void find_dome(vshi_solidity *s) {
     vshi_component *dome = NULL;
     double largest = 0.0;

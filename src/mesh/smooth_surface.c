@@ -10,9 +10,9 @@
  * write them with a float's noise, and a flat mesh is to stay exactly flat. */
 static const double FLAT_COSINE = 1.0 - 1e-6;
 
-/* Normals that lean farther over their face than this (53°) stand for a shared hard edge rather than for a
- * curved surface: over a cube with averaged normals (54.7°) the lift would be two thirds of its half edge and
- * tear it from what it touches. They still shade, but do not lift. */
+/* Normals that lean farther over their face than this (53°) come from a shared hard edge, not from a curved
+ * surface. They still shade, but do not lift: over a cube with averaged normals (54.7°) the lift would be two
+ * thirds of its half edge, and tear it off the floor. */
 static const double LIFT_COSINE = 0.6;
 
 /* The least cosine between the shading and the geometric normal. */

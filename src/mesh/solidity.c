@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What a triangle and a vertex take while edges are found, and afterwards at most. */
+/* The most memory for a triangle and for a vertex, while edges are found and afterwards. */
 static const double BYTES_PER_TRIANGLE = 120.0, BYTES_PER_VERTEX = 24.0;
 /* The same of terrains, whose edges are known. */
 static const double TERRAIN_BYTES_PER_TRIANGLE = 9.0, TERRAIN_BYTES_PER_VERTEX = 4.0;

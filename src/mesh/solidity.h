@@ -31,7 +31,7 @@ typedef struct vshi_wholes {
     size_t *of;         /* [meshes]: the whole that each is a part of */
 } vshi_wholes;
 
-/* What lies on the two sides of a triangle. Its front is where its corners run anticlockwise as
+/* Air or a solid on the two sides of a triangle. From its front its corners run anticlockwise, as
  * vshi_mesh_triangle() gives them. */
 enum {
     VSHI_SIDE_SHEET,  /* air on both */
@@ -43,8 +43,8 @@ typedef enum vshi_kind {
     VSHI_KIND_SHEET, /* air on both sides: a card, a leaf, a curtain, an open cup */
     VSHI_KIND_SOLID, /* encloses a solid, and is closed over its holes */
     VSHI_KIND_ROOM,  /* looks inwards and lies within solids: what it encloses is cut out of them */
-    VSHI_KIND_WALL   /* a thin wall behind its faces, air on both sides of that: a room or a sky dome that
-                        stands for itself, or the outer skin of a house with open rooms in it */
+    VSHI_KIND_WALL   /* a thin wall behind its faces, air on both sides of it: a room or a sky dome by
+                        itself, or the outer skin of a house with open rooms */
 } vshi_kind;
 
 typedef struct vshi_component {
@@ -92,7 +92,7 @@ VSHI_SHARED const vshi_wholes *vshi_solidity_wholes(const vshi_solidity *solidit
 /* The components, whole by whole, in the order of their first triangles. */
 VSHI_SHARED const vshi_component *vshi_solidity_components(const vshi_solidity *solidity, size_t *count);
 
-/* Those of one whole: *count of them from the one returned on. */
+/* The components of one whole: *count of them, from the returned one on. */
 VSHI_SHARED const vshi_component *vshi_solidity_of_whole(const vshi_solidity *solidity, size_t whole,
                                                          size_t *count);
 

@@ -1,4 +1,4 @@
-/* What the files behind mesh/solidity.h share. */
+/* Shared by the files behind mesh/solidity.h. */
 #ifndef VSHI_SOLIDITY_PARTS_H
 #define VSHI_SOLIDITY_PARTS_H
 
@@ -65,7 +65,7 @@ struct vshi_solidity {
     vshi_components *found; /* [wholes.count]: as they are by themselves */
     bool *lent;             /* [wholes.count]: of another solidity, where a whole was found before */
     size_t mesh_count;
-    uint8_t *turned;    /* of all meshes: found[].turned, and what was decided since */
+    uint8_t *turned;    /* of all meshes: found[].turned, changed by later decisions */
     uint8_t *sides;     /* of all meshes */
     uint8_t *holed;     /* likewise */
     size_t *first_side; /* [mesh_count + 1] */
@@ -86,16 +86,16 @@ static inline uint8_t *vshi_solidity_turned(const vshi_solidity *s, const vshi_c
 /* Measures all components, closes their holes, and tells sheets, solids and walls apart, each for itself. */
 vsh_result vshi_kinds_find(vshi_solidity *solidity, vshi_job *job, vsh_error *error);
 
-/* An open surface that encloses this share  counts as closed. Measured: a ball with
- * small holes 0.98 and more, a head open at its neck 0.95, a tree's trunk 0.96; a cup 0.91, a box without its
- * lid 0.90, half a sphere 0.82, a short tube 0.79, a tent 0.64, a curtain 0.60. A cup that is filled by
- * mistake buries its content, so the limit is above it. */
+/* An open surface that encloses this share counts as closed. Measured solids: a ball with small holes has
+ * 0.98 and more, a head open at its neck 0.95, a tree's trunk 0.96. Measured sheets: a cup has 0.91, a box
+ * without its lid 0.90, half a sphere 0.82, a short tube 0.79, a tent 0.64, a curtain 0.60. A cup that is
+ * filled by mistake buries its content, so the limit is above it. */
 #define VSHI_SOLID_ENCLOSES 0.945
 
 /* A component as a part of its whole. */
 vshi_surface_part vshi_component_part(const vshi_solidity *solidity, const vshi_component *component);
 
-/* Tells rooms from walls by what lies around them, and finds what they are cut out of. */
+/* Tells rooms from walls by the solids around them, and finds the solids that rooms are cut out of. */
 vsh_result vshi_rooms_find(vshi_solidity *solidity, vsh_error *error);
 
 #endif

@@ -296,11 +296,11 @@ double vshi_sdf_distance_at(const vsh_sdf *sdf, vshi_vec position) {
                                  : NAN;
 }
 
-/* --- many positions at once: each node is asked for all of them, in loops that compilers make vectors of.
- * The distances are the same, to the bit. */
+/* --- many positions at once: a node measures all of them in one loop, which compilers vectorise. The
+ * distances are the same, to the bit. */
 
-/* Positions at a time; nodes below each other whose places are held at once, 2 KB each: deeper ones are asked
- * one position after the other. */
+/* Positions at a time, and the depth of the tree, at 2 KB a node, below which each position is measured
+ * alone. */
 enum { LANES = 64, DEEP = 32 };
 
 typedef struct places {

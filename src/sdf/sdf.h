@@ -1,4 +1,4 @@
-/* What voxelising and tracing need to know of a tree of shapes. */
+/* Trees of shapes, for voxelising and tracing. */
 #ifndef VSHI_SDF_H
 #define VSHI_SDF_H
 

@@ -284,7 +284,7 @@ static void chart_make(struct vsh_atlas *a, const vshi_item *item, double scale,
     page->covered += (double)item->at.touched;
 }
 
-/* What pages have in all, and shares of texels that were counted. */
+/* Sums over all pages, and shares of the texels that were counted. */
 static void sum_pages(struct vsh_atlas *a) {
     double texels = 0.0, touched = 0.0;
     a->info.texels_per_unit = INFINITY;

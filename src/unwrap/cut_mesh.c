@@ -49,7 +49,7 @@ static void measure(vshi_cut_mesh *s) {
         const vshi_vec cross = vshi_cross(vshi_sub(p[1], p[0]), vshi_sub(p[2], p[0]));
         const double area = 0.5 * vshi_length(cross);
         s->normal[i] = vshi_unit(cross);
-        /* what a transform or the range of doubles flattens has no place either */
+        /* triangles flattened by a transform or by the range of doubles have no place either */
         s->area[i] = vshi_mesh_degenerate(mesh, i) || !(area > 0.0) || !isfinite(area) ? 0.0 : area;
     }
 }

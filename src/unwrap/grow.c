@@ -1,8 +1,7 @@
-/* Charts by variational shape approximation (Cohen-Steiner, Alliez and Desbrun, 2004), with the costs of
- * chart growth that make charts round and their borders straight (as in Young's and Castaño's chart growers):
- * a first partition grows one chart after the other, from the largest unit that is left, as far as normals
- * allow; then all charts are grown again at once, from the unit in the middle of each, which evens them out.
- */
+/* Charts by variational shape approximation (Cohen-Steiner, Alliez and Desbrun, 2004). The costs of growth
+ * make charts round and their borders straight, as in Young's and Castaño's chart growers. A first partition
+ * grows one chart after the other, from the largest unit that is left, as far as normals allow. Then all
+ * charts grow again at once, from the unit in the middle of each, which evens them out. */
 #include "unwrap/cut_mesh.h"
 
 #include "base/memory.h"
@@ -18,16 +17,17 @@ static const char what[] = "growing charts";
  * of 1.05 once it is flat. */
 static const double WIDEST = 0.5;
 
-/* Weights of a unit's cost, which orders growth: the normals' difference, 0 … 0.5; the share of the unit's
- * border that would be added to the chart's less what would vanish, -1 … 1; seams of normals and UVs among
- * what vanishes, 0 … 1; the distance from the chart's middle, in radii of a chart of mean area. */
+/* Weights of a unit's cost, by which charts grow. NORMAL: the normals' difference, 0 … 0.5. STRAIGHT: the
+ * share of the unit's border that the chart's border would gain, less the share that it would lose, -1 … 1.
+ * SEAM: the share of seams of normals and UVs in the border that it would lose, 0 … 1. FAR: the distance from
+ * the chart's middle, in radii of a chart of mean area. */
 static const double NORMAL = 2.0, STRAIGHT = 1.0, SEAM = 2.0, FAR = 0.5;
 
 enum {
     NORMAL_SMOOTHINGS = 2,
     ROUNDS = 3, /* of growing all charts again */
     BORDER_SMOOTHINGS = 8,
-    MOST_SIDES = 48, /* of a unit that are looked at for straightness */
+    MOST_SIDES = 48, /* of a unit that count for straightness */
     CHUNK = 4096     /* units between two looks at whether to stop */
 };
 

@@ -39,9 +39,9 @@ vsh_result vshi_patch_straighten(vshi_patch *patch, vshi_boxes *boxes, vsh_error
 /* Whether a patch nearly fills its box at angle 0: other angles are of no use to it. */
 bool vshi_patch_is_box(const vshi_patch *patch, const vshi_boxes *boxes);
 
-/* Fits a patch at an angle and so many texels to its unit. Patches that nearly fill their boxes are made a
- * whole number of texels wide and high, where stretch stays within the limit, and their borders put on
- * texels' centres: what is read between texels inside of it is then of its own texels alone. */
+/* Fits a patch at an angle and so many texels to its unit. A patch that nearly fills its box becomes a whole
+ * number of texels wide and high, if its stretch stays within the limit. Its borders then lie near texels'
+ * centres, so that a lookup between texels inside of it reads its own texels alone. */
 vshi_fit vshi_mask_fit(const vshi_patch *patch, const vshi_boxes *boxes, int angle, double density,
                        double max_stretch);
 

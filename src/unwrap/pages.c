@@ -1,5 +1,5 @@
-/* All charts go onto pages together, or those of each object onto one of its own; then pages are made as
- * small as what lies on them allows. */
+/* All charts go onto pages together, or the charts of each object onto a page of their own. Then pages are
+ * made as small as their charts allow. */
 #include "unwrap/pack.h"
 
 #include "base/memory.h"

@@ -310,8 +310,8 @@ static double area_of(const vshi_shapes *shapes, size_t begin, size_t end) {
     return sum;
 }
 
-/* Fills largest [shapes]: what a chart of each may have at most, world units² of its first mesh; the least of
- * what its instances may, where objects are packed alone. */
+/* Fills largest [shapes]: the most that a chart of each may have, world units² of its first mesh. Where
+ * objects are packed alone, it is the least over its instances. */
 static void find_largest(const making *m, double *largest) {
     const vshi_shapes *shapes = m->shapes;
     const bool alone = m->options->atlas == VSH_ATLAS_OBJECTS;

@@ -272,6 +272,7 @@ TEST(default_pack_takes_the_first_three_and_coverage) {
         {2, {"A", "ao"}, "R=ao,G=ao,B=ao,A=A"},
         {1, {"ao"}, "R=ao,G=ao,B=ao"},
         {1, {"A"}, "R=A,G=A,B=A,A=A"},
+        {2, {NULL, "ao"}, "R=ao,G=ao,B=ao"},
         {5, {"a", "b", "c", "d", "A"}, "R=a,G=b,B=c,A=A"},
         {5,
          {"ao", "irradiance.R", "irradiance.G", "irradiance.B", "A"},

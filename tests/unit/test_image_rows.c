@@ -155,6 +155,8 @@ TEST(rows_that_are_none_of_it_are_refused) {
     assert_fails(vsh_image_writer_add(writer, 10, s.planes, &failure), VSH_ERROR_ARGUMENT, "'ao'");
     vsh_image_writer_abandon(writer);
     vsh_image_writer_abandon(NULL);
+    assert_fails(vsh_image_writer_add(NULL, 1, s.planes, &failure), VSH_ERROR_ARGUMENT, "writer is NULL");
+    assert_fails(vsh_image_writer_finish(NULL, &failure), VSH_ERROR_ARGUMENT, "writer is NULL");
     assert_fails(vsh_image_writer_create(at("x.exr"), NULL, NULL, &writer, &failure), VSH_ERROR_ARGUMENT, "");
     assert_null(writer);
     unmake(&s);

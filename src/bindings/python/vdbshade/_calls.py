@@ -193,7 +193,7 @@ def _arguments(function: Any, given: Tuple[Any, ...], run: Any, error: Any) -> T
 
 
 def _value(place: Any, count: Optional[int], keeps: Any) -> Any:
-    """What the library filled: a number, a record, a pointer, a handle that is freed when nothing refers to it, or several."""
+    """A result: a number, a record, a pointer, a handle that is freed when nothing refers to it, or several."""
     item = ffi.typeof(place).item
     if count is not None:
         return [told(place[i]) for i in range(count)] if item.kind == "struct" else tuple(place)[:count]
@@ -261,7 +261,7 @@ def call(function: Any, *given: Any, run: Optional[Run] = None, keeps: Any = Non
 
 
 def _level_of_caller() -> int:
-    """How far up the first frame is that is not this package's: what a warning is about."""
+    """Counts the frames up to the first one outside this package, which a warning is about."""
     level, frame = 1, sys._getframe(1)
     while frame.f_back is not None and frame.f_globals.get("__package__") == __package__:
         level, frame = level + 1, frame.f_back
@@ -269,7 +269,7 @@ def _level_of_caller() -> int:
 
 
 class Handle(Struct):
-    """What the library made: it is freed when nothing refers to it any more, or at the end of a ``with``."""
+    """An object of the library. It is freed when nothing refers to it any more, or at the end of a ``with``."""
 
     _cdata: Any
     _keeps: Any  # what must live as long
@@ -302,7 +302,7 @@ class Handle(Struct):
 
     @property
     def info(self) -> Any:
-        """What is known of it, a record of vdbshade.types."""
+        """Its properties, a record of vdbshade.types."""
         return ask(getattr(lib, self.KIND + "_get_info"), self, OUT)
 
     def close(self) -> None:

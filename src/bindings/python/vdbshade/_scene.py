@@ -88,7 +88,7 @@ def _receiver_of(given: Any) -> Filled:
 
 
 class SceneFile(Struct):
-    """What a scene's file holds, changed by settings."""
+    """The content of a scene's file, and the settings that change it."""
 
     def _read(self, function: Any, path: Optional[Path], run: Optional[Run]) -> None:
         self._filled = Filled(self.KIND)

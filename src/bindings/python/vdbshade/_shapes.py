@@ -189,7 +189,7 @@ class Outline(Handle, kind="vsh_outline"):
 
     @classmethod
     def from_polygons(cls, polygons: Sequence[ArrayLike], *, run: Optional[Run] = None) -> "Outline":
-        """What closed polygons wind around: arrays of float64 of shape (n, 2)."""
+        """The area that closed polygons wind around: arrays of float64 of shape (n, 2)."""
         parts = [array(p, numpy.float64, (None, 2), f"polygons[{i}]") for i, p in enumerate(polygons)]
         points = numpy.concatenate(parts) if parts else numpy.zeros((0, 2))
         counts = ffi.new("size_t[]", [len(p) for p in parts] or 1)
