@@ -1,7 +1,9 @@
 #define _GNU_SOURCE
 #include "model/model.h"
 
+#include "base/bytes.h"
 #include "base/file.h"
+#include "base/memory.h"
 #include "base/uri.h"
 #include "model/gltf.h"
 #include "model/obj.h"
@@ -12,7 +14,9 @@
 
 /* Bytes that Jansson takes for one byte of a text, as when the model is read (PEAK_BYTES_A_BYTE in
  * model_file.c). */
-static const double JSON_BYTES = 5.0;
+static const double JSON_BYTES = 6.0;
+
+enum { MOST_JSON = 1 << 30 }; /* bytes */
 
 typedef struct telling {
     const char *path;
@@ -72,23 +76,44 @@ static vsh_result tell_texture(const telling *t, const vshi_gltf *gltf, const js
                : VSH_OK;
 }
 
+/* The JSON of a glTF or GLB, and which of the two; root NULL: it has none that can be read. */
+static vsh_result load_json(const telling *t, FILE *file, uint64_t size, vshi_gltf *gltf, vsh_error *error) {
+    enum { HEADER = 12, CHUNK = 8 };
+    char head[HEADER + CHUNK];
+    char *text = NULL;
+    if (fread(head, 1, sizeof head, file) == sizeof head && memcmp(head, "glTF", 4) == 0) {
+        const uint64_t chunk = vshi_bytes_number(head + HEADER, 4, false);
+        gltf->binary = true;
+        size = chunk <= size - sizeof head ? chunk : 0;
+    } else {
+        rewind(file);
+    }
+    if (size == 0 || size > MOST_JSON) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_check_limit(t->run, JSON_BYTES * (double)size, t->path, error));
+    VSHI_TRY(vshi_allocate((void **)&text, (size_t)size, 1, t->path, error));
+    vsh_error ignored;
+    if (fread(text, 1, (size_t)size, file) == size) {
+        vshi_gltf_parse(gltf, text, (size_t)size, &ignored);
+    }
+    free(text);
+    return VSH_OK;
+}
+
 /* A file that cannot be read, or is no glTF, names nothing. */
 static vsh_result beside_gltf(const telling *t, vsh_error *error) {
-    vshi_gltf gltf = {.path = t->path, .run = t->run, .job = t->job};
-    unsigned char *text = NULL;
-    size_t size, i;
+    vshi_gltf gltf = {.path = t->path, .run = t->run};
+    FILE *file;
+    uint64_t size;
+    vsh_error ignored;
+    if (vshi_input_open(t->path, t->path, UINT64_MAX, &file, &size, &ignored) != VSH_OK) {
+        return VSH_OK;
+    }
+    vsh_result result = load_json(t, file, size, &gltf, error);
+    fclose(file);
+    size_t i;
     json_t *given;
-    vsh_error why;
-    vsh_result result = vshi_gltf_read_file(&gltf, t->path, t->path, &text, &size, &why);
-    if (result == VSH_OK && (result = vshi_gltf_hold(&gltf, JSON_BYTES * (double)size, &why)) == VSH_OK) {
-        result = vshi_gltf_open(&gltf, (const char *)text, size, &why);
-    }
-    if (result != VSH_OK) {
-        result = result == VSH_ERROR_LIMIT || result == VSH_ERROR_MEMORY
-                     ? vshi_fail(error, result, "%s", why.message)
-                     : VSH_OK;
-        goto done;
-    }
     json_array_foreach(json_object_get(gltf.root, "buffers"), i, given) {
         VSHI_TRY_DONE(tell_uri(t, json_string_value(json_object_get(given, "uri")), !gltf.binary, error));
     }
@@ -96,9 +121,7 @@ static vsh_result beside_gltf(const telling *t, vsh_error *error) {
         VSHI_TRY_DONE(tell_texture(t, &gltf, given, error));
     }
 done:
-    vshi_gltf_free_buffers(&gltf);
     json_decref(gltf.root);
-    free(text);
     return result;
 }
 

@@ -140,10 +140,9 @@ static vsh_result check_extensions(const vshi_gltf *gltf, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Parses the JSON itself, perhaps with a mark before it and zeros behind. Jansson takes 25 bytes for a byte
- * of a list of nodes, and 1 for buffers in base64 (measured). PEAK_BYTES_A_BYTE in model_file.c allows for
- * that. */
-static vsh_result parse(vshi_gltf *gltf, const char *text, size_t size, vsh_error *error) {
+/* Jansson takes 25 bytes for a byte of a list of nodes, and 1 for buffers in base64 (measured).
+ * PEAK_BYTES_A_BYTE in model_file.c allows for that. */
+vsh_result vshi_gltf_parse(vshi_gltf *gltf, const char *text, size_t size, vsh_error *error) {
     static const char mark[3] = {'\xef', '\xbb', '\xbf'};
     json_error_t where;
     if (size >= sizeof mark && memcmp(text, mark, sizeof mark) == 0) {
@@ -208,7 +207,7 @@ static vsh_result open_binary(vshi_gltf *gltf, const char *text, size_t size, vs
         gltf->binary = true;
         gltf->chunk = (vshi_gltf_bytes){(const unsigned char *)text + next + CHUNK, held};
     }
-    return parse(gltf, text + HEADER + CHUNK, json, error);
+    return vshi_gltf_parse(gltf, text + HEADER + CHUNK, json, error);
 }
 
 static vsh_result check_version(const vshi_gltf *gltf, vsh_error *error) {
@@ -237,7 +236,8 @@ vsh_result vshi_gltf_open(vshi_gltf *gltf, const char *text, size_t size, vsh_er
     const bool binary = size >= 4 && memcmp(text, "glTF", 4) == 0;
     const size_t length = strlen(gltf->path);
     const bool expected = length >= 4 && (gltf->path[length - 1] == 'b' || gltf->path[length - 1] == 'B');
-    VSHI_TRY(binary || expected ? open_binary(gltf, text, size, error) : parse(gltf, text, size, error));
+    VSHI_TRY(binary || expected ? open_binary(gltf, text, size, error)
+                                : vshi_gltf_parse(gltf, text, size, error));
     VSHI_TRY(check_version(gltf, error));
     VSHI_TRY(check_extensions(gltf, error));
     const size_t buffers = json_array_size(json_object_get(gltf->root, "buffers"));

@@ -232,6 +232,10 @@ vsh_result vshi_gltf_mask_image(const vshi_gltf *gltf, const json_t *material, s
 /* Whether a file is one by its ending (model_file.c). */
 bool vshi_is_gltf(const char *path);
 
+/* Parses the JSON itself into gltf->root, perhaps with a mark before it and zeros behind; of `gltf`, path is
+ * given. Errors: as vsh_model_read(). */
+vsh_result vshi_gltf_parse(vshi_gltf *gltf, const char *text, size_t size, vsh_error *error);
+
 /* Parses the JSON of a glTF or GLB of `size` bytes that lie at `text`, and finds its binary chunk; of `gltf`,
  * path, run and bytes_held are given. Free root with json_decref(), and buffers, after a failure too. Errors:
  * as vsh_model_read(). */

@@ -12,7 +12,8 @@ within() {
 @test "a reader holds an image's pixels against the limit before it reads them" {
     write_box box.obj
     "$VDBSHADE" bake box.obj --sun 1,2,1 --size 1024 --resolution 8 --method hard --bits 8 --quiet -o large.png
-    refuses 4 "large.png: about 17 MB are needed, over the memory limit of 10 MB" # and not the 34 of a copy beside them -- info large.png --memory-limit 10M
+    # and not the 34 of a copy beside them
+    refuses 4 "large.png: about 17 MB are needed, over the memory limit of 10 MB" -- info large.png --memory-limit 10M
 }
 
 @test "the level sets of a scene's casters count together, with the casters" {

@@ -78,7 +78,7 @@ void several_grids_and_files_are_their_union(void **) {
     scene.grid.voxel_size = static_cast<double>(VOXEL);
     scene.shade = preview_options();
     vsh_assets *assets = nullptr;
-    OWNED(vsh_grid) *grid = nullptr;
+    vsh_grid *grid = nullptr;
     vsh_error error{};
     assert_int_equal(vsh_assets_load(&scene, nullptr, &assets, &error), VSH_OK);
     assert_int_equal(vsh_scene_casters(&scene, assets, nullptr, &grid, &error), VSH_OK);
@@ -116,6 +116,7 @@ void several_grids_and_files_are_their_union(void **) {
     for (size_t seen : surfaces) { // every one of them is there
         assert_true(seen > 50);
     }
+    vsh_grid_free(grid);
     vsh_assets_free(assets);
 }
 

@@ -126,7 +126,7 @@ FloatGrid::Ptr fog() {
 void a_fog_is_lit_on_its_own_voxels_and_those_of_its_tiles(void **) {
     const FloatGrid::Ptr source = fog();
     const std::string path = save("fog.vdb", {source});
-    OWNED(vsh_voxels) *voxels = like(path, "density");
+    vsh_voxels *voxels = like(path, "density");
     const vsh_voxels_info info = info_of(voxels);
     const uint64_t expected = 8 * 6 * 7 + 512 + 128 * 128 * 128;
     assert_int_equal(source->activeVoxelCount(), expected);
@@ -138,8 +138,8 @@ void a_fog_is_lit_on_its_own_voxels_and_those_of_its_tiles(void **) {
     vsh_voxels_centre(voxels, index, centre);
     assert_true((Vec3d(centre) - source->indexToWorld(Coord(17, 18, 19))).length() < 1e-12);
 
-    OWNED(vsh_occluders) *occluders = ball();
-    OWNED(vsh_volume) *volume = bake(occluders, voxels, false);
+    vsh_occluders *occluders = ball();
+    vsh_volume *volume = bake(occluders, voxels, false);
     const FloatGrid::Ptr lit = written(volume, "lit.vdb", "shadow.sun", false);
     assert_true(lit->transform() == source->transform());
     vsh_volume_info done;
@@ -162,6 +162,9 @@ void a_fog_is_lit_on_its_own_voxels_and_those_of_its_tiles(void **) {
         }
     }
     assert_true(dark > 1000 && light > 100);
+    vsh_volume_free(volume);
+    vsh_occluders_free(occluders);
+    vsh_voxels_free(voxels);
 }
 
 void grids_of_any_numbers_will_do_and_the_first_is_taken(void **) {
@@ -183,8 +186,9 @@ void grids_of_any_numbers_will_do_and_the_first_is_taken(void **) {
         uint64_t count;
     } grids[] = {{nullptr, 1000}, {"id", 1000}, {"heat", 125}, {"mask", 64}};
     for (const auto &grid : grids) {
-        OWNED(vsh_voxels) *voxels = like(path, grid.name);
+        vsh_voxels *voxels = like(path, grid.name);
         assert_int_equal(info_of(voxels).count, grid.count);
+        vsh_voxels_free(voxels);
     }
 }
 
@@ -195,9 +199,9 @@ void a_frustum_keeps_its_map(void **) {
     const openvdb::math::NonlinearFrustumMap map(Vec3d(0.0, 4.0, 4.0), Vec3d(0.0, -0.83, -0.55),
                                                  Vec3d(0.0, 0.275, -0.415), 0.5, 8.0, 32, 32, 32);
     source->setTransform(std::make_shared<openvdb::math::Transform>(map.copy()));
-    OWNED(vsh_voxels) *voxels = like(save("frustum.vdb", {source}), nullptr);
-    OWNED(vsh_occluders) *occluders = ball();
-    OWNED(vsh_volume) *volume = bake(occluders, voxels, false);
+    vsh_voxels *voxels = like(save("frustum.vdb", {source}), nullptr);
+    vsh_occluders *occluders = ball();
+    vsh_volume *volume = bake(occluders, voxels, false);
     const FloatGrid::Ptr lit = written(volume, "frustum-lit.vdb", "shadow.sun", false);
     assert_true(lit->transform() == source->transform());
     size_t dark = 0;
@@ -211,6 +215,9 @@ void a_frustum_keeps_its_map(void **) {
                     std::hypot(p[0], p[2]) < 1.3);
     }
     assert_true(dark > 10);
+    vsh_volume_free(volume);
+    vsh_occluders_free(occluders);
+    vsh_voxels_free(voxels);
 }
 
 void what_has_no_voxels_is_refused(void **) {
@@ -251,7 +258,7 @@ void what_has_no_voxels_is_refused(void **) {
 }
 
 void other_programs_read_names_class_metadata_and_halves(void **) {
-    OWNED(vsh_volume) *volume = bake_box(2.0, true);
+    vsh_volume *volume = bake_box(2.0, true);
     const FloatGrid::Ptr full = written(volume, "full.vdb", "shadow.sun", false);
     const FloatGrid::Ptr rounded = written(volume, "half.vdb", "shadow.sun", true);
     assert_true(!full->saveFloatAsHalf() && rounded->saveFloatAsHalf());
@@ -298,10 +305,11 @@ void other_programs_read_names_class_metadata_and_halves(void **) {
         const int32_t n = int32_t(i);
         assert_true(values[i] == full->tree().getValue(Coord(n % 40, n / 40 % 40, n / 1600)));
     }
+    vsh_volume_free(volume);
 }
 
 void a_failed_write_leaves_the_old_file(void **) {
-    OWNED(vsh_volume) *volume = bake_box(1.5, false);
+    vsh_volume *volume = bake_box(1.5, false);
     const std::string inner = in_folder("closed"), path = inner + "/out.vdb";
     assert_int_equal(std::system(("mkdir '" + inner + "'").c_str()), 0);
     assert_int_equal(vsh_volume_write(volume, inner.c_str(), 0, nullptr, 0, &failure),
@@ -314,6 +322,7 @@ void a_failed_write_leaves_the_old_file(void **) {
     assert_true(content(path) == "old");
     assert_int_equal(vsh_volume_write(volume, path.c_str(), 0, nullptr, 0, &failure), VSH_OK);
     assert_true(content(path) != "old");
+    vsh_volume_free(volume);
 }
 
 int remove_folder(void **) {
