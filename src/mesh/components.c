@@ -126,14 +126,11 @@ static vsh_result list_terrain_rims(const vsh_mesh *mesh, vshi_terrain t, vshi_c
 
 /* The one component of a terrain: the order of its triangles says how they hang together. */
 static vsh_result list_terrain(const vsh_mesh *mesh, vshi_terrain t, vshi_components *c, vsh_error *error) {
-    const size_t count = mesh->triangle_count, vertices = mesh->vertex_count;
-    const vshi_array arrays[] = {VSHI_ARRAY(c->weld, vertices), VSHI_ARRAY(c->turned, count),
-                                 VSHI_ARRAY(c->doubled, count), VSHI_ARRAY(c->twisted, 1),
-                                 VSHI_ARRAY(c->begin, 3),       VSHI_ARRAY(c->list, count)};
+    const size_t count = mesh->triangle_count;
+    const vshi_array arrays[] = {VSHI_ARRAY(c->turned, count), VSHI_ARRAY(c->doubled, count),
+                                 VSHI_ARRAY(c->twisted, 1), VSHI_ARRAY(c->begin, 3),
+                                 VSHI_ARRAY(c->list, count)};
     VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, what, error));
-    for (size_t v = 0; v < vertices; ++v) {
-        c->weld[v] = (uint32_t)v;
-    }
     for (size_t i = 0; i < count; ++i) {
         if (!vshi_mesh_degenerate(mesh, i)) {
             c->list[c->begin[1]++] = (uint32_t)i;
@@ -165,8 +162,6 @@ vsh_result vshi_components_find(const vsh_mesh *mesh, size_t index, vshi_compone
     VSHI_TRY_DONE(vshi_allocate((void **)&found->begin, found->count + 2, sizeof *found->begin, what, error));
     vshi_list_groups(w.of, count, (uint32_t)found->count, found->begin, found->list);
     VSHI_TRY_DONE(list_rims(&w, error));
-    found->weld = w.edges.weld;
-    w.edges.weld = NULL;
 done:
     free(w.queue);
     free(w.of);
@@ -181,6 +176,5 @@ void vshi_components_free(vshi_components *components) {
     free(components->begin);
     free(components->doubled);
     free(components->turned);
-    free(components->weld);
     *components = (vshi_components){0};
 }

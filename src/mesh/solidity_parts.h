@@ -18,7 +18,6 @@ typedef struct vshi_rim {
 
 typedef struct vshi_components {
     size_t count;
-    uint32_t *weld;   /* [vertex_count]: vshi_mesh_weld() */
     uint8_t *turned;  /* [triangle_count]: against the others of its component */
     uint8_t *doubled; /* [triangle_count]: there is one with the same corners that faces the other way */
     uint32_t *begin;  /* [count + 2] in `list` */
