@@ -64,7 +64,7 @@ static vsh_result add_beside(void *user, char *path, vsh_error *error) {
 }
 
 /* Finds `files`, then the files of casters, receivers and lights, then what is read with the models among
- * them (model/model_file.h); each path once. `scene` may be NULL. Files that cannot be read are listed all
+ * them (model/model.h); each path once. `scene` may be NULL. Files that cannot be read are listed all
  * the same. Free the inputs also where it fails. */
 static vsh_result find_inputs(const vsh_scene *scene, const char *const *files, size_t file_count,
                               const vsh_run *run, vshi_job *job, file_list *inputs, vsh_error *error) {
