@@ -69,7 +69,7 @@ class Reach(Case):
         here, v = self.folder, vdbshade
         glb, lamp = ASSETS / "cloister.glb", sun()
         v.version(), v.isa_available("base"), v.unit("cm"), v.settings(), v.reader_confinement(), v.file_digest(glb), v.Error("", 1).name
-        v.Triangles.available(), v.srgb_to_linear(0.5), v.image_default_pack(["ao"]), v.lit_is_output("a.glb")
+        v.srgb_to_linear(0.5), v.image_default_pack(["ao"]), v.lit_is_output("a.glb")
         v.flat_light_name(0), v.shadow_method_traits("cone"), v.ao_method_traits("exact"), repr(lamp)
         v.shadow_method_resolve("auto", True), v.ao_method_resolve("auto", False)
         # meshes and models
