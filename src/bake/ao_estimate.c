@@ -4,7 +4,6 @@
 #include "bake/raster.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/try.h"
 #include "shade/ao.h"
 #include "shade/window.h"
 

@@ -1,6 +1,5 @@
 #include "bake/charts.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/mesh.h"
 
 #include <math.h>

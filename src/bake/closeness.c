@@ -4,7 +4,6 @@
 #include "base/hash.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/mesh.h"
 #include "mesh/weld.h"
 

@@ -1,7 +1,6 @@
 #include "bake/fill.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>

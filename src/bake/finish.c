@@ -2,7 +2,6 @@
 #include "bake/padding.h"
 #include "bake/page.h"
 #include "bake/planes.h"
-#include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>

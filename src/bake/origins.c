@@ -1,6 +1,5 @@
 #include "bake/origins.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "shade/ao.h"
 #include "shade/inside.h"
 #include "shade/kernel/march.h"

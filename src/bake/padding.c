@@ -1,6 +1,5 @@
 #include "bake/padding.h"
 #include "base/parallel.h"
-#include "base/try.h"
 
 #include <stdlib.h>
 #include <string.h>

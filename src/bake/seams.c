@@ -7,7 +7,6 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>

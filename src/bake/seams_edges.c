@@ -2,7 +2,6 @@
  * in the lightmap are equal, too. Otherwise there is a seam, if the surface is smooth. */
 #include "bake/seams_search.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/weld.h"
 
 #include <stdlib.h>

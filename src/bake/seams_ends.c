@@ -2,7 +2,6 @@
 #include "bake/seams_search.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/weld.h"
 
 #include <math.h>

@@ -6,7 +6,6 @@
 #include "bake/places.h"
 #include "base/hash.h"
 #include "base/memory.h"
-#include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -5,7 +5,6 @@
 #include "bake/tile.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>

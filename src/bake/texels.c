@@ -4,7 +4,6 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/try.h"
 
 #include <stdlib.h>
 

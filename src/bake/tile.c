@@ -2,7 +2,6 @@
 
 #include "bake/texels.h"
 #include "base/memory.h"
-#include "base/try.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -5,7 +5,6 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/try.h"
 #include "shade/ao.h"
 #include "shade/layers.h"
 #include "shade/shadow.h"

@@ -5,7 +5,6 @@
 #include "base/file.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "image/planes.h"
 #include "shade/occluders.h"
 #include "shade/shade.h"

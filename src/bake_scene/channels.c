@@ -2,7 +2,6 @@
 
 #include "bake/planes.h"
 #include "base/memory.h"
-#include "base/try.h"
 
 #include <stdio.h>
 #include <stdlib.h>

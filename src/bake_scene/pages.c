@@ -5,7 +5,6 @@
 #include "base/clock.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "base/try.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -6,7 +6,6 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/try.h"
 #include "shade/ao.h"
 
 #include <errno.h>

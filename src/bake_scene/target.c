@@ -1,7 +1,6 @@
 /* The lightmaps of a job, and the names of their files and of its parts. */
 #include "bake_scene/parts.h"
 
-#include "base/try.h"
 #include "base/utf8.h"
 
 #include <dirent.h>

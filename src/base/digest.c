@@ -2,7 +2,6 @@
 #include "base/digest.h"
 
 #include "base/file.h"
-#include "base/try.h"
 
 #include <sha256.h>
 #include <stdio.h>

@@ -2,11 +2,13 @@
 #ifndef VSHI_ERROR_H
 #define VSHI_ERROR_H
 
-#include "base/shared.h"
-
 #include <vdbshade/base.h>
 
 #include <stddef.h>
+
+/* Marks what modules of this library call of it: exported under a version of its own (cmake/exports.map.in),
+ * for nobody else. */
+#define VSHI_SHARED __attribute__((visibility("default")))
 
 #ifdef __cplusplus
 extern "C" {
@@ -36,6 +38,25 @@ VSHI_SHARED vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *
     do {                                                                                                     \
         if ((count) > 0) {                                                                                   \
             VSHI_NEEDS(array);                                                                               \
+        }                                                                                                    \
+    } while (0)
+
+/* Returns what a call came to, unless that is VSH_OK. */
+#define VSHI_TRY(call)                                                                                       \
+    do {                                                                                                     \
+        const vsh_result tried = (call);                                                                     \
+        if (tried != VSH_OK) {                                                                               \
+            return tried;                                                                                    \
+        }                                                                                                    \
+    } while (0)
+
+/* Puts what a call came to into `result` and, unless that is VSH_OK, goes to the label `done`, where a
+ * function that owns something gives it back. */
+#define VSHI_TRY_DONE(call)                                                                                  \
+    do {                                                                                                     \
+        result = (call);                                                                                     \
+        if (result != VSH_OK) {                                                                              \
+            goto done;                                                                                       \
         }                                                                                                    \
     } while (0)
 

@@ -3,7 +3,6 @@
 #define VSHI_FILE_H
 
 #include "base/error.h"
-#include "base/shared.h"
 
 #include <stdbool.h>
 #include <stdio.h>

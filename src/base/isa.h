@@ -3,7 +3,6 @@
 #define VSHI_ISA_H
 
 #include "base/error.h"
-#include "base/shared.h"
 
 #ifdef __cplusplus
 extern "C" {

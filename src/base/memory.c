@@ -1,8 +1,6 @@
 #define _DEFAULT_SOURCE
 #include "base/memory.h"
 
-#include "base/try.h"
-
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>

@@ -3,7 +3,6 @@
 #define VSHI_MEMORY_H
 
 #include "base/error.h"
-#include "base/shared.h"
 
 #include <stdbool.h>
 #include <string.h>

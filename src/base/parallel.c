@@ -1,7 +1,5 @@
 #include "base/parallel.h"
 
-#include "base/try.h"
-
 #include <pthread.h>
 
 typedef struct elements {

@@ -2,7 +2,6 @@
 #include "base/store.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -2,7 +2,7 @@
 #ifndef VSHI_SUGGEST_H
 #define VSHI_SUGGEST_H
 
-#include "base/shared.h"
+#include "base/error.h"
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -2,7 +2,7 @@
 #ifndef VSHI_THREADS_H
 #define VSHI_THREADS_H
 
-#include "base/shared.h"
+#include "base/error.h"
 
 #include <stdbool.h>
 #include <stddef.h>

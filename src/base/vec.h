@@ -108,4 +108,11 @@ static inline vshi_vec vshi_transform_normal(const double *m, vshi_vec n) {
     };
 }
 
+/* A piece of a ray in world space, from `origin` up to `far` along the unit `direction`. */
+typedef struct vshi_segment_ray {
+    double origin[3];
+    double direction[3];
+    double far; /* may be infinite */
+} vshi_segment_ray;
+
 #endif

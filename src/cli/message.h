@@ -70,7 +70,7 @@ void cli_text_add(cli_text *text, const char *words);
 /* Ends the line, where one was begun. */
 void cli_text_end(cli_text *text);
 
-/* --- early returns of functions that return an exit code, as in base/try.h */
+/* --- early returns of functions that return an exit code, as in base/error.h */
 
 /* Returns what a call came to, unless that is CLI_OK. */
 #define CLI_TRY(call)                                                                                        \

@@ -3,7 +3,6 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>

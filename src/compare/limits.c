@@ -1,7 +1,6 @@
 /* The table of measures with their limits, the verdict, and files of limits, which are JSON. */
 #include "base/floats.h"
 #include "base/job.h"
-#include "base/try.h"
 #include "compare/compare.h"
 #include "json/json.h"
 

@@ -18,7 +18,6 @@
 #include "compare/compare.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -13,7 +13,6 @@
 #include "base/isa.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -2,7 +2,6 @@
 
 #include "base/floats.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "field/surface.h"
 
 #include <math.h>

@@ -4,7 +4,6 @@
  * there, at places all over a mesh, each standing for as much area. A slab that is 1.25 voxels thick has a
  * voxel's centre an eighth of a voxel under its surface, wherever it lies. */
 #include "base/memory.h"
-#include "base/try.h"
 #include "field/field.h"
 #include "field/level.h"
 #include "mesh/mesh.h"

@@ -2,7 +2,6 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/try.h"
 #include "trace/embree.h"
 
 #include <math.h>

@@ -4,7 +4,6 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/try.h"
 #include "flat/visible.h"
 #include "light/light.h"
 #include "light/types.h"

@@ -6,7 +6,6 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/similarity.h"
-#include "base/try.h"
 #include "light/view.h"
 
 #include <stdlib.h>

@@ -5,7 +5,6 @@
 
 #include "base/floats.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/mesh.h"
 #include "model/model.h"
 

@@ -1,7 +1,6 @@
 /* OpenEXR files, through OpenEXR's C core. */
 #include "base/file.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "image/codec.h"
 
 #include <Imath/half.h>

@@ -3,7 +3,6 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/threads.h"
-#include "base/try.h"
 #include "extern/module.h"
 #include "image/codec.h"
 #include "sandbox/reader.h"

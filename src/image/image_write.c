@@ -5,7 +5,6 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "image/codec.h"
 
 #include <stdio.h>

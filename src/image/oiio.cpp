@@ -3,7 +3,6 @@
 #include "image/codec.h"
 
 #include "base/file.h"
-#include "base/try.h"
 #include "extern/guard.h"
 
 #include <OpenImageIO/filesystem.h>

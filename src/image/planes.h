@@ -4,7 +4,6 @@
 
 #include "base/attributes.h"
 #include "base/job.h"
-#include "base/shared.h"
 
 #include <vdbshade/image.h>
 

@@ -1,7 +1,6 @@
 /* PNG files through libpng, whose messages and jumps stay within. */
 #include "base/file.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "image/codec.h"
 
 #include <png.h>

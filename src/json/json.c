@@ -5,7 +5,6 @@
 #include "base/file.h"
 #include "base/memory.h"
 #include "base/threads.h"
-#include "base/try.h"
 
 #include <errno.h>
 #include <stdarg.h>

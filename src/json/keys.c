@@ -2,7 +2,6 @@
  * people. */
 #include "base/decimal.h"
 #include "base/suggest.h"
-#include "base/try.h"
 #include "json/json.h"
 
 #include <math.h>

@@ -3,7 +3,6 @@
 #include "levelset/grid.h"
 
 #include "base/parallel.h"
-#include "base/try.h"
 #include "levelset/file.h"
 
 #include <cmath>

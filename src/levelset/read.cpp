@@ -1,5 +1,4 @@
 // Reading .vdb files, in this process or by run.reader: level sets, lists of grids, dense copies.
-#include "base/try.h"
 #include "levelset/file.h"
 
 #include <cstring>

@@ -1,6 +1,5 @@
 // The union of grids: those on the new lattice are shifted by whole voxels, others are meshed, moved and
 // measured again; then each voxel takes the least value of all.
-#include "base/try.h"
 #include "levelset/surface.h"
 
 #include <cmath>

@@ -1,6 +1,5 @@
 // Volumes: which voxels of which lattice are shaded (a level set's band, a box, another grid's active
 // voxels), the leaves that their values are put into block by block, and the trees made of them.
-#include "base/try.h"
 #include "levelset/file.h"
 
 #include <cmath>

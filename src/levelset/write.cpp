@@ -1,7 +1,6 @@
 // Writing .vdb files: whole, or not at all, and the same bytes for the same grids.
 #include "base/attributes.h"
 #include "base/file.h"
-#include "base/try.h"
 #include "levelset/file.h"
 
 #include <cstdio>

@@ -3,7 +3,6 @@
 #include "base/decimal.h"
 #include "base/error.h"
 #include "base/floats.h"
-#include "base/try.h"
 #include "light/types.h"
 
 #include <math.h>

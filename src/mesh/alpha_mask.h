@@ -3,7 +3,6 @@
 #define VSHI_ALPHA_MASK_H
 
 #include "base/error.h"
-#include "base/shared.h"
 #include "base/vec.h"
 
 #include <stdbool.h>

@@ -1,7 +1,6 @@
 #include "mesh/solidity_parts.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/edges.h"
 #include "mesh/weld.h"
 

@@ -5,7 +5,6 @@
 
 #include "base/elementary.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/weld.h"
 
 #include <stdlib.h>

@@ -2,7 +2,6 @@
 #include "base/elementary.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/try.h"
 #include "mesh/solidity_parts.h"
 #include "mesh/weld.h"
 

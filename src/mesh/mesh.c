@@ -1,7 +1,6 @@
 #include "mesh/mesh.h"
 
 #include "base/similarity.h"
-#include "base/try.h"
 
 #include <stdio.h>
 #include <string.h>

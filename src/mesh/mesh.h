@@ -3,7 +3,6 @@
 #define VSHI_CASTER_MESH_H
 
 #include "base/error.h"
-#include "base/shared.h"
 #include "base/vec.h"
 
 #include <vdbshade/mesh.h>

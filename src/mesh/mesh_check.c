@@ -2,7 +2,6 @@
  * one whose triangles run along it more often one way than the other joins triangles that disagree about the
  * outside. */
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/mesh.h"
 #include "mesh/weld.h"
 

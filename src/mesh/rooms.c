@@ -1,6 +1,5 @@
 /* Which of the components that look inwards are rooms in solids. */
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/solidity_parts.h"
 
 #include <math.h>

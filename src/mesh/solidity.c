@@ -4,7 +4,6 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/try.h"
 #include "mesh/mesh_set.h"
 #include "mesh/solidity_parts.h"
 

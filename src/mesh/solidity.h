@@ -7,7 +7,6 @@
 #define VSHI_SOLIDITY_H
 
 #include "base/error.h"
-#include "base/shared.h"
 #include "base/vec.h"
 #include "mesh/mesh.h"
 

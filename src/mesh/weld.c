@@ -2,7 +2,6 @@
 
 #include "base/hash.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/mesh.h"
 
 #include <stdlib.h>

@@ -6,7 +6,6 @@
 #include "base/bytes.h"
 #include "base/file.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "base/vec.h"
 #include "extern/importers.h"
 #include "mesh/mesh.h"

@@ -4,7 +4,6 @@
 #ifndef VSHI_CASTER_GLTF_H
 #define VSHI_CASTER_GLTF_H
 
-#include "base/try.h"
 #include "extern/importers.h"
 #include "model/model.h"
 

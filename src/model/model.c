@@ -4,7 +4,6 @@
 #include "model/model.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 #include "base/vec.h"
 #include "mesh/mesh.h"
 #include "model/text.h"

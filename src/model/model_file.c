@@ -3,7 +3,6 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/threads.h"
-#include "base/try.h"
 #include "model/gltf.h"
 #include "model/obj.h"
 #include "model/text.h"

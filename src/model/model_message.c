@@ -1,7 +1,6 @@
 /* A model between a reader and its caller. */
 #include "base/file.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/mesh.h"
 #include "model/model.h"
 #include "sandbox/reader.h"

@@ -4,7 +4,6 @@
 
 #include "base/decimal.h"
 #include "base/memory.h"
-#include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -3,7 +3,6 @@
 
 #include "base/file.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "model/obj.h"
 
 #include <math.h>

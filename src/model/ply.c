@@ -4,7 +4,6 @@
 #include "base/bytes.h"
 #include "base/decimal.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "model/faces.h"
 #include "model/model.h"
 #include "model/text.h"

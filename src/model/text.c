@@ -4,7 +4,6 @@
 #include "base/decimal.h"
 #include "base/file.h"
 #include "base/memory.h"
-#include "base/try.h"
 
 #include <errno.h>
 #include <stdio.h>

@@ -6,7 +6,6 @@
 
 #include "base/floats.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "image/planes.h"
 
 #include <math.h>

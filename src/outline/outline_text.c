@@ -5,7 +5,6 @@
 #include "base/elementary.h"
 #include "base/file.h"
 #include "base/floats.h"
-#include "base/try.h"
 #include "base/utf8.h"
 #include "sandbox/reader.h"
 

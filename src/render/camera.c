@@ -2,7 +2,6 @@
 #include "base/error.h"
 #include "base/floats.h"
 #include "base/job.h"
-#include "base/try.h"
 #include "render/render.h"
 
 static const double FOV_LEAST = 0.001, FOV_MOST = 3.0;

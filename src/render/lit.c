@@ -1,5 +1,4 @@
 #include "base/memory.h"
-#include "base/try.h"
 #include "image/planes.h"
 #include "mesh/mesh.h"
 #include "mesh/smooth_surface.h"

@@ -1,6 +1,5 @@
 /* Traces the samples of a tile, and shades their hits. */
 #include "base/elementary.h"
-#include "base/try.h"
 #include "light/view.h"
 #include "render/render.h"
 #include "shade/shade.h"

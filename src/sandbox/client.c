@@ -3,7 +3,6 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "sandbox/confine.h"
 
 #include <dlfcn.h>

@@ -3,7 +3,6 @@
 #define VSHI_READ_READER_H
 
 #include "base/job.h"
-#include "base/shared.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -6,7 +6,6 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/similarity.h"
-#include "base/try.h"
 #include "heightfield/heights.h"
 #include "model/model.h"
 

@@ -1,7 +1,6 @@
 /* Reads casters from scene files: transforms, procedural shapes, and one table of keys for all types. */
 #include "base/elementary.h"
 #include "base/similarity.h"
-#include "base/try.h"
 #include "base/vec.h"
 #include "scene/scene.h"
 

@@ -1,6 +1,5 @@
 /* Lights: those that a scene file lists, in space or in a plane, and those of models and their files. */
 #include "base/memory.h"
-#include "base/try.h"
 #include "light/light.h"
 #include "light/types.h"
 #include "scene/scene.h"

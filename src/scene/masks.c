@@ -2,7 +2,6 @@
 
 #include "base/job.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "image/planes.h"
 #include "mesh/alpha_mask.h"
 #include "mesh/mesh.h"

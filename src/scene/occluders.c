@@ -6,7 +6,6 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "base/vec.h"
 #include "light/view.h"
 #include "mesh/mesh_set.h"

@@ -1,5 +1,4 @@
 /* Reads receivers, and the settings of their images, from scene files. */
-#include "base/try.h"
 #include "scene/scene.h"
 
 #include <math.h>

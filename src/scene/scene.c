@@ -4,7 +4,6 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "model/model.h"
 
 #include <stdio.h>

@@ -4,7 +4,6 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/suggest.h"
-#include "base/try.h"
 #include "mesh/mesh.h"
 
 #include <stdint.h>

@@ -3,7 +3,6 @@
 
 #include "base/job.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/mesh.h"
 #include "model/model.h"
 

@@ -9,7 +9,6 @@
 #include "base/error.h"
 #include "base/floats.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "base/vec.h"
 
 #include <stdlib.h>

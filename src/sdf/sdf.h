@@ -2,7 +2,7 @@
 #ifndef VSHI_SDF_H
 #define VSHI_SDF_H
 
-#include "base/shared.h"
+#include "base/error.h"
 #include "base/vec.h"
 
 #include <stdbool.h>

@@ -1,7 +1,6 @@
 /* Ambient occlusion: options, and which method shades the points. */
 #include "shade/ao.h"
 #include "base/floats.h"
-#include "base/try.h"
 #include "shade/layers.h"
 #include "trace/embree.h"
 

@@ -1,7 +1,6 @@
 #include "shade/layers.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 #include "heightfield/heights.h"
 #include "light/light.h"
 #include "spheres/spheres.h"

@@ -3,7 +3,6 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "field/field.h"
 #include "shade/layers.h"
 #include "trace/embree.h"

@@ -2,7 +2,6 @@
 #include "base/clock.h"
 #include "base/floats.h"
 #include "base/job.h"
-#include "base/try.h"
 #include "mesh/mesh_set.h"
 #include "shade/occluders.h"
 

@@ -1,7 +1,6 @@
 /* Points sorted along Morton's curve. Hilbert's, which never jumps, saves a hundredth of the samples of a
  * million random points and takes 30 ns more a point to compute. */
 #include "base/parallel.h"
-#include "base/try.h"
 #include "field/level.h"
 #include "shade/query.h"
 

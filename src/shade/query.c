@@ -3,7 +3,6 @@
 
 #include "base/floats.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "field/level.h"
 #include "shade/layers.h"
 #include "shade/query.h"

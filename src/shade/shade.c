@@ -2,7 +2,6 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/try.h"
 #include "field/surface.h"
 
 #include <math.h>

@@ -3,7 +3,6 @@
 #include "base/elementary.h"
 #include "base/floats.h"
 #include "base/hash.h"
-#include "base/try.h"
 #include "shade/layers.h"
 #include "trace/embree.h"
 

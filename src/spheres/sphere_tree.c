@@ -7,7 +7,6 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/similarity.h"
-#include "base/try.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -6,7 +6,6 @@
 #include "base/elementary.h"
 #include "base/floats.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "light/view.h"
 #include "table/table.h"
 

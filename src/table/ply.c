@@ -5,7 +5,6 @@
 
 #include "base/bytes.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "table/table.h"
 
 #include <inttypes.h>

@@ -3,7 +3,6 @@
 #include "base/decimal.h"
 #include "base/file.h"
 #include "base/memory.h"
-#include "base/try.h"
 
 #include <errno.h>
 #include <inttypes.h>

@@ -3,7 +3,6 @@
 #define VSHI_EMBREE_H
 
 #include "base/job.h"
-#include "base/segment.h"
 #include "base/vec.h"
 #include "trace/sampler.h"
 

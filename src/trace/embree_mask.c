@@ -1,7 +1,6 @@
 #include "trace/embree_scene.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/mesh.h"
 
 #include <math.h>

@@ -7,7 +7,6 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/similarity.h"
-#include "base/try.h"
 #include "base/vec.h"
 #include "sdf/sdf.h"
 

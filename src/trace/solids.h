@@ -2,7 +2,7 @@
 #ifndef VSHI_SOLIDS_H
 #define VSHI_SOLIDS_H
 
-#include "base/segment.h"
+#include "base/vec.h"
 
 #include <stdbool.h>
 #include <vdbshade/trace.h>

@@ -3,7 +3,6 @@
 #include "base/isa.h"
 #include "base/memory.h"
 #include "base/similarity.h"
-#include "base/try.h"
 
 #include <stdlib.h>
 

@@ -5,7 +5,6 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/try.h"
 #include "base/vec.h"
 #include "light/view.h"
 #include "trace/embree.h"

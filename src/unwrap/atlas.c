@@ -2,7 +2,6 @@
 #include "unwrap/pack.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/weld.h"
 
 #include <stdlib.h>

@@ -1,7 +1,6 @@
 #include "unwrap/cut_mesh.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/edges.h"
 #include "mesh/weld.h"
 

@@ -1,7 +1,6 @@
 #include "unwrap/patch.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 #include "unwrap/sparse.h"
 
 #include <stdlib.h>

@@ -5,7 +5,6 @@
 #include "unwrap/cut_mesh.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 #include "unwrap/heap.h"
 
 #include <stdlib.h>

@@ -3,7 +3,6 @@
 #define VSHI_UNWRAP_HEAP_H
 
 #include "base/memory.h"
-#include "base/try.h"
 
 #include <stdint.h>
 #include <stdlib.h>

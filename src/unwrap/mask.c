@@ -2,7 +2,6 @@
 #include "unwrap/mask.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 
 #include <stdlib.h>
 

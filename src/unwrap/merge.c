@@ -1,7 +1,6 @@
 #include "unwrap/shapes.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 
 #include <stdlib.h>
 

@@ -5,7 +5,6 @@
 #include "unwrap/patch.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 
 #include <stdlib.h>
 

@@ -4,7 +4,6 @@
 
 #include "base/hash.h"
 #include "base/memory.h"
-#include "base/try.h"
 
 #include <stdlib.h>
 

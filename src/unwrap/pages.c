@@ -3,7 +3,6 @@
 #include "unwrap/pack.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/mesh.h"
 
 #include <stdlib.h>

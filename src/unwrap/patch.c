@@ -4,7 +4,6 @@
 #include "unwrap/patch.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/weld.h"
 #include "unwrap/heap.h"
 

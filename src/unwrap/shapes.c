@@ -4,7 +4,6 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/try.h"
 #include "mesh/mesh.h"
 #include "mesh/weld.h"
 

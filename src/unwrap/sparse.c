@@ -3,7 +3,6 @@
 #include "unwrap/sparse.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/weld.h"
 
 #include <stdlib.h>

@@ -1,6 +1,5 @@
 #include "base/floats.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "unwrap/pack.h"
 
 #include <stdlib.h>

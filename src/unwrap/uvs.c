@@ -1,7 +1,6 @@
 /* UVs that meshes have: charts of them, and how dense and how stretched they are. */
 #include "base/floats.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "mesh/weld.h"
 #include "unwrap/patch.h"
 

@@ -2,7 +2,6 @@
 #include "view/page.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 #include "base/uri.h"
 #include "model/model.h"
 

@@ -3,7 +3,6 @@
 #include "view/page.h"
 
 #include "base/memory.h"
-#include "base/try.h"
 
 #include <Imath/half.h>
 #include <math.h>

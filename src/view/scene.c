@@ -1,7 +1,6 @@
 /* A scene in a page: the surface of its casters' voxels, with light at the vertices. */
 #include "base/floats.h"
 #include "base/memory.h"
-#include "base/try.h"
 #include "field/field.h"
 #include "field/surface.h"
 #include "model/model.h"

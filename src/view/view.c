@@ -5,7 +5,6 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/threads.h"
-#include "base/try.h"
 #include "base/utf8.h"
 #include "view/page.h"
 

@@ -2,7 +2,7 @@
 #ifndef VSHI_LEAF_KERNEL_H
 #define VSHI_LEAF_KERNEL_H
 
-#include "base/shared.h"
+#include "base/error.h"
 
 #include <stddef.h>
 #include <stdint.h>
