@@ -161,11 +161,11 @@ static void cover(const vshi_charts *charts, vshi_tile *tile, const uint32_t *sl
 bool vshi_tile_rasterize(const vshi_charts *charts, vshi_tile *tile, int32_t x, int32_t y,
                          const vshi_overlaps *overlaps) {
     const size_t cell = (size_t)(y + 1) * VSHI_TILE_ACROSS + (size_t)(x + 1);
-    const uint32_t *slot = tile->cell_triangle + tile->cell_start[cell];
     const size_t count = tile->cell_start[cell + 1] - tile->cell_start[cell];
     if (count == 0) { /* as none reaches what is outside the image */
         return false;
     }
+    const uint32_t *slot = tile->cell_triangle + tile->cell_start[cell];
     vshi_cell_begin(&charts->raster, tile->column * VSHI_TILE_CELLS + (size_t)x,
                     tile->row * VSHI_TILE_CELLS + (size_t)y, &tile->cell);
     cover(charts, tile, slot, count, overlaps);
