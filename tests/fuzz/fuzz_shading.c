@@ -103,7 +103,7 @@ static void lightmap(fuzz_input *input) {
         vsh_texels_free(texels);
     }
     if (charts != NULL && FITS(options)) {
-        static float planes[6][3 * MOST_TEXELS];
+        static float planes[8][3 * MOST_TEXELS];
         vsh_shade_options shading = vsh_shade_options_default();
         shading.ao_cones = 4;
         fuzz_take(input, &shading, sizeof shading);
@@ -124,6 +124,8 @@ static void lightmap(fuzz_input *input) {
         map.bent = how & 8 ? planes[5] : NULL;
         map.tint = how & 16 ? tint : NULL;
         map.ambient = how & 32 ? ambient : NULL;
+        map.invalid = how & 64 ? planes[6] : NULL;
+        map.sky = how & 128 ? planes[7] : NULL;
         fuzz_ended_plain(
             vsh_bake_lightmap(occluders, charts, &light, 1, &shading, &run, &map, NULL, fuzz_error()));
         fuzz_free_occluders(occluders);
