@@ -13,7 +13,7 @@ int main(int argc, char **argv) {
     run.warning = warn;
     vsh_error error;
     vsh_scene *scene = NULL;
-    vsh_bake_report report;
+    vsh_bake_report report = {.errors = NULL};
     if (vsh_scene_read(argc > 1 ? argv[1] : "scene.json", NULL, &scene, &error) != VSH_OK ||
         vsh_bake_scene(scene, NULL, &run, &report, &error) != VSH_OK) {
         fprintf(stderr, "scene: %s\n", error.message);
