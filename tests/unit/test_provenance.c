@@ -133,6 +133,35 @@ TEST(settings_and_inputs_are_told_in_order_and_once) {
     assert_non_null(strstr(failure.message, "one.bin: cannot be read"));
 }
 
+/* A GLB with 64 MiB of binary data, where the limit on memory is 1 MiB. */
+TEST(files_that_a_large_glb_names_are_found_from_its_json_alone) {
+    static const char json[] = "{\"buffers\": [{}, {\"uri\": \"one.bin\"}]}    ";
+    enum { SIZE = (sizeof json - 1) / 4 * 4, BINARY = 64 << 20, ALL = 28 + SIZE + BINARY };
+    const uint32_t head[] = {0x46546C67, 2, ALL, SIZE, 0x4E4F534A /* "glTF", "JSON" */};
+    const uint32_t binary[] = {BINARY, 0x004E4942 /* "BIN" */};
+    unsigned char bytes[28 + SIZE];
+    memcpy(bytes, head, sizeof head);
+    memcpy(bytes + sizeof head, json, SIZE);
+    memcpy(bytes + sizeof head + SIZE, binary, sizeof binary);
+    write_text("one.bin", "1");
+    write_all(at("large.glb"), bytes, sizeof bytes);
+    assert_int_equal(truncate(at("large.glb"), ALL), 0);
+    const vsh_caster caster = {.type = VSH_CASTER_MESH, .path = at("large.glb")};
+    const vsh_scene scene = {.casters = &caster, .caster_count = 1, .shade = preview_options()};
+    vsh_provenance_source source = vsh_provenance_source_default();
+    source.scene = &scene;
+    vsh_run run = vsh_run_default();
+    run.memory_limit = 1 << 20;
+    vsh_provenance *made = NULL;
+    assert_ok(vsh_provenance_create(&source, &run, &made, &failure));
+    size_t count = 0;
+    const vsh_attribute *list = vsh_provenance_attributes(made, &count);
+    assert_string_equal(list[count - 1].value,
+                        "sha256:6b86b273ff34fce19d6b804eff5a3f5747ada4eaa22f1d49c01e52ddb7875b4b one.bin");
+    vsh_provenance_free(made);
+    assert_int_equal(unlink(at("large.glb")), 0);
+}
+
 TEST(the_error_that_a_channel_was_made_to_is_told) {
     const vsh_attribute list[] = {{"vdbshade_version", "0.2.0"},
                                   {"vdbshade_shadow", "adaptive, max error 0.005, sobol, frame 3"},
