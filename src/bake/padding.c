@@ -273,10 +273,10 @@ void vshi_spread_copy(const vshi_spread *spread, uint8_t *state, const vshi_plan
 
 /* --- everywhere else
  *
- * Pull and push (Gortler, Grzeszczuk, Szeliski and Cohen, "The lumigraph", 1996), with means for weights:
- * levels half as large hold the mean of those of four texels that have a value; from the coarsest on what has
- * none takes that of the texel above it. A texel is never blended with those beside it: what is filled then
- * leaves the means of the levels above as they are. */
+ * Pull and push (Gortler, Grzeszczuk, Szeliski and Cohen, "The lumigraph", 1996) with plain means. Pull: each
+ * level is half as large, and its texel is the mean of the four below that have a value. Push: from the
+ * coarsest level down, a texel without a value copies the one above it. Neighbours are not blended, so
+ * filling does not change the means of coarser levels. */
 enum { MOST_CHANNELS = 4, GRAIN = 16 /* rows */ };
 
 /* A plane, halved some times. */

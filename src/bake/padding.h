@@ -1,6 +1,6 @@
-/* Texels without a value of their own: invalid ones take that of the nearest valid texel of their chart,
- * those around charts that of the nearest valid texel, and all others means, so that no mip level reads
- * background. */
+/* Fills texels that have no value of their own, so that no mip level reads background. Invalid texels copy
+ * the nearest valid texel of their chart, texels around charts copy the nearest valid texel, and the rest
+ * take means. */
 #ifndef VSHI_BAKE_PADDING_H
 #define VSHI_BAKE_PADDING_H
 
@@ -60,10 +60,9 @@ void vshi_spread_free(vshi_store *store, vshi_spread *spread);
 void vshi_spread_copy(const vshi_spread *spread, uint8_t *state, const vshi_plane *planes,
                       size_t plane_count);
 
-/* Gives every texel whose `filled` is 0 the mean of the texels that hold a value among the 2, 4, 8 … on a
- * side that it is one of in the first mip level where there are any: a mip level that is made of means of 2 ×
- * 2 texels holds the means of values alone. Planes where no texel holds a value are left. Errors:
- * as vshi_store_take(); VSH_ERROR_CANCELLED. */
+/* Fills every texel whose `filled` is 0 with the mean of the filled texels in the smallest aligned square (2
+ * × 2, 4 × 4, 8 × 8 …) around it that has any. Box-filtered mip levels then hold means of baked values only.
+ * A plane without filled texels stays as it is. Errors: as vshi_store_take(); VSH_ERROR_CANCELLED. */
 vsh_result vshi_pull_push(vshi_store *store, const vsh_run *run, int32_t width, int32_t height,
                           uint8_t *filled, const vshi_plane *planes, size_t plane_count, vsh_error *error);
 

@@ -32,8 +32,8 @@ typedef struct vshi_targets {
     size_t count;
 } vshi_targets;
 
-/* Of a file that an asset has for each of its `pages`: FILE.OBJECT.exr of an object, FILE.PAGE.exr of one
- * page of several, else FILE.exr. To be freed; NULL where the system refuses memory. */
+/* The name of a target's file: FILE.OBJECT.exr for an object, FILE.PAGE.exr for one of several `pages`, else
+ * FILE.exr. To be freed; NULL if out of memory. */
 char *vshi_target_file(const vshi_target *target, size_t pages, const char *file);
 
 /* Finds what is solid of receivers that do not cast. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY,

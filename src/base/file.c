@@ -31,7 +31,7 @@ enum {
     MAX_TEMPORARIES = 1000 /* of one target and process at a time */
 };
 
-/* What the names of a target's temporaries begin and end with, around process and number. */
+/* The parts of a temporary's name around the process and the number. */
 typedef struct naming {
     const char *name; /* the target's last part */
     int folder_length, stem_length;
@@ -124,10 +124,9 @@ static bool is_left(int file, long process) {
     return errno != EWOULDBLOCK && errno != EINTR && kill((pid_t)process, 0) != 0 && errno == ESRCH;
 }
 
-/* Removes this target's temporaries that no process holds: what a run left that was killed. A lock tells,
- * which every process on this machine sees, in whatever container, and through the usual network file systems
- * other machines do; where a file system knows no locks, the process's number does. Others' files, and all
- * that cannot be looked at, stay. */
+/* Removes temporaries of this target that a killed run left behind. A running process locks its own, and
+ * other containers and most network file systems see the lock. Without locks, the process's number decides.
+ * Files of other users, and those that cannot be opened, stay. */
 static void clean_temporaries(const char *target) {
     const naming n = naming_of(target);
     char folder[PATH_MAX];

@@ -65,8 +65,8 @@ VSHI_SHARED int vshi_sink_close(vshi_sink *sink); /* returns `error`, with what 
 VSHI_SHARED vsh_result vshi_input_open(const char *path, const char *name, uint64_t most, FILE **file,
                                        uint64_t *size, vsh_error *error);
 
-/* Whether a file that `model` names lies in the model's folder or below, links followed; where the model is a
- * link, the folder of what it leads to is as good. A file that is not there lies nowhere else: true. */
+/* Whether `path`, a file that `model` names, is in the model's folder or below it. Links are followed. If the
+ * model is a link, its target's folder counts too. True for a file that does not exist. */
 VSHI_SHARED bool vshi_input_is_beside(const char *model, const char *path);
 
 #ifdef __cplusplus

@@ -21,7 +21,7 @@ enum {
 };
 
 typedef struct example {
-    char name[NAME]; /* of a mesh or file; "": the warning names none */
+    char name[NAME]; /* a mesh or file; "" if the warning names none */
     double number;   /* the first that it gives: the larger, the worse */
     bool numbered;
 } example;

@@ -44,7 +44,7 @@ typedef struct vshi_planes {
     vshi_image_plane planes[VSH_MAX_CHANNELS];
     vshi_grey grey;                  /* where a plane is */
     bool is_srgb;                    /* R, G and B of integers have the sRGB curve */
-    char rgb[2 * VSH_CHANNEL_NAME];  /* what R, G and B are made of, beside channels by name; or empty */
+    char rgb[2 * VSH_CHANNEL_NAME];  /* VSH_IMAGE_RGB: the named channels that R, G and B show; or empty */
     const vsh_attribute *attributes; /* [attribute_count]: looked at when the file is begun */
     size_t attribute_count;
 } vshi_planes;
@@ -107,9 +107,9 @@ typedef struct vshi_codec {
 extern const vshi_codec vshi_exr_codec;
 
 /* Reads the first part of a file, scan lines or the finest level of tiles; half and integers become float.
- * Of all readers: within run->memory_limit; NULL is none. Errors: VSH_ERROR_READ, VSH_ERROR_INPUT,
- * VSH_ERROR_UNSUPPORTED (deep data, subsampled channels, DWA), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Thread
- * safe. */
+ * All readers stay within run->memory_limit; a NULL run has no limit. Errors: VSH_ERROR_READ,
+ * VSH_ERROR_INPUT, VSH_ERROR_UNSUPPORTED (deep data, subsampled channels, DWA), VSH_ERROR_LIMIT,
+ * VSH_ERROR_MEMORY. Thread safe. */
 vsh_result vshi_exr_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error);
 
 /* --- PNG, through libpng itself: OpenImageIO takes longer to load than a small bake takes, leaves libpng's

@@ -233,8 +233,8 @@ static void say_nothing(exr_const_context_t context, exr_result_t code, const ch
     (void)message;
 }
 
-/* After a failed write OpenEXR 3.1.5 waits for ever on its own lock, so it is told of none: the sink keeps
- * it, and the caller looks there. */
+/* After a failed write OpenEXR 3.1.5 deadlocks on its own lock, so this always reports success. The sink
+ * keeps the error, and the caller checks it. */
 static int64_t write_bytes(exr_const_context_t context, void *user, const void *data, uint64_t size,
                            uint64_t offset, exr_stream_error_func_ptr_t fail) {
     (void)context;

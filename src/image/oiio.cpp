@@ -31,8 +31,8 @@ constexpr int32_t BITS_ALL = BITS_8_16 | VSHI_BITS_32;
 constexpr int32_t ANY_SIZE = INT_MAX;
 
 // Sizes are the formats' own limits, but for libjpeg, which ends the process over its own. webp and gif drop
-// the colour of transparent pixels, so they count as having no alpha. What is held until the end was measured
-// as peak memory of 4096² pixels that came eight rows at a time.
+// the colour of transparent pixels, so they count as having no alpha. `held` comes from measured peak memory:
+// 4096² pixels, written eight rows at a time.
 constexpr vshi_format writable[] = {
     // name, bits, alpha, grey, named, size, held
     {"tiff", BITS_ALL, true, false, false, ANY_SIZE, 0.0},
@@ -68,9 +68,8 @@ constexpr struct {
     {"sgi", UNCHECKED},
 };
 
-// Read, too. Others are no still images, or have readers that are not for untrusted files: that of iff reads
-// what is cut short as whole and writes past its buffers, as that of ico does; that of fits takes the row
-// below each.
+// Formats that are read but not written. The others are no still images, or their readers are unsafe: iff and
+// ico write past their buffers, iff accepts truncated files, and fits returns the row below.
 const char *const readable_only[] = {"cineon", "dds", "heif", "psd", "softimage"};
 
 constexpr int64_t BAND = int64_t(1) << 20; // values, but a row at least

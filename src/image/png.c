@@ -170,7 +170,7 @@ typedef struct png_writer {
     png_structp png;
     png_infop info;
     bool to_file;
-    vshi_sink sink;        /* of a file; its errno says more than libpng */
+    vshi_sink sink;        /* the file; its errno says more than libpng */
     unsigned char *bytes;  /* in memory */
     size_t size, capacity; /* written so far; of `bytes` */
     bool out_of_memory;
@@ -217,7 +217,7 @@ static void on_flush(png_structp png) {
     (void)png;
 }
 
-/* libpng goes on without some of what it gets no memory for: a text would be missing. */
+/* When memory runs out, libpng may drop a text and go on, so failures are noted here. */
 static png_voidp on_malloc(png_structp png, png_alloc_size_t size) {
     png_writer *writer = png_get_mem_ptr(png);
     void *memory = malloc(size);

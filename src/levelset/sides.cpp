@@ -1,6 +1,6 @@
-// Which side of a surface voxels are on. Voxels well off the surface are joined across their faces, through
-// leaves that are not there as well: no surface passes between them. A voxel near the surface takes the side
-// of a voxel that no surface separates it from. All that is not joined with the outside is inside.
+// Finds which side of the surface each voxel is on. Voxels well off the surface are joined across their
+// faces, also through missing leaves: no surface passes between them. A voxel near the surface takes the side
+// of a voxel that no surface separates it from. Whatever is not joined with the outside is inside.
 #include "levelset/band.h"
 
 #include <algorithm>

@@ -63,7 +63,7 @@ bool comes_before(const vshi_block &a, const vshi_block &b) {
 
 constexpr double FARTHEST = 1e12;      // voxels from the origin: doubles must tell voxels apart there
 constexpr double ROUNDING = 1e-6;      // voxels: a side so much longer takes no voxel more
-constexpr double BAND_ROUNDING = 1e-6; // of a band's width: the background is a float
+constexpr double BAND_ROUNDING = 1e-6; // share of a band's width: the background is a float
 
 Vec3d centre_of(const VoxelSet &set, const int32_t index[3]) {
     return set.transform->indexToWorld(Vec3d(index[0], index[1], index[2]));

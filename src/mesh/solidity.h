@@ -30,8 +30,8 @@ typedef struct vshi_wholes {
     size_t *of;         /* [meshes]: the whole that each is a part of */
 } vshi_wholes;
 
-/* Air or a solid on the two sides of a triangle. From its front its corners run anticlockwise, as
- * vshi_mesh_triangle() gives them. */
+/* Air or a solid on the two sides of a triangle. Seen from the front, the corners that vshi_mesh_triangle()
+ * gives run anticlockwise. */
 enum {
     VSHI_SIDE_SHEET,  /* air on both */
     VSHI_SIDE_BEHIND, /* air in front; a solid or a wall behind */

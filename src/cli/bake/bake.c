@@ -113,7 +113,7 @@ enum { MOST_LINES = 8 }; /* lightmaps that get a line each */
 typedef struct baking {
     const cli_bake_settings *settings;
     const vsh_scene *scene;
-    const char *parts; /* what goes before ".I-of-N.part" */
+    const char *parts; /* the name before ".I-of-N.part" */
     size_t count;      /* lightmaps */
     int code;          /* an exit code of check_outputs() */
     bool files_known;  /* their warnings are not printed yet */

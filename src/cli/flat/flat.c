@@ -242,8 +242,8 @@ const cli_command cli_flat = {
     "SCENE.json -o OUT [options]",
     "Bakes a light map of a plane, for 2D games: for each light the share of it that is seen, soft\n"
     "shadows of areas, images and text included, the irradiance by all, and where solids are. The\n"
-    "scene's file is one of its own kind: docs/flat.md. What is in brackets holds without the option\n"
-    "and without the scene's key.",
+    "scene's file is one of its own kind: docs/flat.md. Defaults are in brackets; the scene can\n"
+    "set others.",
     options,
     sizeof options / sizeof options[0],
     flat_main};

@@ -47,8 +47,8 @@ static const cli_option options[] = {
      "objects: each has a page of its own; shared: all lie on the\nsame (shared)"},
     {KEY_SIZE, "size", "N|WxH", "texels of each page (1024)"},
     {KEY_MAX_SIZE, "max-size", "N",
-     "with --texels-per-unit, instead of --size: pages are as\nsmall as what lies on them allows, their "
-     "sides powers\nof two up to N"},
+     "with --texels-per-unit, instead of --size: pages are as\nsmall as the charts allow, with sides that "
+     "are powers of\ntwo up to N"},
     {KEY_PAGES, "pages", "N", "pages at most, 1 to 1024 (1)"},
     {CLI_POSITIVE(unwrap_settings, options.texels_per_unit), "texels-per-unit", "X",
      "density, texels along a unit of length (the greatest that\nfits)"},
