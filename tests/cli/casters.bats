@@ -103,7 +103,7 @@ write_hill() {
 }
 
 @test "what a terrain's image lacks is said, and what to do" {
-    refuse bake <<'LIST'
+    refuse_each bake <<'LIST'
 2 'terrain.png' '--height H, the height of white, and --size-world W' | terrain.png --ao 1 -o out.exr
 2 'terrain.png' 'give --size-world W, the length of its longer side' | terrain.png --height 2 --ao 1 -o out.exr
 2 'terrain.png' 'give --height H, the height of white' | terrain.png --size-world 10 --ao 1 -o out.exr

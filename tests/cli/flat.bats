@@ -97,7 +97,7 @@ spoilt() {
 }
 
 @test "bad options" {
-    refuse flat wall.json -o <<'LIST'
+    refuse_each flat wall.json -o <<'LIST'
 2 --method hard | out.exr --method cone
 2 --size | out.exr --size 70000
 2 --supersample | out.exr --supersample 0

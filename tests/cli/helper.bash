@@ -159,9 +159,9 @@ info_tells() {
     done
 }
 
-# refuse WORD …: reads lines "CODE WORD … | WORD …". The program, run with the words of each line behind the given ones, must
-# end as refused() says.
-refuse() {
+# refuse_each WORD …: runs the program once for each line "CODE WORD … | ARG …" of standard input, with the ARGs behind the given
+# words. Each run must end as refused() says.
+refuse_each() {
     local -a cases said more
     local case
     mapfile -t cases

@@ -82,7 +82,7 @@ JSON
 
 @test "a file without lights, one that is not there and sizes without lights are refused" {
     write_box box.obj
-    refuse bake box.obj <<'LIST'
+    refuse_each bake box.obj <<'LIST'
 2 "--lights 'box.obj': has no lights" | --lights box.obj -o out.exr
 3 none.glb 'No such file' | --lights none.glb -o out.exr
 2 '--light-radius: there is no --lights' | --sun 0,1,0 --light-radius 1 -o out.exr

@@ -67,7 +67,7 @@ LEVEL=(--sun 0.3,1,0.2 --sun-angle 5 --size 32 --resolution 24)
 
 @test "a name that is not there is an error with the names that are" {
     write_level level.obj floor wall
-    refuse bake level.obj "${LEVEL[@]}" <<'LIST'
+    refuse_each bake level.obj "${LEVEL[@]}" <<'LIST'
 2 level.obj "'Flor*'" "did you mean 'floor'?" "'floor', 'wall'" | --receive 'Flor*' -o out.exr
 2 level.obj "'zzz'" "'floor', 'wall'" | --no-cast zzz -o out.exr
 2 'no object is left' | --receive wall --no-receive wall -o out.exr

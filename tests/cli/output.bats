@@ -128,7 +128,7 @@ JSON
     [ ! -e maps/one.exr ] && [ ! -e two.png ] || fail "in both places"
     succeed bake two.json --output-folder no/where --quiet
     [ -s no/where/one.exr ] || fail "the folder was not made"
-    refuse bake <<'LIST'
+    refuse_each bake <<'LIST'
 3 box.obj/maps 'cannot be made' | two.json --output-folder box.obj/maps --quiet
 3 missing/out.exr "no folder 'missing'" "mkdir -p 'missing'" | box.obj --ao 1 --resolution 16 -o missing/out.exr
 2 --output-folder | box.obj --ao 1 --output-folder elsewhere -o out.exr

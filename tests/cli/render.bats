@@ -55,7 +55,7 @@ png_size() {
 }
 
 @test "cameras that see nothing are refused" {
-    refuse render box.obj "${SUN[@]}" <<'LIST'
+    refuse_each render box.obj "${SUN[@]}" <<'LIST'
 2 --camera | --camera nan,0,0 -o view.png
 2 --camera | --camera 1,2 -o view.png
 2 'position and target' | --camera 1,2,3 --look-at 1,2,3 -o view.png
@@ -73,7 +73,7 @@ LIST
     refuses 2 view.xyz -- render box.obj "${SUN[@]}" -o view.xyz
     shade render box.obj "${SUN[@]}" -o box.obj
     [ "$status" -eq 2 ] || fail "the input would be replaced"
-    refuse render box.obj <<'LIST'
+    refuse_each render box.obj <<'LIST'
 2 view.png | "${SUN[@]}" -o view.png --stats view.png
 2 'no output' | "${SUN[@]}"
 2 --sun | -o view.png
@@ -115,7 +115,7 @@ LIST
 
 @test "lightmaps that do not fit are refused" {
     succeed bake box.obj --ao 0.5 --size 16 --resolution 24 -o ao.exr --quiet
-    refuse render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap <<'LIST'
+    refuse_each render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap <<'LIST'
 2 shadow.sun | ao.exr -o view.png --quiet
 3 gone.exr | gone.exr -o view.png --quiet
 2 receivers | ao.exr --lightmap ao.exr -o view.png --quiet

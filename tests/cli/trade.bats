@@ -160,7 +160,7 @@ count() {
 
 @test "bad usage is refused, and leaves old outputs alone" {
     old_output trade.html
-    refuse trade box.obj <<'LIST'
+    refuse_each trade box.obj <<'LIST'
 2 '-o OUT.html' | --sun 0,1,0
 2 trade.txt '-o OUT.html' | --sun 0,1,0 -o trade.txt
 2 --sun --ao | -o trade.html

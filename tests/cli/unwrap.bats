@@ -48,7 +48,7 @@ setup() {
     [[ $stderr == *"12 charts on 2 pages of up to 128 × 64"* ]] || fail "no summary"
     [ "$(grep '^usemtl' out.obj | tr '\n' ' ')" = "usemtl box usemtl second " ] || fail "$(grep usemtl out.obj)"
     info_tells charts.png "128 × "
-    refuse unwrap two.obj -o out.obj <<'LIST'
+    refuse_each unwrap two.obj -o out.obj <<'LIST'
 2 --pages | --atlas objects --pages 2
 2 --atlas objects | --atlas each
 2 --max-size --texels-per-unit | --max-size 64
@@ -75,7 +75,7 @@ LIST
 
 @test "bad options and places are refused" {
     old_output out.obj
-    refuse unwrap <<'LIST'
+    refuse_each unwrap <<'LIST'
 2 -o | box.obj
 2 out.ply | box.obj -o out.ply
 3 none/out.obj | box.obj -o none/out.obj

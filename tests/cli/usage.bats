@@ -72,7 +72,7 @@ fits() {
 
 @test "an unknown option suggests the nearest" {
     write_box box.obj
-    refuse bake box.obj -o out.exr <<'LIST'
+    refuse_each bake box.obj -o out.exr <<'LIST'
 2 'did you mean --resolution?' | --resolutoin 5
 2 'bake --help' | --zzzzzzzzzz
 2 '-z' | -z
@@ -87,7 +87,7 @@ LIST
 
 @test "a missing value, a value too many and an operand too many are usage errors" {
     write_box box.obj
-    refuse bake <<'LIST'
+    refuse_each bake <<'LIST'
 2 '-o' value | box.obj -o
 2 '--sun' value | box.obj -o out.exr --sun
 2 '--quiet' | box.obj -o out.exr --quiet=yes
@@ -163,7 +163,7 @@ LIST
 
 @test "what a method does not use is refused beside it" {
     write_box box.obj
-    refuse bake box.obj -o out.exr "${SMALL[@]}" <<'LIST'
+    refuse_each bake box.obj -o out.exr "${SMALL[@]}" <<'LIST'
 2 --rays cone 'rays, adaptive and exact' | --rays 8 --method cone
 2 --error smooth | --error --method smooth
 2 --max-error rays 'adaptive and exact' | --max-error 0.1 --method rays
@@ -172,7 +172,7 @@ LIST
 
 @test "a mesh needs something to bake" {
     write_box box.obj
-    refuse bake box.obj <<'LIST'
+    refuse_each bake box.obj <<'LIST'
 2 --sun --ao | -o out.exr
 2 --sun-angle | -o out.exr --ao 1 --sun-angle 5
 2 --ao-method | -o out.exr --sun 0,1,0 --ao-method cones

@@ -240,7 +240,7 @@ JSON
 
 @test "bad usage" {
     old_output page.html
-    refuse view <<'LIST'
+    refuse_each view <<'LIST'
 2 'give -o OUT.html' | box.obj --planes box.exr
 2 'page.exr' 'give -o OUT.html' | box.obj -o page.exr
 2 'no INPUT' | -o page.html
@@ -257,7 +257,7 @@ LIST
 
 @test "files that are not there, damaged, or too large" {
     old_output page.html
-    refuse view <<'LIST'
+    refuse_each view <<'LIST'
 3 gone.glb | gone.glb -o page.html
 3 gone.exr | box.obj --planes gone.exr -o page.html
 3 gone.obj | box.obj gone.obj -o page.html
@@ -283,7 +283,7 @@ LIST
     for wrong in page.exr again.exr; do
         refuses 2 "--view '$wrong'" -- bake box.obj "${SMALL[@]}" -o again.exr --view $wrong
     done
-    refuse bake box.obj <<'LIST'
+    refuse_each bake box.obj <<'LIST'
 3 nowhere | "${SMALL[@]}" -o again.exr --view nowhere/page.html
 2 'one lightmap of one mesh' | "${SMALL[@]}" --per-object -o objects/ --view page.html
 2 "--view 'page.html': an image does not hold the UVs that are made" | --ao 1 --unwrap always -o unwrapped.png --view page.html

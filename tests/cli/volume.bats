@@ -96,7 +96,7 @@ info() {
 
 @test "bad options are refused, and the old file stays" {
     old_output out.vdb
-    refuse volume <<'LIST'
+    refuse_each volume <<'LIST'
 2 -o | scene.json
 2 out.exr | scene.json -o out.exr
 2 'nothing to bake' | box.obj -o out.vdb
@@ -109,7 +109,7 @@ LIST
         shade volume scene.json -o out.vdb --box 0,0,0,1,1,1 --box-voxel-size "$size"
         refused 2 --box-voxel-size
     done
-    refuse volume scene.json -o <<'LIST'
+    refuse_each volume scene.json -o <<'LIST'
 2 'no --box' | out.vdb --box-voxel-size 1
 2 'one of' | out.vdb --box 0,0,0,1,1,1 --band 2
 2 'one of' | out.vdb --box 0,0,0,1,1,1 --like a.vdb
@@ -125,7 +125,7 @@ LIST
 @test "a bad --like is refused with its reason" {
     old_output out.vdb
     shade voxelize box.obj -o ls.vdb --resolution 24 --quiet
-    refuse volume scene.json -o out.vdb --like <<'LIST'
+    refuse_each volume scene.json -o out.vdb --like <<'LIST'
 3 none.vdb | none.vdb
 2 ls.vdb "no grid 'density'" "'surface'" | ls.vdb:density
 2 --like | ls.vdb:
@@ -141,7 +141,7 @@ LIST
 
 @test "too many voxels are a limit, named before memory is taken" {
     old_output out.vdb
-    refuse volume scene.json -o out.vdb --box -5,-5,-5,5,5,5 --box-voxel-size <<'LIST'
+    refuse_each volume scene.json -o out.vdb --box -5,-5,-5,5,5,5 --box-voxel-size <<'LIST'
 4 '1299 x 1299 x 1299' 'limit' | 0.0077 --memory-limit 2G
 4 'limit' | 0.05 --memory-limit 40M
 4 1e-06 | 1e-6

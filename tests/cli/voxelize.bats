@@ -34,7 +34,7 @@ setup() {
 
 @test "bad options and places are refused" {
     old_output out.vdb
-    refuse voxelize <<'LIST'
+    refuse_each voxelize <<'LIST'
 2 -o | box.obj --resolution 24
 2 out.exr | box.obj -o out.exr
 3 none/out.vdb | box.obj -o none/out.vdb
