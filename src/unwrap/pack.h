@@ -52,12 +52,6 @@ typedef struct vshi_pages {
     size_t count;
 } vshi_pages;
 
-/* Gives each item its place, as the options have it: items are those of the meshes in their order, which are
- * instances of shapes. The stage is "pack". Errors: as vshi_pack(), with the object's name where it has a
- * page of its own; VSH_ERROR_LIMIT (run->memory_limit). */
-vsh_result vshi_pages_pack(const vsh_unwrap_options *options, const vshi_shapes *shapes, vshi_item *items,
-                           size_t item_count, const vsh_run *run, vshi_pages *pages, vsh_error *error);
-
 /* --- the atlas */
 
 /* Makes an atlas of charts that have their places: `items` [item_count] are those of the meshes in their
