@@ -250,7 +250,7 @@ double vshi_outline_square(const vsh_outline *o, vshi_point p, double bound) {
     return best;
 }
 
-/* What a way from a to b that lies to the right of a point at height y adds: the half-open rule. */
+/* Adds how a way from a to b, right of a point at height y, winds around the point: the half-open rule. */
 static int64_t count_crossing(vshi_point a, vshi_point b, double y) {
     return (a.y <= y && b.y > y) - (a.y > y && b.y <= y);
 }

@@ -1,4 +1,4 @@
-"""What casts, and lights: meshes and models, shapes and outlines, level sets, occluders and their parts."""
+"""Casters and lights: meshes and models, shapes and outlines, level sets, occluders and their parts."""
 from __future__ import annotations
 
 from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple, Union
