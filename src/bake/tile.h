@@ -3,7 +3,7 @@
 #define VSHI_BAKE_TILE_H
 
 #include "bake/charts.h"
-#include "mesh/smooth_surface.h"
+#include "mesh/mesh.h"
 
 #include <stdatomic.h>
 

@@ -4,7 +4,7 @@
 #include "base/job.h"
 #include "light/light.h"
 #include "light/view.h"
-#include "mesh/solidity_parts.h"
+#include "mesh/solidity.h"
 #include "trace/embree.h"
 
 #include <inttypes.h>

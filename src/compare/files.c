@@ -22,9 +22,9 @@ static const double SAME_PLACE = 1e-3; /* voxels that two lattices may be apart 
 
 struct vsh_comparison {
     vsh_channel_comparison *channels;
-    size_t channel_count;
+    size_t channel_count, channel_capacity;
     char (*problems)[320]; /* other sizes, channels, voxels, formats */
-    size_t problem_count;
+    size_t problem_count, problem_capacity;
     bool alike;
 };
 
@@ -42,18 +42,11 @@ typedef struct attributes {
     size_t count;
 } attributes;
 
-static vsh_result no_memory(const files *f, vsh_error *error) {
-    return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", f->path[0]);
-}
-
 static vsh_result __attribute__((format(printf, 3, 4)))
 add_problem(const files *f, vsh_error *error, const char *format, ...) {
     vsh_comparison *c = f->comparison;
-    void *more = realloc(c->problems, (c->problem_count + 1) * sizeof *c->problems);
-    if (more == NULL) {
-        return no_memory(f, error);
-    }
-    c->problems = more;
+    VSHI_TRY(vshi_make_room((void **)&c->problems, c->problem_count, &c->problem_capacity,
+                            sizeof *c->problems, f->path[0], error));
     va_list arguments;
     va_start(arguments, format);
     vsnprintf(c->problems[c->problem_count++], sizeof *c->problems, format, arguments);
@@ -100,12 +93,9 @@ static void set_limits(const files *f, const attributes texts[2], vsh_channel_co
 static vsh_result add_channel(const files *f, const char *name, const attributes texts[2],
                               vsh_channel_comparison **channel, vsh_error *error) {
     vsh_comparison *c = f->comparison;
-    vsh_channel_comparison *more = realloc(c->channels, (c->channel_count + 1) * sizeof *more);
-    if (more == NULL) {
-        return no_memory(f, error);
-    }
-    c->channels = more;
-    *channel = &more[c->channel_count++];
+    VSHI_TRY(vshi_make_room((void **)&c->channels, c->channel_count, &c->channel_capacity,
+                            sizeof *c->channels, f->path[0], error));
+    *channel = &c->channels[c->channel_count++];
     memset(*channel, 0, sizeof **channel);
     snprintf((*channel)->name, sizeof(*channel)->name, "%s", name);
     set_limits(f, texts, *channel);
@@ -519,10 +509,7 @@ vsh_result vsh_compare_files(const char *golden, const char *fresh, const vsh_co
     if (options != NULL) {
         VSHI_TRY(vshi_options_resolve(options, &f.options, sizeof f.options, "options", error));
     }
-    f.comparison = calloc(1, sizeof *f.comparison);
-    if (f.comparison == NULL) {
-        return no_memory(&f, error);
-    }
+    VSHI_TRY(vshi_allocate((void **)&f.comparison, 1, sizeof *f.comparison, golden, error));
     const vsh_result result = compare(&f, error);
     vsh_tolerances_free(f.tolerances);
     if (result != VSH_OK) {

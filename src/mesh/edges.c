@@ -7,6 +7,7 @@
 #include "base/memory.h"
 #include "mesh/weld.h"
 
+#include <float.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -356,4 +357,280 @@ void vshi_edges_free(vshi_edges *edges) {
     free(edges->skipped);
     free(edges->weld);
     *edges = (vshi_edges){0};
+}
+
+/* --- components */
+
+#define NO_COMPONENT UINT32_MAX
+
+typedef struct walking {
+    const vsh_mesh *mesh;
+    vshi_edges edges;
+    bool mirrored;
+    uint32_t *of;    /* [triangle_count]: its component; NO_COMPONENT for those without area */
+    uint32_t *queue; /* [triangle_count] */
+    vshi_components *found;
+} walking;
+
+/* Whether a triangle's side runs from its edge's lower vertex to the upper one. */
+static bool upwards(const walking *w, uint32_t side) {
+    uint32_t v[3];
+    vshi_edges_corners(w->mesh, w->edges.weld, w->mirrored, side / 3, v);
+    return v[side % 3] < v[(side % 3 + 1) % 3];
+}
+
+/* Numbers and turns all that hangs together with triangle `seed`. */
+static void walk(walking *w, uint32_t seed) {
+    vshi_components *c = w->found;
+    const uint32_t number = (uint32_t)c->count++;
+    uint8_t *twisted = &c->twisted[number];
+    size_t waiting = 1;
+    w->queue[0] = seed;
+    w->of[seed] = number;
+    for (size_t at = 0; at < waiting; ++at) {
+        const uint32_t i = w->queue[at];
+        for (uint32_t side = 3 * i; side < 3 * i + 3; ++side) {
+            const uint32_t partner = w->edges.partner[side];
+            if (partner == VSHI_NO_PARTNER) {
+                continue;
+            }
+            const uint32_t other = partner / 3;
+            const uint8_t turned = c->turned[i] ^ (uint8_t)(upwards(w, side) == upwards(w, partner));
+            if (w->of[other] == NO_COMPONENT) {
+                w->of[other] = number;
+                c->turned[other] = turned;
+                w->queue[waiting++] = other;
+            } else if (c->turned[other] != turned) {
+                *twisted = 1;
+            }
+        }
+    }
+    for (size_t at = 0; *twisted && at < waiting; ++at) {
+        c->turned[w->queue[at]] = 0;
+    }
+}
+
+static void walk_all(walking *w) {
+    vshi_components *c = w->found;
+    const size_t count = w->mesh->triangle_count;
+    for (size_t i = 0; i < count; ++i) {
+        w->of[i] = NO_COMPONENT;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        if (w->of[i] == NO_COMPONENT && !w->edges.skipped[i]) {
+            walk(w, (uint32_t)i);
+        }
+    }
+    for (size_t i = 0; i < count; ++i) {
+        const uint32_t first = w->edges.first[i];
+        if (first != i) {
+            w->of[i] = w->of[first];
+            c->turned[i] = c->turned[first];
+            c->doubled[i] = c->doubled[first];
+        }
+    }
+}
+
+static vsh_result list_rims(walking *w, vsh_error *error) {
+    vshi_components *c = w->found;
+    VSHI_TRY(vshi_allocate((void **)&c->rims, w->edges.open, sizeof *c->rims, "open edges", error));
+    for (size_t at = 0; at < c->begin[c->count]; ++at) {
+        const uint32_t i = c->list[at];
+        for (uint32_t k = 0; k < 3 && !w->edges.skipped[i]; ++k) {
+            if (w->edges.partner[3 * i + k] == VSHI_NO_PARTNER) {
+                uint32_t v[3];
+                vshi_edges_corners(w->mesh, w->edges.weld, w->mirrored, i, v);
+                const uint32_t a = v[k], b = v[(k + 1) % 3];
+                c->rims[c->rim_count++] = (vshi_rim){w->of[i], c->turned[i] ? b : a, c->turned[i] ? a : b};
+            }
+        }
+    }
+    return VSH_OK;
+}
+
+/* The edge of an open terrain, by its triangles. */
+static vsh_result list_terrain_rims(const vsh_mesh *mesh, vshi_terrain t, vshi_components *c,
+                                    vsh_error *error) {
+    const bool mirrored = vshi_transform_determinant(mesh->transform) < 0.0;
+    const size_t across = t.columns - 1, down = t.rows - 1;
+    VSHI_TRY(
+        vshi_allocate((void **)&c->rims, vshi_terrain_edge_length(t), sizeof *c->rims, "open edges", error));
+    for (size_t i = 0; i < mesh->triangle_count; ++i) {
+        const size_t column = i / 2 % across, row = i / 2 / across;
+        if (column > 0 && column + 1 < across && row > 0 && row + 1 < down) {
+            continue;
+        }
+        uint32_t given[3], v[3];
+        vshi_terrain_triangle(t, i, given);
+        v[0] = given[0];
+        v[1] = given[mirrored ? 2 : 1];
+        v[2] = given[mirrored ? 1 : 2];
+        for (int k = 0; k < 3; ++k) {
+            const uint32_t a = v[k], b = v[(k + 1) % 3];
+            const size_t ax = a % t.columns, bx = b % t.columns, az = a / t.columns, bz = b / t.columns;
+            if ((ax == bx && (ax == 0 || ax == across)) || (az == bz && (az == 0 || az == down))) {
+                c->rims[c->rim_count++] = (vshi_rim){0, a, b};
+            }
+        }
+    }
+    return VSH_OK;
+}
+
+/* The one component of a terrain: the order of its triangles says how they hang together. */
+static vsh_result list_terrain(const vsh_mesh *mesh, vshi_terrain t, vshi_components *c, vsh_error *error) {
+    const size_t count = mesh->triangle_count;
+    const vshi_array arrays[] = {VSHI_ARRAY(c->turned, count), VSHI_ARRAY(c->doubled, count),
+                                 VSHI_ARRAY(c->twisted, 1), VSHI_ARRAY(c->begin, 3),
+                                 VSHI_ARRAY(c->list, count)};
+    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, "components", error));
+    for (size_t i = 0; i < count; ++i) {
+        if (!vshi_mesh_degenerate(mesh, i)) {
+            c->list[c->begin[1]++] = (uint32_t)i;
+        }
+    }
+    c->count = 1;
+    return t.solid ? VSH_OK : list_terrain_rims(mesh, t, c, error);
+}
+
+vsh_result vshi_components_find(const vsh_mesh *mesh, size_t index, vshi_components *found,
+                                vsh_error *error) {
+    *found = (vshi_components){0};
+    VSHI_TRY(vshi_edges_check(mesh, index, error));
+    vshi_terrain terrain;
+    if (vshi_mesh_is_terrain(mesh, &terrain)) {
+        return list_terrain(mesh, terrain, found, error);
+    }
+    walking w = {.mesh = mesh, .mirrored = vshi_transform_determinant(mesh->transform) < 0.0, .found = found};
+    const size_t count = mesh->triangle_count;
+    const vshi_array arrays[] = {VSHI_ARRAY(found->turned, count), VSHI_ARRAY(found->twisted, count),
+                                 VSHI_ARRAY(found->list, count), VSHI_ARRAY(w.of, count),
+                                 VSHI_ARRAY(w.queue, count)};
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_edges_find(mesh, index, false, &w.edges, error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "components", error));
+    found->doubled = w.edges.doubled;
+    w.edges.doubled = NULL;
+    walk_all(&w);
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&found->begin, found->count + 2, sizeof *found->begin, "components", error));
+    vshi_list_groups(w.of, count, (uint32_t)found->count, found->begin, found->list);
+    VSHI_TRY_DONE(list_rims(&w, error));
+done:
+    free(w.queue);
+    free(w.of);
+    vshi_edges_free(&w.edges);
+    return result;
+}
+
+void vshi_components_free(vshi_components *components) {
+    free(components->rims);
+    free(components->twisted);
+    free(components->list);
+    free(components->begin);
+    free(components->doubled);
+    free(components->turned);
+    *components = (vshi_components){0};
+}
+
+/* --- checks of a mesh's triangles and edges. An edge that an odd number of triangles meets at is a border;
+ * one whose triangles run along it more often one way than the other joins triangles that disagree about the
+ * outside. */
+
+static void grow(vsh_mesh_report *report, vshi_vec p) {
+    const double at[3] = {p.x, p.y, p.z};
+    for (int k = 0; k < 3; ++k) {
+        report->bounds_min[k] = at[k] < report->bounds_min[k] ? at[k] : report->bounds_min[k];
+        report->bounds_max[k] = at[k] > report->bounds_max[k] ? at[k] : report->bounds_max[k];
+    }
+}
+
+vsh_result vshi_mesh_look_over(const vsh_mesh *mesh, size_t index, vsh_mesh_report *report,
+                               vsh_error *error) {
+    VSHI_TRY(vshi_mesh_validate(mesh, index, error));
+    *report = (vsh_mesh_report){.bounds_min = {DBL_MAX, DBL_MAX, DBL_MAX},
+                                .bounds_max = {-DBL_MAX, -DBL_MAX, -DBL_MAX}};
+    for (size_t i = 0; i < mesh->triangle_count; ++i) {
+        if (vshi_mesh_degenerate(mesh, i)) {
+            ++report->degenerate_triangles;
+            continue;
+        }
+        vshi_vec corner[3];
+        vshi_mesh_triangle(mesh, i, corner);
+        report->area +=
+            0.5 * vshi_length(vshi_cross(vshi_sub(corner[1], corner[0]), vshi_sub(corner[2], corner[0])));
+        for (int k = 0; k < 3; ++k) {
+            grow(report, corner[k]);
+        }
+    }
+    return VSH_OK;
+}
+
+/* --- edges */
+
+typedef struct edge_count {
+    size_t open;
+    size_t flipped;
+} edge_count;
+
+static void count_edge(edge_count *count, size_t upwards, size_t downwards) {
+    if ((upwards + downwards) % 2 != 0) {
+        ++count->open;
+    } else if (upwards != downwards) {
+        ++count->flipped;
+    }
+}
+
+/* Shapes of triangles: corners on a line make it flat. Two corners in one place make its edges cancel out. */
+enum { SOLID, FLAT, COLLAPSED };
+
+/* Counts edges, without and with the flat triangles. */
+static void count_edges(const vshi_sorted_sides *sides, const uint8_t *shape, edge_count *solid,
+                        edge_count *all) {
+    for (size_t i = 0; i < 3 * sides->triangle_count;) {
+        size_t runs[3][2] = {{0, 0}, {0, 0}, {0, 0}}; /* [shape][downwards] */
+        uint32_t ends[2];
+        for (const size_t end = vshi_next_edge(sides, i); i < end; ++i) {
+            const uint32_t side = sides->sorted[i];
+            vshi_side_ends(sides->corners, side, ends);
+            ++runs[shape[side / 3]][sides->corners[side] != ends[0]];
+        }
+        count_edge(solid, runs[SOLID][0], runs[SOLID][1]);
+        count_edge(all, runs[SOLID][0] + runs[FLAT][0], runs[SOLID][1] + runs[FLAT][1]);
+    }
+}
+
+vsh_result vshi_mesh_count_edges(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error) {
+    const size_t count = mesh->triangle_count;
+    uint32_t *weld = NULL, *corners = NULL;
+    uint8_t *shape = NULL; /* of each triangle */
+    vshi_sorted_sides sides = {NULL, count, mesh->vertex_count, NULL};
+    edge_count solid = {0, 0}, all = {0, 0};
+    const vshi_array arrays[] = {VSHI_ARRAY(weld, mesh->vertex_count), VSHI_ARRAY(corners, 3 * count),
+                                 VSHI_ARRAY(shape, count)};
+    vsh_result result;
+    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "edges of triangles", error));
+    VSHI_TRY_DONE(vshi_mesh_weld(mesh, weld, error));
+    for (size_t i = 0; i < count; ++i) {
+        uint32_t *v = corners + 3 * i;
+        for (size_t k = 0; k < 3; ++k) {
+            v[k] = weld[mesh->indices[3 * i + k]];
+        }
+        shape[i] = v[0] == v[1] || v[1] == v[2] || v[2] == v[0] ? COLLAPSED
+                   : vshi_mesh_degenerate(mesh, i)              ? FLAT
+                                                                : SOLID;
+    }
+    sides.corners = corners;
+    VSHI_TRY_DONE(vshi_sort_sides(&sides, error));
+    count_edges(&sides, shape, &solid, &all);
+    /* A flat triangle casts nothing, but it may be what joins two long edges to one: a mesh that is closed
+     * with such triangles or without them is closed. */
+    const bool with_flat = all.open < solid.open;
+    report->open_edges = with_flat ? all.open : solid.open;
+    report->flipped_edges = with_flat ? all.flipped : solid.flipped;
+done:
+    free(sides.sorted);
+    free(shape);
+    free(corners);
+    free(weld);
+    return result;
 }

@@ -1,4 +1,4 @@
-/* Which triangles of a mesh meet at their edges. */
+/* Which triangles of a mesh meet at their edges, and the components that hang together by them. */
 #ifndef VSHI_EDGES_H
 #define VSHI_EDGES_H
 
@@ -36,5 +36,31 @@ static inline void vshi_edges_corners(const vsh_mesh *mesh, const uint32_t *weld
     v[1] = weld[given[mirrored ? 2 : 1]];
     v[2] = weld[given[mirrored ? 1 : 2]];
 }
+
+/* --- the components of a mesh: pieces that hang together by their edges, turned to face one way */
+
+/* An open edge, from vertex a to b as the triangle beside it runs once it is turned. */
+typedef struct vshi_rim {
+    uint32_t component;
+    uint32_t a, b;
+} vshi_rim;
+
+typedef struct vshi_components {
+    size_t count;
+    uint8_t *turned;  /* [triangle_count]: against the others of its component */
+    uint8_t *doubled; /* [triangle_count]: there is one with the same corners that faces the other way */
+    uint32_t *begin;  /* [count + 2] in `list` */
+    uint32_t *list;   /* triangles by component, ascending */
+    uint8_t *twisted; /* [at least count]: no turning makes all its faces agree (a Moebius strip); none is
+                         turned */
+    vshi_rim *rims;   /* sorted by component, then by triangle */
+    size_t rim_count;
+} vshi_components;
+
+/* Vertices count as one where their positions are equal. Two triangles at an edge hang together; where there
+ * are more, those that have a solid between them do. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Free the
+ * result with vshi_components_free(), after a failure too. */
+vsh_result vshi_components_find(const vsh_mesh *mesh, size_t index, vshi_components *found, vsh_error *error);
+void vshi_components_free(vshi_components *components);
 
 #endif

@@ -78,6 +78,32 @@ static inline void vshi_mesh_triangle(const vsh_mesh *mesh, size_t i, vshi_vec c
  * rounding's worth of area, as they would after a rotation. */
 VSHI_SHARED bool vshi_mesh_degenerate(const vsh_mesh *mesh, size_t i);
 
+/* --- where a point of a triangle lies in the world and which way it faces */
+
+/* One triangle, ready to be evaluated. Corners are anticlockwise from outside. */
+typedef struct vshi_surface {
+    vshi_vec corner[3];
+    vshi_vec normal[3]; /* of the corners, unit; the geometric one where the mesh has none that serves */
+    vshi_vec geometric; /* unit */
+    bool lifts[3];      /* whether the tangent plane at the corner lifts samples */
+    bool smooth;
+    bool mirrored; /* corners 1 and 2 have changed places */
+} vshi_surface;
+
+/* False where the triangle has no area. */
+bool vshi_surface_set(const vsh_mesh *mesh, size_t triangle, vshi_surface *surface);
+
+/* Position and normal at barycentric weights of the triangle's corners as the mesh's indices give them, and
+ * how far the position is off the triangle. */
+void vshi_surface_at(const vshi_surface *surface, const double weight[3], vshi_vec *position,
+                     vshi_vec *normal, vshi_vec *lift);
+
+/* The direction in which a triangle's u grows, unit, and 1 or -1: the side of normal × tangent on which v
+ * grows. A zero vector where the UVs have no area. */
+vshi_vec vshi_surface_tangent(const vsh_mesh *mesh, size_t triangle, double *handedness);
+
+/* --- terrains */
+
 /* A grid of heights: a surface, or a closed solid. Its vertices are the samples, row by row, and of a solid
  * the bottom below each sample of the edge, from the first row's on around, then the bottom's middle. */
 typedef struct vshi_terrain {

@@ -4,7 +4,6 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "mesh/alpha_mask.h"
-#include "mesh/solidity_parts.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -69,7 +68,8 @@ void vshi_mesh_set_free(vshi_mesh_set *set) {
 /* The solidity of just these meshes, in this order; NULL if they were not looked at together. */
 static const vshi_solidity *known_together(const vshi_mesh_set *set) {
     const vshi_solidity *solidity = set->count > 0 ? set->checked[0].solidity : NULL;
-    if (solidity == NULL || solidity->mesh_count != set->count) {
+    const vshi_wholes *wholes = solidity != NULL ? vshi_solidity_wholes(solidity) : NULL;
+    if (wholes == NULL || wholes->first[wholes->count] != set->count) {
         return NULL;
     }
     for (size_t m = 0; m < set->count; ++m) {

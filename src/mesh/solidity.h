@@ -1,6 +1,6 @@
 /* What is solid: which side of every triangle of some meshes is air, and which is not.
  *
- * Meshes fall apart into components, pieces that hang together by their edges (mesh/components.c); each is
+ * Meshes fall apart into components, pieces that hang together by their edges (mesh/edges.h); each is
  * one of four kinds. All meshes of a scene are looked at together, because a room is a room in the walls of
  * another mesh too, and the parts of an object (vshi_wholes) as one mesh. */
 #ifndef VSHI_SOLIDITY_H
@@ -58,8 +58,7 @@ typedef struct vshi_component {
     size_t open_edges;    /* 0: closed */
     size_t holes;         /* groups of open edges that hang together */
     double area;          /* world units² */
-    double enclosed;      /* 1: it encloses all that lies behind its faces, 1/2: a plane (part_encloses() in
-                             mesh/kinds.c) */
+    double enclosed;      /* 1: it encloses all that lies behind its faces, 1/2: a plane (part_encloses()) */
     double volume;        /* world units³; 0 if it has no inside */
     vshi_vec low, high;   /* box, world */
     const uint32_t *list; /* its triangles [triangles], ascending */
@@ -94,6 +93,9 @@ VSHI_SHARED const vshi_component *vshi_solidity_components(const vshi_solidity *
 /* The components of one whole: *count of them, from the returned one on. */
 VSHI_SHARED const vshi_component *vshi_solidity_of_whole(const vshi_solidity *solidity, size_t whole,
                                                          size_t *count);
+
+/* The point of a triangle that has a number: those of numbers that follow each other are spread over it. */
+vshi_vec vshi_point_in(const vshi_vec corner[3], size_t number);
 
 /* A room, and a solid that it is cut out of: places in the list of components. */
 typedef struct vshi_cut {

@@ -41,9 +41,6 @@ enum { VSHI_OUTLINE_STACK = 128 };
 /* Magnitudes of points and sizes. */
 #define VSHI_OUTLINE_LARGEST 1e15
 
-/* Makes the tree; `outline` holds points and starts. Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_outline_grow_tree(vsh_outline *outline, vsh_error *error);
-
 /* Square of the distance to the nearest segment, or `bound` where that is less. */
 double vshi_outline_square(const vsh_outline *outline, vshi_point p, double bound);
 
@@ -68,11 +65,6 @@ void vshi_contours_free(vshi_contours *contours);
 /* The next point of the contour under way; one that equals its predecessor is left out. */
 void vshi_contours_add(vshi_contours *contours, double x, double y);
 
-/* Makes room for one more element of an array. The memory limit counts `bytes` for each element. Returns
- * false, and sets contours->result, where there is no room. */
-bool vshi_contours_reserve(vshi_contours *contours, void *array, size_t size, size_t count, size_t *capacity,
-                           double bytes);
-
 /* Ends the contour; one of fewer than three points is left out. */
 void vshi_contours_close(vshi_contours *contours);
 
@@ -81,11 +73,6 @@ void vshi_contours_close(vshi_contours *contours);
  * `what` names it in messages. Errors: that of the contours; VSH_ERROR_INPUT where there is no area,
  * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
 vsh_result vshi_contours_finish(vshi_contours *contours, bool clean, const char *what, vsh_outline **outline);
-
-/* Cuts contours where they cross and keeps what has the area on one side only, area to the left, into
- * `result`. `outline` holds them, with its tree. False where rounding leaves ends that fit nothing: contours
- * that touch along lines that are nearly the same; `result` is then of no use. */
-bool vshi_outline_resolve(const vsh_outline *outline, vshi_contours *result);
 
 struct vshi_decoder;
 struct vshi_encoder;

@@ -209,16 +209,7 @@ static int by_from(const void *a, const void *b) {
 
 /* Each edge that is crossed begins one step and ends one. */
 static step *find_step(const border *b, uint64_t from) {
-    size_t low = 0, high = b->step_count;
-    while (low + 1 < high) {
-        const size_t middle = low + (high - low) / 2;
-        if (b->steps[middle].from <= from) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    return &b->steps[low];
+    return bsearch(&(step){.from = from}, b->steps, b->step_count, sizeof *b->steps, by_from);
 }
 
 static void join_steps(border *b, vshi_contours *contours) {

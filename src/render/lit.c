@@ -1,7 +1,6 @@
 #include "base/memory.h"
 #include "image/planes.h"
 #include "mesh/mesh.h"
-#include "mesh/smooth_surface.h"
 #include "render/render.h"
 #include "shade/shade.h"
 

@@ -519,25 +519,32 @@ static vsh_result gather_traced(const chosen *of, const vsh_run *run, traced *t,
     return VSH_OK;
 }
 
-static vsh_result make_triangles(const chosen *of, const vsh_run *run, vsh_triangles **triangles,
-                                 vsh_error *error) {
-    vsh_solids *solids = NULL;
+/* Makes what rays meet: triangles that own the solids, or where `solids` is not NULL both apart. Procedural
+ * solids alone then need no Embree. */
+static vsh_result trace_casters(const chosen *of, const vsh_run *run, vsh_triangles **triangles,
+                                vsh_solids **solids, vsh_error *error) {
+    vsh_solids *made = NULL;
     traced t = {.mesh_count = 0};
     vsh_run full;
     vsh_result result;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     VSHI_TRY_DONE(gather_traced(of, &full, &t, error));
-    if (t.mesh_count + t.sdf_count == 0) {
-        goto done;
-    }
     if (t.sdf_count > 0) {
-        VSHI_TRY_DONE(vsh_solids_create(t.sdfs, t.places[0], t.sdf_count, &solids, error));
+        VSHI_TRY_DONE(vsh_solids_create(t.sdfs, t.places[0], t.sdf_count, &made, error));
     }
-    VSHI_TRY_DONE(vsh_triangles_create_beside(t.meshes, t.mesh_count, solids, run, triangles, error));
-    vshi_triangles_own_solids(*triangles);
-    solids = NULL;
+    if (t.mesh_count > 0 || (solids == NULL && made != NULL)) {
+        VSHI_TRY_DONE(vsh_triangles_create_beside(t.meshes, t.mesh_count, solids == NULL ? made : NULL, run,
+                                                  triangles, error));
+    }
+    if (solids != NULL) {
+        *solids = made;
+        made = NULL;
+    } else if (*triangles != NULL) {
+        vshi_triangles_own_solids(*triangles);
+        made = NULL;
+    }
 done:
-    vsh_solids_free(solids);
+    vsh_solids_free(made);
     free_traced(&t);
     return result;
 }
@@ -549,16 +556,16 @@ vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets,
     VSHI_NEEDS(scene);
     VSHI_NEEDS(assets);
     const chosen of = {.scene = scene, .assets = assets, .choice = OF_LAYER, .layer = layer};
-    return make_triangles(&of, run, triangles, error);
+    return trace_casters(&of, run, triangles, NULL, error);
 }
 
 vsh_result vshi_scene_caster_triangles(const vsh_scene *scene, const vsh_assets *assets, size_t caster,
                                        const vsh_run *run, vsh_triangles **triangles, vsh_error *error) {
     const chosen of = {.scene = scene, .assets = assets, .choice = ONE, .one = caster};
-    return make_triangles(&of, run, triangles, error);
+    return trace_casters(&of, run, triangles, NULL, error);
 }
 
-/* The casters as estimates measure errors against them. Procedural solids alone need no Embree. */
+/* The casters as estimates measure errors against them. */
 vsh_result vsh_scene_truth(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                            vsh_triangles **triangles, vsh_solids **solids, vsh_error *error) {
     VSHI_NEEDS(triangles);
@@ -567,23 +574,6 @@ vsh_result vsh_scene_truth(const vsh_scene *scene, const vsh_assets *assets, con
     *solids = NULL;
     VSHI_NEEDS(scene);
     VSHI_NEEDS(assets);
-    traced t = {.mesh_count = 0};
-    vsh_run full;
-    vsh_result result;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
     const chosen of = {.scene = scene, .assets = assets, .choice = ALL};
-    VSHI_TRY_DONE(gather_traced(&of, &full, &t, error));
-    if (t.mesh_count > 0) {
-        VSHI_TRY_DONE(vsh_triangles_create(t.meshes, t.mesh_count, run, triangles, error));
-    }
-    if (t.sdf_count > 0) {
-        result = vsh_solids_create(t.sdfs, t.places[0], t.sdf_count, solids, error);
-    }
-done:
-    if (result != VSH_OK) {
-        vsh_triangles_free(*triangles);
-        *triangles = NULL;
-    }
-    free_traced(&t);
-    return result;
+    return trace_casters(&of, run, triangles, solids, error);
 }

@@ -307,39 +307,35 @@ done:
 
 /* --- patterns of names */
 
-static vsh_result read_patterns(vshi_json *reader, const vshi_value *value, const char *const **patterns,
-                                size_t *count) {
+vsh_result vshi_read_patterns(vshi_json *reader, const vshi_value *value, void *member) {
     static const vshi_key key = {.kind = VSHI_STRING};
-    const bool list = json_is_array(value->json);
-    *count = list ? json_array_size(value->json) : 1;
-    if (*count == 0) {
+    const bool array = json_is_array(value->json);
+    const size_t count = array ? json_array_size(value->json) : 1;
+    const char **strings;
+    if (count == 0) {
         return vshi_json_fail(reader, value, "is empty");
     }
-    const char **strings;
-    VSHI_TRY(vshi_json_allocate(reader, (void **)&strings, *count, sizeof *strings, "patterns"));
-    for (size_t i = 0; i < *count; ++i) {
-        const vshi_value item = list ? vshi_item(value, i) : *value;
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&strings, count, sizeof *strings, "patterns"));
+    for (size_t i = 0; i < count; ++i) {
+        const vshi_value item = array ? vshi_item(value, i) : *value;
         VSHI_TRY(vshi_read_value(reader, &item, &key, &strings[i]));
     }
-    *patterns = strings;
+    memcpy(member, &(vshi_list){strings, count}, sizeof(vshi_list));
     return VSH_OK;
 }
+#define PAIR(type, patterns, count) (offsetof(type, count) == offsetof(type, patterns) + sizeof(void *))
+_Static_assert(PAIR(vsh_selection, only, only_count) && PAIR(vsh_selection, except, except_count) &&
+                   PAIR(vsh_caster, one_sided, one_sided_count),
+               "patterns are as vshi_list");
 
-vsh_result vshi_read_only(vshi_json *reader, const vshi_value *value, void *member) {
-    vsh_selection *selection = member;
-    return read_patterns(reader, value, &selection->only, &selection->only_count);
-}
-
-vsh_result vshi_read_except(vshi_json *reader, const vshi_value *value, void *member) {
-    vsh_selection *selection = member;
-    return read_patterns(reader, value, &selection->except, &selection->except_count);
-}
-
-/* Adds patterns to a caster's rules of solidity. */
-static vsh_result read_rules(vshi_json *reader, const vshi_value *value, vsh_caster *caster,
-                             int32_t solidity) {
+/* Adds patterns to a caster's rules of solidity: the key names what the meshes are. */
+static vsh_result read_rules(vshi_json *reader, const vshi_value *value, void *member) {
+    vsh_caster *caster = member;
+    const int32_t solidity = strcmp(value->key, "solid") == 0   ? VSH_SOLIDITY_SOLID
+                             : strcmp(value->key, "shell") == 0 ? VSH_SOLIDITY_SHELL
+                                                                : VSH_SOLIDITY_INWARD;
     vsh_selection given = {.only = NULL};
-    VSHI_TRY(vshi_read_only(reader, value, &given));
+    VSHI_TRY(vshi_read_patterns(reader, value, &given));
     const size_t count = caster->solidity_count + given.only_count;
     vsh_solidity_rule *rules;
     VSHI_TRY(vshi_json_allocate(reader, (void **)&rules, count, sizeof *rules, "patterns"));
@@ -353,24 +349,21 @@ static vsh_result read_rules(vshi_json *reader, const vshi_value *value, vsh_cas
     return VSH_OK;
 }
 
-static vsh_result read_solid(vshi_json *reader, const vshi_value *value, void *caster) {
-    return read_rules(reader, value, caster, VSH_SOLIDITY_SOLID);
-}
-
-static vsh_result read_shell(vshi_json *reader, const vshi_value *value, void *caster) {
-    return read_rules(reader, value, caster, VSH_SOLIDITY_SHELL);
-}
-
-static vsh_result read_inward(vshi_json *reader, const vshi_value *value, void *caster) {
-    return read_rules(reader, value, caster, VSH_SOLIDITY_INWARD);
-}
-
-static vsh_result read_one_sided(vshi_json *reader, const vshi_value *value, void *member) {
-    vsh_caster *caster = member;
-    return read_patterns(reader, value, &caster->one_sided, &caster->one_sided_count);
-}
-
 /* --- casters */
+
+vsh_result vshi_read_rows(vshi_json *reader, const vshi_value *array, int32_t columns, const char *what,
+                          const double **rows) {
+    const vshi_key key = {.kind = VSHI_VECTOR, .count = columns, VSHI_ANY};
+    const size_t count = json_array_size(array->json), width = (size_t)columns;
+    double *read;
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&read, count, width * sizeof *read, what));
+    for (size_t i = 0; i < count; ++i) {
+        const vshi_value item = vshi_item(array, i);
+        VSHI_TRY(vshi_read_value(reader, &item, &key, read + width * i));
+    }
+    *rows = read;
+    return VSH_OK;
+}
 
 enum {
     MESH = 1 << VSH_CASTER_MESH,
@@ -382,25 +375,38 @@ enum {
     TEXT = 1 << VSH_CASTER_TEXT
 };
 
-/* The key that tells the type, and what messages call it. */
-static const struct {
-    const char *key, *what;
-} types[] = {
-    [VSH_CASTER_MESH] = {"mesh", "a mesh caster"},
-    [VSH_CASTER_SDF] = {"sdf", "an sdf caster"},
-    [VSH_CASTER_VDB] = {"vdb", "a vdb caster"},
-    [VSH_CASTER_HEIGHTFIELD] = {"heightfield", "a heightfield caster"},
-    [VSH_CASTER_SPHERES] = {"spheres", "a caster of spheres"},
-    [VSH_CASTER_MASK] = {"mask", "a mask caster"},
-    [VSH_CASTER_TEXT] = {"text", "a text caster"},
-};
-enum { TYPE_COUNT = sizeof types / sizeof types[0] };
+/* By type: the key that tells it, and what messages call it. */
+static const char *const keys[] = {[VSH_CASTER_MESH] = "mesh",       [VSH_CASTER_SDF] = "sdf",
+                                   [VSH_CASTER_VDB] = "vdb",         [VSH_CASTER_HEIGHTFIELD] = "heightfield",
+                                   [VSH_CASTER_SPHERES] = "spheres", [VSH_CASTER_MASK] = "mask",
+                                   [VSH_CASTER_TEXT] = "text"};
+static const char *const whats[] = {[VSH_CASTER_MESH] = "a mesh caster",
+                                    [VSH_CASTER_SDF] = "an sdf caster",
+                                    [VSH_CASTER_VDB] = "a vdb caster",
+                                    [VSH_CASTER_HEIGHTFIELD] = "a heightfield caster",
+                                    [VSH_CASTER_SPHERES] = "a caster of spheres",
+                                    [VSH_CASTER_MASK] = "a mask caster",
+                                    [VSH_CASTER_TEXT] = "a text caster"};
+
+vsh_result vshi_read_type(vshi_json *reader, const vshi_value *object, const char *const *names,
+                          int32_t count, int32_t *type) {
+    vshi_value given;
+    *type = -1;
+    for (int32_t i = 0; i < count; ++i) {
+        if (!vshi_member(object, names[i], &given)) {
+            continue;
+        }
+        if (*type >= 0) {
+            return vshi_reject_both(reader, object, names[*type], names[i]);
+        }
+        *type = i;
+    }
+    return VSH_OK;
+}
 
 /* A file's name, or [[x, y, z, radius], …]. */
 static vsh_result read_spheres(vshi_json *reader, const vshi_value *value, void *member) {
     static const vshi_key path = {.kind = VSHI_PATH};
-    static const vshi_key sphere = {
-        .kind = VSHI_VECTOR, .count = 4, .lowest = -VSHI_LARGEST, .highest = VSHI_LARGEST};
     vsh_caster *caster = member;
     if (json_is_string(value->json)) {
         return vshi_read_value(reader, value, &path, &caster->path);
@@ -408,23 +414,18 @@ static vsh_result read_spheres(vshi_json *reader, const vshi_value *value, void 
     if (!json_is_array(value->json)) {
         return vshi_json_fail(reader, value, "expected a file's name or an array of [x, y, z, radius]");
     }
-    double *spheres;
     caster->sphere_count = json_array_size(value->json);
     if (caster->sphere_count == 0) {
         return vshi_json_fail(reader, value, "is empty");
     }
-    VSHI_TRY(
-        vshi_json_allocate(reader, (void **)&spheres, caster->sphere_count, sizeof(double[4]), "spheres"));
+    VSHI_TRY(vshi_read_rows(reader, value, 4, "spheres", &caster->spheres));
     for (size_t i = 0; i < caster->sphere_count; ++i) {
-        const vshi_value item = vshi_item(value, i);
-        VSHI_TRY(vshi_read_value(reader, &item, &sphere, spheres + 4 * i));
-        if (!(spheres[4 * i + 3] > 0.0)) {
-            const vshi_value radius = vshi_item(&item, 3);
+        if (!(caster->spheres[4 * i + 3] > 0.0)) {
+            const vshi_value item = vshi_item(value, i), radius = vshi_item(&item, 3);
             return vshi_json_fail(reader, &radius, "%.9g is out of range 0 (excluded) … %.9g",
-                                  spheres[4 * i + 3], VSHI_LARGEST);
+                                  caster->spheres[4 * i + 3], VSHI_LARGEST);
         }
     }
-    caster->spheres = spheres;
     return VSH_OK;
 }
 
@@ -452,12 +453,12 @@ static vsh_result read_vdb(vshi_json *reader, const vshi_value *value, void *mem
 #define AT(member) .offset = offsetof(vsh_caster, member)
 static const vshi_key caster_keys[] = {
     VSHI_KEY("mesh", PATH, AT(path), .variants = MESH),
-    VSHI_KEY("objects", CUSTOM, AT(objects), .variants = MESH, .read = vshi_read_only),
-    VSHI_KEY("except", CUSTOM, AT(objects), .variants = MESH, .read = vshi_read_except),
-    VSHI_KEY("solid", CUSTOM, .variants = MESH, .read = read_solid),
-    VSHI_KEY("shell", CUSTOM, .variants = MESH, .read = read_shell),
-    VSHI_KEY("inward", CUSTOM, .variants = MESH, .read = read_inward),
-    VSHI_KEY("one_sided", CUSTOM, .variants = MESH, .read = read_one_sided),
+    VSHI_KEY("objects", CUSTOM, AT(objects.only), .variants = MESH, .read = vshi_read_patterns),
+    VSHI_KEY("except", CUSTOM, AT(objects.except), .variants = MESH, .read = vshi_read_patterns),
+    VSHI_KEY("solid", CUSTOM, .variants = MESH, .read = read_rules),
+    VSHI_KEY("shell", CUSTOM, .variants = MESH, .read = read_rules),
+    VSHI_KEY("inward", CUSTOM, .variants = MESH, .read = read_rules),
+    VSHI_KEY("one_sided", CUSTOM, AT(one_sided), .variants = MESH, .read = vshi_read_patterns),
     VSHI_KEY("sdf", CUSTOM, AT(sdf), .variants = SDF, .read = read_sdf),
     VSHI_KEY("vdb", CUSTOM, .variants = VDB, .read = read_vdb),
     VSHI_KEY("grid", STRING, AT(grid), .variants = VDB),
@@ -482,22 +483,13 @@ static const vshi_table caster_table = VSHI_TABLE(caster_keys);
 vsh_result vshi_read_caster(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_caster *caster = member;
     *caster = vsh_caster_default();
-    caster->type = -1;
     VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
-    vshi_value given, transform;
-    for (int32_t i = VSH_CASTER_MESH; i < TYPE_COUNT; ++i) {
-        if (!vshi_member(value, types[i].key, &given)) {
-            continue;
-        }
-        if (caster->type >= 0) {
-            return vshi_reject_both(reader, value, types[caster->type].key, types[i].key);
-        }
-        caster->type = i;
-    }
+    vshi_value transform;
+    VSHI_TRY(vshi_read_type(reader, value, keys, sizeof keys / sizeof keys[0], &caster->type));
     /* A caster of no type still has its keys looked over: the type's name may be what is misspelt. */
     const uint32_t variant = caster->type < 0 ? VSHI_ALL : 1U << caster->type;
     VSHI_TRY(vshi_read_object(reader, value, &caster_table, variant,
-                              caster->type < 0 ? "a caster" : types[caster->type].what, caster));
+                              caster->type < 0 ? "a caster" : whats[caster->type], caster));
     if (caster->type < 0) {
         return vshi_json_fail(reader, value,
                               "key \"mesh\", \"sdf\", \"vdb\", \"heightfield\", \"spheres\", \"mask\" "
@@ -507,13 +499,13 @@ vsh_result vshi_read_caster(vshi_json *reader, const vshi_value *value, void *me
         VSHI_TRY(vshi_reject_both(reader, value, "extent", "size"));
         if (!(caster->size[0] > 0.0)) {
             return vshi_json_fail(reader, value, "key \"extent\" is missing: %s needs it",
-                                  types[caster->type].what);
+                                  whats[caster->type]);
         }
     }
     if (caster->type != VSH_CASTER_MESH && !is_similarity(caster->transform) &&
         vshi_member(value, "transform", &transform)) {
         return vshi_json_fail(reader, &transform, "shears or scales unevenly, which %s cannot",
-                              types[caster->type].what);
+                              whats[caster->type]);
     }
     return VSH_OK;
 }

@@ -55,14 +55,7 @@ static vsh_result read_points(vshi_json *reader, const vshi_value *value, void *
     if (count < 3 || count > MAX_POINTS) {
         return vshi_json_fail(reader, value, "has %zu points, out of range 3 … %zu", count, MAX_POINTS);
     }
-    double *points;
-    VSHI_TRY(vshi_json_allocate(reader, (void **)&points, count, sizeof(double[2]), "points"));
-    const vshi_key key = {.kind = VSHI_VECTOR, .count = 2, .lowest = -VSHI_LARGEST, .highest = VSHI_LARGEST};
-    for (size_t i = 0; i < count; ++i) {
-        const vshi_value point = vshi_item(value, i);
-        VSHI_TRY(vshi_read_value(reader, &point, &key, points + 2 * i));
-    }
-    caster->points = points;
+    VSHI_TRY(vshi_read_rows(reader, value, 2, "points", &caster->points));
     caster->point_count = count;
     return VSH_OK;
 }
@@ -103,17 +96,8 @@ static vsh_result read_caster(vshi_json *reader, const vshi_value *value, void *
     p.caster.letters = vsh_text_options_default();
     VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
     static const char *const kinds[] = {"mask", "text", "shape"};
-    int32_t type = -1;
-    for (int32_t i = 0; i < 3; ++i) {
-        vshi_value given;
-        if (!vshi_member(value, kinds[i], &given)) {
-            continue;
-        }
-        if (type >= 0) {
-            return vshi_reject_both(reader, value, kinds[type], kinds[i]);
-        }
-        type = i;
-    }
+    int32_t type;
+    VSHI_TRY(vshi_read_type(reader, value, kinds, 3, &type));
     if (type == 2) {
         int32_t shape = 0;
         VSHI_TRY(
@@ -204,9 +188,8 @@ static vsh_result read_scene(vshi_json *reader, const vshi_value *root, void *ma
     }
     *scene = vsh_flat_scene_default();
     VSHI_TRY(vshi_read_object(reader, root, &vshi_flat_table, 1, "a flat scene", scene));
-    return vshi_member(root, "lights", &lights)
-               ? vshi_check_light_names(reader, &lights, scene->lights, scene->light_count)
-               : VSH_OK;
+    const vsh_scene lit = {.lights = scene->lights, .light_count = scene->light_count};
+    return vshi_member(root, "lights", &lights) ? vshi_check_light_names(reader, &lights, &lit) : VSH_OK;
 }
 
 vsh_result vsh_flat_scene_read(const char *path, const vsh_run *run, vsh_flat_scene **scene,

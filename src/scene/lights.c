@@ -41,18 +41,6 @@ static vsh_result read_name(vshi_json *reader, const vshi_value *value, void *me
 
 enum { MOST_KEYS = 24 };
 
-/* The keys of lights in space, or in a plane. */
-typedef struct light_keys {
-    vshi_key keys[MOST_KEYS];
-    size_t count;
-} light_keys;
-
-static void add_key(light_keys *all, vshi_key key) {
-    if (all->count < MOST_KEYS) {
-        all->keys[all->count++] = key;
-    }
-}
-
 /* A bound in files, whose numbers are no larger than VSHI_LARGEST and whose angles are degrees. */
 static double bound_of(const vshi_light_member *m, double bound) {
     const double number = m->kind == VSHI_LIGHT_ANGLE ? bound / VSHI_PI * 180.0 : bound;
@@ -80,27 +68,24 @@ static vshi_key key_of(const vshi_light_member *m, int32_t dimensions) {
 
 #define AT(member) .offset = offsetof(vsh_light, member)
 
-static void make_keys(bool flat, light_keys *all) {
+/* Lists the keys of lights in space, or in a plane; returns how many there are. */
+static size_t list_keys(bool flat, vshi_key keys[MOST_KEYS]) {
     const uint32_t types = flat ? vshi_light_types_flat() : VSHI_ALL, falling = vshi_light_types_falling();
-    const vshi_key name = VSHI_KEY("name", CUSTOM, AT(name), .required = VSHI_ALL, .read = read_name);
-    const vshi_key reach = VSHI_KEY("reach", NUMBER, AT(reach), .variants = falling, VSHI_POSITIVE);
-    const vshi_key color = VSHI_KEY("color", VECTOR, AT(color), .count = 3, .highest = VSHI_LARGEST);
-    const vshi_key falloff =
-        VSHI_KEY("falloff", NAME, AT(falloff), .variants = falling, .names = VSH_NAMES_FALLOFF);
-    all->count = 0;
-    add_key(all, name);
-    add_key(all, type_key(flat));
-    for (size_t i = 0; i < vshi_light_member_count; ++i) {
+    const vshi_key common[] = {
+        VSHI_KEY("name", CUSTOM, AT(name), .required = VSHI_ALL, .read = read_name),
+        type_key(flat),
+        VSHI_KEY("reach", NUMBER, AT(reach), .variants = falling, VSHI_POSITIVE),
+        VSHI_KEY("color", VECTOR, AT(color), .count = 3, .highest = VSHI_LARGEST),
+        VSHI_KEY("falloff", NAME, AT(falloff), .variants = falling, .names = VSH_NAMES_FALLOFF),
+        VSHI_KEY("layers", LATER, .offset = 0)};
+    size_t count = flat ? 4 : 6; /* in a plane lights have neither falloff nor layers */
+    memcpy(keys, common, count * sizeof *keys);
+    for (size_t i = 0; i < vshi_light_member_count && count < MOST_KEYS; ++i) {
         if ((vshi_light_members[i].types & types) != 0) {
-            add_key(all, key_of(&vshi_light_members[i], flat ? 2 : 3));
+            keys[count++] = key_of(&vshi_light_members[i], flat ? 2 : 3);
         }
     }
-    add_key(all, reach);
-    add_key(all, color);
-    if (!flat) {
-        add_key(all, falloff);
-        add_key(all, (vshi_key){.name = "layers", .kind = VSHI_LATER});
-    }
+    return count;
 }
 #undef AT
 
@@ -114,9 +99,8 @@ static vsh_result read_keys(vshi_json *reader, const vshi_value *value, bool fla
     if (type >= 0) {
         snprintf(what, sizeof what, "a %s light", vshi_key_name(&key, type));
     }
-    light_keys keys;
-    make_keys(flat, &keys);
-    const vshi_table table = {keys.keys, keys.count};
+    vshi_key keys[MOST_KEYS];
+    const vshi_table table = {keys, list_keys(flat, keys)};
     return vshi_read_object(reader, value, &table, type < 0 ? VSHI_ALL : 1U << type, what, light);
 }
 
@@ -160,21 +144,6 @@ vsh_result vshi_read_flat_light(vshi_json *reader, const vshi_value *value, void
         light->falloff = VSH_FALLOFF_QUADRATIC;
     }
     return check(reader, value, light);
-}
-
-vsh_result vshi_check_light_names(vshi_json *reader, const vshi_value *value, const vsh_light *lights,
-                                  size_t count) {
-    for (size_t i = 0; i < count; ++i) {
-        for (size_t j = 0; j < i; ++j) {
-            const vshi_value light = vshi_item(value, i);
-            vshi_value name;
-            if (strcmp(lights[i].name, lights[j].name) == 0 && vshi_member(&light, "name", &name)) {
-                return vshi_json_fail(reader, &name, "\"%s\" is the name of lights[%zu] too", lights[i].name,
-                                      j);
-            }
-        }
-    }
-    return VSH_OK;
 }
 
 /* --- lists of lights and of files that have some */
@@ -225,17 +194,19 @@ vshi_value vshi_light_item(const vshi_value *list, const vsh_scene *scene, size_
     return vshi_item(list, item_of(scene, light));
 }
 
-static vsh_result check_names(vshi_json *reader, const vshi_value *list, const vsh_scene *scene) {
-    if (scene->light_file_count == 0) {
-        return vshi_check_light_names(reader, list, scene->lights, scene->light_count);
-    }
+vsh_result vshi_check_light_names(vshi_json *reader, const vshi_value *list, const vsh_scene *scene) {
     for (size_t i = 0; i < scene->light_count; ++i) {
         for (size_t k = 0; k < i; ++k) {
-            if (strcmp(scene->lights[i].name, scene->lights[k].name) == 0) {
-                const vshi_value value = vshi_light_item(list, scene, i);
-                return vshi_json_fail(reader, &value, "has a light \"%s\", as lights[%zu] has",
-                                      scene->lights[i].name, item_of(scene, k));
+            if (strcmp(scene->lights[i].name, scene->lights[k].name) != 0) {
+                continue;
             }
+            const vshi_value of = vshi_light_item(list, scene, i);
+            vshi_value name;
+            return scene->light_file_count == 0 && vshi_member(&of, "name", &name)
+                       ? vshi_json_fail(reader, &name, "\"%s\" is the name of lights[%zu] too",
+                                        scene->lights[i].name, item_of(scene, k))
+                       : vshi_json_fail(reader, &of, "has a light \"%s\", as lights[%zu] has",
+                                        scene->lights[i].name, item_of(scene, k));
         }
     }
     return VSH_OK;
@@ -292,7 +263,7 @@ vsh_result vshi_read_lights(vshi_json *reader, const vshi_value *list, vsh_scene
         const vshi_value value = vshi_item(list, i);
         VSHI_TRY(add_item(reader, &value, (const item *)items.items + i, lights, files, scene));
     }
-    return check_names(reader, list, scene);
+    return vshi_check_light_names(reader, list, scene);
 }
 
 /* --- lights of a model */

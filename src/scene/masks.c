@@ -171,14 +171,6 @@ static vsh_alpha_mask mask_by_vertices(double base_alpha, double alpha_cutoff) {
 
 /* --- textures */
 
-static const float *plane_of(const vsh_image *image, const char *name) {
-    const float *plane = NULL;
-    for (int32_t c = 0; c < image->channel_count; ++c) {
-        plane = strcmp(image->names[c], name) == 0 ? image->planes[c] : plane;
-    }
-    return plane;
-}
-
 /* What alpha is a weighted sum of; planes are NULL where there is none. */
 typedef struct alpha_source {
     const float *planes[3];
@@ -204,12 +196,13 @@ static bool varies(const alpha_source *source, size_t texels) {
 
 static alpha_source find_alpha(const vsh_image *image, int32_t channel, size_t texels) {
     static const char *const names[] = {"A", "R", "G", "B"};
-    const float *grey = plane_of(image, "Y");
-    const alpha_source luminance = {{plane_of(image, "R"), plane_of(image, "G"), plane_of(image, "B")},
+    const float *grey = vshi_image_find_plane(image, "Y");
+    const alpha_source luminance = {{vshi_image_find_plane(image, "R"), vshi_image_find_plane(image, "G"),
+                                     vshi_image_find_plane(image, "B")},
                                     {0.2126f, 0.7152f, 0.0722f}};
     alpha_source one = {{NULL}, {1.0f, 0.0f, 0.0f}};
     if (channel <= VSH_MASK_CHANNEL_BLUE || channel == VSH_MASK_CHANNEL_AUTO) {
-        one.planes[0] = plane_of(image, names[channel <= VSH_MASK_CHANNEL_BLUE ? channel : 0]);
+        one.planes[0] = vshi_image_find_plane(image, names[channel <= VSH_MASK_CHANNEL_BLUE ? channel : 0]);
     }
     if (channel == VSH_MASK_CHANNEL_ALPHA || (channel == VSH_MASK_CHANNEL_AUTO && varies(&one, texels))) {
         return one;

@@ -12,8 +12,8 @@
 #define VSHI_OPTION(called, stands, of_group, ...)                                                           \
     .option = {.name = called, .value = stands, .group = VSH_SETTINGS_##of_group, .help = __VA_ARGS__}
 
-/* Keys with options are settings: of a vsh_scene the first two, of a vsh_receiver, of a vsh_flat_scene. */
-extern const vshi_table vshi_scene_table, vshi_ao_table, vshi_receiver_table, vshi_flat_table;
+/* Keys with options are settings. */
+extern const vshi_table vshi_scene_table, vshi_ao_table, vshi_flat_table;
 
 /* As vsh_scene_read(), of a text that was read from `path`. With a run of NULL no file is opened: those of
  * lights have none then. */
@@ -28,7 +28,6 @@ vsh_result vshi_scene_file_read(const char *path, const vsh_run *run, size_t siz
 /* --- items of lists */
 
 vsh_result vshi_read_caster(vshi_json *reader, const vshi_value *value, void *caster);
-vsh_result vshi_read_receiver(vshi_json *reader, const vshi_value *value, void *receiver);
 vsh_result vshi_read_flat_light(vshi_json *reader, const vshi_value *value, void *light);
 
 /* Reads the list of lights into a scene whose unit is known, and the files that it names, unless the reader
@@ -37,22 +36,26 @@ vsh_result vshi_read_lights(vshi_json *reader, const vshi_value *list, vsh_scene
 /* The item of that list which light `light` of the scene is of. */
 vshi_value vshi_light_item(const vshi_value *list, const vsh_scene *scene, size_t light);
 
-/* Fails where two lights of the array `value` have one name. */
-vsh_result vshi_check_light_names(vshi_json *reader, const vshi_value *value, const vsh_light *lights,
-                                  size_t count);
+/* Fails where two lights of a scene have one name; `list` is where its file has them. */
+vsh_result vshi_check_light_names(vshi_json *reader, const vshi_value *list, const vsh_scene *scene);
 
 /* --- values of several kinds of items */
 
 /* A "transform" object into double[12]. Errors: also a transform that flattens. */
 vsh_result vshi_read_transform(vshi_json *reader, const vshi_value *value, void *matrix);
+/* Finds which of these keys an object has, -1: none. Fails where it has two. */
+vsh_result vshi_read_type(vshi_json *reader, const vshi_value *object, const char *const *names,
+                          int32_t count, int32_t *type);
+/* The arrays of numbers in an array, each of so many. */
+vsh_result vshi_read_rows(vshi_json *reader, const vshi_value *array, int32_t columns, const char *what,
+                          const double **rows);
 /* Texels: 1024, or [width, height]. */
 vsh_result vshi_read_size(vshi_json *reader, const vshi_value *value, int32_t *width, int32_t *height);
 vsh_result vshi_read_bits(vshi_json *reader, const vshi_value *value, void *bits); /* int32_t */
 const char *vshi_color_space_key(int32_t i); /* names of color_space; NULL behind the last */
 
-/* A pattern, or an array of them, into a vsh_selection: what is chosen, and what of it is not. */
-vsh_result vshi_read_only(vshi_json *reader, const vshi_value *value, void *selection);
-vsh_result vshi_read_except(vshi_json *reader, const vshi_value *value, void *selection);
+/* A pattern, or an array of them, as a vshi_list. */
+vsh_result vshi_read_patterns(vshi_json *reader, const vshi_value *value, void *list);
 
 /* --- masks and texts, which solids and flat scenes share */
 

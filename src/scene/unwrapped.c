@@ -279,19 +279,13 @@ vsh_result vsh_model_densities(const vsh_model *model, const char *path, const v
                              "%s: density '%.100s' is %g, expected a pattern and a finite number above 0",
                              path, rule->pattern != NULL ? rule->pattern : "", rule->factor);
         }
-        bool matched = false; /* by objects, or where none is called so, by materials */
-        for (int material = 0; material < 2 && !matched; ++material) {
-            for (size_t m = 0; m < meshes; ++m) {
-                const vsh_mesh mesh = vsh_model_mesh(model, m, -1);
-                if (vshi_mesh_is_meant(&mesh, rule->pattern, material != 0)) {
-                    density[m] = rule->factor;
-                    matched = true;
-                }
-            }
+        unsigned char *chosen = NULL;
+        const vsh_result result = vshi_select_some(model, path, &rule->pattern, 1, &chosen, error);
+        for (size_t m = 0; m < meshes && result == VSH_OK; ++m) {
+            density[m] = chosen[m] != 0 ? rule->factor : density[m];
         }
-        if (!matched) {
-            return vshi_fail_unmatched(model, path, rule->pattern, error);
-        }
+        free(chosen);
+        VSHI_TRY(result);
     }
     return VSH_OK;
 }

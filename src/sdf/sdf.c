@@ -69,8 +69,8 @@ static inline double cone_distance(vshi_vec p, double half_height, double base, 
     return side_r < 0.0 && cap_y < 0.0 ? -sqrt(squared) : sqrt(squared);
 }
 
-static inline double shape_distance(int32_t shape, const vsh_sdf_node *node, vshi_vec p) {
-    switch (shape) {
+static inline double shape_distance(const vsh_sdf_node *node, vshi_vec p) {
+    switch (node->shape) {
     case VSH_SDF_SPHERE:
         return vshi_length(p) - node->radius;
     case VSH_SDF_BOX:
@@ -100,8 +100,8 @@ static inline double shape_distance(int32_t shape, const vsh_sdf_node *node, vsh
     }
 }
 
-static inline double combine(int32_t shape, const vsh_sdf_node *node, double a, double b) {
-    switch (shape) {
+static inline double combine(const vsh_sdf_node *node, double a, double b) {
+    switch (node->shape) {
     case VSH_SDF_INTERSECTION:
         return larger(a, b);
     case VSH_SDF_SUBTRACTION:
@@ -279,9 +279,9 @@ static double node_distance(const vsh_sdf_node *nodes, const uint8_t *keep, int3
     double distance;
     p = to_node(node, p);
     if (!is_operation(node)) {
-        distance = shape_distance(node->shape, node, p);
+        distance = shape_distance(node, p);
     } else if (kept == KEEP_BOTH) {
-        distance = combine(node->shape, node, node_distance(nodes, keep, node->left, p),
+        distance = combine(node, node_distance(nodes, keep, node->left, p),
                            node_distance(nodes, keep, node->right, p));
     } else {
         distance = node_distance(nodes, keep, kept == KEEP_LEFT ? node->left : node->right, p);
@@ -295,127 +295,13 @@ double vshi_sdf_distance_at(const vsh_sdf *sdf, vshi_vec position) {
                                  : NAN;
 }
 
-/* --- many positions at once: a node measures all of them in one loop, which compilers vectorise. The
- * distances are the same, to the bit. */
-
-/* Positions at a time, and the depth of the tree, at 2 KB a node, below which each position is measured
- * alone. */
-enum { LANES = 64, DEEP = 32 };
-
-typedef struct places {
-    double x[LANES], y[LANES], z[LANES];
-} places;
-
-/* Whether a node has its places where its parent has them, as most operations do. */
-static bool is_in_place(const vsh_sdf_node *node) {
-    const double *q = node->rotation, *t = node->translation;
-    return q[0] == 0.0 && q[1] == 0.0 && q[2] == 0.0 && t[0] == 0.0 && t[1] == 0.0 && t[2] == 0.0 &&
-           !signbit(t[0]) && !signbit(t[1]) && !signbit(t[2]) && node->scale == 1.0;
-}
-
-static void place_all(const vsh_sdf_node *node, const places *from, size_t count, places *to) {
-    const vsh_sdf_node own = *node; /* which nothing below can change */
-    for (size_t i = 0; i < count; ++i) {
-        const vshi_vec p = to_node(&own, (vshi_vec){from->x[i], from->y[i], from->z[i]});
-        to->x[i] = p.x;
-        to->y[i] = p.y;
-        to->z[i] = p.z;
-    }
-}
-
-/* A loop for each shape, which is then a constant in it. */
-#define EACH_PLACE(name)                                                                                     \
-    case name:                                                                                               \
-        for (size_t i = 0; i < count; ++i) {                                                                 \
-            distances[i] = shape_distance(name, &own, (vshi_vec){at->x[i], at->y[i], at->z[i]});             \
-        }                                                                                                    \
-        break
-
-static void measure_all(const vsh_sdf_node *node, const places *at, size_t count, double *distances) {
-    const vsh_sdf_node own = *node;
-    switch (own.shape) {
-        EACH_PLACE(VSH_SDF_SPHERE);
-        EACH_PLACE(VSH_SDF_BOX);
-        EACH_PLACE(VSH_SDF_TORUS);
-        EACH_PLACE(VSH_SDF_PLANE);
-        EACH_PLACE(VSH_SDF_CAPSULE);
-        EACH_PLACE(VSH_SDF_CYLINDER);
-    default:
-        EACH_PLACE(VSH_SDF_CONE);
-    }
-}
-
-#define EACH_PAIR(name)                                                                                      \
-    case name:                                                                                               \
-        for (size_t i = 0; i < count; ++i) {                                                                 \
-            left[i] = combine(name, &own, left[i], right[i]);                                                \
-        }                                                                                                    \
-        break
-
-static void combine_all(const vsh_sdf_node *node, double *restrict left, const double *restrict right,
-                        size_t count) {
-    const vsh_sdf_node own = *node;
-    switch (own.shape) {
-        EACH_PAIR(VSH_SDF_INTERSECTION);
-        EACH_PAIR(VSH_SDF_SUBTRACTION);
-        EACH_PAIR(VSH_SDF_SMOOTH_UNION);
-    default:
-        EACH_PAIR(VSH_SDF_UNION);
-    }
-}
-
-static void ask_all(const vsh_sdf *sdf, const uint8_t *keep, int32_t index, const places *from, size_t count,
-                    int depth, double *distances) {
-    const vsh_sdf_node *node = &sdf->nodes[index];
-    if (depth == DEEP) {
-        for (size_t i = 0; i < count; ++i) {
-            distances[i] =
-                node_distance(sdf->nodes, keep, index, (vshi_vec){from->x[i], from->y[i], from->z[i]});
-        }
-        return;
-    }
-    places own;
-    const places *at = from;
-    if (!is_in_place(node)) {
-        place_all(node, from, count, &own);
-        at = &own;
-    }
-    if (!is_operation(node)) {
-        measure_all(node, at, count, distances);
-    } else if (keep[index] == KEEP_BOTH) {
-        double right[LANES];
-        ask_all(sdf, keep, node->left, at, count, depth + 1, distances);
-        ask_all(sdf, keep, node->right, at, count, depth + 1, right);
-        combine_all(node, distances, right, count);
-    } else {
-        const bool left = keep[index] == KEEP_LEFT;
-        ask_all(sdf, keep, left ? node->left : node->right, at, count, depth + 1, distances);
-        for (size_t i = 0; i < count && !left && node->shape == VSH_SDF_SUBTRACTION; ++i) {
-            distances[i] = -distances[i];
-        }
-    }
-    for (size_t i = 0; i < count; ++i) {
-        distances[i] *= node->scale;
-    }
-}
-
 void vshi_sdf_distances_within(const vsh_sdf *sdf, const uint8_t *keep, size_t count,
                                const double (*positions)[3], double *distances) {
     VSHI_FLOATS;
-    for (size_t first = 0; first < count; first += LANES) {
-        const size_t lanes = count - first < LANES ? count - first : LANES;
-        places world;
-        for (size_t i = 0; i < lanes; ++i) {
-            world.x[i] = positions[first + i][0];
-            world.y[i] = positions[first + i][1];
-            world.z[i] = positions[first + i][2];
-        }
-        ask_all(sdf, keep, (int32_t)sdf->node_count - 1, &world, lanes, 0, distances + first);
-        for (size_t i = 0; i < lanes; ++i) {
-            if (!vshi_finite(vshi_vec_of(positions[first + i]))) {
-                distances[first + i] = NAN;
-            }
-        }
+    for (size_t i = 0; i < count; ++i) {
+        const vshi_vec p = vshi_vec_of(positions[i]);
+        distances[i] =
+            vshi_finite(p) ? node_distance(sdf->nodes, keep, (int32_t)sdf->node_count - 1, p) : NAN;
     }
 }
 
@@ -442,13 +328,13 @@ static rounded narrow(const vsh_sdf_node *nodes, int32_t index, vshi_vec p, doub
     rounded here;
     keep[index] = KEEP_BOTH;
     if (!is_operation(node)) {
-        here.distance = shape_distance(node->shape, node, p);
+        here.distance = shape_distance(node, p);
         here.error = ROUNDED * (fabs(node->size[0]) + fabs(node->size[1]) + fabs(node->size[2]) +
                                 fabs(node->radius) + fabs(node->minor_radius) + fabs(node->rounding));
     } else {
         const rounded left = narrow(nodes, node->left, p, radius, keep);
         const rounded right = narrow(nodes, node->right, p, radius, keep);
-        here = (rounded){combine(node->shape, node, left.distance, right.distance), left.error + right.error};
+        here = (rounded){combine(node, left.distance, right.distance), left.error + right.error};
         /* how much more the left one counts than the right one */
         const double more = node->shape == VSH_SDF_UNION          ? right.distance - left.distance
                             : node->shape == VSH_SDF_INTERSECTION ? left.distance - right.distance

@@ -1,5 +1,5 @@
 /* Where the shadow rays of a point on a mesh begin. They begin on its triangle, or are lifted towards the
- * smooth surface that the vertex normals describe (mesh/smooth_surface.h). Then the facets of a smooth mesh
+ * smooth surface that the vertex normals describe (mesh/mesh.h). Then the facets of a smooth mesh
  * do not hide a light that is above the smooth surface. AO needs no lift: it leaves out the directions below
  * the face. */
 #ifndef VSHI_SHADE_LIFT_H

@@ -259,11 +259,10 @@ static double dot_along(point p, double x, double y) {
     return p.x * x + p.y * y;
 }
 
-/* Direction of the least box's lower side: rotating calipers (Toussaint, 1983). */
+/* Direction of the least box's lower side. */
 static point find_direction(const point *hull, size_t count) {
     point best = {1.0, 0.0};
     double least = INFINITY;
-    size_t right = 0, top = 0, left = 0;
     for (size_t i = 0; i < count; ++i) {
         const point a = hull[i], b = hull[(i + 1) % count];
         const double length = sqrt((b.x - a.x) * (b.x - a.x) + (b.y - a.y) * (b.y - a.y));
@@ -271,23 +270,14 @@ static point find_direction(const point *hull, size_t count) {
             continue;
         }
         const double x = (b.x - a.x) / length, y = (b.y - a.y) / length;
-        right = right < i + 1 ? i + 1 : right;
-        while (right < i + count &&
-               dot_along(hull[(right + 1) % count], x, y) > dot_along(hull[right % count], x, y)) {
-            ++right;
+        double low = INFINITY, high = -INFINITY, top = -INFINITY;
+        for (size_t k = 0; k < count; ++k) {
+            const double along = dot_along(hull[k], x, y), up = dot_along(hull[k], -y, x);
+            low = along < low ? along : low;
+            high = along > high ? along : high;
+            top = up > top ? up : top;
         }
-        top = top < right ? right : top;
-        while (top < i + count &&
-               dot_along(hull[(top + 1) % count], -y, x) > dot_along(hull[top % count], -y, x)) {
-            ++top;
-        }
-        left = left < top ? top : left;
-        while (left < i + count &&
-               dot_along(hull[(left + 1) % count], x, y) < dot_along(hull[left % count], x, y)) {
-            ++left;
-        }
-        const double width = dot_along(hull[right % count], x, y) - dot_along(hull[left % count], x, y);
-        const double height = dot_along(hull[top % count], -y, x) - dot_along(a, -y, x);
+        const double width = high - low, height = top - dot_along(a, -y, x);
         if (width * height <
             least * 0.9999) { /* of boxes that are alike, the first: rounding tells nothing */
             least = width * height;

@@ -1,6 +1,6 @@
 /* Three looks, as none sees everything. Holes that are turned inside out are found by how they run; borders
- * that cross are found by a grid of cells over them: where no triangle flips, a chart that lies over itself
- * has such borders, unless they meet only in corners and along each other, as those of regular grids do. A
+ * that cross are found by a sweep along u: where no triangle flips, a chart that lies over itself has such
+ * borders, unless they meet only in corners and along each other, as those of regular grids do. A
  * raster, about as fine as the triangles, sees these: each of its points is of one triangle at most. */
 #include "unwrap/patch.h"
 
@@ -13,6 +13,9 @@ static const char what[] = "looking for overlap";
 static const double TOUCH = 1e-7; /* of the chart's size: borders that are so near touch */
 static const double OFFSET =
     0.371; /* of a point of the raster: so that none lies on lines that charts are drawn on */
+
+/* Pairs of sides, about a minute: only UVs of slivers that cross the whole square have more. */
+static const uint64_t MOST_LOOKS = UINT64_C(1) << 36;
 
 enum { LEAST_SIDE = 64, MOST_SIDE = 2048, POINTS = 8 /* of the raster to a triangle */ };
 
@@ -83,18 +86,21 @@ static vsh_result raster_overlaps(const vshi_patch *p, const frame *f, bool *ove
 
 /* --- borders */
 
+/* A side of the border, and its box. */
+typedef struct border_side {
+    double low[2], high[2];
+    uint32_t side;
+} border_side;
+
 typedef struct borders {
     const vshi_patch *patch;
     frame frame;
-    uint32_t *sides; /* of the border */
+    border_side *sides; /* [count] */
     uint32_t count;
-    uint32_t cells;  /* along each side of the grid */
-    uint32_t *begin; /* [cells² + 1] in `list` */
-    uint32_t *list;  /* numbers of sides */
 } borders;
 
 static void ends_of(const borders *b, uint32_t i, const double *end[2]) {
-    const uint32_t side = b->sides[i];
+    const uint32_t side = b->sides[i].side;
     end[0] = b->patch->uv[b->patch->corner[side / 3][side % 3]];
     end[1] = b->patch->uv[b->patch->corner[side / 3][(side + 1) % 3]];
 }
@@ -117,47 +123,6 @@ static bool crosses(const borders *b, uint32_t i, uint32_t k) {
            parted(left_of(c[0], c[1], a[0]), left_of(c[0], c[1], a[1]), least);
 }
 
-static uint32_t cell_of(const borders *b, double x) {
-    const double cell = x / b->frame.size * b->cells;
-    return cell <= 0.0 ? 0 : cell >= b->cells ? b->cells - 1 : (uint32_t)cell;
-}
-
-/* Counts a side in each cell that it passes, row by row of cells, or lists it there. */
-static size_t file_side(borders *b, uint32_t i, bool list) {
-    const double *end[2];
-    ends_of(b, i, end);
-    const double ax = end[0][0] - b->frame.low[0], ay = end[0][1] - b->frame.low[1],
-                 bx = end[1][0] - b->frame.low[0], by = end[1][1] - b->frame.low[1];
-    const uint32_t first = cell_of(b, ay < by ? ay : by), last = cell_of(b, ay < by ? by : ay);
-    const double height = b->frame.size / b->cells;
-    size_t passed = 0;
-    for (uint32_t row = first; row <= last; ++row) {
-        double x0 = ax, x1 = bx;
-        if (first != last) { /* the part in this row, with room for rounding */
-            const double t0 = ((double)row * height - ay) / (by - ay),
-                         t1 = ((double)(row + 1) * height - ay) / (by - ay);
-            double begin = t0 < t1 ? t0 : t1, finish = t0 < t1 ? t1 : t0;
-            begin = begin > 0.0 ? begin : 0.0;
-            finish = finish < 1.0 ? finish : 1.0;
-            x0 = ax + (bx - ax) * begin;
-            x1 = ax + (bx - ax) * finish;
-        }
-        const double room = 1e-6 * height;
-        const uint32_t from = cell_of(b, (x0 < x1 ? x0 : x1) - room),
-                       to = cell_of(b, (x0 < x1 ? x1 : x0) + room);
-        for (uint32_t column = from; column <= to; ++column) {
-            const size_t cell = (size_t)row * b->cells + column;
-            if (list) {
-                b->list[b->begin[cell]++] = i;
-            } else {
-                ++b->begin[cell + 1];
-            }
-            ++passed;
-        }
-    }
-    return passed;
-}
-
 /* Holes run clockwise, as what they bound is outside of them. One that runs the other way has been turned
  * inside out, and lies over what is around it without a border that crosses another. */
 static vsh_result holes_overlap(const borders *b, bool *overlaps, vsh_error *error) {
@@ -165,7 +130,8 @@ static vsh_result holes_overlap(const borders *b, bool *overlaps, vsh_error *err
     uint32_t *out = NULL, found = 0; /* [vertex_count]: the side of the border that leaves a vertex, + 1 */
     VSHI_TRY(vshi_allocate((void **)&out, p->vertex_count, sizeof *out, what, error));
     for (uint32_t i = 0; i < b->count; ++i) {
-        out[p->corner[b->sides[i] / 3][b->sides[i] % 3]] = b->sides[i] + 1;
+        const uint32_t side = b->sides[i].side;
+        out[p->corner[side / 3][side % 3]] = side + 1;
     }
     for (uint32_t v = 0; v < p->vertex_count; ++v) {
         double doubled = 0.0;
@@ -183,15 +149,29 @@ static vsh_result holes_overlap(const borders *b, bool *overlaps, vsh_error *err
     return VSH_OK;
 }
 
-static bool any_crosses(const borders *b) {
-    const size_t cells = (size_t)b->cells * b->cells;
-    for (size_t cell = 0, begin = 0; cell < cells; begin = b->begin[cell++]) {
-        for (uint32_t i = (uint32_t)begin; i < b->begin[cell]; ++i) {
-            for (uint32_t k = i + 1; k < b->begin[cell]; ++k) {
-                if (crosses(b, b->list[i], b->list[k])) {
-                    return true;
-                }
+static int compare_sides(const void *a, const void *b) {
+    const border_side *x = a, *y = b;
+    return (x->low[0] > y->low[0]) - (x->low[0] < y->low[0]);
+}
+
+/* Compares each side with those whose boxes touch its own. */
+static bool any_crosses(borders *b) {
+    if (b->count > 0) {
+        qsort(b->sides, b->count, sizeof *b->sides, compare_sides);
+    }
+    uint64_t looked = 0;
+    for (uint32_t i = 0; i < b->count; ++i) {
+        const border_side *one = &b->sides[i];
+        uint32_t k = i + 1;
+        for (; k < b->count && b->sides[k].low[0] <= one->high[0]; ++k) {
+            const border_side *other = &b->sides[k];
+            if (other->low[1] <= one->high[1] && one->low[1] <= other->high[1] && crosses(b, i, k)) {
+                return true;
             }
+        }
+        looked += k - i;
+        if (looked > MOST_LOOKS) {
+            return true;
         }
     }
     return false;
@@ -199,41 +179,28 @@ static bool any_crosses(const borders *b) {
 
 static vsh_result borders_overlap(const vshi_patch *p, const frame *f, bool *overlaps, vsh_error *error) {
     borders b = {.patch = p, .frame = *f};
-    size_t passed = 0;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&b.sides, 3 * (size_t)p->count, sizeof *b.sides, what, error));
+    size_t count = 0;
+    for (uint32_t side = 0; side < 3 * p->count; ++side) {
+        count += p->beyond[side] == VSHI_NONE;
+    }
+    vsh_result result = VSH_OK;
+    VSHI_TRY(vshi_allocate((void **)&b.sides, count, sizeof *b.sides, what, error));
     for (uint32_t side = 0; side < 3 * p->count; ++side) {
         if (p->beyond[side] == VSHI_NONE) {
-            b.sides[b.count++] = side;
+            const double *end[2];
+            b.sides[b.count].side = side;
+            ends_of(&b, b.count, end);
+            for (int d = 0; d < 2; ++d) {
+                b.sides[b.count].low[d] = fmin(end[0][d], end[1][d]);
+                b.sides[b.count].high[d] = fmax(end[0][d], end[1][d]);
+            }
+            ++b.count;
         }
     }
     if (!p->kept) {
-        VSHI_TRY_DONE(holes_overlap(&b, overlaps, error));
-        if (*overlaps) {
-            goto done;
-        }
+        result = holes_overlap(&b, overlaps, error);
     }
-    b.cells = (uint32_t)sqrt((double)b.count) + 1;
-    const size_t cells = (size_t)b.cells * b.cells;
-    VSHI_TRY_DONE(vshi_allocate((void **)&b.begin, cells + 1, sizeof *b.begin, what, error));
-    for (uint32_t i = 0; i < b.count; ++i) {
-        passed += file_side(&b, i, false);
-    }
-    if (passed >= UINT32_MAX) { /* nothing that is laid out is like this */
-        *overlaps = true;
-        goto done;
-    }
-    for (size_t cell = 0; cell < cells; ++cell) {
-        b.begin[cell + 1] += b.begin[cell];
-    }
-    VSHI_TRY_DONE(vshi_allocate((void **)&b.list, passed, sizeof *b.list, what, error));
-    for (uint32_t i = 0; i < b.count; ++i) {
-        file_side(&b, i, true);
-    }
-    *overlaps = any_crosses(&b);
-done:
-    free(b.list);
-    free(b.begin);
+    *overlaps = *overlaps || any_crosses(&b);
     free(b.sides);
     return result;
 }

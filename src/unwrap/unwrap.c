@@ -1,5 +1,6 @@
 #include "base/floats.h"
 #include "base/memory.h"
+#include "mesh/mesh.h"
 #include "unwrap/pack.h"
 
 #include <stdlib.h>
@@ -104,6 +105,274 @@ static vsh_result make_items(const vshi_shapes *shapes, size_t mesh_count, const
     return VSH_OK;
 }
 
+/* --- pages: all charts go onto pages together, or the charts of each object onto a page of their own. Then
+ * pages are made as small as their charts allow. */
+
+/* Of factors of two objects' charts that are packed alike: scales of instances are roots of sums. */
+static const double SAME_FACTOR = 1e-9;
+
+/* Share of a page's texels that charts may touch for it to be tried: beside them is padding. */
+static const double MOST_TOUCHED = 0.98;
+
+enum {
+    UNITS = 1024,  /* of the job, for each group */
+    LEAST_SIDE = 4 /* texels of a page that is made to fit: blocks of compressed textures are as large */
+};
+
+/* Items that are packed together. */
+typedef struct group {
+    size_t first, count; /* items */
+    size_t mesh;         /* the first of its object */
+    size_t before;       /* the last group before whose first mesh is of the same shape, + 1; 0: none */
+    size_t alike;        /* an earlier group that it is packed as, + 1; 0: none */
+    size_t page, pages;  /* its first page, and how many */
+} group;
+
+typedef struct work {
+    const vsh_unwrap_options *options;
+    const vshi_shapes *shapes;
+    vshi_item *items;
+    size_t item_count;
+    vshi_item *own; /* [item_count]: those of a page that is made to fit */
+    group *groups;  /* [group_count] */
+    size_t group_count;
+    size_t *latest; /* [shape count]: the last group whose first mesh is of a shape, + 1; 0: none */
+    vshi_job *job;
+    vshi_pages *pages;
+    size_t room; /* of the pages' list */
+} work;
+
+static vshi_packing packing_of(const vsh_unwrap_options *o) {
+    return (vshi_packing){.width = o->width,
+                          .height = o->height,
+                          .padding = o->padding,
+                          .max_pages = (uint32_t)o->max_pages,
+                          .max_stretch = o->max_stretch,
+                          .density = o->texels_per_unit};
+}
+
+/* --- groups */
+
+static bool same_factor(double a, double b) {
+    return fabs(a - b) <= SAME_FACTOR * b;
+}
+
+/* Whether two groups have the same charts, in sizes that differ by one factor; by none where a density is
+ * asked for. */
+static bool are_alike(const work *w, const group *a, const group *b) {
+    const vshi_item *x = w->items + a->first, *y = w->items + b->first;
+    const double by = w->options->texels_per_unit > 0.0 ? 1.0 : x[0].factor / y[0].factor;
+    bool alike = a->count == b->count;
+    for (size_t i = 0; i < a->count && alike; ++i) {
+        alike = x[i].patch == y[i].patch && same_factor(x[i].factor, by * y[i].factor);
+    }
+    return alike;
+}
+
+static void add_object(work *w, size_t mesh, size_t first, size_t count) {
+    group *made = &w->groups[w->group_count];
+    size_t *latest = &w->latest[w->shapes->instances[w->items[first].mesh].shape];
+    *made = (group){.first = first, .count = count, .mesh = mesh, .before = *latest};
+    for (size_t g = *latest; g > 0 && made->alike == 0; g = w->groups[g - 1].before) {
+        const group *other = &w->groups[g - 1];
+        made->alike = other->alike == 0 && are_alike(w, made, other) ? g : 0;
+    }
+    *latest = ++w->group_count;
+}
+
+static void find_objects(work *w) {
+    const vshi_shapes *s = w->shapes;
+    for (size_t m = 0, item = 0; m < s->mesh_count;) {
+        const size_t end = m + vshi_mesh_object_size(s->meshes, m, s->mesh_count), first = item;
+        while (item < w->item_count && w->items[item].mesh < end) {
+            ++item;
+        }
+        if (item > first) {
+            add_object(w, m, first, item - first);
+        }
+        m = end;
+    }
+}
+
+/* --- pages */
+
+static vsh_result add_pages(work *w, group *g, const vshi_packing *packing, vsh_error *error) {
+    g->page = w->pages->count;
+    g->pages = packing->pages;
+    for (size_t i = 0; i < g->pages; ++i) {
+        VSHI_TRY(vshi_make_room((void **)&w->pages->list, w->pages->count, &w->room, sizeof *w->pages->list,
+                                "pages of an atlas", error));
+        w->pages->list[w->pages->count++] = (vsh_atlas_page){.width = packing->width,
+                                                             .height = packing->height,
+                                                             .texels_per_unit = packing->density,
+                                                             .first_mesh = UINT32_MAX};
+    }
+    for (size_t i = 0; i < g->count; ++i) {
+        w->items[g->first + i].at.page += (uint32_t)g->page;
+    }
+    return VSH_OK;
+}
+
+static vsh_result pack(work *w, group *g, vsh_error *error) {
+    vshi_packing packing = packing_of(w->options);
+    vsh_error why;
+    const vsh_result result = vshi_pack(&packing, w->items + g->first, g->count, w->job, UNITS, &why);
+    if (result == VSH_OK) {
+        return add_pages(w, g, &packing, error);
+    }
+    vsh_mesh named = w->shapes->meshes[g->mesh];
+    named.name = named.object_name != NULL ? named.object_name : named.name;
+    const bool own = result == VSH_ERROR_LIMIT && w->options->atlas == VSH_ATLAS_OBJECTS;
+    return vshi_fail(error, result, "%s%s%s", own ? vshi_mesh_label(&named, g->mesh).text : "",
+                     own ? ": " : "", why.message);
+}
+
+static vsh_result pack_alike(work *w, group *g, vsh_error *error) {
+    const group *as = &w->groups[g->alike - 1];
+    const vsh_atlas_page *page = &w->pages->list[as->page];
+    const vshi_packing packing = {.width = page->width,
+                                  .height = page->height,
+                                  .pages = (uint32_t)as->pages,
+                                  .density = page->texels_per_unit * w->items[as->first].factor /
+                                             w->items[g->first].factor};
+    for (size_t i = 0; i < g->count; ++i) {
+        w->items[g->first + i].at = w->items[as->first + i].at;
+        w->items[g->first + i].at.page -= (uint32_t)as->page;
+    }
+    return vshi_job_advance(w->job, UNITS) ? vshi_job_fail_cancelled(w->job, error)
+                                           : add_pages(w, g, &packing, error);
+}
+
+/* --- pages that fit */
+
+typedef struct page_size {
+    int32_t width, height;
+} page_size;
+
+static int compare_sizes(const void *a, const void *b) {
+    const page_size *x = a, *y = b;
+    const int64_t s = (int64_t)x->width * x->height, t = (int64_t)y->width * y->height;
+    return s != t ? (s > t) - (s < t) : (x->height > y->height) - (x->height < y->height);
+}
+
+/* Powers of two below a side, and the side itself. */
+static int list_sides(int32_t most, int32_t sides[32]) {
+    int count = 0;
+    for (int32_t side = LEAST_SIDE; side < most; side *= 2) {
+        sides[count++] = side;
+    }
+    sides[count++] = most;
+    return count;
+}
+
+enum { MOST_SIZES = 256 };
+
+/* Sizes of pages below the largest, by their texels: sides at most twice as long as each other, or that of
+ * the largest page. */
+static int list_sizes(const vsh_unwrap_options *o, page_size sizes[MOST_SIZES]) {
+    int32_t widths[32], heights[32];
+    const int columns = list_sides(o->width, widths), rows = list_sides(o->height, heights);
+    int count = 0;
+    for (int x = 0; x < columns; ++x) {
+        for (int y = 0; y < rows; ++y) {
+            const int32_t w = widths[x], h = heights[y];
+            const bool even = (w <= 2 * h || h == o->height) && (h <= 2 * w || w == o->width);
+            if (even && (w < o->width || h < o->height) && count < MOST_SIZES) {
+                sizes[count++] = (page_size){w, h};
+            }
+        }
+    }
+    qsort(sizes, (size_t)count, sizeof *sizes, compare_sizes);
+    return count;
+}
+
+/* Packs what lies on a page into the smallest in which it has room. */
+static vsh_result fit_page(work *w, const group *g, size_t number, vsh_error *error) {
+    vshi_item *own = w->own;
+    vsh_atlas_page *page = &w->pages->list[number];
+    page_size sizes[MOST_SIZES];
+    const int size_count = list_sizes(w->options, sizes);
+    size_t count = 0;
+    uint64_t touched = 0;
+    for (size_t i = g->first; i < g->first + g->count; ++i) {
+        if (w->items[i].at.page == number) {
+            own[count++] = w->items[i];
+            touched += w->items[i].at.touched;
+        }
+    }
+    bool fits = false;
+    for (int s = 0; s < size_count && !fits; ++s) {
+        vshi_packing packing = packing_of(w->options);
+        packing.width = sizes[s].width;
+        packing.height = sizes[s].height;
+        packing.max_pages = 1;
+        if ((double)touched > MOST_TOUCHED * packing.width * packing.height) {
+            continue;
+        }
+        VSHI_TRY(vshi_pack_one(&packing, own, count, w->job, &fits, error));
+        page->width = fits ? packing.width : page->width;
+        page->height = fits ? packing.height : page->height;
+    }
+    for (size_t i = g->first, k = 0; i < g->first + g->count && fits; ++i) {
+        if (w->items[i].at.page == number) {
+            w->items[i] = own[k++];
+            w->items[i].at.page = (uint32_t)number;
+        }
+    }
+    return VSH_OK;
+}
+
+/* --- all */
+
+static vsh_result pack_groups(work *w, vsh_error *error) {
+    for (size_t i = 0; i < w->group_count; ++i) {
+        group *g = &w->groups[i];
+        if (g->alike > 0) {
+            VSHI_TRY(pack_alike(w, g, error));
+            continue;
+        }
+        VSHI_TRY(pack(w, g, error));
+        for (size_t page = g->page; page < g->page + g->pages && w->options->fit_pages != 0; ++page) {
+            VSHI_TRY(fit_page(w, g, page, error));
+        }
+    }
+    return VSH_OK;
+}
+
+/* Gives each item its place, as the options have it: items are those of the meshes in their order, which are
+ * instances of shapes. The stage is "pack". */
+static vsh_result pack_pages(const vsh_unwrap_options *options, const vshi_shapes *shapes, vshi_item *items,
+                             size_t item_count, const vsh_run *run, vshi_pages *pages, vsh_error *error) {
+    const size_t mesh_count = shapes->mesh_count;
+    work w = {.options = options, .shapes = shapes, .items = items, .item_count = item_count, .pages = pages};
+    const vshi_packing packing = packing_of(options);
+    const vshi_array arrays[] = {VSHI_ARRAY(w.own, options->fit_pages != 0 ? item_count : 0),
+                                 VSHI_ARRAY(w.groups, mesh_count), VSHI_ARRAY(w.latest, shapes->count)};
+    vsh_result result;
+    *pages = (vshi_pages){NULL, 0};
+    VSHI_TRY_DONE(vshi_check_limit(run, vshi_pack_bytes(&packing, item_count), "packing charts", error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "pages of an atlas", error));
+    if (options->atlas == VSH_ATLAS_OBJECTS) {
+        find_objects(&w);
+    } else {
+        w.groups[w.group_count++] = (group){.count = item_count};
+    }
+    w.job = vshi_job_begin(run, "pack", UNITS * w.group_count);
+    if (w.job == NULL) {
+        result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", "pages of an atlas");
+        goto done;
+    }
+    result = pack_groups(&w, error);
+done:
+    vshi_job_end(w.job);
+    free(w.own);
+    free(w.latest);
+    free(w.groups);
+    return result;
+}
+
+/* --- all */
+
 vsh_result vsh_unwrap(const vsh_mesh *meshes, size_t mesh_count, const vsh_unwrap_options *options,
                       const vsh_run *run, vsh_atlas **atlas, vsh_error *error) {
     VSHI_FLOATS;
@@ -125,7 +394,7 @@ vsh_result vsh_unwrap(const vsh_mesh *meshes, size_t mesh_count, const vsh_unwra
     VSHI_TRY_DONE(check_memory(meshes, mesh_count, &shapes, &o, &full, error));
     VSHI_TRY_DONE(vshi_shapes_lay_out(&shapes, &o, &full, error));
     VSHI_TRY_DONE(make_items(&shapes, mesh_count, o.density, &items, &count, error));
-    VSHI_TRY_DONE(vshi_pages_pack(&o, &shapes, items, count, &full, &pages, error));
+    VSHI_TRY_DONE(pack_pages(&o, &shapes, items, count, &full, &pages, error));
     VSHI_TRY_DONE(vshi_atlas_make(&shapes, &pages, items, count, atlas, error));
 done:
     free(pages.list);

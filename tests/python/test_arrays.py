@@ -48,7 +48,7 @@ class NoCopy(Case):
                              shadow=at(output.visibility[0]))
                 return real.vsh_query_points(query, points, layout, run, output, stats, error)
 
-        real, vdbshade._points.lib = vdbshade._points.lib, Seen()
+        real, vdbshade._shading.lib = vdbshade._shading.lib, Seen()
         try:
             positions, normals = points_on_floor(50)
             out = dict(shadow=numpy.empty((1, 50), numpy.float32))
@@ -60,7 +60,7 @@ class NoCopy(Case):
             self.assertEqual((at(given["layout"].float_positions), given["layout"].position_stride), (address(vertices["position"]), 48))
             self.assertEqual((at(given["points"].normals), given["layout"].normal_stride), (address(vertices["normal"]), 48))
         finally:
-            vdbshade._points.lib = real
+            vdbshade._shading.lib = real
 
     def test_values_are_written_into_the_callers_arrays(self):
         charts, occluders = vdbshade.Charts(floor(), width=32, height=16), vdbshade.Occluders(box())

@@ -368,28 +368,6 @@ TEST(a_tree_narrowed_to_a_ball_has_the_same_bits_in_it) {
     assert_true(left_out > operations / 2); /* else it does not narrow */
 }
 
-TEST(many_places_at_once_are_as_one_by_one_in_deep_trees_too) {
-    enum { SHAPES = 100, POINTS = 70 };
-    vsh_sdf_node nodes[2 * SHAPES];
-    const uint8_t keep[2 * SHAPES] = {0};
-    double p[POINTS][3], at_once[POINTS];
-    for (int way = 0; way < 2; ++way) {
-        const vsh_sdf sdf = {nodes, random_tree(nodes, SHAPES, way == 0)};
-        for (int k = 0; k < POINTS; ++k) {
-            random_point(6.0, p[k]);
-        }
-        p[3][1] = INFINITY;
-        p[POINTS - 1][2] = NAN;
-        for (size_t count = 1; count <= POINTS; count += 23) {
-            vshi_sdf_distances_within(&sdf, keep, count, (const double(*)[3])p, at_once);
-            for (size_t k = 0; k < count; ++k) {
-                const double one = vsh_sdf_distance(&sdf, p[k]);
-                assert_true(memcmp(&one, &at_once[k], sizeof one) == 0 || (isnan(one) && isnan(at_once[k])));
-            }
-        }
-    }
-}
-
 int main(void) {
     return run_all_tests(NULL, NULL);
 }

@@ -4,7 +4,6 @@
 #include "testing.h"
 
 #include "mesh/edges.h"
-#include "mesh/solidity_parts.h"
 
 static const double ORIGIN[3] = {0, 0, 0};
 static const double LOW[3] = {-1, -1, -1}, HIGH[3] = {1, 1, 1};

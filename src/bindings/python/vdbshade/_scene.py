@@ -1,24 +1,195 @@
-"""Scenes: casters, lights and receivers as one description, of a file or of arguments; their settings."""
+"""Scenes and their bakes, flat scenes; lightmap UVs, lit assets and pages that show them; comparing bakes."""
 from __future__ import annotations
 
 import os
-from typing import Any, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy
 from numpy.typing import ArrayLike
 
 from . import types
-from ._arrays import array, transform as matrix, vector
-from ._calls import OUT, Handle, Run, ask, call
-from ._grid import Grid
-from ._library import Path, ffi, lib
-from ._light import Light, lights_of
-from ._lightmap import Charts
-from ._mesh import Mesh, Meshes, Model, meshes_of, rules_of
-from ._occluders import Heights, Occluders, Spheres, Triangles
-from ._shapes import Sdf, Solids
-from ._structs import Filled, Struct, path_of, texts_of, told
-from ._unwrap import Atlas
+from ._arrays import array, borrowed, output, pointer, transform as matrix, vector
+from ._calls import OUT, ask, call, Handle, index_of, note, Run
+from ._casters import (Attributes, attributes_of, distances_at, Grid, Heights, Light, lights_of, Mesh, Meshes, meshes_of, Model,
+                       Occluders, optional, Outline, rules_of, Sdf, Solids, Spheres, Triangles)
+from ._library import ffi, lib, Path, text, Unpack
+from ._shading import Charts, Planes
+from ._structs import constant, Filled, keep, pairs_of, path_of, Struct, struct_of, structs_of, texts_of, told, words_of_bits
+from ._tables import WORDS
+
+# --- lightmap UVs, assets with their light, and pages that show them
+
+
+class AtlasMesh:
+    """One mesh as it lies in the atlas; arrays are views.
+
+    Attributes
+    ----------
+    uvs : array of float32, shape (vertices, 2)
+        0 … 1 of the chart's page, v up
+    sources : array of uint32, shape (vertices,)
+        the vertex of the mesh that each is a copy of
+    indices : array of uint32, shape (triangles, 3)
+        the mesh's triangles in their order
+    charts : array of uint32, shape (triangles,)
+        2^32 - 1: of a triangle without area
+    """
+
+    def __init__(self, struct: Any, owner: Any) -> None:
+        self.struct = struct
+        n, m = struct.vertex_count, struct.triangle_count
+        self.uvs = borrowed(struct.uvs, (n, 2), numpy.float32, owner)
+        self.sources = borrowed(struct.sources, (n,), numpy.uint32, owner)
+        self.indices = borrowed(struct.indices, (m, 3), numpy.uint32, owner)
+        self.charts = borrowed(struct.charts, (m,), numpy.uint32, owner)
+
+    def of(self, mesh: Mesh) -> Mesh:
+        """The mesh that it was made of, with the atlas's vertices and UVs."""
+        normals = None if mesh.normals is None else mesh.normals[self.sources]
+        return Mesh(mesh.positions[self.sources], self.indices, normals=normals, uvs=self.uvs, transform=mesh.transform,
+                    name=mesh.name or "mesh", object_name=mesh.object_name, object=mesh.object, solidity=mesh.solidity, alpha=mesh.alpha,
+                    one_sided=mesh.one_sided, material_name=mesh.material_name, mask=mesh.mask,
+                    mask_uvs=None if mesh.mask_uvs is None else mesh.mask_uvs[self.sources])
+
+
+class Atlas(Handle, kind="vsh_atlas"):
+    """Charts of meshes, packed into pages. A sequence of AtlasMesh."""
+
+    info: types.AtlasInfo
+
+    @property
+    def pages(self) -> int:
+        return ask(lib.vsh_atlas_page_count, self)
+
+    def page(self, index: int) -> types.AtlasPage:
+        """What a page comes to: its size (texels), texels_per_unit, share that is covered, first mesh."""
+        return ask(lib.vsh_atlas_page_view, self, index_of(index, self.pages, "page", "the atlas has"))
+
+    @property
+    def charts(self) -> List[types.AtlasChart]:
+        """All charts: page, mesh, stretch, area and the texels that each touches."""
+        charts = lib.vsh_atlas_charts(self.handle)
+        return [told(charts[i]) for i in range(lib.vsh_atlas_chart_count(self.handle))]
+
+    def __len__(self) -> int:
+        return ask(lib.vsh_atlas_mesh_count, self)
+
+    def __getitem__(self, index: int) -> AtlasMesh:
+        view = lib.vsh_atlas_mesh_view(self.handle, index_of(index, len(self), "mesh", "the atlas has"))
+        return AtlasMesh(ffi.new("vsh_atlas_mesh *", view), self.handle)
+
+
+def unwrap(meshes: Meshes, *, density: Optional[ArrayLike] = None, run: Optional[Run] = None,
+           **options: "Unpack[types.UnwrapOptions]") -> Atlas:
+    """Cuts meshes into charts, lays them out flat, and packs them into pages.
+
+    Parameters
+    ----------
+    density : array of float64, shape (meshes,), optional
+        factors of texels_per_unit
+    **options
+        vdbshade.types.UnwrapOptions: width, height (texels of a page), max_pages, padding, texels_per_unit (0: the most
+        that fit), max_stretch, keep_uvs ("always" lays out anew, "keep" keeps UVs that can serve), atlas
+        ("shared", or "objects": each has a page of its own), fit_pages (pages no larger than they need be)
+    """
+    structs, count = meshes_of(meshes)
+    factors = None if density is None else array(density, numpy.float64, (count,), "density")
+    return Atlas(call(lib.vsh_unwrap, structs, count, Filled("vsh_unwrap_options", options, density=factors), OUT, run=run))
+
+
+class LitImage(Struct, kind="vsh_lit_image"):
+    """An image of one page for one purpose.
+
+    Parameters
+    ----------
+    purpose : str
+        "occlusion", "lightmap" or "preview"
+    image : bytes or array of float32, shape (height, width) or (height, width, 3)
+        a PNG file's bytes, or linear planes, row 0 on top
+    page : int
+    **options
+        vdbshade.types.LitImage: bits, intensity
+    """
+
+    def __init__(self, purpose: str, image: Union[bytes, ArrayLike], page: int = 0, *, bits: int = 0, intensity: float = 0.0) -> None:
+        filled = Filled("vsh_lit_image", purpose=purpose, page=page, bits=bits, intensity=intensity)
+        self.struct = filled.struct
+        if isinstance(image, bytes):
+            filled.fill(dict(png=ffi.from_buffer(image), png_size=len(image)))
+            return
+        planes = numpy.asarray(image)
+        if planes.ndim == 2:
+            planes = planes[:, :, None]
+        if planes.ndim != 3 or planes.shape[2] not in (1, 3):
+            raise ValueError(f"image: expected shape (height, width) or (height, width, 3), got {planes.shape}")
+        pointers = [pointer(array(planes[:, :, c], numpy.float32, planes.shape[:2], "image")) for c in range(planes.shape[2])]
+        filled.fill(dict(height=planes.shape[0], width=planes.shape[1], channel_count=len(pointers),
+                         channels=keep(ffi.new("float *[]", pointers), pointers)))
+
+
+def lit_write(output: Path, model: Model, images: Sequence[LitImage], *, path: Optional[Path] = None,
+              atlas: Optional[Atlas] = None, uv_sets: Optional[Sequence[int]] = None, image_place: str = "auto",
+              run: Optional[Run] = None) -> None:
+    """Writes a .glb or .gltf with its light (docs/lit.md).
+
+    Parameters
+    ----------
+    model : Model
+        what was read of `path`
+    images : sequence of LitImage
+    path : path, optional
+        the model's file: a glTF is given back as it was; None: a document is made of the model
+    atlas : Atlas, optional
+        new UVs of the model's meshes; None: they have their lightmap in a set of their own
+    uv_sets : sequence of int, optional
+        without an atlas: the set of each mesh; -1: it stays unlit; None: as Model.mesh() takes it
+    image_place : str
+        "auto", "embed", "beside"
+    """
+    if not isinstance(model, Model):
+        raise TypeError(f"model: expected a vdbshade.Model, got {type(model).__name__}")
+    options = Filled("vsh_lit_options", image_place=image_place, images=images)
+    meshes = None
+    if atlas is not None:
+        if len(atlas) != len(model):
+            raise ValueError(f"atlas: of {len(atlas)} meshes, the model has {len(model)}")
+        charts = atlas.charts
+        options.fill(dict(chart_pages=ffi.new("uint32_t[]", [chart.page for chart in charts] or 1), chart_count=len(charts)))
+        meshes = [{name: getattr(atlas[i].struct, name) for name in ("uvs", "sources", "indices", "charts", "vertex_count", "triangle_count")}
+                  for i in range(len(model))]
+    elif uv_sets is not None:
+        if len(uv_sets) != len(model):
+            raise ValueError(f"uv_sets: {len(uv_sets)} of {len(model)} meshes")
+        meshes = [dict(sources=numpy.arange(len(mesh.positions), dtype=numpy.uint32), vertex_count=len(mesh.positions),
+                       indices=mesh.indices, triangle_count=len(mesh.indices), uv_set=uv_set) for mesh, uv_set in zip(model, uv_sets)]
+    call(lib.vsh_lit_write, None if path is None else path_of(path, "path"), model,
+         None if meshes is None else structs_of("vsh_lit_mesh", meshes), options, path_of(output, "output"), run=run)
+
+
+def lit_is_output(path: Path) -> bool:
+    """Whether a path ends as a file that lit_write() writes."""
+    return bool(ask(lib.vsh_lit_is_output, path_of(path, "path")))
+
+
+def view_write(path: Path, model: Path, planes: Any = (), *, uv_set: int = -1,
+               name: Optional[str] = None, other: "Optional[types.ViewBake]" = None, run: Optional[Run] = None) -> None:
+    """Writes one HTML page that shows a baked mesh in a browser (docs/view.md).
+
+    Parameters
+    ----------
+    model : path
+        the mesh's file
+    planes : path or sequence of paths
+        image files of its bake, one a page; none: its light is in its materials
+    other : dict, optional
+        a second bake beside it: model, planes, uv_set, name
+    """
+    first = Filled("vsh_view_bake", model=model, planes=planes, uv_set=uv_set, name=name)
+    second = None if other is None else Filled("vsh_view_bake", other)
+    call(lib.vsh_view_write, path_of(path, "path"), first, second, run=run)
+
+
+# --- scenes and their settings
 
 
 def settings() -> List[types.Setting]:
@@ -218,7 +389,6 @@ class Scene(SceneFile, kind="vsh_scene"):
 
     def bake(self, *, run: Optional[Run] = None, **options: Any) -> Any:
         """Bakes its lightmaps into arrays: a list of SceneLightmap; options of bake_scene()."""
-        from ._bake_scene import bake_scene
         return bake_scene(self, arrays=True, run=run, **options).lightmaps
 
 
@@ -304,3 +474,404 @@ class Assets(Handle, kind="vsh_assets"):
             filled.fill({name: None if corner is None else vector(corner, 3, name)})
         return Occluders._of(call(lib.vsh_scene_occluders, self.scene, self, filled, OUT, run=run,
                                   keeps=(self.handle, self.scene, filled.keeps)))
+
+
+# --- baking a scene, whole or in parts; where outputs come from, and who parses files
+
+
+class SceneLightmap(Planes):
+    """A lightmap of a scene: planes by their channels' names, "shadow.sun", "ao", "irradiance.R", "A": arrays of float32 of
+    shape (height, width), row 0 at v = 1.
+
+    Attributes
+    ----------
+    told : vdbshade.types.SceneLightmap
+        its receiver, output, page and counts
+    """
+
+    told: types.SceneLightmap
+
+
+class SceneBake:
+    """A bake's results.
+
+    Attributes
+    ----------
+    report : vdbshade.types.BakeReport
+        times, texels, rays; `errors` is a list of vdbshade.types.BakeError: of each light, of AO, of the sky
+    lightmaps : list of SceneLightmap
+        empty if files were written
+    """
+
+    def __init__(self, report: types.BakeReport, lightmaps: List[SceneLightmap]) -> None:
+        self.report, self.lightmaps = report, lightmaps
+
+
+class _Rows:
+    """Receives rows, in the thread that bakes."""
+
+    def __init__(self) -> None:
+        self.maps: List[SceneLightmap] = []
+        self.raised: Optional[BaseException] = None
+
+
+_FAILED = 9  # VSH_ERROR_INTERNAL: bake_scene() raises the exception instead
+
+
+@ffi.callback("vsh_result(void *, vsh_scene_lightmap *, vsh_image *, int32_t, int32_t, float **, vsh_error *)", error=_FAILED,
+              onerror=note)
+def _add_rows(user: Any, lightmap: Any, image: Any, first: int, count: int, planes: Any, error: Any) -> int:
+    running = ffi.from_handle(user)
+    names = [ffi.string(image.names[i]).decode() for i in range(image.channel_count)]
+    if first == 0:
+        shape = (lightmap.height, lightmap.width)
+        running.maps.append(SceneLightmap((name, numpy.empty(shape, numpy.float32)) for name in names))
+        running.maps[-1].told = told(lightmap)
+        running.maps[-1].told.meshes = None
+    for i, name in enumerate(names):
+        plane = running.maps[-1][name]
+        given = numpy.frombuffer(ffi.buffer(planes[i], 4 * count * plane.shape[1]), numpy.float32)
+        plane[first : first + count] = given.reshape(count, -1)
+    return 0
+
+
+def _bake(function: Any, scene: Scene, arrays: bool, run: Optional[Run], options: Mapping[str, Any], **more: Any) -> SceneBake:
+    rows = _Rows()
+    filled = Filled("vsh_bake_options", options, **more)
+    if arrays:
+        filled.fill(dict(rows=_add_rows, user=ffi.new_handle(rows)))
+    errors = ffi.new("vsh_bake_error[]", scene.struct.light_count + 2 if isinstance(scene, Scene) else 2)
+    report = ffi.new("vsh_bake_report *", {"errors": errors})
+    call(function, scene, filled, report, run=run, watched=rows)
+    made = told(report)
+    made.errors = [told(errors[i]) for i in range(len(errors))]
+    return SceneBake(made, rows.maps)
+
+
+def bake_scene(scene: Scene, *, arrays: bool = False, files: Sequence[Any] = (), words: Sequence[str] = (),
+               run: Optional[Run] = None, **options: Any) -> SceneBake:
+    """Bakes a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    arrays : bool
+        return the lightmaps as arrays; False: write files at the receivers' outputs
+    files : sequence of paths, optional
+        inputs that outputs name, beside those of the scene
+    words : sequence of str, optional
+        stored in a part (part_words())
+    **options
+        vdbshade.types.BakeOptions: scratch, invalid_picture, lit_preview, shard, shard_count, parts (a part of a
+        bake that machines share), …
+    """
+    if isinstance(words, str):
+        raise TypeError("words: expected a list of str, got str")
+    return _bake(lib.vsh_bake_scene, scene, arrays, run, options, files=files, words=words)
+
+
+def merge_scene(scene: Scene, *, arrays: bool = False, files: Sequence[Any] = (), run: Optional[Run] = None,
+                **options: Any) -> SceneBake:
+    """Merges the parts of all shards that bake_scene() wrote for this scene and these options (`parts`, `shard_count`; 0: as
+    many as there are). The result has the same bits as one bake."""
+    return _bake(lib.vsh_merge_scene, scene, arrays, run, options, files=files)
+
+
+def forecast_scene(scene: Scene, *, run: Optional[Run] = None, **options: Any) -> types.BakeForecast:
+    """Forecasts texels, voxels and memory of bake_scene()."""
+    return call(lib.vsh_forecast_scene, scene, Filled("vsh_bake_options", options), OUT, run=run)
+
+
+def part_words(parts: Path, shard_count: int = 0, *, run: Optional[Run] = None) -> List[str]:
+    """The words that were kept in the first part that is there, of `shard_count` shards (0: as many as there are). A part is
+    whatever somebody has put there: words are text that its writer chose."""
+    words, count = call(lib.vsh_part_words, path_of(parts, "parts"), shard_count, OUT, OUT, run=run)
+    owned = ffi.gc(words, lib.vsh_part_words_free)
+    return [text(owned[i]) or "" for i in range(count)]
+
+
+def version() -> str:
+    """The library's, "0.2.0"."""
+    return ask(lib.vsh_version)
+
+
+def isa_available(isa: str) -> bool:
+    """Whether this machine has an instruction set: "base", "avx2", "avx512"."""
+    return bool(lib.vsh_isa_available(constant("VSH_ISA_", isa, "isa")))
+
+
+def file_digest(path: Path, *, run: Optional[Run] = None) -> str:
+    """SHA-256 of a file's bytes, 64 hexadecimal digits."""
+    digest = ffi.new("char[65]")
+    call(lib.vsh_file_digest, path_of(path, "path"), digest, run=run)
+    return ffi.string(digest).decode()
+
+
+def reader_confinement(*, run: Optional[Run] = None) -> List[str]:
+    """How the reader that parses files is confined here: of "limits", "calls", "files"."""
+    return words_of_bits("VSH_CONFINED_", call(lib.vsh_reader_confinement, OUT, run=run))
+
+
+def provenance(scene: Optional[Scene] = None, *, files: Sequence[Path] = (), command: Optional[str] = None,
+               voxel_size: float = 0.0, attributes: Optional[Attributes] = None, has_triangles: bool = False, lightmap: bool = False,
+               run: Optional[Run] = None) -> Dict[str, str]:
+    """Describes how an output was made, as lines of text that it carries: version, methods, lights, hashes of inputs."""
+    source = Filled("vsh_provenance_source", command=command, voxel_size=voxel_size, has_triangles=has_triangles, lightmap=lightmap,
+                    files=files, attributes=attributes_of(attributes), scene=scene)
+    made = call(lib.vsh_provenance_create, source, OUT, run=run)
+    count = ffi.new("size_t *")
+    return pairs_of(lib.vsh_provenance_attributes(made, count), count[0])
+
+
+def provenance_max_error(attributes: Mapping[str, str], channel: str) -> float:
+    """The standard error that a channel was made to, as a file's attributes say; NaN where they don't."""
+    lines = attributes_of(attributes)
+    return ask(lib.vsh_provenance_max_error, structs_of("vsh_attribute", lines), len(lines), channel)
+
+
+# --- flat scenes: light maps of a plane
+
+
+def flat_bake(casters: Optional[Outline], lights: Union[Light, Sequence[Light]] = (), *, irradiance: bool = False,
+              out: Optional[Mapping[str, numpy.ndarray]] = None, run: Optional[Run] = None,
+              **options: "Unpack[types.FlatOptions]") -> Dict[str, numpy.ndarray]:
+    """Bakes a light map of a plane.
+
+    Parameters
+    ----------
+    casters : Outline, optional
+        None: an empty plane
+    lights : Light or sequence of Light
+        third components are ignored
+    irradiance : bool
+        "irradiance.R", ".G", ".B" too
+    **options
+        vdbshade.types.FlatOptions: width, height, region_min, region_max, method, supersample, padding
+
+    Returns
+    -------
+    dict
+        arrays of float32 of shape (height, width), row 0 on top: "shadow.NAME" of each light, "A" (coverage)
+    """
+    return _bake_flat(casters, *lights_of(lights), Filled("vsh_flat_options", options).struct, irradiance, out, run)
+
+
+def _bake_flat(casters: Optional[Outline], structs: Any, count: int, options: Any, irradiance: bool,
+          out: Optional[Mapping[str, numpy.ndarray]], run: Optional[Run]) -> Dict[str, numpy.ndarray]:
+    names = [f"shadow.{ffi.string(structs[i].name).decode()}" for i in range(count)]
+    wanted = names + ["A"] + ([f"irradiance.{c}" for c in "RGB"] if irradiance else [])
+    unknown = set(out or {}) - set(wanted)
+    if unknown or len(set(names)) != len(names):
+        raise ValueError(f"out {sorted(unknown)}: there are {', '.join(wanted)}" if unknown else "lights: two of one name")
+    shape = (max(options.height, 0), max(options.width, 0))
+    if max(shape) > 65536:
+        shape = (0, 0)  # refused by the library, which says why
+    planes = {n: output((out or {}).get(n), numpy.float32, shape, f"out[{n!r}]") for n in wanted}
+    shadow = ffi.new("float *[]", [pointer(planes[n]) for n in names] or 1)
+    colour = ffi.new("float *[3]", [pointer(planes[f"irradiance.{c}"]) for c in "RGB"]) if irradiance else ffi.NULL
+    target = ffi.new("vsh_flat_map *", [shadow, colour, pointer(planes["A"])])
+    call(lib.vsh_flat_bake, optional(casters, "vsh_outline", "casters"), structs, count, options, target, run=run)
+    return planes
+
+
+def flat_visibility(casters: Optional[Outline], light: Light, points: ArrayLike) -> numpy.ndarray:
+    """The share of a light that points (n, 2) see, exactly: float64 of shape (n,)."""
+    outline, struct = optional(casters, "vsh_outline", "casters"), struct_of(light, ffi.typeof("vsh_light"))
+    return distances_at(lambda shape, at: lib.vsh_flat_visibility(shape, struct, at), outline, points, 2, "points")
+
+
+def flat_light_name(type: int) -> Optional[str]:
+    """What a light of a type's number is in a plane: "directional", "disc", "spot"; None where there is none."""
+    return ask(lib.vsh_get_name, lib.VSH_NAMES_FLAT_LIGHT, type)
+
+
+class FlatScene(SceneFile, kind="vsh_flat_scene"):
+    """A flat scene's file (docs/flat.md); settings by the names of `vdbshade flat`'s options."""
+
+    def __init__(self, path: Path, *, run: Optional[Run] = None, **settings: Any) -> None:
+        self._read(lib.vsh_flat_scene_read, path_of(path, "path"), run)
+        for name, value in settings.items():
+            self.set(name, value)
+
+    def set(self, name: str, value: Any) -> None:
+        """Sets what a setting's key or option says."""
+        known_settings(name, ("flat",))
+        call(lib.vsh_flat_scene_set, self, option_of(name), self._filled.text(setting_text(value), name))
+
+    @property
+    def shape(self) -> Tuple[int, int]:
+        return self.struct.options.height, self.struct.options.width
+
+    def casters(self, *, run: Optional[Run] = None) -> Optional[Outline]:
+        """The union of its casters; None where it has none."""
+        return Outline._of(call(lib.vsh_flat_scene_casters, self, OUT, run=run))
+
+    def bake(self, *, irradiance: bool = True, run: Optional[Run] = None) -> Dict[str, numpy.ndarray]:
+        """As flat_bake()."""
+        return _bake_flat(self.casters(run=run), self.struct.lights, self.struct.light_count, ffi.addressof(self.struct, "options"),
+                     irradiance, None, run)
+
+
+# --- comparing baked values with golden ones
+
+
+MEASURES = tuple(WORDS["VSH_MEASURE_"])
+
+
+class Measures(types.Measures):
+    """Differences of values from golden ones. `value` is a dict of "nonfinite", "shift", "penumbra", "lost", "gained", "rmse",
+    "p99" and "max"; NaN if a measure does not apply."""
+
+    value: Dict[str, float]  # type: ignore[assignment]
+    _struct: Any
+
+
+def _measures(struct: Any) -> Measures:
+    found = Measures(**told(struct).__dict__)
+    found.value = dict(zip(MEASURES, struct.value))
+    found._struct = ffi.new("vsh_measures *", struct)
+    return found
+
+
+def _failed(bits: int) -> List[str]:
+    return [name for i, name in enumerate(MEASURES) if bits >> i & 1]
+
+
+def _compared(golden: ArrayLike, values: ArrayLike, mask: Optional[ArrayLike]) -> Filled:
+    shape = numpy.shape(golden)
+    if len(shape) not in (2, 3):
+        raise ValueError(f"golden: expected shape (height, width) or (depth, height, width), got {shape}")
+    if max(shape, default=0) >= 2**31:
+        raise ValueError(f"golden: {shape}: too large")
+    return Filled("vsh_compared", size=list(reversed(shape)) + [1] * (3 - len(shape)), golden=array(golden, numpy.float32, shape, "golden"),
+                  values=array(values, numpy.float32, shape, "values"),
+                  mask=None if mask is None else array(mask, numpy.uint8, shape, "mask"))
+
+
+def compare(golden: ArrayLike, values: ArrayLike, mask: Optional[ArrayLike] = None, *, run: Optional[Run] = None,
+            **options: "Unpack[types.CompareOptions]") -> Measures:
+    """Measures how far values are from golden ones.
+
+    Parameters
+    ----------
+    golden, values : array of float32, shape (height, width) or (depth, height, width)
+    mask : array of bool or uint8, of that shape, optional
+        compared where it is not 0
+    **options
+        vdbshade.types.CompareOptions
+    """
+    measures = ffi.new("vsh_measures *")
+    call(lib.vsh_compare, _compared(golden, values, mask), Filled("vsh_compare_options", options), measures, run=run)
+    return _measures(measures[0])
+
+
+def compare_coverage(golden: Optional[ArrayLike], values: Optional[ArrayLike]) -> Tuple[types.Coverage, numpy.ndarray]:
+    """Compares two planes of coverage (covered above 1/2; None: everywhere), and where both are covered: uint8 of their shape."""
+    planes = [None if p is None else numpy.asarray(p) for p in (golden, values)]
+    shape = next((p.shape for p in planes if p is not None), None)
+    if shape is None:
+        raise TypeError("golden, values: expected an array for one of them")
+    given = [None if p is None else array(p, numpy.float32, shape, "coverage") for p in planes]
+    mask = numpy.empty(shape, numpy.uint8)
+    return ask(lib.vsh_compare_coverage, mask.size, *given, mask, OUT), mask
+
+
+def compare_accuracy(truths: Sequence[ArrayLike], values: Sequence[ArrayLike], masks: Optional[Sequence[ArrayLike]] = None, *,
+                     run: Optional[Run] = None) -> types.Accuracy:
+    """How far planes of values, 0 … 1, are from their truths, together."""
+    if len(truths) != len(values) or (masks is not None and len(masks) != len(values)):
+        raise ValueError(f"expected as many truths as values and masks, got {len(truths)} and {len(values)}")
+    parts = [_compared(t, v, None if masks is None else masks[i]) for i, (t, v) in enumerate(zip(truths, values))]
+    return call(lib.vsh_compare_accuracy, structs_of("vsh_compared", parts), len(parts), OUT, run=run)
+
+
+class Limits:
+    """What a channel is allowed: `value` is a dict by measures' names; members of `options` as of compare().
+
+    Parameters
+    ----------
+    noise : float
+        standard error that the differences may have by sampling, in units of the range
+    **values
+        limits: rmse=0.01, shift=0.2, …
+    """
+
+    def __init__(self, *, noise: float = 0.0, **values: float) -> None:
+        self.struct = ffi.new("vsh_limits *")
+        self.struct[0] = lib.vsh_limits_default()
+        if noise:
+            lib.vsh_limits_allow_noise(self.struct, noise)
+        for name, value in values.items():
+            self.struct.value[constant("VSH_MEASURE_", name, "measure")] = value
+
+    @property
+    def value(self) -> Dict[str, float]:
+        return dict(zip(MEASURES, self.struct.value))
+
+
+def compare_judge(measures: Measures, limits: Optional[Limits] = None) -> List[str]:
+    """Names of the measures that do not hold; none: they are alike."""
+    return _failed(ask(lib.vsh_compare_judge, measures._struct, (limits or Limits()).struct))
+
+
+class Tolerances(Handle, kind="vsh_tolerances"):
+    """Limits from a JSON file (docs/regression.md)."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(call(lib.vsh_tolerances_read, path_of(path, "path"), OUT))
+
+    def limits(self, channel: str) -> Tuple[Limits, float]:
+        """What it says of a channel, and the share of covered texels that may differ (NaN: nothing)."""
+        limits, coverage = Limits(), ffi.new("double *", float("nan"))
+        ask(lib.vsh_tolerances_apply, self, channel, limits.struct, coverage)
+        return limits, coverage[0]
+
+
+class Comparison:
+    """What came of comparing two files.
+
+    Attributes
+    ----------
+    alike : bool
+    channels : list of vdbshade.types.ChannelComparison
+        `failed` are names of measures
+    problems : list of str
+    """
+
+    def __init__(self, cdata: Any) -> None:
+        self.alike = bool(lib.vsh_comparison_alike(cdata))
+        self.channels: List[types.ChannelComparison] = []
+        self.problems: List[str] = []
+        while lib.vsh_comparison_channel(cdata, len(self.channels)) != ffi.NULL:
+            struct = lib.vsh_comparison_channel(cdata, len(self.channels))[0]
+            channel = told(struct)
+            channel.measures, channel.failed = _measures(struct.measures), _failed(struct.failed)
+            self.channels.append(channel)
+        while True:
+            problem = ask(lib.vsh_comparison_problem, cdata, len(self.problems))
+            if problem is None:
+                break
+            self.problems.append(problem)
+
+    def __bool__(self) -> bool:
+        return self.alike
+
+    def __repr__(self) -> str:
+        return f"<vdbshade.Comparison: {'alike' if self.alike else 'not alike'}, {len(self.channels)} channels, problems {self.problems}>"
+
+
+def compare_files(golden: Path, fresh: Path, *, limits: Optional[Mapping[str, float]] = None,
+                  run: Optional[Run] = None, **options: "Unpack[types.CompareFilesOptions]") -> Comparison:
+    """Compares two images channel by channel, or two .vdb files grid by grid.
+
+    Parameters
+    ----------
+    limits : mapping, optional
+        by measures' names, of all channels
+    **options
+        vdbshade.types.CompareFilesOptions: tolerances, coverage, noise, padding, …
+    """
+    filled = Filled("vsh_compare_files_options", options)
+    for name, value in (limits or {}).items():
+        filled.struct.limits[constant("VSH_MEASURE_", name, "limits")] = value
+    return Comparison(call(lib.vsh_compare_files, path_of(golden, "golden"), path_of(fresh, "fresh"), filled, OUT, run=run))

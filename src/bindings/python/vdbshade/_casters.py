@@ -1,0 +1,943 @@
+"""Casters and lights: meshes and models, shapes and outlines, level sets, occluders and their parts."""
+from __future__ import annotations
+
+from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple, Union
+
+import numpy
+from numpy.typing import ArrayLike
+
+from . import types
+from ._arrays import array, borrowed, output, pointer, transform as matrix
+from ._calls import OUT, ask, call, Handle, index_of, note, Run, Several
+from ._library import ffi, lib, Path, Unpack
+from ._structs import constant, Filled, keep, path_of, split, Struct, struct_of, structs_of, told
+
+# --- lights
+
+
+class Light(Struct, kind="vsh_light"):
+    """A light. What a type does not name is ignored; a size of 0 is a hard light.
+
+    Parameters
+    ----------
+    type : str
+        "directional" (direction, angle), "sphere" (position, radius), "spot" (position, radius, axis, inner_angle,
+        outer_angle) or "rectangle" (position, edge_u, edge_v, two_sided)
+    **options
+        members of ``vsh_light`` (vdbshade.types.Light): lengths in world units, angles in radians. `direction` points
+        towards the light, `angle` is its angular diameter; `color` is linear RGB times intensity.
+
+    Examples
+    --------
+    >>> Light("directional", direction=(0.4, 0.8, 0.3), angle=0.03, name="sun")
+    <vdbshade.Light sun: directional …>
+    """
+
+    def __init__(self, type: str = "directional", **options: "Unpack[types.Light]") -> None:
+        self.struct = Filled("vsh_light", options, type=type).struct
+        call(lib.vsh_light_check, self)
+
+    @classmethod
+    def _of(cls, struct: Any) -> "Light":
+        self = cls.__new__(cls)
+        self.struct = ffi.new("vsh_light *", struct)
+        return self
+
+    def __repr__(self) -> str:
+        text = ffi.new("char[]", 256)
+        lib.vsh_light_text(self.struct, text, 256)
+        return f"<vdbshade.Light {self.name}: {ffi.string(text).decode()}>"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Light) and told(self.struct) == told(other.struct)
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def lights_of(given: Union[Light, Sequence[Light]], name: str = "lights") -> Tuple[Any, int]:
+    """Lights as C takes them: ``vsh_light[]`` and how many."""
+    lights = [given] if isinstance(given, Light) else list(given)
+    if not all(isinstance(light, Light) for light in lights):
+        raise TypeError(f"{name}: expected a vdbshade.Light, or several in a list")
+    return structs_of("vsh_light", lights), len(lights)
+
+
+def lights_read(path: Path, angle: float, radius: float, unit: float = 0.0, *, run: Optional[Run] = None) -> List[Light]:
+    """The lights of a glTF's file as those of a scene, which have sizes.
+
+    Parameters
+    ----------
+    angle : float
+        of directional ones, angular diameter, radians
+    radius : float
+        of points, which become spheres, and spots, world units
+    unit : float
+        of the file's numbers, metres; 0: as it says itself
+    """
+    lights, count = call(lib.vsh_lights_read, path_of(path, "path"), angle, radius, unit, OUT, OUT, run=run)
+    return [Light._of(lights[i]) for i in range(count)]
+
+
+# --- triangle meshes: arrays of the caller's, and models read from files
+
+
+class AlphaMask(Struct, kind="vsh_alpha_mask"):
+    """Where a mesh is cut out by a texture: light comes through where base_alpha × alpha, looked up bilinearly, is below
+    alpha_cutoff.
+
+    Parameters
+    ----------
+    alpha : array of uint8, shape (height, width)
+        255 is 1, row 0 on top (v = 1); used as it is where it is C-contiguous
+    wrap : pair of str
+        along u and v, where UVs leave 0 … 1: "repeat", "mirror", "clamp"
+    uv_transform : array of float64, shape (2, 3), optional
+        looked up at u' = a u + b v + c, v' = d u + e v + f; None: at u, v
+    alpha_cutoff : float
+        ≥ 0
+    base_alpha : float
+        0 … 1
+    """
+
+    def __init__(self, alpha: ArrayLike, *, wrap: Sequence[str] = ("repeat", "repeat"), uv_transform: Optional[ArrayLike] = None,
+                 alpha_cutoff: float = 0.5, base_alpha: float = 1.0) -> None:
+        self.alpha = array(alpha, numpy.uint8, (None, None), "alpha")
+        moved = array([[1.0, 0, 0], [0, 1, 0]] if uv_transform is None else uv_transform, numpy.float64, (2, 3), "uv_transform")
+        if max(self.alpha.shape) >= 2**31 or len(wrap) != 2:
+            raise ValueError("alpha: too large" if len(wrap) == 2 else f"wrap: expected 2 words, got {len(wrap)}")
+        height, width = self.alpha.shape
+        self.struct = Filled("vsh_alpha_mask", alpha=self.alpha, width=width, height=height, wrap=wrap, uv_transform=moved.flat,
+                             alpha_cutoff=alpha_cutoff, base_alpha=base_alpha).struct
+
+    @classmethod
+    def _view(cls, given: Any, owner: Any) -> "AlphaMask":
+        self = cls.__new__(cls)
+        self.struct, self._owner = ffi.new("vsh_alpha_mask *", given), owner
+        self.alpha = borrowed(given.alpha, (given.height, given.width), numpy.uint8, owner)
+        return self
+
+    @property
+    def uv_transform(self) -> numpy.ndarray:
+        return numpy.array(list(self.struct.uv_transform)).reshape(2, 3)
+
+
+class Mesh(Struct, kind="vsh_mesh"):
+    """A triangle mesh: a view of arrays, which are not copied where they are as below. They must not change while it
+    is used.
+
+    Parameters
+    ----------
+    positions : array of float32, shape (vertices, 3)
+        local units, finite
+    indices : array of uint32, shape (triangles, 3)
+        each below the number of vertices, anticlockwise from outside
+    normals : array of float32, shape (vertices, 3), optional
+        shading normals of any length; None: flat
+    uvs : array of float32, shape (vertices, 2), optional
+        lightmap coordinates, v up
+    transform : array of float64, shape (3, 4) or (4, 4), optional
+        local to world; column 3 translates
+    name, object_name : str
+        for messages and patterns
+    object : int
+        meshes of one number are parts of one object; 0: an object of its own
+    solidity : str
+        what it is taken for where it casts: "auto", "solid", "shell", "inward"
+    alpha : str
+        "opaque", "masked", "blended"
+    one_sided : bool
+        where it casts, light that falls on the backs of its faces comes through; methods that march voxels take no notice
+    material_name : str, optional
+    mask : AlphaMask, optional
+        where it is cut out
+    mask_uvs : array of float32, shape (vertices, 2), optional
+        texture coordinates for the mask, v up; what is not finite is opaque
+
+    Notes
+    -----
+    Other kinds of numbers (float64 positions, int64 indices) are converted, which copies.
+    """
+
+    positions: numpy.ndarray
+    indices: numpy.ndarray
+    normals: Optional[numpy.ndarray]
+    uvs: Optional[numpy.ndarray]
+    transform: Optional[numpy.ndarray]
+    mask: Optional[AlphaMask]
+    mask_uvs: Optional[numpy.ndarray]
+
+    def __init__(self, positions: ArrayLike, indices: ArrayLike, *, normals: Optional[ArrayLike] = None,
+                 uvs: Optional[ArrayLike] = None, transform: Optional[ArrayLike] = None, name: str = "mesh",
+                 object_name: Optional[str] = None, object: int = 0, solidity: str = "auto", alpha: str = "opaque", one_sided: bool = False,
+                 material_name: Optional[str] = None, mask: Optional[AlphaMask] = None, mask_uvs: Optional[ArrayLike] = None) -> None:
+        self.positions = array(positions, numpy.float32, (None, 3), "positions")
+        self.indices = array(indices, numpy.uint32, (None, 3), "indices")
+        count = len(self.positions)
+        self.normals = None if normals is None else array(normals, numpy.float32, (count, 3), "normals")
+        self.uvs = None if uvs is None else array(uvs, numpy.float32, (count, 2), "uvs")
+        self.transform = matrix(transform)
+        if mask is not None and not isinstance(mask, AlphaMask):
+            raise TypeError(f"mask: expected a vdbshade.AlphaMask, got {type(mask).__name__}")
+        if (mask is None) != (mask_uvs is None):
+            raise ValueError("mask, mask_uvs: expected both, or none")
+        self.mask = mask
+        self.mask_uvs = None if mask_uvs is None else array(mask_uvs, numpy.float32, (count, 2), "mask_uvs")
+        self.struct = Filled("vsh_mesh", name=name, object_name=object_name, object=object, solidity=solidity, alpha=alpha,
+                             one_sided=bool(one_sided), material_name=material_name, positions=self.positions, normals=self.normals,
+                             uvs=self.uvs, indices=self.indices, transform=self.transform, mask_uvs=self.mask_uvs, mask=mask,
+                             vertex_count=count, triangle_count=len(self.indices)).struct
+
+    @classmethod
+    def _view(cls, given: Any, owner: Any) -> "Mesh":
+        """A view of what the library has, which `owner` keeps."""
+        self = cls.__new__(cls)
+        self.struct, self._owner = ffi.new("vsh_mesh *", given), owner
+        n, m = given.vertex_count, given.triangle_count
+        self.positions = borrowed(given.positions, (n, 3), numpy.float32, owner)
+        self.indices = borrowed(given.indices, (m, 3), numpy.uint32, owner)
+        self.normals = borrowed(given.normals, (n, 3), numpy.float32, owner)
+        self.uvs = borrowed(given.uvs, (n, 2), numpy.float32, owner)
+        self.transform = borrowed(given.transform, (3, 4), numpy.float64, owner)
+        self.mask = None if given.mask == ffi.NULL else AlphaMask._view(given.mask[0], owner)
+        self.mask_uvs = borrowed(given.mask_uvs, (n, 2), numpy.float32, owner)
+        return self
+
+    @property
+    def solidity(self) -> str:
+        return self.__getattr__("solidity")
+
+    @solidity.setter
+    def solidity(self, value: str) -> None:
+        self.struct.solidity = constant("VSH_SOLIDITY_", value, "solidity")
+
+    @property
+    def one_sided(self) -> bool:
+        return bool(self.struct.one_sided)
+
+    @one_sided.setter
+    def one_sided(self, value: bool) -> None:
+        self.struct.one_sided = bool(value)
+
+    def __repr__(self) -> str:
+        return f"<vdbshade.Mesh {self.name!r}: {len(self.positions)} vertices, {len(self.indices)} triangles>"
+
+    def matches(self, pattern: str) -> bool:
+        """Whether it is meant by a pattern: its name or its object's as a shell matches them."""
+        return bool(ask(lib.vsh_mesh_matches, self, pattern))
+
+    def check(self) -> types.MeshReport:
+        """Looks it over; InputError for what is not finite or out of range."""
+        return call(lib.vsh_mesh_check, self, OUT)
+
+    def uvs_usable(self, *, run: Optional[Run] = None) -> bool:
+        """Whether a lightmap can be baked by its own UVs: in the unit square, none over another."""
+        return bool(call(lib.vsh_uvs_usable, self, OUT, run=run))
+
+    def measure_uvs(self, width: int, height: int) -> types.UvsMeasures:
+        """How its UVs lie on its surface, in a lightmap of this size (texels)."""
+        return call(lib.vsh_uvs_measure, self, width, height, OUT)
+
+
+Meshes = Union[Mesh, "Model", Sequence[Mesh]]
+
+
+def meshes_of(given: Meshes, name: str = "meshes") -> Tuple[Any, int]:
+    """Meshes as C takes them: ``vsh_mesh[]`` and how many."""
+    if isinstance(given, Mesh):
+        given = [given]
+    meshes = list(given) if isinstance(given, (Model, list, tuple)) else None
+    if meshes is None or not all(isinstance(m, Mesh) for m in meshes):
+        raise TypeError(f"{name}: expected a vdbshade.Mesh, several in a list, or a vdbshade.Model")
+    return structs_of("vsh_mesh", meshes), len(meshes)
+
+
+def mesh_solidity(meshes: Meshes, *, run: Optional[Run] = None) -> List[types.SolidityReport]:
+    """What the pieces of meshes that cast together are taken for: a report for each mesh."""
+    structs, count = meshes_of(meshes)
+    return call(lib.vsh_mesh_solidity, structs, count, Several(count), run=run)
+
+
+def unit(name: str) -> float:
+    """Metres in a unit: "m", "cm", "mm", "in", "ft"; 0 for what is none."""
+    return ask(lib.vsh_unit, name)
+
+
+class Model(Handle, kind="vsh_model"):
+    """A file of meshes: OBJ, glTF, GLB, PLY, STL, FBX, Collada (docs/meshes.md). A sequence of its meshes, as views.
+
+    Parameters
+    ----------
+    path : path
+        its ending tells the format
+    """
+
+    def __init__(self, path: Path, *, run: Optional[Run] = None) -> None:
+        super().__init__(call(lib.vsh_model_read, path_of(path, "path"), OUT, run=run))
+
+    @classmethod
+    def from_heights(cls, values: ArrayLike, *, what: str = "solid", size: Sequence[float] = (1.0, 1.0), height: float = 1.0,
+                     base: float = 0.0, transform: Optional[ArrayLike] = None, name: str = "heights",
+                     run: Optional[Run] = None) -> "Model":
+        """A heightfield as a mesh.
+
+        Parameters
+        ----------
+        values : array of float32, shape (rows, columns)
+        what : str
+            "solid": closed, a caster; "surface": the top alone with UVs, a receiver
+        size : two floats
+            along x and z, local units
+        height, base : float
+            of a value of 1, and under the lowest sample (0: a twentieth of the longer side), local units
+        """
+        source = heights_source(values, size, height, base, transform, name)
+        return cls._of(call(lib.vsh_model_from_heights, source, constant("VSH_HEIGHTS_", what, "what"), OUT, run=run))
+
+    def __len__(self) -> int:
+        return lib.vsh_model_mesh_count(self.handle)
+
+    def __getitem__(self, index: int) -> Mesh:
+        return self.mesh(index)
+
+    def __iter__(self) -> Iterator[Mesh]:
+        return (self.mesh(i) for i in range(len(self)))
+
+    def mesh(self, index: int, uv_set: int = -1) -> Mesh:
+        """A view of a mesh, with the UVs of a set; -1: the second where there is one, else the first."""
+        index = index_of(index, len(self), "mesh")
+        if not -1 <= uv_set < 8:
+            raise ValueError(f"uv_set {uv_set}: expected -1 … 7")
+        return Mesh._view(lib.vsh_model_mesh(self.handle, index, uv_set), self.handle)
+
+    @property
+    def unit(self) -> float:
+        """Metres in one unit of the file, by which positions were multiplied; 0: the format has none."""
+        return lib.vsh_model_unit(self.handle)
+
+    def uv_sets(self, index: int) -> int:
+        """How many sets of UVs a mesh has."""
+        return lib.vsh_model_uv_sets(self.handle, index_of(index, len(self), "mesh"))
+
+    @property
+    def materials(self) -> List[types.ModelMaterial]:
+        """Materials of a glTF or an OBJ, as far as they decide where light comes through."""
+        return [ask(lib.vsh_model_get_material, self, i) for i in range(lib.vsh_model_material_count(self.handle))]
+
+    def mesh_material(self, index: int) -> int:
+        """The material of a mesh; -1: none."""
+        return lib.vsh_model_mesh_material(self.handle, index_of(index, len(self), "mesh"))
+
+    def densities(self, rules: Mapping[str, float], path: str = "model") -> numpy.ndarray:
+        """For each of its meshes the factor of the last rule that means it, else 1: an array of float64 of shape (meshes,), as
+        unwrap() takes it.
+
+        Parameters
+        ----------
+        rules : mapping
+            factors by patterns of names, {"wall*": 2.0}; InputError for one that means no mesh
+        path : str
+            the model's, for messages
+        """
+        factors = numpy.ones(len(self), numpy.float64)
+        call(lib.vsh_model_densities, self, path_of(path, "path"), structs_of("vsh_density_rule", rules_of(rules, "factor")), len(rules),
+             factors)
+        return factors
+
+    @property
+    def lights(self) -> List[types.ModelLight]:
+        """Lights of a glTF."""
+        return [ask(lib.vsh_model_get_light, self, i) for i in range(lib.vsh_model_light_count(self.handle))]
+
+    def lights_from_model(self, angle: float, radius: float, unit: float = 0.0) -> "List[Light]":
+        """Its lights as those of a scene, which have sizes.
+
+        Parameters
+        ----------
+        angle : float
+            of directional ones, angular diameter, radians
+        radius : float
+            of points and spots, world units
+        """
+        lights, count = call(lib.vsh_lights_from_model, self, angle, radius, unit, OUT, OUT)
+        return [Light._of(lights[i]) for i in range(count)]
+
+
+def rules_of(given: Mapping[str, Any], member: str) -> List[dict]:
+    """Rules by their patterns, as dicts of a struct's members."""
+    return [{"pattern": pattern, member: value} for pattern, value in given.items()]
+
+
+def heights_source(values: ArrayLike, size: Sequence[float], height: float, base: float, transform: Optional[ArrayLike], name: str) -> Filled:
+    """``vsh_heights_source``."""
+    given = numpy.asarray(values)
+    if max(given.shape, default=0) > 65536:  # before it is copied
+        raise ValueError(f"values: expected at most 65536 rows and columns, got {given.shape}")
+    heights = array(given, numpy.float32, (None, None), "values")
+    rows, columns = heights.shape
+    return Filled("vsh_heights_source", name=name, size=size, height=height, base=base, values=heights, rows=rows, columns=columns,
+                  transform=matrix(transform))
+
+
+# --- procedural shapes, and outlines in a plane
+
+
+def distances_at(function: Callable[[Any, Any], float], shape: Any, positions: ArrayLike, axes: int, name: str) -> numpy.ndarray:
+    """The values of a C function that takes one point, at points (n, axes)."""
+    at = array(positions, numpy.float64, (None, axes), name)
+    first = pointer(at)
+    return numpy.array([function(shape, first + axes * i) for i in range(len(at))], numpy.float64)
+
+
+def instances_of(kind: str, given: Sequence[Any], matrix_of: Callable[[Any], Optional[numpy.ndarray]]) -> Any:
+    """An array of instances: handles, or pairs of a handle and its transform."""
+    member = kind[len("vsh_") : -len("_instance")]
+    pairs = [entry if isinstance(entry, tuple) else (entry, None) for entry in given]
+    return structs_of(kind, [{member: thing, "transform": matrix_of(moved)} for thing, moved in pairs])
+
+
+def _turned(q: numpy.ndarray, v: numpy.ndarray) -> numpy.ndarray:
+    t = 2.0 * numpy.cross(q[:3], v)
+    return v + q[3] * t + numpy.cross(q[:3], t)
+
+
+def _product(a: numpy.ndarray, b: numpy.ndarray) -> numpy.ndarray:
+    return numpy.append(a[3] * b[:3] + b[3] * a[:3] + numpy.cross(a[:3], b[:3]), a[3] * b[3] - a[:3] @ b[:3])
+
+
+class Sdf(Struct, kind="vsh_sdf"):
+    """A tree of shapes; lengths in world units. ``a | b`` is a union, ``a & b`` an intersection, ``a - b`` a without b.
+
+    Parameters
+    ----------
+    shape : str
+        "sphere", "box", "torus", "plane", "capsule", "cylinder", "cone"
+    **options
+        members of ``vsh_sdf_node`` (vdbshade.types.SdfNode): size, radius, minor_radius, rounding, …
+
+    Examples
+    --------
+    >>> plate = Sdf("box", size=(2, 0.1, 2)) - Sdf("cylinder", size=(1, 1, 1), radius=0.5)
+    >>> ball = Sdf("sphere", radius=0.4).translated(0, 1, 0)
+    >>> (plate | ball).distance([[0, 1, 0]])
+    array([-0.4])
+    """
+
+    def __init__(self, shape: str = "sphere", **options: "Unpack[types.SdfNode]") -> None:
+        self._nodes: List[Dict[str, Any]] = [dict(options, shape=shape)]
+        if "left" in options or "right" in options:
+            raise TypeError("Sdf: operands are combined by |, &, - and smooth_union()")
+        self._made()
+
+    def _made(self) -> None:
+        nodes = structs_of("vsh_sdf_node", self._nodes)
+        self.struct = keep(ffi.new("vsh_sdf *", [nodes, len(self._nodes)]), nodes)
+        call(lib.vsh_sdf_check, self)
+
+    @classmethod
+    def _of(cls, nodes: List[Dict[str, Any]]) -> "Sdf":
+        self = cls.__new__(cls)
+        self._nodes = nodes
+        self._made()
+        return self
+
+    def _combined(self, other: "Sdf", shape: str, **options: Any) -> "Sdf":
+        if not isinstance(other, Sdf):
+            raise TypeError(f"expected a vdbshade.Sdf, got {type(other).__name__}")
+        offset = len(self._nodes)
+        moved = [{k: v + offset if k in ("left", "right") else v for k, v in node.items()} for node in other._nodes]
+        root = dict(options, shape=shape, left=offset - 1, right=offset + len(moved) - 1)
+        return Sdf._of(self._nodes + moved + [root])
+
+    def __or__(self, other: "Sdf") -> "Sdf":
+        return self._combined(other, "union")
+
+    def __and__(self, other: "Sdf") -> "Sdf":
+        return self._combined(other, "intersection")
+
+    def __sub__(self, other: "Sdf") -> "Sdf":
+        return self._combined(other, "subtraction")
+
+    def smooth_union(self, other: "Sdf", smoothing: float) -> "Sdf":
+        """A union, blended over a distance."""
+        return self._combined(other, "smooth_union", smoothing=smoothing)
+
+    def moved(self, translation: Sequence[float] = (0.0, 0.0, 0.0), rotation: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
+              scale: float = 1.0) -> "Sdf":
+        """Scaled, then rotated (a quaternion x, y, z, w), then translated."""
+        root = dict(self._nodes[-1])
+        turn = numpy.asarray(rotation, float)
+        if turn.shape != (4,) or not numpy.linalg.norm(turn) > 0.0:
+            raise ValueError(f"rotation {rotation}: expected a quaternion x, y, z, w of some length")
+        turn = turn / numpy.linalg.norm(turn)
+        before = numpy.asarray(root.get("rotation", (0.0, 0.0, 0.0, 1.0)), float)
+        place_before = numpy.asarray(root.get("translation", (0.0, 0.0, 0.0)), float)
+        if "rotation" in root or tuple(rotation) != (0.0, 0.0, 0.0, 1.0):
+            root["rotation"] = tuple(_product(turn, before))
+        root["translation"] = tuple(_turned(turn, scale * place_before) + numpy.asarray(translation, float))
+        root["scale"] = scale * root.get("scale", 1.0)
+        return Sdf._of(self._nodes[:-1] + [root])
+
+    def translated(self, x: float, y: float, z: float) -> "Sdf":
+        return self.moved(translation=(x, y, z))
+
+    def scaled(self, scale: float) -> "Sdf":
+        return self.moved(scale=scale)
+
+    def rotated(self, axis: Sequence[float], angle: float) -> "Sdf":
+        """Turned around an axis through the origin by an angle, radians."""
+        unit = numpy.asarray(axis, float) / numpy.linalg.norm(axis)
+        return self.moved(rotation=(*(unit * numpy.sin(angle / 2)), numpy.cos(angle / 2)))
+
+    def __len__(self) -> int:
+        """How many nodes the tree has."""
+        return len(self._nodes)
+
+    def distance(self, positions: ArrayLike) -> numpy.ndarray:
+        """Signed distance, negative inside.
+
+        Parameters
+        ----------
+        positions : array of float64, shape (n, 3)
+            world units
+
+        Returns
+        -------
+        array of float64, shape (n,)
+            NaN for positions that are not finite
+        """
+        return distances_at(lib.vsh_sdf_distance, self.struct, positions, 3, "positions")
+
+    def bounds(self) -> Tuple[Tuple[float, ...], Tuple[float, ...]]:
+        """A box around the surface, world units: its least and its greatest corner."""
+        return ask(lib.vsh_sdf_bounds, self, Several(3), Several(3))
+
+
+class Solids(Handle, kind="vsh_solids"):
+    """Procedural casters as they are, for trace_shadow() and trace_ao().
+
+    Parameters
+    ----------
+    sdfs : sequence of Sdf
+    transforms : array of float64, shape (n, 3, 4), optional
+        of each, local to world, without shear or uneven scale
+    """
+
+    def __init__(self, sdfs: Sequence[Sdf], transforms: Optional[ArrayLike] = None) -> None:
+        sdfs = [sdfs] if isinstance(sdfs, Sdf) else list(sdfs)
+        if not all(isinstance(sdf, Sdf) for sdf in sdfs):
+            raise TypeError("sdfs: expected a list of vdbshade.Sdf")
+        moved = None
+        if transforms is not None:
+            moved = numpy.array([matrix(t, "transforms") for t in numpy.asarray(transforms)], numpy.float64)
+            moved = array(moved, numpy.float64, (len(sdfs), 3, 4), "transforms")
+        super().__init__(call(lib.vsh_solids_create, structs_of("vsh_sdf", sdfs), moved, len(sdfs), OUT))
+
+    def distance(self, positions: ArrayLike) -> numpy.ndarray:
+        """Signed distance to the nearest, at positions (n, 3), world units; infinite where there is none."""
+        return distances_at(lib.vsh_solids_distance, self.handle, positions, 3, "positions")
+
+
+class Outline(Handle, kind="vsh_outline"):
+    """An area of the xy-plane, bounded by closed contours; world units, y up. Made by its ``from_…`` methods."""
+
+    info: types.OutlineInfo
+
+    def __init__(self, *arguments: Any) -> None:
+        raise TypeError("an Outline is made by Outline.from_image(), from_text(), from_polygons() or unite()")
+
+    @classmethod
+    def from_image(cls, path: Path, *, run: Optional[Run] = None, **options: "Unpack[types.MaskOptions]") -> "Outline":
+        """Where a channel of an image is at least the threshold."""
+        return cls._of(call(lib.vsh_outline_from_image, path_of(path, "path"), Filled("vsh_mask_options", options), OUT, run=run))
+
+    @classmethod
+    def from_text(cls, text: str, font: Path, *, run: Optional[Run] = None, **options: "Unpack[types.TextOptions]") -> "Outline":
+        """The letters of a text, of a font's file."""
+        return cls._of(call(lib.vsh_outline_from_text, text, path_of(font, "font"), Filled("vsh_text_options", options), OUT, run=run))
+
+    @classmethod
+    def from_polygons(cls, polygons: Sequence[ArrayLike], *, run: Optional[Run] = None) -> "Outline":
+        """The area that closed polygons wind around: arrays of float64 of shape (n, 2)."""
+        parts = [array(p, numpy.float64, (None, 2), f"polygons[{i}]") for i, p in enumerate(polygons)]
+        points = numpy.concatenate(parts) if parts else numpy.zeros((0, 2))
+        counts = ffi.new("size_t[]", [len(p) for p in parts] or 1)
+        return cls._of(call(lib.vsh_outline_from_polygons, points, counts, len(parts), OUT, run=run))
+
+    @classmethod
+    def unite(cls, outlines: "Sequence[Union[Outline, Tuple[Outline, ArrayLike]]]", *, run: Optional[Run] = None) -> "Outline":
+        """The union of outlines, or of pairs of an outline and its transform, shape (2, 3)."""
+        instances = instances_of("vsh_outline_instance", outlines, lambda moved: None if moved is None else array(
+            moved, numpy.float64, (2, 3), "transform"))
+        return cls._of(call(lib.vsh_outline_unite, instances, len(outlines), OUT, run=run))
+
+    @property
+    def contours(self) -> List[numpy.ndarray]:
+        """Each contour's points, arrays of float64 of shape (n, 2), views; the area lies to their left."""
+        found, count = [], ffi.new("size_t *")
+        for index in range(self.info.contours):
+            points = lib.vsh_outline_contour(self.handle, index, count)
+            found.append(borrowed(points, (count[0], 2), numpy.float64, self.handle))
+        return found
+
+    def distance(self, points: ArrayLike) -> numpy.ndarray:
+        """Signed distance at points (n, 2), world units, negative inside."""
+        return distances_at(lib.vsh_outline_distance, self.handle, points, 2, "points")
+
+
+# --- narrow-band level sets
+
+
+Attributes = Mapping[str, str]
+
+
+def attributes_of(given: Optional[Attributes]) -> List[Dict[str, str]]:
+    """Lines of text that a file carries, as members of ``vsh_attribute``."""
+    return [dict(name=name, value=value) for name, value in (given or {}).items()]
+
+
+class _Distance:
+    """A function of the caller's while a grid is made of it."""
+
+    def __init__(self, function: Callable[[numpy.ndarray], Any]) -> None:
+        self.function = function
+        self.raised: Optional[BaseException] = None
+
+
+# Called by several threads, which hold the GIL here in turn.
+@ffi.callback("vsh_distances_fn *", onerror=note)
+def _distances(user: Any, count: int, positions: Any, distances: Any) -> None:
+    running = ffi.from_handle(user)
+    result = numpy.frombuffer(ffi.buffer(distances, 8 * count), numpy.float64)
+    result[:] = numpy.nan  # what ends the call, where the function raises
+    if running.raised is None:
+        # a copy: C's own are gone when the function returns, whoever keeps them
+        at = numpy.array(numpy.frombuffer(ffi.buffer(positions, 24 * count), numpy.float64)).reshape(count, 3)
+        at.flags.writeable = False
+        found = numpy.asarray(running.function(at), numpy.float64)
+        if found.shape != (count,):
+            raise ValueError(f"distance function: expected {count} distances for {count} positions, got shape {found.shape}")
+        result[:] = found
+
+
+class Grid(Handle, kind="vsh_grid"):
+    """A level set: OpenVDB's grid of floats. Made by its ``from_…`` methods and ``read``.
+
+    Voxels are given by `voxel_size` (world units) or `resolution` (voxels along the longest side, 256), the band's
+    `half_width` and sheets' `shell_thickness` in voxels (vdbshade.types.GridOptions).
+    """
+
+    info: types.GridInfo
+
+    def __init__(self, *arguments: Any) -> None:
+        raise TypeError("a Grid is made by Grid.from_meshes(), from_sdf(), from_distance(), from_outline(), unite() or read()")
+
+    @classmethod
+    def from_meshes(cls, meshes: Meshes, *, run: Optional[Run] = None, **options: "Unpack[types.GridOptions]") -> "Grid":
+        """The union of what meshes are taken for: solids, rooms, walls, sheets."""
+        return cls._of(call(lib.vsh_grid_from_meshes, *meshes_of(meshes), Filled("vsh_grid_options", options), OUT, run=run))
+
+    @classmethod
+    def from_sdf(cls, sdf: Sdf, *, run: Optional[Run] = None, **options: "Unpack[types.GridOptions]") -> "Grid":
+        """A procedural tree, voxelised where its surface is."""
+        return cls._of(call(lib.vsh_grid_from_sdf, sdf, Filled("vsh_grid_options", options), OUT, run=run))
+
+    @classmethod
+    def from_distance(cls, distance: Callable[[numpy.ndarray], ArrayLike], bounds_min: Sequence[float],
+                      bounds_max: Sequence[float], *, lipschitz: float = 1.0, exact: bool = True,
+                      run: Optional[Run] = None, **options: "Unpack[types.GridOptions]") -> "Grid":
+        """A field that a Python function gives, voxelised where its surface is.
+
+        Parameters
+        ----------
+        distance : callable
+            called with positions, an array of float64 of shape (n, 3) that it may not keep (n is 64, 8 or 1); returns
+            signed distances, shape (n,), world units, negative inside. It is called from several threads, one at a
+            time, and has to give the same value for the same position. What it raises, this raises.
+        bounds_min, bounds_max : three floats
+            a world box that holds the whole surface
+        lipschitz : float
+            bound on how much distances differ over how far positions do; 1 for true distances
+        exact : bool
+            True: a true distance near the surface; False: it is measured anew, for which single positions are asked
+            for, too: ten times as long
+        """
+        if not callable(distance):
+            raise TypeError(f"distance: expected a function, got {type(distance).__name__}")
+        given = _Distance(distance)
+        filled = Filled("vsh_distance", lipschitz=lipschitz, exact=exact, bounds_min=bounds_min, bounds_max=bounds_max,
+                        user=ffi.new_handle(given))
+        return cls._of(call(lib.vsh_grid_from_distances, filled, _distances, Filled("vsh_grid_options", options), OUT, run=run,
+                            watched=given))
+
+    @classmethod
+    def from_outline(cls, outline: Outline, thickness: float, *, transform: Optional[ArrayLike] = None,
+                     run: Optional[Run] = None, **options: "Unpack[types.GridOptions]") -> "Grid":
+        """An outline extruded along z by a thickness, local units; `transform` (3, 4) as of unite()."""
+        return cls._of(call(lib.vsh_grid_from_outline, outline, thickness, matrix(transform), Filled("vsh_grid_options", options), OUT,
+                            run=run))
+
+    @classmethod
+    def read(cls, path: Path, name: Optional[str] = None, *, run: Optional[Run] = None) -> "Grid":
+        """A level set of a .vdb file; `name` None: its first."""
+        return cls._of(call(lib.vsh_grid_read, path_of(path, "path"), name, OUT, run=run))
+
+    @classmethod
+    def unite(cls, grids: "Sequence[Union[Grid, Tuple[Grid, ArrayLike]]]", *, run: Optional[Run] = None,
+              **options: "Unpack[types.GridOptions]") -> "Grid":
+        """The union of grids, or of pairs of a grid and its transform, shape (3, 4): rotation, translation, mirroring
+        and one scale."""
+        instances = instances_of("vsh_grid_instance", grids, matrix)
+        return cls._of(call(lib.vsh_grid_unite, instances, len(grids), Filled("vsh_grid_options", options), OUT, run=run))
+
+    def write(self, path: Path, name: Optional[str] = None, attributes: Optional[Attributes] = None) -> None:
+        """Writes a .vdb file, whole or not at all; `name` None: "surface"."""
+        lines = attributes_of(attributes)
+        call(lib.vsh_grid_write, self, path_of(path, "path"), name, structs_of("vsh_attribute", lines), len(lines))
+
+    def values(self, index_min: Optional[Sequence[int]] = None, shape: Optional[Sequence[int]] = None,
+               out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
+        """A dense copy of its distances.
+
+        Parameters
+        ----------
+        index_min : three ints, optional
+            the first voxel: x, y, z; None: the first of the band
+        shape : three ints, optional
+            depth, height, width: voxels along z, y, x; None: to the last of the band
+        out : array of float32, shape (depth, height, width), optional
+            to be written into
+
+        Returns
+        -------
+        array of float32, shape (depth, height, width)
+            world units, negative inside; beyond the band ± its half width
+        """
+        return dense(self.info, index_min, shape, out, lambda *box: call(lib.vsh_grid_copy, self, *box))
+
+
+def dense(box: Any, index_min: Optional[Sequence[int]], shape: Optional[Sequence[int]], out: Optional[numpy.ndarray],
+          copy: Callable[[Any, Any, Any], Any]) -> numpy.ndarray:
+    """Fills a dense array of voxels; `box` has index_min and index_max."""
+    low = [int(i) for i in (box.index_min if index_min is None else index_min)]
+    if shape is None:
+        shape = out.shape if out is not None else [box.index_max[2 - i] + 1 - low[2 - i] for i in range(3)]
+    if len(low) != 3 or len(shape) != 3 or not all(1 <= n < 2**31 for n in shape) or not all(abs(i) < 2**31 for i in low):
+        raise ValueError(f"index_min {tuple(low)}, shape {tuple(shape)}: expected three indices, and sizes of at least 1")
+    values = output(out, numpy.float32, tuple(int(n) for n in shape), "out")
+    copy(ffi.new("int32_t[3]", low), ffi.new("int32_t[3]", [int(n) for n in reversed(shape)]), values)
+    return values
+
+
+def vdb_list(path: Path, *, run: Optional[Run] = None) -> List[types.VdbEntry]:
+    """What grids a .vdb file has, of any kind."""
+    count, capacity = ffi.new("size_t *"), 16
+    while True:
+        entries = ffi.new("vsh_vdb_entry[]", capacity)
+        call(lib.vsh_vdb_list, path_of(path, "path"), entries, capacity, count, run=run)
+        if count[0] <= capacity:
+            return [told(entries[i]) for i in range(count[0])]
+        capacity = count[0]
+
+
+def vdb_copy(path: Path, index_min: Sequence[int], shape: Sequence[int], name: Optional[str] = None, *,
+             run: Optional[Run] = None) -> Tuple[numpy.ndarray, numpy.ndarray]:
+    """Values of a grid of numbers of a .vdb file, and where it is active: two arrays of float32 (depth, height, width),
+    from the voxel `index_min` (x, y, z) on; `name` None: the first such grid."""
+    active = numpy.empty(tuple(int(n) for n in shape), numpy.float32)
+    values = dense(None, index_min, shape, None, lambda *box: call(lib.vsh_vdb_copy, path_of(path, "path"), name, *box, active, run=run))
+    return values, active
+
+
+# --- occluders, and the parts that marches and rays meet
+
+
+class Triangles(Handle, kind="vsh_triangles"):
+    """Triangles of meshes in a tree for rays; the meshes need not outlive it."""
+
+    def __init__(self, meshes: Meshes, *, run: Optional[Run] = None) -> None:
+        super().__init__(call(lib.vsh_triangles_create, *meshes_of(meshes), OUT, run=run))
+
+    @property
+    def bytes(self) -> int:
+        """In memory."""
+        return ask(lib.vsh_triangles_bytes, self)
+
+
+class Field(Handle, kind="vsh_field"):
+    """The pyramid of narrow bands that shadow marching samples, of a grid.
+
+    Parameters
+    ----------
+    grid : Grid
+    reach : float
+        largest distance that must be told apart, world units; 0: four times the diagonal of the solid's box
+    surface : bool
+        extract the surface, for rays
+    """
+
+    info: types.FieldInfo
+
+    def __init__(self, grid: Grid, *, run: Optional[Run] = None, **options: "Unpack[types.FieldOptions]") -> None:
+        super().__init__(call(lib.vsh_field_create, grid, Filled("vsh_field_options", options), OUT, run=run))
+
+    def sample(self, positions: ArrayLike, out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
+        """Signed distance.
+
+        Parameters
+        ----------
+        positions : array of float64, shape (n, 3)
+            world units
+        out : array of float32, shape (n,), optional
+
+        Returns
+        -------
+        array of float32, shape (n,)
+            world units, negative inside; NaN for positions that are not finite
+        """
+        at = array(positions, numpy.float64, (None, 3), "positions")
+        distances = output(out, numpy.float32, (len(at),), "out")
+        lib.vsh_field_sample(self.handle, len(at), pointer(at), pointer(distances))
+        return distances
+
+    def find_lost(self, meshes: Meshes, triangles: Optional[Triangles] = None) -> List[types.Lost]:
+        """Finds the parts of its meshes that it does not hold: a record for each mesh."""
+        structs, count = meshes_of(meshes)
+        return call(lib.vsh_field_find_lost, self, structs, count, optional(triangles, "vsh_triangles"), Several(count))
+
+
+class Heights(Handle, kind="vsh_heights"):
+    """A heightfield that casts as it is, without voxels; arguments as of Model.from_heights()."""
+
+    info: types.HeightsInfo
+
+    def __init__(self, values: ArrayLike, *, size: Sequence[float] = (1.0, 1.0), height: float = 1.0, base: float = 0.0,
+                 transform: Optional[ArrayLike] = None, name: str = "heights", run: Optional[Run] = None) -> None:
+        super().__init__(call(lib.vsh_heights_create, heights_source(values, size, height, base, transform, name), OUT, run=run))
+
+
+class Spheres(Handle, kind="vsh_spheres"):
+    """Spheres that cast as they are, without voxels.
+
+    Parameters
+    ----------
+    spheres : array of float64, shape (n, 4)
+        x, y, z, radius, world units
+    transform : array of float64, shape (3, 4), optional
+    """
+
+    info: types.SpheresInfo
+
+    def __init__(self, spheres: ArrayLike, transform: Optional[ArrayLike] = None, *, run: Optional[Run] = None) -> None:
+        balls = array(spheres, numpy.float64, (None, 4), "spheres")
+        super().__init__(call(lib.vsh_spheres_create, balls, len(balls), matrix(transform), OUT, run=run))
+
+
+def spheres_read(path: Path, *, run: Optional[Run] = None) -> numpy.ndarray:
+    """Spheres of a CSV file: an array of float64 of shape (n, 4), x, y, z and radius."""
+    spheres, count = call(lib.vsh_spheres_read, path_of(path, "path"), OUT, OUT, run=run)
+    owned = ffi.gc(spheres, lib.vsh_spheres_list_free)
+    return numpy.frombuffer(ffi.buffer(owned, 32 * count), numpy.float64).reshape(-1, 4).copy()
+
+
+def optional(given: Any, kind: str, name: Optional[str] = None) -> Any:
+    """The C pointer of an argument that may be None."""
+    return ffi.NULL if given is None else struct_of(given, ffi.typeof(kind), name)
+
+
+def _trace(function: Any, triangles: Optional[Triangles], solids: Optional[Solids], positions: ArrayLike, normals: Optional[ArrayLike],
+           out: Optional[numpy.ndarray], run: Optional[Run], *how: Any) -> numpy.ndarray:
+    at = array(positions, numpy.float64, (None, 3), "positions")
+    up = None if normals is None else array(normals, numpy.float32, (len(at), 3), "normals")
+    values = output(out, numpy.float32, (len(at),), "out")
+    call(function, optional(triangles, "vsh_triangles"), optional(solids, "vsh_solids"), len(at), at, up, *how, values, run=run)
+    return values
+
+
+def trace_shadow(positions: ArrayLike, normals: Optional[ArrayLike], light: Light, *, triangles: Optional[Triangles] = None,
+                 solids: Optional[Solids] = None, lift: float = 0.0, rays: int = 256, out: Optional[numpy.ndarray] = None,
+                 run: Optional[Run] = None) -> numpy.ndarray:
+    """Fraction of a light that points see, by rays: the truth for other methods.
+
+    Parameters
+    ----------
+    positions : array of float64, shape (n, 3)
+        world units
+    normals : array of float32, shape (n, 3), optional
+        unit; None: no horizon
+    lift : float
+        world units above the point, where rays begin
+    rays : int
+        a point, 1 … 65536
+
+    Returns
+    -------
+    array of float32, shape (n,)
+    """
+    return _trace(lib.vsh_trace_shadow, triangles, solids, positions, normals, out, run, lift, light, rays)
+
+
+def trace_ao(positions: ArrayLike, normals: ArrayLike, distance: float, *, triangles: Optional[Triangles] = None,
+             solids: Optional[Solids] = None, lift: float = 0.0, rays: int = 256, out: Optional[numpy.ndarray] = None,
+             run: Optional[Run] = None) -> numpy.ndarray:
+    """Cosine-weighted fraction of the hemisphere that is free within a distance, world units; else as trace_shadow()."""
+    return _trace(lib.vsh_trace_ao, triangles, solids, positions, numpy.asarray(normals), out, run, lift, distance, rays)
+
+
+class Layer(Struct, kind="vsh_layer"):
+    """Casters that are shaded in a way of their own: a part of Occluders.from_parts().
+
+    Parameters
+    ----------
+    casters : Field, Heights or Spheres
+    triangles : Triangles, optional
+        of a field's casters, for exact methods
+    lights : sequence of str, optional
+        names of the lights it casts for; None: all
+    **options
+        members of ``vsh_layer`` (vdbshade.types.Layer): method, combine, softness, remap, start_offset, ao, name
+    """
+
+    def __init__(self, casters: Any, *, triangles: Optional[Triangles] = None, lights: Optional[Sequence[str]] = None,
+                 **options: "Unpack[types.Layer]") -> None:
+        if not isinstance(casters, (Field, Heights, Spheres)):
+            raise TypeError(f"casters: expected a Field, Heights or Spheres, got {type(casters).__name__}")
+        self.struct = Filled("vsh_layer", options, triangles=triangles, lights=lights, **{casters.KIND[len("vsh_") :]: casters}).struct
+
+
+class Occluders(Handle, kind="vsh_occluders"):
+    """What casts: points, lightmaps, volumes, pictures and distances are asked of it.
+
+    Parameters
+    ----------
+    meshes : Mesh, Model or sequence of Mesh
+        their triangles are kept, and where voxels are asked for, a level set is made of them
+    **options
+        ``reach``, ``triangles`` (False: voxels alone) of vdbshade.types.OccludersOptions; ``voxel_size``,
+        ``resolution``, ``half_width``, ``shell_thickness`` of vdbshade.types.GridOptions. Without a resolution or a
+        voxel size there are no voxels, and only the methods auto and exact
+    """
+
+    info: types.OccludersInfo
+
+    def __init__(self, meshes: Meshes, *, run: Optional[Run] = None, **options: Any) -> None:
+        mine, grid = split(options, "vsh_occluders_options", "vsh_grid_options")
+        super().__init__(call(lib.vsh_occluders_create, *meshes_of(meshes), Filled("vsh_occluders_options", mine, grid=grid), OUT, run=run))
+
+    @classmethod
+    def from_grid(cls, grid: Grid, *, run: Optional[Run] = None, **options: "Unpack[types.FieldOptions]") -> "Occluders":
+        """A level set as what casts: of a .vdb file, a function, a procedural tree."""
+        return cls._of(call(lib.vsh_occluders_from_grid, grid, Filled("vsh_field_options", options), OUT, run=run))
+
+    @classmethod
+    def from_parts(cls, field: Optional[Field] = None, *, triangles: Optional[Triangles] = None, layers: Sequence[Layer] = (),
+                   true_triangles: Optional[Triangles] = None, true_solids: Optional[Solids] = None,
+                   voxel_size: float = 0.0) -> "Occluders":
+        """Of a field, triangles, layers, and what errors are measured against."""
+        parts = Filled("vsh_occluder_parts", field=field, triangles=triangles, layers=layers, true_triangles=true_triangles,
+                       true_solids=true_solids, voxel_size=voxel_size)
+        return cls._of(call(lib.vsh_occluders_from_parts, parts, OUT, keeps=parts.keeps))
+
+    @property
+    def field(self) -> Field:
+        """Its field, which lives as long as anything that refers to either."""
+        return Field._borrow(ask(lib.vsh_occluders_get_parts, self, OUT).field, self.handle)

@@ -1,0 +1,893 @@
+"""Shadow and ambient occlusion at points; images; lightmaps, volumes and pictures."""
+from __future__ import annotations
+
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+
+import numpy
+from numpy.typing import ArrayLike
+
+from . import types
+from ._arrays import array, borrowed, output, pointer, vector
+from ._calls import OUT, ask, call, Handle, Run, run_of, Several
+from ._casters import Attributes, attributes_of, dense, Field, Grid, Light, lights_of, Meshes, meshes_of, Occluders
+from ._library import fail, ffi, lib, Path, text, Unpack
+from ._structs import constant, Filled, keep, pairs_of, path_of, split, Struct, struct_of, structs_of, texts_of, told, word, words_of_bits
+
+# --- points
+
+
+class Stats(Struct):
+    """Work that was done, added up over the calls that it was given to (vdbshade.types.ShadeStats)."""
+
+    KIND = "vsh_shade_stats"
+
+    def __init__(self) -> None:
+        self.struct = Filled(self.KIND).struct
+
+    @property
+    def told(self) -> types.ShadeStats:
+        return told(self.struct)
+
+
+def _points(positions: ArrayLike, normals: Optional[ArrayLike], texels: Optional[ArrayLike] = None) -> Tuple[Any, int]:
+    at = array(positions, numpy.float64, (None, 3), "positions")
+    up = None if normals is None else array(normals, numpy.float32, (len(at), 3), "normals")
+    numbers = None if texels is None else array(texels, numpy.uint32, (len(at),), "texels")
+    pointers = [pointer(at), pointer(up), pointer(numbers)]
+    return keep(ffi.new("vsh_points *", [len(at)] + pointers), pointers), len(at)
+
+
+def _written(out: Optional[numpy.ndarray], shape: Tuple[int, ...], name: str) -> Optional[numpy.ndarray]:
+    """An array to be written into, checked; None if none was given."""
+    return None if out is None else output(out, numpy.float32, shape, name)
+
+
+def shade_shadow(occluders: Occluders, positions: ArrayLike, normals: Optional[ArrayLike], light: Light, *,
+                 texels: Optional[ArrayLike] = None, out: Optional[numpy.ndarray] = None,
+                 deviation: Optional[numpy.ndarray] = None, stats: Optional[Stats] = None, run: Optional[Run] = None,
+                 **options: "Unpack[types.ShadeOptions]") -> numpy.ndarray:
+    """Fraction of a light that each point sees, 0 dark … 1 lit: before any cosine, colour or falloff.
+
+    Parameters
+    ----------
+    positions : array of float64, shape (n, 3)
+        world units
+    normals : array of float32, shape (n, 3), optional
+        away from the solid, of any length; None: no horizon
+    texels : array of uint32, shape (n,), optional
+        column + 65536 row of each in a lightmap
+    out, deviation : array of float32, shape (n,), optional
+        to be written into: the values, and the standard error left in them
+    **options
+        vdbshade.types.ShadeOptions: method, max_error, rays, sampler, …
+
+    Returns
+    -------
+    array of float32, shape (n,)
+        NaN for invalid points
+    """
+    points, count = _points(positions, normals, texels)
+    values = output(out, numpy.float32, (count,), "out")
+    call(lib.vsh_shade_shadow, occluders, points, light, Filled("vsh_shade_options", options), values,
+         _written(deviation, (count,), "deviation"), stats, run=run)
+    return values
+
+
+def shade_ao(occluders: Occluders, positions: ArrayLike, normals: ArrayLike, *, texels: Optional[ArrayLike] = None,
+             out: Optional[numpy.ndarray] = None, deviation: Optional[numpy.ndarray] = None,
+             bent: Optional[numpy.ndarray] = None, stats: Optional[Stats] = None, run: Optional[Run] = None,
+             **options: "Unpack[types.ShadeOptions]") -> numpy.ndarray:
+    """Cosine-weighted fraction of the hemisphere that is free within ``ao_distance`` (world units), 0 … 1 open.
+
+    Arguments as of shade_shadow(); `bent`, an array of float32 of shape (n, 3), takes bent normals: unit, world space.
+    """
+    points, count = _points(positions, numpy.asarray(normals), texels)
+    values = output(out, numpy.float32, (count,), "out")
+    call(lib.vsh_shade_ao, occluders, points, Filled("vsh_shade_options", options), values, _written(deviation, (count,), "deviation"),
+         _written(bent, (count, 3), "bent"), stats, run=run)
+    return values
+
+
+def tint_of(tint: "str | dict | types.Tint") -> Filled:
+    """``vsh_tint`` of "quadratic" or dict(type="power", power=(r, g, b)), checked."""
+    filled = Filled("vsh_tint", dict(type=tint) if isinstance(tint, str) else tint)
+    call(lib.vsh_tint_check, filled)
+    return filled
+
+
+def shade_tint(visibility: ArrayLike, tint: "str | types.Tint", out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
+    """Tinted visibility, linear RGB: float32 (n,) to float32 (n, 3)."""
+    values = array(visibility, numpy.float32, (None,), "visibility")
+    rgb = output(out, numpy.float32, (len(values), 3), "out")
+    ask(lib.vsh_shade_tint, len(values), values, tint_of(tint), rgb)
+    return rgb
+
+
+def shade_irradiance(positions: ArrayLike, normals: ArrayLike, light: Light, visibility: ArrayLike,
+                     out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
+    """Irradiance of one light, linear RGB, added to `out`, an array of float32 of shape (n, 3) (None: to zeros):
+    visibility × colour × falloff × cosine."""
+    points, count = _points(positions, numpy.asarray(normals))
+    values = array(visibility, numpy.float32, (count,), "visibility")
+    rgb = numpy.zeros((count, 3), numpy.float32) if out is None else output(out, numpy.float32, (count, 3), "out")
+    call(lib.vsh_light_check, light)
+    ask(lib.vsh_shade_irradiance, points, None, light, values, rgb)
+    return rgb
+
+
+_SMALL = 64  # points that vsh_query_points() shades on the calling thread, without progress
+_FLOAT32: numpy.dtype = numpy.dtype(numpy.float32)
+_FLOAT64: numpy.dtype = numpy.dtype(numpy.float64)
+_UINT32: numpy.dtype = numpy.dtype(numpy.uint32)
+
+
+def _rows(given: Any, kind: numpy.dtype, columns: int, name: str) -> Tuple[numpy.ndarray, int]:
+    """Rows of a query as they are in memory, and how far apart; a copy where they cannot be read so."""
+    found = given if isinstance(given, numpy.ndarray) else numpy.asarray(given)
+    shape = (None, columns) if columns > 1 else (None,)
+    size = kind.itemsize
+    if found.dtype == kind and found.ndim == len(shape) and (columns == 1 or found.shape[1] == columns):
+        if found.flags.c_contiguous and found.flags.aligned:
+            return found, 0
+        stride = found.strides[0]
+        inner = columns == 1 or found.strides[1] == size
+        if len(found) > 1 and inner and stride >= columns * size and stride % size == 0 and found.flags.aligned:
+            return found, stride
+    return array(found, kind, shape, name), 0
+
+
+def _at(values: numpy.ndarray, kind: str, stride: int) -> Any:
+    if stride == 0:
+        return ffi.from_buffer(kind, values)
+    return ffi.cast(kind.replace("[]", " *"), values.__array_interface__["data"][0])
+
+
+class Query(Handle, kind="vsh_query"):
+    """Occluders, lights and options, checked and made ready once: for points, asked for again and again.
+
+    Parameters
+    ----------
+    occluders : Occluders
+    lights : Light or sequence of Light
+        none: AO only
+    **options
+        vdbshade.types.ShadeOptions
+    """
+
+    def __init__(self, occluders: Occluders, lights: Union[Light, Sequence[Light]] = (), **options: "Unpack[types.ShadeOptions]") -> None:
+        structs, count = lights_of(lights)
+        owner = struct_of(occluders, ffi.typeof("vsh_occluders"))
+        super().__init__(call(lib.vsh_query_create, owner, structs, count, Filled("vsh_shade_options", options), OUT, keeps=owner))
+        self.light_count = count
+        self.names: List[str] = [ffi.string(structs[i].name).decode() for i in range(count)]
+
+    def points(self, positions: ArrayLike, normals: Optional[ArrayLike] = None, *, shadow: bool = True, ao: bool = False,
+               deviation: bool = False, distance: bool = False, gradient: bool = False, texels: Optional[ArrayLike] = None,
+               out: Optional[Dict[str, numpy.ndarray]] = None, stats: Optional[Stats] = None,
+               run: Optional[Run] = None) -> Dict[str, numpy.ndarray]:
+        """Shades points.
+
+        Parameters
+        ----------
+        positions : array of float64 or float32, shape (n, 3)
+            world units. Rows may be apart, as in a structured array: nothing is copied
+        normals : array of float32, shape (n, 3), optional
+            likewise; needed for AO
+        shadow, ao, deviation, distance, gradient : bool
+            what is asked for
+        texels : array of uint32, shape (n,), optional
+        out : dict of arrays, optional
+            as is returned: written into, and in place of the five above
+
+        Returns
+        -------
+        dict
+            of arrays of float32: "shadow" (lights, n), "ao" (n,), "distance" (n,), "gradient" (n, 3),
+            "shadow_deviation" (lights, n), "ao_deviation" (n,)
+
+        Notes
+        -----
+        Up to 64 points are shaded on the calling thread.
+        """
+        at = positions if isinstance(positions, numpy.ndarray) else numpy.asarray(positions)
+        single = at.dtype == _FLOAT32
+        at, position_stride = _rows(at, _FLOAT32 if single else _FLOAT64, 3, "positions")
+        count = len(at)
+        layout = ffi.NULL
+        points = ffi.new("vsh_points *")
+        points.count = count
+        first = _at(at, "float[]" if single else "double[]", position_stride)
+        normal_stride = texel_stride = 0
+        if normals is not None:
+            up, normal_stride = _rows(normals, _FLOAT32, 3, "normals")
+            if len(up) != count:
+                raise ValueError(f"normals: expected an array of shape ({count}, 3), got {up.shape}")
+            up_first = _at(up, "float[]", normal_stride)
+            points.normals = up_first
+        if texels is not None:
+            numbers, texel_stride = _rows(texels, _UINT32, 1, "texels")
+            if len(numbers) != count:
+                raise ValueError(f"texels: expected an array of shape ({count},), got {numbers.shape}")
+            texel_first = _at(numbers, "uint32_t[]", texel_stride)
+            points.texels = texel_first
+        if single or position_stride or normal_stride or texel_stride:
+            layout = ffi.new("vsh_point_layout *", [ffi.sizeof("vsh_point_layout"), first if single else ffi.NULL, position_stride,
+                                                     normal_stride, texel_stride])
+        if not single:
+            points.positions = first
+
+        lights = self.light_count
+        if out is None:
+            out = {}
+            if shadow and lights:
+                out["shadow"] = numpy.empty((lights, count), _FLOAT32)
+                if deviation:
+                    out["shadow_deviation"] = numpy.empty((lights, count), _FLOAT32)
+            if ao:
+                out["ao"] = numpy.empty(count, _FLOAT32)
+                if deviation:
+                    out["ao_deviation"] = numpy.empty(count, _FLOAT32)
+            if distance:
+                out["distance"] = numpy.empty(count, _FLOAT32)
+            if gradient:
+                out["gradient"] = numpy.empty((count, 3), _FLOAT32)
+        else:
+            self._check(out, count)
+        values, keeps = self._output(out, count)
+        if count <= _SMALL:
+            error = ffi.new("vsh_error *")
+            result = lib.vsh_query_points(self.handle, points, layout, run_of(run).struct, values, ffi.NULL if stats is None else stats.struct,
+                                          error)
+            if result != 0:
+                fail(result, error)
+        else:
+            call(lib.vsh_query_points, self, points, layout, values, stats, run=run)
+        del keeps
+        return out
+
+    def _check(self, out: Dict[str, numpy.ndarray], count: int) -> None:
+        lights = self.light_count
+        shapes = dict(shadow=(lights, count), shadow_deviation=(lights, count), ao=(count,), ao_deviation=(count,),
+                      distance=(count,), gradient=(count, 3))
+        for name, values in out.items():
+            if name not in shapes:
+                raise ValueError(f"out: no value {name!r}; there are {', '.join(shapes)}")
+            if values is None:
+                raise TypeError(f"out[{name!r}]: expected an array")
+            output(values, _FLOAT32, shapes[name], f"out[{name!r}]")
+
+    def _output(self, out: Dict[str, numpy.ndarray], count: int) -> Tuple[Any, Any]:
+        values = ffi.new("vsh_query_output *")
+        values.struct_size = _OUTPUT_SIZE
+        keeps = []
+        for name, array_of in out.items():
+            if not count:
+                continue
+            first = ffi.from_buffer("float[]", array_of, require_writable=True)
+            keeps.append(first)
+            if name in ("shadow", "shadow_deviation"):
+                if self.light_count == 0:
+                    continue
+                planes = ffi.new("float *[]", [first + i * count for i in range(self.light_count)])
+                keeps.append(planes)
+                setattr(values, "visibility" if name == "shadow" else "deviation", planes)
+            else:
+                setattr(values, name, first)
+        return values, keeps
+
+
+_OUTPUT_SIZE = ffi.sizeof("vsh_query_output")
+
+
+def shadow_method_traits(method: str) -> List[str]:
+    """What a shadow method is like: "rays", "keeps_error", "triangles", "inner"."""
+    return words_of_bits("VSH_METHOD_", lib.vsh_shadow_method_traits(constant("VSH_SHADOW_", method, "method")))
+
+
+def ao_method_traits(method: str) -> List[str]:
+    """What an AO method is like, likewise."""
+    return words_of_bits("VSH_METHOD_", lib.vsh_ao_method_traits(constant("VSH_AO_", method, "method")))
+
+
+def shadow_method_resolve(method: str, has_triangles: bool) -> str:
+    """What "auto" comes to with triangles or without; every other method is itself."""
+    return word("VSH_SHADOW_", lib.vsh_shadow_method_resolve(constant("VSH_SHADOW_", method, "method"), has_triangles))
+
+
+def ao_method_resolve(method: str, has_triangles: bool) -> str:
+    """Likewise of AO."""
+    return word("VSH_AO_", lib.vsh_ao_method_resolve(constant("VSH_AO_", method, "method"), has_triangles))
+
+
+# --- image files: planes of floats with names
+
+
+_AXES = {"irradiance": "RGB", "tint": "RGB", "bent": "XYZ"}
+_HOLDS = {"irradiance": "light", "tint": "light", "bent": "vector"}
+
+
+def _flat(channels: Mapping[str, ArrayLike]) -> "Tuple[Dict[str, numpy.ndarray], Dict[str, str]]":
+    """Channels of one plane each, and what they hold: of a plane (height, width, 3) its axes, as files name them."""
+    planes, holds = {}, {}
+    for name, values in channels.items():
+        found = numpy.asarray(values)
+        kind = name.split(".")[0]
+        if found.ndim == 3 and found.shape[2] == 3:
+            for c, axis in enumerate(_AXES.get(kind, "RGB")):
+                planes[f"{name}.{axis}"] = found[:, :, c]
+                holds[f"{name}.{axis}"] = _HOLDS.get(kind, "data")
+        else:
+            planes[name] = found
+            holds[name] = _HOLDS.get(kind, "data")
+    return planes, holds
+
+
+def _named(names: Sequence[str], shape: Tuple[int, int], holds: Optional[Mapping[str, str]] = None) -> Filled:
+    """``vsh_image`` of channels' names, without planes."""
+    kinds = [constant("VSH_CHANNEL_", (holds or {}).get(n, _HOLDS.get(n.split(".")[0], "data")), "holds") for n in names]
+    return Filled("vsh_image", width=shape[1], height=shape[0], channel_count=len(names), names=texts_of(list(names), "names"),
+                  holds=ffi.new("int32_t[]", kinds or 1))
+
+
+def image_of(channels: Mapping[str, ArrayLike], holds: Optional[Mapping[str, str]] = None) -> Filled:
+    """``vsh_image`` of channels by their names."""
+    planes, kinds = _flat(channels)
+    kinds.update(holds or {})
+    shape: Any = next((plane.shape for plane in planes.values()), (0, 0))
+    if len(shape) != 2:
+        raise ValueError(f"channel {next(iter(planes))!r}: expected shape (height, width) or (height, width, 3), got {shape}")
+    if max(shape) >= 2**31:
+        raise ValueError(f"an image of {shape[1]} × {shape[0]}: too large")
+    pointers = [pointer(array(plane, numpy.float32, shape, f"channel {name!r}")) for name, plane in planes.items()]
+    image = _named(list(planes), shape, kinds)
+    image.fill(dict(planes=keep(ffi.new("float *[]", pointers or 1), pointers)))
+    return image
+
+
+class Image(dict):
+    """Planes of an image file by their names: arrays of float32 of shape (height, width), row 0 on top, views.
+
+    Attributes
+    ----------
+    attributes : dict
+        lines of text that the file carries
+    """
+
+    attributes: Dict[str, str]
+
+
+def image_read(path: Path, *, run: Optional[Run] = None) -> Image:
+    """Reads an image; integers become 0 … 1 as they stand."""
+    file = call(lib.vsh_image_read, path_of(path, "path"), OUT, run=run)
+    view = lib.vsh_image_view(file)
+    image = Image()
+    for i in range(view.channel_count):
+        image[text(view.names[i])] = borrowed(view.planes[i], (view.height, view.width), numpy.float32, file)
+    count = ffi.new("size_t *")
+    attributes = lib.vsh_image_attributes(file, count)
+    image.attributes = pairs_of(attributes, count[0])
+    return image
+
+
+def _options(options: Any, attributes: Optional[Attributes]) -> Filled:
+    return Filled("vsh_image_options", options, attributes=attributes_of(attributes))
+
+
+def image_write(path: Path, channels: Mapping[str, ArrayLike], *, holds: Optional[Mapping[str, str]] = None,
+                attributes: Optional[Attributes] = None, **options: "Unpack[types.ImageOptions]") -> None:
+    """Writes an image, whole or not at all; the path's ending is the format (docs/formats.md).
+
+    Parameters
+    ----------
+    channels : mapping
+        arrays of float32 by their names: shape (height, width), row 0 on top; of (height, width, 3) each axis is a
+        channel, "irradiance.R"
+    holds : mapping, optional
+        what channels hold: "data", "light", "vector"
+    attributes : mapping, optional
+        lines of text
+    **options
+        vdbshade.types.ImageOptions: bits, pack, color_space
+    """
+    call(lib.vsh_image_write, path_of(path, "path"), image_of(channels, holds), _options(options, attributes))
+
+
+def image_check(path: Path, names: Sequence[str], shape: Tuple[int, int], *,
+                attributes: Optional[Attributes] = None, **options: "Unpack[types.ImageOptions]") -> int:
+    """Whether such an image could be written, without writing; bytes that writing would take at most."""
+    given = (path_of(path, "path"), _named(names, shape), _options(options, attributes))
+    call(lib.vsh_image_check, *given)
+    return ask(lib.vsh_image_writer_bytes, *given)
+
+
+def image_default_pack(names: Sequence[str]) -> str:
+    """The packing that is used where none is given: "R=irradiance.R,…"."""
+    packed = ffi.new("char[]", 1024)
+    ask(lib.vsh_image_default_pack, _named(names, (1, 1)), packed, 1024)
+    return ffi.string(packed).decode()
+
+
+class ImageWriter(Handle, kind="vsh_image_writer"):
+    """An image that is written as its rows come. In a ``with``, which puts the file in place at its end, or leaves the old
+    one where something is raised.
+
+    Parameters
+    ----------
+    names : sequence of str
+        its channels
+    shape : two ints
+        height and width
+    """
+
+    def __init__(self, path: Path, names: Sequence[str], shape: Tuple[int, int], *,
+                 holds: Optional[Mapping[str, str]] = None, attributes: Optional[Attributes] = None,
+                 **options: "Unpack[types.ImageOptions]") -> None:
+        super().__init__(call(lib.vsh_image_writer_create, path_of(path, "path"), _named(names, shape, holds),
+                              _options(options, attributes), OUT))
+        self._names, self._width = list(names), shape[1]
+
+    def add(self, channels: Mapping[str, ArrayLike]) -> None:
+        """The next rows from the top: arrays of float32 of shape (rows, width)."""
+        if set(channels) != set(self._names):
+            raise ValueError(f"channels: expected {', '.join(self._names)}; got {', '.join(channels)}")
+        arrays = [array(channels[n], numpy.float32, (None, self._width), f"channel {n!r}") for n in self._names]
+        rows = len(arrays[0]) if arrays else 0
+        if any(len(a) != rows for a in arrays):
+            raise ValueError("channels: expected as many rows of each")
+        call(lib.vsh_image_writer_add, self, rows, ffi.new("float *[]", [pointer(a) for a in arrays]))
+
+    @property
+    def clipping(self) -> types.ImageClipping:
+        """Light that integers cut, of the rows so far."""
+        return call(lib.vsh_image_writer_get_clipping, self, OUT)
+
+    def finish(self) -> None:
+        """Puts the file in place."""
+        writer = self.handle
+        self.close()
+        ffi.gc(writer, None)  # it is freed by this, also where it fails
+        call(lib.vsh_image_writer_finish, writer)
+
+    def abandon(self) -> None:
+        """Leaves the old file as it was."""
+        if not self.closed:
+            ffi.release(self.handle)
+            self.close()
+
+    def __exit__(self, kind: Any, *raised: Any) -> None:
+        if kind is not None:
+            self.abandon()
+        elif not self.closed:
+            self.finish()
+
+
+def srgb_to_linear(encoded: float) -> float:
+    """Takes the sRGB curve off a value of 0 … 1."""
+    return lib.vsh_srgb_to_linear(encoded)
+
+
+# --- lightmaps and volumes
+
+
+def _lightmap_options(options: Dict[str, Any]) -> Filled:
+    own, shade = split(options, "vsh_lightmap_options", "vsh_shade_options")
+    return Filled("vsh_lightmap_options", dict(own, shade=shade))
+
+
+def _handle(charts: Any) -> Any:
+    return struct_of(charts, ffi.typeof("vsh_charts"))
+
+
+def charts_closeness(meshes: Meshes, width: int, height: int, *, run: Optional[Run] = None) -> types.Closeness:
+    """How close to each other the charts of a lightmap of this size (texels) lie."""
+    return call(lib.vsh_charts_closeness, *meshes_of(meshes), width, height, OUT, run=run)
+
+
+class Texels(Handle, kind="vsh_texels"):
+    """Where each texel of a lightmap lies in the world, by Charts.texels()."""
+
+    @property
+    def samples(self) -> Dict[str, numpy.ndarray]:
+        """The samples, tile by tile, as views: "positions" float64 (n, 3), "normals" and "geometric_normals" float32 (n, 3),
+        "texels" uint32 (n,)."""
+        found = lib.vsh_texels_samples(self.handle)
+        n, owner = found.count, self.handle
+        return dict(positions=borrowed(found.positions, (n, 3), numpy.float64, owner),
+                    normals=borrowed(found.normals, (n, 3), numpy.float32, owner),
+                    geometric_normals=borrowed(found.geometric_normals, (n, 3), numpy.float32, owner),
+                    texels=borrowed(found.texels, (n,), numpy.uint32, owner))
+
+
+class Charts(Handle, kind="vsh_charts"):
+    """The charts of a receiver at one size of lightmap. They keep the meshes' arrays.
+
+    Parameters
+    ----------
+    meshes : Mesh, Model or sequence of Mesh
+        with lightmap UVs
+    width, height : int
+        texels (1024)
+    supersample : int
+        N × N samples a texel
+    padding : int or "auto"
+        texels that charts are grown by
+    **options
+        vdbshade.types.LightmapOptions and ShadeOptions: what a bake is made by that is given no other
+    """
+
+    info: types.ChartsInfo
+
+    def __init__(self, meshes: Meshes, *, run: Optional[Run] = None, **options: Any) -> None:
+        structs, count = meshes_of(meshes)
+        reports, charts = call(lib.vsh_charts_create, structs, count, _lightmap_options(options), Several(count), OUT, run=run, keeps=structs)
+        self._begin(charts, count)
+        #: what is wrong with the UVs, mesh by mesh
+        self.uv_reports: List[types.UvReport] = reports
+
+    def _begin(self, cdata: Any, mesh_count: int) -> None:
+        Handle.__init__(self, cdata)
+        self.shape: Tuple[int, int] = (self.info.height, self.info.width)
+        self.mesh_count = mesh_count
+
+    def texels(self, *, run: Optional[Run] = None) -> Texels:
+        """Where each texel lies in the world."""
+        return Texels(call(lib.vsh_texels_create, self, OUT, run=run))
+
+
+class Planes(Dict[str, numpy.ndarray]):
+    """Planes of an image by their channels' names."""
+
+    def write(self, path: Path, **options: Any) -> None:
+        """Writes them as an image; options of image_write()."""
+        image_write(path, self, **options)
+
+
+class Lightmap(Planes):
+    """Planes of a lightmap by their names, as files name channels: arrays of float32 of shape (height, width), row 0 at
+    v = 1; of "irradiance", "bent" and "tint.NAME" (height, width, 3).
+
+    Attributes
+    ----------
+    stats : vdbshade.types.BakeStats
+        counts of texels and of work
+    errors : dict
+        root mean square error that is estimated of "shadow.NAME", "ao" and "sky"; NaN where a method knows none
+    field_errors : dict
+        what of it rays don't account for: the voxels'
+    """
+
+    stats: types.BakeStats
+    errors: Dict[str, float]
+    field_errors: Dict[str, float]
+
+
+class _Planes(Struct):
+    """``vsh_lightmap`` and the arrays that it points to."""
+
+    def __init__(self, shape: Tuple[int, int], names: Sequence[str], out: Optional[Mapping[str, numpy.ndarray]], *, ao: bool = False,
+                 irradiance: bool = False, bent: Optional[str] = None, sky: Optional[str] = None, error: bool = False,
+                 invalid: bool = False, tint: Any = None, ambient: Any = None) -> None:
+        wanted: Dict[str, Tuple[int, ...]] = {}
+        threes = (*shape, 3)
+        wanted.update({f"shadow.{n}": shape for n in names})
+        wanted.update({f"tint.{n}": threes for n in names if tint is not None})
+        wanted.update({f"error.{n}": shape for n in names if error})
+        for name, asked, size in (("ao", ao, shape), ("error.ao", ao and error, shape), ("irradiance", irradiance, threes),
+                                  ("bent", bent, threes), ("sky", sky, shape), ("invalid", invalid, shape), ("A", True, shape)):
+            if asked:
+                wanted[name] = size
+        if len(set(names)) != len(names):
+            raise ValueError(f"lights: two of one name ({', '.join(names)})")
+        unknown = set(out or {}) - set(wanted)
+        if unknown:
+            raise ValueError(f"out: {', '.join(sorted(unknown))}: not asked for; there are {', '.join(wanted)}")
+        self.arrays = {n: output((out or {}).get(n), numpy.float32, size, f"out[{n!r}]") for n, size in wanted.items()}
+        given: Dict[str, Any] = dict(asked=dict(invalid=bool(invalid), sky=sky))
+        given["bent_space"] = None if bent is None else constant("VSH_BENT_", bent, "bent")
+        given["tint_by"] = None if tint is None else tint_of(tint)
+        given["ambient"] = None if ambient is None else vector(ambient, 3, "ambient")
+        for member, kind in (("shadow", "shadow"), ("tint", "tint"), ("shadow_error", "error")):
+            planes = [pointer(self.arrays[f"{kind}.{n}"]) for n in names if f"{kind}.{n}" in self.arrays]
+            given[member] = keep(ffi.new("float *[]", planes), planes) if planes else None
+        for member, kind in (("ao", "ao"), ("ao_error", "error.ao"), ("irradiance", "irradiance"), ("coverage", "A"),
+                             ("bent", "bent"), ("sky", "sky"), ("invalid", "invalid")):
+            given[member] = self.arrays.get(kind)
+        self.struct = Filled("vsh_lightmap", given).struct
+
+
+def _names(structs: Any, count: int) -> List[str]:
+    return [ffi.string(structs[i].name).decode() for i in range(count)]
+
+
+def bake_lightmap(occluders: Occluders, charts: Charts, lights: Union[Light, Sequence[Light]] = (), *, ao: bool = False,
+                  irradiance: bool = False, bent: Optional[str] = None, sky: Optional[str] = None, error: bool = False,
+                  invalid: bool = False, tint: "str | types.Tint | None" = None, ambient: Optional[Sequence[float]] = None,
+                  out: Optional[Mapping[str, numpy.ndarray]] = None, run: Optional[Run] = None,
+                  **options: "Unpack[types.ShadeOptions]") -> Lightmap:
+    """Shades the texels of charts into planes: "shadow.NAME" of each light, "A" (1 where a texel is valid), and what is asked for.
+
+    Parameters
+    ----------
+    lights : Light or sequence of Light
+        no two of one name
+    ao : bool
+        AO within ``ao_distance``, world units
+    irradiance : bool
+        linear RGB; with `ambient` (linear RGB) light from all around
+    bent : str, optional
+        bent normals in "world" or "tangent" space (charts of ``tangents=True``)
+    sky : str, optional
+        the sky that is seen, of one that is up: "y", "-z"
+    error : bool
+        the standard error left in each shadow and AO value
+    invalid : bool
+        where texels are invalid
+    tint : str or dict, optional
+        "quadratic", or dict(type="power", power=(r, g, b))
+    out : mapping, optional
+        arrays of float32 that planes are written into, by their names; (height, width) or (height, width, 3)
+    **options
+        vdbshade.types.ShadeOptions; none: those that the charts were made with
+
+    Returns
+    -------
+    Lightmap
+    """
+    structs, count = lights_of(lights)
+    names = _names(structs, count)
+    target = _handle(charts)
+    planes = _Planes(charts.shape, names, out, ao=ao, irradiance=irradiance, bent=bent, sky=sky, error=error, invalid=invalid,
+                     tint=tint, ambient=ambient)
+    errors = ffi.new("vsh_bake_error[]", count + 2)
+    by_mesh = ffi.new("uint64_t[]", max(charts.mesh_count, 1))
+    stats = Filled("vsh_bake_stats", errors=errors, invalid_by_mesh=by_mesh)
+    call(lib.vsh_bake_lightmap, occluders, target, structs, count, Filled("vsh_shade_options", options) if options else None, planes, stats,
+         run=run)
+    lightmap = Lightmap(planes.arrays)
+    lightmap.stats = told(stats.struct)
+    lightmap.stats.errors = None
+    lightmap.stats.invalid_by_mesh = list(by_mesh)[: charts.mesh_count]
+    kinds = [f"shadow.{n}" for n in names] + ["ao"] + (["sky"] if sky else [])
+    lightmap.errors = {n: lib.vsh_bake_error_rmse(errors + i) for i, n in enumerate(kinds) if n in lightmap}
+    lightmap.field_errors = {n: lib.vsh_bake_error_field(errors + i) for i, n in enumerate(kinds) if n in lightmap}
+    return lightmap
+
+
+def _shadows(lightmap: Mapping[str, numpy.ndarray]) -> List[str]:
+    return [n[len("shadow.") :] for n in lightmap if n.startswith("shadow.")]
+
+
+def _given(shape: Tuple[int, int], names: List[str], lightmap: Mapping[str, numpy.ndarray], bent: Optional[str] = None) -> _Planes:
+    """The planes of a lightmap whose values are moved; those of `names` in their order."""
+    given = {n: p for n, p in lightmap.items() if n.split(".")[0] in ("shadow", "tint", "ao", "irradiance", "sky", "A")}
+    if bent is not None:
+        given["bent"] = lightmap["bent"]
+    tinted = any(n.startswith("tint.") for n in given)
+    if "A" not in given:
+        raise ValueError("lightmap: expected a plane 'A', its coverage")
+    return _Planes(shape, names, given, ao="ao" in given, irradiance="irradiance" in given, bent=bent,
+                   sky="y" if "sky" in given else None, tint="quadratic" if tinted else None)
+
+
+def lightmap_stitch(charts: Charts, lightmap: Mapping[str, numpy.ndarray], *, run: Optional[Run] = None,
+                    **options: "Unpack[types.StitchOptions]") -> types.StitchReport:
+    """Makes the values on both sides of charts' borders agree, in a whole lightmap that was baked of these charts. Its arrays
+    are written into."""
+    return lightmaps_stitch([(charts, lightmap)], run=run, **options)
+
+
+def lightmaps_stitch(pages: Sequence[Tuple[Charts, Mapping[str, numpy.ndarray]]], *, run: Optional[Run] = None,
+                     **options: "Unpack[types.StitchOptions]") -> types.StitchReport:
+    """As lightmap_stitch() of several lightmaps of any sizes, such as pages of one atlas: borders between them, too.
+
+    Parameters
+    ----------
+    pages : sequence of (Charts, Lightmap)
+        all of the same planes, whose arrays are written into
+    **options
+        vdbshade.types.StitchOptions
+    """
+    pages = list(pages)
+    names = _shadows(pages[0][1]) if pages else []
+    for i, (_, lightmap) in enumerate(pages):
+        if set(lightmap) != set(pages[0][1]):
+            raise ValueError(f"pages: number {i} has planes {', '.join(sorted(lightmap))}, the first {', '.join(sorted(pages[0][1]))}")
+    structs = structs_of("vsh_stitch_page", [dict(charts=_handle(c), lightmap=_given(c.shape, names, lightmap)) for c, lightmap in pages])
+    return call(lib.vsh_lightmaps_stitch, structs, len(pages), len(names), Filled("vsh_stitch_options", options), OUT, run=run)
+
+
+def lightmap_fill_hidden(charts: Charts, lightmap: Mapping[str, numpy.ndarray], *, bent: Optional[str] = None,
+                         run: Optional[Run] = None) -> int:
+    """Gives texels that are not valid and that no valid one of their chart filled, as those of faces that touch each other, the
+    values of the texel that is nearest in the world, and pads around them. The lightmap's arrays are written into.
+
+    Parameters
+    ----------
+    charts : Charts
+        that the lightmap was baked of
+    bent : str, optional
+        the space of a plane "bent"; None: it is left, as one in "tangent" space is
+
+    Returns
+    -------
+    int
+        how many texels were filled
+    """
+    names = _shadows(lightmap)
+    return call(lib.vsh_lightmap_fill_hidden, _handle(charts), _given(charts.shape, names, lightmap, bent), len(names), OUT, run=run)
+
+
+class Voxels(Handle, kind="vsh_voxels"):
+    """Voxels that are to be shaded, and where they lie. Made by its ``from_…`` methods."""
+
+    info: types.VoxelsInfo
+
+    def __init__(self, *arguments: Any) -> None:
+        raise TypeError("Voxels are made by Voxels.from_grid(), from_box() or from_vdb()")
+
+    @classmethod
+    def from_grid(cls, grid: Grid, band: float = 0.0, *, run: Optional[Run] = None) -> "Voxels":
+        """A level set's own narrow band, `band` voxels to both sides; 0: all of it."""
+        return cls._of(call(lib.vsh_voxels_from_grid, grid, band, OUT, run=run))
+
+    @classmethod
+    def from_box(cls, box_min: Sequence[float], box_max: Sequence[float], voxel_size: float, *, run: Optional[Run] = None) -> "Voxels":
+        """Cubes that cover a world box, world units."""
+        return cls._of(call(lib.vsh_voxels_from_box, vector(box_min, 3, "box_min"), vector(box_max, 3, "box_max"), voxel_size, OUT, run=run))
+
+    @classmethod
+    def from_vdb(cls, path: Path, name: Optional[str] = None, *, run: Optional[Run] = None) -> "Voxels":
+        """The active voxels of a grid of numbers in a .vdb file; `name` None: the first such grid."""
+        return cls._of(call(lib.vsh_voxels_from_vdb, path_of(path, "path"), name, OUT, run=run))
+
+    def centre(self, x: int, y: int, z: int) -> Tuple[float, ...]:
+        """World position of a voxel's centre."""
+        return ask(lib.vsh_voxels_centre, self, ffi.new("int32_t[3]", [x, y, z]), Several(3))
+
+
+class Volume(Handle, kind="vsh_volume"):
+    """Grids of a bake: "shadow.NAME", "ao", "error.NAME", "error.ao"."""
+
+    info: types.VolumeInfo
+
+    @property
+    def grids(self) -> List[types.VolumeGrid]:
+        """Names and values of its grids."""
+        return [ask(lib.vsh_volume_get_grid, self, i, OUT) for i in range(self.info.grids)]
+
+    def _number(self, grid: Union[int, str]) -> int:
+        if isinstance(grid, int):
+            return grid if grid >= 0 else 2**32  # which is none
+        names = [g.name for g in self.grids]
+        if grid not in names:
+            raise KeyError(f"no grid {grid!r}; there are {', '.join(names)}")
+        return names.index(grid)
+
+    def sample(self, grid: Union[int, str], positions: ArrayLike, out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
+        """Values at positions (n, 3), world units, interpolated: an array of float32 of shape (n,)."""
+        at = array(positions, numpy.float64, (None, 3), "positions")
+        values = output(out, numpy.float32, (len(at),), "out")
+        call(lib.vsh_volume_sample, self, self._number(grid), len(at), at, values)
+        return values
+
+    def values(self, grid: Union[int, str], index_min: Sequence[int], shape: Sequence[int],
+               out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
+        """A dense copy: float32 of shape (depth, height, width) from voxel `index_min` (x, y, z) on; 1 where not active."""
+        number = self._number(grid)
+        return dense(None, index_min, shape, out, lambda *box: call(lib.vsh_volume_copy, self, number, *box))
+
+    def write(self, path: Path, *, half: bool = False, attributes: Optional[Attributes] = None) -> None:
+        """Writes all grids as one .vdb file, whole or not at all."""
+        lines = attributes_of(attributes)
+        call(lib.vsh_volume_write, self, path_of(path, "path"), half, structs_of("vsh_attribute", lines), len(lines))
+
+
+def bake_volume(occluders: Occluders, voxels: Voxels, lights: Union[Light, Sequence[Light]] = (), *, stats: Optional[Stats] = None,
+                run: Optional[Run] = None, **options: Any) -> Volume:
+    """Shades voxels.
+
+    Parameters
+    ----------
+    occluders : Occluders
+        with voxels of their own
+    **options
+        ``ao``, ``error`` (bool), ``inside`` ("nearest", "off") of vdbshade.types.VolumeOptions, and vdbshade.types.ShadeOptions
+    """
+    structs, count = lights_of(lights)
+    own, shade = split(options, "vsh_volume_options", "vsh_shade_options")
+    filled = Filled("vsh_volume_options", own, shade=shade)
+    return Volume(call(lib.vsh_bake_volume, occluders, voxels, structs, count, filled, OUT, stats, run=run))
+
+
+# --- pictures
+
+
+class Camera(Struct, kind="vsh_camera"):
+    """A pinhole.
+
+    Parameters
+    ----------
+    position, target, up : three floats
+        world units
+    fov : float
+        angle over the picture's height, radians
+    """
+
+    def __init__(self, **options: "Unpack[types.Camera]") -> None:
+        self.struct = Filled("vsh_camera", options).struct
+        call(lib.vsh_camera_check, self)
+
+    def frame(self, bounds_min: ArrayLike, bounds_max: ArrayLike, azimuth: float = 0.5, elevation: float = 0.5,
+              aspect: float = 16 / 9) -> "Camera":
+        """Moves it so that it sees a whole world box; angles in radians, `aspect` is width over height."""
+        call(lib.vsh_camera_frame, self, vector(bounds_min, 3, "bounds_min"), vector(bounds_max, 3, "bounds_max"), azimuth, elevation, aspect)
+        return self
+
+    def frame_points(self, points: ArrayLike, azimuth: float = 0.5, elevation: float = 0.5, aspect: float = 16 / 9) -> "Camera":
+        """The same for points (n, 3), as near as they can all be seen."""
+        at = array(points, numpy.float64, (None, 3), "points")
+        call(lib.vsh_camera_frame_points, self, len(at), at, azimuth, elevation, aspect)
+        return self
+
+    def orbit(self, angle: float) -> "Camera":
+        """Turns it around its target, radians."""
+        ask(lib.vsh_camera_orbit, self, angle)
+        return self
+
+
+class LitMeshes(Struct, kind="vsh_lit_meshes"):
+    """Meshes that are shown themselves.
+
+    Parameters
+    ----------
+    meshes : Mesh, Model or sequence of Mesh
+    lightmap : mapping, optional
+        planes of a bake on them; None: light is asked for at each point
+    color : three floats
+    ambient : bool
+        its irradiance has the sky's light in it
+    """
+
+    def __init__(self, meshes: Meshes, lightmap: Optional[Mapping[str, ArrayLike]] = None, color: Sequence[float] = (0.7, 0.7, 0.7),
+                 ambient: bool = False) -> None:
+        structs, count = meshes_of(meshes)
+        self.struct = Filled("vsh_lit_meshes", color=color, ambient=ambient, meshes=structs, mesh_count=count,
+                             lightmap=None if lightmap is None else image_of(lightmap)).struct
+
+
+class Picture(Dict[str, numpy.ndarray]):
+    """Planes of float32, row 0 on top: "color" (height, width, 3) linear RGB, "alpha", "depth" (height, width), "normal"
+    (height, width, 3)."""
+
+    def encode(self, exposure: float = 0.0, alpha: bool = False) -> numpy.ndarray:
+        """For files of 8 bits: float32 of shape (height, width, 3 or 4), 0 … 1, through the sRGB curve."""
+        height, width = self["alpha"].shape
+        planes = [numpy.empty((height, width), numpy.float32) for _ in range(4 if alpha else 3)]
+        call(lib.vsh_picture_encode, Filled("vsh_picture", {n: self[n] for n in ("color", "alpha", "depth", "normal")}), width, height, exposure,
+             ffi.new("float *[3]", [pointer(p) for p in planes[:3]]), planes[3] if alpha else None)
+        return numpy.stack(planes, axis=2)
+
+
+def render(surfaces: "Sequence[Union[Field, Tuple[Field, Sequence[float]]]]", occluders: Occluders,
+           lights: Union[Light, Sequence[Light]] = (), *, camera: Optional[Camera] = None, lit: Sequence[LitMeshes] = (),
+           tint: Any = None, stats: Optional[Stats] = None, run: Optional[Run] = None, **options: Any) -> Picture:
+    """Renders a picture.
+
+    Parameters
+    ----------
+    surfaces : sequence
+        fields, or pairs of a field and its colour
+    **options
+        vdbshade.types.RenderOptions: width, height, samples, sky, background, ao, shafts; and ShadeOptions
+    """
+    own, shade = split(options, "vsh_render_options", "vsh_shade_options")
+    filled = Filled("vsh_render_options", own, shade=shade, camera=camera, lit=lit, tint=None if tint is None else tint_of(tint))
+    pairs = [s if isinstance(s, tuple) else (s, (0.7, 0.7, 0.7)) for s in surfaces]
+    fields = structs_of("vsh_surface", [dict(field=field, color=color) for field, color in pairs])
+    shape = (filled.struct.height, filled.struct.width)
+    if not all(0 <= n <= 16384 for n in shape):
+        shape = (0, 0)  # refused by the library, which says why
+    sizes = dict(color=(*shape, 3), alpha=shape, depth=shape, normal=(*shape, 3))
+    picture = Picture({name: numpy.empty(size, numpy.float32) for name, size in sizes.items()})
+    call(lib.vsh_render, fields, len(pairs), occluders, *lights_of(lights), filled, Filled("vsh_picture", picture), stats, run=run)
+    return picture
