@@ -363,7 +363,7 @@ void vshi_gltf_free_buffers(vshi_gltf *gltf) {
 
 static const struct {
     size_t size; /* bytes; 0: no type */
-    float one;   /* what stands for 1 if normalized; 0: never is */
+    float one;   /* the value of 1 if normalized; 0: not normalized */
 } component_types[] = {{1, 127.0F}, {1, 255.0F}, {2, 32767.0F}, {2, 65535.0F},
                        {0, 0.0F},   {4, 0.0F},   {4, 0.0F}};
 
