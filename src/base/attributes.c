@@ -1,5 +1,7 @@
 #include "base/attributes.h"
 
+#include "base/memory.h"
+
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -45,14 +47,9 @@ vsh_result vshi_attributes_check(const char *path, const vsh_attribute *attribut
 }
 
 bool vshi_attributes_add(vshi_attributes *a, const char *name, const char *value) {
-    if (a->count == a->capacity) {
-        const size_t capacity = 2 * a->capacity + 16;
-        vsh_attribute *list = realloc(a->list, capacity * sizeof *list);
-        if (list == NULL) {
-            return false;
-        }
-        a->list = list;
-        a->capacity = capacity;
+    if (vshi_make_room((void **)&a->list, a->count, &a->capacity, sizeof *a->list, "attributes", NULL) !=
+        VSH_OK) {
+        return false;
     }
     const size_t name_size = strlen(name) + 1, value_size = strlen(value) + 1;
     char *texts = malloc(name_size + value_size);

@@ -18,6 +18,17 @@ static const char *last_part(const char *path) {
     return slash != NULL ? slash + 1 : path;
 }
 
+/* The folder of the path, in new memory: "." where the path names none. */
+static char *folder_of(const char *path) {
+    const size_t length = (size_t)(last_part(path) - path);
+    char *folder = malloc(length + 2);
+    if (folder != NULL) {
+        memcpy(folder, length > 0 ? path : ".", length > 0 ? length : 1);
+        folder[length > 1 ? length - 1 : 1] = '\0';
+    }
+    return folder;
+}
+
 const char *vshi_path_ending(const char *path) {
     const char *name = last_part(path);
     const char *dot = strrchr(name, '.');
@@ -129,13 +140,9 @@ static bool is_left(int file, long process) {
  * Files of other users, and those that cannot be opened, stay. */
 static void clean_temporaries(const char *target) {
     const naming n = naming_of(target);
-    char folder[PATH_MAX];
-    if (n.folder_length >= PATH_MAX) {
-        return;
-    }
-    snprintf(folder, sizeof folder, "%.*s", n.folder_length > 0 ? n.folder_length : 1,
-             n.folder_length > 0 ? target : ".");
-    DIR *listing = opendir(folder);
+    char *folder = folder_of(target);
+    DIR *listing = folder != NULL ? opendir(folder) : NULL;
+    free(folder);
     if (listing == NULL) {
         return;
     }
@@ -188,17 +195,6 @@ void vshi_temporary_remove_own(void) {
 }
 
 /* --- files that appear whole or not at all */
-
-/* The folder of the path, in new memory: "." where the path names none. */
-static char *folder_of(const char *path) {
-    const size_t length = (size_t)(last_part(path) - path);
-    char *folder = malloc(length + 2);
-    if (folder != NULL) {
-        memcpy(folder, length > 0 ? path : ".", length > 0 ? length : 1);
-        folder[length > 1 ? length - 1 : 1] = '\0';
-    }
-    return folder;
-}
 
 static vsh_result check_target(const char *path, vsh_error *error) {
     struct stat status;
@@ -473,7 +469,7 @@ static bool lies_in(const char *folder, const char *path) {
 }
 
 bool vshi_input_is_beside(const char *model, const char *path) {
-    char file[PATH_MAX], folder[PATH_MAX], given[PATH_MAX];
+    char file[PATH_MAX], folder[PATH_MAX];
     if (realpath(path, file) == NULL) {
         return errno == ENOENT;
     }
@@ -483,12 +479,8 @@ bool vshi_input_is_beside(const char *model, const char *path) {
             return true;
         }
     }
-    const char *slash = strrchr(model, '/');
-    const size_t length = slash != NULL ? (size_t)(slash - model) + 1 : 0;
-    if (length >= sizeof given) {
-        return false;
-    }
-    memcpy(given, length > 0 ? model : ".", length > 0 ? length : 1);
-    given[length > 0 ? length : 1] = '\0';
-    return realpath(given, folder) != NULL && lies_in(folder, file);
+    char *given = folder_of(model);
+    const bool beside = given != NULL && realpath(given, folder) != NULL && lies_in(folder, file);
+    free(given);
+    return beside;
 }

@@ -110,8 +110,8 @@ static vsh_result list(vshi_lit_document *document, vshi_lit_dracos *dracos, vsh
     json_array_foreach(json_object_get(document->gltf.root, "meshes"), m, mesh) {
         json_array_foreach(json_object_get(mesh, "primitives"), p, primitive) {
             if (vshi_gltf_extension(primitive, extension_name) != NULL) {
-                VSHI_TRY(vshi_model_grow(&dracos->list, dracos->count, &capacity, sizeof *dracos->list,
-                                         document->gltf.path, error));
+                VSHI_TRY(vshi_make_room((void **)&dracos->list, dracos->count, &capacity,
+                                        sizeof *dracos->list, document->gltf.path, error));
                 dracos->list[dracos->count++] = (vshi_lit_draco){.mesh = m, .primitive = p};
             }
         }

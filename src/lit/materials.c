@@ -2,6 +2,8 @@
  * KHR_materials_unlit. */
 #include "lit/work.h"
 
+#include "base/memory.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -24,8 +26,8 @@ static vsh_result find_look(vshi_lit_work *work, const vshi_lit_look *wanted, si
             return VSH_OK;
         }
     }
-    VSHI_TRY(vshi_model_grow(&looks->list, looks->count, &looks->capacity, sizeof *looks->list,
-                             work->document.gltf.path, error));
+    VSHI_TRY(vshi_make_room((void **)&looks->list, looks->count, &looks->capacity, sizeof *looks->list,
+                            work->document.gltf.path, error));
     looks->list[looks->count++] = *wanted;
     json_incref(wanted->transform);
     return VSH_OK;

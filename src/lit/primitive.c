@@ -502,8 +502,8 @@ static vsh_result gather(const primitive *p, size_t split, size_t index,
     vsh_result result;
     VSHI_TRY_DONE(open_elements(p, index, draco, &from, &dense, error));
     VSHI_TRY_DONE(copy_elements(p, index, &from, bounds, accessor, error));
-    VSHI_TRY_DONE(vshi_model_grow(&work->copies, work->copy_count, &work->copy_capacity, sizeof *work->copies,
-                                  work->document.gltf.path, error));
+    VSHI_TRY_DONE(vshi_make_room((void **)&work->copies, work->copy_count, &work->copy_capacity,
+                                 sizeof *work->copies, work->document.gltf.path, error));
     work->copies[work->copy_count++] = (vshi_lit_copy){split, index, *accessor};
 done:
     free(dense);
@@ -543,8 +543,8 @@ static vsh_result find_alike(const primitive *p, size_t *split, vsh_error *error
             return VSH_OK;
         }
     }
-    VSHI_TRY(vshi_model_grow(&work->splits, work->split_count, &work->split_capacity, sizeof *work->splits,
-                             work->document.gltf.path, error));
+    VSHI_TRY(vshi_make_room((void **)&work->splits, work->split_count, &work->split_capacity,
+                            sizeof *work->splits, work->document.gltf.path, error));
     work->splits[work->split_count++] = (vshi_lit_split){p->mesh, p->index, p->lit, SIZE_MAX};
     return VSH_OK;
 }
@@ -587,8 +587,8 @@ static vsh_result put_uvs(const primitive *p, size_t *accessor, vsh_error *error
         ++found;
     }
     if (found == work->uv_count) {
-        VSHI_TRY(vshi_model_grow(&work->uvs, work->uv_count, &work->uv_capacity, sizeof *work->uvs,
-                                 document->gltf.path, error));
+        VSHI_TRY(vshi_make_room((void **)&work->uvs, work->uv_count, &work->uv_capacity, sizeof *work->uvs,
+                                document->gltf.path, error));
         vshi_lit_uvs *made = &work->uvs[found];
         *made = (vshi_lit_uvs){.positions = positions, .count = p->element_count};
         VSHI_TRY(

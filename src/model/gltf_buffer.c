@@ -361,20 +361,15 @@ void vshi_gltf_free_buffers(vshi_gltf *gltf) {
 /* Accessors: typed elements of a buffer view, with those that a sparse accessor replaces (glTF 2.0, 3.6.2),
  * and integers as the numbers that they stand for (3.11, KHR_mesh_quantization). */
 
+static const struct {
+    size_t size; /* bytes; 0: no type */
+    float one;   /* the value of 1 if normalized; 0: not normalized */
+} component_types[] = {{1, 127.0F}, {1, 255.0F}, {2, 32767.0F}, {2, 65535.0F},
+                       {0, 0.0F},   {4, 0.0F},   {4, 0.0F}};
+
 size_t vshi_gltf_component_size(int type) {
-    switch (type) {
-    case VSHI_GLTF_BYTE:
-    case VSHI_GLTF_UBYTE:
-        return 1;
-    case VSHI_GLTF_SHORT:
-    case VSHI_GLTF_USHORT:
-        return 2;
-    case VSHI_GLTF_UINT:
-    case VSHI_GLTF_FLOAT:
-        return 4;
-    default:
-        return 0;
-    }
+    return type >= VSHI_GLTF_BYTE && type <= VSHI_GLTF_FLOAT ? component_types[type - VSHI_GLTF_BYTE].size
+                                                             : 0;
 }
 
 static int component_count(const char *type) {
@@ -512,18 +507,8 @@ vsh_result vshi_gltf_accessor_find(vshi_gltf *gltf, const json_t *object, const 
 
 /* Turns a normalized integer into 0 … 1 or -1 … 1. */
 static float normalize(float given, int type) {
-    switch (type) {
-    case VSHI_GLTF_BYTE:
-        return given / 127.0F < -1.0F ? -1.0F : given / 127.0F;
-    case VSHI_GLTF_UBYTE:
-        return given / 255.0F;
-    case VSHI_GLTF_SHORT:
-        return given / 32767.0F < -1.0F ? -1.0F : given / 32767.0F;
-    case VSHI_GLTF_USHORT:
-        return given / 65535.0F;
-    default:
-        return given;
-    }
+    const float one = component_types[type - VSHI_GLTF_BYTE].one;
+    return one > 0.0F ? fmaxf(given / one, -1.0F) : given;
 }
 
 /* Takes the element at `at` as element i of `to`. */

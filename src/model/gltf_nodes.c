@@ -194,8 +194,8 @@ static vsh_result read_mesh(vshi_gltf *gltf, size_t mesh, const vshi_gltf_pose *
     for (size_t i = 0; i < count; ++i) {
         char where[256];
         snprintf(where, sizeof where, "mesh %zu '%.150s': primitive %zu", mesh, name != NULL ? name : "", i);
-        VSHI_TRY(vshi_model_grow(&model->shapes, model->shape_count, &gltf->shape_capacity,
-                                 sizeof *model->shapes, gltf->path, error));
+        VSHI_TRY(vshi_make_room((void **)&model->shapes, model->shape_count, &gltf->shape_capacity,
+                                sizeof *model->shapes, gltf->path, error));
         vshi_model_shape *shape = &model->shapes[model->shape_count++];
         *shape = (vshi_model_shape){.positions = NULL};
         if (vshi_job_cancelled(gltf->job)) {

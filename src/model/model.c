@@ -64,12 +64,6 @@ vsh_result vshi_model_take_plain_materials(vsh_model *model, size_t count, vsh_e
 
 /* --- lights, in the world */
 
-vsh_result vshi_model_grow(void *list, size_t count, size_t *capacity, size_t size, const char *what,
-                           vsh_error *error) {
-    vshi_budget unlimited = {.path = what};
-    return vshi_grow(&unlimited, list, capacity, count + 1, size, error);
-}
-
 size_t vsh_model_light_count(const vsh_model *model) {
     return model->light_count;
 }
@@ -80,8 +74,8 @@ vsh_model_light vsh_model_get_light(const vsh_model *model, size_t index) {
 
 vsh_result vshi_model_add_light(vsh_model *model, const vsh_model_light *light, const char *name,
                                 vsh_error *error) {
-    VSHI_TRY(vshi_model_grow(&model->lights, model->light_count, &model->light_capacity,
-                             sizeof *model->lights, "a model's lights", error));
+    VSHI_TRY(vshi_make_room((void **)&model->lights, model->light_count, &model->light_capacity,
+                            sizeof *model->lights, "a model's lights", error));
     char *copy = NULL;
     if (name != NULL && name[0] != '\0') {
         VSHI_TRY(vshi_model_copy_line(name, &copy, error));
@@ -156,8 +150,8 @@ uint32_t vshi_model_next_object(const vsh_model *model) {
 static vsh_result append(vsh_model *model, const vshi_model_place *place, vsh_error *error) {
     vshi_model_entry entry = {.object = place->object, .shape = place->shape, .origin = place->origin};
     memcpy(entry.transform, place->world, sizeof entry.transform);
-    VSHI_TRY(vshi_model_grow(&model->entries, model->entry_count, &model->entry_capacity,
-                             sizeof *model->entries, "a model's meshes", error));
+    VSHI_TRY(vshi_make_room((void **)&model->entries, model->entry_count, &model->entry_capacity,
+                            sizeof *model->entries, "a model's meshes", error));
     VSHI_TRY(make_name(place->node, place->mesh, &entry.name, error));
     const vsh_result result = make_name(place->node, "", &entry.object_name, error);
     if (result != VSH_OK) {

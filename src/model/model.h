@@ -104,11 +104,6 @@ typedef struct vshi_model_place {
     vshi_model_origin origin;
 } vshi_model_place;
 
-/* Gives *list (a pointer to a pointer; NULL at first) room for one element more than `count`. Errors:
- * VSH_ERROR_MEMORY, naming `what`. */
-vsh_result vshi_model_grow(void *list, size_t count, size_t *capacity, size_t size, const char *what,
-                           vsh_error *error);
-
 /* Adds an entry; a transform that flattens it is left out, with a warning. Errors: VSH_ERROR_INPUT (a
  * transform that is not finite in 32 bits), VSH_ERROR_MEMORY. */
 vsh_result vshi_model_add(vsh_model *model, const char *path, const vsh_run *run,

@@ -481,11 +481,9 @@ static vsh_result reach_head(vshi_obj *obj, size_t place, bool *there, vsh_error
 /* The vertex of the current mesh with these parts. */
 static vsh_result vertex_of(vshi_obj *obj, const uint32_t part[VSHI_OBJ_KINDS], uint32_t *vertex,
                             vsh_error *error) {
-    bool there = true;
+    bool there;
     const size_t first = obj->meshes[obj->mesh].first_vertex;
-    if (part[0] > obj->head_count) {
-        VSHI_TRY(reach_head(obj, part[0], &there, error));
-    }
+    VSHI_TRY(reach_head(obj, part[0], &there, error));
     if (!there) {
         *vertex = 0;
         return VSH_OK;
@@ -548,10 +546,8 @@ static vsh_result read_face(vshi_obj *obj, const char **at, vsh_error *error) {
         uint32_t part[VSHI_OBJ_KINDS], vertex = 0;
         VSHI_TRY(read_corner(obj, &c, part, error));
         VSHI_TRY(vertex_of(obj, part, &vertex, error));
-        if (faces->count == faces->capacity) {
-            VSHI_TRY(vshi_grow(&obj->budget, &faces->corners, &faces->capacity, faces->count + 1,
-                               sizeof *faces->corners, error));
-        }
+        VSHI_TRY(vshi_grow(&obj->budget, &faces->corners, &faces->capacity, faces->count + 1,
+                           sizeof *faces->corners, error));
         faces->corners[faces->count++] = vertex;
     }
     *at = c;

@@ -178,16 +178,13 @@ static bool fail_value(ply_reader *r, vshi_token token, const char *expected) {
 
 static bool push_corner(ply_reader *r, uint32_t corner) {
     vshi_faces *faces = &r->faces;
-    const size_t at = faces->count + r->corners;
-    if (at == faces->capacity) {
-        const vsh_result result = vshi_grow(&r->budget, &faces->corners, &faces->capacity, at + 1,
-                                            sizeof *faces->corners, r->error);
-        if (result != VSH_OK) {
-            return fail(r, result);
-        }
+    const size_t at = faces->count + r->corners++;
+    const vsh_result result =
+        vshi_grow(&r->budget, &faces->corners, &faces->capacity, at + 1, sizeof *faces->corners, r->error);
+    if (result != VSH_OK) {
+        return fail(r, result);
     }
     faces->corners[at] = corner;
-    ++r->corners;
     return true;
 }
 

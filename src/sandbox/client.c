@@ -409,9 +409,6 @@ static vsh_result fail_end(const vshi_exchange *exchange, int status, bool begun
                          "%s: what its reader sends is more than this process's limit on the size of files "
                          "(ulimit -f); raise it, or read without a reader",
                          path);
-    case VSHI_READER_UNCONFINED:
-        return vshi_fail(error, VSH_ERROR_INTERNAL,
-                         "%s: not read: a thread of its reader is not confined as the others are", path);
     case VSHI_READER_EMPTY:
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "%s: its reader, '%s', cannot load the library of vdbshade %s", path, reader,

@@ -70,50 +70,6 @@ const char *vshi_missing_text(uint64_t confined, char text[VSHI_MISSING_TEXT]) {
     return text;
 }
 
-/* --- threads, as the kernel tells of them */
-
-enum { MODE_NONE = 0, MODE_FILTER = 2, STATUS_ROOM = 4096, PATH_ROOM = 64 };
-
-/* The number of filters on a kernel that does not count them. */
-enum { UNCOUNTED = -1 };
-
-typedef struct task_state {
-    int mode, filters;
-} task_state;
-
-static int field(const char *status, const char *name, int missing) {
-    const char *at = strstr(status, name);
-    return at != NULL ? atoi(at + strlen(name)) : missing;
-}
-
-/* False where it cannot be read, with errno: ENOENT or ESRCH of a task that has ended. */
-static bool read_state(const char *path, task_state *state) {
-    char status[STATUS_ROOM];
-    errno = 0;
-    const int file = open(path, O_RDONLY | O_CLOEXEC);
-    const ssize_t size = file >= 0 ? read(file, status, sizeof status - 1) : -1;
-    const int why = errno;
-    if (file >= 0) {
-        close(file);
-    }
-    if (size <= 0) {
-        errno = why;
-        return false;
-    }
-    status[size] = '\0';
-    *state =
-        (task_state){field(status, "\nSeccomp:", MODE_NONE), field(status, "\nSeccomp_filters:", UNCOUNTED)};
-    return true;
-}
-
-static const char own_status[] = "/proc/thread-self/status";
-
-/* Counts the filters of the calling thread. The host (a container, a sandbox) may have set some. */
-static int count_filters(void) {
-    task_state own = {MODE_NONE, 0};
-    return read_state(own_status, &own) ? own.filters : 0;
-}
-
 int vshi_task_count(void) {
     DIR *tasks = opendir("/proc/self/task");
     int count = 0;
@@ -124,26 +80,6 @@ int vshi_task_count(void) {
         closedir(tasks);
     }
     return count;
-}
-
-int vshi_tasks_filtered(int before) {
-    task_state own = {MODE_NONE, 0};
-    DIR *tasks = read_state(own_status, &own) ? opendir("/proc/self/task") : NULL;
-    if (tasks == NULL) {
-        return VSHI_CALLS_FREE;
-    }
-    bool all = own.mode == MODE_FILTER && (own.filters == UNCOUNTED || own.filters > before);
-    for (const struct dirent *entry; all && (entry = readdir(tasks)) != NULL;) {
-        char path[PATH_ROOM];
-        task_state task = {MODE_NONE, 0};
-        if (entry->d_name[0] != '.') {
-            snprintf(path, sizeof path, "/proc/self/task/%.20s/status", entry->d_name);
-            all = read_state(path, &task) ? task.mode == MODE_FILTER && task.filters == own.filters
-                                          : errno == ENOENT || errno == ESRCH; /* ended meanwhile */
-        }
-    }
-    closedir(tasks);
-    return all ? VSHI_CALLS_CONFINED : VSHI_CALLS_IN_PART;
 }
 
 /* --- limits of resources */
@@ -291,11 +227,11 @@ static int add_conditional(scmp_filter_ctx filter) {
     return failed;
 }
 
-/* Loads it into every thread, those that libraries have begun before main too: a filter of one thread is
- * none, as that thread may write over the stack of another. Calls of another kind of machine (32 bit, x32)
- * end the process, and not a thread that others may wait for. */
-static bool load_filter(void) {
-    const scmp_filter_ctx filter = seccomp_init(SCMP_ACT_ERRNO(EPERM));
+/* The kernel puts the filter into every thread or into none, those that libraries have begun before main too:
+ * a filter of one thread is none, as that thread may write over the stack of another. Calls of another kind
+ * of machine (32 bit, x32) end the process, and not a thread that others may wait for. */
+bool vshi_confine_calls(void) {
+    const scmp_filter_ctx filter = VSHI_SANITIZED ? NULL : seccomp_init(SCMP_ACT_ERRNO(EPERM));
     if (filter == NULL) {
         return false;
     }
@@ -310,17 +246,6 @@ static bool load_filter(void) {
     const bool loaded = failed == 0 && seccomp_load(filter) == 0;
     seccomp_release(filter);
     return loaded;
-}
-
-int vshi_confine_calls(void) {
-    if (VSHI_SANITIZED) {
-        return VSHI_CALLS_FREE;
-    }
-    const int before = count_filters();
-    if (!load_filter()) {
-        return VSHI_CALLS_FREE;
-    }
-    return vshi_tasks_filtered(before);
 }
 
 /* --- files, by Landlock (Linux 5.13): by the numbers of its system calls, as the C library has no functions
@@ -499,22 +424,15 @@ static void confine(const vshi_request *request, bool files, vshi_reader_state *
     if (confine_files(request, false) && files) {
         state->confined |= VSH_CONFINED_FILES;
     }
-    const int calls = vshi_confine_calls();
-    if (calls == VSHI_CALLS_CONFINED) {
+    if (vshi_confine_calls()) {
         state->confined |= VSH_CONFINED_CALLS;
-    } else if (calls == VSHI_CALLS_IN_PART) {
-        state->code = VSHI_READER_UNCONFINED;
     }
 }
 
 /* Reads the word in which vdbshade-reader says how it is confined. */
 static vshi_reader_state take_held(const char *word) {
     const int told = atoi(word);
-    vshi_reader_state state = {(uint32_t)told & VSH_CONFINED_ALL, (told & VSHI_HELD_FILE_LIMIT) != 0, -1};
-    if ((state.confined & VSH_CONFINED_CALLS) != 0 && vshi_tasks_filtered(0) != VSHI_CALLS_CONFINED) {
-        state.code = VSHI_READER_UNCONFINED;
-    }
-    return state;
+    return (vshi_reader_state){(uint32_t)told & VSH_CONFINED_ALL, (told & VSHI_HELD_FILE_LIMIT) != 0, -1};
 }
 
 vshi_answer_head vshi_reader_head(const vshi_reader_state *state, int32_t code) {

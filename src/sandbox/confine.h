@@ -58,20 +58,10 @@ const char *vshi_missing_text(uint64_t confined, char text[VSHI_MISSING_TEXT]);
  * allows not all of it, or in a sanitized build. */
 bool vshi_confine_resources(uint64_t memory, uint64_t beside, double seconds);
 
-/* What became of a filter of system calls. */
-enum {
-    VSHI_CALLS_FREE = 0, /* the host allows none, or does not let it be seen (no /proc); sanitized builds */
-    VSHI_CALLS_CONFINED = 1, /* it holds in every thread, as the kernel tells of each */
-    VSHI_CALLS_IN_PART = 2   /* some thread is not seen to have it: nothing may be parsed here */
-};
-
 /* Leaves the system calls that parsing needs, in every thread of this process and those to come; the others
- * fail with EPERM, and calls of another kind of machine (32 bit, x32) end the process. */
-int vshi_confine_calls(void);
-
-/* Whether every task (thread) has a filter, and as many as the calling one, which are more than `before`. A
- * kernel before 5.9 does not count them: whether every task has one. */
-int vshi_tasks_filtered(int before);
+ * fail with EPERM, and calls of another kind of machine (32 bit, x32) end the process. False where the host
+ * allows no filter, or in a sanitized build. */
+bool vshi_confine_calls(void);
 
 /* Counts the tasks (threads) of this process; 0 where /proc is missing. */
 int vshi_task_count(void);

@@ -128,7 +128,6 @@ enum { VSHI_HELD_FILE_LIMIT = 256 };
 enum {
     VSHI_READER_OUT_OF_MEMORY = 86, /* memory was refused */
     VSHI_READER_FILE_LIMIT = 87, /* the caller's limit on the size of files does not let the answer through */
-    VSHI_READER_UNCONFINED = 88, /* some thread of it is not confined: it read nothing */
     VSHI_READER_CANNOT = 89,     /* it could not begin */
     VSHI_READER_EMPTY = 90       /* it could not load the library */
 };

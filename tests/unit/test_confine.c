@@ -3,9 +3,7 @@
 #include "sandbox/confine.h"
 #include "testing.h"
 
-#include <pthread.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
 
 static char folder[] = "/tmp/vdbshade-test-XXXXXX";
 
@@ -32,50 +30,6 @@ TEST(a_program_is_its_own_reader_and_confined_wholly_though_it_has_threads) {
                      VSH_CONFINED_LIMITS | VSH_CONFINED_CALLS);
     assert_int_equal((confined & VSH_CONFINED_FILES) != 0, vshi_landlock_version() > 0);
     assert_true(vshi_task_count() > 1); /* those of a library's */
-}
-
-static void *nothing(void *user) {
-    return user;
-}
-
-static void *begin_and_end_threads(void *user) {
-    for (;;) {
-        pthread_t thread;
-        if (pthread_create(&thread, NULL, nothing, user) == 0) {
-            pthread_join(thread, NULL);
-        }
-    }
-    return NULL;
-}
-
-/* Of a process that confines itself while a thread of it begins and ends others: 0 where none was called
- * loose. */
-static int confine_among_ending_threads(void) {
-    pthread_t busy;
-    if (pthread_create(&busy, NULL, begin_and_end_threads, NULL) != 0 ||
-        vshi_confine_calls() != VSHI_CALLS_CONFINED) {
-        return 2;
-    }
-    int loose = 0;
-    for (int i = 0; i < 20000; ++i) {
-        loose |= vshi_tasks_filtered(0) != VSHI_CALLS_CONFINED;
-    }
-    return loose;
-}
-
-TEST(a_task_that_ends_meanwhile_is_not_loose) {
-    if (VSHI_SANITIZED) {
-        skip();
-    }
-    const pid_t child = fork();
-    assert_true(child >= 0);
-    if (child == 0) {
-        _exit(confine_among_ending_threads());
-    }
-    int status;
-    assert_int_equal(waitpid(child, &status, 0), child);
-    assert_true(WIFEXITED(status));
-    assert_int_equal(WEXITSTATUS(status), 0);
 }
 
 TEST(what_cannot_be_asked_is_an_argument) {
