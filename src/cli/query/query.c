@@ -25,7 +25,7 @@ typedef struct query_settings {
     double within; /* 0: not given */
 } query_settings;
 
-/* What is answered, and the answers of a batch. */
+/* The kinds of answers, and the answers of a batch. */
 typedef struct query_answers {
     size_t lights;
     const vsh_light *light;
