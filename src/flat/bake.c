@@ -37,14 +37,6 @@ static void size_of(const vsh_outline *outline, double margin, double cell, doub
     }
 }
 
-/* Bytes that it takes for an outline's box grown by `margin`; more than 2^31 values are infinitely many. */
-static double grid_bytes(const vsh_outline *outline, double margin, double cell) {
-    double sides[2];
-    size_of(outline, margin, cell, sides);
-    const double values = sides[0] * sides[1];
-    return values <= MAX_VALUES ? values * sizeof(float) : INFINITY;
-}
-
 typedef struct filling {
     const vsh_outline *outline;
     grid *grid;
@@ -65,11 +57,10 @@ static void fill_grid_rows(void *user, size_t begin, size_t end) {
     }
 }
 
-/* Free the values with free(). Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-static vsh_result make_grid(const vsh_outline *outline, double margin, double cell, const vsh_run *run,
-                            grid *made, vsh_error *error) {
-    double sides[2];
-    size_of(outline, margin, cell, sides);
+/* Makes a grid of the size that size_of() found. Free the values with free(). Errors: VSH_ERROR_MEMORY,
+ * VSH_ERROR_CANCELLED. */
+static vsh_result make_grid(const vsh_outline *outline, double margin, double cell, const double sides[2],
+                            const vsh_run *run, grid *made, vsh_error *error) {
     *made = (grid){.cell = cell, .columns = (size_t)sides[0], .rows = (size_t)sides[1]};
     for (int axis = 0; axis < 2; ++axis) {
         made->low[axis] = outline->nodes[0].low[axis] - margin - 0.5 * cell;
@@ -337,6 +328,7 @@ static vsh_result prepare(bake *b, const vsh_run *run, vsh_error *error) {
     const bool classic = b->options.method == VSH_FLAT_CLASSIC && b->casters != NULL;
     const bool padded = b->options.padding > 0 && b->casters != NULL;
     const double cell = fmin(b->texel[0], b->texel[1]);
+    double margin = 0.0, sides[2] = {0.0, 0.0};
     double bytes = padded ? texels * (1.0 + sizeof(int16_t)) : 0.0;
     if (b->casters != NULL) {
         vsh_outline_info info;
@@ -344,15 +336,16 @@ static vsh_result prepare(bake *b, const vsh_run *run, vsh_error *error) {
         bytes += (double)info.bytes;
     }
     if (classic) {
-        const double held = grid_bytes(b->casters, margin_of(b), cell);
-        if (isinf(held)) {
+        margin = margin_of(b);
+        size_of(b->casters, margin, cell, sides);
+        if (!(sides[0] * sides[1] <= MAX_VALUES)) {
             return vshi_fail(
                 error, VSH_ERROR_LIMIT,
                 "flat: method classic: more than 2^31 distances: the outline and the lights' widths "
                 "are too large for texels of %g",
                 cell);
         }
-        bytes += held;
+        bytes += sides[0] * sides[1] * sizeof(float);
     }
     VSHI_TRY(vshi_check_limit(run, bytes, "flat", error));
     if (padded) {
@@ -361,7 +354,7 @@ static vsh_result prepare(bake *b, const vsh_run *run, vsh_error *error) {
         b->state = memory;
     }
     if (classic) {
-        VSHI_TRY(make_grid(b->casters, margin_of(b), cell, run, &b->grid, error));
+        VSHI_TRY(make_grid(b->casters, margin, cell, sides, run, &b->grid, error));
     }
     return VSH_OK;
 }

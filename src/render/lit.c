@@ -338,9 +338,7 @@ vshi_lit_point vshi_lit_meet(const vshi_lit *lit, uint32_t number, vshi_vec ray)
                             of->color};
 }
 
-void vshi_lit_bounds(const vshi_lit *lit, vshi_vec *low, vshi_vec *high) {
-    *low = (vshi_vec){INFINITY, INFINITY, INFINITY};
-    *high = (vshi_vec){-INFINITY, -INFINITY, -INFINITY};
+void vshi_lit_grow_box(const vshi_lit *lit, vshi_vec *low, vshi_vec *high) {
     for (size_t i = 0; lit != NULL && i < lit->triangle_count; ++i) {
         for (int k = 0; k < 3; ++k) {
             const vshi_vec at = vshi_add(lit->triangles[i].corner[k], lit->grid.frame.eye);

@@ -26,13 +26,6 @@ static vsh_result check_colors(const char *name, const double color[3], double m
     return VSH_OK;
 }
 
-static vsh_result check_number(const char *name, double value, double least, double most, vsh_error *error) {
-    return value >= least && value <= most
-               ? VSH_OK
-               : vshi_fail(error, VSH_ERROR_ARGUMENT, "%s %g is out of range %g … %g", name, value, least,
-                           most);
-}
-
 static vsh_result check_options(const vsh_render_options *o, size_t light_count, vsh_error *error) {
     static const double BRIGHTEST = 1e15;
     const struct {
@@ -45,7 +38,10 @@ static vsh_result check_options(const vsh_render_options *o, size_t light_count,
                    {"shaft_steps", o->shaft_steps, 1, 64},
                    {"light_count", (double)light_count, 0, VSHI_MOST_LIGHTS}};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; ++i) {
-        VSHI_TRY(check_number(numbers[i].name, numbers[i].value, numbers[i].least, numbers[i].most, error));
+        if (!(numbers[i].value >= numbers[i].least && numbers[i].value <= numbers[i].most)) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s %g is out of range %g … %g", numbers[i].name,
+                             numbers[i].value, numbers[i].least, numbers[i].most);
+        }
     }
     const int32_t side = o->width > o->height ? o->width : o->height;
     if ((side + 2) * o->samples > MOST_SIDE) {
@@ -194,10 +190,7 @@ static bool place_fog(rendering *r) {
                               fmax(high.z, info.bounds_max[2])};
         }
     }
-    vshi_vec lit_low, lit_high;
-    vshi_lit_bounds(s->lit, &lit_low, &lit_high);
-    low = (vshi_vec){fmin(low.x, lit_low.x), fmin(low.y, lit_low.y), fmin(low.z, lit_low.z)};
-    high = (vshi_vec){fmax(high.x, lit_high.x), fmax(high.y, lit_high.y), fmax(high.z, lit_high.z)};
+    vshi_lit_grow_box(s->lit, &low, &high);
     const double diagonal = vshi_length(vshi_sub(high, low)), around = FOG_AROUND * diagonal;
     const vshi_vec margin = {around, around, around};
     r->scenery.shafts.low = vshi_sub(low, margin);
@@ -264,12 +257,7 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
         if (sampler == NULL) {
             VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_MEMORY, "render: the system refused memory"));
         }
-        r.scenery.shafts.query = query;
-        r.scenery.shafts.lights = lights;
-        r.scenery.shafts.light_count = light_count;
-        r.scenery.shafts.run = &r.scenery.run;
         r.scenery.shafts.sampler = sampler;
-        r.scenery.shafts.steps = o.shaft_steps;
     }
     result = render_picture(&r, picture, stats != NULL ? stats : &own, error);
 done:

@@ -146,8 +146,8 @@ typedef struct vshi_lit_point {
 
 vshi_lit_point vshi_lit_meet(const vshi_lit *lit, uint32_t triangle, vshi_vec ray);
 
-/* The box around all triangles; low > high where there are none. */
-void vshi_lit_bounds(const vshi_lit *lit, vshi_vec *low, vshi_vec *high);
+/* Grows a box by all triangles, if there are any. */
+void vshi_lit_grow_box(const vshi_lit *lit, vshi_vec *low, vshi_vec *high);
 
 /* Light that comes from a triangle with a lightmap along a ray, and its unit normal towards the eye. */
 void vshi_lit_shade(const vshi_lit *lit, uint32_t triangle, vshi_vec ray, float color[3], float normal[3]);
@@ -158,14 +158,9 @@ enum { VSHI_TILE = 8, VSHI_TILE_SAMPLES = VSHI_TILE * VSHI_TILE, VSHI_MOST_LIGHT
 
 /* Light shafts: a thin, even fog in the box around what is seen. */
 typedef struct vshi_shafts {
-    const vsh_query *query;
-    const vsh_light *lights;
-    size_t light_count;
-    const vsh_run *run;
     const vshi_sampler *sampler; /* blue noise */
     vshi_vec low, high;          /* the fog's box */
     double extinction;           /* per world unit; 0: no fog */
-    int32_t steps;
 } vshi_shafts;
 
 /* The scene of a picture. */

@@ -147,9 +147,9 @@ static vsh_result light_hits(const vshi_scenery *scenery, hits *h, vsh_shade_sta
 
 /* A ray of a tile, up to where it ends. */
 typedef struct fog_ray {
-    vshi_vec origin, direction; /* unit */
-    double end;                 /* world units, may be infinite */
-    uint32_t texel;             /* of the mask */
+    vshi_eye_ray ray;
+    double end;     /* world units, may be infinite */
+    uint32_t texel; /* of the mask */
 } fog_ray;
 
 /* Points of the tile's rays at one step, and what each adds. */
@@ -163,15 +163,15 @@ typedef struct step {
 } step;
 
 /* All the light that passes, whatever its direction: as if each point faced it. */
-static vsh_result light_step(const vshi_shafts *shafts, step *s, vsh_shade_stats *stats, vsh_error *error) {
+static vsh_result light_step(const vshi_scenery *scenery, step *s, vsh_shade_stats *stats, vsh_error *error) {
     const vsh_points points = {s->count, &s->positions[0][0], NULL, NULL};
-    for (size_t l = 0; l < shafts->light_count; ++l) {
-        const vsh_light *light = &shafts->lights[l];
+    for (size_t l = 0; l < scenery->light_count; ++l) {
+        const vsh_light *light = &scenery->lights[l];
         float *visibility[VSHI_MOST_LIGHTS] = {NULL};
         vsh_query_output output = vsh_query_output_default();
         visibility[l] = s->visibility;
         output.visibility = visibility;
-        VSHI_TRY(vsh_query_points(shafts->query, &points, NULL, shafts->run, &output, stats, error));
+        VSHI_TRY(vsh_query_points(scenery->query, &points, NULL, &scenery->run, &output, stats, error));
         const vshi_light_place place = vshi_light_in_world(light);
         for (size_t i = 0; i < s->count; ++i) {
             vshi_vec to;
@@ -184,15 +184,18 @@ static vsh_result light_step(const vshi_shafts *shafts, step *s, vsh_shade_stats
 }
 
 /* Puts the fog before what the rays of a tile brought back. Not inline: its frame would add to the tile's. */
-static __attribute__((noinline)) vsh_result add_fog(const vshi_shafts *shafts, size_t count,
+static __attribute__((noinline)) vsh_result add_fog(const vshi_scenery *scenery, size_t count,
                                                     const fog_ray *rays, vshi_seen **seen,
                                                     vsh_shade_stats *stats, vsh_error *error) {
+    const vshi_shafts *shafts = &scenery->shafts;
+    const int32_t steps = scenery->options->shaft_steps;
     double begin[VSHI_TILE_SAMPLES], length[VSHI_TILE_SAMPLES], jitter[VSHI_TILE_SAMPLES];
     size_t in[VSHI_TILE_SAMPLES], passing = 0;
     for (size_t i = 0; i < count; ++i) {
         double end = rays[i].end;
         begin[i] = 0.0;
-        if (vshi_clip(rays[i].origin, rays[i].direction, shafts->low, shafts->high, &begin[i], &end)) {
+        if (vshi_clip(rays[i].ray.origin, rays[i].ray.direction, shafts->low, shafts->high, &begin[i],
+                      &end)) {
             length[i] = end - begin[i];
             jitter[i] = vshi_sampler_mask(shafts->sampler, rays[i].texel, 0);
             in[passing++] = i;
@@ -202,16 +205,17 @@ static __attribute__((noinline)) vsh_result add_fog(const vshi_shafts *shafts, s
             }
         }
     }
-    for (int32_t k = 0; k < shafts->steps && passing > 0; ++k) {
+    for (int32_t k = 0; k < steps && passing > 0; ++k) {
         step s = {.count = passing};
         for (size_t j = 0; j < passing; ++j) {
             const size_t i = in[j];
-            const double stretch = length[i] / shafts->steps, along = (k + jitter[i]) * stretch;
-            const vshi_vec at = vshi_add(rays[i].origin, vshi_scale(rays[i].direction, begin[i] + along));
-            s.positions[j][0] = at.x, s.positions[j][1] = at.y, s.positions[j][2] = at.z;
+            const double stretch = length[i] / steps, along = (k + jitter[i]) * stretch;
+            const vshi_vec at =
+                vshi_add(rays[i].ray.origin, vshi_scale(rays[i].ray.direction, begin[i] + along));
+            put(at, s.positions[j]);
             s.share[j] = vshi_exp(-shafts->extinction * along) * shafts->extinction * stretch;
         }
-        VSHI_TRY(light_step(shafts, &s, stats, error));
+        VSHI_TRY(light_step(scenery, &s, stats, error));
         for (size_t j = 0; j < passing; ++j) {
             for (int c = 0; c < 3; ++c) {
                 seen[in[j]]->color[c] += (float)(s.share[j] * (double)s.light[j][c]);
@@ -254,13 +258,12 @@ vsh_result vshi_tile_render(const vshi_scenery *scenery, const vshi_rows *rows, 
             for (int c = 0; c < 3 && !(distance < INFINITY); ++c) {
                 seen->color[c] = (float)o->background[c];
             }
-            fog[count] = (fog_ray){ray.origin, ray.direction, distance, texel};
+            fog[count] = (fog_ray){ray, distance, texel};
             all[count++] = seen;
         }
     }
     if (h.count > 0) {
         VSHI_TRY(light_hits(scenery, &h, stats, error));
     }
-    return scenery->shafts.extinction > 0.0 ? add_fog(&scenery->shafts, count, fog, all, stats, error)
-                                            : VSH_OK;
+    return scenery->shafts.extinction > 0.0 ? add_fog(scenery, count, fog, all, stats, error) : VSH_OK;
 }

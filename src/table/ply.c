@@ -60,31 +60,18 @@ static bool read_property(vshi_ply_header *h, int words, word *w) {
     return p->type >= 0 && (!list || (p->count_type >= 0 && p->count_type < VSHI_PLY_FLOAT));
 }
 
-static bool is_blank(char c) {
-    return c == ' ' || c == '\t' || c == '\r';
-}
-
 /* Words of a line; more than there is room for count as one more. */
 static int split(const char *line, size_t size, word w[WORDS]) {
-    int words = 0;
-    for (size_t i = 0; i < size;) {
-        if (is_blank(line[i])) {
-            ++i;
-            continue;
+    const char *at = line, *end = line + size;
+    for (int words = 0;; ++words) {
+        const vshi_field field = vshi_field_next(&at, end, VSHI_BETWEEN_BLANKS);
+        const size_t length = (size_t)(field.end - field.text);
+        if (length == 0 || words == WORDS) {
+            return length > 0 ? WORDS + 1 : words;
         }
-        size_t length = 0;
-        while (i + length < size && !is_blank(line[i + length])) {
-            ++length;
-        }
-        if (words == WORDS) {
-            return WORDS + 1;
-        }
-        const size_t kept = length < VSHI_PLY_NAME ? length : VSHI_PLY_NAME - 1;
         memset(w[words], 0, sizeof w[words]);
-        memcpy(w[words++], line + i, kept);
-        i += length;
+        memcpy(w[words], field.text, length < VSHI_PLY_NAME ? length : VSHI_PLY_NAME - 1);
     }
-    return words;
 }
 
 static bool take_line(vshi_ply_header *h, const char *line, size_t size) {

@@ -75,7 +75,7 @@ far_cubes() {
 @test "a picture counts before it is taken, and with what it shows" {
     write_box box.obj
     within 300 render box.obj --sun 1,2,1 --size 16384 --memory-limit 100MiB -o out.png
-    refused 4 "out.png: a picture of 16384 × 16384 needs 12.0 GiB, over the memory limit of 100 MiB"
+    refused 4 "out.png: about 12885 MB are needed, over the memory limit of 105 MB"
     within 500 render box.obj --sun 1,2,1 --size 64 --resolution 256 --memory-limit 160MiB --quiet -o out.png
     done_well
     within 500 render box.obj --sun 1,2,1 --size 1664 --resolution 256 --memory-limit 160MiB -o out.png

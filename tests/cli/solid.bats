@@ -10,7 +10,7 @@ setup() {
 
 @test "info says what objects are taken for" {
     info_tells box.obj "taken for: 1 solid"
-    info_tells room.obj "taken for: 1 wall with air in front of its faces"
+    info_tells room.obj "taken for: 1 wall with air in front of faces"
     info_tells crate.obj "taken for: 1 open solid," "problem: 4 open edges"
 }
 

@@ -1,6 +1,6 @@
 /* vdbshade flat: light maps of a plane, for 2D games. */
-#include "base/bytes.h"
 #include "base/clock.h"
+#include "base/memory.h"
 #include "cli/commands.h"
 #include "cli/message.h"
 #include "cli/patch.h"
@@ -66,19 +66,13 @@ static void name_planes(const vsh_flat_scene *scene, flat_planes *p) {
                            p->holds};
 }
 
-static int allocate_planes(const vsh_flat_scene *scene, const vsh_image_options *image, flat_planes *p) {
+static int allocate_planes(const vsh_flat_scene *scene, const vsh_image_options *image, const vsh_run *run,
+                           flat_planes *p) {
     const size_t texels = (size_t)scene->options.width * (size_t)scene->options.height;
     const double bytes = (double)texels * sizeof(float) * (double)p->count +
                          (double)vsh_image_writer_bytes(scene->output, &p->image, image);
-    const uint64_t limit = cli_given.memory_limit;
-    if (limit > 0 && bytes > (double)limit) {
-        char need[32], have[32];
-        cli_say("%s: %d × %d texels in %zu channels need %s; the memory limit is %s", scene->output,
-                scene->options.width, scene->options.height, p->count,
-                vshi_bytes_text((uint64_t)bytes, need, sizeof need),
-                vshi_bytes_text(limit, have, sizeof have));
-        return CLI_LIMIT;
-    }
+    vsh_error error;
+    CLI_TRY(cli_check(vshi_check_limit(run, bytes, scene->output, &error), &error));
     p->planes[0] = calloc(texels * p->count, sizeof(float));
     for (size_t i = 1; i < p->count; ++i) {
         p->planes[i] = p->planes[0] + i * texels;
@@ -205,7 +199,7 @@ static int run_flat(const flat_settings *s, const vsh_flat_scene *scene, const v
     int code;
     name_planes(scene, &planes);
     CLI_TRY_DONE(check_files(s, scene, &planes.image, &image));
-    CLI_TRY_DONE(allocate_planes(scene, &image, &planes));
+    CLI_TRY_DONE(allocate_planes(scene, &image, run, &planes));
     cli_signals_watch();
     CLI_TRY_DONE(bake(s, scene, &planes, &image, run, &stats));
     CLI_TRY_DONE(cli_stats_finish(&stats, run, s->stats));

@@ -143,18 +143,6 @@ static void print_grid(const vsh_vdb_entry *grid) {
     }
 }
 
-static void say_names(const char *path, const char *name, const vsh_vdb_entry *entries, size_t count) {
-    char *names;
-    size_t size;
-    FILE *out = open_memstream(&names, &size);
-    for (size_t i = 0; i < count; ++i) {
-        fprintf(out, "%s'%s'", i > 0 ? ", " : "", entries[i].name);
-    }
-    fclose(out);
-    cli_say("%s: no grid '%s'; it holds %.700s", path, name, names);
-    free(names);
-}
-
 static int print_vdb(const char *path, const char *name, const vsh_run *run) {
     vsh_vdb_entry *entries = calloc(MAX_LISTED, sizeof *entries);
     size_t count = 0, shown = 0;
@@ -168,8 +156,8 @@ static int print_vdb(const char *path, const char *name, const vsh_run *run) {
         }
     }
     if (code == CLI_OK && name != NULL && shown == 0) {
-        say_names(path, name, entries, listed);
-        code = CLI_USAGE;
+        code = cli_usage("%s: no grid '%s'; it holds '%s'%s", path, name, entries[0].name,
+                         count > 1 ? " and others" : "");
     } else if (code == CLI_OK && count == 0) {
         printf("problem: no grids\n");
     } else if (count > MAX_LISTED && name == NULL) {
@@ -184,53 +172,16 @@ static int print_vdb(const char *path, const char *name, const vsh_run *run) {
 static void print_caster(const vsh_caster *caster, size_t index) {
     static const char *const types[] = {"mesh", "sdf", "vdb", "heightfield", "spheres", "mask", "text"};
     printf("caster %zu: %s", index, types[caster->type]);
-    if (caster->type == VSH_CASTER_SDF) {
-        double min[3], max[3];
-        vsh_sdf_bounds(&caster->sdf, min, max);
-        printf(", %zu nodes, bounds %g %g %g to %g %g %g", caster->sdf.node_count, min[0], min[1], min[2],
-               max[0], max[1], max[2]);
-    } else if (caster->path == NULL) {
-        printf(", %zu", caster->sphere_count);
-    } else {
+    if (caster->path != NULL) {
         printf(" %s", caster->path);
-        if (caster->grid != NULL) {
-            printf(", grid '%s'", caster->grid);
-        }
-        if (caster->type == VSH_CASTER_TEXT) {
-            printf(", %zu bytes of text", strlen(caster->text));
-        }
-        if (caster->type == VSH_CASTER_HEIGHTFIELD) {
-            printf(", %g × %g, height %g%s", caster->size[0], caster->size[1], caster->height,
-                   caster->direct ? ", direct" : "");
-        }
     }
-    if (caster->type == VSH_CASTER_SPHERES && caster->voxelised) {
-        printf(", voxelised");
+    if (caster->grid != NULL) {
+        printf(", grid '%s'", caster->grid);
     }
     if (caster->layer != NULL) {
         printf(", layer '%s'", caster->layer);
     }
     putchar('\n');
-}
-
-static void print_layer(const vsh_scene_layer *layer) {
-    const vsh_layer *shade = &layer->shade;
-    printf("layer '%s': combine %s", layer->name, vsh_get_name(VSH_NAMES_COMBINE, shade->combine));
-    if (layer->voxel_size > 0.0) {
-        printf(", voxel size %g", layer->voxel_size);
-    } else if (layer->resolution > 0) {
-        printf(", resolution %d", layer->resolution);
-    }
-    if (shade->method >= 0) {
-        printf(", method %s", vsh_get_name(VSH_NAMES_SHADOW, shade->method));
-    }
-    if (shade->softness != 1.0) {
-        printf(", softness %g", shade->softness);
-    }
-    if (shade->remap[1] > 0.0) {
-        printf(", remap %g to %g", shade->remap[0], shade->remap[1]);
-    }
-    printf("%s\n", shade->ao ? "" : ", no ao");
 }
 
 /* Returns false if the file is no flat scene. */
@@ -267,7 +218,9 @@ static int print_scene(const char *path, const vsh_run *run) {
         print_caster(&scene->casters[i], i);
     }
     for (size_t i = 0; i < scene->layer_count; ++i) {
-        print_layer(&scene->layers[i]);
+        const vsh_scene_layer *layer = &scene->layers[i];
+        printf("layer '%s': combine %s\n", layer->name,
+               vsh_get_name(VSH_NAMES_COMBINE, layer->shade.combine));
     }
     for (size_t i = 0; i < scene->light_count; ++i) {
         print_light(&scene->lights[i]);
@@ -294,7 +247,6 @@ static int print_scene(const char *path, const vsh_run *run) {
 /* --- meshes */
 
 enum { PARAGRAPHS = 8 }; /* more meshes have a line each */
-enum { TAKEN = 64 };
 
 /* A file's meshes. */
 typedef struct mesh_info {
@@ -305,7 +257,6 @@ typedef struct mesh_info {
     vsh_mesh *with_uvs;            /* [with_uv_count] */
     vsh_uv_report *reports;        /* [with_uv_count] */
     size_t with_uv_count;
-    bool table; /* a line for each */
 } mesh_info;
 
 static const char *name_of(const vsh_mesh *mesh) {
@@ -316,95 +267,26 @@ static const char *object_of(const vsh_mesh *mesh) {
     return mesh->object_name != NULL ? mesh->object_name : name_of(mesh);
 }
 
-static void print_summary(const vsh_model *model) {
-    const size_t count = vsh_model_mesh_count(model);
-    size_t objects = 0, triangles = 0, without = 0;
+static void print_summary(const mesh_info *info) {
+    size_t objects = 0, triangles = 0;
     uint32_t last = 0;
     int32_t least = VSH_MAX_UV_SETS, most = 0;
-    for (size_t i = 0; i < count; ++i) {
-        const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
-        const int32_t sets = vsh_model_uv_sets(model, i);
-        objects += mesh.object == 0 || mesh.object != last;
-        last = mesh.object;
-        triangles += mesh.triangle_count;
-        without += sets == 0;
+    for (size_t i = 0; i < info->count; ++i) {
+        const vsh_mesh *mesh = &info->meshes[i];
+        const int32_t sets = vsh_model_uv_sets(info->model, i);
+        objects += mesh->object == 0 || mesh->object != last;
+        last = mesh->object;
+        triangles += mesh->triangle_count;
         least = sets < least ? sets : least;
         most = sets > most ? sets : most;
     }
-    printf("objects: %zu, in %zu mesh%s, %zu triangles; UV sets: %d", objects, count, count == 1 ? "" : "es",
-           triangles, least);
+    printf("objects: %zu, in %zu mesh%s, %zu triangles; UV sets: %d", objects, info->count,
+           info->count == 1 ? "" : "es", triangles, least);
     if (most > least) {
         printf(" to %d", most);
     }
-    if (without > 0 && without < count) {
-        printf(", %zu meshes without", without);
-    }
     putchar('\n');
 }
-
-/* --- solids, rooms, walls and sheets */
-
-enum { KINDS = 5 };
-
-static const struct {
-    const char *one, *many, *more_of_one, *more_of_many;
-} kinds[KINDS] = {
-    {"solid", "solids", "", ""},
-    {"room", "rooms", " in a solid", " in solids"},
-    {"wall", "walls", " with air in front of its faces", " with air in front of their faces"},
-    {"open solid", "open solids", ", hidden where only its inner sides are seen",
-     ", hidden where only their inner sides are seen"},
-    {"sheet", "sheets", " with air on both sides", " with air on both sides"},
-};
-
-static size_t count_kind(const vsh_solidity_report *report, int kind) {
-    const size_t counts[KINDS] = {report->solids, report->rooms, report->walls, report->open_solids,
-                                  report->sheets};
-    return counts[kind];
-}
-
-/* Writes a few words, such as "solid", "3 walls" or "mixed". */
-static void describe_kind(const vsh_solidity_report *report, char text[TAKEN]) {
-    strcpy(text, "nothing");
-    for (int i = 0, found = 0; i < KINDS; ++i) {
-        const size_t count = count_kind(report, i);
-        found += count > 0;
-        if (found > 1) {
-            strcpy(text, "mixed");
-        } else if (count == 1) {
-            strcpy(text, kinds[i].one);
-        } else if (count > 1) {
-            snprintf(text, TAKEN, "%zu %s", count, kinds[i].many);
-        }
-    }
-}
-
-static void print_problem(size_t count, const char *what) {
-    if (count > 0) {
-        printf("  problem: %zu %s\n", count, what);
-    }
-}
-
-static void print_solidity(const vsh_solidity_report *report) {
-    const char *separator = "";
-    printf("  taken for: ");
-    for (int i = 0; i < KINDS; ++i) {
-        const size_t count = count_kind(report, i);
-        if (count > 0) {
-            printf("%s%zu %s%s", separator, count, count == 1 ? kinds[i].one : kinds[i].many,
-                   count == 1 ? kinds[i].more_of_one : kinds[i].more_of_many);
-            separator = ", ";
-        }
-    }
-    puts(separator[0] == '\0' ? "nothing" : "");
-    if (report->closed_over > 0) {
-        printf("  closed over: %zu hole%s with %zu open edges, of %zu of these\n", report->holes,
-               report->holes == 1 ? "" : "s", report->open_edges, report->closed_over);
-    }
-    print_problem(report->turned_triangles, "triangles that face the other way than those around");
-}
-
-/* --- a paragraph for each mesh */
 
 static void print_unit(const vsh_model *model, double unit) {
     const double own = vsh_model_unit(model);
@@ -431,8 +313,43 @@ static int print_lights(const vsh_model *model, double unit) {
     return CLI_OK;
 }
 
-static int print_paragraph(const mesh_info *info, size_t index, const info_look *look) {
+/* Prints a list such as "2 solids, 1 wall with air in front of faces". */
+static void print_solidity(const vsh_solidity_report *report) {
+    const struct {
+        size_t count;
+        const char *name, *detail;
+    } kinds[] = {{report->solids, "solid", ""},
+                 {report->rooms, "room", " in solids"},
+                 {report->walls, "wall", " with air in front of faces"},
+                 {report->open_solids, "open solid", ", hidden where only inner sides are seen"},
+                 {report->sheets, "sheet", " with air on both sides"}};
+    const char *separator = "";
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; ++i) {
+        if (kinds[i].count > 0) {
+            printf("%s%zu %s%s%s", separator, kinds[i].count, kinds[i].name, kinds[i].count == 1 ? "" : "s",
+                   kinds[i].detail);
+            separator = ", ";
+        }
+    }
+    puts(separator[0] == '\0' ? "nothing" : "");
+}
+
+static void print_problem(size_t count, const char *what) {
+    if (count > 0) {
+        printf("  problem: %zu %s\n", count, what);
+    }
+}
+
+static void print_uv_problems(const vsh_uv_report *uv) {
+    print_problem(uv->overlap_texels, "texels lie over other charts");
+    print_problem(uv->outside_triangles, "triangles leave the UV square");
+    print_problem(uv->degenerate_triangles, "triangles have no area in the UV set");
+}
+
+static int print_paragraph(const mesh_info *info, size_t index, const vsh_uv_report *uv,
+                           const info_look *look) {
     vsh_mesh mesh = info->meshes[index];
+    const vsh_solidity_report *solidity = &info->solidity[index];
     double scaled[12]; /* the user gives the unit of positions */
     const double own = vsh_model_unit(info->model), scale = look->unit / (own > 0.0 ? own : 1.0);
     for (int i = 0; i < 12; ++i) {
@@ -462,55 +379,44 @@ static int print_paragraph(const mesh_info *info, size_t index, const info_look 
                      "it out, or --cast-blended"
                    : "masked (leaves, fences): it casts by its texture's alpha");
     }
+    printf("  taken for: ");
+    print_solidity(solidity);
+    if (solidity->closed_over > 0) {
+        printf("  closed over: %zu hole%s with %zu open edges, of %zu of these\n", solidity->holes,
+               solidity->holes == 1 ? "" : "s", solidity->open_edges, solidity->closed_over);
+    }
     print_problem(report.open_edges, "open edges");
     print_problem(report.flipped_edges, "edges whose triangles disagree about the outside");
     print_problem(report.degenerate_triangles, "triangles of zero area, which are skipped");
-    print_solidity(&info->solidity[index]);
+    print_problem(solidity->turned_triangles, "triangles that face the other way than those around");
+    print_uv_problems(uv);
     return CLI_OK;
 }
 
-/* --- a line for each mesh */
-
-static void print_table(const mesh_info *info) {
-    printf("%10s %8s %12s %12s %-16s %s\n", "triangles", "UV sets", "over others", "over itself", "taken for",
-           "mesh");
+/* Prints a paragraph for each mesh, or a line if they are many. */
+static int print_each(const mesh_info *info, const info_look *look) {
+    const bool lines = info->count > PARAGRAPHS && !look->all;
     const vsh_uv_report none = {0}, *next = info->reports;
+    if (lines) {
+        puts(" triangles  UV sets  over others  over itself mesh: what it is taken for\n"
+             "(over others, over itself: texels that another object's triangle has, or one of its own)");
+    }
     for (size_t i = 0; i < info->count; ++i) {
         const vsh_mesh *mesh = &info->meshes[i];
         const vsh_uv_report *uv = mesh->uvs != NULL ? next++ : &none;
-        char taken[TAKEN];
-        describe_kind(&info->solidity[i], taken);
+        if (!lines) {
+            CLI_TRY(print_paragraph(info, i, uv, look));
+            continue;
+        }
         /* a precision of 0 prints no 0 */
-        printf("%10zu %8d %12.0zu %12.0zu %-16s %s\n", mesh->triangle_count,
-               vsh_model_uv_sets(info->model, i), uv->other_texels, uv->overlap_texels - uv->other_texels,
-               taken, name_of(mesh));
+        printf("%10zu %8d %12.0zu %12.0zu %s: ", mesh->triangle_count, vsh_model_uv_sets(info->model, i),
+               uv->other_texels, uv->overlap_texels - uv->other_texels, name_of(mesh));
+        print_solidity(&info->solidity[i]);
     }
-    puts("(over others, over itself: texels that another object's triangle has, or one of its own)");
+    return CLI_OK;
 }
 
 /* --- UVs in one lightmap */
-
-static void print_uv_problems(const mesh_info *info) {
-    for (size_t i = 0; i < info->with_uv_count; ++i) {
-        const vsh_uv_report *uv = &info->reports[i];
-        const char *name = name_of(&info->with_uvs[i]);
-        if (uv->overlap_texels > 0) {
-            printf("  problem: mesh '%s': %zu texels of %zu triangles lie over other charts", name,
-                   uv->overlap_texels, uv->overlap_triangles);
-            if (uv->other_texels > 0) {
-                printf(", %zu of them of other objects", uv->other_texels);
-            }
-            putchar('\n');
-        }
-        if (uv->outside_triangles > 0) {
-            printf("  problem: mesh '%s': %zu triangles leave the UV square\n", name, uv->outside_triangles);
-        }
-        if (uv->degenerate_triangles > 0) {
-            printf("  problem: mesh '%s': %zu triangles have no area in the UV set\n", name,
-                   uv->degenerate_triangles);
-        }
-    }
-}
 
 static void print_verdict(const mesh_info *info, uint64_t covered) {
     uint64_t texels = 0;
@@ -538,61 +444,36 @@ static void print_verdict(const mesh_info *info, uint64_t covered) {
 }
 
 /* All meshes with UVs share one lightmap, as they do in `bake`. */
-static int print_uvs(const mesh_info *info, const info_look *look, const vsh_run *run) {
+static int measure_uvs(const mesh_info *info, const info_look *look, const vsh_run *run, uint64_t *covered) {
     vsh_lightmap_options lightmap = vsh_lightmap_options_default();
     lightmap.width = look->width;
     lightmap.height = look->height;
     vsh_run quiet = *run;
-    quiet.warning = NULL; /* printed below */
+    quiet.warning = NULL; /* info prints the problems itself */
     vsh_charts *charts = NULL;
     vsh_charts_info found;
     vsh_error error;
-    if (info->with_uv_count > 0) {
-        CLI_TRY(cli_check_result(vsh_charts_create(info->with_uvs, info->with_uv_count, &lightmap, &quiet,
-                                                   info->reports, &charts, &error),
-                                 &error));
-    }
-    if (info->table) {
-        print_table(info);
-    }
-    if (charts == NULL) {
-        return CLI_OK;
-    }
+    CLI_TRY(cli_check_result(vsh_charts_create(info->with_uvs, info->with_uv_count, &lightmap, &quiet,
+                                               info->reports, &charts, &error),
+                             &error));
     vsh_charts_get_info(charts, &found);
     vsh_charts_free(charts);
-    printf("lightmap of %d × %d texels: %.1f %% covered\n", look->width, look->height,
-           100.0 * (double)found.covered / ((double)look->width * look->height));
-    if (!info->table) {
-        print_uv_problems(info);
-    }
-    print_verdict(info, found.covered);
+    *covered = found.covered;
     return CLI_OK;
 }
 
 /* Prints the work of `bake --unwrap auto`. */
-static int print_unwrap(const vsh_mesh *meshes, size_t count, const info_look *look, const vsh_run *run) {
+static int print_unwrap(const mesh_info *info, const info_look *look, const vsh_run *run) {
     vsh_receiver receiver = vsh_receiver_default();
     receiver.width = look->width;
     receiver.height = look->height;
     receiver.unwrap = VSH_RECEIVER_UNWRAP_AUTO;
     int32_t needs;
     vsh_error error;
-    CLI_TRY(
-        cli_check_result(vsh_receiver_needs_unwrap(&receiver, meshes, count, run, &needs, &error), &error));
-    if (needs == 0) {
-        puts("--unwrap auto: bakes these UVs as they are");
-        return CLI_OK;
-    }
-    size_t kept = 0;
-    for (size_t i = 0; i < count; ++i) {
-        int32_t usable = 0;
-        if (meshes[i].uvs != NULL) {
-            CLI_TRY(cli_check_result(vsh_uvs_usable(&meshes[i], run, &usable, &error), &error));
-        }
-        kept += usable != 0;
-    }
-    printf("--unwrap auto: packs the charts of %zu mesh%s anew, and makes those of %zu\n", kept,
-           kept == 1 ? "" : "es", count - kept);
+    CLI_TRY(cli_check_result(
+        vsh_receiver_needs_unwrap(&receiver, info->meshes, info->count, run, &needs, &error), &error));
+    printf("--unwrap auto: %s\n", needs == 0 ? "bakes these UVs as they are"
+                                             : "packs usable charts anew, and makes those of other meshes");
     return CLI_OK;
 }
 
@@ -606,24 +487,29 @@ static int print_meshes(const char *path, const info_look *look, const vsh_run *
                       .meshes = calloc(count, sizeof *info.meshes),
                       .solidity = calloc(count, sizeof *info.solidity),
                       .with_uvs = calloc(count, sizeof *info.with_uvs),
-                      .reports = calloc(count, sizeof *info.reports),
-                      .table = count > PARAGRAPHS && !look->all};
+                      .reports = calloc(count, sizeof *info.reports)};
+    uint64_t covered = 0;
     int code;
-    print_summary(model);
-    print_unit(model, look->unit);
     for (size_t i = 0; i < count; ++i) {
         info.meshes[i] = vsh_model_mesh(model, i, -1);
         if (info.meshes[i].uvs != NULL) {
             info.with_uvs[info.with_uv_count++] = info.meshes[i];
         }
     }
+    print_summary(&info);
+    print_unit(model, look->unit);
     CLI_TRY_DONE(cli_check_result(vsh_mesh_solidity(info.meshes, count, run, info.solidity, &error), &error));
-    for (size_t i = 0; i < count && !info.table; ++i) {
-        CLI_TRY_DONE(print_paragraph(&info, i, look));
+    if (info.with_uv_count > 0) {
+        CLI_TRY_DONE(measure_uvs(&info, look, run, &covered));
     }
+    CLI_TRY_DONE(print_each(&info, look));
     CLI_TRY_DONE(print_lights(model, look->unit));
-    CLI_TRY_DONE(print_uvs(&info, look, run));
-    CLI_TRY_DONE(print_unwrap(info.meshes, count, look, run));
+    if (info.with_uv_count > 0) {
+        printf("lightmap of %d × %d texels: %.1f %% covered\n", look->width, look->height,
+               100.0 * (double)covered / ((double)look->width * look->height));
+        print_verdict(&info, covered);
+    }
+    CLI_TRY_DONE(print_unwrap(&info, look, run));
     if (info.with_uv_count < count) {
         printf("problem: %zu of %zu meshes have no UVs to bake into: they only cast with --per-object or "
                "--no-receive; or are unwrapped\n",

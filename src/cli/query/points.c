@@ -14,6 +14,8 @@
 #include <sys/stat.h>
 #include <vdbshade/scene.h>
 
+static const char *const point_names[VSHI_TABLE_COLUMNS] = {"x", "y", "z", "nx", "ny", "nz"};
+
 enum {
     NX = 3,  /* columns before the normal */
     SAID = 5 /* bad rows that get a message each */
@@ -31,9 +33,9 @@ int cli_points_parse_format(const char *option, const char *text, int32_t *forma
 
 int32_t cli_points_format_of_path(const char *path) {
     return cli_has_ending(path, "csv tsv txt xyz") ? VSHI_TABLE_CSV
-           : cli_has_ending(path, "ply")              ? VSHI_TABLE_PLY
+           : cli_has_ending(path, "ply")           ? VSHI_TABLE_PLY
            : cli_has_ending(path, "raw f32 bin")   ? VSHI_TABLE_RAW
-                                                      : -1;
+                                                   : -1;
 }
 
 /* --- batches */
@@ -71,16 +73,15 @@ static void keep_bytes(cli_points *points, const char *bytes, size_t size) {
 
 /* Sets row->bad if its values cannot be used. */
 static void check_row(const cli_points_reader *reader, vshi_table_row *row) {
-    const char *const *names = reader->table.wanted.names;
     bool zero = reader->has_normals;
     for (int i = 0; i < (reader->has_normals ? NX + 3 : NX); ++i) {
         const double value = row->value[i];
         if (!isfinite(value)) {
-            snprintf(row->bad, sizeof row->bad, "%s is not finite", names[i]);
+            snprintf(row->bad, sizeof row->bad, "%s is not finite", point_names[i]);
             return;
         }
         if (i >= NX && fabs(value) > FLT_MAX) {
-            snprintf(row->bad, sizeof row->bad, "%s is beyond the range of floats", names[i]);
+            snprintf(row->bad, sizeof row->bad, "%s is beyond the range of floats", point_names[i]);
             return;
         }
         zero = zero && (i < NX || (float)value == 0.0f);
@@ -273,8 +274,7 @@ static int fail(const cli_points_writer *w) {
 
 /* The name of a column before the answers, if rows are not kept; NULL behind the last. */
 static const char *own_name(const cli_points_writer *w, int i) {
-    static const char *const names[] = {"x", "y", "z", "nx", "ny", "nz"};
-    return w->answers_only || w->keep || i >= (w->normals ? 6 : 3) ? NULL : names[i];
+    return w->answers_only || w->keep || i >= (w->normals ? 6 : 3) ? NULL : point_names[i];
 }
 
 static void write_csv_head(cli_points_writer *w, const cli_points_reader *reader) {
@@ -289,8 +289,8 @@ static void write_csv_head(cli_points_writer *w, const cli_points_reader *reader
     for (int i = 0; own_name(w, i) != NULL; ++i, ++written) {
         fprintf(w->file, "%.*s%s", written > 0, &w->delimiter, own_name(w, i));
     }
-    for (size_t c = 0; c < w->column_count; ++c, ++written) {
-        fprintf(w->file, "%.*s%s", written > 0, &w->delimiter, w->columns[c].name);
+    for (size_t c = 0; c < w->answers->width; ++c, ++written) {
+        fprintf(w->file, "%.*s%s", written > 0, &w->delimiter, w->answers->names[c]);
     }
     putc('\n', w->file);
 }
@@ -299,8 +299,8 @@ static void write_ply_properties(const cli_points_writer *w) {
     for (int i = 0; own_name(w, i) != NULL; ++i) {
         fprintf(w->file, "property %s %s\n", i < 3 && !w->floats ? "double" : "float", own_name(w, i));
     }
-    for (size_t c = 0; c < w->column_count; ++c) {
-        fprintf(w->file, "property float %s\n", w->columns[c].name);
+    for (size_t c = 0; c < w->answers->width; ++c) {
+        fprintf(w->file, "property float %s\n", w->answers->names[c]);
     }
 }
 
@@ -326,8 +326,8 @@ static void write_kept_ply_head(const cli_points_writer *w, const cli_points_rea
 
 /* Refuses answers with the name of a column that is there already. */
 static int check_names(const cli_points_writer *w, const cli_points_reader *reader) {
-    for (size_t c = 0; w->keep && c < w->column_count; ++c) {
-        const char *name = w->columns[c].name;
+    for (size_t c = 0; w->keep && c < w->answers->width; ++c) {
+        const char *name = w->answers->names[c];
         const size_t size = strlen(name);
         bool there = false;
         if (reader->table.format == VSHI_TABLE_PLY) {
@@ -352,8 +352,8 @@ static int check_names(const cli_points_writer *w, const cli_points_reader *read
 }
 
 int cli_points_writer_open(const char *path, int32_t format, bool answers_only,
-                           const cli_points_reader *reader, const cli_points_column *columns,
-                           size_t column_count, cli_points_writer *w) {
+                           const cli_points_reader *reader, const cli_points_answers *answers,
+                           cli_points_writer *w) {
     const bool standard = strcmp(path, "-") == 0, same = format == reader->table.format;
     *w = (cli_points_writer){.name = standard ? "standard output" : path,
                              .format = format,
@@ -366,8 +366,7 @@ int cli_points_writer_open(const char *path, int32_t format, bool answers_only,
                              .floats = reader->floats,
                              .normals = reader->has_normals,
                              .delimiter = format == VSHI_TABLE_PLY ? ' ' : ',',
-                             .columns = columns,
-                             .column_count = column_count,
+                             .answers = answers,
                              .file = stdout};
     if (format == VSHI_TABLE_CSV && same && (w->keep || reader->table.delimiter != ' ')) {
         w->delimiter = reader->table.delimiter;
@@ -383,7 +382,7 @@ int cli_points_writer_open(const char *path, int32_t format, bool answers_only,
         }
         w->file = w->spool;
     }
-    w->row = malloc((6 + column_count) * (VSHI_DECIMAL_ROOM + 1) + 1);
+    w->row = malloc((6 + answers->width) * (VSHI_DECIMAL_ROOM + 1) + 1);
     if (format == VSHI_TABLE_CSV) {
         write_csv_head(w, reader);
     } else if (format == VSHI_TABLE_PLY && w->keep) {
@@ -439,8 +438,8 @@ static bool write_row(const cli_points_writer *w, const cli_points *points, size
             at = put_value(w, at, points->normals[3 * i + k], false);
         }
     }
-    for (size_t c = 0; c < w->column_count; ++c) {
-        at = put_value(w, at, w->columns[c].values[i * w->columns[c].stride], false);
+    for (size_t c = 0; c < w->answers->width; ++c) {
+        at = put_value(w, at, w->answers->values[i * w->answers->width + c], false);
     }
     if (w->text) {
         at[-1] = '\n';
@@ -455,10 +454,6 @@ int cli_points_write(cli_points_writer *w, const cli_points *points) {
         }
     }
     w->rows += points->count;
-    return CLI_OK;
-}
-
-int cli_points_writer_flush(cli_points_writer *w) {
     return fflush(w->file) == 0 ? CLI_OK : fail(w);
 }
 

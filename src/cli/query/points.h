@@ -58,11 +58,12 @@ bool cli_points_can_keep(const cli_points_reader *reader);
 
 /* --- writing */
 
-typedef struct cli_points_column {
-    char name[80];
-    const float *values;
-    size_t stride; /* floats */
-} cli_points_column;
+/* The answers of a batch. */
+typedef struct cli_points_answers {
+    char (*names)[80]; /* [width] */
+    float *values;     /* [rows of the batch][width] */
+    size_t width;
+} cli_points_answers;
 
 typedef struct cli_points_writer {
     const char *name;
@@ -70,8 +71,7 @@ typedef struct cli_points_writer {
     bool answers_only, keep;
     bool text, big_endian, floats, normals; /* of the rows */
     char delimiter;
-    const cli_points_column *columns;
-    size_t column_count;
+    const cli_points_answers *answers;
     FILE *file;  /* head and rows are written to it */
     FILE *spool; /* holds them for standard output if the head needs the rows' number; else NULL */
     cli_temporary temporary;
@@ -82,10 +82,10 @@ typedef struct cli_points_writer {
 
 /* Begins a file, or standard output for "-". The reader is open. */
 int cli_points_writer_open(const char *path, int32_t format, bool answers_only,
-                           const cli_points_reader *reader, const cli_points_column *columns,
-                           size_t column_count, cli_points_writer *writer);
+                           const cli_points_reader *reader, const cli_points_answers *answers,
+                           cli_points_writer *writer);
+/* Writes a batch, and sends it into a pipe now. */
 int cli_points_write(cli_points_writer *writer, const cli_points *points);
-int cli_points_writer_flush(cli_points_writer *writer); /* sends rows into a pipe now */
 int cli_points_writer_commit(cli_points_writer *writer, cli_points_reader *reader);
 void cli_points_writer_free(cli_points_writer *writer); /* abandons what is not committed */
 

@@ -1,6 +1,6 @@
 /* vdbshade query: shadow, AO and distance at points of a file or a pipe. */
-#include "base/bytes.h"
 #include "base/clock.h"
+#include "base/memory.h"
 #include "cli/bake/options.h"
 #include "cli/message.h"
 #include "cli/paths.h"
@@ -25,17 +25,15 @@ typedef struct query_settings {
     double within; /* 0: not given */
 } query_settings;
 
-/* The values of a point, and those of a batch. */
+/* The kinds of answers, and the answers of a batch. */
 typedef struct query_answers {
     size_t lights;
     const vsh_light *light;
     bool ao, distance, gradient;
-    bool shadow_error, ao_error; /* standard errors, if the method knows them */
-    float *memory;
+    bool shadow_error, ao_error;     /* standard errors, if the method knows them */
     float **visibility, **deviation; /* [lights] */
     vsh_query_output output;
-    cli_points_column *columns;
-    size_t column_count;
+    cli_points_answers rows;
 } query_answers;
 
 enum { KEY_POINTS_FORMAT = 0x2000, KEY_FORMAT, KEY_NORMALS, KEY_BATCH };
@@ -141,23 +139,14 @@ static int find_formats(query_settings *s) {
     return CLI_OK;
 }
 
-static int check_output(const query_settings *s, const vsh_scene *scene, const char *output) {
-    if (!is_standard(s->points) && cli_same_file(output, s->points)) {
-        return cli_usage("%s: the output is also the points' file", output);
-    }
-    CLI_TRY(cli_bake_check_output(&s->bake, scene, output));
-    CLI_TRY(cli_bake_check_inputs(scene, &output, 1));
-    return cli_temporary_check(output);
-}
-
 /* Refuses an output before anything is read. */
 static int check_files(const query_settings *s, const vsh_scene *scene) {
-    const char *output = s->bake.output, *stats = s->bake.stats;
-    if (stats != NULL && cli_same_file(output, stats)) {
-        return cli_usage("%s: both the output and the --stats file", output);
-    }
-    CLI_TRY(is_standard(output) ? CLI_OK : check_output(s, scene, output));
-    return stats != NULL ? check_output(s, scene, stats) : CLI_OK;
+    cli_bake_settings outputs = s->bake;
+    outputs.output = is_standard(s->bake.output) ? NULL : s->bake.output;
+    const char *points = is_standard(s->points) ? NULL : s->points;
+    CLI_TRY(cli_check_apart(outputs.output, points, "also the points' file"));
+    CLI_TRY(cli_check_apart(outputs.stats, points, "also the points' file"));
+    return cli_bake_check_files(&outputs, scene);
 }
 
 /* --- the work */
@@ -186,49 +175,46 @@ static size_t count_floats(const query_answers *a) {
            (a->gradient ? 3 : 0);
 }
 
-static float *add_column(query_answers *a, float **next, size_t room, const char *kind, const char *name,
-                         size_t width) {
-    static const char *const axes[] = {".x", ".y", ".z"};
-    float *values = *next;
-    *next += width * room;
-    for (size_t i = 0; i < width; ++i) {
-        cli_points_column *column = &a->columns[a->column_count++];
-        snprintf(column->name, sizeof column->name, "%s%s%s", kind, name, width > 1 ? axes[i] : "");
-        column->values = values + i;
-        column->stride = width;
-    }
-    return values;
+static float *add_column(query_answers *a, const char *kind, const char *name) {
+    cli_points_answers *rows = &a->rows;
+    snprintf(rows->names[rows->width], sizeof *rows->names, "%s%s", kind, name);
+    return rows->values + rows->width++;
 }
 
 static void create_answers(query_answers *a, size_t room) {
     const size_t floats = count_floats(a);
-    a->memory = malloc(room * floats * sizeof *a->memory);
-    a->columns = calloc(floats, sizeof *a->columns);
+    a->rows.values = malloc(room * floats * sizeof *a->rows.values);
+    a->rows.names = calloc(floats, sizeof *a->rows.names);
     a->visibility = calloc(a->lights + 1, sizeof *a->visibility);
     a->deviation = calloc(a->lights + 1, sizeof *a->deviation);
-    float *next = a->memory;
     a->output = vsh_query_output_default();
+    a->output.stride = floats * sizeof(float);
     a->output.visibility = a->visibility;
     a->output.deviation = a->deviation;
     for (size_t l = 0; l < a->lights; ++l) {
-        a->visibility[l] = add_column(a, &next, room, "shadow.", a->light[l].name, 1);
+        a->visibility[l] = add_column(a, "shadow.", a->light[l].name);
     }
-    a->output.ao = a->ao ? add_column(a, &next, room, "ao", "", 1) : NULL;
+    a->output.ao = a->ao ? add_column(a, "ao", "") : NULL;
     for (size_t l = 0; a->shadow_error && l < a->lights; ++l) {
-        a->deviation[l] = add_column(a, &next, room, "error.", a->light[l].name, 1);
+        a->deviation[l] = add_column(a, "error.", a->light[l].name);
     }
-    a->output.ao_deviation = a->ao && a->ao_error ? add_column(a, &next, room, "error.", "ao", 1) : NULL;
-    a->output.distance = a->distance ? add_column(a, &next, room, "distance", "", 1) : NULL;
-    a->output.gradient = a->gradient ? add_column(a, &next, room, "gradient", "", 3) : NULL;
+    a->output.ao_deviation = a->ao && a->ao_error ? add_column(a, "error.", "ao") : NULL;
+    a->output.distance = a->distance ? add_column(a, "distance", "") : NULL;
+    if (a->gradient) {
+        a->output.gradient = add_column(a, "gradient", ".x");
+        add_column(a, "gradient", ".y");
+        add_column(a, "gradient", ".z");
+    }
 }
 
 /* Chooses the rows of a batch, and the most of their own bytes that it holds. */
 static int plan_batch(const query_work *work, bool keep, size_t *rows, size_t *most_kept) {
     const int32_t asked = work->settings->batch;
-    const uint64_t limit = cli_given.memory_limit;
-    const uint64_t held = work->shading.stats.casters.field_bytes +
-                          work->shading.stats.casters.triangles_bytes +
-                          work->reader.face_vertices * (uint64_t)sizeof(float[6]);
+    const vsh_occluders_info *casters = &work->shading.stats.casters;
+    const char *name = work->reader.table.source.name;
+    vsh_run run = work->shading.run;
+    run.memory_held += casters->field_bytes + casters->triangles_bytes +
+                       work->reader.face_vertices * (uint64_t)sizeof(float[6]);
     const size_t row_size = work->reader.table.row_size; /* 0: text */
     /* twice, because room grows by doubling */
     const size_t own = !keep ? 0 : row_size > 0 ? 2 * row_size : TEXT_BYTES;
@@ -236,17 +222,11 @@ static int plan_batch(const query_work *work, bool keep, size_t *rows, size_t *m
                         count_floats(&work->answers) * sizeof(float);
     const size_t least = asked > 0 && asked < LEAST_ROWS ? (size_t)asked : LEAST_ROWS;
     *rows = asked > 0 ? (size_t)asked : VSH_QUERY_BATCH;
-    while (limit > 0 && held + (uint64_t)*rows * each > limit && *rows / 2 >= least) {
+    while (*rows / 2 >= least && vshi_check_limit(&run, (double)*rows * (double)each, name, NULL) != VSH_OK) {
         *rows /= 2;
     }
-    if (limit > 0 && held + (uint64_t)*rows * each > limit) {
-        char all[32], most[32];
-        cli_say("%s: the field and %zu points at a time need %s, over the memory limit of %s",
-                work->reader.table.source.name, *rows,
-                vshi_bytes_text(held + (uint64_t)*rows * each, all, sizeof all),
-                vshi_bytes_text(limit, most, sizeof most));
-        return CLI_LIMIT;
-    }
+    vsh_error error;
+    CLI_TRY(cli_check(vshi_check_limit(&run, (double)*rows * (double)each, name, &error), &error));
     *most_kept = *rows * own / 2;
     return CLI_OK;
 }
@@ -275,7 +255,6 @@ static int answer_batch(query_work *work, const cli_points *points) {
 }
 
 static int answer_rows(query_work *work, size_t most_kept, cli_points *points, cli_points_writer *writer) {
-    const bool flush = work->settings->batch > 0 || work->reader.table.source.size == 0;
     for (;;) {
         double start = vshi_seconds();
         CLI_TRY(cli_points_read(&work->reader, most_kept, points));
@@ -286,7 +265,6 @@ static int answer_rows(query_work *work, size_t most_kept, cli_points *points, c
         CLI_TRY(answer_batch(work, points));
         start = vshi_seconds();
         CLI_TRY(cli_points_write(writer, points));
-        CLI_TRY(flush ? cli_points_writer_flush(writer) : CLI_OK);
         cli_stats_stage(&work->shading.stats, CLI_STAGE_WRITE, start);
     }
     const double start = vshi_seconds();
@@ -310,7 +288,7 @@ static int answer_points(query_work *work) {
     points = cli_points_create(rows, reader->has_normals, keep);
     create_answers(&work->answers, rows);
     CLI_TRY_DONE(cli_points_writer_open(s->bake.output, s->format, s->answers_only, reader,
-                                        work->answers.columns, work->answers.column_count, &writer));
+                                        &work->answers.rows, &writer));
     CLI_TRY_DONE(answer_rows(work, most_kept, &points, &writer));
 done:
     cli_points_writer_free(&writer);
@@ -399,8 +377,8 @@ static int run_query(const query_settings *s, vsh_scene *scene) {
     CLI_TRY_DONE(cli_stats_finish(&work.shading.stats, &work.shading.run, s->bake.stats));
     say_results(&work);
 done:
-    free(work.answers.memory);
-    free(work.answers.columns);
+    free(work.answers.rows.values);
+    free(work.answers.rows.names);
     free(work.answers.visibility);
     free(work.answers.deviation);
     vsh_query_free(work.query);

@@ -1,6 +1,6 @@
 /* vdbshade render: pictures of a scene, to look at what bake makes of it. */
-#include "base/bytes.h"
 #include "base/clock.h"
+#include "base/memory.h"
 #include "cli/bake/options.h"
 #include "cli/message.h"
 #include "cli/paths.h"
@@ -189,14 +189,6 @@ static int check_files(const render_settings *s, const vsh_scene *scene) {
     if (scene->light_count == 0 && !scene->ao && s->lightmap_count == 0) {
         return cli_usage("%s: no lights and no ao; give --sun X,Y,Z or --ao DISTANCE, or both",
                          s->bake.input);
-    }
-    const uint64_t limit = cli_given.memory_limit, bytes = count_picture_bytes(s);
-    if (limit > 0 && bytes > limit) {
-        char all[32], most[32];
-        cli_say("%s: a picture of %d × %d needs %s, over the memory limit of %s", s->bake.output,
-                s->options.width, s->options.height, vshi_bytes_text(bytes, all, sizeof all),
-                vshi_bytes_text(limit, most, sizeof most));
-        return CLI_LIMIT;
     }
     return CLI_OK;
 }
@@ -746,8 +738,11 @@ static void say_results(const render_work *work) {
 
 static int run_render(const render_settings *s, vsh_scene *scene) {
     render_work work = {.settings = s, .shading = cli_shading_begin(scene, CLI_STATS_POINTS)};
-    work.shading.run.memory_held += count_picture_bytes(s);
+    vsh_error error;
     int code;
+    CLI_TRY_DONE(cli_check(
+        vshi_check_limit(&work.shading.run, (double)count_picture_bytes(s), s->bake.output, &error), &error));
+    work.shading.run.memory_held += count_picture_bytes(s);
     CLI_TRY_DONE(load(&work));
     CLI_TRY_DONE(make_occluders(&work));
     CLI_TRY_DONE(set_options(&work));

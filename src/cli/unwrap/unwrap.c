@@ -1,6 +1,5 @@
 /* vdbshade unwrap: a mesh file's meshes get lightmap UVs. */
 #include "base/clock.h"
-#include "base/hash.h"
 #include "base/utf8.h"
 #include "cli/commands.h"
 #include "cli/message.h"
@@ -9,7 +8,6 @@
 #include "cli/temporary.h"
 
 #include <inttypes.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -27,7 +25,6 @@ enum {
 typedef struct unwrap_settings {
     const char *input;
     const char *output;
-    const char *picture;
     bool has_size;
     int32_t max_size; /* 0: not given */
     vsh_unwrap_options options;
@@ -40,8 +37,6 @@ static const cli_option options[] = {
      "mesh file to write, with the UVs that were made: .glb or\n.gltf, the input with one more set; .obj, "
      "its meshes "
      "in\nthe world with that set alone"},
-    {CLI_TEXT(unwrap_settings, picture), "picture", "FILE",
-     "picture of the charts to write, PNG or another image"},
     {0, NULL, NULL, "Atlas"},
     {KEY_ATLAS, "atlas", "WHAT",
      "objects: each has a page of its own; shared: all lie on the\nsame (shared)"},
@@ -101,26 +96,12 @@ static int check_atlas(unwrap_settings *s) {
     return CLI_OK;
 }
 
-static const char *const channels[3] = {"R", "G", "B"};
-
 /* Refuses outputs before anything is read. */
 static int check_files(const unwrap_settings *s) {
     if (!vsh_lit_is_output(s->output)) {
         return cli_usage("%s: give -o OUT.obj, .glb or .gltf", s->output != NULL ? s->output : s->input);
     }
     CLI_TRY(cli_check_apart(s->output, s->input, "the input"));
-    if (s->picture != NULL && (cli_same_file(s->picture, s->input) || cli_same_file(s->picture, s->output))) {
-        return cli_usage("%s: the picture is the %s", s->picture,
-                         cli_same_file(s->picture, s->input) ? "input" : "output");
-    }
-    if (s->picture != NULL) {
-        const vsh_image image = {
-            .width = s->options.width, .height = s->options.height, .channel_count = 3, .names = channels};
-        vsh_image_options as = vsh_image_options_default();
-        vsh_error error;
-        as.bits = 8;
-        CLI_TRY(cli_check(vsh_image_check(s->picture, &image, &as, &error), &error));
-    }
     return cli_temporary_check(s->output);
 }
 
@@ -196,117 +177,6 @@ static int write_model(const unwrap_settings *s, const vsh_model *model, const v
     return cli_check_result(result, &error);
 }
 
-/* --- the picture of charts */
-
-/* A colour that is neither dark nor pale, and unlike that of the next chart. */
-static void colour_of(uint32_t chart, float rgb[3]) {
-    const uint64_t bits = vshi_mix(chart + UINT64_C(1));
-    for (int k = 0; k < 3; ++k) {
-        rgb[k] = 0.25F + 0.7F * (float)(bits >> (16 * k) & 0xffff) / 65535.0F;
-    }
-}
-
-/* A picture of pages below each other. */
-typedef struct picture {
-    float *planes[3];
-    int32_t width, height;
-    size_t *rows; /* [pages]: each one's first */
-} picture;
-
-/* Colours the texels whose centres a triangle has. */
-static void paint(const picture *p, const vsh_atlas_page *page, size_t row, const double at[3][2],
-                  const float rgb[3]) {
-    const int32_t width = page->width, height = page->height;
-    double low[2] = {width, height}, high[2] = {0.0, 0.0};
-    for (int k = 0; k < 6; ++k) {
-        low[k % 2] = fmin(low[k % 2], at[k / 2][k % 2]);
-        high[k % 2] = fmax(high[k % 2], at[k / 2][k % 2]);
-    }
-    const int32_t x0 = (int32_t)fmax(0.0, floor(low[0])), y0 = (int32_t)fmax(0.0, floor(low[1]));
-    const int32_t x1 = (int32_t)fmin(width, ceil(high[0])), y1 = (int32_t)fmin(height, ceil(high[1]));
-    for (int32_t y = y0; y < y1; ++y) {
-        for (int32_t x = x0; x < x1; ++x) {
-            bool in = true;
-            for (int k = 0; k < 3 && in; ++k) {
-                const double *a = at[k], *b = at[(k + 1) % 3];
-                in = (b[0] - a[0]) * (y + 0.5 - a[1]) - (b[1] - a[1]) * (x + 0.5 - a[0]) >= 0.0;
-            }
-            for (int k = 0; k < 3 && in; ++k) { /* pictures have v = 1 on top */
-                p->planes[k][(row + (size_t)(height - 1 - y)) * (size_t)p->width + (size_t)x] = rgb[k];
-            }
-        }
-    }
-}
-
-static void paint_mesh(const picture *p, const vsh_atlas *atlas, size_t mesh) {
-    const vsh_atlas_mesh placed = vsh_atlas_mesh_view(atlas, mesh);
-    for (size_t i = 0; i < placed.triangle_count; ++i) {
-        const uint32_t chart = placed.charts[i];
-        if (chart == VSH_NO_CHART) {
-            continue;
-        }
-        const size_t number = vsh_atlas_charts(atlas)[chart].page;
-        const vsh_atlas_page page = vsh_atlas_page_view(atlas, number);
-        double at[3][2];
-        float rgb[3];
-        for (size_t k = 0; k < 3; ++k) {
-            const float *uv = placed.uvs + 2 * (size_t)placed.indices[3 * i + k];
-            at[k][0] = (double)uv[0] * page.width;
-            at[k][1] = (double)uv[1] * page.height;
-        }
-        colour_of(chart, rgb);
-        paint(p, &page, p->rows[number], (const double(*)[2])at, rgb);
-    }
-}
-
-static int make_picture(const vsh_atlas *atlas, picture *p) {
-    const size_t pages = vsh_atlas_page_count(atlas);
-    double width = 0.0, height = 0.0;
-    p->rows = calloc(pages, sizeof *p->rows);
-    for (size_t i = 0; i < pages; ++i) {
-        const vsh_atlas_page page = vsh_atlas_page_view(atlas, i);
-        p->rows[i] = (size_t)height;
-        width = fmax(width, page.width);
-        height += page.height;
-    }
-    if (width * height * 3.0 > 0x1p31) {
-        const vsh_error error = {VSH_ERROR_LIMIT,
-                                 "--picture: more than 2^31 values: give fewer or smaller pages"};
-        return cli_fail(&error);
-    }
-    p->width = (int32_t)width;
-    p->height = (int32_t)height;
-    for (int k = 0; k < 3; ++k) {
-        p->planes[k] = calloc((size_t)p->width * (size_t)p->height, sizeof *p->planes[k]);
-    }
-    return CLI_OK;
-}
-
-/* Writes a picture of the charts, pages from the top down, each chart in a colour of its own. */
-static int write_picture(const char *path, const vsh_atlas *atlas) {
-    picture p = {.rows = NULL};
-    vsh_image_options as = vsh_image_options_default();
-    vsh_error error;
-    int code;
-    CLI_TRY_DONE(make_picture(atlas, &p));
-    for (size_t m = 0; m < vsh_atlas_mesh_count(atlas); ++m) {
-        paint_mesh(&p, atlas, m);
-    }
-    const vsh_image image = {.width = p.width,
-                             .height = p.height,
-                             .channel_count = 3,
-                             .names = channels,
-                             .planes = (const float *const *)p.planes};
-    as.bits = 8;
-    code = cli_check(vsh_image_write(path, &image, &as, &error), &error);
-done:
-    for (int k = 0; k < 3; ++k) {
-        free(p.planes[k]);
-    }
-    free(p.rows);
-    return code;
-}
-
 /* --- the command */
 
 static void say_summary(const unwrap_settings *s, const vsh_atlas *atlas, double seconds) {
@@ -345,9 +215,6 @@ static int unwrap(unwrap_settings *s) {
         vsh_model_densities(model, s->input, s->densities.list, s->densities.count, density, &error),
         &error));
     CLI_TRY_DONE(cli_check_result(vsh_unwrap(meshes, count, &s->options, &run, &atlas, &error), &error));
-    if (s->picture != NULL) {
-        CLI_TRY_DONE(write_picture(s->picture, atlas));
-    }
     CLI_TRY_DONE(write_model(s, model, meshes, atlas, &run));
     cli_signals_end(CLI_OK);
     if (!cli_given.quiet) {
