@@ -29,9 +29,8 @@ typedef struct estimating {
     const vsh_shade_options *shade;
     float *values, *bent;
     vshi_ao_plane *planes;
-    int32_t spacing;        /* of the lattice at work */
-    _Atomic size_t refused; /* blocks whose memory was */
-    row_sum *sums;          /* [rows of cells] */
+    int32_t spacing; /* of the lattice at work */
+    row_sum *sums;   /* [rows of cells] */
 } estimating;
 
 /* Some cells of a lattice and those around them, as one rectangle of its texels. */
@@ -151,25 +150,23 @@ static size_t blocks_across(int32_t texels, int32_t spacing) {
     return (size_t)((texels + side - 1) / side);
 }
 
-/* A vshi_range_fn over blocks, row by row. */
-static void estimate_blocks(void *user, size_t begin, size_t end) {
-    estimating *s = user;
+/* Blocks are numbered row by row. */
+static vsh_result estimate_block(void *user, size_t number, vsh_error *error) {
+    const estimating *s = user;
     const size_t columns = blocks_across(s->map.width, s->spacing);
+    const int32_t side = INNER * s->spacing, beside = VSHI_CELL * s->spacing;
     block *b = malloc(sizeof *b);
     if (b == NULL) {
-        atomic_fetch_add(&s->refused, 1);
-        return;
+        return vshi_fail(error, VSH_ERROR_MEMORY, "AO texels: the system refused memory");
     }
-    for (size_t n = begin; n < end; ++n) {
-        const int32_t side = INNER * s->spacing, beside = VSHI_CELL * s->spacing;
-        b->lattice = (vshi_texel_lattice){(int32_t)(n % columns) * side - beside,
-                                          (int32_t)(n / columns) * side - beside, s->spacing, WIDTH, WIDTH};
-        if (find_texels(s, b)) {
-            lay_out(s, b);
-            estimate_own(s, b);
-        }
+    b->lattice = (vshi_texel_lattice){(int32_t)(number % columns) * side - beside,
+                                      (int32_t)(number / columns) * side - beside, s->spacing, WIDTH, WIDTH};
+    if (find_texels(s, b)) {
+        lay_out(s, b);
+        estimate_own(s, b);
     }
     free(b);
+    return VSH_OK;
 }
 
 /* --- of those between */
@@ -321,10 +318,7 @@ static vsh_result run_estimate(estimating *s, int32_t spacing, vshi_job *job, vs
     const int32_t width = s->map.width, height = s->map.height;
     for (s->spacing = spacing; s->spacing > 0; s->spacing /= 2) {
         const size_t blocks = blocks_across(width, s->spacing) * blocks_across(height, s->spacing);
-        VSHI_TRY(vshi_parallel_for(job, blocks, 1, 0, estimate_blocks, s, error));
-    }
-    if (s->refused > 0) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "AO texels: the system refused memory");
+        VSHI_TRY(vshi_parallel_each(job, blocks, 1, 0, estimate_block, s, error));
     }
     for (s->spacing = spacing; s->spacing > 1; s->spacing /= 2) {
         const size_t cells = (size_t)((height + s->spacing - 1) / s->spacing);

@@ -41,7 +41,6 @@ typedef struct counting {
     vsh_charts *charts;
     vshi_overlaps overlaps;
     _Atomic uint64_t covered;
-    _Atomic vsh_result result; /* of the tiles that failed */
 } counting;
 
 static void count_cell(const counting *all, const vshi_cell *cell, size_t number, uint64_t *covered) {
@@ -54,35 +53,27 @@ static void count_cell(const counting *all, const vshi_cell *cell, size_t number
     *covered += (uint64_t)__builtin_popcountll(cell->border | cell->covered);
 }
 
-/* Rasterizes tiles, for their samples (unless `owners` are looked for) and for what is covered twice. */
-static void count_tiles(void *user, size_t begin, size_t end) {
+/* Rasterizes a tile to count texels that triangles cover twice, and its samples unless `owners` are wanted.
+ */
+static vsh_result count_tile(void *user, size_t number, vsh_error *error) {
     counting *all = user;
     const vshi_charts *sorted = &all->charts->sorted;
-    for (size_t number = begin; number < end; ++number) {
-        vshi_tile tile;
-        const vsh_result result = vshi_tile_open(sorted, number, &tile, NULL);
-        if (result != VSH_OK) {
-            atomic_store(&all->result, result);
+    vshi_tile tile;
+    uint64_t covered = 0;
+    const vsh_result result = vshi_tile_open(sorted, number, &tile, error);
+    for (int32_t k = 0; result == VSH_OK && k < VSHI_TILE_CELLS * VSHI_TILE_CELLS; ++k) {
+        if (vshi_tile_rasterize(sorted, &tile, k % VSHI_TILE_CELLS, k / VSHI_TILE_CELLS, &all->overlaps) &&
+            all->overlaps.owners == NULL) {
+            count_cell(all, &tile.cell, number, &covered);
         }
-        uint64_t covered = 0;
-        for (int32_t k = 0; result == VSH_OK && k < VSHI_TILE_CELLS * VSHI_TILE_CELLS; ++k) {
-            if (vshi_tile_rasterize(sorted, &tile, k % VSHI_TILE_CELLS, k / VSHI_TILE_CELLS,
-                                    &all->overlaps) &&
-                all->overlaps.owners == NULL) {
-                count_cell(all, &tile.cell, number, &covered);
-            }
-        }
-        atomic_fetch_add(&all->covered, covered);
-        vshi_tile_close(&tile);
     }
+    atomic_fetch_add(&all->covered, covered);
+    vshi_tile_close(&tile);
+    return result;
 }
 
-/* Counts over all tiles. */
 static vsh_result count_all(counting *all, vshi_job *job, vsh_error *error) {
-    VSHI_TRY(vshi_parallel_for(job, vshi_charts_tiles(&all->charts->sorted), 1, 1, count_tiles, all, error));
-    const vsh_result result = atomic_load(&all->result);
-    return result == VSH_OK ? VSH_OK
-                            : vshi_fail(error, result, "texels: the system refused memory for a tile");
+    return vshi_parallel_each(job, vshi_charts_tiles(&all->charts->sorted), 1, 1, count_tile, all, error);
 }
 
 static vsh_result count(counting *all, const vsh_run *run, vshi_job *job, vsh_error *error) {
@@ -141,27 +132,29 @@ static void take_overlaps(const counting *all, vsh_uv_report *reports) {
     }
 }
 
-static void warn(const counting *all, const vsh_run *run, const vsh_uv_report *reports) {
-    const vshi_charts *sorted = &all->charts->sorted;
-    for (size_t m = 0; m < sorted->mesh_count; ++m) {
-        const vsh_uv_report *report = &reports[m];
-        const vshi_mesh_name label = vshi_mesh_label(&sorted->meshes[m], m);
-        const char *name = label.text;
-        if (report->overlap_texels > 0) {
-            vshi_warn(
-                run,
-                "%s: %zu texels of %zu triangles overlap other charts, %zu of them those of other objects; "
-                "the first triangle keeps its texels",
-                name, report->overlap_texels, report->overlap_triangles, report->other_texels);
-        }
-        if (report->outside_triangles > 0) {
-            vshi_warn(run, "%s: %zu triangles leave the UV square; the parts outside are not baked", name,
-                      report->outside_triangles);
-        }
-        if (report->degenerate_triangles > 0) {
-            vshi_warn(run, "%s: %zu triangles have no area in the lightmap UVs and are not baked", name,
-                      report->degenerate_triangles);
-        }
+void vshi_warn_mesh_uvs(const char *file, const vsh_mesh *mesh, size_t index, const vsh_uv_report *uv,
+                        const vsh_run *run) {
+    const vshi_mesh_name label = vshi_mesh_label(mesh, index);
+    const char *name = label.text, *colon = file[0] != '\0' ? ": " : "";
+    if (uv->overlap_texels > uv->other_texels) {
+        vshi_warn(run,
+                  "%s%s%s: %zu texels of %zu triangles lie over other charts of the same object; "
+                  "unwrap it anew",
+                  file, colon, name, uv->overlap_texels - uv->other_texels, uv->overlap_triangles);
+    }
+    if (uv->other_texels > 0) {
+        vshi_warn(run, "%s%s%s: %zu texels lie over charts of other objects; use --per-object or one atlas",
+                  file, colon, name, uv->other_texels);
+    }
+    if (uv->outside_triangles > 0) {
+        vshi_warn(run,
+                  "%s%s%s: %zu triangles leave the UV square; the parts outside are not baked; "
+                  "--uv-set N chooses another set",
+                  file, colon, name, uv->outside_triangles);
+    }
+    if (uv->degenerate_triangles > 0) {
+        vshi_warn(run, "%s%s%s: %zu triangles have no area in the UV set and are not baked; unwrap them",
+                  file, colon, name, uv->degenerate_triangles);
     }
 }
 
@@ -232,7 +225,9 @@ static vsh_result make(const vsh_mesh *meshes, size_t mesh_count, const vsh_ligh
     VSHI_TRY_DONE(count(&all, run, job, error));
     take_overlaps(&all, reports);
     VSHI_TRY_DONE(find_owners(&all, job, reports, error));
-    warn(&all, run, reports);
+    for (size_t m = 0; m < mesh_count; ++m) {
+        vshi_warn_mesh_uvs("", &meshes[m], m, &reports[m], run);
+    }
 done:
     vshi_mesh_set_free(&set);
     free(all.overlaps.triangles);

@@ -78,15 +78,10 @@ static bool is_flat(const vsh_mesh *mesh, size_t local) {
 static vsh_result add_border(closeness *c, size_t m, uint32_t side, uint32_t triangle, vsh_error *error) {
     const vsh_mesh *mesh = &c->meshes[m];
     if (c->border_count == c->border_room) {
-        const size_t room = 2 * c->border_room + 64;
-        VSHI_TRY(check_bytes(c, (double)room * sizeof *c->borders, error));
-        border *grown = realloc(c->borders, room * sizeof *grown);
-        if (grown == NULL) {
-            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
-        }
-        c->borders = grown;
-        c->border_room = room;
+        VSHI_TRY(check_bytes(c, 2.0 * (double)c->border_room * sizeof *c->borders, error));
     }
+    VSHI_TRY(vshi_make_room((void **)&c->borders, c->border_count, &c->border_room, sizeof *c->borders, what,
+                            error));
     border *b = &c->borders[c->border_count++];
     *b = (border){.chart = triangle, .mesh = (uint32_t)m};
     for (uint32_t end = 0; end < 2; ++end) {

@@ -42,7 +42,6 @@ typedef struct hiding {
     float *at;      /* [place_count][3]: of texels that are hidden, or give values */
     size_t place_count;
     vshi_places seen;
-    _Atomic vsh_result result; /* of the tiles that failed */
     uint32_t *hidden, *source; /* [hidden_count]: texels, and those whose values they have, then take; NONE */
     size_t hidden_count;
     uint64_t filled;
@@ -63,22 +62,18 @@ static void read_cell(const hiding *h, const vshi_tile *tile) {
     }
 }
 
-static void read_tiles(void *user, size_t begin, size_t end) {
-    hiding *h = user;
-    for (size_t number = begin; number < end; ++number) {
-        vshi_tile tile;
-        const vsh_result result = vshi_tile_open(&h->charts->sorted, number, &tile, NULL);
-        if (result != VSH_OK) {
-            atomic_store(&h->result, result);
+static vsh_result read_tile(void *user, size_t number, vsh_error *error) {
+    const hiding *h = user;
+    const vshi_charts *sorted = &h->charts->sorted;
+    vshi_tile tile;
+    const vsh_result result = vshi_tile_open(sorted, number, &tile, error);
+    for (int32_t k = 0; result == VSH_OK && k < VSHI_TILE_CELLS * VSHI_TILE_CELLS; ++k) {
+        if (vshi_tile_rasterize(sorted, &tile, k % VSHI_TILE_CELLS, k / VSHI_TILE_CELLS, NULL)) {
+            read_cell(h, &tile);
         }
-        for (int32_t k = 0; result == VSH_OK && k < VSHI_TILE_CELLS * VSHI_TILE_CELLS; ++k) {
-            if (vshi_tile_rasterize(&h->charts->sorted, &tile, k % VSHI_TILE_CELLS, k / VSHI_TILE_CELLS,
-                                    NULL)) {
-                read_cell(h, &tile);
-            }
-        }
-        vshi_tile_close(&tile);
     }
+    vshi_tile_close(&tile);
+    return result;
 }
 
 /* Notes where the first samples of texels are that have a place. */
@@ -105,28 +100,19 @@ static bool has_places(const hiding *h, size_t number) {
     return false;
 }
 
-static void place_tiles(void *user, size_t begin, size_t end) {
+static vsh_result place_tile(void *user, size_t number, vsh_error *error) {
     hiding *h = user;
-    for (size_t number = begin; number < end; ++number) {
-        const vsh_result result =
-            has_places(h, number) ? vshi_tile_visit(h->charts, number, false, note_places, h, NULL) : VSH_OK;
-        if (result != VSH_OK) {
-            atomic_store(&h->result, result);
-        }
-    }
+    return has_places(h, number) ? vshi_tile_visit(h->charts, number, false, note_places, h, error) : VSH_OK;
 }
 
-static vsh_result over_tiles(hiding *h, vshi_range_fn *fn, const vsh_run *run, vsh_error *error) {
+static vsh_result over_tiles(hiding *h, vshi_element_fn *fn, const vsh_run *run, vsh_error *error) {
     const size_t tiles = vshi_charts_tiles(&h->charts->sorted);
     vshi_job *job = vshi_job_begin(run, what, tiles);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
     }
-    vsh_result result = vshi_parallel_for(job, tiles, 1, 1, fn, h, error);
+    const vsh_result result = vshi_parallel_each(job, tiles, 1, 1, fn, h, error);
     vshi_job_end(job);
-    if (result == VSH_OK && (result = atomic_load(&h->result)) != VSH_OK) {
-        vshi_fail(error, result, "%s: the system refused memory for a tile", what);
-    }
     return result;
 }
 
@@ -207,7 +193,7 @@ static vsh_result find_seen(hiding *h, const vsh_run *run, vsh_error *error) {
         return VSH_OK;
     }
     VSHI_TRY(vshi_store_take(h->store, (void **)&h->at, h->place_count, 3 * sizeof *h->at, what, error));
-    VSHI_TRY(over_tiles(h, place_tiles, run, error));
+    VSHI_TRY(over_tiles(h, place_tile, run, error));
     VSHI_TRY(vshi_allocate((void **)&h->seen.list, h->seen.count, sizeof *h->seen.list, what, error));
     for (size_t i = 0; i < h->width * h->height; ++i) {
         if (h->mesh[i] > 0 && h->mesh[i] <= h->seen.count) {
@@ -319,7 +305,7 @@ static vsh_result find_and_fill(hiding *h, size_t light_count, const vsh_run *ru
     const size_t count = h->width * h->height;
     VSHI_TRY(vshi_store_take(h->store, (void **)&h->state, count, 1, what, error));
     VSHI_TRY(vshi_store_take(h->store, (void **)&h->mesh, count, sizeof *h->mesh, what, error));
-    VSHI_TRY(over_tiles(h, read_tiles, run, error));
+    VSHI_TRY(over_tiles(h, read_tile, run, error));
     VSHI_TRY(find_hidden(h, error));
     if (h->hidden_count == 0) {
         return VSH_OK;

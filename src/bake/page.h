@@ -69,11 +69,6 @@ static inline size_t vshi_page_place(const vshi_page *page, uint32_t texel) {
     return vsh_texel_place(texel, (int32_t)page->width);
 }
 
-/* Whether a tile holds samples. */
-static inline bool vshi_page_has_tile(const vshi_page *page, size_t tile) {
-    return page->charts->samples[tile] > 0;
-}
-
 /* Notes where the texel of a sample is, which way it faces, and its tangent. */
 void vshi_page_note(vshi_page *page, const vshi_samples *samples, size_t i);
 

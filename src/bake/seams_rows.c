@@ -5,6 +5,7 @@
 #include "bake/tile.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "mesh/weld.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -33,7 +34,6 @@ typedef struct making {
     uint32_t *number;        /* [unknowns]: island by island */
     vshi_seam_row *unsorted; /* [places] */
     size_t page;             /* whose owners are found */
-    _Atomic vsh_result tile_result;
 } making;
 
 /* Texels that a lookup reads, and their weights in 2^-24. */
@@ -163,28 +163,24 @@ static void find_cell_owners(const making *m, const vshi_tile *tile) {
     }
 }
 
-static void find_owners(void *user, size_t begin, size_t end) {
-    making *m = user;
+static vsh_result find_owners(void *user, size_t number, vsh_error *error) {
+    const making *m = user;
     const vshi_charts *charts = m->pages->charts[m->page];
-    for (size_t number = begin; number < end; ++number) {
-        const size_t x = number % charts->columns * VSHI_TILE, y = number / charts->columns * VSHI_TILE;
-        vshi_tile tile;
-        if (!has_marks(m, x, y, VSHI_TILE)) {
-            continue;
-        }
-        const vsh_result result = vshi_tile_open(charts, number, &tile, NULL);
-        if (result != VSH_OK) {
-            atomic_store(&m->tile_result, result);
-        }
-        for (size_t k = 0; result == VSH_OK && k < VSHI_TILE_CELLS * VSHI_TILE_CELLS; ++k) {
-            const size_t cell_x = k % VSHI_TILE_CELLS, cell_y = k / VSHI_TILE_CELLS;
-            if (has_marks(m, x + VSHI_CELL * cell_x, y + VSHI_CELL * cell_y, VSHI_CELL) &&
-                vshi_tile_rasterize(charts, &tile, (int32_t)cell_x, (int32_t)cell_y, NULL)) {
-                find_cell_owners(m, &tile);
-            }
-        }
-        vshi_tile_close(&tile);
+    const size_t x = number % charts->columns * VSHI_TILE, y = number / charts->columns * VSHI_TILE;
+    vshi_tile tile;
+    if (!has_marks(m, x, y, VSHI_TILE)) {
+        return VSH_OK;
     }
+    const vsh_result result = vshi_tile_open(charts, number, &tile, error);
+    for (size_t k = 0; result == VSH_OK && k < VSHI_TILE_CELLS * VSHI_TILE_CELLS; ++k) {
+        const size_t cell_x = k % VSHI_TILE_CELLS, cell_y = k / VSHI_TILE_CELLS;
+        if (has_marks(m, x + VSHI_CELL * cell_x, y + VSHI_CELL * cell_y, VSHI_CELL) &&
+            vshi_tile_rasterize(charts, &tile, (int32_t)cell_x, (int32_t)cell_y, NULL)) {
+            find_cell_owners(m, &tile);
+        }
+    }
+    vshi_tile_close(&tile);
+    return result;
 }
 
 /* Where the unknowns are; none of a chart so far. */
@@ -240,23 +236,6 @@ static bool put_side(const making *m, const lookup *found, const uint32_t chart[
     return true;
 }
 
-static uint32_t root_of(uint32_t *parent, uint32_t unknown) {
-    while (parent[unknown] != unknown) {
-        parent[unknown] = parent[parent[unknown]];
-        unknown = parent[unknown];
-    }
-    return unknown;
-}
-
-static void join_row(making *m, const vshi_seam_row *row) {
-    uint32_t least = root_of(m->parent, row->unknown[0]);
-    for (int k = 1; k < VSHI_SEAM_READS; ++k) {
-        const uint32_t root = root_of(m->parent, row->unknown[k]);
-        m->parent[root > least ? root : least] = root < least ? root : least;
-        least = root < least ? root : least;
-    }
-}
-
 static vsh_result make_rows(making *m, vsh_error *error) {
     vshi_seam_system *system = m->system;
     for (uint32_t u = 0; u < system->unknown_count; ++u) {
@@ -279,7 +258,9 @@ static vsh_result make_rows(making *m, vsh_error *error) {
             /* ends are those of the next edge too */
             row->share = places > 1 && (p == 0 || p + 1 == places) ? 0.5f * share : share;
             system->shares += (double)row->share;
-            join_row(m, row);
+            for (int k = 1; k < VSHI_SEAM_READS; ++k) {
+                vshi_set_join(m->parent, row->unknown[0], row->unknown[k]);
+            }
             ++system->row_count;
         }
     }
@@ -300,7 +281,7 @@ static vsh_result sort_islands(making *m, vsh_error *error) {
     vshi_seam_system *s = m->system;
     const char *what = "seams";
     for (uint32_t u = 0; u < s->unknown_count; ++u) {
-        m->number[u] = root_of(m->parent, u);
+        m->number[u] = vshi_set_of(m->parent, u);
     }
     for (uint32_t u = 0; u < s->unknown_count; ++u) { /* a root is the first of its island */
         m->parent[u] = m->number[u] == u ? (uint32_t)s->island_count++ : m->parent[m->number[u]];
@@ -387,11 +368,8 @@ static vsh_result make(making *m, const vsh_run *run, vsh_error *error) {
     VSHI_TRY(vshi_allocate((void **)&m->unsorted, places, sizeof *m->unsorted, what, error));
     for (m->page = 0; m->page < m->pages->count; ++m->page) {
         place_unknowns(m);
-        VSHI_TRY(vshi_parallel_for(m->job, vshi_charts_tiles(m->pages->charts[m->page]), 1, 0, find_owners, m,
-                                   error));
-    }
-    if (atomic_load(&m->tile_result) != VSH_OK) {
-        return vshi_fail(error, atomic_load(&m->tile_result), "seams: the system refused memory for a tile");
+        VSHI_TRY(vshi_parallel_each(m->job, vshi_charts_tiles(m->pages->charts[m->page]), 1, 0, find_owners,
+                                    m, error));
     }
     VSHI_TRY(make_rows(m, error));
     VSHI_TRY(sort_islands(m, error));

@@ -11,7 +11,6 @@ typedef struct rasterization {
     const vsh_charts *charts;
     vshi_samples *samples; /* of all tiles */
     size_t *start;         /* [tiles]: where a tile's samples begin */
-    _Atomic vsh_result result;
 } rasterization;
 
 /* A view of a tile's part of all samples. */
@@ -26,27 +25,21 @@ static vshi_samples part_of(const vshi_samples *all, size_t first, size_t room) 
                           .tangent = all->tangent != NULL ? all->tangent + 4 * first : NULL};
 }
 
-static vsh_result write_tile(const rasterization *all, size_t number) {
+static vsh_result write_tile(void *user, size_t number, vsh_error *error) {
+    const rasterization *all = user;
     const vsh_charts *charts = all->charts;
+    if (charts->samples[number] == 0) {
+        return VSH_OK;
+    }
     vshi_tile tile;
     vshi_samples own = part_of(all->samples, all->start[number], (size_t)charts->samples[number]);
     vshi_sample_writer writer = {.charts = charts, .tile = &tile, .samples = &own};
-    const vsh_result result = vshi_tile_open(&charts->sorted, number, &tile, NULL);
+    const vsh_result result = vshi_tile_open(&charts->sorted, number, &tile, error);
     if (result == VSH_OK) {
         vshi_samples_write_rows(&writer, &tile, 0, VSHI_TILE_CELLS);
     }
     vshi_tile_close(&tile);
     return result;
-}
-
-static void write_tiles(void *user, size_t begin, size_t end) {
-    rasterization *all = user;
-    for (size_t number = begin; number < end; ++number) {
-        const vsh_result result = all->charts->samples[number] > 0 ? write_tile(all, number) : VSH_OK;
-        if (result != VSH_OK) {
-            atomic_store(&all->result, result);
-        }
-    }
 }
 
 static vsh_result rasterize(rasterization *all, const vsh_run *run, vsh_error *error) {
@@ -55,11 +48,8 @@ static vsh_result rasterize(rasterization *all, const vsh_run *run, vsh_error *e
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "texels: the system refused memory");
     }
-    vsh_result result = vshi_parallel_for(job, tiles, 1, 1, write_tiles, all, error);
+    const vsh_result result = vshi_parallel_each(job, tiles, 1, 1, write_tile, all, error);
     vshi_job_end(job);
-    if (result == VSH_OK && (result = atomic_load(&all->result)) != VSH_OK) {
-        vshi_fail(error, result, "texels: the system refused memory for a tile");
-    }
     return result;
 }
 

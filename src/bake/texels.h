@@ -21,6 +21,10 @@ struct vsh_charts {
                              holds its shell */
 };
 
+/* Warns of faults in a mesh's UVs, one line for each kind. `file` is the mesh's, or "". */
+void vshi_warn_mesh_uvs(const char *file, const vsh_mesh *mesh, size_t index, const vsh_uv_report *uv,
+                        const vsh_run *run);
+
 struct vsh_texels {
     vshi_samples samples;
 };

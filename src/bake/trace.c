@@ -229,7 +229,6 @@ typedef struct tracing {
     work *works; /* [work_count] */
     size_t work_count;
     atomic_bool *busy; /* [work_count] */
-    _Atomic vsh_result result;
 } tracing;
 
 /* Samples that a tile's work has room for. */
@@ -266,24 +265,25 @@ static void free_work(work *w) {
     vshi_samples_free(&w->samples);
 }
 
-static vsh_result allocate_work(const tracing *t, work *w) {
+static vsh_result allocate_work(const tracing *t, work *w, vsh_error *error) {
     const vsh_charts *charts = t->page->charts;
     const size_t room = room_of(charts, t->rows, t->shares);
     const size_t held = t->checking.channels != NULL ? vshi_field_error_most(&t->checking.of, room) : 0;
     const char *what = "lightmap tile";
-    VSHI_TRY(vshi_samples_allocate(&w->samples, room, charts->tangents, NULL));
-    VSHI_TRY(vshi_origins_allocate(&w->origins, room, NULL));
-    VSHI_TRY(vshi_allocate((void **)&w->values, room, sizeof *w->values, what, NULL));
-    VSHI_TRY(vshi_allocate((void **)&w->deviation, room, sizeof *w->deviation, what, NULL));
-    VSHI_TRY(vshi_allocate((void **)&w->vectors, room, 3 * sizeof *w->vectors, what, NULL));
-    VSHI_TRY(vshi_allocate((void **)&w->irradiance, room, 3 * sizeof *w->irradiance, what, NULL));
-    VSHI_TRY(vshi_allocate((void **)&w->smooth, 1, sizeof *w->smooth, what, NULL));
-    VSHI_TRY(vshi_allocate((void **)&w->at, AROUND * AROUND, sizeof *w->at, what, NULL));
-    VSHI_TRY(vshi_allocate((void **)&w->position, t->shares ? room : 0, 3 * sizeof *w->position, what, NULL));
-    VSHI_TRY(vshi_allocate((void **)&w->rays, room, sizeof *w->rays, what, NULL));
-    VSHI_TRY(vshi_allocate((void **)&w->level, room, 1, what, NULL));
-    VSHI_TRY(vshi_allocate((void **)&w->held, held, sizeof *w->held, what, NULL));
-    return vshi_allocate((void **)&w->held_texels, held, sizeof *w->held_texels, what, NULL);
+    VSHI_TRY(vshi_samples_allocate(&w->samples, room, charts->tangents, error));
+    VSHI_TRY(vshi_origins_allocate(&w->origins, room, error));
+    VSHI_TRY(vshi_allocate((void **)&w->values, room, sizeof *w->values, what, error));
+    VSHI_TRY(vshi_allocate((void **)&w->deviation, room, sizeof *w->deviation, what, error));
+    VSHI_TRY(vshi_allocate((void **)&w->vectors, room, 3 * sizeof *w->vectors, what, error));
+    VSHI_TRY(vshi_allocate((void **)&w->irradiance, room, 3 * sizeof *w->irradiance, what, error));
+    VSHI_TRY(vshi_allocate((void **)&w->smooth, 1, sizeof *w->smooth, what, error));
+    VSHI_TRY(vshi_allocate((void **)&w->at, AROUND * AROUND, sizeof *w->at, what, error));
+    VSHI_TRY(
+        vshi_allocate((void **)&w->position, t->shares ? room : 0, 3 * sizeof *w->position, what, error));
+    VSHI_TRY(vshi_allocate((void **)&w->rays, room, sizeof *w->rays, what, error));
+    VSHI_TRY(vshi_allocate((void **)&w->level, room, 1, what, error));
+    VSHI_TRY(vshi_allocate((void **)&w->held, held, sizeof *w->held, what, error));
+    return vshi_allocate((void **)&w->held_texels, held, sizeof *w->held_texels, what, error);
 }
 
 /* Whether the texels of origins `k` and the one before it are one. */
@@ -476,7 +476,8 @@ static vshi_texel_map lay_out(const tracing *t, work *w, size_t tile) {
 }
 
 /* What was shot, to the page. */
-static vsh_result keep_shots(const tracing *t, const work *w, size_t tile, vshi_shots *shots, size_t index) {
+static vsh_result keep_shots(const tracing *t, const work *w, size_t tile, vshi_shots *shots, size_t index,
+                             vsh_error *error) {
     vshi_page *page = t->page;
     const bool keeps = keeps_error(&t->tracer->shade, false);
     for (size_t k = 0; k < w->origins.count; ++k) {
@@ -496,14 +497,14 @@ static vsh_result keep_shots(const tracing *t, const work *w, size_t tile, vshi_
     vshi_held_texels *held = &shots->held[tile];
     held->count = vshi_field_error_count(&t->checking.channels[index], &w->samples, w->held, w->held_count,
                                          w->held_texels);
-    VSHI_TRY(vshi_allocate((void **)&held->list, held->count, sizeof *held->list, "lightmap tile", NULL));
+    VSHI_TRY(vshi_allocate((void **)&held->list, held->count, sizeof *held->list, "lightmap tile", error));
     if (held->count > 0) {
         memcpy(held->list, w->held_texels, held->count * sizeof *held->list);
     }
     return VSH_OK;
 }
 
-static vsh_result shoot_ao(const tracing *t, work *w, size_t tile, bool sky) {
+static vsh_result shoot_ao(const tracing *t, work *w, size_t tile, bool sky, vsh_error *error) {
     const vshi_tracer *tracer = t->tracer;
     vshi_shots *shots = sky ? &t->page->sky : &t->page->ao;
     const vsh_points points = place_points(t, w, NULL, tracer->traces_ao);
@@ -520,7 +521,7 @@ static vsh_result shoot_ao(const tracing *t, work *w, size_t tile, bool sky) {
     vsh_shade_stats stats = vsh_shade_stats_zero(); /* its rays are counted where values come of them */
     vshi_ao_shoot(sky ? &tracer->sky : &tracer->ao, &points, faces_of(t, w), &share, w->values,
                   shots->open != NULL ? w->vectors : NULL, &stats);
-    return keep_shots(t, w, tile, shots, tracer->light_count + sky);
+    return keep_shots(t, w, tile, shots, tracer->light_count + sky, error);
 }
 
 /* --- all of a tile */
@@ -538,7 +539,7 @@ static void note_texels(const tracing *t, const work *w) {
     }
 }
 
-static vsh_result trace_samples(const tracing *t, work *w, size_t tile) {
+static vsh_result trace_samples(const tracing *t, work *w, size_t tile, vsh_error *error) {
     const vshi_tracer *tracer = t->tracer;
     const vsh_lightmap *planes = &t->page->lightmap;
     w->held_count = 0;
@@ -566,7 +567,7 @@ static vsh_result trace_samples(const tracing *t, work *w, size_t tile) {
             continue;
         }
         if (t->shares) {
-            VSHI_TRY(shoot_ao(t, w, tile, sky != 0));
+            VSHI_TRY(shoot_ao(t, w, tile, sky != 0, error));
         } else {
             trace_ao(t, w, tile, sky != 0);
         }
@@ -574,10 +575,10 @@ static vsh_result trace_samples(const tracing *t, work *w, size_t tile) {
     return VSH_OK;
 }
 
-static vsh_result trace_tile(const tracing *t, work *w, size_t number) {
+static vsh_result trace_tile(const tracing *t, work *w, size_t number, vsh_error *error) {
     const vsh_charts *charts = t->page->charts;
     vshi_tile tile;
-    vsh_result result = vshi_tile_open(&charts->sorted, number, &tile, NULL);
+    vsh_result result = vshi_tile_open(&charts->sorted, number, &tile, error);
     vshi_sample_writer writer = {.charts = charts, .tile = &tile, .samples = &w->samples};
     t->page->stats[number] = vsh_shade_stats_zero();
     for (int32_t row = 0; result == VSH_OK && row < VSHI_TILE_CELLS; row += t->rows) {
@@ -590,7 +591,7 @@ static vsh_result trace_tile(const tracing *t, work *w, size_t number) {
             vshi_samples_write_frame(&writer, &tile);
             vshi_origins_add_frame(&t->tracer->placement, &w->samples, w->own, &w->origins);
         }
-        result = w->origins.count > 0 ? trace_samples(t, w, number) : VSH_OK;
+        result = w->origins.count > 0 ? trace_samples(t, w, number, error) : VSH_OK;
     }
     vshi_tile_close(&tile);
     return result;
@@ -605,20 +606,16 @@ static size_t take_work(tracing *t) {
     }
 }
 
-static void trace_tiles(void *user, size_t begin, size_t end) {
+static vsh_result trace_listed_tile(void *user, size_t i, vsh_error *error) {
     tracing *t = user;
-    const size_t own = take_work(t);
-    for (size_t i = begin; i < end; ++i) {
-        const size_t number = t->tiles != NULL ? t->tiles[i] : i;
-        if (!vshi_page_has_tile(t->page, number)) {
-            continue;
-        }
-        const vsh_result result = trace_tile(t, &t->works[own], number);
-        if (result != VSH_OK) {
-            atomic_store(&t->result, result);
-        }
+    const size_t number = t->tiles != NULL ? t->tiles[i] : i;
+    if (t->page->charts->samples[number] == 0) {
+        return VSH_OK;
     }
+    const size_t own = take_work(t);
+    const vsh_result result = trace_tile(t, &t->works[own], number, error);
     atomic_store(&t->busy[own], false);
+    return result;
 }
 
 /* As many as threads work on tiles at a time. */
@@ -628,10 +625,7 @@ static vsh_result allocate_works(tracing *t, size_t tiles, vsh_error *error) {
     VSHI_TRY(vshi_allocate((void **)&t->works, t->work_count, sizeof *t->works, "lightmap tiles", error));
     VSHI_TRY(vshi_allocate((void *)&t->busy, t->work_count, sizeof *t->busy, "lightmap tiles", error));
     for (size_t i = 0; i < t->work_count; ++i) {
-        const vsh_result result = allocate_work(t, &t->works[i]);
-        if (result != VSH_OK) {
-            return vshi_fail(error, result, "lightmap tiles: the system refused memory");
-        }
+        VSHI_TRY(allocate_work(t, &t->works[i], error));
     }
     return VSH_OK;
 }
@@ -648,10 +642,7 @@ vsh_result vshi_trace_tiles(const vshi_tracer *tracer, vshi_page *page, const ui
     vsh_result result;
     VSHI_TRY_DONE(open_checking(tracer, page, &t.checking, error));
     VSHI_TRY_DONE(allocate_works(&t, count, error));
-    VSHI_TRY_DONE(vshi_parallel_for(job, count, 1, 1, trace_tiles, &t, error));
-    if (atomic_load(&t.result) != VSH_OK) {
-        result = vshi_fail(error, atomic_load(&t.result), "lightmap tile: the system refused memory");
-    }
+    result = vshi_parallel_each(job, count, 1, 1, trace_listed_tile, &t, error);
 done:
     for (size_t i = 0; t.works != NULL && i < t.work_count; ++i) {
         free_work(&t.works[i]);

@@ -194,13 +194,6 @@ static vsh_result stitch(group *g, vsh_error *error) {
 
 /* --- a picture of a lightmap's charts, and of the texels of them that are not valid */
 
-typedef struct invalid_picture {
-    char *path; /* NULL: nobody wants one */
-    vsh_image image;
-    float *planes[3]; /* R, G, B of as many rows as are baked at a time */
-    vsh_image_writer *writer;
-} invalid_picture;
-
 /* Colours of texels outside charts, of valid and of invalid texels. */
 static const float COLOURS[3][3] = {{0.05f, 0.05f, 0.06f}, {0.5f, 0.5f, 0.5f}, {0.7f, 0.05f, 0.05f}};
 static const char *const NAMES[3] = {"R", "G", "B"};
@@ -261,65 +254,52 @@ static char *name_picture(const char *path, const vshi_targets *targets, size_t 
     return made;
 }
 
-/* Opens the picture of lightmap `index`, of which ROWS come at a time. Does nothing if nobody wants it. Close
- * it also after a failure. */
-static vsh_result open_picture(invalid_picture *picture, const vshi_scene_bake *bake, size_t index,
-                               vsh_error *error) {
-    const char *path = bake->options.invalid_picture;
-    const vsh_receiver *receiver = &bake->targets.list[index].receiver;
-    const int32_t width = receiver->width, height = receiver->height;
-    memset(picture, 0, sizeof *picture);
-    if (path == NULL) {
+/* Writes a picture of a page's texels, a few rows at a time, if the caller wants one. */
+static vsh_result write_invalid_picture(const vshi_scene_page *page, vsh_error *error) {
+    const char *file = page->bake->options.invalid_picture;
+    const int32_t width = page->lightmap->width, height = page->lightmap->height;
+    const size_t room = (size_t)width * ROWS;
+    char *path = NULL;
+    float *colours = NULL;
+    vsh_image_writer *writer = NULL;
+    vsh_result result;
+    if (file == NULL) {
         return VSH_OK;
     }
-    picture->path = name_picture(path, &bake->targets, index);
-    for (int c = 0; c < 3; ++c) {
-        picture->planes[c] = calloc((size_t)width * ROWS, sizeof(float));
-        if (picture->planes[c] == NULL || picture->path == NULL) {
-            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
-        }
+    VSHI_TRY_DONE(vshi_allocate((void **)&colours, 3 * room, sizeof *colours, file, error));
+    path = name_picture(file, &page->bake->targets, page->index);
+    if (path == NULL) {
+        result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", file);
+        goto done;
     }
-    picture->image = (vsh_image){
-        width, height, 3, (const char *const *)NAMES, (const float *const *)picture->planes, NULL};
+    const float *const planes[3] = {colours, colours + room, colours + 2 * room};
+    const vsh_image image = {width, height, 3, NAMES, planes, NULL};
     vsh_image_options options = vsh_image_options_default();
     options.bits = 8;
-    return vsh_image_writer_create(picture->path, &picture->image, &options, &picture->writer, error);
-}
-
-/* Adds rows of texels, each VSHI_TEXEL_…. */
-static vsh_result add_to_picture(invalid_picture *picture, int32_t rows, const uint8_t *state,
-                                 vsh_error *error) {
-    if (picture->writer == NULL) {
-        return VSH_OK;
-    }
-    const size_t texels = (size_t)picture->image.width * (size_t)rows;
-    for (size_t i = 0; i < texels; ++i) {
-        const int kind = state[i] == VSHI_TEXEL_EMPTY ? 0 : state[i] == VSHI_TEXEL_VALID ? 1 : 2;
-        for (int c = 0; c < 3; ++c) {
-            picture->planes[c][i] = COLOURS[kind][c];
+    VSHI_TRY_DONE(vsh_image_writer_create(path, &image, &options, &writer, error));
+    for (int32_t first = 0; first < height; first += ROWS) {
+        const int32_t rows = height - first < ROWS ? height - first : ROWS;
+        const uint8_t *state = page->page.state + (size_t)first * page->page.width;
+        for (size_t i = 0; i < (size_t)rows * page->page.width; ++i) {
+            const int kind = state[i] == VSHI_TEXEL_EMPTY ? 0 : state[i] == VSHI_TEXEL_VALID ? 1 : 2;
+            for (size_t c = 0; c < 3; ++c) {
+                colours[c * room + i] = COLOURS[kind][c];
+            }
         }
+        VSHI_TRY_DONE(vsh_image_writer_add(writer, rows, planes, error));
     }
-    return vsh_image_writer_add(picture->writer, rows, picture->image.planes, error);
-}
-
-/* Completes the file where `result` is VSH_OK, else leaves what was there. Returns `result`, or why not. */
-static vsh_result close_picture(invalid_picture *picture, vsh_result result, vsh_error *error) {
-    if (picture->writer != NULL && result != VSH_OK) {
-        vsh_image_writer_abandon(picture->writer);
-    } else if (picture->writer != NULL) {
-        result = vsh_image_writer_finish(picture->writer, error);
-    }
-    for (int c = 0; c < 3; ++c) {
-        free(picture->planes[c]);
-    }
-    free(picture->path);
-    memset(picture, 0, sizeof *picture);
+    result = vsh_image_writer_finish(writer, error);
+    writer = NULL;
+done:
+    vsh_image_writer_abandon(writer);
+    free(path);
+    free(colours);
     return result;
 }
 
 /* --- writing */
 
-/* Where the rows of a page go, besides the picture of invalid texels. */
+/* Where the rows of a page go. */
 typedef struct output {
     vsh_image_writer *writer; /* of an image; NULL: there is none */
     vshi_lit_output lit;      /* of an asset */
@@ -380,8 +360,7 @@ static vsh_result report_writing(const vsh_run *run, double fraction, vsh_error 
     return VSH_OK;
 }
 
-static vsh_result add_all_rows(const vshi_scene_page *page, output *out, invalid_picture *picture,
-                               vsh_error *error) {
+static vsh_result add_all_rows(const vshi_scene_page *page, output *out, vsh_error *error) {
     const int32_t height = page->lightmap->height;
     const float *planes[VSH_MAX_CHANNELS];
     float *rows = NULL;
@@ -392,8 +371,6 @@ static vsh_result add_all_rows(const vshi_scene_page *page, output *out, invalid
         const int32_t count = height - first < ROWS ? height - first : ROWS;
         vshi_channels_rows(&page->channels, first, count, rows, planes);
         VSHI_TRY_DONE(add_rows(page, out, first, count, planes, error));
-        VSHI_TRY_DONE(
-            add_to_picture(picture, count, page->page.state + (size_t)first * page->page.width, error));
         VSHI_TRY_DONE(report_writing(&page->bake->run, (double)(first + count) / (double)height, error));
     }
 done:
@@ -403,12 +380,10 @@ done:
 
 static vsh_result write_page(vshi_scene_page *page, vsh_error *error) {
     output out = {.writer = NULL};
-    invalid_picture picture;
-    vsh_result result = open_picture(&picture, page->bake, page->index, error);
-    result = result == VSH_OK ? open_output(page, &out, error) : result;
-    result = result == VSH_OK ? add_all_rows(page, &out, &picture, error) : result;
-    result = close_output(page, &out, result, error);
-    return close_picture(&picture, result, error);
+    vsh_result result = open_output(page, &out, error);
+    result = result == VSH_OK ? add_all_rows(page, &out, error) : result;
+    VSHI_TRY(close_output(page, &out, result, error));
+    return write_invalid_picture(page, error);
 }
 
 static vsh_result write_pages(group *g, vsh_error *error) {

@@ -11,7 +11,6 @@
 #include <errno.h>
 #include <inttypes.h>
 #include <math.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -654,57 +653,25 @@ static vsh_result check_attributes(const part *p, const part_head *own, vsh_erro
     return VSH_OK;
 }
 
-static vsh_result check_lightmaps(const vshi_scene_bake *bake, const part *p, const part_head *own,
-                                  vsh_error *error) {
-    const head_numbers *n = &p->head.numbers;
-    if (n->lightmaps != own->numbers.lightmaps || n->errors != own->numbers.errors) {
-        return vshi_fail(error, VSH_ERROR_INPUT,
-                         "%s: is of other inputs or options: of %" PRIu64 " lightmaps, not of %" PRIu64
-                         "; bake this part again",
-                         p->path, n->lightmaps, own->numbers.lightmaps);
+/* Whether the lightmaps, the channels and the casters are the same. The attributes name every input and
+ * option, so these differ only where a part's head was altered. */
+static bool is_alike(const part_head *a, const part_head *b) {
+    const head_numbers *m = &a->numbers, *n = &b->numbers;
+    bool alike = m->lightmaps == n->lightmaps && m->channels == n->channels && m->errors == n->errors &&
+                 m->voxel_size == n->voxel_size && m->has_triangles == n->has_triangles &&
+                 m->active_voxels == n->active_voxels && m->levels == n->levels &&
+                 m->layered_ao == n->layered_ao;
+    alike = alike && memcmp(a->lightmaps, b->lightmaps, m->lightmaps * sizeof *a->lightmaps) == 0;
+    for (uint64_t c = 0; alike && c < m->channels; ++c) {
+        alike = strcmp(a->channels[c], b->channels[c]) == 0;
     }
-    for (uint64_t i = 0; i < n->lightmaps; ++i) {
-        const part_lightmap *theirs = &p->head.lightmaps[i], *ours = &own->lightmaps[i];
-        if (memcmp(theirs, ours, sizeof *ours) != 0) {
-            return vshi_fail(
-                error, VSH_ERROR_INPUT,
-                "%s: is of other inputs or options: its lightmap %s is of %d × %d texels, %" PRIu64
-                " of them covered, not of %d × %d and %" PRIu64 "; bake this part again",
-                p->path, bake->lightmaps[i].output, theirs->width, theirs->height, theirs->covered,
-                ours->width, ours->height, ours->covered);
-        }
-    }
-    return VSH_OK;
-}
-
-static vsh_result check_channels(const part *p, const part_head *own, vsh_error *error) {
-    const bool same = p->head.numbers.channels == own->numbers.channels;
-    for (uint64_t c = 0; c < own->numbers.channels; ++c) {
-        if (!same || strcmp(own->channels[c], p->head.channels[c]) != 0) {
-            return refuse(p->path, "channel", same ? p->head.channels[c] : "another", own->channels[c],
-                          error);
-        }
-    }
-    return VSH_OK;
-}
-
-/* The casters are the same for all parts, and described by the first. */
-static vsh_result check_casters(const part *p, const part_head *own, vsh_error *error) {
-    const head_numbers *a = &p->head.numbers, *b = &own->numbers;
-    if (a->voxel_size == b->voxel_size && a->has_triangles == b->has_triangles &&
-        a->active_voxels == b->active_voxels && a->levels == b->levels && a->layered_ao == b->layered_ao) {
-        return VSH_OK;
-    }
-    char theirs[64], ours[64];
-    snprintf(theirs, sizeof theirs, "%.9g, %" PRIu64 " of them", a->voxel_size, a->active_voxels);
-    snprintf(ours, sizeof ours, "%.9g, %" PRIu64 " of them", b->voxel_size, b->active_voxels);
-    return refuse(p->path, "voxel size", theirs, ours, error);
+    return alike;
 }
 
 /* Checks that a part is of the job's inputs, and of the first one's casters: `own` is what its head should
  * be. */
-static vsh_result check_part(const vshi_scene_bake *bake, const part *p, const part_head *own, int32_t shard,
-                             int32_t count, vsh_error *error) {
+static vsh_result check_part(const part *p, const part_head *own, int32_t shard, int32_t count,
+                             vsh_error *error) {
     const head_numbers *n = &p->head.numbers;
     if (strcmp(p->head.texts[0], VSHI_VERSION) != 0) {
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: is of vdbshade %.32s, this is %s; bake this part again",
@@ -715,9 +682,11 @@ static vsh_result check_part(const vshi_scene_bake *bake, const part *p, const p
                          n->shard, n->shard_count);
     }
     VSHI_TRY(check_attributes(p, own, error));
-    VSHI_TRY(check_lightmaps(bake, p, own, error));
-    VSHI_TRY(check_channels(p, own, error));
-    return check_casters(p, own, error);
+    return is_alike(&p->head, own) ? VSH_OK
+                                   : vshi_fail(error, VSH_ERROR_INPUT,
+                                               "%s: its lightmaps, channels or voxels are not those of the "
+                                               "other parts or of the scene; bake this part again",
+                                               p->path);
 }
 
 /* Reports the casters of the parts, which are not made. */
@@ -762,7 +731,7 @@ vsh_result vshi_parts_open(vshi_scene_bake *bake, int32_t count, vsh_error *erro
             VSHI_TRY_DONE(report_casters(bake, &p->head.numbers, error));
             VSHI_TRY_DONE(make_head(bake, &own, error));
         }
-        VSHI_TRY_DONE(check_part(bake, p, &own, i + 1, count, error));
+        VSHI_TRY_DONE(check_part(p, &own, i + 1, count, error));
     }
     bake->report.load_s += vshi_seconds() - start;
 done:
@@ -907,24 +876,15 @@ typedef struct checking {
     const vshi_parts *parts;
     vshi_scene_page *page;
     const uint32_t *owner;
-    _Atomic size_t failed; /* the first tile that could not be; SIZE_MAX: none */
 } checking;
 
-static vsh_result check_tile(const checking *c, size_t tile, vsh_error *error) {
+static vsh_result check_tile(void *user, size_t tile, vsh_error *error) {
+    const checking *c = user;
+    if (c->owner[tile] == 0) {
+        return VSH_OK;
+    }
     VSHI_TRY(vshi_page_rasterize(&c->page->page, tile, error));
     return check_tile_values(c->page, tile, c->parts->list[(c->owner[tile] & ~TAKEN) - 1].path, error);
-}
-
-static void check_tiles(void *user, size_t begin, size_t end) {
-    checking *c = user;
-    for (size_t tile = begin; tile < end; ++tile) {
-        if (c->owner[tile] == 0 || check_tile(c, tile, NULL) == VSH_OK) {
-            continue;
-        }
-        size_t first = c->failed;
-        while (tile < first && !atomic_compare_exchange_weak(&c->failed, &first, tile)) {
-        }
-    }
 }
 
 static vsh_result take_all(vshi_parts *parts, vshi_scene_page *page, uint32_t *owner, unsigned char *bytes,
@@ -947,9 +907,8 @@ static vsh_result take_all(vshi_parts *parts, vshi_scene_page *page, uint32_t *o
             return fail_damaged(parts->list[owner[tile] - 1].path, "a tile is missing", error);
         }
     }
-    checking c = {.parts = parts, .page = page, .owner = owner, .failed = SIZE_MAX};
-    VSHI_TRY(vshi_parallel_for(job, tiles, 1, 0, check_tiles, &c, error));
-    return c.failed == SIZE_MAX ? VSH_OK : check_tile(&c, c.failed, error);
+    checking c = {.parts = parts, .page = page, .owner = owner};
+    return vshi_parallel_each(job, tiles, 1, 0, check_tile, &c, error);
 }
 
 vsh_result vshi_parts_read(vshi_parts *parts, vshi_scene_page *page, vshi_job *job, vsh_error *error) {

@@ -1,6 +1,7 @@
 #include "bake_scene/bake_scene.h"
 
 #include "bake/planes.h"
+#include "bake/texels.h"
 #include "base/job.h"
 #include "light/light.h"
 #include "light/view.h"
@@ -21,32 +22,6 @@ static const char *name_of(const vsh_mesh *mesh) {
 
 static const char *object_of(const vsh_mesh *mesh) {
     return mesh->object_name != NULL ? mesh->object_name : name_of(mesh);
-}
-
-static void warn_mesh(const char *path, const vsh_mesh *mesh, const vsh_uv_report *uv, const vsh_run *run) {
-    const char *name = name_of(mesh);
-    if (uv->overlap_texels > uv->other_texels) {
-        vshi_warn(run,
-                  "%s: mesh '%s': %zu texels of %zu triangles lie over other charts of the same object; "
-                  "unwrap it anew",
-                  path, name, uv->overlap_texels - uv->other_texels, uv->overlap_triangles);
-    }
-    if (uv->other_texels > 0) {
-        vshi_warn(run,
-                  "%s: mesh '%s': %zu texels lie over charts of other objects; use --per-object or one atlas",
-                  path, name, uv->other_texels);
-    }
-    if (uv->outside_triangles > 0) {
-        vshi_warn(run,
-                  "%s: mesh '%s': %zu triangles leave the UV square; the parts outside are not baked; "
-                  "--uv-set N chooses another set",
-                  path, name, uv->outside_triangles);
-    }
-    if (uv->degenerate_triangles > 0) {
-        vshi_warn(run,
-                  "%s: mesh '%s': %zu triangles have no area in the UV set and are not baked; unwrap them",
-                  path, name, uv->degenerate_triangles);
-    }
 }
 
 /* Where some charts lie over others, that has been told. */
@@ -118,7 +93,7 @@ static void warn_covered(const vshi_target *target, uint64_t covered, const vsh_
 void vshi_warn_uvs(const vshi_target *target, const vsh_uv_report *reports, uint64_t covered,
                    const vsh_run *run) {
     for (size_t m = 0; m < target->mesh_count; ++m) {
-        warn_mesh(target->receiver.path, &target->meshes[m], &reports[m], run);
+        vshi_warn_mesh_uvs(target->receiver.path, &target->meshes[m], m, &reports[m], run);
     }
     if (run->warning != NULL && target->receiver.type != VSH_RECEIVER_HEIGHTFIELD) { /* that is one chart */
         warn_close(target, reports, run);

@@ -29,6 +29,17 @@ static int create_file(const char *folder) {
     return named;
 }
 
+/* The system zeroes pages as they are first written, so a part of a bake pays only for pages that it uses. */
+static vsh_result map_memory(vshi_store *store, vshi_stored *stored, const char *what, vsh_error *error) {
+    stored->memory = mmap(NULL, stored->bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (stored->memory == MAP_FAILED) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", what, stored->bytes);
+    }
+    stored->in_memory = true;
+    store->held += stored->bytes;
+    return VSH_OK;
+}
+
 static vsh_result map_file(const vshi_store *store, vshi_stored *stored, const char *what, vsh_error *error) {
     const int file = create_file(store->folder);
     int why = file < 0 ? errno : posix_fallocate(file, 0, (off_t)stored->bytes);
@@ -47,7 +58,6 @@ static vsh_result map_file(const vshi_store *store, vshi_stored *stored, const c
             (double)stored->bytes / 1e6, store->folder, strerror(why));
     }
     stored->memory = memory;
-    stored->mapped = true;
     return VSH_OK;
 }
 
@@ -69,8 +79,7 @@ vsh_result vshi_store_take(vshi_store *store, void **memory, size_t count, size_
     }
     const vsh_result fits = vshi_check_limit(store->run, bytes + (double)store->held, what, error);
     if (fits == VSH_OK) {
-        VSHI_TRY(vshi_allocate(&stored.memory, count, size, what, error));
-        store->held += stored.bytes;
+        VSHI_TRY(map_memory(store, &stored, what, error));
     } else if (store->folder == NULL) {
         return fits;
     } else {
@@ -82,12 +91,8 @@ vsh_result vshi_store_take(vshi_store *store, void **memory, size_t count, size_
 }
 
 static void release(vshi_store *store, const vshi_stored *stored) {
-    if (stored->mapped) {
-        munmap(stored->memory, stored->bytes);
-    } else {
-        free(stored->memory);
-        store->held -= stored->bytes;
-    }
+    munmap(stored->memory, stored->bytes);
+    store->held -= stored->in_memory ? stored->bytes : 0;
 }
 
 void vshi_store_give(vshi_store *store, void *memory) {

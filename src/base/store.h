@@ -10,7 +10,7 @@
 typedef struct vshi_stored {
     void *memory;
     size_t bytes;
-    bool mapped;
+    bool in_memory; /* not in a file */
 } vshi_stored;
 
 /* Not for several threads at once. */
